@@ -8,8 +8,8 @@ from packages import includes, packages, report, system_includes, text
 # First folder of a header, or name that CMake finds: name in package.xml. None: no package has to be declared.
 HEADERS = {
     "Eigen": "eigen", "ceres": "libceres-dev", "fftw3.h": "fftw3", "sndfile.h": "libsndfile1-dev", "hdf5.h": "libhdf5-dev",
-    "matio.h": "libmatio-dev", "lz4frame.h": "lz4", "xxhash.h": "libxxhash-dev", "bzlib.h": "bzip2", "zstd.h": "libzstd-dev",
-    "gsl": "libgsl", "yaml-cpp": "yaml-cpp",
+    "matio.h": "libmatio-dev", "lz4frame.h": "lz4", "xxhash.h": "libxxhash-dev", "bzlib.h": "bzip2", "zstd.h": "libzstd-dev", "zlib.h": "zlib",
+    "yaml-cpp": "yaml-cpp",
     "nlohmann": "nlohmann-json-dev", "CLI": "cli11", "sqlite3.h": "sqlite3", "benchmark": "benchmark",
     "rapidcheck": "rapidcheck", "rapidcheck.h": "rapidcheck", "ros": "roscpp", "boost": "boost",
     "glog": "libgoogle-glog-dev", "unsupported": "eigen", "gtest": None, "gmock": None,
@@ -18,8 +18,8 @@ HEADERS = {
     "arpa": None, "netinet": None, "sys": None, "linux": None,
 }
 FOUND = {
-    "Eigen3": "eigen", "Ceres": "libceres-dev", "GSL": "libgsl", "SQLite3": "sqlite3", "CLI11": "cli11", "liblz4": "lz4",
-    "libxxhash": "libxxhash-dev", "libzstd": "libzstd-dev", "BZip2": "bzip2", "hdf5-serial": "libhdf5-dev", "matio": "libmatio-dev",
+    "Eigen3": "eigen", "Ceres": "libceres-dev", "SQLite3": "sqlite3", "CLI11": "cli11", "liblz4": "lz4",
+    "libxxhash": "libxxhash-dev", "libzstd": "libzstd-dev", "BZip2": "bzip2", "ZLIB": "zlib", "hdf5-serial": "libhdf5-dev", "matio": "libmatio-dev",
     "pybind11": "pybind11-dev", "Python": "python3-dev", "Interpreter": None, "Development.Module": None,
     "nlohmann_json": "nlohmann-json-dev", "PkgConfig": None, "Threads": None, "GTest": None, "catkin": None,
 }
@@ -61,6 +61,8 @@ def packages_launched(launch):
 def asked(package, ours):
     """(file, package asked for, kinds of dependency that do)"""
     for path in package.files:
+        if "consumer" in path.parts:
+            continue  # a project of its own, which uses the installed libraries
         test = "test" in path.relative_to(package.folder).parts
         if path.suffix in (".cpp", ".h"):
             kinds = TEST if test else BUILD

@@ -1,6 +1,6 @@
 #include <exception>
 
-#include "node/asked_end.h"
+#include "node/shutdown_request.h"
 #include "session/discovery.h"
 #include "smartmill_ros/run_node.h"
 
@@ -8,7 +8,7 @@ int main(int argc, char** argv) {
   using namespace smartmill::session;
   if (smartmill::printsParameters<Discovery::Parameters>(argc, argv)) return 0;
   ros::init(argc, argv, "discover", ros::init_options::NoSigintHandler);
-  const std::atomic<bool>& stop = takeAskedEnd();
+  const std::atomic<bool>& stop = catchShutdownRequest();
   const ros::NodeHandle nh, private_nh("~");
   try {
     Discovery discovery(nh, private_nh);

@@ -1,4 +1,4 @@
-// rosrun smartmill_launch play BAG --topics TOPIC... --nodes NODE...
+// rosrun smartmill_launch play FILE --topics TOPIC... --nodes NODE...
 
 #include <string>
 #include <vector>
@@ -16,7 +16,7 @@ int main(int argc, char** argv) {
       "Plays topics of a recording, with its clock, to nodes of SmartMill: it waits for them, so that "
       "nothing "
       "is lost on a busy computer, and tells them the end.");
-  line.option("bag", path, "recording").required();
+  line.option("recording", path, "bag or MCAP file").required();
   line.option("--topics", topics, "full names").required();
   line.option("--nodes", nodes, "full names of the nodes that follow").required();
   line.option("--rate", rate, "times real time; 0: as fast as the nodes follow").showDefault().notNegative();

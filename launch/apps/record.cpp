@@ -1,11 +1,11 @@
-// rosrun smartmill_launch record -o BAG PATTERN...
+// rosrun smartmill_launch record -o FILE PATTERN...
 
 #include <atomic>
 #include <string>
 #include <vector>
 
-#include "node/asked_end.h"
 #include "node/bag_recorder.h"
+#include "node/shutdown_request.h"
 #include "smartmill_core/program.h"
 
 namespace {
@@ -29,12 +29,12 @@ void run(const std::string& path, const std::vector<std::string>& patterns, cons
 int main(int argc, char** argv) {
   // What waits when the end is asked for is still written.
   ros::init(argc, argv, "record", ros::init_options::NoSigintHandler);
-  const std::atomic<bool>& ended = smartmill::session::takeAskedEnd();
+  const std::atomic<bool>& ended = smartmill::session::catchShutdownRequest();
   std::string path;
   std::vector<std::string> patterns;
   smartmill::CommandLine line(
-      "Records topics into a bag without losing messages on a busy computer; Ctrl-C ends it.");
-  line.option("-o,--out", path, "bag file to write").required();
+      "Records topics to a bag or an MCAP file without losing messages on a busy computer; Ctrl-C ends it.");
+  line.option("-o,--out", path, "file to write, *.bag or *.mcap").required();
   line.option("patterns", patterns, "regular expressions of whole topic names").required();
   return smartmill::runProgram(line, argc, argv, [&] { run(path, patterns, ended); });
 }

@@ -159,8 +159,10 @@ int run(const Request& request) {
   TrueStability truth;
   const std::string model = recording.chart ? trueModel(recording, data) : "";
   if (!model.empty()) truth = trueStability(recording, TrueLimit(model, data, *recording.chart));
-  const Report report = makeReport(recording, truth);
-  if (report.sections.empty() && report.cuts.empty()) throw Error(request.bag + ": no results are in it");
+  Report report = makeReport(recording, truth);
+  report.failed_steps = failedSteps(session);
+  if (report.sections.empty() && report.cuts.empty() && report.failed_steps.empty())
+    throw Error(request.bag + ": no results are in it");
   const std::string text = markdown(report);
   write(folder / "summary.md", text);
   write(folder / "summary.json", json(report, session));

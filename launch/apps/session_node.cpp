@@ -1,6 +1,6 @@
 #include <exception>
 
-#include "node/asked_end.h"
+#include "node/shutdown_request.h"
 #include "session/session.h"
 #include "smartmill_ros/run_node.h"
 
@@ -8,7 +8,7 @@ int main(int argc, char** argv) {
   using namespace smartmill::session;
   if (smartmill::printsParameters<SessionParameters>(argc, argv)) return 0;
   ros::init(argc, argv, "session", ros::init_options::NoSigintHandler);
-  const std::atomic<bool>& stop = takeAskedEnd();
+  const std::atomic<bool>& stop = catchShutdownRequest();
   const ros::NodeHandle nh, private_nh("~");
   try {
     return Session(nh, private_nh, stop).run();

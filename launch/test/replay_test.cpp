@@ -74,7 +74,7 @@ TEST(Replay, OfAShortSessionIsTheSameToTheLastDigit) {
   ASSERT_EQ(std::sscanf(told.c_str() + motors, "motors: X %lf +- %lf N/A", &constant, &deviation), 2) << told;
   EXPECT_NEAR(constant, 200.0, 3.0 * deviation);
   EXPECT_LT(deviation, 0.15 * constant);
-  EXPECT_NE(told.find("follows to", motors), std::string::npos) << told;
+  EXPECT_NE(told.find("bandwidth", motors), std::string::npos) << told;
   if (look)
     onlooker.emplace(page, "replayed", "tool/frf panel/revolution panel/spectrum panel/strip cnc/load");
   run("roslaunch -p " + freePort() + " smartmill_launch replay.launch rate:=0 motor_currents:=true bag:=" +

@@ -44,8 +44,8 @@ FrfAverage averageOf(const std::string& name) {
   return FrfAverage::hv;
 }
 
-/// Modes of an FRF. @param ringing_length see TapFrf
-void fit(const FitOptions& options, double ringing_length, Work& work, Found& found) {
+/// Modes of an FRF. @param truncated_length see TapFrf
+void fit(const FitOptions& options, double truncated_length, Work& work, Found& found) {
   if (options.max_modes == 0) return;
   ModalEstimateOptions search;
   search.low = options.low;
@@ -67,21 +67,21 @@ void fit(const FitOptions& options, double ringing_length, Work& work, Found& fo
     if (options.exponential_time > 0.0)
       for (EstimatedMode& m : *modes)
         m.damping_ratio -= 1.0 / (options.exponential_time * units::TWO_PI * m.frequency);
-    removeCut(*modes, ringing_length);
+    correctTruncation(*modes, truncated_length);
   }
 }
 
 Found average(const std::vector<TapRecord>& taps, const FitOptions& options, Work& work) {
   TapFrfOptions how;
-  how.judge.weak_force = options.weak_force;
-  how.judge.high = options.high;
+  how.check.weak_force = options.weak_force;
+  how.check.high = options.high;
   how.exponential_time = options.exponential_time;
   how.average = averageOf(options.average);
   const TapFrf averaged = averageTaps(taps, how);
   Found found{averaged.receptance, averaged.hits, {}, {}};
   if (found.frf.averages == 0)
-    throw Error("no hit was accepted; " + found.hits.back().file + ": " + found.hits.back().reason);
-  fit(options, averaged.ringing_length, work, found);
+    throw Error("no accepted hit; " + found.hits.back().file + ": " + found.hits.back().reason);
+  fit(options, averaged.truncated_length, work, found);
   return found;
 }
 

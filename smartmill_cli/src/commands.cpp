@@ -8,6 +8,7 @@
 #include "smartmill_hammer/commands.h"
 #include "smartmill_kalman/commands.h"
 #include "smartmill_loadmeter/commands.h"
+#include "smartmill_recording/commands.h"
 #include "smartmill_sim/commands.h"
 #include "smartmill_stability/commands.h"
 
@@ -20,7 +21,7 @@ CommandProgram smartmillProgram() {
       "Measured and simulated milling: dynamics, forces, stability, and what a machine model lacks.";
   program.version = version();
   program.topics = {
-      {"Records", {discrepancy::campaignCommand()}},
+      {"Records", {discrepancy::campaignCommand(), recording::convertCommand()}},
       {"Machine model and twin",
        {discrepancy::explainCommand(), discrepancy::gapCommand(), sim::simulateCommand(),
         sim::hideCommand()}},

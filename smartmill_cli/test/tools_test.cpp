@@ -1,10 +1,13 @@
 // The command of the program and the tool of the same code do the same to the byte: output, exit code, files.
 
 #include <regex>
+#include <set>
 
 #include <gmock/gmock.h>
 
 #include "shell.h"
+#include "simulated_session.h"
+#include "smartmill_cli/commands.h"
 #include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/testing/shared_data.h"
 
@@ -13,8 +16,15 @@ namespace {
 
 using ::testing::HasSubstr;
 
+/// Commands that were compared with their tool.
+std::set<std::string>& compared() {
+  static std::set<std::string> commands;
+  return commands;
+}
+
 /// The program of a command's old name.
 std::string toolOf(const std::string& command) {
+  compared().insert(command);
   std::istringstream tools(TOOLS);
   for (std::string tool; std::getline(tools, tool, ' ');)
     if (tool.rfind(command + "=", 0) == 0) return tool.substr(command.size() + 1);
@@ -22,8 +32,10 @@ std::string toolOf(const std::string& command) {
   return "false";
 }
 
-/// Without wall times: "seconds" in report.json, their column and sum in report.html.
+/// Without wall times: "seconds" in report.json, their column and sum in report.html, the speed of
+/// compensate.
 std::string withoutTimes(const std::string& file, std::string text) {
+  if (file.empty()) text = std::regex_replace(text, std::regex("in [0-9.]+ s, [0-9]+ x real time"), "");
   if (file.find("report.json") != std::string::npos)
     text = std::regex_replace(text, std::regex("\"seconds\": [-+.e0-9]+"), "\"seconds\"");
   if (file.find("report.html") != std::string::npos) {
@@ -38,7 +50,7 @@ void expectSame(const std::string& command, const std::string& arguments, int co
   const Outcome now = shell(SMARTMILL " " + command + " " + arguments);
   EXPECT_EQ(now.code, code) << command << " " << arguments << "\n" << now.error;
   EXPECT_EQ(old.code, code) << command << " " << arguments << "\n" << old.error;
-  EXPECT_EQ(now.out, old.out) << command << " " << arguments;
+  EXPECT_EQ(withoutTimes("", now.out), withoutTimes("", old.out)) << command << " " << arguments;
   ASSERT_EQ(now.files.size(), old.files.size()) << command << " " << arguments;
   for (const auto& [name, content] : now.files) {
     ASSERT_EQ(old.files.count(name), 1u) << command << ": " << name;
@@ -113,8 +125,73 @@ TEST(Tools, DoWhatTheirCommandsDoToADatabase) {
 }
 
 TEST(Tools, DoWhatTheirCommandsDoWithASpindleSensor) {
+  const TemporaryFolder folder;
+  const std::string table =
+      folder.write("record.csv",
+                   "test,time[s],length[mm],load_x[N],load_y[N],load_z[N],x1[N],x2[N],y1[N],"
+                   "y2[N],z1[N],z2[N]\n"
+                   "1,0,130,0,0,0,1,-1,2,-2,3,3\n"
+                   "1,0.001,130,0,0,0,2,-2,1,-1,2,2\n");
+  expectSame("spindle-sensor", "apply " SPINDLE_SENSOR " " + table + " -o forces.csv");
   expectSame("spindle-sensor", "apply nowhere.yaml nowhere.csv -o forces.csv", 1);
+}
+
+TEST(Tools, DoWhatTheirCommandsDoWithAController) {
   expectSame("capture", "127.0.0.1 --port 1 --timeout 0.2", 1);
+  // Until Ctrl-C. Each run has a port of its own.
+  const auto controller = [](const std::string& program) {
+    return shell("set -m; timeout -s KILL 60 " + program +
+                 " --port 0 --mode dnc >started & process=$!\n"
+                 "for _ in $(seq 1000); do grep -q listens started && break; sleep 0.05; done\n"
+                 "kill -INT -- -$process; wait $process; code=$?\n"
+                 "sed 's/:[0-9]*,/:PORT,/' started; rm started; exit $code");
+  };
+  const Outcome old = controller(toolOf("controller")), now = controller(SMARTMILL " controller");
+  EXPECT_EQ(now.code, 0) << now.error;
+  EXPECT_EQ(old.code, 0) << old.error;
+  EXPECT_THAT(now.out, HasSubstr("127.0.0.1:PORT, mode dnc"));
+  EXPECT_EQ(now.out, old.out);
+}
+
+TEST(Tools, DoWhatTheirCommandsDoToARecording) {
+  const TemporaryFolder folder;
+  const std::string bag = folder.file("monday.bag"), later = folder.file("friday.mcap");
+  const MachineModel mill = readMachineModel(MILL);
+  for (const std::string& path : {bag, later}) {
+    SimulatedSession session(path, mill, path == bag ? 1000.0 : 400000.0);
+    session.results();
+    for (const double rpm : {3000.0, 6000.0, 9000.0}) session.air("air_" + std::to_string(rpm), rpm);
+    for (const double feed : {4e-5, 8e-5, 1.2e-4})
+      session.slot("slot_" + std::to_string(feed), 4500.0, feed, 5e-4);
+    session.close();
+  }
+  const std::string with_model = " --model " MILL;
+  expectSame("campaign", bag + with_model + " -o out");
+  expectSame("convert", bag + " -o out.mcap --compression zstd");
+  expectSame("convert", later + " -o out.bag");
+  expectSame("compensate", bag + with_model + " -o out");
+  expectSame("compensate", later + with_model + " -o out");
+  expectSame("coefficients", bag + with_model + " -o cutting.yaml");
+  expectSame("coefficients", later + with_model);
+  expectSame("force-law", later + " --curve curve.yaml");
+  expectSame("health", bag + " " + later + " -o health.csv");
+  expectSame("chart", bag + with_model + " -o chart.csv --states states.csv");
+  expectSame("detect", later + " --speed 4500 --teeth 4");
+  expectSame("cutting-frf", bag + " -o out", 1);  // no displacement was recorded
+}
+
+// The recording of ./run, by the graph.
+TEST(Tools, DoWhatTheirCommandsDoToTheSessionOfTheJob) {
+  const std::string bag = RESULTS "/session.bag";
+  if (!std::filesystem::exists(bag)) GTEST_SKIP() << bag << " is missing: ./run records it";
+  const std::string with_model = " --model " MILL;
+  expectSame("frf", bag + with_model + " -o out --no-picture");
+  expectSame("compensate", bag + with_model + " -o out");
+  expectSame("coefficients", bag + with_model);
+  expectSame("force-law", bag + " --curve curve.yaml");
+  expectSame("chart", bag + with_model + " -o chart.csv");
+  expectSame("health", bag + " " + bag);
+  expectSame("campaign", bag + with_model + " -o out");
 }
 
 // The search itself, in a campaign of air cuts.
@@ -122,6 +199,15 @@ TEST(Tools, ExplainWhatTheirCommandExplains) {
   SMARTMILL_SHARED_DATA(campaign, "campaigns/stribeck_friction");
   const TemporaryFolder folder;
   expectSame("explain", airCuts(campaign, folder) + " -o out --threads 1");
+}
+
+TEST(Tools, ExplainARecordingAsTheirCommandDoes) {
+  const TemporaryFolder folder;
+  const std::string mcap = folder.file("air.mcap");
+  SimulatedSession session(mcap, readMachineModel(MILL));
+  for (const double rpm : {3000.0, 9000.0}) session.air("air_" + std::to_string(rpm), rpm);
+  session.close();
+  expectSame("explain", mcap + " --model " MILL " -o out --threads 1");
 }
 
 // Ctrl-C ends the search; what was found until then is in the report.
@@ -140,6 +226,20 @@ TEST(Explain, EndsWithItsReportWhenItIsInterrupted) {
   EXPECT_EQ(ended.files.count("out/model.yaml"), 1u);
   EXPECT_THAT(ended.files.at("out/report.json"), HasSubstr("\"interrupted\": true"));
 }
+
+/// After all tests: none of the program's commands was left out.
+class EveryCommand : public ::testing::Environment {
+ public:
+  void TearDown() override {
+    const ::testing::UnitTest& tests = *::testing::UnitTest::GetInstance();
+    if (tests.test_to_run_count() != tests.total_test_count()) return;  // a filter
+    if (sharedData("campaigns/none").empty()) return;
+    for (const CommandTopic& topic : smartmillProgram().topics)
+      for (const Command& command : topic.commands)
+        EXPECT_EQ(compared().count(command.name), 1u) << command.name << " was not compared with its tool";
+  }
+};
+const ::testing::Environment* const EVERY_COMMAND = ::testing::AddGlobalTestEnvironment(new EveryCommand);
 
 }  // namespace
 }  // namespace smartmill

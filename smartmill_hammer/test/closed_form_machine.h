@@ -13,10 +13,10 @@
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_core/units.h"
+#include "smartmill_hammer/search/flute_search.h"
 #include "smartmill_hammer/sequence/hammer_sequence.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// Gap [m] between sensor and a cutter of N flutes, closed form: zero retreat at a flute, floor of depth
 /// between flutes, flanks of different width on the rake and on the relief side.
@@ -43,18 +43,17 @@ struct FluteProfile {
   }
 };
 
-/// A machine with a hammer station for the sequence to drive: spindle and axes move at constant speed after a
-/// latency, the capacitive sensor is V = gain (g0 / gap - 1), the hammer hits with a half sine, the tool
-/// answers by its modes.
+/// A machine with a hammer station: spindle and axes move at constant speed after a latency, the capacitive
+/// sensor is V = gain (g0 / gap - 1), the hammer's force is a half sine, the tool responds by its modes.
 class ClosedFormMachine {
  public:
   MachineModel model;
   FluteProfile profile;
   ModalModel tip[2];      // truth: direct receptance at the tip [m/N]
-  double mounting = 0.3;  // [rad] angle by which the cutter sits in the spindle, unknown to the sequence
+  double mounting = 0.3;  // [rad] of the cutter in the spindle, unknown to the sequence
   double force_noise = 0.2, volt_noise = 0.002;
   double peak = 200.0, contact = 0.4e-3;
-  double pivot = 0.25;  // [m] above the tip, about which the tool turns
+  double pivot = 0.25;  // [m] above the tip, about which the tool rotates
   double latency = 0.05;
   double time = 1000.0;
   bool tool_present = true;
@@ -64,8 +63,8 @@ class ClosedFormMachine {
   std::vector<Command> commands;
   Axes3 position{{0.0, 0.0, 0.15}};
   double spindle = 0.7, spindle_speed = 0.0;
-  double closest = 1.0;  // [m] least gap ever
-  /// [m] standard deviation of a distance moved, which the axes do not show.
+  double closest = 1.0;  // [m] smallest gap so far
+  /// [m] standard deviation of a distance moved, which the axes do not display.
   double position_noise = 0.0;
   int strikes = 0;
 
@@ -126,7 +125,7 @@ class ClosedFormMachine {
   bool at(const std::string& direction) const {
     const auto& p = model.hammer->position.at(direction);
     const std::size_t d = direction == "x" ? 0 : 1;
-    // In front of the sensor: not beside it and not above it.
+    // In front of the sensor, not next to it or above it.
     return tool_present && std::abs(position[1 - d] - p[1 - d]) < 2e-3 &&
            std::abs(position[2] - p[2]) < 0.03 && p[d] - position[d] < 4e-3;
   }
@@ -159,16 +158,16 @@ class ClosedFormMachine {
           filter.emplace_back(crossModel(dir, height), rate * SUB, Hold::first_order);
           filter[0].reset();
         }
-        for (int s = SUB - 1; s >= 0; --s) away = filter[0].step(blow(t - s / (rate * SUB)));
+        for (int s = SUB - 1; s >= 0; --s) away = filter[0].step(forceAt(t - s / (rate * SUB)));
       }
-      force = blow(t);
+      force = forceAt(t);
       double volt = -h.range_volt;
       if (dir >= 0) {
         const auto d = static_cast<std::size_t>(dir);
         const Axes3& p = h.position.at(dir == 0 ? "x" : "y");
         const double facing = dir == 0 ? 0.5 * units::PI : 0.0;
         const double gap =
-            p[d] + 2.0 * h.gap_at_zero_volt - position[d] - unseen[d] + away +
+            p[d] + 2.0 * h.gap_at_zero_volt - position[d] - hidden_offset[d] + away +
             profile.retreat(spindle + mounting, model.tool->lag() * (p[2] - position[2]), facing);
         closest = std::min(closest, gap);
         volt = gap > 0.0 ? h.gain_volt * (h.gap_at_zero_volt / gap - 1.0) : h.range_volt;
@@ -198,7 +197,7 @@ class ClosedFormMachine {
     }
   }
 
-  /// What the sensor, so high above the tip, sees of a blow at the hammer's height: a rigid tool that turns
+  /// FRF from the hammer to the sensor, the latter at a height [m] above the tip: a rigid tool that rotates
   /// about a point far above.
   ModalModel crossModel(int dir, double height) const {
     const auto share = [&](double h) { return 1.0 - h / pivot; };
@@ -212,7 +211,7 @@ class ClosedFormMachine {
  private:
   static constexpr int SUB = 8;
 
-  double blow(double t) const {
+  double forceAt(double t) const {
     double f = 0.0;
     for (int k = 0; k < (double_hit ? 2 : 1); ++k) {
       const double u = t - hit_at - 3e-3 * k;
@@ -244,7 +243,7 @@ class ClosedFormMachine {
         position = to;
         std::normal_distribution<double> normal;
         if (position_noise > 0.0) {
-          for (double& u : unseen) u += position_noise * normal(random);
+          for (double& u : hidden_offset) u += position_noise * normal(random);
         }
         way -= rest;
         path.pop_front();
@@ -260,10 +259,9 @@ class ClosedFormMachine {
   int filter_direction = -1;
   double filter_height = 0.0;  // [m]
   std::deque<Waypoint> path;
-  Axes3 unseen{};  // [m] beyond the shown position
+  Axes3 hidden_offset{};  // [m] beyond the displayed position
   double path_from = 0.0, orient_from = 0.0, orient_to = 0.0, hit_at = -1.0;
   bool orienting = false;
 };
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

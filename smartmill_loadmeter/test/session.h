@@ -18,12 +18,12 @@ namespace smartmill::loadmeter {
 inline const CuttingCoefficients TRUTH{953e6, 0, 0, 17.3e3, 0, 0};
 constexpr double VISCOUS = 4.743e-4, COULOMB = 0.0671, RATE = 50.0;
 
-/// Its believed machine.
+/// Nominal model of the machine.
 inline MachineModel model() {
   MachineModel m;
   m.file = "model.yaml";
   Spindle s;
-  s.viscous = 9e-4;  // wrong: air cuts decide
+  s.viscous = 9e-4;  // wrong on purpose: the air cuts correct it
   s.coulomb = 0.5;
   s.load_meter_gain = 3.88e-4;
   s.load_meter_bandwidth = 7.0;
@@ -33,7 +33,7 @@ inline MachineModel model() {
   return m;
 }
 
-/// A machine that goes through air cuts and slots; everything it says is handed over in stamp order.
+/// Simulated machine with air cuts and slots; its outputs are passed on in stamp order.
 class Session {
  public:
   Session(unsigned seed, double noise) : random_(seed), angle_random_(seed), noise_(noise) {}
@@ -44,18 +44,18 @@ class Session {
 
   void air(double rpm, double seconds) {
     announce(CuttingCondition::Kind::air, rpm, 0.0, "air_" + std::to_string(static_cast<int>(rpm)));
-    turnTo(rpm);
+    accelerateTo(rpm);
     run(seconds, 0.0, 0.0);
     announce(CuttingCondition::Kind::none, 0.0, 0.0, "");
-    run(0.1, 0.0, 0.0);  // two conditions of one stamp would have no order
+    run(0.1, 0.0, 0.0);  // conditions with the same stamp would have no order
   }
 
   void slot(double rpm, double feed, double seconds) {
     announce(CuttingCondition::Kind::cut, rpm, feed, "slot_" + std::to_string(feed));
-    turnTo(rpm);
+    accelerateTo(rpm);
     const double speed = units::radPerSecFromRpm(rpm) / units::TWO_PI * 3 * feed;  // [m/s]
     position_ = 0.1 - 0.3 * speed;
-    run(0.3, speed, 0.0);  // in air, then at once in full cut
+    run(0.3, speed, 0.0);  // in air, then immediately in full cut
     const Engagement e{0.0, units::PI, 0.002, feed};
     const CuttingForce force = MechanisticForce(TOOL, cutting, e).mean();
     x_force_ = force.fx;
@@ -71,26 +71,26 @@ class Session {
     run(0.1, 0.0, 0.0);
   }
 
-  /// Along X in air, the spindle turning: what the feed drive takes without a cut.
+  /// Moves along X in air with a rotating spindle, for the friction of the feed drive.
   void airPass(double rpm, double feed, double seconds) {
     announce(CuttingCondition::Kind::air, rpm, feed, "pass_" + std::to_string(feed));
-    turnTo(rpm);
+    accelerateTo(rpm);
     position_ = 0.1;
     run(seconds, units::radPerSecFromRpm(rpm) / units::TWO_PI * 3 * feed, 0.0);
     announce(CuttingCondition::Kind::none, 0.0, 0.0, "");
     run(0.1, 0.0, 0.0);
   }
 
-  /// Phase currents at 1 kHz when set; channels x, y at rest, spindle.
+  /// Phase currents at 1 kHz if set; channels x, y at rest, spindle.
   std::function<void(const SampleBlock&)> currents;
   CuttingCoefficients cutting = TRUTH;
   static constexpr double X_NEWTON_PER_AMPERE = 200.0, X_AIR = 1.5, PHASE_PER_METRE = 400.0;
 
-  /// The load meter shows how the teeth pass; without it a cut is its mean torque.
+  /// The load meter contains the ripple of the teeth; otherwise a cut is its mean torque.
   bool ripple = false;
-  /// Each slot begins at another angle of the spindle, with the ripple.
+  /// With the ripple: each slot starts at another spindle angle.
   bool any_angle = false;
-  /// Offset of the cutter axis [m] and its angle [rad], with the ripple.
+  /// With the ripple: offset of the cutter axis [m] and its angle [rad].
   double runout = 0.0, runout_angle = 0.0;
 
   double now() const { return time_; }
@@ -112,11 +112,11 @@ class Session {
     condition(c);
   }
 
-  void turnTo(double rpm) {
+  void accelerateTo(double rpm) {
     const double goal = units::radPerSecFromRpm(rpm), step = 800.0 / RATE;
     while (std::abs(goal - speed_) > step) {
       speed_ += goal > speed_ ? step : -step;
-      tick(0.0, 5.0);  // accelerating takes torque
+      tick(0.0, 5.0);  // acceleration requires torque
     }
     speed_ = goal;
   }
@@ -125,8 +125,8 @@ class Session {
     for (int i = 0; i < std::lround(seconds * RATE); ++i) tick(feed_speed, torque);
   }
 
-  // The rule of the file formats, angle by angle and slice by slice: h is the least distance to the surface
-  // of any earlier pass, with the roundness of the tool.
+  // The rule of effects.md, angle by angle and slice by slice: h is the smallest distance to the surface of
+  // any earlier pass, with the curvature of the tool.
   std::vector<double> torqueOverARevolution(const Engagement& e) const {
     constexpr int ANGLES = 720, SLICES = 8, PASSES = 8;
     std::vector<double> torque(ANGLES, 0.0);
@@ -151,7 +151,7 @@ class Session {
     return torque;
   }
 
-  // Torque at the spindle's angle; its mean where the ripple does not matter.
+  // Torque at the spindle angle; without ripple the mean.
   double torqueNow(double mean) const {
     if (ripple_.empty()) return mean;
     const double turn = angle_ / units::TWO_PI;
@@ -176,7 +176,7 @@ class Session {
       block.channels = {"x", "y"};
       block.units = {"A", "A"};
       index_ += 20;
-      // At rest the brake holds and the phases stand: noise only.
+      // At rest the brake holds and the phase is constant: noise only.
       const double range = feed_speed > 0.0 ? X_AIR - x_force_ / X_NEWTON_PER_AMPERE : 0.0;
       for (int i = 0; i < 20; ++i) {
         phase_ += units::TWO_PI * PHASE_PER_METRE * feed_speed / block.sample_rate;
@@ -214,9 +214,8 @@ class Session {
   std::normal_distribution<double> hall_;
 };
 
-/// Three air cuts and three slots. At 6000 rpm the readings, one in two revolutions, meet a single phase of
-/// it.
-inline void takeThrough(Session& session, double rpm = 6000.0) {
+/// Three air cuts and three slots. At 6000 rpm the readings, one per two revolutions, sample a single phase.
+inline void runStandardTests(Session& session, double rpm = 6000.0) {
   for (const double in_air : {2000.0, 6000.0, 12000.0}) session.air(in_air, 3.0);
   for (const double feed : {3e-5, 6e-5, 1e-4}) session.slot(rpm, feed, 4.0);
 }

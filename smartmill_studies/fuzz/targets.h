@@ -22,6 +22,10 @@ void campaign(const std::uint8_t* data, std::size_t size);   ///< campaign file
 void dynoware(const std::uint8_t* data, std::size_t size);   ///< Kistler DynoWare's text
 void uff(const std::uint8_t* data, std::size_t size);        ///< universal files 58 and 58b
 void bag(const std::uint8_t* data, std::size_t size);        ///< recorded ROS bag
+void mcap(const std::uint8_t* data, std::size_t size);       ///< recorded MCAP file
+/// A line as --channels takes it, then a text table of a measurement
+void channels(const std::uint8_t* data, std::size_t size);
+void import_plan(const std::uint8_t* data, std::size_t size);  ///< import.yaml
 
 /// By name; the corpus of each is the folder corpus/NAME.
 inline const std::map<std::string, Target>& targets() {
@@ -34,7 +38,10 @@ inline const std::map<std::string, Target>& targets() {
                                                      {"dynoware", dynoware},
                                                      {"uff", uff},
                                                      {"gateway", gateway},
-                                                     {"bag", bag}};
+                                                     {"bag", bag},
+                                                     {"mcap", mcap},
+                                                     {"channels", channels},
+                                                     {"import_plan", import_plan}};
   return TARGETS;
 }
 

@@ -88,7 +88,7 @@ ModalModel identified(std::size_t axis, FrequencyResponse* measured = nullptr) {
   ReferenceCase reference;
   reference.sensor = dynamometer(axis);
   const ReferenceTaps taps = simulateTaps(reference, 9);
-  if (measured != nullptr) *measured = kalman::averaged(taps.hammer, taps.response, reference.sample_rate);
+  if (measured != nullptr) *measured = kalman::averagedFrf(taps.hammer, taps.response, reference.sample_rate);
   return kalman::identifySensor(taps.hammer, taps.response, reference.sample_rate, {100.0, 5000.0, 4}).model;
 }
 

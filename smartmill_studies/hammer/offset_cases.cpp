@@ -72,8 +72,8 @@ OffsetCase drawOffsetCase(std::mt19937_64& random) {
   b.diameter = {diameter, 0.02e-3};
   b.fluted_length = {length * between(random, 0.4, 0.8), 1e-3};
   b.flute_ratio = {0.81, 0.03};
-  b.young = carbide ? hammer::Known{5.8e11, 1.5e10} : hammer::Known{2.1e11, 5e9};
-  b.density = carbide ? hammer::Known{14300.0, 200.0} : hammer::Known{7850.0, 50.0};
+  b.young = carbide ? hammer::UncertainValue{5.8e11, 1.5e10} : hammer::UncertainValue{2.1e11, 5e9};
+  b.density = carbide ? hammer::UncertainValue{14300.0, 200.0} : hammer::UncertainValue{7850.0, 50.0};
   t.stickout = about(random, length, b.stickout.std);
   t.shank_diameter = about(random, diameter, b.diameter.std);
   t.fluted_length = about(random, b.fluted_length.value, b.fluted_length.std);

@@ -5,6 +5,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
+#include "smartmill_hammer/search/flute_search.h"
 
 namespace smartmill::hammer {
 namespace {

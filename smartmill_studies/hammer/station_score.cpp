@@ -216,7 +216,7 @@ json runStation(const StationStudy& study, int number, StationFrfs* frfs) {
             {"code", static_cast<int>(result.code)},
             {"message", result.message},
             {"moves", machine.searchMoves()},
-            {"sure", std::isfinite(result.flute_sure) ? json(result.flute_sure) : json()},
+            {"sure", std::isfinite(result.flute_confidence) ? json(result.flute_confidence) : json()},
             {"seconds", seconds},
             {"strikes", machine.strikes()},
             {"closest_um", 1e6 * machine.closest()},

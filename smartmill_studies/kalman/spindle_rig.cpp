@@ -21,17 +21,14 @@ SpindleRig::SpindleRig(const MachineModel& model, const sim::WorldOptions& optio
     : model_(model), world_(model, options), use_plate_(use_plate) {
   ForceSensor ideal;
   for (ModalModel& axis : ideal.axis) axis.direct = 1.0;
-  SortedCompensation::Outputs outputs;
-  outputs.force = [this](const ForceBlock& measured, const ForceBlock& compensated) {
-    if (!recording_ || measured.stamp < from_ - 1e-6) return;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto append = [axis](auto& to, const ForceBlock& from) {
-        to[axis].insert(to[axis].end(), from.force[axis].begin(), from.force[axis].end());
-      };
-      append(record_.measured, measured);
-      append(record_.compensated, compensated);
-    }
+  CompensationPipeline::Outputs outputs;
+  const auto append = [this](std::array<std::vector<double>, 3>& to, const ForceBlock& block) {
+    if (!recording_ || block.stamp < from_ - 1e-6) return;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      to[axis].insert(to[axis].end(), block.force[axis].begin(), block.force[axis].end());
   };
+  outputs.force.measured = [this, append](const ForceBlock& block) { append(record_.measured, block); };
+  outputs.force.compensated = [this, append](const ForceBlock& block) { append(record_.compensated, block); };
   outputs.strike = [this](const StrikeCommand& command) {
     std::string message;
     world_.strike(use_plate_ ? "force_sensor" : "tool", command.direction, message);
@@ -39,8 +36,8 @@ SpindleRig::SpindleRig(const MachineModel& model, const sim::WorldOptions& optio
   outputs.result = [this](const SensorResult& result) { tapped_ = result; };
   outputs.calibration = [this](const CalibrationResult& result) { calibration_ = result; };
   // Without hold-back every block comes out as it goes in.
-  sorted_ = std::make_unique<SortedCompensation>(filter, taps, ideal, 0.0, outputs);
-  sorted_->awaitCalibration();
+  sorted_ = std::make_unique<CompensationPipeline>(filter, taps, ideal, 0.0, outputs);
+  sorted_->allowUncalibrated();
 }
 
 void SpindleRig::run(double seconds, const std::array<double, 3>& velocity) {

@@ -6,20 +6,20 @@
 #include <vector>
 
 #include "smartmill_core/model/machine_model.h"
-#include "smartmill_kalman/compensation/sorted_compensation.h"
+#include "smartmill_kalman/compensation/compensation_pipeline.h"
 #include "smartmill_sim/world/world.h"
 
 namespace smartmill::kalman {
 
-/// The simulated machine with its sensors, led by hand without ROS, and what SortedCompensation makes of one
-/// of them: the streams that the nodes would exchange, in one thread.
+/// The simulated machine with its sensors, led by hand without ROS, and what CompensationPipeline makes of
+/// one of them: the streams that the nodes would exchange, in one thread.
 class SpindleRig {
  public:
   /// @param use_plate the dynamometer's blocks are compensated; false: those of the sensor in the spindle
   SpindleRig(const MachineModel& model, const sim::WorldOptions& options,
              const CompensationParameters& filter, const TapParameters& taps, bool use_plate);
 
-  SortedCompensation& sorted() { return *sorted_; }
+  CompensationPipeline& sorted() { return *sorted_; }
   sim::World& world() { return world_; }
   double now() const { return now_; }  ///< [s]
 
@@ -54,7 +54,7 @@ class SpindleRig {
   MachineModel model_;
   sim::World world_;
   bool use_plate_;
-  std::unique_ptr<SortedCompensation> sorted_;
+  std::unique_ptr<CompensationPipeline> sorted_;
   std::array<double, 3> position_{{0, 0, 0}};
   double speed_ = 0.0, angle_ = 0.0, now_ = 0.0;
   int tests_ = 0, slots_ = 0;

@@ -8,7 +8,7 @@
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/testing/mill.h"
 #include "smartmill_core/units.h"
-#include "smartmill_kalman/in_cut/campaign_lines.h"
+#include "smartmill_kalman/in_cut/cut_segments.h"
 #include "smartmill_sim/twin/twin.h"
 
 namespace smartmill::kalman {
@@ -52,13 +52,13 @@ Record TurningToolCase::record(const CampaignTest& test, std::uint64_t seed) con
 }
 
 std::array<std::vector<SpeedFrf>, 2> TurningToolCase::identify(std::uint64_t seed) const {
-  std::array<std::vector<CuttingLine>, 2> lines;
+  std::array<std::vector<FrfLine>, 2> lines;
   std::uint64_t n = 0;
   for (const double speed : speeds) {
     for (const CampaignTest& test : tests(speed)) {
       const Record cut = record(test, 1000 * seed + n++);
       for (std::size_t axis = 0; axis < 2; ++axis) {
-        const auto found = cuttingLines(toolStretch(cut, test, axis, model.force_sensor.axis[axis]), options);
+        const auto found = frfLines(toolSegment(cut, test, axis, model.force_sensor.axis[axis]), options);
         lines[axis].insert(lines[axis].end(), found.begin(), found.end());
       }
     }

@@ -266,7 +266,8 @@ std::vector<MotorCut> runDay(const MotorDay& day, const std::optional<MotorCalib
   for (int i = 0; i < day.cuts; ++i) {
     if (i % GROUP == 0) {
       estimator.emplace(model, estimatorParameters());
-      day.learn ? estimator->learnMotors() : estimator->setMotors(calibration.value_or(MotorCalibration()));
+      day.learn ? estimator->enableSelfCalibration()
+                : estimator->setMotors(calibration.value_or(MotorCalibration()));
       estimator->onForce([&](const ForceEstimate& e) { newest = e; });
       estimator->onForceWindow([&](const ForceEstimate& e) { windows.push_back(e); });
       shop.emplace(day, model, *estimator);
@@ -302,7 +303,7 @@ std::vector<MotorCut> runDay(const MotorDay& day, const std::optional<MotorCalib
     cut.estimate = newest;
     cut.windows = windows;
     for (std::size_t a = 0; a < 3; ++a) cut.bandwidth[a] = estimator->driveBandwidth(a);
-    cut.learnt = estimator->learntMotors();
+    cut.learnt = estimator->selfCalibration();
     all.push_back(cut);
     if (progress) progress(static_cast<double>(i + 1) / day.cuts);
   }

@@ -30,7 +30,7 @@ struct MotorCut {
   double radius = 0.0;                                        ///< [m] of the tool
   std::array<double, 3> force{}, rms{};                       ///< [N] truth: mean, variation about it
   double torque = 0.0;                                        ///< [N m] truth
-  MotorReading cut, air;                                      ///< ranges out of the signal chain
+  MotorMeasurement cut, air;                                  ///< ranges out of the signal chain
   std::optional<MotorForce> motors;                           ///< where a calibration is given
   std::optional<ForceEstimate> estimate;
   std::vector<ForceEstimate> windows;                ///< while it was steady

@@ -152,7 +152,7 @@ void oddMachines(Shop& shop, const std::vector<FleetObservation>& seen, json* li
   for (const MachineEffect& effect : model.machines()) {
     const int m = std::stoi(effect.machine.substr(5));
     z.push_back((effect.effect - shop.effect(m)) / effect.std_dev);
-    if (effect.odd <= NAMED) continue;
+    if (effect.outlier <= NAMED) continue;
     (shop.isOdd(m) ? found : falsely)++;
   }
   (*line)["odd"] = shop.oddCount();
@@ -171,7 +171,7 @@ void oddMachines(Shop& shop, const std::vector<FleetObservation>& seen, json* li
     grown.push_back(o);
     ++cuts;
     for (const MachineEffect& effect : FleetModel(grown).machines())
-      if (effect.machine == o.machine) odd = effect.odd;
+      if (effect.machine == o.machine) odd = effect.outlier;
   }
   (*line)["newcomer_named"] = odd > NAMED;
   (*line)["newcomer_cuts"] = cuts;

@@ -65,7 +65,7 @@ class Shop {
     query.helix = tool.geometry.helix;
     if (const auto answer = recommendCut(database_, query)) {
       job.answered = true;
-      job.way = answer->way;
+      job.way = answer->method;
       job.error = std::abs(answer->set.value.ktc / truth.ktc - 1.0);
       job.inside = truth.ktc >= answer->ktc_lower && truth.ktc <= answer->ktc_upper;
       job.width = answer->ktc_upper / answer->ktc_lower;
@@ -106,7 +106,7 @@ class Shop {
     constexpr double MEMORY = 1800.0, TIME = 20.0, LIFE = 3600.0;  // [s]
     RecursiveCoefficients running(RecursiveCoefficients::Start(), MEMORY);
     for (int i = 0; i < options_.cuts; ++i) {
-      TorqueReading reading;
+      TorqueMeasurement reading;
       reading.tool = tool.geometry;
       reading.engagement = {0.0, units::PI, uniform(0.5e-3, 3e-3), uniform(0.04e-3, 0.16e-3)};
       const auto row = meanForceMatrix(reading.tool, reading.engagement)[3];

@@ -21,7 +21,7 @@ struct ShopOptions {
 struct ShopJob {
   int day = 0;
   bool answered = false, met = false;  ///< something was said; tool and material had met before
-  AnswerWay way{};
+  EstimationMethod way{};
   double error = 0.0;   ///< [1] of Ktc
   bool inside = false;  ///< the truth lay within the 95 % interval
   double width = 0.0;   ///< [1] upper over lower

@@ -1,12 +1,12 @@
 #include "loadmeter/turning_scene.h"
 
-#include <gsl/gsl_cdf.h>
-
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
 #include <memory>
+
+#include <boost/math/distributions/fisher_f.hpp>
 
 #include "loadmeter/anfis.h"
 #include "smartmill_core/error.h"
@@ -23,6 +23,11 @@ constexpr double RATE = 1000.0;  // [Hz]
 constexpr std::size_t SAMPLES = 2048;
 constexpr double HALL_NOISE = 0.15;  // [A] RMS: 0.1 V/A
 constexpr double AT_REST = std::numeric_limits<double>::quiet_NaN();
+
+/// [1] chance that an F with these degrees of freedom is larger.
+double upperTail(double f, double numerator, double denominator) {
+  return cdf(complement(boost::math::fisher_f(numerator, denominator), f));
+}
 
 // The machine's own laws, Table 1: slide X is pulled by its weight.
 double currentX(double force) {
@@ -373,8 +378,8 @@ VarianceSplit splitVariance(const std::vector<double>& dynamometer, const std::v
   const double within = ((na - 1.0) * s.process_variance + (nb - 1.0) * s.current_variance) / (na + nb - 2.0);
   const double difference = s.process_mean - s.current_mean;
   s.f_means = difference * difference / (within * (1.0 / na + 1.0 / nb));
-  s.p_means = gsl_cdf_fdist_Q(s.f_means, 1.0, na + nb - 2.0);
-  s.p_variances = gsl_cdf_fdist_Q(s.current_variance / s.process_variance, nb - 1.0, na - 1.0);
+  s.p_means = upperTail(s.f_means, 1.0, na + nb - 2.0);
+  s.p_variances = upperTail(s.current_variance / s.process_variance, nb - 1.0, na - 1.0);
   return s;
 }
 

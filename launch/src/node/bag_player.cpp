@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <memory>
 #include <utility>
 
 #include <ros/spinner.h>
-#include <rosbag/query.h>
 #include <rosgraph_msgs/Clock.h>
 #include <smartmill_msgs/PlayState.h>
+#include <topic_tools/shape_shifter.h>
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/names.h"
@@ -21,47 +23,58 @@ constexpr std::uint32_t UNLIMITED = 0;
 constexpr double TELL_PERIOD = 0.2;  // [s] of the state
 constexpr double NAP = 0.05;         // [s] after which a wish is heard
 
+ros::Time timeOf(const RecordingFile::Entry& entry) {
+  ros::Time time;
+  return time.fromNSec(entry.time);
+}
+
 }  // namespace
 
 BagPlayer::BagPlayer(ros::NodeHandle nh, const std::string& path, const std::vector<std::string>& topics,
                      std::vector<std::string> nodes)
     : nh_(std::move(nh)),
+      path_(path),
       name_(path.substr(path.rfind('/') + 1)),
+      topics_(topics.begin(), topics.end()),
       followers_(std::move(nodes)),
       clock_(nh_.advertise<rosgraph_msgs::Clock>("/clock", UNLIMITED, true)),
       state_(nh_.advertise<smartmill_msgs::PlayState>(names::absolute(names::REPLAY_STATE), 10, true)),
       control_(nh_.advertiseService(names::absolute(names::REPLAY_CONTROL), &BagPlayer::control, this)) {
-  try {
-    bag_.open(path, rosbag::bagmode::Read);
-  } catch (const rosbag::BagException& error) {
-    throw Error(path + ": cannot be read as a bag: " + error.what());
-  }
-  view_.addQuery(bag_, rosbag::TopicQuery(topics));
-  if (view_.size() == 0) throw Error(path + ": none of the topics is in it");
+  survey();
 }
 
-// As they were recorded: type by its description, latched or not.
-void BagPlayer::advertise() {
-  for (const rosbag::ConnectionInfo* connection : view_.getConnections()) {
-    if (publishers_.count(connection->topic)) continue;
-    ros::AdvertiseOptions options(connection->topic, UNLIMITED, connection->md5sum, connection->datatype,
-                                  connection->msg_def);
-    const auto latching = connection->header->find("latching");
-    options.latch = latching != connection->header->end() && latching->second == "1";
-    publishers_[connection->topic] = nh_.advertise(options);
-  }
+// Publishers, span of time and topics of events. @throws Error
+void BagPlayer::survey() {
+  const std::unique_ptr<RecordingFile> file = openRecording(path_);
   std::map<std::string, std::size_t> count;
-  for (const rosbag::MessageInstance& message : view_) ++count[message.getTopic()];
-  const double duration = (view_.getEndTime() - view_.getBeginTime()).toSec();
-  for (const auto& [topic, messages] : count) {
-    if (static_cast<double>(messages) <= SELDOM * duration) seldom_.insert(topic);
+  for (RecordingFile::Entry entry; file->next(&entry);) {
+    const RecordedConnection& connection = file->connection(entry);
+    if (topics_.count(connection.topic) == 0) continue;
+    if (count.empty()) first_ = timeOf(entry);
+    last_ = timeOf(entry);
+    if (count[connection.topic]++ == 0) advertise(connection);
   }
+  if (count.empty()) throw Error(path_ + ": holds none of the topics to be played");
+  for (const auto& [topic, messages] : count) {
+    if (static_cast<double>(messages) <= SELDOM * length()) seldom_.insert(topic);
+  }
+}
+
+// As it was recorded: type by its description, latched or not.
+void BagPlayer::advertise(const RecordedConnection& connection) {
+  if (connection.encoding != "ros1")
+    throw Error(path_ + ": topic " + connection.topic + " is encoded as " + connection.encoding +
+                ", expected ros1");
+  ros::AdvertiseOptions options(connection.topic, UNLIMITED, connection.md5sum, connection.type,
+                                connection.definition);
+  const auto latching = connection.more.find("latching");
+  options.latch = latching != connection.more.end() && latching->second == "1";
+  publishers_[connection.topic] = nh_.advertise(options);
 }
 
 // The clock begins before anybody is waited for: some wait for it themselves.
 void BagPlayer::connect() {
-  advertise();
-  tick(view_.getBeginTime());
+  tick(first_);
   followers_.begin();
   for (const auto& [topic, publisher] : publishers_) followers_.expect(publisher);
 }
@@ -93,7 +106,7 @@ void BagPlayer::tell(bool now) {
   if (!now && (time - told_at_).toSec() < TELL_PERIOD) return;
   told_at_ = time;
   smartmill_msgs::PlayState message;
-  message.header.stamp = view_.getBeginTime() + ros::Duration(position_);
+  message.header.stamp = first_ + ros::Duration(position_);
   message.name = name_;
   message.position = position_;
   message.length = length();
@@ -114,7 +127,7 @@ bool BagPlayer::jumps() {
 
 // Until a message is due. @return false: somebody wants to go back
 bool BagPlayer::await(const ros::Time& time) {
-  const double at = (time - view_.getBeginTime()).toSec();
+  const double at = (time - first_).toSec();
   for (;;) {
     if (jumps()) return false;
     tell(false);
@@ -146,11 +159,19 @@ bool BagPlayer::play() {
   told_ = ros::Time();
   position_ = paced_position_ = 0.0;
   paced_from_ = ros::WallTime::now();
-  for (const rosbag::MessageInstance& message : view_) {
-    if (!await(message.getTime())) return false;
-    tick(message.getTime());
-    followers_.publish(publishers_.at(message.getTopic()), message);
-    if (seldom_.count(message.getTopic())) followers_.settle();
+  const std::unique_ptr<RecordingFile> file = openRecording(path_);
+  topic_tools::ShapeShifter message;
+  for (RecordingFile::Entry entry; file->next(&entry);) {
+    const RecordedConnection& connection = file->connection(entry);
+    if (topics_.count(connection.topic) == 0) continue;
+    if (!await(timeOf(entry))) return false;
+    tick(timeOf(entry));
+    message.morph(connection.md5sum, connection.type, connection.definition, "");
+    // The stream is read only; its type has no constant form.
+    ros::serialization::IStream stream(const_cast<std::uint8_t*>(file->data(entry)), entry.size);
+    message.read(stream);
+    followers_.publish(publishers_.at(connection.topic), message);
+    if (seldom_.count(connection.topic)) followers_.settle();
   }
   return true;
 }

@@ -8,19 +8,19 @@
 #include <vector>
 
 #include <ros/ros.h>
-#include <rosbag/bag.h>
-#include <rosbag/view.h>
 #include <smartmill_msgs/PlayControl.h>
 
+#include "smartmill_recording/recording_file.h"
 #include "smartmill_ros/follower.h"
 
 namespace smartmill::session {
 
-/// Plays a recording with its clock to nodes that follow (smartmill_ros/follower.h), never further ahead of
-/// them than their queues hold, and tells them the end. Nothing is lost and nothing comes late, however busy
-/// the computer is (rosbag play goes on by the clock on the wall, whether anybody listens or not). Who looks
-/// on may pause it, change its speed and jump (service replay/control, topic replay/state): to where he
-/// jumps, the nodes are taken through all that lies before, so that they know what they would have known.
+/// Plays a bag or an MCAP file with its clock to nodes that follow (smartmill_ros/follower.h), never further
+/// ahead of them than their queues hold, and tells them the end. Nothing is lost and nothing comes late,
+/// however busy the computer is (rosbag play goes on by the clock on the wall, whether anybody listens or
+/// not). Who looks on may pause it, change its speed and jump (service replay/control, topic replay/state):
+/// to where he jumps, the nodes are taken through all that lies before, so that they know what they would
+/// have known.
 class BagPlayer {
  public:
   /// @param topics full names @param nodes full names of those that follow
@@ -39,7 +39,8 @@ class BagPlayer {
     bool paused = false;
     double jump = NO_JUMP;  // [s] since the begin
   };
-  void advertise();
+  void survey();
+  void advertise(const RecordedConnection& connection);
   void connect();
   void tick(const ros::Time& time);
   bool play();
@@ -48,12 +49,12 @@ class BagPlayer {
   void tell(bool now);
   bool control(smartmill_msgs::PlayControl::Request& request,
                smartmill_msgs::PlayControl::Response& response);
-  double length() const { return (view_.getEndTime() - view_.getBeginTime()).toSec(); }
+  double length() const { return (last_ - first_).toSec(); }
 
   ros::NodeHandle nh_;
-  std::string name_;
-  rosbag::Bag bag_;
-  mutable rosbag::View view_;
+  std::string path_, name_;
+  std::set<std::string> topics_;
+  ros::Time first_, last_;  // of the messages played
   Followers followers_;
   ros::Publisher clock_, state_;
   ros::ServiceServer control_;

@@ -1,31 +1,23 @@
 #include "node/bag_recorder.h"
 
 #include <algorithm>
-#include <filesystem>
 
-#include "smartmill_core/error.h"
 #include "smartmill_ros/follower.h"
 
 namespace smartmill::session {
 namespace {
 
-constexpr const char* UNFINISHED = ".active";  // as rosbag names a bag that is being written
 constexpr std::uint32_t UNLIMITED = 0;
-constexpr double QUIET = 0.3, PATIENCE = 8.0;  // [s] without a message, and at most, before the bag is closed
+constexpr double QUIET = 0.3,
+                 PATIENCE = 8.0;  // [s] without a message, and at most, before the file is closed
 
 }  // namespace
 
 BagRecorder::BagRecorder(const ros::NodeHandle& nh, const std::string& path,
                          const std::vector<std::string>& patterns)
-    : nh_(nh), path_(path) {
+    : nh_(nh), writer_(createRecording(path, RecordingCompression::lz4)) {
   nh_.setCallbackQueue(&queue_);
   for (const std::string& pattern : patterns) patterns_.emplace_back(pattern);
-  try {
-    bag_.open(path_ + UNFINISHED, rosbag::bagmode::Write);
-  } catch (const rosbag::BagException&) {
-    throw Error(path_ + UNFINISHED + ": cannot be written");
-  }
-  bag_.setCompression(rosbag::compression::LZ4);
   ros::NodeHandle private_nh("~");
   private_nh.setCallbackQueue(&queue_);
   follow_ = private_nh.advertiseService(FOLLOW, &BagRecorder::follow, this);
@@ -54,14 +46,33 @@ void BagRecorder::finish() {
     before = written_;
     take(QUIET);
   }
-  bag_.close();
-  std::filesystem::rename(path_ + UNFINISHED, path_);
+  writer_->close();
+}
+
+std::uint32_t BagRecorder::connectionOf(const std::string& topic, Event event) {
+  const auto [known, is_new] = connections_.try_emplace({topic, event.getPublisherName()}, 0);
+  if (!is_new) return known->second;
+  const topic_tools::ShapeShifter& message = *event.getMessage();
+  RecordedConnection connection;
+  connection.topic = topic;
+  connection.type = message.getDataType();
+  connection.md5sum = message.getMD5Sum();
+  connection.definition = message.getMessageDefinition();
+  connection.more["callerid"] = event.getPublisherName();
+  const ros::M_string& header = event.getConnectionHeader();
+  if (const auto latching = header.find("latching"); latching != header.end())
+    connection.more["latching"] = latching->second;
+  return known->second = writer_->connect(connection);
 }
 
 void BagRecorder::write(const std::string& topic, Event event) {
   // Simulated time may not have begun.
-  bag_.write(topic, std::max(event.getReceiptTime(), ros::TIME_MIN), *event.getMessage(),
-             event.getConnectionHeaderPtr());
+  const ros::Time time = std::max(event.getReceiptTime(), ros::TIME_MIN);
+  const topic_tools::ShapeShifter& message = *event.getMessage();
+  bytes_.resize(message.size());
+  ros::serialization::OStream stream(bytes_.data(), message.size());
+  message.write(stream);
+  writer_->write(connectionOf(topic, event), time.toNSec(), bytes_.data(), bytes_.size());
   ++written_;
   ++topics_[topic].messages;
 }

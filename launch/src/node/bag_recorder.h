@@ -1,24 +1,27 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <regex>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
-#include <rosbag/bag.h>
 #include <smartmill_msgs/Follow.h>
 #include <topic_tools/shape_shifter.h>
 
+#include "smartmill_recording/recording_writer.h"
+
 namespace smartmill::session {
 
-/// Records whatever is said on some topics. It loses nothing that reaches it: where the computer is too busy
+/// Records topics to a bag or an MCAP file. No message that arrives is lost: where the computer is too busy
 /// to write, messages wait (rosbag record keeps 100 of a topic and drops the rest). Its service `follow`
-/// tells who is about to say something whether it listens (smartmill_ros/follower.h).
+/// reports to publishers which topics it is subscribed to (smartmill_ros/follower.h).
 class BagRecorder {
  public:
-  /// @param patterns regular expressions (ECMAScript) of whole topic names
+  /// @param path ends in .bag or .mcap @param patterns regular expressions (ECMAScript) of whole topic names
   /// @throws Error when the file cannot be written
   BagRecorder(const ros::NodeHandle& nh, const std::string& path, const std::vector<std::string>& patterns);
 
@@ -26,19 +29,21 @@ class BagRecorder {
   void look();
   /// Takes what has come. @param patience [s] of wall time to wait when nothing is there
   void take(double patience);
-  /// Takes what is still on its way, for some seconds at most, and closes the bag.
+  /// Takes what is still on its way, for some seconds at most, and closes the file.
   void finish();
 
  private:
   bool follow(smartmill_msgs::Follow::Request& request, smartmill_msgs::Follow::Response& response);
   using Event = const ros::MessageEvent<topic_tools::ShapeShifter const>&;
   void write(const std::string& topic, Event event);
+  std::uint32_t connectionOf(const std::string& topic, Event event);
 
   ros::NodeHandle nh_;
   ros::CallbackQueue queue_;
-  std::string path_;
   std::vector<std::regex> patterns_;
-  rosbag::Bag bag_;
+  std::unique_ptr<RecordingWriter> writer_;
+  std::map<std::pair<std::string, std::string>, std::uint32_t> connections_;  // by topic and publisher
+  std::vector<std::uint8_t> bytes_;                                           // of one message
   struct Recorded {
     ros::Subscriber subscriber;
     std::uint64_t messages = 0;

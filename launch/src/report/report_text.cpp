@@ -57,6 +57,14 @@ Json number(double value) {
   return std::isfinite(value) ? Json(value) : Json(nullptr);
 }
 
+Json parsed(const std::string& session) {
+  try {
+    return Json::parse(session);
+  } catch (const Json::exception&) {
+    throw Error("the session's summary is not JSON");
+  }
+}
+
 }  // namespace
 
 std::string markdown(const Report& report) {
@@ -88,8 +96,21 @@ std::string markdown(const Report& report) {
   }
   out << "\n";
   for (const std::string& note : report.notes) out << "- " << note << "\n";
+  for (const std::string& step : report.failed_steps)
+    out << "- NOT CHECKED: the session ended at the step '" << step << "'\n";
   out << "\n" << report.met() << " of " << report.targets() << " targets met\n";
   return out.str();
+}
+
+std::vector<std::string> failedSteps(const std::string& session) {
+  std::vector<std::string> failed;
+  if (session.empty()) return failed;
+  const Json summary = parsed(session);
+  for (const Json& step : summary.value("steps", Json::array())) {
+    if (!step.value("done", false))
+      failed.push_back(step.value("name", "") + ": " + step.value("detail", ""));
+  }
+  return failed;
 }
 
 std::string json(const Report& report, const std::string& session) {
@@ -131,13 +152,8 @@ std::string json(const Report& report, const std::string& session) {
                            {"met", cut.met()}});
   }
   out["notes"] = report.notes;
-  if (!session.empty()) {
-    try {
-      out["session"] = Json::parse(session);
-    } catch (const Json::exception&) {
-      throw Error("the session's summary is no JSON");
-    }
-  }
+  out["failed_steps"] = report.failed_steps;
+  if (!session.empty()) out["session"] = parsed(session);
   return out.dump(2) + "\n";
 }
 

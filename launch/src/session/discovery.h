@@ -20,7 +20,7 @@
 #include "smartmill_launch/discovery/discovery_parameters.h"
 #include "smartmill_launch/discovery/explained.h"
 #include "smartmill_launch/discovery/model_place.h"
-#include "smartmill_ros/kept_topic.h"
+#include "smartmill_ros/latched_topic.h"
 
 namespace smartmill::session {
 
@@ -85,7 +85,7 @@ class Discovery {
 
   ros::Subscriber states_;
   ros::Publisher coefficients_;
-  KeptTopic<smartmill_msgs::ModalModel> modes_;
+  LatchedTopic<smartmill_msgs::ModalModel> modes_;
   ros::WallTimer tell_;
   std::unique_ptr<Server> server_;
 };

@@ -4,14 +4,11 @@
 #include <fstream>
 
 #include <gtest/gtest.h>
-#include <rosbag/bag.h>
-#include <smartmill_msgs/ChatterState.h>
-#include <smartmill_msgs/StabilityChart.h>
 
 #include "smartmill_core/names.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
-#include "smartmill_ros/conversions.h"
+#include "smartmill_recording/recording_writer.h"
 
 namespace smartmill::report {
 namespace {
@@ -57,22 +54,21 @@ ForceBlock force(double stamp, std::uint64_t first, double value) {
 class SessionBag : public ::testing::Test {
  protected:
   SessionBag() {
-    rosbag::Bag bag(file_, rosbag::bagmode::Write);
-    const auto put = [&](const std::string& topic, double time, const auto& message) {
-      bag.write("/smartmill/" + topic, ros::Time(time), message);
+    const auto writer = createRecording(file_, RecordingCompression::lz4);
+    const auto put = [&](const std::string& topic, double time, const auto& data) {
+      writer->write(topic, static_cast<std::uint64_t>(std::llround(1e9 * time)), data);
     };
     using Kind = CuttingCondition::Kind;
-    put(names::CUTTING_CONDITION, 10.0, toMsg(condition(10.0, Kind::cut, "resonance")));
-    put(names::CUTTING_CONDITION, 10.01,
-        toMsg(condition(10.0, Kind::cut, "resonance")));                 // latched, said again
-    put(names::CNC_STATE, 10.2, toMsg(state(10.2, -0.05, SPEED)));       // not there yet
-    put(names::CNC_STATE, 10.4, toMsg(state(10.4, 0.01, 0.9 * SPEED)));  // not at speed yet
-    put(names::CNC_STATE, 10.6, toMsg(state(10.6, 0.02, SPEED)));
-    put(names::CNC_STATE, 11.4, toMsg(state(11.4, 0.09, SPEED)));
-    put(names::CNC_STATE, 11.6, toMsg(state(11.6, 0.12, SPEED)));  // past its end
-    put(names::FORCE_COMPENSATED, 10.91, toMsg(force(10.9, 2560, 1.0), "machine"));
-    put(names::TRUE_FORCE, 10.91, toMsg(force(10.9, 2560, 2.0), "machine"));
-    smartmill_msgs::ChatterState window;
+    put(names::CUTTING_CONDITION, 10.0, condition(10.0, Kind::cut, "resonance"));
+    put(names::CUTTING_CONDITION, 10.01, condition(10.0, Kind::cut, "resonance"));  // latched, said again
+    put(names::CNC_STATE, 10.2, state(10.2, -0.05, SPEED));                         // not there yet
+    put(names::CNC_STATE, 10.4, state(10.4, 0.01, 0.9 * SPEED));                    // not at speed yet
+    put(names::CNC_STATE, 10.6, state(10.6, 0.02, SPEED));
+    put(names::CNC_STATE, 11.4, state(11.4, 0.09, SPEED));
+    put(names::CNC_STATE, 11.6, state(11.6, 0.12, SPEED));  // past its end
+    put(names::FORCE_COMPENSATED, 10.91, force(10.9, 2560, 1.0));
+    put(names::TRUE_FORCE, 10.91, force(10.9, 2560, 2.0));
+    plain::ChatterState window;
     window.condition = "resonance";
     window.valid = 1;
     window.chatter = 1;
@@ -80,24 +76,24 @@ class SessionBag : public ::testing::Test {
     put(names::CHATTER_STATE, 11.0, window);
     window.valid = 0;
     put(names::CHATTER_STATE, 11.1, window);
-    put(names::CUTTING_CONDITION, 12.0, toMsg(condition(12.0, Kind::none)));
+    put(names::CUTTING_CONDITION, 12.0, condition(12.0, Kind::none));
     // What the filter has held back arrives after the cut's end and belongs to it; what comes after does not.
-    put(names::FORCE_COMPENSATED, 12.05, toMsg(force(11.99, 30464, 1.0), "machine"));
-    put(names::FORCE_COMPENSATED, 12.06, toMsg(force(12.0, 30720, 1.0), "machine"));
+    put(names::FORCE_COMPENSATED, 12.05, force(11.99, 30464, 1.0));
+    put(names::FORCE_COMPENSATED, 12.06, force(12.0, 30720, 1.0));
     CoefficientSet set;
     set.stamp = 12.0;
     set.value = set.std_dev = NOT_IDENTIFIED;
     set.value.ktc = 8e8;
-    put(names::COEFFICIENTS, 12.1, toMsg(set));
+    put(names::COEFFICIENTS, 12.1, set);
     set.value.ktc = 8.1e8;
-    put(names::TRUE_COEFFICIENTS, 12.1, toMsg(set));
+    put(names::TRUE_COEFFICIENTS, 12.1, set);
     StabilityChart chart;
     chart.stamp = 12.1;
     chart.limit = {{900.0, 1100.0}, {1e-3, 2e-3}, {500.0, 510.0}};
     chart.torque_depth_limit = chart.power_depth_limit = {4e-3, 3e-3};
     chart.absolute_depth_limit = 1e-3;
-    put(names::STABILITY_CHART, 12.2, toMsg(chart));
-    bag.close();
+    put(names::STABILITY_CHART, 12.2, chart);
+    writer->close();
   }
 
   TemporaryFolder folder_;

@@ -191,6 +191,20 @@ TEST(SessionReport, ATrueLimitThatWasNotComputedLeavesItsTargetsUnchecked) {
   }
 }
 
+TEST(SessionReport, AFailedStepIsATargetNotChecked) {
+  Report report = makeReport(example(), {});
+  const std::size_t targets = report.targets();
+  EXPECT_TRUE(failedSteps("").empty());
+  EXPECT_TRUE(failedSteps(R"({"completed": true, "steps": [{"name": "connect", "done": true}]})").empty());
+  report.failed_steps = failedSteps(
+      R"({"steps": [{"name": "connect", "done": true}, {"name": "FRF in x", "done": false, "detail": "no hit"}]})");
+  EXPECT_EQ(report.targets(), targets + 1);
+  EXPECT_EQ(report.met(), targets);
+  EXPECT_NE(markdown(report).find("NOT CHECKED: the session ended at the step 'FRF in x: no hit'"),
+            std::string::npos);
+  EXPECT_THROW(failedSteps("{broken"), Error);
+}
+
 TEST(SessionReport, SummaryForPrograms) {
   const Report report = makeReport(example(), {});
   const auto parsed = nlohmann::json::parse(json(report, R"({"tool": "end_mill"})"));

@@ -18,7 +18,7 @@ using namespace smartmill;
 
 volatile std::sig_atomic_t stop_requested = 0;
 
-extern "C" void requestStop(int) {
+void requestStop(int) {
   stop_requested = 1;
 }
 

@@ -7,7 +7,7 @@ namespace {
 
 volatile std::sig_atomic_t stop_requested = 0;
 
-extern "C" void requestStop(int) {
+void requestStop(int) {
   stop_requested = 1;
 }
 

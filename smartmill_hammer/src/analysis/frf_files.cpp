@@ -5,8 +5,7 @@
 #include "smartmill_core/io/text_file.h"
 #include "smartmill_core/io/uff.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 void writeFrfUff(const std::vector<NamedFrf>& frfs, const std::string& file, bool binary) {
   std::vector<UffFunction> functions;
@@ -52,5 +51,4 @@ void writeHitsCsv(const std::vector<TapVerdict>& hits, const std::string& file) 
   csv.save(file);
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

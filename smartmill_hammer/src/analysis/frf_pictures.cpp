@@ -6,21 +6,20 @@
 #include "smartmill_core/io/gnuplot.h"
 #include "smartmill_core/units.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 using Rows = std::vector<std::vector<double>>;
 
-/// Samples drawn of a hit, and how many hits.
-constexpr std::size_t SHOWN_SAMPLES = 1200, SHOWN_HITS = 24;
+/// Most samples drawn of a hit, and most hits.
+constexpr std::size_t MOST_SAMPLES = 1200, MOST_HITS = 24;
 
 double degrees(std::complex<double> value) {
   return units::degFromRad(std::arg(value));
 }
 
 /// A vertical line at each mode.
-Rows marks(const std::vector<EstimatedMode>& modes) {
+Rows modeLines(const std::vector<EstimatedMode>& modes) {
   Rows rows;
   for (const EstimatedMode& m : modes) {
     rows.push_back({m.frequency, 0.0});
@@ -44,7 +43,7 @@ void drawFrf(const FrequencyResponse& frf, const ModalEstimate& estimate, std::s
   }
   Gnuplot plot(png, 1200, coherent ? 1000 : 750);
   plot.block("lines", rows);
-  plot.block("modes", marks(estimate.modes));
+  plot.block("modes", modeLines(estimate.modes));
   plot << "set multiplot layout " << (coherent ? 3 : 2) << ",1 title " << Gnuplot::quoted(title)
        << "\nset grid\nset lmargin 13\nset xrange [" << frf.frequency.front() << ":" << frf.frequency.back()
        << "]\nset logscale y\nset format y '%.0e'\nset ylabel '|H| [" << (frf.unit == "m/N" ? "m/N" : "N/N")
@@ -65,7 +64,7 @@ void drawFrf(const FrequencyResponse& frf, const ModalEstimate& estimate, std::s
 
 void drawStabilization(const std::vector<NamedFrf>& frfs, const ModalEstimate& estimate,
                        const std::string& png) {
-  Rows stable, others, sizes;
+  Rows stable, others, magnitudes;
   int largest = 2;
   for (const Pole& p : estimate.diagram) {
     (p.stable ? stable : others).push_back({p.frequency, static_cast<double>(p.order)});
@@ -78,21 +77,23 @@ void drawStabilization(const std::vector<NamedFrf>& frfs, const ModalEstimate& e
   for (std::size_t k = 0; k < first.size(); ++k) {
     double sum = 0.0;
     for (const NamedFrf& frf : frfs) sum += std::norm(frf.frf.value[k]);
-    sizes.push_back({first.frequency[k], std::sqrt(sum)});
+    magnitudes.push_back({first.frequency[k], std::sqrt(sum)});
   }
   Gnuplot plot(png, 1200, 700);
   plot.block("stable", stable);
   plot.block("others", others);
-  plot.block("sizes", sizes);
-  plot.block("modes", marks(estimate.modes));
-  plot.block("doubts", marks(estimate.doubts));
+  plot.block("magnitudes", magnitudes);
+  plot.block("modes", modeLines(estimate.modes));
+  plot.block("doubts", modeLines(estimate.doubts));
   plot << "set grid\nset key outside bottom horizontal\nset xlabel 'frequency [Hz]'\nset ylabel 'order'\nset "
           "yrange [0:"
        << largest + 1
-       << "]\nset y2label 'size of all FRFs'\nset logscale y2\nset format y2 '%.0e'\nset y2tics\nset ytics "
+       << "]\nset y2label 'magnitude of all FRFs'\nset logscale y2\nset format y2 '%.0e'\nset y2tics\nset "
+          "ytics "
           "nomirror\nset xrange ["
        << first.frequency.front() << ":" << first.frequency.back() << "]\n"
-       << "plot $sizes using 1:2 axes x1y2 with lines lc rgb '#b0b0b0' title 'size', $others using 1:2 with "
+       << "plot $magnitudes using 1:2 axes x1y2 with lines lc rgb '#b0b0b0' title 'magnitude', $others using "
+          "1:2 with "
           "points pt 2 ps 0.5 lc rgb "
        << "'#c08040' title 'pole', $stable using 1:2 with points pt 7 ps 0.5 lc rgb '#2060c0' title 'stable "
           "pole', $modes using 1:($2*"
@@ -103,13 +104,13 @@ void drawStabilization(const std::vector<NamedFrf>& frfs, const ModalEstimate& e
 
 void drawHits(const std::vector<TapRecord>& taps, const std::vector<TapVerdict>& verdicts,
               const std::string& png) {
-  const std::size_t hits = std::min(taps.size(), SHOWN_HITS);
+  const std::size_t hits = std::min(taps.size(), MOST_HITS);
   Gnuplot plot(png, 1100, static_cast<int>(230 * hits + 60));
   for (std::size_t h = 0; h < hits; ++h) {
     const Hit& hit = taps[h].hit;
-    const std::size_t first = hit.pre_trigger > SHOWN_SAMPLES / 8 ? hit.pre_trigger - SHOWN_SAMPLES / 8 : 0;
+    const std::size_t first = hit.pre_trigger > MOST_SAMPLES / 8 ? hit.pre_trigger - MOST_SAMPLES / 8 : 0;
     Rows rows;
-    for (std::size_t i = first; i < std::min(hit.force.size(), first + SHOWN_SAMPLES); ++i)
+    for (std::size_t i = first; i < std::min(hit.force.size(), first + MOST_SAMPLES); ++i)
       rows.push_back({1e3 * static_cast<double>(i) / hit.sample_rate, hit.force[i], hit.response[i]});
     plot.block("hit" + std::to_string(h), rows);
   }
@@ -121,7 +122,7 @@ void drawHits(const std::vector<TapRecord>& taps, const std::vector<TapVerdict>&
     const std::size_t slash = v.file.find_last_of('/');
     const std::string name = slash == std::string::npos ? v.file : v.file.substr(slash + 1);
     plot << "set title "
-         << Gnuplot::quoted(name + ": " + (v.accepted() ? "accepted" : "refused, " + v.reason))
+         << Gnuplot::quoted(name + ": " + (v.accepted() ? "accepted" : "rejected, " + v.reason))
          << " textcolor rgb '" << (v.accepted() ? "#108010" : "#c02020") << "'\n"
          << (h + 1 == hits ? "set xlabel 'time [ms]'\n" : "") << "plot $hit" << h
          << " using 1:2 with lines lw 1.5 title 'force', '' using 1:3 axes x1y2 "
@@ -131,5 +132,4 @@ void drawHits(const std::vector<TapRecord>& taps, const std::vector<TapVerdict>&
   plot.draw();
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

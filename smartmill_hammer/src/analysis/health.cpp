@@ -5,53 +5,52 @@
 
 #include "smartmill_core/formatted.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
-/// Deviations beyond which a change is one: of some dozens of quantities chance shows it once in a thousand
-/// looks.
+/// Standard deviations of a drift: by chance alone some dozens of quantities exceed it once in a thousand
+/// comparisons.
 constexpr double DRIFT = 4.0;
-/// Modes nearer than that are the same.
-constexpr double SAME = 0.05;
-/// A mode that comes or goes counts from this share of the largest gain on.
-constexpr double SEEN = 0.05;
+/// Relative difference of frequency below which two modes are the same.
+constexpr double SAME_MODE = 0.05;
+/// Share of the largest gain from which a new or missing mode counts.
+constexpr double LEAST_GAIN = 0.05;
 
-double known(double std) {
+double finiteOrZero(double std) {
   return std::isfinite(std) ? std : 0.0;
 }
 
-std::string naming(const char* quantity, const Mode& mode) {
+std::string quantityName(const char* quantity, const Mode& mode) {
   return formatted("%s of the mode at %.0f Hz", quantity, mode.frequency);
 }
 
-HealthChange change(const std::string& what, double before, double before_std, double now, double now_std,
+HealthChange change(const std::string& quantity, double before, double before_std, double now, double now_std,
                     double allowance) {
-  HealthChange c{what, before, now, now / before - 1.0, 0.0};
-  const double deviation = std::hypot(known(before_std), known(now_std), allowance * before);
+  HealthChange c{quantity, before, now, now / before - 1.0, 0.0};
+  const double deviation = std::hypot(finiteOrZero(before_std), finiteOrZero(now_std), allowance * before);
   c.sigmas = deviation > 0.0 ? (now - before) / deviation : 0.0;
   return c;
 }
 
-const Mode* nearest(const std::vector<Mode>& modes, const Mode& mode) {
+const Mode* nearestMode(const std::vector<Mode>& modes, const Mode& mode) {
   const Mode* found = nullptr;
   for (const Mode& m : modes) {
     const double off = std::abs(m.frequency - mode.frequency);
-    if (off < SAME * mode.frequency && (!found || off < std::abs(found->frequency - mode.frequency)))
+    if (off < SAME_MODE * mode.frequency && (!found || off < std::abs(found->frequency - mode.frequency)))
       found = &m;
   }
   return found;
 }
 
-/// Modes of one list that the other lacks.
-void addMissing(const std::vector<Mode>& has, const std::vector<Mode>& lacks, const char* word,
+/// Changes for the modes of one list that the other one does not contain.
+void addMissing(const std::vector<Mode>& present, const std::vector<Mode>& other, const char* word,
                 std::vector<HealthChange>& changes) {
   double largest = 0.0;
-  for (const Mode& m : has) largest = std::max(largest, std::abs(m.gain));
-  for (const Mode& m : has) {
-    if (nearest(lacks, m) || std::abs(m.gain) < SEEN * largest) continue;
+  for (const Mode& m : present) largest = std::max(largest, std::abs(m.gain));
+  for (const Mode& m : present) {
+    if (nearestMode(other, m) || std::abs(m.gain) < LEAST_GAIN * largest) continue;
     const bool gone = word[0] == 'g';
-    changes.push_back({naming("gain", m) + ", " + word, gone ? m.gain : 0.0, gone ? 0.0 : m.gain,
+    changes.push_back({quantityName("gain", m) + ", " + word, gone ? m.gain : 0.0, gone ? 0.0 : m.gain,
                        gone ? -1.0 : INFINITY, gone ? -INFINITY : INFINITY});
   }
 }
@@ -67,33 +66,34 @@ std::vector<HealthChange> modeChanges(const MeasuredModes& before, const Measure
   std::vector<HealthChange> changes;
   const std::vector<Mode>&old = before.model.modes, &fresh = now.model.modes;
   for (const Mode& m : old) {
-    const Mode* n = nearest(fresh, m);
+    const Mode* n = nearestMode(fresh, m);
     if (!n) continue;
-    changes.push_back(change(naming("frequency", m), m.frequency, m.frequency_std, n->frequency,
+    changes.push_back(change(quantityName("frequency", m), m.frequency, m.frequency_std, n->frequency,
                              n->frequency_std, allowance.frequency));
-    changes.push_back(change(naming("damping", m), m.damping_ratio, m.damping_ratio_std, n->damping_ratio,
-                             n->damping_ratio_std, allowance.damping));
-    changes.push_back(change(naming("gain", m), m.gain, m.gain_std, n->gain, n->gain_std, allowance.gain));
+    changes.push_back(change(quantityName("damping", m), m.damping_ratio, m.damping_ratio_std,
+                             n->damping_ratio, n->damping_ratio_std, allowance.damping));
+    changes.push_back(
+        change(quantityName("gain", m), m.gain, m.gain_std, n->gain, n->gain_std, allowance.gain));
   }
   addMissing(old, fresh, "gone", changes);
   addMissing(fresh, old, "new", changes);
   return changes;
 }
 
-HealthChange valueChange(const std::string& what, const Stated& before, const Stated& now, double allowance) {
-  return change(what, before.value, before.std, now.value, now.std, allowance);
+HealthChange valueChange(const std::string& quantity, const ValueWithStd& before, const ValueWithStd& now,
+                         double allowance) {
+  return change(quantity, before.value, before.std, now.value, now.std, allowance);
 }
 
-std::string driftOf(const std::vector<HealthChange>& changes) {
+std::string driftText(const std::vector<HealthChange>& changes) {
   const HealthChange* worst = nullptr;
   for (const HealthChange& c : changes) {
     if (c.drifted() && (!worst || std::abs(c.sigmas) > std::abs(worst->sigmas))) worst = &c;
   }
   if (!worst) return "";
-  if (!std::isfinite(worst->sigmas)) return worst->what;
-  return formatted("%s changed by %+.1f %% (%.1f deviations)", worst->what.c_str(), 100.0 * worst->relative,
-                   std::abs(worst->sigmas));
+  if (!std::isfinite(worst->sigmas)) return worst->quantity;
+  return formatted("%s changed by %+.1f %% (%.1f standard deviations)", worst->quantity.c_str(),
+                   100.0 * worst->relative, std::abs(worst->sigmas));
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -2,54 +2,53 @@
 
 #include "smartmill_hammer/analysis/health.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 namespace {
 
-constexpr double DAY = 86400.0;       // [s]
-constexpr double AIR_AGAIN = 3600.0;  // [s] between two cuts in air that are told though nothing has changed
+constexpr double DAY = 86400.0;           // [s]
+constexpr double REPORT_PERIOD = 3600.0;  // [s] of air cuts without a change
 
 }  // namespace
 
-std::optional<HealthReport> HealthWatch::measured(const MeasuredModes& modes) {
+std::optional<HealthReport> HealthWatch::addModes(const MeasuredModes& modes) {
   const std::string key = modes.tool + " " + modes.point + " " + modes.direction;
   const auto [at, fresh] = modes_.try_emplace(key, Modes{modes, modes, ""});
   if (fresh) return {};
   Modes& known = at->second;
-  known.drift = driftOf(modeChanges(known.last, modes));
+  known.drift = driftText(modeChanges(known.last, modes));
   known.last = modes;
   return HealthReport{key, modes.stamp, (modes.stamp - known.first.stamp) / DAY,
                       modeChanges(known.first, modes)};
 }
 
-std::optional<HealthReport> HealthWatch::turned(const std::string& tool, const IdleRecord& seen) {
-  const double stamp = endOf(seen);
-  const auto [at, fresh] = air_.try_emplace(tool);
-  Air& known = at->second;
-  if (fresh) known.since = stamp;
-  if (addSpeeds(known.first, seen)) return {};
-  const std::vector<HealthChange> changes = idleChanges(known.first, seen, {});
-  const std::string drift = driftOf(changes);
-  const bool news = drift.empty() != known.drift.empty() || !known.told || stamp - *known.told > AIR_AGAIN;
+std::optional<HealthReport> HealthWatch::addAirCut(const std::string& tool, const AirCutRecord& record) {
+  const double stamp = endTime(record);
+  const auto [at, fresh] = air_cuts_.try_emplace(tool);
+  AirCut& known = at->second;
+  if (fresh) known.first_end = stamp;
+  if (addNewSpeeds(known.first, record)) return {};
+  const std::vector<HealthChange> changes = airCutChanges(known.first, record, {});
+  const std::string drift = driftText(changes);
+  const bool report = drift.empty() != known.drift.empty() || !known.last_report ||
+                      stamp - *known.last_report > REPORT_PERIOD;
   known.drift = drift;
-  if (!news || changes.empty()) return {};
-  known.told = stamp;
+  if (!report || changes.empty()) return {};
+  known.last_report = stamp;
   return HealthReport{"spindle in air, " + (tool.empty() ? std::string("tool") : tool), stamp,
-                      (stamp - known.since) / DAY, changes};
+                      (stamp - known.first_end) / DAY, changes};
 }
 
 std::vector<std::string> HealthWatch::warnings() const {
   std::vector<std::string> all;
   for (const auto& [key, modes] : modes_) {
-    if (!modes.drift.empty()) all.push_back(key + " differs from the last good measurement: " + modes.drift);
+    if (!modes.drift.empty()) all.push_back(key + " differs from the previous measurement: " + modes.drift);
   }
-  for (const auto& [tool, air] : air_) {
+  for (const auto& [tool, air] : air_cuts_) {
     if (!air.drift.empty())
-      all.push_back("spindle in air with " + tool + " differs from the first time: " + air.drift);
+      all.push_back("spindle in air with " + tool + " differs from the first air cut: " + air.drift);
   }
   return all;
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -7,15 +7,14 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/parameters/parameter_table.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
-constexpr double MOST_HITS = 1e9;  // an int holds
+constexpr double MOST_HITS = 1e9;  // fits in an int
 
 }  // namespace
 
-HitsNeeded hitsNeeded(const FrequencyResponse& frf, double low, double high, double asked) {
+HitsNeeded hitsNeeded(const FrequencyResponse& frf, double low, double high, double required_std) {
   double variance = 0.0, power = 0.0;
   for (std::size_t k = 0; k < frf.std_dev.size(); ++k) {
     if (frf.frequency[k] < low || frf.frequency[k] > high || !std::isfinite(frf.std_dev[k])) continue;
@@ -28,10 +27,10 @@ HitsNeeded hitsNeeded(const FrequencyResponse& frf, double low, double high, dou
   HitsNeeded result;
   result.relative_std = std::sqrt(variance / power);
   result.hits = frf.averages;
-  const double needed = std::ceil(frf.averages * std::pow(result.relative_std / asked, 2) * (1.0 - 1e-12));
+  const double needed =
+      std::ceil(frf.averages * std::pow(result.relative_std / required_std, 2) * (1.0 - 1e-12));
   result.needed = static_cast<int>(std::clamp(needed, 1.0, MOST_HITS));
   return result;
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -6,44 +6,44 @@
 
 #include <Eigen/Core>
 
+#include "smartmill_core/cutting/friction.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 using Complex = std::complex<double>;
 using Eigen::Index;
 
-constexpr double STEADY = 0.005;         // [1] change of speed that ends a stretch
-constexpr double LEAST_SPEED = 10.0;     // [rad/s] slower the spindle counts as standing
-constexpr double LONGEST = 10.0;         // [s] of a stretch
-constexpr std::size_t PARTS = 8;         // of a stretch, by whose scatter its deviation is told
-constexpr double LEAST_TURNS = 3.0;      // of a part
-constexpr double LOAD_SETTLE = 0.3;      // [s] that a load meter takes to stand still
-constexpr std::size_t LEAST_LOADS = 4;   // readings
-constexpr double LEAST_LOAD_STD = 1e-5;  // [1] of full scale: no meter is finer
+constexpr double STEADY_SPEED = 0.005;     // [1] change of speed that ends a segment
+constexpr double LEAST_SPEED = 10.0;       // [rad/s] below it the spindle counts as stopped
+constexpr double LONGEST_SEGMENT = 10.0;   // [s]
+constexpr std::size_t SECTIONS = 8;        // of a segment; their scatter gives the standard deviation
+constexpr double LEAST_REVOLUTIONS = 3.0;  // of a section
+constexpr double LOAD_SETTLE = 0.3;        // [s] of a load meter
+constexpr std::size_t LEAST_LOADS = 4;     // samples
+constexpr double LEAST_LOAD_STD = 1e-5;    // [1] of full scale: resolution of a meter
 constexpr double SAME_SPEED = 0.01;
-/// Speeds nearer together do not tell friction's two parts.
-constexpr double APART = 1.2;
-/// Share of a line that its own scatter does not show: the sensor's gain.
-constexpr double SYSTEMATIC = 0.002;
+/// Closer speeds do not separate Coulomb and viscous friction.
+constexpr double LEAST_SPEED_RATIO = 1.2;
+/// [1] of a force, not contained in its scatter: error of the sensor's gain.
+constexpr double GAIN_ERROR = 0.002;
 
-/// Cosine and sine of the angle in a part, beside its level and slope. @return [N] F = Re(this exp(i angle))
-Complex lineOf(const std::vector<double>& angle, const std::vector<double>& force, std::size_t first,
-               std::size_t last) {
+/// Fit of mean, slope, cosine and sine of the angle over a section. @return [N] F = Re(this exp(i angle))
+Complex synchronousForce(const std::vector<double>& angle, const std::vector<double>& force,
+                         std::size_t first, std::size_t last) {
   const auto rows = static_cast<Index>(last - first);
   Eigen::MatrixXd columns(rows, 4);
   Eigen::VectorXd values(rows);
   for (Index i = 0; i < rows; ++i) {
-    const std::size_t at = first + static_cast<std::size_t>(i);
+    const std::size_t sample = first + static_cast<std::size_t>(i);
     columns.row(i) << 1.0, 2.0 * static_cast<double>(i) / static_cast<double>(rows) - 1.0,
-        std::cos(angle[at]), std::sin(angle[at]);
-    values[i] = force[at];
+        std::cos(angle[sample]), std::sin(angle[sample]);
+    values[i] = force[sample];
   }
   const Eigen::VectorXd x = linear::solveSymmetric(Eigen::MatrixXd(columns.transpose() * columns),
                                                    Eigen::VectorXd(columns.transpose() * values));
@@ -55,11 +55,11 @@ void append(std::vector<T>& all, const std::vector<T>& more) {
   all.insert(all.end(), more.begin(), more.end());
 }
 
-/// Of stretches, those at speeds that others have too.
+/// The segments at speeds that others have too; with `shared` false, the remaining ones.
 template <class T>
-std::vector<T> atSpeedsOf(const std::vector<T>& others, const std::vector<T>& stretches, bool shared = true) {
+std::vector<T> atSpeedsOf(const std::vector<T>& others, const std::vector<T>& segments, bool shared = true) {
   std::vector<T> chosen;
-  for (const T& s : stretches) {
+  for (const T& s : segments) {
     const bool known = std::any_of(others.begin(), others.end(), [&s](const T& o) {
       return std::abs(o.speed - s.speed) < SAME_SPEED * s.speed;
     });
@@ -68,7 +68,7 @@ std::vector<T> atSpeedsOf(const std::vector<T>& others, const std::vector<T>& st
   return chosen;
 }
 
-double correlation(const std::vector<double>& values) {
+double lagOneCorrelation(const std::vector<double>& values) {
   const double level = mean(values);
   double along = 0.0, power = 0.0;
   for (std::size_t i = 0; i < values.size(); ++i) {
@@ -81,93 +81,99 @@ double correlation(const std::vector<double>& values) {
 }  // namespace
 
 void IdleSpindle::handle(const CuttingCondition& condition) {
-  closeTurning();
-  closeReading();
-  if (!seen_.lines.empty() || !seen_.loads.empty()) {
-    IdleRecord& record = records_[condition_->tool_name];
-    for (const auto& [channel, lines] : seen_.lines) append(record.lines[channel], lines);
-    append(record.loads, seen_.loads);
-    if (told_) told_(condition_->tool_name, seen_);
-    seen_ = {};
+  closeForceSegment();
+  closeLoadSegment();
+  if (!current_.forces.empty() || !current_.loads.empty()) {
+    AirCutRecord& record = records_[condition_->tool_name];
+    for (const auto& [channel, forces] : current_.forces) append(record.forces[channel], forces);
+    append(record.loads, current_.loads);
+    if (on_record_) on_record_(condition_->tool_name, current_);
+    current_ = {};
   }
   condition_ = condition;
 }
 
 void IdleSpindle::handle(const SpindleAngle& angle) {
   angle_ = angle;
-  if (turning_ && std::abs(angle.speed - turning_->speed) > STEADY * turning_->speed) closeTurning();
+  if (force_segment_ && std::abs(angle.speed - force_segment_->speed) > STEADY_SPEED * force_segment_->speed)
+    closeForceSegment();
 }
 
 void IdleSpindle::handle(const SampleBlock& force) {
   if (!inAir() || !angle_ || angle_->speed < LEAST_SPEED) return;
-  if (turning_ && (turning_->channels != force.channels || force.stamp - turning_->from > LONGEST))
-    closeTurning();
-  if (!turning_) {
-    turning_ = Turning{force.stamp, force.stamp, angle_->speed, {}, force.channels, {}};
-    turning_->force.resize(force.channels.size());
+  if (force_segment_ &&
+      (force_segment_->channels != force.channels || force.stamp - force_segment_->from > LONGEST_SEGMENT))
+    closeForceSegment();
+  if (!force_segment_) {
+    force_segment_ = ForceSegment{force.stamp, force.stamp, angle_->speed, {}, force.channels, {}};
+    force_segment_->force.resize(force.channels.size());
   }
-  turning_->to = force.timeOf(force.size());
+  force_segment_->to = force.timeOf(force.size());
   for (std::size_t i = 0; i < force.size(); ++i) {
-    turning_->angle.push_back(angle_->angle + angle_->speed * (force.timeOf(i) - angle_->stamp));
-    for (std::size_t c = 0; c < force.channels.size(); ++c) turning_->force[c].push_back(force.at(i, c));
+    force_segment_->angle.push_back(angle_->angle + angle_->speed * (force.timeOf(i) - angle_->stamp));
+    for (std::size_t c = 0; c < force.channels.size(); ++c)
+      force_segment_->force[c].push_back(force.at(i, c));
   }
   for (std::size_t c = 0; c < force.channels.size(); ++c) {
-    if (force.units[c] != "N") turning_->force[c].clear();
+    if (force.units[c] != "N") force_segment_->force[c].clear();
   }
 }
 
 void IdleSpindle::handle(const LoadSample& load) {
   if (!inAir() || load.spindle_speed < LEAST_SPEED || !std::isfinite(load.spindle_load)) {
-    closeReading();
+    closeLoadSegment();
     return;
   }
-  if (reading_ && (std::abs(load.spindle_speed - reading_->speed) > STEADY * reading_->speed ||
-                   load.stamp - reading_->from > LONGEST))
-    closeReading();
-  if (!reading_) reading_ = Reading{load.stamp, load.stamp, load.spindle_speed, {}};
-  reading_->to = load.stamp;
-  if (load.stamp - reading_->from >= LOAD_SETTLE) reading_->load.push_back(load.spindle_load);
+  if (load_segment_ &&
+      (std::abs(load.spindle_speed - load_segment_->speed) > STEADY_SPEED * load_segment_->speed ||
+       load.stamp - load_segment_->from > LONGEST_SEGMENT))
+    closeLoadSegment();
+  if (!load_segment_) load_segment_ = LoadSegment{load.stamp, load.stamp, load.spindle_speed, {}};
+  load_segment_->to = load.stamp;
+  if (load.stamp - load_segment_->from >= LOAD_SETTLE) load_segment_->load.push_back(load.spindle_load);
 }
 
-void IdleSpindle::closeTurning() {
-  if (!turning_) return;
-  const Turning t = std::move(*turning_);
-  turning_.reset();
-  const double turns = t.speed * (t.to - t.from) / units::TWO_PI;
-  if (turns < LEAST_TURNS * static_cast<double>(PARTS)) return;
+void IdleSpindle::closeForceSegment() {
+  if (!force_segment_) return;
+  const ForceSegment t = std::move(*force_segment_);
+  force_segment_.reset();
+  const double revolutions = t.speed * (t.to - t.from) / units::TWO_PI;
+  if (revolutions < LEAST_REVOLUTIONS * static_cast<double>(SECTIONS)) return;
   for (std::size_t c = 0; c < t.channels.size(); ++c) {
     const std::vector<double>& force = t.force[c];
-    // Nothing turns along the spindle.
+    // No unbalance along the spindle.
     if (force.size() != t.angle.size() || t.channels[c] == "fz" || firstNotFinite(force) < force.size())
       continue;
-    std::vector<Complex> parts;
-    for (std::size_t p = 0; p < PARTS; ++p)
-      parts.push_back(lineOf(t.angle, force, p * force.size() / PARTS, (p + 1) * force.size() / PARTS));
+    std::vector<Complex> sections;
+    for (std::size_t p = 0; p < SECTIONS; ++p)
+      sections.push_back(
+          synchronousForce(t.angle, force, p * force.size() / SECTIONS, (p + 1) * force.size() / SECTIONS));
     Complex middle;
-    for (const Complex& p : parts) middle += p / static_cast<double>(PARTS);
+    for (const Complex& p : sections) middle += p / static_cast<double>(SECTIONS);
     double squares = 0.0;
-    for (const Complex& p : parts) squares += std::norm(p - middle);
-    const double n = static_cast<double>(PARTS);
-    seen_.lines[t.channels[c]].push_back({t.to, t.speed, middle, std::sqrt(squares / (2.0 * (n - 1.0) * n))});
+    for (const Complex& p : sections) squares += std::norm(p - middle);
+    const double n = static_cast<double>(SECTIONS);
+    current_.forces[t.channels[c]].push_back(
+        {t.to, t.speed, middle, std::sqrt(squares / (2.0 * (n - 1.0) * n))});
   }
 }
 
-void IdleSpindle::closeReading() {
-  if (!reading_) return;
-  const Reading r = std::move(*reading_);
-  reading_.reset();
+void IdleSpindle::closeLoadSegment() {
+  if (!load_segment_) return;
+  const LoadSegment r = std::move(*load_segment_);
+  load_segment_.reset();
   if (r.load.size() < LEAST_LOADS) return;
-  const double along = correlation(r.load), n = static_cast<double>(r.load.size());
-  const double std_dev = standardDeviation(r.load) * std::sqrt((1.0 + along) / (1.0 - along) / n);
-  seen_.loads.push_back({r.to, r.speed, mean(r.load), std::max(std_dev, LEAST_LOAD_STD)});
+  const double lag_one = lagOneCorrelation(r.load), n = static_cast<double>(r.load.size());
+  const double std_dev = standardDeviation(r.load) * std::sqrt((1.0 + lag_one) / (1.0 - lag_one) / n);
+  current_.loads.push_back({r.to, r.speed, mean(r.load), std::max(std_dev, LEAST_LOAD_STD)});
 }
 
 void IdleSpindle::interrupt() {
-  turning_.reset();
-  reading_.reset();
+  force_segment_.reset();
+  load_segment_.reset();
   angle_.reset();
   condition_.reset();
-  seen_ = {};
+  current_ = {};
 }
 
 void IdleSpindle::finish() {
@@ -175,8 +181,8 @@ void IdleSpindle::finish() {
   interrupt();
 }
 
-SortedIdle::SortedIdle(double hold_back, IdleSpindle::Told told)
-    : idle_(std::move(told)),
+IdleSpindlePipeline::IdleSpindlePipeline(double hold_back, IdleSpindle::RecordCallback on_record)
+    : idle_(std::move(on_record)),
       sorter_(hold_back),
       conditions_(sorter_.addLatched(names::CUTTING_CONDITION)),
       angles_(sorter_.addOptional(names::SPINDLE_ANGLE)),
@@ -185,27 +191,27 @@ SortedIdle::SortedIdle(double hold_back, IdleSpindle::Told told)
   sorter_.onRestart([this] { idle_.interrupt(); });
 }
 
-void SortedIdle::finish() {
+void IdleSpindlePipeline::finish() {
   sorter_.flush();
   idle_.finish();
 }
 
-Unbalance unbalanceOf(const std::vector<TurningLine>& lines, const std::optional<ModalModel>& sensor) {
+Unbalance unbalanceOf(const std::vector<SynchronousForce>& forces, const std::optional<ModalModel>& sensor) {
   std::vector<Complex> single;
   std::vector<double> weight;
   double weights = 0.0;
   Complex sum;
-  for (const TurningLine& line : lines) {
-    const Complex shown =
-        line.speed * line.speed * (sensor ? sensor->response(line.speed / units::TWO_PI) : Complex(1.0));
+  for (const SynchronousForce& force : forces) {
+    const Complex gain =
+        force.speed * force.speed * (sensor ? sensor->response(force.speed / units::TWO_PI) : Complex(1.0));
     const double std_dev =
-        std::max(std::hypot(line.std, SYSTEMATIC * std::abs(line.force)), 1e-12) / std::abs(shown);
-    single.push_back(line.force / shown);
+        std::max(std::hypot(force.std, GAIN_ERROR * std::abs(force.force)), 1e-12) / std::abs(gain);
+    single.push_back(force.force / gain);
     weight.push_back(1.0 / (std_dev * std_dev));
     weights += weight.back();
     sum += weight.back() * single.back();
   }
-  if (lines.empty()) return {};
+  if (forces.empty()) return {};
   Unbalance u{sum / weights, 1.0 / std::sqrt(weights)};
   double chi2 = 0.0;
   for (std::size_t k = 0; k < single.size(); ++k) chi2 += weight[k] * std::norm(single[k] - u.value);
@@ -214,10 +220,10 @@ Unbalance unbalanceOf(const std::vector<TurningLine>& lines, const std::optional
   return u;
 }
 
-std::optional<IdleFriction> frictionOf(const std::vector<IdleLoad>& loads) {
+std::optional<IdleFriction> frictionOf(const std::vector<AirCutLoad>& loads) {
   double slowest = INFINITY, fastest = 0.0;
   double a = 0.0, b = 0.0, c = 0.0, p = 0.0, q = 0.0;  // normal equations of (w, w^2)
-  for (const IdleLoad& l : loads) {
+  for (const AirCutLoad& l : loads) {
     const double w = l.speed, weight = 1.0 / (l.std * l.std);
     slowest = std::min(slowest, w);
     fastest = std::max(fastest, w);
@@ -227,54 +233,54 @@ std::optional<IdleFriction> frictionOf(const std::vector<IdleLoad>& loads) {
     p += weight * w * l.load;
     q += weight * w * w * l.load;
   }
-  if (!(fastest > APART * slowest)) return {};
+  if (!(fastest > LEAST_SPEED_RATIO * slowest)) return {};
   const double determinant = a * c - b * b;
   IdleFriction f;
   f.coulomb = (c * p - b * q) / determinant;
   f.viscous = (a * q - b * p) / determinant;
   double chi2 = 0.0;
-  for (const IdleLoad& l : loads)
-    chi2 += std::pow((l.load - (f.coulomb + f.viscous * l.speed) * l.speed) / l.std, 2);
+  for (const AirCutLoad& l : loads)
+    chi2 += std::pow((l.load - LinearFriction{f.viscous, f.coulomb}.at(l.speed) * l.speed) / l.std, 2);
   const double freedom = static_cast<double>(loads.size()) - 2.0;
-  // The law itself is not all that friction does: what it leaves counts as noise.
+  // The residual of the law counts as noise.
   const double wide = freedom > 0.0 ? std::max(1.0, chi2 / freedom) : 1.0;
   f.coulomb_std = std::sqrt(wide * c / determinant);
   f.viscous_std = std::sqrt(wide * a / determinant);
   return f;
 }
 
-double endOf(const IdleRecord& record) {
+double endTime(const AirCutRecord& record) {
   double end = record.loads.empty() ? 0.0 : record.loads.back().stamp;
-  for (const auto& [channel, lines] : record.lines) end = std::max(end, lines.back().stamp);
+  for (const auto& [channel, forces] : record.forces) end = std::max(end, forces.back().stamp);
   return end;
 }
 
-bool addSpeeds(IdleRecord& record, const IdleRecord& more) {
+bool addNewSpeeds(AirCutRecord& record, const AirCutRecord& more) {
   bool any = false;
-  for (const auto& [channel, lines] : more.lines) {
-    const std::vector<TurningLine> fresh = atSpeedsOf(record.lines[channel], lines, false);
+  for (const auto& [channel, forces] : more.forces) {
+    const std::vector<SynchronousForce> fresh = atSpeedsOf(record.forces[channel], forces, false);
     any = any || !fresh.empty();
-    append(record.lines[channel], fresh);
+    append(record.forces[channel], fresh);
   }
-  const std::vector<IdleLoad> fresh = atSpeedsOf(record.loads, more.loads, false);
+  const std::vector<AirCutLoad> fresh = atSpeedsOf(record.loads, more.loads, false);
   append(record.loads, fresh);
   return any || !fresh.empty();
 }
 
-std::vector<HealthChange> idleChanges(const IdleRecord& before, const IdleRecord& now,
-                                      const std::map<std::string, ModalModel>& sensors,
-                                      const HealthAllowance& allowance) {
+std::vector<HealthChange> airCutChanges(const AirCutRecord& before, const AirCutRecord& now,
+                                        const std::map<std::string, ModalModel>& sensors,
+                                        const HealthAllowance& allowance) {
   std::vector<HealthChange> changes;
-  for (const auto& [channel, lines] : before.lines) {
-    const auto later = now.lines.find(channel);
-    if (later == now.lines.end()) continue;
+  for (const auto& [channel, forces] : before.forces) {
+    const auto later = now.forces.find(channel);
+    if (later == now.forces.end()) continue;
     const auto known = sensors.find(channel);
     const auto sensor = known == sensors.end() ? std::optional<ModalModel>() : known->second;
-    std::vector<TurningLine> first = atSpeedsOf(later->second, lines),
-                             then = atSpeedsOf(lines, later->second);
-    if (first.empty()) first = lines, then = later->second;
+    std::vector<SynchronousForce> first = atSpeedsOf(later->second, forces),
+                                  then = atSpeedsOf(forces, later->second);
+    if (first.empty()) first = forces, then = later->second;
     const Unbalance old = unbalanceOf(first, sensor), fresh = unbalanceOf(then, sensor);
-    // As vectors: an unbalance that has turned is another one.
+    // As vectors: an unbalance at another angle is a change.
     const double size = std::abs(old.value), apart = std::abs(fresh.value - old.value);
     const double deviation =
         std::sqrt(old.std * old.std + fresh.std * fresh.std + std::pow(allowance.unbalance * size, 2));
@@ -290,16 +296,15 @@ std::vector<HealthChange> idleChanges(const IdleRecord& before, const IdleRecord
                                   {old->coulomb, old->coulomb_std}, {fresh->coulomb, fresh->coulomb_std},
                                   allowance.friction));
   }
-  std::vector<IdleLoad> told;
-  for (const IdleLoad& l : atSpeedsOf(now.loads, before.loads)) {
-    if (!atSpeedsOf({l}, told).empty()) continue;
-    told.push_back(l);
-    const IdleLoad later = atSpeedsOf({l}, now.loads).back();
+  std::vector<AirCutLoad> compared;
+  for (const AirCutLoad& l : atSpeedsOf(now.loads, before.loads)) {
+    if (!atSpeedsOf({l}, compared).empty()) continue;
+    compared.push_back(l);
+    const AirCutLoad later = atSpeedsOf({l}, now.loads).back();
     changes.push_back(valueChange(formatted("load in air at %.0f rpm", units::rpmFromRadPerSec(l.speed)),
                                   {l.load, l.std}, {later.load, later.std}, allowance.friction));
   }
   return changes;
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

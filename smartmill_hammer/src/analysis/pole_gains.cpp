@@ -10,30 +10,30 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/math/linear_algebra.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 using Complex = std::complex<double>;
 using Eigen::Index;
 
 namespace {
 
-/// Weighted real and imaginary parts, line by line; the last two columns are an even share and one that grows
-/// with the square of the frequency.
-struct Lines {
+/// Weighted least-squares rows: real and imaginary part of each line. The last two columns are the residual
+/// terms: a constant and the square of the frequency.
+struct WeightedLines {
   Eigen::MatrixXd a;
   Eigen::VectorXd b;
-  Index flanks = 0;  // first of the two columns
+  Index residual_column = 0;  // first of the residual terms
 
   /// @param columns_at the other columns at a frequency [Hz]
   template <class Columns>
-  Lines(const FrequencyResponse& band, const std::vector<Complex>& due, Index columns, double high,
-        const Columns& columns_at)
+  WeightedLines(const FrequencyResponse& band, const std::vector<Complex>& value, Index columns, double high,
+                const Columns& columns_at)
       : a(2 * static_cast<Index>(band.size()), columns + 2),
         b(2 * static_cast<Index>(band.size())),
-        flanks(columns) {
+        residual_column(columns) {
     if (a.rows() <= a.cols())
-      throw Error("gains of known modes: " + std::to_string(band.size()) + " lines are too few");
+      throw Error("gains of known modes: " + std::to_string(band.size()) +
+                  " lines, expected more than unknowns");
     std::vector<Complex> row;
     for (std::size_t i = 0; i < band.size(); ++i) {
       const double std = i < band.std_dev.size() ? band.std_dev[i] : NAN;
@@ -44,17 +44,17 @@ struct Lines {
       row.push_back(std::pow(band.frequency[i] / high, 2));
       const auto at = static_cast<Index>(2 * i);
       for (Index k = 0; k < a.cols(); ++k) {
-        const Complex value = weight * row[static_cast<std::size_t>(k)];
-        a(at, k) = value.real();
-        a(at + 1, k) = value.imag();
+        const Complex cell = weight * row[static_cast<std::size_t>(k)];
+        a(at, k) = cell.real();
+        a(at + 1, k) = cell.imag();
       }
-      b(at) = weight * due[i].real();
-      b(at + 1) = weight * due[i].imag();
+      b(at) = weight * value[i].real();
+      b(at + 1) = weight * value[i].imag();
     }
   }
 };
 
-Mode unit(Mode mode) {
+Mode withUnitGain(Mode mode) {
   mode.gain = 1.0;
   return mode;
 }
@@ -63,48 +63,49 @@ Mode unit(Mode mode) {
 
 ModalModel gainsAtPoles(const FrequencyResponse& frf, const ModalModel& poles, double low, double high) {
   const FrequencyResponse band = frf.band(low, high);
-  const Lines lines(band, band.value, static_cast<Index>(poles.modes.size()), high,
-                    [&](double f, std::vector<Complex>& row) {
-                      for (const Mode& mode : poles.modes) row.push_back(unit(mode).response(f));
-                    });
+  const WeightedLines lines(band, band.value, static_cast<Index>(poles.modes.size()), high,
+                            [&](double f, std::vector<Complex>& row) {
+                              for (const Mode& mode : poles.modes)
+                                row.push_back(withUnitGain(mode).response(f));
+                            });
   const Eigen::MatrixXd inverse = linear::inverseSymmetric(Eigen::MatrixXd(lines.a.transpose() * lines.a));
   const Eigen::VectorXd x = inverse * (lines.a.transpose() * lines.b);
-  if (!x.allFinite()) throw Error("gains of known modes: two are not told apart");
+  if (!x.allFinite()) throw Error("gains of known modes: the lines do not distinguish two of them");
   const double misfit =
       (lines.a * x - lines.b).squaredNorm() / static_cast<double>(lines.b.size() - x.size());
   const auto std = [&](Index k) { return std::sqrt(std::max(0.0, inverse(k, k)) * std::max(1.0, misfit)); };
   ModalModel model = poles;
-  for (Index k = 0; k < lines.flanks; ++k) {
+  for (Index k = 0; k < lines.residual_column; ++k) {
     model.modes[static_cast<std::size_t>(k)].gain = x(k);
     model.modes[static_cast<std::size_t>(k)].gain_std = std(k);
   }
-  model.direct = x(lines.flanks);
-  model.direct_std = std(lines.flanks);
+  model.direct = x(lines.residual_column);
+  model.direct_std = std(lines.residual_column);
   return model;
 }
 
-ModalModel shiftOf(const FrequencyResponse& frf, const std::vector<Complex>& change, const ModalModel& model,
-                   double low, double high) {
-  constexpr double STEP = 1e-6;  // of frequency and damping
+ModalModel modeShifts(const FrequencyResponse& frf, const std::vector<Complex>& change,
+                      const ModalModel& model, double low, double high) {
+  constexpr double STEP = 1e-6;  // [1] relative, of frequency and damping
   FrequencyResponse changed = frf;
   changed.value = change;
   const FrequencyResponse band = changed.band(low, high);
-  const Lines lines(band, band.value, 3 * static_cast<Index>(model.modes.size()), high,
-                    [&](double f, std::vector<Complex>& row) {
-                      for (const Mode& mode : model.modes) {
-                        Mode faster = mode, damped = mode;
-                        faster.frequency *= 1.0 + STEP;
-                        damped.damping_ratio *= 1.0 + STEP;
-                        const Complex here = mode.response(f);
-                        row.push_back((faster.response(f) - here) / STEP);
-                        row.push_back((damped.response(f) - here) / STEP);
-                        row.push_back(here);
-                      }
-                    });
-  // Relative shifts: their columns are of one size.
+  const WeightedLines lines(band, band.value, 3 * static_cast<Index>(model.modes.size()), high,
+                            [&](double f, std::vector<Complex>& row) {
+                              for (const Mode& mode : model.modes) {
+                                Mode faster = mode, damped = mode;
+                                faster.frequency *= 1.0 + STEP;
+                                damped.damping_ratio *= 1.0 + STEP;
+                                const Complex here = mode.response(f);
+                                row.push_back((faster.response(f) - here) / STEP);
+                                row.push_back((damped.response(f) - here) / STEP);
+                                row.push_back(here);
+                              }
+                            });
+  // Relative shifts, so that the columns are of similar size.
   const Eigen::MatrixXd inverse = linear::inverseSymmetric(Eigen::MatrixXd(lines.a.transpose() * lines.a));
   const Eigen::VectorXd x = inverse * (lines.a.transpose() * lines.b);
-  if (!x.allFinite()) throw Error("shift of modes: two are not told apart");
+  if (!x.allFinite()) throw Error("shift of modes: the lines do not distinguish two of them");
   ModalModel shift = model;
   for (std::size_t k = 0; k < model.modes.size(); ++k) {
     const auto at = static_cast<Index>(3 * k);
@@ -112,7 +113,7 @@ ModalModel shiftOf(const FrequencyResponse& frf, const std::vector<Complex>& cha
     shift.modes[k].damping_ratio *= x(at + 1);
     shift.modes[k].gain *= x(at + 2);
   }
-  shift.direct = x(lines.flanks);
+  shift.direct = x(lines.residual_column);
   return shift;
 }
 
@@ -121,7 +122,7 @@ FrequencyResponse crossTipResponse(const FrequencyResponse& cross, const TipCorr
   ModalModel poles;
   std::vector<const TipMode*> tips;
   for (const TipMode& tip : correction.modes) {
-    if (!tip.seen) continue;
+    if (!tip.measured) continue;
     poles.modes.push_back(tip.direct);
     tips.push_back(&tip);
   }
@@ -140,5 +141,4 @@ FrequencyResponse crossTipResponse(const FrequencyResponse& cross, const TipCorr
   return frf;
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -10,6 +10,7 @@
 #include <sstream>
 #include <utility>
 
+#include "response_kind.h"
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/campaign/sound_record.h"
 #include "smartmill_core/error.h"
@@ -20,24 +21,18 @@
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
-/// Steps of the first column: a record is sampled faster than this, lines of an FRF are wider apart.
+/// Largest step of the first column of a record; frequencies of an FRF have larger steps.
 constexpr double LARGEST_TIME_STEP = 2e-3;  // [s]
-/// Force that counts as the beginning of the hit, of the peak.
+/// Share of the peak force at the beginning of a hit.
 constexpr double ONSET_SHARE = 0.02;
-/// A response rings on when so much of it is left at the end, clear of its noise.
-constexpr double RINGING = 0.02, CLEAR_OF_NOISE = 2.0;
-constexpr std::size_t LEAST_TENTH = 48;  // samples of which a scatter is taken
-constexpr std::size_t LEAD = 8;          // samples kept before the foot of a blow
-
 struct ThreeColumns {
   std::vector<double> a, b, c;
 };
 
-/// Numbers of a line between blanks or commas, up to the first word.
+/// Numbers of a line separated by blanks or commas, up to the first word.
 std::vector<double> numbersOf(std::string line) {
   std::replace(line.begin(), line.end(), ',', ' ');
   std::istringstream cells(line);
@@ -53,7 +48,7 @@ std::vector<double> numbersOf(std::string line) {
   return numbers;
 }
 
-/// Three numbers a line; the first line may be a head, or carry words behind its numbers (CutPro).
+/// Three numbers per line; the first line may be a header, or have words after its numbers (CutPro).
 ThreeColumns readThreeColumns(const std::string& file) {
   std::ifstream stream(file);
   if (!stream) throw Error(file + ": cannot be read");
@@ -63,26 +58,27 @@ ThreeColumns readThreeColumns(const std::string& file) {
     if (line.find_first_not_of(" \t\r") == std::string::npos) continue;
     const std::vector<double> values = numbersOf(line);
     if (number == 1 && values.empty()) continue;
-    if (values.size() < 3) throw Error(file + ": line " + std::to_string(number) + ": three numbers are due");
+    if (values.size() < 3)
+      throw Error(file + ": line " + std::to_string(number) + ": expected three numbers");
     if (!std::isfinite(values[0]) || !std::isfinite(values[1]) || !std::isfinite(values[2]))
       throw Error(file + ": line " + std::to_string(number) + ": not a finite number");
     columns.a.push_back(values[0]);
     columns.b.push_back(values[1]);
     columns.c.push_back(values[2]);
   }
-  if (columns.a.size() < 4) throw Error(file + ": holds fewer than four lines of three numbers");
+  if (columns.a.size() < 4) throw Error(file + ": expected at least four lines of three numbers");
   return columns;
 }
 
-// Times are printed with a few digits; rates are whole numbers of Hz.
+// Times are printed with few digits; rates are integers in Hz.
 double sampleRate(const std::vector<double>& time, const std::string& file) {
   const double rate = static_cast<double>(time.size() - 1) / (time.back() - time.front());
-  if (!(rate > 0.0) || !std::isfinite(rate)) throw Error(file + ": the time column does not rise");
+  if (!(rate > 0.0) || !std::isfinite(rate)) throw Error(file + ": time: expected a rising column");
   const double whole = std::round(rate);
   return std::abs(rate - whole) < 1e-5 * rate ? whole : rate;
 }
 
-void evenTime(const std::vector<double>& time, const std::string& file) {
+void checkEvenTime(const std::vector<double>& time, const std::string& file) {
   const double step = (time.back() - time.front()) / static_cast<double>(time.size() - 1);
   for (std::size_t i = 0; i < time.size(); ++i) {
     if (!(std::abs(time[i] - time.front() - static_cast<double>(i) * step) <= 0.25 * step)) {
@@ -91,7 +87,7 @@ void evenTime(const std::vector<double>& time, const std::string& file) {
   }
 }
 
-std::size_t onset(const std::vector<double>& force) {
+std::size_t onsetIndex(const std::vector<double>& force) {
   const double level = ONSET_SHARE * *std::max_element(force.begin(), force.end());
   const auto peak = std::max_element(force.begin(), force.end()) - force.begin();
   auto i = peak;
@@ -99,41 +95,19 @@ std::size_t onset(const std::vector<double>& force) {
   return static_cast<std::size_t>(i);
 }
 
-/// By ResponseKind.
-constexpr const char* NAME[] = {"acceleration", "velocity", "displacement", "force"};
-constexpr const char* UNIT[] = {"m/s2/N", "m/s/N", "m/N", "1"};
-
-std::size_t index(ResponseKind kind) {
-  return static_cast<std::size_t>(kind);
-}
-
-FrequencyResponse receptanceOf(const FrequencyResponse& measured, ResponseKind kind) {
-  if (kind == ResponseKind::acceleration) return receptanceFromAccelerance(measured);
-  FrequencyResponse receptance = measured;
-  if (kind != ResponseKind::velocity) return receptance;
-  receptance.unit = "m/N";
-  for (std::size_t i = 0; i < receptance.size(); ++i) {
-    const double w = units::TWO_PI * receptance.frequency[i];
-    receptance.value[i] /= std::complex<double>(0.0, w);
-    if (!receptance.std_dev.empty()) receptance.std_dev[i] /= w;
-  }
-  return receptance;
-}
-
-double swing(const std::vector<double>& values) {
+double range(const std::vector<double>& values) {
   const auto ends = std::minmax_element(values.begin(), values.end());
   return *ends.second - *ends.first;
 }
 
-/// The response among a record's columns: a motion before a force, and of the sensor's forces the one that
-/// answers most.
-std::string responseOf(const Record& record) {
+/// The response among a record's columns: a motion rather than a force, and of the forces the largest.
+std::string responseColumn(const Record& record) {
   for (const char* name : {"displacement", "acceleration", "tool_x", "tool_y"}) {
     if (record.has(name)) return name;
   }
   std::string found;
   for (const char* name : {"fx", "fy", "fz"}) {
-    if (record.has(name) && (found.empty() || swing(record.column(name)) > swing(record.column(found))))
+    if (record.has(name) && (found.empty() || range(record.column(name)) > range(record.column(found))))
       found = name;
   }
   if (found.empty())
@@ -144,7 +118,7 @@ std::string responseOf(const Record& record) {
 }  // namespace
 
 TapRecord tapOf(const Record& record, const ChannelNames& channels) {
-  const std::string response = channels.response.empty() ? responseOf(record) : channels.response;
+  const std::string response = channels.response.empty() ? responseColumn(record) : channels.response;
   TapRecord tap;
   tap.file = record.file;
   tap.hit.force = record.column(channels.force.empty() ? "hammer" : channels.force);
@@ -154,14 +128,14 @@ TapRecord tapOf(const Record& record, const ChannelNames& channels) {
              : response.rfind('f', 0) == 0 ? ResponseKind::force
                                            : ResponseKind::displacement;
   tap.hit.sample_rate = sampleRate(record.time, record.file);
-  tap.hit.pre_trigger = onset(tap.hit.force);
+  tap.hit.pre_trigger = onsetIndex(tap.hit.force);
   return tap;
 }
 
 namespace {
 
-/// Channels by name where they are given, otherwise: the hammer's is named so, the response is the first
-/// other of a known unit.
+/// Channels as named; otherwise the hammer's by its name, and as the response the first other channel with a
+/// known unit.
 TapRecord readTapDynoware(const std::string& file, const ChannelNames& channels) {
   std::ifstream stream(file);
   std::string line;
@@ -194,8 +168,8 @@ TapRecord readTapDynoware(const std::string& file, const ChannelNames& channels)
   return tapOf(readDynoware(file, {{"hammer", force}, {kind, response}}), {"", kind, ""});
 }
 
-/// Of a function's values; where the file does not say, by their unit.
-ResponseKind kindOf(const UffFunction& f, const std::string& file) {
+/// By the function's kind of data; where that is unknown, by its unit.
+ResponseKind responseKind(const UffFunction& f, const std::string& file) {
   switch (f.numerator) {
     case uff::ACCELERATION:
       return ResponseKind::acceleration;
@@ -210,7 +184,8 @@ ResponseKind kindOf(const UffFunction& f, const std::string& file) {
     case 1:
       break;
     default:
-      throw Error(file + ": " + f.name + ": kind of data " + std::to_string(f.numerator) + " is no response");
+      throw Error(file + ": " + f.name + ": kind of data " + std::to_string(f.numerator) +
+                  " is not a response");
   }
   const std::string& u = f.unit;
   if (u == "g" || u == "G" || u == "g/N" || (u.rfind("m/s", 0) == 0 && u.find('2') != std::string::npos))
@@ -219,8 +194,8 @@ ResponseKind kindOf(const UffFunction& f, const std::string& file) {
   return u.rfind('N', 0) == 0 || u.rfind("kN", 0) == 0 ? ResponseKind::force : ResponseKind::displacement;
 }
 
-/// SI value of one in the file; units that are none of these are taken for SI.
-double siOf(const std::string& unit) {
+/// SI value of one unit of the file; other units are taken for SI.
+double siFactor(const std::string& unit) {
   if (unit == "g" || unit == "G" || unit == "g/N") return 9.80665;
   if (unit.rfind("mm", 0) == 0) return units::MM;
   if (unit.rfind("um", 0) == 0) return units::UM;
@@ -229,18 +204,18 @@ double siOf(const std::string& unit) {
 
 std::vector<double> realParts(const UffFunction& f) {
   std::vector<double> values;
-  for (const std::complex<double>& v : f.value) values.push_back(v.real() * siOf(f.unit));
+  for (const std::complex<double>& v : f.value) values.push_back(v.real() * siFactor(f.unit));
   return values;
 }
 
 NamedFrf frfOf(const UffFunction& f, const std::string& name, const std::string& file) {
-  const ResponseKind kind = kindOf(f, file);
+  const ResponseKind kind = responseKind(f, file);
   NamedFrf result{name, {}};
-  result.frf.unit = UNIT[index(kind)];
+  result.frf.unit = frfUnit(kind);
   for (std::size_t i = 0; i < f.value.size(); ++i) {
     if (!(f.abscissa[i] > 0.0)) continue;
     result.frf.frequency.push_back(f.abscissa[i]);
-    result.frf.value.push_back(f.value[i] * siOf(f.unit));
+    result.frf.value.push_back(f.value[i] * siFactor(f.unit));
   }
   result.frf = receptanceOf(result.frf, kind);
   return result;
@@ -254,13 +229,13 @@ void addCoherence(const UffFunction& f, FrequencyResponse& frf) {
   if (coherence.size() == frf.size()) frf.coherence = std::move(coherence);
 }
 
-/// Forces and responses over time become hits: as many of both are pairs in their order, otherwise a response
-/// belongs to the last force before it.
+/// Hits from forces and responses over time: equal numbers are paired in order, otherwise a response belongs
+/// to the last force before it.
 std::vector<TapRecord> hitsOf(const std::vector<const UffFunction*>& functions, const std::string& file) {
   const bool named = std::any_of(functions.begin(), functions.end(),
                                  [](const UffFunction* f) { return f->numerator == uff::EXCITATION_FORCE; });
   const auto isHammer = [&](const UffFunction& f) {
-    return named ? f.numerator == uff::EXCITATION_FORCE : kindOf(f, file) == ResponseKind::force;
+    return named ? f.numerator == uff::EXCITATION_FORCE : responseKind(f, file) == ResponseKind::force;
   };
   std::vector<const UffFunction*> forces, responses, before;
   for (const UffFunction* f : functions) {
@@ -278,11 +253,11 @@ std::vector<TapRecord> hitsOf(const std::vector<const UffFunction*>& functions, 
                                                                  : *forces.front();
     TapRecord tap;
     tap.file = responses.size() > 1 ? file + ":" + std::to_string(r + 1) : file;
-    tap.kind = kindOf(*responses[r], file);
+    tap.kind = responseKind(*responses[r], file);
     tap.hit.force = realParts(force);
     tap.hit.response = realParts(*responses[r]);
     tap.hit.sample_rate = sampleRate(force.abscissa, file);
-    tap.hit.pre_trigger = onset(tap.hit.force);
+    tap.hit.pre_trigger = onsetIndex(tap.hit.force);
     taps.push_back(std::move(tap));
   }
   return taps;
@@ -301,57 +276,12 @@ TapFile readTapUff(const std::string& file) {
   }
   result.taps = hitsOf(over_time, file);
   if (result.taps.empty() && result.frfs.empty())
-    throw Error(file + ": holds neither FRFs nor a force and its response over time");
+    throw Error(file + ": neither FRFs nor a force and its response over time");
   return result;
 }
 
-/// Whether the response still rings at the end: its last tenth over the first behind the blow.
-bool ringsOn(const Hit& hit) {
-  const std::size_t quiet = hit.pre_trigger - hit.pre_trigger / 4,
-                    tenth = (hit.response.size() - hit.pre_trigger) / 10;
-  if (tenth < LEAST_TENTH) return false;
-  const auto part = [&](std::size_t from, std::size_t count) {
-    const auto begin = hit.response.begin() + static_cast<std::ptrdiff_t>(from);
-    return standardDeviation({begin, begin + static_cast<std::ptrdiff_t>(count)});
-  };
-  const double noise = quiet < LEAST_TENTH ? 0.0 : part(0, quiet);
-  const double first = part(hit.pre_trigger, tenth), last = part(hit.response.size() - tenth, tenth);
-  return last > std::hypot(CLEAR_OF_NOISE * noise, RINGING * first);
-}
-
-/// The record from just before the blow on, its baselines taken off.
-Hit fromBlow(const Hit& hit) {
-  Hit cut = hit;
-  const auto peak =
-      static_cast<std::size_t>(std::max_element(hit.force.begin(), hit.force.end()) - hit.force.begin());
-  const std::size_t lead = std::min(hit.pre_trigger, peak - hit.pre_trigger + LEAD);
-  const std::size_t quiet = hit.pre_trigger - hit.pre_trigger / 4;
-  for (std::vector<double>* channel : {&cut.force, &cut.response}) {
-    const auto begin = channel->begin();
-    const double base = quiet < LEAST_TENTH ? 0.0 : mean({begin, begin + static_cast<std::ptrdiff_t>(quiet)});
-    channel->erase(begin, begin + static_cast<std::ptrdiff_t>(hit.pre_trigger - lead));
-    for (double& value : *channel) value -= base;
-  }
-  cut.pre_trigger = lead;
-  return cut;
-}
-
-/// Records that ring on begin with the blow and are all as long as the shortest. @return [s] that length
-double cutToBlow(std::vector<Hit>& hits) {
-  std::size_t shortest = std::numeric_limits<std::size_t>::max();
-  for (Hit& hit : hits) {
-    hit = fromBlow(hit);
-    shortest = std::min(shortest, hit.force.size());
-  }
-  for (Hit& hit : hits) {
-    hit.force.resize(shortest);
-    hit.response.resize(shortest);
-  }
-  return static_cast<double>(shortest) / hits.front().sample_rate;
-}
-
-/// What frf.csv says beside the three columns.
-void readDeviations(const std::string& file, FrequencyResponse& frf) {
+/// Coherence and standard deviations of frf.csv.
+void readCoherenceAndStd(const std::string& file, FrequencyResponse& frf) {
   const NumberTable table = readNumberTable(file);
   for (const auto& [name, values] :
        {std::pair("coherence", &frf.coherence), std::pair("std", &frf.std_dev)}) {
@@ -390,10 +320,10 @@ TapRecord readTapCsv(const std::string& file, const ChannelNames& channels) {
   return tapOf(readCsv(file), channels);
 }
 
-/// The hammer is named so; the response is the first other channel.
+/// The hammer by its name; the response is the first other channel.
 TapRecord readTapSound(const std::string& file, const ChannelNames& channels) {
   if (channels.sound.empty())
-    throw Error(file + ": a sound file does not say what its channels are; name them with --sound-channels");
+    throw Error(file + ": a sound file does not name its channels; name them with --sound-channels");
   const std::vector<SoundChannel> named = soundChannels(channels.sound);
   ChannelNames names{"hammer", "", ""};
   for (const SoundChannel& channel : named)
@@ -404,14 +334,14 @@ TapRecord readTapSound(const std::string& file, const ChannelNames& channels) {
 
 TapRecord readTapText(const std::string& file) {
   const ThreeColumns columns = readThreeColumns(file);
-  evenTime(columns.a, file);
+  checkEvenTime(columns.a, file);
   TapRecord tap;
   tap.file = file;
   tap.hit.force = columns.b;
   tap.hit.response = columns.c;
   tap.kind = ResponseKind::acceleration;
   tap.hit.sample_rate = sampleRate(columns.a, file);
-  tap.hit.pre_trigger = onset(tap.hit.force);
+  tap.hit.pre_trigger = onsetIndex(tap.hit.force);
   return tap;
 }
 
@@ -430,7 +360,7 @@ TapFile readTapFile(const std::string& file, TapFormat format, const ChannelName
     case TapFormat::frf:
       return {{}, {{file, readFrfText(file)}}};
     default:
-      throw Error(file + ": no hammer record");
+      throw Error(file + ": not a hammer record");
   }
 }
 
@@ -440,72 +370,14 @@ FrequencyResponse readFrfText(const std::string& file) {
   frf.unit = "m/N";
   for (std::size_t i = 0; i < columns.a.size(); ++i) {
     if (i > 0 && !(columns.a[i] > columns.a[i - 1])) {
-      throw Error(file + ": line " + std::to_string(i + 1) + ": frequencies do not rise");
+      throw Error(file + ": line " + std::to_string(i + 1) + ": expected rising frequencies");
     }
-    if (columns.a[i] <= 0.0) continue;  // no receptance at rest from an accelerometer
+    if (columns.a[i] <= 0.0) continue;  // an accelerometer gives no static receptance
     frf.frequency.push_back(columns.a[i]);
     frf.value.emplace_back(columns.b[i], columns.c[i]);
   }
-  if (readText(file).rfind("frequency_hz", 0) == 0) readDeviations(file, frf);
+  if (readText(file).rfind("frequency_hz", 0) == 0) readCoherenceAndStd(file, frf);
   return frf;
 }
 
-TapFrf averageTaps(const std::vector<TapRecord>& taps, const TapFrfOptions& options) {
-  if (taps.empty()) throw Error("no hit was given");
-  TapFrf result;
-  std::vector<Hit> hits;
-  for (const TapRecord& tap : taps) {
-    if (tap.kind != taps.front().kind) {
-      throw Error(tap.file + ": " + NAME[index(tap.kind)] + ", but " + taps.front().file + " holds " +
-                  NAME[index(taps.front().kind)]);
-    }
-    hits.push_back(tap.hit);
-  }
-  const std::vector<HitFault> faults = judgeHits(hits, options.judge);
-  ImpactOptions impact;
-  impact.exponential_time = options.exponential_time;
-  impact.unit = UNIT[index(taps.front().kind)];
-  std::vector<Hit> accepted;
-  for (std::size_t i = 0; i < taps.size(); ++i) {
-    result.hits.push_back({taps[i].file, faults[i].text});
-    if (!result.hits[i].accepted()) continue;
-    if (!accepted.empty() && (hits[i].force.size() != accepted.front().force.size() ||
-                              hits[i].sample_rate != accepted.front().sample_rate)) {
-      throw Error(formatted("%s: %zu samples at %g Hz, another length or rate than the hits before",
-                            taps[i].file.c_str(), hits[i].force.size(), hits[i].sample_rate));
-    }
-    accepted.push_back(hits[i]);
-  }
-  if (accepted.empty()) return result;
-  if (options.exponential_time == 0.0 && std::any_of(accepted.begin(), accepted.end(), ringsOn))
-    result.ringing_length = cutToBlow(accepted);
-  ImpactAnalysis analysis(impact);
-  for (const Hit& hit : accepted) analysis.add(hit);
-  result.measured = analysis.frf(options.average).band(1e-9, INFINITY);
-  result.receptance = receptanceOf(result.measured, taps.front().kind);
-  return result;
-}
-
-void removeCut(std::vector<EstimatedMode>& modes, double ringing_length) {
-  using Complex = std::complex<double>;
-  if (!(ringing_length > 0.0)) return;
-  for (EstimatedMode& m : modes) {
-    const double w = units::TWO_PI * m.frequency, turn = w * ringing_length;
-    const Complex cut =
-        std::exp(turn * Complex(-m.damping_ratio, std::sqrt(1.0 - m.damping_ratio * m.damping_ratio)));
-    const Complex share = 1.0 - cut;
-    const double by_pole =
-        std::abs(cut / share) * turn * std::hypot(m.frequency_std / m.frequency, m.damping_ratio_std);
-    for (std::size_t o = 0; o < m.gain.size(); ++o) {
-      const Complex whole = Complex(m.gain[o], m.phase_part[o]) / share;
-      const double by_share = by_pole * std::abs(whole);
-      m.gain[o] = whole.real();
-      m.phase_part[o] = whole.imag();
-      m.gain_std[o] = std::hypot(m.gain_std[o] / std::abs(share), by_share);
-      m.phase_part_std[o] = std::hypot(m.phase_part_std[o] / std::abs(share), by_share);
-    }
-  }
-}
-
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -16,37 +16,49 @@
 #include "smartmill_core/signal/statistics.h"
 #include "tool_in_holder.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// The beam is a model: to this it tells a frequency, and a gain (of its own, and of the largest).
-constexpr double MODEL_RATIO = 0.005, MODEL_FACTOR = 0.025;  // of what changes from height to height
+/// [1] model error of the beam: of the ratio of two heights, of a factor to the tip; of a frequency, of a
+/// gain, and of a gain over the largest.
+constexpr double MODEL_RATIO = 0.005, MODEL_FACTOR = 0.025;
 constexpr double MODEL_FREQUENCY = 0.01, MODEL_GAIN = 0.03, MODEL_SMALL = 0.003;
-/// A mode of the model that no measurement shows must be smaller than this share of the largest.
-constexpr double UNSEEN = 0.03;
-/// Bounds of an unknown, in standard deviations.
-constexpr double FAR = 6.0;
-/// A measured mode may be the tool's own when it lies within these factors of the clamped tool's.
+/// Standard deviation of the measured gain of a mode that is not measured, over the largest gain.
+constexpr double LARGEST_UNMEASURED = 0.03;
+/// Bound of an unknown, in standard deviations of its prior.
+constexpr double UNKNOWN_BOUND = 6.0;
+/// Frequency of a tool mode over that of the clamped tool.
 constexpr double TOOL_LOW = 0.35, TOOL_HIGH = 1.5;
 constexpr std::size_t MOST_TOOL_MODES = 2;
-/// A seat as hard as that is rigid; the diameter [m] that the prior's is meant for.
-constexpr double HARD = 0.01, SEAT_START = 0.3, SEAT_DIAMETER = 0.012;
-/// A spindle mode without the tool lies somewhere about a measured one: so far, as logarithms.
-constexpr double WIDE_FREQUENCY = 0.4, WIDE_GAIN = 2.0;
+/// Seat compliance, in standard deviations, that counts as rigid, and at the start; diameter [m] of the
+/// prior.
+constexpr double RIGID_SEAT = 0.01, SEAT_START = 0.3, SEAT_DIAMETER = 0.012;
+/// Spread of a spindle mode without the tool about the measured one, logarithmic.
+constexpr double FREQUENCY_SPREAD = 0.4, GAIN_SPREAD = 2.0;
 constexpr int ROUNDS = 3, ITERATIONS = 40;
-/// Of an unknown, for derivatives; the modes beside it are those of first order.
+/// Step of an unknown for derivatives, with modes to first order.
 constexpr double STEP = 1e-5;
-/// Damping of a mode that is not seen is known to this share.
-constexpr double UNSEEN_DAMPING = 0.5;
+/// Relative, of the damping of a mode that is not measured.
+constexpr double PREDICTED_DAMPING_STD = 0.5;
 
-enum Unknown : Index { YOUNG, DENSITY, STICKOUT, DIAMETER, FLUTED, RATIO, ACROSS, TURNING, HEIGHT, SHARED };
+enum Unknown : Index {
+  YOUNG,
+  DENSITY,
+  STICKOUT,
+  DIAMETER,
+  FLUTED,
+  RATIO,
+  LATERAL,
+  ROTATIONAL,
+  HEIGHT,
+  SHARED
+};
 
-/// Which of the measured modes are the tool's; the others stand for one spindle mode each.
+/// Indices of the measured modes that are tool modes; each other one is a spindle mode.
 using ToolModes = std::set<std::size_t>;
 
 struct Problem {
@@ -58,7 +70,7 @@ struct Problem {
 
   const std::vector<Mode>& modes() const { return measurements.front().modes.modes; }
   std::size_t spindleModes() const { return modes().size() - of_tool.size(); }
-  /// Of a further measurement: its scale over the first's.
+  /// Index of the scale of a further measurement over the first.
   Index scaleOf(std::size_t measurement) const {
     return SHARED + static_cast<Index>(3 * spindleModes() + measurement - 1);
   }
@@ -74,13 +86,13 @@ struct Problem {
   }
 };
 
-double scaled(const Known& known, double z) {
+double scaled(const UncertainValue& known, double z) {
   return known.value * std::exp(z * known.std / known.value);
 }
 
 /// Unknowns in standard deviations of their priors; frequencies and gains of the spindle modes as logarithms
 /// over their starts.
-ToolInHolder built(const Problem& problem, const VectorXd& z) {
+ToolInHolder toolInHolder(const Problem& problem, const VectorXd& z) {
   ToolInHolder t;
   t.young = scaled(problem.tool.young, z[YOUNG]);
   t.density = scaled(problem.tool.density, z[DENSITY]);
@@ -88,8 +100,9 @@ ToolInHolder built(const Problem& problem, const VectorXd& z) {
   t.diameter = scaled(problem.tool.diameter, z[DIAMETER]);
   t.fluted_length = std::min(scaled(problem.tool.fluted_length, z[FLUTED]), t.stickout);
   t.fluted_diameter = t.diameter * std::min(1.0, scaled(problem.tool.flute_ratio, z[RATIO]));
-  t.across = problem.prior.across / std::max(z[ACROSS], HARD);
-  t.turning = problem.prior.turning * std::pow(t.diameter / SEAT_DIAMETER, 3) / std::max(z[TURNING], HARD);
+  t.lateral_stiffness = problem.prior.lateral_stiffness / std::max(z[LATERAL], RIGID_SEAT);
+  t.rotational_stiffness = problem.prior.rotational_stiffness * std::pow(t.diameter / SEAT_DIAMETER, 3) /
+                           std::max(z[ROTATIONAL], RIGID_SEAT);
   Index at = SHARED;
   for (std::size_t r = 0; r < problem.modes().size(); ++r) {
     if (problem.of_tool.count(r) > 0) continue;
@@ -102,8 +115,8 @@ ToolInHolder built(const Problem& problem, const VectorXd& z) {
   return t;
 }
 
-/// Of each measured mode the model's mode that stands for it; the others of the model stand for none.
-std::vector<std::size_t> matched(const Problem& problem, const std::vector<HeldMode>& held) {
+/// For each measured mode the index of the model's mode that corresponds to it.
+std::vector<std::size_t> matchModes(const Problem& problem, const std::vector<HeldMode>& held) {
   std::vector<std::size_t> order(problem.modes().size()), match(problem.modes().size(), held.size());
   std::iota(order.begin(), order.end(), 0u);
   const auto& modes = problem.modes();
@@ -135,11 +148,11 @@ const Mode* nearestMode(const ModalModel& model, double frequency) {
   return found;
 }
 
-double orZero(double std) {
+double finiteOrZero(double std) {
   return std::isfinite(std) ? std : 0.0;
 }
 
-/// What the model leaves of the measured, with the priors; `match` held.
+/// Residuals of measured values and of priors, for a fixed match of the modes.
 class TipResiduals : public fit::Residuals {
  public:
   TipResiduals(const Problem& problem, std::vector<std::size_t> match, std::size_t held_modes)
@@ -153,15 +166,15 @@ class TipResiduals : public fit::Residuals {
   }
 
   bool evaluate(const VectorXd& z, VectorXd* residual, Eigen::MatrixXd* jacobian) const override {
-    const HeldTool tool(built(problem_, z));
+    const HeldTool tool(toolInHolder(problem_, z));
     if (tool.modes().size() < held_modes_) return false;
-    leave(z, tool.modes(), residual);
+    fillResiduals(z, tool.modes(), residual);
     if (jacobian) {
       VectorXd there(count());
       for (Index k = 0; k < z.size(); ++k) {
         VectorXd near = z;
         near[k] += STEP;
-        leave(near, tool.modesOf(built(problem_, near)), &there);
+        fillResiduals(near, tool.modesOf(toolInHolder(problem_, near)), &there);
         jacobian->col(k) = (there - *residual) / STEP;
       }
     }
@@ -169,14 +182,14 @@ class TipResiduals : public fit::Residuals {
   }
 
  private:
-  void leave(const VectorXd& z, const std::vector<HeldMode>& held, VectorXd* residual) const {
+  void fillResiduals(const VectorXd& z, const std::vector<HeldMode>& held, VectorXd* residual) const {
     Index row = 0;
     const auto add = [&](double value) { (*residual)[row++] = value; };
     for (Index k = 0; k < SHARED; ++k) add(z[k]);
     for (std::size_t i = 0; i < problem_.spindleModes(); ++i) {
       const Index at = SHARED + 3 * static_cast<Index>(i);
-      add(z[at] / WIDE_FREQUENCY);
-      add(z[at + 1] / WIDE_GAIN);
+      add(z[at] / FREQUENCY_SPREAD);
+      add(z[at + 1] / GAIN_SPREAD);
       add(z[at + 2]);
     }
     for (std::size_t i = 1; i < problem_.measurements.size(); ++i) add(z[problem_.scaleOf(i)]);
@@ -185,27 +198,28 @@ class TipResiduals : public fit::Residuals {
       const Mode& m = problem_.modes()[r];
       const HeldMode& h = held[match_[r]];
       add(std::log(h.frequency / m.frequency) /
-          std::hypot(MODEL_FREQUENCY, orZero(m.frequency_std) / m.frequency));
+          std::hypot(MODEL_FREQUENCY, finiteOrZero(m.frequency_std) / m.frequency));
       const OffsetMeasurement& first = problem_.measurements.front();
       const double here = problem_.gainOf(h, first, z);
-      add((here - m.gain) / std::hypot(MODEL_GAIN * m.gain, small, orZero(m.gain_std)));
+      add((here - m.gain) / std::hypot(MODEL_GAIN * m.gain, small, finiteOrZero(m.gain_std)));
       for (std::size_t i = 1; i < problem_.measurements.size(); ++i) {
-        // From height to height the beam is told more closely than itself.
+        // The model error of a ratio of two heights is smaller than that of a gain.
         const OffsetMeasurement& at = problem_.measurements[i];
-        const Mode* seen = nearestMode(at.modes, m.frequency);
-        const double ratio = seen ? seen->gain / m.gain : 1.0;
+        const Mode* other = nearestMode(at.modes, m.frequency);
+        const double ratio = other ? other->gain / m.gain : 1.0;
         const double scale = 1.0 + std::hypot(first.scale_std, at.scale_std) * z[problem_.scaleOf(i)];
-        add(seen
-                ? (scale * problem_.gainOf(h, at, z) - here * ratio) /
-                      std::hypot(MODEL_RATIO * seen->gain, orZero(seen->gain_std), ratio * orZero(m.gain_std))
-                : 0.0);
+        add(other ? (scale * problem_.gainOf(h, at, z) - here * ratio) /
+                        std::hypot(MODEL_RATIO * other->gain, finiteOrZero(other->gain_std),
+                                   ratio * finiteOrZero(m.gain_std))
+                  : 0.0);
       }
     }
     for (std::size_t k = 0; k < held_modes_; ++k) {
-      const bool stands = std::find(match_.begin(), match_.end(), k) != match_.end();
+      const bool is_matched = std::find(match_.begin(), match_.end(), k) != match_.end();
       const OffsetMeasurement& at = problem_.measurements.front();
-      const bool due = !stands && held[k].frequency < problem_.high;
-      add(due ? problem_.gainOf(held[k], at, z) / (UNSEEN * problem_.largestGain()) : 0.0);
+      const bool should_be_measured = !is_matched && held[k].frequency < problem_.high;
+      add(should_be_measured ? problem_.gainOf(held[k], at, z) / (LARGEST_UNMEASURED * problem_.largestGain())
+                             : 0.0);
     }
   }
 
@@ -214,7 +228,7 @@ class TipResiduals : public fit::Residuals {
   std::size_t held_modes_;
 };
 
-struct Fitted {
+struct FittedProblem {
   VectorXd z;
   Eigen::MatrixXd covariance;
   std::vector<std::size_t> match;
@@ -226,12 +240,13 @@ std::size_t modesBelow(const std::vector<HeldMode>& held, double high) {
       std::count_if(held.begin(), held.end(), [&](const HeldMode& h) { return h.frequency < 1.5 * high; }));
 }
 
-Fitted fitted(const Problem& problem) {
-  Fitted best;
+FittedProblem fitProblem(const Problem& problem) {
+  FittedProblem best;
   best.z = VectorXd::Zero(problem.unknowns());
-  best.z[ACROSS] = best.z[TURNING] = SEAT_START;
-  std::vector<fit::Parameter> unknowns(static_cast<std::size_t>(problem.unknowns()), {0.0, -FAR, FAR, 1.0});
-  unknowns[ACROSS].low = unknowns[TURNING].low = HARD;
+  best.z[LATERAL] = best.z[ROTATIONAL] = SEAT_START;
+  std::vector<fit::Parameter> unknowns(static_cast<std::size_t>(problem.unknowns()),
+                                       {0.0, -UNKNOWN_BOUND, UNKNOWN_BOUND, 1.0});
+  unknowns[LATERAL].low = unknowns[ROTATIONAL].low = RIGID_SEAT;
   for (std::size_t i = 0; i < problem.spindleModes(); ++i) {
     unknowns[SHARED + 3 * i] = {0.0, -0.7, 0.7, 0.05};
     unknowns[SHARED + 3 * i + 1] = {0.0, -3.0, 3.0, 0.1};
@@ -241,35 +256,35 @@ Fitted fitted(const Problem& problem) {
   options.iterations = ITERATIONS;
   options.function_tolerance = 1e-8;
   for (int round = 0; round < ROUNDS; ++round) {
-    const std::vector<HeldMode> held = HeldTool(built(problem, best.z)).modes();
-    const std::vector<std::size_t> match = matched(problem, held);
+    const std::vector<HeldMode> held = HeldTool(toolInHolder(problem, best.z)).modes();
+    const std::vector<std::size_t> match = matchModes(problem, held);
     if (std::count(match.begin(), match.end(), held.size()) > 0) return {};
     const TipResiduals residuals(problem, match, modesBelow(held, problem.high));
     for (std::size_t k = 0; k < unknowns.size(); ++k) unknowns[k].start = best.z[static_cast<Index>(k)];
     const fit::Result result = fit::minimise(residuals, unknowns, options);
     if (!result.usable()) return {};
-    const bool again = round > 0 && match == best.match && result.squares > 0.999 * best.squares;
-    // Every unknown has a prior, so that this is regular, at a bound too.
-    VectorXd left(residuals.count());
+    const bool converged = round > 0 && match == best.match && result.squares > 0.999 * best.squares;
+    // Every unknown has a prior, so that this is regular at a bound too.
+    VectorXd residual(residuals.count());
     Eigen::MatrixXd jacobian(residuals.count(), result.value.size());
-    if (!residuals.evaluate(result.value, &left, &jacobian)) return {};
+    if (!residuals.evaluate(result.value, &residual, &jacobian)) return {};
     best = {result.value, linear::inverseSymmetric(Eigen::MatrixXd(jacobian.transpose() * jacobian)), match,
             result.squares};
-    if (again) break;
+    if (converged) break;
   }
   return best;
 }
 
-/// What is asked of a fit: of each measured mode direct and measured gain, of unseen modes frequency and
-/// direct gain, and the static share above the band.
-struct Answers {
-  std::vector<double> direct, factor;                        // of measured modes
-  std::vector<double> frequency, unseen_gain, unseen_added;  // of those not seen
+/// Predictions of a fit: of each measured mode the direct gain and the factor, of each other mode frequency,
+/// direct gain and added gain.
+struct Predictions {
+  std::vector<double> direct, factor;                                // of measured modes
+  std::vector<double> frequency, unmeasured_gain, unmeasured_added;  // of the others
 };
 
-Answers answersOf(const Problem& problem, const Fitted& fit, const VectorXd& z) {
-  Answers a;
-  const std::vector<HeldMode> held = HeldTool(built(problem, z)).modes();
+Predictions predict(const Problem& problem, const FittedProblem& fit, const VectorXd& z) {
+  Predictions a;
+  const std::vector<HeldMode> held = HeldTool(toolInHolder(problem, z)).modes();
   const OffsetMeasurement& at = problem.measurements.front();
   for (const std::size_t k : fit.match) {
     a.direct.push_back(held[k].gain(0.0, 0.0));
@@ -278,40 +293,42 @@ Answers answersOf(const Problem& problem, const Fitted& fit, const VectorXd& z) 
   for (std::size_t k = 0; k < held.size(); ++k) {
     if (std::find(fit.match.begin(), fit.match.end(), k) != fit.match.end()) continue;
     a.frequency.push_back(held[k].frequency);
-    a.unseen_gain.push_back(held[k].gain(0.0, 0.0));
-    a.unseen_added.push_back(held[k].gain(0.0, 0.0) - problem.gainOf(held[k], at, z));
+    a.unmeasured_gain.push_back(held[k].gain(0.0, 0.0));
+    a.unmeasured_added.push_back(held[k].gain(0.0, 0.0) - problem.gainOf(held[k], at, z));
   }
   return a;
 }
 
-VectorXd flat(const Answers& a) {
+VectorXd flatten(const Predictions& a) {
   std::vector<double> all;
-  for (const auto* list : {&a.direct, &a.factor, &a.frequency, &a.unseen_gain, &a.unseen_added})
+  for (const auto* list : {&a.direct, &a.factor, &a.frequency, &a.unmeasured_gain, &a.unmeasured_added})
     all.insert(all.end(), list->begin(), list->end());
   return Eigen::Map<const VectorXd>(all.data(), static_cast<Index>(all.size()));
 }
 
-/// Standard deviations of the answers, by those of the unknowns.
-VectorXd deviations(const Problem& problem, const Fitted& fit) {
+/// Standard deviations of the predictions, from the covariance of the unknowns.
+VectorXd predictionStd(const Problem& problem, const FittedProblem& fit) {
   constexpr double SPAN = 1e-4;
   const Index n = fit.z.size();
-  Eigen::MatrixXd map(flat(answersOf(problem, fit, fit.z)).size(), n);
+  Eigen::MatrixXd map(flatten(predict(problem, fit, fit.z)).size(), n);
   for (Index k = 0; k < n; ++k) {
     VectorXd up = fit.z, down = fit.z;
     up[k] += SPAN;
     down[k] -= SPAN;
-    map.col(k) = (flat(answersOf(problem, fit, up)) - flat(answersOf(problem, fit, down))) / (2.0 * SPAN);
+    map.col(k) = (flatten(predict(problem, fit, up)) - flatten(predict(problem, fit, down))) / (2.0 * SPAN);
   }
   return (map * fit.covariance * map.transpose()).diagonal().cwiseMax(0.0).cwiseSqrt();
 }
 
-TipMode seenMode(const Mode& measured, double direct, double direct_std, double factor, double factor_std) {
+TipMode measuredTipMode(const Mode& measured, double direct, double direct_std, double factor,
+                        double factor_std) {
   TipMode tip;
   tip.direct = measured;
   tip.factor = factor;
   tip.factor_std = std::hypot(factor_std, MODEL_FACTOR * (factor - 1.0));
-  // By the factor, or, where the hammer stands near a node and the factor says little, by the beam.
-  const double by_factor = std::hypot(factor * orZero(measured.gain_std), measured.gain * tip.factor_std);
+  // By the factor; near a node of the mode, where the factor is uncertain, by the beam.
+  const double by_factor =
+      std::hypot(factor * finiteOrZero(measured.gain_std), measured.gain * tip.factor_std);
   const double by_beam = std::hypot(direct_std, MODEL_GAIN * direct);
   tip.direct.gain = by_factor <= by_beam ? measured.gain * factor : direct;
   tip.direct.gain_std = std::min(by_factor, by_beam);
@@ -319,34 +336,35 @@ TipMode seenMode(const Mode& measured, double direct, double direct_std, double 
   return tip;
 }
 
-TipCorrection corrected(const Problem& problem, const Fitted& fit) {
-  const Answers a = answersOf(problem, fit, fit.z);
-  const VectorXd std = deviations(problem, fit);
-  const std::size_t seen = a.direct.size();
+TipCorrection correctionOf(const Problem& problem, const FittedProblem& fit) {
+  const Predictions a = predict(problem, fit, fit.z);
+  const VectorXd std = predictionStd(problem, fit);
+  const std::size_t measured = a.direct.size();
   const auto deviation = [&](std::size_t i) { return std[static_cast<Index>(i)]; };
   TipCorrection result;
   std::vector<double> damping;
-  for (std::size_t r = 0; r < seen; ++r) {
+  for (std::size_t r = 0; r < measured; ++r) {
     result.modes.push_back(
-        seenMode(problem.modes()[r], a.direct[r], deviation(r), a.factor[r], deviation(seen + r)));
+        measuredTipMode(problem.modes()[r], a.direct[r], deviation(r), a.factor[r], deviation(measured + r)));
     damping.push_back(problem.modes()[r].damping_ratio);
   }
-  const std::size_t unseen = a.frequency.size();
+  const std::size_t unmeasured = a.frequency.size();
   double variance = 0.0;
-  for (std::size_t k = 0; k < unseen; ++k) {
+  for (std::size_t k = 0; k < unmeasured; ++k) {
     TipMode tip;
-    tip.seen = false;
-    tip.direct = {a.frequency[k], median(damping), a.unseen_gain[k]};
-    tip.direct.frequency_std = std::hypot(deviation(2 * seen + k), MODEL_FREQUENCY * a.frequency[k]);
-    tip.direct.damping_ratio_std = UNSEEN_DAMPING * tip.direct.damping_ratio;
-    tip.direct.gain_std = std::hypot(deviation(2 * seen + unseen + k), MODEL_GAIN * a.unseen_gain[k]);
-    tip.added = a.unseen_added[k];
+    tip.measured = false;
+    tip.direct = {a.frequency[k], median(damping), a.unmeasured_gain[k]};
+    tip.direct.frequency_std = std::hypot(deviation(2 * measured + k), MODEL_FREQUENCY * a.frequency[k]);
+    tip.direct.damping_ratio_std = PREDICTED_DAMPING_STD * tip.direct.damping_ratio;
+    tip.direct.gain_std =
+        std::hypot(deviation(2 * measured + unmeasured + k), MODEL_GAIN * a.unmeasured_gain[k]);
+    tip.added = a.unmeasured_added[k];
     tip.factor = tip.factor_std = INFINITY;
     if (a.frequency[k] < problem.high) {
       result.modes.push_back(tip);
       continue;
     }
-    tip.direct.gain_std = std::hypot(deviation(2 * seen + 2 * unseen + k), MODEL_GAIN * tip.added);
+    tip.direct.gain_std = std::hypot(deviation(2 * measured + 2 * unmeasured + k), MODEL_GAIN * tip.added);
     result.beyond.push_back(tip);
     result.direct += tip.added;
     variance += tip.direct.gain_std * tip.direct.gain_std;
@@ -357,9 +375,9 @@ TipCorrection corrected(const Problem& problem, const Fitted& fit) {
   return result;
 }
 
-/// Which measured modes may be the tool's own: by the clamped tool's frequencies.
+/// Which measured modes may be tool modes, by the frequencies of the clamped tool.
 std::vector<ToolModes> hypotheses(const Problem& problem) {
-  ToolInHolder clamped = built(problem, VectorXd::Zero(problem.unknowns()));
+  ToolInHolder clamped = toolInHolder(problem, VectorXd::Zero(problem.unknowns()));
   clamped.spindle.clear();
   std::vector<double> own;
   const HeldTool alone(clamped);
@@ -379,38 +397,40 @@ std::vector<ToolModes> hypotheses(const Problem& problem) {
   return all;
 }
 
-void check(const std::vector<OffsetMeasurement>& measurements, const ToolBeam& tool) {
+void checkInput(const std::vector<OffsetMeasurement>& measurements, const ToolBeam& tool) {
   if (measurements.empty() || measurements.front().modes.modes.empty())
     throw Error("tip correction: no measured mode");
-  for (const Known& k :
+  for (const UncertainValue& k :
        {tool.stickout, tool.diameter, tool.fluted_length, tool.flute_ratio, tool.young, tool.density}) {
     if (!(k.value > 0.0 && std::isfinite(k.value) && k.std >= 0.0 && std::isfinite(k.std)))
       throw Error(
-          "tip correction: the tool's stick-out, diameter, fluted length, flute ratio, Young's modulus and "
-          "density must be positive and have deviations, got " +
+          "tip correction: stick-out, diameter, fluted length, flute ratio, Young's modulus and density of "
+          "the "
+          "tool: expected positive values with standard deviations, got " +
           shortNumber(k.value) + " +- " + shortNumber(k.std));
   }
   for (const OffsetMeasurement& m : measurements) {
     for (const double height : {m.struck, m.read}) {
       if (!(height >= 0.0 && height < tool.stickout.value))
-        throw Error("tip correction: a height of " + shortNumber(1e3 * height) +
-                    " mm must lie in 0..stickout (" + shortNumber(1e3 * tool.stickout.value) + " mm)");
+        throw Error("tip correction: height " + shortNumber(1e3 * height) +
+                    " mm: expected 0 up to less than the stick-out, " +
+                    shortNumber(1e3 * tool.stickout.value) + " mm");
     }
   }
 }
 
-/// Several explanations as one: means by their weight, and their scatter in the deviations.
-TipCorrection together(const std::vector<TipCorrection>& all, const std::vector<double>& weights) {
+/// Weighted mean of several corrections; their scatter enters the standard deviations.
+TipCorrection averageCorrections(const std::vector<TipCorrection>& all, const std::vector<double>& weights) {
   const auto best =
       static_cast<std::size_t>(std::max_element(weights.begin(), weights.end()) - weights.begin());
   TipCorrection result = all[best];
   const double sum = std::accumulate(weights.begin(), weights.end(), 0.0);
   for (TipMode& tip : result.modes) {
-    if (!tip.seen) continue;
+    if (!tip.measured) continue;
     double mean = 0.0, square = 0.0, factor = 0.0;
     for (std::size_t k = 0; k < all.size(); ++k) {
       for (const TipMode& other : all[k].modes) {
-        if (!other.seen || other.direct.frequency != tip.direct.frequency) continue;
+        if (!other.measured || other.direct.frequency != tip.direct.frequency) continue;
         const double share = weights[k] / sum;
         mean += share * other.direct.gain;
         square += share * (std::pow(other.direct.gain, 2) + std::pow(other.direct.gain_std, 2));
@@ -435,7 +455,7 @@ void setMaterial(ToolBeam& tool, const std::string& material) {
     tool.young = {2.1e11, 5.0e9};
     tool.density = {7900.0, 150.0};
   } else {
-    throw Error("tool material '" + material + "': carbide or steel is due");
+    throw Error("tool material '" + material + "': expected carbide or steel");
   }
 }
 
@@ -449,24 +469,24 @@ ModalModel TipCorrection::model() const {
 
 TipCorrection correctToTip(const std::vector<OffsetMeasurement>& measurements, const ToolBeam& tool,
                            const HolderPrior& prior, double high) {
-  check(measurements, tool);
+  checkInput(measurements, tool);
   Problem problem{measurements, tool, prior, high, {}};
   std::vector<TipCorrection> found;
   std::vector<double> squares;
   for (const ToolModes& of_tool : hypotheses(problem)) {
     problem.of_tool = of_tool;
-    const Fitted fit = fitted(problem);
+    const FittedProblem fit = fitProblem(problem);
     if (!std::isfinite(fit.squares)) continue;
-    found.push_back(corrected(problem, fit));
+    found.push_back(correctionOf(problem, fit));
     squares.push_back(fit.squares);
   }
   if (found.empty()) throw Error("tip correction: no beam in a spindle explains the measured modes");
   const double least = *std::min_element(squares.begin(), squares.end());
   std::vector<double> weights;
   for (const double s : squares) weights.push_back(std::exp(-0.5 * std::min(s - least, 700.0)));
-  TipCorrection result = together(found, weights);
+  TipCorrection result = averageCorrections(found, weights);
   result.direct += measurements.front().modes.direct;
-  result.direct_std = std::hypot(result.direct_std, orZero(measurements.front().modes.direct_std));
+  result.direct_std = std::hypot(result.direct_std, finiteOrZero(measurements.front().modes.direct_std));
   return result;
 }
 
@@ -486,7 +506,7 @@ FrequencyResponse tipResponse(const FrequencyResponse& measured, const TipCorrec
   frf.std_dev.resize(frf.size(), 0.0);
   for (std::size_t i = 0; i < frf.size(); ++i) {
     const double f = frf.frequency[i];
-    double variance = std::pow(orZero(frf.std_dev[i]), 2);
+    double variance = std::pow(finiteOrZero(frf.std_dev[i]), 2);
     for (const std::vector<TipMode>* modes : {&correction.modes, &correction.beyond}) {
       for (const TipMode& tip : *modes) {
         Mode one = tip.direct;
@@ -494,7 +514,7 @@ FrequencyResponse tipResponse(const FrequencyResponse& measured, const TipCorrec
         const Complex u = one.response(f);
         frf.value[i] += tip.added * u;
         variance += std::norm(u) * std::pow(tip.direct.gain_std, 2);
-        if (tip.seen) continue;
+        if (tip.measured) continue;
         one.frequency += tip.direct.frequency_std;
         variance += std::pow(tip.added, 2) * std::norm(one.response(f) - u);
       }
@@ -504,5 +524,4 @@ FrequencyResponse tipResponse(const FrequencyResponse& measured, const TipCorrec
   return frf;
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -8,8 +8,7 @@
 #include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/units.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 using Eigen::Index;
@@ -20,22 +19,22 @@ constexpr int ELEMENTS = 7;
 constexpr Index TOOL = 2 * (ELEMENTS + 1);
 constexpr double POISSON = 0.25, SHEAR_SHARE = 0.89;  // of a round section
 
-/// Bending and mass of an element from its bending stiffness, flexibility in shear and mass.
-void add(double l, double bending, double shear, double mass, double inertia, Index at, MatrixXd& m,
-         MatrixXd& k) {
+/// Adds an element's stiffness and mass matrices. @param bending, shear stiffness of the section
+void addElement(double l, double bending, double shear, double mass, double inertia, Index at, MatrixXd& m,
+                MatrixXd& k) {
   const double phi = 12.0 * bending / (shear * l * l), l2 = l * l;
-  Matrix4d stiffness, line, turn;
+  Matrix4d stiffness, translation, rotation;
   stiffness << 12, 6 * l, -12, 6 * l, 6 * l, (4 + phi) * l2, -6 * l, (2 - phi) * l2, -12, -6 * l, 12, -6 * l,
       6 * l, (2 - phi) * l2, -6 * l, (4 + phi) * l2;
-  line << 156, 22 * l, 54, -13 * l, 22 * l, 4 * l2, 13 * l, -3 * l2, 54, 13 * l, 156, -22 * l, -13 * l,
+  translation << 156, 22 * l, 54, -13 * l, 22 * l, 4 * l2, 13 * l, -3 * l2, 54, 13 * l, 156, -22 * l, -13 * l,
       -3 * l2, -22 * l, 4 * l2;
-  turn << 36, 3 * l, -36, 3 * l, 3 * l, 4 * l2, -3 * l, -l2, -36, -3 * l, 36, -3 * l, 3 * l, -l2, -3 * l,
+  rotation << 36, 3 * l, -36, 3 * l, 3 * l, 4 * l2, -3 * l, -l2, -36, -3 * l, 36, -3 * l, 3 * l, -l2, -3 * l,
       4 * l2;
   k.block<4, 4>(at, at) += bending / (l2 * l * (1.0 + phi)) * stiffness;
-  m.block<4, 4>(at, at) += mass * l / 420.0 * line + inertia / (30.0 * l) * turn;
+  m.block<4, 4>(at, at) += mass * l / 420.0 * translation + inertia / (30.0 * l) * rotation;
 }
 
-/// Share of an element, from x on, that is fluted: averages of the section's powers.
+/// Section of an element; averages where it is partly fluted.
 struct Section {
   double bending, shear, mass, inertia;
 };
@@ -44,7 +43,7 @@ Section sectionOf(const ToolInHolder& t, double x, double l) {
   const auto power = [&](int n) {
     return fluted * std::pow(t.fluted_diameter, n) + (1.0 - fluted) * std::pow(t.diameter, n);
   };
-  // In bending what is soft counts: the mean of 1 / d^4.
+  // Bending compliances add up: the mean of 1 / d^4.
   const double soft =
       1.0 / (fluted / std::pow(t.fluted_diameter, 4) + (1.0 - fluted) / std::pow(t.diameter, 4));
   const double area = 0.25 * units::PI * power(2), second = units::PI / 64.0;
@@ -54,7 +53,7 @@ Section sectionOf(const ToolInHolder& t, double x, double l) {
 
 }  // namespace
 
-double HeldMode::at(double height) const {
+double HeldMode::deflection(double height) const {
   const auto last = shape.size() / 2 - 2;
   const std::size_t e = std::min(last, static_cast<std::size_t>(std::max(0.0, height / element)));
   const double u = height / element - static_cast<double>(e);
@@ -64,13 +63,13 @@ double HeldMode::at(double height) const {
 }
 
 double HeldMode::gain(double struck, double read) const {
-  return at(struck) * at(read) / std::pow(units::TWO_PI * frequency, 2);
+  return deflection(struck) * deflection(read) / std::pow(units::TWO_PI * frequency, 2);
 }
 
 namespace {
 
-/// Stiffness and mass of the beam, free, and of what the spindle's modes (of mass 1) move: x runs from the
-/// tip, so a mode that tilts towards the spindle has its end's deflection less.
+/// Stiffness and mass of the free beam and of the spindle modes (of mass 1). x runs from the tip: with a
+/// positive tilt the deflection falls towards the spindle.
 void assemble(const ToolInHolder& t, MatrixXd& stiffness, MatrixXd& mass) {
   const auto spindle = static_cast<Index>(t.spindle.size());
   const Index size = TOOL + spindle;
@@ -78,19 +77,20 @@ void assemble(const ToolInHolder& t, MatrixXd& stiffness, MatrixXd& mass) {
   const double l = t.stickout / ELEMENTS;
   for (int e = 0; e < ELEMENTS; ++e) {
     const Section s = sectionOf(t, e * l, l);
-    add(l, s.bending, s.shear, s.mass, s.inertia, 2 * e, mass, stiffness);
+    addElement(l, s.bending, s.shear, s.mass, s.inertia, 2 * e, mass, stiffness);
   }
-  MatrixXd across = MatrixXd::Zero(1, size), turning = across;
-  across(0, TOOL - 2) = turning(0, TOOL - 1) = 1.0;
+  MatrixXd lateral = MatrixXd::Zero(1, size), rotation = lateral;
+  lateral(0, TOOL - 2) = rotation(0, TOOL - 1) = 1.0;
   for (Index i = 0; i < spindle; ++i) {
     const SpindleMode& m = t.spindle[static_cast<std::size_t>(i)];
     const double omega = units::TWO_PI * m.frequency, tip = omega * std::sqrt(m.gain);
-    across(0, TOOL + i) = -tip * (1.0 - m.tilt * t.stickout);
-    turning(0, TOOL + i) = tip * m.tilt;
+    lateral(0, TOOL + i) = -tip * (1.0 - m.tilt * t.stickout);
+    rotation(0, TOOL + i) = tip * m.tilt;
     mass(TOOL + i, TOOL + i) = 1.0;
     stiffness(TOOL + i, TOOL + i) = omega * omega;
   }
-  stiffness += t.across * across.transpose() * across + t.turning * turning.transpose() * turning;
+  stiffness += t.lateral_stiffness * lateral.transpose() * lateral +
+               t.rotational_stiffness * rotation.transpose() * rotation;
 }
 
 }  // namespace
@@ -114,28 +114,27 @@ HeldMode HeldTool::modeOf(double frequency, const Eigen::VectorXd& shape, double
   return {frequency, {shape.data(), shape.data() + TOOL}, element};
 }
 
-/// Rayleigh's perturbation: with d = v_j' (dK - w_k^2 dM) v_k, w_k^2 grows by d_kk, and v_k turns towards v_j
-/// by d_jk / (w_k^2 - w_j^2).
+/// Rayleigh's perturbation: with d = v_j' (dK - w_k^2 dM) v_k, w_k^2 grows by d_kk, and v_k mixes with v_j by
+/// d_jk / (w_k^2 - w_j^2).
 std::vector<HeldMode> HeldTool::modesOf(const ToolInHolder& near) const {
   MatrixXd stiffness, mass;
   assemble(near, stiffness, mass);
-  const MatrixXd soft = shapes_.transpose() * (stiffness - stiffness_) * shapes_;
-  const MatrixXd heavy = shapes_.transpose() * (mass - mass_) * shapes_;
+  const MatrixXd stiffness_change = shapes_.transpose() * (stiffness - stiffness_) * shapes_;
+  const MatrixXd mass_change = shapes_.transpose() * (mass - mass_) * shapes_;
   std::vector<HeldMode> found;
   for (Index k = 0; k < squares_.size(); ++k) {
-    Eigen::VectorXd turn(squares_.size());
+    Eigen::VectorXd mix(squares_.size());
     for (Index j = 0; j < squares_.size(); ++j) {
       const double apart = squares_[k] - squares_[j];
-      turn[j] = j == k                  ? 1.0 - 0.5 * heavy(k, k)
-                : std::abs(apart) > 0.0 ? (soft(j, k) - squares_[k] * heavy(j, k)) / apart
-                                        : 0.0;
+      mix[j] = j == k                  ? 1.0 - 0.5 * mass_change(k, k)
+               : std::abs(apart) > 0.0 ? (stiffness_change(j, k) - squares_[k] * mass_change(j, k)) / apart
+                                       : 0.0;
     }
-    const double square = squares_[k] + soft(k, k) - squares_[k] * heavy(k, k);
+    const double square = squares_[k] + stiffness_change(k, k) - squares_[k] * mass_change(k, k);
     found.push_back(
-        modeOf(std::sqrt(std::max(square, 1.0)) / units::TWO_PI, shapes_ * turn, near.stickout / ELEMENTS));
+        modeOf(std::sqrt(std::max(square, 1.0)) / units::TWO_PI, shapes_ * mix, near.stickout / ELEMENTS));
   }
   return found;
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

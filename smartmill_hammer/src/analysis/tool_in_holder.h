@@ -4,43 +4,42 @@
 
 #include <Eigen/Core>
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
-/// A mode of spindle and holder alone, as a rigid tool's tip would show it.
+/// A mode of spindle and holder with a rigid massless tool, at its tip.
 struct SpindleMode {
   double frequency = 0.0;  ///< [Hz]
   double gain = 0.0;       ///< [m/N] static, at the tip
   double tilt = 0.0;       ///< [1/m] slope over deflection at the tip
 };
 
-/// A tool as a beam (Timoshenko elements), held by a spring across and one against tilting in what the
-/// spindle modes move.
+/// A tool as a beam (Timoshenko elements) on a lateral and a rotational spring, whose base the spindle modes
+/// move.
 struct ToolInHolder {
   double young = 0.0, density = 0.0;                                                  // [N/m2], [kg/m3]
   double stickout = 0.0, diameter = 0.0, fluted_length = 0.0, fluted_diameter = 0.0;  // [m]
-  double across = 0.0, turning = 0.0;                                                 // [N/m], [N m/rad]
+  double lateral_stiffness = 0.0, rotational_stiffness = 0.0;                         // [N/m], [N m/rad]
   std::vector<SpindleMode> spindle;
 };
 
-/// A mode of both together.
+/// A mode of tool and spindle coupled.
 struct HeldMode {
   double frequency = 0.0;     ///< [Hz]
   std::vector<double> shape;  ///< deflection [1/sqrt(kg)] and slope at each node, from the tip
   double element = 0.0;       ///< [m] from node to node
 
-  double at(double height) const;                 ///< deflection above the tip [m]
-  double gain(double struck, double read) const;  ///< [m/N] static share
+  double deflection(double height) const;         ///< [1/sqrt(kg)] deflection at a height [m] above the tip
+  double gain(double struck, double read) const;  ///< [m/N] static
 };
 
-/// The modes of a tool in its holder, and, to first order, those of one that differs a little.
+/// Modes of a tool in its holder, and to first order those of a slightly different one.
 class HeldTool {
  public:
   explicit HeldTool(const ToolInHolder& tool);
 
-  /// Lowest first, all that the elements have; empty when the beam is none.
+  /// All modes of the elements, lowest first; empty for an invalid beam.
   const std::vector<HeldMode>& modes() const { return modes_; }
-  /// In the same order. Of the same spindle modes' number; modes of one frequency are not told apart.
+  /// In the same order. @param near with the same number of spindle modes; modes of equal frequency mix
   std::vector<HeldMode> modesOf(const ToolInHolder& near) const;
 
  private:
@@ -51,5 +50,4 @@ class HeldTool {
   std::vector<HeldMode> modes_;
 };
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

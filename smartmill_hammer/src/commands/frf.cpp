@@ -17,8 +17,8 @@
 namespace smartmill::hammer {
 namespace {
 
-/// So many modes, those with the most evidence, whether proven or not.
-void keep(ModalEstimate& estimate, std::size_t count) {
+/// Keeps the modes with the most evidence, proven or not.
+void keepStrongest(ModalEstimate& estimate, std::size_t count) {
   std::vector<EstimatedMode> all = estimate.modes;
   all.insert(all.end(), estimate.doubts.begin(), estimate.doubts.end());
   std::sort(all.begin(), all.end(),
@@ -31,7 +31,7 @@ void keep(ModalEstimate& estimate, std::size_t count) {
 }
 
 void runFiles(const FrfOptions& options, const std::vector<TapFormat>& formats) {
-  const auto [frfs, ringing_length] = readFrfs(options, formats);
+  const auto [frfs, truncated_length] = readFrfs(options, formats);
   const bool receptance = frfs.front().frf.unit == "m/N";
   std::vector<FrequencyResponse> all;
   for (const NamedFrf& frf : frfs) all.push_back(frf.frf);
@@ -40,10 +40,10 @@ void runFiles(const FrfOptions& options, const std::vector<TapFormat>& formats) 
   search.high = options.high;
   search.max_modes = options.max_modes;
   search.real_modes = options.real_modes;
-  int told = -1;
-  search.progress = [&told](double share) {
+  int reported = -1;
+  search.progress = [&reported](double share) {
     const int percent = static_cast<int>(10.0 * share) * 10;
-    if (percent > told) std::cerr << "modes: " << (told = percent) << " %\n";
+    if (percent > reported) std::cerr << "modes: " << (reported = percent) << " %\n";
     return true;
   };
   ModalEstimate estimate;
@@ -52,24 +52,24 @@ void runFiles(const FrfOptions& options, const std::vector<TapFormat>& formats) 
   } catch (const Error& error) {
     throw Error(options.inputs.front() + ": " + error.what());
   }
-  if (options.modes > 0) keep(estimate, static_cast<std::size_t>(options.modes));
+  if (options.modes > 0) keepStrongest(estimate, static_cast<std::size_t>(options.modes));
   const double window = options.parameters.measurement.exponential_time;
   for (std::vector<EstimatedMode>* modes : {&estimate.modes, &estimate.doubts}) {
-    // The exponential window's own damping.
+    // The damping of the exponential window.
     for (EstimatedMode& m : *modes)
       m.damping_ratio -= window > 0.0 ? 1.0 / (window * units::TWO_PI * m.frequency) : 0.0;
   }
-  // Pictures show the FRF as it was measured, cut decay and all.
+  // Plots show the FRF as measured, with the truncated decay.
   ModalEstimate whole = estimate;
-  removeCut(whole.modes, ringing_length);
-  removeCut(whole.doubts, ringing_length);
-  if (ringing_length > 0.0)
+  correctTruncation(whole.modes, truncated_length);
+  correctTruncation(whole.doubts, truncated_length);
+  if (truncated_length > 0.0)
     std::printf(
-        "the response rings on at the record's end: poles as they are, gains with the cut's share taken "
-        "off\n");
+        "the response has not decayed at the end of the record: the gains are corrected for the "
+        "truncation\n");
   printEstimate(whole, receptance);
   writeResults(options, "", frfs, estimate);
-  if (ringing_length > 0.0)
+  if (truncated_length > 0.0)
     writeModesYaml(whole, frfs.front().frf.unit, {frfs.front().name}, options.out + "/modes.yaml");
   if (options.tip.stickout > 0.0) {
     if (!receptance || frfs.size() > 1) throw Error("--stickout-mm: expected a single receptance");
@@ -77,7 +77,7 @@ void runFiles(const FrfOptions& options, const std::vector<TapFormat>& formats) 
   }
 }
 
-/// A cross FRF and the direct one of the same blows, fitted together: one set of poles, gains of both.
+/// A cross FRF and the direct one of the same hits, fitted together with common poles.
 void writeCross(const FrfOptions& options, const MeasureFrfResult& result, const NamedFrf& direct) {
   ModalEstimateOptions search;
   search.low = options.parameters.measurement.fit_low;
@@ -92,7 +92,7 @@ void writeCross(const FrfOptions& options, const MeasureFrfResult& result, const
 
 void runBag(const FrfOptions& options) {
   if (options.inputs.size() != 1) throw Error(options.inputs[1] + ": expected a single bag");
-  if (options.model.empty()) throw Error("--model: a bag needs the machine model that the session ran with");
+  if (options.model.empty()) throw Error("--model: expected the machine model of the recorded session");
   const std::vector<MeasureFrfResult> results =
       replayBag(options.inputs[0], options.model, options.parameters);
   if (results.empty()) throw Error(options.inputs[0] + ": no goal of hammer/measure_frf found");
@@ -164,7 +164,7 @@ void addTip(const CommandOptions& line, TipOptions& tip) {
 std::function<int()> declare(CommandLine& line) {
   const auto o = std::make_shared<FrfOptions>();
   line.option("INPUT", o->inputs,
-              "files; hammer records are averaged as hits of one point, FRFs are fitted together")
+              "files; hammer records are averaged as hits of one point, FRFs are fitted with common poles")
       .required();
   line.option("-o,--out", o->out, "folder for frf.csv, frf.frf, frf.uff, modes.yaml, hits.csv and pictures")
       .showDefault();
@@ -173,16 +173,16 @@ std::function<int()> declare(CommandLine& line) {
       .showDefault();
   line.option("--low", o->low, "lower end of the band of modes [Hz] (bags: fit_low of --params)")
       .notNegative();
-  line.option("--high", o->high, "upper end [Hz], up to which hits must have force; 0: the whole record")
+  line.option("--high", o->high,
+              "upper end [Hz], up to which the force of a hit must have power; 0: the whole record")
       .notNegative();
-  line.option("--modes", o->modes, "number of modes, those with the most evidence; 0: as many as are proven")
+  line.option("--modes", o->modes, "number of modes, those with the most evidence; 0: all proven ones")
       .within(0, 200);
-  line.option("--max-modes", o->max_modes, "largest number, when the data decide")
-      .within(1, 200)
-      .showDefault();
+  line.option("--max-modes", o->max_modes, "largest number of proven modes").within(1, 200).showDefault();
   line.flag("--real-modes", o->real_modes, "proportional damping: gains without phase");
   line.option("--average", o->average, "average of hits").oneOf({"h1", "h2", "hv"}).showDefault();
-  line.option("--weak-force", o->weak_force, "[N] a lower peak is no hit; 0: from the noise").notNegative();
+  line.option("--weak-force", o->weak_force, "[N] hits with a lower peak are rejected; 0: from the noise")
+      .notNegative();
   addChannels(line, o->channels);
   addTip(line, o->tip);
   line.flag("--binary", o->binary, "frf.uff with binary values (58b)");
@@ -192,7 +192,7 @@ std::function<int()> declare(CommandLine& line) {
   parameters->add("--second-hit-share", "second_hit_share");
   parameters->add("--exponential-time", "exponential_time");
   parameters->add("--asked-std", "asked_std");
-  line.flag("--no-picture", o->no_picture, "no PNG");
+  line.flag("--no-picture", o->no_picture, "no PNG files");
   return [o, table, parameters] {
     parameters->apply();
     o->parameters.validate();

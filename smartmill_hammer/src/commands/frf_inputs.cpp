@@ -27,13 +27,13 @@ std::vector<TapFormat> formatsOf(const FrfOptions& options) {
     const TapFormat given = FORMATS.at(options.format);
     formats.push_back(given == TapFormat::automatic ? detectFormat(file) : given);
     if ((formats.back() == TapFormat::bag) != (formats.front() == TapFormat::bag))
-      throw Error(file + ": not the same kind of file as " + options.inputs.front());
+      throw Error(file + ": expected the same kind of file as " + options.inputs.front());
   }
   return formats;
 }
 
 Frfs readFrfs(const FrfOptions& options, const std::vector<TapFormat>& formats) {
-  double ringing_length = 0.0;
+  double truncated_length = 0.0;
   std::vector<TapRecord> taps;
   std::vector<NamedFrf> frfs;
   for (std::size_t i = 0; i < options.inputs.size(); ++i) {
@@ -54,9 +54,9 @@ Frfs readFrfs(const FrfOptions& options, const std::vector<TapFormat>& formats) 
                                 AVERAGES.at(options.average)};
     const TapFrf frf = averageTaps(taps, average);
     verdicts = frf.hits;
-    ringing_length = frf.ringing_length;
+    truncated_length = frf.truncated_length;
     for (const TapVerdict& v : verdicts)
-      std::printf("%s: %s\n", v.file.c_str(), v.accepted() ? "accepted" : ("refused: " + v.reason).c_str());
+      std::printf("%s: %s\n", v.file.c_str(), v.accepted() ? "accepted" : ("rejected: " + v.reason).c_str());
     const int hits = frf.receptance.averages;
     if (hits > 0) printUncertainty(options, frf.receptance);
     if (hits > 0) frfs.push_back({std::to_string(hits) + (hits == 1 ? " hit" : " hits"), frf.receptance});
@@ -65,7 +65,7 @@ Frfs readFrfs(const FrfOptions& options, const std::vector<TapFormat>& formats) 
   writeHitsCsv(verdicts, options.out + "/hits.csv");
   if (frfs.empty())
     throw Error("no hit was accepted; " + verdicts.back().file + ": " + verdicts.back().reason);
-  return {frfs, ringing_length};
+  return {frfs, truncated_length};
 }
 
 }  // namespace smartmill::hammer

@@ -9,13 +9,13 @@ namespace smartmill::hammer {
 
 struct Frfs {
   std::vector<NamedFrf> frfs;
-  double ringing_length = 0.0;  // [s] of hits, see TapFrf
+  double truncated_length = 0.0;  // [s] of hits, see TapFrf
 };
 
-/// The formats of the input files. @throws Error where a bag is among others.
+/// The formats of the input files. @throws Error for a bag among other files.
 std::vector<TapFormat> formatsOf(const FrfOptions& options);
 
-/// Hits become one FRF; FRFs stay as they are. Writes the verdicts on the hits.
+/// Averages hits to one FRF; FRFs are unchanged. Writes the verdicts on the hits.
 Frfs readFrfs(const FrfOptions& options, const std::vector<TapFormat>& formats);
 
 }  // namespace smartmill::hammer

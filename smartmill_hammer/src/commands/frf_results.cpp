@@ -34,31 +34,31 @@ void printModes(const std::vector<EstimatedMode>& modes, bool receptance) {
               receptance ? "stiffness [N/um]" : "gain [1]", "phase [deg]  evidence");
   for (const EstimatedMode& m : modes) {
     const Gain gain = gainOf(m, 0);
-    const double shown = receptance ? 1.0 / gain.value / units::N_PER_UM : gain.value;
+    const double printed = receptance ? 1.0 / gain.value / units::N_PER_UM : gain.value;
     std::printf("  %-24s %-24s %-26s %8.1f  %10.1f\n",
                 formatted("%.3f +- %.3f", m.frequency, m.frequency_std).c_str(),
                 formatted("%.4f +- %.4f", 100.0 * m.damping_ratio, 100.0 * m.damping_ratio_std).c_str(),
-                formatted("%.4g +- %.2g", shown, std::abs(shown * gain.std / gain.value)).c_str(),
+                formatted("%.4g +- %.2g", printed, std::abs(printed * gain.std / gain.value)).c_str(),
                 units::degFromRad(gain.phase), m.evidence);
   }
 }
 
 void printEstimate(const ModalEstimate& estimate, bool receptance) {
-  if (estimate.conjugated) std::printf("phase rises through the resonances: turned before the fit\n");
+  if (estimate.conjugated) std::printf("phase rises through the resonances: conjugated before the fit\n");
   std::printf("%zu modes proven\n", estimate.modes.size());
   printModes(estimate.modes, receptance);
   if (estimate.doubts.empty()) return;
-  std::printf("doubts, seen but not proven:\n");
+  std::printf("doubtful modes, visible but not proven:\n");
   printModes(estimate.doubts, receptance);
 }
 
 void printUncertainty(const FrfOptions& options, const FrequencyResponse& frf) {
   const double high = options.high > 0.0 ? options.high : frf.frequency.back();
-  const double asked = options.parameters.measurement.asked_std;
-  const HitsNeeded needed = hitsNeeded(frf, options.low, high, asked > 0.0 ? asked : 1.0);
+  const double required = options.parameters.measurement.asked_std;
+  const HitsNeeded needed = hitsNeeded(frf, options.low, high, required > 0.0 ? required : 1.0);
   std::printf("relative standard deviation over %.0f..%.0f Hz: %.2f %% by %d hits", options.low, high,
               100.0 * needed.relative_std, needed.hits);
-  if (asked > 0.0) std::printf("; for %.2f %% %d are enough", 100.0 * asked, needed.needed);
+  if (required > 0.0) std::printf("; %.2f %% requires %d", 100.0 * required, needed.needed);
   std::printf("\n");
 }
 
@@ -99,8 +99,8 @@ void writeTip(const FrfOptions& options, const FrequencyResponse& frf, const Mod
                 formatted("%.4g +- %.2g N/um", 1.0 / m.direct.gain / units::N_PER_UM,
                           m.direct.gain_std / std::pow(m.direct.gain, 2) / units::N_PER_UM)
                     .c_str());
-    std::printf("%s\n", m.seen ? formatted("gain x %.3f +- %.3f", m.factor, m.factor_std).c_str()
-                               : "told by the beam alone");
+    std::printf("%s\n", m.measured ? formatted("gain x %.3f +- %.3f", m.factor, m.factor_std).c_str()
+                                   : "predicted by the beam");
   }
   writeFrfCsv(tipResponse(frf, tip), options.out + "/frf_tip.csv");
   writeModesYaml(estimateOf(tip.model()), frf.unit, {"tool tip"}, options.out + "/modes_tip.yaml");

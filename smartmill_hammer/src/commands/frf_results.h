@@ -28,21 +28,20 @@ struct FrfOptions {
   TipOptions tip;
 };
 
-/// Table of modes. @param receptance stiffness in place of the gain
+/// Table of modes. @param receptance prints the stiffness instead of the gain
 void printModes(const std::vector<EstimatedMode>& modes, bool receptance);
 
-/// Proven modes, then those that are not.
+/// Proven modes, then doubtful ones.
 void printEstimate(const ModalEstimate& estimate, bool receptance);
 
-/// Relative standard deviation of the average over the band, and the hits needed for the one asked for.
+/// Relative standard deviation of the average over the band, and the hits that the required one needs.
 void printUncertainty(const FrfOptions& options, const FrequencyResponse& frf);
 
-/// FRFs, modes and pictures in the folder of results.
-/// @param suffix of a measurement among several
+/// Writes FRFs, modes and plots to the folder of results. @param suffix of the file names
 void writeResults(const FrfOptions& options, const std::string& suffix, const std::vector<NamedFrf>& frfs,
                   const ModalEstimate& estimate);
 
-/// The direct FRF at the tip, in addition to the measured one: frf_tip.csv, modes_tip.yaml.
+/// Writes the direct FRF at the tip: frf_tip.csv, modes_tip.yaml.
 void writeTip(const FrfOptions& options, const FrequencyResponse& frf, const ModalEstimate& estimate);
 
 }  // namespace smartmill::hammer

@@ -24,27 +24,27 @@ struct Options {
   HealthAllowance allowance;
 };
 
-struct Seen {
+struct ModesOfBag {
   std::string bag;
   MeasuredModes modes;
 };
-struct Friction {
+struct FrictionOfBag {
   std::string bag;
   double stamp = 0.0, viscous = 0.0, coulomb = 0.0;
 };
-/// In air, of one tool in one bag.
-struct Air {
+/// Air cuts of one tool in one bag.
+struct AirCuts {
   std::string bag;
   double stamp = 0.0;
-  IdleRecord record;
+  AirCutRecord record;
 };
 
-/// All of the bags, in the order of their stamps; modes by tool, point and direction.
+/// Measurements of all bags in order of time; modes by tool, point and direction.
 struct History {
-  std::map<std::string, std::vector<Seen>> modes;
-  std::vector<Friction> friction;
-  std::map<std::string, std::vector<Air>> air;  // by tool
-  std::map<std::string, ModalModel> sensors;    // the newest, by channel of the dynamometer
+  std::map<std::string, std::vector<ModesOfBag>> modes;
+  std::vector<FrictionOfBag> friction;
+  std::map<std::string, std::vector<AirCuts>> air;  // by tool
+  std::map<std::string, ModalModel> sensors;        // latest, by channel of the dynamometer
 };
 
 constexpr double DAY = 86400.0;     // [s]
@@ -65,34 +65,36 @@ History read(const std::vector<std::string>& bags) {
       if (std::isfinite(set.friction_viscous) && std::isfinite(set.friction_coulomb))
         history.friction.push_back({bag, set.stamp, set.friction_viscous, set.friction_coulomb});
     });
-    SortedIdle idle(HOLD_BACK);
+    IdleSpindlePipeline idle(HOLD_BACK);
     connectIdle(reader, idle);
     feed<SpindleAngle>(reader, names::SPINDLE_ANGLE, idle);
     reader.run();
     idle.finish();
     for (const auto& [tool, record] : idle.records())
-      history.air[tool].push_back({bag, endOf(record), record});
+      history.air[tool].push_back({bag, endTime(record), record});
   }
   for (auto& [tool, list] : history.air)
-    std::stable_sort(list.begin(), list.end(), [](const Air& a, const Air& b) { return a.stamp < b.stamp; });
+    std::stable_sort(list.begin(), list.end(),
+                     [](const AirCuts& a, const AirCuts& b) { return a.stamp < b.stamp; });
   for (auto& [name, list] : history.modes)
     std::stable_sort(list.begin(), list.end(),
-                     [](const Seen& a, const Seen& b) { return a.modes.stamp < b.modes.stamp; });
+                     [](const ModesOfBag& a, const ModesOfBag& b) { return a.modes.stamp < b.modes.stamp; });
   std::stable_sort(history.friction.begin(), history.friction.end(),
-                   [](const Friction& a, const Friction& b) { return a.stamp < b.stamp; });
+                   [](const FrictionOfBag& a, const FrictionOfBag& b) { return a.stamp < b.stamp; });
   return history;
 }
 
-/// Table and CSV rows of one measurement against the first. @return how many drifted
+/// Prints one measurement compared with the first and adds it to the CSV. @return number of drifted
+/// quantities
 int report(const std::string& name, const std::string& bag, double first, double stamp,
            const std::vector<HealthChange>& changes, CsvWriter& csv) {
   const double days = (stamp - first) / DAY;
   std::printf("%s, %s, %.2f days after the first\n", name.c_str(), bag.c_str(), days);
   int drifted = 0;
   for (const HealthChange& c : changes) {
-    std::printf("  %-52s %12.5g -> %12.5g  %+8.2f %%  %7.1f deviations%s\n", c.what.c_str(), c.before, c.now,
+    std::printf("  %-52s %12.5g -> %12.5g  %+8.2f %%  %7.1f std%s\n", c.quantity.c_str(), c.before, c.now,
                 100.0 * c.relative, c.sigmas, c.drifted() ? "  DRIFT" : "");
-    csv.row(name, bag, days, c.what, c.before, c.now, c.sigmas, c.drifted() ? "true" : "false", stamp);
+    csv.row(name, bag, days, c.quantity, c.before, c.now, c.sigmas, c.drifted() ? "true" : "false", stamp);
     drifted += c.drifted();
   }
   return drifted;
@@ -108,7 +110,7 @@ int run(const Options& options) {
                         modeChanges(list[0].modes, list[i].modes, options.allowance), csv);
   }
   for (std::size_t i = 1; i < history.friction.size(); ++i, ++compared) {
-    const Friction &first = history.friction[0], &now = history.friction[i];
+    const FrictionOfBag &first = history.friction[0], &now = history.friction[i];
     drifted +=
         report("spindle", now.bag, first.stamp, now.stamp,
                {valueChange("viscous friction", {first.viscous}, {now.viscous}, options.allowance.friction),
@@ -117,13 +119,14 @@ int run(const Options& options) {
   }
   for (const auto& [tool, list] : history.air) {
     for (std::size_t i = 1; i < list.size(); ++i, ++compared)
-      drifted += report("spindle in air, " + (tool.empty() ? std::string("tool") : tool), list[i].bag,
-                        list[0].stamp, list[i].stamp,
-                        idleChanges(list[0].record, list[i].record, history.sensors, options.allowance), csv);
+      drifted +=
+          report("spindle in air, " + (tool.empty() ? std::string("tool") : tool), list[i].bag, list[0].stamp,
+                 list[i].stamp,
+                 airCutChanges(list[0].record, list[i].record, history.sensors, options.allowance), csv);
   }
   if (compared == 0)
     throw Error(options.bags.front() +
-                ": nothing was measured twice (topics tool/modes, material/coefficients; cuts in air)");
+                ": no quantity was measured twice (topics tool/modes, material/coefficients; air cuts)");
   if (!options.out.empty()) csv.save(options.out);
   std::printf("%d measurements compared with the first of their kind, %d quantities drifted\n", compared,
               drifted);
@@ -137,8 +140,9 @@ smartmill::Command healthCommand() {
   command.name = command.tool = "health";
   command.summary = "reports drift of modes, friction and unbalance over recorded sessions";
   command.description =
-      "Health of a spindle over recorded sessions: modes of each tool, point and direction, friction, and in "
-      "air unbalance and the load meter's reading, each compared with its first measurement.";
+      "Health of a spindle over recorded sessions: modes of each tool, point and direction, friction, and "
+      "from "
+      "air cuts unbalance and spindle load, each compared with its first measurement.";
   command.examples = {
       {"monday.bag friday.bag", "changes in standard deviations, DRIFT where significant"},
       {"*.bag -o health.csv", "every comparison as a table; `database DB keep health.csv` stores it"}};

@@ -15,15 +15,14 @@
 #include "smartmill_ros/run_node.h"
 #include "wiring.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
-constexpr double WATCH_PERIOD = 0.01;  // [s]
+constexpr double CHECK_PERIOD = 0.01;  // [s]
 
 NodeParameters read(const ros::NodeHandle& private_nh) {
   NodeParameters parameters = parametersFromServer(private_nh).readAll<NodeParameters>();
-  if (parameters.model.empty()) throw Error("model: the path of a smartmill-model/1 file is due");
+  if (parameters.model.empty()) throw Error("model: empty, expected the path of a smartmill-model/1 file");
   return parameters;
 }
 
@@ -32,42 +31,44 @@ NodeParameters read(const ros::NodeHandle& private_nh) {
 HammerServer::HammerServer(ros::NodeHandle nh, ros::NodeHandle private_nh)
     : parameters_(read(private_nh)),
       shell_(nh, private_nh, "hammer", parameters_.stale_timeout),
-      sorted_(parameters_.measurement, readMachineModel(parameters_.model), parameters_.hold_back,
-              {[this](const Command& command) {
-                 if (machine_) machine_->execute(command);
-               },
-               [this](const Feedback& f) { server_.feedback(f.stage, f.progress, f.hits_done); },
-               [this](const MeasureFrfResult& result) { finish(result); },
-               [this] {
-                 if (machine_) machine_->forget();
-                 server_.restart();
-               }}),
+      pipeline_(parameters_.measurement, readMachineModel(parameters_.model), parameters_.hold_back,
+                {[this](const Command& command) {
+                   if (machine_) machine_->execute(command);
+                 },
+                 [this](const Feedback& f) { server_.feedback(f.stage, f.progress, f.hits_done); },
+                 [this](const MeasureFrfResult& result) { finish(result); },
+                 [this] {
+                   if (machine_) machine_->clear();
+                   server_.restart();
+                 }}),
       idle_(parameters_.hold_back,
-            [this](const std::string& tool, const IdleRecord& seen) { tell(health_.turned(tool, seen)); }),
-      streams_{sorted_, idle_},
+            [this](const std::string& tool, const AirCutRecord& record) {
+              publish(health_.addAirCut(tool, record));
+            }),
+      streams_{pipeline_, idle_},
       server_(nh, names::MEASURE_TOOL_FRF, "hammer",
               {[this](const MeasureFrfGoal& goal, std::function<bool(bool)> begin) {
-                 sorted_.push(goal, std::move(begin));
+                 pipeline_.push(goal, std::move(begin));
                },
-               [this](std::function<bool()> due) { sorted_.cancel(std::move(due)); }}) {
-  // Not in a replay: an action client's constructor waits for the clock, and rosbag play waits for this
-  // node's subscribers before it publishes one.
+               [this](std::function<bool()> applies) { pipeline_.cancel(std::move(applies)); }}) {
+  // Not in a replay: the constructor of an action client waits for the clock, which rosbag play publishes
+  // only once this node has subscribed.
   if (parameters_.command_machine)
-    machine_.emplace(nh, [this](const std::string& text) { sorted_.commandFailed(text); });
+    machine_.emplace(nh, [this](const std::string& text) { pipeline_.commandFailed(text); });
   health_publisher_ = nh.advertise<smartmill_msgs::SpindleHealth>(names::SPINDLE_HEALTH, 10);
   connect(shell_.inputs(), streams_);
   connectIdle(shell_.inputs(), idle_);
   shell_.diagnose("automatic hammer", [this](auto& status) { diagnose(status); });
-  shell_.every(WATCH_PERIOD, [this] { watch(); });
+  shell_.every(CHECK_PERIOD, [this] { checkInputs(); });
 }
 
 void HammerServer::finish(const MeasureFrfResult& result) {
-  if (result.code == FrfCode::ok) tell(health_.measured(result.modes));
+  if (result.code == FrfCode::ok) publish(health_.addModes(result.modes));
   server_.finish({result.code, result.message, result.frf, result.modes, result.cross, result.sensitivity,
-                  result.sensitivity_std, result.flute_sure, result.spindle_moves});
+                  result.sensitivity_std, result.flute_confidence, result.spindle_moves});
 }
 
-void HammerServer::tell(const std::optional<HealthReport>& report) {
+void HammerServer::publish(const std::optional<HealthReport>& report) {
   if (!report) return;
   smartmill_msgs::SpindleHealth message;
   message.header.stamp = fromSec(report->stamp);
@@ -75,7 +76,7 @@ void HammerServer::tell(const std::optional<HealthReport>& report) {
   message.days = report->days;
   for (const HealthChange& c : report->changes) {
     smartmill_msgs::HealthChange change;
-    change.quantity = c.what;
+    change.quantity = c.quantity;
     change.first = c.before;
     change.now = c.now;
     change.deviations = std::isfinite(c.sigmas) ? c.sigmas : NOT_A_NUMBER;
@@ -85,33 +86,32 @@ void HammerServer::tell(const std::optional<HealthReport>& report) {
   health_publisher_.publish(message);
 }
 
-void HammerServer::watch() {
+void HammerServer::checkInputs() {
   if (!machine_) {
-    if (shell_.inputs().any().ended()) sorted_.flush();
+    if (shell_.inputs().any().ended()) pipeline_.flush();
     return;
   }
-  machine_->pump();
+  machine_->update();
   const InputHealth* dead = shell_.inputs().dead({names::HAMMER, names::CNC_STATE, names::SPINDLE_ANGLE});
   if (!dead) return;
   const std::string text =
-      formatted("%s is silent for %.1f s", dead->topic().c_str(), dead->watchdog().silent());
-  sorted_.lost(text);
+      formatted("%s: no message for %.1f s", dead->topic().c_str(), dead->watchdog().silent());
+  pipeline_.inputLost(text);
   server_.refuseWaiting(text, parameters_.stale_timeout);
 }
 
 void HammerServer::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   using Level = diagnostic_msgs::DiagnosticStatus;
-  status.summary(Level::OK, sorted_.measuring() ? "measuring" : "ready");
+  status.summary(Level::OK, pipeline_.isMeasuring() ? "measuring" : "ready");
   if (const InputHealth* dead = shell_.inputs().dead({names::HAMMER, names::CNC_STATE, names::SPINDLE_ANGLE}))
-    status.mergeSummary(Level::WARN, dead->topic() + " is silent");
+    status.mergeSummary(Level::WARN, dead->topic() + ": no messages");
   for (const std::string& warning : health_.warnings()) status.mergeSummary(Level::WARN, warning);
-  status.add("late messages", sorted_.late());
-  status.add("waiting for", sorted_.waitingFor());
+  status.add("late messages", pipeline_.lateMessages());
+  status.add("waiting for", pipeline_.waitingFor());
   status.add("last measurement", server_.lastMessage());
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer
 
 int smartmill::nodeMain(int argc, char** argv) {
   return runNode<hammer::HammerServer>(argc, argv, "hammer");

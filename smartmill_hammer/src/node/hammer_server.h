@@ -8,17 +8,16 @@
 #include "parameters.h"
 #include "smartmill_hammer/analysis/health_watch.h"
 #include "smartmill_hammer/analysis/idle_spindle.h"
-#include "smartmill_hammer/sequence/sorted_sequence.h"
+#include "smartmill_hammer/sequence/hammer_pipeline.h"
 #include "smartmill_ros/frf_server.h"
 #include "smartmill_ros/node_shell.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
-/// The spindle's angle serves the measurement and the watch in air; one subscription.
+/// Inputs of the measurement and of the air cuts, which share the spindle angle.
 struct Streams {
-  SortedSequence& sequence;
-  SortedIdle& idle;
+  HammerPipeline& sequence;
+  IdleSpindlePipeline& idle;
 
   void push(const SampleBlock& hammer) { sequence.push(hammer); }
   void push(const CncState& state) { sequence.push(state); }
@@ -28,8 +27,8 @@ struct Streams {
   }
 };
 
-/// Shell around SortedSequence: goals and streams in, commands to the CNC bridge's actions and to daq/strike,
-/// results out. All callbacks run in one thread.
+/// ROS interface of HammerPipeline: goals and streams in, commands to the actions of the CNC bridge and to
+/// daq/strike, results out. All callbacks run in one thread.
 class HammerServer {
  public:
   using Parameters = NodeParameters;
@@ -38,20 +37,19 @@ class HammerServer {
 
  private:
   void finish(const MeasureFrfResult& result);
-  void tell(const std::optional<HealthReport>& report);
-  void watch();
+  void publish(const std::optional<HealthReport>& report);
+  void checkInputs();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   NodeParameters parameters_;
   NodeShell shell_;
   std::optional<MachineCommands> machine_;  // none in a replay
-  SortedSequence sorted_;
-  SortedIdle idle_;
+  HammerPipeline pipeline_;
+  IdleSpindlePipeline idle_;
   Streams streams_;
   FrfServer server_;
   HealthWatch health_;
   ros::Publisher health_publisher_;
 };
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -5,8 +5,7 @@
 #include "smartmill_core/names.h"
 #include "smartmill_ros/conversions.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 MachineCommands::MachineCommands(ros::NodeHandle nh, std::function<void(const std::string&)> failed)
     : failed_(std::move(failed)),
@@ -24,7 +23,7 @@ void MachineCommands::execute(const Command& command) {
       return stop();
     default:
       waiting_.push_back(command);
-      return pump();
+      return update();
   }
 }
 
@@ -44,12 +43,12 @@ void MachineCommands::send(Client<Action>& client, const char* name, const Goal&
   busy_with_ = name;
   client.sendGoal(goal, [this, name = std::string(name)](const auto& state, const auto& result) {
     const bool good = state == actionlib::SimpleClientGoalState::SUCCEEDED && result && result->code == 0;
-    done(name, good, result && !result->message.empty() ? result->message : state.toString());
+    actionDone(name, good, result && !result->message.empty() ? result->message : state.toString());
   });
 }
 
-// One motion at a time: the streams may show a motion done before its action says so.
-void MachineCommands::pump() {
+// One motion at a time: the streams may indicate completion before the action does.
+void MachineCommands::update() {
   if (const auto fault = strike_.takeFault()) failed_(fault->message);
   if (!busy_with_.empty() || waiting_.empty()) return;
   const Command command = std::move(waiting_.front());
@@ -75,11 +74,10 @@ void MachineCommands::pump() {
   }
 }
 
-void MachineCommands::done(const std::string& name, bool good, const std::string& message) {
-  busy_with_.clear();  // the next command goes out from the timer: not from inside the client's own callback
+void MachineCommands::actionDone(const std::string& name, bool good, const std::string& message) {
+  busy_with_.clear();  // update() sends the next command, not this callback of the client
   if (!good && !stopping_) failed_(name + ": " + message);
   stopping_ = false;
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -11,22 +11,22 @@
 #include <smartmill_msgs/RunProgramAction.h>
 
 #include "smartmill_hammer/sequence/hammer_sequence.h"
-#include "smartmill_ros/strike_caller.h"
+#include "smartmill_ros/strike_client.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
-/// Hands the commands of a measurement to the CNC bridge's actions, one motion at a time, and to daq/strike.
+/// Sends the commands of a measurement to the actions of the CNC bridge, one motion at a time, and to
+/// daq/strike.
 class MachineCommands {
  public:
-  /// @param failed told of a command that could not be done, one line
+  /// @param failed called with one line when a command fails
   MachineCommands(ros::NodeHandle nh, std::function<void(const std::string&)> failed);
 
   void execute(const Command& command);
-  /// Now and then: the next motion, and what the hammer answered.
-  void pump();
-  /// What waits was meant for another run.
-  void forget() { waiting_.clear(); }
+  /// To be called periodically: sends the next motion and checks the hammer's reply.
+  void update();
+  /// Discards commands that wait.
+  void clear() { waiting_.clear(); }
 
  private:
   template <class Action>
@@ -35,17 +35,16 @@ class MachineCommands {
   void stop();
   template <class Action, class Goal>
   void send(Client<Action>& client, const char* name, const Goal& goal);
-  void done(const std::string& name, bool good, const std::string& message);
+  void actionDone(const std::string& name, bool good, const std::string& message);
 
   std::function<void(const std::string&)> failed_;
   Client<smartmill_msgs::JogAction> jog_;
   Client<smartmill_msgs::OrientSpindleAction> orient_;
   Client<smartmill_msgs::RunProgramAction> program_;
-  StrikeCaller strike_;
+  StrikeClient strike_;
   std::deque<Command> waiting_;
-  std::string busy_with_;  // action that is running
-  bool stopping_ = false;  // its failure is wanted
+  std::string busy_with_;  // action in progress
+  bool stopping_ = false;  // a failure is expected
 };
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -4,24 +4,22 @@
 #include "smartmill_core/signal/feed.h"
 #include "smartmill_hammer/analysis/idle_spindle.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
-/// The streams of a measurement, from a node's inputs or from a bag.
-template <class Source, class Sorted>
-void connect(Source& source, Sorted& sorted) {
-  feed<SampleBlock>(source, names::HAMMER, sorted);
-  feed<CncState>(source, names::CNC_STATE, sorted);
-  feed<SpindleAngle>(source, names::SPINDLE_ANGLE, sorted);
+/// Connects the streams of a measurement, from a node's inputs or from a bag.
+template <class Source, class Pipeline>
+void connect(Source& source, Pipeline& pipeline) {
+  feed<SampleBlock>(source, names::HAMMER, pipeline);
+  feed<CncState>(source, names::CNC_STATE, pipeline);
+  feed<SpindleAngle>(source, names::SPINDLE_ANGLE, pipeline);
 }
 
-/// What the spindle shows in air, beside its angle.
+/// Connects the streams of air cuts, except the spindle angle.
 template <class Source>
-void connectIdle(Source& source, SortedIdle& idle) {
+void connectIdle(Source& source, IdleSpindlePipeline& idle) {
   feed<SampleBlock>(source, names::DYNAMOMETER, idle);
   feed<CuttingCondition>(source, names::CUTTING_CONDITION, idle);
   feed<LoadSample>(source, names::CNC_LOAD, idle);
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -3,32 +3,30 @@
 #include <cstdio>
 
 #include "node/wiring.h"
-#include "smartmill_hammer/sequence/sorted_sequence.h"
+#include "smartmill_hammer/sequence/hammer_pipeline.h"
 #include "smartmill_recording/recording_reader.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 std::vector<MeasureFrfResult> replayBag(const std::string& bag, const std::string& model,
                                         const NodeParameters& parameters) {
   std::vector<MeasureFrfResult> results;
   // The recorded streams answer the commands.
-  SortedSequence sorted(
+  HammerPipeline pipeline(
       parameters.measurement, readMachineModel(model), parameters.hold_back,
       {{},
        [](const Feedback& feedback) { std::fprintf(stderr, "%s\n", feedback.stage.c_str()); },
        [&results](const MeasureFrfResult& result) { results.push_back(result); },
        {}});
   RecordingReader reader(bag);
-  connect(reader, sorted);
+  connect(reader, pipeline);
   reader.on<plain::MeasureFrfActionGoal>(names::goals(names::MEASURE_TOOL_FRF),
-                                         [&sorted](const plain::MeasureFrfActionGoal& m, double received) {
-                                           sorted.push(goalFromMsg(m.goal, received));
+                                         [&pipeline](const plain::MeasureFrfActionGoal& m, double received) {
+                                           pipeline.push(goalFromMsg(m.goal, received));
                                          });
   reader.run();
-  sorted.flush();
+  pipeline.flush();
   return results;
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -5,13 +5,11 @@
 
 #include "node/parameters.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
-/// Puts a recorded session through the node's class: same results as live.
-/// @return in order, failed ones too. @throws Error naming bag, model or parameter.
+/// Replays a recorded session through the node's pipeline: same results as live.
+/// @return all results in order, failed ones included. @throws Error naming bag, model or parameter.
 std::vector<MeasureFrfResult> replayBag(const std::string& bag, const std::string& model,
                                         const NodeParameters& parameters);
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -5,8 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 constexpr HealthAllowance NONE{0.0, 0.0, 0.0, 0.0, 0.0};
@@ -20,31 +19,30 @@ MeasuredModes measured(std::mt19937& random, double stiffer = 1.0) {
   return m;
 }
 
-// By their stated deviations alone: a thousand healthy comparisons of nine quantities, and one that is 10 %
-// stiffer (seven deviations of a difference).
-TEST(Health, TellsDriftFromChance) {
+// By the stated standard deviations alone: a thousand comparisons of nine unchanged quantities, and one with
+// 10 % more stiffness (seven standard deviations of a difference).
+TEST(Health, DistinguishesDriftFromChance) {
   std::mt19937 random(5);
   int false_alarms = 0, found = 0;
   for (int i = 0; i < 1000; ++i) {
     const MeasuredModes first = measured(random);
-    false_alarms += !driftOf(modeChanges(first, measured(random), NONE)).empty();
-    found += driftOf(modeChanges(first, measured(random, 1.1), NONE)).find("gain") != std::string::npos;
+    false_alarms += !driftText(modeChanges(first, measured(random), NONE)).empty();
+    found += driftText(modeChanges(first, measured(random, 1.1), NONE)).find("gain") != std::string::npos;
   }
   EXPECT_LE(false_alarms, 5);
   EXPECT_GE(found, 990);
 }
 
-TEST(Health, SeesModesComeAndGo) {
+TEST(Health, ReportsNewAndMissingModes) {
   std::mt19937 random(6);
   const MeasuredModes first = measured(random);
   MeasuredModes less = measured(random);
   less.model.modes.pop_back();
-  EXPECT_NE(driftOf(modeChanges(first, less)).find("gone"), std::string::npos);
-  EXPECT_NE(driftOf(modeChanges(less, first)).find("new"), std::string::npos);
+  EXPECT_NE(driftText(modeChanges(first, less)).find("gone"), std::string::npos);
+  EXPECT_NE(driftText(modeChanges(less, first)).find("new"), std::string::npos);
   EXPECT_TRUE(valueChange("friction", {1.0}, {1.3}, 0.05).drifted());
   EXPECT_FALSE(valueChange("friction", {1.0}, {1.1}, 0.05).drifted());
 }
 
 }  // namespace
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

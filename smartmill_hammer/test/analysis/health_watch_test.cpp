@@ -3,8 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 using ::testing::HasSubstr;
@@ -18,69 +17,69 @@ MeasuredModes modes(const std::string& tool, const std::string& direction, doubl
   return m;
 }
 
-IdleRecord air(double speed, double load) {
-  IdleRecord r;
+AirCutRecord air(double speed, double load) {
+  AirCutRecord r;
   r.loads.push_back({0.0, speed, load, 1e-4});
   return r;
 }
 
-// Day to day 0.2 % of a frequency is allowed and four deviations of it are 0.8 %: 0.3 % is no drift, 2 % is.
-TEST(HealthWatch, WarnsOfModesThatDriftUntilTheNextGoodMeasurement) {
+// The allowance of a frequency is 0.2 %, four standard deviations are 0.8 %: 0.3 % is no drift, 2 % is one.
+TEST(HealthWatch, WarnsOfDriftedModesUntilTheNextMeasurement) {
   HealthWatch watch;
-  watch.measured(modes("T1", "x", 1000.0));
+  watch.addModes(modes("T1", "x", 1000.0));
   EXPECT_TRUE(watch.warnings().empty());
-  watch.measured(modes("T1", "x", 1003.0));
+  watch.addModes(modes("T1", "x", 1003.0));
   EXPECT_TRUE(watch.warnings().empty());
-  watch.measured(modes("T1", "x", 1023.0));
+  watch.addModes(modes("T1", "x", 1023.0));
   ASSERT_EQ(watch.warnings().size(), 1u);
-  EXPECT_THAT(watch.warnings()[0], HasSubstr("T1 tool_tip x differs from the last good measurement"));
-  watch.measured(modes("T1", "x", 1023.0));
+  EXPECT_THAT(watch.warnings()[0], HasSubstr("T1 tool_tip x differs from the previous measurement"));
+  watch.addModes(modes("T1", "x", 1023.0));
   EXPECT_TRUE(watch.warnings().empty());
 }
 
-// Another tool or direction is another thing: neither drift itself nor the end of one.
+// Another tool or direction neither begins nor ends a drift.
 TEST(HealthWatch, ComparesLikeWithLike) {
   HealthWatch watch;
-  watch.measured(modes("T1", "x", 1000.0));
-  watch.measured(modes("T1", "y", 1300.0));
-  watch.measured(modes("T2", "x", 700.0));
+  watch.addModes(modes("T1", "x", 1000.0));
+  watch.addModes(modes("T1", "y", 1300.0));
+  watch.addModes(modes("T2", "x", 700.0));
   EXPECT_TRUE(watch.warnings().empty());
-  watch.measured(modes("T1", "x", 950.0));
-  watch.measured(modes("T1", "y", 1300.0));
+  watch.addModes(modes("T1", "x", 950.0));
+  watch.addModes(modes("T1", "y", 1300.0));
   ASSERT_EQ(watch.warnings().size(), 1u);
   EXPECT_THAT(watch.warnings()[0], HasSubstr("T1 tool_tip x"));
 }
 
-// Told against the first of its kind, however slowly it goes.
-TEST(HealthWatch, TellsEachMeasurementAgainstTheFirst) {
+// Slow drift is reported against the first measurement.
+TEST(HealthWatch, ReportsEachMeasurementAgainstTheFirst) {
   HealthWatch watch;
   MeasuredModes m = modes("T1", "x", 1000.0);
   m.stamp = 1000.0;
-  EXPECT_FALSE(watch.measured(m)) << "the first";
+  EXPECT_FALSE(watch.addModes(m)) << "the first";
   for (const double frequency : {1004.0, 1008.0, 1012.0}) {
     m.stamp += 86400.0;
     m.model.modes[0].frequency = frequency;
-    const auto told = watch.measured(m);
-    ASSERT_TRUE(told);
-    EXPECT_EQ(told->measured, "T1 tool_tip x");
-    EXPECT_EQ(told->stamp, m.stamp);
-    EXPECT_NEAR(told->days, (m.stamp - 1000.0) / 86400.0, 1e-12);
-    ASSERT_EQ(told->changes.size(), 6u) << "frequency, damping and gain of two modes";
-    EXPECT_EQ(told->changes[0].what, "frequency of the mode at 1000 Hz");
-    EXPECT_EQ(told->changes[0].before, 1000.0);
-    EXPECT_EQ(told->changes[0].now, frequency);
-    EXPECT_EQ(told->changes[0].drifted(), frequency > 1010.0);
+    const auto report = watch.addModes(m);
+    ASSERT_TRUE(report);
+    EXPECT_EQ(report->measured, "T1 tool_tip x");
+    EXPECT_EQ(report->stamp, m.stamp);
+    EXPECT_NEAR(report->days, (m.stamp - 1000.0) / 86400.0, 1e-12);
+    ASSERT_EQ(report->changes.size(), 6u) << "frequency, damping and gain of two modes";
+    EXPECT_EQ(report->changes[0].quantity, "frequency of the mode at 1000 Hz");
+    EXPECT_EQ(report->changes[0].before, 1000.0);
+    EXPECT_EQ(report->changes[0].now, frequency);
+    EXPECT_EQ(report->changes[0].drifted(), frequency > 1010.0);
   }
   EXPECT_TRUE(watch.warnings().empty()) << "none differs from the one before";
 }
 
-// Cuts in air come by the hundred: what tells nothing new is told once an hour.
-TEST(HealthWatch, TellsCutsInAirWhereADriftBeginsOrEndsAndOnceAnHour) {
+// Air cuts are frequent: without a change they are reported once an hour.
+TEST(HealthWatch, ReportsAirCutsWhereADriftBeginsOrEndsAndOnceAnHour) {
   HealthWatch watch;
   const auto at = [&](double stamp, double load) {
-    IdleRecord r = air(600.0, load);
+    AirCutRecord r = air(600.0, load);
     r.loads[0].stamp = stamp;
-    return watch.turned("T1", r);
+    return watch.addAirCut("T1", r);
   };
   EXPECT_FALSE(at(0.0, 0.010)) << "the first";
   const auto again = at(60.0, 0.0101);
@@ -96,23 +95,22 @@ TEST(HealthWatch, TellsCutsInAirWhereADriftBeginsOrEndsAndOnceAnHour) {
   EXPECT_TRUE(at(3901.0, 0.010)) << "an hour later";
 }
 
-// 5 % of a load is allowed from day to day: four deviations of it are 20 %. Another speed is compared with
-// none.
-TEST(HealthWatch, WarnsOfLoadInAirAtTheSameSpeed) {
+// The allowance of a load is 5 %, four standard deviations are 20 %. Another speed has nothing to compare
+// with.
+TEST(HealthWatch, WarnsOfTheAirCutLoadAtTheSameSpeed) {
   HealthWatch watch;
-  watch.turned("T1", air(600.0, 0.010));
-  watch.turned("T1", air(1200.0, 0.030));
-  watch.turned("T1", air(600.0, 0.0105));
+  watch.addAirCut("T1", air(600.0, 0.010));
+  watch.addAirCut("T1", air(1200.0, 0.030));
+  watch.addAirCut("T1", air(600.0, 0.0105));
   EXPECT_TRUE(watch.warnings().empty());
-  watch.turned("T1", air(600.0, 0.015));
+  watch.addAirCut("T1", air(600.0, 0.015));
   ASSERT_EQ(watch.warnings().size(), 1u);
-  EXPECT_THAT(watch.warnings()[0], HasSubstr("spindle in air with T1 differs from the first time: "));
-  watch.turned("T2", air(600.0, 0.015));
+  EXPECT_THAT(watch.warnings()[0], HasSubstr("spindle in air with T1 differs from the first air cut: "));
+  watch.addAirCut("T2", air(600.0, 0.015));
   EXPECT_EQ(watch.warnings().size(), 1u);
-  watch.turned("T1", air(600.0, 0.010));
+  watch.addAirCut("T1", air(600.0, 0.010));
   EXPECT_TRUE(watch.warnings().empty());
 }
 
 }  // namespace
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

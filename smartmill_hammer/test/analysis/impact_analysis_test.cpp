@@ -1,5 +1,5 @@
 #include "smartmill_core/modal/impact_analysis.h"
-#include "smartmill_core/modal/hit_judge.h"
+#include "smartmill_core/modal/hit_check.h"
 
 #include <cmath>
 #include <random>
@@ -14,16 +14,15 @@
 #include "smartmill_hammer/analysis/offset_factor.h"
 #include "smartmill_hammer/analysis/tap_records.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 constexpr double RATE = 25600.0;
 
-/// A half-sine blow on one mode; the response is exact for the force drawn straight between samples of 1/8 of
+/// A half-sine hit on one mode; the response is exact for a force that is linear between samples of 1/8 of
 /// the step.
-Hit blow(const ModalModel& model, double peak, double noise, std::mt19937& random,
-         std::size_t samples = 5120) {
+Hit hitOn(const ModalModel& model, double peak, double noise, std::mt19937& random,
+          std::size_t samples = 5120) {
   std::normal_distribution<double> normal;
   ModalFilter filter(model, 8 * RATE, Hold::first_order);
   Hit hit;
@@ -49,22 +48,22 @@ ModalModel oneMode() {
   return m;
 }
 
-// Ringing on at the record's end, 10 ms before the blow: of 1 / (2 pi f zeta) = 5.3 s and 1.3 s one second is
-// recorded, and 151.2 Hz ends a fifth of a cycle off. The modes themselves are the source; 0.1 % of the
-// sampled pulse's aliasing in the gain.
-TEST(TapRecords, CutRingingKeepsPolesAndGains) {
+// A truncated decay, 10 ms before the hit: one second is recorded of time constants 1 / (2 pi f zeta) = 5.3 s
+// and 1.3 s, and 151.2 Hz ends a fifth of a cycle off. Reference: the modes themselves; aliasing of the
+// sampled pulse is 0.1 % of the gain.
+TEST(TapRecords, TruncatedDecayKeepsPolesAndGains) {
   std::mt19937 random(9);
   ModalModel beam;
   beam.modes = {{151.2, 2e-4, 1.3e-6}, {817.3, 1.5e-4, 4e-8}};
   std::vector<TapRecord> taps;
   for (int k = 0; k < 3; ++k)
     taps.push_back(
-        {"blow " + std::to_string(k), blow(beam, 13.0, 1.0, random, 25600), ResponseKind::displacement});
+        {"hit " + std::to_string(k), hitOn(beam, 13.0, 1.0, random, 25600), ResponseKind::displacement});
   const TapFrf frf = averageTaps(taps, {});
   for (const TapVerdict& v : frf.hits) EXPECT_TRUE(v.accepted()) << v.reason;
-  EXPECT_GT(frf.ringing_length, 0.98);
+  EXPECT_GT(frf.truncated_length, 0.98);
   std::vector<EstimatedMode> modes = estimateModes({frf.receptance}, {}).modes;
-  removeCut(modes, frf.ringing_length);
+  correctTruncation(modes, frf.truncated_length);
   ASSERT_EQ(modes.size(), beam.modes.size());
   for (std::size_t k = 0; k < modes.size(); ++k) {
     EXPECT_NEAR(modes[k].frequency, beam.modes[k].frequency, 1e-5 * beam.modes[k].frequency);
@@ -91,7 +90,7 @@ TEST(OffsetCorrection, IsTheThesisFactor) {
 TEST(ImpactAnalysis, ReproducesTheReceptance) {
   std::mt19937 random(3);
   ImpactAnalysis analysis{ImpactOptions()};
-  analysis.add(blow(oneMode(), 200.0, 0.0, random));
+  analysis.add(hitOn(oneMode(), 200.0, 0.0, random));
   const FrequencyResponse h = analysis.frf();
   for (const double f : {200.0, 1000.0, 1200.0, 1300.0, 2000.0}) {
     const auto truth = oneMode().response(f);
@@ -99,13 +98,13 @@ TEST(ImpactAnalysis, ReproducesTheReceptance) {
   }
 }
 
-// Against the noise-free blow (sampling a half sine aliases by some tenths of a percent, which no scatter
-// shows). Mean of |error|^2 over the stated variance is one; over 40 measurements x 40 independent lines it
-// scatters by 4 %.
-TEST(ImpactAnalysis, StandardDeviationIsHonest) {
+// Against the noise-free hit (sampling a half sine aliases by some tenths of a percent, which no scatter
+// contains). Mean of |error|^2 over the stated variance is one; over 40 measurements x 40 independent lines
+// it scatters by 4 %.
+TEST(ImpactAnalysis, StandardDeviationIsCalibrated) {
   std::mt19937 unused(1);
   ImpactAnalysis clean{ImpactOptions()};
-  clean.add(blow(oneMode(), 200.0, 0.0, unused));
+  clean.add(hitOn(oneMode(), 200.0, 0.0, unused));
   const FrequencyResponse exact = clean.frf();
   for (const int hits : {1, 3, 8}) {
     double ratio[3] = {};
@@ -113,7 +112,7 @@ TEST(ImpactAnalysis, StandardDeviationIsHonest) {
     for (int run = 0; run < 40; ++run) {
       std::mt19937 random(50u + static_cast<std::uint32_t>(100 * hits + run));
       ImpactAnalysis analysis{ImpactOptions()};
-      for (int i = 0; i < hits; ++i) analysis.add(blow(oneMode(), 200.0 + 10 * i, 1.0, random));
+      for (int i = 0; i < hits; ++i) analysis.add(hitOn(oneMode(), 200.0 + 10 * i, 1.0, random));
       for (const FrfAverage average : {FrfAverage::h1, FrfAverage::h2, FrfAverage::hv}) {
         const FrequencyResponse h = analysis.frf(average);
         for (std::size_t k = 160; k < 320; k += 4)  // 800..1600 Hz
@@ -129,24 +128,23 @@ TEST(ImpactAnalysis, StandardDeviationIsHonest) {
   }
 }
 
-// As many hits as asked, and no more: the error that is then seen, against the noise-free blow, is the one
-// asked for.
-TEST(HitsNeeded, ReachTheAskedUncertainty) {
+// As many hits as required and no more: the error against the noise-free hit is then the required one.
+TEST(HitsNeeded, ReachTheRequiredUncertainty) {
   std::mt19937 unused(1);
   ImpactAnalysis clean{ImpactOptions()};
-  clean.add(blow(oneMode(), 200.0, 0.0, unused));
+  clean.add(hitOn(oneMode(), 200.0, 0.0, unused));
   const FrequencyResponse exact = clean.frf();
-  const double low = 200.0, high = 2000.0, asked = 0.01;
+  const double low = 200.0, high = 2000.0, required = 0.01;
   double squares = 0.0, hits = 0.0;
   constexpr int RUNS = 20;
   for (std::uint32_t run = 0; run < RUNS; ++run) {
     std::mt19937 random(900u + run);
     ImpactAnalysis analysis{ImpactOptions()};
     HitsNeeded needed;
-    while (analysis.hits() < 3 || !needed.enough()) {
+    while (analysis.hits() < 3 || !needed.isReached()) {
       ASSERT_LT(analysis.hits(), 60);
-      analysis.add(blow(oneMode(), 200.0, 3.0, random));
-      if (analysis.hits() > 1) needed = hitsNeeded(analysis.frf(), low, high, asked);
+      analysis.add(hitOn(oneMode(), 200.0, 3.0, random));
+      if (analysis.hits() > 1) needed = hitsNeeded(analysis.frf(), low, high, required);
     }
     double off = 0.0, all = 0.0;
     const FrequencyResponse h = analysis.frf();
@@ -159,16 +157,16 @@ TEST(HitsNeeded, ReachTheAskedUncertainty) {
     hits += analysis.hits() / static_cast<double>(RUNS);
   }
   EXPECT_GT(hits, 3.5);  // the rule was what ended it
-  EXPECT_LT(std::sqrt(squares), 1.15 * asked);
-  EXPECT_GT(std::sqrt(squares), 0.75 * asked);
-  EXPECT_THROW(hitsNeeded(exact, 1e6, 2e6, asked), Error);
+  EXPECT_LT(std::sqrt(squares), 1.15 * required);
+  EXPECT_GT(std::sqrt(squares), 0.75 * required);
+  EXPECT_THROW(hitsNeeded(exact, 1e6, 2e6, required), Error);
 }
 
-// Noise of the force pulls H1 down, noise of the response pulls H2 up; Hv lies between, |H1| = C |H2|.
-TEST(ImpactAnalysis, AveragesStandInOrder) {
+// Noise of the force lowers H1, noise of the response raises H2; Hv is between them, |H1| = C |H2|.
+TEST(ImpactAnalysis, AveragesAreOrdered) {
   std::mt19937 random(9);
   ImpactAnalysis analysis{ImpactOptions()};
-  for (int i = 0; i < 4; ++i) analysis.add(blow(oneMode(), 20.0, 5.0, random));
+  for (int i = 0; i < 4; ++i) analysis.add(hitOn(oneMode(), 20.0, 5.0, random));
   const FrequencyResponse one = analysis.frf(FrfAverage::h1), two = analysis.frf(FrfAverage::h2),
                           between = analysis.frf(FrfAverage::hv);
   for (std::size_t k = 100; k < 400; k += 7) {
@@ -185,7 +183,7 @@ TEST(ImpactAnalysis, ExponentialWindowAddsKnownDamping) {
   options.exponential_time = 0.02;
   std::mt19937 random(3);
   ImpactAnalysis analysis(options);
-  analysis.add(blow(model, 200.0, 0.0, random));
+  analysis.add(hitOn(model, 200.0, 0.0, random));
   ModalModel damped = model;
   damped.modes[0].damping_ratio += 1.0 / (0.02 * units::TWO_PI * 1200.0);
   EXPECT_LT(std::abs(analysis.frf().at(1200.0) - damped.response(1200.0)),
@@ -196,10 +194,10 @@ TEST(ImpactAnalysis, ExponentialWindowAddsKnownDamping) {
 
 TEST(HitFaults, AreNamed) {
   std::mt19937 random(4);
-  const HitJudgeOptions limits{20.0, 0.1, 1.0, 0.0};
-  const Hit good = blow(oneMode(), 200.0, 0.2, random);
+  const HitCheckOptions limits{20.0, 0.1, 1.0, 0.0};
+  const Hit good = hitOn(oneMode(), 200.0, 0.2, random);
   EXPECT_EQ(hitFault(good, limits).text, "");
-  EXPECT_NE(hitFault(blow(oneMode(), 10.0, 0.2, random), limits).text.find("weak"), std::string::npos);
+  EXPECT_NE(hitFault(hitOn(oneMode(), 10.0, 0.2, random), limits).text.find("weak"), std::string::npos);
   Hit twice = good;
   for (int i = 0; i < 10; ++i) twice.force[800 + i] += 60.0 * std::sin(units::PI * i / 10.0);
   EXPECT_NE(hitFault(twice, limits).text.find("double hit"), std::string::npos);
@@ -217,7 +215,7 @@ TEST(HitFaults, AreNamed) {
 
 TEST(HitCollector, CutsRecordsAndNamesLostSamples) {
   std::mt19937 random(5);
-  const Hit hit = blow(oneMode(), 200.0, 0.2, random, 10000);
+  const Hit hit = hitOn(oneMode(), 200.0, 0.2, random, 10000);
   for (const bool lossy : {false, true}) {
     HitCollector collector({10.0, 0.005, 0.1});
     collector.arm();
@@ -240,5 +238,4 @@ TEST(HitCollector, CutsRecordsAndNamesLostSamples) {
 }
 
 }  // namespace
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -12,15 +12,15 @@
 #include "smartmill_core/testing/shared_data.h"
 #include "smartmill_hammer/analysis/tap_records.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 // The one mode nearest to a published frequency [Hz].
-const EstimatedMode& nearest(const ModalEstimate& estimate, double due) {
-  return *std::min_element(estimate.modes.begin(), estimate.modes.end(), [due](const auto& a, const auto& b) {
-    return std::abs(a.frequency - due) < std::abs(b.frequency - due);
-  });
+const EstimatedMode& nearest(const ModalEstimate& estimate, double expected) {
+  return *std::min_element(estimate.modes.begin(), estimate.modes.end(),
+                           [expected](const auto& a, const auto& b) {
+                             return std::abs(a.frequency - expected) < std::abs(b.frequency - expected);
+                           });
 }
 
 void expectFinite(const ModalEstimate& estimate) {
@@ -33,7 +33,7 @@ void expectFinite(const ModalEstimate& estimate) {
   }
 }
 
-// Published: modes at 1074, 1961, 2617 Hz; what stands about 1265 and 2713 Hz is smaller.
+// Published: modes at 1074, 1961, 2617 Hz; the features near 1265 and 2713 Hz are smaller.
 TEST(MeasuredToolTip, ShowsThePublishedModes) {
   SMARTMILL_SHARED_DATA(file, "measured/tool_tip_tap/EMA_Point_1_Channel_1_CH1.txt");
   ASSERT_EQ(detectFormat(file), TapFormat::frf);
@@ -43,12 +43,12 @@ TEST(MeasuredToolTip, ShowsThePublishedModes) {
     const ModalEstimate estimate = estimateModes({readFrfText(file)}, options);
     ASSERT_GE(estimate.modes.size(), 3u);
     EXPECT_LE(estimate.modes.size(), 10u);
-    for (const double due : {1074.0, 1961.0, 2617.0}) {
-      const EstimatedMode& found = nearest(estimate, due);
-      EXPECT_NEAR(found.frequency, due, 0.01 * due);
+    for (const double expected : {1074.0, 1961.0, 2617.0}) {
+      const EstimatedMode& found = nearest(estimate, expected);
+      EXPECT_NEAR(found.frequency, expected, 0.01 * expected);
       EXPECT_GT(found.gain[0], 0.0);
     }
-    // The shoulder beside the third mode is a mode of its own; that about 1265 Hz is not proven by one point.
+    // The shoulder next to the third mode is a mode of its own; that near 1265 Hz is not proven by one point.
     EXPECT_NEAR(nearest(estimate, 2713.0).frequency, 2713.0, 0.01 * 2713.0);
     expectFinite(estimate);
   }
@@ -63,13 +63,13 @@ TEST(MeasuredToolTip, AllPointsShareThePublishedModes) {
   options.low = 500.0;
   options.high = 3500.0;
   const ModalEstimate estimate = estimateModes(frfs, options);
-  for (const double due : {1074.0, 1961.0, 2617.0})
-    EXPECT_NEAR(nearest(estimate, due).frequency, due, 0.01 * due);
-  // No cancelling companions: one mode within 4 % of the first.
+  for (const double expected : {1074.0, 1961.0, 2617.0})
+    EXPECT_NEAR(nearest(estimate, expected).frequency, expected, 0.01 * expected);
+  // No pair of cancelling modes: one mode within 4 % of the first.
   EXPECT_EQ(std::count_if(estimate.modes.begin(), estimate.modes.end(),
                           [](const EstimatedMode& m) { return std::abs(m.frequency - 1074.0) < 43.0; }),
             1);
-  // The shapes' signs turn along the tool: all points alike in the first mode, not in the second.
+  // Signs of the mode shapes along the tool: equal at all points in the first mode, not in the second.
   const EstimatedMode &first = nearest(estimate, 1074.0), &second = nearest(estimate, 1961.0);
   for (std::size_t o = 1; o < 5; ++o) EXPECT_GT(first.gain[o] * first.gain[0], 0.0);
   EXPECT_LT(second.gain[4] * second.gain[0], 0.0);
@@ -79,7 +79,7 @@ TEST(MeasuredToolTip, AllPointsShareThePublishedModes) {
 // Engineering Vibration Toolbox: one mode each between 156 and 312 Hz.
 TEST(MeasuredVibrationToolbox, OneModeEach) {
   SMARTMILL_SHARED_DATA(folder, "measured/vt_cases");
-  const double due[] = {212.0925, 192.5938};
+  const double expected[] = {212.0925, 192.5938};
   for (const int i : {0, 1}) {
     ModalEstimateOptions options;
     options.low = 156.0;
@@ -87,7 +87,7 @@ TEST(MeasuredVibrationToolbox, OneModeEach) {
     const ModalEstimate estimate =
         estimateModes({readFrfText(folder + "/case" + std::to_string(i + 1) + ".txt")}, options);
     ASSERT_EQ(estimate.modes.size(), 1u) << i;
-    EXPECT_NEAR(estimate.modes[0].frequency, due[i], 5e-4 * due[i]);
+    EXPECT_NEAR(estimate.modes[0].frequency, expected[i], 5e-4 * expected[i]);
     expectFinite(estimate);
   }
 }
@@ -102,7 +102,7 @@ TEST(MeasuredToolTip, SingleHitAgreesWithTheAverage) {
   EXPECT_NEAR(frf.receptance.at(2617.0).imag(), -0.2180e-6, 0.05 * 0.2180e-6);
 }
 
-// H1 of five hits: no hit refused, and poles at the peaks that the record's description lists.
+// H1 of five hits: no hit rejected, and poles at the peaks that the record's description lists.
 TEST(MeasuredFiveHits, GiveOnePoleSet) {
   SMARTMILL_SHARED_DATA(folder, "measured/five_hits");
   std::vector<TapRecord> taps;
@@ -117,8 +117,8 @@ TEST(MeasuredFiveHits, GiveOnePoleSet) {
   options.low = 500.0;
   options.high = 6500.0;
   const ModalEstimate estimate = estimateModes({frf.receptance}, options);
-  for (const double due : {810.0, 900.0, 2640.0, 3669.0, 3690.0, 4093.0, 4128.0, 4164.0, 4392.0, 5969.0})
-    EXPECT_NEAR(nearest(estimate, due).frequency, due, 4.0);
+  for (const double expected : {810.0, 900.0, 2640.0, 3669.0, 3690.0, 4093.0, 4128.0, 4164.0, 4392.0, 5969.0})
+    EXPECT_NEAR(nearest(estimate, expected).frequency, expected, 4.0);
   expectFinite(estimate);
 }
 
@@ -171,7 +171,7 @@ TEST(TapRecords, ReadUniversalFilesAndDynoWare) {
   EXPECT_DOUBLE_EQ(channels.taps[0].hit.response[7], 7.0);
 }
 
-TEST(TapRecords, NameWhatIsWrong) {
+TEST(TapRecords, ErrorsNameTheFault) {
   const auto message = [](const std::string& text, const std::function<void(const std::string&)>& read) {
     const std::string file = testing::TempDir() + "smartmill_tap.csv";
     std::ofstream(file) << text;
@@ -190,7 +190,7 @@ TEST(TapRecords, NameWhatIsWrong) {
             std::string::npos);
   EXPECT_NE(message("0 1 2\n0.1 1\n", [](const std::string& f) { readTapText(f); }).find("line 2"),
             std::string::npos);
-  // Too short to be judged
+  // Too short to be checked
   EXPECT_NE(message("time[s],hammer[N],acceleration[m/s2]\n0,1,1\n0.1,1,1\n",
                     [](const std::string& f) {
                       const TapFrf none = averageTaps({readTapCsv(f)}, {});
@@ -203,5 +203,4 @@ TEST(TapRecords, NameWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

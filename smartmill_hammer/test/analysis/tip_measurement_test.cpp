@@ -1,5 +1,5 @@
-// What leads from hits to the tip: cross-talk of the solenoid, gains at known poles, shifts of modes, the
-// tool's modes beside themselves.
+// From hits to the tip: solenoid crosstalk, gains at known poles, shifts of modes, first-order modes of the
+// tool.
 
 #include <cmath>
 #include <complex>
@@ -11,11 +11,10 @@
 #include "../../src/analysis/tool_in_holder.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
-#include "smartmill_hammer/analysis/coil_talk.h"
 #include "smartmill_hammer/analysis/pole_gains.h"
+#include "smartmill_hammer/analysis/solenoid_crosstalk.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 using Complex = std::complex<double>;
@@ -23,8 +22,8 @@ using Complex = std::complex<double>;
 constexpr double RATE = 25600.0;
 constexpr std::size_t BEFORE = 256, SAMPLES = 2560;
 
-/// A half sine of 0.3 ms and the ringing after it; the current adds to both channels until the touch and dies
-/// away with 2 ms.
+/// A half sine of 0.3 ms and its decaying response; the current adds to both channels until contact and
+/// decays with 2 ms.
 Hit hitWith(double coil_force, double coil_volt, double noise, std::uint32_t seed) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
@@ -48,34 +47,34 @@ double largestDifference(const std::vector<double>& a, const std::vector<double>
   return largest;
 }
 
-TEST(CoilTalk, IsTakenOffBothChannels) {
+TEST(SolenoidCrosstalk, IsSubtractedFromBothChannels) {
   for (const double sign : {1.0, -1.0}) {
     const Hit clean = hitWith(0.0, 0.0, 0.05, 1);
     Hit hit = hitWith(sign * 5.0, -sign * 0.03, 0.05, 1);
-    removeCoilTalk(hit, 0.05);
-    // The time constant is found among steps of 10 %, the touch to a sample.
+    removeSolenoidCrosstalk(hit, 0.05);
+    // The time constant is found in steps of 10 %, the contact to one sample.
     EXPECT_LT(largestDifference(hit.force, clean.force), 0.06 * 5.0) << sign;
     EXPECT_LT(largestDifference(hit.response, clean.response), 0.06 * 0.03) << sign;
   }
 }
 
-TEST(CoilTalk, WhatIsNoneStays) {
+TEST(SolenoidCrosstalk, OtherLevelsAreUnchanged) {
   const Hit clean = hitWith(0.0, 0.0, 0.05, 2);
   Hit hit = clean;
-  removeCoilTalk(hit, 0.05);
+  removeSolenoidCrosstalk(hit, 0.05);
   EXPECT_LT(largestDifference(hit.force, clean.force), 0.05);  // of noise at most
   const Hit large = hitWith(12.0, 0.0, 0.05, 2);               // 8 % of the peak
   hit = large;
-  removeCoilTalk(hit, 0.05);
+  removeSolenoidCrosstalk(hit, 0.05);
   EXPECT_EQ(hit.force, large.force);
-  Hit drifted = clean;  // by 8 % towards the end: nothing that died away
+  Hit drifted = clean;  // by 8 % towards the end: no decay
   for (std::size_t i = BEFORE; i < SAMPLES; ++i)
     drifted.force[i] += 12.0 * static_cast<double>(i - BEFORE) / static_cast<double>(SAMPLES - BEFORE);
   hit = drifted;
-  removeCoilTalk(hit, 0.1);
+  removeSolenoidCrosstalk(hit, 0.1);
   EXPECT_EQ(hit.force, drifted.force);
   hit = drifted;
-  removeCoilTalk(hit, 0.0);
+  removeSolenoidCrosstalk(hit, 0.0);
   EXPECT_EQ(hit.response, drifted.response);
 }
 
@@ -109,7 +108,7 @@ TEST(PoleGains, AreThoseOfTheFrf) {
   EXPECT_THROW(gainsAtPoles(responseOf(model), poles, 100.0, 110.0), Error);
 }
 
-// A mode that is a little faster, more damped and larger: the change of the FRF tells by how much.
+// A slightly higher frequency, damping and gain follow from the change of the FRF.
 TEST(PoleGains, AChangeOfTheFrfShiftsTheModes) {
   const ModalModel model = twoModes();
   ModalModel other = model;
@@ -119,15 +118,15 @@ TEST(PoleGains, AChangeOfTheFrfShiftsTheModes) {
   const FrequencyResponse frf = responseOf(model);
   std::vector<Complex> change = responseOf(other).value;
   for (std::size_t k = 0; k < change.size(); ++k) change[k] -= frf.value[k];
-  const ModalModel shift = shiftOf(frf, change, model, 100.0, 3000.0);
+  const ModalModel shift = modeShifts(frf, change, model, 100.0, 3000.0);
   EXPECT_NEAR(shift.modes[0].frequency, 0.08, 0.001);
   EXPECT_NEAR(shift.modes[0].damping_ratio, -6e-5, 1e-6);
   EXPECT_NEAR(shift.modes[1].gain, -3e-11, 1e-12);
   EXPECT_NEAR(shift.modes[1].frequency, 0.0, 0.01);
 }
 
-// First order against the beam itself: what is left goes with the square of the step.
-TEST(HeldTool, ModesBesideItAreOfFirstOrder) {
+// First order compared with the beam itself: the residual is proportional to the square of the step.
+TEST(HeldTool, ModesOfASimilarToolAreOfFirstOrder) {
   ToolInHolder tool{5.8e11, 14300.0, 60e-3, 12e-3, 30e-3, 9.6e-3, 2e8, 2e5, {}};
   tool.spindle = {{900.0, 5e-9, 4.0}, {1700.0, 3e-9, -6.0}};
   const HeldTool held(tool);
@@ -135,7 +134,7 @@ TEST(HeldTool, ModesBesideItAreOfFirstOrder) {
     ToolInHolder near = tool;
     near.young *= 1.0 + step;
     near.stickout *= 1.0 - 0.3 * step;
-    near.turning *= 1.0 - step;
+    near.rotational_stiffness *= 1.0 - step;
     near.spindle[1].tilt += 3.0 * step;
     const HeldTool exact(near);
     const std::vector<HeldMode> first = held.modesOf(near);
@@ -152,5 +151,4 @@ TEST(HeldTool, ModesBesideItAreOfFirstOrder) {
 }
 
 }  // namespace
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -1,5 +1,4 @@
-// Wiring of hammer_node: one measurement against the closed-form machine, its bag through the offline class,
-// a cancel.
+// Interfaces of hammer_node: one measurement on the closed-form machine, the replay of its bag, a cancel.
 
 #include <algorithm>
 #include <atomic>
@@ -26,8 +25,7 @@
 #include "recordings/bag_replay.h"
 #include "smartmill_core/names.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 using Client = actionlib::SimpleActionClient<smartmill_msgs::MeasureFrfAction>;
@@ -76,14 +74,14 @@ class HammerNode : public testing::Test {
     recorders.push_back(nh.subscribe<Message>(topic, 0, write));
   }
 
-  /// Whether every recorder hears somebody, and hears them for a while.
+  /// Whether every recorder is connected, and has been for a while.
   bool recording() {
     const std::lock_guard<std::mutex> lock(mutex);
     return recorded > 200 && std::all_of(recorders.begin(), recorders.end(),
                                          [](const ros::Subscriber& s) { return s.getNumPublishers() > 0; });
   }
 
-  /// Whether all that was said up to a time has been recorded.
+  /// Whether all messages up to a time have been recorded.
   bool recordedUpTo(const ros::Time& time) {
     const std::lock_guard<std::mutex> lock(mutex);
     return std::all_of(newest.begin(), newest.end(), [&](const auto& entry) { return entry.second > time; });
@@ -123,7 +121,7 @@ TEST_F(HammerNode, MeasuresRecordsAndReplaysToTheLastDigit) {
     EXPECT_NEAR(result->modes.modes[k].gain, truth.tip[0].modes[k].gain, 0.05 * truth.tip[0].modes[k].gain);
   }
 
-  // Subscribers that come late get it too.
+  // Late subscribers receive it too.
   smartmill_msgs::FrfConstPtr frf;
   smartmill_msgs::ModalModelConstPtr modes;
   frf = ros::topic::waitForMessage<smartmill_msgs::Frf>(names::TOOL_FRF, nh, PATIENCE);
@@ -132,14 +130,14 @@ TEST_F(HammerNode, MeasuresRecordsAndReplaysToTheLastDigit) {
   EXPECT_EQ(frf->real, result->frf.real);
   EXPECT_EQ(modes->direction, "x");
 
-  // Measured again, it is told against the first.
+  // A second measurement is reported against the first.
   smartmill_msgs::SpindleHealthConstPtr health;
   const boost::function<void(const smartmill_msgs::SpindleHealthConstPtr&)> take = [&](const auto& m) {
     const std::lock_guard<std::mutex> lock(mutex);
     health = m;
   };
-  const auto told = nh.subscribe<smartmill_msgs::SpindleHealth>(names::SPINDLE_HEALTH, 10, take);
-  ASSERT_TRUE(eventually([&] { return told.getNumPublishers() > 0; }));
+  const auto subscriber = nh.subscribe<smartmill_msgs::SpindleHealth>(names::SPINDLE_HEALTH, 10, take);
+  ASSERT_TRUE(eventually([&] { return subscriber.getNumPublishers() > 0; }));
   ASSERT_TRUE(eventually([&, now = ros::Time::now()] { return recordedUpTo(now); }));
   {
     const std::lock_guard<std::mutex> lock(mutex);
@@ -159,7 +157,7 @@ TEST_F(HammerNode, MeasuresRecordsAndReplaysToTheLastDigit) {
   EXPECT_EQ(health->changes[0].now, client.getResult()->modes.modes[0].frequency);
   for (const auto& change : health->changes) EXPECT_FALSE(change.drifted) << change.quantity;
 
-  // The bag through the offline class: every digit.
+  // The replayed bag gives the same digits.
   std::string model;
   ASSERT_TRUE(nh.getParam("hammer/model", model));
   const std::vector<MeasureFrfResult> results = replayBag(bag_file, model, {});
@@ -203,8 +201,7 @@ TEST_F(HammerNode, RefusesABadGoalInOneLine) {
 }
 
 }  // namespace
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer
 
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);

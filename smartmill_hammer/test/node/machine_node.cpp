@@ -1,5 +1,4 @@
-// The closed-form machine as a ROS node, in the place of the CNC bridge and the sensors' driver, for the
-// wiring test.
+// The closed-form machine as a ROS node that replaces the CNC bridge and the sensor driver in tests.
 
 #include <optional>
 #include <sstream>
@@ -19,8 +18,7 @@
 #include "smartmill_core/names.h"
 #include "smartmill_ros/conversions.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 /// Incremental G0 and G1 blocks from a position.
@@ -46,7 +44,7 @@ std::vector<Waypoint> parse(const std::string& program, Axes3 at) {
   return path;
 }
 
-/// One action of the bridge: obeys, succeeds when the machine stands still.
+/// One action of the bridge: succeeds when the machine is at rest.
 template <class Action, class Result>
 class Motion {
  public:
@@ -140,8 +138,7 @@ void run() {
 }
 
 }  // namespace
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "machine");

@@ -2,8 +2,7 @@
 
 #include "smartmill_core/testing/shipped_parameters.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 TEST(Parameters, TheShippedFileIsTheTable) {
@@ -12,5 +11,4 @@ TEST(Parameters, TheShippedFileIsTheTable) {
 }
 
 }  // namespace
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -7,8 +7,7 @@
 
 #include "../closed_form_machine.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 double curve(double gap) {
@@ -40,24 +39,24 @@ TEST(FluteSearch, FindsAFluteOfRandomToolsWithinOneAndAHalfDegrees) {
     const double mounting = units::TWO_PI * uniform(random), noise = 0.5e-3;
     FluteSearch search(units::TWO_PI * uniform(random), FluteSearchOptions::forPitch(pitch));
     while (search.state() == FluteSearch::State::searching) {
-      const double counts = std::round(search.next() / units::TWO_PI * 4096.0);
+      const double counts = std::round(search.nextAngle() / units::TWO_PI * 4096.0);
       const double angle = units::TWO_PI * std::fmod(counts, 4096.0) / 4096.0;
       const double volt = curve(500e-6 + p.retreat(angle + mounting, 0.0, 0.0)) + noise * normal(random);
-      search.give(angle, volt, noise);
-      ASSERT_LT(search.measurements(), 120);
+      search.addMeasurement(angle, volt, noise);
+      ASSERT_LT(search.measurementCount(), 120);
     }
     ASSERT_EQ(search.state(), FluteSearch::State::found) << search.reason() << " trial " << trial;
     worst = std::max(worst, missed(p, mounting, search.angle()));
-    most = std::max(most, search.measurements());
+    most = std::max(most, search.measurementCount());
   }
   EXPECT_LT(units::degFromRad(worst), 1.5);
   RecordProperty("worst_deg", std::to_string(units::degFromRad(worst)));
   std::cout << "worst " << units::degFromRad(worst) << " deg, at most " << most << " measurements\n";
 }
 
-/// Moves over random cutters with uneven pitch and teeth that stand low, with rounded or insert teeth.
+/// Moves over random cutters with uneven pitch, low teeth, rounded teeth or inserts.
 struct Moves {
-  double mean = 0.0, worst = 0.0, sure = 0.0;  // [1], [rad] missed, [1]
+  double mean = 0.0, worst = 0.0, confidence = 0.0;  // [1], [rad] error, [1]
 };
 Moves movesOver(bool insert, bool golden_only) {
   std::mt19937 random(7);
@@ -90,25 +89,25 @@ Moves movesOver(bool insert, bool golden_only) {
     options.golden_only = golden_only;
     FluteSearch search(units::TWO_PI * uniform(random), options);
     while (search.state() == FluteSearch::State::searching) {
-      const double angle = std::round(search.next() / units::TWO_PI * 4096.0) / 4096.0 * units::TWO_PI;
-      search.give(angle, curve(500e-6 + retreat(angle)) + noise * normal(random), noise);
+      const double angle = std::round(search.nextAngle() / units::TWO_PI * 4096.0) / 4096.0 * units::TWO_PI;
+      search.addMeasurement(angle, curve(500e-6 + retreat(angle)) + noise * normal(random), noise);
     }
     EXPECT_EQ(search.state(), FluteSearch::State::found) << search.reason();
     double off = 10.0;
     for (const double a : at) off = std::min(off, std::abs(nearAngle(search.angle() + a, 0.0)));
     moves.worst = std::max(moves.worst, off);
-    moves.mean += search.measurements() / static_cast<double>(TRIALS);
-    moves.sure += search.sure() / TRIALS;
+    moves.mean += search.measurementCount() / static_cast<double>(TRIALS);
+    moves.confidence += search.confidence() / TRIALS;
   }
   return moves;
 }
 
-// The thesis bounds the bracket by 1.5 degrees; an insert's edge is found no worse.
+// The thesis bounds the bracket by 1.5 degrees; an insert's edge is found as precisely.
 TEST(FluteSearch, FindsUnevenTeethAndInsertsInFewerMovesThanTheThesis) {
   for (const bool insert : {false, true}) {
     const Moves ours = movesOver(insert, false), thesis = movesOver(insert, true);
     EXPECT_LT(units::degFromRad(ours.worst), 1.5) << insert;
-    EXPECT_GT(ours.sure, 0.95) << insert;
+    EXPECT_GT(ours.confidence, 0.95) << insert;
     std::cout << (insert ? "insert: " : "flute: ") << ours.mean << " moves, golden section alone "
               << thesis.mean << "\n";
     // A sharp edge is no parabola.
@@ -116,44 +115,44 @@ TEST(FluteSearch, FindsUnevenTeethAndInsertsInFewerMovesThanTheThesis) {
   }
 }
 
-TEST(FluteSearch, IsUnsureOfWhatTheNoiseHides) {
-  // A land of six degrees: no top to tell.
+TEST(FluteSearch, HasLowConfidenceWithinTheNoise) {
+  // A land of six degrees has no distinct top.
   FluteSearch search(0.5, FluteSearchOptions::forPitch(units::PI / 2));
   std::mt19937 random(4);
   std::normal_distribution<double> normal;
   while (search.state() == FluteSearch::State::searching) {
-    const double off = std::abs(nearAngle(4.0 * search.next(), 0.0)) / 4.0;
+    const double off = std::abs(nearAngle(4.0 * search.nextAngle(), 0.0)) / 4.0;
     const double retreat = 1e-3 * std::min(1.0, std::max(0.0, off - 0.05) / 0.3);
-    search.give(search.next(), curve(500e-6 + retreat) + 0.5e-3 * normal(random), 0.5e-3);
+    search.addMeasurement(search.nextAngle(), curve(500e-6 + retreat) + 0.5e-3 * normal(random), 0.5e-3);
   }
   ASSERT_EQ(search.state(), FluteSearch::State::found);
-  EXPECT_LT(search.sure(), 0.9);
+  EXPECT_LT(search.confidence(), 0.9);
   EXPECT_LT(std::abs(nearAngle(4.0 * search.angle(), 0.0)) / 4.0, 0.05 + units::radFromDeg(1.5));
 }
 
-TEST(FluteSearch, WalksOverTheSaturatedStretch) {
+TEST(FluteSearch, CrossesTheSaturatedInterval) {
   // Out of range but for 20 degrees about the only flute.
   const auto p = FluteProfile::even(1, 50e-3, 0.8, 0.8);
   for (int start = 0; start < 72; ++start) {
     FluteSearch search(start * units::PI / 36.0, FluteSearchOptions::forPitch(units::TWO_PI));
     while (search.state() == FluteSearch::State::searching) {
-      double volt = curve(500e-6 + p.retreat(search.next(), 0.0, 0.0));
+      double volt = curve(500e-6 + p.retreat(search.nextAngle(), 0.0, 0.0));
       if (volt < -9.5) volt = -10.0;
-      search.give(search.next(), volt, 1e-4);
+      search.addMeasurement(search.nextAngle(), volt, 1e-4);
     }
     ASSERT_EQ(search.state(), FluteSearch::State::found) << start << " " << search.reason();
     EXPECT_LT(units::degFromRad(missed(p, 0.0, search.angle())), 1.5) << start;
   }
 }
 
-TEST(FluteSearch, SaysWhenThereIsNoFlute) {
+TEST(FluteSearch, StatesThatThereIsNoFlute) {
   for (const double level : {-10.0, -3.0}) {  // out of range; a round shank
     std::mt19937 random(2);
     std::normal_distribution<double> normal;
     FluteSearch search(0.4, FluteSearchOptions::forPitch(units::PI / 2));
     while (search.state() == FluteSearch::State::searching) {
-      search.give(search.next(), std::max(-10.0, level + 1e-3 * normal(random)), 1e-3);
-      ASSERT_LT(search.measurements(), 60);
+      search.addMeasurement(search.nextAngle(), std::max(-10.0, level + 1e-3 * normal(random)), 1e-3);
+      ASSERT_LT(search.measurementCount(), 60);
     }
     EXPECT_EQ(search.state(), FluteSearch::State::no_flute);
     EXPECT_NE(search.reason().find("no flute"), std::string::npos) << search.reason();
@@ -171,7 +170,8 @@ TEST(FluteSearch, GoldenSectionTakesNoMoreStepsThanItsBound) {
     double width = 0.0;
     while (search.state() == FluteSearch::State::searching) {
       const bool sectioning = search.bracketWidth() > 0.0;
-      search.give(search.next(), curve(500e-6 + p.retreat(search.next(), 0.0, 0.0)), 1e-6);
+      search.addMeasurement(search.nextAngle(), curve(500e-6 + p.retreat(search.nextAngle(), 0.0, 0.0)),
+                            1e-6);
       if (sectioning) {
         ++steps;
       } else {
@@ -187,23 +187,22 @@ TEST(FluteSearch, GoldenSectionTakesNoMoreStepsThanItsBound) {
 // Eq. 4.7: 5.6 degrees first, each step longer by the golden ratio, 22.5 degrees at most.
 TEST(FluteSearch, BracketsByTheThesisSteps) {
   FluteSearch search(0.0, FluteSearchOptions::forPitch(units::PI / 2));
-  std::vector<double> asked;
+  std::vector<double> angles;
   for (int i = 0; i < 7; ++i) {
-    asked.push_back(units::degFromRad(search.next()));
-    search.give(search.next(), 0.1 * i, 1e-6);
+    angles.push_back(units::degFromRad(search.nextAngle()));
+    search.addMeasurement(search.nextAngle(), 0.1 * i, 1e-6);
   }
-  EXPECT_NEAR(asked[1] - asked[0], 5.6, 0.01);
-  EXPECT_NEAR(asked[2] - asked[1], 5.6 * 1.618034, 0.01);
-  EXPECT_NEAR(asked[3] - asked[2], 5.6 * 1.618034 * 1.618034, 0.02);
-  EXPECT_NEAR(asked[4] - asked[3], 22.5, 0.01);
-  EXPECT_NEAR(asked[5] - asked[4], 22.5, 0.01);
+  EXPECT_NEAR(angles[1] - angles[0], 5.6, 0.01);
+  EXPECT_NEAR(angles[2] - angles[1], 5.6 * 1.618034, 0.01);
+  EXPECT_NEAR(angles[3] - angles[2], 5.6 * 1.618034 * 1.618034, 0.02);
+  EXPECT_NEAR(angles[4] - angles[3], 22.5, 0.01);
+  EXPECT_NEAR(angles[5] - angles[4], 22.5, 0.01);
 }
 
-TEST(FluteSearch, AnglesAreModuloATurn) {
+TEST(FluteSearch, AnglesAreModuloARevolution) {
   EXPECT_NEAR(nearAngle(0.1, 2.0 * units::TWO_PI), 2.0 * units::TWO_PI + 0.1, 1e-12);
   EXPECT_NEAR(nearAngle(6.2, 0.0), 6.2 - units::TWO_PI, 1e-12);
 }
 
 }  // namespace
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -8,18 +8,17 @@
 #include "../closed_form_machine.h"
 #include "smartmill_core/units.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 constexpr double FACE = 6.4e-3, READ = 2e-3, HALF_GAP = 250e-6;
 
-/// A fluted tool before a sensor whose gain is off its nominal one, in closed form.
+/// A fluted tool in front of a sensor whose gain deviates from the nominal one, in closed form.
 struct Bench {
   ToolGeometry tool;
   HammerStation station;
   FluteProfile profile;
-  double gain_error = 0.0, set_up = 0.0;  // [1], [m] further off than told
+  double gain_error = 0.0, set_up = 0.0;  // [1], [m] additional distance
 
   Bench(int teeth, double diameter, double helix_deg, double depth) {
     tool.teeth = teeth;
@@ -35,16 +34,16 @@ struct Bench {
     const double gap = 2.0 * HALF_GAP + set_up + profile.retreat(turned, 0.0, 0.0);
     return 10.0 * (1.0 + gain_error) * (HALF_GAP / gap - 1.0);
   }
-  /// As the flute's search reads: about a flute, a few steps to either side.
+  /// Measurements of a flute search: around a flute, a few steps to either side.
   SensorApproach searched() const {
     SensorApproach approach(station, tool, {FACE, 0.15, 0.5 * HALF_GAP});
-    std::vector<FluteSearch::Reading> readings;
+    std::vector<FluteSearch::Measurement> measurements;
     for (const double deg : {-38.0, -14.0, -4.0, -1.0, 0.0, 1.0, 3.0, 8.5, 23.0})
-      readings.push_back({units::radFromDeg(deg), volt(units::radFromDeg(deg))});
-    approach.fluteSeen(readings, 0.0, volt(0.0));
+      measurements.push_back({units::radFromDeg(deg), volt(units::radFromDeg(deg))});
+    approach.startFromFlute(measurements, 0.0, volt(0.0));
     return approach;
   }
-  /// [m] to the first touch of the round face, from there: by a fine grid over it.
+  /// [m] to the first contact with the round face, by a fine grid over it.
   double contact(double turned) const {
     constexpr int STEPS = 30;
     const double radius = tool.radius();
@@ -61,11 +60,11 @@ struct Bench {
     }
     return 2.0 * HALF_GAP + set_up + behind;
   }
-  SensorApproach::Place place(double turned) const { return {turned, READ, tool.lag(), tool.lag()}; }
+  SensorApproach::Pose pose(double turned) const { return {turned, READ, tool.lag(), tool.lag()}; }
 };
 
-// Whatever the sensor's gain, the tool and how it is turned, something is left before the face.
-TEST(SensorApproach, NeverAllowsATouch) {
+// For any gain of the sensor, tool and angle a distance to the face remains.
+TEST(SensorApproach, NeverPermitsContact) {
   double least = 1.0;
   for (const double gain_error : {-0.1, 0.0, 0.1}) {
     for (const int teeth : {2, 3, 4, 6}) {
@@ -78,10 +77,10 @@ TEST(SensorApproach, NeverAllowsATouch) {
             SensorApproach approach = bench.searched();
             const auto room = [&] {
               for (double turned = 0.0; turned < units::TWO_PI / teeth; turned += 0.4)
-                least = std::min(least, bench.contact(turned) - approach.travel(bench.place(turned)));
+                least = std::min(least, bench.contact(turned) - approach.safeTravel(bench.pose(turned)));
             };
             room();
-            approach.curveSeen({-10.0 * (1.0 + gain_error), 10.0 * (1.0 + gain_error) * HALF_GAP});
+            approach.setCurve({-10.0 * (1.0 + gain_error), 10.0 * (1.0 + gain_error) * HALF_GAP});
             room();
           }
         }
@@ -92,10 +91,10 @@ TEST(SensorApproach, NeverAllowsATouch) {
   std::cout << "least room left " << 1e6 * least << " um\n";
 }
 
-// The tool that touched: 24 mm, four teeth, 43 degrees, a sensor that shows a tenth more than its nominal
-// curve, 62.6 degrees on from a flute. By the nominal curve the flank 14 degrees off stands half a millimetre
-// deeper than it does.
-TEST(SensorApproach, ASensorOfLargerGainTellsNoDeeperFlanks) {
+// A case of contact without the curve's error: 24 mm, four teeth, 43 degrees, a sensor with a tenth more gain
+// than nominal, 62.6 degrees from a flute. By the nominal curve the flank 14 degrees away is half a
+// millimetre deeper than it is.
+TEST(SensorApproach, LargerGainDoesNotDeepenFlanks) {
   Bench bench(4, 24e-3, 43.0, 1.36e-3);
   bench.gain_error = 0.1;
   const SensorApproach approach = bench.searched();
@@ -107,46 +106,46 @@ TEST(SensorApproach, ASensorOfLargerGainTellsNoDeeperFlanks) {
             bench.profile.retreat(units::radFromDeg(-14.0), 0.0, 0.0) + 150e-6);
 }
 
-// The curve that the approach tells gives back what the nominal one's error took.
-TEST(SensorApproach, TheCurveSeenOnTheWayAllowsMore) {
+// The measured curve removes the margin for the nominal curve's error.
+TEST(SensorApproach, TheMeasuredCurvePermitsMoreTravel) {
   Bench bench(4, 24e-3, 20.0, 1.3e-3);
   bench.gain_error = -0.08;
   SensorApproach approach = bench.searched();
-  const SensorApproach::Place gullet = bench.place(units::radFromDeg(45.0));
-  const double before = approach.travel(gullet);
-  approach.curveSeen({-20.0, 10.0 * HALF_GAP});  // of no sensor that the station has
-  EXPECT_EQ(approach.travel(gullet), before);
-  approach.curveSeen({-9.2, 9.2 * HALF_GAP});
-  EXPECT_GT(approach.travel(gullet), before + 0.15e-3);
-  EXPECT_LT(approach.travel(gullet), bench.contact(gullet.turned) - 0.4 * HALF_GAP);
+  const SensorApproach::Pose gullet = bench.pose(units::radFromDeg(45.0));
+  const double before = approach.safeTravel(gullet);
+  approach.setCurve({-20.0, 10.0 * HALF_GAP});  // contradicts the station's sensor
+  EXPECT_EQ(approach.safeTravel(gullet), before);
+  approach.setCurve({-9.2, 9.2 * HALF_GAP});
+  EXPECT_GT(approach.safeTravel(gullet), before + 0.15e-3);
+  EXPECT_LT(approach.safeTravel(gullet), bench.contact(gullet.turned) - 0.4 * HALF_GAP);
 }
 
-// A straight flute's gullet is as deep over all the face's height; of a helix the flutes above and below are
-// turned into it, and what the middle sees is not what the face meets.
-TEST(SensorApproach, TheHelixTurnsAFluteBeforeTheFace) {
+// The gullet of a straight flute is equally deep over the face's height; with a helix, the flutes above and
+// below the middle of the face are turned towards it.
+TEST(SensorApproach, TheHelixTurnsAFluteTowardsTheFace) {
   Bench bench(4, 12e-3, 40.0, 0.9e-3);
   const SensorApproach approach = bench.searched();
   const double gullet = units::radFromDeg(45.0);
-  SensorApproach::Place straight = bench.place(gullet);
+  SensorApproach::Pose straight = bench.pose(gullet);
   straight.lag_low = straight.lag_high = 0.0;
-  const double lost = approach.travel(straight) - approach.travel(bench.place(gullet));
+  const double lost = approach.safeTravel(straight) - approach.safeTravel(bench.pose(gullet));
   EXPECT_GT(lost, 0.1e-3);
-  // What is not known of the helix counts with its worst.
-  SensorApproach::Place unknown = bench.place(gullet);
+  // An uncertain helix counts with its worst value.
+  SensorApproach::Pose unknown = bench.pose(gullet);
   unknown.lag_low = 0.0;
   unknown.lag_high = std::tan(units::radFromDeg(45.0)) / bench.tool.radius();
-  EXPECT_LE(approach.travel(unknown), approach.travel(bench.place(gullet)) + 1e-9);
+  EXPECT_LE(approach.safeTravel(unknown), approach.safeTravel(bench.pose(gullet)) + 1e-9);
 }
 
-// Nothing known: round. Its foremost line ends the way where a flute would.
-TEST(SensorApproach, OfNothingKnownTheToolIsRound) {
+// Without flanks the tool is round and ends the travel where a flute would.
+TEST(SensorApproach, WithoutFlanksTheToolIsRound) {
   const Bench bench(3, 16e-3, 30.0, 1e-3);
   SensorApproach approach = bench.searched();
-  approach.forget();
+  approach.clearFlanks();
   for (const double turned : {0.0, 0.3, 1.0})
-    EXPECT_NEAR(approach.travel(bench.place(turned)), HALF_GAP / (1.0 - 0.5 / 1.15) - 0.5 * HALF_GAP, 1e-9);
+    EXPECT_NEAR(approach.safeTravel(bench.pose(turned)), HALF_GAP / (1.0 - 0.5 / 1.15) - 0.5 * HALF_GAP,
+                1e-9);
 }
 
 }  // namespace
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -8,8 +8,7 @@
 
 #include "smartmill_core/testing/coverage.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 struct Sensor {
@@ -32,16 +31,17 @@ Outcome run(const SensorCalibrationOptions& options, double gap, double noise, s
   const auto read = [&] { return sensor.volt(o.gap) + noise * normal(random); };
   o.calibration.start(read(), noise);
   while (o.calibration.state() == SensorCalibration::State::jogging) {
-    o.gap -= o.calibration.next() + options.position_std * normal(random);
+    o.gap -= o.calibration.nextJog() + options.position_std * normal(random);
     o.closest = std::min(o.closest, o.gap);
-    o.calibration.give(read(), noise);
+    o.calibration.addVoltage(read(), noise);
   }
   return o;
 }
 
-// On the sensor's true curve the sensitivity is gap^2 / (gain gap0); the symmetric measurement of +-10 um
-// errs by (10/250)^2 = 0.16 % at most, voltage noise of 0.3 mV over 0.8 V by 0.05 %, a position error of 0.1
-// um by 0.7 %.
+// On the sensor's true curve the sensitivity is gap^2 / (gain gap0); the error of the symmetric measurement
+// of
+// +-10 um is (10/250)^2 = 0.16 % at most, voltage noise of 0.3 mV over 0.8 V by 0.05 %, a position error of
+// 0.1 um by 0.7 %.
 TEST(SensorCalibration, ZeroesTheNonlinearSensorAndFindsItsSensitivity) {
   const SensorCalibrationOptions options;
   for (const double gap : {300e-6, 500e-6, 900e-6, 1.5e-3, 2.5e-3, 245e-6, 200e-6}) {
@@ -61,28 +61,26 @@ TEST(SensorCalibration, JogsAsTheThesisDoes) {
   SensorCalibration c{SensorCalibrationOptions()};
   const Sensor sensor;
   c.start(sensor.volt(900e-6), 1e-4);
-  EXPECT_DOUBLE_EQ(c.next(), 50e-6);
-  c.give(sensor.volt(850e-6), 1e-4);
-  EXPECT_NEAR(c.next(), 100e-6, 1e-12);
+  EXPECT_DOUBLE_EQ(c.nextJog(), 50e-6);
+  c.addVoltage(sensor.volt(850e-6), 1e-4);
+  EXPECT_NEAR(c.nextJog(), 100e-6, 1e-12);
   SensorCalibration near{SensorCalibrationOptions()};
   near.start(sensor.volt(350e-6), 1e-4);
-  near.give(sensor.volt(300e-6), 1e-4);
+  near.addVoltage(sensor.volt(300e-6), 1e-4);
   const double slope = (sensor.volt(300e-6) - sensor.volt(350e-6)) / 50e-6;
-  EXPECT_NEAR(near.next(), 0.5 * -sensor.volt(300e-6) / slope, 0.5e-6);
+  EXPECT_NEAR(near.nextJog(), 0.5 * -sensor.volt(300e-6) / slope, 0.5e-6);
 }
 
-// An edge that stands out touches the sensor's face while the electrode sees the flank behind it: once is too
-// often, a second time never comes.
+// A protruding edge touches the sensor's face while the electrode faces the flank behind it: no further jog.
 TEST(SensorCalibration, StopsWhereTheRangeEndsThoughTheCurveLeavesRoom) {
   SensorCalibration c{SensorCalibrationOptions()};
   const Sensor sensor;
   c.start(sensor.volt(500e-6), 1e-4);
-  c.give(sensor.volt(450e-6), 1e-4);
-  ASSERT_GT(c.next(), 0.0);
-  c.give(9.99, 1e-4);
+  c.addVoltage(sensor.volt(450e-6), 1e-4);
+  ASSERT_GT(c.nextJog(), 0.0);
+  c.addVoltage(9.99, 1e-4);
   ASSERT_EQ(c.state(), SensorCalibration::State::failed);
-  EXPECT_THAT(c.reason(),
-              ::testing::HasSubstr("to the end of its range: something of the tool stands nearer"));
+  EXPECT_THAT(c.reason(), ::testing::HasSubstr("to the end of its range: a point of the tool is nearer"));
 }
 
 TEST(SensorCalibration, StandardDeviationIsHonest) {
@@ -98,25 +96,25 @@ TEST(SensorCalibration, StandardDeviationIsHonest) {
 }
 
 TEST(SensorCalibration, RefusesWhatIsNoSensor) {
-  // Dead: the voltage stays.
+  // Dead sensor: constant voltage.
   SensorCalibration dead{SensorCalibrationOptions()};
   dead.start(-3.0, 1e-4);
-  dead.give(-3.0, 1e-4);
+  dead.addVoltage(-3.0, 1e-4);
   EXPECT_EQ(dead.state(), SensorCalibration::State::failed);
-  // Wrong way round: the voltage falls when the tool comes nearer.
+  // Inverted: the voltage falls when the tool comes nearer.
   SensorCalibration wrong{SensorCalibrationOptions()};
   wrong.start(-3.0, 1e-4);
-  wrong.give(-3.5, 1e-4);
+  wrong.addVoltage(-3.5, 1e-4);
   EXPECT_EQ(wrong.state(), SensorCalibration::State::failed);
-  // Never in range: it stops after max_travel.
+  // Out of range: the approach ends after max_travel.
   SensorCalibration far{SensorCalibrationOptions()};
   far.start(-10.0, 1e-4);
-  while (far.state() == SensorCalibration::State::jogging) far.give(-10.0, 1e-4);
+  while (far.state() == SensorCalibration::State::jogging) far.addVoltage(-10.0, 1e-4);
   EXPECT_LE(far.travelled(), SensorCalibrationOptions().max_travel + 1e-9);
   EXPECT_NE(far.reason().find("out of the sensor's range"), std::string::npos);
 }
 
-// A sensor whose curve is another hyperbola than the nominal one, as before a round tool.
+// A sensor whose curve is not the nominal hyperbola, as in front of a round tool.
 TEST(SensorCalibration, MeasuresTheCurveItself) {
   const auto volt = [](double gap) { return std::clamp(0.8 * 10.0 * 180e-6 / gap - 9.0, -10.0, 10.0); };
   SensorCalibrationOptions options;
@@ -125,18 +123,18 @@ TEST(SensorCalibration, MeasuresTheCurveItself) {
   double gap = 700e-6;
   c.start(volt(gap), 1e-5);
   while (c.state() == SensorCalibration::State::jogging) {
-    gap -= c.next();
-    c.give(volt(gap), 1e-5);
+    gap -= c.nextJog();
+    c.addVoltage(volt(gap), 1e-5);
   }
   ASSERT_EQ(c.state(), SensorCalibration::State::done) << c.reason();
   EXPECT_LT(std::abs(c.volt()), 0.1);
-  EXPECT_FALSE(c.heldBack());
-  EXPECT_NEAR(c.bendGap() / gap, 1.0, 1e-6);
+  EXPECT_FALSE(c.isLimitedByEdges());
+  EXPECT_NEAR(c.curveGap() / gap, 1.0, 1e-6);
   const double slope = 0.8 * 10.0 * 180e-6 / (gap * gap);
   EXPECT_NEAR(c.sensitivity() * slope, 1.0, 1e-6);
 }
 
-// Edges beside the sensor reach out further than what it sees.
+// Edges next to the sensor extend further than the surface in front of it.
 TEST(SensorCalibration, EndsWhereTheToolWouldTouch) {
   const Sensor sensor;
   SensorCalibrationOptions options;
@@ -146,17 +144,17 @@ TEST(SensorCalibration, EndsWhereTheToolWouldTouch) {
   SensorCalibration c{options};
   c.start(sensor.volt(gap), 1e-4);
   while (c.state() == SensorCalibration::State::jogging) {
-    gap -= c.next();
+    gap -= c.nextJog();
     ASSERT_LE(begin - gap, 200e-6 + 1e-9);
-    c.give(sensor.volt(gap), 1e-4);
+    c.addVoltage(sensor.volt(gap), 1e-4);
   }
   ASSERT_EQ(c.state(), SensorCalibration::State::done) << c.reason();
-  EXPECT_TRUE(c.heldBack());
+  EXPECT_TRUE(c.isLimitedByEdges());
   EXPECT_NEAR(c.sensitivity() / sensor.sensitivity(gap), 1.0, 0.01);
   EXPECT_GT(c.sensitivityStd(), 0.0);
 }
 
-// An edge of a tenth of the electrode's width: the voltage is zero only where the edge nearly touches.
+// An edge of a tenth of the electrode's width: the voltage is zero only just before contact.
 TEST(SensorCalibration, DoesNotTouchWithASharpEdge) {
   SensorCalibrationOptions options;
   options.min_gap = 125e-6;
@@ -167,9 +165,9 @@ TEST(SensorCalibration, DoesNotTouchWithASharpEdge) {
   SensorCalibration c{options};
   c.start(volt(gap), 1e-4);
   while (c.state() == SensorCalibration::State::jogging) {
-    gap -= c.next();
+    gap -= c.nextJog();
     closest = std::min(closest, gap);
-    c.give(volt(gap), 1e-4);
+    c.addVoltage(volt(gap), 1e-4);
   }
   EXPECT_GT(closest, 40e-6);
 }
@@ -184,5 +182,4 @@ TEST(SensorCalibration, NeverJogsBelowTheLeastGap) {
 }
 
 }  // namespace
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

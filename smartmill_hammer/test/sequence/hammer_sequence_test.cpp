@@ -11,10 +11,9 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/signal/stream_sorter.h"
 #include "smartmill_core/testing/coverage.h"
-#include "smartmill_hammer/sequence/sorted_sequence.h"
+#include "smartmill_hammer/sequence/hammer_pipeline.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 MeasureFrfGoal goalFor(const std::string& direction, double stamp) {
@@ -30,7 +29,7 @@ MeasureFrfGoal goalFor(const std::string& direction, double stamp) {
   return goal;
 }
 
-/// All that a bag would hold.
+/// The recorded streams.
 struct Recording {
   std::vector<SampleBlock> blocks;
   std::vector<SpindleAngle> angles;
@@ -38,10 +37,10 @@ struct Recording {
   MeasureFrfGoal goal;
 };
 
-/// Runs a measurement on the machine. The sequence sees the inputs in stamp order.
+/// Runs a measurement on the machine, inputs in stamp order.
 MeasureFrfResult measure(ClosedFormMachine& machine, HammerSequence& sequence, const MeasureFrfGoal& goal,
                          Recording* recording = nullptr,
-                         const std::function<void(HammerSequence&, double)>& meddle = nullptr,
+                         const std::function<void(HammerSequence&, double)>& intervene = nullptr,
                          std::vector<std::string>* stages = nullptr) {
   if (recording) recording->goal = goal;
   EXPECT_TRUE(sequence.handle(goal));
@@ -56,7 +55,7 @@ MeasureFrfResult measure(ClosedFormMachine& machine, HammerSequence& sequence, c
       if (i % 2 == 0) recording->states.push_back(state);
     }
     sequence.handle(block);
-    if (meddle) meddle(sequence, angle.stamp);
+    if (intervene) intervene(sequence, angle.stamp);
     if (i % 2 == 0) sequence.handle(state);
     sequence.handle(angle);
     for (const Command& c : sequence.takeCommands()) machine.obey(c);
@@ -71,22 +70,22 @@ bool retracted(const ClosedFormMachine& machine) {
   return machine.position[2] > 0.05 + 0.049;
 }
 
-// An asked uncertainty that three hits reach ends the measurement there; one that none reach takes the goal's
-// hits.
-TEST(HammerSequence, StrikesAsOftenAsTheAskedUncertaintyNeeds) {
-  for (const double asked : {0.5, 1e-6}) {
+// A required uncertainty that three hits reach ends the measurement there; an unreachable one takes all hits
+// of the goal.
+TEST(HammerSequence, StrikesAsOftenAsTheRequiredUncertaintyNeeds) {
+  for (const double required : {0.5, 1e-6}) {
     ClosedFormMachine machine(1);
     HammerParameters parameters;
-    parameters.asked_std = asked;
+    parameters.asked_std = required;
     HammerSequence sequence(parameters, machine.model);
     const auto result = measure(machine, sequence, goalFor("x", machine.time));
     ASSERT_EQ(result.code, FrfCode::ok) << result.message;
-    EXPECT_EQ(result.frf.frf.averages, asked > 0.1 ? 3 : 5);
+    EXPECT_EQ(result.frf.frf.averages, required > 0.1 ? 3 : 5);
   }
 }
 
-// The contract's accuracy: modes within 0.5 % in frequency and 5 % in stiffness, through a sensor whose curve
-// bends by 5 % over the vibration, 2 mV of noise, an unknown mounting angle and a hammer 15 mm above the
+// Required accuracy: modes within 0.5 % in frequency and 5 % in stiffness, through a sensor whose sensitivity
+// varies by 5 % over the vibration, 2 mV of noise, an unknown mounting angle and a hammer 15 mm above the
 // sensor.
 TEST(HammerSequence, MeasuresTheToolTipInBothDirections) {
   ClosedFormMachine machine(1);
@@ -102,14 +101,14 @@ TEST(HammerSequence, MeasuresTheToolTipInBothDirections) {
     const ModalModel& truth = machine.tip[direction == "x" ? 0 : 1];
     ASSERT_EQ(result.modes.model.modes.size(), 2u);
     for (std::size_t k = 0; k < 2; ++k) {
-      const Mode &mode = result.modes.model.modes[k], &due = truth.modes[k];
-      EXPECT_NEAR(mode.frequency, due.frequency, 0.005 * due.frequency);
-      EXPECT_NEAR(mode.gain, due.gain, 0.05 * due.gain) << "mode " << k;  // positive: the sign is right too
-      EXPECT_NEAR(mode.damping_ratio, due.damping_ratio, 0.1 * due.damping_ratio);
+      const Mode &mode = result.modes.model.modes[k], &expected = truth.modes[k];
+      EXPECT_NEAR(mode.frequency, expected.frequency, 0.005 * expected.frequency);
+      EXPECT_NEAR(mode.gain, expected.gain, 0.05 * expected.gain) << "mode " << k;  // positive
+      EXPECT_NEAR(mode.damping_ratio, expected.damping_ratio, 0.1 * expected.damping_ratio);
       EXPECT_GT(mode.gain_std, 0.0);
       std::cout << direction << " mode " << k << ": " << mode.frequency << " Hz, zeta " << mode.damping_ratio
-                << ", k " << 1e-6 / mode.gain << " N/um (truth " << 1e-6 / due.gain << ", z "
-                << (mode.gain - due.gain) / mode.gain_std << ")\n";
+                << ", k " << 1e-6 / mode.gain << " N/um (truth " << 1e-6 / expected.gain << ", z "
+                << (mode.gain - expected.gain) / mode.gain_std << ")\n";
     }
     EXPECT_EQ(result.frf.direction, direction);
     EXPECT_EQ(result.frf.frf.averages, 5);
@@ -165,10 +164,9 @@ TEST(HammerSequence, TurnsAFluteToTheHammerForAnyCutter) {
   }
 }
 
-// Repeated measurements with other noise, the axes off by what is stated of them; what hammer and sensor
-// show, not corrected for the offset. The first mode: on the
-// second one the sampled half sine's aliasing adds up to 1 %, which no scatter shows.
-TEST(HammerSequence, StandardDeviationOfStiffnessIsHonest) {
+// Repeated measurements with different noise and position errors, not corrected for the offset. The first
+// mode: aliasing of the sampled half sine changes the second one by up to 1 %, which no scatter contains.
+TEST(HammerSequence, StandardDeviationOfStiffnessIsCalibrated) {
   Coverage gain;
   for (int run = 0; run < Coverage::RUNS; ++run) {
     ClosedFormMachine machine(300u + static_cast<std::uint32_t>(run));
@@ -187,8 +185,7 @@ TEST(HammerSequence, StandardDeviationOfStiffnessIsHonest) {
   EXPECT_TRUE(gain.honest());
 }
 
-// The same streams cut into other blocks and arriving in another order, put in order by the sorter: the same
-// digits.
+// The same streams, cut into other blocks and sorted from another order of arrival, give the same digits.
 TEST(HammerSequence, ReplayIsBitIdentical) {
   ClosedFormMachine machine(5);
   HammerSequence live(HammerParameters(), machine.model);
@@ -211,10 +208,10 @@ TEST(HammerSequence, ReplayIsBitIdentical) {
       std::uniform_real_distribution<double> delay(0.0, 0.03);
       std::optional<MeasureFrfResult> result;
       const auto drain = [&] {
-        replay.takeCommands();  // nobody obeys
+        replay.takeCommands();  // not executed
         if (auto r = replay.takeResult()) result = r;
       };
-      // Streams keep their own order, but overtake each other.
+      // Each stream keeps its order, but they overtake each other.
       double last = 0.0;
       const auto arrive = [&](double stamp, std::function<void()> push) {
         last = std::max(last, stamp + delay(random));
@@ -273,20 +270,20 @@ TEST(HammerSequence, ReplayIsBitIdentical) {
   }
 }
 
-TEST(HammerSequence, ThrowsAwayDoubleHitsAndCountsTheRest) {
+TEST(HammerSequence, RejectsDoubleHitsAndRepeatsThem) {
   ClosedFormMachine machine(6);
   HammerSequence sequence(HammerParameters(), machine.model);
   machine.each_block = [](ClosedFormMachine& m) { m.double_hit = m.strikes == 3; };
   std::vector<std::string> stages;
   const auto result = measure(machine, sequence, goalFor("x", machine.time), nullptr, nullptr, &stages);
   ASSERT_EQ(result.code, FrfCode::ok) << result.message;
-  EXPECT_EQ(machine.strikes, 10);  // with the trial blow and three at the second height
+  EXPECT_EQ(machine.strikes, 10);  // with the trial hit and three at the second height
   EXPECT_EQ(result.frf.frf.averages, 5);
   EXPECT_TRUE(std::any_of(stages.begin(), stages.end(),
                           [](const std::string& s) { return s.find("double hit") != std::string::npos; }));
 }
 
-TEST(HammerSequence, SurvivesOneNaNAndEndsOnMany) {
+TEST(HammerSequence, ToleratesOneNaNAndEndsOnMany) {
   {
     ClosedFormMachine machine(7);
     HammerSequence sequence(HammerParameters(), machine.model);
@@ -303,7 +300,7 @@ TEST(HammerSequence, SurvivesOneNaNAndEndsOnMany) {
   EXPECT_TRUE(retracted(machine));
 }
 
-TEST(HammerSequence, SaysWhenThereIsNoToolAndWhenNoHammer) {
+TEST(HammerSequence, StatesThatThereIsNoToolOrNoHammer) {
   {
     ClosedFormMachine machine(8);
     machine.tool_present = false;
@@ -320,7 +317,7 @@ TEST(HammerSequence, SaysWhenThereIsNoToolAndWhenNoHammer) {
   EXPECT_TRUE(retracted(machine));
 }
 
-TEST(HammerSequence, CancelRetractsWhereverItComes) {
+TEST(HammerSequence, CancelRetractsAtAnyStep) {
   for (const double after : {0.1, 1.0, 3.0, 6.0, 9.0, 12.0}) {
     ClosedFormMachine machine(9);
     HammerSequence sequence(HammerParameters(), machine.model);
@@ -335,7 +332,7 @@ TEST(HammerSequence, CancelRetractsWhereverItComes) {
         });
     EXPECT_EQ(result.code, FrfCode::cancelled) << after << " " << result.message;
     EXPECT_TRUE(machine.position[2] > 0.0989) << after;
-    EXPECT_FALSE(sequence.active());
+    EXPECT_FALSE(sequence.isActive());
   }
 }
 
@@ -366,7 +363,7 @@ TEST(HammerSequence, FailedCommandAndLostStreamEnd) {
   const double again = machine.time;
   sent = false;
   result = measure(machine, sequence, goalFor("x", again), nullptr, [&](HammerSequence& s, double now) {
-    if (!sent && now > again + 5.0) s.lost(now, "daq/hammer is silent for 1 s"), sent = true;
+    if (!sent && now > again + 5.0) s.inputLost(now, "daq/hammer is silent for 1 s"), sent = true;
   });
   EXPECT_EQ(result.code, FrfCode::bad_data);
   EXPECT_NE(result.message.find("daq/hammer is silent"), std::string::npos) << result.message;
@@ -408,43 +405,43 @@ TEST(HammerSequence, OneMeasurementAtATime) {
   EXPECT_FALSE(sequence.handle(goalFor("y", machine.time)));
 }
 
-TEST(SortedSequence, AJumpBackOfTimeStartsAfreshAndALateCancelFindsNothing) {
+TEST(HammerPipeline, ABackwardJumpOfTimeResetsAndALateCancelIsIgnored) {
   ClosedFormMachine machine(4), again(4);
   int restarts = 0, results = 0;
   std::vector<Command> commands;
-  SortedSequence sorted(HammerParameters(), machine.model, 0.05,
-                        {[&](const Command& c) { commands.push_back(c); },
-                         {},
-                         [&](const MeasureFrfResult&) { ++results; },
-                         [&] { ++restarts; }});
+  HammerPipeline pipeline(HammerParameters(), machine.model, 0.05,
+                          {[&](const Command& c) { commands.push_back(c); },
+                           {},
+                           [&](const MeasureFrfResult&) { ++results; },
+                           [&] { ++restarts; }});
   const auto run = [&](ClosedFormMachine& m, double seconds) {
     for (const double end = m.time + seconds; m.time < end;) {
       SampleBlock block;
       SpindleAngle angle;
       CncState state;
       m.block(block, angle, state);
-      sorted.push(block);
-      sorted.push(state);
-      sorted.push(angle);
+      pipeline.push(block);
+      pipeline.push(state);
+      pipeline.push(angle);
     }
   };
   run(machine, 2.0);
-  sorted.push(goalFor("x", machine.time));
+  pipeline.push(goalFor("x", machine.time));
   run(machine, 1.0);
-  EXPECT_TRUE(sorted.measuring());
+  EXPECT_TRUE(pipeline.isMeasuring());
   EXPECT_FALSE(commands.empty());
   run(again, 0.1);
   EXPECT_EQ(restarts, 1);
-  EXPECT_FALSE(sorted.measuring());
-  sorted.cancel([] { return true; });
-  sorted.push(goalFor("x", again.time), [](bool free) { return !free; });  // refused
+  EXPECT_FALSE(pipeline.isMeasuring());
+  pipeline.cancel([] { return true; });
+  pipeline.push(goalFor("x", again.time), [](bool free) { return !free; });  // refused
   run(again, 1.0);
-  EXPECT_FALSE(sorted.measuring());
+  EXPECT_FALSE(pipeline.isMeasuring());
   EXPECT_EQ(results, 0);
-  EXPECT_EQ(sorted.late(), 0u);
+  EXPECT_EQ(pipeline.lateMessages(), 0u);
 }
 
-TEST(HammerParameters, NameWhatIsOutOfRange) {
+TEST(HammerParameters, ErrorsNameTheKey) {
   HammerParameters p;
   p.least_jog = 1e-6;
   try {
@@ -462,5 +459,4 @@ TEST(MoveProgram, IsIncrementalInMillimetres) {
 }
 
 }  // namespace
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

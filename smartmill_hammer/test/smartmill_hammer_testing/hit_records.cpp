@@ -6,13 +6,12 @@
 #include <functional>
 #include <random>
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 using Random = std::mt19937_64;
 constexpr double TWO_PI = 6.283185307179586;
-constexpr int SUB_STEPS = 16;  // of a sample while the hammer touches
+constexpr int SUB_STEPS = 16;  // of a sample during contact
 
 double between(Random& random, double low, double high) {
   return std::uniform_real_distribution<double>(low, high)(random);
@@ -24,7 +23,7 @@ bool chance(Random& random, double share) {
   return between(random, 0.0, 1.0) < share;
 }
 
-/// One contact: rise and fall by powers, a ripple on top, the force cell ringing after.
+/// One contact: rise and fall by power laws, a ripple, and ringing of the force cell.
 struct Pulse {
   double begin = 0.0, length = 0.0, peak = 0.0;  // [s], [s], [N]
   double rise = 1.0, fall = 1.0, ripple = 0.0, waves = 2.0, phase = 0.0;
@@ -37,8 +36,8 @@ struct Pulse {
     const double shape = std::pow(u / top, rise) * std::pow((1.0 - u) / (1.0 - top), fall);
     return peak * shape * (1.0 + ripple * std::sin(TWO_PI * waves * u + phase));
   }
-  /// What the force cell shows.
-  double shown(double t) const {
+  /// [N] output of the force cell.
+  double forceAt(double t) const {
     const double after = t - begin - length;
     const double ringing =
         after > 0.0 ? ring * peak * std::exp(-after / ring_time) * std::sin(TWO_PI * ring_frequency * after)
@@ -51,7 +50,7 @@ struct Structure {
   std::vector<double> frequency, damping, gain;
 };
 
-/// Noise and converter of a channel, in shares of the largest value.
+/// Noise and converter of a channel, relative to the largest value.
 struct Channel {
   double noise = 0.0, offset = 0.0, hum = 0.0, hum_phase = 0.0, full_scale = 2.0;
   double steps = 32768.0;  // of a full scale
@@ -181,7 +180,7 @@ struct Oscillators {
   std::vector<double> x, v;
 };
 
-/// Clean channels without noise. @param delay [s] of the structure's answer
+/// Clean channels without noise. @param delay [s] of the response
 void play(const Scene& scene, const std::vector<Pulse>& pulses, double delay, std::vector<double>& force,
           std::vector<double>& response) {
   Oscillators modes(scene.structure);
@@ -194,9 +193,9 @@ void play(const Scene& scene, const std::vector<Pulse>& pulses, double delay, st
   for (const Pulse& p : pulses) last = std::max(last, p.begin + p.length);
   for (std::size_t i = 0; i < scene.samples; ++i) {
     const double t = (static_cast<double>(i) - static_cast<double>(scene.before)) / scene.rate;
-    double shown = 0.0;
-    for (const Pulse& p : pulses) shown += p.shown(t);
-    force.push_back(shown);
+    double sum = 0.0;
+    for (const Pulse& p : pulses) sum += p.forceAt(t);
+    force.push_back(sum);
     const double x = modes.displacement();
     response.push_back(scene.kind == 1   ? modes.acceleration(contact(t - delay))
                        : scene.kind == 0 ? x
@@ -231,7 +230,7 @@ void record(Random& random, const Channel& c, double rate, double largest, std::
   }
 }
 
-/// A channel at rest has this level.
+/// Level of a channel at rest.
 double levelOf(const Channel& c, double largest) {
   return c.offset * largest;
 }
@@ -301,8 +300,8 @@ Drawn drawClipped(Random& random, const Scene& scene, const std::vector<Pulse>& 
 void dropOut(Random& random, Drawn& d) {
   const bool force = chance(random, 0.3);
   std::vector<double>& values = channel(d, force);
-  const int due = std::uniform_int_distribution<int>(1, 3)(random);
-  for (int done = 0, tries = 0; done < due && tries < 100000; ++tries) {
+  const int count = std::uniform_int_distribution<int>(1, 3)(random);
+  for (int done = 0, tries = 0; done < count && tries < 100000; ++tries) {
     const auto at = std::uniform_int_distribution<std::size_t>(20, values.size() - 20)(random);
     const auto count = std::uniform_int_distribution<std::size_t>(1, 2)(random);
     const int way = std::uniform_int_distribution<int>(0, 2)(random);
@@ -359,7 +358,7 @@ void bump(Random& random, Drawn& d) {
   const double size = std::max(d.response_largest * between(random, 0.25, 1.0), 2.5 * here);
   std::vector<double> wave(values.size() - at, 0.0);
   if (chance(random, 0.5)) {
-    // Somebody knocks: the structure rings by itself, its modes in other shares.
+    // Another excitation: the modes respond in other proportions.
     for (std::size_t k = 0; k < d.scene.structure.frequency.size(); ++k) {
       const double w = TWO_PI * d.scene.structure.frequency[k], share = between(random, 0.2, 1.0);
       for (std::size_t i = 0; i < wave.size(); ++i) {
@@ -392,7 +391,7 @@ HitCase drawSet(HitClass kind, Random& random) {
                         peak * between(random, 0.7, 1.3));
     double delay = 0.0;
     if (fault && kind == HitClass::trigger_skew) {
-      // Channels apart either way: the force is what shifts where the answer would come first.
+      // Delay of either sign: the force is delayed where the response would come first.
       if (sign > 0.0) {
         delay = apart;
       } else {
@@ -410,7 +409,7 @@ HitCase drawSet(HitClass kind, Random& random) {
   return c;
 }
 
-/// A pulse whose band fits what the class says of it, and the band asked.
+/// A pulse whose spectrum agrees with the class and the band.
 Pulse drawFitting(HitClass kind, Random& random, const Scene& scene, HitCase& c) {
   for (;;) {
     const double peak = byRatio(random, 15.0, 800.0);
@@ -438,7 +437,7 @@ HitCase drawSingle(HitClass kind, Random& random) {
   if (kind == HitClass::weak && c.weak_force == 0.0) scene.force.noise = 1.0 / between(random, 2.0, 7.0);
   std::vector<Pulse> pulses = {p};
   if (kind == HitClass::double_hit) {
-    // The hammer has left before it comes again.
+    // The second contact begins after the end of the first.
     const double gap = between(random, 0.5e-3, 3e-3);
     pulses[0].length = std::min(pulses[0].length, 0.9 * gap);
     pulses.push_back(
@@ -464,8 +463,8 @@ HitCase drawSingle(HitClass kind, Random& random) {
 
 std::string nameOf(HitClass kind) {
   constexpr const char* NAMES[HIT_CLASSES] = {
-      "clean", "clean beside others", "double hit", "clipping", "dropout",      "baseline drift",
-      "stuck", "late bump",           "weak",       "dull",     "trigger skew", "gain jump"};
+      "clean", "clean among others", "double hit", "clipping", "dropout",      "baseline drift",
+      "stuck", "late bump",          "weak",       "dull",     "trigger skew", "gain jump"};
   return NAMES[static_cast<int>(kind)];
 }
 
@@ -474,7 +473,7 @@ HitCase drawHitCase(HitClass kind, std::uint64_t seed) {
                       static_cast<std::uint32_t>(seed >> 32)};
   Random random(seeds);
   switch (kind) {
-    case HitClass::clean_beside:
+    case HitClass::clean_group:
     case HitClass::trigger_skew:
     case HitClass::gain_jump:
       return drawSet(kind, random);
@@ -483,5 +482,4 @@ HitCase drawHitCase(HitClass kind, std::uint64_t seed) {
   }
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -24,6 +24,7 @@
 #include "smartmill_core/parameters/parameter_options.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/compensation/campaign_compensation.h"
+#include "smartmill_kalman/compensation/record_compensation.h"
 #include "smartmill_kalman/sensor/blind_mode.h"
 #include "smartmill_recording/recording_file.h"
 
@@ -41,22 +42,22 @@ struct Request {
   double lag = 0.05;                              // [s]
 };
 
-/// What is said about the samples' times.
+/// Latency of the result, for the report.
 const char* latency(const Request& request) {
-  if (request.method == "fixed-lag") return "the lag taken out";
-  return request.method == "inverse" ? "its latency of 256 samples taken out" : "no latency";
+  if (request.method == "fixed-lag") return "lag compensated";
+  return request.method == "inverse" ? "latency of 256 samples compensated" : "no latency";
 }
 
-/// What a cut says about the sensor without a tap.
+/// Reports modes that a cut shows without a tap.
 void printBlind(const std::string& name, const Record& record, const CampaignTest& test,
                 const Request& request) {
   for (const char* channel : {"fx", "fy", "fz"}) {
     const kalman::BlindMode found = kalman::findBlindMode(
         record.column(channel), test.sample_rate, test.spindle_speed, request.blind_low, request.blind_high);
     if (found.likelihood < 10.0) {
-      std::printf("%s %s: no mode shows between the lines of the spindle\n", name.c_str(), channel);
+      std::printf("%s %s: no mode between the harmonics of the spindle\n", name.c_str(), channel);
     } else {
-      std::printf("%s %s: a mode shows at %.1f +- %.1f Hz, damping %.4f +- %.4f\n", name.c_str(), channel,
+      std::printf("%s %s: mode at %.1f +- %.1f Hz, damping %.4f +- %.4f\n", name.c_str(), channel,
                   found.mode.frequency, found.mode.frequency_std, found.mode.damping_ratio,
                   found.mode.damping_ratio_std);
     }
@@ -110,7 +111,7 @@ void fromCampaign(const Request& request) {
     if (test.kind != TestKind::cut) continue;
     std::fprintf(stderr, "compensating %s\n", test.name.c_str());
     Record record = readRecord(campaign, test);
-    if (workpiece) kalman::turnForces(record);
+    if (workpiece) kalman::negateForces(record);
     if (request.blind) printBlind(test.name, record, test, request);
     const auto force = matrix ? kalman::compensate(record, *matrix, test.spindle_speed, test.sample_rate,
                                                    parameters.compensation.filter)
@@ -121,17 +122,17 @@ void fromCampaign(const Request& request) {
     std::fputs(kalman::rangeLine(test.name, forces(record), force).c_str(), stdout);
     ++cuts;
   }
-  if (cuts == 0) throw Error(campaign.folder + ": the campaign has no cuts");
+  if (cuts == 0) throw Error(campaign.folder + ": no cuts");
   if (request.blind) {
     std::printf(
-        "a mode shown by a cut may be the tool's, the workpiece's or the sensor's, and with which share it "
-        "stands "
-        "in the force it does not tell: it is not used; a tap tells\n");
+        "a mode of a cut may belong to the tool, the workpiece or the sensor, and its gain is unknown: it is "
+        "not "
+        "used; identify the sensor by a tap\n");
   }
   std::printf("%zu cuts written to %s (%s)\n", cuts, request.out.c_str(), latency(request));
 }
 
-/// A test's name as the name of a file; a name that came before gets a number.
+/// File name of a test; a repeated name gets a number.
 std::string fileName(std::string name, std::set<std::string>& used) {
   if (name.empty()) name = "cut";
   for (char& c : name) {
@@ -142,24 +143,23 @@ std::string fileName(std::string name, std::set<std::string>& used) {
   return unique;
 }
 
-/// Writes a cut of a bag. @return what is said of it
+/// Writes a cut of a bag. @return its report
 std::string writeCut(const std::string& folder, const std::string& name, kalman::BagCut cut) {
   const std::string range = kalman::rangeLine(name, cut.measured, cut.compensated);
   kalman::writeForce(folder, name, std::move(cut.offset), std::move(cut.compensated));
-  return range +
-         formatted("%s: time 0 is %.9f s, the first %.3f s settle\n", name.c_str(), cut.stamp, cut.settling);
+  return range + formatted("%s: time 0 is %.9f s, the first %.3f s are settling\n", name.c_str(), cut.stamp,
+                           cut.settling);
 }
 
 void fromBag(const Request& request) {
   if (request.identify || request.coupled || request.blind) {
     throw Error(
-        "--identify, --coupled and --blind are for campaigns: the taps in a bag count from their goals on, "
-        "as in the "
+        "--identify, --coupled, --blind: expected a campaign; the taps of a bag are evaluated as in the "
         "node");
   }
   const kalman::NodeParameters parameters = parametersOf(request);
   const std::string model_file = request.model.empty() ? parameters.model : request.model;
-  if (model_file.empty()) throw Error(request.source + ": a bag needs the machine's model (--model)");
+  if (model_file.empty()) throw Error(request.source + ": bag without a machine model (--model)");
   const MachineModel model = readMachineModel(model_file);
   const bool terminal = isatty(STDERR_FILENO);
   std::set<std::string> used;
@@ -179,13 +179,13 @@ void fromBag(const Request& request) {
     std::printf("taps in %s: %s\n", result.modes.direction.c_str(), result.message.c_str());
     if (result.code == FrfCode::ok) kalman::printSensor(result.modes.direction.c_str(), result.modes.model);
   }
-  if (summary.cuts == 0) throw Error(request.source + ": no cut (cut/condition of kind CUT with samples)");
+  if (summary.cuts == 0) throw Error(request.source + ": no cut (cut/condition of kind CUT) with samples");
   if (!summary.rotation_known) {
-    std::fprintf(stderr, "%s: %s holds no transform of the sensor: forces are in its own frame\n",
+    std::fprintf(stderr, "%s: %s: no transform of the sensor, forces are in the sensor's frame\n",
                  request.program.c_str(), request.source.c_str());
   }
   if (summary.gaps + summary.not_finite + summary.late > 0) {
-    std::fprintf(stderr, "%s: %zu gaps, %zu samples not numbers, %zu inputs out of order\n",
+    std::fprintf(stderr, "%s: %zu gaps, %zu samples not finite, %zu inputs out of order\n",
                  request.program.c_str(), summary.gaps, summary.not_finite, summary.late);
   }
   const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
@@ -194,7 +194,7 @@ void fromBag(const Request& request) {
 }
 
 void run(const Request& request) {
-  if (!std::filesystem::exists(request.source)) throw Error(request.source + ": cannot be read");
+  if (!std::filesystem::exists(request.source)) throw Error(request.source + ": cannot read");
   std::filesystem::create_directories(request.out);
   if (isRecording(request.source)) {
     fromBag(request);
@@ -237,7 +237,7 @@ Command compensateCommand() {
             "--method", o->method,
             "kalman (causal, as the node), delay (as the node with `delay_form`), smoother, fixed-lag (as "
             "the node with `lag`) or inverse")
-        .oneOf({"kalman", "delay", "smoother", "fixed-lag", "inverse"})
+        .oneOf(kalman::methodNames())
         .showDefault();
     line.option("--lag-s", o->lag, "lag of fixed-lag [s]").within(0.0, 10.0).showDefault();
     const auto table = std::make_shared<ParameterTable>(tableOf(o->parameters));

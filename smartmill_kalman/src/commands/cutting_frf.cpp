@@ -16,7 +16,7 @@
 #include "smartmill_core/names.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/compensation/campaign_compensation.h"
-#include "smartmill_kalman/in_cut/campaign_lines.h"
+#include "smartmill_kalman/in_cut/cut_segments.h"
 #include "smartmill_recording/recording_file.h"
 
 namespace {
@@ -41,41 +41,41 @@ kalman::CuttingFrfAxis linesOf(const Campaign& campaign, const MachineModel& mod
     if (test.kind != TestKind::cut) continue;
     std::fprintf(stderr, "%s: %s\n", kalman::AXIS_NAMES[axis], test.name.c_str());
     const Record record = readRecord(campaign, test, model);
-    const kalman::CutStretch cut =
-        tool ? kalman::toolStretch(record, test, axis, sensors[axis])
-             : kalman::sensorStretch(record, test, axis, model, 0.01 * model.uncertainty.cutting);
-    const auto lines = kalman::cuttingLines(cut, request.options);
+    const kalman::CutSegment cut =
+        tool ? kalman::toolSegment(record, test, axis, sensors[axis])
+             : kalman::sensorSegment(record, test, axis, model, 0.01 * model.uncertainty.cutting);
+    const auto lines = kalman::frfLines(cut, request.options);
     if (lines.empty())
-      std::fprintf(stderr, "%s: no line of %s stands out (eleven revolutions are needed)\n",
+      std::fprintf(stderr, "%s: no line of %s exceeds the noise (a part needs eleven revolutions)\n",
                    test.name.c_str(), kalman::AXIS_NAMES[axis]);
     found.lines.insert(found.lines.end(), lines.begin(), lines.end());
   }
   return found;
 }
 
-/// Of a bag: what was recorded beside force/compensated, and its own taps.
+/// Lines of a bag: response over force/compensated, and the taps of the bag.
 std::vector<kalman::CuttingFrfAxis> fromBag(const kalman::CuttingFrfRequest& request) {
   if (request.identify || !request.model.empty())
-    throw Error("--identify and --model are for campaigns: a bag has its force/compensated and its taps");
-  kalman::BagCutsRequest asked;
-  asked.path = request.campaign;
-  asked.tool = request.of == "tool";
-  asked.response = !request.response.empty() ? request.response
-                   : asked.tool              ? names::DISPLACEMENT
-                                             : names::SPINDLE_FORCE;
-  asked.spindle_sensor = request.spindle_sensor;
-  asked.length = request.length;
-  asked.force_error = 0.01 * request.force_error;
-  const kalman::BagCuts cuts = kalman::cutsOfBag(asked);
+    throw Error("--identify, --model: expected a campaign; a bag contains force/compensated and taps");
+  kalman::BagCutsRequest cuts_request;
+  cuts_request.path = request.campaign;
+  cuts_request.tool = request.of == "tool";
+  cuts_request.response = !request.response.empty() ? request.response
+                          : cuts_request.tool       ? names::DISPLACEMENT
+                                                    : names::SPINDLE_FORCE;
+  cuts_request.spindle_sensor = request.spindle_sensor;
+  cuts_request.length = request.length;
+  cuts_request.force_error = 0.01 * request.force_error;
+  const kalman::BagCuts cuts = kalman::cutsOfBag(cuts_request);
   std::vector<kalman::CuttingFrfAxis> axes;
-  for (std::size_t a = 0; a < (asked.tool ? 2U : 3U); ++a) {
+  for (std::size_t a = 0; a < (cuts_request.tool ? 2U : 3U); ++a) {
     kalman::CuttingFrfAxis axis;
     axis.axis = a;
     axis.rest = cuts.rest[a];
-    for (const kalman::CutStretch& cut : cuts.axis[a]) {
-      const auto lines = kalman::cuttingLines(cut, request.options);
+    for (const kalman::CutSegment& cut : cuts.axis[a]) {
+      const auto lines = kalman::frfLines(cut, request.options);
       if (lines.empty())
-        std::fprintf(stderr, "%s: no line of %s stands out (eleven revolutions are needed)\n",
+        std::fprintf(stderr, "%s: no line of %s exceeds the noise (a part needs eleven revolutions)\n",
                      cut.name.c_str(), kalman::AXIS_NAMES[a]);
       axis.lines.insert(axis.lines.end(), lines.begin(), lines.end());
     }
@@ -87,7 +87,7 @@ std::vector<kalman::CuttingFrfAxis> fromBag(const kalman::CuttingFrfRequest& req
 std::vector<kalman::CuttingFrfAxis> axesOf(const kalman::CuttingFrfRequest& request) {
   if (isRecording(request.campaign)) return fromBag(request);
   if (!request.response.empty() || !request.spindle_sensor.empty())
-    throw Error("--response and --spindle-sensor are for bags");
+    throw Error("--response, --spindle-sensor: expected a bag");
   const Campaign campaign = readCampaign(request.campaign);
   const MachineModel model = readMachineModel(request.model.empty() ? campaign.modelPath() : request.model);
   const std::array<ModalModel, 3> sensors = sensorsOf(campaign, model, request);
@@ -108,7 +108,7 @@ void run(const kalman::CuttingFrfRequest& request) {
       std::string("axis,speed_rpm,frequency_hz,frequency_hz_std,damping_ratio,damping_ratio_std,") +
           (tool ? "stiffness_n_per_um,stiffness_n_per_um_std" : "gain,gain_std"),
       8);
-  std::size_t told = 0;
+  std::size_t fits = 0;
   for (kalman::CuttingFrfAxis& found : axesOf(request)) {
     if (found.lines.empty()) continue;
     kalman::printRest(found, tool);
@@ -117,17 +117,17 @@ void run(const kalman::CuttingFrfRequest& request) {
       kalman::printFrf(found, frf, tool, table);
       writeFrfCsv(frf.frf, request.out + "/frf" + kalman::suffixOf(found, frf) + ".csv");
       if (!frf.fit) continue;
-      ++told;
+      ++fits;
       writeModesYaml(estimateOf(frf.fit->model), unit, {"in the cut"},
                      request.out + "/modes" + kalman::suffixOf(found, frf) + ".yaml");
     }
     if (!request.no_picture) kalman::drawAxis(found, request);
   }
   table.save(request.out + "/modes.csv");
-  if (told == 0)
+  if (fits == 0)
     throw Error(request.campaign +
-                ": no modes are told by its cuts at any speed; more lines come from runout, from "
-                "more speeds (--speed-width-percent) and from longer records");
+                ": the cuts determine no mode at any speed; runout, more speeds (--speed-width-percent) and "
+                "longer records give more lines");
   std::printf("written: %s/frf_*.csv, modes_*.yaml, modes.csv%s\n", request.out.c_str(),
               request.no_picture ? "" : ", frf_*.png");
 }

@@ -26,7 +26,7 @@ void printFrf(const CuttingFrfAxis& axis, const SpeedFrf& frf, bool receptance, 
   std::printf("%s, %.0f rpm (%.0f..%.0f), %zu lines", AXIS_NAMES[axis.axis], rpm,
               units::rpmFromRadPerSec(frf.lowest), units::rpmFromRadPerSec(frf.highest), frf.frf.size());
   if (!frf.fit) {
-    std::printf(": no modes are told: %s\n", frf.reason.c_str());
+    std::printf(": no modes: %s\n", frf.reason.c_str());
     return;
   }
   std::printf("\n");
@@ -46,8 +46,8 @@ void drawAxis(const CuttingFrfAxis& axis, const CuttingFrfRequest& request) {
   const bool tool = request.of == "tool";
   const double scale = tool ? 1.0 / units::UM : 1.0;
   plot << "set logscale y\nset grid\nset xlabel 'frequency [Hz]'\nset ylabel '"
-       << (tool ? "size [um/N]" : "size [1]") << "'\nset title 'In the cut, " << AXIS_NAMES[axis.axis]
-       << ", by speed of the spindle; black: at rest'\nset key right top\n";
+       << (tool ? "magnitude [um/N]" : "magnitude [1]") << "'\nset title 'In the cut, "
+       << AXIS_NAMES[axis.axis] << ", by speed of the spindle; black: at rest'\nset key right top\n";
   std::string curves;
   std::vector<std::vector<double>> rest;
   for (double f = request.options.low; f <= request.options.high; f += 5.0)

@@ -22,14 +22,14 @@ struct CuttingFrfRequest {
 /// An axis: its lines in the cuts, and the tap at rest.
 struct CuttingFrfAxis {
   std::size_t axis = 0;
-  std::vector<CuttingLine> lines;
+  std::vector<FrfLine> lines;
   ModalModel rest;
   std::vector<SpeedFrf> found;
 };
 
-/// What the tap shows at rest.
+/// Prints the modes of the tap at rest.
 void printRest(const CuttingFrfAxis& axis, bool receptance);
-/// The modes at a speed, and their rows in the table.
+/// Prints the modes at a speed and adds them to the table.
 void printFrf(const CuttingFrfAxis& axis, const SpeedFrf& frf, bool receptance, CsvWriter& table);
 /// Ending of the files of an axis at a speed, e.g. "_x_6000".
 std::string suffixOf(const CuttingFrfAxis& axis, const SpeedFrf& frf);

@@ -28,7 +28,7 @@ using namespace smartmill;
 using kalman::MatrixTap;
 using kalman::TransferMatrix;
 
-constexpr double TOLD = 0.1;  // [1]
+constexpr double DETERMINED = 0.1;  // [1]
 constexpr auto& CHANNELS = PLATE_CHANNELS;
 
 using Taps = kalman::TapRecords;
@@ -44,7 +44,7 @@ Taps fromCampaign(const std::string& path) {
     tap.hammer = record.column("hammer");
     for (std::size_t c = 0; c < 3; ++c) tap.channels.push_back(record.column(CHANNELS[c]));
     if (found.rate != 0.0 && found.rate != test.sample_rate)
-      throw Error(record.file + ": sample rate differs from the other taps'");
+      throw Error(record.file + ": sample rate differs from the other taps");
     found.rate = test.sample_rate;
     found.taps.push_back(std::move(tap));
   }
@@ -74,18 +74,18 @@ void writeMatrix(const TransferMatrix& matrix, const std::string& file) {
     out << "\n";
   }
   out.close();
-  if (!out) throw Error(file + ": cannot be written");
+  if (!out) throw Error(file + ": cannot write");
 }
 
-/// Frequency up to which the taps tell every element to a tenth of the static gain [Hz].
-double toldTo(const TransferMatrix& matrix, double low) {
-  double told = low;
+/// Frequency up to which every element is known to a tenth of the static gain [Hz].
+double determinedUpTo(const TransferMatrix& matrix, double low) {
+  double determined = low;
   for (std::size_t l = 0; l < matrix.frequency.size(); ++l) {
     if (matrix.frequency[l] <= low) continue;
-    if (matrix.forward_std[l].topLeftCorner(3, 3).maxCoeff() > TOLD) break;
-    told = matrix.frequency[l];
+    if (matrix.forward_std[l].topLeftCorner(3, 3).maxCoeff() > DETERMINED) break;
+    determined = matrix.frequency[l];
   }
-  return told;
+  return determined;
 }
 
 void report(const TransferMatrix& matrix, double low, double high, int max_modes) {
@@ -160,11 +160,11 @@ void run(const Request& request) {
   const Taps taps =
       isTapFile(request.source) ? kalman::readTapFile(request.source) : fromCampaign(request.source);
   const TransferMatrix matrix = kalman::identifyTransferMatrix(taps.taps, taps.rate);
-  const double told = toldTo(matrix, request.low);
-  const double high = request.high == 0.0 ? told : request.high;
+  const double limit = determinedUpTo(matrix, request.low);
+  const double high = request.high == 0.0 ? limit : request.high;
   if (!(request.low >= 0.0 && high > request.low && high < 0.5 * taps.rate))
     throw Error("--low-hz, --high-hz: expected 0 <= low < high < half the sample rate");
-  std::printf("the taps tell every force's share to 0.1 up to %.0f Hz\n", told);
+  std::printf("the taps determine every element to 0.1 up to %.0f Hz\n", limit);
   report(matrix, request.low, high, request.max_modes);
   if (request.out.empty()) return;
   writeMatrix(matrix.band(request.low, high), request.out);

@@ -18,7 +18,7 @@
 namespace {
 
 using namespace smartmill;
-using kalman::LengthLine;
+using kalman::LengthDependence;
 using kalman::SpindleSensorCalibration;
 
 constexpr double LARGEST_ERROR = 0.05;  // Burzoni 3.2.1
@@ -28,7 +28,8 @@ struct Request {
   double low_pass = 0.0;
 };
 
-void printLine(const char* what, const LengthLine& found, const LengthLine& before, double length) {
+void printLengthDependence(const char* what, const LengthDependence& found, const LengthDependence& before,
+                           double length) {
   std::printf("%-32s %9.4g L + %9.4g   std %.2g, %.2g%s   at %.0f mm %8.3f   before %8.3f\n", what,
               found.slope * units::MM, found.offset, found.slope_std * units::MM, found.offset_std,
               found.reciprocal ? " of its reciprocal" : "", length / units::MM, found.at(length),
@@ -38,23 +39,23 @@ void printLine(const char* what, const LengthLine& found, const LengthLine& befo
 void calibrate(const Request& request) {
   const SpindleSensorCalibration base =
       request.base.empty() ? SpindleSensorCalibration::table3() : kalman::readSpindleSensor(request.base);
-  const kalman::StaticReadings readings = kalman::readStaticReadings(request.table);
-  const kalman::StaticCalibration found = kalman::calibrateStatic(readings, base);
+  const kalman::StaticMeasurements measurements = kalman::readStaticMeasurements(request.table);
+  const kalman::StaticCalibration found = kalman::calibrateStatic(measurements, base);
   const SpindleSensorCalibration& c = found.calibration;
   const double length = found.lengths.front().length;
-  LengthLine none;
+  LengthDependence none;
   none.offset = std::nan("");
   std::printf(
-      "constants over the length L [mm] of tool and holder (applied over shown force), known for %.0f .. "
+      "constants over the length L [mm] of tool and holder (applied over measured force), valid for %.0f .. "
       "%.0f mm\n",
       c.lengths[0] / units::MM, c.lengths[1] / units::MM);
-  printLine("x", c.x, base.x, length);
-  printLine("y", c.y, base.y, length);
-  printLine("z", c.z, base.z, length);
-  const auto cross = [&](const char* what, const std::optional<LengthLine>& line,
-                         const std::optional<LengthLine>& before) {
+  printLengthDependence("x", c.x, base.x, length);
+  printLengthDependence("y", c.y, base.y, length);
+  printLengthDependence("z", c.z, base.z, length);
+  const auto cross = [&](const char* what, const std::optional<LengthDependence>& line,
+                         const std::optional<LengthDependence>& before) {
     if (line) {
-      printLine(what, *line, before.value_or(none), length);
+      printLengthDependence(what, *line, before.value_or(none), length);
     } else {
       std::printf("%-32s none beyond its uncertainty\n", what);
     }
@@ -62,10 +63,10 @@ void calibrate(const Request& request) {
   cross("cross-talk in x, caused by y", c.yx, base.yx);
   cross("cross-talk in z, caused by y", c.yz, base.yz);
   cross("cross-talk in z, caused by x", c.xz, base.xz);
-  for (const kalman::LengthConstants& l : found.lengths) {
+  for (const kalman::ConstantsAtLength& l : found.lengths) {
     const auto left = [&l](int row, int column) { return 100.0 * l.share[row][column] / l.share[row][row]; };
     std::printf(
-        "%.1f mm: drift up to %.2f N/min taken out, residual %.3f N; outside the model: x in y %.2f %%, z in "
+        "%.1f mm: drift up to %.2f N/min removed, residual %.3f N; outside the model: x in y %.2f %%, z in "
         "x %.2f %%, z in y %.2f %%\n",
         l.length / units::MM, 60.0 * l.drift, l.residual, left(1, 0), left(0, 2), left(1, 2));
     std::printf("%.1f mm: a sensor is unloaded or overloaded beyond %.0f N along x, %.0f N along y\n",
@@ -77,18 +78,19 @@ void calibrate(const Request& request) {
 }
 
 void verify(const Request& request) {
-  const auto error = kalman::verifyStatic(kalman::readStaticReadings(request.table),
+  const auto error = kalman::verifyStatic(kalman::readStaticMeasurements(request.table),
                                           kalman::readSpindleSensor(request.calibration));
-  std::printf("largest difference to the reference, of its largest force: x %.2f y %.2f z %.2f %% (5 due)\n",
-              100.0 * error[0], 100.0 * error[1], 100.0 * error[2]);
+  std::printf(
+      "largest difference from the reference over its largest force: x %.2f y %.2f z %.2f %% (limit 5)\n",
+      100.0 * error[0], 100.0 * error[1], 100.0 * error[2]);
   if (*std::max_element(error.begin(), error.end()) > LARGEST_ERROR)
     throw Error(request.table + ": the calibration is off by more than 5 %");
 }
 
 void apply(const Request& request) {
   const SpindleSensorCalibration c = kalman::readSpindleSensor(request.calibration);
-  const kalman::StaticReadings record = kalman::readStaticReadings(request.table);
-  kalman::needLengths(record, c);
+  const kalman::StaticMeasurements record = kalman::readStaticMeasurements(request.table);
+  kalman::checkLengths(record, c);
   std::array<std::vector<double>, 3> force;
   std::size_t unloaded = 0;
   for (std::size_t i = 0; i < record.size(); ++i) {
@@ -102,7 +104,7 @@ void apply(const Request& request) {
     for (std::size_t axis = 0; axis < 3; ++axis) force[axis].push_back(good ? f[axis] : std::nan(""));
   }
   if (request.low_pass > 0.0) {
-    if (unloaded > 0) throw Error(request.table + ": holds invalid samples, which cannot be filtered");
+    if (unloaded > 0) throw Error(request.table + ": invalid samples, which cannot be filtered");
     if (record.size() < 3) throw Error(request.table + ": too short for a low-pass");
     const double rate = static_cast<double>(record.size() - 1) / (record.time.back() - record.time.front());
     for (auto& axis : force) axis = kalman::zeroPhaseLowPass(axis, request.low_pass, rate);
@@ -113,8 +115,8 @@ void apply(const Request& request) {
     out << formatted("%.9g,%.6g,%.6g,%.6g\n", record.time[i], force[0][i], force[1][i], force[2][i]);
   }
   out.close();
-  if (!out) throw Error(request.out + ": cannot be written");
-  std::printf("%zu samples written to %s, %zu of them no measurement\n", record.size(), request.out.c_str(),
+  if (!out) throw Error(request.out + ": cannot write");
+  std::printf("%zu samples written to %s, %zu of them invalid\n", record.size(), request.out.c_str(),
               unloaded);
 }
 
@@ -129,7 +131,7 @@ Command spindleSensorCommand() {
   command.summary = "calibrates, verifies and applies a spindle-integrated force sensor";
   command.description =
       "Spindle-integrated force sensor of six preloaded quartz rings.\nTables: test, time[s], length[mm], "
-      "load_x[N], load_y[N], load_z[N], x1[N], x2[N], y1[N], y2[N], z1[N], z2[N]; one row per reading.";
+      "load_x[N], load_y[N], load_z[N], x1[N], x2[N], y1[N], y2[N], z1[N], z2[N]; one row per measurement.";
   command.examples = {
       {"calibrate weights.csv -o sensor.yaml", "constants over tool length from hung weights"},
       {"verify sensor.yaml reference.csv", "fails where a force is off by more than 5 %"},
@@ -140,13 +142,13 @@ Command spindleSensorCommand() {
     const auto request = std::make_shared<Request>();
     const CommandOptions c =
         line.command("calibrate", "constants over tool length from weights hung on a tool");
-    c.option("TABLE", request->table, "readings; those of one test drift together").required();
+    c.option("TABLE", request->table, "measurements; those of one test drift together").required();
     c.option("-o,--out", request->out, "calibration file").required();
     c.option("--base", request->base,
              "calibration file with preload, limits and low-pass (default: Burzoni's sensor)");
     const CommandOptions v = line.command("verify", "compares with reference forces; fails beyond 5 %");
     v.option("CALIBRATION", request->calibration, "calibration file").required();
-    v.option("TABLE", request->table, "readings with reference forces as loads").required();
+    v.option("TABLE", request->table, "measurements with reference forces as loads").required();
     const CommandOptions a = line.command("apply", "forces of a record");
     a.option("CALIBRATION", request->calibration, "calibration file").required();
     a.option("TABLE", request->table, "record, evenly sampled").required();

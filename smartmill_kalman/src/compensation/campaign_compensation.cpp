@@ -24,12 +24,12 @@ void SensorFitParameters::validate() const {
                 " Hz is empty");
   }
   if (max_modes < 1 || max_modes > 20) {
-    throw Error("max_modes: " + std::to_string(max_modes) + ", 1 .. 20 is due");
+    throw Error("max_modes: " + std::to_string(max_modes) + ", expected 1 .. 20");
   }
 }
 
-FrequencyResponse averaged(const std::vector<std::vector<double>>& hammer,
-                           const std::vector<std::vector<double>>& response, double sample_rate) {
+FrequencyResponse averagedFrf(const std::vector<std::vector<double>>& hammer,
+                              const std::vector<std::vector<double>>& response, double sample_rate) {
   if (hammer.empty() || hammer.size() != response.size()) throw Error("sensor identification: no hits");
   FrfEstimator estimator(sample_rate, hammer.front().size());
   for (std::size_t i = 0; i < hammer.size(); ++i) {
@@ -41,7 +41,7 @@ FrequencyResponse averaged(const std::vector<std::vector<double>>& hammer,
       force[k] *= window[k];
       window_power += window[k] * window[k];
     }
-    // What stands before the hit is noise.
+    // The samples before the hit are noise.
     while (before < window.size() && window[before] == 0.0) {
       rest += hammer[i][before] * hammer[i][before];
       rest_response += response[i][before] * response[i][before];
@@ -58,8 +58,8 @@ FrequencyResponse averaged(const std::vector<std::vector<double>>& hammer,
 
 namespace {
 
-/// A blow against the sensor's axis, or a sensor that shows the reaction: its slow response is negative.
-bool staysOpposite(const FrequencyResponse& frf, double low) {
+/// Whether the response at low frequency is negative: hit against the axis, or a sensor of the reaction.
+bool hasNegativeStaticGain(const FrequencyResponse& frf, double low) {
   double sum = 0.0;
   for (const auto& value : frf.band(low, 3.0 * low + 50.0).value) sum += value.real();
   return sum < 0.0;
@@ -77,7 +77,7 @@ Taps tapsAlong(const Campaign& campaign, std::size_t axis) {
     if (test.kind != TestKind::tap || test.direction != DIRECTIONS[axis]) continue;
     const Record record = readRecord(campaign, test);
     if (taps.rate != 0.0 && (taps.rate != test.sample_rate || record.size() != taps.hammer.front().size())) {
-      throw Error(record.file + ": taps of one direction need one rate and one length");
+      throw Error(record.file + ": sample rate or length differs from the other taps of this direction");
     }
     taps.rate = test.sample_rate;
     taps.hammer.push_back(record.column("hammer"));
@@ -97,8 +97,8 @@ ModalFit identifySensor(const std::vector<std::vector<double>>& hammer,
   options.high = std::min(parameters.high, 0.45 * sample_rate);
   options.max_modes = parameters.max_modes;
   options.unit_static_gain = true;
-  FrequencyResponse measured = averaged(hammer, response, sample_rate);
-  if (staysOpposite(measured, parameters.low)) {
+  FrequencyResponse measured = averagedFrf(hammer, response, sample_rate);
+  if (hasNegativeStaticGain(measured, parameters.low)) {
     for (auto& value : measured.value) value = -value;
   }
   return fitModes(measured, options);
@@ -114,7 +114,7 @@ std::array<ModalModel, 3> identifySensor(const Campaign& campaign, const SensorF
     any = true;
     sensor[axis] = identifySensor(taps.hammer, taps.response[axis], taps.rate, parameters).model;
   }
-  if (!any) throw Error(campaign.folder + ": the campaign has no taps to identify the force sensor from");
+  if (!any) throw Error(campaign.folder + ": no taps to identify the force sensor from");
   return sensor;
 }
 
@@ -124,7 +124,7 @@ bool measuresWorkpiece(const Campaign& campaign, const std::string& model_file) 
   return readMachineModel(file).force_sensor.measures_workpiece;
 }
 
-void turnForces(Record& record) {
+void negateForces(Record& record) {
   for (std::size_t i = 0; i < record.names.size(); ++i) {
     if (std::find(FORCE_CHANNELS.begin(), FORCE_CHANNELS.end(), record.names[i]) == FORCE_CHANNELS.end())
       continue;
@@ -154,14 +154,15 @@ SensorMatrix identifySensorMatrix(const Campaign& campaign, const SensorFitParam
   for (std::size_t j = 0; j < 3; ++j) {
     taps[j] = tapsAlong(campaign, j);
     if (taps[j].hammer.empty())
-      throw Error(campaign.folder + ": cross-talk needs taps along " + DIRECTIONS[j] + " too");
+      throw Error(campaign.folder + ": no taps for the cross-talk along " + DIRECTIONS[j]);
     sensor.h[j][j] = identifySensor(taps[j].hammer, taps[j].response[j], taps[j].rate, parameters).model;
   }
   for (std::size_t j = 0; j < 3; ++j) {
     for (std::size_t i = 0; i < 3; ++i) {
       if (i == j) continue;
-      FrequencyResponse across = averaged(taps[j].hammer, taps[j].response[i], taps[j].rate);
-      if (staysOpposite(averaged(taps[j].hammer, taps[j].response[j], taps[j].rate), parameters.low)) {
+      FrequencyResponse across = averagedFrf(taps[j].hammer, taps[j].response[i], taps[j].rate);
+      if (hasNegativeStaticGain(averagedFrf(taps[j].hammer, taps[j].response[j], taps[j].rate),
+                                parameters.low)) {
         for (auto& value : across.value) value = -value;
       }
       sensor.h[i][j] = fitCrossTalk(across, sensor.h[j][j], sensor.h[i][i], parameters.low,

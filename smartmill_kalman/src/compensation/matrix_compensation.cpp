@@ -7,38 +7,33 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/signal/force_channels.h"
+#include "smartmill_kalman/sensor/block_channels.h"
 
 namespace smartmill::kalman {
 
 MatrixCompensation::MatrixCompensation(const MatrixInverse& inverse, bool measures_workpiece,
-                                       ForceCompensation::Output output)
-    : inverse_(inverse), sign_(measures_workpiece ? -1.0 : 1.0), output_(std::move(output)) {
+                                       ForceOutputs outputs)
+    : inverse_(inverse), sign_(measures_workpiece ? -1.0 : 1.0), outputs_(std::move(outputs)) {
   reset();
 }
 
 void MatrixCompensation::reset() {
   inverse_.reset();
-  waiting_.clear();
+  pending_.clear();
   for (auto& axis : ready_) axis.clear();
-  early_ = settling_ = inverse_.latency();
+  discard_ = settling_samples_ = inverse_.latency();
   last_.assign(inverse_.channels(), 0.0);
   next_index_.reset();
 }
 
 std::vector<std::size_t> MatrixCompensation::columnsOf(const SampleBlock& block) const {
   if (std::abs(block.sample_rate / inverse_.sampleRate() - 1.0) > 1e-9) {
-    throw Error(formatted("plate_taps: taps at %.1f Hz, the sensor runs at %.1f Hz", inverse_.sampleRate(),
-                          block.sample_rate));
+    throw Error(formatted("sample block: sample rate %.1f Hz, expected %.1f Hz as in plate_taps",
+                          block.sample_rate, inverse_.sampleRate()));
   }
   std::vector<std::size_t> columns;
-  for (std::size_t c = 0; c < inverse_.channels(); ++c) {
-    columns.push_back(block.channel(PLATE_CHANNELS[c]));
-    const char* due = c < 3 ? "N" : "N m";
-    if (block.units.at(columns.back()) != due) {
-      throw Error(std::string("plate: channel ") + PLATE_CHANNELS[c] + " is in " +
-                  block.units[columns.back()] + ", " + due + " is due");
-    }
-  }
+  for (std::size_t c = 0; c < inverse_.channels(); ++c)
+    columns.push_back(columnOf(block, PLATE_CHANNELS[c], c < 3 ? "N" : "N m"));
   return columns;
 }
 
@@ -59,7 +54,7 @@ void MatrixCompensation::handle(const SampleBlock& block) {
     for (std::size_t i = 0; i < block.size(); ++i) {
       const double sample = block.at(i, columns[c]);
       if (c < 3) measured.force[c].push_back(sign_ * sample);
-      // The filters go on over a hole; nothing is claimed in it.
+      // The inverse gets the last valid sample; the output is NaN.
       if (std::isfinite(sample)) {
         last_[c] = sample;
       } else {
@@ -68,44 +63,44 @@ void MatrixCompensation::handle(const SampleBlock& block) {
       samples[c].push_back(sign_ * last_[c]);
     }
   }
-  waiting_.push_back(std::move(measured));
+  pending_.push_back(std::move(measured));
   const auto force = inverse_.process(samples);
   for (std::size_t i = 0; i < force[0].size(); ++i) {
-    if (early_ > 0) {
-      --early_;
+    if (discard_ > 0) {
+      --discard_;
       continue;
     }
     for (std::size_t axis = 0; axis < 3; ++axis) ready_[axis].push_back(force[axis][i]);
   }
-  while (!waiting_.empty() && ready_[0].size() >= waiting_.front().force[0].size()) release();
+  while (!pending_.empty() && ready_[0].size() >= pending_.front().force[0].size()) publishOldest();
 }
 
-void MatrixCompensation::release() {
-  const ForceBlock measured = std::move(waiting_.front());
-  waiting_.pop_front();
+void MatrixCompensation::publishOldest() {
+  const ForceBlock measured = std::move(pending_.front());
+  pending_.pop_front();
   ForceBlock compensated = measured;
   const std::size_t count = measured.force[0].size();
-  compensated.status = settling_ > 0 ? ForceBlock::Status::settling : ForceBlock::Status::compensated;
-  settling_ -= std::min(settling_, count);
+  compensated.status = settling_samples_ > 0 ? ForceBlock::Status::settling : ForceBlock::Status::compensated;
+  settling_samples_ -= std::min(settling_samples_, count);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     for (std::size_t i = 0; i < count; ++i) {
-      const bool whole = std::isfinite(measured.force[0][i] + measured.force[1][i] + measured.force[2][i]);
-      compensated.force[axis][i] = whole ? ready_[axis].front() : NOT_A_NUMBER;
+      const bool valid = std::isfinite(measured.force[0][i] + measured.force[1][i] + measured.force[2][i]);
+      compensated.force[axis][i] = valid ? ready_[axis].front() : NOT_A_NUMBER;
       ready_[axis].pop_front();
     }
   }
-  output_(measured, compensated);
+  outputs_.publish(measured, compensated);
 }
 
 void MatrixCompensation::flush() {
-  if (waiting_.empty()) return;
+  if (pending_.empty()) return;
   const auto force = inverse_.process(
       std::vector<std::vector<double>>(inverse_.channels(), std::vector<double>(inverse_.latency(), 0.0)));
   for (std::size_t axis = 0; axis < 3; ++axis)
-    ready_[axis].insert(ready_[axis].end(), force[axis].begin() + static_cast<std::ptrdiff_t>(early_),
+    ready_[axis].insert(ready_[axis].end(), force[axis].begin() + static_cast<std::ptrdiff_t>(discard_),
                         force[axis].end());
-  early_ = 0;
-  while (!waiting_.empty() && ready_[0].size() >= waiting_.front().force[0].size()) release();
+  discard_ = 0;
+  while (!pending_.empty() && ready_[0].size() >= pending_.front().force[0].size()) publishOldest();
   reset();
 }
 

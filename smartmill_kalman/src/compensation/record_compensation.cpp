@@ -2,54 +2,139 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
+#include "smartmill_kalman/filter/adaptive_memory.h"
 #include "smartmill_kalman/filter/delay_filter.h"
+#include "smartmill_kalman/filter/fixed_lag_smoother.h"
 #include "smartmill_kalman/filter/inverse_filter.h"
-#include "smartmill_kalman/filter/lag_smoother.h"
 
 namespace smartmill::kalman {
 namespace {
 
-/// Revolutions after a change from which the amplitudes at that change are told.
+/// Revolutions after an abrupt change from which the amplitudes at the change are estimated.
 constexpr double LEAD = 4.0;
-/// Length of the filter's window plus the samples that a change needs to show through the sensor.
-constexpr std::size_t BACK = 24;
+/// Samples between a change of the force and its detection: the window of the innovations, and the delay of
+/// the sensor.
+constexpr std::size_t DETECTION_DELAY = AdaptiveMemory::WINDOW + 8;
+/// Samples per block of the fixed-lag smoother, as from a DAQ.
+constexpr std::size_t BLOCK = 256;
 
-/// Force states at the start of a stretch, told from what the quick filter knows LEAD revolutions later.
+struct RecordTask {
+  const std::vector<double>& measured;  // [N]
+  const ModalModel& sensor;
+  double spindle_speed, sample_rate;  // [rad/s], [Hz]
+  const HarmonicFilterParameters& parameters;
+  double lag;  // [s]
+};
+
+/// State at the start of a segment, from the quick filter LEAD revolutions later.
 std::vector<double> stateAtStart(HarmonicFilter quick, const std::vector<double>& at_rest,
-                                 const std::vector<double>& stretch, std::size_t lead, double sample_rate) {
+                                 const std::vector<double>& segment, std::size_t lead, double sample_rate) {
   quick.reset();
   quick.setState(at_rest);
   for (std::size_t i = 0; i < lead; ++i) {
     quick.setLevel(0);
-    quick.step(stretch[i]);
+    quick.step(segment[i]);
   }
   std::vector<double> state = quick.state();
   const std::size_t m = state.size() - 1 - 2 * static_cast<std::size_t>(quick.harmonics());
-  // The modes are where they were; the amplitudes turn back.
+  // The modes keep their states; the harmonics rotate back to the start.
   std::copy(at_rest.begin(), at_rest.begin() + static_cast<std::ptrdiff_t>(m), state.begin());
   for (int n = 1; n <= quick.harmonics(); ++n) {
     double& in_phase = state[m + 2 * n - 1];
     double& quadrature = state[m + 2 * n];
-    const double turn = -n * quick.spindleSpeed() * static_cast<double>(lead) / sample_rate;
-    const double c = std::cos(turn), s = std::sin(turn), f = in_phase, g = quadrature;
+    const double angle = -n * quick.spindleSpeed() * static_cast<double>(lead) / sample_rate;
+    const double c = std::cos(angle), s = std::sin(angle), f = in_phase, g = quadrature;
     in_phase = c * f + s * g;
     quadrature = c * g - s * f;
   }
   return state;
 }
 
+template <class Filter>
+std::vector<double> filterRecord(const RecordTask& task) {
+  Filter filter(task.sensor, task.spindle_speed, task.sample_rate, task.parameters);
+  std::vector<double> force;
+  force.reserve(task.measured.size());
+  for (const double sample : task.measured) force.push_back(filter.step(sample));
+  return force;
+}
+
+std::vector<double> smoothWithLag(const RecordTask& task) {
+  HarmonicFilter filter(task.sensor, task.spindle_speed, task.sample_rate, task.parameters);
+  const auto lag = static_cast<std::size_t>(std::lround(task.lag * task.sample_rate));
+  FixedLagSmoother smoother;
+  std::vector<double> force;
+  force.reserve(task.measured.size());
+  const auto takeBlock = [&] {
+    const std::vector<double> block = smoother.takeSmoothed(BLOCK);
+    force.insert(force.end(), block.begin(), block.end());
+  };
+  for (const double sample : task.measured) {
+    smoother.step(filter, sample);
+    if (smoother.pending() >= BLOCK + lag) takeBlock();
+  }
+  while (smoother.pending() > 0) takeBlock();
+  return force;
+}
+
+std::vector<double> invertRecord(const RecordTask& task) {
+  InverseParameters inverse;
+  inverse.bandwidth = std::min(task.parameters.bandwidth, 0.4 * task.sample_rate);
+  InverseFilter filter(task.sensor, task.sample_rate, inverse);
+  std::vector<double> padded = task.measured;
+  padded.resize(task.measured.size() + filter.latency(), 0.0);
+  std::vector<double> force = filter.process(padded);
+  force.erase(force.begin(), force.begin() + static_cast<std::ptrdiff_t>(filter.latency()));
+  return force;
+}
+
+std::vector<double> smoothWhole(const RecordTask& task) {
+  return smoothRecord(task.measured, task.sensor, task.spindle_speed, task.sample_rate, task.parameters);
+}
+
+/// A method is a function and a line here.
+struct RecordMethod {
+  Method method;
+  const char* name;
+  bool needs_whole_record;
+  std::vector<double> (*compensate)(const RecordTask&);
+};
+constexpr RecordMethod METHODS[] = {
+    {Method::kalman, "kalman", false, filterRecord<HarmonicFilter>},
+    {Method::delay, "delay", false, filterRecord<DelayFilter>},
+    {Method::smoother, "smoother", true, smoothWhole},
+    {Method::fixed_lag, "fixed-lag", false, smoothWithLag},
+    {Method::inverse, "inverse", true, invertRecord},
+};
+
+const RecordMethod& entryOf(Method method) {
+  return *std::find_if(std::begin(METHODS), std::end(METHODS),
+                       [method](const RecordMethod& m) { return m.method == method; });
+}
+
 }  // namespace
 
 Method methodOf(const std::string& name) {
-  if (name == "kalman") return Method::kalman;
-  if (name == "delay") return Method::delay;
-  if (name == "smoother") return Method::smoother;
-  if (name == "fixed-lag") return Method::fixed_lag;
-  if (name == "inverse") return Method::inverse;
-  throw Error("method '" + name + "': kalman, delay, smoother, fixed-lag or inverse is due");
+  std::string known;
+  for (const RecordMethod& m : METHODS) {
+    if (name == m.name) return m.method;
+    known += (known.empty() ? "" : ", ") + std::string(m.name);
+  }
+  throw Error("method '" + name + "': unknown, expected one of " + known);
+}
+
+std::vector<std::string> methodNames() {
+  std::vector<std::string> names;
+  for (const RecordMethod& m : METHODS) names.emplace_back(m.name);
+  return names;
+}
+
+bool needsWholeRecord(Method method) {
+  return entryOf(method).needs_whole_record;
 }
 
 std::vector<double> smoothRecord(const std::vector<double>& measured, const ModalModel& sensor,
@@ -65,19 +150,19 @@ std::vector<double> smoothRecord(const std::vector<double>& measured, const Moda
     causal.step(measured[i]);
     if (causal.restarts() == restarts) continue;
     restarts = causal.restarts();
-    const std::size_t start = i > BACK ? i - BACK : 0;
-    // What follows a change at once belongs to it.
-    if (start > starts.back() + (starts.size() > 1 ? lead : BACK)) starts.push_back(start);
+    const std::size_t start = i > DETECTION_DELAY ? i - DETECTION_DELAY : 0;
+    // A detection soon after a change belongs to it.
+    if (start > starts.back() + (starts.size() > 1 ? lead : DETECTION_DELAY)) starts.push_back(start);
   }
   std::vector<double> force;
   force.reserve(measured.size());
   for (std::size_t k = 0; k < starts.size(); ++k) {
     const std::size_t end = k + 1 < starts.size() ? starts[k + 1] : measured.size();
-    const std::vector<double> stretch(measured.begin() + static_cast<std::ptrdiff_t>(starts[k]),
+    const std::vector<double> segment(measured.begin() + static_cast<std::ptrdiff_t>(starts[k]),
                                       measured.begin() + static_cast<std::ptrdiff_t>(end));
-    if (stretch.size() > lead)
-      filter.setState(stateAtStart(filter, filter.state(), stretch, lead, sample_rate));
-    const std::vector<double> smoothed = filter.smooth(stretch);
+    if (segment.size() > lead)
+      filter.setState(stateAtStart(filter, filter.state(), segment, lead, sample_rate));
+    const std::vector<double> smoothed = filter.smooth(segment);
     force.insert(force.end(), smoothed.begin(), smoothed.end());
   }
   return force;
@@ -86,44 +171,7 @@ std::vector<double> smoothRecord(const std::vector<double>& measured, const Moda
 std::vector<double> compensateRecord(Method method, const std::vector<double>& measured,
                                      const ModalModel& sensor, double spindle_speed, double sample_rate,
                                      const HarmonicFilterParameters& parameters, double lag) {
-  if (method == Method::smoother)
-    return smoothRecord(measured, sensor, spindle_speed, sample_rate, parameters);
-  std::vector<double> force;
-  if (method == Method::inverse) {
-    InverseParameters inverse;
-    inverse.bandwidth = std::min(parameters.bandwidth, 0.4 * sample_rate);
-    InverseFilter filter(sensor, sample_rate, inverse);
-    std::vector<double> longer = measured;
-    longer.resize(measured.size() + filter.latency(), 0.0);
-    force = filter.process(longer);
-    force.erase(force.begin(), force.begin() + static_cast<std::ptrdiff_t>(filter.latency()));
-    return force;
-  }
-  force.reserve(measured.size());
-  if (method == Method::delay) {
-    DelayFilter filter(sensor, spindle_speed, sample_rate, parameters);
-    for (const double sample : measured) force.push_back(filter.step(sample));
-    return force;
-  }
-  HarmonicFilter filter(sensor, spindle_speed, sample_rate, parameters);
-  if (method == Method::fixed_lag) {
-    // In blocks, as the node: a block's samples know what comes up to the lag after the block's end.
-    constexpr std::size_t BLOCK = 256;
-    const auto late = static_cast<std::size_t>(std::lround(lag * sample_rate));
-    LagSmoother smoother;
-    const auto take = [&](std::size_t count) {
-      const std::vector<double> told = smoother.take(count);
-      force.insert(force.end(), told.begin(), told.end());
-    };
-    for (const double sample : measured) {
-      smoother.step(filter, sample);
-      if (smoother.waiting() >= BLOCK + late) take(BLOCK);
-    }
-    while (smoother.waiting() > 0) take(BLOCK);
-    return force;
-  }
-  for (const double sample : measured) force.push_back(filter.step(sample));
-  return force;
+  return entryOf(method).compensate({measured, sensor, spindle_speed, sample_rate, parameters, lag});
 }
 
 }  // namespace smartmill::kalman

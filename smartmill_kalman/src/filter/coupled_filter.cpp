@@ -47,7 +47,7 @@ ModalModel fitCrossTalk(const FrequencyResponse& frf, const ModalModel& own, con
   ModalModel model;
   model.modes = own.modes;
   for (const Mode& mode : other.modes) {
-    // The same mode seen in both axes is one.
+    // A mode of both axes is taken once.
     const bool known = std::any_of(own.modes.begin(), own.modes.end(), [&](const Mode& m) {
       return std::abs(m.frequency / mode.frequency - 1.0) <
              0.5 * std::max(m.damping_ratio, mode.damping_ratio);
@@ -105,7 +105,7 @@ CrossTalkInverse::CrossTalkInverse(const SensorMatrix& sensor, double spindle_sp
     const Eigen::Matrix3cd h = matrixAt(sensor, f);
     const Eigen::Matrix3cd change =
         h.inverse() * Eigen::Matrix3cd(h.diagonal().asDiagonal()) - Eigen::Matrix3cd::Identity();
-    // The filters' states stand at the next sample.
+    // The states of the filters are those of the next sample.
     const Complex back = std::polar(1.0, -n * spindle_speed / sample_rate);
     correction_.emplace_back();
     for (int i = 0; i < 3; ++i) {
@@ -178,8 +178,7 @@ SensorMatrix readSensorMatrix(const std::string& file) {
 
 void writeSensorMatrix(const SensorMatrix& matrix, const std::string& file) {
   std::ofstream out(file);
-  out << "format: " << FORMAT
-      << "\n# measured axis, then the force's: xy is what x shows of a force along y\n";
+  out << "format: " << FORMAT << "\n# first letter: measured axis, second: axis of the force\n";
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t j = 0; j < 3; ++j) {
       const ModalModel& model = matrix.h[i][j];
@@ -193,7 +192,7 @@ void writeSensorMatrix(const SensorMatrix& matrix, const std::string& file) {
     }
   }
   out.close();
-  if (!out) throw Error(file + ": cannot be written");
+  if (!out) throw Error(file + ": cannot write");
 }
 
 }  // namespace smartmill::kalman

@@ -14,14 +14,14 @@
 namespace smartmill::kalman {
 namespace {
 
-/// The quick memory over settling_revolutions: a line of samples has more to learn than a band of harmonics.
-constexpr double QUICK = 1.5;
-/// Length of the array in which the line moves, in lines.
-constexpr std::size_t ROOM = 8;
-/// Steps of the gain's recursion, in revolutions, and the rise of P over a revolution at which it ends. What
-/// the sensor hardly passes goes on rising long after: it stays as slow as it is then, when the innovation's
-/// variance rises by less than SETTLED.
-constexpr double MOST_REVOLUTIONS = 1000.0, CONVERGED = 1e-7, SETTLED = 1e-4;
+/// Shortest memory over settling_revolutions: the line has more states than the harmonics.
+constexpr double QUICK_FACTOR = 1.5;
+/// Length of the buffer in which the line moves, in lines.
+constexpr std::size_t BUFFER_LINES = 8;
+/// Longest recursion of the gain in revolutions, and relative rise of P per revolution at convergence.
+/// Frequencies that the sensor hardly transmits converge much later; the recursion then ends at its longest,
+/// if the variance of the innovation rises by less than SETTLED.
+constexpr double MAX_REVOLUTIONS = 1000.0, CONVERGED = 1e-7, SETTLED = 1e-4;
 
 /// Coefficients of u^i, lowest first, of the polynomial that is 1 at node j and 0 at the others.
 std::vector<double> lagrangePolynomial(const std::vector<double>& nodes, std::size_t j) {
@@ -39,8 +39,8 @@ std::vector<double> lagrangePolynomial(const std::vector<double>& nodes, std::si
   return p;
 }
 
-/// Shares of the TAPS points around a position in its value (Lagrange). @return the first of them
-std::size_t sharesAt(double position, std::vector<double>& shares) {
+/// Lagrange weights of the TAPS points around a position. @return index of the first point
+std::size_t interpolationAt(double position, std::vector<double>& shares) {
   constexpr std::size_t TAPS = DelayModel::TAPS;
   const auto first = static_cast<std::size_t>(std::floor(position)) - (TAPS / 2 - 1);
   for (std::size_t j = 0; j < TAPS; ++j) {
@@ -95,14 +95,14 @@ DelayModel::DelayModel(const ModalModel& sensor, double turn, double sample_rate
 
 void DelayModel::setPeriod(double samples) {
   if (!(samples >= 18.0) || samples > 1e6) {
-    throw Error("delay form: a period of " + std::to_string(samples) + " samples, 18 .. 1e6 is due");
+    throw Error("delay form: a period of " + std::to_string(samples) + " samples, expected 18 .. 1e6");
   }
   period = samples;
   // The line's next element is line[line]; one period before it is line[line - T].
   line = static_cast<std::size_t>(std::ceil(samples)) + TAPS / 2;
   const double position = static_cast<double>(line) - samples;
   interpolate.resize(TAPS);
-  at = sharesAt(position, interpolate);
+  at = interpolationAt(position, interpolate);
 }
 
 void DelayModel::step(std::vector<double>& x) const {
@@ -131,23 +131,23 @@ double DelayModel::measured(const std::vector<double>& x) const {
 }
 
 std::vector<double> delayGain(const DelayModel& model, double q, double r) {
-  if (!(q > 0.0) || !(r > 0.0)) throw Error("delay form: variances above 0 are due");
+  if (!(q > 0.0) || !(r > 0.0)) throw Error("delay form: expected variances above 0");
   // Morf, Sidhu and Kailath: P(k + 1) - P(k) = m l l', n = P c'.
   std::vector<double> l(model.states(), 0.0), n = l, through(model.states());
   l.back() = 1.0;
   double m = q, variance = r;
-  const auto most = static_cast<std::size_t>(MOST_REVOLUTIONS * static_cast<double>(model.line));
+  const auto most = static_cast<std::size_t>(MAX_REVOLUTIONS * static_cast<double>(model.line));
   double rise = 0.0;  // of the innovation's variance over a revolution
   for (std::size_t step = 1; step <= most; ++step) {
-    const double seen = model.measured(l), before = variance;
+    const double output = model.measured(l), before = variance;
     // l(k + 1) = (phi - phi n c / variance) l
-    for (std::size_t i = 0; i < l.size(); ++i) through[i] = l[i] - n[i] * (seen / before);
-    for (std::size_t i = 0; i < l.size(); ++i) n[i] += m * seen * l[i];
-    variance += m * seen * seen;
+    for (std::size_t i = 0; i < l.size(); ++i) through[i] = l[i] - n[i] * (output / before);
+    for (std::size_t i = 0; i < l.size(); ++i) n[i] += m * output * l[i];
+    variance += m * output * output;
     m *= before / variance;
     model.step(through);
     l.swap(through);
-    rise += m * seen * seen;
+    rise += m * output * output;
     if (step % model.line == 0) {
       double left = 0.0;
       for (const double x : l) left += x * x;
@@ -161,27 +161,27 @@ std::vector<double> delayGain(const DelayModel& model, double q, double r) {
       rise = 0.0;
     }
   }
-  throw Error("delay form: the gain does not settle");
+  throw Error("delay form: the gain does not converge");
 }
 
 DelayFilter::DelayFilter(const ModalModel& sensor, double spindle_speed, double sample_rate,
                          const HarmonicFilterParameters& parameters)
     : sample_rate_(sample_rate),
       model_(sensor, units::TWO_PI / spindle_speed, sample_rate),
-      watch_(1, units::TWO_PI / spindle_speed * sample_rate) {
+      memory_(1, units::TWO_PI / spindle_speed * sample_rate) {
   parameters.validate();
   const double r = parameters.noise_rms * parameters.noise_rms;
-  const double quick = QUICK * parameters.settling_revolutions;
+  const double quick = QUICK_FACTOR * parameters.settling_revolutions;
   const double slow = std::max(quick, parameters.memory_revolutions);
   for (const double memory : {quick, std::sqrt(quick * slow), slow}) {
     gain_.push_back(delayGain(model_, r / (memory * memory), r));
     innovation_std_.push_back(std::sqrt(gain_.back().back()));
     gain_.back().pop_back();
   }
-  watch_.setLevels(gain_.size());
+  memory_.setLevels(gain_.size());
   modes_.resize(2 * model_.modes);
   next_.resize(2 * model_.modes);
-  line_.resize(ROOM * model_.line);
+  line_.resize(BUFFER_LINES * model_.line);
   reset();
 }
 
@@ -190,7 +190,7 @@ void DelayFilter::reset() {
   std::fill(line_.begin(), line_.end(), 0.0);
   head_ = 0;
   innovation_ = 0.0;
-  watch_.reset();
+  memory_.reset();
 }
 
 double DelayFilter::spindleSpeed() const {
@@ -201,7 +201,7 @@ void DelayFilter::retune(double spindle_speed) {
   const DelayFilter before = *this;
   model_.setPeriod(units::TWO_PI * sample_rate_ / spindle_speed);
   for (std::vector<double>& gain : gain_) {
-    // The far end of the line is made of the forces one period before it, and so is its gain.
+    // The end of the line repeats the forces one period earlier, and so does its gain.
     const std::size_t first = 2 * model_.modes;
     gain.resize(std::min(gain.size(), model_.states()));
     while (gain.size() < model_.states()) {
@@ -211,30 +211,30 @@ void DelayFilter::retune(double spindle_speed) {
       gain.push_back(next);
     }
   }
-  takeLine(before);
-  watch_.setRevolution(model_.period);
+  resampleFrom(before);
+  memory_.setRevolution(model_.period);
 }
 
-void DelayFilter::adopt(const DelayFilter& other) {
+void DelayFilter::continueFrom(const DelayFilter& other) {
   modes_ = other.modes_;
-  takeLine(other);
-  watch_.setLevel(other.level());
+  resampleFrom(other);
+  memory_.setLevel(other.level());
 }
 
-// The same force at the same angle: the other's samples lie closer or wider.
-void DelayFilter::takeLine(const DelayFilter& other) {
+// The same force at the same angle, with another spacing of the samples.
+void DelayFilter::resampleFrom(const DelayFilter& other) {
   constexpr std::size_t TAPS = DelayModel::TAPS;
   const DelayModel& was = other.model_;
   const auto first = other.line_.begin() + static_cast<std::ptrdiff_t>(other.head_);
   std::vector<double> known(first, first + static_cast<std::ptrdiff_t>(was.line));
-  // What comes after the line, as the model tells it, so that every place has its points around it.
+  // Extended by the model beyond its end, so that every position has its points around it.
   while (known.size() < was.line + 2 * TAPS) {
     const std::size_t from = was.at + known.size() - was.line;
     double next = 0.0;
     for (std::size_t j = 0; j < TAPS; ++j) next += was.interpolate[j] * known[from + j];
     known.push_back(next);
   }
-  line_.assign(ROOM * model_.line, 0.0);
+  line_.assign(BUFFER_LINES * model_.line, 0.0);
   head_ = 0;
   std::vector<double> share(TAPS);
   constexpr auto NOW = static_cast<double>(DelayModel::NOW);
@@ -242,7 +242,7 @@ void DelayFilter::takeLine(const DelayFilter& other) {
     double position = NOW + (static_cast<double>(i) - NOW) * was.period / model_.period;
     if (position < 0.5 * static_cast<double>(TAPS)) position += was.period;
     if (position > static_cast<double>(was.line + TAPS)) position -= was.period;
-    const std::size_t from = sharesAt(position, share);
+    const std::size_t from = interpolationAt(position, share);
     for (std::size_t j = 0; j < TAPS; ++j) line_[i] += share[j] * known[from + j];
   }
 }
@@ -256,7 +256,7 @@ double DelayFilter::expected() const {
 double DelayFilter::step(double measured) {
   const double innovation = measured - expected();
   const double force = advance(innovation);
-  watch_.add(innovation);
+  memory_.add(innovation);
   return force;
 }
 
@@ -268,7 +268,7 @@ double DelayFilter::advance(double innovation) {
   }
   double* forces = line_.data() + head_;
   innovation_ = innovation;
-  const double* gain = gain_[watch_.level()].data();
+  const double* gain = gain_[memory_.level()].data();
   for (std::size_t i = 0; i < modes_.size(); ++i) modes_[i] += gain[i] * innovation;
   gain += modes_.size();
   for (std::size_t i = 0; i < model_.line; ++i) forces[i] += gain[i] * innovation;

@@ -11,19 +11,19 @@
 namespace smartmill::kalman {
 namespace {
 
-void need(bool good, const char* key, double value, const char* due) {
+void require(bool good, const char* key, double value, const char* expected) {
   if (!good || !std::isfinite(value))
-    throw Error(std::string(key) + ": " + std::to_string(value) + ", " + due + " is due");
+    throw Error(std::string(key) + ": " + std::to_string(value) + ", expected " + expected);
 }
 
 }  // namespace
 
 void InverseParameters::validate() const {
-  need(bandwidth > 0.0, "bandwidth", bandwidth, "above 0 Hz");
-  need(transition > 0.0, "transition", transition, "above 0 Hz");
-  need(noise_share >= 0.0, "noise_share", noise_share, "at least 0");
-  need(uncertainty >= 0.0, "uncertainty", uncertainty, "at least 0");
-  need(taps > latency, "taps", static_cast<double>(taps), "more than latency");
+  require(bandwidth > 0.0, "bandwidth", bandwidth, "above 0 Hz");
+  require(transition > 0.0, "transition", transition, "above 0 Hz");
+  require(noise_share >= 0.0, "noise_share", noise_share, "at least 0");
+  require(uncertainty >= 0.0, "uncertainty", uncertainty, "at least 0");
+  require(taps > latency, "taps", static_cast<double>(taps), "more than latency");
 }
 
 InverseFilter::InverseFilter(const ModalModel& sensor, double sample_rate,
@@ -42,7 +42,7 @@ InverseFilter::InverseFilter(const ModalModel& sensor, double sample_rate,
                       std::polar(1.0, -units::TWO_PI * f / sample_rate * static_cast<double>(latency_)));
   }
   taps_ = inverseFourier(inverse, n);
-  // What rings longer is cut softly.
+  // The end of the impulse response is tapered.
   taps_.resize(parameters.taps);
   const std::size_t tail = parameters.taps / 8;
   for (std::size_t i = 0; i < tail; ++i) {
@@ -60,7 +60,6 @@ std::vector<double> InverseFilter::process(const std::vector<double>& samples) {
   if (samples.empty()) return {};
   std::vector<double> joined = history_;
   joined.insert(joined.end(), samples.begin(), samples.end());
-  // A length that transforms fast.
   std::size_t length = 1;
   while (length < joined.size()) length *= 2;
   history_.assign(joined.end() - static_cast<std::ptrdiff_t>(taps_.size() - 1), joined.end());

@@ -12,8 +12,8 @@ namespace smartmill::kalman {
 
 LowPass::LowPass(double corner, double sample_rate) {
   if (!(corner > 0.0) || !(corner < 0.5 * sample_rate)) {
-    throw Error("low pass: corner " + std::to_string(corner) + " Hz, 0 .. " +
-                std::to_string(0.5 * sample_rate) + " Hz is due");
+    throw Error("low pass: corner " + std::to_string(corner) + " Hz, expected 0 .. " +
+                std::to_string(0.5 * sample_rate) + " Hz");
   }
   const double k = std::tan(units::PI * corner / sample_rate);
   for (std::size_t i = 0; i < sections_.size(); ++i) {
@@ -37,7 +37,7 @@ double LowPass::step(double sample) {
   }
   double value = sample;
   for (Section& s : sections_) {
-    if (!started_) {  // as if this level had stood for ever
+    if (!started_) {  // steady state at this level
       s.s2 = (s.b2 - s.a2) * value;
       s.s1 = (s.b1 - s.a1) * value + s.s2;
     }
@@ -53,7 +53,7 @@ double LowPass::step(double sample) {
 std::vector<double> zeroPhaseLowPass(const std::vector<double>& signal, double corner, double sample_rate) {
   LowPass filter(corner, sample_rate);
   if (signal.empty()) return {};
-  const auto ring = static_cast<std::size_t>(3.0 * sample_rate / corner);  // its memory
+  const auto ring = static_cast<std::size_t>(3.0 * sample_rate / corner);  // duration of its impulse response
   const std::size_t margin = std::min(signal.size() - 1, ring);
   std::vector<double> longer;
   longer.reserve(signal.size() + 2 * margin);

@@ -16,18 +16,18 @@ using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::MatrixXcd;
 
-constexpr double FADE = 0.15;      // [1] of the bandwidth, over which it ends
-constexpr double LATENCY = 0.01;   // [s] for what comes before its cause
-constexpr std::size_t TAIL = 8;    // an eighth of the taps is cut softly
-constexpr std::size_t FORCES = 3;  // rows that are asked for
+constexpr double ROLL_OFF = 0.15;  // [1] of the bandwidth, over which it ends
+constexpr double LATENCY = 0.01;   // [s] for the non-causal part
+constexpr std::size_t TAIL = 8;    // an eighth of the taps is tapered
+constexpr std::size_t FORCES = 3;  // rows: x, y, z
 
-/// 1 up to the bandwidth, 0 from 1 + FADE times it on.
+/// 1 up to the bandwidth, 0 from 1 + ROLL_OFF times it on.
 double passed(double frequency, double bandwidth) {
-  const double beyond = std::clamp((frequency / bandwidth - 1.0) / FADE, 0.0, 1.0);
+  const double beyond = std::clamp((frequency / bandwidth - 1.0) / ROLL_OFF, 0.0, 1.0);
   return 0.5 * (1.0 + std::cos(units::PI * beyond));
 }
 
-/// Applied over measured at a line, the matrix known to its own deviation only.
+/// Regularised inverse at a line: the floor is the variance of the matrix.
 MatrixXcd inverseAt(const TransferMatrix& matrix, std::size_t line, const Eigen::VectorXd& scale) {
   const Index n = scale.size();
   MatrixXcd forward(n, n);
@@ -50,7 +50,7 @@ MatrixXcd inverseAt(const TransferMatrix& matrix, std::size_t line, const Eigen:
 
 MatrixInverse::MatrixInverse(const TransferMatrix& matrix, double bandwidth) : channels_(matrix.channels) {
   if (matrix.frequency.size() < 2 || matrix.frequency.front() != 0.0)
-    throw Error("transfer matrix: all lines of its taps are due");
+    throw Error("transfer matrix: a band, expected all lines from 0 Hz");
   const double spacing = matrix.frequency[1];
   const std::size_t lines = matrix.frequency.size(), samples = 2 * (lines - 1);
   sample_rate_ = spacing * static_cast<double>(samples);
@@ -97,11 +97,11 @@ void MatrixInverse::transformTaps(std::size_t length) {
 
 std::vector<std::vector<double>> MatrixInverse::process(const std::vector<std::vector<double>>& samples) {
   if (samples.size() != channels_) {
-    throw Error("transfer matrix: " + std::to_string(samples.size()) + " channels, " +
-                std::to_string(channels_) + " are due");
+    throw Error("transfer matrix: " + std::to_string(samples.size()) + " channels, expected " +
+                std::to_string(channels_));
   }
   const std::size_t count = samples.front().size(), before = history_.front().size();
-  std::size_t length = 1;  // that transforms fast
+  std::size_t length = 1;  // power of two
   while (length < before + count) length *= 2;
   transformTaps(length);
   std::vector<std::vector<Complex>> sum(FORCES, std::vector<Complex>(length / 2 + 1));

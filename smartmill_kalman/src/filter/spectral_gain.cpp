@@ -1,10 +1,10 @@
 // Spectral factorisation of a filter of harmonics through a sensor's modes.
 //
-// Coordinates in which nothing couples, each turning by exp(s dt) a sample: m of a mode (what it still rings
-// beside its steady answer, and its conjugate), w_n = F_n - i G_n of a harmonic (and its conjugate), the
-// constant. White noise on F and G is a circular noise on w_n; a mode's ringing sees it through its steady
-// answer. B_ij is the noise's intensity between two coordinates; a step's covariance is
-// B_ij (exp((s_i + s_j*) dt) - 1) / (s_i + s_j*).
+// Decoupled coordinates, each multiplied by exp(s dt) per sample: the free response m of a mode and its
+// conjugate, w_n = F_n - i G_n of a harmonic and its conjugate, and the constant. White noise on F and G is
+// circular noise on w_n; it excites the free response of a mode through the steady-state response. B_ij is
+// the noise's intensity between two coordinates; a step's covariance is B_ij (exp((s_i + s_j*) dt) - 1) /
+// (s_i + s_j*).
 
 #include <algorithm>
 #include <array>
@@ -22,12 +22,12 @@ namespace {
 using Complex = std::complex<double>;
 using Vector = std::vector<Complex>;
 
-constexpr int MOST_SWEEPS = 60;
-constexpr double FOUND = 1e-9;         // [1] step of a root after which it is right to rounding: cubic
-constexpr double TOLERANCE = 1e-9;     // [1] of the factors' product over the spectrum
-constexpr double LEAST_PASSED = 1e-6;  // [1] below it a harmonic's covariance is lost in rounding
+constexpr int MAX_SWEEPS = 60;
+constexpr double ROOT_TOLERANCE = 1e-9;    // [1] step of a root at convergence (cubic)
+constexpr double TOLERANCE = 1e-9;         // [1] of the factors' product over the spectrum
+constexpr double MIN_TRANSMISSION = 1e-6;  // [1] least transmissibility for a numerically valid covariance
 
-// Without the care for infinities, which do not arise, a division is a few cycles.
+// Division without checks for infinities, which do not occur here.
 Complex reciprocal(Complex z) {
   const double scale = 1.0 / (z.real() * z.real() + z.imag() * z.imag());
   return {z.real() * scale, -z.imag() * scale};
@@ -37,10 +37,10 @@ Complex times(Complex a, Complex b) {
   return {a.real() * b.real() - a.imag() * b.imag(), a.real() * b.imag() + a.imag() * b.real()};
 }
 
-/// One of each conjugate pair, the constant, which is its own, between modes and harmonics.
-class Uncoupled {
+/// Model in decoupled coordinates: modes, constant, harmonics; one of each conjugate pair.
+class DecoupledModel {
  public:
-  explicit Uncoupled(const HarmonicDesign& design)
+  explicit DecoupledModel(const HarmonicDesign& design)
       : modes_(design.sensor.modes.size()), count_(modes_ + design.settling.size()) {
     const double dt = 1.0 / design.sample_rate, r = design.noise_rms * design.noise_rms;
     for (const Mode& mode : design.sensor.modes) {
@@ -63,19 +63,19 @@ class Uncoupled {
 
   std::size_t modes() const { return modes_; }
   std::size_t count() const { return count_; }
-  bool single(std::size_t i) const { return i == modes_; }  ///< the constant has no conjugate beside it
+  bool single(std::size_t i) const { return i == modes_; }  ///< the constant is its own conjugate
   Complex turn(std::size_t i) const { return turn_[i]; }
   Complex output(std::size_t i) const { return c_[i]; }
   double intensity(std::size_t n) const { return intensity_[n]; }
 
-  /// Share of harmonic n's noise, and of its conjugate, in mode k's ringing.
+  /// Contribution of harmonic n's noise, and of its conjugate, to the free response of mode k.
   std::array<Complex, 2> shares(std::size_t k, std::size_t n) const {
     const Complex w = s_[modes_ + n];
     if (n == 0) return {drive_[k] / s_[k], 0.0};
     return {-0.5 * drive_[k] / (w - s_[k]), -0.5 * drive_[k] / (std::conj(w) - s_[k])};
   }
 
-  /// -B_ij / (s_i + s_j*), the covariance of what is not seen; i a mode or a harmonic, j a mode. @param
+  /// -B_ij / (s_i + s_j*), the covariance without measurements; i a mode or a harmonic, j a mode. @param
   /// conjugate of j
   Complex between(std::size_t i, std::size_t j, bool conjugate) const {
     const Complex sum = s_[i] + (conjugate ? s_[j] : std::conj(s_[j]));
@@ -105,7 +105,7 @@ class Uncoupled {
 /// poles and their conjugates, and what its logarithm rises over log z.
 class Spectrum {
  public:
-  Spectrum(const Uncoupled& plant, double r, double dt) : r_(r) {
+  Spectrum(const DecoupledModel& plant, double r, double dt) : r_(r) {
     for (std::size_t i = 0; i < plant.count(); ++i) {
       pole_.push_back(plant.turn(i));
       Complex h = 0.0;
@@ -157,12 +157,12 @@ class Spectrum {
   std::size_t single_ = 0;
 };
 
-/// Zeros of the spectrum inside the unit circle, one of each conjugate pair, the real one where the constant
-/// stands. @return empty when they are not found
+/// Zeros of the spectrum inside the unit circle, one of each conjugate pair, the real one in the place of the
+/// constant. @return empty when they are not found
 Vector zeros(const Spectrum& spectrum, Vector zero, std::size_t single) {
   std::vector<bool> found(zero.size(), false);
   std::size_t left = zero.size();
-  for (int sweep = 0; sweep < MOST_SWEEPS && left > 0; ++sweep) {
+  for (int sweep = 0; sweep < MAX_SWEEPS && left > 0; ++sweep) {
     for (std::size_t i = 0; i < zero.size(); ++i) {
       if (found[i]) continue;
       const Complex z = zero[i], inverse = reciprocal(z);
@@ -179,9 +179,9 @@ Vector zeros(const Spectrum& spectrum, Vector zero, std::size_t single) {
       if (i == single) step = step.real();
       if (!std::isfinite(std::abs(step))) return {};
       Complex next = z * (1.0 - step);
-      // A root outside is the mirror of one inside.
+      // A root outside the circle is the reciprocal of one inside.
       if (std::abs(next) >= 1.0) next = 1.0 / std::conj(next);
-      found[i] = std::abs(next - z) <= FOUND;
+      found[i] = std::abs(next - z) <= ROOT_TOLERANCE;
       left -= found[i] ? 1 : 0;
       zero[i] = next;
     }
@@ -189,8 +189,8 @@ Vector zeros(const Spectrum& spectrum, Vector zero, std::size_t single) {
   return left == 0 ? zero : Vector{};
 }
 
-/// Each harmonic damped as in a comb of its kind: sinh(decay T / 2) = |H| T / (2 tau).
-Vector firstZeros(const Uncoupled& plant, const HarmonicDesign& design) {
+/// Initial zeros: each harmonic damped as in a comb filter, sinh(decay T / 2) = |H| T / (2 tau).
+Vector firstZeros(const DecoupledModel& plant, const HarmonicDesign& design) {
   const double dt = 1.0 / design.sample_rate, revolution = units::TWO_PI / design.spindle_speed;
   Vector zero;
   for (std::size_t i = 0; i < plant.count(); ++i) {
@@ -206,12 +206,12 @@ Vector firstZeros(const Uncoupled& plant, const HarmonicDesign& design) {
   return zero;
 }
 
-/// Filter, innovation and covariance of the zeros.
-class Factor {
+/// Gain, innovation variance and covariance from the zeros.
+class SpectralFactor {
  public:
-  Factor(const Uncoupled& plant, const Spectrum& spectrum, Vector zero)
+  SpectralFactor(const DecoupledModel& plant, const Spectrum& spectrum, Vector zero)
       : plant_(plant), zero_(std::move(zero)) {
-    // Between the poles, all around: the product of the factors is the spectrum.
+    // Check between the poles around the circle: the product of the factors is the spectrum.
     const std::size_t points = 2 * zero_.size() + 1;
     for (std::size_t i = 0; i < points; ++i) {
       const Complex z =
@@ -230,17 +230,17 @@ class Factor {
   /// P d' of coordinate i, d = 1/2 for each harmonic and its conjugate, 1 for the constant.
   Complex smoothing(std::size_t i) const {
     const std::size_t first = plant_.modes();
-    Complex sum = 0.0, seen = variance_ * filter(i);
+    Complex sum = 0.0, rest = variance_ * filter(i);
     for (std::size_t j = 0; j < plant_.count(); ++j) {
       for (const bool conjugate : {false, true}) {
         if ((conjugate && plant_.single(j)) || (i == j && !conjugate && i >= first)) continue;
         const Complex p = covariance(i, j, conjugate);
-        seen -= p * (conjugate ? plant_.output(j) : std::conj(plant_.output(j)));
+        rest -= p * (conjugate ? plant_.output(j) : std::conj(plant_.output(j)));
         if (j >= first) sum += (plant_.single(j) ? 1.0 : 0.5) * p;
       }
     }
-    // What is left of P c' is the harmonic's own.
-    if (i >= first) sum += (plant_.single(i) ? 1.0 : 0.5) * seen / std::conj(plant_.output(i));
+    // The rest of P c' belongs to the harmonic itself.
+    if (i >= first) sum += (plant_.single(i) ? 1.0 : 0.5) * rest / std::conj(plant_.output(i));
     return sum;
   }
 
@@ -279,7 +279,7 @@ class Factor {
     return unseen - variance_ * gains / (1.0 - turned);
   }
 
-  const Uncoupled& plant_;
+  const DecoupledModel& plant_;
   Vector zero_, predictor_;
   double variance_ = 0.0, misfit_ = 0.0;
 };
@@ -309,14 +309,14 @@ std::vector<double> stateOf(const Vector& v, const HarmonicDesign& design) {
 }  // namespace
 
 std::optional<HarmonicGain> spectralGain(const HarmonicDesign& design) {
-  const Uncoupled plant(design);
+  const DecoupledModel plant(design);
   for (std::size_t i = plant.modes(); i < plant.count(); ++i) {
-    if (std::abs(plant.output(i)) < LEAST_PASSED) return std::nullopt;
+    if (std::abs(plant.output(i)) < MIN_TRANSMISSION) return std::nullopt;
   }
   const Spectrum spectrum(plant, design.noise_rms * design.noise_rms, 1.0 / design.sample_rate);
   Vector zero = zeros(spectrum, firstZeros(plant, design), plant.modes());
   if (zero.empty()) return std::nullopt;
-  const Factor factor(plant, spectrum, std::move(zero));
+  const SpectralFactor factor(plant, spectrum, std::move(zero));
   if (!(factor.misfit() < TOLERANCE)) return std::nullopt;
   Vector filter, smoothing;
   for (std::size_t i = 0; i < plant.count(); ++i) {

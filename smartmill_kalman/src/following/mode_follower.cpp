@@ -26,19 +26,20 @@ constexpr std::size_t TERMS = 4;           // tangential and radial, chip and ed
 using Sensor = std::array<ModalModel, 2>;  // x, y
 using Basis = std::array<ModeFollower::Harmonics, TERMS>;
 
-/// A mode that no tap has shown: where it is looked for, what it is to begin with and how far it may be off.
+/// Search of a mode that is missing in the taps: frequencies, initial damping, prior of the gain.
 constexpr double HIDDEN_LOW = 300.0, HIDDEN_STEP = 1.02;  // [Hz], [1]
 constexpr double HIDDEN_DAMPING = 0.03, GAIN_STD = 0.05;  // [1]
-/// What speaks for it over what speaks for a move, and the rows beyond the unknowns that can speak.
+/// Evidence for a missing mode, in units of the evidence for a shift; least number of redundant rows.
 constexpr double HIDDEN_EVIDENCE = 2.0;
-/// Mean square of the innovations over their variance from which something is missing; share of the cost that
-/// the mode may leave. A force model that is wrong (another helix, depth or exit) leaves a third and more.
-constexpr double UNEXPLAINED = 2.0, REMAINS = 0.25;
-constexpr Eigen::Index LEAST_LEFT = 12;
+/// Mean square of the normalised innovations above which a mode may be missing; largest cost with that mode
+/// over the cost without. A wrong force model (helix, depth, exit) leaves a third of the cost or more.
+constexpr double UNEXPLAINED = 2.0, MAX_COST_RATIO = 0.25;
+constexpr Eigen::Index MIN_REDUNDANCY = 12;
 
-/// Modes moved by p: log frequency, log damping of each in turn, x then y; then, where p goes on, what each
-/// gain grows by, the static gain staying.
-std::array<ModalModel, 2> moved(const std::array<ModalModel, 2>& from, const Eigen::VectorXd& p, bool gains) {
+/// Modes shifted by p: log frequency and log damping of each mode, x then y; then optionally the increase of
+/// each gain, at constant static gain.
+std::array<ModalModel, 2> shiftedSensor(const std::array<ModalModel, 2>& from, const Eigen::VectorXd& p,
+                                        bool gains) {
   std::array<ModalModel, 2> sensor = from;
   Eigen::Index at = 0;
   for (ModalModel& axis : sensor) {
@@ -89,21 +90,21 @@ Basis harmonicsOf(const ToolGeometry& tool, const Engagement& engagement, const 
 }
 
 /// Solution of a linear least-squares problem, its normal matrix stiffened by a share of its diagonal.
-Eigen::VectorXd leastSquares(const Eigen::MatrixXd& seen, const Eigen::VectorXd& target, double stiffer) {
-  Eigen::MatrixXd normal = seen.transpose() * seen;
+Eigen::VectorXd leastSquares(const Eigen::MatrixXd& columns, const Eigen::VectorXd& target, double stiffer) {
+  Eigen::MatrixXd normal = columns.transpose() * columns;
   normal.diagonal().array() *= 1.0 + stiffer;
-  return linear::solveSymmetric(normal, Eigen::VectorXd(seen.transpose() * target));
+  return linear::solveSymmetric(normal, Eigen::VectorXd(columns.transpose() * target));
 }
 
-/// What is measured in one revolution of the cut, weighted: for each axis and harmonic (the mean first: it
-/// tells the pressures) a real and an imaginary row.
+/// Weighted harmonics of one revolution of the cut: a real and an imaginary row for each axis and harmonic,
+/// including the mean.
 class WeightedHarmonics {
  public:
   WeightedHarmonics(const ModeFollower::Harmonics& measured, std::size_t count, double noise_std,
                     double misfit, const Sensor& now, double spindle_speed)
       : count_(count), spindle_frequency_(spindle_speed / units::TWO_PI), weight_(rows()), target_(rows()) {
     for (std::size_t axis = 0; axis < 2; ++axis) {
-      // What the force model misses passes the sensor too.
+      // The error of the force model passes the sensor too.
       double largest = 0.0;
       for (std::size_t n = 0; n < count_; ++n) {
         const double passed = std::abs(now[axis].response(frequency(n)));
@@ -124,9 +125,9 @@ class WeightedHarmonics {
   Eigen::Index rows() const { return static_cast<Eigen::Index>(4 * count_); }
   const Eigen::VectorXd& target() const { return target_; }
 
-  /// A force's harmonics as the sensor shows them, weighted. @param harmonic (axis, n) to [N]
+  /// Weighted sensor output of a force. @param harmonic (axis, n) to [N]
   template <class Harmonic>
-  Eigen::VectorXd seen(const Sensor& sensor, const Harmonic& harmonic) const {
+  Eigen::VectorXd outputOf(const Sensor& sensor, const Harmonic& harmonic) const {
     Eigen::VectorXd column(rows());
     for (std::size_t axis = 0; axis < 2; ++axis) {
       for (std::size_t n = 0; n < count_; ++n) {
@@ -138,27 +139,27 @@ class WeightedHarmonics {
     }
     return column;
   }
-  Eigen::MatrixXd seen(const Sensor& sensor, const Basis& basis) const {
+  Eigen::MatrixXd outputOf(const Sensor& sensor, const Basis& basis) const {
     Eigen::MatrixXd columns(rows(), static_cast<Eigen::Index>(TERMS));
     for (std::size_t term = 0; term < TERMS; ++term)
       columns.col(static_cast<Eigen::Index>(term)) =
-          seen(sensor, [&](std::size_t axis, std::size_t n) { return basis[term][axis][n]; });
+          outputOf(sensor, [&](std::size_t axis, std::size_t n) { return basis[term][axis][n]; });
     return columns;
   }
 
-  /// A mode at f [Hz] of gain 1 in an axis, the static gain staying, as it shows in the force of the cut.
+  /// Weighted sensor output by an additional mode at f [Hz] with gain 1 in an axis, at constant static gain.
   Eigen::VectorXd hidden(std::size_t axis, double f, const Sensor& sensor, const Basis& basis) const {
-    const Eigen::VectorXd x = leastSquares(seen(sensor, basis), target_, 1e-10);
+    const Eigen::VectorXd x = leastSquares(outputOf(sensor, basis), target_, 1e-10);
     Sensor only;
     only[axis].modes = {{f, HIDDEN_DAMPING, 1.0}};
     only[axis].direct = -1.0;
-    return seen(only, basis) * x;
+    return outputOf(only, basis) * x;
   }
   double highest() const { return static_cast<double>(count_ - 1) * spindle_frequency_; }  ///< [Hz]
 
   /// Residual with the force model's numbers at their best for this sensor.
   Eigen::VectorXd innovations(const Sensor& sensor, const Basis& basis) const {
-    const Eigen::MatrixXd columns = seen(sensor, basis);
+    const Eigen::MatrixXd columns = outputOf(sensor, basis);
     return target_ - columns * leastSquares(columns, target_, 1e-10);
   }
 
@@ -173,8 +174,7 @@ class WeightedHarmonics {
   Eigen::VectorXd weight_, target_;
 };
 
-/// To first order runout adds to each tooth's edge force what its chip is thicker by: radii [m] of the teeth
-/// to begin with.
+/// Initial radii [m] of the teeth: to first order, runout changes the chip thickness of each tooth.
 std::vector<double> firstRadii(const WeightedHarmonics& measured, const Sensor& now, const ToolGeometry& tool,
                                const Engagement& engagement) {
   std::vector<double> radius(static_cast<std::size_t>(tool.teeth), 0.0);
@@ -182,18 +182,18 @@ std::vector<double> firstRadii(const WeightedHarmonics& measured, const Sensor& 
   one.teeth = 1;
   one.pitch.clear();
   const Basis tooth = harmonicsOf(one, engagement, {0.0});
-  const Eigen::MatrixXd even = measured.seen(now, harmonicsOf(tool, engagement, radius));
+  const Eigen::MatrixXd even = measured.outputOf(now, harmonicsOf(tool, engagement, radius));
   const Eigen::VectorXd x = leastSquares(even, measured.target(), 0.0);
-  Eigen::MatrixXd seen(measured.rows(), tool.teeth);
+  Eigen::MatrixXd teeth(measured.rows(), tool.teeth);
   for (int k = 0; k < tool.teeth; ++k) {
-    seen.col(k) = measured.seen(now, [&](std::size_t axis, std::size_t n) {
+    teeth.col(k) = measured.outputOf(now, [&](std::size_t axis, std::size_t n) {
       const Complex turned = std::polar(1.0, static_cast<double>(n) * tool.toothAngle(k));
       return turned * (x(0) * tooth[2][axis][n] + x(1) * tooth[3][axis][n]) / engagement.feed_per_tooth;
     });
   }
-  const Eigen::VectorXd thicker = leastSquares(seen, measured.target() - even * x, 1e-6);  // [m]
+  const Eigen::VectorXd thicker = leastSquares(teeth, measured.target() - even * x, 1e-6);  // [m]
   for (Eigen::Index k = 0; k + 1 < tool.teeth; ++k) {
-    // Tooth k cuts what tooth k + 1 has left.
+    // Tooth k cuts the surface of tooth k + 1.
     const double limit = 0.5 * engagement.feed_per_tooth;
     radius[static_cast<std::size_t>(k + 1)] =
         radius[static_cast<std::size_t>(k)] - std::clamp(thicker(k) - thicker.mean(), -limit, limit);
@@ -201,13 +201,13 @@ std::vector<double> firstRadii(const WeightedHarmonics& measured, const Sensor& 
   return radius;
 }
 
-/// Innovations of the cut, and what the prior says against a move, over the modes (log frequency, log damping
-/// of each, x then y) and the teeth's radii [RADIUS_UNIT], the first tooth's being the datum.
+/// Innovations of the cut and prior of the unknowns: modes (log frequency, log damping of each, x then y) and
+/// the teeth's radii [RADIUS_UNIT], the first tooth's being the datum.
 class CutResiduals : public fit::Residuals {
  public:
   CutResiduals(const WeightedHarmonics& measured, const Sensor& now, const ToolGeometry& tool,
                const Engagement& engagement, const std::vector<double>& radius,
-               const FollowParameters& parameters, const std::array<std::size_t, 2>& tapped)
+               const ModeFollowerParameters& parameters, const std::array<std::size_t, 2>& tapped)
       : measured_(measured), now_(now), tool_(tool), engagement_(engagement), radius_(radius) {
     const std::size_t modes = now[0].modes.size() + now[1].modes.size();
     gains_ = modes > tapped[0] + tapped[1];
@@ -216,7 +216,7 @@ class CutResiduals : public fit::Residuals {
     Eigen::Index at = 0;
     for (std::size_t axis = 0; axis < 2; ++axis) {
       for (std::size_t k = 0; k < now[axis].modes.size(); ++k) {
-        // Of one that no tap has shown little is known.
+        // The prior of a mode that is missing in the taps is wide.
         const double wider = k < tapped[axis] ? 1.0 : 5.0;
         prior_(at++) = 1.0 / (wider * parameters.frequency_std);
         prior_(at++) = 1.0 / (wider * parameters.damping_std);
@@ -226,11 +226,11 @@ class CutResiduals : public fit::Residuals {
     prior_.tail(tool.teeth - 1).setConstant(1.0 / RADIUS_STD);
   }
 
-  Eigen::Index modal() const { return modal_; }  ///< so many unknowns are of the modes
+  Eigen::Index modal() const { return modal_; }  ///< number of unknowns of the modes
   Eigen::Index freedom() const { return prior_.size(); }
   Eigen::Index count() const override { return measured_.rows() + freedom(); }
 
-  Sensor sensor(const Eigen::VectorXd& at) const { return moved(now_, at, gains_); }
+  Sensor sensor(const Eigen::VectorXd& at) const { return shiftedSensor(now_, at, gains_); }
   Basis force(const Eigen::VectorXd& at) const { return harmonicsOf(tool_, engagement_, radii(at)); }
   std::vector<double> radii(const Eigen::VectorXd& at) const {
     std::vector<double> radius = radius_;
@@ -245,7 +245,7 @@ class CutResiduals : public fit::Residuals {
     const Eigen::VectorXd innovations = measured_.innovations(sensor(at), here);
     *residual << innovations, prior_.cwiseProduct(at);
     if (!jacobian) return true;
-    // Differences: the force changes with the radii only, and its pieces of a revolution ask for wide steps.
+    // Differences: the force depends on the radii only, and its sampling requires wide steps.
     for (Eigen::Index i = 0; i < freedom(); ++i) {
       const bool of_mode = i < modal_;
       const double step = of_mode ? 1e-5 : 0.05;
@@ -269,7 +269,7 @@ class CutResiduals : public fit::Residuals {
   Eigen::VectorXd prior_;
 };
 
-/// The best modes and radii for what a cut shows.
+/// Fit of modes and radii to a cut.
 class CutFit {
  public:
   explicit CutFit(const CutResiduals& residuals) : residuals_(residuals) {
@@ -280,7 +280,7 @@ class CutFit {
   void fitRadii() { descend(residuals_.modal()); }
   void fitAll() { descend(0); }
 
-  double cost() const { return cost_; }        ///< with what the prior says against the move
+  double cost() const { return cost_; }        ///< including the prior
   double squares() const { return squares_; }  ///< of the innovations
   Sensor sensor() const { return residuals_.sensor(p_); }
   const Basis& force() const { return force_; }
@@ -313,22 +313,21 @@ class CutFit {
   double cost_ = 0.0, squares_ = 0.0;
 };
 
-/// Mean square of what a fit leaves, at least 1: the force model's own shortcomings raise what counts as
-/// evidence.
-double scaleOf(const WeightedHarmonics& seen, const CutResiduals& residuals, double squares) {
-  const Eigen::Index left = seen.rows() - static_cast<Eigen::Index>(TERMS) - residuals.freedom();
+/// Mean square of the residuals of a fit, at least 1: errors of the force model raise the required evidence.
+double scaleOf(const WeightedHarmonics& harmonics, const CutResiduals& residuals, double squares) {
+  const Eigen::Index left = harmonics.rows() - static_cast<Eigen::Index>(TERMS) - residuals.freedom();
   return std::max(1.0, squares / static_cast<double>(std::max<Eigen::Index>(left, 1)));
 }
 
-/// A sensor with one more mode in each axis that has none such yet, where the innovations fall most.
-/// @return nothing where there are too few to tell
+/// Sensor with one more mode per axis, at the frequency that reduces the innovations most.
+/// @return nothing when there are too few harmonics, or the sensor has such a mode already
 std::optional<Sensor> withHidden(const WeightedHarmonics& measured, const Sensor& sensor, const Basis& force,
                                  const std::array<std::size_t, 2>& tapped) {
   const std::size_t modes = tapped[0] + tapped[1];
   const auto unknowns = static_cast<Eigen::Index>(TERMS + 3 * (modes + 2));
-  if (sensor[0].modes.size() + sensor[1].modes.size() > modes || measured.rows() < unknowns + LEAST_LEFT)
+  if (sensor[0].modes.size() + sensor[1].modes.size() > modes || measured.rows() < unknowns + MIN_REDUNDANCY)
     return std::nullopt;
-  const Eigen::MatrixXd even = measured.seen(sensor, force);
+  const Eigen::MatrixXd even = measured.outputOf(sensor, force);
   const Eigen::VectorXd left = measured.innovations(sensor, force);
   Sensor best = sensor;
   double most = 0.0;
@@ -353,12 +352,12 @@ std::optional<Sensor> withHidden(const WeightedHarmonics& measured, const Sensor
 
 }  // namespace
 
-void FollowParameters::validate() const {
+void ModeFollowerParameters::validate() const {
   checkBounds(*this);
 }
 
 ModeFollower::ModeFollower(const ToolGeometry& tool, const Engagement& engagement, int harmonics,
-                           const FollowParameters& parameters)
+                           const ModeFollowerParameters& parameters)
     : tool_(tool), engagement_(engagement), harmonics_(harmonics), parameters_(parameters) {
   parameters.validate();
   validate(tool);
@@ -367,60 +366,60 @@ ModeFollower::ModeFollower(const ToolGeometry& tool, const Engagement& engagemen
   radius_.assign(static_cast<std::size_t>(tool.teeth), 0.0);
 }
 
-std::optional<ModeFollower::Move> ModeFollower::look(const Harmonics& measured, double noise_std,
-                                                     const std::array<ModalModel, 2>& now,
-                                                     double spindle_speed) {
+std::optional<ModeFollower::Update> ModeFollower::update(const Harmonics& measured, double noise_std,
+                                                         const std::array<ModalModel, 2>& now,
+                                                         double spindle_speed) {
   const auto count = static_cast<std::size_t>(harmonics_) + 1;
   if (measured[0].size() < count || measured[1].size() < count)
     throw Error("mode follower: too few harmonics");
   if (!first_) first_ = now;
-  const WeightedHarmonics seen(measured, count, noise_std, parameters_.misfit, now, spindle_speed);
+  const WeightedHarmonics harmonics(measured, count, noise_std, parameters_.misfit, now, spindle_speed);
   if (std::all_of(radius_.begin(), radius_.end(), [](double r) { return r == 0.0; }))
-    radius_ = firstRadii(seen, now, tool_, engagement_);
+    radius_ = firstRadii(harmonics, now, tool_, engagement_);
 
   const std::array<std::size_t, 2> tapped{{(*first_)[0].modes.size(), (*first_)[1].modes.size()}};
   const auto residualsOf = [&](const Sensor& sensor) {
-    return CutResiduals(seen, sensor, tool_, engagement_, radius_, parameters_, tapped);
+    return CutResiduals(harmonics, sensor, tool_, engagement_, radius_, parameters_, tapped);
   };
-  // The tool's runout first, with the sensor as believed: that is what the cut may be without any move.
+  // First the runout of the tool with the sensor in use: the cut without a shift of the modes.
   const CutResiduals residuals = residualsOf(now);
   CutFit cut(residuals);
   cut.fitRadii();
   const double unmoved = cut.cost();
   const std::vector<double> radius = cut.radii();
-  Move move;
-  move.before = cut.squares();
-  const double first = seen.innovations(*first_, cut.force()).squaredNorm();
-  const std::optional<Sensor> suspected = withHidden(seen, now, cut.force(), tapped);
+  Update update;
+  update.before = cut.squares();
+  const double first = harmonics.innovations(*first_, cut.force()).squaredNorm();
+  const std::optional<Sensor> suspected = withHidden(harmonics, now, cut.force(), tapped);
   cut.fitAll();
-  move.after = cut.squares();
-  move.sensor = cut.sensor();
-  const double scale = scaleOf(seen, residuals, move.after);
-  // What no move explains may be a mode that the taps have not shown. It must leave nothing unexplained.
+  update.after = cut.squares();
+  update.sensor = cut.sensor();
+  const double scale = scaleOf(harmonics, residuals, update.after);
+  // A mode that is missing in the taps is accepted only when it explains the cut completely.
   if (suspected && scale > UNEXPLAINED) {
     const CutResiduals more = residualsOf(*suspected);
     CutFit hidden(more);
     hidden.fitAll();
     const double fall = std::min(cut.cost(), unmoved) - hidden.cost();
-    const bool all_told =
-        scaleOf(seen, more, hidden.squares()) <= 1.0 && hidden.cost() < REMAINS * cut.cost();
-    if (all_told && fall > HIDDEN_EVIDENCE * parameters_.evidence) {
+    const bool fully_explained =
+        scaleOf(harmonics, more, hidden.squares()) <= 1.0 && hidden.cost() < MAX_COST_RATIO * cut.cost();
+    if (fully_explained && fall > HIDDEN_EVIDENCE * parameters_.evidence) {
       radius_ = hidden.radii();
-      move.after = hidden.squares();
-      move.sensor = hidden.sensor();
-      return move;
+      update.after = hidden.squares();
+      update.sensor = hidden.sensor();
+      return update;
     }
   }
   if ((unmoved - cut.cost()) / scale > parameters_.evidence) {
     radius_ = cut.radii();
-    return move;
+    return update;
   }
   radius_ = radius;
-  // Back to the taps when they explain the cut as well.
-  if (first < move.before) {
-    move.sensor = *first_;
-    move.after = first;
-    return move;
+  // Back to the tapped sensor when it explains the cut as well.
+  if (first < update.before) {
+    update.sensor = *first_;
+    update.after = first;
+    return update;
   }
   return std::nullopt;
 }

@@ -10,17 +10,18 @@
 namespace smartmill::kalman {
 namespace {
 
-/// Mean square of the innovations over the noise that is still noise.
-constexpr double USUAL = 2.0;
-/// Mean square of a slope over that of noise alone that makes it one.
-constexpr double CLEAR = 10.0;
-/// Revolutions after a change of the force in which the amplitudes rise.
-constexpr double RISE = 1.5;
-/// Load takes speed when it comes or goes; then the speed settles within QUIETENS and what is left is QUIET
-/// of the acceleration.
-constexpr double QUIETENS = 0.2, QUIET = 0.1;  // [s], [1]
-/// Standard deviations that the speed may be off, and revolutions that it may stay there.
-constexpr double MOST = 3.0, LOST = 3.0;
+/// Mean square of the innovations over that of the noise, up to which they are noise.
+constexpr double NOISE_LIMIT = 2.0;
+/// Mean square of a slope over that by noise alone, from which it is used.
+constexpr double MIN_SLOPE_RATIO = 10.0;
+/// Revolutions after a change of the force in which the amplitudes settle.
+constexpr double RISE_REVOLUTIONS = 1.5;
+/// A change of the load changes the speed; the standard deviation of the acceleration then decays within
+/// LOAD_DECAY to LOAD_FLOOR of its initial value.
+constexpr double LOAD_DECAY = 0.2, LOAD_FLOOR = 0.1;  // [s], [1]
+/// Standard deviations of the nominal speed that limit the estimate, and revolutions at the limit before the
+/// tracker restarts.
+constexpr double MAX_DEVIATIONS = 3.0, MAX_LIMIT_REVOLUTIONS = 3.0;
 
 }  // namespace
 
@@ -32,31 +33,31 @@ SpeedTracker::SpeedTracker(const SpeedTrackerParameters& parameters, double spee
     : dt_(1.0 / sample_rate), nominal_(speed), speed_(speed) {
   parameters.validate();
   require("spindle speed [rad/s]", speed, Range::positive());
-  most_variance_ = std::pow(parameters.speed_std * speed, 2);
+  max_variance_ = std::pow(parameters.speed_std * speed, 2);
   const double acceleration = std::pow(parameters.acceleration_std * speed, 2);
   decay_ = std::exp(-dt_ / parameters.acceleration_memory);
   drive_ = acceleration * (1.0 - decay_ * decay_);
-  p_[1][1] = most_variance_;
-  wait_ = RISE * units::TWO_PI / speed;
+  p_[1][1] = max_variance_;
+  rise_left_ = RISE_REVOLUTIONS * units::TWO_PI / speed;
   p_[2][2] = acceleration;
 }
 
 void SpeedTracker::predict(double speed_used, double memory) {
-  wait_ -= dt_;
+  rise_left_ -= dt_;
   const double keep = std::exp(-dt_ / memory);
   phase_ = keep * phase_ + (speed_ - speed_used) * dt_;
   speed_ += acceleration_ * dt_;
-  // The speed is known to a few of its standard deviations; what stays beyond has lost its way.
-  const double most = MOST * std::sqrt(most_variance_);
-  if (std::abs(speed_ - nominal_) < most) {
-    beyond_ = 0.0;
+  // The estimate is limited around the nominal speed; at the limit for long, it restarts.
+  const double limit = MAX_DEVIATIONS * std::sqrt(max_variance_);
+  if (std::abs(speed_ - nominal_) < limit) {
+    at_limit_ = 0.0;
   } else {
-    speed_ = std::clamp(speed_, nominal_ - most, nominal_ + most);
-    beyond_ += dt_;
-    if (beyond_ > LOST * units::TWO_PI / nominal_) {
+    speed_ = std::clamp(speed_, nominal_ - limit, nominal_ + limit);
+    at_limit_ += dt_;
+    if (at_limit_ > MAX_LIMIT_REVOLUTIONS * units::TWO_PI / nominal_) {
       speed_ = nominal_;
-      acceleration_ = beyond_ = 0.0;
-      reopen();
+      acceleration_ = at_limit_ = 0.0;
+      resetCovariance();
     }
   }
   acceleration_ *= decay_;
@@ -72,11 +73,11 @@ void SpeedTracker::predict(double speed_used, double memory) {
     p_[i][1] = fp[i][1] + dt_ * fp[i][2];
     p_[i][2] = decay_ * fp[i][2];
   }
-  const double share = std::max(QUIET, std::exp(std::min(0.0, wait_) / QUIETENS));
+  const double share = std::max(LOAD_FLOOR, std::exp(std::min(0.0, rise_left_) / LOAD_DECAY));
   p_[2][2] += share * share * drive_;
-  // While nothing cuts nothing is learnt: the speed does not become less known than it was.
-  if (p_[1][1] > most_variance_) {
-    const double scale = std::sqrt(most_variance_ / p_[1][1]);
+  // Without cutting there is no information; the variance of the speed does not exceed its prior.
+  if (p_[1][1] > max_variance_) {
+    const double scale = std::sqrt(max_variance_ / p_[1][1]);
     for (int j = 0; j < 3; ++j) p_[1][j] *= scale;
     for (int j = 0; j < 3; ++j) p_[j][1] *= scale;
   }
@@ -84,16 +85,16 @@ void SpeedTracker::predict(double speed_used, double memory) {
 
 void SpeedTracker::update(std::size_t axis, double innovation, double slope, double noise_rms,
                           double slope_noise) {
-  // Over a quarter of a revolution. What exceeds the noise is no noise but a force that changes: it stays for
-  // the filters' memory, so that many samples say it only once.
+  // Averaged over a quarter of a revolution. Power above the noise is a changing force: its samples are
+  // correlated over the memory of the filters and count as one.
   const double share = std::min(1.0, 4.0 * nominal_ / units::TWO_PI * dt_);
   const double left = innovation - slope * phase_;
-  lately_[axis] += share * (left * left - lately_[axis]);
-  slope_[axis] += share * (slope * slope - slope_[axis]);
-  // A slope made of noise leads astray, and so do amplitudes that still rise.
-  if (wait_ > 0.0 || slope_[axis] < CLEAR * slope_noise * slope_noise) return;
+  innovation_power_[axis] += share * (left * left - innovation_power_[axis]);
+  slope_power_[axis] += share * (slope * slope - slope_power_[axis]);
+  // Slopes that are noise, and amplitudes that have not settled, would bias the speed.
+  if (rise_left_ > 0.0 || slope_power_[axis] < MIN_SLOPE_RATIO * slope_noise * slope_noise) return;
   const double white = noise_rms * noise_rms;
-  const double noise = white + std::max(0.0, lately_[axis] - USUAL * white) / share;
+  const double noise = white + std::max(0.0, innovation_power_[axis] - NOISE_LIMIT * white) / share;
   const double variance = slope * slope * p_[0][0] + noise;
   double gain[3];
   for (int i = 0; i < 3; ++i) gain[i] = p_[i][0] * slope / variance;
@@ -109,12 +110,12 @@ void SpeedTracker::update(std::size_t axis, double innovation, double slope, dou
   }
 }
 
-void SpeedTracker::reopen() {
+void SpeedTracker::resetCovariance() {
   for (auto& row : p_) row[0] = row[1] = 0.0;
   p_[0][1] = p_[0][2] = p_[1][2] = 0.0;
-  p_[1][1] = most_variance_;
+  p_[1][1] = max_variance_;
   phase_ = 0.0;
-  wait_ = RISE * units::TWO_PI / nominal_;
+  rise_left_ = RISE_REVOLUTIONS * units::TWO_PI / nominal_;
 }
 
 double SpeedTracker::speedStd() const {

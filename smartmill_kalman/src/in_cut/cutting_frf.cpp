@@ -18,14 +18,14 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr double LEAST_REVOLUTIONS = 11.0;  // the window's main lobe is +-4 of their inverse
-constexpr int NEIGHBOURS = 8;               // places between harmonics whose mean is a line's noise
-constexpr double SAME_LINE = 5e-4;          // [1] of frequency
-constexpr double SAME_MODE = 0.1;           // [1] of frequency, at neighbouring speeds
-constexpr double SEEN = 3.0;                // [1] gain over its deviation
-constexpr double ANOTHER_CUT = 3e-3;        // [1] of speed
-constexpr std::size_t FEWEST_CUTS = 5;      // that tell by leaving one out
-constexpr int PASSES = 4;                   // of slopes and fits, each of which moves the other
+constexpr double MIN_REVOLUTIONS = 11.0;       // the window's main lobe is +-4 of their inverse
+constexpr int NEIGHBOURS = 8;                  // half orders around a harmonic that estimate its noise
+constexpr double SAME_LINE = 5e-4;             // [1] of frequency
+constexpr double SAME_MODE = 0.1;              // [1] of frequency, at neighbouring speeds
+constexpr double MIN_GAIN_DEVIATIONS = 3.0;    // [1] gain over its standard deviation, for a significant mode
+constexpr double SPEED_TOLERANCE = 3e-3;       // [1] of speed
+constexpr std::size_t MIN_JACKKNIFE_CUTS = 5;  // for the jackknife
+constexpr int PASSES = 4;                      // of the iteration between slopes and fits
 
 std::vector<double> taper(std::size_t size) {
   std::vector<double> window(size);
@@ -34,11 +34,10 @@ std::vector<double> taper(std::size_t size) {
   return window;
 }
 
-/// Angle of the spindle over a part: a parabola through what was measured, so that the reading's own noise
-/// does not stand in the lines. [rad]
-class Turning {
+/// Spindle angle over a part [rad]: a parabola fitted to the measured angle, which removes its noise.
+class RotationFit {
  public:
-  Turning(const CutStretch& cut, std::size_t from, std::size_t size)
+  RotationFit(const CutSegment& cut, std::size_t from, std::size_t size)
       : middle_(0.5 * static_cast<double>(size - 1)), rate_(cut.sample_rate) {
     if (cut.angle.empty()) {
       speed_ = cut.speed;
@@ -72,8 +71,8 @@ class Turning {
 struct HalfOrders {
   std::vector<Complex> force, response;
 
-  /// Power of what does not repeat at a line, from the places between the harmonics around it; one less than
-  /// there are, since few places make a ratio of Student's kind.
+  /// Power of the non-synchronous part at a line, from the half orders around it; divided by their number
+  /// less one, since a ratio to so few is distributed as Student's.
   static double noise(const std::vector<Complex>& values, std::size_t order) {
     double sum = 0.0;
     int count = 0;
@@ -88,7 +87,7 @@ struct HalfOrders {
   }
 };
 
-HalfOrders halfOrders(const CutStretch& cut, std::size_t from, std::size_t size, const Turning& turning,
+HalfOrders halfOrders(const CutSegment& cut, std::size_t from, std::size_t size, const RotationFit& rotation,
                       std::size_t orders) {
   HalfOrders found;
   found.force.resize(2 * orders + NEIGHBOURS);
@@ -107,7 +106,7 @@ HalfOrders halfOrders(const CutStretch& cut, std::size_t from, std::size_t size,
     const double w = 2.0 * window[i] / sum;
     const double force = w * (cut.force[from + i] - force_mean);
     const double response = w * (cut.response[from + i] - response_mean);
-    const Complex turn = std::polar(1.0, -0.5 * turning.at(i));
+    const Complex turn = std::polar(1.0, -0.5 * rotation.at(i));
     Complex phase = 1.0;
     for (std::size_t k = 0; k < found.force.size(); ++k, phase *= turn) {
       found.force[k] += force * phase;
@@ -117,7 +116,7 @@ HalfOrders halfOrders(const CutStretch& cut, std::size_t from, std::size_t size,
   return found;
 }
 
-/// Relative variance that the deviations of a sensor's modes leave in its response.
+/// Relative variance of a sensor's response by the standard deviations of its modes.
 double relativeVariance(const ModalModel& chain, double f) {
   const Complex nominal = chain.response(f);
   double sum = 0.0;
@@ -136,36 +135,36 @@ double relativeVariance(const ModalModel& chain, double f) {
   return sum;
 }
 
-void linesOfPart(const CutStretch& cut, std::size_t from, std::size_t size, const CuttingFrfOptions& options,
-                 std::vector<CuttingLine>& lines) {
-  const Turning turning(cut, from, size);
-  const double step = turning.speed() / units::TWO_PI;  // [Hz]
-  if (!(step > 0.0) || static_cast<double>(size) / cut.sample_rate * step < LEAST_REVOLUTIONS) return;
+void addSegmentLines(const CutSegment& cut, std::size_t from, std::size_t size,
+                     const CuttingFrfOptions& options, std::vector<FrfLine>& lines) {
+  const RotationFit rotation(cut, from, size);
+  const double step = rotation.speed() / units::TWO_PI;  // [Hz]
+  if (!(step > 0.0) || static_cast<double>(size) / cut.sample_rate * step < MIN_REVOLUTIONS) return;
   const auto orders = static_cast<std::size_t>(options.high / step);
-  const HalfOrders found = halfOrders(cut, from, size, turning, orders);
+  const HalfOrders found = halfOrders(cut, from, size, rotation, orders);
   for (auto k = static_cast<std::size_t>(cut.every); k <= orders; k += static_cast<std::size_t>(cut.every)) {
-    CuttingLine line;
+    FrfLine line;
     line.frequency = static_cast<double>(k) * step;
     if (line.frequency < options.low) continue;
-    line.speed = turning.speed();
-    const Complex shown = found.force[2 * k], chain = cut.chain.response(line.frequency);
+    line.speed = rotation.speed();
+    const Complex measured = found.force[2 * k], chain = cut.chain.response(line.frequency);
     const double force_noise = HalfOrders::noise(found.force, k),
                  response_noise = HalfOrders::noise(found.response, k);
-    if (std::norm(shown) < options.least_signal * options.least_signal * force_noise) continue;
-    line.value = found.response[2 * k] / shown * chain;
-    line.force = std::abs(shown / chain);
-    const double relative = force_noise / std::norm(shown) + relativeVariance(cut.chain, line.frequency) +
+    if (std::norm(measured) < options.least_signal * options.least_signal * force_noise) continue;
+    line.value = found.response[2 * k] / measured * chain;
+    line.force = std::abs(measured / chain);
+    const double relative = force_noise / std::norm(measured) + relativeVariance(cut.chain, line.frequency) +
                             cut.relative_force_std * cut.relative_force_std;
     line.std_dev = std::sqrt(response_noise / (line.force * line.force) + std::norm(line.value) * relative);
     if (line.std_dev > 0.0) lines.push_back(line);
   }
 }
 
-/// Lines at one frequency become one, the likelier the heavier; their scatter counts where it is larger.
-CuttingLine merged(const std::vector<CuttingLine>& lines) {
-  CuttingLine sum;
+/// Weighted mean of lines at one frequency; its standard deviation includes their scatter.
+FrfLine merged(const std::vector<FrfLine>& lines) {
+  FrfLine sum;
   double weights = 0.0;
-  for (const CuttingLine& line : lines) {
+  for (const FrfLine& line : lines) {
     const double weight = 1.0 / (line.std_dev * line.std_dev);
     weights += weight;
     sum.frequency += weight * line.frequency;
@@ -174,23 +173,23 @@ CuttingLine merged(const std::vector<CuttingLine>& lines) {
   sum.frequency /= weights;
   sum.value /= weights;
   double chi2 = 0.0;
-  for (const CuttingLine& line : lines)
+  for (const FrfLine& line : lines)
     chi2 += std::norm((line.value - sum.value) / line.std_dev) / static_cast<double>(lines.size());
   sum.std_dev = std::sqrt(std::max(1.0, chi2) / weights);
   return sum;
 }
 
-FrequencyResponse frfOf(std::vector<CuttingLine> lines, const std::string& unit) {
+FrequencyResponse frfOf(std::vector<FrfLine> lines, const std::string& unit) {
   std::sort(lines.begin(), lines.end(),
-            [](const CuttingLine& a, const CuttingLine& b) { return a.frequency < b.frequency; });
+            [](const FrfLine& a, const FrfLine& b) { return a.frequency < b.frequency; });
   FrequencyResponse frf;
   frf.unit = unit;
   frf.averages = 1;
   for (std::size_t i = 0; i < lines.size();) {
-    std::vector<CuttingLine> same{lines[i]};
+    std::vector<FrfLine> same{lines[i]};
     for (++i; i < lines.size() && lines[i].frequency < same.front().frequency * (1.0 + SAME_LINE); ++i)
       same.push_back(lines[i]);
-    const CuttingLine line = merged(same);
+    const FrfLine line = merged(same);
     frf.frequency.push_back(line.frequency);
     frf.value.push_back(line.value);
     frf.std_dev.push_back(line.std_dev);
@@ -198,36 +197,36 @@ FrequencyResponse frfOf(std::vector<CuttingLine> lines, const std::string& unit)
   return frf;
 }
 
-/// What of a mode goes with the speed.
+/// Parameters of a mode that depend on the speed.
 using Value = double Mode::*;
 constexpr Value VALUES[] = {&Mode::frequency, &Mode::damping_ratio, &Mode::gain};
 constexpr Value DEVIATIONS[] = {&Mode::frequency_std, &Mode::damping_ratio_std, &Mode::gain_std};
 constexpr std::size_t KINDS = 3;
 
-/// How a mode goes with the speed around a group of cuts: d ln value / d ln speed of each.
-struct MovingMode {
+/// Dependence of a mode on the speed around a group of cuts: d ln value / d ln speed.
+struct SpeedDependentMode {
   Mode mode;
   double slope[KINDS] = {0.0, 0.0, 0.0}, std_dev[KINDS] = {0.0, 0.0, 0.0};
 
-  /// What its response at f loses when the speed is by this ratio another one. [unit]
-  Complex lost(double f, double ratio) const {
+  /// Correction of the response at f from another speed to that of the group. @param ratio of the speeds
+  /// [unit]
+  Complex correction(double f, double ratio) const {
     Mode there = mode;
     for (std::size_t k = 0; k < KINDS; ++k) there.*VALUES[k] *= std::pow(ratio, slope[k]);
     return mode.response(f) - there.response(f);
   }
 };
 
-double meanSpeed(const std::vector<CuttingLine>& lines) {
+double meanSpeed(const std::vector<FrfLine>& lines) {
   double sum = 0.0;
-  for (const CuttingLine& line : lines) sum += line.speed / static_cast<double>(lines.size());
+  for (const FrfLine& line : lines) sum += line.speed / static_cast<double>(lines.size());
   return sum;
 }
 
-/// Takes out modes whose gain does not stand out of its own deviation: what the lines' misfit between groups
-/// of speeds may seem to ask for.
-void dropUnseen(ModalFit& fit, bool unit_static_gain) {
+/// Removes modes with a gain that is not significant; differences between speeds can produce such modes.
+void dropUncertainModes(ModalFit& fit, bool unit_static_gain) {
   std::vector<Mode>& modes = fit.model.modes;
-  const auto unseen = [](const Mode& m) { return !(std::abs(m.gain) > SEEN * m.gain_std); };
+  const auto unseen = [](const Mode& m) { return !(std::abs(m.gain) > MIN_GAIN_DEVIATIONS * m.gain_std); };
   if (std::none_of(modes.begin(), modes.end(), unseen)) return;
   for (const Mode& mode : modes)
     if (unit_static_gain && unseen(mode)) fit.model.direct += mode.gain;
@@ -235,19 +234,20 @@ void dropUnseen(ModalFit& fit, bool unit_static_gain) {
   fit.covariance.resize(0, 0);  // of other modes than these
 }
 
-/// Lines of one group, each as it would be at the group's mean speed, or at the one given.
-SpeedFrf fitted(std::vector<CuttingLine> lines, const std::vector<MovingMode>& moving,
+/// FRF and fit of one group, lines corrected to the group's mean speed or to the given one.
+SpeedFrf fitted(std::vector<FrfLine> lines, const std::vector<SpeedDependentMode>& moving,
                 const std::string& unit, const CuttingFrfOptions& options, std::optional<double> speed = {}) {
   SpeedFrf found;
   found.speed = speed.value_or(meanSpeed(lines));
   found.lowest = lines.front().speed;
   found.highest = lines.back().speed;
-  for (CuttingLine& line : lines)
-    for (const MovingMode& mode : moving) line.value += mode.lost(line.frequency, line.speed / found.speed);
+  for (FrfLine& line : lines)
+    for (const SpeedDependentMode& mode : moving)
+      line.value += mode.correction(line.frequency, line.speed / found.speed);
   found.frf = frfOf(std::move(lines), unit);
   const auto count = static_cast<int>(found.frf.size());
   if (count < options.least_lines) {
-    found.reason = formatted("%d lines, %d are needed", count, options.least_lines);
+    found.reason = formatted("%d lines, expected at least %d", count, options.least_lines);
     return found;
   }
   ModalFitOptions fit;
@@ -258,17 +258,17 @@ SpeedFrf fitted(std::vector<CuttingLine> lines, const std::vector<MovingMode>& m
   fit.positive_gains = true;
   try {
     found.fit = fitModes(found.frf, fit);
-    dropUnseen(*found.fit, options.unit_static_gain);
+    dropUncertainModes(*found.fit, options.unit_static_gain);
     if (!found.fit->model.modes.empty()) return found;
     found.fit.reset();
-    found.reason = "no mode stands out of its deviation";
+    found.reason = "no significant mode";
   } catch (const Error& e) {
     found.reason = e.what();
   }
   return found;
 }
 
-/// One of the modes that has this frequency, or none.
+/// Mode closest to a frequency, within SAME_MODE; null: none.
 const Mode* nearest(const SpeedFrf& frf, double frequency) {
   const Mode* best = nullptr;
   if (!frf.fit) return best;
@@ -279,31 +279,31 @@ const Mode* nearest(const SpeedFrf& frf, double frequency) {
   return best;
 }
 
-/// Slopes of one mode at a group: of the parabola through the values at the nearest three speeds, of the
-/// line through two; unknown beside no other group, and then taken for none.
-MovingMode movingMode(const std::vector<SpeedFrf>& all, std::size_t group, const Mode& mode,
-                      bool receptance) {
-  MovingMode moving;
+/// Slopes of one mode at a group: of the parabola through the values at the nearest three speeds, or of the
+/// line through two; zero for a single group.
+SpeedDependentMode speedDependentMode(const std::vector<SpeedFrf>& all, std::size_t group, const Mode& mode,
+                                      bool receptance) {
+  SpeedDependentMode moving;
   moving.mode = mode;
-  std::vector<std::pair<double, const Mode*>> seen;  // speed over this one, less 1
+  std::vector<std::pair<double, const Mode*>> neighbours;  // speed over this one, less 1
   for (const SpeedFrf& other : all) {
     if (const Mode* same = nearest(other, mode.frequency))
-      seen.emplace_back(other.speed / all[group].speed - 1.0, same);
+      neighbours.emplace_back(other.speed / all[group].speed - 1.0, same);
   }
-  std::sort(seen.begin(), seen.end(),
+  std::sort(neighbours.begin(), neighbours.end(),
             [](const auto& a, const auto& b) { return std::abs(a.first) < std::abs(b.first); });
-  seen.resize(std::min<std::size_t>(seen.size(), 3));
-  const auto count = static_cast<Eigen::Index>(seen.size());
+  neighbours.resize(std::min<std::size_t>(neighbours.size(), 3));
+  const auto count = static_cast<Eigen::Index>(neighbours.size());
   if (count < 2) return moving;
   Eigen::MatrixXd powers(count, count);
   for (Eigen::Index i = 0; i < count; ++i)
     for (Eigen::Index j = 0; j < count; ++j)
-      powers(i, j) = std::pow(seen[static_cast<std::size_t>(i)].first, static_cast<double>(j));
+      powers(i, j) = std::pow(neighbours[static_cast<std::size_t>(i)].first, static_cast<double>(j));
   const Eigen::RowVectorXd share = powers.inverse().row(1);
-  // The gains of a force sensor are shares of its static answer, which no speed changes.
+  // The gains of a force sensor do not depend on the speed: its static gain is 1.
   for (std::size_t k = 0; k < (receptance ? KINDS : KINDS - 1); ++k) {
     for (Eigen::Index i = 0; i < count; ++i) {
-      const Mode& at = *seen[static_cast<std::size_t>(i)].second;
+      const Mode& at = *neighbours[static_cast<std::size_t>(i)].second;
       moving.slope[k] += share[i] * std::log(at.*VALUES[k]);
       moving.std_dev[k] = std::hypot(moving.std_dev[k], share[i] * (at.*DEVIATIONS[k]) / (at.*VALUES[k]));
     }
@@ -311,30 +311,31 @@ MovingMode movingMode(const std::vector<SpeedFrf>& all, std::size_t group, const
   return moving;
 }
 
-/// How the modes may move in a group that does not tell it by itself: as those of the nearest one that does.
-std::vector<MovingMode> borrowed(const std::vector<SpeedFrf>& all,
-                                 const std::vector<std::vector<MovingMode>>& moving, std::size_t group) {
+/// Speed dependence for a group without a fit: that of the nearest group with one.
+std::vector<SpeedDependentMode> borrowed(const std::vector<SpeedFrf>& all,
+                                         const std::vector<std::vector<SpeedDependentMode>>& moving,
+                                         std::size_t group) {
   std::size_t best = all.size();
   const auto apart = [&](std::size_t g) { return std::abs(std::log(all[g].speed / all[group].speed)); };
   for (std::size_t g = 0; g < all.size(); ++g)
     if (all[g].fit && (best == all.size() || apart(g) < apart(best))) best = g;
   if (best == all.size()) return {};
-  std::vector<MovingMode> here = moving[best];
-  for (MovingMode& m : here)
+  std::vector<SpeedDependentMode> here = moving[best];
+  for (SpeedDependentMode& m : here)
     for (std::size_t k = 0; k < KINDS; ++k)
       m.mode.*VALUES[k] *= std::pow(all[group].speed / all[best].speed, m.slope[k]);
   return here;
 }
 
-/// What slopes that are not known better do to the modes, as a further deviation.
-void addSlopes(const std::vector<CuttingLine>& lines, const std::vector<MovingMode>& moving,
-               const std::string& unit, const CuttingFrfOptions& options, SpeedFrf& found) {
+/// Adds the uncertainty of the slopes to the standard deviations of the modes.
+void widenBySlopes(const std::vector<FrfLine>& lines, const std::vector<SpeedDependentMode>& moving,
+                   const std::string& unit, const CuttingFrfOptions& options, SpeedFrf& found) {
   if (!found.fit) return;
   std::vector<Mode>& modes = found.fit->model.modes;
   const std::vector<Mode> before = modes;
   for (std::size_t n = 0; n < moving.size() * KINDS; ++n) {
-    std::vector<MovingMode> other = moving;
-    MovingMode& changed = other[n / KINDS];
+    std::vector<SpeedDependentMode> other = moving;
+    SpeedDependentMode& changed = other[n / KINDS];
     if (changed.std_dev[n % KINDS] == 0.0) continue;
     changed.slope[n % KINDS] += changed.std_dev[n % KINDS];
     const SpeedFrf moved = fitted(lines, other, unit, options);
@@ -347,40 +348,40 @@ void addSlopes(const std::vector<CuttingLine>& lines, const std::vector<MovingMo
   }
 }
 
-/// Cuts of a group, by their speeds: lines from .. to.
-std::vector<std::pair<std::size_t, std::size_t>> cutsOf(const std::vector<CuttingLine>& lines) {
+/// Cuts of a group, by their speeds: ranges of lines.
+std::vector<std::pair<std::size_t, std::size_t>> cutsOf(const std::vector<FrfLine>& lines) {
   std::vector<std::pair<std::size_t, std::size_t>> cuts;
   for (std::size_t i = 0; i < lines.size(); ++i) {
-    if (i == 0 || lines[i].speed > lines[i - 1].speed * (1.0 + ANOTHER_CUT)) cuts.emplace_back(i, i);
+    if (i == 0 || lines[i].speed > lines[i - 1].speed * (1.0 + SPEED_TOLERANCE)) cuts.emplace_back(i, i);
     cuts.back().second = i + 1;
   }
   return cuts;
 }
 
-/// Deviations by leaving out each cut in turn (jackknife), where they are larger: few lines lie in a mode's
-/// band, those of one cut side by side, and what is left of their fit hardly shows how they scatter.
-void widenByCuts(const std::vector<CuttingLine>& lines, const std::vector<MovingMode>& moving,
+/// Standard deviations by leaving out each cut in turn (jackknife), where they are larger: a mode's band has
+/// few lines, those of one cut are adjacent, and the residual of the fit underestimates their scatter.
+void widenByCuts(const std::vector<FrfLine>& lines, const std::vector<SpeedDependentMode>& moving,
                  const std::string& unit, const CuttingFrfOptions& options, SpeedFrf& found) {
   if (!found.fit) return;
   const auto cuts = cutsOf(lines);
   std::vector<Mode>& modes = found.fit->model.modes;
-  if (cuts.size() < FEWEST_CUTS) return;
-  std::vector<std::array<std::vector<double>, KINDS>> seen(modes.size());
+  if (cuts.size() < MIN_JACKKNIFE_CUTS) return;
+  std::vector<std::array<std::vector<double>, KINDS>> neighbours(modes.size());
   for (const auto& [from, to] : cuts) {
-    std::vector<CuttingLine> others;
+    std::vector<FrfLine> others;
     for (std::size_t i = 0; i < lines.size(); ++i)
       if (i < from || i >= to) others.push_back(lines[i]);
-    // At the group's speed, not at that of those left.
+    // At the mean speed of the whole group.
     const SpeedFrf left = fitted(std::move(others), moving, unit, options, found.speed);
     for (std::size_t m = 0; m < modes.size(); ++m) {
       const Mode* there = nearest(left, modes[m].frequency);
-      for (std::size_t k = 0; there && k < KINDS; ++k) seen[m][k].push_back(there->*VALUES[k]);
+      for (std::size_t k = 0; there && k < KINDS; ++k) neighbours[m][k].push_back(there->*VALUES[k]);
     }
   }
   for (std::size_t m = 0; m < modes.size(); ++m) {
     for (std::size_t k = 0; k < KINDS; ++k) {
-      const std::vector<double>& values = seen[m][k];
-      if (values.size() < FEWEST_CUTS) continue;
+      const std::vector<double>& values = neighbours[m][k];
+      if (values.size() < MIN_JACKKNIFE_CUTS) continue;
       const auto n = static_cast<double>(values.size());
       const double deviation = (n - 1.0) / std::sqrt(n) * standardDeviation(values);
       modes[m].*DEVIATIONS[k] = std::max(modes[m].*DEVIATIONS[k], deviation);
@@ -403,46 +404,46 @@ void CuttingFrfOptions::validate() const {
   check(max_modes >= 1 && max_modes <= 20, "max_modes", max_modes);
 }
 
-std::vector<CuttingLine> cuttingLines(const CutStretch& cut, const CuttingFrfOptions& options) {
+std::vector<FrfLine> frfLines(const CutSegment& cut, const CuttingFrfOptions& options) {
   options.validate();
   const std::size_t size = cut.force.size();
   if (cut.response.size() != size || (!cut.angle.empty() && cut.angle.size() != size))
-    throw Error(cut.name + ": force, response and angle are not of one length");
+    throw Error(cut.name + ": force, response and angle differ in length");
   for (const std::vector<double>* values : {&cut.force, &cut.response, &cut.angle})
-    if (firstNotFinite(*values) < values->size()) throw Error(cut.name + ": a value is not a finite number");
+    if (firstNotFinite(*values) < values->size()) throw Error(cut.name + ": a value is not finite");
   if (!(cut.sample_rate > 0.0) || !(cut.speed > 0.0)) throw Error(cut.name + ": no sample rate or no speed");
-  // Parts as long as asked, but of enough revolutions.
-  const double least = 1.02 * LEAST_REVOLUTIONS * units::TWO_PI / cut.speed;
-  const auto wanted = static_cast<std::size_t>(std::max(options.part, least) * cut.sample_rate);
-  const std::size_t parts = std::max<std::size_t>(1, size / std::max<std::size_t>(1, wanted));
-  std::vector<CuttingLine> lines;
-  for (std::size_t p = 0; p < parts; ++p) linesOfPart(cut, p * (size / parts), size / parts, options, lines);
+  // Each part has MIN_REVOLUTIONS at least.
+  const double least = 1.02 * MIN_REVOLUTIONS * units::TWO_PI / cut.speed;
+  const auto part_size = static_cast<std::size_t>(std::max(options.part, least) * cut.sample_rate);
+  const std::size_t parts = std::max<std::size_t>(1, size / std::max<std::size_t>(1, part_size));
+  std::vector<FrfLine> lines;
+  for (std::size_t p = 0; p < parts; ++p)
+    addSegmentLines(cut, p * (size / parts), size / parts, options, lines);
   return lines;
 }
 
-std::vector<SpeedFrf> cuttingFrfs(std::vector<CuttingLine> lines, const std::string& unit,
+std::vector<SpeedFrf> cuttingFrfs(std::vector<FrfLine> lines, const std::string& unit,
                                   const CuttingFrfOptions& options) {
   options.validate();
   std::stable_sort(lines.begin(), lines.end(),
-                   [](const CuttingLine& a, const CuttingLine& b) { return a.speed < b.speed; });
-  std::vector<std::vector<CuttingLine>> groups;
+                   [](const FrfLine& a, const FrfLine& b) { return a.speed < b.speed; });
+  std::vector<std::vector<FrfLine>> groups;
   for (auto begin = lines.begin(); begin != lines.end();) {
     const double most = begin->speed * (1.0 + options.speed_width);
-    const auto end =
-        std::find_if(begin, lines.end(), [most](const CuttingLine& l) { return l.speed > most; });
+    const auto end = std::find_if(begin, lines.end(), [most](const FrfLine& l) { return l.speed > most; });
     groups.emplace_back(begin, end);
     begin = end;
   }
   std::vector<SpeedFrf> found;
   for (const auto& group : groups) found.push_back(fitted(group, {}, unit, options));
-  // Within a group the modes move, too: how, the groups beside it tell.
-  std::vector<std::vector<MovingMode>> moving(groups.size());
+  // Modes also shift within a group; the neighbouring groups give the slopes.
+  std::vector<std::vector<SpeedDependentMode>> moving(groups.size());
   for (int pass = 0; pass < PASSES && groups.size() > 1; ++pass) {
     for (std::size_t g = 0; g < groups.size(); ++g) {
       if (!found[g].fit) continue;
       moving[g].clear();
       for (const Mode& mode : found[g].fit->model.modes)
-        moving[g].push_back(movingMode(found, g, mode, unit == "m/N"));
+        moving[g].push_back(speedDependentMode(found, g, mode, unit == "m/N"));
     }
     for (std::size_t g = 0; g < groups.size(); ++g)
       if (!found[g].fit) moving[g] = borrowed(found, moving, g);
@@ -450,7 +451,7 @@ std::vector<SpeedFrf> cuttingFrfs(std::vector<CuttingLine> lines, const std::str
   }
   for (std::size_t g = 0; g < groups.size(); ++g) {
     widenByCuts(groups[g], moving[g], unit, options, found[g]);
-    addSlopes(groups[g], moving[g], unit, options, found[g]);
+    widenBySlopes(groups[g], moving[g], unit, options, found[g]);
   }
   return found;
 }

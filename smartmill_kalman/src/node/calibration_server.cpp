@@ -22,7 +22,7 @@ using Server = actionlib::ActionServer<smartmill_msgs::CalibrateForceSensorActio
 using Handle = Server::GoalHandle;
 using Code = CalibrationResult::Code;
 
-constexpr double USUAL_DURATION = 0.5;  // [s]
+constexpr double DEFAULT_DURATION = 0.5;  // [s] where the goal has 0
 
 CalibrationGoal fromMsg(const smartmill_msgs::CalibrateForceSensorGoal& message, double received) {
   CalibrationGoal goal;
@@ -35,12 +35,12 @@ CalibrationGoal fromMsg(const smartmill_msgs::CalibrateForceSensorGoal& message,
   if (goal.step == CalibrationGoal::Step::point)
     goal.load = {message.point.x, message.point.y, message.point.z};
   goal.reference = message.reference;
-  goal.duration = message.duration == 0.0 ? USUAL_DURATION : message.duration;
+  goal.duration = message.duration == 0.0 ? DEFAULT_DURATION : message.duration;
   goal.file = message.file;
   return goal;
 }
 
-smartmill_msgs::CalibrateForceSensorResult answer(Code code, const std::string& text) {
+smartmill_msgs::CalibrateForceSensorResult resultOf(Code code, const std::string& text) {
   smartmill_msgs::CalibrateForceSensorResult result;
   result.code = static_cast<std::uint8_t>(code);
   result.message = text;
@@ -50,12 +50,12 @@ smartmill_msgs::CalibrateForceSensorResult answer(Code code, const std::string& 
 }  // namespace
 
 struct CalibrationServer::Impl {
-  Impl(ros::NodeHandle nh, SortedCompensation& thinking)
-      : sorted(thinking),
+  Impl(ros::NodeHandle nh, CompensationPipeline& target)
+      : pipeline(target),
         server(nh, names::CALIBRATE_SENSOR,
                boost::function<void(Handle)>([this](Handle handle) { onGoal(handle); }),
                boost::function<void(Handle)>([this](Handle handle) {
-                 if (active && *active == handle) sorted.cancelCalibration();
+                 if (active && *active == handle) pipeline.cancelCalibration();
                }),
                false) {
     server.start();
@@ -63,28 +63,30 @@ struct CalibrationServer::Impl {
 
   void onGoal(Handle handle) {
     const smartmill_msgs::CalibrateForceSensorGoal& message = *handle.getGoal();
-    const auto reject = [&](const std::string& why) { handle.setRejected(answer(Code::bad_goal, why), why); };
+    const auto reject = [&](const std::string& reason) {
+      handle.setRejected(resultOf(Code::bad_goal, reason), reason);
+    };
     if (message.step > smartmill_msgs::CalibrateForceSensorGoal::POINT)
       return reject("step " + std::to_string(message.step) +
-                    ": READING, FIT, VERIFY, FORGET or POINT is due");
+                    ": expected READING, FIT, VERIFY, FORGET or POINT");
     if (active) return reject("another step is running");
     handle.setAccepted();
     active = handle;
     file = message.file;
-    sorted.push(fromMsg(message, toSec(ros::Time::now())), [this, handle](bool free) {
-      // It may have been ended while it waited for its turn.
+    pipeline.push(fromMsg(message, toSec(ros::Time::now())), [this, handle](bool free) {
+      // It may have been cancelled before its stamp was reached.
       return free && active && *active == handle;
     });
   }
 
-  /// Calibration and readings. @throws Error.
+  /// Writes the calibration and the measurements that it was fitted to. @throws Error.
   void write(const SpindleSensorCalibration& calibration) const {
     if (file.empty()) return;
     writeSpindleSensor(calibration, file);
     std::ofstream table(file + ".csv");
-    table << sorted.calibrator().readingsTable();
+    table << pipeline.calibrator().measurementTable();
     table.close();
-    if (!table) throw Error(file + ".csv: cannot be written");
+    if (!table) throw Error(file + ".csv: cannot write");
   }
 
   void end(const smartmill_msgs::CalibrateForceSensorResult& result) {
@@ -94,25 +96,25 @@ struct CalibrationServer::Impl {
     } else {
       ROS_ERROR("kalman: %s", result.message.c_str());
     }
-    std::optional<Handle> done = std::exchange(active, std::nullopt);
-    if (!done) return;
+    std::optional<Handle> ended = std::exchange(active, std::nullopt);
+    if (!ended) return;
     if (result.code == result.OK) {
-      done->setSucceeded(result, result.message);
+      ended->setSucceeded(result, result.message);
     } else if (result.code == result.CANCELLED) {
-      done->setCanceled(result, result.message);
+      ended->setCanceled(result, result.message);
     } else {
-      done->setAborted(result, result.message);
+      ended->setAborted(result, result.message);
     }
   }
 
-  SortedCompensation& sorted;
+  CompensationPipeline& pipeline;
   std::string file, last_message = "no calibration yet";
   std::optional<Handle> active;
   Server server;
 };
 
-CalibrationServer::CalibrationServer(ros::NodeHandle nh, SortedCompensation& sorted)
-    : impl_(std::make_unique<Impl>(std::move(nh), sorted)) {
+CalibrationServer::CalibrationServer(ros::NodeHandle nh, CompensationPipeline& pipeline)
+    : impl_(std::make_unique<Impl>(std::move(nh), pipeline)) {
 }
 
 CalibrationServer::~CalibrationServer() = default;
@@ -122,14 +124,14 @@ const std::string& CalibrationServer::lastMessage() const {
 }
 
 void CalibrationServer::finish(const CalibrationResult& result) {
-  smartmill_msgs::CalibrateForceSensorResult message = answer(result.code, result.message);
+  smartmill_msgs::CalibrateForceSensorResult message = resultOf(result.code, result.message);
   message.readings = static_cast<std::uint32_t>(result.readings);
   message.error.x = result.error[0];
   message.error.y = result.error[1];
   message.error.z = result.error[2];
   try {
     if (result.calibration) impl_->write(*result.calibration);
-    if (result.matrix && !impl_->file.empty()) writeTapFile(impl_->sorted.plate().taps(), impl_->file);
+    if (result.matrix && !impl_->file.empty()) writeTapFile(impl_->pipeline.plate().taps(), impl_->file);
   } catch (const Error& e) {
     message.code = message.FIT_FAILED;
     message.message = e.what();
@@ -137,15 +139,15 @@ void CalibrationServer::finish(const CalibrationResult& result) {
   impl_->end(message);
 }
 
-void CalibrationServer::lost(const std::string& why) {
+void CalibrationServer::abort(const std::string& reason) {
   if (!impl_->active) return;
-  const bool running = impl_->sorted.calibrator().active();
-  impl_->end(answer(Code::bad_data, why));
-  if (running) impl_->sorted.cancelCalibration();
+  const bool running = impl_->pipeline.calibrator().active();
+  impl_->end(resultOf(Code::bad_data, reason));
+  if (running) impl_->pipeline.cancelCalibration();
 }
 
 void CalibrationServer::restart() {
-  if (impl_->active) impl_->end(answer(Code::cancelled, "time went back: the bag was restarted"));
+  if (impl_->active) impl_->end(resultOf(Code::cancelled, "time jumped back: the recording was restarted"));
 }
 
 }  // namespace smartmill::kalman

@@ -5,21 +5,21 @@
 
 #include <ros/node_handle.h>
 
-#include "smartmill_kalman/compensation/sorted_compensation.h"
+#include "smartmill_kalman/compensation/compensation_pipeline.h"
 
 namespace smartmill::kalman {
 
-/// The action kalman/calibrate: a step of a calibration a goal, each begun at its turn among the streams;
-/// what a fit found is written where the goal says. All in the thread of the callbacks.
+/// The action kalman/calibrate: each goal is a step of a calibration, started at its stamp in the streams.
+/// The result of a fit is written to the goal's file. Runs in the thread of the callbacks.
 class CalibrationServer {
  public:
-  CalibrationServer(ros::NodeHandle nh, SortedCompensation& sorted);
+  CalibrationServer(ros::NodeHandle nh, CompensationPipeline& pipeline);
   ~CalibrationServer();
 
   void finish(const CalibrationResult& result);
-  /// The sensor is silent: nothing that runs or waits can come to an end.
-  void lost(const std::string& why);
-  /// Time went back: nothing that was asked for is of this run.
+  /// Ends a running goal; no more sensor data are expected.
+  void abort(const std::string& reason);
+  /// Time jumped back: ends a running goal.
   void restart();
   const std::string& lastMessage() const;
 

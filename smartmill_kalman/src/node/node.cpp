@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include <geometry_msgs/WrenchStamped.h>
 #include <smartmill_msgs/ForceBlock.h>
@@ -18,14 +19,14 @@
 namespace smartmill::kalman {
 namespace {
 
-constexpr std::size_t MOST_WAITING = 2000;  // blocks, 20 s
-constexpr double COLOURED = 0.5;            // [1] correlation of neighbouring innovations
-constexpr double WATCH_PERIOD = 0.05;       // [s]
-/// A goal that a dead stream holds back is refused after this.
-constexpr double GOAL_PATIENCE = 1.0;  // [s]
+constexpr std::size_t MAX_WAITING = 4000;     // blocks that wait for the rotation: 20 s of both topics
+constexpr double MAX_INNOVATION_RATIO = 3.0;  // [1] innovations are larger than the model explains
+constexpr double MAX_CORRELATION = 0.5;       // [1] of neighbouring innovations
+constexpr double CHECK_PERIOD = 0.05;         // [s]
+constexpr double GOAL_TIMEOUT = 1.0;          // [s] before a goal that waits for a dead input is refused
 
 ForceSensor sensorOf(const NodeParameters& parameters) {
-  if (parameters.model.empty()) throw Error("model: the path of a smartmill-model/1 file is due");
+  if (parameters.model.empty()) throw Error("model: empty, expected the path of a smartmill-model/1 file");
   return readMachineModel(parameters.model).force_sensor;
 }
 
@@ -39,46 +40,64 @@ KalmanNode::KalmanNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
       compensated_(nh.advertise<smartmill_msgs::ForceBlock>(names::FORCE_COMPENSATED, STREAM_QUEUE)),
       wrench_(nh.advertise<geometry_msgs::WrenchStamped>(names::FORCE_WRENCH, STREAM_QUEUE)),
       strike_(nh, parameters_.inSpindle() ? "tool" : POINT_FORCE_SENSOR),
-      sorted_(parameters_.compensation, parameters_.taps, sensorOf(parameters_), parameters_.hold_back,
-              {[this](const ForceBlock& m, const ForceBlock& c) { publish(m, c); },
-               [this](const StrikeCommand& command) {
-                 if (parameters_.command_machine) strike_.strike(command.direction);
-               },
-               [this](const TapFeedback& f) { measure_.feedback(f.stage, f.progress, f.hits_done); },
-               [this](const SensorResult& r) {
-                 FrfServer::Result result;
-                 result.code = r.code;
-                 result.message = r.message;
-                 result.frf = r.frf;
-                 result.modes = r.modes;
-                 measure_.finish(result);
-               },
-               [this](const CalibrationResult& result) { calibrate_.finish(result); }}),
-      measure_(nh, names::MEASURE_SENSOR_FRF, "kalman",
-               {[this](const MeasureFrfGoal& goal, std::function<bool(bool)> begin) {
-                  sorted_.push(goal, std::move(begin));
-                },
-                [this](std::function<bool()> due) {
-                  sorted_.event([due](SensorMeasurement& m) {
-                    if (due()) m.cancel();
-                  });
-                }}),
-      calibrate_(nh, sorted_) {
-  useFiles(sorted_, parameters_);
+      pipeline_(parameters_.compensation, parameters_.taps, sensorOf(parameters_), parameters_.hold_back,
+                pipelineOutputs()),
+      measurement_server_(nh, names::MEASURE_SENSOR_FRF, "kalman", measurementHandlers()),
+      calibration_server_(nh, pipeline_) {
+  loadSensorFiles(pipeline_, parameters_);
   if (parameters_.inSpindle() && parameters_.spindle_sensor.empty()) {
-    sorted_.awaitCalibration();
-    ROS_WARN("spindle_sensor: no calibration of the six sensors; they wait for kalman/calibrate");
+    pipeline_.allowUncalibrated();
+    ROS_WARN(
+        "spindle_sensor: not set; no force is published until kalman/calibrate has calibrated the sensors");
   }
-  sorted_.onRestart([this] {
-    measure_.restart();
-    calibrate_.restart();
+  pipeline_.onRestart([this] {
+    measurement_server_.restart();
+    calibration_server_.restart();
   });
-  listen();
+  subscribe();
   shell_.diagnose("force compensation", [this](auto& status) { diagnose(status); });
-  shell_.every(WATCH_PERIOD, [this] { watch(); });
+  shell_.every(CHECK_PERIOD, [this] { checkInputs(); });
 }
 
-void KalmanNode::listen() {
+CompensationPipeline::Outputs KalmanNode::pipelineOutputs() {
+  CompensationPipeline::Outputs outputs;
+  outputs.force = {[this](const ForceBlock& block) { enqueue(measured_, block); },
+                   [this](const ForceBlock& block) { enqueue(compensated_, block); }};
+  outputs.strike = [this](const StrikeCommand& command) {
+    if (parameters_.command_machine) strike_.strike(command.direction);
+  };
+  outputs.feedback = [this](const TapFeedback& feedback) {
+    measurement_server_.feedback(feedback.stage, feedback.progress, feedback.hits_done);
+  };
+  outputs.result = [this](const SensorResult& sensor) {
+    FrfServer::Result result;
+    result.code = sensor.code;
+    result.message = sensor.message;
+    result.frf = sensor.frf;
+    result.modes = sensor.modes;
+    measurement_server_.finish(result);
+  };
+  outputs.calibration = [this](const CalibrationResult& result) { calibration_server_.finish(result); };
+  outputs.block_error = [this](const std::string& reason) {
+    ++failed_blocks_;
+    last_failure_ = parameters_.force_input + ": block not compensated: " + reason;
+    ROS_ERROR_STREAM_THROTTLE(5.0, last_failure_);
+  };
+  return outputs;
+}
+
+FrfServer::Handlers KalmanNode::measurementHandlers() {
+  return {[this](const MeasureFrfGoal& goal, std::function<bool(bool)> begin) {
+            pipeline_.push(goal, std::move(begin));
+          },
+          [this](std::function<bool()> is_active) {
+            pipeline_.event([is_active](SensorMeasurement& measurement) {
+              if (is_active()) measurement.cancel();
+            });
+          }};
+}
+
+void KalmanNode::subscribe() {
   Inputs& inputs = shell_.inputs();
   inputs.on<smartmill_msgs::SampleBlock>(
       parameters_.force_input, [this](const smartmill_msgs::SampleBlock& message, double) {
@@ -86,50 +105,52 @@ void KalmanNode::listen() {
             message.header.frame_id.empty() ? frames::DYNAMOMETER : message.header.frame_id;
         if (frame != sensor_frame_) rotation_known_ = false;
         sensor_frame_ = frame;
-        sorted_.push(fromMsg(message));
+        pipeline_.push(fromMsg(message));
       });
-  inputs.setWaiting(parameters_.force_input, [this] { return waiting_.size(); });
-  connect(inputs, sorted_);
-  feed<CuttingCondition>(inputs, names::CUTTING_CONDITION, sorted_);
-  // A recording that began after the taps holds the modes that served in it.
-  if (!parameters_.command_machine) feed<MeasuredModes>(inputs, names::TOOL_MODES, sorted_);
+  // One input block becomes two output blocks.
+  inputs.setWaiting(parameters_.force_input, [this] { return (waiting_.size() + 1) / 2; });
+  connect(inputs, pipeline_);
+  feed<CuttingCondition>(inputs, names::CUTTING_CONDITION, pipeline_);
+  // A recording that starts after the taps contains the modes that were used in it.
+  if (!parameters_.command_machine) feed<MeasuredModes>(inputs, names::TOOL_MODES, pipeline_);
 }
 
-// The sensor is bolted to its table: its rotation is asked for once. Until it is known results wait, for
-// the filters must not depend on when it came.
-bool KalmanNode::findRotation() {
+// The sensor is fixed to its table: its rotation is looked up once. Blocks wait until then, so that the
+// filters do not depend on when the transform arrives.
+bool KalmanNode::lookUpRotation() {
   try {
     const auto transform = transforms_.lookupTransform(frames::MACHINE, sensor_frame_, ros::Time(0));
     rotation_ = frames::rotationMatrix(transform.transform.rotation);
     return true;
   } catch (const tf2::TransformException& e) {
-    ROS_WARN_THROTTLE(5.0, "no transform from %s to %s yet, force blocks wait: %s", sensor_frame_.c_str(),
+    ROS_WARN_THROTTLE(5.0, "no transform from %s to %s, force blocks wait: %s", sensor_frame_.c_str(),
                       frames::MACHINE, e.what());
     return false;
   }
 }
 
-void KalmanNode::publish(const ForceBlock& measured, const ForceBlock& compensated) {
-  waiting_.emplace_back(measured, compensated);
-  if (waiting_.size() > MOST_WAITING) waiting_.pop_front();
+void KalmanNode::enqueue(ros::Publisher& publisher, const ForceBlock& block) {
+  waiting_.emplace_back(&publisher, block);
+  if (waiting_.size() > MAX_WAITING) {
+    waiting_.pop_front();
+    ++dropped_blocks_;
+  }
   publishWaiting();
 }
 
 void KalmanNode::publishWaiting() {
-  if (waiting_.empty() || !(rotation_known_ || (rotation_known_ = findRotation()))) return;
-  for (auto& [measured, compensated] : waiting_) {
-    rotateInPlace(rotation_, measured.force);
-    rotateInPlace(rotation_, compensated.force);
-    measured_.publish(toMsg(measured, frames::MACHINE));
-    compensated_.publish(toMsg(compensated, frames::MACHINE));
-    publishWrench(compensated);
+  if (waiting_.empty() || !(rotation_known_ || (rotation_known_ = lookUpRotation()))) return;
+  for (auto& [publisher, block] : waiting_) {
+    rotateInPlace(rotation_, block.force);
+    publisher->publish(toMsg(block, frames::MACHINE));
+    if (publisher == &compensated_) publishWrench(block);
   }
   waiting_.clear();
 }
 
 void KalmanNode::publishWrench(const ForceBlock& block) {
   const double period = 1.0 / parameters_.wrench_rate;
-  if (block.stamp < next_wrench_ - 2.0 * period) next_wrench_ = block.stamp;  // a bag was restarted
+  if (block.stamp < next_wrench_ - 2.0 * period) next_wrench_ = block.stamp;  // recording restarted
   for (std::size_t i = 0; i < block.force[0].size(); ++i) {
     const double stamp = block.stamp + static_cast<double>(i) / block.sample_rate;
     if (stamp < next_wrench_) continue;
@@ -144,94 +165,95 @@ void KalmanNode::publishWrench(const ForceBlock& block) {
   }
 }
 
-void KalmanNode::watch() {
-  watchMeasurement();
+void KalmanNode::checkInputs() {
+  checkMeasurement();
   publishWaiting();
-  // End of data: nothing more will come to release what waits.
-  if (shell_.inputs().watchdog(parameters_.force_input).ended()) sorted_.flush();
+  // End of data: no later input releases the blocks that wait.
+  if (shell_.inputs().watchdog(parameters_.force_input).ended()) pipeline_.flush();
 }
 
-void KalmanNode::watchMeasurement() {
+void KalmanNode::checkMeasurement() {
   if (const auto fault = strike_.takeFault()) {
-    using Kind = StrikeCaller::Answer::Kind;
-    sorted_.event([fault](SensorMeasurement& m) {
-      // Without an automatic hammer somebody hits by hand.
-      if (fault->kind == Kind::failed) return m.commandFailed(fault->message);
-      m.hitByHand();
+    using Kind = StrikeClient::Answer::Kind;
+    pipeline_.event([fault](SensorMeasurement& measurement) {
+      if (fault->kind == Kind::failed) return measurement.commandFailed(fault->message);
+      measurement.hitByHand();  // no automatic hammer
     });
   }
   const InputHealth* dead = shell_.inputs().dead({names::HAMMER, parameters_.force_input.c_str()});
   if (!dead) return;
-  const std::string text = dead->topic() + " is silent";
+  const std::string reason = "no data on " + dead->topic();
   if (shell_.inputs().watchdog(names::HAMMER).ended()) {
-    sorted_.hammerLost(text);
-  } else if (parameters_.command_machine && sorted_.measuring()) {
-    sorted_.event([text](SensorMeasurement& m) { m.lost(text); });
-    sorted_.flush();
+    pipeline_.hammerStopped(reason);
+  } else if (parameters_.command_machine && pipeline_.isMeasuring()) {
+    pipeline_.event([reason](SensorMeasurement& measurement) { measurement.abort(reason); });
+    pipeline_.flush();
   }
-  if (parameters_.command_machine) measure_.refuseWaiting(text, GOAL_PATIENCE);
-  calibrate_.lost(text);
+  if (parameters_.command_machine) measurement_server_.refuseWaiting(reason, GOAL_TIMEOUT);
+  calibration_server_.abort(reason);
 }
 
-std::pair<int, std::string> KalmanNode::judge(const SpindleSensorHealth* spindle) {
+std::pair<int, std::string> KalmanNode::summary(const SpindleSensorHealth* spindle) {
   using Level = diagnostic_msgs::DiagnosticStatus;
-  const CompensationHealth& health = sorted_.health();
+  const CompensationHealth health = pipeline_.health();
+  // Events between two publications of the diagnostics are reported once, whatever the present state.
   const std::size_t invalid = spindle ? spindle->unloaded + spindle->overloaded : 0;
-  const double zero =
-      std::max({std::abs(health.zero[0]), std::abs(health.zero[1]), std::abs(health.zero[2])});
-  // Told once, whatever came after.
-  if (spindle && invalid != invalid_told_) {
-    invalid_told_ = invalid;
-    return {Level::ERROR,
-            "a sensor of the spindle was unloaded or overloaded: those samples are no measurement"};
-  }
+  if (std::exchange(reported_invalid_, invalid) != invalid)
+    return {Level::ERROR, "a sensor in the spindle was unloaded or overloaded: its samples are invalid"};
+  if (std::exchange(reported_failures_, failed_blocks_) != failed_blocks_)
+    return {Level::ERROR, last_failure_};
+  if (std::exchange(reported_drops_, dropped_blocks_) != dropped_blocks_)
+    return {Level::ERROR, "force blocks were dropped: no transform of the force sensor for 20 s"};
   if (shell_.inputs().watchdog(parameters_.force_input).dead())
     return {Level::STALE, "no samples from the force sensor"};
-  if (sorted_.uncalibrated()) return {Level::ERROR, "the spindle's sensors are not calibrated"};
+  if (pipeline_.isUncalibrated()) return {Level::ERROR, "the sensors in the spindle are not calibrated"};
   if (!rotation_known_) return {Level::ERROR, "no transform of the force sensor"};
   if (health.gaps + health.not_finite + health.clipped > 0)
-    return {Level::WARN, "samples were lost, clipped or not numbers"};
-  if (health.innovation_ratio > 3.0)
+    return {Level::WARN, "samples were lost, clipped or not finite"};
+  if (health.innovation_ratio > MAX_INNOVATION_RATIO)
     return {Level::WARN, "innovations larger than the sensor model explains"};
-  if (health.speed > 0.0 && health.colour > COLOURED) {
-    return {Level::WARN,
-            "innovations are not white: something of the force or of the sensor is not in the model"};
-  }
+  if (health.speed > 0.0 && health.innovation_correlation > MAX_CORRELATION)
+    return {Level::WARN, "innovations are not white: the model misses part of the force or of the sensor"};
+  const double zero =
+      std::max({std::abs(health.zero[0]), std::abs(health.zero[1]), std::abs(health.zero[2])});
   if (parameters_.drift_limit > 0.0 && zero > parameters_.drift_limit)
-    return {Level::WARN, "the sensor's zero has drifted"};
-  if (parameters_.model_max_age > 0.0 && sorted_.modesAge() > parameters_.model_max_age)
-    return {Level::WARN, "the taps in use are old: measure the sensor again"};
-  if (sorted_.measuring()) return {Level::OK, "measuring the sensor"};
+    return {Level::WARN, "the zero of the sensor has drifted beyond drift_limit"};
+  if (parameters_.model_max_age > 0.0 && pipeline_.ageOfModes() > parameters_.model_max_age)
+    return {Level::WARN, "the measured modes are older than model_max_age: repeat the taps"};
+  if (pipeline_.isMeasuring()) return {Level::OK, "measuring the sensor"};
   return {Level::OK, health.speed > 0.0 ? "compensating" : "passing through"};
 }
 
 void KalmanNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
-  const CompensationHealth& health = sorted_.health();
-  const SpindleSensorHealth* spindle = sorted_.spindleHealth();
-  const auto [level, text] = judge(spindle);
+  const CompensationHealth health = pipeline_.health();
+  const SpindleSensorHealth* spindle = pipeline_.spindleHealth();
+  const auto [level, text] = summary(spindle);
   status.summary(static_cast<unsigned char>(level), text);
   status.add("spindle speed of the filters [rad/s]", health.speed);
-  status.add("innovation over design [1]", health.innovation_ratio);
-  status.add("colour of the innovations [1]", health.colour);
+  status.add("innovation ratio [1]", health.innovation_ratio);
+  status.add("correlation of the innovations [1]", health.innovation_correlation);
   status.addf("zero of the sensor [N]", "%.2f %.2f %.2f", health.zero[0], health.zero[1], health.zero[2]);
-  status.add("age of the taps in use [s]", sorted_.modesAge());
-  status.add("moves of the sensor's modes", health.moves);
+  status.add("age of the measured modes [s]", pipeline_.ageOfModes());
+  status.add("updates of the sensor's modes", health.mode_updates);
   status.add("gaps", health.gaps);
-  status.add("samples not numbers", health.not_finite);
+  status.add("samples not finite", health.not_finite);
   status.add("samples clipped", health.clipped);
+  status.add("blocks not compensated", failed_blocks_);
+  status.add("blocks waiting for a transform", waiting_.size());
+  status.add("blocks dropped for want of a transform", dropped_blocks_);
   if (spindle) {
     status.add("samples with a sensor unloaded", spindle->unloaded);
     status.add("samples with a sensor overloaded", spindle->overloaded);
-    status.add("least compression left [N]", spindle->least_left);
-    status.add("uncertainty of the zero [N]", spindle->zero_std);
+    status.add("smallest compression margin [N]", spindle->compression_margin);
+    status.add("standard deviation of the zero [N]", spindle->zero_std);
     status.addf("unbalance [g mm]", "%.3f %.3f %.3f", 1e6 * std::abs(spindle->unbalance[0]),
                 1e6 * std::abs(spindle->unbalance[1]), 1e6 * std::abs(spindle->unbalance[2]));
-    status.add("stretches in the air learnt", spindle->stretches);
+    status.add("segments without cutting evaluated", spindle->air_segments);
   }
-  status.add("inputs out of order", sorted_.late());
-  status.add("waiting for", sorted_.waitingFor());
-  status.add("last measurement of the sensor", measure_.lastMessage());
-  status.add("last step of a calibration", calibrate_.lastMessage());
+  status.add("inputs out of order", pipeline_.late());
+  status.add("waiting for", pipeline_.waitingFor());
+  status.add("last measurement of the sensor", measurement_server_.lastMessage());
+  status.add("last calibration step", calibration_server_.lastMessage());
 }
 
 }  // namespace smartmill::kalman

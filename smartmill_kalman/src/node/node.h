@@ -1,8 +1,8 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <deque>
-#include <functional>
 #include <string>
 #include <utility>
 
@@ -15,28 +15,30 @@
 #include "node/parameters.h"
 #include "smartmill_ros/frf_server.h"
 #include "smartmill_ros/node_shell.h"
-#include "smartmill_ros/strike_caller.h"
+#include "smartmill_ros/strike_client.h"
 
 namespace smartmill::kalman {
 
-/// Shell around SortedCompensation: sensor blocks in, force/measured, force/compensated and force/wrench out,
-/// in the machine's frame; taps in, tool/frf and tool/modes of the force sensor out.
+/// CompensationPipeline in ROS: sensor blocks in; force/measured, force/compensated and force/wrench out, in
+/// the machine's frame; taps in, tool/frf and tool/modes of the force sensor out.
 class KalmanNode {
  public:
   using Parameters = NodeParameters;
-  /// @throws Error on a wrong parameter or model.
+  /// @throws Error on an invalid parameter or model.
   KalmanNode(ros::NodeHandle nh, ros::NodeHandle private_nh);
 
  private:
-  void listen();
-  void publish(const ForceBlock& measured, const ForceBlock& compensated);
+  CompensationPipeline::Outputs pipelineOutputs();
+  FrfServer::Handlers measurementHandlers();
+  void subscribe();
+  void enqueue(ros::Publisher& publisher, const ForceBlock& block);
   void publishWaiting();
   void publishWrench(const ForceBlock& block);
-  bool findRotation();
-  void watch();
-  void watchMeasurement();
+  bool lookUpRotation();
+  void checkInputs();
+  void checkMeasurement();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
-  std::pair<int, std::string> judge(const SpindleSensorHealth* spindle);
+  std::pair<int, std::string> summary(const SpindleSensorHealth* spindle);
 
   NodeParameters parameters_;
   tf2_ros::Buffer transforms_;
@@ -45,15 +47,19 @@ class KalmanNode {
   std::string sensor_frame_;
   std::array<double, 9> rotation_{{1, 0, 0, 0, 1, 0, 0, 0, 1}};  // sensor to machine
   bool rotation_known_ = false;
-  std::deque<std::pair<ForceBlock, ForceBlock>> waiting_;  // for the rotation
-  std::size_t invalid_told_ = 0;
+  std::deque<std::pair<ros::Publisher*, ForceBlock>> waiting_;  // for the rotation
+  std::size_t dropped_blocks_ = 0;                              // the rotation came too late
+  std::size_t failed_blocks_ = 0;                               // could not be compensated
+  std::string last_failure_;
+  std::size_t reported_invalid_ = 0;  // samples
+  std::size_t reported_failures_ = 0, reported_drops_ = 0;
   double next_wrench_ = 0.0;  // [s]
 
   ros::Publisher measured_, compensated_, wrench_;
-  StrikeCaller strike_;
-  SortedCompensation sorted_;
-  FrfServer measure_;
-  CalibrationServer calibrate_;
+  StrikeClient strike_;
+  CompensationPipeline pipeline_;
+  FrfServer measurement_server_;
+  CalibrationServer calibration_server_;
 };
 
 }  // namespace smartmill::kalman

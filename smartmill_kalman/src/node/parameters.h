@@ -5,13 +5,13 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/parameters/parameter_table.h"
-#include "smartmill_kalman/compensation/sorted_compensation.h"
+#include "smartmill_kalman/compensation/compensation_pipeline.h"
 
 namespace smartmill::kalman {
 
 /// Parameters of kalman_node and of `compensate` on a bag.
 struct NodeParameters {
-  std::string model;  ///< may stay empty where the tool is given one
+  std::string model;  ///< may be empty in tools with an option --model
   std::string force_input = names::DYNAMOMETER;
   std::string sensor_matrix, spindle_sensor, plate_taps;
   double spindle_sensor_length = 0.139;
@@ -26,48 +26,46 @@ struct NodeParameters {
 
   void declare(ParameterTable& table) {
     table.title(
-        "Parameters of kalman_node (package smartmill_kalman): the force at the tool from a force sensor.");
+        "Parameters of kalman_node (package smartmill_kalman): force at the tool from a force sensor.");
     table.atLaunch("model", model,
-                   "path of a smartmill-model/1 file whose force_sensor section gives the sensor's modes");
+                   "path of a smartmill-model/1 file; its force_sensor section gives the sensor's modes");
     table.section();
-    table.text(
-        "force_input", force_input,
-        "topic of the force sensor; daq/spindle_force: of the one in the spindle, taps go on the tool");
+    table.text("force_input", force_input,
+               "topic of the force sensor; daq/spindle_force: sensor in the spindle, taps are on the tool");
     table.text("sensor_matrix", sensor_matrix,
-               "smartmill-sensor-matrix/1 file (compensate --coupled --matrix-out): cross-talk is taken out");
+               "smartmill-sensor-matrix/1 file (compensate --coupled --matrix-out): corrects cross-talk");
     table.text(
         "spindle_sensor", spindle_sensor,
-        "smartmill-spindle-sensor/1 file: force_input brings six sensors x1 x2 y1 y2 z1 z2; without, they "
-        "are calibrated first (action kalman/calibrate)");
+        "smartmill-spindle-sensor/1 file: calibration of six sensors x1 x2 y1 y2 z1 z2 on force_input; "
+        "empty: calibrate them first (action kalman/calibrate)");
     table.number("spindle_sensor_length", spindle_sensor_length, "m", Range::positive(),
-                 "of tool and holder, for spindle_sensor");
+                 "length of tool and holder, for spindle_sensor");
     table.text("plate_taps", plate_taps,
-               "smartmill-taps/1 file: the sensor's 3x3 or 6x6 matrix is inverted up to bandwidth, in the "
-               "place of the "
-               "filters; 10 ms late");
+               "smartmill-taps/1 file: the sensor's 3x3 or 6x6 matrix is inverted up to bandwidth instead of "
+               "filtering; 10 ms latency");
     compensation.declare(table);
     table.number("hold_back", hold_back, "s", Range::notNegative(),
-                 "how late an event may arrive and still be in order");
-    table.number("wrench_rate", wrench_rate, "Hz", Range::positive(), "of force/wrench");
+                 "time after its stamp that an event may arrive and still be in order");
+    table.number("wrench_rate", wrench_rate, "Hz", Range::positive(), "rate of force/wrench");
     table.number("drift_limit", drift_limit, "N", Range::notNegative(),
-                 "zero of the sensor without cutting that raises a diagnostic; 0: not watched");
+                 "zero of the sensor without cutting above which diagnostics warn; 0: not checked");
     table.number("model_max_age", model_max_age, "s", Range::notNegative(),
-                 "age of the taps in use that raises a diagnostic; 0: not watched");
+                 "age of the measured modes above which diagnostics warn; 0: not checked");
     table.number("input_timeout", input_timeout, "s", Range::positive(),
-                 "silence of the sensor that raises a diagnostic");
-    table.section("Taps on the workpiece (kalman/measure_frf): the modes found serve from then on.");
+                 "time without samples after which diagnostics report a dead input");
+    table.section("Taps on the workpiece (kalman/measure_frf): measured modes replace those in use.");
     table.flag("command_machine", command_machine,
-               "false: replay; daq/strike is not called, the recorded blows answer");
+               "false: replay; daq/strike is not called, the recorded hits are used");
     taps.declare(table);
   }
-  /// Whether the force acts on a sensor in the spindle: taps go on the tool then.
+  /// Whether the sensor is in the spindle; taps are on the tool then.
   bool inSpindle() const { return force_input == names::SPINDLE_FORCE; }
   /// @throws Error naming key and value.
   void validate() const {
     checkBounds(*this);
-    if (force_input.empty()) throw Error("force_input: a topic is due");
+    if (force_input.empty()) throw Error("force_input: empty, expected a topic");
     if (!plate_taps.empty() && !(spindle_sensor.empty() && sensor_matrix.empty()))
-      throw Error("plate_taps: without sensor_matrix and spindle_sensor, which are another sensor's");
+      throw Error("plate_taps: set together with sensor_matrix or spindle_sensor, expected only one of them");
     compensation.validate();
     taps.validate();
   }

@@ -3,31 +3,31 @@
 #include "node/parameters.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/signal/feed.h"
-#include "smartmill_kalman/compensation/sorted_compensation.h"
+#include "smartmill_kalman/compensation/compensation_pipeline.h"
 #include "smartmill_kalman/sensor/spindle_sensor_calibration.h"
 #include "smartmill_kalman/sensor/tap_file.h"
 
 namespace smartmill::kalman {
 
-/// The streams beside the sensor's own blocks, from a node's inputs or from a bag.
+/// Connects hammer and tachometer, from the inputs of a node or from a recording.
 template <class Source>
-void connect(Source& source, SortedCompensation& sorted) {
-  source.template on<SampleBlock>(names::HAMMER,
-                                  [&sorted](const SampleBlock& block, double) { sorted.pushHammer(block); });
-  feed<SpindleAngle>(source, names::SPINDLE_ANGLE, sorted);
+void connect(Source& source, CompensationPipeline& pipeline) {
+  source.template on<SampleBlock>(
+      names::HAMMER, [&pipeline](const SampleBlock& block, double) { pipeline.pushHammer(block); });
+  feed<SpindleAngle>(source, names::SPINDLE_ANGLE, pipeline);
 }
 
-/// What the parameters say of the sensor beyond its modes. @throws Error on a bad file.
-inline void useFiles(SortedCompensation& sorted, const NodeParameters& parameters) {
-  if (!parameters.sensor_matrix.empty()) sorted.useMatrix(readSensorMatrix(parameters.sensor_matrix));
+/// Reads the sensor files that the parameters name. @throws Error on an invalid file.
+inline void loadSensorFiles(CompensationPipeline& pipeline, const NodeParameters& parameters) {
+  if (!parameters.sensor_matrix.empty()) pipeline.useMatrix(readSensorMatrix(parameters.sensor_matrix));
   if (!parameters.plate_taps.empty()) {
     const TapRecords records = readTapFile(parameters.plate_taps);
-    sorted.useTransferMatrix(identifyTransferMatrix(records.taps, records.rate),
-                             parameters.compensation.filter.bandwidth);
+    pipeline.useTransferMatrix(identifyTransferMatrix(records.taps, records.rate),
+                               parameters.compensation.filter.bandwidth);
   }
-  sorted.setSpindleSensorLength(parameters.spindle_sensor_length);
+  pipeline.setSpindleSensorLength(parameters.spindle_sensor_length);
   if (!parameters.spindle_sensor.empty()) {
-    sorted.useSpindleSensor(readSpindleSensor(parameters.spindle_sensor), parameters.spindle_sensor_length);
+    pipeline.useSpindleSensor(readSpindleSensor(parameters.spindle_sensor), parameters.spindle_sensor_length);
   }
 }
 

@@ -14,36 +14,39 @@
 namespace smartmill::kalman {
 namespace {
 
-/// Cuts the compensated blocks at the conditions' stamps.
-class Cutter {
+/// Splits force blocks into cuts at the stamps of the cutting conditions.
+class CutSplitter {
  public:
-  explicit Cutter(std::function<void(BagCut&&)> done) : done_(std::move(done)) {}
+  explicit CutSplitter(std::function<void(BagCut&&)> output) : output_(std::move(output)) {}
 
-  void condition(const CuttingCondition& condition) { conditions_[condition.stamp] = condition; }
+  void addCondition(const CuttingCondition& condition) { conditions_[condition.stamp] = condition; }
 
-  void blocks(const ForceBlock& measured, const ForceBlock& compensated, double speed) {
-    for (std::size_t i = 0; i < measured.force[0].size(); ++i) {
-      const double time = measured.stamp + static_cast<double>(i) / measured.sample_rate;
-      turnTo(time);
+  void addMeasured(const ForceBlock& block) { measured_ = block; }
+  /// Compensated block of the same samples. @param speed [rad/s] of the filters; 0: unknown
+  void addCompensated(const ForceBlock& block, double speed) {
+    for (std::size_t i = 0; i < block.force[0].size(); ++i) {
+      const double time = block.stamp + static_cast<double>(i) / block.sample_rate;
+      startCutAt(time);
       if (!cut_) continue;
-      cut_->sample_rate = measured.sample_rate;
+      cut_->sample_rate = block.sample_rate;
       if (speed > 0.0) cut_->speed = speed;
       cut_->offset.push_back(time - cut_->stamp);
-      if (compensated.status != ForceBlock::Status::compensated) cut_->settling += 1.0 / measured.sample_rate;
+      if (block.status != ForceBlock::Status::compensated) cut_->settling += 1.0 / block.sample_rate;
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        cut_->measured[axis].push_back(measured.force[axis][i]);
-        cut_->compensated[axis].push_back(compensated.force[axis][i]);
+        cut_->measured[axis].push_back(measured_.force[axis][i]);
+        cut_->compensated[axis].push_back(block.force[axis][i]);
       }
     }
   }
 
   void close() {
-    if (cut_ && !cut_->offset.empty()) done_(std::move(*cut_));
+    if (cut_ && !cut_->offset.empty()) output_(std::move(*cut_));
     cut_.reset();
   }
 
  private:
-  void turnTo(double time) {
+  /// Switches to the condition in force at a time [s].
+  void startCutAt(double time) {
     auto next = conditions_.upper_bound(time);
     if (next == conditions_.begin()) return;
     --next;
@@ -56,16 +59,17 @@ class Cutter {
     cut_->stamp = next->first;
   }
 
-  std::function<void(BagCut&&)> done_;
+  std::function<void(BagCut&&)> output_;
   std::map<double, CuttingCondition> conditions_;  // by stamp
-  std::optional<double> current_;                  // [s] stamp of the condition that holds
+  std::optional<double> current_;                  // [s] stamp of the condition in force
   std::optional<BagCut> cut_;
+  ForceBlock measured_;
 };
 
-/// Turns cuts into the machine's frame as soon as the bag has told how the sensor sits; until then they wait.
-class Turner {
+/// Rotates cuts into the machine's frame. They wait until the recording has given the sensor's transform.
+class FrameTransformer {
  public:
-  Turner(RecordingReader& bag, std::function<void(BagCut&&)> done) : done_(std::move(done)) {
+  FrameTransformer(RecordingReader& bag, std::function<void(BagCut&&)> output) : output_(std::move(output)) {
     for (const char* topic : {"/tf_static", "/tf"}) {
       bag.on<plain::TFMessage>(topic, [this](const plain::TFMessage& message, double) {
         for (const plain::TransformStamped& transform : message.transforms) frames_.add(transform);
@@ -73,37 +77,36 @@ class Turner {
     }
   }
   void setFrame(const std::string& frame) { frame_ = frame; }
-  bool known() const { return frames_.rotation(frames::MACHINE, frame_).has_value(); }
-  void take(BagCut&& cut) {
+  bool isKnown() const { return frames_.rotation(frames::MACHINE, frame_).has_value(); }
+  void add(BagCut&& cut) {
     waiting_.push_back(std::move(cut));
-    if (known()) release();
+    if (isKnown()) flush();
   }
-  /// Those that nothing is known of stay in the sensor's own frame.
-  void release() {
+  /// Without a transform the cuts stay in the sensor's frame.
+  void flush() {
     std::array<double, 9> rotation{{1, 0, 0, 0, 1, 0, 0, 0, 1}};
     if (const auto known = frames_.rotation(frames::MACHINE, frame_))
       rotation = frames::rotationMatrix(*known);
     for (BagCut& cut : waiting_) {
       for (auto* force : {&cut.measured, &cut.compensated}) rotateInPlace(rotation, *force);
-      done_(std::move(cut));
+      output_(std::move(cut));
     }
     waiting_.clear();
   }
 
  private:
-  std::function<void(BagCut&&)> done_;
+  std::function<void(BagCut&&)> output_;
   FrameTree frames_;
   std::string frame_ = frames::DYNAMOMETER;
   std::vector<BagCut> waiting_;
 };
 
-/// A method that wants the whole cut, in place of what came sample by sample.
-void compensateWhole(BagCut& cut, Method method, const SortedCompensation& sorted,
-                     const HarmonicFilterParameters& parameters) {
-  // The others come as the node makes them.
-  if ((method != Method::smoother && method != Method::inverse) || !(cut.speed > 0.0)) return;
+/// Replaces the forces of a cut where the method needs the whole record; the pipeline runs the others.
+void compensateWholeCut(BagCut& cut, Method method, const CompensationPipeline& pipeline,
+                        const HarmonicFilterParameters& parameters) {
+  if (!needsWholeRecord(method) || !(cut.speed > 0.0)) return;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    cut.compensated[axis] = compensateRecord(method, cut.measured[axis], sorted.sensor(axis), cut.speed,
+    cut.compensated[axis] = compensateRecord(method, cut.measured[axis], pipeline.sensor(axis), cut.speed,
                                              cut.sample_rate, parameters);
   }
 }
@@ -115,47 +118,47 @@ BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, con
                          const std::function<void(double)>& progress) {
   BagSummary summary;
   RecordingReader bag(path);
-  Turner turner(bag, done);
-  std::optional<SortedCompensation> sorted;
-  Cutter cutter([&](BagCut&& cut) {
+  FrameTransformer transformer(bag, done);
+  std::optional<CompensationPipeline> pipeline;
+  CutSplitter splitter([&](BagCut&& cut) {
     ++summary.cuts;
-    compensateWhole(cut, method, *sorted, parameters.compensation.filter);
-    turner.take(std::move(cut));
+    compensateWholeCut(cut, method, *pipeline, parameters.compensation.filter);
+    transformer.add(std::move(cut));
   });
-  sorted.emplace(
-      parameters.compensation, parameters.taps, sensor, parameters.hold_back,
-      SortedCompensation::Outputs{[&](const ForceBlock& measured, const ForceBlock& compensated) {
-                                    cutter.blocks(measured, compensated, sorted->health().speed);
-                                  },
-                                  {},
-                                  {},
-                                  [&](const SensorResult& result) { summary.identified.push_back(result); }});
-  useFiles(*sorted, parameters);
+  CompensationPipeline::Outputs outputs;
+  outputs.force.measured = [&](const ForceBlock& block) { splitter.addMeasured(block); };
+  outputs.force.compensated = [&](const ForceBlock& block) {
+    splitter.addCompensated(block, pipeline->health().speed);
+  };
+  outputs.result = [&](const SensorResult& result) { summary.identified.push_back(result); };
+  pipeline.emplace(parameters.compensation, parameters.taps, sensor, parameters.hold_back,
+                   std::move(outputs));
+  loadSensorFiles(*pipeline, parameters);
   std::size_t blocks = 0;
   bag.on<plain::SampleBlock>(parameters.force_input, [&](const plain::SampleBlock& m, double) {
-    if (blocks++ == 0 && !m.header.frame_id.empty()) turner.setFrame(m.header.frame_id);
-    sorted->push(fromMsg(m));
+    if (blocks++ == 0 && !m.header.frame_id.empty()) transformer.setFrame(m.header.frame_id);
+    pipeline->push(fromMsg(m));
   });
-  connect(bag, *sorted);
+  connect(bag, *pipeline);
   bag.on<CuttingCondition>(names::CUTTING_CONDITION, [&](const CuttingCondition& condition, double) {
-    cutter.condition(condition);
-    sorted->push(condition);
+    splitter.addCondition(condition);
+    pipeline->push(condition);
   });
-  feed<MeasuredModes>(bag, names::TOOL_MODES, *sorted);
+  feed<MeasuredModes>(bag, names::TOOL_MODES, *pipeline);
   bag.on<plain::MeasureFrfActionGoal>(names::goals(names::MEASURE_SENSOR_FRF),
                                       [&](const plain::MeasureFrfActionGoal& m, double received) {
-                                        sorted->push(goalFromMsg(m.goal, received));
+                                        pipeline->push(goalFromMsg(m.goal, received));
                                       });
   bag.run(progress);
   summary.duration = bag.duration();
-  if (blocks == 0) throw Error(path + ": holds no " + parameters.force_input);
-  sorted->flush();
-  cutter.close();
-  turner.release();
-  summary.rotation_known = turner.known();
-  summary.gaps = sorted->health().gaps;
-  summary.not_finite = sorted->health().not_finite;
-  summary.late = sorted->late();
+  if (blocks == 0) throw Error(path + ": topic " + parameters.force_input + " not found");
+  pipeline->flush();
+  splitter.close();
+  transformer.flush();
+  summary.rotation_known = transformer.isKnown();
+  summary.gaps = pipeline->health().gaps;
+  summary.not_finite = pipeline->health().not_finite;
+  summary.late = pipeline->late();
   return summary;
 }
 

@@ -21,17 +21,16 @@ struct BagCut {
   std::array<std::vector<double>, 3> measured, compensated;  ///< [N]
 };
 
-/// What a bag held beside its cuts.
+/// Contents of a bag besides its cuts.
 struct BagSummary {
   std::size_t cuts = 0, gaps = 0, not_finite = 0, late = 0;
-  bool rotation_known = false;           ///< false: no transform in the bag, forces are in the sensor's frame
+  bool rotation_known = false;           ///< false: no transform, forces are in the sensor's frame
   double duration = 0.0;                 ///< [s]
-  std::vector<SensorResult> identified;  ///< tap tests that the bag holds
+  std::vector<SensorResult> identified;  ///< tap tests in the bag
 };
 
-/// Puts a bag's sensors, conditions and goals through SortedCompensation, as the node does, without a master.
-/// Methods other than kalman run over each cut's samples with the sensor and the speed that the node had in
-/// it.
+/// Feeds a bag's sensors, conditions and goals to CompensationPipeline, as the node does. Methods that need
+/// the whole record then run on each cut, with the sensor and the speed of the pipeline.
 /// @param done called at the end of each cut, in order @throws Error.
 BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, const NodeParameters& parameters,
                          Method method, const std::function<void(BagCut&&)>& done,

@@ -9,10 +9,10 @@
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/modal/results.h"
 #include "smartmill_core/names.h"
-#include "smartmill_core/signal/counted_angle.h"
 #include "smartmill_core/signal/feed.h"
 #include "smartmill_core/signal/steady_path.h"
 #include "smartmill_core/signal/streams.h"
+#include "smartmill_core/signal/unwrapped_angle.h"
 #include "smartmill_kalman/sensor/spindle_force_sensor.h"
 #include "smartmill_recording/recording_reader.h"
 
@@ -24,15 +24,15 @@ constexpr double PATH_TOLERANCE = 1e-3;  // [m]
 constexpr double MAXIMUM_GAP = 0.2;      // [s] of states: not steady
 constexpr double TOGETHER = 0.02;        // [1] of a sample's time
 
-/// A channel set over time, samples one after the other.
+/// Consecutive samples of three channels.
 struct Stream {
   double stamp = 0.0, rate = 0.0;  // [s] of the first, [Hz]
   std::array<std::vector<double>, 3> value;
 
-  /// Behind what is there; another rate or a hole begins anew.
+  /// Appends samples; another rate or a gap starts anew.
   void add(double begin, double sample_rate, const std::array<std::vector<double>, 3>& values) {
-    const double due = stamp + static_cast<double>(value[0].size()) / std::max(rate, 1.0);
-    if (value[0].empty() || sample_rate != rate || std::abs(begin - due) > 0.5 / sample_rate) {
+    const double expected = stamp + static_cast<double>(value[0].size()) / std::max(rate, 1.0);
+    if (value[0].empty() || sample_rate != rate || std::abs(begin - expected) > 0.5 / sample_rate) {
       for (auto& v : value) v.clear();
       stamp = begin;
       rate = sample_rate;
@@ -42,9 +42,9 @@ struct Stream {
   double end() const { return stamp + static_cast<double>(value[0].size()) / rate; }
 };
 
-class Gatherer {
+class CutCollector {
  public:
-  Gatherer(const BagCutsRequest& request, BagCuts& found) : request_(request), found_(found) {
+  CutCollector(const BagCutsRequest& request, BagCuts& found) : request_(request), found_(found) {
     if (!request.spindle_sensor.empty())
       spindle_.emplace(readSpindleSensor(request.spindle_sensor), request.length);
   }
@@ -81,7 +81,7 @@ class Gatherer {
     const bool six = SpindleForceSensor::isSixChannels(raw);
     if (six && !spindle_)
       throw Error(request_.path + ": " + request_.response +
-                  " is of the six sensors in the spindle: their calibration is due (--spindle-sensor)");
+                  ": six sensors in the spindle, expected a calibration (--spindle-sensor)");
     const SampleBlock block = six ? spindle_->handle(raw) : raw;
     if (!cutting()) return;
     std::array<std::vector<double>, 3> values;
@@ -124,7 +124,7 @@ class Gatherer {
     const double begin = std::max({*from_ + SETTLING, force_.stamp, response_.stamp, angles_.front().time});
     const double end = std::min({to_ - SETTLING, force_.end(), response_.end(), angles_.back().time});
     if (!(end > begin)) return;
-    CutStretch one;
+    CutSegment one;
     one.name = condition_->name;
     one.sample_rate = force_.rate;
     one.relative_force_std = request_.force_error;
@@ -157,7 +157,7 @@ class Gatherer {
   std::optional<double> from_;  // [s] steady since
   double to_ = 0.0, last_state_ = 0.0;
   bool to_closed_ = false;
-  std::deque<CountedAngle> angles_;
+  std::deque<UnwrappedAngle> angles_;
   Stream force_, response_;
 };
 
@@ -165,20 +165,20 @@ class Gatherer {
 
 BagCuts cutsOfBag(const BagCutsRequest& request, const std::function<void(double)>& progress) {
   BagCuts found;
-  Gatherer gatherer(request, found);
+  CutCollector collector(request, found);
   RecordingReader bag(request.path);
   for (const std::string& topic :
        {std::string(names::FORCE_COMPENSATED), std::string(names::SPINDLE_ANGLE), request.response}) {
-    if (!bag.has(topic)) throw Error(request.path + ": holds no " + topic);
+    if (!bag.has(topic)) throw Error(request.path + ": topic " + topic + " not found");
   }
-  feed<CuttingCondition>(bag, names::CUTTING_CONDITION, gatherer);
-  feed<CncState>(bag, names::CNC_STATE, gatherer);
-  feed<SpindleAngle>(bag, names::SPINDLE_ANGLE, gatherer);
-  feed<ForceBlock>(bag, names::FORCE_COMPENSATED, gatherer);
-  feed<SampleBlock>(bag, request.response, gatherer);
-  feed<MeasuredModes>(bag, names::TOOL_MODES, gatherer);
+  feed<CuttingCondition>(bag, names::CUTTING_CONDITION, collector);
+  feed<CncState>(bag, names::CNC_STATE, collector);
+  feed<SpindleAngle>(bag, names::SPINDLE_ANGLE, collector);
+  feed<ForceBlock>(bag, names::FORCE_COMPENSATED, collector);
+  feed<SampleBlock>(bag, request.response, collector);
+  feed<MeasuredModes>(bag, names::TOOL_MODES, collector);
   bag.run(progress);
-  gatherer.close();
+  collector.close();
   return found;
 }
 

@@ -13,7 +13,7 @@ namespace smartmill::kalman {
 /// /tf_static).
 class FrameTree {
  public:
-  /// One with a damaged name or without a unit quaternion is left out.
+  /// A transform with an empty name or without a unit quaternion is ignored.
   void add(const plain::TransformStamped& transform);
 
   /// Unit quaternion x, y, z, w: v_target = q v_source q*. Empty: no chain connects the frames.

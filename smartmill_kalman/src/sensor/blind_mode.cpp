@@ -16,12 +16,12 @@
 namespace smartmill::kalman {
 namespace {
 
-/// Lines of the Hann window's main lobe at each side of a harmonic, and some for a speed that is not exact.
+/// Lines on each side of a harmonic that are omitted: main lobe of the Hann window, and error of the speed.
 constexpr double SKIRT = 4.0;
-/// Powers of neighbouring lines of a Hann window are correlated, (2/3)^2 and (1/6)^2: so many lines count as
-/// one.
+/// Number of lines per independent line: powers of neighbours in a Hann window are correlated by (2/3)^2 and
+/// (1/6)^2.
 constexpr double CORRELATED = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0);
-constexpr std::size_t LEAST_LINES = 50;
+constexpr std::size_t MIN_LINES = 50;
 
 struct Fit {
   double f0 = 0.0, zeta = 0.0, share = 0.0, floor = 0.0;
@@ -71,7 +71,7 @@ Eigen::VectorXd unknownsOf(const Fit& fit, double unit) {
   return at;
 }
 
-/// The likelihood's maximum beside the best point of the grid.
+/// Maximum of the likelihood, from the best point of the grid.
 Fit refined(const BlindResiduals& residuals, const Fit& start, double low, double high) {
   const Eigen::VectorXd at = unknownsOf(start, residuals.unit());
   std::vector<fit::Parameter> unknowns(4);
@@ -91,7 +91,7 @@ Fit refined(const BlindResiduals& residuals, const Fit& start, double low, doubl
   best.zeta = std::exp(found.value[1]);
   best.share = residuals.unit() * found.value[2];
   best.floor = residuals.unit() * found.value[3];
-  // The residuals' squares say it but for a constant, which the start tells.
+  // The squares give the cost up to a constant, which follows from the start.
   Eigen::VectorXd before(residuals.count());
   residuals.evaluate(at, &before, nullptr);
   best.cost = start.cost + 0.5 * (found.squares - before.squaredNorm());
@@ -104,9 +104,9 @@ fit::Covariance covarianceOf(const PowerLines& lines, const Fit& best, double un
   const Eigen::VectorXd at = unknownsOf(best, unit);
   Eigen::MatrixXd slopes(static_cast<Eigen::Index>(lines.frequency.size()), 4);
   for (std::size_t k = 0; k < lines.frequency.size(); ++k) {
-    const DuePower due = duePower(lines.frequency[k], at, unit);
+    const ExpectedPower expected = expectedPower(lines.frequency[k], at, unit);
     for (Eigen::Index i = 0; i < 4; ++i)
-      slopes(static_cast<Eigen::Index>(k), i) = due.slope[i] / due.value / std::sqrt(CORRELATED);
+      slopes(static_cast<Eigen::Index>(k), i) = expected.slope[i] / expected.value / std::sqrt(CORRELATED);
   }
   return fit::covarianceOf(slopes);
 }
@@ -129,7 +129,8 @@ BlindMode findBlindMode(const std::vector<double>& samples, double sample_rate, 
     lines.frequency.push_back(frequency[k]);
     lines.power.push_back(std::norm(spectrum[k]));
   }
-  if (lines.power.size() < LEAST_LINES) throw Error("blind mode: too few lines between those of the spindle");
+  if (lines.power.size() < MIN_LINES)
+    throw Error("blind mode: too few lines between the harmonics of the spindle");
 
   Fit best;
   for (double f0 = low; f0 <= high; f0 *= 1.008) {

@@ -6,25 +6,25 @@
 
 namespace smartmill::kalman {
 
-/// Powers of lines on which nothing but noise through a resonance stands.
+/// Powers of lines that contain only noise through a resonance.
 struct PowerLines {
   std::vector<double> frequency, power;  // [Hz], [any]
   double mean() const;
 };
 
-/// Shape of a resonance's power, 1 at rest.
+/// Power gain of a resonance, 1 at 0 Hz.
 double resonance(double f, double f0, double zeta);
 
-/// Power that is due on a line with its derivatives by log f0, log zeta, share and floor (over `unit`).
-struct DuePower {
+/// Expected power of a line, with derivatives by log f0, log zeta, gain and floor (over `unit`).
+struct ExpectedPower {
   double value = 0.0;
   double slope[4] = {};
 };
-DuePower duePower(double f, const Eigen::VectorXd& at, double unit);
+ExpectedPower expectedPower(double f, const Eigen::VectorXd& at, double unit);
 
-/// Deviance residuals of an exponentially distributed spectrum over log f0, log zeta, share and floor (over
-/// the mean power): half the sum of their squares is minus the log-likelihood but for a constant, so that
-/// least squares find its maximum.
+/// Deviance residuals of an exponentially distributed spectrum over log f0, log zeta, gain and floor (over
+/// the mean power): half the sum of their squares is minus the log-likelihood up to a constant, so that least
+/// squares find its maximum.
 class BlindResiduals : public fit::Residuals {
  public:
   /// The lines must outlive this.

@@ -23,11 +23,11 @@ CalibrationResult PlateCalibrator::handle(const CalibrationGoal& goal) {
         std::all_of(goal.load.begin(), goal.load.end(), [](double v) { return std::isfinite(v); });
     if (!finite) {
       result.code = Code::bad_goal;
-      result.message = "point: a number is due along each axis";
+      result.message = "point: expected finite numbers";
       return result;
     }
     point_ = goal.load;
-    result.message = formatted("taps of kalman/measure_frf are at %.1f %.1f %.1f mm from now on",
+    result.message = formatted("taps of kalman/measure_frf are now at %.1f %.1f %.1f mm",
                                goal.load[0] / units::MM, goal.load[1] / units::MM, goal.load[2] / units::MM);
   } else if (goal.step == CalibrationGoal::Step::fit) {
     try {
@@ -68,22 +68,23 @@ void PlateCalibrator::handleHammer(const SampleBlock& block) {
   if (collector_) collector_->handleHammer(block);
 }
 
-void PlateCalibrator::tapping(const std::string& direction) {
+void PlateCalibrator::beginTaps(const std::string& direction) {
   if (!point_) return;
   direction_ = direction;
-  columns_.clear();  // told by the first block
+  columns_.clear();  // from the first block
   collector_.emplace(parameters_, 0);
 }
 
-void PlateCalibrator::tapped(const SensorResult& result) {
+void PlateCalibrator::endTaps(const SensorResult& result) {
   if (!collector_) return;
   const auto axis = std::string("xyz").find(direction_);
   if (result.code == FrfCode::ok && axis < 3) {
-    if (records_.rate != collector_->rate()) records_ = {{}, collector_->rate()};  // another device
-    for (std::vector<Hit>& hit : collector_->counted(result)) {
+    if (records_.rate != collector_->rate())
+      records_ = {{}, collector_->rate()};  // another sample rate: another device
+    for (std::vector<Hit>& hit : collector_->acceptedHits(result)) {
       MatrixTap tap;
       tap.point = *point_;
-      // The blow came from the side that the sensor shows.
+      // The sensor gives the direction of the hit.
       tap.direction[axis] = result.static_gain < 0.0 ? -1.0 : 1.0;
       tap.hammer = std::move(hit[0].force);
       for (Hit& channel : hit) tap.channels.push_back(std::move(channel.response));

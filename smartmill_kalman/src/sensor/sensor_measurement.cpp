@@ -6,19 +6,20 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
-#include "smartmill_core/modal/hit_judge.h"
+#include "smartmill_core/modal/hit_check.h"
 #include "smartmill_core/modal/impact_analysis.h"
 #include "smartmill_core/modal/modal_fit.h"
 #include "smartmill_core/signal/statistics.h"
+#include "smartmill_kalman/sensor/block_channels.h"
 
 namespace smartmill::kalman {
 namespace {
 
 /// Stamps are rounded to nanoseconds; equal times must compare equal however a stream is cut into blocks.
 constexpr double SAME_TIME = 1e-6;  // [s]
-/// Lines at the lower end that tell the static gain at least.
-constexpr std::size_t LEAST_STATIC_LINES = 4;
-/// Share of the time before the trigger that is free of the foot of the hit.
+/// Least number of lines for the static gain.
+constexpr std::size_t MIN_STATIC_LINES = 4;
+/// Share of the pre-trigger time before the rise of the hit.
 constexpr double QUIET_SHARE = 0.75;
 
 }  // namespace
@@ -41,7 +42,7 @@ void SensorMeasurement::reset() {
   hits_.clear();
   command_.reset();
   feedback_.reset();
-  done_.reset();
+  finished_.reset();
 }
 
 std::optional<StrikeCommand> SensorMeasurement::takeCommand() {
@@ -51,10 +52,10 @@ std::optional<TapFeedback> SensorMeasurement::takeFeedback() {
   return std::exchange(feedback_, std::nullopt);
 }
 std::optional<SensorResult> SensorMeasurement::takeResult() {
-  return std::exchange(done_, std::nullopt);
+  return std::exchange(finished_, std::nullopt);
 }
 
-void SensorMeasurement::say(const std::string& stage) {
+void SensorMeasurement::reportStage(const std::string& stage) {
   feedback_ = TapFeedback{stage, 0.95 * static_cast<double>(hits_.size()) / goal_.hits,
                           static_cast<int>(hits_.size())};
 }
@@ -69,27 +70,26 @@ bool SensorMeasurement::handle(const MeasureFrfGoal& goal) {
   if (goal.point != POINT_FORCE_SENSOR) {
     finish(FrfCode::bad_goal, "point '" + goal.point + "': this node measures " + POINT_FORCE_SENSOR);
   } else if (goal.direction != "x" && goal.direction != "y" && goal.direction != "z") {
-    finish(FrfCode::bad_goal, "direction '" + goal.direction + "': x, y or z is due");
+    finish(FrfCode::bad_goal, "direction '" + goal.direction + "': expected x, y or z");
   } else if (goal.hits < 1 || goal.hits > 1000) {
-    finish(FrfCode::bad_goal, "hits " + std::to_string(goal.hits) + ": 1..1000 are due");
+    finish(FrfCode::bad_goal, "hits " + std::to_string(goal.hits) + ": expected 1..1000");
   } else if (goal.modes < 0 || goal.modes > 20) {
-    finish(FrfCode::bad_goal, "modes " + std::to_string(goal.modes) + ": 0..20 are due");
+    finish(FrfCode::bad_goal, "modes " + std::to_string(goal.modes) + ": expected 0..20");
   } else {
-    // The samples before the first blow fill the record's quiet part.
+    // Samples before the first hit fill the pre-trigger part of the record.
     rest_until_ = goal.stamp + std::max(parameters_.rest_time, 2.0 * parameters_.pre_trigger);
-    say("waiting for the samples");
+    reportStage("waiting for samples");
   }
   return true;
 }
 
-void SensorMeasurement::take(const SampleBlock& block, const std::string& channel,
-                             std::deque<Sample>& queue) {
-  const std::size_t c = block.channel(channel);
-  if (block.units.at(c) != "N") throw Error("channel " + channel + " is in " + block.units[c] + ", N is due");
+void SensorMeasurement::addBlock(const SampleBlock& block, const std::string& channel,
+                                 std::deque<Sample>& queue) {
+  const std::size_t c = columnOf(block, channel, "N");
   for (std::size_t i = 0; i < block.size(); ++i) {
     queue.push_back({block.timeOf(i), block.first_index + i, block.sample_rate, block.at(i, c)});
   }
-  join();
+  pairSamples();
   for (const auto* waiting : {&hammer_, &sensor_}) {
     if (waiting->empty() || waiting->back().time - waiting->front().time <= parameters_.strike_timeout)
       continue;
@@ -100,79 +100,80 @@ void SensorMeasurement::take(const SampleBlock& block, const std::string& channe
 }
 
 void SensorMeasurement::handleHammer(const SampleBlock& block) {
-  if (active_) take(block, "hammer", hammer_);
+  if (active_) addBlock(block, "hammer", hammer_);
 }
 
 void SensorMeasurement::handleSensor(const SampleBlock& block) {
-  if (active_) take(block, "f" + goal_.direction, sensor_);
+  if (active_) addBlock(block, "f" + goal_.direction, sensor_);
 }
 
-// A sample that one stream lost leaves a gap in the index, which the collector sees.
-void SensorMeasurement::join() {
+// A sample lost by one stream is a gap in the index, which the collector detects.
+void SensorMeasurement::pairSamples() {
   while (!hammer_.empty() && !sensor_.empty()) {
     const Sample h = hammer_.front(), s = sensor_.front();
     if (h.index <= s.index) hammer_.pop_front();
     if (s.index <= h.index) sensor_.pop_front();
     if (h.index != s.index) continue;
     if (h.rate != s.rate) return finish(FrfCode::bad_data, "hammer and force sensor differ in sample rate");
-    sample(h.time, h.index, h.rate, h.value, s.value);
+    addSample(h.time, h.index, h.rate, h.value, s.value);
     if (!active_) return;
   }
 }
 
-void SensorMeasurement::sample(double time, std::uint64_t index, double rate, double force, double response) {
+void SensorMeasurement::addSample(double time, std::uint64_t index, double rate, double force,
+                                  double response) {
   if (time < goal_.stamp - SAME_TIME) return;
   auto record = collector_.add(time, index, rate, force, response);
-  if (record) return recorded(time, std::move(*record));
+  if (record) return handleRecord(time, std::move(*record));
   if (!waiting_for_hit_) {
-    if (time >= rest_until_ - SAME_TIME) strike(time);
+    if (time >= rest_until_ - SAME_TIME) requestHit(time);
   } else if (time > deadline_ && !collector_.recording()) {
     collector_.disarm();
-    badHit(time, formatted("no hit within %.1f s", parameters_.strike_timeout), false);
+    rejectHit(time, formatted("no hit within %.1f s", parameters_.strike_timeout), false);
   }
 }
 
-void SensorMeasurement::strike(double now) {
+void SensorMeasurement::requestHit(double now) {
   waiting_for_hit_ = true;
   deadline_ = now + parameters_.strike_timeout;
   collector_.arm();
   command_ = StrikeCommand{now, goal_.direction};
-  say("waiting for hit " + std::to_string(hits_.size() + 1) + " of " + std::to_string(goal_.hits));
+  reportStage("waiting for hit " + std::to_string(hits_.size() + 1) + " of " + std::to_string(goal_.hits));
 }
 
 void SensorMeasurement::hitByHand() {
-  if (active_) say("hit the workpiece by hand in " + goal_.direction);
+  if (active_) reportStage("hit the workpiece by hand in " + goal_.direction);
 }
 
-void SensorMeasurement::recorded(double now, HitCollector::Record record) {
+void SensorMeasurement::handleRecord(double now, HitCollector::Record record) {
   HitFault fault{record.fault, true};
   if (fault.text.empty()) {
     fault = hitFault(record.hit,
                      {parameters_.weak_force, parameters_.second_hit_share, parameters_.response_range, 0.0});
   }
-  if (!fault.text.empty()) return badHit(now, fault.text, fault.bad_data);
+  if (!fault.text.empty()) return rejectHit(now, fault.text, fault.bad_data);
   hits_.push_back(std::move(record.hit));
   if (static_cast<int>(hits_.size()) >= goal_.hits) return evaluate();
-  say("hit " + std::to_string(hits_.size()) + " of " + std::to_string(goal_.hits));
+  reportStage("hit " + std::to_string(hits_.size()) + " of " + std::to_string(goal_.hits));
   waiting_for_hit_ = false;
   rest_until_ = now + parameters_.rest_time;
 }
 
-void SensorMeasurement::badHit(double now, const std::string& why, bool bad_data) {
+void SensorMeasurement::rejectHit(double now, const std::string& why, bool bad_data) {
   if (++bad_hits_ > parameters_.max_bad_hits) {
     return finish(bad_data ? FrfCode::bad_data : FrfCode::no_hit,
-                  std::to_string(bad_hits_) + " useless hits, the last: " + why);
+                  std::to_string(bad_hits_) + " rejected hits, the last: " + why);
   }
-  say("hit thrown away: " + why);
+  reportStage("rejected hit: " + why);
   waiting_for_hit_ = false;
   rest_until_ = now + parameters_.rest_time;
 }
 
 // Mean of the real part over the lines below the fit's band, where the sensor has no dynamics yet.
-void SensorMeasurement::staticGain(const FrequencyResponse& frf) {
+void SensorMeasurement::estimateStaticGain(const FrequencyResponse& frf) {
   double weights = 0.0, sum = 0.0;
-  for (std::size_t k = 0;
-       k < frf.size() && (k < LEAST_STATIC_LINES || frf.frequency[k] <= parameters_.fit_low); ++k) {
+  for (std::size_t k = 0; k < frf.size() && (k < MIN_STATIC_LINES || frf.frequency[k] <= parameters_.fit_low);
+       ++k) {
     const double weight = std::isfinite(frf.std_dev[k]) ? 2.0 / std::norm(frf.std_dev[k]) : 0.0;
     weights += weight;
     sum += weight * frf.value[k].real();
@@ -200,14 +201,14 @@ void SensorMeasurement::evaluate() {
     options.unit = "1";
     ImpactAnalysis analysis(options);
     for (const Hit& hit : hits_) analysis.add(hit);
-    // The line at zero is the drift of the sensor.
+    // The line at 0 Hz is the drift of the sensor.
     FrequencyResponse frf = analysis.frf().band(1e-3, parameters_.frf_high);
-    staticGain(frf);
+    estimateStaticGain(frf);
     const double off = std::abs(std::abs(result_.static_gain) - 1.0);
     if (!(off <= parameters_.static_tolerance + 4.0 * result_.static_gain_std)) {
       return finish(
           FrfCode::bad_data,
-          formatted("static gain %.3f +- %.3f, 1 is due: check the hammer's and the sensor's sensitivity",
+          formatted("static gain %.3f +- %.3f, expected 1: check the sensitivities of hammer and sensor",
                     result_.static_gain, result_.static_gain_std));
     }
     for (std::size_t k = 0; k < frf.size(); ++k) {
@@ -240,7 +241,7 @@ void SensorMeasurement::commandFailed(const std::string& text) {
   if (active_) finish(FrfCode::no_hit, text);
 }
 
-void SensorMeasurement::lost(const std::string& text) {
+void SensorMeasurement::abort(const std::string& text) {
   if (active_) finish(FrfCode::bad_data, text);
 }
 
@@ -251,7 +252,7 @@ void SensorMeasurement::finish(FrfCode code, const std::string& message) {
   sensor_.clear();
   result_.code = code;
   result_.message = message;
-  done_ = std::move(result_);
+  finished_ = std::move(result_);
   result_ = SensorResult();
 }
 

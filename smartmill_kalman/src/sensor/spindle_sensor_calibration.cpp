@@ -21,8 +21,8 @@ namespace smartmill::kalman {
 namespace {
 
 constexpr const char* AXES = "xyz";
-constexpr double PROOF = 9.0;           // [1] of chi squared by which a beam's law must fit better
-constexpr double LENGTH_MARGIN = 2e-3;  // [m] that constants hold beyond the lengths of their readings
+constexpr double MIN_CHI2_GAIN = 9.0;   // [1] decrease of chi squared that proves a linear reciprocal
+constexpr double LENGTH_MARGIN = 2e-3;  // [m] validity of the constants beyond the measured lengths
 constexpr const char* FORMAT = "smartmill-spindle-sensor/1";
 
 ModalModel ideal() {
@@ -39,7 +39,7 @@ struct LeastSquares {
 
 LeastSquares solve(const Eigen::MatrixXd& a, const Eigen::VectorXd& b, const std::string& what) {
   const linear::LeastSquares fitted = linear::leastSquares(a, b);
-  if (fitted.rank < a.cols()) throw Error(what + ": the readings do not tell all constants apart");
+  if (fitted.rank < a.cols()) throw Error(what + ": the measurements do not determine all constants");
   LeastSquares found;
   found.x = fitted.x;
   const Eigen::Index free = a.rows() - a.cols();
@@ -51,32 +51,32 @@ LeastSquares solve(const Eigen::MatrixXd& a, const Eigen::VectorXd& b, const std
   return found;
 }
 
-LengthConstants constantsOf(const StaticReadings& readings, double length) {
+ConstantsAtLength constantsOf(const StaticMeasurements& measurements, double length) {
   std::map<int, Eigen::Index> tests;
   std::vector<std::size_t> rows;
-  for (std::size_t i = 0; i < readings.size(); ++i) {
-    if (readings.length[i] != length) continue;
-    tests.emplace(readings.test[i], static_cast<Eigen::Index>(tests.size()));
+  for (std::size_t i = 0; i < measurements.size(); ++i) {
+    if (measurements.length[i] != length) continue;
+    tests.emplace(measurements.test[i], static_cast<Eigen::Index>(tests.size()));
     rows.push_back(i);
   }
   const auto n = static_cast<Eigen::Index>(rows.size());
   const auto columns = 3 + 2 * static_cast<Eigen::Index>(tests.size());
-  const std::string what = readings.file + ": length " + std::to_string(length / units::MM) + " mm";
-  if (n <= columns) throw Error(what + ": too few readings");
+  const std::string what = measurements.file + ": length " + std::to_string(length / units::MM) + " mm";
+  if (n <= columns) throw Error(what + ": too few measurements");
   Eigen::MatrixXd a = Eigen::MatrixXd::Zero(n, columns), b(n, 3);
   for (Eigen::Index r = 0; r < n; ++r) {
     const std::size_t i = rows[static_cast<std::size_t>(r)];
-    const Eigen::Index test = 3 + 2 * tests.at(readings.test[i]);
-    for (Eigen::Index j = 0; j < 3; ++j) a(r, j) = readings.load[i][static_cast<std::size_t>(j)];
+    const Eigen::Index test = 3 + 2 * tests.at(measurements.test[i]);
+    for (Eigen::Index j = 0; j < 3; ++j) a(r, j) = measurements.load[i][static_cast<std::size_t>(j)];
     a(r, test) = 1.0;
-    a(r, test + 1) = readings.time[i] - readings.time[rows.front()];
-    const auto means = pairMeans(readings.sensors[i]);
+    a(r, test + 1) = measurements.time[i] - measurements.time[rows.front()];
+    const auto means = pairMeans(measurements.sensors[i]);
     for (Eigen::Index k = 0; k < 3; ++k) b(r, k) = means[static_cast<std::size_t>(k)];
   }
   for (Eigen::Index j = 0; j < 3; ++j) {
     if (a.col(j).isZero()) throw Error(what + ": no load along " + AXES[j]);
   }
-  LengthConstants found;
+  ConstantsAtLength found;
   found.length = length;
   double squares = 0.0;
   for (Eigen::Index k = 0; k < 3; ++k) {
@@ -92,14 +92,14 @@ LengthConstants constantsOf(const StaticReadings& readings, double length) {
   return found;
 }
 
-/// Weighted line over length of the constants, or of their reciprocals, and what it leaves.
-std::pair<LengthLine, double> fitLine(const std::vector<LengthConstants>& lengths, int row, int column,
-                                      bool reciprocal) {
+/// Weighted line over length of the constants, or of their reciprocals, and its chi squared.
+std::pair<LengthDependence, double> fitLine(const std::vector<ConstantsAtLength>& lengths, int row,
+                                            int column, bool reciprocal) {
   Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
   Eigen::Vector2d right = Eigen::Vector2d::Zero();
   double middle = 0.0, weights = 0.0;
   std::vector<std::array<double, 3>> points;  // length, value, weight
-  for (const LengthConstants& l : lengths) {
+  for (const ConstantsAtLength& l : lengths) {
     const double share = l.share[row][column], value = reciprocal ? share : 1.0 / share;
     const double moves = reciprocal ? 1.0 : value * value;
     const double std_dev = std::max(l.std_dev[row][column] * moves, 1e-12 * std::abs(value));
@@ -108,7 +108,7 @@ std::pair<LengthLine, double> fitLine(const std::vector<LengthConstants>& length
     weights += points.back()[2];
   }
   middle /= weights;
-  LengthLine line;
+  LengthDependence line;
   line.reciprocal = reciprocal;
   if (points.size() == 1) {
     line.offset = points[0][1];
@@ -133,24 +133,25 @@ std::pair<LengthLine, double> fitLine(const std::vector<LengthConstants>& length
   return {line, chi2};
 }
 
-/// Constant over length: a line, unless readings at three lengths or more prove that the reciprocal is one.
-LengthLine lineOf(const std::vector<LengthConstants>& lengths, int row, int column) {
+/// Constant over length: linear, unless measurements at three lengths or more prove a linear reciprocal.
+LengthDependence lengthDependenceOf(const std::vector<ConstantsAtLength>& lengths, int row, int column) {
   const auto [line, chi2] = fitLine(lengths, row, column, false);
   if (lengths.size() < 3) return line;
   const auto [beam, beam_chi2] = fitLine(lengths, row, column, true);
-  return chi2 - beam_chi2 > PROOF ? beam : line;
+  return chi2 - beam_chi2 > MIN_CHI2_GAIN ? beam : line;
 }
 
-/// Cross-talk that is there at every length.
-std::optional<LengthLine> crossOf(const std::vector<LengthConstants>& lengths, int row, int column) {
-  for (const LengthConstants& l : lengths) {
+/// Cross-talk that is significant at every length.
+std::optional<LengthDependence> crossTalkOf(const std::vector<ConstantsAtLength>& lengths, int row,
+                                            int column) {
+  for (const ConstantsAtLength& l : lengths) {
     if (!(std::abs(l.share[row][column]) > 2.0 * l.std_dev[row][column])) return {};
   }
-  return lineOf(lengths, row, column);
+  return lengthDependenceOf(lengths, row, column);
 }
 
-LengthLine readLine(const StrictYaml& yaml) {
-  LengthLine line;
+LengthDependence readLengthDependence(const StrictYaml& yaml) {
+  LengthDependence line;
   line.slope = yaml.number("slope_per_mm") / units::MM;
   line.offset = yaml.number("offset");
   if (yaml.has("line_of")) line.reciprocal = yaml.oneOf("line_of", {"constant", "share"}) == "share";
@@ -161,7 +162,7 @@ LengthLine readLine(const StrictYaml& yaml) {
   return line;
 }
 
-std::string text(const std::string& key, const LengthLine& line) {
+std::string text(const std::string& key, const LengthDependence& line) {
   std::string out =
       key + ": {slope_per_mm: " + yamlNumber(line.slope * units::MM) + ", offset: " + yamlNumber(line.offset);
   if (std::isfinite(line.slope_std)) out += ", slope_per_mm_std: " + yamlNumber(line.slope_std * units::MM);
@@ -169,7 +170,7 @@ std::string text(const std::string& key, const LengthLine& line) {
   return out + (line.reciprocal ? ", line_of: share}\n" : "}\n");
 }
 
-ModalModel readCourse(const StrictYaml& yaml) {
+ModalModel readDynamics(const StrictYaml& yaml) {
   ModalModel model = ideal();
   for (const StrictYaml& entry : yaml.maps("modes")) {
     Mode mode;
@@ -203,7 +204,7 @@ SpindleSensorCalibration::SpindleSensorCalibration()
 SpindleSensorCalibration SpindleSensorCalibration::table3() {
   SpindleSensorCalibration table;
   const auto line = [](double slope_per_mm, double offset) {
-    LengthLine l;
+    LengthDependence l;
     l.slope = slope_per_mm / units::MM;
     l.offset = offset;
     return l;
@@ -220,7 +221,7 @@ SpindleSensorCalibration SpindleSensorCalibration::table3() {
 }
 
 void SpindleSensorCalibration::validate() const {
-  const auto check = [](const std::string& key, const LengthLine& line) {
+  const auto check = [](const std::string& key, const LengthDependence& line) {
     require((key + ".slope").c_str(), line.slope, Range{});
     require((key + ".offset").c_str(), line.offset, Range{});
   };
@@ -232,12 +233,12 @@ void SpindleSensorCalibration::validate() const {
   if (xz) check("xz", *xz);
   for (const double p : preload) require("preload_n", p, Range::positive());
   require("least_compression_n", least_compression, Range::notNegative());
-  if (!(range_limit > 0.0)) throw Error("range_limit_n: above 0 N is due");  // may be infinite
+  if (!(range_limit > 0.0)) throw Error("range_limit_n: expected above 0 N");  // may be infinite
   require("low_pass_hz", low_pass, Range::notNegative());
   require("drift_std_n_per_s", drift_std, Range::positive());
 }
 
-void SpindleSensorCalibration::needLength(double length) const {
+void SpindleSensorCalibration::checkLength(double length) const {
   if (length >= lengths[0] && length <= lengths[1]) return;
   throw Error(formatted("%.1f mm of tool and holder is outside the calibrated %.1f .. %.1f mm",
                         length / units::MM, lengths[0] / units::MM, lengths[1] / units::MM));
@@ -269,15 +270,15 @@ SpindleSensorCalibration readSpindleSensor(const std::string& file) {
   const StrictYaml yaml = StrictYaml::fromFile(file);
   yaml.oneOf("format", {FORMAT});
   SpindleSensorCalibration c;
-  c.x = readLine(yaml.map("x"));
-  c.y = readLine(yaml.map("y"));
-  c.z = readLine(yaml.map("z"));
-  const auto cross = [&](const char* key, std::optional<LengthLine>& line, ModalModel& course) {
-    if (const auto map = yaml.optionalMap(key)) line = readLine(*map);
+  c.x = readLengthDependence(yaml.map("x"));
+  c.y = readLengthDependence(yaml.map("y"));
+  c.z = readLengthDependence(yaml.map("z"));
+  const auto cross = [&](const char* key, std::optional<LengthDependence>& line, ModalModel& dynamics) {
+    if (const auto map = yaml.optionalMap(key)) line = readLengthDependence(*map);
     const std::string dynamic = std::string("dynamic_") + key;
     if (const auto map = yaml.optionalMap(dynamic)) {
-      if (!line) yaml.fail(dynamic, "there is no static cross-talk " + std::string(key));
-      course = readCourse(*map);
+      if (!line) yaml.fail(dynamic, "expected a static cross-talk " + std::string(key));
+      dynamics = readDynamics(*map);
     }
   };
   cross("yx", c.yx, c.dynamic_yx);
@@ -324,7 +325,7 @@ void writeSpindleSensor(const SpindleSensorCalibration& c, const std::string& fi
   if (c.yz) out += text("yz", *c.yz) + text("dynamic_yz", c.dynamic_yz);
   if (c.xz) out += text("xz", *c.xz) + text("dynamic_xz", c.dynamic_xz);
   if (std::isfinite(c.lengths[1])) {
-    out += "# of tool and holder that they are known for\n" +
+    out += "# valid range, length of tool and holder\n" +
            list("length_mm", c.lengths.begin(), c.lengths.end(), [](double l) { return l / units::MM; }) +
            "\n";
   }
@@ -345,107 +346,109 @@ void writeSpindleSensor(const SpindleSensorCalibration& c, const std::string& fi
   std::ofstream stream(file);
   stream << out;
   stream.close();
-  if (!stream) throw Error(file + ": cannot be written");
+  if (!stream) throw Error(file + ": cannot write");
 }
 
-StaticReadings readStaticReadings(const std::string& file) {
+StaticMeasurements readStaticMeasurements(const std::string& file) {
   const auto columns = readColumns(file, {"test", "time[s]", "length[mm]", "load_x[N]", "load_y[N]",
                                           "load_z[N]", "x1[N]", "x2[N]", "y1[N]", "y2[N]", "z1[N]", "z2[N]"});
-  StaticReadings readings;
-  readings.file = file;
+  StaticMeasurements measurements;
+  measurements.file = file;
   for (std::size_t i = 0; i < columns[0].size(); ++i) {
-    readings.test.push_back(static_cast<int>(std::lround(columns[0][i])));
-    readings.time.push_back(columns[1][i]);
-    readings.length.push_back(columns[2][i] * units::MM);
-    readings.load.push_back({columns[3][i], columns[4][i], columns[5][i]});
-    readings.sensors.push_back(
+    measurements.test.push_back(static_cast<int>(std::lround(columns[0][i])));
+    measurements.time.push_back(columns[1][i]);
+    measurements.length.push_back(columns[2][i] * units::MM);
+    measurements.load.push_back({columns[3][i], columns[4][i], columns[5][i]});
+    measurements.sensors.push_back(
         {columns[6][i], columns[7][i], columns[8][i], columns[9][i], columns[10][i], columns[11][i]});
   }
-  return readings;
+  return measurements;
 }
 
-StaticCalibration calibrateStatic(const StaticReadings& readings, const SpindleSensorCalibration& base) {
-  const std::set<double> lengths(readings.length.begin(), readings.length.end());
-  if (lengths.empty()) throw Error(readings.file + ": there are none");
+StaticCalibration calibrateStatic(const StaticMeasurements& measurements,
+                                  const SpindleSensorCalibration& base) {
+  const std::set<double> lengths(measurements.length.begin(), measurements.length.end());
+  if (lengths.empty()) throw Error(measurements.file + ": no measurements");
   StaticCalibration result;
   result.calibration = base;
-  for (const double length : lengths) result.lengths.push_back(constantsOf(readings, length));
-  for (const LengthConstants& l : result.lengths) {
+  for (const double length : lengths) result.lengths.push_back(constantsOf(measurements, length));
+  for (const ConstantsAtLength& l : result.lengths) {
     for (int axis = 0; axis < 3; ++axis) {
       if (!(std::abs(l.share[axis][axis]) > 2.0 * l.std_dev[axis][axis])) {
-        throw Error(readings.file + ": length " + std::to_string(l.length / units::MM) + " mm: the pair " +
-                    AXES[axis] + " does not answer its load");
+        throw Error(measurements.file + ": length " + std::to_string(l.length / units::MM) + " mm: pair " +
+                    AXES[axis] + " does not respond to its load");
       }
     }
   }
   result.calibration.lengths = {*lengths.begin() - LENGTH_MARGIN, *lengths.rbegin() + LENGTH_MARGIN};
-  result.calibration.x = lineOf(result.lengths, 0, 0);
-  result.calibration.y = lineOf(result.lengths, 1, 1);
-  result.calibration.z = lineOf(result.lengths, 2, 2);
-  result.calibration.yx = crossOf(result.lengths, 0, 1);
-  result.calibration.yz = crossOf(result.lengths, 2, 1);
-  result.calibration.xz = crossOf(result.lengths, 2, 0);
+  result.calibration.x = lengthDependenceOf(result.lengths, 0, 0);
+  result.calibration.y = lengthDependenceOf(result.lengths, 1, 1);
+  result.calibration.z = lengthDependenceOf(result.lengths, 2, 2);
+  result.calibration.yx = crossTalkOf(result.lengths, 0, 1);
+  result.calibration.yz = crossTalkOf(result.lengths, 2, 1);
+  result.calibration.xz = crossTalkOf(result.lengths, 2, 0);
   return result;
 }
 
-void needLengths(const StaticReadings& readings, const SpindleSensorCalibration& calibration) {
+void checkLengths(const StaticMeasurements& measurements, const SpindleSensorCalibration& calibration) {
   try {
-    for (const double length : readings.length) calibration.needLength(length);
+    for (const double length : measurements.length) calibration.checkLength(length);
   } catch (const Error& error) {
-    throw Error(readings.file + ": " + error.what());
+    throw Error(measurements.file + ": " + error.what());
   }
 }
 
-std::array<double, 3> verifyStatic(const StaticReadings& readings,
+std::array<double, 3> verifyStatic(const StaticMeasurements& measurements,
                                    const SpindleSensorCalibration& calibration) {
-  needLengths(readings, calibration);
+  checkLengths(measurements, calibration);
   std::array<double, 3> worst{}, largest{};
-  const std::set<int> tests(readings.test.begin(), readings.test.end());
+  const std::set<int> tests(measurements.test.begin(), measurements.test.end());
   for (const int test : tests) {
     std::vector<std::size_t> rows, unloaded;
-    for (std::size_t i = 0; i < readings.size(); ++i) {
-      if (readings.test[i] != test) continue;
+    for (std::size_t i = 0; i < measurements.size(); ++i) {
+      if (measurements.test[i] != test) continue;
       rows.push_back(i);
-      const auto& l = readings.load[i];
+      const auto& l = measurements.load[i];
       if (l[0] == 0.0 && l[1] == 0.0 && l[2] == 0.0) unloaded.push_back(i);
     }
-    const std::string what = readings.file + ": test " + std::to_string(test);
-    if (unloaded.size() < 2) throw Error(what + ": two readings without load are due, they tell the drift");
+    const std::string what = measurements.file + ": test " + std::to_string(test);
+    if (unloaded.size() < 2)
+      throw Error(what + ": expected two or more measurements without load (zero and drift)");
     const auto n = static_cast<Eigen::Index>(unloaded.size());
     Eigen::MatrixXd a(n, 2), b(n, 3);
     for (Eigen::Index r = 0; r < n; ++r) {
       const std::size_t i = unloaded[static_cast<std::size_t>(r)];
-      a.row(r) << 1.0, readings.time[i] - readings.time[rows.front()];
-      const auto f = staticForce(calibration, readings.length[i], pairMeans(readings.sensors[i]));
+      a.row(r) << 1.0, measurements.time[i] - measurements.time[rows.front()];
+      const auto f = staticForce(calibration, measurements.length[i], pairMeans(measurements.sensors[i]));
       b.row(r) << f[0], f[1], f[2];
     }
     const Eigen::MatrixXd zero = linear::leastSquares(a, b).x;
     for (const std::size_t i : rows) {
-      const auto f = staticForce(calibration, readings.length[i], pairMeans(readings.sensors[i]));
+      const auto f = staticForce(calibration, measurements.length[i], pairMeans(measurements.sensors[i]));
       for (std::size_t axis = 0; axis < 3; ++axis) {
         const auto k = static_cast<Eigen::Index>(axis);
-        const double told =
-            f[axis] - zero(0, k) - zero(1, k) * (readings.time[i] - readings.time[rows.front()]);
-        worst[axis] = std::max(worst[axis], std::abs(told - readings.load[i][axis]));
-        largest[axis] = std::max(largest[axis], std::abs(readings.load[i][axis]));
+        const double estimated =
+            f[axis] - zero(0, k) - zero(1, k) * (measurements.time[i] - measurements.time[rows.front()]);
+        worst[axis] = std::max(worst[axis], std::abs(estimated - measurements.load[i][axis]));
+        largest[axis] = std::max(largest[axis], std::abs(measurements.load[i][axis]));
       }
     }
   }
   const double any = *std::max_element(largest.begin(), largest.end());
-  if (!(any > 0.0)) throw Error(readings.file + ": no reading has a load");
+  if (!(any > 0.0)) throw Error(measurements.file + ": no measurement has a load");
   for (std::size_t axis = 0; axis < 3; ++axis) worst[axis] /= largest[axis] > 0.0 ? largest[axis] : any;
   return worst;
 }
 
-ModalModel fitDynamicCrossTalk(const std::vector<std::vector<double>>& shown,
+ModalModel fitDynamicCrossTalk(const std::vector<std::vector<double>>& force,
                                const std::vector<std::vector<double>>& cross, double constant,
                                double sample_rate, double low, double high, int max_modes) {
-  if (shown.empty() || shown.size() != cross.size()) throw Error("dynamic cross-talk: no taps");
-  FrfEstimator estimator(sample_rate, shown.front().size());
-  for (std::size_t i = 0; i < shown.size(); ++i) {
+  if (force.empty() || force.size() != cross.size()) throw Error("dynamic cross-talk: no taps");
+  FrfEstimator estimator(sample_rate, force.front().size());
+  for (std::size_t i = 0; i < force.size(); ++i) {
     std::vector<double> response = cross[i];
     for (double& v : response) v *= constant;
-    estimator.add(shown[i], response);
+    estimator.add(force[i], response);
   }
   ModalFitOptions options;
   options.low = low;

@@ -15,15 +15,15 @@ namespace {
 using Code = CalibrationResult::Code;
 
 constexpr double SAME_TIME = 1e-6;  // [s] stamps are rounded to nanoseconds
-constexpr double DUE = 0.05;        // [1] Burzoni 3.2.1
+constexpr double MAX_ERROR = 0.05;  // [1] of verify, Burzoni 3.2.1
 
 }  // namespace
 
 SpindleSensorCalibrator::SpindleSensorCalibrator(const TapParameters& taps,
                                                  const SpindleSensorCalibration& base)
     : parameters_(taps), base_(base), collector_(taps, 3) {
-  readings_.file = "readings";
-  reference_.file = "reference readings";
+  measurements_.file = "measurements";
+  reference_.file = "reference measurements";
 }
 
 void SpindleSensorCalibrator::reset() {
@@ -38,7 +38,7 @@ void SpindleSensorCalibrator::finish(Code code, const std::string& message) {
   CalibrationResult result;
   result.code = code;
   result.message = message;
-  result.readings = readings_.size();
+  result.readings = measurements_.size();
   goal_.reset();
   result_ = result;
 }
@@ -55,13 +55,13 @@ bool SpindleSensorCalibrator::handle(const CalibrationGoal& goal) {
     verify();
   } else if (goal.step == CalibrationGoal::Step::forget) {
     reset();
-    finish(Code::ok, "readings and taps are forgotten");
+    finish(Code::ok, "measurements and taps were deleted");
   } else if (!(goal.length > 0.0)) {
-    finish(Code::bad_goal, formatted("length %g m: above 0 is due", goal.length));
+    finish(Code::bad_goal, formatted("length %g m: expected above 0", goal.length));
   } else if (!(goal.duration > 0.0 && goal.duration <= 60.0)) {
-    finish(Code::bad_goal, formatted("duration %g s: above 0, at most 60 s are due", goal.duration));
+    finish(Code::bad_goal, formatted("duration %g s: expected above 0, at most 60", goal.duration));
   } else if (!(std::isfinite(goal.load[0]) && std::isfinite(goal.load[1]) && std::isfinite(goal.load[2]))) {
-    finish(Code::bad_goal, "load: a number is due along each axis");
+    finish(Code::bad_goal, "load: expected finite numbers");
   } else {
     goal_ = goal;
     sum_ = {};
@@ -74,7 +74,7 @@ bool SpindleSensorCalibrator::handle(const CalibrationGoal& goal) {
 
 void SpindleSensorCalibrator::handle(const SampleBlock& block) {
   const std::array<std::size_t, 6> column = SpindleForceSensor::columnsOf(block);
-  if (goal_) read(block, column);
+  if (goal_) addSamples(block, column);
   if (direction_.empty()) return;
   for (std::size_t i = 0; i < block.size(); ++i) {
     std::array<double, 6> sensors{};
@@ -84,34 +84,33 @@ void SpindleSensorCalibrator::handle(const SampleBlock& block) {
   }
 }
 
-void SpindleSensorCalibrator::read(const SampleBlock& block, const std::array<std::size_t, 6>& column) {
-  const auto due = static_cast<std::size_t>(std::ceil(goal_->duration * block.sample_rate));
+void SpindleSensorCalibrator::addSamples(const SampleBlock& block, const std::array<std::size_t, 6>& column) {
+  const auto wanted_count = static_cast<std::size_t>(std::ceil(goal_->duration * block.sample_rate));
   for (std::size_t i = 0; i < block.size(); ++i) {
     const double time = block.timeOf(i);
     if (time < goal_->stamp - SAME_TIME) continue;
     if (next_index_ && *next_index_ != block.first_index + i)
-      return finish(Code::bad_data, "samples were lost during the reading");
+      return finish(Code::bad_data, "samples were lost during the measurement");
     next_index_ = block.first_index + i + 1;
     for (std::size_t k = 0; k < 6; ++k) sum_[k] += block.at(i, column[k]);
     time_sum_ += time;
-    if (++count_ < due) continue;
+    if (++count_ < wanted_count) continue;
     const double n = static_cast<double>(count_);
     std::array<double, 6> mean{};
     for (std::size_t k = 0; k < 6; ++k) mean[k] = sum_[k] / n;
     for (std::size_t k = 0; k < 6; ++k) {
       if (!std::isfinite(mean[k])) {
-        return finish(Code::bad_data,
-                      formatted("channel %s is not a number in the reading", SPINDLE_SENSOR_CHANNELS[k]));
+        return finish(Code::bad_data, formatted("channel %s: not finite", SPINDLE_SENSOR_CHANNELS[k]));
       }
     }
-    StaticReadings& to = goal_->reference ? reference_ : readings_;
+    StaticMeasurements& to = goal_->reference ? reference_ : measurements_;
     to.test.push_back(goal_->test);
     to.time.push_back(time_sum_ / n);
     to.length.push_back(goal_->length);
     to.load.push_back(goal_->load);
     to.sensors.push_back(mean);
     if (!(tap_length_ > 0.0)) tap_length_ = goal_->length;
-    return finish(Code::ok, formatted("reading %zu: %.2f %.2f %.2f %.2f %.2f %.2f N", to.size(), mean[0],
+    return finish(Code::ok, formatted("measurement %zu: %.2f %.2f %.2f %.2f %.2f %.2f N", to.size(), mean[0],
                                       mean[1], mean[2], mean[3], mean[4], mean[5]));
   }
 }
@@ -120,7 +119,7 @@ void SpindleSensorCalibrator::handleHammer(const SampleBlock& block) {
   collector_.handleHammer(block);
 }
 
-void SpindleSensorCalibrator::tapping(const std::string& direction, double length) {
+void SpindleSensorCalibrator::beginTaps(const std::string& direction, double length) {
   direction_ = direction;
   if (length > 0.0) tap_length_ = length;
   if (direction.empty()) {
@@ -130,59 +129,59 @@ void SpindleSensorCalibrator::tapping(const std::string& direction, double lengt
   }
 }
 
-void SpindleSensorCalibrator::tapped(const SensorResult& result) {
+void SpindleSensorCalibrator::endTaps(const SensorResult& result) {
   const std::size_t along = direction_ == "x" ? 0 : direction_ == "y" ? 1 : 2;
   if (!direction_.empty() && result.code == FrfCode::ok) {
     taps_[along].clear();
     tap_rate_ = collector_.rate();
-    for (const std::vector<Hit>& hit : collector_.counted(result))
+    for (const std::vector<Hit>& hit : collector_.acceptedHits(result))
       taps_[along].push_back({hit[0].response, hit[1].response, hit[2].response});
   }
-  tapping("");
+  beginTaps("");
 }
 
-/// Courses of the cross-talk where there are taps. @return what was found, for the message
-std::string SpindleSensorCalibrator::fitCourses(SpindleSensorCalibration& c) const {
+/// Dynamic cross-talk from the taps. @return its description, for the message
+std::string SpindleSensorCalibrator::fitDynamicCrossTalks(SpindleSensorCalibration& c) const {
   std::string text;
-  const auto course = [&](std::size_t along, std::size_t in, const std::optional<LengthLine>& line,
-                          ModalModel& model, const char* name) {
+  const auto fit_one = [&](std::size_t along, std::size_t in, const std::optional<LengthDependence>& line,
+                           ModalModel& model, const char* name) {
     const auto& taps = taps_[along];
     if (taps.empty() || !line) return;
     const double constant = along == 0 ? c.x.at(tap_length_) : c.y.at(tap_length_);
-    std::vector<std::vector<double>> shown, cross;
+    std::vector<std::vector<double>> force, cross;
     for (const auto& tap : taps) {
-      shown.push_back(tap[along]);
+      force.push_back(tap[along]);
       cross.push_back(tap[in]);
-      for (std::vector<double>* record : {&shown.back(), &cross.back()}) {
+      for (std::vector<double>* record : {&force.back(), &cross.back()}) {
         double zero = 0.0;
         const auto quiet = static_cast<std::size_t>(0.75 * parameters_.pre_trigger * tap_rate_);
         for (std::size_t i = 0; i < quiet; ++i) zero += record->at(i) / static_cast<double>(quiet);
         for (double& v : *record) v -= zero;
       }
-      for (double& v : shown.back()) v *= constant;
+      for (double& v : force.back()) v *= constant;
     }
     try {
-      model = fitDynamicCrossTalk(shown, cross, line->at(tap_length_), tap_rate_, parameters_.fit_low,
+      model = fitDynamicCrossTalk(force, cross, line->at(tap_length_), tap_rate_, parameters_.fit_low,
                                   parameters_.fit_high, parameters_.max_modes);
       text += formatted(", %s with %zu modes", name, model.modes.size());
     } catch (const Error&) {
-      text += std::string(", ") + name + " static alone";
+      text += std::string(", ") + name + " static only";
     }
   };
-  course(1, 0, c.yx, c.dynamic_yx, "yx");
-  course(1, 2, c.yz, c.dynamic_yz, "yz");
-  course(0, 2, c.xz, c.dynamic_xz, "xz");
+  fit_one(1, 0, c.yx, c.dynamic_yx, "yx");
+  fit_one(1, 2, c.yz, c.dynamic_yz, "yz");
+  fit_one(0, 2, c.xz, c.dynamic_xz, "xz");
   return text;
 }
 
-std::string SpindleSensorCalibrator::readingsTable() const {
+std::string SpindleSensorCalibrator::measurementTable() const {
   std::string out =
       "test,time[s],length[mm],load_x[N],load_y[N],load_z[N],x1[N],x2[N],y1[N],y2[N],z1[N],z2[N]\n";
-  for (std::size_t i = 0; i < readings_.size(); ++i) {
-    out += formatted("%d,%.9g,%.9g", readings_.test[i], readings_.time[i] - readings_.time[0],
-                     readings_.length[i] / units::MM);
-    for (const double load : readings_.load[i]) out += formatted(",%.9g", load);
-    for (const double sensor : readings_.sensors[i]) out += formatted(",%.9g", sensor);
+  for (std::size_t i = 0; i < measurements_.size(); ++i) {
+    out += formatted("%d,%.9g,%.9g", measurements_.test[i], measurements_.time[i] - measurements_.time[0],
+                     measurements_.length[i] / units::MM);
+    for (const double load : measurements_.load[i]) out += formatted(",%.9g", load);
+    for (const double sensor : measurements_.sensors[i]) out += formatted(",%.9g", sensor);
     out += "\n";
   }
   return out;
@@ -190,13 +189,13 @@ std::string SpindleSensorCalibrator::readingsTable() const {
 
 void SpindleSensorCalibrator::fit() {
   try {
-    StaticCalibration found = calibrateStatic(readings_, base_);
-    const std::string courses = fitCourses(found.calibration);
+    StaticCalibration found = calibrateStatic(measurements_, base_);
+    const std::string dynamics = fitDynamicCrossTalks(found.calibration);
     const SpindleSensorCalibration& c = found.calibration;
-    finish(Code::ok, formatted("%zu readings at %zu lengths: constants x %.3f, y %.3f, z %.3f at %.0f mm",
-                               readings_.size(), found.lengths.size(), c.x.at(tap_length_),
+    finish(Code::ok, formatted("%zu measurements at %zu lengths: constants x %.3f, y %.3f, z %.3f at %.0f mm",
+                               measurements_.size(), found.lengths.size(), c.x.at(tap_length_),
                                c.y.at(tap_length_), c.z.at(tap_length_), tap_length_ / units::MM) +
-                         courses);
+                         dynamics);
     result_->calibration = c;
     base_ = c;
   } catch (const Error& e) {
@@ -207,10 +206,10 @@ void SpindleSensorCalibrator::fit() {
 void SpindleSensorCalibrator::verify() {
   try {
     const auto error = verifyStatic(reference_, base_);
-    const bool good = *std::max_element(error.begin(), error.end()) <= DUE;
+    const bool good = *std::max_element(error.begin(), error.end()) <= MAX_ERROR;
     finish(good ? Code::ok : Code::fit_failed,
-           formatted("largest difference to the reference x %.2f, y %.2f, z %.2f %% (%.0f due)",
-                     100.0 * error[0], 100.0 * error[1], 100.0 * error[2], 100.0 * DUE));
+           formatted("largest difference from the reference x %.2f, y %.2f, z %.2f %% (limit %.0f)",
+                     100.0 * error[0], 100.0 * error[1], 100.0 * error[2], 100.0 * MAX_ERROR));
     result_->readings = reference_.size();
     result_->error = error;
   } catch (const Error& e) {

@@ -39,8 +39,7 @@ StateSpaceCheck checkStateSpace(const StateSpace& space, const std::string& form
   check.states = static_cast<int>(n);
   if (n == 0) return check;
   const MatrixXd a = time * space.a;
-  // However small the pivots: a matrix near to singular is what this number is for. A constant force is
-  // singular.
+  // Also for nearly singular matrices. With a constant force as a state, A is singular.
   const MatrixXd inverse = linear::inverse(a);
   check.condition = inverse.allFinite() ? infinityNorm(a) * infinityNorm(inverse) : HUGE_VAL;
   check.conditioned = 1.0 / check.condition > PRECISION;
@@ -157,7 +156,7 @@ Balanced balance(const StateSpace& space, int states) {
   Balanced balanced;
   balanced.hankel.assign(hankel.data(), hankel.data() + n);
   Index keep = states == 0 ? n : states;
-  while (keep > 1 && !(hankel(keep - 1) > 1e-12 * hankel(0))) --keep;  // what cannot be told at all
+  while (keep > 1 && !(hankel(keep - 1) > 1e-12 * hankel(0))) --keep;  // not observable or not controllable
   for (Index i = keep; i < n; ++i) balanced.bound += 2.0 * hankel(i);
   const Eigen::VectorXd scale = hankel.head(keep).cwiseSqrt().cwiseInverse();
   const MatrixXd t = p * svd.v.leftCols(keep) * scale.asDiagonal();

@@ -7,8 +7,8 @@
 namespace smartmill::kalman {
 namespace {
 
-constexpr double SAME_TIME = 1e-6;             // [s] stamps are rounded to nanoseconds
-constexpr std::size_t MOST_WAITING = 1000000;  // samples of one stream without the other's index
+constexpr double SAME_TIME = 1e-6;            // [s] stamps are rounded to nanoseconds
+constexpr std::size_t MAX_WAITING = 1000000;  // samples of one stream without the other's index
 
 }  // namespace
 
@@ -33,16 +33,16 @@ void TapCollector::handleHammer(const SampleBlock& block) {
   if (!active_) return;
   const std::size_t c = block.channel("hammer");
   for (std::size_t i = 0; i < block.size(); ++i) hammer_.push_back({block.first_index + i, block.at(i, c)});
-  join();
+  pairSamples();
 }
 
 void TapCollector::add(double time, std::uint64_t index, double rate, std::vector<double> values) {
   if (!active_) return;
   samples_.push_back({time, index, rate, std::move(values)});
-  join();
+  pairSamples();
 }
 
-void TapCollector::join() {
+void TapCollector::pairSamples() {
   while (!hammer_.empty() && !samples_.empty()) {
     const Force h = hammer_.front();
     const std::uint64_t index = samples_.front().index;
@@ -61,10 +61,10 @@ void TapCollector::join() {
     }
     if (hit.size() == collectors_.size()) hits_.push_back(std::move(hit));
   }
-  if (std::max(hammer_.size(), samples_.size()) > MOST_WAITING) end();
+  if (std::max(hammer_.size(), samples_.size()) > MAX_WAITING) end();
 }
 
-std::vector<std::vector<Hit>> TapCollector::counted(const SensorResult& result) const {
+std::vector<std::vector<Hit>> TapCollector::acceptedHits(const SensorResult& result) const {
   std::vector<std::vector<Hit>> good;
   for (const std::vector<Hit>& hit : hits_) {
     const double stamp = hit[0].stamp;

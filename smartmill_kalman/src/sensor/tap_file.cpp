@@ -69,10 +69,10 @@ void writeTapFile(const TapRecords& records, const std::string& path) {
       table << "\n";
     }
     table.close();
-    if (!table) throw Error((file.parent_path() / name).string() + ": cannot be written");
+    if (!table) throw Error((file.parent_path() / name).string() + ": cannot write");
   }
   out.close();
-  if (!out) throw Error(path + ": cannot be written");
+  if (!out) throw Error(path + ": cannot write");
 }
 
 }  // namespace smartmill::kalman

@@ -20,11 +20,11 @@ using Eigen::Index;
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 
-constexpr std::size_t SMOOTH = 8;   // lines to each side that share a residual variance
-constexpr double FULL_RANK = 1e-6;  // [1] smallest over largest singular value of the directions tapped
+constexpr std::size_t SMOOTHING_LINES = 8;  // lines on each side averaged for the residual variance
+constexpr double MIN_RANK_RATIO = 1e-6;  // [1] smallest over largest singular value of the directions tapped
 
-/// Force and moment of a unit blow (eq. 2.2, 2.6), moments over the lever.
-Eigen::VectorXd blow(const MatrixTap& tap, Index channels, double lever) {
+/// Force and moment of a unit hit (eq. 2.2, 2.6), moments over the lever.
+Eigen::VectorXd unitHit(const MatrixTap& tap, Index channels, double lever) {
   const Eigen::Vector3d n =
       Eigen::Vector3d(tap.direction[0], tap.direction[1], tap.direction[2]).normalized();
   const Eigen::Vector3d r(tap.point[0], tap.point[1], tap.point[2]);
@@ -48,22 +48,22 @@ void check(const std::vector<MatrixTap>& taps) {
   if (taps.empty()) throw Error("transfer matrix: no taps");
   const std::size_t channels = taps.front().channels.size(), samples = taps.front().hammer.size();
   if (channels != 3 && channels != 6) {
-    throw Error("transfer matrix: " + std::to_string(channels) + " channels, 3 or 6 are due");
+    throw Error("transfer matrix: " + std::to_string(channels) + " channels, expected 3 or 6");
   }
   if (taps.size() < channels) {
-    throw Error("transfer matrix: " + std::to_string(taps.size()) + " taps, " + std::to_string(channels) +
-                " at least are due");
+    throw Error("transfer matrix: " + std::to_string(taps.size()) + " taps, expected at least " +
+                std::to_string(channels));
   }
   for (std::size_t k = 0; k < taps.size(); ++k) {
     const std::string what = "transfer matrix: tap " + std::to_string(k + 1);
     const auto& d = taps[k].direction;
     if (!(d[0] * d[0] + d[1] * d[1] + d[2] * d[2] > 0.0)) throw Error(what + ": no direction");
-    if (taps[k].channels.size() != channels) throw Error(what + ": another number of channels");
+    if (taps[k].channels.size() != channels) throw Error(what + ": number of channels differs from tap 1");
     if (taps[k].hammer.size() != samples || samples < 64)
-      throw Error(what + ": another length, or too short");
+      throw Error(what + ": length differs from tap 1 or is below 64 samples");
     if (firstNotFinite(taps[k].hammer) != samples) throw Error(what + ": hammer: NaN");
     for (const auto& channel : taps[k].channels) {
-      if (channel.size() != samples) throw Error(what + ": another length");
+      if (channel.size() != samples) throw Error(what + ": length differs from tap 1");
       if (firstNotFinite(channel) != samples) throw Error(what + ": NaN");
     }
   }
@@ -116,32 +116,33 @@ Matrix scaledBy(const Eigen::VectorXd& scale, const Matrix& matrix) {
   return scale.asDiagonal() * matrix * scale.cwiseInverse().asDiagonal();
 }
 
-/// Forces and moments of every tap over its hammer's force, a column a tap. @throws Error when they leave a
-/// direction out.
-MatrixXd blowsOf(const std::vector<MatrixTap>& taps, Index channels, double lever) {
-  MatrixXd blows(channels, static_cast<Index>(taps.size()));
+/// Forces and moments of every tap over its hammer's force, a column each. @throws Error when they do not
+/// span all directions.
+MatrixXd unitHitsOf(const std::vector<MatrixTap>& taps, Index channels, double lever) {
+  MatrixXd unit_hits(channels, static_cast<Index>(taps.size()));
   for (std::size_t k = 0; k < taps.size(); ++k)
-    blows.col(static_cast<Index>(k)) = blow(taps[k], channels, lever);
-  const Eigen::VectorXd values = linear::singularValues(blows);
-  if (!(values(channels - 1) > FULL_RANK * values(0))) {
-    throw Error(channels == 6 ? "transfer matrix: the taps do not press along and turn about every axis"
-                              : "transfer matrix: the taps do not press along every axis");
+    unit_hits.col(static_cast<Index>(k)) = unitHit(taps[k], channels, lever);
+  const Eigen::VectorXd values = linear::singularValues(unit_hits);
+  if (!(values(channels - 1) > MIN_RANK_RATIO * values(0))) {
+    throw Error(channels == 6 ? "transfer matrix: the taps do not span forces and moments of all axes"
+                              : "transfer matrix: the taps do not span the forces of all axes");
   }
-  return blows;
+  return unit_hits;
 }
 
-/// What every tap shows on the lines, scaled.
+/// Spectra of all taps, scaled.
 struct TapSpectra {
   std::vector<std::vector<Complex>> hammer;                 // [tap][line]
   std::vector<std::vector<std::vector<Complex>>> measured;  // [tap][channel][line]
   MatrixXd noise;                                           // [N^2 samples] of a line; channel, tap
 
-  MatrixXcd applied(const MatrixXd& blows, std::size_t line) const {
-    MatrixXcd e(blows.rows(), blows.cols());
-    for (Index k = 0; k < e.cols(); ++k) e.col(k) = blows.col(k) * hammer[static_cast<std::size_t>(k)][line];
+  MatrixXcd applied(const MatrixXd& unit_hits, std::size_t line) const {
+    MatrixXcd e(unit_hits.rows(), unit_hits.cols());
+    for (Index k = 0; k < e.cols(); ++k)
+      e.col(k) = unit_hits.col(k) * hammer[static_cast<std::size_t>(k)][line];
     return e;
   }
-  MatrixXcd shown(std::size_t line) const {
+  MatrixXcd measuredAt(std::size_t line) const {
     MatrixXcd m(noise.rows(), noise.cols());
     for (Index k = 0; k < m.cols(); ++k) {
       for (Index c = 0; c < m.rows(); ++c)
@@ -187,8 +188,8 @@ TapSpectra spectraOf(const std::vector<MatrixTap>& taps, const Eigen::VectorXd& 
 /// One line's matrices, scaled.
 struct LineFit {
   MatrixXcd forward, inverse;
-  MatrixXcd covariance;  // of a row of forward, over the channel's variance: inverse of E E'
-  Eigen::VectorXd left;  // sum of squares that the hits leave over, a channel each
+  MatrixXcd covariance;              // of a row of forward, over the channel's variance: inverse of E E'
+  Eigen::VectorXd residual_squares;  // of the hits, each channel
 };
 
 LineFit fitLine(const MatrixXcd& e, const MatrixXcd& m) {
@@ -197,11 +198,11 @@ LineFit fitLine(const MatrixXcd& e, const MatrixXcd& m) {
   line.covariance = linear::inverseSymmetric(square);
   line.forward = m * e.adjoint() * line.covariance;
   line.inverse = e * pseudoInverse(m);
-  line.left = (m - line.forward * e).rowwise().squaredNorm();
+  line.residual_squares = (m - line.forward * e).rowwise().squaredNorm();
   return line;
 }
 
-/// Standard deviations of a line's two matrices. @param variance of what a channel shows there
+/// Standard deviations of a line's two matrices. @param variance of each channel on the line
 std::array<MatrixXd, 2> deviations(const LineFit& line, const Eigen::VectorXd& variance) {
   const Index channels = variance.size();
   MatrixXd forward(channels, channels), inverse(channels, channels);
@@ -218,16 +219,17 @@ std::array<MatrixXd, 2> deviations(const LineFit& line, const Eigen::VectorXd& v
   return {forward, inverse};
 }
 
-/// Variance of what every channel shows on a line: what the hits leave over there and on its neighbours,
-/// never below what stands before the hits.
+/// Variance of each channel on a line: residual variance of the hits on the line and its neighbours, at least
+/// that before the hits.
 Eigen::VectorXd varianceAt(const std::vector<LineFit>& lines, std::size_t at, const Eigen::VectorXd& before,
                            Index hits) {
   const Index free = hits - before.size();
   if (free <= 0) return before;
-  const std::size_t from = at < SMOOTH ? 0 : at - SMOOTH, to = std::min(lines.size(), at + SMOOTH + 1);
-  Eigen::VectorXd left = Eigen::VectorXd::Zero(before.size());
-  for (std::size_t l = from; l < to; ++l) left += lines[l].left;
-  return before.cwiseMax(left / static_cast<double>(to - from) / static_cast<double>(free));
+  const std::size_t from = at < SMOOTHING_LINES ? 0 : at - SMOOTHING_LINES,
+                    to = std::min(lines.size(), at + SMOOTHING_LINES + 1);
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(before.size());
+  for (std::size_t l = from; l < to; ++l) squares += lines[l].residual_squares;
+  return before.cwiseMax(squares / static_cast<double>(to - from) / static_cast<double>(free));
 }
 
 }  // namespace
@@ -246,13 +248,13 @@ TransferMatrix identifyTransferMatrix(const std::vector<MatrixTap>& taps, double
   }
   result.lever = std::max(1e-3, std::sqrt(distance / static_cast<double>(hits)));
   const Eigen::VectorXd scale = result.scale();
-  const MatrixXd blows = blowsOf(taps, channels, result.lever);
+  const MatrixXd unit_hits = unitHitsOf(taps, channels, result.lever);
   const TapSpectra spectra = spectraOf(taps, scale);
 
-  // First what each line leaves over, then its standard deviations.
+  // First the residuals of all lines, then the standard deviations.
   std::vector<LineFit> lines;
   for (std::size_t l = 0; l < result.frequency.size(); ++l)
-    lines.push_back(fitLine(spectra.applied(blows, l), spectra.shown(l)));
+    lines.push_back(fitLine(spectra.applied(unit_hits, l), spectra.measuredAt(l)));
   const Eigen::VectorXd before = spectra.noise.rowwise().mean();
   for (std::size_t l = 0; l < lines.size(); ++l) {
     const auto std_dev = deviations(lines[l], varianceAt(lines, l, before, hits));

@@ -15,7 +15,7 @@
 namespace smartmill::kalman {
 namespace {
 
-/// The reference cut and nine taps as a campaign whose sensor measures what its model says.
+/// The reference cut and nine taps as a campaign whose sensor agrees with its model.
 class Measures : public testing::TestWithParam<bool> {
  protected:
   void SetUp() override {
@@ -86,7 +86,7 @@ TEST_P(Measures, IdentifiedSensorGivesTheForceOnTheTool) {
   EXPECT_NEAR(sensor[0].modes[0].frequency, 1450.0, 3.0);
   EXPECT_NEAR(sensor[0].staticGain(), 1.0, 1e-9);
   Record cut = readRecord(campaign, campaign.tests[0]);
-  if (measuresWorkpiece(campaign, "")) turnForces(cut);
+  if (measuresWorkpiece(campaign, "")) negateForces(cut);
   const auto force = compensate(cut, sensor, false, reference.spindle_speed, reference.sample_rate, {});
   for (std::size_t axis = 0; axis < 2; ++axis)
     EXPECT_LT(
@@ -96,7 +96,7 @@ TEST_P(Measures, IdentifiedSensorGivesTheForceOnTheTool) {
 
 INSTANTIATE_TEST_SUITE_P(Sensor, Measures, testing::Bool());
 
-// Taps in WAV files, the hammer among their channels, tell the same sensor.
+// Taps in WAV files, the hammer among their channels, give the same sensor.
 TEST(SoundFiles, TapsTellTheSameSensor) {
   SMARTMILL_SHARED_DATA(folder, "campaigns/none");
   const Campaign campaign = readCampaign(folder);
@@ -104,12 +104,12 @@ TEST(SoundFiles, TapsTellTheSameSensor) {
   const Campaign sound =
       asSoundFiles(campaign, wav.file(""), [](const CampaignTest& t) { return t.kind == TestKind::tap; });
   const SensorFitParameters fit;
-  const auto due = identifySensor(campaign, fit), found = identifySensor(sound, fit);
+  const auto expected = identifySensor(campaign, fit), found = identifySensor(sound, fit);
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    ASSERT_EQ(found[axis].modes.size(), due[axis].modes.size());
-    for (std::size_t m = 0; m < due[axis].modes.size(); ++m) {
-      EXPECT_NEAR(found[axis].modes[m].frequency, due[axis].modes[m].frequency, 0.1);
-      EXPECT_NEAR(found[axis].modes[m].gain, due[axis].modes[m].gain, 1e-3);
+    ASSERT_EQ(found[axis].modes.size(), expected[axis].modes.size());
+    for (std::size_t m = 0; m < expected[axis].modes.size(); ++m) {
+      EXPECT_NEAR(found[axis].modes[m].frequency, expected[axis].modes[m].frequency, 0.1);
+      EXPECT_NEAR(found[axis].modes[m].gain, expected[axis].modes[m].gain, 1e-3);
     }
   }
 }

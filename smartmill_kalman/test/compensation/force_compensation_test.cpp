@@ -1,4 +1,4 @@
-#include "smartmill_kalman/compensation/sorted_compensation.h"
+#include "smartmill_kalman/compensation/compensation_pipeline.h"
 
 #include <algorithm>
 #include <cmath>
@@ -79,24 +79,19 @@ struct Collected {
 class Runner {
  public:
   explicit Runner(bool workpiece = false)
-      : sorted({}, {}, forceSensor(workpiece), 0.05,
-               {[this](const ForceBlock& m, const ForceBlock& c) {
-                  result.measured.push_back(m);
-                  result.compensated.push_back(c);
-                },
-                {},
-                {},
-                {}}) {}
+      : pipeline({}, {}, forceSensor(workpiece), 0.05,
+                 {{[this](const ForceBlock& block) { result.measured.push_back(block); },
+                   [this](const ForceBlock& block) { result.compensated.push_back(block); }}}) {}
   void feed(const Session& s) {
-    sorted.push(s.condition);
+    pipeline.push(s.condition);
     for (std::size_t b = 0; b < s.blocks.size(); ++b) {
-      sorted.push(s.angles[b]);
-      sorted.push(s.blocks[b]);
+      pipeline.push(s.angles[b]);
+      pipeline.push(s.blocks[b]);
     }
-    sorted.flush();
+    pipeline.flush();
   }
   Collected result;
-  SortedCompensation sorted;
+  CompensationPipeline pipeline;
 };
 
 TEST(ForceCompensation, keepsTheSampleIndexAndFindsTheForce) {
@@ -126,15 +121,15 @@ TEST(ForceCompensation, doesNotDependOnTheOrderOfArrival) {
   Runner straight;
   straight.feed(s);
   Runner mixed;
-  mixed.sorted.push(s.angles[0]);
-  mixed.sorted.push(s.condition);
+  mixed.pipeline.push(s.angles[0]);
+  mixed.pipeline.push(s.condition);
   for (std::size_t b = 0; b < s.blocks.size(); b += 4) {  // angles three blocks late
-    for (std::size_t i = b; i < b + 4; ++i) mixed.sorted.push(s.blocks[i]);
+    for (std::size_t i = b; i < b + 4; ++i) mixed.pipeline.push(s.blocks[i]);
     for (std::size_t i = b; i < b + 4; ++i) {
-      if (i > 0) mixed.sorted.push(s.angles[i]);
+      if (i > 0) mixed.pipeline.push(s.angles[i]);
     }
   }
-  mixed.sorted.flush();
+  mixed.pipeline.flush();
   ASSERT_EQ(mixed.result.compensated.size(), straight.result.compensated.size());
   for (std::size_t b = 0; b < s.blocks.size(); ++b) {
     EXPECT_EQ(mixed.result.compensated[b].force, straight.result.compensated[b].force) << "block " << b;
@@ -148,7 +143,7 @@ TEST(ForceCompensation, restartsAtAGapAndMarksIt) {
   gapped.blocks.erase(gapped.blocks.begin() + 50);
   gapped.angles.erase(gapped.angles.begin() + 50);
   runner.feed(gapped);
-  EXPECT_EQ(runner.sorted.health().gaps, 1u);
+  EXPECT_EQ(runner.pipeline.health().gaps, 1u);
   EXPECT_EQ(runner.result.compensated[49].status, ForceBlock::Status::compensated);
   EXPECT_EQ(runner.result.compensated[50].status, ForceBlock::Status::settling);
 }
@@ -158,9 +153,9 @@ TEST(ForceCompensation, followsASlowChangeOfSpeedWithoutAJump) {
   const ModalModel model = dynamometer();
   ModalFilter dynamometer(model, 4.0 * RATE, Hold::first_order);
   std::vector<double> truth, found;
-  ForceCompensation compensation({}, false, [&](const ForceBlock&, const ForceBlock& c) {
-    found.insert(found.end(), c.force[0].begin(), c.force[0].end());
-  });
+  ForceCompensation compensation(
+      {}, false,
+      {{}, [&](const ForceBlock& c) { found.insert(found.end(), c.force[0].begin(), c.force[0].end()); }});
   for (std::size_t axis = 0; axis < 3; ++axis) compensation.setSensor(axis, model);
   double angle = 0.0;
   for (std::size_t b = 0; b < 200; ++b) {
@@ -186,21 +181,21 @@ TEST(ForceCompensation, followsASlowChangeOfSpeedWithoutAJump) {
   EXPECT_LT(worst, 2.0);
 }
 
-TEST(ForceCompensation, tellsTheZeroOfTheSensorAndTheColourOfTheInnovations) {
-  ForceCompensation compensation({}, false, [](const ForceBlock&, const ForceBlock&) {});
+TEST(ForceCompensation, estimatesTheZeroOfTheSensorAndTheCorrelationOfTheInnovations) {
+  ForceCompensation compensation({}, false, {});
   for (std::size_t axis = 0; axis < 3; ++axis) compensation.setSensor(axis, dynamometer());
   std::mt19937 random(4);
   std::normal_distribution<double> noise;
   CuttingCondition air;
   air.kind = CuttingCondition::Kind::air;
   compensation.handle(air);
-  const auto feed = [&](std::size_t from, double colour) {
+  const auto feed = [&](std::size_t from, double correlation) {
     double last = 0.0;
     for (std::size_t b = from; b < from + 1000; ++b) {
       SampleBlock block = blockAt(0.0, b);
       compensation.handle(SpindleAngle{block.stamp, 0.0, 1200.0});
       for (std::size_t i = 0; i < 256; ++i) {
-        last = colour * last + std::sqrt(1.0 - colour * colour) * noise(random);
+        last = correlation * last + std::sqrt(1.0 - correlation * correlation) * noise(random);
         block.samples.insert(block.samples.end(), {5.0 + last, -2.0 + noise(random), noise(random)});
       }
       compensation.handle(block);
@@ -210,10 +205,11 @@ TEST(ForceCompensation, tellsTheZeroOfTheSensorAndTheColourOfTheInnovations) {
   // Mean over 2 s of 1 N noise: 5 mN; the zero comes in with that time constant, 10 s of it.
   EXPECT_NEAR(compensation.health().zero[0], 5.0, 0.05);
   EXPECT_NEAR(compensation.health().zero[1], -2.0, 0.05);
-  EXPECT_LT(compensation.health().colour, 0.3);  // 1 / sqrt(256) a block, and what the filter takes out
+  EXPECT_LT(compensation.health().innovation_correlation,
+            0.3);  // 1 / sqrt(256) a block, and what the filter takes out
   EXPECT_NEAR(compensation.health().innovation_ratio, 1.0, 0.2);
   feed(1000, 0.9);
-  EXPECT_GT(compensation.health().colour, 0.5);
+  EXPECT_GT(compensation.health().innovation_correlation, 0.5);
 }
 
 TEST(ForceCompensation, bridgesSamplesThatAreNotNumbers) {
@@ -221,7 +217,7 @@ TEST(ForceCompensation, bridgesSamplesThatAreNotNumbers) {
   for (std::size_t i = 0; i < 5; ++i) s.blocks[50].samples[3 * (100 + i)] = NAN;
   Runner runner;
   runner.feed(s);
-  EXPECT_EQ(runner.sorted.health().not_finite, 5u);
+  EXPECT_EQ(runner.pipeline.health().not_finite, 5u);
   for (const ForceBlock& block : runner.result.compensated) {
     for (const double force : block.force[0]) ASSERT_TRUE(std::isfinite(force));
   }
@@ -244,13 +240,61 @@ TEST(ForceCompensation, passesThroughAtRestAndTurnsTheReaction) {
 }
 
 TEST(ForceCompensation, refusesBlocksWithoutForces) {
-  ForceCompensation compensation({}, false, [](const ForceBlock&, const ForceBlock&) {});
+  ForceCompensation compensation({}, false, {});
   SampleBlock block;
   block.channels = {"hammer"};
   block.units = {"N"};
   block.sample_rate = RATE;
   block.samples = {1.0};
   EXPECT_THROW(compensation.handle(block), Error);
+}
+
+// The block is refused when it arrives, not when an angle releases it from the sorter.
+TEST(CompensationPipeline, RefusesABadBlockAtItsOwnPush) {
+  Session s = session(20);
+  s.blocks[10].units[1] = "V";
+  Runner runner;
+  runner.pipeline.push(s.condition);
+  for (std::size_t b = 0; b < 20; ++b) {
+    if (b == 10) {
+      EXPECT_THROW(runner.pipeline.push(s.blocks[b]), Error);
+    } else {
+      EXPECT_NO_THROW(runner.pipeline.push(s.blocks[b]));
+    }
+    EXPECT_NO_THROW(runner.pipeline.push(s.angles[b]));
+  }
+  runner.pipeline.flush();
+  EXPECT_EQ(runner.result.compensated.size(), 19u);
+  EXPECT_EQ(runner.pipeline.health().gaps, 1u);
+}
+
+// The delay form needs 18 samples a revolution; 90,000 rpm give 17.07 at 25.6 kHz. The input that releases
+// the block is not blamed.
+TEST(CompensationPipeline, ReportsABlockThatCannotBeCompensated) {
+  Session s = session(10);
+  for (SpindleAngle& angle : s.angles) angle.speed = units::radPerSecFromRpm(90000.0);
+  CompensationParameters parameters;
+  parameters.delay_form = true;
+  std::vector<std::string> errors;
+  CompensationPipeline::Outputs outputs;
+  outputs.block_error = [&](const std::string& reason) { errors.push_back(reason); };
+  CompensationPipeline pipeline(parameters, {}, forceSensor(false), 0.05, outputs);
+  CompensationPipeline strict(parameters, {}, forceSensor(false), 0.0, {});
+  bool thrown = false;
+  for (std::size_t b = 0; b < 10; ++b) {
+    pipeline.push(s.blocks[b]);
+    EXPECT_NO_THROW(pipeline.push(s.angles[b]));
+    strict.push(s.blocks[b]);
+    try {
+      strict.push(s.angles[b]);
+    } catch (const Error&) {
+      thrown = true;
+    }
+  }
+  pipeline.flush();
+  EXPECT_EQ(errors.size(), 10u);
+  EXPECT_NE(errors.at(0).find("period"), std::string::npos) << errors[0];
+  EXPECT_TRUE(thrown);
 }
 
 }  // namespace

@@ -114,13 +114,17 @@ TEST(ForceCompensation, CoupledIsTheCoupledFilter) {
   CoupledFilter whole(sensor(), speed, RATE, parameters.filter);
   std::vector<std::array<double, 3>> expected;
   std::vector<double> worst;
-  ForceCompensation online(parameters, false, [&](const ForceBlock& measured, const ForceBlock& compensated) {
+  ForceBlock measured;
+  ForceOutputs outputs;
+  outputs.measured = [&](const ForceBlock& block) { measured = block; };
+  outputs.compensated = [&](const ForceBlock& compensated) {
     for (std::size_t i = 0; i < measured.force[0].size(); ++i) {
       const auto force = whole.step({measured.force[0][i], measured.force[1][i], measured.force[2][i]});
       for (std::size_t axis = 0; axis < 3; ++axis)
         worst.push_back(std::abs(force[axis] - compensated.force[axis][i]));
     }
-  });
+  };
+  ForceCompensation online(parameters, false, outputs);
   online.setMatrix(sensor());
   online.handle(SpindleAngle{0.0, 0.0, speed});
   std::mt19937 random(9);

@@ -57,7 +57,7 @@ ModalModel sensor(double frequency) {
 }
 
 TEST(StationaryCovariance, solvesTheScalarEquation) {
-  // Random walk seen with noise: p^2 = q (p + r), so p = (q + sqrt(q^2 + 4 q r)) / 2.
+  // Random walk with measurement noise: p^2 = q (p + r), so p = (q + sqrt(q^2 + 4 q r)) / 2.
   const double q = 0.3, r = 2.0;
   const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(1, 1);
   const Eigen::MatrixXd p = stationaryCovariance(one, q * one, one.row(0), r);
@@ -199,13 +199,13 @@ TEST(HarmonicFilter, stateGoesToAndFroAndALayoutChangesWithoutAJump) {
   const std::vector<double> again = other.state();
   for (std::size_t i = 0; i < state.size(); ++i) EXPECT_NEAR(again[i], state[i], 1e-9);
   // The force right after a change of speed, of the gains or of both is what it was to be.
-  const double expected = HarmonicFilter(filter).coast();
+  const double expected = HarmonicFilter(filter).predict();
   HarmonicFilter retuned = filter;
   retuned.retune(sensor(930.0), 1.01 * speed);
-  EXPECT_NEAR(retuned.coast(), expected, 1e-9);
+  EXPECT_NEAR(retuned.predict(), expected, 1e-9);
   HarmonicFilter next(sensor(930.0), 1.005 * speed, RATE, {});
-  next.adopt(filter);
-  EXPECT_NEAR(next.coast(), expected, 1e-9);
+  next.continueFrom(filter);
+  EXPECT_NEAR(next.predict(), expected, 1e-9);
 }
 
 // The uncoupled coordinates are the coupled ones in other clothes: against the plain matrix recursion.
@@ -259,8 +259,9 @@ TEST(HarmonicFilter, coastsThroughAGap) {
   double worst = 0.0;
   for (int i = 0; i < 256000; ++i) {
     const double phase = speed * i / RATE;
-    const double estimate =
-        i > 250000 && i < 250100 ? filter.coast() : filter.step((response * std::polar(100.0, phase)).real());
+    const double estimate = i > 250000 && i < 250100
+                                ? filter.predict()
+                                : filter.step((response * std::polar(100.0, phase)).real());
     if (i > 245000) worst = std::max(worst, std::abs(estimate - 100.0 * std::cos(phase)));
   }
   EXPECT_LT(worst, 1e-6);

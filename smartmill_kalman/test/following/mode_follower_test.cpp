@@ -41,18 +41,18 @@ ModeFollower::Harmonics harmonics(const ModalModel& sensor, double speed, int co
 
 TEST(ModeFollower, FindsModesThatHaveMoved) {
   const double speed = units::radPerSecFromRpm(9000.0);
-  const ModalModel believed = ReferenceCase::exactSensor();
-  ModalModel is = believed;
+  const ModalModel model_sensor = ReferenceCase::exactSensor();
+  ModalModel is = model_sensor;
   is.modes[0].frequency *= 1.02;
   is.modes[1].frequency *= 0.99;
   is.modes[2].damping_ratio *= 1.2;
   ModeFollower follower(TOOL, SLOT, 33, {});
-  const auto move = follower.look(harmonics(is, speed, 33), 0.05, {believed, believed}, speed);
-  ASSERT_TRUE(move.has_value());
-  EXPECT_LT(move->after, 0.01 * move->before);
-  for (const ModalModel& axis : move->sensor) {
+  const auto update = follower.update(harmonics(is, speed, 33), 0.05, {model_sensor, model_sensor}, speed);
+  ASSERT_TRUE(update.has_value());
+  EXPECT_LT(update->after, 0.01 * update->before);
+  for (const ModalModel& axis : update->sensor) {
     for (std::size_t k = 0; k < 3; ++k) {
-      // Priors of 2 % and 10 % pull a little where the harmonics say little.
+      // Priors of 2 % and 10 % bias the result where the harmonics contain little information.
       EXPECT_NEAR(axis.modes[k].frequency, is.modes[k].frequency, 0.002 * is.modes[k].frequency) << k;
       EXPECT_NEAR(axis.modes[k].damping_ratio, is.modes[k].damping_ratio, 0.15 * is.modes[k].damping_ratio)
           << k;
@@ -67,25 +67,25 @@ ModalModel withOneMore() {
   return sensor;
 }
 
-// A mode that the taps have not shown: the force through the sensor that is found is the applied one.
+// A mode that is missing in the taps: the force through the identified sensor is the applied one.
 TEST(ModeFollower, FindsAModeThatNoTapHasShown) {
-  const ModalModel believed = ReferenceCase::exactSensor(), is = withOneMore();
+  const ModalModel model_sensor = ReferenceCase::exactSensor(), is = withOneMore();
   for (const double rpm : {15000.0, 21750.0}) {
     const double speed = units::radPerSecFromRpm(rpm);
     const int count = static_cast<int>(5000.0 * units::TWO_PI / speed);
     ModeFollower follower(TOOL, SLOT, count, {});
-    const auto seen = harmonics(is, speed, count);
-    const auto move = follower.look(seen, 0.03, {believed, believed}, speed);
-    ASSERT_TRUE(move.has_value()) << rpm;
+    const auto measured_harmonics = harmonics(is, speed, count);
+    const auto update = follower.update(measured_harmonics, 0.03, {model_sensor, model_sensor}, speed);
+    ASSERT_TRUE(update.has_value()) << rpm;
     for (std::size_t axis = 0; axis < 2; ++axis) {
-      ASSERT_EQ(move->sensor[axis].modes.size(), 4u) << rpm;
-      EXPECT_NEAR(move->sensor[axis].modes[3].frequency, 3000.0, 60.0) << rpm;
-      EXPECT_NEAR(move->sensor[axis].staticGain(), 1.0, 1e-12);
+      ASSERT_EQ(update->sensor[axis].modes.size(), 4u) << rpm;
+      EXPECT_NEAR(update->sensor[axis].modes[3].frequency, 3000.0, 60.0) << rpm;
+      EXPECT_NEAR(update->sensor[axis].staticGain(), 1.0, 1e-12);
       double error = 0.0, norm = 0.0;
       for (int n = 1; n <= count; ++n) {
-        const auto y = seen[axis][static_cast<std::size_t>(n)];
+        const auto y = measured_harmonics[axis][static_cast<std::size_t>(n)];
         const double f = n * speed / units::TWO_PI;
-        error += std::norm(y / move->sensor[axis].response(f) - y / is.response(f));
+        error += std::norm(y / update->sensor[axis].response(f) - y / is.response(f));
         norm += std::norm(y / is.response(f));
       }
       EXPECT_LT(std::sqrt(error / norm), 0.015) << rpm;
@@ -103,36 +103,38 @@ TEST(ModeFollower, AbstainsWhereTheForceModelIsWrong) {
   const Engagement narrower{0.0, 0.9 * units::PI, 2e-3, 6e-5};
   for (ModeFollower follower : {ModeFollower(steeper, SLOT, 33, {}), ModeFollower(TOOL, deeper, 33, {}),
                                 ModeFollower(TOOL, narrower, 33, {})}) {
-    const auto move = follower.look(harmonics(sensor, speed, 33), 0.05, {sensor, sensor}, speed);
-    if (!move) continue;
-    EXPECT_EQ(move->sensor[0].modes.size(), 3u);
-    EXPECT_EQ(move->sensor[1].modes.size(), 3u);
+    const auto update = follower.update(harmonics(sensor, speed, 33), 0.05, {sensor, sensor}, speed);
+    if (!update) continue;
+    EXPECT_EQ(update->sensor[0].modes.size(), 3u);
+    EXPECT_EQ(update->sensor[1].modes.size(), 3u);
   }
 }
 
 TEST(ModeFollower, LeavesWhatFitsAlone) {
   const double speed = units::radPerSecFromRpm(9000.0);
-  const ModalModel believed = ReferenceCase::exactSensor();
+  const ModalModel model_sensor = ReferenceCase::exactSensor();
   ModeFollower follower(TOOL, SLOT, 33, {});
   for (int look = 0; look < 3; ++look)
     EXPECT_FALSE(
-        follower.look(harmonics(believed, speed, 33), 0.05, {believed, believed}, speed).has_value());
+        follower.update(harmonics(model_sensor, speed, 33), 0.05, {model_sensor, model_sensor}, speed)
+            .has_value());
 }
 
 TEST(ModeFollower, GoesBackToTheTaps) {
   const double speed = units::radPerSecFromRpm(9000.0);
-  const ModalModel believed = ReferenceCase::exactSensor();
-  ModalModel strayed = believed;
+  const ModalModel model_sensor = ReferenceCase::exactSensor();
+  ModalModel strayed = model_sensor;
   strayed.modes[0].frequency *= 1.03;
   ModeFollower follower(TOOL, SLOT, 33, {});
-  ASSERT_FALSE(follower.look(harmonics(believed, speed, 33), 0.05, {believed, believed}, speed).has_value());
-  const auto move = follower.look(harmonics(believed, speed, 33), 0.05, {strayed, strayed}, speed);
-  ASSERT_TRUE(move.has_value());
-  EXPECT_NEAR(move->sensor[0].modes[0].frequency, 1450.0, 1.5);
+  ASSERT_FALSE(follower.update(harmonics(model_sensor, speed, 33), 0.05, {model_sensor, model_sensor}, speed)
+                   .has_value());
+  const auto update = follower.update(harmonics(model_sensor, speed, 33), 0.05, {strayed, strayed}, speed);
+  ASSERT_TRUE(update.has_value());
+  EXPECT_NEAR(update->sensor[0].modes[0].frequency, 1450.0, 1.5);
 }
 
 TEST(ModeFollower, RefusesImpossibleParameters) {
-  FollowParameters parameters;
+  ModeFollowerParameters parameters;
   parameters.misfit = 0.0;
   EXPECT_THROW(ModeFollower(TOOL, SLOT, 33, parameters), Error);
   EXPECT_THROW(ModeFollower(TOOL, SLOT, 0, {}), Error);
@@ -144,20 +146,21 @@ class Following : public testing::Test {
  protected:
   struct Outcome {
     double raw = 0.0, frozen = 0.0, following = 0.0;
-    std::size_t moves = 0;
+    std::size_t mode_updates = 0;
   };
   Outcome run(const ModalModel& is) {
     ReferenceCase reference;
     reference.spindle_speed = units::radPerSecFromRpm(21750.0);
     reference.duration = 0.42;
-    const ModalModel believed = reference.sensor;
+    const ModalModel model_sensor = reference.sensor;
     reference.sensor = is;
     const ReferenceRecord record = simulate(reference);
     CompensationParameters parameters;
-    const auto frozen = runCompensation(reference, record, believed, parameters);
+    const auto frozen = runCompensation(reference, record, model_sensor, parameters);
     parameters.follow = true;
     Outcome outcome;
-    const auto following = runCompensation(reference, record, believed, parameters, &outcome.moves);
+    const auto following =
+        runCompensation(reference, record, model_sensor, parameters, &outcome.mode_updates);
     // From 100 revolutions after engagement on.
     const auto from = static_cast<std::size_t>((0.02 + 100.0 * 60.0 / 21750.0) * reference.sample_rate);
     for (std::size_t axis = 0; axis < 2; ++axis) {
@@ -183,7 +186,7 @@ class Following : public testing::Test {
 
 TEST_F(Following, ExactModelStays) {
   const Outcome outcome = run(scaled(1.0, 1.0));
-  EXPECT_EQ(outcome.moves, 0u);
+  EXPECT_EQ(outcome.mode_updates, 0u);
   EXPECT_EQ(outcome.following, outcome.frozen);
 }
 

@@ -9,16 +9,16 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/testing/coverage.h"
 #include "smartmill_core/units.h"
-#include "smartmill_kalman/compensation/sorted_compensation.h"
+#include "smartmill_kalman/compensation/compensation_pipeline.h"
 #include "smartmill_kalman_testing/reference_case.h"
 
 namespace smartmill::kalman {
 namespace {
 
 // A phase that the filters never take in (endless memory) and a speed that is off: with the slope known the
-// tracker is a textbook Kalman filter, and least squares over the same samples says how well it can do: a
-// ramp of phase seen with noise has the variance 12 r / (slope^2 dt^2 N^3), four times that where the phase
-// at the start is known.
+// tracker is a textbook Kalman filter, and least squares over the same samples gives the achievable variance:
+// a ramp of phase with noise has the variance 12 r / (slope^2 dt^2 N^3), four times that where the phase at
+// the start is known.
 TEST(SpeedTracker, FindsTheSpeedAsWellAsLeastSquares) {
   constexpr double RATE = 25600.0, SPEED = 900.0, SLOPE = 400.0;
   constexpr int COUNT = 2000, RUNS = Coverage::RUNS;
@@ -92,7 +92,7 @@ Outcome outcome(double rpm, double off, double drop) {
   return {error(false), error(true)};
 }
 
-// The causal target of 1.2 % holds without a tachometer, speed unknown within 1 % and falling by 1 %.
+// The causal target of 1.2 % is met without a tachometer, speed unknown within 1 % and falling by 1 %.
 TEST(TrackedSpeed, ServesAsWellAsATachometer) {
   for (const double rpm : {9000.0, 21750.0}) {
     for (const double off : {0.01, -0.01}) {
@@ -112,18 +112,14 @@ TEST(TrackedSpeed, NeedsNoAngles) {
   parameters.track_speed = true;
   std::size_t out = 0;
   ForceBlock::Status last = ForceBlock::Status::measured;
-  SortedCompensation sorted(parameters, {}, ForceSensor(), 0.05,
-                            {[&](const ForceBlock&, const ForceBlock& c) {
-                               ++out;
-                               last = c.status;
-                             },
-                             {},
-                             {},
-                             {}});
+  CompensationPipeline pipeline(parameters, {}, ForceSensor(), 0.05, {{{}, [&](const ForceBlock& c) {
+                                                                         ++out;
+                                                                         last = c.status;
+                                                                       }}});
   CuttingCondition condition;
   condition.kind = CuttingCondition::Kind::cut;
   condition.spindle_speed = units::TWO_PI * 150.0;
-  sorted.push(condition);
+  pipeline.push(condition);
   for (std::size_t b = 0; b < 100; ++b) {
     SampleBlock block;
     block.stamp = 0.01 * static_cast<double>(b);
@@ -137,11 +133,11 @@ TEST(TrackedSpeed, NeedsNoAngles) {
           100.0 * std::cos(units::TWO_PI * 150.7 * t) + 300.0 * std::sin(units::TWO_PI * 602.8 * t);
       block.samples.insert(block.samples.end(), {force, 0.5 * force, 0.1 * force});
     }
-    sorted.push(block);
+    pipeline.push(block);
   }
   EXPECT_GT(out, 90u);  // the last 50 ms wait for events
   EXPECT_EQ(last, ForceBlock::Status::compensated);
-  EXPECT_NEAR(sorted.health().speed, units::TWO_PI * 150.7, 0.01);
+  EXPECT_NEAR(pipeline.health().speed, units::TWO_PI * 150.7, 0.01);
 }
 
 }  // namespace

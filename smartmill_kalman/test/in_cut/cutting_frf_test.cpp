@@ -11,7 +11,7 @@
 #include "smartmill_core/testing/coverage.h"
 #include "smartmill_core/testing/shared_data.h"
 #include "smartmill_core/units.h"
-#include "smartmill_kalman/in_cut/campaign_lines.h"
+#include "smartmill_kalman/in_cut/cut_segments.h"
 
 namespace smartmill::kalman {
 namespace {
@@ -26,9 +26,9 @@ ModalModel structure() {
 
 /// A force of all orders of the spindle through a structure, in its steady state by the closed form, with
 /// noise on both channels. @param ramp [1/s] of the speed
-CutStretch periodic(double rpm, std::mt19937& random, double ramp = 0.0, double force_noise = 1.0,
+CutSegment periodic(double rpm, std::mt19937& random, double ramp = 0.0, double force_noise = 1.0,
                     double response_noise = 5e-8) {
-  CutStretch cut;
+  CutSegment cut;
   cut.name = "periodic";
   cut.sample_rate = RATE;
   cut.speed = units::radPerSecFromRpm(rpm);
@@ -55,14 +55,14 @@ CutStretch periodic(double rpm, std::mt19937& random, double ramp = 0.0, double 
   return cut;
 }
 
-// At every line, over force and response with noise: errors are what the deviations say.
+// At every line, over force and response with noise: errors agree with the standard deviations.
 TEST(CuttingLines, DeviationsCoverTheTruth) {
   std::mt19937 random(1);
   Coverage coverage;
   CuttingFrfOptions options;
   options.high = 3000.0;
   for (int run = 0; run < 12; ++run) {
-    for (const CuttingLine& line : cuttingLines(periodic(4200.0 + 300.0 * run, random), options)) {
+    for (const FrfLine& line : frfLines(periodic(4200.0 + 300.0 * run, random), options)) {
       const std::complex<double> error = line.value - structure().response(line.frequency);
       coverage.add(std::sqrt(2.0) * error.real(), line.std_dev);
       coverage.add(std::sqrt(2.0) * error.imag(), line.std_dev);
@@ -79,9 +79,9 @@ TEST(CuttingLines, ASweepIsAsGoodAsManyCuts) {
   CuttingFrfOptions options;
   options.high = 3000.0;
   options.part = 0.13;
-  std::vector<CuttingLine> lines;
+  std::vector<FrfLine> lines;
   for (const double rpm : {6000.0, 6240.0, 6490.0}) {
-    const auto found = cuttingLines(periodic(rpm, random, 0.1), options);
+    const auto found = frfLines(periodic(rpm, random, 0.1), options);
     lines.insert(lines.end(), found.begin(), found.end());
   }
   const std::vector<SpeedFrf> frfs = cuttingFrfs(lines, "m/N", options);
@@ -99,14 +99,14 @@ TEST(CuttingFrf, AbstainsFromFewAndFromNoisyLines) {
   CuttingFrfOptions options;
   options.low = 700.0;
   options.high = 1600.0;
-  const auto few = cuttingFrfs(cuttingLines(periodic(12000.0, random), options), "m/N", options);
+  const auto few = cuttingFrfs(frfLines(periodic(12000.0, random), options), "m/N", options);
   ASSERT_EQ(few.size(), 1U);
   EXPECT_FALSE(few[0].fit);
   EXPECT_NE(few[0].reason.find("lines, 12 are needed"), std::string::npos) << few[0].reason;
   // A response that is noise: lines, but no mode.
-  std::vector<CuttingLine> lines;
+  std::vector<FrfLine> lines;
   for (const double rpm : {5800.0, 6000.0, 6200.0}) {
-    const auto found = cuttingLines(periodic(rpm, random, 0.0, 1.0, 1e-4), options);
+    const auto found = frfLines(periodic(rpm, random, 0.0, 1.0, 1e-4), options);
     lines.insert(lines.end(), found.begin(), found.end());
   }
   const auto noisy = cuttingFrfs(lines, "m/N", options);
@@ -117,36 +117,36 @@ TEST(CuttingFrf, AbstainsFromFewAndFromNoisyLines) {
 
 TEST(CuttingLines, RefusesWhatIsNoCut) {
   std::mt19937 random(4);
-  CutStretch cut = periodic(6000.0, random);
+  CutSegment cut = periodic(6000.0, random);
   cut.response.pop_back();
-  EXPECT_THROW(cuttingLines(cut, {}), Error);
+  EXPECT_THROW(frfLines(cut, {}), Error);
   cut = periodic(6000.0, random);
   cut.force[7] = NAN;
-  EXPECT_THROW(cuttingLines(cut, {}), Error);
+  EXPECT_THROW(frfLines(cut, {}), Error);
   CuttingFrfOptions options;
   options.high = 100.0;
-  EXPECT_THROW(cuttingLines(periodic(6000.0, random), options), Error);
+  EXPECT_THROW(frfLines(periodic(6000.0, random), options), Error);
 }
 
-// Cuts of another program's machine, its tool known: what its cuts tell at each speed is that tool.
+// Cuts of another program's machine, its tool known: its cuts give that tool at each speed.
 TEST(CuttingFrf, FindsTheToolOfAnIndependentCampaign) {
   SMARTMILL_SHARED_DATA(folder, "campaigns/vibrating_runout");
   const Campaign campaign = readCampaign(folder);
   const MachineModel model = readMachineModel(campaign.modelPath());
   for (std::size_t axis = 0; axis < 2; ++axis) {
-    std::vector<CuttingLine> lines;
+    std::vector<FrfLine> lines;
     for (const CampaignTest& test : campaign.tests) {
       if (test.kind != TestKind::cut) continue;
-      const CutStretch cut =
-          toolStretch(readRecord(campaign, test, model), test, axis, model.force_sensor.axis[axis]);
-      const auto found = cuttingLines(cut, {});
+      const CutSegment cut =
+          toolSegment(readRecord(campaign, test, model), test, axis, model.force_sensor.axis[axis]);
+      const auto found = frfLines(cut, {});
       lines.insert(lines.end(), found.begin(), found.end());
     }
     const Mode& truth = (axis == 0 ? model.tool_tip.x : model.tool_tip.y).modes.front();
-    int told = 0;
+    int fits = 0;
     for (const SpeedFrf& frf : cuttingFrfs(lines, "m/N", {})) {
       if (!frf.fit) continue;
-      ++told;
+      ++fits;
       ASSERT_EQ(frf.fit->model.modes.size(), 1U);
       const Mode& mode = frf.fit->model.modes.front();
       // That program's own integration is good to 0.04 N of 20 N a line.
@@ -154,7 +154,7 @@ TEST(CuttingFrf, FindsTheToolOfAnIndependentCampaign) {
       EXPECT_NEAR(mode.damping_ratio, truth.damping_ratio, 0.04 * truth.damping_ratio);
       EXPECT_NEAR(mode.gain, truth.gain, 0.01 * truth.gain);
     }
-    EXPECT_EQ(told, 3);  // 13,950 rpm has too few lines, 1200 and 3000 too few revolutions
+    EXPECT_EQ(fits, 3);  // 13,950 rpm has too few lines, 1200 and 3000 too few revolutions
   }
 }
 

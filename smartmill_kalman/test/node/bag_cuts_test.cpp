@@ -115,14 +115,14 @@ class Shop {
   std::normal_distribution<double> normal_;
 };
 
-std::vector<SpeedFrf> frfs(const std::vector<CutStretch>& cuts, bool tool) {
+std::vector<SpeedFrf> frfs(const std::vector<CutSegment>& cuts, bool tool) {
   CuttingFrfOptions options;
   options.high = 4000.0;
   options.speed_width = 0.1;
   options.unit_static_gain = !tool;
-  std::vector<CuttingLine> lines;
-  for (const CutStretch& cut : cuts) {
-    const auto some = cuttingLines(cut, options);
+  std::vector<FrfLine> lines;
+  for (const CutSegment& cut : cuts) {
+    const auto some = frfLines(cut, options);
     lines.insert(lines.end(), some.begin(), some.end());
   }
   return cuttingFrfs(lines, tool ? "m/N" : "1", options);
@@ -192,7 +192,7 @@ TEST(BagCuts, WhatIsMissingOrNotSampledTogetherIsNamed) {
   BagCutsRequest request;
   request.path = folder.file("run.bag");
   request.response = names::DISPLACEMENT;
-  EXPECT_THAT(errorOf([&] { cutsOfBag(request); }), HasSubstr("run.bag: holds no daq/displacement"));
+  EXPECT_THAT(errorOf([&] { cutsOfBag(request); }), HasSubstr("run.bag: topic daq/displacement not found"));
   request.tool = false;
   request.response = SENSOR;
   EXPECT_THAT(errorOf([&] { cutsOfBag(request); }), HasSubstr("cut '6000': force/compensated and"));

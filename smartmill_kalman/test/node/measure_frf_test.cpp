@@ -38,7 +38,7 @@
 namespace smartmill::kalman {
 namespace {
 
-/// Goals and conditions are told ahead, so that they are in order on a busy machine too.
+/// Goals and conditions are sent ahead, so that they are in order on a busy machine.
 const ros::Duration LEAD(2.0);
 
 using Client = actionlib::SimpleActionClient<smartmill_msgs::MeasureFrfAction>;
@@ -147,7 +147,7 @@ TEST_F(MeasureFrf, TapsThenCutsAndReplaysToTheLastDigit) {
     EXPECT_TRUE(std::isnan(result.sensitivity));
     EXPECT_EQ(result.frf.unit, "1");
   }
-  // No hammer strikes in z and nobody hits by hand.
+  // No hammer strikes in z, and there is no hit by hand.
   const auto z = measure("z", 1);
   EXPECT_EQ(z.code, smartmill_msgs::MeasureFrfResult::NO_HIT);
   EXPECT_NE(said.find("by hand"), std::string::npos) << said;
@@ -281,7 +281,7 @@ TEST_F(MeasureFrf, TapsThenCutsAndReplaysToTheLastDigit) {
   }));
   {
     const std::lock_guard<std::mutex> lock(mutex);
-    // From the cut on: before it the live node had seen more.
+    // From the cut on: before it the live node had received more.
     while (!again.empty() && again.begin()->second.header.stamp < cut.header.stamp)
       again.erase(again.begin());
     expectSame(again, live, 120);

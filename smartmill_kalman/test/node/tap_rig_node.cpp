@@ -1,5 +1,5 @@
-// The closed-form rig as a ROS node, in the place of the sensors' driver, for the wiring test: strikes when
-// asked, spins and cuts as cut/condition says.
+// The closed-form rig as a ROS node, in the place of the sensors' driver, for the wiring test: strikes on
+// request, spins and cuts by cut/condition.
 
 #include <cmath>
 

@@ -39,7 +39,7 @@ std::vector<double> cut(const ModalModel& sensor, std::uint32_t seed, double rou
   return samples;
 }
 
-// Lines beside and on the resonance, some of them next to what is due, where the deviance is a small
+// Lines off and on the resonance, some of them near the expected power, where the deviance is a small
 // difference.
 TEST(BlindMode, DerivativesAgreeWithDifferences) {
   PowerLines lines;
@@ -50,8 +50,8 @@ TEST(BlindMode, DerivativesAgreeWithDifferences) {
     lines.power.push_back(2.0);
   }
   for (std::size_t k = 0; k < lines.power.size(); ++k) {
-    const double due = duePower(lines.frequency[k], at, 2.0).value;
-    if (k % 3 > 0) lines.power[k] = due * (k % 3 == 1 ? 1.0 + 1e-5 : 0.2);
+    const double expected = expectedPower(lines.frequency[k], at, 2.0).value;
+    if (k % 3 > 0) lines.power[k] = expected * (k % 3 == 1 ? 1.0 + 1e-5 : 0.2);
   }
   // The mean power is the unit of share and floor.
   const double unit = lines.mean() / 2.0;
@@ -61,7 +61,7 @@ TEST(BlindMode, DerivativesAgreeWithDifferences) {
   EXPECT_LT(gap.relative, 1e-6) << gap.row << " " << gap.column << " " << gap.given << " " << gap.numeric;
 }
 
-// One second of a cut, whose tenth harmonic lies at 1000 Hz beside the mode.
+// One second of a cut, whose tenth harmonic lies at 1000 Hz near the mode.
 TEST(BlindMode, FindsTheModeWithAnHonestDeviation) {
   ModalModel sensor;
   sensor.modes = {{970.0, 0.02, 1.0}};
@@ -85,7 +85,7 @@ TEST(BlindMode, SaysThatThereIsNone) {
   EXPECT_THROW(findBlindMode(cut(ideal, 1, 3.0), RATE, SPEED, 990.0, 1010.0), Error);
 }
 
-// Measured slots (sensor rings near 958 .. 985 Hz, as its README tells).
+// Measured slots (sensor rings near 958 .. 985 Hz, by its README).
 TEST(BlindMode, MeasuredSlotsAt6000) {
   SMARTMILL_SHARED_DATA(folder, "measured/slot_6000");
   const Campaign campaign = readCampaign(folder);

@@ -8,7 +8,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/testing/coverage.h"
 #include "smartmill_core/testing/tap_rig.h"
-#include "smartmill_kalman/compensation/sorted_compensation.h"
+#include "smartmill_kalman/compensation/compensation_pipeline.h"
 
 namespace smartmill::kalman {
 namespace {
@@ -25,49 +25,49 @@ MeasureFrfGoal goal(const std::string& direction, int hits, int modes) {
   return g;
 }
 
-/// Rig and class in a loop: the rig's hammer strikes when it is told to.
+/// Rig and class in a loop: the rig's hammer executes the strike commands.
 class Loop {
  public:
   explicit Loop(const ModalModel& truth = dynamometer(), std::uint32_t seed = 1, TapParameters taps = {})
       : rig(TapRig::diagonal(truth), START, seed),
-        sorted({}, taps, ForceSensor(), 0.05,
-               {[this](const ForceBlock&, const ForceBlock& c) { forces.push_back(c); },
-                [this](const StrikeCommand& c) {
-                  ++strikes;
-                  if (strike) rig.strike(static_cast<std::size_t>(c.direction[0] - 'x'));
-                },
-                [this](const TapFeedback& f) { said.push_back(f.stage); },
-                [this](const SensorResult& r) { results.push_back(r); }}) {}
+        pipeline({}, taps, ForceSensor(), 0.05,
+                 {{{}, [this](const ForceBlock& c) { forces.push_back(c); }},
+                  [this](const StrikeCommand& c) {
+                    ++strikes;
+                    if (automatic_hammer) rig.strike(static_cast<std::size_t>(c.direction[0] - 'x'));
+                  },
+                  [this](const TapFeedback& f) { said.push_back(f.stage); },
+                  [this](const SensorResult& r) { results.push_back(r); }}) {}
 
   void run(double seconds) {
     const double end = rig.now() + seconds;
     while (rig.now() < end && (results.empty() || go_on)) {
       TapRig::Blocks blocks = rig.next();
       if (spoil) spoil(blocks);
-      sorted.push(blocks.angle);
-      sorted.pushHammer(blocks.hammer);
-      sorted.push(blocks.sensor);
+      pipeline.push(blocks.angle);
+      pipeline.pushHammer(blocks.hammer);
+      pipeline.push(blocks.sensor);
     }
   }
   /// @return the only result.
   SensorResult measure(const MeasureFrfGoal& g) {
-    sorted.push(g);
+    pipeline.push(g);
     run(120.0);
     if (results.size() != 1) throw Error("no result");
     return results.front();
   }
 
   TapRig rig;
-  bool strike = true, go_on = false;
+  bool automatic_hammer = true, go_on = false;
   std::function<void(TapRig::Blocks&)> spoil;
   int strikes = 0;
   std::vector<std::string> said;
   std::vector<SensorResult> results;
   std::vector<ForceBlock> forces;
-  SortedCompensation sorted;
+  CompensationPipeline pipeline;
 };
 
-// Closed form: one mode at 930 Hz, 3 %. 1 N of noise against 300 N blows.
+// Closed form: one mode at 930 Hz, 3 %. 1 N of noise with hits of 300 N.
 TEST(SensorMeasurement, findsTheModeFromThreeTaps) {
   for (const char* direction : {"x", "y", "z"}) {
     Loop loop;
@@ -129,7 +129,7 @@ TEST(SensorMeasurement, NamesWhatIsWrong) {
   taps.strike_timeout = 0.5;
   {
     Loop loop(dynamometer(), 1, taps);
-    loop.strike = false;
+    loop.automatic_hammer = false;
     const SensorResult r = loop.measure(goal("x", 3, 0));
     EXPECT_EQ(r.code, FrfCode::no_hit);
     EXPECT_EQ(loop.strikes, 2);
@@ -177,36 +177,36 @@ TEST(SensorMeasurement, NamesWhatIsWrong) {
 TEST(SensorMeasurement, CancelsAndRefusesASecondGoal) {
   Loop loop;
   std::vector<bool> taken;
-  loop.sorted.push(goal("x", 50, 0), [&](bool free) {
+  loop.pipeline.push(goal("x", 50, 0), [&](bool free) {
     taken.push_back(free);
     return true;
   });
   loop.run(1.0);
-  loop.sorted.push(goal("y", 3, 0), [&](bool free) {
+  loop.pipeline.push(goal("y", 3, 0), [&](bool free) {
     taken.push_back(free);
     return true;
   });
   loop.run(1.0);
   ASSERT_TRUE(loop.results.empty());
-  loop.sorted.event([](SensorMeasurement& m) { m.hitByHand(); });
+  loop.pipeline.event([](SensorMeasurement& m) { m.hitByHand(); });
   loop.run(0.2);
   EXPECT_NE(std::find(loop.said.begin(), loop.said.end(), "hit the workpiece by hand in x"), loop.said.end());
-  loop.sorted.event([](SensorMeasurement& m) { m.cancel(); });
+  loop.pipeline.event([](SensorMeasurement& m) { m.cancel(); });
   loop.run(0.2);
   ASSERT_EQ(loop.results.size(), 1u);
   EXPECT_EQ(loop.results[0].code, FrfCode::cancelled);
   EXPECT_EQ(taken, (std::vector<bool>{true, false}));
 }
 
-// The believed sensor is ideal; only the tap test can tell its modes. Slot at 9000 rpm, 4 flutes: the second
-// harmonic of 600 Hz is on the flank of the mode.
+// The model has an ideal sensor; its modes are known from the tap test only. Slot at 9000 rpm, 4 flutes: the
+// second harmonic of 600 Hz is on the flank of the mode.
 TEST(SensorMeasurement, IdentifiedModesServeFromThenOn) {
   Loop loop;
   loop.go_on = true;
   for (const char* direction : {"x", "y"}) {
     MeasureFrfGoal g = goal(direction, 5, 0);
     g.stamp = loop.rig.now() + 0.05;
-    loop.sorted.push(g);
+    loop.pipeline.push(g);
     loop.run(4.0);
   }
   ASSERT_EQ(loop.results.size(), 2u);
@@ -219,7 +219,7 @@ TEST(SensorMeasurement, IdentifiedModesServeFromThenOn) {
   };
   loop.rig.speed = speed;
   loop.run(1.0);
-  loop.sorted.flush();
+  loop.pipeline.flush();
   std::array<double, 3> error{}, norm{};
   for (const ForceBlock& block : loop.forces) {
     if (block.stamp < loop.rig.now() - 0.5) continue;
@@ -233,10 +233,10 @@ TEST(SensorMeasurement, IdentifiedModesServeFromThenOn) {
   }
   std::printf("error x %.4f y %.4f z (not tapped) %.4f\n", std::sqrt(error[0] / norm[0]),
               std::sqrt(error[1] / norm[1]), std::sqrt(error[2] / norm[2]));
-  // What is left is noise of 1 N in a force of some 30 N.
+  // The residual is noise of 1 N in a force of some 30 N.
   EXPECT_LT(std::sqrt(error[0] / norm[0]), 0.05);
   EXPECT_LT(std::sqrt(error[1] / norm[1]), 0.05);
-  EXPECT_GT(std::sqrt(error[2] / norm[2]), 0.05);  // believed ideal, left as it is
+  EXPECT_GT(std::sqrt(error[2] / norm[2]), 0.05);  // ideal by the model, not compensated
 }
 
 TEST(SensorMeasurement, RefusesParametersOutOfRange) {

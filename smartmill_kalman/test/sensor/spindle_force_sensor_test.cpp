@@ -10,7 +10,7 @@
 #include "smartmill_core/testing/coverage.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
-#include "smartmill_kalman/compensation/sorted_compensation.h"
+#include "smartmill_kalman/compensation/compensation_pipeline.h"
 
 namespace smartmill::kalman {
 namespace {
@@ -57,12 +57,12 @@ TEST(SpindleSensorCalibration, RefusesALengthBeyondItsLine) {
 }
 
 /// Burzoni 3.2: seven weights of 10 lbs hung on one after another and taken off, drift to 5 N/min a sensor.
-StaticReadings weights(const std::vector<double>& lengths_mm, double noise, std::uint32_t seed) {
+StaticMeasurements weights(const std::vector<double>& lengths_mm, double noise, std::uint32_t seed) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal(0.0, 1.0);
   std::uniform_real_distribution<double> drift(-5.0 / 60.0, 5.0 / 60.0);
-  StaticReadings readings;
-  readings.file = "weights";
+  StaticMeasurements measurements;
+  measurements.file = "weights";
   int test = 0;
   for (const double mm : lengths_mm) {
     for (std::size_t axis = 0; axis < 3; ++axis, ++test) {
@@ -79,22 +79,22 @@ StaticReadings weights(const std::vector<double>& lengths_mm, double noise, std:
         const double time = 10.0 * step;
         for (std::size_t k = 0; k < 6; ++k)
           sensors[k] += offset[k] + slope[k] * time + noise * normal(random);
-        readings.test.push_back(test);
-        readings.time.push_back(time);
-        readings.length.push_back(mm * 1e-3);
-        readings.load.push_back(load);
-        readings.sensors.push_back(sensors);
+        measurements.test.push_back(test);
+        measurements.time.push_back(time);
+        measurements.length.push_back(mm * 1e-3);
+        measurements.load.push_back(load);
+        measurements.sensors.push_back(sensors);
       }
     }
   }
-  return readings;
+  return measurements;
 }
 
 TEST(CalibrateStatic, FindsTable3ThroughDrift) {
   const StaticCalibration found = calibrateStatic(weights({100.0, 139.0, 180.0}, 0.01, 3), TABLE);
   ASSERT_EQ(found.lengths.size(), 3u);
   EXPECT_GT(found.lengths[0].drift, 0.02);  // there was one to take out [N/s]
-  const auto near = [](const LengthLine& a, const LengthLine& b) {
+  const auto near = [](const LengthDependence& a, const LengthDependence& b) {
     EXPECT_NEAR(a.slope, b.slope, 4.0 * a.slope_std);
     EXPECT_NEAR(a.offset, b.offset, 4.0 * a.offset_std);
     EXPECT_NEAR(a.at(LENGTH), b.at(LENGTH), 0.01 * std::abs(b.at(LENGTH)));
@@ -104,7 +104,7 @@ TEST(CalibrateStatic, FindsTable3ThroughDrift) {
   near(found.calibration.z, TABLE.z);
   ASSERT_TRUE(found.calibration.yx && found.calibration.yz && found.calibration.xz);
   near(*found.calibration.yx, *TABLE.yx);
-  // Weights of 310 N move the z pair by 2 N through cross-talk: told to a few percent.
+  // Weights of 310 N move the z pair by 2 N through cross-talk: known to a few percent.
   EXPECT_NEAR(found.calibration.xz->at(LENGTH), TABLE.xz->at(LENGTH), 0.05 * 341.0);
   // Burzoni 3.2.1 at a length between and with all axes: 5 %.
   const auto error = verifyStatic(weights({120.0}, 0.01, 4), found.calibration);
@@ -122,9 +122,9 @@ TEST(CalibrateStatic, VerificationTellsAWrongConstant) {
 TEST(CalibrateStatic, ALengthThatNoWeightWasHungAtIsRefused) {
   SpindleSensorCalibration known = SpindleSensorCalibration::table3();
   known.lengths = {0.1, 0.18};
-  StaticReadings readings = weights({139.0, 250.0}, 0.001, 5);
-  readings.file = "weights.csv";
-  EXPECT_EQ(errorOf([&] { verifyStatic(readings, known); }),
+  StaticMeasurements measurements = weights({139.0, 250.0}, 0.001, 5);
+  measurements.file = "weights.csv";
+  EXPECT_EQ(errorOf([&] { verifyStatic(measurements, known); }),
             "weights.csv: 250.0 mm of tool and holder is outside the calibrated 100.0 .. 180.0 mm");
   EXPECT_EQ(errorOf([&] { SpindleForceSensor(known, 0.25); }),
             "spindle_sensor_length: 250.0 mm of tool and holder is outside the calibrated 100.0 .. 180.0 mm");
@@ -232,7 +232,7 @@ TEST(SpindleForceSensor, TakesOffsetAndDriftOut) {
   rig.run(8.0, 0.0, still);
   rig.condition(CuttingCondition::Kind::cut);
   const auto out = rig.run(4.0, 0.0, [](double) { return std::array<double, 3>{200.0, 100.0, 50.0}; });
-  // Without: 3 N of offset and 4 s of drift stand as 300 N in z. Noise alone: 18 x 0.02 / sqrt 2 = 0.25 N in
+  // Without: 3 N of offset and 4 s of drift give 300 N in z. Noise alone: 18 x 0.02 / sqrt 2 = 0.25 N in
   // x, 62 x 0.014 = 0.9 N in z, and what the cross-talk carries.
   EXPECT_NEAR(rmsFrom(out[0], 200.0), 0.35, 0.3);
   EXPECT_LT(rmsFrom(out[1], 100.0), 0.5);
@@ -257,7 +257,7 @@ TEST(SpindleForceSensor, UnbalanceLearntInTheAirIsTakenOffAtAnySpeed) {
   const double fast = units::radPerSecFromRpm(18000.0);
   const auto out = rig.run(1.0, fast, [](double) { return std::array<double, 3>{100.0, 0.0, 0.0}; });
   const auto& health = rig.sensor.health();
-  EXPECT_EQ(health.stretches, 2u);
+  EXPECT_EQ(health.air_segments, 2u);
   // (m e) cos(a + 0.7), sin(a + 0.7): phasors m e exp(0.7 i) and -i m e exp(0.7 i).
   EXPECT_NEAR(std::abs(health.unbalance[0] - std::polar(2e-5, 0.7)), 0.0, 4.0 * health.unbalance_std[0]);
   EXPECT_NEAR(std::abs(health.unbalance[1] - std::polar(2e-5, 0.7 - units::PI / 2.0)), 0.0,
@@ -280,10 +280,10 @@ TEST(SpindleForceSensor, UnbalanceStandardDeviationIsHonest) {
       return std::array<double, 3>{0.0, 0.0, 0.0};
     });
     rig.condition(CuttingCondition::Kind::cut);
-    const double r = 150.0 / 930.0, seen = 1e-6 / (1.0 - r * r);
+    const double r = 150.0 / 930.0, response = 1e-6 / (1.0 - r * r);
     for (std::size_t axis = 0; axis < 2; ++axis) {
       const auto error =
-          rig.sensor.health().unbalance[axis] - std::polar(seen, 0.7 - (axis ? units::PI / 2.0 : 0.0));
+          rig.sensor.health().unbalance[axis] - std::polar(response, 0.7 - (axis ? units::PI / 2.0 : 0.0));
       const double part = rig.sensor.health().unbalance_std[axis] / std::sqrt(2.0);
       unbalance.add(error.real(), part);
       unbalance.add(error.imag(), part);
@@ -317,10 +317,10 @@ TEST(SpindleForceSensor, AForceThatUnloadsASensorIsNoMeasurement) {
 
 TEST(SpindleForceSensor, DynamicCrossTalkGoesWhereTheStaticOneFails) {
   // The cross-talk of y in x has a mode at 800 Hz; a force along y alone must leave x at zero.
-  ModalModel course;
-  course.modes = {{800.0, 0.05, 1.0}};
+  ModalModel dynamics;
+  dynamics.modes = {{800.0, 0.05, 1.0}};
   SpindleSensorCalibration dynamic = TABLE;
-  dynamic.dynamic_yx = course;
+  dynamic.dynamic_yx = dynamics;
   SpindleForceSensor with(dynamic, LENGTH), without(TABLE, LENGTH);
   const double w = units::TWO_PI * 600.0, r = 600.0 / 800.0;
   const std::complex<double> h = 1.0 / std::complex<double>(1.0 - r * r, 2.0 * 0.05 * r);
@@ -342,30 +342,25 @@ TEST(SpindleForceSensor, DynamicCrossTalkGoesWhereTheStaticOneFails) {
     left = std::max(left, std::abs(a.at(i, 0)));
     was = std::max(was, std::abs(b.at(i, 0)));
   }
-  EXPECT_GT(was, 40.0);         // 100 N in y stand as 18/27.7 |h - 1| 100 N
+  EXPECT_GT(was, 40.0);         // 100 N in y give 18/27.7 |h - 1| 100 N
   EXPECT_LT(left, 0.01 * was);  // a force linear between samples: 1 - (w dt)^2 / 12 = 0.2 %
 }
 
 // What the node is made of: six channels in, force at the tool out, with the sensor's own sample index.
-TEST(SortedCompensation, TakesSixChannels) {
-  ForceSensor believed;
-  for (ModalModel& axis : believed.axis) {
+TEST(CompensationPipeline, TakesSixChannels) {
+  ForceSensor model_sensor;
+  for (ModalModel& axis : model_sensor.axis) {
     axis.modes = {{930.0, 0.03, 0.9}};
     axis.direct = 0.1;
   }
   SpindleSensorCalibration slack = TABLE;
   slack.preload.fill(50.0);
   std::vector<ForceBlock> measured, compensated;
-  SortedCompensation sorted({}, {}, believed, 0.05,
-                            {[&](const ForceBlock& m, const ForceBlock& c) {
-                               measured.push_back(m);
-                               compensated.push_back(c);
-                             },
-                             {},
-                             {},
-                             {}});
+  CompensationPipeline pipeline({}, {}, model_sensor, 0.05,
+                                {{[&](const ForceBlock& m) { measured.push_back(m); },
+                                  [&](const ForceBlock& c) { compensated.push_back(c); }}});
   const double speed = units::TWO_PI * 232.5;  // the fourth harmonic meets the mode: 15 times too large
-  const std::complex<double> passed = believed.axis[0].response(930.0);
+  const std::complex<double> passed = model_sensor.axis[0].response(930.0);
   const auto push = [&](int b, double fy) {
     SampleBlock block;
     block.stamp = 50.0 + b * 0.01;
@@ -378,25 +373,25 @@ TEST(SortedCompensation, TakesSixChannels) {
       const auto s = sensorsUnder(139.0, (passed * std::polar(20.0, phase)).real(), fy, 0.0);
       block.samples.insert(block.samples.end(), s.begin(), s.end());
     }
-    sorted.push(SpindleAngle{block.stamp, 0.0, speed});
-    sorted.push(block);
+    pipeline.push(SpindleAngle{block.stamp, 0.0, speed});
+    pipeline.push(block);
   };
-  EXPECT_THROW(  // no calibration yet, and it says so
+  EXPECT_THROW(  // no calibration yet
       {
         push(0, 0.0);
-        sorted.flush();
+        pipeline.flush();
       },
       Error);
-  sorted.useSpindleSensor(slack, LENGTH);
+  pipeline.useSpindleSensor(slack, LENGTH);
   for (int b = 50; b < 250; ++b) push(b, b == 240 ? 905.0 : 0.0);  // 905 N unload the pair of y
-  sorted.flush();
+  pipeline.flush();
   ASSERT_GT(measured.size(), 190u);
   const std::size_t last = measured.size() - 1, bad = last - 9;
   EXPECT_EQ(compensated[last].first_index, measured[last].first_index);
   EXPECT_EQ(compensated[bad].first_index, 1000u + 256u * 240u);
-  double largest = 0.0, shown = 0.0;
+  double largest = 0.0, largest_measured = 0.0;
   for (std::size_t i = 0; i < 256; ++i) {
-    shown = std::max(shown, std::abs(measured[bad - 1].force[0][i]));
+    largest_measured = std::max(largest_measured, std::abs(measured[bad - 1].force[0][i]));
     largest = std::max(largest, std::abs(compensated[bad - 1].force[0][i]));
     for (std::size_t axis = 0; axis < 3; ++axis) {
       EXPECT_TRUE(std::isnan(measured[bad].force[axis][i]));
@@ -404,34 +399,35 @@ TEST(SortedCompensation, TakesSixChannels) {
       EXPECT_FALSE(std::isnan(compensated[bad + 1].force[axis][i]));
     }
   }
-  EXPECT_NEAR(shown, 20.0 * std::abs(passed), 2.0);
+  EXPECT_NEAR(largest_measured, 20.0 * std::abs(passed), 2.0);
   EXPECT_NEAR(largest, 20.0, 0.2);
-  ASSERT_NE(sorted.spindleHealth(), nullptr);
-  EXPECT_EQ(sorted.spindleHealth()->unloaded, 256u);
+  ASSERT_NE(pipeline.spindleHealth(), nullptr);
+  EXPECT_EQ(pipeline.spindleHealth()->unloaded, 256u);
 }
 
 TEST(FitDynamicCrossTalk, FindsTheCourse) {
-  ModalModel course;
-  course.modes = {{800.0, 0.04, 1.3}};
-  course.direct = -0.3;
+  ModalModel dynamics;
+  dynamics.modes = {{800.0, 0.04, 1.3}};
+  dynamics.direct = -0.3;
   std::mt19937 random(5);
   std::normal_distribution<double> noise(0.0, 0.05);
-  std::vector<std::vector<double>> shown, cross;
+  std::vector<std::vector<double>> first_axis, cross;
   for (int tap = 0; tap < 5; ++tap) {
-    ModalFilter path(course, RATE, Hold::first_order);
-    shown.emplace_back();
+    ModalFilter path(dynamics, RATE, Hold::first_order);
+    first_axis.emplace_back();
     cross.emplace_back();
     for (int i = 0; i < 5120; ++i) {
       const double t = (i - 200) / RATE;
       const double f = t > 0.0 && t < 5e-4 ? 400.0 * std::pow(std::sin(units::PI * t / 5e-4), 2) : 0.0;
-      shown.back().push_back(f + noise(random));
+      first_axis.back().push_back(f + noise(random));
       cross.back().push_back(path.step(f) / 27.7 + 0.02 * noise(random));
     }
   }
-  const ModalModel found = fitDynamicCrossTalk(shown, cross, 27.7, RATE, 50.0, 2500.0, 3);
+  const ModalModel found = fitDynamicCrossTalk(first_axis, cross, 27.7, RATE, 50.0, 2500.0, 3);
   EXPECT_NEAR(found.staticGain(), 1.0, 1e-9);
   for (const double f : {200.0, 700.0, 800.0, 1200.0})
-    EXPECT_NEAR(std::abs(found.response(f) - course.response(f)), 0.0, 0.02 * std::abs(course.response(f)))
+    EXPECT_NEAR(std::abs(found.response(f) - dynamics.response(f)), 0.0,
+                0.02 * std::abs(dynamics.response(f)))
         << f;
 }
 

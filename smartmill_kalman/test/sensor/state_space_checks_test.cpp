@@ -46,7 +46,7 @@ TEST(Balance, KeepsTheResponseAndItsBound) {
 }
 
 TEST(CheckStateSpace, TellsTheFormsApart) {
-  // Burzoni 4.4: companion matrices of modes in rad/s are ill-conditioned; a transformation mends them.
+  // Burzoni 4.4: companion matrices of modes in rad/s are ill-conditioned; a transformation corrects this.
   const auto checks = checkSensor(ReferenceCase::exactSensor());
   ASSERT_EQ(checks.size(), 5u);
   // In seconds the companion's poles are lost in the rounding: it may even look unstable.
@@ -54,7 +54,7 @@ TEST(CheckStateSpace, TellsTheFormsApart) {
     EXPECT_TRUE(checks[i].stable) << checks[i].form;
     EXPECT_GT(checks[i].margin, 0.0) << checks[i].form;
   }
-  EXPECT_FALSE(checks[0].conditioned);  // 9110^2 14451^2 22619^2 rad^6/s^6 = 9e24 beside 1
+  EXPECT_FALSE(checks[0].conditioned);  // 9110^2 14451^2 22619^2 rad^6/s^6 = 9e24 next to 1
   // Companion: the observability matrix is the unit matrix; a mode is two rotating states.
   EXPECT_NEAR(checks[0].observability_condition, 1.0, 1e-9);
   EXPECT_LT(checks[1].condition, 10.0);
@@ -68,7 +68,7 @@ TEST(CheckStateSpace, TellsTheFormsApart) {
 
 TEST(CheckStateSpace, SeesAnUnobservableAndAnUnstableMode) {
   StateSpace space = stateSpace(ReferenceCase::exactSensor());
-  // Two modes of one frequency and damping cannot be told apart by one output.
+  // Two modes of one frequency and damping are not distinguishable by one output.
   ModalModel twice = one(0.03);
   twice.modes.push_back(twice.modes[0]);
   const auto time = 1.0 / (units::TWO_PI * 1000.0);

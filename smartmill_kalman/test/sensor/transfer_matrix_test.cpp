@@ -76,7 +76,7 @@ TEST(TransferMatrix, StandardDeviationsAreHonest) {
   std::mt19937 random(3);
   std::normal_distribution<double> noise(0.0, 0.5);
   std::vector<MatrixTap> quiet;
-  for (int k = 0; k < 9; ++k) {  // one point, three blows along each axis
+  for (int k = 0; k < 9; ++k) {  // one point, three hits along each axis
     MatrixTap tap;
     tap.direction[k % 3] = 1.0;
     std::array<std::vector<double>, 3> force;

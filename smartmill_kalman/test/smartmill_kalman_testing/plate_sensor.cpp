@@ -78,21 +78,21 @@ std::vector<std::vector<double>> PlateSensor::measure(const std::array<std::vect
     padded.resize(length, 0.0);
     applied[i] = fourier(padded);
   }
-  std::vector<std::vector<Complex>> shown(6, std::vector<Complex>(line.size()));
+  std::vector<std::vector<Complex>> spectra(6, std::vector<Complex>(line.size()));
   const Eigen::Vector3d r(point[0], point[1], point[2]);
   for (std::size_t l = 0; l < line.size(); ++l) {
     const Eigen::Vector3cd f(applied[0][l], applied[1][l], applied[2][l]);
     Eigen::Matrix<Complex, 6, 1> wrench;
     wrench << f, cross(r).cast<Complex>() * f;
     const Eigen::Matrix<Complex, 6, 1> feet = plate.response(line[l]) * wrench;
-    for (Eigen::Index c = 0; c < 6; ++c) shown[static_cast<std::size_t>(c)][l] = feet(c);
+    for (Eigen::Index c = 0; c < 6; ++c) spectra[static_cast<std::size_t>(c)][l] = feet(c);
   }
   std::normal_distribution<double> normal(0.0, 1.0);
   std::vector<std::vector<double>> records;
   for (std::size_t c = 0; c < channels; ++c) {
     // The highest line of a real signal is real.
-    if (length % 2 == 0) shown[c].back() = shown[c].back().real();
-    records.push_back(inverseFourier(shown[c], length));
+    if (length % 2 == 0) spectra[c].back() = spectra[c].back().real();
+    records.push_back(inverseFourier(spectra[c], length));
     records.back().resize(samples);
     for (double& v : records.back()) v += (c < 3 ? force_noise : moment_noise) * normal(random);
   }
@@ -123,10 +123,10 @@ std::vector<MatrixTap> tapPlate(const PlateSensor& plate, double sample_rate, st
       std::array<std::vector<double>, 3> force;
       for (int i = 0; i < static_cast<int>(LENGTH * sample_rate); ++i) {
         const double t = i / sample_rate - BEFORE;
-        const double blow =
+        const double hit =
             t > 0.0 && t < CONTACT ? PEAK * std::pow(std::sin(units::PI * t / CONTACT), 2) : 0.0;
-        tap.hammer.push_back(blow + NOISE * normal(random));
-        for (std::size_t axis = 0; axis < 3; ++axis) force[axis].push_back(blow * direction[axis]);
+        tap.hammer.push_back(hit + NOISE * normal(random));
+        for (std::size_t axis = 0; axis < 3; ++axis) force[axis].push_back(hit * direction[axis]);
       }
       tap.channels = plate.measure(force, point, sample_rate, channels, random);
       taps.push_back(std::move(tap));

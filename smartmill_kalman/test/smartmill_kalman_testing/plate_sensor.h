@@ -34,7 +34,7 @@ struct PlateSensor {
                                            std::size_t channels, std::mt19937& random) const;
 };
 
-/// Taps of a small hammer (sin^2 blows of 0.11 ms and 300 N, 0.1 N of noise): on the top (down) and on two
+/// Taps of a small hammer (sin^2 hits of 0.11 ms and 300 N, 0.1 N of noise): on the top (down) and on two
 /// sides of the workpiece, 14 points as in Bachrathy's fig. 1, each hits times.
 std::vector<MatrixTap> tapPlate(const PlateSensor& plate, double sample_rate, std::size_t channels, int hits,
                                 std::mt19937& random);

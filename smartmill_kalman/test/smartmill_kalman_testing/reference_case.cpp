@@ -7,18 +7,21 @@
 namespace smartmill::kalman {
 
 std::array<std::vector<double>, 2> runCompensation(const ReferenceCase& reference,
-                                                   const ReferenceRecord& record, const ModalModel& believed,
+                                                   const ReferenceRecord& record,
+                                                   const ModalModel& model_sensor,
                                                    const CompensationParameters& parameters,
-                                                   std::size_t* moves) {
+                                                   std::size_t* mode_updates) {
   constexpr std::size_t BLOCK = 256;
   std::array<std::vector<double>, 2> force;
-  ForceCompensation compensation(parameters, false, [&](const ForceBlock&, const ForceBlock& compensated) {
-    for (std::size_t axis = 0; axis < 2; ++axis) {
-      force[axis].insert(force[axis].end(), compensated.force[axis].begin(), compensated.force[axis].end());
-    }
-  });
-  compensation.setSensor(0, believed);
-  compensation.setSensor(1, believed);
+  ForceCompensation compensation(parameters, false, {{}, [&](const ForceBlock& compensated) {
+                                                       for (std::size_t axis = 0; axis < 2; ++axis) {
+                                                         force[axis].insert(force[axis].end(),
+                                                                            compensated.force[axis].begin(),
+                                                                            compensated.force[axis].end());
+                                                       }
+                                                     }});
+  compensation.setSensor(0, model_sensor);
+  compensation.setSensor(1, model_sensor);
   ModalModel ideal;
   ideal.direct = 1.0;
   compensation.setSensor(2, ideal);
@@ -43,7 +46,7 @@ std::array<std::vector<double>, 2> runCompensation(const ReferenceCase& referenc
     compensation.handle(block);
   }
   compensation.flush();
-  if (moves) *moves = compensation.health().moves;
+  if (mode_updates) *mode_updates = compensation.health().mode_updates;
   return force;
 }
 

@@ -12,14 +12,15 @@
 namespace smartmill::kalman {
 
 /// The reference record through ForceCompensation in blocks of 256 samples, with its angle and cutting
-/// condition: force x and y. With track_speed no angle comes. @param believed sensor @param moves counts the
-/// moves that were followed; may be null
+/// condition: force x and y. With track_speed there is no angle. @param model_sensor of the compensation
+/// @param mode_updates number of accepted shifts of the modes; may be null
 std::array<std::vector<double>, 2> runCompensation(const ReferenceCase& reference,
-                                                   const ReferenceRecord& record, const ModalModel& believed,
+                                                   const ReferenceRecord& record,
+                                                   const ModalModel& model_sensor,
                                                    const CompensationParameters& parameters,
-                                                   std::size_t* moves = nullptr);
+                                                   std::size_t* mode_updates = nullptr);
 
-/// RMS innovation of a filter that is shown noise of 1 N rms alone [N]. @param from first sample that counts
+/// RMS innovation of a filter with an input of 1 N rms noise [N]. @param from first sample that counts
 template <class Filter>
 double innovationUnderNoise(Filter& filter, int count, int from) {
   std::mt19937 random(3);

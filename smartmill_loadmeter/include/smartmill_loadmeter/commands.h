@@ -12,7 +12,7 @@ Command databaseCommand();
 Command planCutsCommand();
 /// Friction and load-meter constants of a machine.
 Command calibrateCommand();
-/// The force law that force records prefer.
+/// Force law with the strongest evidence in force records.
 Command forceLawCommand();
 
 }  // namespace smartmill::loadmeter

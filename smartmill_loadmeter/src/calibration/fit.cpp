@@ -5,8 +5,9 @@
 
 namespace smartmill::loadmeter {
 
-FitResult fit(const std::function<void(const std::vector<double>& value, double* residuals)>& residuals,
-              std::size_t count, const std::vector<FitParameter>& parameters, double tolerance) {
+FitResult fitLeastSquares(
+    const std::function<void(const std::vector<double>& value, double* residuals)>& residuals,
+    std::size_t count, const std::vector<FitParameter>& parameters, double tolerance) {
   const smartmill::fit::FunctionResiduals function(
       static_cast<Eigen::Index>(count), [&](const Eigen::VectorXd& at, Eigen::VectorXd& residual) {
         residuals(std::vector<double>(at.data(), at.data() + at.size()), residual.data());
@@ -25,7 +26,8 @@ FitResult fit(const std::function<void(const std::vector<double>& value, double*
   return result;
 }
 
-double informationCriterion(double squares, std::size_t count, std::size_t unknowns, bool known_variance) {
+double bayesianInformationCriterion(double squares, std::size_t count, std::size_t unknowns,
+                                    bool known_variance) {
   const double n = static_cast<double>(count), p = static_cast<double>(unknowns) * std::log(n);
   if (known_variance) return squares + p;
   return n * std::log(std::max(squares, 1e-300) / n) + p;

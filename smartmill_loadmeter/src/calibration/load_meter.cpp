@@ -9,10 +9,6 @@
 
 namespace smartmill::loadmeter {
 
-double Friction::torque(double speed) const {
-  return speed < zero_below ? 0.0 : viscous * speed + coulomb;
-}
-
 std::array<double, 2> Friction::gradient(double speed) const {
   if (speed < zero_below) return {0.0, 0.0};
   return {speed, 1.0};
@@ -33,7 +29,8 @@ Friction fitFriction(const std::vector<AirCut>& air_cuts, double load_meter_gain
   double slowest = 0.0, fastest = 0.0;
   for (const AirCut& cut : air_cuts) {
     if (!(cut.speed > 0.0) || !std::isfinite(cut.voltage)) {
-      throw Error("friction: an air cut at " + std::to_string(cut.speed) + " rad/s is not usable");
+      throw Error("friction: air cut at " + std::to_string(cut.speed) +
+                  " rad/s: expected a speed > 0 and a finite voltage");
     }
     const double w = weightOf(cut);
     if (w == 0.0) continue;
@@ -43,7 +40,7 @@ Friction fitFriction(const std::vector<AirCut>& air_cuts, double load_meter_gain
     s += w, sx += w * cut.speed, sy += w * torqueOf(cut);
   }
   if (used < 2 || !(fastest > slowest * 1.05)) {
-    throw Error("friction: air cuts at two or more speeds are due, " + std::to_string(used) + " usable");
+    throw Error("friction: expected air cuts at two or more speeds, " + std::to_string(used) + " usable");
   }
   const double mean_x = sx / s, mean_y = sy / s;
   double sxx = 0.0, sxy = 0.0;
@@ -60,8 +57,8 @@ Friction fitFriction(const std::vector<AirCut>& air_cuts, double load_meter_gain
   if (used > 2) {
     double chi2 = 0.0;
     for (const AirCut& cut : air_cuts) {
-      const double rest = torqueOf(cut) - friction.torque(cut.speed);
-      chi2 += weightOf(cut) * rest * rest;
+      const double residual = torqueOf(cut) - friction.at(cut.speed);
+      chi2 += weightOf(cut) * residual * residual;
     }
     scale = weighted ? std::max(1.0, chi2 / (used - 2)) : chi2 / (used - 2);
   }
@@ -87,7 +84,7 @@ double timeConstant(double bandwidth) {
 
 MeanVoltage meanVoltage(const std::vector<double>& readings, double interval, double time_constant,
                         double resolution) {
-  if (readings.size() < 2) throw Error("load meter: a mean needs two readings");
+  if (readings.size() < 2) throw Error("load meter: expected two or more readings for a mean");
   const double n = static_cast<double>(readings.size());
   MeanVoltage result;
   for (const double v : readings) result.mean += v / n;
@@ -98,15 +95,15 @@ MeanVoltage meanVoltage(const std::vector<double>& readings, double interval, do
     if (i > 0) neighbours += d * before / (n - 1.0);
     before = d;
   }
-  // What passes the lag is correlated: rho after one interval, rho^2 after two; noise of the meter itself is
-  // not. The share that is shows in the correlation of neighbours, r = share x rho, and n readings are worth
-  // n / (1 + 2 r / (1 - rho)).
+  // Noise that passes the lag is correlated, rho after one interval, rho^2 after two; the meter's own noise
+  // is not. The correlated share follows from neighbouring readings, r = share x rho, and n readings are
+  // equivalent to n / (1 + 2 r / (1 - rho)) independent ones.
   const double rho = std::exp(-interval / time_constant);
   const double r = variance > 0.0 ? std::clamp(neighbours / variance, 0.0, rho) : 0.0;
   const double of_mean = variance * (1.0 + 2.0 * r / (1.0 - rho)) / n;
-  // Rounding moves the mean by up to half a step when there is no noise; noise of some 0.4 steps takes that
-  // away (first term of the characteristic function of the rounding error). Readings on one or two steps do
-  // not tell of such noise.
+  // Without noise rounding shifts the mean by up to half a step; noise of some 0.4 steps removes the shift
+  // (first term of the characteristic function of the rounding error). Readings on one or two steps do not
+  // show such noise.
   const double step = resolution / std::sqrt(12.0);
   const auto [lowest, highest] = std::minmax_element(readings.begin(), readings.end());
   const bool spread = *highest - *lowest > 1.5 * resolution;

@@ -27,17 +27,17 @@ IdleVoltage fitIdleVoltage(const std::vector<AirCut>& air_cuts, double zero_belo
   }
   const double determinant = s4 * s2 - s3 * s3;
   if (used < 2 || !(determinant > 1e-9 * s4 * s2)) {
-    throw Error("idle voltage: air cuts at two or more speeds are due, " + std::to_string(used) + " usable");
+    throw Error("idle voltage: expected air cuts at two or more speeds, " + std::to_string(used) + " usable");
   }
   IdleVoltage idle;
   idle.kb.value = (s2 * y2 - s3 * y1) / determinant;
   idle.ktcf.value = (s4 * y1 - s3 * y2) / determinant;
-  double rest2 = 0.0;
+  double squares = 0.0;
   for (const AirCut& cut : air_cuts) {
-    if (cut.speed >= zero_below) rest2 += std::pow(cut.voltage - idle.at(cut.speed), 2);
+    if (cut.speed >= zero_below) squares += std::pow(cut.voltage - idle.at(cut.speed), 2);
   }
   double variance = rounding(resolution) * rounding(resolution);
-  if (used > 2) variance = std::max(variance, rest2 / static_cast<double>(used - 2));
+  if (used > 2) variance = std::max(variance, squares / static_cast<double>(used - 2));
   idle.kb.std_dev = std::sqrt(variance * s2 / determinant);
   idle.ktcf.std_dev = std::sqrt(variance * s4 / determinant);
   idle.covariance = -variance * s3 / determinant;

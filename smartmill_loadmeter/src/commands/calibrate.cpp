@@ -47,21 +47,21 @@ void run(const Arguments& a) {
   }
   const IdleVoltage idle = fitIdleVoltage(air, spindle.friction_zero_below, spindle.load_meter_resolution);
   std::printf(
-      "air cuts, as the thesis (eq. 3.6..3.8):\n  Kb   %.4e +- %.1e V s2/rad2\n  KTcf %.4e +- %.1e V s/rad\n",
+      "air cuts (Dunwoody eq. 3.6..3.8):\n  Kb   %.4e +- %.1e V s2/rad2\n  KTcf %.4e +- %.1e V s/rad\n",
       idle.kb.value, idle.kb.std_dev, idle.ktcf.value, idle.ktcf.std_dev);
   std::printf("friction laws, best first:\n");
   for (const FittedFriction& f :
        fitFrictionLaws(timed, spindle.load_meter_gain, spindle.friction_zero_below)) {
-    std::printf("  BIC %9.1f, RMS %.2e Nm: %s: %.4e Nm s/rad, %.4f Nm", f.bic, f.rms, f.shape.name().c_str(),
+    std::printf("  BIC %9.1f, RMS %.2e Nm: %s: %.4e Nm s/rad, %.4f Nm", f.bic, f.rms, f.terms.name().c_str(),
                 f.law.viscous, f.law.coulomb);
-    if (f.shape.stribeck) {
+    if (f.terms.stribeck) {
       std::printf(", breakaway %.4f Nm to %.0f rpm", f.law.breakaway,
                   units::rpmFromRadPerSec(f.law.stribeck_speed));
     }
-    if (f.shape.warmup) std::printf(", cold +%.1f %%, %.0f s", 100.0 * f.law.cold_ratio, f.law.warmup_time);
+    if (f.terms.warmup) std::printf(", cold +%.1f %%, %.0f s", 100.0 * f.law.cold_ratio, f.law.warmup_time);
     std::printf("\n");
   }
-  // The force records tell the torque of every cut, the transients of the load meter its bandwidth.
+  // The force records determine the torque of every cut, the transients of the load meter its bandwidth.
   const IdentifiedCoefficients force = identifyFromForceRecords(campaign, model, Means::revolutions);
   MachineModel free_lag = model;
   free_lag.uncertainty.spindle = 50.0;
@@ -88,7 +88,7 @@ void runMotors(const Arguments& arguments) {
   const std::array<const char*, 3> names{"X", "Y", "Z"};
   for (std::size_t a = 0; a < 3; ++a) {
     if (!c.drive[a]) {
-      std::printf("drive %s: not calibrated, it moves in no standard cut\n", names[a]);
+      std::printf("drive %s: not calibrated, fewer than three standard cuts with motion\n", names[a]);
       continue;
     }
     const DriveCalibration& d = *c.drive[a];

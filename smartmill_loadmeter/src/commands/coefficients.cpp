@@ -17,7 +17,7 @@
 namespace smartmill::loadmeter {
 namespace {
 
-const char* practice(Means means) {
+const char* nameOf(Means means) {
   return means == Means::all ? "means of all samples in cut" : "means over whole revolutions";
 }
 
@@ -26,7 +26,7 @@ void fromForce(const CoefficientOptions& o, const Campaign& campaign, const Mach
   for (const Means means : {chosen, chosen == Means::all ? Means::revolutions : Means::all}) {
     const IdentifiedCoefficients found = identifyFromForceRecords(campaign, model, means);
     std::printf("%sfrom the forces of %d cuts, %s (unweighted fit):\n",
-                means == chosen ? "" : "\nfor comparison, ", found.tests, practice(means));
+                means == chosen ? "" : "\nfor comparison, ", found.tests, nameOf(means));
     printCoefficients(found.value, found.std_dev);
     std::printf("  R2 of the mean forces: x %.4f, y %.4f, z %.4f\n", found.r_squared_x, found.r_squared_y,
                 found.r_squared_z);
@@ -43,16 +43,16 @@ void fromForce(const CoefficientOptions& o, const Campaign& campaign, const Mach
             found.covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
       }
     }
-    keepRecord(o, record);
+    storeRecord(o, record);
   }
 }
 
 void fromBag(const CoefficientOptions& o) {
-  if (o.source == "force") throw Error(o.source_path + ": a bag gives coefficients from the load meter only");
+  if (o.source == "force") throw Error(o.source_path + ": --source force requires a campaign, not a bag");
   const NodeParameters& parameters = o.parameters;
   parameters.validate();
   const std::string model_file = o.model.empty() ? parameters.model : o.model;
-  if (model_file.empty()) throw Error(o.source_path + ": a bag needs the machine's model (--model)");
+  if (model_file.empty()) throw Error(o.source_path + ": a bag requires the machine's model (--model)");
   const bool terminal = isatty(STDERR_FILENO);
   const auto progress = [terminal](double share) {
     if (terminal) std::fprintf(stderr, "\rreading %3.0f %%%s", 100.0 * share, share >= 1.0 ? "\n" : "");
@@ -67,13 +67,13 @@ void fromBag(const CoefficientOptions& o) {
     };
   }
   const auto results = identifyFromBag(o.source_path, readMachineModel(model_file), parameters, listeners);
-  keepCuts(o, std::move(cuts));
+  storeCuts(o, std::move(cuts));
   for (const IdentifyResult& result : results) {
     if (result.code != IdentifyResult::Code::ok) throw Error(o.source_path + ": " + result.message);
     std::printf("%s\n", result.message.c_str());
     printLoad(result.coefficients);
     writeSection(o.output, result.coefficients.value, result.coefficients.std_dev);
-    keepRecord(o, result.record);
+    storeRecord(o, result.record);
   }
 }
 
@@ -103,7 +103,7 @@ void fromCampaign(const CoefficientOptions& o) {
   record.covariance[index(0, 0)] = found.set.std_dev.ktc * found.set.std_dev.ktc;
   record.covariance[index(0, 3)] = found.covariance_tc_te;
   record.covariance[index(3, 3)] = found.set.std_dev.kte * found.set.std_dev.kte;
-  keepRecord(o, record);
+  storeRecord(o, record);
 }
 
 void run(const CoefficientOptions& o) {

@@ -30,7 +30,7 @@ void writeSection(const std::string& file, const CuttingCoefficients& value,
   if (!stream) throw Error(file + ": cannot be written");
 }
 
-void keepRecord(const CoefficientOptions& o, CoefficientRecord record) {
+void storeRecord(const CoefficientOptions& o, CoefficientRecord record) {
   if (o.database.empty()) return;
   if (!o.tool.empty()) record.set.tool = o.tool;
   if (!o.material.empty()) record.set.material = o.material;
@@ -38,10 +38,10 @@ void keepRecord(const CoefficientOptions& o, CoefficientRecord record) {
   record.bag = o.source_path;
   record.machine = o.parameters.machine;
   const bool is_new = CoefficientDatabase(o.database).add(record);
-  std::printf("  %s: %s\n", o.database.c_str(), is_new ? "kept" : "was there already");
+  std::printf("  %s: %s\n", o.database.c_str(), is_new ? "added" : "exists already");
 }
 
-void keepCuts(const CoefficientOptions& o, std::vector<CoefficientRecord> cuts) {
+void storeCuts(const CoefficientOptions& o, std::vector<CoefficientRecord> cuts) {
   if (o.database.empty() || !o.parameters.keep_cuts) return;
   for (CoefficientRecord& cut : cuts) {
     cut.rake = units::radFromDeg(o.rake);
@@ -65,14 +65,15 @@ void printLoad(const CoefficientSet& found) {
 
 void printTerms(const CoefficientOptions& o, const LoadRecordResult& found) {
   if (o.spindle_uncertainty) {
-    std::printf("  with the stated uncertainty of the spindle; load meter's bandwidth %.4f Hz\n",
+    std::printf("  with the stated uncertainty of the spindle; load-meter bandwidth %.4f Hz\n",
                 found.bandwidth);
   }
   std::string terms;
   for (const std::string& term : found.terms) terms += (terms.empty() ? "" : ", ") + term;
   if (terms.empty()) terms = "none";
   std::printf(
-      "  noise %.4f mV; records disagree by %.4f %% (chi2 %.1f a degree of freedom); added by evidence: %s\n",
+      "  noise %.4f mV; records disagree by %.4f %% (chi2 %.1f per degree of freedom); added by evidence: "
+      "%s\n",
       1e3 * found.noise, 100.0 * found.disagreement, found.misfit, terms.c_str());
   if (found.friction.breakaway != 0.0) {
     std::printf("  Stribeck friction %.4f Nm x exp(-(n / %.1f rpm)^2)\n", found.friction.breakaway,
@@ -88,8 +89,8 @@ void printTerms(const CoefficientOptions& o, const LoadRecordResult& found) {
     std::printf("  runout %.2f um at %.1f deg\n", found.runout / units::UM,
                 units::degFromRad(found.runout_angle));
   }
-  if (!o.spindle_uncertainty && !found.terms.empty() && found.terms.back() == "load meter's lag") {
-    std::printf("  load meter's bandwidth %.4f Hz\n", found.bandwidth);
+  if (!o.spindle_uncertainty && !found.terms.empty() && found.terms.back() == "load-meter lag") {
+    std::printf("  load-meter bandwidth %.4f Hz\n", found.bandwidth);
   }
 }
 

@@ -11,7 +11,7 @@
 
 namespace smartmill::loadmeter {
 
-/// Where coefficients are identified from, and what becomes of them.
+/// Options of the command `coefficients`.
 struct CoefficientOptions {
   std::string program, source_path, source, model, means = "all", output, database;
   NodeParameters parameters;
@@ -24,16 +24,16 @@ void printCoefficients(const CuttingCoefficients& value, const CuttingCoefficien
 void printLoad(const CoefficientSet& found);
 void printTerms(const CoefficientOptions& options, const LoadRecordResult& found);
 
-/// A model file's section cutting, where a file is named. @throws Error if it cannot be written.
+/// Writes section cutting of a model file if a file is given. @throws Error when it cannot be written.
 void writeSection(const std::string& file, const CuttingCoefficients& value,
                   const CuttingCoefficients& std_dev);
 
-/// Adds an identification to the database, where one is named.
-void keepRecord(const CoefficientOptions& options, CoefficientRecord record);
+/// Adds an identification to the database if one is given.
+void storeRecord(const CoefficientOptions& options, CoefficientRecord record);
 /// Adds every cut of a bag.
-void keepCuts(const CoefficientOptions& options, std::vector<CoefficientRecord> cuts);
+void storeCuts(const CoefficientOptions& options, std::vector<CoefficientRecord> cuts);
 
-/// Means over the cuts of a campaign.
+/// Record with the mean conditions of a campaign's cuts.
 CoefficientRecord recordOf(const Campaign& campaign, const MachineModel& model);
 
 }  // namespace smartmill::loadmeter

@@ -18,8 +18,8 @@
 
 namespace smartmill::loadmeter {
 
-void mustExist(const std::string& file) {
-  if (!isFleet(file) && !std::filesystem::exists(file)) throw Error(file + ": cannot be read");
+void requireExists(const std::string& file) {
+  if (!isServerUrl(file) && !std::filesystem::exists(file)) throw Error(file + ": cannot be read");
 }
 
 CommandOptions DatabaseCommands::add(const std::string& name, const std::string& help, Body body) {
@@ -46,7 +46,7 @@ bool isCsv(const std::string& file) {
 }
 
 void list(const DatabaseOptions& o) {
-  mustExist(o.file);
+  requireExists(o.file);
   for (const CoefficientRecord& r : CoefficientDatabase(o.file).records(o.tool, o.material)) {
     std::printf("%s / %s  %s, %d tests, stamp %.3f s, %s", r.set.tool.c_str(), r.set.material.c_str(),
                 r.set.source.c_str(), r.set.tests, r.set.stamp, r.machine.empty() ? "-" : r.machine.c_str());
@@ -69,11 +69,11 @@ CoefficientQuery queryOf(const DatabaseOptions& o) {
 }
 
 void find(const DatabaseOptions& o) {
-  mustExist(o.file);
+  requireExists(o.file);
   const CoefficientDatabase database(o.file);
   const auto found = database.estimate(queryOf(o));
   if (!found) {
-    throw Error(o.file + ": nothing for '" + o.tool + "' in '" + o.material +
+    throw Error(o.file + ": no records for '" + o.tool + "' in '" + o.material +
                 "'; known: " + database.contents());
   }
   std::printf("# from %d records, the nearest '%s' in '%s' at distance %.2f%s\n%s", found->records,
@@ -83,19 +83,20 @@ void find(const DatabaseOptions& o) {
 }
 
 void answer(const DatabaseOptions& o) {
-  mustExist(o.file);
+  requireExists(o.file);
   const CoefficientDatabase database(o.file);
   const auto found = recommendCut(database, queryOf(o));
-  if (!found) throw Error(o.file + ": nothing in '" + o.material + "'; known: " + database.contents());
+  if (!found) throw Error(o.file + ": no records in '" + o.material + "'; known: " + database.contents());
   std::printf("%s\n", found->message.c_str());
-  for (const WayAnswer& way : found->ways)
-    std::printf("#   %s: Ktc %.1f +- %.1f N/mm2, %d records\n", nameOf(way.way),
-                way.set.value.ktc / units::N_PER_MM2, way.set.std_dev.ktc / units::N_PER_MM2, way.records);
+  for (const MethodEstimate& method : found->estimates)
+    std::printf("#   %s: Ktc %.1f +- %.1f N/mm2, %d records\n", nameOf(method.method),
+                method.set.value.ktc / units::N_PER_MM2, method.set.std_dev.ktc / units::N_PER_MM2,
+                method.records);
   std::printf("%s", cuttingSection(found->set.value, found->set.std_dev).c_str());
 }
 
 void predictFor(const DatabaseOptions& o) {
-  mustExist(o.file);
+  requireExists(o.file);
   std::vector<ObliqueSet> sets;
   int without_rake = 0;
   for (const CoefficientRecord& r : CoefficientDatabase(o.file).records("", o.material)) {
@@ -106,7 +107,7 @@ void predictFor(const DatabaseOptions& o) {
     sets.push_back({r.rake, r.helix, r.set.value, r.set.std_dev});
   }
   if (without_rake > 0) {
-    std::fprintf(stderr, "%s: %d records without rake or helix left out\n", o.program.c_str(), without_rake);
+    std::fprintf(stderr, "%s: %d records without rake or helix ignored\n", o.program.c_str(), without_rake);
   }
   const OrthogonalParameters p = semiInverse(sets);
   const ShearZone zone = p.at(units::radFromDeg(o.rake));
@@ -121,7 +122,7 @@ void merge(const DatabaseOptions& o) {
 }
 
 void exportAll(const DatabaseOptions& o) {
-  mustExist(o.file);
+  requireExists(o.file);
   const bool csv = isCsv(o.other);
   const auto records = CoefficientDatabase(o.file).records(o.tool, o.material);
   (csv ? exportCsv : exportYaml)(records, o.other);
@@ -133,7 +134,7 @@ void importAll(const DatabaseOptions& o) {
   std::printf("%zu new of %zu\n", CoefficientDatabase(o.file).add(records), records.size());
 }
 
-/// What is known of the cut; rake and helix may also come from records of the tool.
+/// Condition of the cut; rake and helix may also come from the tool's records.
 void cutOptions(const CommandOptions& command, DatabaseOptions& o) {
   command.option("--cutting-speed", o.cutting_speed, "cutting speed [m/min]");
   command.option("--feed-per-tooth", o.feed, "feed per tooth [mm]");
@@ -142,7 +143,7 @@ void cutOptions(const CommandOptions& command, DatabaseOptions& o) {
   command.option("--rake", o.rake, "normal rake [deg]");
 }
 
-/// Which records are meant.
+/// Selection of records.
 void pairOptions(const CommandOptions& command, DatabaseOptions& o) {
   command.option("--tool", o.tool, "name of the tool (default: any)");
   command.option("--material", o.material, "workpiece material (default: any)");

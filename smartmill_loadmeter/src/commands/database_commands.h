@@ -35,7 +35,7 @@ class DatabaseCommands {
 };
 
 /// @throws Error on a file that does not exist; a fleet's server is not looked up.
-void mustExist(const std::string& file);
+void requireExists(const std::string& file);
 
 /// Health records and explanations, which the database holds in addition to coefficients.
 void addEvidenceCommands(DatabaseCommands& commands);

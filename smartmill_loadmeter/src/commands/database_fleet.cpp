@@ -13,15 +13,15 @@
 namespace smartmill::loadmeter {
 namespace {
 
-void progressOf(const char* verb, const FleetTransfer& done) {
+void printProgress(const char* verb, const FleetTransfer& done) {
   if (isatty(STDERR_FILENO)) std::fprintf(stderr, "\r%zu %s", done.offered, verb);
 }
 
 void transfer(const DatabaseOptions& o, bool out) {
-  if (out) mustExist(o.file);
+  if (out) requireExists(o.file);
   CoefficientDatabase local(o.file);
-  const char* verb = out ? "sent" : "came";
-  const auto progress = [&](const FleetTransfer& done) { progressOf(verb, done); };
+  const char* verb = out ? "sent" : "received";
+  const auto progress = [&](const FleetTransfer& done) { printProgress(verb, done); };
   const FleetTransfer done = out ? push(local, o.other, progress, o.all) : pull(local, o.other, progress);
   if (isatty(STDERR_FILENO)) std::fprintf(stderr, "\r");
   std::printf("%zu new of %zu %s\n", done.fresh, done.offered, verb);
@@ -30,11 +30,11 @@ void transfer(const DatabaseOptions& o, bool out) {
 void migrate(const DatabaseOptions& o) {
   const int found = migrateFleet(o.file);
   if (found == FLEET_SCHEMA) {
-    std::printf("tables are of version %d already\n", found);
+    std::printf("tables have version %d already\n", found);
   } else if (found > 0) {
-    std::printf("tables of version %d are of version %d now\n", found, FLEET_SCHEMA);
+    std::printf("tables updated from version %d to %d\n", found, FLEET_SCHEMA);
   } else {
-    std::printf("tables of version %d made\n", FLEET_SCHEMA);
+    std::printf("tables of version %d created\n", FLEET_SCHEMA);
   }
 }
 
@@ -54,16 +54,16 @@ void members(const DatabaseOptions& o) {
   for (const FleetMember& m : fleetMembers(o.file)) {
     std::printf("%s of %s: %zu records", m.name.c_str(), m.shop.c_str(), m.records);
     if (std::isfinite(m.silent)) {
-      std::printf(", last push %.0f s ago, %zu behind then\n", m.silent, m.behind);
+      std::printf(", last push %.0f s ago, %zu not sent then\n", m.silent, m.behind);
     } else {
       std::printf(", no push yet\n");
     }
   }
 }
 
-/// What machines share and what is each one's own, from Ktc; then the next cut of each.
-void learn(const DatabaseOptions& o) {
-  mustExist(o.file);
+/// Prints the deviations and effects of the hierarchical model of Ktc and each machine's next cut.
+void compareMachines(const DatabaseOptions& o) {
+  requireExists(o.file);
   const auto records = CoefficientDatabase(o.file).records("", "");
   const FleetModel model(observationsOf(records, &CuttingCoefficients::ktc));
   const FleetDeviations s = model.deviations();
@@ -72,12 +72,12 @@ void learn(const DatabaseOptions& o) {
       "from cut to cut\n",
       100.0 * s.machine, 100.0 * s.batch, 100.0 * s.tool, 100.0 * s.noise);
   for (const MachineEffect& m : model.machines()) {
-    std::printf("%s: %+.2f +- %.2f %% beside the fleet, from %d, odd with probability %.3f",
-                m.machine.c_str(), 100.0 * m.effect, 100.0 * m.std_dev, m.observations, m.odd);
+    std::printf("%s: %+.2f +- %.2f %% from the fleet, %d observations, outlier with probability %.3f",
+                m.machine.c_str(), 100.0 * m.effect, 100.0 * m.std_dev, m.observations, m.outlier);
     if (const auto next = model.predict(m.machine, o.material, o.tool))
       std::printf("; next cut Ktc %.1f +- %.1f N/mm2%s", next->value / units::N_PER_MM2,
-                  next->std_dev / units::N_PER_MM2, next->own > 0 ? "" : " (it has none)");
-    std::printf("%s\n", m.odd > 0.5 ? (": " + m.meaning()).c_str() : "");
+                  next->std_dev / units::N_PER_MM2, next->own > 0 ? "" : " (no cut of its own)");
+    std::printf("%s\n", m.outlier > 0.5 ? (": " + m.meaning()).c_str() : "");
   }
 }
 
@@ -85,12 +85,12 @@ void learn(const DatabaseOptions& o) {
 
 void addFleetCommands(DatabaseCommands& commands) {
   DatabaseOptions& o = commands.options();
-  const CommandOptions sent = commands.add("push", "sends what a fleet's server does not hold yet",
+  const CommandOptions sent = commands.add("push", "sends the records that a fleet's server does not have",
                                            [](const DatabaseOptions& given) { transfer(given, true); });
   sent.option("URL", o.other, "postgresql://USER@HOST/DATABASE").required();
   sent.flag("--all", o.all, "sends everything again, for a server restored from an older copy");
   const CommandOptions fetched =
-      commands.add("pull", "fetches what the shop's other machines sent to a fleet's server",
+      commands.add("pull", "fetches the records of the shop's other machines from a fleet's server",
                    [](const DatabaseOptions& given) { transfer(given, false); });
   fetched.option("URL", o.other, "postgresql://USER@HOST/DATABASE").required();
   commands.add("migrate", "DATABASE is a server: creates its tables, or updates older ones", migrate);
@@ -101,8 +101,8 @@ void addFleetCommands(DatabaseCommands& commands) {
   enrolled.option("--login", o.login, "login at the server (default: the machine's name)");
   enrolled.option("--password-file", o.password_file, "file with its password (default: unchanged)");
   commands.add("members", "DATABASE is a server: lists its machines and how far behind each is", members);
-  const CommandOptions learned =
-      commands.add("fleet", "prints what the machines of these records share, and which deviates", learn);
+  const CommandOptions learned = commands.add(
+      "fleet", "compares the machines of these records and prints which deviate", compareMachines);
   learned.option("--tool", o.tool, "name of the tool of the next cut");
   learned.option("--material", o.material, "material of the next cut");
 }

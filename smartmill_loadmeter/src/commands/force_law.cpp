@@ -12,8 +12,8 @@
 #include "smartmill_core/io/gnuplot.h"
 #include "smartmill_core/parameters/parameter_options.h"
 #include "smartmill_core/units.h"
-#include "smartmill_loadmeter/identification/curve_finder.h"
 #include "smartmill_loadmeter/identification/force_curve.h"
+#include "smartmill_loadmeter/identification/force_curve_identification.h"
 #include "smartmill_loadmeter/identification/force_law.h"
 #include "smartmill_recording/recording_file.h"
 
@@ -22,7 +22,7 @@ namespace {
 using namespace smartmill;             // NOLINT
 using namespace smartmill::loadmeter;  // NOLINT
 
-void laws(const char* name, const std::vector<double>& chip, const std::vector<double>& force) {
+void printLaws(const char* name, const std::vector<double>& chip, const std::vector<double>& force) {
   std::printf("%s force per depth against chip thickness, best first (%zu points):\n", name, chip.size());
   for (const ForceLaw& law : fitForceLaws(chip, force)) {
     std::printf("  BIC %9.1f, RMS %6.2f N/mm  %s: ", law.bic, law.rms / units::N_PER_MM, nameOf(law.kind));
@@ -47,9 +47,9 @@ struct Options {
   NodeParameters parameters;
 };
 
-/// Steady samples of a campaign's cuts, the forces as `compensate` has left them where a folder is named.
+/// Mean revolutions of a campaign's cuts, with the forces of `compensate` if a folder is given.
 std::vector<AngleRecord> angleRecords(const Options& o, const Campaign& campaign, const MachineModel& model,
-                                      const SlotFit& fit) {
+                                      const SlotFitResult& fit) {
   std::vector<AngleRecord> records;
   std::size_t cut = 0;
   for (const CampaignTest& test : campaign.tests) {
@@ -64,8 +64,8 @@ std::vector<AngleRecord> angleRecords(const Options& o, const Campaign& campaign
                        ? record
                        : readCsv((std::filesystem::path(o.compensated) / (test.name + ".csv")).string());
     if (force.size() != record.size())
-      throw Error(
-          formatted("%s: %zu samples, the record has %zu", force.file.c_str(), force.size(), record.size()));
+      throw Error(formatted("%s: %zu samples, expected %zu as in the record", force.file.c_str(),
+                            force.size(), record.size()));
     const std::vector<double>&fx = force.column("fx"), &fy = force.column("fy");
     for (std::size_t i = first; i < record.size(); ++i) {
       revolution.add(
@@ -101,12 +101,12 @@ void draw(const ForceCurves& curves, const std::string& file) {
   plot.draw();
 }
 
-/// Writes, draws and tells curves.
-void write(const ForceCurves& curves, const std::string& file) {
+/// Writes, draws and prints curves.
+void writeAndPrint(const ForceCurves& curves, const std::string& file) {
   writeForceCurves(curves, file);
   draw(curves, file);
-  std::printf("%s: monotone splines of %zu pieces, any number of teeth in cut, %.2f N left (RMS)",
-              file.c_str(), curves.tangential.knots.size() - 1, curves.rms);
+  std::printf("%s: monotone splines of %zu segments, residual %.2f N RMS", file.c_str(),
+              curves.tangential.knots.size() - 1, curves.rms);
   std::printf(curves.scatter > 0.0 ? ", cuts differ by %.1f %%\n" : "\n", 100.0 * curves.scatter);
   for (const double share : {0.1, 0.25, 0.5, 0.75, 1.0}) {
     const double h = share * curves.tangential.knots.back();
@@ -116,29 +116,30 @@ void write(const ForceCurves& curves, const std::string& file) {
   }
 }
 
-/// What loadmeter_node makes of a recording.
+/// Force curves as loadmeter_node identifies them.
 void fromBag(const Options& o) {
-  if (o.curve.empty()) throw Error(o.campaign + ": a bag gives the curve only, name its file with --curve");
-  if (!o.compensated.empty()) throw Error("--compensated: not for a bag, which holds force/compensated");
+  if (o.curve.empty()) throw Error(o.campaign + ": a bag requires --curve FILE");
+  if (!o.compensated.empty()) throw Error("--compensated: not for a bag, which contains force/compensated");
   NodeParameters parameters = o.parameters;
   if (o.pieces > 0) parameters.curve.pieces = o.pieces;
   parameters.validate();
-  for (const FoundCurves& found : curvesFromBag(o.campaign, parameters)) {
+  for (const IdentifiedForceCurves& found : curvesFromBag(o.campaign, parameters)) {
     if ((!o.tool.empty() && found.tool != o.tool) || (!o.material.empty() && found.material != o.material))
       continue;
     std::string cuts;
     for (const std::string& name : found.cuts) cuts += (cuts.empty() ? "" : ", ") + name;
     std::printf("%s in %s: %s\n", found.tool.c_str(), found.material.c_str(), cuts.c_str());
-    write(found.curves, o.curve);
+    writeAndPrint(found.curves, o.curve);
   }
 }
 
-void writeCurve(const Options& o, const Campaign& campaign, const MachineModel& model, const SlotFit& fit) {
+void writeCurve(const Options& o, const Campaign& campaign, const MachineModel& model,
+                const SlotFitResult& fit) {
   ForceCurves curves =
       fitForceCurves(angleRecords(o, campaign, model, fit), model.needTool("fit a force curve"),
                      o.pieces > 0 ? o.pieces : o.parameters.curve.pieces);
   widen(curves, o.parameters.curve.gain_error);
-  write(curves, o.curve);
+  writeAndPrint(curves, o.curve);
 }
 
 void run(const Options& o) {
@@ -149,9 +150,9 @@ void run(const Options& o) {
   if (o.curve.empty() && !o.compensated.empty()) throw Error("--compensated: only with --curve");
   const Campaign campaign = readCampaign(o.campaign);
   const MachineModel model = readMachineModel(campaign.modelPath());
-  const std::vector<SlotFit> fits = fitSlots(campaign, model);
+  const std::vector<SlotFitResult> fits = fitSlots(campaign, model);
   std::printf("fits of the mean and the first orders of a revolution, best first:\n");
-  for (const SlotFit& f : fits) {
+  for (const SlotFitResult& f : fits) {
     std::printf("  BIC %8.1f, RMS %6.2f N  %s\n", f.bic, f.rms, f.name.c_str());
     for (const CuttingKey& k : cuttingKeys()) {
       const std::string key = k.key;
@@ -164,10 +165,10 @@ void run(const Options& o) {
     if (f.offset > 0.0) {
       std::printf("    runout %.1f +- %.1f um", f.offset / units::UM, f.offset_std / units::UM);
     }
-    if (f.unbalance > 0.0) std::printf("    turning force %.1f N", f.unbalance);
+    if (f.unbalance > 0.0) std::printf("    rotating force %.1f N", f.unbalance);
     std::printf("\n");
   }
-  // For any number of teeth; what follows needs one tooth alone.
+  // The curve is for any number of teeth, the force laws for a single tooth in cut.
   if (!o.curve.empty()) {
     writeCurve(o, campaign, model, fits.front());
     return;
@@ -179,8 +180,8 @@ void run(const Options& o) {
     tangential.push_back(p.tangential);
     radial.push_back(p.radial);
   }
-  laws("tangential", chip, tangential);
-  laws("radial", chip, radial);
+  printLaws("tangential", chip, tangential);
+  printLaws("radial", chip, radial);
 }
 
 }  // namespace
@@ -193,7 +194,7 @@ Command forceLawCommand() {
   command.tool = "force_law";
   command.summary = "compares force laws on a campaign's force records";
   command.description =
-      "Which force law the force records of a campaign prefer: linear, shifted linear or power against chip "
+      "Compares force laws on the force records of a campaign: linear, shifted linear or power over chip "
       "thickness, size effect, runout.";
   command.examples = {
       {"campaigns/none", "the laws, best first by BIC"},
@@ -214,7 +215,8 @@ Command forceLawCommand() {
     line.option("--compensated", o->compensated,
                 "folder that `compensate CAMPAIGN -o` wrote: source of fx and fy (without the sensor's own "
                 "modes)");
-    line.option("--pieces", o->pieces, "pieces of a spline (default: 8, of a bag the parameter curve_pieces)")
+    line.option("--pieces", o->pieces,
+                "segments of a spline (default: 8, of a bag the parameter curve_pieces)")
         .within(2, 30);
     line.option("--tool", o->tool, "bag with several tools: name of the tool");
     line.option("--material", o->material, "bag with several materials: name of the material");

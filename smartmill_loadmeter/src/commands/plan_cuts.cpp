@@ -23,14 +23,14 @@ struct Options {
   std::vector<double> speeds, feeds, depths;
   double ktc = 0.0, kte = 0.0, torque = 0.0, power = 0.0, voltage_std = 3e-4, ktc_std = 0.0, kte_std = 0.0;
   double entry = 0.0, exit = 180.0;
-  std::size_t most = 30;
+  std::size_t max_cuts = 30;
 };
 
 struct Limit {
   double rpm, depth_mm;
 };
 
-/// Rows speed_rpm,axial_depth_mm with rising speed; one header row.
+/// Rows speed_rpm,axial_depth_mm with increasing speed; one header row.
 std::vector<Limit> readLimits(const std::string& file) {
   const auto columns = readColumns(file, {"speed_rpm", "axial_depth_mm"});
   std::vector<Limit> limits;
@@ -45,7 +45,7 @@ std::vector<Limit> readLimits(const std::string& file) {
   return limits;
 }
 
-/// The lower of the two neighbours; nothing is known outside.
+/// Smaller depth of the two neighbours; 0 outside.
 double depthAt(const std::vector<Limit>& limits, double rpm) {
   for (std::size_t i = 1; i < limits.size(); ++i) {
     if (rpm >= limits[i - 1].rpm && rpm <= limits[i].rpm) {
@@ -59,7 +59,7 @@ double required(const char* name, double given, const std::optional<double>& of_
                 const std::string& file) {
   if (given > 0.0) return given;
   if (of_model) return *of_model;
-  throw Error(file + ": spindle." + name + " is missing and no limit is given");
+  throw Error(file + ": spindle." + name + " is missing; add it or give the limit as an option");
 }
 
 void run(const Options& o) {
@@ -82,11 +82,11 @@ void run(const Options& o) {
       return depthAt(depths, units::rpmFromRadPerSec(speed));
     };
   }
-  CuttingCoefficients believed;
-  believed.ktc = o.ktc > 0.0 ? o.ktc * units::N_PER_MM2 : model.needCutting("expect torques").ktc;
-  believed.kte = o.kte > 0.0 ? o.kte * units::N_PER_MM : model.needCutting("expect torques").kte;
-  const TestPlan plan = planTests(tool, spindle, believed, candidates, limits, o.voltage_std,
-                                  o.ktc_std * units::N_PER_MM2, o.kte_std * units::N_PER_MM, o.most);
+  CuttingCoefficients expected;
+  expected.ktc = o.ktc > 0.0 ? o.ktc * units::N_PER_MM2 : model.needCutting("expect torques").ktc;
+  expected.kte = o.kte > 0.0 ? o.kte * units::N_PER_MM : model.needCutting("expect torques").kte;
+  const TestPlan plan = planTests(tool, spindle, expected, candidates, limits, o.voltage_std,
+                                  o.ktc_std * units::N_PER_MM2, o.kte_std * units::N_PER_MM, o.max_cuts);
   std::printf(
       "# Ktc +- %.2f N/mm2, Kte +- %.3f N/mm expected from %zu cuts, each with an air cut at its speed\n",
       plan.ktc_std / units::N_PER_MM2, plan.kte_std / units::N_PER_MM, plan.cuts.size());
@@ -132,7 +132,7 @@ Command planCutsCommand() {
     line.option("--torque", o->torque, "[Nm] limit of the mean torque (default: the model's rated torque)");
     line.option("--power", o->power, "[W] limit of the mean power (default: the model's rated power)");
     line.option("--stable", o->limits, "CSV speed_rpm,axial_depth_mm: largest stable depth");
-    line.option("--most", o->most, "largest number of cuts").showDefault();
+    line.option("--most", o->max_cuts, "largest number of cuts").showDefault();
     return commandBody(o, run);
   };
   return command;

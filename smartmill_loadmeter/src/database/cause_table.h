@@ -8,31 +8,32 @@
 
 namespace smartmill::loadmeter {
 
-/// The parts of which CauseSearch's hypotheses are mixed, and what each says of every test.
+/// Mixture components of CauseSearch's hypotheses and their predictions for every test.
 struct CauseTable {
-  /// Within it each channel of each test shows with a probability of its own.
-  struct Part {
+  /// Within a component each channel of each test shows the cause with its own probability.
+  struct Component {
     std::size_t hypothesis = 0;
-    double weight = 0.0;                     // [1] of its hypothesis
+    double weight = 0.0;                     // [1] within its hypothesis
     std::vector<std::vector<double>> shows;  // [test][channel]
   };
   struct Test {
-    /// Of each outcome that some part expects most, and of all others together: [outcome][part]
+    /// Likelihood of each outcome that is the most probable one of a component, and of all others
+    /// together: [outcome][component]
     std::vector<std::vector<double>> likelihood;
   };
 
   explicit CauseTable(const FleetCauses& fleet);
   std::vector<bool> channelsOf(const Outcome& outcome) const;
-  double likelihood(const Part& part, std::size_t test, const std::vector<bool>& shows) const;
+  double likelihood(const Component& component, std::size_t test, const std::vector<bool>& shows) const;
 
   std::vector<std::string> channels;
-  std::vector<Part> parts;
+  std::vector<Component> components;
   std::vector<Test> tests;
 
  private:
   void addCause(const FleetCause& cause, std::size_t hypothesis);
-  void addNone(std::size_t hypothesis);
-  void addUnmet(std::size_t hypothesis);
+  void addNoCause(std::size_t hypothesis);
+  void addUnknownCause(std::size_t hypothesis);
   void tabulate(std::size_t test);
 
   std::size_t count_ = 0;  // of tests

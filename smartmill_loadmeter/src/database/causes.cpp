@@ -14,43 +14,43 @@ namespace smartmill::loadmeter {
 
 namespace {
 
-// Squares over the noise that a record must lose: explain names from a gain of 100 on. A force has thousands
-// of samples a record, a load meter a mean or two.
+// Squared-gap reduction that identifies a cause in a single record: `explain` names a cause from a gain of
+// 100 on. A force record has thousands of samples, a load-meter record one or two independent means.
 constexpr double FORCE_SQUARES = 0.05, LOAD_SQUARES = 100.0;
-const double ALONE = std::log(100.0);  // evidence against each rival
-constexpr double TELLS = 1e-9;         // [nat] what rounding leaves
-constexpr std::size_t NEWEST = 8;      // explanations of a cause that are looked at
+const double ACCEPTANCE = std::log(100.0);  // evidence against each other hypothesis
+constexpr double LEAST_INFORMATION = 1e-9;  // [nat] rounding error
+constexpr std::size_t NEWEST = 8;           // explanations of a cause that are used
 
-double dueOf(const std::string& channel) {
+double thresholdOf(const std::string& channel) {
   return channel == "load_meter" ? LOAD_SQUARES : FORCE_SQUARES;
 }
 
-double jeffreys(std::size_t have, std::size_t of) {
+double jeffreysOdds(std::size_t have, std::size_t of) {
   return (static_cast<double>(have) + 0.5) / (static_cast<double>(of - have) + 0.5);
 }
 
-/// Explanations of a cause, the newest last.
-struct Shown {
+/// Explanations of a cause, newest last.
+struct Explanations {
   std::vector<const ModelImprovement*> by;
-  bool alone = false;  // those that named it only
+  bool single_cause = false;  // all of them named this cause only
 
   void add(const ModelImprovement& improvement, bool is_alone) {
-    if (alone && !is_alone) return;
-    if (is_alone && !alone) *this = {{}, true};
+    if (single_cause && !is_alone) return;
+    if (is_alone && !single_cause) *this = {{}, true};
     by.push_back(&improvement);
     if (by.size() > NEWEST) by.erase(by.begin());
   }
 };
 
-Showing showingOf(const ModelImprovement& improvement, const std::vector<std::string>& tests) {
-  Showing showing(tests.size());
+EvidenceProfile profileOf(const ModelImprovement& improvement, const std::vector<std::string>& tests) {
+  EvidenceProfile profile(tests.size());
   for (const TestEvidence& t : evidenceOf(improvement)) {
     const auto at = std::lower_bound(tests.begin(), tests.end(), t.test) - tests.begin();
     for (const TestEvidence::Gap& g : t.gaps)
-      showing[static_cast<std::size_t>(at)][g.channel] =
-          std::max(0.0, g.before * g.before - g.after * g.after) / dueOf(g.channel);
+      profile[static_cast<std::size_t>(at)][g.channel] =
+          std::max(0.0, g.before * g.before - g.after * g.after) / thresholdOf(g.channel);
   }
-  return showing;
+  return profile;
 }
 
 }  // namespace
@@ -58,7 +58,7 @@ Showing showingOf(const ModelImprovement& improvement, const std::vector<std::st
 Outcome outcomeOf(const TestEvidence& test) {
   Outcome outcome;
   for (const TestEvidence::Gap& g : test.gaps) {
-    if (g.before * g.before - g.after * g.after >= dueOf(g.channel))
+    if (g.before * g.before - g.after * g.after >= thresholdOf(g.channel))
       outcome += (outcome.empty() ? "" : " ") + g.channel;
   }
   return outcome;
@@ -67,7 +67,7 @@ Outcome outcomeOf(const TestEvidence& test) {
 FleetCauses fleetCauses(const std::vector<ModelImprovement>& improvements, const std::string& except) {
   std::set<std::string> explained, tests;
   std::map<std::string, std::set<std::string>> machines;
-  std::map<std::string, Shown> shown;
+  std::map<std::string, Explanations> profiles;
   std::map<std::string, FoundCause> newest;
   for (const ModelImprovement& i : improvements) {
     if (i.machine == except) continue;
@@ -76,13 +76,13 @@ FleetCauses fleetCauses(const std::vector<ModelImprovement>& improvements, const
     for (const FoundCause& cause : causes) {
       machines[cause.name].insert(i.machine);
       newest[cause.name] = cause;
-      shown[cause.name].add(i, causes.size() == 1);
+      profiles[cause.name].add(i, causes.size() == 1);
     }
   }
   FleetCauses fleet;
   fleet.explained = explained.size();
-  fleet.other_odds = jeffreys(0, explained.size());
-  for (const auto& [name, s] : shown) {
+  fleet.other_odds = jeffreysOdds(0, explained.size());
+  for (const auto& [name, s] : profiles) {
     for (const ModelImprovement* i : s.by) {
       for (const TestEvidence& t : evidenceOf(*i)) tests.insert(t.test);
     }
@@ -90,8 +90,8 @@ FleetCauses fleetCauses(const std::vector<ModelImprovement>& improvements, const
   fleet.tests.assign(tests.begin(), tests.end());
   for (const auto& [name, who] : machines) {
     FleetCause cause{
-        name, {who.begin(), who.end()}, jeffreys(who.size(), explained.size()), newest[name], {}};
-    for (const ModelImprovement* i : shown[name].by) cause.shown.push_back(showingOf(*i, fleet.tests));
+        name, {who.begin(), who.end()}, jeffreysOdds(who.size(), explained.size()), newest[name], {}};
+    for (const ModelImprovement* i : profiles[name].by) cause.profiles.push_back(profileOf(*i, fleet.tests));
     fleet.causes.push_back(cause);
   }
   std::stable_sort(fleet.causes.begin(), fleet.causes.end(),
@@ -110,28 +110,29 @@ CauseOdds oddsOf(const FleetCauses& fleet) {
 }
 
 CauseSearch::CauseSearch(const FleetCauses& fleet, const std::vector<double>& odds)
-    : table_(std::make_shared<CauseTable>(fleet)), prior_(odds), made_(fleet.tests.size(), false) {
-  // Each beside none: probabilities in the ratio of their odds, and none as 1.
+    : table_(std::make_shared<CauseTable>(fleet)), prior_(odds), is_done_(fleet.tests.size(), false) {
+  // Prior probabilities in the ratio of the odds; the hypothesis of no cause has odds 1.
   prior_.push_back(1.0);
   prior_.push_back(fleet.other_odds);
   const double sum = std::accumulate(prior_.begin(), prior_.end(), 0.0);
   for (double& p : prior_) p /= sum;
-  for (const CauseTable::Part& part : table_->parts) parts_.push_back(std::log(part.weight));
-  weigh();
+  for (const CauseTable::Component& component : table_->components)
+    log_weights_.push_back(std::log(component.weight));
+  updateProbabilities();
 }
 
-// From the parts' likelihoods: of the hypotheses, and what is probable now.
-void CauseSearch::weigh() {
+// Updates the evidence and the probabilities of hypotheses and components.
+void CauseSearch::updateProbabilities() {
   evidence_.assign(prior_.size(), -std::numeric_limits<double>::infinity());
   std::vector<double> most = evidence_;
-  for (std::size_t p = 0; p < parts_.size(); ++p) {
-    double& m = most[table_->parts[p].hypothesis];
-    m = std::max(m, parts_[p]);
+  for (std::size_t p = 0; p < log_weights_.size(); ++p) {
+    double& m = most[table_->components[p].hypothesis];
+    m = std::max(m, log_weights_[p]);
   }
   std::vector<double> sums(prior_.size(), 0.0);
-  for (std::size_t p = 0; p < parts_.size(); ++p) {
-    const std::size_t h = table_->parts[p].hypothesis;
-    sums[h] += std::exp(parts_[p] - most[h]);
+  for (std::size_t p = 0; p < log_weights_.size(); ++p) {
+    const std::size_t h = table_->components[p].hypothesis;
+    sums[h] += std::exp(log_weights_[p] - most[h]);
   }
   for (std::size_t h = 0; h < sums.size(); ++h) evidence_[h] = most[h] + std::log(sums[h]);
   const double largest = *std::max_element(evidence_.begin(), evidence_.end());
@@ -142,10 +143,10 @@ void CauseSearch::weigh() {
     sum += probability_.back();
   }
   for (double& p : probability_) p /= sum;
-  now_.clear();
-  for (std::size_t p = 0; p < parts_.size(); ++p) {
-    const std::size_t h = table_->parts[p].hypothesis;
-    now_.push_back(probability_[h] * std::exp(parts_[p] - evidence_[h]));
+  component_probability_.clear();
+  for (std::size_t p = 0; p < log_weights_.size(); ++p) {
+    const std::size_t h = table_->components[p].hypothesis;
+    component_probability_.push_back(probability_[h] * std::exp(log_weights_[p] - evidence_[h]));
   }
 }
 
@@ -154,8 +155,8 @@ double CauseSearch::information(std::size_t test) const {
   double gained = 0.0;
   for (const std::vector<double>& likelihoods : of.likelihood) {
     std::vector<double> joint(probability_.size(), 0.0);
-    for (std::size_t p = 0; p < now_.size(); ++p)
-      joint[table_->parts[p].hypothesis] += now_[p] * likelihoods[p];
+    for (std::size_t p = 0; p < component_probability_.size(); ++p)
+      joint[table_->components[p].hypothesis] += component_probability_[p] * likelihoods[p];
     const double mixed = std::accumulate(joint.begin(), joint.end(), 0.0);
     for (std::size_t h = 0; h < joint.size(); ++h) {
       if (joint[h] > 0.0) gained += joint[h] * std::log(joint[h] / (mixed * probability_[h]));
@@ -166,9 +167,9 @@ double CauseSearch::information(std::size_t test) const {
 
 std::optional<std::size_t> CauseSearch::next() const {
   std::optional<std::size_t> best;
-  double most = TELLS;
-  for (std::size_t t = 0; t < made_.size(); ++t) {
-    if (made_[t]) continue;
+  double most = LEAST_INFORMATION;
+  for (std::size_t t = 0; t < is_done_.size(); ++t) {
+    if (is_done_[t]) continue;
     const double gained = information(t);
     if (gained <= most) continue;
     most = gained;
@@ -177,32 +178,32 @@ std::optional<std::size_t> CauseSearch::next() const {
   return best;
 }
 
-void CauseSearch::saw(std::size_t test, const Outcome& outcome) {
-  made_[test] = true;
+void CauseSearch::addOutcome(std::size_t test, const Outcome& outcome) {
+  is_done_[test] = true;
   const std::vector<bool> shows = table_->channelsOf(outcome);
-  for (std::size_t p = 0; p < parts_.size(); ++p)
-    parts_[p] += std::log(table_->likelihood(table_->parts[p], test, shows));
-  weigh();
+  for (std::size_t p = 0; p < log_weights_.size(); ++p)
+    log_weights_[p] += std::log(table_->likelihood(table_->components[p], test, shows));
+  updateProbabilities();
 }
 
-std::optional<std::size_t> CauseSearch::alone() const {
+std::optional<std::size_t> CauseSearch::acceptedHypothesis() const {
   const auto best =
       static_cast<std::size_t>(std::max_element(evidence_.begin(), evidence_.end()) - evidence_.begin());
   if (best + 1 == evidence_.size()) return std::nullopt;
   for (std::size_t h = 0; h < evidence_.size(); ++h) {
-    if (h != best && evidence_[best] - evidence_[h] < ALONE) return std::nullopt;
+    if (h != best && evidence_[best] - evidence_[h] < ACCEPTANCE) return std::nullopt;
   }
   return best;
 }
 
 namespace {
 
-// What its explanations showed in a test, each once; not where they showed nothing.
+// Distinct nonempty outcomes of a cause's explanations in a test.
 std::set<Outcome> outcomesOf(const FleetCause& cause, std::size_t test) {
   std::set<Outcome> all;
-  for (const Showing& showing : cause.shown) {
+  for (const EvidenceProfile& profile : cause.profiles) {
     Outcome outcome;
-    for (const auto& [channel, squares] : showing[test]) {
+    for (const auto& [channel, squares] : profile[test]) {
       if (squares >= 1.0) outcome += (outcome.empty() ? "" : " ") + channel;
     }
     if (!outcome.empty()) all.insert(outcome);
@@ -228,17 +229,17 @@ std::vector<Proposal> proposalsFor(const std::string& machine,
   for (const FleetCause& c : causes) odds.push_back(c.odds);
   CauseSearch search(fleet, odds);
   std::vector<Proposal> proposals;
-  while (const auto test = search.alone() ? std::nullopt : search.next()) {
+  while (const auto test = search.acceptedHypothesis() ? std::nullopt : search.next()) {
     Proposal p{fleet.tests[*test], search.information(*test), {}};
     for (std::size_t c = 0; c < causes.size(); ++c) {
       for (const Outcome& outcome : outcomesOf(causes[c], *test)) {
-        p.reasons.push_back(formatted("%s would show in %s (probability %.3f; %zu of %zu machines have it)",
+        p.reasons.push_back(formatted("%s would show in %s (probability %.3f; found on %zu of %zu machines)",
                                       causes[c].newest.text().c_str(), outcome.c_str(),
                                       search.probabilities()[c], causes[c].machines.size(), fleet.explained));
       }
     }
     proposals.push_back(p);
-    search.saw(*test, "");
+    search.addOutcome(*test, "");
   }
   return proposals;
 }

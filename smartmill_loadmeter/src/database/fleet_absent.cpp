@@ -1,4 +1,4 @@
-// In place of fleet_postgresql.cpp where libpq is not installed.
+// Replaces fleet_postgresql.cpp without libpq.
 #include "fleet_server.h"
 #include "smartmill_core/error.h"
 
@@ -7,8 +7,7 @@ namespace smartmill::loadmeter {
 namespace {
 
 [[noreturn]] void refuse(const std::string& url) {
-  throw Error(withoutPassword(url) +
-              ": this build has no libpq, `./setup --with-fleet` installs and builds it");
+  throw Error(withoutPassword(url) + ": this build has no libpq; install it with `./setup --with-fleet`");
 }
 
 }  // namespace

@@ -11,7 +11,7 @@ namespace smartmill::loadmeter {
 
 namespace {
 
-// libpq's messages have several lines and end in one.
+// Messages of libpq have several lines.
 std::string oneLine(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
   std::replace(text.begin(), text.end(), '\t', ' ');
@@ -25,18 +25,18 @@ std::string oneLine(std::string text) {
 
 }  // namespace
 
-double FleetRows::number(int row, int column) const {
+double QueryResult::number(int row, int column) const {
   if (PQgetisnull(result_.get(), row, column)) return std::numeric_limits<double>::quiet_NaN();
   return std::strtod(PQgetvalue(result_.get(), row, column), nullptr);
 }
 
-std::size_t FleetRows::affected() const {
+std::size_t QueryResult::affected() const {
   return std::strtoull(PQcmdTuples(result_.get()), nullptr, 10);
 }
 
 FleetConnection::FleetConnection(const std::string& url)
-    : shown_(withoutPassword(url)), connection_(nullptr, PQfinish) {
-  // Later words win, so that the address may say otherwise: a cable that is pulled is found within seconds.
+    : displayed_url_(withoutPassword(url)), connection_(nullptr, PQfinish) {
+  // The address may override these values. A broken connection is detected within seconds.
   const char* keys[] = {"connect_timeout",
                         "tcp_user_timeout",
                         "keepalives_idle",
@@ -53,11 +53,11 @@ FleetConnection::FleetConnection(const std::string& url)
 }
 
 void FleetConnection::fail(const std::string& what) const {
-  throw Error(shown_ + ": " + oneLine(what));
+  throw Error(displayed_url_ + ": " + oneLine(what));
 }
 
-FleetRows FleetConnection::checked(PGresult* result) const {
-  FleetRows rows(result);
+QueryResult FleetConnection::requireSuccess(PGresult* result) const {
+  QueryResult rows(result);
   const ExecStatusType status = PQresultStatus(result);
   if (status != PGRES_COMMAND_OK && status != PGRES_TUPLES_OK) {
     const std::string what = result ? PQresultErrorMessage(result) : "";
@@ -66,30 +66,30 @@ FleetRows FleetConnection::checked(PGresult* result) const {
   return rows;
 }
 
-FleetRows FleetConnection::run(const std::string& sql) {
-  return checked(PQexec(connection_.get(), sql.c_str()));
+QueryResult FleetConnection::execute(const std::string& sql) {
+  return requireSuccess(PQexec(connection_.get(), sql.c_str()));
 }
 
-FleetRows FleetConnection::ask(const std::string& sql, const std::vector<std::string>& parameters) {
+QueryResult FleetConnection::query(const std::string& sql, const std::vector<std::string>& parameters) {
   const auto at = std::find(prepared_.begin(), prepared_.end(), sql);
   const std::string statement = "s" + std::to_string(at - prepared_.begin());
   const int count = static_cast<int>(parameters.size());
   if (at == prepared_.end()) {
-    checked(PQprepare(connection_.get(), statement.c_str(), sql.c_str(), count, nullptr));
+    requireSuccess(PQprepare(connection_.get(), statement.c_str(), sql.c_str(), count, nullptr));
     prepared_.push_back(sql);
   }
   std::vector<const char*> values;
   for (const std::string& p : parameters) values.push_back(p.c_str());
-  return checked(
+  return requireSuccess(
       PQexecPrepared(connection_.get(), statement.c_str(), count, values.data(), nullptr, nullptr, 0));
 }
 
 void FleetConnection::copyIn(const std::string& sql, const std::string& lines) {
   PGresult* start = PQexec(connection_.get(), sql.c_str());
   const bool ready = PQresultStatus(start) == PGRES_COPY_IN;
-  const std::string refused = PQresultErrorMessage(start);
+  const std::string message = PQresultErrorMessage(start);
   PQclear(start);
-  if (!ready) fail(refused);
+  if (!ready) fail(message);
   if (PQputCopyData(connection_.get(), lines.data(), static_cast<int>(lines.size())) != 1 ||
       PQputCopyEnd(connection_.get(), nullptr) != 1)
     fail(PQerrorMessage(connection_.get()));
@@ -101,7 +101,7 @@ void FleetConnection::copyIn(const std::string& sql, const std::string& lines) {
   if (!what.empty()) fail(what);
 }
 
-std::string FleetConnection::quoted(const std::string& word) const {
+std::string FleetConnection::literal(const std::string& word) const {
   char* text = PQescapeLiteral(connection_.get(), word.c_str(), word.size());
   if (!text) fail(PQerrorMessage(connection_.get()));
   std::string result(text);

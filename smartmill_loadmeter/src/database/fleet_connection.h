@@ -8,10 +8,10 @@
 
 namespace smartmill::loadmeter {
 
-/// Answer to a command: rows of text. NULL numbers are NaN, NULL words empty.
-class FleetRows {
+/// Result of a command: rows of text. NULL numbers are NaN, NULL text is empty.
+class QueryResult {
  public:
-  explicit FleetRows(PGresult* result) : result_(result, PQclear) {}
+  explicit QueryResult(PGresult* result) : result_(result, PQclear) {}
   int size() const { return PQntuples(result_.get()); }
   std::string word(int row, int column) const { return PQgetvalue(result_.get(), row, column); }
   double number(int row, int column) const;
@@ -21,27 +21,29 @@ class FleetRows {
   std::unique_ptr<PGresult, decltype(&PQclear)> result_;
 };
 
-/// A connection of libpq whose every failure is an Error "URL: what" in one line.
+/// Connection of libpq that reports failures as Error "URL: reason" in one line. libpqxx would not shorten
+/// it: its interface differs between the supported releases (6.4 and 7.10), and errors, COPY and time-outs
+/// need the same code.
 class FleetConnection {
  public:
   explicit FleetConnection(const std::string& url);
 
-  /// Any commands, without parameters.
-  FleetRows run(const std::string& sql);
-  /// One command with parameters $1.., prepared when it comes for the first time.
-  FleetRows ask(const std::string& sql, const std::vector<std::string>& parameters);
-  /// Lines of the text format into what "COPY ... FROM STDIN" names.
+  /// Executes commands without parameters.
+  QueryResult execute(const std::string& sql);
+  /// Executes one command with parameters $1.., prepared on first use.
+  QueryResult query(const std::string& sql, const std::vector<std::string>& parameters);
+  /// Sends lines of the text format to "COPY ... FROM STDIN".
   void copyIn(const std::string& sql, const std::string& lines);
-  std::string quoted(const std::string& word) const;  ///< as a literal
-  std::string name(const std::string& word) const;    ///< as an identifier
+  std::string literal(const std::string& word) const;  ///< as a literal
+  std::string name(const std::string& word) const;     ///< as an identifier
 
-  /// Work between BEGIN and COMMIT; anything thrown takes all of it back.
+  /// Runs work between BEGIN and COMMIT; an exception rolls it back.
   template <typename Work>
   void transaction(const char* begin, const Work& work) {
-    run(begin);
+    execute(begin);
     try {
       work();
-      run("COMMIT");
+      execute("COMMIT");
     } catch (...) {
       PQclear(PQexec(connection_.get(), "ROLLBACK"));
       throw;
@@ -51,9 +53,9 @@ class FleetConnection {
   [[noreturn]] void fail(const std::string& what) const;
 
  private:
-  FleetRows checked(PGresult* result) const;
+  QueryResult requireSuccess(PGresult* result) const;
 
-  std::string shown_;
+  std::string displayed_url_;
   std::unique_ptr<PGconn, decltype(&PQfinish)> connection_;
   std::vector<std::string> prepared_;
 };

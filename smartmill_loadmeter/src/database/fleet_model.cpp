@@ -15,12 +15,12 @@ namespace smartmill::loadmeter {
 
 namespace {
 
-constexpr double UNSTATED = 0.05;  // [1] deviation of an observation that states none
-// [1] half-normal beliefs of the deviations; they count where two or three machines tell little.
-constexpr FleetDeviations BELIEVED{0.15, 0.1, 0.3, 0.0};
-constexpr double CERTAIN = 1e-9;  // [1] least deviation of a cell
+constexpr double DEFAULT_STD = 0.05;  // [1] standard deviation of an observation without one
+// Scales of the half-normal priors of the deviations [1]; they matter with two or three machines.
+constexpr FleetDeviations PRIOR_SCALE{0.15, 0.1, 0.3, 0.0};
+constexpr double LEAST_STD = 1e-9;  // [1] smallest standard deviation of a cell
 
-/// All of one machine's observations of one group.
+/// Observations of one group by one machine.
 struct Cell {
   std::size_t group = 0;
   int count = 0;
@@ -38,13 +38,13 @@ struct Group {
   std::size_t material = 0;
 };
 
-/// The marginal covariance of a machine's cells, D + s^2 11', by Woodbury.
-struct Block {
-  Eigen::VectorXd weight;  // of D's inverse
+/// Marginal covariance of a machine's cells, D + s^2 11', by the Woodbury identity.
+struct CellCovariance {
+  Eigen::VectorXd weight;  // of the inverse of D
   double shrink = 0.0;     // V^-1 = W - shrink w w'
   double log_determinant = 0.0;
 
-  Block(const Machine& machine, double effect_variance, double batch_variance)
+  CellCovariance(const Machine& machine, double effect_variance, double batch_variance)
       : weight(machine.cells.size()) {
     for (std::size_t i = 0; i < machine.cells.size(); ++i) {
       const double variance = batch_variance + machine.cells[i].variance;
@@ -60,17 +60,17 @@ struct Block {
   }
 };
 
-/// One choice of deviations: its weight, the groups' effects, and how odd each machine is.
-struct Node {
+/// Grid point of the deviations: weight, groups' effects, and outlier probability of each machine.
+struct GridPoint {
   FleetDeviations s;
   double log_weight = 0.0;
   Eigen::VectorXd groups;
   Eigen::MatrixXd covariance;
-  std::vector<double> odd;
+  std::vector<double> outlier;
 };
 
-double gauss(const Block& block, const Eigen::VectorXd& r) {
-  return -0.5 * (block.log_determinant + r.dot(block.solve(r)));
+double logLikelihood(const CellCovariance& covariance, const Eigen::VectorXd& r) {
+  return -0.5 * (covariance.log_determinant + r.dot(covariance.solve(r)));
 }
 
 }  // namespace
@@ -83,7 +83,7 @@ struct FleetModel::Impl {
   std::vector<Machine> machines;
   std::vector<std::size_t> group_of, machine_of;  // of each observation
   double noise = 0.0;
-  std::vector<Node> nodes;
+  std::vector<GridPoint> points;
 
   std::optional<std::size_t> materialAt(const std::string& name) const {
     const auto at = std::find(materials.begin(), materials.end(), name);
@@ -97,25 +97,26 @@ struct FleetModel::Impl {
   }
 
   static double ownVariance(const FleetObservation& o) {
-    const double relative = std::isfinite(o.std_dev) ? o.std_dev / o.value : UNSTATED;
+    const double relative = std::isfinite(o.std_dev) ? o.std_dev / o.value : DEFAULT_STD;
     return relative * relative;
   }
 
-  void sort();
+  void indexObservations();
   void estimateNoise();
   void fillCells();
-  Eigen::VectorXd rest(const Machine& machine, const Eigen::VectorXd& effects) const;
+  Eigen::VectorXd residualOf(const Machine& machine, const Eigen::VectorXd& effects) const;
   Eigen::MatrixXd toolPrior(double tool) const;
-  void solveGroups(Node* node) const;
-  Node solve(const FleetDeviations& s) const;
-  void explore();
-  void average(const std::array<std::vector<double>, 3>& axes, bool last);
+  void solveGroups(GridPoint* point) const;
+  GridPoint solve(const FleetDeviations& s) const;
+  void integrate();
+  void evaluateGrid(const std::array<std::vector<double>, 3>& axes, bool last);
 };
 
-void FleetModel::Impl::sort() {
+void FleetModel::Impl::indexObservations() {
   for (const FleetObservation& o : observations) {
     if (!(o.value > 0.0) || !std::isfinite(o.value))
-      throw Error("fleet: a value of '" + o.machine + "' in '" + o.material + "' is not above 0");
+      throw Error("fleet: value of '" + o.machine + "' in '" + o.material +
+                  "': expected a finite number > 0");
     auto material = materialAt(o.material);
     if (!material) {
       materials.push_back(o.material);
@@ -131,11 +132,11 @@ void FleetModel::Impl::sort() {
     group_of.push_back(g);
     machine_of.push_back(m);
   }
-  if (observations.empty()) throw Error("fleet: nothing was observed");
+  if (observations.empty()) throw Error("fleet: no observations");
 }
 
-// Scatter within cells beyond the stated deviations, by moments: E sum (y - mean)^2 = sum (1 - 1/n) (s^2 +
-// noise^2).
+// Scatter within cells beyond the stated deviations, by the method of moments: E sum (y - mean)^2 = sum (1 -
+// 1/n) (s^2 + noise^2).
 void FleetModel::Impl::estimateNoise() {
   if (options.known) {
     noise = options.known->noise;
@@ -163,8 +164,8 @@ void FleetModel::Impl::fillCells() {
       auto cell = std::find_if(machine.cells.begin(), machine.cells.end(),
                                [&](const Cell& c) { return c.group == group_of[i]; });
       if (cell == machine.cells.end()) cell = machine.cells.insert(machine.cells.end(), Cell{group_of[i]});
-      const double variance = std::max(ownVariance(observations[i]) + noise * noise, CERTAIN * CERTAIN);
-      // For now: sums of weights and of weighted values.
+      const double variance = std::max(ownVariance(observations[i]) + noise * noise, LEAST_STD * LEAST_STD);
+      // At first sums of weights and of weighted values.
       ++cell->count;
       cell->variance += 1.0 / variance;
       cell->mean += std::log(observations[i].value) / variance;
@@ -176,7 +177,7 @@ void FleetModel::Impl::fillCells() {
   }
 }
 
-Eigen::VectorXd FleetModel::Impl::rest(const Machine& machine, const Eigen::VectorXd& effects) const {
+Eigen::VectorXd FleetModel::Impl::residualOf(const Machine& machine, const Eigen::VectorXd& effects) const {
   Eigen::VectorXd r(machine.cells.size());
   for (std::size_t i = 0; i < machine.cells.size(); ++i)
     r[static_cast<Eigen::Index>(i)] =
@@ -184,7 +185,7 @@ Eigen::VectorXd FleetModel::Impl::rest(const Machine& machine, const Eigen::Vect
   return r;
 }
 
-// Precision of the groups about their material's unknown mean: (I - 11'/n) / tool^2 for each material.
+// Precision of the groups about the unknown mean of their material: (I - 11'/n) / tool^2.
 Eigen::MatrixXd FleetModel::Impl::toolPrior(double tool) const {
   const auto count = static_cast<Eigen::Index>(groups.size());
   Eigen::MatrixXd prior = Eigen::MatrixXd::Zero(count, count);
@@ -200,104 +201,108 @@ Eigen::MatrixXd FleetModel::Impl::toolPrior(double tool) const {
   return prior;
 }
 
-// Generalised least squares of the groups' effects, each machine's block between usual and odd by how odd it
-// is.
-void FleetModel::Impl::solveGroups(Node* node) const {
-  const double usual = node->s.machine * node->s.machine, batch = node->s.batch * node->s.batch;
-  const double wide = usual + options.odd_size * options.odd_size;
+// Generalised least squares of the groups' effects; each machine's covariance is a mean of the usual and the
+// outlier one by its outlier probability.
+void FleetModel::Impl::solveGroups(GridPoint* point) const {
+  const double usual = point->s.machine * point->s.machine, batch = point->s.batch * point->s.batch;
+  const double wide = usual + options.outlier_std * options.outlier_std;
   const auto count = static_cast<Eigen::Index>(groups.size());
-  Eigen::MatrixXd normal = toolPrior(node->s.tool);
+  Eigen::MatrixXd normal = toolPrior(point->s.tool);
   Eigen::VectorXd right = Eigen::VectorXd::Zero(count);
   for (std::size_t m = 0; m < machines.size(); ++m) {
     const std::vector<Cell>& cells = machines[m].cells;
     for (const auto& [share, variance] :
-         {std::pair{1.0 - node->odd[m], usual}, std::pair{node->odd[m], wide}}) {
+         {std::pair{1.0 - point->outlier[m], usual}, std::pair{point->outlier[m], wide}}) {
       if (share == 0.0) continue;
-      const Block block(machines[m], variance, batch);
+      const CellCovariance covariance(machines[m], variance, batch);
       double mean = 0.0;
       for (std::size_t i = 0; i < cells.size(); ++i)
-        mean += block.weight[static_cast<Eigen::Index>(i)] * cells[i].mean;
+        mean += covariance.weight[static_cast<Eigen::Index>(i)] * cells[i].mean;
       for (std::size_t i = 0; i < cells.size(); ++i) {
-        const double w = block.weight[static_cast<Eigen::Index>(i)];
+        const double w = covariance.weight[static_cast<Eigen::Index>(i)];
         const auto g = static_cast<Eigen::Index>(cells[i].group);
-        right[g] += share * w * (cells[i].mean - block.shrink * mean);
+        right[g] += share * w * (cells[i].mean - covariance.shrink * mean);
         normal(g, g) += share * w;
         for (std::size_t j = 0; j < cells.size(); ++j)
           normal(g, static_cast<Eigen::Index>(cells[j].group)) -=
-              share * block.shrink * w * block.weight[static_cast<Eigen::Index>(j)];
+              share * covariance.shrink * w * covariance.weight[static_cast<Eigen::Index>(j)];
       }
     }
   }
   const Eigen::LDLT<Eigen::MatrixXd> solver(normal);
-  node->groups = solver.solve(right);
-  node->covariance = solver.solve(Eigen::MatrixXd::Identity(count, count));
-  node->log_weight = -0.5 * solver.vectorD().array().abs().max(1e-300).log().sum();
+  point->groups = solver.solve(right);
+  point->covariance = solver.solve(Eigen::MatrixXd::Identity(count, count));
+  point->log_weight = -0.5 * solver.vectorD().array().abs().max(1e-300).log().sum();
 }
 
-// Groups and oddness in turn; then the restricted likelihood of these deviations.
-Node FleetModel::Impl::solve(const FleetDeviations& s) const {
-  constexpr int TURNS = 12;
-  constexpr double SETTLED = 1e-4;
-  Node node;
-  node.s = s;
-  node.odd.assign(machines.size(), 0.0);
+// Alternates between groups and outlier probabilities, then computes the restricted likelihood of these
+// deviations.
+GridPoint FleetModel::Impl::solve(const FleetDeviations& s) const {
+  constexpr int MAX_ITERATIONS = 12;
+  constexpr double CONVERGED = 1e-4;
+  GridPoint point;
+  point.s = s;
+  point.outlier.assign(machines.size(), 0.0);
   const double batch = s.batch * s.batch, usual = s.machine * s.machine;
-  const double wide = usual + options.odd_size * options.odd_size;
+  const double wide = usual + options.outlier_std * options.outlier_std;
   double likelihood = 0.0;
-  for (int turn = 0; turn < TURNS; ++turn) {
-    solveGroups(&node);
+  for (int iteration = 0; iteration < MAX_ITERATIONS; ++iteration) {
+    solveGroups(&point);
     double change = 0.0;
     likelihood = 0.0;
     for (std::size_t m = 0; m < machines.size(); ++m) {
-      const Eigen::VectorXd r = rest(machines[m], node.groups);
-      const double as_usual = std::log1p(-options.odd_share) + gauss(Block(machines[m], usual, batch), r);
-      const double as_odd = options.odd_share > 0.0
-                                ? std::log(options.odd_share) + gauss(Block(machines[m], wide, batch), r)
-                                : -std::numeric_limits<double>::infinity();
-      const double top = std::max(as_usual, as_odd);
-      const double sum = std::exp(as_usual - top) + std::exp(as_odd - top);
+      const Eigen::VectorXd r = residualOf(machines[m], point.groups);
+      const double as_usual = std::log1p(-options.outlier_probability) +
+                              logLikelihood(CellCovariance(machines[m], usual, batch), r);
+      const double as_outlier = options.outlier_probability > 0.0
+                                    ? std::log(options.outlier_probability) +
+                                          logLikelihood(CellCovariance(machines[m], wide, batch), r)
+                                    : -std::numeric_limits<double>::infinity();
+      const double top = std::max(as_usual, as_outlier);
+      const double sum = std::exp(as_usual - top) + std::exp(as_outlier - top);
       likelihood += top + std::log(sum);
-      const double odd = std::exp(as_odd - top) / sum;
-      change = std::max(change, std::abs(odd - node.odd[m]));
-      node.odd[m] = odd;
+      const double outlier = std::exp(as_outlier - top) / sum;
+      change = std::max(change, std::abs(outlier - point.outlier[m]));
+      point.outlier[m] = outlier;
     }
-    if (change < SETTLED) break;
+    if (change < CONVERGED) break;
   }
   const double contrasts = static_cast<double>(groups.size() - materials.size());
-  node.log_weight +=
-      likelihood - contrasts * std::log(s.tool) - 0.5 * node.groups.dot(toolPrior(s.tool) * node.groups);
-  return node;
+  point.log_weight +=
+      likelihood - contrasts * std::log(s.tool) - 0.5 * point.groups.dot(toolPrior(s.tool) * point.groups);
+  return point;
 }
 
-void FleetModel::Impl::average(const std::array<std::vector<double>, 3>& axes, bool last) {
-  nodes.clear();
+void FleetModel::Impl::evaluateGrid(const std::array<std::vector<double>, 3>& axes, bool last) {
+  points.clear();
   for (const double machine : axes[0]) {
     for (const double batch : axes[1]) {
       for (const double tool : axes[2]) {
-        nodes.push_back(solve({machine, batch, tool, noise}));
+        points.push_back(solve({machine, batch, tool, noise}));
         // The axes are logarithmic.
-        nodes.back().log_weight +=
+        points.back().log_weight +=
             std::log(machine * batch * tool) -
-            0.5 * (std::pow(machine / BELIEVED.machine, 2) + std::pow(batch / BELIEVED.batch, 2) +
-                   std::pow(tool / BELIEVED.tool, 2));
+            0.5 * (std::pow(machine / PRIOR_SCALE.machine, 2) + std::pow(batch / PRIOR_SCALE.batch, 2) +
+                   std::pow(tool / PRIOR_SCALE.tool, 2));
       }
     }
   }
   double top = -std::numeric_limits<double>::infinity(), sum = 0.0;
-  for (const Node& node : nodes) top = std::max(top, node.log_weight);
-  for (Node& node : nodes) sum += node.log_weight = std::exp(node.log_weight - top);
-  for (Node& node : nodes) node.log_weight /= sum;
+  for (const GridPoint& point : points) top = std::max(top, point.log_weight);
+  for (GridPoint& point : points) sum += point.log_weight = std::exp(point.log_weight - top);
+  for (GridPoint& point : points) point.log_weight /= sum;
   if (!last) return;
-  constexpr double SMALL = 1e-4;  // of the weight: left out
-  nodes.erase(std::remove_if(nodes.begin(), nodes.end(), [](const Node& n) { return n.log_weight < SMALL; }),
-              nodes.end());
+  constexpr double SMALL = 1e-4;  // grid points with a smaller weight are removed
+  points.erase(
+      std::remove_if(points.begin(), points.end(), [](const GridPoint& n) { return n.log_weight < SMALL; }),
+      points.end());
 }
 
-// Twice over a grid: wide, then where the weight was. From here on log_weight is the weight itself.
-void FleetModel::Impl::explore() {
+// Integrates over a wide grid, then over one about its mean. Afterwards log_weight holds the weight itself.
+void FleetModel::Impl::integrate() {
   if (options.known) {
-    nodes = {solve(*options.known)};
-    nodes[0].log_weight = 1.0;
+    points = {solve(*options.known)};
+    points[0].log_weight = 1.0;
     return;
   }
   const std::array<std::pair<double, double>, 3> wide{{{2e-3, 0.5}, {5e-4, 0.3}, {3e-3, 1.0}}};
@@ -307,15 +312,15 @@ void FleetModel::Impl::explore() {
     for (int i = 0; i < COARSE; ++i)
       axes[a].push_back(wide[a].first * std::pow(wide[a].second / wide[a].first, i / (COARSE - 1.0)));
   }
-  average(axes, false);
+  evaluateGrid(axes, false);
   const std::array<double FleetDeviations::*, 3> members{&FleetDeviations::machine, &FleetDeviations::batch,
                                                          &FleetDeviations::tool};
   for (std::size_t a = 0; a < 3; ++a) {
     double mean = 0.0, square = 0.0;
-    for (const Node& node : nodes) {
-      const double x = std::log(node.s.*members[a]);
-      mean += node.log_weight * x;
-      square += node.log_weight * x * x;
+    for (const GridPoint& point : points) {
+      const double x = std::log(point.s.*members[a]);
+      mean += point.log_weight * x;
+      square += point.log_weight * x * x;
     }
     const double step = std::log(wide[a].second / wide[a].first) / (COARSE - 1.0);
     const double spread = std::max(0.5 * step, std::sqrt(std::max(0.0, square - mean * mean)));
@@ -323,24 +328,24 @@ void FleetModel::Impl::explore() {
     for (int i = 0; i < FINE; ++i)
       axes[a].push_back(std::exp(mean + spread * (4.0 * i / (FINE - 1.0) - 2.0)));
   }
-  average(axes, true);
+  evaluateGrid(axes, true);
 }
 
 FleetModel::FleetModel(const std::vector<FleetObservation>& observations, const FleetModelOptions& options)
     : impl_(std::make_unique<Impl>()) {
   impl_->options = options;
   impl_->observations = observations;
-  impl_->sort();
+  impl_->indexObservations();
   impl_->estimateNoise();
   impl_->fillCells();
-  impl_->explore();
+  impl_->integrate();
 }
 FleetModel::~FleetModel() = default;
 FleetModel::FleetModel(FleetModel&&) noexcept = default;
 
 namespace {
 
-/// A mixture of normals, by its first two moments.
+/// First two moments of a mixture of normal distributions.
 struct Mixture {
   double weight = 0.0, mean = 0.0, square = 0.0;
 
@@ -353,37 +358,38 @@ struct Mixture {
   double variance() const { return std::max(0.0, square / weight - value() * value()); }
 };
 
-/// What is asked of the random effects of a machine: its own effect, and a batch of a group where it has one.
-struct Asked {
+/// Combination of effects to predict: groups, the machine's effect, and a batch of a group.
+struct EffectQuery {
   Eigen::VectorXd group;                // weights of the groups' effects
-  double extra = 0.0;                   // [1] variance of what no observation shows
-  double machine = 1.0;                 // share of the machine's effect
-  std::optional<std::size_t> batch_of;  // group whose batch effect counts
+  double extra = 0.0;                   // [1] variance of unobserved effects
+  double machine = 1.0;                 // weight of the machine's effect
+  std::optional<std::size_t> batch_of;  // group whose batch effect is included
 };
 
-/// Best linear unbiased prediction for one component of the machine's effect (Henderson).
-void addPrediction(const Machine* machine, const Node& node, const Asked& asked, double effect_variance,
-                   double share, Mixture* sum) {
-  const double batch = node.s.batch * node.s.batch;
-  double mean = asked.group.dot(node.groups);
-  double variance = asked.extra + asked.machine * effect_variance + (asked.batch_of ? batch : 0.0);
-  Eigen::VectorXd group = asked.group;
+/// Adds the best linear unbiased prediction for one component of the machine's effect (Henderson).
+void addPrediction(const Machine* machine, const GridPoint& point, const EffectQuery& query,
+                   double effect_variance, double share, Mixture* sum) {
+  const double batch = point.s.batch * point.s.batch;
+  double mean = query.group.dot(point.groups);
+  double variance = query.extra + query.machine * effect_variance + (query.batch_of ? batch : 0.0);
+  Eigen::VectorXd group = query.group;
   if (machine) {
-    const Block block(*machine, effect_variance, batch);
-    Eigen::VectorXd towards(machine->cells.size()), rest(machine->cells.size());
+    const CellCovariance covariance(*machine, effect_variance, batch);
+    Eigen::VectorXd prior_covariance(machine->cells.size()), residualOf(machine->cells.size());
     for (std::size_t i = 0; i < machine->cells.size(); ++i) {
       const auto at = static_cast<Eigen::Index>(i);
-      towards[at] =
-          asked.machine * effect_variance + (asked.batch_of == machine->cells[i].group ? batch : 0.0);
-      rest[at] = machine->cells[i].mean - node.groups[static_cast<Eigen::Index>(machine->cells[i].group)];
+      prior_covariance[at] =
+          query.machine * effect_variance + (query.batch_of == machine->cells[i].group ? batch : 0.0);
+      residualOf[at] =
+          machine->cells[i].mean - point.groups[static_cast<Eigen::Index>(machine->cells[i].group)];
     }
-    const Eigen::VectorXd gain = block.solve(towards);
-    mean += gain.dot(rest);
-    variance -= gain.dot(towards);
+    const Eigen::VectorXd gain = covariance.solve(prior_covariance);
+    mean += gain.dot(residualOf);
+    variance -= gain.dot(prior_covariance);
     for (std::size_t i = 0; i < machine->cells.size(); ++i)
       group[static_cast<Eigen::Index>(machine->cells[i].group)] -= gain[static_cast<Eigen::Index>(i)];
   }
-  sum->add(share, mean, variance + group.dot(node.covariance * group));
+  sum->add(share, mean, variance + group.dot(point.covariance * group));
 }
 
 }  // namespace
@@ -394,39 +400,39 @@ std::optional<FleetPrediction> FleetModel::predict(const std::string& machine, c
   if (!material_at) return std::nullopt;
   const Machine* own = impl_->machineAt(machine);
   const auto count = static_cast<Eigen::Index>(impl_->groups.size());
-  Asked asked;
-  asked.group = Eigen::VectorXd::Zero(count);
+  EffectQuery query;
+  query.group = Eigen::VectorXd::Zero(count);
   FleetPrediction found;
   std::size_t same_material = 0;
   for (std::size_t g = 0; g < impl_->groups.size(); ++g) {
     if (impl_->groups[g].material != *material_at) continue;
     ++same_material;
-    if (impl_->groups[g].tool == tool) asked.batch_of = g;
+    if (impl_->groups[g].tool == tool) query.batch_of = g;
   }
-  found.known_group = asked.batch_of.has_value();
+  found.known_group = query.batch_of.has_value();
   for (std::size_t g = 0; g < impl_->groups.size(); ++g) {
     if (impl_->groups[g].material != *material_at) continue;
-    if (!asked.batch_of || *asked.batch_of == g)
-      asked.group[static_cast<Eigen::Index>(g)] =
-          asked.batch_of ? 1.0 : 1.0 / static_cast<double>(same_material);
+    if (!query.batch_of || *query.batch_of == g)
+      query.group[static_cast<Eigen::Index>(g)] =
+          query.batch_of ? 1.0 : 1.0 / static_cast<double>(same_material);
   }
   if (own) {
     for (const Cell& cell : own->cells)
-      if (asked.batch_of == cell.group) found.own = cell.count;
+      if (query.batch_of == cell.group) found.own = cell.count;
   }
   Mixture sum;
-  for (const Node& node : impl_->nodes) {
-    const double usual = node.s.machine * node.s.machine;
-    const double odd =
-        own ? node.odd[static_cast<std::size_t>(own - impl_->machines.data())] : impl_->options.odd_share;
-    // A tool that nobody tried lies about the others' mean; its batch is as any.
-    asked.extra = asked.batch_of
+  for (const GridPoint& point : impl_->points) {
+    const double usual = point.s.machine * point.s.machine;
+    const double outlier = own ? point.outlier[static_cast<std::size_t>(own - impl_->machines.data())]
+                               : impl_->options.outlier_probability;
+    // A new tool varies about the mean of the others, with a new batch.
+    query.extra = query.batch_of
                       ? 0.0
-                      : node.s.tool * node.s.tool * (1.0 + 1.0 / static_cast<double>(same_material)) +
-                            node.s.batch * node.s.batch;
-    addPrediction(own, node, asked, usual, node.log_weight * (1.0 - odd), &sum);
-    addPrediction(own, node, asked, usual + impl_->options.odd_size * impl_->options.odd_size,
-                  node.log_weight * odd, &sum);
+                      : point.s.tool * point.s.tool * (1.0 + 1.0 / static_cast<double>(same_material)) +
+                            point.s.batch * point.s.batch;
+    addPrediction(own, point, query, usual, point.log_weight * (1.0 - outlier), &sum);
+    addPrediction(own, point, query, usual + impl_->options.outlier_std * impl_->options.outlier_std,
+                  point.log_weight * outlier, &sum);
   }
   found.log_std = std::sqrt(sum.variance());
   found.value = std::exp(sum.value());
@@ -436,14 +442,14 @@ std::optional<FleetPrediction> FleetModel::predict(const std::string& machine, c
 
 namespace {
 
-// Slope over time of what a machine's cells leave, weighted least squares about each group's mean.
+// Slope of a machine's residuals over time, weighted least squares about each group's mean.
 void fitDrift(const std::vector<FleetObservation>& observations, const std::vector<std::size_t>& members,
               const std::vector<std::size_t>& group_of, double noise, MachineEffect* effect) {
   std::map<std::size_t, std::array<double, 3>> sums;  // weight, time, value
   const auto weightOf = [&](std::size_t i) {
     const FleetObservation& o = observations[i];
-    const double own = std::isfinite(o.std_dev) ? o.std_dev / o.value : UNSTATED;
-    return 1.0 / std::max(own * own + noise * noise, CERTAIN * CERTAIN);
+    const double own = std::isfinite(o.std_dev) ? o.std_dev / o.value : DEFAULT_STD;
+    return 1.0 / std::max(own * own + noise * noise, LEAST_STD * LEAST_STD);
   };
   for (const std::size_t i : members) {
     std::array<double, 3>& s = sums[group_of[i]];
@@ -466,24 +472,24 @@ void fitDrift(const std::vector<FleetObservation>& observations, const std::vect
 
 std::vector<MachineEffect> FleetModel::machines() const {
   std::vector<MachineEffect> found;
-  Asked asked;
-  asked.group = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(impl_->groups.size()));
+  EffectQuery query;
+  query.group = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(impl_->groups.size()));
   for (std::size_t m = 0; m < impl_->machines.size(); ++m) {
     const Machine& machine = impl_->machines[m];
     MachineEffect effect;
     effect.machine = machine.name;
     effect.observations = static_cast<int>(machine.observations.size());
     Mixture sum;
-    for (const Node& node : impl_->nodes) {
-      const double usual = node.s.machine * node.s.machine;
-      effect.odd += node.log_weight * node.odd[m];
-      addPrediction(&machine, node, asked, usual, node.log_weight * (1.0 - node.odd[m]), &sum);
-      addPrediction(&machine, node, asked, usual + impl_->options.odd_size * impl_->options.odd_size,
-                    node.log_weight * node.odd[m], &sum);
+    for (const GridPoint& point : impl_->points) {
+      const double usual = point.s.machine * point.s.machine;
+      effect.outlier += point.log_weight * point.outlier[m];
+      addPrediction(&machine, point, query, usual, point.log_weight * (1.0 - point.outlier[m]), &sum);
+      addPrediction(&machine, point, query, usual + impl_->options.outlier_std * impl_->options.outlier_std,
+                    point.log_weight * point.outlier[m], &sum);
     }
     double weight = 0.0;
-    for (const Node& node : impl_->nodes) weight += node.log_weight;
-    effect.odd /= weight;
+    for (const GridPoint& point : impl_->points) weight += point.log_weight;
+    effect.outlier /= weight;
     effect.effect = sum.value();
     effect.std_dev = std::sqrt(sum.variance());
     fitDrift(impl_->observations, machine.observations, impl_->group_of, impl_->noise, &effect);
@@ -496,20 +502,20 @@ std::vector<MachineEffect> FleetModel::machines() const {
 FleetDeviations FleetModel::deviations() const {
   FleetDeviations mean;
   double weight = 0.0;
-  for (const Node& node : impl_->nodes) {
-    weight += node.log_weight;
-    mean.machine += node.log_weight * node.s.machine;
-    mean.batch += node.log_weight * node.s.batch;
-    mean.tool += node.log_weight * node.s.tool;
+  for (const GridPoint& point : impl_->points) {
+    weight += point.log_weight;
+    mean.machine += point.log_weight * point.s.machine;
+    mean.batch += point.log_weight * point.s.batch;
+    mean.tool += point.log_weight * point.s.tool;
   }
   return {mean.machine / weight, mean.batch / weight, mean.tool / weight, impl_->noise};
 }
 
 std::string MachineEffect::meaning() const {
-  constexpr double SURE = 4.0;  // deviations
-  if (std::isfinite(drift_std) && std::abs(drift) > SURE * drift_std)
-    return "changes with time: a spindle that wears, or a load meter that drifts";
-  return "the same in all cuts: a wrong load-meter constant";
+  constexpr double SIGNIFICANT = 4.0;  // standard deviations
+  if (std::isfinite(drift_std) && std::abs(drift) > SIGNIFICANT * drift_std)
+    return "changes with time: spindle wear or drift of the load meter";
+  return "constant in all cuts: wrong load-meter constant";
 }
 
 std::vector<FleetObservation> observationsOf(const std::vector<CoefficientRecord>& records,

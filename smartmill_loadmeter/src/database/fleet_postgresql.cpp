@@ -1,4 +1,4 @@
-// The fleet's server: fleet_server.h by PostgreSQL. Tables: fleet_schema.cpp.
+// Implementation of fleet_server.h by PostgreSQL. Tables: fleet_schema.cpp.
 #include <algorithm>
 #include <cmath>
 #include <string_view>
@@ -12,7 +12,7 @@ namespace smartmill::loadmeter {
 
 namespace {
 
-constexpr int BATCH = 2000;  // records that come at once
+constexpr int BATCH = 2000;  // records per fetch
 
 void appendWord(const std::string& word, std::string* line) {
   constexpr std::string_view SPECIAL = "\\\t\n\r", LETTER = "\\tnr";
@@ -42,7 +42,7 @@ void appendLine(const RecordKind& kind, const Row& row, std::string* lines) {
   *lines += '\n';
 }
 
-std::vector<Row> rowsOf(const RecordKind& kind, const FleetRows& rows) {
+std::vector<Row> rowsOf(const RecordKind& kind, const QueryResult& rows) {
   std::vector<Row> found;
   for (int r = 0; r < rows.size(); ++r) {
     Row row;
@@ -56,15 +56,15 @@ std::vector<Row> rowsOf(const RecordKind& kind, const FleetRows& rows) {
   return found;
 }
 
-CoefficientRecord recordOf(const FleetRows& rows, int row) {
+CoefficientRecord recordOf(const QueryResult& rows, int row) {
   CoefficientRecord record;
   int column = 0;
-  for (const WordField& f : wordFields()) f.at(record) = rows.word(row, column++);
+  for (const TextField& f : textFields()) f.at(record) = rows.word(row, column++);
   for (const NumberField& f : numberFields()) f.set(record, f.index, rows.number(row, column++));
   return record;
 }
 
-std::vector<CoefficientRecord> recordsOf(const FleetRows& rows) {
+std::vector<CoefficientRecord> recordsOf(const QueryResult& rows) {
   std::vector<CoefficientRecord> records;
   for (int row = 0; row < rows.size(); ++row) records.push_back(recordOf(rows, row));
   return records;
@@ -72,12 +72,12 @@ std::vector<CoefficientRecord> recordsOf(const FleetRows& rows) {
 
 std::string columnsOf(const std::string& table) {
   std::string list;
-  for (const WordField& f : wordFields()) list += (list.empty() ? "" : ", ") + table + "." + f.name;
+  for (const TextField& f : textFields()) list += (list.empty() ? "" : ", ") + table + "." + f.name;
   for (const NumberField& f : numberFields()) list += ", " + table + "." + f.name;
   return list;
 }
 
-/// " WHERE material = $1 AND tool = $2" of what is asked, and its parameters.
+/// Condition " WHERE material = $1 AND tool = $2" of a query, and its parameters.
 struct Pair {
   std::string where;
   std::vector<std::string> parameters;
@@ -99,36 +99,37 @@ class PostgresqlServer : public FleetServer {
   }
 
   std::string identity() override { return identity_; }
-  void echo() override { connection_.ask("SELECT 1", {}); }
+  void echo() override { connection_.query("SELECT 1", {}); }
 
   std::size_t add(const RecordKind& kind, const std::vector<Row>& rows) override {
-    if (connection_.ask("SELECT (me()).id", {}).word(0, 0).empty())
-      connection_.fail("this login is no machine of the fleet, `coefficients_db URL enrol` makes it one");
+    if (connection_.query("SELECT (me()).id", {}).word(0, 0).empty())
+      connection_.fail("this login is not a machine of the fleet; enrol it with `coefficients_db URL enrol`");
     const std::string list = kind.columns();
     std::string lines;
     for (const Row& row : rows) appendLine(kind, row, &lines);
     std::size_t added = 0;
     connection_.transaction("BEGIN", [&] {
-      connection_.run("CREATE TEMP TABLE incoming ON COMMIT DROP AS SELECT " + list + " FROM " + kind.table +
-                      " WITH NO DATA");
+      connection_.execute("CREATE TEMP TABLE incoming ON COMMIT DROP AS SELECT " + list + " FROM " +
+                          kind.table + " WITH NO DATA");
       connection_.copyIn("COPY incoming (" + list + ") FROM STDIN", lines);
-      // In one order, or two machines with the same records wait for each other.
-      added = connection_
-                  .run("INSERT INTO " + kind.table + " (shop, machine_id, " + list +
+      // A fixed order prevents a deadlock of two machines with the same records.
+      added =
+          connection_
+              .execute("INSERT INTO " + kind.table + " (shop, machine_id, " + list +
                        ") SELECT m.shop, m.id, incoming.* FROM incoming, me() m ORDER BY incoming.identity "
                        "ON CONFLICT (shop, identity) DO NOTHING")
-                  .affected();
+              .affected();
     });
     return added;
   }
 
   std::vector<Row> rows(const RecordKind& kind) override {
-    return rowsOf(
-        kind, connection_.run("SELECT " + kind.columns() + " FROM " + kind.table + " ORDER BY stamp, id"));
+    return rowsOf(kind, connection_.execute("SELECT " + kind.columns() + " FROM " + kind.table +
+                                            " ORDER BY stamp, id"));
   }
 
-  void notePush(const FleetTransfer& done, std::size_t behind) override {
-    connection_.ask(
+  void storePush(const FleetTransfer& done, std::size_t behind) override {
+    connection_.query(
         "INSERT INTO push (machine_id, shop, offered, fresh, behind) SELECT m.id, m.shop, $1, $2, $3 FROM "
         "me() m",
         {std::to_string(done.offered), std::to_string(done.fresh), std::to_string(behind)});
@@ -136,7 +137,7 @@ class PostgresqlServer : public FleetServer {
 
   std::optional<CoefficientRecord> newest(const std::string& tool, const std::string& material) override {
     const Pair pair(tool, material);
-    const FleetRows rows = connection_.ask(
+    const QueryResult rows = connection_.query(
         "SELECT " + columns() + " FROM coefficients" + pair.where + " ORDER BY stamp DESC, id DESC LIMIT 1",
         pair.parameters);
     if (rows.size() == 0) return std::nullopt;
@@ -145,20 +146,20 @@ class PostgresqlServer : public FleetServer {
 
   std::vector<CoefficientRecord> records(const std::string& tool, const std::string& material) override {
     const Pair pair(tool, material);
-    return recordsOf(connection_.ask(
+    return recordsOf(connection_.query(
         "SELECT " + columns() + " FROM coefficients" + pair.where + " ORDER BY stamp, id", pair.parameters));
   }
 
-  // One question, whether there is something about that speed or not.
+  // One query, whether there are records near that speed or not.
   std::vector<CoefficientRecord> near(const std::string& tool, const CoefficientQuery& query) override {
     Pair pair(tool, query.material);
     const std::string newest = " ORDER BY stamp DESC LIMIT " + std::to_string(NEWEST);
     const std::string any = "SELECT " + columns() + " FROM coefficients" + pair.where + newest;
-    if (!(query.cutting_speed > 0.0)) return recordsOf(connection_.ask(any, pair.parameters));
+    if (!(query.cutting_speed > 0.0)) return recordsOf(connection_.query(any, pair.parameters));
     pair.parameters.push_back(std::to_string(bucketOf(query.cutting_speed)));
     const std::string middle = "$" + std::to_string(pair.parameters.size()) + "::int";
     const std::string span = std::to_string(BUCKETS);
-    return recordsOf(connection_.ask(
+    return recordsOf(connection_.query(
         "WITH about AS MATERIALIZED (SELECT " + columnsOf("c") + " FROM (SELECT " + std::to_string(NO_SPEED) +
             " AS at UNION ALL SELECT " + middle + " + b FROM generate_series(-" + span + ", " + span +
             ") b) buckets, LATERAL (SELECT * FROM coefficients" + pair.where +
@@ -169,14 +170,15 @@ class PostgresqlServer : public FleetServer {
   }
 
   std::vector<std::pair<std::string, std::string>> pairs() override {
-    const FleetRows rows = connection_.run("SELECT DISTINCT tool, material FROM coefficients ORDER BY 1, 2");
+    const QueryResult rows =
+        connection_.execute("SELECT DISTINCT tool, material FROM coefficients ORDER BY 1, 2");
     std::vector<std::pair<std::string, std::string>> found;
     for (int row = 0; row < rows.size(); ++row) found.emplace_back(rows.word(row, 0), rows.word(row, 1));
     return found;
   }
 
   std::size_t size() override {
-    return static_cast<std::size_t>(connection_.run("SELECT count(*) FROM coefficients").number(0, 0));
+    return static_cast<std::size_t>(connection_.execute("SELECT count(*) FROM coefficients").number(0, 0));
   }
 
   void missing(const RecordKind& kind, const std::vector<std::string>& identities,
@@ -184,16 +186,16 @@ class PostgresqlServer : public FleetServer {
     std::string lines;
     for (const std::string& identity : identities) lines += identity + "\n";
     connection_.transaction("BEGIN ISOLATION LEVEL REPEATABLE READ", [&] {
-      connection_.run("CREATE TEMP TABLE have (identity text) ON COMMIT DROP");
+      connection_.execute("CREATE TEMP TABLE have (identity text) ON COMMIT DROP");
       connection_.copyIn("COPY have FROM STDIN", lines);
-      connection_.run("ANALYZE have");
-      connection_.run("DECLARE lacking NO SCROLL CURSOR FOR SELECT " + kind.columns("c.") + " FROM " +
-                      kind.table +
-                      " c WHERE NOT EXISTS (SELECT 1 FROM have h WHERE h.identity = c.identity) ORDER BY "
-                      "c.id");
+      connection_.execute("ANALYZE have");
+      connection_.execute("DECLARE lacking NO SCROLL CURSOR FOR SELECT " + kind.columns("c.") + " FROM " +
+                          kind.table +
+                          " c WHERE NOT EXISTS (SELECT 1 FROM have h WHERE h.identity = c.identity) ORDER BY "
+                          "c.id");
       while (true) {
         const std::vector<Row> some =
-            rowsOf(kind, connection_.run("FETCH " + std::to_string(BATCH) + " FROM lacking"));
+            rowsOf(kind, connection_.execute("FETCH " + std::to_string(BATCH) + " FROM lacking"));
         if (some.empty()) break;
         batch(some);
       }
@@ -204,7 +206,7 @@ class PostgresqlServer : public FleetServer {
     std::string count = "0";
     for (const RecordKind& kind : recordKinds())
       count += " + (SELECT count(*) FROM " + kind.table + " c WHERE c.shop = m.shop AND c.machine_id = m.id)";
-    const FleetRows rows = connection_.run(
+    const QueryResult rows = connection_.execute(
         "SELECT m.name, m.login, m.shop, " + count +
         ", extract(epoch FROM now() - p.at), coalesce(p.behind, 0) FROM members() m LEFT "
         "JOIN "

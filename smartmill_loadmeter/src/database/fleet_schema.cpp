@@ -1,4 +1,4 @@
-// Tables of the fleet's server, their versions, and who may do what.
+// Tables of the fleet's server, their versions and access rights.
 #include "fleet_schema.h"
 
 #include "record_fields.h"
@@ -8,13 +8,13 @@ namespace smartmill::loadmeter {
 
 namespace {
 
-// The owner's work is one transaction; two owners at once wait for each other.
+// The owner's changes are one transaction; two owners wait for each other.
 constexpr const char* LOCK = "SELECT pg_advisory_xact_lock(7365746)";
 
 // 0: no tables yet.
 int versionOf(FleetConnection& connection) {
-  if (connection.run("SELECT to_regclass('fleet')").word(0, 0).empty()) return 0;
-  const FleetRows rows = connection.run("SELECT schema FROM fleet");
+  if (connection.execute("SELECT to_regclass('fleet')").word(0, 0).empty()) return 0;
+  const QueryResult rows = connection.execute("SELECT schema FROM fleet");
   return rows.size() == 1 ? static_cast<int>(rows.number(0, 0)) : 0;
 }
 
@@ -23,11 +23,11 @@ std::string makeRole(const std::string& role) {
          "') THEN CREATE ROLE " + role + " NOLOGIN; END IF; END $$;";
 }
 
-// Version 1: machines, their records, and row-level security. Every index begins with what the policy filters
-// by. A record's own word `machine` is what its file says; machine_id is who brought it, from the login.
+// Version 1: machines, their records, and row-level security. Every index starts with the column of the
+// policy. A record's column `machine` is the name in its file; machine_id is the sender, from the login.
 std::string first() {
   std::string record;
-  for (const WordField& f : wordFields()) record += ", " + f.name + " text NOT NULL";
+  for (const TextField& f : textFields()) record += ", " + f.name + " text NOT NULL";
   for (const NumberField& f : numberFields()) record += ", " + f.name + " double precision";
   return makeRole("fleet_reader") + makeRole("fleet_machine") +
          "CREATE TABLE fleet (one bool PRIMARY KEY DEFAULT true CHECK (one), id uuid NOT NULL DEFAULT "
@@ -65,7 +65,7 @@ std::string first() {
          "GRANT USAGE ON ALL SEQUENCES IN SCHEMA public TO fleet_machine;";
 }
 
-// Version 2: who pushed when, and what it had left; which machines a login may know of.
+// Version 2: time and backlog of each push, and the machines that a login may see.
 std::string second() {
   return "CREATE TABLE push (id bigint GENERATED ALWAYS AS IDENTITY PRIMARY KEY, shop text NOT NULL, "
          "machine_id int "
@@ -88,7 +88,7 @@ std::string second() {
          "UPDATE fleet SET schema = 2;";
 }
 
-// What version 1 has for coefficients, for another kind of record.
+// Table, index and policies as in version 1, for another kind of record.
 std::string tableOf(const RecordKind& kind) {
   std::string columns;
   for (const std::string& name : kind.words) columns += ", " + name + " text NOT NULL";
@@ -107,7 +107,7 @@ std::string tableOf(const RecordKind& kind) {
          " TO fleet_machine; GRANT SELECT ON " + t + " TO fleet_reader;";
 }
 
-// Version 3: improvements of models, and spindles' health.
+// Version 3: model improvements and spindle health.
 std::string third() {
   return tableOf(improvementKind()) + tableOf(healthKind()) +
          "GRANT USAGE ON ALL SEQUENCES IN SCHEMA public TO fleet_machine;UPDATE fleet SET schema = 3;";
@@ -117,27 +117,27 @@ std::string third() {
 
 std::string checkFleet(FleetConnection& connection) {
   const int version = versionOf(connection);
-  if (version == 0)
-    connection.fail("no fleet's tables, `coefficients_db URL migrate` by its owner makes them");
+  if (version == 0) connection.fail("no tables; create them with `coefficients_db URL migrate` by the owner");
   if (version < FLEET_SCHEMA)
-    connection.fail("tables of version " + std::to_string(version) + ", " + std::to_string(FLEET_SCHEMA) +
-                    " is due: `coefficients_db URL migrate` by its owner");
+    connection.fail("tables of version " + std::to_string(version) + ", expected " +
+                    std::to_string(FLEET_SCHEMA) +
+                    ": update them with `coefficients_db URL migrate` by the owner");
   if (version > FLEET_SCHEMA)
     connection.fail("tables of version " + std::to_string(version) + ", newer than this program's " +
                     std::to_string(FLEET_SCHEMA));
-  return connection.run("SELECT id FROM fleet").word(0, 0);
+  return connection.execute("SELECT id FROM fleet").word(0, 0);
 }
 
 int migrateFleet(const std::string& url, int schema) {
   FleetConnection connection(url);
   int found = 0;
   connection.transaction("BEGIN", [&] {
-    connection.run(LOCK);
+    connection.execute(LOCK);
     found = versionOf(connection);
     if (found > schema)
       connection.fail("tables of version " + std::to_string(found) + " are newer than this program");
     const std::string steps[] = {first(), second(), third()};
-    for (int version = found; version < schema; ++version) connection.run(steps[version]);
+    for (int version = found; version < schema; ++version) connection.execute(steps[version]);
   });
   return found;
 }
@@ -146,19 +146,21 @@ void enrol(const std::string& url, const FleetMember& member, const std::string&
   FleetConnection connection(url);
   checkFleet(connection);
   connection.transaction("BEGIN", [&] {
-    connection.run(LOCK);
+    connection.execute(LOCK);
     const std::string login = connection.name(member.login);
-    if (connection.ask("SELECT 1 FROM pg_roles WHERE rolname = $1", {member.login}).size() == 0)
-      connection.run("CREATE ROLE " + login + " LOGIN");
-    connection.run("GRANT fleet_machine TO " + login);
-    if (!password.empty()) connection.run("ALTER ROLE " + login + " PASSWORD " + connection.quoted(password));
-    connection.ask("INSERT INTO machine (name, login, shop) VALUES ($1, $2, $3) ON CONFLICT DO NOTHING",
-                   {member.name, member.login, member.shop});
-    const FleetRows rows =
-        connection.ask("SELECT 1 FROM machine WHERE name = $1 AND login = $2 AND shop = $3",
-                       {member.name, member.login, member.shop});
+    if (connection.query("SELECT 1 FROM pg_roles WHERE rolname = $1", {member.login}).size() == 0)
+      connection.execute("CREATE ROLE " + login + " LOGIN");
+    connection.execute("GRANT fleet_machine TO " + login);
+    if (!password.empty())
+      connection.execute("ALTER ROLE " + login + " PASSWORD " + connection.literal(password));
+    connection.query("INSERT INTO machine (name, login, shop) VALUES ($1, $2, $3) ON CONFLICT DO NOTHING",
+                     {member.name, member.login, member.shop});
+    const QueryResult rows =
+        connection.query("SELECT 1 FROM machine WHERE name = $1 AND login = $2 AND shop = $3",
+                         {member.name, member.login, member.shop});
     if (rows.size() == 0)
-      connection.fail("machine '" + member.name + "' or login '" + member.login + "' is enrolled otherwise");
+      connection.fail("machine '" + member.name + "' or login '" + member.login +
+                      "' is enrolled with another name, login or shop");
   });
 }
 

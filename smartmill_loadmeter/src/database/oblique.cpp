@@ -24,13 +24,13 @@ void checkEdge(double rake, double inclination) {
                 units::degFromRad(rake), units::degFromRad(inclination)));
 }
 
-struct Belief {
+struct PriorValue {
   double value, std_dev;
 };
-const std::array<Belief, 4> BELIEFS{Belief{radFromDeg(25.0), radFromDeg(15.0)}, Belief{0.3, 0.3},
-                                    Belief{radFromDeg(45.0), radFromDeg(6.0)}, Belief{0.75, 0.25}};
+const std::array<PriorValue, 4> PRIORS{PriorValue{radFromDeg(25.0), radFromDeg(15.0)}, PriorValue{0.3, 0.3},
+                                       PriorValue{radFromDeg(45.0), radFromDeg(6.0)}, PriorValue{0.75, 0.25}};
 
-struct Weighted {
+struct WeightedMean {
   double weight = 0.0, sum = 0.0;
   void add(double value, double std_dev, double per) {
     if (!std::isfinite(value) || per == 0.0) return;
@@ -43,16 +43,6 @@ struct Weighted {
 };
 
 }  // namespace
-
-ShearZone shearZoneOf(double rake, double chip_ratio, double power_force, double thrust_force,
-                      double chip_area) {
-  ShearZone zone;
-  zone.shear_angle = std::atan2(chip_ratio * std::cos(rake), 1.0 - chip_ratio * std::sin(rake));
-  zone.friction_angle = rake + std::atan2(thrust_force, power_force);
-  const double along = power_force * std::cos(zone.shear_angle) - thrust_force * std::sin(zone.shear_angle);
-  zone.shear_stress = along * std::sin(zone.shear_angle) / chip_area;
-  return zone;
-}
 
 CuttingCoefficients obliqueCoefficients(const ShearZone& zone, double rake, double inclination) {
   const double t = std::tan(inclination),
@@ -79,7 +69,7 @@ OrthogonalParameters semiInverse(const std::vector<ObliqueSet>& sets) {
   OrthogonalParameters found;
   std::size_t observations = 0;
   double largest = 0.0;
-  Weighted kte, kre, kae;
+  WeightedMean kte, kre, kae;
   for (const ObliqueSet& set : sets) {
     checkEdge(set.rake, set.inclination);
     for (std::size_t i = 0; i < 3; ++i)
@@ -89,7 +79,7 @@ OrthogonalParameters semiInverse(const std::vector<ObliqueSet>& sets) {
     kre.add(set.value.kre, set.std_dev.kre, 1.0);
     kae.add(set.value.kae, set.std_dev.kae, std::sin(set.inclination));
   }
-  if (!(largest > 0.0)) throw Error("orthogonal parameters: no identified set with Ktc and a known rake");
+  if (!(largest > 0.0)) throw Error("orthogonal parameters: expected a set with Ktc and a known rake");
   found.sets = static_cast<int>(sets.size());
   found.kte = kte.value(), found.kte_std = kte.stdDev();
   found.kre = kre.value(), found.kre_std = kre.stdDev();
@@ -104,7 +94,7 @@ OrthogonalParameters semiInverse(const std::vector<ObliqueSet>& sets) {
     const OrthogonalParameters p = parametersOf(v);
     for (const ObliqueSet& set : sets) {
       ShearZone zone = p.at(set.rake);
-      // Where the fit strays out of the model: hold, the beliefs pull back.
+      // Keeps the angle within the model; the priors pull it back.
       zone.shear_angle = std::clamp(zone.shear_angle, radFromDeg(3.0), radFromDeg(80.0));
       const CuttingCoefficients k = obliqueCoefficients(zone, set.rake, set.inclination);
       for (std::size_t i = 0; i < 3; ++i) {
@@ -116,8 +106,7 @@ OrthogonalParameters semiInverse(const std::vector<ObliqueSet>& sets) {
         *out++ = (k.*member - measured) / sigma;
       }
     }
-    for (std::size_t i = 0; i < BELIEFS.size(); ++i)
-      *out++ = (v[i + 1] - BELIEFS[i].value) / BELIEFS[i].std_dev;
+    for (std::size_t i = 0; i < PRIORS.size(); ++i) *out++ = (v[i + 1] - PRIORS[i].value) / PRIORS[i].std_dev;
   };
   FitResult best;
   for (const double friction : {15.0, 25.0, 40.0}) {
@@ -126,8 +115,8 @@ OrthogonalParameters semiInverse(const std::vector<ObliqueSet>& sets) {
                                           {0.3, -1.5, 2.0, 0.3},
                                           {radFromDeg(45.0), radFromDeg(15.0), radFromDeg(75.0), 0.1},
                                           {0.75, -0.5, 2.0, 0.25}};
-    const FitResult tried = fit(residuals, observations + BELIEFS.size(), start);
-    if (best.value.empty() || tried.squares < best.squares) best = tried;
+    const FitResult candidate = fitLeastSquares(residuals, observations + PRIORS.size(), start);
+    if (best.value.empty() || candidate.squares < best.squares) best = candidate;
   }
   std::copy(best.value.begin(), best.value.end(), found.value.begin());
   std::copy(best.covariance.begin(), best.covariance.end(), found.covariance.begin());

@@ -24,7 +24,7 @@ NumberField ofSet(const char* name, const char* unit) {
           [](Record& r, std::size_t, double v) { r.set.*member = v; }, 0};
 }
 
-// Integers have no NaN: 0 is unknown.
+// Integers have no NaN; 0 is unknown.
 int whole(double v) {
   return std::isfinite(v) ? static_cast<int>(std::lround(v)) : 0;
 }
@@ -35,8 +35,8 @@ std::size_t CoefficientRecord::covarianceIndex(std::size_t row, std::size_t colu
   return row * 6 - row * (row + 1) / 2 + column;
 }
 
-const std::vector<WordField>& wordFields() {
-  static const std::vector<WordField> fields{
+const std::vector<TextField>& textFields() {
+  static const std::vector<TextField> fields{
       {"tool", [](Record& r) -> std::string& { return r.set.tool; }},
       {"material", [](Record& r) -> std::string& { return r.set.material; }},
       {"source", [](Record& r) -> std::string& { return r.set.source; }},
@@ -99,14 +99,14 @@ std::string exactNumber(double value) {
 
 std::string columns() {
   std::string list;
-  for (const WordField& f : wordFields()) list += (list.empty() ? "" : ", ") + f.name;
+  for (const TextField& f : textFields()) list += (list.empty() ? "" : ", ") + f.name;
   for (const NumberField& f : numberFields()) list += ", " + f.name;
   return list;
 }
 
 std::string identityOf(CoefficientRecord record) {
   std::string text;
-  for (const WordField& f : wordFields()) {
+  for (const TextField& f : textFields()) {
     if (f.name != "version") text += f.at(record) + '\x1f';
   }
   for (const NumberField& f : numberFields()) text += exactNumber(f.get(record, f.index)) + '\x1f';
@@ -135,7 +135,7 @@ const RecordKind& coefficientKind() {
     RecordKind k;
     k.table = "coefficients";
     k.by_speed = true;
-    for (const WordField& f : wordFields()) k.words.push_back(f.name);
+    for (const TextField& f : textFields()) k.words.push_back(f.name);
     for (const NumberField& f : numberFields()) k.numbers.push_back(f.name);
     return k;
   }();
@@ -148,17 +148,17 @@ const std::vector<RecordKind>& recordKinds() {
 }
 
 Row rowOf(CoefficientRecord record) {
-  if (!std::isfinite(record.set.stamp)) throw Error("stamp of a record is not a number");
+  if (!std::isfinite(record.set.stamp)) throw Error("stamp of a record: expected a finite number");
   Row row;
   row.identity = identityOf(record);
   row.speed_bucket = bucketOf(record.cutting_speed);
-  for (const WordField& f : wordFields()) row.words.push_back(f.at(record));
+  for (const TextField& f : textFields()) row.words.push_back(f.at(record));
   for (const NumberField& f : numberFields()) row.numbers.push_back(f.get(record, f.index));
   return row;
 }
 
-void take(const Row& row, CoefficientRecord* record) {
-  for (std::size_t i = 0; i < row.words.size(); ++i) wordFields()[i].at(*record) = row.words[i];
+void readRow(const Row& row, CoefficientRecord* record) {
+  for (std::size_t i = 0; i < row.words.size(); ++i) textFields()[i].at(*record) = row.words[i];
   for (std::size_t i = 0; i < row.numbers.size(); ++i)
     numberFields()[i].set(*record, numberFields()[i].index, row.numbers[i]);
 }

@@ -21,7 +21,7 @@ std::string columnName(const NumberField& f) {
   return f.name + "[" + f.unit + "]";
 }
 
-// Key of a file carries its unit: cutting_speed_m_per_s.
+// Keys of a file contain the unit: cutting_speed_m_per_s.
 std::string keyOf(const NumberField& f) {
   if (f.unit == "1") return f.name;
   std::string key = f.name + "_";
@@ -45,12 +45,12 @@ CoefficientRecord empty() {
 
 void exportCsv(const std::vector<CoefficientRecord>& records, const std::string& file) {
   std::string text;
-  for (const WordField& f : wordFields()) text += (text.empty() ? "" : ",") + f.name;
+  for (const TextField& f : textFields()) text += (text.empty() ? "" : ",") + f.name;
   for (const NumberField& f : numberFields()) text += "," + columnName(f);
   text += "\n";
   for (CoefficientRecord record : records) {
     std::string row;
-    for (const WordField& f : wordFields()) row += csvCell(f.at(record)) + ",";
+    for (const TextField& f : textFields()) row += csvCell(f.at(record)) + ",";
     for (const NumberField& f : numberFields()) row += exactNumber(f.get(record, f.index)) + ",";
     row.back() = '\n';
     text += row;
@@ -62,7 +62,7 @@ namespace {
 
 void setCell(const CsvReader& reader, const std::string& column, std::string_view cell,
              CoefficientRecord* record) {
-  for (const WordField& f : wordFields()) {
+  for (const TextField& f : textFields()) {
     if (f.name == column) f.at(*record) = std::string(cell);
   }
   for (const NumberField& f : numberFields()) {
@@ -71,9 +71,9 @@ void setCell(const CsvReader& reader, const std::string& column, std::string_vie
 }
 
 bool isKnown(const std::string& column) {
-  const auto& words = wordFields();
+  const auto& words = textFields();
   const auto& numbers = numberFields();
-  return std::any_of(words.begin(), words.end(), [&](const WordField& f) { return f.name == column; }) ||
+  return std::any_of(words.begin(), words.end(), [&](const TextField& f) { return f.name == column; }) ||
          std::any_of(numbers.begin(), numbers.end(),
                      [&](const NumberField& f) { return columnName(f) == column; });
 }
@@ -86,12 +86,12 @@ std::vector<CoefficientRecord> importCsv(const std::string& file) {
   if (!reader.next(&cells)) throw Error(file + ": is empty");
   const std::vector<std::string> head(cells.begin(), cells.end());
   for (const std::string& name : head) {
-    if (!isKnown(name)) reader.fail("column '" + name + "' is not known");
+    if (!isKnown(name)) reader.fail("column '" + name + "' is unknown");
   }
   std::vector<CoefficientRecord> records;
   while (reader.nextFilled(&cells)) {
     if (cells.size() != head.size())
-      reader.fail(std::to_string(cells.size()) + " values, " + std::to_string(head.size()) + " are due");
+      reader.fail(std::to_string(cells.size()) + " values, expected " + std::to_string(head.size()));
     CoefficientRecord record = empty();
     for (std::size_t i = 0; i < head.size(); ++i) setCell(reader, head[i], cells[i], &record);
     records.push_back(record);
@@ -104,7 +104,7 @@ void exportYaml(const std::vector<CoefficientRecord>& records, const std::string
   out << "format: " << FORMAT << "\n" << (records.empty() ? "entries: []\n" : "entries:\n");
   for (CoefficientRecord record : records) {
     out << "- source: " << yamlWord(record.set.source) << "\n";
-    for (const WordField& f : wordFields()) {
+    for (const TextField& f : textFields()) {
       if (f.name != "source" && !f.at(record).empty())
         out << "  " << f.name << ": " << yamlWord(f.at(record)) << "\n";
     }
@@ -129,13 +129,13 @@ std::vector<CoefficientRecord> importYaml(const std::string& file) {
   std::vector<CoefficientRecord> records;
   for (const StrictYaml& map : root.maps("entries")) {
     CoefficientRecord record = empty();
-    for (const WordField& f : wordFields()) {
+    for (const TextField& f : textFields()) {
       if (map.has(f.name)) f.at(record) = map.word(f.name);
     }
     for (const NumberField& f : numberFields()) {
       if (const auto value = map.optionalNumber(keyOf(f))) f.set(record, f.index, *value);
     }
-    // The older form: shop units in a model file's cutting section.
+    // Earlier form: shop units as in a model file's cutting section.
     if (const auto cutting = map.optionalMap("cutting")) {
       for (const CuttingKey& k : cuttingKeys()) {
         if (const auto v = cutting->optionalNumber(k.key)) record.set.value.*k.coefficient = *v * k.unit;

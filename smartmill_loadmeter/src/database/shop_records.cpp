@@ -23,42 +23,42 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 template <typename R>
-struct Word {
+struct TextColumn {
   const char* name = nullptr;
   std::string R::*at = nullptr;
-  bool told = true;  ///< part of what makes the record itself
+  bool identifying = true;  ///< part of the record's identity
 };
 template <typename R>
-struct Number {
+struct NumberColumn {
   const char* name = nullptr;
   double R::*at = nullptr;
-  bool told = true;
+  bool identifying = true;
 };
 
 using I = ModelImprovement;
-// A report that is read twice, or copied, stays one record.
-const std::vector<Word<I>> IMPROVEMENT_WORDS{
+// Report path, stamp and version are not part of the identity: a copy of a report is the same record.
+const std::vector<TextColumn<I>> IMPROVEMENT_WORDS{
     {"machine", &I::machine}, {"verdict", &I::verdict},      {"effects", &I::effects},
     {"rivals", &I::rivals},   {"resembles", &I::resembles},  {"tests", &I::tests},
     {"asked", &I::asked},     {"report", &I::report, false}, {"version", &I::version, false}};
-const std::vector<Number<I>> IMPROVEMENT_NUMBERS{{"stamp", &I::stamp, false},
-                                                 {"fit_before", &I::fit_before},
-                                                 {"fit_after", &I::fit_after},
-                                                 {"heldout_before", &I::heldout_before},
-                                                 {"heldout_after", &I::heldout_after}};
+const std::vector<NumberColumn<I>> IMPROVEMENT_NUMBERS{{"stamp", &I::stamp, false},
+                                                       {"fit_before", &I::fit_before},
+                                                       {"fit_after", &I::fit_after},
+                                                       {"heldout_before", &I::heldout_before},
+                                                       {"heldout_after", &I::heldout_after}};
 using H = HealthRecord;
-const std::vector<Word<H>> HEALTH_WORDS{{"machine", &H::machine},
-                                        {"measured", &H::measured},
-                                        {"quantity", &H::quantity},
-                                        {"bag", &H::bag},
-                                        {"version", &H::version, false}};
-const std::vector<Number<H>> HEALTH_NUMBERS{{"stamp", &H::stamp},           {"days", &H::days},
-                                            {"first", &H::first},           {"now", &H::now},
-                                            {"deviations", &H::deviations}, {"drifted", &H::drifted}};
+const std::vector<TextColumn<H>> HEALTH_WORDS{{"machine", &H::machine},
+                                              {"measured", &H::measured},
+                                              {"quantity", &H::quantity},
+                                              {"bag", &H::bag},
+                                              {"version", &H::version, false}};
+const std::vector<NumberColumn<H>> HEALTH_NUMBERS{{"stamp", &H::stamp},           {"days", &H::days},
+                                                  {"first", &H::first},           {"now", &H::now},
+                                                  {"deviations", &H::deviations}, {"drifted", &H::drifted}};
 
 template <typename R>
-RecordKind kindOf(const char* table, const std::vector<Word<R>>& words,
-                  const std::vector<Number<R>>& numbers) {
+RecordKind kindOf(const char* table, const std::vector<TextColumn<R>>& words,
+                  const std::vector<NumberColumn<R>>& numbers) {
   RecordKind kind;
   kind.table = table;
   for (const auto& w : words) kind.words.push_back(w.name);
@@ -67,30 +67,31 @@ RecordKind kindOf(const char* table, const std::vector<Word<R>>& words,
 }
 
 template <typename R>
-Row rowFrom(const R& record, const std::vector<Word<R>>& words, const std::vector<Number<R>>& numbers) {
-  if (!std::isfinite(record.stamp)) throw Error("stamp of a record is not a number");
+Row rowFrom(const R& record, const std::vector<TextColumn<R>>& words,
+            const std::vector<NumberColumn<R>>& numbers) {
+  if (!std::isfinite(record.stamp)) throw Error("stamp of a record: expected a finite number");
   Row row;
   std::string content;
   for (const auto& w : words) {
     row.words.push_back(record.*w.at);
-    if (w.told) content += record.*w.at + '\x1f';
+    if (w.identifying) content += record.*w.at + '\x1f';
   }
   for (const auto& n : numbers) {
     row.numbers.push_back(record.*n.at);
-    if (n.told) content += exactNumber(record.*n.at) + '\x1f';
+    if (n.identifying) content += exactNumber(record.*n.at) + '\x1f';
   }
   row.identity = identityOf(content);
   return row;
 }
 
 template <typename R>
-void takeFrom(const Row& row, const std::vector<Word<R>>& words, const std::vector<Number<R>>& numbers,
-              R* record) {
+void readColumns(const Row& row, const std::vector<TextColumn<R>>& words,
+                 const std::vector<NumberColumn<R>>& numbers, R* record) {
   for (std::size_t i = 0; i < words.size(); ++i) record->*words[i].at = row.words[i];
   for (std::size_t i = 0; i < numbers.size(); ++i) record->*numbers[i].at = row.numbers[i];
 }
 
-// In the keys of a campaign's tests, as the report's suggested_cut.
+// Adds the condition in the keys of a campaign's tests, as the report's suggested_cut.
 void addCondition(const CampaignTest& test, Json* json) {
   (*json)["spindle_speed_rpm"] = units::rpmFromRadPerSec(test.spindle_speed);
   if (!test.engagement) return;
@@ -100,7 +101,7 @@ void addCondition(const CampaignTest& test, Json* json) {
   (*json)["exit_deg"] = units::degFromRad(test.engagement->exit);
 }
 
-// Each test once, with its channels.
+// List of the tests with the gaps of their channels.
 std::string testsOf(const Json& gaps, const std::string& campaign) {
   std::map<std::string, Json> conditions;
   if (!campaign.empty()) {
@@ -122,7 +123,7 @@ std::string testsOf(const Json& gaps, const std::string& campaign) {
 
 ModelImprovement improvementOf(const Json& report, const std::string& campaign) {
   if (report.at("format") != "smartmill-report/1")
-    throw Error("format " + report.at("format").dump() + ", \"smartmill-report/1\" is due");
+    throw Error("format " + report.at("format").dump() + ", expected \"smartmill-report/1\"");
   ModelImprovement i;
   i.verdict = report.at("verdict");
   i.effects = report.at("effects").dump();
@@ -156,21 +157,21 @@ Row rowOf(const ModelImprovement& improvement) {
 Row rowOf(const HealthRecord& health) {
   return rowFrom(health, HEALTH_WORDS, HEALTH_NUMBERS);
 }
-void take(const Row& row, ModelImprovement* improvement) {
-  takeFrom(row, IMPROVEMENT_WORDS, IMPROVEMENT_NUMBERS, improvement);
+void readRow(const Row& row, ModelImprovement* improvement) {
+  readColumns(row, IMPROVEMENT_WORDS, IMPROVEMENT_NUMBERS, improvement);
 }
-void take(const Row& row, HealthRecord* health) {
-  takeFrom(row, HEALTH_WORDS, HEALTH_NUMBERS, health);
+void readRow(const Row& row, HealthRecord* health) {
+  readColumns(row, HEALTH_WORDS, HEALTH_NUMBERS, health);
 }
 
 namespace {
 
-// Name and condition, in words.
+// Name and condition as text.
 std::string nameOf(const Json& test) {
   const auto number = [&test](const char* key) { return test.at(key).get<double>(); };
   const std::string name = test.at("test");
   if (test.contains("axial_depth_mm")) {
-    return name + formatted(" (a cut at %.0f rpm, %.3g mm a tooth, %.3g mm deep, from %.0f to %.0f deg)",
+    return name + formatted(" (a cut at %.0f rpm, %.3g mm per tooth, %.3g mm deep, from %.0f to %.0f deg)",
                             number("spindle_speed_rpm"), number("feed_per_tooth_mm"),
                             number("axial_depth_mm"), number("entry_deg"), number("exit_deg"));
   }
@@ -179,7 +180,7 @@ std::string nameOf(const Json& test) {
   return name;
 }
 
-// Lists of a record. @throws Error naming whose it is.
+// Visits a list of a record. @throws Error with the machine's name.
 template <typename Work>
 void eachOf(const ModelImprovement& improvement, const std::string& list, const Work& work) {
   try {
@@ -250,7 +251,7 @@ std::vector<HealthRecord> readHealth(const std::string& file) {
   std::vector<HealthRecord> records;
   while (reader.nextFilled(&cells)) {
     if (cells.size() != columns.size())
-      reader.fail(std::to_string(cells.size()) + " values, " + std::to_string(columns.size()) + " are due");
+      reader.fail(std::to_string(cells.size()) + " values, expected " + std::to_string(columns.size()));
     const auto word = [&](const char* name) { return std::string(cells[columns[name]]); };
     const auto number = [&](const char* name) {
       const std::string_view cell = cells[columns[name]];
@@ -261,7 +262,7 @@ std::vector<HealthRecord> readHealth(const std::string& file) {
     r.quantity = word("quantity");
     r.bag = word("bag");
     r.stamp = number("stamp");
-    if (!std::isfinite(r.stamp)) reader.fail("stamp is due");
+    if (!std::isfinite(r.stamp)) reader.fail("stamp: expected a number");
     r.days = number("days");
     r.first = number("first");
     r.now = number("now");

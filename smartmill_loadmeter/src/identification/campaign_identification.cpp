@@ -30,11 +30,11 @@ IdentifiedCoefficients identifyFromForceRecords(const Campaign& campaign, const 
     std::size_t first = firstInCut(test, record);
     std::size_t count = record.size() - std::min(first, record.size());
     if (means == Means::revolutions) {
-      const double turn = units::TWO_PI / test.spindle_speed * test.sample_rate;  // samples, not whole
+      const double turn = units::TWO_PI / test.spindle_speed * test.sample_rate;  // samples, not an integer
       const double turns = std::floor(static_cast<double>(count) / turn + 1e-9);
       if (turns < 1.0) throw Error(record.file + ": less than one revolution in cut");
       const std::size_t whole = static_cast<std::size_t>(std::lround(turns * turn));
-      // The last ones: farthest from what engagement set ringing. Without engagement the first ones.
+      // The last ones, farthest from the transient of engagement. Without engagement the first ones.
       if (test.engage_time) first += count - whole;
       count = whole;
     }

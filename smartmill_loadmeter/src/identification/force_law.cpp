@@ -19,7 +19,7 @@ namespace {
 using units::TWO_PI;
 
 constexpr double REFERENCE_CHIP = 1e-4;      // [m]
-constexpr std::size_t ANGLES = 48;           // of a mean revolution
+constexpr std::size_t ANGLES = 48;           // bins of a mean revolution
 constexpr double LARGEST_OFFSET = 6e-5;      // [m]
 constexpr double LARGEST_UNBALANCE = 500.0;  // [N]
 constexpr double FIT_TOLERANCE = 1e-7;
@@ -36,7 +36,7 @@ std::vector<ForcePoint> forcePoints(const std::vector<double>& fx, const std::ve
     double phi = 0.0;
     for (int t = 0; t < tool.teeth; ++t) {
       const double tip = wrapped(spindle_angle[i] + tool.toothAngle(t));
-      // The edge reaches from the tip back by the spread.
+      // The edge extends from the tip back by the spread.
       const bool touches = (tip > engagement.entry && tip - spread < engagement.exit) ||
                            (tip + TWO_PI > engagement.entry && tip + TWO_PI - spread < engagement.exit);
       if (!touches) continue;
@@ -56,7 +56,9 @@ std::vector<ForcePoint> forcePoints(const std::vector<double>& fx, const std::ve
     points.push_back(p);
   }
   if (points.empty()) {
-    throw Error("force against chip thickness: at no time does one tooth cut alone over its whole depth");
+    throw Error(
+        "force against chip thickness: expected angles with one tooth in cut over its whole depth, found "
+        "none");
   }
   return points;
 }
@@ -76,13 +78,13 @@ double ForceLaw::at(double chip) const {
 
 std::vector<ForceLaw> fitForceLaws(const std::vector<double>& chip, const std::vector<double>& force) {
   const std::size_t n = chip.size();
-  if (n < 10) throw Error("force law: " + std::to_string(n) + " points, 10 are due");
+  if (n < 10) throw Error("force law: " + std::to_string(n) + " points, expected 10 or more");
   double sx = 0.0, sy = 0.0, sxx = 0.0, sxy = 0.0;
   for (std::size_t i = 0; i < n; ++i) {
     sx += chip[i], sy += force[i], sxx += chip[i] * chip[i], sxy += chip[i] * force[i];
   }
   const double count = static_cast<double>(n), determinant = count * sxx - sx * sx;
-  if (!(determinant > 1e-12 * count * sxx)) throw Error("force law: one chip thickness only");
+  if (!(determinant > 1e-12 * count * sxx)) throw Error("force law: all points have the same chip thickness");
   const double slope = (count * sxy - sx * sy) / determinant, level = (sy - slope * sx) / count;
   const auto [low, high] = std::minmax_element(chip.begin(), chip.end());
   const double size = std::max(std::abs(slope) * *high, std::abs(level)) + 1e-9;
@@ -108,15 +110,15 @@ std::vector<ForceLaw> fitForceLaws(const std::vector<double>& chip, const std::v
     FitResult best;
     for (const double knee : {0.1, 0.3, 0.6}) {
       if (kind == ForceLawKind::shifted_linear) start[2].start = knee * *high;
-      const FitResult tried = fit(residuals, n, start);
-      if (best.value.empty() || tried.squares < best.squares) best = tried;
+      const FitResult candidate = fitLeastSquares(residuals, n, start);
+      if (best.value.empty() || candidate.squares < best.squares) best = candidate;
       if (kind != ForceLawKind::shifted_linear) break;
     }
     std::copy(best.value.begin(), best.value.end(), law.value.begin());
     const double variance = best.squares / (count - static_cast<double>(start.size()));
     for (std::size_t i = 0; i < start.size(); ++i)
       law.std_dev[i] = std::sqrt(variance * best.covarianceOf(i, i));
-    law.bic = informationCriterion(best.squares, n, start.size(), false);
+    law.bic = bayesianInformationCriterion(best.squares, n, start.size(), false);
     law.rms = size * std::sqrt(best.squares / count);
     laws.push_back(law);
   }
@@ -133,15 +135,15 @@ struct Revolution {
   std::array<std::array<double, ANGLES>, 3> force{};  // [N]
 };
 
-// Without a tachometer the speed is the one at which the revolutions resemble each other most: a spindle that
-// slips by 0.2 % smears a record of a hundred revolutions.
-double turnsPerSample(const std::vector<double>& force, std::size_t first, double nominal) {
-  const auto likeness = [&](double per_sample) {
+// Without a tachometer the speed is estimated as the one with the largest energy of the mean revolution: a
+// slip of 0.2 % blurs a record of a hundred revolutions.
+double revolutionsPerSample(const std::vector<double>& force, std::size_t first, double nominal) {
+  const auto energyAt = [&](double per_sample) {
     std::array<double, ANGLES> sum{}, count{};
     for (std::size_t i = first; i < force.size(); ++i) {
-      const double turn = static_cast<double>(i - first) * per_sample;
+      const double revolutions = static_cast<double>(i - first) * per_sample;
       const std::size_t bin =
-          static_cast<std::size_t>((turn - std::floor(turn)) * static_cast<double>(ANGLES));
+          static_cast<std::size_t>((revolutions - std::floor(revolutions)) * static_cast<double>(ANGLES));
       sum[std::min(bin, ANGLES - 1)] += force[i];
       count[std::min(bin, ANGLES - 1)] += 1.0;
     }
@@ -150,13 +152,13 @@ double turnsPerSample(const std::vector<double>& force, std::size_t first, doubl
     return energy;
   };
   const double turns = static_cast<double>(force.size() - first) * nominal;
-  double best = nominal, most = likeness(nominal);
-  // A tenth of a revolution at the end of the record is seen; then finer about the best.
+  double best = nominal, most = energyAt(nominal);
+  // Resolves a tenth of a revolution at the end of the record; then refined about the best.
   for (double step = 0.1 / turns, span = 0.01; step > 1e-3 / turns; span = 2.0 * step, step *= 0.25) {
     const double middle = best;
     for (double off = -span; off <= span; off += step) {
-      const double tried = likeness(middle * (1.0 + off));
-      if (tried > most) most = tried, best = middle * (1.0 + off);
+      const double candidate = energyAt(middle * (1.0 + off));
+      if (candidate > most) most = candidate, best = middle * (1.0 + off);
     }
   }
   return best;
@@ -171,25 +173,26 @@ Revolution revolutionOf(const CampaignTest& test, const Record& record) {
       test.engage_time ? static_cast<std::size_t>(*test.engage_time * test.sample_rate) : 0;
   const bool angle = record.has("spindle_angle");
   const double nominal = test.spindle_speed / TWO_PI / test.sample_rate;
-  const double per_sample = angle ? nominal : turnsPerSample(record.column("fy"), first, nominal);
+  const double per_sample = angle ? nominal : revolutionsPerSample(record.column("fy"), first, nominal);
   const double turns = std::floor(static_cast<double>(record.size() - first) * per_sample);
   if (turns < 1.0) throw Error(record.file + ": less than one revolution in cut");
   for (std::size_t i = first; i < record.size(); ++i) {
-    const double turn = static_cast<double>(i - first) * per_sample;
-    if (turn >= turns) break;
-    const double at = angle ? wrapped(record.column("spindle_angle")[i]) / TWO_PI : turn - std::floor(turn);
+    const double revolutions = static_cast<double>(i - first) * per_sample;
+    if (revolutions >= turns) break;
+    const double at =
+        angle ? wrapped(record.column("spindle_angle")[i]) / TWO_PI : revolutions - std::floor(revolutions);
     const std::size_t bin = std::min(ANGLES - 1, static_cast<std::size_t>(at * static_cast<double>(ANGLES)));
     count[bin] += 1.0;
     for (std::size_t a = 0; a < 3; ++a) r.force[a][bin] += record.column(names[a])[i];
   }
   for (std::size_t bin = 0; bin < ANGLES; ++bin) {
-    if (count[bin] == 0.0) throw Error(record.file + ": too few samples a revolution (48 are due)");
+    if (count[bin] == 0.0) throw Error(record.file + ": too few samples per revolution, expected 48 or more");
     for (std::size_t a = 0; a < 3; ++a) r.force[a][bin] /= count[bin];
   }
   return r;
 }
 
-/// Forces at the middles of the bins by quantities per coefficient; size effect and runout nonlinear.
+/// Forces at the bin centres for given coefficients, size effect and runout.
 void forces(const ToolGeometry& tool, const Engagement& e, const CuttingCoefficients& k, double exponent,
             double offset, double offset_angle, double phase,
             std::array<std::array<double, ANGLES>, 3>* out) {
@@ -205,7 +208,8 @@ void forces(const ToolGeometry& tool, const Engagement& e, const CuttingCoeffici
   }
 }
 
-/// Rotating force on the tool: x sin(a), y cos(a) with a the angle of its direction (effects.md, unbalance).
+/// Adds a force rotating with the tool: x sin(a), y cos(a) with a the angle of its direction (effects.md,
+/// unbalance).
 void addRotating(double towards, double square, double phase,
                  std::array<std::array<double, ANGLES>, 3>* out) {
   if (towards == 0.0 && square == 0.0) return;
@@ -216,8 +220,8 @@ void addRotating(double towards, double square, double phase,
   }
 }
 
-/// Mean and the cosine and sine parts of the first orders, RMS-weighted: what a sensor that rings higher up
-/// shows undistorted. @return numbers written.
+/// Mean and cosine and sine components of the first orders, RMS-weighted: not distorted by the resonances of
+/// a sensor. @return number of values written.
 std::size_t lowOrders(const std::array<std::array<double, ANGLES>, 3>& force, int orders, double* out) {
   const double n = static_cast<double>(ANGLES);
   static const auto CIRCLE = [] {
@@ -247,7 +251,7 @@ std::size_t lowOrders(const std::array<std::array<double, ANGLES>, 3>& force, in
   return written;
 }
 
-// Terms of a fit beyond linear edge forces.
+// Terms of a fit in addition to linear edge forces.
 struct SlotTerms {
   bool size, runout, unbalance;
 
@@ -261,7 +265,7 @@ struct SlotTerms {
   std::size_t unknowns() const { return 6 + (size ? 1 : 0) + (runout ? 2 : 0) + (unbalance ? 2 : 0); }
 };
 
-// Fits of one campaign's mean revolutions, each from the values of a poorer one.
+// Fits one campaign's mean revolutions, each fit starting from the values of one with fewer terms.
 class SlotFitter {
  public:
   SlotFitter(const Campaign& campaign, const MachineModel& model)
@@ -272,7 +276,7 @@ class SlotFitter {
       angle_ = angle_ && record.has("spindle_angle");
       cuts_.push_back(revolutionOf(test, record));
     }
-    if (cuts_.size() < 2) throw Error(campaign.folder + ": two cuts are due");
+    if (cuts_.size() < 2) throw Error(campaign.folder + ": expected two or more cuts");
     mean_ = identifyFromForceRecords(campaign, model, Means::revolutions).value;
     orders_ = tool_.teeth + 1;
     numbers_ = 3 * (1 + 2 * static_cast<std::size_t>(orders_));
@@ -284,18 +288,18 @@ class SlotFitter {
     if (!angle_) searchPhases();
   }
 
-  SlotFit add(const SlotTerms& terms) {
+  SlotFitResult add(const SlotTerms& terms) {
     std::vector<FitParameter> start = startOf(terms);
-    FitResult best = descend(terms, start);
-    if (!angle_ && (terms.runout || terms.unbalance)) best = turnByPitches(start, best);
-    // Phases found without runout start the fits with it.
+    FitResult best = solveFromStarts(terms, start);
+    if (!angle_ && (terms.runout || terms.unbalance)) best = searchPitchShifts(start, best);
+    // The phases without runout are the start of the fits with it.
     if (!angle_) phases_.assign(best.value.begin() + PHASES, best.value.end());
     solved_.emplace_back(terms, best.value);
     return resultOf(terms, best);
   }
 
  private:
-  enum Unknown : std::size_t { SIZE = 6, OFFSET_X, OFFSET_Y, HEAVY_X, HEAVY_Y, PHASES };
+  enum Unknown : std::size_t { SIZE = 6, OFFSET_X, OFFSET_Y, UNBALANCE_X, UNBALANCE_Y, PHASES };
   std::size_t count() const { return numbers_ * cuts_.size(); }
 
   void residuals(const std::vector<double>& v, double* out) const {
@@ -305,41 +309,41 @@ class SlotFitter {
       const double phase = angle_ ? 0.0 : v[PHASES + c];
       forces(tool_, cuts_[c].engagement, k, v[SIZE], std::hypot(v[OFFSET_X], v[OFFSET_Y]),
              std::atan2(v[OFFSET_Y], v[OFFSET_X]), phase, &f);
-      addRotating(v[HEAVY_X], v[HEAVY_Y], phase, &f);
+      addRotating(v[UNBALANCE_X], v[UNBALANCE_Y], phase, &f);
       lowOrders(f, orders_, out);
       for (std::size_t i = 0; i < numbers_; ++i) *out++ -= measured_[c][i];
     }
   }
 
   double squaresAt(const std::vector<double>& value) const {
-    std::vector<double> rest(count());
-    residuals(value, rest.data());
-    return std::inner_product(rest.begin(), rest.end(), rest.begin(), 0.0);
+    std::vector<double> residual(count());
+    residuals(value, residual.data());
+    return std::inner_product(residual.begin(), residual.end(), residual.begin(), 0.0);
   }
 
   FitResult solve(const std::vector<FitParameter>& start) const {
-    return fit([this](const std::vector<double>& v, double* out) { residuals(v, out); }, count(), start,
-               FIT_TOLERANCE);
+    return fitLeastSquares([this](const std::vector<double>& v, double* out) { residuals(v, out); }, count(),
+                           start, FIT_TOLERANCE);
   }
 
-  // Each cut for itself, from the coefficients of the mean forces.
+  // Finds the phase of each cut from the coefficients of the mean forces.
   void searchPhases() {
     std::array<std::array<double, ANGLES>, 3> f{};
-    std::vector<double> rest(numbers_);
+    std::vector<double> residual(numbers_);
     for (std::size_t c = 0; c < cuts_.size(); ++c) {
       double best = std::numeric_limits<double>::infinity();
       for (std::size_t p = 0; p < 2 * ANGLES; ++p) {
         const double phase = TWO_PI * static_cast<double>(p) / (2.0 * ANGLES);
         forces(tool_, cuts_[c].engagement, mean_, 0.0, 0.0, 0.0, phase, &f);
-        lowOrders(f, orders_, rest.data());
+        lowOrders(f, orders_, residual.data());
         double squares = 0.0;
-        for (std::size_t i = 0; i < numbers_; ++i) squares += std::pow(rest[i] - measured_[c][i], 2);
+        for (std::size_t i = 0; i < numbers_; ++i) squares += std::pow(residual[i] - measured_[c][i], 2);
         if (squares < best) best = squares, phases_[c] = phase;
       }
     }
   }
 
-  // From the values of the richest fit that has no more terms.
+  // Starts from the fit with the most terms among those without additional ones.
   std::vector<FitParameter> startOf(const SlotTerms& terms) const {
     const std::vector<double>* parent = nullptr;
     for (const auto& [has, value] : solved_) {
@@ -356,36 +360,37 @@ class SlotFitter {
     }
     start.push_back(
         {terms.size ? from(SIZE, 0.1) : 0.0, terms.size ? -0.3 : 0.0, terms.size ? 0.95 : 0.0, 0.2});
-    // Two components, towards tooth 1 and square to it; held at 0 where they take no part.
+    // Two components, along and perpendicular to tooth 1; fixed to 0 without the term.
     const auto pair = [&](bool in, std::size_t first, double otherwise, double far, double scale) {
       for (const std::size_t i : {first, first + 1}) {
         start.push_back({in ? from(i, otherwise) : 0.0, in ? -far : 0.0, in ? far : 0.0, scale});
       }
     };
     pair(terms.runout, OFFSET_X, 0.0, LARGEST_OFFSET, 1e-5);
-    pair(terms.unbalance, HEAVY_X, 20.0, LARGEST_UNBALANCE, 30.0);
+    pair(terms.unbalance, UNBALANCE_X, 20.0, LARGEST_UNBALANCE, 30.0);
     for (const double phase : phases_) {
       start.push_back({phase, angle_ ? 0.0 : phase - 0.5, angle_ ? 0.0 : phase + 0.5, 0.1});
     }
     return start;
   }
 
-  // A first offset is searched from two directions.
-  FitResult descend(const SlotTerms& terms, std::vector<FitParameter>& start) const {
+  // The first fit with an offset starts from two directions.
+  FitResult solveFromStarts(const SlotTerms& terms, std::vector<FitParameter>& start) const {
     const bool search = terms.runout && start[OFFSET_X].start == 0.0 && start[OFFSET_Y].start == 0.0;
     if (!search) return solve(start);
     FitResult best;
     for (const double direction : {0.5, 2.6}) {
       start[OFFSET_X].start = 1e-5 * std::cos(direction);
       start[OFFSET_Y].start = 1e-5 * std::sin(direction);
-      const FitResult tried = solve(start);
-      if (best.value.empty() || tried.squares < best.squares) best = tried;
+      const FitResult candidate = solve(start);
+      if (best.value.empty() || candidate.squares < best.squares) best = candidate;
     }
     return best;
   }
 
-  // Equal teeth: which of them is tooth 1 in a cut shows only by what turns. Each cut may be off by a pitch.
-  FitResult turnByPitches(std::vector<FitParameter> start, FitResult best) const {
+  // With equal teeth only rotating terms show which of them is tooth 1: the phase of each cut is ambiguous by
+  // pitches.
+  FitResult searchPitchShifts(std::vector<FitParameter> start, FitResult best) const {
     for (;;) {
       std::vector<double> value = best.value;
       bool moved = false;
@@ -404,14 +409,14 @@ class SlotFitter {
         start[i].start = value[i];
         if (i >= PHASES) start[i].low = value[i] - 0.5, start[i].high = value[i] + 0.5;
       }
-      const FitResult tried = solve(start);
-      if (tried.squares >= best.squares) return best;
-      best = tried;
+      const FitResult candidate = solve(start);
+      if (candidate.squares >= best.squares) return best;
+      best = candidate;
     }
   }
 
-  SlotFit resultOf(const SlotTerms& terms, const FitResult& best) const {
-    SlotFit result;
+  SlotFitResult resultOf(const SlotTerms& terms, const FitResult& best) const {
+    SlotFitResult result;
     result.name = terms.name();
     const std::size_t unknowns = terms.unknowns() + (angle_ ? 0 : cuts_.size());
     const double variance = best.squares / (static_cast<double>(count()) - static_cast<double>(unknowns));
@@ -433,8 +438,8 @@ class SlotFitter {
     for (std::size_t c = 0; c < cuts_.size(); ++c) {
       result.phase.push_back(angle_ ? 0.0 : wrapped(best.value[PHASES + c]));
     }
-    result.unbalance = std::hypot(best.value[HEAVY_X], best.value[HEAVY_Y]);
-    result.bic = informationCriterion(best.squares, count(), unknowns, false);
+    result.unbalance = std::hypot(best.value[UNBALANCE_X], best.value[UNBALANCE_Y]);
+    result.bic = bayesianInformationCriterion(best.squares, count(), unknowns, false);
     result.rms = std::sqrt(best.squares / static_cast<double>(3 * cuts_.size()));
     return result;
   }
@@ -444,7 +449,7 @@ class SlotFitter {
   bool angle_ = true;
   CuttingCoefficients mean_;
   int orders_ = 0;
-  std::size_t numbers_ = 0;  // of one cut that are fitted
+  std::size_t numbers_ = 0;  // fitted values of one cut
   std::vector<std::vector<double>> measured_;
   std::vector<double> phases_;
   std::vector<std::pair<SlotTerms, std::vector<double>>> solved_;
@@ -452,9 +457,9 @@ class SlotFitter {
 
 }  // namespace
 
-std::vector<SlotFit> fitSlots(const Campaign& campaign, const MachineModel& model) {
+std::vector<SlotFitResult> fitSlots(const Campaign& campaign, const MachineModel& model) {
   SlotFitter fitter(campaign, model);
-  std::vector<SlotFit> found;
+  std::vector<SlotFitResult> found;
   for (const SlotTerms& terms :
        {SlotTerms{false, false, false}, SlotTerms{false, false, true}, SlotTerms{false, true, false},
         SlotTerms{true, false, false}, SlotTerms{false, true, true}, SlotTerms{true, true, false},
@@ -462,13 +467,13 @@ std::vector<SlotFit> fitSlots(const Campaign& campaign, const MachineModel& mode
     found.push_back(fitter.add(terms));
   }
   std::stable_sort(found.begin(), found.end(),
-                   [](const SlotFit& a, const SlotFit& b) { return a.bic < b.bic; });
+                   [](const SlotFitResult& a, const SlotFitResult& b) { return a.bic < b.bic; });
   return found;
 }
 
 std::vector<ForcePoint> revolutionPoints(const Campaign& campaign, const MachineModel& model,
-                                         const SlotFit& fit) {
-  const ToolGeometry& tool = model.needTool("turn forces into the frame of the edge");
+                                         const SlotFitResult& fit) {
+  const ToolGeometry& tool = model.needTool("transform forces into the frame of the edge");
   std::vector<ForcePoint> points;
   std::size_t cut = 0;
   for (const CampaignTest& test : campaign.tests) {

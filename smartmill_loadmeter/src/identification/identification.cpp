@@ -13,22 +13,22 @@ namespace smartmill::loadmeter {
 
 namespace {
 
-constexpr int FEWEST_IN_WINDOW = 5;  // readings of the load meter
+constexpr int FEWEST_IN_WINDOW = 5;  // of the load meter
 
 std::string countOf(std::size_t n, const char* what) {
   return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
 }
 
-// [rad] of the feed in the X-Y plane.
+// Direction of the feed in the X-Y plane [rad].
 double headingOf(const CuttingCondition& condition) {
   const auto& from = condition.steady_from;
   const auto& to = condition.steady_to;
   return std::atan2(to[1] - from[1], to[0] - from[0]);
 }
 
-/// [m2] from one point to another, along the steady path: its sign.
-double wayAlong(const CuttingCondition& condition, const std::array<double, 3>& a,
-                const std::array<double, 3>& b) {
+/// Progress from one point to another along the steady path, times its length [m2].
+double progressAlong(const CuttingCondition& condition, const std::array<double, 3>& a,
+                     const std::array<double, 3>& b) {
   double sum = 0.0;
   for (std::size_t i = 0; i < 3; ++i)
     sum += (b[i] - a[i]) * (condition.steady_to[i] - condition.steady_from[i]);
@@ -52,31 +52,29 @@ LoadMeterIdentification::LoadMeterIdentification(const MachineModel& model,
       moves_(parameters.motor, model.axes) {
   parameters.validate();
   if (!spindle_.load_meter_full_scale) {
-    throw Error(model.file + ": spindle.load_meter_full_scale_v is missing (needed to read the load meter)");
+    throw Error(model.file + ": spindle.load_meter_full_scale_v is missing (required for the load meter)");
   }
 }
 
 void LoadMeterIdentification::reset() {
   condition_.reset();
-  speed_since_.reset();
-  path_since_.reset();
-  last_reading_ = last_state_ = next_window_ = 0.0;
-  readings_.clear();
-  motor_record_.clear();
-  force_record_.clear();
+  at_speed_since_.reset();
+  on_path_since_.reset();
+  last_load_ = last_state_ = next_window_ = 0.0;
+  steady_.clear();
   path_first_.reset();
   path_last_.reset();
   air_cuts_.clear();
   cuts_.clear();
-  dropped_.clear();
+  rejected_tests_.clear();
   bad_data_.clear();
   production_.reset();
   moves_.clear();
-  if (learnt_) learnt_->clear();
+  if (self_calibration_) self_calibration_->clear();
 }
 
-std::optional<MotorCalibration> LoadMeterIdentification::learntMotors() const {
-  return learnt_ ? learnt_->calibration() : std::nullopt;
+std::optional<MotorCalibration> LoadMeterIdentification::selfCalibration() const {
+  return self_calibration_ ? self_calibration_->calibration() : std::nullopt;
 }
 
 bool LoadMeterIdentification::onPath(const CncState& state) const {
@@ -89,13 +87,11 @@ void LoadMeterIdentification::handle(const CncState& state) {
   last_state_ = state.stamp;
   moves_.handle(state);
   if (!condition_ || condition_->kind == CuttingCondition::Kind::none) return;
-  // In air the tool need not move; where it does the feed drives show their friction.
-  const bool on_path = onPath(state);
-  if (path_since_ && (!on_path || gap)) {
-    if (condition_->kind == CuttingCondition::Kind::cut) dropAfter(state.stamp - parameters_.guard_time);
-    motor_record_.dropAfter(state.stamp - parameters_.guard_time);
-    force_record_.dropAfter(state.stamp - parameters_.guard_time);
-    path_since_.reset();
+  // In air the tool may be at rest; if it moves, the feed drives show their friction.
+  const bool on_path = onPath(state), is_cut = condition_->kind == CuttingCondition::Kind::cut;
+  if (on_path_since_ && (!on_path || gap)) {
+    steady_.dropAfter(state.stamp - parameters_.guard_time, is_cut);
+    on_path_since_.reset();
   }
   if (!on_path) return;
   PathPoint point{state.stamp, {}};
@@ -104,45 +100,44 @@ void LoadMeterIdentification::handle(const CncState& state) {
     const auto axis = std::find(state.axes.begin(), state.axes.end(), names[a]);
     point.position[a] = state.position[static_cast<std::size_t>(axis - state.axes.begin())];
   }
-  // The way back to its beginning may lead along the path too, and standing still comes before it.
-  const bool entered = !path_since_;
-  if (path_first_ && (wayAlong(*condition_, path_last_->position, point.position) < 0.0 ||
+  // The return to the start may run along the path, and the tool is at rest before the path.
+  const bool entered = !on_path_since_;
+  if (path_first_ && (progressAlong(*condition_, path_last_->position, point.position) < 0.0 ||
                       (entered && path_first_->stamp == path_last_->stamp)))
     path_first_.reset();
   if (!path_first_) {
-    if (condition_->kind == CuttingCondition::Kind::cut) readings_.clear();
-    motor_record_.clear();
-    force_record_.clear();
+    if (condition_->kind == CuttingCondition::Kind::cut) steady_.clear();
     path_first_ = point;
-    path_since_ = state.stamp;
+    on_path_since_ = state.stamp;
   }
-  if (entered) path_since_ = state.stamp;
+  if (entered) on_path_since_ = state.stamp;
   path_last_ = point;
 }
 
 // Whether a block of another sensor belongs to the steady part of a test.
-bool LoadMeterIdentification::counts(double stamp) const {
+bool LoadMeterIdentification::isSteadyAt(double stamp) const {
   if (!condition_ || condition_->kind == CuttingCondition::Kind::none) return false;
-  if (!speed_since_ || stamp - last_reading_ > parameters_.maximum_gap) return false;
-  double since = *speed_since_;
-  // In air without motion the spindle alone is read.
-  if (!path_since_ && (path_first_ || condition_->kind == CuttingCondition::Kind::cut)) return false;
-  if (path_since_) since = std::max(since, *path_since_);
+  if (!at_speed_since_ || stamp - last_load_ > parameters_.maximum_gap) return false;
+  double since = *at_speed_since_;
+  // In air without motion only the spindle is measured.
+  if (!on_path_since_ && (path_first_ || condition_->kind == CuttingCondition::Kind::cut)) return false;
+  if (on_path_since_) since = std::max(since, *on_path_since_);
   return stamp >= since + parameters_.settle_time_constants * timeConstant(spindle_.load_meter_bandwidth);
 }
 
 void LoadMeterIdentification::handle(const SampleBlock& block) {
-  if (!readsMotors()) return;
+  if (!usesMotors()) return;
   if (!isServoRecord(block)) moves_.handle(block);
-  if (counts(block.stamp)) motor_record_.add(block);
+  if (isSteadyAt(block.stamp)) steady_.motor.add(block);
 }
 
 void LoadMeterIdentification::handle(const ForceBlock& block) {
-  if (counts(block.stamp)) force_record_.add(block);
+  if (isSteadyAt(block.stamp)) steady_.force.add(block);
 }
 
-void LoadMeterIdentification::readMotorsOf(LoadTest* test, const MotorRecord& record, bool is_short) const {
-  if (!readsMotors() || record.empty()) return;
+void LoadMeterIdentification::addMotorMeasurement(LoadTest* test, const MotorRecord& record,
+                                                  bool is_short) const {
+  if (!usesMotors() || record.empty()) return;
   std::array<double, 3> velocity{{0.0, 0.0, 0.0}};
   if (path_first_ && path_last_ && path_last_->stamp > path_first_->stamp) {
     for (std::size_t a = 0; a < 3; ++a) {
@@ -151,24 +146,24 @@ void LoadMeterIdentification::readMotorsOf(LoadTest* test, const MotorRecord& re
     }
   }
   const bool cut = test->condition.kind == CuttingCondition::Kind::cut;
-  test->motor = readMotors(record, parameters_.motor, velocity, test->speed, is_short,
-                           cut ? test->condition.tool.teeth : 0);
+  test->motor = measureMotors(record, parameters_.motor, velocity, test->speed, is_short,
+                              cut ? test->condition.tool.teeth : 0);
   if (!cut) return;
-  std::vector<MotorReading> air;
+  std::vector<MotorMeasurement> air;
   for (const LoadTest& one : air_cuts_) {
     if (one.motor) air.push_back(*one.motor);
   }
-  if (learnt_) air = learnt_->airFor(*test->motor);
-  const auto& calibration = motors_ ? motors_ : learnt_->calibration();
-  if (!calibration) return;  // not learnt yet
+  if (self_calibration_) air = self_calibration_->airFor(*test->motor);
+  const auto& calibration = motors_ ? motors_ : self_calibration_->calibration();
+  if (!calibration) return;  // too few cuts so far
   test->force = forceFromMotors(*test->motor, air, *calibration, parameters_.motor);
   test->force->stamp = test->stamp;
   test->force->name = test->condition.name;
 }
 
 void LoadMeterIdentification::handle(const LoadSample& sample) {
-  const bool gap = sample.stamp - last_reading_ > parameters_.maximum_gap;
-  last_reading_ = sample.stamp;
+  const bool gap = sample.stamp - last_load_ > parameters_.maximum_gap;
+  last_load_ = sample.stamp;
   if (!condition_ || condition_->kind == CuttingCondition::Kind::none) return;
   if (!std::isfinite(sample.spindle_load) || !std::isfinite(sample.spindle_speed)) {
     if (bad_data_.empty()) {
@@ -179,67 +174,70 @@ void LoadMeterIdentification::handle(const LoadSample& sample) {
   }
   const bool steady = std::abs(sample.spindle_speed - condition_->spindle_speed) <=
                       parameters_.speed_tolerance * condition_->spindle_speed;
-  if (speed_since_ && (!steady || gap)) {
-    dropAfter(sample.stamp - parameters_.guard_time);
-    motor_record_.dropAfter(sample.stamp - parameters_.guard_time);
-    force_record_.dropAfter(sample.stamp - parameters_.guard_time);
-    speed_since_.reset();
+  if (at_speed_since_ && (!steady || gap)) {
+    steady_.dropAfter(sample.stamp - parameters_.guard_time);
+    at_speed_since_.reset();
   }
   if (!steady) return;
-  if (!speed_since_) speed_since_ = sample.stamp;
-  double since = *speed_since_;
+  if (!at_speed_since_) at_speed_since_ = sample.stamp;
+  double since = *at_speed_since_;
   if (condition_->kind == CuttingCondition::Kind::cut) {
-    if (!path_since_ || sample.stamp - last_state_ > parameters_.maximum_gap) return;
-    since = std::max(since, *path_since_);
+    if (!on_path_since_ || sample.stamp - last_state_ > parameters_.maximum_gap) return;
+    since = std::max(since, *on_path_since_);
   }
   const double settle = parameters_.settle_time_constants * timeConstant(spindle_.load_meter_bandwidth);
   if (sample.stamp < since + settle) return;
-  readings_.push_back(
+  steady_.readings.push_back(
       {sample.stamp, sample.spindle_load * *spindle_.load_meter_full_scale, sample.spindle_speed});
-  if (window_ && parameters_.force.period > 0.0 && condition_->kind == CuttingCondition::Kind::cut)
-    lookBack(sample.stamp);
+  if (on_window_ && parameters_.force.period > 0.0 && condition_->kind == CuttingCondition::Kind::cut)
+    estimateWindow(sample.stamp);
 }
 
-// Force of the last part of a steady cut.
-void LoadMeterIdentification::lookBack(double now) {
+// Force over the last window of a steady cut.
+void LoadMeterIdentification::estimateWindow(double now) {
   const double since = now - parameters_.force.window;
-  if (now < next_window_ || readings_.front().stamp > since) return;
+  if (now < next_window_ || steady_.readings.front().stamp > since) return;
   next_window_ = now + parameters_.force.period - 1e-6;
   LoadTest part = steadyTest(since);
   if (part.readings < FEWEST_IN_WINDOW) return;
-  readMotorsOf(&part, motor_record_.last(parameters_.force.window), true);
-  part.sensor = force_record_.reading(since);
-  if (const auto found = estimate(part)) window_(*found);
+  addMotorMeasurement(&part, steady_.motor.last(parameters_.force.window), true);
+  part.sensor = steady_.force.measurement(since);
+  if (const auto found = estimate(part)) on_window_(*found);
 }
 
 void LoadMeterIdentification::handle(const CuttingCondition& condition) {
-  // A latched condition comes again when a subscriber connects anew.
+  // A latched condition is received again when a subscriber reconnects.
   if (condition_ && condition_->stamp == condition.stamp && condition_->name == condition.name) return;
   closeTest();
   condition_ = condition;
-  speed_since_.reset();
-  path_since_.reset();
+  at_speed_since_.reset();
+  on_path_since_.reset();
 }
 
-void LoadMeterIdentification::dropAfter(double stamp) {
-  while (!readings_.empty() && readings_.back().stamp > stamp) readings_.pop_back();
+void LoadMeterIdentification::SteadyRecord::dropAfter(double stamp, bool with_readings) {
+  while (with_readings && !readings.empty() && readings.back().stamp > stamp) readings.pop_back();
+  motor.dropAfter(stamp);
+  force.dropAfter(stamp);
+}
+
+void LoadMeterIdentification::SteadyRecord::clear(bool with_readings) {
+  if (with_readings) readings.clear();
+  motor.clear();
+  force.clear();
 }
 
 void LoadMeterIdentification::closeTest() {
   if (condition_ && condition_->kind != CuttingCondition::Kind::none) {
-    dropAfter(last_reading_ - parameters_.guard_time);
-    motor_record_.dropAfter(last_reading_ - parameters_.guard_time);
-    force_record_.dropAfter(last_reading_ - parameters_.guard_time);
-    if (readings_.size() < static_cast<std::size_t>(parameters_.minimum_readings)) {
-      dropped_.push_back("'" + condition_->name + "' has " + countOf(readings_.size(), "steady reading") +
-                         ", " + std::to_string(parameters_.minimum_readings) + " are due");
+    steady_.dropAfter(last_load_ - parameters_.guard_time);
+    if (steady_.readings.size() < static_cast<std::size_t>(parameters_.minimum_readings)) {
+      rejected_tests_.push_back("'" + condition_->name +
+                                "': " + countOf(steady_.readings.size(), "steady reading") + ", expected " +
+                                std::to_string(parameters_.minimum_readings) + " or more");
     } else {
-      keep(steadyTest());
+      storeTest(steadyTest());
     }
   }
-  readings_.clear();
-  motor_record_.clear();
-  force_record_.clear();
+  steady_.clear();
   path_first_.reset();
   path_last_.reset();
 }
@@ -247,53 +245,52 @@ void LoadMeterIdentification::closeTest() {
 LoadTest LoadMeterIdentification::steadyTest(double since) const {
   LoadTest test;
   test.condition = *condition_;
-  const auto first = std::find_if(readings_.begin(), readings_.end(),
-                                  [since](const Reading& r) { return r.stamp >= since; });
-  const std::vector<Reading> steady(first, readings_.end());
+  const auto first = std::find_if(steady_.readings.begin(), steady_.readings.end(),
+                                  [since](const SteadyRecord::Sample& r) { return r.stamp >= since; });
+  const std::vector<SteadyRecord::Sample> steady(first, steady_.readings.end());
   test.readings = static_cast<int>(steady.size());
   if (test.readings < 2) return test;
   const double n = static_cast<double>(steady.size());
-  for (const Reading& r : steady) {
+  for (const SteadyRecord::Sample& r : steady) {
     test.voltages.push_back(r.voltage);
     test.times.push_back(r.stamp - steady.front().stamp);
     test.speed += r.speed / n;
   }
   double speed2 = 0.0;
-  for (const Reading& r : steady) speed2 += (r.speed - test.speed) * (r.speed - test.speed);
+  for (const SteadyRecord::Sample& r : steady) speed2 += (r.speed - test.speed) * (r.speed - test.speed);
   test.speed_std = std::sqrt(speed2 / (n * (n - 1.0)));
   test.stamp = steady.back().stamp;
   test.duration = steady.back().stamp - steady.front().stamp;
-  test.takeMean(spindle_, stepOf(test.voltages, spindle_.load_meter_resolution));
+  test.computeMean(spindle_, resolutionOf(test.voltages, spindle_.load_meter_resolution));
   return test;
 }
 
-void LoadMeterIdentification::keep(LoadTest test) {
-  readMotorsOf(&test, motor_record_, false);
-  test.sensor = force_record_.reading();
+void LoadMeterIdentification::storeTest(LoadTest test) {
+  addMotorMeasurement(&test, steady_.motor, false);
+  test.sensor = steady_.force.measurement();
   const bool cut = test.condition.kind == CuttingCondition::Kind::cut;
   (cut ? cuts_ : air_cuts_).push_back(test);
-  if (cut) follow(test);
-  if (learnt_ && test.motor && !cut) learnt_->air(*test.motor, test.stamp);
-  if (learnt_ && test.motor && cut) {
-    if (const auto seen = estimate(test, true)) learnt_->cut(*test.motor, *seen);
+  if (cut) updateProduction(test);
+  if (self_calibration_ && test.motor && !cut) self_calibration_->air(*test.motor, test.stamp);
+  if (self_calibration_ && test.motor && cut) {
+    if (const auto reference = estimate(test, true)) self_calibration_->cut(*test.motor, *reference);
   }
-  if (test_) test_(test);
-  if (motor_force_ && test.force) motor_force_(*test.force);
-  if (!cut || !force_) return;
-  if (const auto found = estimate(test)) force_(*found);
+  if (on_test_) on_test_(test);
+  if (on_motor_force_ && test.force) on_motor_force_(*test.force);
+  if (!cut || !on_force_) return;
+  if (const auto found = estimate(test)) on_force_(*found);
 }
 
-// All three components by all that was measured of the cut; a sensor's zero and noise are those of the last
-// air cut.
+// Force from all measurements of a cut; a sensor's zero and noise are those of the last air cut.
 std::optional<ForceEstimate> LoadMeterIdentification::estimate(const LoadTest& cut,
                                                                bool without_motors) const {
-  ForceReadings readings;
+  CutMeasurements readings;
   readings.stamp = cut.stamp;
   readings.name = cut.condition.name;
   readings.tool = cut.condition.tool;
   readings.engagement = cut.condition.engagement;
   readings.heading = headingOf(cut.condition);
-  readings.load_torque = cuttingTorque(cut);
+  readings.load_torque = cuttingTorqueOf(cut);
   readings.spindle_speed = cut.speed;
   if (cut.force && !without_motors) {
     readings.motor_lines = cut.force->lines;
@@ -303,13 +300,13 @@ std::optional<ForceEstimate> LoadMeterIdentification::estimate(const LoadTest& c
     readings.motor_other = cut.force->other;
   }
   if (cut.sensor) {
-    std::optional<ForceReading> air;
+    std::optional<ForceMeasurement> air;
     for (const LoadTest& test : air_cuts_) {
       if (test.sensor) air = test.sensor;
     }
     for (std::size_t a = 0; a < 3; ++a) {
-      readings.sensor_force[a] = cut.sensor->meanOver(air, a);
-      readings.sensor_rms[a] = cut.sensor->rmsOver(air, a);
+      readings.sensor_force[a] = cut.sensor->meanAbove(air, a);
+      readings.sensor_rms[a] = cut.sensor->rmsAbove(air, a);
     }
   }
   try {
@@ -317,11 +314,11 @@ std::optional<ForceEstimate> LoadMeterIdentification::estimate(const LoadTest& c
     found.duration = cut.duration;
     return found;
   } catch (const Error&) {
-    return std::nullopt;  // nothing was measured of it: friction is not known yet, no motor, no sensor
+    return std::nullopt;  // no measurement: friction is unknown, no motor, no sensor
   }
 }
 
-std::optional<Estimate> LoadMeterIdentification::cuttingTorque(const LoadTest& cut) const {
+std::optional<Estimate> LoadMeterIdentification::cuttingTorqueOf(const LoadTest& cut) const {
   try {
     const IdleTorque idle = idleTorque(air_cuts_, spindle_, spindle_uncertainty_);
     const double watt = spindle_.load_meter_gain * cut.speed;
@@ -334,34 +331,34 @@ std::optional<Estimate> LoadMeterIdentification::cuttingTorque(const LoadTest& c
     }
     return Estimate{cut.voltage.mean / watt - idle.torque(cut), std::sqrt(variance)};
   } catch (const Error&) {
-    return std::nullopt;  // one air cut so far: the friction is not known yet
+    return std::nullopt;  // a single air cut does not determine the friction
   }
 }
 
-void LoadMeterIdentification::follow(const LoadTest& cut) {
-  const std::optional<Estimate> torque = cuttingTorque(cut);
+void LoadMeterIdentification::updateProduction(const LoadTest& cut) {
+  const std::optional<Estimate> torque = cuttingTorqueOf(cut);
   if (!torque) return;
-  TorqueReading reading;
-  reading.torque = torque->value;
-  reading.torque_std = torque->std_dev;
-  if (!(reading.torque_std > 0.0)) return;
+  TorqueMeasurement measurement;
+  measurement.torque = torque->value;
+  measurement.torque_std = torque->std_dev;
+  if (!(measurement.torque_std > 0.0)) return;
   const std::string of = cut.condition.tool_name + "\n" + cut.condition.material;
   if (!production_ || of != production_of_) {
     production_.emplace(RecursiveCoefficients::Start(), parameters_.production_memory);
     production_of_ = of;
   }
-  reading.tool = cut.condition.tool;
-  reading.engagement = cut.condition.engagement;
-  reading.cutting_time = cut.duration;
-  production_->update(reading);
-  tell(cut);
+  measurement.tool = cut.condition.tool;
+  measurement.engagement = cut.condition.engagement;
+  measurement.cutting_time = cut.duration;
+  production_->update(measurement);
+  reportCut(cut);
 }
 
-void LoadMeterIdentification::tell(const LoadTest& cut) {
+void LoadMeterIdentification::reportCut(const LoadTest& cut) {
   const CuttingCondition& c = cut.condition;
   double& age = edge_age_[c.tool_name];
   age += cut.duration;
-  if (!cut_) return;
+  if (!on_cut_) return;
   CoefficientRecord record;
   record.set.stamp = cut.stamp;
   record.set.tool = c.tool_name;
@@ -384,32 +381,30 @@ void LoadMeterIdentification::tell(const LoadTest& cut) {
   record.entry = c.engagement.entry;
   record.exit = c.engagement.exit;
   record.edge_age = age;
-  cut_(record);
+  on_cut_(record);
 }
 
 void LoadMeterIdentification::handle(const IdentifyGoal& goal) {
   if (goal.reset) {
-    // The condition that holds stays: its test begins anew.
-    readings_.clear();
-    motor_record_.clear();
-    force_record_.clear();
+    // The present condition remains: its test starts again.
+    steady_.clear();
     air_cuts_.clear();
     cuts_.clear();
-    if (learnt_) learnt_->clear();
-    dropped_.clear();
+    if (self_calibration_) self_calibration_->clear();
+    rejected_tests_.clear();
     bad_data_.clear();
     IdentifyResult result;
     result.reset = true;
     result.id = goal.id;
-    result.message = "earlier tests are forgotten";
+    result.message = "earlier tests discarded";
     result.coefficients.stamp = goal.stamp;
     result.coefficients.value = result.coefficients.std_dev = NOT_IDENTIFIED;
-    if (result_) result_(result);
+    if (on_result_) on_result_(result);
     return;
   }
   closeTest();
   condition_.reset();
-  if (result_) result_(identify(goal));
+  if (on_result_) on_result_(identify(goal));
 }
 
 IdentifyResult LoadMeterIdentification::identify(const IdentifyGoal& goal) const {
@@ -432,9 +427,9 @@ IdentifyResult LoadMeterIdentification::identify(const IdentifyGoal& goal) const
   SessionResult found;
   std::string aside;
   if (cuts.size() < cuts_.size()) {
-    aside += "; " + countOf(cuts_.size() - cuts.size(), "cut") + " with another tool or material left out";
+    aside += "; " + countOf(cuts_.size() - cuts.size(), "cut") + " with another tool or material ignored";
   }
-  for (const std::string& reason : dropped_) aside += "; " + reason;
+  for (const std::string& reason : rejected_tests_) aside += "; " + reason;
   try {
     found = identifyFromTests(air_cuts_, cuts, spindle_, spindle_uncertainty_, parameters_.largest_runout);
   } catch (const Error& error) {
@@ -443,7 +438,7 @@ IdentifyResult LoadMeterIdentification::identify(const IdentifyGoal& goal) const
     return result;
   }
   result.record = found.record;
-  aside = found.found + addFromMotors(cuts, &result.record) + aside;
+  aside = found.found + addMotorCoefficients(cuts, &result.record) + aside;
   CoefficientSet& k = result.record.set;
   if (!goal.tool.empty()) k.tool = goal.tool;
   if (!goal.material.empty()) k.material = goal.material;
@@ -452,27 +447,27 @@ IdentifyResult LoadMeterIdentification::identify(const IdentifyGoal& goal) const
                              k.value.ktc / units::N_PER_MM2, k.std_dev.ktc / units::N_PER_MM2,
                              k.value.kte / units::N_PER_MM, k.std_dev.kte / units::N_PER_MM, air_cuts_.size(),
                              cuts.size()) +
-                   aside + motorsText();
+                   aside + selfCalibrationText();
   return result;
 }
 
-std::string LoadMeterIdentification::motorsText() const {
-  if (!readsMotors()) return "";
+std::string LoadMeterIdentification::selfCalibrationText() const {
+  if (!usesMotors()) return "";
   const std::array<std::optional<Estimate>, 3> bandwidth{moves_.bandwidth(0), moves_.bandwidth(1),
                                                          moves_.bandwidth(2)};
-  const std::string text = learnt_.value_or(SelfCalibration(parameters_.motor)).text(bandwidth);
-  return text.empty() ? "; motors: nothing learnt" : "; motors: " + text;
+  const std::string text = self_calibration_.value_or(SelfCalibration(parameters_.motor)).text(bandwidth);
+  return text.empty() ? "; motors: not calibrated yet" : "; motors: " + text;
 }
 
-// Radial and axial coefficients; Ktc and Kte stay those of the torque, which know the friction they share.
-// @return what to add to the message.
-std::string LoadMeterIdentification::addFromMotors(const std::vector<LoadTest>& cuts,
-                                                   CoefficientRecord* record) const {
-  std::vector<JointReading> readings;
+// Adds radial and axial coefficients; Ktc and Kte remain those of the torque, which account for the common
+// friction. @return text for the message.
+std::string LoadMeterIdentification::addMotorCoefficients(const std::vector<LoadTest>& cuts,
+                                                          CoefficientRecord* record) const {
+  std::vector<JointMeasurement> readings;
   bool any = false;
   const IdleTorque idle = idleTorque(air_cuts_, spindle_, spindle_uncertainty_);
   for (const LoadTest& cut : cuts) {
-    JointReading r;
+    JointMeasurement r;
     r.tool = cut.condition.tool;
     r.engagement = cut.condition.engagement;
     r.heading = headingOf(cut.condition);
@@ -505,7 +500,7 @@ std::string LoadMeterIdentification::addFromMotors(const std::vector<LoadTest>& 
   }
   for (const std::string& name : joint.not_observable) text += (text.empty() ? "" : ", ") + name;
   record->set.source = "load_meter and motor_current";
-  return text.empty() ? "; motor currents give all six"
+  return text.empty() ? "; all six coefficients observable with motor currents"
                       : "; not observable from the axes that moved: " + text;
 }
 

@@ -16,30 +16,30 @@ namespace {
 
 using Square = Eigen::Matrix<double, LOAD_COLUMNS, LOAD_COLUMNS>;
 
-// One first-order lag, exact for an input that runs linearly within a step.
+// First-order lag, exact for an input that is linear within a step.
 class Lag {
  public:
   explicit Lag(double time_constant) : time_constant_(time_constant) {}
   void start(double value) { output_ = value; }
   double step(double from, double to, double dt) {
-    if (dt != dt_) keep_ = std::exp(-dt / time_constant_), dt_ = dt;
-    const double a = keep_, slope = dt > 0.0 ? (to - from) / dt : 0.0;
+    if (dt != dt_) decay_ = std::exp(-dt / time_constant_), dt_ = dt;
+    const double a = decay_, slope = dt > 0.0 ? (to - from) / dt : 0.0;
     output_ = a * output_ + (1.0 - a) * (from - slope * time_constant_) + slope * dt;
     return output_;
   }
 
  private:
   double time_constant_;
-  double output_ = 0.0, dt_ = 0.0, keep_ = 1.0;
+  double output_ = 0.0, dt_ = 0.0, decay_ = 1.0;
 };
 
-// Torque in cut per unit of Ktc, Kte: at engagement, in the mean, from `first` on.
+// Torque in cut per unit of Ktc, Kte: at engagement, mean, and per sample from `first` on.
 struct UnitTorque {
   std::array<double, 2> at_engagement{}, mean{};
   std::array<std::vector<double>, 2> torque;
 };
 
-// Without the angle: the mean. @param steps of a revolution, linear between them.
+// Without the spindle angle the mean torque. @param steps of a revolution, linear between them.
 UnitTorque unitTorque(const LoadRecord& r, const Runout& runout, std::size_t steps) {
   UnitTorque unit;
   const RunoutTorque torque(r.tool, r.engagement, runout.x, runout.y);
@@ -60,16 +60,16 @@ UnitTorque unitTorque(const LoadRecord& r, const Runout& runout, std::size_t ste
     const double turn = r.angle[i] / units::TWO_PI,
                  at = (turn - std::floor(turn)) * static_cast<double>(steps);
     const std::size_t k = std::min(static_cast<std::size_t>(at), steps - 1);
-    const double share = at - static_cast<double>(k);
+    const double weight = at - static_cast<double>(k);
     for (std::size_t u = 0; u < 2; ++u) {
-      unit.torque[u][i] = table[k][u] + share * (table[k + 1][u] - table[k][u]);
+      unit.torque[u][i] = table[k][u] + weight * (table[k + 1][u] - table[k][u]);
     }
   }
   unit.at_engagement = torque.at(r.engage_angle);
   return unit;
 }
 
-// Both torques as one, in place of the first.
+// Combines both torques into the first.
 UnitTorque weighted(UnitTorque unit, const LoadPoint& about, double factor) {
   const auto join = [&](double& first, double second) {
     first = factor * (about.ktc * first + about.kte * second);
@@ -83,41 +83,41 @@ UnitTorque weighted(UnitTorque unit, const LoadPoint& about, double factor) {
 std::vector<double> lagged(const LoadRecord& r, const UnitTorque& unit, std::size_t u, double time_constant) {
   std::vector<double> out(r.voltage.size(), 0.0);
   Lag lag(time_constant);
-  if (r.throughout) lag.start(unit.mean[u]);
+  if (r.starts_in_cut) lag.start(unit.mean[u]);
   double before = unit.at_engagement[u];
   for (std::size_t i = 0; i < unit.torque[u].size(); ++i) {
     const double now = unit.torque[u][i];
-    // Engagement is a step that need not fall on a sample.
+    // Engagement is a step between samples.
     out[r.first + i] = lag.step(before, now, i == 0 ? r.lead : r.dt);
     before = now;
   }
   return out;
 }
 
-// Mean torque with runout over that without, per Ktc and Kte.
+// Ratio of the mean torque with runout to that without, for Ktc and Kte.
 std::array<double, 2> meanShare(const LoadRecord& r, const Runout& runout) {
   const std::array<double, 2> plain = RunoutTorque(r.tool, r.engagement, 0.0, 0.0).mean(),
                               with = RunoutTorque(r.tool, r.engagement, runout.x, runout.y).mean();
   return {with[0] / plain[0], with[1] / plain[1]};
 }
 
-// Response to the offset in x or y, about the point.
+// Derivative of the response with respect to the offset in x or y.
 std::vector<double> runoutResponse(const LoadRecord& r, const LoadPoint& about, std::size_t axis) {
   const double d = 2e-7;
-  const auto beside = [&](double step) {
+  const auto torqueAt = [&](double step) {
     Runout at = about.runout;
     (axis == 0 ? at.x : at.y) += step;
     return weighted(unitTorque(r, at, 1024), about, 0.5 / d);
   };
-  UnitTorque sum = beside(d);
-  const UnitTorque below = beside(-d);
+  UnitTorque sum = torqueAt(d);
+  const UnitTorque below = torqueAt(-d);
   sum.at_engagement[0] -= below.at_engagement[0];
   sum.mean[0] -= below.mean[0];
   for (std::size_t i = 0; i < sum.torque[0].size(); ++i) sum.torque[0][i] -= below.torque[0][i];
   return lagged(r, sum, 0, about.time_constant);
 }
 
-// Torque of each column of a cut, sample by sample; empty where the record holds no such response.
+// Torque of each column of a cut per sample; empty where the record has no such response.
 std::array<std::vector<double>, LOAD_COLUMNS> responses(LoadRecord& r, const LoadPoint& about) {
   std::array<std::vector<double>, LOAD_COLUMNS> by;
   by[IDLE].assign(r.voltage.size(), 1.0);
@@ -125,7 +125,7 @@ std::array<std::vector<double>, LOAD_COLUMNS> responses(LoadRecord& r, const Loa
   const UnitTorque here = unitTorque(r, r.has_angle ? about.runout : Runout(), 4096);
   by[KTC] = lagged(r, here, 0, about.time_constant);
   by[KTE] = lagged(r, here, 1, about.time_constant);
-  // What is weighted may be summed before the lag, which is linear.
+  // The lag is linear, so that the weighted torques are summed before it.
   const UnitTorque sum = weighted(here, about, 1.0);
   const double h = 1e-3;
   by[LAG] = lagged(r, sum, 0, about.time_constant * (1.0 + h));
@@ -135,12 +135,12 @@ std::array<std::vector<double>, LOAD_COLUMNS> responses(LoadRecord& r, const Loa
     by[RUNOUT_X] = runoutResponse(r, about, 0);
     by[RUNOUT_Y] = runoutResponse(r, about, 1);
   } else if (about.runout.x != 0.0 || about.runout.y != 0.0) {
-    r.share = meanShare(r, about.runout);
+    r.mean_ratio = meanShare(r, about.runout);
   }
   return by;
 }
 
-// Of a revolution that take part: those beyond hardly pass the lag.
+// Number of harmonics of a revolution; the lag suppresses higher ones.
 std::size_t harmonicsOf(const ToolGeometry& tool) {
   return 3 * static_cast<std::size_t>(tool.teeth);
 }
@@ -149,15 +149,15 @@ bool isSparse(const LoadRecord& r, double interval) {
   return 2.0 * r.tool.teeth * r.speed * interval > units::TWO_PI;
 }
 
-// What passes the lag is alike from sample to sample.
+// Number of independent samples behind the lag.
 double differentSamples(double samples, double interval, double time_constant) {
   const double alike = std::exp(-interval / time_constant);
   return samples * (1.0 - alike) / (1.0 + alike);
 }
 
-// Readings at even times meet the same phases of a harmonic again and again when its period divides theirs;
-// at random times 1 / n would be left, which their scatter tells already.
-std::vector<double> lockedShares(const LoadRecord& r, const std::vector<double>& times) {
+// Evenly spaced readings alias a harmonic to zero frequency when its period divides their interval. Random
+// times leave 1 / n, which the scatter contains already.
+std::vector<double> aliasedShares(const LoadRecord& r, const std::vector<double>& times) {
   const double n = static_cast<double>(times.size());
   std::vector<double> shares;
   for (std::size_t k = 1; k <= harmonicsOf(r.tool); ++k) {
@@ -186,7 +186,7 @@ LoadRecord loadRecord(const CampaignTest& test, const Record& record, const Tool
   r.sparse = isSparse(r, r.dt);
   if (!r.cut) return r;
   const double begin = record.time.front(), engage = test.engage_time.value_or(0.0);
-  r.throughout = !test.engage_time;
+  r.starts_in_cut = !test.engage_time;
   r.first = std::min(record.size(), static_cast<std::size_t>(std::ceil(engage / r.dt - 1e-9)));
   r.lead = static_cast<double>(r.first) * r.dt - engage;
   r.in_cut = 1.0 - static_cast<double>(r.first) / static_cast<double>(record.size());
@@ -225,7 +225,7 @@ LoadRecord loadRecord(const LoadTest& test, bool cut, const Spindle& spindle, do
   const double n = static_cast<double>(test.voltages.size());
   r.sparse = isSparse(r, test.duration / (n - 1.0));
   r.samples = differentSamples(n, test.duration / (n - 1.0), timeConstant(spindle.load_meter_bandwidth));
-  if (r.cut && r.sparse) r.locked = lockedShares(r, test.times);
+  if (r.cut && r.sparse) r.aliased_share = aliasedShares(r, test.times);
   return r;
 }
 
@@ -261,11 +261,11 @@ void LoadRecord::condense(const Spindle& spindle, const LoadPoint& about) {
     rows.row(at) = root * own.vectors.col(kept[i]).transpose();
     target[at] = own.vectors.col(kept[i]).dot(right) / root;
   }
-  left = std::max(0.0, squares - target.squaredNorm());
-  variance = left / static_cast<double>(voltage.size());
+  residual_squares = std::max(0.0, squares - target.squaredNorm());
+  variance = residual_squares / static_cast<double>(voltage.size());
   samples = differentSamples(static_cast<double>(voltage.size()), dt, about.time_constant);
-  // Rounding moves a level by up to half a step where no noise spreads the readings over the steps. A cut's
-  // own response sweeps the steps.
+  // Rounding shifts a level by up to half a step unless noise, or a cut's own response, spreads the readings
+  // over the steps.
   const double step = resolution / std::sqrt(12.0);
   const auto [low, high] = std::minmax_element(voltage.begin(), voltage.end());
   const bool swept = *high - *low > 1.5 * resolution;
@@ -287,14 +287,14 @@ RunoutEffect::RunoutEffect(const LoadRecord& record, const Spindle& spindle, dou
       const RunoutTorque torque(record.tool, record.engagement, offset * std::cos(angle),
                                 offset * std::sin(angle));
       Node& node = nodes_[i][a];
-      node.share = {torque.mean()[0] / plain[0], torque.mean()[1] / plain[1]};
+      node.mean_ratio = {torque.mean()[0] / plain[0], torque.mean()[1] / plain[1]};
       node.harmonics.assign(highest, {});
       for (std::size_t s = 0; s < steps; ++s) {
         const double turn = units::TWO_PI * static_cast<double>(s) / n;
         const std::array<double, 2> here = torque.at(turn);
         for (std::size_t k = 1; k <= highest; ++k) {
           const double order = static_cast<double>(k);
-          // Through the first-order lag; the amplitude is twice the Fourier coefficient.
+          // First-order lag; the amplitude is twice the Fourier coefficient.
           const std::complex<double> turned = std::polar(2.0 * watt / n, -order * turn) /
                                               std::complex<double>(1.0, order * record.speed * time_constant);
           for (std::size_t u = 0; u < 2; ++u) node.harmonics[k - 1][u] += turned * here[u];
@@ -310,17 +310,18 @@ double RunoutEffect::at(double offset, std::size_t* node) const {
   return x - static_cast<double>(*node);
 }
 
-std::array<double, 2> RunoutEffect::share(double offset, std::size_t angle) const {
+std::array<double, 2> RunoutEffect::meanRatio(double offset, std::size_t angle) const {
   std::size_t node = 0;
   const double beyond = at(offset, &node);
-  const std::array<double, 2>&low = nodes_[node][angle].share, &high = nodes_[node + 1][angle].share;
+  const std::array<double, 2>&low = nodes_[node][angle].mean_ratio,
+                           &high = nodes_[node + 1][angle].mean_ratio;
   return {low[0] + beyond * (high[0] - low[0]), low[1] + beyond * (high[1] - low[1])};
 }
 
-std::array<double, 2> RunoutEffect::share(double offset) const {
+std::array<double, 2> RunoutEffect::meanRatio(double offset) const {
   std::array<double, 2> mean{{0.0, 0.0}};
   for (std::size_t a = 0; a < ANGLES; ++a) {
-    const std::array<double, 2> one = share(offset, a);
+    const std::array<double, 2> one = meanRatio(offset, a);
     for (std::size_t u = 0; u < 2; ++u) mean[u] += one[u] / ANGLES;
   }
   return mean;
@@ -347,16 +348,16 @@ RunoutEffect::Variance RunoutEffect::variance(double offset, std::size_t angle, 
     sum2 += p;
     sum4 += p * p;
   }
-  // Harmonics that look alike at the samples add as phasors: |sum|^2 / 2, whose cross terms have this RMS.
+  // Aliased harmonics add as phasors: |sum|^2 / 2, whose cross terms have this RMS.
   return {0.5 * sum2, 0.5 * std::sqrt(std::max(0.0, sum2 * sum2 - sum4))};
 }
 
-double RunoutEffect::lockedVariance(double offset, double ktc, double kte,
-                                    const std::vector<double>& locked) const {
+double RunoutEffect::aliasedVariance(double offset, double ktc, double kte,
+                                     const std::vector<double>& aliased_share) const {
   double variance = 0.0;
   for (std::size_t a = 0; a < ANGLES; ++a) {
     const std::vector<double> p = power(offset, a, ktc, kte);
-    for (std::size_t k = 0; k < locked.size(); ++k) variance += 0.5 * locked[k] * p[k] / ANGLES;
+    for (std::size_t k = 0; k < aliased_share.size(); ++k) variance += 0.5 * aliased_share[k] * p[k] / ANGLES;
   }
   return variance;
 }

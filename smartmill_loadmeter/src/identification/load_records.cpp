@@ -24,7 +24,7 @@ LoadRecordResult identifyFromLoadRecords(const std::vector<TestRecord>& tests, c
     if (record.has("load_meter")) {
       records.push_back(loadRecord(test, record, tool));
     } else {
-      notes.push_back(record.file + ": no load_meter column, left out");
+      notes.push_back(record.file + ": no column load_meter, ignored");
     }
   }
   LoadEstimator estimator(std::move(records), spindle, model.uncertainty.spindle, options, 0.0, timed, where);

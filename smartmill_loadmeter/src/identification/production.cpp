@@ -40,17 +40,17 @@ void add(Information& i, const Sensitivity& s, double variance) {
 RecursiveCoefficients::RecursiveCoefficients(const Start& start, double memory)
     : value_{start.ktc, start.kte}, memory_(memory) {
   if (!(memory > 0.0) || !(start.ktc_std > 0.0) || !(start.kte_std > 0.0)) {
-    throw Error("recursive coefficients: memory and starting standard deviations must be > 0");
+    throw Error("recursive coefficients: expected memory and initial standard deviations > 0");
   }
   start_ = {1.0 / (start.ktc_std * start.ktc_std), 0.0, 1.0 / (start.kte_std * start.kte_std)};
   information_ = start_;
 }
 
-void RecursiveCoefficients::update(const TorqueReading& reading) {
+void RecursiveCoefficients::update(const TorqueMeasurement& reading) {
   if (!(reading.torque_std > 0.0) || !std::isfinite(reading.torque)) {
-    throw Error("recursive coefficients: a torque with a standard deviation > 0 is due");
+    throw Error("recursive coefficients: expected a finite torque with a standard deviation > 0");
   }
-  // What fades is replaced by the ignorance of the start about the present value.
+  // Forgotten information is replaced by the initial one about the present value.
   const double keep = std::exp(-reading.cutting_time / memory_);
   for (std::size_t i = 0; i < 3; ++i) information_[i] = keep * information_[i] + (1.0 - keep) * start_[i];
   const Sensitivity s = sensitivityOf(reading.tool, reading.engagement);
@@ -60,7 +60,7 @@ void RecursiveCoefficients::update(const TorqueReading& reading) {
       (s.tc * s.tc * information_[2] - 2.0 * s.tc * s.te * information_[1] + s.te * s.te * information_[0]) /
       d0;
   const double error = reading.torque - s.tc * value_[0] - s.te * value_[1];
-  surprise_ = error / std::sqrt(variance + expected);
+  innovation_ = error / std::sqrt(variance + expected);
   add(information_, s, variance);
   const double d = determinant(information_);
   value_[0] += (information_[2] * s.tc - information_[1] * s.te) / d * error / variance;
@@ -86,9 +86,9 @@ struct Candidate {
   double variance = 0.0;  // [N2 m2] of its torque
 };
 
-// Cuts that keep the limits.
+// Candidates within the limits.
 std::vector<Candidate> allowedCuts(const ToolGeometry& tool, const Spindle& spindle,
-                                   const CuttingCoefficients& believed, const CandidateCuts& candidates,
+                                   const CuttingCoefficients& expected, const CandidateCuts& candidates,
                                    const CutLimits& limits, double voltage_std) {
   std::vector<Candidate> allowed;
   for (const double speed : candidates.speeds) {
@@ -98,12 +98,12 @@ std::vector<Candidate> allowedCuts(const ToolGeometry& tool, const Spindle& spin
         c.cut.speed = speed;
         c.cut.engagement = {candidates.entry, candidates.exit, depth, feed};
         c.s = sensitivityOf(tool, c.cut.engagement);
-        c.cut.torque = c.s.tc * believed.ktc + c.s.te * believed.kte;
+        c.cut.torque = c.s.tc * expected.ktc + c.s.te * expected.kte;
         c.cut.power = c.cut.torque * speed;
         if (c.cut.torque > limits.torque || c.cut.power > limits.power) continue;
         if (limits.stable_depth && depth > limits.stable_depth(speed, c.cut.engagement)) continue;
-        // eq. 3.12: a volt is worth less torque the faster the spindle turns. Friction is measured in air at
-        // the same speed: twice the variance.
+        // Eq. 3.12: the torque per volt falls with the speed. Friction is measured in air at the same speed,
+        // which doubles the variance.
         const double std_dev = voltage_std / (spindle.load_meter_gain * speed);
         c.variance = 2.0 * std_dev * std_dev;
         allowed.push_back(c);
@@ -113,22 +113,22 @@ std::vector<Candidate> allowedCuts(const ToolGeometry& tool, const Spindle& spin
   return allowed;
 }
 
-// Chooses among allowed cuts, one by one, then exchanged while that helps.
+// Selects cuts one by one, with exchanges as long as they help.
 class Planner {
  public:
-  Planner(const std::vector<Candidate>& allowed, double asked_ktc_std, double asked_kte_std)
-      : allowed_(allowed), asked_ktc_(asked_ktc_std), asked_kte_(asked_kte_std) {}
+  Planner(const std::vector<Candidate>& allowed, double target_ktc_std, double target_kte_std)
+      : allowed_(allowed), target_ktc_(target_ktc_std), target_kte_(target_kte_std) {}
 
-  // @return whether `most` cuts reach what is asked.
-  bool choose(std::size_t most) {
-    double reached = INFINITY;
-    while (chosen_.size() < most) {
+  // @return whether max_cuts reach the targets.
+  bool choose(std::size_t max_cuts) {
+    double cost = INFINITY;
+    while (chosen_.size() < max_cuts) {
       chosen_.push_back(bestAddition());
-      reached = exchange();
-      if (chosen_.size() >= 3 && reached <= 1.0) break;
+      cost = exchange();
+      if (chosen_.size() >= 3 && cost <= 1.0) break;
     }
     std::sort(chosen_.begin(), chosen_.end());
-    return reached <= 1.0;
+    return cost <= 1.0;
   }
 
   const std::vector<std::size_t>& chosen() const { return chosen_; }
@@ -150,16 +150,16 @@ class Planner {
     return {std::sqrt(i[2] / d), std::sqrt(i[0] / d)};
   }
 
-  // The worse of the two against what is asked; too few feeds are impossible.
+  // Larger of the two standard deviations over their targets; fewer than three feeds are penalised.
   double cost(const List& list) const {
     std::set<double> own;
     for (const std::size_t k : list) own.insert(allowed_[k].cut.engagement.feed_per_tooth);
     const Information i = informationOf(list);
     const std::array<double, 2> s = stdsOf(i);
     const double missing = own.size() < std::min<std::size_t>(3, list.size()) ? 1e6 : 1.0;
-    // The sum breaks ties before both are finite.
-    if (!std::isfinite(s[0])) return 1e12 * missing / (1e-300 + i[0] * asked_ktc_ * asked_ktc_);
-    return missing * std::max(s[0] / asked_ktc_, s[1] / asked_kte_);
+    // Breaks ties before both are finite.
+    if (!std::isfinite(s[0])) return 1e12 * missing / (1e-300 + i[0] * target_ktc_ * target_ktc_);
+    return missing * std::max(s[0] / target_ktc_, s[1] / target_kte_);
   }
 
   std::size_t bestAddition() const {
@@ -174,7 +174,7 @@ class Planner {
     return pick;
   }
 
-  // @return the cost reached.
+  // @return the final cost.
   double exchange() {
     double best = cost(chosen_);
     for (bool better = true; better;) {
@@ -195,30 +195,30 @@ class Planner {
   }
 
   const std::vector<Candidate>& allowed_;
-  double asked_ktc_, asked_kte_;
+  double target_ktc_, target_kte_;
   List chosen_;
 };
 
 }  // namespace
 
-TestPlan planTests(const ToolGeometry& tool, const Spindle& spindle, const CuttingCoefficients& believed,
+TestPlan planTests(const ToolGeometry& tool, const Spindle& spindle, const CuttingCoefficients& expected,
                    const CandidateCuts& candidates, const CutLimits& limits, double voltage_std,
-                   double asked_ktc_std, double asked_kte_std, std::size_t most) {
+                   double target_ktc_std, double target_kte_std, std::size_t max_cuts) {
   const std::vector<Candidate> allowed =
-      allowedCuts(tool, spindle, believed, candidates, limits, voltage_std);
+      allowedCuts(tool, spindle, expected, candidates, limits, voltage_std);
   std::set<double> feeds;
   for (const Candidate& c : allowed) feeds.insert(c.cut.engagement.feed_per_tooth);
   if (feeds.size() < 3) {
     throw Error("test plan: " + std::to_string(feeds.size()) +
-                " feeds keep the limits of torque, power and stability; three are due");
+                " feeds within the limits of torque, power and stability, expected three or more");
   }
-  Planner planner(allowed, asked_ktc_std, asked_kte_std);
-  const bool reached = planner.choose(most);
+  Planner planner(allowed, target_ktc_std, target_kte_std);
+  const bool cost = planner.choose(max_cuts);
   const std::array<double, 2> s = planner.stds();
-  if (!reached) {
-    throw Error(formatted(
-        "test plan: %zu cuts within the limits reach Ktc +- %.3g N/mm2 and Kte +- %.3g N/mm, more is asked",
-        most, s[0] / units::N_PER_MM2, s[1] / units::N_PER_MM));
+  if (!cost) {
+    throw Error(
+        formatted("test plan: %zu cuts within the limits reach Ktc +- %.3g N/mm2 and Kte +- %.3g N/mm only",
+                  max_cuts, s[0] / units::N_PER_MM2, s[1] / units::N_PER_MM));
   }
   TestPlan plan;
   for (const std::size_t k : planner.chosen()) plan.cuts.push_back(allowed[k].cut);

@@ -1,4 +1,4 @@
-// Tests of a session and what they say: identification.h.
+// Identification from the tests of a session: identification.h.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -17,22 +17,22 @@ namespace smartmill::loadmeter {
 
 namespace {
 
-// With one step for all: a test whose readings stand on few steps does not tell it.
-void takeMeans(std::vector<LoadTest>* air_cuts, std::vector<LoadTest>* cuts, const Spindle& spindle) {
+// One resolution for all tests, because a test whose readings are on few steps does not show it.
+void computeMeans(std::vector<LoadTest>* air_cuts, std::vector<LoadTest>* cuts, const Spindle& spindle) {
   std::vector<double> voltages;
   for (const auto* tests : {air_cuts, cuts}) {
     for (const LoadTest& t : *tests) voltages.insert(voltages.end(), t.voltages.begin(), t.voltages.end());
   }
-  const double step = stepOf(voltages, spindle.load_meter_resolution);
+  const double step = resolutionOf(voltages, spindle.load_meter_resolution);
   for (auto* tests : {air_cuts, cuts}) {
     for (LoadTest& t : *tests) {
-      if (t.voltages.size() >= 2) t.takeMean(spindle, step);
+      if (t.voltages.size() >= 2) t.computeMean(spindle, step);
     }
   }
 }
 
-// Means of what was tried; the database measures distances from them.
-void describe(const std::vector<LoadTest>& cuts, CoefficientRecord* record) {
+// Mean conditions of the cuts, from which the database measures distances.
+void addConditions(const std::vector<LoadTest>& cuts, CoefficientRecord* record) {
   const CuttingCondition& first = cuts.front().condition;
   record->teeth = first.tool.teeth;
   record->diameter = first.tool.diameter;
@@ -52,7 +52,7 @@ void describe(const std::vector<LoadTest>& cuts, CoefficientRecord* record) {
   }
 }
 
-// Air cuts and cuts as records, in the order in which they ran; the edge ages with each cut.
+// Air cuts and cuts as records in the order of time; the edge ages with each cut.
 std::vector<LoadRecord> recordsOf(const std::vector<LoadTest>& air_cuts, const std::vector<LoadTest>& cuts,
                                   const Spindle& spindle, double noise) {
   struct Entry {
@@ -75,7 +75,7 @@ std::vector<LoadRecord> recordsOf(const std::vector<LoadTest>& air_cuts, const s
   return records;
 }
 
-std::string foundText(const LoadRecordResult& found) {
+std::string descriptionOf(const LoadRecordResult& found) {
   std::string text;
   for (const std::string& term : found.terms) text += "; with " + term;
   if (found.runout > 0.0) {
@@ -87,7 +87,7 @@ std::string foundText(const LoadRecordResult& found) {
 
 }  // namespace
 
-double stepOf(const std::vector<double>& readings, double resolution) {
+double resolutionOf(const std::vector<double>& readings, double resolution) {
   std::vector<double> sorted = readings;
   std::sort(sorted.begin(), sorted.end());
   double smallest = std::numeric_limits<double>::infinity();
@@ -98,7 +98,7 @@ double stepOf(const std::vector<double>& readings, double resolution) {
   return std::isfinite(smallest) ? std::max(smallest, resolution) : resolution;
 }
 
-void LoadTest::takeMean(const Spindle& spindle, double step) {
+void LoadTest::computeMean(const Spindle& spindle, double step) {
   const double interval = duration / static_cast<double>(voltages.size() - 1);
   voltage = meanVoltage(voltages, interval, timeConstant(spindle.load_meter_bandwidth), step);
 }
@@ -107,7 +107,7 @@ double LoadTest::variance() const {
   return voltages.size() < 2 ? 0.0 : std::pow(standardDeviation(voltages), 2);
 }
 
-// T = V / (K omega): the shares of both add up.
+// T = V / (K omega): relative errors add up.
 double LoadTest::torqueStdAsVoltage() const {
   return std::hypot(voltage.std_dev, voltage.mean * speed_std / speed);
 }
@@ -130,13 +130,13 @@ IdleTorque idleTorque(const std::vector<LoadTest>& air_cuts, const Spindle& spin
     friction = fitFriction(air, spindle.load_meter_gain, spindle.friction_zero_below);
     idle.viscous = friction.viscous;
     idle.coulomb = friction.coulomb;
-    if (weighted && air.size() > FrictionShape{true, false}.unknowns()) {
+    if (weighted && air.size() > FrictionTerms{true, false}.unknowns()) {
       const FittedFriction best =
           fitFrictionLaws(timed, spindle.load_meter_gain, spindle.friction_zero_below).front();
-      if (best.shape.unknowns() > 2) {
+      if (best.terms.unknowns() > 2) {
         idle.viscous = best.law.viscous;
         idle.coulomb = best.law.coulomb;
-        idle.unknowns = best.shape.unknowns();
+        idle.unknowns = best.terms.unknowns();
         idle.covariance = best.covariance;
         idle.torque = [best, first](const LoadTest& t) { return best.law.torque(t.speed, t.stamp - first); };
         idle.gradient = [best, first](const LoadTest& t) {
@@ -146,7 +146,7 @@ IdleTorque idleTorque(const std::vector<LoadTest>& air_cuts, const Spindle& spin
             const double step = 1e-5 * (std::abs(v[i]) + 1e-6);
             const auto at = [&](double value) {
               v[i] = value;
-              return FrictionLaw::fromValues(best.shape, v.data(), best.law.zero_below)
+              return FrictionLaw::fromValues(best.terms, v.data(), best.law.zero_below)
                   .torque(t.speed, t.stamp - first);
             };
             slope.push_back((at(best.value[i] + step) - at(best.value[i] - step)) / (2.0 * step));
@@ -159,7 +159,7 @@ IdleTorque idleTorque(const std::vector<LoadTest>& air_cuts, const Spindle& spin
   }
   idle.unknowns = 2;
   idle.covariance.assign(friction.covariance.begin(), friction.covariance.end());
-  idle.torque = [friction](const LoadTest& t) { return friction.torque(t.speed); };
+  idle.torque = [friction](const LoadTest& t) { return friction.at(t.speed); };
   idle.gradient = [friction](const LoadTest& t) {
     const std::array<double, 2> g = friction.gradient(t.speed);
     return std::vector<double>{g[0], g[1]};
@@ -170,7 +170,7 @@ IdleTorque idleTorque(const std::vector<LoadTest>& air_cuts, const Spindle& spin
 SessionResult identifyFromTests(std::vector<LoadTest> air_cuts, std::vector<LoadTest> cuts,
                                 const Spindle& spindle, double spindle_uncertainty_percent,
                                 double largest_runout) {
-  takeMeans(&air_cuts, &cuts, spindle);
+  computeMeans(&air_cuts, &cuts, spindle);
   double noise2 = 0.0;
   for (const auto* tests : {&air_cuts, &cuts}) {
     for (const LoadTest& t : *tests) noise2 += std::pow(t.torqueStdAsVoltage(), 2);
@@ -183,12 +183,12 @@ SessionResult identifyFromTests(std::vector<LoadTest> air_cuts, std::vector<Load
   const LoadRecordResult found = estimator.estimate();
   SessionResult result;
   result.record.set = found.set;
-  describe(cuts, &result.record);
+  addConditions(cuts, &result.record);
   const auto index = CoefficientRecord::covarianceIndex;
   result.record.covariance[index(0, 0)] = found.set.std_dev.ktc * found.set.std_dev.ktc;
   result.record.covariance[index(0, 3)] = found.covariance_tc_te;
   result.record.covariance[index(3, 3)] = found.set.std_dev.kte * found.set.std_dev.kte;
-  result.found = foundText(found);
+  result.found = descriptionOf(found);
   return result;
 }
 

@@ -7,12 +7,12 @@ namespace smartmill::loadmeter {
 
 namespace {
 
-constexpr double STANDS = 2e-6;               // [m] between states: more is motion
-constexpr double BEFORE = 0.08, AFTER = 0.1;  // [s] of current around a move
-constexpr double KEPT = 6.0;                  // [s] of current
+constexpr double REST_TOLERANCE = 2e-6;       // [m] largest change between states at rest
+constexpr double BEFORE = 0.08, AFTER = 0.1;  // [s] of current before and after a move
+constexpr double STORED = 6.0;                // [s] of current
 constexpr double LARGEST_GAP = 0.1;           // [s] between states
-constexpr double TIME_OFF = 0.06;  // [s] by which a move may take another time than rapid traverse does
-constexpr std::size_t MOST = 12;   // moves of an axis: then its lag is known
+constexpr double DURATION_TOLERANCE = 0.06;  // [s] largest difference of a duration from that of a rapid move
+constexpr std::size_t MAX_MOVES = 12;        // moves of an axis that are evaluated
 
 }  // namespace
 
@@ -39,17 +39,17 @@ void DriveMoves::handle(const CncState& state) {
     Axis& axis = axes_[a];
     const double moved = std::abs(state.position[at] - axis.position);
     if (gap) {
-      axis.moving = moved > STANDS && last_state_ > 0.0;
-      axis.begin = -1.0;  // unseen
-    } else if (moved > STANDS && !axis.moving) {
+      axis.moving = moved > REST_TOLERANCE && last_state_ > 0.0;
+      axis.begin = -1.0;  // start not observed
+    } else if (moved > REST_TOLERANCE && !axis.moving) {
       axis.moving = true;
       axis.begin = last_state_;
       axis.from = axis.position;
-    } else if (moved <= STANDS && axis.moving) {
+    } else if (moved <= REST_TOLERANCE && axis.moving) {
       axis.moving = false;
       if (axis.begin >= 0.0) {
         last_[a] = {axis.begin, last_state_, std::abs(axis.position - axis.from)};
-        if (axis.bandwidths.size() + axis.waiting.size() < MOST) axis.waiting.push_back(last_[a]);
+        if (axis.bandwidths.size() + axis.waiting.size() < MAX_MOVES) axis.waiting.push_back(last_[a]);
       }
     }
     axis.position = state.position[at];
@@ -72,31 +72,31 @@ void DriveMoves::handle(const SampleBlock& block) {
     if (found == block.channels.end()) continue;
     const auto channel = static_cast<std::size_t>(found - block.channels.begin());
     for (std::size_t i = 0; i < block.size(); ++i) samples_[a].push_back(block.at(i, channel));
-    const auto most = static_cast<std::size_t>(KEPT * rate_);
+    const auto most = static_cast<std::size_t>(STORED * rate_);
     while (samples_[a].size() > most) samples_[a].pop_front();
   }
   const std::size_t kept = std::max({samples_[0].size(), samples_[1].size(), samples_[2].size()});
   start_ = block.timeOf(block.size()) - static_cast<double>(kept) / rate_;
-  look();
+  evaluateWaiting();
 }
 
-void DriveMoves::look() {
+void DriveMoves::evaluateWaiting() {
   for (std::size_t a = 0; a < 3; ++a) {
     const double until = start_ + static_cast<double>(samples_[a].size()) / rate_;
-    // Axes of one line end together: their moves are all known by then.
+    // Axes of one line stop together, so that all their moves are known by then.
     auto& waiting = axes_[a].waiting;
     while (!waiting.empty() && waiting.front().end + AFTER < until) {
       const Move move = waiting.front();
       waiting.erase(waiting.begin());
-      judge(a, move);
+      identifyMove(a, move);
     }
   }
 }
 
-void DriveMoves::judge(std::size_t axis, const Move& move) {
+void DriveMoves::identifyMove(std::size_t axis, const Move& move) {
   const double per_metre = parameters_.phase_per_metre[axis];
   if (!(per_metre > 0.0) || move.begin - BEFORE < start_) return;
-  // Rapid traverse leads all axes along one line.
+  // In rapid traverse all axes follow one line.
   double length = 0.0;
   for (const Move& other : last_) {
     const bool same =
@@ -107,23 +107,24 @@ void DriveMoves::judge(std::size_t axis, const Move& move) {
   if (!(length > 0.0)) return;
   const double share = move.distance / length,
                fastest = std::min(limits_->rapid, std::sqrt(length * limits_->acceleration));
-  const double due = length / fastest + fastest / limits_->acceleration;
-  if (std::abs(move.end - move.begin - due) > TIME_OFF) return;
+  const double duration = length / fastest + fastest / limits_->acceleration;
+  if (std::abs(move.end - move.begin - duration) > DURATION_TOLERANCE) return;
   DriveMove one;
   one.sample_rate = rate_;
   const double from = move.begin - BEFORE;
   const auto first = static_cast<std::ptrdiff_t>((from - start_) * rate_),
              last = static_cast<std::ptrdiff_t>((move.end + AFTER - start_) * rate_);
   one.current.assign(samples_[axis].begin() + first, samples_[axis].begin() + last);
-  // The beginning lies between two states.
-  one.begin = move.begin - start_ - static_cast<double>(first) / rate_ + 0.5 * (move.end - move.begin - due);
+  // The start lies between two states.
+  one.begin =
+      move.begin - start_ - static_cast<double>(first) / rate_ + 0.5 * (move.end - move.begin - duration);
   one.distance = move.distance;
   one.velocity = limits_->rapid * share;
   one.acceleration = limits_->acceleration * share;
   const auto response = identifyResponse(one, per_metre);
   if (!response) return;
   axes_[axis].bandwidths.push_back(response->bandwidth);
-  axes_[axis].bandwidth = together(axes_[axis].bandwidths);
+  axes_[axis].bandwidth = weightedMean(axes_[axis].bandwidths);
 }
 
 }  // namespace smartmill::loadmeter

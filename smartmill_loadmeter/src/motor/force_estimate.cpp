@@ -22,23 +22,25 @@ namespace {
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
-// Tangential coefficients of any metal: nothing is said but their size (N/m2, N/m).
+// Prior of the tangential coefficients of metals, wide on purpose (N/m2, N/m).
 constexpr double KTC = 1.5e9, KTC_STD = 1.5e9, KTE = 2.5e4, KTE_STD = 2.5e4;
-constexpr int ANGLES = 64;  // over a tooth
-// What the mechanics tell: mean force X, Y, Z, torque, root mean square of X, Y, Z, then the squared
-// amplitudes of tooth passing and its harmonics, axis by axis.
-constexpr int RMS = 4, LINES = 7, QUANTITIES = LINES + 3 * TOOTH_LINES;
+constexpr int ANGLES = 64;  // per tooth period
+// Quantities of the mechanics: mean force X, Y, Z, torque, RMS of X, Y, Z, then the squared amplitudes of the
+// tooth passing harmonics of each axis.
+constexpr int RMS = 4, LINES = 7, QUANTITIES = LINES + 3 * TOOTH_HARMONICS;
 constexpr Eigen::Index COEFFICIENTS = 6;
-constexpr Estimate NOBODY{std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN()};
+constexpr Estimate NOT_MEASURED{std::numeric_limits<double>::quiet_NaN(),
+                                std::numeric_limits<double>::quiet_NaN()};
 
 int lineOf(int axis, int tooth) {
-  return LINES + axis * TOOTH_LINES + tooth - 1;
+  return LINES + axis * TOOTH_HARMONICS + tooth - 1;
 }
 
-/// What a cut's coefficients make: linear in the mean, quadratic in the variance over a tooth.
-class Mechanics {
+/// Forces as functions of the coefficients: linear in the mean, quadratic in the variance over a tooth
+/// period.
+class CutMechanics {
  public:
-  explicit Mechanics(const ForceReadings& r) {
+  explicit CutMechanics(const CutMeasurements& r) {
     const auto map = meanForceMatrix(r.tool, r.engagement);
     Eigen::Matrix<double, 4, 6> own;
     for (int f = 0; f < 4; ++f) {
@@ -86,83 +88,86 @@ class Mechanics {
   }
 
  private:
-  using Unit = Eigen::Matrix<double, 3, 6>;  // force by each coefficient
+  using Unit = Eigen::Matrix<double, 3, 6>;  // force per coefficient
 
-  // Variance of an axis over a tooth, and the squared amplitudes of its harmonics.
+  // Variance of an axis over a tooth period and squared amplitudes of its harmonics.
   void addSquares(const std::vector<Unit>& all, const Unit& mean, int axis) {
     const auto square = [this](int quantity) -> Matrix6& {
       return squares_[static_cast<std::size_t>(quantity - RMS)];
     };
-    std::array<Vector6, 2 * TOOTH_LINES> parts;
+    std::array<Vector6, 2 * TOOTH_HARMONICS> parts;
     for (Vector6& part : parts) part.setZero();
     for (std::size_t i = 0; i < all.size(); ++i) {
       const Vector6 away = (all[i] - mean).row(axis).transpose();
       square(RMS + axis) += away * away.transpose() / ANGLES;
-      for (std::size_t k = 0; k < TOOTH_LINES; ++k) {
+      for (std::size_t k = 0; k < TOOTH_HARMONICS; ++k) {
         const double turned = units::TWO_PI * static_cast<double>((k + 1) * i) / ANGLES;
         parts[2 * k] += 2.0 / ANGLES * std::cos(turned) * away;
         parts[2 * k + 1] += 2.0 / ANGLES * std::sin(turned) * away;
       }
     }
-    for (int k = 0; k < 2 * TOOTH_LINES; ++k) {
+    for (int k = 0; k < 2 * TOOTH_HARMONICS; ++k) {
       const Vector6& part = parts[static_cast<std::size_t>(k)];
       square(lineOf(axis, 1 + k / 2)) += part * part.transpose();
     }
   }
 
   Eigen::Matrix<double, 4, 6> mean_;
-  std::array<Matrix6, QUANTITIES - RMS> squares_;  // of the variations, of the coefficients
+  std::array<Matrix6, QUANTITIES - RMS> squares_;  // quadratic forms of the variations
 };
 
-/// Readings as rows: which of Mechanics' quantities, its value and its whole standard deviation.
-struct Row {
+/// Measurement: quantity of CutMechanics, value and total standard deviation.
+struct Observation {
   int quantity;
   double value, std_dev;
-  int drive = -1;  // axis whose motor's constant and lag are unknowns; -1: neither
-  Following following{};
+  int drive = -1;  // axis of the drive whose motor constant and lag are unknowns; -1: none
+  LagResponse lagResponse{};
 
   bool isLine() const { return quantity >= LINES; }
 };
 
-/// Unknowns beside the coefficients: of each drive with lines the logarithms of its constant and of its
-/// bandwidth, over their standard deviations.
+/// Unknowns in addition to the coefficients: for each drive with lines, the logarithms of its motor constant
+/// and bandwidth over their standard deviations.
 struct Drives {
   std::array<Eigen::Index, 3> at{{-1, -1, -1}};
   std::array<double, 3> gain_std{}, lag_std{};
   Eigen::Index count = 0;
 
-  double predicted(const Row& row, const Eigen::VectorXd& due, const Eigen::VectorXd& unknowns) const {
-    const double value = due[row.quantity];
+  double predicted(const Observation& row, const Eigen::VectorXd& expected,
+                   const Eigen::VectorXd& unknowns) const {
+    const double value = expected[row.quantity];
     if (row.drive < 0) return value;
     const auto axis = static_cast<std::size_t>(row.drive);
     const double gain = gain_std[axis] * unknowns[at[axis]];
     if (!row.isLine()) return value * std::exp(gain);
-    const double lag = row.following.slope * lag_std[axis] * unknowns[at[axis] + 1];
-    return value * std::pow(row.following.gain, 2) * std::exp(2.0 * (gain + lag));
+    const double lag = row.lagResponse.slope * lag_std[axis] * unknowns[at[axis] + 1];
+    return value * std::pow(row.lagResponse.gain, 2) * std::exp(2.0 * (gain + lag));
   }
 };
 
-class Rows {
+class Observations {
  public:
-  std::vector<Row> rows;
+  std::vector<Observation> rows;
   std::vector<std::string> sources;
   Drives drives;
 
-  /// @param share of the value that the sensor may be wrong by @param size [N, N m] that such a share is of
+  /// @param share relative systematic error of the sensor. @param size [N, N m] to which the share applies
   void add(const std::string& source, int quantity, const std::optional<Estimate>& e, double share,
            double size, double zero = 0.0) {
     if (!e) return;
     if (!(e->std_dev >= 0.0) || !std::isfinite(e->value)) {
-      throw Error("force of a cut: the reading of " + source + " has no value or no standard deviation");
+      throw Error("force of a cut: measurement of " + source +
+                  ": expected a finite value and a standard deviation");
     }
     const double all = std::hypot(std::hypot(e->std_dev, share * size), zero);
-    if (!(all > 0.0)) throw Error("force of a cut: the reading of " + source + " has no standard deviation");
+    if (!(all > 0.0))
+      throw Error("force of a cut: measurement of " + source + ": expected a standard deviation > 0");
     rows.push_back({quantity, e->value, all, -1, {}});
     if (sources.empty() || sources.back() != source) sources.push_back(source);
   }
 
-  /// Lines of the drive whose mean was added last.
-  void addLines(int axis, const std::vector<VariationLine>& lines, const Estimate& bandwidth,
+  /// Adds the lines of the drive whose mean was added last.
+  void addLines(int axis, const std::vector<SpectralLine>& lines, const Estimate& bandwidth,
                 const ForceEstimateParameters& p) {
     const auto i = static_cast<std::size_t>(axis);
     drives.at[i] = COEFFICIENTS + drives.count;
@@ -170,12 +175,12 @@ class Rows {
     drives.gain_std[i] = std::max(1e-4, p.motor_error);
     drives.lag_std[i] = std::max(1e-4, bandwidth.std_dev / bandwidth.value);
     rows.back().drive = axis;
-    for (const VariationLine& line : lines) {
-      if (line.tooth < 1 || line.tooth > TOOTH_LINES) continue;
+    for (const SpectralLine& line : lines) {
+      if (line.tooth < 1 || line.tooth > TOOTH_HARMONICS) continue;
       const double all = std::hypot(line.power_std, 2.0 * p.model_error * std::max(0.0, line.power));
       if (!(all > 0.0) || !std::isfinite(line.power)) continue;
       rows.push_back(
-          {lineOf(axis, line.tooth), line.power, all, axis, following(line.frequency, bandwidth.value)});
+          {lineOf(axis, line.tooth), line.power, all, axis, lagResponse(line.frequency, bandwidth.value)});
     }
   }
 };
@@ -186,8 +191,8 @@ double sizeOf(const std::array<std::optional<Estimate>, 3>& force) {
   return size;
 }
 
-Rows rowsOf(const ForceReadings& r, const ForceEstimateParameters& p) {
-  Rows rows;
+Observations observationsOf(const CutMeasurements& r, const ForceEstimateParameters& p) {
+  Observations rows;
   const double model = p.model_error, motor = std::hypot(model, p.motor_error),
                sensor = std::hypot(model, p.sensor_error);
   const auto own = [](const std::optional<Estimate>& e) { return e ? std::abs(e->value) : 0.0; };
@@ -200,18 +205,17 @@ Rows rowsOf(const ForceReadings& r, const ForceEstimateParameters& p) {
              own(r.motor_force[i]));
     if (varies) rows.addLines(a, r.motor_lines[i], *r.bandwidth[i], p);
   }
-  // Cross-talk leaves shares of the largest component in the others.
+  // Cross-talk adds shares of the largest component to the others.
   for (int a = 0; a < 3; ++a) {
     const auto i = static_cast<std::size_t>(a);
     rows.add("sensor", a, r.sensor_force[i], sensor, sizeOf(r.sensor_force), p.sensor_zero);
     rows.add("sensor", 4 + a, r.sensor_rms[i], sensor, sizeOf(r.sensor_rms));
   }
-  if (rows.rows.empty()) throw Error("force of a cut: no sensor says anything");
+  if (rows.rows.empty()) throw Error("force of a cut: no measurement");
   return rows;
 }
 
-/// What is known beforehand of the unknowns: the coefficients (Ktc, ratios, Kte, ratios; in units of the
-/// prior's sizes) and the drives'.
+/// Prior of the unknowns: coefficients (Ktc, ratios, Kte, ratios, in units of the prior's values) and drives.
 struct Prior {
   Eigen::VectorXd value, scatter;
 
@@ -224,15 +228,16 @@ struct Prior {
   }
 };
 
-/// The unknowns that readings and prior like best.
-Eigen::VectorXd solve(const Mechanics& mechanics, const Rows& rows, const Prior& prior, double* squares) {
+/// Maximum a posteriori estimate of the unknowns.
+Eigen::VectorXd solve(const CutMechanics& mechanics, const Observations& rows, const Prior& prior,
+                      double* squares) {
   const auto count = static_cast<Eigen::Index>(rows.rows.size()), unknowns = prior.value.size();
   const fit::FunctionResiduals residuals(
       count + unknowns, [&](const Eigen::VectorXd& at, Eigen::VectorXd& out) {
-        const Eigen::VectorXd due = mechanics.of(at);
+        const Eigen::VectorXd expected = mechanics.of(at);
         for (Eigen::Index i = 0; i < count; ++i) {
-          const Row& row = rows.rows[static_cast<std::size_t>(i)];
-          out[i] = (rows.drives.predicted(row, due, at) - row.value) / row.std_dev;
+          const Observation& row = rows.rows[static_cast<std::size_t>(i)];
+          out[i] = (rows.drives.predicted(row, expected, at) - row.value) / row.std_dev;
         }
         out.tail(unknowns) = (at - prior.value).cwiseQuotient(prior.scatter);
       });
@@ -253,27 +258,29 @@ Eigen::VectorXd solve(const Mechanics& mechanics, const Rows& rows, const Prior&
 }  // namespace
 
 void ForceEstimateParameters::declare(ParameterTable& table) {
-  table.number("radial_ratio", radial_ratio, "1", Range::closed(0.0, 2.0), "Krc over Ktc of metals");
-  table.number("radial_ratio_std", radial_ratio_std, "1", Range::openLow(0.0, 2.0), "its scatter");
-  table.number("axial_ratio", axial_ratio, "1", Range::closed(-1.0, 2.0), "Kac over Ktc");
-  table.number("axial_ratio_std", axial_ratio_std, "1", Range::openLow(0.0, 2.0), "its scatter");
-  table.number("radial_edge_ratio", radial_edge_ratio, "1", Range::closed(0.0, 5.0), "Kre over Kte");
-  table.number("radial_edge_ratio_std", radial_edge_ratio_std, "1", Range::openLow(0.0, 5.0), "its scatter");
-  table.number("axial_edge_ratio", axial_edge_ratio, "1", Range::closed(-2.0, 5.0), "Kae over Kte");
-  table.number("axial_edge_ratio_std", axial_edge_ratio_std, "1", Range::openLow(0.0, 5.0), "its scatter");
+  table.number("radial_ratio", radial_ratio, "1", Range::closed(0.0, 2.0), "Krc / Ktc of metals, prior mean");
+  table.number("radial_ratio_std", radial_ratio_std, "1", Range::openLow(0.0, 2.0), "its standard deviation");
+  table.number("axial_ratio", axial_ratio, "1", Range::closed(-1.0, 2.0), "Kac / Ktc, prior mean");
+  table.number("axial_ratio_std", axial_ratio_std, "1", Range::openLow(0.0, 2.0), "its standard deviation");
+  table.number("radial_edge_ratio", radial_edge_ratio, "1", Range::closed(0.0, 5.0), "Kre / Kte, prior mean");
+  table.number("radial_edge_ratio_std", radial_edge_ratio_std, "1", Range::openLow(0.0, 5.0),
+               "its standard deviation");
+  table.number("axial_edge_ratio", axial_edge_ratio, "1", Range::closed(-2.0, 5.0), "Kae / Kte, prior mean");
+  table.number("axial_edge_ratio_std", axial_edge_ratio_std, "1", Range::openLow(0.0, 5.0),
+               "its standard deviation");
   table.number("model_error", model_error, "1", Range::closed(0.0, 0.5),
-               "share of a reading by which the cut's mechanics may miss it");
+               "relative error of the cut's mechanics");
   table.number("motor_error", motor_error, "1", Range::closed(0.0, 0.5),
-               "share by which a motor's constant may have moved since its calibration (warmth)");
+               "relative change of a motor constant since its calibration (temperature)");
   table.number("sensor_error", sensor_error, "1", Range::closed(0.0, 0.5),
-               "share of the largest component by which a force sensor may be wrong (gain, cross-talk)");
+               "error of a force sensor over its largest component (gain, cross-talk)");
   table.number("sensor_zero", sensor_zero, "N", Range::closed(0.0, 1000.0),
-               "by which its zero may have moved");
+               "drift of the force sensor's zero");
   table.number("period", period, "s", Range::closed(0.0, 10.0),
-               "between estimates while a cut is steady; 0: one a cut, at its end");
-  table.number(
-      "window", window, "s", Range::closed(0.05, 60.0),
-      "that such an estimate looks back; a drive whose current turns less than twice in it says nothing");
+               "period of the estimates during a steady cut; 0: one per cut, at its end");
+  table.number("window", window, "s", Range::closed(0.05, 60.0),
+               "length of the window of these estimates; drives with less than two electrical periods in it "
+               "are ignored");
 }
 
 std::string ForceEstimate::text() const {
@@ -289,21 +296,22 @@ std::string ForceEstimate::text() const {
 
 namespace {
 
-/// Squared amplitude to amplitude.
+/// Converts a squared amplitude to an amplitude.
 Estimate amplitudeOf(double square, double std_dev) {
   const double amplitude = std::sqrt(std::max(0.0, square));
   return {amplitude, std_dev / (2.0 * std::max(amplitude, std::sqrt(0.5 * std_dev + 1e-12)))};
 }
 
-/// What the drives show at the revolution is no part of the mechanics: only turned back through their lag.
-std::optional<ForceLine> revolutionOf(const ForceReadings& r, const ForceEstimateParameters& p) {
+/// The mechanics have no component at the spindle frequency: the drives' lines are only corrected for their
+/// lag.
+std::optional<ForceLine> revolutionOf(const CutMeasurements& r, const ForceEstimateParameters& p) {
   std::optional<ForceLine> found;
   for (std::size_t a = 0; a < 3; ++a) {
     if (!r.bandwidth[a]) continue;
-    for (const VariationLine& line : r.motor_lines[a]) {
+    for (const SpectralLine& line : r.motor_lines[a]) {
       if (line.tooth != 0) continue;
-      if (!found) found.emplace(ForceLine{line.frequency, {NOBODY, NOBODY, NOBODY}});
-      const Following h = following(line.frequency, r.bandwidth[a]->value);
+      if (!found) found.emplace(ForceLine{line.frequency, {NOT_MEASURED, NOT_MEASURED, NOT_MEASURED}});
+      const LagResponse h = lagResponse(line.frequency, r.bandwidth[a]->value);
       Estimate& e = found->amplitude[a] = amplitudeOf(line.power, line.power_std);
       const double share =
           std::hypot(p.motor_error, h.slope * r.bandwidth[a]->std_dev / r.bandwidth[a]->value);
@@ -313,11 +321,11 @@ std::optional<ForceLine> revolutionOf(const ForceReadings& r, const ForceEstimat
   return found;
 }
 
-void addLines(const ForceReadings& r, const ForceEstimateParameters& p, const Eigen::VectorXd& best,
+void addLines(const CutMeasurements& r, const ForceEstimateParameters& p, const Eigen::VectorXd& best,
               const Eigen::MatrixXd& spread, ForceEstimate* found) {
   if (!(r.spindle_speed > 0.0)) return;
   if (const auto revolution = revolutionOf(r, p)) found->lines.push_back(*revolution);
-  for (const VariationLine& known : linesOfCut(r.spindle_speed, r.tool.teeth)) {
+  for (const SpectralLine& known : cutLines(r.spindle_speed, r.tool.teeth)) {
     if (known.tooth == 0) continue;
     ForceLine line;
     line.frequency = known.frequency;
@@ -330,25 +338,26 @@ void addLines(const ForceReadings& r, const ForceEstimateParameters& p, const Ei
   }
 }
 
-/// One reading of each drive. @param squares becomes its distance from prior and mechanics
-ForceEstimate estimateOne(const ForceReadings& readings, const ForceEstimateParameters& p, double* squares) {
-  const Rows rows = rowsOf(readings, p);
-  const Mechanics mechanics(readings);
+/// Estimate for one sign of each drive's force. @param squares chi2 of prior and measurements
+ForceEstimate estimateOne(const CutMeasurements& measurements, const ForceEstimateParameters& p,
+                          double* squares) {
+  const Observations rows = observationsOf(measurements, p);
+  const CutMechanics mechanics(measurements);
   const Prior prior(p, rows.drives);
   const auto count = static_cast<Eigen::Index>(rows.rows.size()), unknowns = prior.value.size();
   const Eigen::VectorXd at = solve(mechanics, rows, prior, squares);
   ForceEstimate found;
-  found.stamp = readings.stamp;
-  found.name = readings.name;
+  found.stamp = measurements.stamp;
+  found.name = measurements.name;
   found.sources = rows.sources;
-  const auto shown = [&](const Eigen::VectorXd& u) {
-    const Eigen::VectorXd due = mechanics.of(u);
+  const auto predictedValues = [&](const Eigen::VectorXd& u) {
+    const Eigen::VectorXd expected = mechanics.of(u);
     Eigen::VectorXd all(count);
     for (Eigen::Index i = 0; i < count; ++i)
-      all[i] = rows.drives.predicted(rows.rows[static_cast<std::size_t>(i)], due, u);
+      all[i] = rows.drives.predicted(rows.rows[static_cast<std::size_t>(i)], expected, u);
     return all;
   };
-  const Eigen::VectorXd best = mechanics.of(at), readings_due = shown(at);
+  const Eigen::VectorXd best = mechanics.of(at), predictions = predictedValues(at);
   Eigen::MatrixXd slope(QUANTITIES, unknowns), of_rows(count, unknowns);
   for (Eigen::Index c = 0; c < unknowns; ++c) {
     const double step = 1e-4 * prior.scatter[c];
@@ -356,14 +365,14 @@ ForceEstimate estimateOne(const ForceReadings& readings, const ForceEstimatePara
     up[c] += step;
     down[c] -= step;
     slope.col(c) = (mechanics.of(up) - mechanics.of(down)) / (2.0 * step);
-    of_rows.col(c) = (shown(up) - shown(down)) / (2.0 * step);
+    of_rows.col(c) = (predictedValues(up) - predictedValues(down)) / (2.0 * step);
   }
-  // What readings and prior tell together; a bound says nothing.
+  // Information of measurements and prior; bounds are ignored.
   Eigen::MatrixXd information = prior.scatter.cwiseAbs2().cwiseInverse().asDiagonal();
   for (Eigen::Index i = 0; i < count; ++i) {
-    const Row& row = rows.rows[static_cast<std::size_t>(i)];
+    const Observation& row = rows.rows[static_cast<std::size_t>(i)];
     information += of_rows.row(i).transpose() * of_rows.row(i) / (row.std_dev * row.std_dev);
-    found.surprise += std::pow((readings_due[i] - row.value) / row.std_dev, 2) / static_cast<double>(count);
+    found.chi_square += std::pow((predictions[i] - row.value) / row.std_dev, 2) / static_cast<double>(count);
   }
   const Eigen::MatrixXd covariance = linear::inverseSymmetric(information);
   const Eigen::MatrixXd spread = slope * covariance * slope.transpose();
@@ -375,13 +384,13 @@ ForceEstimate estimateOne(const ForceReadings& readings, const ForceEstimatePara
     found.rms[static_cast<std::size_t>(a)] = estimate(RMS + a);
   }
   found.torque = estimate(3);
-  addLines(readings, p, best, spread, &found);
+  addLines(measurements, p, best, spread, &found);
   return found;
 }
 
-/// Several estimates as one: mean and spread of a mixture.
-Estimate mixed(const std::vector<ForceEstimate>& all, const std::vector<double>& weight,
-               const std::function<const Estimate&(const ForceEstimate&)>& of) {
+/// Mean and standard deviation of a mixture.
+Estimate mixtureOf(const std::vector<ForceEstimate>& all, const std::vector<double>& weight,
+                   const std::function<const Estimate&(const ForceEstimate&)>& of) {
   Estimate sum;
   for (std::size_t i = 0; i < all.size(); ++i) sum.value += weight[i] * of(all[i]).value;
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -394,13 +403,13 @@ Estimate mixed(const std::vector<ForceEstimate>& all, const std::vector<double>&
 
 }  // namespace
 
-ForceEstimate estimateForce(const ForceReadings& readings, const ForceEstimateParameters& p) {
-  std::vector<ForceReadings> variants{readings};
+ForceEstimate estimateForce(const CutMeasurements& measurements, const ForceEstimateParameters& p) {
+  std::vector<CutMeasurements> variants{measurements};
   for (std::size_t a = 0; a < 3; ++a) {
-    if (!readings.motor_force[a] || !readings.motor_other[a]) continue;
+    if (!measurements.motor_force[a] || !measurements.motor_other[a]) continue;
     for (std::size_t i = variants.size(); i-- > 0;) {
       variants.push_back(variants[i]);
-      variants.back().motor_force[a] = readings.motor_other[a];
+      variants.back().motor_force[a] = measurements.motor_other[a];
     }
   }
   std::vector<ForceEstimate> all;
@@ -416,10 +425,12 @@ ForceEstimate estimateForce(const ForceReadings& readings, const ForceEstimatePa
   for (double& w : weight) w /= sum;
   ForceEstimate found = all[best];
   for (std::size_t a = 0; a < 3; ++a) {
-    found.mean[a] = mixed(all, weight, [a](const ForceEstimate& e) -> const Estimate& { return e.mean[a]; });
-    found.rms[a] = mixed(all, weight, [a](const ForceEstimate& e) -> const Estimate& { return e.rms[a]; });
+    found.mean[a] =
+        mixtureOf(all, weight, [a](const ForceEstimate& e) -> const Estimate& { return e.mean[a]; });
+    found.rms[a] =
+        mixtureOf(all, weight, [a](const ForceEstimate& e) -> const Estimate& { return e.rms[a]; });
   }
-  found.torque = mixed(all, weight, [](const ForceEstimate& e) -> const Estimate& { return e.torque; });
+  found.torque = mixtureOf(all, weight, [](const ForceEstimate& e) -> const Estimate& { return e.torque; });
   return found;
 }
 

@@ -13,42 +13,27 @@ namespace smartmill::loadmeter {
 
 namespace {
 
-// Typical sizes, so that singular values compare.
+// Typical values that scale the singular values.
 const std::array<double, 6> UNIT{1e9, 1e9, 1e9, 1e4, 1e4, 1e4};
-constexpr double RANK = 1e-7;     // [1] of the largest singular value
-constexpr double LEAKAGE = 1e-3;  // [1] share of a coefficient that may lie in what is not seen
+constexpr double LEAST_SINGULAR_VALUE = 1e-7;  // [1] smallest singular value over the largest
+constexpr double LARGEST_NULL_SPACE_SHARE =
+    1e-3;  // [1] largest share of an observable coefficient in the null space
 
-}  // namespace
-
-Estimate FeedDrive::opposing(double current) const {
-  const double rise = current - air_current;
-  return {newton_per_ampere * rise,
-          std::hypot(newton_per_ampere_std * rise, newton_per_ampere * current_std)};
-}
-
-std::optional<Estimate> axisForce(const FeedDrive& drive, double current, double velocity, double smallest) {
-  if (std::abs(velocity) < smallest) return std::nullopt;
-  Estimate force = drive.opposing(current);
-  if (velocity > 0.0) force.value = -force.value;
-  return force;
-}
-
-namespace {
-
-// Torques and forces of axes in units of their standard deviations, rows x coefficients in units of UNIT.
+// Torques and axis forces over their standard deviations; rows x coefficients in units of UNIT.
 struct Observations {
   std::vector<Eigen::Matrix<double, 1, 6>> rows;
   std::vector<double> targets;
 
   void add(const Eigen::Matrix<double, 1, 6>& row, const Estimate& e) {
     if (!(e.std_dev > 0.0) || !std::isfinite(e.value)) {
-      throw Error("joint coefficients: a reading without a standard deviation > 0");
+      throw Error(
+          "joint coefficients: expected measurements with a finite value and a standard deviation > 0");
     }
     rows.push_back(row / e.std_dev);
     targets.push_back(e.value / e.std_dev);
   }
 
-  void add(const JointReading& r) {
+  void add(const JointMeasurement& r) {
     const auto map = meanForceMatrix(r.tool, r.engagement);
     std::array<Eigen::Matrix<double, 1, 6>, 4> row;
     for (std::size_t f = 0; f < 4; ++f) {
@@ -62,13 +47,14 @@ struct Observations {
   }
 };
 
-struct JointFit {
+struct JointFitResult {
   Eigen::Matrix<double, 6, 1> found = Eigen::Matrix<double, 6, 1>::Zero();
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
-  Eigen::Matrix<double, 6, 1> unseen = found;  // squared share of each coefficient that no row tells
+  Eigen::Matrix<double, 6, 1> null_space_share =
+      found;  // squared share of each coefficient in the null space
 };
 
-JointFit solve(const Observations& all) {
+JointFitResult solve(const Observations& all) {
   Eigen::MatrixXd a(static_cast<Eigen::Index>(all.rows.size()), 6);
   Eigen::VectorXd b(static_cast<Eigen::Index>(all.rows.size()));
   for (std::size_t i = 0; i < all.rows.size(); ++i) {
@@ -78,18 +64,18 @@ JointFit solve(const Observations& all) {
   const linear::Svd svd = linear::svd(a, true);
   const Eigen::VectorXd& s = svd.values;
   const Eigen::MatrixXd& v = svd.v;
-  JointFit fit;
+  JointFitResult fit;
   Eigen::Index rank = 0;
   for (Eigen::Index k = 0; k < 6; ++k) {
-    if (k < s.size() && s[k] > RANK * s[0]) {
+    if (k < s.size() && s[k] > LEAST_SINGULAR_VALUE * s[0]) {
       fit.found += v.col(k) * (svd.u.col(k).dot(b) / s[k]);
       fit.covariance += v.col(k) * v.col(k).transpose() / (s[k] * s[k]);
       ++rank;
     } else {
-      fit.unseen += v.col(k).cwiseAbs2();
+      fit.null_space_share += v.col(k).cwiseAbs2();
     }
   }
-  // Scatter beyond the stated standard deviations widens them.
+  // Scatter beyond the stated standard deviations increases the covariance.
   const double freedom = static_cast<double>(all.rows.size()) - static_cast<double>(rank);
   if (freedom > 0.0) fit.covariance *= std::max(1.0, (a * fit.found - b).squaredNorm() / freedom);
   return fit;
@@ -97,21 +83,21 @@ JointFit solve(const Observations& all) {
 
 }  // namespace
 
-JointResult identifyJointly(const std::vector<JointReading>& readings) {
+JointResult identifyJointly(const std::vector<JointMeasurement>& measurements) {
   Observations all;
-  for (const JointReading& r : readings) all.add(r);
-  if (all.rows.empty()) throw Error("joint coefficients: no torque and no moving axis in any reading");
-  const JointFit fit = solve(all);
+  for (const JointMeasurement& r : measurements) all.add(r);
+  if (all.rows.empty()) throw Error("joint coefficients: no measurement with a torque or a moving axis");
+  const JointFitResult fit = solve(all);
   JointResult result;
   result.value = result.std_dev = NOT_IDENTIFIED;
   result.covariance.fill(NOT_IDENTIFIED.ktc);
-  result.readings = static_cast<int>(readings.size());
-  std::array<bool, 6> seen{};
+  result.measurements = static_cast<int>(measurements.size());
+  std::array<bool, 6> is_observable{};
   for (std::size_t c = 0; c < 6; ++c) {
     const Eigen::Index i = static_cast<Eigen::Index>(c);
     const CuttingKey& key = cuttingKeys()[c];
-    seen[c] = std::sqrt(fit.unseen[i]) < LEAKAGE;
-    if (!seen[c]) {
+    is_observable[c] = std::sqrt(fit.null_space_share[i]) < LARGEST_NULL_SPACE_SHARE;
+    if (!is_observable[c]) {
       const std::string name = key.key;
       result.not_observable.push_back(name.substr(0, name.find('_')));
       continue;
@@ -121,13 +107,13 @@ JointResult identifyJointly(const std::vector<JointReading>& readings) {
   }
   for (std::size_t i = 0; i < 6; ++i) {
     for (std::size_t j = 0; j < 6; ++j) {
-      if (!seen[i] || !seen[j]) continue;
+      if (!is_observable[i] || !is_observable[j]) continue;
       result.covariance[6 * i + j] =
           fit.covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) * UNIT[i] * UNIT[j];
     }
   }
   if (result.not_observable.size() == 6) {
-    throw Error("joint coefficients: the readings separate none of the six (one feed, or too few)");
+    throw Error("joint coefficients: none of the six is observable (one feed only, or too few cuts)");
   }
   return result;
 }

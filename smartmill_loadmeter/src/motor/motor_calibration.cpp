@@ -19,7 +19,7 @@ namespace {
 constexpr const char* FORMAT = "smartmill-motor-calibration/1";
 const std::array<const char*, 3> AXES{"x", "y", "z"};
 
-/// Rows of a table whose first-named column is a word and all others numbers or empty.
+/// Table with a text column `cut` and otherwise numbers or empty cells.
 class Table {
  public:
   Table(const std::string& file, const std::vector<std::string>& known) {
@@ -29,16 +29,16 @@ class Table {
     const std::vector<std::string> names(cells.begin(), cells.end());
     for (std::size_t c = 0; c < names.size(); ++c) {
       if (std::count(names.begin(), names.end(), names[c]) > 1)
-        reader.fail("column '" + names[c] + "' stands twice");
+        reader.fail("column '" + names[c] + "' is repeated");
       if (names[c] != "cut" && std::find(known.begin(), known.end(), names[c]) == known.end())
-        reader.fail("column '" + names[c] + "' is not known");
+        reader.fail("column '" + names[c] + "' is unknown");
     }
     if (std::find(names.begin(), names.end(), "cut") == names.end()) reader.fail("column 'cut' is missing");
     while (reader.next(&cells)) {
       const auto blank = [](std::string_view cell) { return cell.empty(); };
       if (std::all_of(cells.begin(), cells.end(), blank)) continue;
       if (cells.size() != names.size())
-        reader.fail(std::to_string(cells.size()) + " cells, " + std::to_string(names.size()) + " are due");
+        reader.fail(std::to_string(cells.size()) + " cells, expected " + std::to_string(names.size()));
       rows_.push_back(rowOf(reader, names, cells));
     }
     if (rows_.empty()) throw Error(file + ": no cut in the table");
@@ -69,9 +69,9 @@ class Table {
         row.values[names[c]] = reader.number(cells[c], names[c]);
       }
     }
-    if (row.cut.empty()) reader.fail("cut: a name is due");
+    if (row.cut.empty()) reader.fail("cut: expected a name");
     for (const Row& other : rows_) {
-      if (other.cut == row.cut) reader.fail("cut '" + row.cut + "' stands twice");
+      if (other.cut == row.cut) reader.fail("cut '" + row.cut + "' is repeated");
     }
     return row;
   }
@@ -121,7 +121,7 @@ std::vector<MachineCurrents> readMachineCurrents(const std::string& file) {
       *air = row.at("air_" + axis + "[A]");
       if (current->has_value() != air->has_value()) {
         throw Error(where + (*current ? "air_" : "current_") + axis +
-                    "[A]: empty; current in cut and in air are due together");
+                    "[A]: empty; expected currents in cut and in air");
       }
     };
     MachineCurrents c;
@@ -130,7 +130,7 @@ std::vector<MachineCurrents> readMachineCurrents(const std::string& file) {
     for (std::size_t a = 0; a < 3; ++a) pair(AXES[a], &c.current[a], &c.air[a]);
     pair("spindle", &c.spindle_current, &c.spindle_air);
     if (c.spindle_current && !(c.spindle_speed > 0.0)) {
-      throw Error(where + "spindle_speed[rpm]: > 0 is due with a current of the spindle");
+      throw Error(where + "spindle_speed[rpm]: expected > 0 with a current of the spindle");
     }
     all.push_back(c);
   }
@@ -139,7 +139,7 @@ std::vector<MachineCurrents> readMachineCurrents(const std::string& file) {
 
 namespace {
 
-// Currents of the machine beside what the dynamometer recorded of the same cut.
+// Currents of the machine and forces that the dynamometer recorded in the same cuts.
 struct MatchedCuts {
   std::array<std::vector<double>, 3> rises, forces;  // [A], [N]
   std::vector<SpindleCut> spindle;
@@ -149,13 +149,13 @@ MatchedCuts match(const std::vector<StandardCut>& cuts, const std::vector<Machin
                   std::vector<std::string>* notes) {
   std::map<std::string, const StandardCut*> standard;
   for (const StandardCut& cut : cuts) {
-    if (!standard.emplace(cut.name, &cut).second) throw Error("standard cut '" + cut.name + "' stands twice");
+    if (!standard.emplace(cut.name, &cut).second) throw Error("standard cut '" + cut.name + "' is repeated");
   }
   MatchedCuts matched;
   for (const MachineCurrents& c : currents) {
     const auto found = standard.find(c.name);
     if (found == standard.end()) {
-      notes->push_back("cut '" + c.name + "' is no standard cut, left out");
+      notes->push_back("cut '" + c.name + "' is not a standard cut, ignored");
       continue;
     }
     const StandardCut& cut = *found->second;
@@ -180,12 +180,12 @@ std::optional<DriveCalibration> calibrateDrive(const char* axis, const std::vect
   if (n == 0) return std::nullopt;
   if (n < 3) {
     notes->push_back(std::string("axis ") + axis + ": " + std::to_string(n) +
-                     " standard cuts in which it moves, three are due; not calibrated");
+                     " standard cuts in which it moves, expected three or more; not calibrated");
     return std::nullopt;
   }
   double rr = 0.0, rf = 0.0, left = 0.0;
   for (std::size_t i = 0; i < n; ++i) rr += rises[i] * rises[i], rf += rises[i] * forces[i];
-  if (!(rr > 0.0)) throw Error(std::string("axis ") + axis + ": its current never differs from air");
+  if (!(rr > 0.0)) throw Error(std::string("axis ") + axis + ": its currents in cut equal those in air");
   DriveCalibration drive;
   drive.cuts = static_cast<int>(n);
   drive.newton_per_ampere.value = rf / rr;
@@ -193,13 +193,14 @@ std::optional<DriveCalibration> calibrateDrive(const char* axis, const std::vect
     left += std::pow(forces[i] - drive.newton_per_ampere.value * rises[i], 2);
   drive.scatter = std::sqrt(left / static_cast<double>(n - 1));
   drive.newton_per_ampere.std_dev = drive.scatter / std::sqrt(rr);
-  // No current beyond air means no force: a line that misses zero tells of other air cuts than these.
+  // Without a rise of the current there is no force: an intercept indicates other air cuts.
   const Line line = fitLine(rises, forces);
   if (std::abs(line.level.value) > 4.0 * line.level.std_dev + 1e-9 * std::sqrt(rf)) {
-    notes->push_back(formatted(
-        "axis %s: forces are %.1f +- %.1f N where the current is that of air: were the air currents "
-        "taken in the same motion?",
-        axis, line.level.value, line.level.std_dev));
+    notes->push_back(
+        formatted("axis %s: force %.1f +- %.1f N without a rise of the current, expected 0: check that the "
+                  "air currents "
+                  "are of the same motion",
+                  axis, line.level.value, line.level.std_dev));
   }
   return drive;
 }
@@ -217,7 +218,8 @@ MotorCalibration calibrateMotors(const std::vector<StandardCut>& cuts,
     result.spindle = TorquePowerLaw(matched.spindle, units::rpmFromRadPerSec(base_speed));
   }
   if (!result.drive[0] && !result.drive[1] && !result.drive[2] && !result.spindle) {
-    throw Error("motor calibration: no axis and no spindle with three standard cuts and their currents");
+    throw Error(
+        "motor calibration: expected an axis or the spindle with three or more standard cuts and currents");
   }
   return result;
 }

@@ -15,8 +15,8 @@ namespace {
 
 const std::string TRIGGER = "trigger";
 const std::array<const char*, 4> CHANNELS{"x", "y", "z", "spindle"};
-const char* const AT_REST = "the axis stands still";
-const char* const NOT_MEASURED = "no current of this motor";
+const char* const AT_REST = "the axis is at rest";
+const char* const NOT_MEASURED = "its motor current is not measured";
 
 }  // namespace
 
@@ -46,7 +46,7 @@ void MotorRecord::add(const SampleBlock& block) {
   std::size_t longest = 0;
   for (const auto& s : samples_) longest = std::max(longest, s.size());
   if (rate_ > 0.0 && (block.first_index != next_ || block.sample_rate != rate_)) {
-    // Kept when it is long enough to read slow phases from.
+    // Kept if it is long enough for slow phases.
     if (static_cast<double>(longest) > 1.0 * rate_) return;
     clear();
     longest = 0;
@@ -91,11 +91,11 @@ MotorRecord MotorRecord::last(double duration) const {
 
 namespace {
 
-/// Mean of a current with its sign, and its standard deviation by pieces longer than what varies in it.
+/// Mean of a signed current; standard deviation from segments longer than its variation.
 Estimate meanOf(const std::vector<double>& samples) {
   constexpr std::size_t PIECES = 8;
   const std::size_t length = samples.size() / PIECES;
-  if (length < 2) throw Error("a record of " + std::to_string(samples.size()) + " samples is too short");
+  if (length < 2) throw Error("record of " + std::to_string(samples.size()) + " samples is too short");
   std::vector<double> pieces;
   for (std::size_t k = 0; k < PIECES; ++k) {
     const auto from = samples.begin() + static_cast<std::ptrdiff_t>(k * length);
@@ -109,52 +109,53 @@ Estimate meanOf(const std::vector<double>& samples) {
 
 }  // namespace
 
-MotorReading readMotors(const MotorRecord& record, const MotorParameters& parameters,
-                        const std::array<double, 3>& velocity, double spindle_speed, bool is_short,
-                        int teeth) {
-  MotorReading reading;
-  reading.velocity = velocity;
-  reading.spindle_speed = spindle_speed;
-  reading.is_signed = record.isSigned();
+MotorMeasurement measureMotors(const MotorRecord& record, const MotorParameters& parameters,
+                               const std::array<double, 3>& velocity, double spindle_speed, bool is_short,
+                               int teeth) {
+  MotorMeasurement measurement;
+  measurement.velocity = velocity;
+  measurement.spindle_speed = spindle_speed;
+  measurement.is_signed = record.isSigned();
   for (std::size_t c = 0; c < CHANNELS.size(); ++c) {
     const bool spindle = c == 3;
     const double per = spindle ? parameters.phase_per_revolution : parameters.phase_per_metre[c];
     if (!spindle && std::abs(velocity[c]) < parameters.smallest_velocity) {
-      reading.reason[c] = AT_REST;
+      measurement.reason[c] = AT_REST;
       continue;
     }
     const std::vector<double>& samples = record.channel(c);
     if (!(per > 0.0 || record.isSigned()) || samples.empty()) {
-      reading.reason[c] = NOT_MEASURED;
+      measurement.reason[c] = NOT_MEASURED;
       continue;
     }
     if (!std::all_of(samples.begin(), samples.end(), [](double v) { return std::isfinite(v); })) {
-      reading.reason[c] = "its current has a sample that is not a finite number";
+      measurement.reason[c] = "its current has a sample that is not a finite number";
       continue;
     }
     if (record.isSigned()) {
-      const Estimate pushing = meanOf(samples);
-      reading.range[c] = std::copysign(1.0, velocity[c]) * pushing.value;
-      if (is_short) reading.short_std[c] = pushing.std_dev;
+      const Estimate mean_current = meanOf(samples);
+      measurement.range[c] = std::copysign(1.0, velocity[c]) * mean_current.value;
+      if (is_short) measurement.short_std[c] = mean_current.std_dev;
       continue;
     }
     const double frequency = per * (spindle ? spindle_speed / units::TWO_PI : std::abs(velocity[c]));
     if (!(frequency < 0.4 * record.rate())) {
-      reading.reason[c] = "its phase turns faster than the current is sampled";
+      measurement.reason[c] = "its phase frequency exceeds the sample rate";
       continue;
     }
     try {
-      const PhaseFit fit =
+      const PhaseFitResult fit =
           fitPhase(samples, record.rate(), frequency, spindle ? parameters.largest_slip : 0.0);
-      (spindle ? reading.spindle_range : reading.range[c]) = fit.range.value;
-      if (is_short) reading.short_std[c] = fit.range.std_dev;
+      (spindle ? measurement.spindle_range : measurement.range[c]) = fit.range.value;
+      if (is_short) measurement.short_std[c] = fit.range.std_dev;
       if (!spindle && teeth > 0)
-        reading.lines[c] = linesOf(samples, record.rate(), fit.frequency, linesOfCut(spindle_speed, teeth));
+        measurement.lines[c] =
+            fitSpectralLines(samples, record.rate(), fit.frequency, cutLines(spindle_speed, teeth));
     } catch (const Error& error) {
-      reading.reason[c] = error.what();
+      measurement.reason[c] = error.what();
     }
   }
-  return reading;
+  return measurement;
 }
 
 std::string MotorForce::text() const {
@@ -176,18 +177,18 @@ std::string MotorForce::text() const {
 
 namespace {
 
-/// Torque of the spindle's motor, or why there is none.
-void addTorque(const MotorReading& cut, const std::vector<MotorReading>& air,
+/// Adds the torque of the spindle motor, or the reason why it is unknown.
+void addTorque(const MotorMeasurement& cut, const std::vector<MotorMeasurement>& air,
                const MotorCalibration& calibration, MotorForce* result) {
-  const MotorReading* nearest = nullptr;
+  const MotorMeasurement* nearest = nullptr;
   double least = 0.1;
-  for (const MotorReading& one : air) {
+  for (const MotorMeasurement& one : air) {
     if (!one.spindle_range) continue;
     const double distance = std::abs(one.spindle_speed / cut.spindle_speed - 1.0);
     if (distance <= least + 1e-3) nearest = &one, least = std::min(least, distance);
   }
   if (!calibration.spindle) {
-    result->reason[3] = "the spindle's current is not calibrated";
+    result->reason[3] = "the spindle motor is not calibrated";
   } else if (!nearest) {
     result->reason[3] = "no air cut near this spindle speed";
   } else {
@@ -205,7 +206,7 @@ void addTorque(const MotorReading& cut, const std::vector<MotorReading>& air,
 
 }  // namespace
 
-MotorForce forceFromMotors(const MotorReading& cut, const std::vector<MotorReading>& air,
+MotorForce forceFromMotors(const MotorMeasurement& cut, const std::vector<MotorMeasurement>& air,
                            const MotorCalibration& calibration, const MotorParameters& parameters) {
   MotorForce result;
   result.reason = cut.reason;
@@ -215,12 +216,12 @@ MotorForce forceFromMotors(const MotorReading& cut, const std::vector<MotorReadi
       result.reason[a] = "the drive is not calibrated";
       continue;
     }
-    const MotorReading* nearest = nullptr;
+    const MotorMeasurement* nearest = nullptr;
     double least = std::log(2.0);
-    for (const MotorReading& one : air) {
+    for (const MotorMeasurement& one : air) {
       if (!one.range[a] || one.velocity[a] * cut.velocity[a] <= 0.0) continue;
       const double distance = std::abs(std::log(one.velocity[a] / cut.velocity[a]));
-      // The later one of equals: friction warms up.
+      // Of equal ones the latest, because friction changes with temperature.
       if (distance <= least + 1e-3) nearest = &one, least = std::min(least, distance);
     }
     if (!nearest) {
@@ -241,7 +242,7 @@ MotorForce forceFromMotors(const MotorReading& cut, const std::vector<MotorReadi
     if (!cut.is_signed) result.other[a] = other;
     const double squared = std::pow(calibration.drive[a]->newton_per_ampere.value, 2);
     result.lines[a] = cut.lines[a];
-    for (VariationLine& line : result.lines[a]) line.power *= squared, line.power_std *= squared;
+    for (SpectralLine& line : result.lines[a]) line.power *= squared, line.power_std *= squared;
   }
   if (cut.spindle_range) addTorque(cut, air, calibration, &result);
   return result;

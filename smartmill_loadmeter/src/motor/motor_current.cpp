@@ -1,13 +1,11 @@
 #include "smartmill_loadmeter/motor/motor_current.h"
 
-#include <gsl/gsl_wavelet.h>
-
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <set>
 
 #include <Eigen/Dense>
+#include <boost/math/filters/daubechies.hpp>
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/signal/statistics.h"
@@ -18,9 +16,31 @@ namespace smartmill::loadmeter {
 
 namespace {
 
-constexpr std::size_t DB5 = 10;  // GSL counts taps: Daubechies with 5 vanishing moments has 10
 constexpr int COARSEST = 10;
-constexpr double MARGIN = 6.0;  // a band must end this many times above the sine it is to keep
+constexpr double BAND_MARGIN = 6.0;  // smallest ratio of a band's upper end to the frequency of the sine
+
+/// Approximation at half the sample rate: one step of the periodic wavelet transform (Daubechies, five
+/// vanishing moments) without its detail. @param fine a power of two of samples
+std::vector<double> coarser(const std::vector<double>& fine) {
+  static const auto scaling = boost::math::filters::daubechies_scaling_filter<double, 5>();
+  std::vector<double> coarse(fine.size() / 2, 0.0);
+  for (std::size_t i = 0; i < coarse.size(); ++i) {
+    for (std::size_t k = 0; k < scaling.size(); ++k)
+      coarse[i] += scaling[k] * fine[(2 * i + k) & (fine.size() - 1)];
+  }
+  return coarse;
+}
+
+/// The inverse of coarser(), with no detail added.
+std::vector<double> finer(const std::vector<double>& coarse) {
+  static const auto scaling = boost::math::filters::daubechies_scaling_filter<double, 5>();
+  std::vector<double> fine(2 * coarse.size(), 0.0);
+  for (std::size_t i = 0; i < coarse.size(); ++i) {
+    for (std::size_t k = 0; k < scaling.size(); ++k)
+      fine[(2 * i + k) & (fine.size() - 1)] += scaling[k] * coarse[i];
+  }
+  return fine;
+}
 
 }  // namespace
 
@@ -31,7 +51,7 @@ std::vector<double> denoise(const std::vector<double>& signal, int level) {
                 std::to_string(level));
   }
   if (level == 0) return signal;
-  // Mirrored on both sides, so that the periodic transform sees no jump.
+  // Mirrored on both sides, so that the periodic transform has no jump.
   std::size_t size = 1;
   while (size < 2 * n) size *= 2;
   std::vector<double> data(size);
@@ -40,20 +60,14 @@ std::vector<double> denoise(const std::vector<double>& signal, int level) {
     const std::size_t at = (i + period * (size / period + 1) - before) % period;
     data[i] = signal[at < n ? at : period - 1 - at];
   }
-  const std::unique_ptr<gsl_wavelet, void (*)(gsl_wavelet*)> wavelet(
-      gsl_wavelet_alloc(gsl_wavelet_daubechies, DB5), gsl_wavelet_free);
-  const std::unique_ptr<gsl_wavelet_workspace, void (*)(gsl_wavelet_workspace*)> space(
-      gsl_wavelet_workspace_alloc(size), gsl_wavelet_workspace_free);
-  gsl_wavelet_transform_forward(wavelet.get(), data.data(), 1, size, space.get());
-  // Coefficients stand from coarse to fine; the finest band fills the upper half.
-  std::fill(data.begin() + static_cast<std::ptrdiff_t>(size >> level), data.end(), 0.0);
-  gsl_wavelet_transform_inverse(wavelet.get(), data.data(), 1, size, space.get());
+  for (int step = 0; step < level; ++step) data = coarser(data);
+  for (int step = 0; step < level; ++step) data = finer(data);
   return {data.begin() + static_cast<std::ptrdiff_t>(before),
           data.begin() + static_cast<std::ptrdiff_t>(before + n)};
 }
 
 int levelFor(double frequency, double sample_rate) {
-  const int level = static_cast<int>(std::floor(std::log2(sample_rate / (2.0 * MARGIN * frequency))));
+  const int level = static_cast<int>(std::floor(std::log2(sample_rate / (2.0 * BAND_MARGIN * frequency))));
   return std::clamp(level, 0, COARSEST);
 }
 
@@ -61,42 +75,43 @@ double phaseRange(const std::vector<double>& current, double sample_rate, double
   return fitPhase(current, sample_rate, frequency, slip).range.value;
 }
 
-PhaseFit fitPhase(const std::vector<double>& current, double sample_rate, double frequency, double slip) {
+PhaseFitResult fitPhase(const std::vector<double>& current, double sample_rate, double frequency,
+                        double slip) {
   const double periods = static_cast<double>(current.size()) * frequency / sample_rate;
   if (!(periods >= 2.0)) throw Error("phase current: less than two periods in the record");
   const std::vector<double> smooth = denoise(current, levelFor(frequency, sample_rate));
-  // Amplitude by least squares of level, cosine and sine; the slip leaves the frequency free a little.
-  double best = -1.0, amplitude = 0.0, found_at = 0.0;
-  const auto tryAt = [&](double offset) {  // [1] of 1 / record
+  // Amplitude by least squares of level, cosine and sine; the frequency is searched within the slip.
+  double best = -1.0, amplitude = 0.0, best_offset = 0.0;
+  const auto fitAt = [&](double offset) {  // [1] of 1 / record
     const double w = units::TWO_PI * frequency * (1.0 + offset / periods) / sample_rate;
     Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
     Eigen::Vector3d right = Eigen::Vector3d::Zero();
-    double c = 1.0, q = 0.0;  // cosine and sine by turning
+    double c = 1.0, q = 0.0;  // cosine and sine by rotation
     const double cw = std::cos(w), sw = std::sin(w);
     for (const double value : smooth) {
       const Eigen::Vector3d row(1.0, c, q);
       normal += row * row.transpose();
       right += row * value;
-      const double turned = c * cw - q * sw;
+      const double rotated = c * cw - q * sw;
       q = q * cw + c * sw;
-      c = turned;
+      c = rotated;
     }
     const Eigen::Vector3d found = normal.ldlt().solve(right);
     const double explained = found.dot(right);
     if (explained <= best) return;
     best = explained;
     amplitude = std::hypot(found[1], found[2]);
-    found_at = offset;
+    best_offset = offset;
   };
   const int steps = 4 + static_cast<int>(std::ceil(4.0 * slip * periods));
-  for (int step = -4; step <= steps; ++step) tryAt(0.25 * step);
-  const double middle = found_at;
-  for (int step = -4; step <= 4; ++step) tryAt(middle + 0.05 * step);
-  // The sum of squares that level and sine leave, over independent samples.
+  for (int step = -4; step <= steps; ++step) fitAt(0.25 * step);
+  const double middle = best_offset;
+  for (int step = -4; step <= 4; ++step) fitAt(middle + 0.05 * step);
+  // Residual sum of squares of level and sine.
   double squares = 0.0;
   for (const double value : current) squares += value * value;
   const double n = static_cast<double>(current.size()), left = std::max(0.0, squares - best) / n;
-  return {{2.0 * amplitude, 2.0 * std::sqrt(2.0 * left / n)}, frequency * (1.0 + found_at / periods)};
+  return {{2.0 * amplitude, 2.0 * std::sqrt(2.0 * left / n)}, frequency * (1.0 + best_offset / periods)};
 }
 
 double Line::stdAt(double x) const {
@@ -106,7 +121,8 @@ double Line::stdAt(double x) const {
 
 Line fitLine(const std::vector<double>& x, const std::vector<double>& y) {
   const std::size_t n = x.size();
-  if (n < 3 || y.size() != n) throw Error("calibration line: " + std::to_string(n) + " cuts, three are due");
+  if (n < 3 || y.size() != n)
+    throw Error("calibration line: " + std::to_string(n) + " cuts, expected three or more");
   const double count = static_cast<double>(n), mx = mean(x), my = mean(y);
   double sxx = 0.0, sxy = 0.0, syy = 0.0;
   for (std::size_t i = 0; i < n; ++i) {
@@ -114,7 +130,7 @@ Line fitLine(const std::vector<double>& x, const std::vector<double>& y) {
     sxy += (x[i] - mx) * (y[i] - my);
     syy += (y[i] - my) * (y[i] - my);
   }
-  if (!(sxx > 0.0)) throw Error("calibration line: all cuts at one current");
+  if (!(sxx > 0.0)) throw Error("calibration line: all cuts have the same current");
   Line line;
   line.count = static_cast<int>(n);
   line.slope.value = sxy / sxx;
@@ -148,20 +164,20 @@ TorquePowerLaw::TorquePowerLaw(const std::vector<SpindleCut>& cuts, double base_
     std::set<double> speeds;
     for (const SpindleCut& cut : cuts) {
       if ((cut.speed_rpm > base_) != above) continue;
-      if (!(cut.rise > 0.0) || !(cut.torque > 0.0)) continue;  // nothing is cut
+      if (!(cut.rise > 0.0) || !(cut.torque > 0.0)) continue;  // no cut
       own.push_back(cut);
       speeds.insert(cut.speed_rpm);
     }
     if (own.empty()) continue;
     if (own.size() < 3) {
       throw Error("spindle calibration: " + std::to_string(own.size()) + " cuts " +
-                  (above ? "above" : "below") + " base speed, three are due");
+                  (above ? "above" : "below") + " base speed, expected three or more");
     }
     Side side;
     side.middle = 0.5 * (*speeds.begin() + *speeds.rbegin());
     side.span = std::max(1.0, 0.5 * (*speeds.rbegin() - *speeds.begin()));
     const std::size_t degree = std::min({std::size_t{3}, speeds.size() - 1, own.size() / 2 - 1});
-    // A straight line of the logarithms starts the fit.
+    // A straight line of the logarithms is the start of the fit.
     std::vector<double> x, y;
     for (const SpindleCut& cut : own) {
       x.push_back(std::log(cut.rise));
@@ -183,12 +199,12 @@ TorquePowerLaw::TorquePowerLaw(const std::vector<SpindleCut>& cuts, double base_
       const Side s = sideOf(v);
       for (const SpindleCut& cut : own) *out++ = evaluate(s, cut.speed_rpm, cut.rise) - cut.torque;
     };
-    const FitResult found = fit(residuals, own.size(), start, 1e-10);
+    const FitResult found = fitLeastSquares(residuals, own.size(), start, 1e-10);
     sides_[above ? 1 : 0] = sideOf(found.value);
     left += found.squares;
     unknowns += static_cast<double>(start.size());
   }
-  if (!sides_[0] && !sides_[1]) throw Error("spindle calibration: no cut with a rise of current");
+  if (!sides_[0] && !sides_[1]) throw Error("spindle calibration: expected cuts with a rise of the current");
   double total = 0.0, middle = 0.0;
   for (const SpindleCut& cut : cuts) middle += cut.torque / static_cast<double>(cuts.size());
   for (const SpindleCut& cut : cuts) total += (cut.torque - middle) * (cut.torque - middle);
@@ -200,17 +216,17 @@ double TorquePowerLaw::torque(double speed_rpm, double rise) const {
   const bool above = speed_rpm > base_;
   if (!side(above)) {
     throw Error("spindle calibration: no cut " + std::string(above ? "above" : "below") +
-                " base speed: torque at " + std::to_string(speed_rpm) + " rpm is not known");
+                " base speed: torque at " + std::to_string(speed_rpm) + " rpm is unknown");
   }
   const Side& law = *side(above);
-  // Polynomials say nothing beyond the speeds that they were made from.
+  // Polynomials are not extrapolated.
   double low = law.middle - law.span, high = law.middle + law.span;
   (above ? low : high) = above ? std::min(low, base_) : std::max(high, base_);
   const double beyond = 0.1 * law.middle;
   if (speed_rpm < low - beyond || speed_rpm > high + beyond) {
-    throw Error("spindle calibration: cuts from " + std::to_string(std::lround(low)) + " to " +
-                std::to_string(std::lround(high)) + " rpm: torque at " +
-                std::to_string(std::lround(speed_rpm)) + " rpm is not known");
+    throw Error("spindle calibration: valid from " + std::to_string(std::lround(low)) + " to " +
+                std::to_string(std::lround(high)) + " rpm, torque at " +
+                std::to_string(std::lround(speed_rpm)) + " rpm is unknown");
   }
   return evaluate(law, speed_rpm, rise);
 }

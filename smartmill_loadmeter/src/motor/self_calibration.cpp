@@ -12,10 +12,10 @@ namespace smartmill::loadmeter {
 
 namespace {
 
-constexpr std::size_t FEWEST = 3;  // cuts
-constexpr double NEAR = 1.1;       // feeds are the same within
+constexpr std::size_t MIN_CUTS = 3;      // cuts
+constexpr double SAME_FEED_RATIO = 1.1;  // largest ratio of equal feeds
 
-bool sameWay(const MotorReading& a, const MotorReading& b, std::size_t axis) {
+bool isSameDirection(const MotorMeasurement& a, const MotorMeasurement& b, std::size_t axis) {
   return a.range[axis] && b.velocity[axis] * a.velocity[axis] > 0.0;
 }
 
@@ -28,24 +28,24 @@ void SelfCalibration::clear() {
   calibration_.reset();
 }
 
-void SelfCalibration::air(const MotorReading& reading, double stamp) {
-  air_.push_back({reading, stamp});
+void SelfCalibration::air(const MotorMeasurement& measurement, double stamp) {
+  air_.push_back({measurement, stamp});
   for (std::size_t a = 0; a < 3; ++a) {
-    if (reading.range[a]) learnFriction(a);
+    if (measurement.range[a]) updateFriction(a);
   }
 }
 
-// Laws of a spindle's friction serve a slide: range over speed.
-void SelfCalibration::learnFriction(std::size_t axis) {
+// The friction laws of a spindle also apply to a slide, with range over velocity.
+void SelfCalibration::updateFriction(std::size_t axis) {
   std::vector<TimedAirCut> all;
   std::set<double> speeds;
   for (const Air& one : air_) {
-    if (!one.reading.range[axis]) continue;
-    const double speed = std::abs(one.reading.velocity[axis]);
-    all.push_back({{speed, *one.reading.range[axis] * speed, 0.0}, one.stamp - air_.front().stamp});
+    if (!one.measurement.range[axis]) continue;
+    const double speed = std::abs(one.measurement.velocity[axis]);
+    all.push_back({{speed, *one.measurement.range[axis] * speed, 0.0}, one.stamp - air_.front().stamp});
     speeds.insert(speed);
   }
-  if (speeds.size() < 2 || *speeds.rbegin() < NEAR * *speeds.begin()) return;
+  if (speeds.size() < 2 || *speeds.rbegin() < SAME_FEED_RATIO * *speeds.begin()) return;
   slowest_[axis] = *speeds.begin(), fastest_[axis] = *speeds.rbegin();
   try {
     friction_[axis] = fitFrictionLaws(all, 1.0, 0.0).front();
@@ -54,23 +54,23 @@ void SelfCalibration::learnFriction(std::size_t axis) {
   }
 }
 
-void SelfCalibration::cut(const MotorReading& reading, const ForceEstimate& seen) {
-  cuts_.push_back({reading, seen});
+void SelfCalibration::cut(const MotorMeasurement& measurement, const ForceEstimate& reference) {
+  cuts_.push_back({measurement, reference});
   calibrate();
 }
 
-std::vector<MotorReading> SelfCalibration::airFor(const MotorReading& cut) const {
-  std::vector<MotorReading> all;
-  for (const Air& one : air_) all.push_back(one.reading);
+std::vector<MotorMeasurement> SelfCalibration::airFor(const MotorMeasurement& cut) const {
+  std::vector<MotorMeasurement> all;
+  for (const Air& one : air_) all.push_back(one.measurement);
   for (std::size_t a = 0; a < 3; ++a) {
     if (!cut.range[a] || !friction_[a]) continue;
     const double speed = std::abs(cut.velocity[a]);
     const bool near = std::any_of(air_.begin(), air_.end(), [&](const Air& one) {
-      return sameWay(one.reading, cut, a) &&
-             std::abs(std::log(one.reading.velocity[a] / cut.velocity[a])) < std::log(NEAR);
+      return isSameDirection(one.measurement, cut, a) &&
+             std::abs(std::log(one.measurement.velocity[a] / cut.velocity[a])) < std::log(SAME_FEED_RATIO);
     });
-    if (near || speed < slowest_[a] / NEAR || speed > fastest_[a] * NEAR) continue;
-    MotorReading by_law;
+    if (near || speed < slowest_[a] / SAME_FEED_RATIO || speed > fastest_[a] * SAME_FEED_RATIO) continue;
+    MotorMeasurement by_law;
     by_law.velocity[a] = cut.velocity[a];
     by_law.range[a] = friction_[a]->law.torque(speed, air_.back().stamp - air_.front().stamp);
     all.push_back(by_law);
@@ -78,23 +78,22 @@ std::vector<MotorReading> SelfCalibration::airFor(const MotorReading& cut) const
   return all;
 }
 
-// F = m (I - Ia) by cuts whose force another sensor saw, each as good as it saw it; what its own error may be
-// is common to all.
+// F = m (I - Ia) from cuts whose force another sensor measured; its systematic error is common to all cuts.
 std::optional<DriveCalibration> SelfCalibration::drive(std::size_t axis) const {
   MotorCalibration unit;
-  unit.drive[axis] = DriveCalibration{{1.0, 0.0}, 0.0, static_cast<int>(FEWEST)};
+  unit.drive[axis] = DriveCalibration{{1.0, 0.0}, 0.0, static_cast<int>(MIN_CUTS)};
   double rr = 0.0, rf = 0.0, share = 0.0;
   std::vector<std::pair<double, double>> points;  // [A], [N] against the motion
   for (const Cut& cut : cuts_) {
-    if (!cut.reading.range[axis]) continue;
-    const MotorForce rise = forceFromMotors(cut.reading, airFor(cut.reading), unit, parameters_);
-    const Estimate& seen = cut.seen.mean[axis];
-    if (!rise.force[axis] || !(seen.std_dev < std::abs(seen.value))) continue;
-    const double sign = cut.reading.velocity[axis] > 0.0 ? -1.0 : 1.0;
-    points.emplace_back(sign * rise.force[axis]->value, sign * seen.value);
-    share += seen.std_dev / std::abs(seen.value);
+    if (!cut.measurement.range[axis]) continue;
+    const MotorForce rise = forceFromMotors(cut.measurement, airFor(cut.measurement), unit, parameters_);
+    const Estimate& reference = cut.reference.mean[axis];
+    if (!rise.force[axis] || !(reference.std_dev < std::abs(reference.value))) continue;
+    const double sign = cut.measurement.velocity[axis] > 0.0 ? -1.0 : 1.0;
+    points.emplace_back(sign * rise.force[axis]->value, sign * reference.value);
+    share += reference.std_dev / std::abs(reference.value);
   }
-  if (points.size() < FEWEST) return std::nullopt;
+  if (points.size() < MIN_CUTS) return std::nullopt;
   for (const auto& [r, f] : points) rr += r * r, rf += r * f;
   if (!(rr > 0.0)) return std::nullopt;
   DriveCalibration found;
@@ -113,21 +112,23 @@ std::optional<TorquePowerLaw> SelfCalibration::spindle() const {
   std::vector<SpindleCut> cuts;
   double fastest = 0.0;
   for (const Cut& cut : cuts_) {
-    if (!cut.reading.spindle_range) continue;
-    const MotorReading* air = nullptr;
+    if (!cut.measurement.spindle_range) continue;
+    const MotorMeasurement* air = nullptr;
     for (const Air& one : air_) {
-      const bool same = std::abs(one.reading.spindle_speed / cut.reading.spindle_speed - 1.0) < NEAR - 1.0;
-      if (one.reading.spindle_range && same) air = &one.reading;
+      const bool same = std::abs(one.measurement.spindle_speed / cut.measurement.spindle_speed - 1.0) <
+                        SAME_FEED_RATIO - 1.0;
+      if (one.measurement.spindle_range && same) air = &one.measurement;
     }
-    const double rpm = units::rpmFromRadPerSec(cut.reading.spindle_speed);
-    if (!air || !(*cut.reading.spindle_range > *air->spindle_range) || !(cut.seen.torque.value > 0.0))
+    const double rpm = units::rpmFromRadPerSec(cut.measurement.spindle_speed);
+    if (!air || !(*cut.measurement.spindle_range > *air->spindle_range) ||
+        !(cut.reference.torque.value > 0.0))
       continue;
-    cuts.push_back({rpm, *cut.reading.spindle_range - *air->spindle_range, cut.seen.torque.value});
+    cuts.push_back({rpm, *cut.measurement.spindle_range - *air->spindle_range, cut.reference.torque.value});
     fastest = std::max(fastest, rpm);
   }
-  if (cuts.size() < FEWEST) return std::nullopt;
+  if (cuts.size() < MIN_CUTS) return std::nullopt;
   try {
-    return TorquePowerLaw(cuts, fastest);  // one law over the speeds that were cut at
+    return TorquePowerLaw(cuts, fastest);  // one law over all speeds of the cuts
   } catch (const Error&) {
     return std::nullopt;
   }
@@ -151,21 +152,20 @@ std::string SelfCalibration::text(const std::array<std::optional<Estimate>, 3>& 
     const auto add = [&](const std::string& what) { one += (one.empty() ? "" : ", ") + what; };
     if (calibration_ && calibration_->drive[a]) {
       const DriveCalibration& d = *calibration_->drive[a];
-      add(formatted("%.1f +- %.1f N/A by %d cuts", d.newton_per_ampere.value, d.newton_per_ampere.std_dev,
+      add(formatted("%.1f +- %.1f N/A from %d cuts", d.newton_per_ampere.value, d.newton_per_ampere.std_dev,
                     d.cuts));
     }
     if (friction_[a]) {
       const FittedFriction& f = *friction_[a];
       add(formatted("air current %.3f A + %.2f A s/m (%s)", f.law.coulomb, f.law.viscous,
-                    f.shape.name().c_str()));
+                    f.terms.name().c_str()));
     }
-    if (bandwidth[a])
-      add(formatted("follows to %.1f +- %.1f Hz", bandwidth[a]->value, bandwidth[a]->std_dev));
+    if (bandwidth[a]) add(formatted("bandwidth %.1f +- %.1f Hz", bandwidth[a]->value, bandwidth[a]->std_dev));
     if (!one.empty()) all += std::string(all.empty() ? "" : "; ") + "XYZ"[a] + " " + one;
   }
   if (calibration_ && calibration_->spindle)
     all += std::string(all.empty() ? "" : "; ") +
-           formatted("spindle's torque within %.3f N m", calibration_->spindle->scatter());
+           formatted("spindle torque +- %.3f N m", calibration_->spindle->scatter());
   return all;
 }
 

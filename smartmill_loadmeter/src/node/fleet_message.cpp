@@ -22,12 +22,13 @@ smartmill_msgs::FleetMachine toMsg(const FleetMachine& machine) {
   message.here = machine.here;
   message.member = !machine.member.login.empty();
   message.records = static_cast<std::uint32_t>(machine.member.records);
-  for (const std::size_t count : machine.knows) message.knows.push_back(static_cast<std::uint32_t>(count));
+  for (const std::size_t count : machine.records_by_pair)
+    message.knows.push_back(static_cast<std::uint32_t>(count));
   message.silent = machine.member.silent;
   message.behind = static_cast<std::uint32_t>(machine.member.behind);
   message.effect = machine.effect;
   message.effect_std = machine.effect_std;
-  message.odd = machine.odd;
+  message.odd = machine.outlier;
   message.meaning = machine.meaning;
   return message;
 }

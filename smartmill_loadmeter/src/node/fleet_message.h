@@ -8,7 +8,7 @@
 
 namespace smartmill::loadmeter {
 
-/// Its header is left to who sends it. @param url of the server
+/// Message without its header. @param url of the server
 smartmill_msgs::FleetState toMsg(const FleetPusher::State& state, const std::string& url);
 
 }  // namespace smartmill::loadmeter

@@ -7,12 +7,12 @@
 namespace smartmill::loadmeter {
 namespace {
 
-constexpr double NAMED = 0.5;  // [1] probability from which a machine is said to be odd
-constexpr double NOT_KNOWN = CoefficientRecord::UNKNOWN;
+constexpr double OUTLIER_PROBABILITY = 0.5;  // [1] smallest probability of an outlier with a stated cause
+constexpr double UNKNOWN = CoefficientRecord::UNKNOWN;
 
 using Pair = std::pair<std::string, std::string>;  // tool, material
 
-/// Machines by name, those without a login too.
+/// Machines by name, including those without a login.
 std::map<std::string, FleetMachine> machinesOf(const std::vector<FleetMember>& members,
                                                std::vector<CoefficientRecord>& records,
                                                const std::string& login) {
@@ -49,10 +49,10 @@ std::vector<FleetPair> pairsOf(const std::vector<CoefficientRecord>& records, co
   return pairs;
 }
 
-/// What the hierarchical model says; without one Ktc it says nothing.
+/// Adds the results of the hierarchical model; NaN without a Ktc.
 void addModel(const std::vector<CoefficientRecord>& records, const std::string& here,
               std::map<std::string, FleetMachine>& machines, FleetOverview& overview) {
-  overview.deviations = {NOT_KNOWN, NOT_KNOWN, NOT_KNOWN, NOT_KNOWN};
+  overview.deviations = {UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN};
   const auto observations = observationsOf(records, &CuttingCoefficients::ktc);
   if (observations.empty()) return;
   const FleetModel model(observations);
@@ -61,8 +61,8 @@ void addModel(const std::vector<CoefficientRecord>& records, const std::string& 
     FleetMachine& machine = machines.at(effect.machine);
     machine.effect = effect.effect;
     machine.effect_std = effect.std_dev;
-    machine.odd = effect.odd;
-    if (effect.odd > NAMED) machine.meaning = effect.meaning();
+    machine.outlier = effect.outlier;
+    if (effect.outlier > OUTLIER_PROBABILITY) machine.meaning = effect.meaning();
   }
   for (FleetPair& pair : overview.pairs) {
     const auto next = model.predict(here, pair.material, pair.tool);
@@ -93,18 +93,18 @@ FleetOverview fleetOverview(const std::vector<FleetMember>& members,
   const std::string here = self == machines.end() ? "" : self->first;
   FleetOverview overview;
   overview.pairs = pairsOf(records, here);
-  std::map<Pair, std::size_t> place;
+  std::map<Pair, std::size_t> index;
   for (std::size_t k = 0; k < overview.pairs.size(); ++k)
-    place[{overview.pairs[k].tool, overview.pairs[k].material}] = k;
-  for (auto& [name, machine] : machines) machine.knows.assign(overview.pairs.size(), 0);
+    index[{overview.pairs[k].tool, overview.pairs[k].material}] = k;
+  for (auto& [name, machine] : machines) machine.records_by_pair.assign(overview.pairs.size(), 0);
   for (const CoefficientRecord& record : records)
-    ++machines.at(record.machine).knows[place.at({record.set.tool, record.set.material})];
+    ++machines.at(record.machine).records_by_pair[index.at({record.set.tool, record.set.material})];
   addModel(records, here, machines, overview);
   for (auto& [name, machine] : machines) overview.machines.push_back(std::move(machine));
   return overview;
 }
 
-bool renew(const std::vector<FleetMember>& members, FleetOverview& overview) {
+bool updateMembers(const std::vector<FleetMember>& members, FleetOverview& overview) {
   for (const FleetMember& member : members) {
     const auto found = std::find_if(overview.machines.begin(), overview.machines.end(), [&](const auto& m) {
       return m.member.name == member.name && m.member.login == member.login;

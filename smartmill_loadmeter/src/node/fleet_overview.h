@@ -9,39 +9,40 @@
 
 namespace smartmill::loadmeter {
 
-/// What a fleet knows of one tool in one material.
+/// Records of one tool in one material.
 struct FleetPair {
   std::string tool, material;
-  std::size_t records = 0, own = 0;  ///< of all machines, of the one that asks
+  std::size_t records = 0, own = 0;  ///< of all machines, of this machine
   double ktc = CoefficientRecord::UNKNOWN,
-         ktc_std = CoefficientRecord::UNKNOWN;  ///< [N/m2] of its next cut; NaN: nothing is known
+         ktc_std = CoefficientRecord::UNKNOWN;  ///< [N/m2] predicted for its next cut; NaN: unknown
 };
 
-/// One machine as its fleet sees it.
+/// Machine in its fleet.
 struct FleetMachine {
-  FleetMember member;              ///< login empty: only its name stands in records
-  bool here = false;               ///< the one that asks
-  std::vector<std::size_t> knows;  ///< records of each pair
+  FleetMember member;                        ///< login empty: only named in records
+  bool here = false;                         ///< this machine
+  std::vector<std::size_t> records_by_pair;  ///< records of each pair
   double effect = CoefficientRecord::UNKNOWN, effect_std = CoefficientRecord::UNKNOWN;  ///< [1] of ln Ktc
-  double odd = CoefficientRecord::UNKNOWN;                                              ///< [1] probability
-  std::string meaning;  ///< what an odd one points to; empty: it is none
+  double outlier = CoefficientRecord::UNKNOWN;                                          ///< [1] probability
+  std::string meaning;  ///< probable cause of an outlier; empty: not an outlier
 };
 
 struct FleetOverview {
-  FleetDeviations deviations;          ///< of ln Ktc; NaN: not known
+  FleetDeviations deviations;          ///< of ln Ktc; NaN: unknown
   std::vector<FleetPair> pairs;        ///< most records first
   std::vector<FleetMachine> machines;  ///< by name
 };
 
-/// Login in an address, empty: none is told.
+/// Login in an address; empty: none.
 std::string loginOf(const std::string& url);
 
-/// Who knows what, and who is odd by the fleet's model of Ktc. A record belongs to the member whose name or
-/// login it bears. @param login of the machine that asks
+/// Records of each machine, and outliers by the fleet's model of Ktc. A record belongs to the member with its
+/// machine name or login. @param login of this machine
 FleetOverview fleetOverview(const std::vector<FleetMember>& members,
                             const std::vector<CoefficientRecord>& records, const std::string& login);
 
-/// The same records, but members as they are now. @return false when one is new: a fresh overview is due
-bool renew(const std::vector<FleetMember>& members, FleetOverview& overview);
+/// Updates the members for unchanged records. @return false when a member is new, so that a new overview is
+/// needed
+bool updateMembers(const std::vector<FleetMember>& members, FleetOverview& overview);
 
 }  // namespace smartmill::loadmeter

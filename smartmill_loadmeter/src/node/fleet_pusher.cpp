@@ -15,7 +15,7 @@ FleetPusher::FleetPusher(std::string file, std::string url, double period)
 FleetPusher::~FleetPusher() {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    end_ = true;
+    stop_ = true;
   }
   wake_.notify_all();
   thread_.join();
@@ -28,29 +28,29 @@ FleetPusher::State FleetPusher::state() const {
 
 void FleetPusher::work() {
   std::unique_lock<std::mutex> lock(mutex_);
-  while (!end_) {
+  while (!stop_) {
     lock.unlock();
     pushOnce();
     lock.lock();
-    wake_.wait_for(lock, std::chrono::duration<double>(period_), [this] { return end_; });
+    wake_.wait_for(lock, std::chrono::duration<double>(period_), [this] { return stop_; });
   }
 }
 
-// Who pushed when changes with every look; what is known only with new records.
-void FleetPusher::look(State& next) {
-  CoefficientDatabase seen(file_ + ".fleet");
+// Push times change with every update, the overview only with new records.
+void FleetPusher::updateOverview(State& next) {
+  CoefficientDatabase shop(file_ + ".fleet");
   const std::vector<FleetMember> members = fleetMembers(url_);
-  if (CoefficientDatabase(url_).size() != seen.size()) {
-    pull(seen, url_);
+  if (CoefficientDatabase(url_).size() != shop.size()) {
+    pull(shop, url_);
   } else if (next.overview) {
     auto same = std::make_shared<FleetOverview>(*next.overview);
-    if (renew(members, *same)) {
+    if (updateMembers(members, *same)) {
       next.overview = same;
       return;
     }
   }
   next.overview =
-      std::make_shared<FleetOverview>(fleetOverview(members, seen.records("", ""), loginOf(url_)));
+      std::make_shared<FleetOverview>(fleetOverview(members, shop.records("", ""), loginOf(url_)));
 }
 
 void FleetPusher::pushOnce() {
@@ -63,7 +63,7 @@ void FleetPusher::pushOnce() {
       const FleetTransfer done = push(local, url_);
       next.message = std::to_string(done.fresh) + " new of " + std::to_string(done.offered) + " sent to " +
                      withoutPassword(url_);
-      look(next);
+      updateOverview(next);
     } catch (const Error& error) {
       next.failing = true;
       next.message = error.what();

@@ -12,21 +12,20 @@
 
 namespace smartmill::loadmeter {
 
-/// Pushes a machine's file to the fleet's server every now and then, in a thread of its own: the node never
-/// waits for the network, and what the server has not got stays in the file. Then it looks at what the fleet
-/// knows: records of the others come into a file of their own (FILE.fleet), so that each comes once, and the
-/// machine's own file stays its own.
+/// Pushes a machine's file to the fleet's server periodically in its own thread, so that the node does not
+/// wait for the network; unacknowledged records remain in the file. After each push it fetches the shop's
+/// records into a separate file (FILE.fleet) and updates the overview.
 class FleetPusher {
  public:
   struct State {
     std::size_t behind = 0;  ///< records that the server has not acknowledged
-    bool failing = false;    ///< the last try did
+    bool failing = false;    ///< the last push failed
     std::string message = "no push yet";
     std::uint64_t tries = 0;
-    std::shared_ptr<const FleetOverview> overview;  ///< of the last look that was one; empty: none yet
+    std::shared_ptr<const FleetOverview> overview;  ///< of the last successful update; empty: none
   };
 
-  /// @param period [s] between tries
+  /// @param period [s] between pushes
   FleetPusher(std::string file, std::string url, double period);
   ~FleetPusher();
   FleetPusher(const FleetPusher&) = delete;
@@ -37,13 +36,13 @@ class FleetPusher {
  private:
   void work();
   void pushOnce();
-  void look(State& next);
+  void updateOverview(State& next);
 
   const std::string file_, url_;
   const double period_;
   mutable std::mutex mutex_;
   std::condition_variable wake_;
-  bool end_ = false;
+  bool stop_ = false;
   State state_;
   std::thread thread_;
 };

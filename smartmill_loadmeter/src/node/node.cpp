@@ -21,7 +21,7 @@ namespace {
 constexpr double WATCH_PERIOD = 0.2;  // [s]
 
 MachineModel modelOf(const NodeParameters& parameters) {
-  if (parameters.model.empty()) throw Error("model: the path of a smartmill-model/1 file is due");
+  if (parameters.model.empty()) throw Error("model: expected the path of a smartmill-model/1 file");
   return readMachineModel(parameters.model);
 }
 
@@ -43,22 +43,23 @@ LoadMeterNode::LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
     feedback();
   });
   if (parameters_.keep_cuts)
-    identification_.identification().onCut([this](const CoefficientRecord& cut) { keep(cut); });
+    identification_.identification().onCut([this](const CoefficientRecord& cut) { store(cut); });
   publisher_ = nh.advertise<smartmill_msgs::CuttingCoefficients>(names::COEFFICIENTS, 1, true);
-  if (parameters_.motor_learn) identification_.identification().learnMotors();
+  if (parameters_.motor_learn) identification_.identification().enableSelfCalibration();
   if (!parameters_.motor_calibration.empty())
     identification_.identification().setMotors(readMotorCalibration(parameters_.motor_calibration));
-  if (parameters_.readsMotors()) {
+  if (parameters_.usesMotors()) {
     identification_.identification().onMotorForce([this](const MotorForce& force) { publish(force); });
     force_publisher_ = nh.advertise<geometry_msgs::WrenchStamped>(names::FORCE_OF_MOTORS, 10, true);
   }
-  identification_.identification().onForce([this](const ForceEstimate& force) { tell(force); });
+  identification_.identification().onForce([this](const ForceEstimate& force) { report(force); });
   identification_.identification().onForceWindow([this](const ForceEstimate& force) { publish(force); });
   estimate_publisher_ = nh.advertise<smartmill_msgs::ForceEstimate>(names::FORCE_ESTIMATE, 10, true);
   if (parameters_.force_curve) {
     curve_publisher_ = nh.advertise<smartmill_msgs::ForceCurve>(names::FORCE_CURVE, 1, true);
-    curves_.finder().onCurves([this](const FoundCurves& found) { publish(found); });
-    curves_.finder().onLeftOut([](const std::string& why) { ROS_WARN("force curve: %s", why.c_str()); });
+    curves_.identification().onCurves([this](const IdentifiedForceCurves& found) { publish(found); });
+    curves_.identification().onRejected(
+        [](const std::string& why) { ROS_WARN("force curve: %s", why.c_str()); });
   }
   connect(shell_.inputs(), parameters_, streams_);
   connectCurves(shell_.inputs(), parameters_, streams_);
@@ -66,10 +67,10 @@ LoadMeterNode::LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   recommend_service_ = nh.advertiseService(names::RECOMMEND_CUT, &LoadMeterNode::recommend, this);
   discovered_ = nh.subscribe<smartmill_msgs::DiscoverActionResult>(
       std::string(names::DISCOVER) + "/result", 10,
-      [this](const smartmill_msgs::DiscoverActionResult::ConstPtr& result) { keep(*result); });
+      [this](const smartmill_msgs::DiscoverActionResult::ConstPtr& result) { store(*result); });
   health_ = nh.subscribe<smartmill_msgs::SpindleHealth>(
       names::SPINDLE_HEALTH, 100,
-      [this](const smartmill_msgs::SpindleHealth::ConstPtr& health) { keep(*health); });
+      [this](const smartmill_msgs::SpindleHealth::ConstPtr& health) { store(*health); });
   shell_.diagnose("load meter", [this](auto& status) { diagnose(status); });
   shell_.every(WATCH_PERIOD, [this] { watch(); });
   if (!parameters_.fleet.empty()) {
@@ -80,7 +81,7 @@ LoadMeterNode::LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   server_.start();
 }
 
-// Mean force of a cut on the tool; NaN: not observable, nothing is put in its place.
+// Mean force of a cut on the tool; NaN: not observable.
 void LoadMeterNode::publish(const MotorForce& force) {
   geometry_msgs::WrenchStamped message;
   message.header.stamp = fromSec(force.stamp);
@@ -114,17 +115,17 @@ void LoadMeterNode::publish(const ForceEstimate& force) {
   }
   message.torque = force.torque.value;
   message.torque_std = force.torque.std_dev;
-  message.surprise = force.surprise;
+  message.surprise = force.chi_square;
   message.sources = force.sources;
   estimate_publisher_.publish(message);
 }
 
-void LoadMeterNode::tell(const ForceEstimate& force) {
+void LoadMeterNode::report(const ForceEstimate& force) {
   publish(force);
   ROS_INFO("force, test '%s': %s", force.name.c_str(), force.text().c_str());
 }
 
-void LoadMeterNode::publish(const FoundCurves& found) {
+void LoadMeterNode::publish(const IdentifiedForceCurves& found) {
   curve_publisher_.publish(toMsg(found));
   const ForceCurve& curve = found.curves.tangential;
   const double chip = 0.5 * curve.knots.back();
@@ -138,7 +139,7 @@ void LoadMeterNode::publish(const FoundCurves& found) {
 void LoadMeterNode::goal(Server::GoalHandle handle) {
   const auto request = handle.getGoal();
   IdentifyGoal goal;
-  // A client that leaves the stamp open means the time at which it sent the goal.
+  // Without a stamp the goal has the time at which the client sent it.
   const ros::Time stamp = request->header.stamp.isZero() ? handle.getGoalID().stamp : request->header.stamp;
   goal.stamp = toSec(stamp);
   goal.tool = request->tool;
@@ -183,7 +184,7 @@ void LoadMeterNode::finish(const IdentifyResult& result) {
       database_.add(record);
     } catch (const Error& error) {
       ROS_ERROR("database: %s", error.what());
-      message.message += "; not kept: " + std::string(error.what());
+      message.message += "; not stored: " + std::string(error.what());
     }
   }
   const auto waiting = waiting_.find(result.id);
@@ -239,47 +240,47 @@ bool LoadMeterNode::recommend(smartmill_msgs::RecommendCut::Request& request,
   query.cutting_speed = request.cutting_speed;
   query.feed_per_tooth = request.feed_per_tooth;
   try {
-    const std::optional<CutAnswer> answer = recommendCut(database_, query);
+    const std::optional<CutRecommendation> answer = recommendCut(database_, query);
     if (!answer) {
-      response.message = "nothing in '" + request.material + "'; known: " + database_.contents();
+      response.message = "no records in '" + request.material + "'; known: " + database_.contents();
       return true;
     }
     response.code = Response::OK;
     response.message = answer->message;
-    response.way = static_cast<std::uint8_t>(answer->way);
+    response.way = static_cast<std::uint8_t>(answer->method);
     response.coefficients = toMsg(answer->set);
     response.ktc_lower = answer->ktc_lower;
     response.ktc_upper = answer->ktc_upper;
-    response.surprise = answer->surprise;
+    response.surprise = answer->disagreement;
   } catch (const Error& error) {
     response.message = error.what();
   }
   return true;
 }
 
-void LoadMeterNode::keep(CoefficientRecord cut) {
+void LoadMeterNode::store(CoefficientRecord cut) {
   cut.machine = parameters_.machine;
   try {
-    kept_cuts_ += database_.add(cut);
+    stored_cuts_ += database_.add(cut);
   } catch (const Error& error) {
-    ROS_ERROR("database: cut not kept: %s", error.what());
+    ROS_ERROR("database: cut not stored: %s", error.what());
   }
 }
 
-// Whoever explained: the report has the evidence.
-void LoadMeterNode::keep(const smartmill_msgs::DiscoverActionResult& discovered) {
+// The report contains the evidence, whichever node explained.
+void LoadMeterNode::store(const smartmill_msgs::DiscoverActionResult& discovered) {
   if (discovered.result.verdict.empty()) return;
   try {
     ModelImprovement improvement = readImprovement(discovered.result.report);
     improvement.machine = parameters_.machine;
     improvement.stamp = discovered.header.stamp.toSec();
-    kept_explanations_ += database_.add(std::vector<ModelImprovement>{improvement});
+    stored_explanations_ += database_.add(std::vector<ModelImprovement>{improvement});
   } catch (const Error& error) {
-    ROS_ERROR("database: explanation not kept: %s", error.what());
+    ROS_ERROR("database: explanation not stored: %s", error.what());
   }
 }
 
-void LoadMeterNode::keep(const smartmill_msgs::SpindleHealth& health) {
+void LoadMeterNode::store(const smartmill_msgs::SpindleHealth& health) {
   std::vector<HealthRecord> records;
   for (const smartmill_msgs::HealthChange& c : health.changes) {
     HealthRecord r;
@@ -295,28 +296,29 @@ void LoadMeterNode::keep(const smartmill_msgs::SpindleHealth& health) {
     records.push_back(r);
   }
   try {
-    kept_health_ += database_.add(records);
+    stored_health_ += database_.add(records);
   } catch (const Error& error) {
-    ROS_ERROR("database: the spindle's health not kept: %s", error.what());
+    ROS_ERROR("database: spindle health not stored: %s", error.what());
   }
 }
 
-// After every try of the pusher.
-void LoadMeterNode::tellFleet() {
+// Publishes the state after every push.
+void LoadMeterNode::publishFleetState() {
   if (!pusher_) return;
   const FleetPusher::State state = pusher_->state();
-  if (state.tries == fleet_told_) return;
-  fleet_told_ = state.tries;
+  if (state.tries == published_fleet_state_) return;
+  published_fleet_state_ = state.tries;
   smartmill_msgs::FleetState message = toMsg(state, parameters_.fleet);
   message.header.stamp = ros::Time::now();
   fleet_publisher_.publish(message);
 }
 
-// Liveness only: when every input has fallen silent nothing more can come before what waits.
+// Liveness: when all inputs have stopped, nothing can precede the waiting ones.
 void LoadMeterNode::watch() {
-  tellFleet();
+  publishFleetState();
   if (!shell_.inputs().any().dead()) return;
-  if (!waiting_.empty()) ROS_WARN_THROTTLE(5.0, "no controller state or load any more: using what has come");
+  if (!waiting_.empty())
+    ROS_WARN_THROTTLE(5.0, "controller state and load have stopped: using the data received");
   identification_.flush();
   curves_.flush();
 }
@@ -339,13 +341,13 @@ void LoadMeterNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status
                 production->ktcStd() / units::N_PER_MM2);
     status.addf("production Kte [N/mm]", "%.2f +- %.2f", production->kte() / units::N_PER_MM,
                 production->kteStd() / units::N_PER_MM);
-    status.addf("last cut's surprise", "%.1f sigma", production->surprise());
+    status.addf("last cut's normalised innovation", "%.1f sigma", production->normalisedInnovation());
   }
   if (!last_force_.empty()) status.add("force by motor currents", last_force_);
   if (!last_curve_.empty()) status.add("force curve", last_curve_);
-  status.add("cuts kept", kept_cuts_);
-  status.add("explanations kept", kept_explanations_);
-  status.add("quantities of the spindle's health kept", kept_health_);
+  status.add("cuts stored", stored_cuts_);
+  status.add("explanations stored", stored_explanations_);
+  status.add("spindle-health quantities stored", stored_health_);
   if (pusher_) {
     const FleetPusher::State fleet = pusher_->state();
     status.add("not sent to the fleet [records]", fleet.behind);

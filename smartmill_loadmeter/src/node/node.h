@@ -12,7 +12,7 @@
 #include "node/wiring.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_loadmeter/database/database.h"
-#include "smartmill_loadmeter/identification/sorted_identification.h"
+#include "smartmill_loadmeter/identification/identification_pipeline.h"
 #include "smartmill_msgs/DiscoverActionResult.h"
 #include "smartmill_msgs/FindCoefficients.h"
 #include "smartmill_msgs/IdentifyCoefficientsAction.h"
@@ -22,11 +22,11 @@
 
 namespace smartmill::loadmeter {
 
-/// Shell around SortedIdentification: topics in, action and service at the front, coefficients out.
+/// ROS interface of IdentificationPipeline and ForceCurvePipeline.
 class LoadMeterNode {
  public:
   using Parameters = NodeParameters;
-  /// @throws Error on a wrong parameter, model or database.
+  /// @throws Error for an invalid parameter, model or database.
   LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh);
 
  private:
@@ -40,29 +40,29 @@ class LoadMeterNode {
             smartmill_msgs::FindCoefficients::Response& response);
   bool recommend(smartmill_msgs::RecommendCut::Request& request,
                  smartmill_msgs::RecommendCut::Response& response);
-  void keep(CoefficientRecord cut);
-  void keep(const smartmill_msgs::DiscoverActionResult& discovered);
-  void keep(const smartmill_msgs::SpindleHealth& health);
+  void store(CoefficientRecord cut);
+  void store(const smartmill_msgs::DiscoverActionResult& discovered);
+  void store(const smartmill_msgs::SpindleHealth& health);
   void publish(const MotorForce& force);
   void publish(const ForceEstimate& force);
-  void tell(const ForceEstimate& force);
-  void publish(const FoundCurves& found);
+  void report(const ForceEstimate& force);
+  void publish(const IdentifiedForceCurves& found);
   void watch();
-  void tellFleet();
+  void publishFleetState();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   NodeParameters parameters_;
   NodeShell shell_;
-  SortedIdentification identification_;
-  SortedCurves curves_;
+  IdentificationPipeline identification_;
+  ForceCurvePipeline curves_;
   CutStreams streams_{identification_, curves_, parameters_};
   CoefficientDatabase database_;
   std::unique_ptr<FleetPusher> pusher_;
   std::map<std::uint64_t, Server::GoalHandle> waiting_;
   std::uint64_t next_id_ = 1;
   std::string last_message_, last_force_, last_curve_;
-  std::size_t kept_cuts_ = 0, kept_explanations_ = 0, kept_health_ = 0;
-  std::uint64_t fleet_told_ = 0;
+  std::size_t stored_cuts_ = 0, stored_explanations_ = 0, stored_health_ = 0;
+  std::uint64_t published_fleet_state_ = 0;
 
   ros::Publisher publisher_, force_publisher_, estimate_publisher_, curve_publisher_, fleet_publisher_;
   ros::Subscriber discovered_, health_;

@@ -5,7 +5,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_loadmeter/database/fleet.h"
-#include "smartmill_loadmeter/identification/curve_finder.h"
+#include "smartmill_loadmeter/identification/force_curve_identification.h"
 #include "smartmill_loadmeter/identification/identification.h"
 
 namespace smartmill::loadmeter {
@@ -21,7 +21,7 @@ struct NodeParameters {
   std::string motor_calibration;
   bool motor_learn = false, motor_servo = false;
 
-  bool readsMotors() const { return motor_learn || !motor_calibration.empty(); }
+  bool usesMotors() const { return motor_learn || !motor_calibration.empty(); }
   bool force_sensor = false;
   bool force_curve = true;
   CurveParameters curve;
@@ -33,60 +33,57 @@ struct NodeParameters {
         "Parameters of loadmeter_node (package smartmill_loadmeter): cutting coefficients from the spindle's "
         "load "
         "meter.");
-    table.atLaunch("model", model,
-                   "path of a smartmill-model/1 file; its spindle section tells what the load meter shows");
+    table.atLaunch("model", model, "path of a smartmill-model/1 file with a spindle section");
     table.section();
-    table.text("database", database,
-               "path of the SQLite file that keeps what this machine identifies; empty: this run only");
-    table.text("machine", machine, "name of this machine, in every record of its database");
+    table.text("database", database, "path of the SQLite file for this machine's records; empty: not stored");
+    table.text("machine", machine, "name of this machine in its records");
     table.flag("keep_cuts", keep_cuts,
-               "true: every cut enters the database, with its condition and what it says");
+               "true: every cut is stored with its condition and the running estimate");
     table.text("fleet", fleet,
                "address of the fleet's server, postgresql://USER@HOST/DATABASE, to which the file is pushed; "
                "empty: none");
     table.number("fleet_period", fleet_period, "s", Range::openLow(0.0, 86400.0),
-                 "between pushes; a server that is away is asked again after it");
+                 "between pushes, also after a failed one");
     identification.declare(table);
     table.section("Motor currents.");
-    table.text("motor_calibration", motor_calibration,
-               "path of what `calibrate --standard-cuts` wrote; empty: daq/motor_current is not used");
+    table.text(
+        "motor_calibration", motor_calibration,
+        "path of a motor calibration (`calibrate --standard-cuts`); empty: daq/motor_current is not used");
     table.flag("motor_learn", motor_learn,
-               "true: daq/motor_current is used and calibrated by the session's own air moves and cuts");
-    table.flag(
-        "motor_servo", motor_servo,
-        "true: the record of Servo Guide, daq/servo, takes the place of daq/motor_current, from its trigger "
-        "on; calibrated or learnt alike");
+               "true: daq/motor_current is used, calibrated by the session's own air moves and cuts");
+    table.flag("motor_servo", motor_servo,
+               "true: the record of Servo Guide, daq/servo, from its trigger on, is used instead of "
+               "daq/motor_current");
     table.part("motor_", identification.motor);
-    table.section("Force of each cut by all that is measured of it (force/estimate).");
+    table.section("Force of each cut from all its measurements (force/estimate).");
     table.flag("force_sensor", force_sensor,
-               "whether force/compensated takes part, beside load meter and motors");
+               "true: force/compensated is used in addition to load meter and motors");
     table.part("force_", identification.force);
     table.section("Force over chip thickness (material/force_curve).");
-    table.flag(
-        "force_curve", force_curve,
-        "whether force/compensated over spindle/angle of each cut is made one; without either none comes");
+    table.flag("force_curve", force_curve,
+               "true: a force curve is identified from force/compensated and spindle/angle of the cuts");
     table.part("curve_", curve);
     table.section("Streams.");
     table.number("hold_back", hold_back, "s", Range::notNegative(),
-                 "an event may arrive after its stamp and still be in order");
+                 "longest delay of an event between its stamp and its arrival");
     table.number("input_timeout", input_timeout, "s", Range::positive(),
-                 "without any input: data has ended, or its source is stale");
+                 "time without input after which the data have ended or their source is stale");
   }
   /// @throws Error naming key and value.
   void validate() const {
     checkBounds(*this);
     identification.validate();
     checkBounds(curve);
-    if (isFleet(database))
-      throw Error("database: a file is due, a machine does not wait for a server (fleet)");
-    if (!fleet.empty() && !isFleet(fleet))
-      throw Error("fleet: '" + fleet + "': postgresql://USER@HOST/DATABASE is due");
-    if (!fleet.empty() && database.empty()) throw Error("fleet: without a database there is nothing to push");
-    if (motor_learn && !motor_calibration.empty())
-      throw Error("motor_learn: with a motor_calibration there is nothing to learn");
-    if (motor_servo && !readsMotors()) throw Error("motor_servo: without motor_learn or motor_calibration");
-    if (readsMotors() && !motor_servo && !identification.motor.any())
-      throw Error("motor_phase_per_metre: all 0, and motor_phase_per_revolution too: no current can be read");
+    if (isServerUrl(database))
+      throw Error(
+          "database: expected a file, because a machine does not wait for a server (parameter fleet)");
+    if (!fleet.empty() && !isServerUrl(fleet))
+      throw Error("fleet: '" + fleet + "': expected postgresql://USER@HOST/DATABASE");
+    if (!fleet.empty() && database.empty()) throw Error("fleet: requires a database to push");
+    if (motor_learn && !motor_calibration.empty()) throw Error("motor_learn: excludes motor_calibration");
+    if (motor_servo && !usesMotors()) throw Error("motor_servo: requires motor_learn or motor_calibration");
+    if (usesMotors() && !motor_servo && !identification.motor.any())
+      throw Error("motor_phase_per_metre: expected a value > 0 in it or in motor_phase_per_revolution");
   }
 };
 

@@ -3,15 +3,15 @@
 #include "node/parameters.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/signal/feed.h"
-#include "smartmill_loadmeter/identification/curve_finder.h"
-#include "smartmill_loadmeter/identification/sorted_identification.h"
+#include "smartmill_loadmeter/identification/force_curve_identification.h"
+#include "smartmill_loadmeter/identification/identification_pipeline.h"
 
 namespace smartmill::loadmeter {
 
-/// What comes in, to both that think: coefficients, and force curves where they are asked for.
+/// Distributes the inputs to the identification of coefficients and, if enabled, of force curves.
 struct CutStreams {
-  SortedIdentification& identification;
-  SortedCurves& curves;
+  IdentificationPipeline& identification;
+  ForceCurvePipeline& curves;
   const NodeParameters& parameters;
 
   template <class Data>
@@ -34,19 +34,19 @@ struct CutStreams {
   }
 };
 
-/// The streams of an identification, from a node's inputs or from a bag.
-/// @param sorted a SortedIdentification, or what stands before it
-template <class Source, class Sorted>
-void connect(Source& source, const NodeParameters& parameters, Sorted& sorted) {
-  feed<CncState>(source, names::CNC_STATE, sorted);
-  feed<LoadSample>(source, names::CNC_LOAD, sorted);
-  feed<CuttingCondition>(source, names::CUTTING_CONDITION, sorted);
-  if (parameters.readsMotors())
-    feed<SampleBlock>(source, parameters.motor_servo ? names::daq("servo") : names::MOTOR_CURRENT, sorted);
-  if (parameters.force_sensor) feed<ForceBlock>(source, names::FORCE_COMPENSATED, sorted);
+/// Connects the streams of the identification to a node's inputs or a bag.
+/// @param pipeline an IdentificationPipeline, or CutStreams
+template <class Source, class Pipeline>
+void connect(Source& source, const NodeParameters& parameters, Pipeline& pipeline) {
+  feed<CncState>(source, names::CNC_STATE, pipeline);
+  feed<LoadSample>(source, names::CNC_LOAD, pipeline);
+  feed<CuttingCondition>(source, names::CUTTING_CONDITION, pipeline);
+  if (parameters.usesMotors())
+    feed<SampleBlock>(source, parameters.motor_servo ? names::daq("servo") : names::MOTOR_CURRENT, pipeline);
+  if (parameters.force_sensor) feed<ForceBlock>(source, names::FORCE_COMPENSATED, pipeline);
 }
 
-/// What force curves need besides.
+/// Connects the additional streams of force curves.
 template <class Source>
 void connectCurves(Source& source, const NodeParameters& parameters, CutStreams& streams) {
   if (!parameters.force_curve) return;
@@ -54,9 +54,9 @@ void connectCurves(Source& source, const NodeParameters& parameters, CutStreams&
   if (!parameters.force_sensor) feed<ForceBlock>(source, names::FORCE_COMPENSATED, streams);
 }
 
-/// The streams of force curves alone.
+/// Connects the streams of force curves without the identification.
 template <class Source>
-void connectCurves(Source& source, SortedCurves& curves) {
+void connectCurves(Source& source, ForceCurvePipeline& curves) {
   feed<CncState>(source, names::CNC_STATE, curves);
   feed<SpindleAngle>(source, names::SPINDLE_ANGLE, curves);
   feed<CuttingCondition>(source, names::CUTTING_CONDITION, curves);

@@ -5,18 +5,18 @@
 
 #include "node/wiring.h"
 #include "smartmill_core/error.h"
-#include "smartmill_loadmeter/identification/sorted_identification.h"
+#include "smartmill_loadmeter/identification/identification_pipeline.h"
 #include "smartmill_recording/recording_reader.h"
 
 namespace smartmill::loadmeter {
 
 std::vector<IdentifyResult> identifyFromBag(const std::string& path, const MachineModel& model,
                                             const NodeParameters& parameters, const BagListeners& listeners) {
-  SortedIdentification identification(model, parameters.identification, parameters.hold_back);
-  if (parameters.motor_learn) identification.identification().learnMotors();
+  IdentificationPipeline identification(model, parameters.identification, parameters.hold_back);
+  if (parameters.motor_learn) identification.identification().enableSelfCalibration();
   if (!parameters.motor_calibration.empty())
     identification.identification().setMotors(readMotorCalibration(parameters.motor_calibration));
-  if (parameters.readsMotors()) {
+  if (parameters.usesMotors()) {
     if (listeners.motors) identification.identification().onMotorForce(listeners.motors);
   }
   if (listeners.force) identification.identification().onForce(listeners.force);
@@ -26,7 +26,7 @@ std::vector<IdentifyResult> identifyFromBag(const std::string& path, const Machi
     if (!result.reset) results.push_back(result);
   });
   RecordingReader bag(path);
-  if (!bag.has(names::CNC_LOAD)) throw Error(path + ": holds no " + names::CNC_LOAD);
+  if (!bag.has(names::CNC_LOAD)) throw Error(path + ": expected topic " + names::CNC_LOAD);
   connect(bag, parameters, identification);
   bag.on<plain::IdentifyCoefficientsActionGoal>(
       names::goals(names::IDENTIFY_COEFFICIENTS),
@@ -44,22 +44,24 @@ std::vector<IdentifyResult> identifyFromBag(const std::string& path, const Machi
   return results;
 }
 
-std::vector<FoundCurves> curvesFromBag(const std::string& path, const NodeParameters& parameters,
-                                       const std::function<void(double)>& progress) {
-  SortedCurves curves(parameters.curve, parameters.hold_back);
-  std::map<std::pair<std::string, std::string>, FoundCurves> last;
-  std::string left_out;
-  curves.finder().onCurves([&](const FoundCurves& found) { last[{found.tool, found.material}] = found; });
-  curves.finder().onLeftOut([&](const std::string& why) { left_out += "; " + why; });
+std::vector<IdentifiedForceCurves> curvesFromBag(const std::string& path, const NodeParameters& parameters,
+                                                 const std::function<void(double)>& progress) {
+  ForceCurvePipeline curves(parameters.curve, parameters.hold_back);
+  std::map<std::pair<std::string, std::string>, IdentifiedForceCurves> last;
+  std::string rejected;
+  curves.identification().onCurves([&](const IdentifiedForceCurves& found) {
+    last[{found.tool, found.material}] = found;
+  });
+  curves.identification().onRejected([&](const std::string& why) { rejected += "; " + why; });
   RecordingReader bag(path);
   for (const char* topic : {names::FORCE_COMPENSATED, names::SPINDLE_ANGLE}) {
-    if (!bag.has(topic)) throw Error(path + ": holds no " + topic);
+    if (!bag.has(topic)) throw Error(path + ": expected topic " + topic);
   }
   connectCurves(bag, curves);
   bag.run(progress);
   curves.flush();
-  if (last.empty()) throw Error(path + ": no cut makes a force curve" + left_out);
-  std::vector<FoundCurves> found;
+  if (last.empty()) throw Error(path + ": no force curve from its cuts" + rejected);
+  std::vector<IdentifiedForceCurves> found;
   for (auto& [of, one] : last) found.push_back(std::move(one));
   return found;
 }

@@ -10,27 +10,27 @@
 
 namespace smartmill::loadmeter {
 
-/// What is called on the way; empty: not.
+/// Callbacks; may be empty.
 struct BagListeners {
-  std::function<void(double)> progress;           ///< now and then, with the share read, 0..1
-  std::function<void(const MotorForce&)> motors;  ///< a cut's force by the motors, where they are calibrated
-  std::function<void(const ForceEstimate&)> force;    ///< a cut's force by all that was measured of it
-  std::function<void(const CoefficientRecord&)> cut;  ///< every cut, as it enters the database
+  std::function<void(double)> progress;               ///< share read, 0..1
+  std::function<void(const MotorForce&)> motors;      ///< force of each cut by calibrated motors
+  std::function<void(const ForceEstimate&)> force;    ///< force of each cut by all its measurements
+  std::function<void(const CoefficientRecord&)> cut;  ///< record of every cut for the database
 };
 
-/// Runs a recorded bag through the class that the node runs: cnc/state, cnc/load, daq/motor_current,
-/// cut/condition and the action's goals.
-/// @return the answer to each goal in the bag that asked for coefficients; to one at its end when there is
+/// Processes a bag with the class of the node: cnc/state, cnc/load, daq/motor_current, cut/condition and the
+/// action's goals.
+/// @return the result of each goal that requests coefficients, or of one at the end of the bag if there is
 /// none.
-/// @throws Error on a bad bag.
+/// @throws Error for an invalid bag.
 std::vector<IdentifyResult> identifyFromBag(const std::string& path, const MachineModel& model,
                                             const NodeParameters& parameters,
                                             const BagListeners& listeners = {});
 
-/// The force curves of a bag, the last of each tool and material, by the class that the node runs.
-/// @throws Error when it holds no force/compensated or spindle/angle, or no cut makes one (each with its
-/// reason).
-std::vector<FoundCurves> curvesFromBag(const std::string& path, const NodeParameters& parameters,
-                                       const std::function<void(double)>& progress = {});
+/// Newest force curve of each tool and material in a bag, by the class of the node.
+/// @throws Error when it has no force/compensated or spindle/angle, or no cut gives a curve (with the
+/// reasons).
+std::vector<IdentifiedForceCurves> curvesFromBag(const std::string& path, const NodeParameters& parameters,
+                                                 const std::function<void(double)>& progress = {});
 
 }  // namespace smartmill::loadmeter

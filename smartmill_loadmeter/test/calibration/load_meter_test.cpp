@@ -32,8 +32,8 @@ TEST(Friction, thesisFigures) {
   // Three printed digits: 1.43e-7 / 3.88e-4 = 3.686e-4, printed as 3.70e-4 (eq. 3.11).
   EXPECT_NEAR(f.viscous, 3.70e-4, 0.02e-4);
   EXPECT_NEAR(f.coulomb, -0.0647, 0.00005);
-  EXPECT_EQ(f.torque(radPerSecFromRpm(1000.0)), 0.0);  // zero below 2000 rpm
-  EXPECT_NEAR(f.torque(radPerSecFromRpm(10000.0)), f.viscous * 1047.2 + f.coulomb, 1e-6);
+  EXPECT_EQ(f.at(radPerSecFromRpm(1000.0)), 0.0);  // zero below 2000 rpm
+  EXPECT_NEAR(f.at(radPerSecFromRpm(10000.0)), f.viscous * 1047.2 + f.coulomb, 1e-6);
 }
 
 TEST(Friction, refusesTooFewSpeeds) {
@@ -44,7 +44,7 @@ TEST(Friction, refusesTooFewSpeeds) {
   EXPECT_THROW(fitFriction({{100.0, NAN, 1e-4}, {300.0, 0.03, 1e-4}}, K, 0.0), Error);
 }
 
-TEST(Friction, standardDeviationsAreHonest) {
+TEST(Friction, standardDeviationsAreCalibrated) {
   std::mt19937 random(3);
   std::normal_distribution<double> normal;
   const int runs = 200;
@@ -58,22 +58,22 @@ TEST(Friction, standardDeviationsAreHonest) {
     const Friction f = fitFriction(cuts, K, 0.0);
     inside_b += std::abs(f.viscous - 4.7e-4) < 1.96 * std::sqrt(f.covariance[0]);
     inside_c += std::abs(f.coulomb - 0.067) < 1.96 * std::sqrt(f.covariance[3]);
-    // With the covariance: the torque at a speed in the middle.
+    // The torque at a speed in the middle checks the covariance.
     const double w = 600.0;
     const double var = w * w * f.covariance[0] + 2.0 * w * f.covariance[1] + f.covariance[3];
-    inside_torque += std::abs(f.torque(w) - (4.7e-4 * w + 0.067)) < 1.96 * std::sqrt(var);
+    inside_torque += std::abs(f.at(w) - (4.7e-4 * w + 0.067)) < 1.96 * std::sqrt(var);
   }
-  // 95 % of 200 runs with four sigma of the count (6 %), upwards up to 1: the scatter may scale the figure
-  // up.
+  // 95 % of 200 runs with four sigma of the count (6 %); more are possible, because the scatter can only
+  // increase the standard deviations.
   for (const int inside : {inside_b, inside_c, inside_torque}) {
     EXPECT_GT(inside, 0.89 * runs);
     EXPECT_LT(inside, runs);
   }
 }
 
-// White noise through the meter's lag, rounded: the stated deviation of the mean is the one that the means
-// have.
-TEST(MeanVoltage, standardDeviationIsHonestForCorrelatedAndRoundedReadings) {
+// White noise behind the meter's lag, rounded: the stated standard deviation of the mean agrees with the
+// scatter of the means.
+TEST(MeanVoltage, standardDeviationIsCalibratedForCorrelatedAndRoundedReadings) {
   std::mt19937 random(5);
   std::normal_distribution<double> normal;
   const double interval = 0.02, tau = timeConstant(7.0), rho = std::exp(-interval / tau);
@@ -95,8 +95,8 @@ TEST(MeanVoltage, standardDeviationIsHonestForCorrelatedAndRoundedReadings) {
       stated += m.std_dev * m.std_dev / runs;
       inside += std::abs(m.mean - truth) < 1.96 * m.std_dev;
     }
-    // Rounding without noise is uniform, not normal, so nothing lies outside; between, the bound is on the
-    // safe side.
+    // Rounding errors without noise are uniform, so that all lie inside; with some noise the bound is
+    // conservative.
     EXPECT_GT(stated / squares, 0.75) << noise;
     EXPECT_LT(stated / squares, 2.5) << noise;
     EXPECT_GT(inside, 0.90 * runs) << noise;

@@ -46,7 +46,7 @@ TEST(IdleVoltage, reproducesTheFiguresOfTheThesis) {
   EXPECT_NEAR(idle.ktcf.value, -2.51e-5, 0.05e-5);  // rounding of 3e-4 V over the speed range
 }
 
-TEST(IdleVoltage, standardDeviationsAreHonest) {
+TEST(IdleVoltage, standardDeviationsAreCalibrated) {
   Coverage kb, ktcf;
   for (int run = 0; run < Coverage::RUNS; ++run) {
     const IdleVoltage idle = fitIdleVoltage(thesisAirCuts(static_cast<unsigned>(run) + 10), ZERO_BELOW, STEP);
@@ -57,11 +57,11 @@ TEST(IdleVoltage, standardDeviationsAreHonest) {
   EXPECT_TRUE(ktcf.honest());
 }
 
-TEST(IdleVoltage, saysWhatIsMissing) {
+TEST(IdleVoltage, namesWhatIsMissing) {
   EXPECT_THAT(errorOf([] { fitIdleVoltage({{100.0, 0.1, 0.0}}, 0.0, STEP); }), HasSubstr("1 usable"));
 }
 
-// Friction as Armstrong draws it: the thesis' negative Coulomb term is what a straight line makes of it.
+// Friction with Stribeck and warm-up terms (Armstrong).
 std::vector<TimedAirCut> airCuts(double breakaway, double stribeck_rpm, double cold, double warmup,
                                  unsigned seed) {
   std::mt19937 random(seed);
@@ -86,19 +86,19 @@ std::vector<TimedAirCut> airCuts(double breakaway, double stribeck_rpm, double c
   return cuts;
 }
 
-TEST(FrictionLaws, theEvidenceChoosesWhatIsThere) {
+TEST(FrictionLaws, theEvidenceSelectsTheTrueTerms) {
   const auto plain = fitFrictionLaws(airCuts(0.0, 2500, 0.0, 600.0, 1), K, 0.0).front();
-  EXPECT_EQ(plain.shape.name(), "Coulomb and viscous");
+  EXPECT_EQ(plain.terms.name(), "Coulomb and viscous");
   EXPECT_NEAR(plain.law.coulomb, 0.08, 3.0 * plain.std_dev[1]);
   const auto stribeck = fitFrictionLaws(airCuts(0.3, 2500, 0.0, 600.0, 2), K, 0.0).front();
-  EXPECT_EQ(stribeck.shape.name(), "Coulomb and viscous, Stribeck");
+  EXPECT_EQ(stribeck.terms.name(), "Coulomb and viscous, Stribeck");
   EXPECT_NEAR(stribeck.law.breakaway, 0.3, 3.0 * stribeck.std_dev[2]);
   EXPECT_NEAR(units::rpmFromRadPerSec(stribeck.law.stribeck_speed), 2500.0, 30.0);
   const auto cold = fitFrictionLaws(airCuts(0.0, 2500, 0.25, 500.0, 3), K, 0.0).front();
-  EXPECT_EQ(cold.shape.name(), "Coulomb and viscous, warm-up");
+  EXPECT_EQ(cold.terms.name(), "Coulomb and viscous, warm-up");
   EXPECT_NEAR(cold.law.cold_ratio, 0.25, 3.0 * cold.std_dev[2]);
   const auto both = fitFrictionLaws(airCuts(0.3, 2500, 0.25, 500.0, 4), K, 0.0).front();
-  EXPECT_EQ(both.shape.name(), "Coulomb and viscous, Stribeck, warm-up");
+  EXPECT_EQ(both.terms.name(), "Coulomb and viscous, Stribeck, warm-up");
   EXPECT_NEAR(both.law.warmup_time, 500.0, 3.0 * both.std_dev[5]);
 }
 
@@ -106,16 +106,16 @@ TEST(FrictionLaws, falseChoicesAreRare) {
   int wrong = 0;
   for (unsigned seed = 1; seed <= 60; ++seed) {
     const auto best = fitFrictionLaws(airCuts(0.0, 2500, 0.0, 600.0, seed + 100), K, 0.0).front();
-    wrong += best.shape.stribeck || best.shape.warmup;
+    wrong += best.terms.stribeck || best.terms.warmup;
   }
-  EXPECT_LE(wrong, 3);  // two more unknowns pay off by chance in 5 % at most
+  EXPECT_LE(wrong, 3);  // at most 5 % by chance
 }
 
 TEST(FrictionLaws, aLineThroughStribeckDataHasANegativeCoulombTerm) {
   std::vector<AirCut> air;
   for (int rpm = 1000; rpm <= 20000; rpm += 1000) {
     const double w = radPerSecFromRpm(rpm);
-    // Viscous friction dominates except under 2000 rpm, and grows with speed (windage).
+    // Viscous friction dominates above 2000 rpm and grows with speed (windage).
     air.push_back(
         {w, K * w * (2.5e-4 * w + 6e-8 * w * w + 0.05 * std::exp(-std::pow(rpm / 1500.0, 2))), 0.0});
   }

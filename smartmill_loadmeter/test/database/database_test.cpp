@@ -57,7 +57,7 @@ std::string contentOf(const std::string& file) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-TEST(CoefficientDatabase, keepsTheNewestOfEachToolAndMaterialInItsFile) {
+TEST(CoefficientDatabase, storesTheNewestOfEachToolAndMaterialInItsFile) {
   const TemporaryFolder folder;
   const std::string file = folder.file("machine.sqlite");
   {
@@ -82,13 +82,13 @@ TEST(CoefficientDatabase, keepsTheNewestOfEachToolAndMaterialInItsFile) {
   EXPECT_FALSE(database.records("", "").front().version.empty());
 }
 
-TEST(CoefficientDatabase, withoutAFileKeepsThisRun) {
+TEST(CoefficientDatabase, withoutAFileStoresThisRun) {
   CoefficientDatabase database("");
   database.add(setOf("a", "b", 1.0, 1e9));
   EXPECT_EQ(database.size(), 1u);
 }
 
-TEST(CoefficientDatabase, refusesWhatIsNoSuchFile) {
+TEST(CoefficientDatabase, refusesOtherFiles) {
   const TemporaryFolder folder;
   const std::string yaml = folder.write("m.yaml", "format: smartmill-coefficients/1\nentries: []\n");
   EXPECT_EQ(errorOf([&] { CoefficientDatabase{yaml}; }), yaml + ": file is not a database");
@@ -98,8 +98,7 @@ TEST(CoefficientDatabase, refusesWhatIsNoSuchFile) {
   ASSERT_EQ(sqlite3_open(other.c_str(), &db), SQLITE_OK);
   sqlite3_exec(db, "CREATE TABLE songs (name TEXT)", nullptr, nullptr, nullptr);
   sqlite3_close(db);
-  EXPECT_EQ(errorOf([&] { CoefficientDatabase{other}; }),
-            other + ": a database, but not of cutting coefficients");
+  EXPECT_EQ(errorOf([&] { CoefficientDatabase{other}; }), other + ": not a database of cutting coefficients");
 }
 
 TEST(CoefficientDatabase, exportAndImportLoseNothing) {
@@ -121,7 +120,7 @@ TEST(CoefficientDatabase, exportAndImportLoseNothing) {
   exportCsv(from_yaml.records("", ""), folder.file("c.csv"));
   EXPECT_EQ(contentOf(folder.file("a.csv")), contentOf(folder.file("b.csv")));
   EXPECT_EQ(contentOf(folder.file("a.csv")), contentOf(folder.file("c.csv")));
-  // The same content is the same record wherever it came from.
+  // The same content is the same record, whatever its source.
   EXPECT_EQ(database.add(importYaml(folder.file("a.yaml"))), 0u);
 }
 
@@ -130,7 +129,7 @@ TEST(CoefficientDatabase, importNamesWhatIsWrong) {
   const std::string file = folder.write("x.csv", "tool,ktc[N/m2]\na,1e9\nb,many\n");
   EXPECT_EQ(errorOf([&] { importCsv(file); }), file + ": line 3: column ktc[N/m2]: 'many' is not a number");
   const std::string unknown = folder.write("y.csv", "tool,ktc[N/mm2]\n");
-  EXPECT_EQ(errorOf([&] { importCsv(unknown); }), unknown + ": line 1: column 'ktc[N/mm2]' is not known");
+  EXPECT_EQ(errorOf([&] { importCsv(unknown); }), unknown + ": line 1: column 'ktc[N/mm2]' is unknown");
   const std::string yaml = folder.write(
       "z.yaml", "format: smartmill-coefficients/1\nentries:\n- {source: force, stamp_s: 1.0, kct: 3.0}\n");
   EXPECT_THAT(errorOf([&] { importYaml(yaml); }), HasSubstr("kct"));
@@ -144,7 +143,7 @@ TEST(CoefficientDatabase, importNamesWhatIsWrong) {
   EXPECT_EQ(old[0].set.std_dev.ktc, 3e6);
 }
 
-TEST(CoefficientDatabase, mergeTakesOverWhatIsNewOnce) {
+TEST(CoefficientDatabase, mergeAddsNewRecordsOnce) {
   const TemporaryFolder folder;
   CoefficientDatabase a(folder.file("a.sqlite"));
   {
@@ -160,7 +159,7 @@ TEST(CoefficientDatabase, mergeTakesOverWhatIsNewOnce) {
               HasSubstr("none.sqlite: cannot be read"));
 }
 
-TEST(Estimate, uncertaintyGrowsWithDistanceFromWhatWasTried) {
+TEST(Estimate, uncertaintyGrowsWithDistance) {
   CoefficientDatabase database("");
   database.add(recordOf("t", 1.0, 1e9, 2.0));
   CoefficientQuery query;
@@ -178,7 +177,7 @@ TEST(Estimate, uncertaintyGrowsWithDistanceFromWhatWasTried) {
   }
   query.cutting_speed = 2.0;
   EXPECT_DOUBLE_EQ(database.estimate(query)->set.std_dev.ktc, 2e6);
-  // Another tool of the same material: farther, and said.
+  // Another tool in the same material is farther away, which the message states.
   query.tool = "new";
   const auto other = database.estimate(query);
   ASSERT_TRUE(other);
@@ -188,7 +187,7 @@ TEST(Estimate, uncertaintyGrowsWithDistanceFromWhatWasTried) {
   EXPECT_FALSE(database.estimate(query));
   const FoundCoefficients found = findCoefficients(database, "new", "1018");
   ASSERT_TRUE(found.set);
-  EXPECT_THAT(found.message, HasSubstr("nothing with 'new' yet"));
+  EXPECT_THAT(found.message, HasSubstr("no records with 'new'"));
 }
 
 TEST(Estimate, nearRecordsCountMoreThanFarOnes) {
@@ -203,8 +202,9 @@ TEST(Estimate, nearRecordsCountMoreThanFarOnes) {
   EXPECT_NEAR(database.estimate(query)->set.value.ktc, 0.9e9, 0.01e9);
 }
 
-// Cutting speed lowers Ktc by a power law the database does not know: its stated uncertainty must cover that.
-TEST(Estimate, isHonestWhereCuttingSpeedActs) {
+// Ktc varies with cutting speed by a power law that the database does not model: its standard deviation must
+// cover that.
+TEST(Estimate, coversTheEffectOfCuttingSpeed) {
   std::mt19937 random(5);
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> exponent(-0.12, 0.12), octave(-2.0, 2.0);
@@ -226,7 +226,7 @@ TEST(Estimate, isHonestWhereCuttingSpeedActs) {
 }
 
 TEST(Database, hundredThousandRecordsAreLookedUpInUnderFiveMilliseconds) {
-  CoefficientDatabase database("");  // the same tables; from a file: loadmeter_database lookup
+  CoefficientDatabase database("");  // same tables as a file (loadmeter_database lookup)
   std::mt19937 random(1);
   std::uniform_real_distribution<double> uniform;
   std::vector<CoefficientRecord> many;
@@ -241,7 +241,7 @@ TEST(Database, hundredThousandRecordsAreLookedUpInUnderFiveMilliseconds) {
   for (int i = 0; i < 60; ++i) {
     CoefficientQuery query{i % 3 ? "common" : "tool 42", "1018", 0.5 + 10.0 * uniform(random), 6e-5};
     if (i % 5 == 0) query.tool = "unheard of";
-    const auto begin = std::clock();  // of this process, whatever else the computer does
+    const auto begin = std::clock();  // CPU time, independent of other processes
     const auto estimate = database.estimate(query);
     const auto newest = database.find(query.tool == "unheard of" ? "" : query.tool, query.material);
     times.push_back(static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC);
@@ -253,8 +253,8 @@ TEST(Database, hundredThousandRecordsAreLookedUpInUnderFiveMilliseconds) {
   EXPECT_LT(times[30], 5e-3);
 }
 
-// A file as version 1 left it: with records, one of them handed on.
-TEST(Database, anOlderFileIsBroughtUpWithAllItHolds) {
+// A file of version 1 with records, one of them sent.
+TEST(Database, anOlderFileIsUpdatedWithoutLoss) {
   const TemporaryFolder folder;
   const std::string file = folder.file("old.sqlite");
   {
@@ -280,11 +280,11 @@ TEST(Database, anOlderFileIsBroughtUpWithAllItHolds) {
   EXPECT_EQ(database.unsentCount("f"), 2u);
   health.stamp = NAN;
   EXPECT_THAT(errorOf([&] { database.add(std::vector<HealthRecord>{health}); }),
-              HasSubstr("old.sqlite: stamp of a record is not a number"));
+              HasSubstr("old.sqlite: stamp of a record: expected a finite number"));
 }
 
-// Keys and numbers as docs/formats.md has them.
-TEST(Database, aReportIsKeptWithItsEvidenceAndOnce) {
+// Keys and numbers of docs/formats.md.
+TEST(Database, aReportIsStoredOnceWithItsEvidence) {
   const TemporaryFolder folder;
   const std::string report = folder.write("report.json", R"({"format": "smartmill-report/1",
     "verdict": "explained", "effects": [{"name": "runout", "parameters": {"angle_deg": {"value": 261.8,
@@ -299,7 +299,7 @@ TEST(Database, aReportIsKeptWithItsEvidenceAndOnce) {
   ModelImprovement kept = readImprovement(report);
   kept.machine = "mill 07";
   const auto causes = causesOf(kept);
-  ASSERT_EQ(causes.size(), 1u) << "a cause without a name is none to look for";
+  ASSERT_EQ(causes.size(), 1u) << "an unnamed cause cannot be proposed";
   EXPECT_EQ(causes[0].text(), "runout: angle_deg 261.8 +- 0.01, offset_um 21.08 +- 0.004");
   EXPECT_EQ(evidenceOf(kept).at(1).test, "slot");
   EXPECT_EQ(evidenceOf(kept).at(1).gaps.at(1).channel, "fy");
@@ -314,7 +314,7 @@ TEST(Database, aReportIsKeptWithItsEvidenceAndOnce) {
   EXPECT_THAT(errorOf([&] { readImprovement(folder.file("none")); }), HasSubstr("none: cannot be read"));
 }
 
-TEST(Database, healthIsReadAsTheHammerWritesIt) {
+TEST(Database, healthFilesOfTheHammerAreRead) {
   const TemporaryFolder folder;
   const std::string head = "measured,bag,days,quantity,first,now,deviations,drifted,stamp\n";
   const auto rows = readHealth(folder.write(
@@ -329,8 +329,8 @@ TEST(Database, healthIsReadAsTheHammerWritesIt) {
               HasSubstr("old.csv: line 1: column 'days' is missing"));
 }
 
-// The full minute is loadmeter_database crash. Writers tell through a pipe what add() has acknowledged; one
-// after the other is killed and started anew.
+// loadmeter_database crash runs a full minute. Writers report acknowledged records through a pipe; they are
+// killed and restarted one after the other.
 TEST(Database, whatWasAcknowledgedSurvivesKilledWriters) {
   const TemporaryFolder folder;
   const std::string file = folder.file("shared.sqlite");
@@ -358,14 +358,14 @@ TEST(Database, whatWasAcknowledgedSurvivesKilledWriters) {
   std::set<int> acknowledged;
   int stamp = 0;
   for (int kill_at = 0; kill_at < 12; ++kill_at) {
-    // However slow the disk is.
+    // Independent of the speed of the disk.
     for (int i = 0; i < 10 && read(pipe_ends[0], &stamp, sizeof stamp) == sizeof stamp; ++i)
       acknowledged.insert(stamp);
     pid_t& victim = writers[static_cast<std::size_t>(kill_at) % writers.size()];
     kill(victim, SIGKILL);
     int status = 0;
     waitpid(victim, &status, 0);
-    EXPECT_TRUE(WIFSIGNALED(status));  // it had not stopped by itself
+    EXPECT_TRUE(WIFSIGNALED(status));  // it was killed
     victim = launch();
   }
   for (const pid_t writer : writers) {

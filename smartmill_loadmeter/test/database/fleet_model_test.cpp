@@ -17,12 +17,12 @@ std::string nameOf(int machine) {
   return "mill " + std::to_string(100 + machine);
 }
 
-/// A shop with known deviations: machines x materials x tools, cuts of each cell.
+/// Shop with known deviations: machines x materials x tools, cuts of each cell.
 struct Shop {
   int machines = 50, materials = 4, tools = 2, cuts = 2;
   FleetDeviations s{0.04, 0.01, 0.08, 0.02};
   std::vector<double> group, effect;  // of the logarithm
-  std::vector<FleetObservation> seen;
+  std::vector<FleetObservation> observations;
 
   double normal(std::mt19937& random, double deviation) {
     return std::normal_distribution<double>(0.0, deviation)(random);
@@ -31,7 +31,7 @@ struct Shop {
     return static_cast<std::size_t>(material * tools + tool);
   }
 
-  /// @param share of the cells that are cut at all
+  /// @param share of the cells with cuts
   void draw(unsigned seed, double share) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> uniform;
@@ -48,8 +48,9 @@ struct Shop {
           for (int c = 0; c < cuts; ++c) {
             const double y =
                 group[groupAt(j, t)] + effect.back() + batch + normal(random, std::hypot(s.noise, 0.01));
-            seen.push_back({nameOf(m), "material " + std::to_string(j), "tool " + std::to_string(t),
-                            std::exp(y), 0.01 * std::exp(y), 1000.0 * static_cast<double>(seen.size())});
+            observations.push_back({nameOf(m), "material " + std::to_string(j), "tool " + std::to_string(t),
+                                    std::exp(y), 0.01 * std::exp(y),
+                                    1000.0 * static_cast<double>(observations.size())});
           }
         }
       }
@@ -64,7 +65,7 @@ TEST(FleetModel, isTheClosedFormOfTheBalancedOneWayLayout) {
   const double b = 0.05, e = 0.03;
   std::mt19937 random(3);
   std::normal_distribution<double> normal;
-  std::vector<FleetObservation> seen;
+  std::vector<FleetObservation> observations;
   std::vector<double> mean(machines, 0.0);
   double grand = 0.0;
   for (int m = 0; m < machines; ++m) {
@@ -73,13 +74,13 @@ TEST(FleetModel, isTheClosedFormOfTheBalancedOneWayLayout) {
       const double y = 20.0 + effect + e * normal(random);
       mean[static_cast<std::size_t>(m)] += y / cuts;
       grand += y / (cuts * machines);
-      seen.push_back({nameOf(m), "1018", "endmill", std::exp(y), 0.0, 0.0});
+      observations.push_back({nameOf(m), "1018", "endmill", std::exp(y), 0.0, 0.0});
     }
   }
   FleetModelOptions options;
-  options.odd_share = 0.0;
+  options.outlier_probability = 0.0;
   options.known = FleetDeviations{b, 0.0, 0.1, e};
-  const FleetModel model(seen, options);
+  const FleetModel model(observations, options);
   const double shrink = cuts * b * b / (cuts * b * b + e * e), of_grand = (b * b + e * e / cuts) / machines;
   const auto effects = model.machines();
   ASSERT_EQ(effects.size(), 8u);
@@ -101,12 +102,12 @@ TEST(FleetModel, isTheClosedFormOfTheBalancedOneWayLayout) {
 }
 
 // Restricted likelihood of the balanced layout: s_e^2 = MSW, s_b^2 = (MSB - MSW) / n. With 200 machines the
-// mean over what is left open lies within a tenth of its deviation, s_b / sqrt(2 M) = 5 %.
+// posterior mean is within a tenth of its deviation, s_b / sqrt(2 M) = 5 %.
 TEST(FleetModel, findsTheDeviationsOfTheBalancedLayout) {
   const int machines = 200, cuts = 4;
   std::mt19937 random(5);
   std::normal_distribution<double> normal;
-  std::vector<FleetObservation> seen;
+  std::vector<FleetObservation> observations;
   double between = 0.0, within = 0.0, grand = 0.0;
   std::vector<double> means;
   for (int m = 0; m < machines; ++m) {
@@ -116,32 +117,33 @@ TEST(FleetModel, findsTheDeviationsOfTheBalancedLayout) {
     const double mean = (y[0] + y[1] + y[2] + y[3]) / cuts;
     for (const double one : y) {
       within += std::pow(one - mean, 2) / (machines * (cuts - 1.0));
-      seen.push_back({nameOf(m), "1018", "endmill", std::exp(one), 0.0, 0.0});
+      observations.push_back({nameOf(m), "1018", "endmill", std::exp(one), 0.0, 0.0});
     }
     means.push_back(mean);
     grand += mean / machines;
   }
   for (const double mean : means) between += cuts * std::pow(mean - grand, 2) / (machines - 1.0);
   FleetModelOptions options;
-  options.odd_share = 0.0;
-  const FleetDeviations found = FleetModel(seen, options).deviations();
+  options.outlier_probability = 0.0;
+  const FleetDeviations found = FleetModel(observations, options).deviations();
   EXPECT_NEAR(found.noise, std::sqrt(within), 1e-9);
-  // A machine's effect and its one batch cannot be told apart in this layout: their sum of squares can.
+  // This layout does not separate a machine's effect from its only batch, but determines their sum of
+  // squares.
   EXPECT_NEAR(std::hypot(found.machine, found.batch), std::sqrt((between - within) / cuts), 0.005);
 }
 
-TEST(FleetModel, statesHonestBandsForMachinesThatNeverCutAMaterial) {
+TEST(FleetModel, bandsAreCalibratedForMachinesNewToAMaterial) {
   Coverage first, after, of_machines;
   for (unsigned seed = 1; seed <= 14; ++seed) {
     Shop shop;
     shop.draw(seed, 0.5);
     // Machines 0..19 have not cut material 0; then one cut each.
-    std::vector<FleetObservation> believed, cut;
-    for (const FleetObservation& o : shop.seen) {
-      const bool held = o.material == "material 0" && o.machine < nameOf(20);
-      (held ? cut : believed).push_back(o);
+    std::vector<FleetObservation> known, cut;
+    for (const FleetObservation& o : shop.observations) {
+      const bool is_new = o.material == "material 0" && o.machine < nameOf(20);
+      (is_new ? cut : known).push_back(o);
     }
-    const FleetModel model(believed);
+    const FleetModel model(known);
     std::string last;
     for (const FleetObservation& o : cut) {
       if (o.machine == last) continue;
@@ -157,66 +159,66 @@ TEST(FleetModel, statesHonestBandsForMachinesThatNeverCutAMaterial) {
     }
   }
   EXPECT_TRUE(first.honest());
-  // Machines of a shop share what is not known of its groups.
+  // Machines of a shop share the uncertainty of its groups.
   EXPECT_TRUE(of_machines.honest(Coverage::RUNS));
 }
 
-TEST(FleetModel, firstCutsPullTheBand) {
+TEST(FleetModel, firstCutsNarrowTheBand) {
   Shop shop;
   shop.draw(4, 0.6);
-  std::vector<FleetObservation> seen = shop.seen;
+  std::vector<FleetObservation> observations = shop.observations;
   const double truth = shop.group[shop.groupAt(1, 0)] + 0.10;
   double last = 1.0;
   for (int cuts = 0; cuts < 4; ++cuts) {
-    const auto p = FleetModel(seen).predict("new", "material 1", "tool 0");
+    const auto p = FleetModel(observations).predict("new", "material 1", "tool 0");
     ASSERT_TRUE(p);
     EXPECT_LT(p->log_std, last);
     EXPECT_NEAR(std::log(p->value), truth, 3.0 * p->log_std);
     last = p->log_std;
-    seen.push_back({"new", "material 1", "tool 0", std::exp(truth + 0.01 * (cuts % 2 ? 1 : -1)),
-                    0.01 * std::exp(truth), 0.0});
+    observations.push_back({"new", "material 1", "tool 0", std::exp(truth + 0.01 * (cuts % 2 ? 1 : -1)),
+                            0.01 * std::exp(truth), 0.0});
   }
 }
 
-TEST(FleetModel, namesTheOddMachineAndNoOther) {
+TEST(FleetModel, namesTheOutlierAndNoOther) {
   Shop shop;
   shop.draw(9, 0.5);
-  for (FleetObservation& o : shop.seen)
+  for (FleetObservation& o : shop.observations)
     if (o.machine == nameOf(17)) o.value *= 1.25;
-  for (const MachineEffect& m : FleetModel(shop.seen).machines()) {
+  for (const MachineEffect& m : FleetModel(shop.observations).machines()) {
     if (m.machine == nameOf(17)) {
-      EXPECT_GT(m.odd, 0.95);
+      EXPECT_GT(m.outlier, 0.95);
       EXPECT_NEAR(m.effect, std::log(1.25) + shop.effect[17], 3.0 * m.std_dev);
       EXPECT_THAT(m.meaning(), ::testing::HasSubstr("load-meter constant"));
     } else {
-      EXPECT_LT(m.odd, 0.5) << m.machine;
+      EXPECT_LT(m.outlier, 0.5) << m.machine;
     }
   }
 }
 
-TEST(FleetModel, tellsAChangeFromAConstant) {
+TEST(FleetModel, distinguishesAChangeFromAConstant) {
   Shop shop;
   shop.cuts = 6;
   shop.draw(11, 0.5);
   int cut = 0;
-  for (FleetObservation& o : shop.seen) {
+  for (FleetObservation& o : shop.observations) {
     o.stamp = 1e4 * (cut++ % shop.cuts);
     if (o.machine == nameOf(3)) o.value *= std::exp(0.3 + 3e-6 * o.stamp);
   }
-  for (const MachineEffect& m : FleetModel(shop.seen).machines()) {
+  for (const MachineEffect& m : FleetModel(shop.observations).machines()) {
     if (m.machine != nameOf(3)) continue;
-    EXPECT_GT(m.odd, 0.95);
+    EXPECT_GT(m.outlier, 0.95);
     EXPECT_NEAR(m.drift, 3e-6, 4.0 * m.drift_std);
     EXPECT_THAT(m.meaning(), ::testing::HasSubstr("changes with time"));
   }
 }
 
-TEST(FleetModel, refusesWhatIsNoCoefficient) {
-  EXPECT_EQ(errorOf([] { FleetModel({}); }), "fleet: nothing was observed");
+TEST(FleetModel, refusesInvalidObservations) {
+  EXPECT_EQ(errorOf([] { FleetModel({}); }), "fleet: no observations");
   EXPECT_EQ(errorOf([] {
               FleetModel({{"mill", "1018", "t", -1.0, 0.1, 0.0}});
             }),
-            "fleet: a value of 'mill' in '1018' is not above 0");
+            "fleet: value of 'mill' in '1018': expected a finite number > 0");
 }
 
 }  // namespace

@@ -72,7 +72,7 @@ void fill(CoefficientDatabase& database, const std::string& machine, int first, 
   database.add(records);
 }
 
-/// A server with three machines: a and b of one shop, c of another.
+/// Server with three machines: a and b of one shop, c of another.
 class FleetDatabase : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -81,7 +81,7 @@ class FleetDatabase : public ::testing::Test {
   static void TearDownTestSuite() { server_.reset(); }
 
   void SetUp() override {
-    if (!server_) GTEST_SKIP() << "./setup --with-fleet installs what is missing";
+    if (!server_) GTEST_SKIP() << "requires ./setup --with-fleet";
     static int count = 0;
     database_ = "fleet_" + std::to_string(++count);
     server_->makeDatabase(database_);
@@ -108,15 +108,15 @@ class FleetDatabase : public ::testing::Test {
 
 std::unique_ptr<PrivateServer> FleetDatabase::server_;
 
-TEST_F(FleetDatabase, pushesWhatIsNewAndPullsItBitByBit) {
+TEST_F(FleetDatabase, pushesNewRecordsAndPullsThemExactly) {
   CoefficientDatabase a(file("a")), b(file("b"));
   fill(a, "a", 0, 5000);
   fill(b, "b", 0, 10);
   const FleetTransfer first = push(a, url("a"));
   EXPECT_EQ(first.offered, 5000u);
   EXPECT_EQ(first.fresh, 5000u);
-  EXPECT_EQ(push(a, url("a")).offered, 0u) << "what was acknowledged is noted";
-  EXPECT_EQ(push(a, url("a"), {}, true).fresh, 0u) << "a record counts once";
+  EXPECT_EQ(push(a, url("a")).offered, 0u) << "acknowledged records are noted";
+  EXPECT_EQ(push(a, url("a"), {}, true).fresh, 0u) << "a record is stored once";
   fill(a, "a", 5000, 1);
   EXPECT_EQ(a.unsentCount(a.lastFleet()), 1u);
   EXPECT_EQ(push(a, url("a")).fresh, 1u);
@@ -124,22 +124,22 @@ TEST_F(FleetDatabase, pushesWhatIsNewAndPullsItBitByBit) {
   EXPECT_EQ(push(b, url("b")).fresh, 10u);
   EXPECT_EQ(pull(b, url("b")).fresh, 5001u);
   EXPECT_EQ(pull(b, url("b")).offered, 0u);
-  EXPECT_EQ(push(b, url("b")).offered, 0u) << "what came from the fleet is not handed back";
+  EXPECT_EQ(push(b, url("b")).offered, 0u) << "records of the fleet are not sent back";
   EXPECT_EQ(b.size(), 5011u);
   for (const CoefficientRecord& r : b.records("", "")) {
     if (r.machine != "a") continue;
     const int number = static_cast<int>(std::lround(3.0 * (r.set.stamp - 1700000000.0)));
-    const CoefficientRecord due = recordOf("a", number);
-    ASSERT_EQ(r.set.stamp, due.set.stamp);
-    ASSERT_EQ(r.set.value.ktc, due.set.value.ktc);
-    ASSERT_EQ(r.set.tool, due.set.tool);
-    ASSERT_EQ(r.bag, due.bag);
+    const CoefficientRecord expected = recordOf("a", number);
+    ASSERT_EQ(r.set.stamp, expected.set.stamp);
+    ASSERT_EQ(r.set.value.ktc, expected.set.value.ktc);
+    ASSERT_EQ(r.set.tool, expected.set.tool);
+    ASSERT_EQ(r.bag, expected.bag);
     ASSERT_EQ(r.covariance[3], -1.0 / 3.0);
     ASSERT_TRUE(std::isnan(r.set.value.krc));
   }
 }
 
-TEST_F(FleetDatabase, pullKeepsWhatWaitsToBePushed) {
+TEST_F(FleetDatabase, pullKeepsUnsentRecords) {
   CoefficientDatabase a(file("a")), b(file("b"));
   fill(a, "a", 0, 20);
   push(a, url("a"));
@@ -171,7 +171,7 @@ TEST_F(FleetDatabase, answersAsTheFileDoes) {
   }
 }
 
-TEST_F(FleetDatabase, aShopSeesItsOwn) {
+TEST_F(FleetDatabase, aShopSeesOnlyItsOwn) {
   CoefficientDatabase a(file("a")), c(file("c"));
   fill(a, "a", 0, 50);
   fill(c, "c", 0, 5);
@@ -180,27 +180,27 @@ TEST_F(FleetDatabase, aShopSeesItsOwn) {
   EXPECT_EQ(CoefficientDatabase(url("a")).size(), 50u);
   EXPECT_EQ(CoefficientDatabase(url("c")).size(), 5u);
   EXPECT_EQ(pull(c, url("c")).offered, 0u);
-  const std::vector<FleetMember> seen = fleetMembers(url("a"));
-  ASSERT_EQ(seen.size(), 2u);
-  EXPECT_EQ(seen[0].name, "machine a");
-  EXPECT_EQ(seen[0].records, 50u);
-  EXPECT_LT(seen[0].silent, 60.0);
-  EXPECT_TRUE(std::isnan(seen[1].silent));
-  // A stranger's file with the same records counts once in each shop.
+  const std::vector<FleetMember> visible = fleetMembers(url("a"));
+  ASSERT_EQ(visible.size(), 2u);
+  EXPECT_EQ(visible[0].name, "machine a");
+  EXPECT_EQ(visible[0].records, 50u);
+  EXPECT_LT(visible[0].silent, 60.0);
+  EXPECT_TRUE(std::isnan(visible[1].silent));
+  // Another shop's file with the same records counts once in each shop.
   EXPECT_EQ(CoefficientDatabase(url("c")).merge(file("a")), 50u);
 }
 
-TEST_F(FleetDatabase, refusesTwoOfOneNameAndStrangers) {
-  EXPECT_THAT(errorOf([&] { enrolAs("a", "turning"); }), HasSubstr("is enrolled otherwise"));
+TEST_F(FleetDatabase, refusesDuplicateNamesAndUnknownLogins) {
+  EXPECT_THAT(errorOf([&] { enrolAs("a", "turning"); }),
+              HasSubstr("is enrolled with another name, login or shop"));
   EXPECT_THAT(errorOf([&] { CoefficientDatabase(url("owner")).add(recordOf("x", 1)); }),
-              HasSubstr("no machine of the fleet"));
+              HasSubstr("not a machine of the fleet"));
 }
 
-TEST_F(FleetDatabase, wrongAddressesAndPasswordsAreOneLine) {
+TEST_F(FleetDatabase, wrongAddressesAndPasswordsGiveOneLine) {
   CoefficientDatabase a(file("a"));
   fill(a, "a", 0, 3);
-  EXPECT_THAT(errorOf([&] { push(a, "mysql://there"); }),
-              HasSubstr("'mysql://there': a fleet's server is due"));
+  EXPECT_THAT(errorOf([&] { push(a, "mysql://there"); }), HasSubstr("'mysql://there': expected a server"));
   EXPECT_THAT(errorOf([&] { push(a, "postgresql://a@/postgres?host=/tmp/nowhere"); }),
               HasSubstr("/tmp/nowhere"));
   EXPECT_THAT(errorOf([&] { push(a, url("stranger")); }), HasSubstr("role \"stranger\" does not exist"));
@@ -208,16 +208,16 @@ TEST_F(FleetDatabase, wrongAddressesAndPasswordsAreOneLine) {
   const std::string wrong = errorOf([&] { push(a, url("locked", "secret_word")); });
   EXPECT_THAT(wrong, AllOf(HasSubstr("password authentication failed"), Not(HasSubstr("secret_word")),
                            Not(HasSubstr("\n"))));
-  EXPECT_EQ(push(a, url("locked", "right%20'word'")).fresh, 3u) << "nothing was lost on the way";
+  EXPECT_EQ(push(a, url("locked", "right%20'word'")).fresh, 3u) << "nothing was lost";
 }
 
-TEST_F(FleetDatabase, olderTablesAreToldAndBroughtUpWithAllTheyHold) {
+TEST_F(FleetDatabase, olderTablesAreNamedAndMigratedWithoutLoss) {
   server_->makeDatabase("old");
   const std::string old = server_->url("owner", "", "old");
-  EXPECT_THAT(errorOf([&] { CoefficientDatabase database(old); }), HasSubstr("no fleet's tables"));
+  EXPECT_THAT(errorOf([&] { CoefficientDatabase database(old); }), HasSubstr("no tables"));
   EXPECT_EQ(migrateFleet(old, 1), 0);
   EXPECT_THAT(errorOf([&] { CoefficientDatabase database(old); }),
-              HasSubstr("tables of version 1, 3 is due: `coefficients_db URL migrate`"));
+              HasSubstr("tables of version 1, expected 3: update them with `coefficients_db URL migrate`"));
   ASSERT_TRUE(server_->run("owner", "old",
                            "INSERT INTO machine (name, login, shop) VALUES ('a', 'owner', 'milling')"));
   ASSERT_TRUE(server_->run("owner", "old",
@@ -225,13 +225,13 @@ TEST_F(FleetDatabase, olderTablesAreToldAndBroughtUpWithAllTheyHold) {
                            "material, source, machine, bag, version, "
                            "stamp, ktc) VALUES ('1', 'milling', 1, 0, 't', 'm', '', '', '', '', 5, 7e8)"));
   EXPECT_EQ(migrateFleet(old), 1);
-  EXPECT_EQ(migrateFleet(old), 3) << "again does nothing";
+  EXPECT_EQ(migrateFleet(old), 3) << "a repeated migration changes nothing";
   EXPECT_EQ(CoefficientDatabase(old).find("t", "m")->value.ktc, 7e8);
   ASSERT_TRUE(server_->run("owner", "old", "UPDATE fleet SET schema = 4"));
   EXPECT_THAT(errorOf([&] { CoefficientDatabase database(old); }), HasSubstr("newer than this program's 3"));
 }
 
-// As a shop's server was before improvements and health: a machine that pushed then goes on.
+// A server of version 2, without improvements and health: a machine that pushed then continues.
 TEST_F(FleetDatabase, tablesOfVersionTwoTakeTheNewKindsAfterMigration) {
   server_->makeDatabase("second");
   const auto there = [&](const std::string& login) { return server_->url(login, "", "second"); };
@@ -247,7 +247,7 @@ TEST_F(FleetDatabase, tablesOfVersionTwoTakeTheNewKindsAfterMigration) {
                            "1, 1, 1, 0)"));
   CoefficientDatabase a(file("a"));
   a.add(std::vector<HealthRecord>{healthOf("a", 1)});
-  EXPECT_THAT(errorOf([&] { push(a, there("a")); }), HasSubstr("tables of version 2, 3 is due"));
+  EXPECT_THAT(errorOf([&] { push(a, there("a")); }), HasSubstr("tables of version 2, expected 3"));
   EXPECT_EQ(migrateFleet(there("owner")), 2);
   EXPECT_EQ(push(a, there("a")).fresh, 1u);
   EXPECT_EQ(CoefficientDatabase(there("a")).find("t", "m")->value.ktc, 7e8);
@@ -255,28 +255,28 @@ TEST_F(FleetDatabase, tablesOfVersionTwoTakeTheNewKindsAfterMigration) {
   EXPECT_EQ(fleetMembers(there("a")).at(0).records, 2u);
 }
 
-TEST_F(FleetDatabase, everyKindOfRecordGoesThereAndBack) {
+TEST_F(FleetDatabase, everyKindOfRecordIsTransferred) {
   CoefficientDatabase a(file("a")), b(file("b"));
   CoefficientRecord cut = recordOf("a", 7);
   cut.set.source = SOURCE_PRODUCTION;
   a.add(cut);
   a.add(std::vector<ModelImprovement>{improvementOf("a", 1), improvementOf("a", 2)});
   a.add(std::vector<HealthRecord>{healthOf("a", 1), healthOf("a", 2), healthOf("a", 3)});
-  EXPECT_EQ(a.add(std::vector<HealthRecord>{healthOf("a", 3)}), 0u) << "what is there is there once";
+  EXPECT_EQ(a.add(std::vector<HealthRecord>{healthOf("a", 3)}), 0u) << "an existing record is not added";
   EXPECT_EQ(push(a, url("a")).fresh, 6u);
   EXPECT_EQ(push(a, url("a")).offered, 0u);
   EXPECT_EQ(push(a, url("a"), {}, true).fresh, 0u);
   b.add(std::vector<HealthRecord>{healthOf("b", 1)});
   EXPECT_EQ(pull(b, url("b")).fresh, 6u);
   EXPECT_EQ(pull(b, url("b")).offered, 0u);
-  EXPECT_EQ(push(b, url("b")).fresh, 1u) << "its own waited";
+  EXPECT_EQ(push(b, url("b")).fresh, 1u) << "its own record was not sent yet";
   EXPECT_EQ(b.unsentCount(b.lastFleet()), 0u);
   EXPECT_EQ(b.records("", "").at(0).set.source, SOURCE_PRODUCTION);
-  const ModelImprovement got = b.improvements().at(1), due = improvementOf("a", 2);
-  EXPECT_EQ(got.effects, due.effects);
-  EXPECT_EQ(got.fit_before, due.fit_before);
-  EXPECT_TRUE(std::isnan(got.heldout_before));
-  EXPECT_EQ(got.report, due.report);
+  const ModelImprovement received = b.improvements().at(1), expected = improvementOf("a", 2);
+  EXPECT_EQ(received.effects, expected.effects);
+  EXPECT_EQ(received.fit_before, expected.fit_before);
+  EXPECT_TRUE(std::isnan(received.heldout_before));
+  EXPECT_EQ(received.report, expected.report);
   const HealthRecord health = b.health().at(3), sent = healthOf("a", 3);
   EXPECT_EQ(health.quantity, sent.quantity);
   EXPECT_EQ(health.now, sent.now);
@@ -285,7 +285,7 @@ TEST_F(FleetDatabase, everyKindOfRecordGoesThereAndBack) {
   EXPECT_EQ(CoefficientDatabase(url("c")).improvements().size(), 0u);
 }
 
-TEST_F(FleetDatabase, everyKindIsItsBringersOnly) {
+TEST_F(FleetDatabase, recordsOfEveryKindAreBoundToTheirSender) {
   CoefficientDatabase a(file("a"));
   a.add(std::vector<ModelImprovement>{improvementOf("a", 1)});
   a.add(std::vector<HealthRecord>{healthOf("a", 1)});
@@ -326,7 +326,7 @@ TEST_F(FleetDatabase, rowsOfOthersCanBeNeitherForgedNorChanged) {
   EXPECT_FALSE(done("UPDATE fleet SET schema = 1"));
 }
 
-TEST_F(FleetDatabase, aClientKilledInMidPushLosesNothing) {
+TEST_F(FleetDatabase, aClientKilledDuringAPushLosesNothing) {
   {
     CoefficientDatabase a(file("a"));
     fill(a, "a", 0, 9000);
@@ -346,25 +346,25 @@ TEST_F(FleetDatabase, aClientKilledInMidPushLosesNothing) {
   EXPECT_EQ(CoefficientDatabase(url("a")).size(), 9000u);
 }
 
-TEST_F(FleetDatabase, aServerKilledInMidPushLosesNothing) {
+TEST_F(FleetDatabase, aServerKilledDuringAPushLosesNothing) {
   CoefficientDatabase a(file("a"));
   fill(a, "a", 0, 6000);
   std::size_t acknowledged = 0;
-  const std::string said = errorOf([&] {
+  const std::string message = errorOf([&] {
     push(a, url("a"), [&](const FleetTransfer& done) {
       acknowledged = done.offered;
       server_->kill();
       usleep(200000);
     });
   });
-  EXPECT_THAT(said, Not(HasSubstr("\n")));
-  EXPECT_EQ(a.unsentCount(a.lastFleet()), said.empty() ? 0u : 6000u - acknowledged);
+  EXPECT_THAT(message, Not(HasSubstr("\n")));
+  EXPECT_EQ(a.unsentCount(a.lastFleet()), message.empty() ? 0u : 6000u - acknowledged);
   server_->start();
   push(a, url("a"));
   EXPECT_EQ(CoefficientDatabase(url("a")).size(), 6000u);
 }
 
-TEST_F(FleetDatabase, twoClientsWithTheSameRecordsCountThemOnce) {
+TEST_F(FleetDatabase, twoClientsWithTheSameRecordsStoreThemOnce) {
   for (const char* name : {"a", "b"}) {
     CoefficientDatabase database(file(name));
     fill(database, "a", 0, 4000);
@@ -381,7 +381,7 @@ TEST_F(FleetDatabase, twoClientsWithTheSameRecordsCountThemOnce) {
   EXPECT_EQ(CoefficientDatabase(url("a")).size(), 4000u);
 }
 
-TEST_F(FleetDatabase, theNodesPusherTellsHowFarBehindItIsAndCatchesUp) {
+TEST_F(FleetDatabase, theNodesPusherReportsUnsentRecordsAndCatchesUp) {
   CoefficientDatabase a(file("a"));
   fill(a, "a", 0, 5);
   server_->stop();
@@ -406,7 +406,7 @@ TEST_F(FleetDatabase, theNodesPusherTellsHowFarBehindItIsAndCatchesUp) {
   EXPECT_EQ(CoefficientDatabase(url("b")).size(), 6u);
 }
 
-TEST(Fleet, addressesAreShownWithoutTheirPassword) {
+TEST(Fleet, addressesAreDisplayedWithoutTheirPassword) {
   EXPECT_EQ(withoutPassword("postgresql://mill:secret@shop.local:5432/fleet"),
             "postgresql://mill@shop.local:5432/fleet");
   EXPECT_EQ(withoutPassword("postgresql://mill@shop.local:5432/fleet"),
@@ -414,16 +414,16 @@ TEST(Fleet, addressesAreShownWithoutTheirPassword) {
   EXPECT_EQ(withoutPassword("postgresql://shop.local:5432/fleet"), "postgresql://shop.local:5432/fleet");
   EXPECT_EQ(withoutPassword("postgresql:///fleet?user=mill&password=secret&host=/tmp"),
             "postgresql:///fleet?user=mill&password=&host=/tmp");
-  EXPECT_TRUE(isFleet("postgresql:///fleet"));
-  EXPECT_FALSE(isFleet("machine.sqlite"));
+  EXPECT_TRUE(isServerUrl("postgresql:///fleet"));
+  EXPECT_FALSE(isServerUrl("machine.sqlite"));
 }
 
-TEST(Fleet, aBuildWithoutLibpqSaysSo) {
+TEST(Fleet, aBuildWithoutLibpqNamesTheOption) {
   if (fleetSupported()) return;
   const TemporaryFolder folder;
   CoefficientDatabase local(folder.file("a.sqlite"));
   EXPECT_THAT(errorOf([&] { push(local, "postgresql://mill@shop.local/fleet"); }),
-              HasSubstr("no libpq, `./setup --with-fleet`"));
+              HasSubstr("no libpq; install it with `./setup --with-fleet`"));
   EXPECT_THAT(errorOf([&] { CoefficientDatabase("postgresql://mill@shop.local/fleet"); }),
               HasSubstr("./setup"));
 }

@@ -39,7 +39,7 @@ CoefficientRecord titanium(const std::string& tool, double rake_deg, double heli
   return r;
 }
 
-CoefficientQuery asked(const std::string& tool, const std::string& material) {
+CoefficientQuery queryOf(const std::string& tool, const std::string& material) {
   CoefficientQuery query;
   query.tool = tool;
   query.material = material;
@@ -53,12 +53,12 @@ void fill(CoefficientDatabase& database, const std::string& in_aluminium) {
   database.add(record(in_aluminium, "aluminium", 0.8e9, 0.01));
 }
 
-TEST(RecommendCut, thePairItselfIsSurest) {
+TEST(RecommendCut, thePairsOwnRecordsAreMostCertain) {
   CoefficientDatabase database("");
   fill(database, "b");
-  const auto answer = recommendCut(database, asked("a", "steel"));
+  const auto answer = recommendCut(database, queryOf("a", "steel"));
   ASSERT_TRUE(answer);
-  EXPECT_EQ(answer->way, AnswerWay::pair);
+  EXPECT_EQ(answer->method, EstimationMethod::pair);
   EXPECT_DOUBLE_EQ(answer->set.value.ktc, 2e9);
   EXPECT_LT(answer->ktc_lower, 2e9);
   EXPECT_GT(answer->ktc_upper, 2e9);
@@ -66,59 +66,59 @@ TEST(RecommendCut, thePairItselfIsSurest) {
 }
 
 // Two tools, two materials, three pairs cut: in logs the fourth is their sum, K = 0.8 x 1.1.
-TEST(RecommendCut, standardCutsCarryOverToAPairThatNeverMet) {
+TEST(RecommendCut, standardCutsPredictANewPair) {
   CoefficientDatabase database("");
   fill(database, "a");
-  const auto answer = recommendCut(database, asked("b", "aluminium"));
+  const auto answer = recommendCut(database, queryOf("b", "aluminium"));
   ASSERT_TRUE(answer);
-  EXPECT_EQ(answer->way, AnswerWay::standard_cuts);
+  EXPECT_EQ(answer->method, EstimationMethod::standard_cuts);
   EXPECT_NEAR(answer->set.value.ktc, 0.88e9, 1e-3 * 0.88e9);
-  // It is not surer than three pairs, each with a scatter of its own, can make it.
+  // Not more certain than three pairs with their own scatter allow.
   EXPECT_GT(answer->set.std_dev.ktc, 0.05 * 0.88e9);
   EXPECT_LT(answer->set.std_dev.ktc, 0.2 * 0.88e9);
 }
 
-TEST(RecommendCut, withoutAChainOfCommonCutsOtherToolsSpeak) {
+TEST(RecommendCut, withoutCommonCutsOtherToolsAreUsed) {
   CoefficientDatabase database("");
   database.add(record("a", "steel", 2e9, 0.01));
   database.add(record("b", "aluminium", 0.8e9, 0.01));
-  const auto answer = recommendCut(database, asked("b", "steel"));
+  const auto answer = recommendCut(database, queryOf("b", "steel"));
   ASSERT_TRUE(answer);
-  EXPECT_EQ(answer->way, AnswerWay::other_tool);
+  EXPECT_EQ(answer->method, EstimationMethod::other_tool);
   EXPECT_DOUBLE_EQ(answer->set.value.ktc, 2e9);
   EXPECT_GT(answer->set.std_dev.ktc, 0.1 * 2e9);
-  EXPECT_TRUE(std::isnan(answer->surprise));
-  EXPECT_FALSE(recommendCut(database, asked("a", "brass")));
-  EXPECT_THROW(recommendCut(database, asked("", "steel")), Error);
+  EXPECT_TRUE(std::isnan(answer->disagreement));
+  EXPECT_FALSE(recommendCut(database, queryOf("a", "brass")));
+  EXPECT_THROW(recommendCut(database, queryOf("", "steel")), Error);
 }
 
-TEST(RecommendCut, theShearZoneKnowsAToolThatHasCutNothing) {
+TEST(RecommendCut, theShearZonePredictsANewTool) {
   CoefficientDatabase database("");
   database.add(titanium("a", 0.0, 30.0));
   database.add(titanium("b", 6.0, 30.0));
   database.add(titanium("c", 12.0, 45.0));
-  CoefficientQuery query = asked("new", "titanium");
+  CoefficientQuery query = queryOf("new", "titanium");
   query.rake = radFromDeg(9.0);
   query.helix = radFromDeg(40.0);
   const auto answer = recommendCut(database, query);
   ASSERT_TRUE(answer);
-  EXPECT_EQ(answer->way, AnswerWay::shear_zone);
+  EXPECT_EQ(answer->method, EstimationMethod::shear_zone);
   const double truth = titanium("new", 9.0, 40.0).set.value.ktc;
   EXPECT_NEAR(answer->set.value.ktc, truth, 0.05 * truth);
   EXPECT_LT(answer->ktc_lower, truth);
   EXPECT_GT(answer->ktc_upper, truth);
 }
 
-TEST(RecommendCut, waysThatDisagreeMakeItLessSure) {
+TEST(RecommendCut, disagreeingMethodsIncreaseTheUncertainty) {
   CoefficientDatabase database("");
   fill(database, "a");
-  const auto before = recommendCut(database, asked("b", "aluminium"));
+  const auto before = recommendCut(database, queryOf("b", "aluminium"));
   database.add(record("b", "aluminium", 1.6e9, 0.1));
-  const auto after = recommendCut(database, asked("b", "aluminium"));
+  const auto after = recommendCut(database, queryOf("b", "aluminium"));
   ASSERT_TRUE(before && after);
-  EXPECT_GT(after->surprise, 2.0);
+  EXPECT_GT(after->disagreement, 2.0);
   EXPECT_GT(after->ktc_upper / after->ktc_lower, before->ktc_upper / before->ktc_lower);
-  EXPECT_NE(after->message.find("other ways differ"), std::string::npos);
+  EXPECT_NE(after->message.find("other methods differ"), std::string::npos);
 }
 
 }  // namespace

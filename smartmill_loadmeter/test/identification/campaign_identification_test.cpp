@@ -24,7 +24,7 @@ using units::radPerSecFromRpm;
 
 const CuttingCoefficients TRUTH{953e6, 357e6, 188e6, 17.3e3, 17.7e3, 0.72e3};
 
-// A load meter's records by small steps of the differential equation; rounding and noise as a real one has.
+// Load-meter records by small steps of the differential equation, with realistic rounding and noise.
 struct Plant {
   MachineModel model;
   Campaign campaign;
@@ -89,7 +89,7 @@ struct Plant {
   }
 };
 
-TEST(LoadRecords, shortRecordsGiveTheTruthWithHonestStandardDeviations) {
+TEST(LoadRecords, shortRecordsGiveTheTruthWithCalibratedStandardDeviations) {
   const TemporaryFolder folder;
   Coverage ktc, kte;
   for (int run = 0; run < Coverage::RUNS; ++run) {
@@ -107,7 +107,7 @@ TEST(LoadRecords, shortRecordsGiveTheTruthWithHonestStandardDeviations) {
   EXPECT_TRUE(kte.honest());
 }
 
-TEST(LoadRecords, withoutAirCutsTheIdleOfTheCutsAndTheModelsFrictionStand) {
+TEST(LoadRecords, withoutAirCutsTheModelsFrictionIsUsed) {
   const TemporaryFolder folder;
   int inside = 0;
   for (unsigned seed = 1; seed <= 20; ++seed) {
@@ -121,29 +121,29 @@ TEST(LoadRecords, withoutAirCutsTheIdleOfTheCutsAndTheModelsFrictionStand) {
   EXPECT_GE(inside, 16);  // 19 less three sigma of the count
 }
 
-TEST(LoadRecords, theSpindlesStatedUncertaintyGrowsTheStandardDeviations) {
+TEST(LoadRecords, theSpindlesStatedUncertaintyIncreasesTheStandardDeviations) {
   const TemporaryFolder folder;
   Plant plant(folder.file(""), 1, true);
   plant.model.uncertainty.spindle = 3.0;
-  // The lag is 2 % off what the model states: within its uncertainty, and told by the transients.
+  // The lag differs by 2 % from the model, within its uncertainty, and is estimated from the transients.
   plant.model.spindle->load_meter_bandwidth = 7.0 * 1.02;
   LoadRecordOptions options;
   options.spindle_uncertainty = true;
   const LoadRecordResult k = identifyFromLoadRecords(plant.campaign, plant.model, options);
   EXPECT_NEAR(k.bandwidth, 7.0, 0.005 * 7.0);
   EXPECT_NEAR(k.set.value.ktc, TRUTH.ktc, 0.005 * TRUTH.ktc);
-  // load_meter_v_per_w is all that remains: 3 % of the value, and both move together.
+  // Only load_meter_v_per_w remains: 3 % of the value, common to both.
   EXPECT_NEAR(k.set.std_dev.ktc, 0.03 * TRUTH.ktc, 0.002 * TRUTH.ktc);
   EXPECT_NEAR(k.set.std_dev.kte, 0.03 * TRUTH.kte, 0.004 * TRUTH.kte);
   EXPECT_GT(k.covariance_tc_te / (k.set.std_dev.ktc * k.set.std_dev.kte), 0.95);
 }
 
-TEST(LoadRecords, aSlowerLoadMeterIsFoundWhereTheRecordsDemandIt) {
+TEST(LoadRecords, aSlowerLoadMeterIsIdentified) {
   const TemporaryFolder folder;
   Plant plant(folder.file(""), 3, true);
   plant.model.spindle->load_meter_bandwidth = 9.0;
   const LoadRecordResult k = identifyFromLoadRecords(plant.campaign, plant.model, {});
-  EXPECT_THAT(k.terms, ::testing::ElementsAre("load meter's lag"));
+  EXPECT_THAT(k.terms, ::testing::ElementsAre("load-meter lag"));
   EXPECT_NEAR(k.bandwidth, 7.0, 0.01 * 7.0);
   EXPECT_NEAR(k.set.value.ktc, TRUTH.ktc, 0.005 * TRUTH.ktc);
   EXPECT_TRUE(k.notes.empty());
@@ -154,21 +154,21 @@ TEST(LoadRecords, aSlowerLoadMeterIsFoundWhereTheRecordsDemandIt) {
   EXPECT_THAT(biased.notes[0], HasSubstr("the records disagree"));
 }
 
-TEST(LoadRecords, sayWhatIsMissing) {
+TEST(LoadRecords, missingTestsAreNamed) {
   const TemporaryFolder folder;
   Plant plant(folder.file(""), 1, true);
   const auto messageOf = [&] {
     return errorOf([&] { identifyFromLoadRecords(plant.campaign, plant.model, {}); });
   };
   plant.campaign.tests.pop_back();
-  EXPECT_THAT(messageOf(), HasSubstr("2 cuts at 2 different feeds; at least three are due"));
+  EXPECT_THAT(messageOf(), HasSubstr("2 cuts at 2 different feeds, expected three or more feeds"));
   plant.campaign.tests.erase(plant.campaign.tests.begin(), plant.campaign.tests.begin() + 2);
-  EXPECT_THAT(messageOf(), HasSubstr("air cuts at two or more speeds are due, 1 usable"));
+  EXPECT_THAT(messageOf(), HasSubstr("expected air cuts at two or more speeds, 1 usable"));
   plant.model.spindle.reset();
   EXPECT_THAT(messageOf(), HasSubstr("spindle is missing (needed to read the load meter)"));
 }
 
-TEST(MeasuredSlots, bothPracticesGiveTheirFigures) {
+TEST(MeasuredSlots, bothKindsOfMeansGiveThePublishedFigures) {
   SMARTMILL_SHARED_DATA(folder, "measured/slot_6000");
   const Campaign campaign = readCampaign(folder);
   const MachineModel model = readMachineModel(campaign.modelPath());
@@ -194,7 +194,7 @@ TEST(ExampleCampaign, forceAndLoadMeterFindTheModelsCoefficients) {
   const LoadRecordResult result = identifyFromLoadRecords(campaign, model, {});
   const CoefficientSet load = result.set;
   EXPECT_TRUE(result.notes.empty() && result.terms.empty());
-  EXPECT_LT(load.std_dev.ktc, 1e-4 * truth.ktc);  // the information bound is near half of that
+  EXPECT_LT(load.std_dev.ktc, 1e-4 * truth.ktc);  // the information bound is about half of that
   EXPECT_NEAR(load.value.ktc, truth.ktc, 2e-3 * truth.ktc);
   EXPECT_NEAR(load.value.kte, truth.kte, 5e-3 * truth.kte);
   EXPECT_NEAR(load.value.ktc, truth.ktc, 4.0 * load.std_dev.ktc);
@@ -211,7 +211,7 @@ struct CampaignCase {
   std::vector<std::string> terms;
 };
 
-TEST(ExampleCampaigns, hiddenFrictionWearAndRunoutAreFound) {
+TEST(ExampleCampaigns, hiddenFrictionWearAndRunoutAreIdentified) {
   const std::vector<CampaignCase> cases{{"cross_talk", {}},
                                         {"outside_catalogue", {}},
                                         {"runout", {"runout"}},
@@ -243,7 +243,7 @@ TEST(ExampleCampaigns, hiddenFrictionWearAndRunoutAreFound) {
   EXPECT_NEAR(60.0 * w.edge_growth, 0.4194, 0.002);
 }
 
-// The same cuts in WAV files, channels and scales named: 24 bits round to a thousandth of the noise.
+// The same cuts as WAV files with named channels and scales: 24 bits round to a thousandth of the noise.
 TEST(ForceRecords, SoundFilesGiveTheSameCoefficients) {
   SMARTMILL_SHARED_DATA(folder, "campaigns/none");
   Campaign campaign = readCampaign(folder);
@@ -256,10 +256,11 @@ TEST(ForceRecords, SoundFilesGiveTheSameCoefficients) {
                                       [&](const CampaignTest& t) { return !few(t); }),
                        campaign.tests.end());
   const MachineModel model = readMachineModel(campaign.modelPath());
-  const CuttingCoefficients due = identifyFromForceRecords(campaign, model, Means::all).value,
+  const CuttingCoefficients expected = identifyFromForceRecords(campaign, model, Means::all).value,
                             found = identifyFromForceRecords(sound, model, Means::all).value;
   for (const CuttingKey& k : cuttingKeys())
-    EXPECT_NEAR(found.*k.coefficient, due.*k.coefficient, 1e-4 * std::abs(due.*k.coefficient)) << k.key;
+    EXPECT_NEAR(found.*k.coefficient, expected.*k.coefficient, 1e-4 * std::abs(expected.*k.coefficient))
+        << k.key;
 }
 
 }  // namespace

@@ -58,13 +58,12 @@ TEST(ForceCurve, FindsAPowerLawWithFourTeethInASlot) {
     EXPECT_GT(curves.tangential.stdAt(h), 0.0);
     before = curves.tangential.at(h);
   }
-  // The slope is what chatter knows: power law times exponent over chip.
+  // The slope determines chatter: power law times exponent over chip.
   EXPECT_NEAR(curves.tangential.slope(0.2e-3), 0.75 * tangential(0.2e-3) / 0.2e-3,
               0.06 * 0.75 * tangential(0.2e-3) / 0.2e-3);
 }
 
-/// Four teeth with runout, cuts that differ from one another as a whole, an angle that is a little off: what
-/// is in a shop's records and in no curve.
+/// Four teeth with runout, scale errors between cuts and an angle offset, as in real records.
 AngleRecord shopCut(const Engagement& e, double share, double runout, double early, double noise,
                     std::mt19937& random) {
   constexpr int TEETH = 4;
@@ -89,8 +88,8 @@ AngleRecord shopCut(const Engagement& e, double share, double runout, double ear
   return record;
 }
 
-// Both sides: neither too narrow nor wide enough for anything.
-TEST(ForceCurve, TheBandHoldsTheLawAsOftenAsItSays) {
+// Coverage from both sides.
+TEST(ForceCurve, TheBandIsCalibrated) {
   int inside = 0, all = 0;
   for (unsigned seed = 1; seed <= 60; ++seed) {
     std::mt19937 random(seed);
@@ -110,13 +109,13 @@ TEST(ForceCurve, TheBandHoldsTheLawAsOftenAsItSays) {
       all += 2;
     }
   }
-  // 95 % of what is about 60 x 4 independent places: within 3 deviations of that count.
+  // 95 % of about 60 x 4 independent points, within 3 deviations of that count.
   EXPECT_GT(inside, 0.91 * all);
   EXPECT_LT(inside, 0.99 * all);
   std::printf("inside 1.96 deviations: %.1f %%\n", 100.0 * inside / all);
 }
 
-TEST(ForceCurve, AFileTellsTheSameCurve) {
+TEST(ForceCurve, AFileRestoresTheCurve) {
   const TemporaryFolder folder;
   const ForceCurves curves =
       fitForceCurves({cut(2, {0.0, units::PI, 2e-3, 0.2e-3}, 2.0, 1)}, {2, 12e-3, 0.0, {}});

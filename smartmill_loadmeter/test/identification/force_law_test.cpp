@@ -17,7 +17,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-TEST(ForcePoints, turnMeasuredForcesBackIntoTheLawThatMadeThem) {
+TEST(ForcePoints, transformForcesBackIntoTheLaw) {
   // Down milling with one tooth in cut, as Bachrathy & Stepan: 12 mm, 2 teeth, 6 mm wide.
   const ToolGeometry tool{2, 0.012, 0.0, {}};
   const CuttingCoefficients k{800e6, 300e6, 0, 12e3, 9e3, 0};
@@ -36,12 +36,12 @@ TEST(ForcePoints, turnMeasuredForcesBackIntoTheLawThatMadeThem) {
     EXPECT_NEAR(p.tangential, k.ktc * p.chip + k.kte, 1e-6 * k.kte);
     EXPECT_NEAR(p.radial, k.krc * p.chip + k.kre, 1e-6 * k.kre);
   }
-  // Four teeth in a slot: never alone.
+  // Four teeth in a slot: always two in cut.
   const ToolGeometry four{4, 0.012, 0.0, {}};
   EXPECT_THAT(errorOf([&] {
                 forcePoints(fx, fy, angle, four, {0.0, units::PI, 0.002, 1e-4});
               }),
-              HasSubstr("one tooth cut alone"));
+              HasSubstr("expected angles with one tooth in cut"));
 }
 
 std::vector<double> chips() {
@@ -50,7 +50,7 @@ std::vector<double> chips() {
   return chip;
 }
 
-TEST(ForceLaws, theEvidenceChoosesTheLawThatMadeTheData) {
+TEST(ForceLaws, theEvidenceSelectsTheTrueLaw) {
   std::mt19937 random(3);
   std::normal_distribution<double> normal;
   const std::vector<double> chip = chips();
@@ -81,20 +81,20 @@ TEST(Slots, runoutIsFoundInTheExampleCampaign) {
   }
   campaign.tests = few;
   const MachineModel model = readMachineModel(campaign.modelPath());
-  const SlotFit best = fitSlots(campaign, model).front();
+  const SlotFitResult best = fitSlots(campaign, model).front();
   EXPECT_THAT(best.name, HasSubstr("runout"));
-  EXPECT_NEAR(best.offset, 21.08e-6, 2.5e-6);  // the sensor's modes amplify the first orders by some percent
+  EXPECT_NEAR(best.offset, 21.08e-6, 2.5e-6);  // the sensor's modes amplify the first orders by a few percent
   EXPECT_NEAR(best.value.ktc, model.cutting->ktc, 0.06 * model.cutting->ktc);
 }
 
-TEST(Slots, measuredOnesPreferSomethingThatTurns) {
+TEST(Slots, measuredSlotsPreferARotatingTerm) {
   SMARTMILL_SHARED_DATA(folder, "measured/slot_6000");
   Campaign campaign = readCampaign(folder);
   campaign.tests.erase(campaign.tests.begin() + 1, campaign.tests.begin() + 3);
-  const std::vector<SlotFit> fits = fitSlots(campaign, readMachineModel(campaign.modelPath()));
+  const std::vector<SlotFitResult> fits = fitSlots(campaign, readMachineModel(campaign.modelPath()));
   EXPECT_TRUE(fits.front().offset > 0.0 || fits.front().unbalance > 0.0);
   double plain = 0.0;
-  for (const SlotFit& f : fits) {
+  for (const SlotFitResult& f : fits) {
     if (f.name == "linear edge forces") plain = f.bic;
   }
   EXPECT_GT(plain - fits.front().bic, 20.0);

@@ -24,23 +24,24 @@ void connect(Session& session, LoadMeterIdentification& identification) {
   session.condition = [&](const CuttingCondition& c) { identification.handle(c); };
 }
 
-IdentifyResult ask(LoadMeterIdentification& identification, const IdentifyGoal& goal) {
+IdentifyResult identify(LoadMeterIdentification& identification, const IdentifyGoal& goal) {
   IdentifyResult result;
   identification.onResult([&](const IdentifyResult& r) { result = r; });
   identification.handle(goal);
   return result;
 }
 
-/// Many sessions with slots at a speed. @param ktc_error, kte_error [1] that no session may exceed
-void checkHonesty(double rpm, double ktc_error, double kte_error) {
+/// Coverage over many sessions with slots at a speed. @param ktc_error, kte_error [1] largest error of a
+/// session
+void checkCoverage(double rpm, double ktc_error, double kte_error) {
   Coverage ktc, kte;
   for (int run = 0; run < Coverage::RUNS; ++run) {
     Session session(static_cast<unsigned>(run + 1), 2e-4);
     session.ripple = session.any_angle = true;
     LoadMeterIdentification identification(model(), {});
     connect(session, identification);
-    takeThrough(session, rpm);
-    const IdentifyResult r = ask(identification, {session.now(), "endmill", "aluminium", false, 0});
+    runStandardTests(session, rpm);
+    const IdentifyResult r = identify(identification, {session.now(), "endmill", "aluminium", false, 0});
     ASSERT_EQ(r.code, IdentifyResult::Code::ok) << r.message;
     ASSERT_EQ(identification.airCuts().size(), 3u);
     ASSERT_EQ(r.coefficients.tests, 3);
@@ -58,23 +59,24 @@ void checkHonesty(double rpm, double ktc_error, double kte_error) {
   EXPECT_TRUE(kte.honest()) << rpm;
 }
 
-TEST(LoadMeterIdentification, findsTheTruthWithHonestStandardDeviations) {
-  // A mean over some 180 readings of 0.22 mV on 0.1..0.3 V: far below one percent.
-  checkHonesty(6100.0, 0.01, 0.03);
+TEST(LoadMeterIdentification, findsTheTruthWithCalibratedStandardDeviations) {
+  // Mean over some 180 readings of 0.22 mV on 0.1..0.3 V: far below one percent.
+  checkCoverage(6100.0, 0.01, 0.03);
 }
 
-// At 100 turns a second each reading of a slot meets the same phase of the ripple, of which the lag leaves 1
-// / 43 at the 300 Hz of the teeth: a percent of the torque, which no mean over readings takes away and three
-// feeds make some percent of Ktc and of the smaller Kte. The deviations must say so.
-TEST(LoadMeterIdentification, readingsInStepWithTheTeethSaySo) {
-  checkHonesty(6000.0, 0.05, 0.2);
+// At 100 revolutions per second each reading of a slot has the same phase of the ripple, of which the lag
+// leaves 1 / 43 at the 300 Hz of the teeth: a percent of the torque, which a mean over readings does not
+// remove and which three feeds amplify to some percent of Ktc and of the smaller Kte. The standard deviations
+// must cover it.
+TEST(LoadMeterIdentification, aliasedReadingsIncreaseTheStandardDeviations) {
+  checkCoverage(6000.0, 0.05, 0.2);
 }
 
-// Readings are taken every 20 ms without the spindle's angle: they meet three phases of a revolution at 4000
-// rpm, many at 4100. Small feeds lose edge to the runout, so that coefficients by means alone carry its bias.
-TEST(LoadMeterIdentification, runoutIsToldFromMeansAndRippleOfTheReadings) {
+// Readings every 20 ms without the spindle angle have three phases of a revolution at 4000 rpm, many at 4100.
+// Runout reduces the edge in cut at small feeds, so that means alone are biased.
+TEST(LoadMeterIdentification, runoutIsEstimatedFromMeansAndRippleOfTheReadings) {
   int inside = 0, runs = 0;
-  double worst_beside = 0.0;
+  double worst_bias = 0.0;
   for (const double rpm : {4000.0, 4100.0}) {
     for (const double offset : {0.0, 4e-6, 9e-6, 14e-6}) {
       for (unsigned seed = 1; seed <= 4; ++seed) {
@@ -90,7 +92,7 @@ TEST(LoadMeterIdentification, runoutIsToldFromMeansAndRippleOfTheReadings) {
           connect(session, identification);
           for (const double air : {3000.0, 6000.0, 9000.0, 12000.0}) session.air(air, 2.0);
           for (const double feed : {5e-5, 1e-4, 1.5e-4, 2e-4}) session.slot(rpm, feed, 4.0);
-          results.push_back(ask(identification, {session.now(), "", "", false, 0}));
+          results.push_back(identify(identification, {session.now(), "", "", false, 0}));
           ASSERT_EQ(results.back().code, IdentifyResult::Code::ok) << results.back().message;
         }
         const CoefficientSet& k = results[0].coefficients;
@@ -99,40 +101,41 @@ TEST(LoadMeterIdentification, runoutIsToldFromMeansAndRippleOfTheReadings) {
         EXPECT_NEAR(k.value.kte, TRUTH.kte, 3.0 * k.std_dev.kte) << rpm << " " << offset << " " << seed;
         inside += std::abs(k.value.ktc - TRUTH.ktc) < 1.96 * k.std_dev.ktc;
         ++runs;
-        worst_beside = std::max(worst_beside, results[1].coefficients.value.ktc / TRUTH.ktc - 1.0);
+        worst_bias = std::max(worst_bias, results[1].coefficients.value.ktc / TRUTH.ktc - 1.0);
       }
     }
   }
-  EXPECT_GE(inside, runs - 5);     // 95 % of 32 less three sigma of the count
-  EXPECT_GT(worst_beside, 0.015);  // what it is there for
+  EXPECT_GE(inside, runs - 5);   // 95 % of 32 less three sigma of the count
+  EXPECT_GT(worst_bias, 0.015);  // bias without the estimate of runout
 }
 
-TEST(LoadMeterIdentification, resetForgetsAndWrongPlansAreNamed) {
+TEST(LoadMeterIdentification, resetDiscardsTestsAndWrongPlansAreNamed) {
   Session session(1, 2e-4);
   LoadMeterIdentification identification(model(), {});
   connect(session, identification);
-  EXPECT_EQ(ask(identification, {session.now(), "", "", false, 0}).code, IdentifyResult::Code::too_few_tests);
+  EXPECT_EQ(identify(identification, {session.now(), "", "", false, 0}).code,
+            IdentifyResult::Code::too_few_tests);
   session.air(2000.0, 2.0);
-  IdentifyResult r = ask(identification, {session.now(), "", "", false, 0});
+  IdentifyResult r = identify(identification, {session.now(), "", "", false, 0});
   EXPECT_EQ(r.code, IdentifyResult::Code::too_few_tests);
-  EXPECT_THAT(r.message, HasSubstr("air cuts at two or more speeds are due, 1 usable"));
+  EXPECT_THAT(r.message, HasSubstr("expected air cuts at two or more speeds, 1 usable"));
   session.air(6000.0, 2.0);
   session.slot(6000.0, 3e-5, 2.0);
   session.slot(6000.0, 6e-5, 0.1);  // too short to settle
-  r = ask(identification, {session.now(), "", "", false, 0});
+  r = identify(identification, {session.now(), "", "", false, 0});
   EXPECT_EQ(r.code, IdentifyResult::Code::too_few_tests);
-  EXPECT_THAT(r.message, HasSubstr("at least three are due"));
-  EXPECT_THAT(r.message, HasSubstr("steady readings, 10 are due"));
-  takeThrough(session);
-  r = ask(identification, {session.now(), "endmill", "steel", false, 0});
-  EXPECT_THAT(r.message, HasSubstr("cuts with another tool or material left out"));
-  r = ask(identification, {session.now(), "", "", true, 0});
+  EXPECT_THAT(r.message, HasSubstr("expected three or more feeds"));
+  EXPECT_THAT(r.message, HasSubstr("steady readings, expected 10 or more"));
+  runStandardTests(session);
+  r = identify(identification, {session.now(), "endmill", "steel", false, 0});
+  EXPECT_THAT(r.message, HasSubstr("cuts with another tool or material ignored"));
+  r = identify(identification, {session.now(), "", "", true, 0});
   EXPECT_EQ(r.code, IdentifyResult::Code::ok);
   EXPECT_TRUE(identification.cuts().empty());
   EXPECT_TRUE(std::isnan(r.coefficients.value.ktc));
 }
 
-TEST(LoadMeterIdentification, aLoadThatIsNoNumberIsBadData) {
+TEST(LoadMeterIdentification, aLoadThatIsNotFiniteIsBadData) {
   Session session(1, 2e-4);
   LoadMeterIdentification identification(model(), {});
   connect(session, identification);
@@ -141,24 +144,24 @@ TEST(LoadMeterIdentification, aLoadThatIsNoNumberIsBadData) {
     if (++n == 300) l.spindle_load = NOT_A_NUMBER;
     identification.handle(l);
   };
-  takeThrough(session);
-  const IdentifyResult r = ask(identification, {session.now(), "", "", false, 0});
+  runStandardTests(session);
+  const IdentifyResult r = identify(identification, {session.now(), "", "", false, 0});
   EXPECT_EQ(r.code, IdentifyResult::Code::bad_data);
   EXPECT_THAT(r.message, HasSubstr("is not a finite number"));
 }
 
-TEST(LoadMeterIdentification, withoutAirCutsTheModelsFrictionStandsWithItsUncertainty) {
+TEST(LoadMeterIdentification, withoutAirCutsTheModelsFrictionIsUsedWithItsUncertainty) {
   MachineModel m = model();
   m.spindle->viscous = VISCOUS;
   m.spindle->coulomb = COULOMB;
   m.uncertainty.spindle = 3.0;
   IdentificationParameters parameters;
-  parameters.largest_runout = 0.0;  // without air cuts noise may be ripple: the friction's share alone
+  parameters.largest_runout = 0.0;  // without air cuts noise may be ripple; checks the friction only
   Session session(2, 2e-4);
   LoadMeterIdentification identification(m, parameters);
   connect(session, identification);
   for (const double feed : {3e-5, 6e-5, 1e-4}) session.slot(6000.0, feed, 4.0);
-  const IdentifyResult r = ask(identification, {session.now(), "", "", false, 0});
+  const IdentifyResult r = identify(identification, {session.now(), "", "", false, 0});
   ASSERT_EQ(r.code, IdentifyResult::Code::ok) << r.message;
   EXPECT_TRUE(std::isnan(r.coefficients.friction_viscous));
   EXPECT_NEAR(r.coefficients.value.kte, TRUTH.kte, 4.0 * r.coefficients.std_dev.kte);
@@ -166,7 +169,7 @@ TEST(LoadMeterIdentification, withoutAirCutsTheModelsFrictionStandsWithItsUncert
   EXPECT_NEAR(r.coefficients.std_dev.kte, 0.03 * std::hypot(0.298, 0.0671) / 1.8e-5, 60.0);
 }
 
-// The same data through the sorter in another order of arrival: the same figures to the last digit.
+// The same data in another order of arrival give the same result to the last digit.
 TEST(LoadMeterIdentification, arrivalDoesNotMatter) {
   std::vector<double> found;
   for (unsigned seed = 0; seed < 3; ++seed) {
@@ -194,18 +197,18 @@ TEST(LoadMeterIdentification, arrivalDoesNotMatter) {
       items.push_back({c.stamp + delay(random),
                        [&, c] { sorter.push(events, c.stamp, [&, c] { identification.handle(c); }); }});
     };
-    takeThrough(session);
+    runStandardTests(session);
     std::stable_sort(items.begin(), items.end(),
                      [](const Item& l, const Item& r) { return l.arrival < r.arrival; });
     for (const Item& item : items) item.push();
     sorter.flush();
-    found.push_back(ask(identification, {session.now(), "", "", false, 0}).coefficients.value.ktc);
+    found.push_back(identify(identification, {session.now(), "", "", false, 0}).coefficients.value.ktc);
   }
   EXPECT_EQ(found[0], found[1]);
   EXPECT_EQ(found[0], found[2]);
 }
 
-TEST(LoadMeterIdentification, refusesWhatItCannotUse) {
+TEST(LoadMeterIdentification, refusesIncompleteModelsAndWrongParameters) {
   MachineModel m = model();
   m.spindle->load_meter_full_scale.reset();
   try {
@@ -224,8 +227,8 @@ TEST(LoadMeterIdentification, refusesWhatItCannotUse) {
   }
 }
 
-// Five and more air cuts let the evidence choose the friction law; a straight line would bias the cuts.
-TEST(Tests, theFrictionLawIsChosenByEvidence) {
+// From five air cuts on the friction law is selected by evidence; a straight line would bias the cuts.
+TEST(Tests, theFrictionLawIsSelectedByEvidence) {
   const Spindle spindle = *model().spindle;
   FrictionLaw law;
   law.viscous = VISCOUS;
@@ -264,7 +267,7 @@ TEST(Production, cutsOfASessionAreFollowedWithoutAGoal) {
   session.load = [&](const LoadSample& l) { identification.handle(l); };
   session.condition = [&](const CuttingCondition& c) { identification.handle(c); };
   EXPECT_FALSE(identification.production());
-  takeThrough(session);
+  runStandardTests(session);
   ASSERT_TRUE(identification.production());
   const RecursiveCoefficients& k = *identification.production();
   EXPECT_EQ(k.readings(), 3);

@@ -25,11 +25,11 @@ double torqueOf(const Engagement& e, double ktc, double kte) {
   return MechanisticForce(TOOL, {ktc, 0, 0, kte, 0, 0}, e).mean().torque;
 }
 
-// Production: whatever engagement, depth and feed comes.
-TorqueReading reading(std::mt19937& random, double ktc, double kte, double std_dev) {
+// Production cut with random engagement, depth and feed.
+TorqueMeasurement reading(std::mt19937& random, double ktc, double kte, double std_dev) {
   std::uniform_real_distribution<double> uniform;
   std::normal_distribution<double> normal;
-  TorqueReading r;
+  TorqueMeasurement r;
   r.tool = TOOL;
   r.engagement.entry = uniform(random) < 0.5 ? 0.0 : 1.5 * uniform(random);
   r.engagement.exit = r.engagement.entry + 0.5 + (units::PI - r.engagement.entry - 0.5) * uniform(random);
@@ -45,11 +45,11 @@ struct Batch {
   double ktc, kte, ktc_std;
 };
 
-// Weighted least squares of the mean torque over readings, two unknowns in closed form; what it says of Ktc
-// and Kte is eq. 3.19 for any engagement.
-Batch regression(const std::vector<TorqueReading>& readings) {
+// Weighted least squares of the mean torque over measurements, two unknowns in closed form (eq. 3.19 for any
+// engagement).
+Batch regression(const std::vector<TorqueMeasurement>& readings) {
   double cc = 0.0, ce = 0.0, ee = 0.0, ct = 0.0, et = 0.0;
-  for (const TorqueReading& r : readings) {
+  for (const TorqueMeasurement& r : readings) {
     const double c = torqueOf(r.engagement, 1.0, 0.0), e = torqueOf(r.engagement, 0.0, 1.0);
     const double weight = 1.0 / (r.torque_std * r.torque_std);
     cc += weight * c * c;
@@ -65,24 +65,23 @@ Batch regression(const std::vector<TorqueReading>& readings) {
 TEST(Recursive, withoutForgettingIsTheBatchRegression) {
   std::mt19937 random(1);
   RecursiveCoefficients recursive({}, 1e12);
-  std::vector<TorqueReading> readings;
+  std::vector<TorqueMeasurement> readings;
   for (int i = 0; i < 40; ++i) {
     readings.push_back(reading(random, 953e6, 17.3e3, 0.005));
     recursive.update(readings.back());
   }
   const Batch all = regression(readings);
-  EXPECT_NEAR(recursive.ktc(), all.ktc, 1e-4 * all.ktc);  // the start's ignorance
+  EXPECT_NEAR(recursive.ktc(), all.ktc, 1e-4 * all.ktc);  // the initial uncertainty
   EXPECT_NEAR(recursive.kte(), all.kte, 1e-3 * all.kte);
   EXPECT_NEAR(recursive.ktcStd(), all.ktc_std, 1e-3 * all.ktc_std);
 }
 
-TEST(Recursive, isHonest) {
+TEST(Recursive, standardDeviationsAreCalibrated) {
   Coverage ktc, kte;
   constexpr int READINGS = 60;
   constexpr double MEMORY = 300.0;
-  // Readings of 10 s fade by exp(-10 s / memory) each: what is stated counts the weights w as so many
-  // readings, for values that drift; values that stand still are better known, by sum w / sum w^2 in
-  // variance.
+  // Measurements of 10 s are weighted by w = exp(-10 s / memory) each. The stated variance treats them as sum
+  // w measurements, for drifting values; the variance of constant values is smaller by sum w^2 / sum w.
   double weights = 0.0, squares = 0.0;
   for (int i = 0; i < READINGS; ++i) {
     const double weight = std::exp(-10.0 * i / MEMORY);
@@ -101,7 +100,7 @@ TEST(Recursive, isHonest) {
   EXPECT_TRUE(kte.honest());
 }
 
-TEST(Recursive, watchesTheEdgeWear) {
+TEST(Recursive, followsEdgeWear) {
   std::mt19937 random(7);
   RecursiveCoefficients recursive({}, 120.0);
   double minutes = 0.0;
@@ -109,17 +108,17 @@ TEST(Recursive, watchesTheEdgeWear) {
     minutes += 10.0 / 60.0;
     recursive.update(reading(random, 953e6, 17.3e3 * (1.0 + 0.05 * minutes), 0.01));
   }
-  // After 50 minutes; the estimate runs behind by the memory of two minutes.
+  // After 50 minutes; the estimate lags by the memory of two minutes.
   EXPECT_NEAR(recursive.kte(), 17.3e3 * (1.0 + 0.05 * (minutes - 2.0)), 4.0 * recursive.kteStd());
   EXPECT_NEAR(recursive.ktc(), 953e6, 4.0 * recursive.ktcStd());
   EXPECT_GT(recursive.kte(), 3.0 * 17.3e3);
 }
 
-TEST(Recursive, oneFeedOnlyDoesNotBlowUpAndAChippedEdgeSurprises) {
+TEST(Recursive, oneFeedStaysBoundedAndAChippedEdgeIsDetected) {
   std::mt19937 random(9);
   std::normal_distribution<double> normal;
   RecursiveCoefficients recursive({900e6, 15e3, 90e6, 5e3}, 60.0);
-  TorqueReading r;
+  TorqueMeasurement r;
   r.tool = TOOL;
   r.engagement = {0.0, units::PI, 0.003, 6e-5};
   r.torque_std = 0.01;
@@ -130,12 +129,12 @@ TEST(Recursive, oneFeedOnlyDoesNotBlowUpAndAChippedEdgeSurprises) {
     ASSERT_LE(recursive.ktcStd(), 90e6 * 1.0001);
     ASSERT_LE(recursive.kteStd(), 5e3 * 1.0001);
   }
-  // What these cuts do tell is known well: the torque.
+  // The torque of these cuts is well determined.
   EXPECT_NEAR(torqueOf(r.engagement, recursive.ktc(), recursive.kte()), torqueOf(r.engagement, 953e6, 17.3e3),
               0.01);
   r.torque *= 1.2;
   recursive.update(r);
-  EXPECT_GT(recursive.surprise(), 5.0);
+  EXPECT_GT(recursive.normalisedInnovation(), 5.0);
   r.torque_std = 0.0;
   EXPECT_THAT(errorOf([&] { recursive.update(r); }), HasSubstr("standard deviation > 0"));
 }
@@ -154,13 +153,13 @@ CandidateCuts candidates() {
   return c;
 }
 
-TEST(Plan, keepsEveryLimitAndReachesWhatIsAskedInASimulatedMachine) {
+TEST(Plan, satisfiesTheLimitsAndReachesTheTargetsOnASimulatedMachine) {
   CutLimits limits{3.5, 1500.0, [](double speed, const Engagement&) {
                      return speed > radPerSecFromRpm(5000) && speed < radPerSecFromRpm(7000) ? 0.0015
                                                                                              : 0.0025;
                    }};
-  const CuttingCoefficients believed{953e6, 0, 0, 17.3e3, 0, 0};
-  const TestPlan plan = planTests(TOOL, spindleOf(), believed, candidates(), limits, 1e-3, 10e6, 0.6e3, 20);
+  const CuttingCoefficients expected{953e6, 0, 0, 17.3e3, 0, 0};
+  const TestPlan plan = planTests(TOOL, spindleOf(), expected, candidates(), limits, 1e-3, 10e6, 0.6e3, 20);
   std::set<double> feeds;
   for (const PlannedCut& cut : plan.cuts) {
     EXPECT_LE(cut.torque, 3.5);
@@ -171,37 +170,37 @@ TEST(Plan, keepsEveryLimitAndReachesWhatIsAskedInASimulatedMachine) {
   EXPECT_GE(feeds.size(), 3u);
   EXPECT_LE(plan.ktc_std, 10e6);
   EXPECT_LE(plan.kte_std, 0.6e3);
-  // Cut the plan 200 times.
+  // 200 simulated runs of the plan.
   std::mt19937 random(2);
   std::normal_distribution<double> normal;
   double ktc2 = 0.0, kte2 = 0.0;
   for (int run = 0; run < 200; ++run) {
-    std::vector<TorqueReading> readings;
+    std::vector<TorqueMeasurement> readings;
     for (const PlannedCut& cut : plan.cuts) {
       const double s = std::sqrt(2.0) * 1e-3 / (3.88e-4 * cut.speed);
       readings.push_back({TOOL, cut.engagement, cut.torque + s * normal(random), s});
     }
     const Batch k = regression(readings);
-    ktc2 += std::pow(k.ktc - believed.ktc, 2) / 200.0;
-    kte2 += std::pow(k.kte - believed.kte, 2) / 200.0;
+    ktc2 += std::pow(k.ktc - expected.ktc, 2) / 200.0;
+    kte2 += std::pow(k.kte - expected.kte, 2) / 200.0;
   }
   EXPECT_NEAR(std::sqrt(ktc2), plan.ktc_std, 0.2 * plan.ktc_std);  // 4 sigma of 200 runs
   EXPECT_NEAR(std::sqrt(kte2), plan.kte_std, 0.2 * plan.kte_std);
 }
 
-TEST(Plan, noFewerCutsWouldDo) {
+TEST(Plan, noFewerCutsReachTheTargets) {
   CandidateCuts few = candidates();
   few.speeds = {radPerSecFromRpm(3000), radPerSecFromRpm(6000)};
   few.axial_depths = {0.002};
   const CutLimits limits{100.0, 1e5, {}};
-  const CuttingCoefficients believed{953e6, 0, 0, 17.3e3, 0, 0};
-  const double asked_ktc = 40e6, asked_kte = 1.5e3;
+  const CuttingCoefficients expected{953e6, 0, 0, 17.3e3, 0, 0};
+  const double target_ktc = 40e6, target_kte = 1.5e3;
   for (const double voltage_std : {2e-3, 3e-3, 3.6e-3}) {
     const TestPlan plan =
-        planTests(TOOL, spindleOf(), believed, few, limits, voltage_std, asked_ktc, asked_kte, 30);
+        planTests(TOOL, spindleOf(), expected, few, limits, voltage_std, target_ktc, target_kte, 30);
     const std::size_t n = plan.cuts.size();
     if (n <= 3) continue;
-    // Every choice of one cut fewer, with repetition.
+    // Every selection of one cut fewer, with repetition.
     struct Row {
       double tc, te, v;
     };
@@ -222,7 +221,7 @@ TEST(Plan, noFewerCutsWouldDo) {
         c += rows[k].te * rows[k].te / rows[k].v;
       }
       const double d = a * c - b * b;
-      reached = reached || (d > 0.0 && std::sqrt(c / d) <= asked_ktc && std::sqrt(a / d) <= asked_kte);
+      reached = reached || (d > 0.0 && std::sqrt(c / d) <= target_ktc && std::sqrt(a / d) <= target_kte);
       std::size_t i = 0;
       while (i < at.size() && at[i] + 1 == rows.size()) ++i;
       more = i < at.size();
@@ -231,21 +230,21 @@ TEST(Plan, noFewerCutsWouldDo) {
         for (std::size_t j = 0; j < i; ++j) at[j] = at[i];
       }
     }
-    // Three different feeds are due besides: one more cut than without that rule at most.
+    // The rule of three different feeds adds one cut at most.
     EXPECT_TRUE(!reached || n <= 4u) << voltage_std;
   }
 }
 
-TEST(Plan, saysWhenTheLimitsForbidIt) {
-  const CuttingCoefficients believed{953e6, 0, 0, 17.3e3, 0, 0};
+TEST(Plan, namesLimitsThatPreventAPlan) {
+  const CuttingCoefficients expected{953e6, 0, 0, 17.3e3, 0, 0};
   EXPECT_THAT(errorOf([&] {
-                planTests(TOOL, spindleOf(), believed, candidates(), {0.1, 1e5, {}}, 1e-3, 1e7, 1e3, 10);
+                planTests(TOOL, spindleOf(), expected, candidates(), {0.1, 1e5, {}}, 1e-3, 1e7, 1e3, 10);
               }),
-              HasSubstr("0 feeds keep the limits"));
+              HasSubstr("0 feeds within the limits"));
   EXPECT_THAT(errorOf([&] {
-                planTests(TOOL, spindleOf(), believed, candidates(), {10.0, 1e5, {}}, 1e-2, 1e5, 10.0, 10);
+                planTests(TOOL, spindleOf(), expected, candidates(), {10.0, 1e5, {}}, 1e-2, 1e5, 10.0, 10);
               }),
-              HasSubstr("more is asked"));
+              HasSubstr("only"));
 }
 
 }  // namespace

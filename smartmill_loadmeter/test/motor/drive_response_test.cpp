@@ -14,7 +14,7 @@ namespace {
 
 constexpr double RATE = 1000.0, PER_METRE = 400.0;
 
-/// A trapezoid of speed whose load goes through a lag of first order, integrated in steps of 10 us.
+/// Trapezoidal velocity profile whose load passes a first-order lag, integrated in steps of 10 us.
 DriveMove rapidTraverse(double bandwidth, unsigned seed) {
   constexpr double STEP = 1e-5, BEGIN = 0.1234, RAMP = 0.1, WAY = 0.12, ACCELERATION = 5.0;
   const double fastest = ACCELERATION * RAMP, brake = BEGIN + WAY / fastest;
@@ -36,8 +36,8 @@ DriveMove rapidTraverse(double bandwidth, unsigned seed) {
                                 : t < brake        ? 0.0
                                                    : -ACCELERATION;
     // 400 kg, friction of 150 N and 600 N s/m, 200 N/A of the range.
-    const double due = moves ? (400.0 * acceleration + 150.0 + 600.0 * velocity) / 200.0 : 0.0;
-    load += STEP * units::TWO_PI * bandwidth * (due - load);
+    const double load_current = moves ? (400.0 * acceleration + 150.0 + 600.0 * velocity) / 200.0 : 0.0;
+    load += STEP * units::TWO_PI * bandwidth * (load_current - load);
     if (i % 100 == 0) {
       move.current.push_back(0.5 * load * std::sin(units::TWO_PI * PER_METRE * position + 0.7) +
                              noise(random));
@@ -48,7 +48,7 @@ DriveMove rapidTraverse(double bandwidth, unsigned seed) {
   return move;
 }
 
-TEST(DriveResponse, aMoveTellsTheLag) {
+TEST(DriveResponse, theLagIsIdentifiedFromAMove) {
   for (const double bandwidth : {20.0, 60.0, 120.0}) {
     const auto found = identifyResponse(rapidTraverse(bandwidth, 1), PER_METRE);
     ASSERT_TRUE(found) << bandwidth;
@@ -58,22 +58,22 @@ TEST(DriveResponse, aMoveTellsTheLag) {
     EXPECT_NEAR(found->friction, (150.0 + 600.0 * 0.5) / 200.0, 0.08);
   }
   DriveMove other = rapidTraverse(60.0, 1);
-  other.distance *= 0.5;  // not the move that the current shows
+  other.distance *= 0.5;  // not the move of this current
   EXPECT_FALSE(identifyResponse(other, PER_METRE));
   EXPECT_FALSE(identifyResponse({}, PER_METRE));
 }
 
-TEST(DriveResponse, aLagTakesWhatItsFormulaSays) {
-  EXPECT_NEAR(following(60.0, 60.0).gain, std::sqrt(0.5), 1e-12);
+TEST(DriveResponse, theLagResponseFollowsItsFormula) {
+  EXPECT_NEAR(lagResponse(60.0, 60.0).gain, std::sqrt(0.5), 1e-12);
   const double step = 1e-4;
-  const double slope = (std::log(following(110.0, 60.0 * (1.0 + step)).gain) -
-                        std::log(following(110.0, 60.0 * (1.0 - step)).gain)) /
+  const double slope = (std::log(lagResponse(110.0, 60.0 * (1.0 + step)).gain) -
+                        std::log(lagResponse(110.0, 60.0 * (1.0 - step)).gain)) /
                        (2.0 * step);
-  EXPECT_NEAR(following(110.0, 60.0).slope, slope, 1e-6);
+  EXPECT_NEAR(lagResponse(110.0, 60.0).slope, slope, 1e-6);
 }
 
-// A range of 0.2 A that a cut makes swing by 0.8 A at 100 Hz and by 0.1 A at 33 Hz: 100 records.
-TEST(DriveResponse, linesOfARangeAndTheirDeviations) {
+// 100 records of a range of 0.2 A that a cut modulates by 0.8 A at 100 Hz and by 0.1 A at 33 Hz.
+TEST(DriveResponse, linesOfARangeHaveCalibratedStandardDeviations) {
   std::mt19937_64 random(3);
   std::normal_distribution<double> noise(0.0, 0.03);
   int inside = 0, half = 0;
@@ -86,7 +86,7 @@ TEST(DriveResponse, linesOfARangeAndTheirDeviations) {
                            0.1 * std::sin(units::TWO_PI * 100.0 / 3.0 * t);
       current.push_back(0.5 * range * std::sin(units::TWO_PI * 6.3 * t + 1.1) + noise(random));
     }
-    const auto lines = linesOf(current, RATE, 6.3, linesOfCut(units::TWO_PI * 100.0 / 3.0, 3));
+    const auto lines = fitSpectralLines(current, RATE, 6.3, cutLines(units::TWO_PI * 100.0 / 3.0, 3));
     ASSERT_EQ(lines.size(), 5u);
     EXPECT_NEAR(std::sqrt(lines[1].power), 0.8, 0.03);
     inside += std::abs(lines[0].power - 0.01) < 1.96 * lines[0].power_std;
@@ -98,19 +98,19 @@ TEST(DriveResponse, linesOfARangeAndTheirDeviations) {
   EXPECT_LE(half, 65);
 }
 
-TEST(DriveResponse, estimatesThatScatterAreLessSure) {
-  EXPECT_NEAR(together({{60.0, 2.0}, {60.0, 2.0}}).std_dev, 2.0 / std::sqrt(2.0), 1e-12);
-  EXPECT_GT(together({{50.0, 2.0}, {70.0, 2.0}}).std_dev, 9.0);
-  EXPECT_THROW(together({}), Error);
+TEST(DriveResponse, scatterIncreasesTheStandardDeviation) {
+  EXPECT_NEAR(weightedMean({{60.0, 2.0}, {60.0, 2.0}}).std_dev, 2.0 / std::sqrt(2.0), 1e-12);
+  EXPECT_GT(weightedMean({{50.0, 2.0}, {70.0, 2.0}}).std_dev, 9.0);
+  EXPECT_THROW(weightedMean({}), Error);
 }
 
-// Slots along +X whose force a dynamometer saw; feeds of the air moves between those of the cuts.
-TEST(SelfCalibration, learnsFrictionAndConstantFromOwnMovesAndCuts) {
+// Slots along +X with forces by a dynamometer; feeds of the air moves between those of the cuts.
+TEST(SelfCalibration, identifiesFrictionAndConstantFromOwnMovesAndCuts) {
   MotorParameters parameters;
   parameters.phase_per_metre = {PER_METRE, 0.0, 0.0};
   SelfCalibration self(parameters);
   const auto reading = [](double velocity, double force) {
-    MotorReading r;
+    MotorMeasurement r;
     r.velocity[0] = velocity;
     r.range[0] = (150.0 + 600.0 * velocity + force) / 200.0;
     r.spindle_speed = 400.0;
@@ -119,16 +119,16 @@ TEST(SelfCalibration, learnsFrictionAndConstantFromOwnMovesAndCuts) {
   for (const double v : {0.004, 0.013, 0.027, 0.053}) self.air(reading(v, 0.0), 100.0 * v);
   EXPECT_FALSE(self.calibration());
   for (const double force : {60.0, 100.0, 140.0}) {
-    ForceEstimate seen;
-    seen.mean[0] = {-force, 0.02 * force};
-    self.cut(reading(0.016 + 5e-5 * force, force), seen);
+    ForceEstimate reference;
+    reference.mean[0] = {-force, 0.02 * force};
+    self.cut(reading(0.016 + 5e-5 * force, force), reference);
   }
   ASSERT_TRUE(self.calibration() && self.calibration()->drive[0]);
   const DriveCalibration& drive = *self.calibration()->drive[0];
   EXPECT_NEAR(drive.newton_per_ampere.value, 200.0, 1e-3 * 200.0);
-  EXPECT_NEAR(drive.newton_per_ampere.std_dev, 0.02 * 200.0, 0.2);  // what the dynamometer is known to
+  EXPECT_NEAR(drive.newton_per_ampere.std_dev, 0.02 * 200.0, 0.2);  // uncertainty of the dynamometer
   EXPECT_FALSE(self.calibration()->drive[1]);
-  EXPECT_NE(self.text({}).find("X 200.0 +- 4.0 N/A by 3 cuts"), std::string::npos) << self.text({});
+  EXPECT_NE(self.text({}).find("X 200.0 +- 4.0 N/A from 3 cuts"), std::string::npos) << self.text({});
   self.clear();
   EXPECT_FALSE(self.calibration());
 }

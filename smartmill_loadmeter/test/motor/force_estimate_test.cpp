@@ -24,19 +24,19 @@ const std::vector<CuttingCoefficients> METALS{
     {959e6, 251e6, 146e6, 15.8e3, 19.4e3, 18.2e3}};  // slot_6000, measured
 
 struct Case {
-  ForceReadings readings;
+  CutMeasurements measurements;
   std::array<double, 3> mean{}, rms{};
   double torque = 0.0;
 };
 
-/// A cut whose sensors are off by what they state. @param axes that move and whose motors are read
+/// Cut with measurement errors of the stated standard deviations. @param axes with motion and motor currents
 Case draw(std::mt19937_64& random, const std::vector<std::size_t>& axes, bool sensor) {
   std::normal_distribution<double> normal;
   const auto uniform = [&](double a, double b) {
     return std::uniform_real_distribution<double>(a, b)(random);
   };
   Case one;
-  ForceReadings& r = one.readings;
+  CutMeasurements& r = one.measurements;
   r.tool.teeth = 2 + static_cast<int>(uniform(0.0, 2.999));
   r.tool.diameter = uniform(10e-3, 20e-3);
   r.tool.helix = uniform(0.3, 0.7);
@@ -81,21 +81,21 @@ Case draw(std::mt19937_64& random, const std::vector<std::size_t>& axes, bool se
   return one;
 }
 
-/// Share of 300 cuts whose truth lies within 1.96 standard deviations, and the median relative deviation.
-struct Honesty {
+/// Share of 300 cuts within 1.96 standard deviations, and the median relative standard deviation.
+struct Calibration {
   std::array<double, 3> mean{}, rms{};
-  double torque = 0.0, surprise = 0.0;
+  double torque = 0.0, chi_square = 0.0;
   std::array<double, 3> deviation{};  // [1] median of std over the whole force
 };
 
-Honesty honesty(const std::vector<std::size_t>& axes, bool sensor, unsigned seed) {
+Calibration calibrationOf(const std::vector<std::size_t>& axes, bool sensor, unsigned seed) {
   constexpr int COUNT = 300;
   std::mt19937_64 random(seed);
-  Honesty h;
+  Calibration h;
   std::array<std::vector<double>, 3> deviations;
   for (int i = 0; i < COUNT; ++i) {
     const Case one = draw(random, axes, sensor);
-    const ForceEstimate found = estimateForce(one.readings, {});
+    const ForceEstimate found = estimateForce(one.measurements, {});
     const double whole = std::hypot(std::hypot(one.mean[0], one.mean[1]), one.mean[2]);
     for (std::size_t a = 0; a < 3; ++a) {
       h.mean[a] +=
@@ -104,7 +104,7 @@ Honesty honesty(const std::vector<std::size_t>& axes, bool sensor, unsigned seed
       deviations[a].push_back(found.mean[a].std_dev / whole);
     }
     h.torque += (std::abs(found.torque.value - one.torque) < 1.96 * found.torque.std_dev) / double{COUNT};
-    h.surprise += found.surprise / COUNT;
+    h.chi_square += found.chi_square / COUNT;
   }
   for (std::size_t a = 0; a < 3; ++a) {
     std::nth_element(deviations[a].begin(), deviations[a].begin() + COUNT / 2, deviations[a].end());
@@ -113,9 +113,9 @@ Honesty honesty(const std::vector<std::size_t>& axes, bool sensor, unsigned seed
   return h;
 }
 
-// Coverage from both sides: 95 % stated; with 300 cuts three standard deviations are 3.8 %, and the metals'
-// ratios are not those of the prior.
-TEST(ForceEstimate, deviationsAreHonest) {
+// Coverage from both sides: 95 % nominal; with 300 cuts three standard deviations are 3.8 %, and the metals'
+// ratios differ from the prior.
+TEST(ForceEstimate, standardDeviationsAreCalibrated) {
   struct Set {
     const char* name;
     std::vector<std::size_t> axes;
@@ -123,10 +123,10 @@ TEST(ForceEstimate, deviationsAreHonest) {
   };
   for (const Set& set : {Set{"load meter", {}, false}, Set{"and motor X", {0}, false},
                          Set{"and motors X, Y", {0, 1}, false}, Set{"and sensor", {0, 1}, true}}) {
-    const Honesty h = honesty(set.axes, set.sensor, 7);
+    const Calibration h = calibrationOf(set.axes, set.sensor, 7);
     std::printf(
         "%-16s mean %.3f %.3f %.3f rms %.3f %.3f %.3f torque %.3f surprise %.2f; std %.3f %.3f %.3f\n",
-        set.name, h.mean[0], h.mean[1], h.mean[2], h.rms[0], h.rms[1], h.rms[2], h.torque, h.surprise,
+        set.name, h.mean[0], h.mean[1], h.mean[2], h.rms[0], h.rms[1], h.rms[2], h.torque, h.chi_square,
         h.deviation[0], h.deviation[1], h.deviation[2]);
     for (std::size_t a = 0; a < 3; ++a) {
       EXPECT_GT(h.mean[a], 0.90) << set.name << " mean " << a;
@@ -137,24 +137,25 @@ TEST(ForceEstimate, deviationsAreHonest) {
   }
 }
 
-// What is measured is known better than what is not.
-TEST(ForceEstimate, everySensorTakesFromTheDoubt) {
-  const Honesty alone = honesty({}, false, 3), motors = honesty({0, 1}, false, 3),
-                all = honesty({0, 1}, true, 3);
+// Measured components are more certain than others.
+TEST(ForceEstimate, everySensorReducesTheUncertainty) {
+  const Calibration alone = calibrationOf({}, false, 3), motors = calibrationOf({0, 1}, false, 3),
+                    all = calibrationOf({0, 1}, true, 3);
   EXPECT_LT(motors.deviation[0], 0.7 * alone.deviation[0]);
   EXPECT_LT(motors.deviation[1], 0.7 * alone.deviation[1]);
   EXPECT_LT(all.deviation[2], 0.6 * motors.deviation[2]);
 }
 
-TEST(ForceEstimate, sensorsThatDisagreeAreTold) {
+TEST(ForceEstimate, disagreeingSensorsIncreaseChiSquare) {
   std::mt19937_64 random(5);
   Case one = draw(random, {0, 1}, true);
-  EXPECT_LT(estimateForce(one.readings, {}).surprise, 3.0);
-  for (auto& force : one.readings.sensor_force) force->value *= 1.5;
-  EXPECT_GT(estimateForce(one.readings, {}).surprise, 5.0);
+  EXPECT_LT(estimateForce(one.measurements, {}).chi_square, 3.0);
+  for (auto& force : one.measurements.sensor_force) force->value *= 1.5;
+  EXPECT_GT(estimateForce(one.measurements, {}).chi_square, 5.0);
 }
 
-// A cut that pulls an axis on shows the same range as one that holds it harder: the others tell which it is.
+// A cut that pulls an axis along has the same range as one that opposes it more: the other measurements
+// decide.
 TEST(ForceEstimate, aRangeHasNoSign) {
   std::mt19937_64 random(11);
   int near = 0;
@@ -162,26 +163,26 @@ TEST(ForceEstimate, aRangeHasNoSign) {
     Case one = draw(random, {0, 1}, false);
     for (std::size_t a = 0; a < 2; ++a) {
       // Friction of 150 N either way.
-      one.readings.motor_other[a] = one.readings.motor_force[a];
+      one.measurements.motor_other[a] = one.measurements.motor_force[a];
       const bool on = one.mean[a] > 0.0;
-      const double wrong = -one.readings.motor_force[a]->value + (on ? -300.0 : 300.0);
-      (i % 2 ? one.readings.motor_force : one.readings.motor_other)[a]->value = wrong;
+      const double wrong = -one.measurements.motor_force[a]->value + (on ? -300.0 : 300.0);
+      (i % 2 ? one.measurements.motor_force : one.measurements.motor_other)[a]->value = wrong;
     }
-    const ForceEstimate found = estimateForce(one.readings, {});
+    const ForceEstimate found = estimateForce(one.measurements, {});
     near += std::abs(found.mean[0].value - one.mean[0]) < 3.0 * found.mean[0].std_dev &&
             std::abs(found.mean[1].value - one.mean[1]) < 3.0 * found.mean[1].std_dev;
   }
   EXPECT_GE(near, 38);
 }
 
-TEST(ForceEstimate, refusesWhatSaysNothing) {
+TEST(ForceEstimate, refusesMissingAndInvalidMeasurements) {
   std::mt19937_64 random(5);
   Case one = draw(random, {0}, false);
-  ForceReadings none = one.readings;
+  CutMeasurements none = one.measurements;
   none.load_torque.reset();
   none.motor_torque.reset();
   none.motor_force = {};
-  const auto error = [](const ForceReadings& r) {
+  const auto error = [](const CutMeasurements& r) {
     try {
       estimateForce(r, {});
     } catch (const std::exception& e) {
@@ -189,14 +190,14 @@ TEST(ForceEstimate, refusesWhatSaysNothing) {
     }
     return std::string();
   };
-  EXPECT_EQ(error(none), "force of a cut: no sensor says anything");
-  one.readings.motor_force[0]->std_dev = std::nan("");
-  EXPECT_EQ(error(one.readings),
-            "force of a cut: the reading of motor_x has no value or no standard deviation");
+  EXPECT_EQ(error(none), "force of a cut: no measurement");
+  one.measurements.motor_force[0]->std_dev = std::nan("");
+  EXPECT_EQ(error(one.measurements),
+            "force of a cut: measurement of motor_x: expected a finite value and a standard deviation");
 }
 
-// A sine of 30 N about 50 N with a zero of 20 N and noise of 5 N.
-TEST(ForceRecord, meanAndVariationBeyondTheZeroAndTheNoise) {
+// Sine of 30 N about 50 N with a zero of 20 N and noise of 5 N.
+TEST(ForceRecord, meanAndVariationWithoutZeroAndNoise) {
   std::mt19937_64 random(1);
   std::normal_distribution<double> normal(0.0, 5.0);
   const auto record = [&](double mean, double amplitude) {
@@ -214,15 +215,15 @@ TEST(ForceRecord, meanAndVariationBeyondTheZeroAndTheNoise) {
       }
       made.add(block);
     }
-    return made.reading();
+    return made.measurement();
   };
   const auto air = record(0.0, 0.0), cut = record(50.0, 30.0);
   ASSERT_TRUE(air && cut);
   for (std::size_t a = 0; a < 3; ++a) {
-    EXPECT_NEAR(cut->meanOver(air, a).value, 50.0, 0.6);
-    ASSERT_TRUE(cut->rmsOver(air, a));
-    EXPECT_NEAR(cut->rmsOver(air, a)->value, 30.0 / std::sqrt(2.0), 0.3);
-    EXPECT_FALSE(air->rmsOver(air, a));
+    EXPECT_NEAR(cut->meanAbove(air, a).value, 50.0, 0.6);
+    ASSERT_TRUE(cut->rmsAbove(air, a));
+    EXPECT_NEAR(cut->rmsAbove(air, a)->value, 30.0 / std::sqrt(2.0), 0.3);
+    EXPECT_FALSE(air->rmsAbove(air, a));
   }
 }
 

@@ -8,14 +8,14 @@
 #include "../session.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/testing/temporary_folder.h"
-#include "smartmill_loadmeter/identification/sorted_identification.h"
+#include "smartmill_loadmeter/identification/identification_pipeline.h"
 
 namespace smartmill::loadmeter {
 namespace {
 
 using ::testing::HasSubstr;
 
-TEST(StandardCuts, sayWhatIsWrong) {
+TEST(StandardCuts, errorsAreNamed) {
   const TemporaryFolder folder;
   const auto standard = [&](const std::string& text) {
     return readStandardCuts(folder.write("s.csv", text));
@@ -24,28 +24,28 @@ TEST(StandardCuts, sayWhatIsWrong) {
     return readMachineCurrents(folder.write("c.csv", text));
   };
   EXPECT_THAT(errorOf([&] { standard("cut,force_x[kN]\na,1\n"); }),
-              HasSubstr("s.csv: line 1: column 'force_x[kN]' is not known"));
+              HasSubstr("s.csv: line 1: column 'force_x[kN]' is unknown"));
   EXPECT_THAT(errorOf([&] { standard("cut,force_x[N]\na,lots\n"); }),
               HasSubstr("s.csv: line 2: column force_x[N]: 'lots' is not a number"));
   EXPECT_THAT(errorOf([&] { standard("cut,force_x[N]\na,1\na,2\n"); }),
-              HasSubstr("line 3: cut 'a' stands twice"));
+              HasSubstr("line 3: cut 'a' is repeated"));
   EXPECT_THAT(errorOf([&] { standard("cut,force_x[N]\n"); }), HasSubstr("no cut in the table"));
   EXPECT_THAT(errorOf([&] { currents("cut,current_x[A],air_x[A]\na,1,\n"); }),
               HasSubstr("line 2: air_x[A]: empty"));
   EXPECT_THAT(errorOf([&] { currents("cut,current_spindle[A],air_spindle[A]\na,1,1\n"); }),
-              HasSubstr("spindle_speed[rpm]: > 0"));
+              HasSubstr("spindle_speed[rpm]: expected > 0"));
   EXPECT_THAT(errorOf([&] { readStandardCuts("/nowhere.csv"); }), HasSubstr("/nowhere.csv: cannot be read"));
   EXPECT_THAT(errorOf([&] {
                 calibrateMotors(standard("cut,force_x[N]\na,1\nb,2\n"),
                                 currents("cut,current_x[A],air_x[A]\na,1,0\nb,2,0\nc,3,0\n"), 100.0);
               }),
-              HasSubstr("no axis and no spindle with three"));
-  // Forces that do not vanish with the current's rise: other air cuts than these.
+              HasSubstr("expected an axis or the spindle with three"));
+  // Forces without a rise of the current indicate other air cuts.
   const MotorCalibration c = calibrateMotors(
       standard("cut,force_x[N]\na,110\nb,201\nc,299\nd,401\n"),
       currents("cut,current_x[A],air_x[A]\na,1.0,1.0\nb,1.5,1.0\nc,2.0,1.0\nd,2.5,1.0\n"), 100.0);
   ASSERT_EQ(c.notes.size(), 1u);
-  EXPECT_THAT(c.notes[0], HasSubstr("axis x: forces are 10"));
+  EXPECT_THAT(c.notes[0], HasSubstr("axis x: force 10"));
 }
 
 struct MotorSession {
@@ -70,7 +70,7 @@ struct MotorSession {
     from.onMotorForce([this](const MotorForce& f) { forces.push_back(f); });
     from.onResult([this](const IdentifyResult& r) { results.push_back(r); });
     const auto put = [&to](const auto& input) {
-      if constexpr (std::is_same_v<Identification, SortedIdentification>) {
+      if constexpr (std::is_same_v<Identification, IdentificationPipeline>) {
         to.push(input);
       } else {
         to.handle(input);
@@ -81,14 +81,14 @@ struct MotorSession {
     session.condition = put;
     session.currents = put;
     for (const double rpm : {2000.0, 6000.0, 12000.0}) session.air(rpm, 2.0);
-    session.slot(6000.0, 6e-5, 4.0);  // before any pass in air
+    session.slot(6000.0, 6e-5, 4.0);  // before any air pass
     for (const double f : {3e-5, 6e-5, 1e-4}) session.airPass(6000.0, f, 4.0);
     for (const double f : {3e-5, 6e-5, 1e-4}) session.slot(6000.0, f, 4.0);
     put(IdentifyGoal{session.now(), "", "", false, 0});
   }
 };
 
-TEST(MotorChain, movingAxisTellsItsForceAndRestingAxesAreNotObservable) {
+TEST(MotorChain, forceOfAMovingAxisIsObservableAndOfARestingOneIsNot) {
   MotorSession m;
   LoadMeterIdentification identification(model(), m.parameters);
   m.feed(identification, identification);
@@ -104,15 +104,15 @@ TEST(MotorChain, movingAxisTellsItsForceAndRestingAxesAreNotObservable) {
     ASSERT_TRUE(f.force[0]);
     EXPECT_LT(f.force[0]->value, 0.0);  // it opposes the motion along +X
     EXPECT_NEAR(f.force[0]->value, truth, 4.0 * f.force[0]->std_dev);
-    // A current of 3 A stands in channel y: at rest it tells nothing.
+    // Channel y has a constant current of 3 A, without information at rest.
     EXPECT_FALSE(f.force[1]);
     EXPECT_FALSE(f.force[2]);
-    EXPECT_THAT(f.text(), HasSubstr("Fy not observable: the axis stands still"));
+    EXPECT_THAT(f.text(), HasSubstr("Fy not observable: the axis is at rest"));
   }
   ASSERT_EQ(m.results.size(), 1u);
   const CoefficientSet& k = m.results[0].coefficients;
   EXPECT_NEAR(k.value.ktc, 953e6, 0.01 * 953e6);
-  EXPECT_NEAR(k.value.krc, 420e6, 0.1 * 420e6);  // 10 % is asked
+  EXPECT_NEAR(k.value.krc, 420e6, 0.1 * 420e6);  // required: 10 %
   EXPECT_NEAR(k.value.krc, 420e6, 4.0 * k.std_dev.krc);
   EXPECT_NEAR(k.value.kre, 21e3, 4.0 * k.std_dev.kre);
   EXPECT_TRUE(std::isnan(k.value.kac) && std::isnan(k.value.kae));
@@ -120,11 +120,11 @@ TEST(MotorChain, movingAxisTellsItsForceAndRestingAxesAreNotObservable) {
   EXPECT_THAT(m.results[0].message, HasSubstr("not observable from the axes that moved: Kac, Kae"));
 }
 
-TEST(MotorChain, throughTheSorterAgreesWithTheInputsAsTheyCame) {
+TEST(MotorChain, thePipelineAgreesWithDirectInput) {
   MotorSession direct, sorted;
   LoadMeterIdentification identification(model(), direct.parameters);
   direct.feed(identification, identification);
-  SortedIdentification sorter(model(), sorted.parameters, 0.05);
+  IdentificationPipeline sorter(model(), sorted.parameters, 0.05);
   sorted.feed(sorter, sorter.identification());
   sorter.flush();
   ASSERT_EQ(direct.results.size(), 1u);

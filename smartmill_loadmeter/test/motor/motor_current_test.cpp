@@ -22,7 +22,7 @@ double rmsOf(const std::vector<double>& a, const std::vector<double>& b) {
 }
 
 TEST(Wavelets, aPolynomialOfDegreeFourHasNoDetail) {
-  // Five vanishing moments: the approximation of such a signal is itself, away from the ends.
+  // Five vanishing moments: such a signal is its own approximation away from the ends.
   std::vector<double> signal;
   for (int i = 0; i < 2000; ++i) {
     const double t = i / 2000.0;
@@ -34,7 +34,7 @@ TEST(Wavelets, aPolynomialOfDegreeFourHasNoDetail) {
   EXPECT_THAT(errorOf([] { denoise({1.0, 2.0, 3.0}, 6); }), HasSubstr("3 samples are too few for level 6"));
 }
 
-TEST(Wavelets, takeNoiseOutAndLeaveTheSlowSignal) {
+TEST(Wavelets, removeNoiseAndKeepTheSlowSignal) {
   std::mt19937 random(1);
   std::normal_distribution<double> normal;
   std::vector<double> clean, noisy;
@@ -43,7 +43,7 @@ TEST(Wavelets, takeNoiseOutAndLeaveTheSlowSignal) {
     noisy.push_back(clean.back() + 0.5 * normal(random));
   }
   const double left = rmsOf(denoise(noisy, 6), clean);
-  // One of 64 coefficients keeps its noise: 0.5 / 8, and the ends' mirror adds a little.
+  // One of 64 coefficients keeps its noise: 0.5 / 8; the mirrored ends add a little.
   EXPECT_LT(left, 1.3 * 0.5 / 8.0);
   EXPECT_GT(left, 0.7 * 0.5 / 8.0);
 }
@@ -65,7 +65,7 @@ TEST(PhaseRange, isTwiceTheAmplitudeThroughHarmonicsAndNoise) {
               HasSubstr("less than two periods"));
 }
 
-TEST(TorqueLaw, findsThePowersBelowAndAboveBaseSpeed) {
+TEST(TorqueLaw, findsTheLawBelowAndAboveBaseSpeed) {
   std::mt19937 random(4);
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> uniform;
@@ -88,7 +88,7 @@ TEST(TorqueLaw, findsThePowersBelowAndAboveBaseSpeed) {
     EXPECT_NEAR(found.torque(n, 2.5), law(n, 2.5), 0.5) << n;
   const std::vector<SpindleCut> slow(cuts.begin(), cuts.begin() + 4);
   EXPECT_THAT(errorOf([&] { TorquePowerLaw(slow, 1570.0).torque(100.0, 1.0); }),
-              HasSubstr("rpm: torque at 100 rpm is not known"));
+              HasSubstr("rpm, torque at 100 rpm is unknown"));
   EXPECT_THAT(errorOf([&] { TorquePowerLaw(slow, 1570.0).torque(2000.0, 1.0); }),
               HasSubstr("no cut above base speed"));
 }

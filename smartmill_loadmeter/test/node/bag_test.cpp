@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 #include <rosbag/bag.h>
 
-#include "../curve_shop.h"
+#include "../cut_simulator.h"
 #include "../session.h"
 #include "recordings/bag_identification.h"
 #include "smartmill_core/names.h"
@@ -21,7 +21,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-/// Plays a session into a bag and, the same messages, into a class; the goals too.
+/// Writes a session to a bag and passes the same messages to an identification, including goals.
 class Recorder {
  public:
   explicit Recorder(const std::string& file) : bag_(file, rosbag::bagmode::Write), direct(model(), {}) {
@@ -60,7 +60,7 @@ class Recorder {
   LoadMeterIdentification direct;
 };
 
-TEST(Bag, givesTheFiguresOfTheLiveRunToTheLastDigit) {
+TEST(Bag, givesTheResultsOfTheLiveRunToTheLastDigit) {
   const TemporaryFolder folder;
   const std::string file = folder.file("run.bag");
   std::vector<IdentifyResult> live;
@@ -70,7 +70,7 @@ TEST(Bag, givesTheFiguresOfTheLiveRunToTheLastDigit) {
     recorder.direct.onForce([&](const ForceEstimate& f) { forces.push_back(f); });
     recorder.session.air(9000.0, 2.0);
     recorder.goal(true);
-    takeThrough(recorder.session);
+    runStandardTests(recorder.session);
     recorder.goal(false);
     live = recorder.results;
   }
@@ -87,25 +87,25 @@ TEST(Bag, givesTheFiguresOfTheLiveRunToTheLastDigit) {
   ASSERT_EQ(forces.size(), 3u);
   for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(played[i].text(), forces[i].text());
 
-  // Half a bag is refused in one line.
+  // A truncated bag is refused in one line.
   std::filesystem::resize_file(file, std::filesystem::file_size(file) / 2);
   const std::string message = errorOf([&] { identifyFromBag(file, model(), {}); });
   EXPECT_THAT(message, HasSubstr("run.bag"));
   EXPECT_EQ(message.find('\n'), std::string::npos);
 }
 
-TEST(Bag, withoutAGoalIsAskedAtItsEnd) {
+TEST(Bag, withoutAGoalIsIdentifiedAtItsEnd) {
   const TemporaryFolder folder;
   {
     Recorder recorder(folder.file("run.bag"));
-    takeThrough(recorder.session);
+    runStandardTests(recorder.session);
   }
   const auto found = identifyFromBag(folder.file("run.bag"), model(), {});
   ASSERT_EQ(found.size(), 1u);
   EXPECT_NEAR(found[0].coefficients.value.ktc, TRUTH.ktc, 0.01 * TRUTH.ktc);
 }
 
-TEST(Bag, aRunoutIsToldAsOnTheRunningMachine) {
+TEST(Bag, runoutIsEstimatedAsInTheLiveRun) {
   const TemporaryFolder folder;
   std::vector<IdentifyResult> live;
   {
@@ -131,16 +131,16 @@ TEST(Bag, aRunoutIsToldAsOnTheRunningMachine) {
 TEST(Bag, givesTheForceCurveOfTheLiveRunToTheLastDigit) {
   const TemporaryFolder folder;
   const std::string file = folder.file("run.bag");
-  SortedCurves live({}, 0.05);
-  std::optional<FoundCurves> told;
-  live.finder().onCurves([&](const FoundCurves& found) { told = found; });
+  ForceCurvePipeline live({}, 0.05);
+  std::optional<IdentifiedForceCurves> live_curves;
+  live.identification().onCurves([&](const IdentifiedForceCurves& found) { live_curves = found; });
   {
     rosbag::Bag bag(file, rosbag::bagmode::Write);
     const auto write = [&](const std::string& topic, const auto& message) {
       bag.write("/smartmill/" + topic, message.header.stamp, message);
       live.push(fromMsg(message));
     };
-    Shop shop([&](const auto& input) {
+    CutSimulator shop([&](const auto& input) {
       using Input = std::decay_t<decltype(input)>;
       if constexpr (std::is_same_v<Input, ForceBlock>) {
         write(names::FORCE_COMPENSATED, toMsg(input, "machine"));
@@ -156,35 +156,35 @@ TEST(Bag, givesTheForceCurveOfTheLiveRunToTheLastDigit) {
     shop.end();
   }
   live.flush();
-  const std::vector<FoundCurves> offline = curvesFromBag(file, {});
-  ASSERT_TRUE(told);
+  const std::vector<IdentifiedForceCurves> offline = curvesFromBag(file, {});
+  ASSERT_TRUE(live_curves);
   ASSERT_EQ(offline.size(), 1u);
-  // By the message too.
-  const FoundCurves sent = fromMsg(toMsg(*told));
-  for (const FoundCurves* found : {&offline[0], &sent}) {
-    EXPECT_EQ(found->curves.tangential.value, told->curves.tangential.value);
-    EXPECT_EQ(found->curves.radial.std_dev, told->curves.radial.std_dev);
-    EXPECT_EQ(found->cuts, told->cuts);
+  // Also through the message.
+  const IdentifiedForceCurves sent = fromMsg(toMsg(*live_curves));
+  for (const IdentifiedForceCurves* found : {&offline[0], &sent}) {
+    EXPECT_EQ(found->curves.tangential.value, live_curves->curves.tangential.value);
+    EXPECT_EQ(found->curves.radial.std_dev, live_curves->curves.radial.std_dev);
+    EXPECT_EQ(found->cuts, live_curves->cuts);
     EXPECT_EQ(found->material, "steel");
   }
-  EXPECT_NEAR(told->curves.tangential.at(1e-4), KTC * 1e-4 + KTE, 0.005 * (KTC * 1e-4 + KTE));
+  EXPECT_NEAR(live_curves->curves.tangential.at(1e-4), KTC * 1e-4 + KTE, 0.005 * (KTC * 1e-4 + KTE));
 
-  smartmill_msgs::ForceCurve falling = toMsg(*told);
+  smartmill_msgs::ForceCurve falling = toMsg(*live_curves);
   falling.radial[3] = 0.5 * falling.radial[2];
   EXPECT_THAT(errorOf([&] { fromMsg(falling); }), HasSubstr("radial: the coefficients must not fall"));
 }
 
-TEST(Bag, withoutForcesMakesNoForceCurveAndSaysWhy) {
+TEST(Bag, withoutForcesGivesNoForceCurveAndNamesTheReason) {
   const TemporaryFolder folder;
   {
     Recorder recorder(folder.file("run.bag"));
-    takeThrough(recorder.session);
+    runStandardTests(recorder.session);
   }
   EXPECT_THAT(errorOf([&] { curvesFromBag(folder.file("run.bag"), {}); }),
-              HasSubstr("run.bag: holds no force/compensated"));
+              HasSubstr("run.bag: expected topic force/compensated"));
 }
 
-TEST(Parameters, theShippedFileIsTheDefaultsAndWrongOnesAreNamed) {
+TEST(Parameters, theShippedFileHasTheDefaultsAndErrorsAreNamed) {
   expectShipped<NodeParameters>(std::string(LAUNCH_CONFIG_FOLDER) + "/loadmeter.yaml",
                                 "smartmill_loadmeter loadmeter_node");
   EXPECT_NO_THROW(NodeParameters().validate());

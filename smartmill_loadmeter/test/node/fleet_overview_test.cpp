@@ -44,7 +44,7 @@ FleetMember memberOf(const std::string& name, const std::string& login) {
   return m;
 }
 
-/// Ten machines that agree within a percent, and one that shows 30 % more; "new" has cut no steel yet.
+/// Ten machines that agree within a percent, and an outlier by 30 %; "new" has cut no steel yet.
 std::vector<CoefficientRecord> shop() {
   std::vector<CoefficientRecord> records;
   for (int m = 0; m < 11; ++m)
@@ -59,89 +59,90 @@ std::vector<CoefficientRecord> shop() {
   return records;
 }
 
-TEST(FleetOverviewTest, saysWhoKnowsWhatWhoIsOddAndWhatTheNextCutShows) {
+TEST(FleetOverviewTest, listsRecordsOutliersAndPredictedCuts) {
   std::vector<FleetMember> members{memberOf("new", "mill_09"), memberOf("odd", "mill_10"),
                                    memberOf("silent", "mill_11")};
   members[0].records = 3;
   members[0].behind = 2;
   members[0].silent = 60.0;
-  const FleetOverview seen = fleetOverview(members, shop(), "mill_09");
-  ASSERT_EQ(seen.pairs.size(), 2u);
-  EXPECT_EQ(seen.pairs[0].material, "aluminium");
-  EXPECT_EQ(seen.pairs[0].records, 33u);
-  EXPECT_EQ(seen.pairs[0].own, 3u);
-  EXPECT_EQ(seen.pairs[1].material, "steel");
-  EXPECT_EQ(seen.pairs[1].own, 0u);
-  // Nine machines show 1800 within a percent: so will the tenth, which never cut it.
-  EXPECT_NEAR(seen.pairs[1].ktc, 1800e6, 0.02 * 1800e6);
-  EXPECT_LT(seen.pairs[1].ktc_std, 0.05 * 1800e6);
-  EXPECT_LT(std::abs(seen.pairs[1].ktc - 1800e6), 3.0 * seen.pairs[1].ktc_std);
+  const FleetOverview overview = fleetOverview(members, shop(), "mill_09");
+  ASSERT_EQ(overview.pairs.size(), 2u);
+  EXPECT_EQ(overview.pairs[0].material, "aluminium");
+  EXPECT_EQ(overview.pairs[0].records, 33u);
+  EXPECT_EQ(overview.pairs[0].own, 3u);
+  EXPECT_EQ(overview.pairs[1].material, "steel");
+  EXPECT_EQ(overview.pairs[1].own, 0u);
+  // Nine machines have 1800 within a percent: so does the prediction for the tenth, which is new to the
+  // material.
+  EXPECT_NEAR(overview.pairs[1].ktc, 1800e6, 0.02 * 1800e6);
+  EXPECT_LT(overview.pairs[1].ktc_std, 0.05 * 1800e6);
+  EXPECT_LT(std::abs(overview.pairs[1].ktc - 1800e6), 3.0 * overview.pairs[1].ktc_std);
 
-  ASSERT_EQ(seen.machines.size(), 12u);
-  int odd = 0;
-  for (const FleetMachine& m : seen.machines) {
+  ASSERT_EQ(overview.machines.size(), 12u);
+  int outlier = 0;
+  for (const FleetMachine& m : overview.machines) {
     EXPECT_EQ(m.here, m.member.name == "new");
     if (m.member.name == "odd") {
-      EXPECT_GT(m.odd, 0.9);
+      EXPECT_GT(m.outlier, 0.9);
       EXPECT_NEAR(m.effect, std::log(1.3), 0.03);
-      EXPECT_THAT(m.meaning, HasSubstr("the same in all cuts"));
+      EXPECT_THAT(m.meaning, HasSubstr("constant in all cuts"));
     } else if (m.member.name == "silent") {
-      EXPECT_THAT(m.knows, ElementsAre(0u, 0u));
-      EXPECT_TRUE(std::isnan(m.odd));
+      EXPECT_THAT(m.records_by_pair, ElementsAre(0u, 0u));
+      EXPECT_TRUE(std::isnan(m.outlier));
     } else {
-      EXPECT_LT(m.odd, 0.1) << m.member.name;
+      EXPECT_LT(m.outlier, 0.1) << m.member.name;
       EXPECT_TRUE(m.meaning.empty());
     }
-    odd += m.odd > 0.5;
+    outlier += m.outlier > 0.5;
     if (m.member.name == "new") {
-      EXPECT_THAT(m.knows, ElementsAre(3u, 0u));
+      EXPECT_THAT(m.records_by_pair, ElementsAre(3u, 0u));
     }
   }
-  EXPECT_EQ(odd, 1);
+  EXPECT_EQ(outlier, 1);
 }
 
-TEST(FleetOverviewTest, ofNothingSaysNothing) {
-  const FleetOverview seen = fleetOverview({memberOf("a", "a")}, {}, "a");
-  EXPECT_TRUE(seen.pairs.empty());
-  ASSERT_EQ(seen.machines.size(), 1u);
-  EXPECT_TRUE(std::isnan(seen.machines[0].effect));
-  EXPECT_TRUE(std::isnan(seen.deviations.machine));
+TEST(FleetOverviewTest, isEmptyWithoutRecords) {
+  const FleetOverview overview = fleetOverview({memberOf("a", "a")}, {}, "a");
+  EXPECT_TRUE(overview.pairs.empty());
+  ASSERT_EQ(overview.machines.size(), 1u);
+  EXPECT_TRUE(std::isnan(overview.machines[0].effect));
+  EXPECT_TRUE(std::isnan(overview.deviations.machine));
 }
 
-TEST(FleetOverviewTest, aRecordBelongsToTheMemberWhoseLoginItBears) {
-  const FleetOverview seen = fleetOverview({memberOf("mill 07", "mill_07")},
-                                           {recordOf("mill_07", "steel", 1.8e9, 1.7e9)}, "mill_07");
-  ASSERT_EQ(seen.machines.size(), 1u);
-  EXPECT_THAT(seen.machines[0].knows, ElementsAre(1u));
-  EXPECT_EQ(seen.pairs[0].own, 1u);
+TEST(FleetOverviewTest, aRecordWithALoginBelongsToItsMember) {
+  const FleetOverview overview = fleetOverview({memberOf("mill 07", "mill_07")},
+                                               {recordOf("mill_07", "steel", 1.8e9, 1.7e9)}, "mill_07");
+  ASSERT_EQ(overview.machines.size(), 1u);
+  EXPECT_THAT(overview.machines[0].records_by_pair, ElementsAre(1u));
+  EXPECT_EQ(overview.pairs[0].own, 1u);
 }
 
-TEST(FleetOverviewTest, aLoginStandsInItsAddress) {
+TEST(FleetOverviewTest, aLoginIsReadFromItsAddress) {
   EXPECT_EQ(loginOf("postgresql://mill_07@shop.local/fleet"), "mill_07");
   EXPECT_EQ(loginOf("postgresql://mill_07:word@shop.local:5432/fleet"), "mill_07");
   EXPECT_EQ(loginOf("postgresql:///fleet?user=mill_07&host=/tmp"), "mill_07");
   EXPECT_EQ(loginOf("postgresql://shop.local/fleet"), "");
 }
 
-/// A server with two machines.
+/// Server with two machines.
 class FleetMessage : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!fleetSupported() || !PrivateServer::available())
-      GTEST_SKIP() << "./setup --with-fleet installs what is missing";
+    if (!fleetSupported() || !PrivateServer::available()) GTEST_SKIP() << "requires ./setup --with-fleet";
     server_ = std::make_unique<PrivateServer>();
     migrateFleet(server_->url("owner"));
     for (const char* name : {"a", "b"}) enrol(server_->url("owner"), memberOf(name, name), "");
     FleetMember locked = memberOf("locked", "locked");
     enrol(server_->url("owner"), locked, "right");
   }
-  /// What the page would be told once it holds.
-  template <class Holds>
-  smartmill_msgs::FleetState await(const FleetPusher& pusher, const std::string& url, const Holds& holds) {
+  /// First message that satisfies a condition.
+  template <class Condition>
+  smartmill_msgs::FleetState await(const FleetPusher& pusher, const std::string& url,
+                                   const Condition& condition) {
     smartmill_msgs::FleetState message;
     for (int tries = 0; tries < 1200; ++tries) {
       message = toMsg(pusher.state(), url);
-      if (pusher.state().tries > 0 && holds(message)) break;
+      if (pusher.state().tries > 0 && condition(message)) break;
       usleep(50000);
     }
     return message;
@@ -151,7 +152,7 @@ class FleetMessage : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
-TEST_F(FleetMessage, tellsOfAllMachinesAndKeepsItWhileTheServerIsAway) {
+TEST_F(FleetMessage, listsAllMachinesAlsoWhileTheServerIsUnreachable) {
   CoefficientDatabase a(folder_.file("a.sqlite")), b(folder_.file("b.sqlite"));
   b.add(recordOf("b", "steel", 1810e6, 1.7e9));
   b.add(recordOf("b", "steel", 1790e6, 1.7e9 + 60.0));
@@ -162,48 +163,49 @@ TEST_F(FleetMessage, tellsOfAllMachinesAndKeepsItWhileTheServerIsAway) {
   const auto whole = [](const auto& m) {
     return m.reached && m.pairs.size() == 1 && m.pairs[0].records == 3;
   };
-  auto said = await(pusher, url, whole);
-  ASSERT_EQ(said.pairs.size(), 1u) << said.message;
-  EXPECT_EQ(said.pairs[0].own, 1u);
-  EXPECT_NEAR(said.pairs[0].ktc, 1800e6, 40e6);
-  ASSERT_EQ(said.machines.size(), 3u);
-  EXPECT_EQ(said.machines[0].name, "a");
-  EXPECT_TRUE(said.machines[0].here);
-  EXPECT_EQ(said.machines[1].records, 2u);
-  EXPECT_THAT(said.machines[1].knows, ElementsAre(2u));
-  EXPECT_LT(said.machines[1].silent, 600.0);
-  EXPECT_TRUE(std::isnan(said.machines[2].silent)) << "the locked one never pushed";
-  EXPECT_EQ(a.size(), 1u) << "the machine's own file stays its own";
+  auto message = await(pusher, url, whole);
+  ASSERT_EQ(message.pairs.size(), 1u) << message.message;
+  EXPECT_EQ(message.pairs[0].own, 1u);
+  EXPECT_NEAR(message.pairs[0].ktc, 1800e6, 40e6);
+  ASSERT_EQ(message.machines.size(), 3u);
+  EXPECT_EQ(message.machines[0].name, "a");
+  EXPECT_TRUE(message.machines[0].here);
+  EXPECT_EQ(message.machines[1].records, 2u);
+  EXPECT_THAT(message.machines[1].knows, ElementsAre(2u));
+  EXPECT_LT(message.machines[1].silent, 600.0);
+  EXPECT_TRUE(std::isnan(message.machines[2].silent)) << "no push of this machine";
+  EXPECT_EQ(a.size(), 1u) << "the machine's own file is unchanged";
 
   server_->stop();
-  said = await(pusher, url, [](const auto& m) { return !m.reached; });
-  EXPECT_FALSE(said.reached);
-  EXPECT_THAT(said.message, AllOf(HasSubstr(said.server + ": "), Not(HasSubstr("\n"))));
-  EXPECT_EQ(said.machines.size(), 3u) << "what was known stays";
+  message = await(pusher, url, [](const auto& m) { return !m.reached; });
+  EXPECT_FALSE(message.reached);
+  EXPECT_THAT(message.message, AllOf(HasSubstr(message.server + ": "), Not(HasSubstr("\n"))));
+  EXPECT_EQ(message.machines.size(), 3u) << "the last overview remains";
   server_->start();
   b.add(recordOf("b", "aluminium", 700e6, 1.7e9));
   push(b, server_->url("b"));
-  said = await(pusher, url, [](const auto& m) { return m.pairs.size() == 2; });
-  EXPECT_EQ(said.pairs.size(), 2u);
+  message = await(pusher, url, [](const auto& m) { return m.pairs.size() == 2; });
+  EXPECT_EQ(message.pairs.size(), 2u);
 }
 
-TEST_F(FleetMessage, wrongPasswordsAndAddressesAreOneLineWithoutTheWord) {
+TEST_F(FleetMessage, wrongPasswordsAndAddressesGiveOneLineWithoutThePassword) {
   const std::string file = folder_.file("a.sqlite");
   CoefficientDatabase(file).add(recordOf("locked", "steel", 1800e6, 1.7e9));
   const struct {
-    std::string url, due;
+    std::string url, expected;
   } cases[] = {{server_->url("locked", "secret_word"), "password authentication failed"},
                {server_->url("stranger"), "role \"stranger\" does not exist"},
                {server_->url("a", "", "nowhere"), "database \"nowhere\" does not exist"},
                {"postgresql://a@/postgres?host=/tmp/nowhere", "/tmp/nowhere"}};
   for (const auto& c : cases) {
     const FleetPusher pusher(file, c.url, 60.0);
-    const auto said = await(pusher, c.url, [](const auto&) { return true; });
-    EXPECT_FALSE(said.reached);
-    EXPECT_THAT(said.message, AllOf(HasSubstr(c.due), Not(HasSubstr("\n")), Not(HasSubstr("secret_word"))));
-    EXPECT_THAT(said.server, Not(HasSubstr("secret_word")));
-    EXPECT_EQ(said.behind, 1u);
-    EXPECT_TRUE(said.machines.empty());
+    const auto message = await(pusher, c.url, [](const auto&) { return true; });
+    EXPECT_FALSE(message.reached);
+    EXPECT_THAT(message.message,
+                AllOf(HasSubstr(c.expected), Not(HasSubstr("\n")), Not(HasSubstr("secret_word"))));
+    EXPECT_THAT(message.server, Not(HasSubstr("secret_word")));
+    EXPECT_EQ(message.behind, 1u);
+    EXPECT_TRUE(message.machines.empty());
   }
 }
 

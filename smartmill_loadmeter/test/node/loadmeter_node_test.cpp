@@ -31,7 +31,7 @@ namespace {
 
 using Client = actionlib::SimpleActionClient<smartmill_msgs::IdentifyCoefficientsAction>;
 
-const ros::Duration PATIENCE(120.0);  // of a busy machine
+const ros::Duration PATIENCE(120.0);  // for a busy machine
 
 smartmill_msgs::IdentifyCoefficientsGoal goalAt(double stamp, bool reset) {
   smartmill_msgs::IdentifyCoefficientsGoal goal;
@@ -63,7 +63,7 @@ TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
   node.begin();
   for (const ros::Publisher& publisher : {states, loads, currents, conditions}) node.expect(publisher);
   node.expect(forces);
-  // A goal keeps no order with the streams: it is there before they go on.
+  // A goal is not ordered with the streams: it must arrive before they continue.
   const auto send = [&](double stamp, bool reset) {
     client.sendGoal(goalAt(stamp, reset));
     node.settle();
@@ -79,7 +79,7 @@ TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
     node.settle();
   };
 
-  // A plan that was forgotten does not count.
+  // A discarded plan has no effect.
   session.air(9000.0, 2.0);
   send(session.now(), true);
   session.air(2000.0, 0.2);
@@ -92,10 +92,10 @@ TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
   EXPECT_EQ(client.getState(), actionlib::SimpleClientGoalState::ABORTED);
   EXPECT_EQ(client.getResult()->code, smartmill_msgs::IdentifyCoefficientsResult::TOO_FEW_TESTS);
 
-  takeThrough(session);
+  runStandardTests(session);
   send(session.now(), false);
   node.leave();
-  // Nothing follows: the node must not wait for ever for a stream that has ended.
+  // No more data: the node must not wait for a stream that has ended.
   ASSERT_TRUE(client.waitForResult(PATIENCE));
   const auto result = client.getResult();
   ASSERT_EQ(result->code, smartmill_msgs::IdentifyCoefficientsResult::OK) << result->message;
@@ -106,7 +106,7 @@ TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
   EXPECT_EQ(result->coefficients.test_count, 3u);
   EXPECT_EQ(result->coefficients.source, "load_meter");
 
-  // Latched: who comes late gets it.
+  // Latched: a late subscriber receives it.
   const auto latched =
       ros::topic::waitForMessage<smartmill_msgs::CuttingCoefficients>("material/coefficients", nh, PATIENCE);
   ASSERT_TRUE(latched);
@@ -126,7 +126,7 @@ TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
   EXPECT_NE(call.response.message.find("endmill / aluminium"), std::string::npos);
 
   node.begin();
-  // After a pass in air the X drive tells the force of a cut; Y and Z stood still: nothing is told of them.
+  // After a pass in air the X drive gives the force of a cut; Y and Z are at rest and not observable.
   session.airPass(6000.0, 6e-5, 4.0);
   session.slot(6000.0, 6e-5, 4.0);
   session.air(2000.0, 0.3);
@@ -141,11 +141,11 @@ TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
     last = force;
     if (std::isfinite(last.wrench.force.x) && last.wrench.force.x != 0.0) break;
   }
-  EXPECT_NEAR(last.wrench.force.x, truth, 4.0);  // scatter of the calibration: 1 N
+  EXPECT_NEAR(last.wrench.force.x, truth, 4.0);  // the calibration's scatter is 1 N
   EXPECT_TRUE(std::isnan(last.wrench.force.y));
   EXPECT_TRUE(std::isnan(last.wrench.force.z));
 
-  // The one estimator tells all three of the same cut, each as well as it is known.
+  // The estimator gives all three components of the same cut with their uncertainty.
   smartmill_msgs::ForceEstimate::ConstPtr estimate;
   for (int i = 0; i < 200 && !(estimate && estimate->header.stamp == last.header.stamp); ++i)
     estimate = ros::topic::waitForMessage<smartmill_msgs::ForceEstimate>(names::FORCE_ESTIMATE, nh, PATIENCE);
@@ -157,8 +157,8 @@ TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
   EXPECT_GT(estimate->rms.y, 0.0);
 }
 
-// What a discovery explained is kept with its evidence; one that explained nothing is not.
-TEST(LoadMeterNode, keepsWhatADiscoveryFound) {
+// An explanation of a discovery is stored with its evidence; without an explanation nothing is stored.
+TEST(LoadMeterNode, storesExplanations) {
   ros::NodeHandle nh;
   ros::AsyncSpinner spinner(1);
   spinner.start();
@@ -174,7 +174,7 @@ TEST(LoadMeterNode, keepsWhatADiscoveryFound) {
     const std::lock_guard<std::mutex> guard(lock);
     for (const auto& status : m.status) {
       for (const auto& value : status.values) {
-        if (value.key == "explanations kept") kept = value.value;
+        if (value.key == "explanations stored") kept = value.value;
       }
     }
   };
@@ -185,7 +185,7 @@ TEST(LoadMeterNode, keepsWhatADiscoveryFound) {
   result.result.verdict = "no_disagreement";
   result.result.report = folder.file("");
   results.publish(result);
-  results.publish(result);  // the same again
+  results.publish(result);  // repeated
   for (int i = 0; i < 2400; ++i) {
     ros::WallDuration(0.05).sleep();
     const std::lock_guard<std::mutex> guard(lock);
@@ -195,8 +195,8 @@ TEST(LoadMeterNode, keepsWhatADiscoveryFound) {
   EXPECT_EQ(kept, "1");
 }
 
-// What the hammer tells of the spindle's health is kept with the machine's other records, each quantity once.
-TEST(LoadMeterNode, keepsTheSpindlesHealth) {
+// Spindle health of the hammer's node is stored with the other records, each quantity once.
+TEST(LoadMeterNode, storesSpindleHealth) {
   ros::NodeHandle nh, node("loadmeter");
   ros::AsyncSpinner spinner(1);
   spinner.start();
@@ -216,7 +216,7 @@ TEST(LoadMeterNode, keepsTheSpindlesHealth) {
   message.changes[1].quantity = "gain of the mode at 2200 Hz, gone";
   message.changes[1].deviations = std::nan("");
   health.publish(message);
-  health.publish(message);  // the same again
+  health.publish(message);  // repeated
   std::string file;
   ASSERT_TRUE(node.getParam("database", file));
   std::vector<HealthRecord> kept;
@@ -237,7 +237,7 @@ TEST(LoadMeterNode, keepsTheSpindlesHealth) {
   EXPECT_EQ(kept[0].deviations, 4.2);
   EXPECT_EQ(kept[0].drifted, 1.0);
   EXPECT_TRUE(std::isnan(kept[1].deviations));
-  // The node holds it open; this is its last test.
+  // The node has the file open; this is the last test.
   for (const char* part : {"", "-shm", "-wal"}) std::filesystem::remove(file + part);
 }
 

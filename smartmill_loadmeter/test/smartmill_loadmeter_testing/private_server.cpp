@@ -14,7 +14,7 @@ namespace smartmill::loadmeter {
 
 namespace {
 
-/// Folder of the newest PostgreSQL installed, with a slash at its end; empty without one.
+/// Folder of the newest installed PostgreSQL with a trailing slash; empty: none.
 std::string programs() {
   const std::filesystem::path root = "/usr/lib/postgresql";
   int newest = 0;
@@ -35,14 +35,14 @@ bool PrivateServer::available() {
 PrivateServer::PrivateServer(bool durable, const std::string& folder)
     : durable_(durable), own_(folder.empty()), folder_(folder) {
   if (own_) {
-    // A socket's path has 107 bytes at most.
+    // The path of a socket has at most 107 bytes.
     std::string pattern = "/tmp/smartmill_pg_XXXXXX";
-    if (!mkdtemp(pattern.data())) throw Error("no temporary folder");
+    if (!mkdtemp(pattern.data())) throw Error("temporary folder cannot be created");
     folder_ = pattern;
   }
-  // The server refuses to be root.
+  // The server does not run as root.
   if (getuid() == 0 && std::system(("chown postgres " + folder_).c_str()) != 0)
-    throw Error("no user postgres");
+    throw Error("user postgres not found");
   if (execute("initdb -D " + folder_ + "/data -U owner --auth=trust -E UTF8 --locale=C --no-sync") != 0)
     throw Error(folder_ + ": initdb failed");
   std::ofstream(folder_ + "/data/pg_hba.conf", std::ios::trunc)
@@ -72,7 +72,7 @@ void PrivateServer::start() {
   const std::string command = "pg_ctl -D " + folder_ + "/data -w -t 30 -l " + folder_ +
                               "/log -o \"-c listen_addresses='' " + "-c unix_socket_directories='" + folder_ +
                               "' -c shared_buffers=64MB -c max_connections=100" + fast + "\" start";
-  // After a kill old backends live for a moment.
+  // After a kill the old backends end with a delay.
   for (int tries = 0; execute(command) != 0; ++tries) {
     if (tries == 20) throw Error(folder_ + ": the server does not start, see its log");
     usleep(250000);

@@ -35,7 +35,7 @@ struct Arguments {
 
 volatile std::sig_atomic_t stop_requested = 0;
 
-extern "C" void requestStop(int) {
+void requestStop(int) {
   stop_requested = 1;
 }
 

@@ -2,14 +2,16 @@
 
 #include <cmath>
 
+#include "smartmill_core/cutting/friction.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::sim {
 
 double AxisDrive::friction(double velocity, double factor) const {
   if (velocity == 0.0) return 0.0;
-  const double dry = coulomb + stribeck * std::exp(-std::pow(velocity / stribeck_velocity, 2));
-  return factor * (viscous * velocity + std::copysign(dry, velocity));
+  const double speed = std::abs(velocity);
+  const double dry = coulomb + stribeckFriction(stribeck, stribeck_velocity, speed);
+  return std::copysign(LinearFriction{viscous, dry}.at(speed, 0.0, factor), velocity);
 }
 
 double AxisDrive::force(double position, double velocity, double acceleration, double cut,

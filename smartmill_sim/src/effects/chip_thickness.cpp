@@ -23,7 +23,7 @@ class ChipThickness : public Effect {
   void update(const Instant&, TwinState& state) const override { state.law.course = &course_; }
 
  private:
-  ChipCourse course_;
+  EffectiveChipCurve course_;
 };
 
 const EffectClass<ChipThickness> REGISTERED("empirical:chip_thickness");

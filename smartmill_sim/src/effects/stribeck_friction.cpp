@@ -1,4 +1,5 @@
 #include "effect_class.h"
+#include "smartmill_core/cutting/friction.h"
 
 namespace smartmill::sim {
 namespace {
@@ -11,8 +12,7 @@ class StribeckFriction : public Effect {
         speed_(units::radPerSecFromRpm(valueOf(entry, "speed_rpm"))) {}
 
   void update(const Instant& now, TwinState& state) const override {
-    const double ratio = now.speed / speed_;
-    state.friction_extra += breakaway_ * std::exp(-ratio * ratio);
+    state.friction_extra += stribeckFriction(breakaway_, speed_, now.speed);
   }
 
  private:

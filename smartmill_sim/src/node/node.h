@@ -18,7 +18,7 @@
 #include "smartmill_core/modal/modal_model.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_focas/server.h"
-#include "smartmill_ros/kept_topic.h"
+#include "smartmill_ros/latched_topic.h"
 #include "smartmill_ros/node_shell.h"
 #include "smartmill_sim/world/axes_track.h"
 #include "smartmill_sim/world/world.h"
@@ -63,8 +63,8 @@ class Node {
   double start_ = 0.0;  // [s] stamp of sample 0
   ros::Publisher hammer_, dynamometer_, spindle_force_, angle_, force_, vibration_, servo_, motor_current_,
       coefficients_, load_meter_;
-  KeptTopic<smartmill_msgs::Frf> frf_;
-  KeptTopic<smartmill_msgs::ModalModel> modes_;
+  LatchedTopic<smartmill_msgs::Frf> frf_;
+  LatchedTopic<smartmill_msgs::ModalModel> modes_;
   ros::ServiceServer strike_server_;
   std::vector<ros::ServiceServer> panel_;
   NodeShell shell_;

@@ -346,7 +346,7 @@ CutSums MillingProcess::sumsAt(const ToolMotion& now) {
   advance(now);
   if (path_share_ != 0.0) steepest_ = std::max(fastest_[0], fastest_[1]) / (now.speed * time_step_);
   rubs_ = {};
-  forEachEdgePart(arcs_, lag_, rule_.toothAngle(), now.angle, [&](const EdgePart& part) {
+  forEachEdgeSegment(arcs_, lag_, rule_.toothAngle(), now.angle, [&](const EdgeSegment& part) {
     if (only_tooth_ >= 0 && part.tooth != only_tooth_) return;
     // A straight edge stands at one angle: any little spread gives the same.
     const double from = part.straight ? part.to : part.from,

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "smartmill_core/cutting/friction.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::sim {
@@ -161,9 +162,8 @@ void MotorCurrents::sample(const At& at) {
         phase(load_[a] / (traits_.newton_per_ampere[a] * gain), traits_.phase_per_metre[a] * at.position[a]));
   }
   const double speed = std::abs(at.speed);
-  const double friction = speed < spindle_.friction_zero_below
-                              ? 0.0
-                              : friction_factor * (spindle_.viscous * speed + spindle_.coulomb);
+  const double friction = LinearFriction{spindle_.viscous, spindle_.coulomb, spindle_.friction_zero_below}.at(
+      speed, 0.0, friction_factor);
   torque_load_ += follow * (torque_ / count_ + friction - torque_load_);
   power += friction * speed;
   slipped_ += traits_.spindle_slip * torque_load_ * std::abs(at.turns - sampled_.turns);

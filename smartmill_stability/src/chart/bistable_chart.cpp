@@ -5,7 +5,7 @@
 namespace smartmill::stability {
 
 std::optional<BistableChart> bistableChart(const ChartMaker& maker, const ChartParameters& parameters,
-                                           const FoundCurves& curves, int speeds) {
+                                           const IdentifiedForceCurves& curves, int speeds) {
   const std::optional<RegenerativeSystem> system = maker.system({});
   if (!system || curves.teeth != maker.teeth() || speeds < 2) return std::nullopt;
   const ForceCurve& law = curves.curves.tangential;

@@ -13,8 +13,7 @@ void CutRequest::addTo(CommandLine& line, const std::string& form) {
 }
 
 void CutRequest::addOutTo(CommandLine& line, const std::string& what) {
-  line.option("-o,--out", out, "CSV file; " + what + " of the same name with .png is drawn")
-      .required();
+  line.option("-o,--out", out, "CSV file; " + what + " of the same name with .png is drawn").required();
 }
 
 RegenerativeSystem CutRequest::system(const MachineModel& machine) const {

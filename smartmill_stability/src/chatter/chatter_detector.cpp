@@ -300,8 +300,8 @@ ForceBlock signalBlock(const SampleBlock& block) {
   return signal;
 }
 
-SortedDetection::SortedDetection(const ChatterParameters& parameters, double hold_back,
-                                 ChatterDetector::Output output)
+DetectionPipeline::DetectionPipeline(const ChatterParameters& parameters, double hold_back,
+                                     ChatterDetector::Output output)
     : detector_(parameters, std::move(output)),
       sorter_(hold_back),
       conditions_(sorter_.addLatched(names::CUTTING_CONDITION)),
@@ -311,19 +311,19 @@ SortedDetection::SortedDetection(const ChatterParameters& parameters, double hol
   sorter_.onRestart([this] { detector_.reset(); });
 }
 
-void SortedDetection::push(const CuttingCondition& condition) {
+void DetectionPipeline::push(const CuttingCondition& condition) {
   sorter_.push(conditions_, condition.stamp, [this, condition] { detector_.handle(condition); });
 }
 
-void SortedDetection::push(const CncState& state) {
+void DetectionPipeline::push(const CncState& state) {
   sorter_.push(states_, state.stamp, [this, state] { detector_.handle(state); });
 }
 
-void SortedDetection::push(const SpindleAngle& angle) {
+void DetectionPipeline::push(const SpindleAngle& angle) {
   sorter_.push(angles_, angle.stamp, [this, angle] { detector_.handle(angle); });
 }
 
-void SortedDetection::push(const ForceBlock& block) {
+void DetectionPipeline::push(const ForceBlock& block) {
   sorter_.push(blocks_, block.stamp, [this, block] { detector_.handle(block); });
 }
 

@@ -104,7 +104,7 @@ void StabilityNode::listen() {
 template <typename Measured>
 void StabilityNode::measured(const Measured& measured) {
   bistable_due_ = true;
-  if constexpr (std::is_same_v<Measured, FoundCurves>) {
+  if constexpr (std::is_same_v<Measured, IdentifiedForceCurves>) {
     if (parameters_.force_curve.empty()) curves_ = measured;
     return;
   } else {

@@ -25,7 +25,7 @@
 
 namespace smartmill::stability {
 
-/// Shell around ChartMaker and SortedDetection: FRFs and coefficients in, stability/chart and the service
+/// Shell around ChartMaker and DetectionPipeline: FRFs and coefficients in, stability/chart and the service
 /// stability/predict and stability/what_if out; compensated force (or vibration, sound) and controller state
 /// in, chatter/state and chatter/advice out. With adaptive: true MillingControl's wishes go to
 /// cnc/set_overrides.
@@ -69,7 +69,7 @@ class StabilityNode {
   NodeParameters parameters_;
   NodeShell shell_;
   ChartMaker maker_;
-  SortedDetection detection_;
+  DetectionPipeline detection_;
   ChatterAdvisor advisor_;
   MillingControl control_;
   Streams streams_{*this};
@@ -81,7 +81,7 @@ class StabilityNode {
   ros::ServiceClient overrides_;
   std::future<smartmill_msgs::SetOverrides::Response> answer_;  // of the wish that is on its way
 
-  std::optional<FoundCurves> curves_;
+  std::optional<IdentifiedForceCurves> curves_;
   bool bistable_due_ = false;
   std::future<std::optional<BistableChart>> bistable_chart_;  // that is being made
   std::string bistable_problem_;

@@ -10,7 +10,7 @@
 namespace smartmill::stability {
 
 /// The streams beside the cutting condition in which chatter shows, from a node's inputs or from a bag.
-/// @param detection a SortedDetection, or what stands before it
+/// @param detection a DetectionPipeline, or what stands before it
 template <class Source, class Detection>
 void connect(Source& source, const NodeParameters& parameters, Detection& detection) {
   feed<CncState>(source, names::CNC_STATE, detection);
@@ -30,8 +30,8 @@ void connectMeasured(Source& source, Use use) {
                                     [use](const MeasuredModes& modes, double) { use(modes); });
   source.template on<CoefficientSet>(names::COEFFICIENTS,
                                      [use](const CoefficientSet& set, double) { use(set); });
-  source.template on<FoundCurves>(names::FORCE_CURVE,
-                                  [use](const FoundCurves& curves, double) { use(curves); });
+  source.template on<IdentifiedForceCurves>(
+      names::FORCE_CURVE, [use](const IdentifiedForceCurves& curves, double) { use(curves); });
 }
 
 }  // namespace smartmill::stability

@@ -12,12 +12,12 @@ BagCharts chartsFromBag(const std::string& path, const MachineModel& model, cons
                         const std::function<void(double)>& progress) {
   BagCharts found;
   ChartMaker maker(parameters.chart, model);
-  SortedDetection detection(parameters.chatter, parameters.hold_back,
-                            [&](const ChatterState& state) { found.states.push_back(state); });
+  DetectionPipeline detection(parameters.chatter, parameters.hold_back,
+                              [&](const ChatterState& state) { found.states.push_back(state); });
   RecordingReader bag(path);
-  std::optional<FoundCurves> curves;
+  std::optional<IdentifiedForceCurves> curves;
   connectMeasured(bag, [&](const auto& measured) {
-    if constexpr (std::is_same_v<std::decay_t<decltype(measured)>, FoundCurves>) {
+    if constexpr (std::is_same_v<std::decay_t<decltype(measured)>, IdentifiedForceCurves>) {
       curves = measured;
     } else {
       maker.handle(measured);

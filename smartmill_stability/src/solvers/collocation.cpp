@@ -2,8 +2,8 @@
 #include <cmath>
 #include <map>
 
-#include <gsl/gsl_integration.h>
 #include <Eigen/LU>
+#include <boost/math/special_functions/legendre.hpp>
 
 #include "smartmill_core/error.h"
 #include "smartmill_stability/solvers/delayed_system.h"
@@ -42,14 +42,7 @@ struct Reference {
     for (int i = 0; i < n; ++i)
       node[static_cast<std::size_t>(i)] = 0.5 * (1.0 - std::cos(units::PI * i / (n - 1)));
     const auto points = static_cast<std::size_t>(n + 6);
-    gsl_integration_glfixed_table* table = gsl_integration_glfixed_table_alloc(points);
-    for (std::size_t q = 0; q < points; ++q) {
-      double x = 0.0, w = 0.0;
-      gsl_integration_glfixed_point(0.0, 1.0, q, &x, &w, table);
-      gauss.push_back(x);
-      weight.push_back(w);
-    }
-    gsl_integration_glfixed_table_free(table);
+    gaussRule(static_cast<int>(points));
     quadrature = VectorXd::Zero(n);
     for (int i = 0; i < n; ++i) {
       MatrixXd values(n, static_cast<Index>(points));
@@ -77,6 +70,20 @@ struct Reference {
       sum += b;
     }
     return w / sum;
+  }
+
+  /// Gauss-Legendre points and weights on [0, 1], ascending.
+  void gaussRule(int points) {
+    const auto add = [&](double zero) {
+      const double slope = boost::math::legendre_p_prime(points, zero);
+      gauss.push_back(0.5 * (1.0 + zero));
+      weight.push_back(1.0 / ((1.0 - zero * zero) * slope * slope));
+    };
+    const std::vector<double> zeros =
+        boost::math::legendre_p_zeros<double>(points);  // not negative, ascending
+    for (auto zero = zeros.rbegin(); zero != zeros.rend(); ++zero)
+      if (*zero > 0.0) add(-*zero);
+    for (const double zero : zeros) add(zero);
   }
 
   int n;

@@ -142,8 +142,8 @@ TEST(ChatterDetector, saysNothingOutsideTheSteadyPart) {
 
 // The same inputs through a sorter, however late by stream, and again after a restart of the bag: the same
 // verdicts.
-TEST(SortedDetection, anyArrivalGivesTheSameVerdicts) {
-  const auto feed = [](SortedDetection& detection, double lag) {
+TEST(DetectionPipeline, anyArrivalGivesTheSameVerdicts) {
+  const auto feed = [](DetectionPipeline& detection, double lag) {
     CuttingCondition condition;
     condition.stamp = 0.01;
     condition.kind = CuttingCondition::Kind::cut;
@@ -182,7 +182,7 @@ TEST(SortedDetection, anyArrivalGivesTheSameVerdicts) {
   };
   std::vector<std::vector<ChatterState>> results;
   std::vector<ChatterState> states;
-  SortedDetection detection({}, 0.05, [&](const ChatterState& state) {
+  DetectionPipeline detection({}, 0.05, [&](const ChatterState& state) {
     if (state.valid) states.push_back(state);
   });
   for (const double lag : {0.0, 0.0, 0.3}) {
@@ -203,10 +203,10 @@ TEST(SortedDetection, anyArrivalGivesTheSameVerdicts) {
 }
 
 // The condition that holds when a recording begins may have been recorded behind the first states.
-TEST(SortedDetection, theConditionOfTheBeginningMayComeLate) {
+TEST(DetectionPipeline, theConditionOfTheBeginningMayComeLate) {
   const auto verdicts = [](int before) {
     std::vector<ChatterState> states;
-    SortedDetection detection({}, 0.05, [&](const ChatterState& state) { states.push_back(state); });
+    DetectionPipeline detection({}, 0.05, [&](const ChatterState& state) { states.push_back(state); });
     for (int b = 0; b < 100; ++b) {
       if (b == before) {
         CuttingCondition condition;

@@ -30,7 +30,7 @@ class Recorder {
   void operator()(const ForceBlock& b) { write(names::FORCE_COMPENSATED, toMsg(b, "machine")); }
   void operator()(const MeasuredFrf& f) { write(names::TOOL_FRF, toMsg(f)); }
   void operator()(const MeasuredModes& m) { write(names::TOOL_MODES, toMsg(m)); }
-  void operator()(const FoundCurves& f) { write(names::FORCE_CURVE, toMsg(f)); }
+  void operator()(const IdentifiedForceCurves& f) { write(names::FORCE_CURVE, toMsg(f)); }
   void operator()(const CoefficientSet& s) { write(names::COEFFICIENTS, toMsg(s)); }
 
  private:
@@ -98,10 +98,10 @@ MeasuredModes modes(const char* direction) {
 }
 
 /// Kc h + Ke: a straight line in splines has its values at Greville's abscissae.
-FoundCurves straight(double kc, double ke, int teeth) {
+IdentifiedForceCurves straight(double kc, double ke, int teeth) {
   constexpr int PIECES = 8;
   constexpr double TOP = 2e-4;
-  FoundCurves found;
+  IdentifiedForceCurves found;
   found.stamp = 2.0;
   found.material = "steel";
   found.teeth = teeth;

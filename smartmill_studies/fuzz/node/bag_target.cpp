@@ -12,9 +12,7 @@ void hear(RecordingReader& reader, const char* topic) {
   reader.on<Data>(topic, [](const Data&, double) {});
 }
 
-}  // namespace
-
-void bag(const std::uint8_t* data, std::size_t size) {
+void recordingOf(const std::uint8_t* data, std::size_t size) {
   RecordingBytes bytes;
   bytes.size = size;
   bytes.read = [data](std::uint64_t at, char* to, std::size_t count) {
@@ -37,6 +35,17 @@ void bag(const std::uint8_t* data, std::size_t size) {
     reader.run();
     reader.duration();
   });
+}
+
+}  // namespace
+
+// The first bytes of the corpus decide which reader runs.
+void bag(const std::uint8_t* data, std::size_t size) {
+  recordingOf(data, size);
+}
+
+void mcap(const std::uint8_t* data, std::size_t size) {
+  recordingOf(data, size);
 }
 
 }  // namespace smartmill::fuzz

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "smartmill_core/modal/hit_judge.h"
+#include "smartmill_core/modal/hit_check.h"
 #include "smartmill_core/program.h"
 #include "smartmill_hammer_testing/hit_records.h"
 #include "study_case.h"
@@ -49,7 +49,7 @@ Tally count(HitClass kind, const Request& request, int first, int step) {
   for (int i = first; i < request.records; i += step) {
     const std::uint64_t seed = request.seed * 1000000 + static_cast<std::uint64_t>(i);
     const hammer::HitCase drawn = hammer::drawHitCase(kind, seed);
-    HitJudgeOptions options;
+    HitCheckOptions options;
     options.weak_force = drawn.weak_force;
     options.high = drawn.high;
     const std::vector<HitFault> faults = judgeHits(drawn.hits, options);

@@ -15,7 +15,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
-#include "smartmill_kalman/compensation/sorted_compensation.h"
+#include "smartmill_kalman/compensation/compensation_pipeline.h"
 #include "smartmill_kalman_testing/reference_case.h"
 
 namespace {
@@ -75,7 +75,7 @@ class Machine {
     block_.samples.resize(3 * BLOCK);
   }
 
-  void feed(kalman::SortedCompensation& sorted, long number) {
+  void feed(kalman::CompensationPipeline& sorted, long number) {
     const long minute = number / BLOCKS_PER_MINUTE;
     const double speed = units::radPerSecFromRpm(6000.0 + 3000.0 * static_cast<double>(minute % 4));
     block_.stamp = 0.01 * static_cast<double>(number);
@@ -130,11 +130,11 @@ void run(double minutes) {
   for (ModalModel& axis : sensor.axis) axis = ReferenceCase::exactSensor();
   std::size_t blocks_out = 0;
   double sum = 0.0;
-  const auto receive = [&](const ForceBlock&, const ForceBlock& compensated) {
+  const auto receive = [&](const ForceBlock& compensated) {
     ++blocks_out;
     sum += compensated.force[0].back();
   };
-  kalman::SortedCompensation sorted({}, {}, sensor, 0.05, {receive, {}, {}, {}});
+  kalman::CompensationPipeline sorted({}, {}, sensor, 0.05, {{{}, receive}});
   const auto blocks = static_cast<long>(minutes * BLOCKS_PER_MINUTE);
   const auto begin = std::chrono::steady_clock::now();
   Machine machine;

@@ -60,7 +60,7 @@ void blockOfThreeAxesAt50kHz(benchmark::State& state) {
   constexpr double FAST = 50000.0;
   constexpr std::size_t SAMPLES = 500;
   ForceCompensation compensation(
-      {}, false, [](const ForceBlock&, const ForceBlock& c) { benchmark::DoNotOptimize(c.force[0].data()); });
+      {}, false, {{}, [](const ForceBlock& c) { benchmark::DoNotOptimize(c.force[0].data()); }});
   for (std::size_t axis = 0; axis < 3; ++axis) compensation.setSensor(axis, ReferenceCase::exactSensor());
   SampleBlock block;
   block.sample_rate = FAST;

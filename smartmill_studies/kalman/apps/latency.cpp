@@ -15,7 +15,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
-#include "smartmill_kalman/compensation/sorted_compensation.h"
+#include "smartmill_kalman/compensation/compensation_pipeline.h"
 #include "smartmill_kalman_testing/reference_case.h"
 
 namespace {
@@ -104,10 +104,10 @@ class Load {
 
 Took runEstimator(int blocks, double& sum) {
   std::size_t out = 0;
-  kalman::ForceCompensation estimator({}, false, [&](const ForceBlock&, const ForceBlock& compensated) {
-    ++out;
-    sum += compensated.force[0].back();
-  });
+  kalman::ForceCompensation estimator({}, false, {{}, [&](const ForceBlock& compensated) {
+                                                    ++out;
+                                                    sum += compensated.force[0].back();
+                                                  }});
   for (std::size_t axis = 0; axis < 3; ++axis) estimator.setSensor(axis, ReferenceCase::exactSensor());
   const Took took = run(blocks, [&](const SampleBlock& block) {
     estimator.handle(SpindleAngle{block.stamp, SPEED * block.stamp, SPEED});

@@ -315,7 +315,7 @@ class TuningStudy {
     reference_.duration = duration;
     taps_ = simulateTaps(reference_, 9);
     sensor_ = identifySensor(taps_.hammer, taps_.response, rate(), {100.0, BAND, 4}).model;
-    frf_ = averaged(taps_.hammer, taps_.response, rate());
+    frf_ = averagedFrf(taps_.hammer, taps_.response, rate());
     r_taps_ = noiseBefore(taps_, rate(), 0.009);
     for (double rpm = 1000.0; rpm <= 20000.0; rpm += 200.0) speeds_.push_back(units::radPerSecFromRpm(rpm));
     map_ = tapMap(taps_, sensor_, rate(), r_taps_, speeds_, BAND);

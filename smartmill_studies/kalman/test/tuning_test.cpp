@@ -48,7 +48,7 @@ TEST(Tuning, NoiseIsToldFromBeforeTheBlows) {
 }
 
 TEST(Tuning, PlantsLieAtTheEdgeOfTheConfidenceInterval) {
-  FrequencyResponse frf = averaged(taps().hammer, taps().response, RATE);
+  FrequencyResponse frf = averagedFrf(taps().hammer, taps().response, RATE);
   for (std::size_t i = 0; i < frf.size(); ++i) frf.std_dev[i] = 0.01 * std::abs(frf.value[i]);
   const auto before = fourier(taps().response[2]),
              after = fourier(plantAt(taps(), frf, RATE, -3.0).response[2]);

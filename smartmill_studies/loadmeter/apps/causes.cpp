@@ -97,7 +97,7 @@ void tell(CauseSearch search, const std::vector<std::string>& tests, const Model
   for (const TestEvidence& t : evidenceOf(machine)) shows[t.test] = outcomeOf(t);
   for (Count* count : counts) ++count->machines;
   for (std::size_t made = 0; made <= tests.size(); ++made) {
-    if (const auto alone = search.alone()) {
+    if (const auto alone = search.acceptedHypothesis()) {
       for (Count* count : counts) {
         (*alone == due ? count->right : count->wrong) += 1;
         if (*alone == due) count->tests += static_cast<double>(made);
@@ -106,7 +106,7 @@ void tell(CauseSearch search, const std::vector<std::string>& tests, const Model
     }
     const auto test = way == Way::plan ? std::optional<std::size_t>(made) : search.next();
     if (!test || *test >= tests.size()) return;
-    search.saw(*test, shows[tests[*test]]);
+    search.addOutcome(*test, shows[tests[*test]]);
   }
 }
 

@@ -256,7 +256,7 @@ void lookUp(const Shop& shop, const Options& o) {
   const CoefficientDatabase fleet(shop.url(1));
   std::mt19937 random(o.seed + 9);
   std::uniform_real_distribution<double> uniform;
-  const std::function<void()> echo = fleetEcho(shop.url(1));
+  const std::function<void()> echo = roundTripTimer(shop.url(1));
   std::vector<double> estimates, newest, bare;
   for (int i = 0; i < o.lookups; ++i) {
     const int number = static_cast<int>(1000 * uniform(random));

@@ -61,8 +61,8 @@ void print(const std::vector<ShopJob>& jobs, int days) {
       if (job.met == met) part.add(job);
     part.print(met ? "pairs that have met" : "pairs that have never met");
   }
-  for (const AnswerWay way :
-       {AnswerWay::pair, AnswerWay::shear_zone, AnswerWay::standard_cuts, AnswerWay::other_tool}) {
+  for (const EstimationMethod way : {EstimationMethod::pair, EstimationMethod::shear_zone,
+                                     EstimationMethod::standard_cuts, EstimationMethod::other_tool}) {
     Part part;
     for (const ShopJob& job : jobs)
       if (job.answered && job.way == way) part.add(job);

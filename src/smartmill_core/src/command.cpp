@@ -81,7 +81,7 @@ const Command* CommandProgram::find(const std::string& command) const {
 }
 
 std::string CommandProgram::nearest(const std::string& word) const {
-  std::string name;
+  std::string closest;
   std::size_t least = std::max<std::size_t>(2, word.size() / 2) + 1;
   for (const CommandTopic& topic : topics) {
     for (const Command& one : topic.commands) {
@@ -89,10 +89,10 @@ std::string CommandProgram::nearest(const std::string& word) const {
       if (!word.empty() && one.name.rfind(word, 0) == 0) apart = std::min<std::size_t>(apart, 1);
       if (apart >= least) continue;
       least = apart;
-      name = one.name;
+      closest = one.name;
     }
   }
-  return name;
+  return closest;
 }
 
 std::string CommandProgram::help() const {

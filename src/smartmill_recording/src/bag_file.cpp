@@ -127,7 +127,7 @@ Record BagFile::record(std::uint64_t at) const {
     const std::string where =
         ": a record at byte " + std::to_string(at) + " of " + std::to_string(bytes_.size);
     if (bytes_.size - place < LENGTH) fail("is cut off" + where + " has no length");
-    look(place, bytes, LENGTH);
+    copy(place, bytes, LENGTH);
     const auto size = numberAt<std::uint32_t>(bytes);
     if (size > bytes_.size - place - LENGTH)
       fail((size > bytes_.size ? "is damaged" : "is cut off") + where + " states " + std::to_string(size) +
@@ -137,7 +137,7 @@ Record BagFile::record(std::uint64_t at) const {
   Record found;
   found.begin = at;
   found.header.resize(length(at));
-  look(at + LENGTH, found.header.data(), found.header.size());
+  copy(at + LENGTH, found.header.data(), found.header.size());
   const std::uint64_t middle = at + LENGTH + found.header.size();
   found.data_size = length(middle);
   found.data_at = middle + LENGTH;

@@ -105,7 +105,7 @@ std::string BagWriter::header(std::uint64_t index) const {
 std::uint32_t BagWriter::connect(const RecordedConnection& connection) {
   if (connection.encoding != "ros1")
     throw Error(path_ + ": topic " + connection.topic + " is encoded as " + connection.encoding +
-                ", a bag holds ros1 only");
+                ", expected ros1");
   const auto number = static_cast<std::uint32_t>(connections_.size());
   Fields more;
   more.add("topic", connection.topic)
@@ -123,7 +123,7 @@ void BagWriter::write(std::uint32_t connection, std::uint64_t time, const std::u
                       std::size_t size) {
   if (time / SECOND > std::numeric_limits<std::uint32_t>::max())
     throw Error(path_ + ": a time of " + std::to_string(time / SECOND) +
-                " s, a bag holds up to 4294967295 s");
+                " s, expected at most 4294967295 s in a bag");
   if (!in_file_.at(connection)) {
     in_file_[connection] = true;
     chunk_ += connections_[connection];

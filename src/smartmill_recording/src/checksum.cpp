@@ -1,5 +1,7 @@
 #include "checksum.h"
 
+#include <zlib.h>
+
 #include <array>
 #include <cmath>
 
@@ -7,27 +9,6 @@
 
 namespace smartmill {
 namespace {
-
-constexpr std::size_t SLICES = 8;
-using Table = std::array<std::array<std::uint32_t, 256>, SLICES>;
-
-/// Of each byte, with 0 to 7 zero bytes behind it: eight bytes are then taken at once.
-Table makeTable() {
-  constexpr std::uint32_t POLYNOMIAL = 0xEDB88320U;
-  Table table{};
-  for (std::uint32_t byte = 0; byte < 256; ++byte) {
-    std::uint32_t value = byte;
-    for (int bit = 0; bit < 8; ++bit) value = (value & 1U) != 0U ? value >> 1U ^ POLYNOMIAL : value >> 1U;
-    table[0][byte] = value;
-  }
-  for (std::size_t slice = 1; slice < SLICES; ++slice) {
-    for (std::size_t byte = 0; byte < 256; ++byte) {
-      const std::uint32_t value = table[slice - 1][byte];
-      table[slice][byte] = value >> 8U ^ table[0][value & 0xFFU];
-    }
-  }
-  return table;
-}
 
 std::uint32_t rotated(std::uint32_t value, unsigned by) {
   return value << by | value >> (32U - by);
@@ -65,17 +46,7 @@ void digest(const std::uint8_t* block, std::array<std::uint32_t, 4>& state) {
 }  // namespace
 
 std::uint32_t crc32(const std::uint8_t* bytes, std::size_t size, std::uint32_t before) {
-  static const Table TABLE = makeTable();
-  std::uint32_t value = ~before;
-  for (; size >= SLICES; size -= SLICES, bytes += SLICES) {
-    const std::uint32_t low = value ^ numberAt<std::uint32_t>(bytes),
-                        high = numberAt<std::uint32_t>(bytes + 4);
-    value = TABLE[7][low & 0xFFU] ^ TABLE[6][low >> 8U & 0xFFU] ^ TABLE[5][low >> 16U & 0xFFU] ^
-            TABLE[4][low >> 24U] ^ TABLE[3][high & 0xFFU] ^ TABLE[2][high >> 8U & 0xFFU] ^
-            TABLE[1][high >> 16U & 0xFFU] ^ TABLE[0][high >> 24U];
-  }
-  for (; size > 0; --size, ++bytes) value = value >> 8U ^ TABLE[0][(value ^ *bytes) & 0xFFU];
-  return ~value;
+  return static_cast<std::uint32_t>(::crc32_z(before, bytes, size));
 }
 
 std::string md5(const std::string& text) {

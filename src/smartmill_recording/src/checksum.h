@@ -6,7 +6,7 @@
 
 namespace smartmill {
 
-/// CRC-32 of IEEE 802.3 (reflected polynomial 0xEDB88320), as zlib and MCAP use it.
+/// CRC-32 of IEEE 802.3, as MCAP uses it.
 /// @param before of the bytes before these; 0: none
 std::uint32_t crc32(const std::uint8_t* bytes, std::size_t size, std::uint32_t before = 0);
 

@@ -15,9 +15,10 @@
 namespace smartmill {
 namespace {
 
-constexpr std::size_t WINDOW = 4096;          // [byte]
-constexpr std::size_t KEPT = 4;               // chunks, since neighbours overlap in time
-constexpr std::uint64_t SECOND = 1000000000;  // [ns]
+constexpr std::size_t WINDOW = 4096;            // [byte]
+constexpr std::size_t MOST_KEPT = 256U << 20U;  // [byte] of chunks that overlap in time
+constexpr std::size_t LEAST_KEPT = 4;           // chunks
+constexpr std::uint64_t SECOND = 1000000000;    // [ns]
 
 }  // namespace
 
@@ -29,7 +30,7 @@ void ChunkedFile::fail(const std::string& what) const {
   throw Error(name_ + ": " + what);
 }
 
-void ChunkedFile::look(std::uint64_t at, std::uint8_t* to, std::size_t count) const {
+void ChunkedFile::copy(std::uint64_t at, std::uint8_t* to, std::size_t count) const {
   if (count > WINDOW) {
     bytes_.read(at, reinterpret_cast<char*>(to), count);
     return;
@@ -42,9 +43,9 @@ void ChunkedFile::look(std::uint64_t at, std::uint8_t* to, std::size_t count) co
   std::copy_n(window_.begin() + static_cast<std::ptrdiff_t>(at - window_at_), count, to);
 }
 
-std::string ChunkedFile::word(std::uint64_t at, std::size_t count) const {
+std::string ChunkedFile::textAt(std::uint64_t at, std::size_t count) const {
   std::string bytes(count, '\0');
-  look(at, reinterpret_cast<std::uint8_t*>(bytes.data()), count);
+  copy(at, reinterpret_cast<std::uint8_t*>(bytes.data()), count);
   return bytes;
 }
 
@@ -58,16 +59,20 @@ void ChunkedFile::finishChunks() {
 }
 
 bool ChunkedFile::next(Entry* entry) {
+  if (spent_) release(chunks_[*spent_]);
+  spent_.reset();
   const auto waits = [this] {
     return waiting_.empty() || waiting_.top().entry.time > chunks_[indexed_ - 1].first_behind;
   };
   while (indexed_ < chunks_.size() && waits()) {
     index(indexed_, load(indexed_));
+    if (chunks_[indexed_].waiting == 0) release(chunks_[indexed_]);
     if (++indexed_ == chunks_.size()) checkEnd(arrivals_);
   }
   if (waiting_.empty()) return false;
   *entry = waiting_.top().entry;
   waiting_.pop();
+  if (--chunks_[entry->chunk].waiting == 0) spent_ = entry->chunk;
   if (connections_.count(entry->connection) == 0)
     fail("is damaged: a message of connection " + std::to_string(entry->connection) +
          ", which is not declared");
@@ -82,16 +87,35 @@ void ChunkedFile::addMessage(const Entry& entry) {
   if (entry.time < chunks_[entry.chunk].first)
     fail("is damaged: a message is older than the first time that is stated of its chunk");
   waiting_.push({arrivals_++, entry});
+  ++chunks_[entry.chunk].waiting;
 }
 
-/// Memory that was used before is at hand already.
+/// Memory for a chunk: that of a released one, or of the oldest where too much is kept.
 ChunkedFile::Loaded ChunkedFile::spare() {
+  if (spares_.empty() && kept_ > MOST_KEPT && loaded_.size() > LEAST_KEPT) release(chunks_[loaded_.front()]);
   Loaded loaded;
-  if (loaded_.size() >= KEPT) {
-    loaded = std::move(loaded_.back());
-    loaded_.pop_back();
-  }
+  loaded.stored = std::move(stored_);
+  if (spares_.empty()) return loaded;
+  loaded.bytes = std::move(spares_.back());
+  spares_.pop_back();
   return loaded;
+}
+
+void ChunkedFile::release(Chunk& chunk) {
+  if (!chunk.loaded) return;
+  chunk.loaded = false;
+  kept_ -= chunk.bytes.size();
+  spares_.push_back(std::move(chunk.bytes));
+  while (!loaded_.empty() && !chunks_[loaded_.front()].loaded) loaded_.pop_front();
+}
+
+void ChunkedFile::keep(std::uint32_t number, Loaded&& loaded) {
+  Chunk& chunk = chunks_[number];
+  chunk.bytes = std::move(loaded.bytes);
+  stored_ = std::move(loaded.stored);
+  chunk.loaded = true;
+  kept_ += chunk.bytes.size();
+  loaded_.push_back(number);
 }
 
 /// @throws std::exception
@@ -106,43 +130,37 @@ void ChunkedFile::unpackInto(const Chunk& chunk, Loaded* loaded) const {
     throw std::runtime_error("checksum mismatch");
 }
 
-/// Begins to unpack a chunk that will be asked for.
+/// Begins to unpack a chunk that is needed next.
 void ChunkedFile::ahead(std::uint32_t number) {
   if (number >= chunks_.size()) return;
-  Loaded loaded = spare();
-  loaded.chunk = number;
-  coming_ =
-      std::async(std::launch::async, [this, chunk = chunks_[number], loaded = std::move(loaded)]() mutable {
-        unpackInto(chunk, &loaded);
-        return std::move(loaded);
-      });
+  coming_ = std::async(std::launch::async, [this, number, loaded = spare()]() mutable {
+    unpackInto(chunks_[number], &loaded);
+    return std::move(loaded);
+  });
 }
 
 const std::vector<std::uint8_t>& ChunkedFile::load(std::uint32_t number) {
-  const auto kept = std::find_if(loaded_.begin(), loaded_.end(),
-                                 [number](const Loaded& loaded) { return loaded.chunk == number; });
-  if (kept != loaded_.end()) return kept->bytes;
+  Chunk& chunk = chunks_[number];
+  if (chunk.loaded) return chunk.bytes;
   try {
     // Only next() goes on to a chunk that was never seen.
-    if (!chunks_[number].seen && coming_.valid()) {
-      loaded_.push_front(coming_.get());
+    if (!chunk.seen && coming_.valid()) {
+      keep(number, coming_.get());
     } else {
       Loaded loaded = spare();
-      loaded.chunk = number;
-      unpackInto(chunks_[number], &loaded);
-      loaded_.push_front(std::move(loaded));
+      unpackInto(chunk, &loaded);
+      keep(number, std::move(loaded));
     }
   } catch (const Error&) {
     throw;
   } catch (const std::exception& e) {
-    fail("is damaged: the chunk at byte " + std::to_string(chunks_[number].begin) +
-         " cannot be unpacked: " + e.what());
+    fail("is damaged: the chunk at byte " + std::to_string(chunk.begin) + " cannot be unpacked: " + e.what());
   }
-  if (!chunks_[number].seen) {
-    chunks_[number].seen = true;
+  if (!chunk.seen) {
+    chunk.seen = true;
     ahead(number + 1);
   }
-  return loaded_.front().bytes;
+  return chunk.bytes;
 }
 
 const std::uint8_t* ChunkedFile::data(const Entry& entry) {

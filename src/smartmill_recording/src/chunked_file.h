@@ -6,6 +6,7 @@
 #include <functional>
 #include <future>
 #include <map>
+#include <optional>
 #include <queue>
 #include <string>
 #include <vector>
@@ -15,9 +16,10 @@
 
 namespace smartmill {
 
-/// What bags and MCAP files share: messages in chunks, each of which is read and decompressed once, ahead of
-/// the reader by a thread of its own, and put in the order of reception. Of the file's index only the time of
-/// each chunk's first message is used, and compared when the chunk is read.
+/// What bags and MCAP files share: messages in chunks, which a thread reads and decompresses ahead of the
+/// reader, in the order of reception. A chunk stays in memory until its last message was returned; only where
+/// chunks that overlap in time exceed a limit is one of them decompressed again. Of the file's index only the
+/// time of each chunk's first message is used, and compared when the chunk is read.
 class ChunkedFile : public RecordingFile {
  public:
   const std::map<std::uint32_t, RecordedConnection>& connections() const override { return connections_; }
@@ -32,20 +34,23 @@ class ChunkedFile : public RecordingFile {
     std::uint64_t stored = 0;  // [byte]
     std::uint32_t size = 0;    // [byte] when unpacked
     Packing packing = Packing::none;
-    std::uint64_t first = 0;         // [ns] none of its messages is older
-    std::uint64_t first_behind = 0;  // [ns] nor of the chunks behind it
-    std::uint32_t checksum = 0;      // CRC-32 of the unpacked bytes; 0: not stated
-    bool seen = false;               // unpacked before, its checksum was right
+    std::uint64_t first = 0;          // [ns] none of its messages is older
+    std::uint64_t first_behind = 0;   // [ns] nor of the chunks behind it
+    std::uint32_t checksum = 0;       // CRC-32 of the unpacked bytes; 0: not stated
+    bool seen = false;                // unpacked before, its checksum was right
+    std::vector<std::uint8_t> bytes;  // unpacked, while loaded
+    bool loaded = false;
+    std::size_t waiting = 0;  // messages that next() has found and not returned yet
   };
 
   ChunkedFile(RecordingBytes bytes, std::string name) : bytes_(std::move(bytes)), name_(std::move(name)) {}
 
   /// One line that names the file. @throws Error
   [[noreturn]] void fail(const std::string& what) const;
-  /// Copies bytes that lie within the file; small ones by a window, since records lie side by side.
-  void look(std::uint64_t at, std::uint8_t* to, std::size_t count) const;
-  /// Bytes that lie within the file, as a word.
-  std::string word(std::uint64_t at, std::size_t count) const;
+  /// Copies bytes that lie within the file; few of them by a window, since records are next to each other.
+  void copy(std::uint64_t at, std::uint8_t* to, std::size_t count) const;
+  /// Bytes that lie within the file, as a string.
+  std::string textAt(std::uint64_t at, std::size_t count) const;
   /// After the last chunk was added.
   void finishChunks();
   /// Calls addMessage() for each message of an unpacked chunk. @throws Error
@@ -63,7 +68,6 @@ class ChunkedFile : public RecordingFile {
 
  private:
   struct Loaded {
-    std::uint32_t chunk = 0;
     std::vector<std::uint8_t> bytes, stored;
   };
   struct Waiting {
@@ -75,16 +79,22 @@ class ChunkedFile : public RecordingFile {
   };
 
   Loaded spare();
+  void release(Chunk& chunk);
+  void keep(std::uint32_t number, Loaded&& loaded);
   void unpackInto(const Chunk& chunk, Loaded* loaded) const;
   void ahead(std::uint32_t number);
 
-  mutable std::vector<std::uint8_t> window_;  // of the file, while its records are gone through
+  mutable std::vector<std::uint8_t> window_;  // of the file, while its records are scanned
   mutable std::uint64_t window_at_ = 0;
   std::uint32_t indexed_ = 0;  // chunks
   std::size_t arrivals_ = 0;   // messages
   std::priority_queue<Waiting, std::vector<Waiting>, std::greater<>> waiting_;
-  std::deque<Loaded> loaded_;   // the newest in front
-  std::future<Loaded> coming_;  // is waited for before anything else here goes
+  std::deque<std::uint32_t> loaded_;    // chunks in the order of loading; some are released already
+  std::size_t kept_ = 0;                // [byte] of loaded chunks
+  std::optional<std::uint32_t> spent_;  // chunk whose last message was returned last
+  std::vector<std::vector<std::uint8_t>> spares_;  // memory of released chunks
+  std::vector<std::uint8_t> stored_;               // memory of packed bytes
+  std::future<Loaded> coming_;                     // is waited for before anything else here goes
 };
 
 }  // namespace smartmill

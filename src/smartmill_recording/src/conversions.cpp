@@ -74,10 +74,10 @@ StabilityChart fromMsg(const plain::StabilityChart& message) {
 plain::StabilityChart toPlain(const StabilityChart& data) {
   return conversion::to<plain::StabilityChart>(data);
 }
-FoundCurves fromMsg(const plain::ForceCurve& message) {
-  return conversion::from<FoundCurves>(message);
+IdentifiedForceCurves fromMsg(const plain::ForceCurve& message) {
+  return conversion::from<IdentifiedForceCurves>(message);
 }
-plain::ForceCurve toPlain(const FoundCurves& data) {
+plain::ForceCurve toPlain(const IdentifiedForceCurves& data) {
   return conversion::to<plain::ForceCurve>(data);
 }
 MeasureFrfGoal goalFromMsg(const plain::MeasureFrfGoal& message, double received) {

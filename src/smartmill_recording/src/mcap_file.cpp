@@ -118,7 +118,7 @@ McapFile::McapFile(RecordingBytes bytes, std::string name) : ChunkedFile(std::mo
   if (statistics_ && statistics_->chunks != 0 && chunks_.empty())
     fail("is damaged: its statistics state " + std::to_string(statistics_->chunks) +
          " chunks, none is there");
-  // Without a copy of the channels in the summary they stand in the chunks alone.
+  // Without a copy of the channels in the summary they are in the chunks alone.
   if (!statistics_ || statistics_->channels != channels_.size()) {
     for (std::uint32_t i = 0; i < chunks_.size(); ++i) index(i, load(i));
   }
@@ -132,7 +132,7 @@ Record McapFile::record(std::uint64_t at) const {
   if (bytes_.size - at < MCAP_RECORD_HEAD)
     fail("is cut off" + where() + ": expected a record, the last one a footer");
   std::uint8_t head[MCAP_RECORD_HEAD];
-  look(at, head, sizeof head);
+  copy(at, head, sizeof head);
   const Record found{static_cast<McapOp>(head[0]), at, at + MCAP_RECORD_HEAD,
                      numberAt<std::uint64_t>(head + 1)};
   if (found.size > bytes_.size - found.at)
@@ -150,7 +150,7 @@ void McapFile::scan() {
     const bool in_data = !summary;
     if (found.op == McapOp::schema || found.op == McapOp::channel || found.op == McapOp::statistics ||
         found.op == McapOp::data_end) {
-      const std::string content = word(found.at, static_cast<std::size_t>(found.size));
+      const std::string content = textAt(found.at, static_cast<std::size_t>(found.size));
       const auto* const data = reinterpret_cast<const std::uint8_t*>(content.data());
       Fields fields(*this, data, content.size());
       if (found.op == McapOp::data_end) {
@@ -185,12 +185,12 @@ void McapFile::scan() {
 /// @param summary position behind the data section
 void McapFile::checkFooter(const Record& footer, std::uint64_t summary) const {
   const std::string content =
-      word(footer.at, static_cast<std::size_t>(std::min<std::uint64_t>(footer.size, FOOTER_SIZE)));
+      textAt(footer.at, static_cast<std::size_t>(std::min<std::uint64_t>(footer.size, FOOTER_SIZE)));
   Fields fields(*this, reinterpret_cast<const std::uint8_t*>(content.data()), content.size());
   const auto start = fields.number<std::uint64_t>();
   fields.number<std::uint64_t>();  // of the summary's offsets
   const auto checksum = fields.number<std::uint32_t>();
-  if (footer.end() + MCAP_MAGIC_SIZE != bytes_.size || word(footer.end(), MCAP_MAGIC_SIZE) != MCAP_MAGIC)
+  if (footer.end() + MCAP_MAGIC_SIZE != bytes_.size || textAt(footer.end(), MCAP_MAGIC_SIZE) != MCAP_MAGIC)
     fail("is damaged: expected the MCAP magic bytes behind the footer, at byte " +
          std::to_string(footer.end()));
   if (start != 0 && start != summary)
@@ -220,7 +220,7 @@ void McapFile::addLoose(const Record& found) {
     fail("is damaged: a message record of " + std::to_string(found.size) + " bytes at byte " +
          std::to_string(found.begin));
   std::uint8_t head[MCAP_MESSAGE_HEAD];
-  look(found.at, head, sizeof head);
+  copy(found.at, head, sizeof head);
   const auto time = numberAt<std::uint64_t>(head + 6);
   const std::uint64_t size = found.end() - found.begin;
   if (chunks_.empty() || loose_end_ != found.begin || chunks_.back().stored + size > MOST_TOGETHER) {
@@ -238,7 +238,7 @@ void McapFile::addLoose(const Record& found) {
 
 void McapFile::addChunk(const Record& found) {
   const std::string head =
-      word(found.at, static_cast<std::size_t>(std::min<std::uint64_t>(found.size, CHUNK_HEAD)));
+      textAt(found.at, static_cast<std::size_t>(std::min<std::uint64_t>(found.size, CHUNK_HEAD)));
   Fields fields(*this, reinterpret_cast<const std::uint8_t*>(head.data()), head.size());
   Chunk chunk;
   chunk.begin = found.begin;
@@ -251,7 +251,7 @@ void McapFile::addChunk(const Record& found) {
   const auto where = [&] { return ": the chunk at byte " + std::to_string(found.begin); };
   if (found.size < CHUNK_HEAD + LENGTH || name > found.size - CHUNK_HEAD - LENGTH)
     fail("is damaged" + where() + " states a compression of " + std::to_string(name) + " letters");
-  const std::string tail = word(found.at + CHUNK_HEAD, name + LENGTH);
+  const std::string tail = textAt(found.at + CHUNK_HEAD, name + LENGTH);
   const std::string packing = tail.substr(0, name);
   chunk.stored = numberAt<std::uint64_t>(tail.data() + name);
   chunk.at = found.at + CHUNK_HEAD + name + LENGTH;
@@ -342,7 +342,7 @@ void McapFile::index(std::uint32_t number, const std::vector<std::uint8_t>& byte
   }
 }
 
-/// A record whose code is damaged is passed over as an unknown one; the statistics tell that it is missing.
+/// A record whose code is damaged is skipped as an unknown one; it is then missing from the statistics.
 void McapFile::checkEnd(std::size_t messages) const {
   if (statistics_ && statistics_->messages != messages)
     fail("is damaged: its statistics state " + std::to_string(statistics_->messages) + " messages, " +

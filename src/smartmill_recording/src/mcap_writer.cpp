@@ -51,7 +51,7 @@ std::string recordOf(McapOp op, const Content& content) {
 class McapWriter : public RecordingWriter {
  public:
   McapWriter(const std::string& path, Packing packing) : path_(path), file_(path), packing_(packing) {
-    file_.write(MAGIC + recordOf(McapOp::header, Content().text(MCAP_PROFILE).text(LIBRARY)));
+    put(MAGIC + recordOf(McapOp::header, Content().text(MCAP_PROFILE).text(LIBRARY)));
   }
   std::uint32_t connect(const RecordedConnection& connection) override;
   void write(std::uint32_t connection, std::uint64_t time, const std::uint8_t* data,
@@ -83,12 +83,17 @@ class McapWriter : public RecordingWriter {
     std::uint64_t begin() const { return std::min(first, last); }  // 0 without messages
   };
 
+  void put(const std::string& bytes);
+  static std::uint32_t checksumOf(const std::string& bytes, std::uint32_t before = 0) {
+    return crc32(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size(), before);
+  }
   std::uint16_t schemaOf(const RecordedConnection& connection);
   void flush();
   void writeSummary();
 
   std::string path_;
   OutputFile file_;
+  std::uint32_t data_checksum_ = 0;
   Packing packing_;
   std::vector<Schema> schemas_;  // number 1 first
   std::vector<Channel> channels_;
@@ -98,6 +103,12 @@ class McapWriter : public RecordingWriter {
   std::uint64_t messages_ = 0;
   std::vector<std::string> chunk_indexes_;  // their records
 };
+
+/// In the data section, of which the checksum is written behind it.
+void McapWriter::put(const std::string& bytes) {
+  file_.write(bytes);
+  data_checksum_ = checksumOf(bytes, data_checksum_);
+}
 
 /// 0 where neither type nor definition is known.
 std::uint16_t McapWriter::schemaOf(const RecordedConnection& connection) {
@@ -118,7 +129,7 @@ std::uint16_t McapWriter::schemaOf(const RecordedConnection& connection) {
 
 std::uint32_t McapWriter::connect(const RecordedConnection& connection) {
   if (channels_.size() >= std::numeric_limits<std::uint16_t>::max())
-    throw Error(path_ + ": an MCAP file holds up to 65535 channels");
+    throw Error(path_ + ": expected at most 65535 channels in an MCAP file");
   if (connection.encoding != MCAP_MESSAGE_ENCODING)
     throw Error(path_ + ": topic " + connection.topic + " is encoded as " + connection.encoding +
                 ", expected ros1");
@@ -167,24 +178,23 @@ void McapWriter::flush() {
   const std::string packing = packing_ == Packing::zstd ? "zstd" : packing_ == Packing::lz4 ? "lz4" : "";
   const auto size = static_cast<std::uint64_t>(chunk_.size()),
              stored = static_cast<std::uint64_t>(packed.size());
-  const std::string record = recordOf(
-      McapOp::chunk, Content()
-                         .number(chunk_span_.begin())
-                         .number(chunk_span_.last)
-                         .number(size)
-                         .number(crc32(reinterpret_cast<const std::uint8_t*>(chunk_.data()), chunk_.size()))
-                         .text(packing)
-                         .number(stored)
-                         .raw(packed));
+  const std::string record = recordOf(McapOp::chunk, Content()
+                                                         .number(chunk_span_.begin())
+                                                         .number(chunk_span_.last)
+                                                         .number(size)
+                                                         .number(checksumOf(chunk_))
+                                                         .text(packing)
+                                                         .number(stored)
+                                                         .raw(packed));
   const std::uint64_t begin = file_.position();
-  file_.write(record);
+  put(record);
   const std::uint64_t index_begin = file_.position();
   Content offsets;
   for (const auto& [channel, places] : places_) {
     offsets.number(channel).number(file_.position());
     Content entries;
     for (const Place& place : places) entries.number(place.time).number(place.offset);
-    file_.write(recordOf(McapOp::message_index, Content().number(channel).text(entries.bytes())));
+    put(recordOf(McapOp::message_index, Content().number(channel).text(entries.bytes())));
   }
   chunk_indexes_.push_back(
       recordOf(McapOp::chunk_index, Content()
@@ -211,7 +221,7 @@ void McapWriter::close() {
     chunk_ += channel.record;
   }
   flush();
-  file_.write(recordOf(McapOp::data_end, Content().number(file_.checksum())));
+  file_.write(recordOf(McapOp::data_end, Content().number(data_checksum_)));
   writeSummary();
   file_.write(MAGIC);
   file_.close();
@@ -259,7 +269,7 @@ void McapWriter::writeSummary() {
                                    .number(std::uint32_t{0}));
   std::string bytes = summary + offsets + footer;
   bytes.resize(bytes.size() - sizeof(std::uint32_t));
-  appendNumber(bytes, crc32(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()));
+  appendNumber(bytes, checksumOf(bytes));
   file_.write(bytes);
 }
 

@@ -11,6 +11,7 @@ namespace {
 
 constexpr const char* BLANK = " \t\r";
 constexpr const char* CONTAINED = "MSG: ";
+constexpr int DEEPEST = 50;  // messages within each other; real ones have five
 
 const std::set<std::string>& builtins() {
   static const std::set<std::string> NAMES{"bool",    "char",   "byte",   "int8",    "uint8",  "int16",
@@ -48,14 +49,17 @@ class Sums {
  public:
   explicit Sums(std::map<std::string, std::string> texts) : texts_(std::move(texts)) {}
 
-  /// @return empty: incomplete
+  /// @return empty: incomplete, or nested deeper than DEEPEST
   std::string of(const std::string& type) {
     const auto known = sums_.find(type);
     if (known != sums_.end()) return known->second;
     sums_[type];  // empty while its own text is read: a message that contains itself has no sum
     const auto text = texts_.find(type);
-    if (text == texts_.end()) return {};
-    return sums_[type] = sum(type, text->second);
+    if (text == texts_.end() || depth_ >= DEEPEST) return {};
+    ++depth_;
+    std::string found = sum(type, text->second);
+    --depth_;
+    return sums_[type] = std::move(found);
   }
 
  private:
@@ -97,6 +101,7 @@ class Sums {
   }
 
   std::map<std::string, std::string> texts_, sums_;
+  int depth_ = 0;
 };
 
 }  // namespace

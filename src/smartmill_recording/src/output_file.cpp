@@ -4,7 +4,6 @@
 #include <system_error>
 #include <utility>
 
-#include "checksum.h"
 #include "smartmill_core/error.h"
 
 namespace smartmill {
@@ -31,7 +30,6 @@ void OutputFile::write(const std::string& bytes) {
   stream_.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   check();
   position_ += bytes.size();
-  checksum_ = crc32(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size(), checksum_);
 }
 
 void OutputFile::rewrite(std::uint64_t position, const std::string& bytes) {

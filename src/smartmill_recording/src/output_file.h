@@ -19,7 +19,6 @@ class OutputFile {
   void rewrite(std::uint64_t position, const std::string& bytes);  ///< @throws Error
   void close();                                                    ///< @throws Error
   std::uint64_t position() const { return position_; }
-  std::uint32_t checksum() const { return checksum_; }  ///< CRC-32 of all that was written
 
  private:
   void check();
@@ -27,7 +26,6 @@ class OutputFile {
   std::string path_, active_;
   std::ofstream stream_;
   std::uint64_t position_ = 0;
-  std::uint32_t checksum_ = 0;
   bool closed_ = false;
 };
 

@@ -20,7 +20,7 @@ Format formatOf(const std::string& begin) {
   return begin.compare(0, MCAP_MAGIC_SIZE, MCAP_MAGIC, MCAP_MAGIC_SIZE) == 0 ? Format::mcap : Format::unknown;
 }
 
-const std::size_t LONGEST = std::string(BAG_VERSION_LINE).size();  // [byte] that tell the format
+const std::size_t LONGEST = std::string(BAG_VERSION_LINE).size();  // [byte] that decide the format
 
 }  // namespace
 

@@ -8,7 +8,7 @@
 namespace smartmill {
 namespace {
 
-constexpr std::size_t TELL_EVERY = 1000;  // messages
+constexpr std::size_t REPORT_EVERY = 1000;  // messages
 
 }  // namespace
 
@@ -56,7 +56,7 @@ void RecordingReader::run(const std::function<void(double)>& progress) {
     }
     if (known->second != nullptr)
       (*known->second)({connection, file_->data(last_), last_.size, last_.seconds()});
-    if (progress && ++done % TELL_EVERY == 0) progress(file_->share());
+    if (progress && ++done % REPORT_EVERY == 0) progress(file_->share());
   }
   if (progress) progress(1.0);
 }

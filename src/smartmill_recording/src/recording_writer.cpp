@@ -9,7 +9,7 @@
 namespace smartmill {
 namespace {
 
-constexpr std::size_t TELL_EVERY = 1000;  // messages
+constexpr std::size_t REPORT_EVERY = 1000;  // messages
 
 }  // namespace
 
@@ -26,7 +26,9 @@ std::uint32_t RecordingWriter::numberOf(const std::string& topic, const char* ty
 }
 
 std::unique_ptr<RecordingWriter> createRecording(const std::string& path, RecordingCompression compression) {
-  const bool bag = std::filesystem::path(path).extension() == ".bag";
+  const std::string ending = std::filesystem::path(path).extension().string();
+  const bool bag = ending == ".bag";
+  if (!bag && ending != ".mcap") throw Error(path + ": expected a name that ends in .bag or .mcap");
   if (bag && compression == RecordingCompression::zstd)
     throw Error(path + ": a bag is compressed by lz4 or not at all, zstd is for MCAP files");
   const Packing packing = compression == RecordingCompression::zstd  ? Packing::zstd
@@ -51,7 +53,7 @@ std::size_t convertRecording(const std::string& from, const std::string& to, Rec
     if (number == numbers.end())
       number = numbers.emplace(entry.connection, writer->connect(file->connection(entry))).first;
     writer->write(number->second, entry.time, file->data(entry), entry.size);
-    if (++messages % TELL_EVERY == 0 && progress) progress(file->share());
+    if (++messages % REPORT_EVERY == 0 && progress) progress(file->share());
   }
   writer->close();
   if (progress) progress(1.0);

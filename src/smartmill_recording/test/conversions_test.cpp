@@ -240,7 +240,7 @@ TEST(Conversions, ChartAndForceCurve) {
   ASSERT_EQ(again.unstable.size(), 1u);
   EXPECT_EQ(again.unstable[0].chatter_frequency, 710.0);
 
-  FoundCurves found;
+  IdentifiedForceCurves found;
   found.stamp = STAMP;
   found.tool = "D12";
   found.teeth = 4;
@@ -248,7 +248,7 @@ TEST(Conversions, ChartAndForceCurve) {
   found.curves.tangential = {{0.0, 1e-4, 2e-4}, {0.0, 1.0, 2.0, 3.0, 4.0}, {0.1, 0.2, 0.3}};
   found.curves.radial = {{0.0, 1e-4, 2e-4}, {0.0, 0.5, 1.0, 1.5, 2.0}, {0.1, 0.1, 0.1}};
   found.curves.rms = 3.0;
-  const FoundCurves same = recorded(found);
+  const IdentifiedForceCurves same = recorded(found);
   EXPECT_EQ(same.cuts, found.cuts);
   EXPECT_EQ(same.teeth, 4);
   EXPECT_EQ(same.curves.radial.knots, found.curves.radial.knots);

@@ -78,10 +78,10 @@ StabilityChart fromMsg(const smartmill_msgs::StabilityChart& message) {
 smartmill_msgs::StabilityChart toMsg(const StabilityChart& data) {
   return conversion::to<smartmill_msgs::StabilityChart>(data);
 }
-FoundCurves fromMsg(const smartmill_msgs::ForceCurve& message) {
-  return conversion::from<FoundCurves>(message);
+IdentifiedForceCurves fromMsg(const smartmill_msgs::ForceCurve& message) {
+  return conversion::from<IdentifiedForceCurves>(message);
 }
-smartmill_msgs::ForceCurve toMsg(const FoundCurves& data) {
+smartmill_msgs::ForceCurve toMsg(const IdentifiedForceCurves& data) {
   return conversion::to<smartmill_msgs::ForceCurve>(data);
 }
 

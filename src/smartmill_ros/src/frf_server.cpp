@@ -13,7 +13,7 @@
 #include "smartmill_core/names.h"
 #include "smartmill_ros/conversions.h"
 #include "smartmill_ros/goals.h"
-#include "smartmill_ros/kept_topic.h"
+#include "smartmill_ros/latched_topic.h"
 
 namespace smartmill {
 namespace {
@@ -90,8 +90,8 @@ struct FrfServer::Impl {
   std::deque<std::shared_ptr<Pending>> waiting;
   std::optional<Handle> active;
   std::string last_message = "no measurement yet";
-  KeptTopic<smartmill_msgs::Frf> frf;
-  KeptTopic<smartmill_msgs::ModalModel> modes;
+  LatchedTopic<smartmill_msgs::Frf> frf;
+  LatchedTopic<smartmill_msgs::ModalModel> modes;
   Server server;
 };
 

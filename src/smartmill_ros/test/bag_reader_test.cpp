@@ -10,7 +10,6 @@
 
 #include <algorithm>
 #include <cstring>
-#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <random>
@@ -18,6 +17,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/names.h"
+#include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_ros/conversions.h"
 
 namespace smartmill {
@@ -25,7 +25,7 @@ namespace {
 
 class DamagedBag : public ::testing::Test {
  protected:
-  DamagedBag() : file_((std::filesystem::temp_directory_path() / "smartmill_damaged.bag").string()) {
+  DamagedBag() {
     rosbag::Bag bag(file_, rosbag::bagmode::Write);
     smartmill_msgs::SampleBlock block;
     block.sample_rate = 100.0;
@@ -38,8 +38,6 @@ class DamagedBag : public ::testing::Test {
     std::ifstream in(file_, std::ios::binary);
     bytes_.assign(std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>());
   }
-  ~DamagedBag() override { std::filesystem::remove(file_); }
-
   /// What a reader says of these bytes; empty: it reads them.
   std::string fault(const std::vector<char>& bytes) const {
     std::ofstream(file_, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
@@ -55,7 +53,8 @@ class DamagedBag : public ::testing::Test {
     return {};
   }
 
-  std::string file_;
+  const TemporaryFolder folder_;
+  const std::string file_ = folder_.file("damaged.bag");
   std::vector<char> bytes_;
 };
 
@@ -65,7 +64,8 @@ TEST_F(DamagedBag, ALengthBeyondTheFileIsRefusedBeforeMemoryIsTaken) {
   for (std::size_t i = 13; i < 17; ++i) {
     bytes[i] = '\x7f';
   }
-  EXPECT_EQ(fault(bytes), file_ + ": is no bag, or damaged: a record tells of 2139062143 bytes");
+  EXPECT_EQ(fault(bytes), file_ + ": is damaged: a record at byte 13 of " + std::to_string(bytes.size()) +
+                              " states 2139062143 bytes");
 }
 
 TEST_F(DamagedBag, PackedBagsAreReadTheSame) {
@@ -114,7 +114,7 @@ TEST_F(DamagedBag, APackedChunkOfAnotherChecksumIsRefused) {
   std::uint32_t length = 0;
   std::memcpy(&length, &*frame - sizeof length, sizeof length);
   *(frame + length - 1) ^= 1;  // the last of its checksum
-  EXPECT_NE(fault(bytes).find("another checksum than it tells"), std::string::npos) << fault(bytes);
+  EXPECT_NE(fault(bytes).find("checksum mismatch"), std::string::npos) << fault(bytes);
 }
 
 // Where a chunk begins is believed of the index, but looked at.
@@ -124,7 +124,8 @@ TEST_F(DamagedBag, AnIndexThatTellsLaterTimesIsRefused) {
   const auto at = std::search(bytes.begin(), bytes.end(), key.begin(), key.end());
   ASSERT_NE(at, bytes.end());
   at[static_cast<std::ptrdiff_t>(key.size())] = 2;
-  EXPECT_EQ(fault(bytes), file_ + ": is damaged: a message that is older than the index tells");
+  EXPECT_EQ(fault(bytes),
+            file_ + ": is damaged: a message is older than the first time that is stated of its chunk");
   at[static_cast<std::ptrdiff_t>(key.size())] = 0;
   EXPECT_EQ(fault(bytes), "");
 }
@@ -136,7 +137,7 @@ TEST_F(DamagedBag, AVectorLongerThanItsMessageTakesNoMemory) {
   const auto at = std::search(bytes.begin(), bytes.end(), count.begin(), count.end());
   ASSERT_NE(at, bytes.end());
   at[3] = '\x7f';
-  EXPECT_NE(fault(bytes).find("the bag ends too early or is damaged"), std::string::npos) << fault(bytes);
+  EXPECT_NE(fault(bytes).find("the message ends too early or is damaged"), std::string::npos) << fault(bytes);
 }
 
 TEST_F(DamagedBag, AnyDamagedByteIsReadOrRefusedWithTheFilesName) {

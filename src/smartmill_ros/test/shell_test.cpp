@@ -15,9 +15,9 @@
 #include "smartmill_core/names.h"
 #include "smartmill_ros/follower.h"
 #include "smartmill_ros/frf_server.h"
-#include "smartmill_ros/kept_topic.h"
+#include "smartmill_ros/latched_topic.h"
 #include "smartmill_ros/node_shell.h"
-#include "smartmill_ros/strike_caller.h"
+#include "smartmill_ros/strike_client.h"
 
 namespace smartmill {
 namespace {
@@ -124,9 +124,9 @@ TEST(Followers, WhoPlaysLosesNothingAndItsPausesAreNoEnd) {
   spinner.stop();
 }
 
-TEST(KeptTopic, ALateSubscriberGetsTheLastOfEveryKey) {
+TEST(LatchedTopic, ALateSubscriberGetsTheLastOfEveryKey) {
   ros::NodeHandle nh;
-  KeptTopic<smartmill_msgs::Frf> topic(nh, names::TOOL_FRF);
+  LatchedTopic<smartmill_msgs::Frf> topic(nh, names::TOOL_FRF);
   smartmill_msgs::Frf frf;
   for (const char* direction : {"x", "y", "x"}) {
     frf.direction = direction;
@@ -218,12 +218,12 @@ TEST(FrfServer, OneGoalAtATimeEachWithItsAnswer) {
   EXPECT_TRUE(eventually([&] { return client.statusOf("again") == Status::ABORTED; }));
 }
 
-TEST(StrikeCaller, TellsWhatWentWrongOnce) {
-  using Kind = StrikeCaller::Answer::Kind;
+TEST(StrikeClient, TellsWhatWentWrongOnce) {
+  using Kind = StrikeClient::Answer::Kind;
   using Strike = smartmill_msgs::Strike;
   ros::NodeHandle nh;
-  StrikeCaller caller(nh, "tool");
-  std::optional<StrikeCaller::Answer> fault;
+  StrikeClient caller(nh, "tool");
+  std::optional<StrikeClient::Answer> fault;
   const auto told = [&] { return (fault = caller.takeFault()).has_value(); };
   caller.strike("x");
   ASSERT_TRUE(eventually([&] { return fault || told(); }));

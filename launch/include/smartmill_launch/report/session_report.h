@@ -58,20 +58,25 @@ struct Section {
 struct TrueStability {
   std::optional<StabilityChart> chart;  ///< empty: no truth recorded, or not computed
   std::vector<double> limits;           ///< [m] at the speed of each recorded cut; NaN or empty: not known
-  std::string failure;                  ///< why it was not computed although the truth is known; empty: it was
+  std::string failure;  ///< why it was not computed although the truth is known; empty: it was
 };
 
 struct Report {
   std::vector<Section> sections;
   std::vector<CutCheck> cuts;
   std::vector<std::string> notes;
-  std::size_t targets() const;  ///< figures with a verdict or not checked, and cuts
-  std::size_t met() const;      ///< of these
+  std::vector<std::string> failed_steps;  ///< of the session: each one target not checked
+  std::size_t targets() const;            ///< figures with a verdict or not checked, cuts, failed steps
+  std::size_t met() const;                ///< of these
 };
 
 /// The samples that a cut is judged by: in its steady stretch, there in all three recordings, compensation
 /// settled. Empty (first == second) when there are none.
 std::pair<std::uint64_t, std::uint64_t> judgedSamples(const RecordedCut& cut, double settle_revolutions);
+
+/// Steps that failed, with the reason. @param session JSON text that the session wrote @throws Error when it
+/// is not JSON
+std::vector<std::string> failedSteps(const std::string& session);
 
 Report makeReport(const SessionRecording& recording, const TrueStability& truth);
 

@@ -9,10 +9,9 @@
 #include "smartmill_hammer/analysis/health.h"
 #include "smartmill_hammer/analysis/idle_spindle.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
-/// A measurement against the first of its kind.
+/// A measurement compared with the first of its kind.
 struct HealthReport {
   std::string measured;  ///< tool, point and direction; or the spindle in air with a tool
   double stamp = 0.0;    ///< [s]
@@ -20,33 +19,32 @@ struct HealthReport {
   std::vector<HealthChange> changes;
 };
 
-/// What the node tells and warns of while it runs. It warns of each good measurement that differs from the
-/// one before of the same tool, point and direction, and of cuts in air that differ from the first of the
-/// same tool at the same speed, where the sensor's dynamics fall out. It tells measurements against the first
-/// of their kind; cuts in air where a drift begins or ends, and else once an hour.
+/// Reports and warnings of the node while it runs. It warns when a measurement differs from the previous one
+/// of the same tool, point and direction, and when an air cut differs from the first one of the same tool at
+/// the same speed, where the sensor's dynamics cancel. It reports each measurement against the first of its
+/// kind; air cuts where a drift begins or ends, and otherwise once an hour.
 class HealthWatch {
  public:
-  /// @return nothing: the first of its kind, or told already
-  std::optional<HealthReport> measured(const MeasuredModes& modes);
-  std::optional<HealthReport> turned(const std::string& tool, const IdleRecord& seen);
+  /// @return empty: the first of its kind, or already reported
+  std::optional<HealthReport> addModes(const MeasuredModes& modes);
+  std::optional<HealthReport> addAirCut(const std::string& tool, const AirCutRecord& record);
 
-  /// One line each; empty: nothing has drifted.
+  /// One line per drift.
   std::vector<std::string> warnings() const;
 
  private:
   struct Modes {
     MeasuredModes first, last;
-    std::string drift;  // of the last; empty: none
+    std::string drift;  // of the last one; empty: none
   };
-  struct Air {
-    IdleRecord first;
-    double since = 0.0;  // [s] end of the first
+  struct AirCut {
+    AirCutRecord first;
+    double first_end = 0.0;  // [s]
     std::string drift;
-    std::optional<double> told;  // [s]
+    std::optional<double> last_report;  // [s]
   };
-  std::map<std::string, Modes> modes_;  // by tool, point and direction
-  std::map<std::string, Air> air_;      // by tool
+  std::map<std::string, Modes> modes_;      // by tool, point and direction
+  std::map<std::string, AirCut> air_cuts_;  // by tool
 };
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

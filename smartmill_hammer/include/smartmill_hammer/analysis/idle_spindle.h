@@ -14,35 +14,34 @@
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_hammer/analysis/health.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
-/// A stretch in air at a steady speed, as a force sensor's channel sees it: the line once per revolution.
-struct TurningLine {
-  double stamp = 0.0, speed = 0.0;  ///< [s] of its end, [rad/s]
+/// Once-per-revolution component of a force channel over a segment of an air cut at steady speed.
+struct SynchronousForce {
+  double stamp = 0.0, speed = 0.0;  ///< [s] of the segment's end, [rad/s]
   std::complex<double> force;       ///< [N] force = Re(this exp(i spindle angle))
   double std = 0.0;                 ///< [N] of real and imaginary part each
 };
 
-/// The same stretch as the load meter sees it.
-struct IdleLoad {
+/// Mean of the load meter over the same segment.
+struct AirCutLoad {
   double stamp = 0.0, speed = 0.0;  ///< [s] of its end, [rad/s]
   double load = 0.0, std = 0.0;     ///< [1] of full scale
 };
 
-/// What was seen in air of one tool in one session.
-struct IdleRecord {
-  std::map<std::string, std::vector<TurningLine>> lines;  ///< by channel: fx, fy, or a sensor's own
-  std::vector<IdleLoad> loads;
+/// The air cuts of one tool in one session.
+struct AirCutRecord {
+  std::map<std::string, std::vector<SynchronousForce>> forces;  ///< by channel: fx, fy, or a sensor's own
+  std::vector<AirCutLoad> loads;
 };
 
-/// Watches the spindle turn in air (condition AIR), streams in stamp order: force, angle, load meter. A
-/// stretch ends when the speed changes by 0.5 %, and after ten seconds.
+/// Evaluates air cuts (condition AIR) from streams in stamp order: force, angle, load meter. A segment ends
+/// when the speed changes by 0.5 %, and after ten seconds.
 class IdleSpindle {
  public:
-  /// Called with the tool's name and what it showed when an air cut has ended that told something.
-  using Told = std::function<void(const std::string& tool, const IdleRecord& seen)>;
-  explicit IdleSpindle(Told told = {}) : told_(std::move(told)) {}
+  /// Called with the tool's name at the end of an air cut with at least one complete segment.
+  using RecordCallback = std::function<void(const std::string& tool, const AirCutRecord& record)>;
+  explicit IdleSpindle(RecordCallback on_record = {}) : on_record_(std::move(on_record)) {}
 
   void handle(const CuttingCondition& condition);
   void handle(const SpindleAngle& angle);
@@ -50,49 +49,50 @@ class IdleSpindle {
   void handle(const LoadSample& load);
   /// End of data.
   void finish();
-  /// Forgets what is under way; what was told stays.
+  /// Discards the current air cut; finished ones remain.
   void interrupt();
 
   /// By tool.
-  const std::map<std::string, IdleRecord>& records() const { return records_; }
+  const std::map<std::string, AirCutRecord>& records() const { return records_; }
 
  private:
   /// Samples at one speed.
-  struct Turning {
+  struct ForceSegment {
     double from = 0.0, to = 0.0, speed = 0.0;  // [s], [rad/s]
     std::vector<double> angle;                 // [rad]
     std::vector<std::string> channels;
     std::vector<std::vector<double>> force;  // [N] per channel
   };
-  struct Reading {
+  struct LoadSegment {
     double from = 0.0, to = 0.0, speed = 0.0;
     std::vector<double> load;
   };
   bool inAir() const { return condition_ && condition_->kind == CuttingCondition::Kind::air; }
-  void closeTurning();
-  void closeReading();
+  void closeForceSegment();
+  void closeLoadSegment();
 
-  Told told_;
+  RecordCallback on_record_;
   std::optional<CuttingCondition> condition_;
   std::optional<SpindleAngle> angle_;
-  std::optional<Turning> turning_;
-  std::optional<Reading> reading_;
-  IdleRecord seen_;  // of the air cut that runs
-  std::map<std::string, IdleRecord> records_;
+  std::optional<ForceSegment> force_segment_;
+  std::optional<LoadSegment> load_segment_;
+  AirCutRecord current_;  // of the current air cut
+  std::map<std::string, AirCutRecord> records_;
 };
 
-/// An IdleSpindle behind a StreamSorter, for node and offline tool. A jump back of time keeps what was told.
-class SortedIdle {
+/// An IdleSpindle behind a StreamSorter, for node and offline tool. A backward jump of time keeps the
+/// finished air cuts.
+class IdleSpindlePipeline {
  public:
   /// @param hold_back [s] see StreamSorter
-  explicit SortedIdle(double hold_back, IdleSpindle::Told told = {});
+  explicit IdleSpindlePipeline(double hold_back, IdleSpindle::RecordCallback on_record = {});
 
   void push(const CuttingCondition& condition) { sort(conditions_, condition); }
   void push(const SpindleAngle& angle) { sort(angles_, angle); }
   void push(const SampleBlock& force) { sort(blocks_, force); }
   void push(const LoadSample& load) { sort(loads_, load); }
   void finish();
-  const std::map<std::string, IdleRecord>& records() const { return idle_.records(); }
+  const std::map<std::string, AirCutRecord>& records() const { return idle_.records(); }
 
  private:
   template <class Input>
@@ -102,43 +102,41 @@ class SortedIdle {
 
   IdleSpindle idle_;
   StreamSorter sorter_;
-  StreamSorter::Stream conditions_, angles_, blocks_, loads_;  // equal stamps come out in this order
+  StreamSorter::Stream conditions_, angles_, blocks_, loads_;  // equal stamps are passed on in this order
 };
 
-/// Unbalance as a channel sees it: F = Re(unbalance w^2 G(w) exp(i spindle angle)) (effects.md), G what the
-/// sensor makes of a force.
+/// Unbalance as measured by a channel: F = Re(unbalance w^2 G(w) exp(i spindle angle)) (effects.md), G the
+/// transmissibility of the force sensor.
 struct Unbalance {
   std::complex<double> value;  ///< [kg m]
   double std = 0.0;            ///< [kg m] of real and imaginary part each
 };
 
-/// Weighted mean of the lines over w^2 G. What does not go with the square of the speed shows as scatter
-/// between speeds, and widens the deviation. @param sensor dynamics of the channel, static gain 1; empty:
-/// ideal
-Unbalance unbalanceOf(const std::vector<TurningLine>& lines, const std::optional<ModalModel>& sensor);
+/// Weighted mean of the forces over w^2 G. Scatter between speeds widens the standard deviation: what is not
+/// proportional to the square of the speed. @param sensor G, static gain 1; empty: ideal
+Unbalance unbalanceOf(const std::vector<SynchronousForce>& forces, const std::optional<ModalModel>& sensor);
 
-/// Power in air over speed: load = coulomb w + viscous w^2 [1 of full scale], Dunwoody eq. 3.2 read on the
-/// load meter's own scale.
+/// Power in air over speed: load = coulomb w + viscous w^2 [1 of full scale], Dunwoody eq. 3.2 on the load
+/// meter's own scale.
 struct IdleFriction {
   double coulomb = 0.0, coulomb_std = 0.0;  ///< [s]
   double viscous = 0.0, viscous_std = 0.0;  ///< [s2]
 };
 
-/// By weighted least squares over all stretches; none where there are not two speeds.
-std::optional<IdleFriction> frictionOf(const std::vector<IdleLoad>& loads);
+/// By weighted least squares over all segments; empty without two different speeds.
+std::optional<IdleFriction> frictionOf(const std::vector<AirCutLoad>& loads);
 
-/// [s] end of the last stretch
-double endOf(const IdleRecord& record);
+/// [s] end of the last segment
+double endTime(const AirCutRecord& record);
 
-/// Adds what stands at speeds that the record does not have yet. @return whether there was any
-bool addSpeeds(IdleRecord& record, const IdleRecord& more);
+/// Adds the segments at speeds that the record does not contain yet. @return whether there are any
+bool addNewSpeeds(AirCutRecord& record, const AirCutRecord& more);
 
-/// Changes of unbalance by channel, at the speeds that both have seen where there are any (what does not go
-/// with the square of the speed then falls out), of friction, and of the load at those speeds.
+/// Changes of unbalance by channel, of friction, and of the load at common speeds. Common speeds are used for
+/// the unbalance too, where there are any: what is not proportional to the square of the speed then cancels.
 /// @param sensors by channel
-std::vector<HealthChange> idleChanges(const IdleRecord& before, const IdleRecord& now,
-                                      const std::map<std::string, ModalModel>& sensors,
-                                      const HealthAllowance& allowance = {});
+std::vector<HealthChange> airCutChanges(const AirCutRecord& before, const AirCutRecord& now,
+                                        const std::map<std::string, ModalModel>& sensors,
+                                        const HealthAllowance& allowance = {});
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

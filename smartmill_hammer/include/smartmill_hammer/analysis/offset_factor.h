@@ -1,11 +1,9 @@
 #pragma once
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
-/// Receptance factor of Dunwoody eq. 4.44: direct FRF at the tip from a hit offset [m] above it, tool of
-/// stickout L [m]: 2 L^3 / (l^2 (3 L - l)), l = L - offset. @throws Error when 0 <= offset < L does not hold.
+/// Direct receptance at the tip over that of a hit `offset` [m] above it, for a tool of stick-out L [m]
+/// (Dunwoody eq. 4.44): 2 L^3 / (l^2 (3 L - l)), l = L - offset. @throws Error unless 0 <= offset < L.
 double offsetFactor(double stickout, double offset);
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

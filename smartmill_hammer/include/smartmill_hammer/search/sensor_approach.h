@@ -7,76 +7,76 @@
 #include "smartmill_hammer/search/flute_search.h"
 #include "smartmill_hammer/search/sensor_calibration.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 struct SensorApproachOptions {
   double face = 8e-3;  ///< [m] diameter of the sensor's face
-  /// [1] by which the sensor's voltage may stand off its nominal curve's: gain and bend of the curve. Far
-  /// off, where the nominal curve is flat, a depth between flutes would else be told too deep.
+  /// [1] possible deviation of gain and curvature from the nominal curve. Far from the sensor, where the
+  /// nominal curve is flat, depths between flutes would otherwise be overestimated.
   double curve_error = 0.15;
-  double min_gap = 125e-6;  ///< [m] left before the face
-  /// [m] diameter of what sees: a reading is the mean over so much of a flank, and that of an edge across the
-  /// disc is off by what lies the mean distance of its places further from the flute.
+  double min_gap = 125e-6;  ///< [m] that remains to the face
+  /// [m] diameter of the electrode: a voltage is the mean over that much of a flank, as if measured further
+  /// from the flute by the mean distance from the disc's diameter.
   double electrode = 2e-3;
 };
 
-/// What of a fluted tool stands foremost before the sensor's round face, by what the sensor itself has read
-/// of it, and how far the tool may go towards it. The sensor sees the middle of its face; the rest meets the
-/// tool's other places: beside the middle those that stand turned, above and below it those that the helix
-/// has turned. All of the tool lies at or behind what is told here, as long as the readings' curve is within
-/// its error.
+/// How far a fluted tool may move towards the sensor's round face without contact, from the voltages that the
+/// sensor itself has measured of the tool's surface. The sensor measures at the middle of its face; next to
+/// the middle the face meets other angles of the tool, above and below it what the helix has turned there.
+/// The bounds are conservative: no point of the tool is nearer, as long as the sensor's curve is within its
+/// error.
 class SensorApproach {
  public:
   SensorApproach(const smartmill::HammerStation& station, const ToolGeometry& tool,
                  const SensorApproachOptions& options);
 
-  /// Begins anew with a search's readings of one flute. @param angle [rad] of the flute @param volt [V] there
-  void fluteSeen(const std::vector<FluteSearch::Reading>& readings, double angle, double volt);
-  /// What the sensor sees `turned` [rad] on from a flute belongs to the flanks of the flutes on either side.
-  /// The last reading of a place counts. @param moved [m] nearer to the sensor than where the flute was seen
-  /// @param own false: another sensor
-  /// than the one that saw the flute, and whose curve the approach tells
-  void seen(double turned, double volt, double moved, bool own = true);
-  /// The sensor's curve as the approach tells it, in place of the nominal one: what has been read before is
-  /// read anew. One that the nominal curve's error does not allow is not taken.
-  void curveSeen(const SensorCurve& curve);
-  /// Nothing is known of the flanks: the tool counts as round.
-  void forget();
+  /// Replaces all flanks by a search's measurements of one flute. @param angle [rad] and @param volt [V] of
+  /// the flute
+  void startFromFlute(const std::vector<FluteSearch::Measurement>& measurements, double angle, double volt);
+  /// Adds a measurement to the flanks of the flutes on either side; the last one at an angle counts.
+  /// @param turned [rad] rotation of the spindle from a flute at the sensor
+  /// @param moved [m] nearer to the sensor than where the flute was measured
+  /// @param same_sensor false: not the sensor that measured the flute and whose curve setCurve() states
+  void addMeasurement(double turned, double volt, double moved, bool same_sensor = true);
+  /// Replaces the nominal curve by that of the calibration and evaluates all measurements again. Ignored
+  /// where it contradicts the nominal curve's error.
+  void setCurve(const SensorCurve& curve);
+  /// Without flanks the tool counts as round.
+  void clearFlanks();
 
-  /// [m] at least, of the surface behind a flute with the spindle so far [rad] from one. The root of the
-  /// depth runs straight between two readings, which lies below a flank that is round or straight; beyond the
-  /// last reading the surface falls towards the gullet. Of uneven teeth any may be the flute that was found.
+  /// [m] smallest depth of the surface below a flute, at an angle [rad] from one. The root of the depth is
+  /// interpolated linearly, which bounds round and straight flanks from below; beyond the last measurement
+  /// the surface falls towards the gullet. Of uneven teeth any may be the flute that was found.
   double leastRetreat(double off) const;
 
-  /// Where the tool stands before the sensor.
-  struct Place {
-    double turned = 0.0;                   ///< [rad] of the spindle on from a flute at the sensor's middle
-    double above_tip = 0.0;                ///< [m] of the sensor's middle: below the tip there is nothing
-    double lag_low = 0.0, lag_high = 0.0;  ///< [rad/m] the helix turns the edges with height: between these
+  /// The tool in front of the sensor.
+  struct Pose {
+    double turned = 0.0;                   ///< [rad] of the spindle from a flute at the sensor's middle
+    double above_tip = 0.0;                ///< [m] height of the sensor's middle
+    double lag_low = 0.0, lag_high = 0.0;  ///< [rad/m] bounds of the helix's lag over height
   };
-  /// [m] towards the sensor, from where the flute was seen, until the tool is as near to its face as allowed.
-  /// There a flute that points at the sensor leaves twice the gap at zero volt, or what its reading says.
-  double travel(const Place& place) const;
+  /// [m] towards the sensor, from where the flute was measured, until the tool is as near to its face as
+  /// permitted. At the start a flute leaves twice the gap at zero volt, or less if its voltage indicates so.
+  double safeTravel(const Pose& pose) const;
 
-  /// [m] by the sensor's nominal curve.
+  /// [m] from the sensor's nominal curve.
   double nominalGap(double volt) const;
 
  private:
-  struct Reading {
+  struct FlankMeasurement {
     double off, volt, moved;  // [rad] of the spindle from a flute at the sensor, [V], [m]
-    bool own;
+    bool same_sensor;
   };
-  double turnedFromTooth(double off, int tooth, int found) const;
-  double leastBetween(double first, double last) const;
+  double rotationFromTooth(double off, int tooth, int found) const;
+  double leastRetreatBetween(double first, double last) const;
   static double gap(double volt, const SensorCurve& curve, double error);
   SensorCurve nominal() const;
   double fluteGap() const;
-  void readAnew();
-  double retreatOf(const Reading& reading) const;
+  void updateProfile();
+  double retreatOf(const FlankMeasurement& measurement) const;
 
   struct Retreat {
-    double off, depth;  // [rad], [m] behind the flute
+    double off, depth;  // [rad], [m] below the flute
   };
 
   smartmill::HammerStation station_;
@@ -84,11 +84,11 @@ class SensorApproach {
   SensorApproachOptions options_;
   SensorCurve curve_;
   double curve_error_;
-  std::vector<double> turns_;  // [rad] of any tooth, were any the flute that was found; each once
-  std::vector<Reading> readings_;
-  std::vector<Retreat> profile_;  // of these readings by that curve
+  std::vector<double>
+      tooth_rotations_;  // [rad] of each tooth from the flute found, whichever tooth that is; each once
+  std::vector<FlankMeasurement> measurements_;
+  std::vector<Retreat> profile_;  // of the measurements by curve_
   double flute_volt_ = 0.0;       // [V] of the flute that was found
 };
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

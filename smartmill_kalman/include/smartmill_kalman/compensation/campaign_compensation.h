@@ -22,11 +22,11 @@ struct SensorFitParameters {
 };
 
 /// H1 over all hits [1], hammer force windowed, with standard deviations.
-FrequencyResponse averaged(const std::vector<std::vector<double>>& hammer,
-                           const std::vector<std::vector<double>>& response, double sample_rate);
+FrequencyResponse averagedFrf(const std::vector<std::vector<double>>& hammer,
+                              const std::vector<std::vector<double>>& response, double sample_rate);
 
 /// Sensor model of one axis (static gain 1) from taps along it: H1 over all hits, hammer force windowed
-/// (Dunwoody ch. 5). A sensor that answers a blow with the other sign is turned: its static gain is 1.
+/// (Dunwoody ch. 5). A response with negative static gain is negated.
 /// @param hammer, response [N] one vector a hit, all of one length @param sample_rate [Hz]
 /// @throws Error when there is no hit, a NaN, or no mode in the band.
 ModalFit identifySensor(const std::vector<std::vector<double>>& hammer,
@@ -46,7 +46,7 @@ std::array<std::vector<double>, 3> compensate(const Record& record, const Sensor
                                               const HarmonicFilterParameters& parameters);
 
 /// Force on the tool of one cut, at the record's sample times [N]; any latency is taken out.
-/// @param measures_workpiece the sensor shows the reaction: turned here.
+/// @param measures_workpiece the sensor measures the reaction: samples are negated.
 std::array<std::vector<double>, 3> compensate(const Record& record, const std::array<ModalModel, 3>& sensor,
                                               bool measures_workpiece, double spindle_speed,
                                               double sample_rate, const HarmonicFilterParameters& parameters,
@@ -56,7 +56,7 @@ std::array<std::vector<double>, 3> compensate(const Record& record, const std::a
 /// model; false without a model. @throws Error when a model cannot be read.
 bool measuresWorkpiece(const Campaign& campaign, const std::string& model_file);
 
-/// Turns fx, fy, fz: the reaction becomes the force on the tool.
-void turnForces(Record& record);
+/// Negates fx, fy, fz: the reaction becomes the force on the tool.
+void negateForces(Record& record);
 
 }  // namespace smartmill::kalman

@@ -7,20 +7,22 @@
 #include <vector>
 
 #include "smartmill_core/signal/streams.h"
-#include "smartmill_kalman/compensation/force_compensation.h"
+#include "smartmill_kalman/compensation/compensation_method.h"
 #include "smartmill_kalman/filter/matrix_inverse.h"
 
 namespace smartmill::kalman {
 
-/// Blocks of a sensor of 3 or 6 channels through MatrixInverse: blocks come out late by its latency, with
-/// their own index and stamp. Needs neither a tachometer nor a periodic force.
+/// Inverts the transfer matrix of a sensor of 3 or 6 channels (MatrixInverse). Blocks are published late by
+/// its latency, with their own index and stamp. Requires neither a tachometer nor a periodic force.
 class MatrixCompensation {
  public:
-  MatrixCompensation(const MatrixInverse& inverse, bool measures_workpiece, ForceCompensation::Output output);
+  MatrixCompensation(const MatrixInverse& inverse, bool measures_workpiece, ForceOutputs outputs);
 
   /// @throws Error when a channel is missing, in another unit or at another sample rate than the taps'.
+  void check(const SampleBlock& block) const { columnsOf(block); }
+  /// @throws Error as check().
   void handle(const SampleBlock& block);
-  /// End of data: what waits comes out with silence after it.
+  /// End of data: pending blocks are published, with zeros assumed after them.
   void flush();
   void reset();
   std::size_t gaps() const { return gaps_; }
@@ -28,16 +30,17 @@ class MatrixCompensation {
 
  private:
   std::vector<std::size_t> columnsOf(const SampleBlock& block) const;
-  void release();
+  void publishOldest();
 
   MatrixInverse inverse_;
   double sign_;
-  ForceCompensation::Output output_;
+  ForceOutputs outputs_;
   std::optional<std::uint64_t> next_index_;
-  std::deque<ForceBlock> waiting_;           // as measured
+  std::deque<ForceBlock> pending_;           // as measured
   std::array<std::deque<double>, 3> ready_;  // [N]
-  std::size_t early_ = 0, settling_ = 0;     // samples that no block has asked for, that still settle
-  std::vector<double> last_;                 // of each channel
+  std::size_t discard_ = 0;                  // output samples before the first input sample
+  std::size_t settling_samples_ = 0;
+  std::vector<double> last_;  // valid sample of each channel
   std::size_t gaps_ = 0, not_finite_ = 0;
 };
 

@@ -10,15 +10,19 @@ namespace smartmill::kalman {
 
 /// How a whole record is compensated.
 enum class Method {
-  kalman,     ///< causal, as the node does it; no latency
-  delay,      ///< the same with F(t) = F(t - T) in place of harmonics
-  smoother,   ///< fixed interval: every sample knows the whole record; no latency
-  fixed_lag,  ///< every sample knows what comes up to a lag after it; no latency in a record
-  inverse     ///< frequency-domain inversion; its latency is taken out
+  kalman,     ///< causal, as the node; no latency
+  delay,      ///< causal with the force model F(t) = F(t - T)
+  smoother,   ///< fixed interval: each force is estimated from the whole record
+  fixed_lag,  ///< each force is estimated from the samples up to a lag after it
+  inverse     ///< frequency-domain inversion, latency compensated
 };
 
-/// @throws Error naming the method when there is none of that name.
+/// @throws Error naming the method when it is unknown.
 Method methodOf(const std::string& name);
+/// Names of all methods.
+std::vector<std::string> methodNames();
+/// Whether the method cannot run on a stream.
+bool needsWholeRecord(Method method);
 
 /// Applied force of one axis at the record's samples [N].
 /// @param measured [N] @param spindle_speed [rad/s] (not used by the inverse) @param sample_rate [Hz]
@@ -27,8 +31,8 @@ std::vector<double> compensateRecord(Method method, const std::vector<double>& m
                                      const ModalModel& sensor, double spindle_speed, double sample_rate,
                                      const HarmonicFilterParameters& parameters, double lag = 0.05);
 
-/// Fixed-interval smoother over a record whose force may set in or end inside it: the record is parted where
-/// the causal filter's innovations fell out of line.
+/// Fixed-interval smoother. The record is split where the causal filter's innovations show an abrupt change
+/// of the force (tool entry, exit).
 std::vector<double> smoothRecord(const std::vector<double>& measured, const ModalModel& sensor,
                                  double spindle_speed, double sample_rate,
                                  const HarmonicFilterParameters& parameters);

@@ -27,20 +27,20 @@ struct SensorMatrix {
 ModalModel fitCrossTalk(const FrequencyResponse& frf, const ModalModel& own, const ModalModel& other,
                         double low, double high);
 
-/// What turns the force of three filters that know only their own axis into that of a sensor with cross-talk:
-/// the harmonics of the force are the matrix inverse times those measured.
+/// Cross-talk correction of three single-axis filters: the harmonics of the force are the inverse of the
+/// sensor matrix times the measured harmonics.
 class CrossTalkInverse {
  public:
   /// @param harmonics of the filters. @throws Error when the matrix cannot be inverted at one of them.
   CrossTalkInverse(const SensorMatrix& sensor, double spindle_speed, double sample_rate, int harmonics);
 
-  /// Adds what the other axes tell. @param axes filters of x, y, z after their step @param force [N] of x, y,
-  /// z
+  /// Corrects the force by the other axes. @param axes filters of x, y, z after their step @param force [N]
+  /// of x, y, z
   void add(const std::vector<HarmonicFilter>& axes, std::array<double, 3>& force) const;
 
  private:
-  /// Share of axis [column]'s harmonic n (as it stands after the step) in the force along [row], less its
-  /// own.
+  /// Contribution of axis [column]'s harmonic n (state after the step) to the force along [row], without the
+  /// single-axis estimate.
   std::vector<std::array<std::array<std::complex<double>, 3>, 3>> correction_;
 };
 
@@ -50,11 +50,11 @@ SensorMatrix readSensorMatrix(const std::string& file);
 void writeSensorMatrix(const SensorMatrix& matrix, const std::string& file);
 
 /// Three axes with cross-talk (Bachrathy and Stepan eq. 2.3..2.7 at the harmonics of the spindle): one
-/// HarmonicFilter an axis follows what is measured; the harmonics of the force are the matrix inverse times
-/// those measured. What the modes ring after a change is compensated axis by axis.
+/// HarmonicFilter per axis estimates the measured harmonics; the harmonics of the force are the inverse of
+/// the matrix times these. Transients of the modes are compensated axis by axis.
 class CoupledFilter {
  public:
-  /// @throws Error when the matrix cannot be inverted at a harmonic.
+  /// @throws Error when the matrix is singular at a harmonic.
   CoupledFilter(const SensorMatrix& sensor, double spindle_speed, double sample_rate,
                 const HarmonicFilterParameters& parameters);
 

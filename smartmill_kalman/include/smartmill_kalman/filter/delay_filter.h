@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "smartmill_core/modal/modal_model.h"
+#include "smartmill_kalman/filter/adaptive_memory.h"
 #include "smartmill_kalman/filter/harmonic_filter.h"
-#include "smartmill_kalman/filter/innovation_watch.h"
 
 namespace smartmill::kalman {
 
@@ -26,8 +26,8 @@ struct DelayModel {
   std::size_t at = 0;
   double period = 0.0;  ///< [samples]
 
-  static constexpr std::size_t HOLD = 8;   ///< forces that tell the one between two samples
-  static constexpr std::size_t TAPS = 16;  ///< forces that tell the one a period before
+  static constexpr std::size_t HOLD = 8;   ///< points of the interpolation between two samples
+  static constexpr std::size_t TAPS = 16;  ///< points of the interpolation one period earlier
   static constexpr std::size_t NOW = 3;    ///< line[NOW] is F(k)
 
   std::size_t states() const { return 2 * modes + line; }
@@ -51,8 +51,8 @@ std::vector<double> delayGain(const DelayModel& model, double q, double r);
 /// exponential) for a force that is the polynomial through HOLD samples.
 ///
 /// Process noise q = r / tau^2 with tau the memory in revolutions; three memories as in HarmonicFilter.
-/// There is no band limit but what
-/// the sensor passes. A sample costs one pass over the line of T samples.
+/// The band is limited by the sensor
+/// only. A step costs one pass over the line of T samples.
 class DelayFilter {
  public:
   /// @param spindle_speed [rad/s] > 0, a revolution at least 18 samples @param parameters bandwidth and
@@ -60,36 +60,36 @@ class DelayFilter {
   DelayFilter(const ModalModel& sensor, double spindle_speed, double sample_rate,
               const HarmonicFilterParameters& parameters);
 
-  /// Takes one measured sample [N]. @return applied force [N] at this sample, from all samples up to it.
+  /// Filters one measured sample [N]. @return applied force [N] at this sample, from all samples up to it.
   double step(double measured);
-  /// Keeps the state going without a measurement. @return predicted force [N].
-  double coast() { return advance(0.0); }
+  /// Advances the state without a measurement. @return predicted force [N].
+  double predict() { return advance(0.0); }
   void reset();
 
-  /// Another spindle speed: the force goes on over the angle, the gains stay.
+  /// Changes the spindle speed: the force is kept as a function of the angle, the gains stay.
   void retune(double spindle_speed);
-  /// Takes the force of another filter of the same sensor over, so that new gains start without a jump.
-  void adopt(const DelayFilter& other);
+  /// Takes over the force of another filter of the same sensor, so that new gains start without a jump.
+  void continueFrom(const DelayFilter& other);
 
   double innovation() const { return innovation_; }  ///< [N] of the last step
-  double innovationStd() const { return innovation_std_[watch_.level()]; }
+  double innovationStd() const { return innovation_std_[memory_.level()]; }
   std::size_t states() const { return model_.states(); }
-  std::size_t level() const { return watch_.level(); }
-  void setLevel(std::size_t level) { watch_.setLevel(level); }
+  std::size_t level() const { return memory_.level(); }
+  void setLevel(std::size_t level) { memory_.setLevel(level); }
 
   double spindleSpeed() const;  ///< [rad/s]
 
  private:
   double advance(double innovation);
   double expected() const;
-  /// Line of a filter as it stands in this one's samples.
-  void takeLine(const DelayFilter& other);
+  /// Resamples the line of another filter to the period of this one.
+  void resampleFrom(const DelayFilter& other);
 
   double sample_rate_;
   DelayModel model_;
   std::vector<std::vector<double>> gain_;  // a level each
   std::vector<double> innovation_std_;
-  InnovationWatch watch_;
+  AdaptiveMemory memory_;
   std::vector<double> modes_, next_, line_;  // the line is a window that moves through a longer array
   std::size_t head_ = 0;
   double innovation_ = 0.0;

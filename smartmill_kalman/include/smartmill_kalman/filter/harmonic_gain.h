@@ -16,7 +16,7 @@ struct HarmonicGain {
   double variance = 0.0;  ///< [N2] of the innovation
 };
 
-/// What a stationary gain is laid out for.
+/// Parameters of a stationary gain.
 struct HarmonicDesign {
   ModalModel sensor;             ///< measured over applied force [1]
   double spindle_speed = 0.0;    ///< [rad/s]
@@ -27,21 +27,22 @@ struct HarmonicDesign {
 
 /// Stationary gain of the Kalman filter of Dunwoody eq. 5.37, exact in time (Van Loan's integrals for the
 /// noise). Process noise q = (r dt) / tau^2 for every amplitude puts each harmonic's pole near -|H| / tau, H
-/// the sensor's answer to it. By spectralGain, or where that finds nothing by riccatiGain: the same numbers.
+/// the sensor's response to it. Uses spectralGain(), or riccatiGain() when that fails; both give the same
+/// numbers.
 HarmonicGain designHarmonicGain(const HarmonicDesign& design);
 
-/// The same with one time constant: a harmonic that the sensor hardly passes is slow already: tau is
-/// min(1, 2 |H|) settling there, not below quickest, so that a long memory does not make it slower still.
+/// The same with one time constant. A harmonic with a low transmissibility is slow already: its tau is
+/// min(1, 2 |H|) settling, at least quickest, so that a long memory does not slow it further.
 /// @param spindle_speed [rad/s] @param sample_rate [Hz] @param settling, quickest [s]
 HarmonicGain designHarmonicGain(const ModalModel& sensor, double spindle_speed, double sample_rate,
                                 int harmonics, double noise_rms, double settling, double quickest);
 
-/// By spectral factorisation, in the coordinates in which nothing couples. The spectrum of what is measured,
+/// By spectral factorisation in decoupled coordinates. The spectrum of the measurement,
 /// r + |force through the sensor|^2, is a sum of partial fractions of known poles; its zeros inside the unit
-/// circle are the filter's own poles, found together (Aberth, Math. Comp. 27 (1973) 339); the gain is the
+/// circle are the filter's poles, found together (Aberth, Math. Comp. 27 (1973) 339); the gain is the
 /// residues of zeros over poles, the covariance follows from it in closed form: the square of the number of
-/// states where the Riccati equation asks for its cube.
-/// @return nothing where the product of the factors is not the spectrum to 1e-9
+/// states instead of its cube for the Riccati equation.
+/// @return nothing when the product of the factors differs from the spectrum by more than 1e-9
 std::optional<HarmonicGain> spectralGain(const HarmonicDesign& design);
 
 /// By the discrete Riccati equation of all states together. @throws Error when it has no solution.

@@ -9,7 +9,7 @@ namespace smartmill::kalman {
 /// convergence; every iterate stays symmetric and positive semidefinite).
 /// @param phi n x n transition, q n x n process noise covariance of a step, c 1 x n output, r > 0 measurement
 /// noise variance
-/// @throws Error when it does not converge (a state that is neither seen nor damped).
+/// @throws Error when it does not converge (a state that is neither observable nor damped).
 Eigen::MatrixXd stationaryCovariance(const Eigen::MatrixXd& phi, const Eigen::MatrixXd& q,
                                      const Eigen::RowVectorXd& c, double r);
 

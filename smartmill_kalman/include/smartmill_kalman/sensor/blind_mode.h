@@ -6,20 +6,19 @@
 
 namespace smartmill::kalman {
 
-/// A mode of the sensor told from a cut alone, without a tap.
+/// A mode of the sensor estimated from a cut, without a tap.
 struct BlindMode {
-  Mode mode;           ///< with standard deviations; gain is not told and stays NaN
-  double above = 0.0;  ///< [1] peak of its spectral density over the floor beside it
-  double likelihood =
-      0.0;  ///< [1] rise of the log-likelihood over a flat spectrum; below 10 there is no mode
+  Mode mode;                ///< with standard deviations; the gain is unknown: NaN
+  double above = 0.0;       ///< [1] peak of its spectral density over the noise floor
+  double likelihood = 0.0;  ///< [1] gain in log-likelihood over a flat spectrum; below 10: no mode
 };
 
-/// What does not repeat with the revolution (chips breaking, material) shakes the sensor at all frequencies:
-/// between the lines of the spindle its spectrum shows the sensor's mode. Whittle likelihood of one resonance
-/// on a floor in the band; the resonance may as well be the tool's or the workpiece's, and the record does
-/// not say with which share it shows in the force.
+/// The part of the cutting force that is not synchronous with the spindle (chip breakage, material) excites
+/// the sensor at all frequencies, so that its modes appear between the harmonics of the spindle. Fits one
+/// resonance on a noise floor in the band by its Whittle likelihood. The resonance may also belong to the
+/// tool or the workpiece, and its gain in the measured force is not identifiable.
 /// @param samples [N] steady cut @param sample_rate [Hz] @param spindle_speed [rad/s] @param low, high [Hz]
-/// @throws Error when too few lines stand between the spindle's.
+/// @throws Error when there are too few lines between the harmonics.
 BlindMode findBlindMode(const std::vector<double>& samples, double sample_rate, double spindle_speed,
                         double low, double high);
 

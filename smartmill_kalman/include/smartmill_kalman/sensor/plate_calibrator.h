@@ -12,9 +12,9 @@
 
 namespace smartmill::kalman {
 
-/// Taps of a plate of three or six channels on the machine (Bachrathy and Stepan, section 2): a goal tells
-/// the point, the taps of measure_frf along an axis there are kept with all channels, and a fit makes the
-/// matrix of all. Inputs in stamp order; nothing moves, and nothing is written.
+/// Taps of a plate of three or six channels on the machine (Bachrathy and Stepan, section 2): a goal sets the
+/// point, the taps of measure_frf there are recorded with all channels, and a fit identifies the transfer
+/// matrix from all taps. Inputs in stamp order; no machine motion, no files.
 class PlateCalibrator {
  public:
   explicit PlateCalibrator(const TapParameters& taps) : parameters_(taps) {}
@@ -24,16 +24,16 @@ class PlateCalibrator {
   /// Block of the plate.
   void handle(const SampleBlock& block);
   void handleHammer(const SampleBlock& block);
-  /// Blows from now on are along an axis, for the measurement that tapped() ends.
-  void tapping(const std::string& direction);
-  void tapped(const SensorResult& result);
+  /// Records hits along an axis until endTaps().
+  void beginTaps(const std::string& direction);
+  void endTaps(const SensorResult& result);
   void reset() { *this = PlateCalibrator(parameters_); }
 
   const TapRecords& taps() const { return records_; }
 
  private:
   TapParameters parameters_;
-  std::optional<std::array<double, 3>> point_;  // [m] of the taps; empty: not told
+  std::optional<std::array<double, 3>> point_;  // [m] of the taps; empty: unknown
   std::string direction_;
   std::optional<TapCollector> collector_;
   std::vector<std::size_t> columns_;  // of the blocks' channels

@@ -22,16 +22,15 @@ struct TapParameters : HitTestParameters {
 
   TapParameters() {
     record_length = 0.2;
-    strike_timeout = 10.0;  // long enough for a blow by hand
+    strike_timeout = 10.0;  // long enough for a hit by hand
   }
   void declare(ParameterTable& table) {
     declareHits(table);
     table.internal("response_range", response_range, "N", Range::notNegative());
     table.number("static_tolerance", static_tolerance, "1", Range::positive(),
-                 "the measured static gain may differ from 1 by this");
-    table.number(
-        "systematic", systematic, "1", Range::openHigh(0.0, 1.0),
-        "share of |H| that scatter does not show (linearity, aliasing), in every standard deviation");
+                 "accepted difference of the measured static gain from 1");
+    table.number("systematic", systematic, "1", Range::openHigh(0.0, 1.0),
+                 "systematic relative error of |H| (linearity, aliasing), part of each standard deviation");
     declareFit(table);
   }
   /// @throws Error naming key and value.
@@ -40,13 +39,13 @@ struct TapParameters : HitTestParameters {
 
 struct SensorResult {
   FrfCode code = FrfCode::ok;
-  std::string message;       ///< one line
-  MeasuredFrf frf;           ///< [1] measured over applied force, static gain positive
-  MeasuredModes modes;       ///< [1] static gain 1
-  double noise_rms = 0.0;    ///< [N] of one sample of the sensor, from the samples before the hits
-  double static_gain = 0.0;  ///< [1] measured, before the fit took it for 1; negative: blow against the axis
+  std::string message;             ///< one line
+  MeasuredFrf frf;                 ///< [1] measured over applied force, static gain positive
+  MeasuredModes modes;             ///< [1] static gain 1
+  double noise_rms = 0.0;          ///< [N] of one sample of the sensor, from the samples before the hits
+  double static_gain = 0.0;        ///< [1] measured; the fit assumes 1; negative: hit against the axis
   double static_gain_std = 0.0;    ///< [1]
-  std::vector<double> hit_stamps;  ///< [s] triggers of the hits that count
+  std::vector<double> hit_stamps;  ///< [s] triggers of the accepted hits
 };
 
 struct TapFeedback {
@@ -60,12 +59,12 @@ struct StrikeCommand {
   std::string direction;  ///< x, y or z
 };
 
-/// Sequence of a tap test of the force sensor: asks for a blow, waits for it in the hammer's samples, takes
-/// the sensor's samples with the same running index, averages, fits modes with static gain 1 (Dunwoody ch.
-/// 5). Nothing moves.
+/// Sequence of a tap test of the force sensor: requests a hit, detects it in the hammer's samples, pairs them
+/// with the sensor's samples by the running index, averages, and fits modes with static gain 1 (Dunwoody
+/// ch. 5). No machine motion.
 ///
-/// Inputs come in stamp order; time is theirs. Outputs are drained. Directions are the sensor's own axes. A
-/// blow may come from either side: the response is turned so that its static gain is positive.
+/// Inputs come in stamp order, and time is that of the inputs. Directions are the sensor's axes. A hit may
+/// come from either side: the sign of the response is chosen for a positive static gain.
 class SensorMeasurement {
  public:
   explicit SensorMeasurement(const TapParameters& parameters);
@@ -77,12 +76,12 @@ class SensorMeasurement {
   /// Block of the force sensor (channels fx, fy, fz [N]). @throws Error when the channel is missing.
   void handleSensor(const SampleBlock& block);
   void cancel();
-  /// There is no automatic hammer: says so; the hit is waited for all the same.
+  /// There is no automatic hammer: feedback requests a hit by hand.
   void hitByHand();
   void commandFailed(const std::string& text);
-  /// An input stream has died, nothing further can be judged.
-  void lost(const std::string& text);
-  /// Forgets everything: a bag was restarted.
+  /// Ends the measurement: an input stream has ended.
+  void abort(const std::string& text);
+  /// As new: a recording was restarted.
   void reset();
 
   bool active() const { return active_; }
@@ -97,16 +96,16 @@ class SensorMeasurement {
     std::uint64_t index;
     double rate, value;
   };
-  void take(const SampleBlock& block, const std::string& channel, std::deque<Sample>& queue);
-  void join();
-  void sample(double time, std::uint64_t index, double rate, double force, double response);
-  void strike(double now);
-  void recorded(double now, HitCollector::Record record);
-  void badHit(double now, const std::string& why, bool bad_data);
-  void staticGain(const FrequencyResponse& frf);
+  void addBlock(const SampleBlock& block, const std::string& channel, std::deque<Sample>& queue);
+  void pairSamples();
+  void addSample(double time, std::uint64_t index, double rate, double force, double response);
+  void requestHit(double now);
+  void handleRecord(double now, HitCollector::Record record);
+  void rejectHit(double now, const std::string& why, bool bad_data);
+  void estimateStaticGain(const FrequencyResponse& frf);
   void evaluate();
   void finish(FrfCode code, const std::string& message);
-  void say(const std::string& stage);
+  void reportStage(const std::string& stage);
 
   TapParameters parameters_;
   bool active_ = false;
@@ -121,7 +120,7 @@ class SensorMeasurement {
 
   std::optional<StrikeCommand> command_;
   std::optional<TapFeedback> feedback_;
-  std::optional<SensorResult> done_;
+  std::optional<SensorResult> finished_;
 };
 
 }  // namespace smartmill::kalman

@@ -18,39 +18,39 @@ namespace smartmill::kalman {
 
 /// Counts for diagnostics, since the start.
 struct SpindleSensorHealth {
-  std::size_t unloaded = 0;    ///< samples at which a sensor had less than least_compression left
-  std::size_t overloaded = 0;  ///< samples at which a sensor was beyond its range
-  double least_left = std::numeric_limits<double>::infinity();  ///< [N] least compression of any sensor over
-                                                                ///< least_compression
-  std::size_t stretches = 0;  ///< stretches without cutting that told zero and unbalance
+  std::size_t unloaded = 0;    ///< samples with a sensor below least_compression
+  std::size_t overloaded = 0;  ///< samples with a sensor above its range limit
+  double compression_margin = std::numeric_limits<double>::infinity();  ///< [N] least compression of any
+                                                                        ///< sensor over least_compression
+  std::size_t air_segments = 0;                     ///< segments without cutting used for zero and unbalance
   std::array<std::complex<double>, 3> unbalance{};  ///< [kg m]
   std::array<double, 3> unbalance_std{{0, 0, 0}};   ///< [kg m]; 0: none known
   double zero_std =
-      0.0;  ///< [N] of the zero of a pair, last block: grows in a cut with the drift's uncertainty
+      0.0;  ///< [N] of the zero of a pair, last block; grows in a cut with the uncertainty of the drift
 };
 
 /// Spindle-integrated force sensor (Burzoni ch. 3): blocks of six sensors in, blocks of fx, fy, fz with the
-/// same index out: zero and drift off, pairs (eq. 3-1), constants at this length of tool and holder (3-4),
-/// static and dynamic cross-talk (3-5, 3-7), unbalance off (3-6).
+/// same index out. Subtracts zero and drift, forms pairs (eq. 3-1), applies the constants at this length of
+/// tool and holder (3-4), static and dynamic cross-talk (3-5, 3-7), and subtracts the unbalance (3-6).
 ///
-/// Zero, drift and unbalance are learnt while nothing is cut (condition AIR or NONE) and serve from the next
-/// condition on, at any speed: the unbalance pulls with the square of the speed and shows through the axis'
-/// own dynamics. What stands at a cut: line of the sensor's drift extrapolated, with its standard deviation.
+/// Zero, drift and unbalance are estimated without cutting (condition AIR or NONE) and used from the next
+/// condition on, at any speed: the unbalance force grows with the square of the speed and passes the dynamics
+/// of the axis. In a cut the drift is extrapolated, with its standard deviation.
 ///
-/// A sensor that a lateral force would unload, or that is overloaded, does not measure: fx, fy and fz of that
-/// sample are NaN and invalid() names it. Inputs in stamp order.
+/// A sample with an unloaded or overloaded sensor is invalid: its fx, fy and fz are NaN, see invalid().
+/// Inputs in stamp order.
 class SpindleForceSensor {
  public:
   /// @param length [m] of tool and holder. @throws Error when a constant is not positive there.
   SpindleForceSensor(const SpindleSensorCalibration& calibration, double length);
 
-  /// Whether a block is one of this sensor: it has the first of its channels.
+  /// Whether a block is from such a sensor (by its first channel).
   static bool isSixChannels(const SampleBlock& block);
 
   /// Columns of the six sensors. @throws Error when one is missing or not in N.
   static std::array<std::size_t, 6> columnsOf(const SampleBlock& block);
 
-  /// Dynamics of an axis (shown over applied, static gain 1) through which the unbalance shows.
+  /// Dynamics of an axis (measured over applied, static gain 1) that the unbalance force passes.
   void setSensor(std::size_t axis, const ModalModel& sensor) { sensor_.at(axis) = sensor; }
 
   void handle(const SpindleAngle& angle);
@@ -58,7 +58,7 @@ class SpindleForceSensor {
   /// @throws Error when a channel is missing or not in N.
   SampleBlock handle(const SampleBlock& block);
 
-  /// Of the last block: samples that are no measurement.
+  /// Invalid samples of the last block.
   const std::vector<bool>& invalid() const { return invalid_; }
   bool anyInvalid() const { return any_invalid_; }
 
@@ -69,54 +69,54 @@ class SpindleForceSensor {
   const SpindleSensorHealth& health() const { return health_; }
 
  private:
-  /// Sums of a stretch without cutting: offset, drift, cosine and sine of the spindle angle of every pair.
-  struct Stretch {
+  /// Normal equations of a segment without cutting: offset, drift, cosine and sine of the spindle angle.
+  struct AirSegment {
     double from = 0.0, speed = 0.0;  // [s], [rad/s]
     std::size_t samples = 0;
     std::array<std::array<double, 4>, 4> normal{};
     std::array<std::array<double, 4>, 6> right{};
     std::array<double, 6> squares{};
-    std::array<double, 6> first{};  // [N] taken off so that sums stay small
+    std::array<double, 6> first{};  // [N] subtracted for small sums
   };
   struct Zero {
-    double at = 0.0;  // [s] where offset holds
+    double at = 0.0;  // [s] reference time of the offset
     std::array<double, 6> offset{}, drift{};
     double oo = 0.0, od = 0.0, dd = 0.0;  // covariance of offset and drift, worst sensor
   };
-  void learnPending(double before);
-  void learn(double time, double angle, double speed, const std::array<double, 6>& sensors);
-  void closeStretch();
-  void tellZero();
-  void layOutCourses(const SampleBlock& block);
-  bool turning() const;
-  /// [N] of the unbalance at a time [s], complex: its real part shows.
-  std::array<std::complex<double>, 3> unbalancePull(double time) const;
-  /// @return whether all six measure: none unloaded or overloaded, which is counted.
-  bool takeZeroOff(double time, std::array<double, 6>& sensors);
+  void addPendingSamples(double before);
+  void addAirSample(double time, double angle, double speed, const std::array<double, 6>& sensors);
+  void closeAirSegment();
+  void updateZero();
+  void prepareCrossTalkFilters(const SampleBlock& block);
+  bool isRotating() const;
+  /// Unbalance force at a time [s], complex [N]; the real part acts.
+  std::array<std::complex<double>, 3> unbalanceForce(double time) const;
+  /// Counts unloaded and overloaded sensors. @return whether there is none.
+  bool subtractZero(double time, std::array<double, 6>& sensors);
   std::array<double, 3> forceOf(const std::array<double, 6>& sensors);
-  /// A sample that is no measurement: the cross-talk's courses go on with the last forces.
-  void passOver();
-  std::array<std::complex<double>, 3> throughCalibration(const std::array<std::complex<double>, 3>& means,
-                                                         double f) const;
+  /// Advances the cross-talk filters with the last valid forces.
+  void skipSample();
+  std::array<std::complex<double>, 3> calibratedAmplitudes(const std::array<std::complex<double>, 3>& means,
+                                                           double f) const;
 
   SpindleSensorCalibration calibration_;
   double length_;
   std::array<double, 3> constant_{};  // of x, y, z
   double yx_, yz_, xz_;               // pair per load; 0: none
   std::array<ModalModel, 3> sensor_;
-  std::vector<ModalFilter> courses_;  // of yx, yz, xz
-  double course_rate_ = 0.0;          // [Hz]
+  std::vector<ModalFilter> cross_talk_filters_;  // of yx, yz, xz
+  double cross_talk_rate_ = 0.0;                 // [Hz]
   std::array<double, 3> last_{{0, 0, 0}};
   std::vector<LowPass> low_pass_;
   double low_pass_rate_ = 0.0;
   std::uint64_t next_low_pass_ = 0;
 
   std::optional<CuttingCondition::Kind> kind_;
-  // Samples wait a block: a condition may tell afterwards that they belong to a cut.
+  // Samples wait for one block: a condition may arrive that makes them part of a cut.
   std::vector<std::array<double, 6>> pending_;
   double pending_from_ = 0.0, pending_rate_ = 0.0;  // [s], [Hz]
   SpindleAngle pending_angle_;
-  std::optional<Stretch> stretch_;
+  std::optional<AirSegment> air_segment_;
   std::optional<Zero> zero_;
   SpindleAngle angle_;
   bool angle_known_ = false;

@@ -20,8 +20,8 @@ struct StateSpaceCheck {
   int rank = 0;              ///< of the observability matrix (eq. 4-40)
   double observability_condition = 0.0;  ///< [1] of the observability matrix (eq. 4-42)
   bool observable = false;               ///< full rank and conditioned
-  /// [1] least over the poles p of the smallest singular value of (A - p) / |A|, C / |C|: what is left of
-  /// observability in these coordinates, whatever the powers of A do to the matrix of eq. 4-40
+  /// [1] smallest singular value of [(A - p) / |A|; C / |C|] over all poles p (Hautus): observability without
+  /// the powers of A of eq. 4-40
   double margin = 0.0;
 };
 

@@ -11,7 +11,8 @@
 
 namespace smartmill::kalman {
 
-/// Records of all channels of a force sensor at the blows of a measurement that another class judges.
+/// Records of all channels of a force sensor at the hits of a tap test; SensorMeasurement decides which
+/// count.
 class TapCollector {
  public:
   TapCollector(const TapParameters& taps, std::size_t channels);
@@ -23,9 +24,9 @@ class TapCollector {
   void handleHammer(const SampleBlock& block);
   /// One sample of all channels. @param time [s] @param index running index @param rate [Hz]
   void add(double time, std::uint64_t index, double rate, std::vector<double> values);
-  /// Blows so far that the measurement counts: a hit a channel.
-  std::vector<std::vector<Hit>> counted(const SensorResult& result) const;
-  double rate() const { return rate_; }  ///< [Hz] of the last blow; 0 before
+  /// Accepted hits of the measurement, each with one record per channel.
+  std::vector<std::vector<Hit>> acceptedHits(const SensorResult& result) const;
+  double rate() const { return rate_; }  ///< [Hz] of the last hit; 0 before
 
  private:
   struct Force {
@@ -38,7 +39,7 @@ class TapCollector {
     double rate;
     std::vector<double> values;
   };
-  void join();
+  void pairSamples();
 
   bool active_ = false;
   double rate_ = 0.0;

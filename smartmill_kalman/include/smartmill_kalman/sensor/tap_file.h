@@ -15,7 +15,7 @@ struct TapRecords {
 
 /// A smartmill-taps/1 file and the tables that it names. @throws Error naming file, key and value.
 TapRecords readTapFile(const std::string& path);
-/// The same, its tables beside it: NAME_01.csv and so on. @throws Error.
+/// Writes the file and its tables NAME_01.csv ... in the same folder. @throws Error.
 void writeTapFile(const TapRecords& records, const std::string& path);
 
 }  // namespace smartmill::kalman

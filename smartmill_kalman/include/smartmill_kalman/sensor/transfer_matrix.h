@@ -11,7 +11,7 @@
 
 namespace smartmill::kalman {
 
-/// One tap on the workpiece: where, along what, and what the sensor showed.
+/// One tap on the workpiece: point, direction, and records of hammer and sensor.
 struct MatrixTap {
   std::array<double, 3> direction{{0, 0, 0}};  ///< [1] of the force; need not be of unit length
   std::array<double, 3> point{{0, 0, 0}};      ///< [m] from the sensor's origin
@@ -28,12 +28,11 @@ struct TransferMatrix {
   std::vector<Eigen::MatrixXd> forward_std;  ///< root of E|error|^2
   std::vector<Eigen::MatrixXcd> inverse;     ///< H_F: applied over measured (eq. 2.4)
   std::vector<Eigen::MatrixXd> inverse_std;
-  /// [1] of the forward matrix: how much inverting it multiplies relative errors; moments over lever
+  /// [1] of the forward matrix, moments over the lever: amplification of relative errors by the inversion
   std::vector<double> condition;
-  double lever =
-      0.0;  ///< [m] root mean square distance of the taps from the sensor's origin; moments over it
+  double lever = 0.0;  ///< [m] RMS distance of the taps from the sensor's origin, the unit of moments
 
-  /// What a condition number counts in: forces as they are, moments over the lever.
+  /// Units of the condition number: 1 for forces, the lever for moments.
   Eigen::VectorXd scale() const;
   /// Lines with low <= frequency <= high [Hz].
   TransferMatrix band(double low, double high) const;
@@ -41,12 +40,12 @@ struct TransferMatrix {
   FrequencyResponse element(std::size_t row, std::size_t column) const;
 };
 
-/// Bachrathy and Stepan eq. 2.2..2.7: with the force n F and the moment r x n F of every tap in E and what
-/// was measured in M, forward = M E^+ and inverse = E M^+ over all hits, line by line. Noise in M is what
-/// makes them uncertain: its variance a channel and line from what the hits leave over (smoothed over
-/// neighbouring lines), never below what stands before the hits. Hammer windowed (Dunwoody eq. 4.17..4.19).
-/// @param sample_rate [Hz] @throws Error when taps differ in length, are fewer than channels, or do not press
-/// in every direction (and, of six channels, turn about every axis).
+/// Bachrathy and Stepan eq. 2.2..2.7: with force n F and moment r x n F of every tap in E and the measured
+/// channels in M, forward = M E^+ and inverse = E M^+ over all hits, line by line. Standard deviations come
+/// from the noise in M: its variance per channel and line is the residual variance of the hits (smoothed over
+/// neighbouring lines), at least that before the hits. Hammer windowed (Dunwoody eq. 4.17..4.19).
+/// @param sample_rate [Hz] @throws Error when taps differ in length, are fewer than the channels, or do not
+/// span all directions (with six channels also moments about all axes).
 TransferMatrix identifyTransferMatrix(const std::vector<MatrixTap>& taps, double sample_rate);
 
 }  // namespace smartmill::kalman

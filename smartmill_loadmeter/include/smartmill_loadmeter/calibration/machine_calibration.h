@@ -21,8 +21,8 @@ struct IdleVoltage {
   double at(double speed) const { return (kb.value * speed + ktcf.value) * speed; }  ///< [V]
 };
 
-/// Least squares of the voltage, all speeds alike as the thesis has it. The standard deviations are the
-/// larger of the residuals' and the rounding's (resolution / sqrt(12) each, eq. 3.12).
+/// Unweighted least squares of the voltage, as in the thesis. The standard deviations are the larger of the
+/// residuals' and the rounding's (resolution / sqrt(12) each, eq. 3.12).
 /// @throws Error with fewer than two speeds at or above zero_below.
 IdleVoltage fitIdleVoltage(const std::vector<AirCut>& air_cuts, double zero_below, double resolution);
 

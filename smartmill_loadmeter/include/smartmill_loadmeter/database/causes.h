@@ -12,88 +12,88 @@
 
 namespace smartmill::loadmeter {
 
-/// What one machine explained, the others check: the causes that a shop's explanations named, how often, and
-/// what each shows in which test.
+/// Causes that a shop's explanations named, their frequency, and the channels in which each test shows them.
 
-/// Channels in which a test shows something, between blanks; empty: in none.
+/// Channels in which a test shows a cause, separated by blanks; empty: none.
 using Outcome = std::string;
 
-/// In which channels a test shows its cause: where the gap lost what would name it in a record alone.
+/// Channels of a test whose gap falls by at least the amount that identifies a cause from a single record.
 Outcome outcomeOf(const TestEvidence& test);
 
-/// What the tests of one explanation lost with its cause, over what would name it in a record alone, by
-/// channel [1]; of FleetCauses::tests, empty: not made.
-using Showing = std::vector<std::map<std::string, double>>;
+/// Squared-gap reduction of each test in FleetCauses::tests by the cause of one explanation, relative to the
+/// amount that identifies it in a single record, by channel [1]; empty: not measured.
+using EvidenceProfile = std::vector<std::map<std::string, double>>;
 
-/// A cause that machines of a shop have.
+/// Cause that machines of a shop have.
 struct FleetCause {
   std::string name;
-  std::vector<std::string> machines;  ///< that were found to have it
-  /// Beforehand, of one machine more: (k + 1/2) / (n - k + 1/2), k of n explained machines (Jeffreys' prior
-  /// of a share).
+  std::vector<std::string> machines;  ///< machines with this cause
+  /// Prior odds for a further machine, (k + 1/2) / (n - k + 1/2) for k of n explained machines (Jeffreys'
+  /// prior of a proportion).
   double odds = 0.0;
   FoundCause newest;
-  std::vector<Showing> shown;  ///< the newest explanations, eight at most
+  std::vector<EvidenceProfile> profiles;  ///< of the newest explanations, at most eight
 };
 
 struct FleetCauses {
-  std::size_t explained = 0;       ///< machines with an explanation, whatever it said
-  double other_odds = 0.0;         ///< of a cause that none of them has
-  std::vector<FleetCause> causes;  ///< the likeliest first
-  std::vector<std::string> tests;  ///< with its condition where that is known
+  std::size_t explained = 0;       ///< machines with an explanation, whatever its verdict
+  double other_odds = 0.0;         ///< prior odds of a cause that none of them has
+  std::vector<FleetCause> causes;  ///< most probable first
+  std::vector<std::string> tests;  ///< with their conditions where known
 };
 
-/// Of all machines but one. Explanations that named several causes do not tell what each shows: they count
-/// among the machines, and among the tests only where no other one tells.
+/// Causes of all machines except one. Explanations with several causes do not show what each cause
+/// contributes: they count among the machines, and among the tests only if the cause has no other
+/// explanation.
 FleetCauses fleetCauses(const std::vector<ModelImprovement>& improvements, const std::string& except);
 
-/// What the fleet's frequency of causes says beforehand of one machine more. Names that the catalogue of
-/// effects does not know are left out.
+/// Prior odds of the causes for a further machine, from their frequency in the fleet. Names that are not in
+/// the catalogue of effects are left out.
 CauseOdds oddsOf(const FleetCauses& fleet);
 
 struct CauseTable;
 
-/// Which test to make next: the one whose outcome is expected to tell most about the cause (Lindley 1956: the
-/// entropy that it takes away). One cause, none, or one that nobody has met.
-///
-/// Outcomes of a machine's tests are not independent given the cause: they share its size. Each hypothesis is
-/// a mixture, and within a part of it channels show independently of each other:
-/// - a cause: each of its explanations, as large a cause or up to twenty times larger or smaller (squares
-/// grow
-///   with the size's square), two machines' profiles differing by half a natural logarithm besides;
-/// - one that nobody has met: like one that is known but for a tenth or a third of its places; in the same
-///   channels whatever the test; anything.
-/// The prior weighs the choice of tests only: a cause stands alone where the outcomes speak for it
-/// against each other one by 100 to 1, whatever was likely beforehand. Names are an explanation's to give.
+/// Selects the test with the largest expected information about the cause: one of the fleet's, none, or an
+/// unknown one (Lindley 1956: expected reduction of entropy). | Outcomes of one machine's tests are not
+/// independent given the cause, because they share its size. Each hypothesis is a mixture of components,
+/// within which channels are independent:
+/// - a known cause: each of its explanations, with the size scaled by up to a factor of 20 either way
+/// (squares scale with the square of the size) and a log-normal difference of 0.5 between the profiles of two
+/// machines;
+/// - an unknown cause: like a known one with 10 % or 33 % of its channels changed; the same channels in every
+/// test; or any channels. The prior affects the choice of tests only. A cause is accepted when the outcomes
+/// alone favour it over each other hypothesis by 100 to 1.
 class CauseSearch {
  public:
   CauseSearch(const FleetCauses& fleet, const std::vector<double>& odds);
-  /// The test not yet made that tells most; empty: none tells anything more.
+  /// Remaining test with the largest expected information; empty: no test adds information.
   std::optional<std::size_t> next() const;
-  void saw(std::size_t test, const Outcome& outcome);
-  double information(std::size_t test) const;  ///< [nat] that it is expected to give
-  const std::vector<double>& probabilities() const { return probability_; }  ///< causes, none, another
-  /// Of the causes; or causes.size(): none, the machine is as believed.
-  std::optional<std::size_t> alone() const;
+  void addOutcome(std::size_t test, const Outcome& outcome);
+  double information(std::size_t test) const;  ///< [nat] expected
+  const std::vector<double>& probabilities() const {
+    return probability_;
+  }  ///< of each cause, no cause, an unknown cause
+  /// Index of the accepted cause; causes.size(): no cause; empty: undecided.
+  std::optional<std::size_t> acceptedHypothesis() const;
 
  private:
-  void weigh();
+  void updateProbabilities();
   std::shared_ptr<const CauseTable> table_;
-  std::vector<double> prior_, probability_, evidence_;  // evidence: logarithm of the likelihood
-  std::vector<double> parts_;                           // logarithms of weight and likelihood
-  std::vector<double> now_;                             // probability of each part
-  std::vector<bool> made_;
+  std::vector<double> prior_, probability_, evidence_;  // evidence: log likelihood
+  std::vector<double> log_weights_;                     // log of weight x likelihood
+  std::vector<double> component_probability_;           // of each component
+  std::vector<bool> is_done_;
 };
 
-/// Something for a machine to check.
+/// Test proposed to a machine.
 struct Proposal {
   std::string test;
   double information = 0.0;          ///< [nat]
-  std::vector<std::string> reasons;  ///< for each cause that it may show, the likeliest first, one line
+  std::vector<std::string> reasons;  ///< one line for each cause that it may show, most probable first
 };
 
-/// Tests in the order in which a machine had better make them while they show nothing. Causes it was found to
-/// have itself are left out.
+/// Tests in the order in which the machine should make them as long as they show nothing. Causes that its own
+/// explanations found are left out.
 std::vector<Proposal> proposalsFor(const std::string& machine,
                                    const std::vector<ModelImprovement>& improvements);
 

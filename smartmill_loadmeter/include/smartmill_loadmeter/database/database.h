@@ -15,16 +15,16 @@
 
 namespace smartmill::loadmeter {
 
-/// Source of a record that a cut of production has left.
+/// Source of a record from a production cut.
 constexpr const char* SOURCE_PRODUCTION = "production";
 
-/// One identification as this machine keeps it. NaN (and an empty word): not known.
+/// One identification. NaN and empty text: unknown.
 struct CoefficientRecord {
   static constexpr double UNKNOWN = std::numeric_limits<double>::quiet_NaN();
 
   CoefficientSet set;                      ///< tool, material, source, stamp, values, standard deviations
   std::string machine;                     ///< name of the machine
-  int teeth = 0;                           ///< 0: not known
+  int teeth = 0;                           ///< 0: unknown
   double diameter = UNKNOWN;               ///< [m]
   double helix = UNKNOWN;                  ///< [rad]
   double rake = UNKNOWN;                   ///< [rad] normal rake
@@ -33,8 +33,8 @@ struct CoefficientRecord {
   double axial_depth = UNKNOWN;            ///< [m] mean of the cuts
   double entry = UNKNOWN, exit = UNKNOWN;  ///< [rad]
   double edge_age = UNKNOWN;               ///< [s] cutting time of the edge
-  std::string bag;                         ///< bag or campaign it came from
-  std::string version;                     ///< of the software; filled in by add()
+  std::string bag;                         ///< source bag or campaign
+  std::string version;                     ///< of the software; set by add()
   /// Upper triangle of the covariance, row by row, in the order ktc, krc, kac, kte, kre, kae [SI]; NaN:
   /// unknown.
   std::array<double, 21> covariance = unknownCovariance();
@@ -47,7 +47,7 @@ struct CoefficientRecord {
   static std::size_t covarianceIndex(std::size_t row, std::size_t column);  ///< of 6 x 6, row <= column
 };
 
-/// What is asked of the database. NaN: no matter.
+/// Query of the database. NaN: not specified.
 struct CoefficientQuery {
   std::string tool, material;                          ///< empty: any
   double cutting_speed = CoefficientRecord::UNKNOWN;   ///< [m/s]
@@ -58,87 +58,86 @@ struct CoefficientQuery {
   double edge_age = CoefficientRecord::UNKNOWN;        ///< [s]
 };
 
-/// How fast knowledge fades with distance from what was tried.
+/// Growth of the uncertainty with the distance between a record and a query.
 struct DistanceScale {
   double growth = 0.08;     ///< [1] > 0, relative standard deviation of a coefficient at distance 1
   double octaves = 1.0;     ///< [octave] > 0 of cutting speed, feed per tooth and diameter make distance 1
   double angle = 0.15;      ///< [rad] > 0, of rake or helix
   double age = 600.0;       ///< [s] > 0, of the edge's cutting time
-  double other_tool = 2.0;  ///< [1] >= 0, another tool of whatever name in the same material
+  double other_tool = 2.0;  ///< [1] >= 0, any other tool in the same material
 };
 
-/// Distance between what was tried and what is asked, unknown or unasked quantities left out.
+/// Distance between a record and a query; unknown and unspecified quantities are left out.
 double distance(const CoefficientRecord& record, const CoefficientQuery& query, const DistanceScale& scale);
 
-/// Answer to a query: records combined, each with its own covariance widened by its distance.
+/// Answer to a query: the records combined, each with its covariance widened by its distance.
 struct CoefficientEstimate {
   CoefficientSet set;       ///< tool and material of the nearest record
   double nearest = 0.0;     ///< [1] distance of the nearest record
   int records = 0;          ///< combined
-  bool other_tool = false;  ///< nothing was tried with the asked tool
+  bool other_tool = false;  ///< no record has the requested tool
 };
 
 struct RecordKind;
 struct Row;
 
-/// Everything a machine has identified, what its model was found to lack, and its spindle's health: one
-/// SQLite file a machine, or in memory. Each add() is one durable
-/// transaction (write-ahead log, synchronised): when it has returned, no crash takes it back, and any number
-/// of processes may write at once. A record with the content of one that is there is kept once. The same
-/// questions go to a fleet's server (fleet.h), where its address stands in the file's place.
+/// Coefficients, model improvements and spindle health of a machine in one SQLite file or in memory. Each
+/// add() is one durable transaction (write-ahead log, synchronous): it survives a crash after it has
+/// returned, and several processes may write concurrently. A record with the content of an existing one is
+/// ignored. With the address of a fleet's server (fleet.h) instead of a file, the queries go to the server.
 class CoefficientDatabase {
  public:
-  /// @param file empty: in memory; postgresql://..: a fleet's server. @throws Error naming a file that is no
-  /// such database or cannot be opened.
+  /// @param file empty: in memory; postgresql://..: a fleet's server. @throws Error when the file is not such
+  /// a database or cannot be opened.
   explicit CoefficientDatabase(const std::string& file);
   ~CoefficientDatabase();
   CoefficientDatabase(const CoefficientDatabase&) = delete;
   CoefficientDatabase& operator=(const CoefficientDatabase&) = delete;
 
-  /// @return false when it is there already. @throws Error when it cannot be written.
+  /// @return false when the record exists already. @throws Error when it cannot be written.
   bool add(const CoefficientRecord& record);
   bool add(const CoefficientSet& set);
-  /// @{ One transaction: all or none. @return how many were new.
+  /// @{ One transaction. @return number of new records.
   std::size_t add(const std::vector<CoefficientRecord>& records);
   std::size_t add(const std::vector<ModelImprovement>& improvements);
   std::size_t add(const std::vector<HealthRecord>& health);
   /// @}
 
-  /// The newest of this tool and material; empty words match any.
+  /// Newest set of this tool and material; empty text matches any.
   std::optional<CoefficientSet> find(const std::string& tool, const std::string& material) const;
 
-  /// Best knowledge for a query: newest records near the asked speed, of the tool, else of other tools in the
-  /// material. Empty: nothing in this material.
+  /// Best estimate for a query, from the newest records near the cutting speed of the tool, or of other tools
+  /// in the material if there are none. Empty: no record in this material.
   std::optional<CoefficientEstimate> estimate(const CoefficientQuery& query,
                                               const DistanceScale& scale = DistanceScale()) const;
 
-  /// Oldest first. Empty words match any.
+  /// Oldest first. Empty text matches any.
   std::vector<CoefficientRecord> records(const std::string& tool, const std::string& material) const;
   std::size_t size() const;
   std::vector<ModelImprovement> improvements() const;  ///< oldest first
   std::vector<HealthRecord> health() const;            ///< oldest first
 
-  /// Takes over what another machine's file has. @return how many were new.
+  /// Copies the records of another machine's file. @return number of new records.
   std::size_t merge(const std::string& file);
 
-  /// "tool / material" of what is known, for messages.
+  /// "tool / material" of all records, for messages.
   std::string contents() const;
 
   const std::string& file() const;
 
-  /// @{ Of a file, for a fleet (by its identity) to which it is handed on. Records are numbered as they come,
-  /// each kind by itself.
+  /// @{ Synchronisation of a file with a fleet, which is named by its identity. Records of each kind are
+  /// numbered in the order of insertion.
   struct Batch {
     std::vector<Row> rows;
-    std::int64_t last = 0;  ///< number of the last one
+    std::int64_t last = 0;  ///< number of the last row
   };
   Batch unsent(const std::string& fleet, const RecordKind& kind, std::size_t limit) const;  ///< oldest first
   std::size_t unsentCount(const std::string& fleet) const;                                  ///< of all kinds
-  /// All up to this number.
+  /// Marks all rows up to this number.
   void markSent(const std::string& fleet, const RecordKind& kind, std::int64_t last);
-  /// The fleet that was handed on to last, by its identity; empty: none yet.
+  /// Identity of the fleet that was pushed to last; empty: none.
   std::string lastFleet() const;
-  /// Records that came from the fleet are not to be handed back. @return how many were new.
+  /// Adds records of the fleet, which are not sent back. @return number of new records.
   std::size_t addFrom(const std::string& fleet, const RecordKind& kind, const std::vector<Row>& rows);
   std::vector<std::string> identities(const RecordKind& kind) const;
   /// @}
@@ -146,7 +145,6 @@ class CoefficientDatabase {
  private:
   std::size_t add(const RecordKind& kind, const std::vector<Row>& rows);
   std::vector<Row> rows(const RecordKind& kind) const;
-  std::size_t unsentCount(const std::string& fleet, const RecordKind& kind) const;
   std::vector<CoefficientRecord> near(const std::string& tool, const CoefficientQuery& query) const;
 
   struct Impl;
@@ -155,16 +153,16 @@ class CoefficientDatabase {
 
 struct FoundCoefficients {
   std::optional<CoefficientSet> set;
-  std::string message;  ///< one line: where they come from, or what is known instead
+  std::string message;  ///< one line: their origin, or the known pairs
 };
 
-/// Answer to the service: the newest of the pair; else, in the same material, what other tools gave, with its
-/// uncertainty widened. @throws Error when the database cannot be read.
+/// Answer of the service: the newest set of the pair, or the estimate from other tools in the material with a
+/// larger uncertainty. @throws Error when the database cannot be read.
 FoundCoefficients findCoefficients(const CoefficientDatabase& database, const std::string& tool,
                                    const std::string& material);
 
-/// @{ All records as CSV (one header row, name[unit]) or YAML (smartmill-coefficients/1); 17 digits, so that
-/// export and import lose nothing. @throws Error naming file, line or key, and value.
+/// @{ Records as CSV (one header row, name[unit]) or YAML (smartmill-coefficients/1) with 17 digits, so that
+/// export and import are lossless. @throws Error with file, line or key, and value.
 void exportCsv(const std::vector<CoefficientRecord>& records, const std::string& file);
 std::vector<CoefficientRecord> importCsv(const std::string& file);
 void exportYaml(const std::vector<CoefficientRecord>& records, const std::string& file);

@@ -7,18 +7,12 @@
 
 namespace smartmill::loadmeter {
 
-/// What a work-tool material pair shows in the shear zone, whatever the tool's geometry.
+/// Shear zone of a pair of work and tool material, independent of the tool's geometry.
 struct ShearZone {
   double shear_stress = 0.0;    ///< [N/m2]
   double shear_angle = 0.0;     ///< [rad]
   double friction_angle = 0.0;  ///< [rad] mean, on the rake face
 };
-
-/// One orthogonal cut with its chip measured: shear zone by the thin-shear-zone analysis (Armarego), tan(phi)
-/// = r cos(rake) / (1 - r sin(rake)). @param chip_ratio [1] cut over chip thickness. @param power_force,
-/// thrust_force [N], edge forces taken off. @param chip_area [m2] width x cut thickness.
-ShearZone shearZoneOf(double rake, double chip_ratio, double power_force, double thrust_force,
-                      double chip_area);
 
 /// Cutting coefficients (edge terms zero) of an edge with normal rake [rad] and inclination (helix) [rad]:
 /// Budak, Altintas, Armarego 1996, chip flow angle = inclination (Stabler), tan(bn) = tan(ba)
@@ -35,30 +29,30 @@ struct ObliqueSet {
   CuttingCoefficients value, std_dev;  ///< NaN: not identified
 };
 
-/// Orthogonal parameters of a pair found from milling coefficients, without chips measured: the semi-inverse
-/// of obliqueCoefficients() over all sets at once. friction_angle = friction + friction_slope x rake;
-/// shear_angle = shear + shear_slope (rake - friction_angle). Milling says nothing of the shear angle by
-/// itself, so what is known of metals takes part as observations: shear 45 +- 6 deg and slope 0.75 +- 0.25
-/// (Merchant 0.5, Lee and Shaffer 1), friction slope 0.3 +- 0.3, friction 25 +- 15 deg.
+/// Orthogonal parameters of a material pair from milling coefficients, without measured chips: the inverse of
+/// obliqueCoefficients() for all sets together, with friction_angle = friction + friction_slope x rake
+/// and shear_angle = shear + shear_slope (rake - friction_angle). Milling coefficients do not determine the
+/// shear angle, so prior knowledge of metals enters as observations: shear 45 +- 6 deg, shear_slope 0.75 +-
+/// 0.25 (Merchant 0.5, Lee and Shaffer 1), friction_slope 0.3 +- 0.3, friction 25 +- 15 deg.
 struct OrthogonalParameters {
   static constexpr std::size_t COUNT = 5;
   /// shear_stress [N/m2], friction [rad], friction_slope, shear [rad], shear_slope
   std::array<double, COUNT> value{};
   std::array<double, COUNT * COUNT> covariance{};  ///< row by row
-  double kte = 0.0, kte_std = 0.0;  ///< [N/m] edge forces do not follow the rake; NaN: not identified
-  double kre = 0.0, kre_std = 0.0;  ///< [N/m]
-  double kae = 0.0, kae_std = 0.0;  ///< [N/m] per sine of the inclination
+  double kte = 0.0, kte_std = 0.0;                 ///< [N/m] independent of the rake; NaN: not identified
+  double kre = 0.0, kre_std = 0.0;                 ///< [N/m]
+  double kae = 0.0, kae_std = 0.0;                 ///< [N/m] per sine of the inclination
   int sets = 0;
 
   ShearZone at(double rake) const;
 };
 
-/// @throws Error without a set that has Ktc, or with an edge out of range (|rake| < 60 deg, 0 <= inclination
-/// < 80 deg).
+/// @throws Error when no set has Ktc, or an edge is out of range (|rake| < 60 deg, 0 <= inclination < 80
+/// deg).
 OrthogonalParameters semiInverse(const std::vector<ObliqueSet>& sets);
 
-/// Forward prediction for another geometry, standard deviations from the covariance and the model's own error
-/// (3 % of each coefficient). @throws Error as above.
+/// Prediction for another geometry; the standard deviations contain the covariance and a model error of 3 %
+/// of each coefficient. @throws Error as above.
 CoefficientSet predict(const OrthogonalParameters& parameters, double rake, double inclination);
 
 }  // namespace smartmill::loadmeter

@@ -8,33 +8,37 @@
 
 namespace smartmill::loadmeter {
 
-/// By which way the database answers for a tool and a material.
-enum class AnswerWay { pair = 0, shear_zone = 1, standard_cuts = 2, other_tool = 3 };
-const char* nameOf(AnswerWay way);
+/// Method by which coefficients are estimated for a tool and a material. Values as in RecommendCut.srv.
+enum class EstimationMethod { pair = 0, shear_zone = 1, standard_cuts = 2, other_tool = 3 };
+const char* nameOf(EstimationMethod method);
 
-/// One way's Ktc and Kte.
-struct WayAnswer {
-  AnswerWay way{};
+/// Ktc and Kte by one method.
+struct MethodEstimate {
+  EstimationMethod method{};
   CoefficientSet set;
-  int records = 0;  ///< that it rests on
+  int records = 0;  ///< used
 };
 
-/// What to reckon with when this tool is to cut this material.
-struct CutAnswer {
-  AnswerWay way{};                          ///< the surest one, whose coefficients these are, but for Ktc
-  CoefficientSet set;                       ///< Ktc by all ways together, less sure where they contradict
-  double ktc_lower = 0.0, ktc_upper = 0.0;  ///< [N/m2] with 95 % probability Ktc lies between, log-normal
-  /// [1] largest distance between two ways, over their joint standard deviation; NaN: there is one only
-  double surprise = CoefficientRecord::UNKNOWN;
-  std::vector<WayAnswer> ways;  ///< all that can answer
-  std::string message;          ///< one line
+/// Recommended coefficients for a tool in a material.
+struct CutRecommendation {
+  EstimationMethod method{};                ///< most certain method; all coefficients but Ktc are its own
+  CoefficientSet set;                       ///< Ktc by all methods combined, less certain where they disagree
+  double ktc_lower = 0.0, ktc_upper = 0.0;  ///< [N/m2] 95 % interval of Ktc, log-normal
+  /// [1] largest difference from the most certain method over the joint standard deviation; NaN: one method
+  /// only
+  double disagreement = CoefficientRecord::UNKNOWN;
+  std::vector<MethodEstimate> estimates;  ///< of all applicable methods
+  std::string message;                    ///< one line
 };
 
-/// Answers from everything that was cut: the pair itself; the material's shear zone from other tools (Budak,
-/// Altintas, Armarego), forward to this tool's rake and helix, which its records in other materials tell
-/// where the query does not; standard cuts: log K = tool + material, fitted to all pairs that have been cut,
-/// whose scatter is what one pair departs from it; other tools in the material. @param query tool and
-/// material are due. Empty: nothing in this material.
-std::optional<CutAnswer> recommendCut(const CoefficientDatabase& database, const CoefficientQuery& query);
+/// Combines all applicable methods:
+/// - the records of the pair;
+/// - the material's shear zone from other tools (Budak, Altintas, Armarego), evaluated for this tool's rake
+/// and helix, from the query or from its records in other materials;
+/// - standard cuts: log K = tool + material, fitted to all pairs, with the scatter of single pairs about it;
+/// - other tools in the material.
+/// @param query requires tool and material. Empty: no record in this material.
+std::optional<CutRecommendation> recommendCut(const CoefficientDatabase& database,
+                                              const CoefficientQuery& query);
 
 }  // namespace smartmill::loadmeter

@@ -10,58 +10,57 @@
 
 namespace smartmill::loadmeter {
 
-/// Mean torque of one cut of whatever kind.
-struct TorqueReading {
+/// Mean torque of one cut.
+struct TorqueMeasurement {
   ToolGeometry tool;
   Engagement engagement;
   double torque = 0.0;        ///< [N m] mean cutting torque
   double torque_std = 0.0;    ///< [N m] > 0
-  double cutting_time = 0.0;  ///< [s] of the edge since the last reading
+  double cutting_time = 0.0;  ///< [s] of the edge since the previous measurement
 };
 
-/// Ktc and Kte followed over ordinary production cuts: recursive least squares on the mean torque (eq. 3.19
-/// for any engagement), forgetting what is older than some minutes of cutting, so that wear shows. Directions
-/// that the cuts do not excite (one feed only) fade back to the uncertainty of the start, never beyond.
-/// Standard deviations leave room for a drift within the memory: of coefficients that stand still they are up
-/// to sqrt(2) times as large as the errors.
+/// Running estimate of Ktc and Kte over production cuts: recursive least squares of the mean torque (eq. 3.19
+/// for any engagement) with exponential forgetting in cutting time, so that it follows wear. Directions
+/// without excitation (one feed only) return to the initial uncertainty, not beyond. The standard deviations
+/// allow for a drift within the memory; for constant coefficients they are up to sqrt(2) times the errors.
 class RecursiveCoefficients {
  public:
   struct Start {
     double ktc = 1e9, kte = 1.5e4;        ///< [N/m2], [N/m]
     double ktc_std = 1e9, kte_std = 5e4;  ///< > 0
   };
-  /// @param memory [s] > 0 of cutting time after which a reading counts 1/e.
-  /// @throws Error naming a value out of range.
+  /// @param memory [s] > 0 cutting time after which the weight of a measurement is 1/e.
+  /// @throws Error when a value is out of range.
   RecursiveCoefficients(const Start& start, double memory);
 
-  void update(const TorqueReading& reading);
+  void update(const TorqueMeasurement& reading);
 
   double ktc() const { return value_[0]; }
   double kte() const { return value_[1]; }
   double ktcStd() const;
   double kteStd() const;
   double covariance() const;  ///< of the two
-  /// Normalised innovation of the last reading, z-score: beyond 3 the cut was not what was believed.
-  double surprise() const { return surprise_; }
+  /// Normalised innovation of the last measurement: beyond 3 the cut contradicts the estimate.
+  double normalisedInnovation() const { return innovation_; }
   int readings() const { return readings_; }
 
  private:
   std::array<double, 2> value_;
   std::array<double, 3> information_{}, start_{};  // xx, xy, yy
   double memory_;
-  double surprise_ = 0.0;
+  double innovation_ = 0.0;
   int readings_ = 0;
 };
 
-/// What a test cut may not exceed.
+/// Limits of a test cut.
 struct CutLimits {
   double torque = 0.0;  ///< [N m] mean
   double power = 0.0;   ///< [W]
-  /// Largest stable axial depth [m] at a spindle speed [rad/s] for an engagement; empty: no limit known.
+  /// Largest stable axial depth [m] at a spindle speed [rad/s] for an engagement; empty: unlimited.
   std::function<double(double speed, const Engagement& engagement)> stable_depth;
 };
 
-/// Cuts the planner may choose among.
+/// Candidate cuts of a plan.
 struct CandidateCuts {
   std::vector<double> speeds;                         ///< [rad/s]
   std::vector<double> feeds;                          ///< [m] per tooth
@@ -80,12 +79,14 @@ struct TestPlan {
   double ktc_std = 0.0, kte_std = 0.0;  ///< expected
 };
 
-/// Fewest cuts that reach the asked standard deviations: at least three different feeds (regression), chosen
-/// one by one and then exchanged while that helps. @param believed expected coefficients (Ktc, Kte). @param
-/// voltage_std [V] of one cut's mean load-meter voltage. @param most cuts allowed.
-/// @throws Error when no candidate keeps the limits, or `most` cuts do not reach what is asked.
-TestPlan planTests(const ToolGeometry& tool, const Spindle& spindle, const CuttingCoefficients& believed,
+/// Fewest cuts that reach the target standard deviations, with at least three different feeds (regression),
+/// selected one by one and improved by exchanges.
+/// @param expected coefficients Ktc, Kte.
+/// @param voltage_std [V] of one cut's mean load-meter voltage.
+/// @param max_cuts largest number of cuts.
+/// @throws Error when fewer than three feeds satisfy the limits, or max_cuts do not reach the targets.
+TestPlan planTests(const ToolGeometry& tool, const Spindle& spindle, const CuttingCoefficients& expected,
                    const CandidateCuts& candidates, const CutLimits& limits, double voltage_std,
-                   double asked_ktc_std, double asked_kte_std, std::size_t most);
+                   double target_ktc_std, double target_kte_std, std::size_t max_cuts);
 
 }  // namespace smartmill::loadmeter

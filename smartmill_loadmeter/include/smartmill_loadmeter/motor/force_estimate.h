@@ -12,7 +12,7 @@
 
 namespace smartmill::loadmeter {
 
-/// What is known of any metal before a cut, and how good sensors are beyond what their own scatter says.
+/// Prior knowledge of metals, and systematic errors of sensors in addition to their scatter.
 struct ForceEstimateParameters {
   double radial_ratio = 0.35, radial_ratio_std = 0.15;
   double axial_ratio = 0.20, axial_ratio_std = 0.11;
@@ -28,56 +28,57 @@ struct ForceEstimateParameters {
   void declare(ParameterTable& table);
 };
 
-/// What one cut showed. Forces: on the tool, machine axes.
-struct ForceReadings {
+/// Measurements of one cut. Forces act on the tool, in machine axes.
+struct CutMeasurements {
   double stamp = 0.0;  ///< [s]
   std::string name;
   ToolGeometry tool;
   Engagement engagement;
   double heading = 0.0;                  ///< [rad] of the feed in the X-Y plane, from +X towards +Y
-  std::optional<Estimate> load_torque;   ///< [N m] of the cut, by the load meter
+  std::optional<Estimate> load_torque;   ///< [N m] cutting torque by the load meter
   std::optional<Estimate> motor_torque;  ///< [N m] by the spindle's current
-  std::array<std::optional<Estimate>, 3> motor_force;  ///< [N] mean, of axes that moved
-  /// [N] what that is where the cut pulls the axis on; empty: it cannot be.
+  std::array<std::optional<Estimate>, 3> motor_force;  ///< [N] mean, of moving axes
+  /// [N] alternative value if the cut pulls the axis along; empty: excluded.
   std::array<std::optional<Estimate>, 3> motor_other;
-  double spindle_speed = 0.0;  ///< [rad/s] 0: not known, no lines are told
-  /// [N2] lines of the feed drives' load, as their lag leaves them.
-  std::array<std::vector<VariationLine>, 3> motor_lines;
-  std::array<std::optional<Estimate>, 3> bandwidth;     ///< [Hz] of that lag; empty: lines are not used
+  double spindle_speed = 0.0;  ///< [rad/s] 0: unknown, no lines are estimated
+  /// [N2] spectral lines of the feed drives' load, attenuated by their lag.
+  std::array<std::vector<SpectralLine>, 3> motor_lines;
+  std::array<std::optional<Estimate>, 3> bandwidth;     ///< [Hz] of the lag; empty: lines are not used
   std::array<std::optional<Estimate>, 3> sensor_force;  ///< [N] mean, of a force sensor
-  std::array<std::optional<Estimate>, 3> sensor_rms;    ///< [N] variation over a tooth, of the sensor
+  std::array<std::optional<Estimate>, 3>
+      sensor_rms;  ///< [N] RMS variation over a tooth period, of the sensor
 };
 
-/// What the force varies by at one frequency.
+/// Amplitude of the force at one frequency.
 struct ForceLine {
   double frequency = 0.0;             ///< [Hz]
-  std::array<Estimate, 3> amplitude;  ///< [N] machine X, Y, Z; NaN: nobody saw it
+  std::array<Estimate, 3> amplitude;  ///< [N] machine X, Y, Z; NaN: not measured
 };
 
-/// All three components of one cut. A component that no sensor saw is what the others and the mechanics of
-/// the cut say of it, as uncertain as that is.
+/// Force of one cut. A component without a sensor follows from the others and the mechanics of the cut, with
+/// a correspondingly larger standard deviation.
 struct ForceEstimate {
   double stamp = 0.0;     ///< [s]
-  double duration = 0.0;  ///< [s] steady, that it is the mean of
+  double duration = 0.0;  ///< [s] averaged steady interval
   std::string name;
-  std::array<Estimate, 3> mean;  ///< [N] static part: mean on the tool, machine X, Y, Z
-  std::array<Estimate, 3> rms;   ///< [N] dynamic part: root mean square about the mean, over a tooth
-  std::vector<ForceLine> lines;  ///< the revolution's by the drives alone, tooth passing and its harmonics
+  std::array<Estimate, 3> mean;  ///< [N] static component: mean on the tool, machine X, Y, Z
+  std::array<Estimate, 3> rms;   ///< [N] dynamic component: RMS about the mean over a tooth period
+  std::vector<ForceLine> lines;  ///< spindle frequency (by the drives alone), tooth passing and harmonics
   Estimate torque;               ///< [N m] mean
-  /// [1] squared distance of the readings from the estimate over their number; much above 1: they disagree.
-  double surprise = 0.0;
+  /// [1] chi2 of the measurements per measurement; well above 1: they disagree.
+  double chi_square = 0.0;
   std::vector<std::string> sources;  ///< load_meter, motor_spindle, motor_x.., sensor
-  /// E.g. "Fx -120.1 +- 3.0 N, Fy ..".
+  /// For example "Fx -120.1 +- 3.0 N, Fy ..".
   std::string text() const;
 };
 
-/// One estimator of load meter, motor currents and force sensor: six cutting coefficients as Ktc, Kte and the
-/// ratios of the others to these, whose prior any metal obeys, weighted least squares with the cut's
-/// mechanics; the forces and their deviations follow from the coefficients'. A feed drive's lines stand
-/// beside the mechanics' through its lag H(f), whose bandwidth and whose motor's constant are unknowns too:
-/// what the drive does not follow is as unsure as cut and metal leave it, and no quotient by a small H is
-/// ever formed.
-/// @throws Error without any reading, or with one that has no standard deviation.
-ForceEstimate estimateForce(const ForceReadings& readings, const ForceEstimateParameters& parameters);
+/// Estimates the force of a cut from load meter, motor currents and force sensor: weighted least squares of
+/// the six cutting coefficients through the cut's mechanics. Unknowns are Ktc, Kte and the ratios of the
+/// others to these, with a prior for metals; the forces and their standard deviations follow from the
+/// coefficients. The spectral lines of a feed drive are compared with those of the mechanics through its lag
+/// H(f), with bandwidth and motor constant as unknowns: components that the drive does not follow remain as
+/// uncertain as cut and metal leave them, without a division by a small H.
+/// @throws Error without measurements, or with one that has no standard deviation.
+ForceEstimate estimateForce(const CutMeasurements& measurements, const ForceEstimateParameters& parameters);
 
 }  // namespace smartmill::loadmeter

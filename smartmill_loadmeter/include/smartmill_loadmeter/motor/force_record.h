@@ -9,34 +9,34 @@
 
 namespace smartmill::loadmeter {
 
-/// What a force sensor showed over the steady part of one test.
-struct ForceReading {
+/// Force by a force sensor over the steady state of one test.
+struct ForceMeasurement {
   std::array<Estimate, 3> mean;               ///< [N] X, Y, Z on the tool
-  std::array<double, 3> variance{{0, 0, 0}};  ///< [N2] about it
+  std::array<double, 3> variance{{0, 0, 0}};  ///< [N2] about the mean
   std::array<double, 3> variance_std{{0, 0, 0}};
 
-  /// Mean above that in air, where the sensor's zero was seen.
-  Estimate meanOver(const std::optional<ForceReading>& air, std::size_t axis) const;
-  /// Root mean square about the mean beyond what the sensor shows in air; empty where it is less.
-  std::optional<Estimate> rmsOver(const std::optional<ForceReading>& air, std::size_t axis) const;
+  /// Mean minus that in air, which measures the sensor's zero.
+  Estimate meanAbove(const std::optional<ForceMeasurement>& air, std::size_t axis) const;
+  /// RMS about the mean without the sensor's noise in air; empty: not significant.
+  std::optional<Estimate> rmsAbove(const std::optional<ForceMeasurement>& air, std::size_t axis) const;
 };
 
-/// Blocks of force/compensated while a test is steady, each condensed to its sums.
+/// Sums of the blocks of force/compensated during a steady test.
 class ForceRecord {
  public:
-  void clear() { parts_.clear(); }
-  /// Blocks of a filter that settles, and blocks with numbers that are not finite, do not count.
+  void clear() { blocks_.clear(); }
+  /// Ignores blocks of a settling filter and blocks with values that are not finite.
   void add(const ForceBlock& block);
   void dropAfter(double stamp);
-  /// Of blocks that end after `since` [s]. Empty with fewer than 8 of them.
-  std::optional<ForceReading> reading(double since = -1e300) const;
+  /// From the blocks that end after `since` [s]. Empty with fewer than 8 of them.
+  std::optional<ForceMeasurement> measurement(double since = -1e300) const;
 
  private:
-  struct Part {
+  struct BlockSums {
     double end = 0.0, count = 0.0;
     std::array<double, 3> mean{{0, 0, 0}}, square{{0, 0, 0}};  // [N] and [N2], means over the block
   };
-  std::deque<Part> parts_;
+  std::deque<BlockSums> blocks_;
 };
 
 }  // namespace smartmill::loadmeter

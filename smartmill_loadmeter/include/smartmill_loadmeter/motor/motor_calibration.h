@@ -10,16 +10,16 @@
 
 namespace smartmill::loadmeter {
 
-/// A standard cut whose forces a remote dynamometer recorded once for all machines (Cheng & Venuvinod).
+/// Standard cut whose forces a remote dynamometer recorded once for all machines (Cheng & Venuvinod).
 struct StandardCut {
   std::string name;
-  /// [N] mean, X, Y, Z, positive where it opposes the motion of the axis; empty: not recorded.
+  /// [N] mean, X, Y, Z, positive against the motion of the axis; empty: not recorded.
   std::array<std::optional<double>, 3> force;
   std::optional<double> torque;  ///< [N m] mean, of the spindle
 };
 
-/// The same cut on this machine: ranges of phase currents in cut and in air, same motion. Empty: axis at
-/// rest.
+/// The same cut on this machine: ranges of phase currents in the cut and in air with the same motion. Empty:
+/// axis at rest.
 struct MachineCurrents {
   std::string name;
   double spindle_speed = 0.0;                          ///< [rad/s]
@@ -29,29 +29,30 @@ struct MachineCurrents {
 
 /// F = m (I - Ia) of one feed drive.
 struct DriveCalibration {
-  Estimate newton_per_ampere;  ///< [N/A] m; negative where weight aids the motion more than friction hinders
-  double scatter = 0.0;        ///< [N] standard deviation of one cut about the law
+  Estimate
+      newton_per_ampere;  ///< [N/A] m; negative when the weight aids the motion more than friction opposes it
+  double scatter = 0.0;   ///< [N] standard deviation of one cut about the law
   int cuts = 0;
 
-  /// Force that opposes the motion, as one new cut shows it [N].
+  /// Force of a new cut against the motion [N].
   Estimate opposing(double current, double air) const;
 };
 
 struct MotorCalibration {
-  std::array<std::optional<DriveCalibration>, 3> drive;  ///< X, Y, Z; empty: never moved in a standard cut
+  std::array<std::optional<DriveCalibration>, 3> drive;  ///< X, Y, Z; empty: did not move in a standard cut
   std::optional<TorquePowerLaw> spindle;
-  std::vector<std::string> notes;  ///< what was left out, or does not go with the law; one line each
+  std::vector<std::string> notes;  ///< rejected cuts and inconsistencies; one line each
 };
 
 /// Tables "cut,force_x[N],force_y[N],force_z[N],torque[N m]" and "cut,spindle_speed[rpm],current_x[A],
-/// air_x[A],..,current_spindle[A],air_spindle[A]"; columns in any order, absent ones and empty cells: not
-/// known. @throws Error naming file, line and column.
+/// air_x[A],..,current_spindle[A],air_spindle[A]"; columns in any order, missing columns and empty cells:
+/// unknown. @throws Error with file, line and column.
 std::vector<StandardCut> readStandardCuts(const std::string& file);
 std::vector<MachineCurrents> readMachineCurrents(const std::string& file);
 
-/// Standard cuts and this machine's currents, matched by name, to its calibration.
+/// Calibration of this machine from standard cuts and its currents, matched by name.
 /// @param base_speed [rad/s] of the spindle motor.
-/// @throws Error when no axis has three cuts, or a name stands twice.
+/// @throws Error when no axis has three cuts, or a name is repeated.
 MotorCalibration calibrateMotors(const std::vector<StandardCut>& cuts,
                                  const std::vector<MachineCurrents>& currents, double base_speed);
 

@@ -12,30 +12,30 @@ namespace smartmill::loadmeter {
 
 /// Motor currents to forces: Cheng & Venuvinod, sections 7..9.
 
-/// Approximation of a signal by Daubechies-5 wavelets: the `level` finest bands of detail are taken out (GSL,
-/// dyadic; the signal is mirrored at its ends to a power of two). Level L keeps what lies below rate /
+/// Approximation of a signal by Daubechies-5 wavelets without the `level` finest bands of detail
+/// (dyadic; the signal is mirrored at its ends to a power of two). Level L retains frequencies below rate /
 /// 2^(L+1).
 /// @throws Error with fewer than 2^level samples.
 std::vector<double> denoise(const std::vector<double>& signal, int level);
 
-/// Coarsest level that leaves a sine of this frequency as it is, at most 10.
+/// Coarsest level that does not attenuate a sine of this frequency, at most 10.
 int levelFor(double frequency, double sample_rate);
 
 /// Range (twice the amplitude) of one phase's current: the de-noised signal's sine. @param frequency [Hz] of
-/// the phase. @param slip [1] share by which it may lie higher (induction motors under load). @return [A].
+/// the phase. @param slip [1] largest relative increase of the frequency (induction motors under load).
+/// @return [A].
 /// @throws Error with less than two periods.
 double phaseRange(const std::vector<double>& current, double sample_rate, double frequency,
                   double slip = 0.0);
-/// The same with the standard deviation that what is left beside the sine gives it, and the frequency that
-/// was found.
-struct PhaseFit {
+/// The same with the fitted frequency and the standard deviation from the residual.
+struct PhaseFitResult {
   Estimate range;          ///< [A]
   double frequency = 0.0;  ///< [Hz]
 };
-PhaseFit fitPhase(const std::vector<double>& current, double sample_rate, double frequency,
-                  double slip = 0.0);
+PhaseFitResult fitPhase(const std::vector<double>& current, double sample_rate, double frequency,
+                        double slip = 0.0);
 
-/// A straight line y = slope x + level, with its covariance.
+/// Straight line y = slope x + level with its covariance.
 struct Line {
   Estimate slope, level;
   double covariance = 0.0;
@@ -48,11 +48,11 @@ struct Line {
   double stdAt(double x) const;
 };
 
-/// Feed drive (Table 1): F = m I + c over calibration cuts; c = -(W + R), m takes the sign of W + R: negative
-/// where the weight aids the motion more than friction hinders it. @throws Error with fewer than three cuts.
+/// Feed drive (Table 1): F = m I + c over calibration cuts; c = -(W + R), m has the sign of W + R, negative
+/// when the weight aids the motion more than friction opposes it. @throws Error with fewer than three cuts.
 Line fitLine(const std::vector<double>& x, const std::vector<double>& y);
 
-/// One spindle cut: rise of the phase range over air cutting, and what torque the force made.
+/// Spindle cut: rise of the phase range over air cutting and the cutting torque.
 struct SpindleCut {
   double speed_rpm = 0.0;
   double rise = 0.0;    ///< [A] I - Ia > 0
@@ -63,8 +63,8 @@ struct SpindleCut {
 /// 1).
 class TorquePowerLaw {
  public:
-  /// Polynomials of lower degree where the cuts have fewer different speeds. @throws Error with fewer than
-  /// three cuts on a side that has any.
+  /// The degree is lower when the cuts have fewer different speeds. @throws Error with fewer than three cuts
+  /// on a side that has cuts.
   TorquePowerLaw(const std::vector<SpindleCut>& cuts, double base_speed_rpm);
 
   /// Polynomials in (N - middle) / span, lowest power first; N, middle, span in rpm.
@@ -72,14 +72,14 @@ class TorquePowerLaw {
     std::vector<double> a, b;
     double middle = 0.0, span = 1.0;
   };
-  /// As found earlier. @param scatter [N m].
+  /// From stored values. @param scatter [N m].
   TorquePowerLaw(std::optional<Side> below, std::optional<Side> above, double base_speed_rpm, double scatter)
       : base_(base_speed_rpm), sides_{std::move(below), std::move(above)}, scatter_(scatter) {}
 
   double torque(double speed_rpm, double rise) const;  ///< [N m]
-  /// Standard deviation of one new torque: scatter about the law, [N m].
+  /// Standard deviation of one new torque [N m]: scatter about the law.
   double scatter() const { return scatter_; }
-  double rSquared() const { return r_squared_; }  ///< [1] of the cuts it was made from
+  double rSquared() const { return r_squared_; }  ///< [1] of the fitted cuts
   double baseSpeed() const { return base_; }      ///< [rpm]
   const std::optional<Side>& side(bool above) const { return sides_[above ? 1 : 0]; }
 

@@ -12,39 +12,39 @@
 
 namespace smartmill::loadmeter {
 
-/// What a session's own air moves and first cuts say of the drives: friction of each axis over its speed,
-/// and, from cuts whose force another sensor saw (dynamometer, sensor in the spindle; the load meter alone,
-/// with the doubt that leaves), force and torque an ampere. No standard cuts from elsewhere are needed.
+/// Calibration of the drives by a session's own air moves and cuts, without standard cuts: friction of each
+/// axis over velocity, and force and torque per ampere from cuts whose force another sensor measured
+/// (dynamometer, spindle sensor; or the load meter alone, with its larger uncertainty).
 class SelfCalibration {
  public:
   explicit SelfCalibration(const MotorParameters& parameters) : parameters_(parameters) {}
   void clear();
 
-  /// A test in air. @param stamp [s]
-  void air(const MotorReading& reading, double stamp);
-  /// A cut. @param seen its force by what is no motor
-  void cut(const MotorReading& reading, const ForceEstimate& seen);
+  /// Adds a test in air. @param stamp [s]
+  void air(const MotorMeasurement& measurement, double stamp);
+  /// Adds a cut. @param reference its force without motor currents
+  void cut(const MotorMeasurement& measurement, const ForceEstimate& reference);
 
-  /// Air readings so far, and what each axis' friction law says of this cut's feed where none was near it.
-  std::vector<MotorReading> airFor(const MotorReading& cut) const;
-  /// Empty before three cuts told of an axis or of the spindle.
+  /// Measurements in air, completed by each axis' friction law for this cut's feed if there is none near it.
+  std::vector<MotorMeasurement> airFor(const MotorMeasurement& cut) const;
+  /// Empty with fewer than three cuts for each axis and the spindle.
   const std::optional<MotorCalibration>& calibration() const { return calibration_; }
-  /// What was learnt, one line. @param bandwidth [Hz] of the drives' lags
+  /// Calibration in one line. @param bandwidth [Hz] of the drives' lags
   std::string text(const std::array<std::optional<Estimate>, 3>& bandwidth) const;
 
  private:
   struct Air {
-    MotorReading reading;
+    MotorMeasurement measurement;
     double stamp = 0.0;
   };
   struct Cut {
-    MotorReading reading;
-    ForceEstimate seen;
+    MotorMeasurement measurement;
+    ForceEstimate reference;
   };
   void calibrate();
   std::optional<DriveCalibration> drive(std::size_t axis) const;
   std::optional<TorquePowerLaw> spindle() const;
-  void learnFriction(std::size_t axis);
+  void updateFriction(std::size_t axis);
 
   MotorParameters parameters_;
   std::vector<Air> air_;

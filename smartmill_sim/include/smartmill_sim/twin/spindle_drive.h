@@ -1,5 +1,6 @@
 #pragma once
 
+#include "smartmill_core/cutting/friction.h"
 #include "smartmill_core/model/machine_model.h"
 
 namespace smartmill::sim {
@@ -13,8 +14,8 @@ class SpindleDrive {
 
   /// Friction torque [N m] at a speed [rad/s]; zero below friction_zero_below.
   double friction(double speed) const {
-    if (speed < spindle_.friction_zero_below) return 0.0;
-    return factor_ * (spindle_.viscous * speed + spindle_.coulomb + extra_);
+    return LinearFriction{spindle_.viscous, spindle_.coulomb, spindle_.friction_zero_below}.at(speed, extra_,
+                                                                                               factor_);
   }
 
   /// Friction besides the model's [N m], and a factor on all of it.

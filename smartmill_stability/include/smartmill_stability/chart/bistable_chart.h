@@ -25,6 +25,6 @@ struct BistableChart {
 /// and where the curve is another tool's. @param speeds [1] evenly over the chart's. @throws Error as
 /// bistableLimits().
 std::optional<BistableChart> bistableChart(const ChartMaker& maker, const ChartParameters& parameters,
-                                           const FoundCurves& curves, int speeds);
+                                           const IdentifiedForceCurves& curves, int speeds);
 
 }  // namespace smartmill::stability

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "smartmill_core/parameters/parameter_table.h"
-#include "smartmill_core/signal/counted_angle.h"
 #include "smartmill_core/signal/stream_sorter.h"
 #include "smartmill_core/signal/streams.h"
+#include "smartmill_core/signal/unwrapped_angle.h"
 
 namespace smartmill::stability {
 
@@ -89,7 +89,7 @@ class ChatterDetector {
     double time;
     std::array<double, 3> force;
   };
-  using Angle = CountedAngle;
+  using Angle = UnwrappedAngle;
   void dropWindow();
   void notSteady(double stamp);
   void evaluate();
@@ -116,10 +116,10 @@ class ChatterDetector {
 ForceBlock signalBlock(const SampleBlock& block);
 
 /// A detector behind a StreamSorter: what node and offline tool both use.
-class SortedDetection {
+class DetectionPipeline {
  public:
   /// @param hold_back [s], see StreamSorter.
-  SortedDetection(const ChatterParameters& parameters, double hold_back, ChatterDetector::Output output);
+  DetectionPipeline(const ChatterParameters& parameters, double hold_back, ChatterDetector::Output output);
 
   void push(const CuttingCondition& condition);
   void push(const CncState& state);

@@ -225,7 +225,11 @@ std::optional<UnevenStep> unevenStep(const std::vector<double>& t) {
   const auto worst = std::max_element(steps.begin(), steps.end(), [usual](double l, double r) {
     return std::abs(l - usual) < std::abs(r - usual);
   });
-  return UnevenStep{static_cast<std::size_t>(worst - steps.begin()), *worst, usual};
+  // Two rates in one record: times have printed digits, all steps of the second rate are alike.
+  const double alike = 0.99 * std::abs(*worst - usual);
+  const auto first =
+      std::find_if(steps.begin(), steps.end(), [&](double step) { return std::abs(step - usual) >= alike; });
+  return UnevenStep{static_cast<std::size_t>(first - steps.begin()), *first, usual};
 }
 
 bool Record::has(const std::string& name) const {

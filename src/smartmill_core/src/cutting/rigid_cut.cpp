@@ -134,7 +134,7 @@ void addBetween(const std::vector<EdgeSums>& rows, double from, double to, doubl
 
 }  // namespace
 
-void RigidCut::addStraight(const EdgePart& part, EdgeSums& sums) const {
+void RigidCut::addStraight(const EdgeSegment& part, EdgeSums& sums) const {
   const double thickness = chip(part.tooth, part.to);
   if (thickness > 0.0) add(part.height, thickness, {std::sin(part.to), std::cos(part.to)}, sums);
 }
@@ -143,7 +143,7 @@ EdgeSums RigidCut::sumsAt(double angle) {
   EdgeSums sums;
   if (arcs_.empty()) return sums;
   if (lag_ > 0.0) tabulate();
-  forEachEdgePart(arcs_, lag_, rule_.toothAngle(), angle, [&](const EdgePart& part) {
+  forEachEdgeSegment(arcs_, lag_, rule_.toothAngle(), angle, [&](const EdgeSegment& part) {
     if (part.straight) {
       addStraight(part, sums);
     } else {
@@ -172,7 +172,7 @@ void RigidCut::integrate(const std::vector<ChipShape>& shapes, double from, doub
 
 std::array<CuttingForce, 2> RigidCut::partsAt(double angle) const {
   EdgeSums sums;
-  forEachEdgePart(arcs_, lag_, rule_.toothAngle(), angle, [&](const EdgePart& part) {
+  forEachEdgeSegment(arcs_, lag_, rule_.toothAngle(), angle, [&](const EdgeSegment& part) {
     if (part.straight) {
       addStraight(part, sums);
     } else {

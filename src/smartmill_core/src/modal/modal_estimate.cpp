@@ -185,7 +185,7 @@ void doubtIncoherent(const std::vector<FrequencyResponse>& bands, ModalEstimate&
 }
 
 /// Lower and upper residual of what modes and doubts leave, by least squares.
-ModalFlanks flanksOf(const WeightedLines& lines, const ModalEstimate& estimate, std::size_t o) {
+ResidualTerms flanksOf(const WeightedLines& lines, const ModalEstimate& estimate, std::size_t o) {
   const double reference = units::TWO_PI * lines.frequency[lines.size() / 2];
   double a = 0.0, b = 0.0, c = 0.0;  // normal equations of (1, -(reference / w)^2)
   Complex one, two;
@@ -209,7 +209,7 @@ ModalFlanks flanksOf(const WeightedLines& lines, const ModalEstimate& estimate, 
 
 }  // namespace
 
-Complex ModalFlanks::response(double f) const {
+Complex ResidualTerms::response(double f) const {
   const double w = units::TWO_PI * f;
   return upper - lower / (w * w);
 }

@@ -20,10 +20,10 @@
 /// holds.
 namespace smartmill::conversion {
 
-inline void requireLength(const char* field, std::size_t length, std::size_t due) {
-  if (length != due) {
+inline void requireLength(const char* field, std::size_t length, std::size_t expected) {
+  if (length != expected) {
     throw Error(std::string(field) + ": " + std::to_string(length) + " values, expected " +
-                std::to_string(due));
+                std::to_string(expected));
   }
 }
 
@@ -408,7 +408,7 @@ inline ForceCurve forceCurveOf(const std::vector<double>& chip, const std::vecto
 }
 
 template <class M>
-void read(const M& m, FoundCurves& found) {
+void read(const M& m, IdentifiedForceCurves& found) {
   constexpr std::uint32_t MOST_TEETH = 1000;
   found.stamp = secondsOf(m.header.stamp);
   found.tool = m.tool;
@@ -424,7 +424,7 @@ void read(const M& m, FoundCurves& found) {
 }
 
 template <class M>
-void write(const FoundCurves& found, M& m) {
+void write(const IdentifiedForceCurves& found, M& m) {
   setStamp(found.stamp, m);
   m.tool = found.tool;
   m.material = found.material;

@@ -5,6 +5,7 @@
 #include "smartmill_core/cutting/coefficient_set.h"
 #include "smartmill_core/cutting/force_curve.h"
 #include "smartmill_core/cutting/stability_chart.h"
+#include "smartmill_core/frames.h"
 #include "smartmill_core/modal/results.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_recording/messages.h"
@@ -29,7 +30,7 @@ plain::LoadSample toPlain(const LoadSample& load);
 CuttingCondition fromMsg(const plain::CuttingCondition& message);
 plain::CuttingCondition toPlain(const CuttingCondition& condition);
 ForceBlock fromMsg(const plain::ForceBlock& message);
-plain::ForceBlock toPlain(const ForceBlock& block, const std::string& frame_id);
+plain::ForceBlock toPlain(const ForceBlock& block, const std::string& frame_id = frames::MACHINE);
 MeasuredFrf fromMsg(const plain::Frf& message);
 plain::Frf toPlain(const MeasuredFrf& measured);
 MeasuredModes fromMsg(const plain::ModalModel& message);
@@ -40,8 +41,8 @@ StabilityPoint fromMsg(const plain::StabilityPoint& message);
 plain::StabilityPoint toPlain(const StabilityPoint& point);
 StabilityChart fromMsg(const plain::StabilityChart& message);
 plain::StabilityChart toPlain(const StabilityChart& chart);
-FoundCurves fromMsg(const plain::ForceCurve& message);
-plain::ForceCurve toPlain(const FoundCurves& curves);
+IdentifiedForceCurves fromMsg(const plain::ForceCurve& message);
+plain::ForceCurve toPlain(const IdentifiedForceCurves& curves);
 /// @param received [s] taken for a missing stamp; only a stamped goal replays to the last digit
 MeasureFrfGoal goalFromMsg(const plain::MeasureFrfGoal& message, double received);
 
@@ -89,7 +90,7 @@ struct PlainOf<StabilityChart> {
   using Type = plain::StabilityChart;
 };
 template <>
-struct PlainOf<FoundCurves> {
+struct PlainOf<IdentifiedForceCurves> {
   using Type = plain::ForceCurve;
 };
 

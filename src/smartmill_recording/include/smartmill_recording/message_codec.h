@@ -12,6 +12,12 @@
 
 namespace smartmill {
 
+/// Whether a type is a message of smartmill::plain.
+template <class Data, class = void>
+struct IsMessage : std::false_type {};
+template <class Data>
+struct IsMessage<Data, std::void_t<decltype(Data::LEAST_SIZE)>> : std::true_type {};
+
 /// Deserialization of ROS 1 (little-endian; strings and lists behind a length of 32 bits). Every length is
 /// compared with the bytes that are left before memory is taken for it.
 class MessageReader {

@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <type_traits>
 
 #include "smartmill_recording/conversions.h"
 #include "smartmill_recording/message_codec.h"
@@ -11,12 +10,12 @@ namespace smartmill {
 
 /// How recorded bytes become a Data: its message type, and decode(), whose result is valid until the next
 /// call. @throws Error on bytes that end too early and on data that contradict themselves.
-template <class Data, class = void>
+template <class Data, bool MESSAGE = IsMessage<Data>::value>
 class Recorded;
 
 /// Messages themselves.
 template <class Message>
-class Recorded<Message, std::void_t<decltype(Message::LEAST_SIZE)>> {
+class Recorded<Message, true> {
  public:
   static const char* type() { return Message::TYPE; }
   static const char* md5() { return Message::MD5; }
@@ -31,7 +30,7 @@ class Recorded<Message, std::void_t<decltype(Message::LEAST_SIZE)>> {
 
 /// Core types, by the message that carries them.
 template <class Data>
-class Recorded<Data, std::void_t<typename PlainOf<Data>::Type>> {
+class Recorded<Data, false> {
  public:
   static const char* type() { return PlainOf<Data>::Type::TYPE; }
   static const char* md5() { return PlainOf<Data>::Type::MD5; }

@@ -27,9 +27,9 @@ struct RecordedConnection {
   std::map<std::string, std::string> more;  ///< other fields of its header: callerid, latching
 };
 
-/// The messages of a recording in the order of their reception. No length that the file states is believed
-/// before it was compared with the bytes that are there: a damaged file is refused with one line, never with
-/// a read beyond a buffer or an allocation that the file's bytes do not fill.
+/// The messages of a recording in the order of their reception. Every length in the file is compared with the
+/// bytes that are there before it is used: a damaged file is refused with one line, without a read beyond a
+/// buffer or an allocation that the file's bytes do not fill.
 class RecordingFile {
  public:
   /// Of one message.
@@ -52,7 +52,7 @@ class RecordingFile {
   virtual bool next(Entry* entry) = 0;
   /// The message's bytes, valid until the next call of next() or data(). @throws Error.
   virtual const std::uint8_t* data(const Entry& entry) = 0;
-  /// Share of the file that next() has gone through. [1]
+  /// [1] share of the file that next() has read.
   virtual double share() const = 0;
   /// @throws std::out_of_range
   const RecordedConnection& connection(const Entry& entry) const {
@@ -61,7 +61,7 @@ class RecordingFile {
 };
 
 /// Opens a bag of format 2.0 (wiki.ros.org/Bags/Format/2.0) or an MCAP file (mcap.dev/spec) with messages of
-/// ROS 1; which of both is told by its first bytes, not by its name.
+/// ROS 1, by its first bytes and not by its name.
 /// @throws Error of one line: missing, neither format, cut off, damaged, without index.
 std::unique_ptr<RecordingFile> openRecording(const std::string& path);
 /// @param name for messages

@@ -6,7 +6,6 @@
 #include <map>
 #include <memory>
 #include <string>
-#include <type_traits>
 
 #include "smartmill_core/names.h"
 #include "smartmill_recording/conversions.h"
@@ -49,17 +48,13 @@ class RecordingWriter {
   }
 
  private:
-  template <class Data, class = void>
-  struct IsMessage : std::false_type {};
-  template <class Data>
-  struct IsMessage<Data, std::void_t<decltype(Data::LEAST_SIZE)>> : std::true_type {};
   std::uint32_t numberOf(const std::string& topic, const char* type, const char* md5, const char* definition);
 
   std::map<std::string, std::uint32_t> numbers_;  // of written topics
 };
 
-/// A bag of format 2.0 where the name ends in .bag, else an MCAP file of the profile ros1.
-/// @throws Error when the file cannot be written, or a bag is to be compressed by zstd.
+/// A bag of format 2.0 where the name ends in .bag, an MCAP file of the profile ros1 where it ends in .mcap.
+/// @throws Error on another name, when the file cannot be written, or a bag is to be compressed by zstd.
 std::unique_ptr<RecordingWriter> createRecording(const std::string& path, RecordingCompression compression);
 
 /// Copies a recording into the other format, or the same: messages, times, definitions and connections stay.

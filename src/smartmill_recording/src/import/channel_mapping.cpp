@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <functional>
 #include <set>
 #include <sstream>
 
@@ -54,15 +55,21 @@ const Known& known(const std::string& column) {
                        [&](const Known& k) { return column == k.column; });
 }
 
-std::string listOf(const ChannelFile& file) {
+std::string listOf(const std::vector<const FileChannel*>& channels) {
   constexpr std::size_t MOST = 12;
   std::string text;
-  for (std::size_t i = 0; i < file.channels.size() && i < MOST; ++i) {
-    const FileChannel& c = file.channels[i];
+  for (std::size_t i = 0; i < channels.size() && i < MOST; ++i) {
+    const FileChannel& c = *channels[i];
     text += (i ? ", " : "") + c.name + (c.unit.empty() ? "" : "[" + c.unit + "]");
   }
-  if (file.channels.size() > MOST) text += ", ...";
-  return file.channels.empty() ? "none" : text;
+  if (channels.size() > MOST) text += ", ...";
+  return channels.empty() ? "none" : text;
+}
+
+std::string listOf(const ChannelFile& file) {
+  std::vector<const FileChannel*> channels;
+  for (const FileChannel& channel : file.channels) channels.push_back(&channel);
+  return listOf(channels);
 }
 
 class Mapper {
@@ -79,11 +86,13 @@ class Mapper {
       if (column != "time") takeColumn(column, *channel);
     }
     needed();
+    std::vector<const FileChannel*> unused;
     for (const FileChannel& channel : file_.channels) {
       const bool used = std::any_of(found_.begin(), found_.end(),
                                     [&](const auto& entry) { return entry.second == &channel; });
-      if (!used) result_.report.push_back("channel " + channel.name + " is not used");
+      if (!used) unused.push_back(&channel);
     }
+    if (!unused.empty()) result_.report.push_back("not used: " + listOf(unused));
     if (result_.faults.empty() && result_.record.names.empty())
       fault("no channel is used; the file has " + listOf(file_));
     return std::move(result_);
@@ -237,8 +246,13 @@ class Mapper {
       if (channel.values.size() < 2) return fault("channel " + channel.name + ": fewer than two samples");
       std::vector<double> time = channel.values;
       for (double& t : time) t *= *factor;
+      const auto stop = std::adjacent_find(time.begin(), time.end(), std::greater_equal<>());
+      if (stop != time.end())
+        return fault(formatted("channel %s: times must increase: %g s at sample %zu, %g s at the next",
+                               channel.name.c_str(), stop[0],
+                               static_cast<std::size_t>(stop - time.begin()) + 1, stop[1]));
       if (const std::optional<UnevenStep> step = unevenStep(time))
-        return fault(formatted("channel %s: uneven time: a step of %g s behind sample %zu, %g s expected",
+        return fault(formatted("channel %s: uneven time: a step of %g s after sample %zu, %g s expected",
                                channel.name.c_str(), step->step, step->sample + 1, step->usual));
       rate = static_cast<double>(time.size() - 1) / (time.back() - time.front());
       const double whole = std::round(rate);

@@ -159,11 +159,11 @@ void takeRate(ChannelFile* file) {
         const std::string key = (path.empty() ? "" : path + "/") + name;
         const auto at = file->numbers.find(key);
         if (at == file->numbers.end()) continue;
-        if (!(at->second > 0.0) || !std::isfinite(at->second))
-          throw Error(file->file + ": " + key + ": a sample rate or step above 0 is expected");
         const double rate = std::string(name) == "dt" ? 1.0 / at->second : at->second;
+        if (!(at->second > 0.0) || !std::isfinite(rate))
+          throw Error(file->file + ": " + key + ": expected a sample rate or step above 0");
         if (file->sample_rate && std::abs(*file->sample_rate / rate - 1.0) > 1e-6)
-          throw Error(file->file + formatted(": %s states %g Hz, %s %g Hz; one rate per file is expected",
+          throw Error(file->file + formatted(": %s states %g Hz, %s %g Hz; expected one rate per file",
                                              key.c_str(), rate, file->sample_rate_from.c_str(),
                                              *file->sample_rate));
         file->sample_rate = rate;

@@ -1,6 +1,8 @@
 #include "smartmill_recording/import/import_campaign.h"
 
+#include <cerrno>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <set>
 
@@ -29,7 +31,7 @@ class NewFolder {
     std::error_code code;
     fs::create_directories(target_.parent_path(), code);
     std::string pattern = target_.string() + ".XXXXXX";
-    if (!mkdtemp(pattern.data())) throw Error(target + ": cannot be made");
+    if (!mkdtemp(pattern.data())) throw Error(target + ": cannot be created: " + std::strerror(errno));
     path_ = pattern;
     fs::permissions(path_,
                     fs::perms::owner_all | fs::perms::group_read | fs::perms::group_exec |
@@ -72,7 +74,13 @@ class Importer {
       : plan_(plan), folder_(folder), recordings_(recordings) {}
 
   ImportResult run(const std::vector<std::string>& files) {
-    for (const std::string& file : files) guarded(file);
+    std::set<std::string> given;
+    for (const std::string& file : files) {
+      if (given.insert(canonicalPath(file)).second)
+        guarded(file);
+      else
+        result_.faults.push_back(file + ": given twice");
+    }
     bool needs_tool = false;
     for (const CampaignTest& test : campaign_.tests) needs_tool = needs_tool || test.kind == TestKind::cut;
     writeModel(needs_tool || a_cut_);

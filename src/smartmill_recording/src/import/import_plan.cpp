@@ -1,6 +1,8 @@
 #include "smartmill_recording/import/import_plan.h"
 
 #include <filesystem>
+#include <set>
+#include <system_error>
 
 #include "smartmill_core/model/strict_yaml.h"
 
@@ -51,10 +53,6 @@ TestSettings readSettings(const StrictYaml& map) {
   return settings;
 }
 
-bool sameFile(const std::string& a, const std::string& b) {
-  return fs::weakly_canonical(a) == fs::weakly_canonical(b);
-}
-
 template <typename T>
 void take(std::optional<T>& to, const std::optional<T>& from) {
   if (from) to = from;
@@ -99,10 +97,17 @@ void TestSettings::overlay(const TestSettings& other) {
   }
 }
 
+std::string canonicalPath(const std::string& path) {
+  std::error_code failed;
+  const fs::path canonical = fs::weakly_canonical(path, failed);
+  return failed ? path : canonical.string();
+}
+
 TestSettings ImportPlan::settingsOf(const std::string& path) const {
   TestSettings settings = defaults;
+  const std::string canonical = canonicalPath(path);
   for (const Entry& entry : files) {
-    if (sameFile(entry.file, path)) settings.overlay(entry.settings);
+    if (entry.canonical == canonical) settings.overlay(entry.settings);
   }
   settings.overlay(stated);
   return settings;
@@ -123,7 +128,7 @@ ImportPlan readImport(const std::string& file) {
     tool->finish();
   }
   if (root.has("measures")) {
-    if (!plan.model.empty()) root.fail("measures", "contradicts model, whose force_sensor.measures holds");
+    if (!plan.model.empty()) root.fail("measures", "contradicts model, whose force_sensor.measures is used");
     plan.measures = root.oneOf("measures", {"force_on_tool", "force_on_workpiece"});
   }
   if (const auto defaults = root.optionalMap("defaults")) {
@@ -131,12 +136,13 @@ ImportPlan readImport(const std::string& file) {
     defaults->finish();
   }
   if (root.has("files")) {
+    std::set<std::string> listed;
     for (const StrictYaml& map : root.maps("files")) {
       ImportPlan::Entry entry;
       entry.file = (folder / map.word("file")).string();
-      for (const ImportPlan::Entry& other : plan.files) {
-        if (sameFile(other.file, entry.file)) map.fail("file", "'" + map.word("file") + "' is listed twice");
-      }
+      entry.canonical = canonicalPath(entry.file);
+      if (!listed.insert(entry.canonical).second)
+        map.fail("file", "'" + map.word("file") + "' is listed twice");
       entry.settings = readSettings(map);
       if (map.has("name")) entry.settings.name = map.word("name");
       map.finish();

@@ -4,7 +4,6 @@
 #include <csignal>
 #include <cstdint>
 #include <cstring>
-#include <new>
 
 #include <fcntl.h>
 #include <sys/resource.h>
@@ -39,9 +38,9 @@ class Writer {
 
 class Reader {
  public:
-  explicit Reader(const std::string& text) : text_(text) {}
+  Reader(const std::string& text, const std::string& file) : text_(text), file_(file) {}
   void bytes(void* data, std::size_t size) {
-    if (size > text_.size() - at_) throw std::bad_alloc();  // the process ended in the middle
+    within(size);
     if (size > 0) std::memcpy(data, text_.data() + at_, size);
     at_ += size;
   }
@@ -61,12 +60,12 @@ class Reader {
     return word;
   }
   std::size_t within(std::size_t size) const {
-    if (size > text_.size() - at_) throw std::bad_alloc();
+    if (size > text_.size() - at_) throw Error(file_ + ": the process that reads it ended too early");
     return size;
   }
 
  private:
-  const std::string& text_;
+  const std::string &text_, &file_;
   std::size_t at_ = 0;
 };
 
@@ -104,7 +103,7 @@ ChannelFile read(const std::string& file, Reader& from) {
     c.name = from.word();
     c.unit = from.word();
     const std::size_t count = from.size();
-    from.within(count);
+    from.within(count * sizeof(double));
     c.values.resize(count);
     from.bytes(c.values.data(), count * sizeof(double));
     f.channels.push_back(std::move(c));
@@ -127,6 +126,7 @@ ChannelFile read(const std::string& file, Reader& from) {
 bool writeAll(int to, const std::string& text) {
   for (std::size_t at = 0; at < text.size();) {
     const ssize_t written = ::write(to, text.data() + at, text.size() - at);
+    if (written < 0 && errno == EINTR) continue;
     if (written < 0) return false;
     at += static_cast<std::size_t>(written);
   }
@@ -189,7 +189,7 @@ ChannelFile readIsolated(const std::string& file,
   if (done && !text.empty() && text[0] == 'e') throw Error(text.substr(1));
   if (done && !text.empty()) {
     text.erase(0, 1);
-    Reader from(text);
+    Reader from(text, file);
     return read(file, from);
   }
   throw Error(file + ": damaged: its library cannot read it");

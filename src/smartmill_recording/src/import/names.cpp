@@ -9,6 +9,11 @@ std::string lastPart(const std::string& name) {
   return at == std::string::npos ? name : name.substr(at + 1);
 }
 
+std::string trimmed(const std::string& text) {
+  const std::size_t begin = text.find_first_not_of(" \t");
+  return begin == std::string::npos ? "" : text.substr(begin, text.find_last_not_of(" \t") + 1 - begin);
+}
+
 std::string plainName(const std::string& name) {
   std::string plain;
   for (const char c : lastPart(name)) {

@@ -2,6 +2,7 @@
 #include <cctype>
 #include <charconv>
 #include <cmath>
+#include <set>
 #include <string_view>
 
 #include "smartmill_core/error.h"
@@ -205,6 +206,11 @@ ChannelFile readTextTable(const std::string& file) {
   result.file = file;
   result.kind = "text";
   readHeader(head, layout, &result);
+  std::set<std::string_view> names;
+  for (const FileChannel& channel : result.channels) {
+    if (!names.insert(channel.name).second)
+      throw Error(file + ": two columns are named '" + channel.name + "'");
+  }
   CsvReader reader(file, '\t');
   std::string_view line;
   std::vector<std::string_view> cells;
@@ -222,11 +228,6 @@ ChannelFile readTextTable(const std::string& file) {
     for (std::size_t c = 0; c < cells.size(); ++c)
       result.channels[c].values.push_back(
           reader.number(withPoint(cells[c], layout.style, &room), result.channels[c].name));
-  }
-  for (const FileChannel& channel : result.channels) {
-    const auto same = std::count_if(result.channels.begin(), result.channels.end(),
-                                    [&](const FileChannel& other) { return other.name == channel.name; });
-    if (same > 1) throw Error(file + ": two columns are named '" + channel.name + "'");
   }
   return result;
 }

@@ -212,36 +212,56 @@ TEST(Hdf5File, claimsAreRefused) {
   EXPECT_EQ(errorOf([&] { readChannelFile(file); }), file + ": fx: its values were never written");
 }
 
-/// Files of scipy and h5py, which share no code with this reader's libraries (scipy) or its calls (h5py).
-TEST(OtherWriters, scipyAndH5py) {
+/// Runs a Python program that writes a file. @return false where a module is missing
+bool written(const TemporaryFolder& folder, const std::string& program, const std::string& file) {
+  return std::system(("/usr/bin/python3 " + folder.write("write.py", program) + " " + file + " 2>/dev/null")
+                         .c_str()) == 0;
+}
+
+void expectSine(const FileChannel& channel, double tolerance) {
+  ASSERT_EQ(channel.values.size(), 100u);
+  for (std::size_t i = 0; i < channel.values.size(); ++i)
+    EXPECT_NEAR(channel.values[i], std::sin(static_cast<double>(i) / RATE * 50.0), tolerance);
+}
+
+// scipy shares no code with libmatio.
+TEST(OtherWriters, scipy) {
   const TemporaryFolder folder;
-  const std::string program = folder.write(
-      "write.py",
-      "import sys, numpy, scipy.io, h5py\n"
-      "t = numpy.arange(100) / 1000.0\n"
-      "fx = numpy.sin(t * 50)\n"
-      "scipy.io.savemat(sys.argv[1], {'s': {'t_s': t, 'fx': fx, 'fx_unit': 'kN'}, 'Fs': 1000.0,\n"
-      "                               'raw': numpy.arange(100, dtype='int16'), 'c': [['a', 'bc']]},\n"
-      "                 do_compression=True)\n"
-      "with h5py.File(sys.argv[2], 'w') as f:\n"
-      "    d = f.create_dataset('run/fx', data=fx.astype('f4'), compression='gzip')\n"
-      "    d.attrs['units'] = 'N'\n"
-      "    f.attrs['sample_rate'] = 1000\n");
-  const std::string mat = folder.file("a.mat"), hdf5 = folder.file("a.h5");
-  if (std::system(("/usr/bin/python3 " + program + " " + mat + " " + hdf5 + " 2>/dev/null").c_str()) != 0)
-    GTEST_SKIP() << "scipy or h5py is absent";
-  const ChannelFile m = readChannelFile(mat), h = readChannelFile(hdf5);
-  EXPECT_EQ(m.sample_rate, RATE);
-  EXPECT_EQ(channel(m, "s.t").unit, "s");
-  EXPECT_EQ(channel(m, "s.fx").unit, "kN");
-  EXPECT_EQ(channel(m, "raw").values[99], 99.0);
-  EXPECT_EQ(channel(h, "run/fx").unit, "N");
-  EXPECT_EQ(h.sample_rate, RATE);
-  for (std::size_t i = 0; i < 100; ++i) {
-    const double expected = std::sin(static_cast<double>(i) / RATE * 50.0);
-    EXPECT_NEAR(channel(m, "s.fx").values[i], expected, 1e-15);
-    EXPECT_NEAR(channel(h, "run/fx").values[i], expected, 1e-7);  // single precision
-  }
+  const std::string file = folder.file("a.mat");
+  if (!written(
+          folder,
+          "import sys, numpy, scipy.io\n"
+          "t = numpy.arange(100) / 1000.0\n"
+          "scipy.io.savemat(sys.argv[1], {'s': {'t_s': t, 'fx': numpy.sin(t * 50), 'fx_unit': 'kN'}, 'Fs': "
+          "1000.0,\n"
+          "                               'raw': numpy.arange(100, dtype='int16'), 'c': [['a', 'bc']]},\n"
+          "                 do_compression=True)\n",
+          file))
+    GTEST_SKIP() << "scipy is absent";
+  const ChannelFile read = readChannelFile(file);
+  EXPECT_EQ(read.sample_rate, RATE);
+  EXPECT_EQ(channel(read, "s.t").unit, "s");
+  EXPECT_EQ(channel(read, "s.fx").unit, "kN");
+  EXPECT_EQ(channel(read, "raw").values[99], 99.0);
+  expectSine(channel(read, "s.fx"), 1e-15);
+}
+
+TEST(OtherWriters, h5py) {
+  const TemporaryFolder folder;
+  const std::string file = folder.file("a.h5");
+  if (!written(folder,
+               "import sys, numpy, h5py\n"
+               "fx = numpy.sin(numpy.arange(100) / 1000.0 * 50)\n"
+               "with h5py.File(sys.argv[1], 'w') as f:\n"
+               "    d = f.create_dataset('run/fx', data=fx.astype('f4'), compression='gzip')\n"
+               "    d.attrs['units'] = 'N'\n"
+               "    f.attrs['sample_rate'] = 1000\n",
+               file))
+    GTEST_SKIP() << "h5py is absent";
+  const ChannelFile read = readChannelFile(file);
+  EXPECT_EQ(channel(read, "run/fx").unit, "N");
+  EXPECT_EQ(read.sample_rate, RATE);
+  expectSine(channel(read, "run/fx"), 1e-7);  // single precision
 }
 
 struct TextCase {
@@ -269,6 +289,22 @@ TEST(TextTable, styles) {
     ASSERT_EQ(read.channels[1].values.size(), 3u) << c.text;
     EXPECT_EQ(read.channels[1].values[2], c.second_of_last_row) << c.text;
   }
+}
+
+// As many columns as a spectrum analyser exports: their names are compared in one pass.
+TEST(TextTable, manyColumns) {
+  const TemporaryFolder folder;
+  constexpr int COLUMNS = 200000;
+  std::string names, row;
+  for (int c = 0; c < COLUMNS; ++c) {
+    names += (c ? ",c" : "c") + std::to_string(c);
+    row += c ? ",1" : "1";
+  }
+  const ChannelFile read =
+      readChannelFile(folder.write("a.csv", names + "\n" + row + "\n" + row + "\n" + row + "\n"));
+  EXPECT_EQ(read.channels.size(), COLUMNS);
+  EXPECT_EQ(errorOf([&] { readChannelFile(folder.write("a.csv", "a,b,a\n1,2,3\n1,2,3\n1,2,3\n")); }),
+            folder.file("a.csv") + ": two columns are named 'a'");
 }
 
 TEST(TextTable, rateOfThePreamble) {

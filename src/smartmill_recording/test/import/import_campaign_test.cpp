@@ -9,6 +9,7 @@
 
 #include "hdf5_writer.h"
 #include "mat_writer.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/testing/shared_data.h"
 #include "smartmill_core/testing/temporary_folder.h"
@@ -173,7 +174,14 @@ TEST_F(Import, nothingIsGuessed) {
 TEST_F(Import, badColumnsHaveTheirLines) {
   EXPECT_THAT(
       faultsOf(slotPlan(), "Time (s),Fx (N),Fy (N)\n0,1,1\n0.001,1,1\n0.005,1,1\n0.006,1,1\n0.007,1,1\n"),
-      ElementsAre("channel Time: uneven time: a step of 0.004 s behind sample 2, 0.001 s expected"));
+      ElementsAre("channel Time: uneven time: a step of 0.004 s after sample 2, 0.001 s expected"));
+  EXPECT_THAT(faultsOf(slotPlan(), "Time (s),Fx (N)\n0,1\n0.1,1\n0.1,1\n0.2,1\n"),
+              ElementsAre("channel Time: times must increase: 0.1 s at sample 2, 0.1 s at the next"));
+  std::string two_rates = "Time (s),Fx (N)\n";
+  for (int i = 0; i < 40; ++i) two_rates += formatted("%.6g,1\n", i < 30 ? 1e-4 * i : 3e-3 + 2e-4 * (i - 30));
+  EXPECT_THAT(
+      faultsOf(slotPlan(), two_rates),
+      ElementsAre("channel Time: uneven time: a step of 0.0002 s after sample 31, 0.0001 s expected"));
   const std::string file = folder_.file("cut.mat"), out = folder_.file("out");
   {
     MatWriter mat(file, MAT_FT_MAT5);
@@ -251,8 +259,14 @@ TEST_F(Import, nothingIsLeftAfterAFault) {
   std::filesystem::create_directory(place);
   EXPECT_EQ(importCampaign(slotPlan(), {good, bad}, place + "/out").faults.size(), 1u);
   EXPECT_EQ(leftIn(place), "");
-  EXPECT_THAT(importCampaign(slotPlan(), {good, good}, place + "/out").faults,
-              ElementsAre(HasSubstr("a second test named good")));
+  EXPECT_THAT(importCampaign(slotPlan(), {good, place + "/../good.csv"}, place + "/out").faults,
+              ElementsAre(place + "/../good.csv: given twice"));
+  std::filesystem::create_directory(folder_.file("other"));
+  const std::string other = folder_.file("other") + "/good.csv";
+  std::filesystem::copy_file(good, other);
+  EXPECT_THAT(
+      importCampaign(slotPlan(), {good, other}, place + "/out").faults,
+      ElementsAre(other + ": a second test named good; expected different names (name in import.yaml)"));
   EXPECT_EQ(leftIn(place), "");
   EXPECT_THAT(importCampaign(slotPlan(), {good}, place + "/out").faults, IsEmpty());
   EXPECT_EQ(leftIn(place), "out ");

@@ -52,8 +52,8 @@ StabilityPoint fromMsg(const smartmill_msgs::StabilityPoint& message);
 smartmill_msgs::StabilityPoint toMsg(const StabilityPoint& point);
 StabilityChart fromMsg(const smartmill_msgs::StabilityChart& message);
 smartmill_msgs::StabilityChart toMsg(const StabilityChart& chart);
-FoundCurves fromMsg(const smartmill_msgs::ForceCurve& message);
-smartmill_msgs::ForceCurve toMsg(const FoundCurves& curves);
+IdentifiedForceCurves fromMsg(const smartmill_msgs::ForceCurve& message);
+smartmill_msgs::ForceCurve toMsg(const IdentifiedForceCurves& curves);
 
 /// The message that carries a core type on a topic: MessageOf<SampleBlock>::Type; messages carry themselves.
 template <class Data>
@@ -101,7 +101,7 @@ struct MessageOf<StabilityChart> {
   using Type = smartmill_msgs::StabilityChart;
 };
 template <>
-struct MessageOf<FoundCurves> {
+struct MessageOf<IdentifiedForceCurves> {
   using Type = smartmill_msgs::ForceCurve;
 };
 

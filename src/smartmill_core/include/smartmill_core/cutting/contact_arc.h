@@ -20,7 +20,7 @@ struct ContactArc {
 void validate(const ContactArc& arc);
 
 /// What of a tooth's edge stands in an arc.
-struct EdgePart {
+struct EdgeSegment {
   int tooth;
   double from, to;  ///< [rad] immersion angles that it covers
   double height;    ///< [m/rad]; of a straight edge, which stands at `to`, [m]
@@ -32,8 +32,8 @@ constexpr double LEAST_LAG = 1e-6;  ///< [rad] over the depth; below it the edge
 /// @param lag [rad/m] of the edge with height @param tooth_angle [rad] of each tooth against the first
 /// @param angle [rad] of the first tooth at its tip
 template <class Visit>
-void forEachEdgePart(const std::vector<ContactArc>& arcs, double lag, const std::vector<double>& tooth_angle,
-                     double angle, Visit&& visit) {
+void forEachEdgeSegment(const std::vector<ContactArc>& arcs, double lag,
+                        const std::vector<double>& tooth_angle, double angle, Visit&& visit) {
   for (const ContactArc& arc : arcs) {
     const double spread = lag * arc.depth;
     const bool straight = spread < LEAST_LAG;
@@ -44,7 +44,7 @@ void forEachEdgePart(const std::vector<ContactArc>& arcs, double lag, const std:
       for (double low = tip - spread;; tip += units::TWO_PI, low += units::TWO_PI) {
         const double from = std::max(low, arc.entry), to = std::min(tip, arc.exit);
         if (straight ? tip >= arc.entry && tip < arc.exit : to > from)
-          visit(EdgePart{static_cast<int>(j), from, to, height, straight});
+          visit(EdgeSegment{static_cast<int>(j), from, to, height, straight});
         if (low + units::TWO_PI >= arc.exit) break;
       }
     }

@@ -10,7 +10,7 @@ namespace smartmill {
 
 /// A course of the effective chip that no law gives: straight between its nodes, from nothing at no chip, and
 /// straight on behind the last one.
-struct ChipCourse {
+struct EffectiveChipCurve {
   std::vector<double> chip;       ///< [m] > 0, rising; two or more
   std::vector<double> effective;  ///< [m] of each, rising
 
@@ -32,13 +32,13 @@ struct ChipCourse {
 /// effects.md).
 struct CuttingLaw {
   CuttingCoefficients coefficients;
-  double chip_factor = 1.0;            ///< [1] on ktc, krc, kac
-  double edge_factor = 1.0;            ///< [1] on kte, kre, kae
-  double edge_chip = 0.0;              ///< [m] over which the edge terms come; 0: there at once
-  double size_exponent = 0.0;          ///< [1]
-  double size_reference = 1e-4;        ///< [m]
-  const ChipCourse* course = nullptr;  ///< of another; none: h itself
-  double damping = 0.0;                ///< [N/m]
+  double chip_factor = 1.0;                    ///< [1] on ktc, krc, kac
+  double edge_factor = 1.0;                    ///< [1] on kte, kre, kae
+  double edge_chip = 0.0;                      ///< [m] over which the edge terms come; 0: there at once
+  double size_exponent = 0.0;                  ///< [1]
+  double size_reference = 1e-4;                ///< [m]
+  const EffectiveChipCurve* course = nullptr;  ///< of another; none: h itself
+  double damping = 0.0;                        ///< [N/m]
   double damping_radial = 1.0;  ///< [1] share of d across the tool; below 1 where the edge leans (corner.h)
   double damping_axial = 0.0;   ///< [1] share of d along it
 };

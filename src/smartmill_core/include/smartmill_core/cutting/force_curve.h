@@ -28,7 +28,7 @@ struct ForceCurves {
 };
 
 /// Curves with where they come from (topic material/force_curve).
-struct FoundCurves {
+struct IdentifiedForceCurves {
   double stamp = 0.0;  ///< [s] end of the last cut used
   std::string tool, material;
   int teeth = 0;                  ///< [1] of the tool

@@ -67,7 +67,7 @@ class RigidCut {
   void tabulate();
   std::vector<EdgeSums> integrals(std::vector<ChipShape> shapes) const;
   void add(double weight, double thickness, const SineCosine& at, EdgeSums& sums) const;
-  void addStraight(const EdgePart& part, EdgeSums& sums) const;
+  void addStraight(const EdgeSegment& part, EdgeSums& sums) const;
   void integrate(const std::vector<ChipShape>& shapes, double from, double to, double height,
                  EdgeSums& sums) const;
   // Sums times coefficients, see EdgeForce::add().

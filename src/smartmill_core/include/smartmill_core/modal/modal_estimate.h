@@ -32,7 +32,7 @@ struct EstimatedMode {
 };
 
 /// What modes outside the lines leave inside: upper - lower / (2 pi f)^2.
-struct ModalFlanks {
+struct ResidualTerms {
   std::complex<double> upper;  ///< [unit] of modes above, as an even share
   std::complex<double> lower;  ///< [unit/s2] of modes below, as a mass line
 
@@ -42,7 +42,7 @@ struct ModalFlanks {
 struct ModalEstimate {
   std::vector<EstimatedMode> modes;   ///< proven, lowest frequency first
   std::vector<EstimatedMode> doubts;  ///< seen, not proven
-  std::vector<ModalFlanks> flanks;    ///< per FRF, beside modes and doubts
+  std::vector<ResidualTerms> flanks;  ///< per FRF, beside modes and doubts
   std::vector<Pole> diagram;          ///< of the whole band: the stabilization diagram
   /// Phase rises through resonances: the record's e^{-i w t} was turned before the fit.
   bool conjugated = false;

@@ -15,7 +15,7 @@ struct Hit {
   std::vector<double> response;  ///< [V], [m] or [m/s2]
 };
 
-/// Why a hit cannot be used (smartmill_core/modal/hit_judge.h).
+/// Why a hit cannot be used (smartmill_core/modal/hit_check.h).
 struct HitFault {
   std::string text;       ///< one line; empty: the hit can be used
   bool bad_data = false;  ///< clipped, NaN, lost samples; otherwise the blow itself was weak, dull or double

@@ -38,7 +38,8 @@ enum class FileKind { text, mat, hdf5, sound, uff, bag, mcap, campaign };
 FileKind fileKind(const std::string& path);
 
 /// MATLAB (5, 7, 7.3), HDF5, WAV/FLAC, UFF58, DynoWare and other text files.
-/// MATLAB and HDF5 files are read in a process of their own, since their libraries can crash on a damaged file.
+/// MATLAB and HDF5 files are read in a process of their own, since their libraries can crash on a damaged
+/// file.
 /// @throws Error of one line "FILE: what".
 ChannelFile readChannelFile(const std::string& file);
 

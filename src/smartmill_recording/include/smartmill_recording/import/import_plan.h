@@ -36,6 +36,9 @@ struct ToolSettings {
   std::optional<double> diameter_mm, helix_deg;
 };
 
+/// The same for every spelling of a path; the file may be absent.
+std::string canonicalPath(const std::string& path);
+
 /// How files become a campaign: smartmill-import/1 (docs/formats.md) and the options of the command.
 struct ImportPlan {
   std::string file;   ///< of the plan; empty: none
@@ -44,7 +47,8 @@ struct ImportPlan {
   std::string measures;  ///< force_on_tool or force_on_workpiece; empty: not stated
   TestSettings defaults;
   struct Entry {
-    std::string file;  ///< path, relative paths from the plan's folder
+    std::string file;       ///< path, relative paths from the plan's folder
+    std::string canonical;  ///< canonicalPath() of it
     TestSettings settings;
   };
   std::vector<Entry> files;

@@ -10,4 +10,7 @@ std::string plainName(const std::string& name);
 /// The last part of a name as it is.
 std::string lastPart(const std::string& name);
 
+/// Without blanks and tabs at its ends.
+std::string trimmed(const std::string& text);
+
 }  // namespace smartmill::recording

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <string>
+
+#include "smartmill_core/modal/hit_test_parameters.h"
+
+namespace smartmill::hammer {
+
+/// Parameters of a measurement; declare() states units, bounds and meaning. The defaults are those of the
+/// thesis where it gives one.
+struct HammerParameters : HitTestParameters {
+  // Flute search.
+  double start_angle = 0.0;
+  double bracket_first_step = 0.0977;
+  double bracket_max_step = 0.3927;
+  double flute_tolerance = 0.02618;
+  double noise_sigmas = 5.0;
+  double least_rise = 0.005;
+  int golden_only = 0;
+  // Completion of a command.
+  double command_delay = 0.2;
+  double settle_time = 0.05;
+  double averaging_time = 0.01;
+  double angle_tolerance = 2.6e-3;
+  double zero_speed = 0.02;
+  int rest_readings = 5;
+  double position_tolerance = 2.0e-6;
+  double orient_timeout = 20.0;
+  double motion_timeout = 60.0;
+  // Paths.
+  double standoff = 5.0e-3;
+  double retract_height = 50.0e-3;
+  double approach_feed = 16.7e-3;
+  double jog_feed = 1.0e-3;
+  double near_path = 1.0e-3;
+  // Sensor calibration.
+  double first_jog = 50.0e-6;
+  double max_jog = 100.0e-6;
+  double least_jog = 5.0e-6;
+  double resolution = 1.0e-6;
+  double zero_volt = 0.1;
+  double check_jog = 10.0e-6;
+  double position_std = 0.1e-6;
+  double min_gap_share = 0.5;
+  double sensor_face = 8.0e-3;
+  double sensor_electrode = 2.0e-3;
+  double curve_error = 0.15;
+  double curve_jog = 100.0e-6;
+  double max_approach = 1.0e-3;
+  // Hits.
+  double force_high = 3000.0;
+  double asked_std = 0.0;
+  double exponential_time = 0.0;
+  int straighten_sensor = 1;
+  double averaged_share = 1.0;
+  double coil_share = 0.1;
+  double axes_turn_std = 0.03;
+  int cross_frf = 1;
+  // From the struck height to the tip.
+  std::string tip_correction = "apart";
+  int second_height = 1;
+  double read_height = 0.0;
+  double height_std = 0.5e-3;
+  double stickout_std = 0.5e-3;
+  std::string tool_material = "unknown";
+  double tool_fluted_length = 0.0;
+
+  HammerParameters() {
+    fit_low = 200.0;
+    fit_high = 3500.0;
+    max_modes = 6;
+  }
+  void declare(ParameterTable& table);
+  /// @throws Error naming the key and the value that is out of range.
+  void validate() const;
+};
+
+}  // namespace smartmill::hammer

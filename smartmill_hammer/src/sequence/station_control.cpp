@@ -1,0 +1,236 @@
+#include "station_control.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "controller_state.h"
+#include "smartmill_core/formatted.h"
+#include "smartmill_core/units.h"
+#include "smartmill_hammer/analysis/solenoid_crosstalk.h"
+#include "stamp_tolerance.h"
+#include "station_paths.h"
+
+namespace smartmill::hammer {
+namespace {
+
+/// Angles of M119: 0..4095 (thesis eq. 6.1).
+constexpr double COUNTS = 4096.0;
+constexpr double STOP_TIMEOUT = 10.0;    // [s] for the axes to come to rest after a stop
+constexpr double AVERAGE_TIMEOUT = 1.0;  // [s]
+/// Share of the sensor's range, and consecutive samples above it, that mean the tool is too near.
+constexpr double NEAR_SHARE = 0.98;
+constexpr int NEAR_SAMPLES = 8;
+
+Command commandOf(Command::Kind kind, double now) {
+  Command command;
+  command.kind = kind;
+  command.stamp = now;
+  return command;
+}
+
+}  // namespace
+
+StationControl::StationControl(const HammerParameters& parameters, double range_volt)
+    : parameters_(parameters),
+      range_volt_(range_volt),
+      motion_(parameters),
+      average_(parameters.averaging_time),
+      collector_({parameters.trigger_force, parameters.pre_trigger, parameters.record_length}),
+      cross_collector_({parameters.trigger_force, parameters.pre_trigger, parameters.record_length}) {
+}
+
+void StationControl::start(double stamp, const std::string& direction) {
+  direction_ = direction;
+  commanded_ = has_cross_ = cross_selected_ = range_watched_ = false;
+  spindle_moves_ = near_samples_ = 0;
+  average_.reset();
+  collector_.reset();
+  cross_collector_.reset();
+  wait_ = Wait::readiness;
+  sent_ = stamp;
+  deadline_ = stamp + parameters_.motion_timeout;
+}
+
+// ------------------------------------------------------------------------------------------ commands
+
+void StationControl::send(Command command, Wait wait, double timeout) {
+  sent_ = command.stamp;
+  deadline_ = command.stamp + timeout;
+  wait_ = wait;
+  commanded_ = true;
+  commands_.push_back(std::move(command));
+}
+
+void StationControl::orient(double now, double angle) {
+  Command c = commandOf(Command::Kind::orient, now);
+  const double counts = std::round(angle / units::TWO_PI * COUNTS);
+  c.angle = (counts - COUNTS * std::floor(counts / COUNTS)) * units::TWO_PI / COUNTS;
+  motion_.expectAngle(c.angle);
+  ++spindle_moves_;
+  send(std::move(c), Wait::angle, parameters_.orient_timeout);
+}
+
+void StationControl::jog(double now, std::size_t axis, double distance, double feed) {
+  Command c = commandOf(Command::Kind::jog, now);
+  c.axis = AXIS_NAMES[axis];
+  c.distance = distance;
+  c.feed = feed;
+  // From the commanded position, not the displayed one, so that the display's rounding does not accumulate.
+  Axes3 target = motion_.position();
+  target[axis] += distance;
+  motion_.expectPosition(target, std::min(parameters_.position_tolerance, 0.25 * std::abs(distance)));
+  send(std::move(c), Wait::position, parameters_.motion_timeout);
+}
+
+void StationControl::move(double now, const Axes3& from, std::vector<Waypoint> path) {
+  Command c = commandOf(Command::Kind::move, now);
+  c.from = from;
+  // In increments that the controller can command.
+  Axes3 position = from;
+  for (Waypoint& w : path) {
+    for (std::size_t i = 0; i < 3; ++i)
+      position[i] += roundTo(w.position[i] - position[i], parameters_.resolution);
+    w.position = position;
+  }
+  motion_.expectPosition(position, parameters_.position_tolerance);
+  c.path = std::move(path);
+  send(std::move(c), Wait::position, parameters_.motion_timeout);
+}
+
+void StationControl::strike(double now) {
+  Command c = commandOf(Command::Kind::strike, now);
+  c.direction = direction_;
+  collector_.arm();
+  cross_collector_.arm();
+  send(std::move(c), Wait::hit, parameters_.strike_timeout);
+}
+
+void StationControl::strikeAfterRest(double now) {
+  wait_ = Wait::rest;
+  rest_until_ = now + parameters_.rest_time;
+}
+
+void StationControl::measureVoltage(double from) {
+  average_.start(from);
+  wait_ = Wait::voltage;
+  deadline_ = from + AVERAGE_TIMEOUT;
+}
+
+void StationControl::stop(double now) {
+  motion_.expectStandstill();
+  send(commandOf(Command::Kind::stop, now), Wait::standstill, STOP_TIMEOUT);
+}
+
+void StationControl::release() {
+  wait_ = Wait::nothing;
+  collector_.disarm();
+  cross_collector_.disarm();
+}
+
+std::vector<Command> StationControl::takeCommands() {
+  return std::exchange(commands_, {});
+}
+
+// -------------------------------------------------------------------------------------------- inputs
+
+ControlEvent StationControl::complete() {
+  wait_ = Wait::nothing;
+  return MotionDone{};
+}
+
+ControlEvent StationControl::handle(const CncState& state) {
+  state_ = state;
+  if (const std::string fault = motionFault(state); !fault.empty())
+    return ControlFault{FrfCode::motion_failed, fault};
+  if (wait_ == Wait::readiness) {
+    if (state.stamp >= sent_ && !state.motion) return complete();
+    return {};
+  }
+  const std::optional<AxesPosition> axes = axesPosition(state);
+  if (!axes)
+    return ControlFault{FrfCode::motion_failed, "cnc/state: expected the axes x, y and z, one is missing"};
+  const bool waits = wait_ == Wait::position || wait_ == Wait::standstill;
+  return waits && canComplete(state.stamp) && motion_.isComplete(state, *axes) ? complete() : ControlEvent();
+}
+
+ControlEvent StationControl::handle(const SpindleAngle& angle) {
+  return wait_ == Wait::angle && canComplete(angle.stamp) && motion_.isComplete(angle) ? complete()
+                                                                                       : ControlEvent();
+}
+
+/// The controller starts with a delay: an earlier input may still be from before the motion.
+bool StationControl::canComplete(double stamp) const {
+  return stamp > sent_ + parameters_.command_delay + SAME_TIME;
+}
+
+bool StationControl::isTooNear(double volt) {
+  near_samples_ = range_watched_ && volt >= NEAR_SHARE * range_volt_ ? near_samples_ + 1 : 0;
+  return near_samples_ >= NEAR_SAMPLES;
+}
+
+ControlEvent StationControl::handle(const StationSample& s) {
+  has_cross_ = s.cross_volt.has_value();
+  const double volt = cross_selected_ ? s.cross_volt.value_or(NOT_A_NUMBER) : s.volt;
+  auto record = collector_.add(s.time, s.index, s.rate, s.force, volt);
+  std::optional<HitCollector::Record> cross;
+  if (s.cross_volt) cross = cross_collector_.add(s.time, s.index, s.rate, s.force, *s.cross_volt);
+  if (isTooNear(volt))
+    return ControlFault{
+        FrfCode::no_flute,
+        formatted("the tool is too near to the sensor: %.2f V is the end of its range", volt)};
+  if (record && wait_ == Wait::hit) return hitOf(std::move(*record), std::move(cross));
+  if (wait_ == Wait::rest && s.time >= rest_until_ - SAME_TIME) {
+    strike(s.time);
+  } else if (wait_ == Wait::voltage) {
+    const auto mean = average_.add(s.time, s.index, s.rate, volt);
+    if (!average_.fault().empty()) return ControlFault{FrfCode::bad_data, average_.fault()};
+    if (!mean) return {};
+    wait_ = Wait::nothing;
+    return *mean;
+  }
+  return {};
+}
+
+ControlEvent StationControl::hitOf(HitCollector::Record record, std::optional<HitCollector::Record> cross) {
+  removeSolenoidCrosstalk(record.hit, parameters_.coil_share);
+  RecordedHit result{std::move(record.hit), std::nullopt, {record.fault, true}};
+  if (cross) {
+    removeSolenoidCrosstalk(cross->hit, parameters_.coil_share);
+    if (result.fault.text.empty()) result.fault.text = cross->fault;
+    result.cross = std::move(cross->hit);
+  }
+  return result;
+}
+
+ControlEvent StationControl::checkDeadline(double now) {
+  if (now <= deadline_) return {};
+  const double waited = now - sent_;
+  switch (wait_) {
+    case Wait::readiness:
+      return ControlFault{FrfCode::motion_failed, state_ ? "the axes are moving" : "no message on cnc/state"};
+    case Wait::angle:
+      return ControlFault{FrfCode::motion_failed,
+                          formatted("the spindle did not reach %.2f deg within %.1f s",
+                                    units::degFromRad(motion_.angle()), waited)};
+    case Wait::position:
+      return ControlFault{FrfCode::motion_failed,
+                          formatted("the axes did not reach their target within %.1f s", waited)};
+    case Wait::standstill:
+      return ControlFault{FrfCode::motion_failed, "the axes did not come to rest after the stop"};
+    case Wait::voltage:
+      return ControlFault{FrfCode::bad_data, "no valid voltage of the displacement sensor"};
+    case Wait::hit:
+      if (collector_.recording()) return {};
+      collector_.disarm();
+      cross_collector_.disarm();
+      return RecordedHit{
+          {},
+          std::nullopt,
+          {formatted("no hit within %.1f s of the command", parameters_.strike_timeout), false}};
+    default:
+      return {};
+  }
+}
+
+}  // namespace smartmill::hammer

@@ -1,0 +1,56 @@
+#pragma once
+
+#include "smartmill_core/parameters/parameter_table.h"
+#include "smartmill_kalman/filter/harmonic_filter.h"
+#include "smartmill_kalman/following/mode_follower.h"
+#include "smartmill_kalman/following/speed_tracker.h"
+
+namespace smartmill::kalman {
+
+/// Choice and settings of the compensation method.
+struct CompensationParameters {
+  HarmonicFilterParameters filter;
+  double least_speed = 20.0;
+  double speed_tolerance = 0.002;
+  double lag = 0.0;
+  bool delay_form = false;
+  bool track_speed = false;
+  SpeedTrackerParameters tracker;
+  double settling_periods = 5.0;
+  bool follow = false;
+  int follow_revolutions = 8;
+  ModeFollowerParameters follower;
+  double saturation = 0.0;
+
+  void declare(ParameterTable& table) {
+    filter.declare(table);
+    table.number("least_speed", least_speed, "rad/s", Range::positive(),
+                 "spindle speed below which samples pass through");
+    table.number("speed_tolerance", speed_tolerance, "1", Range::open(0.0, 0.5),
+                 "relative change of speed within 50 ms above which samples pass through");
+    table.number("lag", lag, "s", Range::closed(0.0, 10.0),
+                 "delay of the blocks; each force is estimated from the samples up to this time after it; "
+                 "0: causal");
+    table.flag(
+        "delay_form", delay_form,
+        "true: force model F(t) = F(t - T) in place of harmonics; no band limit, three times the cost; "
+        "requires lag 0, no track_speed, no follow and no sensor_matrix");
+    table.flag("track_speed", track_speed,
+               "true: no tachometer; the speed is estimated from the force, starting at the cutting "
+               "condition's speed; use memory_revolutions 2");
+    tracker.declare(table);
+    table.number("settling_periods", settling_periods, "1", Range::notNegative(),
+                 "settling times after a start or a gap that are marked SETTLING");
+    table.flag("follow", follow,
+               "true: tracks shifts of the sensor's modes from the harmonics of the cutting force");
+    table.number("follow_revolutions", follow_revolutions, "1", Range::positive(),
+                 "revolutions between two updates of the modes");
+    table.part("follow_", follower);
+    table.number("saturation", saturation, "N", Range::notNegative(),
+                 "magnitude from which a sample counts as clipped; 0: not checked");
+  }
+  /// @throws Error naming key and value.
+  void validate() const;
+};
+
+}  // namespace smartmill::kalman

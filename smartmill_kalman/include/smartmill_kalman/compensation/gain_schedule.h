@@ -1,0 +1,39 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "smartmill_kalman/compensation/compensation_method.h"
+#include "smartmill_kalman/filter/harmonic_gain.h"
+
+namespace smartmill::kalman {
+
+/// Gains of three axes on a logarithmic grid of spindle speed, designed on demand and kept.
+class GainSchedule {
+ public:
+  explicit GainSchedule(const HarmonicFilterParameters& parameters) : parameters_(parameters) {}
+
+  /// Nearest grid point. @param speed [rad/s]
+  static int gridPointOf(double speed);
+  /// Whether the gains of a grid point still suit a speed [rad/s].
+  static bool covers(int grid_point, double speed);
+
+  /// Gains from quick to slow. @param sample_rate [Hz]; gains of another rate are dropped.
+  const std::vector<HarmonicGain>& gains(std::size_t axis, const SensorAxis& sensor, int grid_point,
+                                         double sample_rate);
+  /// Whether the modes are close enough to those of the last design for its gains.
+  bool suits(std::size_t axis, const ModalModel& sensor) const;
+  void clear() { gains_.clear(); }
+  void clear(std::size_t axis);
+
+ private:
+  HarmonicFilterParameters parameters_;
+  std::map<std::pair<std::size_t, int>, std::vector<HarmonicGain>> gains_;  // by axis and grid point
+  std::array<std::vector<double>, 3> design_frequencies_;                   // [Hz] of the modes, last design
+  double sample_rate_ = 0.0;                                                // [Hz]
+};
+
+}  // namespace smartmill::kalman

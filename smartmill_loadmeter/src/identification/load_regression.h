@@ -1,0 +1,106 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "load_record.h"
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_loadmeter/calibration/fit.h"
+#include "smartmill_loadmeter/calibration/friction_law.h"
+#include "smartmill_loadmeter/identification/campaign_identification.h"
+
+namespace smartmill::loadmeter {
+
+/// Unknowns of a fit in addition to viscous and Coulomb friction, Ktc and Kte.
+struct LoadTerms {
+  FrictionTerms friction;
+  bool growth = false, runout = false, lag = false;
+
+  std::size_t count() const;
+  std::size_t ktcIndex() const { return friction.unknowns(); }
+};
+
+/// Fit of condensed records.
+struct LoadSolution {
+  LoadTerms terms;
+  FitResult fit;
+  double bic = 0.0;
+  double freedom = 1.0;       ///< degrees of freedom
+  double misfit = 0.0;        ///< [1] chi2 per degree of freedom
+  double disagreement = 0.0;  ///< [1] RMS of the residual over that of the records' voltage
+
+  double ktc() const { return fit.value[terms.ktcIndex()]; }
+  double kte() const { return fit.value[terms.ktcIndex() + 1]; }
+  /// Whether the records disagree significantly, beyond the accuracy of the model.
+  bool recordsDisagree() const;
+};
+
+/// Records condensed about a point of linearisation, and the solution there. A value: alternatives are fitted
+/// to copies.
+struct LoadState {
+  std::vector<LoadRecord> records;
+  double noise = 0.0;  ///< [V]
+  LoadPoint point;
+  double log_lag = 0.0;  ///< log of (time constant / the model's)
+  double growth = 0.0;   ///< [1/s]
+  FrictionLaw friction;  ///< start of the next fit
+  LoadSolution solution;
+};
+
+/// Contents of the tests, which decide the observable terms.
+struct LoadPlan {
+  std::size_t cuts = 0, air_cuts = 0, air_speeds = 0, edge_ages = 0;
+  double slowest = 0.0, fastest = 0.0;  ///< [rad/s]
+  bool has_angle = false;               ///< of the spindle, in a cut with several teeth
+  bool has_teeth = false;               ///< a cut with several teeth
+
+  /// @throws Error with fewer than two speeds of air cuts or three feeds. @param where prefix of the message
+  LoadPlan(const std::vector<LoadRecord>& records, double friction_zero_below, const std::string& where);
+};
+
+/// Least squares of friction, coefficients and further terms over condensed records.
+class LoadRegression {
+ public:
+  /// @param spindle_uncertainty [1] of the model's spindle section. @param known_noise the noise is not
+  /// estimated from the samples.
+  LoadRegression(const LoadPlan& plan, const Spindle& spindle, double spindle_uncertainty,
+                 const LoadRecordOptions& options, bool known_noise);
+
+  LoadState initialState(std::vector<LoadRecord> records, double noise) const;
+  LoadTerms initialTerms() const;
+  std::size_t residualCount(const LoadState& state) const;
+  /// Fit of the records as they are condensed. @param start of the friction's unknowns
+  LoadSolution solve(const LoadState& state, const LoadTerms& terms, const FrictionLaw& start) const;
+  /// Condenses the records and fits them, repeatedly: the columns of lag and runout depend on the solution.
+  LoadState converge(LoadState state, const LoadTerms& terms) const;
+  FrictionLaw frictionOf(const LoadSolution& solution) const;
+  /// Covariance of all unknowns: the larger of noise and scatter between the records, and the rounding error
+  /// of each record.
+  Eigen::MatrixXd covariance(const LoadState& state) const;
+  double timeConstantOf(const LoadState& state) const;  ///< [s] of the load meter
+
+  const Spindle& spindle() const { return spindle_; }
+
+ private:
+  struct Prior {
+    std::size_t unknown;
+    double value, std_dev;
+  };
+
+  void residuals(const LoadState& state, const LoadTerms& terms, const std::vector<double>& value,
+                 double* out) const;
+  void condense(LoadState* state) const;
+  Eigen::MatrixXd jacobian(const LoadState& state) const;
+
+  LoadPlan plan_;
+  Spindle spindle_;
+  bool known_noise_;
+  std::vector<Prior> friction_priors_;
+  double runout_prior_ = 0.0;  // [m] standard deviation of each component; 0: none
+  double lag_prior_ = 0.0;     // standard deviation of the log time constant; 0: none
+};
+
+}  // namespace smartmill::loadmeter
