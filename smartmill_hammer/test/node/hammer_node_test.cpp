@@ -136,8 +136,8 @@ TEST_F(HammerNode, MeasuresRecordsAndReplaysToTheLastDigit) {
     const std::lock_guard<std::mutex> lock(mutex);
     health = m;
   };
-  const auto health = nh.subscribe<smartmill_msgs::SpindleHealth>(names::SPINDLE_HEALTH, 10, take);
-  ASSERT_TRUE(eventually([&] { return health.getNumPublishers() > 0; }));
+  const auto subscriber = nh.subscribe<smartmill_msgs::SpindleHealth>(names::SPINDLE_HEALTH, 10, take);
+  ASSERT_TRUE(eventually([&] { return subscriber.getNumPublishers() > 0; }));
   ASSERT_TRUE(eventually([&, now = ros::Time::now()] { return recordedUpTo(now); }));
   {
     const std::lock_guard<std::mutex> lock(mutex);
