@@ -153,7 +153,7 @@ TEST(Station, RefusedHitsEndTheMeasurementWithTheirReason) {
   double seconds = 0.0;
   const MeasureFrfResult result = measure(machine, parameters, drawn.believed, goalOf(drawn, 3), seconds);
   EXPECT_EQ(result.code, FrfCode::no_hit) << result.message;
-  EXPECT_NE(result.message.find("4 useless hits"), std::string::npos) << result.message;
+  EXPECT_NE(result.message.find("4 rejected hits"), std::string::npos) << result.message;
   EXPECT_NE(result.message.find("double"), std::string::npos) << result.message;
   EXPECT_EQ(machine.strikes(), 4);
 }
