@@ -149,7 +149,7 @@ TEST(KalmanNode, takesSixSensorsInTheSpindle) {
     EXPECT_TRUE(std::isnan((*stream)[256 * BAD].fz[255]));
     EXPECT_FALSE(std::isnan((*stream)[256 * (BAD + 1)].fx[0]));
   }
-  EXPECT_TRUE(waitUntil([&] { return determined; }));
+  EXPECT_TRUE(waitUntil([&] { return reported; }));
 }
 
 // 2100 input blocks are 4200 force blocks, 4000 of which may wait. The last 0.05 s wait for their order. A
