@@ -27,7 +27,7 @@ using kalman::TuningMap;
 constexpr const char* AXES[] = {"x", "y"};
 
 FrequencyResponse tapped(const BurzoniData& data, std::size_t axis) {
-  return kalman::averaged(data.taps[axis].hammer, data.taps[axis].response, BURZONI_RATE)
+  return kalman::averagedFrf(data.taps[axis].hammer, data.taps[axis].response, BURZONI_RATE)
       .band(20.0, BURZONI_BAND);
 }
 
@@ -277,7 +277,7 @@ Drawn variedPlants(const std::string& folder, unsigned seed) {
   for (std::size_t axis = 0; axis < 2; ++axis) {
     const BurzoniTable& table = burzoniTableOf(seed, HYPOTHESES * axis);
     const FrequencyResponse frf =
-        kalman::averaged(data.taps[axis].hammer, data.taps[axis].response, BURZONI_RATE);
+        kalman::averagedFrf(data.taps[axis].hammer, data.taps[axis].response, BURZONI_RATE);
     std::vector<kalman::NamedMap> all;
     std::vector<double> smaller, larger, cuts;
     TuningMap as_measured;

@@ -21,7 +21,7 @@ namespace {
 
 using Rows = std::vector<std::vector<double>>;
 using kalman::BurzoniStatics;
-using kalman::LengthLine;
+using kalman::LengthDependence;
 using kalman::SpindleSensorCalibration;
 
 constexpr double LENGTH = 0.139;  // [m] 138 mm told in section 6.3
@@ -39,7 +39,7 @@ const BurzoniStatics& statics(unsigned seed) {
 struct Constant {
   const char* name;
   double printed;  ///< table 2
-  std::optional<LengthLine> table_3, found;
+  std::optional<LengthDependence> table_3, found;
 };
 
 std::vector<Constant> constantsOf(unsigned seed) {

@@ -99,7 +99,7 @@ double HarmonicCompensation::step(std::size_t, HarmonicFilter& filter, double me
   return std::isfinite(measured) ? filter.step(measured) : filter.predict();
 }
 
-void HarmonicCompensation::processSample(std::array<double, 3>& force, InnovationStatistics& innovations) {
+void HarmonicCompensation::filterSample(std::array<double, 3>& force, InnovationStatistics& innovations) {
   if (speed_tracker_) speed_tracker_->prepare(filters_, spindle_.speed);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     force[axis] = step(axis, filters_[axis], force[axis]);
@@ -110,20 +110,37 @@ void HarmonicCompensation::processSample(std::array<double, 3>& force, Innovatio
   speed_tracker_->update(filters_, {sensor_[0].noise_rms, sensor_[1].noise_rms, sensor_[2].noise_rms});
 }
 
-void HarmonicCompensation::process(const ForceBlock& measured, ForceBlock compensated,
-                                   CompensationHealth& health) {
-  InnovationStatistics innovations;
-  health.speed = filters_.front().spindleSpeed();
-  const std::size_t count = compensated.force[0].size();
-  for (std::size_t i = 0; i < count; ++i) {
-    std::array<double, 3> force{{compensated.force[0][i], compensated.force[1][i], compensated.force[2][i]}};
-    processSample(force, innovations);
-    for (std::size_t axis = 0; axis < 3; ++axis) compensated.force[axis][i] = force[axis];
+void HarmonicCompensation::filterAxes(ForceBlock& block, InnovationStatistics& innovations) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (double& sample : block.force[axis]) {
+      sample = step(axis, filters_[axis], sample);
+      innovations.add(axis, filters_[axis]);
+    }
+  }
+}
+
+void HarmonicCompensation::filterSamples(ForceBlock& block, InnovationStatistics& innovations) {
+  for (std::size_t i = 0; i < block.force[0].size(); ++i) {
+    std::array<double, 3> force{{block.force[0][i], block.force[1][i], block.force[2][i]}};
+    filterSample(force, innovations);
+    for (std::size_t axis = 0; axis < 3; ++axis) block.force[axis][i] = force[axis];
     if (speed_tracker_ && (i + 1) % RETUNE_INTERVAL == 0 &&
         std::abs(speed_tracker_->speed() / spindle_.speed - 1.0) > RETUNE_TOLERANCE) {
       spindle_.speed = speed_tracker_->speed();
       retune();
     }
+  }
+}
+
+void HarmonicCompensation::process(const ForceBlock& measured, ForceBlock compensated,
+                                   CompensationHealth& health) {
+  InnovationStatistics innovations;
+  health.speed = filters_.front().spindleSpeed();
+  const std::size_t count = compensated.force[0].size();
+  if (speed_tracker_ || isCoupled()) {
+    filterSamples(compensated, innovations);
+  } else {
+    filterAxes(compensated, innovations);
   }
   innovations.report(count, health);
   if (speed_tracker_) {

@@ -17,6 +17,7 @@ class CoupledCompensation : public HarmonicCompensation {
                       ForceOutputs outputs);
 
  protected:
+  bool isCoupled() const override { return true; }
   void couple(const std::vector<HarmonicFilter>& filters, std::array<double, 3>& force) override;
   void onFiltersChanged(const std::vector<HarmonicFilter>& filters, double sample_rate) override;
 

@@ -34,7 +34,9 @@ class HarmonicCompensation : public CompensationMethod {
  protected:
   /// Force of one sample [N]. A sample that is not a number is replaced by the prediction.
   virtual double step(std::size_t axis, HarmonicFilter& filter, double measured);
-  /// Cross-talk of one sample, after the step of all filters.
+  /// Whether the force of an axis depends on the filters of the others.
+  virtual bool isCoupled() const { return false; }
+  /// Cross-talk of one sample, after the step of all filters; called when isCoupled().
   virtual void couple(const std::vector<HarmonicFilter>&, std::array<double, 3>&) {}
   /// The filters have another design, speed or sensor.
   virtual void onFiltersChanged(const std::vector<HarmonicFilter>&, double /*sample_rate*/) {}
@@ -45,7 +47,9 @@ class HarmonicCompensation : public CompensationMethod {
  private:
   void design();
   void retune();
-  void processSample(std::array<double, 3>& force, InnovationStatistics& innovations);
+  void filterAxes(ForceBlock& block, InnovationStatistics& innovations);
+  void filterSamples(ForceBlock& block, InnovationStatistics& innovations);
+  void filterSample(std::array<double, 3>& force, InnovationStatistics& innovations);
   bool followModes(double now);
   void restoreModes();
 
