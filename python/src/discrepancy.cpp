@@ -8,7 +8,7 @@
 #include "module.h"
 #include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/model/cause_odds.h"
-#include "smartmill_discrepancy/data/phase.h"
+#include "smartmill_discrepancy/data/alignment.h"
 #include "smartmill_discrepancy/explain/explain.h"
 #include "smartmill_discrepancy/gap/gap.h"
 #include "smartmill_discrepancy/report/pictures.h"
@@ -35,7 +35,7 @@ py::object gap(const std::string& path, const std::optional<MachineModel>& given
     Dataset data = loadDataset(campaign, nominal);
     work.check();
     const MachineModel model = given.value_or(nominal);
-    turnPhases(data, model);
+    alignPhases(data, model);
     work.check();
     return Found{campaignGap(data, model, threads), data.noise, data.notes};
   });
@@ -83,15 +83,15 @@ py::object toPython(const Explanation& e, const std::string& summary) {
           tupleOf(e.not_separable, [](const auto& names) { return py::tuple(py::cast(names)); }),
       arg("suggested_test") = e.suggested_test,
       arg("gaps") = tupleOf(e.gaps,
-                            [](const BlockGap& g) {
+                            [](const TestGap& g) {
                               return make("TestGap", g.test, g.channel, g.heldout, g.before, g.after,
                                           g.std_dev);
                             }),
       arg("channels") = tupleOf(e.channels,
                                 [](const ChannelShare& c) {
                                   return make("ChannelShare", c.channel, c.explained_before,
-                                              c.explained_after, c.explained_heldout, c.repeats, c.floor,
-                                              c.floor_gap);
+                                              c.explained_after, c.explained_heldout, c.synchronous_share,
+                                              c.floor, c.floor_gap);
                                 }),
       arg("revolutions") = tupleOf(e.revolutions,
                                    [](const RevolutionCurve& r) {
@@ -115,8 +115,8 @@ py::object explainCampaign(const std::string& path, const std::optional<MachineM
       work.check();
       return work.stopped();
     };
-    options.search.progress = [&](const std::string& line) { work.progress(done, line); };
-    options.search.course = [&](double share) { work.progress(done = share); };
+    options.search.on_log = [&](const std::string& line) { work.progress(done, line); };
+    options.search.on_progress = [&](double share) { work.progress(done = share); };
     std::filesystem::create_directories(out);
     const Campaign campaign = readCampaign(path);
     work.progress(0.0, "reading the records");

@@ -52,9 +52,9 @@ inline Dataset airCuts(const MachineModel& machine, const MachineModel& nominal,
     }
     t.record.add("spindle_angle") = angle;
     t.record.add("load_meter") = blank;
-    std::vector<double> shown = sim::simulateTest(machine, t.test, t.record, quiet).column("load_meter");
-    for (double& v : shown) v += noise(random);
-    t.record.add("load_meter") = shown;
+    std::vector<double> load = sim::simulateTest(machine, t.test, t.record, quiet).column("load_meter");
+    for (double& v : load) v += noise(random);
+    t.record.add("load_meter") = load;
     t.quiet = t.first_cut = t.record.size();
     data.tests.push_back(std::move(t));
   }

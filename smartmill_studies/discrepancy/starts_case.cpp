@@ -19,8 +19,8 @@
 #include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_discrepancy/data/chatter.h"
-#include "smartmill_discrepancy/explain/challenge.h"
 #include "smartmill_discrepancy/explain/outcome.h"
+#include "smartmill_discrepancy/explain/validate_effects.h"
 #include "smartmill_discrepancy/search/refinement.h"
 #include "study_case.h"
 
@@ -90,7 +90,7 @@ Campaign copyOf(const Campaign& campaign, const std::string& folder) {
   return copy;
 }
 
-void compare(const Workbench& bench, const Fit& best, const std::vector<double>& off, json* line) {
+void compare(const Workbench& bench, const FitResult& best, const std::vector<double>& off, json* line) {
   const std::vector<Coordinate>& coordinates = bench.freedom().coordinates();
   std::vector<Eigen::Index> places;
   for (std::size_t c = 0; c < coordinates.size(); ++c) {
@@ -122,18 +122,18 @@ void fit(const Dataset& data, const std::vector<double>& off, json* line) {
   Workbench bench(data, options);
   out["chattering"] = std::count_if(data.tests.begin(), data.tests.end(),
                                     [](const TestData& t) { return t.chatter.has_value(); });
-  out["gap_before"] = remainsOf(bench, data.nominal).gap.fit;
+  out["gap_before"] = residualOf(bench, data.nominal).gap.fit;
   const SearchOptions searched;
   const std::vector<Hypothesis> hypotheses = catalogueHypotheses(data, nullptr);
   SearchResult found = search(bench, hypotheses, searched);
   std::vector<Resemblance> resembles;
-  challenge(bench, searched, &found, &resembles);
-  found.best.covariance = settledCovariance(bench, found.best);
+  validateEffects(bench, searched, &found, &resembles);
+  found.best.covariance = robustCovariance(bench, found.best);
   bench.guide(false);
-  bench.turnTo(found.best.state);
+  bench.alignTo(found.best.state);
   for (const Member& m : found.best.state.members) out["named"].push_back(m.hypothesis->title());
   compare(bench, found.best, off, line);
-  const GapPair after = remainsOf(bench, bench.exact().model(found.best.state)).gap;
+  const GapPair after = residualOf(bench, bench.exact().model(found.best.state)).gap;
   out["gap_after"] = after.fit;
   out["heldout_after"] = after.heldout;
   out["right"] = out["named"].empty() && out["distance"] <= 2.0;

@@ -4,11 +4,11 @@
 
 namespace smartmill::discrepancy {
 
-/// Measurement files and recordings become a campaign.
+/// Converts measurement files and recordings into a campaign.
 Command campaignCommand();
-/// Which effects a model lacks, from a campaign or a recorded session.
+/// Finds the effects that a model lacks, from a campaign or a recording.
 Command explainCommand();
-/// How far measurement and twin are apart, test by test.
+/// Prints the gap between measurement and twin, test by test.
 Command gapCommand();
 
 }  // namespace smartmill::discrepancy

@@ -44,7 +44,7 @@ ImportPlan planOf(const Arguments& arguments) {
   if (!plan.model.empty() &&
       (plan.tool.teeth || plan.tool.diameter_mm || plan.tool.helix_deg || !plan.measures.empty()))
     throw UsageError(plan.model +
-                     ": a model is given; --teeth, --diameter-mm, --helix-deg and --force-on contradict it");
+                     ": --teeth, --diameter-mm, --helix-deg and --force-on cannot be combined with a model");
   take(plan.stated.kind, arguments.kind, !arguments.kind.empty());
   take(plan.stated.direction, arguments.direction, !arguments.direction.empty());
   for (std::size_t i = 0; i < settingKeys().size(); ++i) {
@@ -73,7 +73,7 @@ int run(const Arguments& arguments) {
   for (const std::string& line : result.report) note(line);
   for (const std::string& fault : result.faults) std::fprintf(stderr, "%s\n", fault.c_str());
   if (!result.faults.empty()) {
-    std::fprintf(stderr, "%zu things are missing or wrong; nothing was written\n", result.faults.size());
+    std::fprintf(stderr, "%zu errors; nothing was written\n", result.faults.size());
     return 1;
   }
   note(arguments.out + "/campaign.yaml: written");
@@ -87,38 +87,39 @@ namespace smartmill::discrepancy {
 Command campaignCommand() {
   Command command;
   command.name = command.tool = "campaign";
-  command.summary = "makes a campaign of measurement files and recordings";
+  command.summary = "converts measurement files and recordings into a campaign";
   command.description =
-      "Makes a campaign of measurement files (MATLAB, HDF5, CSV and other text, DynoWare, WAV, FLAC, UFF58), "
-      "recordings (bag, MCAP) and campaigns: campaign.yaml, model.yaml and one CSV per test. What is missing "
-      "is reported line by line; then nothing is written.";
+      "Converts measurement files (MATLAB, HDF5, CSV and other text, DynoWare, WAV, FLAC, UFF58), recordings "
+      "(bag, MCAP) and campaigns into one campaign: campaign.yaml, model.yaml and one CSV per test. Missing "
+      "or "
+      "wrong statements are reported one per line; then nothing is written.";
   command.examples = {
       {"cut.mat --kind cut --speed-rpm 4500 --feed-per-tooth-mm 0.06 --axial-depth-mm 2 --entry-deg 0 "
        "--exit-deg 180 --teeth 4 --diameter-mm 19.05 --helix-deg 30 -o campaign",
-       "one cut, all of it stated on the command line"},
-      {"--import import.yaml -o campaign", "the files that import.yaml lists, with what it states of each"},
+       "one cut, stated on the command line"},
+      {"--import import.yaml -o campaign", "the files and statements of import.yaml"},
       {"hit.csv --kind tap --direction x --channels 'acceleration=Ch2[V]*981' -o taps",
-       "a hammer test whose accelerometer shows 981 m/s2 per volt"},
+       "a hammer test with an accelerometer of 981 m/s2 per volt"},
       {"session.mcap --model mill.yaml -o campaign", "the steady cuts of a recording"}};
   command.files = {{"OUT/campaign.yaml", "the tests"},
-                   {"OUT/model.yaml", "the model that is given, or one made of the tool"},
-                   {"import.yaml", "smartmill-import/1: what is stated of the files (docs/formats.md)"}};
+                   {"OUT/model.yaml", "the given model, or one with the tool only"},
+                   {"import.yaml", "smartmill-import/1: statements about the files (docs/formats.md)"}};
   command.declare = [](CommandLine& line) -> std::function<int()> {
     const auto a = std::make_shared<Arguments>();
     line.option("FILES", a->files, "measurement files, recordings, campaigns (default: those of --import)");
-    line.option("-o,--out", a->out, "folder of the campaign, absent or empty").required();
-    line.option("--import", a->plan, "import.yaml: what is stated of the files");
+    line.option("-o,--out", a->out, "folder of the campaign; must not exist or be empty").required();
+    line.option("--import", a->plan, "import.yaml: statements about the files");
     line.option("--model", a->model, "machine model of the campaign");
-    line.option("--kind", a->kind, "of the tests: cut, air or tap").oneOf({"cut", "air", "tap"});
+    line.option("--kind", a->kind, "kind of the tests: cut, air or tap").oneOf({"cut", "air", "tap"});
     for (std::size_t i = 0; i < settingKeys().size(); ++i)
       line.option(settingKeys()[i].option, a->numbers[i], settingKeys()[i].help);
-    line.option("--direction", a->direction, "of a tap, the hammer's axis: x, y or z").oneOf({"x", "y", "z"});
+    line.option("--direction", a->direction, "axis of the hammer in a tap: x, y or z").oneOf({"x", "y", "z"});
     line.option("--channels", a->channels,
                 "COLUMN=NAME[UNIT]*SCALE,...: channels of the file and their units");
-    line.option("--teeth", a->teeth, "of the tool, where no model is given").within(1, 20);
-    line.option("--diameter-mm", a->diameter, "of the tool").positive();
-    line.option("--helix-deg", a->helix, "of the tool").within(0.0, 79.999);
-    line.option("--force-on", a->measures, "what the force sensor shows the force on: tool or workpiece")
+    line.option("--teeth", a->teeth, "teeth of the tool, if no model is given").within(1, 20);
+    line.option("--diameter-mm", a->diameter, "diameter of the tool").positive();
+    line.option("--helix-deg", a->helix, "helix angle of the tool").within(0.0, 79.999);
+    line.option("--force-on", a->measures, "object on which the measured force acts: tool or workpiece")
         .oneOf({"tool", "workpiece"});
     return [a] { return run(*a); };
   };

@@ -31,9 +31,10 @@ constexpr int INTERRUPTED = 130;  // exit status
 std::atomic<bool> interrupted{false};
 static_assert(std::atomic<bool>::is_always_lock_free);
 
-// The first Ctrl-C asks for what has been found, the second ends at once.
+// The first Ctrl-C ends the search and keeps its result, the second ends the program.
 void interrupt(int) {
-  constexpr char HEARD[] = "cancelled: what was found until now is judged and written (again: end at once)\n";
+  constexpr char HEARD[] =
+      "cancelled: the effects found so far are validated and written (again: end at once)\n";
   [[maybe_unused]] const auto written = write(STDERR_FILENO, HEARD, sizeof(HEARD) - 1);
   interrupted = true;
   std::signal(SIGINT, SIG_DFL);
@@ -47,7 +48,7 @@ struct Arguments {
 Campaign load(const Arguments& arguments, const std::function<void(const std::string&)>& progress) {
   if (!isRecording(arguments.campaign)) return readCampaign(arguments.campaign);
   if (arguments.model.empty())
-    throw Error(arguments.campaign + ": a bag holds no model, give one with --model");
+    throw Error(arguments.campaign + ": a bag contains no model; state one with --model");
   std::error_code failed;
   std::filesystem::remove_all(arguments.out + "/campaign", failed);
   return campaignOfBag(arguments.campaign, arguments.model, arguments.out + "/campaign", progress);
@@ -63,17 +64,17 @@ int run(const Arguments& arguments) {
   const auto elapsed = [&] {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   };
-  options.search.progress = [&](const std::string& line) {
+  options.search.on_log = [&](const std::string& line) {
     std::fprintf(stderr, "[%5.1f s] %s\n", elapsed(), line.c_str());
   };
-  options.search.course = [&](double share) {
+  options.search.on_progress = [&](double share) {
     const double t = elapsed();
-    std::fprintf(stderr, "[%5.1f s] about %.0f s more, should nothing else be found\n", t, t / share - t);
+    std::fprintf(stderr, "[%5.1f s] about %.0f s left if nothing more is found\n", t, t / share - t);
   };
   std::error_code failed;
   std::filesystem::create_directories(arguments.out, failed);
   if (failed) throw Error(arguments.out + ": " + failed.message());
-  const Campaign campaign = load(arguments, options.search.progress);
+  const Campaign campaign = load(arguments, options.search.on_log);
   const Dataset data = loadDataset(
       campaign, readMachineModel(arguments.model.empty() ? campaign.modelPath() : arguments.model));
   std::signal(SIGINT, interrupt);
@@ -95,13 +96,12 @@ Command explainCommand() {
   command.summary = "finds which effects a machine model lacks, from a campaign or a bag";
   command.description =
       "Finds where the twin and the records of a campaign disagree and which effects the model lacks.";
-  command.examples = {
-      {"campaigns/runout -o report", "searches a campaign; report/report.html shows what was found"},
-      {"session.bag --model mill.yaml -o report", "the same for a recorded session"}};
+  command.examples = {{"campaigns/runout -o report", "searches a campaign; report/report.html is the result"},
+                      {"session.bag --model mill.yaml -o report", "the same for a recorded session"}};
   command.files = {{"OUT/report.html", "the report with its pictures"},
                    {"OUT/report.json", "the report for programs"},
                    {"OUT/model.yaml", "the model with the effects found"}};
-  command.exits = {{INTERRUPTED, "interrupted by Ctrl-C; the report holds what was found until then"}};
+  command.exits = {{INTERRUPTED, "interrupted by Ctrl-C; the report contains the effects found until then"}};
   command.declare = [](CommandLine& line) -> std::function<int()> {
     const auto arguments = std::make_shared<Arguments>();
     line.option("CAMPAIGN", arguments->campaign, "campaign folder, or a bag").required();

@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "smartmill_discrepancy/data/phase.h"
+#include "smartmill_discrepancy/data/alignment.h"
 #include "smartmill_discrepancy/gap/gap.h"
 
 namespace {
@@ -20,11 +20,11 @@ void run(const Arguments& arguments) {
   using namespace smartmill;
   const Campaign campaign = readCampaign(arguments.campaign);
   const MachineModel nominal = readMachineModel(campaign.modelPath());
-  // The noise is that of the campaign, whatever model is compared with it.
+  // The noise is that of the campaign, for any model.
   discrepancy::Dataset data = discrepancy::loadDataset(campaign, nominal);
   for (const std::string& note : data.notes) std::fprintf(stderr, "note: %s\n", note.c_str());
   const MachineModel model = arguments.model.empty() ? nominal : readMachineModel(arguments.model);
-  discrepancy::turnPhases(data, model);
+  discrepancy::alignPhases(data, model);
   const discrepancy::CampaignGap gap = discrepancy::campaignGap(data, model, arguments.threads);
   std::map<std::string, double> largest;
   std::printf("%-24s %-12s %8s %14s\n", "test", "channel", "gap", "residual rms");

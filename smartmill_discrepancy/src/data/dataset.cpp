@@ -10,16 +10,16 @@
 #include "smartmill_core/signal/fourier.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
-#include "smartmill_discrepancy/data/phase.h"
+#include "smartmill_discrepancy/data/alignment.h"
 #include "smartmill_sim/twin/guide.h"
 
 namespace smartmill::discrepancy {
 namespace {
 
-const std::vector<std::string> COUNTING{"fx", "fy", "fz", "load_meter", "tool_x", "tool_y"};
+const std::vector<std::string> COMPARED{"fx", "fy", "fz", "load_meter", "tool_x", "tool_y"};
 constexpr std::size_t LEAST_SAMPLES = 64;
-constexpr std::size_t LEAST_QUIET = 50;  // samples without force that make an estimate of noise
-constexpr std::size_t CLIPPED_RUN = 5;   // equal extreme readings in a row of a noisy channel
+constexpr std::size_t MIN_QUIET = 50;   // samples without force for a noise estimate
+constexpr std::size_t CLIPPED_RUN = 5;  // equal extreme samples in a row of a noisy channel
 
 std::size_t quietSamples(const CampaignTest& test, const Record& record) {
   if (test.kind == TestKind::air) return record.size();
@@ -29,7 +29,7 @@ std::size_t quietSamples(const CampaignTest& test, const Record& record) {
     for (const double f : hammer) peak = std::max(peak, std::abs(f));
     std::size_t i = 0;
     while (i < hammer.size() && std::abs(hammer[i]) < 0.05 * peak) ++i;
-    // The contact began before the force passed a twentieth of its peak.
+    // The contact starts before the force exceeds a twentieth of its peak.
     const auto lead = static_cast<std::size_t>(std::lround(1e-3 * test.sample_rate));
     return i > lead ? i - lead : 0;
   }
@@ -43,16 +43,16 @@ std::string number(double value) {
   return formatted("%.6g", value);
 }
 
-// A noisy channel repeats its extreme reading only when it is clipped; a dead channel repeats everything.
+// A noisy channel repeats its extreme value only if it is clipped; a dead channel has one value.
 void checkChannel(const TestData& data, const std::string& channel) {
   const std::vector<double>& values = data.record.column(channel);
   const auto [low, high] = std::minmax_element(values.begin(), values.end());
   if (*low == *high)
-    throw Error(data.record.file + ": " + channel + " is dead: every reading is " + number(*low));
-  if (channel == "load_meter") return;  // rounded and slow: repeats by nature
+    throw Error(data.record.file + ": " + channel + " is dead: every sample is " + number(*low));
+  if (channel == "load_meter") return;  // rounded and slow: values repeat
   if (const std::size_t run = longestRunAtExtreme(values); run >= CLIPPED_RUN) {
     throw Error(data.record.file + ": " + channel + " is clipped: " + std::to_string(run) +
-                " equal readings in a row at its extreme (range " + number(*low) + " to " + number(*high) +
+                " equal samples in a row at its extreme (range " + number(*low) + " to " + number(*high) +
                 ")");
   }
 }
@@ -68,9 +68,9 @@ std::map<std::string, double> noiseOf(const Dataset& data) {
   for (const TestData& t : data.tests) {
     for (const std::string& channel : t.channels) {
       const std::vector<double>& values = t.record.column(channel);
-      if (t.quiet >= LEAST_QUIET && t.test.kind != TestKind::air) {
+      if (t.quiet >= MIN_QUIET && t.test.kind != TestKind::air) {
         const std::vector<double> part(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(t.quiet));
-        // Lines that stand there without cutting (hum, unbalance) are no noise.
+        // Lines that exist without cutting (hum, unbalance) are not noise.
         const double deviation = part.size() >= LEAST_SAMPLES && channel != "load_meter"
                                      ? std::min(standardDeviation(part), 1.5 * noiseBetweenLines(part))
                                      : standardDeviation(part);
@@ -87,30 +87,30 @@ std::map<std::string, double> noiseOf(const Dataset& data) {
     double& value = noise[channel];
     if (data.nominal.force_sensor.noise_rms) {
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        if (channel == COUNTING[axis]) value = (*data.nominal.force_sensor.noise_rms)[axis];
+        if (channel == COMPARED[axis]) value = (*data.nominal.force_sensor.noise_rms)[axis];
       }
     }
-    if (value == 0.0 && pool.freedom >= LEAST_QUIET)
+    if (value == 0.0 && pool.freedom >= MIN_QUIET)
       value = std::sqrt(pool.squares / static_cast<double>(pool.freedom));
     if (value == 0.0 && !between_lines[channel].empty()) value = median(between_lines[channel]);
     if (!(value > 0.0)) {
       throw Error(data.campaign.folder + ": no noise estimate for " + channel +
-                  ": the model states none and no record shows any");
+                  ": expected noise_rms_n in the model, or records without force");
     }
   }
   return noise;
 }
 
-// @param readings on the record's clock, which begins at `begin` [s] and lasts so long [s]
-SlowMeans meansOf(const std::string& channel, const Record& readings, double begin, double lasts) {
+// @param measurements on the record's clock @param begin, lasts [s] start and length of the record
+SlowMeans meansOf(const std::string& channel, const Record& measurements, double begin, double lasts) {
   constexpr double PIECE = 0.25;  // [s]
-  const std::vector<double>& values = readings.column(channel);
+  const std::vector<double>& values = measurements.column(channel);
   const auto pieces = std::max<std::size_t>(1, static_cast<std::size_t>(lasts / PIECE));
   SlowMeans slow;
   slow.channel = channel;
   std::vector<std::vector<double>> of_piece(pieces), times(pieces);
   for (std::size_t i = 0; i < values.size(); ++i) {
-    const double t = readings.time[i] - begin;
+    const double t = measurements.time[i] - begin;
     if (t < 0.0 || t > lasts) continue;
     const auto k = std::min(pieces - 1, static_cast<std::size_t>(t / lasts * static_cast<double>(pieces)));
     of_piece[k].push_back(values[i]);
@@ -124,7 +124,7 @@ SlowMeans meansOf(const std::string& channel, const Record& readings, double beg
     const double deviation = standardDeviation(of_piece[k]);
     variance += deviation * deviation / static_cast<double>(of_piece[k].size());
   }
-  if (slow.mean.empty()) throw Error(readings.file + ": no reading falls into the record of its test");
+  if (slow.mean.empty()) throw Error(measurements.file + ": no sample within the record of its test");
   slow.scatter = std::sqrt(variance / static_cast<double>(slow.mean.size()));
   std::vector<double> sorted = values;
   std::sort(sorted.begin(), sorted.end());
@@ -145,27 +145,28 @@ void addSlowChannels(Dataset& data) {
       continue;
     }
     if (test->record.has(channel.channel))
-      throw Error(test->record.file + ": " + channel.channel + " stands in slow_channels too");
-    const Record readings = readRecord(data.campaign, channel);
-    test->slow.push_back(meansOf(channel.channel, readings, test->record.time.front(),
+      throw Error(test->record.file + ": " + channel.channel +
+                  " is in slow_channels too; expected one of both");
+    const Record measurements = readRecord(data.campaign, channel);
+    test->slow.push_back(meansOf(channel.channel, measurements, test->record.time.front(),
                                  static_cast<double>(test->record.size()) / test->test.sample_rate));
   }
 }
 
-// Of a mean: the scatter of its readings, which ripple in a cut, and the rounding that they share. Readings
-// never stand nearer than the step in which they are told.
+// Noise of a mean: scatter of its samples, which ripple in a cut, and the common rounding error; the
+// resolution is at most the smallest difference between samples.
 void addSlowNoise(Dataset& data) {
   std::map<std::string, double> step, least;
   for (const TestData& t : data.tests) {
     for (const SlowMeans& slow : t.slow) {
-      double& told = step[slow.channel];
-      if (slow.step > 0.0 && (told == 0.0 || slow.step < told)) told = slow.step;
+      double& resolution = step[slow.channel];
+      if (slow.step > 0.0 && (resolution == 0.0 || slow.step < resolution)) resolution = slow.step;
     }
   }
   for (TestData& t : data.tests) {
     for (SlowMeans& slow : t.slow) {
-      const double told = std::max(step[slow.channel], data.nominal.spindle->load_meter_resolution);
-      slow.noise = std::hypot(slow.scatter, told / std::sqrt(12.0));
+      const double resolution = std::max(step[slow.channel], data.nominal.spindle->load_meter_resolution);
+      slow.noise = std::hypot(slow.scatter, resolution / std::sqrt(12.0));
       double& noise = least[slow.channel];
       if (noise == 0.0 || slow.noise < noise) noise = slow.noise;
     }
@@ -173,7 +174,7 @@ void addSlowNoise(Dataset& data) {
   data.noise.insert(least.begin(), least.end());
 }
 
-// No model that runs freely follows the phase of chatter: such cuts are predicted step by step, or set aside.
+// No free simulation follows the phase of chatter: such cuts are compared by one-step prediction or excluded.
 void markChatter(Dataset& data) {
   for (std::size_t k = 0; k < data.tests.size();) {
     TestData& t = data.tests[k];
@@ -184,9 +185,9 @@ void markChatter(Dataset& data) {
     }
     const std::string note =
         "test " + t.test.name + " chatters at " + number(std::round(chatter->frequency)) + " Hz and is ";
-    // Where the record does not tell its phase nothing else does in a cut that chatters.
-    if (canBeLed(t, data.nominal) && !t.phase_estimated) {
-      data.notes.push_back(note + "compared by what is predicted from one step to the next");
+    // The phase of a chattering cut without spindle angle cannot be estimated.
+    if (canBeGuided(t, data.nominal) && !t.phase_estimated) {
+      data.notes.push_back(note + "compared by one-step prediction");
       t.chatter = chatter;
       t.guided = true;
       ++k;
@@ -197,14 +198,17 @@ void markChatter(Dataset& data) {
     data.tests.erase(data.tests.begin() + static_cast<std::ptrdiff_t>(k));
   }
   if (std::all_of(data.tests.begin(), data.tests.end(), [](const TestData& t) { return t.chatter; }))
-    throw Error(data.campaign.folder + ": every test chatters, nothing can be compared");
+    throw Error(data.campaign.folder + ": every test chatters; expected a test without chatter");
 }
 
 }  // namespace
 
-bool canBeLed(const TestData& test, const MachineModel& model) {
-  const bool modes = !model.tool_tip.x.modes.empty() || !model.tool_tip.y.modes.empty();
-  return modes && test.test.kind == TestKind::cut && !test.test.running_before &&
+bool hasToolModes(const MachineModel& model) {
+  return !model.tool_tip.x.modes.empty() || !model.tool_tip.y.modes.empty();
+}
+
+bool canBeGuided(const TestData& test, const MachineModel& model) {
+  return hasToolModes(model) && test.test.kind == TestKind::cut && !test.test.running_before &&
          sim::Guide::canBe(test.record) && !sim::Guide::byForce(test.record);
 }
 
@@ -219,10 +223,10 @@ std::size_t Dataset::samples() const {
 
 double noiseBetweenLines(const std::vector<double>& values) {
   if (values.size() < LEAST_SAMPLES) {
-    throw Error("noise estimate: " + std::to_string(values.size()) + " samples, at least " +
-                std::to_string(LEAST_SAMPLES) + " are due");
+    throw Error("noise estimate: " + std::to_string(values.size()) + " samples, expected at least " +
+                std::to_string(LEAST_SAMPLES));
   }
-  // Second differences take the slow course away before the window's leakage spreads it over the band.
+  // Second differences remove slow trends before the leakage of the window spreads them.
   const std::size_t n = values.size() - 2;
   std::vector<double> x(n);
   double window_power = 0.0;
@@ -242,15 +246,16 @@ double noiseBetweenLines(const std::vector<double>& values) {
   return std::sqrt(median(power) / std::log(2.0) / window_power);
 }
 
-std::optional<Dataset> briefOf(const Dataset& data) {
-  constexpr double TURNS = 6.0;
-  constexpr double WORTH = 0.75;  // [1] of the samples of fit cuts, which cost what a search costs
-  Dataset brief = data;
+std::optional<Dataset> shortenedDataset(const Dataset& data) {
+  constexpr double REVOLUTIONS = 6.0;
+  constexpr double MAX_SHARE = 0.75;  // [1] of the samples of fitted cuts: no benefit above
+  Dataset shortened = data;
   double all = 0.0, kept = 0.0;
-  for (TestData& t : brief.tests) {
+  for (TestData& t : shortened.tests) {
     if (t.test.kind != TestKind::cut || t.heldout) continue;
-    const double turn = units::TWO_PI / t.test.spindle_speed * t.test.sample_rate;  // [samples]
-    const std::size_t first = std::max(LEAST_SAMPLES, t.first_cut + static_cast<std::size_t>(TURNS * turn));
+    const double revolution = units::TWO_PI / t.test.spindle_speed * t.test.sample_rate;  // [samples]
+    const std::size_t first =
+        std::max(LEAST_SAMPLES, t.first_cut + static_cast<std::size_t>(REVOLUTIONS * revolution));
     const std::size_t size = t.phase_estimated ? t.record.size() : first;
     all += static_cast<double>(t.record.size());
     kept += static_cast<double>(std::min(size, t.record.size()));
@@ -258,8 +263,8 @@ std::optional<Dataset> briefOf(const Dataset& data) {
     t.record.time.resize(size);
     for (std::vector<double>& column : t.record.columns) column.resize(size);
   }
-  if (kept >= WORTH * all) return {};
-  return brief;
+  if (kept >= MAX_SHARE * all) return {};
+  return shortened;
 }
 
 void chooseHeldout(std::vector<TestData>& tests) {
@@ -269,7 +274,7 @@ void chooseHeldout(std::vector<TestData>& tests) {
     if (t.test.kind == TestKind::cut && !t.chatter) cuts.push_back(&t);
     if (t.test.kind == TestKind::air) air.push_back(&t);
   }
-  // Conditions of a cut. A test alone at the end of any range stays for the fit.
+  // Conditions of a cut. A test alone at the end of a range is not held out.
   const auto conditions = [](const TestData& t) {
     return std::vector<double>{t.test.spindle_speed,           t.test.engagement->feed_per_tooth,
                                t.test.engagement->axial_depth, t.test.engagement->entry,
@@ -296,8 +301,8 @@ void chooseHeldout(std::vector<TestData>& tests) {
     }
     if (!alone) inside.push_back(t);
   }
-  const std::size_t due = cuts.size() >= 4 ? std::min(inside.size(), (cuts.size() + 3) / 4) : 0;
-  for (std::size_t k = 0; k < due; ++k) inside[(2 * k + 1) * inside.size() / (2 * due)]->heldout = true;
+  const std::size_t count = cuts.size() >= 4 ? std::min(inside.size(), (cuts.size() + 3) / 4) : 0;
+  for (std::size_t k = 0; k < count; ++k) inside[(2 * k + 1) * inside.size() / (2 * count)]->heldout = true;
   if (air.size() >= 4) {
     std::sort(air.begin(), air.end(), [](const TestData* a, const TestData* b) {
       return a->test.spindle_speed < b->test.spindle_speed;
@@ -310,19 +315,19 @@ Dataset loadDataset(const Campaign& campaign, const MachineModel& nominal) {
   Dataset data;
   data.campaign = campaign;
   data.nominal = nominal;
-  std::set<std::string> aside;
+  std::set<std::string> notes;
   for (const CampaignTest& test : campaign.tests) {
     TestData t;
     t.test = test;
     t.record = readRecord(campaign, test);
     if (t.record.size() < LEAST_SAMPLES) {
-      throw Error(t.record.file + ": " + std::to_string(t.record.size()) + " samples, at least " +
-                  std::to_string(LEAST_SAMPLES) + " are due");
+      throw Error(t.record.file + ": " + std::to_string(t.record.size()) + " samples, expected at least " +
+                  std::to_string(LEAST_SAMPLES));
     }
     for (const std::string& name : t.record.names) {
-      if (std::find(COUNTING.begin(), COUNTING.end(), name) != COUNTING.end()) {
+      if (std::find(COMPARED.begin(), COMPARED.end(), name) != COMPARED.end()) {
         if (name == "load_meter" && (!nominal.spindle || test.kind == TestKind::tap)) {
-          aside.insert(test.kind == TestKind::tap
+          notes.insert(test.kind == TestKind::tap
                            ? "load_meter of taps is not compared"
                            : "load_meter is not compared: the model has no spindle section");
           continue;
@@ -330,18 +335,18 @@ Dataset loadDataset(const Campaign& campaign, const MachineModel& nominal) {
         t.channels.push_back(name);
         checkChannel(t, name);
       } else if (name != "spindle_angle" && name != "hammer") {
-        aside.insert(name + " is not simulated");
+        notes.insert(name + " is not simulated");
       }
     }
     if (t.channels.empty()) throw Error(t.record.file + ": no channel to compare");
     t.phase_estimated = test.kind != TestKind::tap && !t.record.has("spindle_angle");
     t.quiet = quietSamples(test, t.record);
     t.first_cut = test.kind == TestKind::cut ? t.quiet : t.record.size();
-    for (const std::string& note : t.record.notes) aside.insert(note);
+    for (const std::string& note : t.record.notes) notes.insert(note);
     data.tests.push_back(std::move(t));
   }
   if (data.tests.empty()) throw Error(campaign.folder + ": no tests");
-  data.notes.assign(aside.begin(), aside.end());
+  data.notes.assign(notes.begin(), notes.end());
   addSlowChannels(data);
   data.noise = noiseOf(data);
   addSlowNoise(data);

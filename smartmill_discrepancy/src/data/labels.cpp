@@ -13,14 +13,14 @@
 namespace smartmill::discrepancy {
 namespace {
 
-constexpr double FAR = 5.0;      // gap beyond which a label is doubted
-constexpr double SWAPPED = 0.1;  // share of the squares that a swap leaves
+constexpr double DOUBTFUL_GAP = 5.0;  // gap above which a label is doubtful
+constexpr double SWAPPED = 0.1;       // maximum share of the squares after a swap
 constexpr double RELABELLED =
-    0.35;  // the same with another test's label, when it then fits as well as that test does
-constexpr double AS_WELL = 1.5;
+    0.35;  // the same with another test's label, if the gap is comparable to that test's own
+constexpr double COMPARABLE = 1.5;
 constexpr double SPEED_TOLERANCE = 0.02;
-constexpr double UNIT = 30.0;  // factor that no gain error reaches
-constexpr double ALIKE = 0.5;  // squared correlation of a channel with the model's, turned about
+constexpr double UNIT_FACTOR = 30.0;  // factor beyond any gain error
+constexpr double CORRELATED = 0.5;    // minimum squared correlation with the negative model
 
 double squaresBetween(const std::vector<double>& a, const std::vector<double>& b) {
   double s = 0.0;
@@ -34,20 +34,20 @@ std::string joined(const std::vector<std::string>& names) {
   return text;
 }
 
-sim::SimulationOptions quickly() {
+sim::SimulationOptions coarseSimulation() {
   sim::SimulationOptions options;
   options.noise = false;
   options.substeps = 2;
   return options;
 }
 
-// Speed at which the recorded angle turns [rad/s].
-double turningSpeed(const TestData& t) {
+// Speed of the recorded spindle angle [rad/s].
+double rotationSpeed(const TestData& t) {
   const std::vector<double>& angle = t.record.column("spindle_angle");
-  double turned = 0.0;
+  double rotated = 0.0;
   for (std::size_t i = 1; i < angle.size(); ++i)
-    turned += std::remainder(angle[i] - angle[i - 1], units::TWO_PI);
-  return turned / (static_cast<double>(angle.size() - 1) / t.test.sample_rate);
+    rotated += std::remainder(angle[i] - angle[i - 1], units::TWO_PI);
+  return rotated / (static_cast<double>(angle.size() - 1) / t.test.sample_rate);
 }
 
 double forceSquares(const TestData& t, const Record& simulated) {
@@ -62,16 +62,16 @@ std::vector<std::string> wrongSpeeds(const Dataset& data) {
   std::vector<std::string> wrong;
   for (const TestData& t : data.tests) {
     if (t.test.kind == TestKind::tap || t.phase_estimated || !t.record.has("spindle_angle")) continue;
-    const double speed = turningSpeed(t);
+    const double speed = rotationSpeed(t);
     if (std::abs(speed / t.test.spindle_speed - 1.0) <= SPEED_TOLERANCE) continue;
     wrong.push_back(formatted(
-        "test %s looks mislabelled: its spindle turns at %.0f rpm, spindle_speed_rpm says %.0f",
+        "test %s looks mislabelled: its spindle angle advances at %.0f rpm, spindle_speed_rpm is %.0f",
         t.test.name.c_str(), units::rpmFromRadPerSec(speed), units::rpmFromRadPerSec(t.test.spindle_speed)));
   }
   return wrong;
 }
 
-// A channel of all cuts beside what the model says.
+// One channel of all cuts, measured and simulated.
 struct Comparison {
   double product = 0.0, simulated = 0.0, measured = 0.0;  // sums over samples; the last two of squares
 };
@@ -93,26 +93,26 @@ Comparison compare(const Dataset& data, const std::vector<Record>& own, const st
 
 // Units and signs: one factor over all records of a channel.
 std::vector<std::string> wrongScales(const Dataset& data, const std::vector<Record>& own) {
-  std::vector<std::string> wrong, turned;
+  std::vector<std::string> wrong, inverted;
   for (const auto& [channel, noise] : data.noise) {
     const Comparison c = compare(data, own, channel);
-    if (c.product < 0.0 && c.product * c.product > ALIKE * c.simulated * c.measured)
-      turned.push_back(channel);
+    if (c.product < 0.0 && c.product * c.product > CORRELATED * c.simulated * c.measured)
+      inverted.push_back(channel);
     if (c.simulated <= noise * noise) continue;
     const double factor = std::abs(c.product / c.simulated);
-    if (factor > UNIT ||
-        (factor < 1.0 / UNIT && c.product * c.product / c.simulated > 100.0 * noise * noise)) {
-      wrong.push_back(formatted("%s reads %.3g times what the model says in every cut: its unit looks wrong",
+    if (factor > UNIT_FACTOR ||
+        (factor < 1.0 / UNIT_FACTOR && c.product * c.product / c.simulated > 100.0 * noise * noise)) {
+      wrong.push_back(formatted("%s is %.3g times the simulated value in every cut: its unit looks wrong",
                                 channel.c_str(), factor));
     }
   }
-  if (!turned.empty())
-    wrong.push_back(joined(turned) +
-                    " read minus what the model says: sign or force_sensor.measures looks wrong");
+  if (!inverted.empty())
+    wrong.push_back(joined(inverted) +
+                    " have the opposite sign of the simulation: sign or force_sensor.measures looks wrong");
   return wrong;
 }
 
-// Whether two force channels of a test fit the model far better swapped.
+// Whether swapping two force channels of a test fits the model far better.
 bool looksSwapped(const Dataset& data, const TestData& t, const Record& own, const std::string& x,
                   const std::string& y) {
   if (!t.record.has(x) || !t.record.has(y)) return false;
@@ -122,7 +122,7 @@ bool looksSwapped(const Dataset& data, const TestData& t, const Record& own, con
       squaresBetween(t.record.column(x), own.column(y)) + squaresBetween(t.record.column(y), own.column(x));
   const double floor =
       static_cast<double>(t.record.size()) * (std::pow(data.noise.at(x), 2) + std::pow(data.noise.at(y), 2));
-  return as_is > FAR * floor && swap - floor < SWAPPED * (as_is - floor);
+  return as_is > DOUBTFUL_GAP * floor && swap - floor < SWAPPED * (as_is - floor);
 }
 
 std::vector<std::string> swappedChannels(const Dataset& data, const std::vector<Record>& own) {
@@ -142,7 +142,7 @@ std::vector<std::string> swappedChannels(const Dataset& data, const std::vector<
   return wrong;
 }
 
-// The cut whose label fits a cut's record best.
+// The label of another cut that fits a record best.
 struct Foreign {
   double gap = 0.0, theirs = 0.0;  // [N2] of the record with the label, and of the label's own record
   std::string name;
@@ -157,14 +157,14 @@ Foreign bestForeignLabel(const Dataset& data, const MachineModel& model, const s
     if (other.test.kind != TestKind::cut || other.test.name == t.test.name) continue;
     CampaignTest test = t.test;
     test.engagement = other.test.engagement;
-    const double gap = forceSquares(t, sim::simulateTest(model, test, t.record, quickly())) /
+    const double gap = forceSquares(t, sim::simulateTest(model, test, t.record, coarseSimulation())) /
                        static_cast<double>(t.record.size());
     if (gap < best.gap) best = {gap, gaps[k], other.test.name};
   }
   return best;
 }
 
-// Cuts that another cut's label fits far better than their own, while the others fit theirs.
+// Cuts that the label of another cut fits far better, while other cuts fit their own.
 std::vector<std::string> foreignLabels(const Dataset& data, const MachineModel& model,
                                        const std::vector<Record>& own) {
   std::vector<double> gaps(own.size(), 0.0), all;
@@ -178,9 +178,9 @@ std::vector<std::string> foreignLabels(const Dataset& data, const MachineModel& 
   std::vector<std::string> doubtful;
   for (std::size_t i = 0; i < own.size(); ++i) {
     const TestData& t = data.tests[i];
-    if (t.test.kind != TestKind::cut || gaps[i] < 3.0 * usual || gaps[i] < FAR) continue;
+    if (t.test.kind != TestKind::cut || gaps[i] < 3.0 * usual || gaps[i] < DOUBTFUL_GAP) continue;
     const Foreign best = bestForeignLabel(data, model, gaps, i);
-    if (best.gap < RELABELLED * gaps[i] && best.gap < AS_WELL * std::max(best.theirs, 6.0))
+    if (best.gap < RELABELLED * gaps[i] && best.gap < COMPARABLE * std::max(best.theirs, 6.0))
       doubtful.push_back("test " + t.test.name + " looks mislabelled: feed, depth or immersion of " +
                          best.name + " fit its record");
   }
@@ -190,7 +190,7 @@ std::vector<std::string> foreignLabels(const Dataset& data, const MachineModel& 
 std::vector<Record> simulated(const Dataset& data, const MachineModel& model, int threads) {
   std::vector<Record> own(data.tests.size());
   runParallel(own.size(), threads, [&](std::size_t i) {
-    own[i] = sim::simulateTest(model, data.tests[i].test, data.tests[i].record, quickly());
+    own[i] = sim::simulateTest(model, data.tests[i].test, data.tests[i].record, coarseSimulation());
   });
   return own;
 }
@@ -203,7 +203,7 @@ bool anyChatters(const Dataset& data) {
   return std::any_of(data.tests.begin(), data.tests.end(), chatters);
 }
 
-// What no free simulation follows tells nothing of labels.
+// Labels of chattering cuts cannot be checked by free simulation.
 Dataset withoutChatter(const Dataset& data) {
   Dataset others = data;
   others.tests.erase(std::remove_if(others.tests.begin(), others.tests.end(), chatters), others.tests.end());
@@ -224,8 +224,8 @@ Labels checkLabels(const Dataset& data, int threads) {
   return labels;
 }
 
-std::vector<std::string> doubtfulWith(const MachineModel& model, const Dataset& data, int threads) {
-  if (anyChatters(data)) return doubtfulWith(model, withoutChatter(data), threads);
+std::vector<std::string> doubtfulLabels(const MachineModel& model, const Dataset& data, int threads) {
+  if (anyChatters(data)) return doubtfulLabels(model, withoutChatter(data), threads);
   return foreignLabels(data, model, simulated(data, model, threads));
 }
 

@@ -11,42 +11,31 @@ namespace {
 
 // Sums over the cuts of one channel.
 struct Sums {
-  double squares = 0.0, before = 0.0, after = 0.0;     // about the mean; what the models leave
-  double heldout_squares = 0.0, heldout_after = 0.0;   // of these, in held-out tests
+  double squares = 0.0, before = 0.0, after = 0.0;     // about the mean; of the residuals
+  double heldout_squares = 0.0, heldout_after = 0.0;   // of held-out tests
   double periodic_squares = 0.0, floor_squares = 0.0;  // of the steady parts
   double steady = 0.0;                                 // [samples] of them
   double noise = 0.0;                                  // [unit of the channel]
 };
 
-// In cut, after the sensor's first ringing; all that repeats is looked at in turns of the spindle.
-std::optional<Repeatability> steadyPart(const TestData& test, const std::vector<double>& values) {
-  if (!test.record.has("spindle_angle")) return {};
-  const std::size_t from = test.first_cut + (values.size() - test.first_cut) / 8;
-  const std::vector<double>& angle = test.record.column("spindle_angle");
-  const auto part = [from](const std::vector<double>& all) {
-    return std::vector<double>(all.begin() + static_cast<std::ptrdiff_t>(from), all.end());
-  };
-  return repeatability(part(values), part(angle));
-}
-
 void add(const TwinRunner& runner, const std::vector<double>& before, const std::vector<double>& after,
          std::map<std::string, Sums>* sums) {
-  const std::vector<Block>& blocks = runner.blocks();
-  const auto valuesOf = [&](const Block& b) {
+  const std::vector<ChannelSpan>& spans = runner.spans();
+  const auto valuesOf = [&](const ChannelSpan& b) {
     const auto at = runner.measured().begin() + static_cast<std::ptrdiff_t>(b.offset);
     return std::vector<double>(at, at + static_cast<std::ptrdiff_t>(b.size));
   };
-  const auto isCut = [&](const Block& b) {
-    return b.judged && runner.data().tests[b.test].test.kind == TestKind::cut;
+  const auto isCut = [&](const ChannelSpan& b) {
+    return b.in_gap && runner.data().tests[b.test].test.kind == TestKind::cut;
   };
-  std::vector<std::optional<Repeatability>> repeat(blocks.size());
-  runParallel(blocks.size(), runner.threads(), [&](std::size_t k) {
-    // The load meter settles for longer than a record.
-    if (isCut(blocks[k]) && blocks[k].channel != "load_meter")
-      repeat[k] = steadyPart(runner.data().tests[blocks[k].test], valuesOf(blocks[k]));
+  std::vector<std::optional<Repeatability>> repeat(spans.size());
+  runParallel(spans.size(), runner.threads(), [&](std::size_t k) {
+    // The load meter settles more slowly than a record lasts.
+    if (isCut(spans[k]) && spans[k].channel != "load_meter")
+      repeat[k] = steadyRepeatability(runner.data().tests[spans[k].test], valuesOf(spans[k]));
   });
-  for (std::size_t k = 0; k < blocks.size(); ++k) {
-    const Block& b = blocks[k];
+  for (std::size_t k = 0; k < spans.size(); ++k) {
+    const ChannelSpan& b = spans[k];
     if (!isCut(b)) continue;
     const std::vector<double> values = valuesOf(b);
     const double level = mean(values);
@@ -68,7 +57,7 @@ void add(const TwinRunner& runner, const std::vector<double>& before, const std:
 
 }  // namespace
 
-void addChannelShares(const Workbench& bench, const Remains& before, const Remains& after,
+void addChannelShares(const Workbench& bench, const ModelResidual& before, const ModelResidual& after,
                       Explanation* explanation) {
   std::map<std::string, Sums> sums;
   add(bench.heldout(), before.heldout, after.heldout, &sums);
@@ -86,7 +75,7 @@ void addChannelShares(const Workbench& bench, const Remains& before, const Remai
     if (s.heldout_squares > 0.0) share.explained_heldout = 1.0 - s.heldout_after / s.heldout_squares;
     if (s.steady > 0.0) {
       const double floor = std::sqrt(s.floor_squares / s.steady);
-      share.repeats = 1.0 - s.floor_squares / s.periodic_squares;
+      share.synchronous_share = 1.0 - s.floor_squares / s.periodic_squares;
       share.floor = floor * s.noise;
       share.floor_gap = floor;
     }

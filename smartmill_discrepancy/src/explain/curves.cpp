@@ -8,32 +8,31 @@
 namespace smartmill::discrepancy {
 namespace {
 
-double squaresOf(const std::vector<double>& v, const Block& b) {
+double squaresOf(const std::vector<double>& v, const ChannelSpan& b) {
   double s = 0.0;
   for (std::size_t i = b.offset; i < b.offset + b.size; ++i) s += v[i] * v[i];
   return s / static_cast<double>(b.size);
 }
 
-RevolutionCurve overRevolution(const TwinRunner& runner, const Block& block,
+RevolutionCurve overRevolution(const TwinRunner& runner, const ChannelSpan& span,
                                const std::vector<double>& before, const std::vector<double>& after) {
   constexpr std::size_t BINS = 180;
-  const TestData& test = runner.data().tests[block.test];
-  RevolutionCurve curve{test.test.name, block.channel, {}, {}, {}, {}};
+  const TestData& test = runner.data().tests[span.test];
+  RevolutionCurve curve{test.test.name, span.channel, {}, {}, {}, {}};
   std::vector<double> count(BINS, 0.0), measured(BINS, 0.0), nominal(BINS, 0.0), improved(BINS, 0.0);
   const std::vector<double>& angle = test.record.column("spindle_angle");
-  // The sensor's first ringing after engagement is left out.
-  const std::size_t from = test.first_cut + (block.size - test.first_cut) / 8;
-  for (std::size_t i = from; i < block.size; ++i) {
+  // Without the initial transient of the sensor.
+  for (std::size_t i = test.steadyBegin(); i < span.size; ++i) {
     const auto bin = std::min(BINS - 1, static_cast<std::size_t>(angle[i] / units::TWO_PI * BINS));
-    const double m = runner.measured()[block.offset + i];
+    const double m = runner.measured()[span.offset + i];
     count[bin] += 1.0;
     measured[bin] += m;
-    nominal[bin] += m - before[block.offset + i];
-    improved[bin] += m - after[block.offset + i];
+    nominal[bin] += m - before[span.offset + i];
+    improved[bin] += m - after[span.offset + i];
   }
   for (std::size_t b = 0; b < BINS; ++b) {
     if (count[b] == 0.0) continue;
-    const double scale = block.noise / count[b];
+    const double scale = span.noise / count[b];
     curve.angle_deg.push_back((static_cast<double>(b) + 0.5) * 360.0 / BINS);
     curve.measured.push_back(measured[b] * scale);
     curve.nominal.push_back(nominal[b] * scale);
@@ -47,9 +46,9 @@ RevolutionCurve overRevolution(const TwinRunner& runner, const Block& block,
 void addCurves(const TwinRunner& runner, const std::vector<double>& before, const std::vector<double>& after,
                Explanation* explanation) {
   for (const char* channel : {"fx", "fy", "fz", "load_meter", "tool_x", "tool_y"}) {
-    const Block *worst = nullptr, *worst_cut = nullptr;
-    for (const Block& b : runner.blocks()) {
-      if (b.channel != channel || b.slow || !b.judged) continue;
+    const ChannelSpan *worst = nullptr, *worst_cut = nullptr;
+    for (const ChannelSpan& b : runner.spans()) {
+      if (b.channel != channel || b.slow || !b.in_gap) continue;
       const TestData& test = runner.data().tests[b.test];
       if (!worst || squaresOf(before, b) > squaresOf(before, *worst)) worst = &b;
       if (test.test.kind == TestKind::cut && test.record.has("spindle_angle") &&

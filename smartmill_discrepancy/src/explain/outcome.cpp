@@ -9,55 +9,51 @@
 namespace smartmill::discrepancy {
 namespace {
 
-std::vector<double> residualOf(const TwinRunner& runner, const MachineModel& model) {
-  std::vector<double> r = runner.simulate(model);
-  for (std::size_t i = 0; i < r.size(); ++i) r[i] = runner.measured()[i] - r[i];
-  return r;
-}
-
 double rmsOf(const std::vector<double>& v, std::size_t from, std::size_t size) {
   double squares = 0.0;
   for (std::size_t i = from; i < from + size; ++i) squares += v[i] * v[i];
   return size ? std::sqrt(squares / static_cast<double>(size)) : 0.0;
 }
 
-// Over the noise, of all that is judged.
-double gapOf(const TwinRunner& runner, const std::vector<double>& left) {
+// Gap of all spans except chattering cuts.
+double gapOf(const TwinRunner& runner, const std::vector<double>& residual) {
   double squares = 0.0;
   std::size_t samples = 0;
-  for (const Block& b : runner.blocks()) {
-    if (!b.judged) continue;
-    squares += std::pow(rmsOf(left, b.offset, b.size), 2) * static_cast<double>(b.size);
+  for (const ChannelSpan& b : runner.spans()) {
+    if (!b.in_gap) continue;
+    squares += std::pow(rmsOf(residual, b.offset, b.size), 2) * static_cast<double>(b.size);
     samples += b.size;
   }
   return samples ? std::sqrt(squares / static_cast<double>(samples)) : 0.0;
 }
 
-// By cuts that chatter.
-std::map<std::string, double> predictionErrors(const TwinRunner& runner, const std::vector<double>& left) {
-  const std::array<const char*, 4> shown{{"fx", "fy", "tool_x", "tool_y"}};
+// By chattering cut.
+std::map<std::string, double> predictionErrors(const TwinRunner& runner,
+                                               const std::vector<double>& residual) {
+  const std::array<const char*, 4> compared{{"fx", "fy", "tool_x", "tool_y"}};
   std::map<std::string, double> errors;
-  for (const Block& b : runner.blocks()) {
-    if (b.judged || b.slow || std::find(shown.begin(), shown.end(), b.channel) == shown.end()) continue;
+  for (const ChannelSpan& b : runner.spans()) {
+    if (b.in_gap || b.slow || std::find(compared.begin(), compared.end(), b.channel) == compared.end())
+      continue;
     const TestData& test = runner.data().tests[b.test];
     const auto from = static_cast<std::ptrdiff_t>(b.offset + test.first_cut),
                to = static_cast<std::ptrdiff_t>(b.offset + b.size);
     const double all = standardDeviation({runner.measured().begin() + from, runner.measured().begin() + to});
     double& error = errors[test.test.name];
-    error = std::max(error, rmsOf(left, b.offset + test.first_cut, b.size - test.first_cut) / all);
+    error = std::max(error, rmsOf(residual, b.offset + test.first_cut, b.size - test.first_cut) / all);
   }
   return errors;
 }
 
-// Chi-square statistic of noise alone varies by sqrt(2 / n).
+// The chi-square statistic of noise alone has the relative deviation sqrt(2 / n).
 double floorDeviation(std::size_t samples) {
   return samples ? std::sqrt(0.5 / static_cast<double>(samples)) : 0.0;
 }
 
 void addGaps(const TwinRunner& runner, const std::vector<double>& before, const std::vector<double>& after,
-             bool heldout, std::vector<BlockGap>* gaps) {
-  for (const Block& b : runner.blocks()) {
-    if (!b.judged) continue;
+             bool heldout, std::vector<TestGap>* gaps) {
+  for (const ChannelSpan& b : runner.spans()) {
+    if (!b.in_gap) continue;
     gaps->push_back({runner.data().tests[b.test].test.name, b.channel, heldout,
                      rmsOf(before, b.offset, b.size), rmsOf(after, b.offset, b.size),
                      floorDeviation(b.size)});
@@ -66,19 +62,19 @@ void addGaps(const TwinRunner& runner, const std::vector<double>& before, const 
 
 }  // namespace
 
-Remains remainsOf(const Workbench& bench, const MachineModel& model) {
-  Remains r{residualOf(bench.fitted(), model), residualOf(bench.heldout(), model), {}, {}};
+ModelResidual residualOf(const Workbench& bench, const MachineModel& model) {
+  ModelResidual r{residualOf(bench.fitted(), model), residualOf(bench.heldout(), model), {}, {}};
   r.gap = {gapOf(bench.fitted(), r.fit), gapOf(bench.heldout(), r.heldout)};
   r.chattering = predictionErrors(bench.fitted(), r.fit);
   return r;
 }
 
-void writeOutcome(const Workbench& bench, const Remains& before, const MachineModel& improved,
+void writeOutcome(const Workbench& bench, const ModelResidual& before, const MachineModel& improved,
                   const std::string& folder, Explanation* result) {
   const std::string file = folder + "/model.yaml";
   writeMachineModel(improved, file);
   result->model = readMachineModel(file);
-  const Remains after = remainsOf(bench, result->model);
+  const ModelResidual after = residualOf(bench, result->model);
   result->after = after.gap;
   for (const TestData& t : bench.data().tests) {
     if (t.chatter)

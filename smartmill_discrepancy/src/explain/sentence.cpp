@@ -37,12 +37,11 @@ const char* moreOrLess(double value) {
   return value >= 0.0 ? "more" : "less";
 }
 
-// Whether factors follow (h / reference)^-exponent: slope of their logarithms, and the share of their
-// variance that it explains.
-struct Power {
+// Power law (h / reference)^-exponent: slope of the logarithms and explained share of their variance.
+struct PowerLawFit {
   double exponent = 0.0, explained = 0.0;
 };
-Power powerOf(const std::vector<double>& h, const std::vector<double>& factor) {
+PowerLawFit fitPowerLaw(const std::vector<double>& h, const std::vector<double>& factor) {
   const auto n = static_cast<double>(h.size());
   double x = 0.0, y = 0.0, xx = 0.0, xy = 0.0, yy = 0.0;
   for (std::size_t k = 0; k < h.size(); ++k) {
@@ -63,27 +62,26 @@ std::string ofChip(const FoundEffect& effect) {
   if (h.size() == 2) {
     const double slope = (h[1] * factor[1] - h[0] * factor[0]) / (h[1] - h[0]) / factor[0];
     return formatted(
-        "the cutting force has a kink: above a chip of %.3g um it rises %.0f %% as fast with the chip as "
-        "below",
+        "the cutting force has a kink: above a chip thickness of %.3g um it rises %.0f %% as fast as below",
         h[0], 100.0 * slope);
   }
-  std::string text = "the force per chip is no constant: against the model it is";
+  std::string text = "the specific cutting force depends on the chip thickness: relative to the model it is";
   for (std::size_t k = 0; k < h.size(); ++k)
     text += formatted("%s %.2f at %.0f um", k ? "," : "", factor[k], h[k]);
-  const Power power = powerOf(h, factor);
-  if (power.explained > FOLLOWS)
-    text += formatted(", which follows a power law as size_effect does, exponent %.2f", power.exponent);
+  const PowerLawFit fit = fitPowerLaw(h, factor);
+  if (fit.explained > FOLLOWS)
+    text += formatted(", a power law like size_effect with exponent %.2f", fit.exponent);
   return text;
 }
 
-// Of which share of the force a form of the law speaks.
+// Force component of a form.
 const char* shareOf(const FoundEffect& effect) {
-  return effect.words.at("of") == "chip" ? "cutting force" : "force of its rubbing edge";
+  return effect.words.at("of") == "chip" ? "cutting force" : "edge force";
 }
 
-// The tooth that is not as the others, which are alike; nothing where several differ.
+// The tooth that differs while the others agree; nothing if several differ.
 std::optional<std::size_t> oddTooth(const std::vector<double>& factor) {
-  constexpr double ALIKE = 0.2;  // of the odd one's distance
+  constexpr double ALIKE = 0.2;  // of the tooth's distance to the others
   for (std::size_t k = 0; k < factor.size(); ++k) {
     std::vector<double> others = factor;
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
@@ -98,14 +96,13 @@ std::string ofTeeth(const FoundEffect& effect) {
   const std::vector<double> factor = seriesOf(effect, "factor");
   if (const std::optional<std::size_t> odd = oddTooth(factor)) {
     const double ratio = factor[*odd] / factor[*odd == 0 ? 1 : 0];
-    if (ratio < OUT) return formatted("one tooth is out: tooth %zu hardly cuts", *odd + 1);
+    if (ratio < OUT) return formatted("tooth %zu hardly cuts", *odd + 1);
     return formatted(
-        "one tooth is not as the others: the %s of tooth %zu is %.0f %% %s; look whether it is %s",
+        "one tooth differs from the others: the %s of tooth %zu is %.0f %% %s; check whether it is %s",
         shareOf(effect), *odd + 1, 100.0 * std::abs(ratio - 1.0), moreOrLess(ratio - 1.0),
         ratio > 1.0 ? "dull or chipped" : "of another grade or edge");
   }
-  std::string text =
-      formatted("the teeth are not alike: the %s of each, over that of the model, is", shareOf(effect));
+  std::string text = formatted("the teeth differ: the %s of each relative to the model is", shareOf(effect));
   for (std::size_t k = 0; k < factor.size(); ++k) text += formatted("%s %.2f", k ? "," : "", factor[k]);
   return text;
 }
@@ -114,98 +111,95 @@ std::string ofLife(const FoundEffect& effect) {
   constexpr double STRAIGHT = 1500.0;  // [s]
   const double amplitude = valueOf(effect, "amplitude"), constant = valueOf(effect, "time_constant_s");
   if (constant > STRAIGHT)
-    return formatted("the %s becomes %.2g %% %s with each minute of cutting, in a straight line as wear does",
+    return formatted("the %s becomes %.2g %% %s per minute of cutting, linear like tool_wear",
                      shareOf(effect), 100.0 * std::abs(amplitude) * 60.0 / constant, moreOrLess(amplitude));
   return formatted(
-      "while the edge is run in its %s becomes %.0f %% %s, by the exponential approach of a time constant of "
-      "%.2g min of cutting",
-      effect.words.at("of") == "chip" ? "cutting force" : "rubbing force", 100.0 * std::abs(amplitude),
+      "during run-in of the edge its %s becomes %.0f %% %s, exponentially with a time constant of %.2g min "
+      "of "
+      "cutting",
+      effect.words.at("of") == "chip" ? "cutting force" : "edge force", 100.0 * std::abs(amplitude),
       moreOrLess(amplitude), constant / 60.0);
 }
 
 std::string ofTime(const FoundEffect& effect) {
   const double amplitude = valueOf(effect, "amplitude");
-  return formatted("a cut begins with %.0f %% %s cutting force and settles with a time constant of %.3g s",
+  return formatted("a cut starts with %.0f %% %s cutting force, which decays with a time constant of %.3g s",
                    100.0 * std::abs(amplitude), moreOrLess(amplitude), valueOf(effect, "time_constant_s"));
 }
 
 std::string ofProfile(const FoundEffect& effect) {
   const double extra = valueOf(effect, "factor") - 1.0;
   const bool surface = effect.words.at("from") == "surface";
-  return formatted("the %s %.3g mm of the cut %s %.0f %% %s cutting force: look for %s",
-                   surface ? "uppermost" : "lowest", valueOf(effect, "height_mm"), surface ? "cost" : "take",
+  return formatted("the %s %.3g mm of the cut %s %.0f %% %s cutting force: check for %s",
+                   surface ? "uppermost" : "lowest", valueOf(effect, "height_mm"), surface ? "need" : "need",
                    100.0 * std::abs(extra), moreOrLess(extra),
-                   surface ? "a skin of the stock" : "a corner that is worn or of another shape");
+                   surface ? "a hard skin of the stock" : "a worn corner or one of another shape");
 }
 
 std::string ofLostEdge(const FoundEffect& effect) {
   return formatted(
-      "one tooth is out: the lowest %.3g mm of tooth %.0f do not cut and the next tooth takes its chip; look "
-      "for a lost corner",
+      "the lowest %.3g mm of tooth %.0f do not cut and the next tooth removes its chip; check for a broken "
+      "corner",
       valueOf(effect, "height_mm"), valueOf(effect, "tooth"));
 }
 
 std::string ofCurve(const FoundEffect& effect) {
-  const auto bend = [&](double kn) {
+  const auto deviation = [&](double kn) {
     return kn * (valueOf(effect, "odd_per_kn") * std::abs(kn) + valueOf(effect, "even_per_kn") * kn +
                  valueOf(effect, "cubic_per_kn2") * kn * kn);
   };
-  return formatted(
-      "%s is not straight: it shows %+.3g N at 300 N and %+.3g N at -300 N beside the true force",
-      effect.words.at("channel").c_str(), 1e3 * bend(0.3), 1e3 * bend(-0.3));
+  return formatted("%s is nonlinear: its error is %+.3g N at 300 N and %+.3g N at -300 N",
+                   effect.words.at("channel").c_str(), 1e3 * deviation(0.3), 1e3 * deviation(-0.3));
 }
 
 std::string ofTone(const FoundEffect& effect) {
   const std::string& channel = effect.words.at("channel");
-  return formatted("%s carries a tone of %.3g %s at %.5g Hz, %s", channel.c_str(),
+  return formatted("%s contains a tone of %.3g %s at %.5g Hz, %s", channel.c_str(),
                    valueOf(effect, "amplitude"), unitOf(channel), valueOf(effect, "frequency_hz"),
-                   effect.words.at("while") == "turning"
-                       ? "at any speed of the spindle, but not while it stands"
-                       : "whatever the spindle does");
+                   effect.words.at("while") == "turning" ? "at any spindle speed, but not at standstill"
+                                                         : "independent of the spindle");
 }
 
 std::string ofOrder(const FoundEffect& effect) {
   const std::string& channel = effect.words.at("channel");
   return formatted(
-      "%s carries a tone of %.3g %s at %.4g times the spindle's turning, its phase another one each "
-      "record",
+      "%s contains a tone of %.3g %s at %.4g times the spindle frequency with a random phase in each record",
       channel.c_str(), valueOf(effect, "amplitude"), unitOf(channel), valueOf(effect, "order"));
 }
 
 std::string ofSettling(const FoundEffect& effect) {
   const std::string& channel = effect.words.at("channel");
-  return formatted("%s begins each record off by %.3g %s and comes back with a time constant of %.3g s",
-                   channel.c_str(), valueOf(effect, "amplitude"), unitOf(channel),
-                   valueOf(effect, "time_constant_s"));
+  return formatted(
+      "%s starts each record with an offset of %.3g %s, which decays with a time constant of %.3g s",
+      channel.c_str(), valueOf(effect, "amplitude"), unitOf(channel), valueOf(effect, "time_constant_s"));
 }
 
 std::string ofStep(const FoundEffect& effect) {
   const std::string& channel = effect.words.at("channel");
   const double amplitude = valueOf(effect, "amplitude"), at = valueOf(effect, "at_s");
   if (effect.words.at("clock") == "record")
-    return formatted("%s jumps by %+.3g %s %.4g s after each record began: look at what switches then",
+    return formatted("%s jumps by %+.3g %s %.4g s after the start of each record: check what switches then",
                      channel.c_str(), amplitude, unitOf(channel), at);
   return formatted(
-      "%s reads %+.3g %s off from the time on that stands %.0f s after the campaign's begin: "
-      "something was touched between two tests",
+      "%s has an offset of %+.3g %s from %.0f s after the start of the campaign: the setup changed between "
+      "two tests",
       channel.c_str(), amplitude, unitOf(channel), at);
 }
 
 std::string ofRamp(const FoundEffect& effect) {
   const std::string& channel = effect.words.at("channel");
   const bool record = effect.words.at("clock") == "record";
-  return formatted("%s drifts by %+.3g %s a minute %s, in a straight line as charge_drift does: look at %s",
-                   channel.c_str(), valueOf(effect, "per_min"), unitOf(channel),
+  return formatted("%s drifts by %+.3g %s per minute %s, linear like charge_drift: check %s", channel.c_str(),
+                   valueOf(effect, "per_min"), unitOf(channel),
                    record ? "from the start of each record" : "over the whole campaign",
-                   record ? "its charge amplifier" : "what it is fastened to and how warm that becomes");
+                   record ? "its charge amplifier" : "the temperature of its mounting");
 }
 
 std::string ofApproach(const FoundEffect& effect) {
   const std::string& channel = effect.words.at("channel");
   return formatted(
-      "%s comes to be %+.3g %s off while the machine warms up, by the exponential approach of a time "
-      "constant "
-      "of %.2g min",
+      "%s reaches an offset of %+.3g %s while the machine warms up, exponentially with a time constant of "
+      "%.2g min",
       channel.c_str(), valueOf(effect, "amplitude"), unitOf(channel),
       valueOf(effect, "time_constant_s") / 60.0);
 }
@@ -213,8 +207,8 @@ std::string ofApproach(const FoundEffect& effect) {
 std::string ofBursts(const FoundEffect& effect) {
   const std::string& channel = effect.words.at("channel");
   return formatted(
-      "%s rings every %.4g s at %.4g Hz, at first with %.3g %s and dying out within %.2g ms: look for what "
-      "knocks or switches in that beat",
+      "%s rings every %.4g s at %.4g Hz with an initial amplitude of %.3g %s and a decay time of %.2g ms: "
+      "check what knocks or switches with that period",
       channel.c_str(), valueOf(effect, "period_s"), valueOf(effect, "frequency_hz"),
       valueOf(effect, "amplitude"), unitOf(channel), 1e3 * valueOf(effect, "decay_s"));
 }
@@ -226,32 +220,32 @@ std::string ofTransfer(const FoundEffect& effect) {
   const double corner = valueOf(effect, "corner_hz");
   if (std::abs(above) < NOTHING)
     return formatted(
-        "%s loses what is quicker than %.3g Hz, as a low pass of first order does: look for a "
-        "filter that is switched on",
+        "%s is attenuated above %.3g Hz like behind a first-order low pass: check for an active filter",
         channel.c_str(), corner);
   if (std::abs(below) < NOTHING)
     return formatted(
-        "%s loses what is slower than %.3g Hz, as a high pass of first order does: look at the "
-        "time constant of its charge amplifier, %.2g s",
+        "%s is attenuated below %.3g Hz like behind a first-order high pass: check the time constant of its "
+        "charge amplifier, %.2g s",
         channel.c_str(), corner, 1.0 / (units::TWO_PI * corner));
-  return formatted("%s shows what is %s than %.3g Hz %.2f times as large as it is", channel.c_str(),
-                   above != 1.0 ? "quicker" : "slower", corner, above != 1.0 ? above : below);
+  return formatted("%s is amplified %s %.3g Hz by %.2f", channel.c_str(), above != 1.0 ? "above" : "below",
+                   corner, above != 1.0 ? above : below);
 }
 
 std::string ofResonance(const FoundEffect& effect) {
   const std::string &channel = effect.words.at("channel"), &from = effect.words.at("from");
-  const std::string path = channel == from ? "beside itself" : "of what " + from + " carries";
+  const std::string path = channel == from ? "" : " excited by " + from;
   return formatted(
-      "%s shows a resonance %s at %.4g Hz (damping %.2g %%, share %.2g): its sensor, or what it is "
-      "bolted to, has a mode that the model lacks",
+      "%s has a resonance%s at %.4g Hz (damping %.2g %%, share %.2g): its sensor or mounting has a mode that "
+      "the model lacks",
       channel.c_str(), path.c_str(), valueOf(effect, "frequency_hz"),
       100.0 * valueOf(effect, "damping_ratio"), valueOf(effect, "gain"));
 }
 
 std::string ofRevolution(const FoundEffect& effect) {
   return formatted(
-      "at %.0f rpm and %.3g mm depth more comes again with each revolution than the model tells: the table "
-      "serves between the feeds that were cut, and its cause is not known",
+      "at %.0f rpm and %.3g mm depth the residual is synchronous with the spindle: the table is valid "
+      "between "
+      "the measured feeds; its cause is unknown",
       valueOf(effect, "speed_rpm"), valueOf(effect, "depth_mm"));
 }
 
@@ -285,7 +279,7 @@ std::string sentenceOf(const Explanation& explanation) {
   std::string text;
   for (const FoundEffect& effect : explanation.effects) {
     const std::string one = sentenceOf(effect);
-    if (!one.empty()) text += (text.empty() ? "No effect of the catalogue, but it repeats: " : "; ") + one;
+    if (!one.empty()) text += (text.empty() ? "Not in the catalogue, but reproducible: " : "; ") + one;
   }
   return text.empty() ? text : text + ".";
 }

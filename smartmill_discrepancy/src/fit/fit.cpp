@@ -13,7 +13,7 @@
 #include "smartmill_core/fit/least_squares.h"
 #include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/signal/statistics.h"
-#include "smartmill_discrepancy/gap/asked.h"
+#include "smartmill_discrepancy/gap/scale_evidence.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -22,58 +22,59 @@ using Values = std::vector<double>;
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-// Ends a fit that is through: what a step gains is a trifle beside what is above the noise, steps in a row
-// gain nothing, or it comes too slowly near what it has to beat.
-class Course {
+// Ends a fit when a step gains a negligible share of the squares above the noise, when several steps gain
+// nothing, or when it cannot reach the competing fit.
+class StoppingRule {
  public:
-  Course(const FitOptions& options, double samples) : options_(options), samples_(samples) {}
+  StoppingRule(const FitOptions& options, double samples) : options_(options), samples_(samples) {}
 
-  bool goesOn(const fit::Progress& now) {
-    constexpr int IN_VAIN = 4, PATIENCE = 3;
+  bool mayContinue(const fit::Progress& now) {
+    constexpr int MAX_WITHOUT_GAIN = 4, PATIENCE = 3;
     const double gain = before_ - now.squares;
     before_ = now.squares;
-    in_vain_ = gain > 0.0 ? 0 : in_vain_ + 1;
+    steps_without_gain_ = gain > 0.0 ? 0 : steps_without_gain_ + 1;
     if (now.iteration == 0) return true;
-    const bool trifle = gain > 0.0 && gain < least(now.squares);
-    const bool hopeless = now.iteration >= PATIENCE && now.squares - options_.to_beat > HOPE * gain;
-    return !trifle && !hopeless && in_vain_ < IN_VAIN;
+    const bool negligible = gain > 0.0 && gain < minGain(now.squares);
+    const bool cannot_improve =
+        now.iteration >= PATIENCE && now.squares - options_.to_beat > EXPECTED_GAIN_FACTOR * gain;
+    return !negligible && !cannot_improve && steps_without_gain_ < MAX_WITHOUT_GAIN;
   }
-  bool mayBeat(double squares, double promised) const {
-    return promised >= least(squares) && squares - HOPE * promised <= options_.to_beat;
+  bool mayImprove(double squares, double predicted) const {
+    return predicted >= minGain(squares) && squares - EXPECTED_GAIN_FACTOR * predicted <= options_.to_beat;
   }
 
  private:
-  static constexpr double HOPE = 10.0;  // times what a step gains or promises, that later ones may bring
-  double least(double squares) const {
+  static constexpr double EXPECTED_GAIN_FACTOR = 10.0;  // gain of later steps over that of the last one
+  double minGain(double squares) const {
     return options_.tolerance * std::min(std::max(squares - samples_, 20.0), squares);
   }
   const FitOptions& options_;
   double samples_, before_ = std::numeric_limits<double>::infinity();
-  int in_vain_ = 0;
+  int steps_without_gain_ = 0;
 };
 
-// Damped steps, which cross what is curved. Where nominal values are simulated undamped ones follow: an
-// effect beside the nominal value that it resembles leaves a narrow valley, in which damping would creep.
-// @return no value: the twin gives no numbers at the start
+// Damped steps for curved costs. If nominal values are simulated, undamped steps follow: an effect and a
+// similar nominal value form a narrow valley in which damped steps are slow.
+// @return no value if the twin gives no finite values at the start
 std::optional<Eigen::VectorXd> solve(const CampaignCost& cost, const FitOptions& options, double samples,
                                      const std::function<bool()>& cancelled) {
-  constexpr int EASILY = 2;  // times the steps where each simulates little
+  constexpr int CHEAP_STEP_FACTOR = 2;  // more steps if each simulates few coordinates
   if (options.iterations == 0) return cost.start();
   fit::Options solver;
   solver.name = "fit of a campaign";
-  solver.iterations = cost.simulatesAll() ? options.iterations : EASILY * options.iterations;
-  solver.function_tolerance = 1e-15;  // Course ends it
+  solver.iterations = cost.simulatesAll() ? options.iterations : CHEAP_STEP_FACTOR * options.iterations;
+  solver.function_tolerance = 1e-15;  // StoppingRule decides
   solver.parameter_tolerance = 1e-7;
   solver.dear_derivatives = true;
-  solver.finish_at_bounds = false;  // simulations are dear, and the next round comes back
+  solver.finish_at_bounds = false;  // simulations are expensive and later rounds refit
   std::vector<fit::Parameter> parameters = cost.parameters();
   Eigen::VectorXd own(static_cast<Index>(parameters.size()));
   const std::vector<double> radii =
       cost.simulatesAll() ? std::vector<double>{1e4, 1e10} : std::vector<double>{1e5};
   for (const double radius : radii) {
-    Course course(options, samples);
+    StoppingRule rule(options, samples);
     solver.progress = [&](const fit::Progress& now) {
-      return course.goesOn(now) && !(cancelled && cancelled());
+      return rule.mayContinue(now) && !(cancelled && cancelled());
     };
     solver.trust_radius = radius;
     fit::Result result;
@@ -85,52 +86,53 @@ std::optional<Eigen::VectorXd> solve(const CampaignCost& cost, const FitOptions&
     if (!result.usable()) return {};
     own = result.value;
     for (std::size_t c = 0; c < parameters.size(); ++c) parameters[c].start = own[static_cast<Index>(c)];
-    if (radius == radii.back() || !course.mayBeat(result.squares, cost.promisedAt(own))) break;
+    if (radius == radii.back() || !rule.mayImprove(result.squares, cost.predictedReductionAt(own))) break;
   }
   return cost.pointAt(own);
 }
 
 // Inverse of the information with priors.
-MatrixXd inverseAt(const CampaignCost& cost, MatrixXd information) {
+MatrixXd covarianceOf(const CampaignCost& cost, MatrixXd information) {
   for (Index c = 0; c < information.cols(); ++c)
     information(c, c) += cost.precision(static_cast<std::size_t>(c));
   return linear::inverseSymmetric(information);
 }
 
-// [1] Of the variance, which an estimate of it with so many degrees of freedom passes in one of twenty
-// (Wilson and Hilferty 1931).
-double scatterByChance(double freedom) {
+// [1] Upper 5 % limit of a variance estimate over the variance, by degrees of freedom (Wilson and Hilferty
+// 1931).
+double chanceScatterLimit(double freedom) {
   const double spread = 2.0 / (9.0 * freedom);
   return std::pow(1.0 - spread + 1.645 * std::sqrt(spread), 3);
 }
 
 // Variance of influence.residual over all tests.
-double pulledVariance(const TwinRunner& runner, const Eigen::VectorXd& influence,
-                      const Eigen::VectorXd& residual, const std::vector<Values>& power) {
-  std::map<std::size_t, AskedTest> by_test;
+double influenceVariance(const TwinRunner& runner, const Eigen::VectorXd& influence,
+                         const Eigen::VectorXd& residual, const std::vector<Values>& power) {
+  std::map<std::size_t, ScaleEvidence> by_test;
   for (std::size_t b = 0; b < power.size(); ++b) {
-    const Block& block = runner.blocks()[b];
+    const ChannelSpan& block = runner.spans()[b];
     by_test[block.test].add(influence.data() + block.offset, residual.data() + block.offset, block.size,
                             power[b]);
   }
-  std::vector<AskedTest> tests;
+  std::vector<ScaleEvidence> tests;
   double squares = 0.0;
-  for (const auto& [test, asked] : by_test) {
-    tests.push_back(asked);
-    squares += asked.squares;
+  for (const auto& [test, evidence] : by_test) {
+    tests.push_back(evidence);
+    squares += evidence.squares;
   }
-  const double within = std::max(squares, varianceOfLines(tests));
-  const Scatter scatter = scatterOf(tests);
+  const double uncorrelated = std::max(squares, varianceOfLines(tests));
+  const TestScatter scatter = testScatterOf(tests);
   const double freedom = std::max(scatter.freedom, 1.0);
-  if (scatter.variance < scatterByChance(freedom) * within) return std::max(within, scatter.variance);
-  // Each test has an error of its own, of which a few tests tell the size but poorly.
+  if (scatter.variance < chanceScatterLimit(freedom) * uncorrelated)
+    return std::max(uncorrelated, scatter.variance);
+  // Each test has an error of its own, whose size a few tests estimate poorly.
   const double student = studentOverNormal(freedom);
   return student * student * scatter.variance;
 }
 
-// Cost, residual and covariance at a point. @return false: no numbers there
+// Cost, residual and covariance at a point. @return false if there are no finite values
 bool describe(const CampaignCost& cost, const Eigen::VectorXd& at, double samples, std::size_t records,
-              Fit& fit) {
+              FitResult& fit) {
   const CampaignCost::Linear* point = cost.linearise(at);
   if (!point) return false;
   fit.state = cost.stateAt(at);
@@ -145,11 +147,17 @@ bool describe(const CampaignCost& cost, const Eigen::VectorXd& at, double sample
     fit.bic += static_cast<double>(m.values.size()) * std::log(samples) + m.hypothesis->handicap;
     fit.bic += m.hypothesis->found_in_each_record * of_records * std::log(samples / of_records);
   }
-  fit.covariance = inverseAt(cost, point->information);
+  fit.covariance = covarianceOf(cost, point->information);
   return true;
 }
 
 }  // namespace
+
+bool hasMember(const FitState& state, const std::string& effect, const std::string& variant) {
+  return std::any_of(state.members.begin(), state.members.end(), [&](const Member& m) {
+    return m.hypothesis->effect == effect && m.hypothesis->variant == variant;
+  });
+}
 
 FitState without(const FitState& state, std::size_t member) {
   FitState less = state;
@@ -160,14 +168,14 @@ FitState without(const FitState& state, std::size_t member) {
 Fitter::Fitter(const TwinRunner& runner, const NominalFreedom& freedom, std::function<bool()> cancelled)
     : runner_(runner), freedom_(freedom), cancelled_(std::move(cancelled)) {
   for (std::size_t k = 0; k < runner.tests().size(); ++k) {
-    for (const TurnFreedom& free : turnFreedoms(runner.data().tests[runner.tests()[k]]))
-      turns_.push_back({k, free});
+    for (const AlignmentFreedom& free : alignmentFreedoms(runner.data().tests[runner.tests()[k]]))
+      alignments_.push_back({k, free});
   }
 }
 
-NominalTangents NominalTangents::ofTurns() const {
-  const auto count = static_cast<Index>(turns.size());
-  return {{}, turns, columns.right(count), information.bottomRightCorner(count, count)};
+NominalTangents NominalTangents::ofAlignments() const {
+  const auto count = static_cast<Index>(alignment.size());
+  return {{}, alignment, columns.lastColumns(count), information.bottomRightCorner(count, count)};
 }
 
 MachineModel Fitter::model(const FitState& state) const {
@@ -186,26 +194,27 @@ NominalTangents Fitter::nominalTangents(const FitState& state) const {
     moved.nominal[c] += steps.back();
     models.push_back(model(moved));
   }
-  std::vector<SimulatedBlocks> simulated = runner_.simulateBlocks(models);
-  const SimulatedBlocks base = std::move(simulated.front());
+  std::vector<SimulatedChannels> simulated = runner_.simulateChannels(models);
+  const SimulatedChannels base = std::move(simulated.front());
   simulated.erase(simulated.begin());
-  simulated.resize(coordinates.size() + turns_.size());
-  for (const TurnOf& t : turns_) steps.push_back(t.freedom.step);
-  runParallel(turns_.size(), runner_.threads(), [&](std::size_t k) {
-    Turn by;
-    by.*turns_[k].freedom.value = turns_[k].freedom.step;
-    simulated[coordinates.size() + k] = runner_.turned(models.front(), base, turns_[k].chosen, by);
+  simulated.resize(coordinates.size() + alignments_.size());
+  for (const FreeAlignment& t : alignments_) steps.push_back(t.freedom.step);
+  runParallel(alignments_.size(), runner_.threads(), [&](std::size_t k) {
+    RecordAlignment by;
+    by.*alignments_[k].freedom.value = alignments_[k].freedom.step;
+    simulated[coordinates.size() + k] = runner_.realigned(models.front(), base, alignments_[k].chosen, by);
   });
-  NominalTangents tangents{state.nominal, state.turns, BlockColumns(runner_, base, simulated, steps), {}};
-  tangents.turns.resize(turns_.size(), 0.0);
+  NominalTangents tangents{
+      state.nominal, state.alignment, SparseColumns(runner_, base, simulated, steps), {}};
+  tangents.alignment.resize(alignments_.size(), 0.0);
   tangents.information = tangents.columns.gram();
   return tangents;
 }
 
-Fit Fitter::fit(const FitState& start, const NominalTangents* frozen, const FitOptions& options) const {
+FitResult Fitter::fit(const FitState& start, const NominalTangents* frozen, const FitOptions& options) const {
   const CampaignCost cost(*this, start, frozen, options);
-  const double samples = runner_.counts();
-  Fit fit;
+  const double samples = runner_.effectiveSamples();
+  FitResult fit;
   const std::optional<Eigen::VectorXd> at = solve(cost, options, samples, cancelled_);
   fit.converged = at && describe(cost, *at, samples, runner_.tests().size(), fit);
   if (!fit.converged) {
@@ -215,12 +224,12 @@ Fit Fitter::fit(const FitState& start, const NominalTangents* frozen, const FitO
   return fit;
 }
 
-std::optional<FitState> Fitter::straightOn(const FitState& state, const NominalTangents& tangents,
-                                           double prior_weight) const {
+std::optional<FitState> Fitter::linearOptimum(const FitState& state, const NominalTangents& tangents,
+                                              double prior_weight) const {
   FitOptions options;
   options.prior_weight = prior_weight;
   const CampaignCost cost(*this, state, &tangents, options);
-  const std::optional<Eigen::VectorXd> at = cost.straightOn(cost.start());
+  const std::optional<Eigen::VectorXd> at = cost.linearOptimumFrom(cost.start());
   return at ? std::optional<FitState>(cost.stateAt(*at)) : std::nullopt;
 }
 
@@ -240,16 +249,17 @@ MatrixXd Fitter::sandwichCovariance(const FitState& state, const NominalTangents
   Eigen::VectorXd std_dev(at.size());
   const CampaignCost::Linear* point = cost.linearise(at);
   if (!point) return {};
-  const MatrixXd inverse = inverseAt(cost, point->information);
+  const MatrixXd inverse = covarianceOf(cost, point->information);
   const Eigen::VectorXd residual = cost.residual(at);
-  const std::vector<Block>& blocks = runner_.blocks();
+  const std::vector<ChannelSpan>& blocks = runner_.spans();
   std::vector<Values> power(blocks.size());
-  runParallel(blocks.size(), runner_.threads(),
-              [&](std::size_t b) { power[b] = powerOf(residual.data() + blocks[b].offset, blocks[b].size); });
+  runParallel(blocks.size(), runner_.threads(), [&](std::size_t b) {
+    power[b] = powerSpectrum(residual.data() + blocks[b].offset, blocks[b].size);
+  });
   runParallel(cost.coordinates().size(), runner_.threads(), [&](std::size_t coordinate) {
     const auto c = static_cast<Index>(coordinate);
-    double variance = pulledVariance(runner_, cost.influence(inverse.col(c)), residual, power);
-    // What is stated lies off by its own deviation.
+    double variance = influenceVariance(runner_, cost.influence(inverse.col(c)), residual, power);
+    // Stated values have an error of their own.
     for (Index k = 0; k < at.size(); ++k) {
       const double precision = cost.precision(static_cast<std::size_t>(k));
       variance += std::pow(inverse(k, c), 2) * prior_weight * precision;

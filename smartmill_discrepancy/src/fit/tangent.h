@@ -2,8 +2,8 @@
 
 namespace smartmill::discrepancy {
 
-/// Share of a coordinate's step in which tangents are taken: one that is a little curved would tell effects
-/// apart from nominal values that do exactly the same.
+/// Share of a coordinate's step for numerical derivatives: curvature would distinguish effects from nominal
+/// values with exactly the same response.
 constexpr double TANGENT = 0.02;
 
 }  // namespace smartmill::discrepancy

@@ -25,7 +25,7 @@ std::vector<Condition> conditionsOf(bool among_cuts) {
   return {speed,
           {"chip_load", [](const CampaignTest& t) { return t.engagement->feed_per_tooth; }},
           {"depth", [](const CampaignTest& t) { return t.engagement->axial_depth; }},
-          // Up- and down-milling of the same immersion are told apart too.
+          // Distinguishes up- and down-milling with the same immersion.
           {"immersion",
            [](const CampaignTest& t) {
              return t.engagement->exit - t.engagement->entry + t.engagement->entry / 7.0;
@@ -33,40 +33,40 @@ std::vector<Condition> conditionsOf(bool among_cuts) {
           time};
 }
 
-double rmsAmplitude(const std::vector<Shown>& shown) {
+double rmsAmplitude(const std::vector<TestAmplitude>& amplitudes) {
   double squares = 0.0;
-  for (const Shown& s : shown) squares += s.amplitude * s.amplitude;
-  return shown.empty() ? 0.0 : std::sqrt(squares / static_cast<double>(shown.size()));
+  for (const TestAmplitude& s : amplitudes) squares += s.amplitude * s.amplitude;
+  return amplitudes.empty() ? 0.0 : std::sqrt(squares / static_cast<double>(amplitudes.size()));
 }
 
-// Whether the sizes differ by more than their own uncertainty.
-bool differ(const std::vector<Shown>& shown) {
+// Whether the amplitudes differ by more than their uncertainty.
+bool differ(const std::vector<TestAmplitude>& amplitudes) {
   double weighted = 0.0, weights = 0.0, spread = 0.0;
-  for (const Shown& s : shown) {
+  for (const TestAmplitude& s : amplitudes) {
     weighted += s.amplitude / (s.std_dev * s.std_dev);
     weights += 1.0 / (s.std_dev * s.std_dev);
   }
-  for (const Shown& s : shown) {
+  for (const TestAmplitude& s : amplitudes) {
     const double z = (s.amplitude - weighted / weights) / s.std_dev;
     spread += z * z;
   }
-  const std::size_t freedom = shown.size() - 1;
+  const std::size_t freedom = amplitudes.size() - 1;
   return chiSquareTail(spread, freedom + freedom % 2) <= 1e-4;
 }
 
-// Correlation of the sizes with a condition; 0 where one of them does not change.
-double correlation(const std::vector<Shown>& shown, const Condition& condition) {
-  const double n = static_cast<double>(shown.size());
+// Correlation of the amplitudes with a condition; 0 if one of them is constant.
+double correlation(const std::vector<TestAmplitude>& amplitudes, const Condition& condition) {
+  const double n = static_cast<double>(amplitudes.size());
   std::vector<double> x;
   double my = 0.0;
-  for (const Shown& s : shown) {
+  for (const TestAmplitude& s : amplitudes) {
     x.push_back(condition.of(s.test->test));
     my += s.amplitude / n;
   }
   const double mx = std::accumulate(x.begin(), x.end(), 0.0) / n;
   double xx = 0.0, yy = 0.0, xy = 0.0;
-  for (std::size_t k = 0; k < shown.size(); ++k) {
-    const double dx = x[k] - mx, dy = shown[k].amplitude - my;
+  for (std::size_t k = 0; k < amplitudes.size(); ++k) {
+    const double dx = x[k] - mx, dy = amplitudes[k].amplitude - my;
     xx += dx * dx;
     yy += dy * dy;
     xy += dx * dy;
@@ -76,23 +76,23 @@ double correlation(const std::vector<Shown>& shown, const Condition& condition) 
 
 }  // namespace
 
-std::vector<std::string> dependence(const std::vector<Shown>& shown) {
-  constexpr double AIR_SHARE = 0.3;  // of the size in cuts, below which only cutting shows it
-  std::vector<Shown> cuts, rest, turning;
-  for (const Shown& s : shown) {
+std::vector<std::string> dependentConditions(const std::vector<TestAmplitude>& amplitudes) {
+  constexpr double AIR_SHARE = 0.3;  // amplitude outside cuts over that in cuts: limit for "cutting"
+  std::vector<TestAmplitude> cuts, rest, with_spindle;
+  for (const TestAmplitude& s : amplitudes) {
     (s.test->test.kind == TestKind::cut ? cuts : rest).push_back(s);
-    if (s.test->test.kind != TestKind::tap) turning.push_back(s);
+    if (s.test->test.kind != TestKind::tap) with_spindle.push_back(s);
   }
   std::vector<std::string> names;
   if (!cuts.empty() && !rest.empty() && rmsAmplitude(rest) < AIR_SHARE * rmsAmplitude(cuts))
     names.push_back("cutting");
   const bool among_cuts = cuts.size() >= LEAST_TESTS;
-  const std::vector<Shown>& chosen = among_cuts ? cuts : turning;
+  const std::vector<TestAmplitude>& chosen = among_cuts ? cuts : with_spindle;
   if (chosen.size() < LEAST_TESTS || !differ(chosen)) return names;
   const std::vector<Condition> conditions = conditionsOf(among_cuts);
   std::vector<std::pair<double, std::string>> strengths;
   for (const Condition& c : conditions) {
-    // Fisher's z against chance among n tests and as many looks as there are conditions.
+    // Fisher's z of n tests, Bonferroni-corrected for the number of conditions.
     const double r = correlation(chosen, c);
     const double z = std::atanh(std::min(r, 0.999999)) *
                      std::sqrt(std::max(static_cast<double>(chosen.size()) - 3.0, 1.0));

@@ -16,7 +16,7 @@ CampaignGap campaignGap(const Dataset& data, const MachineModel& model, int thre
   const std::vector<double> simulated = runner.simulate(model);
   CampaignGap result;
   double sum = 0.0;
-  for (const Block& b : runner.blocks()) {
+  for (const ChannelSpan& b : runner.spans()) {
     double squares = 0.0;
     for (std::size_t i = b.offset; i < b.offset + b.size; ++i)
       squares += std::pow(runner.measured()[i] - simulated[i], 2);

@@ -5,8 +5,8 @@
 
 namespace smartmill::discrepancy {
 
-Orders::Orders(const std::vector<double>& angle) : samples_(angle.size()) {
-  constexpr auto WIDTH = static_cast<std::size_t>(SIDE_BY_SIDE);
+OrderBasis::OrderBasis(const std::vector<double>& angle) : samples_(angle.size()) {
+  constexpr auto WIDTH = static_cast<std::size_t>(LANES);
   const std::size_t groups = (samples_ + WIDTH - 1) / WIDTH;
   cosine_.assign(groups, Lanes::Ones());
   sine_.assign(groups, Lanes::Zero());
@@ -17,8 +17,8 @@ Orders::Orders(const std::vector<double>& angle) : samples_(angle.size()) {
   }
 }
 
-std::vector<double> Orders::along(const std::vector<double>& values, std::size_t count) const {
-  constexpr auto WIDTH = static_cast<std::size_t>(SIDE_BY_SIDE);
+std::vector<double> OrderBasis::along(const std::vector<double>& values, std::size_t count) const {
+  constexpr auto WIDTH = static_cast<std::size_t>(LANES);
   std::vector<double> sums(2 * count + 1, 0.0);
   for (std::size_t g = 0; g < cosine_.size(); ++g) {
     Lanes value = Lanes::Zero(), cosine = Lanes::Ones(), sine = Lanes::Zero();
@@ -36,8 +36,8 @@ std::vector<double> Orders::along(const std::vector<double>& values, std::size_t
   return sums;
 }
 
-std::vector<double> Orders::sumOf(const std::vector<double>& lines) const {
-  constexpr auto WIDTH = static_cast<std::size_t>(SIDE_BY_SIDE);
+std::vector<double> OrderBasis::sumOf(const std::vector<double>& lines) const {
+  constexpr auto WIDTH = static_cast<std::size_t>(LANES);
   std::vector<double> values(samples_);
   for (std::size_t g = 0; g < cosine_.size(); ++g) {
     Lanes sum = Lanes::Constant(lines[0]), cosine = Lanes::Ones(), sine = Lanes::Zero();

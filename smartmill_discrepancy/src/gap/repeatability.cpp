@@ -10,15 +10,15 @@
 namespace smartmill::discrepancy {
 namespace {
 
-constexpr int MOST_STEPS = 30;   // of conjugate gradients: the columns are nearly orthogonal
-constexpr double CLOSE = 1e-10;  // of the first gradient's squares
-constexpr double HIGHEST = 0.9;  // of half the sample rate, up to which orders count
+constexpr int MAX_STEPS = 30;        // of conjugate gradients: the columns are nearly orthogonal
+constexpr double TOLERANCE = 1e-10;  // of the squares of the first gradient
+constexpr double HIGHEST = 0.9;      // of the Nyquist frequency
 
-double turnedOver(const std::vector<double>& angle) {
-  double turned = 0.0;
+double revolutionsIn(const std::vector<double>& angle) {
+  double rotated = 0.0;
   for (std::size_t i = 1; i < angle.size(); ++i)
-    turned += std::remainder(angle[i] - angle[i - 1], units::TWO_PI);
-  return std::abs(turned) / units::TWO_PI;
+    rotated += std::remainder(angle[i] - angle[i - 1], units::TWO_PI);
+  return std::abs(rotated) / units::TWO_PI;
 }
 
 double dot(const std::vector<double>& a, const std::vector<double>& b) {
@@ -27,34 +27,36 @@ double dot(const std::vector<double>& a, const std::vector<double>& b) {
   return sum;
 }
 
-// Squares that the orders leave: conjugate gradients on the normal equations (Hestenes & Stiefel 1952, CGLS).
-// @param lines receives level and orders
-double squaresLeft(const Orders& orders, std::size_t count, std::vector<double> left,
-                   std::vector<double>* lines) {
-  std::vector<double> s = orders.along(left, count), p = s;
+// Squares of the residual of the orders: conjugate gradients on the normal equations (Hestenes & Stiefel
+// 1952, CGLS).
+// @param lines receives mean and orders
+double residualSquares(const OrderBasis& orders, std::size_t count, std::vector<double> residual,
+                       std::vector<double>* lines) {
+  std::vector<double> s = orders.along(residual, count), p = s;
   double gamma = dot(s, s);
   const double first = gamma;
   lines->assign(s.size(), 0.0);
-  for (int step = 0; step < MOST_STEPS && gamma > CLOSE * first; ++step) {
+  for (int step = 0; step < MAX_STEPS && gamma > TOLERANCE * first; ++step) {
     const std::vector<double> q = orders.sumOf(p);
     const double alpha = gamma / dot(q, q);
-    for (std::size_t i = 0; i < left.size(); ++i) left[i] -= alpha * q[i];
+    for (std::size_t i = 0; i < residual.size(); ++i) residual[i] -= alpha * q[i];
     for (std::size_t i = 0; i < p.size(); ++i) (*lines)[i] += alpha * p[i];
-    s = orders.along(left, count);
+    s = orders.along(residual, count);
     const double next = dot(s, s);
     for (std::size_t i = 0; i < p.size(); ++i) p[i] = s[i] + next / gamma * p[i];
     gamma = next;
   }
-  return dot(left, left);
+  return dot(residual, residual);
 }
 
 }  // namespace
 
 std::optional<Repeatability> repeatability(const std::vector<double>& values,
                                            const std::vector<double>& angle) {
-  const double turns = turnedOver(angle), samples = static_cast<double>(values.size());
-  if (values.size() != angle.size() || turns < LEAST_TURNS) return {};
-  const auto orders = static_cast<std::size_t>(std::max(1.0, std::floor(HIGHEST * 0.5 * samples / turns)));
+  const double revolutions = revolutionsIn(angle), samples = static_cast<double>(values.size());
+  if (values.size() != angle.size() || revolutions < LEAST_REVOLUTIONS) return {};
+  const auto orders =
+      static_cast<std::size_t>(std::max(1.0, std::floor(HIGHEST * 0.5 * samples / revolutions)));
   const double level = mean(values);
   std::vector<double> about = values;
   for (double& v : about) v -= level;
@@ -62,9 +64,17 @@ std::optional<Repeatability> repeatability(const std::vector<double>& values,
   result.samples = values.size();
   result.variance = dot(about, about) / samples;
   const double free = samples - 2.0 * static_cast<double>(orders) - 1.0;
-  result.floor = std::sqrt(squaresLeft(Orders(angle), orders, std::move(about), &result.lines) / free);
+  result.floor =
+      std::sqrt(residualSquares(OrderBasis(angle), orders, std::move(about), &result.lines) / free);
   result.lines[0] += level;
   return result;
+}
+
+std::optional<Repeatability> steadyRepeatability(const TestData& test, const std::vector<double>& values) {
+  if (!test.record.has("spindle_angle")) return {};
+  const auto from = static_cast<std::ptrdiff_t>(test.steadyBegin());
+  const std::vector<double>& angle = test.record.column("spindle_angle");
+  return repeatability({values.begin() + from, values.end()}, {angle.begin() + from, angle.end()});
 }
 
 }  // namespace smartmill::discrepancy

@@ -23,7 +23,7 @@ constexpr std::size_t ORDERS = 36;
 constexpr std::size_t HALF_ORDERS = 4;  // 0.5, 1.5, ..
 constexpr std::size_t PADDED = 1 << 16;
 
-// Squares that a sine of these phases takes from the values, and its amplitude.
+// Reduction of squares by a sine with free phase, and its amplitudes.
 struct Line {
   double squares = 0.0, sine = 0.0, cosine = 0.0;
 };
@@ -49,7 +49,8 @@ struct LineSums {
   }
 };
 
-// Lines at orders of the spindle, each by itself. What of them does not depend on the values is summed once.
+// Lines at orders of the spindle, each fitted separately. Sums that do not depend on the values are computed
+// once.
 class SpindleLines {
  public:
   explicit SpindleLines(const std::vector<double>& angle) : whole_(angle), half_(halved(angle)) {
@@ -92,13 +93,13 @@ class SpindleLines {
     return lines;
   }
 
-  Orders whole_, half_;
+  OrderBasis whole_, half_;
   std::array<LineSums, ORDERS> wholes_;
   std::array<LineSums, HALF_ORDERS> halves_;
 };
 
-// The part of a block in which one kind of thing goes on: the cut of a cut, all of the rest.
-struct Stretch {
+// Part of a span with one condition: the time in cut of a cut, otherwise all samples.
+struct ChannelSegment {
   const TestData* test;
   double noise;
   std::vector<double> values;
@@ -130,17 +131,17 @@ void subtract(std::vector<double>& values, const Phase& phase, const Line& line)
     values[i] -= line.sine * std::sin(phase(i)) + line.cosine * std::cos(phase(i));
 }
 
-enum class Kind { level, trend, settling, order, frequency };
+enum class ComponentKind { level, trend, decay, order, frequency };
 
-struct Candidate {
-  Kind kind = Kind::level;
-  double place = 0.0;    // order or Hz
-  double squares = 0.0;  // over all stretches
+struct Component {
+  ComponentKind kind = ComponentKind::level;
+  double location_value = 0.0;  // order or Hz
+  double squares = 0.0;         // over all segments
   std::size_t freedom = 0;
-  double looks = 1.0;  // independent places looked at
+  double trials = 1.0;  // independent locations tried
 };
 
-double excess(const Candidate& c) {
+double excess(const Component& c) {
   return (c.squares - static_cast<double>(c.freedom)) /
          std::sqrt(2.0 * static_cast<double>(std::max<std::size_t>(c.freedom, 1)));
 }
@@ -149,7 +150,7 @@ double meanOf(const std::vector<double>& v) {
   return std::accumulate(v.begin(), v.end(), 0.0) / static_cast<double>(v.size());
 }
 
-// Slope per sample about the middle, and squares that it takes.
+// Slope per sample about the middle, and reduction of squares.
 std::pair<double, double> trendOf(const std::vector<double>& v) {
   const double n = static_cast<double>(v.size()), middle = 0.5 * (n - 1.0);
   double xy = 0.0;
@@ -158,14 +159,14 @@ std::pair<double, double> trendOf(const std::vector<double>& v) {
   return {xy / xx, xy * xy / xx};
 }
 
-// Of something that settles from the record's start on, place: its time constant [s].
-double settled(double time_constant, const Stretch& s, std::size_t i) {
+// Exponential decay from the start of the record. @param time_constant [s]
+double decayAt(double time_constant, const ChannelSegment& s, std::size_t i) {
   return std::exp(-static_cast<double>(i) / (s.rate * time_constant));
 }
 
-// Size of it and squares that it takes.
-std::pair<double, double> settlingOf(double time_constant, const Stretch& s) {
-  const double share = settled(time_constant, s, 1);  // from one sample to the next
+// Its size and reduction of squares.
+std::pair<double, double> decayFit(double time_constant, const ChannelSegment& s) {
+  const double share = decayAt(time_constant, s, 1);  // from one sample to the next
   double xy = 0.0, xx = 0.0, shape = 1.0;
   for (const double value : s.values) {
     xy += shape * value;
@@ -175,7 +176,7 @@ std::pair<double, double> settlingOf(double time_constant, const Stretch& s) {
   return {xy / xx, xy * xy / xx};
 }
 
-void countOrders(const Stretch& s, std::vector<Candidate>& halves, std::vector<Candidate>& orders) {
+void countOrders(const ChannelSegment& s, std::vector<Component>& halves, std::vector<Component>& orders) {
   const std::array<Line, ORDERS> lines = s.lines->wholes(s.values);
   const std::array<Line, HALF_ORDERS> between = s.lines->halves(s.values);
   for (std::size_t k = 0; k < HALF_ORDERS; ++k) {
@@ -183,23 +184,23 @@ void countOrders(const Stretch& s, std::vector<Candidate>& halves, std::vector<C
     halves[k].freedom += 2;
   }
   for (std::size_t k = 0; k < ORDERS; ++k) {
-    Candidate& o = orders[k];
-    if (o.place * s.test->test.spindle_speed / units::TWO_PI > 0.45 * s.rate) continue;
+    Component& o = orders[k];
+    if (o.location_value * s.test->test.spindle_speed / units::TWO_PI > 0.45 * s.rate) continue;
     o.squares += lines[k].squares;
     o.freedom += 2;
   }
 }
 
-// The strongest line at a fixed frequency over all stretches of the highest rate; no freedom: there is none.
-Candidate strongestFrequency(const std::vector<Stretch>& stretches) {
+// The strongest line at a fixed frequency over all segments with the highest rate; freedom 0: none.
+Component strongestFrequency(const std::vector<ChannelSegment>& segments) {
   double rate = 0.0;
   std::size_t longest = 0, used = 0;
-  for (const Stretch& s : stretches) {
+  for (const ChannelSegment& s : segments) {
     rate = std::max(rate, s.rate);
     longest = std::max(longest, s.values.size());
   }
   std::vector<double> sum(PADDED / 2 + 1, 0.0);
-  for (const Stretch& s : stretches) {
+  for (const ChannelSegment& s : segments) {
     if (s.rate != rate || s.values.size() > PADDED) continue;
     std::vector<double> padded(s.values);
     const double m = meanOf(padded);
@@ -211,139 +212,142 @@ Candidate strongestFrequency(const std::vector<Stretch>& stretches) {
     ++used;
   }
   if (used == 0) return {};
-  // Below one cycle a record a line is a trend.
+  // A line below one cycle per record is a trend.
   const auto first = static_cast<std::size_t>(PADDED / longest + 1);
   const auto top = static_cast<std::size_t>(
       std::max_element(sum.begin() + static_cast<std::ptrdiff_t>(first), sum.end() - 1) - sum.begin());
-  double place = static_cast<double>(top);
+  double location_value = static_cast<double>(top);
   const double a = sum[top - 1], b = sum[top], c = sum[top + 1];
-  if (2.0 * b - a - c > 0.0) place += 0.5 * (c - a) / (2.0 * b - a - c);
-  return {Kind::frequency, place * rate / PADDED, sum[top], 2 * used, 0.5 * static_cast<double>(longest)};
+  if (2.0 * b - a - c > 0.0) location_value += 0.5 * (c - a) / (2.0 * b - a - c);
+  return {ComponentKind::frequency, location_value * rate / PADDED, sum[top], 2 * used,
+          0.5 * static_cast<double>(longest)};
 }
 
-std::vector<Candidate> candidatesOf(const std::vector<Stretch>& stretches) {
-  Candidate level{Kind::level, 0.0, 0.0, 0, 1.0}, trend{Kind::trend, 0.0, 0.0, 0, 1.0};
-  std::vector<Candidate> orders, halves, settling;
+std::vector<Component> componentsOf(const std::vector<ChannelSegment>& segments) {
+  Component level{ComponentKind::level, 0.0, 0.0, 0, 1.0}, trend{ComponentKind::trend, 0.0, 0.0, 0, 1.0};
+  std::vector<Component> orders, halves, decay;
   for (std::size_t k = 0; k < HALF_ORDERS; ++k)
-    halves.push_back({Kind::order, static_cast<double>(k) + 0.5, 0.0, 0, 1.0});
-  for (const double t : {0.02, 0.035, 0.06, 0.1}) settling.push_back({Kind::settling, t, 0.0, 0, 2.0});
+    halves.push_back({ComponentKind::order, static_cast<double>(k) + 0.5, 0.0, 0, 1.0});
+  for (const double t : {0.02, 0.035, 0.06, 0.1}) decay.push_back({ComponentKind::decay, t, 0.0, 0, 2.0});
   for (std::size_t k = 1; k <= ORDERS; ++k)
-    orders.push_back({Kind::order, static_cast<double>(k), 0.0, 0, 1.0});
-  for (const Stretch& s : stretches) {
+    orders.push_back({ComponentKind::order, static_cast<double>(k), 0.0, 0, 1.0});
+  for (const ChannelSegment& s : segments) {
     const double n = static_cast<double>(s.values.size()), m = meanOf(s.values);
     level.squares += n * m * m;
     ++level.freedom;
     trend.squares += trendOf(s.values).second;
     ++trend.freedom;
-    for (Candidate& c : settling) {
-      c.squares += settlingOf(c.place, s).second;
+    for (Component& c : decay) {
+      c.squares += decayFit(c.location_value, s).second;
       ++c.freedom;
     }
     if (!s.angle.empty()) countOrders(s, halves, orders);
   }
-  std::vector<Candidate> all{level, trend};
-  all.insert(all.end(), settling.begin(), settling.end());
+  std::vector<Component> all{level, trend};
+  all.insert(all.end(), decay.begin(), decay.end());
   all.insert(all.end(), halves.begin(), halves.end());
   all.insert(all.end(), orders.begin(), orders.end());
-  const Candidate frequency = strongestFrequency(stretches);
+  const Component frequency = strongestFrequency(segments);
   if (frequency.freedom > 0) all.push_back(frequency);
   return all;
 }
 
-// What a candidate was in one stretch.
-struct Taken {
+// A component of one segment.
+struct RemovedPart {
   double amplitude = 0.0, squares = 0.0, std_dev = 1.0;
 };
 
-// Takes a candidate's part out of a stretch; nothing where it cannot be there.
-std::optional<Taken> takeAway(const Candidate& c, Stretch& s) {
+// Removes a component from a segment; nothing if the segment cannot contain it.
+std::optional<RemovedPart> removeFrom(const Component& c, ChannelSegment& s) {
   const double n = static_cast<double>(s.values.size());
-  if (c.kind == Kind::level) {
+  if (c.kind == ComponentKind::level) {
     const double mean = meanOf(s.values);
     for (double& v : s.values) v -= mean;
-    return Taken{mean, n * mean * mean, 1.0 / std::sqrt(n)};
+    return RemovedPart{mean, n * mean * mean, 1.0 / std::sqrt(n)};
   }
-  if (c.kind == Kind::trend) {
+  if (c.kind == ComponentKind::trend) {
     const auto [slope, squares] = trendOf(s.values);
     for (std::size_t i = 0; i < s.values.size(); ++i)
       s.values[i] -= slope * (static_cast<double>(i) - 0.5 * (n - 1.0));
-    return Taken{slope * s.rate, squares, s.rate * std::sqrt(12.0 / (n * n * n))};
+    return RemovedPart{slope * s.rate, squares, s.rate * std::sqrt(12.0 / (n * n * n))};
   }
-  if (c.kind == Kind::settling) {
-    const auto [size, squares] = settlingOf(c.place, s);
-    for (std::size_t i = 0; i < s.values.size(); ++i) s.values[i] -= size * settled(c.place, s, i);
-    return Taken{size, squares, std::sqrt(2.0 / (s.rate * c.place))};
+  if (c.kind == ComponentKind::decay) {
+    const auto [size, squares] = decayFit(c.location_value, s);
+    for (std::size_t i = 0; i < s.values.size(); ++i) s.values[i] -= size * decayAt(c.location_value, s, i);
+    return RemovedPart{size, squares, std::sqrt(2.0 / (s.rate * c.location_value))};
   }
-  if (c.kind == Kind::order && s.angle.empty()) return {};
+  if (c.kind == ComponentKind::order && s.angle.empty()) return {};
   const auto phase = [&](std::size_t i) {
-    return c.kind == Kind::order ? c.place * s.angle[i]
-                                 : units::TWO_PI * c.place * static_cast<double>(i) / s.rate;
+    return c.kind == ComponentKind::order
+               ? c.location_value * s.angle[i]
+               : units::TWO_PI * c.location_value * static_cast<double>(i) / s.rate;
   };
   const Line line = lineOf(s.values, phase);
   subtract(s.values, phase, line);
-  return Taken{std::hypot(line.sine, line.cosine), line.squares, std::sqrt(2.0 / n)};
+  return RemovedPart{std::hypot(line.sine, line.cosine), line.squares, std::sqrt(2.0 / n)};
 }
 
 // Domain and location as reports name them.
-Finding named(const Candidate& c, const std::string& channel) {
+Finding named(const Component& c, const std::string& channel) {
   Finding f;
   f.channel = channel;
   switch (c.kind) {
-    case Kind::level:
+    case ComponentKind::level:
       f.domain = "level";
       break;
-    case Kind::trend:
+    case ComponentKind::trend:
       f.domain = "time";
       f.location["time_s"] = 0.0;
       break;
-    case Kind::settling:
+    case ComponentKind::decay:
       f.domain = "time";
-      f.location["time_s"] = c.place;
+      f.location["time_s"] = c.location_value;
       break;
-    case Kind::order:
+    case ComponentKind::order:
       f.domain = "order";
-      f.location["order"] = c.place;
+      f.location["order"] = c.location_value;
       break;
-    case Kind::frequency:
+    case ComponentKind::frequency:
       f.domain = "frequency";
-      f.location["frequency_hz"] = c.place;
+      f.location["frequency_hz"] = c.location_value;
   }
   f.squares = c.squares;
   return f;
 }
 
-// Takes a candidate out of every stretch and tells of it.
-Finding take(const Candidate& c, const std::string& channel, std::vector<Stretch>& stretches) {
+// Removes a component from every segment. @return its finding
+Finding removeComponent(const Component& c, const std::string& channel,
+                        std::vector<ChannelSegment>& segments) {
   Finding f = named(c, channel);
-  std::vector<Shown> shown;
-  for (Stretch& s : stretches) {
-    const std::optional<Taken> taken = takeAway(c, s);
-    if (!taken) continue;
-    shown.push_back({s.test, taken->amplitude, taken->std_dev});
-    if (chiSquareTail(taken->squares, 2) < 1e-4) f.tests.push_back(s.test->test.name);
-    f.amplitude = std::max(f.amplitude, std::abs(taken->amplitude) * s.noise);
+  std::vector<TestAmplitude> amplitudes;
+  for (ChannelSegment& s : segments) {
+    const std::optional<RemovedPart> removed = removeFrom(c, s);
+    if (!removed) continue;
+    amplitudes.push_back({s.test, removed->amplitude, removed->std_dev});
+    if (chiSquareTail(removed->squares, 2) < 1e-4) f.tests.push_back(s.test->test.name);
+    f.amplitude = std::max(f.amplitude, std::abs(removed->amplitude) * s.noise);
   }
-  f.depends_on = dependence(shown);
+  f.depends_on = dependentConditions(amplitudes);
   return f;
 }
 
-// One channel of a campaign, to be taken apart.
+// One channel of a campaign.
 struct Channel {
-  std::vector<Stretch> stretches;
+  std::vector<ChannelSegment> segments;
   double samples = 0.0;
-  double floor = 0.0;  // squares by which two faithful twins may differ
+  double floor = 0.0;  // squares by which two accurate simulations may differ
 };
 
 Channel channelOf(const TwinRunner& runner, const std::vector<double>& residual, const std::string& name,
                   double twin_accuracy) {
   constexpr std::size_t LEAST_SAMPLES = 32;
   Channel channel;
-  for (const Block& block : runner.blocks()) {
-    if (block.channel != name || block.slow || !block.judged) continue;
+  for (const ChannelSpan& block : runner.spans()) {
+    if (block.channel != name || block.slow || !block.in_gap) continue;
     const TestData& test = runner.data().tests[block.test];
     const std::size_t from = test.test.kind == TestKind::cut ? test.first_cut : 0;
     if (block.size < from + LEAST_SAMPLES) continue;
-    Stretch s{&test, block.noise, {}, {}, test.test.sample_rate, {}};
+    ChannelSegment s{&test, block.noise, {}, {}, test.test.sample_rate, {}};
     s.values.assign(residual.begin() + static_cast<std::ptrdiff_t>(block.offset + from),
                     residual.begin() + static_cast<std::ptrdiff_t>(block.offset + block.size));
     if (test.test.kind != TestKind::tap && test.record.has("spindle_angle"))
@@ -351,30 +355,30 @@ Channel channelOf(const TwinRunner& runner, const std::vector<double>& residual,
     if (!s.angle.empty()) s.lines.emplace(s.angle);
     channel.samples += static_cast<double>(s.values.size());
     for (std::size_t i = block.offset; i < block.offset + block.size; ++i) {
-      const double trust = twin_accuracy * runner.measured()[i];
-      channel.floor += trust * trust;
+      const double accuracy = twin_accuracy * runner.measured()[i];
+      channel.floor += accuracy * accuracy;
     }
-    channel.stretches.push_back(std::move(s));
+    channel.segments.push_back(std::move(s));
   }
   return channel;
 }
 
-// Takes a channel apart. Returns the p-values of the last looks, which found nothing.
-std::vector<double> takeApart(const std::string& name, Channel channel, const StructureOptions& options,
+// Decomposes a channel. @return p-values of the last trials, which found nothing
+std::vector<double> decompose(const std::string& name, Channel channel, const StructureOptions& options,
                               double all_excess, std::vector<Finding>& found) {
   for (int step = 0; step < options.most; ++step) {
-    const std::vector<Candidate> all = candidatesOf(channel.stretches);
+    const std::vector<Component> all = componentsOf(channel.segments);
     std::vector<double> p_values;
-    const Candidate* best = nullptr;
-    for (const Candidate& c : all) {
+    const Component* best = nullptr;
+    for (const Component& c : all) {
       p_values.push_back(
-          std::min(1.0, c.freedom ? c.looks * chiSquareTail(c.squares, c.freedom + c.freedom % 2) : 1.0));
+          std::min(1.0, c.freedom ? c.trials * chiSquareTail(c.squares, c.freedom + c.freedom % 2) : 1.0));
       if (c.freedom > 0 && (!best || excess(c) > excess(*best))) best = &c;
     }
     const double p = p_values[static_cast<std::size_t>(best - all.data())];
-    if (p > options.p_value || best->squares < options.least_share * channel.samples + channel.floor)
+    if (p > options.p_value || best->squares < options.min_share * channel.samples + channel.floor)
       return p_values;
-    Finding f = take(*best, name, channel.stretches);
+    Finding f = removeComponent(*best, name, channel.segments);
     f.p_value = p;
     f.share_of_gap = (best->squares - static_cast<double>(best->freedom)) / all_excess;
     found.push_back(std::move(f));
@@ -382,13 +386,13 @@ std::vector<double> takeApart(const std::string& name, Channel channel, const St
   return {};
 }
 
-// Corrects the p-values for all looks and keeps what stands, the largest first.
-void keepSignificant(const std::vector<double>& looks, const StructureOptions& options,
+// Corrects the p-values for all trials and keeps the significant findings, the largest first.
+void keepSignificant(const std::vector<double>& null_p_values, const StructureOptions& options,
                      std::vector<Finding>& found) {
-  std::vector<double> p_values = looks;
+  std::vector<double> p_values = null_p_values;
   for (const Finding& f : found) p_values.push_back(f.p_value);
   const std::vector<double> rates = falseDiscoveryRates(p_values);
-  for (std::size_t k = 0; k < found.size(); ++k) found[k].p_value = rates[looks.size() + k];
+  for (std::size_t k = 0; k < found.size(); ++k) found[k].p_value = rates[null_p_values.size() + k];
   found.erase(std::remove_if(found.begin(), found.end(),
                              [&](const Finding& f) { return f.p_value > options.p_value; }),
               found.end());
@@ -398,18 +402,18 @@ void keepSignificant(const std::vector<double>& looks, const StructureOptions& o
   if (found.size() > most) found.resize(most);
 }
 
-// A channel that was read now and then: whether its level stands where the model says, in all tests together.
-void lookAtMeans(const TwinRunner& runner, const std::vector<double>& residual, const std::string& name,
-                 const StructureOptions& options, double all_excess, std::vector<Finding>& found,
-                 std::vector<double>& looks) {
+// Level of a channel of slow means, over all tests.
+void checkSlowMeans(const TwinRunner& runner, const std::vector<double>& residual, const std::string& name,
+                    const StructureOptions& options, double all_excess, std::vector<Finding>& found,
+                    std::vector<double>& null_p_values) {
   Finding f;
   f.channel = name;
   f.domain = "level";
-  std::vector<Shown> shown;
+  std::vector<TestAmplitude> amplitudes;
   std::size_t count = 0;
   double floor = 0.0;
-  for (const Block& b : runner.blocks()) {
-    if (b.channel != name || !b.slow || !b.judged) continue;
+  for (const ChannelSpan& b : runner.spans()) {
+    if (b.channel != name || !b.slow || !b.in_gap) continue;
     const TestData& test = runner.data().tests[b.test];
     double sum = 0.0, squares = 0.0;
     for (std::size_t i = b.offset; i < b.offset + b.size; ++i) {
@@ -418,7 +422,7 @@ void lookAtMeans(const TwinRunner& runner, const std::vector<double>& residual, 
       floor += std::pow(options.twin_accuracy * runner.measured()[i], 2);
     }
     const auto n = static_cast<double>(b.size);
-    shown.push_back({&test, sum / n, 1.0 / std::sqrt(n)});
+    amplitudes.push_back({&test, sum / n, 1.0 / std::sqrt(n)});
     if (chiSquareTail(squares, b.size + b.size % 2) < 1e-4) f.tests.push_back(test.test.name);
     f.amplitude = std::max(f.amplitude, std::abs(sum / n) * b.noise);
     f.squares += squares;
@@ -427,11 +431,11 @@ void lookAtMeans(const TwinRunner& runner, const std::vector<double>& residual, 
   if (count == 0) return;
   f.p_value = chiSquareTail(f.squares, count + count % 2);
   if (f.p_value > options.p_value || f.squares < 2.0 * static_cast<double>(count) + floor) {
-    looks.push_back(f.p_value);
+    null_p_values.push_back(f.p_value);
     return;
   }
   f.share_of_gap = (f.squares - static_cast<double>(count)) / all_excess;
-  f.depends_on = dependence(shown);
+  f.depends_on = dependentConditions(amplitudes);
   found.push_back(std::move(f));
 }
 
@@ -446,28 +450,28 @@ std::vector<Finding> findStructure(const TwinRunner& runner, const std::vector<d
     all_excess = std::max(squares - static_cast<double>(residual.size()), 1.0);
   }
   std::set<std::string> channels;
-  for (const Block& b : runner.blocks()) channels.insert(b.channel);
-  struct Looked {
+  for (const ChannelSpan& b : runner.spans()) channels.insert(b.channel);
+  struct ChannelFindings {
     std::vector<Finding> found;
-    std::vector<double> looks;  // p-values of those that found nothing, for the control of false discovery
+    std::vector<double> null_p_values;  // p-values of trials without finding, for the false discovery rate
   };
   const std::vector<std::string> names(channels.begin(), channels.end());
-  std::vector<Looked> looked(names.size());
+  std::vector<ChannelFindings> of_channels(names.size());
   runParallel(names.size(), runner.threads(), [&](std::size_t k) {
-    Looked& of = looked[k];
+    ChannelFindings& of = of_channels[k];
     Channel channel = channelOf(runner, residual, names[k], options.twin_accuracy);
-    lookAtMeans(runner, residual, names[k], options, all_excess, of.found, of.looks);
-    if (channel.stretches.empty()) return;
-    const std::vector<double> last = takeApart(names[k], std::move(channel), options, all_excess, of.found);
-    of.looks.insert(of.looks.end(), last.begin(), last.end());
+    checkSlowMeans(runner, residual, names[k], options, all_excess, of.found, of.null_p_values);
+    if (channel.segments.empty()) return;
+    const std::vector<double> last = decompose(names[k], std::move(channel), options, all_excess, of.found);
+    of.null_p_values.insert(of.null_p_values.end(), last.begin(), last.end());
   });
   std::vector<Finding> found;
-  std::vector<double> looks;
-  for (const Looked& of : looked) {
+  std::vector<double> null_p_values;
+  for (const ChannelFindings& of : of_channels) {
     found.insert(found.end(), of.found.begin(), of.found.end());
-    looks.insert(looks.end(), of.looks.begin(), of.looks.end());
+    null_p_values.insert(null_p_values.end(), of.null_p_values.begin(), of.null_p_values.end());
   }
-  keepSignificant(looks, options, found);
+  keepSignificant(null_p_values, options, found);
   return found;
 }
 

@@ -6,8 +6,7 @@
 namespace smartmill::discrepancy {
 namespace {
 
-// Of lags up to the order; shrunk by the samples that are missing at the ends, which keeps every predictor
-// stable.
+// For lags up to the order, with the biased normalisation that keeps every predictor stable.
 std::vector<double> autocovariance(const double* values, std::size_t size, std::size_t order) {
   std::vector<double> lags(order + 1, 0.0);
   for (std::size_t lag = 0; lag <= order; ++lag) {
@@ -17,9 +16,9 @@ std::vector<double> autocovariance(const double* values, std::size_t size, std::
   return lags;
 }
 
-// Predictor of one order more. @param variance of what is not told, made that of the new one
-std::vector<double> longer(const std::vector<double>& weights, const std::vector<double>& lags,
-                           double* variance) {
+// Levinson-Durbin step to the next order. @param variance of the prediction error, updated
+std::vector<double> nextPredictor(const std::vector<double>& weights, const std::vector<double>& lags,
+                                  double* variance) {
   const std::size_t m = weights.size() + 1;
   double reflection = lags[m];
   for (std::size_t k = 0; k + 1 < m; ++k) reflection -= weights[k] * lags[m - 1 - k];
@@ -33,37 +32,38 @@ std::vector<double> longer(const std::vector<double>& weights, const std::vector
 
 }  // namespace
 
-Whitening::Whitening(const double* left, std::size_t size) {
-  constexpr std::size_t SAMPLES_OF_ORDER = 16;  // at least, so that a few values are given a level at most
-  const std::size_t most = std::min(MOST, size / SAMPLES_OF_ORDER);
-  const std::vector<double> lags = autocovariance(left, size, most);
+Whitening::Whitening(const double* residual, std::size_t size) {
+  constexpr std::size_t SAMPLES_OF_ORDER = 16;  // minimum, so that a few values get at most a variance
+  const std::size_t max_order = std::min(MAX_ORDER, size / SAMPLES_OF_ORDER);
+  const std::vector<double> lags = autocovariance(residual, size, max_order);
   const auto n = static_cast<double>(size);
   if (size == 0 || !std::isfinite(lags[0]) || lags[0] <= 0.0) return;
-  std::vector<Step> steps;
-  Step step;
+  std::vector<Predictor> predictors;
+  Predictor predictor;
   double variance = lags[0], best = n * variance;  // -2 ln likelihood of white noise as stated
-  for (std::size_t order = 0; order <= most; ++order) {
-    if (order > 0) step.weights = longer(step.weights, lags, &variance);
+  for (std::size_t order = 0; order <= max_order; ++order) {
+    if (order > 0) predictor.weights = nextPredictor(predictor.weights, lags, &variance);
     if (!(variance > 0.0)) break;
-    step.rms = std::sqrt(std::max(variance, 1.0));
-    steps.push_back(step);
-    const double level = step.rms * step.rms;
+    predictor.rms = std::sqrt(std::max(variance, 1.0));
+    predictors.push_back(predictor);
+    const double level = predictor.rms * predictor.rms;
     const double bic =
         n * std::log(level) + n * variance / level + static_cast<double>(order + 1) * std::log(n);
     if (bic >= best) continue;
     best = bic;
-    steps_ = steps;
+    predictors_ = predictors;
   }
 }
 
 void Whitening::apply(double* values, std::size_t size) const {
-  if (!changes()) return;
-  // From the end on, so that the samples before are still what they were.
+  if (!isActive()) return;
+  // Backwards, since earlier samples must be unfiltered.
   for (std::size_t i = size; i-- > 0;) {
-    const Step& step = steps_[std::min(i, order())];
-    double told = 0.0;
-    for (std::size_t k = 0; k < step.weights.size(); ++k) told += step.weights[k] * values[i - 1 - k];
-    values[i] = (values[i] - told) / step.rms;
+    const Predictor& predictor = predictors_[std::min(i, order())];
+    double predicted = 0.0;
+    for (std::size_t k = 0; k < predictor.weights.size(); ++k)
+      predicted += predictor.weights[k] * values[i - 1 - k];
+    values[i] = (values[i] - predicted) / predictor.rms;
   }
 }
 

@@ -43,11 +43,11 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
   const EffectScope scope = scopeOf(data);
   std::vector<Hypothesis> all;
   for (const EffectKind& kind : effectCatalogue()) {
-    const std::optional<std::string> lacking = lackingFor(kind, scope);
-    if (!lacking) {
+    const std::optional<std::string> missing = lackingFor(kind, scope);
+    if (!missing) {
       for (Hypothesis& form : formsOf(kind, scope)) all.push_back(std::move(form));
-    } else if (!lacking->empty() && notes) {
-      notes->push_back(kind.name + " is not tried: " + *lacking);
+    } else if (!missing->empty() && notes) {
+      notes->push_back(kind.name + " is not tested: " + *missing);
     }
   }
   return all;

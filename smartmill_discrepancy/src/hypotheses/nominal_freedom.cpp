@@ -29,7 +29,7 @@ NominalFreedom::NominalFreedom(const MachineModel& nominal) {
   if (nominal.tool && nominal.cutting) addToothPath();
 }
 
-// From the rule of the surface, which other programs follow, to what the teeth of a machine leave.
+// From the surface rule of formats.md to the true tooth path.
 void NominalFreedom::addToothPath() {
   constexpr double STD = 0.5, LEAST = -0.5, MOST = 1.5, STEP = 0.02;
   coordinates_.push_back({PATH_SHARE, 0.0, LEAST, MOST, STEP, STD});
@@ -44,9 +44,9 @@ void NominalFreedom::addToothPath() {
 }
 
 void NominalFreedom::add(std::string name, double value, double percent, Scale scale) {
-  // Not far enough to hide an effect that a value could stand for.
+  // Too narrow to hide an effect that the value could replace.
   constexpr double REACH = 4.5;
-  constexpr double STEP = 2e-3;  // of tangents, standard deviations
+  constexpr double STEP = 2e-3;  // of numerical derivatives, in standard deviations
   if (value == 0.0 || !std::isfinite(value) || percent <= 0.0) return;
   const double std_dev = 0.01 * percent;
   coordinates_.push_back({std::move(name), 0.0, -REACH * std_dev, REACH * std_dev, STEP * std_dev, std_dev});
@@ -122,9 +122,9 @@ std::optional<std::size_t> NominalFreedom::pathShare() const {
   return {};
 }
 
-bool NominalFreedom::tellsPath(double share, double std_dev) {
-  constexpr double TOLD = 3.0;
-  return std::abs(share) >= TOLD * std_dev;
+bool NominalFreedom::isPathShareSignificant(double share, double std_dev) {
+  constexpr double MIN_DEVIATIONS = 3.0;
+  return std::abs(share) >= MIN_DEVIATIONS * std_dev;
 }
 
 void NominalFreedom::writeStdDevs(MachineModel& model, const std::vector<double>& std_devs) const {
@@ -138,7 +138,7 @@ void NominalFreedom::writeStdDevs(MachineModel& model, const std::vector<double>
     const auto path = std::find_if(model.effects.begin(), model.effects.end(), isToothPath);
     if (coordinates_[i].name != PATH_SHARE || path == model.effects.end()) continue;
     path->std_devs["share"] = std_devs[i];
-    if (!tellsPath(path->numbers["share"], std_devs[i])) model.effects.erase(path);
+    if (!isPathShareSignificant(path->numbers["share"], std_devs[i])) model.effects.erase(path);
   }
   if (model.cutting) model.cutting_std = stds;
 }

@@ -12,20 +12,21 @@
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
 #include "smartmill_discrepancy/data/chatter.h"
+#include "smartmill_discrepancy/data/dataset.h"
 #include "smartmill_sim/twin/twin.h"
 
 namespace smartmill::discrepancy {
 namespace {
 
-constexpr double LEAST_RUNNING = 0.1;      // [s] before a stretch, within which the twin settles
-constexpr double EDGE_SETTLING = 0.6;      // [s] that vibrations near the stability limit take to die out
-constexpr std::size_t LEAST_READINGS = 5;  // of the load meter
+constexpr double MIN_RUNNING = 0.1;     // [s] before a segment, in which the twin reaches the steady state
+constexpr double LIMIT_SETTLING = 0.6;  // [s] decay time of vibrations near the stability limit
+constexpr std::size_t MIN_MEASUREMENTS = 5;  // of the load meter
 
-// RMS difference from one revolution to the next [N], the larger of fx and fy.
-double unsettled(const Record& record, const CampaignTest& test) {
-  const double turn = units::TWO_PI / test.spindle_speed * test.sample_rate;  // [samples]
-  const auto whole = static_cast<std::size_t>(turn) + 1;
-  const double share = static_cast<double>(whole) - turn;
+// RMS difference between consecutive revolutions [N], the larger of fx and fy.
+double revolutionDifference(const Record& record, const CampaignTest& test) {
+  const double revolution = units::TWO_PI / test.spindle_speed * test.sample_rate;  // [samples]
+  const auto whole = static_cast<std::size_t>(revolution) + 1;
+  const double share = static_cast<double>(whole) - revolution;
   double largest = 0.0;
   for (const char* channel : {"fx", "fy"}) {
     const std::vector<double>& x = record.column(channel);
@@ -45,59 +46,57 @@ std::string chatterText(const Chatter& chatter) {
   return formatted("chatters at %.0f Hz with %.0f N", chatter.frequency, chatter.amplitude);
 }
 
-void addLoad(const Spindle& spindle, const Stretch& stretch, const Record& simulated,
+void addLoad(const Spindle& spindle, const RecordSegment& segment, const Record& simulated,
              const LiveGapOptions& options, LiveGap& result) {
   const std::vector<double>& v = simulated.column("load_meter");
   const double level = mean(v), ripple = standardDeviation(v), scale = *spindle.load_meter_full_scale;
   const double half_step = 0.5 * (options.load_step * scale + spindle.load_meter_resolution);
   double squares = 0.0;
-  for (const LoadReading& r : stretch.load) squares += std::pow(r.load * scale - level, 2);
+  for (const LoadMeasurement& r : segment.load) squares += std::pow(r.load * scale - level, 2);
   result.channels.push_back("load_meter");
-  result.gap.push_back(std::sqrt(squares / static_cast<double>(stretch.load.size()) /
+  result.gap.push_back(std::sqrt(squares / static_cast<double>(segment.load.size()) /
                                  (half_step * half_step + ripple * ripple)));
 }
 
 }  // namespace
 
-LiveGap liveGap(const MachineModel& model, const Stretch& stretch, const LiveGapOptions& options) {
+LiveGap liveGap(const MachineModel& model, const RecordSegment& segment, const LiveGapOptions& options) {
   if (!model.force_sensor.noise_rms)
-    throw Error(model.file + ": force_sensor.noise_rms_n is missing (needed to measure a gap)");
+    throw Error(model.file + ": force_sensor.noise_rms_n: not found, expected for the gap");
   LiveGap result;
-  result.stamp = stretch.stamp;
-  result.condition = stretch.test.name;
-  if (const auto chatter = findChatter(stretch.record, stretch.test, 0)) {
-    result.aside = chatterText(*chatter);
+  result.stamp = segment.stamp;
+  result.condition = segment.test.name;
+  if (const auto chatter = findChatter(segment.record, segment.test, 0)) {
+    result.exclusion = chatterText(*chatter);
     return result;
   }
   const bool with_load =
-      model.spindle && model.spindle->load_meter_full_scale && stretch.load.size() >= LEAST_READINGS;
-  Record shown = stretch.record;
-  if (with_load) shown.add("load_meter").assign(shown.size(), 0.0);
+      model.spindle && model.spindle->load_meter_full_scale && segment.load.size() >= MIN_MEASUREMENTS;
+  Record with_channels = segment.record;
+  if (with_load) with_channels.add("load_meter").assign(with_channels.size(), 0.0);
   sim::SimulationOptions twin;
   twin.noise = false;
-  Record simulated = sim::simulateTest(model, stretch.test, shown, twin);
+  Record simulated = sim::simulateTest(model, segment.test, with_channels, twin);
   const Axes3& noise = *model.force_sensor.noise_rms;
-  const bool vibrates = !model.tool_tip.x.modes.empty() || !model.tool_tip.y.modes.empty();
-  if (stretch.test.kind == TestKind::cut && vibrates &&
-      unsettled(simulated, stretch.test) > std::min(noise[0], noise[1])) {
-    // A tool that is about to chatter.
-    result.at_the_edge = true;
-    if (stretch.test.running_before.value_or(0.0) < EDGE_SETTLING) {
-      result.aside = "is near its stability limit and has not settled yet";
+  if (segment.test.kind == TestKind::cut && hasToolModes(model) &&
+      revolutionDifference(simulated, segment.test) > std::min(noise[0], noise[1])) {
+    result.near_limit = true;
+    if (segment.test.running_before.value_or(0.0) < LIMIT_SETTLING) {
+      result.exclusion = "is near its stability limit and not yet steady";
       return result;
     }
   }
   const std::size_t from =
-      stretch.test.running_before.value_or(0.0) >= LEAST_RUNNING ? 0 : stretch.record.size() / 2;
+      segment.test.running_before.value_or(0.0) >= MIN_RUNNING ? 0 : segment.record.size() / 2;
   std::size_t axis = 0;
   for (const char* channel : {"fx", "fy", "fz"}) {
-    const auto &m = stretch.record.column(channel), &s = simulated.column(channel);
+    const auto &m = segment.record.column(channel), &s = simulated.column(channel);
     double squares = 0.0;
     for (std::size_t i = from; i < m.size(); ++i) squares += (m[i] - s[i]) * (m[i] - s[i]);
     result.channels.push_back(channel);
     result.gap.push_back(std::sqrt(squares / static_cast<double>(m.size() - from)) / noise[axis++]);
   }
-  if (with_load) addLoad(*model.spindle, stretch, simulated, options, result);
+  if (with_load) addLoad(*model.spindle, segment, simulated, options, result);
   result.model_fits =
       std::all_of(result.gap.begin(), result.gap.end(), [&](double gap) { return gap <= options.limit; });
   result.simulated = std::move(simulated);
@@ -106,17 +105,17 @@ LiveGap liveGap(const MachineModel& model, const Stretch& stretch, const LiveGap
 
 namespace {
 
-// The readings of a stretch on an even grid from the first to the last of them: polling is not quite even.
-Record readingsOf(const Stretch& stretch, double full_scale) {
+// Load meter values on an even grid from the first to the last, since polling is not quite even.
+Record resampledLoad(const RecordSegment& segment, double full_scale) {
   Record record;
   std::vector<double> load;
-  const std::vector<LoadReading>& read = stretch.load;
+  const std::vector<LoadMeasurement>& read = segment.load;
   const double step = (read.back().time - read.front().time) / static_cast<double>(read.size() - 1);
   std::size_t k = 0;
   for (std::size_t i = 0; i < read.size(); ++i) {
     const double t = read.front().time + static_cast<double>(i) * step;
     while (k + 2 < read.size() && read[k + 1].time <= t) ++k;
-    // The nearer of two: what was told is not mixed.
+    // The nearer of two: values are not interpolated.
     const bool later = t - read[k].time > read[k + 1].time - t;
     record.time.push_back(t);
     load.push_back(full_scale * read[later ? k + 1 : k].load);
@@ -125,22 +124,22 @@ Record readingsOf(const Stretch& stretch, double full_scale) {
   return record;
 }
 
-void recordLoad(const MachineModel& model, const Stretch& stretch, const std::string& name,
+void recordLoad(const MachineModel& model, const RecordSegment& segment, const std::string& name,
                 const std::string& folder, std::vector<SlowChannel>* slow) {
-  const bool told = model.spindle && model.spindle->load_meter_full_scale;
-  if (!told || stretch.load.size() < LEAST_READINGS) return;
-  const Record readings = readingsOf(stretch, *model.spindle->load_meter_full_scale);
-  const double lasts = readings.time.back() - readings.time.front();
+  const bool has_full_scale = model.spindle && model.spindle->load_meter_full_scale;
+  if (!has_full_scale || segment.load.size() < MIN_MEASUREMENTS) return;
+  const Record load_record = resampledLoad(segment, *model.spindle->load_meter_full_scale);
+  const double lasts = load_record.time.back() - load_record.time.front();
   if (!(lasts > 0.0)) return;
   SlowChannel channel{name, "load_meter", name + "_load.csv",
-                      static_cast<double>(readings.size() - 1) / lasts};
-  writeCsv(readings, folder + "/" + channel.file);
+                      static_cast<double>(load_record.size() - 1) / lasts};
+  writeCsv(load_record, folder + "/" + channel.file);
   slow->push_back(std::move(channel));
 }
 
 }  // namespace
 
-void recordStretch(const MachineModel& model, const Stretch& stretch, const std::string& folder) {
+void recordSegment(const MachineModel& model, const RecordSegment& segment, const std::string& folder) {
   std::error_code failed;
   std::filesystem::create_directories(folder, failed);
   if (failed) throw Error(folder + ": " + failed.message());
@@ -154,21 +153,21 @@ void recordStretch(const MachineModel& model, const Stretch& stretch, const std:
     writeMachineModel(model, folder + "/model.yaml");
   }
   campaign.folder = folder;
-  CampaignTest test = stretch.test;
-  const auto taken = [&](const std::string& name) {
+  CampaignTest test = segment.test;
+  const auto is_used = [&](const std::string& name) {
     return std::any_of(campaign.tests.begin(), campaign.tests.end(),
                        [&](const CampaignTest& t) { return t.name == name; });
   };
-  // A name may hold what no file's name may.
+  // A condition's name may contain characters that a file name may not.
   for (char& c : test.name) {
     if (!std::isalnum(static_cast<unsigned char>(c)) && c != '_' && c != '-') c = '_';
   }
   const std::string name = test.name;
-  for (int k = 2; taken(test.name); ++k) test.name = name + "_" + std::to_string(k);
+  for (int k = 2; is_used(test.name); ++k) test.name = name + "_" + std::to_string(k);
   test.file = test.name + ".csv";
-  writeCsv(stretch.record, folder + "/" + test.file);
+  writeCsv(segment.record, folder + "/" + test.file);
   campaign.tests.push_back(test);
-  recordLoad(model, stretch, test.name, folder, &slow);
+  recordLoad(model, segment, test.name, folder, &slow);
   writeCampaign(campaign, slow, folder);
 }
 

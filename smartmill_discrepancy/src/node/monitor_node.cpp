@@ -18,7 +18,7 @@ constexpr double INPUT_TIMEOUT = 1.0;  // [s]
 
 MonitorParameters read(const ros::NodeHandle& private_nh) {
   MonitorParameters parameters = parametersFromServer(private_nh).readAll<MonitorParameters>();
-  if (parameters.model.empty()) throw Error("model: the path of a smartmill-model/1 file is due");
+  if (parameters.model.empty()) throw Error("model: expected the path of a smartmill-model/1 file");
   return parameters;
 }
 
@@ -28,18 +28,18 @@ MonitorNode::MonitorNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
     : parameters_(read(private_nh)),
       model_(readMachineModel(parameters_.model)),
       shell_(nh, private_nh, "none", INPUT_TIMEOUT),
-      stretches_(parameters_.stretch, parameters_.hold_back,
-                 [this](const Stretch& stretch) { judge(stretch); }),
+      segments_(parameters_.segment, parameters_.hold_back,
+                [this](const RecordSegment& segment) { evaluate(segment); }),
       state_(nh.advertise<smartmill_msgs::DiscrepancyState>(names::DISCREPANCY_STATE, 100)),
       force_(nh.advertise<smartmill_msgs::ForceBlock>(names::TWIN_FORCE, 100)),
       install_(nh.advertiseService(names::INSTALL_MODEL, &MonitorNode::install, this)) {
-  connect(shell_.inputs(), stretches_);
+  connect(shell_.inputs(), segments_);
   shell_.diagnose("model fits", [this](auto& status) { diagnose(status); });
 }
 
-void MonitorNode::judge(const Stretch& stretch) {
+void MonitorNode::evaluate(const RecordSegment& segment) {
   try {
-    last_ = liveGap(model_, stretch, parameters_.gap);
+    last_ = liveGap(model_, segment, parameters_.gap);
     problem_.clear();
   } catch (const Error& error) {
     problem_ = error.what();
@@ -52,46 +52,46 @@ void MonitorNode::judge(const Stretch& stretch) {
   message.gap = last_.gap;
   message.model_fits = last_.model_fits;
   state_.publish(message);
-  publishForce(stretch);
+  publishForce(segment);
   shell_.tell();
-  const bool wanted = !last_.model_fits || (parameters_.record_all && last_.aside.empty());
-  if (wanted && !last_.at_the_edge) record(stretch);
+  const bool keep = !last_.model_fits || (parameters_.record_all && last_.exclusion.empty());
+  if (keep && !last_.near_limit) record(segment);
 }
 
-// Late by the stretch and its simulation, with the stamps of what was measured.
-void MonitorNode::publishForce(const Stretch& stretch) {
+// Published with the stamps of the measurement, delayed by segment length and simulation.
+void MonitorNode::publishForce(const RecordSegment& segment) {
   const Record& simulated = last_.simulated;
   if (simulated.size() == 0) return;
   ForceBlock block;
-  block.sample_rate = stretch.test.sample_rate;
-  block.stamp = stretch.stamp - static_cast<double>(simulated.size()) / block.sample_rate;
+  block.sample_rate = segment.test.sample_rate;
+  block.stamp = segment.stamp - static_cast<double>(simulated.size()) / block.sample_rate;
   block.first_index = simulated_;
   block.force = {simulated.column("fx"), simulated.column("fy"), simulated.column("fz")};
   simulated_ += simulated.size();
   force_.publish(toMsg(block, frames::DYNAMOMETER));
 }
 
-void MonitorNode::record(const Stretch& stretch) {
-  int& of_condition = recorded_of_[stretch.test.name];
+void MonitorNode::record(const RecordSegment& segment) {
+  int& of_condition = recorded_of_[segment.test.name];
   if (parameters_.record_folder.empty() || recorded_ >= parameters_.most_recorded ||
       of_condition >= parameters_.most_per_condition ||
-      *stretch.test.running_before < parameters_.record_after)
+      *segment.test.running_before < parameters_.record_after)
     return;
-  recordStretch(model_, stretch, parameters_.record_folder);
+  recordSegment(model_, segment, parameters_.record_folder);
   ++recorded_;
   ++of_condition;
 }
 
-// Between two stretches: services and streams come in the same thread.
+// Services and streams use the same thread, so the model changes between two segments.
 bool MonitorNode::install(smartmill_msgs::InstallModel::Request& request,
                           smartmill_msgs::InstallModel::Response& response) {
   try {
     MachineModel model = readMachineModel(request.file);
     if (!model.force_sensor.noise_rms)
-      throw Error(request.file + ": force_sensor.noise_rms_n is missing (needed to measure a gap)");
+      throw Error(request.file + ": force_sensor.noise_rms_n: not found, expected for the gap");
     model_ = std::move(model);
-    response.message = "the monitor follows " + request.file;
-    ROS_INFO("monitor: model is %s now", request.file.c_str());
+    response.message = "the monitor uses " + request.file;
+    ROS_INFO("monitor: model changed to %s", request.file.c_str());
   } catch (const Error& error) {
     response.code = smartmill_msgs::InstallModel::Response::BAD_MODEL;
     response.message = error.what();
@@ -105,13 +105,13 @@ void MonitorNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) 
     return;
   }
   if (last_.condition.empty()) {
-    status.summary(diagnostic_msgs::DiagnosticStatus::OK, "no steady stretch yet");
+    status.summary(diagnostic_msgs::DiagnosticStatus::OK, "no steady segment yet");
     return;
   }
-  status.add("stretches recorded", recorded_);
-  if (!last_.aside.empty()) {
+  status.add("segments recorded", recorded_);
+  if (!last_.exclusion.empty()) {
     status.summary(diagnostic_msgs::DiagnosticStatus::OK,
-                   "not compared: " + last_.condition + " " + last_.aside);
+                   "not compared: " + last_.condition + " " + last_.exclusion);
     return;
   }
   status.summary(

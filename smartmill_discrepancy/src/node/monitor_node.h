@@ -15,18 +15,17 @@
 
 namespace smartmill::discrepancy {
 
-/// Shell around SegmentPipeline and liveGap(): the twin follows the running machine, discrepancy/state and
-/// discrepancy/force out.
+/// ROS shell around SegmentPipeline and liveGap(): publishes discrepancy/state and discrepancy/force.
 class MonitorNode {
  public:
   using Parameters = MonitorParameters;
-  /// @throws Error on a wrong parameter or model.
+  /// @throws Error on an invalid parameter or model.
   MonitorNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh);
 
  private:
-  void judge(const Stretch& stretch);
-  void publishForce(const Stretch& stretch);
-  void record(const Stretch& stretch);
+  void evaluate(const RecordSegment& segment);
+  void publishForce(const RecordSegment& segment);
+  void record(const RecordSegment& segment);
   bool install(smartmill_msgs::InstallModel::Request& request,
                smartmill_msgs::InstallModel::Response& response);
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
@@ -34,9 +33,9 @@ class MonitorNode {
   MonitorParameters parameters_;
   MachineModel model_;
   NodeShell shell_;
-  SegmentPipeline stretches_;
+  SegmentPipeline segments_;
   LiveGap last_;
-  std::string problem_;  // why the last stretch could not be judged
+  std::string problem_;  // why the last segment could not be evaluated
   int recorded_ = 0;
   std::map<std::string, int> recorded_of_;  // by condition
   std::uint64_t simulated_ = 0;             // samples of the twin published

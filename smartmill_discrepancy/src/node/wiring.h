@@ -2,18 +2,18 @@
 
 #include "smartmill_core/names.h"
 #include "smartmill_core/signal/feed.h"
-#include "smartmill_discrepancy/live/stretch_recorder.h"
+#include "smartmill_discrepancy/live/segment_recorder.h"
 
 namespace smartmill::discrepancy {
 
-/// The streams of a stretch, from a node's inputs or from a bag.
+/// Connects the streams of a segment, from a node's inputs or from a bag.
 template <class Source>
-void connect(Source& source, SegmentPipeline& stretches) {
-  feed<CuttingCondition>(source, names::CUTTING_CONDITION, stretches);
-  feed<CncState>(source, names::CNC_STATE, stretches);
-  feed<SpindleAngle>(source, names::SPINDLE_ANGLE, stretches);
-  feed<SampleBlock>(source, names::DYNAMOMETER, stretches);
-  feed<LoadSample>(source, names::CNC_LOAD, stretches);
+void connect(Source& source, SegmentPipeline& segments) {
+  feed<CuttingCondition>(source, names::CUTTING_CONDITION, segments);
+  feed<CncState>(source, names::CNC_STATE, segments);
+  feed<SpindleAngle>(source, names::SPINDLE_ANGLE, segments);
+  feed<SampleBlock>(source, names::DYNAMOMETER, segments);
+  feed<LoadSample>(source, names::CNC_LOAD, segments);
 }
 
 }  // namespace smartmill::discrepancy

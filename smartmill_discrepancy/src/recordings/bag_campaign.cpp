@@ -15,30 +15,30 @@ Campaign campaignOfBag(const std::string& bag, const std::string& model_file, co
                        const std::function<void(const std::string&)>& progress) {
   const MonitorParameters parameters;
   const MachineModel model = readMachineModel(model_file);
-  std::vector<Stretch> chosen;
-  SegmentPipeline stretches(parameters.stretch, parameters.hold_back, [&](const Stretch& stretch) {
-    const auto same = [&](const Stretch& other) { return other.test.name == stretch.test.name; };
+  std::vector<RecordSegment> chosen;
+  SegmentPipeline segments(parameters.segment, parameters.hold_back, [&](const RecordSegment& segment) {
+    const auto same = [&](const RecordSegment& other) { return other.test.name == segment.test.name; };
     const auto earlier = std::find_if(chosen.begin(), chosen.end(), same);
     if (earlier == chosen.end()) {
-      chosen.push_back(stretch);
+      chosen.push_back(segment);
     } else {
-      *earlier = stretch;
+      *earlier = segment;
     }
   });
   RecordingReader reader(bag);
-  connect(reader, stretches);
+  connect(reader, segments);
   reader.run();
-  stretches.flush();
+  segments.flush();
   bool recorded = false;
-  for (const Stretch& stretch : chosen) {
-    if (model.force_sensor.noise_rms && liveGap(model, stretch, parameters.gap).at_the_edge) {
-      progress(stretch.test.name + ": left out, the model's tool is about to chatter there");
+  for (const RecordSegment& segment : chosen) {
+    if (model.force_sensor.noise_rms && liveGap(model, segment, parameters.gap).near_limit) {
+      progress(segment.test.name + ": omitted, near the stability limit of the model");
       continue;
     }
-    recordStretch(model, stretch, folder);
+    recordSegment(model, segment, folder);
     recorded = true;
   }
-  if (!recorded) throw Error(bag + ": no steady stretch of 0.3 s under a cutting condition");
+  if (!recorded) throw Error(bag + ": expected a steady segment of 0.3 s with a cutting condition");
   return readCampaign(folder);
 }
 

@@ -7,10 +7,10 @@
 
 namespace smartmill::discrepancy {
 
-/// Makes a campaign of the steady stretches of a recorded bag, the last of each cutting condition, in a
-/// folder; what the model does not follow because it is about to chatter is left out.
-/// @param progress told what was left out, a line each
-/// @throws Error on a bad bag or one without a steady stretch.
+/// Converts the last steady segment of each cutting condition of a bag into a campaign in a folder. Segments
+/// near the model's stability limit are omitted.
+/// @param progress receives one line per omitted segment
+/// @throws Error on an invalid bag or one without a steady segment.
 Campaign campaignOfBag(const std::string& bag, const std::string& model_file, const std::string& folder,
                        const std::function<void(const std::string&)>& progress);
 

@@ -23,7 +23,7 @@ std::string gapMap(const Explanation& e, bool after) {
     return names.size() - 1;
   };
   std::ostringstream data;
-  for (const BlockGap& g : e.gaps) {
+  for (const TestGap& g : e.gaps) {
     const std::size_t x = index(tests, g.test + (g.heldout ? " (held out)" : "")),
                       y = index(channels, g.channel);
     data << x << " " << y << " " << std::max(after ? g.after : g.before, 0.5) << "\n";
@@ -103,34 +103,34 @@ std::string spectra(const Explanation& e) {
   return out.str();
 }
 
-std::string ladder(const Explanation& e) {
+std::string candidateChart(const Explanation& e) {
   std::ostringstream out;
   out << "$l << EOD\n";
   std::vector<std::string> names;
-  for (const TriedEffect& r : e.ladder) {
+  for (const CandidateResult& r : e.candidates) {
     const std::string name =
         std::to_string(r.round + 1) + ". " + r.effect + (r.variant.empty() ? "" : " " + r.variant);
-    out << names.size() << " " << std::max(r.delta_bic, 1.0) << " " << (r.taken ? 1 : 0) << "\n";
+    out << names.size() << " " << std::max(r.delta_bic, 1.0) << " " << (r.accepted ? 1 : 0) << "\n";
     names.push_back(name);
   }
   out << "EOD\nset logscale x\nset xrange [1:*]\nset yrange [" << names.size()
-      << ":-1]\nset xlabel 'gain of evidence (difference of BIC)'\nset grid x\nset ytics (";
+      << ":-1]\nset xlabel 'BIC gain'\nset grid x\nset ytics (";
   for (std::size_t k = 0; k < names.size(); ++k)
     out << (k ? "," : "") << Gnuplot::quoted(names[k]) << " " << k;
-  out << ")\nset title 'evidence ladder: hypotheses by round, taken ones dark'\n";
+  out << ")\nset title 'candidates by round, accepted ones dark'\n";
   out << "plot $l using (1):1:(1):2:($1-0.35):($1+0.35):($3>0 ? 0x1b9e77 : 0xbbbbbb) with boxxyerror "
          "fillstyle solid lc rgb variable notitle\n";
   return out.str();
 }
 
-std::string remains(const Explanation& e) {
+std::string gapsAfter(const Explanation& e) {
   std::ostringstream out;
   out << "$r << EOD\n";
   for (std::size_t k = 0; k < e.gaps.size(); ++k)
     out << k << " " << e.gaps[k].after << " " << 1.96 * e.gaps[k].std_dev << " "
         << (e.gaps[k].heldout ? 1 : 0) << "\n";
-  out << "EOD\nset grid y\nset ylabel 'gap after'\nset title 'what remains: 1 is the noise floor; bars: 95 % "
-         "by chance'\nset xtics rotate by -75 font ',6' (";
+  out << "EOD\nset grid y\nset ylabel 'gap after'\nset title 'residual: 1 is the noise floor; bars: 95 % "
+         "interval'\nset xtics rotate by -75 font ',6' (";
   for (std::size_t k = 0; k < e.gaps.size(); ++k)
     out << (k ? "," : "") << Gnuplot::quoted(e.gaps[k].test + " " + e.gaps[k].channel) << " " << k;
   out << ")\nplot 1 w l lc 'black' notitle, $r u 1:($4==0?$2:NaN):3 w yerrorbars pt 7 ps 0.5 lc '#1b9e77' t "
@@ -153,8 +153,9 @@ std::vector<std::string> drawPictures(const Explanation& e, const std::string& f
     add("revolution.png", 1200, 350 * static_cast<int>((e.revolutions.size() + 1) / 2), revolutions(e));
   if (!e.spectra.empty())
     add("spectra.png", 1200, 350 * static_cast<int>((e.spectra.size() + 1) / 2), spectra(e));
-  if (!e.ladder.empty()) add("ladder.png", 1000, 120 + 22 * static_cast<int>(e.ladder.size()), ladder(e));
-  add("remains.png", 1300, 500, remains(e));
+  if (!e.candidates.empty())
+    add("candidates.png", 1000, 120 + 22 * static_cast<int>(e.candidates.size()), candidateChart(e));
+  add("residual.png", 1300, 500, gapsAfter(e));
   return names;
 }
 

@@ -36,26 +36,27 @@ void findings(std::ostream& out, const char* title, const std::vector<Finding>& 
 
 const char* sentenceOf(Verdict verdict) {
   static const std::map<Verdict, const char*> SENTENCES{
-      {Verdict::no_disagreement, "Model and records agree to the noise."},
-      {Verdict::explained, "The effects below explain what model and records differ by."},
+      {Verdict::no_disagreement, "Model and records agree within the noise."},
+      {Verdict::explained, "The effects below explain the difference between model and records."},
       {Verdict::partly_explained,
-       "The effects below explain a part; something remains that no effect of the catalogue explains."},
-      {Verdict::unknown_effect, "Model and records differ, and no effect of the catalogue explains it."}};
+       "The effects below explain a part of the difference; the rest is not in the catalogue."},
+      {Verdict::unknown_effect,
+       "Model and records differ, and no effect of the catalogue explains the difference."}};
   return SENTENCES.at(verdict);
 }
 
 const std::map<std::string, std::string> CAPTIONS{
     {"gaps.png", "Gap of every test and channel before and after"},
-    {"revolution.png", "One revolution of the cut that differed most: measured, nominal, improved"},
+    {"revolution.png", "One revolution of the cut with the largest residual: measured, nominal, improved"},
     {"spectra.png",
-     "Spectra of the difference before and after; arrows: lines found (orange) and left (violet)"},
-    {"ladder.png", "Evidence of the hypotheses tried"},
-    {"remains.png", "Gap after, test by test"}};
+     "Spectra of the residual before and after; arrows: lines found (orange) and unexplained (violet)"},
+    {"candidates.png", "BIC gain of the candidates"},
+    {"residual.png", "Gap after, test by test"}};
 
 void verdict(std::ostream& out, const Explanation& e) {
   out << "<p class=\"verdict\"><b>" << nameOf(e.verdict) << "</b>. " << sentenceOf(e.verdict) << "</p>\n";
   if (!e.sentence.empty()) out << "<p><b>" << escapedHtml(e.sentence) << "</b></p>\n";
-  if (e.interrupted) out << "<p>The search was interrupted: this is what was found until then.</p>\n";
+  if (e.interrupted) out << "<p>The search was interrupted: effects found until then.</p>\n";
   out << "<table><tr><th>gap<th>before<th>after</tr><tr><td>fit tests<td>" << number(e.before.fit) << "<td>"
       << number(e.after.fit) << "</tr><tr><td>held-out tests<td>" << number(e.before.heldout) << "<td>"
       << number(e.after.heldout)
@@ -65,8 +66,8 @@ void verdict(std::ostream& out, const Explanation& e) {
 
 void effects(std::ostream& out, const Explanation& e) {
   if (!e.effects.empty()) {
-    out << "<h2>Effects found</h2>\n<table><tr><th>effect<th>parameters<th>evidence lost without it<th>share "
-           "of the held-out gap<th>alternatives (evidence)</tr>\n";
+    out << "<h2>Effects found</h2>\n<table><tr><th>effect<th>parameters<th>BIC gain<th>share "
+           "of the held-out gap<th>alternatives (BIC gain)</tr>\n";
     for (const FoundEffect& f : e.effects) {
       out << "<tr><td><b>" << f.name << "</b><td>";
       for (const auto& [key, word] : f.words) out << key << " " << escapedHtml(word) << "<br>";
@@ -85,22 +86,24 @@ void effects(std::ostream& out, const Explanation& e) {
         << ".</p>\n";
   }
   for (const auto& group : e.not_separable)
-    out << "<p>Not to be told apart on this campaign: " << joined(group) << ".</p>\n";
+    out << "<p>Unidentifiable with this campaign: " << joined(group) << ".</p>\n";
   if (e.suggested_test)
-    out << "<p>A test that would tell them apart: " << escapedHtml(*e.suggested_test) << ".</p>\n";
+    out << "<p>A test that separates them: " << escapedHtml(*e.suggested_test) << ".</p>\n";
 }
 
 void shares(std::ostream& out, const std::vector<ChannelShare>& channels) {
   if (channels.empty()) return;
   out << "<h2>Shares of the variance in all cuts</h2>\n<table><tr><th>channel<th>explained "
          "before<th>explained "
-         "after<th>comes again with the revolution<th>RMS of what does not<th>the same over the noise</tr>\n";
+         "after<th>synchronous with the spindle<th>RMS of the asynchronous part<th>the same over the "
+         "noise</tr>\n";
   const auto percent = [](double share) { return number(100.0 * share, "%.2f %%"); };
   for (const ChannelShare& c : channels) {
     out << "<tr><td>" << c.channel << "<td>" << percent(c.explained_before) << "<td>"
         << percent(c.explained_after);
-    if (c.repeats)
-      out << "<td>" << percent(*c.repeats) << "<td>" << number(c.floor) << "<td>" << number(c.floor_gap);
+    if (c.synchronous_share)
+      out << "<td>" << percent(*c.synchronous_share) << "<td>" << number(c.floor) << "<td>"
+          << number(c.floor_gap);
     out << "</tr>\n";
   }
   out << "</table>\n";
@@ -108,10 +111,9 @@ void shares(std::ostream& out, const std::vector<ChannelShare>& channels) {
 
 void chattering(std::ostream& out, const std::vector<ChatteringCut>& cuts) {
   if (cuts.empty()) return;
-  out << "<h2>Cuts that chatter</h2>\n<p>Predicted from one step to the next, never as the model runs "
-         "freely; "
-         "no part of the gaps.</p>\n<table><tr><th>test<th>frequency [Hz]<th>amplitude [N]<th>left by the "
-         "prediction before<th>after</tr>\n";
+  out << "<h2>Cuts that chatter</h2>\n<p>Compared by one-step prediction, not by free simulation; "
+         "not part of the gaps.</p>\n<table><tr><th>test<th>frequency [Hz]<th>amplitude [N]<th>prediction "
+         "error before<th>after</tr>\n";
   for (const ChatteringCut& c : cuts) {
     out << "<tr><td>" << escapedHtml(c.test) << "<td>" << number(c.frequency) << "<td>" << number(c.amplitude)
         << "<td>" << number(100.0 * c.before, "%.1f %%") << "<td>" << number(100.0 * c.after, "%.1f %%")
@@ -127,14 +129,14 @@ void images(ReportPage& page, const std::vector<std::string>& pictures, const st
   }
 }
 
-void ladder(std::ostream& out, const std::vector<TriedEffect>& tried) {
+void candidates(std::ostream& out, const std::vector<CandidateResult>& tried) {
   if (tried.empty()) return;
-  out << "<h2>Candidates fitted</h2>\n<table><tr><th>round<th>effect<th>evidence promised by its "
-         "tangents<th>evidence gained<th>tests simulated<th>seconds</tr>\n";
-  for (const TriedEffect& t : tried) {
-    out << "<tr><td>" << t.round + 1 << "<td>" << (t.taken ? "<b>" : "") << t.effect
-        << (t.variant.empty() ? "" : " (" + t.variant + ")") << (t.taken ? "</b>" : "") << "<td>"
-        << number(t.promised) << "<td>" << number(t.delta_bic) << "<td>" << t.simulations << "<td>"
+  out << "<h2>Candidates fitted</h2>\n<table><tr><th>round<th>effect<th>predicted "
+         "gain<th>BIC gain<th>tests simulated<th>seconds</tr>\n";
+  for (const CandidateResult& t : tried) {
+    out << "<tr><td>" << t.round + 1 << "<td>" << (t.accepted ? "<b>" : "") << t.effect
+        << (t.variant.empty() ? "" : " (" + t.variant + ")") << (t.accepted ? "</b>" : "") << "<td>"
+        << number(t.predicted_gain) << "<td>" << number(t.delta_bic) << "<td>" << t.simulations << "<td>"
         << number(t.seconds, "%.1f") << "</tr>\n";
   }
   out << "</table>\n";
@@ -158,9 +160,9 @@ void writeHtml(const Explanation& e, const std::string& campaign, const std::vec
   shares(out, e.channels);
   chattering(out, e.chattering);
   images(page, pictures, folder);
-  findings(out, "What remains unexplained", e.unexplained);
-  findings(out, "Where the nominal model differs", e.where);
-  ladder(out, e.ladder);
+  findings(out, "Unexplained residual", e.unexplained);
+  findings(out, "Disagreement of the nominal model", e.where);
+  candidates(out, e.candidates);
   notes(out, e.notes);
   out << "<p>" << number(e.seconds, "%.0f") << " s.</p>\n";
   page.write(folder + "/report.html");

@@ -43,8 +43,8 @@ Json sharesOf(const std::vector<ChannelShare>& channels) {
     Json share = {{"channel", c.channel},
                   {"explained_before", rounded(c.explained_before)},
                   {"explained_after", rounded(c.explained_after)}};
-    if (c.repeats) {
-      share["repeats"] = rounded(*c.repeats);
+    if (c.synchronous_share) {
+      share["repeats"] = rounded(*c.synchronous_share);
       share["floor"] = rounded(c.floor);
       share["floor_gap"] = rounded(c.floor_gap);
     }
@@ -53,7 +53,7 @@ Json sharesOf(const std::vector<ChannelShare>& channels) {
   return list;
 }
 
-// In the keys of a campaign's tests.
+// With the keys of a campaign's tests.
 Json cutOf(const CampaignTest& test) {
   Json cut = {{"kind", test.engagement ? "cut" : "air"},
               {"spindle_speed_rpm", rounded(units::rpmFromRadPerSec(test.spindle_speed))}};
@@ -113,7 +113,7 @@ void writeReport(const Explanation& e, const std::string& folder) {
                                           {"heldout", rounded(e.named_only->heldout)}};
   if (!e.sentence.empty()) report["sentence"] = e.sentence;
   report["gaps"] = Json::array();
-  for (const BlockGap& g : e.gaps) {
+  for (const TestGap& g : e.gaps) {
     report["gaps"].push_back(
         {{"test", g.test},
          {"channel", g.channel},
@@ -125,7 +125,7 @@ void writeReport(const Explanation& e, const std::string& folder) {
   report["channels"] = sharesOf(e.channels);
   for (const ChannelShare& c : e.channels) {
     if (c.explained_heldout) report["explained_share"][c.channel] = rounded(*c.explained_heldout);
-    if (c.repeats) report["repeatability_floor"][c.channel] = rounded(c.floor);
+    if (c.synchronous_share) report["repeatability_floor"][c.channel] = rounded(c.floor);
   }
   for (const ChatteringCut& c : e.chattering) {
     report["chattering"].push_back(
@@ -135,13 +135,13 @@ void writeReport(const Explanation& e, const std::string& folder) {
          {"prediction_error", {{"before", rounded(c.before)}, {"after", rounded(c.after)}}}});
   }
   report["candidates"] = Json::array();
-  for (const TriedEffect& t : e.ladder) {
+  for (const CandidateResult& t : e.candidates) {
     report["candidates"].push_back({{"round", t.round + 1},
                                     {"name", t.effect},
                                     {"variant", t.variant},
-                                    {"promised", rounded(t.promised)},
+                                    {"promised", rounded(t.predicted_gain)},
                                     {"delta_bic", rounded(t.delta_bic)},
-                                    {"taken", t.taken},
+                                    {"taken", t.accepted},
                                     {"simulations", t.simulations},
                                     {"seconds", rounded(t.seconds)}});
   }

@@ -26,11 +26,11 @@ std::string summaryOf(const Explanation& e) {
   for (const ChannelShare& c : e.channels) {
     lines += formatted("%s: %.2f -> %.2f %% of the variance explained", c.channel.c_str(),
                        100.0 * c.explained_before, 100.0 * c.explained_after);
-    lines += c.repeats ? formatted(", %.2f %% come again with the revolution (all but a gap of %.3f)\n",
-                                   100.0 * *c.repeats, c.floor_gap)
-                       : std::string("\n");
+    lines += c.synchronous_share ? formatted(", %.2f %% synchronous with the spindle (floor: gap %.3f)\n",
+                                             100.0 * *c.synchronous_share, c.floor_gap)
+                                 : std::string("\n");
   }
-  if (e.interrupted) lines += "interrupted: this is what was found until then\n";
+  if (e.interrupted) lines += "interrupted: effects found until then\n";
   return lines;
 }
 

@@ -10,7 +10,7 @@ namespace {
 // Squares by channel.
 std::map<std::string, double> squaresOf(const TwinRunner& runner, const std::vector<double>& values) {
   std::map<std::string, double> squares;
-  for (const Block& b : runner.blocks()) {
+  for (const ChannelSpan& b : runner.spans()) {
     double& sum = squares[b.channel];
     for (std::size_t i = b.offset; i < b.offset + b.size; ++i) sum += values[i] * values[i];
   }
@@ -19,9 +19,10 @@ std::map<std::string, double> squaresOf(const TwinRunner& runner, const std::vec
 
 }  // namespace
 
-double leastGain(const TwinRunner& runner, const Fit& less, const Fit& more, const SearchOptions& options) {
+double requiredGain(const TwinRunner& runner, const FitResult& less, const FitResult& more,
+                    const SearchOptions& options) {
   constexpr double SHARE = 0.05;  // of the gain, for a channel to count
-  if (!less.converged || !more.converged) return options.least_gain;
+  if (!less.converged || !more.converged) return options.min_gain;
   const auto before = squaresOf(runner, less.residual), after = squaresOf(runner, more.residual),
              signal = squaresOf(runner, runner.measured());
   double floor = 0.0;
@@ -29,16 +30,18 @@ double leastGain(const TwinRunner& runner, const Fit& less, const Fit& more, con
     if (before.at(channel) - after.at(channel) > SHARE * (less.chi2 - more.chi2))
       floor += squares * options.twin_accuracy * options.twin_accuracy;
   }
-  return std::max(options.least_gain, floor);
+  return std::max(options.min_gain, floor);
 }
 
-bool relieves(const Fit& less, const Fit& more, const SearchOptions& options) {
-  return less.bic - more.bic > options.least_prior_gain &&
-         less.penalty - more.penalty > 4.0 * options.least_prior_gain;
+bool reducesPriorTension(const FitResult& less, const FitResult& more, const SearchOptions& options) {
+  return less.bic - more.bic > options.min_prior_gain &&
+         less.penalty - more.penalty > 4.0 * options.min_prior_gain;
 }
 
-bool tells(const TwinRunner& runner, const Fit& less, const Fit& more, const SearchOptions& options) {
-  return less.bic - more.bic > leastGain(runner, less, more, options) || relieves(less, more, options);
+bool isSignificant(const TwinRunner& runner, const FitResult& less, const FitResult& more,
+                   const SearchOptions& options) {
+  return less.bic - more.bic > requiredGain(runner, less, more, options) ||
+         reducesPriorTension(less, more, options);
 }
 
 }  // namespace smartmill::discrepancy

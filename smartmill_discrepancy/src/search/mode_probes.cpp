@@ -15,7 +15,7 @@ namespace {
 
 const std::array<std::string, 2> TIP{{"tool_x", "tool_y"}};
 
-constexpr std::size_t POINTS = 360;  // a turn
+constexpr std::size_t POINTS = 360;  // per revolution
 
 bool actsBehindSensor(const std::string& effect) {
   const EffectKind* kind = findEffect(effect);
@@ -32,7 +32,7 @@ ModalModel oneMode(double frequency, double damping_ratio, double gain) {
   return m;
 }
 
-// Filters side by side: each waits for its own last step only.
+// Independent filters, interleaved for throughput.
 class Filters {
  public:
   Filters(const std::vector<double>& frequencies, double damping_ratio, double rate) {
@@ -42,11 +42,11 @@ class Filters {
   Filters(const ModalModel& all, std::size_t count, double rate)
       : filters_(count, ModalFilter(all, rate, Hold::first_order)) {}
 
-  /// The same input for all of them.
+  /// The same input for all filters.
   void step(double input, double* output) {
     for (std::size_t k = 0; k < filters_.size(); ++k) output[k] = filters_[k].step(input);
   }
-  /// To each its own, in its place.
+  /// One input per filter, replaced by its output.
   void step(double* values) {
     for (std::size_t k = 0; k < filters_.size(); ++k) values[k] = filters_[k].step(values[k]);
   }
@@ -57,8 +57,8 @@ class Filters {
 
 }  // namespace
 
-// Of the tip in one test: rows of samples, a value a frequency.
-struct ModeProbes::Displaced {
+// Tip displacement of one test: one row per sample, one value per frequency.
+struct ModeProbes::TipDisplacement {
   std::size_t count = 0;
   std::vector<double> at;
 
@@ -111,39 +111,39 @@ std::vector<ModeProbes::Stiffness> ModeProbes::cuttingStiffness(const MachineMod
   return table;
 }
 
-template <class Put>
-void ModeProbes::forEachIn(const Block& block, const Put& put) const {
+template <class Function>
+void ModeProbes::forEachSampleIn(const ChannelSpan& block, const Function& function) const {
   const auto begin = static_cast<Eigen::Index>(block.offset);
   auto next = std::lower_bound(samples_.begin(), samples_.end(), begin);
   for (; next != samples_.end() && *next < begin + static_cast<Eigen::Index>(block.size); ++next)
-    put(static_cast<std::size_t>(*next - begin), next - samples_.begin());
+    function(static_cast<std::size_t>(*next - begin), next - samples_.begin());
 }
 
 Eigen::MatrixXd ModeProbes::sensorModes(std::size_t axis, const std::vector<double>& frequencies,
                                         double damping_ratio) const {
   const auto count = static_cast<Eigen::Index>(frequencies.size());
   Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(samples_.size()), count);
-  Eigen::RowVectorXd shown(count);
-  for (const Block& b : runner_.blocks()) {
+  Eigen::RowVectorXd response(count);
+  for (const ChannelSpan& b : runner_.spans()) {
     if (b.channel != FORCES[axis]) continue;
     Filters filters(frequencies, damping_ratio, runner_.data().tests[b.test].test.sample_rate);
     std::size_t at = 0;
-    forEachIn(b, [&](std::size_t i, Eigen::Index row) {
-      for (; at <= i; ++at) filters.step(applied_[b.offset + at], shown.data());
-      columns.row(row) = shown.array() - applied_[b.offset + i];
+    forEachSampleIn(b, [&](std::size_t i, Eigen::Index row) {
+      for (; at <= i; ++at) filters.step(applied_[b.offset + at], response.data());
+      columns.row(row) = response.array() - applied_[b.offset + i];
     });
   }
   return columns;
 }
 
-// Blocks first..end are those of one test. Empty where nothing tells of the tip.
-ModeProbes::Displaced ModeProbes::displaced(std::size_t first, std::size_t end, std::size_t axis,
-                                            const std::vector<double>& frequencies,
-                                            double damping_ratio) const {
-  const std::vector<Block>& blocks = runner_.blocks();
+// Spans first..end are those of one test. Empty if the test has no force on the tip.
+ModeProbes::TipDisplacement ModeProbes::tipDisplacement(std::size_t first, std::size_t end, std::size_t axis,
+                                                        const std::vector<double>& frequencies,
+                                                        double damping_ratio) const {
+  const std::vector<ChannelSpan>& blocks = runner_.spans();
   const TestData& data = runner_.data().tests[blocks[first].test];
   Filters tip(frequencies, damping_ratio, data.test.sample_rate);
-  Displaced result{frequencies.size(), {}};
+  TipDisplacement result{frequencies.size(), {}};
   const auto push = [&](double force) {
     result.at.resize(result.at.size() + result.count);
     tip.step(force, result.at.data() + result.at.size() - result.count);
@@ -159,10 +159,10 @@ ModeProbes::Displaced ModeProbes::displaced(std::size_t first, std::size_t end, 
   return result;
 }
 
-// Forces of the chips that the tip's displacement and that of the tooth before make.
-void ModeProbes::addRegeneration(std::size_t first, std::size_t end, std::size_t axis, const Displaced& tip,
-                                 Eigen::MatrixXd* columns) const {
-  const std::vector<Block>& blocks = runner_.blocks();
+// Forces of the chip thickness between the current displacement and that one tooth period earlier.
+void ModeProbes::addRegeneration(std::size_t first, std::size_t end, std::size_t axis,
+                                 const TipDisplacement& tip, Eigen::MatrixXd* columns) const {
+  const std::vector<ChannelSpan>& blocks = runner_.spans();
   const TestData& data = runner_.data().tests[blocks[first].test];
   const double rate = data.test.sample_rate;
   const std::vector<Stiffness>& table = stiffness_.at(blocks[first].test);
@@ -187,7 +187,7 @@ void ModeProbes::addRegeneration(std::size_t first, std::size_t end, std::size_t
       sensor.step(force.data());
     };
     std::size_t at = 0;
-    forEachIn(blocks[b], [&](std::size_t i, Eigen::Index row) {
+    forEachSampleIn(blocks[b], [&](std::size_t i, Eigen::Index row) {
       for (; at <= i; ++at) step(at);
       columns->row(row) = force / blocks[b].noise;
     });
@@ -198,14 +198,14 @@ Eigen::MatrixXd ModeProbes::tipModes(std::size_t axis, const std::vector<double>
                                      double damping_ratio) const {
   const auto count = static_cast<Eigen::Index>(frequencies.size());
   Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(samples_.size()), count);
-  const std::vector<Block>& blocks = runner_.blocks();
+  const std::vector<ChannelSpan>& blocks = runner_.spans();
   for (std::size_t first = 0, end = 0; first < blocks.size(); first = end) {
     while (end < blocks.size() && blocks[end].test == blocks[first].test) ++end;
-    const Displaced tip = displaced(first, end, axis, frequencies, damping_ratio);
+    const TipDisplacement tip = tipDisplacement(first, end, axis, frequencies, damping_ratio);
     if (tip.at.empty()) continue;
     for (std::size_t b = first; b < end; ++b) {
       if (blocks[b].channel != TIP[axis]) continue;
-      forEachIn(blocks[b], [&](std::size_t i, Eigen::Index row) {
+      forEachSampleIn(blocks[b], [&](std::size_t i, Eigen::Index row) {
         columns.row(row) = Eigen::Map<const Eigen::RowVectorXd>(tip.row(i), count) / blocks[b].noise;
       });
     }

@@ -12,10 +12,10 @@ namespace smartmill::discrepancy {
 namespace {
 
 constexpr double LEAST_ORDER = 0.2, MOST_ORDER = 60.0;
-constexpr double BAND = 0.42;        // of the sample rate
-constexpr std::size_t PADDING = 8;   // lines of a spectrum between two that a record tells apart
-constexpr double SPACING = 0.25;     // of what the longest record tells apart
-constexpr double LEAST_TURNS = 3.0;  // of a record that speaks of an order
+constexpr double BAND = 0.42;            // of the sample rate
+constexpr std::size_t PADDING = 8;       // spectral lines per resolution of a record
+constexpr double SPACING = 0.25;         // of the resolution of the longest record
+constexpr double MIN_REVOLUTIONS = 3.0;  // minimum of a record for an order
 
 using Complex = std::complex<double>;
 
@@ -26,23 +26,23 @@ struct Spectrum {
   double samples = 0.0, noise = 0.0;
   std::vector<Complex> lines;
 
-  double turns() const { return samples / rate * speed / units::TWO_PI; }
+  double revolutions() const { return samples / rate * speed / units::TWO_PI; }
   double frequency(double order) const { return order * speed / units::TWO_PI; }
   // Sum of the residual times exp(-i order angle).
   Complex at(double order) const {
     const double step = rate / (samples * static_cast<double>(PADDING)), f = frequency(order);
     const auto line = static_cast<std::size_t>(std::lround(f / step));
-    // The line's middle of the record stands right; the nearest line turns about it.
-    const double beside = f - static_cast<double>(line) * step;
-    return lines.at(line) * std::polar(1.0, -order * start - units::PI * beside * samples / rate);
+    // Phase about the middle of the record; the nearest spectral line rotates about it.
+    const double offset = f - static_cast<double>(line) * step;
+    return lines.at(line) * std::polar(1.0, -order * start - units::PI * offset * samples / rate);
   }
 };
 
 std::vector<Spectrum> spectraOf(const TwinRunner& runner, const std::vector<double>& residual) {
   std::vector<Spectrum> spectra;
-  for (const Block& b : runner.blocks()) {
+  for (const ChannelSpan& b : runner.spans()) {
     const TestData& t = runner.data().tests[b.test];
-    if (!b.judged || b.channel.size() != 2 || b.channel.front() != 'f' || t.test.kind == TestKind::tap)
+    if (!b.in_gap || b.channel.size() != 2 || b.channel.front() != 'f' || t.test.kind == TestKind::tap)
       continue;
     Spectrum s;
     s.axis = static_cast<std::size_t>(b.channel[1] - 'x');
@@ -51,7 +51,7 @@ std::vector<Spectrum> spectraOf(const TwinRunner& runner, const std::vector<doub
     s.start = t.record.column("spindle_angle").front();
     s.samples = static_cast<double>(b.size);
     s.noise = b.noise;
-    if (s.turns() < LEAST_TURNS) continue;
+    if (s.revolutions() < MIN_REVOLUTIONS) continue;
     std::vector<double> padded(residual.begin() + static_cast<std::ptrdiff_t>(b.offset),
                                residual.begin() + static_cast<std::ptrdiff_t>(b.offset + b.size));
     double mean = 0.0;
@@ -64,16 +64,16 @@ std::vector<Spectrum> spectraOf(const TwinRunner& runner, const std::vector<doub
   return spectra;
 }
 
-// Squares that one sine and cosine an axis, the same in all records, would take.
+// Reduction of squares by one sine and cosine per axis, common to all records.
 double gainAt(double order, const std::vector<Spectrum>& spectra, const MachineModel& model) {
   std::array<Complex, 3> product{};
   std::array<double, 3> squares{};
   for (const Spectrum& s : spectra) {
     const double f = s.frequency(order);
-    if (f > BAND * s.rate || order * s.turns() < LEAST_TURNS) continue;
-    const Complex shown = model.force_sensor.axis[s.axis].response(f) / s.noise;
-    product[s.axis] += std::conj(shown) * s.at(order);
-    squares[s.axis] += 0.5 * s.samples * std::norm(shown);
+    if (f > BAND * s.rate || order * s.revolutions() < MIN_REVOLUTIONS) continue;
+    const Complex response = model.force_sensor.axis[s.axis].response(f) / s.noise;
+    product[s.axis] += std::conj(response) * s.at(order);
+    squares[s.axis] += 0.5 * s.samples * std::norm(response);
   }
   double gain = 0.0;
   for (std::size_t a = 0; a < 3; ++a) {
@@ -87,11 +87,11 @@ double gainAt(double order, const std::vector<Spectrum>& spectra, const MachineM
 std::vector<double> bestOrders(const TwinRunner& runner, const MachineModel& model,
                                const std::vector<double>& residual, std::size_t count) {
   const std::vector<Spectrum> spectra = spectraOf(runner, residual);
-  double turns = 0.0;
-  for (const Spectrum& s : spectra) turns = std::max(turns, s.turns());
+  double revolutions = 0.0;
+  for (const Spectrum& s : spectra) revolutions = std::max(revolutions, s.revolutions());
   std::vector<double> orders, gains, best;
-  if (turns <= 0.0) return best;
-  for (double o = LEAST_ORDER; o < MOST_ORDER; o += SPACING / turns) {
+  if (revolutions <= 0.0) return best;
+  for (double o = LEAST_ORDER; o < MOST_ORDER; o += SPACING / revolutions) {
     orders.push_back(o);
     gains.push_back(gainAt(o, spectra, model));
   }
@@ -100,7 +100,7 @@ std::vector<double> bestOrders(const TwinRunner& runner, const MachineModel& mod
     if (*top <= 0.0) break;
     best.push_back(orders[static_cast<std::size_t>(top - gains.begin())]);
     for (std::size_t k = 0; k < gains.size(); ++k) {
-      if (std::abs(orders[k] - best.back()) < 2.0 / turns) gains[k] = 0.0;
+      if (std::abs(orders[k] - best.back()) < 2.0 / revolutions) gains[k] = 0.0;
     }
   }
   return best;

@@ -20,14 +20,14 @@ namespace {
 
 using Eigen::Index;
 
-// Some of the samples of a campaign, with weights that make up for the others: one in four, and all of what
-// has few. Which one of the four is drawn, since at even distances a line would look like another.
-class Thinned {
+// Weighted subset of the samples of a campaign: one of four, chosen at random to avoid aliasing, and all
+// samples of short spans.
+class ThinnedSamples {
  public:
-  explicit Thinned(const TwinRunner& runner) {
+  explicit ThinnedSamples(const TwinRunner& runner) {
     constexpr std::size_t EVERY = 4, FEW = 256;
     std::minstd_rand random(1);
-    for (const Block& b : runner.blocks()) {
+    for (const ChannelSpan& b : runner.spans()) {
       const std::size_t every = b.size < FEW ? 1 : EVERY;
       for (std::size_t i = 0; i + every <= b.size; i += every) {
         rows_.push_back(static_cast<Index>(b.offset + i + (every > 1 ? random() % every : 0)));
@@ -37,11 +37,11 @@ class Thinned {
   }
 
   Eigen::VectorXd of(const Eigen::VectorXd& values) const { return weighted(values(rows_)); }
-  Eigen::MatrixXd of(const BlockColumns& columns) const { return weighted(columns.rows(rows_)); }
-  /// Of columns over these samples alone.
-  Eigen::MatrixXd weighted(Eigen::MatrixXd few) const {
-    few.array().colwise() *= weights().array();
-    return few;
+  Eigen::MatrixXd of(const SparseColumns& columns) const { return weighted(columns.rows(rows_)); }
+  /// Weights columns given at these samples.
+  Eigen::MatrixXd weighted(Eigen::MatrixXd values) const {
+    values.array().colwise() *= weights().array();
+    return values;
   }
   const std::vector<Index>& rows() const { return rows_; }
 
@@ -54,11 +54,11 @@ class Thinned {
   std::vector<double> weights_;
 };
 
-// Orthogonal projection off the nominal tangents (with their priors), off where the records lie, and off the
-// tangents of the members.
+// Orthogonal projection off the derivatives of the nominal values (with their priors), the alignment and the
+// members.
 class Projection {
  public:
-  Projection(const Fitter& fitter, const Fit& now, const NominalTangents& tangents)
+  Projection(const Fitter& fitter, const FitResult& now, const NominalTangents& tangents)
       : freedom_(fitter.freedom().coordinates()),
         nominal_(now.state.nominal),
         tangents_(tangents),
@@ -74,64 +74,65 @@ class Projection {
     pull_ = Eigen::VectorXd::Zero(prior_.size());
     for (std::size_t c = 0; c < freedom_.size(); ++c)
       pull_[static_cast<Index>(c)] = -nominal_[c] * prior_[static_cast<Index>(c)];
-    for (std::size_t k = 0; k < tangents.turns.size(); ++k) {
+    for (std::size_t k = 0; k < tangents.alignment.size(); ++k) {
       const auto at = static_cast<Index>(freedom_.size() + k);
-      if (fitter.turns()[k].freedom.value == &Turn::entry && !now.state.turns.empty())
-        pull_[at] = -now.state.turns[k] * prior_[at];
+      if (fitter.alignment()[k].freedom.value == &RecordAlignment::entry && !now.state.alignment.empty())
+        pull_[at] = -now.state.alignment[k] * prior_[at];
     }
     score_ = stacked(tangents.columns.along(residual_), members_.along(residual_)) + pull_;
-    alone_ = withinBounds(information_, score_);
-    Eigen::VectorXd left = residual_;
-    move(-alone_.by, &left);
-    left_ = std::make_shared<const Eigen::VectorXd>(std::move(left));
-    thinOut();
+    baseline_ = withinBounds(information_, score_);
+    Eigen::VectorXd residual = residual_;
+    move(-baseline_.by, &residual);
+    baseline_residual_ = std::make_shared<const Eigen::VectorXd>(std::move(residual));
+    thinSamples();
   }
 
-  const SimulatedBlocks& base() const { return base_; }
-  const Thinned& thinned() const { return thinned_; }
+  const SimulatedChannels& base() const { return base_; }
+  const ThinnedSamples& thinned() const { return thinned_; }
 
-  // What columns take away when all else moves with them.
-  struct Taken {
+  // Reduction of the cost by columns with all other values free.
+  struct Reduction {
     double gain = 0.0;  // [1] of chi2 and priors
     Eigen::VectorXd amplitudes;
-    double apart = 1.0;  // [1] share of them that nothing else can stand for
+    double independent_share = 1.0;  // [1] share of the columns that the other values cannot replace
     Eigen::VectorXd all_else;
   };
-  Taken taken(const BlockColumns& columns) const {
-    return taken(information_, score_, alone_.by, crossWith(columns), columns.gram(),
-                 columns.along(residual_));
+  Reduction reduction(const SparseColumns& columns) const {
+    return reduction(information_, score_, baseline_.by, crossWith(columns), columns.gram(),
+                     columns.along(residual_));
   }
 
-  // What such a way changes of the simulation, beside the way without the columns.
-  void addChange(const BlockColumns& columns, const Taken& taken, Promise* promise) const {
+  // Change of the simulation with the columns relative to that without them.
+  void addChange(const SparseColumns& columns, const Reduction& reduction, PredictedGain* predicted) const {
     auto change = std::make_shared<Eigen::VectorXd>(Eigen::VectorXd::Zero(residual_.size()));
-    columns.addTo(taken.amplitudes, change.get());
-    move(taken.all_else - alone_.by, change.get());
-    promise->change = std::move(change);
-    promise->left_without = left_;
+    columns.addTo(reduction.amplitudes, change.get());
+    move(reduction.all_else - baseline_.by, change.get());
+    predicted->change = std::move(change);
+    predicted->baseline_residual = baseline_residual_;
     for (std::size_t c = 0; c < freedom_.size(); ++c) {
-      const double by = taken.all_else[static_cast<Index>(c)];
-      const double d = (by - alone_.by[static_cast<Index>(c)]) / freedom_[c].prior_std;
-      promise->stated.squares += d * d;
-      promise->stated.product -= d * (nominal_[c] + by - freedom_[c].null) / freedom_[c].prior_std;
+      const double by = reduction.all_else[static_cast<Index>(c)];
+      const double d = (by - baseline_.by[static_cast<Index>(c)]) / freedom_[c].prior_std;
+      predicted->prior_evidence.squares += d * d;
+      predicted->prior_evidence.product -= d * (nominal_[c] + by - freedom_[c].null) / freedom_[c].prior_std;
     }
   }
 
-  // About the same gain, from thinned columns.
+  // Approximate gain from thinned columns.
   double roughGain(const Eigen::MatrixXd& columns) const {
-    return taken(few_information_, few_score_, few_alone_, few_beside_.transpose() * columns,
-                 columns.transpose() * columns, columns.transpose() * few_residual_)
+    return reduction(thinned_information_, thinned_score_, thinned_baseline_,
+                     thinned_columns_.transpose() * columns, columns.transpose() * columns,
+                     columns.transpose() * thinned_residual_)
         .gain;
   }
 
-  // The same of each column by itself; 0 where it has no trace, no number, or a sign that cannot be.
+  // The same for single columns; 0 if a column is zero or not finite or has an impossible sign.
   Eigen::VectorXd roughGains(const Eigen::MatrixXd& columns, bool positive) const {
-    Eigen::MatrixXd cross = few_beside_.transpose() * columns;
-    for (const Index c : alone_.held) cross.row(c).setZero();
-    const Eigen::MatrixXd solved = linear::solveSymmetric(few_held_information_, cross);
+    Eigen::MatrixXd cross = thinned_columns_.transpose() * columns;
+    for (const Index c : baseline_.at_bounds) cross.row(c).setZero();
+    const Eigen::MatrixXd solved = linear::solveSymmetric(thinned_fixed_information_, cross);
     const Eigen::VectorXd raw = columns.colwise().squaredNorm();
     const Eigen::VectorXd own = raw - (cross.cwiseProduct(solved)).colwise().sum().transpose();
-    const Eigen::VectorXd score = columns.transpose() * few_left_;
+    const Eigen::VectorXd score = columns.transpose() * thinned_baseline_residual_;
     Eigen::VectorXd result = Eigen::VectorXd::Zero(columns.cols());
     for (Index k = 0; k < columns.cols(); ++k) {
       if (!std::isfinite(own[k]) || !std::isfinite(score[k]) || raw[k] == 0.0) continue;
@@ -147,64 +148,67 @@ class Projection {
     return all;
   }
 
-  Eigen::MatrixXd crossWith(const BlockColumns& columns) const {
+  Eigen::MatrixXd crossWith(const SparseColumns& columns) const {
     return stacked(tangents_.columns.cross(columns), members_.cross(columns));
   }
 
-  // vector += what nominal values, turns and members do when they move.
+  // vector += change by nominal values, alignment and members.
   void move(const Eigen::VectorXd& by, Eigen::VectorXd* vector) const {
     tangents_.columns.addTo(by.head(tangents_.columns.cols()), vector);
     members_.addTo(by.tail(members_.cols()), vector);
   }
 
-  static double taken(const Eigen::MatrixXd& information, const Eigen::VectorXd& score,
-                      const Eigen::VectorXd& by) {
+  static double reduction(const Eigen::MatrixXd& information, const Eigen::VectorXd& score,
+                          const Eigen::VectorXd& by) {
     return 2.0 * score.dot(by) - by.dot(information * by);
   }
 
-  Taken taken(const Eigen::MatrixXd& information, const Eigen::VectorXd& score, const Eigen::VectorXd& alone,
-              const Eigen::MatrixXd& cross, Eigen::MatrixXd own, const Eigen::VectorXd& along) const {
-    const Index beside = information.rows(), count = own.rows();
+  Reduction reduction(const Eigen::MatrixXd& information, const Eigen::VectorXd& score,
+                      const Eigen::VectorXd& baseline, const Eigen::MatrixXd& cross, Eigen::MatrixXd own,
+                      const Eigen::VectorXd& along) const {
+    const Index fixed_count = information.rows(), count = own.rows();
     const double raw = own.trace();
     own.diagonal() = own.diagonal().array() * (1.0 + 1e-9) + 1e-30;
-    Eigen::MatrixXd all(beside + count, beside + count);
+    Eigen::MatrixXd all(fixed_count + count, fixed_count + count);
     all << information, cross, cross.transpose(), own;
-    Eigen::VectorXd right(beside + count);
+    Eigen::VectorXd right(fixed_count + count);
     right << score, along;
-    const Way way = withinBounds(all, right);
-    Taken result;
-    result.gain = taken(all, right, way.by) - taken(information, score, alone);
-    result.amplitudes = way.by.tail(count);
-    result.all_else = way.by.head(beside);
-    const Eigen::MatrixXd held = heldAt(way.held, information);
+    const ConstrainedStep step = withinBounds(all, right);
+    Reduction result;
+    result.gain = reduction(all, right, step.by) - reduction(information, score, baseline);
+    result.amplitudes = step.by.tail(count);
+    result.all_else = step.by.head(fixed_count);
+    const Eigen::MatrixXd at_bounds = fixedAt(step.at_bounds, information);
     Eigen::MatrixXd free = cross;
-    for (const Index c : way.held) free.row(c).setZero();
-    result.apart = (own - free.transpose() * linear::solveSymmetric(held, free)).trace() / raw;
+    for (const Index c : step.at_bounds) free.row(c).setZero();
+    result.independent_share =
+        (own - free.transpose() * linear::solveSymmetric(at_bounds, free)).trace() / raw;
     return result;
   }
 
-  // Tangents of the members' values beside the nominal ones.
+  // Derivatives of the members' values.
   void addMembers(const Fitter& fitter, const FitState& state) {
     std::vector<std::size_t> all(state.members.size());
     std::iota(all.begin(), all.end(), 0u);
     members_ = memberTangents(fitter, state, all, &base_);
-    const Index beside = tangents_.columns.cols();
-    prior_.resize(beside + members_.cols());
-    for (std::size_t k = 0; k < tangents_.turns.size(); ++k)
-      prior_[static_cast<Index>(freedom_.size() + k)] = std::pow(fitter.turns()[k].freedom.prior_std, -2.0);
+    const Index fixed_count = tangents_.columns.cols();
+    prior_.resize(fixed_count + members_.cols());
+    for (std::size_t k = 0; k < tangents_.alignment.size(); ++k)
+      prior_[static_cast<Index>(freedom_.size() + k)] =
+          std::pow(fitter.alignment()[k].freedom.prior_std, -2.0);
     for (std::size_t c = 0; c < freedom_.size(); ++c)
       prior_[static_cast<Index>(c)] = 1.0 / (freedom_[c].prior_std * freedom_[c].prior_std);
     prior_.tail(members_.cols()) = 1e-12 + 1e-9 * members_.squares().array();
   }
 
-  // Where everything moves to, and the nominal values that their bounds keep.
-  struct Way {
+  // Step of all values, and the nominal values at their bounds.
+  struct ConstrainedStep {
     Eigen::VectorXd by;
-    std::vector<Index> held;
+    std::vector<Index> at_bounds;
   };
 
-  Eigen::MatrixXd heldAt(const std::vector<Index>& held, Eigen::MatrixXd information) const {
-    for (const Index c : held) {
+  Eigen::MatrixXd fixedAt(const std::vector<Index>& at_bounds, Eigen::MatrixXd information) const {
+    for (const Index c : at_bounds) {
       information.row(c).setZero();
       information.col(c).setZero();
       information(c, c) = prior_[c];
@@ -212,72 +216,72 @@ class Projection {
     return information;
   }
 
-  // A value that would go over its bound stays there, one after the other, the furthest first: what is tried
-  // may bring back one that stands there without it.
-  Way withinBounds(const Eigen::MatrixXd& information, const Eigen::VectorXd& right) const {
-    constexpr double AT_BOUND = 0.01;  // standard deviations
-    Way way;
+  // Values beyond a bound are fixed there one by one, the furthest first; the columns may bring back values
+  // that are at a bound without them.
+  ConstrainedStep withinBounds(const Eigen::MatrixXd& information, const Eigen::VectorXd& right) const {
+    constexpr double TOLERANCE = 0.01;  // standard deviations
+    ConstrainedStep step;
     Eigen::VectorXd at_bound = Eigen::VectorXd::Zero(right.size());
     for (;;) {
       Eigen::VectorXd score = right - information * at_bound;
-      for (const Index c : way.held) score[c] = 0.0;
-      way.by = linear::solveSymmetric(heldAt(way.held, information), score) + at_bound;
-      double worst = AT_BOUND;
+      for (const Index c : step.at_bounds) score[c] = 0.0;
+      step.by = linear::solveSymmetric(fixedAt(step.at_bounds, information), score) + at_bound;
+      double worst = TOLERANCE;
       Index which = -1;
       for (std::size_t k = 0; k < freedom_.size(); ++k) {
         const auto c = static_cast<Index>(k);
-        if (std::find(way.held.begin(), way.held.end(), c) != way.held.end()) continue;
-        const double to = nominal_[k] + way.by[c];
+        if (std::find(step.at_bounds.begin(), step.at_bounds.end(), c) != step.at_bounds.end()) continue;
+        const double to = nominal_[k] + step.by[c];
         const double beyond = std::max(freedom_[k].low - to, to - freedom_[k].high) / freedom_[k].prior_std;
         if (beyond <= worst) continue;
         worst = beyond;
         which = c;
       }
-      if (which < 0) return way;
+      if (which < 0) return step;
       const Coordinate& over = freedom_[static_cast<std::size_t>(which)];
       const double at = nominal_[static_cast<std::size_t>(which)];
-      at_bound[which] = (way.by[which] > 0.0 ? over.high : over.low) - at;
-      way.held.push_back(which);
+      at_bound[which] = (step.by[which] > 0.0 ? over.high : over.low) - at;
+      step.at_bounds.push_back(which);
     }
   }
 
-  // What is left beside all that moves, thinned.
-  void thinOut() {
+  // Thinned residual and derivatives.
+  void thinSamples() {
     const Eigen::MatrixXd nominal = thinned_.of(tangents_.columns), members = thinned_.of(members_);
-    few_beside_.resize(nominal.rows(), nominal.cols() + members.cols());
-    few_beside_ << nominal, members;
-    few_residual_ = thinned_.of(residual_);
-    few_left_ = thinned_.of(*left_);
-    few_information_.setZero(few_beside_.cols(), few_beside_.cols());
-    if (few_beside_.size() > 0)
-      few_information_.selfadjointView<Eigen::Lower>().rankUpdate(few_beside_.transpose());
-    few_information_ = few_information_.selfadjointView<Eigen::Lower>();
-    few_information_.diagonal() += prior_;
-    few_held_information_ = heldAt(alone_.held, few_information_);
-    few_score_ = few_beside_.transpose() * few_residual_ + pull_;
-    few_alone_ = withinBounds(few_information_, few_score_).by;
+    thinned_columns_.resize(nominal.rows(), nominal.cols() + members.cols());
+    thinned_columns_ << nominal, members;
+    thinned_residual_ = thinned_.of(residual_);
+    thinned_baseline_residual_ = thinned_.of(*baseline_residual_);
+    thinned_information_.setZero(thinned_columns_.cols(), thinned_columns_.cols());
+    if (thinned_columns_.size() > 0)
+      thinned_information_.selfadjointView<Eigen::Lower>().rankUpdate(thinned_columns_.transpose());
+    thinned_information_ = thinned_information_.selfadjointView<Eigen::Lower>();
+    thinned_information_.diagonal() += prior_;
+    thinned_fixed_information_ = fixedAt(baseline_.at_bounds, thinned_information_);
+    thinned_score_ = thinned_columns_.transpose() * thinned_residual_ + pull_;
+    thinned_baseline_ = withinBounds(thinned_information_, thinned_score_).by;
   }
 
   const std::vector<Coordinate>& freedom_;
   const std::vector<double>& nominal_;
   const NominalTangents& tangents_;
-  SimulatedBlocks base_;
-  BlockColumns members_;
+  SimulatedChannels base_;
+  SparseColumns members_;
   Eigen::VectorXd prior_, residual_, pull_, score_;  // pull: of the priors, part of the score
   Eigen::MatrixXd information_;
-  Way alone_;  // without what is tried
-  std::shared_ptr<const Eigen::VectorXd> left_;
-  Thinned thinned_;
-  Eigen::MatrixXd few_beside_, few_information_, few_held_information_;
-  Eigen::VectorXd few_residual_, few_left_, few_score_, few_alone_;
+  ConstrainedStep baseline_;  // without columns
+  std::shared_ptr<const Eigen::VectorXd> baseline_residual_;
+  ThinnedSamples thinned_;
+  Eigen::MatrixXd thinned_columns_, thinned_information_, thinned_fixed_information_;
+  Eigen::VectorXd thinned_residual_, thinned_baseline_residual_, thinned_score_, thinned_baseline_;
 };
 
-// The two best frequencies of a mode, one octave-third or more apart, from columns to first order.
+// The two best frequencies of a mode, at least a third of an octave apart, from first-order columns.
 std::vector<double> bestFrequencies(const Projection& projection, const TwinRunner& runner,
                                     const std::vector<double>& frequencies,
                                     const std::function<Eigen::MatrixXd(const std::vector<double>&)>& columns,
                                     bool positive) {
-  constexpr std::size_t BATCH = 8;  // one pass over the tangents serves so many
+  constexpr std::size_t BATCH = 8;  // frequencies per pass over the derivatives
   std::vector<double> gains(frequencies.size(), 0.0);
   runParallel((frequencies.size() + BATCH - 1) / BATCH, runner.threads(), [&](std::size_t batch) {
     const std::size_t first = batch * BATCH, count = std::min(BATCH, frequencies.size() - first);
@@ -299,12 +303,13 @@ std::vector<double> bestFrequencies(const Projection& projection, const TwinRunn
   return best;
 }
 
-// Where to try an effect of which nobody knows the place: frequency of a mode, order of a line.
-class Seeker {
+// Finds probes of an effect with unknown location: frequency of a mode, order of a line.
+class ProbeFinder {
  public:
   using Probes = std::vector<Hypothesis::Probe>;
 
-  Seeker(const Projection& projection, const TwinRunner& runner, const MachineModel& model, const Fit& now)
+  ProbeFinder(const Projection& projection, const TwinRunner& runner, const MachineModel& model,
+              const FitResult& now)
       : projection_(projection),
         runner_(runner),
         model_(model),
@@ -357,7 +362,7 @@ class Seeker {
     return {probe};
   }
 
-  // The order, then sizes.
+  // The order, then amplitudes.
   Probes orders(std::size_t coordinates) const {
     Probes found;
     for (const double order : bestOrders(runner_, model_, now_.residual, 2)) {
@@ -378,31 +383,25 @@ class Seeker {
   const Projection& projection_;
   const TwinRunner& runner_;
   const MachineModel& model_;
-  const Fit& now_;
+  const FitResult& now_;
   const ModeProbes probes_;
-  std::map<char, std::vector<double>> tip_;  // best frequencies of the tool's axes, once found
+  std::map<char, std::vector<double>> tip_;  // best frequencies of the tool's axes, computed once
 };
 
-bool isMember(const FitState& state, const std::string& effect, const std::string& variant) {
-  return std::any_of(state.members.begin(), state.members.end(), [&](const Member& m) {
-    return m.hypothesis->effect == effect && m.hypothesis->variant == variant;
-  });
-}
-
-// What the points of a probe add to the records.
-BlockColumns columnsOf(const Fitter& fitter, const FitState& state, const Hypothesis& h,
-                       const Hypothesis::Probe& probe, const SimulatedBlocks& base) {
+// Change of the records by the points of a probe.
+SparseColumns columnsOf(const Fitter& fitter, const FitState& state, const Hypothesis& h,
+                        const Hypothesis::Probe& probe, const SimulatedChannels& base) {
   std::vector<MachineModel> models;
   for (const std::vector<double>& point : probe.points) {
     FitState with = state;
     with.members.push_back({&h, point});
     models.push_back(fitter.model(with));
   }
-  return {fitter.runner(), base, fitter.runner().simulateBlocks(models),
+  return {fitter.runner(), base, fitter.runner().simulateChannels(models),
           std::vector<double>(models.size(), 1.0)};
 }
 
-// Where a fit begins that has these amplitudes along a probe's points.
+// Start of a fit from amplitudes along a probe's points.
 std::vector<double> startOf(const Hypothesis& h, const Hypothesis::Probe& probe,
                             const Eigen::VectorXd& amplitudes) {
   std::vector<double> start = probe.from_points ? probe.points.front() : probe.null;
@@ -419,119 +418,121 @@ std::vector<double> startOf(const Hypothesis& h, const Hypothesis::Probe& probe,
 
 namespace {
 
-// The most that a hypothesis promises by what it did when it was simulated last; no number: it was not.
+// Largest gain by remembered derivatives; no value without any.
 std::optional<double> rememberedGain(const Projection& projection, const Hypothesis& h,
                                      const ScreeningMemory& memory) {
-  const auto found = memory.did.find(&h);
-  if (found == memory.did.end()) return {};
+  const auto found = memory.columns.find(&h);
+  if (found == memory.columns.end()) return {};
   double gain = 0.0;
   for (const Eigen::MatrixXf& columns : found->second)
     gain = std::max(gain, projection.roughGain(columns.cast<double>()));
   return gain;
 }
 
-// @param did receives what the probes do, thinned out
-Promise promiseOf(const Fitter& fitter, const Fit& now, const Projection& projection, const Hypothesis& h,
-                  const std::vector<Hypothesis::Probe>& probes, std::vector<Eigen::MatrixXf>* did) {
-  Promise best;
+// @param columns receives the thinned derivatives of the probes
+PredictedGain predictGain(const Fitter& fitter, const FitResult& now, const Projection& projection,
+                          const Hypothesis& h, const std::vector<Hypothesis::Probe>& probes,
+                          std::vector<Eigen::MatrixXf>* columns) {
+  PredictedGain best;
   best.hypothesis = &h;
   for (const Hypothesis::Probe& probe : probes) {
-    const BlockColumns columns = columnsOf(fitter, now.state, h, probe, projection.base());
-    if (!columns.allFinite() || columns.squares().sum() == 0.0) continue;
-    if (did) did->push_back(projection.thinned().of(columns).cast<float>());
-    const Projection::Taken taken = projection.taken(columns);
-    if (taken.gain <= best.gain) continue;
-    std::vector<double> start = startOf(h, probe, taken.amplitudes);
-    if (start == probe.null) continue;  // the data ask for what cannot be
-    best.gain = taken.gain;
-    best.apart = taken.apart;
+    const SparseColumns change = columnsOf(fitter, now.state, h, probe, projection.base());
+    if (!change.allFinite() || change.squares().sum() == 0.0) continue;
+    if (columns) columns->push_back(projection.thinned().of(change).cast<float>());
+    const Projection::Reduction reduction = projection.reduction(change);
+    if (reduction.gain <= best.gain) continue;
+    std::vector<double> start = startOf(h, probe, reduction.amplitudes);
+    if (start == probe.null) continue;  // the optimum is outside the bounds
+    best.gain = reduction.gain;
+    best.independent_share = reduction.independent_share;
     best.start = std::move(start);
-    best.stated = {};
-    if (best.gain > Standing::tellingSquares()) projection.addChange(columns, taken, &best);
+    best.prior_evidence = {};
+    if (best.gain > ValidationResult::requiredSquares()) projection.addChange(change, reduction, &best);
     best.null = probe.from_points ? std::vector<double>{} : probe.null;
   }
   return best;
 }
 
-void sortByGain(std::vector<Promise>* promises) {
-  std::stable_sort(promises->begin(), promises->end(),
-                   [](const Promise& a, const Promise& b) { return a.gain > b.gain; });
+void sortByGain(std::vector<PredictedGain>* predictions) {
+  std::stable_sort(predictions->begin(), predictions->end(),
+                   [](const PredictedGain& a, const PredictedGain& b) { return a.gain > b.gain; });
 }
 
 }  // namespace
 
-std::vector<Promise> screen(const Fitter& fitter, const Fit& now, const NominalTangents& tangents,
-                            const std::vector<Hypothesis>& tried, double due, ScreeningMemory* memory) {
-  constexpr double NOWHERE_NEAR = 0.1;
+std::vector<PredictedGain> screen(const Fitter& fitter, const FitResult& now, const NominalTangents& tangents,
+                                  const std::vector<Hypothesis>& hypotheses, double required_gain,
+                                  ScreeningMemory* memory) {
+  constexpr double MIN_SHARE = 0.1;
   const Projection projection(fitter, now, tangents);
   const MachineModel model = fitter.model(now.state);
-  Seeker seeker(projection, fitter.runner(), model, now);
-  struct Look {
+  ProbeFinder finder(projection, fitter.runner(), model, now);
+  struct Screened {
     const Hypothesis* hypothesis;
     std::vector<Hypothesis::Probe> probes;
-    std::optional<std::vector<Eigen::MatrixXf>> did;
-    std::optional<Promise> promise;
+    std::optional<std::vector<Eigen::MatrixXf>> columns;
+    std::optional<PredictedGain> predicted;
   };
-  const auto inVain = [&](const Hypothesis& h) {
-    const auto most = memory->at_most.find(&h);
-    return most != memory->at_most.end() && most->second < due;
+  const auto isBelowLimit = [&](const Hypothesis& h) {
+    const auto most = memory->gain_limits.find(&h);
+    return most != memory->gain_limits.end() && most->second < required_gain;
   };
-  std::vector<Look> looks;
-  for (const Hypothesis& h : tried) {
+  std::vector<Screened> screened;
+  for (const Hypothesis& h : hypotheses) {
     if (fitter.cancelled()) break;
-    if (isMember(now.state, h.effect, h.variant) ||
-        (!h.after.empty() && !isMember(now.state, h.effect, h.after)))
+    if (hasMember(now.state, h.effect, h.variant) ||
+        (!h.after.empty() && !hasMember(now.state, h.effect, h.after)))
       continue;
-    looks.push_back({&h, {}, std::nullopt, std::nullopt});
-    if (h.seek != Hypothesis::Seek::nothing && !inVain(h)) looks.back().probes = seeker.probesOf(h);
+    screened.push_back({&h, {}, std::nullopt, std::nullopt});
+    if (h.seek != Hypothesis::Seek::nothing && !isBelowLimit(h)) screened.back().probes = finder.probesOf(h);
   }
-  runParallel(looks.size(), fitter.runner().threads(), [&](std::size_t k) {
+  runParallel(screened.size(), fitter.runner().threads(), [&](std::size_t k) {
     if (fitter.cancelled()) return;
-    Look& look = looks[k];
-    const Hypothesis& h = *look.hypothesis;
-    const bool in_vain = inVain(h);
+    Screened& one = screened[k];
+    const Hypothesis& h = *one.hypothesis;
+    const bool below_limit = isBelowLimit(h);
     const std::optional<double> gain =
-        in_vain ? memory->at_most.at(&h) : rememberedGain(projection, h, *memory);
-    if (in_vain || (gain && *gain < NOWHERE_NEAR * due)) {
-      look.promise.emplace();
-      look.promise->hypothesis = &h;
-      look.promise->rough = true;
-      look.promise->gain = *gain;
+        below_limit ? memory->gain_limits.at(&h) : rememberedGain(projection, h, *memory);
+    if (below_limit || (gain && *gain < MIN_SHARE * required_gain)) {
+      one.predicted.emplace();
+      one.predicted->hypothesis = &h;
+      one.predicted->approximate = true;
+      one.predicted->gain = *gain;
       return;
     }
-    // What is to be sought lies elsewhere each time.
+    // Probes with a searched location change with the state.
     const bool remembered = h.seek == Hypothesis::Seek::nothing;
-    if (remembered) look.did.emplace();
-    look.promise = promiseOf(fitter, now, projection, h, remembered ? h.probes : look.probes,
-                             remembered ? &*look.did : nullptr);
+    if (remembered) one.columns.emplace();
+    one.predicted = predictGain(fitter, now, projection, h, remembered ? h.probes : one.probes,
+                                remembered ? &*one.columns : nullptr);
   });
-  memory->at_most.clear();
-  std::vector<Promise> promises;
-  for (Look& look : looks) {
-    if (look.did) memory->did[look.hypothesis] = std::move(*look.did);
-    if (look.promise) promises.push_back(std::move(*look.promise));
+  memory->gain_limits.clear();
+  std::vector<PredictedGain> predictions;
+  for (Screened& one : screened) {
+    if (one.columns) memory->columns[one.hypothesis] = std::move(*one.columns);
+    if (one.predicted) predictions.push_back(std::move(*one.predicted));
   }
-  sortByGain(&promises);
-  return promises;
+  sortByGain(&predictions);
+  return predictions;
 }
 
-void screenRough(const Fitter& fitter, const Fit& now, const NominalTangents& tangents, double least,
-                 ScreeningMemory* memory, std::vector<Promise>* promises) {
+void screenRemembered(const Fitter& fitter, const FitResult& now, const NominalTangents& tangents,
+                      double least, ScreeningMemory* memory, std::vector<PredictedGain>* predictions) {
   const Projection projection(fitter, now, tangents);
   const MachineModel model = fitter.model(now.state);
-  Seeker seeker(projection, fitter.runner(), model, now);
-  for (Promise& p : *promises) {
-    if (!p.rough || p.gain <= least || fitter.cancelled()) continue;
+  ProbeFinder finder(projection, fitter.runner(), model, now);
+  for (PredictedGain& p : *predictions) {
+    if (!p.approximate || p.gain <= least || fitter.cancelled()) continue;
     const Hypothesis& h = *p.hypothesis;
-    std::vector<Eigen::MatrixXf> did;
-    p = promiseOf(fitter, now, projection, h, seeker.probesOf(h), &did);
-    if (h.seek == Hypothesis::Seek::nothing) memory->did[&h] = std::move(did);
+    std::vector<Eigen::MatrixXf> columns;
+    p = predictGain(fitter, now, projection, h, finder.probesOf(h), &columns);
+    if (h.seek == Hypothesis::Seek::nothing) memory->columns[&h] = std::move(columns);
   }
-  sortByGain(promises);
+  sortByGain(predictions);
 }
 
-BlockColumns memberTangents(const Fitter& fitter, const FitState& state,
-                            const std::vector<std::size_t>& members, SimulatedBlocks* base) {
+SparseColumns memberTangents(const Fitter& fitter, const FitState& state,
+                             const std::vector<std::size_t>& members, SimulatedChannels* base) {
   std::vector<MachineModel> models{fitter.model(state)};
   std::vector<double> steps;
   for (const std::size_t m : members) {
@@ -546,24 +547,25 @@ BlockColumns memberTangents(const Fitter& fitter, const FitState& state,
       models.push_back(fitter.model(moved));
     }
   }
-  auto simulated = fitter.runner().simulateBlocks(models);
+  auto simulated = fitter.runner().simulateChannels(models);
   *base = std::move(simulated.front());
   simulated.erase(simulated.begin());
   return {fitter.runner(), *base, simulated, steps};
 }
 
-AskedShare fittedShare(const Fitter& fitter, const Promise& promise) {
-  if (!promise.change) return sharedBy({});
-  const Eigen::VectorXd left = *promise.left_without - *promise.change;
-  std::vector<AskedTest> tests = askedIn(fitter.runner(), promise.change->data(), left.data());
-  tests.push_back(promise.stated);
-  const double variance = std::max(1.0, left.squaredNorm() / static_cast<double>(left.size()));
-  tests.back().variance = variance * promise.stated.squares;
-  return sharedBy(tests);
+EffectScale fittedScale(const Fitter& fitter, const PredictedGain& predicted) {
+  if (!predicted.change) return effectScaleOf({});
+  const Eigen::VectorXd residual = *predicted.baseline_residual - *predicted.change;
+  std::vector<ScaleEvidence> tests =
+      scaleEvidenceIn(fitter.runner(), predicted.change->data(), residual.data());
+  tests.push_back(predicted.prior_evidence);
+  const double variance = std::max(1.0, residual.squaredNorm() / static_cast<double>(residual.size()));
+  tests.back().variance = variance * predicted.prior_evidence.squares;
+  return effectScaleOf(tests);
 }
 
-std::optional<std::vector<double>> inPlaceOf(const Fitter& fitter, const Member& member,
-                                             const Hypothesis& hypothesis) {
+std::optional<std::vector<double>> equivalentValues(const Fitter& fitter, const Member& member,
+                                                    const Hypothesis& hypothesis) {
   const auto radii = [&](const EffectEntry& entry) {
     MachineModel model = fitter.runner().data().nominal;
     model.effects = {entry};
@@ -574,8 +576,8 @@ std::optional<std::vector<double>> inPlaceOf(const Fitter& fitter, const Member&
   std::vector<double> values;
   for (const Coordinate& c : hypothesis.coordinates) values.push_back(c.null);
   const Eigen::VectorXd null = radii(hypothesis.entry(values));
-  const Eigen::VectorXd wanted = radii(member.hypothesis->entry(member.values)) - null;
-  if (wanted.size() == 0 || wanted.isZero(0.0)) return {};
+  const Eigen::VectorXd target = radii(member.hypothesis->entry(member.values)) - null;
+  if (target.size() == 0 || target.isZero(0.0)) return {};
   Eigen::MatrixXd columns(null.size(), static_cast<Index>(values.size()));
   for (std::size_t c = 0; c < values.size(); ++c) {
     std::vector<double> moved = values;
@@ -584,35 +586,36 @@ std::optional<std::vector<double>> inPlaceOf(const Fitter& fitter, const Member&
         (radii(hypothesis.entry(moved)) - null) / hypothesis.coordinates[c].step;
   }
   if (columns.size() == 0 || (columns.colwise().squaredNorm().array() == 0.0).any()) return {};
-  const Eigen::VectorXd found = linear::leastNorm(columns, wanted);
+  const Eigen::VectorXd found = linear::leastNorm(columns, target);
   for (std::size_t c = 0; c < values.size(); ++c)
     values[c] = std::clamp(values[c] + found[static_cast<Index>(c)], hypothesis.coordinates[c].low,
                            hypothesis.coordinates[c].high);
   return values;
 }
 
-std::vector<double> bestStart(const Fitter& fitter, const Fit& now, const Promise& promise,
+std::vector<double> bestStart(const Fitter& fitter, const FitResult& now, const PredictedGain& predicted,
                               const std::optional<std::vector<double>>& other) {
-  if (promise.null.empty() && !other) return promise.start;
-  std::vector<std::vector<double>> starts{promise.start};
+  if (predicted.null.empty() && !other) return predicted.start;
+  std::vector<std::vector<double>> starts{predicted.start};
   for (const double share : {0.5, 0.2, 0.05}) {
-    if (promise.null.empty()) break;
-    std::vector<double> start = promise.null;
-    for (std::size_t c = 0; c < start.size(); ++c) start[c] += share * (promise.start[c] - promise.null[c]);
+    if (predicted.null.empty()) break;
+    std::vector<double> start = predicted.null;
+    for (std::size_t c = 0; c < start.size(); ++c)
+      start[c] += share * (predicted.start[c] - predicted.null[c]);
     starts.push_back(std::move(start));
   }
   if (other) starts.push_back(*other);
   std::vector<MachineModel> models;
   for (const std::vector<double>& start : starts) {
     FitState with = now.state;
-    with.members.push_back({promise.hypothesis, start});
+    with.members.push_back({predicted.hypothesis, start});
     models.push_back(fitter.model(with));
   }
   const auto simulated = fitter.runner().simulate(models);
   std::size_t best = 0;
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < simulated.size(); ++k) {
-    const double squares = squaresLeft(fitter.runner(), simulated[k]);
+    const double squares = residualSquares(fitter.runner(), simulated[k]);
     if (squares < least) {
       least = squares;
       best = k;

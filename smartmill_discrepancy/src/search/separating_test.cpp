@@ -51,22 +51,20 @@ std::optional<SeparatingTest> separatingTest(const Dataset& data, const MachineM
           try {
             value = separation(data, test, a, b);
           } catch (const Error&) {
-            continue;  // the twin does not run this one
+            continue;  // the twin cannot simulate this test
           }
           if (value <= (best ? best->difference : 0.0)) continue;
           best = SeparatingTest{"", test, value};
           if (test.engagement) {
             best->text = formatted(
-                "a cut at %.0f rpm, %.3g mm a tooth, %.3g mm deep, from %.0f to %.0f deg: the two "
-                "predictions "
-                "differ there by %.2g times the noise",
+                "a cut at %.0f rpm, %.3g mm per tooth, %.3g mm deep, from %.0f to %.0f deg: the predictions "
+                "differ by %.2g times the noise",
                 units::rpmFromRadPerSec(test.spindle_speed), test.engagement->feed_per_tooth * 1e3,
                 test.engagement->axial_depth * 1e3, units::degFromRad(test.engagement->entry),
                 units::degFromRad(test.engagement->exit), value);
           } else {
-            best->text =
-                formatted("an air cut at %.0f rpm: the two predictions differ there by %.2g times the noise",
-                          units::rpmFromRadPerSec(test.spindle_speed), value);
+            best->text = formatted("an air cut at %.0f rpm: the predictions differ by %.2g times the noise",
+                                   units::rpmFromRadPerSec(test.spindle_speed), value);
           }
         }
       }

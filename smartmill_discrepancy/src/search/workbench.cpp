@@ -5,8 +5,8 @@
 #include <map>
 
 #include "smartmill_core/math/linear_algebra.h"
-#include "smartmill_discrepancy/data/phase.h"
-#include "smartmill_discrepancy/gap/asked.h"
+#include "smartmill_discrepancy/data/alignment.h"
+#include "smartmill_discrepancy/gap/scale_evidence.h"
 #include "smartmill_sim/twin/guide.h"
 
 namespace smartmill::discrepancy {
@@ -20,18 +20,17 @@ std::vector<std::size_t> testsOf(const Dataset& data, bool heldout) {
   return tests;
 }
 
-bool guides(const TestData& test, const MachineModel& nominal) {
-  const bool modes = !nominal.tool_tip.x.modes.empty() || !nominal.tool_tip.y.modes.empty();
-  return modes && test.test.kind == TestKind::cut && !test.heldout && !test.test.running_before &&
-         sim::Guide::canBe(test.record);
+bool isGuidable(const TestData& test, const MachineModel& nominal) {
+  return hasToolModes(nominal) && test.test.kind == TestKind::cut && !test.heldout &&
+         !test.test.running_before && sim::Guide::canBe(test.record);
 }
 
-constexpr int QUICK_SLICES = 4;  // of a tool's corner, of the quick twin
+constexpr int QUICK_SLICES = 4;  // of a tool's corner, for the quick twin
 
-// Of the quick twin where nothing guides it: with too few steps it chatters elsewhere than the machine, and a
-// fit goes where it does not. Beyond twice the steps refineQuick() is for where it must be.
+// Of the unguided quick twin: with too few steps per period its stability limit is wrong and misleads the
+// fit. More than twice the steps are left to refineQuick().
 int freeSubsteps(const Dataset& data, const WorkbenchOptions& options) {
-  constexpr double STEPS = 12.0;  // a period
+  constexpr double STEPS = 12.0;  // per period
   constexpr double MOST = 2.0;
   double substeps = options.screening_substeps;
   for (const ModalModel* axis : {&data.nominal.tool_tip.x, &data.nominal.tool_tip.y}) {
@@ -46,69 +45,68 @@ int freeSubsteps(const Dataset& data, const WorkbenchOptions& options) {
   return std::min(static_cast<int>(std::min(substeps, most)), options.final_substeps);
 }
 
-// Of each block, by what a model leaves.
+// By span, from the residual of a model.
 std::vector<Whitening> whiteningOf(const TwinRunner& runner, const MachineModel& model) {
-  std::vector<double> left = runner.simulate(model);
-  for (std::size_t i = 0; i < left.size(); ++i) left[i] = runner.measured()[i] - left[i];
-  std::vector<Whitening> of_blocks;
-  for (const Block& b : runner.blocks()) of_blocks.emplace_back(&left[b.offset], b.size);
-  return of_blocks;
+  const std::vector<double> residual = residualOf(runner, model);
+  std::vector<Whitening> of_spans;
+  for (const ChannelSpan& b : runner.spans()) of_spans.emplace_back(&residual[b.offset], b.size);
+  return of_spans;
 }
 
-// A value that is moved by u.r has the variance of lines of random phase, which is largest where u lies at
-// the lines of what is left: as that of independent samples of so much more noise, of which so many count.
-Trust trustOf(const std::vector<double>& left) {
+// A value displaced by u.r has the variance of lines of random phase, largest if u overlaps the lines of the
+// residual: equivalent to more noise with fewer independent samples.
+ChannelWeight weightOf(const std::vector<double>& residual) {
   double sum = 0.0, squares = 0.0, all = 0.0;
-  for (const double r : left) all += r * r;
-  const std::vector<double> power = powerOf(left.data(), left.size());
+  for (const double r : residual) all += r * r;
+  const std::vector<double> power = powerSpectrum(residual.data(), residual.size());
   for (const double p : power) {
     sum += p;
     squares += p * p;
   }
-  const double mean_square = all / static_cast<double>(left.size());
+  const double mean_square = all / static_cast<double>(residual.size());
   if (!(sum > 0.0) || !std::isfinite(sum)) return {};
-  // Of white noise the mean of squares is twice the square of the mean.
-  const double gathered = std::max(1.0, 0.5 * static_cast<double>(power.size()) * squares / (sum * sum));
-  const double noise = std::sqrt(std::max(1.0, gathered * mean_square));
+  // For white noise the mean of squares is twice the square of the mean.
+  const double concentration = std::max(1.0, 0.5 * static_cast<double>(power.size()) * squares / (sum * sum));
+  const double noise = std::sqrt(std::max(1.0, concentration * mean_square));
   return {noise, std::min(1.0, mean_square / (noise * noise))};
 }
 
-// One step of Gauss and Newton of where each record lies. @return the largest turn [rad]
-double turnOnce(const TwinRunner& runner, const MachineModel& model, Dataset* data) {
+// One Gauss-Newton step of each record's alignment. @return largest rotation [rad]
+double alignOnce(const TwinRunner& runner, const MachineModel& model, Dataset* data) {
   constexpr double MOST = 0.3;  // [rad]
-  const SimulatedBlocks base = runner.simulateBlocks({model}).front();
+  const SimulatedChannels base = runner.simulateChannels({model}).front();
   const std::vector<double> simulated = runner.joined(base);
   const auto size = static_cast<Eigen::Index>(simulated.size());
-  const Eigen::VectorXd apart = Eigen::Map<const Eigen::VectorXd>(runner.measured().data(), size) -
-                                Eigen::Map<const Eigen::VectorXd>(simulated.data(), size);
+  const Eigen::VectorXd residual = Eigen::Map<const Eigen::VectorXd>(runner.measured().data(), size) -
+                                   Eigen::Map<const Eigen::VectorXd>(simulated.data(), size);
   double largest = 0.0;
   for (std::size_t k = 0; k < runner.tests().size(); ++k) {
     TestData& test = data->tests[runner.tests()[k]];
-    const std::vector<TurnFreedom> free = turnFreedoms(test);
+    const std::vector<AlignmentFreedom> free = alignmentFreedoms(test);
     if (free.empty()) continue;
-    std::vector<SimulatedBlocks> moved;
+    std::vector<SimulatedChannels> moved;
     std::vector<double> steps;
     Eigen::VectorXd precision(static_cast<Eigen::Index>(free.size())), pull = precision;
-    for (const TurnFreedom& f : free) {
+    for (const AlignmentFreedom& f : free) {
       const auto at = static_cast<Eigen::Index>(moved.size());
       precision[at] = 1.0 / (f.prior_std * f.prior_std);
-      pull[at] = f.value == &Turn::entry ? -precision[at] * test.early_entry : 0.0;
-      Turn step;
+      pull[at] = f.value == &RecordAlignment::entry ? -precision[at] * test.early_entry : 0.0;
+      RecordAlignment step;
       step.*f.value = f.step;
-      moved.push_back(runner.turned(model, base, k, step));
+      moved.push_back(runner.realigned(model, base, k, step));
       steps.push_back(f.step);
     }
-    const BlockColumns columns(runner, base, moved, steps);
+    const SparseColumns columns(runner, base, moved, steps);
     Eigen::MatrixXd information = columns.gram();
     information.diagonal() += precision;
-    const Eigen::VectorXd right = columns.along(apart) + pull;
+    const Eigen::VectorXd right = columns.along(residual) + pull;
     const Eigen::VectorXd found = linear::solveSymmetric(information, right);
-    Turn by;
+    RecordAlignment by;
     for (std::size_t f = 0; f < free.size(); ++f) by.*free[f].value = found[static_cast<Eigen::Index>(f)];
-    const double turn = std::max(std::abs(by.middle), std::abs(by.end));
-    if (!found.allFinite() || turn > MOST) continue;
-    turnRecord(test, by);
-    largest = std::max(largest, turn);
+    const double rotation = std::max(std::abs(by.phase), std::abs(by.drift));
+    if (!found.allFinite() || rotation > MOST) continue;
+    alignRecord(test, by);
+    largest = std::max(largest, rotation);
   }
   return largest;
 }
@@ -122,7 +120,7 @@ Workbench::Workbench(const Dataset& data, const WorkbenchOptions& options)
       phases_estimated_(std::any_of(data.tests.begin(), data.tests.end(),
                                     [](const TestData& t) { return t.phase_estimated; })),
       can_guide_(std::any_of(data.tests.begin(), data.tests.end(),
-                             [&](const TestData& t) { return guides(t, data.nominal); })),
+                             [&](const TestData& t) { return isGuidable(t, data.nominal); })),
       quick_runner_(data_, testsOf(data_, false), options.threads, freeSubsteps(data_, options)),
       exact_runner_(data_, testsOf(data_, false), options.threads, options.final_substeps),
       guided_runner_(data_, testsOf(data_, false), options.threads, options.final_substeps),
@@ -134,7 +132,7 @@ Workbench::Workbench(const Dataset& data, const WorkbenchOptions& options)
   for (const std::size_t t : exact_runner_.tests()) loaded_.push_back(data_.tests[t]);
   FitState stated;
   stated.nominal.assign(freedom_.coordinates().size(), 0.0);
-  trustAt(stated);
+  updateWeights(stated);
 }
 
 void Workbench::readGuidance() {
@@ -142,57 +140,58 @@ void Workbench::readGuidance() {
     runner->readGuidance();
 }
 
-void Workbench::trustAt(const FitState& state) {
+void Workbench::updateWeights(const FitState& state) {
   const auto& tests = exact_runner_.tests();
   if (std::none_of(tests.begin(), tests.end(), [&](std::size_t t) { return data_.tests[t].guided; })) return;
-  turnFitted(state);
+  alignFitted(state);
   const TwinRunner& runner = exact_runner_;
   const std::vector<double> simulated = runner.simulate(quick_.model(state));
-  for (const Block& b : runner.blocks()) {
+  for (const ChannelSpan& b : runner.spans()) {
     TestData& test = data_.tests[b.test];
     if (!test.guided) continue;
-    std::vector<double> left(b.size);
+    std::vector<double> residual(b.size);
     const double scale = b.noise / (b.slow ? b.slow->noise : data_.noise.at(b.channel));
     for (std::size_t i = 0; i < b.size; ++i)
-      left[i] = scale * (simulated[b.offset + i] - runner.measured()[b.offset + i]);
-    test.trust[b.channel] = trustOf(left);
+      residual[i] = scale * (simulated[b.offset + i] - runner.measured()[b.offset + i]);
+    test.weights[b.channel] = weightOf(residual);
   }
   readGuidance();
 }
 
 void Workbench::guideNearLimit(const FitState& state) {
   if (!can_guide_ || guided_) return;
-  turnFitted(state);
+  alignFitted(state);
   const MachineModel model = quick_.model(state);
   bool any = false;
-  const auto look = [&](const TwinRunner& free, const std::vector<double>& freely, const TwinRunner& led,
-                        const std::vector<double>& guided) {
-    constexpr double CLEARLY = 4.0;  // deviations of squares of noise
+  const auto markGuided = [&](const TwinRunner& free, const std::vector<double>& freely,
+                              const TwinRunner& guided_runner, const std::vector<double>& guided) {
+    constexpr double MIN_DEVIATIONS = 4.0;  // standard deviations of the squares of noise
     std::map<std::size_t, double> gain, samples;
-    for (const Block& b : free.blocks()) {
+    for (const ChannelSpan& b : free.spans()) {
       for (std::size_t i = b.offset; i < b.offset + b.size; ++i)
-        gain[b.test] +=
-            std::pow(freely[i] - free.measured()[i], 2) - std::pow(guided[i] - led.measured()[i], 2);
+        gain[b.test] += std::pow(freely[i] - free.measured()[i], 2) -
+                        std::pow(guided[i] - guided_runner.measured()[i], 2);
       samples[b.test] += static_cast<double>(b.size);
     }
     for (const auto& [t, gained] : gain) {
       TestData& test = data_.tests[t];
-      if (test.guided || !canBeLed(test, data_.nominal) || !(gained > CLEARLY * std::sqrt(2.0 * samples[t])))
+      if (test.guided || !canBeGuided(test, data_.nominal) ||
+          !(gained > MIN_DEVIATIONS * std::sqrt(2.0 * samples[t])))
         continue;
       test.guided = any = true;
     }
   };
-  look(exact_runner_, exact_runner_.simulate(model), guided_runner_, guided_runner_.simulate(model));
+  markGuided(exact_runner_, exact_runner_.simulate(model), guided_runner_, guided_runner_.simulate(model));
   const std::vector<double> freely = heldout_runner_.simulate(model);
   heldout_runner_.setGuided(true);
   const std::vector<double> guided = heldout_runner_.simulate(model);
   heldout_runner_.setGuided(false);
-  look(heldout_runner_, freely, heldout_runner_, guided);
+  markGuided(heldout_runner_, freely, heldout_runner_, guided);
   if (any) readGuidance();
 }
 
-// The records and the exact twin; the quick one stays where its tangents were taken.
-void Workbench::turnFitted(const FitState& state) {
+// Aligns the records and the exact twins; the quick one keeps the alignment of its derivatives.
+void Workbench::alignFitted(const FitState& state) {
   const std::vector<std::size_t>& tests = exact_runner_.tests();
   for (std::size_t k = 0; k < tests.size(); ++k) {
     TestData& t = data_.tests[tests[k]];
@@ -200,53 +199,55 @@ void Workbench::turnFitted(const FitState& state) {
     t.early_entry = loaded_[k].early_entry;
     if (t.phase_estimated) t.record.add("spindle_angle") = loaded_[k].record.column("spindle_angle");
   }
-  std::vector<Turn> by(tests.size());
-  for (std::size_t k = 0; k < state.turns.size(); ++k)
-    by[quick_.turns()[k].chosen].*quick_.turns()[k].freedom.value = state.turns[k];
-  for (std::size_t k = 0; k < tests.size(); ++k) turnRecord(data_.tests[tests[k]], by[k]);
+  std::vector<RecordAlignment> by(tests.size());
+  for (std::size_t k = 0; k < state.alignment.size(); ++k)
+    by[quick_.alignment()[k].chosen].*quick_.alignment()[k].freedom.value = state.alignment[k];
+  for (std::size_t k = 0; k < tests.size(); ++k) alignRecord(data_.tests[tests[k]], by[k]);
   exact_runner_.readPhases();
   guided_runner_.readPhases();
 }
 
 void Workbench::correctAt(const FitState& state, double* exact_squares) {
   const MachineModel model = quick_.model(state);
-  turnFitted(state);
+  alignFitted(state);
   quick_runner_.readPhases();
   const std::vector<double> simulated = fitted().simulate(model);
-  if (exact_squares) *exact_squares = squaresLeft(fitted(), simulated);
+  if (exact_squares) *exact_squares = residualSquares(fitted(), simulated);
   quick_runner_.correctTo(model, simulated);
 }
 
 NominalTangents Workbench::linearise(const FitState& state, double* exact_squares) {
   correctAt(state, exact_squares);
-  const SimulatedBlocks said = quick_runner_.simulateBlocks({quick_.model(state)}).front();
-  const bool hold = taken_ && taken_->state == state &&
-                    std::equal(said.begin(), said.end(), taken_->said.begin(), taken_->said.end(),
-                               [](const auto& a, const auto& b) { return a == b || *a == *b; });
-  if (!hold) taken_ = Taken{state, said, quick_.nominalTangents(state)};
-  return taken_->tangents;
+  const SimulatedChannels simulated_there = quick_runner_.simulateChannels({quick_.model(state)}).front();
+  const bool hold =
+      last_linearised_ && last_linearised_->state == state &&
+      std::equal(simulated_there.begin(), simulated_there.end(), last_linearised_->simulated_there.begin(),
+                 last_linearised_->simulated_there.end(),
+                 [](const auto& a, const auto& b) { return a == b || *a == *b; });
+  if (!hold) last_linearised_ = LinearisedState{state, simulated_there, quick_.nominalTangents(state)};
+  return last_linearised_->tangents;
 }
 
 NominalTangents Workbench::lineariseBy(NominalTangents tangents, const FitState& state,
                                        double* exact_squares) {
   correctAt(state, exact_squares);
   tangents.at = state.nominal;
-  tangents.turns = state.turns;
-  tangents.turns.resize(quick_.turns().size(), 0.0);
+  tangents.alignment = state.alignment;
+  tangents.alignment.resize(quick_.alignment().size(), 0.0);
   return tangents;
 }
 
 double Workbench::exactSquares(const FitState& state) {
-  turnFitted(state);
+  alignFitted(state);
   return exactSquaresHere(state);
 }
 
 double Workbench::freeSquares(const FitState& state) {
-  turnFitted(state);
-  return squaresLeft(exact_runner_, exact_runner_.simulate(quick_.model(state)));
+  alignFitted(state);
+  return residualSquares(exact_runner_, exact_runner_.simulate(quick_.model(state)));
 }
 
-void Workbench::guide(bool guided) {
+void Workbench::setGuided(bool guided) {
   guided_ = guided && can_guide_;
   for (TestData& t : data_.tests) t.guided = t.chatter.has_value();
   readGuidance();
@@ -257,14 +258,14 @@ void Workbench::guide(bool guided) {
   heldout_runner_.setGuided(guided_);
 }
 
-bool Workbench::weighBy(const FitState& state) {
-  weighAlike();
+bool Workbench::whitenAt(const FitState& state) {
+  clearWhitening();
   if (guided_) return false;
-  turnTo(state);
+  alignTo(state);
   const MachineModel model = quick_.model(state);
   const std::vector<Whitening> of_fitted = whiteningOf(fitted(), model),
                                of_heldout = whiteningOf(heldout_runner_, model);
-  const auto changes = [](const Whitening& w) { return w.changes(); };
+  const auto changes = [](const Whitening& w) { return w.isActive(); };
   if (std::none_of(of_fitted.begin(), of_fitted.end(), changes)) return false;
   for (TwinRunner* runner : {&quick_runner_, &exact_runner_, &guided_runner_})
     runner->setWhitening(of_fitted);
@@ -272,13 +273,13 @@ bool Workbench::weighBy(const FitState& state) {
   return true;
 }
 
-void Workbench::weighAlike() {
+void Workbench::clearWhitening() {
   for (TwinRunner* runner : {&quick_runner_, &exact_runner_, &guided_runner_, &heldout_runner_})
     runner->setWhitening({});
 }
 
 double Workbench::exactSquaresHere(const FitState& state) const {
-  return squaresLeft(fitted(), fitted().simulate(quick_.model(state)));
+  return residualSquares(fitted(), fitted().simulate(quick_.model(state)));
 }
 
 bool Workbench::refineQuick() {
@@ -290,32 +291,32 @@ bool Workbench::refineQuick() {
   return true;
 }
 
-double Workbench::turnPhases(FitState& state) {
-  // Fits find what is less better, by every sample and with what else is free: turned back and forth between
-  // two answers nothing would settle.
-  constexpr double FITTED = 0.05;  // [rad]
+double Workbench::alignPhases(FitState& state) {
+  // Smaller rotations are left to the fits, which use all samples and free values; correcting them here would
+  // alternate between two solutions.
+  constexpr double MIN_ROTATION = 0.05;  // [rad]
   if (!phases_estimated_) return 0.0;
-  turnFitted(state);
-  const double turn = discrepancy::turnPhases(data_, quick_.model(state), FITTED);
+  alignFitted(state);
+  const double moved = discrepancy::alignPhases(data_, quick_.model(state), MIN_ROTATION);
   heldout_runner_.readPhases();
-  if (turn == 0.0) return turn;
-  state.turns.clear();
-  for (const Fitter::TurnOf& t : quick_.turns()) {
+  if (moved == 0.0) return moved;
+  state.alignment.clear();
+  for (const Fitter::FreeAlignment& t : quick_.alignment()) {
     const TestData& now = data_.tests[exact_runner_.tests()[t.chosen]];
-    state.turns.push_back(turnBetween(loaded_[t.chosen], now).*t.freedom.value);
+    state.alignment.push_back(alignmentBetween(loaded_[t.chosen], now).*t.freedom.value);
   }
-  return turn;
+  return moved;
 }
 
-void Workbench::turnTo(const FitState& state) {
+void Workbench::alignTo(const FitState& state) {
   constexpr int PASSES = 3;
-  constexpr double SETTLED = 1e-4;  // [rad]
-  turnFitted(state);
+  constexpr double TOLERANCE = 1e-4;  // [rad]
+  alignFitted(state);
   for (int pass = 0; pass < PASSES; ++pass) {
     const MachineModel model = quick_.model(state);
-    const double turn = turnOnce(heldout_runner_, model, &data_);
+    const double moved = alignOnce(heldout_runner_, model, &data_);
     heldout_runner_.readPhases();
-    if (turn < SETTLED) return;
+    if (moved < TOLERANCE) return;
   }
 }
 

@@ -1,4 +1,4 @@
-// Chatter in a record: what does not come again with the revolution, from sums of sines made here.
+// Detection of chatter in synthetic sums of sines.
 
 #include "smartmill_discrepancy/data/chatter.h"
 
@@ -23,7 +23,7 @@ CampaignTest cut() {
   return t;
 }
 
-// Tooth passing at 300 Hz of 100 N, runout of 20 N, 1 N of noise, and a line of its own.
+// Tooth passing at 300 Hz of 100 N, runout of 20 N, 1 N of noise, and one more line.
 Record forces(double amplitude, double frequency, std::size_t samples = 5120) {
   std::mt19937_64 random(3);
   std::normal_distribution<double> normal;
@@ -42,27 +42,27 @@ Record forces(double amplitude, double frequency, std::size_t samples = 5120) {
   return r;
 }
 
-TEST(FindChatter, tellsALineOfItsOwnFromTheRevolution) {
+TEST(FindChatter, FindsAnAsynchronousLine) {
   EXPECT_FALSE(findChatter(forces(0.0, 1111.0), cut(), 0).has_value());
   const auto chatter = findChatter(forces(80.0, 1111.0), cut(), 0);
   ASSERT_TRUE(chatter.has_value());
-  // The second half holds 0.1 s: lines of 10 Hz.
+  // The second half lasts 0.1 s: resolution 10 Hz.
   EXPECT_NEAR(chatter->frequency, 1111.0, 10.0);
-  // Share: 80 / sqrt2 over the RMS of all, times |2 sin(phi / 2)| / sqrt2 between revolutions; between the
-  // channels the smaller of two alike. phi = 2 pi 1111 / 75: 14.813 turns.
-  const double turn = std::abs(2.0 * std::sin(units::PI * 1111.0 / 75.0)) / std::sqrt(2.0);
+  // Share: 80 / sqrt2 over the RMS of all, times |2 sin(phi / 2)| / sqrt2 between revolutions; the smaller of
+  // both channels. phi = 2 pi 1111 / 75: 14.813 revolutions.
+  const double change = std::abs(2.0 * std::sin(units::PI * 1111.0 / 75.0)) / std::sqrt(2.0);
   const double all = std::sqrt(80.0 * 80.0 + 100.0 * 100.0 + 20.0 * 20.0);
-  EXPECT_NEAR(chatter->share, turn * 80.0 / all, 0.1 * turn * 80.0 / all);
+  EXPECT_NEAR(chatter->share, change * 80.0 / all, 0.1 * change * 80.0 / all);
   EXPECT_NEAR(chatter->amplitude, 80.0, 12.0);
 }
 
-// Hum and drift are no chatter; nor is a line at an order, which a model can follow.
-TEST(FindChatter, leavesSlowAndPeriodicLinesAlone) {
+// Hum, drift and lines at orders of the spindle are not chatter.
+TEST(FindChatter, IgnoresSlowAndSynchronousLines) {
   EXPECT_FALSE(findChatter(forces(80.0, 50.0), cut(), 0).has_value());
   EXPECT_FALSE(findChatter(forces(80.0, 75.0 * 13), cut(), 0).has_value());
 }
 
-TEST(FindChatter, saysNothingOfShortOrOtherRecords) {
+TEST(FindChatter, IgnoresShortAndOtherRecords) {
   EXPECT_FALSE(findChatter(forces(80.0, 1111.0, 500), cut(), 0).has_value());
   EXPECT_FALSE(findChatter(forces(80.0, 1111.0), cut(), 5119).has_value());
   CampaignTest air = cut();

@@ -15,7 +15,7 @@
 namespace smartmill::discrepancy {
 namespace {
 
-TEST(Labels, nameSwappedChannelsWrongSignsAndAnotherSpeed) {
+TEST(Labels, NameSwappedChannelsWrongSignsAndWrongSpeed) {
   SMARTMILL_SHARED_DATA(folder, "campaigns/runout");
   Campaign campaign = readCampaign(folder);
   const std::set<std::string> kept{"air_1000", "slot_3000", "slot_7200", "slot_4500_060"};
@@ -33,24 +33,24 @@ TEST(Labels, nameSwappedChannelsWrongSignsAndAnotherSpeed) {
   ASSERT_EQ(wrong.size(), 1u);
   EXPECT_EQ(wrong.front(), "fx and fy look swapped in tests " + swapped.tests[2].test.name);
 
-  Dataset turned = data;
-  for (TestData& t : turned.tests) {
+  Dataset inverted = data;
+  for (TestData& t : inverted.tests) {
     for (const char* channel : {"fx", "fz"}) {
       for (double& v : t.record.add(channel)) v = -v;
     }
   }
-  ASSERT_EQ(checkLabels(turned, 2).wrong.size(), 1u);
-  EXPECT_EQ(checkLabels(turned, 2).wrong.front(),
-            "fx, fz read minus what the model says: sign or force_sensor.measures looks wrong");
+  ASSERT_EQ(checkLabels(inverted, 2).wrong.size(), 1u);
+  EXPECT_EQ(checkLabels(inverted, 2).wrong.front(),
+            "fx, fz have the opposite sign of the simulation: sign or force_sensor.measures looks wrong");
 
   Dataset speed = data;
   speed.tests[2].test.spindle_speed *= 1.25;
   ASSERT_EQ(checkLabels(speed, 2).wrong.size(), 1u);
 }
 
-// Chips at other feeds than the label says are doubted with any model. Where the law bends, so that a high
-// feed is as easy as a lower one, that is doubted beside a nominal model only.
-TEST(Labels, areClearedByAModelThatHasTheCause) {
+// A wrong feed label is doubtful with any model. A nonlinear law, with which a high feed has the force of a
+// lower one, is doubtful with the nominal model only.
+TEST(Labels, AreNotDoubtfulWithAModelThatHasTheCause) {
   SMARTMILL_SHARED_DATA(folder, "campaigns/none");
   const Campaign campaign = readCampaign(folder);
   const Dataset data = loadDataset(campaign, readMachineModel(campaign.modelPath()));
@@ -70,13 +70,13 @@ TEST(Labels, areClearedByAModelThatHasTheCause) {
   ASSERT_EQ(doubtful.size(), 1u);
   EXPECT_EQ(doubtful.front(),
             "test slot_4500_100 looks mislabelled: feed, depth or immersion of slot_4500_060 fit its record");
-  EXPECT_EQ(doubtfulWith(data.nominal, machine, 2), doubtful);
-  EXPECT_TRUE(doubtfulWith(bent, machine, 2).empty());
+  EXPECT_EQ(doubtfulLabels(data.nominal, machine, 2), doubtful);
+  EXPECT_TRUE(doubtfulLabels(bent, machine, 2).empty());
   relabelled.tests[again].test.engagement = data.tests[high].test.engagement;
   const std::vector<std::string> wrong = checkLabels(relabelled, 2).doubtful;
   ASSERT_EQ(wrong.size(), 1u);
   EXPECT_NE(wrong.front().find("slot_4500_again looks mislabelled"), std::string::npos) << wrong.front();
-  EXPECT_EQ(doubtfulWith(data.nominal, relabelled, 2), wrong);
+  EXPECT_EQ(doubtfulLabels(data.nominal, relabelled, 2), wrong);
 }
 
 }  // namespace

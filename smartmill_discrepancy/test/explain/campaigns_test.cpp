@@ -16,8 +16,7 @@
 namespace smartmill::discrepancy {
 namespace {
 
-// Records of another program, with what it hid in them: nothing, one or two effects of the catalogue, or a
-// cause that the catalogue does not list.
+// Records of another program with hidden effects: none, one or two of the catalogue, or a cause outside it.
 struct Example {
   std::string name;
   Verdict verdict;
@@ -73,26 +72,26 @@ void expectTrue(const FoundEffect& found, const std::map<std::string, Printed>& 
   }
 }
 
-// The cause outside the catalogue is a tone on fz, told where it is, and built from what is left.
+// The cause outside the catalogue is a tone on fz: localised in the residual and modelled empirically.
 void expectTone(const Explanation& e, const std::map<std::string, Printed>& truth) {
   ASSERT_FALSE(e.unexplained.empty());
   const Finding& tone = e.unexplained.front();
   EXPECT_EQ(tone.channel, "fz");
   EXPECT_EQ(tone.domain, "frequency");
-  // Records of 0.2 s tell lines 5 Hz apart; their amplitude tells the centre far better.
+  // The resolution of 0.2 s is 5 Hz; the centre is estimated far better from the amplitude.
   EXPECT_NEAR(tone.location.at("frequency_hz"), truth.at("frequency_hz").value, 0.3);
   EXPECT_NEAR(tone.amplitude, truth.at("amplitude_n").value, 0.5);
   ASSERT_EQ(namesOf(e), std::vector<std::string>{"empirical:tone"});
   EXPECT_EQ(e.effects[0].words.at("channel"), "fz");
   for (const FoundParameter& p : e.effects[0].parameters) {
-    const Printed due = truth.at(p.key == "amplitude" ? "amplitude_n" : p.key);
-    EXPECT_LE(std::abs(p.value - due.value), 3.0 * p.std_dev + due.rounding) << p.key;
+    const Printed expected = truth.at(p.key == "amplitude" ? "amplitude_n" : p.key);
+    EXPECT_LE(std::abs(p.value - expected.value), 3.0 * p.std_dev + expected.rounding) << p.key;
   }
 }
 
 class ExampleCampaign : public testing::TestWithParam<Example> {};
 
-TEST_P(ExampleCampaign, IsExplainedAsItsMakerKnows) {
+TEST_P(ExampleCampaign, IsExplainedByItsTruth) {
   SMARTMILL_SHARED_DATA(folder, "campaigns/" + GetParam().name);
   const Truth truth = truthOf(folder);
   const Explanation e = explained(folder);
@@ -107,15 +106,15 @@ TEST_P(ExampleCampaign, IsExplainedAsItsMakerKnows) {
     ASSERT_EQ(namesOf(e), names);
     for (const FoundEffect& effect : e.effects) expectTrue(effect, truth.at(effect.name));
     EXPECT_TRUE(e.unexplained.empty());
-    // Nor on the way: a fit in a wrong valley makes room for others.
-    for (const TriedEffect& t : e.ladder)
-      EXPECT_TRUE(!t.taken || truth.count(t.effect) > 0) << t.effect << " in round " << t.round;
+    // Nor accepted in between, which would indicate a fit in a wrong valley.
+    for (const CandidateResult& t : e.candidates)
+      EXPECT_TRUE(!t.accepted || truth.count(t.effect) > 0) << t.effect << " in round " << t.round;
   }
   EXPECT_LE(e.after.fit, 1.05);
   EXPECT_LE(e.after.heldout, 1.05);
 }
 
-// A campaign as people have it: half the sample rate, no taps, no spindle angle.
+// A typical campaign: half the sample rate, no taps, no spindle angle.
 void writeLess(const Campaign& full, const std::string& folder) {
   Campaign less = full;
   less.folder = folder;
@@ -137,9 +136,9 @@ void writeLess(const Campaign& full, const std::string& folder) {
   writeCampaign(less, folder);
 }
 
-// Nominal values a deviation or two off: phases and speeds that were estimated with them are wrong too, and
-// what is wrong with them is no effect. The maker's entry takes half of a sample's part at half the rate.
-TEST(RecordsWithoutAngle, offNominalValuesAreNoEffect) {
+// Nominal values one or two standard deviations off: estimated phases and speeds are off too, without any
+// effect. The entry of the other program lasts half a sample at half the rate.
+TEST(RecordsWithoutAngle, DeviatingNominalValuesAreNoEffect) {
   SMARTMILL_SHARED_DATA(folder, "campaigns/none");
   TemporaryFolder less;
   const Campaign full = readCampaign(folder);

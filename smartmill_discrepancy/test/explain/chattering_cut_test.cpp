@@ -1,6 +1,5 @@
-// A cut that chatters as data: predicted step by step it tells coefficients and modes of the tool, and it
-// tells them honestly, where nothing but shallow cuts stands beside it. The truth is what its simulation was
-// given.
+// A chattering cut, compared by one-step prediction, as data: it improves coefficients and tool modes with
+// calibrated uncertainties next to shallow cuts only. The truth is that of the simulation.
 
 #include <algorithm>
 #include <cmath>
@@ -19,7 +18,7 @@
 namespace smartmill::discrepancy {
 namespace {
 
-constexpr double DEEP = 4e-3, SHALLOW = 0.5e-3;  // [m] about the least limit, some 1 mm
+constexpr double DEEP = 4e-3, SHALLOW = 0.5e-3;  // [m] around the critical limit of about 1 mm
 
 MachineModel slender(double stiffness, double damping) {
   MachineModel m = believed();
@@ -30,15 +29,15 @@ MachineModel slender(double stiffness, double damping) {
   return m;
 }
 
-// With the displacement of the tip or without it, in steps four times as fine as those of the fit.
-Record measured(const CampaignTest& test, bool shows_tip, std::mt19937_64& random) {
+// With or without the displacement of the tip, in steps four times as fine as those of the fit.
+Record measured(const CampaignTest& test, bool has_tip, std::mt19937_64& random) {
   std::normal_distribution<double> normal;
   sim::SimulationOptions options;
   options.substeps = 32;
   options.seed = random();
   const MachineModel truth = slender(30e6, 0.03);
   Record record = sim::simulateTest(truth, test, 0.15, options);
-  if (!shows_tip) return record;
+  if (!has_tip) return record;
   for (const char* tip : {"tool_x", "tool_y"}) record.add(tip).assign(record.size(), 0.0);
   record = sim::simulateTest(truth, test, record, options);
   for (const char* tip : {"tool_x", "tool_y"}) {
@@ -47,7 +46,7 @@ Record measured(const CampaignTest& test, bool shows_tip, std::mt19937_64& rando
   return record;
 }
 
-Dataset campaignOf(const MachineModel& nominal, const std::string& folder, bool deep, bool shows_tip) {
+Dataset campaignOf(const MachineModel& nominal, const std::string& folder, bool deep, bool has_tip) {
   Campaign campaign;
   campaign.folder = folder;
   campaign.model_file = "model.yaml";
@@ -56,64 +55,63 @@ Dataset campaignOf(const MachineModel& nominal, const std::string& folder, bool 
   if (!deep) campaign.tests.pop_back();
   writeMachineModel(nominal, campaign.modelPath());
   std::mt19937_64 random(7);
-  for (const CampaignTest& t : campaign.tests)
-    writeCsv(measured(t, shows_tip, random), folder + "/" + t.file);
+  for (const CampaignTest& t : campaign.tests) writeCsv(measured(t, has_tip, random), folder + "/" + t.file);
   return loadDataset(campaign, readMachineModel(campaign.modelPath()));
 }
 
-struct Told {
+struct FittedValues {
   std::vector<std::string> names;
   std::vector<double> value, std_dev;
   double gap = 0.0, error_before = 0.0, error_after = 0.0;
 };
 
-Told fitted(const Dataset& data) {
+FittedValues fitted(const Dataset& data) {
   WorkbenchOptions options;
   options.threads = 1;
   Workbench bench(data, options);
   FitState start;
   start.nominal.assign(bench.freedom().coordinates().size(), 0.0);
-  Told told;
-  const auto error = [](const Remains& r) {
+  FittedValues fitted_values;
+  const auto error = [](const ModelResidual& r) {
     return r.chattering.empty() ? 0.0 : r.chattering.begin()->second;
   };
-  told.error_before = error(remainsOf(bench, data.nominal));
+  fitted_values.error_before = error(residualOf(bench, data.nominal));
   SearchResult found;
   for (int pass = 0; pass < 2; ++pass) {
     EXPECT_TRUE(refine(bench, start, {}, &found));
     start = found.best.state;
-    bench.trustAt(start);
+    bench.updateWeights(start);
   }
-  const Remains after = remainsOf(bench, bench.exact().model(start));
-  told.gap = after.gap.fit;
-  told.error_after = error(after);
-  const Eigen::MatrixXd covariance = settledCovariance(bench, found.best);
+  const ModelResidual after = residualOf(bench, bench.exact().model(start));
+  fitted_values.gap = after.gap.fit;
+  fitted_values.error_after = error(after);
+  const Eigen::MatrixXd covariance = robustCovariance(bench, found.best);
   for (std::size_t c = 0; c < start.nominal.size(); ++c) {
     const auto k = static_cast<Eigen::Index>(c);
-    told.names.push_back(bench.freedom().coordinates()[c].name);
-    told.value.push_back(start.nominal[c]);
-    told.std_dev.push_back(std::sqrt(covariance(k, k)));
+    fitted_values.names.push_back(bench.freedom().coordinates()[c].name);
+    fitted_values.value.push_back(start.nominal[c]);
+    fitted_values.std_dev.push_back(std::sqrt(covariance(k, k)));
   }
-  return told;
+  return fitted_values;
 }
 
-TEST(ChatteringCut, IsDataOfItsOwnWeight) {
+TEST(ChatteringCut, ImprovesTheFitWithCalibratedDeviations) {
   const TemporaryFolder with_folder, without_folder;
-  // 20 % too stiff and 20 % damped too much: coordinates are logarithms of factors.
+  // 20 % too much stiffness and damping: coordinates are logarithms of factors.
   const MachineModel nominal = slender(36e6, 0.036);
   const Dataset data = campaignOf(nominal, with_folder.file("."), true, true);
   ASSERT_EQ(data.tests.size(), 3u);
   EXPECT_TRUE(data.chattering.empty());
   EXPECT_TRUE(data.tests.back().chatter && data.tests.back().guided && !data.tests.back().heldout);
-  const Told with = fitted(data);
-  const Told without = fitted(campaignOf(nominal, without_folder.file("."), false, true));
+  const FittedValues with = fitted(data);
+  const FittedValues without = fitted(campaignOf(nominal, without_folder.file("."), false, true));
   for (std::size_t c = 0; c < with.names.size(); ++c) {
     const std::string& name = with.names[c];
     double truth = 0.0;
     if (name.find("stiffness") != std::string::npos) truth = std::log(30.0 / 36.0);
     if (name.find("damping") != std::string::npos) truth = std::log(0.03 / 0.036);
     EXPECT_LT(with.std_dev[c], without.std_dev[c]) << name;
-    // Modes are known by what vibrates.
+    // Vibration determines the modes.
     if (name.find("damping") != std::string::npos) {
       EXPECT_LT(with.std_dev[c], 0.5 * without.std_dev[c]) << name;
     }
@@ -123,9 +121,8 @@ TEST(ChatteringCut, IsDataOfItsOwnWeight) {
   EXPECT_LT(with.error_after, 0.5 * with.error_before);
 }
 
-// Without the displacement, or a tool of the model that moves, nothing leads through the cut: it is set
-// aside.
-TEST(ChatteringCut, IsSetAsideWhereNothingLeads) {
+// Without displacement or tool modes the cut cannot be guided and is excluded.
+TEST(ChatteringCut, IsExcludedIfItCannotBeGuided) {
   const TemporaryFolder rigid_folder, forces_folder;
   for (const Dataset& data : {campaignOf(believed(), rigid_folder.file("."), true, true),
                               campaignOf(slender(30e6, 0.03), forces_folder.file("."), true, false)}) {
@@ -135,10 +132,11 @@ TEST(ChatteringCut, IsSetAsideWhereNothingLeads) {
   }
 }
 
-// Records of another program, two of plain cuts and one of a cut so near its limit that what rings on in it
-// is another's rounding. Its runout is that of truth.yaml.
+// Records of another program: two cuts far from the stability limit and one so near that its vibration is due
+// to rounding errors. Runout as in truth.yaml.
 struct NearLimit {
-  double apart = 0.0;    // [standard deviations] of cutting law and tool from the truth, by their covariance
+  double offset =
+      0.0;  // [standard deviations] distance of cutting law and tool from the truth, by their covariance
   double kre_std = 0.0;  // of the logarithm
 };
 
@@ -155,11 +153,11 @@ NearLimit fittedNearLimit(const std::string& folder, bool guided) {
   for (const Coordinate& c : freedom.coordinates())
     off.push_back(!isCompared(c) ? 0.0 : c.name.find("frequency") != std::string::npos ? 0.005 : -0.1);
   Dataset data = loadDataset(campaign, freedom.apply(truth, off));
-  const auto wanted = [](const TestData& t) {
+  const auto isUsed = [](const TestData& t) {
     return t.test.name == "slot_4500_deep" || t.test.name == "slot_1200" || t.test.name == "slot_4500_100";
   };
   data.tests.erase(
-      std::remove_if(data.tests.begin(), data.tests.end(), [&](const TestData& t) { return !wanted(t); }),
+      std::remove_if(data.tests.begin(), data.tests.end(), [&](const TestData& t) { return !isUsed(t); }),
       data.tests.end());
   for (TestData& t : data.tests) t.heldout = false;
   WorkbenchOptions options;
@@ -172,33 +170,33 @@ NearLimit fittedNearLimit(const std::string& folder, bool guided) {
     EXPECT_TRUE(refine(bench, state, {}, &found));
     state = found.best.state;
     if (guided) bench.guideNearLimit(state);
-    bench.trustAt(state);
+    bench.updateWeights(state);
   }
-  const Eigen::MatrixXd covariance = settledCovariance(bench, found.best);
+  const Eigen::MatrixXd covariance = robustCovariance(bench, found.best);
   NearLimit result;
-  std::vector<Eigen::Index> places;
+  std::vector<Eigen::Index> indices;
   for (std::size_t c = 0; c < off.size(); ++c) {
     const auto k = static_cast<Eigen::Index>(c);
-    if (isCompared(freedom.coordinates()[c])) places.push_back(k);
+    if (isCompared(freedom.coordinates()[c])) indices.push_back(k);
     if (freedom.coordinates()[c].name == "cutting.Kre_n_per_mm") result.kre_std = std::sqrt(covariance(k, k));
   }
-  Eigen::VectorXd apart(static_cast<Eigen::Index>(places.size()));
-  for (Eigen::Index k = 0; k < apart.size(); ++k) {
-    const auto c = static_cast<std::size_t>(places[static_cast<std::size_t>(k)]);
-    apart[k] = state.nominal[c] + off[c];
+  Eigen::VectorXd offset(static_cast<Eigen::Index>(indices.size()));
+  for (Eigen::Index k = 0; k < offset.size(); ++k) {
+    const auto c = static_cast<std::size_t>(indices[static_cast<std::size_t>(k)]);
+    offset[k] = state.nominal[c] + off[c];
   }
-  const Eigen::MatrixXd of_compared = covariance(places, places);
-  result.apart =
-      std::sqrt(apart.dot(linear::solveSymmetric(of_compared, apart)) / static_cast<double>(apart.size()));
+  const Eigen::MatrixXd of_compared = covariance(indices, indices);
+  result.offset =
+      std::sqrt(offset.dot(linear::solveSymmetric(of_compared, offset)) / static_cast<double>(offset.size()));
   return result;
 }
 
-TEST(CutNearItsLimit, IsLedAndDrawsNothingAfterItsRing) {
+TEST(CutNearItsLimit, IsGuidedAndUnbiasedByItsVibration) {
   SMARTMILL_SHARED_DATA(folder, "campaigns/vibrating_runout");
-  const NearLimit led = fittedNearLimit(folder, true), free = fittedNearLimit(folder, false);
-  EXPECT_LT(led.apart, 1.5);
-  EXPECT_LT(led.apart, free.apart);
-  EXPECT_LT(led.kre_std, 0.5 * free.kre_std);
+  const NearLimit guided = fittedNearLimit(folder, true), free = fittedNearLimit(folder, false);
+  EXPECT_LT(guided.offset, 1.5);
+  EXPECT_LT(guided.offset, free.offset);
+  EXPECT_LT(guided.kre_std, 0.5 * free.kre_std);
 }
 
 }  // namespace

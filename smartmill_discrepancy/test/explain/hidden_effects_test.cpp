@@ -1,6 +1,6 @@
-// Effects that no campaign of another program hides: from records of a machine that has them to their names.
-// Machine and twin share the kernel of the cut (eight steps a sample here, four there), so that this shows
-// the search, not the physics; that stands in smartmill_sim's tests of each effect.
+// Effects without a shared campaign: identification from simulated records. Machine and twin share the
+// cutting kernel (eight and four steps per sample), so this tests the search; smartmill_sim tests the physics
+// of each effect.
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -29,31 +29,32 @@ void expectFound(const EffectEntry& hidden) {
   ASSERT_EQ(e.effects.size(), 1u);
   EXPECT_EQ(e.effects.front().name, hidden.name);
   for (const auto& [key, truth] : numbersOf(hidden)) {
-    bool told = false;
+    bool reported = false;
     for (const FoundParameter& p : e.effects.front().parameters) {
       if (p.key != key) continue;
-      told = true;
+      reported = true;
       EXPECT_NEAR(p.value, truth, 4.0 * p.std_dev) << key;
       EXPECT_LT(p.std_dev, 0.1 * std::abs(truth) + 0.1) << key;
     }
-    EXPECT_TRUE(told) << key;
+    EXPECT_TRUE(reported) << key;
   }
 }
 
-TEST(HiddenEffects, aChippedToothIsFound) {
+TEST(HiddenEffects, FindsAChippedTooth) {
   EffectEntry hidden;
   hidden.name = "tooth_radius";
   hidden.lists["offset_um"] = {4.0, 6.0, -13.0, 3.0};
   expectFound(hidden);
 }
 
-// All cuts are of one depth: only the shape of the forces tells a round corner from other coefficients.
-TEST(HiddenEffects, aRoundCornerIsFound) {
+// All cuts have one depth: only the shape of the forces distinguishes a corner radius from other
+// coefficients.
+TEST(HiddenEffects, FindsACornerRadius) {
   expectFound(effectEntry("corner_radius", {{"corner_radius_mm", 0.8}}));
 }
 
 // All cuts start within a few time constants.
-TEST(HiddenEffects, aWarmingSpindleIsFound) {
+TEST(HiddenEffects, FindsThermalGrowth) {
   expectFound(effectEntry("thermal_growth", {{"growth_um", 58.0}, {"time_constant_s", 190.0}}));
 }
 

@@ -22,12 +22,12 @@ Dataset withHiddenFriction() {
 ExplainOptions cancelledAfter(int times) {
   ExplainOptions options;
   options.bench.threads = 1;
-  options.bench.cancelled = [times, asked = 0]() mutable { return ++asked > times; };
+  options.bench.cancelled = [times, calls = 0]() mutable { return ++calls > times; };
   return options;
 }
 
-// Ended from outside it says so and still writes the model that it has come to.
-TEST(Explain, EndsWithWhatWasFoundWhenItIsInterrupted) {
+// A cancelled search reports it and writes the current model.
+TEST(Explain, EndsWithTheEffectsFoundWhenInterrupted) {
   const Dataset data = withHiddenFriction();
   TemporaryFolder out;
   const Explanation at_once = explain(data, cancelledAfter(0), out.file("."));
@@ -41,8 +41,8 @@ TEST(Explain, EndsWithWhatWasFoundWhenItIsInterrupted) {
   EXPECT_EQ(whole.effects.front().name, "stribeck_friction");
 }
 
-// A twin without numbers is refused in one line that names test and channel, not searched.
-TEST(Explain, RefusesAModelForWhichTheTwinGivesNoNumbers) {
+// A model for which the twin gives no finite values is rejected in one line with test and channel.
+TEST(Explain, RejectsAModelWithoutFiniteValuesOfTheTwin) {
   Dataset data = withHiddenFriction();
   data.nominal.spindle->viscous = std::numeric_limits<double>::quiet_NaN();
   TemporaryFolder out;

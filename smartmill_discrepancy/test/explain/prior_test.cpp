@@ -1,5 +1,5 @@
-// Slots at one speed, of a law that knows the cutting speed: nothing there tells a slower feed from other
-// coefficients.
+// Slots at one speed with a law that depends on the cutting speed, which is equivalent to a smaller feed or
+// other coefficients.
 #include <optional>
 #include <string>
 
@@ -40,14 +40,14 @@ CauseOdds odds(const std::string& frequent) {
   return odds;
 }
 
-// A feed error and other coefficients of the chip fit alike. The prior says how sure the name is and nothing
-// else: it is the same one, with the same values, however rare.
-TEST(Prior, saysHowSureANameIsAgainstOneThatTheRecordsDoNotPart) {
+// A feed error and other chip coefficients fit equally. The prior changes the confidence only, neither the
+// name nor its values.
+TEST(Prior, SetsTheConfidenceOfUnidentifiablePairs) {
   const Explanation without = slotsAtOneSpeed({});
   ASSERT_EQ(without.effects.size(), 1u);
   ASSERT_EQ(without.not_separable.size(), 1u);
-  const std::string name = without.not_separable[0][0], rival = without.not_separable[0][1];
-  const Explanation usual = slotsAtOneSpeed(odds(name)), rare = slotsAtOneSpeed(odds(rival));
+  const std::string name = without.not_separable[0][0], alternative = without.not_separable[0][1];
+  const Explanation usual = slotsAtOneSpeed(odds(name)), rare = slotsAtOneSpeed(odds(alternative));
   for (const Explanation* e : {&usual, &rare}) {
     ASSERT_EQ(e->effects.size(), 1u);
     EXPECT_EQ(e->verdict, without.verdict);
@@ -58,8 +58,8 @@ TEST(Prior, saysHowSureANameIsAgainstOneThatTheRecordsDoNotPart) {
     EXPECT_EQ(e->suggested_test, without.suggested_test);
   }
   EXPECT_GT(usual.effects[0].confidence, 0.99);
-  EXPECT_LT(rare.effects[0].confidence, 0.5) << "183 to 1 beforehand, and next to nothing by the records";
-  EXPECT_NE(rare.notes.back().find("beforehand, by 30 other machines: odds of " + name + " 0.0164"),
+  EXPECT_LT(rare.effects[0].confidence, 0.5) << "prior odds 1 to 183, and hardly any evidence of the records";
+  EXPECT_NE(rare.notes.back().find("prior of 30 other machines: odds of " + name + " 0.0164"),
             std::string::npos)
       << rare.notes.back();
 }

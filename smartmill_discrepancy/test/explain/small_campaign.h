@@ -18,7 +18,7 @@ inline MachineModel believed() {
   return m;
 }
 
-/// Within what is stated of the values: 3 %.
+/// Within the stated uncertainty of 3 %.
 inline MachineModel real() {
   MachineModel m = believed();
   m.cutting->ktc *= 1.03;
@@ -40,14 +40,14 @@ inline CampaignTest slot(const std::string& name, double rpm, double feed_mm, do
   return t;
 }
 
-/// Slots at three feeds and three speeds, a quarter of an hour long.
+/// Slots at three feeds and three speeds over a quarter of an hour.
 inline std::vector<CampaignTest> slotsOfManyKinds() {
   return {slot("a", 4500, 0.06, 90),  slot("b", 4500, 0.03, 180), slot("c", 4500, 0.1, 270),
           slot("d", 3000, 0.06, 360), slot("e", 7200, 0.06, 540), slot("f", 7200, 0.1, 720),
           slot("g", 3000, 0.03, 810), slot("h", 4500, 0.06, 900)};
 }
 
-/// A campaign of them, nominal model as believed. @param record of a test, drawn with a seed
+/// A campaign with the nominal model believed(). @param record of a test, drawn with a seed
 inline Dataset datasetOf(const std::function<Record(const CampaignTest&, std::uint64_t seed)>& record,
                          const std::string& folder,
                          const std::vector<CampaignTest>& tests = slotsOfManyKinds()) {

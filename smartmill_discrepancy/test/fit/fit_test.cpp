@@ -26,9 +26,9 @@ const Hypothesis& effectOf(const std::vector<Hypothesis>& hypotheses, std::strin
                        [&](const Hypothesis& h) { return h.effect == effect; });
 }
 
-// Machines drawn with friction that their nominal models lack, nominal values off by what is stated of them:
-// the fit's standard deviations tell how far it is from the truth, neither too small nor inflated.
-TEST(Fitter, standardDeviationsAreHonest) {
+// Machines with random friction that their nominal models lack, and nominal values off by their stated
+// uncertainty: the standard deviations of the fit are calibrated.
+TEST(Fitter, DeviationsAreCalibrated) {
   std::mt19937_64 random(17);
   std::normal_distribution<double> normal;
   const MachineModel nominal = spindleOnly();
@@ -48,7 +48,7 @@ TEST(Fitter, standardDeviationsAreHonest) {
     FitState start;
     start.nominal.assign(freedom.coordinates().size(), 0.0);
     start.members.push_back({&stribeck, {0.3, std::log(2000.0)}});
-    const Fit fit = fitter.fit(start, nullptr, {30, 1e-10, true});
+    const FitResult fit = fitter.fit(start, nullptr, {30, 1e-10, true});
     ASSERT_TRUE(fit.converged);
     const std::vector<double>& values = fit.state.members.front().values;
     const std::vector<double> true_values{breakaway, std::log(speed)};
@@ -60,37 +60,37 @@ TEST(Fitter, standardDeviationsAreHonest) {
   for (const Coverage& c : coverage) EXPECT_TRUE(c.honest());
 }
 
-// The noise of air cuts of a machine carries a share of each sample on to the next.
-void carryNoiseOn(double share, const MachineModel& machine, Dataset* data) {
+// Correlates the noise of air cuts: each sample contains a share of the previous one.
+void correlateNoise(double share, const MachineModel& machine, Dataset* data) {
   sim::SimulationOptions quiet;
   quiet.noise = false;
   for (TestData& test : data->tests) {
-    std::vector<double> shown = test.record.column("load_meter");
+    std::vector<double> simulated_state = test.record.column("load_meter");
     const std::vector<double> clean =
         sim::simulateTest(machine, test.test, test.record, quiet).column("load_meter");
-    double carried = (shown[0] - clean[0]) * (1.0 / std::sqrt(1.0 - share * share) - 1.0) / share;
-    for (std::size_t i = 0; i < shown.size(); ++i) {
-      carried = share * carried + shown[i] - clean[i];
-      shown[i] = clean[i] + carried;
+    double correlated =
+        (simulated_state[0] - clean[0]) * (1.0 / std::sqrt(1.0 - share * share) - 1.0) / share;
+    for (std::size_t i = 0; i < simulated_state.size(); ++i) {
+      correlated = share * correlated + simulated_state[i] - clean[i];
+      simulated_state[i] = clean[i] + correlated;
     }
-    test.record.add("load_meter") = shown;
+    test.record.add("load_meter") = simulated_state;
   }
 }
 
-// What follows upon another tells nothing new: where every sample counts for itself the deviations of slow
-// values are too small by the root of (1 + share) / (1 - share), three here; through the filter of what a
-// first fit leaves they are honest again.
-TEST(Fitter, standardDeviationsAreHonestBesideNoiseThatIsCarriedOn) {
+// Without whitening the standard deviations of slow values are too small by the root of (1 + share) / (1 -
+// share), three here; whitened by the residual of a first fit they are calibrated.
+TEST(Fitter, DeviationsAreCalibratedWithCorrelatedNoise) {
   constexpr double SHARE = 0.8;
   std::mt19937_64 random(23);
   const MachineModel nominal = spindleOnly();
   const NominalFreedom freedom(nominal);
   MachineModel machine = nominal;
   machine.effects.push_back(stribeckFriction(0.4, 2500.0));
-  Coverage alike, weighed;
+  Coverage unweighted, whitened;
   for (int run = 0; run < Coverage::RUNS; ++run) {
     Dataset data = airCuts(machine, nominal, random);
-    carryNoiseOn(SHARE, machine, &data);
+    correlateNoise(SHARE, machine, &data);
     const std::vector<Hypothesis> hypotheses = catalogueHypotheses(data, nullptr);
     const Hypothesis& stribeck = effectOf(hypotheses, "stribeck_friction");
     TwinRunner runner(data, {0, 1, 2, 3, 4, 5}, 1, 1);
@@ -98,23 +98,23 @@ TEST(Fitter, standardDeviationsAreHonestBesideNoiseThatIsCarriedOn) {
     const FitOptions options{30, 1e-10, false};
     const FitState start{
         std::vector<double>(freedom.coordinates().size(), 0.0), {{&stribeck, {0.4, std::log(2500.0)}}}, {}};
-    const Fit first = fitter.fit(start, nullptr, options);
+    const FitResult first = fitter.fit(start, nullptr, options);
     ASSERT_TRUE(first.converged);
     std::vector<Whitening> whitening;
-    for (const Block& b : runner.blocks()) whitening.emplace_back(&first.residual[b.offset], b.size);
+    for (const ChannelSpan& b : runner.spans()) whitening.emplace_back(&first.residual[b.offset], b.size);
     runner.setWhitening(whitening);
-    const Fit fit = fitter.fit(first.state, nullptr, options);
+    const FitResult fit = fitter.fit(first.state, nullptr, options);
     ASSERT_TRUE(fit.converged);
     EXPECT_NEAR(fit.chi2 / static_cast<double>(runner.size()), 1.0, 0.2);
-    alike.add(first.state.members[0].values[0] - 0.4, std::sqrt(first.covariance(0, 0)));
-    weighed.add(fit.state.members[0].values[0] - 0.4, std::sqrt(fit.covariance(0, 0)));
+    unweighted.add(first.state.members[0].values[0] - 0.4, std::sqrt(first.covariance(0, 0)));
+    whitened.add(fit.state.members[0].values[0] - 0.4, std::sqrt(fit.covariance(0, 0)));
   }
-  EXPECT_GT(alike.rms(), 2.0);
-  EXPECT_TRUE(weighed.honest());
+  EXPECT_GT(unweighted.rms(), 2.0);
+  EXPECT_TRUE(whitened.honest());
 }
 
-// A prior stated twice as sure counts four times: the weight is that of its squares.
-TEST(Fitter, priorWeightIsThatOfItsSquares) {
+// Half the prior standard deviation equals four times the prior weight.
+TEST(Fitter, PriorWeightScalesTheSquares) {
   std::mt19937_64 random(3);
   const MachineModel nominal = spindleOnly();
   MachineModel surer = nominal, machine = nominal;
@@ -126,15 +126,15 @@ TEST(Fitter, priorWeightIsThatOfItsSquares) {
   const FitState start{std::vector<double>(freedom.coordinates().size(), 0.0), {}, {}};
   FitOptions weighted{30, 1e-12, true};
   weighted.prior_weight = 4.0;
-  const Fit a = Fitter(runner, freedom).fit(start, nullptr, weighted);
-  const Fit b = Fitter(runner, sure_freedom).fit(start, nullptr, {30, 1e-12, true});
+  const FitResult a = Fitter(runner, freedom).fit(start, nullptr, weighted);
+  const FitResult b = Fitter(runner, sure_freedom).fit(start, nullptr, {30, 1e-12, true});
   for (std::size_t c = 0; c < start.nominal.size(); ++c)
     EXPECT_NEAR(a.state.nominal[c], b.state.nominal[c], 1e-4) << freedom.coordinates()[c].name;
   EXPECT_NEAR(a.bic, b.bic, 1e-3 * b.bic);
 }
 
-// What a fit says of itself holds where it stands, also after a step that was refused.
-TEST(Fitter, whatIsLeftIsThatOfItsState) {
+// State, residual and chi2 of a fit belong together, also after a rejected step.
+TEST(Fitter, ResidualBelongsToTheState) {
   std::mt19937_64 random(11);
   const MachineModel nominal = spindleOnly();
   MachineModel machine = nominal;
@@ -151,15 +151,15 @@ TEST(Fitter, whatIsLeftIsThatOfItsState) {
     for (const int iterations : {1, 2, 3, 5, 8}) {
       FitState start = at_nominal;
       start.members.push_back({&h, h.probes.front().points.front()});
-      const Fit fit = fitter.fit(start, nullptr, {iterations, 1e-9, true});
-      const double left = squaresLeft(runner, runner.simulate(fitter.model(fit.state)));
+      const FitResult fit = fitter.fit(start, nullptr, {iterations, 1e-9, true});
+      const double left = residualSquares(runner, runner.simulate(fitter.model(fit.state)));
       EXPECT_NEAR(fit.chi2, left, 1e-9 * left) << h.title() << " after " << iterations;
-      // Along frozen tangents only what they are taken from is simulated.
-      const Fit along = fitter.fit(start, &tangents, {iterations, 1e-9, true});
-      FitState shown = along.state;
-      shown.nominal = at_nominal.nominal;
+      // Frozen derivatives are relative to the state at which they were computed.
+      const FitResult along = fitter.fit(start, &tangents, {iterations, 1e-9, true});
+      FitState simulated_state = along.state;
+      simulated_state.nominal = at_nominal.nominal;
       Eigen::VectorXd there = Eigen::Map<const Eigen::VectorXd>(runner.measured().data(), runner.size());
-      const std::vector<double> simulated = runner.simulate(fitter.model(shown));
+      const std::vector<double> simulated = runner.simulate(fitter.model(simulated_state));
       there -= Eigen::Map<const Eigen::VectorXd>(simulated.data(), there.size());
       const Eigen::VectorXd shift = -Eigen::Map<const Eigen::VectorXd>(
           along.state.nominal.data(), static_cast<Eigen::Index>(along.state.nominal.size()));
@@ -169,9 +169,9 @@ TEST(Fitter, whatIsLeftIsThatOfItsState) {
   }
 }
 
-// Friction far beyond what is stated holds nominal values at their bounds, against which they press: from
-// wherever it starts a fit ends at one point, and what is simulated alone moves there.
-TEST(Fitter, endsAtOnePointWhereNominalValuesPressAgainstTheirBounds) {
+// Friction far beyond its stated uncertainty pushes nominal values to their bounds: every start ends at the
+// same point.
+TEST(Fitter, EndsAtOnePointWithValuesAtTheirBounds) {
   std::mt19937_64 random(29);
   const MachineModel nominal = spindleOnly();
   MachineModel machine = nominal;
@@ -185,7 +185,7 @@ TEST(Fitter, endsAtOnePointWhereNominalValuesPressAgainstTheirBounds) {
   const Fitter fitter(runner, freedom);
   const FitState at_nominal{std::vector<double>(freedom.coordinates().size(), 0.0), {}, {}};
   const NominalTangents tangents = fitter.nominalTangents(at_nominal);
-  std::vector<Fit> fits;
+  std::vector<FitResult> fits;
   for (const double breakaway : {0.35, 0.8}) {
     for (const double speed : {1500.0, 5000.0}) {
       FitState start = at_nominal;
@@ -194,14 +194,14 @@ TEST(Fitter, endsAtOnePointWhereNominalValuesPressAgainstTheirBounds) {
       ASSERT_TRUE(fits.back().converged);
     }
   }
-  const Fit& first = fits.front();
+  const FitResult& first = fits.front();
   bool at_bound = false;
   for (std::size_t c = 0; c < first.state.nominal.size(); ++c) {
     const Coordinate& k = freedom.coordinates()[c];
     at_bound = at_bound || first.state.nominal[c] == k.high || first.state.nominal[c] == k.low;
   }
   EXPECT_TRUE(at_bound);
-  for (const Fit& fit : fits) {
+  for (const FitResult& fit : fits) {
     EXPECT_NEAR(fit.chi2 + fit.penalty, first.chi2 + first.penalty, 1e-5 * first.chi2);
     for (std::size_t k = 0; k < 2; ++k) {
       const auto i = static_cast<Eigen::Index>(at_nominal.nominal.size() + k);
@@ -220,7 +220,7 @@ MachineModel slenderTool() {
   return m;
 }
 
-// A slot of little more than a turn, in which the tool swings once while a tooth turns on by D / R.
+// A slot of little more than a revolution, with one tool vibration while a tooth advances by D / R.
 Dataset slowSlot(const MachineModel& machine, const MachineModel& nominal, std::mt19937_64& random) {
   TestData t;
   t.test.name = "slot";
@@ -241,8 +241,8 @@ Dataset slowSlot(const MachineModel& machine, const MachineModel& nominal, std::
   return data;
 }
 
-// Machines between the rule of the surface and their teeth's path: the fit finds where, as well as it says.
-TEST(Fitter, tellsTheShareOfTheTeethsPath) {
+// Machines between surface rule and true tooth path: the share is estimated with calibrated uncertainty.
+TEST(Fitter, EstimatesThePathShare) {
   std::mt19937_64 random(31);
   std::normal_distribution<double> normal;
   const MachineModel nominal = slenderTool();
@@ -256,7 +256,8 @@ TEST(Fitter, tellsTheShareOfTheTeethsPath) {
     const Dataset data = slowSlot(freedom.apply(nominal, off), nominal, random);
     const TwinRunner runner(data, {0}, 1, 2);
     const Fitter fitter(runner, freedom);
-    const Fit fit = fitter.fit({std::vector<double>(off.size(), 0.0), {}, {}}, nullptr, {30, 1e-8, true});
+    const FitResult fit =
+        fitter.fit({std::vector<double>(off.size(), 0.0), {}, {}}, nullptr, {30, 1e-8, true});
     ASSERT_TRUE(fit.converged);
     const auto i = static_cast<Eigen::Index>(share);
     coverage.add(fit.state.nominal[share] - off[share], std::sqrt(fit.covariance(i, i)));
@@ -265,8 +266,8 @@ TEST(Fitter, tellsTheShareOfTheTeethsPath) {
   EXPECT_TRUE(coverage.honest());
 }
 
-// The share has no place among nominal values: it stands in the model as an entry, where it tells anything.
-TEST(NominalFreedom, writesTheShareOfTheTeethsPath) {
+// The path share is written as an entry if it is significant.
+TEST(NominalFreedom, WritesAndRemovesThePathShare) {
   MachineModel nominal = slenderTool();
   const NominalFreedom freedom(nominal);
   ASSERT_EQ(freedom.coordinates().back().name, "tool.path_share");
@@ -282,13 +283,13 @@ TEST(NominalFreedom, writesTheShareOfTheTeethsPath) {
   std_devs.back() = 0.3;
   freedom.writeStdDevs(model, std_devs);
   EXPECT_EQ(toothPathOf(model), nullptr);
-  // What a model had found before goes on from there.
+  // A new fit adds to an existing share.
   nominal.effects = {effectEntry("empirical:tooth_path", {{"share", 0.2}})};
   model = NominalFreedom(nominal).apply(nominal, values);
   EXPECT_EQ(model.effects.size(), 1u);
   EXPECT_NEAR(toothPathOf(model)->numbers.at("share"), 0.9, 1e-12);
-  // A share that is not told is left out, and what was fitted beside it moves to where it is best without.
-  Fit fit;
+  // An insignificant share is set to zero, and the other values move to their conditional optimum.
+  FitResult fit;
   fit.state.nominal.assign(freedom.coordinates().size(), 0.0);
   fit.state.nominal.front() = 0.01;
   fit.state.nominal.back() = 0.2;
@@ -296,21 +297,21 @@ TEST(NominalFreedom, writesTheShareOfTheTeethsPath) {
   fit.covariance = 0.25 * Eigen::MatrixXd::Identity(count, count);
   Eigen::MatrixXd of_fit = 0.04 * Eigen::MatrixXd::Identity(count, count);
   of_fit(0, count - 1) = of_fit(count - 1, 0) = 0.002;
-  Fit told = fit;
-  told.covariance = of_fit / 16.0;
-  leaveOutUntoldPath(nominal, freedom, of_fit, &told);
-  EXPECT_EQ(told.state, fit.state);
-  leaveOutUntoldPath(nominal, freedom, of_fit, &fit);
+  FitResult kept_fit = fit;
+  kept_fit.covariance = of_fit / 16.0;
+  dropInsignificantPathShare(nominal, freedom, of_fit, &kept_fit);
+  EXPECT_EQ(kept_fit.state, fit.state);
+  dropInsignificantPathShare(nominal, freedom, of_fit, &fit);
   EXPECT_EQ(fit.state.nominal.back(), -0.2);
   EXPECT_NEAR(fit.state.nominal.front(), 0.01 - 0.4 * 0.05, 1e-12);
   EXPECT_NEAR(toothPathOf(freedom.apply(nominal, fit.state.nominal))->numbers.at("share"), 0.0, 1e-15);
-  // What has no tool has none.
+  // No tool, no path share.
   nominal.tool.reset();
   const NominalFreedom none(nominal);
   for (const Coordinate& c : none.coordinates()) EXPECT_NE(c.name, "tool.path_share");
 }
 
-// BIC by which the fit is better with a hum. @param amplitude [N] of the machine's
+// BIC gain of a hum. @param amplitude [N] of the machine's hum
 double gainOfHum(double amplitude) {
   const TemporaryFolder folder;
   MachineModel machine = believed();
@@ -333,16 +334,15 @@ double gainOfHum(double amplitude) {
   const Fitter fitter(runner, freedom);
   FitState start;
   start.nominal.assign(freedom.coordinates().size(), 0.0);
-  const Fit without_it = fitter.fit(start, nullptr, {30, 1e-10, true});
+  const FitResult without_it = fitter.fit(start, nullptr, {30, 1e-10, true});
   start.members.push_back({&*hum, {0.5, 0.6}});
-  const Fit with = fitter.fit(start, nullptr, {30, 1e-10, true});
+  const FitResult with = fitter.fit(start, nullptr, {30, 1e-10, true});
   EXPECT_TRUE(with.converged && without_it.converged);
   return without_it.bic - with.bic;
 }
 
-// The phase of a hum is found in each record: in noise there is always one that fits, and all amplitudes
-// that come of it are above zero.
-TEST(Fitter, noiseAloneMakesNoHum) {
+// The phase of a hum is estimated in each record, so noise alone fits a positive amplitude.
+TEST(Fitter, NoiseAloneIsNoHum) {
   EXPECT_LT(gainOfHum(0.0), -20.0);
   EXPECT_GT(gainOfHum(2.0), 200.0);
 }

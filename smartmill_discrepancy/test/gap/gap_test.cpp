@@ -18,8 +18,8 @@ double largestOf(const CampaignGap& gap, const std::string& channel) {
   return largest;
 }
 
-// Independent campaigns: one whose model is exact, others with something hidden in the channels named.
-TEST(Gap, isTheNoiseFloorOnlyWhereNothingIsHidden) {
+// Independent campaigns: one whose model is exact, others with a hidden effect in the channels named.
+TEST(Gap, IsTheNoiseFloorOnlyWithoutHiddenEffects) {
   SMARTMILL_SHARED_DATA(campaigns, "campaigns");
   const auto load = [&](const std::string& name) {
     const Campaign campaign = readCampaign(campaigns + "/" + name);
@@ -33,7 +33,7 @@ TEST(Gap, isTheNoiseFloorOnlyWhereNothingIsHidden) {
   for (const char* channel : {"fx", "fy", "fz", "load_meter"})
     EXPECT_LE(largestOf(none, channel), 1.05) << channel;
   EXPECT_NEAR(none.overall, 1.0, 0.01);
-  EXPECT_NEAR(load("none").noise.at("load_meter"), 2.2e-4, 0.1e-4);  // as the campaigns' maker states it
+  EXPECT_NEAR(load("none").noise.at("load_meter"), 2.2e-4, 0.1e-4);  // as stated in the campaigns' README
 
   const CampaignGap friction = gapOf("stribeck_friction");
   EXPECT_GT(largestOf(friction, "load_meter"), 2.0);

@@ -9,7 +9,7 @@ namespace smartmill::discrepancy {
 namespace {
 
 // Closed forms: chi-square with two degrees of freedom is exponential; Benjamini-Hochberg by hand.
-TEST(Significance, countsLooksAsTextbooksDo) {
+TEST(Significance, MatchesClosedForms) {
   EXPECT_NEAR(chiSquareTail(3.0, 2), std::exp(-1.5), 1e-12);
   EXPECT_NEAR(chiSquareTail(4.0, 4), std::exp(-2.0) * 3.0, 1e-12);
   EXPECT_GT(chiSquareTail(1e9, 2), 0.0);

@@ -12,9 +12,9 @@
 namespace smartmill::discrepancy {
 namespace {
 
-// Noise of unit variance of what is new, each sample carrying a share of the one before; in its steady state
-// from the first sample on.
-std::vector<double> carried(double share, std::size_t size, std::mt19937_64& random) {
+// Correlated noise with innovations of unit variance and a share of the previous sample, stationary from the
+// first sample on.
+std::vector<double> correlatedNoise(double share, std::size_t size, std::mt19937_64& random) {
   std::normal_distribution<double> noise;
   std::vector<double> values{noise(random) / std::sqrt(1.0 - share * share)};
   while (values.size() < size) values.push_back(share * values.back() + noise(random));
@@ -22,10 +22,10 @@ std::vector<double> carried(double share, std::size_t size, std::mt19937_64& ran
 }
 
 std::vector<double> white(std::size_t size, std::mt19937_64& random) {
-  return carried(0.0, size, random);
+  return correlatedNoise(0.0, size, random);
 }
 
-// A wave of a few turns of the spindle beside a level: lines where noise that follows upon itself is strong.
+// A mean and a slow wave, where correlated noise is strong.
 Eigen::MatrixXd columnsOf(std::size_t size) {
   Eigen::MatrixXd columns(static_cast<Eigen::Index>(size), 2);
   for (Eigen::Index i = 0; i < columns.rows(); ++i) {
@@ -35,34 +35,36 @@ Eigen::MatrixXd columnsOf(std::size_t size) {
   return columns;
 }
 
-// Values of a linear channel by what its samples tell, over the deviations stated of them.
-struct Weighed {
+// Linear fit with whitening and its stated standard deviations.
+struct WhitenedFit {
   Eigen::Vector2d found, std_dev;
   std::size_t order = 0;
 };
 
-Weighed weighed(const Eigen::MatrixXd& columns, const std::vector<double>& measured) {
+WhitenedFit whitenedFit(const Eigen::MatrixXd& columns, const std::vector<double>& measured) {
   const auto size = static_cast<Eigen::Index>(measured.size());
   const Eigen::Map<const Eigen::VectorXd> y(measured.data(), size);
   const Eigen::VectorXd left = y - columns * columns.colPivHouseholderQr().solve(y);
   const Whitening whitening(left.data(), measured.size());
-  Eigen::MatrixXd seen = columns;
+  Eigen::MatrixXd whitened_columns = columns;
   Eigen::VectorXd records = y;
-  for (Eigen::Index k = 0; k < seen.cols(); ++k) whitening.apply(seen.col(k).data(), measured.size());
+  for (Eigen::Index k = 0; k < whitened_columns.cols(); ++k)
+    whitening.apply(whitened_columns.col(k).data(), measured.size());
   whitening.apply(records.data(), measured.size());
-  const Eigen::Matrix2d covariance = (seen.transpose() * seen).inverse();
-  return {covariance * (seen.transpose() * records), covariance.diagonal().cwiseSqrt(), whitening.order()};
+  const Eigen::Matrix2d covariance = (whitened_columns.transpose() * whitened_columns).inverse();
+  return {covariance * (whitened_columns.transpose() * records), covariance.diagonal().cwiseSqrt(),
+          whitening.order()};
 }
 
-// Each sample for itself would state a deviation too small by sqrt((1 + share) / (1 - share)).
-TEST(Whitening, StatedDeviationsAreThoseOfTheScatter) {
+// Without whitening the deviations would be too small by sqrt((1 + share) / (1 - share)).
+TEST(Whitening, DeviationsAreCalibrated) {
   constexpr std::size_t SIZE = 4000;
   const Eigen::MatrixXd columns = columnsOf(SIZE);
   for (const double share : {0.0, 0.6, 0.95}) {
     std::mt19937_64 random(7);
     Coverage level, wave;
     for (int run = 0; run < Coverage::RUNS; ++run) {
-      const Weighed w = weighed(columns, carried(share, SIZE, random));
+      const WhitenedFit w = whitenedFit(columns, correlatedNoise(share, SIZE, random));
       level.add(w.found[0], w.std_dev[0]);
       wave.add(w.found[1], w.std_dev[1]);
     }
@@ -71,19 +73,19 @@ TEST(Whitening, StatedDeviationsAreThoseOfTheScatter) {
   }
 }
 
-// The variance of a level beside such noise: that of what is new over (1 - share)^2 and the samples.
-TEST(Whitening, DeviationOfALevelIsThatOfTheClosedForm) {
+// The variance of a mean with such noise: that of the innovations over (1 - share)^2 and the samples.
+TEST(Whitening, DeviationOfAMeanMatchesTheClosedForm) {
   constexpr std::size_t SIZE = 20000;
   constexpr double SHARE = 0.8;
   std::mt19937_64 random(8);
   Eigen::MatrixXd columns = columnsOf(SIZE);
-  const Weighed w = weighed(columns, carried(SHARE, SIZE, random));
+  const WhitenedFit w = whitenedFit(columns, correlatedNoise(SHARE, SIZE, random));
   EXPECT_NEAR(w.std_dev[0], 1.0 / (1.0 - SHARE) / std::sqrt(static_cast<double>(SIZE)), 0.05 * w.std_dev[0]);
 }
 
-TEST(Whitening, WhatIsLeftIsWhite) {
+TEST(Whitening, ResidualIsWhite) {
   std::mt19937_64 random(9);
-  std::vector<double> values = carried(0.95, 20000, random);
+  std::vector<double> values = correlatedNoise(0.95, 20000, random);
   const Whitening whitening(values.data(), values.size());
   EXPECT_NEAR(whitening.innovation(), 1.0, 0.03);
   whitening.apply(values.data(), values.size());
@@ -96,16 +98,15 @@ TEST(Whitening, WhatIsLeftIsWhite) {
   EXPECT_NEAR(next / squares, 0.0, 0.03);
 }
 
-// White noise as stated is left as it is, but for one record in hundreds by chance; noise below what is
-// stated counts as stated.
-TEST(Whitening, LeavesWhiteNoiseAlone) {
+// White noise is unchanged except for a few records by chance; noise below the stated level counts as stated.
+TEST(Whitening, KeepsWhiteNoise) {
   std::mt19937_64 random(10);
   int changed = 0;
   for (int run = 0; run < 200; ++run) {
     std::vector<double> values = white(2000, random);
-    changed += Whitening(values.data(), values.size()).changes() ? 1 : 0;
+    changed += Whitening(values.data(), values.size()).isActive() ? 1 : 0;
     for (double& v : values) v *= 0.5;
-    EXPECT_FALSE(Whitening(values.data(), values.size()).changes());
+    EXPECT_FALSE(Whitening(values.data(), values.size()).isActive());
   }
   EXPECT_LE(changed, 5);
   std::vector<double> values{1.0, 2.0, 3.0};
@@ -113,11 +114,11 @@ TEST(Whitening, LeavesWhiteNoiseAlone) {
   EXPECT_EQ(values, (std::vector<double>{1.0, 2.0, 3.0}));
 }
 
-// A few values tell a level at most.
-TEST(Whitening, FewValuesTellALevel) {
+// A few values get at most a variance.
+TEST(Whitening, FewValuesGetAVarianceOnly) {
   const std::vector<double> left{10.0, -12.0, 9.0, 11.0, -8.0, 10.0};
   const Whitening whitening(left.data(), left.size());
-  EXPECT_TRUE(whitening.changes());
+  EXPECT_TRUE(whitening.isActive());
   EXPECT_EQ(whitening.order(), 0u);
   EXPECT_NEAR(whitening.innovation(), 10.08, 0.01);
 }

@@ -26,34 +26,34 @@ MachineModel mill(bool with_noise = true) {
   return model;
 }
 
-Stretch slot(const MachineModel& model, std::uint64_t seed) {
-  Stretch stretch;
-  stretch.stamp = 12.3;
-  stretch.test.name = "slot";
-  stretch.test.sample_rate = 25600.0;
-  stretch.test.spindle_speed = 600.0;
+RecordSegment slot(const MachineModel& model, std::uint64_t seed) {
+  RecordSegment segment;
+  segment.stamp = 12.3;
+  segment.test.name = "slot";
+  segment.test.sample_rate = 25600.0;
+  segment.test.spindle_speed = 600.0;
   Engagement engagement;
   engagement.feed_per_tooth = 1e-4;
   engagement.axial_depth = 1e-3;
   engagement.entry = 0.0;
   engagement.exit = units::TWO_PI / 2.0;
-  stretch.test.engagement = engagement;
+  segment.test.engagement = engagement;
   sim::SimulationOptions options;
   options.seed = seed;
-  stretch.record = sim::simulateTest(model, stretch.test, 0.3, options);
-  return stretch;
+  segment.record = sim::simulateTest(model, segment.test, 0.3, options);
+  return segment;
 }
 
 // RMS of n samples of white noise over its standard deviation: 1 with deviation 1 / sqrt(2 n).
-TEST(LiveGap, isOneForTheTwinsOwnRecord) {
+TEST(LiveGap, IsOneForTheTwinsOwnRecord) {
   const MachineModel model = mill();
   double sum2 = 0.0;
   int count = 0;
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
-    const Stretch stretch = slot(model, seed);
-    const LiveGap gap = liveGap(model, stretch, {});
+    const RecordSegment segment = slot(model, seed);
+    const LiveGap gap = liveGap(model, segment, {});
     const double deviation =
-        1.0 / std::sqrt(static_cast<double>(stretch.record.size()));  // half of it judged
+        1.0 / std::sqrt(static_cast<double>(segment.record.size()));  // half of it is compared
     EXPECT_TRUE(gap.model_fits);
     EXPECT_EQ(gap.stamp, 12.3);
     EXPECT_EQ(gap.condition, "slot");
@@ -67,20 +67,20 @@ TEST(LiveGap, isOneForTheTwinsOwnRecord) {
   EXPECT_NEAR(sum2 / count, 1.0, 0.45);
 }
 
-// A tone of amplitude a beside noise s: sqrt(1 + a^2 / (2 s^2)).
-TEST(LiveGap, risesByAKnownTone) {
+// A tone of amplitude a with noise s: sqrt(1 + a^2 / (2 s^2)).
+TEST(LiveGap, RisesByAKnownTone) {
   const MachineModel model = mill();
-  Stretch stretch = slot(model, 7);
+  RecordSegment segment = slot(model, 7);
   constexpr double AMPLITUDE = 3.0 * SIGMA;
-  Record& record = stretch.record;
+  Record& record = segment.record;
   for (std::size_t c = 0; c < record.names.size(); ++c) {
     if (record.names[c] != "fy") continue;
     for (std::size_t i = 0; i < record.size(); ++i)
       record.columns[c][i] += AMPLITUDE * std::sin(units::TWO_PI * 200.0 * record.time[i]);
   }
-  const LiveGap gap = liveGap(model, stretch, {});
+  const LiveGap gap = liveGap(model, segment, {});
   EXPECT_FALSE(gap.model_fits);
-  const double n = static_cast<double>(stretch.record.size()) / 2.0, expected = std::sqrt(1.0 + 9.0 / 2.0);
+  const double n = static_cast<double>(segment.record.size()) / 2.0, expected = std::sqrt(1.0 + 9.0 / 2.0);
   // Variance of the mean of (tone + noise)^2: (2 + 4 a^2 / 2) / n in units of the noise.
   const double deviation = std::sqrt((2.0 + 18.0) / n) / (2.0 * expected);
   EXPECT_NEAR(gap.gap[1], expected, 4.0 * deviation);
@@ -88,7 +88,7 @@ TEST(LiveGap, risesByAKnownTone) {
   EXPECT_NEAR(gap.gap[2], 1.0, 0.06);
 }
 
-/// A tool that vibrates and a spindle with a load meter.
+/// A vibrating tool and a spindle with a load meter.
 MachineModel flexibleMill() {
   MachineModel model = mill();
   model.tool_tip.x.modes = {{1210.0, 0.031, 1.0 / 28e6}};
@@ -98,17 +98,17 @@ MachineModel flexibleMill() {
   return model;
 }
 
-/// A stretch out of a cut that a machine of its own does: the surface stored, from full engagement on.
-Stretch runningCut(const MachineModel& model, double speed, double depth) {
+/// A segment of a cut simulated by CuttingMachine from full engagement on.
+RecordSegment runningCut(const MachineModel& model, double speed, double depth) {
   constexpr double RATE = 25600.0, SETTLE = 0.6;
   constexpr int SUBSTEPS = 4;
-  Stretch stretch;
-  stretch.stamp = 5.0;
-  stretch.test.name = "slot";
-  stretch.test.sample_rate = RATE;
-  stretch.test.spindle_speed = speed;
-  stretch.test.running_before = SETTLE;
-  stretch.test.engagement = Engagement{0.0, units::PI, depth, 1e-4};
+  RecordSegment segment;
+  segment.stamp = 5.0;
+  segment.test.name = "slot";
+  segment.test.sample_rate = RATE;
+  segment.test.spindle_speed = speed;
+  segment.test.running_before = SETTLE;
+  segment.test.engagement = Engagement{0.0, units::PI, depth, 1e-4};
   sim::CuttingMachine machine(model, 1.0 / (RATE * SUBSTEPS));
   sim::CuttingMachine::Input input;
   input.motion.speed = speed;
@@ -116,7 +116,7 @@ Stretch runningCut(const MachineModel& model, double speed, double depth) {
   machine.engage({{0.0, units::PI, depth}}, input.motion);
   std::mt19937_64 random(5);
   std::normal_distribution<double> noise(0.0, SIGMA);
-  Record& record = stretch.record;
+  Record& record = segment.record;
   for (const char* name : {"spindle_angle", "fx", "fy", "fz"}) record.add(name);
   const int settle = static_cast<int>(SETTLE * RATE), samples = static_cast<int>(0.3 * RATE);
   for (int i = 0; i < settle + samples; ++i) {
@@ -134,54 +134,54 @@ Stretch runningCut(const MachineModel& model, double speed, double depth) {
     for (std::size_t axis = 0; axis < 3; ++axis)
       record.columns[axis + 1].push_back(out.sensor[axis] + noise(random));
     if ((i - settle) % 512 == 500) {
-      // As the controller tells it: in steps of 1e-4 of the full scale.
+      // Resolution of the controller: 1e-4 of the full scale.
       const double load = std::round(out.load_meter / 8.0 / 1e-4) * 1e-4;
-      stretch.load.push_back({record.time.back(), load});
+      segment.load.push_back({record.time.back(), load});
     }
   }
-  return stretch;
+  return segment;
 }
 
-// A stretch out of the midst of a running cut, made by another process than the twin's: no transient at its
-// begin counts as misfit, and the load meter takes part.
-TEST(LiveGap, isOneForARunningCutOfAVibratingTool) {
+// A segment from the middle of a cut, simulated by another process than the twin's: no initial transient, and
+// the load meter is compared.
+TEST(LiveGap, IsOneForARunningCutOfAVibratingTool) {
   const MachineModel model = flexibleMill();
-  const Stretch stretch = runningCut(model, units::radPerSecFromRpm(4000.0), 1e-3);
-  const LiveGap gap = liveGap(model, stretch, {});
-  EXPECT_EQ(gap.aside, "");
+  const RecordSegment segment = runningCut(model, units::radPerSecFromRpm(4000.0), 1e-3);
+  const LiveGap gap = liveGap(model, segment, {});
+  EXPECT_EQ(gap.exclusion, "");
   ASSERT_EQ(gap.channels, (std::vector<std::string>{"fx", "fy", "fz", "load_meter"}));
-  // 7680 samples: deviation 0.008; the two processes differ by 2e-4 of 500 N or so beside 2 N of noise.
+  // 7680 samples: deviation 0.008; the two processes differ by 2e-4 of about 500 N, with 2 N of noise.
   for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(gap.gap[k], 1.0, 0.05) << gap.channels[k];
   EXPECT_LT(gap.gap[3], 1.2);
   EXPECT_TRUE(gap.model_fits);
-  // A hundredth of the full scale more: 80 mV beside 0.6 mV of half a step and the ripple of a few mV.
-  Stretch loaded = stretch;
-  for (LoadReading& r : loaded.load) r.load += 0.01;
+  // One percent of full scale more: 80 mV; noise 0.6 mV of half a step and a ripple of a few mV.
+  RecordSegment loaded = segment;
+  for (LoadMeasurement& r : loaded.load) r.load += 0.01;
   EXPECT_GT(liveGap(model, loaded, {}).gap[3], 5.0);
   EXPECT_FALSE(liveGap(model, loaded, {}).model_fits);
 }
 
-TEST(LiveGap, setsChatterAside) {
+TEST(LiveGap, ExcludesChatter) {
   const MachineModel model = flexibleMill();
   const LiveGap gap = liveGap(model, runningCut(model, units::radPerSecFromRpm(9000.0), 6e-3), {});
-  EXPECT_NE(gap.aside.find("chatters at "), std::string::npos) << gap.aside;
+  EXPECT_NE(gap.exclusion.find("chatters at "), std::string::npos) << gap.exclusion;
   EXPECT_TRUE(gap.model_fits);
   EXPECT_TRUE(gap.channels.empty());
 }
 
-TEST(LiveGap, refusesAModelWithoutNoise) {
+TEST(LiveGap, RejectsAModelWithoutNoise) {
   const MachineModel with = mill();
   EXPECT_THROW(liveGap(mill(false), slot(with, 1), {}), Error);
 }
 
-TEST(RecordStretch, readsBackTheSame) {
+TEST(RecordSegmentFiles, ReadBackEqual) {
   const TemporaryFolder folder;
   const MachineModel model = mill();
-  Stretch stretch = slot(model, 3);
-  stretch.test.name = "slot 1/2";  // no file's name
+  RecordSegment segment = slot(model, 3);
+  segment.test.name = "slot 1/2";  // invalid as a file name
   const std::string out = folder.file("campaign");
-  recordStretch(model, stretch, out);
-  recordStretch(model, stretch, out);
+  recordSegment(model, segment, out);
+  recordSegment(model, segment, out);
   const Campaign campaign = readCampaign(out);
   ASSERT_EQ(campaign.tests.size(), 2U);
   EXPECT_EQ(campaign.tests[0].name, "slot_1_2");
@@ -190,14 +190,14 @@ TEST(RecordStretch, readsBackTheSame) {
   EXPECT_FALSE(campaign.tests[0].engage_time);
   const MachineModel read = readMachineModel(campaign.modelPath());
   const Record record = readRecord(campaign, campaign.tests[1], read);
-  ASSERT_EQ(record.size(), stretch.record.size());
+  ASSERT_EQ(record.size(), segment.record.size());
   for (const char* channel : {"fx", "fy", "fz"}) {
-    const auto &a = record.column(channel), &b = stretch.record.column(channel);
+    const auto &a = record.column(channel), &b = segment.record.column(channel);
     for (std::size_t i = 0; i < a.size(); ++i)
       ASSERT_NEAR(a[i], b[i], 1e-5 * std::abs(b[i]) + 1e-9);  // six significant digits
   }
-  stretch.record = record;
-  EXPECT_TRUE(liveGap(read, stretch, {}).model_fits);
+  segment.record = record;
+  EXPECT_TRUE(liveGap(read, segment, {}).model_fits);
 }
 
 }  // namespace

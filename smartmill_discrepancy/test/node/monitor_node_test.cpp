@@ -1,5 +1,5 @@
-// The monitor beside a machine of which it knows everything, and beside one that hides a runout. Everything
-// is judged by the stamps of the data; only patience is in wall time.
+// The monitor with a machine equal to its model, and with one that has a hidden runout. Checks use the stamps
+// of the data; only timeouts use wall time.
 
 #include <algorithm>
 #include <cmath>
@@ -69,7 +69,7 @@ class MonitorNodeTest : public testing::Test {
     return reached();
   }
 
-  // A second of slot by that machine, ten stretches of data a message each.
+  // A second of slot milling, one message per 10 ms and stream.
   void mill(const MachineModel& machine, const std::string& name, double begin, double rpm, double depth) {
     CuttingCondition condition;
     condition.stamp = begin;
@@ -92,7 +92,7 @@ class MonitorNodeTest : public testing::Test {
     const Record record = sim::simulateTest(machine, test, DURATION, options);
     const auto &fx = record.column("fx"), &fy = record.column("fy"), &fz = record.column("fz");
     node_.publish(conditions_, toMsg(condition));
-    node_.settle();  // topics keep no order among each other
+    node_.settle();  // messages of different topics are not ordered
     const double feed = FEED_PER_TOOTH * machine.tool->teeth * test.spindle_speed / units::TWO_PI;
     for (std::size_t k = 0; (k + 1) * BLOCK <= record.size(); ++k) {
       const double t = static_cast<double>(k * BLOCK) / RATE;
@@ -139,20 +139,20 @@ class MonitorNodeTest : public testing::Test {
   Followers node_{{names::absolute("monitor")}};
 };
 
-TEST_F(MonitorNodeTest, warnsOfAHiddenEffectAndOfNothingElse) {
+TEST_F(MonitorNodeTest, WarnsOfAHiddenEffectOnly) {
   node_.begin();
   for (const ros::Publisher& publisher : {conditions_, states_, angles_, blocks_}) node_.expect(publisher);
   node_.expect(results_);
   node_.expect(diagnostics_);
 
-  // 0.15 s of settling leave two stretches of 0.3 s of a second.
+  // 0.15 s of settling leave two segments of 0.3 s of a second.
   mill(model_, "healthy", 1000.0, 4000.0, 1e-3);
   ASSERT_TRUE(wait([&] { return gapsOf("healthy").size() == 2 && status_.message == "model fits"; }))
       << gaps_.size() << status_.message;
   for (const auto& g : gapsOf("healthy")) {
     EXPECT_TRUE(g.model_fits);
     ASSERT_EQ(g.gap.size(), 3U);
-    // Deviation 0.008 of 7680 samples, and what two faithful processes differ by.
+    // Deviation 0.008 of 7680 samples, and the difference between two accurate processes.
     for (const double gap : g.gap) EXPECT_NEAR(gap, 1.0, 0.1);
   }
   EXPECT_EQ(status_.level, diagnostic_msgs::DiagnosticStatus::OK);
@@ -168,7 +168,7 @@ TEST_F(MonitorNodeTest, warnsOfAHiddenEffectAndOfNothingElse) {
   for (const auto& g : gapsOf("hiding")) EXPECT_FALSE(g.model_fits);
   EXPECT_EQ(status_.message, "model does not fit in hiding: run explain");
 
-  // Stamps that the wall knows nothing of; chatter is no misfit.
+  // Stamps independent of wall time; chatter is no misfit.
   mill(model_, "chattering", 1020.0, 9000.0, 6e-3);
   ASSERT_TRUE(wait([&] { return status_.message.find("not compared: chattering chatters") == 0; }))
       << status_.message;

@@ -5,7 +5,7 @@
 namespace smartmill::discrepancy {
 namespace {
 
-TEST(Parameters, TheShippedFileIsTheTable) {
+TEST(Parameters, ShippedFileMatchesTheTable) {
   expectShipped<MonitorParameters>("../launch/config/monitor.yaml", "smartmill_discrepancy monitor");
   EXPECT_NO_THROW(MonitorParameters().validate());
 }

@@ -15,10 +15,10 @@ struct ExplainOptions {
   StructureOptions structure;
 };
 
-/// The whole workflow: check the labels, search which effects are missing, see where the model differs,
-/// challenge what was found, judge it, write FOLDER/model.yaml and measure the gap after from that file.
-/// Cancelled, it ends with what was found until then.
-/// @throws Error on a campaign or model that cannot be worked with.
+/// The complete workflow: check labels, search for missing effects, localise the disagreement, validate
+/// effects, write FOLDER/model.yaml and measure the gap with that file. When cancelled, it ends with the
+/// effects found so far.
+/// @throws Error if campaign or model cannot be used.
 Explanation explain(const Dataset& data, const ExplainOptions& options, const std::string& folder);
 
 }  // namespace smartmill::discrepancy

@@ -9,24 +9,24 @@
 
 namespace smartmill::discrepancy {
 
-/// What a model leaves of the records, over noise, and its RMS in all that is judged.
-struct Remains {
+/// Whitened residual of a model and its gap.
+struct ModelResidual {
   std::vector<double> fit, heldout;
   GapPair gap;
-  std::map<std::string, double> chattering;  ///< prediction errors, as in ChatteringCut, by tests
+  std::map<std::string, double> chattering;  ///< prediction errors by test, as in ChatteringCut
 };
-Remains remainsOf(const Workbench& bench, const MachineModel& model);
+ModelResidual residualOf(const Workbench& bench, const MachineModel& model);
 
-/// Writes the improved model into FOLDER/model.yaml, reads it and measures what it leaves.
+/// Writes the improved model to FOLDER/model.yaml, reads it back and measures its residual.
 /// @param result receives model, after, gaps and curves
-void writeOutcome(const Workbench& bench, const Remains& before, const MachineModel& improved,
+void writeOutcome(const Workbench& bench, const ModelResidual& before, const MachineModel& improved,
                   const std::string& folder, Explanation* result);
 
-/// Shares of the variance explained and repeated, channel by channel over all cuts.
-void addChannelShares(const Workbench& bench, const Remains& before, const Remains& after,
+/// Explained and synchronous shares of the variance, channel by channel over all cuts.
+void addChannelShares(const Workbench& bench, const ModelResidual& before, const ModelResidual& after,
                       Explanation* explanation);
 
-/// Curves of the test and channels in which nominal model and records differ most.
+/// Curves of the test and channels with the largest residual of the nominal model.
 void addCurves(const TwinRunner& runner, const std::vector<double>& before, const std::vector<double>& after,
                Explanation* explanation);
 

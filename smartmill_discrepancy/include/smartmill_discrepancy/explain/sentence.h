@@ -6,11 +6,11 @@
 
 namespace smartmill::discrepancy {
 
-/// What of an effect without a name a machinist should know, and which law it follows where it follows one.
-/// Empty for an effect of the catalogue.
+/// Description of an empirical effect for the machinist, with the law that it follows if any. Empty for an
+/// effect of the catalogue.
 std::string sentenceOf(const FoundEffect& effect);
 
-/// The same of all of them, as one line.
+/// All empirical effects in one line.
 std::string sentenceOf(const Explanation& explanation);
 
 }  // namespace smartmill::discrepancy

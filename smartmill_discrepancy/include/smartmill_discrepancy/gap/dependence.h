@@ -7,14 +7,14 @@
 
 namespace smartmill::discrepancy {
 
-/// How large something shows in one test.
-struct Shown {
+/// Amplitude of a component in one test.
+struct TestAmplitude {
   const TestData* test = nullptr;
   double amplitude = 0.0, std_dev = 1.0;
 };
 
-/// Conditions of the tests that the size goes with, the strongest first: cutting (cuts show it, the rest do
-/// not), speed, chip_load, depth, immersion, time. Nothing where the sizes differ by no more than chance.
-std::vector<std::string> dependence(const std::vector<Shown>& shown);
+/// Conditions that the amplitude depends on, the strongest first: cutting (present in cuts only), speed,
+/// chip_load, depth, immersion, time. Empty if the amplitudes agree within their uncertainty.
+std::vector<std::string> dependentConditions(const std::vector<TestAmplitude>& amplitudes);
 
 }  // namespace smartmill::discrepancy

@@ -23,7 +23,7 @@ struct CampaignGap {
   double overall = 0.0;
 };
 
-/// Simulates every test of a campaign, held-out ones too, and compares it with its record.
+/// Simulates every test of a campaign, held-out tests included, and compares it with its record.
 /// @throws Error of the twin
 CampaignGap campaignGap(const Dataset& data, const MachineModel& model, int threads = 1);
 

@@ -4,27 +4,37 @@
 #include <optional>
 #include <vector>
 
+#include "smartmill_discrepancy/data/dataset.h"
+
 namespace smartmill::discrepancy {
 
-/// What of a record comes again with the revolution.
+/// Part of a record that is synchronous with the spindle.
 struct Repeatability {
   double variance = 0.0;  ///< [unit^2] of the samples about their mean
   double floor =
-      0.0;  ///< [unit] RMS of what does not come again: the least that a model of a steady cut leaves
-  std::size_t samples = 0;  ///< used
-  /// [unit] Level, then cosine and sine of each order of the spindle.
+      0.0;  ///< [unit] RMS of the asynchronous part: the smallest residual of any model of a steady cut
+  std::size_t samples = 0;  ///< number of samples
+  /// [unit] mean, then cosine and sine of each order of the spindle
   std::vector<double> lines;
 
-  double repeats() const { return variance > 0.0 ? 1.0 - floor * floor / variance : 0.0; }  ///< [1] share
+  double synchronousShare() const {
+    return variance > 0.0 ? 1.0 - floor * floor / variance : 0.0;
+  }  ///< [1] share of the variance
 };
 
-/// Estimated from the record itself: mean and all orders of the spindle below 0.9 of half the sample rate, by
-/// least squares; what they leave, over its degrees of freedom. White noise of RMS s has a floor of s.
-/// @param values of a steady cut @param angle [rad] of the spindle at each, whole turns may be left out
-/// @return nothing for less than LEAST_TURNS turns
+/// Least-squares estimate from the record itself: mean and all orders of the spindle below 0.9 of the Nyquist
+/// frequency; the floor is the RMS of their residual over its degrees of freedom. White noise of RMS s has a
+/// floor of s.
+/// @param values of a steady cut @param angle [rad] of the spindle at each sample, whole revolutions may be
+/// omitted
+/// @return nothing below LEAST_REVOLUTIONS revolutions
 std::optional<Repeatability> repeatability(const std::vector<double>& values,
                                            const std::vector<double>& angle);
 
-constexpr double LEAST_TURNS = 5.0;
+constexpr double LEAST_REVOLUTIONS = 5.0;
+
+/// Of the steady part of a cut. @param values one per sample of the record
+/// @return nothing without spindle angle or enough revolutions
+std::optional<Repeatability> steadyRepeatability(const TestData& test, const std::vector<double>& values);
 
 }  // namespace smartmill::discrepancy

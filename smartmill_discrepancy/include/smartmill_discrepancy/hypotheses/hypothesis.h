@@ -8,14 +8,13 @@
 
 namespace smartmill::discrepancy {
 
-/// One way in which an effect of the catalogue may be present, e.g. gain_error of fx.
+/// One form of an effect of the catalogue, e.g. gain_error of fx.
 using Hypothesis = EffectForm;
 
-/// All hypotheses that a campaign can speak of; the rest is named in notes with its reason.
+/// All hypotheses that a campaign can test; notes receives the others with the reason.
 std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std::string>* notes);
 
-/// All forms that a cause without a name may have in a campaign. Lines have no probe: where they lie only the
-/// residual tells.
+/// All empirical forms of a campaign. Lines have no probe: their frequency follows from the residual.
 std::vector<Hypothesis> empiricalHypotheses(const Dataset& data);
 
 }  // namespace smartmill::discrepancy

@@ -10,22 +10,22 @@
 
 namespace smartmill::discrepancy {
 
-/// Values of the nominal model, free within their stated uncertainty: each coordinate is the natural
-/// logarithm of value over nominal value. Of a tool there is one more, which no nominal model states: how far
-/// the surface that its teeth leave lies from the rule of formats.md (0) towards that of
-/// their true path (1), an entry `empirical:tooth_path`.
+/// Values of the nominal model that are free within their stated uncertainty. Each coordinate is the natural
+/// logarithm of value over nominal value. A tool has one more coordinate, which no nominal model states: the
+/// share between the surface of the rule in formats.md (0) and that of the true tooth path (1), written as
+/// the entry `empirical:tooth_path`.
 class NominalFreedom {
  public:
   explicit NominalFreedom(const MachineModel& nominal);
   const std::vector<Coordinate>& coordinates() const { return coordinates_; }
   /// The model with these values. values.size() == coordinates().size()
   MachineModel apply(const MachineModel& nominal, const std::vector<double>& values) const;
-  /// Which coordinate is the share of the teeth's path; none without a tool.
+  /// Index of the path share; none without a tool.
   std::optional<std::size_t> pathShare() const;
-  /// Whether a share is more than three of its deviations.
-  static bool tellsPath(double share, double std_dev);
-  /// Writes the standard deviations that the file format has a place for (cutting coefficients, share of the
-  /// teeth's path), and leaves out a share that is not told.
+  /// Whether a share exceeds three standard deviations.
+  static bool isPathShareSignificant(double share, double std_dev);
+  /// Writes the standard deviations that the file format supports (cutting coefficients, path share) and
+  /// removes an insignificant path share.
   void writeStdDevs(MachineModel& model, const std::vector<double>& std_devs) const;
 
  private:
@@ -40,7 +40,7 @@ class NominalFreedom {
   std::vector<Scale> scale_;
 };
 
-/// The entry `empirical:tooth_path` of a model; nullptr: it has none.
+/// The entry `empirical:tooth_path` of a model, or nullptr.
 const EffectEntry* toothPathOf(const MachineModel& model);
 
 }  // namespace smartmill::discrepancy

@@ -7,8 +7,8 @@
 
 namespace smartmill::discrepancy {
 
-/// Writes FOLDER/gaps.png, revolution.png, spectra.png, ladder.png, remains.png with gnuplot; returns the
-/// files' names. @throws Error.
+/// Draws FOLDER/gaps.png, revolution.png, spectra.png, candidates.png and residual.png with gnuplot.
+/// @return names of the files @throws Error.
 std::vector<std::string> drawPictures(const Explanation& explanation, const std::string& folder);
 
 }  // namespace smartmill::discrepancy

@@ -7,7 +7,7 @@
 
 namespace smartmill::discrepancy {
 
-/// Writes FOLDER/report.html, which holds the pictures of the folder. @throws Error.
+/// Writes FOLDER/report.html with embedded pictures. @throws Error.
 void writeHtml(const Explanation& explanation, const std::string& campaign,
                const std::vector<std::string>& pictures, const std::string& folder);
 

@@ -6,7 +6,7 @@
 
 namespace smartmill::discrepancy {
 
-/// What explain says on the terminal: verdict, effects, what is left, gap; a line each.
+/// Terminal output of explain: verdict, effects, unexplained findings and gap, one line each.
 std::string summaryOf(const Explanation& explanation);
 
 }  // namespace smartmill::discrepancy

@@ -4,15 +4,17 @@
 
 namespace smartmill::discrepancy {
 
-/// Gain of BIC below which one fit is not better than another: in the channels in which they differ two
-/// faithful simulations differ by so many squares.
-double leastGain(const TwinRunner& runner, const Fit& less, const Fit& more, const SearchOptions& options);
+/// Least significant BIC gain: at least the squares by which two accurate simulations differ in the channels
+/// where the fits differ.
+double requiredGain(const TwinRunner& runner, const FitResult& less, const FitResult& more,
+                    const SearchOptions& options);
 
-/// Nominal values pulled far off their stated uncertainty speak for an effect even where they could stand for
-/// it.
-bool relieves(const Fit& less, const Fit& more, const SearchOptions& options);
+/// Whether a fit brings nominal values significantly closer to their stated values; an effect may be required
+/// even if the nominal values could replace it.
+bool reducesPriorTension(const FitResult& less, const FitResult& more, const SearchOptions& options);
 
-/// Whether a fit is better than one with less in it.
-bool tells(const TwinRunner& runner, const Fit& less, const Fit& more, const SearchOptions& options);
+/// Whether the larger model is significantly better.
+bool isSignificant(const TwinRunner& runner, const FitResult& less, const FitResult& more,
+                   const SearchOptions& options);
 
 }  // namespace smartmill::discrepancy

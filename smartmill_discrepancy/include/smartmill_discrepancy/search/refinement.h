@@ -8,33 +8,33 @@
 
 namespace smartmill::discrepancy {
 
-/// The rung of a promise, with what its fit took.
-/// @param now where the round stands @param fit that is run; its newest member is the promised one
+/// Fits a screened hypothesis and returns it as a candidate with gain and cost.
+/// @param now fit at the start of the round @param fit runs the fit; the hypothesis is its last member
 /// @param tried receives the fit
-Rung rungOf(const Fitter& fitter, const Promise& promise, std::size_t round, const Fit& now,
-            const std::function<Fit()>& fit, Fit* tried);
+Candidate fitCandidate(const Fitter& fitter, const PredictedGain& predicted, std::size_t round,
+                       const FitResult& now, const std::function<FitResult()>& fit, FitResult* tried);
 
-/// Rivals of fewer values than the member that they came near to are followed to where they fit best beside
-/// the others, so that the comparison begins there: where a search is guided its squares are smooth, those of
-/// a free simulation near a tool's limit are not.
-/// @param now where the search stands @param tangents there @param ladder receives the values
-void followSimpler(const Fitter& fitter, const Fit& now, const NominalTangents& tangents,
-                   std::vector<Rung>* ladder);
+/// Refits alternatives with fewer values than the member that they compete with, so that the later comparison
+/// starts from their best values. Guided simulations have a smooth cost; free ones near a tool's stability
+/// limit do not.
+/// @param now current fit @param tangents at its state @param candidates receives the values
+void refitSimplerAlternatives(const Fitter& fitter, const FitResult& now, const NominalTangents& tangents,
+                              std::vector<Candidate>* candidates);
 
-/// Fits a state with every value free and simulated exactly, and measures what each member contributes and
-/// how its best rivals do in its place.
-/// @param result its ladder tells the rivals; best, contribution, needed and rivals are written
-/// @return false: the twin gives no numbers there, best is as it was
+/// Fits a state with all values free and exact simulation; measures the contribution of each member and of
+/// its best alternatives.
+/// @param result candidates are read; best, contribution, is_needed, without_member and alternatives are
+/// written
+/// @return false: the twin gives no finite values, best is unchanged
 bool refine(Workbench& bench, const FitState& state, const SearchOptions& options, SearchResult* result);
 
-/// Covariance of the values of a refined fit as far as what is left lets one know them
-/// (Fitter::sandwichCovariance()).
-Eigen::MatrixXd settledCovariance(Workbench& bench, const Fit& best);
+/// Covariance of a refined fit for a residual that is not white (Fitter::sandwichCovariance()).
+Eigen::MatrixXd robustCovariance(Workbench& bench, const FitResult& best);
 
-/// A share of the teeth's path that is no more than three of its deviations is left out
-/// (NominalFreedom::writeStdDevs()): the fit moves to where it is best without. @param of_fit covariance with
-/// which it was fitted; the fit holds the settled one
-void leaveOutUntoldPath(const MachineModel& nominal, const NominalFreedom& freedom,
-                        const Eigen::MatrixXd& of_fit, Fit* best);
+/// Sets an insignificant path share to zero (NominalFreedom::writeStdDevs()) and moves the other values to
+/// their conditional optimum.
+/// @param of_fit covariance of the fit itself; best->covariance is the robust one
+void dropInsignificantPathShare(const MachineModel& nominal, const NominalFreedom& freedom,
+                                const Eigen::MatrixXd& of_fit, FitResult* best);
 
 }  // namespace smartmill::discrepancy

@@ -8,72 +8,69 @@
 #include <Eigen/Core>
 
 #include "smartmill_discrepancy/fit/fit.h"
-#include "smartmill_discrepancy/search/standing.h"
+#include "smartmill_discrepancy/search/validation.h"
 
 namespace smartmill::discrepancy {
 
-/// What a hypothesis promises, from its tangents beside those of the nominal values and of the effects found
-/// so far.
-struct Promise {
+/// Predicted gain of a hypothesis from its derivatives, with nominal values and members free.
+struct PredictedGain {
   const Hypothesis* hypothesis = nullptr;
-  double gain = 0.0;   ///< chi2 that it takes away in linear approximation
-  bool rough = false;  ///< by what it did when it was simulated last; nothing but the gain is known
-  /// [1] Share of what it does that nominal values and members cannot stand for: where it is small, a gain
-  /// says that they are off.
-  double apart = 1.0;
-  std::vector<double> start;  ///< coordinates to start a fit from
+  double gain = 0.0;         ///< reduction of chi2 in linear approximation
+  bool approximate = false;  ///< from the previous simulation: only the gain is valid
+  /// [1] Share of its change that nominal values and members cannot replace; a gain with a small share means
+  /// that those are off.
+  double independent_share = 1.0;
+  std::vector<double> start;  ///< coordinates from which a fit starts
   std::vector<double>
-      null;  ///< the point without effect that the start was reached from; empty: the start stands
-  /// What it would change beside all else that moves with it, and what would be left without it, laid out as
-  /// the runner's vectors; nullptr: too little to tell.
-  std::shared_ptr<const Eigen::VectorXd> change, left_without;
-  AskedTest stated;  ///< what the stated nominal values say of it, its variance left open
+      null;  ///< point without effect from which start was reached; empty: start is used as it is
+  /// Change of the simulation including all values that move with it, and residual without it, in the layout
+  /// of the runner's vectors; nullptr: gain too small.
+  std::shared_ptr<const Eigen::VectorXd> change, baseline_residual;
+  ScaleEvidence prior_evidence;  ///< of the stated nominal values; its variance is not set
 };
 
-/// What hypotheses did when they were simulated last, thinned out: what one does changes little from one
-/// state to the next, so that one that comes nowhere near to what is due need not be simulated again.
+/// Derivatives of hypotheses from their last simulation, on thinned samples. They change little from one
+/// state to the next, so hypotheses with a far too small gain are not simulated again.
 struct ScreeningMemory {
-  std::map<const Hypothesis*, std::vector<Eigen::MatrixXf>> did;  ///< of each probe
-  /// The most that a hypothesis may promise by what parts of the same records said: for the next screening.
-  std::map<const Hypothesis*, double> at_most;
+  std::map<const Hypothesis*, std::vector<Eigen::MatrixXf>> columns;  ///< by probe
+  /// Upper limits of the gain from a screening of shortened records: for the next screening.
+  std::map<const Hypothesis*, double> gain_limits;
 
   void clear() {
-    did.clear();
-    at_most.clear();
+    columns.clear();
+    gain_limits.clear();
   }
 };
 
-/// Score test of each hypothesis at a fitted state. Best first; hypotheses without any trace in the data come
-/// last.
-/// @param tangents of the nominal values at the state
-/// Cancelled, it ends with those that it has come to.
-/// @param tried simulated one by one or in groups; may hold effects that are members already: those are
-/// passed over
-/// @param due gain below which a promise is of no use @param memory of the same runner and tried; those that
-/// it says promise far less have a rough gain and no start
-std::vector<Promise> screen(const Fitter& fitter, const Fit& now, const NominalTangents& tangents,
-                            const std::vector<Hypothesis>& tried, double due, ScreeningMemory* memory);
+/// Score test of each hypothesis at a fitted state, best first; hypotheses without any response come last.
+/// When cancelled, it returns the predictions so far.
+/// @param tangents of the nominal values at the state @param hypotheses existing members are skipped
+/// @param required_gain smaller gains are of no use @param memory of the same runner and hypotheses; those
+/// with a far smaller remembered gain are approximate and have no start
+std::vector<PredictedGain> screen(const Fitter& fitter, const FitResult& now, const NominalTangents& tangents,
+                                  const std::vector<Hypothesis>& hypotheses, double required_gain,
+                                  ScreeningMemory* memory);
 
-/// Simulates those that were only remembered, where they promise this much.
-void screenRough(const Fitter& fitter, const Fit& now, const NominalTangents& tangents, double least,
-                 ScreeningMemory* memory, std::vector<Promise>* promises);
+/// Simulates the approximate predictions whose gain exceeds a minimum.
+void screenRemembered(const Fitter& fitter, const FitResult& now, const NominalTangents& tangents,
+                      double least, ScreeningMemory* memory, std::vector<PredictedGain>* predictions);
 
-/// Tangents of these members' values, one member after the other.
-/// @param base receives what the state itself says
-BlockColumns memberTangents(const Fitter& fitter, const FitState& state,
-                            const std::vector<std::size_t>& members, SimulatedBlocks* base);
+/// Derivatives with respect to the values of these members, one member after the other.
+/// @param base receives the simulation of the state
+SparseColumns memberTangents(const Fitter& fitter, const FitState& state,
+                             const std::vector<std::size_t>& members, SimulatedChannels* base);
 
-/// What the fit tests would ask for of what is promised: as sure as a fit of it would be.
-AskedShare fittedShare(const Fitter& fitter, const Promise& promise);
+/// Predicted effect scale of the fitted tests, as of a fit.
+EffectScale fittedScale(const Fitter& fitter, const PredictedGain& predicted);
 
-/// Where a hypothesis does to the radii of the teeth what a member does, as nearly as it can: runout in the
-/// place of radii that were fitted one by one. No value: one of both changes none.
-std::optional<std::vector<double>> inPlaceOf(const Fitter& fitter, const Member& member,
-                                             const Hypothesis& hypothesis);
+/// Values at which a hypothesis reproduces the tooth radii of a member as closely as possible, e.g. runout
+/// instead of individually fitted radii. No value if one of both does not change radii.
+std::optional<std::vector<double>> equivalentValues(const Fitter& fitter, const Member& member,
+                                                    const Hypothesis& hypothesis);
 
-/// The promise is linear: of shorter ways from the null point to its start the one that fits best, or one
-/// that is given beside them.
-std::vector<double> bestStart(const Fitter& fitter, const Fit& now, const Promise& promise,
+/// Best of several starts, since the prediction is linear: full and shorter steps from the null point, and an
+/// optional other one.
+std::vector<double> bestStart(const Fitter& fitter, const FitResult& now, const PredictedGain& predicted,
                               const std::optional<std::vector<double>>& other = {});
 
 }  // namespace smartmill::discrepancy

@@ -8,14 +8,14 @@
 
 namespace smartmill::discrepancy {
 
-/// A test that would tell two models apart.
+/// A test that distinguishes two models.
 struct SeparatingTest {
-  std::string text;         ///< for people
-  CampaignTest test;        ///< as one of the campaign, begun anew
-  double difference = 0.0;  ///< [1] RMS of what the predictions differ by, over the noise
+  std::string text;         ///< description
+  CampaignTest test;        ///< as a new test of the campaign
+  double difference = 0.0;  ///< [1] RMS difference of the predictions over the noise
 };
 
-/// The cut or air cut, among variations of the campaign's tests, in which two models differ most.
+/// The cut or air cut with the largest difference of two models among variations of the campaign's tests.
 std::optional<SeparatingTest> separatingTest(const Dataset& data, const MachineModel& a,
                                              const MachineModel& b);
 

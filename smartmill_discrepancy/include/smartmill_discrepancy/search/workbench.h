@@ -13,13 +13,13 @@ namespace smartmill::discrepancy {
 
 struct WorkbenchOptions {
   int threads = 2;
-  int screening_substeps = 1;  ///< more where nothing guides the modes of a tool
+  int screening_substeps = 1;  ///< increased for unguided tools with modes
   int final_substeps = 8;
-  std::function<bool()> cancelled;  ///< asked now and then; true ends every fit where it stands
+  std::function<bool()> cancelled;  ///< polled; true ends every fit at its current step
 };
 
-/// A campaign with what simulates and fits it: a quick and an exact twin of the tests to be fitted, and an
-/// exact one of the held-out tests. The quick twin is made equal to the exact one where the search stands.
+/// A campaign with its twins and fitters: a quick and an exact twin of the fitted tests, and an exact one of
+/// the held-out tests. The quick twin is corrected to the exact one at the current state.
 class Workbench {
  public:
   Workbench(const Dataset& data, const WorkbenchOptions& options);
@@ -30,85 +30,85 @@ class Workbench {
   const NominalFreedom& freedom() const { return freedom_; }
   const Fitter& quick() const { return quick_; }
   const Fitter& exact() const { return exact_; }
-  /// Exact twin of the fit tests, guided where fits are.
+  /// Exact twin of the fitted tests, guided if the fits are.
   const TwinRunner& fitted() const { return guided_ ? guided_runner_ : exact_runner_; }
   const TwinRunner& heldout() const { return heldout_runner_; }  ///< exact twin of the held-out tests
   const WorkbenchOptions& options() const { return options_; }
   bool cancelled() const { return options_.cancelled && options_.cancelled(); }
 
-  /// Samples of the fit tests that count.
-  double samples() const { return exact_runner_.counts(); }
+  /// Independent samples of the fitted tests.
+  double samples() const { return exact_runner_.effectiveSamples(); }
 
-  /// Makes the quick twin equal to the exact one at a state and takes the nominal tangents there.
-  /// @param exact_squares receives what the exact twin leaves there; may be nullptr
+  /// Corrects the quick twin to the exact one at a state and computes the nominal derivatives there.
+  /// @param exact_squares receives the squares of the exact twin; may be nullptr
   NominalTangents linearise(const FitState& state, double* exact_squares = nullptr);
-  /// The same with the tangents of another state, which serve a fit on its way.
+  /// The same with the derivatives of another state, for intermediate steps of a fit.
   NominalTangents lineariseBy(NominalTangents tangents, const FitState& state,
                               double* exact_squares = nullptr);
 
-  /// From here on samples count by what the exact twin leaves of them at a state, fit and held-out tests each
-  /// by their own (gap/whitening.h): what follows upon another tells nothing new. The records are turned
-  /// there. @return false, and nothing has changed: all of it is noise as stated; or a guided twin, which no
-  /// free one follows, has part of the records on both sides, so that what is left is not noise beside what
-  /// it says
-  bool weighBy(const FitState& state);
-  /// Every sample alike, by its noise, as the gap is told.
-  void weighAlike();
+  /// Whitens all residuals by the residual of the exact twin at a state, fitted and held-out tests each by
+  /// their own (gap/whitening.h), and aligns the records there.
+  /// @return false, without change: the residual is white noise as stated, or the twin is guided, whose
+  /// prediction contains part of the record
+  bool whitenAt(const FitState& state);
+  /// Removes the whitening: every sample counts by its noise, as in the gap.
+  void clearWhitening();
 
-  /// Whether some cut of a tool with modes shows its displacement: such tools are searched guided by it, so
-  /// that no candidate runs away, and judged freely.
+  /// Whether a cut of a tool with modes has a recorded displacement: the search is then guided by it, so that
+  /// no candidate diverges; results are compared freely.
   bool canGuide() const { return can_guide_; }
   bool guided() const { return guided_; }
-  void guide(bool guided);
+  void setGuided(bool guided);
 
-  /// Guided cuts are trusted as far as a state predicts them, those that chatter from the beginning on.
-  void trustAt(const FitState& state);
-  /// Where the search is not guided: cuts of which free simulation leaves clearly more than a guided one are
-  /// guided from here on (near its limit a tool rings on in free simulation at what any small error has
-  /// begun). Until guide().
+  /// Sets the weights of guided cuts from their residual at a state; chattering cuts are guided from the
+  /// beginning.
+  void updateWeights(const FitState& state);
+  /// If the search is not guided: guides cuts whose free simulation has a clearly larger residual than the
+  /// guided one from now on (near its limit a tool keeps vibrating from any small error). Reset by
+  /// setGuided().
   void guideNearLimit(const FitState& state);
 
-  /// What the exact twin leaves of the fit tests at a state.
+  /// Squares of the exact twin on the fitted tests at a state.
   double exactSquares(const FitState& state);
-  /// The same with the records where they lie now.
+  /// The same with the current alignment of the records.
   double exactSquaresHere(const FitState& state) const;
-  /// What the exact twin leaves that nothing guides.
+  /// Squares of the exact twin without guidance.
   double freeSquares(const FitState& state);
 
-  /// Smaller steps for the quick twin. @return false: they are as small as the exact one's
+  /// Smaller steps for the quick twin. @return false: they are those of the exact twin already
   bool refineQuick();
 
   bool phasesEstimated() const { return phases_estimated_; }  ///< some records have no spindle angle
 
-  /// Turns the records without spindle angle, of the state and held out, to where the lines of the state's
-  /// forces say, where it then fits better: another tooth, another turn in air; not by what fits find
-  /// themselves. @return by how much [rad], 0: not at all
-  double turnPhases(FitState& state);
+  /// Aligns records without spindle angle with the force lines of the state, where this reduces the residual:
+  /// another tooth, another angle of an air cut. Small corrections are left to the fits.
+  /// @return largest rotation [rad], 0: none
+  double alignPhases(FitState& state);
 
-  /// The records lie where a state has them, those held out where it fits them best.
-  void turnTo(const FitState& state);
+  /// Gives the records the alignment of a state; held-out records are aligned by their best fit.
+  void alignTo(const FitState& state);
 
  private:
-  void turnFitted(const FitState& state);
+  void alignFitted(const FitState& state);
   void readGuidance();
   void correctAt(const FitState& state, double* exact_squares);
 
-  // The last tangents: the search comes back to where it stood. They hold as long as the quick twin says the
-  // same there: not where records lie elsewhere, steps are others, or what is compared is weighed anew.
-  struct Taken {
+  // The last derivatives, valid while the quick twin gives the same values at the state: not after a change
+  // of alignment, steps or whitening.
+  struct LinearisedState {
     FitState state;
-    SimulatedBlocks said;
+    SimulatedChannels simulated_there;
     NominalTangents tangents;
   };
   WorkbenchOptions options_;
-  Dataset data_;                  // its records without spindle angle are turned as the model becomes better
-  std::vector<TestData> loaded_;  // those to be fitted, as they were loaded
+  Dataset data_;                  // records without spindle angle are aligned again as the model improves
+  std::vector<TestData> loaded_;  // fitted tests as loaded
   NominalFreedom freedom_;
   bool phases_estimated_;
   bool can_guide_, guided_ = false, refined_ = false;
   TwinRunner quick_runner_, exact_runner_, guided_runner_, heldout_runner_;
   Fitter quick_, exact_;
-  std::optional<Taken> taken_;
+  std::optional<LinearisedState> last_linearised_;
 };
 
 }  // namespace smartmill::discrepancy

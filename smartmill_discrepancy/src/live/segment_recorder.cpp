@@ -1,0 +1,214 @@
+#include "smartmill_discrepancy/live/segment_recorder.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "smartmill_core/names.h"
+#include "smartmill_core/signal/steady_path.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::discrepancy {
+namespace {
+
+constexpr double SPEED_TOLERANCE = 0.02;  // of the stated speed
+constexpr double ANGLE_TOLERANCE = 0.02;  // [rad] from constant speed
+constexpr double CONFIRMATION_TIME =
+    0.05;  // [s] of steady motion after a segment, since the controller's state may be late
+constexpr double HISTORY = 1.0;  // [s] of angles and loads in addition to the length of a segment
+
+}  // namespace
+
+SegmentRecorder::SegmentRecorder(const SegmentParameters& parameters,
+                                 std::function<void(const RecordSegment&)> deliver)
+    : parameters_(parameters), deliver_(std::move(deliver)) {
+}
+
+void SegmentRecorder::reset() {
+  dropCondition();
+  first_.reset();
+  cut_time_ = 0.0;
+  angles_.clear();
+  loads_.clear();
+}
+
+void SegmentRecorder::dropCondition() {
+  condition_.reset();
+  restartSegment();
+}
+
+void SegmentRecorder::restartSegment() {
+  steady_since_.reset();
+  blocks_.clear();
+  unconfirmed_.clear();
+}
+
+void SegmentRecorder::handle(const CuttingCondition& condition) {
+  dropCondition();
+  condition_ = condition;
+}
+
+void SegmentRecorder::handle(const CncState& state) {
+  if (!condition_ || condition_->kind == CuttingCondition::Kind::none) return;
+  const bool cut = condition_->kind == CuttingCondition::Kind::cut;
+  const bool path = !cut || onSteadyPath(*condition_, state, parameters_.path_tolerance);
+  const bool steady =
+      path && std::abs(state.spindle_speed / condition_->spindle_speed - 1.0) < SPEED_TOLERANCE;
+  if (steady && !steady_since_) steady_since_ = state.stamp;
+  if (!steady && steady_since_) {
+    if (cut) cut_time_ += state.stamp - *steady_since_;
+    restartSegment();
+  }
+  while (!unconfirmed_.empty() && state.stamp >= unconfirmed_.front().stamp + CONFIRMATION_TIME) {
+    const RecordSegment segment = std::move(unconfirmed_.front());
+    unconfirmed_.pop_front();
+    deliver_(segment);
+  }
+}
+
+void SegmentRecorder::handle(const SpindleAngle& angle) {
+  angles_.push_back(angle);
+  while (angles_.front().stamp < angle.stamp - parameters_.length - HISTORY) angles_.pop_front();
+}
+
+void SegmentRecorder::handle(const LoadSample& load) {
+  loads_.push_back(load);
+  while (loads_.front().stamp < load.stamp - parameters_.length - HISTORY) loads_.pop_front();
+}
+
+void SegmentRecorder::handle(const SampleBlock& dynamometer) {
+  if (dynamometer.size() == 0) return;
+  if (!first_) first_ = dynamometer.stamp;
+  if (!steady_since_ || dynamometer.stamp < *steady_since_ + parameters_.settle) return;
+  const bool gap =
+      !blocks_.empty() && dynamometer.first_index != blocks_.back().first_index + blocks_.back().size();
+  if (gap) blocks_.clear();
+  blocks_.push_back(dynamometer);
+  // Stamps are rounded: half a sample is enough.
+  const double length = dynamometer.timeOf(dynamometer.size()) - blocks_.front().stamp;
+  if (length >= parameters_.length - 0.5 / dynamometer.sample_rate) finish();
+}
+
+// Linear fit of the angles of a segment; nothing if the speed is not constant.
+std::optional<SegmentRecorder::SpindleRotation> SegmentRecorder::steadyRotation(double begin,
+                                                                                double end) const {
+  double n = 0.0, st = 0.0, sa = 0.0, stt = 0.0, sta = 0.0, unwrapped = 0.0, last = 0.0, last_stamp = 0.0;
+  for (const SpindleAngle& a : angles_) {
+    if (a.stamp < begin || a.stamp > end) continue;
+    if (n == 0.0) {
+      unwrapped = a.angle;
+    } else {
+      const double expected = a.speed * (a.stamp - last_stamp);
+      unwrapped += expected + std::remainder(a.angle - last - expected, units::TWO_PI);
+    }
+    last = a.angle;
+    last_stamp = a.stamp;
+    const double t = a.stamp - begin;
+    n += 1.0;
+    st += t;
+    sa += unwrapped;
+    stt += t * t;
+    sta += t * unwrapped;
+  }
+  const double det = n * stt - st * st;
+  if (n < 3.0 || det <= 0.0) return {};
+  SpindleRotation rotation;
+  rotation.speed = (n * sta - st * sa) / det;
+  rotation.phase = (sa - rotation.speed * st) / n;
+  const bool is_steady = std::all_of(angles_.begin(), angles_.end(), [&](const SpindleAngle& a) {
+    const double expected = rotation.phase + rotation.speed * (a.stamp - begin);
+    return a.stamp < begin || a.stamp > end ||
+           std::abs(std::remainder(a.angle - expected, units::TWO_PI)) < ANGLE_TOLERANCE;
+  });
+  if (!is_steady) return {};
+  return rotation;
+}
+
+CampaignTest SegmentRecorder::testOf(double begin, double speed) const {
+  CampaignTest test;
+  test.name = condition_->name;
+  test.file = condition_->name + ".csv";
+  test.kind = condition_->kind == CuttingCondition::Kind::air ? TestKind::air : TestKind::cut;
+  test.sample_rate = blocks_.front().sample_rate;
+  test.spindle_speed = speed;
+  test.running_before = begin - *steady_since_;
+  test.start_time = begin - *first_;
+  if (test.kind == TestKind::cut) {
+    test.engagement = condition_->engagement;
+    test.cut_time_before = cut_time_ + *test.running_before;
+  }
+  return test;
+}
+
+Record SegmentRecorder::recordOf(const std::string& name, const SpindleRotation& rotation) const {
+  Record record;
+  record.file = name;
+  std::vector<double> angle;
+  std::array<std::vector<double>, 3> force;
+  for (const SampleBlock& b : blocks_) {
+    const std::array<std::size_t, 3> channel{{b.channel("fx"), b.channel("fy"), b.channel("fz")}};
+    for (std::size_t i = 0; i < b.size(); ++i) {
+      const double t = static_cast<double>(record.time.size()) / blocks_.front().sample_rate;
+      record.time.push_back(t);
+      const double a = std::fmod(rotation.phase + rotation.speed * t, units::TWO_PI);
+      angle.push_back(a < 0.0 ? a + units::TWO_PI : a);
+      for (std::size_t axis = 0; axis < 3; ++axis) force[axis].push_back(b.at(i, channel[axis]));
+    }
+  }
+  record.add("spindle_angle") = std::move(angle);
+  record.add("fx") = std::move(force[0]);
+  record.add("fy") = std::move(force[1]);
+  record.add("fz") = std::move(force[2]);
+  return record;
+}
+
+void SegmentRecorder::finish() {
+  const double begin = blocks_.front().stamp, end = blocks_.back().timeOf(blocks_.back().size());
+  if (const std::optional<SpindleRotation> rotation = steadyRotation(begin, end)) {
+    RecordSegment segment;
+    segment.stamp = end;
+    segment.test = testOf(begin, rotation->speed);
+    segment.record = recordOf(segment.test.name, *rotation);
+    for (const LoadSample& l : loads_) {
+      if (l.stamp >= begin && l.stamp <= end) segment.load.push_back({l.stamp - begin, l.spindle_load});
+    }
+    unconfirmed_.push_back(std::move(segment));
+  }
+  blocks_.clear();
+}
+
+SegmentPipeline::SegmentPipeline(const SegmentParameters& parameters, double hold_back,
+                                 std::function<void(const RecordSegment&)> deliver)
+    : recorder_(parameters, std::move(deliver)),
+      sorter_(hold_back),
+      conditions_(sorter_.addLatched(names::CUTTING_CONDITION)),
+      states_(sorter_.addRegular(names::CNC_STATE)),
+      angles_(sorter_.addRegular(names::SPINDLE_ANGLE)),
+      blocks_(sorter_.addRegular(names::DYNAMOMETER)),
+      // Absent from some machines: waited for only by the hold-back.
+      loads_(sorter_.addUnawaited(names::CNC_LOAD)) {
+  sorter_.onRestart([this] { recorder_.reset(); });
+}
+
+void SegmentPipeline::push(const CuttingCondition& condition) {
+  sorter_.push(conditions_, condition.stamp, [this, condition] { recorder_.handle(condition); });
+}
+
+void SegmentPipeline::push(const CncState& state) {
+  sorter_.push(states_, state.stamp, [this, state] { recorder_.handle(state); });
+}
+
+void SegmentPipeline::push(const SpindleAngle& angle) {
+  sorter_.push(angles_, angle.stamp, [this, angle] { recorder_.handle(angle); });
+}
+
+void SegmentPipeline::push(const SampleBlock& dynamometer) {
+  sorter_.push(blocks_, dynamometer.stamp, [this, dynamometer] { recorder_.handle(dynamometer); });
+}
+
+void SegmentPipeline::push(const LoadSample& load) {
+  sorter_.push(loads_, load.stamp, [this, load] { recorder_.handle(load); });
+}
+
+}  // namespace smartmill::discrepancy
