@@ -73,7 +73,7 @@ Explanation look(const Dataset& data, const std::string& folder,
                  const std::function<void(const std::string&)>& progress) {
   ExplainOptions options;
   options.bench.threads = 1;
-  options.search.progress = progress;
+  options.search.on_log = progress;
   std::filesystem::create_directories(folder + "/report");
   Explanation e = explain(data, options, folder + "/report");
   writeReport(e, folder + "/report");
