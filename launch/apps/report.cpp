@@ -161,7 +161,8 @@ int run(const Request& request) {
   if (!model.empty()) truth = trueStability(recording, TrueLimit(model, data, *recording.chart));
   Report report = makeReport(recording, truth);
   report.unchecked = notMeasured(recording, session);
-  if (report.sections.empty() && report.cuts.empty() && report.unchecked.empty()) throw Error(request.bag + ": no results are in it");
+  if (report.sections.empty() && report.cuts.empty() && report.unchecked.empty())
+    throw Error(request.bag + ": no results are in it");
   const std::string text = markdown(report);
   write(folder / "summary.md", text);
   write(folder / "summary.json", json(report, session));

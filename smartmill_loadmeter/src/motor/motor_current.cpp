@@ -19,8 +19,8 @@ namespace {
 constexpr int COARSEST = 10;
 constexpr double MARGIN = 6.0;  // a band must end this many times above the sine it is to keep
 
-/// Approximation at half the sample rate: one step of the periodic wavelet transform (Daubechies, five vanishing
-/// moments) without its detail. @param fine a power of two of samples
+/// Approximation at half the sample rate: one step of the periodic wavelet transform (Daubechies, five
+/// vanishing moments) without its detail. @param fine a power of two of samples
 std::vector<double> coarser(const std::vector<double>& fine) {
   static const auto scaling = boost::math::filters::daubechies_scaling_filter<double, 5>();
   std::vector<double> coarse(fine.size() / 2, 0.0);

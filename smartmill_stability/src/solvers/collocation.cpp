@@ -79,7 +79,8 @@ struct Reference {
       gauss.push_back(0.5 * (1.0 + zero));
       weight.push_back(1.0 / ((1.0 - zero * zero) * slope * slope));
     };
-    const std::vector<double> zeros = boost::math::legendre_p_zeros<double>(points);  // not negative, ascending
+    const std::vector<double> zeros =
+        boost::math::legendre_p_zeros<double>(points);  // not negative, ascending
     for (auto zero = zeros.rbegin(); zero != zeros.rend(); ++zero)
       if (*zero > 0.0) add(-*zero);
     for (const double zero : zeros) add(zero);
