@@ -160,8 +160,8 @@ int run(const Request& request) {
   const std::string model = recording.chart ? trueModel(recording, data) : "";
   if (!model.empty()) truth = trueStability(recording, TrueLimit(model, data, *recording.chart));
   Report report = makeReport(recording, truth);
-  report.failed_steps = failedSteps(session);
-  if (report.sections.empty() && report.cuts.empty() && report.failed_steps.empty())
+  report.unchecked = notMeasured(recording, session);
+  if (report.sections.empty() && report.cuts.empty() && report.unchecked.empty())
     throw Error(request.bag + ": no results are in it");
   const std::string text = markdown(report);
   write(folder / "summary.md", text);

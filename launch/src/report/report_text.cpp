@@ -96,21 +96,30 @@ std::string markdown(const Report& report) {
   }
   out << "\n";
   for (const std::string& note : report.notes) out << "- " << note << "\n";
-  for (const std::string& step : report.failed_steps)
-    out << "- NOT CHECKED: the session ended at the step '" << step << "'\n";
+  for (const std::string& what : report.unchecked) out << "- NOT CHECKED: " << what << "\n";
   out << "\n" << report.met() << " of " << report.targets() << " targets met\n";
   return out.str();
 }
 
-std::vector<std::string> failedSteps(const std::string& session) {
-  std::vector<std::string> failed;
-  if (session.empty()) return failed;
+std::vector<std::string> notMeasured(const SessionRecording& recording, const std::string& session) {
+  std::vector<std::string> missing;
+  if (session.empty()) return missing;
   const Json summary = parsed(session);
   for (const Json& step : summary.value("steps", Json::array())) {
     if (!step.value("done", false))
-      failed.push_back(step.value("name", "") + ": " + step.value("detail", ""));
+      missing.push_back("step '" + step.value("name", "") + "' failed: " + step.value("detail", ""));
   }
-  return failed;
+  if (missing.empty()) return missing;
+  const auto require = [&](bool there, const std::string& what) {
+    if (!there) missing.push_back(what + ": not in the recording");
+  };
+  require(recording.coefficients.has_value(), "cutting coefficients");
+  require(recording.modal(false, POINT_TOOL_TIP, "x"), "tool-tip modes in x");
+  require(recording.modal(false, POINT_TOOL_TIP, "y"), "tool-tip modes in y");
+  require(recording.chart.has_value(), "stability chart");
+  for (const char* cut : {"verify_stable", "verify_unstable", "resonance"})
+    require(recording.cut(cut), std::string("cut ") + cut);
+  return missing;
 }
 
 std::string json(const Report& report, const std::string& session) {
@@ -152,7 +161,7 @@ std::string json(const Report& report, const std::string& session) {
                            {"met", cut.met()}});
   }
   out["notes"] = report.notes;
-  out["failed_steps"] = report.failed_steps;
+  out["unchecked"] = report.unchecked;
   if (!session.empty()) out["session"] = parsed(session);
   return out.dump(2) + "\n";
 }

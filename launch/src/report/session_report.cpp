@@ -295,7 +295,7 @@ Report makeReport(const SessionRecording& recording, const TrueStability& truth)
 }
 
 std::size_t Report::targets() const {
-  std::size_t count = cuts.size() + failed_steps.size();
+  std::size_t count = cuts.size() + unchecked.size();
   for (const Section& section : sections) {
     for (const Figure& figure : section.figures) count += figure.met() || figure.unchecked ? 1 : 0;
   }

@@ -187,22 +187,31 @@ TEST(SessionReport, ATrueLimitThatWasNotComputedLeavesItsTargetsUnchecked) {
   EXPECT_NE(markdown(report).find("| NOT CHECKED |"), std::string::npos);
   const auto parsed = nlohmann::json::parse(json(report, ""));
   for (const auto& f : parsed["figures"]) {
-    if (f["quantity"] == "pocket 1") EXPECT_TRUE(f["met"].is_null());
+    if (f["quantity"] == "pocket 1") {
+      EXPECT_TRUE(f["met"].is_null());
+    }
   }
 }
 
-TEST(SessionReport, AFailedStepIsATargetNotChecked) {
-  Report report = makeReport(example(), {});
-  const std::size_t targets = report.targets();
-  EXPECT_TRUE(failedSteps("").empty());
-  EXPECT_TRUE(failedSteps(R"({"completed": true, "steps": [{"name": "connect", "done": true}]})").empty());
-  report.failed_steps = failedSteps(
-      R"({"steps": [{"name": "connect", "done": true}, {"name": "FRF in x", "done": false, "detail": "no hit"}]})");
-  EXPECT_EQ(report.targets(), targets + 1);
-  EXPECT_EQ(report.met(), targets);
-  EXPECT_NE(markdown(report).find("NOT CHECKED: the session ended at the step 'FRF in x: no hit'"),
-            std::string::npos);
-  EXPECT_THROW(failedSteps("{broken"), Error);
+TEST(SessionReport, WhatAFailedSessionDidNotMeasureIsNotChecked) {
+  const std::string done = R"({"steps": [{"name": "connect", "done": true}]})";
+  const std::string failed =
+      R"({"steps": [{"name": "connect", "done": true}, {"name": "chart", "done": false, "detail": "no modes"}]})";
+  SessionRecording recording = example();
+  recording.chart.reset();
+  EXPECT_TRUE(notMeasured(recording, "").empty());
+  EXPECT_TRUE(notMeasured(recording, done).empty());
+  EXPECT_THROW(notMeasured(recording, "{broken"), Error);
+  Report report = makeReport(recording, {});
+  const std::size_t targets = report.targets(), met = report.met();
+  report.unchecked = notMeasured(recording, failed);
+  EXPECT_EQ(report.targets(), targets + report.unchecked.size());
+  EXPECT_EQ(report.met(), met);
+  const std::string text = markdown(report);
+  EXPECT_NE(text.find("- NOT CHECKED: step 'chart' failed: no modes\n"), std::string::npos);
+  EXPECT_NE(text.find("- NOT CHECKED: stability chart: not in the recording\n"), std::string::npos);
+  EXPECT_EQ(text.find("cutting coefficients: not in the recording"), std::string::npos);
+  EXPECT_EQ(nlohmann::json::parse(json(report, failed))["unchecked"].size(), report.unchecked.size());
 }
 
 TEST(SessionReport, SummaryForPrograms) {

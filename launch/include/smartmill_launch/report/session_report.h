@@ -65,18 +65,18 @@ struct Report {
   std::vector<Section> sections;
   std::vector<CutCheck> cuts;
   std::vector<std::string> notes;
-  std::vector<std::string> failed_steps;  ///< of the session: each one target not checked
-  std::size_t targets() const;            ///< figures with a verdict or not checked, cuts, failed steps
-  std::size_t met() const;                ///< of these
+  std::vector<std::string> unchecked;  ///< what a session that failed did not measure: each one target
+  std::size_t targets() const;         ///< figures with a verdict or not checked, cuts, what is unchecked
+  std::size_t met() const;             ///< of these
 };
 
 /// The samples that a cut is judged by: in its steady stretch, there in all three recordings, compensation
 /// settled. Empty (first == second) when there are none.
 std::pair<std::uint64_t, std::uint64_t> judgedSamples(const RecordedCut& cut, double settle_revolutions);
 
-/// Steps that failed, with the reason. @param session JSON text that the session wrote @throws Error when it
-/// is not JSON
-std::vector<std::string> failedSteps(const std::string& session);
+/// Steps that failed, with the reason; then what the recording lacks for them. Empty when no step failed.
+/// @param session JSON text that the session wrote @throws Error when it is not JSON
+std::vector<std::string> notMeasured(const SessionRecording& recording, const std::string& session);
 
 Report makeReport(const SessionRecording& recording, const TrueStability& truth);
 
