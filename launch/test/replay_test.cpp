@@ -50,7 +50,7 @@ TEST(Replay, OfAShortSessionIsTheSameToTheLastDigit) {
   const TemporaryFolder folder;
   setenv("ROS_HOSTNAME", "localhost", 1);
   setenv("ROS_HOME", folder.file("ros_home").c_str(), 1);
-  const std::string live = folder.file("live.bag"), again = folder.file("again.bag");
+  const std::string live = folder.file("live.mcap"), again = folder.file("again.bag");  // both formats
   const std::string summary = folder.file("session.json"), log = folder.file("log.txt");
 
   const bool look = browserThere();

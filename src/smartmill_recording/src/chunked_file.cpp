@@ -18,6 +18,7 @@ namespace {
 constexpr std::size_t WINDOW = 4096;            // [byte]
 constexpr std::size_t MOST_KEPT = 256U << 20U;  // [byte] of chunks that overlap in time
 constexpr std::size_t LEAST_KEPT = 4;           // chunks
+constexpr std::uint32_t READ_AHEAD = 3;         // chunks
 constexpr std::uint64_t SECOND = 1000000000;    // [ns]
 
 }  // namespace
@@ -94,10 +95,11 @@ void ChunkedFile::addMessage(const Entry& entry) {
 ChunkedFile::Loaded ChunkedFile::spare() {
   if (spares_.empty() && kept_ > MOST_KEPT && loaded_.size() > LEAST_KEPT) release(chunks_[loaded_.front()]);
   Loaded loaded;
-  loaded.stored = std::move(stored_);
-  if (spares_.empty()) return loaded;
-  loaded.bytes = std::move(spares_.back());
-  spares_.pop_back();
+  for (auto [pool, taken] : {std::pair{&spares_, &loaded.bytes}, std::pair{&stored_, &loaded.stored}}) {
+    if (pool->empty()) continue;
+    *taken = std::move(pool->back());
+    pool->pop_back();
+  }
   return loaded;
 }
 
@@ -112,7 +114,7 @@ void ChunkedFile::release(Chunk& chunk) {
 void ChunkedFile::keep(std::uint32_t number, Loaded&& loaded) {
   Chunk& chunk = chunks_[number];
   chunk.bytes = std::move(loaded.bytes);
-  stored_ = std::move(loaded.stored);
+  stored_.push_back(std::move(loaded.stored));
   chunk.loaded = true;
   kept_ += chunk.bytes.size();
   loaded_.push_back(number);
@@ -130,22 +132,29 @@ void ChunkedFile::unpackInto(const Chunk& chunk, Loaded* loaded) const {
     throw std::runtime_error("checksum mismatch");
 }
 
-/// Begins to unpack a chunk that is needed next.
+/// Begins to unpack the chunks behind one that was loaded. What is only copied takes less time than a thread.
 void ChunkedFile::ahead(std::uint32_t number) {
-  if (number >= chunks_.size()) return;
-  coming_ = std::async(std::launch::async, [this, number, loaded = spare()]() mutable {
-    unpackInto(chunks_[number], &loaded);
-    return std::move(loaded);
-  });
+  const auto end =
+      std::min(static_cast<std::uint64_t>(chunks_.size()), std::uint64_t{number} + 1 + READ_AHEAD);
+  for (std::uint32_t next = number + 1; next < end; ++next) {
+    const Chunk& chunk = chunks_[next];
+    if ((chunk.packing == Packing::none && chunk.checksum == 0) || coming_.count(next) != 0) continue;
+    coming_[next] = std::async(std::launch::async, [this, next, loaded = spare()]() mutable {
+      unpackInto(chunks_[next], &loaded);
+      return std::move(loaded);
+    });
+  }
 }
 
 const std::vector<std::uint8_t>& ChunkedFile::load(std::uint32_t number) {
   Chunk& chunk = chunks_[number];
   if (chunk.loaded) return chunk.bytes;
   try {
-    // Only next() goes on to a chunk that was never seen.
-    if (!chunk.seen && coming_.valid()) {
-      keep(number, coming_.get());
+    const auto begun = coming_.find(number);
+    if (begun != coming_.end()) {
+      std::future<Loaded> unpacked = std::move(begun->second);
+      coming_.erase(begun);
+      keep(number, unpacked.get());
     } else {
       Loaded loaded = spare();
       unpackInto(chunk, &loaded);
@@ -158,7 +167,7 @@ const std::vector<std::uint8_t>& ChunkedFile::load(std::uint32_t number) {
   }
   if (!chunk.seen) {
     chunk.seen = true;
-    ahead(number + 1);
+    ahead(number);
   }
   return chunk.bytes;
 }

@@ -92,9 +92,9 @@ class ChunkedFile : public RecordingFile {
   std::deque<std::uint32_t> loaded_;    // chunks in the order of loading; some are released already
   std::size_t kept_ = 0;                // [byte] of loaded chunks
   std::optional<std::uint32_t> spent_;  // chunk whose last message was returned last
-  std::vector<std::vector<std::uint8_t>> spares_;  // memory of released chunks
-  std::vector<std::uint8_t> stored_;               // memory of packed bytes
-  std::future<Loaded> coming_;                     // is waited for before anything else here goes
+  std::vector<std::vector<std::uint8_t>> spares_;        // memory of released chunks
+  std::vector<std::vector<std::uint8_t>> stored_;        // memory of packed bytes
+  std::map<std::uint32_t, std::future<Loaded>> coming_;  // by chunk; destroyed first, which waits for them
 };
 
 }  // namespace smartmill

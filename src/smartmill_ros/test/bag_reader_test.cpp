@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 #include <rosbag/bag.h>
+#include <rosbag/view.h>
 #include <smartmill_msgs/CncState.h>
 #include <smartmill_msgs/SampleBlock.h>
 #include <smartmill_msgs/SpindleAngle.h>
@@ -18,6 +19,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/testing/temporary_folder.h"
+#include "smartmill_recording/recording_writer.h"
 #include "smartmill_ros/conversions.h"
 
 namespace smartmill {
@@ -94,6 +96,45 @@ TEST_F(DamagedBag, PackedBagsAreReadTheSame) {
     for (int i = 0; i < 500; ++i) {
       ASSERT_EQ(seen[static_cast<std::size_t>(i)], i ^ 1);
     }
+  }
+}
+
+/// The reader of ROS takes what this project writes.
+TEST(WrittenBag, IsReadByRosbag) {
+  const TemporaryFolder folder;
+  for (const RecordingCompression packing : {RecordingCompression::none, RecordingCompression::lz4}) {
+    const std::string file = folder.file("written.bag");
+    constexpr int COUNT = 5000;  // several chunks
+    {
+      const auto writer = createRecording(file, packing);
+      SampleBlock block;
+      block.sample_rate = 100.0;
+      block.channels = block.units = {"N"};
+      for (int i = 0; i < COUNT; ++i) {
+        const auto time = static_cast<std::uint64_t>(1000 + i) * 1000000001U;
+        block.samples.assign(100, i);
+        writer->write(names::DYNAMOMETER, time, block);
+        writer->write(names::SPINDLE_ANGLE, time, SpindleAngle{1.0, 0.5 * i, 2.0});
+      }
+      writer->close();
+    }
+    const rosbag::Bag bag(file, rosbag::bagmode::Read);
+    rosbag::View view(bag);
+    EXPECT_EQ(view.size(), 2U * COUNT);
+    EXPECT_EQ(view.getConnections().size(), 2U);
+    EXPECT_EQ(view.getEndTime().toNSec(), (999U + COUNT) * 1000000001ULL);
+    int blocks = 0, angles = 0;
+    for (const rosbag::MessageInstance& message : view) {
+      if (const auto block = message.instantiate<smartmill_msgs::SampleBlock>()) {
+        ASSERT_EQ(message.getTopic(), names::absolute(names::DYNAMOMETER));
+        ASSERT_EQ(message.getTime().toNSec(), static_cast<std::uint64_t>(1000 + blocks) * 1000000001U);
+        ASSERT_EQ(block->samples, std::vector<double>(100, blocks++));
+      } else if (const auto angle = message.instantiate<smartmill_msgs::SpindleAngle>()) {
+        ASSERT_EQ(angle->angle, 0.5 * angles++);
+      }
+    }
+    EXPECT_EQ(blocks, COUNT);
+    EXPECT_EQ(angles, COUNT);
   }
 }
 
