@@ -16,7 +16,7 @@
 #include "smartmill_core/testing/mill.h"
 #include "smartmill_core/testing/shared_data.h"
 #include "smartmill_core/units.h"
-#include "smartmill_sim/effects/effect.h"
+#include "smartmill_sim/effects/effect_set.h"
 #include "smartmill_sim/twin/cut_traces.h"
 #include "smartmill_sim/twin/spindle_drive.h"
 

@@ -10,7 +10,7 @@
 #include "smartmill_core/modal/modal_filter.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_sim/effects/delay_line.h"
-#include "smartmill_sim/effects/effect.h"
+#include "smartmill_sim/effects/effect_set.h"
 #include "smartmill_sim/effects/shelf_filter.h"
 #include "smartmill_sim/twin/cutter.h"
 #include "smartmill_sim/twin/edge_layers.h"
@@ -126,7 +126,7 @@ class CuttingMachine {
   void step(const Input& input, Output& output);
 
   /// Early channels of many steps: a row each, of those that are asked for.
-  using EarlyRows = std::array<std::vector<double>*, CHANNELS>;
+  using EarlyRows = std::array<std::vector<double>*, CHANNEL_COUNT>;
   /// So many steps at one speed, without a probe and with no force from elsewhere: what step() gives, stage
   /// after stage instead of step after step. @param next sets what of an input moves on, may engage()
   /// @param early as long as there are steps, or nullptr
