@@ -461,6 +461,30 @@ TEST(Twin, leavesOnlyTheNoiseOfIndependentCampaigns) {
   }
 }
 
+// Without an effect that the motion acts through, a move has no force; its axes are inputs, as the spindle
+// angle is.
+TEST(Twin, aMoveOfTheAxesIsWithoutForce) {
+  CampaignTest test;
+  test.name = "move";
+  test.kind = TestKind::move;
+  test.sample_rate = 1000.0;
+  Record recorded;
+  for (int i = 0; i < 200; ++i) {
+    recorded.time.push_back(i / 1000.0);
+    recorded.add("axis_x").push_back(1e-2 * std::sin(0.05 * i));
+    for (const char* name : {"fx", "fy", "fz"}) recorded.add(name).push_back(7.0);
+    recorded.add("current_x").push_back(1.0);
+  }
+  SimulationOptions options;
+  options.noise = false;
+  const Record simulated = simulateTest(mill(4), test, recorded, options);
+  EXPECT_EQ(simulated.column("axis_x"), recorded.column("axis_x"));
+  for (const char* name : {"fx", "fy", "fz"})
+    EXPECT_EQ(simulated.column(name), std::vector<double>(recorded.size(), 0.0)) << name;
+  EXPECT_FALSE(simulated.has("current_x"));
+  EXPECT_THROW(simulateTest(mill(4), test, 0.1, options), Error);
+}
+
 // The steps of the integration are no part of the answer.
 TEST(Twin, leavesTheSameWithFinerSteps) {
   SMARTMILL_SHARED_DATA(folder, "campaigns/vibrating_runout");

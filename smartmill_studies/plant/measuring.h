@@ -117,8 +117,8 @@ class Disturbance {
       orders_.push_back(order);
     }
   }
-  /// [N] @param angle [rad] of the spindle
-  std::array<double, 3> force(double angle) const {
+  /// [N] @param angle [rad] of the spindle @param axes [m/s2] acceleration of the machine's axes
+  std::array<double, 3> force(double angle, const std::array<double, 3>& /*axes*/) const {
     const double at = angle + unbalance_angle_;
     std::array<double, 3> force{unbalance_ * std::sin(at), unbalance_ * std::cos(at), 0.0};
     for (const Order& o : orders_) {

@@ -201,6 +201,7 @@ void CuttingMachine::takeOver(const Input& input) {
     if (moved && cutting()) setActualDepths();
   }
   --steps_to_update_;
+  now_.axis_acceleration = input.axis_acceleration;
   now_.angle = input.motion.angle;
   now_.speed = input.motion.speed;
   now_.chip = now_.depth = 0.0;

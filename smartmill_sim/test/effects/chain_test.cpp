@@ -276,7 +276,7 @@ TEST(Effects, everyDrawnEntryHasItsPhysics) {
 // At the null coordinates of a fit an effect changes nothing.
 TEST(Effects, nullValuesChangeNothing) {
   const MachineModel model = sensorMill();
-  EffectScope scope{model, {"fx", "fy", "fz", "load_meter"}};
+  EffectScope scope{model, {"fx", "fy", "fz", "load_meter"}, {"x", "y", "z"}};
   scope.largest_force = 1000.0;
   const Record pure = run(model, slotCut(4200.0), 0.03);
   for (const EffectKind& kind : effectCatalogue()) {

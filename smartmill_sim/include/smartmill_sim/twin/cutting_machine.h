@@ -45,6 +45,7 @@ class CuttingMachine {
     ToolMotion motion;                              ///< vibration is not read: the structure gives it
     std::array<double, 2> tip_force{{0, 0}};        ///< [N] on the tool besides cutting (a hammer)
     std::array<double, 3> sensor_force{{0, 0, 0}};  ///< [N] on the sensor besides cutting
+    Axes3 axis_acceleration{{0, 0, 0}};             ///< [m/s2] of the machine axes
     /// Where the tip is known to be: the chip is of that, whatever the structure would do.
     std::optional<TipPlace> tip;
   };

@@ -57,6 +57,8 @@ std::optional<std::string> lackingFor(EffectNeed need, const EffectScope& scope)
       return unless(scope.start_times, "start_time_s is not stated");
     case EffectNeed::cut_time:
       return unless(scope.cut_times, "cut_time_before_s is not stated");
+    case EffectNeed::axis_motion:
+      return unless(!scope.axes.empty(), "");
   }
   return {};
 }

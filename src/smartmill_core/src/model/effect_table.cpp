@@ -66,9 +66,9 @@ std::string searchText(const std::vector<EffectForm>& forms) {
 }
 
 std::string needText(const EffectKind& kind) {
-  static const std::array<const char*, 9> NAMES{{"cuts", "two teeth or more", "forces", "fx or fy",
-                                                 "load meter", "tool with modes", "sensor modes",
-                                                 "start_time_s", "cut_time_before_s"}};
+  static const std::array<const char*, 10> NAMES{{"cuts", "two teeth or more", "forces", "fx or fy",
+                                                  "load meter", "tool with modes", "sensor modes",
+                                                  "start_time_s", "cut_time_before_s", "axis motion"}};
   std::string text;
   for (const EffectNeed need : kind.needs)
     text += (text.empty() ? "" : ", ") + std::string(NAMES[static_cast<std::size_t>(need)]);
@@ -77,7 +77,7 @@ std::string needText(const EffectKind& kind) {
 
 std::string effectTable() {
   const MachineModel mill = exampleMill();
-  EffectScope scope{mill, {"fx", "fy", "fz", "load_meter"}};
+  EffectScope scope{mill, {"fx", "fy", "fz", "load_meter"}, {"x", "y", "z"}};
   scope.largest_force = 500.0;
   std::string table =
       "| name | what it does | keys (unit; range) | stage | coordinates of a fit (bounds; prior deviation) "

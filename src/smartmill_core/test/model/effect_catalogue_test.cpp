@@ -31,7 +31,7 @@ MachineModel vibratingMill(int teeth) {
 }
 
 EffectScope scopeOf(const MachineModel& model) {
-  EffectScope scope{model, {"fx", "fy", "fz", "load_meter"}};
+  EffectScope scope{model, {"fx", "fy", "fz", "load_meter"}, {"x", "y", "z"}};
   scope.cuts = scope.start_times = scope.cut_times = true;
   scope.largest_force = 600.0;
   return scope;

@@ -57,7 +57,8 @@ enum class EffectNeed {
   flexible_tool,
   sensor_modes,
   start_time,  ///< of every test that the effect acts in: start_time_s
-  cut_time     ///< of every cut: cut_time_before_s
+  cut_time,    ///< of every cut: cut_time_before_s
+  axis_motion  ///< position or velocity of a machine axis
 };
 
 /// Uniform distribution of realistic values: low..high around `about`, on one side or on both.
@@ -98,7 +99,8 @@ struct EffectParameter {
 /// Properties of a campaign that are known before any fit.
 struct EffectScope {
   const MachineModel& nominal;
-  std::set<std::string> channels;  ///< measured and simulated
+  std::set<std::string> channels;   ///< measured and simulated
+  std::set<std::string> axes = {};  ///< x, y, z whose motion is recorded
   bool cuts = false;
   bool start_times = false, cut_times = false;         ///< stated wherever they matter
   double largest_force = 0.0;                          ///< [N] of the records
