@@ -278,6 +278,37 @@ TEST(Machine, LeavesTheSurfaceOfTheTeethsPath) {
   }
 }
 
+// The plant knows its acceleration in closed form, the twin derives it from the recorded position.
+TEST(Machine, MovesAMassAsTheTwinDoes) {
+  MachineModel model;
+  model.tool = rigidPlant().tool;
+  model.cutting = rigidPlant().cutting;
+  for (ModalModel& axis : model.force_sensor.axis) {
+    axis.modes = {{1200.0, 0.03, 0.9}};
+    axis.direct = 0.1;
+  }
+  model.effects = {effectEntry("axis_inertia", {{"mass_kg", 25.0}}, {{"axis", "y"}})};
+  CampaignTest test;
+  test.name = "move";
+  test.kind = TestKind::move;
+  test.sample_rate = 10000.0;
+  std::mt19937_64 random(1);
+  RunOptions options;
+  options.noise = false;
+  const Record plant = run(plantOf(model), test, options, random);
+  sim::SimulationOptions quiet;
+  quiet.noise = false;
+  const Record twin = sim::simulateTest(model, test, plant, quiet);
+  double squares = 0.0, difference = 0.0;
+  for (std::size_t i = 0; i < plant.size(); ++i) {
+    squares += std::pow(plant.column("fy")[i], 2);
+    difference += std::pow(plant.column("fy")[i] - twin.column("fy")[i], 2);
+  }
+  EXPECT_GT(std::sqrt(squares / static_cast<double>(plant.size())), 20.0);  // [N]
+  EXPECT_LT(std::sqrt(difference / squares), 0.01);
+  for (const char* still : {"fx", "fz"}) EXPECT_NEAR(plant.column(still)[4000], 0.0, 1e-9);
+}
+
 // The effects act by the plant's own means, each in one of these tests at least.
 TEST(Machine, HasEveryEffectOfTheCatalogue) {
   MachineModel model;
