@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """Who may know whom: no ROS under the core, the FOCAS wire, the recordings and in the libraries of the node packages; no node package
 knows another's headers. Exceptions stand here and nowhere else."""
+import pathlib
 import re
 import sys
 
-from packages import includes, packages, report
+from packages import includes, packages, report, text
 
 ROS = re.compile(r"(ros|rosbag|roslib|actionlib|tf2|tf2_\w+|diagnostic_updater|topic_tools|smartmill_ros|\w+_msgs)/")
 ROS_FREE = {"smartmill_core", "smartmill_focas", "smartmill_recording"}
@@ -37,6 +38,19 @@ def may_use_ros(package, path):
     return parts[0] != "include" and bool(ROS_ROOMS.intersection(parts[:-1]))
 
 
+EFFECTS = pathlib.Path("src/smartmill_core/src/effects")
+
+
+def faults_of_effects(paths):
+    """Each file is one effect: it defines the function of its name and includes nothing but the core and the vocabulary of effects."""
+    for path in paths:
+        if not re.search(rf"^EffectKind {path.stem}\(\)", text(path), re.MULTILINE):
+            yield f"{path}: expected a function EffectKind {path.stem}()"
+        for header in includes(path):
+            if "/" in header and header != "model/effect_declaration.h" and not header.startswith("smartmill_core/"):
+                yield f"{path}: {header}: an effect depends on the core only"
+
+
 def main():
     faults = []
     everything = packages()
@@ -50,6 +64,7 @@ def main():
                     faults.append(f"{path}: {header}: ROS has no place here")
                 if owner in names and owner != package.name and knows is not None and owner not in knows:
                     faults.append(f"{path}: {header}: {package.name} does not know {owner}")
+    faults += faults_of_effects(path for p in everything for path in p.code() if path.parent == EFFECTS)
     return report("rooms", faults)
 
 

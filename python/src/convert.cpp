@@ -98,7 +98,7 @@ py::object toPython(const Engagement& engagement, double spindle_speed) {
 }
 
 py::object toPython(const CampaignTest& test, Record record) {
-  const char* const kind = test.kind == TestKind::cut ? "cut" : test.kind == TestKind::air ? "air" : "tap";
+  const char* const kind = testKindName(test.kind);
   py::dict channels;
   for (std::size_t c = 0; c < record.names.size(); ++c)
     channels[record.names[c].c_str()] = arrayOf(std::move(record.columns[c]));

@@ -14,7 +14,7 @@
 #include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/testing/disc_mill.h"
 #include "smartmill_core/units.h"
-#include "smartmill_sim/effects/effect.h"
+#include "smartmill_sim/effects/effect_set.h"
 #include "smartmill_sim/twin/cutting_machine.h"
 
 namespace smartmill::sim {

@@ -16,7 +16,7 @@
 #include "smartmill_core/testing/mill.h"
 #include "smartmill_core/testing/shared_data.h"
 #include "smartmill_core/units.h"
-#include "smartmill_sim/effects/effect.h"
+#include "smartmill_sim/effects/effect_set.h"
 #include "smartmill_sim/twin/cut_traces.h"
 #include "smartmill_sim/twin/spindle_drive.h"
 
@@ -459,6 +459,30 @@ TEST(Twin, leavesOnlyTheNoiseOfIndependentCampaigns) {
     EXPECT_EQ(checked, vibrates ? 21u * 3u + 18u + 12u * 2u : 21u * 3u + 18u) << name;
     for (const auto& [channel, left] : whole) EXPECT_LE(left.gap(), 1.02) << name << " " << channel;
   }
+}
+
+// Without an effect that the motion acts through, a move has no force; its axes are inputs, as the spindle
+// angle is.
+TEST(Twin, aMoveOfTheAxesIsWithoutForce) {
+  CampaignTest test;
+  test.name = "move";
+  test.kind = TestKind::move;
+  test.sample_rate = 1000.0;
+  Record recorded;
+  for (int i = 0; i < 200; ++i) {
+    recorded.time.push_back(i / 1000.0);
+    recorded.add("axis_x").push_back(1e-2 * std::sin(0.05 * i));
+    for (const char* name : {"fx", "fy", "fz"}) recorded.add(name).push_back(7.0);
+    recorded.add("current_x").push_back(1.0);
+  }
+  SimulationOptions options;
+  options.noise = false;
+  const Record simulated = simulateTest(mill(4), test, recorded, options);
+  EXPECT_EQ(simulated.column("axis_x"), recorded.column("axis_x"));
+  for (const char* name : {"fx", "fy", "fz"})
+    EXPECT_EQ(simulated.column(name), std::vector<double>(recorded.size(), 0.0)) << name;
+  EXPECT_FALSE(simulated.has("current_x"));
+  EXPECT_THROW(simulateTest(mill(4), test, 0.1, options), Error);
 }
 
 // The steps of the integration are no part of the answer.

@@ -138,7 +138,7 @@ MachineModel believedOf(const Plant& plant, Random& random) {
 /// How the machine is tested: the usual plan, or one of what people have instead.
 struct Plan {
   double sample_rate = 25600.0;
-  bool taps = true, angle = true, few = false;
+  bool taps = true, angle = true, few = false, moves = false;
   double other_immersion = 0.0;  // [deg] of one more cut; 0: none
 };
 
@@ -209,6 +209,7 @@ std::vector<CampaignTest> testsOf(const Plan& plan, double depth) {
     for (const char* axis : {"x", "y", "z"})
       tests.add(std::string("tap_") + axis, TestKind::tap, 0.0).direction = axis;
   }
+  if (plan.moves) tests.add("move", TestKind::move, 0.0);
   tests.cut("slot_4500_030", 4500, 0.03, 1.0, 0, 180);
   tests.cut("slot_4500_060", 4500, 0.06, 1.0, 0, 180);
   tests.cut("slot_4500_100", 4500, 0.10, 1.0, 0, 180);
@@ -333,7 +334,10 @@ Drawn draw(const Case& hidden) {
     for (const std::string& name : hidden.names)
       drawn.plant.effects.push_back(drawEffect(name, drawn.nominal, random));
   }
-  const Plan plan = drawPlan(random);
+  Plan plan = drawPlan(random);
+  plan.moves = std::any_of(drawn.plant.effects.begin(), drawn.plant.effects.end(), [](const EffectEntry& e) {
+    return findEffect(e.name)->has(EffectNeed::axis_motion);
+  });
   const double depth = depthFor(drawn.plant, plan, hidden.seed);
   if (hidden.kind == "outside") drawn.plant.outside = drawOutside(hidden.names.front(), depth, random);
   drawn.campaign.model_file = "model.yaml";

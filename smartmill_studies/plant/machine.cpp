@@ -96,23 +96,35 @@ double blow(double peak, double since) {
   return share <= 0.0 || share >= 1.0 ? 0.0 : peak * 6.75 * share * (1.0 - share) * (1.0 - share);
 }
 
-void requireKnown(const Plant& plant) {
-  const std::vector<std::string> known{"runout",         "edge_forces",       "size_effect",
-                                       "tool_wear",      "cutting_speed",     "uneven_pitch",
-                                       "helix",          "tool_flexibility",  "process_damping",
-                                       "extra_mode",     "mass_loading",      "speed_dependent_mode",
-                                       "cross_talk",     "charge_drift",      "mains_hum",
-                                       "unbalance",      "channel_delay",     "gain_error",
-                                       "saturation",     "stribeck_friction", "friction_warmup",
-                                       "load_meter_lag", "depth_tilt",        "feed_error",
-                                       "tooth_radius",   "thermal_growth",    "chip_coefficients",
-                                       "edge_buildup",   "spindle_order",     "zero_offset",
-                                       "corner_radius"};
-  for (const EffectEntry& e : plant.effects) {
-    if (std::find(known.begin(), known.end(), e.name) == known.end())
-      throw Error("plant: effect '" + e.name + "' is unknown");
+// To and fro along each axis in turn, with rests between the strokes; jerk and its rate are continuous.
+class AxisMoves {
+ public:
+  static constexpr double LENGTH = 0.8;  // [s]
+
+  // [m]
+  static double position(std::size_t axis, double t) { return STROKE * (way(axis, t, 0) - back(axis, t, 0)); }
+  // [m/s2]
+  static std::array<double, 3> acceleration(double t) {
+    std::array<double, 3> now{};
+    for (std::size_t a = 0; a < 3; ++a) now[a] = STROKE / (TIME * TIME) * (way(a, t, 2) - back(a, t, 2));
+    return now;
   }
-}
+
+ private:
+  static constexpr double STROKE = 12e-3, TIME = 0.1, REST = 0.02;  // [m], [s], [s]
+  static double way(std::size_t axis, double t, int order) {
+    return septic((t - REST - 2.0 * static_cast<double>(axis) * (TIME + REST)) / TIME, order);
+  }
+  static double back(std::size_t axis, double t, int order) { return way(axis, t - TIME - REST, order); }
+  // From 0 at 0 to 1 at 1, or its second derivative.
+  static double septic(double x, int order) {
+    if (x <= 0.0) return 0.0;
+    if (x >= 1.0) return order == 0 ? 1.0 : 0.0;
+    const double x2 = x * x;
+    return order == 0 ? x2 * x2 * (35.0 - 84.0 * x + 70.0 * x2 - 20.0 * x2 * x)
+                      : x2 * (420.0 - 1680.0 * x + 2100.0 * x2 - 840.0 * x2 * x);
+  }
+};
 
 /// One test from its first sample to its last.
 class TestRun {
@@ -133,7 +145,7 @@ class TestRun {
         disturbance_(hidden_, test.spindle_speed),
         chain_(plant, hidden_, test.spindle_speed, step_, random),
         peak_(std::uniform_real_distribution<double>(150.0, 300.0)(random)) {
-    if (plant.spindle && !isTap()) drive_.emplace(plant, hidden_, test, step_);
+    if (plant.spindle && turns()) drive_.emplace(plant, hidden_, test, step_);
     for (std::size_t a = 0; a < 3; ++a)
       noise_.emplace_back(plant.noise_rms[a], plant.unsteadiness.noise_colour, test.sample_rate);
     if (test.kind == TestKind::cut) prepareWork();
@@ -154,7 +166,9 @@ class TestRun {
 
  private:
   bool isTap() const { return test_.kind == TestKind::tap; }
-  double angle(double t) const { return isTap() ? 0.0 : turning_.angle(t); }
+  bool isMove() const { return test_.kind == TestKind::move; }
+  bool turns() const { return !isTap() && !isMove(); }
+  double angle(double t) const { return turns() ? turning_.angle(t) : 0.0; }
   double hammer(double t) const { return isTap() ? blow(peak_, t - 5e-3) : 0.0; }
 
   // The work as earlier revolutions of a tool at rest left it; its axis has come from behind.
@@ -178,7 +192,8 @@ class TestRun {
                             turning_.unsteadiness(angle(t)), t - engage_, fed);
     }
     tip_.step(chip.force);
-    std::array<double, 3> force = disturbance_.force(angle(t));
+    std::array<double, 3> force =
+        disturbance_.force(angle(t), isMove() ? AxisMoves::acceleration(t) : std::array<double, 3>{});
     for (std::size_t a = 0; a < 3; ++a) force[a] += chip.force[a];
     force[test_.direction == "y" ? 1 : test_.direction == "z" ? 2 : 0] += hammer(t);
     sensor_.step(force);
@@ -196,6 +211,9 @@ class TestRun {
     for (std::size_t a = 0; a < 3; ++a)
       force_[a].push_back(c[a] + (options_.noise ? noise_[a](random_) : 0.0));
     hammer_.push_back(hammer(t) + normal(0.2));
+    if (isMove()) {
+      for (std::size_t a = 0; a < 3; ++a) axes_[a].push_back(AxisMoves::position(a, t));
+    }
     if (drive_) {
       const double volt = c[LOAD] + normal(plant_.load_meter_noise),
                    bit = plant_.spindle->load_meter_resolution;
@@ -210,13 +228,16 @@ class TestRun {
   Record record() const {
     Record r;
     r.time = time_;
-    if (!isTap() && options_.show_angle) r.add("spindle_angle") = angles_;
+    if (turns() && options_.show_angle) r.add("spindle_angle") = angles_;
     r.add("fx") = force_[0];
     r.add("fy") = force_[1];
     r.add("fz") = force_[2];
     if (isTap()) r.add("hammer") = hammer_;
+    if (isMove()) {
+      for (std::size_t a = 0; a < 3; ++a) r.add(std::string("axis_") + "xyz"[a]) = axes_[a];
+    }
     if (drive_) r.add("load_meter") = load_;
-    if (options_.show_tip && !isTap()) {
+    if (options_.show_tip && turns()) {
       r.add("tool_x") = tip_x_;
       r.add("tool_y") = tip_y_;
     }
@@ -241,7 +262,7 @@ class TestRun {
   std::optional<Cutting> cutting_;
   double engage_ = 0.0, feed_ = 0.0, came_ = 0.0;  // [s], [m/s], [m] of the axis until engagement
   std::vector<double> time_, angles_, hammer_, load_, tip_x_, tip_y_;
-  std::array<std::vector<double>, 3> force_;
+  std::array<std::vector<double>, 3> force_, axes_;
 };
 
 }  // namespace
@@ -276,7 +297,8 @@ Plant plantOf(const MachineModel& model) {
 }
 
 std::size_t samplesOf(const CampaignTest& test) {
-  const double seconds = test.kind == TestKind::tap   ? 0.12
+  const double seconds = test.kind == TestKind::move  ? AxisMoves::LENGTH
+                         : test.kind == TestKind::tap ? 0.12
                          : test.kind == TestKind::air ? 0.15
                          : test.spindle_speed < 200.0 ? 0.3
                                                       : 0.2;
@@ -284,7 +306,6 @@ std::size_t samplesOf(const CampaignTest& test) {
 }
 
 Record run(const Plant& plant, const CampaignTest& test, const RunOptions& options, Random& random) {
-  requireKnown(plant);
   return TestRun(plant, test, options, random).run();
 }
 

@@ -66,10 +66,11 @@ struct RunOptions {
   bool noise = true;
 };
 
-/// Length of a record of that kind [samples].
+/// Length of a record of that kind [samples]. In a move each axis goes to and fro in turn while the spindle
+/// stands still.
 std::size_t samplesOf(const CampaignTest& test);
 
-/// Runs one test and measures. @throws Error on an effect that the plant does not know.
+/// Runs one test and measures.
 Record run(const Plant& plant, const CampaignTest& test, const RunOptions& options, std::mt19937_64& random);
 
 }  // namespace smartmill::plant

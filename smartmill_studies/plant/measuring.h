@@ -106,6 +106,8 @@ class Disturbance {
   Disturbance(const Hidden& hidden, double speed)
       : unbalance_(1e-6 * hidden("unbalance", "mass_eccentricity_g_mm") * speed * speed),
         unbalance_angle_(units::radFromDeg(hidden("unbalance", "angle_deg"))) {
+    for (const EffectEntry* e : hidden.all("axis_inertia"))
+      moved_mass_[channelNumber("f" + e->words.at("axis"))] += e->numbers.at("mass_kg");
     if (speed == 0.0) return;
     for (const EffectEntry* e : hidden.all("spindle_order")) {
       Order order{e->numbers.at("order"), {}, {}};
@@ -117,10 +119,11 @@ class Disturbance {
       orders_.push_back(order);
     }
   }
-  /// [N] @param angle [rad] of the spindle
-  std::array<double, 3> force(double angle) const {
+  /// [N] @param angle [rad] of the spindle @param axes [m/s2] acceleration of the machine's axes
+  std::array<double, 3> force(double angle, const std::array<double, 3>& axes) const {
     const double at = angle + unbalance_angle_;
     std::array<double, 3> force{unbalance_ * std::sin(at), unbalance_ * std::cos(at), 0.0};
+    for (std::size_t a = 0; a < 3; ++a) force[a] -= moved_mass_[a] * axes[a];
     for (const Order& o : orders_) {
       for (std::size_t a = 0; a < 3; ++a) force[a] += o.size[a] * std::sin(o.order * angle + o.phase[a]);
     }
@@ -133,6 +136,7 @@ class Disturbance {
     std::array<double, 3> size{}, phase{};  // [N], [rad]
   };
   double unbalance_, unbalance_angle_;  // [N], [rad]
+  std::array<double, 3> moved_mass_{};  // [kg] with the sensor, by axis
   std::vector<Order> orders_;
 };
 

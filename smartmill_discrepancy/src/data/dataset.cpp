@@ -4,7 +4,9 @@
 #include <cmath>
 #include <set>
 
+#include "smartmill_core/campaign/record_columns.h"
 #include "smartmill_core/campaign/slow_channels.h"
+#include "smartmill_core/campaign/stream_offset.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/signal/fourier.h"
@@ -21,8 +23,12 @@ constexpr std::size_t LEAST_SAMPLES = 64;
 constexpr std::size_t MIN_QUIET = 50;   // samples without force for a noise estimate
 constexpr std::size_t CLIPPED_RUN = 5;  // equal extreme samples in a row of a noisy channel
 
+bool cutsOrTaps(const CampaignTest& test) {
+  return test.kind == TestKind::cut || test.kind == TestKind::tap;
+}
+
 std::size_t quietSamples(const CampaignTest& test, const Record& record) {
-  if (test.kind == TestKind::air) return record.size();
+  if (!cutsOrTaps(test)) return record.size();
   if (test.kind == TestKind::tap) {
     const std::vector<double>& hammer = record.column("hammer");
     double peak = 0.0;
@@ -68,7 +74,7 @@ std::map<std::string, double> noiseOf(const Dataset& data) {
   for (const TestData& t : data.tests) {
     for (const std::string& channel : t.channels) {
       const std::vector<double>& values = t.record.column(channel);
-      if (t.quiet >= MIN_QUIET && t.test.kind != TestKind::air) {
+      if (t.quiet >= MIN_QUIET && cutsOrTaps(t.test)) {
         const std::vector<double> part(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(t.quiet));
         // Lines that exist without cutting (hum, unbalance) are not noise.
         const double deviation = part.size() >= LEAST_SAMPLES && channel != "load_meter"
@@ -319,7 +325,7 @@ Dataset loadDataset(const Campaign& campaign, const MachineModel& nominal) {
   for (const CampaignTest& test : campaign.tests) {
     TestData t;
     t.test = test;
-    t.record = readRecord(campaign, test);
+    t.record = aligned(readRecord(campaign, test), test);
     if (t.record.size() < LEAST_SAMPLES) {
       throw Error(t.record.file + ": " + std::to_string(t.record.size()) + " samples, expected at least " +
                   std::to_string(LEAST_SAMPLES));
@@ -334,12 +340,13 @@ Dataset loadDataset(const Campaign& campaign, const MachineModel& nominal) {
         }
         t.channels.push_back(name);
         checkChannel(t, name);
-      } else if (name != "spindle_angle" && name != "hammer") {
+      } else if (name != "spindle_angle" && name != "hammer" && !motionAxis(name)) {
         notes.insert(name + " is not simulated");
       }
     }
     if (t.channels.empty()) throw Error(t.record.file + ": no channel to compare");
-    t.phase_estimated = test.kind != TestKind::tap && !t.record.has("spindle_angle");
+    t.phase_estimated =
+        test.kind != TestKind::tap && test.spindle_speed > 0.0 && !t.record.has("spindle_angle");
     t.quiet = quietSamples(test, t.record);
     t.first_cut = test.kind == TestKind::cut ? t.quiet : t.record.size();
     for (const std::string& note : t.record.notes) notes.insert(note);

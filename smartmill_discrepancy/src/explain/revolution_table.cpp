@@ -235,7 +235,7 @@ std::optional<Hypothesis> revolutionTable(const TwinRunner& runner, const std::v
   writeCurvature(extends_table && curvature.chips.empty() ? curvatureOf(now.state.members.back()) : curvature,
                  orders, &table_form);
   table_form.probe({0.0}, {{1.0}}).named(formatted("%zu orders", orders.size()));
-  table_form.handicap = cost * (4.0 * static_cast<double>(orders.size() * residuals.size()) - 1.0);
+  table_form.bic_penalty = cost * (4.0 * static_cast<double>(orders.size() * residuals.size()) - 1.0);
   return table_form;
 }
 

@@ -144,7 +144,7 @@ bool describe(const CampaignCost& cost, const Eigen::VectorXd& at, double sample
   fit.bic = fit.chi2 + fit.penalty;
   const auto of_records = static_cast<double>(records);
   for (const Member& m : fit.state.members) {
-    fit.bic += static_cast<double>(m.values.size()) * std::log(samples) + m.hypothesis->handicap;
+    fit.bic += static_cast<double>(m.values.size()) * std::log(samples) + m.hypothesis->bic_penalty;
     fit.bic += m.hypothesis->found_in_each_record * of_records * std::log(samples / of_records);
   }
   fit.covariance = covarianceOf(cost, point->information);

@@ -9,7 +9,7 @@
 #include <thread>
 #include <utility>
 
-#include "smartmill_sim/effects/effect.h"
+#include "smartmill_sim/effects/effect_set.h"
 #include "smartmill_sim/twin/guide.h"
 #include "smartmill_sim/twin/twin.h"
 
@@ -218,7 +218,7 @@ SimulatedChannels TwinRunner::simulateOne(const MachineModel& model, std::size_t
   std::vector<std::string> missing;
   for (std::size_t c = 0; c < count; ++c) {
     const std::string& channel = spans_[first + c].channel;
-    keys.push_back(separable ? sim::valuesOfChannel(model, cache.test.kind, sim::channelOf(channel))
+    keys.push_back(separable ? sim::valuesOfChannel(model, cache.test.kind, channelOf(channel))
                              : sim::valuesOfRecord(model, cache.test.kind));
     const std::lock_guard<std::mutex> lock(cache.mutex);
     for (const auto& [values, channels] : cache.channels[c]) {

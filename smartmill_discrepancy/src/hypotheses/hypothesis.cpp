@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "smartmill_core/campaign/record_columns.h"
 #include "smartmill_core/model/effect_catalogue.h"
 
 namespace smartmill::discrepancy {
@@ -16,6 +17,9 @@ EffectScope scopeOf(const Dataset& data) {
     const bool cut = t.test.kind == TestKind::cut;
     scope.channels.insert(t.channels.begin(), t.channels.end());
     for (const SlowMeans& slow : t.slow) scope.channels.insert(slow.channel);
+    for (const std::string& column : t.record.names) {
+      if (const auto axis = motionAxis(column)) scope.axes.insert(std::string(1, "xyz"[*axis]));
+    }
     scope.cuts = scope.cuts || cut;
     scope.start_times = scope.start_times && t.test.start_time;
     scope.cut_times = scope.cut_times && (!cut || t.test.cut_time_before);

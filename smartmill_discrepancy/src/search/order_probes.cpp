@@ -42,7 +42,8 @@ std::vector<Spectrum> spectraOf(const TwinRunner& runner, const std::vector<doub
   std::vector<Spectrum> spectra;
   for (const ChannelSpan& b : runner.spans()) {
     const TestData& t = runner.data().tests[b.test];
-    if (!b.in_gap || b.channel.size() != 2 || b.channel.front() != 'f' || t.test.kind == TestKind::tap)
+    if (!b.in_gap || b.channel.size() != 2 || b.channel.front() != 'f' || t.test.kind == TestKind::tap ||
+        !t.record.has("spindle_angle"))
       continue;
     Spectrum s;
     s.axis = static_cast<std::size_t>(b.channel[1] - 'x');

@@ -13,7 +13,7 @@
 #include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_discrepancy/search/mode_probes.h"
 #include "smartmill_discrepancy/search/order_probes.h"
-#include "smartmill_sim/effects/effect.h"
+#include "smartmill_sim/effects/effect_set.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -317,14 +317,14 @@ class ProbeFinder {
         probes_(runner, model, projection.thinned().rows()) {}
 
   Probes probesOf(const Hypothesis& h) {
-    switch (h.seek) {
-      case Hypothesis::Seek::nothing:
+    switch (h.strategy) {
+      case Hypothesis::SearchStrategy::none:
         return h.probes;
-      case Hypothesis::Seek::sensor_mode:
+      case Hypothesis::SearchStrategy::sensor_mode:
         return sensorModes(static_cast<std::size_t>(h.variant.front() - 'x'));
-      case Hypothesis::Seek::tip_mode:
+      case Hypothesis::SearchStrategy::tip_mode:
         return tipModes(h.variant);
-      case Hypothesis::Seek::spindle_order:
+      case Hypothesis::SearchStrategy::spindle_order:
         return orders(h.coordinates.size());
     }
     return {};
@@ -484,7 +484,8 @@ std::vector<PredictedGain> screen(const Fitter& fitter, const FitResult& now, co
         (!h.after.empty() && !hasMember(now.state, h.effect, h.after)))
       continue;
     screened.push_back({&h, {}, std::nullopt, std::nullopt});
-    if (h.seek != Hypothesis::Seek::nothing && !isBelowLimit(h)) screened.back().probes = finder.probesOf(h);
+    if (h.strategy != Hypothesis::SearchStrategy::none && !isBelowLimit(h))
+      screened.back().probes = finder.probesOf(h);
   }
   runParallel(screened.size(), fitter.runner().threads(), [&](std::size_t k) {
     if (fitter.cancelled()) return;
@@ -501,7 +502,7 @@ std::vector<PredictedGain> screen(const Fitter& fitter, const FitResult& now, co
       return;
     }
     // Probes with a searched location change with the state.
-    const bool remembered = h.seek == Hypothesis::Seek::nothing;
+    const bool remembered = h.strategy == Hypothesis::SearchStrategy::none;
     if (remembered) one.columns.emplace();
     one.predicted = predictGain(fitter, now, projection, h, remembered ? h.probes : one.probes,
                                 remembered ? &*one.columns : nullptr);
@@ -526,7 +527,7 @@ void screenRemembered(const Fitter& fitter, const FitResult& now, const NominalT
     const Hypothesis& h = *p.hypothesis;
     std::vector<Eigen::MatrixXf> columns;
     p = predictGain(fitter, now, projection, h, finder.probesOf(h), &columns);
-    if (h.seek == Hypothesis::Seek::nothing) memory->columns[&h] = std::move(columns);
+    if (h.strategy == Hypothesis::SearchStrategy::none) memory->columns[&h] = std::move(columns);
   }
   sortByGain(predictions);
 }

@@ -23,7 +23,7 @@
 #include "smartmill_discrepancy/data/dataset.h"
 #include "smartmill_ros/conversions.h"
 #include "smartmill_ros/follower.h"
-#include "smartmill_sim/effects/effect.h"
+#include "smartmill_sim/effects/effect_set.h"
 #include "smartmill_sim/twin/twin.h"
 
 namespace smartmill::discrepancy {

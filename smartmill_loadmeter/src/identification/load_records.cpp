@@ -7,7 +7,8 @@ LoadRecordResult identifyFromLoadRecords(const Campaign& campaign, const Machine
                                          const LoadRecordOptions& options) {
   std::vector<TestRecord> tests;
   for (const CampaignTest& test : campaign.tests) {
-    if (test.kind != TestKind::tap) tests.push_back({test, readRecord(campaign, test)});
+    if (test.kind == TestKind::cut || test.kind == TestKind::air)
+      tests.push_back({test, readRecord(campaign, test)});
   }
   return identifyFromLoadRecords(tests, model, options, campaign.folder);
 }

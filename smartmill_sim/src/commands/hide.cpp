@@ -19,7 +19,8 @@ bool isShort(const EffectKind& kind) {
   static const std::vector<std::string> SLOW{"charge_drift", "depth_tilt", "saturation"};
   return std::find(SLOW.begin(), SLOW.end(), kind.name) == SLOW.end() && kind.stage != EffectStage::drive &&
          kind.stage != EffectStage::structure && !kind.has(EffectNeed::start_time) &&
-         !kind.has(EffectNeed::cut_time) && !kind.has(EffectNeed::flexible_tool);
+         !kind.has(EffectNeed::cut_time) && !kind.has(EffectNeed::flexible_tool) &&
+         !kind.has(EffectNeed::axis_motion);
 }
 
 EffectEntry drawn(const MachineModel& model, std::mt19937_64& random) {

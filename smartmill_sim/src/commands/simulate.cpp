@@ -9,6 +9,7 @@
 
 #include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/campaign/record.h"
+#include "smartmill_core/campaign/stream_offset.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_sim/twin/twin.h"
@@ -36,7 +37,7 @@ void run(const Arguments& a) {
   double simulated = 0.0, used = 0.0;  // [s] of records, of the processor
   for (CampaignTest& test : campaign.tests) {
     std::fprintf(stderr, "simulating %s\n", test.name.c_str());
-    const Record recorded = readRecord(campaign, test);
+    const Record recorded = aligned(readRecord(campaign, test), test);
     const std::clock_t start = std::clock();
     const Record record = sim::simulateTest(model, test, recorded, options);
     used += static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
@@ -45,6 +46,7 @@ void run(const Arguments& a) {
     // Written as smartmill CSV whatever the recorded format was.
     test.file_format.clear();
     test.channels.clear();
+    test.stream_offset.clear();
     const fs::path file = fs::path(out) / test.file;
     fs::create_directories(file.parent_path());
     writeCsv(record, file.string());

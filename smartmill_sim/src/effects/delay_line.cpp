@@ -12,7 +12,7 @@ DelayLine::DelayLine(double delay, double time_step, double rest) {
 }
 
 double DelayLine::step(double value) {
-  // The ring holds the values of 0 .. whole + 1 steps ago; the oldest stands after this one.
+  // The ring contains the values of the last whole + 2 steps; the oldest follows this one.
   past_[next_] = value;
   next_ = next_ + 1 < past_.size() ? next_ + 1 : 0;
   const double older = past_[next_], newer = past_[next_ + 1 < past_.size() ? next_ + 1 : 0];

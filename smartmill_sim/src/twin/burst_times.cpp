@@ -58,8 +58,8 @@ double bestFirst(const std::vector<double>& left, double rate, const BurstTrain&
 
 }  // namespace
 
-void findBursts(const Record* recorded, const std::array<std::vector<double>*, CHANNELS>& early, double rate,
-                CuttingMachine& machine, std::mt19937_64& random) {
+void findBursts(const Record* recorded, const std::array<std::vector<double>*, CHANNEL_COUNT>& early,
+                double rate, CuttingMachine& machine, std::mt19937_64& random) {
   for (BurstTrain* train : machine.bursts()) {
     const std::size_t c = train->channel;
     if (!recorded) {

@@ -4,7 +4,7 @@
 #include <functional>
 #include <string>
 
-#include "smartmill_sim/effects/effect.h"
+#include "smartmill_sim/effects/effect_set.h"
 
 namespace smartmill::sim {
 namespace {
@@ -88,7 +88,7 @@ Values valuesOfRecord(const MachineModel& model, TestKind kind) {
   if (kind != TestKind::tap) appendSpindle(values, model);
   for (const EffectEntry& effect : model.effects) {
     const EffectKind* known = findEffect(effect.name);
-    if (!known || touches(known->stage, kind)) append(values, effect);
+    if (!known || actsIn(known->stage, kind)) append(values, effect);
   }
   return values;
 }
@@ -111,7 +111,7 @@ Values valuesOfChannel(const MachineModel& model, TestKind kind, std::size_t cha
   if (channel == LOAD_METER && kind != TestKind::tap) appendSpindle(values, model);
   for (const EffectEntry& effect : model.effects) {
     const EffectKind& known = *findEffect(effect.name);
-    if (touches(known.stage, kind) && actsOn(effect, known.stage, channel)) append(values, effect);
+    if (actsIn(known.stage, kind) && actsOn(effect, known.stage, channel)) append(values, effect);
   }
   return values;
 }
@@ -130,7 +130,7 @@ Values valuesOfTrace(const MachineModel& model, TestKind kind, bool guided) {
   if (!guided) append(values, model.tool_tip.y);
   for (const EffectEntry& effect : model.effects) {
     const EffectKind* known = findEffect(effect.name);
-    if (known && (!ofTheTool(known->stage) || !touches(known->stage, kind))) continue;
+    if (known && (!ofTheTool(known->stage) || !actsIn(known->stage, kind))) continue;
     if (known && guided && known->stage == Stage::structure) continue;
     if (sums && known && known->stage == Stage::cutting_law && makeEffect(effect)->scalesForce()) continue;
     append(values, effect);

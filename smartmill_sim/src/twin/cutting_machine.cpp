@@ -58,7 +58,7 @@ CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed
   }
   for (const auto& [channel, shelf] : setup.shelves)
     shelves_.emplace_back(channel, ShelfFilter(shelf, time_step));
-  for (std::size_t c = 0; c < CHANNELS; ++c) {
+  for (std::size_t c = 0; c < CHANNEL_COUNT; ++c) {
     if (setup.delay[c] > 0.0) delays_.emplace_back(c, DelayLine(setup.delay[c], time_step, 0.0));
   }
 }
@@ -201,6 +201,7 @@ void CuttingMachine::takeOver(const Input& input) {
     if (moved && cutting()) setActualDepths();
   }
   --steps_to_update_;
+  now_.axis_acceleration = input.axis_acceleration;
   now_.angle = input.motion.angle;
   now_.speed = input.motion.speed;
   now_.chip = now_.depth = 0.0;
@@ -457,11 +458,11 @@ void CuttingMachine::showAll(const Course& course, const EarlyRows& early) {
 void CuttingMachine::measureAll(const Course& course, const EarlyRows& early) const {
   for (std::size_t k = 0; k < course.instants.size(); ++k) {
     ChannelValues values{};
-    for (std::size_t c = 0; c < CHANNELS; ++c) {
+    for (std::size_t c = 0; c < CHANNEL_COUNT; ++c) {
       if (early[c]) values[c] = (*early[c])[k];
     }
     effects_.measure(Stage::sensor_output, course.instants[k], values);
-    for (std::size_t c = 0; c < CHANNELS; ++c) {
+    for (std::size_t c = 0; c < CHANNEL_COUNT; ++c) {
       if (early[c]) (*early[c])[k] = values[c];
     }
   }

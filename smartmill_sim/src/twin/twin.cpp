@@ -11,11 +11,13 @@
 
 #include <Eigen/Dense>
 
+#include "smartmill_core/campaign/record_columns.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/signal/window.h"
 #include "smartmill_core/units.h"
+#include "smartmill_sim/twin/axis_motion.h"
 #include "smartmill_sim/twin/burst_times.h"
 #include "smartmill_sim/twin/cut_traces.h"
 #include "smartmill_sim/twin/cutting_machine.h"
@@ -52,11 +54,11 @@ double growth(double x) {
 
 // Columns that this twin gives: inputs and the channels of the measuring chain.
 bool gives(const std::string& column, const CampaignTest& test) {
-  if (column == "spindle_angle" || column == "hammer") return true;
+  if (column == "spindle_angle" || column == "hammer" || motionAxis(column)) return true;
   // Where such a sensor stands is known of a tap only: where it is hit.
   if (column == channelName(DISPLACEMENT) || column == channelName(ACCELERATION))
     return test.kind == TestKind::tap && test.direction != "z";
-  for (std::size_t c = 0; c < CHANNELS; ++c) {
+  for (std::size_t c = 0; c < CHANNEL_COUNT; ++c) {
     if (column == channelName(c)) return true;
   }
   return false;
@@ -76,7 +78,7 @@ std::vector<double> contactForce(const std::vector<double>& hammer) {
 CuttingMachine::Clock clockOf(const MachineModel& model, const CampaignTest& test, const Record& record) {
   for (const EffectEntry& effect : model.effects) {
     const EffectKind* kind = findEffect(effect.name);
-    if (!kind || !touches(kind->stage, test.kind)) continue;
+    if (!kind || !actsIn(kind->stage, test.kind)) continue;
     const bool shows = kind->stage != Stage::drive || record.has("load_meter");
     const char* lacks = nullptr;
     if (kind->has(EffectNeed::start_time) && shows && !test.start_time) lacks = "start_time_s";
@@ -92,8 +94,8 @@ CuttingMachine::Clock clockOf(const MachineModel& model, const CampaignTest& tes
 // Phases of tones that no model knows, from what the record shows beyond the twin without them: joint least
 // squares of sine and cosine on every channel that a tone is in, about the means. Clipped samples do not
 // count.
-void findPhases(const Record& recorded, const std::array<std::vector<double>*, CHANNELS>& early, double rate,
-                double speed, const CuttingMachine& machine, const std::vector<Tone*>& tones) {
+void findPhases(const Record& recorded, const std::array<std::vector<double>*, CHANNEL_COUNT>& early,
+                double rate, double speed, const CuttingMachine& machine, const std::vector<Tone*>& tones) {
   const ChannelValues limits = machine.limits();
   const auto n = static_cast<Eigen::Index>(2 * tones.size());
   std::vector<double> amplitude;
@@ -102,11 +104,11 @@ void findPhases(const Record& recorded, const std::array<std::vector<double>*, C
     tone->amplitude.fill(0.0);
   }
   const auto amplitudeOf = [&](Eigen::Index tone, std::size_t channel) {
-    return amplitude[static_cast<std::size_t>(tone) * CHANNELS + channel];
+    return amplitude[static_cast<std::size_t>(tone) * CHANNEL_COUNT + channel];
   };
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(n, n);
   Eigen::VectorXd right = Eigen::VectorXd::Zero(n);
-  for (std::size_t c = 0; c < CHANNELS; ++c) {
+  for (std::size_t c = 0; c < CHANNEL_COUNT; ++c) {
     bool in_channel = false;
     for (Eigen::Index k = 0; k < n / 2; ++k) in_channel = in_channel || amplitudeOf(k, c) != 0.0;
     if (!in_channel || !early[c] || !recorded.has(channelName(c))) continue;
@@ -135,7 +137,7 @@ void findPhases(const Record& recorded, const std::array<std::vector<double>*, C
   const Eigen::VectorXd wave = normal.completeOrthogonalDecomposition().solve(right);
   for (Eigen::Index k = 0; k < n / 2; ++k) {
     Tone& tone = *tones[static_cast<std::size_t>(k)];
-    for (std::size_t c = 0; c < CHANNELS; ++c) tone.amplitude[c] = amplitudeOf(k, c);
+    for (std::size_t c = 0; c < CHANNEL_COUNT; ++c) tone.amplitude[c] = amplitudeOf(k, c);
     tone.phase = std::atan2(wave(2 * k + 1), wave(2 * k));
   }
 }
@@ -183,7 +185,7 @@ void stepThrough(CuttingMachine& machine, std::size_t samples, int substeps, con
   CuttingMachine::Output now, between;
   for (std::size_t i = 0; i < samples; ++i) {
     machine.step(input(i, 0.0), now);
-    for (std::size_t c = 0; c < CHANNELS; ++c) {
+    for (std::size_t c = 0; c < CHANNEL_COUNT; ++c) {
       if (out[c]) (*out[c])[i] = now.early[c];
     }
     for (int s = 1; s < substeps; ++s) machine.step(input(i, static_cast<double>(s) / substeps), between);
@@ -195,9 +197,9 @@ template <class Input>
 void passThrough(CuttingMachine& machine, std::size_t samples, int substeps, const Input& input,
                  const Rows& out) {
   const auto every = static_cast<std::size_t>(substeps);
-  std::array<std::vector<double>, CHANNELS> fine;
+  std::array<std::vector<double>, CHANNEL_COUNT> fine;
   Rows rows = out;
-  for (std::size_t c = 0; c < CHANNELS && every > 1; ++c) {
+  for (std::size_t c = 0; c < CHANNEL_COUNT && every > 1; ++c) {
     if (!out[c]) continue;
     fine[c].resize(samples * every);
     rows[c] = &fine[c];
@@ -209,7 +211,7 @@ void passThrough(CuttingMachine& machine, std::size_t samples, int substeps, con
         input(i, every > 1 ? static_cast<double>(step - i * every) / substeps : 0.0, at);
       },
       rows);
-  for (std::size_t c = 0; c < CHANNELS && every > 1; ++c) {
+  for (std::size_t c = 0; c < CHANNEL_COUNT && every > 1; ++c) {
     for (std::size_t i = 0; i < samples && out[c]; ++i) (*out[c])[i] = fine[c][i * every];
   }
 }
@@ -226,7 +228,7 @@ void run(const MachineModel& model, const CampaignTest& test, const SimulationOp
   }
   Rows out{};
   std::vector<std::size_t> shown;
-  for (std::size_t c = 0; c < CHANNELS; ++c) {
+  for (std::size_t c = 0; c < CHANNEL_COUNT; ++c) {
     if (!record.has(channelName(c))) continue;
     out[c] = &record.add(channelName(c));
     shown.push_back(c);
@@ -378,6 +380,16 @@ std::optional<Guide> guideOf(const CampaignTest& test, const Record* recorded,
   return Guide(machine.model(), *recorded, test.sample_rate);
 }
 
+std::optional<AxisMotion> motionOf(const MachineModel& model, const CampaignTest& test,
+                                   const Record* recorded, const SimulationOptions& options) {
+  const bool needed = std::any_of(model.effects.begin(), model.effects.end(), [](const EffectEntry& effect) {
+    const EffectKind* kind = findEffect(effect.name);
+    return kind && kind->has(EffectNeed::axis_motion);
+  });
+  if (!needed || !recorded || !AxisMotion::isRecorded(*recorded)) return {};
+  return AxisMotion(*recorded, test.sample_rate, options.axis_smoothing);
+}
+
 Record simulateOn(CuttingMachine& machine, const MachineModel& model, const CampaignTest& test,
                   const Record* recorded, Record record, double phase, const std::optional<Guide>& guide,
                   const SimulationOptions& options) {
@@ -391,9 +403,11 @@ Record simulateOn(CuttingMachine& machine, const MachineModel& model, const Camp
     steady.lead();
   }
   const double dt = 1.0 / test.sample_rate;
+  const std::optional<AxisMotion> motion = motionOf(model, test, recorded, options);
   const auto input = [&](std::size_t i, double share, CuttingMachine::Input& at) {
     steady.next(record.time[i] + share * dt, at);
     if (guide) at.tip = guide->at(i, share);
+    if (motion) at.axis_acceleration = motion->acceleration(i, share);
   };
   run(
       model, test, options, machine,
@@ -454,7 +468,7 @@ Record simulateTest(const MachineModel& model, const CampaignTest& test, const R
   for (std::size_t i = 0; i < recorded.size(); ++i)
     record.time.push_back(recorded.time[0] + static_cast<double>(i) / test.sample_rate);
   const auto asked = [&](const std::string& name) {
-    return name == "hammer" || !options.channels ||
+    return name == "hammer" || motionAxis(name) || !options.channels ||
            std::find(options.channels->begin(), options.channels->end(), name) != options.channels->end();
   };
   for (const std::string& name : recorded.names) {
@@ -469,6 +483,7 @@ Record simulateTest(const MachineModel& model, const CampaignTest& test, double 
   if (!(duration > 0.0))
     throw Error("simulation: duration " + std::to_string(duration) + " s is not positive");
   if (test.kind == TestKind::tap) throw Error("simulation: a tap needs a recorded hammer force");
+  if (test.kind == TestKind::move) throw Error("simulation: a move needs a recorded motion of an axis");
   Record record;
   const auto samples = static_cast<std::size_t>(std::llround(duration * test.sample_rate));
   for (std::size_t i = 0; i < samples; ++i) record.time.push_back(static_cast<double>(i) / test.sample_rate);

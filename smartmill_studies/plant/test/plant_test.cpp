@@ -12,6 +12,7 @@
 #include "plant/plate.h"
 #include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/model/effect_catalogue.h"
+#include "smartmill_core/testing/mill.h"
 #include "smartmill_core/testing/shared_data.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
@@ -274,6 +275,86 @@ TEST(Machine, LeavesTheSurfaceOfTheTeethsPath) {
     EXPECT_LT(by_path, 0.2 * by_rule) << name << " " << by_rule;
     EXPECT_LT(by_path, 0.005) << name;
     EXPECT_NEAR(half, 0.5 * by_rule, 0.15 * by_rule) << name;
+  }
+}
+
+// The plant knows its acceleration in closed form, the twin derives it from the recorded position.
+TEST(Machine, MovesAMassAsTheTwinDoes) {
+  MachineModel model;
+  model.tool = rigidPlant().tool;
+  model.cutting = rigidPlant().cutting;
+  for (ModalModel& axis : model.force_sensor.axis) {
+    axis.modes = {{1200.0, 0.03, 0.9}};
+    axis.direct = 0.1;
+  }
+  model.effects = {effectEntry("axis_inertia", {{"mass_kg", 25.0}}, {{"axis", "y"}})};
+  CampaignTest test;
+  test.name = "move";
+  test.kind = TestKind::move;
+  test.sample_rate = 10000.0;
+  std::mt19937_64 random(1);
+  RunOptions options;
+  options.noise = false;
+  const Record plant = run(plantOf(model), test, options, random);
+  sim::SimulationOptions quiet;
+  quiet.noise = false;
+  const Record twin = sim::simulateTest(model, test, plant, quiet);
+  double squares = 0.0, difference = 0.0;
+  for (std::size_t i = 0; i < plant.size(); ++i) {
+    squares += std::pow(plant.column("fy")[i], 2);
+    difference += std::pow(plant.column("fy")[i] - twin.column("fy")[i], 2);
+  }
+  EXPECT_GT(std::sqrt(squares / static_cast<double>(plant.size())), 20.0);  // [N]
+  EXPECT_LT(std::sqrt(difference / squares), 0.01);
+  for (const char* still : {"fx", "fz"}) EXPECT_NEAR(plant.column(still)[4000], 0.0, 1e-9);
+}
+
+// The effects act by the plant's own means, each in one of these tests at least.
+TEST(Machine, HasEveryEffectOfTheCatalogue) {
+  MachineModel model;
+  model.tool = rigidPlant().tool;
+  model.cutting = rigidPlant().cutting;
+  model.spindle = mill().spindle;
+  model.tool_tip.x.modes = {{1100.0, 0.03, 1.0 / 25e6}};
+  for (ModalModel& axis : model.force_sensor.axis) {
+    axis.modes = {{1000.0, 0.03, 0.9}};
+    axis.direct = 0.1;
+  }
+  CampaignTest cut = slot(3000.0, 0.1e-3, 2e-3), move;  // slow enough for Stribeck friction
+  cut.cut_time_before = 60.0;
+  cut.start_time = 100.0;
+  move.kind = TestKind::move;
+  move.sample_rate = 10000.0;
+  RunOptions options;
+  options.noise = false;
+  options.steps = 2;
+  options.slice = 0.5e-3;
+  options.phase = 0.3;
+  const auto runBoth = [&](const std::vector<EffectEntry>& effects) {
+    std::vector<Record> records;
+    for (const CampaignTest& test : {cut, move}) {
+      std::mt19937_64 random(1);
+      model.effects = effects;
+      records.push_back(run(plantOf(model), test, options, random));
+    }
+    return records;
+  };
+  const std::vector<Record> without = runBoth({});
+  std::mt19937_64 random(2);
+  for (const EffectKind& kind : effectCatalogue()) {
+    EffectEntry entry = drawEffect(kind.name, model, random);
+    if (kind.name == "saturation") entry.numbers["limit_n"] = 100.0;
+    const std::vector<Record> with = runBoth({entry});
+    double difference = 0.0;
+    for (std::size_t t = 0; t < with.size(); ++t) {
+      for (const std::string& name : with[t].names) {
+        const double unit = name == "load_meter" ? 1e-3 : 1.0;
+        for (std::size_t i = 0; i < with[t].size(); ++i)
+          difference =
+              std::max(difference, std::abs(with[t].column(name)[i] - without[t].column(name)[i]) / unit);
+      }
+    }
+    EXPECT_GT(difference, 0.5) << kind.name;
   }
 }
 

@@ -4,7 +4,7 @@
 #include <benchmark/benchmark.h>
 
 #include "smartmill_core/units.h"
-#include "smartmill_sim/effects/effect.h"
+#include "smartmill_sim/effects/effect_set.h"
 #include "smartmill_sim/twin/twin.h"
 
 namespace {

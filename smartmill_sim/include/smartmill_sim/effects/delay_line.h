@@ -5,15 +5,15 @@
 
 namespace smartmill::sim {
 
-/// A signal that comes late by a constant time, linear between steps.
+/// A signal delayed by a constant time, linear between steps.
 class DelayLine {
  public:
-  /// @param delay [s] >= 0 @param time_step [s] > 0 @param rest shown until the signal's start arrives
+  /// @param delay [s] >= 0 @param time_step [s] > 0 @param rest output until the start of the signal arrives
   DelayLine(double delay, double time_step, double rest);
 
   double step(double value);
 
-  /// As if value had stood since ever.
+  /// As if the signal had been constant before.
   void reset(double value);
 
  private:

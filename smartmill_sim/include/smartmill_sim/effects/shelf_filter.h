@@ -1,6 +1,6 @@
 #pragma once
 
-#include "smartmill_sim/effects/effect.h"
+#include "smartmill_core/model/effect.h"
 
 namespace smartmill::sim {
 

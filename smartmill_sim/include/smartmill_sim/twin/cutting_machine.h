@@ -10,7 +10,7 @@
 #include "smartmill_core/modal/modal_filter.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_sim/effects/delay_line.h"
-#include "smartmill_sim/effects/effect.h"
+#include "smartmill_sim/effects/effect_set.h"
 #include "smartmill_sim/effects/shelf_filter.h"
 #include "smartmill_sim/twin/cutter.h"
 #include "smartmill_sim/twin/edge_layers.h"
@@ -45,6 +45,7 @@ class CuttingMachine {
     ToolMotion motion;                              ///< vibration is not read: the structure gives it
     std::array<double, 2> tip_force{{0, 0}};        ///< [N] on the tool besides cutting (a hammer)
     std::array<double, 3> sensor_force{{0, 0, 0}};  ///< [N] on the sensor besides cutting
+    Axes3 axis_acceleration{{0, 0, 0}};             ///< [m/s2] of the machine axes
     /// Where the tip is known to be: the chip is of that, whatever the structure would do.
     std::optional<TipPlace> tip;
   };
@@ -126,7 +127,7 @@ class CuttingMachine {
   void step(const Input& input, Output& output);
 
   /// Early channels of many steps: a row each, of those that are asked for.
-  using EarlyRows = std::array<std::vector<double>*, CHANNELS>;
+  using EarlyRows = std::array<std::vector<double>*, CHANNEL_COUNT>;
   /// So many steps at one speed, without a probe and with no force from elsewhere: what step() gives, stage
   /// after stage instead of step after step. @param next sets what of an input moves on, may engage()
   /// @param early as long as there are steps, or nullptr

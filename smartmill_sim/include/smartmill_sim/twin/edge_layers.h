@@ -8,7 +8,7 @@
 #include "smartmill_core/cutting/cutting_law.h"
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/cutting/rigid_cut.h"
-#include "smartmill_sim/effects/effect.h"
+#include "smartmill_core/model/effect.h"
 #include "smartmill_sim/twin/milling_process.h"
 
 namespace smartmill::sim {

@@ -33,6 +33,10 @@ struct SimulationOptions {
   bool random_phases = false;
   /// Channels to give, of those that the record has; nullptr: all. Only where channelsApart().
   const std::vector<std::string>* channels = nullptr;
+  /// [s] deviation of the Gaussian weights by which the acceleration of the axes follows from their recorded
+  /// motion (smoothedDerivative()): passes frequencies up to 58 Hz (-3 dB), above the bandwidth of a feed
+  /// drive's position loop, and suppresses the resolution of an encoder.
+  double axis_smoothing = 4e-3;
   /// What cut and tool did in this very test (record, phase, substeps, slices) under other models: taken from
   /// there where the model has the same values, and put there. nullptr: each simulation by itself.
   CutTraces* traces = nullptr;
@@ -50,8 +54,8 @@ double recordedPhase(const CampaignTest& test, const Record& recorded);
 
 /// Simulates one test of a campaign: a record with the columns and sample times of the recorded one. The
 /// recorded spindle angle gives the phase (of a tap: stands as it is), the recorded hammer force drives a
-/// tap. The effects that the model lists act. What no model knows, the phase of a mains hum, is found in the
-/// recorded signals.
+/// tap, the recorded motion of the machine axes gives their acceleration. The effects that the model lists
+/// act. What no model knows, the phase of a mains hum, is found in the recorded signals.
 ///
 /// Before engage_time the tool is out of cut; from there full engagement with the surface that steady cutting
 /// leaves. The sensor begins at rest, the load meter at its air-cut value. With running_before the record

@@ -1,11 +1,14 @@
 #include "smartmill_core/campaign/campaign.h"
 
+#include <algorithm>
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <set>
 #include <sstream>
 
 #include "smartmill_core/campaign/slow_channels.h"
+#include "smartmill_core/campaign/stream_offset.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/strict_yaml.h"
 #include "smartmill_core/units.h"
@@ -21,6 +24,7 @@ constexpr const char* FORMAT = "smartmill-campaign/1";
 const Range POSITIVE = Range::positive();
 const Range NOT_NEGATIVE = Range::notNegative();
 const Range TURN_DEG{0.0, 360.0, false, false};
+constexpr std::array<TestKind, 4> KINDS{{TestKind::cut, TestKind::air, TestKind::tap, TestKind::move}};
 
 bool insideFolder(const std::string& file) {
   const fs::path path(file);
@@ -31,11 +35,28 @@ bool insideFolder(const std::string& file) {
   return true;
 }
 
+TestKind readKind(const StrictYaml& map) {
+  std::vector<std::string> names;
+  for (const TestKind kind : KINDS) names.push_back(testKindName(kind));
+  const std::string name = map.oneOf("kind", names);
+  return KINDS[static_cast<std::size_t>(std::find(names.begin(), names.end(), name) - names.begin())];
+}
+
+std::map<std::string, double> readStreamOffsets(const StrictYaml& map) {
+  std::map<std::string, double> offsets;
+  for (const std::string& group : map.keys()) {
+    if (streamGroups().count(group) == 0)
+      map.fail(group, "is not a group of columns (expected force, controller or tool)");
+    offsets[group] = map.number(group, Range{});
+  }
+  map.finish();
+  return offsets;
+}
+
 CampaignTest readTest(const StrictYaml& map) {
   CampaignTest test;
   test.name = map.word("name");
-  const std::string kind = map.oneOf("kind", {"cut", "air", "tap"});
-  test.kind = kind == "cut" ? TestKind::cut : kind == "air" ? TestKind::air : TestKind::tap;
+  test.kind = readKind(map);
   test.file = fileInside(map);
   test.sample_rate = map.number("sample_rate_hz", POSITIVE);
   if (map.has("file_format")) {
@@ -49,13 +70,11 @@ CampaignTest readTest(const StrictYaml& map) {
     channels.finish();
     if (test.channels.empty()) map.fail("channels", "names no channel");
   }
-  if (test.kind == TestKind::tap) {
-    test.spindle_speed =
-        units::radPerSecFromRpm(map.optionalNumber("spindle_speed_rpm", NOT_NEGATIVE).value_or(0.0));
-    test.direction = map.oneOf("direction", {"x", "y", "z"});
-  } else {
-    test.spindle_speed = units::radPerSecFromRpm(map.number("spindle_speed_rpm", POSITIVE));
-  }
+  const bool turns = test.kind == TestKind::cut || test.kind == TestKind::air;
+  test.spindle_speed =
+      units::radPerSecFromRpm(turns ? map.number("spindle_speed_rpm", POSITIVE)
+                                    : map.optionalNumber("spindle_speed_rpm", NOT_NEGATIVE).value_or(0.0));
+  if (test.kind == TestKind::tap) test.direction = map.oneOf("direction", {"x", "y", "z"});
   if (test.kind == TestKind::cut) {
     Engagement e;
     e.feed_per_tooth = map.number("feed_per_tooth_mm", POSITIVE) * units::MM;
@@ -69,29 +88,34 @@ CampaignTest readTest(const StrictYaml& map) {
     test.engagement = e;
     test.engage_time = map.optionalNumber("engage_time_s", NOT_NEGATIVE);
   }
-  if (test.kind != TestKind::tap) {
+  if (turns) {
     test.running_before = map.optionalNumber("running_before_s", NOT_NEGATIVE);
     if (test.running_before && test.engage_time)
       map.fail("running_before_s", yamlNumber(*test.running_before) + " contradicts engage_time_s");
   }
   test.start_time = map.optionalNumber("start_time_s", NOT_NEGATIVE);
   test.cut_time_before = map.optionalNumber("cut_time_before_s", NOT_NEGATIVE);
+  if (const auto offsets = map.optionalMap("stream_offset_s"))
+    test.stream_offset = readStreamOffsets(*offsets);
   map.finish();
   return test;
 }
 
-const char* nameOf(TestKind kind) {
+}  // namespace
+
+const char* testKindName(TestKind kind) {
   switch (kind) {
     case TestKind::cut:
       return "cut";
     case TestKind::air:
       return "air";
-    default:
+    case TestKind::tap:
       return "tap";
+    case TestKind::move:
+      break;
   }
+  return "move";
 }
-
-}  // namespace
 
 std::string fileInside(const StrictYaml& map) {
   const std::string file = map.word("file");
@@ -134,7 +158,7 @@ void writeCampaign(const Campaign& campaign, const std::string& folder) {
     out << "  " << key << ": " << yamlNumber(value) << "\n";
   };
   for (const CampaignTest& test : campaign.tests) {
-    out << "- name: " << yamlWord(test.name) << "\n  kind: " << nameOf(test.kind) << "\n";
+    out << "- name: " << yamlWord(test.name) << "\n  kind: " << testKindName(test.kind) << "\n";
     out << "  file: " << yamlWord(test.file) << "\n";
     if (!test.file_format.empty()) {
       out << "  file_format: " << test.file_format << "\n  channels:\n";
@@ -154,6 +178,9 @@ void writeCampaign(const Campaign& campaign, const std::string& folder) {
     if (test.start_time) number("start_time_s", *test.start_time);
     if (test.cut_time_before) number("cut_time_before_s", *test.cut_time_before);
     if (!test.direction.empty()) out << "  direction: " << test.direction << "\n";
+    if (!test.stream_offset.empty()) out << "  stream_offset_s:\n";
+    for (const auto& [group, offset] : test.stream_offset)
+      out << "    " << group << ": " << yamlNumber(offset) << "\n";
   }
   std::error_code ignored;
   fs::create_directories(folder, ignored);

@@ -207,6 +207,13 @@ const RecordColumn* recordColumn(std::string_view name) {
   return at == RECORD_COLUMNS.end() ? nullptr : &*at;
 }
 
+std::optional<std::size_t> motionAxis(std::string_view name) {
+  constexpr std::string_view PREFIX = "axis_";
+  if (name.substr(0, PREFIX.size()) != PREFIX) return {};
+  const std::size_t axis = std::string_view("xyz").find(name.back());
+  return axis < 3 ? std::optional<std::size_t>(axis) : std::nullopt;
+}
+
 std::optional<UnevenStep> unevenStep(const std::vector<double>& t) {
   const std::size_t n = t.size();
   if (n < 2) return std::nullopt;
@@ -252,7 +259,12 @@ std::vector<double>& Record::add(const std::string& name) {
 Record readRecord(const Campaign& campaign, const CampaignTest& test) {
   const std::string path = campaign.pathOf(test);
   if (test.file_format == "dynoware") return readDynowareAt(path, test.channels, test.sample_rate);
-  if (test.file_format != "sound") return readCsvAt(path, test.sample_rate);
+  if (test.file_format != "sound") {
+    Record record = readCsvAt(path, test.sample_rate);
+    if (test.kind == TestKind::move && std::none_of(record.names.begin(), record.names.end(), motionAxis))
+      throw Error(path + ": a move needs a column axis_x[mm], axis_vx[mm/min] or the same of y or z");
+    return record;
+  }
   std::string channels;
   for (const auto& [name, number] : test.channels) {
     const std::size_t scale = std::min(number.find('='), number.size());

@@ -15,7 +15,7 @@ Coordinate coordinate(const std::string& name, const FitRange& range, double nul
   return {name, null, range.low, range.high, range.step, range.prior_std};
 }
 
-// 0 where the file left an optional key out.
+// 0 where the file omits an optional key.
 double valueOf(const EffectEntry& entry, const std::string& key) {
   const auto found = entry.numbers.find(key);
   return found == entry.numbers.end() ? 0.0 : found->second;
@@ -171,7 +171,7 @@ EffectCoordinates tipMode(char axis) {
            {"ln " + name + " damping_ratio", damping_ratio, std::log(0.003), std::log(0.4), 5e-4, 1.0},
            {name + " compliance_um_per_kn", 0.0, 0.0, 1000.0, 5e-3, 100.0}},
           [=](const double* v, EffectEntry& e) {
-            if (v[2] <= 0.0) return;  // a stiff one is none
+            if (v[2] <= 0.0) return;  // without compliance there is no mode
             Mode mode;
             mode.frequency = std::exp(v[0]);
             mode.damping_ratio = std::exp(v[1]);
@@ -186,9 +186,9 @@ EffectCoordinates tipMode(char axis) {
           }};
 }
 
-EffectForm::EffectForm(std::vector<EffectCoordinates> parts) : parts_(std::move(parts)) {
-  for (const EffectCoordinates& p : parts_)
-    coordinates.insert(coordinates.end(), p.coordinates.begin(), p.coordinates.end());
+EffectForm::EffectForm(std::vector<EffectCoordinates> terms) : terms_(std::move(terms)) {
+  for (const EffectCoordinates& t : terms_)
+    coordinates.insert(coordinates.end(), t.coordinates.begin(), t.coordinates.end());
 }
 
 EffectForm& EffectForm::named(const std::string& name) {
@@ -249,8 +249,8 @@ EffectForm& EffectForm::foundInEachRecord(int count) {
   return *this;
 }
 
-EffectForm& EffectForm::sought(Seek what) {
-  seek = what;
+EffectForm& EffectForm::searchedBy(SearchStrategy how) {
+  strategy = how;
   return *this;
 }
 
@@ -269,9 +269,9 @@ EffectEntry EffectForm::entry(const Values& values) const {
   EffectEntry e = fixed_;
   e.name = effect;
   const double* next = values.data();
-  for (const EffectCoordinates& p : parts_) {
-    p.write(next, e);
-    next += p.coordinates.size();
+  for (const EffectCoordinates& t : terms_) {
+    t.write(next, e);
+    next += t.coordinates.size();
   }
   return e;
 }
@@ -279,17 +279,17 @@ EffectEntry EffectForm::entry(const Values& values) const {
 EffectForm::Values EffectForm::values(const EffectEntry& entry) const {
   Values v(coordinates.size(), 0.0);
   double* next = v.data();
-  for (const EffectCoordinates& p : parts_) {
-    p.read(entry, next);
-    next += p.coordinates.size();
+  for (const EffectCoordinates& t : terms_) {
+    t.read(entry, next);
+    next += t.coordinates.size();
   }
   return v;
 }
 
 EffectForm::Values EffectForm::pieceOf(const Values& values, std::size_t piece) const {
   auto first = values.begin();
-  for (std::size_t k = 0; k < piece; ++k) first += static_cast<std::ptrdiff_t>(parts_[k].coordinates.size());
-  return {first, first + static_cast<std::ptrdiff_t>(parts_[piece].coordinates.size())};
+  for (std::size_t k = 0; k < piece; ++k) first += static_cast<std::ptrdiff_t>(terms_[k].coordinates.size());
+  return {first, first + static_cast<std::ptrdiff_t>(terms_[piece].coordinates.size())};
 }
 
 }  // namespace smartmill

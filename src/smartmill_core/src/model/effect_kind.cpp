@@ -57,6 +57,8 @@ std::optional<std::string> lackingFor(EffectNeed need, const EffectScope& scope)
       return unless(scope.start_times, "start_time_s is not stated");
     case EffectNeed::cut_time:
       return unless(scope.cut_times, "cut_time_before_s is not stated");
+    case EffectNeed::axis_motion:
+      return unless(!scope.axes.empty(), "");
   }
   return {};
 }
@@ -120,22 +122,6 @@ bool EffectKind::has(EffectNeed need) const {
   return std::find(needs.begin(), needs.end(), need) != needs.end();
 }
 
-const EffectKind* findEffect(const std::string& name) {
-  for (const std::vector<EffectKind>* kinds : {&effectCatalogue(), &empiricalCatalogue()}) {
-    for (const EffectKind& kind : *kinds) {
-      if (kind.name == name) return &kind;
-    }
-  }
-  return nullptr;
-}
-
-const EffectKind* findEmpirical(const std::string& stage, const std::string& form) {
-  for (const EffectKind& kind : empiricalCatalogue()) {
-    if (kind.form_stage == stage && kind.form == form) return &kind;
-  }
-  return nullptr;
-}
-
 const EffectParameter* findParameter(const EffectKind& kind, const std::string& key) {
   for (const EffectParameter& parameter : kind.parameters) {
     if (parameter.key == key) return &parameter;
@@ -153,7 +139,7 @@ std::optional<std::string> lackingFor(const EffectKind& kind, const EffectScope&
   std::optional<std::string> reason;
   for (const EffectNeed need : kind.needs) {
     const std::optional<std::string> lacking = lackingFor(need, scope);
-    if (lacking && lacking->empty()) return lacking;  // whatever else it lacks
+    if (lacking && lacking->empty()) return lacking;  // reported before any other reason
     if (lacking && !reason) reason = lacking;
   }
   return reason;
@@ -163,7 +149,7 @@ std::vector<EffectForm> formsOf(const EffectKind& kind, const EffectScope& scope
   std::vector<EffectForm> forms = kind.forms(scope);
   for (EffectForm& form : forms) {
     form.effect = kind.name;
-    form.handicap = kind.handicap;
+    form.bic_penalty = kind.bic_penalty;
   }
   return forms;
 }
@@ -172,10 +158,10 @@ EffectEntry effectEntry(const std::string& name, const std::map<std::string, dou
                         const std::map<std::string, std::string>& words,
                         const std::map<std::string, std::vector<double>>& lists) {
   const EffectKind* kind = findEffect(name);
-  if (!kind) throw Error("'" + name + "' is no effect of the catalogue");
+  if (!kind) throw Error("'" + name + "' is not an effect of the catalogue");
   const auto known = [&](const std::string& key, EffectValue value) -> const EffectParameter& {
     const EffectParameter* p = findParameter(*kind, key);
-    if (!p || p->value != value) throw Error(name + "." + key + ": no such key of this kind");
+    if (!p || p->value != value) throw Error(name + "." + key + ": no such key of this type");
     return *p;
   };
   const auto check = [&](const EffectParameter& p, double value) {
@@ -209,7 +195,7 @@ EffectEntry effectEntry(const std::string& name, const std::map<std::string, dou
 
 EffectEntry drawEffect(const std::string& name, const MachineModel& machine, Random& random) {
   const EffectKind* kind = findEffect(name);
-  if (!kind) throw Error("'" + name + "' is no effect of the catalogue");
+  if (!kind) throw Error("'" + name + "' is not an effect of the catalogue");
   EffectEntry entry;
   entry.name = name;
   for (const EffectParameter& p : kind->parameters) {

@@ -10,7 +10,7 @@ namespace smartmill {
 
 namespace {
 
-// A mill of which every effect can be thought: bounds that depend on the machine are shown for this one.
+// A mill in which every effect is possible; bounds that depend on the machine are those for this one.
 MachineModel exampleMill() {
   MachineModel m;
   m.tool = ToolGeometry{4, 19.05e-3, units::radFromDeg(30.0), {}};
@@ -31,11 +31,11 @@ std::string keyText(const EffectParameter& p) {
     case EffectValue::number:
       return p.key + " (" + p.unit + rangeText(p) + (p.optional ? "; absent: 0)" : ")");
     case EffectValue::list:
-      return p.key + " (" + p.unit + ", one a tooth" + rangeText(p) +
+      return p.key + " (" + p.unit + ", one per tooth" + rangeText(p) +
              (p.sum ? ", sum " + shortNumber(*p.sum) + ")" : ")");
     case EffectValue::series:
     case EffectValue::table:
-      return p.key + " (" + p.unit + ", any number of them" + rangeText(p) +
+      return p.key + " (" + p.unit + "; any number of values" + rangeText(p) +
              (p.optional ? "; absent: none)" : ")");
     case EffectValue::modes:
       return p.key + " (modes as in tool_tip; absent: none)";
@@ -66,9 +66,9 @@ std::string searchText(const std::vector<EffectForm>& forms) {
 }
 
 std::string needText(const EffectKind& kind) {
-  static const std::array<const char*, 9> NAMES{{"cuts", "two teeth", "forces", "fx or fy", "load meter",
-                                                 "vibrating tool", "sensor modes", "start_time_s",
-                                                 "cut_time_before_s"}};
+  static const std::array<const char*, 10> NAMES{{"cuts", "two teeth or more", "forces", "fx or fy",
+                                                  "load meter", "tool with modes", "sensor modes",
+                                                  "start_time_s", "cut_time_before_s", "axis motion"}};
   std::string text;
   for (const EffectNeed need : kind.needs)
     text += (text.empty() ? "" : ", ") + std::string(NAMES[static_cast<std::size_t>(need)]);
@@ -77,17 +77,17 @@ std::string needText(const EffectKind& kind) {
 
 std::string effectTable() {
   const MachineModel mill = exampleMill();
-  EffectScope scope{mill, {"fx", "fy", "fz", "load_meter"}};
+  EffectScope scope{mill, {"fx", "fy", "fz", "load_meter"}, {"x", "y", "z"}};
   scope.largest_force = 500.0;
   std::string table =
-      "| name | what it does | keys (unit; what files may say) | stage | a fit moves (from..to; usual size) "
+      "| name | what it does | keys (unit; range) | stage | coordinates of a fit (bounds; prior deviation) "
       "| needs | "
       "source |\n|---|---|---|---|---|---|---|\n";
   for (const EffectKind& kind : effectCatalogue()) {
     std::string keys;
     for (const EffectParameter& p : kind.parameters) keys += (keys.empty() ? "" : ", ") + keyText(p);
-    table += "| " + kind.name + " | " + kind.says + " | " + keys + " | " + stageName(kind.stage) + " | " +
-             searchText(formsOf(kind, scope)) + " | " + needText(kind) + " | " + kind.source + " |\n";
+    table += "| " + kind.name + " | " + kind.description + " | " + keys + " | " + stageName(kind.stage) +
+             " | " + searchText(formsOf(kind, scope)) + " | " + needText(kind) + " | " + kind.source + " |\n";
   }
   return table;
 }
@@ -97,7 +97,7 @@ std::string effectTable() {
 std::string withEffectTable(const std::string& document) {
   const std::size_t begin = document.find("<!-- effects"), end = document.find("<!-- end of effects");
   if (begin == std::string::npos || end == std::string::npos || end < begin)
-    throw Error("a document without the lines between which the table of effects stands");
+    throw Error("the document lacks the lines <!-- effects and <!-- end of effects");
   const std::size_t first = document.find('\n', begin) + 1;
   return document.substr(0, first) + "\n" + effectTable() + "\n" + document.substr(end);
 }

@@ -11,6 +11,7 @@
 
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/campaign/slow_channels.h"
+#include "smartmill_core/campaign/stream_offset.h"
 #include "smartmill_core/cutting/regression.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
@@ -122,7 +123,7 @@ TEST(Campaign, refusesWithFileKeyAndValue) {
        "tests[0].file: '../slot.csv' lies outside the campaign's folder"},
       {"file: slot.csv", "file: /slot.csv", "tests[0].file: '/slot.csv' lies outside the campaign's folder"},
       {"name: air", "name: slot", "tests[1].name: 'slot' names two tests"},
-      {"kind: air", "kind: ari", "tests[1].kind: 'ari' is not one of cut | air | tap"},
+      {"kind: air", "kind: ari", "tests[1].kind: 'ari' is not one of cut | air | tap | move"},
       {"spindle_speed_rpm: 1000", "spindle_speed_rpm: 0",
        "tests[1].spindle_speed_rpm: 0 is out of range (> 0)"},
       {"exit_deg: 180.0", "exit_deg: 0", "tests[0].exit_deg: 0.0 is out of range (> entry_deg 0.0)"},
@@ -137,6 +138,76 @@ TEST(Campaign, refusesWithFileKeyAndValue) {
       {"tests:", "runs:", "tests: is missing"},
   };
   expectRefusals(CAMPAIGN, refusals, readCampaign);
+}
+
+constexpr const char* MOVES = R"(format: smartmill-campaign/1
+model: model.yaml
+tests:
+- {name: rest, kind: move, file: rest.csv, sample_rate_hz: 100, stream_offset_s: {force: 0.02, tool: -0.01}}
+- {name: turning, kind: move, file: turning.csv, sample_rate_hz: 100, spindle_speed_rpm: 60}
+)";
+
+TEST(Campaign, readsAndWritesMoves) {
+  const TemporaryFolder folder;
+  folder.write("campaign.yaml", MOVES);
+  const auto expectMoves = [](const Campaign& campaign) {
+    ASSERT_EQ(campaign.tests.size(), 2u);
+    EXPECT_EQ(campaign.tests[0].kind, TestKind::move);
+    EXPECT_EQ(campaign.tests[0].spindle_speed, 0.0);
+    EXPECT_EQ(campaign.tests[0].stream_offset,
+              (std::map<std::string, double>{{"force", 0.02}, {"tool", -0.01}}));
+    EXPECT_DOUBLE_EQ(campaign.tests[1].spindle_speed, units::TWO_PI);
+    EXPECT_TRUE(campaign.tests[1].stream_offset.empty());
+  };
+  const Campaign campaign = readCampaign(folder.file("."));
+  expectMoves(campaign);
+  writeCampaign(campaign, folder.file("copy"));
+  expectMoves(readCampaign(folder.file("copy")));
+  expectRefusals(
+      MOVES,
+      {{"force: 0.02", "sound: 0.02",
+        "tests[0].stream_offset_s.sound: is not a group of columns (expected force, controller or tool)"},
+       {"force: 0.02", "force: soon", "tests[0].stream_offset_s.force: 'soon' is not a number"},
+       {"spindle_speed_rpm: 60", "feed_per_tooth_mm: 0.1",
+        "tests[1].feed_per_tooth_mm: unknown key (its value: '0.1')"},
+       {"spindle_speed_rpm: 60", "running_before_s: 1",
+        "tests[1].running_before_s: unknown key (its value: '1')"}},
+      readCampaign);
+
+  folder.write("rest.csv",
+               "time[s],axis_x[mm],axis_vx[mm/min],current_x[A],fx[N]\n0,1,60,2,3\n0.01,2,60,2,4\n");
+  const Record record = readRecord(campaign, campaign.tests[0]);
+  EXPECT_DOUBLE_EQ(record.column("axis_x")[1], 2e-3);
+  EXPECT_DOUBLE_EQ(record.column("axis_vx")[0], 1e-3);
+  folder.write("turning.csv", "time[s],fx[N],current_x[A]\n0,1,2\n0.01,2,3\n");
+  EXPECT_THAT(errorOf([&] { readRecord(campaign, campaign.tests[1]); }),
+              HasSubstr("needs a column axis_x[mm]"));
+}
+
+// A ramp in every column; the force is recorded three and a half samples later, the tool one sample earlier.
+TEST(Record, groupsWithAnOffsetAreAligned) {
+  CampaignTest test;
+  test.sample_rate = 100.0;
+  test.stream_offset = {{"force", 0.035}, {"tool", -0.01}};
+  Record record;
+  for (int i = 0; i < 50; ++i) {
+    const double t = i / 100.0;
+    record.time.push_back(t);
+    record.add("axis_x").push_back(t);
+    record.add("fx").push_back(t - 0.035);
+    record.add("tool_x").push_back(t + 0.01);
+  }
+  const Record moved = aligned(record, test);
+  ASSERT_EQ(moved.size(), 50u - 4u - 1u);
+  EXPECT_DOUBLE_EQ(moved.time.front(), 0.01);
+  for (std::size_t i = 3; i + 3 < moved.size(); ++i) {
+    for (const char* column : {"axis_x", "fx", "tool_x"})
+      EXPECT_NEAR(moved.column(column)[i], moved.time[i], 1e-12) << column << " " << i;
+  }
+  test.stream_offset = {{"force", 0.5}};
+  EXPECT_THAT(errorOf([&] { aligned(record, test); }), HasSubstr("longer than the record"));
+  test.stream_offset.clear();
+  EXPECT_EQ(aligned(record, test).size(), record.size());
 }
 
 TEST(Record, readsColumnsInAnyOrderAndNotesTheUnknown) {

@@ -19,7 +19,7 @@ namespace {
 
 constexpr int DRAWS = 20;
 
-// With modes, so that every effect can be thought.
+// With modes, so that every effect is possible.
 MachineModel vibratingMill(int teeth) {
   MachineModel m = mill(teeth);
   for (ModalModel& axis : m.force_sensor.axis) {
@@ -31,13 +31,13 @@ MachineModel vibratingMill(int teeth) {
 }
 
 EffectScope scopeOf(const MachineModel& model) {
-  EffectScope scope{model, {"fx", "fy", "fz", "load_meter"}};
+  EffectScope scope{model, {"fx", "fy", "fz", "load_meter"}, {"x", "y", "z"}};
   scope.cuts = scope.start_times = scope.cut_times = true;
   scope.largest_force = 600.0;
   return scope;
 }
 
-// Digits that files keep.
+// Equal to the digits of files.
 void expectSame(const EffectEntry& a, const EffectEntry& b, double tolerance) {
   EXPECT_EQ(a.name, b.name);
   EXPECT_EQ(a.words, b.words) << a.name;
@@ -50,13 +50,13 @@ void expectSame(const EffectEntry& a, const EffectEntry& b, double tolerance) {
   }
 }
 
-TEST(EffectCatalogue, everyEntryIsWhole) {
+TEST(EffectCatalogue, everyEntryIsComplete) {
   const MachineModel model = vibratingMill(4);
   std::set<std::string> names;
   for (const EffectKind& kind : effectCatalogue()) {
-    EXPECT_TRUE(names.insert(kind.name).second) << kind.name << " stands twice";
+    EXPECT_TRUE(names.insert(kind.name).second) << kind.name << " occurs twice";
     EXPECT_EQ(findEffect(kind.name), &kind);
-    EXPECT_FALSE(kind.says.empty()) << kind.name;
+    EXPECT_FALSE(kind.description.empty()) << kind.name;
     EXPECT_FALSE(kind.source.empty()) << kind.name;
     EXPECT_FALSE(kind.parameters.empty()) << kind.name;
     EXPECT_FALSE(formsOf(kind, scopeOf(model)).empty()) << kind.name;
@@ -68,8 +68,8 @@ TEST(EffectCatalogue, everyEntryIsWhole) {
                              [](const EffectKind& a, const EffectKind& b) { return a.stage < b.stage; }));
 }
 
-// The names and keys of the contract with the programs of others (effects.md beside the repository).
-TEST(EffectCatalogue, holdsTheNamesThatOtherProgramsUse) {
+// The names and keys that other programs use too.
+TEST(EffectCatalogue, hasTheNamesThatOtherProgramsUse) {
   const std::vector<std::pair<std::string, std::vector<std::string>>> contract{
       {"runout", {"offset_um", "angle_deg"}},
       {"edge_forces", {"Kte_n_per_mm", "Kre_n_per_mm", "Kae_n_per_mm"}},
@@ -111,21 +111,21 @@ TEST(EffectCatalogue, holdsTheNamesThatOtherProgramsUse) {
   EXPECT_EQ(findEffect("saturation")->parameters.at(0).unit, "N");
 }
 
-TEST(EffectCatalogue, anglesDifferTheShortWayRound) {
+TEST(EffectCatalogue, anglesDifferByTheShorterWay) {
   const EffectKind &order = *findEffect("spindle_order"), &runout = *findEffect("runout");
   EXPECT_NEAR(parameterOf(order, "y_deg").difference(359.0, 2.0), -3.0, 1e-12);
   EXPECT_NEAR(parameterOf(order, "y_deg").scale(10.0), 57.29577951308232, 1e-12);  // one radian
   EXPECT_EQ(parameterOf(order, "y_n").difference(359.0, 2.0), 357.0);
   EXPECT_EQ(parameterOf(order, "y_n").scale(10.0), 10.0);
   EXPECT_NEAR(parameterOf(runout, "angle_deg").difference(-170.0, 170.0), 20.0, 1e-12);
-  // Names of a report lead to their key; a pitch is a width, not a direction.
+  // Names of reports belong to a key; a pitch is a width, not a direction.
   EXPECT_EQ(parameterOf(*findEffect("uneven_pitch"), "pitch_deg[1]").difference(359.0, 2.0), 357.0);
   EXPECT_EQ(parameterOf(*findEffect("tool_flexibility"), "x[0].frequency_hz").key, "x");
   EXPECT_THROW(parameterOf(runout, "offset"), Error);
 }
 
-// Modes found axis by axis are what the form of both axes writes.
-TEST(EffectCatalogue, piecesMakeUpTheWhole) {
+// Modes found axis by axis equal those of the form of both axes.
+TEST(EffectCatalogue, piecesEqualTheWhole) {
   const MachineModel model = vibratingMill(2);
   const std::vector<EffectForm> forms = formsOf(*findEffect("tool_flexibility"), scopeOf(model));
   const auto named = [&](const std::string& variant) -> const EffectForm& {
@@ -147,14 +147,14 @@ TEST(EffectCatalogue, piecesMakeUpTheWhole) {
   }
 }
 
-TEST(EffectCatalogue, fitsLookInsideTheirBounds) {
+TEST(EffectCatalogue, probesLieInsideTheBounds) {
   for (const int teeth : {2, 3, 4}) {
     const MachineModel model = vibratingMill(teeth);
     for (const EffectKind& kind : effectCatalogue()) {
       for (const EffectForm& form : formsOf(kind, scopeOf(model))) {
         const std::string name = form.title();
         EXPECT_EQ(form.effect, kind.name);
-        EXPECT_EQ(form.probes.empty(), form.seek != EffectForm::Seek::nothing) << name;
+        EXPECT_EQ(form.probes.empty(), form.strategy != EffectForm::SearchStrategy::none) << name;
         for (const Coordinate& c : form.coordinates) {
           EXPECT_LT(c.low, c.high) << name << " " << c.name;
           EXPECT_LE(c.low, c.null) << name << " " << c.name;
@@ -170,7 +170,7 @@ TEST(EffectCatalogue, fitsLookInsideTheirBounds) {
               EXPECT_GE(point[c], form.coordinates[c].low) << name;
               EXPECT_LE(point[c], form.coordinates[c].high) << name;
             }
-            // What a probe says, a file may say.
+            // A probe is valid in files.
             const EffectEntry e = form.entry(point);
             EXPECT_NO_THROW(effectEntry(e.name, e.numbers, e.words, e.lists)) << name;
           }
@@ -180,8 +180,8 @@ TEST(EffectCatalogue, fitsLookInsideTheirBounds) {
   }
 }
 
-// What a bench draws is an entry that files may hold, and comes back from a file as it was written.
-TEST(EffectCatalogue, drawnEntriesComeBackFromFiles) {
+// Drawn entries are valid in files and are read back as they were written.
+TEST(EffectCatalogue, drawnEntriesAreReadBack) {
   const TemporaryFolder folder;
   EffectKind::Random random(7);
   for (const int teeth : {2, 3, 4}) {
@@ -200,9 +200,9 @@ TEST(EffectCatalogue, drawnEntriesComeBackFromFiles) {
   }
 }
 
-// Some form of the effect can say every drawn entry, with coordinates that lie inside its bounds; and the
-// coordinates come back from the entry that they make.
-TEST(EffectCatalogue, coordinatesAndEntriesAreEachOthersInverse) {
+// Every drawn entry has coordinates inside the bounds of some form of the effect; coordinates and entry are
+// inverse to each other.
+TEST(EffectCatalogue, coordinatesAndEntriesAreInverse) {
   EffectKind::Random random(11);
   for (const int teeth : {2, 3, 4, 6}) {
     const MachineModel model = vibratingMill(teeth);
@@ -210,7 +210,7 @@ TEST(EffectCatalogue, coordinatesAndEntriesAreEachOthersInverse) {
       const std::vector<EffectForm> forms = formsOf(kind, scopeOf(model));
       for (int k = 0; k < DRAWS; ++k) {
         const EffectEntry drawn = drawEffect(kind.name, model, random);
-        bool said = false;
+        bool possible = false;
         for (const EffectForm& form : forms) {
           if (form.entry(form.values(drawn)).words != drawn.words) continue;
           const EffectForm::Values values = form.values(drawn);
@@ -223,31 +223,31 @@ TEST(EffectCatalogue, coordinatesAndEntriesAreEachOthersInverse) {
             same = std::abs(again[n].second - numbers[n].second) <
                    1e-8 * std::max(1.0, std::abs(numbers[n].second));
           if (!same) continue;  // another frequency, another axis
-          said = true;
+          possible = true;
           const EffectForm::Values back = form.values(form.entry(values));
           for (std::size_t c = 0; c < values.size(); ++c)
             EXPECT_NEAR(back[c], values[c], 1e-9 * std::max(1.0, std::abs(values[c]))) << form.title();
         }
-        EXPECT_TRUE(said) << kind.name << " with " << teeth << " teeth";
+        EXPECT_TRUE(possible) << kind.name << " with " << teeth << " teeth";
       }
     }
   }
 }
 
-// A vector of which one direction is known must not have a pole at zero: closed forms of the coordinates.
-TEST(EffectCoordinates, areWhatTheySay) {
+// Closed forms of the coordinates.
+TEST(EffectCoordinates, areTheirClosedForms) {
   EffectForm vector({planar("size", "angle_deg", 10.0, 1e-3, 1.0)});
   EXPECT_NEAR(vector.entry({-3.0, -4.0}).numbers.at("size"), 5.0, 1e-12);
   EXPECT_NEAR(vector.entry({0.0, -4.0}).numbers.at("angle_deg"), 270.0, 1e-12);
 
-  // At the middle the level says everything, whatever the exponent: (x / reference)^-exponent = exp(level).
+  // At the middle only the level counts, whatever the exponent: (x / reference)^-exponent = exp(level).
   EffectForm power({powerLaw("exponent", "reference", 60.0, 1.0, 3000.0)});
   for (const double exponent : {0.1, 0.4}) {
     const EffectEntry e = power.entry({exponent, 0.05});
     EXPECT_NEAR(std::pow(60.0 / e.numbers.at("reference"), -e.numbers.at("exponent")), std::exp(0.05), 1e-12);
   }
 
-  // Contrasts are orthonormal and know no mean.
+  // Contrasts are orthonormal and independent of the mean.
   for (const int teeth : {2, 3, 5}) {
     const EffectForm list({contrasts("offset", teeth, {-10.0, 10.0, 1e-3, 1.0})});
     ASSERT_EQ(list.coordinates.size(), static_cast<std::size_t>(teeth - 1));
@@ -276,7 +276,7 @@ TEST(EffectCoordinates, areWhatTheySay) {
     EXPECT_NEAR(degrees[k].second, (std::array<double, 3>{{124.0, 119.0, 117.0}})[k], 1e-9);
 }
 
-TEST(EffectCatalogue, tellsWhyACampaignCannotSpeakOfAnEffect) {
+TEST(EffectCatalogue, givesTheReasonWhyAnEffectIsNotTried) {
   MachineModel model = vibratingMill(1);
   model.tool_tip = {};
   EffectScope scope = scopeOf(model);
@@ -288,7 +288,7 @@ TEST(EffectCatalogue, tellsWhyACampaignCannotSpeakOfAnEffect) {
   EXPECT_EQ(lacking("uneven_pitch").value(), "");  // one tooth
   EXPECT_FALSE(lacking("runout"));
   scope.cuts = false;
-  EXPECT_EQ(lacking("tool_wear").value(), "");  // no word of what nobody asked for
+  EXPECT_EQ(lacking("tool_wear").value(), "");  // no reason for an effect that is not measured
 }
 
 TEST(EffectEntry, isChecked) {
@@ -304,8 +304,8 @@ TEST(EffectEntry, isChecked) {
   EXPECT_THROW(drawEffect("coolant", vibratingMill(2), *std::make_unique<EffectKind::Random>(1)), Error);
 }
 
-// docs/effects.md is made from the catalogue: rosrun smartmill_studies sim_effect_table docs/effects.md
-TEST(EffectTable, isThatOfTheDocument) {
+// docs/effects.md is generated from the catalogue: rosrun smartmill_studies sim_effect_table docs/effects.md
+TEST(EffectTable, equalsThatOfTheDocument) {
   std::ifstream file(SMARTMILL_DOCS_FOLDER "/effects.md");
   ASSERT_TRUE(file.good());
   std::ostringstream text;

@@ -1,4 +1,4 @@
-// Forms of causes without a name: what files say of them, and what a fit moves.
+// Empirical effects: their entries in files and their coordinates.
 
 #include <cmath>
 #include <set>
@@ -16,7 +16,7 @@ namespace {
 
 const std::set<std::string> CHANNELS{"fx", "fy", "fz", "load_meter"};
 
-// A form away from its null, as a fit might leave it.
+// A form away from its null, as after a fit.
 EffectEntry someEntry(const EffectForm& form) {
   EffectForm::Values values;
   for (const Coordinate& c : form.coordinates)
@@ -26,7 +26,7 @@ EffectEntry someEntry(const EffectForm& form) {
   return e;
 }
 
-TEST(EmpiricalCatalogue, noneOfThemStandsInTheCatalogue) {
+TEST(EmpiricalCatalogue, noneIsPartOfTheCatalogue) {
   for (const EffectKind& kind : effectCatalogue()) EXPECT_FALSE(kind.empirical()) << kind.name;
   for (const EffectKind& kind : empiricalCatalogue()) {
     EXPECT_TRUE(kind.empirical());
@@ -37,7 +37,7 @@ TEST(EmpiricalCatalogue, noneOfThemStandsInTheCatalogue) {
   EXPECT_EQ(findEmpirical("channel", "chip_thickness"), nullptr);
 }
 
-TEST(EmpiricalCatalogue, entriesComeBackFromFilesUnderOneName) {
+TEST(EmpiricalCatalogue, entriesAreReadBackUnderOneName) {
   const TemporaryFolder folder;
   const std::string file = folder.file("model.yaml");
   const MachineModel nominal = mill(4, 30.0);
@@ -62,7 +62,7 @@ TEST(EmpiricalCatalogue, entriesComeBackFromFilesUnderOneName) {
       ASSERT_EQ(x.size(), y.size()) << kind.name;
       for (std::size_t k = 0; k < x.size(); ++k)
         EXPECT_NEAR(x[k].second, y[k].second, 1e-8 * std::abs(x[k].second));
-      // What was written is read back into the numbers that the fit moved.
+      // The entry is read back into the coordinates of the fit.
       const EffectForm::Values values = form.values(b), again = form.values(form.entry(values));
       for (std::size_t k = 0; k < values.size(); ++k) EXPECT_NEAR(values[k], again[k], 1e-6) << form.title();
     }
@@ -72,13 +72,13 @@ TEST(EmpiricalCatalogue, entriesComeBackFromFilesUnderOneName) {
 TEST(EmpiricalCatalogue, unknownFormsAreRefused) {
   const TemporaryFolder folder;
   const std::string file = folder.file("model.yaml");
-  const auto refuses = [&](const std::string& effect, const char* says) {
+  const auto refuses = [&](const std::string& effect, const char* reason) {
     writeText(file, "format: smartmill-model/1\neffects: [" + effect + "]\n");
     try {
       readMachineModel(file);
       ADD_FAILURE() << effect;
     } catch (const Error& e) {
-      EXPECT_NE(std::string(e.what()).find(says), std::string::npos) << e.what();
+      EXPECT_NE(std::string(e.what()).find(reason), std::string::npos) << e.what();
     }
   };
   refuses("{name: empirical, stage: chip, form: magic}", "'magic'");
@@ -88,7 +88,7 @@ TEST(EmpiricalCatalogue, unknownFormsAreRefused) {
           "frequency_hz");
 }
 
-// Whatever a fit moves, force rises with the chip.
+// For any coordinates the force rises with the chip.
 TEST(EmpiricalCatalogue, chipTimesFactorRises) {
   const MachineModel nominal = mill(4, 30.0);
   for (const EffectForm& form : formsOf(*findEffect("empirical:chip_thickness"), {nominal, CHANNELS})) {

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/signal/derivative.h"
 #include "smartmill_core/signal/fourier.h"
 #include "smartmill_core/signal/frequency_response.h"
 #include "smartmill_core/signal/statistics.h"
@@ -265,6 +266,52 @@ TEST(Statistics, closedForms) {
   EXPECT_THROW(mean({}), Error);
   EXPECT_THROW(standardDeviation({1.0}), Error);
   EXPECT_THROW(percentile({1.0}, 1.5), Error);
+}
+
+// Cubics and quartics, away from the ends.
+TEST(SmoothedDerivative, isExactForPolynomials) {
+  const double rate = 1000.0;
+  std::vector<double> cubic, quartic;
+  for (int i = 0; i < 400; ++i) {
+    const double t = i / rate;
+    cubic.push_back(2.0 - 3.0 * t + 5.0 * t * t - 4.0 * t * t * t);
+    quartic.push_back(1.0 + t - 2.0 * t * t + 3.0 * t * t * t + 6.0 * t * t * t * t);
+  }
+  const std::vector<double> slope = smoothedDerivative(cubic, rate, 1, 5e-3),
+                            curvature = smoothedDerivative(quartic, rate, 2, 5e-3);
+  for (const int i : {50, 200, 340}) {
+    const double t = i / rate;
+    EXPECT_NEAR(slope[static_cast<std::size_t>(i)], -3.0 + 10.0 * t - 12.0 * t * t, 1e-9) << i;
+    EXPECT_NEAR(curvature[static_cast<std::size_t>(i)], -4.0 + 18.0 * t + 72.0 * t * t, 1e-6) << i;
+  }
+}
+
+TEST(SmoothedDerivative, attenuatesASineAsItsWeightsSay) {
+  const double rate = 10000.0, smoothing = 4e-3;
+  for (const double frequency : {5.0, 20.0, 57.5}) {
+    const double w = units::TWO_PI * frequency, u = std::pow(w * smoothing, 2),
+                 attenuation = (1.0 + 0.5 * u) * std::exp(-0.5 * u);
+    std::vector<double> sine;
+    for (int i = 0; i < 8000; ++i) sine.push_back(std::sin(w * i / rate));
+    const std::vector<double> slope = smoothedDerivative(sine, rate, 1, smoothing),
+                              curvature = smoothedDerivative(sine, rate, 2, smoothing);
+    for (const int i : {3000, 4021, 5555}) {
+      const auto k = static_cast<std::size_t>(i);
+      // The weights end at 4.5 deviations, which changes the response at the highest frequency.
+      EXPECT_NEAR(slope[k], attenuation * w * std::cos(w * i / rate), 2.5e-3 * w) << frequency;
+      EXPECT_NEAR(curvature[k], -attenuation * w * w * std::sin(w * i / rate), 1e-2 * w * w) << frequency;
+    }
+  }
+}
+
+// A motion that goes on beyond the record, and one that rests.
+TEST(SmoothedDerivative, tendsToZeroAtTheEnds) {
+  std::vector<double> moving(300), resting(300, 7.0);
+  for (std::size_t i = 0; i < moving.size(); ++i) moving[i] = 0.02 * static_cast<double>(i);
+  for (const double a : smoothedDerivative(moving, 1000.0, 2, 4e-3)) EXPECT_NEAR(a, 0.0, 1e-6);
+  for (const double a : smoothedDerivative(resting, 1000.0, 1, 4e-3)) EXPECT_NEAR(a, 0.0, 1e-9);
+  EXPECT_NEAR(smoothedDerivative(moving, 1000.0, 1, 4e-3).front(), 0.0, 1e-6);
+  EXPECT_EQ(smoothedDerivative({3.0}, 1000.0, 1, 4e-3), std::vector<double>{0.0});
 }
 
 }  // namespace

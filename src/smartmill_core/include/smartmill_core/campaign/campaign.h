@@ -10,7 +10,10 @@
 
 namespace smartmill {
 
-enum class TestKind { cut, air, tap };
+/// A move: axes move and nothing cuts; the spindle may stand still.
+enum class TestKind { cut, air, tap, move };
+/// As in campaign.yaml.
+const char* testKindName(TestKind kind);
 
 /// One test of a campaign (formats.md section 2), SI.
 struct CampaignTest {
@@ -27,6 +30,8 @@ struct CampaignTest {
   std::optional<double> start_time;       ///< [s]
   std::optional<double> cut_time_before;  ///< [s]
   std::string direction;                  ///< of a tap: x, y or z
+  /// [s] by which a group of columns (streamGroups()) is recorded later than the rest, where it is known.
+  std::map<std::string, double> stream_offset;
 };
 
 /// smartmill-campaign/1: a folder with campaign.yaml and one CSV a test.

@@ -17,7 +17,7 @@ struct RecordColumn {
   double si;         ///< SI value of one in the CSV
 };
 
-inline constexpr std::array<RecordColumn, 11> RECORD_COLUMNS{{{"time", "s", 1.0},
+inline constexpr std::array<RecordColumn, 20> RECORD_COLUMNS{{{"time", "s", 1.0},
                                                               {"spindle_angle", "rad", 1.0},
                                                               {"fx", "N", 1.0},
                                                               {"fy", "N", 1.0},
@@ -27,10 +27,23 @@ inline constexpr std::array<RecordColumn, 11> RECORD_COLUMNS{{{"time", "s", 1.0}
                                                               {"tool_x", "um", units::UM},
                                                               {"tool_y", "um", units::UM},
                                                               {"displacement", "m", 1.0},
-                                                              {"acceleration", "m/s2", 1.0}}};
+                                                              {"acceleration", "m/s2", 1.0},
+                                                              {"axis_x", "mm", units::MM},
+                                                              {"axis_y", "mm", units::MM},
+                                                              {"axis_z", "mm", units::MM},
+                                                              {"axis_vx", "mm/min", units::MM / 60.0},
+                                                              {"axis_vy", "mm/min", units::MM / 60.0},
+                                                              {"axis_vz", "mm/min", units::MM / 60.0},
+                                                              {"current_x", "A", 1.0},
+                                                              {"current_y", "A", 1.0},
+                                                              {"current_z", "A", 1.0}}};
 
 /// @return nullptr for a name that is not a column
 const RecordColumn* recordColumn(std::string_view name);
+
+/// Axis (0: x, 1: y, 2: z) of a column with the position (axis_x) or velocity (axis_vx) of a machine axis;
+/// nothing for any other column.
+std::optional<std::size_t> motionAxis(std::string_view name);
 
 /// A step between two samples that differs from the others.
 struct UnevenStep {

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <random>
 #include <set>
@@ -16,35 +17,37 @@
 
 namespace smartmill {
 
-/// Where in a machine an effect acts, in the order in which the stages pass.
+class Effect;
+
+/// Where in a machine an effect acts, in the order of action.
 enum class EffectStage {
   geometry,       ///< of the tool: radii, pitch, helix
-  motion,         ///< where the tool is in the work: feed, depth
+  motion,         ///< of the tool in the work: feed, depth
   cutting_law,    ///< from chip to force
   structure,      ///< modes of the tool tip
   sensor,         ///< modes of the force sensor
-  sensor_force,   ///< force on the sensor besides cutting
+  sensor_force,   ///< force on the sensor in addition to cutting
   drive,          ///< spindle friction and load meter
-  sensor_output,  ///< measured channels, before they are late
-  delay,          ///< lateness of one channel
-  signal          ///< measured channels at last, before the noise
+  sensor_output,  ///< measured channels before their delays
+  delay,          ///< delay of one channel
+  signal          ///< measured channels after their delays, before the noise
 };
 const char* stageName(EffectStage stage);
 
-/// Between the force on the sensor and what its channels show.
+/// Whether a stage lies between the force on the sensor and its channels.
 bool isBehindSensor(EffectStage stage);
 
-/// What stands behind a key of an effect.
+/// Type of a key's value.
 enum class EffectValue {
   number,
   word,
-  list,    ///< of numbers, one a tooth
-  series,  ///< of numbers, as many as the file has
-  table,   ///< a series that is one shape: no fit moves its numbers, no report lists them
+  list,    ///< of numbers, one per tooth
+  series,  ///< of numbers, of any length
+  table,   ///< a series that describes one shape: no fit changes its numbers, no report lists them
   modes    ///< of the tool tip, as in the section tool_tip
 };
 
-/// What a campaign must hold for an effect to be looked for in it.
+/// What a campaign must contain for an effect to be tried in it.
 enum class EffectNeed {
   cuts,
   several_teeth,
@@ -53,38 +56,39 @@ enum class EffectNeed {
   load_meter,
   flexible_tool,
   sensor_modes,
-  start_time,  ///< of every test it touches: start_time_s
-  cut_time     ///< of every cut: cut_time_before_s
+  start_time,  ///< of every test that the effect acts in: start_time_s
+  cut_time,    ///< of every cut: cut_time_before_s
+  axis_motion  ///< position or velocity of a machine axis
 };
 
-/// Values that a workshop might meet: even in low..high beside about, on one side or on both.
+/// Uniform distribution of realistic values: low..high around `about`, on one side or on both.
 struct EffectDraw {
   double low = 0.0, high = 0.0;
   double about = 0.0;
   bool both_sides = false;
 };
 
-/// One key of an effect, as files write it (shop units).
+/// One key of an effect, as in files (shop units).
 struct EffectParameter {
   std::string key;
   std::string unit;  ///< "1" without one
   EffectValue value = EffectValue::number;
   Range range = {};
-  bool optional = false;                ///< absent is 0 (modes: none)
+  bool optional = false;                ///< absent means 0 (modes: none)
   std::vector<std::string> words = {};  ///< allowed words
-  std::vector<double> choices = {};     ///< allowed numbers, empty: the range
-  std::optional<double> sum = {};       ///< of a list, where it must be this
-  double period = 0.0;                  ///< of an angle: what turns by it is the same again; 0: none
+  std::vector<double> choices = {};     ///< allowed numbers; empty: the range
+  std::optional<double> sum = {};       ///< required sum of a list
+  double period = 0.0;                  ///< of an angle; 0: not periodic
   EffectDraw draw = {};
-  std::size_t words_drawn = 0;  ///< so many of the words, from the first; 0: all
+  std::size_t words_drawn = 0;  ///< only this many words, from the first, are drawn; 0: all
 
-  /// Whether files may say this number.
+  /// Whether files may contain this number.
   bool allows(double number) const;
-  /// What allows() asks for, e.g. "> 0"; "50 or 60".
+  /// The condition of allows(), for example "> 0" or "50 or 60".
   std::string rangeText() const;
-  /// number - other, of an angle the short way round.
+  /// number - other; of an angle the shorter way round.
   double difference(double number, double other) const;
-  /// Against which an error of a number is small: the number itself, of an angle one radian.
+  /// Scale of relative errors: the number itself; of an angle one radian.
   double scale(double number) const;
 
   EffectParameter drawn(double low, double high) const;
@@ -92,97 +96,99 @@ struct EffectParameter {
   EffectParameter drawnFromFirst(std::size_t count) const;
 };
 
-/// What is known of a campaign before anything is fitted.
+/// Properties of a campaign that are known before any fit.
 struct EffectScope {
   const MachineModel& nominal;
-  std::set<std::string> channels;  ///< measured and simulated
+  std::set<std::string> channels;   ///< measured and simulated
+  std::set<std::string> axes = {};  ///< x, y, z whose motion is recorded
   bool cuts = false;
-  bool start_times = false, cut_times = false;  ///< stated wherever they count
-  double largest_force = 0.0;                   ///< [N] of the records
-  double first_cut = 400.0;  ///< [s] > 0, least start time of a cut that does not start at 0
+  bool start_times = false, cut_times = false;         ///< stated wherever they matter
+  double largest_force = 0.0;                          ///< [N] of the records
+  double first_cut = 400.0;                            ///< [s] > 0, smallest positive start time of a cut
   double largest_chip = 100e-6, largest_depth = 2e-3;  ///< [m] of the cuts
 };
 
-/// One cause that a nominal model may lack. Everything that speaks of it reads this declaration: the strict
-/// reader and the writer of model files, the twin (whose class of this name acts), the search for missing
-/// effects, benches, docs/effects.md.
+/// Declaration of an effect: one physical cause that a nominal model may lack. It is made by the effect's own
+/// file (src/effects/NAME.cpp) and read by the reader and the writer of model files, the twin, the search for
+/// missing effects, benches and docs/effects.md.
 struct EffectKind {
   using Random = std::mt19937_64;
 
-  std::string name;
-  EffectStage stage;
-  std::string says;    ///< what it does, in one line
-  std::string source;  ///< where the law stands
-  std::vector<EffectParameter> parameters;
-  std::vector<EffectNeed> needs;
-  /// Ways in which it may be present where needs are met: coordinates of a fit, bounds, priors, starting
-  /// points. By formsOf().
-  std::function<std::vector<EffectForm>(const EffectScope&)> forms;
-  /// Draws what the keys' own draws do not: lists, modes, what depends on the machine.
+  std::string name = {};
+  EffectStage stage = EffectStage::geometry;
+  int rank = 0;                  ///< within the stage: lower acts first
+  std::string description = {};  ///< one line
+  std::string source = {};       ///< publication or cause of the law
+  std::vector<EffectParameter> parameters = {};
+  std::vector<EffectNeed> needs = {};
+  /// Forms in which the effect may be present where its needs are met: coordinates of a fit, bounds, priors,
+  /// starting points. Called through formsOf().
+  std::function<std::vector<EffectForm>(const EffectScope&)> forms = {};
+  /// Draws what the keys' own distributions do not cover: lists, modes, values that depend on the machine.
   std::function<void(const MachineModel&, Random&, EffectEntry&)> draw = {};
-  /// [BIC] that the effect must explain beyond what another one does: of two that no record tells apart the
-  /// commoner one is named.
-  double handicap = 0.0;
-  /// Of an effect built from what the catalogue leaves: files and reports call it `empirical` and tell it by
-  /// stage and form. Empty: it has a name.
+  /// [BIC] gain required in addition to that of a rival: of two effects that no record distinguishes the more
+  /// common one is named.
+  double bic_penalty = 0.0;
+  /// Of an empirical effect, which is built from the residual: files and reports call it `empirical` and
+  /// identify it by these two. Empty: the effect is part of the catalogue.
   std::string form_stage = {}, form = {};
+  /// Constructs the physics of an entry. Called through makeEffect().
+  std::function<std::unique_ptr<Effect>(const EffectEntry&)> make = {};
 
   bool empirical() const { return !form.empty(); }
   bool has(EffectNeed need) const;
 };
 
-/// Channels that a measuring chain may show, as columns of a record are named.
+/// Channels of a measuring chain, named as columns of a record.
 const std::vector<std::string>& measuredChannels();
 
-/// The catalogue: every effect that a model's `effects:` and a report may name, in the order in which they
-/// act.
+/// Every effect that a model's `effects:` and a report may name, in the order of action (stage, rank).
 const std::vector<EffectKind>& effectCatalogue();
 
-/// Causes without a name: forms in which an effect may be built from what the catalogue leaves. None of them
-/// stands in the catalogue; their own names ("empirical:" and the form) are used inside only.
+/// Empirical effects, which have no name of their own in files; in the program they are named "empirical:"
+/// and the form. In the order of action.
 const std::vector<EffectKind>& empiricalCatalogue();
 
-/// What files and reports call every one of them.
+/// Name of every empirical effect in files and reports.
 constexpr const char* EMPIRICAL = "empirical";
 
 /// nullptr when there is none of this stage and form.
 const EffectKind* findEmpirical(const std::string& stage, const std::string& form);
 
-/// nullptr when there is no such effect, with or without a name.
+/// Searches both catalogues; nullptr when there is no such effect.
 const EffectKind* findEffect(const std::string& name);
 
 /// nullptr when the effect has no such key.
 const EffectParameter* findParameter(const EffectKind& kind, const std::string& key);
 
-/// The key behind a name that numbersOf() gives: itself, a list's, that of the modes.
+/// The key that a name of numbersOf() belongs to.
 /// @throws Error when the effect has no such key.
 const EffectParameter& parameterOf(const EffectKind& kind, const std::string& name);
 
-/// Why a campaign cannot speak of an effect: nothing when it can; an empty text when nothing of the kind was
-/// measured.
+/// Why an effect cannot be tried in a campaign: nothing when it can; an empty text when the campaign measures
+/// nothing of the kind.
 std::optional<std::string> lackingFor(const EffectKind& kind, const EffectScope& scope);
 
-/// The forms of an effect with its name in them, whether its needs are met or not.
+/// The forms of an effect, labelled with its name, whether its needs are met or not.
 std::vector<EffectForm> formsOf(const EffectKind& kind, const EffectScope& scope);
 
-/// An entry of a model's effects: from values by key (shop units, as in the file).
+/// An entry of a model's effects, from values by key (shop units, as in the file).
 /// @throws Error on an unknown name or key, a missing key, a value out of range.
 EffectEntry effectEntry(const std::string& name, const std::map<std::string, double>& numbers,
                         const std::map<std::string, std::string>& words = {},
                         const std::map<std::string, std::vector<double>>& lists = {});
 
-/// An effect of the catalogue with values that a workshop might meet. @throws Error on an unknown name.
+/// An effect of the catalogue with realistic random values. @throws Error on an unknown name.
 EffectEntry drawEffect(const std::string& name, const MachineModel& machine, EffectKind::Random& random);
 
 /// Name of one item of a list: pitch_deg[0].
 std::string itemOf(const std::string& key, std::size_t item);
 
-/// Numbers of an entry with the names a report uses: offset_um; pitch_deg[0]; x[0].frequency_hz. Without
-/// tables.
+/// Numbers of an entry by their names in reports: offset_um; pitch_deg[0]; x[0].frequency_hz. Without tables.
 std::vector<std::pair<std::string, double>> numbersOf(const EffectEntry& entry);
 
-/// A document (Markdown) with the catalogue as a table for people between the lines that begin with
-/// "<!-- effects" and "<!-- end of effects". @throws Error on a document without these lines.
+/// A Markdown document with the table of the catalogue between the lines that begin with "<!-- effects" and
+/// "<!-- end of effects". @throws Error on a document without these lines.
 std::string withEffectTable(const std::string& document);
 
 }  // namespace smartmill

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "smartmill_core/campaign/campaign.h"
+#include "smartmill_core/model/effect.h"
+#include "smartmill_core/model/effect_catalogue.h"
+#include "smartmill_core/model/machine_model.h"
+
+namespace smartmill::sim {
+
+using Stage = EffectStage;
+
+/// Whether effects of a stage act in tests of this kind: a tap has no chip and no turning spindle, a move no
+/// chip.
+bool actsIn(Stage stage, TestKind kind);
+
+/// The effects of one model, in the order of action.
+class EffectSet {
+ public:
+  /// @throws Error on an unknown name or a missing key, naming the model's file.
+  explicit EffectSet(const MachineModel& model);
+
+  bool empty() const { return effects_.empty(); }
+  bool has(Stage stage) const;
+
+  void setUp(TwinSetup& setup) const;
+  void update(const Instant& now, TwinState& state) const;
+  void addForce(const Instant& now, Axes3& force) const;
+  /// Only the effects of one stage (sensor_output or signal).
+  void measure(Stage stage, const Instant& now, ChannelValues& channels) const;
+  /// The largest magnitude that each channel can indicate; infinity: unlimited.
+  ChannelValues limits() const;
+  std::vector<Tone*> tones();
+  std::vector<BurstTrain*> bursts();
+
+ private:
+  struct Member {
+    Stage stage;
+    std::unique_ptr<Effect> effect;
+  };
+  std::vector<Member> effects_;
+  std::array<bool, static_cast<std::size_t>(Stage::signal) + 1> has_{};
+};
+
+/// The machine before it starts, as its effects change it.
+/// @throws Error as EffectSet()
+TwinSetup setUpOf(MachineModel model, const EffectSet& effects);
+
+}  // namespace smartmill::sim

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "smartmill_core/campaign/record.h"
+#include "smartmill_core/model/machine_model.h"
+
+namespace smartmill::sim {
+
+/// Acceleration of the machine axes in a record, by a smoothed derivative of their velocity (columns
+/// axis_vx..) or, without it, of their position (axis_x..).
+class AxisMotion {
+ public:
+  static bool isRecorded(const Record& record);
+
+  /// @param smoothing [s] of smoothedDerivative()
+  AxisMotion(const Record& record, double sample_rate, double smoothing);
+
+  /// [m/s2] of x, y, z between sample i (share 0) and the next one (share 1), linear; 0 of axes without
+  /// columns.
+  Axes3 acceleration(std::size_t i, double share) const;
+
+ private:
+  std::array<std::vector<double>, 3> acceleration_;  // [m/s2] at the samples; empty: not recorded
+};
+
+}  // namespace smartmill::sim

@@ -1,0 +1,34 @@
+#include "model/effect_declaration.h"
+
+namespace smartmill::effects {
+namespace {
+
+/// The axial depth changes along the feed path from engagement.
+class DepthTilt : public Effect {
+ public:
+  static EffectKind declaration() {
+    EffectKind kind{"depth_tilt", EffectStage::motion, 20};
+    kind.description = "the axial depth changes along the feed path from engagement";
+    kind.source = "stock or table not level along the feed";
+    kind.parameters = {number("slope_um_per_mm", "um/mm").drawnOnBothSides(15.0, 60.0)};
+    kind.needs = {EffectNeed::cuts};
+    kind.forms =
+        always(EffectForm({amplitude("slope_um_per_mm", {-900.0, 900.0, 0.0125, 50.0})}).straight({5.0}));
+    return kind;
+  }
+
+  explicit DepthTilt(const EffectEntry& entry) : slope_(1e-3 * valueOf(entry, "slope_um_per_mm")) {}
+
+  void update(const Instant&, TwinState& state) const override { state.depth_slope += slope_; }
+
+ private:
+  double slope_;  // [m/m]
+};
+
+}  // namespace
+
+EffectKind depth_tilt() {
+  return declared<DepthTilt>();
+}
+
+}  // namespace smartmill::effects

@@ -1,0 +1,42 @@
+#include "model/effect_declaration.h"
+
+namespace smartmill::effects {
+namespace {
+
+/// A cold spindle has more friction: all of it times 1 + cold exp(-start_time / constant).
+class FrictionWarmup : public Effect {
+ public:
+  static EffectKind declaration() {
+    EffectKind kind{"friction_warmup", EffectStage::drive, 20};
+    kind.description =
+        "spindle friction (Stribeck's included) multiplied by 1 + cold x exp(-start_time / constant)";
+    kind.source = "Dunwoody 3.2.1: friction falls as the spindle warms up";
+    kind.parameters = {number("cold_ratio", "1").drawn(0.2, 0.8),
+                       number("time_constant_s", "s", Range::positive()).drawn(120.0, 500.0)};
+    kind.needs = {EffectNeed::load_meter, EffectNeed::start_time};
+    kind.forms =
+        always(EffectForm({amplitude("cold_ratio", {-0.9, 20.0, 0.000125, 0.5}),
+                           logarithm("time_constant_s", {std::log(2.0), std::log(20000.0), 2.5e-4, 1.0}, 1.0,
+                                     std::log(250.0))})
+                   .scaled(0.05, {80.0, 250.0, 700.0}));
+    return kind;
+  }
+
+  explicit FrictionWarmup(const EffectEntry& entry)
+      : cold_(valueOf(entry, "cold_ratio")), constant_(valueOf(entry, "time_constant_s")) {}
+
+  void update(const Instant& now, TwinState& state) const override {
+    state.friction_factor *= 1.0 + cold_ * std::exp(-now.start_time / constant_);
+  }
+
+ private:
+  double cold_, constant_;  // [1], [s]
+};
+
+}  // namespace
+
+EffectKind friction_warmup() {
+  return declared<FrictionWarmup>();
+}
+
+}  // namespace smartmill::effects

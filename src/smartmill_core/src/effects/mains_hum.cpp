@@ -1,0 +1,57 @@
+#include "model/effect_declaration.h"
+
+namespace smartmill::effects {
+namespace {
+
+/// Mains hum, in phase on fx and fy; its phase differs from record to record.
+class MainsHum : public Effect {
+ public:
+  static EffectKind declaration() {
+    EffectKind kind{"mains_hum", EffectStage::signal, 30};
+    kind.description = "sine on fx, y_ratio of it in phase on fy; the phase is estimated from each record";
+    kind.source = "coupling of the mains into the charge lines";
+    kind.parameters = {oneOfNumbers("frequency_hz", "Hz", {50.0, 60.0}),
+                       number("amplitude_n", "N").drawn(2.0, 12.0),
+                       number("y_ratio", "1").drawnOnBothSides(0.3, 1.2)};
+    kind.needs = {EffectNeed::plane_forces};
+    kind.forms = [](const Scope&) {
+      Forms forms;
+      for (const double frequency : {50.0, 60.0}) {
+        // The phase is undefined at zero amplitude: the points lie away from it.
+        forms.push_back(EffectForm({amplitude("amplitude_n", {0.0, 1e4, 0.0005, 10.0}),
+                                    amplitude("y_ratio", {-20.0, 20.0, 0.000125, 1.0}, 0.5)})
+                            .probe({0.0, 0.6}, {{2.0, 0.6}})
+                            .probe({0.0, -0.6}, {{2.0, -0.6}})
+                            .number("frequency_hz", frequency)
+                            .foundInEachRecord(1)
+                            .named(frequency == 50.0 ? "50 Hz" : "60 Hz"));
+      }
+      return forms;
+    };
+    return kind;
+  }
+
+  explicit MainsHum(const EffectEntry& entry) {
+    tone_.frequency = valueOf(entry, "frequency_hz");
+    tone_.amplitude[FX] = valueOf(entry, "amplitude_n");
+    tone_.amplitude[FY] = valueOf(entry, "y_ratio") * tone_.amplitude[FX];
+  }
+
+  void measure(const Instant& now, ChannelValues& c) const override {
+    const double wave = std::sin(units::TWO_PI * tone_.frequency * now.record_time + tone_.phase);
+    c[FX] += tone_.amplitude[FX] * wave;
+    c[FY] += tone_.amplitude[FY] * wave;
+  }
+  Tone* tone() override { return &tone_; }
+
+ private:
+  Tone tone_;
+};
+
+}  // namespace
+
+EffectKind mains_hum() {
+  return declared<MainsHum>();
+}
+
+}  // namespace smartmill::effects

@@ -1,0 +1,42 @@
+#include "model/effect_declaration.h"
+#include "smartmill_core/cutting/chip_rule.h"
+
+namespace smartmill::effects {
+namespace {
+
+/// Offset between the axes of cutter and spindle: tooth j cuts at R + offset cos(angle - position of tooth
+/// j). The surface that it meets follows from the geometry.
+class Runout : public Effect {
+ public:
+  static EffectKind declaration() {
+    EffectKind kind{"runout", EffectStage::geometry, 20};
+    kind.description = "tooth j cuts at radius R + offset cos(angle - position of tooth j)";
+    kind.source = "Kline & DeVor 1983; Dunwoody 6.1";
+    kind.parameters = {number("offset_um", "um", Range::notNegative()).drawn(5.0, 25.0), angle("angle_deg")};
+    kind.needs = {EffectNeed::cuts};
+    kind.forms =
+        always(EffectForm({planar("offset_um", "angle_deg", 200.0, 5e-4, 20.0)}).straight({1.0, 15.0}));
+    return kind;
+  }
+
+  explicit Runout(const EffectEntry& entry)
+      : offset_(valueOf(entry, "offset_um") * units::UM),
+        angle_(units::radFromDeg(valueOf(entry, "angle_deg"))) {}
+
+  void setUp(TwinSetup& setup) const override {
+    if (!setup.model.tool) return;
+    const std::vector<double> radii = runoutRadii(*setup.model.tool, offset_, angle_);
+    for (std::size_t j = 0; j < radii.size(); ++j) setup.radius_offset[j] += radii[j];
+  }
+
+ private:
+  double offset_, angle_;  // [m], [rad]
+};
+
+}  // namespace
+
+EffectKind runout() {
+  return declared<Runout>();
+}
+
+}  // namespace smartmill::effects
