@@ -80,7 +80,7 @@ Found average(const std::vector<TapRecord>& taps, const FitOptions& options, Wor
   const TapFrf averaged = averageTaps(taps, how);
   Found found{averaged.receptance, averaged.hits, {}, {}};
   if (found.frf.averages == 0)
-    throw Error("no accepted hit; " + found.hits.back().file + ": " + found.hits.back().reason);
+    throw Error("no hit was accepted; " + found.hits.back().file + ": " + found.hits.back().reason);
   fit(options, averaged.truncated_length, work, found);
   return found;
 }

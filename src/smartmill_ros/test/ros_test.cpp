@@ -115,7 +115,7 @@ TEST(Conversions, aChartComesBackUnchanged) {
   ASSERT_EQ(back.recommended.size(), 1u);
   EXPECT_EQ(back.recommended[0].material_removal_rate, 1e-6);
   message.power_depth_limit.pop_back();
-  EXPECT_NE(errorOf([&] { fromMsg(message); }).find("power_depth_limit: 1 values where 2"),
+  EXPECT_NE(errorOf([&] { fromMsg(message); }).find("power_depth_limit: 1 values, expected 2"),
             std::string::npos);
 }
 

@@ -96,20 +96,20 @@ TEST_F(ParameterFiles, EveryFaultIsOneLineWithKeyAndValue) {
   EXPECT_THAT(errorOf("bandwith: 1.0\n"), HasSubstr("bandwith is unknown"));
   EXPECT_THAT(errorOf("memory: 0.1\n"), HasSubstr("memory is unknown"));
   EXPECT_THAT(errorOf("share: 0.1\n"), HasSubstr("share is unknown"));
-  EXPECT_THAT(errorOf("bandwidth: 1e3\n"), HasSubstr("bandwidth: '1e3' is a string, a number is due"));
+  EXPECT_THAT(errorOf("bandwidth: 1e3\n"), HasSubstr("bandwidth: '1e3' is a string, expected a number"));
   EXPECT_THAT(errorOf("bandwidth: .nan\n"), HasSubstr("bandwidth: not a finite number"));
   EXPECT_THAT(errorOf("bandwidth: -1.0\n"), HasSubstr("bandwidth: -1 is out of range (> 0 Hz)"));
-  EXPECT_THAT(errorOf("hits: 2.5\n"), HasSubstr("hits: '2.500000' is a number, an integer is due"));
+  EXPECT_THAT(errorOf("hits: 2.5\n"), HasSubstr("hits: '2.500000' is a number, expected an integer"));
   EXPECT_THAT(errorOf("hits: 0\n"), HasSubstr("hits: 0 is out of range (1 <= value <= 100)"));
   EXPECT_THAT(errorOf("seed: -1\n"), HasSubstr("seed: -1 is out of range (>= 0)"));
-  EXPECT_THAT(errorOf("follow: 1\n"), HasSubstr("follow: '1' is an integer, true or false is due"));
-  EXPECT_THAT(errorOf("method: 5\n"), HasSubstr("method: '5' is an integer, a string is due"));
+  EXPECT_THAT(errorOf("follow: 1\n"), HasSubstr("follow: '1' is an integer, expected true or false"));
+  EXPECT_THAT(errorOf("method: 5\n"), HasSubstr("method: '5' is an integer, expected a string"));
   EXPECT_THAT(errorOf("method: fast\n"), HasSubstr("method: 'fast' is not one of auto | exact"));
   EXPECT_THAT(errorOf("speeds: 5.0\n"),
-              HasSubstr("speeds: '5.000000' is a number, a list of numbers is due"));
+              HasSubstr("speeds: '5.000000' is a number, expected a list of numbers"));
   EXPECT_THAT(errorOf("speeds: [1.0, a]\n"), HasSubstr("speeds[1]: 'a' is a string"));
   EXPECT_THAT(errorOf("speeds: [1.0, -1.0]\n"), HasSubstr("speeds: -1 is out of range (> 0 rad/s)"));
-  EXPECT_THAT(errorOf("per_metre: [1.0, 2.0]\n"), HasSubstr("per_metre: 2 numbers, three are due"));
+  EXPECT_THAT(errorOf("per_metre: [1.0, 2.0]\n"), HasSubstr("per_metre: 2 numbers, expected three"));
   EXPECT_THAT(errorOf("part_share: 1.0\n"), HasSubstr("part_share: 1 is out of range (0 <= value < 1)"));
   EXPECT_THAT(errorOf("part_share: 0.9\nhits: 100\n"), HasSubstr("part_share: too many of hits"));
 }
