@@ -54,7 +54,7 @@ py::tuple compensateArrays(const std::vector<Array>& measured, const py::list& s
     }
     return result;
   });
-  return tupleOf(std::move(forces), [](const auto& force) { return arrayOf(force); });
+  return tupleOf(forces, [](const auto& force) { return arrayOf(force); });
 }
 
 py::tuple compensateCampaign(const std::string& path, const std::optional<MachineModel>& given, bool identify,
@@ -97,8 +97,8 @@ py::tuple compensateCampaign(const std::string& path, const std::optional<Machin
   py::dict sensor;
   for (std::size_t axis = 0; axis < 3; ++axis)
     sensor[std::string(1, static_cast<char>('x' + axis)).c_str()] = toPython(found.sensor[axis].modes);
-  return py::make_tuple(sensor, tupleOf(std::move(found.cuts),
-                                        [](const auto& cut) { return toPython(cut.first, cut.second); }));
+  return py::make_tuple(sensor,
+                        tupleOf(found.cuts, [](const auto& cut) { return toPython(cut.first, cut.second); }));
 }
 
 }  // namespace

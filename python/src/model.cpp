@@ -84,7 +84,7 @@ py::tuple readCampaignRecords(const std::string& path) {
     }
     return read;
   });
-  return tupleOf(std::move(records), [](const auto& r) { return toPython(r.first, r.second); });
+  return tupleOf(records, [](const auto& r) { return toPython(r.first, r.second); });
 }
 
 }  // namespace

@@ -33,7 +33,7 @@ py::tuple simulateCampaign(const std::optional<MachineModel>& given, const std::
     work.progress(1.0, "");
     return simulated;
   });
-  return tupleOf(std::move(records), [](const auto& r) { return toPython(r.first, r.second); });
+  return tupleOf(records, [](const auto& r) { return toPython(r.first, r.second); });
 }
 
 py::object simulateCut(const MachineModel& model, const py::object& cut, double duration, double rate,

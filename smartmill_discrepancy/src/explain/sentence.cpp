@@ -130,9 +130,9 @@ std::string ofTime(const FoundEffect& effect) {
 std::string ofProfile(const FoundEffect& effect) {
   const double extra = valueOf(effect, "factor") - 1.0;
   const bool surface = effect.words.at("from") == "surface";
-  return formatted("the %s %.3g mm of the cut %s %.0f %% %s cutting force: check for %s",
-                   surface ? "uppermost" : "lowest", valueOf(effect, "height_mm"), surface ? "need" : "need",
-                   100.0 * std::abs(extra), moreOrLess(extra),
+  return formatted("the %s %.3g mm of the cut need %.0f %% %s cutting force: check for %s",
+                   surface ? "uppermost" : "lowest", valueOf(effect, "height_mm"), 100.0 * std::abs(extra),
+                   moreOrLess(extra),
                    surface ? "a hard skin of the stock" : "a worn corner or one of another shape");
 }
 

@@ -14,6 +14,13 @@
 namespace smartmill::recording {
 namespace {
 
+// The structure of H5Oget_info2() and H5Ovisit2() has a name of its own since HDF5 1.12.
+#if H5_VERSION_GE(1, 12, 0)
+using ObjectInfo = H5O_info1_t;
+#else
+using ObjectInfo = H5O_info_t;
+#endif
+
 constexpr hsize_t LONGEST_WORD = 1000;  // [byte] of an attribute
 
 /// An identifier of libhdf5 with the call that gives it back.
@@ -60,7 +67,7 @@ std::string readWord(hid_t attribute, hid_t type) {
 
 /// Attributes of an object as PATH/NAME.
 void readAttributes(hid_t object, const std::string& path, ChannelFile* file) {
-  H5O_info_t info;
+  ObjectInfo info;
   if (H5Oget_info2(object, &info, H5O_INFO_NUM_ATTRS) < 0) return;
   for (hsize_t i = 0; i < info.num_attrs; ++i) {
     const Handle attribute(
@@ -129,7 +136,7 @@ struct Visit {
 };
 
 // Called by libhdf5, which no exception may pass.
-herr_t visit(hid_t root, const char* name, const H5O_info_t* info, void* data) {
+herr_t visit(hid_t root, const char* name, const ObjectInfo* info, void* data) {
   auto& to = *static_cast<Visit*>(data);
   try {
     const std::string path = std::string(name) == "." ? "" : name;
