@@ -58,8 +58,8 @@ def packages_launched(launch):
     yield from re.findall(r"\$\(find ([\w-]+)\)", launch)
 
 
-def asked(package, ours):
-    """(file, package asked for, kinds of dependency that do)"""
+def required(package, ours):
+    """(file, required package, kinds of dependency that satisfy it)"""
     for path in package.files:
         if "consumer" in path.parts:
             continue  # a project of its own, which uses the installed libraries
@@ -84,7 +84,7 @@ def main():
     ours = {p.name for p in everything}
     faults = set()
     for package in everything:
-        for path, name, kinds in asked(package, ours):
+        for path, name, kinds in required(package, ours):
             if name is None or name == package.name:
                 continue
             if not SAME.get(name, {name}) & package.declares(*kinds):

@@ -41,6 +41,7 @@ BANNED = {
 # Occurrences in their plain sense: part of a line.
 ALLOWED = (
     "who knows C++", "let me know", "ask the operator", "asks the operator", "asked the operator", "--ask", "AskPass",
+    "tests, asked, report",  # columns of a database
 )
 # Folders and files whose older text is still to be rewritten: counted, not refused.
 PENDING = (

@@ -1,4 +1,4 @@
-"""What the checks of the house read: the packages of this repository, their sources and what these ask for."""
+"""Shared by the checks: the packages of this repository, their sources, includes and declared dependencies."""
 import pathlib
 import re
 import subprocess
@@ -10,7 +10,7 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.MULTILINE)
 
 
 def tracked():
-    """Paths of all files of the repository that git knows or would take, relative to its root."""
+    """Paths of all files that git tracks or would add, relative to the root of the repository."""
     names = subprocess.run(["git", "-C", ROOT, "ls-files", "--cached", "--others", "--exclude-standard"],
                            check=True, capture_output=True, text=True).stdout.split("\n")
     return [pathlib.Path(n) for n in names if n and (ROOT / n).is_file()]

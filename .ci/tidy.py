@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Holds sources to .clang-tidy. What was good before and has not changed (nor a header of the project that it reads, nor
-the checks) is not read again: CACHE remembers it. Needs a built tree, which knows what each source reads.
+"""Runs clang-tidy with the checks of .clang-tidy. A source that passed is skipped until it, a header of the project that it includes, or
+the checks change (CACHE). Needs a built tree, whose dependency files list the includes of each source.
 
-usage: tidy.py [--minutes N] [FOLDER...]   all sources under these folders; none: those of the libraries and programs that
-know no ROS. Shells cost 10 s each for ROS's headers and hold little thought; tests and studies would double the time.
+usage: tidy.py [--minutes N] [FOLDER...]   all sources under these folders; none: those of the libraries and programs
+without ROS. Node sources are left out, since the ROS headers cost 10 s each; tests and studies would double the time.
 """
 import argparse
 import collections
@@ -20,7 +20,7 @@ import time
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build"
 CACHE = pathlib.Path(os.environ.get("XDG_CACHE_HOME", pathlib.Path.home() / ".cache")) / "smartmill_tidy"
-# Headers that gcc has compiled before mean nothing to clang, and a source has to stand without them.
+# clang cannot read headers precompiled by gcc; a source must compile without them.
 PRECOMPILED = re.compile(r" -Winvalid-pch| -include \S*cmake_pch\.hxx")
 ROS = pathlib.Path("/usr/include/ros")
 OUT_OF_TIME = 124  # exit code, as that of timeout
@@ -28,7 +28,7 @@ VERSION = subprocess.run(["clang-tidy", "--version"], capture_output=True, check
 
 
 def dependencies():
-    """What ninja knows: the files of the project that each source was compiled from, and which sources read ROS."""
+    """From ninja: the files of the project that each source includes, and the sources that include ROS."""
     reads, shells = collections.defaultdict(set), set()
     for block in subprocess.run(["ninja", "-C", BUILD, "-t", "deps"], capture_output=True, text=True,
                                 check=True).stdout.split("\n\n"):
@@ -42,7 +42,7 @@ def dependencies():
     return reads, shells
 
 
-def looked_at(source, folders, shells):
+def is_selected(source, folders, shells):
     if folders:
         return any(f == source or f in source.parents for f in folders)
     parts = source.relative_to(ROOT).parts
@@ -68,7 +68,7 @@ def fingerprint(source, command, files):
 
 
 def check(folder, source, good):
-    """What clang-tidy says of a source; empty: it is good."""
+    """Output of clang-tidy for a source; empty: no findings."""
     run = subprocess.run(["clang-tidy", "-p", folder, "--quiet", source], capture_output=True, text=True, check=False)
     if run.returncode == 0:
         good.touch()
@@ -76,16 +76,16 @@ def check(folder, source, good):
     return run.stdout.strip() or run.stderr.strip()
 
 
-def findings(said):
-    """Each finding with the lines that explain it; one of a header is told by every source that reads it."""
-    return re.split(r"\n(?=/\S+:\d+:\d+: (?:error|warning): )", said)
+def findings(output):
+    """Each finding with its explaining lines; a finding in a header occurs once for every source that includes it."""
+    return re.split(r"\n(?=/\S+:\d+:\d+: (?:error|warning): )", output)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folders", nargs="*")
     parser.add_argument("--minutes", type=float, default=float("inf"),
-                        help="no source is begun after them; what was not reached is told, exit code 124")
+                        help="no source is started after this time; unchecked sources are counted, exit code 124")
     arguments = parser.parse_args()
     end = time.monotonic() + 60.0 * arguments.minutes
     folders = [(ROOT / f).resolve() for f in arguments.folders]
@@ -97,7 +97,7 @@ def main():
     entries = commands()
     (database / "compile_commands.json").write_text(json.dumps(list(entries.values())))
     for source, entry in sorted(entries.items()):
-        if not looked_at(source, folders, shells):
+        if not is_selected(source, folders, shells):
             continue
         count += 1
         if source not in reads:
@@ -105,17 +105,17 @@ def main():
         good = CACHE / fingerprint(source, entry["command"], reads[source])
         if not good.exists():
             todo.append((source, good))
-    told, bad, late = set(), 0, 0
+    printed, bad, late = set(), 0, 0
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        for said in pool.map(lambda job: check(database, *job) if time.monotonic() < end else None, todo):
-            late += said is None
-            bad += bool(said)
-            for finding in findings(said or ""):
-                if finding not in told:
+        for output in pool.map(lambda job: check(database, *job) if time.monotonic() < end else None, todo):
+            late += output is None
+            bad += bool(output)
+            for finding in findings(output or ""):
+                if finding not in printed:
                     print(finding, flush=True)
-                    told.add(finding)
-    print(f"clang-tidy: {f'{bad} sources are not good' if bad else 'good'}; {count} sources, {count - len(todo)} "
-          f"unchanged since they were good, {late} not reached in time")
+                    printed.add(finding)
+    print(f"clang-tidy: {f'findings in {bad} sources' if bad else 'good'}; {count} sources, {count - len(todo)} "
+          f"unchanged since they passed, {late} not checked in time")
     return 1 if bad else OUT_OF_TIME if late else 0
 
 

@@ -74,7 +74,7 @@ def compensate(fx: Union[Path, npt.ArrayLike], fy: Optional[npt.ArrayLike] = Non
     rate: sample rate [Hz]. sensor: modes by axis "x", "y", "z" (gain [1]; an axis left out is ideal).
     speed_rpm: of the spindle [rpm].
     Of a campaign: model with the sensor (None: the campaign's own), or identify=True: by its own taps.
-    method: kalman (causal), delay, smoother (knows the whole record), fixed-lag or inverse.
+    method: kalman (causal), delay, smoother (uses the whole record), fixed-lag or inverse.
     bandwidth [Hz] of the force. noise_rms [N] of one sample. lag [s] of fixed-lag.
     Raises Error naming file and cause.
     """

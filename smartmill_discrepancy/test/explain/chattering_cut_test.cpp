@@ -132,8 +132,8 @@ TEST(ChatteringCut, IsExcludedIfItCannotBeGuided) {
   }
 }
 
-// Records of another program: two cuts far from the stability limit and one so near that its vibration is due
-// to rounding errors. Runout as in truth.yaml.
+// Records of another program: two cuts far from the stability limit and one so near that rounding errors
+// excite its vibration. Runout as in truth.yaml.
 struct NearLimit {
   double offset =
       0.0;  // [standard deviations] distance of cutting law and tool from the truth, by their covariance

@@ -88,7 +88,7 @@ TEST(SensorApproach, NeverPermitsContact) {
     }
   }
   EXPECT_GT(least, 0.0);
-  std::cout << "least room left " << 1e6 * least << " um\n";
+  std::cout << "least clearance " << 1e6 * least << " um\n";
 }
 
 // A case of contact without the curve's error: 24 mm, four teeth, 43 degrees, a sensor with a tenth more gain

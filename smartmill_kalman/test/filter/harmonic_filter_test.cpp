@@ -133,8 +133,8 @@ TEST(HarmonicFilter, rangeAndWaveformAtTheSensorsResonance) {
 }
 
 // Dunwoody section 5.3: six speeds, tooth passing from 50 to 1200 Hz around the sensor's modes. The force
-// does not know the speed: its 10th to 90th percentile range must stay within 5 %, and the waveform within 10
-// % of the truth.
+// is independent of the speed: its 10th to 90th percentile range must stay within 5 %, and the waveform
+// within 10 % of the truth.
 class SixSpeeds : public testing::TestWithParam<double> {};
 
 TEST_P(SixSpeeds, rangeStaysAndWaveformIsRight) {

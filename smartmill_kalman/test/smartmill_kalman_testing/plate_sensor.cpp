@@ -70,7 +70,8 @@ std::vector<std::vector<double>> PlateSensor::measure(const std::array<std::vect
                                                       const std::array<double, 3>& point, double sample_rate,
                                                       std::size_t channels, std::mt19937& random) const {
   const Plate plate(*this);
-  const std::size_t samples = force[0].size(), length = 2 * samples;  // room for what rings on
+  const std::size_t samples = force[0].size(),
+                    length = 2 * samples;  // zero padding for the decaying response
   const std::vector<double> line = fourierFrequencies(length, sample_rate);
   std::array<std::vector<Complex>, 3> applied;
   for (std::size_t i = 0; i < 3; ++i) {

@@ -79,7 +79,7 @@ function(smartmill_precompiled_headers target kind)
 endfunction()
 
 # smartmill_library(NAME SOURCES a.cpp ... LIBRARIES x ...): a library, installed with its headers. Of LIBRARIES, those of the
-# project and Eigen are passed on to whoever links it; the public headers include no other.
+# project and Eigen are passed on to the targets that link it; the public headers include no other.
 function(smartmill_library name)
   cmake_parse_arguments(arg "" "" "SOURCES;LIBRARIES" ${ARGN})
   add_library(${name} ${arg_SOURCES})
@@ -194,7 +194,7 @@ function(smartmill_gtest name)
   add_dependencies(${PROJECT_NAME}_gtests ${PROJECT_NAME}_${name})
 endfunction()
 
-# smartmill_run_alone(NAME): a gtest of this package beside which no other runs, as it has a real-time thread.
+# smartmill_run_alone(NAME): a gtest of this package that runs while no other does, as it has a real-time thread.
 function(smartmill_run_alone name)
   if(TARGET ${PROJECT_NAME}_${name})
     set_tests_properties(_ctest_${PROJECT_NAME}_gtest_${PROJECT_NAME}_${name} PROPERTIES RUN_SERIAL TRUE)

@@ -60,13 +60,13 @@ void split(std::string_view line, char separator, std::vector<std::string_view>*
   }
 }
 
-// A decimal comma becomes a point in `room`.
-std::string_view withPoint(std::string_view cell, const Style& style, std::string* room) {
+// Replaces a decimal comma by a point, in `buffer`.
+std::string_view withPoint(std::string_view cell, const Style& style, std::string* buffer) {
   if (!style.decimal_comma || cell.find(',') == std::string_view::npos) return cell;
   if (cell.find('.') != std::string_view::npos) return cell;  // 1.234,5 is not a number
-  room->assign(cell);
-  std::replace(room->begin(), room->end(), ',', '.');
-  return *room;
+  buffer->assign(cell);
+  std::replace(buffer->begin(), buffer->end(), ',', '.');
+  return *buffer;
 }
 
 bool isNumber(std::string_view cell) {
@@ -86,9 +86,9 @@ std::size_t numbersIn(const std::string& line, const Style& style) {
   std::vector<std::string_view> cells;
   split(line, style.separator, &cells);
   dropEmptyLast(&cells);
-  std::string room;
+  std::string buffer;
   for (const std::string_view cell : cells) {
-    if (!isNumber(withPoint(cell, style, &room))) return 0;
+    if (!isNumber(withPoint(cell, style, &buffer))) return 0;
   }
   return cells.size();
 }
@@ -214,7 +214,7 @@ ChannelFile readTextTable(const std::string& file) {
   CsvReader reader(file, '\t');
   std::string_view line;
   std::vector<std::string_view> cells;
-  std::string room;
+  std::string buffer;
   while (reader.nextLine(&line)) {
     if (reader.line() < head[layout.first].number) continue;
     if (line.empty()) {
@@ -227,7 +227,7 @@ ChannelFile readTextTable(const std::string& file) {
       reader.fail(std::to_string(cells.size()) + " values, " + std::to_string(layout.columns) + " expected");
     for (std::size_t c = 0; c < cells.size(); ++c)
       result.channels[c].values.push_back(
-          reader.number(withPoint(cells[c], layout.style, &room), result.channels[c].name));
+          reader.number(withPoint(cells[c], layout.style, &buffer), result.channels[c].name));
   }
   return result;
 }

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Tells how the house stands: files and lines of each package, its longest functions, runs of lines that stand twice.
+"""Metrics of the sources: files and lines of each package, the longest functions, runs of lines that occur twice.
 
-usage: house.py [FOLDER] [--long N] [--run N]
+usage: metrics.py [FOLDER] [--long N] [--run N]
 """
 import argparse
 import collections
@@ -62,7 +62,7 @@ def functions(text):
 
 
 def repeated(files, run):
-    """Runs of `run` lines of code that stand in two places, overlapping runs of one pair of files told once."""
+    """Runs of `run` lines of code that occur in two places; overlapping runs of one pair of files are listed once."""
     places = collections.defaultdict(list)
     for path, text in files:
         lines = [re.sub(r"\s+", " ", l).strip() for l in without_text(text).split("\n")]
@@ -80,7 +80,7 @@ def repeated(files, run):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", nargs="?", default=".")
-    parser.add_argument("--long", type=int, default=60, help="lines above which a function is told of")
+    parser.add_argument("--long", type=int, default=60, help="functions with more lines than this are listed")
     parser.add_argument("--run", type=int, default=6, help="lines of a repeated run")
     arguments = parser.parse_args()
     root = pathlib.Path(arguments.folder).resolve()

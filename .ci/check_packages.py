@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Who may know whom: no ROS under the core, the FOCAS wire, the recordings and in the libraries of the node packages; no node package
-knows another's headers. Exceptions stand here and nowhere else."""
+"""Dependency rules: the core, the FOCAS wire, the recordings and the libraries of the node packages include no ROS header; no node
+package includes headers of another. All exceptions are listed in this file."""
 import pathlib
 import re
 import sys
@@ -11,7 +11,7 @@ ROS = re.compile(r"(ros|rosbag|roslib|actionlib|tf2|tf2_\w+|diagnostic_updater|t
 ROS_FREE = {"smartmill_core", "smartmill_focas", "smartmill_recording"}
 SHELLS = {"smartmill_ros", "smartmill_msgs"}  # ROS everywhere
 COMMON = {"smartmill_core", "smartmill_focas", "smartmill_recording", "smartmill_ros", "smartmill_msgs"}
-KNOWS = {
+MAY_INCLUDE = {
     "smartmill_core": set(),
     "smartmill_focas": set(),
     "smartmill_recording": {"smartmill_core"},
@@ -21,9 +21,9 @@ KNOWS = {
     "smartmill_cli": None,  # the commands of every library
     "smartmill_python": None,  # every library
 }
-ROS_ROOMS = {"node", "apps", "test"}
-ROS_SOURCES = ("launch/src/session/",)  # of programs, in no library
-# Of the room node, but read by offline tools too.
+ROS_FOLDERS = {"node", "apps", "test"}
+ROS_SOURCES = ("launch/src/session/",)  # sources of programs only
+# In the folder node, but included by offline tools too.
 ROS_FREE_FILES = {"parameters.h", "monitor_parameters.h", "rotation.h", "wiring.h"}
 
 
@@ -35,7 +35,7 @@ def may_use_ros(package, path):
     parts = path.relative_to(package.folder).parts
     if parts[:2] == ("src", "node") and path.name in ROS_FREE_FILES:
         return False
-    return parts[0] != "include" and bool(ROS_ROOMS.intersection(parts[:-1]))
+    return parts[0] != "include" and bool(ROS_FOLDERS.intersection(parts[:-1]))
 
 
 EFFECTS = pathlib.Path("src/smartmill_core/src/effects")
@@ -56,16 +56,16 @@ def main():
     everything = packages()
     names = {p.name for p in everything}
     for package in everything:
-        knows = KNOWS.get(package.name, COMMON)
+        allowed = MAY_INCLUDE.get(package.name, COMMON)
         for path in package.code():
             for header in includes(path):
                 owner = header.split("/")[0]
                 if ROS.match(header) and not may_use_ros(package, path):
-                    faults.append(f"{path}: {header}: ROS has no place here")
-                if owner in names and owner != package.name and knows is not None and owner not in knows:
-                    faults.append(f"{path}: {header}: {package.name} does not know {owner}")
+                    faults.append(f"{path}: {header}: ROS headers are not allowed here")
+                if owner in names and owner != package.name and allowed is not None and owner not in allowed:
+                    faults.append(f"{path}: {header}: {package.name} must not depend on {owner}")
     faults += faults_of_effects(path for p in everything for path in p.code() if path.parent == EFFECTS)
-    return report("rooms", faults)
+    return report("dependency rules", faults)
 
 
 sys.exit(main())
