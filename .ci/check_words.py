@@ -47,7 +47,6 @@ ALLOWED = (
 PENDING = (
     "smartmill_sim/", "smartmill_stability/", "smartmill_cnc/", "smartmill_panel/", "smartmill_msgs/", "smartmill_studies/", "launch/",
     "src/smartmill_core/", "src/smartmill_focas/", "src/smartmill_ros/", "docs/discrepancy_figures.md", "docs/results.md",
-    "CHANGELOG.md",
 )
 EXTENSIONS = (".md", ".cpp", ".h", ".py", ".yaml", ".yml", ".launch", ".msg", ".srv", ".action", ".js", ".html", ".css", ".cmake",
               ".txt", ".toml", "")
