@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Holds the documents against the tree: every program, launch file, test and linked file that they name exists."""
+"""Checks that every program, launch file, test and linked file named in the documents exists."""
 import pathlib
 import re
 import subprocess
@@ -39,7 +39,7 @@ def tests(folders):
     return names
 
 
-def stands(path, folders):
+def exists(path, folders):
     """Whether a file of the tree, or a public header, has this path."""
     roots = [ROOT, *folders.values(), *(f / "include" for f in folders.values())]
     return any((root / path).exists() for root in roots)
@@ -48,7 +48,7 @@ def stands(path, folders):
 def faults(document, folders, known_tests):
     text = document.read_text()
     for path in set(re.findall(r"`((?:src/)?(?:smartmill_|launch/)[\w/.]+\.(?:h|cpp|yaml|launch))`", text)):
-        if "/" in path and not stands(path, folders):
+        if "/" in path and not exists(path, folders):
             yield f"{path}: there is no such file"
     for package, program in re.findall(r"rosrun (smartmill_\w+) (\w+)", text):
         if package not in folders or program not in programs(folders[package]):
@@ -66,8 +66,8 @@ def faults(document, folders, known_tests):
         yield f"{number}: a reader cannot open it"
 
 
-# What is numbered in the five documents: equations by chapter (0: without chapters), figures, tables, and from which
-# chapter on the figures carry it. Burzoni's list of figures is counted, not his captions.
+# Numbers of the last equation, figure and table of each chapter of the five documents (0: numbered without chapters).
+# Burzoni: numbers of his list of figures, not of his captions.
 NUMBERED = {
     "Dunwoody": {"equations": {2: 4, 3: 23, 4: 44, 5: 68, 6: 14, 7: 1},
                  "figures": {2: 1, 3: 5, 4: 8, 5: 9, 6: 3}, "tables": {}},
@@ -88,8 +88,8 @@ def spread(text):
     return found
 
 
-def told(section):
-    """What the first column of a document's table names, kind by kind."""
+def listed(section):
+    """Numbers in the first column of a document's table, by kind."""
     found = {"equations": set(), "figures": set(), "tables": set()}
     for cell in re.findall(r"^\| ([^|]*) \|", section, re.M):
         kind = "equations"
@@ -102,14 +102,14 @@ def told(section):
 
 
 def seed_faults(folders):
-    """docs/seeds.md names every number of the documents, and nothing that is not there."""
+    """docs/seeds.md lists every number of the documents, and only files and figures that exist."""
     text = (ROOT / "docs/seeds.md").read_text()
     for section in re.split(r"\n## ", text)[1:]:
         name = re.match(r"\w+", section).group(0)
-        found = told(section)
+        found = listed(section)
         for kind, chapters in NUMBERED[name].items():
-            due = {(chapter, n) for chapter, last in chapters.items() for n in range(1, last + 1)}
-            for chapter, n in sorted(due - found[kind]):
+            expected = {(chapter, n) for chapter, last in chapters.items() for n in range(1, last + 1)}
+            for chapter, n in sorted(expected - found[kind]):
                 yield f"{name}: {kind[:-1]} {f'{chapter}.{n}' if chapter else n} is missing"
     gallery = "".join(p.read_text() for p in sorted((ROOT / "smartmill_studies/gallery").glob("*.cpp")))
     figures = set(re.findall(r'"((?:dunwoody|kim|burzoni|bachrathy|cheng)_\w+)"', gallery))
