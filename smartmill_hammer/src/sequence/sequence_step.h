@@ -50,7 +50,7 @@ class SequenceStep {
   virtual StepOutcome voltageMeasured(double /*now*/, const MeanVoltage& /*voltage*/) {
     return StepOutcome::running();
   }
-  virtual StepOutcome hitRecorded(double /*now*/, RecordedHit /*hit*/) { return StepOutcome::running(); }
+  virtual StepOutcome hitRecorded(double /*now*/, RecordedHit&& /*hit*/) { return StepOutcome::running(); }
 
  protected:
   StepOutcome measureVoltageAfter(double now, double delay) {

@@ -23,11 +23,11 @@ class FrameTree {
   using Quaternion = std::array<double, 4>;
   struct Link {
     std::string parent;
-    Quaternion rotation;  // v_parent = q v q*
+    Quaternion rotation{};  // v_parent = q v q*
   };
   struct Climb {
     std::string top;
-    Quaternion rotation;  // from the first frame to the top one
+    Quaternion rotation{};  // from the first frame to the top one
   };
   Climb climb(const std::string& from, const std::string& until) const;
 

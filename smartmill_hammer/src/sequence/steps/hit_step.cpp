@@ -9,7 +9,7 @@ StepOutcome HitStep::begin(double now) {
   return StepOutcome::running();
 }
 
-StepOutcome HitStep::hitRecorded(double now, RecordedHit hit) {
+StepOutcome HitStep::hitRecorded(double now, RecordedHit&& hit) {
   if (hit.fault.text.empty()) hit.fault = faultOf(hit.hit);
   if (!hit.fault.text.empty()) return reject(now, hit.fault);
   return hitAccepted(now, std::move(hit));

@@ -13,7 +13,7 @@ class HitStep : public SequenceStep {
   using SequenceStep::SequenceStep;
 
   StepOutcome begin(double now) override;
-  StepOutcome hitRecorded(double now, RecordedHit hit) final;
+  StepOutcome hitRecorded(double now, RecordedHit&& hit) final;
 
  protected:
   virtual HitFault faultOf(const Hit& hit) const = 0;
