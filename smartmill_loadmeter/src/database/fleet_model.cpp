@@ -104,7 +104,7 @@ struct FleetModel::Impl {
   void indexObservations();
   void estimateNoise();
   void fillCells();
-  Eigen::VectorXd residual_of(const Machine& machine, const Eigen::VectorXd& effects) const;
+  Eigen::VectorXd residualOf(const Machine& machine, const Eigen::VectorXd& effects) const;
   Eigen::MatrixXd toolPrior(double tool) const;
   void solveGroups(GridPoint* point) const;
   GridPoint solve(const FleetDeviations& s) const;
@@ -177,7 +177,7 @@ void FleetModel::Impl::fillCells() {
   }
 }
 
-Eigen::VectorXd FleetModel::Impl::residual_of(const Machine& machine, const Eigen::VectorXd& effects) const {
+Eigen::VectorXd FleetModel::Impl::residualOf(const Machine& machine, const Eigen::VectorXd& effects) const {
   Eigen::VectorXd r(machine.cells.size());
   for (std::size_t i = 0; i < machine.cells.size(); ++i)
     r[static_cast<Eigen::Index>(i)] =
@@ -251,7 +251,7 @@ GridPoint FleetModel::Impl::solve(const FleetDeviations& s) const {
     double change = 0.0;
     likelihood = 0.0;
     for (std::size_t m = 0; m < machines.size(); ++m) {
-      const Eigen::VectorXd r = residual_of(machines[m], point.groups);
+      const Eigen::VectorXd r = residualOf(machines[m], point.groups);
       const double as_usual = std::log1p(-options.outlier_probability) +
                               logLikelihood(CellCovariance(machines[m], usual, batch), r);
       const double as_outlier = options.outlier_probability > 0.0
