@@ -23,9 +23,6 @@ struct Closer {
 };
 
 // libmatio's messages; a fault is reported once, by what it makes impossible to read.
-void silent(int, char*) {
-}
-
 /// Size of a file, after a check that its elements end inside it: libmatio takes a cut file for a shorter
 /// one.
 std::uint64_t checkedSize(const std::string& file) {
@@ -227,7 +224,7 @@ void takeUnits(ChannelFile* file) {
 ChannelFile readMatFile(const std::string& file) {
   const std::uint64_t size = checkedSize(file);
   const Hdf5ErrorsOff quiet;
-  Mat_LogInitFunc("smartmill", silent);
+  Mat_LogInitFunc("smartmill", [](int, auto* /*text*/) {});  // char*, const char* since matio 1.5.24
   const std::unique_ptr<mat_t, Closer> mat(Mat_Open(file.c_str(), MAT_ACC_RDONLY));
   if (!mat) throw Error(file + ": not a readable MATLAB file");
   ChannelFile result;
