@@ -22,7 +22,6 @@ struct Closer {
   void operator()(matvar_t* variable) const { Mat_VarFree(variable); }
 };
 
-// libmatio's messages; a fault is reported once, by what it makes impossible to read.
 /// Size of a file, after a check that its elements end inside it: libmatio takes a cut file for a shorter
 /// one.
 std::uint64_t checkedSize(const std::string& file) {
@@ -224,7 +223,9 @@ void takeUnits(ChannelFile* file) {
 ChannelFile readMatFile(const std::string& file) {
   const std::uint64_t size = checkedSize(file);
   const Hdf5ErrorsOff quiet;
-  Mat_LogInitFunc("smartmill", [](int, auto* /*text*/) {});  // char*, const char* since matio 1.5.24
+  // Without libmatio's messages: a fault is reported once, by what it makes impossible to read. The text is
+  // char*, since matio 1.5.24 const char*.
+  Mat_LogInitFunc("smartmill", [](int, auto* /*text*/) {});
   const std::unique_ptr<mat_t, Closer> mat(Mat_Open(file.c_str(), MAT_ACC_RDONLY));
   if (!mat) throw Error(file + ": not a readable MATLAB file");
   ChannelFile result;
