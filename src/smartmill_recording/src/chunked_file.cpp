@@ -24,7 +24,8 @@ constexpr std::uint64_t SECOND = 1000000000;    // [ns]
 }  // namespace
 
 double RecordingFile::Entry::seconds() const {
-  return static_cast<double>(time / SECOND) + 1e-9 * static_cast<double>(time % SECOND);
+  const std::uint64_t whole = time / SECOND, rest = time % SECOND;
+  return static_cast<double>(whole) + 1e-9 * static_cast<double>(rest);
 }
 
 void ChunkedFile::fail(const std::string& what) const {

@@ -42,7 +42,7 @@ class AxisInertia : public Effect {
 
 }  // namespace
 
-EffectKind axis_inertia() {
+EffectKind axisInertia() {
   return declared<AxisInertia>();
 }
 

@@ -39,7 +39,7 @@ class ChannelDelay : public Effect {
 
 }  // namespace
 
-EffectKind channel_delay() {
+EffectKind channelDelay() {
   return declared<ChannelDelay>();
 }
 

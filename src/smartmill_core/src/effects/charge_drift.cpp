@@ -33,7 +33,7 @@ class ChargeDrift : public Effect {
 
 }  // namespace
 
-EffectKind charge_drift() {
+EffectKind chargeDrift() {
   return declared<ChargeDrift>();
 }
 

@@ -43,7 +43,7 @@ class ChipCoefficients : public Effect {
 
 }  // namespace
 
-EffectKind chip_coefficients() {
+EffectKind chipCoefficients() {
   return declared<ChipCoefficients>();
 }
 

@@ -37,7 +37,7 @@ class CornerRadius : public Effect {
 
 }  // namespace
 
-EffectKind corner_radius() {
+EffectKind cornerRadius() {
   return declared<CornerRadius>();
 }
 

@@ -52,7 +52,7 @@ class CrossTalk : public Effect {
 
 }  // namespace
 
-EffectKind cross_talk() {
+EffectKind crossTalk() {
   return declared<CrossTalk>();
 }
 

@@ -35,7 +35,7 @@ class CuttingSpeed : public Effect {
 
 }  // namespace
 
-EffectKind cutting_speed() {
+EffectKind cuttingSpeed() {
   return declared<CuttingSpeed>();
 }
 

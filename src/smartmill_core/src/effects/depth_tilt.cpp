@@ -27,7 +27,7 @@ class DepthTilt : public Effect {
 
 }  // namespace
 
-EffectKind depth_tilt() {
+EffectKind depthTilt() {
   return declared<DepthTilt>();
 }
 

@@ -27,7 +27,7 @@ class EdgeBuildup : public Effect {
 
 }  // namespace
 
-EffectKind edge_buildup() {
+EffectKind edgeBuildup() {
   return declared<EdgeBuildup>();
 }
 

@@ -43,7 +43,7 @@ class EdgeForces : public Effect {
 
 }  // namespace
 
-EffectKind edge_forces() {
+EffectKind edgeForces() {
   return declared<EdgeForces>();
 }
 

@@ -40,7 +40,7 @@ class ChannelApproach : public Effect {
 
 }  // namespace
 
-EffectKind empirical_approach() {
+EffectKind empiricalApproach() {
   return declared<ChannelApproach>();
 }
 

@@ -52,7 +52,7 @@ class ChannelBursts : public Effect {
 
 }  // namespace
 
-EffectKind empirical_bursts() {
+EffectKind empiricalBursts() {
   return declared<ChannelBursts>();
 }
 

@@ -109,7 +109,7 @@ class ChipThickness : public Effect {
 
 }  // namespace
 
-EffectKind empirical_chip_thickness() {
+EffectKind empiricalChipThickness() {
   return declared<ChipThickness>();
 }
 

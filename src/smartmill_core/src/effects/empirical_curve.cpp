@@ -46,7 +46,7 @@ class ChannelCurve : public Effect {
 
 }  // namespace
 
-EffectKind empirical_curve() {
+EffectKind empiricalCurve() {
   return declared<ChannelCurve>();
 }
 

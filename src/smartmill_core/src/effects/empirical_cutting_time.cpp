@@ -33,7 +33,7 @@ class CuttingTime : public Effect {
 
 }  // namespace
 
-EffectKind empirical_cutting_time() {
+EffectKind empiricalCuttingTime() {
   return declared<CuttingTime>();
 }
 

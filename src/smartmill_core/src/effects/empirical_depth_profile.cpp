@@ -60,7 +60,7 @@ class DepthProfile : public Effect {
 
 }  // namespace
 
-EffectKind empirical_depth_profile() {
+EffectKind empiricalDepthProfile() {
   return declared<DepthProfile>();
 }
 

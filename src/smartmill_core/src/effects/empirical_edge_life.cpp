@@ -45,7 +45,7 @@ class EdgeLife : public Effect {
 
 }  // namespace
 
-EffectKind empirical_edge_life() {
+EffectKind empiricalEdgeLife() {
   return declared<EdgeLife>();
 }
 

@@ -51,7 +51,7 @@ class LostEdge : public Effect {
 
 }  // namespace
 
-EffectKind empirical_lost_edge() {
+EffectKind empiricalLostEdge() {
   return declared<LostEdge>();
 }
 

@@ -42,7 +42,7 @@ class OrderTone : public Effect {
 
 }  // namespace
 
-EffectKind empirical_order() {
+EffectKind empiricalOrder() {
   return declared<OrderTone>();
 }
 

@@ -39,7 +39,7 @@ class ChannelRamp : public Effect {
 
 }  // namespace
 
-EffectKind empirical_ramp() {
+EffectKind empiricalRamp() {
   return declared<ChannelRamp>();
 }
 

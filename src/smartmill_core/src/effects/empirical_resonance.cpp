@@ -55,7 +55,7 @@ class ChannelResonance : public Effect {
 
 }  // namespace
 
-EffectKind empirical_resonance() {
+EffectKind empiricalResonance() {
   return declared<ChannelResonance>();
 }
 

@@ -122,7 +122,7 @@ class ChannelRevolution : public Effect {
 
 }  // namespace
 
-EffectKind empirical_revolution() {
+EffectKind empiricalRevolution() {
   return declared<ChannelRevolution>();
 }
 

@@ -41,7 +41,7 @@ class ChannelSettling : public Effect {
 
 }  // namespace
 
-EffectKind empirical_settling() {
+EffectKind empiricalSettling() {
   return declared<ChannelSettling>();
 }
 

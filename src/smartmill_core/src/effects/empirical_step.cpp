@@ -43,7 +43,7 @@ class ChannelStep : public Effect {
 
 }  // namespace
 
-EffectKind empirical_step() {
+EffectKind empiricalStep() {
   return declared<ChannelStep>();
 }
 

@@ -56,7 +56,7 @@ class FrequencyTone : public Effect {
 
 }  // namespace
 
-EffectKind empirical_tone() {
+EffectKind empiricalTone() {
   return declared<FrequencyTone>();
 }
 

@@ -75,7 +75,7 @@ class ToothFactor : public Effect {
 
 }  // namespace
 
-EffectKind empirical_tooth_factor() {
+EffectKind empiricalToothFactor() {
   return declared<ToothFactor>();
 }
 

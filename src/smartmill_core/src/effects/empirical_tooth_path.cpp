@@ -29,7 +29,7 @@ class ToothPath : public Effect {
 
 }  // namespace
 
-EffectKind empirical_tooth_path() {
+EffectKind empiricalToothPath() {
   return declared<ToothPath>();
 }
 

@@ -52,7 +52,7 @@ class ChannelTransfer : public Effect {
 
 }  // namespace
 
-EffectKind empirical_transfer() {
+EffectKind empiricalTransfer() {
   return declared<ChannelTransfer>();
 }
 

@@ -62,7 +62,7 @@ class ExtraMode : public Effect {
 
 }  // namespace
 
-EffectKind extra_mode() {
+EffectKind extraMode() {
   return declared<ExtraMode>();
 }
 

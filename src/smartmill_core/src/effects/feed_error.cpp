@@ -27,7 +27,7 @@ class FeedError : public Effect {
 
 }  // namespace
 
-EffectKind feed_error() {
+EffectKind feedError() {
   return declared<FeedError>();
 }
 

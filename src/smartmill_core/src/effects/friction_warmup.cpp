@@ -35,7 +35,7 @@ class FrictionWarmup : public Effect {
 
 }  // namespace
 
-EffectKind friction_warmup() {
+EffectKind frictionWarmup() {
   return declared<FrictionWarmup>();
 }
 

@@ -41,7 +41,7 @@ class GainError : public Effect {
 
 }  // namespace
 
-EffectKind gain_error() {
+EffectKind gainError() {
   return declared<GainError>();
 }
 

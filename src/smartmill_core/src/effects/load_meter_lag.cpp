@@ -32,7 +32,7 @@ class LoadMeterLag : public Effect {
 
 }  // namespace
 
-EffectKind load_meter_lag() {
+EffectKind loadMeterLag() {
   return declared<LoadMeterLag>();
 }
 

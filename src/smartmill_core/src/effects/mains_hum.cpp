@@ -50,7 +50,7 @@ class MainsHum : public Effect {
 
 }  // namespace
 
-EffectKind mains_hum() {
+EffectKind mainsHum() {
   return declared<MainsHum>();
 }
 

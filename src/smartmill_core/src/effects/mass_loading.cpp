@@ -36,7 +36,7 @@ class MassLoading : public Effect {
 
 }  // namespace
 
-EffectKind mass_loading() {
+EffectKind massLoading() {
   return declared<MassLoading>();
 }
 

@@ -31,7 +31,7 @@ class ProcessDamping : public Effect {
 
 }  // namespace
 
-EffectKind process_damping() {
+EffectKind processDamping() {
   return declared<ProcessDamping>();
 }
 

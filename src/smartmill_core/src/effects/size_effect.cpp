@@ -33,7 +33,7 @@ class SizeEffect : public Effect {
 
 }  // namespace
 
-EffectKind size_effect() {
+EffectKind sizeEffect() {
   return declared<SizeEffect>();
 }
 

@@ -33,7 +33,7 @@ class SpeedDependentMode : public Effect {
 
 }  // namespace
 
-EffectKind speed_dependent_mode() {
+EffectKind speedDependentMode() {
   return declared<SpeedDependentMode>();
 }
 

@@ -51,7 +51,7 @@ class SpindleOrder : public Effect {
 
 }  // namespace
 
-EffectKind spindle_order() {
+EffectKind spindleOrder() {
   return declared<SpindleOrder>();
 }
 

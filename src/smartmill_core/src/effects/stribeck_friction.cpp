@@ -35,7 +35,7 @@ class StribeckFriction : public Effect {
 
 }  // namespace
 
-EffectKind stribeck_friction() {
+EffectKind stribeckFriction() {
   return declared<StribeckFriction>();
 }
 

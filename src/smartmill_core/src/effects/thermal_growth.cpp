@@ -41,7 +41,7 @@ class ThermalGrowth : public Effect {
 
 }  // namespace
 
-EffectKind thermal_growth() {
+EffectKind thermalGrowth() {
   return declared<ThermalGrowth>();
 }
 

@@ -46,7 +46,7 @@ class ToolFlexibility : public Effect {
 
 }  // namespace
 
-EffectKind tool_flexibility() {
+EffectKind toolFlexibility() {
   return declared<ToolFlexibility>();
 }
 

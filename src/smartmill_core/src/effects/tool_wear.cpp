@@ -31,7 +31,7 @@ class ToolWear : public Effect {
 
 }  // namespace
 
-EffectKind tool_wear() {
+EffectKind toolWear() {
   return declared<ToolWear>();
 }
 

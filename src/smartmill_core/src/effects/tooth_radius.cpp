@@ -52,7 +52,7 @@ class ToothRadius : public Effect {
 
 }  // namespace
 
-EffectKind tooth_radius() {
+EffectKind toothRadius() {
   return declared<ToothRadius>();
 }
 

@@ -46,7 +46,7 @@ class UnevenPitch : public Effect {
 
 }  // namespace
 
-EffectKind uneven_pitch() {
+EffectKind unevenPitch() {
   return declared<UnevenPitch>();
 }
 

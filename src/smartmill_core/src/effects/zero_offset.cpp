@@ -35,7 +35,7 @@ class ZeroOffset : public Effect {
 
 }  // namespace
 
-EffectKind zero_offset() {
+EffectKind zeroOffset() {
   return declared<ZeroOffset>();
 }
 

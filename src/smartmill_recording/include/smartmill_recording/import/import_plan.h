@@ -22,11 +22,11 @@ struct TestSettings {
 
 /// A number of TestSettings: its key in YAML, its option and its range.
 struct SettingKey {
-  const char* key;
-  const char* option;
-  std::optional<double> TestSettings::*value;
-  Range range;
-  const char* help;
+  const char* key = "";
+  const char* option = "";
+  std::optional<double> TestSettings::*value = nullptr;
+  Range range = {};
+  const char* help = "";
 };
 const std::vector<SettingKey>& settingKeys();
 
