@@ -67,7 +67,7 @@ TEST(AxisInertia, passesTheModesOfTheSensor) {
   sensor.modes = {{20.0, 0.2, 0.9}};
   sensor.direct = 0.1;
   const Record recorded = moveOfY(FREQUENCY, true);
-  const std::vector<double>& fy = simulated(model, recorded).column("fy");
+  const std::vector<double> fy = simulated(model, recorded).column("fy");
   // Half a second, four periods, after the transient.
   const double w = units::TWO_PI * FREQUENCY;
   std::complex<double> line;
