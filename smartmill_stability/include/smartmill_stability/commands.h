@@ -6,7 +6,7 @@ namespace smartmill::stability {
 
 /// Stability lobes of a machine model.
 Command lobesCommand();
-/// The stability chart that stability_node makes of a recorded session.
+/// Stability chart and chatter verdicts of a recorded session, as computed by stability_node.
 Command chartCommand();
 /// Probability of chatter over speed and depth.
 Command chatterProbabilityCommand();

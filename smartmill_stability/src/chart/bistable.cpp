@@ -11,17 +11,17 @@
 namespace smartmill::stability {
 namespace {
 
-constexpr int STEPS = 720;     // over a swing
-constexpr int SWINGS = 10;     // tried up to the mean chip
-constexpr double LIKE = 1e-9;  // [1] greater than another
+constexpr int STEPS = 720;          // of one oscillation
+constexpr int AMPLITUDES = 10;      // from 0 to the mean chip thickness
+constexpr double TOLERANCE = 1e-9;  // [1] relative, of a comparison
 
 constexpr int CHIPS = 200;  // of the table over the arc
 
-/// Both curves' gains over the chip, where every chip swings by the same share of itself: as it is for one
-/// direction of vibration.
+/// Tangential and radial gain over the chip thickness. The amplitude is the same fraction of every chip thickness,
+/// as for a vibration in one direction.
 class Gains {
  public:
-  /// @param gain of a curve at a chip
+  /// @param gain of a curve at a chip thickness
   template <class Gain>
   Gains(const ForceCurves& law, double feed, Gain gain) : feed_(feed) {
     for (int k = 0; k <= CHIPS; ++k) {
@@ -31,9 +31,9 @@ class Gains {
   }
 
   std::array<double, 2> at(double chip) const {
-    const double place = std::clamp(chip / feed_, 0.0, 1.0) * CHIPS;
-    const auto k = std::min(static_cast<std::size_t>(place), table_.size() - 2);
-    const double share = place - static_cast<double>(k);
+    const double position = std::clamp(chip / feed_, 0.0, 1.0) * CHIPS;
+    const auto k = std::min(static_cast<std::size_t>(position), table_.size() - 2);
+    const double share = position - static_cast<double>(k);
     return {(1.0 - share) * table_[k][0] + share * table_[k + 1][0],
             (1.0 - share) * table_[k][1] + share * table_[k + 1][1]};
   }
@@ -58,14 +58,14 @@ std::vector<Limit> limitsWith(RegenerativeSystem system, const Gains& gains, dou
 
 }  // namespace
 
-double swingGain(const ForceCurve& law, double chip, double swing) {
-  if (!(swing > 0.0)) return law.slope(chip);
+double describingFunction(const ForceCurve& law, double chip, double amplitude) {
+  if (!(amplitude > 0.0)) return law.slope(chip);
   double sum = 0.0;
   for (int k = 0; k < STEPS; ++k) {
     const double c = std::cos(units::TWO_PI * (k + 0.5) / STEPS);
-    sum += law.at(chip + swing * c) * c;
+    sum += law.at(chip + amplitude * c) * c;
   }
-  return 2.0 * sum / (STEPS * swing);
+  return 2.0 * sum / (STEPS * amplitude);
 }
 
 double meanChip(const RegenerativeSystem& system, double feed) {
@@ -77,28 +77,32 @@ std::vector<BistableLimit> bistableLimits(const RegenerativeSystem& system, cons
                                           double feed, Method method, const SolverOptions& options,
                                           const std::vector<double>& speeds, double max_depth) {
   const double chip = meanChip(system, feed), top = law.tangential.knots.back();
-  if (!(chip > 0.0) || feed > top * (1.0 + LIKE))
-    throw Error(formatted("force curve: a feed of %.4f mm a tooth, the law knows 0 .. %.4f mm",
+  if (!(chip > 0.0) || feed > top * (1.0 + TOLERANCE))
+    throw Error(formatted("force curve: feed per tooth %.4f mm: expected a value within the curve, 0 .. %.4f mm",
                           feed / units::MM, top / units::MM));
   if (!(law.tangential.slope(chip) > 0.0))
-    throw Error(
-        formatted("force curve: the tangential force does not rise at a chip of %.4f mm", chip / units::MM));
+    throw Error(formatted(
+        "force curve: the tangential force does not rise at the mean chip thickness %.4f mm; expected a positive "
+        "slope",
+        chip / units::MM));
   const auto limitsAt = [&](const Gains& gains) {
     return limitsWith(system, gains, feed, method, options, speeds, max_depth);
   };
-  // The share of the chip whose gain is greatest, at the mean chip.
-  double share = 0.0, greatest = 0.0;
-  for (int k = 0; k <= SWINGS; ++k) {
-    const double tried = std::hypot(swingGain(law.tangential, chip, chip * k / SWINGS),
-                                    swingGain(law.radial, chip, chip * k / SWINGS));
-    if (tried > greatest * (1.0 + LIKE)) {
-      greatest = tried;
-      share = static_cast<double>(k) / SWINGS;
+  // Amplitude over chip thickness with the largest gain, at the mean chip thickness.
+  double share = 0.0, largest = 0.0;
+  for (int k = 0; k <= AMPLITUDES; ++k) {
+    const double amplitude = chip * k / AMPLITUDES;
+    const double gain = std::hypot(describingFunction(law.tangential, chip, amplitude),
+                                   describingFunction(law.radial, chip, amplitude));
+    if (gain > largest * (1.0 + TOLERANCE)) {
+      largest = gain;
+      share = static_cast<double>(k) / AMPLITUDES;
     }
   }
   const auto smalls = limitsAt({law, feed, [](const ForceCurve& curve, double h) { return curve.slope(h); }});
   const auto larges = limitsAt(
-      {law, feed, [share](const ForceCurve& curve, double h) { return swingGain(curve, h, share * h); }});
+      {law, feed,
+       [share](const ForceCurve& curve, double h) { return describingFunction(curve, h, share * h); }});
   const auto secants =
       limitsAt({law, feed, [](const ForceCurve& curve, double h) { return curve.at(h) / h; }});
   std::vector<BistableLimit> found;

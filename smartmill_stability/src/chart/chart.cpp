@@ -21,11 +21,11 @@ namespace smartmill::stability {
 namespace {
 
 constexpr double NO_LIMIT = std::numeric_limits<double>::infinity();
-/// Points nearer than this share of their speed belong to one pocket or valley.
+/// [1] Points with a smaller relative difference of speed belong to one pocket or valley.
 constexpr double SAME_POCKET = 0.03;
-constexpr int LINES_BEYOND = 20;  // speeds on each side that the margin needs
+constexpr int EXTRA_SPEEDS = 20;  // on each side of the chart, for the speed margin
 
-/// Worst value over the speeds within the margin on both sides, up to the next speed of the grid.
+/// Worst value over the speeds within the margin on both sides, including the next speed of the grid.
 double around(const StabilityLimit& limit, std::size_t k, double margin,
               const std::function<bool(double, double)>& worse) {
   double worst = limit.depth[k];
@@ -44,7 +44,7 @@ bool removesMore(const StabilityPoint& a, const StabilityPoint& b) {
   return a.material_removal_rate > b.material_removal_rate;
 }
 
-/// The first points in the given order, one a pocket.
+/// The first points in the given order, one for each pocket.
 std::vector<StabilityPoint> pick(
     std::vector<StabilityPoint> points, int count,
     const std::function<bool(const StabilityPoint&, const StabilityPoint&)>& better) {
@@ -60,8 +60,8 @@ std::vector<StabilityPoint> pick(
   return chosen;
 }
 
-/// Where the spindle's power limits the removal rate it hardly changes over the pocket: of cuts that remove
-/// nearly as much, the one with the widest margin of speed to the nearer flank of its lobe.
+/// Of the neighbouring cuts with nearly the same removal rate as the best, the one with the largest margin of
+/// speed to the nearer flank of its lobe. Where the power limits the removal rate it is constant over the pocket.
 StabilityPoint farthestFromFlanks(const StabilityLimit& limit, const std::vector<StabilityPoint>& cuts,
                                   const StabilityPoint& best) {
   constexpr double AS_MUCH = 0.98;
@@ -86,28 +86,28 @@ StabilityPoint farthestFromFlanks(const StabilityLimit& limit, const std::vector
 
 namespace {
 
-/// Without the lines at which the hammer excited too little, or that do not stand above their own deviation
-/// by a factor: there noise would pass for a resonance. What the neighbours say is put in their place by the
-/// interpolation.
-FrequencyResponse certainLines(const FrequencyResponse& frf, double error, double told) {
+/// Removes lines with too little excitation and lines below a multiple of their own standard deviation, where
+/// noise would appear as a resonance. Interpolation between the neighbours replaces them.
+/// @param error [1] largest standard deviation over the peak @param factor [1] least value over standard deviation
+FrequencyResponse certainLines(const FrequencyResponse& frf, double error, double factor) {
   if (frf.std_dev.size() != frf.size()) return frf;
   double peak = 0.0;
   for (std::size_t i = 0; i < frf.size(); ++i) {
     if (frf.std_dev[i] < std::abs(frf.value[i])) peak = std::max(peak, std::abs(frf.value[i]));
   }
-  FrequencyResponse kept;
-  kept.unit = frf.unit;
-  kept.averages = frf.averages;
+  FrequencyResponse result;
+  result.unit = frf.unit;
+  result.averages = frf.averages;
   for (std::size_t i = 0; i < frf.size(); ++i) {
-    if (frf.std_dev[i] > error * peak || std::abs(frf.value[i]) < told * frf.std_dev[i]) continue;
-    kept.frequency.push_back(frf.frequency[i]);
-    kept.value.push_back(frf.value[i]);
+    if (frf.std_dev[i] > error * peak || std::abs(frf.value[i]) < factor * frf.std_dev[i]) continue;
+    result.frequency.push_back(frf.frequency[i]);
+    result.value.push_back(frf.value[i]);
   }
-  return kept;
+  return result;
 }
 
-/// Cross receptances where they were measured over the whole band: "xy" is struck along x and read along y.
-/// One alone stands for both (reciprocity).
+/// Adds cross receptances that were measured over the whole band. "xy": excitation along x, response along y. A
+/// single one is used for both (reciprocity).
 void addCross(const std::map<std::string, MeasuredFrf>& frfs, ToolTipResponse& response) {
   const auto lines = [&](const char* direction) {
     std::vector<std::complex<double>> values;
@@ -117,12 +117,12 @@ void addCross(const std::map<std::string, MeasuredFrf>& frfs, ToolTipResponse& r
     if (frf.frequency.front() > response.frequency.front() ||
         frf.frequency.back() < response.frequency.back())
       return values;
-    // What noise would show as well counts as none: it would take depth off at random.
-    FrequencyResponse seen = frf;
-    for (std::size_t i = 0; i < seen.size() && seen.std_dev.size() == seen.size(); ++i) {
-      if (std::abs(seen.value[i]) < 2.0 * seen.std_dev[i]) seen.value[i] = 0.0;
+    // Lines within the noise are set to 0; they would lower the limit at random.
+    FrequencyResponse significant = frf;
+    for (std::size_t i = 0; i < significant.size() && significant.std_dev.size() == significant.size(); ++i) {
+      if (std::abs(significant.value[i]) < 2.0 * significant.std_dev[i]) significant.value[i] = 0.0;
     }
-    for (const double f : response.frequency) values.push_back(seen.at(f));
+    for (const double f : response.frequency) values.push_back(significant.at(f));
     return values;
   };
   response.yx = lines("xy");
@@ -131,8 +131,8 @@ void addCross(const std::map<std::string, MeasuredFrf>& frfs, ToolTipResponse& r
   if (response.yx.empty()) response.yx = response.xy;
 }
 
-/// Limits at rising speeds, solved where a straight line between the neighbours would be off by more than a
-/// fraction of a percent, and interpolated elsewhere.
+/// Limits at ascending speeds: solved by bisection until linear interpolation between the neighbours is right to
+/// STRAIGHT, then interpolated.
 StabilityLimit refinedLimits(const StabilitySolver& solver, const std::vector<double>& speeds,
                              double max_depth) {
   constexpr std::size_t STRIDE = 16;
@@ -189,7 +189,7 @@ struct ChartMaker::Basis {
   RegenerativeProcess process;
   ToolTipResponse response;                 // zero-order
   std::unique_ptr<StabilitySolver> solver;  // collocation
-  double max_depth = 0.0;                   // [m] looked at by collocation
+  double max_depth = 0.0;                   // [m] of the search by collocation
 
   StabilityLimit limits(const std::vector<double>& speeds) const {
     return solver ? refinedLimits(*solver, speeds, max_depth) : zeroOrderLimit(process, response, speeds);
@@ -202,7 +202,8 @@ ChartMaker::ChartMaker(const ChartParameters& parameters, const MachineModel& mo
   if (parameters_.speed_high == 0.0 && spindle_.max_speed) parameters_.speed_high = *spindle_.max_speed;
   parameters_.validate();
   if (parameters_.speed_high == 0.0) {
-    throw Error("speed_high: 0 takes the spindle's highest speed, which " + model.file + " does not state");
+    throw Error("speed_high: 0 selects the highest spindle speed, which is missing in " + model.file +
+                "; expected a value above speed_low");
   }
 }
 
@@ -234,8 +235,8 @@ void ChartMaker::handle(const CoefficientSet& coefficients) {
 
 std::string ChartMaker::missing() const {
   std::string list;
-  const auto need = [&](bool there, const std::string& what) {
-    if (!there) list += (list.empty() ? "" : ", ") + what;
+  const auto need = [&](bool present, const std::string& what) {
+    if (!present) list += (list.empty() ? "" : ", ") + what;
   };
   for (const std::string direction : {"x", "y"}) {
     if (needsModes()) {
@@ -290,7 +291,7 @@ std::optional<UncertainSystem> ChartMaker::uncertainSystem(const Engagement& eng
   return measuredSystem(*mean, modes_.at("x").model, modes_.at("y").model, *coefficients_, least);
 }
 
-/// The cross receptance that was measured, either way; without lines: none.
+/// The measured cross receptance, in either direction; empty without one.
 FrequencyResponse ChartMaker::crossFrf() const {
   for (const char* direction : {"xy", "yx"}) {
     const auto found = frfs_.find(direction);
@@ -322,17 +323,17 @@ ChartMaker::Basis ChartMaker::basis() const {
     options.tolerance = 1e-4;
     options.nodes = 10;  // 1e-6 of the depth, enough for a chart
     basis.solver = makeSolver(Method::collocation, system, options);
-    // So deep that a limit beyond cannot hold a recommended cut down.
+    // A limit beyond this depth does not restrict a recommended cut.
     basis.max_depth = parameters_.max_depth / (1.0 - parameters_.depth_margin);
   } else if (parameters_.use_modes) {
     constexpr std::size_t LINES = 20000;
     basis.response = responseOf(modes_.at("x").model, modes_.at("y").model,
                                 std::max(1.0, parameters_.frequency_low), parameters_.frequency_high, LINES);
   } else {
-    constexpr double TOLD = 3.0;  // standard deviations
+    constexpr double STD_DEVS = 3.0;
     const auto lines = [&](const char* direction) {
       return certainLines(frfs_.at(direction).frf.band(parameters_.frequency_low, parameters_.frequency_high),
-                          parameters_.line_error, TOLD);
+                          parameters_.line_error, STD_DEVS);
     };
     basis.response = responseOf(lines("x"), lines("y"));
     addCross(frfs_, basis.response);
@@ -356,11 +357,11 @@ double ChartMaker::friction(double speed) const {
 }
 
 std::array<double, 2> ChartMaker::loadLimits(double speed) const {
-  const double per_depth = torquePerDepth(), lost = friction(speed);
+  const double per_depth = torquePerDepth(), loss = friction(speed);
   const double torque =
-      spindle_.rated_torque ? std::max(0.0, *spindle_.rated_torque - lost) / per_depth : NO_LIMIT;
+      spindle_.rated_torque ? std::max(0.0, *spindle_.rated_torque - loss) / per_depth : NO_LIMIT;
   const double power =
-      spindle_.rated_power ? std::max(0.0, *spindle_.rated_power / speed - lost) / per_depth : NO_LIMIT;
+      spindle_.rated_power ? std::max(0.0, *spindle_.rated_power / speed - loss) / per_depth : NO_LIMIT;
   return {{torque, power}};
 }
 
@@ -375,24 +376,24 @@ StabilityPoint ChartMaker::point(double speed, double depth, double limit, doubl
   return result;
 }
 
-int ChartMaker::linesBeyond() const {
-  return parameters_.speed_margin > 0.0 ? LINES_BEYOND : 0;
+int ChartMaker::extraSpeeds() const {
+  return parameters_.speed_margin > 0.0 ? EXTRA_SPEEDS : 0;
 }
 
 StabilityLimit ChartMaker::wideLimits(const Basis& given) const {
-  const int n = parameters_.speeds, beyond = linesBeyond();
+  const int n = parameters_.speeds, extra = extraSpeeds();
   const double low = parameters_.speed_low, high = parameters_.speed_high,
-               part = parameters_.speed_margin / LINES_BEYOND;
+               step = parameters_.speed_margin / EXTRA_SPEEDS;
   std::vector<double> speeds;
-  for (int i = -beyond; i < n + beyond; ++i) {
-    speeds.push_back(i < 0    ? low * (1.0 + part * i)
-                     : i >= n ? high * (1.0 + part * (i - n + 1))
+  for (int i = -extra; i < n + extra; ++i) {
+    speeds.push_back(i < 0    ? low * (1.0 + step * i)
+                     : i >= n ? high * (1.0 + step * (i - n + 1))
                               : low + (high - low) * i / (n - 1));
   }
   return given.limits(speeds);
 }
 
-/// Of the limit at each speed, what the risk leaves of it; without modes nothing can be drawn.
+/// [1] Depth at the accepted risk over the limit at each speed; +inf without modes, which drawing requires.
 std::vector<double> ChartMaker::depthShares(const std::vector<double>& speeds) const {
   constexpr int DRAWS = 100;
   constexpr unsigned SEED = 1;
@@ -411,38 +412,38 @@ void ChartMaker::recommend(StabilityChart& chart, const StabilityLimit& wide) co
   std::vector<StabilityPoint> cuts, peaks;
   for (std::size_t k = 0; k < speeds.size(); ++k) {
     const double stable =
-        around(wide, k + static_cast<std::size_t>(linesBeyond()), parameters_.speed_margin, std::less<>());
-    const double depth = std::min(
-        {(1.0 - parameters_.depth_margin) * stable, shares[k] * chart.limit.depth[k], carried(chart, k)});
+        around(wide, k + static_cast<std::size_t>(extraSpeeds()), parameters_.speed_margin, std::less<>());
+    const double depth = std::min({(1.0 - parameters_.depth_margin) * stable,
+                                   shares[k] * chart.limit.depth[k], permittedDepth(chart, k)});
     cuts.push_back(point(speeds[k], depth, chart.limit.depth[k], chart.limit.chatter_frequency[k]));
   }
   for (std::size_t k = 0; k < cuts.size(); ++k) {
     const double rate = cuts[k].material_removal_rate;
-    const bool over_left = k == 0 || rate > cuts[k - 1].material_removal_rate;
-    const bool over_right = k + 1 == cuts.size() || rate >= cuts[k + 1].material_removal_rate;
-    if (rate > 0.0 && over_left && over_right) peaks.push_back(cuts[k]);
+    const bool above_left = k == 0 || rate > cuts[k - 1].material_removal_rate;
+    const bool above_right = k + 1 == cuts.size() || rate >= cuts[k + 1].material_removal_rate;
+    if (rate > 0.0 && above_left && above_right) peaks.push_back(cuts[k]);
   }
   peaks = pick(peaks, static_cast<int>(peaks.size()), removesMore);
   for (StabilityPoint& best : peaks) best = farthestFromFlanks(chart.limit, cuts, best);
-  peaks = pick(peaks, static_cast<int>(peaks.size()), removesMore);  // some have moved to the same place
-  chart.recommended = borne(std::move(peaks));
+  peaks = pick(peaks, static_cast<int>(peaks.size()), removesMore);  // some may now coincide
+  chart.recommended = confirmed(std::move(peaks));
 }
 
-/// The best of these, as deep as collocation says that they are borne: zero-order limits do not know every
-/// loss. What it refuses is tried again less deep, in the order of what is removed then.
-std::vector<StabilityPoint> ChartMaker::borne(std::vector<StabilityPoint> peaks) const {
-  constexpr double LESS = 0.95, LEAST = 0.2;  // [1] of the depth at each try; then the point is given up
+/// The best of the peaks whose stability collocation confirms, since the zero-order solution misses flips. A
+/// rejected point is tried again at a smaller depth, in the order of the reduced removal rate.
+std::vector<StabilityPoint> ChartMaker::confirmed(std::vector<StabilityPoint> peaks) const {
+  constexpr double REDUCTION = 0.95, LEAST = 0.2;  // [1] of the depth: per try, and in all before it is dropped
   const std::optional<UncertainSystem> uncertain = uncertainSystem({});
   RiskOptions options;
   options.risk = parameters_.risk;
   options.speed_margin = parameters_.speed_margin;
   std::optional<DrawnMachines> machines;
   if (parameters_.risk > 0.0 && uncertain) machines.emplace(*uncertain, options);
-  const bool mean_known = byCollocation();  // the chart's own limits are collocation's
-  const auto bears = [&](const StabilityPoint& cut) {
+  const bool mean_known = byCollocation();  // the limits of the chart are from collocation already
+  const auto isStable = [&](const StabilityPoint& cut) {
     if (!machines) return true;
     const double depth = cut.axial_depth / (1.0 - parameters_.depth_margin);
-    return (mean_known || machines->meanBears(cut.spindle_speed, depth)) &&
+    return (mean_known || machines->meanIsStable(cut.spindle_speed, depth)) &&
            machines->probability(cut.spindle_speed, cut.axial_depth).has_value();
   };
   std::stable_sort(peaks.begin(), peaks.end(), removesMore);
@@ -452,14 +453,14 @@ std::vector<StabilityPoint> ChartMaker::borne(std::vector<StabilityPoint> peaks)
   while (!peaks.empty() && static_cast<int>(found.size()) < parameters_.recommended) {
     const StabilityPoint cut = peaks.front();
     peaks.erase(peaks.begin());
-    if (bears(cut)) {
+    if (isStable(cut)) {
       found.push_back(cut);
       continue;
     }
-    const StabilityPoint less =
-        point(cut.spindle_speed, LESS * cut.axial_depth, cut.depth_limit, cut.chatter_frequency);
-    if (less.axial_depth > least[less.spindle_speed])
-      peaks.insert(std::upper_bound(peaks.begin(), peaks.end(), less, removesMore), less);
+    const StabilityPoint reduced =
+        point(cut.spindle_speed, REDUCTION * cut.axial_depth, cut.depth_limit, cut.chatter_frequency);
+    if (reduced.axial_depth > least[reduced.spindle_speed])
+      peaks.insert(std::upper_bound(peaks.begin(), peaks.end(), reduced, removesMore), reduced);
   }
   return found;
 }
@@ -471,12 +472,12 @@ void ChartMaker::proposeUnstable(StabilityChart& chart, const StabilityLimit& wi
   for (std::size_t k = 1; k + 1 < speeds.size(); ++k) {
     if (!(depth[k] < depth[k - 1] && depth[k] <= depth[k + 1])) continue;
     const double highest =
-        around(wide, k + static_cast<std::size_t>(linesBeyond()), parameters_.speed_margin, std::greater<>());
-    const double proposed = std::min(parameters_.unstable_factor * highest, carried(chart, k));
+        around(wide, k + static_cast<std::size_t>(extraSpeeds()), parameters_.speed_margin, std::greater<>());
+    const double proposed = std::min(parameters_.unstable_factor * highest, permittedDepth(chart, k));
     if (!std::isfinite(proposed) || proposed < ChartParameters::CLEARLY_UNSTABLE * highest) continue;
     valleys.push_back(point(speeds[k], proposed, depth[k], chart.limit.chatter_frequency[k]));
   }
-  // A check beside the recommended cut tells most: nearly the same speed, another outcome.
+  // A check close to the recommended cut is the most informative: nearly the same speed, another outcome.
   const double reference =
       chart.recommended.empty() ? speeds.back() : chart.recommended.front().spindle_speed;
   chart.unstable = pick(valleys, parameters_.unstable, [&](const StabilityPoint& a, const StabilityPoint& b) {
@@ -484,7 +485,7 @@ void ChartMaker::proposeUnstable(StabilityChart& chart, const StabilityLimit& wi
   });
 }
 
-double ChartMaker::carried(const StabilityChart& chart, std::size_t k) const {
+double ChartMaker::permittedDepth(const StabilityChart& chart, std::size_t k) const {
   return std::min({parameters_.load_share * chart.torque_depth_limit[k],
                    parameters_.load_share * chart.power_depth_limit[k], parameters_.max_depth});
 }
@@ -499,8 +500,8 @@ StabilityChart ChartMaker::chart() const {
   chart.exit = parameters_.exit;
   chart.feed_per_tooth = parameters_.feed_per_tooth;
   const StabilityLimit wide = wideLimits(given);
-  const auto inner = [beyond = linesBeyond()](const std::vector<double>& all) {
-    return std::vector<double>(all.begin() + beyond, all.end() - beyond);
+  const auto inner = [extra = extraSpeeds()](const std::vector<double>& all) {
+    return std::vector<double>(all.begin() + extra, all.end() - extra);
   };
   chart.limit = {inner(wide.spindle_speed), inner(wide.depth), inner(wide.chatter_frequency)};
   chart.method = given.solver ? nameOf(Method::collocation) : nameOf(Method::zero_order);
@@ -519,10 +520,10 @@ StabilityChart ChartMaker::chart() const {
 
 Prediction ChartMaker::predict(double spindle_speed, double axial_depth) const {
   if (!(spindle_speed > 0.0) || !std::isfinite(spindle_speed)) {
-    throw Error("spindle_speed: " + std::to_string(spindle_speed) + " rad/s is not positive");
+    throw Error("spindle_speed: " + std::to_string(spindle_speed) + " rad/s: expected a value above 0");
   }
   if (!(axial_depth > 0.0) || !std::isfinite(axial_depth)) {
-    throw Error("axial_depth: " + std::to_string(axial_depth) + " m is not positive");
+    throw Error("axial_depth: " + std::to_string(axial_depth) + " m: expected a value above 0");
   }
   const Basis given = basis();
   const StabilityLimit limit = given.limits({spindle_speed});
@@ -540,8 +541,8 @@ WhatIfChart ChartMaker::whatIf(const WhatIf& request) const {
   constexpr double LEAST_DEPTH = 0.01;
   request.validate();
   ChartMaker other = *this;
-  const auto change = [](double& value, double wanted) {
-    if (!std::isnan(wanted)) value = wanted;
+  const auto change = [](double& value, double requested) {
+    if (!std::isnan(requested)) value = requested;
   };
   change(other.tool_geometry_.helix, request.helix);
   change(other.parameters_.entry, request.entry);
@@ -561,11 +562,11 @@ WhatIfChart ChartMaker::whatIf(const WhatIf& request) const {
     speeds.push_back(parameters_.speed_low +
                      (parameters_.speed_high - parameters_.speed_low) * i / (count - 1));
   WhatIfChart chart;
-  // What lies far beyond the depth in question is not looked for: it would take most of the time.
+  // Limits far beyond the requested depth would take most of the time.
   const double all = parameters_.max_depth / (1.0 - parameters_.depth_margin);
   const double deepest =
       std::isnan(request.axial_depth) ? all : std::min(all, std::max(LEAST_DEPTH, 3.0 * request.axial_depth));
-  chart.limit = followedLimits(*system, speeds, deepest);
+  chart.limit = limitsByContinuation(*system, speeds, deepest);
   for (std::size_t k = 0; k < system->modes.size(); ++k) {
     const SystemMode& mode = system->modes[k];
     const bool along_x = std::abs(mode.output[0]) >= std::abs(mode.output[1]);
@@ -585,7 +586,7 @@ WhatIfChart ChartMaker::whatIf(const WhatIf& request) const {
   return chart;
 }
 
-// By the zero-order solution, whose ratio to the machine's own is carried over: what matters is the spread.
+// The spread is computed by the zero-order solution and applied as a ratio to the limits of the chart.
 void ChartMaker::addSpread(const RegenerativeSystem& system, WhatIfChart& chart) const {
   constexpr int DRAWS = 40;
   constexpr unsigned SEED = 1;

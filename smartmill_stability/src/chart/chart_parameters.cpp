@@ -5,65 +5,68 @@ namespace smartmill::stability {
 namespace {
 
 void declarePoints(ChartParameters& p, ParameterTable& table) {
-  table.section("Points to cut at.");
+  table.section("Recommended and unstable points.");
   table.number("max_depth", p.max_depth, "m", Range::positive(),
-               "of the tool; nothing deeper is recommended or proposed");
+               "largest axial depth of a recommended or proposed point");
   table.number("depth_margin", p.depth_margin, "1", Range::openHigh(0.0, 1.0),
-               "recommended depths stay this share below the limit");
+               "relative distance of recommended depths below the limit");
   table.number("speed_margin", p.speed_margin, "1", Range::openHigh(0.0, 0.2),
-               "and below it also for speeds this much off");
+               "relative error of the speed for which the depth margin holds");
   table.number(
       "risk", p.risk, "1", Range::closed(0.0, 0.5),
-      "largest probability of chatter of a recommended cut, by the deviations of what was measured, by "
-      "zero-order theory and by collocation; needs modes (tool/modes); 0: not asked for");
+      "largest probability of chatter of a recommended cut, from the standard deviations of the measurements, "
+      "by the zero-order solution and by collocation; requires modes (tool/modes); 0: not limited");
   table.number("frequency_std", p.frequency_std, "1", Range::openHigh(0.0, 0.2),
-               "deviation of a mode's frequency besides its estimate's: a spindle that turns and warms up is "
-               "not the one tapped at rest");
+               "relative standard deviation of modal frequencies in addition to that of the estimate: dynamics "
+               "at rest differ from those of a rotating, warm spindle");
   table.number("gain_std", p.gain_std, "1", Range::openHigh(0.0, 0.5),
-               "the same of compliance, damping and cutting coefficients");
+               "the same for compliance, damping and cutting coefficients");
   table.number("kr_std", p.radial_std, "1", Range::openHigh(0.0, 0.5),
-               "deviation of a radial coefficient that was not identified, over its value");
+               "relative standard deviation of a radial coefficient that was not identified");
   table.number("load_share", p.load_share, "1", Range::openLow(0.0, 1.0),
-               "of the spindle's torque and power that is used");
-  table.number("recommended", p.recommended, "1", Range::closed(0, 100), "at most so many, one a pocket");
+               "largest fraction of the rated torque and power of the spindle");
+  table.number("recommended", p.recommended, "1", Range::closed(0, 100),
+               "largest number of recommended points, one for each pocket");
   table.number("unstable_factor", p.unstable_factor, "1",
                Range::closed(ChartParameters::CLEARLY_UNSTABLE, 5.0),
-               "depth over the limit of the points for a check");
-  table.number("unstable", p.unstable, "1", Range::closed(0, 100), "at most so many, one a valley");
+               "depth over limit of unstable points, which are proposed for a check");
+  table.number("unstable", p.unstable, "1", Range::closed(0, 100),
+               "largest number of unstable points, one for each minimum between pockets");
 }
 
 }  // namespace
 
 void ChartParameters::declare(ParameterTable& table) {
-  table.section("The cut that the chart is for.");
+  table.section("Cut of the chart.");
   table.number("entry_angle", entry, "rad", Range::openHigh(0.0, units::TWO_PI),
-               "immersion angle at which a tooth enters, clockwise from +y; x is the feed");
+               "immersion angle at which a tooth enters, clockwise from +y; the feed is along x");
   table.number("exit_angle", exit, "rad", Range::openLow(0.0, units::TWO_PI),
-               "above entry_angle; 0 .. pi is a slot");
+               "immersion angle at which a tooth leaves, above entry_angle; 0 .. pi is a slot");
   table.number("feed_per_tooth", feed_per_tooth, "m", Range::positive(),
-               "torque, power and removal rate belong to it");
+               "feed per tooth, for torque, power and removal rate");
   table.number("kr", radial_ratio, "1", Range::notNegative(),
-               "radial over tangential coefficient where the radial one was not identified");
-  table.section("The chart.");
-  table.number("speed_low", speed_low, "rad/s", Range::positive(), "lowest");
+               "radial over tangential coefficient, used while the radial one is not identified");
+  table.section("Chart.");
+  table.number("speed_low", speed_low, "rad/s", Range::positive(), "lowest spindle speed");
   table.number("speed_high", speed_high, "rad/s", Range::notNegative(),
-               "above speed_low; 0: the spindle's highest speed from the model");
-  table.number("speeds", speeds, "1", Range::closed(2, 100000), "evenly from low to high");
+               "highest spindle speed, above speed_low; 0: from the model");
+  table.number("speeds", speeds, "1", Range::closed(2, 100000), "number of evenly spaced speeds");
   table.number("frequency_low", frequency_low, "Hz", Range::notNegative(),
-               "lines of measured FRFs below say little and are left out");
-  table.number("frequency_high", frequency_high, "Hz", Range::positive(), "above frequency_low");
+               "lower end of the band of measured FRFs");
+  table.number("frequency_high", frequency_high, "Hz", Range::positive(),
+               "upper end of the band, above frequency_low");
   table.number(
       "line_error", line_error, "1", Range::positive(),
-      "lines with a standard deviation above this share of the FRF's peak are left out: the hammer's "
-      "spectrum has zeros; so are lines below three of their own standard deviations");
+      "lines with a standard deviation above this fraction of the peak of the FRF are ignored (zeros of the "
+      "hammer's spectrum), as are lines below three of their own standard deviations");
   table.choice(
       "method", method, {"zero_order", "collocation", "auto"},
-      "zero_order: from the measured FRFs at once; collocation: exact, from the modes (tool/modes), takes "
-      "seconds; auto: collocation where modes of x and y are known and fit well");
+      "zero_order: immediate, from the measured FRFs; collocation: exact, from the modes (tool/modes), takes "
+      "seconds; auto: collocation where the modes of x and y fit well");
   table.number("modes_error", modes_error, "1", Range::positive(),
-               "relative error of the modes' fit up to which auto trusts them");
+               "largest relative error of the modal fit for which auto selects collocation");
   table.flag("use_modes", use_modes,
-             "zero_order: true: fitted modes (tool/modes) instead of the measured FRFs (tool/frf)");
+             "zero_order: true: from the fitted modes (tool/modes) instead of the measured FRFs (tool/frf)");
   declarePoints(*this, table);
 }
 

@@ -7,9 +7,9 @@
 namespace smartmill::stability {
 
 void drawBeside(const std::string& csv, std::string commands) {
-  const std::string mark = "%FILE", file = Gnuplot::quoted(csv);
-  for (std::size_t at = 0; (at = commands.find(mark, at)) != std::string::npos; at += file.size()) {
-    commands.replace(at, mark.size(), file);
+  const std::string placeholder = "%FILE", file = Gnuplot::quoted(csv);
+  for (std::size_t at = 0; (at = commands.find(placeholder, at)) != std::string::npos; at += file.size()) {
+    commands.replace(at, placeholder.size(), file);
   }
   Gnuplot plot(std::filesystem::path(csv).replace_extension(".png").string(), 1100, 600, 12);
   plot << "set datafile separator ','\nset grid\nset key top left\n" << commands << "\n";

@@ -11,8 +11,8 @@
 namespace smartmill::stability {
 namespace {
 
-constexpr double UNKNOWN = 0.1;  // [1] deviation of what has none
-constexpr double MOST = 0.5;     // [1]
+constexpr double UNKNOWN = 0.1;  // [1] relative standard deviation of a value without one
+constexpr double MOST = 0.5;     // [1] largest relative standard deviation
 
 double shareOf(double deviation, double value, double least) {
   const double share = std::isfinite(deviation) && value != 0.0 ? std::abs(deviation / value) : UNKNOWN;
@@ -27,7 +27,7 @@ std::unique_ptr<FloquetSolver> solverOf(const RegenerativeSystem& system) {
   return makeFloquetSolver(Method::collocation, system, options);
 }
 
-bool bears(const FloquetSolver& solver, double speed, double depth, double margin) {
+bool isStable(const FloquetSolver& solver, double speed, double depth, double margin) {
   for (const double side : {0.0, margin, -margin}) {
     if (solver.multiplier(speed * (1.0 + side), depth).radius() > 1.0) return false;
   }
@@ -38,7 +38,7 @@ bool bears(const FloquetSolver& solver, double speed, double depth, double margi
 
 DrawnMachines::DrawnMachines(const UncertainSystem& system, const RiskOptions& options)
     : system_(system), options_(options), random_(options.seed), mean_(solverOf(system.mean())) {
-  if (options.draws < 1) throw Error("draws: " + std::to_string(options.draws) + ", at least 1 is due");
+  if (options.draws < 1) throw Error("draws: " + std::to_string(options.draws) + ": expected at least 1");
 }
 
 DrawnMachines::~DrawnMachines() = default;
@@ -47,14 +47,14 @@ std::optional<double> DrawnMachines::probability(double speed, double depth) {
   int chattering = 0;
   for (int i = 0; i < options_.draws; ++i) {
     while (static_cast<int>(drawn_.size()) <= i) drawn_.push_back(solverOf(system_.draw(random_)));
-    chattering += !bears(*drawn_[static_cast<std::size_t>(i)], speed, depth, options_.speed_margin);
+    chattering += !isStable(*drawn_[static_cast<std::size_t>(i)], speed, depth, options_.speed_margin);
     if (chattering > options_.risk * options_.draws) return std::nullopt;
   }
   return static_cast<double>(chattering) / options_.draws;
 }
 
-bool DrawnMachines::meanBears(double speed, double depth) const {
-  return bears(*mean_, speed, depth, options_.speed_margin);
+bool DrawnMachines::meanIsStable(double speed, double depth) const {
+  return isStable(*mean_, speed, depth, options_.speed_margin);
 }
 
 UncertainSystem measuredSystem(const RegenerativeSystem& system, const ModalModel& x, const ModalModel& y,
@@ -68,7 +68,7 @@ UncertainSystem measuredSystem(const RegenerativeSystem& system, const ModalMode
                        shareOf(mode.damping_ratio_std, mode.damping_ratio, least.damping),
                        shareOf(mode.gain_std, mode.gain, least.gain)});
     }
-    // What lies above the band counts as one mode more.
+    // The residual compliance is one more mode.
     modes.resize(before + count, {UNKNOWN, UNKNOWN, UNKNOWN});
   }
   const CuttingCoefficients &value = coefficients.value, &deviation = coefficients.std_dev;
@@ -80,13 +80,14 @@ UncertainSystem measuredSystem(const RegenerativeSystem& system, const ModalMode
 
 DrawnLimits drawnLimits(const UncertainSystem& system, const std::vector<double>& speeds, int draws,
                         unsigned seed) {
-  constexpr std::size_t LINES = 600;  // what they miss, mean and draws miss alike
-  if (draws < 1) throw Error("draws: " + std::to_string(draws) + ", at least 1 is due");
+  constexpr std::size_t LINES = 600;  // the error of this resolution cancels in the ratio of draw to mean
+  if (draws < 1) throw Error("draws: " + std::to_string(draws) + ": expected at least 1");
   double highest = 0.0;
   for (const SystemMode& mode : system.mean().modes) highest = std::max(highest, mode.frequency);
-  const auto zeroOrder = [&](const RegenerativeSystem& of) {
-    const RegenerativeProcess process{of.teeth, of.entry, of.exit, of.kt, of.kr / of.kt};
-    return zeroOrderLimit(process, responseOf(of.modes, 1.0, 2.0 * highest, LINES), speeds).depth;
+  const auto zeroOrder = [&](const RegenerativeSystem& machine) {
+    const RegenerativeProcess process{machine.teeth, machine.entry, machine.exit, machine.kt,
+                                      machine.kr / machine.kt};
+    return zeroOrderLimit(process, responseOf(machine.modes, 1.0, 2.0 * highest, LINES), speeds).depth;
   };
   DrawnLimits limits;
   limits.mean = zeroOrder(system.mean());
@@ -110,7 +111,7 @@ std::vector<double> depthsAtRisk(const DrawnLimits& limits, const std::vector<do
       least[draw] = *std::min_element(depth.begin() + static_cast<std::ptrdiff_t>(from),
                                       depth.begin() + static_cast<std::ptrdiff_t>(to) + 1);
     }
-    // So many machines may chatter; the next one's limit is what remains.
+    // This many machines may chatter; the result is the limit of the next one.
     const auto at = static_cast<std::ptrdiff_t>(std::floor(risk * static_cast<double>(draws)));
     std::nth_element(least.begin(), least.begin() + at, least.end());
     const double depth = least[static_cast<std::size_t>(at)];
@@ -122,9 +123,9 @@ std::vector<double> depthsAtRisk(const DrawnLimits& limits, const std::vector<do
 
 std::optional<StableSpeed> stableSpeed(const UncertainSystem& system, double depth, double low, double high,
                                        const RiskOptions& options) {
-  constexpr double STEP = 0.004;  // [1] between speeds that are tried
+  constexpr double STEP = 0.004;  // [1] relative, between speeds
   if (!(depth > 0.0) || !(low > 0.0) || !(high >= low))
-    throw Error("stable speed: a depth above 0 and 0 < low <= high are due");
+    throw Error("stable speed: expected a depth above 0 and speeds 0 < low <= high");
   DrawnMachines drawn(system, options);
   const auto mean = solverOf(system.mean());
   std::vector<double> speeds;
@@ -137,11 +138,11 @@ std::optional<StableSpeed> stableSpeed(const UncertainSystem& system, double dep
     std::size_t below = k, above = k;
     while (stable[k] && below > 0 && stable[below - 1]) --below;
     while (stable[k] && above + 1 < speeds.size() && stable[above + 1]) ++above;
-    // Beyond what is asked nothing is known; there the drawn machines judge.
-    const bool room_below = below == 0 || speeds[below] <= speeds[k] * (1.0 - options.speed_margin);
-    const bool room_above =
+    // At the ends of the range the margin lies beyond the solved speeds; the drawn machines decide there.
+    const bool margin_below = below == 0 || speeds[below] <= speeds[k] * (1.0 - options.speed_margin);
+    const bool margin_above =
         above + 1 == speeds.size() || speeds[above] >= speeds[k] * (1.0 + options.speed_margin);
-    if (!stable[k] || !room_below || !room_above) continue;
+    if (!stable[k] || !margin_below || !margin_above) continue;
     if (const std::optional<double> probability = drawn.probability(speeds[k], depth))
       return StableSpeed{speeds[k], *probability, speeds[below], speeds[above]};
   }

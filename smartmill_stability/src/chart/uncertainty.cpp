@@ -9,7 +9,7 @@
 namespace smartmill::stability {
 namespace {
 
-/// Factor of mean 1 and the standard deviation given, > 0.
+/// Log-normal factor with mean 1 and a standard deviation of `share`.
 double factor(std::mt19937_64& random, double share) {
   std::normal_distribution<double> normal;
   const double variance = std::log1p(share * share);
@@ -27,13 +27,13 @@ UncertainSystem::UncertainSystem(const RegenerativeSystem& system, std::vector<M
     : system_(system), modes_(std::move(modes)), kt_share_(kt_share), kr_share_(kr_share) {
   system_.validate();
   if (modes_.size() != system_.modes.size())
-    throw Error("uncertainty: " + std::to_string(modes_.size()) + " modes are described, the system has " +
+    throw Error("uncertainty: standard deviations of " + std::to_string(modes_.size()) + " modes: expected " +
                 std::to_string(system_.modes.size()));
   for (const ModeUncertainty& m : modes_)
     for (const double value : {m.frequency, m.damping, m.gain, kt_share, kr_share})
       if (!(value >= 0.0) || !(value < 1.0))
-        throw Error("uncertainty: a standard deviation of " + std::to_string(value) +
-                    " of the value, 0..1 is due");
+        throw Error("uncertainty: relative standard deviation " + std::to_string(value) +
+                    ": expected 0 <= value < 1");
 }
 
 UncertainSystem UncertainSystem::of(const MachineModel& model, const RegenerativeSystem& system) {
@@ -56,12 +56,12 @@ RegenerativeSystem UncertainSystem::draw(std::mt19937_64& random) const {
   RegenerativeSystem drawn = system_;
   for (std::size_t k = 0; k < modes_.size(); ++k) {
     SystemMode& mode = drawn.modes[k];
-    // Beyond four standard deviations nothing is drawn, so that a frequency stays positive.
+    // Limited to four standard deviations, so that the frequency stays positive.
     const double off = std::clamp(normal(random), -4.0, 4.0) * modes_[k].frequency;
     const double frequency = std::max(0.05, 1.0 + off);
     mode.frequency *= frequency;
     mode.damping_ratio = std::min(0.99, mode.damping_ratio * factor(random, modes_[k].damping));
-    // Both vectors go with w sqrt(gain).
+    // Both vectors are proportional to w sqrt(gain).
     const double size = frequency * std::sqrt(factor(random, modes_[k].gain));
     for (std::size_t a = 0; a < 2; ++a) {
       mode.input[a] *= size;
@@ -75,7 +75,7 @@ RegenerativeSystem UncertainSystem::draw(std::mt19937_64& random) const {
 
 double chatterProbability(const UncertainSystem& system, double speed, double depth, int draws, unsigned seed,
                           Method method) {
-  if (draws < 1) throw Error("draws: " + std::to_string(draws) + ", at least 1 is due");
+  if (draws < 1) throw Error("draws: " + std::to_string(draws) + ": expected at least 1");
   std::mt19937_64 random(seed);
   int unstable = 0;
   for (int i = 0; i < draws; ++i)
@@ -86,14 +86,15 @@ double chatterProbability(const UncertainSystem& system, double speed, double de
 ProbabilityChart probabilityChart(const UncertainSystem& system, const std::vector<double>& speeds,
                                   const std::vector<double>& depths, int draws, unsigned seed,
                                   const std::function<void(double)>& progress) {
-  if (speeds.empty() || depths.empty()) throw Error("probability chart: no speeds or no depths");
-  if (draws < 1) throw Error("draws: " + std::to_string(draws) + ", at least 1 is due");
+  if (speeds.empty() || depths.empty())
+    throw Error("probability chart: expected at least one speed and one depth");
+  if (draws < 1) throw Error("draws: " + std::to_string(draws) + ": expected at least 1");
   ProbabilityChart chart;
   chart.speeds = speeds;
   chart.depths = depths;
   chart.probability.assign(speeds.size(), std::vector<double>(depths.size(), 0.0));
   SolverOptions options;
-  options.tolerance = 1e-3;  // far below what the draws differ by
+  options.tolerance = 1e-3;  // far below the scatter of the draws
   const double most = *std::max_element(depths.begin(), depths.end());
   for (const Limit& limit : makeSolver(Method::collocation, system.mean(), options)->limits(speeds, most))
     chart.nominal.push_back(limit.depth);
@@ -115,7 +116,7 @@ std::vector<RobustPoint> robustPoints(const ProbabilityChart& chart, double risk
   std::vector<RobustPoint> points;
   for (std::size_t s = 0; s < chart.speeds.size(); ++s) {
     const double speed = chart.speeds[s];
-    // A margin that reaches beyond the chart cannot be vouched for.
+    // Beyond the chart the probability is unknown.
     if (speed * (1.0 - speed_margin) < chart.speeds.front() ||
         speed * (1.0 + speed_margin) > chart.speeds.back())
       continue;

@@ -16,17 +16,17 @@ namespace {
 
 constexpr double NO_LIMIT = std::numeric_limits<double>::infinity();
 
-/// Two numbers within a share of each other.
+/// Whether two numbers differ by at most a relative amount.
 bool close(double a, double b, double share) {
   return std::abs(a - b) <= share * std::min(std::abs(a), std::abs(b));
 }
 
-/// Zero-order limits as a first guess; without any where the solution does not apply.
+/// Zero-order limits as a first guess; empty where that solution does not apply.
 StabilityLimit firstGuess(const RegenerativeSystem& system, const std::vector<double>& speeds) {
   if (system.cut != Cut::milling || !system.evenPitch() || !(system.kt > 0.0) ||
       system.exit > units::TWO_PI + 1e-9)
     return {};
-  // Lines dense around each mode: within a twentieth of its half-power width.
+  // Lines are dense around each mode: spacing below a twentieth of its half-power bandwidth.
   constexpr int NEAR = 60;
   constexpr double REACH = 20.0, LEAST = 50.0;
   double highest = 0.0;
@@ -55,13 +55,13 @@ StabilityLimit firstGuess(const RegenerativeSystem& system, const std::vector<do
   return zeroOrderLimit(mean, response, speeds);
 }
 
-/// First losses at the speeds of a chart: solved from zero at every so many, between them from what the
-/// neighbours and the first guess foretell.
-class Following {
+/// Continuation of the first loss of stability over the speeds of a chart: every STRIDE-th speed is searched from
+/// depth zero, the speeds between start from a prediction by their neighbours and the first guess.
+class LimitContinuation {
  public:
-  /// @param teeth that follow each other evenly; 0: they do not
-  Following(const FloquetSolver& solver, const std::vector<double>& speeds, double max_depth, int teeth,
-            StabilityLimit guess)
+  /// @param teeth with even pitch; 0: uneven pitch
+  LimitContinuation(const FloquetSolver& solver, const std::vector<double>& speeds, double max_depth, int teeth,
+                    StabilityLimit guess)
       : solver_(solver),
         max_depth_(max_depth),
         teeth_(teeth),
@@ -78,8 +78,8 @@ class Following {
     if (seeds.back() + 1 != speeds_.size()) seeds.push_back(speeds_.size() - 1);
     inThreads(seeds.size(), [&](std::size_t k) { search(seeds[k]); });
     inThreads(seeds.size() - 1, [&](std::size_t k) { fill(seeds[k], seeds[k + 1]); });
-    const std::vector<std::size_t> doubted = besideFlips();
-    inThreads(doubted.size(), [&](std::size_t k) { follow(doubted[k], knots_[doubted[k]]); });
+    const std::vector<std::size_t> uncertain = nearFlipLobes();
+    inThreads(uncertain.size(), [&](std::size_t k) { correct(uncertain[k], knots_[uncertain[k]]); });
     StabilityLimit limit;
     limit.spindle_speed = speeds_;
     for (const Knot& knot : knots_) {
@@ -91,34 +91,34 @@ class Following {
 
  private:
   static constexpr std::size_t STRIDE = 10;
-  static constexpr double BELOW = 0.6;       // of the least first guess: a search begins there
+  static constexpr double BELOW = 0.6;       // first depth of a search over the least first guess
   static constexpr double GROWTH = 1.25;     // of the depth in a search
-  static constexpr double TOLERANCE = 1e-3;  // of a depth
-  static constexpr double SAME_LOBE = 0.03;  // of the chatter frequency
-  static constexpr double STRAIGHT = 0.01;   // of a depth foretold
+  static constexpr double TOLERANCE = 1e-3;  // relative, of a depth
+  static constexpr double SAME_LOBE = 0.03;  // relative difference of the chatter frequency
+  static constexpr double STRAIGHT = 0.01;   // relative error of a prediction that permits interpolation
 
   struct Knot {
     double depth = NO_LIMIT;
     double frequency = std::numeric_limits<double>::quiet_NaN();  // [Hz]
-    double slope = 1.0;  // of the log of the radius over that of the depth, at the limit
+    double slope = 1.0;  // d log(spectral radius) / d log(depth) at the limit
     Kind kind = Kind::none;
-    bool solved = false;  // else interpolated
+    bool solved = false;  // false: interpolated
   };
 
-  /// What the map says at a depth.
+  /// Dominant multiplier at a depth.
   struct Sample {
     double depth = 0.0, log_radius = 0.0;
     CharacteristicMultiplier multiplier;
   };
 
-  /// Work 0..count - 1, each independent of the others, by two threads.
+  /// Calls work(0) .. work(count - 1), independent of each other, in two threads.
   static void inThreads(std::size_t count, const std::function<void(std::size_t)>& work) {
     std::atomic<std::size_t> next{0};
-    const auto take = [&] {
+    const auto loop = [&] {
       for (std::size_t k = next++; k < count; k = next++) work(k);
     };
-    auto other = std::async(std::launch::async, take);
-    take();
+    auto other = std::async(std::launch::async, loop);
+    loop();
     other.get();
   }
 
@@ -132,7 +132,7 @@ class Following {
     return (b.log_radius - a.log_radius) / std::log(b.depth / a.depth);
   }
 
-  /// From zero, as the full search does, in larger steps.
+  /// Search from depth zero, in larger steps than FloquetSolver::limit().
   void search(std::size_t i) {
     const auto here = solver_.at(speeds_[i]);
     constexpr int MOST = 8;
@@ -144,15 +144,15 @@ class Following {
     double slope = 0.0;
     while (high.log_radius <= 0.0 && low.depth < max_depth_) {
       constexpr double OVERSHOOT = 1.2, LEAST = 1.04;
-      const double foretold = slope > 0.0 ? std::exp(-OVERSHOOT * low.log_radius / slope) : GROWTH;
-      high = sampleOf(*here, std::min(max_depth_, low.depth * std::clamp(foretold, LEAST, GROWTH)));
+      const double predicted = slope > 0.0 ? std::exp(-OVERSHOOT * low.log_radius / slope) : GROWTH;
+      high = sampleOf(*here, std::min(max_depth_, low.depth * std::clamp(predicted, LEAST, GROWTH)));
       slope = slopeOf(low, high);
       if (high.log_radius <= 0.0) low = high;
     }
     if (high.log_radius > 0.0) knots_[i] = refined(*here, low, high, NO_LIMIT);
   }
 
-  /// Between a stable and an unstable depth. @param frequency [Hz] expected; not finite: unknown
+  /// Limit between a stable and an unstable depth. @param frequency [Hz] expected; not finite: unknown
   static Knot refined(FloquetSolver::AtSpeed& here, Sample low, Sample high, double frequency) {
     constexpr int MOST = 12;
     for (int k = 0; k < MOST && high.depth > (1.0 + TOLERANCE) * low.depth; ++k) {
@@ -173,21 +173,21 @@ class Following {
     knot.slope = slope;
     knot.kind = sample.multiplier.kind();
     knot.depth = sample.depth * std::exp(-sample.log_radius / slope);
-    // The motion holds the multiplier's frequency plus every multiple of the map's.
+    // The motion contains the frequency of the multiplier plus all multiples of that of the period.
     const double step = 1.0 / sample.multiplier.period;
     const double base = std::abs(std::arg(sample.multiplier.value)) / units::TWO_PI * step;
     for (const double sign : {1.0, -1.0}) {
-      const double here_near = sign * base + step * std::round((frequency - sign * base) / step);
-      if (close(here_near, frequency, SAME_LOBE) &&
-          !(std::abs(knot.frequency - frequency) < std::abs(here_near - frequency)))
-        knot.frequency = here_near;
+      const double nearest = sign * base + step * std::round((frequency - sign * base) / step);
+      if (close(nearest, frequency, SAME_LOBE) &&
+          !(std::abs(knot.frequency - frequency) < std::abs(nearest - frequency)))
+        knot.frequency = nearest;
     }
     if (std::isnan(knot.frequency)) knot.frequency = here.chatterFrequency((1.0 + TOLERANCE) * knot.depth);
     return knot;
   }
 
-  /// From a guess. @return false: the limit is not near it
-  bool follow(std::size_t i, const Knot& guess) {
+  /// Solves for the limit near a prediction. @return false: there is none near it
+  bool correct(std::size_t i, const Knot& guess) {
     constexpr int MOST = 5;
     constexpr double NEAR = 0.003, CLOSE_BY = 0.03, FAR = 0.2, REACH = 1.4, LEAST_SLOPE = 0.05;
     if (!(guess.depth > 0.0) || guess.depth > max_depth_) return false;
@@ -224,14 +224,14 @@ class Following {
 
   bool guessed(std::size_t i) const { return !guess_.depth.empty() && std::isfinite(guess_.depth[i]); }
 
-  /// The first guess at i belongs to the lobe that is there.
+  /// Whether the first guess at i belongs to the lobe of a chatter frequency [Hz].
   bool guessFits(std::size_t i, double frequency) const {
     return guessed(i) && close(guess_.chatter_frequency[i], frequency, SAME_LOBE);
   }
 
-  /// Interpolated speeds at which half a wave more than whole ones fits between two teeth: there a flip lobe
-  /// of a speed's width may stand in the flank of the other.
-  std::vector<std::size_t> besideFlips() const {
+  /// Interpolated speeds with an odd number of half waves between two teeth: a flip lobe as narrow as one speed may
+  /// cut the flank of the lobe there.
+  std::vector<std::size_t> nearFlipLobes() const {
     constexpr double NEAR = 0.03;
     std::vector<std::size_t> found;
     for (std::size_t i = 0; i < knots_.size(); ++i)
@@ -241,8 +241,8 @@ class Following {
     return found;
   }
 
-  /// What a and b foretell between them; the first guess over the limit is carried on where it knows the
-  /// lobe.
+  /// Interpolation between a and b; where the first guess belongs to the same lobe, the ratio of limit to guess is
+  /// interpolated.
   Knot between(std::size_t a, std::size_t b, std::size_t i) const {
     const Knot &from = knots_[a], &to = knots_[b];
     const double share = (speeds_[i] - speeds_[a]) / (speeds_[b] - speeds_[a]);
@@ -258,8 +258,9 @@ class Following {
     return knot;
   }
 
-  /// Where a and b stand in different lobes: the first guess, corrected by whichever of them knows its lobe.
-  Knot beyond(std::size_t a, std::size_t b, std::size_t i) const {
+  /// Prediction where a and b belong to different lobes: the first guess, scaled by the ratio of limit to guess at
+  /// the one in the same lobe.
+  Knot acrossLobes(std::size_t a, std::size_t b, std::size_t i) const {
     Knot knot = std::isfinite(knots_[a].depth) ? knots_[a] : knots_[b];
     if (std::isfinite(knots_[a].depth) && std::isfinite(knots_[b].depth))
       knot.depth = std::sqrt(knots_[a].depth * knots_[b].depth);
@@ -275,14 +276,14 @@ class Following {
     return knot;
   }
 
-  /// Waves between two teeth; whole ones are the number of the lobe.
+  /// Number of waves between two teeth; its integer part is the number of the lobe.
   double waves(std::size_t i, double frequency) const {
     return teeth_ > 0 ? frequency * units::TWO_PI / (teeth_ * speeds_[i]) : 0.0;
   }
   double lobe(std::size_t i, double frequency) const { return std::floor(waves(i, frequency)); }
 
-  /// Near enough to each other for what is between them to be foretold.
-  bool alike(std::size_t a, std::size_t b) const {
+  /// Whether a and b are similar enough for interpolation between them.
+  bool similar(std::size_t a, std::size_t b) const {
     constexpr double RATIO = 0.06, DEPTH = 0.3;
     const Knot &from = knots_[a], &to = knots_[b];
     if (guessFits(a, from.frequency) && guessFits(b, to.frequency))
@@ -303,7 +304,7 @@ class Following {
     return true;
   }
 
-  /// Stable as deep as is asked for, on both sides and by the first guess between them.
+  /// Whether a and b are stable to the largest depth, and the speeds between them by the first guess.
   bool noneBetween(std::size_t a, std::size_t b) const {
     if (std::isfinite(knots_[a].depth) || std::isfinite(knots_[b].depth)) return false;
     for (std::size_t i = a + 1; i < b; ++i)
@@ -323,12 +324,12 @@ class Following {
     const std::size_t middle = (a + b) / 2;
     if (noneBetween(a, b) && stableTo(middle, max_depth_)) return;
     const bool one = oneLobe(a, b);
-    const Knot foretold = one ? between(a, b, middle) : beyond(a, b, middle);
-    if (!follow(middle, foretold)) search(middle);
+    const Knot predicted = one ? between(a, b, middle) : acrossLobes(a, b, middle);
+    if (!correct(middle, predicted)) search(middle);
     const Knot& found = knots_[middle];
-    if (!one || !alike(a, b) || found.kind != knots_[a].kind ||
-        !close(found.depth, foretold.depth, STRAIGHT) ||
-        !close(found.frequency, foretold.frequency, STRAIGHT)) {
+    if (!one || !similar(a, b) || found.kind != knots_[a].kind ||
+        !close(found.depth, predicted.depth, STRAIGHT) ||
+        !close(found.frequency, predicted.frequency, STRAIGHT)) {
       fill(a, middle);
       fill(middle, b);
       return;
@@ -376,16 +377,16 @@ std::vector<SystemMode> withOverhang(std::vector<SystemMode> modes, double overh
   return modes;
 }
 
-StabilityLimit followedLimits(const RegenerativeSystem& system, const std::vector<double>& speeds,
-                              double max_depth) {
+StabilityLimit limitsByContinuation(const RegenerativeSystem& system, const std::vector<double>& speeds,
+                                    double max_depth) {
   constexpr int NODES = 8;
   SolverOptions options;
   options.tolerance = 1e-3;
   options.nodes = NODES;
   options.many = true;
-  if (speeds.size() < 2) throw Error("what if: at least two speeds are due");
-  return Following(*makeFloquetSolver(Method::collocation, system, options), speeds, max_depth,
-                   system.evenPitch() ? system.teeth : 0, firstGuess(system, speeds))
+  if (speeds.size() < 2) throw Error("what if: expected at least two speeds");
+  return LimitContinuation(*makeFloquetSolver(Method::collocation, system, options), speeds, max_depth,
+                           system.evenPitch() ? system.teeth : 0, firstGuess(system, speeds))
       .run();
 }
 
@@ -395,9 +396,9 @@ int dominantMode(const std::vector<SystemMode>& modes, double frequency) {
   if (std::isnan(frequency)) return found;
   for (std::size_t k = 0; k < modes.size(); ++k) {
     const auto h = receptance({modes[k]}, frequency);
-    const double answer = std::sqrt(std::norm(h[0]) + std::norm(h[1]) + std::norm(h[2]) + std::norm(h[3]));
-    if (!(answer > largest)) continue;
-    largest = answer;
+    const double size = std::sqrt(std::norm(h[0]) + std::norm(h[1]) + std::norm(h[2]) + std::norm(h[3]));
+    if (!(size > largest)) continue;
+    largest = size;
     found = static_cast<int>(k);
   }
   return found;

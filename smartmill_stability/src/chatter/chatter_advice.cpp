@@ -9,8 +9,8 @@ namespace smartmill::stability {
 namespace {
 
 struct Probe {
-  double gap =
-      0.0;  // [Hz] signed distance of the predicted frequency from the observed, modulo the tooth passing
+  /// [Hz] Predicted minus observed frequency, modulo the tooth passing frequency.
+  double gap = 0.0;
   bool chatters = false;
 };
 
@@ -18,7 +18,7 @@ Probe probe(const RegenerativeSystem& system, double speed, double depth, double
   const auto at = makeFloquetSolver(Method::collocation, system)->at(speed);
   const CharacteristicMultiplier m = at->multiplier(depth);
   const double passing = 1.0 / m.period, predicted = at->chatterFrequency(depth);
-  // A multiplier and its conjugate: frequencies at +f and -f, each plus whole multiples.
+  // A multiplier and its conjugate: frequencies +f and -f, each plus integer multiples of the tooth passing.
   const double same = std::remainder(predicted - observed, passing);
   const double mirrored = -std::remainder(-predicted - observed, passing);
   return {std::abs(same) <= std::abs(mirrored) ? same : mirrored, m.radius() > 1.0};
@@ -27,7 +27,7 @@ Probe probe(const RegenerativeSystem& system, double speed, double depth, double
 RegenerativeSystem scaled(const RegenerativeSystem& system, std::size_t mode, double factor) {
   RegenerativeSystem changed = system;
   SystemMode& m = changed.modes[mode];
-  // The compliance stays: both vectors go with the frequency.
+  // Constant compliance: both vectors are proportional to the frequency.
   m.frequency *= factor;
   for (std::size_t a = 0; a < 2; ++a) {
     m.input[a] *= factor;
@@ -67,8 +67,9 @@ std::vector<ChatterEpisode> episodes(const std::vector<ChatterState>& states) {
 }
 
 std::vector<double> speedsFromChatter(double frequency, int teeth, double low, double high) {
-  if (!(frequency > 0.0) || teeth < 1) throw Error("chatter speeds: a frequency and teeth are due");
-  if (!(low > 0.0) || !(high >= low)) throw Error("chatter speeds: 0 < low <= high is due");
+  if (!(frequency > 0.0) || teeth < 1)
+    throw Error("chatter speeds: expected a frequency above 0 Hz and at least 1 tooth");
+  if (!(low > 0.0) || !(high >= low)) throw Error("chatter speeds: expected 0 < low <= high");
   std::vector<double> speeds;
   for (int k = 1;; ++k) {
     const double speed = units::TWO_PI * frequency / (k * teeth);
@@ -79,8 +80,9 @@ std::vector<double> speedsFromChatter(double frequency, int teeth, double low, d
 
 std::optional<ModeCorrection> correctFromChatter(const RegenerativeSystem& believed, double speed,
                                                  double depth, double observed, double most) {
-  if (!(observed > 0.0)) throw Error("chatter correction: a frequency above 0 Hz is due");
-  if (!(most > 0.0) || most >= 0.5) throw Error("chatter correction: largest change 0..0.5 is due");
+  if (!(observed > 0.0)) throw Error("chatter correction: expected a frequency above 0 Hz");
+  if (!(most > 0.0) || most >= 0.5)
+    throw Error("chatter correction: expected a largest change between 0 and 0.5");
   std::optional<ModeCorrection> best;
   const auto consider = [&](std::size_t mode, double factor, bool chatters) {
     const bool better = !best || (chatters && !best->chatters) ||
@@ -91,7 +93,7 @@ std::optional<ModeCorrection> correctFromChatter(const RegenerativeSystem& belie
   };
   const double passing = speed * believed.teeth / units::TWO_PI;
   for (std::size_t mode = 0; mode < believed.modes.size(); ++mode) {
-    // Roots of the gap over the factor; a step where another motion takes over, or a wrap, is no root.
+    // Roots of the gap over the factor. A jump to another motion and a wrap-around are no roots.
     constexpr int STEPS = 40;
     double before_factor = 1.0 - most;
     Probe before = probe(scaled(believed, mode, before_factor), speed, depth, observed);
@@ -124,14 +126,14 @@ ChatterAdvisor::ChatterAdvisor(double low, double high, int teeth, Believed beli
       believed_(std::move(believed)),
       output_(std::move(output)),
       early_(std::move(early)) {
-  if (!(low > 0.0) || !(high >= low)) throw Error("chatter advice: 0 < low <= high speed is due");
-  if (teeth < 1) throw Error("chatter advice: teeth are due");
+  if (!(low > 0.0) || !(high >= low)) throw Error("chatter advice: expected speeds 0 < low <= high");
+  if (teeth < 1) throw Error("chatter advice: expected at least 1 tooth");
 }
 
 void ChatterAdvisor::handle(const CuttingCondition& condition) {
-  constexpr std::size_t KEPT = 8;
+  constexpr std::size_t MOST = 8;
   conditions_.push_back(condition);
-  if (conditions_.size() > KEPT) conditions_.pop_front();
+  if (conditions_.size() > MOST) conditions_.pop_front();
 }
 
 void ChatterAdvisor::handle(const CncState& state) {
@@ -158,12 +160,12 @@ void ChatterAdvisor::handle(const ChatterState& state) {
 
 namespace {
 
-/// Speeds at which the teeth pass in step with the chatter, fastest first, then with a mode (a flip's
-/// frequency is no mode's: the pockets lie there). Limits are not known yet.
+/// Speeds at which the tooth passing frequency divides the chatter frequency, highest first, then those of the
+/// modal frequencies, where the pockets are if the chatter is a flip. The limits are still unknown.
 std::vector<ChatterAdvice::Speed> inStep(double frequency, int teeth, const std::vector<SystemMode>& modes,
                                          double low, double high) {
   constexpr std::size_t MOST_SPEEDS = 12;
-  constexpr double ALIKE = 0.01, UNKNOWN = std::numeric_limits<double>::quiet_NaN();
+  constexpr double SAME_SPEED = 0.01, UNKNOWN = std::numeric_limits<double>::quiet_NaN();
   std::vector<double> proposed = speedsFromChatter(frequency, teeth, low, high);
   if (proposed.size() > MOST_SPEEDS) proposed.resize(MOST_SPEEDS);
   for (const SystemMode& mode : modes)
@@ -172,7 +174,7 @@ std::vector<ChatterAdvice::Speed> inStep(double frequency, int teeth, const std:
   std::vector<ChatterAdvice::Speed> speeds;
   for (const double s : proposed) {
     if (std::none_of(speeds.begin(), speeds.end(), [&](const ChatterAdvice::Speed& other) {
-          return std::abs(other.speed / s - 1.0) < ALIKE;
+          return std::abs(other.speed / s - 1.0) < SAME_SPEED;
         }))
       speeds.push_back({s, UNKNOWN, UNKNOWN});
   }
@@ -193,14 +195,14 @@ void ChatterAdvisor::advise(const ChatterState& state) {
   advice.depth = condition.engagement.axial_depth;
   const int teeth = condition.tool.teeth > 0 ? condition.tool.teeth : teeth_;
   std::optional<RegenerativeSystem> system = believed_(condition);
-  // Nearer than this it is the commanded speed under load, further off a spindle that runs up or down.
+  // A smaller difference is the effect of load on the commanded speed, a larger one a spindle run-up or stop.
   constexpr double LOAD = 0.01, OVERRIDE = 0.5;
   const double off = std::abs(actual_speed_ - condition.spindle_speed) / condition.spindle_speed;
   const double speed = off > LOAD && off < OVERRIDE ? actual_speed_ : condition.spindle_speed;
   advice.speed = speed;
   advice.engagement = condition.engagement;
   advice.teeth = teeth;
-  // Deep enough to tell a pocket from the rest.
+  // Deep enough to identify pockets.
   const double most = 5.0 * advice.depth;
   if (system && speed > 0.0 && advice.depth > 0.0) {
     const auto limitOf = [&](const RegenerativeSystem& s) {

@@ -15,10 +15,10 @@
 namespace smartmill::stability {
 namespace {
 
-/// What a window of whole turns holds, summed over the axes.
+/// Energies of a window of whole revolutions, summed over the axes.
 class WindowContent {
  public:
-  /// @param bins samples a turn @param teeth of the tool
+  /// @param bins samples in a revolution @param teeth of the tool
   WindowContent(std::size_t bins, std::size_t turns, int teeth)
       : outside_of_turn(turns, 0.0),
         bins_(bins),
@@ -28,10 +28,10 @@ class WindowContent {
         of_order_(bins / 2 + 1, 0.0),
         power_(bins * turns / 2 + 1, 0.0) {}
 
-  double all = 0.0;                     // mean square about the mean
-  double outside = 0.0;                 // of what does not repeat with the turn
-  double alternating = 0.0;             // of what repeats with the turn where a flip lies
-  std::vector<double> outside_of_turn;  // mean square of each
+  double all = 0.0;                     // variance
+  double outside = 0.0;                 // mean square of the remainder without the synchronous part
+  double alternating = 0.0;             // mean square of the synchronous part at the orders of a flip
+  std::vector<double> outside_of_turn;  // mean square of the remainder in each revolution
 
   void add(std::vector<double> force) {
     const auto n = static_cast<double>(force.size());
@@ -41,7 +41,7 @@ class WindowContent {
       mean += force[i] / n;
       repeated[i % bins_] += force[i] / static_cast<double>(turns_);
     }
-    // The mean over the turns takes one part in `turns` of whatever does not repeat with it.
+    // The mean over the revolutions removes 1 / turns of the energy of the remainder.
     const double share = static_cast<double>(turns_) / static_cast<double>(turns_ - 1);
     for (std::size_t i = 0; i < force.size(); ++i) {
       all += (force[i] - mean) * (force[i] - mean) / n;
@@ -55,11 +55,11 @@ class WindowContent {
     for (std::size_t k = 0; k < power_.size(); ++k) power_[k] += std::norm(spectrum[k]);
   }
 
-  /// [1 / window] frequency of the strongest line beside what repeats.
+  /// [1 / window] Frequency of the strongest line of the remainder.
   double strongest() const {
     const auto peak =
         static_cast<std::size_t>(std::max_element(power_.begin() + 1, power_.end() - 1) - power_.begin());
-    // Vertex of the parabola through the logarithms: exact to a few percent of a line under a Hann window.
+    // Vertex of the parabola through the logarithms: exact to a few percent of a line for a Hann window.
     const double a = std::log(power_[peak - 1] + 1e-300), b = std::log(power_[peak] + 1e-300),
                  c = std::log(power_[peak + 1] + 1e-300);
     const double curve = a - 2.0 * b + c;
@@ -67,21 +67,21 @@ class WindowContent {
     return static_cast<double>(peak) + shift;
   }
 
-  /// [1 / turn] the strongest of the orders where a flip lies.
+  /// [1 / revolution] Strongest order of a flip.
   double strongestOrder() const {
     return static_cast<double>(std::max_element(of_order_.begin(), of_order_.end()) - of_order_.begin());
   }
 
-  /// What dies out within the window is a transient (an entry), not chatter.
-  bool dies() const {
-    constexpr double DIES = 0.7;
+  /// Whether the remainder decays within the window: a transient of the entry, not chatter.
+  bool decays() const {
+    constexpr double DECAY = 0.7;
     double early = 0.0, late = 0.0;
     for (std::size_t k = 0; k < turns_; ++k) (2 * k < turns_ ? early : late) += outside_of_turn[k];
-    return late < DIES * early;
+    return late < DECAY * early;
   }
 
  private:
-  /// Orders of the spindle at which a flip of an even number of teeth lies: odd multiples of half the teeth.
+  /// Spindle orders of a flip for an even number of teeth: odd multiples of half the number of teeth.
   void addAlternation(const std::vector<double>& repeated) {
     if (half_ == 0) return;
     const auto orders = fourier(repeated);
@@ -116,7 +116,7 @@ void ChatterDetector::reset() {
   dropWindow();
   last_state_ = 0.0;
   next_index_ = 0;
-  said_invalid_ = false;
+  reported_invalid_ = false;
 }
 
 void ChatterDetector::dropWindow() {
@@ -127,10 +127,9 @@ void ChatterDetector::dropWindow() {
 
 void ChatterDetector::notSteady(double stamp) {
   dropWindow();
-  // The condition that holds at the beginning is older than its receipt: who recorded it late must not hear
-  // more than who had it in time.
-  if (said_invalid_ || !condition_) return;
-  said_invalid_ = true;
+  // The first condition may be older than its receipt: the results must not depend on how late it was received.
+  if (reported_invalid_ || !condition_) return;
+  reported_invalid_ = true;
   ChatterState state;
   state.stamp = stamp;
   state.condition = condition_->name;
@@ -139,8 +138,8 @@ void ChatterDetector::notSteady(double stamp) {
 
 void ChatterDetector::handle(const CuttingCondition& condition) {
   condition_ = condition;
-  said_invalid_ = false;
-  // Turns are counted from here on: the digits of a verdict must not depend on how long the node has run.
+  reported_invalid_ = false;
+  // The angle is accumulated from here on, so that rounding does not depend on how long the node has run.
   if (!angles_.empty()) angles_.assign(1, {angles_.back().time, angles_.back().shown, angles_.back().shown});
   notSteady(condition.stamp);
 }
@@ -211,10 +210,10 @@ double ChatterDetector::timeAt(double turned) const {
 
 void ChatterDetector::evaluate() {
   if (!steady_since_) {
-    // Nothing to judge: keep what the next controller state may still declare steady.
-    const double kept = 2.0 * parameters_.maximum_gap;
-    while (!samples_.empty() && samples_.front().time < samples_.back().time - kept) samples_.pop_front();
-    while (angles_.size() > 2 && angles_[1].time < angles_.back().time - kept) angles_.pop_front();
+    // Retain data that the next controller state may declare steady.
+    const double retained = 2.0 * parameters_.maximum_gap;
+    while (!samples_.empty() && samples_.front().time < samples_.back().time - retained) samples_.pop_front();
+    while (angles_.size() > 2 && angles_[1].time < angles_.back().time - retained) angles_.pop_front();
     return;
   }
   if (samples_.size() < 4 || angles_.size() < 2) return;
@@ -237,12 +236,12 @@ std::vector<double> ChatterDetector::forceAt(const std::vector<double>& times, s
   std::vector<double> force;
   force.reserve(times.size());
   for (const double time : times) {
-    const double place = (time - samples_.front().time) * rate;
+    const double position = (time - samples_.front().time) * rate;
     const auto at = static_cast<std::size_t>(
-        std::clamp(std::floor(place), 1.0, static_cast<double>(samples_.size() - 3)));
+        std::clamp(std::floor(position), 1.0, static_cast<double>(samples_.size() - 3)));
     force.push_back(catmullRom(samples_[at - 1].force[axis], samples_[at].force[axis],
                                samples_[at + 1].force[axis], samples_[at + 2].force[axis],
-                               place - static_cast<double>(at)));
+                               position - static_cast<double>(at)));
   }
   return force;
 }
@@ -252,7 +251,7 @@ void ChatterDetector::judge(double from, double to) {
   const double period = (stop - start) / parameters_.revolutions;
   const double rate =
       static_cast<double>(samples_.size() - 1) / (samples_.back().time - samples_.front().time);
-  if (!(period * rate >= 8.0)) return;  // fewer samples a turn carry no harmonics
+  if (!(period * rate >= 8.0)) return;  // fewer samples in a revolution do not resolve harmonics
   const auto bins = static_cast<std::size_t>(std::ceil(period * rate));
   const auto turns = static_cast<std::size_t>(parameters_.revolutions);
   std::vector<double> times;
@@ -273,20 +272,21 @@ void ChatterDetector::judge(double from, double to) {
   state.energy_ratio = all > 0.0 ? std::min(1.0, chatter_energy / all) : 0.0;
   state.severity = std::sqrt(chatter_energy);
   state.frequency = flip ? content.strongestOrder() / period : content.strongest() / (stop - start);
-  state.chatter = (flip || !content.dies()) && state.energy_ratio > parameters_.energy_ratio &&
+  state.chatter = (flip || !content.decays()) && state.energy_ratio > parameters_.energy_ratio &&
                   state.severity > parameters_.least_severity;
   if (state.chatter) {
-    // A flip repeats: it was there from the window's beginning, as far as this window tells.
+    // A flip is synchronous: within this window it is present from the start.
     std::size_t turn = flip ? 0 : turns - 1;
     while (turn > 0 && content.outside_of_turn[turn - 1] > parameters_.energy_ratio * all) --turn;
     state.onset = times[turn * bins];
   }
-  said_invalid_ = false;
+  reported_invalid_ = false;
   output_(state);
 }
 
 ForceBlock signalBlock(const SampleBlock& block) {
-  if (block.channels.empty()) throw Error("chatter detection: a sample block without channels");
+  if (block.channels.empty())
+    throw Error("chatter detection: sample block without channels: expected at least one");
   ForceBlock signal;
   signal.stamp = block.stamp;
   signal.sample_rate = block.sample_rate;

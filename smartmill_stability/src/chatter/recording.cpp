@@ -14,29 +14,29 @@
 namespace smartmill::stability {
 namespace {
 
-constexpr double LOWEST = 80.0, HIGHEST = 6000.0;            // [Hz] looked at
+constexpr double LOWEST = 80.0, HIGHEST = 6000.0;            // [Hz] band of the analysis
 constexpr double TURNS = 32.0;                               // revolutions of a window
 constexpr double LEAST_WINDOW = 0.08, LONGEST_WINDOW = 0.8;  // [s]
 constexpr int LEAST_WINDOWS = 5;
-constexpr double MAIN_LOBE = 3.5;  // [lines] half width of a sine under the window
-constexpr double SPREAD = 0.0015;  // [1] of the frequency: the spindle's speed varies
-constexpr double LINE = 14.0;      // [x] of what is beside it, power
-constexpr double NARROW = 0.06;    // [1] of a line's power, this far beside it at most
-constexpr double AIR = 6.0;        // [x] over the same line out of the cut, power
-constexpr double PRESENT = 5.0;    // [x] of what is beside it, in one window
-constexpr double STANDS = 0.6;     // [1] of the cut's windows
-constexpr double CONTRAST = 1.8;   // [x] power of cutting over not cutting
-constexpr double STRONG = 0.3;     // [1] of the harmonics' power: needs no companion where the air is silent
-constexpr double LEAST_SHARE = 0.02;                    // [1] of the harmonics' power
-constexpr double BELOW_MODE = 0.06, ABOVE_MODE = 0.15;  // [1] chatter lies above its mode, mostly
-constexpr double APART = 0.5, DRIFT = 0.0006;           // [lines], [1] of the frequency: between companions
-constexpr int COMPANIONS = 4;                           // tooth passings to each side
+constexpr double MAIN_LOBE = 3.5;  // [lines] half width of the main lobe of the window
+constexpr double SPREAD = 0.0015;  // [1] relative variation of the spindle speed
+constexpr double LINE = 14.0;      // [1] least power of a line over the noise floor
+constexpr double NARROW = 0.06;    // [1] largest power next to a line over its power
+constexpr double AIR = 6.0;        // [1] least power over that of the same line outside the cut
+constexpr double PRESENT = 5.0;    // [1] least power over the surroundings in one window
+constexpr double STEADY = 0.6;     // [1] least fraction of the windows of the cut
+constexpr double CONTRAST = 1.8;   // [1] least power of the cut over that of the rest
+constexpr double STRONG = 0.3;     // [1] power over the harmonics above which no companion is required
+constexpr double LEAST_SHARE = 0.02;                    // [1] least power over the harmonics
+constexpr double BELOW_MODE = 0.06, ABOVE_MODE = 0.15;  // [1] range around a mode; chatter is mostly above it
+constexpr double LINE_ERROR = 0.5, DRIFT = 0.0006;      // [lines], [1]: tolerance of the distance of companions
+constexpr int COMPANIONS = 4;                           // tooth passing frequencies to each side
 
 double decibel(double ratio) {
   return 10.0 * std::log10(std::max(1e-30, ratio));
 }
 
-/// So that no strong harmonic makes lines beside itself.
+/// Blackman-Harris window: the side lobes of strong harmonics stay below chatter lines.
 std::vector<double> taper(std::size_t n) {
   std::vector<double> window(n);
   for (std::size_t i = 0; i < n; ++i)
@@ -79,7 +79,7 @@ Spectrogram spectrogramOf(const Recording& recording, double window_seconds) {
   return result;
 }
 
-/// Median over the lines beside each: broadband noise, whatever lines stand in it.
+/// Noise floor: running median over neighbouring lines, insensitive to single lines.
 std::vector<double> floorOf(const std::vector<double>& power) {
   constexpr std::size_t REACH = 40, STRIDE = 4;
   std::vector<double> floor(power.size());
@@ -94,15 +94,15 @@ std::vector<double> floorOf(const std::vector<double>& power) {
   return floor;
 }
 
-class Judge {
+class RecordingAnalysis {
  public:
-  Judge(const Recording& recording, const RecordingRequest& request) : request_(request) {
+  RecordingAnalysis(const Recording& recording, const RecordingRequest& request) : request_(request) {
     const double seconds = static_cast<double>(recording.channels[0].size()) / recording.sample_rate;
     const double turn = units::TWO_PI / request.speed;
     const double window =
         std::min(std::clamp(TURNS * turn, LEAST_WINDOW, LONGEST_WINDOW), 2.0 * seconds / (LEAST_WINDOWS + 1));
     if (window < 8.0 * turn)
-      throw Error(formatted("recording: %.2f s hold %.0f revolutions, %d at least are due", seconds,
+      throw Error(formatted("recording: %.2f s with %.0f revolutions: expected at least %d revolutions", seconds,
                             seconds / turn, 8 * (LEAST_WINDOWS + 1) / 2));
     verdict_.spectrogram = spectrogramOf(recording, window);
     step_ = verdict_.spectrogram.frequency[1];
@@ -115,8 +115,8 @@ class Judge {
     floor_ = floorOf(in_cut_);
     findSpeed();
     findLines();
-    verdict_.cut = parts_ || verdict_.chatter || inStep();
-    if (!verdict_.cut) verdict_.reason = "nothing is heard that cuts";
+    verdict_.cut = has_air_ || verdict_.chatter || hasToothPassing();
+    if (!verdict_.cut) verdict_.reason = "no louder part and no lines at the tooth passing frequency";
     return verdict_;
   }
 
@@ -131,7 +131,7 @@ class Judge {
   }
   double passing() const { return request_.teeth * verdict_.speed / units::TWO_PI; }  // [Hz]
 
-  /// Loud windows and quiet ones, by Otsu's threshold on the log of their power.
+  /// Separates loud from quiet windows, by Otsu's threshold on the logarithm of their power.
   void findCut() {
     std::vector<double> level;
     for (const std::vector<double>& power : windows()) {
@@ -155,10 +155,10 @@ class Judge {
       threshold = 0.5 * (sorted[i] + sorted[i + 1]);
       contrast = high - low;
     }
-    parts_ = contrast > std::log(CONTRAST);
-    for (std::size_t w = 0; w < level.size(); ++w) cut_.push_back(!parts_ || level[w] > threshold);
-    if (parts_ && !teethPart()) {
-      parts_ = false;
+    has_air_ = contrast > std::log(CONTRAST);
+    for (std::size_t w = 0; w < level.size(); ++w) cut_.push_back(!has_air_ || level[w] > threshold);
+    if (has_air_ && !loudFromTeeth()) {
+      has_air_ = false;
       cut_.assign(level.size(), true);
     }
     const auto first = std::find(cut_.begin(), cut_.end(), true) - cut_.begin();
@@ -167,10 +167,11 @@ class Judge {
     verdict_.to = verdict_.spectrogram.time[static_cast<std::size_t>(last)];
   }
 
-  /// Louder because the teeth are in it, for a while, and not because a vibration grows in the cut.
-  bool teethPart() {
-    constexpr double TEETH = 3.0;   // [x] power
-    constexpr double LEAST = 0.12;  // [1] of the windows
+  /// Whether the loud windows are louder at the tooth passing frequency: a cut, not a vibration that grows within
+  /// a cut.
+  bool loudFromTeeth() {
+    constexpr double TEETH = 3.0;   // [1] power ratio
+    constexpr double LEAST = 0.12;  // [1] least fraction of the windows of either kind
     const auto loud = static_cast<double>(std::count(cut_.begin(), cut_.end(), true));
     const double all = static_cast<double>(cut_.size());
     if (std::min(loud, all - loud) < std::max(2.0, LEAST * all)) return false;
@@ -180,7 +181,7 @@ class Judge {
     for (double f = tooth; f < verdict_.spectrogram.frequency.back(); f += tooth) {
       const double reach = request_.speed_error * f + MAIN_LOBE * step_;
       if (f < LOWEST) continue;
-      if (reach > 0.25 * tooth) break;  // higher ones cannot be told apart
+      if (reach > 0.25 * tooth) break;  // higher harmonics are not resolved
       const auto from = static_cast<std::size_t>((f - reach) / step_);
       const auto to = std::min(cut.size() - 1, static_cast<std::size_t>((f + reach) / step_));
       for (std::size_t k = from; k <= to; ++k) {
@@ -191,8 +192,8 @@ class Judge {
     return in > TEETH * out;
   }
 
-  /// Mean over the windows of one kind whose neighbours are of that kind too; all of the kind where there is
-  /// none. Empty: none of that kind.
+  /// Mean spectrum of the windows in the cut or outside, without those at a transition unless there are no others.
+  /// Empty without such windows.
   std::vector<double> mean(bool cut) const {
     std::vector<double> sum(verdict_.spectrogram.frequency.size(), 0.0);
     for (const bool inner : {true, false}) {
@@ -212,8 +213,8 @@ class Judge {
     return {};
   }
 
-  /// How well tooth passings at a speed meet lines.
-  double comb(double speed) const {
+  /// Agreement of the lines with the tooth passing harmonics at a speed.
+  double combScore(double speed) const {
     const double tooth = request_.teeth * speed / units::TWO_PI;
     double score = 0.0;
     for (double f = tooth; f < verdict_.spectrogram.frequency.back(); f += tooth) {
@@ -225,74 +226,74 @@ class Judge {
 
   void findSpeed() {
     verdict_.speed = request_.speed;
-    // A correction beyond what a spindle's load does has to say more.
+    // A correction larger than the effect of load must improve the score by the factor BEYOND.
     constexpr double LOADED = 0.005, BEYOND = 1.15;
-    double best = comb(request_.speed);
+    double best = combScore(request_.speed);
     const double step = 0.3 * step_ / verdict_.spectrogram.frequency.back();
     for (double off = -request_.speed_error; off <= request_.speed_error; off += step) {
       const double speed = request_.speed * (1.0 + off);
-      const double score = comb(speed) / (std::abs(off) > LOADED ? BEYOND : 1.0);
+      const double score = combScore(speed) / (std::abs(off) > LOADED ? BEYOND : 1.0);
       if (!(score > best)) continue;
       best = score;
       verdict_.speed = speed;
     }
   }
 
-  /// The teeth are heard, though nothing changes.
-  bool inStep() const {
-    constexpr double HEARD = 30.0;  // [x] of what is beside it
-    int heard = 0;
+  /// Whether tooth passing harmonics are present.
+  bool hasToothPassing() const {
+    constexpr double LEAST = 30.0;  // [1] power over the noise floor
+    int found = 0;
     for (int k = 1; k <= 3; ++k) {
       const std::size_t at = lineAt(k * passing());
-      heard += in_cut_[at] > HEARD * floor_[at];
+      found += in_cut_[at] > LEAST * floor_[at];
     }
-    return heard >= 2;
+    return found >= 2;
   }
 
-  /// [Hz] to the nearest order of the turn.
+  /// [Hz] Distance to the nearest spindle harmonic.
   double offHarmonic(double frequency) const {
     return std::abs(std::remainder(frequency, verdict_.speed / units::TWO_PI));
   }
 
   bool narrowLine(std::size_t k) const {
-    constexpr std::size_t BESIDE = 6;
-    if (k < BESIDE + 2 || k + BESIDE + 2 >= in_cut_.size()) return false;
+    constexpr std::size_t DISTANCE = 6;
+    if (k < DISTANCE + 2 || k + DISTANCE + 2 >= in_cut_.size()) return false;
     const double p = in_cut_[k];
     if (p < LINE * floor_[k] || p < in_cut_[k - 1] || p < in_cut_[k + 1]) return false;
-    const auto beside = [&](std::size_t at) {
+    const auto meanAt = [&](std::size_t at) {
       return (in_cut_[at - 1] + in_cut_[at] + in_cut_[at + 1]) / 3.0;
     };
-    // On one side a harmonic may stand.
-    return std::min(beside(k - BESIDE), beside(k + BESIDE)) < NARROW * p;
+    // A harmonic may be present on one side.
+    return std::min(meanAt(k - DISTANCE), meanAt(k + DISTANCE)) < NARROW * p;
   }
 
   double overAir(std::size_t k) const {
-    if (!parts_ || air_.empty()) return RecordingVerdict::UNKNOWN;
+    if (!has_air_ || air_.empty()) return RecordingVerdict::UNKNOWN;
     return in_cut_[k] / std::max({air_[k - 1], air_[k], air_[k + 1], 1e-30});
   }
 
-  /// In most of the cut's windows it stands where it stands in their mean.
-  bool stands(std::size_t k) const {
-    int cut = 0, there = 0;
+  /// Whether a line of the mean spectrum is present at the same frequency in most windows of the cut.
+  bool isSteady(std::size_t k) const {
+    int cut = 0, present = 0;
     for (std::size_t w = 0; w < cut_.size(); ++w) {
       if (!cut_[w]) continue;
       ++cut;
       const std::vector<double>& power = windows()[w];
       const double here = std::max({power[k - 1], power[k], power[k + 1]});
       constexpr std::size_t FAR = 12, WIDE = 6;
-      double beside = 0.0;
+      double around = 0.0;
       for (std::size_t i = 0; i < WIDE; ++i)
-        beside += (power[k > FAR + i ? k - FAR - i : 0] + power[std::min(power.size() - 1, k + FAR + i)]) /
+        around += (power[k > FAR + i ? k - FAR - i : 0] + power[std::min(power.size() - 1, k + FAR + i)]) /
                   (2.0 * WIDE);
-      there += here > PRESENT * std::min(beside, floor_[k] * 3.0);
+      present += here > PRESENT * std::min(around, floor_[k] * 3.0);
     }
-    return there >= STANDS * cut;
+    return present >= STEADY * cut;
   }
 
-  /// Lines that belong to one.
+  /// Lines that differ from one line by an integer number of tooth passing frequencies.
   struct Family {
     int companions = 0;
-    bool adjacent = false;  // one of them is a single tooth passing away
+    bool adjacent = false;  // one of them is one tooth passing frequency away
     double power = 0.0;
   };
   Family familyOf(const Line& line, const std::vector<Line>& lines) const {
@@ -301,10 +302,10 @@ class Judge {
     for (const Line& other : lines) {
       if (&other == &line || !sameFamily(line, other)) continue;
       const double order = (other.frequency - line.frequency) / passing();
-      const bool apart = std::abs(order - std::round(order)) * passing() < tolerance(line, other);
-      if (apart && std::abs(order) > COMPANIONS + 0.5) continue;
+      const bool integer = std::abs(order - std::round(order)) * passing() < tolerance(line, other);
+      if (integer && std::abs(order) > COMPANIONS + 0.5) continue;
       ++family.companions;
-      family.adjacent = family.adjacent || (apart && std::abs(std::round(order)) == 1.0);
+      family.adjacent = family.adjacent || (integer && std::abs(std::round(order)) == 1.0);
       family.power += other.power;
     }
     return family;
@@ -322,29 +323,29 @@ class Judge {
   void findLines() {
     std::vector<Line> lines;
     double harmonics = 0.0;
-    int alone_in_air = 0;
+    int lines_in_air = 0;
     for (std::size_t k = 1; k + 1 < in_cut_.size(); ++k) {
       const double f = verdict_.spectrogram.frequency[k];
       if (f < LOWEST) continue;
-      const bool beside = offHarmonic(f) < MAIN_LOBE * step_ + SPREAD * f;
+      const bool near_harmonic = offHarmonic(f) < MAIN_LOBE * step_ + SPREAD * f;
       // The flank of a harmonic has no peak of its own.
       const bool line = narrowLine(k) && offHarmonic(vertex(k)) > step_ + DRIFT * f;
-      if (beside && !line) harmonics += std::max(0.0, in_cut_[k] - floor_[k]);
-      if (!line || !stands(k)) continue;
-      if (parts_ && overAir(k) < AIR) {
-        ++alone_in_air;
+      if (near_harmonic && !line) harmonics += std::max(0.0, in_cut_[k] - floor_[k]);
+      if (!line || !isSteady(k)) continue;
+      if (has_air_ && overAir(k) < AIR) {
+        ++lines_in_air;
         continue;
       }
-      // Its main lobe is about four lines of the mean wide.
+      // The power of the main lobe is about twice that of its peak line.
       lines.push_back({vertex(k), 2.0 * in_cut_[k], k});
     }
-    decide(lines, harmonics, alone_in_air);
+    decide(lines, harmonics, lines_in_air);
   }
 
-  void decide(const std::vector<Line>& lines, double harmonics, int in_air) {
+  void decide(const std::vector<Line>& lines, double harmonics, int lines_in_air) {
     const Line* best = nullptr;
     double best_power = 0.0;
-    bool weak = false, lonely = false, far = false;
+    bool weak = false, single = false, far = false;
     for (const Line& line : lines) {
       const Family family = familyOf(line, lines);
       double mode = RecordingVerdict::UNKNOWN;
@@ -355,14 +356,14 @@ class Judge {
         if (family.companions > 0 && sameFamily(line, other)) near = near || nearMode(other.frequency, &off);
         if (std::isnan(mode)) mode = off;
       }
-      const bool due = request_.modes.empty() || near;
-      // Without air to compare with, another machine's tone is told by its loneliness alone.
-      const bool belongs = parts_ ? family.companions > 0 || std::isfinite(mode) || share > STRONG
-                                  : family.companions > 1 || family.adjacent;
+      const bool possible = request_.modes.empty() || near;
+      // Without air for comparison, a tone of another machine is identified only by the lack of companions.
+      const bool belongs = has_air_ ? family.companions > 0 || std::isfinite(mode) || share > STRONG
+                                    : family.companions > 1 || family.adjacent;
       weak = weak || share < LEAST_SHARE;
-      lonely = lonely || !belongs;
-      far = far || !due;
-      if (share < LEAST_SHARE || !belongs || !due || line.power <= best_power) continue;
+      single = single || !belongs;
+      far = far || !possible;
+      if (share < LEAST_SHARE || !belongs || !possible || line.power <= best_power) continue;
       best = &line;
       best_power = line.power;
       verdict_.companions = family.companions;
@@ -373,21 +374,21 @@ class Judge {
     if (best) {
       verdict_.frequency = vertex(best->at);
       verdict_.over_noise = decibel(in_cut_[best->at] / floor_[best->at]);
-      verdict_.over_air = parts_ ? decibel(overAir(best->at)) : RecordingVerdict::UNKNOWN;
+      verdict_.over_air = has_air_ ? decibel(overAir(best->at)) : RecordingVerdict::UNKNOWN;
     }
-    verdict_.reason = best     ? ""
-                      : far    ? "lines beside the harmonics are near no mode"
-                      : lonely ? "a line beside the harmonics has no companions a tooth passing away"
-                      : weak   ? "lines beside the harmonics are weak"
-                      : in_air ? "lines beside the harmonics sound out of the cut too"
-                               : "no line beside the harmonics";
+    verdict_.reason = best           ? ""
+                      : far          ? "lines outside the harmonics are not near a mode"
+                      : single       ? "lines outside the harmonics have no companions one tooth passing frequency away"
+                      : weak         ? "lines outside the harmonics are weak"
+                      : lines_in_air ? "lines outside the harmonics are also present outside the cut"
+                                     : "no lines outside the harmonics";
   }
 
   double tolerance(const Line& a, const Line& b) const {
-    return APART * step_ + DRIFT * std::max(a.frequency, b.frequency);
+    return LINE_ERROR * step_ + DRIFT * std::max(a.frequency, b.frequency);
   }
 
-  /// A whole number of tooth passings apart; of a real signal the mirrored lines belong to it as well.
+  /// Whether two lines differ by an integer number of tooth passing frequencies, mirrored lines included.
   bool sameFamily(const Line& a, const Line& b) const {
     for (const double sign : {1.0, -1.0})
       if (std::abs(std::remainder(b.frequency - sign * a.frequency, passing())) < tolerance(a, b))
@@ -395,7 +396,7 @@ class Judge {
     return false;
   }
 
-  /// [Hz] of the parabola through the logarithms.
+  /// [Hz] Vertex of the parabola through the logarithms.
   double vertex(std::size_t k) const {
     const double a = std::log(in_cut_[k - 1] + 1e-300), b = std::log(in_cut_[k] + 1e-300),
                  c = std::log(in_cut_[k + 1] + 1e-300);
@@ -406,8 +407,8 @@ class Judge {
 
   RecordingRequest request_;
   RecordingVerdict verdict_;
-  double step_ = 0.0;   // [Hz] between lines
-  bool parts_ = false;  // cutting and not cutting are told apart
+  double step_ = 0.0;     // [Hz] between lines
+  bool has_air_ = false;  // the recording contains windows outside the cut
   std::vector<bool> cut_;
   std::vector<double> in_cut_, air_, floor_;
 };
@@ -415,10 +416,11 @@ class Judge {
 }  // namespace
 
 void RecordingRequest::validate() const {
-  if (!(speed > 0.0) || !std::isfinite(speed)) throw Error("recording: a speed above 0 is due");
-  if (teeth < 1 || teeth > 40) throw Error("recording: 1 to 40 teeth are due");
+  if (!(speed > 0.0) || !std::isfinite(speed))
+    throw Error(formatted("recording: spindle speed %g rad/s: expected a value above 0", speed));
+  if (teeth < 1 || teeth > 40) throw Error(formatted("recording: %d teeth: expected 1 to 40", teeth));
   if (!(speed_error >= 0.0) || speed_error > 0.1)
-    throw Error("recording: an error of the speed of 0 to 10 % is due");
+    throw Error(formatted("recording: speed error %g %%: expected 0 to 10 %%", 100.0 * speed_error));
 }
 
 std::string RecordingVerdict::text() const {
@@ -426,9 +428,9 @@ std::string RecordingVerdict::text() const {
       formatted(" (%.0f rpm, %.2f .. %.2f s)", units::rpmFromRadPerSec(speed), from, to);
   if (!cut) return "no cut: " + reason;
   if (!chatter) return "stable: " + reason + where;
-  std::string line = formatted("chatter at %.1f Hz, %.0f dB over the noise", frequency, over_noise);
-  if (std::isfinite(over_air)) line += formatted(", %.0f dB over the air", over_air);
-  line += formatted(", %d companions, %.1f times the harmonics' power", companions, share);
+  std::string line = formatted("chatter at %.1f Hz, %.0f dB above the noise floor", frequency, over_noise);
+  if (std::isfinite(over_air)) line += formatted(", %.0f dB above the level outside the cut", over_air);
+  line += formatted(", %d companions, %.1f times the power of the harmonics", companions, share);
   if (std::isfinite(mode)) line += formatted(", near the mode at %.0f Hz", mode);
   return line + where;
 }
@@ -436,14 +438,15 @@ std::string RecordingVerdict::text() const {
 RecordingVerdict judgeRecording(const Recording& recording, const RecordingRequest& request) {
   request.validate();
   if (!(recording.sample_rate > 0.0) || recording.channels.empty() || recording.channels[0].empty())
-    throw Error("recording: samples and their rate are due");
+    throw Error("recording: expected samples and a sample rate above 0");
   for (const std::vector<double>& channel : recording.channels)
     if (channel.size() != recording.channels[0].size())
-      throw Error("recording: channels of different length");
+      throw Error("recording: channels of different length: expected equal lengths");
   if (request.teeth * request.speed / units::TWO_PI > 0.2 * recording.sample_rate)
     throw Error(
-        formatted("recording: %.0f samples a second do not show the tooth passings", recording.sample_rate));
-  return Judge(recording, request).run();
+        formatted("recording: sample rate %.0f Hz: expected at least 5 times the tooth passing frequency, %.0f Hz",
+                  recording.sample_rate, request.teeth * request.speed / units::TWO_PI));
+  return RecordingAnalysis(recording, request).run();
 }
 
 }  // namespace smartmill::stability

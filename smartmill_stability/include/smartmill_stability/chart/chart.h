@@ -18,9 +18,9 @@
 
 namespace smartmill::stability {
 
-/// What a chart is asked for.
+/// Parameters of a chart; units and ranges in declare().
 struct ChartParameters {
-  /// A point for a check must lie at least so far above the limit, else its outcome would say nothing. [1]
+  /// [1] Least ratio of depth to limit of a point proposed for a check, so that its outcome is unambiguous.
   static constexpr double CLEARLY_UNSTABLE = 1.5;
 
   double entry = 0.0, exit = units::PI;
@@ -48,46 +48,45 @@ struct ChartParameters {
   void validate() const;
 };
 
-/// Answer to: is this cut stable?
+/// Whether a cut is stable.
 struct Prediction {
   bool stable = false;
   bool within_spindle_limits = false;
   StabilityPoint point;
 };
 
-/// Makes charts of what was measured: gathers the FRFs (or modes) of x and y and the coefficients, in any
-/// order.
+/// Computes charts from measurements: FRFs or modes of x and y, and coefficients, in any order.
 class ChartMaker {
  public:
-  /// @param model tool and spindle limits; neither its tool_tip nor its cutting section is read.
+  /// @param model tool and spindle limits; its sections tool_tip and cutting are not used.
   /// @throws Error on bad parameters or a model without a tool.
   ChartMaker(const ChartParameters& parameters, const MachineModel& model);
 
-  /// Other points than the tool tip are left alone; a new tool's FRF puts those of the old tool away.
+  /// Points other than the tool tip are ignored; the first result of a new tool discards those of the old one.
   void handle(const MeasuredFrf& frf);
   void handle(const MeasuredModes& modes);
   void handle(const CoefficientSet& coefficients);
 
-  /// What is still missing, empty when a chart can be made.
+  /// List of the missing inputs; empty when a chart can be computed.
   std::string missing() const;
 
-  /// @throws Error when something is missing or the data contradict each other.
+  /// @throws Error when an input is missing or inputs contradict each other.
   StabilityChart chart() const;
 
-  /// The machine as measured in a cut with other angles (a cut that has none: those of the chart); empty
+  /// The measured machine in a cut with another engagement (exit <= entry: the angles of the chart); empty
   /// while modes of x and y or the tangential coefficient are missing.
   std::optional<RegenerativeSystem> system(const Engagement& engagement) const;
-  /// The same with the deviations of what was measured and the least ones of the parameters.
+  /// The same with the standard deviations of the measurements, combined with those of the parameters.
   std::optional<UncertainSystem> uncertainSystem(const Engagement& engagement) const;
   int teeth() const { return tool_geometry_.teeth; }
-  std::size_t modesInX() const;                                   ///< of system(): those of y follow
+  std::size_t modesInX() const;                                   ///< first modes of system(); y follows
   double highestSpeed() const { return parameters_.speed_high; }  ///< [rad/s]
 
-  /// @throws Error as chart(), or on a speed or depth that is not positive.
+  /// @throws Error as chart(), and on a speed [rad/s] or depth [m] that is not positive.
   Prediction predict(double spindle_speed, double axial_depth) const;
 
-  /// The chart of a cut that differs, by collocation from the modes, for who moves a slider.
-  /// @throws Error while modes of x and y or the tangential coefficient are missing, or on a bad request.
+  /// The chart of a modified cut, by collocation from the modes, fast enough for interactive use.
+  /// @throws Error while modes of x and y or the tangential coefficient are missing, and on an invalid request.
   WhatIfChart whatIf(const WhatIf& request) const;
 
  private:
@@ -98,16 +97,16 @@ class ChartMaker {
   bool needsModes() const;
   FrequencyResponse crossFrf() const;
   void use(const std::string& tool, double stamp);
-  /// Depth that the spindle carries at a speed: torque and power limit [m].
+  /// [m] Depths at which the rated torque and the rated power are reached at a speed.
   std::array<double, 2> loadLimits(double speed) const;
-  double carried(const StabilityChart& chart,
-                 std::size_t k) const;  // [m] by the spindle at a speed, with its reserve
-  int linesBeyond() const;
-  /// A little beyond both ends of the chart, so that the margin of speed holds there too.
+  /// [m] Largest depth permitted by torque, power and max_depth at speed k.
+  double permittedDepth(const StabilityChart& chart, std::size_t k) const;
+  int extraSpeeds() const;
+  /// Extended beyond both ends of the chart by the speed margin.
   StabilityLimit wideLimits(const Basis& given) const;
   std::vector<double> depthShares(const std::vector<double>& speeds) const;
   void recommend(StabilityChart& chart, const StabilityLimit& wide) const;
-  std::vector<StabilityPoint> borne(std::vector<StabilityPoint> peaks) const;
+  std::vector<StabilityPoint> confirmed(std::vector<StabilityPoint> peaks) const;
   void proposeUnstable(StabilityChart& chart, const StabilityLimit& wide) const;
   StabilityPoint point(double speed, double depth, double limit, double frequency) const;
   double torquePerDepth() const;  // [N]

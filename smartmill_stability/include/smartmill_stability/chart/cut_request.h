@@ -9,17 +9,17 @@
 
 namespace smartmill::stability {
 
-/// What programs that look at cuts of a machine are asked on their command line: the machine, an arc, speeds.
+/// Command-line options common to programs on cuts of a machine: model, engagement, speeds, output.
 struct CutRequest {
   std::string model, speeds, out;
   double entry_deg = 0.0, exit_deg = 180.0;
 
-  /// @param form of the speeds, e.g. LO:HI:N
+  /// @param form of the option --speeds, for example LO:HI:N
   void addTo(CommandLine& line, const std::string& form);
-  /// A CSV file that must be named, with a picture beside it. @param what the picture is
+  /// Adds the required CSV file, next to which a picture is drawn. @param what is drawn, for the help text
   void addOutTo(CommandLine& line, const std::string& what = "a picture");
 
-  /// @throws Error on a file that cannot be read or lacks something.
+  /// @throws Error naming the section that the model lacks.
   RegenerativeSystem system(const MachineModel& machine) const;
   /// [rad/s] of LO:HI:N. @throws Error naming the option.
   std::vector<double> speedRange() const;

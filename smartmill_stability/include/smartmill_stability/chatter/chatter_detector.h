@@ -26,24 +26,24 @@ struct ChatterParameters {
 
   void declare(ParameterTable& table) {
     table.number("chatter_revolutions", revolutions, "1", Range::closed(4, 200),
-                 "of the spindle in a window: a longer one tells nearer frequencies from the harmonics");
+                 "spindle revolutions of a window; a longer window separates chatter from nearer harmonics");
     table.number("chatter_hop_revolutions", hop_revolutions, "1", Range::positive(),
-                 "between two verdicts, at most chatter_revolutions");
+                 "revolutions between two verdicts, at most chatter_revolutions");
     table.number("chatter_energy_ratio", energy_ratio, "1", Range::open(0.0, 1.0),
-                 "energy outside the spindle's harmonics over all: chatter above");
+                 "chatter above this ratio of the energy outside the spindle harmonics to the total energy");
     table.number("chatter_least_severity", least_severity, "N", Range::notNegative(),
-                 "and above this force outside the harmonics (or in the signal's unit)");
+                 "and above this RMS outside the harmonics (in the unit of the signal)");
     table.number(
         "chatter_alternation_ratio", alternation_ratio, "1", Range::openLow(0.0, 1.0),
-        "flip of an even number of teeth above: energy that alternates from tooth to tooth over all; 1: "
-        "never. Runout of a tool with two teeth alternates too: 0.02 at 5 % of the feed, with the square of "
-        "it");
+        "flip chatter of a tool with an even number of teeth above this ratio of the energy that alternates "
+        "from tooth to tooth to the total energy; 1: never. Runout of a tool with two teeth alternates too: "
+        "0.02 for a runout of 5 % of the feed per tooth, growing with its square");
     table.number("settle_revolutions", settle_revolutions, "1", Range::closed(0.0, 1000.0),
-                 "dropped after the tool came into full engagement");
+                 "revolutions ignored after the tool reaches full engagement");
     table.number("path_tolerance", path_tolerance, "m", Range::openLow(0.0, 1.0),
-                 "distance of the tool from the steady part of the cut");
+                 "largest distance of the tool from the path of the steady cut");
     table.number("maximum_gap", maximum_gap, "s", Range::openLow(0.0, 60.0),
-                 "longer without controller state or spindle angle: not steady");
+                 "longest interval without controller state or spindle angle within a window");
   }
   /// @throws Error naming key and value.
   void validate() const;
@@ -56,21 +56,20 @@ struct ChatterState {
   bool valid = false;
   bool chatter = false;
   double frequency = std::numeric_limits<double>::quiet_NaN();  ///< [Hz]
-  double energy_ratio = 0.0;  ///< [1] outside the spindle's harmonics over all, without the mean
-  double severity = 0.0;      ///< [N] root mean square outside the harmonics, all axes together
-  /// [1] energy that alternates from tooth to tooth (odd multiples of half the tooth passing) over all; 0 for
-  /// an odd number of teeth
+  double energy_ratio = 0.0;  ///< [1] energy outside the spindle harmonics over total energy, without mean
+  double severity = 0.0;      ///< [N] RMS outside the spindle harmonics, all axes together
+  /// [1] Energy that alternates from tooth to tooth (odd multiples of half the tooth passing frequency) over
+  /// total energy; 0 for an odd number of teeth.
   double alternation = 0.0;
-  /// [s] begin of the first revolution from which the force repeats no more to the end of the window; NaN
-  /// without chatter
+  /// [s] Start of the first revolution after which no revolution of the window repeats; NaN without chatter.
   double onset = std::numeric_limits<double>::quiet_NaN();
 };
 
-/// Tells chatter from forced vibration in the compensated force: what repeats every revolution (teeth,
-/// runout) is the mean over the window's revolutions at each angle; what is left is chatter or noise. A flip
-/// (period-two) of an even number of teeth repeats every revolution as runout does, and no sampling once per
-/// revolution tells it from runout; what tells is its size: a flip makes every other tooth leave the cut, so
-/// most of the energy alternates from tooth to tooth. Inputs in stamp order; results follow from them alone.
+/// Distinguishes chatter from forced vibration in the compensated force. The synchronous part (teeth, runout) is
+/// the mean over the revolutions of the window at each angle; the remainder is chatter or noise. A flip
+/// (period doubling) of a tool with an even number of teeth repeats every revolution, as runout does, and is
+/// distinguished by its amplitude alone: every other tooth leaves the cut, so most of the energy alternates from
+/// tooth to tooth. Inputs in stamp order; the results depend on the inputs only.
 class ChatterDetector {
  public:
   using Output = std::function<void(const ChatterState&)>;
@@ -95,7 +94,7 @@ class ChatterDetector {
   void evaluate();
   double angleAt(double time) const;
   double timeAt(double turned) const;
-  /// Force of an axis at times between the samples, which come at a rate [Hz].
+  /// Force of an axis, interpolated at times [s]. @param rate [Hz] of the samples
   std::vector<double> forceAt(const std::vector<double>& times, std::size_t axis, double rate) const;
   void judge(double from, double to);
 
@@ -105,20 +104,20 @@ class ChatterDetector {
   std::deque<Sample> samples_;
   std::deque<Angle> angles_;
   std::optional<double> steady_since_, steady_until_;  // [s]
-  std::optional<double> window_start_;                 // [rad] turned
+  std::optional<double> window_start_;                 // [rad] accumulated angle
   double last_state_ = 0.0;
   std::uint64_t next_index_ = 0;
-  bool said_invalid_ = false;
+  bool reported_invalid_ = false;
 };
 
-/// Samples of another sensor for the detector: up to three channels in their own unit (vibration, sound), to
-/// which severity and least_severity then belong. @throws Error without a channel.
+/// Samples of another sensor (vibration, sound) in the form of the detector: up to three channels in their own
+/// unit, which is then that of severity and least_severity. @throws Error without a channel.
 ForceBlock signalBlock(const SampleBlock& block);
 
-/// A detector behind a StreamSorter: what node and offline tool both use.
+/// A detector behind a StreamSorter, for node and offline program.
 class DetectionPipeline {
  public:
-  /// @param hold_back [s], see StreamSorter.
+  /// @param hold_back [s] see StreamSorter
   DetectionPipeline(const ChatterParameters& parameters, double hold_back, ChatterDetector::Output output);
 
   void push(const CuttingCondition& condition);
@@ -126,7 +125,7 @@ class DetectionPipeline {
   void push(const SpindleAngle& angle);
   void push(const ForceBlock& block);
   void push(const SampleBlock& block) { push(signalBlock(block)); }
-  void flush() { sorter_.flush(); }  ///< end of data
+  void flush() { sorter_.flush(); }  ///< at the end of the data
   std::string waitingFor() const { return sorter_.waitingFor(); }
   std::size_t late() const { return sorter_.late(); }
 

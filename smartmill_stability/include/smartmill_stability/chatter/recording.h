@@ -6,17 +6,17 @@
 
 namespace smartmill::stability {
 
-/// Evenly sampled channels of a cut, of whatever sensor.
+/// Evenly sampled channels of a cut from any sensor.
 struct Recording {
   double sample_rate = 0.0;                   ///< [Hz]
-  std::vector<std::vector<double>> channels;  ///< each in a unit of its own
+  std::vector<std::vector<double>> channels;  ///< each in its own unit
 };
 
 struct RecordingRequest {
-  double speed = 0.0;  ///< [rad/s] of the spindle in the cut, as far as it is known
+  double speed = 0.0;  ///< [rad/s] approximate spindle speed in the cut
   int teeth = 0;
-  double speed_error = 0.02;  ///< [1] it may be so much off
-  std::vector<double> modes;  ///< [Hz] natural frequencies of tool and spindle; empty: not known
+  double speed_error = 0.02;  ///< [1] largest relative error of speed
+  std::vector<double> modes;  ///< [Hz] natural frequencies of tool and spindle; empty: unknown
   /// @throws Error naming the quantity.
   void validate() const;
 };
@@ -25,37 +25,41 @@ struct RecordingRequest {
 struct Spectrogram {
   std::vector<double> time;       ///< [s] middle of each window
   std::vector<double> frequency;  ///< [Hz]
-  std::vector<std::vector<double>>
-      power;  ///< [window][line], channels together, each over its own mean square
+  /// [window][line] sum over the channels, each normalised by its mean square
+  std::vector<std::vector<double>> power;
 };
 
-/// What a recording says.
+/// Result of judgeRecording().
 struct RecordingVerdict {
   static constexpr double UNKNOWN = std::numeric_limits<double>::quiet_NaN();
-  bool cut = false;  ///< something is louder than the rest, or as loud throughout and in step with the teeth
+  /// Whether the recording contains a cut: a louder part, or a constant level with lines at the tooth passing
+  /// frequency.
+  bool cut = false;
   bool chatter = false;
-  double speed = 0.0;           ///< [rad/s] that the harmonics show
-  double from = 0.0, to = 0.0;  ///< [s] of the (first and last) cut
-  double frequency = UNKNOWN;   ///< [Hz] strongest line of the chatter
-  double over_noise = UNKNOWN;  ///< [dB] of that line, over what is beside it
-  double over_air = UNKNOWN;    ///< [dB] and over the same line out of the cut; NaN: all of it is cut
-  int companions = 0;           ///< lines a whole number of tooth passings away from it
-  double share = 0.0;           ///< [1] of chatter's lines over those of the spindle's harmonics
-  double mode = UNKNOWN;        ///< [Hz] the mode it is near; NaN: none is known
-  std::string reason;           ///< why it is chatter, or is not
+  double speed = 0.0;           ///< [rad/s] corrected from the harmonics
+  double from = 0.0, to = 0.0;  ///< [s] first and last window with a cut
+  double frequency = UNKNOWN;   ///< [Hz] strongest chatter line
+  double over_noise = UNKNOWN;  ///< [dB] of that line over the noise floor around it
+  double over_air = UNKNOWN;    ///< [dB] of that line over the same line outside the cut; NaN: no such part
+  int companions = 0;           ///< lines an integer number of tooth passing frequencies away
+  double share = 0.0;           ///< [1] power of the chatter lines over that of the spindle harmonics
+  double mode = UNKNOWN;        ///< [Hz] nearby mode; NaN: none is known
+  std::string reason;           ///< why there is no chatter or no cut
   Spectrogram spectrogram;
   /// One line.
   std::string text() const;
 };
 
-/// Judges a recorded cut without a tachometer. Chatter is a narrow line that is no harmonic of the spindle
-/// (whose speed the harmonics themselves correct), that lives only while the tool cuts, stands in most of the
-/// cut's windows at the same frequency, and has companions a whole number of tooth passings away, since the
-/// teeth sample the vibration (Insperger, Stepan and others: the chatter frequencies of a time-periodic
-/// process); where modes are known one of these lines lies near a mode. So broadband noise of chip and load
-/// is none (wide), nor a tone of another machine (it sounds out of the cut too, and alone), nor a spindle
-/// that runs up (no steady line). A flip of an even number of teeth lies on the spindle's harmonics and is
-/// not told from runout here. @throws Error of RecordingRequest::validate(), or on a recording too short.
+/// Detects chatter in a recorded cut without a tachometer. Chatter is a narrow line that
+/// - is not a spindle harmonic (the speed is corrected from the harmonics),
+/// - is present only while the tool cuts, and in most windows of the cut at the same frequency,
+/// - has companions an integer number of tooth passing frequencies away, because the teeth sample the vibration
+///   (Insperger, Stepan et al.: chatter frequencies of a time-periodic process),
+/// - lies near a mode with its family, where modes are known.
+/// This excludes broadband noise of chips and load, a tone of another machine (present outside the cut, without
+/// companions) and a spindle run-up (no steady line). A flip of a tool with an even number of teeth lies on the
+/// spindle harmonics and is not distinguished from runout.
+/// @throws Error of RecordingRequest::validate(), and on a recording that is too short.
 RecordingVerdict judgeRecording(const Recording& recording, const RecordingRequest& request);
 
 }  // namespace smartmill::stability

@@ -25,87 +25,88 @@ struct MillingControlParameters {
   void declare(ParameterTable& table) {
     table.flag(
         "adaptive", adaptive,
-        "true: while motion is armed, overrides of spindle and feed follow the advice against chatter");
+        "true: while motion is armed, the spindle and feed overrides follow the advice against chatter");
     table.number("override_spindle_low", spindle_low, "1", Range::closed(0.3, 1.0),
-                 "least override of the spindle");
-    table.number("override_spindle_high", spindle_high, "1", Range::closed(1.0, 1.5), "and the largest");
-    table.number("override_feed_high", feed_high, "1", Range::closed(1.0, 1.5),
-                 "largest override of the feed");
+                 "smallest spindle override");
+    table.number("override_spindle_high", spindle_high, "1", Range::closed(1.0, 1.5),
+                 "largest spindle override");
+    table.number("override_feed_high", feed_high, "1", Range::closed(1.0, 1.5), "largest feed override");
     table.number("override_feed_floor", feed_floor, "1", Range::closed(0.05, 1.0),
-                 "the least: a tool that rubs wears out");
+                 "smallest feed override; below it the tool rubs and wears");
     table.number("override_risk", risk, "1", Range::closed(0.0, 0.5),
-                 "largest probability of chatter at the speed that is gone to");
+                 "largest probability of chatter at a new spindle speed");
     table.number("override_speed_margin", speed_margin, "1", Range::openHigh(0.0, 0.1),
-                 "and also for speeds this much off");
+                 "relative error of the speed for which override_risk holds");
     table.number("override_moves", moves, "1", Range::closed(1, 20),
-                 "of the spindle in one cut; if it chatters then, the feed goes to its floor");
+                 "largest number of speed changes in one cut; after further chatter the feed goes to its floor");
     table.number("override_settle_revolutions", settle_revolutions, "1", Range::closed(0.0, 1000.0),
-                 "after a new speed is reached before what is seen counts");
+                 "revolutions ignored after a new speed is reached");
     table.number("override_settle_time", settle_time, "s", Range::positive(),
-                 "within which the spindle reaches its new speed");
+                 "time within which the spindle must reach a new speed");
     table.number("load_target", load_target, "1", Range::closed(0.0, 2.0),
-                 "of the spindle's full scale, to which the feed is led; 0: the load is not followed");
+                 "spindle load over full scale to which the feed is controlled; 0: no load control");
     table.number("load_timeout", load_timeout, "s", Range::positive(),
-                 "an older load is not known: it changes nothing");
+                 "a load older than this does not change the feed");
     table.number("feed_rise", feed_rise, "1/s", Range::openLow(0.0, 1.0),
-                 "of the feed's override by the load; it falls five times as fast");
+                 "rate of increase of the feed override by the load; the decrease is five times as fast");
   }
   /// @throws Error naming key and value.
   void validate() const { checkBounds(*this); }
 };
 
-/// What the controller is asked for.
+/// Overrides requested from the controller.
 struct OverrideRequest {
-  double feed = 1.0, spindle = 1.0;  ///< [1] of what is programmed
+  double feed = 1.0, spindle = 1.0;  ///< [1] of the programmed values
   std::string reason;                ///< one line
-  bool chatter = false;              ///< because of it; else the load
-  /// What the next cut may do where this one is not to be saved: largest removal at the asked risk within the
-  /// limits of the spindle's override; 0: not known. [rad/s], [m]
+  bool chatter = false;              ///< true: because of chatter; false: because of the load
+  /// [rad/s], [m] Proposal for the next cut when no speed stabilises this one: largest removal rate at the
+  /// accepted risk within the limits of the spindle override; 0: unknown.
   double next_speed = 0.0, next_depth = 0.0;
 };
 
-/// Leads feed and spindle override of the running cut. Chatter: the spindle goes to the fastest speed within
-/// its limits at which the machine, corrected by the chatter that was seen, stays stable at the asked risk;
-/// the feed goes with it, so that the chip stays as thick. Where there is none, the feed goes to its floor
-/// and the next cut's depth is said. Load: the feed falls five times as fast as it rises, an unknown load
-/// changes nothing. Only while motion is armed; a refusal is said once and ends the attempts in this cut.
-/// Time comes with the data, in the order of their stamps.
+/// Controls feed and spindle override of the running cut.
+/// Chatter: the spindle moves to the highest speed within its limits at which the machine, corrected from the
+/// detected chatter, is stable at the accepted risk; the feed changes in proportion, which keeps the feed per
+/// tooth. Without such a speed the feed goes to its floor, and a depth for the next cut is proposed.
+/// Load: the feed decreases five times as fast as it increases; an unknown load changes nothing.
+/// Acts only while motion is armed. A refusal is reported once and ends the attempts in this cut.
+/// Time is taken from the data, which arrive in stamp order.
 class MillingControl {
  public:
-  /// What is believed of the machine in a cut; empty while it is not known.
+  /// Provides the estimated machine in a cut; empty while it is unknown.
   using Believed = std::function<std::optional<UncertainSystem>(const Engagement&)>;
-  /// @param window [revolutions] of the detector's verdicts
+  /// @param window [revolutions] of a verdict of the detector
   MillingControl(const MillingControlParameters& parameters, int window, Believed believed);
 
   void handle(const CuttingCondition& condition);
   void handle(const CncState& state);
   void handle(const LoadSample& load);
   void handle(const ChatterState& state);
-  /// @throws Error as the solvers on an impossible system.
+  /// @throws Error as the solvers on an invalid system.
   void handle(const ChatterAdvice& advice);
 
-  /// What is to be asked of the controller now, once.
+  /// The pending request, once.
   std::optional<OverrideRequest> takeRequest();
-  /// What it said to that. @param message its line
-  void answer(bool taken, const std::string& message);
-  /// Lines for people since the last call.
+  /// Response of the controller to the last request. @param message of the controller, one line
+  void answer(bool accepted, const std::string& message);
+  /// Log lines since the last call.
   std::vector<std::string> takeNotes();
 
-  /// The machine goes to another speed, or what is seen still belongs to the time before: a verdict says
-  /// nothing.
+  /// Whether the spindle changes its speed or the window of the detector still contains the time before:
+  /// verdicts are ignored.
   bool moving() const { return phase_ != Phase::watching; }
-  double feed() const { return feed_; }        ///< [1] asked for last
-  double spindle() const { return spindle_; }  ///< [1]
+  double feed() const { return feed_; }        ///< [1] last requested
+  double spindle() const { return spindle_; }  ///< [1] last requested
 
  private:
   enum class Phase { watching, moving, settling };
 
   void begin(const CuttingCondition& condition);
   bool mayAct() const;
-  void ask(double feed, double spindle, const std::string& reason, bool chatter);
-  void goTo(const ChatterAdvice& advice, const StableSpeed& speed, bool corrected);
-  void stepAside(const ChatterAdvice& advice);
-  void backOff(const ChatterAdvice& advice, const UncertainSystem* system);
+  void request(double feed, double spindle, const std::string& reason, bool chatter);
+  void moveTo(const ChatterAdvice& advice, const StableSpeed& speed, bool corrected);
+  void moveWithoutModel(const ChatterAdvice& advice);
+  void reduceFeed(const ChatterAdvice& advice, const UncertainSystem* system);
   std::optional<UncertainSystem> systemOf(const ChatterAdvice& advice) const;
   double feedFor(double spindle) const;
   RiskOptions riskOptions() const;
@@ -118,11 +119,11 @@ class MillingControl {
   std::optional<CuttingCondition> next_, cut_;
   std::optional<CncState> state_;
   Phase phase_ = Phase::watching;
-  double spindle_ = 1.0, feed_ = 1.0;          // asked for last
-  double old_spindle_ = 1.0, old_feed_ = 1.0;  // before
-  double load_share_ = 1.0;                    // [1] what the load leaves of the feed
+  double spindle_ = 1.0, feed_ = 1.0;          // last requested
+  double old_spindle_ = 1.0, old_feed_ = 1.0;  // before the last request
+  double load_factor_ = 1.0;                   // [1] of the feed, by the load control
   double last_load_ = 0.0;                     // [s]
-  double since_ = 0.0;                         // [s] of the phase
+  double since_ = 0.0;                         // [s] start of the phase
   double moved_at_ = 0.0;                      // [s]
   int moves_ = 0;
   bool refused_ = false, at_floor_ = false;

@@ -12,20 +12,20 @@
 
 namespace smartmill::stability {
 
-/// Single-point turning after Kim: chip thickness a = a0 - y(t) + mu y(t - T), y = y_w - y_t the deflection
-/// y_w of the machine less the displacement y_t that an actuator gives to the tool (Kim eq. 1..4, 9).
-/// Second-order machine as the controller believes it: y_w = gain w^2 / (s^2 + 2 zeta w s + w^2) a.
+/// Second-order model of the machine in single-point turning (Kim eq. 1..4, 9): y_w = gain w^2 / (s^2 +
+/// 2 zeta w s + w^2) a. Chip thickness a = a0 - y(t) + mu y(t - T), y = y_w - y_t: deflection y_w of the machine
+/// minus displacement y_t of the tool by the actuator.
 struct SecondOrder {
   double gain = 0.0;           ///< [1] K / K_m
   double frequency = 0.0;      ///< [rad/s]
   double damping_ratio = 0.0;  ///< [1]
-  /// Of gain, frequency, damping ratio; in their units.
+  /// Of gain, frequency and damping ratio, in their units.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  std::complex<double> response(double w) const;  ///< [1] at w [rad/s]
+  std::complex<double> response(double w) const;  ///< [1] deflection over chip thickness at w [rad/s]
   ModalModel modal() const;
 };
 
-/// Kim's spectral estimate: blocks of a segment under a Hamming window.
+/// Spectral estimate of Kim: a segment in blocks with a Hamming window.
 struct EstimatorParameters {
   double sample_rate = 1000.0;
   int segment = 2048;
@@ -34,48 +34,49 @@ struct EstimatorParameters {
   double frequency_low = 5.0, frequency_high = 150.0;
 
   void declare(ParameterTable& table) {
-    table.section("Estimate: segments of 2.048 s at 1 ms, Hamming window, 512 points, half overlapping.");
+    table.section(
+        "Estimator: segments of 2.048 s at 1 ms, blocks of 512 samples overlapping by half, Hamming window.");
     table.number("estimator_rate", sample_rate, "Hz", Range::positive(),
-                 "the streams' rate is a whole multiple of it");
-    table.number("segment", segment, "1", Range::atLeast(16), "samples");
-    table.number("block", block, "1", Range::atLeast(16), "samples under one window, at most segment");
+                 "sample rate of the estimator; the rate of the streams is an integer multiple of it");
+    table.number("segment", segment, "1", Range::atLeast(16), "samples of a segment");
+    table.number("block", block, "1", Range::atLeast(16), "samples of a block, at most segment");
     table.number("least_signal", least_signal, "1", Range::positive(),
-                 "power of a line over the noise floor from which it is used");
-    table.number("frequency_low", frequency_low, "Hz", Range::notNegative(), "of the lines looked at");
+                 "smallest ratio of power to noise floor of a line that is used");
+    table.number("frequency_low", frequency_low, "Hz", Range::notNegative(), "lower end of the band");
     table.number("frequency_high", frequency_high, "Hz", Range::positive(),
-                 "above frequency_low; the noise floor is taken above");
+                 "upper end of the band, above frequency_low; the noise floor is estimated above it");
   }
 };
 
-/// What one segment shows.
+/// Estimate from one segment.
 struct SegmentEstimate {
-  bool informed = false;  ///< enough lines stand above the noise
-  int lines = 0;
-  SecondOrder model;  ///< fit of the lines
-  /// Ratio y_w / a line by line [1] at frequency [rad/s]: biased by leakage, as Kim's.
+  bool informed = false;  ///< enough lines above the noise floor for a fit
+  int lines = 0;          ///< above the noise floor
+  SecondOrder model;      ///< fitted to the lines
+  /// [1] Plain ratio y_w / a at each frequency [Hz]: biased by leakage, as in Kim.
   std::vector<double> frequency;
   std::vector<std::complex<double>> ratio;
 };
 
-/// Estimates gain, frequency and damping of y_w over a from one segment. The fit compares the windowed
-/// spectra of the blocks with those of the model's own answer to the measured chip thickness, so the leakage
-/// of the window (2.7 Hz at 512 points, more than the half-power bandwidth of 2.2 Hz) is in both; the state
-/// at the segment's begin is free.
-/// @param start of the search, nullptr: searched over the band. @throws Error on wrong lengths.
+/// Estimates gain, frequency and damping of y_w over a from one segment. The fit compares the windowed spectra
+/// of the deflection with those of the model response to the measured chip thickness, so both contain the
+/// leakage of the window (2.7 Hz at 512 points, more than the half-power bandwidth of 2.2 Hz). The state at the
+/// start of the segment is fitted too.
+/// @param start of the iteration; nullptr: grid search over the band. @throws Error on wrong lengths.
 SegmentEstimate estimateSegment(const std::vector<double>& chip, const std::vector<double>& deflection,
                                 const EstimatorParameters& parameters, const SecondOrder* start = nullptr);
 
-/// Kim eq. 10: least real part of K/K_m (G_m - K_m K_c G_c) over all frequencies; above -0.5 every speed is
-/// stable.
+/// Kim eq. 10: minimum of the real part of K/K_m (G_m - K_m K_c G_c) over all frequencies; above -0.5 every
+/// speed is stable.
 double residualMargin(const SecondOrder& machine, const SecondOrder& controller);
 
-/// The least of that over the machine's uncertainty (corners at two standard deviations along each principal
-/// axis of the covariance).
+/// Minimum of residualMargin() at two standard deviations of the machine on both sides along each principal axis
+/// of its covariance.
 double worstMargin(const SecondOrder& machine, const SecondOrder& controller);
 
 struct ControllerParameters {
   EstimatorParameters estimator;
-  double rate = 10000.0;  ///< [Hz] of the control loop, a whole multiple of the estimator's
+  double rate = 10000.0;  ///< [Hz] of the control loop, an integer multiple of the estimator's
   double period = 0.1;    ///< [s] of a revolution
   double overlap = 1.0;
   double chip = 1.0e-4;
@@ -88,67 +89,70 @@ struct ControllerParameters {
   void declare(ParameterTable& table) {
     table.internal("rate", rate, "Hz", Range::positive());
     table.internal("period", period, "s", Range::positive());
-    table.number("overlap", overlap, "1", Range::closed(0.0, 1.0), "of the cut with the one before (mu)");
+    table.number("overlap", overlap, "1", Range::closed(0.0, 1.0),
+                 "overlap factor of consecutive revolutions (mu)");
     table.number("chip", chip, "m", {}, "nominal chip thickness");
     table.number("drift", drift, "1", Range::notNegative(),
-                 "change of the machine a segment that is granted");
+                 "relative change of the machine within a segment (process noise of the estimate)");
     table.number("margin", margin, "1", Range::open(-0.5, 0.0),
-                 "real part that a new controller must keep at two standard deviations");
+                 "smallest real part of the residual (Kim eq. 10) at two standard deviations that activates a "
+                 "new controller");
     table.number("lead", lead, "s", Range::closed(0.0, 0.5),
-                 "commands are for samples so much later: the way to the actuator and back; a whole number "
-                 "of samples");
+                 "time from a sample to the sample at which its command acts, for the transport to the actuator "
+                 "and back; an integer number of samples");
     table.number("actuator_delay", actuator_delay, "s", Range::closed(0.0, 0.1),
-                 "by which the actuator follows its commands late");
+                 "delay of the actuator after its command");
     table.flag("leaves_cut", leaves_cut,
-               "whether a tool that vibrates out of the cut leaves the surface as it was; false: chips may "
-               "be negative");
+               "true: a tool that vibrates out of the cut leaves the surface unchanged; false: the chip "
+               "thickness may be negative");
     estimator.declare(table);
   }
   /// @throws Error naming key and value.
   void validate() const;
 };
 
-/// Feed-forward controller (Kim fig. 3, eq. 8..10): moves the tool as the machine is believed to deflect
-/// under the chip thickness, and learns the machine segment by segment. Needs the two displacement streams
-/// alone.
+/// Feed-forward controller (Kim fig. 3, eq. 8..10): moves the tool by the deflection that the estimated machine
+/// has under the chip thickness, and updates the estimate with each segment. Its only inputs are the two
+/// displacement streams.
 class AdaptiveChatterController {
  public:
   /// @throws Error on bad parameters.
   explicit AdaptiveChatterController(const ControllerParameters& parameters);
 
-  /// One sample of deflection and tool displacement [m]. @return tool displacement to make until the next
-  /// sample [m], or from `lead` after this one until the next: then it stands on a prediction, the machine as
-  /// believed under the chips that this and the commands under way will make. 0 before the first estimate.
+  /// One sample of deflection and tool displacement [m]. @return [m] commanded tool displacement until the next
+  /// sample, or, with a lead, for the sample interval that begins `lead` after this sample. It is then predicted
+  /// from the estimated machine and the chips that result from this and the pending commands. 0 before the first
+  /// estimate.
   double step(double deflection, double tool);
 
-  /// What each segment showed, in order.
+  /// Estimates of the single segments, in order.
   const std::vector<SegmentEstimate>& segments() const { return segments_; }
-  /// The machine as believed after each segment; gain 0 before any information.
-  const std::vector<SecondOrder>& beliefs() const { return beliefs_; }
-  const SecondOrder& active() const { return active_; }  ///< controller in force; gain 0: none
+  /// Combined estimate after each segment; gain 0 before the first informed one.
+  const std::vector<SecondOrder>& estimates() const { return estimates_; }
+  const SecondOrder& active() const { return active_; }  ///< active controller; gain 0: none
 
  private:
   double pastSurface() const;
   double predicted();
   double issued(double after) const;
-  void learn();
+  void updateEstimate();
   void activate(const SecondOrder& model);
 
   ControllerParameters parameters_;
   std::deque<double> surface_, chips_;  // newest first, at the control rate
-  std::deque<double> issued_;           // commands that are under way, newest first
-  std::vector<double> coming_;          // surface that is predicted
+  std::deque<double> issued_;           // pending commands, newest first
+  std::vector<double> future_surface_;  // predicted
   std::vector<double> segment_chip_, segment_deflection_;
   int phase_ = 0;
-  SecondOrder believed_, active_;
+  SecondOrder estimate_, active_;
   std::unique_ptr<ModalFilter> filter_;
   std::vector<SegmentEstimate> segments_;
-  std::vector<SecondOrder> beliefs_;
+  std::vector<SecondOrder> estimates_;
 };
 
-/// Integrates a headstock accelerometer to displacement above a corner frequency (the paper's own proposal
-/// for machines whose deflection cannot be measured). The ratio of deflection to chip thickness is not
-/// changed where both went through it.
+/// Integrates an acceleration of the headstock to displacement above a corner frequency (proposed by Kim for
+/// machines whose deflection cannot be measured). The ratio of deflection to chip thickness is unchanged when
+/// both pass through the same integrator.
 class AccelerationIntegrator {
  public:
   /// @param corner [Hz] @param rate [Hz]

@@ -13,7 +13,7 @@ struct BoundaryPoint {
   Kind kind = Kind::none;
 };
 
-/// One connected piece of the stability boundary; a closed one is an island (or a hole).
+/// One connected piece of the stability boundary; a closed one is an island or a hole.
 struct BoundaryCurve {
   std::vector<BoundaryPoint> points;
   bool closed = false;
@@ -22,13 +22,13 @@ struct BoundaryCurve {
 struct TraceOptions {
   double speed_low = 0.0, speed_high = 0.0;  ///< [rad/s] 0 < low < high
   double max_depth = 0.0;                    ///< [m] > 0
-  int speeds = 60, depths = 30;              ///< cells of the coarse grid, 4..2000; depths even from 0
-  int levels = 2;                            ///< halvings of the cells that the boundary passes, 0..6
+  int speeds = 60, depths = 30;              ///< cells of the coarse grid, 4..2000; depths start at 0
+  int levels = 2;                            ///< bisections of the cells on the boundary, 0..6
 };
 
-/// The whole boundary in a window of speed and depth, not only the first loss: the multipliers' radius on a
-/// coarse grid, cells that the boundary passes (and their neighbours) halved in both directions, crossings of
-/// the finest edges found by iteration and joined. @throws Error on a bad window.
+/// The whole boundary in a window of speed and depth, not only the first loss of stability: the spectral radius
+/// is evaluated on a coarse grid, cells on the boundary and their neighbours are bisected in both directions, and
+/// the crossings of the finest edges are solved by iteration and joined. @throws Error on an invalid window.
 std::vector<BoundaryCurve> traceBoundary(const FloquetSolver& solver, const TraceOptions& options);
 
 }  // namespace smartmill::stability

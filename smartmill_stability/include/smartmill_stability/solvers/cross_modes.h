@@ -8,13 +8,12 @@
 
 namespace smartmill::stability {
 
-/// Modes of x and y with what a measured cross receptance says of their directions. A mode of a structure
-/// whose principal directions are not x and y shows in both fits; modes of x and y whose half-power bands
-/// meet are one such pair. The cross receptance's residue there, by least squares over its lines, makes with
-/// their gains the pair's symmetric matrix of residues, which is the sum of two modes along its principal
-/// directions. A residue below two of its standard deviations counts as none. Number and order are those of
-/// systemModes(x, y).
-/// @param cross [m/N] y for a force in x or the reverse (reciprocity); without lines: systemModes(x, y)
+/// Modes of x and y with directions from a measured cross receptance. A mode whose principal direction is neither
+/// x nor y appears in both fits; modes of x and y with overlapping half-power bands form such a pair. The residue
+/// of the cross receptance (least squares over its lines) and the gains of the pair make a symmetric residue
+/// matrix, which is the sum of two modes along its principal directions. A residue below two standard deviations
+/// is taken as 0. Number and order of the modes are those of systemModes(x, y).
+/// @param cross [m/N] y for a force in x or the reverse (reciprocity); empty: systemModes(x, y)
 std::vector<SystemMode> crossModes(const ModalModel& x, const ModalModel& y, const FrequencyResponse& cross);
 
 }  // namespace smartmill::stability

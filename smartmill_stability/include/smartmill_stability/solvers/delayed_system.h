@@ -11,39 +11,38 @@
 
 namespace smartmill::stability {
 
-/// Feedback of the motion u of the tool onto the force at one time: F = now u(t) + velocity u'(t) + sum_k
-/// delayed_k u(t - delay_k). Axes: x, y.
+/// Feedback of the tool motion u to the force at one time: F = now u(t) + velocity u'(t) + sum_k delayed_k
+/// u(t - delay_k). Axes: x, y.
 struct Feedback {
   Eigen::Matrix2d now = Eigen::Matrix2d::Zero();       ///< [N/m]
   Eigen::Matrix2d velocity = Eigen::Matrix2d::Zero();  ///< [N s/m]
-  std::vector<Eigen::Matrix2d> delayed;                ///< [N/m] one a delay
+  std::vector<Eigen::Matrix2d> delayed;                ///< [N/m] one for each delay
 };
 
-/// Linear system of modes with periodic, delayed feedback; between breaks the feedback is smooth.
+/// Linear system of modes with periodic delayed feedback, which is smooth between the breaks.
 struct DelayedSystem {
   std::vector<SystemMode> modes;
   double period = 0.0;         ///< [s] of the feedback
   std::vector<double> delays;  ///< [s] 0 < delay <= period
   std::vector<double> breaks;  ///< [s] in [0, period), in any order
-  /// [N/m] bound of the feedback's stiffness, for the resolution.
+  /// [N/m] Upper bound of the stiffness of the feedback; sets the resolution.
   double stiffness = 0.0;
-  double rate = 0.0;  ///< [rad/s] of the fastest variation of the feedback
-  /// Feedback at t, as it continues from the time `inside` (between the same breaks as t).
+  double rate = 0.0;  ///< [rad/s] fastest variation of the feedback
+  /// Feedback at t as the smooth continuation from the time `inside`, which lies between the same breaks.
   std::function<void(double t, double inside, Feedback& feedback)> feedback;
 };
 
-/// The regenerative system at a speed [rad/s] and depth [m]. Principal period: a tooth's for even pitch, else
-/// a revolution.
+/// The regenerative system at a speed [rad/s] and depth [m]. Principal period: the tooth period for even pitch,
+/// else a revolution.
 DelayedSystem delayedSystem(const RegenerativeSystem& system, double speed, double depth);
 
-/// The same with the contact of a system's chip geometry about the forced vibration. Principal period: a
-/// revolution.
+/// The same with the contact of the teeth in the forced vibration (system.chip). Principal period: a revolution.
 DelayedSystem contactSystem(const RegenerativeSystem& system, double speed, double depth);
 
-/// Dominant multiplier of any delayed system by Chebyshev collocation. @param nodes an element, 4..40
+/// Dominant multiplier of a delayed system by Chebyshev collocation. @param nodes of an element, 4..40
 CharacteristicMultiplier collocationMultiplier(const DelayedSystem& system, int nodes);
 
-/// The same by semi-discretization. @param steps a period @param order of the delayed term, 0..2
+/// The same by semi-discretization. @param steps in a period @param order of the delayed term, 0..2
 CharacteristicMultiplier semiDiscretizationMultiplier(const DelayedSystem& system, int steps, int order);
 
 }  // namespace smartmill::stability

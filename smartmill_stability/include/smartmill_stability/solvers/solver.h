@@ -16,8 +16,8 @@
 
 namespace smartmill::stability {
 
-/// One vibration mode of the tool against the workpiece: q'' + 2 zeta w q' + w^2 q = input . F, and the tool
-/// moves by output q. Unit 1/sqrt(kg) for both when q has unit modal mass. A mode in one axis has input and
+/// One vibration mode of the tool relative to the workpiece: q'' + 2 zeta w q' + w^2 q = input . F; displacement
+/// of the tool: output q. Both vectors are in 1/sqrt(kg) for unit modal mass. A mode along one axis has input and
 /// output along that axis; cross terms are modes whose vectors have both components.
 struct SystemMode {
   double frequency = 0.0;      ///< [Hz] > 0
@@ -28,49 +28,48 @@ struct SystemMode {
 
 enum class Cut { milling, turning };
 
-/// What makes the chips of one tooth differ from another's: runout, a serrated edge, and, where pitch or
-/// radius are uneven, the forced vibration itself. A tooth may then miss the cut at some place, and a later
-/// one cuts what several left. The stability is that of the vibration about the forced one, with the contact
-/// as it is there (chips grow with the feed, so with chip-proportional forces the ratio of offsets to feed
-/// matters alone).
+/// Causes of different chips at different teeth: runout, a serrated edge and, with uneven pitch or radius, the
+/// forced vibration. A tooth may then miss the cut locally, and a later tooth cuts the material of several.
+/// Stability is that of the vibration about the forced vibration with its contact. With forces proportional to
+/// the chip thickness only the ratio of the offsets to the feed matters.
 struct ChipGeometry {
   double feed = 0.0;                  ///< [m] per tooth (mean over the teeth) > 0
   std::vector<double> radius_offset;  ///< [m] runout of each tooth; empty: none
-  double serration_amplitude =
-      0.0;  ///< [m] >= 0, radius = amplitude x sin(2 pi (z / wavelength + k / teeth))
-  double serration_wavelength = 0.0;  ///< [m] > 0 where there is an amplitude
-  bool forced_vibration = true;       ///< false: chips of a rigid tool decide about the contact
+  /// [m] >= 0, radius offset = amplitude x sin(2 pi (z / wavelength + k / teeth))
+  double serration_amplitude = 0.0;
+  double serration_wavelength = 0.0;  ///< [m] > 0 with an amplitude
+  bool forced_vibration = true;       ///< false: contact of a rigid tool
 };
 
-/// A milling or turning system: dynamics of the tool tip and what regenerates. Angles are immersion angles,
-/// clockwise from +y, x is the feed; forces act on the tool (docs/formats.md).
+/// A milling or turning system: dynamics of the tool tip and regeneration. Angles are immersion angles, clockwise
+/// from +y, the feed is along x; forces act on the tool (docs/formats.md).
 struct RegenerativeSystem {
   /// Dynamics: modes for every solver; receptances (measured or computed) for zero_order and multi_frequency,
-  /// which fall back on the modes when it is empty.
+  /// which use the modes without them.
   std::vector<SystemMode> modes;
   std::optional<ToolTipResponse> response;
 
   Cut cut = Cut::milling;
   int teeth = 1;              ///< 1..20
   std::vector<double> pitch;  ///< [rad] tooth k to tooth k + 1, sum 2 pi; empty: even
-  double helix = 0.0;         ///< [rad] 0 <= helix < 80 deg; needs the diameter
+  double helix = 0.0;         ///< [rad] 0 <= helix < 80 deg; requires the diameter
   double diameter = 0.0;      ///< [m] of the tool (milling) or of the workpiece (turning)
-  double entry = 0.0;         ///< [rad] milling; turning: the angle at which the edge stands all the time
+  double entry = 0.0;         ///< [rad] milling: entry angle; turning: constant angle of the edge
   double exit = units::PI;    ///< [rad] > entry; unused in turning
   double kt = 0.0;            ///< [N/m2] tangential
   double kr = 0.0;            ///< [N/m2] radial
-  /// Coefficients that change along the arc, tangential and radial [N/m2] at an immersion angle (a force law
-  /// that is no straight line, about the chip there). Empty: kt and kr; else these tell the size alone. Known
-  /// to the Floquet solvers, without a chip geometry.
+  /// [N/m2] Tangential and radial coefficient at an immersion angle, for a nonlinear force law linearised at the
+  /// chip thickness of that angle. Empty: kt and kr; otherwise kt and kr only set the scale. Supported by the
+  /// Floquet solvers, without a chip geometry.
   std::function<std::array<double, 2>(double angle)> along_arc;
-  /// Process damping: a flank that moves into the material meets a force of coefficient x depth x velocity
-  /// over cutting speed, velocity along the chip's normal. [N/m] >= 0
+  /// [N/m] >= 0 Process damping: force on the flank = coefficient x depth x velocity / cutting speed, velocity
+  /// along the chip normal, into the material.
   double damping_tangential = 0.0;
   double damping_radial = 0.0;
-  /// Share of the earlier surface that is cut again (Kim's mu): 1 milling and plunge turning, 0 threading.
+  /// [1] Overlap factor with the previous cut (Kim's mu): 1 for milling and plunge turning, 0 for threading.
   double overlap = 1.0;
-  /// Milling: contact as it is. Absent: every tooth cuts all along its arc what the tooth before it left.
-  /// Known to the Floquet solvers; zero_order knows the serration's mean over whole wavelengths.
+  /// Milling: actual contact of the teeth. Absent: every tooth cuts along its whole arc the surface left by the
+  /// previous tooth. Supported by the Floquet solvers; zero_order uses the mean over whole serration waves.
   std::optional<ChipGeometry> chip;
 
   /// @throws Error naming the quantity and its value.
@@ -79,8 +78,8 @@ struct RegenerativeSystem {
   double pitchOf(int tooth) const;  ///< [rad]
 };
 
-/// Modes of a receptance along one axis (0 x, 1 y), as SystemModes. @throws Error on a direct share: a
-/// residual compliance has no inertia and would act at once.
+/// Modes of a receptance along one axis (0 x, 1 y). A residual compliance becomes a well-damped mode at four
+/// times the highest natural frequency.
 std::vector<SystemMode> systemModes(const ModalModel& model, int axis);
 
 /// Modes of x and y together.
@@ -89,20 +88,20 @@ std::vector<SystemMode> systemModes(const ModalModel& x, const ModalModel& y);
 /// Receptance of the tool tip at f [Hz]: xx, xy, yx, yy [m/N].
 std::array<std::complex<double>, 4> receptance(const std::vector<SystemMode>& modes, double f);
 
-/// Receptances with cross terms, dense around each mode: lines from low to high [Hz].
+/// Receptances with cross terms at frequencies from low to high [Hz], dense around each mode.
 ToolTipResponse responseOf(const std::vector<SystemMode>& modes, double low, double high, std::size_t lines);
 
-/// How stability is lost: flip (period doubling: the vibration repeats every two tooth passages), Hopf
-/// (quasi-periodic). fold, a multiplier at +1, belongs to static loss of stability.
+/// Type of the loss of stability: Hopf (quasi-periodic), flip (period doubling: the vibration repeats every two
+/// principal periods), fold (multiplier +1: static loss of stability).
 enum class Kind { none, hopf, flip, fold };
 const char* nameOf(Kind kind);
 
 /// First loss of stability at one speed.
 struct Limit {
-  double depth = std::numeric_limits<double>::infinity();       ///< [m] +inf: stable to the largest asked for
+  double depth = std::numeric_limits<double>::infinity();       ///< [m] +inf: stable to the largest depth
   double frequency = std::numeric_limits<double>::quiet_NaN();  ///< [Hz] of the strongest chatter component
   Kind kind = Kind::none;
-  /// [m] change of the depth when the resolution is raised; NaN where not asked for
+  /// [m] Change of the depth with a finer resolution; NaN without estimate_error.
   double error = std::numeric_limits<double>::quiet_NaN();
 };
 
@@ -119,17 +118,17 @@ enum class Method { zero_order, multi_frequency, semi_discretization, collocatio
 Method methodOf(const std::string& name);
 const char* nameOf(Method method);
 
-/// Resolution of the solvers; 0 takes the default stated with it.
+/// Resolution of the solvers; 0 selects the default.
 struct SolverOptions {
-  int nodes = 0;                ///< collocation: Chebyshev nodes an element (default 12), 4..40
-  int steps = 0;                ///< semi_discretization: intervals a principal period (default 200)
-  int order = 1;                ///< semi_discretization: order of the delayed term's interpolation, 0..2
+  int nodes = 0;                ///< collocation: Chebyshev nodes in an element (default 12), 4..40
+  int steps = 0;                ///< semi_discretization: steps in a principal period (default 200)
+  int order = 1;                ///< semi_discretization: interpolation order of the delayed term, 0..2
   int harmonics = 0;            ///< multi_frequency: tooth passing harmonics on each side (default 10)
-  int lines = 0;                ///< multi_frequency: chatter frequencies tried a speed (default by damping)
-  double tolerance = 1e-6;      ///< [1] of the depth, relative
-  bool estimate_error = false;  ///< limits carry an error estimate from a refinement
-  /// collocation: thousands of multipliers are due. What depends on an element's length alone then comes from
-  /// a table (relative error 1e-9) that costs as much as a few of them.
+  int lines = 0;                ///< multi_frequency: evenly spaced chatter frequencies (default 60)
+  double tolerance = 1e-6;      ///< [1] relative, of the depth
+  bool estimate_error = false;  ///< sets Limit::error from a refined solution
+  /// collocation: optimises for thousands of multipliers. Matrices that depend only on the length of an element
+  /// are taken from a table (relative error 1e-9) that costs as much as a few multipliers.
   bool many = false;
 };
 
@@ -137,32 +136,32 @@ struct SolverOptions {
 class StabilitySolver {
  public:
   virtual ~StabilitySolver() = default;
-  /// First loss of stability when the depth grows from zero. @param speed [rad/s] > 0
-  /// @param max_depth [m] > 0. @throws Error.
+  /// First loss of stability with growing depth. @param speed [rad/s] > 0 @param max_depth [m] > 0
+  /// @throws Error on values out of range.
   virtual Limit limit(double speed, double max_depth) const = 0;
-  /// The same over speeds. Solvers that share work between speeds do it here.
+  /// The same at several speeds, between which a solver may share work.
   virtual std::vector<Limit> limits(const std::vector<double>& speeds, double max_depth) const;
 };
 
-/// A solver in the time domain, which knows the multipliers at any depth (Floquet).
+/// A solver in the time domain, which provides the characteristic multipliers at any depth (Floquet).
 class FloquetSolver : public StabilitySolver {
  public:
-  /// Of one speed; remembers what does not depend on the depth, and may outlive its solver.
+  /// The solver at one speed; caches results that do not depend on the depth, and may outlive its solver.
   class AtSpeed {
    public:
     virtual ~AtSpeed() = default;
     virtual CharacteristicMultiplier multiplier(double depth) = 0;
-    /// [Hz] strongest component of the tool's motion in the dominant mode at a depth.
+    /// [Hz] Strongest component of the tool motion that belongs to the dominant multiplier at a depth.
     virtual double chatterFrequency(double depth) = 0;
   };
   virtual std::unique_ptr<AtSpeed> at(double speed) const = 0;
-  /// The same system at a higher resolution, for error estimates.
+  /// The same system at a finer resolution, for error estimates.
   virtual std::unique_ptr<FloquetSolver> refined() const = 0;
 
   /// @param speed [rad/s], depth [m] >= 0
   CharacteristicMultiplier multiplier(double speed, double depth) const;
   Limit limit(double speed, double max_depth) const override;
-  /// Looks again where a neighbour's limit is much lower.
+  /// Repeats the search where the limit at a neighbouring speed is much lower.
   std::vector<Limit> limits(const std::vector<double>& speeds, double max_depth) const override;
 
  protected:
@@ -170,16 +169,15 @@ class FloquetSolver : public StabilitySolver {
   RegenerativeSystem system_;
   SolverOptions options_;
   Limit describe(AtSpeed& here, double speed, double depth, double slope) const;
-  double depth_scale_ = 0.0;  // [m] where a search from zero begins to look closely
+  double depth_scale_ = 0.0;  // [m] first depth of a search from zero
 };
 
-/// The default where modes are known is Method::collocation: the structure is propagated exactly, elements
-/// end where teeth enter and leave, so the error falls exponentially with the nodes at the least cost a
-/// digit.
-/// @throws Error on an impossible system or options, or a method that lacks its dynamics.
+/// Method::collocation is the method of choice where modes are known: the structure is propagated exactly and
+/// elements end where teeth enter and leave, so the error falls exponentially with the number of nodes.
+/// @throws Error on an invalid system or options, and on dynamics that the method does not support.
 std::unique_ptr<StabilitySolver> makeSolver(Method method, const RegenerativeSystem& system,
                                             const SolverOptions& options = {});
-/// @throws Error for methods in the frequency domain, which know no multipliers.
+/// @throws Error as makeSolver(), and for methods in the frequency domain, which have no multipliers.
 std::unique_ptr<FloquetSolver> makeFloquetSolver(Method method, const RegenerativeSystem& system,
                                                  const SolverOptions& options = {});
 

@@ -12,7 +12,7 @@
 
 namespace smartmill::stability {
 
-/// What regenerates: tooth count, radial engagement and the cutting stiffness per depth.
+/// Regenerative process: number of teeth, engagement and cutting coefficients.
 struct RegenerativeProcess {
   int teeth = 0;              ///< 1..20, evenly spaced
   double entry = 0.0;         ///< [rad] immersion angle, clockwise from +y
@@ -28,16 +28,16 @@ struct ToolTipResponse {
   std::vector<double> frequency;
   std::vector<std::complex<double>> xx, yy;
   std::vector<std::complex<double>> xy, yx;  ///< x for a force in y and the reverse; empty: none
-  /// xx, xy, yx, yy at any f [Hz]; negative: conjugate. Below the lines the real part of the first, above the
+  /// xx, xy, yx, yy at any f [Hz]; negative f: conjugate. Below the lines: real part of the first line; above:
   /// mass line through the last.
   std::array<std::complex<double>, 4> at(double f) const;
 };
 
-/// Evaluated from modes, dense around each mode: lines from low to high [Hz].
+/// Evaluated from modes at frequencies from low to high [Hz], dense around each mode.
 ToolTipResponse responseOf(const ModalModel& x, const ModalModel& y, double low, double high,
                            std::size_t lines);
-/// From measured FRFs; y is interpolated onto the lines of x. @throws Error when a unit is not m/N or the
-/// bands do not meet.
+/// From measured FRFs; y is interpolated at the lines of x. @throws Error when a unit is not m/N or the bands do
+/// not overlap.
 ToolTipResponse responseOf(const FrequencyResponse& x, const FrequencyResponse& y);
 
 /// Mean directional coefficients a_xx, a_xy, a_yx, a_yy over a revolution times 2 pi / teeth, so that A_0 =
@@ -45,12 +45,12 @@ ToolTipResponse responseOf(const FrequencyResponse& x, const FrequencyResponse& 
 /// tool and forces on the tool.
 std::array<double, 4> directionalCoefficients(const RegenerativeProcess& process);
 
-/// Zero-order solution of Altintas and Budak (Dunwoody eq. 6.10..6.14): at each speed the least depth over
-/// all lobes and both eigenvalues, interpolated between the lines. @param speeds [rad/s] > 0 rising
+/// Zero-order solution of Altintas and Budak (Dunwoody eq. 6.10..6.14): at each speed the smallest depth over
+/// all lobes and both eigenvalues, interpolated between the lines. @param speeds [rad/s] > 0, ascending
 StabilityLimit zeroOrderLimit(const RegenerativeProcess& process, const ToolTipResponse& tool,
                               const std::vector<double>& speeds);
 
-/// Depth below which every speed is stable in the zero-order sense [m]; +inf without a limit.
+/// [m] Critical limit: below this depth every speed is stable by the zero-order solution; +inf without a limit.
 double absoluteDepthLimit(const RegenerativeProcess& process, const ToolTipResponse& tool);
 
 }  // namespace smartmill::stability
