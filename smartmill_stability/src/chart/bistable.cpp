@@ -17,8 +17,8 @@ constexpr double TOLERANCE = 1e-9;  // [1] relative, of a comparison
 
 constexpr int CHIPS = 200;  // of the table over the arc
 
-/// Tangential and radial gain over the chip thickness. The amplitude is the same fraction of every chip thickness,
-/// as for a vibration in one direction.
+/// Tangential and radial gain over the chip thickness. The amplitude is the same fraction of every chip
+/// thickness, as for a vibration in one direction.
 class Gains {
  public:
   /// @param gain of a curve at a chip thickness
@@ -78,13 +78,15 @@ std::vector<BistableLimit> bistableLimits(const RegenerativeSystem& system, cons
                                           const std::vector<double>& speeds, double max_depth) {
   const double chip = meanChip(system, feed), top = law.tangential.knots.back();
   if (!(chip > 0.0) || feed > top * (1.0 + TOLERANCE))
-    throw Error(formatted("force curve: feed per tooth %.4f mm: expected a value within the curve, 0 .. %.4f mm",
-                          feed / units::MM, top / units::MM));
+    throw Error(
+        formatted("force curve: feed per tooth %.4f mm: expected a value within the curve, 0 .. %.4f mm",
+                  feed / units::MM, top / units::MM));
   if (!(law.tangential.slope(chip) > 0.0))
-    throw Error(formatted(
-        "force curve: the tangential force does not rise at the mean chip thickness %.4f mm; expected a positive "
-        "slope",
-        chip / units::MM));
+    throw Error(
+        formatted("force curve: the tangential force does not rise at the mean chip thickness %.4f mm; "
+                  "expected a positive "
+                  "slope",
+                  chip / units::MM));
   const auto limitsAt = [&](const Gains& gains) {
     return limitsWith(system, gains, feed, method, options, speeds, max_depth);
   };
@@ -100,9 +102,9 @@ std::vector<BistableLimit> bistableLimits(const RegenerativeSystem& system, cons
     }
   }
   const auto smalls = limitsAt({law, feed, [](const ForceCurve& curve, double h) { return curve.slope(h); }});
-  const auto larges = limitsAt(
-      {law, feed,
-       [share](const ForceCurve& curve, double h) { return describingFunction(curve, h, share * h); }});
+  const auto larges = limitsAt({law, feed, [share](const ForceCurve& curve, double h) {
+                                  return describingFunction(curve, h, share * h);
+                                }});
   const auto secants =
       limitsAt({law, feed, [](const ForceCurve& curve, double h) { return curve.at(h) / h; }});
   std::vector<BistableLimit> found;

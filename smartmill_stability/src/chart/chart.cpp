@@ -61,7 +61,8 @@ std::vector<StabilityPoint> pick(
 }
 
 /// Of the neighbouring cuts with nearly the same removal rate as the best, the one with the largest margin of
-/// speed to the nearer flank of its lobe. Where the power limits the removal rate it is constant over the pocket.
+/// speed to the nearer flank of its lobe. Where the power limits the removal rate it is constant over the
+/// pocket.
 StabilityPoint farthestFromFlanks(const StabilityLimit& limit, const std::vector<StabilityPoint>& cuts,
                                   const StabilityPoint& best) {
   constexpr double AS_MUCH = 0.98;
@@ -88,7 +89,8 @@ namespace {
 
 /// Removes lines with too little excitation and lines below a multiple of their own standard deviation, where
 /// noise would appear as a resonance. Interpolation between the neighbours replaces them.
-/// @param error [1] largest standard deviation over the peak @param factor [1] least value over standard deviation
+/// @param error [1] largest standard deviation over the peak @param factor [1] least value over standard
+/// deviation
 FrequencyResponse certainLines(const FrequencyResponse& frf, double error, double factor) {
   if (frf.std_dev.size() != frf.size()) return frf;
   double peak = 0.0;
@@ -106,8 +108,8 @@ FrequencyResponse certainLines(const FrequencyResponse& frf, double error, doubl
   return result;
 }
 
-/// Adds cross receptances that were measured over the whole band. "xy": excitation along x, response along y. A
-/// single one is used for both (reciprocity).
+/// Adds cross receptances that were measured over the whole band. "xy": excitation along x, response along y.
+/// A single one is used for both (reciprocity).
 void addCross(const std::map<std::string, MeasuredFrf>& frfs, ToolTipResponse& response) {
   const auto lines = [&](const char* direction) {
     std::vector<std::complex<double>> values;
@@ -131,8 +133,8 @@ void addCross(const std::map<std::string, MeasuredFrf>& frfs, ToolTipResponse& r
   if (response.yx.empty()) response.yx = response.xy;
 }
 
-/// Limits at ascending speeds: solved by bisection until linear interpolation between the neighbours is right to
-/// STRAIGHT, then interpolated.
+/// Limits at ascending speeds: solved by bisection until linear interpolation between the neighbours is right
+/// to STRAIGHT, then interpolated.
 StabilityLimit refinedLimits(const StabilitySolver& solver, const std::vector<double>& speeds,
                              double max_depth) {
   constexpr std::size_t STRIDE = 16;
@@ -432,7 +434,8 @@ void ChartMaker::recommend(StabilityChart& chart, const StabilityLimit& wide) co
 /// The best of the peaks whose stability collocation confirms, since the zero-order solution misses flips. A
 /// rejected point is tried again at a smaller depth, in the order of the reduced removal rate.
 std::vector<StabilityPoint> ChartMaker::confirmed(std::vector<StabilityPoint> peaks) const {
-  constexpr double REDUCTION = 0.95, LEAST = 0.2;  // [1] of the depth: per try, and in all before it is dropped
+  constexpr double REDUCTION = 0.95,
+                   LEAST = 0.2;  // [1] of the depth: per try, and in all before it is dropped
   const std::optional<UncertainSystem> uncertain = uncertainSystem({});
   RiskOptions options;
   options.risk = parameters_.risk;

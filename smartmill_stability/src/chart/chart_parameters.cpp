@@ -12,13 +12,14 @@ void declarePoints(ChartParameters& p, ParameterTable& table) {
                "relative distance of recommended depths below the limit");
   table.number("speed_margin", p.speed_margin, "1", Range::openHigh(0.0, 0.2),
                "relative error of the speed for which the depth margin holds");
+  table.number("risk", p.risk, "1", Range::closed(0.0, 0.5),
+               "largest probability of chatter of a recommended cut, from the standard deviations of the "
+               "measurements, "
+               "by the zero-order solution and by collocation; requires modes (tool/modes); 0: not limited");
   table.number(
-      "risk", p.risk, "1", Range::closed(0.0, 0.5),
-      "largest probability of chatter of a recommended cut, from the standard deviations of the measurements, "
-      "by the zero-order solution and by collocation; requires modes (tool/modes); 0: not limited");
-  table.number("frequency_std", p.frequency_std, "1", Range::openHigh(0.0, 0.2),
-               "relative standard deviation of modal frequencies in addition to that of the estimate: dynamics "
-               "at rest differ from those of a rotating, warm spindle");
+      "frequency_std", p.frequency_std, "1", Range::openHigh(0.0, 0.2),
+      "relative standard deviation of modal frequencies in addition to that of the estimate: dynamics "
+      "at rest differ from those of a rotating, warm spindle");
   table.number("gain_std", p.gain_std, "1", Range::openHigh(0.0, 0.5),
                "the same for compliance, damping and cutting coefficients");
   table.number("kr_std", p.radial_std, "1", Range::openHigh(0.0, 0.5),

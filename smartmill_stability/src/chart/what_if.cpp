@@ -55,13 +55,13 @@ StabilityLimit firstGuess(const RegenerativeSystem& system, const std::vector<do
   return zeroOrderLimit(mean, response, speeds);
 }
 
-/// Continuation of the first loss of stability over the speeds of a chart: every STRIDE-th speed is searched from
-/// depth zero, the speeds between start from a prediction by their neighbours and the first guess.
+/// Continuation of the first loss of stability over the speeds of a chart: every STRIDE-th speed is searched
+/// from depth zero, the speeds between start from a prediction by their neighbours and the first guess.
 class LimitContinuation {
  public:
   /// @param teeth with even pitch; 0: uneven pitch
-  LimitContinuation(const FloquetSolver& solver, const std::vector<double>& speeds, double max_depth, int teeth,
-                    StabilityLimit guess)
+  LimitContinuation(const FloquetSolver& solver, const std::vector<double>& speeds, double max_depth,
+                    int teeth, StabilityLimit guess)
       : solver_(solver),
         max_depth_(max_depth),
         teeth_(teeth),
@@ -229,8 +229,8 @@ class LimitContinuation {
     return guessed(i) && close(guess_.chatter_frequency[i], frequency, SAME_LOBE);
   }
 
-  /// Interpolated speeds with an odd number of half waves between two teeth: a flip lobe as narrow as one speed may
-  /// cut the flank of the lobe there.
+  /// Interpolated speeds with an odd number of half waves between two teeth: a flip lobe as narrow as one
+  /// speed may cut the flank of the lobe there.
   std::vector<std::size_t> nearFlipLobes() const {
     constexpr double NEAR = 0.03;
     std::vector<std::size_t> found;
@@ -241,8 +241,8 @@ class LimitContinuation {
     return found;
   }
 
-  /// Interpolation between a and b; where the first guess belongs to the same lobe, the ratio of limit to guess is
-  /// interpolated.
+  /// Interpolation between a and b; where the first guess belongs to the same lobe, the ratio of limit to
+  /// guess is interpolated.
   Knot between(std::size_t a, std::size_t b, std::size_t i) const {
     const Knot &from = knots_[a], &to = knots_[b];
     const double share = (speeds_[i] - speeds_[a]) / (speeds_[b] - speeds_[a]);
@@ -258,8 +258,8 @@ class LimitContinuation {
     return knot;
   }
 
-  /// Prediction where a and b belong to different lobes: the first guess, scaled by the ratio of limit to guess at
-  /// the one in the same lobe.
+  /// Prediction where a and b belong to different lobes: the first guess, scaled by the ratio of limit to
+  /// guess at the one in the same lobe.
   Knot acrossLobes(std::size_t a, std::size_t b, std::size_t i) const {
     Knot knot = std::isfinite(knots_[a].depth) ? knots_[a] : knots_[b];
     if (std::isfinite(knots_[a].depth) && std::isfinite(knots_[b].depth))

@@ -160,8 +160,8 @@ void ChatterAdvisor::handle(const ChatterState& state) {
 
 namespace {
 
-/// Speeds at which the tooth passing frequency divides the chatter frequency, highest first, then those of the
-/// modal frequencies, where the pockets are if the chatter is a flip. The limits are still unknown.
+/// Speeds at which the tooth passing frequency divides the chatter frequency, highest first, then those of
+/// the modal frequencies, where the pockets are if the chatter is a flip. The limits are still unknown.
 std::vector<ChatterAdvice::Speed> inStep(double frequency, int teeth, const std::vector<SystemMode>& modes,
                                          double low, double high) {
   constexpr std::size_t MOST_SPEEDS = 12;

@@ -127,7 +127,8 @@ void ChatterDetector::dropWindow() {
 
 void ChatterDetector::notSteady(double stamp) {
   dropWindow();
-  // The first condition may be older than its receipt: the results must not depend on how late it was received.
+  // The first condition may be older than its receipt: the results must not depend on how late it was
+  // received.
   if (reported_invalid_ || !condition_) return;
   reported_invalid_ = true;
   ChatterState state;

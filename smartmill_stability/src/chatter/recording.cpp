@@ -18,19 +18,19 @@ constexpr double LOWEST = 80.0, HIGHEST = 6000.0;            // [Hz] band of the
 constexpr double TURNS = 32.0;                               // revolutions of a window
 constexpr double LEAST_WINDOW = 0.08, LONGEST_WINDOW = 0.8;  // [s]
 constexpr int LEAST_WINDOWS = 5;
-constexpr double MAIN_LOBE = 3.5;  // [lines] half width of the main lobe of the window
-constexpr double SPREAD = 0.0015;  // [1] relative variation of the spindle speed
-constexpr double LINE = 14.0;      // [1] least power of a line over the noise floor
-constexpr double NARROW = 0.06;    // [1] largest power next to a line over its power
-constexpr double AIR = 6.0;        // [1] least power over that of the same line outside the cut
-constexpr double PRESENT = 5.0;    // [1] least power over the surroundings in one window
-constexpr double STEADY = 0.6;     // [1] least fraction of the windows of the cut
-constexpr double CONTRAST = 1.8;   // [1] least power of the cut over that of the rest
-constexpr double STRONG = 0.3;     // [1] power over the harmonics above which no companion is required
-constexpr double LEAST_SHARE = 0.02;                    // [1] least power over the harmonics
+constexpr double MAIN_LOBE = 3.5;     // [lines] half width of the main lobe of the window
+constexpr double SPREAD = 0.0015;     // [1] relative variation of the spindle speed
+constexpr double LINE = 14.0;         // [1] least power of a line over the noise floor
+constexpr double NARROW = 0.06;       // [1] largest power next to a line over its power
+constexpr double AIR = 6.0;           // [1] least power over that of the same line outside the cut
+constexpr double PRESENT = 5.0;       // [1] least power over the surroundings in one window
+constexpr double STEADY = 0.6;        // [1] least fraction of the windows of the cut
+constexpr double CONTRAST = 1.8;      // [1] least power of the cut over that of the rest
+constexpr double STRONG = 0.3;        // [1] power over the harmonics above which no companion is required
+constexpr double LEAST_SHARE = 0.02;  // [1] least power over the harmonics
 constexpr double BELOW_MODE = 0.06, ABOVE_MODE = 0.15;  // [1] range around a mode; chatter is mostly above it
-constexpr double LINE_ERROR = 0.5, DRIFT = 0.0006;      // [lines], [1]: tolerance of the distance of companions
-constexpr int COMPANIONS = 4;                           // tooth passing frequencies to each side
+constexpr double LINE_ERROR = 0.5, DRIFT = 0.0006;  // [lines], [1]: tolerance of the distance of companions
+constexpr int COMPANIONS = 4;                       // tooth passing frequencies to each side
 
 double decibel(double ratio) {
   return 10.0 * std::log10(std::max(1e-30, ratio));
@@ -102,8 +102,8 @@ class RecordingAnalysis {
     const double window =
         std::min(std::clamp(TURNS * turn, LEAST_WINDOW, LONGEST_WINDOW), 2.0 * seconds / (LEAST_WINDOWS + 1));
     if (window < 8.0 * turn)
-      throw Error(formatted("recording: %.2f s with %.0f revolutions: expected at least %d revolutions", seconds,
-                            seconds / turn, 8 * (LEAST_WINDOWS + 1) / 2));
+      throw Error(formatted("recording: %.2f s with %.0f revolutions: expected at least %d revolutions",
+                            seconds, seconds / turn, 8 * (LEAST_WINDOWS + 1) / 2));
     verdict_.spectrogram = spectrogramOf(recording, window);
     step_ = verdict_.spectrogram.frequency[1];
   }
@@ -167,8 +167,8 @@ class RecordingAnalysis {
     verdict_.to = verdict_.spectrogram.time[static_cast<std::size_t>(last)];
   }
 
-  /// Whether the loud windows are louder at the tooth passing frequency: a cut, not a vibration that grows within
-  /// a cut.
+  /// Whether the loud windows are louder at the tooth passing frequency: a cut, not a vibration that grows
+  /// within a cut.
   bool loudFromTeeth() {
     constexpr double TEETH = 3.0;   // [1] power ratio
     constexpr double LEAST = 0.12;  // [1] least fraction of the windows of either kind
@@ -192,8 +192,8 @@ class RecordingAnalysis {
     return in > TEETH * out;
   }
 
-  /// Mean spectrum of the windows in the cut or outside, without those at a transition unless there are no others.
-  /// Empty without such windows.
+  /// Mean spectrum of the windows in the cut or outside, without those at a transition unless there are no
+  /// others. Empty without such windows.
   std::vector<double> mean(bool cut) const {
     std::vector<double> sum(verdict_.spectrogram.frequency.size(), 0.0);
     for (const bool inner : {true, false}) {
@@ -376,9 +376,10 @@ class RecordingAnalysis {
       verdict_.over_noise = decibel(in_cut_[best->at] / floor_[best->at]);
       verdict_.over_air = has_air_ ? decibel(overAir(best->at)) : RecordingVerdict::UNKNOWN;
     }
-    verdict_.reason = best           ? ""
-                      : far          ? "lines outside the harmonics are not near a mode"
-                      : single       ? "lines outside the harmonics have no companions one tooth passing frequency away"
+    verdict_.reason = best  ? ""
+                      : far ? "lines outside the harmonics are not near a mode"
+                      : single
+                          ? "lines outside the harmonics have no companions one tooth passing frequency away"
                       : weak         ? "lines outside the harmonics are weak"
                       : lines_in_air ? "lines outside the harmonics are also present outside the cut"
                                      : "no lines outside the harmonics";
@@ -443,9 +444,9 @@ RecordingVerdict judgeRecording(const Recording& recording, const RecordingReque
     if (channel.size() != recording.channels[0].size())
       throw Error("recording: channels of different length: expected equal lengths");
   if (request.teeth * request.speed / units::TWO_PI > 0.2 * recording.sample_rate)
-    throw Error(
-        formatted("recording: sample rate %.0f Hz: expected at least 5 times the tooth passing frequency, %.0f Hz",
-                  recording.sample_rate, request.teeth * request.speed / units::TWO_PI));
+    throw Error(formatted(
+        "recording: sample rate %.0f Hz: expected at least 5 times the tooth passing frequency, %.0f Hz",
+        recording.sample_rate, request.teeth * request.speed / units::TWO_PI));
   return RecordingAnalysis(recording, request).run();
 }
 

@@ -24,7 +24,7 @@ struct Options {
   NodeParameters parameters;
 };
 
-constexpr int DIGITS = 17;  // the node's figures to the last one
+constexpr int DIGITS = 17;  // every digit of the values that the node publishes
 
 void write(const StabilityChart& chart, const std::string& file) {
   CsvWriter csv("rpm,limit_mm,chatter_hz,torque_limit_mm,power_limit_mm", DIGITS);
@@ -48,7 +48,7 @@ void write(const std::vector<ChatterState>& states, const std::string& file) {
   csv.save(file);
 }
 
-/// Small and large vibrations by the force curve.
+/// Limits of small and large vibrations for the force curve.
 void write(const BistableChart& chart, const std::string& file) {
   CsvWriter csv("rpm,limit_mm,large_limit_mm,secant_limit_mm", DIGITS);
   for (const BistableLimit& b : chart.limits)
@@ -57,9 +57,9 @@ void write(const BistableChart& chart, const std::string& file) {
   csv.save(file);
   drawBeside(file,
              "set xlabel 'Spindle speed [rpm]'\nset ylabel 'Axial depth [mm]'\nset yrange [0:]\n"
-             "plot %FILE skip 1 using 1:3:2 with filledcurves lc 'gold' title 'still or chatter', "
-             "%FILE skip 1 using 1:2 with lines lw 2 lc 'black' title 'the least vibration grows', "
-             "%FILE skip 1 using 1:3 with lines lw 2 lc 'red' title 'a large vibration stays'");
+             "plot %FILE skip 1 using 1:3:2 with filledcurves lc 'gold' title 'bistable', "
+             "%FILE skip 1 using 1:2 with lines lw 2 lc 'black' title 'limit of small vibrations', "
+             "%FILE skip 1 using 1:3 with lines lw 2 lc 'red' title 'limit of large vibrations'");
 }
 
 void print(const char* title, const std::vector<StabilityPoint>& points) {
@@ -76,7 +76,8 @@ void run(const Options& o) {
   NodeParameters parameters = o.parameters;
   if (!o.model.empty()) parameters.model = o.model;
   parameters.validate();
-  if (parameters.model.empty()) throw Error(o.bag + ": a bag needs the machine's model (--model)");
+  if (parameters.model.empty())
+    throw Error(o.bag + ": machine model missing: expected --model or the parameter model");
   const bool terminal = isatty(STDERR_FILENO);
   const auto progress = [terminal](double share) {
     if (terminal) std::fprintf(stderr, "\rreading %3.0f %%%s", 100.0 * share, share >= 1.0 ? "\n" : "");
@@ -84,21 +85,23 @@ void run(const Options& o) {
   const BagCharts found = chartsFromBag(o.bag, readMachineModel(parameters.model), parameters, progress);
   if (!o.states.empty()) write(found.states, o.states);
   if (found.bistable) {
-    std::printf("by the force curve, feed %.4f mm (mean chip %.4f mm): tangential slope %.1f N/mm2\n",
-                found.bistable->feed / units::MM, found.bistable->mean_chip / units::MM,
-                found.bistable->slope / units::N_PER_MM2);
+    std::printf(
+        "force curve at feed per tooth %.4f mm (mean chip thickness %.4f mm): tangential slope %.1f N/mm2\n",
+        found.bistable->feed / units::MM, found.bistable->mean_chip / units::MM,
+        found.bistable->slope / units::N_PER_MM2);
     if (!o.bistable.empty()) write(*found.bistable, o.bistable);
   } else if (!o.bistable.empty()) {
-    throw Error(o.bag +
-                ": no limits by a force curve: material/force_curve (or the parameter force_curve), "
-                "modes of x and y or coefficients are missing");
+    throw Error(
+        o.bag +
+        ": no limits for a force curve: expected material/force_curve (or the parameter force_curve), "
+        "modes of x and y, and coefficients");
   }
   int valid = 0, chatter = 0;
   for (const ChatterState& s : found.states) {
     valid += s.valid;
     chatter += s.chatter;
   }
-  std::printf("chatter in %d of %d steady windows\n", chatter, valid);
+  std::printf("chatter in %d of %d windows of steady cutting\n", chatter, valid);
   if (!found.chart) {
     if (!o.output.empty()) throw Error(o.bag + ": no chart, missing: " + found.missing);
     std::printf("no chart, missing: %s\n", found.missing.c_str());
@@ -107,7 +110,7 @@ void run(const Options& o) {
   std::printf("tool %s, material %s, stable at every speed below %.4f mm\n", found.chart->tool.c_str(),
               found.chart->material.c_str(), found.chart->absolute_depth_limit / units::MM);
   print("recommended:", found.chart->recommended);
-  print("unstable, for a check:", found.chart->unstable);
+  print("unstable, proposed for a check:", found.chart->unstable);
   if (!o.output.empty()) write(*found.chart, o.output);
 }
 
@@ -118,22 +121,26 @@ namespace smartmill::stability {
 Command chartCommand() {
   Command command;
   command.name = command.tool = "chart";
-  command.summary = "makes the stability chart of a recorded session, as stability_node does";
+  command.summary = "computes the stability chart of a recorded session";
   command.description =
-      "The stability chart and the chatter verdicts that stability_node makes of a recorded bag.";
+      "Stability chart and chatter verdicts of a recorded bag, as computed by stability_node.";
   command.examples = {
       {"session.bag --model mill.yaml -o chart.csv", "the chart, a picture, recommended points"},
       {"session.bag --model mill.yaml --states states.csv", "the chatter verdicts over time"}};
-  command.files = {{"OUT", "CSV rpm,limit_mm,chatter_hz,torque_limit_mm,power_limit_mm; a picture with .png"},
-                   {"launch/config/stability.yaml", "the node's parameters, for --params"}};
+  command.files = {
+      {"OUT",
+       "CSV rpm,limit_mm,chatter_hz,torque_limit_mm,power_limit_mm; a picture of the same name with "
+       ".png"},
+      {"launch/config/stability.yaml", "the node's parameters, for --params"}};
   command.declare = [](CommandLine& line) -> std::function<int()> {
     const auto o = std::make_shared<Options>();
-    line.option("BAG", o->bag, "recording with tool/frf, material/coefficients, cuts").required();
-    line.option("--model", o->model, "machine model file: tool and spindle limits (default: the parameter)");
+    line.option("BAG", o->bag, "recording with tool/frf, material/coefficients and cuts").required();
+    line.option("--model", o->model,
+                "machine model file: tool and spindle limits (default: parameter model)");
     line.option("-o,--out", o->output, "CSV of the chart; a picture of the same name with .png");
     line.option(
         "--bistable", o->bistable,
-        "CSV of the limits of small and large vibrations by the force curve; a picture of the same name "
+        "CSV of the limits of small and large vibrations for the force curve; a picture of the same name "
         "with .png");
     line.option("--states", o->states, "CSV of the chatter verdicts");
     const auto table = std::make_shared<ParameterTable>(tableOf(o->parameters));

@@ -26,7 +26,7 @@ struct Request : stability::CutRequest {
 };
 
 void run(const Request& request) {
-  if (!(request.risk >= 0.0) || !(request.risk < 1.0)) throw Error("--risk: must be from 0 to below 1");
+  if (!(request.risk >= 0.0) || !(request.risk < 1.0)) throw Error("--risk: expected 0 <= value < 1");
   const MachineModel model = readMachineModel(request.model);
   const stability::RegenerativeSystem system = request.system(model);
   const std::vector<double> speeds = request.speedRange();
@@ -41,7 +41,7 @@ void run(const Request& request) {
                                                  });
   CsvWriter csv("rpm,depth_mm,probability,nominal_limit_mm", 8);
   for (std::size_t s = 0; s < speeds.size(); ++s) {
-    if (s > 0) csv.gap();  // gnuplot's rows
+    if (s > 0) csv.gap();  // separates the rows for gnuplot
     for (std::size_t d = 0; d < depths.size(); ++d)
       csv.row(units::rpmFromRadPerSec(speeds[s]), depths[d] / units::MM, chart.probability[s][d],
               chart.nominal[s] / units::MM);
@@ -76,18 +76,19 @@ Command chatterProbabilityCommand() {
   command.examples = {
       {"mill.yaml --entry-deg 0 --exit-deg 180 --speeds 4000:9000:101 --depths-mm 0.1:3:30 -o "
        "grid.csv",
-       "a map, and the points that are robust against 5 % risk"}};
+       "a map, and robust points at a risk of 5 %"}};
   command.files = {
       {"OUT", "CSV rpm,depth_mm,probability,nominal_limit_mm; a picture of the same name with .png"}};
   command.declare = [](CommandLine& line) -> std::function<int()> {
     const auto request = std::make_shared<Request>();
     request->addTo(line, "LO:HI:N");
     line.option("--depths-mm", request->depths, "LO:HI:N [mm]").required();
-    line.option("--draws", request->draws, "machines drawn").showDefault();
+    line.option("--draws", request->draws, "number of drawn machines").showDefault();
     line.option("--seed", request->seed, "seed of the draws").showDefault();
-    line.option("--risk", request->risk, "probability of chatter that robust points may have").showDefault();
-    line.option("--speed-margin", request->speed_margin, "share of the speed to both sides").showDefault();
-    line.option("--points", request->points, "robust points printed").showDefault();
+    line.option("--risk", request->risk, "largest probability of chatter of robust points").showDefault();
+    line.option("--speed-margin", request->speed_margin, "relative error of the speed on both sides")
+        .showDefault();
+    line.option("--points", request->points, "largest number of robust points").showDefault();
     request->addOutTo(line);
     return commandBody(request, run);
   };

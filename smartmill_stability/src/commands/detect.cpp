@@ -30,7 +30,8 @@ std::vector<double> modesOf(const std::string& file) {
   return modes;
 }
 
-/// Time and frequency in dB, tooth passings as thin lines, the chatter as an arrow.
+/// Draws the spectrogram in dB with the tooth passing harmonics as dotted lines and the chatter as a red
+/// line.
 void draw(const RecordingVerdict& verdict, const RecordingOptions& o) {
   constexpr std::size_t MOST = 400;
   const Spectrogram& s = verdict.spectrogram;
@@ -56,7 +57,7 @@ void draw(const RecordingVerdict& verdict, const RecordingOptions& o) {
                       verdict.frequency, s.time[0], verdict.frequency);
   plot << "set title " << Gnuplot::quoted(verdict.text()) << " font ',10'\nset xlabel "
        << Gnuplot::quoted("Time [s] of " + std::filesystem::path(o.file).filename().string())
-       << "\nset ylabel 'Frequency [Hz] (dotted: tooth passings)'\nset cblabel 'Power [dB]'\n"
+       << "\nset ylabel 'Frequency [Hz] (dotted: tooth passing harmonics)'\nset cblabel 'Power [dB]'\n"
        << formatted("set xrange [%g:%g]\nset yrange [0:%g]\n", s.time[0], end, s.frequency.back())
        << "set palette defined (0 '#000020', 1 '#203080', 2 '#3090a0', 3 '#e0d060', 4 '#ffffff')\n"
        << "plot $levels using 1:2:3 with image notitle\n";
@@ -93,24 +94,28 @@ Command detectCommand() {
   command.name = command.tool = "detect";
   command.summary = "detects chatter in a recorded cut (sound, vibration, force)";
   command.description =
-      "Decides whether a recording of a cut (sound, vibration, displacement or force; WAV, FLAC, CSV or bag) "
-      "shows chatter, in one line, and draws its spectrogram.";
+      "Detects chatter in a recording of a cut (sound, vibration, displacement or force; WAV, FLAC, CSV or "
+      "bag), "
+      "prints the result in one line and draws the spectrogram.";
   command.examples = {{"cut.wav --speed 8000 --teeth 4", "all channels of a sound file"},
                       {"cut.csv --speed 8000 --teeth 4 --channels fx,fy --model mill.yaml",
                        "two columns; chatter must lie near a mode of the model"}};
   command.files = {{"FILE", "the recording: WAV, FLAC, AIFF, CSV with a column time[s], or a bag"},
-                   {"NAME_spectrogram.png", "the picture, unless -o names another"}};
+                   {"NAME_spectrogram.png", "spectrogram, unless -o sets another name"}};
   command.declare = [](CommandLine& line) -> std::function<int()> {
     const auto o = std::make_shared<RecordingOptions>();
     line.option("FILE", o->file, "the recording").required();
     line.option("--speed", o->rpm, "spindle speed of the cut [rpm]").required().positive();
     line.option("--teeth", o->teeth, "teeth of the tool").required();
     line.option("--speed-error", o->speed_error, "largest error of the speed [percent]").showDefault();
-    line.option("--model", o->model, "machine model with the modes of tool_tip: chatter must lie near one");
-    line.option("--channels", o->channels, "numbers of a sound file's channels, or columns of a CSV (all)")
+    line.option("--model", o->model, "machine model file; chatter must lie near a mode of its tool_tip");
+    line.option("--channels", o->channels,
+                "channel numbers of a sound file, or columns of a CSV file (default: all)")
         .commas();
-    line.option("--topic", o->topic,
-                "topic of a bag (default: the first present of daq/sound, daq/vibration, force/compensated)");
+    line.option(
+        "--topic", o->topic,
+        "topic of a bag (default: the first available of daq/sound, daq/vibration, force/compensated, "
+        "daq/dynamometer)");
     line.option("--from", o->from, "start of the part to use [s]").notNegative();
     line.option("--to", o->to, "end of the part to use [s]");
     line.option("-o,--out", o->picture, "picture of the spectrogram (default: NAME_spectrogram.png)");

@@ -36,16 +36,16 @@ std::string axes(double max_depth_mm) {
          std::to_string(max_depth_mm) + "]\n";
 }
 
-/// [s] a limit may take before progress is shown.
+/// [s] Computing time after which the progress is displayed.
 constexpr double QUIET = 1.0;
 
 std::vector<stability::Limit> limitsOf(const stability::StabilitySolver& solver,
                                        const std::vector<double>& speeds, double max_depth) {
-  // In pieces that overlap by one speed, so that neighbours are compared across them.
+  // Pieces overlap by one speed, because the solver compares neighbouring speeds.
   constexpr std::size_t PIECE = 25;
   const auto begin = std::chrono::steady_clock::now();
   std::vector<stability::Limit> limits;
-  bool shown = false;
+  bool progress = false;
   for (std::size_t i = 0; i < speeds.size(); i += PIECE) {
     const std::size_t from = i > 0 ? i - 1 : 0, to = std::min(i + PIECE + 1, speeds.size());
     const std::vector<double> part(speeds.begin() + static_cast<std::ptrdiff_t>(from),
@@ -53,27 +53,27 @@ std::vector<stability::Limit> limitsOf(const stability::StabilitySolver& solver,
     const std::vector<stability::Limit> found = solver.limits(part, max_depth);
     for (std::size_t k = i; k < std::min(i + PIECE, speeds.size()); ++k) limits.push_back(found[k - from]);
     const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - begin;
-    if (passed.count() > QUIET || shown) {
+    if (passed.count() > QUIET || progress) {
       std::fprintf(stderr, "\r%3zu %% of the speeds", 100 * limits.size() / speeds.size());
-      shown = true;
+      progress = true;
     }
   }
-  if (shown) std::fprintf(stderr, "\n");
+  if (progress) std::fprintf(stderr, "\n");
   return limits;
 }
 
 void traceAll(const Request& request, const stability::FloquetSolver& solver,
               const std::vector<double>& speeds) {
-  if (speeds.size() < 2) throw Error("--boundary: expected a range of speeds");
+  if (speeds.size() < 2) throw Error("--boundary: one speed: expected a range of speeds (--speeds)");
   stability::TraceOptions options;
   options.speed_low = speeds.front();
   options.speed_high = speeds.back();
   options.max_depth = request.max_depth_mm * units::MM;
-  options.levels = 3;  // tips of pockets down to 1/480 of the range of speeds
+  options.levels = 3;  // resolves tips of pockets down to 1/480 of the speed range
   const auto curves = stability::traceBoundary(solver, options);
   CsvWriter csv("curve,rpm,depth_mm,chatter_hz,kind", 8);
   for (std::size_t c = 0; c < curves.size(); ++c) {
-    // A blank line parts the curves for gnuplot.
+    // A blank line separates the curves for gnuplot.
     if (c > 0) csv.gap();
     for (const stability::BoundaryPoint& p : curves[c].points)
       csv.row(c, units::rpmFromRadPerSec(p.speed), p.depth / units::MM, p.frequency, nameOf(p.kind));
@@ -89,10 +89,11 @@ void traceAll(const Request& request, const stability::FloquetSolver& solver,
   std::printf("%zu boundary curves, %zu of them islands\n", curves.size(), islands);
 }
 
-/// Contact of the teeth as it is, where a feed is given.
+/// Adds the chip geometry, and with it the actual contact of the teeth, when a feed is given.
 void addChips(const Request& request, stability::RegenerativeSystem& system) {
   if (request.feed_mm == 0.0 && request.serration.empty()) return;
-  if (!(request.feed_mm > 0.0)) throw Error("--feed-mm: must be above 0 (with --serration-mm as well)");
+  if (!(request.feed_mm > 0.0))
+    throw Error("--feed-mm: expected a value above 0 (required by --serration-mm)");
   stability::ChipGeometry chip;
   chip.feed = request.feed_mm * units::MM;
   if (!request.serration.empty()) {
@@ -107,9 +108,9 @@ void addChips(const Request& request, stability::RegenerativeSystem& system) {
   system.chip = chip;
 }
 
-/// Both limits of a force law that is no straight line, and the range between them.
+/// Limits of small and large vibrations for a nonlinear force law.
 void bistable(const Request& request, stability::Method method) {
-  if (!(request.feed_mm > 0.0)) throw Error("--force-curve: needs --feed-mm, above 0");
+  if (!(request.feed_mm > 0.0)) throw Error("--force-curve: requires --feed-mm: expected a value above 0");
   if (!request.serration.empty() || !request.boundary.empty() || request.errors)
     throw Error("--force-curve: cannot be combined with --serration-mm, --boundary or --errors");
   const ForceCurves law = readForceCurves(request.force_curve);
@@ -131,27 +132,29 @@ void bistable(const Request& request, stability::Method method) {
     widest = std::max(widest, share);
   }
   csv.save(request.out);
-  stability::drawBeside(request.out,
-                        axes(request.max_depth_mm) +
-                            "plot %FILE skip 1 using 1:5:2 with filledcurves lc 'gold' title 'still or "
-                            "chatter', %FILE skip 1 using 1:2 with lines lw 2 lc 'black' title 'the least "
-                            "vibration grows', %FILE skip 1 using 1:5 with lines lw 2 lc 'red' title 'a "
-                            "large vibration stays'");
+  stability::drawBeside(
+      request.out, axes(request.max_depth_mm) +
+                       "plot %FILE skip 1 using 1:5:2 with filledcurves lc 'gold' title 'bistable', "
+                       "%FILE skip 1 using 1:2 with lines lw 2 lc 'black' title 'limit of small "
+                       "vibrations', %FILE skip 1 using 1:5 with lines lw 2 lc 'red' title 'limit of large "
+                       "vibrations'");
   const double chip = stability::meanChip(system, request.feed_mm * units::MM);
   std::printf(
-      "mean chip %.4f mm: %.2f +- %.2f N/mm tangential, %.2f +- %.2f N/mm radial; slopes %.1f, %.1f "
+      "mean chip thickness %.4f mm: %.2f +- %.2f N/mm tangential, %.2f +- %.2f N/mm radial; slopes %.1f, "
+      "%.1f "
       "N/mm2\n",
       chip / units::MM, law.tangential.at(chip) / units::N_PER_MM,
       law.tangential.stdAt(chip) / units::N_PER_MM, law.radial.at(chip) / units::N_PER_MM,
       law.radial.stdAt(chip) / units::N_PER_MM, law.tangential.slope(chip) / units::N_PER_MM2,
       law.radial.slope(chip) / units::N_PER_MM2);
-  std::printf("a large vibration stays from %.1f %% (mean) below the limit of a small one, at most %.1f %%\n",
-              100.0 * range, 100.0 * widest);
+  std::printf(
+      "limit of large vibrations below that of small vibrations by %.1f %% on average, by %.1f %% at most\n",
+      100.0 * range, 100.0 * widest);
 }
 
 void run(const Request& request) {
   const stability::Method method = stability::methodOf(request.method);
-  if (!(request.max_depth_mm > 0.0)) throw Error("--max-depth-mm: must be above 0");
+  if (!(request.max_depth_mm > 0.0)) throw Error("--max-depth-mm: expected a value above 0");
   if (!request.force_curve.empty()) {
     bistable(request, method);
     return;
@@ -185,8 +188,8 @@ void run(const Request& request) {
                        std::string(nameOf(method)) +
                        ")', %FILE skip 1 using 1:(strcol(4) eq 'flip' ? $2 : NaN) with points pt 7 ps 0.4 "
                        "title 'flip'");
-  std::printf("stable at every one of these speeds below %.4f mm (%s)\n", least / units::MM, nameOf(method));
-  if (request.errors) std::printf("largest estimated error of a limit %.2g %%\n", 100.0 * error);
+  std::printf("stable below %.4f mm at all of these speeds (%s)\n", least / units::MM, nameOf(method));
+  if (request.errors) std::printf("largest estimated error of a limit: %.2g %%\n", 100.0 * error);
   if (!request.boundary.empty())
     traceAll(request, *stability::makeFloquetSolver(method, system, options), speeds);
 }
@@ -207,7 +210,7 @@ Command lobesCommand() {
        "a slot, 201 speeds"},
       {"mill.yaml --entry-deg 90 --exit-deg 180 --speeds 2000:12000:101 --max-depth-mm 8 -o chart.csv "
        "--boundary all.csv",
-       "down-milling; the whole boundary with its islands as well"}};
+       "down-milling; in addition the whole boundary with its islands"}};
   command.files = {{"OUT", "CSV rpm,limit_mm,chatter_hz,kind; a picture of the same name with .png"},
                    {"BOUNDARY", "CSV curve,rpm,depth_mm,chatter_hz,kind"}};
   command.declare = [](CommandLine& line) -> std::function<int()> {
@@ -225,12 +228,13 @@ Command lobesCommand() {
                 "feed per tooth [mm]: takes the contact of the teeth in the forced vibration into account "
                 "(uneven pitch, serration); without it every tooth cuts along its whole arc");
     line.option("--serration-mm", request->serration,
-                "AMPLITUDE:WAVELENGTH [mm] of a serrated edge, evenly shifted from tooth to tooth; needs "
+                "AMPLITUDE:WAVELENGTH [mm] of a serrated edge, evenly shifted from tooth to tooth; requires "
                 "--feed-mm");
-    line.option("--force-curve", request->force_curve,
-                "force over chip thickness in place of the model's coefficients (`force-law --curve` writes "
-                "it): limits of small and of large vibrations; needs --feed-mm");
-    line.flag("--errors", request->errors, "estimate the error of each limit by a refined solution");
+    line.option(
+        "--force-curve", request->force_curve,
+        "force curve (written by `force-law --curve`) instead of the coefficients of the model: limits of "
+        "small and large vibrations; requires --feed-mm");
+    line.flag("--errors", request->errors, "estimate the error of each limit from a refined solution");
     return commandBody(request, run);
   };
   return command;

@@ -28,7 +28,7 @@ Recording fromSound(const RecordingOptions& o) {
     char rest = 0;
     if (std::sscanf(channel.c_str(), "%zu%c", &number, &rest) != 1 || number < 1 ||
         number > sound.channels.size())
-      throw Error(o.file + ": channel '" + channel + "': expected 1 to " +
+      throw Error(o.file + ": channel '" + channel + "': expected a number from 1 to " +
                   std::to_string(sound.channels.size()));
     recording.channels.push_back(sound.channels[number - 1]);
   }
@@ -44,13 +44,15 @@ Recording fromTable(const RecordingOptions& o) {
   const auto time = std::find_if(table.names.begin(), table.names.end(), isTime);
   if (time == table.names.end()) throw Error(o.file + ": expected a column time[s] (or t[s])");
   const std::vector<double>& t = table.columns[static_cast<std::size_t>(time - table.names.begin())];
-  if (t.size() < 2 || !(t.back() > t.front())) throw Error(o.file + ": column time does not increase");
+  if (t.size() < 2 || !(t.back() > t.front()))
+    throw Error(o.file + ": column " + *time + ": expected increasing values");
   Recording recording;
   recording.sample_rate = static_cast<double>(t.size() - 1) / (t.back() - t.front());
   for (std::size_t i = 1; i < t.size(); ++i) {
-    if (!std::isfinite(t[i])) throw Error(o.file + formatted(": no time after %.6f s", t[i - 1]));
+    if (!std::isfinite(t[i]))
+      throw Error(o.file + ": column " + *time + formatted(": expected a number after %.6f s", t[i - 1]));
     if (std::abs((t[i] - t[i - 1]) * recording.sample_rate - 1.0) > 0.1)
-      throw Error(o.file + formatted(": samples are not equally spaced at %.6f s", t[i]));
+      throw Error(o.file + formatted(": samples at %.6f s: expected equal spacing", t[i]));
   }
   std::vector<std::string> names = o.channels;
   for (const std::string& name : table.names)
@@ -59,50 +61,49 @@ Recording fromTable(const RecordingOptions& o) {
     recording.channels.push_back(table.column(name));
     for (std::size_t i = 0; i < t.size(); ++i)
       if (!std::isfinite(recording.channels.back()[i]))
-        throw Error(o.file + ": column " + name + formatted(" has no number at %.6f s", t[i]));
+        throw Error(o.file + ": column " + name + formatted(": expected a number at %.6f s", t[i]));
   }
   return recording;
 }
 
-/// The longest stretch of a topic without lost samples.
-class Stretch {
+/// Finds the longest segment of a topic without lost samples.
+class LongestSegment {
  public:
-  explicit Stretch(const RecordingOptions& o) : o_(o) {}
+  explicit LongestSegment(const RecordingOptions& o) : o_(o) {}
   void add(const SampleBlock& block) {
-    if (!begun_) begun_ = block.stamp;
-    if (block.stamp - *begun_ < o_.from || block.stamp - *begun_ > o_.to) return;
-    if (block.first_index != next_ || now_.channels.size() != block.channels.size()) restart(block);
+    if (!start_) start_ = block.stamp;
+    if (block.stamp - *start_ < o_.from || block.stamp - *start_ > o_.to) return;
+    if (block.first_index != next_ || current_.channels.size() != block.channels.size()) restart(block);
     next_ = block.first_index + block.size();
     for (std::size_t c = 0; c < block.channels.size(); ++c)
-      for (std::size_t i = 0; i < block.size(); ++i) now_.channels[c].push_back(block.at(i, c));
+      for (std::size_t i = 0; i < block.size(); ++i) current_.channels[c].push_back(block.at(i, c));
   }
-  Recording longest() {
-    keep();
-    if (best_.channels.empty()) throw Error(o_.file + ": topic " + o_.topic + " holds no samples");
-    for (const std::vector<double>& channel : best_.channels)
+  Recording result() {
+    finishSegment();
+    if (longest_.channels.empty()) throw Error(o_.file + ": topic " + o_.topic + ": expected samples");
+    for (const std::vector<double>& channel : longest_.channels)
       for (const double v : channel)
-        if (!std::isfinite(v))
-          throw Error(o_.file + ": topic " + o_.topic + " holds a value that is not a finite number");
-    return best_;
+        if (!std::isfinite(v)) throw Error(o_.file + ": topic " + o_.topic + ": expected finite values");
+    return longest_;
   }
 
  private:
-  void keep() {
-    if (!now_.channels.empty() &&
-        (best_.channels.empty() || now_.channels[0].size() > best_.channels[0].size()))
-      best_ = now_;
+  void finishSegment() {
+    if (!current_.channels.empty() &&
+        (longest_.channels.empty() || current_.channels[0].size() > longest_.channels[0].size()))
+      longest_ = current_;
   }
   void restart(const SampleBlock& block) {
-    keep();
-    now_ = Recording();
-    now_.sample_rate = block.sample_rate;
-    now_.channels.resize(block.channels.size());
+    finishSegment();
+    current_ = Recording();
+    current_.sample_rate = block.sample_rate;
+    current_.channels.resize(block.channels.size());
   }
 
   const RecordingOptions& o_;
-  std::optional<double> begun_;
+  std::optional<double> start_;  // [s] of the topic
   std::uint64_t next_ = 0;
-  Recording now_, best_;
+  Recording current_, longest_;
 };
 
 Recording fromBag(RecordingOptions o) {
@@ -110,9 +111,9 @@ Recording fromBag(RecordingOptions o) {
   for (const char* topic : {"daq/sound", "daq/vibration", names::FORCE_COMPENSATED, names::DYNAMOMETER})
     if (o.topic.empty() && bag.has(topic)) o.topic = topic;
   if (o.topic.empty() || !bag.has(o.topic))
-    throw Error(o.file + ": topic " +
-                (o.topic.empty() ? "daq/sound, daq/vibration or force/compensated" : o.topic) + " not found");
-  Stretch stretch(o);
+    throw Error(o.file + ": expected topic " +
+                (o.topic.empty() ? "daq/sound, daq/vibration or force/compensated" : o.topic));
+  LongestSegment segment(o);
   if (o.topic.find("force/") != std::string::npos) {
     bag.on<ForceBlock>(o.topic, [&](const ForceBlock& force, double) {
       SampleBlock block;
@@ -122,13 +123,13 @@ Recording fromBag(RecordingOptions o) {
       block.channels = {"fx", "fy", "fz"};
       for (std::size_t i = 0; i < force.force[0].size(); ++i)
         for (const std::vector<double>& axis : force.force) block.samples.push_back(axis[i]);
-      stretch.add(block);
+      segment.add(block);
     });
   } else {
-    bag.on<SampleBlock>(o.topic, [&](const SampleBlock& block, double) { stretch.add(block); });
+    bag.on<SampleBlock>(o.topic, [&](const SampleBlock& block, double) { segment.add(block); });
   }
   bag.run();
-  return stretch.longest();
+  return segment.result();
 }
 
 }  // namespace
@@ -142,7 +143,9 @@ Recording loadRecording(const RecordingOptions& o) {
         std::clamp(seconds * recording.sample_rate, 0.0, static_cast<double>(size)));
   };
   const std::size_t from = at(o.from), to = at(o.to);
-  if (from >= to) throw Error(o.file + formatted(": nothing between %.2f and %.2f s", o.from, o.to));
+  if (from >= to)
+    throw Error(o.file + formatted(": no samples from %.2f to %.2f s (--from, --to): expected at least one",
+                                   o.from, o.to));
   for (std::vector<double>& channel : recording.channels)
     channel = {channel.begin() + static_cast<std::ptrdiff_t>(from),
                channel.begin() + static_cast<std::ptrdiff_t>(to)};

@@ -8,7 +8,7 @@
 
 namespace smartmill::stability {
 
-/// A recording of a cut and what is known of the cut.
+/// Options of a recorded cut: file, channels, and data of the cut.
 struct RecordingOptions {
   std::string file, model, topic, picture;
   std::vector<std::string> channels;
@@ -16,8 +16,8 @@ struct RecordingOptions {
   int teeth = 0;
 };
 
-/// The named channels of a sound file, a CSV with a column of time, or a topic of a bag, from `from` to `to`.
-/// @throws Error naming the file and what is wrong with it.
+/// Channels of a sound file, a CSV file with a time column, or a topic of a bag, from `from` to `to` [s].
+/// @throws Error naming the file and the fault.
 Recording loadRecording(const RecordingOptions& options);
 
 }  // namespace smartmill::stability

@@ -29,10 +29,9 @@ std::optional<SampleBlock> ControlStream::handle(const SampleBlock& block) {
   const std::size_t tool = block.channel(parameters_.tool_channel);
   const std::string& unit = block.units.at(deflection);
   if (unit != "m" && unit != "m/s2")
-    throw Error("channel " + parameters_.deflection_channel + " has the unit " + unit + ", m or m/s2 is due");
+    throw Error("channel " + parameters_.deflection_channel + ": unit " + unit + ": expected m or m/s2");
   if (block.units.at(tool) != "m")
-    throw Error("channel " + parameters_.tool_channel + " has the unit " + block.units.at(tool) +
-                ", m is due");
+    throw Error("channel " + parameters_.tool_channel + ": unit " + block.units.at(tool) + ": expected m");
   if (!(speed_ > 0.0)) return std::nullopt;
   if (!controller_ || block.first_index != next_index_ || block.stamp < last_stamp_ ||
       block.sample_rate != rate_) {
@@ -60,7 +59,7 @@ std::optional<SampleBlock> ControlStream::handle(const SampleBlock& block) {
     commands.samples.push_back(
         controller_->step(integrator_ ? integrator_->step(measured) : measured, block.at(i, tool)));
     if (controller_->segments().size() > before && learnt_)
-      learnt_({block.timeOf(i), controller_->beliefs().back(), controller_->active(),
+      learnt_({block.timeOf(i), controller_->estimates().back(), controller_->active(),
                controller_->segments().back().informed});
   }
   return commands;

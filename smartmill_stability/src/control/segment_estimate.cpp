@@ -20,42 +20,41 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using units::TWO_PI;
 
-/// Windowed spectra of the blocks of a signal at chosen lines.
-class Blocks {
+/// Windowed spectra of the blocks of a signal at selected lines.
+class BlockSpectra {
  public:
-  explicit Blocks(const EstimatorParameters& p) : p_(p) {
+  explicit BlockSpectra(const EstimatorParameters& p) : p_(p) {
     for (int i = 0; i < p.block; ++i) window_.push_back(0.54 - 0.46 * std::cos(TWO_PI * i / (p.block - 1)));
   }
 
   int count() const { return (p_.segment - p_.block) / (p_.block / 2) + 1; }
 
-  /// [Hz]
-  double frequencyOf(int line) const { return line * p_.sample_rate / p_.block; }
+  double frequencyOf(int line) const { return line * p_.sample_rate / p_.block; }  ///< [Hz]
 
-  void choose(const std::vector<int>& lines) {
-    turns_.resize(p_.block, static_cast<Index>(2 * lines.size()));
+  void select(const std::vector<int>& lines) {
+    kernel_.resize(p_.block, static_cast<Index>(2 * lines.size()));
     for (std::size_t l = 0; l < lines.size(); ++l) {
       for (int i = 0; i < p_.block; ++i) {
         const double angle = TWO_PI * std::fmod(static_cast<double>(lines[l]) * i, p_.block) / p_.block;
-        turns_(i, static_cast<Index>(2 * l)) = window_[static_cast<std::size_t>(i)] * std::cos(angle);
-        turns_(i, static_cast<Index>(2 * l + 1)) = -window_[static_cast<std::size_t>(i)] * std::sin(angle);
+        kernel_(i, static_cast<Index>(2 * l)) = window_[static_cast<std::size_t>(i)] * std::cos(angle);
+        kernel_(i, static_cast<Index>(2 * l + 1)) = -window_[static_cast<std::size_t>(i)] * std::sin(angle);
       }
     }
   }
 
   /// Real and imaginary parts, line by line, block after block.
   VectorXd spectra(const VectorXd& signal) const {
-    VectorXd all(count() * turns_.cols());
+    VectorXd all(count() * kernel_.cols());
     for (int b = 0; b < count(); ++b)
-      all.segment(b * turns_.cols(), turns_.cols()).noalias() =
-          turns_.transpose() * signal.segment(b * (p_.block / 2), p_.block);
+      all.segment(b * kernel_.cols(), kernel_.cols()).noalias() =
+          kernel_.transpose() * signal.segment(b * (p_.block / 2), p_.block);
     return all;
   }
 
  private:
   const EstimatorParameters& p_;
   std::vector<double> window_;
-  MatrixXd turns_;
+  MatrixXd kernel_;  // windowed Fourier kernel: cosine and sine of each line
 };
 
 /// Power of each line, summed over the blocks.
@@ -67,14 +66,15 @@ std::vector<double> powers(const VectorXd& spectra, int lines, int blocks) {
   return power;
 }
 
-/// Fit of deflection spectra by those of gain x model(chip) and of free motion from the segment's begin.
-class Fit {
+/// Fit of the spectra of the deflection by those of gain x model(chip) and of the free motion from the start
+/// of the segment.
+class SegmentFit {
  public:
-  Fit(const Blocks& blocks, const VectorXd& chip, const VectorXd& deflection, double rate)
+  SegmentFit(const BlockSpectra& blocks, const VectorXd& chip, const VectorXd& deflection, double rate)
       : blocks_(blocks), chip_(chip), target_(blocks.spectra(deflection)), rate_(rate) {}
 
-  /// What is left after the linear parameters (gain and the state at the begin) took their best values.
-  VectorXd left(double frequency, double damping) {
+  /// Residual with the best values of the linear parameters (gain and initial state).
+  VectorXd residual(double frequency, double damping) {
     const MatrixXd basis = basisOf(frequency, damping);
     linear_ = linear::solveSymmetric(basis.transpose() * basis, VectorXd(basis.transpose() * target_));
     return target_ - basis * linear_;
@@ -88,15 +88,15 @@ class Fit {
     const Index n = chip_.size();
     MatrixXd signals(n, 3);
     const double wd = frequency * std::sqrt(1.0 - damping * damping);
-    // Free motion by rotation and decay.
-    const Complex turn = std::polar(std::exp(-damping * frequency / rate_), wd / rate_);
+    // Free motion: rotation and decay.
+    const Complex rotation = std::polar(std::exp(-damping * frequency / rate_), wd / rate_);
     Complex state = 1.0;
     filter.reset(chip_[0]);
     for (Index i = 0; i < n; ++i) {
       signals(i, 0) = filter.step(chip_[i]);
       signals(i, 1) = state.real();
       signals(i, 2) = state.imag();
-      state *= turn;
+      state *= rotation;
     }
     MatrixXd basis(target_.size(), 3);
     for (Index k = 0; k < 3; ++k) basis.col(k) = blocks_.spectra(signals.col(k));
@@ -107,23 +107,23 @@ class Fit {
   const VectorXd& linear() const { return linear_; }
 
  private:
-  const Blocks& blocks_;
+  const BlockSpectra& blocks_;
   const VectorXd& chip_;
   VectorXd target_;
   double rate_;
   VectorXd linear_;
 };
 
-/// Lines of the blocks, those of the band first.
+/// Lines of the spectra, those of the band first.
 struct Lines {
   std::vector<int> all;
   int in_band = 0;
-  std::vector<double> force, answer;  // power of each, summed over the blocks
-  int strongest = 0;                  // in the band, by answer
+  std::vector<double> input, output;  // power of each line, summed over the blocks
+  int strongest = 0;                  // in the band, by output
 };
 
-/// Lines of the band and, of the floor, some above it.
-Lines linesOf(const Blocks& blocks, const EstimatorParameters& p) {
+/// Lines of the band, and some above it for the noise floor.
+Lines linesOf(const BlockSpectra& blocks, const EstimatorParameters& p) {
   Lines lines;
   for (int l = 1; l < p.block / 2; ++l) {
     const double f = blocks.frequencyOf(l);
@@ -134,8 +134,8 @@ Lines linesOf(const Blocks& blocks, const EstimatorParameters& p) {
   return lines;
 }
 
-/// H1 line by line.
-void ratios(const Blocks& blocks, const Lines& lines, const VectorXd& us, const VectorXd& ys,
+/// H1 estimate of each line.
+void ratios(const BlockSpectra& blocks, const Lines& lines, const VectorXd& us, const VectorXd& ys,
             SegmentEstimate* result) {
   const int count = static_cast<int>(lines.all.size());
   for (int l = 0; l < lines.in_band; ++l) {
@@ -145,37 +145,37 @@ void ratios(const Blocks& blocks, const Lines& lines, const VectorXd& us, const 
       cross += std::conj(Complex(us[i], us[i + 1])) * Complex(ys[i], ys[i + 1]);
     }
     result->frequency.push_back(blocks.frequencyOf(lines.all[static_cast<std::size_t>(l)]));
-    result->ratio.push_back(cross / lines.force[static_cast<std::size_t>(l)]);
+    result->ratio.push_back(cross / lines.input[static_cast<std::size_t>(l)]);
   }
 }
 
-/// Lines of the band on which both signals stand out of their floors.
+/// Lines of the band in which both signals exceed their noise floors.
 std::vector<int> usedLines(Lines* lines, double least_signal) {
   const auto floorOf = [&](const std::vector<double>& values) {
     std::vector<double> high(values.begin() + lines->in_band, values.end());
     std::nth_element(high.begin(), high.begin() + static_cast<std::ptrdiff_t>(high.size() / 2), high.end());
     return high[high.size() / 2];
   };
-  const double floor_u = floorOf(lines->force), floor_y = floorOf(lines->answer);
+  const double floor_u = floorOf(lines->input), floor_y = floorOf(lines->output);
   std::vector<int> used;
   for (int l = 0; l < lines->in_band; ++l) {
     const auto i = static_cast<std::size_t>(l);
-    if (lines->force[i] > least_signal * floor_u && lines->answer[i] > least_signal * floor_y)
+    if (lines->input[i] > least_signal * floor_u && lines->output[i] > least_signal * floor_y)
       used.push_back(lines->all[i]);
-    if (lines->answer[i] > lines->answer[static_cast<std::size_t>(lines->strongest)]) lines->strongest = l;
+    if (lines->output[i] > lines->output[static_cast<std::size_t>(lines->strongest)]) lines->strongest = l;
   }
   return used;
 }
 
-/// The best of some starts, or the one given.
-std::array<double, 2> startOf(Fit* fit, const SecondOrder* start, double strongest) {
+/// The given start, or the best of a grid around the strongest line [rad/s].
+std::array<double, 2> startOf(SegmentFit* fit, const SecondOrder* start, double strongest) {
   if (start) return {start->frequency, start->damping_ratio};
   std::array<double, 2> best{strongest, 0.02};
   double least = std::numeric_limits<double>::infinity();
   for (int i = -12; i <= 8; ++i) {
     for (const double damping : {0.008, 0.02, 0.05}) {
       const double frequency = strongest * (1.0 + 0.0125 * i);
-      const double squares = fit->left(frequency, damping).squaredNorm();
+      const double squares = fit->residual(frequency, damping).squaredNorm();
       if (squares < least) least = squares, best = {frequency, damping};
     }
   }
@@ -184,10 +184,10 @@ std::array<double, 2> startOf(Fit* fit, const SecondOrder* start, double stronge
 
 constexpr double MOST_DAMPING = 0.9, LEAST_DAMPING = 1e-6;
 
-/// Least squares over the logarithms of frequency and damping. @return sum of squares left
-double refine(Fit* fit, std::array<double, 2> start, SecondOrder* model) {
+/// Least squares over the logarithms of frequency and damping. @return residual sum of squares
+double refine(SegmentFit* fit, std::array<double, 2> start, SecondOrder* model) {
   const fit::FunctionResiduals residuals(fit->size(), [&](const VectorXd& x, VectorXd& residual) {
-    residual = fit->left(std::exp(x[0]), std::exp(x[1]));
+    residual = fit->residual(std::exp(x[0]), std::exp(x[1]));
   });
   const double frequency = std::log(start[0]), damping = std::log(start[1]);
   constexpr double FAR = 1.0, FREQUENCY_SCALE = 0.006, DAMPING_SCALE = 0.2;
@@ -201,13 +201,14 @@ double refine(Fit* fit, std::array<double, 2> start, SecondOrder* model) {
                     options);
   model->frequency = std::exp(found.value[0]);
   model->damping_ratio = std::exp(found.value[1]);
-  const double rest = fit->left(model->frequency, model->damping_ratio).squaredNorm();
+  const double squares = fit->residual(model->frequency, model->damping_ratio).squaredNorm();
   model->gain = fit->gain();
-  return rest;
+  return squares;
 }
 
-/// Of gain, frequency and damping; blocks overlap by half, so half of the residuals count.
-Eigen::Matrix3d covarianceOf(const Fit& fit, const SecondOrder& model, double squares) {
+/// Covariance of gain, frequency and damping; blocks overlap by half, so half of the residuals are
+/// independent.
+Eigen::Matrix3d covarianceOf(const SegmentFit& fit, const SecondOrder& model, double squares) {
   const VectorXd& linear = fit.linear();
   MatrixXd jacobian(fit.size(), 5);
   jacobian.rightCols(3) = fit.basisOf(model.frequency, model.damping_ratio);
@@ -232,26 +233,29 @@ Eigen::Matrix3d covarianceOf(const Fit& fit, const SecondOrder& model, double sq
 SegmentEstimate estimateSegment(const std::vector<double>& chip, const std::vector<double>& deflection,
                                 const EstimatorParameters& p, const SecondOrder* start) {
   if (static_cast<int>(chip.size()) != p.segment || static_cast<int>(deflection.size()) != p.segment)
-    throw Error("segment estimate: " + std::to_string(chip.size()) + " and " +
-                std::to_string(deflection.size()) + " samples, " + std::to_string(p.segment) + " are due");
-  if (p.block < 16 || p.block > p.segment) throw Error("segment estimate: block " + std::to_string(p.block));
+    throw Error("segment estimate: " + std::to_string(chip.size()) + " samples of the chip thickness, " +
+                std::to_string(deflection.size()) + " of the deflection: expected " +
+                std::to_string(p.segment));
+  if (p.block < 16 || p.block > p.segment)
+    throw Error("segment estimate: block of " + std::to_string(p.block) + " samples: expected 16 to " +
+                std::to_string(p.segment));
   const VectorXd u = Eigen::Map<const VectorXd>(chip.data(), p.segment);
   const VectorXd y = Eigen::Map<const VectorXd>(deflection.data(), p.segment);
-  Blocks blocks(p);
+  BlockSpectra blocks(p);
   Lines lines = linesOf(blocks, p);
-  blocks.choose(lines.all);
+  blocks.select(lines.all);
   const VectorXd us = blocks.spectra(u), ys = blocks.spectra(y);
   const int count = static_cast<int>(lines.all.size());
-  lines.force = powers(us, count, blocks.count());
-  lines.answer = powers(ys, count, blocks.count());
+  lines.input = powers(us, count, blocks.count());
+  lines.output = powers(ys, count, blocks.count());
   SegmentEstimate result;
   ratios(blocks, lines, us, ys, &result);
   std::vector<int> used = usedLines(&lines, p.least_signal);
   result.lines = static_cast<int>(used.size());
-  // Gain, frequency, damping and the state at the begin: five numbers, two a line and block.
+  // Five unknowns (gain, frequency, damping, initial state); two residuals for each line and block.
   constexpr int FEWEST = 3;
   if (result.lines < FEWEST) return result;
-  // The strongest tell all; more lines cost time alone.
+  // Lines far from the resonance add computing time, but no information.
   constexpr std::size_t MOST = 24;
   const int middle = lines.all[static_cast<std::size_t>(lines.strongest)];
   if (used.size() > MOST) {
@@ -259,12 +263,12 @@ SegmentEstimate estimateSegment(const std::vector<double>& chip, const std::vect
               [&](int a, int b) { return std::abs(a - middle) < std::abs(b - middle); });
     used.resize(MOST);
   }
-  blocks.choose(used);
-  Fit fit(blocks, u, y, p.sample_rate);
+  blocks.select(used);
+  SegmentFit fit(blocks, u, y, p.sample_rate);
   SecondOrder& model = result.model;
-  const double rest = refine(&fit, startOf(&fit, start, TWO_PI * blocks.frequencyOf(middle)), &model);
+  const double squares = refine(&fit, startOf(&fit, start, TWO_PI * blocks.frequencyOf(middle)), &model);
   if (!(model.gain > 0.0)) return result;
-  model.covariance = covarianceOf(fit, model, rest);
+  model.covariance = covarianceOf(fit, model, squares);
   result.informed = model.covariance.allFinite();
   return result;
 }

@@ -10,7 +10,6 @@
 #include "smartmill_core/units.h"
 
 namespace smartmill::stability {
-namespace {}  // namespace
 
 std::complex<double> SecondOrder::response(double w) const {
   return gain * frequency * frequency /
@@ -23,24 +22,24 @@ ModalModel SecondOrder::modal() const {
 
 double residualMargin(const SecondOrder& machine, const SecondOrder& controller) {
   double least = 0.0;
-  const auto look = [&](double w) {
+  const auto include = [&](double w) {
     least = std::min(least, (machine.response(w) - controller.response(w)).real());
   };
   for (const SecondOrder* model : {&machine, &controller}) {
     if (model->frequency <= 0.0) continue;
-    // Dense within many half-power bandwidths, coarse elsewhere.
+    // Dense around the resonance, coarse elsewhere.
     constexpr int DENSE = 200, COARSE = 100;
     for (int i = -DENSE; i <= DENSE; ++i)
-      look(std::abs(model->frequency *
-                    (1.0 + 20.0 * model->damping_ratio * std::pow(static_cast<double>(i) / DENSE, 3))));
-    for (int i = 0; i <= COARSE; ++i) look(3.0 * model->frequency * i / COARSE);
+      include(std::abs(model->frequency *
+                       (1.0 + 20.0 * model->damping_ratio * std::pow(static_cast<double>(i) / DENSE, 3))));
+    for (int i = 0; i <= COARSE; ++i) include(3.0 * model->frequency * i / COARSE);
   }
   return least;
 }
 
 double worstMargin(const SecondOrder& machine, const SecondOrder& controller) {
   double worst = residualMargin(machine, controller);
-  // Of the relative quantities, which have one size.
+  // Principal axes of the relative covariance, whose entries are of comparable size.
   const Eigen::Vector3d mean(machine.gain, machine.frequency, machine.damping_ratio);
   if (mean.minCoeff() <= 0.0) return worst;
   const Eigen::Matrix3d relative =
@@ -62,11 +61,11 @@ double worstMargin(const SecondOrder& machine, const SecondOrder& controller) {
 void ControllerParameters::validate() const {
   checkBounds(*this);
   const double ratio = rate / estimator.sample_rate;
-  require(ratio >= 1.0 && std::abs(ratio - std::round(ratio)) < 1e-9, "rate over the estimator's", ratio,
-          "a whole number");
+  require(ratio >= 1.0 && std::abs(ratio - std::round(ratio)) < 1e-9, "rate over estimator_rate", ratio,
+          "a positive integer");
   require("period [s]", period, Range::above(2.0 / rate));
   require(std::abs(lead * rate - std::round(lead * rate)) < 1e-6, "lead in samples", lead * rate,
-          "a whole number");
+          "an integer");
 }
 
 AdaptiveChatterController::AdaptiveChatterController(const ControllerParameters& parameters)
@@ -75,10 +74,10 @@ AdaptiveChatterController::AdaptiveChatterController(const ControllerParameters&
 }
 
 double AdaptiveChatterController::pastSurface() const {
-  // surface_[0] is the newest: this sample's.
+  // surface_[0] belongs to the current sample.
   const double back = parameters_.period * parameters_.rate;
   const auto i = static_cast<std::size_t>(back);
-  if (i + 1 >= surface_.size()) return 0.0;  // nothing was cut before
+  if (i + 1 >= surface_.size()) return 0.0;  // first revolution
   const double share = back - static_cast<double>(i);
   return surface_[i] + share * (surface_[i + 1] - surface_[i]);
 }
@@ -90,11 +89,11 @@ double AdaptiveChatterController::step(double deflection, double tool) {
   const double old = parameters_.chip + parameters_.overlap * pastSurface();
   double chip = old - surface_.front();
   if (parameters_.leaves_cut && chip < 0.0) {
-    surface_.front() = old;  // one feed further off
+    surface_.front() = old;  // the surface remains, one feed further away
     chip = 0.0;
   }
   chips_.push_front(chip);
-  // Memory of a lightly damped machine, for the start of a new filter.
+  // Memory of a lightly damped machine, to initialise a new filter.
   constexpr double MEMORY = 1.0;  // [s]
   if (chips_.size() > static_cast<std::size_t>(MEMORY * parameters_.rate)) chips_.pop_back();
 
@@ -106,25 +105,25 @@ double AdaptiveChatterController::step(double deflection, double tool) {
   phase_ = (phase_ + 1) % decimation;
   if (filter_) filter_->step(chip);
   if (phase_ == 0 && static_cast<int>(segment_chip_.size()) == parameters_.estimator.segment) {
-    learn();
+    updateEstimate();
     segment_chip_.clear();
     segment_deflection_.clear();
   }
-  // The command lasts to the next sample: the machine's answer there, chip thickness going on as it went.
+  // The command acts until the next sample: response of the machine there, with extrapolated chip thickness.
   double command = 0.0;
   if (filter_) {
-    const bool at_once = parameters_.lead == 0.0 && parameters_.actuator_delay == 0.0;
-    command = at_once ? filter_->peek(chips_.size() > 1 ? 2.0 * chips_[0] - chips_[1] : chip) : predicted();
+    const bool immediate = parameters_.lead == 0.0 && parameters_.actuator_delay == 0.0;
+    command = immediate ? filter_->peek(chips_.size() > 1 ? 2.0 * chips_[0] - chips_[1] : chip) : predicted();
   }
   issued_.push_front(command);
-  const double way = (parameters_.lead + parameters_.actuator_delay) * parameters_.rate;
-  if (issued_.size() > static_cast<std::size_t>(way) + 4) issued_.pop_back();
+  const double latency = (parameters_.lead + parameters_.actuator_delay) * parameters_.rate;  // samples
+  if (issued_.size() > static_cast<std::size_t>(latency) + 4) issued_.pop_back();
   return command;
 }
 
-// Displacement that commands under way give the tool, so many samples after this one.
+// [m] Tool displacement by the pending commands, `after` samples after the current one.
 double AdaptiveChatterController::issued(double after) const {
-  // issued_[0] acts from `lead` after the last sample on, through the actuator's delay.
+  // issued_[0] acts from `lead` after the last sample, through the delay of the actuator.
   const double age = (parameters_.lead + parameters_.actuator_delay) * parameters_.rate - after;
   if (issued_.empty()) return 0.0;
   if (age <= 0.0) return issued_.front();
@@ -134,14 +133,15 @@ double AdaptiveChatterController::issued(double after) const {
   return issued_[i] + share * (issued_[i + 1] - issued_[i]);
 }
 
-// The machine's answer where this command will act: chips of a cut that goes on under the commands issued.
+// [m] Response of the machine at the time at which this command acts, predicted by simulating the cut under
+// the pending commands.
 double AdaptiveChatterController::predicted() {
   ModalFilter ahead = *filter_;
-  const double scale = believed_.gain / active_.gain, back = parameters_.period * parameters_.rate;
-  const double due = 1.0 + (parameters_.lead + parameters_.actuator_delay) * parameters_.rate;
-  const auto steps = static_cast<int>(std::ceil(due - 1e-9));
-  double chip = chips_[0], before = 0.0, answer = 0.0;
-  coming_.clear();
+  const double scale = estimate_.gain / active_.gain, back = parameters_.period * parameters_.rate;
+  const double horizon = 1.0 + (parameters_.lead + parameters_.actuator_delay) * parameters_.rate;  // samples
+  const auto steps = static_cast<int>(std::ceil(horizon - 1e-9));
+  double chip = chips_[0], before = 0.0, response = 0.0;
+  future_surface_.clear();
   for (int k = 1; k <= steps; ++k) {
     const double tool = issued(k), age = back - k;
     double past = 0.0;
@@ -151,65 +151,65 @@ double AdaptiveChatterController::predicted() {
         past = surface_[i] + (age - static_cast<double>(i)) * (surface_[i + 1] - surface_[i]);
       }
     } else {
-      past = coming_[std::min(coming_.size() - 1, static_cast<std::size_t>(-age))];
+      past = future_surface_[std::min(future_surface_.size() - 1, static_cast<std::size_t>(-age))];
     }
-    // The chip moves the machine within the sample: a few turns.
+    // The chip thickness of this sample affects the deflection of this sample: solved by iteration.
     const double old = parameters_.chip + parameters_.overlap * past;
     const auto chipAt = [&](double deflection) {
       const double free = old - (deflection - tool);
       return parameters_.leaves_cut ? std::max(0.0, free) : free;
     };
-    for (int turn = 0; turn < 3; ++turn) chip = chipAt(scale * ahead.peek(chip));
-    before = answer;
-    answer = ahead.step(chip);
-    coming_.push_back(parameters_.leaves_cut && chip == 0.0 ? old : scale * answer - tool);
+    for (int iteration = 0; iteration < 3; ++iteration) chip = chipAt(scale * ahead.peek(chip));
+    before = response;
+    response = ahead.step(chip);
+    future_surface_.push_back(parameters_.leaves_cut && chip == 0.0 ? old : scale * response - tool);
   }
-  return steps > 1 ? answer + (steps - due) * (before - answer) : answer;
+  return steps > 1 ? response + (steps - horizon) * (before - response) : response;
 }
 
-void AdaptiveChatterController::learn() {
+void AdaptiveChatterController::updateEstimate() {
   const SegmentEstimate found = estimateSegment(segment_chip_, segment_deflection_, parameters_.estimator,
-                                                believed_.gain > 0.0 ? &believed_ : nullptr);
+                                                estimate_.gain > 0.0 ? &estimate_ : nullptr);
   segments_.push_back(found);
   if (found.informed) {
-    if (believed_.gain == 0.0) {
-      believed_ = found.model;
+    if (estimate_.gain == 0.0) {
+      estimate_ = found.model;
     } else {
-      // Belief and news, each with its covariance; the machine may have drifted meanwhile.
-      Eigen::Vector3d old(believed_.gain, believed_.frequency, believed_.damping_ratio);
+      // Combination of prior and new estimate by their covariances, with the drift as process noise.
+      Eigen::Vector3d old(estimate_.gain, estimate_.frequency, estimate_.damping_ratio);
       const Eigen::Vector3d fresh(found.model.gain, found.model.frequency, found.model.damping_ratio);
-      Eigen::Matrix3d covariance = believed_.covariance;
+      Eigen::Matrix3d covariance = estimate_.covariance;
       covariance.diagonal() +=
           (parameters_.drift * Eigen::Vector3d(old[0], 0.1 * old[1], old[2])).cwiseAbs2();
       const Eigen::Matrix3d weight = covariance * (covariance + found.model.covariance).inverse();
       old += weight * (fresh - old);
-      believed_.gain = old[0];
-      believed_.frequency = old[1];
-      believed_.damping_ratio = std::clamp(old[2], 1e-4, 0.9);
-      believed_.covariance = (Eigen::Matrix3d::Identity() - weight) * covariance;
+      estimate_.gain = old[0];
+      estimate_.frequency = old[1];
+      estimate_.damping_ratio = std::clamp(old[2], 1e-4, 0.9);
+      estimate_.covariance = (Eigen::Matrix3d::Identity() - weight) * covariance;
     }
   }
-  beliefs_.push_back(believed_);
-  if (believed_.gain <= 0.0 || !found.informed) return;
-  // Guard of stability (eq. 10): the old controller stays unless the new one bears the uncertainty better.
+  estimates_.push_back(estimate_);
+  if (estimate_.gain <= 0.0 || !found.informed) return;
+  // Stability guard (Kim eq. 10): a new controller requires a larger margin than the active one.
   SecondOrder best = active_;
-  double margin = active_.gain > 0.0 ? worstMargin(believed_, active_) : -1e300;
-  SecondOrder candidate = believed_;
+  double margin = active_.gain > 0.0 ? worstMargin(estimate_, active_) : -1e300;
+  SecondOrder candidate = estimate_;
   for (const double share : {1.0, 0.9, 0.8, 0.7}) {
-    candidate.gain = share * believed_.gain;
-    const double m = worstMargin(believed_, candidate);
+    candidate.gain = share * estimate_.gain;
+    const double m = worstMargin(estimate_, candidate);
     if (m > margin) {
       margin = m;
       best = candidate;
     }
   }
-  if (margin >= parameters_.margin || margin > worstMargin(believed_, SecondOrder())) activate(best);
+  if (margin >= parameters_.margin || margin > worstMargin(estimate_, SecondOrder())) activate(best);
 }
 
 void AdaptiveChatterController::activate(const SecondOrder& model) {
   active_ = model;
   filter_ = std::make_unique<ModalFilter>(model.modal(), parameters_.rate, Hold::first_order);
-  // Into the motion that the machine is in.
+  // Continues the current motion of the machine.
   filter_->reset(parameters_.chip);
   for (auto chip = chips_.rbegin(); chip != chips_.rend(); ++chip) filter_->step(*chip);
 }

@@ -39,10 +39,10 @@ ControlNode::ControlNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
 
 void ControlNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   status.summary(diagnostic_msgs::DiagnosticStatus::OK,
-                 last_.controller.gain > 0.0 ? "controlling" : "learning");
+                 last_.controller.gain > 0.0 ? "controlling" : "identifying");
   status.add("natural frequency [rad/s]", last_.machine.frequency);
   status.add("damping ratio [1]", last_.machine.damping_ratio);
-  status.add("cutting over machine stiffness [1]", last_.machine.gain);
+  status.add("cutting stiffness over machine stiffness [1]", last_.machine.gain);
 }
 
 void ControlNode::publish(const LearntMachine& learnt) {

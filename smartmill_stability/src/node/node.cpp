@@ -24,7 +24,7 @@ constexpr double OVERRIDE_PERIOD = 0.02;  // [s]
 
 NodeParameters read(const ros::NodeHandle& private_nh) {
   NodeParameters parameters = parametersFromServer(private_nh).readAll<NodeParameters>();
-  if (parameters.model.empty()) throw Error("model: the path of a smartmill-model/1 file is due");
+  if (parameters.model.empty()) throw Error("model: empty: expected the path of a smartmill-model/1 file");
   return parameters;
 }
 
@@ -50,7 +50,7 @@ StabilityNode::StabilityNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
       shell_(nh, private_nh, "none", parameters_.input_timeout),
       maker_(parameters_.chart, readMachineModel(parameters_.model)),
       detection_(parameters_.chatter, parameters_.hold_back,
-                 [this](const ChatterState& state) { judged(state); }),
+                 [this](const ChatterState& state) { handle(state); }),
       advisor_(
           parameters_.chart.speed_low, maker_.highestSpeed(), maker_.teeth(),
           [this](const CuttingCondition& condition) { return maker_.system(condition.engagement); },
@@ -67,9 +67,9 @@ StabilityNode::StabilityNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
       bistable_(nh.advertise<smartmill_msgs::BistableChart>(names::BISTABLE_CHART, 1, true)),
       predict_(nh.advertiseService(names::PREDICT_STABILITY, &StabilityNode::predict, this)),
       overrides_(nh.serviceClient<smartmill_msgs::SetOverrides>(names::SET_OVERRIDES)) {
-  ros::NodeHandle aside(nh);
-  aside.setCallbackQueue(&what_if_queue_);
-  what_if_ = aside.advertiseService(names::WHAT_IF, &StabilityNode::whatIf, this);
+  ros::NodeHandle what_if_nh(nh);
+  what_if_nh.setCallbackQueue(&what_if_queue_);
+  what_if_ = what_if_nh.advertiseService(names::WHAT_IF, &StabilityNode::whatIf, this);
   what_if_spinner_.start();
   if (!parameters_.force_curve.empty()) {
     curves_.emplace();
@@ -85,7 +85,7 @@ StabilityNode::StabilityNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
 
 void StabilityNode::listen() {
   Inputs& inputs = shell_.inputs();
-  connectMeasured(inputs, [this](const auto& found) { measured(found); });
+  connectMeasured(inputs, [this](const auto& measured) { handleMeasured(measured); });
   inputs.on<smartmill_msgs::CuttingCondition>(
       names::CUTTING_CONDITION, [this](const smartmill_msgs::CuttingCondition& message, double) {
         const CuttingCondition condition = fromMsg(message);
@@ -102,8 +102,8 @@ void StabilityNode::listen() {
 }
 
 template <typename Measured>
-void StabilityNode::measured(const Measured& measured) {
-  bistable_due_ = true;
+void StabilityNode::handleMeasured(const Measured& measured) {
+  bistable_outdated_ = true;
   if constexpr (std::is_same_v<Measured, IdentifiedForceCurves>) {
     if (parameters_.force_curve.empty()) curves_ = measured;
     return;
@@ -121,7 +121,7 @@ void StabilityNode::measured(const Measured& measured) {
   }
 }
 
-void StabilityNode::judged(const ChatterState& state) {
+void StabilityNode::handle(const ChatterState& state) {
   publish(state);
   control_.handle(state);
   try {
@@ -142,14 +142,14 @@ void StabilityNode::override() {
     const smartmill_msgs::SetOverrides::Response answer = answer_.get();
     control_.answer(answer.code == smartmill_msgs::SetOverrides::Response::OK, answer.message);
   }
-  const std::optional<OverrideRequest> wish = control_.takeRequest();
-  if (!wish) return;
-  ROS_WARN("%s", wish->reason.c_str());
-  answer_ = std::async(std::launch::async, [client = overrides_, wish]() mutable {
+  const std::optional<OverrideRequest> request = control_.takeRequest();
+  if (!request) return;
+  ROS_WARN("%s", request->reason.c_str());
+  answer_ = std::async(std::launch::async, [client = overrides_, request]() mutable {
     smartmill_msgs::SetOverrides call;
-    call.request.feed = wish->feed;
-    call.request.spindle = wish->spindle;
-    call.request.reason = wish->reason;
+    call.request.feed = request->feed;
+    call.request.spindle = request->spindle;
+    call.request.reason = request->reason;
     if (!client.call(call)) {
       call.response.code = smartmill_msgs::SetOverrides::Response::NOT_CONNECTED;
       call.response.message = "no answer from " + client.getService();
@@ -225,7 +225,7 @@ bool StabilityNode::whatIf(smartmill_msgs::WhatIf::Request& request,
   lock.unlock();
   if (!maker.system({})) {
     response.code = Response::NOT_READY;
-    response.message = "modes of x and y or the tangential coefficient are missing";
+    response.message = "expected modes of x and y and the tangential coefficient";
     return true;
   }
   try {
@@ -251,8 +251,8 @@ bool StabilityNode::whatIf(smartmill_msgs::WhatIf::Request& request,
 }
 
 void StabilityNode::startBistable() {
-  if (!bistable_due_ || bistable_chart_.valid() || !curves_ || !maker_.system({})) return;
-  bistable_due_ = false;
+  if (!bistable_outdated_ || bistable_chart_.valid() || !curves_ || !maker_.system({})) return;
+  bistable_outdated_ = false;
   bistable_chart_ = std::async(std::launch::async, [maker = maker_, chart = parameters_.chart,
                                                     curves = *curves_, speeds = parameters_.bistable_speeds] {
     return bistableChart(maker, chart, curves, speeds);
@@ -285,14 +285,14 @@ void StabilityNode::publishBistable() {
     bistable_.publish(message);
   } catch (const Error& error) {
     bistable_problem_ = error.what();
-    ROS_ERROR("stability by the force curve: %s", error.what());
+    ROS_ERROR("limits for the force curve: %s", error.what());
   }
 }
 
 void StabilityNode::watch() {
   publishBistable();
   startBistable();
-  // End of data: nothing more will come to release what waits.
+  // At the end of the data no further input releases the events held back.
   if (shell_.inputs().any().ended()) detection_.flush();
 }
 
@@ -305,7 +305,7 @@ void StabilityNode::diagnoseChart(diagnostic_updater::DiagnosticStatusWrapper& s
   } else {
     status.summary(diagnostic_msgs::DiagnosticStatus::OK, "chart published");
   }
-  if (!bistable_problem_.empty()) status.add("by the force curve", bistable_problem_);
+  if (!bistable_problem_.empty()) status.add("limits for the force curve", bistable_problem_);
 }
 
 void StabilityNode::diagnoseChatter(diagnostic_updater::DiagnosticStatusWrapper& status) {
@@ -314,8 +314,7 @@ void StabilityNode::diagnoseChatter(diagnostic_updater::DiagnosticStatusWrapper&
   } else if (last_state_.chatter) {
     status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "chatter in " + last_state_.condition);
   } else {
-    status.summary(diagnostic_msgs::DiagnosticStatus::OK,
-                   last_state_.valid ? "no chatter" : "not cutting steadily");
+    status.summary(diagnostic_msgs::DiagnosticStatus::OK, last_state_.valid ? "no chatter" : "no steady cut");
   }
   status.add("energy ratio [1]", last_state_.energy_ratio);
   status.add("severity [N]", last_state_.severity);

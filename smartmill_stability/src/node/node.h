@@ -25,18 +25,18 @@
 
 namespace smartmill::stability {
 
-/// Shell around ChartMaker and DetectionPipeline: FRFs and coefficients in, stability/chart and the service
-/// stability/predict and stability/what_if out; compensated force (or vibration, sound) and controller state
-/// in, chatter/state and chatter/advice out. With adaptive: true MillingControl's wishes go to
-/// cnc/set_overrides.
+/// ROS node of ChartMaker, DetectionPipeline and MillingControl. From FRFs, modes and coefficients: topic
+/// stability/chart, services stability/predict and stability/what_if. From compensated force (or vibration,
+/// sound) and controller state: topics chatter/state and chatter/advice. With adaptive: true, the requests of
+/// MillingControl are sent to the service cnc/set_overrides.
 class StabilityNode {
  public:
   using Parameters = NodeParameters;
-  /// @throws Error on a wrong parameter or model.
+  /// @throws Error on an invalid parameter or model.
   StabilityNode(ros::NodeHandle nh, ros::NodeHandle private_nh);
 
  private:
-  /// What comes in on its way to the detection: advice and control need to know the controller's state too.
+  /// Passes the streams to the detection, and the controller state also to advisor and control.
   struct Streams {
     StabilityNode& node;
     template <class Data>
@@ -50,16 +50,16 @@ class StabilityNode {
   };
   void listen();
   template <typename Measured>
-  void measured(const Measured& measured);
-  void judged(const ChatterState& state);
-  /// Hands a wish of the control to the controller, or its answer back.
+  void handleMeasured(const Measured& measured);
+  void handle(const ChatterState& state);
+  /// Sends a request of the control to the controller, and returns the answer to the control.
   void override();
   void publish(const ChatterState& state);
   void publish(const ChatterAdvice& advice);
   bool predict(smartmill_msgs::PredictStability::Request& request,
                smartmill_msgs::PredictStability::Response& response);
   bool whatIf(smartmill_msgs::WhatIf::Request& request, smartmill_msgs::WhatIf::Response& response);
-  /// Makes the chart of small and large vibrations aside, where what it needs is there.
+  /// Starts the chart of small and large vibrations in a thread, when its inputs are complete.
   void startBistable();
   void publishBistable();
   void watch();
@@ -73,20 +73,20 @@ class StabilityNode {
   ChatterAdvisor advisor_;
   MillingControl control_;
   Streams streams_{*this};
-  std::string chart_problem_;  // why the last chart could not be made
+  std::string chart_problem_;  // error of the last chart
   ChatterState last_state_;
 
   ros::Publisher chart_, chatter_, advice_, bistable_;
   ros::ServiceServer predict_;
   ros::ServiceClient overrides_;
-  std::future<smartmill_msgs::SetOverrides::Response> answer_;  // of the wish that is on its way
+  std::future<smartmill_msgs::SetOverrides::Response> answer_;  // to the pending request
 
   std::optional<IdentifiedForceCurves> curves_;
-  bool bistable_due_ = false;
-  std::future<std::optional<BistableChart>> bistable_chart_;  // that is being made
+  bool bistable_outdated_ = false;
+  std::future<std::optional<BistableChart>> bistable_chart_;  // in progress
   std::string bistable_problem_;
 
-  // What if is asked in a thread of its own: chatter must not wait for it.
+  // The service what_if has its own thread, so that it does not delay the detection.
   std::mutex maker_mutex_;
   ros::CallbackQueue what_if_queue_;
   ros::ServiceServer what_if_;

@@ -9,7 +9,7 @@
 
 namespace smartmill::stability {
 
-/// Parameters of stability_node and of `chart` on a bag.
+/// Parameters of stability_node and of the program chart.
 struct NodeParameters {
   std::string model;
   ChartParameters chart;
@@ -23,31 +23,31 @@ struct NodeParameters {
 
   void declare(ParameterTable& table) {
     table.title(
-        "Parameters of stability_node (package smartmill_stability): the stability chart, chatter in the "
-        "cut.");
-    table.atLaunch("model", model,
-                   "path of a smartmill-model/1 file; it gives the tool and the spindle's limits");
+        "Parameters of stability_node (package smartmill_stability): stability chart, chatter detection and "
+        "control.");
+    table.atLaunch("model", model, "path of a smartmill-model/1 file with tool and spindle limits");
     chart.declare(table);
-    table.section("Small and large vibrations by a force curve (material/force_curve): stability/bistable.");
+    table.section(
+        "Limits of small and large vibrations for a force curve (material/force_curve): topic "
+        "stability/bistable.");
     table.number("bistable_speeds", bistable_speeds, "1", Range::closed(0, 10000),
-                 "evenly from low to high; 0 or 1: none is made");
-    table.text(
-        "force_curve", force_curve,
-        "path of a smartmill-force-curve/1 file (force_law --curve) in the place of material/force_curve; "
-        "empty: the topic");
-    table.section("Chatter in the running cut.");
+                 "number of evenly spaced speeds; 0 or 1: no such chart");
+    table.text("force_curve", force_curve,
+               "path of a smartmill-force-curve/1 file (force_law --curve) used instead of the topic "
+               "material/force_curve; empty: the topic");
+    table.section("Chatter detection.");
     chatter.declare(table);
-    table.choice(
-        "chatter_signal", chatter_signal, {"force", "vibration", "sound"},
-        "force (force/compensated), vibration (daq/vibration) or sound (daq/sound); severity has the "
-        "signal's unit");
-    table.section("What is done about it: overrides of the running cut (service cnc/set_overrides).");
+    table.choice("chatter_signal", chatter_signal, {"force", "vibration", "sound"},
+                 "force (force/compensated), vibration (daq/vibration) or sound (daq/sound); severity is in "
+                 "the unit of "
+                 "the signal");
+    table.section("Control: overrides in the running cut (service cnc/set_overrides).");
     control.declare(table);
     table.section();
     table.number("hold_back", hold_back, "s", Range::notNegative(),
-                 "how late an event may arrive and still be in order");
+                 "largest delay of an event that is still put into stamp order");
     table.number("input_timeout", input_timeout, "s", Range::positive(),
-                 "of silence that raises a diagnostic and ends a record");
+                 "time without input after which a diagnostic is raised and a record ends");
   }
   /// @throws Error naming key and value.
   void validate() const {

@@ -9,8 +9,8 @@
 
 namespace smartmill::stability {
 
-/// The streams beside the cutting condition in which chatter shows, from a node's inputs or from a bag.
-/// @param detection a DetectionPipeline, or what stands before it
+/// Connects the streams of the chatter detection, except the cutting condition, from the inputs of a node or
+/// from a bag. @param detection a DetectionPipeline or an object with the same push()
 template <class Source, class Detection>
 void connect(Source& source, const NodeParameters& parameters, Detection& detection) {
   feed<CncState>(source, names::CNC_STATE, detection);
@@ -22,7 +22,7 @@ void connect(Source& source, const NodeParameters& parameters, Detection& detect
   }
 }
 
-/// What a chart is made of. @param use gets it as its core type
+/// Connects the inputs of a chart. @param use called with each input as its core type
 template <class Source, class Use>
 void connectMeasured(Source& source, Use use) {
   source.template on<MeasuredFrf>(names::TOOL_FRF, [use](const MeasuredFrf& frf, double) { use(frf); });

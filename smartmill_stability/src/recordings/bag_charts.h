@@ -10,16 +10,16 @@
 
 namespace smartmill::stability {
 
-/// What the node would have published.
+/// Results that the node publishes for the same data.
 struct BagCharts {
-  std::optional<StabilityChart> chart;    ///< the last one
-  std::string missing;                    ///< why there is none
-  std::optional<BistableChart> bistable;  ///< by the last force curve
+  std::optional<StabilityChart> chart;    ///< from all inputs of the bag
+  std::string missing;                    ///< missing inputs, without a chart
+  std::optional<BistableChart> bistable;  ///< for the last force curve
   std::vector<ChatterState> states;
 };
 
-/// Puts tool/frf, tool/modes, material/coefficients and the streams of the cuts in a bag through the classes
-/// of the node. @throws Error as RecordingReader; when the data contradict each other.
+/// Processes tool/frf, tool/modes, material/coefficients and the streams of the cuts of a bag with the
+/// classes of the node. @throws Error as RecordingReader, and when inputs contradict each other.
 BagCharts chartsFromBag(const std::string& path, const MachineModel& model, const NodeParameters& parameters,
                         const std::function<void(double)>& progress = {});
 

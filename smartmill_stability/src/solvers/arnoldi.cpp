@@ -41,7 +41,7 @@ Dominant dominantEigenvalue(const std::function<void(const Eigen::VectorXd&, Eig
   constexpr Index FIRST = 6, STEP = 3;
   const Index most = std::min<Index>(size, 150);
   Eigen::MatrixXd basis(size, most + 1), h = Eigen::MatrixXd::Zero(most + 1, most);
-  // A fixed start that no symmetry makes orthogonal to what is sought.
+  // A fixed start without symmetry, which is not orthogonal to the dominant eigenvector.
   for (Index i = 0; i < size; ++i) basis(i, 0) = 1.0 + std::sin(1.3 * static_cast<double>(i * i) + 0.7);
   basis.col(0).normalize();
   Eigen::VectorXd in(size), out(size), share;
@@ -51,18 +51,18 @@ Dominant dominantEigenvalue(const std::function<void(const Eigen::VectorXd&, Eig
     in = basis.col(k);
     map(in, out);
     const double before = out.norm();
-    // Twice is enough.
+    // Two passes of Gram-Schmidt are sufficient.
     for (int pass = 0; pass < 2; ++pass) {
       share = basis.leftCols(k + 1).transpose() * out;
       out.noalias() -= basis.leftCols(k + 1) * share;
       h.col(k).head(k + 1) += share;
     }
-    const double rest = out.norm();
+    const double norm = out.norm();
     ++k;
-    const bool exhausted = k == most || rest <= 1e-14 * before;
+    const bool exhausted = k == most || norm <= 1e-14 * before;
     if (!exhausted) {
-      h(k, k - 1) = rest;
-      basis.col(k) = out / rest;
+      h(k, k - 1) = norm;
+      basis.col(k) = out / norm;
     }
     if (exhausted || (k == check)) {
       const Complex found = largest(h.topLeftCorner(k, k));

@@ -12,19 +12,20 @@
 namespace smartmill::stability {
 namespace {
 
-using Corner = std::array<int, 2>;  ///< speed and depth on the finest grid
-using Edge = std::array<int, 3>;    ///< corner it begins at, and 0 along speed, 1 along depth
+using Corner = std::array<int, 2>;  ///< indices of speed and depth on the finest grid
+using Edge = std::array<int, 3>;    ///< first corner, and direction: 0 along speed, 1 along depth
 
 class Tracer {
  public:
   Tracer(const FloquetSolver& solver, const TraceOptions& options) : solver_(solver), o_(options) {
     if (!(o_.speed_low > 0.0) || !(o_.speed_high > o_.speed_low))
-      throw Error("boundary: the range of speeds is empty");
-    if (!(o_.max_depth > 0.0)) throw Error("boundary: the largest depth must be above 0");
+      throw Error("boundary: empty range of speeds: expected 0 < low < high");
+    if (!(o_.max_depth > 0.0)) throw Error("boundary: largest depth: expected a value above 0");
     if (o_.speeds < 4 || o_.speeds > 2000 || o_.depths < 4 || o_.depths > 2000)
-      throw Error("boundary: 4..2000 cells in each direction are due");
+      throw Error("boundary: " + std::to_string(o_.speeds) + " x " + std::to_string(o_.depths) +
+                  " cells: expected 4..2000 in each direction");
     if (o_.levels < 0 || o_.levels > 6)
-      throw Error("boundary: levels " + std::to_string(o_.levels) + ", 0..6 is due");
+      throw Error("boundary: levels " + std::to_string(o_.levels) + ": expected 0..6");
     fine_ = 1 << o_.levels;
   }
 
@@ -36,8 +37,8 @@ class Tracer {
       const int size = fine_ >> level;
       const int rows = o_.speeds << level, columns = o_.depths << level;
       std::set<Corner> passed;
-      // Follow the boundary into cells that were not looked at: a narrow tip goes on where a coarser grid
-      // lost it.
+      // Follow the boundary into cells that were not evaluated yet: a narrow tip continues where a coarser
+      // grid lost it.
       std::vector<Corner> open(cells.begin(), cells.end());
       while (!open.empty()) {
         const Corner c = open.back();
@@ -45,16 +46,17 @@ class Tracer {
         if (!crosses(c, size) || !passed.insert(c).second) continue;
         for (int di = -1; di <= 1; ++di)
           for (int dj = -1; dj <= 1; ++dj) {
-            const Corner beside{c[0] + di, c[1] + dj};
-            const bool in = beside[0] >= 0 && beside[1] >= 0 && beside[0] < rows && beside[1] < columns;
-            if (in && cells.insert(beside).second) open.push_back(beside);
+            const Corner next{c[0] + di, c[1] + dj};
+            const bool inside = next[0] >= 0 && next[1] >= 0 && next[0] < rows && next[1] < columns;
+            if (inside && cells.insert(next).second) open.push_back(next);
           }
       }
       if (level == o_.levels) {
         for (const Corner& c : passed) connect(c);
         break;
       }
-      // The neighbours too: the boundary may leave through a corner or bend back between two samples.
+      // Neighbours are bisected too: the boundary may leave through a corner or turn back between two
+      // samples.
       std::set<Corner> next;
       for (const Corner& c : passed)
         for (int di = -1; di <= 1; ++di)
@@ -101,7 +103,7 @@ class Tracer {
     return false;
   }
 
-  /// Marching squares on a finest cell.
+  /// Marching squares on a cell of the finest grid.
   void connect(const Corner& cell) {
     std::vector<Edge> cut;
     const std::array<Edge, 4> edges{
@@ -111,11 +113,11 @@ class Tracer {
       if (a != b) cut.push_back(edges[static_cast<std::size_t>(k)]);
     }
     if (cut.size() == 4) {
-      // A saddle: the sign in the middle tells which corners belong together.
+      // Saddle: the sign in the middle decides which corners are connected.
       const auto middle = solver_.at(speedAt(cell[0] + 0.5));
       const bool inside = logRadius(*middle, depthAt(cell[1] + 0.5)) > 0.0;
-      // Edges run around from corner 0: joined with the middle, it parts edges 0, 1 from 2, 3; else 3, 0 from
-      // 1, 2.
+      // Edges are numbered around the cell from corner 0. If corner 0 is connected with the middle, edges 0,
+      // 1 and 2, 3 are pairs; otherwise 3, 0 and 1, 2.
       if (inside != (value(cornerOf(cell, 1, 0)) > 0.0)) std::rotate(cut.begin(), cut.begin() + 3, cut.end());
     }
     for (std::size_t k = 0; k + 1 < cut.size(); k += 2) {
@@ -126,11 +128,11 @@ class Tracer {
 
   BoundaryPoint crossing(const Edge& edge) {
     const Corner from{edge[0], edge[1]}, to{edge[0] + (edge[2] == 0), edge[1] + (edge[2] == 1)};
-    std::unique_ptr<FloquetSolver::AtSpeed> own;
+    std::unique_ptr<FloquetSolver::AtSpeed> between;
     const auto at = [&](double share) -> FloquetSolver::AtSpeed& {
       if (edge[2] == 1) return line(edge[0]);
-      own = solver_.at(speedAt(edge[0] + share));
-      return *own;
+      between = solver_.at(speedAt(edge[0] + share));
+      return *between;
     };
     const auto depth = [&](double share) { return depthAt(edge[1] + (edge[2] == 1 ? share : 0.0)); };
     double a = 0.0, b = 1.0, fa = value(from), fb = value(to);
@@ -169,7 +171,7 @@ class Tracer {
       }
       curves.push_back(std::move(curve));
     };
-    // Open ones from their ends first, what is left is closed.
+    // Open curves first, from their ends; the remaining ones are closed.
     std::vector<Edge> ends, all;
     for (const auto& [edge, next] : links_) {
       all.push_back(edge);

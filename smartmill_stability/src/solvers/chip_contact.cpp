@@ -9,11 +9,11 @@
 #include "smartmill_stability/solvers/delayed_system.h"
 #include "solvers/floquet.h"
 
-// Contact of the teeth about the forced vibration. Along the axis the tool is cut into slices, a revolution
-// into cells. Where a tooth's chip against the tooth m places before it is the thinnest of all and positive,
-// it cuts, and what it meets was left m teeth ago. The forced vibration is linear once the contact is known
-// (harmonic balance over a revolution), and the contact follows from the vibration: Newton's method of a
-// function in linear pieces, which ends when the contact repeats.
+// Contact of the teeth in the forced vibration. The tool is divided into axial slices, a revolution into
+// cells. The chip thickness of a tooth is the smallest of those against the surfaces of the 1 .. teeth
+// previous teeth; the tooth cuts where it is positive. For a given contact the forced vibration is a linear
+// problem (harmonic balance over a revolution), and the vibration determines the contact: Newton's method for
+// a piecewise linear function, which ends when the contact no longer changes.
 
 namespace smartmill::stability {
 namespace {
@@ -27,20 +27,20 @@ using units::TWO_PI;
 
 constexpr int CELLS = 384;          // of a revolution
 constexpr double SLICE_LAG = 0.03;  // [rad] lag of the edge over a slice
-constexpr int WAVE_SLICES = 20;     // a serration's wave
+constexpr int WAVE_SLICES = 20;     // of a serration wave
 constexpr int MOST_SLICES = 60;
 constexpr int MOST_ITERATIONS = 30;
-constexpr std::size_t MOST_BREAKS = 80;  // more: the slices themselves smooth the feedback
+constexpr std::size_t MOST_BREAKS = 80;  // above, the feedback is treated as smooth
 
 double wrap(double angle) {
   angle = std::fmod(angle, TWO_PI);
   return angle < 0.0 ? angle + TWO_PI : angle;
 }
 
-/// A stretch of one tooth's slice in cut.
-struct Stretch {
-  double begin, end;  ///< [s] may reach beyond the period
-  std::size_t delay;
+/// Contact segment in time of one tooth in one slice.
+struct ContactSegment {
+  double begin, end;  ///< [s] may extend beyond the period
+  std::size_t delay;  ///< index into the delays
 };
 
 class Contact {
@@ -49,10 +49,10 @@ class Contact {
       : system_(system), chip_(*system.chip), speed_(speed), period_(TWO_PI / speed), teeth_(system.teeth) {
     const ToolGeometry tool{system.teeth, system.diameter, system.helix, system.pitch};
     const double lag = system.helix > 0.0 ? tool.lag() : 0.0;
-    double wanted = std::max(1.0, lag * depth / SLICE_LAG);
+    double required = std::max(1.0, lag * depth / SLICE_LAG);
     if (chip_.serration_amplitude > 0.0)
-      wanted = std::max(wanted, WAVE_SLICES * depth / chip_.serration_wavelength);
-    slices_ = std::min(MOST_SLICES, static_cast<int>(std::ceil(wanted)));
+      required = std::max(required, WAVE_SLICES * depth / chip_.serration_wavelength);
+    slices_ = std::min(MOST_SLICES, static_cast<int>(std::ceil(required)));
     height_ = depth / slices_;
     bool alike = true;
     for (int s = 0; s < slices_; ++s) {
@@ -71,12 +71,12 @@ class Contact {
 
   double period() const { return period_; }
   const std::vector<double>& delays() const { return delays_; }
-  bool staircase() const { return breaks().size() > MOST_BREAKS; }
+  bool tooManyBreaks() const { return breaks().size() > MOST_BREAKS; }
 
   std::vector<double> breaks() const {
     std::vector<double> times;
-    for (const auto& of_edge : stretch_) {
-      for (const Stretch& s : of_edge) {
+    for (const auto& of_edge : segments_) {
+      for (const ContactSegment& s : of_edge) {
         times.push_back(std::fmod(s.begin, period_));
         times.push_back(std::fmod(s.end, period_));
       }
@@ -97,8 +97,8 @@ class Contact {
                             : 0.0;
     double at = std::fmod(inside, period_);
     if (at < 0.0) at += period_;
-    for (std::size_t e = 0; e < stretch_.size(); ++e) {
-      for (const Stretch& s : stretch_[e]) {
+    for (std::size_t e = 0; e < segments_.size(); ++e) {
+      for (const ContactSegment& s : segments_[e]) {
         const double shifted = at < s.begin ? at + period_ : at;
         if (shifted < s.begin || shifted >= s.end) continue;
         const double angle = angle_[e] + speed_ * t;
@@ -116,12 +116,12 @@ class Contact {
  private:
   std::size_t edge(int s, int k) const { return static_cast<std::size_t>(s * teeth_ + k); }
   std::size_t pass(int k, int m) const { return static_cast<std::size_t>(k * teeth_ + m - 1); }
-  /// The chip of an edge against the tooth m places before it, without vibration.
-  const ChipShape& still(std::size_t e, int m) const {
-    return still_[e * static_cast<std::size_t>(teeth_) + static_cast<std::size_t>(m - 1)];
+  /// Chip of an edge against the m-th previous tooth, without vibration.
+  const ChipShape& rigidChip(std::size_t e, int m) const {
+    return rigid_chips_[e * static_cast<std::size_t>(teeth_) + static_cast<std::size_t>(m - 1)];
   }
 
-  /// [m] radius of tooth k at a height over the nominal one.
+  /// [m] Radius of tooth k at height z minus the nominal radius.
   double offsetAt(int k, double z) const {
     double offset = chip_.radius_offset.empty() ? 0.0 : chip_.radius_offset[static_cast<std::size_t>(k)];
     if (chip_.serration_amplitude > 0.0)
@@ -130,11 +130,12 @@ class Contact {
     return offset;
   }
 
-  /// Passes of one revolution: the forced vibration comes again with it, so that older ones lie deeper.
+  /// Adds the previous passes of one revolution. The forced vibration is synchronous with the revolution, so
+  /// older surfaces are deeper.
   void addPasses(const ChipRule& rule, bool first_slice) {
     for (int k = 0; k < teeth_; ++k) {
       for (int m = 1; m <= teeth_; ++m) {
-        still_.push_back(rule.steadyShape(k, m, {{chip_.feed * teeth_ / TWO_PI, 0.0}}));
+        rigid_chips_.push_back(rule.steadyShape(k, m, {{chip_.feed * teeth_ / TWO_PI, 0.0}}));
         if (!first_slice) continue;
         const double delay = rule.turn(k, m) / speed_;
         std::size_t d = 0;
@@ -145,13 +146,12 @@ class Contact {
     }
   }
 
-  /// Chip of a tooth against the one m places before it, at a cell; u: [axis][cell], before: the same a delay
-  /// ago.
+  /// [m] Chip thickness of a tooth against the m-th previous tooth at a cell.
   double chipAgainst(int s, int k, int m, int cell) const {
     const std::size_t e = edge(s, k), p = pass(k, m);
     const double angle = angle_[e] + TWO_PI * (cell + 0.5) / CELLS;
     const double sine = std::sin(angle), cosine = std::cos(angle);
-    double h = still(e, m).at(sine, cosine);
+    double h = rigidChip(e, m).at(sine, cosine);
     if (!motion_.empty()) {
       const auto i = static_cast<std::size_t>(cell);
       const auto& before = delayed_motion_[delay_[p]];
@@ -160,8 +160,8 @@ class Contact {
     return h;
   }
 
-  /// Which earlier tooth (1 .. teeth) left what a tooth meets, and the chip.
-  std::pair<int, double> meets(int s, int k, int cell) const {
+  /// Previous tooth (1 .. teeth) that left the surface at a cell, and the chip thickness [m].
+  std::pair<int, double> thinnestChip(int s, int k, int cell) const {
     std::pair<int, double> best{1, chipAgainst(s, k, 1, cell)};
     for (int m = 2; m <= teeth_; ++m) {
       const double h = chipAgainst(s, k, m, cell);
@@ -170,7 +170,7 @@ class Contact {
     return best;
   }
 
-  /// Share of a cell of the slice's edge in the arc.
+  /// [1] Fraction of a cell of an edge within the arc.
   double inArc(std::size_t e, int cell) const {
     const double width = TWO_PI / CELLS, middle = wrap(angle_[e] + width * (cell + 0.5));
     double share = 0.0;
@@ -191,7 +191,7 @@ class Contact {
         const std::size_t e = edge(s, k);
         for (int cell = 0; cell < CELLS; ++cell) {
           if (inArc(e, cell) <= 0.0) continue;
-          const auto [m, h] = meets(s, k, cell);
+          const auto [m, h] = thinnestChip(s, k, cell);
           if (h > 0.0) pattern[e * CELLS + static_cast<std::size_t>(cell)] = static_cast<signed char>(m);
         }
       }
@@ -202,26 +202,28 @@ class Contact {
   void solve(bool with_motion) {
     Pattern pattern = patternOf();
     for (int i = 0; with_motion && i < MOST_ITERATIONS; ++i) {
-      move(pattern, i < MOST_ITERATIONS / 2 ? 1.0 : 0.5);
+      updateMotion(pattern, i < MOST_ITERATIONS / 2 ? 1.0 : 0.5);
       const Pattern next = patternOf();
       std::size_t changed = 0;
       for (std::size_t c = 0; c < next.size(); ++c) changed += next[c] != pattern[c];
       pattern = next;
       if (changed == 0) break;
     }
-    stretches(pattern);
+    setSegments(pattern);
   }
 
-  /// Feedback [kind][cell], now and of each delay, and constant force [cell] of a contact.
-  struct Action {
+  /// Forces of a contact: feedback [kind][cell] (kind 0: present motion, 1 + d: motion delayed by d) and
+  /// force of the rigid tool [cell].
+  struct ContactForces {
     std::vector<std::vector<Eigen::Matrix2d>> gain;
     std::vector<Eigen::Vector2d> force;
   };
 
-  Action actionOf(const Pattern& pattern) const {
-    Action action{std::vector<std::vector<Eigen::Matrix2d>>(
-                      1 + delays_.size(), std::vector<Eigen::Matrix2d>(CELLS, Eigen::Matrix2d::Zero())),
-                  std::vector<Eigen::Vector2d>(CELLS, Eigen::Vector2d::Zero())};
+  ContactForces forcesOf(const Pattern& pattern) const {
+    ContactForces forces{
+        std::vector<std::vector<Eigen::Matrix2d>>(
+            1 + delays_.size(), std::vector<Eigen::Matrix2d>(CELLS, Eigen::Matrix2d::Zero())),
+        std::vector<Eigen::Vector2d>(CELLS, Eigen::Vector2d::Zero())};
     for (int s = 0; s < slices_; ++s) {
       for (int k = 0; k < teeth_; ++k) {
         const std::size_t e = edge(s, k);
@@ -232,40 +234,40 @@ class Contact {
           const double angle = angle_[e] + TWO_PI * (cell + 0.5) / CELLS;
           const double sine = std::sin(angle), cosine = std::cos(angle);
           const Eigen::Matrix2d d = inArc(e, cell) * height_ * directional(system_.kt, system_.kr, angle);
-          action.gain[0][i] += d;
-          action.gain[1 + delay_[pass(k, m)]][i] -= d;
-          // directional() is force times normal: times the normal again it is the force of a chip of one.
-          action.force[i] += d * Eigen::Vector2d(sine, cosine) * still(e, m).at(sine, cosine);
+          forces.gain[0][i] += d;
+          forces.gain[1 + delay_[pass(k, m)]][i] -= d;
+          // directional() is force times normal; multiplied by the normal it is the force per chip thickness.
+          forces.force[i] += d * Eigen::Vector2d(sine, cosine) * rigidChip(e, m).at(sine, cosine);
         }
       }
     }
-    return action;
+    return forces;
   }
 
   /// exp(-2 pi i j / CELLS).
-  static Complex turn(long j) {
-    static const std::vector<Complex> TURN = [] {
-      std::vector<Complex> turn;
-      for (int k = 0; k < CELLS; ++k) turn.push_back(std::polar(1.0, -TWO_PI * k / CELLS));
-      return turn;
+  static Complex rootOfUnity(long j) {
+    static const std::vector<Complex> ROOTS = [] {
+      std::vector<Complex> roots;
+      for (int k = 0; k < CELLS; ++k) roots.push_back(std::polar(1.0, -TWO_PI * k / CELLS));
+      return roots;
     }();
-    return TURN[static_cast<std::size_t>(((j % CELLS) + CELLS) % CELLS)];
+    return ROOTS[static_cast<std::size_t>(((j % CELLS) + CELLS) % CELLS)];
   }
 
-  /// Fourier coefficient j of values at the cells' middles, which stand half a cell on.
+  /// Fourier coefficient j of values in the middles of the cells.
   template <class Result, class Value>
   static Result coefficient(const std::vector<Value>& values, int j) {
     Result sum = Result::Zero();
     for (int i = 0; i < CELLS; ++i)
-      sum += turn(static_cast<long>(j) * i) * values[static_cast<std::size_t>(i)];
+      sum += rootOfUnity(static_cast<long>(j) * i) * values[static_cast<std::size_t>(i)];
     return sum * std::polar(1.0 / CELLS, -PI * j / CELLS);
   }
 
-  /// Harmonics -most .. most of the vibration that a contact forces.
-  VectorXcd balance(const Action& action, int most) const {
+  /// Harmonic balance: harmonics -most .. most of the forced vibration.
+  VectorXcd balance(const ContactForces& forces, int most) const {
     const Index n = 2 * most + 1;
-    std::vector<std::vector<Eigen::Matrix2cd>> c;  // of the gains, -2 most .. 2 most
-    for (const auto& gain : action.gain) {
+    std::vector<std::vector<Eigen::Matrix2cd>> c;  // Fourier coefficients of the gains, -2 most .. 2 most
+    for (const auto& gain : forces.gain) {
       c.emplace_back(static_cast<std::size_t>(4 * most + 1));
       for (int j = 0; j <= 2 * most; ++j) {
         const auto sum = coefficient<Eigen::Matrix2cd>(gain, j);
@@ -277,28 +279,28 @@ class Contact {
     VectorXcd right(2 * n);
     for (int r = -most; r <= most; ++r) {
       const auto g = receptance(system_.modes, r / period_);
-      Eigen::Matrix2cd answer;
-      answer << g[0], g[1], g[2], g[3];
-      right.segment<2>(2 * (r + most)) = answer * coefficient<Eigen::Vector2cd>(action.force, r);
+      Eigen::Matrix2cd compliance;
+      compliance << g[0], g[1], g[2], g[3];
+      right.segment<2>(2 * (r + most)) = compliance * coefficient<Eigen::Vector2cd>(forces.force, r);
       for (int l = -most; l <= most; ++l) {
         const auto k = static_cast<std::size_t>(2 * most + r - l);
         Eigen::Matrix2cd sum = c[0][k];
         for (std::size_t d = 0; d < delays_.size(); ++d)
           sum += std::polar(1.0, -TWO_PI * l * delays_[d] / period_) * c[1 + d][k];
-        matrix.block<2, 2>(2 * (r + most), 2 * (l + most)) -= answer * sum;
+        matrix.block<2, 2>(2 * (r + most), 2 * (l + most)) -= compliance * sum;
       }
     }
     return linear::solve(matrix, right);
   }
 
-  /// The forced vibration a delay ago, at the cells: [axis][cell].
+  /// [m] The delayed forced vibration in the cells: [axis][cell].
   std::vector<std::vector<double>> seriesAt(double delay, int most) const {
     std::vector<std::vector<double>> u(2, std::vector<double>(CELLS, 0.0));
     for (int r = 0; r <= most; ++r) {
       const Complex shift = std::polar(r == 0 ? 1.0 : 2.0, TWO_PI * r * (0.5 / CELLS - delay / period_));
       const Complex x = shift * spectrum_[2 * (r + most)], y = shift * spectrum_[2 * (r + most) + 1];
       for (int i = 0; i < CELLS; ++i) {
-        const Complex wave = std::conj(turn(static_cast<long>(r) * i));
+        const Complex wave = std::conj(rootOfUnity(static_cast<long>(r) * i));
         u[0][static_cast<std::size_t>(i)] += (x * wave).real();
         u[1][static_cast<std::size_t>(i)] += (y * wave).real();
       }
@@ -306,12 +308,12 @@ class Contact {
     return u;
   }
 
-  /// The forced vibration with a contact given; `share` of the way there.
-  void move(const Pattern& pattern, double share) {
+  /// Updates the forced vibration to that of a contact. @param share [1] damping of the step, 1: full step
+  void updateMotion(const Pattern& pattern, double share) {
     double highest = 0.0;
     for (const SystemMode& mode : system_.modes) highest = std::max(highest, mode.frequency);
     const int most = std::min(90, static_cast<int>(std::ceil(2.0 * highest * period_)) + 8);
-    VectorXcd found = balance(actionOf(pattern), most);
+    VectorXcd found = balance(forcesOf(pattern), most);
     if (!found.allFinite()) return;
     if (spectrum_.size() == found.size() && share < 1.0) found = share * found + (1.0 - share) * spectrum_;
     spectrum_ = found;
@@ -320,15 +322,15 @@ class Contact {
     for (const double delay : delays_) delayed_motion_.push_back(seriesAt(delay, most));
   }
 
-  /// Cells joined to stretches; their ends where the chip goes through zero or another tooth's surface takes
-  /// over.
-  void stretches(const Pattern& pattern) {
+  /// Joins cells to contact segments, whose ends are where the chip thickness is zero or where the surface of
+  /// another tooth begins.
+  void setSegments(const Pattern& pattern) {
     const double width = period_ / CELLS;
-    stretch_.assign(angle_.size(), {});
+    segments_.assign(angle_.size(), {});
     for (int s = 0; s < slices_; ++s) {
       for (int k = 0; k < teeth_; ++k) {
         const std::size_t e = edge(s, k);
-        // The arc in time: entry and exit of this edge.
+        // Entry and exit of this edge in time.
         const double begin = wrap(system_.entry - angle_[e]) / speed_;
         const double end = begin + (system_.exit - system_.entry) / speed_;
         const auto of = [&](int cell) {
@@ -344,7 +346,7 @@ class Contact {
           if (next == m) continue;
           double to = end;
           if (cell <= last) to = std::clamp(change(s, k, cell - 1, m, next), from, end);
-          if (m > 0 && to > from + 1e-9 * period_) stretch_[e].push_back({from, to, delay_[pass(k, m)]});
+          if (m > 0 && to > from + 1e-9 * period_) segments_[e].push_back({from, to, delay_[pass(k, m)]});
           from = to;
           m = next;
         }
@@ -352,17 +354,17 @@ class Contact {
     }
   }
 
-  /// [s] between the middles of a cell and the next, where contact a gives way to b.
+  /// [s] Transition from contact a to b between the middles of a cell and the next.
   double change(int s, int k, int cell, int a, int b) const {
-    const int here = ((cell % CELLS) + CELLS) % CELLS, there = (here + 1) % CELLS;
+    const int here = ((cell % CELLS) + CELLS) % CELLS, next = (here + 1) % CELLS;
     double before, after;
     if (a == 0 || b == 0) {
       const int m = a == 0 ? b : a;
       before = chipAgainst(s, k, m, here);
-      after = chipAgainst(s, k, m, there);
+      after = chipAgainst(s, k, m, next);
     } else {
       before = chipAgainst(s, k, a, here) - chipAgainst(s, k, b, here);
-      after = chipAgainst(s, k, a, there) - chipAgainst(s, k, b, there);
+      after = chipAgainst(s, k, a, next) - chipAgainst(s, k, b, next);
     }
     const double share = before * after < 0.0 ? before / (before - after) : 0.5;
     return (cell + 0.5 + share) * period_ / CELLS;
@@ -372,22 +374,22 @@ class Contact {
   ChipGeometry chip_;
   double speed_, period_;
   int teeth_, slices_ = 1;
-  double height_ = 0.0;             // [m] of a slice
-  std::vector<double> angle_;       // [rad] of each edge at time 0
-  std::vector<double> delays_;      // [s]
-  std::vector<ChipShape> still_;    // of each edge against each pass
-  std::vector<std::size_t> delay_;  // of each pass
+  double height_ = 0.0;                 // [m] of a slice
+  std::vector<double> angle_;           // [rad] of each edge at time 0
+  std::vector<double> delays_;          // [s]
+  std::vector<ChipShape> rigid_chips_;  // of each edge against each pass
+  std::vector<std::size_t> delay_;      // of each pass
   VectorXcd spectrum_;
   std::vector<std::vector<double>> motion_;                       // [axis][cell] [m]
   std::vector<std::vector<std::vector<double>>> delayed_motion_;  // [delay][axis][cell]
-  std::vector<std::vector<Stretch>> stretch_;                     // of each edge
+  std::vector<std::vector<ContactSegment>> segments_;             // of each edge
 };
 
 }  // namespace
 
 DelayedSystem contactSystem(const RegenerativeSystem& system, double speed, double depth) {
-  if (!system.chip) throw Error("stability: no chip geometry");
-  if (!(speed > 0.0) || !(depth > 0.0)) throw Error("stability: speed and depth above 0 are due");
+  if (!system.chip) throw Error("stability: expected a system with a chip geometry");
+  if (!(speed > 0.0) || !(depth > 0.0)) throw Error("stability: expected speed and depth above 0");
   const Contact contact(system, speed, depth);
   DelayedSystem delayed;
   delayed.modes = system.modes;
@@ -395,8 +397,8 @@ DelayedSystem contactSystem(const RegenerativeSystem& system, double speed, doub
   delayed.period = contact.period();
   delayed.delays = contact.delays();
   delayed.rate = 2.0 * speed;
-  if (contact.staircase()) {
-    // So many small steps: taken as they come.
+  if (contact.tooManyBreaks()) {
+    // Many small jumps: treated as smooth feedback.
     delayed.feedback = [contact](double t, double, Feedback& feedback) { contact(t, t, feedback); };
   } else {
     delayed.breaks = contact.breaks();

@@ -11,9 +11,9 @@
 #include "solvers/floquet.h"
 
 // Chebyshev collocation of the feedback force. On each element the force is the polynomial through its values
-// at the Chebyshev-Lobatto nodes; the modes answer to it exactly (closed convolution with exp(s t)), so only
-// the force has to be resolved and free flight between cuts costs and errs nothing. Elements end at the
-// breaks.
+// at the Chebyshev-Lobatto nodes. The response of the modes to it is exact (convolution with exp(s t) in
+// closed form), so only the force has to be resolved, and the free motion between cuts has no error. Elements
+// end at the breaks.
 
 namespace smartmill::stability {
 namespace {
@@ -23,20 +23,20 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// [rad] of vibration and feedback that one element may span: the default of 12 nodes leaves 1e-7 of the
-/// depth.
+/// [rad] Largest phase of vibration and feedback over an element; with the default of 12 nodes the error of
+/// the depth is 1e-7.
 constexpr double PHASE = 9.0;
 constexpr int DEFAULT_NODES = 12, REFINEMENT = 4;
 constexpr double EIGENVALUE_TOLERANCE = 1e-9, COARSEST_EIGENVALUE = 1e-6;
 
-/// Of an eigenvalue from which a depth is to be known to the options' tolerance.
+/// [1] Tolerance of an eigenvalue for the tolerance of the depth in the options.
 double eigenvalueTolerance(const SolverOptions& options) {
   constexpr double SHARE = 1e-3, SHARE_OF_MANY = 0.1;
   if (options.many) return SHARE_OF_MANY * options.tolerance;
   return std::clamp(SHARE * options.tolerance, EIGENVALUE_TOLERANCE, COARSEST_EIGENVALUE);
 }
 
-/// What depends on the number of nodes alone, on the unit interval.
+/// Nodes, quadrature and interpolation on the unit interval.
 struct Reference {
   explicit Reference(int count) : n(count), node(static_cast<std::size_t>(count)) {
     for (int i = 0; i < n; ++i)
@@ -80,7 +80,7 @@ struct Reference {
       weight.push_back(1.0 / ((1.0 - zero * zero) * slope * slope));
     };
     const std::vector<double> zeros =
-        boost::math::legendre_p_zeros<double>(points);  // not negative, ascending
+        boost::math::legendre_p_zeros<double>(points);  // non-negative, ascending
     for (auto zero = zeros.rbegin(); zero != zeros.rend(); ++zero)
       if (*zero > 0.0) add(-*zero);
     for (const double zero : zeros) add(zero);
@@ -88,19 +88,19 @@ struct Reference {
 
   int n;
   std::vector<double> node, gauss, weight;
-  std::vector<MatrixXd> lagrange;  ///< per node i: the polynomials (rows) at node_i times each Gauss point
-  VectorXd quadrature;             ///< integral over [0, 1] from the nodes
+  std::vector<MatrixXd> lagrange;  ///< for each node: the polynomials (rows) at node times each Gauss point
+  VectorXd quadrature;             ///< weights of the nodes for the integral over [0, 1]
 };
 
-/// Answer of the modes over an element of one length. State of a mode: q, q'/w.
-struct Shape {
+/// Response of the modes over an element of one length. State of a mode: q, q'/w.
+struct ElementResponse {
   double length = 0.0;
-  MatrixXd motion, velocity;              ///< (n D) x 2M: from the state at the beginning
+  MatrixXd motion, velocity;              ///< (n D) x 2M: from the state at the start
   MatrixXd force_motion, force_velocity;  ///< (n D) x (n D)
   MatrixXd state, force_state;            ///< 2M x 2M, 2M x (n D): state at the end
 };
 
-/// A mode's own motion: pole -a + i wd, w its size.
+/// Pole -a + i wd of a mode, with modulus w.
 struct Pole {
   explicit Pole(const SystemMode& mode)
       : w(units::TWO_PI * mode.frequency),
@@ -118,12 +118,12 @@ struct Pole {
   double w, a, wd;
 };
 
-/// Motion and velocity at the nodes (rows) that a unit of each polynomial of the force (columns) leaves.
-struct NodeAnswer {
+/// Motion and velocity at the nodes (rows) for a unit of each polynomial of the force (columns).
+struct NodeResponse {
   MatrixXd motion, velocity;
 };
 
-NodeAnswer answerOf(const Pole& pole, const Reference& reference, double length) {
+NodeResponse nodeResponse(const Pole& pole, const Reference& reference, double length) {
   const Index n = reference.n;
   MatrixXd re(n, n), im(n, n);
   VectorXd wr(static_cast<Index>(reference.gauss.size())), wi(wr.size());
@@ -142,63 +142,65 @@ NodeAnswer answerOf(const Pole& pole, const Reference& reference, double length)
   return {im / pole.wd, re - (pole.a / pole.wd) * im};
 }
 
-/// Adds a mode's part; c: first of its two columns of state.
-void addMode(Shape& shape, const SystemMode& mode, const Axes& axes, const Reference& reference, Index c) {
+/// Adds the response of a mode. @param c first of its two columns of the state
+void addMode(ElementResponse& response, const SystemMode& mode, const Axes& axes, const Reference& reference,
+             Index c) {
   const Index n = reference.n, d = axes.count();
-  const bool with_velocity = shape.velocity.size() > 0;
+  const bool with_velocity = response.velocity.size() > 0;
   const Pole pole(mode);
-  const NodeAnswer answer = answerOf(pole, reference, shape.length);
+  const NodeResponse node = nodeResponse(pole, reference, response.length);
   for (Index i = 0; i < n; ++i) {
-    const Eigen::Matrix2d flow = pole.flow(shape.length * reference.node[static_cast<std::size_t>(i)]);
+    const Eigen::Matrix2d flow = pole.flow(response.length * reference.node[static_cast<std::size_t>(i)]);
     for (Index p = 0; p < d; ++p) {
       const double out = mode.output[axes.index[static_cast<std::size_t>(p)]];
-      shape.motion.block<1, 2>(i * d + p, c) = out * flow.row(0);
-      if (with_velocity) shape.velocity.block<1, 2>(i * d + p, c) = out * pole.w * flow.row(1);
+      response.motion.block<1, 2>(i * d + p, c) = out * flow.row(0);
+      if (with_velocity) response.velocity.block<1, 2>(i * d + p, c) = out * pole.w * flow.row(1);
       for (Index r = 0; r < d; ++r) {
         const double gain = out * mode.input[axes.index[static_cast<std::size_t>(r)]];
         if (gain == 0.0) continue;
         for (Index j = 0; j < n; ++j) {
-          shape.force_motion(i * d + p, j * d + r) += gain * answer.motion(i, j);
-          if (with_velocity) shape.force_velocity(i * d + p, j * d + r) += gain * answer.velocity(i, j);
+          response.force_motion(i * d + p, j * d + r) += gain * node.motion(i, j);
+          if (with_velocity) response.force_velocity(i * d + p, j * d + r) += gain * node.velocity(i, j);
         }
       }
     }
-    if (i + 1 == n) shape.state.block<2, 2>(c, c) = flow;
+    if (i + 1 == n) response.state.block<2, 2>(c, c) = flow;
   }
   for (Index r = 0; r < d; ++r) {
     const double in = mode.input[axes.index[static_cast<std::size_t>(r)]];
     for (Index j = 0; j < n; ++j) {
-      shape.force_state(c, j * d + r) = in * answer.motion(n - 1, j);
-      shape.force_state(c + 1, j * d + r) = in * answer.velocity(n - 1, j) / pole.w;
+      response.force_state(c, j * d + r) = in * node.motion(n - 1, j);
+      response.force_state(c + 1, j * d + r) = in * node.velocity(n - 1, j) / pole.w;
     }
   }
 }
 
-Shape shapeOf(const std::vector<SystemMode>& modes, const Axes& axes, const Reference& reference,
-              double length, bool with_velocity) {
+ElementResponse elementResponse(const std::vector<SystemMode>& modes, const Axes& axes,
+                                const Reference& reference, double length, bool with_velocity) {
   const Index nd = reference.n * axes.count(), m2 = 2 * static_cast<Index>(modes.size());
-  Shape shape;
-  shape.length = length;
-  shape.motion = MatrixXd::Zero(nd, m2);
-  shape.force_motion = MatrixXd::Zero(nd, nd);
-  shape.state = MatrixXd::Zero(m2, m2);
-  shape.force_state = MatrixXd::Zero(m2, nd);
+  ElementResponse response;
+  response.length = length;
+  response.motion = MatrixXd::Zero(nd, m2);
+  response.force_motion = MatrixXd::Zero(nd, nd);
+  response.state = MatrixXd::Zero(m2, m2);
+  response.force_state = MatrixXd::Zero(m2, nd);
   if (with_velocity) {
-    shape.velocity = shape.motion;
-    shape.force_velocity = shape.force_motion;
+    response.velocity = response.motion;
+    response.force_velocity = response.force_motion;
   }
   for (std::size_t k = 0; k < modes.size(); ++k)
-    addMode(shape, modes[k], axes, reference, 2 * static_cast<Index>(k));
-  return shape;
+    addMode(response, modes[k], axes, reference, 2 * static_cast<Index>(k));
+  return response;
 }
 
-/// [rad/s] of the fastest vibration that elements resolve. @param stiffness [N/m] of the feedback
+/// [rad/s] Fastest vibration that the elements resolve. @param stiffness [N/m] of the feedback
 double fastestOf(const std::vector<SystemMode>& modes, double stiffness) {
   double fastest = 0.0;
-  // What a heavily damped mode far above the others adds (a residual compliance) follows the force at once.
-  constexpr double FOLLOWS = 0.4;
+  // A heavily damped mode far above the others represents a residual compliance and follows the force
+  // immediately.
+  constexpr double HEAVY_DAMPING = 0.4;
   for (const SystemMode& mode : modes) {
-    if (mode.damping_ratio >= FOLLOWS && modes.size() > 1) continue;
+    if (mode.damping_ratio >= HEAVY_DAMPING && modes.size() > 1) continue;
     const double w = units::TWO_PI * mode.frequency;
     const double added =
         stiffness * std::hypot(mode.input[0], mode.input[1]) * std::hypot(mode.output[0], mode.output[1]);
@@ -207,13 +209,14 @@ double fastestOf(const std::vector<SystemMode>& modes, double stiffness) {
   return fastest;
 }
 
-/// Shapes of every length up to the longest, as Chebyshev series in the length: all entries are sums of
-/// exponentials of it, so the terms fall as (r / 2)^k / k!, r the largest pole times half the longest.
-class ShapeTable {
+/// Responses for every length up to the longest as Chebyshev series in the length. All entries are sums of
+/// exponentials of the length, so the terms decrease as (r / 2)^k / k!, with r the largest pole times half
+/// the longest length.
+class ResponseTable {
  public:
-  ShapeTable(const std::vector<SystemMode>& modes, const Reference& reference, bool with_velocity)
+  ResponseTable(const std::vector<SystemMode>& modes, const Reference& reference, bool with_velocity)
       : longest_(PHASE / fastestOf(modes, 0.0)),
-        example_(shapeOf(modes, Axes(modes), reference, longest_, with_velocity)) {
+        example_(elementResponse(modes, Axes(modes), reference, longest_, with_velocity)) {
     constexpr double ERROR = 1e-9;
     double half = 0.0, term = 1.0;
     for (const SystemMode& mode : modes)
@@ -223,8 +226,8 @@ class ShapeTable {
     MatrixXd values(pack(example_).size(), terms), cosines(terms, terms);
     for (int k = 0; k < terms; ++k) {
       const double angle = units::PI * (k + 0.5) / terms;
-      values.col(k) = pack(
-          shapeOf(modes, Axes(modes), reference, 0.5 * longest_ * (1.0 + std::cos(angle)), with_velocity));
+      values.col(k) = pack(elementResponse(modes, Axes(modes), reference,
+                                           0.5 * longest_ * (1.0 + std::cos(angle)), with_velocity));
       for (int j = 0; j < terms; ++j) cosines(k, j) = (j == 0 ? 1.0 : 2.0) / terms * std::cos(j * angle);
     }
     coefficients_ = values * cosines;
@@ -232,34 +235,35 @@ class ShapeTable {
 
   double longest() const { return longest_; }
 
-  Shape at(double length) const {
+  ElementResponse at(double length) const {
     VectorXd series(coefficients_.cols());
     const double x = 2.0 * length / longest_ - 1.0;
     for (Index j = 0; j < series.size(); ++j)
       series[j] = j == 0 ? 1.0 : j == 1 ? x : 2.0 * x * series[j - 1] - series[j - 2];
     const VectorXd all = coefficients_ * series;
-    Shape shape = example_;
-    shape.length = length;
+    ElementResponse response = example_;
+    response.length = length;
     Index at = 0;
-    for (MatrixXd Shape::*part : PARTS) {
-      MatrixXd& matrix = shape.*part;
+    for (MatrixXd ElementResponse::*part : PARTS) {
+      MatrixXd& matrix = response.*part;
       matrix = Eigen::Map<const MatrixXd>(all.data() + at, matrix.rows(), matrix.cols());
       at += matrix.size();
     }
-    return shape;
+    return response;
   }
 
  private:
-  static constexpr MatrixXd Shape::*PARTS[] = {&Shape::motion,         &Shape::velocity, &Shape::force_motion,
-                                               &Shape::force_velocity, &Shape::state,    &Shape::force_state};
+  static constexpr MatrixXd ElementResponse::*PARTS[] = {
+      &ElementResponse::motion,         &ElementResponse::velocity, &ElementResponse::force_motion,
+      &ElementResponse::force_velocity, &ElementResponse::state,    &ElementResponse::force_state};
 
-  static VectorXd pack(const Shape& shape) {
+  static VectorXd pack(const ElementResponse& response) {
     Index size = 0;
-    for (MatrixXd Shape::*part : PARTS) size += (shape.*part).size();
+    for (MatrixXd ElementResponse::*part : PARTS) size += (response.*part).size();
     VectorXd all(size);
     size = 0;
-    for (MatrixXd Shape::*part : PARTS) {
-      const MatrixXd& matrix = shape.*part;
+    for (MatrixXd ElementResponse::*part : PARTS) {
+      const MatrixXd& matrix = response.*part;
       all.segment(size, matrix.size()) = Eigen::Map<const VectorXd>(matrix.data(), matrix.size());
       size += matrix.size();
     }
@@ -267,59 +271,60 @@ class ShapeTable {
   }
 
   double longest_;
-  Shape example_;
-  MatrixXd coefficients_;  ///< entries x terms
+  ElementResponse example_;  ///< provides the sizes of the matrices
+  MatrixXd coefficients_;    ///< entries x terms
 };
 
-/// Shapes met at one speed; a cut without helix meets the same at every depth.
-class Shapes {
+/// Cache of the responses at one speed; without helix they are the same at every depth.
+class ResponseCache {
  public:
-  Shapes(const std::vector<SystemMode>& of_modes, std::shared_ptr<const Reference> of_reference,
-         bool velocities, std::shared_ptr<const ShapeTable> of_table = nullptr)
+  ResponseCache(const std::vector<SystemMode>& of_modes, std::shared_ptr<const Reference> of_reference,
+                bool velocities, std::shared_ptr<const ResponseTable> of_table = nullptr)
       : modes(of_modes),
         axes(of_modes),
         reference(std::move(of_reference)),
         with_velocity(velocities),
         table_(std::move(of_table)) {}
 
-  std::shared_ptr<const Shape> of(double length) {
-    for (const auto& shape : known_)
-      if (std::abs(shape->length - length) <= 1e-13 * length) return shape;
+  std::shared_ptr<const ElementResponse> of(double length) {
+    for (const auto& response : cached_)
+      if (std::abs(response->length - length) <= 1e-13 * length) return response;
     constexpr std::size_t MOST = 100;
-    if (known_.size() >= MOST) known_.clear();
-    known_.push_back(std::make_shared<Shape>(table_ && length <= table_->longest()
-                                                 ? table_->at(length)
-                                                 : shapeOf(modes, axes, *reference, length, with_velocity)));
-    return known_.back();
+    if (cached_.size() >= MOST) cached_.clear();
+    cached_.push_back(std::make_shared<ElementResponse>(
+        table_ && length <= table_->longest()
+            ? table_->at(length)
+            : elementResponse(modes, axes, *reference, length, with_velocity)));
+    return cached_.back();
   }
 
   std::vector<SystemMode> modes;
   Axes axes;
   std::shared_ptr<const Reference> reference;
   bool with_velocity;
-  Index expected = 0;  ///< applications that the last eigenvalue took
+  Index expected = 0;  ///< number of applications for the last eigenvalue
   double eigenvalue_tolerance = EIGENVALUE_TOLERANCE;
 
  private:
-  std::shared_ptr<const ShapeTable> table_;
-  std::vector<std::shared_ptr<const Shape>> known_;
+  std::shared_ptr<const ResponseTable> table_;
+  std::vector<std::shared_ptr<const ElementResponse>> cached_;
 };
 
-/// The map over one period of [state; motion at the nodes that later delays look back to].
+/// The map over one period of [state; motion at the nodes that is needed with a delay in the next period].
 class PeriodMap {
  public:
-  PeriodMap(const DelayedSystem& system, Shapes& shapes)
-      : d_(shapes.axes.count()),
-        n_(shapes.reference->n),
+  PeriodMap(const DelayedSystem& system, ResponseCache& responses)
+      : d_(responses.axes.count()),
+        n_(responses.reference->n),
         m2_(2 * static_cast<Index>(system.modes.size())),
-        reference_(*shapes.reference),
+        reference_(*responses.reference),
         period_(system.period),
-        shapes_(shapes) {
-    mesh(system, shapes);
-    for (Element& element : elements_) fill(system, shapes, element);
+        responses_(responses) {
+    mesh(system);
+    for (Element& element : elements_) fill(system, responses, element);
     size_ = m2_;
     for (Element& element : elements_) {
-      if (!element.looked_back_to) continue;
+      if (!element.needed_next_period) continue;
       element.slot = size_;
       size_ += n_ * d_;
     }
@@ -332,10 +337,10 @@ class PeriodMap {
 
   Dominant dominant(bool with_vector) {
     return dominantEigenvalue([this](const VectorXd& in, VectorXd& out) { apply(in, out); }, size_,
-                              shapes_.eigenvalue_tolerance, with_vector, shapes_.expected);
+                              responses_.eigenvalue_tolerance, with_vector, responses_.expected);
   }
 
-  /// [Hz] of the strongest Fourier component of the motion that starts with a mode of the map.
+  /// [Hz] Strongest Fourier component of the motion of an eigenvector. @param highest [rad/s]
   double strongest(const Dominant& mode, double highest) {
     VectorXd out(size_);
     std::vector<Eigen::VectorXcd> motion(elements_.size());
@@ -367,28 +372,28 @@ class PeriodMap {
   }
 
  private:
-  /// Where a node's delayed motion comes from.
+  /// Source of the delayed motion at a node.
   struct Source {
     std::size_t element = 0;
-    bool previous = true;  ///< period
-    VectorXd weights;      ///< empty: node by node
+    bool previous = true;  ///< in the previous period
+    VectorXd weights;      ///< of the nodes of that element; empty: the same node
   };
 
   struct Element {
     double begin = 0.0, length = 0.0;
-    std::shared_ptr<const Shape> shape;
-    bool cuts = false, looked_at = false, looked_back_to = false;
+    std::shared_ptr<const ElementResponse> response;
+    bool cuts = false, needed = false, needed_next_period = false;
     Index slot = 0;
-    /// Where the delay is the period: [state; motion] at the end and the nodes from [state; motion a period
-    /// ago]; else empty, and the parts below are used.
+    /// If the delay is the period: [state at the end; motion at the nodes] from [state; motion one period
+    /// ago]. Otherwise empty, and the members below are used.
     MatrixXd step;
     MatrixXd from_state;                         // (n D) x 2M
-    Eigen::PartialPivLU<MatrixXd> lu;            // of I - feedback x answer
+    Eigen::PartialPivLU<MatrixXd> lu;            // of I - feedback x response
     std::vector<std::vector<MatrixXd>> delayed;  // [delay][node] D x D, empty where zero
     std::vector<std::vector<Source>> source;     // [delay][node]; one entry: the whole element
   };
 
-  void mesh(const DelayedSystem& system, const Shapes&) {
+  void mesh(const DelayedSystem& system) {
     std::vector<double> ends = system.breaks;
     ends.push_back(0.0);
     ends.push_back(period_);
@@ -417,20 +422,20 @@ class PeriodMap {
     if (source.previous) t += period_;
     std::size_t e = 0;
     while (e + 1 < elements_.size() && elements_[e + 1].begin <= t) ++e;
-    // Rounding must not make an element look into itself.
+    // Rounding must not make an element its own source.
     if (!source.previous && e >= self && e > 0) e = self - 1;
     source.element = e;
     source.weights = reference_.weights(std::clamp((t - elements_[e].begin) / elements_[e].length, 0.0, 1.0));
-    elements_[e].looked_at = true;
-    if (source.previous) elements_[e].looked_back_to = true;
+    elements_[e].needed = true;
+    if (source.previous) elements_[e].needed_next_period = true;
     return source;
   }
 
-  void fill(const DelayedSystem& system, Shapes& shapes, Element& element) {
-    element.shape = shapes.of(element.length);
-    const Shape& shape = *element.shape;
+  void fill(const DelayedSystem& system, ResponseCache& responses, Element& element) {
+    element.response = responses.of(element.length);
+    const ElementResponse& response = *element.response;
     const auto self = static_cast<std::size_t>(&element - elements_.data());
-    const auto reduced = [&](const Eigen::Matrix2d& full) { return shapes.axes.reduced(full); };
+    const auto reduced = [&](const Eigen::Matrix2d& full) { return responses.axes.reduced(full); };
     const double inside = element.begin + 0.5 * element.length;
     std::vector<Feedback> at(static_cast<std::size_t>(n_));
     for (Index i = 0; i < n_; ++i) {
@@ -447,13 +452,13 @@ class PeriodMap {
     for (Index i = 0; i < n_; ++i) {
       const Feedback& f = at[static_cast<std::size_t>(i)];
       const MatrixXd now = reduced(f.now);
-      element.from_state.middleRows(i * d_, d_).noalias() = now * shape.motion.middleRows(i * d_, d_);
-      matrix.middleRows(i * d_, d_).noalias() -= now * shape.force_motion.middleRows(i * d_, d_);
+      element.from_state.middleRows(i * d_, d_).noalias() = now * response.motion.middleRows(i * d_, d_);
+      matrix.middleRows(i * d_, d_).noalias() -= now * response.force_motion.middleRows(i * d_, d_);
       if (!f.velocity.isZero(0.0)) {
         const MatrixXd velocity = reduced(f.velocity);
         element.from_state.middleRows(i * d_, d_).noalias() +=
-            velocity * shape.velocity.middleRows(i * d_, d_);
-        matrix.middleRows(i * d_, d_).noalias() -= velocity * shape.force_velocity.middleRows(i * d_, d_);
+            velocity * response.velocity.middleRows(i * d_, d_);
+        matrix.middleRows(i * d_, d_).noalias() -= velocity * response.force_velocity.middleRows(i * d_, d_);
       }
     }
     element.lu.compute(matrix);
@@ -468,7 +473,7 @@ class PeriodMap {
         Source same;
         same.element = self;
         element.source[k].push_back(same);
-        element.looked_at = element.looked_back_to = true;
+        element.needed = element.needed_next_period = true;
         if (system.delays.size() == 1) condense(element);
         continue;
       }
@@ -480,7 +485,7 @@ class PeriodMap {
   }
 
   void condense(Element& element) {
-    const Shape& shape = *element.shape;
+    const ElementResponse& response = *element.response;
     const Index nd = n_ * d_;
     MatrixXd force(nd, m2_ + nd);
     force.leftCols(m2_) = element.from_state;
@@ -489,10 +494,10 @@ class PeriodMap {
       force.block(i * d_, m2_ + i * d_, d_, d_) = element.delayed.front()[static_cast<std::size_t>(i)];
     force = element.lu.solve(force).eval();
     element.step.resize(m2_ + nd, m2_ + nd);
-    element.step.topRows(m2_).noalias() = shape.force_state * force;
-    element.step.bottomRows(nd).noalias() = shape.force_motion * force;
-    element.step.topLeftCorner(m2_, m2_) += shape.state;
-    element.step.bottomLeftCorner(nd, m2_) += shape.motion;
+    element.step.topRows(m2_).noalias() = response.force_state * force;
+    element.step.bottomRows(nd).noalias() = response.force_motion * force;
+    element.step.topLeftCorner(m2_, m2_) += response.state;
+    element.step.bottomLeftCorner(nd, m2_) += response.motion;
   }
 
   void march(const VectorXd& in, VectorXd& out, bool everywhere) {
@@ -500,7 +505,7 @@ class PeriodMap {
     state_ = in.head(m2_);
     for (std::size_t e = 0; e < elements_.size(); ++e) {
       const Element& element = elements_[e];
-      const Shape& shape = *element.shape;
+      const ElementResponse& response = *element.response;
       if (element.step.size() > 0) {
         before_.resize(m2_ + n_ * d_);
         before_ << state_, in.segment(element.slot, n_ * d_);
@@ -509,8 +514,8 @@ class PeriodMap {
         motion_[e] = after_.tail(n_ * d_);
         continue;
       }
-      const bool wanted = everywhere || element.looked_at;
-      if (wanted) motion_[e].noalias() = shape.motion * state_;
+      const bool needed = everywhere || element.needed;
+      if (needed) motion_[e].noalias() = response.motion * state_;
       if (element.cuts) {
         force_.noalias() = element.from_state * state_;
         for (std::size_t k = 0; k < element.delayed.size(); ++k) {
@@ -533,21 +538,21 @@ class PeriodMap {
           }
         }
         force_ = element.lu.solve(force_);
-        if (wanted) motion_[e].noalias() += shape.force_motion * force_;
+        if (needed) motion_[e].noalias() += response.force_motion * force_;
       }
-      next_.noalias() = shape.state * state_;
-      if (element.cuts) next_.noalias() += shape.force_state * force_;
+      next_.noalias() = response.state * state_;
+      if (element.cuts) next_.noalias() += response.force_state * force_;
       state_.swap(next_);
     }
     out.head(m2_) = state_;
     for (std::size_t e = 0; e < elements_.size(); ++e)
-      if (elements_[e].looked_back_to) out.segment(elements_[e].slot, n_ * d_) = motion_[e];
+      if (elements_[e].needed_next_period) out.segment(elements_[e].slot, n_ * d_) = motion_[e];
   }
 
   Index d_, n_, m2_, size_ = 0;
   const Reference& reference_;
   double period_;
-  Shapes& shapes_;
+  ResponseCache& responses_;
   std::vector<Element> elements_;
   std::vector<VectorXd> motion_;
   VectorXd state_, next_, force_, before_, after_;
@@ -561,7 +566,7 @@ class Collocation : public FloquetSolver {
         reference_(std::make_shared<Reference>(options.nodes > 0 ? options.nodes : DEFAULT_NODES)),
         with_velocity_(system.damping_radial > 0.0 || system.damping_tangential > 0.0),
         table_(options.many && fastestOf(system.modes, 0.0) > 0.0
-                   ? std::make_shared<ShapeTable>(system.modes, *reference_, with_velocity_)
+                   ? std::make_shared<ResponseTable>(system.modes, *reference_, with_velocity_)
                    : nullptr) {}
 
   class Speed : public AtSpeed {
@@ -569,25 +574,25 @@ class Collocation : public FloquetSolver {
     Speed(const Collocation& solver, double speed)
         : system_(solver.system_),
           speed_(speed),
-          shapes_(system_.modes, solver.reference_, solver.with_velocity_, solver.table_) {
-      shapes_.eigenvalue_tolerance = eigenvalueTolerance(solver.options_);
+          responses_(system_.modes, solver.reference_, solver.with_velocity_, solver.table_) {
+      responses_.eigenvalue_tolerance = eigenvalueTolerance(solver.options_);
     }
 
     CharacteristicMultiplier multiplier(double depth) override {
       const DelayedSystem delayed = delayedSystem(system_, speed_, depth);
-      return {PeriodMap(delayed, shapes_).dominant(false).value, delayed.period};
+      return {PeriodMap(delayed, responses_).dominant(false).value, delayed.period};
     }
 
     double chatterFrequency(double depth) override {
       const DelayedSystem delayed = delayedSystem(system_, speed_, depth);
-      PeriodMap map(delayed, shapes_);
+      PeriodMap map(delayed, responses_);
       return map.strongest(map.dominant(true), highestOf(system_));
     }
 
    private:
     RegenerativeSystem system_;
     double speed_;
-    Shapes shapes_;
+    ResponseCache responses_;
   };
 
   std::unique_ptr<AtSpeed> at(double speed) const override { return std::make_unique<Speed>(*this, speed); }
@@ -602,7 +607,7 @@ class Collocation : public FloquetSolver {
  private:
   std::shared_ptr<const Reference> reference_;
   bool with_velocity_;
-  std::shared_ptr<const ShapeTable> table_;
+  std::shared_ptr<const ResponseTable> table_;
 };
 
 }  // namespace
@@ -610,14 +615,14 @@ class Collocation : public FloquetSolver {
 std::unique_ptr<FloquetSolver> makeCollocation(const RegenerativeSystem& system,
                                                const SolverOptions& options) {
   if (options.nodes != 0 && (options.nodes < 4 || options.nodes > 40 + REFINEMENT))
-    throw Error("nodes: " + std::to_string(options.nodes) + " is out of range (4..40)");
+    throw Error("nodes: " + std::to_string(options.nodes) + ": expected 4..40");
   return std::make_unique<Collocation>(system, options);
 }
 
 CharacteristicMultiplier collocationMultiplier(const DelayedSystem& system, int nodes) {
-  if (nodes < 4 || nodes > 40) throw Error("nodes: " + std::to_string(nodes) + " is out of range (4..40)");
-  Shapes shapes(system.modes, std::make_shared<Reference>(nodes), true);
-  return {PeriodMap(system, shapes).dominant(false).value, system.period};
+  if (nodes < 4 || nodes > 40) throw Error("nodes: " + std::to_string(nodes) + ": expected 4..40");
+  ResponseCache responses(system.modes, std::make_shared<Reference>(nodes), true);
+  return {PeriodMap(system, responses).dominant(false).value, system.period};
 }
 
 }  // namespace smartmill::stability

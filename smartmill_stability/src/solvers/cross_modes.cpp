@@ -12,14 +12,14 @@
 namespace smartmill::stability {
 namespace {
 
-constexpr double LEAST = 1e-9;  // [1] of the mean gain
+constexpr double LEAST = 1e-9;  // [1] least gain over the mean gain
 
 struct Pair {
   std::size_t x, y;
   double frequency, damping_ratio;  // means of both fits
 };
 
-/// Each mode of x with the nearest of y, where their half-power bands meet.
+/// Pairs each mode of x with the nearest of y, if their half-power bands overlap.
 std::vector<Pair> pairsOf(const ModalModel& x, const ModalModel& y) {
   std::vector<Pair> pairs;
   std::vector<bool> taken(y.modes.size(), false);
@@ -29,16 +29,16 @@ std::vector<Pair> pairsOf(const ModalModel& x, const ModalModel& y) {
     double least = 1.0;
     for (std::size_t j = 0; j < y.modes.size(); ++j) {
       const Mode& b = y.modes[j];
-      const double apart = std::abs(a.frequency - b.frequency) /
-                           (a.damping_ratio * a.frequency + b.damping_ratio * b.frequency);
-      if (taken[j] || apart >= least || !(a.gain > 0.0) || !(b.gain > 0.0)) continue;
-      least = apart;
+      const double distance = std::abs(a.frequency - b.frequency) /
+                              (a.damping_ratio * a.frequency + b.damping_ratio * b.frequency);
+      if (taken[j] || distance >= least || !(a.gain > 0.0) || !(b.gain > 0.0)) continue;
+      least = distance;
       best = j;
     }
     if (best == y.modes.size()) continue;
     taken[best] = true;
     const Mode& b = y.modes[best];
-    // The fit in which a mode is large knows it better.
+    // The fit with the larger gain of the mode is more accurate.
     const double share = a.gain / (a.gain + b.gain);
     pairs.push_back({i, best, share * a.frequency + (1.0 - share) * b.frequency,
                      share * a.damping_ratio + (1.0 - share) * b.damping_ratio});
@@ -46,7 +46,7 @@ std::vector<Pair> pairsOf(const ModalModel& x, const ModalModel& y) {
   return pairs;
 }
 
-/// Residues of the cross receptance as static gains [m/N]; 0 where they are not sure.
+/// [m/N] Residues of the cross receptance as static gains; 0 where they are not significant.
 std::vector<double> residues(const std::vector<Pair>& pairs, const FrequencyResponse& cross) {
   const auto lines = static_cast<Eigen::Index>(cross.size()), count = static_cast<Eigen::Index>(pairs.size());
   if (lines <= count || count == 0) return std::vector<double>(pairs.size(), 0.0);
@@ -74,8 +74,8 @@ std::vector<double> residues(const std::vector<Pair>& pairs, const FrequencyResp
   return values;
 }
 
-/// Of a mode among systemModes(), which leaves out those without a gain.
-std::size_t placeOf(const ModalModel& model, std::size_t mode) {
+/// Index of a mode within systemModes(), which omits modes with zero gain.
+std::size_t systemIndex(const ModalModel& model, std::size_t mode) {
   return static_cast<std::size_t>(std::count_if(model.modes.begin(),
                                                 model.modes.begin() + static_cast<std::ptrdiff_t>(mode),
                                                 [](const Mode& m) { return m.gain != 0.0; }));
@@ -94,15 +94,16 @@ std::vector<SystemMode> crossModes(const ModalModel& x, const ModalModel& y, con
     const double xx = x.modes[pair.x].gain, yy = y.modes[pair.y].gain, most = std::sqrt(xx * yy);
     const double xy = std::clamp(residue[k], -most, most);
     // Principal directions of [[xx, xy], [xy, yy]].
-    const double turn = 0.5 * std::atan2(2.0 * xy, xx - yy), middle = 0.5 * (xx + yy),
+    const double rotation = 0.5 * std::atan2(2.0 * xy, xx - yy), middle = 0.5 * (xx + yy),
                  half = std::hypot(0.5 * (xx - yy), xy);
-    const bool strong_in_x = std::abs(std::cos(turn)) > std::sqrt(0.5);
+    const bool strong_in_x = std::abs(std::cos(rotation)) > std::sqrt(0.5);
     for (const bool strong : {true, false}) {
-      // A mode that shows along one direction only leaves nothing across it, but keeps its place.
+      // A pair that is a single mode has no gain across it; the second mode remains to preserve the order.
       const double gain = std::max(strong ? middle + half : middle - half, LEAST * middle);
       const double size = units::TWO_PI * pair.frequency * std::sqrt(gain);
-      const double angle = strong ? turn : turn + 0.5 * units::PI;
-      SystemMode& mode = modes[strong == strong_in_x ? placeOf(x, pair.x) : in_x + placeOf(y, pair.y)];
+      const double angle = strong ? rotation : rotation + 0.5 * units::PI;
+      SystemMode& mode =
+          modes[strong == strong_in_x ? systemIndex(x, pair.x) : in_x + systemIndex(y, pair.y)];
       mode.frequency = pair.frequency;
       mode.damping_ratio = pair.damping_ratio;
       mode.input = mode.output = {{size * std::cos(angle), size * std::sin(angle)}};

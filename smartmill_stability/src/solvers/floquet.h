@@ -18,7 +18,7 @@ std::unique_ptr<StabilitySolver> makeMultiFrequency(const RegenerativeSystem& sy
 
 std::unique_ptr<StabilitySolver> makeZeroOrder(const RegenerativeSystem& system);
 
-/// Axes along which some mode is driven or moves; in the others the tool is rigid.
+/// Axes along which a mode is excited or moves; along the others the tool is rigid.
 struct Axes {
   explicit Axes(const std::vector<SystemMode>& modes);
   Eigen::Index count() const { return static_cast<Eigen::Index>(index.size()); }
@@ -26,11 +26,12 @@ struct Axes {
   std::vector<std::size_t> index;
 };
 
-/// d n^T at an immersion angle [rad]: force on the tool per unit of depth and of chip thickness, times the
-/// chip's normal. @param tangential, radial [N/m2]
+/// d n^T at an immersion angle [rad]: force d on the tool per depth and chip thickness, n: normal of the
+/// chip.
+/// @param tangential, radial [N/m2]
 Eigen::Matrix2d directional(double tangential, double radial, double angle);
 
-/// [rad/s] up to which chatter is looked for: 1.5 times the highest mode.
+/// [rad/s] Upper end of the search for the chatter frequency: 1.5 times the highest natural frequency.
 double highestOf(const RegenerativeSystem& system);
 
 }  // namespace smartmill::stability

@@ -29,7 +29,7 @@ std::vector<double> rangeOf(const std::string& option, const std::string& text) 
   char rest = 0;
   if (std::sscanf(text.c_str(), "%lf:%lf:%d%c", &low, &high, &count, &rest) != 3 || !(low > 0.0) ||
       !(high >= low) || count < 1 || (count > 1 && high == low)) {
-    throw Error(option + " " + text + ": LO:HI:N is due, 0 < LO < HI, N >= 1");
+    throw Error(option + " " + text + ": expected LO:HI:N with 0 < LO < HI and N >= 1");
   }
   std::vector<double> values;
   for (int i = 0; i < count; ++i) values.push_back(count == 1 ? low : low + (high - low) * i / (count - 1));

@@ -8,9 +8,10 @@
 #include "smartmill_stability/solvers/delayed_system.h"
 #include "solvers/floquet.h"
 
-// Multi-frequency solution (Budak and Altintas): chatter at w moves the tool at w + k w_T; the harmonics of
-// the feedback couple them: U_r = depth G(w + r w_T) sum_l F_{r - l}(w + l w_T) U_l. The depth is the inverse
-// of an eigenvalue where that is real and positive. Zero-order keeps the mean of the feedback alone.
+// Multi-frequency solution (Budak and Altintas): chatter at w contains tool motion at w + k w_T, coupled by
+// the harmonics of the feedback: U_r = depth G(w + r w_T) sum_l F_{r - l}(w + l w_T) U_l. The depth is the
+// inverse of an eigenvalue where that is real and positive. The zero-order solution retains only the mean of
+// the feedback.
 
 namespace smartmill::stability {
 namespace {
@@ -22,7 +23,7 @@ using units::TWO_PI;
 
 constexpr int DEFAULT_HARMONICS = 10;
 
-/// Receptance of the system, from its lines or its modes.
+/// Receptance of the system at w [rad/s], from its lines or its modes.
 Eigen::Matrix2cd receptanceOf(const RegenerativeSystem& system, double w) {
   const auto g = system.response ? system.response->at(w / TWO_PI) : receptance(system.modes, w / TWO_PI);
   Eigen::Matrix2cd m;
@@ -46,7 +47,7 @@ struct Harmonics {
   }
 };
 
-/// @param depth [m] at which the feedback is taken, over the depth
+/// @param depth [m] at which the feedback is evaluated, and by which it is divided
 Harmonics harmonicsOf(const RegenerativeSystem& system, double speed, int most, double depth = 1.0) {
   const DelayedSystem unit = delayedSystem(system, speed, depth);
   Harmonics h;
@@ -61,7 +62,7 @@ Harmonics harmonicsOf(const RegenerativeSystem& system, double speed, int most, 
   ends.push_back(0.0);
   ends.push_back(unit.period);
   std::sort(ends.begin(), ends.end());
-  // Gauss's rule of three points on parts much shorter than the highest harmonic and the second of the speed.
+  // Three-point Gauss quadrature on parts much shorter than the period of the highest harmonic.
   const double longest = unit.period / (12.0 * (most + 2));
   Feedback f;
   for (std::size_t e = 0; e + 1 < ends.size(); ++e) {
@@ -76,10 +77,10 @@ Harmonics harmonicsOf(const RegenerativeSystem& system, double speed, int most, 
         unit.feedback(t, middle, f);
         for (int k = -most; k <= most; ++k) {
           const auto i = static_cast<std::size_t>(k + most);
-          const Complex turn = weight * std::polar(1.0, -k * h.step * t);
-          h.now[i] += turn * f.now;
-          h.velocity[i] += turn * f.velocity;
-          for (std::size_t d = 0; d < f.delayed.size(); ++d) h.delayed[i][d] += turn * f.delayed[d];
+          const Complex kernel = weight * std::polar(1.0, -k * h.step * t);
+          h.now[i] += kernel * f.now;
+          h.velocity[i] += kernel * f.velocity;
+          for (std::size_t d = 0; d < f.delayed.size(); ++d) h.delayed[i][d] += kernel * f.delayed[d];
         }
       }
     }
@@ -87,10 +88,10 @@ Harmonics harmonicsOf(const RegenerativeSystem& system, double speed, int most, 
   return h;
 }
 
-/// Eigenvalues of the harmonic balance at chatter frequencies of one speed.
+/// Harmonic balance at one speed.
 class Balance {
  public:
-  /// @param depth [m] at which the feedback is taken (with helix it is not proportional to the depth)
+  /// @param depth [m] at which the feedback is evaluated (with helix it is not proportional to the depth)
   Balance(const RegenerativeSystem& system, const Axes& axes, double speed, int below, int above,
           double depth = 1.0)
       : system_(system),
@@ -120,15 +121,15 @@ class Balance {
     return m;
   }
 
-  /// Eigenvalues larger than one over the depth of interest.
+  /// [1/m] Eigenvalues at w [rad/s] with a modulus above `least`.
   std::vector<Complex> eigenvalues(double w, double least) const {
-    std::vector<Complex> kept;
+    std::vector<Complex> large;
     for (const Complex& value : linear::eigenvalues(matrix(w)))
-      if (std::abs(value) > least) kept.push_back(value);
-    return kept;
+      if (std::abs(value) > least) large.push_back(value);
+    return large;
   }
 
-  /// [Hz] of the largest component of the eigenvector of an eigenvalue.
+  /// [Hz] Frequency of the largest component of the eigenvector of an eigenvalue.
   double strongest(double w, Complex value) const {
     MatrixXcd m = matrix(w);
     m.diagonal().array() -= value * (1.0 + 1e-10);
@@ -173,7 +174,7 @@ class MultiFrequency : public StabilitySolver {
     if (options_.harmonics == 0) options_.harmonics = DEFAULT_HARMONICS;
     if (system_.chip)
       throw Error(
-          "multi_frequency: with a chip geometry the contact changes with the depth, collocation is due");
+          "multi_frequency: chip geometry (the contact changes with the depth): expected method collocation");
     for (const SystemMode& mode : system_.modes) {
       peaks_.push_back(TWO_PI * mode.frequency);
       widths_.push_back(TWO_PI * mode.frequency * mode.damping_ratio);
@@ -183,7 +184,7 @@ class MultiFrequency : public StabilitySolver {
   }
 
   Limit limit(double speed, double max_depth) const override {
-    if (!(max_depth > 0.0)) throw Error("stability: the largest depth must be above 0");
+    if (!(max_depth > 0.0)) throw Error("stability: largest depth: expected a value above 0");
     Limit limit = solve(speed, max_depth, options_.harmonics);
     if (options_.estimate_error && std::isfinite(limit.depth))
       limit.error = std::abs(solve(speed, max_depth, 2 * options_.harmonics).depth - limit.depth);
@@ -198,7 +199,7 @@ class MultiFrequency : public StabilitySolver {
     const int within = static_cast<int>(std::ceil(highest_ * period / TWO_PI));
     const int reach = within + extra;
     if (system_.helix > 0.0) return withHelix(speed, max_depth, reach);
-    // The set -reach .. reach - 1 is symmetric at half a step, where the flip lies.
+    // The harmonics -reach .. reach - 1 are symmetric at half a step, the frequency of a flip.
     const Balance balance(system_, axes_, speed, reach, reach - 1);
     Limit limit;
     Crossing first;
@@ -218,11 +219,11 @@ class MultiFrequency : public StabilitySolver {
     limit.frequency = balance.strongest(at.w, at.value);
   }
 
-  /// The crossings of a feedback scaled with the sweep that the edge has at a depth.
+  /// Crossings for the feedback with the helix lag of one depth.
   struct Sweep {
     double depth = 0.0;
-    int below = 0;         // crossings under the depth
-    double nearest = 0.0;  // log of the crossing nearest to the depth, over the depth
+    int below = 0;         // number of crossings below the depth
+    double nearest = 0.0;  // log(nearest crossing / depth)
     Crossing at;
   };
   Sweep sweep(double speed, int reach, double depth) const {
@@ -241,7 +242,7 @@ class MultiFrequency : public StabilitySolver {
     return sweep;
   }
 
-  /// A straight edge loses stability near the same depth unless the sweep is long.
+  /// [m] Limit without helix, close to that with helix unless the lag of the edge is large.
   double straightLimit(double speed, double max_depth, int reach) const {
     RegenerativeSystem straight = system_;
     straight.helix = 0.0;
@@ -251,11 +252,11 @@ class MultiFrequency : public StabilitySolver {
     return limit;
   }
 
-  /// Between two depths with different numbers of crossings below them: the one where that changes.
+  /// Depth at which the number of crossings below it changes, between two depths with different numbers.
   Sweep change(double speed, int reach, Sweep a, Sweep b) const {
     const int below = a.below;
     for (int i = 0; i < 40 && b.depth / a.depth - 1.0 > options_.tolerance; ++i) {
-      // The same crossing above the depth on one side, below it on the other: false position, else halves.
+      // False position where the same crossing lies above one depth and below the other, otherwise bisection.
       double share = 0.5;
       if (i % 3 != 2 && a.nearest > 0.0 && b.nearest < 0.0 && std::isfinite(a.nearest - b.nearest))
         share = std::clamp(a.nearest / (a.nearest - b.nearest), 1e-3, 1.0 - 1e-3);
@@ -266,24 +267,24 @@ class MultiFrequency : public StabilitySolver {
     return std::abs(a.nearest) < std::abs(b.nearest) ? a : b;
   }
 
-  /// With helix the sweep of the edge belongs to a depth d; scaled with that sweep the feedback has crossings
-  /// a_i(d), and the cut itself is at a boundary where one of them is d. The first such d when d grows from
-  /// zero, where all a_i lie above, is the first loss.
+  /// With helix the lag of the edge depends on the depth d. The feedback with the lag of d has crossings
+  /// a_i(d), and the stability boundary is where a_i(d) = d. For small d all a_i lie above d; the first
+  /// solution with growing d is the first loss of stability.
   Limit withHelix(double speed, double max_depth, int reach) const {
     constexpr double GROWTH = 1.12, BELOW = 0.5, CLOSE = 0.02;
     Limit limit;
     Sweep before = sweep(speed, reach, std::min(BELOW * straightLimit(speed, max_depth, reach), max_depth));
-    // Should it chatter there already, go down.
+    // Start lower if the first depth is unstable.
     for (int i = 0; i < 20 && before.below > 0; ++i) before = sweep(speed, reach, 0.5 * before.depth);
     while (before.depth < max_depth) {
-      // Not beyond the crossing that is foretold, by more than a little.
+      // At most slightly beyond the predicted crossing.
       const double growth = before.nearest > 0.0 && std::isfinite(before.nearest)
                                 ? std::clamp(std::exp(1.1 * before.nearest), 1.0 + CLOSE, GROWTH)
                                 : GROWTH;
       const Sweep next = sweep(speed, reach, std::min(max_depth, growth * before.depth));
       if (next.below != before.below) {
         const Sweep found = change(speed, reach, before, next);
-        // A pair of crossings that appears below the depth all at once is no boundary at this depth.
+        // A pair of crossings that appears below the depth is no boundary at this depth.
         if (std::abs(found.nearest) < 0.5 * CLOSE) {
           limit.depth = found.depth;
           describe(Balance(system_, axes_, speed, reach, reach - 1, found.depth), found.at, limit);
@@ -344,7 +345,7 @@ class MultiFrequency : public StabilitySolver {
     return {wa + share * (wb - wa), a + share * (b - a)};
   }
 
-  /// Frequencies from 0 to half a step, dense where a mode's frequency folds to.
+  /// [rad/s] Frequencies from 0 to half a step, dense around the aliases of the natural frequencies.
   std::vector<double> gridOf(double step) const {
     const double half = 0.5 * step;
     const int uniform = options_.lines > 0 ? options_.lines : 60;
@@ -371,8 +372,8 @@ class MultiFrequency : public StabilitySolver {
   double highest_ = 0.0;
 };
 
-/// Mean feedback alone. Even pitch in milling: the direct method over all speeds at once; else, with several
-/// delays or an overlap, the sign of the imaginary part is followed over the lines at each speed.
+/// Mean feedback only. Milling with even pitch: zeroOrderLimit() for all speeds; otherwise (several delays,
+/// overlap, damping) sign changes of the imaginary part over the lines at each speed.
 class ZeroOrder : public StabilitySolver {
  public:
   explicit ZeroOrder(const RegenerativeSystem& system) : system_(system) {
@@ -388,7 +389,7 @@ class ZeroOrder : public StabilitySolver {
   Limit limit(double speed, double max_depth) const override { return limits({speed}, max_depth).front(); }
 
   std::vector<Limit> limits(const std::vector<double>& speeds, double max_depth) const override {
-    if (!(max_depth > 0.0)) throw Error("stability: the largest depth must be above 0");
+    if (!(max_depth > 0.0)) throw Error("stability: largest depth: expected a value above 0");
     const bool damped = system_.damping_radial > 0.0 || system_.damping_tangential > 0.0;
     if (system_.cut == Cut::milling && system_.evenPitch() && system_.overlap == 1.0 && !damped &&
         !system_.chip && system_.kt > 0.0) {
@@ -417,14 +418,14 @@ class ZeroOrder : public StabilitySolver {
  private:
   Limit general(double speed, double max_depth) const {
     RegenerativeSystem straight = system_;
-    straight.helix = 0.0;  // the mean does not know it
-    // A serration by its mean over a whole wave.
-    double part = 1.0;  // [m]
+    straight.helix = 0.0;  // no effect on the mean
+    // Serration: mean over a whole wave.
+    double height = 1.0;  // [m]
     if (straight.chip) {
       straight.chip->forced_vibration = false;
-      if (straight.chip->serration_amplitude > 0.0) part = straight.chip->serration_wavelength;
+      if (straight.chip->serration_amplitude > 0.0) height = straight.chip->serration_wavelength;
     }
-    const Harmonics mean = harmonicsOf(straight, speed, 0, part);
+    const Harmonics mean = harmonicsOf(straight, speed, 0, height);
     Limit limit;
     std::array<Complex, 2> before{};
     for (std::size_t i = 0; i < response_.frequency.size(); ++i) {
@@ -462,17 +463,18 @@ class ZeroOrder : public StabilitySolver {
 void needDynamics(const RegenerativeSystem& system) {
   system.validate();
   if (system.modes.empty() && !system.response)
-    throw Error("stability: neither modes nor receptances of the tool tip are known");
-  if (system.response && system.response->frequency.size() < 2) throw Error("stability: an FRF is empty");
+    throw Error("stability: expected modes or receptances of the tool tip");
+  if (system.response && system.response->frequency.size() < 2)
+    throw Error("stability: FRF of the tool tip: expected at least 2 lines");
 }
 
 }  // namespace
 
 ToolTipResponse responseOf(const std::vector<SystemMode>& modes, double low, double high, std::size_t lines) {
-  ModalModel places;
-  for (const SystemMode& mode : modes) places.modes.push_back({mode.frequency, mode.damping_ratio, 0.0});
+  ModalModel grid;
+  for (const SystemMode& mode : modes) grid.modes.push_back({mode.frequency, mode.damping_ratio, 0.0});
   ToolTipResponse response;
-  response.frequency = responseOf(places, ModalModel{}, low, high, lines).frequency;
+  response.frequency = responseOf(grid, ModalModel{}, low, high, lines).frequency;
   for (const double f : response.frequency) {
     const auto g = receptance(modes, f);
     response.xx.push_back(g[0]);
@@ -487,7 +489,7 @@ std::unique_ptr<StabilitySolver> makeMultiFrequency(const RegenerativeSystem& sy
                                                     const SolverOptions& options) {
   needDynamics(system);
   if (options.harmonics < 0 || options.harmonics > 400)
-    throw Error("harmonics: " + std::to_string(options.harmonics) + " is out of range (0..400)");
+    throw Error("harmonics: " + std::to_string(options.harmonics) + ": expected 0..400");
   return std::make_unique<MultiFrequency>(system, options);
 }
 

@@ -34,14 +34,14 @@ Eigen::Matrix2d directionalIntegral(double tangential, double radial, double ang
   return m;
 }
 
-/// directional() with the system's coefficients at an angle.
+/// directional() with the coefficients of the system at an angle [rad].
 Eigen::Matrix2d stiffnessAt(const RegenerativeSystem& system, double angle) {
   if (!system.along_arc) return directional(system.kt, system.kr, angle);
   const auto [tangential, radial] = system.along_arc(angle);
   return directional(tangential, radial, angle);
 }
 
-constexpr double NO_SWEEP = 1e-9;  // [rad] of a straight edge
+constexpr double NO_SWEEP = 1e-9;  // [rad] lag of an edge that is taken as straight
 constexpr int ARC_PARTS = 1024;
 
 double wrap(double angle) {
@@ -78,12 +78,12 @@ class Teeth {
     for (const double angle : angle_) {
       for (const double edge : {system_.entry, system_.exit, system_.entry + swept_, system_.exit + swept_}) {
         const double t = wrap(edge - angle) / speed_;
-        // Of one principal period; with even pitch every tooth repeats the first.
+        // Only those of one principal period; with even pitch the teeth are identical.
         if (t < period * (1.0 - 1e-12)) times.push_back(t);
       }
     }
-    // A surface with a bend is met again a delay later: for uneven pitch the period does not map it on
-    // itself.
+    // A kink of the surface acts again one delay later, which for uneven pitch is another time within the
+    // period.
     if (!system_.evenPitch()) {
       const std::vector<double> first = times;
       for (const double t : first) {
@@ -102,11 +102,11 @@ class Teeth {
       const double angle = middle + speed_ * (t - inside);
       if (swept_ < NO_SWEEP) {
         add(feedback, k, angle, middle);
-        // The angle of an exit beyond a full turn, and of an entry just below one.
+        // An arc beyond a full revolution contains angle + 2 pi too.
         if (system_.exit > TWO_PI) add(feedback, k, angle + TWO_PI, middle + TWO_PI);
         continue;
       }
-      // The edge's angles reach from angle - swept to angle.
+      // The edge covers the angles from angle - swept to angle.
       for (double turn = 0.0; angle + turn - swept_ < system_.exit; turn += TWO_PI) {
         const double high = std::min(angle + turn, system_.exit);
         const double low = std::max(angle + turn - swept_, system_.entry);
@@ -116,18 +116,18 @@ class Teeth {
   }
 
  private:
-  void put(Feedback& feedback, std::size_t k, const Eigen::Matrix2d& stiffness) const {
+  void addStiffness(Feedback& feedback, std::size_t k, const Eigen::Matrix2d& stiffness) const {
     feedback.now += stiffness;
     feedback.delayed[delay_[k]] -= system_.overlap * stiffness;
   }
 
   void add(Feedback& feedback, std::size_t k, double angle, double middle) const {
     if (middle <= system_.entry || middle >= system_.exit) return;
-    put(feedback, k, depth_ * stiffnessAt(system_, angle));
+    addStiffness(feedback, k, depth_ * stiffnessAt(system_, angle));
     if (damps_) feedback.velocity += depth_ * directional(tangential_damping_, radial_damping_, angle);
   }
 
-  /// Integrals of the stiffness from the entry on, at even angles.
+  /// Integrals of the stiffness from the entry to evenly spaced angles.
   void sumAlongArc() {
     const double step = (system_.exit - system_.entry) / ARC_PARTS;
     arc_.assign(1, Eigen::Matrix2d::Zero());
@@ -136,10 +136,10 @@ class Teeth {
   }
 
   Eigen::Matrix2d arcUpTo(double angle) const {
-    const double place =
+    const double position =
         std::clamp((angle - system_.entry) / (system_.exit - system_.entry), 0.0, 1.0) * ARC_PARTS;
-    const auto part = std::min(static_cast<std::size_t>(place), arc_.size() - 2);
-    const double share = place - static_cast<double>(part);
+    const auto part = std::min(static_cast<std::size_t>(position), arc_.size() - 2);
+    const double share = position - static_cast<double>(part);
     return (1.0 - share) * arc_[part] + share * arc_[part + 1];
   }
 
@@ -148,7 +148,8 @@ class Teeth {
       return (depth_ / swept_) *
              (directionalIntegral(tangential, radial, high) - directionalIntegral(tangential, radial, low));
     };
-    put(feedback, k,
+    addStiffness(
+        feedback, k,
         arc_.empty() ? integral(system_.kt, system_.kr) : depth_ / swept_ * (arcUpTo(high) - arcUpTo(low)));
     if (damps_) feedback.velocity += integral(tangential_damping_, radial_damping_);
   }
@@ -181,16 +182,17 @@ void RegenerativeSystem::validate() const {
   const bool needs_diameter = helix > 0.0 || damping_radial > 0.0 || damping_tangential > 0.0;
   require(diameter > 0.0 || !needs_diameter, "diameter [m]", diameter, "above 0");
   if (chip && along_arc)
-    throw Error("a chip geometry with coefficients that change along the arc is impossible");
+    throw Error("chip geometry with coefficients along the arc: expected only one of them");
   if (chip) {
-    if (cut != Cut::milling) throw Error("a chip geometry outside milling is impossible");
+    if (cut != Cut::milling) throw Error("chip geometry in turning: expected milling");
     require("feed per tooth [m]", chip->feed, Range::positive());
     require(chip->radius_offset.empty() || static_cast<int>(chip->radius_offset.size()) == teeth,
-            "number of radius offsets", static_cast<double>(chip->radius_offset.size()), "one a tooth");
+            "number of radius offsets", static_cast<double>(chip->radius_offset.size()),
+            "one for each tooth");
     require("serration amplitude [m]", chip->serration_amplitude, Range::notNegative());
     require(chip->serration_amplitude == 0.0 || chip->serration_wavelength > 0.0, "serration wavelength [m]",
             chip->serration_wavelength, "above 0");
-    require(exit <= TWO_PI + 1e-9, "exit angle with a chip geometry [rad]", exit, "at most a turn");
+    require(exit <= TWO_PI + 1e-9, "exit angle with a chip geometry [rad]", exit, "at most 2 pi");
   }
   if (cut == Cut::turning) {
     require(teeth == 1, "number of teeth in turning", teeth, "1");
@@ -202,7 +204,7 @@ void RegenerativeSystem::validate() const {
   require("helix [rad]", helix, Range::openHigh(0.0, 80.0 * PI / 180.0));
   if (!pitch.empty()) {
     require(static_cast<int>(pitch.size()) == teeth, "number of pitches", static_cast<double>(pitch.size()),
-            "one a tooth");
+            "one for each tooth");
     double sum = 0.0;
     for (const double p : pitch) {
       require("pitch [rad]", p, Range::positive());
@@ -225,7 +227,7 @@ std::vector<SystemMode> systemModes(const ModalModel& model, int axis) {
   std::vector<SystemMode> modes;
   const auto add = [&](double frequency, double damping, double gain) {
     if (gain == 0.0) return;
-    // gain w^2 / (w^2 - ...) = output input / (w^2 - ...): the sign of the gain goes to the output.
+    // gain w^2 / (w^2 - ...) = output input / (w^2 - ...); the output carries the sign of the gain.
     const double size = units::TWO_PI * frequency * std::sqrt(std::abs(gain));
     SystemMode mode{frequency, damping, {{0.0, 0.0}}, {{0.0, 0.0}}};
     mode.input[static_cast<std::size_t>(axis)] = size;

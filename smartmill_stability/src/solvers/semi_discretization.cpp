@@ -6,9 +6,10 @@
 #include "solvers/arnoldi.h"
 #include "solvers/floquet.h"
 
-// Semi-discretization (Insperger and Stepan): over a step the feedback is its mean, the delayed motion a
-// polynomial through grid values, the rest is exact. The map over a period is never formed: a march through
-// the steps with a ring of earlier motion costs O(steps), and Arnoldi's method needs a few dozen marches.
+// Semi-discretization (Insperger and Stepan): within a step the feedback is replaced by its mean and the
+// delayed motion by a polynomial through grid values; everything else is exact. The matrix over a period is
+// never formed: applying it step by step to a history of the motion costs O(steps), and Arnoldi's method
+// needs a few dozen applications.
 
 namespace smartmill::stability {
 namespace {
@@ -20,8 +21,8 @@ using Eigen::VectorXd;
 constexpr int DEFAULT_STEPS = 200;
 constexpr double EIGENVALUE_TOLERANCE = 1e-9;
 
-/// phi_0 .. phi_count (X) with phi_k = sum X^j / (j + k)!, by Taylor's series of the last and phi_k = X
-/// phi_{k+1} + 1/k!.
+/// phi_0 .. phi_count of X with phi_k = sum_j X^j / (j + k)!: Taylor series of the last, then phi_k = X
+/// phi_{k+1} + 1 / k!.
 std::vector<MatrixXd> phiFunctions(const MatrixXd& x, int count) {
   const Index n = x.rows();
   double factorial = 1.0;
@@ -43,7 +44,7 @@ std::vector<MatrixXd> phiFunctions(const MatrixXd& x, int count) {
   return phi;
 }
 
-/// Means of the feedback over the steps, by Gauss quadrature on the pieces between breaks.
+/// Mean of the feedback over a step, by Gauss quadrature between the breaks.
 Feedback meanOf(const DelayedSystem& system, const std::vector<double>& breaks, double begin, double end) {
   Feedback mean;
   mean.delayed.assign(system.delays.size(), Eigen::Matrix2d::Zero());
@@ -77,8 +78,9 @@ class StepMap {
     const double h = system.period / steps;
     const double longest = *std::max_element(system.delays.begin(), system.delays.end());
     if (*std::min_element(system.delays.begin(), system.delays.end()) < 2.0 * h)
-      throw Error("semi_discretization: the steps are longer than half a delay, more steps are due");
-    // One earlier value more than the longest delay for the interpolation on both sides.
+      throw Error("semi_discretization: " + std::to_string(steps) +
+                  " steps, longer than half the shortest delay: expected more steps");
+    // One value beyond the longest delay, for the interpolation on both sides.
     ring_ = static_cast<Index>(std::ceil(longest / h - 1e-9)) + 2;
     MatrixXd a = MatrixXd::Zero(m2_, m2_), in = MatrixXd::Zero(m2_, d_);
     out_ = MatrixXd::Zero(d_, m2_);
@@ -157,7 +159,7 @@ class StepMap {
   }
 
  private:
-  /// Polynomial of s / h for the motion a delay before t_i + s: coefficients of the grid value at i - back.
+  /// Weight of the grid value at step i - back in the delayed motion at t_i + s: polynomial in s / h.
   struct Tap {
     Index back;
     std::vector<double> coefficients;
@@ -171,15 +173,16 @@ class StepMap {
   /// @param delay in steps
   static std::vector<Tap> tapsOf(double delay, int order) {
     const auto below =
-        static_cast<Index>(std::ceil(delay - 1e-9));           // i - below is the grid time at or before
-    const double offset = static_cast<double>(below) - delay;  // [0, 1) of a step after it
+        static_cast<Index>(std::ceil(delay - 1e-9));  // i - below: last grid time before the delayed time
+    const double offset =
+        static_cast<double>(below) - delay;  // [steps] delayed time after it, 0 <= value < 1
     if (order == 0) {
-      // The value at half a step.
+      // Value in the middle of the step.
       const double x = offset + 0.5;
       if (x <= 1.0) return {{below, {1.0 - x}}, {below - 1, {x}}};
       return {{below - 1, {2.0 - x}}, {below - 2, {x - 1.0}}};
     }
-    // Lagrange through the grid; x = offset + s / h counts steps after i - below.
+    // Lagrange interpolation in x = offset + s / h, steps after i - below.
     if (order == 1) return {{below, {1.0 - offset, -1.0}}, {below - 1, {offset, 1.0}}};
     const double o = offset;
     return {{below + 1, {0.5 * o * (o - 1.0), 0.5 * (2.0 * o - 1.0), 0.5}},
@@ -187,10 +190,10 @@ class StepMap {
             {below - 1, {0.5 * o * (o + 1.0), 0.5 * (2.0 * o + 1.0), 0.5}}};
   }
 
-  // Vector: state, then motion 1, 2, ... ring steps before.
+  // Vector: state, then the motion 1, 2, ... ring_ steps before.
   void march(const VectorXd& in, VectorXd& out, MatrixXd* motion) {
     const auto count = static_cast<Index>(steps_.size());
-    MatrixXd past(d_, ring_ + count);  // column ring + i: the motion at step i
+    MatrixXd past(d_, ring_ + count);  // column ring_ + i: motion at step i
     for (Index b = 1; b <= ring_; ++b) past.col(ring_ - b) = in.segment(m2_ + (b - 1) * d_, d_);
     VectorXd state = in.head(m2_), next(m2_), force(d_), value(d_);
     for (Index i = 0; i < count; ++i) {
@@ -269,9 +272,9 @@ class SemiDiscretization : public FloquetSolver {
 std::unique_ptr<FloquetSolver> makeSemiDiscretization(const RegenerativeSystem& system,
                                                       const SolverOptions& options) {
   if (options.steps != 0 && (options.steps < 4 || options.steps > 1000000))
-    throw Error("steps: " + std::to_string(options.steps) + " is out of range (4..1000000)");
+    throw Error("steps: " + std::to_string(options.steps) + ": expected 4..1000000");
   if (options.order < 0 || options.order > 2)
-    throw Error("order: " + std::to_string(options.order) + " is out of range (0..2)");
+    throw Error("order: " + std::to_string(options.order) + ": expected 0..2");
   return std::make_unique<SemiDiscretization>(system, options);
 }
 

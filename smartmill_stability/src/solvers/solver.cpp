@@ -9,48 +9,50 @@
 namespace smartmill::stability {
 namespace {
 
-/// Search from zero: share of the depth by which it grows, and the least one near a crossing.
+/// [1] Largest and smallest relative step of the depth in a search from zero.
 constexpr double STEP = 0.15, LEAST_STEP = 0.02;
-/// Of the distance to the crossing that the last two samples foretell.
+/// [1] Step over the distance to the crossing that is extrapolated from the last two samples.
 constexpr double OVERSHOOT = 1.3;
 
-/// Logarithm of the spectral radius over the depth at one speed.
+/// Logarithm of the spectral radius at a depth.
 struct Sample {
   double depth, log_radius;
 };
 
+/// Search for the limit at one speed.
 class Search {
  public:
   Search(FloquetSolver::AtSpeed& at, double tolerance) : at_(at), tolerance_(tolerance) {}
 
   double logRadius(double depth) { return std::log(std::max(1e-300, at_.multiplier(depth).radius())); }
 
-  /// First depth with a multiplier on the unit circle, +inf without; 0 < start < most.
+  /// [m] First depth with a multiplier on the unit circle; +inf: none up to `most`. @param start [m] first
+  /// depth
   double first(double start, double most) {
-    std::vector<Sample> known{{0.0, logRadius(0.0)}};
+    std::vector<Sample> samples{{0.0, logRadius(0.0)}};
     double depth = std::min(start, most);
     for (;;) {
-      known.push_back({depth, logRadius(depth)});
-      if (known.size() >= 4) {
-        // A lens of instability between two stable samples: extrapolate the slopes from both sides.
-        const Sample* s = &known[known.size() - 4];
+      samples.push_back({depth, logRadius(depth)});
+      if (samples.size() >= 4) {
+        // A lens of instability between two stable samples: the slopes are extrapolated from both sides.
+        const Sample* s = &samples[samples.size() - 4];
         const double found = lens(s[0], s[1], s[2], s[3], 4);
         if (std::isfinite(found)) return found;
       }
-      if (known.back().log_radius > 0.0) return root(known[known.size() - 2], known.back());
+      if (samples.back().log_radius > 0.0) return root(samples[samples.size() - 2], samples.back());
       if (depth >= most) return std::numeric_limits<double>::infinity();
-      const Sample &a = known[known.size() - 2], &b = known.back();
+      const Sample &a = samples[samples.size() - 2], &b = samples.back();
       const double slope = (b.log_radius - a.log_radius) / (b.depth - a.depth);
-      const double foretold = slope > 0.0 ? -OVERSHOOT * b.log_radius / slope : STEP * depth;
-      depth = std::min(depth + std::clamp(foretold, LEAST_STEP * depth, STEP * depth), most);
+      const double step = slope > 0.0 ? -OVERSHOOT * b.log_radius / slope : STEP * depth;
+      depth = std::min(depth + std::clamp(step, LEAST_STEP * depth, STEP * depth), most);
     }
   }
 
-  /// Between stable a and unstable b.
+  /// [m] Limit between a stable sample a and an unstable sample b.
   double root(Sample a, Sample b) {
     constexpr int MOST = 60;
-    // Illinois: false position with the kept end's value halved.
-    int kept = 0;
+    // Illinois method: false position, halving the value of an end that is retained twice.
+    int replaced = 0;  // end replaced last: 1 b, -1 a
     double fa = a.log_radius, fb = b.log_radius;
     for (int i = 0; i < MOST && b.depth - a.depth > tolerance_ * b.depth; ++i) {
       double middle = (a.depth * fb - b.depth * fa) / (fb - fa);
@@ -60,22 +62,23 @@ class Search {
       if (f > 0.0) {
         b = {middle, f};
         fb = f;
-        if (kept == 1) fa *= 0.5;
-        kept = 1;
+        if (replaced == 1) fa *= 0.5;
+        replaced = 1;
       } else {
         a = {middle, f};
         fa = f;
-        if (kept == -1) fb *= 0.5;
-        kept = -1;
+        if (replaced == -1) fb *= 0.5;
+        replaced = -1;
       }
     }
     slope_ = (b.log_radius - a.log_radius) / (b.depth - a.depth);
     return (a.depth * b.log_radius - b.depth * a.log_radius) / (b.log_radius - a.log_radius);
   }
 
-  double slope() const { return slope_; }
+  double slope() const { return slope_; }  ///< [1/m] of the log radius at the limit
 
  private:
+  /// [m] Start of a lens of instability between the stable samples b and c; +inf: none.
   double lens(const Sample& a, const Sample& b, const Sample& c, const Sample& d, int levels) {
     const double none = std::numeric_limits<double>::infinity();
     if (levels == 0 || b.log_radius > 0.0 || c.log_radius > 0.0) return none;
@@ -110,7 +113,7 @@ const char* nameOf(Kind kind) {
 }
 
 Kind CharacteristicMultiplier::kind() const {
-  // Real to the accuracy with which a double pole would be split.
+  // Tolerance: the splitting of a double eigenvalue by rounding.
   constexpr double REAL = 1e-5;
   if (std::abs(value.imag()) > REAL * std::abs(value)) return Kind::hopf;
   return value.real() < 0.0 ? Kind::flip : Kind::fold;
@@ -120,7 +123,8 @@ Method methodOf(const std::string& name) {
   for (const Method method :
        {Method::zero_order, Method::multi_frequency, Method::semi_discretization, Method::collocation})
     if (name == nameOf(method)) return method;
-  throw Error("method " + name + ": collocation, semi_discretization, multi_frequency or zero_order is due");
+  throw Error("method " + name +
+              ": expected collocation, semi_discretization, multi_frequency or zero_order");
 }
 
 const char* nameOf(Method method) {
@@ -171,9 +175,10 @@ FloquetSolver::FloquetSolver(const RegenerativeSystem& system, const SolverOptio
     : system_(system), options_(options) {
   system_.validate();
   if (system_.modes.empty())
-    throw Error("stability: this method needs modes of the tool tip, there are none");
-  // Below Merritt's minimum for the whole cutting coefficient nothing can chatter (one mode); the mean over
-  // an interrupted cut bears more.
+    throw Error(
+        "stability: modes of the tool tip are missing: expected at least one (required by this method)");
+  // Merritt's minimum for the full cutting coefficient is a lower bound of the limit (one mode); the mean
+  // over an interrupted cut gives a larger one.
   double compliance = 0.0, highest = 0.0;
   for (const SystemMode& mode : system_.modes) {
     const double w = units::TWO_PI * mode.frequency;
@@ -200,7 +205,7 @@ CharacteristicMultiplier FloquetSolver::multiplier(double speed, double depth) c
 }
 
 Limit FloquetSolver::limit(double speed, double max_depth) const {
-  if (!(max_depth > 0.0)) throw Error("stability: the largest depth must be above 0");
+  if (!(max_depth > 0.0)) throw Error("stability: largest depth: expected a value above 0");
   const std::unique_ptr<AtSpeed> here = at(speed);
   Search search(*here, options_.tolerance);
   const double depth = search.first(depth_scale_, max_depth);
@@ -210,7 +215,7 @@ Limit FloquetSolver::limit(double speed, double max_depth) const {
 Limit FloquetSolver::describe(AtSpeed& here, double speed, double depth, double slope) const {
   Limit limit;
   limit.depth = depth;
-  // Just above, the multiplier that leaves the circle is the dominant one.
+  // Just above the limit the multiplier that left the unit circle is the dominant one.
   const double above = depth * (1.0 + 10.0 * options_.tolerance);
   limit.kind = here.multiplier(above).kind();
   limit.frequency = here.chatterFrequency(above);
@@ -221,7 +226,7 @@ Limit FloquetSolver::describe(AtSpeed& here, double speed, double depth, double 
 
 std::vector<Limit> FloquetSolver::limits(const std::vector<double>& speeds, double max_depth) const {
   std::vector<Limit> found = StabilitySolver::limits(speeds, max_depth);
-  // A lens of instability that the search stepped over at one speed lies near the limit of its neighbour.
+  // A lens of instability that the search missed at one speed lies near the limit of a neighbouring speed.
   const std::vector<Limit> before = found;
   for (std::size_t i = 0; i < found.size(); ++i) {
     for (const std::size_t j : {i - 1, i + 1}) {
@@ -250,16 +255,18 @@ std::vector<Limit> FloquetSolver::limits(const std::vector<double>& speeds, doub
 std::unique_ptr<FloquetSolver> makeFloquetSolver(Method method, const RegenerativeSystem& system,
                                                  const SolverOptions& options) {
   if (!(options.tolerance > 0.0) || options.tolerance > 0.1)
-    throw Error("tolerance: " + std::to_string(options.tolerance) + " is out of range (0 < value <= 0.1)");
+    throw Error("tolerance: " + std::to_string(options.tolerance) + ": expected 0 < value <= 0.1");
   if (method == Method::collocation) return makeCollocation(system, options);
   if (method == Method::semi_discretization) return makeSemiDiscretization(system, options);
-  throw Error(std::string("method ") + nameOf(method) + " knows no multipliers");
+  throw Error(std::string("method ") + nameOf(method) +
+              ": no characteristic multipliers: expected collocation or semi_discretization");
 }
 
 std::unique_ptr<StabilitySolver> makeSolver(Method method, const RegenerativeSystem& system,
                                             const SolverOptions& options) {
   if (system.along_arc && (method == Method::zero_order || method == Method::multi_frequency))
-    throw Error(std::string("method ") + nameOf(method) + " knows no coefficients that change along the arc");
+    throw Error(std::string("method ") + nameOf(method) +
+                ": coefficients along the arc: expected collocation or semi_discretization");
   if (method == Method::zero_order) return makeZeroOrder(system);
   if (method == Method::multi_frequency) return makeMultiFrequency(system, options);
   return makeFloquetSolver(method, system, options);

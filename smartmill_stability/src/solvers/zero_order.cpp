@@ -15,8 +15,8 @@ using Complex = std::complex<double>;
 using units::PI;
 using units::TWO_PI;
 
-// Eigenvalues of the oriented FRF A0 Phi without its factor teeth / (2 pi), followed from line to line so
-// that branches stay branches.
+// Eigenvalues of the oriented FRF A0 Phi without its factor teeth / (2 pi), ordered such that each branch is
+// continuous over the lines.
 std::array<std::vector<Complex>, 2> eigenvalues(const RegenerativeProcess& process,
                                                 const ToolTipResponse& tool) {
   const std::array<double, 4> a = directionalCoefficients(process);
@@ -28,9 +28,10 @@ std::array<std::vector<Complex>, 2> eigenvalues(const RegenerativeProcess& proce
     const Complex root = std::sqrt(trace * trace - 4.0 * determinant);
     std::array<Complex, 2> value{{0.5 * (trace + root), 0.5 * (trace - root)}};
     if (i > 0) {
-      const double keep = std::abs(value[0] - branches[0].back()) + std::abs(value[1] - branches[1].back());
-      const double change = std::abs(value[1] - branches[0].back()) + std::abs(value[0] - branches[1].back());
-      if (change < keep) std::swap(value[0], value[1]);
+      const double same = std::abs(value[0] - branches[0].back()) + std::abs(value[1] - branches[1].back());
+      const double swapped =
+          std::abs(value[1] - branches[0].back()) + std::abs(value[0] - branches[1].back());
+      if (swapped < same) std::swap(value[0], value[1]);
     }
     branches[0].push_back(value[0]);
     branches[1].push_back(value[1]);
@@ -38,15 +39,15 @@ std::array<std::vector<Complex>, 2> eigenvalues(const RegenerativeProcess& proce
   return branches;
 }
 
-// 1 = b g (1 - exp(-i w T)) with g = kt teeth / (4 pi) lambda: depth and phase of one line.
+// Solution of 1 = b g (1 - exp(-i w T)) with g = kt teeth / (4 pi) lambda at one line.
 struct LobePoint {
   double depth;  // [m] > 0, +inf where no positive depth exists
   double phase;  // [rad] w T modulo 2 pi, in (0, 2 pi)
 };
 
 LobePoint lobePoint(Complex g) {
-  // 1/(b g) = 1 - exp(-i theta) needs Re(1/(b g)) >= 0 on the circle of radius 1 around 1: b = |1/g|^2 / (2
-  // Re(1/g)).
+  // 1 / (b g) = 1 - exp(-i theta) lies on the circle of radius 1 around 1, so b = |1 / g|^2 / (2 Re(1 / g))
+  // with Re(1 / g) > 0.
   const Complex inverse = 1.0 / g;
   const double depth = std::norm(inverse) / (2.0 * inverse.real());
   if (!(depth > 0.0) || !std::isfinite(depth)) return {std::numeric_limits<double>::infinity(), 0.0};
@@ -99,26 +100,27 @@ void RegenerativeProcess::validate() const {
 
 std::array<double, 4> directionalCoefficients(const RegenerativeProcess& process) {
   process.validate();
-  // Integrals over immersion of -cos - r sin and sin - r cos (force on the tool per Kt h) times sin and cos
-  // (h per x and y).
+  // Integrals over the immersion of -cos - r sin and sin - r cos (force on the tool per Kt h) times sin and
+  // cos (chip thickness per x and y).
   const double f = process.entry, t = process.exit;
   const double ss = 0.5 * (t - f) - 0.25 * (std::sin(2 * t) - std::sin(2 * f));
   const double cc = 0.5 * (t - f) + 0.25 * (std::sin(2 * t) - std::sin(2 * f));
   const double sc = 0.5 * (std::sin(t) * std::sin(t) - std::sin(f) * std::sin(f));
   const double r = process.radial_ratio;
-  // Twice the integrals: the factor 1/2 of eq. 6.2 stays in front.
+  // Twice the integrals, since the factor 1/2 of eq. 6.2 is not included.
   return {2.0 * (-sc - r * ss), 2.0 * (-cc - r * sc), 2.0 * (ss - r * sc), 2.0 * (sc - r * cc)};
 }
 
 ToolTipResponse responseOf(const ModalModel& x, const ModalModel& y, double low, double high,
                            std::size_t lines) {
-  if (!(low >= 0.0) || !(high > low) || lines < 2) throw Error("stability: the frequency band is empty");
+  if (!(low >= 0.0) || !(high > low) || lines < 2)
+    throw Error("stability: frequency band: expected 0 <= low < high");
   ToolTipResponse response;
   for (std::size_t i = 0; i < lines; ++i) {
     response.frequency.push_back(low +
                                  (high - low) * static_cast<double>(i) / static_cast<double>(lines - 1));
   }
-  // Around a mode the response turns within its half-power bandwidth.
+  // Around a mode the response changes within its half-power bandwidth.
   constexpr int DENSE = 400;
   for (const ModalModel* model : {&x, &y}) {
     for (const Mode& mode : model->modes) {
@@ -141,8 +143,8 @@ ToolTipResponse responseOf(const ModalModel& x, const ModalModel& y, double low,
 
 ToolTipResponse responseOf(const FrequencyResponse& x, const FrequencyResponse& y) {
   if (x.unit != "m/N" || y.unit != "m/N")
-    throw Error("stability: receptances [m/N] are due, got " + x.unit + " and " + y.unit);
-  if (x.size() < 2 || y.size() < 2) throw Error("stability: an FRF is empty");
+    throw Error("stability: FRFs with units " + x.unit + " and " + y.unit + ": expected receptances [m/N]");
+  if (x.size() < 2 || y.size() < 2) throw Error("stability: FRF of the tool tip: expected at least 2 lines");
   ToolTipResponse response;
   for (std::size_t i = 0; i < x.size(); ++i) {
     if (x.frequency[i] < y.frequency.front() || x.frequency[i] > y.frequency.back() || x.frequency[i] <= 0.0)
@@ -151,7 +153,7 @@ ToolTipResponse responseOf(const FrequencyResponse& x, const FrequencyResponse& 
     response.xx.push_back(x.value[i]);
     response.yy.push_back(y.at(x.frequency[i]));
   }
-  if (response.frequency.size() < 2) throw Error("stability: the FRFs of x and y share no band");
+  if (response.frequency.size() < 2) throw Error("stability: FRFs of x and y: expected overlapping bands");
   return response;
 }
 
@@ -163,7 +165,7 @@ StabilityLimit zeroOrderLimit(const RegenerativeProcess& process, const ToolTipR
   limit.chatter_frequency.assign(speeds.size(), std::numeric_limits<double>::quiet_NaN());
   for (std::size_t k = 0; k < speeds.size(); ++k) {
     if (!(speeds[k] > 0.0) || (k > 0 && speeds[k] <= speeds[k - 1])) {
-      throw Error("stability: spindle speeds must be positive and rising");
+      throw Error("stability: spindle speeds: expected positive, ascending values");
     }
   }
   if (speeds.empty()) return limit;
@@ -175,8 +177,7 @@ StabilityLimit zeroOrderLimit(const RegenerativeProcess& process, const ToolTipR
       if (to.phase - from.phase > PI) to.phase -= TWO_PI;
       if (from.phase - to.phase > PI) to.phase += TWO_PI;
       const double w1 = TWO_PI * tool.frequency[i], w2 = TWO_PI * tool.frequency[i + 1];
-      // Lobe j: w T = phase + 2 pi j, spindle speed 2 pi / (teeth T). From the slowest to the fastest speed
-      // asked for.
+      // Lobe j: w T = phase + 2 pi j, spindle speed 2 pi / (teeth T).
       const auto speedOf = [&](double w, double phase, int j) {
         return TWO_PI * w / (process.teeth * (phase + TWO_PI * j));
       };

@@ -21,8 +21,8 @@ struct BistableChart {
   std::vector<BistableLimit> limits;
 };
 
-/// By collocation from the modes in x and y; takes seconds. Empty while modes or coefficients are missing, and
-/// when the curve belongs to a tool with another number of teeth.
+/// By collocation from the modes in x and y; takes seconds. Empty while modes or coefficients are missing,
+/// and when the curve belongs to a tool with another number of teeth.
 /// @param speeds [1] number of speeds, evenly spaced over the range of the chart. @throws Error as
 /// bistableLimits().
 std::optional<BistableChart> bistableChart(const ChartMaker& maker, const ChartParameters& parameters,

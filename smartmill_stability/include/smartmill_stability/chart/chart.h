@@ -62,7 +62,8 @@ class ChartMaker {
   /// @throws Error on bad parameters or a model without a tool.
   ChartMaker(const ChartParameters& parameters, const MachineModel& model);
 
-  /// Points other than the tool tip are ignored; the first result of a new tool discards those of the old one.
+  /// Points other than the tool tip are ignored; the first result of a new tool discards those of the old
+  /// one.
   void handle(const MeasuredFrf& frf);
   void handle(const MeasuredModes& modes);
   void handle(const CoefficientSet& coefficients);
@@ -86,7 +87,8 @@ class ChartMaker {
   Prediction predict(double spindle_speed, double axial_depth) const;
 
   /// The chart of a modified cut, by collocation from the modes, fast enough for interactive use.
-  /// @throws Error while modes of x and y or the tangential coefficient are missing, and on an invalid request.
+  /// @throws Error while modes of x and y or the tangential coefficient are missing, and on an invalid
+  /// request.
   WhatIfChart whatIf(const WhatIf& request) const;
 
  private:

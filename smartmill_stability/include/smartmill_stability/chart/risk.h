@@ -21,7 +21,8 @@ struct LeastDeviations {
   double radial = 0.0;     ///< [1] >= 0, of a radial coefficient derived from the tangential one
 };
 
-/// A measured machine with the standard deviations of its modes and coefficients; a value without one gets 10 %.
+/// A measured machine with the standard deviations of its modes and coefficients; a value without one gets 10
+/// %.
 /// @param system with the modes of systemModes(x, y)
 UncertainSystem measuredSystem(const RegenerativeSystem& system, const ModalModel& x, const ModalModel& y,
                                const CoefficientSet& coefficients, const LeastDeviations& least = {});
@@ -76,8 +77,8 @@ struct StableSpeed {
   double below = 0.0, above = 0.0;
 };
 
-/// The highest speed within low..high [rad/s] at which a cut of a depth [m] chatters with at most the accepted
-/// risk; empty without such a speed. At constant feed per tooth the highest speed removes most.
+/// The highest speed within low..high [rad/s] at which a cut of a depth [m] chatters with at most the
+/// accepted risk; empty without such a speed. At constant feed per tooth the highest speed removes most.
 /// @throws Error on a depth or a range that is not positive.
 std::optional<StableSpeed> stableSpeed(const UncertainSystem& system, double depth, double low, double high,
                                        const RiskOptions& options = {});

@@ -16,8 +16,8 @@ struct ModeUncertainty {
   double gain = 0.0;       ///< [1] >= 0, of the compliance
 };
 
-/// A distribution of systems. Frequencies are normal; damping, compliance and coefficients are log-normal with
-/// the given standard deviations; all are independent.
+/// A distribution of systems. Frequencies are normal; damping, compliance and coefficients are log-normal
+/// with the given standard deviations; all are independent.
 class UncertainSystem {
  public:
   /// @param modes one entry for each mode of the system. @param kt_share, kr_share [1] relative standard

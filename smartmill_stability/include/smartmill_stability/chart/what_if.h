@@ -18,8 +18,8 @@ struct WhatIf {
   double entry = SAME;           ///< [rad]
   double exit = SAME;            ///< [rad]
   double feed_per_tooth = SAME;  ///< [m]
-  /// [1] Overhang over the measured one. The tool is modelled as a cantilever beam: compliance ~ L^3, frequency
-  /// ~ 1 / L^2 (Euler-Bernoulli: k = 3 E I / L^3, w ~ sqrt(E I / A) / L^2).
+  /// [1] Overhang over the measured one. The tool is modelled as a cantilever beam: compliance ~ L^3,
+  /// frequency ~ 1 / L^2 (Euler-Bernoulli: k = 3 E I / L^3, w ~ sqrt(E I / A) / L^2).
   double overhang = SAME;
   double axial_depth = SAME;  ///< [m] compared with the limit at every speed
   int speeds = 0;             ///< 0: 300
@@ -42,12 +42,12 @@ struct WhatIfChart {
 /// Modes of the tool at another overhang. @param overhang [1] as WhatIf::overhang
 std::vector<SystemMode> withOverhang(std::vector<SystemMode> modes, double overhang);
 
-/// Limits at two or more ascending speeds by continuation, fast enough for interactive use: every tenth speed is
-/// searched from depth zero by collocation; the speeds between start from a prediction by their neighbours and
-/// the zero-order solution, and are interpolated where the prediction is right to 1 %. Where the lobe changes,
-/// every speed is solved.
+/// Limits at two or more ascending speeds by continuation, fast enough for interactive use: every tenth speed
+/// is searched from depth zero by collocation; the speeds between start from a prediction by their neighbours
+/// and the zero-order solution, and are interpolated where the prediction is right to 1 %. Where the lobe
+/// changes, every speed is solved.
 StabilityLimit limitsByContinuation(const RegenerativeSystem& system, const std::vector<double>& speeds,
-                              double max_depth);
+                                    double max_depth);
 
 /// Index of the mode with the largest receptance at a frequency [Hz]; -1 for NaN or without modes.
 int dominantMode(const std::vector<SystemMode>& modes, double frequency);

@@ -25,9 +25,9 @@ struct ChatterEpisode {
 /// Joins consecutive windows of one condition with chatter to episodes.
 std::vector<ChatterEpisode> episodes(const std::vector<ChatterState>& states);
 
-/// Spindle speeds [rad/s] at which the chatter frequency is an integer multiple of the tooth passing frequency,
-/// so that consecutive teeth leave parallel waves: 2 pi f / (k teeth), k = 1, 2, ..., within low..high [rad/s],
-/// highest first. @throws Error on values out of range.
+/// Spindle speeds [rad/s] at which the chatter frequency is an integer multiple of the tooth passing
+/// frequency, so that consecutive teeth leave parallel waves: 2 pi f / (k teeth), k = 1, 2, ..., within
+/// low..high [rad/s], highest first. @throws Error on values out of range.
 std::vector<double> speedsFromChatter(double frequency, int teeth, double low, double high);
 
 /// Correction of one mode of the prior system from an observed chatter frequency.
@@ -39,9 +39,9 @@ struct ModeCorrection {
   RegenerativeSystem system;  ///< corrected
 };
 
-/// The smallest change of one modal frequency for which the dominant motion of the system at a speed [rad/s] and
-/// depth [m] has the observed frequency [Hz], modulo the tooth passing frequency (a sideband may dominate the
-/// force). Corrections with which the system chatters take precedence. Empty when no correction fits.
+/// The smallest change of one modal frequency for which the dominant motion of the system at a speed [rad/s]
+/// and depth [m] has the observed frequency [Hz], modulo the tooth passing frequency (a sideband may dominate
+/// the force). Corrections with which the system chatters take precedence. Empty when no correction fits.
 /// @param most [1] largest relative change. @throws Error on values out of range.
 std::optional<ModeCorrection> correctFromChatter(const RegenerativeSystem& believed, double speed,
                                                  double depth, double observed, double most = 0.1);
@@ -66,15 +66,16 @@ struct ChatterAdvice {
   double corrected_limit = std::numeric_limits<double>::quiet_NaN();  ///< [m] at the speed of the cut
 };
 
-/// Gives advice once per episode, when two consecutive windows agree on the frequency within 1 %: while chatter
-/// grows, the first window may contain another dominant line.
+/// Gives advice once per episode, when two consecutive windows agree on the frequency within 1 %: while
+/// chatter grows, the first window may contain another dominant line.
 class ChatterAdvisor {
  public:
   /// Provides the prior system of a cut; empty while modes or coefficients are missing.
   using Believed = std::function<std::optional<RegenerativeSystem>(const CuttingCondition&)>;
   using Output = std::function<void(const ChatterAdvice&)>;
   /// @param low, high [rad/s] range of the proposed speeds @param teeth of conditions that state none
-  /// @param early receives the advice before the limits at the proposed speeds are computed, which takes longest
+  /// @param early receives the advice before the limits at the proposed speeds are computed, which takes
+  /// longest
   ChatterAdvisor(double low, double high, int teeth, Believed believed, Output output, Output early = {});
 
   /// May precede the last verdicts of the previous cut.

@@ -65,11 +65,11 @@ struct ChatterState {
   double onset = std::numeric_limits<double>::quiet_NaN();
 };
 
-/// Distinguishes chatter from forced vibration in the compensated force. The synchronous part (teeth, runout) is
-/// the mean over the revolutions of the window at each angle; the remainder is chatter or noise. A flip
+/// Distinguishes chatter from forced vibration in the compensated force. The synchronous part (teeth, runout)
+/// is the mean over the revolutions of the window at each angle; the remainder is chatter or noise. A flip
 /// (period doubling) of a tool with an even number of teeth repeats every revolution, as runout does, and is
-/// distinguished by its amplitude alone: every other tooth leaves the cut, so most of the energy alternates from
-/// tooth to tooth. Inputs in stamp order; the results depend on the inputs only.
+/// distinguished by its amplitude alone: every other tooth leaves the cut, so most of the energy alternates
+/// from tooth to tooth. Inputs in stamp order; the results depend on the inputs only.
 class ChatterDetector {
  public:
   using Output = std::function<void(const ChatterState&)>;
@@ -110,8 +110,8 @@ class ChatterDetector {
   bool reported_invalid_ = false;
 };
 
-/// Samples of another sensor (vibration, sound) in the form of the detector: up to three channels in their own
-/// unit, which is then that of severity and least_severity. @throws Error without a channel.
+/// Samples of another sensor (vibration, sound) in the form of the detector: up to three channels in their
+/// own unit, which is then that of severity and least_severity. @throws Error without a channel.
 ForceBlock signalBlock(const SampleBlock& block);
 
 /// A detector behind a StreamSorter, for node and offline program.

@@ -37,8 +37,9 @@ struct MillingControlParameters {
                  "largest probability of chatter at a new spindle speed");
     table.number("override_speed_margin", speed_margin, "1", Range::openHigh(0.0, 0.1),
                  "relative error of the speed for which override_risk holds");
-    table.number("override_moves", moves, "1", Range::closed(1, 20),
-                 "largest number of speed changes in one cut; after further chatter the feed goes to its floor");
+    table.number(
+        "override_moves", moves, "1", Range::closed(1, 20),
+        "largest number of speed changes in one cut; after further chatter the feed goes to its floor");
     table.number("override_settle_revolutions", settle_revolutions, "1", Range::closed(0.0, 1000.0),
                  "revolutions ignored after a new speed is reached");
     table.number("override_settle_time", settle_time, "s", Range::positive(),

@@ -13,8 +13,8 @@
 namespace smartmill::stability {
 
 /// Second-order model of the machine in single-point turning (Kim eq. 1..4, 9): y_w = gain w^2 / (s^2 +
-/// 2 zeta w s + w^2) a. Chip thickness a = a0 - y(t) + mu y(t - T), y = y_w - y_t: deflection y_w of the machine
-/// minus displacement y_t of the tool by the actuator.
+/// 2 zeta w s + w^2) a. Chip thickness a = a0 - y(t) + mu y(t - T), y = y_w - y_t: deflection y_w of the
+/// machine minus displacement y_t of the tool by the actuator.
 struct SecondOrder {
   double gain = 0.0;           ///< [1] K / K_m
   double frequency = 0.0;      ///< [rad/s]
@@ -58,10 +58,10 @@ struct SegmentEstimate {
   std::vector<std::complex<double>> ratio;
 };
 
-/// Estimates gain, frequency and damping of y_w over a from one segment. The fit compares the windowed spectra
-/// of the deflection with those of the model response to the measured chip thickness, so both contain the
-/// leakage of the window (2.7 Hz at 512 points, more than the half-power bandwidth of 2.2 Hz). The state at the
-/// start of the segment is fitted too.
+/// Estimates gain, frequency and damping of y_w over a from one segment. The fit compares the windowed
+/// spectra of the deflection with those of the model response to the measured chip thickness, so both contain
+/// the leakage of the window (2.7 Hz at 512 points, more than the half-power bandwidth of 2.2 Hz). The state
+/// at the start of the segment is fitted too.
 /// @param start of the iteration; nullptr: grid search over the band. @throws Error on wrong lengths.
 SegmentEstimate estimateSegment(const std::vector<double>& chip, const std::vector<double>& deflection,
                                 const EstimatorParameters& parameters, const SecondOrder* start = nullptr);
@@ -70,8 +70,8 @@ SegmentEstimate estimateSegment(const std::vector<double>& chip, const std::vect
 /// speed is stable.
 double residualMargin(const SecondOrder& machine, const SecondOrder& controller);
 
-/// Minimum of residualMargin() at two standard deviations of the machine on both sides along each principal axis
-/// of its covariance.
+/// Minimum of residualMargin() at two standard deviations of the machine on both sides along each principal
+/// axis of its covariance.
 double worstMargin(const SecondOrder& machine, const SecondOrder& controller);
 
 struct ControllerParameters {
@@ -94,12 +94,14 @@ struct ControllerParameters {
     table.number("chip", chip, "m", {}, "nominal chip thickness");
     table.number("drift", drift, "1", Range::notNegative(),
                  "relative change of the machine within a segment (process noise of the estimate)");
-    table.number("margin", margin, "1", Range::open(-0.5, 0.0),
-                 "smallest real part of the residual (Kim eq. 10) at two standard deviations that activates a "
-                 "new controller");
-    table.number("lead", lead, "s", Range::closed(0.0, 0.5),
-                 "time from a sample to the sample at which its command acts, for the transport to the actuator "
-                 "and back; an integer number of samples");
+    table.number(
+        "margin", margin, "1", Range::open(-0.5, 0.0),
+        "smallest real part of the residual (Kim eq. 10) at two standard deviations that activates a "
+        "new controller");
+    table.number(
+        "lead", lead, "s", Range::closed(0.0, 0.5),
+        "time from a sample to the sample at which its command acts, for the transport to the actuator "
+        "and back; an integer number of samples");
     table.number("actuator_delay", actuator_delay, "s", Range::closed(0.0, 0.1),
                  "delay of the actuator after its command");
     table.flag("leaves_cut", leaves_cut,
@@ -111,18 +113,18 @@ struct ControllerParameters {
   void validate() const;
 };
 
-/// Feed-forward controller (Kim fig. 3, eq. 8..10): moves the tool by the deflection that the estimated machine
-/// has under the chip thickness, and updates the estimate with each segment. Its only inputs are the two
-/// displacement streams.
+/// Feed-forward controller (Kim fig. 3, eq. 8..10): moves the tool by the deflection that the estimated
+/// machine has under the chip thickness, and updates the estimate with each segment. Its only inputs are the
+/// two displacement streams.
 class AdaptiveChatterController {
  public:
   /// @throws Error on bad parameters.
   explicit AdaptiveChatterController(const ControllerParameters& parameters);
 
-  /// One sample of deflection and tool displacement [m]. @return [m] commanded tool displacement until the next
-  /// sample, or, with a lead, for the sample interval that begins `lead` after this sample. It is then predicted
-  /// from the estimated machine and the chips that result from this and the pending commands. 0 before the first
-  /// estimate.
+  /// One sample of deflection and tool displacement [m]. @return [m] commanded tool displacement until the
+  /// next sample, or, with a lead, for the sample interval that begins `lead` after this sample. It is then
+  /// predicted from the estimated machine and the chips that result from this and the pending commands. 0
+  /// before the first estimate.
   double step(double deflection, double tool);
 
   /// Estimates of the single segments, in order.

@@ -26,9 +26,10 @@ struct TraceOptions {
   int levels = 2;                            ///< bisections of the cells on the boundary, 0..6
 };
 
-/// The whole boundary in a window of speed and depth, not only the first loss of stability: the spectral radius
-/// is evaluated on a coarse grid, cells on the boundary and their neighbours are bisected in both directions, and
-/// the crossings of the finest edges are solved by iteration and joined. @throws Error on an invalid window.
+/// The whole boundary in a window of speed and depth, not only the first loss of stability: the spectral
+/// radius is evaluated on a coarse grid, cells on the boundary and their neighbours are bisected in both
+/// directions, and the crossings of the finest edges are solved by iteration and joined. @throws Error on an
+/// invalid window.
 std::vector<BoundaryCurve> traceBoundary(const FloquetSolver& solver, const TraceOptions& options);
 
 }  // namespace smartmill::stability

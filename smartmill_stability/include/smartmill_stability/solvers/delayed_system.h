@@ -32,11 +32,12 @@ struct DelayedSystem {
   std::function<void(double t, double inside, Feedback& feedback)> feedback;
 };
 
-/// The regenerative system at a speed [rad/s] and depth [m]. Principal period: the tooth period for even pitch,
-/// else a revolution.
+/// The regenerative system at a speed [rad/s] and depth [m]. Principal period: the tooth period for even
+/// pitch, else a revolution.
 DelayedSystem delayedSystem(const RegenerativeSystem& system, double speed, double depth);
 
-/// The same with the contact of the teeth in the forced vibration (system.chip). Principal period: a revolution.
+/// The same with the contact of the teeth in the forced vibration (system.chip). Principal period: a
+/// revolution.
 DelayedSystem contactSystem(const RegenerativeSystem& system, double speed, double depth);
 
 /// Dominant multiplier of a delayed system by Chebyshev collocation. @param nodes of an element, 4..40

@@ -16,9 +16,9 @@
 
 namespace smartmill::stability {
 
-/// One vibration mode of the tool relative to the workpiece: q'' + 2 zeta w q' + w^2 q = input . F; displacement
-/// of the tool: output q. Both vectors are in 1/sqrt(kg) for unit modal mass. A mode along one axis has input and
-/// output along that axis; cross terms are modes whose vectors have both components.
+/// One vibration mode of the tool relative to the workpiece: q'' + 2 zeta w q' + w^2 q = input . F;
+/// displacement of the tool: output q. Both vectors are in 1/sqrt(kg) for unit modal mass. A mode along one
+/// axis has input and output along that axis; cross terms are modes whose vectors have both components.
 struct SystemMode {
   double frequency = 0.0;      ///< [Hz] > 0
   double damping_ratio = 0.0;  ///< [1] 0 < value < 1
@@ -28,10 +28,10 @@ struct SystemMode {
 
 enum class Cut { milling, turning };
 
-/// Causes of different chips at different teeth: runout, a serrated edge and, with uneven pitch or radius, the
-/// forced vibration. A tooth may then miss the cut locally, and a later tooth cuts the material of several.
-/// Stability is that of the vibration about the forced vibration with its contact. With forces proportional to
-/// the chip thickness only the ratio of the offsets to the feed matters.
+/// Causes of different chips at different teeth: runout, a serrated edge and, with uneven pitch or radius,
+/// the forced vibration. A tooth may then miss the cut locally, and a later tooth cuts the material of
+/// several. Stability is that of the vibration about the forced vibration with its contact. With forces
+/// proportional to the chip thickness only the ratio of the offsets to the feed matters.
 struct ChipGeometry {
   double feed = 0.0;                  ///< [m] per tooth (mean over the teeth) > 0
   std::vector<double> radius_offset;  ///< [m] runout of each tooth; empty: none
@@ -41,8 +41,8 @@ struct ChipGeometry {
   bool forced_vibration = true;       ///< false: contact of a rigid tool
 };
 
-/// A milling or turning system: dynamics of the tool tip and regeneration. Angles are immersion angles, clockwise
-/// from +y, the feed is along x; forces act on the tool (docs/formats.md).
+/// A milling or turning system: dynamics of the tool tip and regeneration. Angles are immersion angles,
+/// clockwise from +y, the feed is along x; forces act on the tool (docs/formats.md).
 struct RegenerativeSystem {
   /// Dynamics: modes for every solver; receptances (measured or computed) for zero_order and multi_frequency,
   /// which use the modes without them.
@@ -58,18 +58,19 @@ struct RegenerativeSystem {
   double exit = units::PI;    ///< [rad] > entry; unused in turning
   double kt = 0.0;            ///< [N/m2] tangential
   double kr = 0.0;            ///< [N/m2] radial
-  /// [N/m2] Tangential and radial coefficient at an immersion angle, for a nonlinear force law linearised at the
-  /// chip thickness of that angle. Empty: kt and kr; otherwise kt and kr only set the scale. Supported by the
-  /// Floquet solvers, without a chip geometry.
+  /// [N/m2] Tangential and radial coefficient at an immersion angle, for a nonlinear force law linearised at
+  /// the chip thickness of that angle. Empty: kt and kr; otherwise kt and kr only set the scale. Supported by
+  /// the Floquet solvers, without a chip geometry.
   std::function<std::array<double, 2>(double angle)> along_arc;
-  /// [N/m] >= 0 Process damping: force on the flank = coefficient x depth x velocity / cutting speed, velocity
-  /// along the chip normal, into the material.
+  /// [N/m] >= 0 Process damping: force on the flank = coefficient x depth x velocity / cutting speed,
+  /// velocity along the chip normal, into the material.
   double damping_tangential = 0.0;
   double damping_radial = 0.0;
   /// [1] Overlap factor with the previous cut (Kim's mu): 1 for milling and plunge turning, 0 for threading.
   double overlap = 1.0;
-  /// Milling: actual contact of the teeth. Absent: every tooth cuts along its whole arc the surface left by the
-  /// previous tooth. Supported by the Floquet solvers; zero_order uses the mean over whole serration waves.
+  /// Milling: actual contact of the teeth. Absent: every tooth cuts along its whole arc the surface left by
+  /// the previous tooth. Supported by the Floquet solvers; zero_order uses the mean over whole serration
+  /// waves.
   std::optional<ChipGeometry> chip;
 
   /// @throws Error naming the quantity and its value.
@@ -91,8 +92,8 @@ std::array<std::complex<double>, 4> receptance(const std::vector<SystemMode>& mo
 /// Receptances with cross terms at frequencies from low to high [Hz], dense around each mode.
 ToolTipResponse responseOf(const std::vector<SystemMode>& modes, double low, double high, std::size_t lines);
 
-/// Type of the loss of stability: Hopf (quasi-periodic), flip (period doubling: the vibration repeats every two
-/// principal periods), fold (multiplier +1: static loss of stability).
+/// Type of the loss of stability: Hopf (quasi-periodic), flip (period doubling: the vibration repeats every
+/// two principal periods), fold (multiplier +1: static loss of stability).
 enum class Kind { none, hopf, flip, fold };
 const char* nameOf(Kind kind);
 
@@ -127,8 +128,8 @@ struct SolverOptions {
   int lines = 0;                ///< multi_frequency: evenly spaced chatter frequencies (default 60)
   double tolerance = 1e-6;      ///< [1] relative, of the depth
   bool estimate_error = false;  ///< sets Limit::error from a refined solution
-  /// collocation: optimises for thousands of multipliers. Matrices that depend only on the length of an element
-  /// are taken from a table (relative error 1e-9) that costs as much as a few multipliers.
+  /// collocation: optimises for thousands of multipliers. Matrices that depend only on the length of an
+  /// element are taken from a table (relative error 1e-9) that costs as much as a few multipliers.
   bool many = false;
 };
 

@@ -28,16 +28,16 @@ struct ToolTipResponse {
   std::vector<double> frequency;
   std::vector<std::complex<double>> xx, yy;
   std::vector<std::complex<double>> xy, yx;  ///< x for a force in y and the reverse; empty: none
-  /// xx, xy, yx, yy at any f [Hz]; negative f: conjugate. Below the lines: real part of the first line; above:
-  /// mass line through the last.
+  /// xx, xy, yx, yy at any f [Hz]; negative f: conjugate. Below the lines: real part of the first line;
+  /// above: mass line through the last.
   std::array<std::complex<double>, 4> at(double f) const;
 };
 
 /// Evaluated from modes at frequencies from low to high [Hz], dense around each mode.
 ToolTipResponse responseOf(const ModalModel& x, const ModalModel& y, double low, double high,
                            std::size_t lines);
-/// From measured FRFs; y is interpolated at the lines of x. @throws Error when a unit is not m/N or the bands do
-/// not overlap.
+/// From measured FRFs; y is interpolated at the lines of x. @throws Error when a unit is not m/N or the bands
+/// do not overlap.
 ToolTipResponse responseOf(const FrequencyResponse& x, const FrequencyResponse& y);
 
 /// Mean directional coefficients a_xx, a_xy, a_yx, a_yy over a revolution times 2 pi / teeth, so that A_0 =
@@ -50,7 +50,8 @@ std::array<double, 4> directionalCoefficients(const RegenerativeProcess& process
 StabilityLimit zeroOrderLimit(const RegenerativeProcess& process, const ToolTipResponse& tool,
                               const std::vector<double>& speeds);
 
-/// [m] Critical limit: below this depth every speed is stable by the zero-order solution; +inf without a limit.
+/// [m] Critical limit: below this depth every speed is stable by the zero-order solution; +inf without a
+/// limit.
 double absoluteDepthLimit(const RegenerativeProcess& process, const ToolTipResponse& tool);
 
 }  // namespace smartmill::stability
