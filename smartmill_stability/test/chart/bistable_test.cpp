@@ -18,7 +18,7 @@
 namespace smartmill::stability {
 namespace {
 
-/// A power law over 0 .. 0.4 mm: of a cubic spline whose breaks are so near that it follows the power.
+/// Power law over 0 .. 0.4 mm, approximated by a cubic spline with closely spaced knots.
 ForceCurve powerLaw(double at_tenth, double power) {
   constexpr int PIECES = 400;
   constexpr double TOP = 0.4e-3;
@@ -26,7 +26,7 @@ ForceCurve powerLaw(double at_tenth, double power) {
   for (int k = 0; k <= PIECES; ++k) curve.knots.push_back(TOP * k / PIECES);
   curve.std_dev.assign(PIECES + 1, 0.0);
   const auto knot = [&](int k) { return static_cast<double>(std::clamp(k, 0, PIECES)) / PIECES; };
-  for (int k = 0; k < PIECES + 3; ++k) {  // Greville's abscissae
+  for (int k = 0; k < PIECES + 3; ++k) {  // Greville abscissae
     const double x = (knot(k - 2) + knot(k - 1) + knot(k)) / 3.0 * TOP;
     curve.value.push_back(at_tenth * std::pow(x / 1e-4, power));
   }
@@ -40,25 +40,29 @@ ForceCurves powerLaws(double power) {
   return law;
 }
 
-/// Gain at a swing that just reaches the surface over the slope, in closed form: the mean of (1 + cos)^q is
-/// 2^q Gamma(q + 1/2) / (sqrt(pi) Gamma(q + 1)).
+/// Describing function over slope for an amplitude that just reaches the surface, in closed form: the mean of
+/// (1 + cos)^q is 2^q Gamma(q + 1/2) / (sqrt(pi) Gamma(q + 1)).
 double grazing(double q) {
   return 2.0 / (q + 1.0) * std::pow(2.0, q) * std::tgamma(q + 0.5) /
          (std::sqrt(units::PI) * std::tgamma(q + 1.0));
 }
 
-TEST(Bistable, GainOfASwingHasThePowerLawsClosedForm) {
+TEST(Bistable, DescribingFunctionOfAPowerLawHasItsClosedForm) {
   for (const double q : {0.5, 0.75, 1.0}) {
     const ForceCurve law = powerLaw(60e3, q);
-    EXPECT_NEAR(swingGain(law, 0.1e-3, 0.1e-3) / swingGain(law, 0.1e-3, 0.0), grazing(q), 0.004) << q;
-    // Half the swing: the next terms of the series, 1 + (q - 1)(q - 2) / 8 s^2 + ...
+    EXPECT_NEAR(describingFunction(law, 0.1e-3, 0.1e-3) / describingFunction(law, 0.1e-3, 0.0), grazing(q),
+                0.004)
+        << q;
+    // Smaller amplitude: next term of the series, 1 + (q - 1)(q - 2) / 8 s^2 + ...
     const double s = 0.3, cubic = (q - 1.0) * (q - 2.0) / 8.0 * s * s;
-    EXPECT_NEAR(swingGain(law, 0.1e-3, s * 0.1e-3) / law.slope(0.1e-3), 1.0 + cubic, 0.1 * cubic + 1e-3) << q;
+    EXPECT_NEAR(describingFunction(law, 0.1e-3, s * 0.1e-3) / law.slope(0.1e-3), 1.0 + cubic,
+                0.1 * cubic + 1e-3)
+        << q;
   }
 }
 
-// The edge that cuts all the time: depth times gain is what counts, so limits stand to each other as gains
-// do: q + 1 over 2 a, about 6 % for Kienzle's 3/4, the secant's q.
+// With continuous contact the limit is inversely proportional to the gain: ratio of large to small limit
+// 1 / grazing(q), about 6 % below 1 for Kienzle's 3/4; secant: q.
 TEST(Bistable, RangeOfAPowerLawHasItsClosedForm) {
   RegenerativeSystem system = benchmarkSystem(1.0, true, false);
   system.cut = Cut::turning;
@@ -77,18 +81,19 @@ TEST(Bistable, RangeOfAPowerLawHasItsClosedForm) {
 
 constexpr double SOFT = 0.02, HARD = 60.0;
 
-bool chatters(const RegenerativeSystem& system, double q, double speed, double depth, double knock) {
+bool chatters(const RegenerativeSystem& system, double q, double speed, double depth, double disturbance) {
   constexpr int STEPS = 720;
   TimeDomain run(system, benchmark(), {}, speed, depth, 0.1e-3, STEPS);
   run.setLaw(powerLaws(q));
-  run.setKnock(knock);
+  run.setDisturbance(disturbance);
   return chattersInTime(run, STEPS / system.teeth, 0.1e-3);
 }
 
-// A slot, in time, with a tool that may leave the cut: the least vibration grows at the limit of the slopes
-// within 2 %; a little below it the cut stays still or chatters, as it is knocked; a tenth below the large
-// limit it always comes to rest (the limit in time lies -9 .. +8 % beside ours over speeds).
-TEST(Bistable, BothStatesLiveInTimeBetweenTheLimits) {
+// Time-domain simulation of a slot with a tool that may leave the cut: a small vibration grows above the
+// limit of the slopes within 2 %. Slightly below it the cut remains stable after a small disturbance and
+// chatters after a large one. 10 % below the large limit it is always stable (the limit in time differs by -9
+// .. +8 % over the speeds).
+TEST(Bistable, BothStatesPersistInTimeBetweenTheLimits) {
   const RegenerativeSystem system = benchmarkSystem(1.0, true, false);
   for (const double rpm : {8000.0, 12000.0}) {
     const double speed = units::radPerSecFromRpm(rpm), q = 0.6;
@@ -101,22 +106,22 @@ TEST(Bistable, BothStatesLiveInTimeBetweenTheLimits) {
   }
 }
 
-TEST(Bistable, CoefficientsAlongTheArcThatDoNotChangeChangeNothing) {
+TEST(Bistable, ConstantCoefficientsAlongTheArcGiveTheSameLimits) {
   for (const double helix : {0.0, 0.5}) {
     RegenerativeSystem plain = benchmarkSystem(0.5, true, true);
     plain.helix = helix;
     RegenerativeSystem along = plain;
     along.along_arc = [&plain](double) { return std::array<double, 2>{plain.kt, plain.kr}; };
     const double speed = units::radPerSecFromRpm(9000.0);
-    const double due = makeSolver(Method::collocation, plain)->limit(speed, 20e-3).depth;
-    EXPECT_NEAR(makeSolver(Method::collocation, along)->limit(speed, 20e-3).depth, due, 1e-4 * due);
+    const double expected = makeSolver(Method::collocation, plain)->limit(speed, 20e-3).depth;
+    EXPECT_NEAR(makeSolver(Method::collocation, along)->limit(speed, 20e-3).depth, expected, 1e-4 * expected);
   }
   RegenerativeSystem system = benchmarkSystem(0.5, true, true);
   system.along_arc = [](double) { return std::array<double, 2>{1e9, 0.0}; };
   EXPECT_NE(errorOf([&] { makeSolver(Method::zero_order, system); }), "");
 }
 
-TEST(Bistable, RefusesAFeedThatTheLawDoesNotKnow) {
+TEST(Bistable, RefusesAFeedBeyondTheForceCurve) {
   const RegenerativeSystem system = benchmarkSystem(1.0, true, false);
   EXPECT_NE(errorOf([&] {
               bistableLimits(system, powerLaws(0.75), 1e-3, Method::collocation, {}, {1000.0}, 5e-3);
@@ -124,7 +129,7 @@ TEST(Bistable, RefusesAFeedThatTheLawDoesNotKnow) {
             std::string::npos);
 }
 
-TEST(Bistable, ProgramDrawsTheRange) {
+TEST(Bistable, ProgramWritesAndDrawsBothLimits) {
   const TemporaryFolder folder;
   writeForceCurves(powerLaws(0.6), folder.file("law.yaml"));
   const auto run = [&](const std::string& rest) {

@@ -26,14 +26,14 @@ ChartMaker filled(ChartParameters parameters, double step = 1.0) {
 ChartParameters slot() {
   ChartParameters parameters;
   parameters.speed_low = units::radPerSecFromRpm(5000.0);
-  parameters.method = "auto";  // by collocation where a test gives modes
+  parameters.method = "auto";  // collocation in tests with modes
   return parameters;
 }
 
-// Zero-order limits of the benchmark, an independent table (6000, 10000, 15000, 20000 rpm), printed to 0.1 ..
-// 0.2 %; it lies up to 0.5 % above the exact root. Lines of 1 Hz joined by straight lines cost less than 0.5
-// % more.
-TEST(ChartMaker, measuredFrfsGiveTheBenchmarksLimits) {
+// Zero-order limits of the benchmark from an independent table (6000, 10000, 15000, 20000 rpm), printed to
+// 0.1 .. 0.2 % and up to 0.5 % above the exact root. Linear interpolation between lines of 1 Hz adds less
+// than 0.5 %.
+TEST(ChartMaker, measuredFrfsGiveTheLimitsOfTheBenchmark) {
   const ChartMaker maker = filled(slot());
   const double table[][2] = {{6000, 0.0496}, {10000, 0.0737}, {15000, 0.1177}, {20000, 0.0626}};
   for (const auto& row : table) {
@@ -43,8 +43,9 @@ TEST(ChartMaker, measuredFrfsGiveTheBenchmarksLimits) {
   }
 }
 
-// Between 2950 and 3050 Hz lines of that value and standard deviation, both over the FRF's peak.
-void expectTheChartWithoutThem(std::complex<double> value, double std_dev, double line_error) {
+// Expects that lines from 2950 to 3050 Hz with a value and a standard deviation, both relative to the peak of
+// the FRF, do not affect the chart.
+void expectLinesIgnored(std::complex<double> value, double std_dev, double line_error) {
   const StabilityChart clean = filled(slot()).chart();
   ChartParameters parameters = slot();
   parameters.radial_ratio = 1.0 / 3.0;
@@ -72,26 +73,27 @@ void expectTheChartWithoutThem(std::complex<double> value, double std_dev, doubl
   }
 }
 
-// Where the hammer's spectrum has a zero the FRF is noise as large as a resonance; its standard deviation
-// says so.
-TEST(ChartMaker, linesThatTheHammerDidNotExciteMakeNoPocket) {
-  expectTheChartWithoutThem({-1.2, 0.5}, 1.3, 0.05);
+// At a zero of the hammer's spectrum the FRF is noise as large as a resonance, with a large standard
+// deviation.
+TEST(ChartMaker, linesWithoutExcitationAreIgnored) {
+  expectLinesIgnored({-1.2, 0.5}, 1.3, 0.05);
 }
 
-// Far above the modes nothing but noise is left, little beside the peak, but enough to close a deep pocket.
-TEST(ChartMaker, linesThatDoNotStandAboveTheirDeviationCloseNoPocket) {
-  expectTheChartWithoutThem({-0.1, 0.5}, 0.2, 0.3);
+// Far above the modes the FRF is noise, small compared with the peak, but large enough to close a deep
+// pocket.
+TEST(ChartMaker, linesBelowTheirStandardDeviationAreIgnored) {
+  expectLinesIgnored({-0.1, 0.5}, 0.2, 0.3);
 }
 
-// With the tool engaged all round no direction is special: a structure turned by 30 degrees about the spindle
-// keeps its limits, when the receptances across are known; without them it does not.
-TEST(ChartMaker, crossFrfsMakeATurnedStructureTheSame) {
+// With full engagement no direction is preferred: a structure rotated by 30 degrees about the spindle has the
+// same limits with the cross receptances, but not without them.
+TEST(ChartMaker, crossFrfsPreserveTheLimitsOfARotatedStructure) {
   ChartParameters parameters = slot();
   parameters.method = "zero_order";
   parameters.radial_ratio = 1.0 / 3.0;
   parameters.exit = units::TWO_PI;
   MeasuredFrf along = frf("x", 1.0), across = frf("y", 1.0);
-  // One direction half as stiff, so that both differ.
+  // One direction is half as stiff as the other.
   for (std::complex<double>& value : across.frf.value) value *= 2.0;
   const double c = std::cos(units::PI / 6.0), s = std::sin(units::PI / 6.0);
   MeasuredFrf x = along, y = across, xy = along;
@@ -108,13 +110,13 @@ TEST(ChartMaker, crossFrfsMakeATurnedStructureTheSame) {
     maker.handle(coefficients());
     return maker.chart().limit.depth;
   };
-  const std::vector<double> due = limits({along, across}), turned = limits({x, y, xy}),
+  const std::vector<double> expected = limits({along, across}), rotated = limits({x, y, xy}),
                             without = limits({x, y});
   double most = 0.0, most_without = 0.0;
-  for (std::size_t k = 0; k < due.size(); ++k) {
-    if (std::isinf(due[k])) continue;
-    most = std::max(most, std::abs(turned[k] / due[k] - 1.0));
-    most_without = std::max(most_without, std::abs(without[k] / due[k] - 1.0));
+  for (std::size_t k = 0; k < expected.size(); ++k) {
+    if (std::isinf(expected[k])) continue;
+    most = std::max(most, std::abs(rotated[k] / expected[k] - 1.0));
+    most_without = std::max(most_without, std::abs(without[k] / expected[k] - 1.0));
   }
   EXPECT_LT(most, 1e-6);
   EXPECT_GT(most_without, 0.02);
@@ -152,7 +154,8 @@ ChartMaker fromModes(ChartParameters parameters, double relative_error) {
   return maker;
 }
 
-// Where modes are known the chart comes from the default solver: the independent table of converged limits.
+// With known modes the chart is computed by collocation; expected values from an independent table of
+// converged limits.
 TEST(ChartMaker, knownModesGiveTheConvergedLimits) {
   ChartParameters parameters = slot();
   parameters.speeds = 601;
@@ -175,7 +178,7 @@ TEST(ChartMaker, knownModesGiveTheConvergedLimits) {
   EXPECT_FALSE(chart.unstable.empty());
 }
 
-TEST(ChartMaker, modesThatFitBadlyLeaveTheChartToTheFrf) {
+TEST(ChartMaker, autoUsesTheFrfWhenTheModesFitBadly) {
   EXPECT_EQ(fromModes(slot(), 0.3).chart().method, "zero_order");
   ChartParameters parameters = slot();
   parameters.method = "zero_order";
@@ -186,9 +189,9 @@ TEST(ChartMaker, modesThatFitBadlyLeaveTheChartToTheFrf) {
 
 TEST(ChartMaker, spindleLimitsFollowTheMeanTorque) {
   const StabilityChart chart = filled(slot()).chart();
-  // A slot removes depth x diameter a feed: energy Ktc per volume, and the edge force along half a turn of
-  // each tooth.
-  const double energy_per_depth = 6e8 * 0.02 * 2 * 0.1e-3 + 1e4 * 2 * units::PI * 0.01;  // [J/m] a revolution
+  // Energy of a revolution in a slot: Ktc times the removed volume depth x diameter x feed, plus the edge
+  // force along half a revolution of each tooth.
+  const double energy_per_depth = 6e8 * 0.02 * 2 * 0.1e-3 + 1e4 * 2 * units::PI * 0.01;  // [J/m]
   const double torque_per_depth = energy_per_depth / units::TWO_PI;
   for (std::size_t k = 0; k < chart.limit.spindle_speed.size(); k += 100) {
     const double speed = chart.limit.spindle_speed[k], friction = 0.1 + 1e-3 * speed;
@@ -204,8 +207,8 @@ TEST(ChartMaker, spindleLimitsFollowTheMeanTorque) {
               1.0, 1e-12);
 }
 
-// The best pocket of one mode lies where the tooth passing frequency nears the natural frequency (from below
-// 922 Hz x 60 / 2 = 27660 rpm, here cut off), or a whole part of it: 13830 rpm, 9220 rpm.
+// The pockets of one mode lie where the tooth passing frequency is close to the natural frequency (922 Hz x
+// 60 / 2 = 27660 rpm, outside this chart) or to an integer fraction of it: 13830 rpm, 9220 rpm.
 TEST(ChartMaker, recommendsStablePocketsAndProposesClearlyUnstableValleys) {
   ChartParameters parameters = slot();
   parameters.speed_high = units::radPerSecFromRpm(16000.0);
@@ -217,9 +220,9 @@ TEST(ChartMaker, recommendsStablePocketsAndProposesClearlyUnstableValleys) {
   for (std::size_t i = 0; i < chart.recommended.size(); ++i) {
     const StabilityPoint& point = chart.recommended[i];
     for (const double off : {0.991, 1.0, 1.009}) {
-      const Prediction there = maker.predict(point.spindle_speed * off, point.axial_depth);
-      EXPECT_TRUE(there.stable);
-      EXPECT_LE(point.axial_depth, 0.8 * there.point.depth_limit * (1 + 1e-3));
+      const Prediction prediction = maker.predict(point.spindle_speed * off, point.axial_depth);
+      EXPECT_TRUE(prediction.stable);
+      EXPECT_LE(point.axial_depth, 0.8 * prediction.point.depth_limit * (1 + 1e-3));
     }
     EXPECT_TRUE(maker.predict(point.spindle_speed, point.axial_depth).within_spindle_limits);
     if (i > 0) {
@@ -229,18 +232,19 @@ TEST(ChartMaker, recommendsStablePocketsAndProposesClearlyUnstableValleys) {
   ASSERT_FALSE(chart.unstable.empty());
   for (const StabilityPoint& point : chart.unstable) {
     for (const double off : {0.991, 1.0, 1.009}) {
-      const Prediction there = maker.predict(point.spindle_speed * off, point.axial_depth);
-      EXPECT_FALSE(there.stable);
-      EXPECT_GE(point.axial_depth, 1.5 * there.point.depth_limit * (1 - 1e-3));
+      const Prediction prediction = maker.predict(point.spindle_speed * off, point.axial_depth);
+      EXPECT_FALSE(prediction.stable);
+      EXPECT_GE(point.axial_depth, 1.5 * prediction.point.depth_limit * (1 - 1e-3));
     }
     EXPECT_TRUE(maker.predict(point.spindle_speed, point.axial_depth).within_spindle_limits);
-    EXPECT_GT(point.chatter_frequency, 922.0);  // a slot's Hopf lobes lie above the natural frequency
+    EXPECT_GT(point.chatter_frequency, 922.0);  // Hopf lobes of a slot lie above the natural frequency
   }
 }
 
-// A small arc: beside the first lobe stability is lost by period doubling, which zero-order theory does not
-// know (Davies et al. 2002). What is recommended is judged by another solver, semi-discretization.
-TEST(ChartMaker, recommendsNothingThatZeroOrderTheoryAloneCallsStable) {
+// At small immersion, stability is lost by period doubling next to the first lobe, which the zero-order
+// solution does not contain (Davies et al. 2002). The recommended points are checked by another solver,
+// semi-discretization.
+TEST(ChartMaker, recommendsNothingThatIsStableOnlyByTheZeroOrderSolution) {
   ChartParameters parameters = slot();
   parameters.method = "zero_order";
   parameters.use_modes = true;
@@ -254,11 +258,11 @@ TEST(ChartMaker, recommendsNothingThatZeroOrderTheoryAloneCallsStable) {
   const auto chattering = [&](double risk) {
     parameters.risk = risk;
     ChartMaker maker = fromModes(parameters, 0.01);
-    CoefficientSet known = coefficients();
-    known.value.krc = 2e8;
-    known.std_dev.ktc = 0.02 * known.value.ktc;
-    known.std_dev.krc = 0.02 * known.value.krc;
-    maker.handle(known);
+    CoefficientSet identified = coefficients();
+    identified.value.krc = 2e8;
+    identified.std_dev.ktc = 0.02 * identified.value.ktc;
+    identified.std_dev.krc = 0.02 * identified.value.krc;
+    maker.handle(identified);
     ModalModel modes = benchmark();
     modes.modes[0].frequency_std = 0.003 * modes.modes[0].frequency;
     modes.modes[0].damping_ratio_std = 0.02 * modes.modes[0].damping_ratio;
@@ -271,22 +275,23 @@ TEST(ChartMaker, recommendsNothingThatZeroOrderTheoryAloneCallsStable) {
     const auto solver = makeFloquetSolver(Method::semi_discretization, *maker.system({}));
     int count = 0;
     for (const StabilityPoint& cut : chart.recommended) {
-      // With the margin of depth that is promised.
+      // At the limit of the depth margin.
       const double depth = cut.axial_depth / (1.0 - parameters.depth_margin);
       count += solver->multiplier(cut.spindle_speed, depth).radius() > 1.0;
       if (risk == 0.0) continue;
-      // The same risk of other draws by the other solver: 5 of 100 and three deviations.
+      // Independent draws with the other solver: 5 of 100, plus three standard deviations.
       const double probability = chatterProbability(*maker.uncertainSystem({}), cut.spindle_speed,
                                                     cut.axial_depth, 100, 7, Method::semi_discretization);
       EXPECT_LE(probability, 0.05 + 3.0 * std::sqrt(0.05 * 0.95 / 100.0));
     }
     return count;
   };
-  EXPECT_GT(chattering(0.0), 0) << "the case shows what it is to show";
+  EXPECT_GT(chattering(0.0), 0)
+      << "expected a case in which the zero-order solution recommends an unstable point";
   EXPECT_EQ(chattering(0.05), 0);
 }
 
-TEST(ChartMaker, aWeakSpindleHoldsTheRecommendationDown) {
+TEST(ChartMaker, aWeakSpindleLimitsTheRecommendedDepth) {
   MachineModel weak = machine();
   weak.spindle->rated_torque = 0.8;
   ChartParameters parameters = slot();
@@ -302,7 +307,7 @@ TEST(ChartMaker, aWeakSpindleHoldsTheRecommendationDown) {
   }
 }
 
-TEST(ChartMaker, saysWhatIsMissing) {
+TEST(ChartMaker, listsMissingInputs) {
   ChartMaker maker(slot(), machine());
   EXPECT_EQ(maker.missing(), "FRF in x, FRF in y, tangential coefficient");
   maker.handle(frf("x", 5.0));
@@ -316,13 +321,13 @@ TEST(ChartMaker, saysWhatIsMissing) {
   MeasuredFrf other = frf("y", 5.0);
   other.tool = "face_mill";
   maker.handle(other);
-  EXPECT_EQ(maker.missing(), "FRF in x");  // another tool: the first one's FRF is put away
+  EXPECT_EQ(maker.missing(), "FRF in x");  // another tool: the FRF of the first one is discarded
 }
 
-TEST(ChartMaker, refusesBadParametersByKey) {
-  const auto message = [](const std::function<void(ChartParameters&)>& spoil) -> std::string {
+TEST(ChartMaker, errorsNameTheInvalidParameter) {
+  const auto message = [](const std::function<void(ChartParameters&)>& change) -> std::string {
     ChartParameters parameters = slot();
-    spoil(parameters);
+    change(parameters);
     try {
       ChartMaker maker(parameters, machine());
     } catch (const Error& error) {

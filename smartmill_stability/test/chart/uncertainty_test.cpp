@@ -32,7 +32,7 @@ TEST(Uncertainty, drawsHaveTheStatedScatter) {
     const double c = drawn.modes[0].input[0] * drawn.modes[0].output[0] / (w * w) * 0.03993 * w0 * w0 - 1.0;
     f += a, ff += a * a, z += b, zz += b * b, k += c, kk += c * c;
   }
-  // Four standard errors of 4000 draws: 6 % of the scatter, 4.5 % of its estimate.
+  // Four standard errors of 4000 draws: 6.3 % of the standard deviation for the mean, 4.5 % for its estimate.
   EXPECT_NEAR(f / N, 0.0, 0.065 * 0.005);
   EXPECT_NEAR(z / N, 0.0, 0.065 * 0.1);
   EXPECT_NEAR(k / N, 0.0, 0.065 * 0.05);
@@ -41,18 +41,19 @@ TEST(Uncertainty, drawsHaveTheStatedScatter) {
   EXPECT_NEAR(std::sqrt(kk / N), 0.05, 0.06 * 0.05);
 }
 
-TEST(Uncertainty, noUncertaintyIsAStep) {
+TEST(Uncertainty, probabilityWithoutUncertaintyIsAStep) {
   const UncertainSystem u = uncertain(benchmarkSystem(1.0, true, false), 0.0);
   const double speed = radPerSecFromRpm(10000.0);  // 0.32238 mm
   EXPECT_EQ(chatterProbability(u, speed, 0.3222e-3, 5, 1), 0.0);
   EXPECT_EQ(chatterProbability(u, speed, 0.3226e-3, 5, 1), 1.0);
 }
 
-// Coefficients alone: the limit goes with 1 / coefficient exactly, so the probability has a closed form.
+// With uncertain coefficients only, the limit is proportional to 1 / coefficient, so the probability has a
+// closed form.
 TEST(Uncertainty, coefficientsAloneFollowTheLogNormalLaw) {
   const RegenerativeSystem system = benchmarkSystem(1.0, true, false);
   constexpr double SHARE = 0.1;
-  // kt and kr are drawn apart; with kt = 0 kr alone scales the limit.
+  // kt and kr are drawn independently; with kt = 0 only kr scales the limit.
   RegenerativeSystem radial = system;
   radial.kt = 0.0;
   const double speed = radPerSecFromRpm(10000.0);
@@ -61,13 +62,13 @@ TEST(Uncertainty, coefficientsAloneFollowTheLogNormalLaw) {
   const double s = std::sqrt(std::log1p(SHARE * SHARE));
   for (const double ratio : {0.9, 1.0, 1.1}) {
     const double expected = 0.5 * std::erfc(-(std::log(ratio) - 0.5 * s * s) / s / std::sqrt(2.0));
-    // 1500 draws: standard error 1.3 %, four of them.
+    // Four standard errors of 1500 draws.
     EXPECT_NEAR(chatterProbability(u, speed, ratio * limit, 1500, 3), expected, 0.052) << ratio;
   }
 }
 
-// 200 machines: each true one is known through a measurement with the stated errors; what was predicted from
-// the measurement must happen as often on the true machine (reliability).
+// Reliability: 200 machines, each known from a measurement with the stated errors. The probability predicted
+// from the measurement must equal the observed frequency of chatter on the true machines.
 TEST(Uncertainty, predictedProbabilityIsTheObservedShare) {
   std::mt19937_64 random(2024);
   std::uniform_real_distribution<double> unit;
@@ -77,15 +78,15 @@ TEST(Uncertainty, predictedProbabilityIsTheObservedShare) {
   double all_predicted = 0.0, all_observed = 0.0, variance = 0.0;
   int n = 0;
   for (int i = 0; i < MACHINES; ++i) {
-    // Flat knowledge before the measurement: truth drawn around what was measured.
+    // Flat prior: the true machine is drawn around the measured one.
     const RegenerativeSystem measured = benchmarkSystem(0.5, i % 2 == 0, false);
-    const UncertainSystem belief = uncertain(measured);
-    const RegenerativeSystem truth = belief.draw(random);
+    const UncertainSystem posterior = uncertain(measured);
+    const RegenerativeSystem truth = posterior.draw(random);
     const double speed = radPerSecFromRpm(9000.0 + 11000.0 * unit(random));
     const double nominal = makeSolver(Method::collocation, measured)->limit(speed, 10e-3).depth;
     if (!std::isfinite(nominal)) continue;
     const double depth = nominal * (0.75 + 0.5 * unit(random));
-    const double p = chatterProbability(belief, speed, depth, DRAWS, static_cast<unsigned>(1000 + i));
+    const double p = chatterProbability(posterior, speed, depth, DRAWS, static_cast<unsigned>(1000 + i));
     const bool chatters =
         makeFloquetSolver(Method::collocation, truth)->multiplier(speed, depth).radius() > 1.0;
     const int bin = std::min(BINS - 1, static_cast<int>(p * BINS));
@@ -100,7 +101,7 @@ TEST(Uncertainty, predictedProbabilityIsTheObservedShare) {
   std::cout << "predicted/observed by quarter:";
   for (int b = 0; b < BINS; ++b) {
     std::cout << ' ' << predicted[b] / count[b] << '/' << observed[b] / count[b] << " of " << count[b];
-    // Three standard errors of the bin, and of the draws behind each prediction.
+    // Three standard errors of the bin and of the draws of each prediction.
     const double p = predicted[b] / count[b];
     EXPECT_NEAR(observed[b] / count[b], p, 3.0 * std::sqrt((p * (1.0 - p) + 0.05) / count[b])) << b;
   }
@@ -120,12 +121,12 @@ TEST(Uncertainty, chartIsMonotonicAndRobustPointsKeepTheRisk) {
   ASSERT_FALSE(points.empty());
   for (const RobustPoint& p : points) {
     EXPECT_LE(p.probability, 0.05);
-    // Draws of another seed agree: 60 of them, binomial.
+    // Agrees with 60 draws of another seed (binomial).
     EXPECT_LE(chatterProbability(u, p.speed, p.depth, 60, 99), 0.15);
   }
 }
 
-TEST(Uncertainty, takesTheModelsStandardDeviations) {
+TEST(Uncertainty, usesTheStandardDeviationsOfTheModel) {
   MachineModel model = machine();
   model.tool_tip.x = benchmark();
   model.tool_tip.x.modes[0].frequency_std = 9.22;
@@ -145,7 +146,7 @@ TEST(Uncertainty, takesTheModelsStandardDeviations) {
   EXPECT_NEAR(std::sqrt(z / N), 0.2, 0.02);
 }
 
-TEST(Uncertainty, refusesTheImpossible) {
+TEST(Uncertainty, refusesInvalidValues) {
   const RegenerativeSystem system = benchmarkSystem(1.0, true, false);
   EXPECT_THROW(UncertainSystem(system, {}, 0.1, 0.1), Error);
   EXPECT_THROW(UncertainSystem(system, {{-0.1, 0.0, 0.0}}, 0.1, 0.1), Error);

@@ -31,16 +31,16 @@ ChartMaker benchmarkMaker(double direct = 0.0) {
   return maker;
 }
 
-// What is followed from neighbour to neighbour against the solver that searches each of 300 speeds from zero,
-// six digits: at slotting, at a third and at a small immersion with its flip lobes. Interpolation may cost a
-// percent (what ends the refinement); 296 of 300 keep it, and where two lobes meet it is 15 % at most.
-TEST(WhatIf, FollowsTheLimitsOfTheFullSearch) {
+// Continuation compared with the solver that searches each of 300 speeds from depth zero, in a slot, at a
+// third and at a small immersion with flip lobes. Interpolation is permitted an error of 1 %, exceeded at
+// most at five speeds where lobes intersect.
+TEST(WhatIf, ContinuationGivesTheLimitsOfTheFullSearch) {
   for (const double exit_deg : {180.0, 60.0, 30.0}) {
     const RegenerativeSystem system = *benchmarkMaker().system({0.0, units::radFromDeg(exit_deg), 0.0, 0.0});
     std::vector<double> speeds;
     for (int i = 0; i < 300; ++i) speeds.push_back(units::radPerSecFromRpm(5000.0 + 50.0 * i));
     constexpr double DEEPEST = 5e-3;
-    const StabilityLimit found = followedLimits(system, speeds, DEEPEST);
+    const StabilityLimit found = limitsByContinuation(system, speeds, DEEPEST);
     const std::vector<Limit> exact = makeFloquetSolver(Method::collocation, system)->limits(speeds, DEEPEST);
     ASSERT_EQ(found.depth.size(), speeds.size());
     int off = 0;
@@ -54,15 +54,16 @@ TEST(WhatIf, FollowsTheLimitsOfTheFullSearch) {
   }
 }
 
-// The same whatever thread takes which speed.
-TEST(WhatIf, TwoCallsAgreeToTheLastDigit) {
+// The result does not depend on the distribution of the speeds to threads.
+TEST(WhatIf, TwoCallsAreIdentical) {
   const RegenerativeSystem system = *benchmarkMaker().system({});
   std::vector<double> speeds;
   for (int i = 0; i < 101; ++i) speeds.push_back(units::radPerSecFromRpm(5000.0 + 150.0 * i));
-  EXPECT_EQ(followedLimits(system, speeds, 5e-3).depth, followedLimits(system, speeds, 5e-3).depth);
+  EXPECT_EQ(limitsByContinuation(system, speeds, 5e-3).depth,
+            limitsByContinuation(system, speeds, 5e-3).depth);
 }
 
-TEST(WhatIf, NothingChangedIsTheChart) {
+TEST(WhatIf, WithoutChangesGivesTheChart) {
   const ChartMaker maker = benchmarkMaker();
   WhatIf same;
   same.speeds = 31;
@@ -74,14 +75,14 @@ TEST(WhatIf, NothingChangedIsTheChart) {
     EXPECT_NEAR(chart.limit.depth[k] / solver->limit(chart.limit.spindle_speed[k], 0.02).depth, 1.0, 0.005);
   EXPECT_GT(chart.stable_share, 0.5);
   EXPECT_TRUE(chart.limit_low.empty());
-  // At the torque's limit a cut takes what friction leaves of the rated torque.
+  // At the torque limit the cutting torque is the rated torque minus friction.
   const Prediction prediction = maker.predict(units::radPerSecFromRpm(10000.0), 0.05e-3);
   const double torque_at_limit = prediction.point.torque * chart.torque_depth_limit[10] / 0.05e-3;
   EXPECT_NEAR(torque_at_limit, 20.0 - 0.1 - 1e-3 * units::radPerSecFromRpm(10000.0), 1e-6);
 }
 
-// In a slot four straight teeth add up to a force that does not vary with the angle: the zero-order solution
-// (Altintas and Budak) is exact there.
+// In a slot the sum of the directional coefficients of four straight teeth is constant, so the zero-order
+// solution (Altintas and Budak) is exact.
 TEST(WhatIf, FourTeethInASlotHaveTheZeroOrderLimits) {
   const ChartMaker maker = benchmarkMaker();
   WhatIf four;
@@ -99,10 +100,10 @@ TEST(WhatIf, FourTeethInASlotHaveTheZeroOrderLimits) {
     off += !(std::abs(chart.limit.depth[k] / exact[k].depth - 1.0) <= 0.01);
   }
   EXPECT_GT(compared, 50);
-  EXPECT_LE(off, 1);  // where two lobes meet
+  EXPECT_LE(off, 1);  // at the intersection of two lobes
 }
 
-TEST(WhatIf, OverhangBendsAsABeam) {
+TEST(WhatIf, OverhangScalesAsACantileverBeam) {
   const std::vector<SystemMode> modes = systemModes(benchmark(), benchmark());
   const std::vector<SystemMode> longer = withOverhang(modes, 2.0);
   EXPECT_NEAR(std::abs(receptance(longer, 0.0)[0]) / std::abs(receptance(modes, 0.0)[0]), 8.0, 1e-9);
@@ -110,7 +111,7 @@ TEST(WhatIf, OverhangBendsAsABeam) {
   EXPECT_EQ(longer[0].damping_ratio, modes[0].damping_ratio);
 }
 
-TEST(WhatIf, NamesTheModeThatLimits) {
+TEST(WhatIf, NamesTheLimitingMode) {
   std::vector<SystemMode> modes = systemModes(benchmark(), benchmark());
   modes[1].frequency = 2000.0;
   EXPECT_EQ(dominantMode(modes, 930.0), 0);
@@ -128,7 +129,7 @@ TEST(WhatIf, SpreadLiesAroundTheLimit) {
   WhatIf request;
   request.speeds = 40;
   request.spread = true;
-  for (const double direct : {0.0, 1e-9}) {  // a residual compliance counts as a mode more
+  for (const double direct : {0.0, 1e-9}) {  // a residual compliance is one more mode
     const WhatIfChart chart = benchmarkMaker(direct).whatIf(request);
     ASSERT_EQ(chart.limit_low.size(), 40u);
     for (std::size_t k = 0; k < 40; ++k) {
@@ -138,7 +139,7 @@ TEST(WhatIf, SpreadLiesAroundTheLimit) {
   }
 }
 
-TEST(WhatIf, RefusesWhatCannotBe) {
+TEST(WhatIf, RefusesInvalidRequests) {
   const ChartMaker maker = benchmarkMaker();
   const auto refused = [&](auto change) {
     WhatIf request;

@@ -18,35 +18,35 @@ namespace {
 
 using units::radPerSecFromRpm;
 
-/// The benchmark with 25 times the stiffness: cuts of a millimetre and of hundreds of newtons.
+/// The benchmark with 25 times the stiffness: depths of about a millimetre and forces of hundreds of newtons.
 ModalModel stiff() {
   ModalModel model = benchmark();
   model.modes[0].gain /= 25.0;
   return model;
 }
 
-/// Verdicts of the detector on a simulated cut: runout, noise, a tool that sinks in, an end in the air.
+/// Verdicts of the detector on a simulated cut with runout, noise, a ramp of the depth and an end in air.
 struct Study {
   std::vector<ChatterState> states;
-  /// [s] from when the noiseless force fails the detector's ratio, turn by turn, to the end
+  /// [s] Time from which the noiseless force exceeds the energy ratio of the detector in every revolution.
   double grown = NAN;
-  /// [Hz] strongest line of the noiseless force without its mean over the last 60 turns
+  /// [Hz] Strongest line of the noiseless force without its synchronous part, over the last 60 revolutions.
   double frequency = NAN;
 };
 
 Study cutOnce(const RegenerativeSystem& system, double speed, double depth, unsigned seed) {
-  constexpr int STEPS = 720, TURNS = 170, AIR = 10, KEPT = 4, LATE = 60;
+  constexpr int STEPS = 720, TURNS = 170, AIR = 10, DECIMATION = 4, LATE = 60;
   TimeDomain run(system, stiff(), stiff(), speed, depth, 0.1e-3, STEPS);
   std::mt19937_64 random(seed);
   std::normal_distribution<double> noise(0.0, 3.0), runout(0.0, 5e-6);
   std::vector<double> offsets;
   for (int k = 0; k < system.teeth; ++k) offsets.push_back(runout(random));
   run.setRunout(offsets);
-  const double turn = units::TWO_PI / speed, rate = STEPS / KEPT / turn;
+  const double turn = units::TWO_PI / speed, rate = STEPS / DECIMATION / turn;
   Study study;
   ChatterDetector detector(ChatterParameters(),
                            [&](const ChatterState& state) { study.states.push_back(state); });
-  CutStreams streams(detector, speed, ToolGeometry(), 30.0 * turn);  // in full engagement after 30 turns
+  CutStreams streams(detector, speed, ToolGeometry(), 30.0 * turn);  // full engagement after 30 revolutions
   ForceBlock block;
   block.sample_rate = rate;
   block.status = ForceBlock::Status::compensated;
@@ -58,14 +58,14 @@ Study cutOnce(const RegenerativeSystem& system, double speed, double depth, unsi
     const bool cutting = i < STEPS * TURNS;
     if (cutting) run.step();
     const std::array<double, 2> force = cutting ? run.force() : std::array<double, 2>{{0.0, 0.0}};
-    // Turn by turn: what does not repeat against what there is.
+    // Energy of the change from the previous revolution, and total energy, of each revolution.
     if (i % STEPS == 0) change = all = 0.0;
     auto& old = before[static_cast<std::size_t>(i % STEPS)];
     for (std::size_t a = 0; a < 2; ++a) {
       change += 0.5 * std::pow(force[a] - old[a], 2);
       all += force[a] * force[a];
     }
-    if (cutting && i >= STEPS * (TURNS - LATE) && i % KEPT == 0)
+    if (cutting && i >= STEPS * (TURNS - LATE) && i % DECIMATION == 0)
       for (std::size_t a = 0; a < 2; ++a) late[a].push_back(force[a]);
     old = force;
     if (cutting && i % STEPS == STEPS - 1 && i > 34 * STEPS) {
@@ -75,7 +75,7 @@ Study cutOnce(const RegenerativeSystem& system, double speed, double depth, unsi
         study.grown = t - turn;
       }
     }
-    if (i % KEPT == 0) {
+    if (i % DECIMATION == 0) {
       block.force[0].push_back(force[0] + noise(random));
       block.force[1].push_back(force[1] + noise(random));
       block.force[2].push_back(noise(random));
@@ -88,16 +88,16 @@ Study cutOnce(const RegenerativeSystem& system, double speed, double depth, unsi
     }
     streams.at(t, cutting);
   }
-  study.frequency = strongestLine(late, STEPS / KEPT, rate);
+  study.frequency = strongestLine(late, STEPS / DECIMATION, rate);
   return study;
 }
 
-// Cuts on both sides of the limit, 10 % off at least: false alarms, detections, delay and frequency.
-TEST(DetectionStudy, alarmsAndDetections) {
+// Cuts at least 10 % away from the limit on both sides: false alarms, detections, delay and frequency.
+TEST(DetectionStudy, falseAlarmsAndDetections) {
   const int cuts = std::getenv("SMARTMILL_STUDY") ? 300 : 60;
   RegenerativeSystem system = benchmarkSystem(0.5, true, true);
   system.modes = systemModes(stiff(), stiff());
-  system.teeth = 3;  // odd: a flip then lies off the spindle's harmonics
+  system.teeth = 3;  // odd: a flip is not a spindle harmonic
   const auto solver = makeFloquetSolver(Method::collocation, system);
   std::mt19937_64 random(11);
   std::uniform_real_distribution<double> unit;
@@ -110,34 +110,34 @@ TEST(DetectionStudy, alarmsAndDetections) {
     const double depth = limit * (i % 2 ? 0.4 + 0.5 * unit(random) : 1.2 + 0.8 * unit(random));
     const auto at = solver->at(speed);
     const bool chatters = at->multiplier(depth).radius() > 1.0;
-    // Beyond a first loss a pocket may follow; ask for clear cases.
+    // Only cuts that are at least 10 % away from a boundary; a pocket may follow above the first loss.
     if ((at->multiplier(1.1 * depth).radius() > 1.0) != chatters ||
         (at->multiplier(0.9 * depth).radius() > 1.0) != chatters)
       continue;
     const Study study = cutOnce(system, speed, depth, static_cast<unsigned>(100 + i));
-    const std::vector<ChatterEpisode> seen = episodes(study.states);
+    const std::vector<ChatterEpisode> detected = episodes(study.states);
     ++i;
     if (!chatters) {
       ++stable;
-      alarms += !seen.empty();
+      alarms += !detected.empty();
       continue;
     }
-    // Whether it came to chatter within this cut the noiseless force says.
+    // The noiseless force decides whether the chatter grew within the cut.
     if (std::isnan(study.grown)) continue;
     ++chattering;
-    if (seen.empty()) continue;
+    if (detected.empty()) continue;
     ++found;
-    delays.push_back((seen.front().detected - study.grown) * speed / units::TWO_PI);
-    near += std::abs(seen.back().frequency - study.frequency) < 0.01 * study.frequency;
+    delays.push_back((detected.front().detected - study.grown) * speed / units::TWO_PI);
+    near += std::abs(detected.back().frequency - study.frequency) < 0.01 * study.frequency;
   }
   std::sort(delays.begin(), delays.end());
   const double median = delays.empty() ? NAN : delays[delays.size() / 2];
   std::cout << alarms << " false alarms in " << stable << " stable cuts; " << found << " of " << chattering
-            << " found, median delay " << median << " turns after the force stopped repeating; " << near
-            << " frequencies within 1 %\n";
+            << " detected, median delay " << median << " revolutions after the force stopped repeating; "
+            << near << " frequencies within 1 %\n";
   EXPECT_LE(alarms, 0.01 * stable);
   EXPECT_GE(found, 0.98 * chattering);
-  EXPECT_LE(median, 24.0);  // a window and a hop
+  EXPECT_LE(median, 24.0);  // one window and one hop
   EXPECT_GE(near, 0.9 * found);
 }
 
@@ -167,7 +167,7 @@ TEST(Episodes, joinWindowsOfOneCut) {
   EXPECT_TRUE(episodes({}).empty());
 }
 
-TEST(ChatterSpeeds, meetTheToothPassingFrequency) {
+TEST(ChatterSpeeds, toothPassingFrequencyDividesTheChatterFrequency) {
   const auto speeds = speedsFromChatter(950.0, 2, radPerSecFromRpm(6000.0), radPerSecFromRpm(20000.0));
   ASSERT_EQ(speeds.size(), 3u);  // 28500, then 14250, 9500, 7125 rpm, then 5700
   EXPECT_NEAR(units::rpmFromRadPerSec(speeds[0]), 14250.0, 1e-9);
@@ -176,8 +176,8 @@ TEST(ChatterSpeeds, meetTheToothPassingFrequency) {
   EXPECT_THROW(speedsFromChatter(0.0, 2, 100.0, 200.0), Error);
 }
 
-// The speed so found is better: its limit exceeds the one at which it chattered, several times.
-TEST(ChatterSpeeds, liesInAPocket) {
+// The limit at the proposed speed is several times that at the speed with chatter.
+TEST(ChatterSpeeds, lieInAPocket) {
   const auto solver = makeSolver(Method::collocation, benchmarkSystem(0.5, true, true));
   const double speed = radPerSecFromRpm(15000.0);
   const Limit limit = solver->limit(speed, 10e-3);
@@ -187,51 +187,51 @@ TEST(ChatterSpeeds, liesInAPocket) {
   EXPECT_GT(solver->limit(speeds.front(), 10e-3).depth, 3.0 * limit.depth);
 }
 
-/// A machine, and a belief about it whose y mode is 3 % low.
-std::array<RegenerativeSystem, 2> truthAndBelief() {
+/// A machine, and a prior model of it with a y mode 3 % low.
+std::array<RegenerativeSystem, 2> truthAndPrior() {
   const ModalModel x{{{700.0, 0.03, 4e-8}}, 0.0};
   ModalModel y = benchmark();
   RegenerativeSystem truth = benchmarkSystem(0.5, true, true);
   truth.modes = systemModes(x, y);
-  RegenerativeSystem belief = truth;
+  RegenerativeSystem prior = truth;
   y.modes[0].frequency /= 1.03;
-  belief.modes = systemModes(x, y);
-  return {truth, belief};
+  prior.modes = systemModes(x, y);
+  return {truth, prior};
 }
 
-// A belief whose y mode is 3 % low: the frequency of one chattering cut tells which mode and how far.
+// The frequency of one cut with chatter identifies the wrong mode and its error.
 TEST(Correction, findsTheModeAndItsError) {
-  const auto systems = truthAndBelief();
-  const RegenerativeSystem &truth = systems[0], &belief = systems[1];
+  const auto systems = truthAndPrior();
+  const RegenerativeSystem &truth = systems[0], &prior = systems[1];
   for (const double rpm : {9000.0, 13000.0, 17000.0}) {
     const double speed = radPerSecFromRpm(rpm);
     const double limit = makeSolver(Method::collocation, truth)->limit(speed, 10e-3).depth;
     if (!std::isfinite(limit)) continue;
     const double depth = 1.2 * limit;
     const double observed = makeFloquetSolver(Method::collocation, truth)->at(speed)->chatterFrequency(depth);
-    const auto correction = correctFromChatter(belief, speed, depth, observed);
+    const auto correction = correctFromChatter(prior, speed, depth, observed);
     ASSERT_TRUE(correction) << rpm;
     EXPECT_EQ(correction->mode, 1u) << rpm;
     EXPECT_NEAR(correction->factor, 1.03, 0.004) << rpm;
     EXPECT_TRUE(correction->chatters);
-    // The corrected chart is the true one again.
+    // The corrected limit is the true one.
     const double corrected = makeSolver(Method::collocation, correction->system)->limit(speed, 10e-3).depth;
     EXPECT_NEAR(corrected / limit, 1.0, 0.1) << rpm;
   }
 }
 
-TEST(Correction, nothingFitsIsSaid) {
-  // 40 % beside any mode.
+TEST(Correction, isEmptyWithoutAFit) {
+  // No mode within the largest change.
   EXPECT_FALSE(
       correctFromChatter(benchmarkSystem(1.0, true, false), radPerSecFromRpm(40000.0), 0.2e-3, 1900.0, 0.02));
   EXPECT_THROW(correctFromChatter(benchmarkSystem(1.0, true, false), 1000.0, 1e-3, -1.0), Error);
 }
 
-// A belief 3 % low in one mode, and verdicts with the true frequency: advice once, with mode, factor and
-// speeds whose limit is several times that of the cut.
-TEST(Advisor, advisesOnceAnEpisode) {
-  const auto systems = truthAndBelief();
-  const RegenerativeSystem &truth = systems[0], &belief = systems[1];
+// A prior model with one mode 3 % low, and verdicts with the true frequency: one advice per episode, with
+// mode, factor and speeds whose limit is several times that of the cut.
+TEST(Advisor, advisesOncePerEpisode) {
+  const auto systems = truthAndPrior();
+  const RegenerativeSystem &truth = systems[0], &prior = systems[1];
   const double speed = radPerSecFromRpm(13000.0);
   CuttingCondition condition;
   condition.name = "cut";
@@ -244,10 +244,10 @@ TEST(Advisor, advisesOnceAnEpisode) {
   std::vector<ChatterAdvice> given;
   ChatterAdvisor advisor(
       radPerSecFromRpm(8000.0), radPerSecFromRpm(40000.0), 2,
-      [&](const CuttingCondition&) { return std::optional<RegenerativeSystem>(belief); },
+      [&](const CuttingCondition&) { return std::optional<RegenerativeSystem>(prior); },
       [&](const ChatterAdvice& advice) { given.push_back(advice); });
   advisor.handle(condition);
-  CuttingCondition next = condition;  // told ahead of its time
+  CuttingCondition next = condition;  // received ahead of its time
   next.name = "next";
   next.spindle_speed = 100.0;
   advisor.handle(next);
@@ -255,24 +255,24 @@ TEST(Advisor, advisesOnceAnEpisode) {
   state.valid = true;
   state.condition = "cut";
   double stamp = 1.0;
-  const auto tell = [&](bool chatter, double frequency) {
+  const auto verdict = [&](bool chatter, double frequency) {
     state.chatter = chatter;
     state.frequency = frequency;
     state.stamp = stamp++;
     advisor.handle(state);
   };
-  tell(false, 100.0);
-  tell(true, 3.0 * observed);  // growing still: another line
+  verdict(false, 100.0);
+  verdict(true, 3.0 * observed);  // growing chatter with another dominant line
   EXPECT_TRUE(given.empty());
-  tell(true, observed);
+  verdict(true, observed);
   EXPECT_TRUE(given.empty());
-  tell(true, 1.001 * observed);
+  verdict(true, 1.001 * observed);
   ASSERT_EQ(given.size(), 1u);
-  tell(true, observed);
+  verdict(true, observed);
   EXPECT_EQ(given.size(), 1u);
-  tell(false, 100.0);
-  tell(true, observed);
-  tell(true, observed);
+  verdict(false, 100.0);
+  verdict(true, observed);
+  verdict(true, observed);
   EXPECT_EQ(given.size(), 2u);
   const ChatterAdvice& advice = given.front();
   EXPECT_EQ(advice.stamp, 4.0);
@@ -282,18 +282,18 @@ TEST(Advisor, advisesOnceAnEpisode) {
   EXPECT_NEAR(advice.believed_frequency, 922.0 / 1.03, 1e-9);
   EXPECT_NEAR(advice.corrected_limit / limit, 1.0, 0.1);
   ASSERT_FALSE(advice.speeds.empty());
-  // In step with the chatter is among them (its frequency is the flip's here, no pocket), in step with a mode
+  // The chatter is a flip: the speed of its frequency is included, but a speed of a modal frequency comes
   // first.
   const double step = units::TWO_PI * 1.0005 * observed / 2.0;
   EXPECT_TRUE(std::any_of(advice.speeds.begin(), advice.speeds.end(),
                           [&](const auto& s) { return std::abs(s.speed - step) < 1.0; }));
   EXPECT_GT(advice.speeds.front().limit, 2.0 * limit);
-  const double there =
+  const double true_limit =
       makeSolver(Method::collocation, truth)->limit(advice.speeds.front().speed, 10e-3).depth;
-  EXPECT_GT(there, 1.5 * limit);
+  EXPECT_GT(true_limit, 1.5 * limit);
 }
 
-TEST(Advisor, withoutABeliefTheSpeedsAlone) {
+TEST(Advisor, withoutAPriorModelProposesSpeedsWithoutLimits) {
   std::vector<ChatterAdvice> given;
   ChatterAdvisor advisor(
       100.0, 4000.0, 4, [](const CuttingCondition&) { return std::nullopt; },

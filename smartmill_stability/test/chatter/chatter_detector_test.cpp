@@ -15,7 +15,7 @@ namespace {
 
 using units::TWO_PI;
 
-/// A cut as the detector sees it.
+/// Verdicts of the detector on a scene.
 std::vector<ChatterState> run(const Scene& scene, const ChatterParameters& parameters = {}) {
   std::vector<ChatterState> states;
   ChatterDetector detector(parameters, [&](const ChatterState& state) { states.push_back(state); });
@@ -30,19 +30,19 @@ TEST(ChatterDetector, forcedVibrationIsNoChatter) {
     EXPECT_FALSE(state.chatter) << state.stamp;
     if (!state.valid) continue;
     ++valid;
-    // What is left is the noise, 1 N in each of three axes; resampling takes at most 36 % of white noise's
-    // power.
+    // The remainder is the noise, 1 N in each of three axes; resampling removes at most 36 % of the power of
+    // white noise.
     EXPECT_LT(state.severity, 1.03 * std::sqrt(3.0)) << state.stamp;
     EXPECT_GT(state.severity, 0.8 * std::sqrt(3.0)) << state.stamp;
     EXPECT_EQ(state.condition, "cut_1");
     EXPECT_GT(state.stamp, 0.5);
     EXPECT_LT(state.stamp, 2.52);
   }
-  // Two seconds of 75.3 turns each, a verdict every 8 turns, the first after 20.
+  // Two seconds at 75.3 revolutions per second, a verdict every 8 revolutions, the first after 20.
   EXPECT_NEAR(valid, (2.0 * 75.3 - 20.0) / 8.0, 2.0);
 }
 
-TEST(ChatterDetector, measuresChattersFrequencyAndForce) {
+TEST(ChatterDetector, measuresFrequencyAndForceOfChatter) {
   Scene scene;
   scene.chatter = 120.0;
   int valid = 0;
@@ -51,9 +51,9 @@ TEST(ChatterDetector, measuresChattersFrequencyAndForce) {
     ++valid;
     EXPECT_TRUE(state.chatter);
     EXPECT_NEAR(state.frequency, scene.frequency, 0.5) << state.stamp;
-    // Amplitude over root two, with noise; the turn-wise mean takes up to a few percent with it.
+    // Amplitude over sqrt(2), plus noise; the mean over the revolutions removes up to a few percent.
     EXPECT_NEAR(state.severity, 120.0 / std::sqrt(2.0), 6.0) << state.stamp;
-    // All energy: forced in x and in y (times 0.7), and chatter.
+    // Total energy: forced vibration in x and in y (amplitude times 0.7), and chatter.
     const double forced = 1.49 * (150.0 * 150.0 + 60.0 * 60.0 + 40.0 * 40.0) / 2.0,
                  chatter = 120.0 * 120.0 / 2.0;
     EXPECT_NEAR(state.energy_ratio, chatter / (forced + chatter), 0.03) << state.stamp;
@@ -61,7 +61,7 @@ TEST(ChatterDetector, measuresChattersFrequencyAndForce) {
   EXPECT_GT(valid, 10);
 }
 
-TEST(ChatterDetector, tellsWhenChatterBegins) {
+TEST(ChatterDetector, detectsTheOnsetOfChatter) {
   Scene scene;
   scene.chatter = 150.0;
   scene.chatter_from = 1.5;
@@ -73,11 +73,12 @@ TEST(ChatterDetector, tellsWhenChatterBegins) {
   }
   EXPECT_FALSE(before);
   EXPECT_GT(first, 1.5);
-  EXPECT_LT(first, 1.5 + 24 / 75.3);  // a window and a hop later at the most
+  EXPECT_LT(first, 1.5 + 24 / 75.3);  // at most one window and one hop later
 }
 
-// Every other tooth out of the cut: it repeats each revolution, and only its size tells it from runout.
-TEST(ChatterDetector, findsTheFlipOfFourTeeth) {
+// Every other tooth leaves the cut: synchronous with the revolution, distinguished from runout by its
+// amplitude.
+TEST(ChatterDetector, detectsTheFlipOfFourTeeth) {
   Scene scene;
   scene.teeth = 4;
   scene.alternating = 150.0;
@@ -93,8 +94,8 @@ TEST(ChatterDetector, findsTheFlipOfFourTeeth) {
     EXPECT_NEAR(state.severity, 150.0 / std::sqrt(2.0), 5.0);
   }
   EXPECT_GT(valid, 10);
-  // A tenth of the force alternating, as runout does it, is none; nor can it be told where the teeth are not
-  // known.
+  // Alternation of a tenth of the force, typical of runout, is no chatter. With an unknown number of teeth a
+  // flip is not detected.
   scene.alternating = 20.0;
   for (const ChatterState& state : run(scene)) EXPECT_FALSE(state.chatter);
   scene.alternating = 150.0;
@@ -102,8 +103,8 @@ TEST(ChatterDetector, findsTheFlipOfFourTeeth) {
   for (const ChatterState& state : run(scene)) EXPECT_FALSE(state.chatter);
 }
 
-// The ringing of an entry is no chatter, though it is large in the first window.
-TEST(ChatterDetector, whatDiesOutIsNoChatter) {
+// The transient of an entry is no chatter, although it is large in the first window.
+TEST(ChatterDetector, aDecayingTransientIsNoChatter) {
   Scene scene;
   scene.transient = 400.0;
   double largest = 0.0;
@@ -111,10 +112,10 @@ TEST(ChatterDetector, whatDiesOutIsNoChatter) {
     EXPECT_FALSE(state.chatter) << state.stamp;
     largest = std::max(largest, state.energy_ratio);
   }
-  EXPECT_GT(largest, 0.1);  // the ratio alone would have called it chatter
+  EXPECT_GT(largest, 0.1);  // above energy_ratio
 }
 
-TEST(SignalBlock, takesUpToThreeChannels) {
+TEST(SignalBlock, hasUpToThreeChannels) {
   SampleBlock block;
   block.stamp = 3.0;
   block.sample_rate = 1000.0;
@@ -131,7 +132,7 @@ TEST(SignalBlock, takesUpToThreeChannels) {
   EXPECT_THROW(signalBlock(SampleBlock{}), Error);
 }
 
-TEST(ChatterDetector, saysNothingOutsideTheSteadyPart) {
+TEST(ChatterDetector, isInvalidOutsideTheSteadyCut) {
   const std::vector<ChatterState> states = run({});
   ASSERT_FALSE(states.empty());
   EXPECT_FALSE(states.front().valid);
@@ -140,9 +141,8 @@ TEST(ChatterDetector, saysNothingOutsideTheSteadyPart) {
   EXPECT_NEAR(states.back().stamp, 2.5, 0.03);
 }
 
-// The same inputs through a sorter, however late by stream, and again after a restart of the bag: the same
-// verdicts.
-TEST(DetectionPipeline, anyArrivalGivesTheSameVerdicts) {
+// The verdicts do not depend on the delay between streams, and are the same after a restart of the bag.
+TEST(DetectionPipeline, verdictsDoNotDependOnTheOrderOfArrival) {
   const auto feed = [](DetectionPipeline& detection, double lag) {
     CuttingCondition condition;
     condition.stamp = 0.01;
@@ -186,7 +186,7 @@ TEST(DetectionPipeline, anyArrivalGivesTheSameVerdicts) {
     if (state.valid) states.push_back(state);
   });
   for (const double lag : {0.0, 0.0, 0.3}) {
-    feed(detection, lag);  // from the second on the stamps jump back: a restart
+    feed(detection, lag);  // from the second call on the stamps jump back: a restart
     results.push_back(states);
     states.clear();
   }
@@ -202,8 +202,8 @@ TEST(DetectionPipeline, anyArrivalGivesTheSameVerdicts) {
   EXPECT_TRUE(results[0].back().chatter);
 }
 
-// The condition that holds when a recording begins may have been recorded behind the first states.
-TEST(DetectionPipeline, theConditionOfTheBeginningMayComeLate) {
+// The condition that is valid at the start of a recording may be recorded after the first states.
+TEST(DetectionPipeline, theFirstConditionMayArriveLate) {
   const auto verdicts = [](int before) {
     std::vector<ChatterState> states;
     DetectionPipeline detection({}, 0.05, [&](const ChatterState& state) { states.push_back(state); });
@@ -239,7 +239,7 @@ TEST(DetectionPipeline, theConditionOfTheBeginningMayComeLate) {
   }
 }
 
-TEST(ChatterDetector, refusesBadParameters) {
+TEST(ChatterDetector, refusesInvalidParameters) {
   ChatterParameters parameters;
   parameters.energy_ratio = 0.0;
   EXPECT_THROW(ChatterDetector(parameters, [](const ChatterState&) {}), Error);

@@ -12,13 +12,13 @@ namespace smartmill::stability {
 namespace {
 
 constexpr double RATE = 16000.0, SPEED = 6000.0 * units::TWO_PI / 60.0;
-constexpr int TEETH = 2;  // they pass at 200 Hz
+constexpr int TEETH = 2;  // tooth passing frequency 200 Hz
 
 struct Tone {
   double frequency, size;
 };
 
-/// A second of air, two of cut, one of air; noise of unit size.
+/// One second of air, two of cut, one of air; noise with unit variance.
 Recording recording(const std::vector<Tone>& in_cut, const std::vector<Tone>& always, bool air = true) {
   std::mt19937_64 random(5);
   std::normal_distribution<double> normal;
@@ -43,14 +43,14 @@ RecordingRequest request() {
   return r;
 }
 
-const std::vector<Tone> TEETH_HEARD{{200.0, 3.0}, {400.0, 2.0}, {600.0, 2.0}, {800.0, 1.0}};
+const std::vector<Tone> TOOTH_PASSING{{200.0, 3.0}, {400.0, 2.0}, {600.0, 2.0}, {800.0, 1.0}};
 
 std::vector<Tone> with(std::vector<Tone> more) {
-  more.insert(more.end(), TEETH_HEARD.begin(), TEETH_HEARD.end());
+  more.insert(more.end(), TOOTH_PASSING.begin(), TOOTH_PASSING.end());
   return more;
 }
 
-TEST(Recording, linesATeethsPassingApartThatLiveInTheCutAreChatter) {
+TEST(Recording, linesOneToothPassingApartDuringTheCutAreChatter) {
   const RecordingVerdict v =
       judgeRecording(recording(with({{873.0, 3.0}, {673.0, 1.0}, {1073.0, 1.0}}), {}), request());
   EXPECT_TRUE(v.cut);
@@ -62,21 +62,21 @@ TEST(Recording, linesATeethsPassingApartThatLiveInTheCutAreChatter) {
   EXPECT_NEAR(v.to, 3.0, 0.3);
 }
 
-TEST(Recording, harmonicsAreNone) {
+TEST(Recording, harmonicsAreNoChatter) {
   const RecordingVerdict v =
       judgeRecording(recording(with({{100.0, 1.0}, {300.0, 1.0}, {900.0, 2.0}}), {}), request());
   EXPECT_TRUE(v.cut);
   EXPECT_FALSE(v.chatter) << v.text();
 }
 
-TEST(Recording, aToneThatSoundsOutOfTheCutIsAnotherMachines) {
+TEST(Recording, aToneOutsideTheCutIsNoChatter) {
   const std::vector<Tone> other{{873.0, 2.0}, {1746.0, 1.0}, {1231.0, 2.0}};
-  EXPECT_FALSE(judgeRecording(recording(TEETH_HEARD, other), request()).chatter);
-  // Without air its loneliness tells.
-  EXPECT_FALSE(judgeRecording(recording(TEETH_HEARD, other, false), request()).chatter);
+  EXPECT_FALSE(judgeRecording(recording(TOOTH_PASSING, other), request()).chatter);
+  // Without air it is identified by the lack of companions.
+  EXPECT_FALSE(judgeRecording(recording(TOOTH_PASSING, other, false), request()).chatter);
 }
 
-TEST(Recording, theHarmonicsCorrectASpeedThatIsToldWrong) {
+TEST(Recording, theHarmonicsCorrectAWrongSpeed) {
   RecordingRequest wrong = request();
   wrong.speed = 1.012 * SPEED;
   const RecordingVerdict stable = judgeRecording(recording(with({{1200.0, 2.0}, {1800.0, 2.0}}), {}), wrong);
@@ -84,7 +84,7 @@ TEST(Recording, theHarmonicsCorrectASpeedThatIsToldWrong) {
   EXPECT_FALSE(stable.chatter) << stable.text();
 }
 
-TEST(Recording, whereModesAreKnownChatterLiesNearOne) {
+TEST(Recording, withKnownModesChatterLiesNearOne) {
   RecordingRequest known = request();
   known.modes = {840.0};
   const Recording r = recording(with({{873.0, 3.0}, {673.0, 1.0}, {1073.0, 1.0}}), {});
@@ -97,10 +97,10 @@ TEST(Recording, whereModesAreKnownChatterLiesNearOne) {
 TEST(Recording, noiseAloneIsNoCut) {
   const RecordingVerdict v = judgeRecording(recording({}, {}), request());
   EXPECT_FALSE(v.cut);
-  EXPECT_EQ(v.text(), "no cut: nothing is heard that cuts");
+  EXPECT_EQ(v.text(), "no cut: no louder part and no lines at the tooth passing frequency");
 }
 
-TEST(Recording, whatCannotBeJudgedIsRefusedInOneLine) {
+TEST(Recording, refusesInvalidRecordingsAndRequests) {
   Recording brief = recording({}, {});
   brief.channels[0].resize(500);
   EXPECT_THROW(judgeRecording(brief, request()), Error);

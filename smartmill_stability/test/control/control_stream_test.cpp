@@ -31,7 +31,7 @@ Played play(const TurningProcess& process, const std::vector<SampleBlock>& block
   return played;
 }
 
-TEST(ControlStream, learnsAndCommandsWhateverTheBlocks) {
+TEST(ControlStream, resultsDoNotDependOnTheSizeOfTheBlocks) {
   const TurningProcess process = kimProcess(2.0);
   const Played fine = play(process, displacementBlocks(process, 2.1, 100));
   const Played coarse = play(process, displacementBlocks(process, 2.1, 250));
@@ -40,23 +40,23 @@ TEST(ControlStream, learnsAndCommandsWhateverTheBlocks) {
   EXPECT_NEAR(fine.learnt[0].machine.frequency, 350.0, 3.5);
   EXPECT_NEAR(fine.learnt[0].machine.damping_ratio, 0.02, 0.004);
   EXPECT_NEAR(fine.learnt[0].stamp, 100.0 + 2.048, 2e-3);
-  EXPECT_EQ(fine.commands, coarse.commands);  // to the last digit
+  EXPECT_EQ(fine.commands, coarse.commands);
   EXPECT_EQ(fine.commands.front(), 0.0);
   EXPECT_NE(fine.commands.back(), 0.0);
 }
 
-TEST(ControlStream, aGapOrANewSpeedStartsAnew) {
+TEST(ControlStream, aGapRestartsTheEstimateAndCommandsRequireASpeed) {
   const TurningProcess process = kimProcess(2.0);
   std::vector<SampleBlock> blocks = displacementBlocks(process, 2.1, 100);
   for (std::size_t i = 100; i < blocks.size(); ++i) blocks[i].first_index += 7;
   EXPECT_TRUE(play(process, blocks).learnt.empty());
   ControlStream stream(ControlStreamParameters(), {});
-  EXPECT_FALSE(stream.handle(blocks[0]));  // the speed is not known yet
+  EXPECT_FALSE(stream.handle(blocks[0]));  // unknown speed
   stream.handle(SpindleAngle{99.0, 0.0, 60.0});
   EXPECT_TRUE(stream.handle(blocks[0]));
 }
 
-TEST(ControlStream, namesWhatIsWrong) {
+TEST(ControlStream, refusesInvalidBlocksAndParameters) {
   ControlStream stream(ControlStreamParameters(), {});
   SampleBlock block = displacementBlocks(kimProcess(1.0), 0.01, 100)[0];
   block.units[0] = "V";

@@ -14,12 +14,12 @@ namespace {
 
 constexpr double RPM = units::TWO_PI / 60.0;
 
-/// A slot whose zero-order pockets lie where tooth passing meets the one mode.
+/// Down-milling at half immersion with one mode in x and y.
 RegenerativeSystem system() {
   return systemOf(readMachineModel(MODEL_FILE), 90.0, 180.0);
 }
 
-UncertainSystem believed(double frequency = 0.005) {
+UncertainSystem estimated(double frequency = 0.005) {
   const RegenerativeSystem mean = system();
   return UncertainSystem(mean, std::vector<ModeUncertainty>(mean.modes.size(), {frequency, 0.05, 0.05}), 0.05,
                          0.1);
@@ -33,7 +33,7 @@ class Control : public ::testing::Test {
     parameters_.adaptive = true;
     control_ = std::make_unique<MillingControl>(parameters_, 16,
                                                 [known](const Engagement&) -> std::optional<UncertainSystem> {
-                                                  if (known) return believed();
+                                                  if (known) return estimated();
                                                   return std::nullopt;
                                                 });
     cut_.kind = CuttingCondition::Kind::cut;
@@ -59,7 +59,7 @@ class Control : public ::testing::Test {
     s.chatter = chatter;
     control_->handle(s);
   }
-  /// @param share of the limit at the cut's speed
+  /// @param share [1] depth over the limit at the speed of the cut
   ChatterAdvice advice(double stamp, double share) {
     ChatterAdvice a;
     a.stamp = stamp;
@@ -82,40 +82,40 @@ class Control : public ::testing::Test {
   CuttingCondition cut_;
 };
 
-TEST_F(Control, theSpindleGoesWhereDrawnMachinesAreStableAndTheFeedWithIt) {
+TEST_F(Control, movesToASpeedAtWhichDrawnMachinesAreStable) {
   const ChatterAdvice a = advice(1.0, 1.5);
   control_->handle(a);
-  const auto wish = control_->takeRequest();
-  ASSERT_TRUE(wish);
-  EXPECT_TRUE(wish->chatter);
-  EXPECT_NEAR(wish->feed, wish->spindle, 1e-12);
-  EXPECT_GE(wish->spindle, 0.8);
-  EXPECT_LE(wish->spindle, 1.2);
-  // Another seed, more draws: the probability is what was promised, within the binomial's spread.
-  EXPECT_LT(chatterProbability(believed(), wish->spindle * cut_.spindle_speed, a.depth, 200, 99), 0.12);
-  EXPECT_NE(wish->reason.find("chatter at 1000 Hz"), std::string::npos) << wish->reason;
-  EXPECT_EQ(wish->reason.find('\n'), std::string::npos);
+  const auto request = control_->takeRequest();
+  ASSERT_TRUE(request);
+  EXPECT_TRUE(request->chatter);
+  EXPECT_NEAR(request->feed, request->spindle, 1e-12);
+  EXPECT_GE(request->spindle, 0.8);
+  EXPECT_LE(request->spindle, 1.2);
+  // Accepted risk, within the scatter of 200 draws of another seed.
+  EXPECT_LT(chatterProbability(estimated(), request->spindle * cut_.spindle_speed, a.depth, 200, 99), 0.12);
+  EXPECT_NE(request->reason.find("chatter at 1000 Hz"), std::string::npos) << request->reason;
+  EXPECT_EQ(request->reason.find('\n'), std::string::npos);
   EXPECT_FALSE(control_->takeRequest());
 }
 
-TEST_F(Control, itSettlesAndSaysSo) {
+TEST_F(Control, reportsAStableCutAfterTheMove) {
   control_->handle(advice(1.0, 1.5));
-  const auto wish = control_->takeRequest();
-  ASSERT_TRUE(wish);
+  const auto request = control_->takeRequest();
+  ASSERT_TRUE(request);
   control_->answer(true, "");
   EXPECT_TRUE(control_->moving());
-  const double speed = wish->spindle * cut_.spindle_speed, turn = units::TWO_PI / speed;
+  const double speed = request->spindle * cut_.spindle_speed, turn = units::TWO_PI / speed;
   state(1.1, speed);
-  verdict(1.1 + 10.0 * turn, true);  // its window reaches back before the move
+  verdict(1.1 + 10.0 * turn, true);  // its window begins before the move
   EXPECT_TRUE(control_->moving());
   verdict(1.1 + 30.0 * turn, false);
   EXPECT_FALSE(control_->moving());
   const auto notes = control_->takeNotes();
   ASSERT_EQ(notes.size(), 1u);
-  EXPECT_NE(notes[0].find("slot: the cut has settled"), std::string::npos) << notes[0];
+  EXPECT_NE(notes[0].find("slot: cut stable at"), std::string::npos) << notes[0];
 }
 
-TEST_F(Control, nothingHappensDisarmedOrUnasked) {
+TEST_F(Control, doesNotActWhileDisarmedOrNotAdaptive) {
   state(0.5, cut_.spindle_speed, false);
   control_->handle(advice(1.0, 1.5));
   EXPECT_FALSE(control_->takeRequest());
@@ -123,25 +123,25 @@ TEST_F(Control, nothingHappensDisarmedOrUnasked) {
   const MillingControlParameters off = parameters_;
   start();
   parameters_ = off;
-  control_ = std::make_unique<MillingControl>(off, 16, [](const Engagement&) { return believed(); });
+  control_ = std::make_unique<MillingControl>(off, 16, [](const Engagement&) { return estimated(); });
   control_->handle(cut_);
   state(0.0, cut_.spindle_speed);
   control_->handle(advice(1.0, 1.5));
   EXPECT_FALSE(control_->takeRequest());
 }
 
-TEST_F(Control, whereNoSpeedBearsItTheFeedGoesToItsFloorAndTheNextCutIsSaid) {
+TEST_F(Control, withoutAStableSpeedTheFeedGoesToItsFloor) {
   const ChatterAdvice a = advice(1.0, 40.0);
   control_->handle(a);
-  const auto wish = control_->takeRequest();
-  ASSERT_TRUE(wish);
-  EXPECT_EQ(wish->feed, 0.4);
-  EXPECT_EQ(wish->spindle, 1.0);
-  EXPECT_NE(wish->reason.find("no speed from 8000 to 12000 rpm"), std::string::npos) << wish->reason;
+  const auto request = control_->takeRequest();
+  ASSERT_TRUE(request);
+  EXPECT_EQ(request->feed, 0.4);
+  EXPECT_EQ(request->spindle, 1.0);
+  EXPECT_NE(request->reason.find("no speed from 8000 to 12000 rpm"), std::string::npos) << request->reason;
   control_->answer(true, "");
   control_->handle(advice(2.0, 1.5));
   EXPECT_FALSE(control_->takeRequest());
-  // The cut after it begins anew.
+  // The next cut starts from the programmed values.
   cut_.stamp = 3.0;
   control_->handle(cut_);
   state(3.1, cut_.spindle_speed);
@@ -149,29 +149,29 @@ TEST_F(Control, whereNoSpeedBearsItTheFeedGoesToItsFloorAndTheNextCutIsSaid) {
   EXPECT_TRUE(control_->takeRequest());
 }
 
-TEST_F(Control, aNextCutIsStableAndRemovesMoreThanHalfAsDeep) {
+TEST_F(Control, theProposedNextCutIsStable) {
   const ChatterAdvice a = advice(1.0, 12.0);
   control_->handle(a);
-  const auto wish = control_->takeRequest();
-  ASSERT_TRUE(wish);
-  if (wish->next_speed == 0.0) GTEST_SKIP() << "borne at once";
-  EXPECT_LT(chatterProbability(believed(), wish->next_speed, wish->next_depth, 200, 7), 0.12);
+  const auto request = control_->takeRequest();
+  ASSERT_TRUE(request);
+  if (request->next_speed == 0.0) GTEST_SKIP() << "the cut has a stable speed";
+  EXPECT_LT(chatterProbability(estimated(), request->next_speed, request->next_depth, 200, 7), 0.12);
 }
 
-TEST_F(Control, aRefusalIsSaidOnceAndEndsTheAttemptsInThisCut) {
+TEST_F(Control, aRefusalIsReportedOnceAndEndsTheAttemptsInThisCut) {
   control_->handle(advice(1.0, 1.5));
   ASSERT_TRUE(control_->takeRequest());
-  control_->answer(false, "overrides: the panel has the say");
+  control_->answer(false, "overrides: controlled by the panel");
   EXPECT_EQ(control_->spindle(), 1.0);
   const auto notes = control_->takeNotes();
   ASSERT_EQ(notes.size(), 1u);
-  EXPECT_EQ(notes[0], "slot: overrides stay as they are: overrides: the panel has the say");
+  EXPECT_EQ(notes[0], "slot: overrides unchanged: overrides: controlled by the panel");
   control_->handle(advice(2.0, 1.5));
   EXPECT_FALSE(control_->takeRequest());
   EXPECT_TRUE(control_->takeNotes().empty());
 }
 
-TEST_F(Control, aSpindleThatDoesNotFollowIsGivenUp) {
+TEST_F(Control, aSpindleThatDoesNotReachItsSpeedEndsTheAttempts) {
   control_->handle(advice(1.0, 1.5));
   ASSERT_TRUE(control_->takeRequest());
   control_->answer(true, "");
@@ -182,7 +182,7 @@ TEST_F(Control, aSpindleThatDoesNotFollowIsGivenUp) {
   EXPECT_EQ(control_->takeNotes().size(), 1u);
 }
 
-TEST_F(Control, withoutModesItGoesToTheNearestSpeedInStep) {
+TEST_F(Control, withoutModesMovesToTheNearestProposedSpeed) {
   start(false);
   ChatterAdvice a = advice(1.0, 1.5);
   for (const double rpm : {15000.0, 11200.0, 9500.0, 4000.0}) {
@@ -192,13 +192,12 @@ TEST_F(Control, withoutModesItGoesToTheNearestSpeedInStep) {
     a.speeds.push_back(s);
   }
   control_->handle(a);
-  const auto wish = control_->takeRequest();
-  ASSERT_TRUE(wish);
-  EXPECT_NEAR(wish->spindle, 0.95, 1e-9);
+  const auto request = control_->takeRequest();
+  ASSERT_TRUE(request);
+  EXPECT_NEAR(request->spindle, 0.95, 1e-9);
 }
 
-// The rules that users of such controls asked for.
-TEST_F(Control, loadLeadsTheFeedDownFiveTimesAsFastAsUp) {
+TEST_F(Control, loadDecreasesTheFeedFiveTimesAsFastAsItIncreasesIt) {
   parameters_.load_target = 0.6;
   parameters_.feed_rise = 0.05;
   start();
@@ -211,8 +210,8 @@ TEST_F(Control, loadLeadsTheFeedDownFiveTimesAsFastAsUp) {
   };
   run(1.2, 1.0);
   const double down = 1.0 - control_->feed();
-  EXPECT_NEAR(down, 0.25, 0.03);  // 5 x 0.05 a second
-  run(std::nan(""), 5.0);         // unknown: nothing changes
+  EXPECT_NEAR(down, 0.25, 0.03);  // 5 x 0.05 per second
+  run(std::nan(""), 5.0);         // an unknown load is ignored
   EXPECT_NEAR(control_->feed(), 1.0 - down, 1e-12);
   const double before = control_->feed();
   run(0.1, 2.0);
@@ -220,20 +219,20 @@ TEST_F(Control, loadLeadsTheFeedDownFiveTimesAsFastAsUp) {
   run(5.0, 20.0);
   EXPECT_EQ(control_->feed(), 0.4);  // the floor
   EXPECT_EQ(control_->spindle(), 1.0);
-  // A load after a silence is the first of its kind.
+  // The first load after a gap is ignored.
   t += 30.0;
   load(t, 0.0);
   EXPECT_FALSE(control_->takeRequest());
 }
 
-TEST(StableSpeed, noSpeedMeansNone) {
-  EXPECT_FALSE(stableSpeed(believed(), 1.0, 800.0, 1200.0));
-  EXPECT_THROW(stableSpeed(believed(), 0.0, 800.0, 1200.0), Error);
+TEST(StableSpeed, isEmptyWithoutAStableSpeed) {
+  EXPECT_FALSE(stableSpeed(estimated(), 1.0, 800.0, 1200.0));
+  EXPECT_THROW(stableSpeed(estimated(), 0.0, 800.0, 1200.0), Error);
 }
 
-// With coefficients alone uncertain a limit goes with 1 / K: the share of depth at a risk is the log-normal's
-// quantile, whatever the speed.
-TEST(DepthsAtRisk, followTheClosedForm) {
+// With uncertain coefficients only, the limit is proportional to 1 / K: the relative depth at a risk is a
+// quantile of the log-normal distribution, independent of the speed.
+TEST(DepthsAtRisk, haveTheClosedForm) {
   RegenerativeSystem mean = system();
   constexpr double SHARE = 0.2;
   const UncertainSystem uncertain(mean, std::vector<ModeUncertainty>(mean.modes.size()), SHARE, 0.0);
@@ -245,8 +244,8 @@ TEST(DepthsAtRisk, followTheClosedForm) {
   const double sigma = std::sqrt(std::log1p(SHARE * SHARE));
   const double expected = 1.0 / std::exp(1.644854 * sigma - 0.5 * sigma * sigma);
   for (const double share : depthsAtRisk(limits, speeds, 0.05, 0.0))
-    EXPECT_NEAR(share, expected, 0.045);  // 4 sigma of 800 draws
-  // A margin of speed can only take away.
+    EXPECT_NEAR(share, expected, 0.045);  // four standard errors of 800 draws
+  // A speed margin can only reduce the depth.
   const auto wide = depthsAtRisk(limits, speeds, 0.05, 0.03), none = depthsAtRisk(limits, speeds, 0.05, 0.0);
   for (std::size_t k = 0; k < speeds.size(); ++k) EXPECT_LE(wide[k], none[k] + 1e-12);
 }

@@ -15,9 +15,9 @@ namespace {
 
 constexpr double FREQUENCY = 350.0, DAMPING = 0.02;
 
-TEST(Merritt, leastStiffnessRatioAndFrequency) {
+TEST(Merritt, criticalStiffnessRatioAndFrequency) {
   EXPECT_NEAR(merrittLimit(DAMPING), 0.0408, 1e-12);
-  // Eq. 5 evaluated on a fine grid.
+  // Kim eq. 5 on a fine grid.
   const SecondOrder machine{0.0408, FREQUENCY, DAMPING};
   double least = 0.0, at = 0.0;
   for (double w = 300.0; w < 420.0; w += 0.001) {
@@ -31,8 +31,9 @@ TEST(Merritt, leastStiffnessRatioAndFrequency) {
   EXPECT_NEAR(criticalFrequency(FREQUENCY, DAMPING), at, 2e-3);
 }
 
-// Simulation against the dominant root: the vibration of the second and third segment.
-TEST(TurningSimulation, growsAsTheCharacteristicRootSays) {
+// Growth of the vibration from the second to the third segment, compared with the dominant characteristic
+// root.
+TEST(TurningSimulation, growsAtTheRateOfTheCharacteristicRoot) {
   for (const double logarithm : {1.0, 2.0, 3.0}) {
     const TurningProcess process = kimProcess(logarithm);
     const TurningRun run = simulateTurning(process, 3.0 * SEGMENT, CONTROL_RATE, 0.0, 1, {});
@@ -54,7 +55,7 @@ TEST(TurningSimulation, stableBelowMerrittsLimitAndWithoutOverlap) {
               1e-3 * process.chip);  // static: y = K/K_m (a0 - y)
 }
 
-TEST(Guard, knowsWhatMismatchIsDangerous) {
+TEST(Guard, marginDependsOnTheMismatchOfTheModel) {
   const SecondOrder machine{0.1, FREQUENCY, DAMPING};
   // Uncontrolled: eq. 5 scaled, -0.5 x 0.1 / 0.0408.
   EXPECT_NEAR(residualMargin(machine, SecondOrder()), -0.5 * 0.1 / 0.0408, 1e-3);
@@ -71,7 +72,7 @@ TEST(Guard, knowsWhatMismatchIsDangerous) {
 
 struct Outcome {
   double reduction = 0.0;  ///< [1] of the uncontrolled vibration over the last half second
-  std::vector<SecondOrder> beliefs;
+  std::vector<SecondOrder> estimates;
 };
 
 Outcome controlled(const TurningProcess& process, const TurningRun& free, unsigned seed) {
@@ -80,11 +81,12 @@ Outcome controlled(const TurningProcess& process, const TurningRun& free, unsign
   const auto controller = std::make_shared<AdaptiveChatterController>(kimController(process));
   const TurningRun run = simulateTurning(process, 3.0 * SEGMENT + 0.001, CONTROL_RATE, noise, seed,
                                          [controller](double y, double t) { return controller->step(y, t); });
-  return {1.0 - vibration(run, 5.644, 6.144) / vibration(free, 5.644, 6.144), controller->beliefs()};
+  return {1.0 - vibration(run, 5.644, 6.144) / vibration(free, 5.644, 6.144), controller->estimates()};
 }
 
-// Kim's table. The paper: 327/0.05, 332/0.11, 335/0.06, 346/0.07 (rad/s, damping) in successive estimates.
-TEST(KimsCase, learnsTheMachineAndEndsTheChatterOnFiftySeeds) {
+// Kim's case; the paper states 327/0.05, 332/0.11, 335/0.06, 346/0.07 (rad/s, damping) for successive
+// estimates.
+TEST(KimsCase, identifiesTheMachineAndSuppressesTheChatterForFiftySeeds) {
   for (const double logarithm : {1.0, 2.0, 3.0}) {
     const TurningProcess process = kimProcess(logarithm);
     const TurningRun free = simulateTurning(process, 3.0 * SEGMENT, CONTROL_RATE, 0.0, 1, {});
@@ -93,18 +95,20 @@ TEST(KimsCase, learnsTheMachineAndEndsTheChatterOnFiftySeeds) {
     double first[2] = {}, second[2] = {};
     for (unsigned seed = 1; seed <= seeds; ++seed) {
       const Outcome outcome = controlled(process, free, seed);
-      ASSERT_EQ(outcome.beliefs.size(), 3u);
-      const SecondOrder& third = outcome.beliefs[2];
+      ASSERT_EQ(outcome.estimates.size(), 3u);
+      const SecondOrder& third = outcome.estimates[2];
       worst_frequency = std::max(worst_frequency, std::abs(third.frequency / FREQUENCY - 1.0));
       worst_damping = std::max(worst_damping, std::abs(third.damping_ratio / DAMPING - 1.0));
       least_reduction = std::min(least_reduction, outcome.reduction);
-      first[0] += outcome.beliefs[0].frequency / seeds, first[1] += outcome.beliefs[0].damping_ratio / seeds;
-      second[0] += outcome.beliefs[1].frequency / seeds,
-          second[1] += outcome.beliefs[1].damping_ratio / seeds;
+      first[0] += outcome.estimates[0].frequency / seeds,
+          first[1] += outcome.estimates[0].damping_ratio / seeds;
+      second[0] += outcome.estimates[1].frequency / seeds,
+          second[1] += outcome.estimates[1].damping_ratio / seeds;
     }
     std::printf(
-        "T %.5f s, growth e^%.0f a segment, %u seeds: mean %.2f/%.4f then %.2f/%.4f; third: worst %.3f %% in "
-        "frequency, %.2f %% in damping; least reduction %.3f %%\n",
+        "T %.5f s, growth e^%.0f per segment, %u seeds: mean estimates %.2f/%.4f, %.2f/%.4f; third: largest "
+        "error "
+        "%.3f %% in frequency, %.2f %% in damping; smallest reduction %.3f %%\n",
         process.period, logarithm, seeds, first[0], first[1], second[0], second[1], 100.0 * worst_frequency,
         100.0 * worst_damping, 100.0 * least_reduction);
     EXPECT_LT(worst_frequency, 0.01);
@@ -113,8 +117,8 @@ TEST(KimsCase, learnsTheMachineAndEndsTheChatterOnFiftySeeds) {
   }
 }
 
-// What Kim read off: the plain ratio of spectra is smeared by the window; its half-power width is not the
-// machine's. The fit that knows the leakage is not fooled by the same data.
+// The plain ratio of spectra, as used by Kim, is smeared by the window: its half-power bandwidth is not that
+// of the machine. The fit with leakage in the model is unbiased on the same data.
 TEST(KimsCase, thePlainRatioIsBiasedByLeakage) {
   const TurningProcess process = kimProcess(1.0);
   const TurningRun run = simulateTurning(process, SEGMENT, CONTROL_RATE, 0.0, 1, {});
@@ -134,8 +138,8 @@ TEST(KimsCase, thePlainRatioIsBiasedByLeakage) {
   ASSERT_TRUE(found.informed);
   EXPECT_NEAR(found.model.frequency, FREQUENCY, 0.002 * FREQUENCY);
   EXPECT_NEAR(found.model.damping_ratio, DAMPING, 0.05 * DAMPING);
-  EXPECT_NEAR(found.model.gain, 0.1, 0.02 * 0.1);  // samples of 1 ms joined by lines: 1 %
-  // The peak of the plain ratio against the true one, gain / (2 zeta) = 2.5.
+  EXPECT_NEAR(found.model.gain, 0.1, 0.02 * 0.1);  // linear interpolation between samples of 1 ms: 1 %
+  // Peak of the plain ratio compared with the true one, gain / (2 zeta) = 2.5.
   double peak = 0.0;
   for (std::size_t l = 0; l < found.ratio.size(); ++l)
     if (std::abs(found.frequency[l] - FREQUENCY / units::TWO_PI) < 5.0)
@@ -143,7 +147,7 @@ TEST(KimsCase, thePlainRatioIsBiasedByLeakage) {
   EXPECT_GT(std::abs(peak / 2.5 - 1.0), 0.1);
 }
 
-// Estimates are honest: a fresh seed each, z-scores of the first segment.
+// The standard deviations of the first segment match the scatter over seeds.
 TEST(KimsCase, standardDeviationsCoverTheError) {
   const TurningProcess process = kimProcess(2.0);
   const TurningRun free = simulateTurning(process, SEGMENT, CONTROL_RATE, 0.0, 1, {});
@@ -164,13 +168,13 @@ TEST(KimsCase, standardDeviationsCoverTheError) {
   }
   for (int k = 0; k < 2; ++k) {
     const double scatter = std::sqrt(squares[k] - mean[k] * mean[k]);
-    // 60 seeds tell the scatter to 9 %; noise in the chip thickness too is not white after the model.
+    // The scatter of 60 seeds is known to 9 %; the noise of the chip thickness is not white after the model.
     EXPECT_GT(std::sqrt(stated[k]) / scatter, 0.5) << k;
     EXPECT_LT(std::sqrt(stated[k]) / scatter, 2.0) << k;
   }
 }
 
-// The paper's own proposal: spindle accelerometers in place of the deflection.
+// Kim's proposal: spindle accelerometers instead of the deflection.
 TEST(Accelerometers, giveTheSameMachine) {
   const TurningProcess process = kimProcess(2.0);
   const TurningRun run = simulateTurning(process, SEGMENT + 0.01, CONTROL_RATE, 0.0, 1, {});
@@ -192,10 +196,9 @@ TEST(Accelerometers, giveTheSameMachine) {
   EXPECT_NEAR(found.model.damping_ratio, DAMPING, 0.2 * DAMPING);
 }
 
-// The two classical schemes: a fixed model that is 10 % off cannot hold the chatter that the learning
-// controller ends; feeding back the displacement error stiffens the machine, and holds it where 1 + gain
-// does.
-TEST(ClassicalSchemes, besideTheLearningOne) {
+// The two classical schemes: force feedback with a fixed model that is 10 % off does not suppress the
+// chatter; displacement error feedback increases the stiffness by 1 + gain and suppresses it here.
+TEST(ClassicalSchemes, comparedWithAnExactModel) {
   const TurningProcess process = kimProcess(2.0);
   const TurningRun free = simulateTurning(process, 3.0 * SEGMENT, CONTROL_RATE, 0.0, 1, {});
   const double uncontrolled = vibration(free, 5.644, 6.144);
@@ -217,7 +220,7 @@ TEST(ClassicalSchemes, besideTheLearningOne) {
   EXPECT_LT(displacement, 0.05);
 }
 
-TEST(Turning, refusesTheImpossible) {
+TEST(Turning, refusesInvalidValues) {
   TurningProcess process;
   process.damping_ratio = 0.0;
   EXPECT_THROW(growthRate(process), Error);

@@ -49,7 +49,7 @@ NodeParameters parameters() {
   return p;
 }
 
-TEST(Bag, givesTheChartAndVerdictsOfTheLiveClasses) {
+TEST(Bag, givesTheChartAndVerdictsOfTheNode) {
   const TemporaryFolder folder;
   const std::string file = folder.file("run.bag");
   Scene scene;
@@ -97,7 +97,8 @@ MeasuredModes modes(const char* direction) {
   return m;
 }
 
-/// Kc h + Ke: a straight line in splines has its values at Greville's abscissae.
+/// Force curve Kc h + Ke: the spline coefficients of a straight line are its values at the Greville
+/// abscissae.
 IdentifiedForceCurves straight(double kc, double ke, int teeth) {
   constexpr int PIECES = 8;
   constexpr double TOP = 2e-4;
@@ -115,12 +116,12 @@ IdentifiedForceCurves straight(double kc, double ke, int teeth) {
   return found;
 }
 
-// Of a straight law the slope is what counts for small and large vibrations alike: the limits of its Kc.
-TEST(Bag, givesTheLimitsByItsForceCurve) {
+// For a linear force law the limits of small and large vibrations are those of its slope Kc.
+TEST(Bag, givesTheLimitsForItsForceCurve) {
   const TemporaryFolder folder;
   const std::string file = folder.file("run.bag");
   CoefficientSet set = coefficients();
-  set.value.ktc = 1.3e9;  // the curve stands in its place
+  set.value.ktc = 1.3e9;  // replaced by the curve
   const double kc = 700e6;
   {
     Recorder bag(file);
@@ -154,7 +155,7 @@ TEST(Bag, givesTheLimitsByItsForceCurve) {
   }
 }
 
-TEST(Bag, saysWhatIsMissing) {
+TEST(Bag, listsMissingInputs) {
   const TemporaryFolder folder;
   const std::string file = folder.file("run.bag");
   {
@@ -166,14 +167,14 @@ TEST(Bag, saysWhatIsMissing) {
   EXPECT_EQ(found.missing, "FRF in y, tangential coefficient");
 }
 
-TEST(Parameters, theShippedFilesAreTheTables) {
+TEST(Parameters, theShippedFilesMatchTheTables) {
   expectShipped<NodeParameters>(LAUNCH_CONFIG_FOLDER "/stability.yaml", "smartmill_stability stability_node");
   EXPECT_NO_THROW(NodeParameters().validate());
   expectShipped<ControlStreamParameters>("config/chatter_control.yaml",
                                          "smartmill_stability chatter_control_node");
 }
 
-TEST(Parameters, wrongTypesUnknownKeysAndRangesAreNamed) {
+TEST(Parameters, errorsNameWrongTypesUnknownKeysAndRanges) {
   const TemporaryFolder folder;
   const auto error = [&](const std::string& text) {
     return errorOf(

@@ -15,7 +15,7 @@
 namespace smartmill::stability {
 namespace {
 
-TEST(ChatterControlNode, learnsFromItsStreams) {
+TEST(ChatterControlNode, identifiesTheMachineFromItsStreams) {
   ros::NodeHandle nh;
   ros::AsyncSpinner spinner(1);
   spinner.start();
@@ -33,7 +33,7 @@ TEST(ChatterControlNode, learnsFromItsStreams) {
   node.expect(listener);
   const TurningProcess process = kimProcess(2.0);
   node.publish(angles, toMsg(SpindleAngle{99.0, 0.0, units::TWO_PI / process.period}));
-  node.settle();  // another topic keeps no order with this one
+  node.settle();  // ROS does not preserve the order between topics
   for (const SampleBlock& block : displacementBlocks(process, 2.1, 100)) node.publish(blocks, toMsg(block));
   node.end();
   const auto machine = ros::topic::waitForMessage<smartmill_msgs::ModalModel>(names::CONTROL_MACHINE, nh,
@@ -43,7 +43,7 @@ TEST(ChatterControlNode, learnsFromItsStreams) {
   const ModalModel model = fromMsg(*machine).model;
   EXPECT_NEAR(model.modes[0].frequency * units::TWO_PI, 350.0, 3.5);
   EXPECT_NEAR(model.modes[0].damping_ratio, 0.02, 0.004);
-  // Everything said has come; what is not handled yet is handled here.
+  // All messages have arrived; the pending callbacks are called here.
   spinner.stop();
   ros::getGlobalCallbackQueue()->callAvailable();
   EXPECT_EQ(commands, 21000u);

@@ -18,7 +18,7 @@ namespace {
 
 using smartmill_msgs::PredictStability;
 
-const ros::Duration PATIENCE(120.0);  // of a busy machine
+const ros::Duration TIMEOUT(120.0);  // sufficient on a busy computer
 
 class StabilityNode : public ::testing::Test {
  protected:
@@ -29,7 +29,7 @@ class StabilityNode : public ::testing::Test {
     call.request.spindle_speed = units::radPerSecFromRpm(rpm);
     call.request.axial_depth = depth;
     auto client = nh_.serviceClient<PredictStability>(names::PREDICT_STABILITY);
-    EXPECT_TRUE(client.waitForExistence(PATIENCE));
+    EXPECT_TRUE(client.waitForExistence(TIMEOUT));
     EXPECT_TRUE(client.call(call));
     return call.response;
   }
@@ -47,7 +47,7 @@ class StabilityNode : public ::testing::Test {
   Followers node_{{names::absolute("stability")}};
 };
 
-TEST_F(StabilityNode, publishesTheChartAndAnswers) {
+TEST_F(StabilityNode, publishesTheChartAndPredictsStability) {
   EXPECT_EQ(predict(10000.0, 0.05e-3).code, PredictStability::Response::NO_CHART);
   EXPECT_NE(predict(10000.0, 0.05e-3).message.find("FRF in x, FRF in y, tangential"), std::string::npos);
 
@@ -57,9 +57,9 @@ TEST_F(StabilityNode, publishesTheChartAndAnswers) {
   frfs.publish(toMsg(frf("y", 1.0)));
   sets.publish(toMsg(coefficients()));
 
-  // Latched: who comes late gets it.
+  // Latched: a late subscriber receives it.
   const auto chart =
-      ros::topic::waitForMessage<smartmill_msgs::StabilityChart>(names::STABILITY_CHART, nh_, PATIENCE);
+      ros::topic::waitForMessage<smartmill_msgs::StabilityChart>(names::STABILITY_CHART, nh_, TIMEOUT);
   ASSERT_TRUE(chart);
   EXPECT_EQ(chart->tool, "end_mill");
   EXPECT_EQ(chart->material, "aluminium");
@@ -68,7 +68,7 @@ TEST_F(StabilityNode, publishesTheChartAndAnswers) {
   EXPECT_EQ(toSec(chart->header.stamp), 20.0);
   EXPECT_FALSE(chart->recommended.empty());
 
-  // An independent table, zero-order, printed to 0.2 %; lines of 1 Hz joined by straight lines.
+  // Independent zero-order table, printed to 0.2 %; linear interpolation between lines of 1 Hz.
   const auto below = predict(10000.0, 0.07e-3), above = predict(10000.0, 0.08e-3);
   EXPECT_EQ(below.code, PredictStability::Response::OK);
   EXPECT_NEAR(below.point.depth_limit, 0.0737e-3, 0.01 * 0.0737e-3);
@@ -77,7 +77,7 @@ TEST_F(StabilityNode, publishesTheChartAndAnswers) {
   EXPECT_EQ(predict(-1.0, 0.07e-3).code, PredictStability::Response::BAD_REQUEST);
 }
 
-TEST_F(StabilityNode, findsChatterInReplayedForce) {
+TEST_F(StabilityNode, detectsChatterInAReplayedForce) {
   std::vector<smartmill_msgs::ChatterState> states;
   const ros::Subscriber subscriber = nh_.subscribe<smartmill_msgs::ChatterState>(
       names::CHATTER_STATE, 0,
@@ -107,7 +107,7 @@ TEST_F(StabilityNode, findsChatterInReplayedForce) {
   scene.chatter = 150.0;
   play(scene, sink, 200.0);
   node_.end();
-  // Everything said has come; what is not handled yet is handled here.
+  // All messages have arrived; the pending callbacks are called here.
   spinner_.stop();
   ros::getGlobalCallbackQueue()->callAvailable();
 
@@ -124,10 +124,10 @@ TEST_F(StabilityNode, findsChatterInReplayedForce) {
   }
   EXPECT_GT(quiet, 10);
   EXPECT_GT(chatter, 10);
-  // Two straight teeth of the model: the fastest speed below 2200 rad/s at which they pass in step with the
-  // chatter.
+  // Two teeth: the highest speed below 2200 rad/s whose tooth passing frequency divides the chatter
+  // frequency.
   const auto advice =
-      ros::topic::waitForMessage<smartmill_msgs::ChatterAdvice>(names::CHATTER_ADVICE, nh_, PATIENCE);
+      ros::topic::waitForMessage<smartmill_msgs::ChatterAdvice>(names::CHATTER_ADVICE, nh_, TIMEOUT);
   ASSERT_TRUE(advice);
   EXPECT_EQ(advice->condition, "cut_1");
   EXPECT_GT(toSec(advice->header.stamp), 200.0);

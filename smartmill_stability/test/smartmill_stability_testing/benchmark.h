@@ -10,7 +10,7 @@
 
 namespace smartmill::stability {
 
-// The classic benchmark in x and y: 0.03993 kg, 922 Hz, 1.1 % damping, two teeth, Kt 6e8, Kr 1/3.
+// Benchmark in x and y: 0.03993 kg, 922 Hz, 1.1 % damping, two teeth, Kt 6e8 N/m2, Kr/Kt 1/3.
 inline ModalModel benchmark() {
   ModalModel model;
   const double w = units::TWO_PI * 922.0;

@@ -8,7 +8,7 @@
 
 namespace smartmill::stability {
 
-/// Displacement streams of an uncontrolled run of Kim's case in blocks. @param size samples a block
+/// Displacement streams of an uncontrolled run of a process in blocks. @param size samples in a block
 inline std::vector<SampleBlock> displacementBlocks(const TurningProcess& process, double duration,
                                                    std::size_t size) {
   const TurningRun run = simulateTurning(process, duration, CONTROL_RATE, 0.0, 1, {});

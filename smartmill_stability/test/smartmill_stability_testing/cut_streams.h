@@ -12,12 +12,12 @@
 
 namespace smartmill::stability {
 
-/// What a machine says beside the force while it makes one straight steady cut.
+/// Streams of a machine in one straight steady cut, in addition to the force.
 class CutStreams {
  public:
-  /// @param speed [rad/s] @param states_from [s] the controller says nothing before
+  /// @param speed [rad/s] @param states_from [s] stamp of the first controller state
   CutStreams(ChatterDetector& detector, double speed, const ToolGeometry& tool, double states_from = 0.0)
-      : detector_(detector), speed_(speed), state_due_(states_from) {
+      : detector_(detector), speed_(speed), next_state_(states_from) {
     CuttingCondition condition;
     condition.kind = CuttingCondition::Kind::cut;
     condition.name = "cut";
@@ -27,14 +27,15 @@ class CutStreams {
     detector_.handle(condition);
   }
 
-  /// Angle and controller's state when they are due, in order of time [s]. @param in_stock the tool is in the
-  /// steady part of the cut
+  /// Passes spindle angle and controller state to the detector in their periods; called with ascending time
+  /// [s].
+  /// @param in_stock whether the tool is in the steady part of the cut
   void at(double time, bool in_stock) {
-    if (time >= angle_due_) {
+    if (time >= next_angle_) {
       detector_.handle(SpindleAngle{time, std::fmod(speed_ * time, units::TWO_PI), speed_});
-      angle_due_ += 0.005;
+      next_angle_ += 0.005;
     }
-    if (time < state_due_) return;
+    if (time < next_state_) return;
     CncState state;
     state.stamp = time;
     state.connected = true;
@@ -43,17 +44,17 @@ class CutStreams {
     state.distance_to_go = {0.0, 0.0, 0.0};
     state.feed = 0.02;
     detector_.handle(state);
-    state_due_ += 0.02;
+    next_state_ += 0.02;
   }
 
  private:
   ChatterDetector& detector_;
   double speed_;
-  double angle_due_ = 0.0, state_due_;  // [s]
+  double next_angle_ = 0.0, next_state_;  // [s]
 };
 
-/// [Hz] strongest line of all channels beside what repeats with a period of so many samples.
-/// @param signal whole periods @param rate [Hz]
+/// [Hz] Strongest line of all channels without the part that repeats with a period.
+/// @param signal whole periods @param period in samples @param rate [Hz]
 inline double strongestLine(std::vector<std::vector<double>> signal, std::size_t period, double rate) {
   const std::size_t count = signal.front().size();
   std::vector<double> power(count / 2 + 1, 0.0);

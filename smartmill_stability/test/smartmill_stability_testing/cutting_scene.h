@@ -18,8 +18,8 @@ struct Scene {
   double noise = 1.0;         // [N]
   double chatter_from = 0.0;  // [s]
   double alternating = 0.0;   // [N] at half the tooth passing frequency of four teeth
-  double transient = 0.0;     // [N] at the chatter frequency when the cut begins, dying out with 0.12 s
-  int teeth = 0;              // told with the condition
+  double transient = 0.0;     // [N] at the chatter frequency from the start of the cut, time constant 0.12 s
+  int teeth = 0;              // stated in the condition
   double duration = 3.0;      // [s]; full engagement from 0.5 s to 2.5 s
 };
 
@@ -38,29 +38,29 @@ void play(const Scene& scene, const Handle& handle, double start = 0.0) {
   std::mt19937 random(7);
   std::normal_distribution<double> normal(0.0, scene.noise);
   handle(condition);
-  double block_due = 0.0, angle_due = 0.0, state_due = 0.0;
-  for (int b = 0; block_due < scene.duration;) {
-    if (state_due <= angle_due && state_due <= block_due) {
+  double next_block = 0.0, next_angle = 0.0, next_state = 0.0;
+  for (int b = 0; next_block < scene.duration;) {
+    if (next_state <= next_angle && next_state <= next_block) {
       CncState state;
-      state.stamp = start + state_due;
+      state.stamp = start + next_state;
       state.connected = true;
       state.axes = {"X", "Y", "Z"};
-      state.position = {0.020 * state_due, 0.0, -0.001};
+      state.position = {0.020 * next_state, 0.0, -0.001};
       state.distance_to_go = {0.0, 0.0, 0.0};
       state.feed = 0.020;
       handle(state);
-      state_due += 0.02;
-    } else if (angle_due <= block_due) {
-      handle(SpindleAngle{start + angle_due, std::fmod(SPEED * angle_due, units::TWO_PI), SPEED});
-      angle_due += 0.0087;
+      next_state += 0.02;
+    } else if (next_angle <= next_block) {
+      handle(SpindleAngle{start + next_angle, std::fmod(SPEED * next_angle, units::TWO_PI), SPEED});
+      next_angle += 0.0087;
     } else {
       ForceBlock block;
-      block.stamp = start + block_due;
+      block.stamp = start + next_block;
       block.sample_rate = RATE;
       block.first_index = static_cast<std::uint64_t>(b) * BLOCK;
       block.status = ForceBlock::Status::compensated;
       for (int i = 0; i < BLOCK; ++i) {
-        const double t = block_due + i / RATE, angle = SPEED * t;
+        const double t = next_block + i / RATE, angle = SPEED * t;
         const bool cutting = t > 0.5 && t < 2.5;
         const double forced = cutting ? 200.0 + 150.0 * std::cos(4.0 * angle) +
                                             60.0 * std::cos(8.0 * angle + 1.0) +
@@ -78,7 +78,7 @@ void play(const Scene& scene, const Handle& handle, double start = 0.0) {
         block.force[2].push_back(normal(random));
       }
       handle(block);
-      block_due += BLOCK / RATE;
+      next_block += BLOCK / RATE;
       ++b;
     }
   }

@@ -10,11 +10,11 @@ namespace smartmill::stability {
 constexpr double SEGMENT = 2.048;         // [s]
 constexpr double CONTROL_RATE = 10000.0;  // [Hz]
 
-/// Kim's case (K/K_m 0.1, zeta 0.02, 350 rad/s) at the period near 0.109 s at which the uncontrolled
-/// vibration grows by exp(logarithm) a segment; the paper states none.
+/// Kim's case (K/K_m 0.1, zeta 0.02, 350 rad/s) at the period near 0.109 s for which the uncontrolled
+/// vibration grows by exp(logarithm) per segment; the paper does not state the period.
 inline TurningProcess kimProcess(double logarithm) {
   TurningProcess process;
-  double low = 0.108, high = 0.111;  // from below one segment's e^0.2 to above e^5
+  double low = 0.108, high = 0.111;  // growth per segment from below e^0.2 to above e^5
   for (int i = 0; i < 50; ++i) {
     process.period = 0.5 * (low + high);
     (growthRate(process) * SEGMENT < logarithm ? low : high) = process.period;
@@ -31,7 +31,7 @@ inline ControllerParameters kimController(const TurningProcess& process) {
   return parameters;
 }
 
-/// Root mean square of the motion about its mean, from begin to end [s].
+/// [m] RMS of the motion about its mean, from begin to end [s].
 inline double vibration(const TurningRun& run, double begin, double end) {
   double sum = 0.0, squares = 0.0, n = 0.0;
   for (std::size_t i = 0; i < run.time.size(); ++i) {

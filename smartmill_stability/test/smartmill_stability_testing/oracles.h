@@ -11,8 +11,8 @@
 
 namespace smartmill::stability {
 
-/// The benchmark of the oracles: straight teeth, two of them, in x alone or the same mode in x and y.
-/// @param immersion radial over diameter
+/// The benchmark of the oracles: two straight teeth, one mode in x or the same mode in x and y.
+/// @param immersion [1] radial depth over diameter
 inline RegenerativeSystem benchmarkSystem(double immersion, bool down, bool two_axes) {
   RegenerativeSystem system;
   system.modes = two_axes ? systemModes(benchmark(), benchmark()) : systemModes(benchmark(), 0);
@@ -31,7 +31,7 @@ struct OracleRow {
   bool down;
 };
 
-/// Rows of a file like the shared oracles/insperger_1dof_first_limit.csv.
+/// Rows of a file in the format of oracles/insperger_1dof_first_limit.csv.
 inline std::vector<OracleRow> oracleRows(const std::string& name) {
   std::ifstream file(name);
   std::vector<OracleRow> rows;

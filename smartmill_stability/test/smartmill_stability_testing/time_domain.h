@@ -12,13 +12,13 @@
 
 namespace smartmill::stability {
 
-/// An independent time-domain simulation of milling with the surface that earlier teeth left: chips cannot be
-/// negative and teeth leave the cut. Modes of one axis each; edges in slices, angles on a grid of whole
-/// steps.
+/// Independent time-domain simulation of milling with the surface left by previous teeth: the chip thickness
+/// is not negative and teeth leave the cut. Modes along single axes; edges in slices, angles on the grid of
+/// the steps.
 class TimeDomain {
  public:
-  /// @param x, y receptances of the tool tip @param feed [m] per tooth @param may_leave false: chips may be
-  /// negative, as linear theory has it
+  /// @param x, y receptances of the tool tip @param feed [m] per tooth @param may_leave false: the chip
+  /// thickness may be negative, as in linear theory
   TimeDomain(const RegenerativeSystem& system, const ModalModel& x, const ModalModel& y, double speed,
              double depth, double feed, int steps_per_revolution = 720, bool may_leave = true,
              int least_slices = 1)
@@ -42,7 +42,7 @@ class TimeDomain {
       angle += system.pitchOf(k);
     }
     surface_.assign(static_cast<std::size_t>(slices), std::vector<Mark>(static_cast<std::size_t>(steps_)));
-    // As if teeth without vibration had passed before.
+    // Surface of previous teeth without vibration.
     for (auto& slice : surface_)
       for (int i = 0; i < steps_; ++i)
         slice[static_cast<std::size_t>(i)] = {-feed_ * std::sin(units::TWO_PI * i / steps_), -feed_};
@@ -51,8 +51,8 @@ class TimeDomain {
   /// Radial offset of each tooth [m], outwards.
   void setRunout(std::vector<double> runout) { runout_ = std::move(runout); }
 
-  /// Radius of tooth k at a height: amplitude sin(2 pi (height / wavelength + k / teeth)) [m]. Needs slices
-  /// much thinner than the wave.
+  /// Radius offset of tooth k at a height: amplitude sin(2 pi (height / wavelength + k / teeth)) [m].
+  /// Requires slices much thinner than the wavelength.
   void setSerration(double amplitude, double wavelength) {
     const std::size_t slices = surface_.size();
     serration_.assign(slices, std::vector<double>(tooth_.size(), 0.0));
@@ -64,15 +64,15 @@ class TimeDomain {
                                       static_cast<double>(k) / static_cast<double>(tooth_.size())));
   }
 
-  /// Force over chip thickness that is no straight line, in place of kt and kr.
+  /// Nonlinear force law in place of kt and kr.
   void setLaw(ForceCurves law) { law_ = std::move(law); }
 
-  /// [1] of the knock that follows the way in; 1: a twentieth of the force at the feed.
-  void setKnock(double times) { knock_ = times; }
+  /// Disturbance force after the ramp. @param size [1] 1: 5 % of the force at the feed per tooth
+  void setDisturbance(double size) { disturbance_ = size; }
 
-  /// One step of the spindle. @return displacement x, y [m]; force() that made it.
+  /// One step of the spindle. @return displacement x, y [m], caused by force().
   std::array<double, 2> step() {
-    // Displacement with the force as it was, force with that displacement, then the true step.
+    // Predictor and corrector for the displacement, then the final step.
     const std::array<double, 2> guess{{x_.peek(force_[0]), y_.peek(force_[1])}};
     force_ = cut(guess, false);
     const std::array<double, 2> better{{x_.peek(force_[0]), y_.peek(force_[1])}};
@@ -84,18 +84,18 @@ class TimeDomain {
   const std::array<double, 2>& force() const { return force_; }  ///< [N] on the tool
 
  private:
-  static constexpr double RAMP = 30.0;  // [1] turns
+  static constexpr double RAMP = 30.0;  // [revolutions] of the depth
 
   std::array<double, 2> cut(const std::array<double, 2>& u, bool leave) {
     std::array<double, 2> force{{0.0, 0.0}};
-    // A knock once the tool is in: what grows must begin somewhere.
+    // Disturbance at the end of the ramp, from which a vibration may grow.
     const double turns = static_cast<double>(count_) / steps_ - RAMP;
     if (turns >= 0.0 && turns < 0.02) {
-      const double knock = 0.05 * knock_ * (tangential(feed_) + radial(feed_)) * slice_depth_ *
-                           static_cast<double>(lag_.size());
-      force = {{knock, knock}};
+      const double disturbance = 0.05 * disturbance_ * (tangential(feed_) + radial(feed_)) * slice_depth_ *
+                                 static_cast<double>(lag_.size());
+      force = {{disturbance, disturbance}};
     }
-    // Feed made so far, along x.
+    // Feed motion so far, along x.
     const double fed = feed_ * system_.teeth * static_cast<double>(count_) / steps_;
     for (std::size_t s = 0; s < surface_.size(); ++s) {
       for (std::size_t k = 0; k < tooth_.size(); ++k) {
@@ -107,7 +107,7 @@ class TimeDomain {
         const double si = std::sin(phi), co = std::cos(phi);
         const double reach = (u[0] + fed) * si + u[1] * co + (runout_.empty() ? 0.0 : runout_[k]) +
                              (serration_.empty() ? 0.0 : serration_[s][k]);
-        // The roundness of the tool: beside the feed an older surface lies deeper (formats.md).
+        // Curvature of the tool: away from the feed direction an older surface is deeper (docs/formats.md).
         const double since = fed - left.fed,
                      last = feed_ * system_.teeth * system_.pitchOf(static_cast<int>(k)) / units::TWO_PI;
         const double round =
@@ -115,8 +115,7 @@ class TimeDomain {
         const double chip = reach - left.reach + round;
         if (chip <= 0.0 && may_leave_) continue;
         if (leave) left = {reach, fed};
-        // The tool sinks in over some turns: a sudden start could throw it into chatter that lives beside the
-        // stable cut.
+        // The depth is ramped: a sudden start could excite chatter in the bistable zone.
         const double depth = slice_depth_ * std::min(1.0, static_cast<double>(count_) / (RAMP * steps_));
         const double ft = tangential(chip) * depth, fr = radial(chip) * depth;
         force[0] += -ft * co - fr * si;
@@ -129,7 +128,7 @@ class TimeDomain {
   double tangential(double chip) const { return law_ ? law_->tangential.at(chip) : system_.kt * chip; }
   double radial(double chip) const { return law_ ? law_->radial.at(chip) : system_.kr * chip; }
 
-  /// What the last tooth that cut here left, and the feed made then.
+  /// Surface left by the last tooth that cut here, and the feed motion at that time.
   struct Mark {
     double reach = 0.0, fed = 0.0;  // [m]
   };
@@ -142,17 +141,18 @@ class TimeDomain {
   std::vector<int> lag_, tooth_;
   std::vector<double> runout_;
   std::optional<ForceCurves> law_;
-  double knock_ = 1.0;
+  double disturbance_ = 1.0;
   std::vector<std::vector<double>> serration_;  // [slice][tooth]
   std::vector<std::vector<Mark>> surface_;
   std::array<double, 2> force_{{0.0, 0.0}};
   long count_ = 0;
 };
 
-/// Whether what does not repeat with a period (in steps) grows or stays over the second half of a run.
+/// Whether the part of the motion that does not repeat with a period (in steps) grows or persists in the
+/// second half of a run.
 inline bool chattersInTime(TimeDomain& run, int period, double feed, int revolutions = 180, int steps = 720) {
   std::vector<std::array<double, 2>> before(static_cast<std::size_t>(period));
-  constexpr int WINDOW = 25;  // turns: longer than the beats of a quasi-periodic motion
+  constexpr int WINDOW = 25;  // revolutions, longer than the beats of a quasi-periodic motion
   double middle = 0.0, last = 0.0;
   for (int r = 0; r < revolutions; ++r) {
     double change = 0.0;
@@ -165,13 +165,13 @@ inline bool chattersInTime(TimeDomain& run, int period, double feed, int revolut
     if (r >= revolutions / 2 - WINDOW && r < revolutions / 2) middle += change;
     if (r >= revolutions - WINDOW) last += change;
   }
-  // Per sample: a millionth of the feed has died out, a twentieth will not die any more.
+  // RMS below 1e-6 of the feed: decayed; above 5 %: persistent.
   const double samples = static_cast<double>(WINDOW) * steps;
   if (last < samples * std::pow(1e-6 * feed, 2)) return false;
   return last > 0.7 * middle || last > samples * std::pow(0.05 * feed, 2);
 }
 
-/// The same by the principal period: a tooth's for even pitch, else a revolution.
+/// The same with the principal period: tooth period for even pitch, else a revolution.
 inline bool chattersInTime(const RegenerativeSystem& system, const ModalModel& x, const ModalModel& y,
                            double speed, double depth, double feed, bool may_leave = true,
                            int revolutions = 180, int steps = 720) {

@@ -12,7 +12,6 @@
 #include "smartmill_stability/solvers/solver.h"
 
 namespace smartmill::stability {
-namespace {}  // namespace
 
 void TurningProcess::validate() const {
   require("stiffness ratio", stiffness_ratio, Range::positive());
@@ -32,7 +31,7 @@ double criticalFrequency(double natural_frequency, double damping_ratio) {
 
 double growthRate(const TurningProcess& process) {
   process.validate();
-  // One mode of unit stiffness along x; a depth of one metre cuts with the stiffness ratio.
+  // One mode of unit stiffness along x; at a depth of 1 m the cutting stiffness is the stiffness ratio.
   RegenerativeSystem system;
   system.cut = Cut::turning;
   system.entry = 0.5 * units::PI;
@@ -79,8 +78,8 @@ TurningRun simulateTurning(const TurningProcess& process, double duration, doubl
   require("rate x period", rate * process.period, Range::above(2.0));
   const SecondOrder machine{process.stiffness_ratio, process.natural_frequency, process.damping_ratio};
   ModalFilter filter(machine.modal(), rate, Hold::first_order);
-  const double direct =
-      filter.peek(1.0) - filter.peek(0.0);  // of this sample's chip on this sample's deflection
+  // Effect of the chip thickness on the deflection of the same sample.
+  const double direct = filter.peek(1.0) - filter.peek(0.0);
   std::mt19937_64 random(seed);
   std::normal_distribution<double> noise(0.0, 1.0);
   TurningRun run;
@@ -93,7 +92,7 @@ TurningRun simulateTurning(const TurningProcess& process, double duration, doubl
   for (std::size_t i = 0; i < samples; ++i) {
     double past = 0.0;
     if (i > whole) past = run.motion[i - whole] + share * (run.motion[i - whole - 1] - run.motion[i - whole]);
-    // deflection = free + direct chip and chip = a0 - (deflection - tool) + mu past, at once.
+    // Solves deflection = free + direct chip and chip = a0 - (deflection - tool) + mu past.
     const double chip = (process.chip + tool - filter.peek(0.0) + process.overlap * past) / (1.0 + direct);
     const double deflection = filter.step(chip);
     run.time.push_back(static_cast<double>(i) / rate);

@@ -29,7 +29,7 @@ TraceOptions window(double low_rpm, double high_rpm, double max_depth) {
   return options;
 }
 
-// Every point lies on the unit circle, to the depth that 1e-4 of a fine cell makes.
+// At every point the dominant multiplier is on the unit circle, within 1e-4 of a fine cell.
 TEST(Boundary, pointsLieOnTheUnitCircle) {
   const auto solver = makeFloquetSolver(Method::collocation, benchmarkSystem(1.0, true, false));
   const auto curves = traceBoundary(*solver, window(9000.0, 22000.0, 4e-3));
@@ -65,8 +65,8 @@ TEST(Boundary, agreesWithTheFirstLoss) {
   }
 }
 
-// A helix closes flip lobes to islands (Zatarain et al. 2006): where the depth is a whole axial pitch of the
-// edges the feedback is constant and no flip can exist.
+// A helix closes flip lobes to islands (Zatarain et al. 2006): where the depth is an integer multiple of the
+// axial pitch the feedback is constant and no flip exists.
 TEST(Boundary, helixMakesIslandsOfFlip) {
   RegenerativeSystem system = benchmarkSystem(0.05, true, false);
   system.helix = units::radFromDeg(30.0);
@@ -99,7 +99,7 @@ TEST(Boundary, refusesAnEmptyWindow) {
   EXPECT_THROW(traceBoundary(*solver, window(9000.0, 10000.0, 0.0)), Error);
 }
 
-// The program: columns and content as other programs rely on them.
+// Columns and content of the program's CSV file, which other programs read.
 TEST(Lobes, writesTheFirstLossOfStability) {
   const TemporaryFolder folder;
   const std::string out = folder.file("chart.csv");

@@ -22,8 +22,8 @@ RegenerativeSystem withChips(RegenerativeSystem system) {
   return system;
 }
 
-// Teeth that are alike cut all along the arc what the one before left: the limit is the tabulated one.
-TEST(ChipContact, alikeTeethChangeNothing) {
+// Identical teeth cut along the whole arc the surface of the previous tooth: the limit is the tabulated one.
+TEST(ChipContact, identicalTeethGiveTheTabulatedLimits) {
   const RegenerativeSystem plain = benchmarkSystem(1.0, true, false);
   const auto solver = makeSolver(Method::collocation, withChips(plain));
   EXPECT_NEAR(solver->limit(radPerSecFromRpm(10000.0), MAX_DEPTH).depth * 1e3, 0.32238, 1e-5);
@@ -41,10 +41,9 @@ TEST(ChipContact, slicesOfAHelixGiveTheSameAsTheIntegral) {
   }
 }
 
-// A serration far deeper than the feed: at each height one tooth alone cuts, and all of them share the
-// height. In the mean that is a tool of one tooth, with its speeds (the teeth of the rigid tool decide; whole
-// waves).
-TEST(ChipContact, aDeepSerrationIsAToolOfOneToothInTheMean) {
+// With a serration much deeper than the feed only one tooth cuts at each height. The mean over a whole wave
+// is that of a tool with one tooth (contact of the rigid tool).
+TEST(ChipContact, theMeanOfADeepSerrationIsThatOfOneTooth) {
   RegenerativeSystem serrated = withChips(benchmarkSystem(0.5, true, true));
   serrated.teeth = 3;
   serrated.chip->serration_amplitude = 200.0 * FEED;
@@ -56,7 +55,7 @@ TEST(ChipContact, aDeepSerrationIsAToolOfOneToothInTheMean) {
     const Limit a = makeSolver(Method::zero_order, serrated)->limit(speed, 50e-3);
     const Limit b = makeSolver(Method::zero_order, one)->limit(speed, 50e-3);
     ASSERT_TRUE(std::isfinite(b.depth)) << rpm;
-    // Slices of a twentieth of the wave: at its crossings a few of them are shared.
+    // Slices are 1/20 of the wave; a few at the intersections are cut by two teeth.
     EXPECT_NEAR(a.depth / b.depth, 1.0, 0.02) << rpm;
     EXPECT_NEAR(a.frequency / b.frequency, 1.0, 0.01) << rpm;
   }
@@ -82,8 +81,8 @@ TEST(ChipContact, aSerrationRaisesTheLeastLimit) {
   EXPECT_LT(least_serrated, 3.5 * least_plain);
 }
 
-/// Points at which the solver (with or without the contact) and the simulation in time, in which teeth leave
-/// the cut, agree; 5 % beside the solver's boundary at least.
+/// Number of points at which the solver (with or without the contact) and the time-domain simulation, in
+/// which teeth leave the cut, agree. The points are at least 5 % away from the boundary of the solver.
 int agreement(const RegenerativeSystem& system, const std::vector<double>& offsets, int points, unsigned seed,
               bool with_contact) {
   RegenerativeSystem solved = with_contact ? withChips(system) : system;
@@ -91,13 +90,13 @@ int agreement(const RegenerativeSystem& system, const std::vector<double>& offse
   const auto solver = makeFloquetSolver(Method::collocation, solved);
   RegenerativeSystem bare = system;
   bare.chip.reset();
-  const auto places = makeFloquetSolver(Method::collocation, bare);
+  const auto bare_solver = makeFloquetSolver(Method::collocation, bare);
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> unit;
   int agree = 0;
   for (int n = 0; n < points;) {
     const double speed = radPerSecFromRpm(6000.0 + 14000.0 * unit(random));
-    const double reference = places->limit(speed, MAX_DEPTH).depth;
+    const double reference = bare_solver->limit(speed, MAX_DEPTH).depth;
     const double factor = system.chip ? 0.8 + 2.4 * unit(random) : 0.4 + 1.2 * unit(random);
     const double depth = (std::isfinite(reference) ? reference : 3e-3) * factor;
     const auto at = solver->at(speed);
@@ -111,9 +110,9 @@ int agreement(const RegenerativeSystem& system, const std::vector<double>& offse
     TimeDomain run(system, benchmark(), benchmark(), speed, depth, FEED, 720, true, slices);
     run.setRunout(offsets);
     if (system.chip) run.setSerration(system.chip->serration_amplitude, system.chip->serration_wavelength);
-    const bool seen = chattersInTime(run, 720, FEED);
-    agree += seen == chatters;
-    if (seen != chatters)
+    const bool simulated = chattersInTime(run, 720, FEED);
+    agree += simulated == chatters;
+    if (simulated != chatters)
       std::cout << "  differs at " << units::rpmFromRadPerSec(speed) << " rpm, " << depth * 1e3
                 << " mm: multiplier " << at->multiplier(depth).radius() << '\n';
   }
@@ -121,8 +120,8 @@ int agreement(const RegenerativeSystem& system, const std::vector<double>& offse
   return agree;
 }
 
-// Linear theory with uneven pitch stood at 48 of 50: the forced vibration differs from tooth to tooth and
-// teeth leave thin chips early. With the contact about that vibration nothing is left.
+// Linear theory with uneven pitch agrees at 48 of 50 points: the forced vibration differs from tooth to
+// tooth, and teeth leave thin chips early. With the contact in the forced vibration all points agree.
 TEST(ChipContact, unevenPitchWithTeethThatLeaveTheCut) {
   RegenerativeSystem system = benchmarkSystem(0.5, true, true);
   system.helix = units::radFromDeg(30.0);
@@ -130,14 +129,14 @@ TEST(ChipContact, unevenPitchWithTeethThatLeaveTheCut) {
   EXPECT_EQ(agreement(system, {}, 12, 4, true), 12);
 }
 
-TEST(ChipContact, aSerratedToolInTime) {
+TEST(ChipContact, aSerratedToolAgreesWithTheTimeDomain) {
   RegenerativeSystem system = withChips(benchmarkSystem(0.5, true, true));
   system.chip->serration_amplitude = 0.15e-3;
-  system.chip->serration_wavelength = 0.2e-3;  // depths of the benchmark are tenths of a millimetre
+  system.chip->serration_wavelength = 0.2e-3;  // limits of the benchmark are tenths of a millimetre
   EXPECT_EQ(agreement(system, {}, 4, 5, true), 4);
 }
 
-TEST(ChipContact, refusesTheImpossible) {
+TEST(ChipContact, refusesInvalidSystems) {
   RegenerativeSystem system = withChips(benchmarkSystem(0.5, true, true));
   system.chip->feed = 0.0;
   EXPECT_THROW(makeSolver(Method::collocation, system), Error);

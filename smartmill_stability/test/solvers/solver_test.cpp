@@ -15,7 +15,7 @@ namespace {
 using units::radPerSecFromRpm;
 
 constexpr double MAX_DEPTH = 10e-3;
-/// The tables print five digits after the point.
+/// [mm] Rounding of the tables.
 constexpr double PRINTED = 0.5e-5;
 
 struct Row {
@@ -65,8 +65,7 @@ TEST(Collocation, twoDegreesOfFreedomAgreeWithTheTable) {
   check(*makeSolver(Method::collocation, benchmarkSystem(0.05, true, true)), FINISHING_XY, 1e-6);
 }
 
-// Every tabulated limit, asked for 0.1 %; the table's own scan in steps of 0.05 mm may have stepped over a
-// lens.
+// Every tabulated limit; the table was computed by a scan in steps of 0.05 mm.
 TEST(Collocation, everyTabulatedImmersion) {
   int checked = 0;
   SMARTMILL_SHARED_DATA(file, "oracles/insperger_1dof_first_limit.csv");
@@ -83,7 +82,7 @@ TEST(Collocation, everyTabulatedImmersion) {
   EXPECT_EQ(checked, 63);
 }
 
-// The zero-order solution says 6.85 mm here (zero_order_test).
+// The zero-order solution gives 6.85 mm here (zero_order_test).
 TEST(MultiFrequency, findsTheFlipThatZeroOrderMisses) {
   SolverOptions options;
   options.harmonics = 20;
@@ -91,7 +90,7 @@ TEST(MultiFrequency, findsTheFlipThatZeroOrderMisses) {
   const Limit limit = solver->limit(radPerSecFromRpm(20000.0), MAX_DEPTH);
   EXPECT_NEAR(limit.depth * 1e3, 3.250386, 1e-3 * 3.25);
   EXPECT_EQ(limit.kind, Kind::flip);
-  EXPECT_NEAR(limit.frequency, 1000.0, 1e-6);  // odd multiples of half the tooth frequency: 333 Hz
+  EXPECT_NEAR(limit.frequency, 1000.0, 1e-6);  // odd multiple of half the tooth passing frequency, 333 Hz
   const auto mean = makeSolver(Method::zero_order, benchmarkSystem(0.05, true, true));
   EXPECT_NEAR(mean->limit(radPerSecFromRpm(20000.0), MAX_DEPTH).depth * 1e3, 6.850, 6e-3 * 6.85);
 }
@@ -127,12 +126,12 @@ DelayedSystem mathieu() {
 // Delayed Mathieu equation, delta 3, eps 2, damping 0.1, delayed gain -0.15: 0.5120523.
 TEST(DelayedMathieu, spectralRadius) {
   EXPECT_NEAR(collocationMultiplier(mathieu(), 12).radius(), 0.5120523, 1e-6);
-  // Printed .51170, .51196, .51203 at 80, 160, 320 steps: ours are of the same size.
+  // Published: .51170, .51196, .51203 at 80, 160, 320 steps.
   EXPECT_NEAR(semiDiscretizationMultiplier(mathieu(), 320, 0).radius(), 0.51203, 1e-5);
   EXPECT_NEAR(semiDiscretizationMultiplier(mathieu(), 5120, 1).radius(), 0.5120523, 1e-6);
 }
 
-/// Least slope of log error over log resolution between successive doublings, and the largest.
+/// Smallest and largest order of convergence between successive doublings of the resolution.
 std::pair<double, double> slopes(const std::function<double(int)>& value, double exact, int first,
                                  int count) {
   double least = 1e9, most = -1e9, before = std::abs(value(first) - exact);
@@ -146,7 +145,7 @@ std::pair<double, double> slopes(const std::function<double(int)>& value, double
   return {least, most};
 }
 
-// The means of the feedback over a step bound every order of interpolation to two.
+// The mean of the feedback over a step limits the order to two for every interpolation order.
 TEST(Convergence, semiDiscretizationIsOfSecondOrder) {
   const double exact = collocationMultiplier(mathieu(), 24).radius();
   for (const int order : {0, 1, 2}) {
@@ -158,7 +157,7 @@ TEST(Convergence, semiDiscretizationIsOfSecondOrder) {
   }
 }
 
-// Entry and exit make jumps: coefficients of the feedback fall with 1/k, compliances with 1/k^2.
+// Jumps at entry and exit: Fourier coefficients of the feedback decrease as 1/k, receptances as 1/k^2.
 TEST(Convergence, multiFrequencyIsOfThirdOrderInTheHarmonics) {
   const RegenerativeSystem system = benchmarkSystem(0.05, true, false);
   const double speed = radPerSecFromRpm(20000.0);
@@ -174,7 +173,7 @@ TEST(Convergence, multiFrequencyIsOfThirdOrderInTheHarmonics) {
   EXPECT_LT(most, 3.2);
 }
 
-// Two more nodes divide the error by ten or more, down to the rounding.
+// Two more nodes reduce the error at least tenfold, down to rounding.
 TEST(Convergence, collocationIsSpectral) {
   const RegenerativeSystem system = benchmarkSystem(1.0, true, false);
   const auto depth = [&](int nodes) {
@@ -213,16 +212,16 @@ TEST(Convergence, theErrorEstimateCoversTheError) {
 RegenerativeSystem turning(double zeta) {
   RegenerativeSystem system;
   system.cut = Cut::turning;
-  system.entry = 0.5 * units::PI;  // the edge stands at +x: radial force and chip along x
+  system.entry = 0.5 * units::PI;  // edge at +x: radial force and chip along x
   system.kr = 1e9;
   system.kt = 0.0;
   system.modes = systemModes(ModalModel{{{100.0, zeta, 1e-8}}, 0.0}, 0);
   return system;
 }
 
-// Merritt's minimum 2 k zeta (1 + zeta) / k_f, reached where the lobe's bottom lies: at w_c = w_n sqrt(1 + 2
-// zeta) the phase w T of the regeneration is 3 pi / 2 less the structure's: found by the search over speeds.
-TEST(Turning, merrittsMinimumFromTheMultipliers) {
+// Merritt's minimum 2 k zeta (1 + zeta) / k_f at the bottom of a lobe, with chatter frequency w_c = w_n
+// sqrt(1 + 2 zeta).
+TEST(Turning, minimumOfMerrittFromTheMultipliers) {
   const double zeta = 0.05, minimum = 2.0 * 1e8 * zeta * (1.0 + zeta) / 1e9;
   SolverOptions options;
   options.tolerance = 1e-10;
@@ -237,34 +236,35 @@ TEST(Turning, merrittsMinimumFromTheMultipliers) {
     const Limit limit = solver->limit(speed, 0.1);
     EXPECT_NEAR(limit.depth / minimum, 1.0, 1e-6) << lobe;
     EXPECT_NEAR(limit.frequency * units::TWO_PI / w, 1.0, 1e-5) << lobe;
-    // No neighbour lies below.
+    // It is a minimum.
     EXPECT_GT(solver->limit(1.01 * speed, 0.1).depth, minimum);
     EXPECT_GT(solver->limit(0.99 * speed, 0.1).depth, minimum);
   }
 }
 
-// Without overlap nothing regenerates and one mode stays stable; two modes with slanted axes do not need it.
-TEST(Turning, modeCouplingAlone) {
+// Without overlap there is no regeneration and one mode is stable; two modes with inclined axes are unstable
+// by mode coupling.
+TEST(Turning, modeCouplingWithoutRegeneration) {
   RegenerativeSystem system = turning(0.02);
   system.overlap = 0.0;
   EXPECT_TRUE(std::isinf(makeSolver(Method::collocation, system)->limit(100.0, 0.1).depth));
-  // Two modes with axes at right angles, the cut's force between them: as the depth grows their frequencies
-  // meet and one of them takes energy (flutter).
-  const auto slanted = [](double frequency, double angle) {
+  // Two modes with perpendicular axes, the cutting force between them: with growing depth their frequencies
+  // coincide and one of them becomes unstable (flutter).
+  const auto inclined = [](double frequency, double angle) {
     SystemMode mode{
         frequency, 0.01, {{std::sin(angle), std::cos(angle)}}, {{std::sin(angle), std::cos(angle)}}};
     return mode;
   };
-  system.modes = {slanted(120.0, units::radFromDeg(50.0)), slanted(100.0, units::radFromDeg(140.0))};
+  system.modes = {inclined(120.0, units::radFromDeg(50.0)), inclined(100.0, units::radFromDeg(140.0))};
   system.kt = 1e9;
   system.kr = 0.5e9;
   const Limit limit = makeSolver(Method::collocation, system)->limit(100.0, 1.0);
   ASSERT_TRUE(std::isfinite(limit.depth));
-  // Independent: growth rate of the modes with the feedback as a plain matrix.
+  // Independent stability criterion of the modes with constant feedback; positive: unstable.
   const auto growth = [&](double depth) {
     Feedback f;
     delayedSystem(system, 100.0, depth).feedback(0.0, 0.0, f);
-    // lambda from det(diag(l^2 + 2 z w l + w^2) - I^T F O) = 0: quartic a_0 .. a_4 by its coefficients.
+    // Coefficients a_0 .. a_3 of the quartic det(diag(l^2 + 2 z w l + w^2) - I^T F O) = 0.
     double c[2][2];
     for (int i = 0; i < 2; ++i)
       for (int j = 0; j < 2; ++j) {
@@ -278,15 +278,14 @@ TEST(Turning, modeCouplingAlone) {
     const double w1 = units::TWO_PI * 120.0, w2 = units::TWO_PI * 100.0, d1 = 0.02 * w1, d2 = 0.02 * w2;
     const double k1 = w1 * w1 - c[0][0], k2 = w2 * w2 - c[1][1], cc = c[0][1] * c[1][0];
     const double a3 = d1 + d2, a2 = k1 + k2 + d1 * d2, a1 = d1 * k2 + d2 * k1, a0 = k1 * k2 - cc;
-    // Routh: stable where a1 a2 a3 - a1^2 - a3^2 a0 > 0 (and a0 > 0).
+    // Routh: stable for a1 a2 a3 - a1^2 - a3^2 a0 > 0 (and a0 > 0).
     return -(a1 * a2 * a3 - a1 * a1 - a3 * a3 * a0);
   };
   EXPECT_LT(growth(limit.depth * 0.9999), 0.0);
   EXPECT_GT(growth(limit.depth * 1.0001), 0.0);
 }
 
-// A pitch that is uneven by nothing is even; teeth at real uneven pitch agree between two solvers that share
-// no discretization.
+// Three solvers without a common discretization agree for an uneven pitch.
 TEST(UnevenPitch, solversAgree) {
   RegenerativeSystem system = benchmarkSystem(0.3, true, true);
   system.pitch = {units::radFromDeg(170.0), units::radFromDeg(190.0)};
@@ -308,7 +307,7 @@ TEST(UnevenPitch, solversAgree) {
   }
 }
 
-TEST(UnevenPitch, theEvenOneAsALimit) {
+TEST(UnevenPitch, convergesToEvenPitch) {
   const RegenerativeSystem even = benchmarkSystem(0.3, true, false);
   RegenerativeSystem nearly = even;
   nearly.pitch = {units::PI * (1.0 + 1e-6), units::PI * (1.0 - 1e-6)};
@@ -319,7 +318,7 @@ TEST(UnevenPitch, theEvenOneAsALimit) {
   EXPECT_NEAR(b.frequency, a.frequency, 0.1);
 }
 
-TEST(Helix, solversAgreeAndNoHelixIsALimit) {
+TEST(Helix, solversAgreeAndConvergeToNoHelix) {
   RegenerativeSystem system = benchmarkSystem(0.3, true, true);
   const double speed = radPerSecFromRpm(13000.0);
   const double straight = makeSolver(Method::collocation, system)->limit(speed, MAX_DEPTH).depth;
@@ -338,8 +337,8 @@ TEST(Helix, solversAgreeAndNoHelixIsALimit) {
   }
 }
 
-// In the frequency domain, with the sweep of the edge at the depth itself, against collocation: Hopf and
-// flip, and speeds that are stable to the largest depth.
+// Frequency-domain solution with the lag of the edge at the limit, compared with collocation: Hopf, flip, and
+// speeds that are stable to the largest depth.
 TEST(Helix, multiFrequencyAgreesWithCollocation) {
   RegenerativeSystem system = benchmarkSystem(0.3, true, false);
   system.helix = units::radFromDeg(30.0);
@@ -357,7 +356,7 @@ TEST(Helix, multiFrequencyAgreesWithCollocation) {
   }
 }
 
-// A flank that rubs takes energy: at low speed the limit rises; both Floquet solvers see the same.
+// Process damping raises the limit at low speed, equally in both Floquet solvers.
 TEST(ProcessDamping, raisesTheLimitAtLowSpeed) {
   RegenerativeSystem system = benchmarkSystem(0.5, true, true);
   SolverOptions options;
@@ -373,7 +372,7 @@ TEST(ProcessDamping, raisesTheLimitAtLowSpeed) {
   EXPECT_NEAR(semi / damped, 1.0, 1e-3);
 }
 
-TEST(Modes, aNegativeGainAndADirectShareKeepTheReceptance) {
+TEST(Modes, negativeGainAndResidualCompliancePreserveTheReceptance) {
   const ModalModel model{{{500.0, 0.03, -2e-8}, {900.0, 0.02, 5e-8}}, 0.0};
   for (const double f : {100.0, 510.0, 880.0, 2000.0}) {
     const auto g = receptance(systemModes(model, 1), f);
@@ -386,7 +385,7 @@ TEST(Modes, aNegativeGainAndADirectShareKeepTheReceptance) {
   EXPECT_NEAR(std::abs(g[0] - with_direct.response(450.0)), 0.0, 0.25 * 1e-8);
 }
 
-TEST(Solvers, refuseTheImpossible) {
+TEST(Solvers, refuseInvalidInput) {
   RegenerativeSystem system = benchmarkSystem(1.0, true, false);
   EXPECT_THROW(makeSolver(Method::collocation, system)->limit(-1.0, 1e-3), Error);
   EXPECT_THROW(makeSolver(Method::collocation, system)->limit(1000.0, 0.0), Error);

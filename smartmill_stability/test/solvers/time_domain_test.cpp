@@ -10,7 +10,8 @@
 namespace smartmill::stability {
 namespace {
 
-/// Share of random points outside a band of 5 % around the boundary at which the time domain agrees.
+/// [1] Fraction of random points outside a band of 5 % around the boundary at which solver and time domain
+/// agree.
 double agreement(RegenerativeSystem system, bool two_axes, int points, unsigned seed, bool may_leave = true) {
   const ModalModel x = benchmark(), y = two_axes ? benchmark() : ModalModel{};
   system.modes = systemModes(x, y);
@@ -24,16 +25,16 @@ double agreement(RegenerativeSystem system, bool two_axes, int points, unsigned 
     const double depth = (std::isfinite(reference) ? reference : 5e-3) * (0.4 + 1.2 * unit(random));
     const auto at = solver->at(speed);
     const bool chatters = at->multiplier(depth).radius() > 1.0;
-    // Outside the band: 5 % deeper and 5 % shallower are alike.
+    // Outside the band: the same result at 5 % larger and smaller depth.
     if ((at->multiplier(1.05 * depth).radius() > 1.0) != chatters ||
         (at->multiplier(0.95 * depth).radius() > 1.0) != chatters)
       continue;
-    const bool seen = chattersInTime(system, x, y, speed, depth, 0.1e-3, may_leave);
-    if (seen != chatters)
+    const bool simulated = chattersInTime(system, x, y, speed, depth, 0.1e-3, may_leave);
+    if (simulated != chatters)
       std::cout << "  differs at " << units::rpmFromRadPerSec(speed) << " rpm, " << depth * 1e3
                 << " mm (limit " << reference * 1e3 << "): multiplier " << at->multiplier(depth).radius()
-                << ", in time " << seen << '\n';
-    agree += seen == chatters;
+                << ", in time " << simulated << '\n';
+    agree += simulated == chatters;
     chattering += chatters;
     ++n;
   }
@@ -41,7 +42,7 @@ double agreement(RegenerativeSystem system, bool two_axes, int points, unsigned 
   return static_cast<double>(agree) / n;
 }
 
-/// 400 points each where a study is asked for.
+/// 400 points if SMARTMILL_STUDY is set.
 int points(int few) {
   return std::getenv("SMARTMILL_STUDY") ? 400 : few;
 }
@@ -60,9 +61,9 @@ TEST(TimeDomain, agreesWithHelix) {
   EXPECT_GE(agreement(system, true, points(10), 3), 0.98);
 }
 
-// With uneven pitch the forced vibration differs from tooth to tooth, the chips with it, and teeth leave a
-// thin chip early: a nonlinear effect that linear theory cannot know (it moves the boundary by up to a
-// tenth).
+// With uneven pitch the forced vibration and the chips differ from tooth to tooth, and teeth leave thin chips
+// early: a nonlinear effect, absent from linear theory, which moves the boundary by up to 10 %. Here teeth do
+// not leave.
 TEST(TimeDomain, agreesWithHelixAndUnevenPitch) {
   RegenerativeSystem system = benchmarkSystem(0.5, true, true);
   system.helix = units::radFromDeg(30.0);
@@ -70,11 +71,11 @@ TEST(TimeDomain, agreesWithHelixAndUnevenPitch) {
   EXPECT_GE(agreement(system, true, points(10), 4, false), 0.98);
 }
 
-// The flip that zero-order misses by more than a factor of two.
+// The limit of this flip is less than half the zero-order limit.
 TEST(TimeDomain, findsTheFlipThatZeroOrderMisses) {
   const RegenerativeSystem system = benchmarkSystem(0.05, true, true);
   const double speed = units::radPerSecFromRpm(20000.0);
-  // 3.250386 mm in the tables, 6.850 by zero-order.
+  // 3.250386 mm in the tables, 6.850 mm by the zero-order solution.
   EXPECT_FALSE(chattersInTime(system, benchmark(), benchmark(), speed, 3.18e-3, 0.1e-3));
   EXPECT_TRUE(chattersInTime(system, benchmark(), benchmark(), speed, 3.32e-3, 0.1e-3));
 }

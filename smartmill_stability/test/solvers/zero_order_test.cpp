@@ -12,7 +12,7 @@ namespace {
 
 using units::PI;
 
-// The classic benchmark: 0.03993 kg, 922 Hz, 1.1 % damping, two straight teeth, Kt 6e8, Kn 2e8 N/m2.
+// Benchmark: 0.03993 kg, 922 Hz, 1.1 % damping, two straight teeth, Kt 6e8, Kr 2e8 N/m2.
 ModalModel benchmark() {
   ModalModel model;
   const double w = units::TWO_PI * 922.0;
@@ -24,9 +24,9 @@ struct Row {
   double rpm, root_mm, table_mm;
 };
 
-// root_mm: det[I - 1/2 Kt a (1 - exp(-i w T)) A_0 Phi(i w)] = 0 (eq. 6.10) solved by Newton's method with A_0
-// by numeric quadrature, outside this code. table_mm: the zero-order column of an independent
-// two-degree-of-freedom table, which was read off a frequency grid: it lies up to 0.5 % above the root.
+// root_mm: det[I - 1/2 Kt a (1 - exp(-i w T)) A_0 Phi(i w)] = 0 (eq. 6.10), solved by Newton's method with
+// A_0 by numerical quadrature, independent of this code. table_mm: zero-order column of an independent table
+// for two degrees of freedom, evaluated on a frequency grid and therefore up to 0.5 % above the root.
 void check(const RegenerativeProcess& process, const std::vector<Row>& rows) {
   const ToolTipResponse tool = responseOf(benchmark(), benchmark(), 1.0, 6000.0, 60000);
   std::vector<double> speeds;
@@ -46,7 +46,7 @@ TEST(ZeroOrder, slotting) {
 }
 
 TEST(ZeroOrder, smallImmersionDownMilling) {
-  // Radial immersion 0.05 D: the last arccos(1 - 2 x 0.05) of the half turn.
+  // Radial depth 0.05 D: the last arccos(1 - 2 x 0.05) of half a revolution.
   const double entry = PI - std::acos(1.0 - 2.0 * 0.05);
   check({2, entry, PI, 6e8, 2e8 / 6e8}, {{6000, 1.42978594, 1.431},
                                          {10000, 1.35010717, 1.351},
@@ -75,7 +75,7 @@ TEST(ZeroOrder, chartNeverFallsBelowTheAbsoluteLimit) {
     EXPECT_GE(depth, absolute * (1.0 - 1e-9));
     least = std::min(least, depth);
   }
-  EXPECT_NEAR(least / absolute, 1.0, 1e-3);  // some speed of the grid comes this near
+  EXPECT_NEAR(least / absolute, 1.0, 1e-3);  // reached at a speed of the grid
 }
 
 TEST(ZeroOrder, rigidToolHasNoLimit) {
@@ -85,7 +85,7 @@ TEST(ZeroOrder, rigidToolHasNoLimit) {
   EXPECT_TRUE(std::isnan(limit.chatter_frequency[0]));
 }
 
-TEST(ZeroOrder, refusesTheImpossible) {
+TEST(ZeroOrder, refusesInvalidInput) {
   const ToolTipResponse tool = responseOf(benchmark(), benchmark(), 1.0, 2000.0, 100);
   EXPECT_THROW(zeroOrderLimit({0, 0.0, PI, 1e9, 0.3}, tool, {100.0}), Error);
   EXPECT_THROW(zeroOrderLimit({4, PI, 0.0, 1e9, 0.3}, tool, {100.0}), Error);
