@@ -78,8 +78,8 @@ std::vector<double> speedsFromChatter(double frequency, int teeth, double low, d
   }
 }
 
-std::optional<ModeCorrection> correctFromChatter(const RegenerativeSystem& believed, double speed,
-                                                 double depth, double observed, double most) {
+std::optional<ModeCorrection> correctFromChatter(const RegenerativeSystem& prior, double speed, double depth,
+                                                 double observed, double most) {
   if (!(observed > 0.0)) throw Error("chatter correction: expected a frequency above 0 Hz");
   if (!(most > 0.0) || most >= 0.5)
     throw Error("chatter correction: expected a largest change between 0 and 0.5");
@@ -88,24 +88,24 @@ std::optional<ModeCorrection> correctFromChatter(const RegenerativeSystem& belie
     const bool better = !best || (chatters && !best->chatters) ||
                         (chatters == best->chatters && std::abs(factor - 1.0) < std::abs(best->factor - 1.0));
     if (!better) return;
-    best = ModeCorrection{mode, factor, believed.modes[mode].frequency * factor, chatters,
-                          scaled(believed, mode, factor)};
+    best = ModeCorrection{mode, factor, prior.modes[mode].frequency * factor, chatters,
+                          scaled(prior, mode, factor)};
   };
-  const double passing = speed * believed.teeth / units::TWO_PI;
-  for (std::size_t mode = 0; mode < believed.modes.size(); ++mode) {
+  const double passing = speed * prior.teeth / units::TWO_PI;
+  for (std::size_t mode = 0; mode < prior.modes.size(); ++mode) {
     // Roots of the gap over the factor. A jump to another motion and a wrap-around are no roots.
     constexpr int STEPS = 40;
     double before_factor = 1.0 - most;
-    Probe before = probe(scaled(believed, mode, before_factor), speed, depth, observed);
+    Probe before = probe(scaled(prior, mode, before_factor), speed, depth, observed);
     for (int i = 1; i <= STEPS; ++i) {
       const double factor = 1.0 - most + 2.0 * most * i / STEPS;
-      const Probe here = probe(scaled(believed, mode, factor), speed, depth, observed);
+      const Probe here = probe(scaled(prior, mode, factor), speed, depth, observed);
       if ((before.gap > 0.0) != (here.gap > 0.0) && std::abs(here.gap - before.gap) < 0.25 * passing) {
         double a = before_factor, b = factor;
         Probe pa = before, pb = here;
         for (int k = 0; k < 25 && b - a > 1e-7; ++k) {
           const double middle = 0.5 * (a + b);
-          const Probe pm = probe(scaled(believed, mode, middle), speed, depth, observed);
+          const Probe pm = probe(scaled(prior, mode, middle), speed, depth, observed);
           ((pm.gap > 0.0) == (pa.gap > 0.0) ? a : b) = middle;
           ((pm.gap > 0.0) == (pa.gap > 0.0) ? pa : pb) = pm;
         }
@@ -118,12 +118,12 @@ std::optional<ModeCorrection> correctFromChatter(const RegenerativeSystem& belie
   return best;
 }
 
-ChatterAdvisor::ChatterAdvisor(double low, double high, int teeth, Believed believed, Output output,
+ChatterAdvisor::ChatterAdvisor(double low, double high, int teeth, PriorSystem prior, Output output,
                                Output early)
     : low_(low),
       high_(high),
       teeth_(teeth),
-      believed_(std::move(believed)),
+      prior_system_(std::move(prior)),
       output_(std::move(output)),
       early_(std::move(early)) {
   if (!(low > 0.0) || !(high >= low)) throw Error("chatter advice: expected speeds 0 < low <= high");
@@ -194,7 +194,7 @@ void ChatterAdvisor::advise(const ChatterState& state) {
     if (c.name == state.condition) condition = c;
   advice.depth = condition.engagement.axial_depth;
   const int teeth = condition.tool.teeth > 0 ? condition.tool.teeth : teeth_;
-  std::optional<RegenerativeSystem> system = believed_(condition);
+  std::optional<RegenerativeSystem> system = prior_system_(condition);
   // A smaller difference is the effect of load on the commanded speed, a larger one a spindle run-up or stop.
   constexpr double LOAD = 0.01, OVERRIDE = 0.5;
   const double off = std::abs(actual_speed_ - condition.spindle_speed) / condition.spindle_speed;

@@ -22,8 +22,8 @@ double rpm(double speed) {
 
 }  // namespace
 
-MillingControl::MillingControl(const MillingControlParameters& parameters, int window, Believed believed)
-    : parameters_(parameters), window_(window), believed_(std::move(believed)) {
+MillingControl::MillingControl(const MillingControlParameters& parameters, int window, Estimate estimate)
+    : parameters_(parameters), window_(window), estimate_(std::move(estimate)) {
   parameters_.validate();
 }
 
@@ -113,9 +113,9 @@ void MillingControl::handle(const ChatterState& state) {
 }
 
 std::optional<UncertainSystem> MillingControl::systemOf(const ChatterAdvice& advice) const {
-  const std::optional<UncertainSystem> believed = believed_(advice.engagement);
-  if (!believed || !advice.correction) return believed;
-  return believed->about(advice.correction->system);
+  const std::optional<UncertainSystem> estimate = estimate_(advice.engagement);
+  if (!estimate || !advice.correction) return estimate;
+  return estimate->about(advice.correction->system);
 }
 
 void MillingControl::handle(const ChatterAdvice& advice) {

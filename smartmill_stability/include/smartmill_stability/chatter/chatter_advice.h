@@ -43,8 +43,8 @@ struct ModeCorrection {
 /// and depth [m] has the observed frequency [Hz], modulo the tooth passing frequency (a sideband may dominate
 /// the force). Corrections with which the system chatters take precedence. Empty when no correction fits.
 /// @param most [1] largest relative change. @throws Error on values out of range.
-std::optional<ModeCorrection> correctFromChatter(const RegenerativeSystem& believed, double speed,
-                                                 double depth, double observed, double most = 0.1);
+std::optional<ModeCorrection> correctFromChatter(const RegenerativeSystem& prior, double speed, double depth,
+                                                 double observed, double most = 0.1);
 
 /// Advice against chatter in a running cut (topic chatter/advice).
 struct ChatterAdvice {
@@ -71,12 +71,12 @@ struct ChatterAdvice {
 class ChatterAdvisor {
  public:
   /// Provides the prior system of a cut; empty while modes or coefficients are missing.
-  using Believed = std::function<std::optional<RegenerativeSystem>(const CuttingCondition&)>;
+  using PriorSystem = std::function<std::optional<RegenerativeSystem>(const CuttingCondition&)>;
   using Output = std::function<void(const ChatterAdvice&)>;
   /// @param low, high [rad/s] range of the proposed speeds @param teeth of conditions that state none
   /// @param early receives the advice before the limits at the proposed speeds are computed, which takes
   /// longest
-  ChatterAdvisor(double low, double high, int teeth, Believed believed, Output output, Output early = {});
+  ChatterAdvisor(double low, double high, int teeth, PriorSystem prior, Output output, Output early = {});
 
   /// May precede the last verdicts of the previous cut.
   void handle(const CuttingCondition& condition);
@@ -92,7 +92,7 @@ class ChatterAdvisor {
 
   double low_, high_;
   int teeth_;
-  Believed believed_;
+  PriorSystem prior_system_;
   Output output_, early_;
   std::deque<CuttingCondition> conditions_;  // most recent
   std::vector<ChatterState> running_;        // of the current episode

@@ -54,8 +54,7 @@ struct RecordingVerdict {
 /// - is not a spindle harmonic (the speed is corrected from the harmonics),
 /// - is present only while the tool cuts, and in most windows of the cut at the same frequency,
 /// - has companions an integer number of tooth passing frequencies away, because the teeth sample the
-/// vibration
-///   (Insperger, Stepan et al.: chatter frequencies of a time-periodic process),
+///   vibration (Insperger, Stepan et al.: chatter frequencies of a time-periodic process),
 /// - lies near a mode with its family, where modes are known.
 /// This excludes broadband noise of chips and load, a tone of another machine (present outside the cut,
 /// without companions) and a spindle run-up (no steady line). A flip of a tool with an even number of teeth

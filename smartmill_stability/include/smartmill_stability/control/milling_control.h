@@ -75,9 +75,9 @@ struct OverrideRequest {
 class MillingControl {
  public:
   /// Provides the estimated machine in a cut; empty while it is unknown.
-  using Believed = std::function<std::optional<UncertainSystem>(const Engagement&)>;
+  using Estimate = std::function<std::optional<UncertainSystem>(const Engagement&)>;
   /// @param window [revolutions] of a verdict of the detector
-  MillingControl(const MillingControlParameters& parameters, int window, Believed believed);
+  MillingControl(const MillingControlParameters& parameters, int window, Estimate estimate);
 
   void handle(const CuttingCondition& condition);
   void handle(const CncState& state);
@@ -116,7 +116,7 @@ class MillingControl {
 
   MillingControlParameters parameters_;
   int window_;
-  Believed believed_;
+  Estimate estimate_;
   std::optional<CuttingCondition> next_, cut_;
   std::optional<CncState> state_;
   Phase phase_ = Phase::watching;
