@@ -9,26 +9,24 @@
 
 namespace smartmill::sim {
 
-/// Where a tip is and how it moves, x and y.
+/// Displacement and rate of the tip in x and y.
 struct TipPlace {
   std::array<double, 2> displacement{{0, 0}};  ///< [m]
   std::array<double, 2> rate{{0, 0}};          ///< [m/s]
 };
 
-/// Where the tip of a tool was in a recorded cut: as tool_x and tool_y show it or, without them, where the
-/// forces that fx and fy show push it by this model: through the force sensor's inverse to the forces on the
-/// tool, through the tool's modes to its place.
+/// Motion of the tool tip in a recorded cut: from tool_x and tool_y or, without them, from fx and fy through the inverse of the force sensor's FRF and the receptance of the tool tip.
 class Guide {
  public:
-  /// Whether a record shows enough.
+  /// Whether the record has the channels.
   static bool canBe(const Record& recorded);
-  /// The same, and by its forces only.
+  /// Whether it follows from the forces.
   static bool byForce(const Record& recorded);
 
-  /// @param model as the effects left it @param sample_rate [Hz]
+  /// @param model as changed by its effects @param sample_rate [Hz]
   Guide(const MachineModel& model, const Record& recorded, double sample_rate);
 
-  /// At a share 0..1 of the way from sample i to the next.
+  /// Interpolated between sample i (share 0) and the next one (share 1).
   TipPlace at(std::size_t i, double share) const;
 
  private:
@@ -36,7 +34,7 @@ class Guide {
   std::array<std::vector<double>, 2> tip_;  // [m]
 };
 
-/// Smooth, exact at the samples, the last ones held beyond the ends.
+/// Cubic (Catmull-Rom) interpolation between sample i (share 0) and the next one (share 1); constant beyond the ends.
 double interpolated(const std::vector<double>& samples, std::size_t i, double share);
 
 }  // namespace smartmill::sim
