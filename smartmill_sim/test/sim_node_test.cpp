@@ -175,7 +175,7 @@ TEST_F(SimNode, thePanelsKeysAnswerAndRefuse) {
   };
   EXPECT_EQ(press("mode", {1.0}).message, "mode: done");
   EXPECT_EQ(press("mode", {77.0}).code, smartmill_msgs::PanelKey::Response::REFUSED);
-  EXPECT_EQ(press("mode", {}).message, "mode: 0 values, 1 due");
+  EXPECT_EQ(press("mode", {}).message, "mode: 0 values, expected 1");
   EXPECT_EQ(press("emergency_stop", {1.0}).message, "emergency_stop: done");
   EXPECT_EQ(press("cycle_start", {}).message, "cycle_start: EW_ALARM");
   EXPECT_EQ(press("emergency_stop", {0.0}).message, "emergency_stop: done");

@@ -6,8 +6,8 @@
 namespace smartmill::sim {
 namespace {
 
-// Room that sensor and hammer take, as in Dunwoody fig. 4.1: a probe of 10 mm and a solenoid of 20 mm, 60 mm
-// long; the hammer rests as far behind the sensor's face as its plunger goes.
+// Size of sensor and hammer as in Dunwoody fig. 4.1: a probe of 10 mm and a solenoid of 20 mm, 60 mm long;
+// the hammer at rest is behind the sensor's face by the stroke of its plunger.
 constexpr double SENSOR_HALF_WIDTH = 5e-3, SENSOR_ABOVE_TIP = 5e-3;  // [m]
 constexpr double HAMMER_HALF_WIDTH = 10e-3, PLUNGER = 3e-3;          // [m]
 constexpr double BODY_LENGTH = 60e-3;                                // [m]
@@ -43,7 +43,7 @@ CollisionWatch CollisionWatch::ofModel(const MachineModel& model) {
         watch.add(b);
       };
       const double face = FACE_GAPS * station.gap_at_zero_volt;
-      // Nearer than the face there may be nothing: the tool's flutes turn there.
+      // No body in front of the face: the tool turns there.
       body("SENSOR", face, SENSOR_HALF_WIDTH, -FAR, place[2] + SENSOR_ABOVE_TIP);
       body("HAMMER", face + PLUNGER, HAMMER_HALF_WIDTH, place[2] + SENSOR_ABOVE_TIP,
            place[2] + station.offset + HAMMER_HALF_WIDTH);
@@ -59,7 +59,7 @@ const CollisionWatch::Body* CollisionWatch::touched(const Axes3& position, bool 
   const double radius = turning ? tool_radius : core_radius;
   for (const Body& body : bodies_) {
     if (position[2] >= body.high[2]) {
-      continue;  // the tip is above it, so is all of the tool
+      continue;  // the whole tool is above it
     }
     double square = 0.0;
     for (std::size_t i = 0; i < 2; ++i) {

@@ -13,15 +13,15 @@ namespace {
 
 using focas::EwCode;
 
-constexpr double ORIENT_STEPS = 4096;  // of one turn
-constexpr double ORIENT_SPEED = 20.0;  // [rad/s] about 190 rpm, as spindles orient
+constexpr double ORIENT_STEPS = 4096;  // per revolution
+constexpr double ORIENT_SPEED = 20.0;  // [rad/s] about 190 rpm, typical of spindles
 constexpr double MINUTE = 60.0;        // [s]
 constexpr double INCH = 25.4 * units::MM;
 constexpr double TRAVEL_TOLERANCE = 1e-9;  // [m] rounding of decimal input
-constexpr double ARC_TOLERANCE = 20e-6;    // [m] by which start and end may differ in their distance to I, J
-constexpr double LOOK = 2e-3;              // [s] between two looks at the obstacles
-constexpr double AT_SPEED = 0.05;          // [1] of the commanded speed
-constexpr std::size_t TEXT_AHEAD = 4096;   // [byte] of the program that is shown
+constexpr double ARC_TOLERANCE = 20e-6;    // [m] difference of the start and end radius
+constexpr double LOOK = 2e-3;              // [s] between two checks of the obstacles
+constexpr double AT_SPEED = 0.05;          // [1] tolerance, relative to the commanded speed
+constexpr std::size_t TEXT_AHEAD = 4096;   // [byte] of the indicated program text
 constexpr double NEVER = std::numeric_limits<double>::infinity();
 
 constexpr int PS_BLOCK_TOO_LONG = 3;
@@ -63,7 +63,7 @@ std::optional<std::string> BlockBuffer::takeLine() {
 ControlledMachine::ControlledMachine(const ControllerOptions& o)
     : options(o), mode_(o.mode), move_(o.axes.home), spindle_(o.spindle_acceleration) {
   variables.offsets[0] = o.work_offset;
-  // As every control has programs in its memory; the one that is selected parks the machine.
+  // Every control has programs in its memory; the selected one parks the machine.
   memory.store(RESIDENT_PROGRAM, 0, focas::DateTime());
   main_program_ = 1;
 }
@@ -74,7 +74,7 @@ void ControlledMachine::step(double dt) {
     dt_ = dt;
     steps_ = 0;
   }
-  // A product, not a sum: rounding does not add up.
+  // A product instead of a sum: rounding errors do not accumulate.
   const double end = base_ + static_cast<double>(++steps_) * dt_;
   double time = now_;
   while (!held_ && !stopped_ && (running_ || takeBlock(time))) {
@@ -180,7 +180,7 @@ void ControlledMachine::haltAt(double time, EwCode why) {
   if (time < move_.end()) {
     move_.stop(time, options.axes.acceleration);
   } else if (move_.held()) {
-    move_ = PathMove(move_.position(time));  // it stands in feed hold: the rest of its way is dropped
+    move_ = PathMove(move_.position(time));  // at rest in feed hold: the rest of its path is dropped
   }
   pending_.clear();
   spindle_.ramp(time, 0.0);
@@ -261,7 +261,7 @@ void ControlledMachine::setOverrides(double feed, double rapid, double spindle) 
   }
 }
 
-/// The running move goes on with the feed that holds now.
+/// Replans the running move for the present overrides.
 void ControlledMachine::replan() {
   if (running_ && (moving() || move_.held())) {
     move_.plan(now_, feedOf(move_, move_rapid_), options.axes.acceleration);
@@ -302,7 +302,7 @@ void ControlledMachine::setSpindleTorque(double torque) {
     return;
   }
   torque_ = torque;
-  // The drive's limit accelerates the inertia and carries the cut, which helps to brake.
+  // The drive's torque limit accelerates the inertia and carries the cut; the cut assists braking.
   const double share = torque / options.spindle_torque;
   const double drive = options.spindle_acceleration;
   spindle_.setAccelerations(now_, drive * (1.0 - share), drive * std::max(1.0 + share, 0.01));
@@ -328,7 +328,7 @@ EwCode ControlledMachine::open() {
 
 std::size_t ControlledMachine::take(const char* data, std::size_t size) {
   if (!session_) {
-    return size;  // of a session that has ended: thrown away
+    return size;  // data of a closed session is discarded
   }
   const std::size_t taken =
       std::min(size, options.buffer_size - std::min(options.buffer_size, buffer_.size()));
@@ -401,7 +401,7 @@ void ControlledMachine::beginProgram() {
   variables.clearLocals();
 }
 
-/// Starts the next block at a time. @return whether there was one (or an alarm).
+/// Starts the next block at a time [s]. @return whether there was one (or an alarm).
 bool ControlledMachine::takeBlock(double time) {
   try {
     const std::optional<std::string> line = buffer_.takeLine();
@@ -506,7 +506,7 @@ void ControlledMachine::planPath(const NcBlock& block) {
   const std::array<double, 3> to = targetOf(block, from);
   pending_.clear();
   if (block.reference) {
-    // Through the point written to the reference position, the axes that are named.
+    // Through the programmed point to the reference position of the named axes.
     std::array<double, 3> home = to;
     for (std::size_t i = 0; i < 3; ++i) {
       home[i] = block.axis[i] ? options.axes.home[i] : to[i];
@@ -517,8 +517,8 @@ void ControlledMachine::planPath(const NcBlock& block) {
     const bool clockwise = modal_.motion == 2;
     append(PathMove::arc(from, to, centreOf(block, from, to), clockwise), false);
   } else {
-    // In machine coordinates a control goes in rapid traverse, whatever motion is in force; an arc of a
-    // radius that ends where it begins is none.
+    // Machine coordinates are approached in rapid traverse in any motion mode; a radius arc that ends at its
+    // start is no motion.
     append(PathMove::line(from, to), modal_.motion == 0 || block.machine);
   }
 }
@@ -526,7 +526,7 @@ void ControlledMachine::planPath(const NcBlock& block) {
 std::array<double, 2> ControlledMachine::centreOf(const NcBlock& block, const std::array<double, 3>& from,
                                                   const std::array<double, 3>& to) const {
   if (block.radius) {
-    // Two circles pass through start and end; a positive R means the shorter arc.
+    // Two circles pass through start and end; a positive R selects the shorter arc.
     const double r = *block.radius * unit();
     const double dx = to[0] - from[0], dy = to[1] - from[1], chord = std::hypot(dx, dy);
     const double square = r * r - 0.25 * chord * chord;
@@ -580,7 +580,7 @@ void ControlledMachine::append(const PathMove& move, bool rapid) {
   pending_.push_back({move, rapid});
 }
 
-/// [m/s] that override, rapid traverse and the axes' acceleration on a curve leave.
+/// Feed [m/s], limited by override, rapid traverse and the centripetal acceleration of a curve.
 double ControlledMachine::feedOf(const PathMove& move, bool rapid) const {
   if (rapid) {
     return options.axes.rapid * rapid_override_;
@@ -601,7 +601,7 @@ void ControlledMachine::beginMove(double time) {
   wait_until_ = move_.held() ? NEVER : move_.end();
 }
 
-/// The block's next piece of path, if there is one.
+/// Begins the next segment of the block's path, if any.
 bool ControlledMachine::followMove(double time) {
   if (pending_.empty()) {
     return false;
@@ -610,8 +610,7 @@ bool ControlledMachine::followMove(double time) {
   return true;
 }
 
-/// What the block waited for has come: the rest of its path, its M word that comes after the motion, or its
-/// end.
+/// The wait of the block is over: its next segment, its M word after the motion, or its end.
 void ControlledMachine::goOn(double time) {
   if (followMove(time)) {
     return;

@@ -7,7 +7,7 @@
 namespace smartmill::sim {
 namespace {
 
-/// Only what the control looks at: no blanks, no comments, upper case.
+/// The line without blanks and comments, in upper case.
 std::string significant(const std::string& line) {
   std::string text;
   bool comment = false;
@@ -122,7 +122,7 @@ NcBlock parseAssignment(NcReader& reader) {
   return block;
 }
 
-/// Words of a macro program's flow, which this control does not have.
+/// Refuses control flow of macro programs, which this control does not support.
 void refuseFlow(NcReader& reader) {
   for (const char* word : {"IF", "WHILE", "GOTO", "DO", "END", "THEN"}) {
     if (reader.take(word)) {
@@ -204,7 +204,7 @@ NcBlock parseBlock(const std::string& line, const NcVariables& variables) {
   if (text.empty() || text[0] == '%') {
     return {};
   }
-  // A sequence number may stand before an assignment.
+  // A sequence number may precede an assignment.
   const std::size_t first = text[0] == 'N' ? text.find_first_not_of("0123456789", 1) : 0;
   NcReader reader(text, variables);
   return first != std::string::npos && text[first] == '#' && first != 1 ? parseAssignment(reader)

@@ -11,7 +11,7 @@ namespace smartmill::sim {
 namespace {
 
 constexpr std::size_t MAX_DIGITS = 12;
-constexpr int MAX_DEPTH = 5;  // of brackets, as a 30i has it
+constexpr int MAX_DEPTH = 5;  // of brackets, as on a 30i
 constexpr double MAX_WHOLE = 99999999.0;
 
 [[noreturn]] void badFormat() {

@@ -43,7 +43,7 @@ void PathMove::plan(double time, double feed, double acceleration) {
   from_distance_ = done;
   acceleration_ = acceleration;
   first_ = now;
-  // The ramps alone take (peak^2 - first^2) / 2a and peak^2 / 2a; a shorter way has a triangle of speed.
+  // The ramps need (peak^2 - first^2) / 2a and peak^2 / 2a; a shorter path has a triangular profile.
   peak_ = std::min(feed, std::sqrt(left * acceleration + 0.5 * now * now));
   if (feed <= 0.0) {
     peak_ = now;
@@ -77,7 +77,7 @@ double PathMove::distance(double time) const {
   if (left <= 0.0) {
     return end_distance_;
   }
-  // From the nearer end, so that both are exact.
+  // Measured from the nearer end, so that both ends are exact.
   if (left < down_) {
     return end_distance_ - 0.5 * acceleration_ * left * left;
   }
@@ -109,7 +109,7 @@ PathMove::Point PathMove::at(double distance) const {
   }
   const double share = distance / length_;
   Point point;
-  // From the nearer end.
+  // Measured from the nearer end.
   for (std::size_t i = 0; i < 3; ++i) {
     point[i] = share < 0.5 ? start_[i] + share * (target_[i] - start_[i])
                            : target_[i] - (1.0 - share) * (target_[i] - start_[i]);
@@ -162,7 +162,7 @@ std::array<std::array<double, 2>, 2> PathMove::extent() const {
   if (radius_ == 0.0) {
     return ends;
   }
-  // Where the arc crosses an axis through its centre it is farthest out.
+  // Extrema of an arc: crossings of the axes through its centre.
   for (int quarter = -8; quarter <= 8; ++quarter) {
     const double angle = 0.5 * units::PI * quarter;
     const double share = (angle - start_angle_) / sweep_;

@@ -58,7 +58,7 @@ std::uint8_t& PmcMemory::at(PmcArea area, std::size_t address) {
   return areas_[static_cast<std::size_t>(area)][address];
 }
 
-/// The low byte stands first.
+/// Little-endian.
 void PmcMemory::put(PmcArea area, std::size_t address, std::uint32_t value, std::size_t bytes) {
   for (std::size_t i = 0; i < bytes; ++i) {
     at(area, address + i) = static_cast<std::uint8_t>(value >> (8 * i));

@@ -81,7 +81,7 @@ const SpindleMotion::Phase& SpindleMotion::phaseAt(double time) const {
   return phases_[i];
 }
 
-/// Forgets what was planned: one phase from the state at time on.
+/// Drops the plan: one phase that begins with the state at a time [s].
 void SpindleMotion::begin(double time) {
   const Phase now{time, angle(time), speed(time), 0.0};
   phases_.assign(1, now);

@@ -25,13 +25,13 @@ namespace {
 constexpr double TRUTH_STEP = 2.0, TRUTH_END = 6000.0;  // [Hz] lines of the true FRFs
 constexpr double BLOCK_TIME = World::BLOCK / World::SAMPLE_RATE;
 constexpr double LOOK_AGAIN = 2e-3;  // [s]
-constexpr double MOST_WAIT = 0.8;    // [1] of most_behind, for where the axes are led
+constexpr double MOST_WAIT = 0.8;    // [1] of most_behind: wait for an external controller
 
 NodeParameters read(const ros::NodeHandle& private_nh) {
   NodeParameters parameters = parametersFromServer(private_nh).readAll<NodeParameters>();
-  if (parameters.model.empty()) throw Error("model: the path of a smartmill-model/1 file is due");
+  if (parameters.model.empty()) throw Error("model: empty, expected the path of a smartmill-model/1 file");
   if (ros::Time::isSimTime())
-    throw Error("/use_sim_time is set: the simulated machine runs by the real clock");
+    throw Error("/use_sim_time is set: the simulated machine runs in wall-clock time");
   return parameters;
 }
 
@@ -136,7 +136,7 @@ void Node::publish(const World::Block& block) {
   };
   hammer_.publish(toMsg(shifted(block.hammer)));
   dynamometer_.publish(toMsg(shifted(block.dynamometer), frames::DYNAMOMETER));
-  // The ring in the flange does not turn with the spindle.
+  // The ring in the flange is fixed to the spindle housing.
   if (!block.spindle_force.channels.empty())
     spindle_force_.publish(toMsg(shifted(block.spindle_force), frames::MACHINE));
   if (server_) {
@@ -164,7 +164,7 @@ void Node::run() {
       world_->lose(blocks * World::BLOCK);
       done += static_cast<double>(blocks) * BLOCK_TIME;
       lost_ += blocks * World::BLOCK;
-      ROS_WARN("sim: the twin fell behind the clock, %.2f s of samples are lost",
+      ROS_WARN("sim: the simulation fell behind the clock, %.2f s of samples lost",
                static_cast<double>(blocks) * BLOCK_TIME);
     }
     if (now < done + BLOCK_TIME) {
@@ -189,12 +189,12 @@ void Node::run() {
   }
 }
 
-/// Where the controller elsewhere leads the machine in the next block, once that is known.
+/// States of the next block under the external controller. @return whether they are available
 bool Node::lead(double now, double done) {
   const std::lock_guard<std::mutex> lock(axes_mutex_);
   const double end = start_ + done + BLOCK_TIME;
   if (!(axes_.newest() >= end)) {
-    // Nothing comes: without a command every drive stands.
+    // No samples: without commands the axes are at rest.
     if (now - done < MOST_WAIT * parameters_.most_behind) return false;
     axes_.stand(end);
   }
@@ -205,7 +205,7 @@ bool Node::lead(double now, double done) {
   return true;
 }
 
-/// The machine's own controller, which leads nothing then, is where collisions are noticed.
+/// Under an external controller collisions raise alarms in the machine's own controller, which is idle then.
 void Node::tellAlarms() {
   std::string text;
   for (const focas::AlarmMessage& alarm : world_->controller().alarmMessages()) text += " " + alarm.text;
@@ -234,8 +234,8 @@ void Node::offer(const std::string& key, std::size_t values, Press press) {
   const boost::function<bool(Request&, Response&)> answer = [key, values, press = std::move(press)](
                                                                 const Request& request, Response& response) {
     response.message = request.values.size() == values ? press(request)
-                                                       : std::to_string(request.values.size()) + " values, " +
-                                                             std::to_string(values) + " due";
+                                                       : std::to_string(request.values.size()) +
+                                                             " values, expected " + std::to_string(values);
     response.code = response.message.empty() ? Response::OK : Response::REFUSED;
     response.message = key + ": " + (response.message.empty() ? "done" : response.message);
     return true;
@@ -249,7 +249,7 @@ void Node::offerPanel() {
   offer("mode", 1, [&controller](const Request& request) -> std::string {
     const int mode = static_cast<int>(request.values[0]);
     if (mode != request.values[0] || mode < focas::AUT_MDI || mode > focas::AUT_REMOTE) {
-      return "one of MODE_* of CncState is due";
+      return "expected one of MODE_* of CncState";
     }
     controller.setMode(mode);
     return {};
@@ -313,11 +313,11 @@ void Node::offerHands() {
 
 void Node::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   if (lost_ > 0) {
-    status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "samples were lost: the computer is too slow");
+    status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "samples lost: the computer is too slow");
   } else {
-    status.summary(diagnostic_msgs::DiagnosticStatus::OK, "runs");
+    status.summary(diagnostic_msgs::DiagnosticStatus::OK, "running");
   }
-  status.addf("share of real time needed [1]", "%.3f", load_.load());
+  status.addf("processor time per real time [1]", "%.3f", load_.load());
   status.addf("samples lost [1]", "%llu", static_cast<unsigned long long>(lost_.load()));
 }
 

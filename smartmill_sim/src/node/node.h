@@ -25,8 +25,9 @@
 
 namespace smartmill::sim {
 
-/// The simulated machine on ROS: the controller on its port, sensors on daq/* and spindle/angle, the hammers
-/// behind daq/strike, truth on sim/truth/*, the operator's panel behind sim/panel/*. Paced by the clock.
+/// The simulated machine on ROS: the controller on its port, sensors on daq/* and spindle/angle, hammers by
+/// the service daq/strike, true values on sim/truth/*, the operator's panel by services sim/panel/*. Runs in
+/// wall-clock time.
 class Node {
  public:
   using Parameters = NodeParameters;
@@ -46,11 +47,11 @@ class Node {
   void publishTruth();
   bool strike(smartmill_msgs::Strike::Request& request, smartmill_msgs::Strike::Response& response);
   void addTruth(const std::string& point, const std::string& direction, const ModalModel& modes);
-  /// Offers a key of the panel. @param press returns why it refuses, empty: done
+  /// Advertises a key of the panel. @param press returns the reason of a refusal, empty: done
   using Press = std::function<std::string(const smartmill_msgs::PanelKey::Request&)>;
   void offer(const std::string& key, std::size_t values, Press press);
   void offerPanel();
-  /// What an operator does by hand: hangs weights on the tool, changes it, taps elsewhere.
+  /// Manual actions of an operator: weights on the tool, change of the tool, another tap point.
   void offerHands();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
@@ -68,10 +69,10 @@ class Node {
   ros::ServiceServer strike_server_;
   std::vector<ros::ServiceServer> panel_;
   NodeShell shell_;
-  std::atomic<double> load_{0.0};  // [1] share of real time that the twin needs
+  std::atomic<double> load_{0.0};  // [1] processor time per real time
   std::atomic<std::uint64_t> lost_{0};
 
-  // Axes and spindle that a controller elsewhere leads.
+  // Axes and spindle under an external controller.
   std::mutex axes_mutex_;  // of the track
   AxesTrack axes_;
   std::vector<MotionState> states_;

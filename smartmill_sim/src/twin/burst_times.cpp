@@ -8,11 +8,11 @@
 namespace smartmill::sim {
 namespace {
 
-constexpr double BINS_A_CYCLE = 24.0;  // of the ringing
+constexpr double BINS_A_CYCLE = 24.0;  // per period of the oscillation
 constexpr double MOST_BINS = 8192.0;
-constexpr double DECAYS = 5.0;  // that a burst is looked at
+constexpr double DECAYS = 5.0;  // length of the burst template, in decay times
 
-// What is left of a record, folded at a period.
+// Residual of a record, folded at a period.
 struct Folded {
   std::vector<double> sum, count;
 };
@@ -29,7 +29,7 @@ Folded fold(const std::vector<double>& left, double rate, double period, std::si
   return folded;
 }
 
-// [s] at which bursts begin that take most squares from what is left.
+// Begin [s] of the bursts that reduce the sum of squares of the residual most.
 double bestFirst(const std::vector<double>& left, double rate, const BurstTrain& train) {
   const auto bins = static_cast<std::size_t>(
       std::clamp(std::ceil(BINS_A_CYCLE * train.frequency * train.period), 16.0, MOST_BINS));

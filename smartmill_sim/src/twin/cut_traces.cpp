@@ -65,7 +65,7 @@ bool ofTheTool(Stage stage) {
          stage == Stage::structure;
 }
 
-// Whether an effect may act on a channel, of effects that leave the channels apart.
+// Whether an effect may act on a channel, for effects that do not mix channels.
 bool actsOn(const EffectEntry& effect, Stage stage, std::size_t channel) {
   const auto says = [&](const char* key, const std::string& word) {
     const auto found = effect.words.find(key);

@@ -25,14 +25,14 @@ Cutter::Cutter(const ToolGeometry& tool, const CuttingLaw& law, double time_step
   }
 }
 
-// The edge of a slice stands where a tip would that lags so far.
+// The edge of a slice is the edge of a tip whose angle lags accordingly.
 ToolMotion Cutter::motionOf(const Part& part, const ToolMotion& now) const {
   ToolMotion motion = now;
   motion.angle -= lag_ * part.slice.low;
   return motion;
 }
 
-// What of the arcs' heights lies in a slice.
+// Intersects the arcs with the height of a slice.
 void Cutter::place(Part& part) {
   std::vector<ContactArc> arcs;
   double top = 0.0;
@@ -100,7 +100,7 @@ CuttingForce Cutter::force() const {
   return sum;
 }
 
-// The force is linear in the rate, and the rate in the force.
+// The force is linear in the rate and the rate in the force: a linear system of two equations.
 void Cutter::yieldTo(const ToolMotion& now, const TipYield& yield) {
   const auto forceAt = [&](const Eigen::Vector2d& rate) -> Eigen::Vector2d {
     for (Part& part : parts_) {
@@ -119,7 +119,7 @@ void Cutter::yieldTo(const ToolMotion& now, const TipYield& yield) {
 }
 
 CuttingForce Cutter::step(const ToolMotion& now, const TipYield& yield) {
-  if (parts_.size() > 1) now_ = now;  // where depths change, another part may engage
+  if (parts_.size() > 1) now_ = now;  // a change of depth may engage another slice
   for (Part& part : parts_) {
     if (part.arcs == 0) continue;
     part.sums = followed_ ? followed_->at(place_++) : sumsOf(part, now);

@@ -9,16 +9,16 @@
 namespace smartmill::sim {
 namespace {
 
-constexpr int UPDATE_STEPS = 16;           // between looks at what changes slowly with time
-constexpr double SENSOR_TOLERANCE = 1e-5;  // share by which a sensor mode moves before its filter follows
-constexpr double LEAST_DEPTH = 1e-9;       // [m] a cut that would end in air
+constexpr int UPDATE_STEPS = 16;           // between updates of slow changes
+constexpr double SENSOR_TOLERANCE = 1e-5;  // relative change of a sensor mode that updates its filter
+constexpr double LEAST_DEPTH = 1e-9;       // [m] instead of a depth <= 0
 
 ModalModel firstModeAt(ModalModel axis, double factor) {
   if (!axis.modes.empty()) axis.modes.front().frequency *= factor;
   return axis;
 }
 
-// What a resonance adds to its channel.
+// Output that a resonance adds to its channel.
 double resonated(const Resonance& resonance, ModalFilter& filter, double from) {
   const double itself = resonance.channel == resonance.from ? resonance.mode.gain * from : 0.0;
   return filter.step(from) - itself;
@@ -88,7 +88,7 @@ void CuttingMachine::engage(const std::vector<ContactArc>& arcs, const ToolMotio
   input.motion = now;
   update(input);
   if (arcs_.empty()) feed_path_ = 0.0;
-  // Contact that only moves on changes the force little by little.
+  // A contact that only shifts changes the force gradually.
   engaged_ = arcs_.empty() != arcs.empty();
   jump_ = 1.0 - rise;
   arcs_ = arcs;
@@ -153,7 +153,7 @@ void CuttingMachine::update(const Input& input) {
   if (cutter_) cutter_->setLaw(state_.law);
   layers_.setLaw(state_.law);
   if (drive_) drive_->setFriction(state_.friction_extra, state_.friction_factor);
-  // The first time exactly, then only when it has moved.
+  // The first update is exact, later ones follow the tolerance.
   const double moved = std::abs(state_.sensor_frequency / sensor_frequency_ - 1.0);
   if (moved > SENSOR_TOLERANCE || (sensor_frequency_ == 1.0 && moved > 0.0)) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -228,8 +228,8 @@ CuttingForce CuttingMachine::cut(const Input& input) {
     motion.displacement = input.tip->displacement;
     motion.rate = input.tip->rate;
   }
-  // The tip's place needs this step's force and the force needs the place: the force is first taken to go
-  // on in a straight line, which errs by the square of the step.
+  // The displacement of the tip depends on the force of this step and vice versa: the force is first
+  // extrapolated linearly, with an error of second order in the step.
   TipYield yield;
   for (std::size_t axis = 0; axis < 2 && vibrates_ && !input.tip; ++axis) {
     const std::array<double, 2>& f = tip_history_[axis];
@@ -274,7 +274,7 @@ void CuttingMachine::settleTip(const Input& input, Output& out) {
   for (std::size_t axis = 0; axis < 2 && vibrates_; ++axis) {
     const double before = tip[axis] - jump_ * ((axis == 0 ? out.force.fx : out.force.fy) - last_cut_[axis]);
     channels[TOOL_X + axis] = jump_ != 0.0 ? tip_[axis].jump(before, tip[axis]) : tip_[axis].step(before);
-    // A jump does not go on.
+    // A jump is not extrapolated.
     tip_history_[axis] = {{tip[axis], engaged_ ? tip[axis] : tip_history_[axis][0]}};
   }
   if (!cutter_) return;
@@ -329,7 +329,7 @@ void CuttingMachine::passTime(const ToolMotion& motion, std::size_t steps) {
   }
 }
 
-// Whether a step sets nothing anew and nothing asks where it is.
+// Whether no effect changes the state from step to step or depends on the instant of a step.
 bool CuttingMachine::stepsAlike() const {
   return layers_.empty() && !probe_ &&
          !(effects_.has(Stage::motion) || effects_.has(Stage::cutting_law) || effects_.has(Stage::sensor) ||
@@ -337,7 +337,7 @@ bool CuttingMachine::stepsAlike() const {
            effects_.has(Stage::sensor_output));
 }
 
-// The rest of what is followed, in a cut that goes on.
+// Replays the remaining steps of a continuing cut.
 void CuttingMachine::replay(std::size_t from, const EarlyRows& early, Course& course) {
   std::vector<double>* const x = early[TOOL_X];
   std::vector<double>* const y = early[TOOL_Y];
@@ -366,7 +366,7 @@ void CuttingMachine::replay(std::size_t from, const EarlyRows& early, Course& co
 
 void CuttingMachine::run(std::size_t steps, const std::function<void(std::size_t, Input&)>& next,
                          const EarlyRows& early) {
-  // What is not asked for may still show in what is.
+  // Channels that are not requested may act on requested ones.
   const bool mixes = effects_.has(Stage::sensor_output) || !resonances_.empty();
   std::array<std::vector<double>, LOAD_METER + 1> own;
   EarlyRows rows = early;
@@ -421,7 +421,7 @@ void CuttingMachine::cutAll(std::size_t steps, const std::function<void(std::siz
   }
 }
 
-// Each filter waits for its own last step only: side by side they take little longer than one.
+// The filters are independent of each other and run in parallel on one core (instruction-level parallelism).
 void CuttingMachine::showAll(const Course& course, const EarlyRows& early) {
   struct Shown {
     std::size_t axis;

@@ -6,8 +6,8 @@
 namespace smartmill::sim {
 namespace {
 
-constexpr double LEAST_DEPTH = 1e-9;  // [m] of a layer that reaches nowhere
-constexpr double GONE = 1e-3;         // [m] by which a missing edge lies behind: deeper than any feed
+constexpr double LEAST_DEPTH = 1e-9;  // [m] instead of a depth <= 0
+constexpr double GONE = 1e-3;         // [m] radius reduction of a missing edge, more than any feed
 
 double depthOf(const EdgeLayer& layer, double depth) {
   return std::max(layer.from_surface ? depth - layer.height : std::min(layer.height, depth), LEAST_DEPTH);
@@ -30,7 +30,7 @@ EdgeLayers::EdgeLayers(const TwinSetup& setup, const CuttingLaw& law, double tim
     std::vector<double> radius = setup.radius_offset;
     if (of.missing_tooth >= 0) radius.at(static_cast<std::size_t>(of.missing_tooth)) -= GONE;
     Layer layer{of, {}, {}};
-    // Tables do not tell one tooth from the next.
+    // Tables do not separate the teeth.
     if (rigid && of.only_tooth < 0) {
       layer.rigid.emplace(*setup.model.tool, lawOf(of, law), std::move(radius), setup.path_share);
     } else {

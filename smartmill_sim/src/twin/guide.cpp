@@ -12,12 +12,12 @@ namespace {
 
 const std::array<const char*, 2> TIP{{"tool_x", "tool_y"}}, FORCE{{"fx", "fy"}};
 
-// Displacement of the tip under the force that a sensor shows. Where the sensor hardly answers, its noise is
-// not blown up.
+// Displacement [m] of the tip under the measured force [N]. The inverse of the sensor's FRF is regularised
+// where its gain is small.
 std::vector<double> pushed(const std::vector<double>& shown, const ModalModel& sensor, const ModalModel& tip,
                            double sign, double sample_rate) {
-  constexpr double LEAST_ANSWER = 0.05;  // [1] of the static one
-  constexpr double RINGING = 0.2;        // [s] kept free behind the record, since the transform is a ring
+  constexpr double LEAST_ANSWER = 0.05;  // [1] relative to the static gain
+  constexpr double RINGING = 0.2;        // [s] zero padding against the circular convolution
   std::vector<double> padded = shown;
   padded.resize(shown.size() + static_cast<std::size_t>(RINGING * sample_rate), 0.0);
   std::vector<std::complex<double>> spectrum = fourier(padded);
@@ -32,7 +32,7 @@ std::vector<double> pushed(const std::vector<double>& shown, const ModalModel& s
   return place;
 }
 
-// Four samples, the second of which is sample i.
+// Samples i - 1 .. i + 2.
 std::array<double, 4> about(const std::vector<double>& samples, std::size_t i) {
   const auto at = [&](std::ptrdiff_t k) {
     return samples[static_cast<std::size_t>(

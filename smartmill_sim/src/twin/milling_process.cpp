@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t LEAST_HISTORY = 4096, MOST_HISTORY = 131072;  // steps; powers of two
 constexpr double SAME_TURN = 1e-10;                                 // [rad]
-constexpr double SETTLED_STEPS = 3.0;  // of a regime before its steps count as even
+constexpr double SETTLED_STEPS = 3.0;  // steps of a regime before it counts as steady
 
 std::size_t ring(long step, std::size_t size) {
   return static_cast<std::size_t>(step) & (size - 1);
@@ -22,7 +22,7 @@ std::size_t ring(long step, std::size_t size) {
 }  // namespace
 
 std::array<double, 2> feedOf(const ToolMotion& motion) {
-  if (!(motion.speed > 0.0)) throw Error("milling: the spindle stands");
+  if (!(motion.speed > 0.0)) throw Error("milling: the spindle is at rest");
   return {{motion.velocity[0] / motion.speed, motion.velocity[1] / motion.speed}};
 }
 
@@ -70,7 +70,7 @@ void MillingProcess::setDepths(const std::vector<double>& depths) {
   for (std::size_t a = 0; a < arcs_.size(); ++a) arcs_[a].depth = depths.at(a);
 }
 
-// The spindle turns on to where it is now.
+// Advances angle, feed and regime to the present motion.
 void MillingProcess::advance(const ToolMotion& now) {
   if (count_ > 0) turned_now_ += wrapped(now.angle - now_.angle);
   if (now.speed != now_.speed || now.velocity != now_.velocity) {
@@ -81,12 +81,12 @@ void MillingProcess::advance(const ToolMotion& now) {
   now_ = now;
 }
 
-// Whether speed and feed have been as now for so long [rad]; before the history they always were.
+// Whether speed and feed have been constant over an angle [rad]; before the history they were constant.
 bool MillingProcess::steadySince(double turn) const {
   return regime_ == 0 || turned_now_ - regime_began_ > turn + SETTLED_STEPS * now_.speed * time_step_;
 }
 
-/// The place so many steps ago: cubic through the four steps about it.
+/// Interpolation point so many steps ago: cubic through the four steps around it.
 MillingProcess::Place MillingProcess::placeOf(double steps) {
   steps = std::max(2.0, steps);
   const auto whole = static_cast<std::size_t>(steps);
@@ -94,14 +94,14 @@ MillingProcess::Place MillingProcess::placeOf(double steps) {
   return {steps, whole, {{across * g / 6.0, -across * h / 2.0, (f + 1.0) * g * h / 2.0, -f * g * h / 6.0}}};
 }
 
-/// By how much these weights change a step farther back.
+/// Derivatives of these weights per step farther back.
 std::array<double, 4> MillingProcess::slopesOf(const Place& at) {
   const double f = at.ago - static_cast<double>(at.steps), square = 3.0 * f * f;
   return {{(square - 1.0) / 6.0, (2.0 + 2.0 * f - square) / 2.0, (square - 4.0 * f - 1.0) / 2.0,
            (6.0 * f - square - 2.0) / 6.0}};
 }
 
-/// Finds the place in a history of changing speed or feed.
+/// Finds the interpolation point of a delay in a history of changing speed or feed.
 void MillingProcess::search(Delay& delay) {
   const double target = turned_now_ - delay.turn;
   const long kept = std::min(count_, static_cast<long>(turned_.size()));
@@ -109,7 +109,7 @@ void MillingProcess::search(Delay& delay) {
     return ago == 0 ? turned_now_ : turned_[ring(count_ - ago, turned_.size())];
   };
   if (kept == 0 || target < turnedAt(kept)) {
-    // Before the history the tool went on as it then did.
+    // Before the history the tool moved as at its beginning.
     const std::array<double, 2> oldest =
         kept == 0 ? now_.centre : centre_[ring(count_ - kept, centre_.size())];
     const double before = (kept == 0 ? turned_now_ : turnedAt(kept)) - target;
@@ -132,7 +132,7 @@ void MillingProcess::search(Delay& delay) {
   }
 }
 
-// Displacements about a place; none before the history.
+// Displacements around an interpolation point; none before the history.
 template <class Step>
 void MillingProcess::forEachStep(const Place& at, Step&& step) const {
   const std::size_t size = displacement_.size();
@@ -191,8 +191,8 @@ void MillingProcess::shapePass(int tooth, int n, Pass& pass) {
   pass.of_regime = steady ? regime_ : -1;
 }
 
-// By so much a surface that is looked up beside the ray may lie nearer than the rule's.
-// @param vibrated, fed [m] across the ray, since then
+// Bound [m] on how much nearer the exact surface of a pass may be than that of the ChipRule. @param vibrated,
+// fed [m] across the ray, since then
 double MillingProcess::beside(double vibrated, double fed) const {
   constexpr double MARGIN = 1.25;  // of what the tool moves while its tooth turns on
   const double moved = std::abs(fed + vibrated), share = std::abs(path_share_) / tool_.radius();
@@ -209,7 +209,7 @@ double MillingProcess::besides(const Delay& delay, const Stretch& cell) const {
       across(delay.fed[0], delay.fed[1]));
 }
 
-/// The same of whatever a tooth left so many radians ago.
+/// The bound for all vibrations, for a pass `turn` radians ago.
 double MillingProcess::mostBeside(double turn) const {
   if (path_share_ == 0.0) return 0.0;
   const double fed = turn * (std::abs(feed_[0]) + std::abs(feed_[1])),
@@ -217,19 +217,19 @@ double MillingProcess::mostBeside(double turn) const {
   return beside(vibrated, fed) + beside(-std::min(vibrated, fed), fed);
 }
 
-// On the ray at phi from the axis lies what a tooth left when it stood at psi = phi + D.t / R, D what the
-// axis has moved since then, t across the ray: its distance is R - D(psi).e - (D.t)^2 / (2 R). One step of
-// Newton from where the pass was last met.
+// The surface on the ray at phi was cut by a tooth at psi = phi + D.t / R, with the motion D of the axis
+// since then and t across the ray; its distance is R - D(psi).e - (D.t)^2 / (2 R). One Newton step from the
+// solution of the last contact.
 void MillingProcess::lookBeside(const Delay& delay, const Delay& first, const Stretch& cell, Pass& pass,
                                 ChipShape* shape) const {
-  constexpr double MOST = 0.25;         // [rad] of a tool that does not run away
-  constexpr double LEAST_SLOPE = 0.25;  // [1] of what is solved
+  constexpr double MOST = 0.25;         // [rad] bound on the angle
+  constexpr double LEAST_SLOPE = 0.25;  // [1] bound on the slope of the equation
   const double radius = tool_.radius(), steps = 1.0 / (now_.speed * time_step_);  // [m], [1/rad]
   const double share = path_share_ / radius;
   const auto across = [&](double x, double y) { return x * cell.at.cosine - y * cell.at.sine; };
   const Place at = placeOf(delay.at.ago - pass.beside * steps);
   const std::array<double, 4> slopes = slopesOf(at);
-  std::array<double, 2> then{}, rate{};  // [m], [m] a step farther back
+  std::array<double, 2> then{}, rate{};  // [m], [m] per step farther back
   forEachStep(at, [&](std::size_t k, const std::array<double, 2>& u) {
     for (std::size_t i = 0; i < 2; ++i) {
       then[i] += at.weights[k] * u[i];
@@ -246,19 +246,19 @@ void MillingProcess::lookBeside(const Delay& delay, const Delay& first, const St
   const double of_rule = across(delay.fed[0], delay.fed[1]), of_first = across(first.fed[0], first.fed[1]);
   shape->sine += delay.displacement[0] - then[0] - feed_[0] * pass.beside + slope_x * moved;
   shape->cosine += delay.displacement[1] - then[1] - feed_[1] * pass.beside + slope_y * moved;
-  // The rule holds the roundness of later passes against that of the first.
+  // The ChipRule takes the curvature of older passes relative to the first.
   shape->level += 0.5 * share * (aside * aside - of_rule * of_rule + of_first * of_first);
   pass.beside = by;
 }
 
-/// The passes that may give a tooth's chip over a cell of its edge: from the last one back until none can be
-/// nearer.
-/// @return whether there is contact; a single pass is in contact all along when `certain`
+/// Collects the passes that may bound a tooth's chip over a cell of its edge: from the last one back until no
+/// older pass can be nearer.
+/// @param certain receives whether a single pass is in contact all along @return whether there may be contact
 bool MillingProcess::gather(int tooth, const Stretch& cell, bool& certain) {
   shapes_.clear();
   const std::size_t last = passOf(tooth, 1).delay;
   const std::array<double, 2> then = back(last).displacement;
-  double off = 0.0;  // [m] by which the pass that was looked at last lies off the rule's
+  double off = 0.0;  // [m] deviation of the last pass from the ChipRule
   const auto chip = [&](Pass& pass) {
     const Delay& at = back(pass.delay);
     ChipShape shape = pass.still;
@@ -276,7 +276,7 @@ bool MillingProcess::gather(int tooth, const Stretch& cell, bool& certain) {
   if (of_first.high <= 0.0) return false;
   certain = of_first.low > 0.0;
   shapes_.push_back(first);
-  // By so much vibration may bring an older surface nearer than the last one: (u_1 - u_n).e.
+  // [m] bound on how much nearer vibration may bring an older surface than the last one: (u_1 - u_n).e.
   const double reach = std::max(largest_[0], largest_[1]) -
                        (then[0] * cell.at.sine + then[1] * cell.at.cosine) +
                        cell.half * (std::abs(then[0]) + std::abs(then[1]));
@@ -288,7 +288,7 @@ bool MillingProcess::gather(int tooth, const Stretch& cell, bool& certain) {
     if (behind - pass.step > end + mostBeside(delays_[pass.delay].turn) + off_first) break;
     const Delay& delay = back(pass.delay);
     const double beside = path_share_ == 0.0 ? 0.0 : besides(delay, cell) + off_first;
-    // Older than the history none has vibrated, and a tooth is only farther than a turn later.
+    // Passes before the history have no vibration: each is farther than that of the next revolution.
     unknown = delay.known ? 0 : unknown + 1;
     if (behind > reach + beside) continue;
     const double x = then[0] - delay.displacement[0], y = then[1] - delay.displacement[1];
@@ -307,9 +307,9 @@ bool MillingProcess::gather(int tooth, const Stretch& cell, bool& certain) {
   return true;
 }
 
-/// Adds what a stretch of an edge in contact with one shape gives, integrated over the immersion angle.
+/// Adds the sums over a segment of an edge in contact with one shape, integrated over the immersion angle.
 void MillingProcess::add(const ChipShape& shape, const Stretch& over, double height, CutSums& sums) {
-  constexpr double LEAST_CHIP = 1e-15;  // [m] at the ends of a contact, which still rub
+  constexpr double LEAST_CHIP = 1e-15;  // [m] at the ends of a contact, where the edge still rubs
   gauss(over, [&](double weight, double s, double c) {
     const double chip = std::max(shape.at(s, c), LEAST_CHIP), w = height * weight;
     const double h = w * effectiveChip(law_, chip), e = w * edgeShare(law_, chip);
@@ -328,7 +328,7 @@ void MillingProcess::add(const ChipShape& shape, const Stretch& over, double hei
   });
 }
 
-/// Adds what one edge gives over a cell of it.
+/// Adds the sums of one edge over one of its cells.
 void MillingProcess::cut(int tooth, const Stretch& cell, double height, CutSums& sums) {
   bool certain = false;
   if (!gather(tooth, cell, certain)) return;
@@ -348,7 +348,7 @@ CutSums MillingProcess::sumsAt(const ToolMotion& now) {
   rubs_ = {};
   forEachEdgeSegment(arcs_, lag_, rule_.toothAngle(), now.angle, [&](const EdgeSegment& part) {
     if (only_tooth_ >= 0 && part.tooth != only_tooth_) return;
-    // A straight edge stands at one angle: any little spread gives the same.
+    // A straight edge is at one angle: a small interval gives the same result.
     const double from = part.straight ? part.to : part.from,
                  to = part.straight ? part.to + LEAST_LAG : part.to;
     const double height = part.straight ? part.height / LEAST_LAG : part.height;
@@ -404,7 +404,7 @@ void MillingProcess::settle(const std::array<double, 2>& displacement) {
   if (static_cast<std::size_t>(count_) >= size && size < MOST_HISTORY && 2 * deepest_ > size) grow();
 }
 
-/// Rings of twice the length. Full ones lose nothing.
+/// Doubles the length of the full rings.
 void MillingProcess::grow() {
   const std::size_t size = displacement_.size();
   const auto wider = [&](auto& old) {

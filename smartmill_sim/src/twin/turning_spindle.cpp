@@ -9,11 +9,14 @@ namespace smartmill::sim {
 
 ModalModel TurningSpindle::at(double speed, const ModalModel& standing) const {
   if (!(reference_speed > 0.0))
-    throw Error(formatted("reference_speed: %g is not above zero", reference_speed));
+    throw Error(formatted("reference_speed: %g, expected a value above 0", reference_speed));
   const double share = speed / reference_speed;
   const double stiffness = 1.0 - softening * share * share, damping = 1.0 + damping_rise * share;
   if (!(stiffness > 0.0) || !(damping > 0.0) || !(gyroscopic >= 0.0))
-    throw Error(formatted("turning spindle: no stiffness or no damping is left at %g rad/s", speed));
+    throw Error(
+        formatted("spindle speed %g rad/s: softening, damping_rise or gyroscopic out of range (stiffness and "
+                  "damping must stay above 0)",
+                  speed));
   ModalModel turning = standing;
   for (Mode& mode : turning.modes) {
     mode.frequency *= std::sqrt(stiffness);

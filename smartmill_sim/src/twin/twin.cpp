@@ -28,15 +28,15 @@ namespace {
 
 const std::array<const char*, 2> TIP{{"tool_x", "tool_y"}};
 
-// What ran before the record: so much of it is simulated, the depth of cut growing over the first part, since
-// full cut at once makes the tool ring for long.
+// Lead-in before a record of a running cut. The depth of cut grows over its first part: a sudden full cut
+// would excite a long transient.
 constexpr double LEAD = 0.4;           // [s]
-constexpr double LEAST_STEADY = 0.1;   // [s] of running before a record that make it steady
-constexpr double GROWING_SHARE = 0.6;  // [1] of the lead
+constexpr double LEAST_STEADY = 0.1;   // [s] shorter times before the record are simulated as they are
+constexpr double GROWING_SHARE = 0.6;  // [1] of the lead-in
 constexpr double LEAST_GROWTH = 0.01;  // [1] of the depth at the beginning
 constexpr long GROWTH_STEPS = 32;      // between two depths
 
-// Means over the samples' intervals: x + x'' dt^2 / 24, good to the fourth order of frequency over sample
+// Means over the sample intervals: x + x'' dt^2 / 24, with an error of fourth order in frequency over sample
 // rate.
 void average(std::vector<double>& x) {
   double before = x.front();
@@ -47,15 +47,15 @@ void average(std::vector<double>& x) {
   }
 }
 
-// From 0 at 0 smoothly to 1 at 1.
+// Smooth step from 0 at 0 to 1 at 1.
 double growth(double x) {
   return x >= 1.0 ? 1.0 : x * x * (3.0 - 2.0 * x);
 }
 
-// Columns that this twin gives: inputs and the channels of the measuring chain.
+// Whether this twin simulates a column: inputs and channels of the measuring chain.
 bool gives(const std::string& column, const CampaignTest& test) {
   if (column == "spindle_angle" || column == "hammer" || motionAxis(column)) return true;
-  // Where such a sensor stands is known of a tap only: where it is hit.
+  // The position of these sensors is known only for a tap: at the hit point.
   if (column == channelName(DISPLACEMENT) || column == channelName(ACCELERATION))
     return test.kind == TestKind::tap && test.direction != "z";
   for (std::size_t c = 0; c < CHANNEL_COUNT; ++c) {
@@ -64,8 +64,8 @@ bool gives(const std::string& column, const CampaignTest& test) {
   return false;
 }
 
-// The force of a tap: zero outside the contact (Dunwoody section 4.3.1), where the record shows only noise,
-// which would ring in the sensor's modes. A record with further hits stays as it is.
+// Force of a tap: zero outside the contact (Dunwoody section 4.3.1), where the record contains only noise,
+// which would excite the sensor's modes. A record with further hits is left unchanged.
 std::vector<double> contactForce(const std::vector<double>& hammer) {
   constexpr double SECOND_HIT = 0.05;
   if (hasSecondHit(hammer, SECOND_HIT)) return hammer;
@@ -74,7 +74,7 @@ std::vector<double> contactForce(const std::vector<double>& hammer) {
   return force;
 }
 
-// Times of a test that effects in time need.
+// Times of a test for effects in time.
 CuttingMachine::Clock clockOf(const MachineModel& model, const CampaignTest& test, const Record& record) {
   for (const EffectEntry& effect : model.effects) {
     const EffectKind* kind = findEffect(effect.name);
@@ -91,9 +91,8 @@ CuttingMachine::Clock clockOf(const MachineModel& model, const CampaignTest& tes
   return {test.start_time.value_or(0.0), test.cut_time_before.value_or(0.0), true};
 }
 
-// Phases of tones that no model knows, from what the record shows beyond the twin without them: joint least
-// squares of sine and cosine on every channel that a tone is in, about the means. Clipped samples do not
-// count.
+// Estimates the phases of tones from the residual of the twin without them: joint least squares of sine and
+// cosine over the channels of the tones, with their means removed. Clipped samples are ignored.
 void findPhases(const Record& recorded, const std::array<std::vector<double>*, CHANNEL_COUNT>& early,
                 double rate, double speed, const CuttingMachine& machine, const std::vector<Tone*>& tones) {
   const ChannelValues limits = machine.limits();
@@ -142,8 +141,8 @@ void findPhases(const Record& recorded, const std::array<std::vector<double>*, C
   }
 }
 
-// What a tap hits: the tool tip, the sensor or (when a program shows both answers in one record) both. A
-// channel answers when it stands out of its noise after the hit.
+// Target of a tap: the tool tip, the sensor or (if a record contains both responses) both. A channel responds
+// if its peak after the hit exceeds its noise.
 struct TapTarget {
   bool tip, sensor;
 };
@@ -167,7 +166,7 @@ TapTarget targetOf(const Record& record, std::size_t axis) {
   if (axis < 2)
     target.tip = answers(channelName(TOOL_X + axis)) || answers("displacement") || answers("acceleration");
   if (!target.tip && !target.sensor) {
-    // Silent channels: by what was measured at all.
+    // No response: the target follows from the measured channels.
     target.tip =
         axis < 2 && (record.has(TIP[axis]) || record.has("displacement") || record.has("acceleration"));
     target.sensor = !target.tip;
@@ -177,8 +176,8 @@ TapTarget targetOf(const Record& record, std::size_t axis) {
 
 using Rows = CuttingMachine::EarlyRows;
 
-// Step after step: early channels of each sample, with substeps between the samples.
-// input(i, share): what happens at a share 0..1 of the way from sample i to the next.
+// Simulates step by step: channels before the signal stage at each sample, with substeps between the samples.
+// input(i, share): input between sample i (share 0) and the next one (share 1).
 template <class Input>
 void stepThrough(CuttingMachine& machine, std::size_t samples, int substeps, const Input& input,
                  const Rows& out) {
@@ -192,7 +191,7 @@ void stepThrough(CuttingMachine& machine, std::size_t samples, int substeps, con
   }
 }
 
-// The same stage after stage. input(i, share, input): sets what moves on.
+// Simulates stage by stage. input(i, share, input): updates the input of a step.
 template <class Input>
 void passThrough(CuttingMachine& machine, std::size_t samples, int substeps, const Input& input,
                  const Rows& out) {
@@ -216,8 +215,8 @@ void passThrough(CuttingMachine& machine, std::size_t samples, int substeps, con
   }
 }
 
-// Runs the machine over the record; recorded columns are kept.
-// move(rows): writes early channels of each sample. recorded: nullptr when there is none.
+// Runs the machine over the record. move(rows): writes the channels before the signal stage at each sample;
+// recorded: nullptr if there is none.
 template <class Move>
 void run(const MachineModel& model, const CampaignTest& test, const SimulationOptions& options,
          CuttingMachine& machine, const Move& move, const Record* recorded, Record& record) {
@@ -289,20 +288,20 @@ Record simulateTap(const MachineModel& model, const CampaignTest& test, const Re
   return record;
 }
 
-// A spindle that turns steadily and, in a cut, a tool that is fed into its work.
+// Constant spindle speed and, in a cut, constant feed.
 class SteadyTest {
  public:
-  // @param phase of tooth 1 [rad] at the time `begin` [s] of the first sample
+  // @param phase [rad] angle of tooth 1 at the time `begin` [s] of the first sample
   SteadyTest(const MachineModel& model, const CampaignTest& test, double phase, double begin,
              const SimulationOptions& options, CuttingMachine& machine)
       : test_(test),
         phase_(phase),
         begin_(begin),
         substeps_(options.substeps),
-        // Half of what comes on linearly is there before the step ends.
+        // A linear rise is on average half a step before the end of the step.
         rise_(engagementRise(machine.vibrates()) + 2.0 * options.early_entry),
         machine_(machine),
-        // A rounded time stamp must not put the sample of engagement on the wrong side.
+        // Tolerance for a rounded time stamp of the engagement.
         start_(test.engage_time.value_or(begin - 1.0) - 1e-3 / test.sample_rate) {
     if (!cut()) return;
     model.needCutting("simulate a cut");
@@ -317,15 +316,15 @@ class SteadyTest {
     input.motion.centre[0] = feed_ * (t - begin_);
   }
 
-  // The same in a record; the tool engages when its time has come.
+  // As inputAt(), within a record: the tool engages at its time.
   void next(double t, CuttingMachine::Input& input) {
     inputAt(t, input);
     if (!engaged_ && cut() && t >= start_) engage(input.motion, test_.engagement->axial_depth);
   }
 
-  // What ran before the record.
+  // Simulates the lead-in before the record.
   void lead() {
-    // The same for every model, or what is compared would jump between models.
+    // Independent of the model, so that differences between models are smooth.
     const double time = *test_.running_before < LEAST_STEADY ? *test_.running_before : LEAD;
     const auto steps = static_cast<long>(time * test_.sample_rate * substeps_);
     const double step = 1.0 / test_.sample_rate / substeps_;
@@ -357,12 +356,12 @@ class SteadyTest {
   int substeps_;
   double rise_;  // [samples]
   CuttingMachine& machine_;
-  double start_;       // [s] from which the tool is in cut
+  double start_;       // [s] begin of the cut
   double feed_ = 0.0;  // [m/s]
   bool engaged_ = false;
 };
 
-// The angle of a spindle that turns steadily, where a record asks for it.
+// Fills the spindle angle of a record at constant speed.
 void fillAngle(Record& record, double phase, double speed) {
   if (!record.has("spindle_angle")) return;
   std::vector<double>& angle = record.add("spindle_angle");
@@ -427,7 +426,7 @@ Record simulate(const MachineModel& model, const CampaignTest& test, const Recor
     return simulateOn(machine, model, test, recorded, std::move(record), phase, guide, options);
   };
   if (!options.traces || !(test.kind == TestKind::cut || machine.vibrates())) return simulated();
-  // Where forces tell the place of the tip, the sensor and the tool's modes enter it.
+  // If the motion of the tip follows from the forces, it depends on the sensor and the tool's modes.
   std::vector<double> values = guide && Guide::byForce(*recorded)
                                    ? valuesOfRecord(model, test.kind)
                                    : valuesOfTrace(model, test.kind, guide.has_value());
@@ -449,13 +448,13 @@ double recordedPhase(const CampaignTest& test, const Record& recorded) {
   const std::vector<double>& angle = recorded.column("spindle_angle");
   double s = 0.0, c = 0.0;
   for (std::size_t i = 0; i < angle.size(); ++i) {
-    // On the grid of the sample rate, as the test is simulated.
+    // On the grid of the sample rate, as in the simulation.
     const double turned = test.spindle_speed * static_cast<double>(i) / test.sample_rate;
     s += std::sin(angle[i] - turned);
     c += std::cos(angle[i] - turned);
   }
-  // A line of no whole order tells one turn from the next: the record's own count, 0..2 pi at its first
-  // sample.
+  // A line of non-integer order distinguishes revolutions: the result is on the revolution of the record's
+  // first sample, 0..2 pi.
   return angle[0] + std::remainder(std::atan2(s, c) - angle[0], units::TWO_PI);
 }
 
@@ -464,7 +463,7 @@ Record simulateTest(const MachineModel& model, const CampaignTest& test, const R
   if (recorded.size() == 0) throw Error(recorded.file + ": no samples");
   Record record;
   record.file = recorded.file;
-  // The grid of the sample rate; a file's times are rounded to its printed digits.
+  // Grid of the sample rate: times in a file are rounded.
   for (std::size_t i = 0; i < recorded.size(); ++i)
     record.time.push_back(recorded.time[0] + static_cast<double>(i) / test.sample_rate);
   const auto asked = [&](const std::string& name) {

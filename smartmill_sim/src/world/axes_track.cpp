@@ -8,7 +8,7 @@
 namespace smartmill::sim {
 namespace {
 
-constexpr double GAP = 0.02;  // [s] between samples; no machine is led over more in one straight line
+constexpr double GAP = 0.02;  // [s] between samples; longer intervals are gaps
 
 }  // namespace
 

@@ -9,9 +9,9 @@
 namespace smartmill::sim {
 namespace {
 
-constexpr int ACROSS = 9, ALONG = 5;  // spots of an electrode's diameter, across and along the tool
+constexpr int ACROSS = 9, ALONG = 5;  // spots over the electrode, across and along the tool
 constexpr int HOUSING = 10;           // spots on the housing's radius
-constexpr double TOUCHING = 0.5e-6;   // [m] gap that a voltage is still told of
+constexpr double TOUCHING = 0.5e-6;   // [m] least gap for which a voltage is computed
 
 }  // namespace
 
@@ -28,7 +28,8 @@ ToolSurface::ToolSurface(const StationTraits& traits, const ToolGeometry& tool, 
   low_.resize(static_cast<std::size_t>(tool.teeth), 0.0);
 }
 
-/// Of one tooth, `off` [rad] ahead of the direction looked at: then its relief is seen.
+/// Recess [m] of the surface at a tooth that is `off` [rad] ahead of the direction; off > 0: on its relief
+/// flank.
 double ToolSurface::behind(double off) const {
   const double past = off > 0.0 ? std::max(0.0, off - land_) : off;
   const double width = past > 0.0 ? relief_ : rake_;
@@ -61,7 +62,7 @@ GapSensor::GapSensor(const StationTraits& traits, const smartmill::HammerStation
     spots_.push_back({0.0, 0.0, 1.0});
   } else {
     double sum = 0.0;
-    // Even in the angle about the disc's middle: the chord's end needs no fine steps.
+    // Uniform in the angle about the disc's centre: accurate at the ends of the chord.
     for (int i = 0; i < ACROSS; ++i) {
       const double turn = units::PI * (i + 0.5) / ACROSS, chord = radius * std::sin(turn);
       const double share = chord * chord;
@@ -84,8 +85,8 @@ void GapSensor::face(const ToolSurface& surface, double angle, double above, dou
   const double radius = surface.radius(), towards = surface.throwTo(angle, facing_);
   for (std::size_t i = 0; i < spots_.size(); ++i) {
     const double across = (spots_[i].lateral + beside) / radius;
-    const bool below = spots_[i].share == 0.0 && above + spots_[i].height < 0.0;  // the tool's tip
-    if (std::abs(across) >= 1.0 || below) {                                       // beside the tool
+    const bool below = spots_[i].share == 0.0 && above + spots_[i].height < 0.0;  // below the tool tip
+    if (std::abs(across) >= 1.0 || below) {                                       // next to the tool
       behind_[i] = radius;
       continue;
     }

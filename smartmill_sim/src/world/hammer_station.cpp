@@ -9,16 +9,16 @@
 namespace smartmill::sim {
 namespace {
 
-// In front of a sensor: not beside it, not above it, not far from it.
+// Limits of a position in front of a sensor: lateral, vertical and axial distance.
 constexpr double BESIDE = 2e-3;    // [m]
 constexpr double ABOVE = 30e-3;    // [m]
 constexpr double FAR = 4e-3;       // [m]
-constexpr double STANDING = 0.02;  // [rad/s] a hammer that meets no standing tool hits the air
-constexpr double RINGS = 2.0;      // [s] after a blow all is still
-constexpr int LOOK = 32;           // samples between two looks at a moving surface
+constexpr double STANDING = 0.02;  // [rad/s] a hammer hits only a tool at rest
+constexpr double RINGS = 2.0;      // [s] decay time of the vibration after a hit
+constexpr int LOOK = 32;           // samples between two updates of a moving surface
 constexpr std::array<const char*, 2> AXIS{{"x", "y"}};
 
-/// A tooth that points along the axis.
+/// Angle [rad] of a tooth that points along the axis.
 double angleOf(std::size_t axis) {
   return axis == 0 ? 0.5 * units::PI : 0.0;
 }
@@ -26,7 +26,7 @@ double angleOf(std::size_t axis) {
 void checkHeight(double stickout, double struck) {
   if (struck < stickout) return;
   throw Error("hammer.offset_mm: " + std::to_string(struck / units::MM) +
-              " is not below the tool's stickout");
+              " mm above the tip, expected less than the tool's stickout");
 }
 
 bool same(const HammerStation::Place& a, const HammerStation::Place& b) {
@@ -55,13 +55,12 @@ HammerStation::HammerStation(const MachineModel& model, const StationTraits& tra
   for (std::size_t axis = 0; axis < 2; ++axis) standBy(axis);
 }
 
-/// Share of the tip's displacement, or of a force there, at a height of a rigid tool that turns about a
-/// point.
+/// Displacement at a height [m] of a rigid tool over that of its tip; the same ratio applies to forces.
 double HammerStation::rigid(double height) const {
   return turns_ ? 1.0 - height / traits_.pivot : 1.0;
 }
 
-/// The beam's filters for the height at which the tool stands.
+/// Updates the beam's filters for the height of the tool.
 void HammerStation::standBy(std::size_t axis) {
   if (!structure_ || (!ways_[axis].tip.empty() && std::abs(height_ - way_height_[axis]) < 1e-7)) return;
   way_height_[axis] = height_;
@@ -107,7 +106,7 @@ double HammerStation::struckRetreat(const Place& place, std::size_t axis) const 
   return surface_.retreat(place.angle, height + traits_.read_height + station_.offset, angleOf(axis));
 }
 
-/// Where an axis has stopped it is not quite where it shows.
+/// Draws the positioning error of an axis that has stopped.
 void HammerStation::settle(const Place& place, std::mt19937_64& random) {
   if (place.position != place_.position) {
     moving_ = true;
@@ -163,7 +162,7 @@ HammerStation::Push HammerStation::push(double time) {
   if (meets) push.force = solenoid_.force(time);
   if (push.force != 0.0) rings_until_ = time + RINGS;
   if (structure_ && before_ && time < rings_until_) {
-    // The blow comes from the sensor's side.
+    // The hit comes from the sensor's side.
     Way& way = ways_[fired_axis_];
     for (std::size_t axis = 0; axis < 2; ++axis) {
       now_[axis] = way.read[axis].step(-push.force);
@@ -177,7 +176,7 @@ HammerStation::Push HammerStation::push(double time) {
   return push;
 }
 
-/// [m] from each sensor's face to the cutting circle.
+/// Distance [m] from each sensor's face to the cutting circle.
 std::array<double, 2> HammerStation::gaps(const std::array<double, 2>& displacement) const {
   const Axes3& p = station_.position.at(AXIS[*before_]);
   std::array<double, 2> gap{};

@@ -11,11 +11,11 @@ namespace {
 
 using units::TWO_PI;
 
-constexpr int LOOKS = 360;               // over the front half; finer details of the stock are overlooked
+constexpr int LOOKS = 360;  // scanned angles of the front half; finer details of the stock are ignored
 constexpr double LEAST_ARC = 1e-6;       // [rad]
-constexpr double LEAST_DEPTH = 1e-7;     // [m] controllers' increment
+constexpr double LEAST_DEPTH = 1e-7;     // [m] position increment of a controller
 constexpr double LEAST_SPEED = 1e-7;     // [m/s]
-constexpr double ON_WALL = 1e-9;         // [m] a point this near to a slot's wall is on it: not material
+constexpr double ON_WALL = 1e-9;         // [m] a point closer to a slot's wall is on the wall: no material
 constexpr double SAME_WAY = 1.0 - 1e-9;  // [1] cosine
 constexpr double OFF_LINE = 1e-9;        // [m]
 
@@ -32,7 +32,7 @@ double distanceToLine(double x, double y, const std::array<double, 2>& from,
 Stock::Stock(const Workpiece& workpiece, double radius) : box_(workpiece), radius_(radius) {
 }
 
-/// [m] height of the material above z at a point that the first so many slots left, 0 without.
+/// Height [m] of the material above z at a point after the first `slots` slots; 0: none.
 double Stock::depthAt(double x, double y, double z, std::size_t slots) const {
   if (x < box_.low[0] || x > box_.high[0] || y < box_.low[1] || y > box_.high[1]) return 0.0;
   double top = box_.high[2];
@@ -47,7 +47,7 @@ std::vector<ContactArc> Stock::contact(const std::array<double, 3>& position,
                                        const std::array<double, 3>& velocity) const {
   std::vector<ContactArc> arcs;
   if (std::hypot(velocity[0], velocity[1]) < LEAST_SPEED || position[2] >= box_.high[2]) return arcs;
-  // The slot that this motion is making ends at the tool's own front.
+  // The slot being cut by this motion is excluded: it ends at the front of the tool.
   const std::size_t slots = slots_.size() - (along(velocity) ? 1 : 0);
   const double heading = std::atan2(velocity[0], velocity[1]), first = heading - 0.5 * units::PI;
   const auto depth = [&](double offset) {
@@ -97,7 +97,7 @@ bool Stock::above(const std::array<double, 3>& position) const {
   return false;
 }
 
-/// Whether a motion goes on with the slot that is being made.
+/// Whether a motion continues the open slot.
 bool Stock::along(const std::array<double, 3>& velocity) const {
   if (!open_) return false;
   const Slot& slot = slots_.back();

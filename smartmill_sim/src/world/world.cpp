@@ -18,11 +18,11 @@
 namespace smartmill::sim {
 namespace {
 
-constexpr std::size_t LOOK = 64;       // samples between two looks at where the tool meets stock
+constexpr std::size_t LOOK = 64;       // samples between two updates of the contact with the stock
 constexpr double HAMMER_DELAY = 0.03;  // [s] of the solenoid
 constexpr double TURNING = 1.0;        // [rad/s] a slower spindle cannot cut
 constexpr double SAME_ANGLE = 1e-7;    // [rad]
-constexpr std::uint64_t FLANGE_SEED = 0x1000, PLATE_SEED = 0x2000;  // apart from the world's own
+constexpr std::uint64_t FLANGE_SEED = 0x1000, PLATE_SEED = 0x2000;  // offsets from the seed of the world
 constexpr int TOUCHED = 3001, PLUNGED = 3002, SENSOR = 3003;        // external alarms
 
 bool same(const std::vector<ContactArc>& a, const std::vector<ContactArc>& b) {
@@ -32,7 +32,7 @@ bool same(const std::vector<ContactArc>& a, const std::vector<ContactArc>& b) {
   });
 }
 
-/// The model with the tool's structure that the hammer station's traits give it.
+/// The model with the tool structure of the hammer station, if it defines one.
 MachineModel withStructure(MachineModel model, const std::optional<HammerStation>& station) {
   if (station) {
     if (const std::optional<ToolTip> tip = station->tip()) model.tool_tip = *tip;
@@ -92,13 +92,13 @@ class World::Impl {
     const double now = static_cast<double>(index_) / SAMPLE_RATE;
     if ((blow_ && !blow_->over(now)) || (tip_blow_ && !tip_blow_->over(now)) ||
         (station_ && station_->busy(now))) {
-      message = "a blow is still under way";
+      message = "the previous hit is still in progress";
       return StrikeAnswer::failed;
     }
     const bool tool = point == "tool";
     const bool before_hammer = station_ && axis < 2 && (!flange_ || station_->facing(last_.position) == axis);
     if (tool && before_hammer) {
-      // Between two samples anywhere, as a real one.
+      // At a random time between two samples.
       station_->fire(axis, now, now + HAMMER_DELAY + uniform() / SAMPLE_RATE, random_);
       message = "hammer fired in " + direction;
     } else if (tool && flange_ && axis < 3) {
@@ -173,7 +173,7 @@ class World::Impl {
     return peak * std::clamp(1.0 + options_.force_scatter * normal_(random_), 0.5, 1.5);
   }
   double noise(double rms) { return rms * normal_(random_); }
-  /// Of an automatic hammer or of a person.
+  /// Hit by an automatic hammer or by hand.
   Blow blowBy(double now) {
     const double delay = options_.operator_delay > 0.0 ? options_.operator_delay : HAMMER_DELAY;
     const double begin = now + delay + uniform() / SAMPLE_RATE;
@@ -242,7 +242,7 @@ class World::Impl {
     return motion;
   }
 
-  /// Where the tool meets stock now.
+  /// Updates the contact of tool and stock.
   void look(const MotionState& state) {
     if (!stock_) return;
     std::vector<ContactArc> arcs = stock_->contact(state.position, state.velocity);
@@ -269,7 +269,7 @@ class World::Impl {
     if (controller_.status().alarm == 0) controller_.raiseAlarm(number, text);
   }
 
-  /// What acts on the tool besides cut and station [N]: weights and blows by hand.
+  /// Forces on the tool in addition to cut and station [N]: weights and manual hits.
   std::array<double, 3> byHand(double at, CuttingMachine::Input& input, double& tap) const {
     std::array<double, 3> tip = pull_;
     if (tip_blow_) {
@@ -282,7 +282,7 @@ class World::Impl {
     return tip;
   }
 
-  /// The step in the flange's sensors and in the plate.
+  /// Steps the sensors in the flange and the plate.
   void showFurther(const CuttingMachine::Input& input, const HammerStation::Push& push,
                    const std::array<double, 3>& tip, const std::array<double, 3>& blow, double height,
                    const CuttingMachine::Output& out) {
@@ -297,9 +297,9 @@ class World::Impl {
     plate_->step(cut, {input.motion.centre[0], input.motion.centre[1], height}, blow, tap_point_);
   }
 
-  /// Sensors are averaged over the sample's own interval, centred on it, as a converter with an anti-aliasing
-  /// filter does: what a short blow has above half the sample rate would else fold into its spectrum, another
-  /// way in force and in answer. @param now state half a sample after it
+  /// Simulates a sample. Sensor signals are averaged over the interval centred on the sample, as by an
+  /// anti-aliasing filter: otherwise the spectrum of a short hit above half the sample rate would alias
+  /// differently in force and response. @param now state half a sample after the sample
   void sample(double time, const MotionState& now, Block& block) {
     if (station_) station_->stand({now.position, now.spindle_angle, now.spindle_speed}, random_);
     std::array<double, 3> sensor{}, force{};
@@ -375,15 +375,15 @@ class World::Impl {
   std::vector<ContactArc> arcs_;
   std::optional<Blow> blow_;  // on the workpiece
   std::size_t blow_axis_ = 0;
-  std::array<double, 3> tap_point_{};  // [m] of it, from the plate's origin
-  std::optional<Blow> tip_blow_;       // on the tool, by hand
+  std::array<double, 3> tap_point_{};  // [m] point of the hit, from the plate's origin
+  std::optional<Blow> tip_blow_;       // manual hit on the tool
   std::size_t tip_blow_axis_ = 0;
   std::array<double, 3> pull_{};  // [N] at the tool's tip
   bool pull_on_table_ = false;
   std::optional<SpindleSensor> flange_;
   std::optional<Plate> plate_;
   double load_meter_ = 0.0;  // [V]
-  double torque_ = 0.0;      // [N m] of the cut, summed over the samples of a block
+  double torque_ = 0.0;      // [N m] cutting torque, summed over the samples of a block
 };
 
 World::World(const MachineModel& model, const WorldOptions& options) {
@@ -423,7 +423,8 @@ void World::advance(Block& block) {
 }
 
 void World::advance(Block& block, const std::vector<MotionState>& states) {
-  if (states.size() != BLOCK) throw Error("axes: " + std::to_string(states.size()) + " states for one block");
+  if (states.size() != BLOCK)
+    throw Error("axes: " + std::to_string(states.size()) + " states, expected one block");
   impl_->advance(block, states);
 }
 

@@ -9,7 +9,8 @@
 
 namespace smartmill::sim {
 
-/// Obstacles on the table as boxes in machine coordinates of the tool tip. The tool is a cylinder whose tip has its centre at the machine position.
+/// Obstacles on the table as boxes in machine coordinates of the tool tip. The tool is a cylinder whose tip
+/// has its centre at the machine position.
 class CollisionWatch {
  public:
   struct Body {
@@ -19,13 +20,16 @@ class CollisionWatch {
 
   /// No obstacles.
   CollisionWatch() = default;
-  /// Obstacles of a model: sensor and hammer of each direction of its hammer station, and the table under its workpiece. None without a tool or without these sections.
+  /// Obstacles of a model: sensor and hammer of each direction of its hammer station, and the table under its
+  /// workpiece. None without a tool or without these sections.
   static CollisionWatch ofModel(const MachineModel& model);
 
   void add(const Body& body) { bodies_.push_back(body); }
   const std::vector<Body>& bodies() const { return bodies_; }
 
-  /// The body that the tool intersects at a position [m]; nullptr: none. A tool at rest may face the body with the space between two flutes, so that only its core counts. @param turning whether the spindle turns
+  /// The body that the tool intersects at a position [m]; nullptr: none. A tool at rest may face the body
+  /// with the space between two flutes, so that only its core counts. @param turning whether the spindle
+  /// turns
   const Body* touched(const Axes3& position, bool turning) const;
 
   double tool_radius = 0.0;  ///< [m] over the edges

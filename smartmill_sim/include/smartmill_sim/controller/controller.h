@@ -16,17 +16,18 @@
 namespace smartmill::sim {
 
 struct ControllerOptions {
-  MachineAxes axes;                              ///< travel, rapid, acceleration, home (where it starts)
-  double spindle_max_speed = 0.0;                ///< [rad/s] limits S
-  double spindle_acceleration = 0.0;             ///< [rad/s2] without load
-  double spindle_torque = 0.0;                   ///< [N m] limit of the drive; 0: the load does not slow the spindle
+  MachineAxes axes;                   ///< travel, rapid, acceleration, home (where it starts)
+  double spindle_max_speed = 0.0;     ///< [rad/s] limits S
+  double spindle_acceleration = 0.0;  ///< [rad/s2] without load
+  double spindle_torque = 0.0;        ///< [N m] limit of the drive; 0: the load does not slow the spindle
   std::array<double, 3> work_offset{{0, 0, 0}};  ///< [m] machine minus absolute position, of G54
   focas::SysInfo info = fineInfo();              ///< reported identification
   int mode = focas::AUT_REMOTE;                  ///< focas::Aut, set at the panel
   std::size_t buffer_size = 1024;                ///< [byte] of DNC text that has not run
   double load_step = 0.0;                        ///< [percent] resolution of the polled loads; 0: not rounded
   CollisionWatch obstacles;
-  std::function<std::int64_t()> wall_clock;  ///< [s] since 1970, of the controller's calendar; empty: the computer's clock
+  std::function<std::int64_t()>
+      wall_clock;  ///< [s] since 1970, of the controller's calendar; empty: the computer's clock
 
   /// @throws Error naming key and value.
   void validate() const;
@@ -34,7 +35,9 @@ struct ControllerOptions {
   /// Moment of inertia [kg m2] of the spindle: torque over acceleration.
   double spindleInertia() const { return spindle_torque / spindle_acceleration; }
 
-  /// From a model's sections axes, spindle, hammer, tool and workpiece. Loads are rounded to 0.3 mV of the load meter. Defaults: travel x -250..250, y -200..200, z -300..0 mm, home 0 0 0, rapid 30 m/min, 5 m/s2; spindle up to 20000 rpm, 10000 rpm/s.
+  /// From a model's sections axes, spindle, hammer, tool and workpiece. Loads are rounded to 0.3 mV of the
+  /// load meter. Defaults: travel x -250..250, y -200..200, z -300..0 mm, home 0 0 0, rapid 30 m/min, 5 m/s2;
+  /// spindle up to 20000 rpm, 10000 rpm/s.
   static ControllerOptions ofModel(const MachineModel& model);
   /// Identification with a position increment of 0.1 um.
   static focas::SysInfo fineInfo();
@@ -49,9 +52,15 @@ struct MotionState {
   int sequence = 0;                           ///< N word of the running or last block
 };
 
-/// The simulated controller with ideal axes and spindle: each block has a trapezoidal speed profile and ends with an exact stop; the torque of the spindle drive accelerates the inertia and carries the cut. advance() moves the time on. All methods are thread-safe.
+/// The simulated controller with ideal axes and spindle: each block has a trapezoidal speed profile and ends
+/// with an exact stop; the torque of the spindle drive accelerates the inertia and carries the cut. advance()
+/// moves the time on. All methods are thread-safe.
 ///
-/// Dialect of the program text: see nc_block.h. A program begins in G90, G21, G94, G54 and G1 without F. `#n=` is executed after all blocks before it. The program does not wait for M3 and M4; it waits for M5, M19, M119, M30 and M2; M0 waits for cycle start. A block that is not understood, leaves the travel or lacks F raises an alarm, which stops the machine and ends the session; so does a collision of the tool with an obstacle.
+/// Dialect of the program text: see nc_block.h. A program begins in G90, G21, G94, G54 and G1 without F.
+/// `#n=` is executed after all blocks before it. The program does not wait for M3 and M4; it waits for M5,
+/// M19, M119, M30 and M2; M0 waits for cycle start. A block that is not understood, leaves the travel or
+/// lacks F raises an alarm, which stops the machine and ends the session; so does a collision of the tool
+/// with an obstacle.
 ///
 /// Programs run by DNC or from the memory (mode MEM, cycle start).
 class Controller : public focas::ControllerInterface {
@@ -62,7 +71,8 @@ class Controller : public focas::ControllerInterface {
   Controller(const Controller&) = delete;
   Controller& operator=(const Controller&) = delete;
 
-  /// Advances the machine by `count` steps. @param dt [s] one step @param states receives the state at the end of each step
+  /// Advances the machine by `count` steps. @param dt [s] one step @param states receives the state at the
+  /// end of each step
   void advance(double dt, std::size_t count, std::vector<MotionState>& states);
   MotionState motion() const;
 
@@ -74,7 +84,8 @@ class Controller : public focas::ControllerInterface {
   /// Torque of the cut on the spindle [N m].
   void setSpindleTorque(double torque);
 
-  /// Mode at the panel. Leaving DNC (focas::AUT_REMOTE) while blocks run or a session is open stops the machine and ends the session (EW_MODE). @param aut focas::Aut
+  /// Mode at the panel. Leaving DNC (focas::AUT_REMOTE) while blocks run or a session is open stops the
+  /// machine and ends the session (EW_MODE). @param aut focas::Aut
   void setMode(int aut);
   /// External alarm (type EX); reset() clears it.
   void raiseAlarm(int number, const std::string& text);
@@ -98,7 +109,8 @@ class Controller : public focas::ControllerInterface {
   std::vector<double> servoCurrent() const override;
   std::vector<double> servoSpeed() const override;
   std::vector<double> servoLoopGain() const override;
-  /// Variables 1..33, 100..199, 500..999 and 1133, initially vacant; work offsets 5221..5323; read-only positions 5001.., 5021.., 5041.. .
+  /// Variables 1..33, 100..199, 500..999 and 1133, initially vacant; work offsets 5221..5323; read-only
+  /// positions 5001.., 5021.., 5041.. .
   focas::EwCode readMacro(int number, std::optional<double>* value) const override;
   focas::EwCode writeMacro(int number, std::optional<double> value) override;
   std::uint32_t alarmBits() const override;

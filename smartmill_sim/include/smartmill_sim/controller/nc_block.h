@@ -54,9 +54,10 @@ struct NcBlock {
 /// Value of a variable #n; nullopt: vacant. @throws NcAlarm if the variable does not exist.
 using NcVariables = std::function<std::optional<double>(int)>;
 
-/// Parses one line. Dialect: O and N; G0 G1 G2 G3 (I J or R, plane G17) G4 (P in ms or X in s) G20 G21 G28 G53
-/// G54..G59 G90 G91 G94 G95; X Y Z F S; M0 M2 M3 M4 M5 M19 M30 M119; or #n=value. A value is a number, which
-/// needs no decimal point, #n, or an expression in brackets with + - * / SIN COS SQRT (degrees); a word with a vacant #n is ignored. Blanks, comments in parentheses and lines that begin with % are ignored.
+/// Parses one line. Dialect: O and N; G0 G1 G2 G3 (I J or R, plane G17) G4 (P in ms or X in s) G20 G21 G28
+/// G53 G54..G59 G90 G91 G94 G95; X Y Z F S; M0 M2 M3 M4 M5 M19 M30 M119; or #n=value. A value is a number,
+/// which needs no decimal point, #n, or an expression in brackets with + - * / SIN COS SQRT (degrees); a word
+/// with a vacant #n is ignored. Blanks, comments in parentheses and lines that begin with % are ignored.
 /// @throws NcAlarm (PS) for everything else; the alarm names IF, WHILE and GOTO.
 NcBlock parseBlock(const std::string& line, const NcVariables& variables = {});
 

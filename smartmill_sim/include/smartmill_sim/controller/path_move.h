@@ -5,7 +5,9 @@
 
 namespace smartmill::sim {
 
-/// Motion of a point along a straight line or an arc in x and y (z proportional to the path), with a trapezoidal speed profile: from the present speed to the feed, to rest exactly at the target. Closed form in time. Times [s] are those of the caller's clock and do not decrease.
+/// Motion of a point along a straight line or an arc in x and y (z proportional to the path), with a
+/// trapezoidal speed profile: from the present speed to the feed, to rest exactly at the target. Closed form
+/// in time. Times [s] are those of the caller's clock and do not decrease.
 class PathMove {
  public:
   using Point = std::array<double, 3>;
@@ -17,7 +19,8 @@ class PathMove {
   static PathMove arc(const Point& start, const Point& target, const std::array<double, 2>& centre,
                       bool clockwise);
 
-  /// Plans the motion from a time on with a feed [m/s]; 0: brakes to rest on the path, and the rest of the path remains.
+  /// Plans the motion from a time on with a feed [m/s]; 0: brakes to rest on the path, and the rest of the
+  /// path remains.
   /// @param acceleration [m/s2] > 0
   void plan(double time, double feed, double acceleration);
   /// Brakes to rest on the path; the point of rest becomes the target.
@@ -47,7 +50,8 @@ class PathMove {
   std::array<double, 2> centre_{{0, 0}};
   double radius_ = 0.0, start_angle_ = 0.0, sweep_ = 0.0;
 
-  // Speed profile: from begin_ a ramp of ramp_ seconds from first_ to peak_, constant for steady_ seconds, a ramp of down_ seconds to rest.
+  // Speed profile: from begin_ a ramp of ramp_ seconds from first_ to peak_, constant for steady_ seconds, a
+  // ramp of down_ seconds to rest.
   double begin_ = 0.0, duration_ = 0.0;              // [s]
   double from_distance_ = 0.0, end_distance_ = 0.0;  // [m]
   double first_ = 0.0, peak_ = 0.0;                  // [m/s]

@@ -9,7 +9,8 @@
 
 namespace smartmill::sim {
 
-/// Record of Fanuc's Servo Guide: spindle load and motor currents of the axes at 1 kHz, the running block, and a trigger at the start of a block (N word).
+/// Record of Fanuc's Servo Guide: spindle load and motor currents of the axes at 1 kHz, the running block,
+/// and a trigger at the start of a block (N word).
 class ServoRecorder {
  public:
   static constexpr double SAMPLE_RATE = 1000.0;  ///< [Hz]

@@ -14,7 +14,8 @@ namespace smartmill::sim {
 
 using Stage = EffectStage;
 
-/// Whether effects of a stage act in tests of this kind: a tap has neither chip nor spindle rotation, a move has no chip.
+/// Whether effects of a stage act in tests of this kind: a tap has neither chip nor spindle rotation, a move
+/// has no chip.
 bool actsIn(Stage stage, TestKind kind);
 
 /// The effects of one model, in the order of action.

@@ -13,7 +13,9 @@
 
 namespace smartmill::sim {
 
-/// Single-point turning after Kim (eq. 1 to 4, fig. 3) with the deviations of a real lathe: a cutting force that is not proportional to the chip thickness, a tool that may leave the cut, an actuator with bandwidth, delay and stroke, and sensor noise. Units and meaning: declare().
+/// Single-point turning after Kim (eq. 1 to 4, fig. 3) with the deviations of a real lathe: a cutting force
+/// that is not proportional to the chip thickness, a tool that may leave the cut, an actuator with bandwidth,
+/// delay and stroke, and sensor noise. Units and meaning: declare().
 struct LatheTraits {
   std::uint64_t seed = 1;
   double rate = 10000.0;
@@ -42,7 +44,8 @@ class Lathe {
   /// @throws Error on bad traits.
   explicit Lathe(const LatheTraits& traits);
 
-  /// Commands of the tool position, one channel "command" [m]; a command takes effect after the sample of its index. Commands for past samples take effect at once and are counted.
+  /// Commands of the tool position, one channel "command" [m]; a command takes effect after the sample of its
+  /// index. Commands for past samples take effect at once and are counted.
   /// @throws Error without this channel, or in another unit.
   void command(const SampleBlock& commands);
 

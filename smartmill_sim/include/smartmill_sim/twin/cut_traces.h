@@ -13,7 +13,8 @@
 
 namespace smartmill::sim {
 
-/// All values of a model on which the record of a test of this kind depends; two models with the same values give the same record. @param model whose effects are in the catalogue
+/// All values of a model on which the record of a test of this kind depends; two models with the same values
+/// give the same record. @param model whose effects are in the catalogue
 std::vector<double> valuesOfRecord(const MachineModel& model, TestKind kind);
 
 /// Whether the channels of a record are independent of each other, i.e. no effect (as cross talk) mixes them.
@@ -22,10 +23,12 @@ bool channelsApart(const MachineModel& model);
 /// As valuesOfRecord(), for one channel (ChannelIndex) of a record with independent channels.
 std::vector<double> valuesOfChannel(const MachineModel& model, TestKind kind, std::size_t channel);
 
-/// As valuesOfRecord(), for the CutTrace of the test. @param guided whether the motion of the tip is prescribed
+/// As valuesOfRecord(), for the CutTrace of the test. @param guided whether the motion of the tip is
+/// prescribed
 std::vector<double> valuesOfTrace(const MachineModel& model, TestKind kind, bool guided);
 
-/// Cache of the CutTrace of one test for the last few models: most models of a search differ from the previous one only in the stages after cut and tool. Thread-safe.
+/// Cache of the CutTrace of one test for the last few models: most models of a search differ from the
+/// previous one only in the stages after cut and tool. Thread-safe.
 class CutTraces {
  public:
   /// @param most >= 1 number of traces

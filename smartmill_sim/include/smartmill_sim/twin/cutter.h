@@ -26,7 +26,8 @@ class Cutter {
     tables    ///< from tables over a revolution (RigidCut): steady and rigid
   };
 
-  /// @param radius_offset [m] of each tooth @param corner_radius [m] 0: none @throws Error on an invalid tool or corner radius.
+  /// @param radius_offset [m] of each tooth @param corner_radius [m] 0: none @throws Error on an invalid tool
+  /// or corner radius.
   Cutter(const ToolGeometry& tool, const CuttingLaw& law, double time_step,
          const std::vector<double>& radius_offset, double corner_radius, double path_share, Way way,
          int corner_slices = CORNER_SLICES);
@@ -38,11 +39,14 @@ class Cutter {
   void setLaw(const CuttingLaw& law);
 
   Way way() const { return way_; }
-  /// With tables or a prescribed motion of the tip: record the sums of each further step, or replay sums that a cutter with other coefficients and factors of the law recorded over the same steps. @param sums must outlive the steps
+  /// With tables or a prescribed motion of the tip: record the sums of each further step, or replay sums that
+  /// a cutter with other coefficients and factors of the law recorded over the same steps. @param sums must
+  /// outlive the steps
   void keep(std::vector<CutSums>* sums) { kept_ = sums; }
   void follow(const std::vector<CutSums>* sums) { followed_ = sums; }
 
-  /// Force on the tool with the tip displaced as in this motion. With a mobility the rate of the tip is solved together with the force: otherwise rubbing edges would excite a light mode that they damp.
+  /// Force on the tool with the tip displaced as in this motion. With a mobility the rate of the tip is
+  /// solved together with the force: otherwise rubbing edges would excite a light mode that they damp.
   CuttingForce step(const ToolMotion& now, const TipYield& yield = {});
   /// Ends the step. @param displacement [m] of the tip
   void settle(const std::array<double, 2>& displacement);

@@ -19,7 +19,8 @@
 
 namespace smartmill::sim {
 
-/// How the tool is fed. steady: speed, feed and contact are constant while the tool cuts (a record of a campaign); without tool-tip modes the forces then come from tables over a revolution.
+/// How the tool is fed. steady: speed, feed and contact are constant while the tool cuts (a record of a
+/// campaign); without tool-tip modes the forces then come from tables over a revolution.
 enum class Feed { any, steady };
 
 /// Result of cut and tool structure in each step, before sensors, drive and signals.
@@ -29,18 +30,20 @@ struct CutTrace {
     std::array<double, 2> displacement{{0, 0}};  ///< [m] of the tip
     double acceleration = 0.0;                   ///< [m/s2] at the probe
   };
-  /// For a tool without modes or with a prescribed motion of the tip; coefficients and factors of the law and the response of the tip are applied on replay.
+  /// For a tool without modes or with a prescribed motion of the tip; coefficients and factors of the law and
+  /// the response of the tip are applied on replay.
   std::vector<CutSums> sums;
   std::vector<Step> steps;  ///< for other tools
 };
 
-/// Cutting process, tool structure, force sensor, spindle drive and measuring chain of one machine with the effects of its model, in constant time steps.
+/// Cutting process, tool structure, force sensor, spindle drive and measuring chain of one machine with the
+/// effects of its model, in constant time steps.
 class CuttingMachine {
  public:
   /// Input over one step.
   struct Input {
-    ToolMotion motion;                              ///< displacement and rate are ignored: they follow from the structure
-    std::array<double, 2> tip_force{{0, 0}};        ///< [N] force on the tool in addition to cutting (a hammer)
+    ToolMotion motion;  ///< displacement and rate are ignored: they follow from the structure
+    std::array<double, 2> tip_force{{0, 0}};  ///< [N] force on the tool in addition to cutting (a hammer)
     std::array<double, 3> sensor_force{{0, 0, 0}};  ///< [N] force on the sensor in addition to cutting
     Axes3 axis_acceleration{{0, 0, 0}};             ///< [m/s2] of the machine axes
     /// Prescribed motion of the tip: the chip follows from it instead of the structure's response.
@@ -73,10 +76,12 @@ class CuttingMachine {
   bool vibrates() const { return vibrates_; }
 
   /// Changes the contact of tool and material, see MillingProcess.
-  /// @param rise [1] share of the change in force that is linear over the step that ends now; the rest is a jump at its end.
+  /// @param rise [1] share of the change in force that is linear over the step that ends now; the rest is a
+  /// jump at its end.
   void engage(const std::vector<ContactArc>& arcs, const ToolMotion& now, double rise = 1.0);
   bool cutting() const { return !arcs_.empty(); }
-  /// Sets the axial depth [m] > 0 of every arc; the surface is unchanged. @param passed_over [m] feed path that is skipped
+  /// Sets the axial depth [m] > 0 of every arc; the surface is unchanged. @param passed_over [m] feed path
+  /// that is skipped
   void setDepth(double depth, double passed_over = 0.0);
 
   /// Starts a record: drift and hum restart. A new edge has edge_time 0.
@@ -87,7 +92,8 @@ class CuttingMachine {
   std::vector<Tone*> tones() { return effects_.tones(); }
   /// Burst trains in the signals; the caller sets their begin.
   std::vector<BurstTrain*> bursts() { return effects_.bursts(); }
-  /// Applies the signal stage (drift, hum, saturation) to the channels at a time since the begin of the record [s].
+  /// Applies the signal stage (drift, hum, saturation) to the channels at a time since the begin of the
+  /// record [s].
   void finish(double record_time, ChannelValues& channels) const;
   bool finishes() const { return effects_.has(Stage::signal); }  ///< whether the model has a signal stage
 
@@ -100,7 +106,9 @@ class CuttingMachine {
   /// The input of every step will prescribe the motion of the tip.
   void guide() { guided_ = true; }
 
-  /// From here on the trace of cut and tool is recorded, or replayed from a machine that recorded it over the same steps and differs only in later stages (without modes or with a prescribed motion of the tip: also in coefficients and factors of the law and in the tool's modes). @param trace must outlive the steps
+  /// From here on the trace of cut and tool is recorded, or replayed from a machine that recorded it over the
+  /// same steps and differs only in later stages (without modes or with a prescribed motion of the tip: also
+  /// in coefficients and factors of the law and in the tool's modes). @param trace must outlive the steps
   void keep(CutTrace* trace) {
     kept_ = trace;
     if (keepsSums()) cutter_->keep(&trace->sums);
@@ -122,7 +130,9 @@ class CuttingMachine {
 
   /// Channels of many steps before the signal stage: one row each; nullptr: not requested.
   using EarlyRows = std::array<std::vector<double>*, CHANNEL_COUNT>;
-  /// Simulates many steps at constant speed, without probe and external forces: the same result as step(), computed stage by stage. @param next updates the input of a step, may call engage() @param early rows of one value per step, or nullptr
+  /// Simulates many steps at constant speed, without probe and external forces: the same result as step(),
+  /// computed stage by stage. @param next updates the input of a step, may call engage() @param early rows of
+  /// one value per step, or nullptr
   void run(std::size_t steps, const std::function<void(std::size_t, Input&)>& next, const EarlyRows& early);
 
   /// Voltage rounded to the load meter's resolution [V].
@@ -143,7 +153,7 @@ class CuttingMachine {
   struct Course {
     std::array<double, 3> before{{0, 0, 0}};  // [N] cutting force before the first step
     std::vector<CuttingForce> force;
-    std::vector<std::array<double, 3>> applied;         // [N] force on the sensor; empty: the cutting force alone
+    std::vector<std::array<double, 3>> applied;  // [N] force on the sensor; empty: the cutting force alone
     std::vector<std::pair<std::size_t, double>> jumps;  // steps with a jump of the force, share of the jump
     std::vector<Instant> instants;                      // where effects need them
   };

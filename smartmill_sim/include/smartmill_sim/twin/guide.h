@@ -15,7 +15,8 @@ struct TipPlace {
   std::array<double, 2> rate{{0, 0}};          ///< [m/s]
 };
 
-/// Motion of the tool tip in a recorded cut: from tool_x and tool_y or, without them, from fx and fy through the inverse of the force sensor's FRF and the receptance of the tool tip.
+/// Motion of the tool tip in a recorded cut: from tool_x and tool_y or, without them, from fx and fy through
+/// the inverse of the force sensor's FRF and the receptance of the tool tip.
 class Guide {
  public:
   /// Whether the record has the channels.
@@ -34,7 +35,8 @@ class Guide {
   std::array<std::vector<double>, 2> tip_;  // [m]
 };
 
-/// Cubic (Catmull-Rom) interpolation between sample i (share 0) and the next one (share 1); constant beyond the ends.
+/// Cubic (Catmull-Rom) interpolation between sample i (share 0) and the next one (share 1); constant beyond
+/// the ends.
 double interpolated(const std::vector<double>& samples, std::size_t i, double share);
 
 }  // namespace smartmill::sim

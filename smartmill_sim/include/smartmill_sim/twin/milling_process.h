@@ -23,12 +23,14 @@ struct ToolMotion {
   std::array<double, 2> rate{{0, 0}};          ///< [m/s] of the displacement
 };
 
-/// Process damping: sums over the edge length in contact [m] of the edge's velocity into the work over the cutting speed, times sin(phi), cos(phi), 1.
+/// Process damping: sums over the edge length in contact [m] of the edge's velocity into the work over the
+/// cutting speed, times sin(phi), cos(phi), 1.
 struct RubbingSums {
   double sine = 0.0, cosine = 0.0, plain = 0.0;
 };
 
-/// Sums over the edges in contact at a step, in which the force is linear; independent of coefficients and factors of the law.
+/// Sums over the edges in contact at a step, in which the force is linear; independent of coefficients and
+/// factors of the law.
 struct CutSums {
   EdgeSums edges;
   RubbingSums rubbing;  ///< for laws with damping
@@ -37,10 +39,15 @@ struct CutSums {
 /// Feed per angle of the spindle [m/rad]. @throws Error if the spindle is at rest.
 std::array<double, 2> feedOf(const ToolMotion& motion);
 
-/// Milling in constant time steps: every tooth cuts the surface left by earlier teeth (ChipRule), from the history of position and deflection of the tool. This includes regeneration, loss of contact, runout and variable pitch; speed, feed and contact may change at any time (Dunwoody 2.2, 6.1 with exact kinematics). Each earlier pass is one ChipShape for the whole edge, so that the force is integrated between the exact ends of every contact. Passes are considered from the last one back until no older pass can be nearer.
+/// Milling in constant time steps: every tooth cuts the surface left by earlier teeth (ChipRule), from the
+/// history of position and deflection of the tool. This includes regeneration, loss of contact, runout and
+/// variable pitch; speed, feed and contact may change at any time (Dunwoody 2.2, 6.1 with exact kinematics).
+/// Each earlier pass is one ChipShape for the whole edge, so that the force is integrated between the exact
+/// ends of every contact. Passes are considered from the last one back until no older pass can be nearer.
 class MillingProcess {
  public:
-  /// @param time_step [s] > 0 @param radius_offset [m] of each tooth, empty: none @throws Error on an invalid tool.
+  /// @param time_step [s] > 0 @param radius_offset [m] of each tooth, empty: none @throws Error on an invalid
+  /// tool.
   MillingProcess(const ToolGeometry& tool, const CuttingLaw& law, double time_step,
                  std::vector<double> radius_offset = {}, double path_share = 0.0);
 

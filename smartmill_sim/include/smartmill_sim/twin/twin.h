@@ -23,29 +23,42 @@ struct SimulationOptions {
   std::optional<double> phase;
   /// [samples] Mean advance of the rise of the cutting force over engage_time and engagementRise().
   double early_entry = 0.0;
-  /// For a tool with modes: the chip follows from the measured displacement of the tip (or from the displacement under the measured forces, see Guide), and the structure only responds to the forces. The simulation cannot become unstable, follows a chattering cut, and its residual is a prediction error.
+  /// For a tool with modes: the chip follows from the measured displacement of the tip (or from the
+  /// displacement under the measured forces, see Guide), and the structure only responds to the forces. The
+  /// simulation cannot become unstable, follows a chattering cut, and its residual is a prediction error.
   bool guided = false;
   /// Phases of tones (mains hum) are drawn from the seed instead of estimated from the record.
   bool random_phases = false;
   /// Channels of the record to simulate; nullptr: all. Requires channelsApart().
   const std::vector<std::string>* channels = nullptr;
-  /// [s] standard deviation of the Gaussian weights of the axis acceleration (smoothedDerivative()): the -3 dB frequency of 58 Hz is above the bandwidth of a feed drive's position loop, and the quantisation of an encoder is suppressed.
+  /// [s] standard deviation of the Gaussian weights of the axis acceleration (smoothedDerivative()): the -3
+  /// dB frequency of 58 Hz is above the bandwidth of a feed drive's position loop, and the quantisation of an
+  /// encoder is suppressed.
   double axis_smoothing = 4e-3;
-  /// Cache of cut and tool in the same test (record, phase, substeps, slices) under other models, read and extended. nullptr: no cache.
+  /// Cache of cut and tool in the same test (record, phase, substeps, slices) under other models, read and
+  /// extended. nullptr: no cache.
   CutTraces* traces = nullptr;
 };
 
-/// [1] Part of a sample before the engagement over which the cutting force rises: one step of the programs that generate campaigns, which use smaller steps if the tool vibrates.
+/// [1] Part of a sample before the engagement over which the cutting force rises: one step of the programs
+/// that generate campaigns, which use smaller steps if the tool vibrates.
 constexpr double engagementRise(bool vibrates) {
   return vibrates ? 1.0 / 64.0 : 1.0 / 6.0;
 }
 
-/// [rad] Spindle angle at the first sample of a record: best fit to its angles at the test's speed. 0 for a tap and for a record without spindle_angle.
+/// [rad] Spindle angle at the first sample of a record: best fit to its angles at the test's speed. 0 for a
+/// tap and for a record without spindle_angle.
 double recordedPhase(const CampaignTest& test, const Record& recorded);
 
-/// Simulates one test of a campaign: a record with the columns and sample times of the recorded one. The recorded spindle angle gives the phase (in a tap it is copied), the recorded hammer force excites a tap, and the recorded motion of the machine axes gives their acceleration. All effects of the model act. Values that are not part of a model, as the phase of a mains hum, are estimated from the recorded signals.
+/// Simulates one test of a campaign: a record with the columns and sample times of the recorded one. The
+/// recorded spindle angle gives the phase (in a tap it is copied), the recorded hammer force excites a tap,
+/// and the recorded motion of the machine axes gives their acceleration. All effects of the model act. Values
+/// that are not part of a model, as the phase of a mains hum, are estimated from the recorded signals.
 ///
-/// Before engage_time the tool is out of cut; from there it is fully engaged with the surface of steady cutting. The sensor begins at rest, the load meter at its air-cut value. With running_before the record begins in the steady state: a lead-in with growing depth of cut is simulated until transients have decayed.
+/// Before engage_time the tool is out of cut; from there it is fully engaged with the surface of steady
+/// cutting. The sensor begins at rest, the load meter at its air-cut value. With running_before the record
+/// begins in the steady state: a lead-in with growing depth of cut is simulated until transients have
+/// decayed.
 /// @param recorded columns, times, phase and hammer force
 /// @throws Error naming what the model lacks or what this twin does not support.
 Record simulateTest(const MachineModel& model, const CampaignTest& test, const Record& recorded,

@@ -9,12 +9,14 @@
 
 namespace smartmill::sim {
 
-/// Motion of axes and spindle under an external controller: samples of x, y, z [m] and revolutions [1], linear between the samples. Over a gap axes and spindle are at rest.
+/// Motion of axes and spindle under an external controller: samples of x, y, z [m] and revolutions [1],
+/// linear between the samples. Over a gap axes and spindle are at rest.
 class AxesTrack {
  public:
   /// @throws Error naming a missing channel. Samples that are not newer than all earlier ones are ignored.
   void push(const SampleBlock& block);
-  /// No samples until a time [s]: the axes are at rest from the last sample on and resume at the position of the next one.
+  /// No samples until a time [s]: the axes are at rest from the last sample on and resume at the position of
+  /// the next one.
   void stand(double until);
   /// [s] time of the last sample; nullopt: none yet.
   std::optional<double> newest() const;

@@ -15,7 +15,8 @@ class ToolSurface {
   /// @param depth [m] of the flutes
   ToolSurface(const StationTraits& traits, const ToolGeometry& tool, double depth);
 
-  /// Radial distance [m] from the cutting circle to the surface in the direction `facing` [rad, clockwise from +y] with the spindle at `angle` [rad], at a height [m] above the tip; edges lag by the helix.
+  /// Radial distance [m] from the cutting circle to the surface in the direction `facing` [rad, clockwise
+  /// from +y] with the spindle at `angle` [rad], at a height [m] above the tip; edges lag by the helix.
   double retreat(double angle, double height, double facing) const;
   /// Offset [m] of the tool axis towards `facing` by eccentricity.
   double throwTo(double angle, double facing) const;
@@ -32,13 +33,18 @@ class ToolSurface {
   double eccentricity_, eccentricity_angle_;
 };
 
-/// Capacitive displacement sensor: the capacitance of a disc electrode in front of the tool is the mean of 1 / gap over the disc, where the gap follows the tool's curvature, flutes and helix. The linearising amplifier has the characteristic of a flat target, V = gain (g0 <1 / gap> - 1). The sensitivity therefore depends on diameter and flutes (Dunwoody section 4.2).
+/// Capacitive displacement sensor: the capacitance of a disc electrode in front of the tool is the mean of 1
+/// / gap over the disc, where the gap follows the tool's curvature, flutes and helix. The linearising
+/// amplifier has the characteristic of a flat target, V = gain (g0 <1 / gap> - 1). The sensitivity therefore
+/// depends on diameter and flutes (Dunwoody section 4.2).
 class GapSensor {
  public:
   /// @param facing [rad] angle of a tooth that points at the sensor, clockwise from +y
   GapSensor(const StationTraits& traits, const smartmill::HammerStation& station, double facing);
 
-  /// Sets the target of the sensor. @param angle [rad] of the spindle @param above [m] height of the sensor's centre above the tip @param beside [m] lateral offset of the tool axis from the sensor axis, against the sense of the angle
+  /// Sets the target of the sensor. @param angle [rad] of the spindle @param above [m] height of the sensor's
+  /// centre above the tip @param beside [m] lateral offset of the tool axis from the sensor axis, against the
+  /// sense of the angle
   void face(const ToolSurface& surface, double angle, double above, double beside);
 
   /// Voltage [V], clipped, without noise. @param gap [m] from the sensor's face to the cutting circle
@@ -52,7 +58,8 @@ class GapSensor {
     double lateral, height, share;  // [m], [m], [1]; share 0: on the housing, not on the electrode
   };
   std::vector<Spot> spots_;
-  std::vector<double> behind_;  // [m] distance of the surface from the foremost line of the cutting circle, by spot
+  std::vector<double>
+      behind_;  // [m] distance of the surface from the foremost line of the cutting circle, by spot
   double facing_, gain_, gap_, range_, bend_;
 };
 

@@ -15,13 +15,16 @@
 
 namespace smartmill::sim {
 
-/// Automatic hammer and capacitive displacement sensor on the table, for a tool at rest (Dunwoody fig. 4.1). Calls per sample: stand(), then push() and hear() for each integration step, then read().
+/// Automatic hammer and capacitive displacement sensor on the table, for a tool at rest (Dunwoody fig. 4.1).
+/// Calls per sample: stand(), then push() and hear() for each integration step, then read().
 class HammerStation {
  public:
-  /// @param step [s] of integration @throws Error if the model lacks tool or hammer, or if stickout, offset and traits are inconsistent.
+  /// @param step [s] of integration @throws Error if the model lacks tool or hammer, or if stickout, offset
+  /// and traits are inconsistent.
   HammerStation(const MachineModel& model, const StationTraits& traits, double force_scatter, double step);
 
-  /// Drive-point receptances of the tip if the traits define the structure; nullopt: those of the model apply.
+  /// Drive-point receptances of the tip if the traits define the structure; nullopt: those of the model
+  /// apply.
   std::optional<ToolTip> tip() const;
   /// Receptance [m/N] between hammer and sensor of two axes; beam only.
   ModalModel measured(std::size_t read_axis, std::size_t struck_axis) const;

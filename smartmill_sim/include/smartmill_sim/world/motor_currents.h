@@ -13,7 +13,10 @@
 
 namespace smartmill::sim {
 
-/// Motors of feed drives and spindle, with a Hall sensor at one phase of each (Cheng & Venuvinod, sections 5 to 9; Broms for the effect of temperature). Feed drives: synchronous motors, current proportional to force. Spindle: an induction motor with a magnetising current and constant power above its base speed. Units and meaning: declare().
+/// Motors of feed drives and spindle, with a Hall sensor at one phase of each (Cheng & Venuvinod, sections 5
+/// to 9; Broms for the effect of temperature). Feed drives: synchronous motors, current proportional to
+/// force. Spindle: an induction motor with a magnetising current and constant power above its base speed.
+/// Units and meaning: declare().
 struct MotorTraits {
   bool currents = false;
   std::array<double, 3> mass{{400.0, 400.0, 400.0}};
@@ -44,7 +47,9 @@ struct MotorTraits {
   std::array<AxisDrive, 3> drives() const;
 };
 
-/// Phase currents of the motors at 1 kHz: a sine over the electrical angle, whose range (twice the amplitude) follows the motor's load. At rest static friction carries the load up to its limit, and the current is constant.
+/// Phase currents of the motors at 1 kHz: a sine over the electrical angle, whose range (twice the amplitude)
+/// follows the motor's load. At rest static friction carries the load up to its limit, and the current is
+/// constant.
 class MotorCurrents {
  public:
   static constexpr double SAMPLE_RATE = 1000.0;  ///< [Hz]

@@ -10,7 +10,9 @@
 
 namespace smartmill::sim {
 
-/// A six-channel dynamometer plate under the workpiece. Defaults: natural frequencies of the sensor of Bachrathy and Stepan (section 2); the centre of mass is above the feet, so that forces couple into rotation. Units and meaning: declare().
+/// A six-channel dynamometer plate under the workpiece. Defaults: natural frequencies of the sensor of
+/// Bachrathy and Stepan (section 2); the centre of mass is above the feet, so that forces couple into
+/// rotation. Units and meaning: declare().
 struct PlateTraits {
   bool present = false;
   std::array<double, 3> origin{{0.0, 0.0, -0.2}};
@@ -26,12 +28,15 @@ struct PlateTraits {
   void declare(ParameterTable& table);
 };
 
-/// Plate and workpiece as a rigid body on four sensing feet: M q'' + C q' + K q = w with the wrench w of the applied forces about the origin in the plane of the feet; the output is C q' + K q. Exact for forces that are linear between steps.
+/// Plate and workpiece as a rigid body on four sensing feet: M q'' + C q' + K q = w with the wrench w of the
+/// applied forces about the origin in the plane of the feet; the output is C q' + K q. Exact for forces that
+/// are linear between steps.
 class Plate {
  public:
   Plate(const PlateTraits& traits, double step, std::uint64_t seed);
 
-  /// One integration step. @param cut [N] cutting force @param cut_point [m] machine coordinates @param blow [N] force of a hit @param blow_point [m] from the plate's origin
+  /// One integration step. @param cut [N] cutting force @param cut_point [m] machine coordinates @param blow
+  /// [N] force of a hit @param blow_point [m] from the plate's origin
   void step(const std::array<double, 3>& cut, const std::array<double, 3>& cut_point,
             const std::array<double, 3>& blow, const std::array<double, 3>& blow_point);
   /// The sample of these steps: means over them, with noise. @return forces [N], moments [N m]

@@ -8,7 +8,8 @@
 
 namespace smartmill::sim {
 
-/// One contact of a hammer: peak sin(pi u^(1 + skew)) over the relative contact time u; skew 0 is the half sine of Dunwoody section 4.3.1.
+/// One contact of a hammer: peak sin(pi u^(1 + skew)) over the relative contact time u; skew 0 is the half
+/// sine of Dunwoody section 4.3.1.
 struct Blow {
   double begin = 0.0;    ///< [s]
   double peak = 0.0;     ///< [N]
@@ -20,7 +21,8 @@ struct Blow {
   bool over(double time) const { return time > end(); }
 };
 
-/// Solenoid of the hammer: the current rises from the command until the first contact and then decays; the hammer falls back or bounces.
+/// Solenoid of the hammer: the current rises from the command until the first contact and then decays; the
+/// hammer falls back or bounces.
 class Solenoid {
  public:
   /// @param force_scatter [1] standard deviation of the peak, relative to its nominal value

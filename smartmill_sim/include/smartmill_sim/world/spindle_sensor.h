@@ -11,7 +11,8 @@
 
 namespace smartmill::sim {
 
-/// A ring of six preloaded quartz washers in the spindle flange (Burzoni ch. 3). With a tool and holder of 139 mm the defaults give the constants of his Table 3. Units and meaning: declare().
+/// A ring of six preloaded quartz washers in the spindle flange (Burzoni ch. 3). With a tool and holder of
+/// 139 mm the defaults give the constants of his Table 3. Units and meaning: declare().
 struct SpindleSensorTraits {
   bool present = false;
   double length = 0.139;
@@ -47,13 +48,18 @@ struct SpindleSensorTraits {
   void validate() const;
 };
 
-/// Dynamics and output of the ring: a force on the tool tip excites the modes of spindle, holder and tool, and the moment at the ring loads one washer of each pair and unloads the other. Each output is proportional to (length + reach) F, linear in the length of tool and holder (its reciprocal, a calibration constant, is not). Cross-talk follows from the angle between a pair and its nominal axis and from unequal sensitivities of its two washers.
+/// Dynamics and output of the ring: a force on the tool tip excites the modes of spindle, holder and tool,
+/// and the moment at the ring loads one washer of each pair and unloads the other. Each output is
+/// proportional to (length + reach) F, linear in the length of tool and holder (its reciprocal, a calibration
+/// constant, is not). Cross-talk follows from the angle between a pair and its nominal axis and from unequal
+/// sensitivities of its two washers.
 class SpindleSensor {
  public:
   /// @param step [s] of integration @throws Error naming key and value.
   SpindleSensor(const SpindleSensorTraits& traits, double step, double sample_rate, std::uint64_t seed);
 
-  /// Changes tool and holder; the modes restart at rest. @param length [m] of tool and holder @throws Error if it is out of range.
+  /// Changes tool and holder; the modes restart at rest. @param length [m] of tool and holder @throws Error
+  /// if it is out of range.
   void setLength(double length);
 
   /// FRF of measured over applied force of an axis, for the main pair alone and unrotated principal planes.
@@ -61,9 +67,11 @@ class SpindleSensor {
   /// Mean of a pair [row] over a static force along an axis [column] [1].
   std::array<std::array<double, 3>, 3> shares() const;
 
-  /// One integration step. @param force [N] on the tool, without the unbalance @param angle [rad] of the spindle @param speed [rad/s] of the spindle
+  /// One integration step. @param force [N] on the tool, without the unbalance @param angle [rad] of the
+  /// spindle @param speed [rad/s] of the spindle
   void step(const std::array<double, 3>& force, double angle, double speed);
-  /// The sample of these steps: means over them with zero, drift and noise; limited where a washer loses its compression. @return x1 .. z2 [N]
+  /// The sample of these steps: means over them with zero, drift and noise; limited where a washer loses its
+  /// compression. @return x1 .. z2 [N]
   std::array<double, 6> read();
   /// Skips a time [s].
   void lose(double time) { time_ += time; }

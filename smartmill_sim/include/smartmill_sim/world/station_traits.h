@@ -7,7 +7,10 @@
 
 namespace smartmill::sim {
 
-/// Properties of a hammer station beyond the model's `hammer` section: bending of the tool between hammer, sensor and tip, the sensor's electrode, and imperfections of the solenoid. The defaults are an ideal station: a point sensor, half-sine pulses and the model's modes with a rigid tool. Units and meaning: declare().
+/// Properties of a hammer station beyond the model's `hammer` section: bending of the tool between hammer,
+/// sensor and tip, the sensor's electrode, and imperfections of the solenoid. The defaults are an ideal
+/// station: a point sensor, half-sine pulses and the model's modes with a rigid tool. Units and meaning:
+/// declare().
 struct StationTraits {
   std::string structure = "modes";
   double pivot = 0.25;

@@ -11,7 +11,8 @@
 
 namespace smartmill::sim {
 
-/// A round beam of two sections, from the holder's face (height = length) to the tip (height 0), in one plane: Timoshenko stiffness, consistent mass of cubic shapes with rotary inertia.
+/// A round beam of two sections, from the holder's face (height = length) to the tip (height 0), in one
+/// plane: Timoshenko stiffness, consistent mass of cubic shapes with rotary inertia.
 struct RoundBeam {
   double length = 0.0;                          ///< [m]
   double fluted = 0.0;                          ///< [m] from the tip
@@ -20,7 +21,8 @@ struct RoundBeam {
   double poisson = 0.22;                        ///< [1] Poisson's ratio; carbide
   bool shear = true;                            ///< false: Euler-Bernoulli beam
 
-  /// Stiffness and mass matrices over (displacement, slope) of the nodes, the holder's face first; slope is d w / d x with x from the face to the tip. Free at both ends.
+  /// Stiffness and mass matrices over (displacement, slope) of the nodes, the holder's face first; slope is d
+  /// w / d x with x from the face to the tip. Free at both ends.
   struct Matrices {
     Eigen::MatrixXd stiffness, mass;
     std::vector<double> x;  ///< [m] of the nodes
@@ -43,14 +45,18 @@ struct Joint {
   double loss = 0.0;     ///< [1] loss factor
 };
 
-/// Tool and spindle coupled at the holder's face, in one plane: the joint's stiffness connects the beam's first node and the spindle's modal coordinates. The receptances are those of receptance coupling, H = H_tt - H_tf (H_ff + H_s + 1 / k)^-1 H_ft (Schmitz and Donalson; not in Dunwoody). Modes are real: the damping of each component acts on a mode by its share of the energy.
+/// Tool and spindle coupled at the holder's face, in one plane: the joint's stiffness connects the beam's
+/// first node and the spindle's modal coordinates. The receptances are those of receptance coupling, H = H_tt
+/// - H_tf (H_ff + H_s + 1 / k)^-1 H_ft (Schmitz and Donalson; not in Dunwoody). Modes are real: the damping
+/// of each component acts on a mode by its share of the energy.
 class CoupledTool {
  public:
   /// @param tool_loss [1] loss factor of the beam
   CoupledTool(const RoundBeam& beam, const std::vector<FaceMode>& spindle, const Joint& joint,
               double tool_loss);
 
-  /// Receptance [m/N] between two heights above the tip [m]: modes below `highest` [Hz] plus the static residual.
+  /// Receptance [m/N] between two heights above the tip [m]: modes below `highest` [Hz] plus the static
+  /// residual.
   ModalModel between(double read, double struck, double highest) const;
   /// Natural frequencies [Hz], ascending.
   const Eigen::VectorXd& frequencies() const { return frequency_; }

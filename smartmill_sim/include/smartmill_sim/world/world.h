@@ -33,15 +33,18 @@ struct WorldOptions {
 
   void declare(ParameterTable& table) {
     table.number("seed", seed, "1", Range::notNegative(), "seed of noise and scatter");
-    table.number("substeps", substeps, "1", Range::closed(1, 64), "integration steps per sample of 1/25600 s");
+    table.number("substeps", substeps, "1", Range::closed(1, 64),
+                 "integration steps per sample of 1/25600 s");
     table.number("tap_peak", tap_peak, "N", Range::closed(1.0, 1e5), "peak of a hit on the workpiece");
-    table.number("tap_contact", tap_contact, "s", Range::closed(1e-5, 1e-2), "contact time of a hit on the workpiece");
+    table.number("tap_contact", tap_contact, "s", Range::closed(1e-5, 1e-2),
+                 "contact time of a hit on the workpiece");
     table.number("operator_delay", operator_delay, "s", Range::closed(0.0, 60.0),
                  "delay of a manual hit on the workpiece after its request; 0: automatic hammer");
     table.number("force_scatter", force_scatter, "1", Range::closed(0.0, 0.5),
                  "standard deviation of a hit's peak, relative to its nominal value");
-    table.number("load_step", load_step, "V", Range::closed(0.0, 1.0),
-                 "resolution of the loads that the controller reports, on the load meter's scale; 0: not rounded");
+    table.number(
+        "load_step", load_step, "V", Range::closed(0.0, 1.0),
+        "resolution of the loads that the controller reports, on the load meter's scale; 0: not rounded");
     table.number("servo_trigger", servo_trigger, "1", Range::notNegative(),
                  "N word of the block that sets the trigger in daq/servo; 0: none");
     table.part("hammer_", hammer);
@@ -54,7 +57,9 @@ struct WorldOptions {
   void validate() const;
 };
 
-/// A complete machine under its controller: axes, spindle, tool in stock, force sensor under the stock, hammer station next to it, load meter. It advances in sample blocks; time is the running sample index over the sample rate.
+/// A complete machine under its controller: axes, spindle, tool in stock, force sensor under the stock,
+/// hammer station next to it, load meter. It advances in sample blocks; time is the running sample index over
+/// the sample rate.
 class World {
  public:
   static constexpr double SAMPLE_RATE = 25600.0;  ///< [Hz]
@@ -63,20 +68,20 @@ class World {
 
   /// Sensor signals and true values; stamps [s] count from sample 0.
   struct Block {
-    SampleBlock hammer;       ///< hammer [N] positive in compression, gap [V]; gap_cross [V] if present
-    SampleBlock dynamometer;  ///< fx, fy, fz [N]; with a plate also mx, my, mz [N m]
+    SampleBlock hammer;         ///< hammer [N] positive in compression, gap [V]; gap_cross [V] if present
+    SampleBlock dynamometer;    ///< fx, fy, fz [N]; with a plate also mx, my, mz [N m]
     SampleBlock spindle_force;  ///< x1 .. z2 [N]; no channels without these sensors
     std::array<SpindleAngle, ANGLES> angle;
-    ForceBlock force;       ///< true cutting force on the tool
-    SampleBlock vibration;  ///< true displacement of the tip, x, y [m]
-    SampleBlock servo;      ///< ServoRecorder's: spindle load and axis currents at 1 kHz
-    SampleBlock
-        motor_current;  ///< MotorCurrents': phase currents at 1 kHz; no channels if they are off
+    ForceBlock force;           ///< true cutting force on the tool
+    SampleBlock vibration;      ///< true displacement of the tip, x, y [m]
+    SampleBlock servo;          ///< ServoRecorder's: spindle load and axis currents at 1 kHz
+    SampleBlock motor_current;  ///< MotorCurrents': phase currents at 1 kHz; no channels if they are off
     double spindle_load = 0.0;  ///< [1] indicated load at the end, 1 is full scale
   };
   enum class StrikeAnswer { ok, by_hand, failed };
 
-  /// @throws Error naming a missing section of the model: tool, spindle, axes or cutting. Hammer and workpiece are optional.
+  /// @throws Error naming a missing section of the model: tool, spindle, axes or cutting. Hammer and
+  /// workpiece are optional.
   World(const MachineModel& model, const WorldOptions& options);
   ~World();
   World(const World&) = delete;
@@ -88,10 +93,13 @@ class World {
   /// Drive-point receptances of the tool tip, from the model or from the hammer station's beam.
   const ToolTip& toolTip() const;
 
-  /// Fires a hammer once. Thread-safe. @param point tool or force_sensor @param message receives one line of text
+  /// Fires a hammer once. Thread-safe. @param point tool or force_sensor @param message receives one line of
+  /// text
   StrikeAnswer strike(const std::string& point, const std::string& direction, std::string& message);
 
-  /// Applies a constant force at the tool tip from now on. @param force [N] on the tool @param on_table whether it acts between tool and workpiece, so that the force sensor measures it too. Thread-safe, as the next two.
+  /// Applies a constant force at the tool tip from now on. @param force [N] on the tool @param on_table
+  /// whether it acts between tool and workpiece, so that the force sensor measures it too. Thread-safe, as
+  /// the next two.
   void pull(const std::array<double, 3>& force, bool on_table);
   /// Changes tool and holder. @param length [m] of both @throws Error if the spindle has no force sensor.
   void setToolLength(double length);
@@ -100,7 +108,8 @@ class World {
 
   /// The next BLOCK samples.
   void advance(Block& block);
-  /// The same with axes and spindle under an external controller. @param states at half a sample after each sample, BLOCK values
+  /// The same with axes and spindle under an external controller. @param states at half a sample after each
+  /// sample, BLOCK values
   void advance(Block& block, const std::vector<MotionState>& states);
 
   /// Skips samples: the index advances, the machine does not move.
