@@ -39,7 +39,7 @@ std::array<double, 3> meansUnder(SpindleSensor& sensor, const std::array<double,
 }
 
 // Burzoni Table 3 at the 139 mm of his Table 2; three digits of the defaults.
-TEST(SpindleSensor, ShowsTable3AtItsLength) {
+TEST(SpindleSensor, MatchesTable3AtItsLength) {
   SpindleSensor sensor(quiet(), STEP, RATE, 1);
   const auto x = meansUnder(sensor, {100.0, 0.0, 0.0});
   const auto y = meansUnder(sensor, {0.0, 100.0, 0.0});
@@ -52,8 +52,9 @@ TEST(SpindleSensor, ShowsTable3AtItsLength) {
   EXPECT_NEAR(100.0 / z[2], 62.46, 0.1);
 }
 
-// The moment at the ring is force times lever: what is shown, not the constant, is a line in the length.
-TEST(SpindleSensor, ShownForceIsALineInTheLength) {
+// The moment at the ring is force times lever: the output is linear in the length, its reciprocal, the
+// constant, is not.
+TEST(SpindleSensor, MeasuredForceIsLinearInTheLength) {
   SpindleSensor sensor(quiet(), STEP, RATE, 1);
   std::array<double, 3> shown{};
   for (std::size_t k = 0; k < 3; ++k) {
@@ -66,7 +67,7 @@ TEST(SpindleSensor, ShownForceIsALineInTheLength) {
   EXPECT_THROW(sensor.setLength(1.0), Error);
 }
 
-// A longer tool hangs on softer modes; a washer without compression shows no less.
+// A longer tool lowers the modes; the output of a washer is limited where its compression ends.
 TEST(SpindleSensor, ModesFallWithLengthAndWashersUnload) {
   SpindleSensorTraits traits = quiet();
   traits.preload = {50.0, 50.0, 50.0};
@@ -104,9 +105,9 @@ TEST(SpindleSensor, NoiseGrowsFromRestToAirToCut) {
   EXPECT_NEAR(rms(1000.0, 900.0), std::hypot(0.03, 0.25, 0.01 * 900.0 * 0.195 * 0.285), 0.012);
 }
 
-// Statically the feet carry the wrench, wherever the force acts; along z the mode of a plate that cannot turn
-// is that of its mass on its springs.
-TEST(Plate, CarriesTheWrenchAndSwingsAtItsFrequency) {
+// Statically the feet carry the wrench of a force at any point; along z, without rotation, the natural
+// frequency is that of the mass on its springs.
+TEST(Plate, CarriesTheWrenchAndResonatesAtItsFrequency) {
   PlateTraits traits;
   traits.force_noise = traits.moment_noise = 0.0;
   traits.centre = {0.0, 0.0, 0.0};
@@ -118,9 +119,9 @@ TEST(Plate, CarriesTheWrenchAndSwingsAtItsFrequency) {
     shown = plate.read();
   }
   // M = r x F about the origin, r = (0.02, 0.01, 0.03).
-  const std::array<double, 6> due{
+  const std::array<double, 6> expected{
       100.0, -50.0, 30.0, 0.01 * 30.0 + 0.03 * 50.0, 0.03 * 100.0 - 0.02 * 30.0, -0.02 * 50.0 - 0.01 * 100.0};
-  for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(shown[i], due[i], 1e-6) << i;
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(shown[i], expected[i], 1e-6) << i;
   // Along z through the centre at the natural frequency: (1 + 2 i zeta) / (2 i zeta).
   Plate other(traits, STEP, 1);
   constexpr int N = 25600;
@@ -136,7 +137,7 @@ TEST(Plate, CarriesTheWrenchAndSwingsAtItsFrequency) {
   EXPECT_NEAR(std::abs(line), std::abs((1.0 + i2z) / i2z) * std::pow(std::sin(x) / x, 2), 0.3);
 }
 
-TEST(SpindleSensor, RefusesModesThatDoNotAgree) {
+TEST(SpindleSensor, RefusesListsOfDifferentLength) {
   WorldOptions options;
   options.spindle_sensor.x_damping = {0.1};
   EXPECT_THROW(options.validate(), Error);

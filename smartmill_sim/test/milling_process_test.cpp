@@ -75,12 +75,12 @@ TEST(MillingProcess, rigidSteadyCutMatchesTheClosedForm) {
   EXPECT_LT(largestError(endMill(1, 45.0), {1.2, 1.3, 10e-3, 5e-5}, 600.0, 3973), 2e-6);
   EXPECT_LT(largestError(endMill(2, 0.0), {0.4, 2.2, 3e-3, 1e-4}, 6000.0, 1001), 2e-6);
   EXPECT_LT(largestError(endMill(4, 45.0), {0.0, PI, 70e-3, 5e-5}, 6000.0, 1001),
-            2e-6);  // lags by over a turn
+            2e-6);  // lags by more than a revolution
 }
 
-/// A way to mill: all of it by the angle that the spindle has turned.
+/// A prescribed motion of spindle and tool.
 struct Way {
-  std::function<double(double)> time;                                 // [s]
+  std::function<double(double)> time;                                 // [s] by angle of the spindle [rad]
   std::function<std::array<double, 2>(double)> centre, displacement;  // [m] by time
   std::function<double(double)> speed;                                // [rad/s] by time
   std::function<double(double)> turned;                               // [rad] by time
@@ -91,8 +91,8 @@ double derivative(const std::function<double(double)>& f, double t) {
   return (f(t + H) - f(t - H)) / (2.0 * H);
 }
 
-/// Largest difference of a prescribed way from the rule (share 0) or from the teeth's path, summed over
-/// discs, as a share of the largest force.
+/// Largest deviation from a sum over discs under a prescribed motion, relative to the largest force: with the
+/// ChipRule (share 0) or with the paths of the teeth.
 double differenceOnTheWay(const Way& way, const ToolGeometry& tool, const std::vector<double>& radius,
                           const CuttingLaw& law, double duration, double share = 0.0, bool by_path = false) {
   testing::DiscMill reference{tool, law, radius, [&](double turned) {
@@ -107,7 +107,7 @@ double differenceOnTheWay(const Way& way, const ToolGeometry& tool, const std::v
                                 return state;
                               }};
   reference.by_path = by_path;
-  if (by_path) reference.passes = 6;  // nothing that is left so long ago is met
+  if (by_path) reference.passes = 6;  // older surfaces are not in contact
   const double dt = 1e-5, depth = 1.5e-3;
   const auto motionOf = [&](double t) {
     ToolMotion motion;
@@ -130,9 +130,9 @@ double differenceOnTheWay(const Way& way, const ToolGeometry& tool, const std::v
     const CuttingForce force = process.step(motion);
     process.settle(motion.displacement);
     if (i % 41 != 7) continue;
-    const CuttingForce due = reference.force(motion.angle, 0.1, 2.9, depth, 300);
-    worst = std::max(worst, largestDifference(force, due, tool.radius()));
-    largest = std::max({largest, std::abs(due.fx), std::abs(due.fy)});
+    const CuttingForce expected = reference.force(motion.angle, 0.1, 2.9, depth, 300);
+    worst = std::max(worst, largestDifference(force, expected, tool.radius()));
+    largest = std::max({largest, std::abs(expected.fx), std::abs(expected.fy)});
   }
   return worst / largest;
 }
@@ -142,7 +142,7 @@ std::array<double, 2> shaking(double t) {
            12e-6 * std::sin(7300.0 * t + 1.0) - 10e-6}};
 }
 
-// @param feed [m] a turn
+// @param feed [m] per revolution
 Way steadyWay(double feed, std::function<std::array<double, 2>(double)> displacement) {
   constexpr double SPEED = 471.0;  // [rad/s]
   return {[](double turned) { return turned / SPEED; },
@@ -152,9 +152,9 @@ Way steadyWay(double feed, std::function<std::array<double, 2>(double)> displace
           std::move(displacement), [](double) { return SPEED; }, [](double t) { return SPEED * t; }};
 }
 
-// Any vibration, runout and pitch: what earlier teeth left stays until the feed, or the roundness of the
-// tool, has taken it away.
-TEST(MillingProcess, isTheRuleSummedOverDiscs) {
+// Any vibration, runout and pitch: the surface of earlier teeth remains until the feed or the tool's
+// curvature has removed it.
+TEST(MillingProcess, matchesTheChipRuleSummedOverDiscs) {
   const Way way = steadyWay(4.0 * 3e-5, shaking);
   ToolGeometry tool = endMill(4, 30.0);
   EXPECT_LT(differenceOnTheWay(way, tool, {0, 0, 0, 0}, aluminium(), 0.12), 0.01);
@@ -170,8 +170,8 @@ std::array<double, 2> swinging(double t) {
   return {{60e-6 * std::sin(5200.0 * t), 90e-6 * std::sin(4700.0 * t)}};
 }
 
-// Before the whole of its path, what a tooth left is met where it was when it passed beside the ray.
-TEST(MillingProcess, whatTeethLeaveByTheirPath) {
+// With the full path of the teeth: a surface is met at the angle at which its tooth crossed the ray.
+TEST(MillingProcess, surfacesFollowThePathsOfTheTeeth) {
   const Way way = steadyWay(4.0 * 2e-4, swinging);
   ToolGeometry tool = endMill(4, 30.0);
   const std::vector<double> even(4, 0.0);
@@ -187,7 +187,7 @@ TEST(MillingProcess, whatTeethLeaveByTheirPath) {
 // The spindle runs up and the feed turns into a curve at the same time.
 TEST(MillingProcess, speedAndFeedMayChange) {
   const double begin = 400.0, rise = 1200.0, feed = 9e-3, bend = 4.0;
-  // turned = begin t + rise t^2 / 2; before the beginning all went on as at it.
+  // turned = begin t + rise t^2 / 2; constant speed and feed before t = 0.
   const auto speed = [=](double t) { return t < 0.0 ? begin : begin + rise * t; };
   const auto turned = [=](double t) { return t < 0.0 ? begin * t : begin * t + 0.5 * rise * t * t; };
   const auto time = [=](double angle) {
@@ -206,8 +206,7 @@ TEST(MillingProcess, speedAndFeedMayChange) {
       0.01);
 }
 
-// A steady stretch after a change is the same as one without it, once the teeth no longer meet what was
-// before.
+// Steady cutting after a change equals that without it, once the earlier surfaces are cut away.
 TEST(MillingProcess, aChangeIsForgotten) {
   const double speed = 500.0, dt = 1e-5, feed = 4.0 * 5e-5 * speed / TWO_PI;
   const ToolGeometry tool = endMill(4, 30.0);
@@ -233,7 +232,7 @@ TEST(MillingProcess, aChangeIsForgotten) {
   }
 }
 
-/// Growth of the vibration of a tool with one mode: size over the last quarter of a cut over that over the
+/// Growth of the vibration of a tool with one mode: its norm in the last quarter of a cut over that in the
 /// second quarter.
 double growth(double depth, double rpm, bool both_axes, int steps_per_rev, Feed steadiness = Feed::any) {
   // Insperger's benchmark: m 0.03993 kg, 922 Hz, damping ratio 0.011, 2 teeth, Kt 6e8, Kn 2e8 N/m2.
@@ -245,7 +244,7 @@ double growth(double depth, double rpm, bool both_axes, int steps_per_rev, Feed 
   if (both_axes) model.tool_tip.y.modes = {mode};
   const double speed = units::radPerSecFromRpm(rpm), dt = TWO_PI / speed / steps_per_rev;
   CuttingMachine machine(model, dt, steadiness);
-  const double feed = 2e-4 * 2.0 * speed / TWO_PI;  // large: the tool must not leave the cut
+  const double feed = 2e-4 * 2.0 * speed / TWO_PI;  // large, so that the tool does not leave the cut
   CuttingMachine::Input input;
   input.motion = motionAt(0.0, speed, feed);
   machine.engage({{0.0, PI, depth}}, input.motion);
@@ -253,11 +252,11 @@ double growth(double depth, double rpm, bool both_axes, int steps_per_rev, Feed 
   std::vector<double> x;
   for (int i = 0; i < revolutions * steps_per_rev; ++i) {
     input.motion = motionAt(i * dt, speed, feed);
-    // A push in the first revolution.
+    // A force pulse in the first revolution.
     input.tip_force[0] = i < steps_per_rev / 8 ? 1.0 : 0.0;
     x.push_back(machine.step(input).displacement[0]);
   }
-  // What does not repeat from revolution to revolution is the vibration that grows or dies.
+  // The difference between revolutions is the vibration that grows or decays.
   const auto size = [&](int from, int to) {
     double sum = 0.0;
     for (int i = from * steps_per_rev; i < to * steps_per_rev; ++i) {
@@ -269,8 +268,7 @@ double growth(double depth, double rpm, bool both_axes, int steps_per_rev, Feed 
   return size(3 * revolutions / 4, revolutions) / size(revolutions / 4, revolutions / 2);
 }
 
-// First limits of the oracle (converged Chebyshev collocation; see the stability oracles): slot, one mode in
-// x.
+// Stability limits by converged Chebyshev collocation (see the stability oracles): slot, one mode in x.
 TEST(CuttingMachine, chattersAboveTheStabilityLimitOnly) {
   struct Case {
     double rpm, limit;
@@ -298,8 +296,8 @@ TEST(CuttingMachine, steadyFeedChattersAtTheSameLimits) {
   EXPECT_GT(growth(1.02 * 0.0483482e-3, 6000.0, true, 2000, Feed::steady), 1.0);
 }
 
-// Four straight teeth in a slot: the squares of their sines sum to 2 of them, so that edges that only rub are
-// a damper of C b / v_c in x. The mode is overdamped, c/m times a step 2.5 and 1.3.
+// Four straight teeth in a slot: the squares of the sines of the two engaged ones sum to 1, so that rubbing
+// edges are a damper of C b / v_c in x. The mode is overdamped: c/m times the step is 2.5 and 1.3.
 TEST(CuttingMachine, rubbingEdgesAreADamper) {
   constexpr double DAMPING = 640e3, DEPTH = 2e-3, STIFFNESS = 13e6, FREQUENCY = 5000.0, RATIO = 0.03;
   MachineModel model;
@@ -329,7 +327,7 @@ TEST(CuttingMachine, rubbingEdgesAreADamper) {
   }
 }
 
-TEST(MillingProcess, runoutLetsOneToothOfTwoDoAllTheWork) {
+TEST(MillingProcess, runoutLeavesTheCutToOneToothOfTwo) {
   // Offset over half the feed: tooth 1 takes the chip of both, tooth 2 never touches.
   CuttingLaw law;
   law.coefficients = {1e9, 0.0, 0.0, 0.0, 0.0, 0.0};
@@ -346,13 +344,13 @@ TEST(MillingProcess, runoutLetsOneToothOfTwoDoAllTheWork) {
     double& peak = angle < PI ? first : second;
     peak = std::max(peak, force.torque);
   }
-  // Where the chip is thickest, ahead of the tool, its roundness adds nothing.
+  // At the thickest chip, in feed direction, the tool's curvature has no effect.
   EXPECT_NEAR(first, 1e9 * 2.0 * f * depth * 0.5 * 19.05e-3, 1e-4 * first);
   EXPECT_EQ(second, 0.0);
 }
 
-// By tables and by history the forces of a rigid tool with runout and uneven pitch are the same.
-TEST(MillingProcess, isRigidCutWithoutVibration) {
+// Tables and history give the same forces for a rigid tool with runout and variable pitch.
+TEST(MillingProcess, equalsRigidCutWithoutVibration) {
   MachineModel model;
   model.tool = ToolGeometry{3, 12e-3, units::radFromDeg(35.0), {2.0, 2.2, TWO_PI - 4.2}};
   model.cutting = CuttingCoefficients{953e6, 357e6, 188e6, 17.3e3, 17.7e3, 0.72e3};
@@ -376,15 +374,16 @@ TEST(MillingProcess, isRigidCutWithoutVibration) {
   EXPECT_LT(std::sqrt(squares / steps), 0.02);
 }
 
-TEST(MillingProcess, refusesContactThatCannotBe) {
+TEST(MillingProcess, refusesInvalidContact) {
   CuttingLaw law;
   MillingProcess process(endMill(2, 0.0), law, 1e-5);
   const ToolMotion turning = motionAt(0.0, 100.0, 0.0);
   EXPECT_THROW(process.engage({{0.5, 0.5, 1e-3}}, turning), Error);
   EXPECT_THROW(process.engage({{0.0, 7.0, 1e-3}}, turning), Error);
   EXPECT_THROW(process.engage({{0.0, 1.0, 0.0}}, turning), Error);
-  EXPECT_THROW(process.engage({{0.0, PI, 1e-3}}, {}), Error);                            // the spindle stands
-  EXPECT_THROW(process.engage({{0.0, PI, 1e-3}}, motionAt(0.0, 200000.0, 0.0)), Error);  // two steps a tooth
+  EXPECT_THROW(process.engage({{0.0, PI, 1e-3}}, {}), Error);  // the spindle is at rest
+  EXPECT_THROW(process.engage({{0.0, PI, 1e-3}}, motionAt(0.0, 200000.0, 0.0)),
+               Error);  // less than two steps per tooth
   EXPECT_THROW(MillingProcess(endMill(2, 0.0), law, 1e-5, {1e-6}), Error);
 }
 
