@@ -58,7 +58,7 @@ TEST(AxesTrack, AxesOfASilentControllerAreAtRest) {
   AxesTrack track;
   EXPECT_EQ(track.at(3.0).position[0], 0.0);
   track.push(block(10.0, 11));
-  track.stand(10.2);
+  track.holdUntil(10.2);
   EXPECT_EQ(*track.newest(), 10.2);
   EXPECT_EQ(track.at(10.1).velocity[0], 0.0);
   // The motion restarts at another position: nothing is interpolated to it.

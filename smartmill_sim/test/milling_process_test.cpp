@@ -60,7 +60,7 @@ double largestError(const ToolGeometry& tool, const Engagement& cut, double rpm,
   for (int i = 0; i < 3 * steps_per_rev; ++i) {
     const ToolMotion motion = motionAt(i * dt, speed, feed);
     const CuttingForce f = process.step(motion), e = closed.at(motion.angle);
-    process.settle({{0.0, 0.0}});
+    process.endStep({{0.0, 0.0}});
     worst = std::max(worst, largestDifference(f, e, tool.radius()));
     largest = std::max({largest, std::abs(e.fx), std::abs(e.fy)});
   }
@@ -79,7 +79,7 @@ TEST(MillingProcess, rigidSteadyCutMatchesTheClosedForm) {
 }
 
 /// A prescribed motion of spindle and tool.
-struct Way {
+struct PrescribedMotion {
   std::function<double(double)> time;                                 // [s] by angle of the spindle [rad]
   std::function<std::array<double, 2>(double)> centre, displacement;  // [m] by time
   std::function<double(double)> speed;                                // [rad/s] by time
@@ -93,17 +93,18 @@ double derivative(const std::function<double(double)>& f, double t) {
 
 /// Largest deviation from a sum over discs under a prescribed motion, relative to the largest force: with the
 /// ChipRule (share 0) or with the paths of the teeth.
-double differenceOnTheWay(const Way& way, const ToolGeometry& tool, const std::vector<double>& radius,
-                          const CuttingLaw& law, double duration, double share = 0.0, bool by_path = false) {
+double largestDeviation(const PrescribedMotion& path, const ToolGeometry& tool,
+                        const std::vector<double>& radius, const CuttingLaw& law, double duration,
+                        double share = 0.0, bool by_path = false) {
   testing::DiscMill reference{tool, law, radius, [&](double turned) {
-                                const double t = way.time(turned);
-                                testing::DiscMill::State state{turned, way.centre(t), {{0.0, 0.0}}};
-                                state.speed = way.speed(t);
+                                const double t = path.time(turned);
+                                testing::DiscMill::State state{turned, path.centre(t), {{0.0, 0.0}}};
+                                state.speed = path.speed(t);
                                 if (t < 0.0) return state;
-                                state.displacement = way.displacement(t);
+                                state.displacement = path.displacement(t);
                                 for (std::size_t i = 0; i < 2; ++i)
                                   state.rate[i] =
-                                      derivative([&](double s) { return way.displacement(s)[i]; }, t);
+                                      derivative([&](double s) { return path.displacement(s)[i]; }, t);
                                 return state;
                               }};
   reference.by_path = by_path;
@@ -111,14 +112,14 @@ double differenceOnTheWay(const Way& way, const ToolGeometry& tool, const std::v
   const double dt = 1e-5, depth = 1.5e-3;
   const auto motionOf = [&](double t) {
     ToolMotion motion;
-    motion.angle = way.turned(t);
-    motion.speed = way.speed(t);
-    motion.centre = way.centre(t);
+    motion.angle = path.turned(t);
+    motion.speed = path.speed(t);
+    motion.centre = path.centre(t);
     for (std::size_t i = 0; i < 2; ++i)
-      motion.velocity[i] = derivative([&](double s) { return way.centre(s)[i]; }, t);
-    motion.displacement = way.displacement(t);
+      motion.velocity[i] = derivative([&](double s) { return path.centre(s)[i]; }, t);
+    motion.displacement = path.displacement(t);
     for (std::size_t i = 0; i < 2; ++i)
-      motion.rate[i] = derivative([&](double s) { return way.displacement(s)[i]; }, t);
+      motion.rate[i] = derivative([&](double s) { return path.displacement(s)[i]; }, t);
     return motion;
   };
   MillingProcess process(tool, law, dt, radius, share);
@@ -128,7 +129,7 @@ double differenceOnTheWay(const Way& way, const ToolGeometry& tool, const std::v
   for (int i = 0; i < steps; ++i) {
     const ToolMotion motion = motionOf(i * dt);
     const CuttingForce force = process.step(motion);
-    process.settle(motion.displacement);
+    process.endStep(motion.displacement);
     if (i % 41 != 7) continue;
     const CuttingForce expected = reference.force(motion.angle, 0.1, 2.9, depth, 300);
     worst = std::max(worst, largestDifference(force, expected, tool.radius()));
@@ -143,7 +144,7 @@ std::array<double, 2> shaking(double t) {
 }
 
 // @param feed [m] per revolution
-Way steadyWay(double feed, std::function<std::array<double, 2>(double)> displacement) {
+PrescribedMotion steadyPath(double feed, std::function<std::array<double, 2>(double)> displacement) {
   constexpr double SPEED = 471.0;  // [rad/s]
   return {[](double turned) { return turned / SPEED; },
           [=](double t) {
@@ -155,15 +156,15 @@ Way steadyWay(double feed, std::function<std::array<double, 2>(double)> displace
 // Any vibration, runout and pitch: the surface of earlier teeth remains until the feed or the tool's
 // curvature has removed it.
 TEST(MillingProcess, matchesTheChipRuleSummedOverDiscs) {
-  const Way way = steadyWay(4.0 * 3e-5, shaking);
+  const PrescribedMotion path = steadyPath(4.0 * 3e-5, shaking);
   ToolGeometry tool = endMill(4, 30.0);
-  EXPECT_LT(differenceOnTheWay(way, tool, {0, 0, 0, 0}, aluminium(), 0.12), 0.01);
+  EXPECT_LT(largestDeviation(path, tool, {0, 0, 0, 0}, aluminium(), 0.12), 0.01);
   tool.pitch = {1.5, 1.65, 1.55, TWO_PI - 4.7};
   CuttingLaw law = aluminium();
   law.damping = 2e5;
   law.size_exponent = 0.15;
   law.edge_chip = 4e-6;
-  EXPECT_LT(differenceOnTheWay(way, tool, {0.0, 14e-6, -6e-6, 5e-6}, law, 0.12), 0.01);
+  EXPECT_LT(largestDeviation(path, tool, {0.0, 14e-6, -6e-6, 5e-6}, law, 0.12), 0.01);
 }
 
 std::array<double, 2> swinging(double t) {
@@ -172,16 +173,15 @@ std::array<double, 2> swinging(double t) {
 
 // With the full path of the teeth: a surface is met at the angle at which its tooth crossed the ray.
 TEST(MillingProcess, surfacesFollowThePathsOfTheTeeth) {
-  const Way way = steadyWay(4.0 * 2e-4, swinging);
+  const PrescribedMotion path = steadyPath(4.0 * 2e-4, swinging);
   ToolGeometry tool = endMill(4, 30.0);
   const std::vector<double> even(4, 0.0);
-  EXPECT_LT(differenceOnTheWay(way, tool, even, aluminium(), 0.06, 1.0, true), 0.01);
-  const double by_rule = differenceOnTheWay(way, tool, even, aluminium(), 0.06, 0.0, true);
+  EXPECT_LT(largestDeviation(path, tool, even, aluminium(), 0.06, 1.0, true), 0.01);
+  const double by_rule = largestDeviation(path, tool, even, aluminium(), 0.06, 0.0, true);
   EXPECT_GT(by_rule, 0.1);
-  EXPECT_NEAR(differenceOnTheWay(way, tool, even, aluminium(), 0.06, 0.5, true), 0.5 * by_rule,
-              0.1 * by_rule);
+  EXPECT_NEAR(largestDeviation(path, tool, even, aluminium(), 0.06, 0.5, true), 0.5 * by_rule, 0.1 * by_rule);
   tool.pitch = {1.5, 1.65, 1.55, TWO_PI - 4.7};
-  EXPECT_LT(differenceOnTheWay(way, tool, {0.0, 14e-6, -6e-6, 5e-6}, aluminium(), 0.06, 1.0, true), 0.01);
+  EXPECT_LT(largestDeviation(path, tool, {0.0, 14e-6, -6e-6, 5e-6}, aluminium(), 0.06, 1.0, true), 0.01);
 }
 
 // The spindle runs up and the feed turns into a curve at the same time.
@@ -198,12 +198,11 @@ TEST(MillingProcess, speedAndFeedMayChange) {
     return std::array<double, 2>{
         {feed / bend * std::sin(bend * t), feed / bend * (1.0 - std::cos(bend * t))}};
   };
-  const Way way{time, centre, shaking, speed, turned};
-  EXPECT_LT(differenceOnTheWay(way, endMill(4, 30.0), {0.0, 14e-6, -6e-6, 5e-6}, aluminium(), 0.12), 0.01);
-  const Way wide{time, centre, swinging, speed, turned};
-  EXPECT_LT(
-      differenceOnTheWay(wide, endMill(4, 30.0), {0.0, 14e-6, -6e-6, 5e-6}, aluminium(), 0.06, 1.0, true),
-      0.01);
+  const PrescribedMotion path{time, centre, shaking, speed, turned};
+  EXPECT_LT(largestDeviation(path, endMill(4, 30.0), {0.0, 14e-6, -6e-6, 5e-6}, aluminium(), 0.12), 0.01);
+  const PrescribedMotion wide{time, centre, swinging, speed, turned};
+  EXPECT_LT(largestDeviation(wide, endMill(4, 30.0), {0.0, 14e-6, -6e-6, 5e-6}, aluminium(), 0.06, 1.0, true),
+            0.01);
 }
 
 // Steady cutting after a change equals that without it, once the earlier surfaces are cut away.
@@ -224,8 +223,8 @@ TEST(MillingProcess, aChangeIsForgotten) {
     slower.centre[0] -= 0.6 * feed * std::min(t, 4000 * dt);
     motion.displacement = slower.displacement = shaking(t);
     const CuttingForce a = steady.step(motion), b = changed.step(slower);
-    steady.settle(motion.displacement);
-    changed.settle(slower.displacement);
+    steady.endStep(motion.displacement);
+    changed.endStep(slower.displacement);
     if (i > 14000) {
       ASSERT_LT(largestDifference(a, b, tool.radius()), 1e-3) << i;
     }
@@ -315,15 +314,15 @@ TEST(CuttingMachine, rubbingEdgesAreADamper) {
     CuttingMachine::Input input;
     input.motion = motionAt(0.0, speed, 1e-2);
     machine.engage({{0.0, PI, DEPTH}}, input.motion);
-    std::complex<double> shown = 0.0;
+    std::complex<double> response = 0.0;
     const auto steps = static_cast<int>(0.2 * rate);
     for (int i = 0; i < steps; ++i) {
       input.motion = motionAt(i / rate, speed, 1e-2);
       input.tip_force[0] = std::cos(w * i / rate);
       const double x = machine.step(input).displacement[0];
-      if (2 * i >= steps) shown += x * std::polar(4.0 / steps, -w * i / rate);
+      if (2 * i >= steps) response += x * std::polar(4.0 / steps, -w * i / rate);
     }
-    EXPECT_LT(std::abs(shown / compliance - 1.0), 0.02) << rate;
+    EXPECT_LT(std::abs(response / compliance - 1.0), 0.02) << rate;
   }
 }
 
@@ -339,7 +338,7 @@ TEST(MillingProcess, runoutLeavesTheCutToOneToothOfTwo) {
   for (int i = 0; i < 5000; ++i) {
     const ToolMotion motion = motionAt(i * dt, speed, feed);
     const CuttingForce force = process.step(motion);
-    process.settle({{0.0, 0.0}});
+    process.endStep({{0.0, 0.0}});
     const double angle = std::fmod(motion.angle, TWO_PI);
     double& peak = angle < PI ? first : second;
     peak = std::max(peak, force.torque);

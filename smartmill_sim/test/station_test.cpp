@@ -219,7 +219,7 @@ TEST(GapSensor, IntegratesOverACylinder) {
   for (const double diameter : {40e-3, 20e-3, 10e-3, 6e-3}) {
     const ToolSurface surface(traits, mill(4, diameter), 0.0);
     GapSensor sensor(traits, station, 0.5 * PI);
-    sensor.face(surface, 0.3, 0.0, 0.0);
+    sensor.setTarget(surface, 0.3, 0.0, 0.0);
     const double r = 1.5e-3, R = 0.5 * diameter, g = 200e-6;
     double capacity = 0.0;
     constexpr int STEPS = 4000;
@@ -242,16 +242,16 @@ TEST(GapSensor, APointSensorAtAnEdgeHasTheNominalCurve) {
   const smartmill::HammerStation station = stationModel();
   const ToolSurface surface(traits, mill(4, 19e-3), station.flute_depth);
   GapSensor sensor(traits, station, 0.5 * PI);
-  sensor.face(surface, 0.5 * PI, 0.0, 0.0);
+  sensor.setTarget(surface, 0.5 * PI, 0.0, 0.0);
   for (const double gap : {150e-6, 250e-6, 500e-6})
     EXPECT_NEAR(sensor.voltage(gap), 10.0 * (250e-6 / gap - 1.0), 1e-9);
   // Halfway to the next tooth: nearly the floor of the flute.
-  sensor.face(surface, 0.25 * PI, 0.0, 0.0);
+  sensor.setTarget(surface, 0.25 * PI, 0.0, 0.0);
   EXPECT_NEAR(sensor.clearance(100e-6), 1.1e-3, 0.02e-3);
   // Helix: at a height z the edge faces the sensor after a further rotation of the spindle by z tan(helix) /
   // R.
   const double lag = 7.5e-3 * std::tan(units::radFromDeg(30.0)) / 9.5e-3;
-  sensor.face(surface, 0.5 * PI + lag, 7.5e-3, 0.0);
+  sensor.setTarget(surface, 0.5 * PI + lag, 7.5e-3, 0.0);
   EXPECT_NEAR(sensor.clearance(100e-6), 100e-6, 1e-9);
 }
 
@@ -263,9 +263,9 @@ TEST(GapSensor, LowTeethEccentricityAndHousing) {
   const smartmill::HammerStation station = stationModel();
   const ToolSurface surface(traits, mill(4, 19e-3), station.flute_depth);
   GapSensor sensor(traits, station, 0.0);
-  sensor.face(surface, 0.0, 0.0, 0.0);  // tooth 1, at the eccentric side
+  sensor.setTarget(surface, 0.0, 0.0, 0.0);  // tooth 1, at the eccentric side
   EXPECT_NEAR(sensor.clearance(100e-6), 80e-6, 1e-9);
-  sensor.face(surface, -0.5 * PI, 0.0, 0.0);  // tooth 2
+  sensor.setTarget(surface, -0.5 * PI, 0.0, 0.0);  // tooth 2
   EXPECT_NEAR(sensor.clearance(100e-6), 130e-6, 1e-6);
   // Ten teeth: between two of them the sensor's centre faces the floor, its housing the edges.
   StationTraits round;
@@ -275,12 +275,12 @@ TEST(GapSensor, LowTeethEccentricityAndHousing) {
   straight.helix = 0.0;
   const ToolSurface many(round, straight, 1e-3);
   GapSensor between(round, station, 0.0);
-  between.face(many, units::radFromDeg(18.0), 0.0, 0.0);
+  between.setTarget(many, units::radFromDeg(18.0), 0.0, 0.0);
   const double edge = 9.5e-3 * (1.0 - std::cos(units::radFromDeg(18.0)));
   EXPECT_NEAR(between.clearance(0.0), edge, 60e-6);  // spots of 0.3 mm on a steep flank
   EXPECT_LT(between.voltage(250e-6), -7.0);
   // Up to the upper end of the housing the helix shifts an edge by 17.4 of these 18 degrees.
-  between.face(ToolSurface(round, mill(10, 19e-3), 1e-3), units::radFromDeg(18.0), 0.0, 0.0);
+  between.setTarget(ToolSurface(round, mill(10, 19e-3), 1e-3), units::radFromDeg(18.0), 0.0, 0.0);
   EXPECT_NEAR(between.clearance(0.0), 0.0, 30e-6);
 }
 

@@ -182,18 +182,18 @@ TEST(Twin, singleChannelsEqualThoseOfTheRecord) {
   sensor.force_sensor.axis[0].modes.front().frequency *= 1.1;
   delayed.effects = {effectEntry("channel_delay", {{"delay_us", 30.0}}, {{"channel", "fy"}})};
   mixed.effects = {effectEntry("cross_talk", {{"xy", 0.1}})};
-  EXPECT_FALSE(channelsApart(mixed));
+  EXPECT_FALSE(channelsAreIndependent(mixed));
   mixed.effects = {effectEntry("empirical:resonance",
                                {{"frequency_hz", 870.0}, {"damping_ratio", 0.03}, {"gain", 0.3}},
                                {{"channel", "fz"}, {"from", "fx"}})};
-  EXPECT_FALSE(channelsApart(mixed));
+  EXPECT_FALSE(channelsAreIndependent(mixed));
   SimulationOptions options;
   options.noise = false;
   options.phase = 1.0;
   const std::vector<std::string> channels{"fx", "fy", "fz", "tool_x", "tool_y"};
   const Record nominal = simulateTest(first, test, blank(), options);
   for (const MachineModel& model : {sensor, delayed}) {
-    ASSERT_TRUE(channelsApart(model));
+    ASSERT_TRUE(channelsAreIndependent(model));
     options.channels = nullptr;
     const Record all = simulateTest(model, test, blank(), options);
     for (const std::string& c : channels) {
@@ -381,11 +381,11 @@ std::map<std::string, std::vector<EffectEntry>> hiddenEffects() {
 }
 
 /// Residual of a channel with the true model, in units of its noise.
-struct Left {
+struct Residual {
   double squares = 0.0;
   std::size_t samples = 0;
 
-  void add(const Left& other) {
+  void add(const Residual& other) {
     squares += other.squares;
     samples += other.samples;
   }
@@ -394,15 +394,15 @@ struct Left {
   double limit() const { return std::max(1.05, 1.0 + 4.0 / std::sqrt(2.0 * static_cast<double>(samples))); }
 };
 
-Left leftOf(const Record& measured, const Record& simulated, const std::string& channel, double noise,
-            std::size_t from, std::size_t to) {
-  Left left;
+Residual residualOf(const Record& measured, const Record& simulated, const std::string& channel, double noise,
+                    std::size_t from, std::size_t to) {
+  Residual residual;
   const std::vector<double>&m = measured.column(channel), &s = simulated.column(channel);
   for (std::size_t i = from; i < std::min(to, m.size()); ++i) {
-    left.squares += std::pow((m[i] - s[i]) / noise, 2);
-    ++left.samples;
+    residual.squares += std::pow((m[i] - s[i]) / noise, 2);
+    ++residual.samples;
   }
-  return left;
+  return residual;
 }
 
 /// Noise RMS that the campaigns state: 1 N, 0.22 mV with the rounding, 0.05 um.
@@ -437,29 +437,30 @@ TEST(Twin, residualOfIndependentCampaignsIsTheirNoise) {
     model.effects = effects;
     SimulationOptions options;
     options.noise = false;
-    std::map<std::string, Left> whole;
+    std::map<std::string, Residual> whole;
     std::size_t checked = 0;
     for (const CampaignTest& test : campaign.tests) {
       const Record measured = readRecord(campaign, test);
       const Record simulated = simulateTest(model, test, measured, options);
       for (const auto& [channel, noise] : statedNoise()) {
         if (!measured.has(channel)) continue;
-        const Left left = leftOf(measured, simulated, channel, noise, 0, measured.size());
-        whole[channel].add(left);
-        EXPECT_LE(left.gap(), allowedGap(name, test, channel)) << name << " " << test.name << " " << channel;
+        const Residual residual = residualOf(measured, simulated, channel, noise, 0, measured.size());
+        whole[channel].add(residual);
+        EXPECT_LE(residual.gap(), allowedGap(name, test, channel))
+            << name << " " << test.name << " " << channel;
         ++checked;
         if (test.kind != TestKind::cut) continue;
         const auto begin = static_cast<std::size_t>(*test.engage_time * test.sample_rate);
         const double turn = units::TWO_PI / test.spindle_speed * test.sample_rate;
-        const Left first =
-            leftOf(measured, simulated, channel, noise, begin, begin + static_cast<std::size_t>(2.0 * turn));
+        const Residual first = residualOf(measured, simulated, channel, noise, begin,
+                                          begin + static_cast<std::size_t>(2.0 * turn));
         EXPECT_LE(first.gap(), first.limit())
             << name << " " << test.name << " " << channel << ", first revolutions";
       }
     }
     const bool vibrates = !model.tool_tip.x.modes.empty();
     EXPECT_EQ(checked, vibrates ? 21u * 3u + 18u + 12u * 2u : 21u * 3u + 18u) << name;
-    for (const auto& [channel, left] : whole) EXPECT_LE(left.gap(), 1.02) << name << " " << channel;
+    for (const auto& [channel, residual] : whole) EXPECT_LE(residual.gap(), 1.02) << name << " " << channel;
   }
 }
 

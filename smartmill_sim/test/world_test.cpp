@@ -87,7 +87,7 @@ TEST(Stock, ASlotIsAir) {
   Stock stock(box(), RADIUS);
   for (int k = 0; k <= 200; ++k) {
     const std::array<double, 3> at{-60e-3 + 0.6e-3 * k, 0.0, -2e-3};
-    stock.pass(at);
+    stock.cutTo(at);
     // The slot being cut is material for the tool in front.
     if (std::abs(at[0]) < 40e-3) {
       const std::vector<ContactArc> arcs = stock.contact(at, {0.01, 0.0, 0.0});
@@ -98,7 +98,7 @@ TEST(Stock, ASlotIsAir) {
   }
   // Back through it.
   EXPECT_TRUE(stock.contact({40e-3, 0.0, -2e-3}, {-0.01, 0.0, 0.0}).empty());
-  stock.pass({40e-3, 0.0, 1e-3});
+  stock.cutTo({40e-3, 0.0, 1e-3});
   // Again at the same depth and deeper: only the material below remains.
   EXPECT_TRUE(stock.contact({0.0, 0.0, -2e-3}, {0.01, 0.0, 0.0}).empty());
   const std::vector<ContactArc> deeper = stock.contact({0.0, 0.0, -3e-3}, {0.01, 0.0, 0.0});
@@ -109,18 +109,18 @@ TEST(Stock, ASlotIsAir) {
   ASSERT_EQ(beside.size(), 1u);
   EXPECT_NEAR(beside[0].entry, 0.0, 1e-9);
   EXPECT_NEAR(beside[0].exit, PI - std::acos(4e-3 / RADIUS), 1e-6);
-  EXPECT_FALSE(stock.above({0.0, 0.0, -2e-3}));
-  EXPECT_TRUE(stock.above({0.0, 0.0, -2.1e-3}));
-  EXPECT_TRUE(stock.above({0.0, 12e-3, -2e-3}));
+  EXPECT_FALSE(stock.hasMaterialAbove({0.0, 0.0, -2e-3}));
+  EXPECT_TRUE(stock.hasMaterialAbove({0.0, 0.0, -2.1e-3}));
+  EXPECT_TRUE(stock.hasMaterialAbove({0.0, 12e-3, -2e-3}));
 }
 
 // Exit at one end and entry at another, at the same depth: the material between remains.
 TEST(Stock, ASlotEndsWhereTheToolLeaves) {
   Stock stock(box(), RADIUS);
-  stock.pass({-40e-3, 40e-3, -2e-3});
-  stock.pass({60e-3, 40e-3, -2e-3});
-  stock.leave();
-  stock.pass({-60e-3, 20e-3, -2e-3});
+  stock.cutTo({-40e-3, 40e-3, -2e-3});
+  stock.cutTo({60e-3, 40e-3, -2e-3});
+  stock.endSlot();
+  stock.cutTo({-60e-3, 20e-3, -2e-3});
   const std::vector<ContactArc> arcs = stock.contact({0.0, 24e-3, -2e-3}, {0.0, -0.01, 0.0});
   ASSERT_EQ(arcs.size(), 1u);
   EXPECT_NEAR(arcs[0].entry, 0.5 * PI, 1e-9);
@@ -401,7 +401,7 @@ TEST(World, LostSamplesAreAJumpOfTheIndex) {
   World::Block b;
   world.advance(b);
   EXPECT_EQ(b.hammer.first_index, 0u);
-  world.lose(1000);
+  world.skipSamples(1000);
   world.advance(b);
   EXPECT_EQ(b.hammer.first_index, 1256u);
   EXPECT_EQ(b.dynamometer.first_index, 1256u);

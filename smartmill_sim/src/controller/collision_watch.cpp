@@ -28,25 +28,25 @@ CollisionWatch CollisionWatch::ofModel(const MachineModel& model) {
     const HammerStation& station = *model.hammer;
     for (const auto& entry : station.position) {
       const std::string& direction = entry.first;
-      const Axes3& place = entry.second;
+      const Axes3& station_position = entry.second;
       const std::size_t along = direction == "y" ? 1 : 0;
       const std::size_t across = 1 - along;
       const auto body = [&](const std::string& name, double behind, double half_width, double low,
                             double high) {
-        Body b{name + " " + direction, place, place};
-        b.low[along] = place[along] + watch.tool_radius + behind;
+        Body b{name + " " + direction, station_position, station_position};
+        b.low[along] = station_position[along] + watch.tool_radius + behind;
         b.high[along] = b.low[along] + BODY_LENGTH;
-        b.low[across] = place[across] - half_width;
-        b.high[across] = place[across] + half_width;
+        b.low[across] = station_position[across] - half_width;
+        b.high[across] = station_position[across] + half_width;
         b.low[2] = low;
         b.high[2] = high;
         watch.add(b);
       };
       const double face = FACE_GAPS * station.gap_at_zero_volt;
       // No body in front of the face: the tool turns there.
-      body("SENSOR", face, SENSOR_HALF_WIDTH, -FAR, place[2] + SENSOR_ABOVE_TIP);
-      body("HAMMER", face + PLUNGER, HAMMER_HALF_WIDTH, place[2] + SENSOR_ABOVE_TIP,
-           place[2] + station.offset + HAMMER_HALF_WIDTH);
+      body("SENSOR", face, SENSOR_HALF_WIDTH, -FAR, station_position[2] + SENSOR_ABOVE_TIP);
+      body("HAMMER", face + PLUNGER, HAMMER_HALF_WIDTH, station_position[2] + SENSOR_ABOVE_TIP,
+           station_position[2] + station.offset + HAMMER_HALF_WIDTH);
     }
   }
   if (model.workpiece) {
@@ -55,7 +55,7 @@ CollisionWatch CollisionWatch::ofModel(const MachineModel& model) {
   return watch;
 }
 
-const CollisionWatch::Body* CollisionWatch::touched(const Axes3& position, bool turning) const {
+const CollisionWatch::Body* CollisionWatch::collidingBody(const Axes3& position, bool turning) const {
   const double radius = turning ? tool_radius : core_radius;
   for (const Body& body : bodies_) {
     if (position[2] >= body.high[2]) {

@@ -376,7 +376,7 @@ EwCode Controller::setDateTime(const focas::DateTime& date_time) {
 
 EwCode Controller::readPmc(focas::PmcArea area, int first, int last, focas::Bytes* bytes) const {
   const Lock lock(impl_->mutex);
-  impl_->machine.pmc.show(impl_->machine.signals());
+  impl_->machine.pmc.update(impl_->machine.signals());
   return impl_->machine.pmc.read(area, first, last, bytes);
 }
 
@@ -384,7 +384,7 @@ EwCode Controller::writePmc(focas::PmcArea area, int first, const focas::Bytes& 
   const Lock lock(impl_->mutex);
   const EwCode code = impl_->machine.pmc.write(area, first, bytes);
   if (area == focas::PmcArea::d) {
-    impl_->machine.followDataTable();
+    impl_->machine.updateDataTableOverrides();
   }
   return code;
 }
@@ -438,27 +438,27 @@ EwCode Controller::reset() {
 
 EwCode Controller::dncStart() {
   const Lock lock(impl_->mutex);
-  return impl_->machine.open();
+  return impl_->machine.openSession();
 }
 
 std::size_t Controller::dncData(const char* data, std::size_t size) {
   const Lock lock(impl_->mutex);
-  return impl_->machine.take(data, size);
+  return impl_->machine.receive(data, size);
 }
 
 EwCode Controller::dncEnd() {
   const Lock lock(impl_->mutex);
-  return impl_->machine.end();
+  return impl_->machine.closeSession();
 }
 
 void Controller::dncCancel(int /*result*/) {
   const Lock lock(impl_->mutex);
-  impl_->machine.cancel();
+  impl_->machine.cancelSession();
 }
 
 EwCode Controller::dncAbort() {
   const Lock lock(impl_->mutex);
-  return impl_->machine.abort();
+  return impl_->machine.takeAbortCode();
 }
 
 }  // namespace smartmill::sim

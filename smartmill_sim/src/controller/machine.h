@@ -19,18 +19,18 @@ namespace smartmill::sim {
 /// Received program text that has not run.
 class BlockBuffer {
  public:
-  std::size_t size() const { return text_.size() - at_; }
+  std::size_t size() const { return text_.size() - position_; }
   void append(const char* text, std::size_t size);
   void clear();
-  bool hasLine() const { return text_.find_first_of("\r\n", at_) != std::string::npos; }
+  bool hasLine() const { return text_.find_first_of("\r\n", position_) != std::string::npos; }
   /// The next line without its end; nullopt: no complete line.
   std::optional<std::string> takeLine();
   /// The next text, at most `most` bytes.
-  std::string ahead(std::size_t most) const { return text_.substr(at_, most); }
+  std::string preview(std::size_t most) const { return text_.substr(position_, most); }
 
  private:
   std::string text_;
-  std::size_t at_ = 0;
+  std::size_t position_ = 0;
 };
 
 /// The machine behind a Controller: panel, programs, axes, spindle. Not thread-safe.
@@ -63,17 +63,17 @@ class ControlledMachine {
   void feedHold();
   void setOverrides(double feed, double rapid, double spindle);
   /// PMC program: multiplies the overrides of the panel by the percentages of the data table.
-  void followDataTable();
+  void updateDataTableOverrides();
   focas::EwCode cycleStart();
   void alarm(const focas::AlarmMessage& message);
   void setSpindleTorque(double torque);
 
   // The DNC session.
-  focas::EwCode open();
-  std::size_t take(const char* data, std::size_t size);
-  focas::EwCode end();
-  void cancel();
-  focas::EwCode abort();
+  focas::EwCode openSession();
+  std::size_t receive(const char* data, std::size_t size);
+  focas::EwCode closeSession();
+  void cancelSession();
+  focas::EwCode takeAbortCode();
 
   // Memory.
   std::optional<double> readVariable(int number) const;
@@ -100,13 +100,13 @@ class ControlledMachine {
     double feed = 0.0;   // in units of the text, per minute or per revolution
     double speed = 0.0;  // [rad/s] commanded, without sign and override
   };
-  enum class Turn { off, forwards, backwards };
+  enum class Rotation { off, forwards, backwards };
 
   bool busy() const { return running_ || buffer_.hasLine(); }
   bool moving() const { return now_ < move_.end(); }
   void halt(focas::EwCode why);
   void haltAt(double time, focas::EwCode why);
-  void refuse(double time, const NcAlarm& alarm);
+  void raiseProgramAlarm(double time, const NcAlarm& alarm);
   void beginProgram();
   bool takeBlock(double time);
   void start(double time, const NcBlock& block);
@@ -121,22 +121,22 @@ class ControlledMachine {
   double unit() const;
   void beginMove(double time);
   void replan();
-  void goOn(double time);
-  bool followMove(double time);
+  void continueBlock(double time);
+  bool beginNextMove(double time);
   void orient(double time, double steps);
   double commandedSpeed() const;
-  void watchObstacles();
+  void checkCollision();
 
   // Time is base_ + steps_ dt_ [s].
   double now_ = 0.0, base_ = 0.0, dt_ = 0.0;
   std::uint64_t steps_ = 0;
-  double looked_ = -1.0;  // [s] last check of the obstacles
+  double checked_ = -1.0;  // [s] last check of the obstacles
 
   int mode_;
   bool emergency_ = false, held_ = false, stopped_ = false;                     // stopped: M0
   double held_since_ = 0.0;                                                     // [s]
   double feed_override_ = 1.0, rapid_override_ = 1.0, spindle_override_ = 1.0;  // set at the panel
-  double feed_share_ = 1.0, spindle_share_ = 1.0;                               // from the data table
+  double data_feed_override_ = 1.0, data_spindle_override_ = 1.0;               // from the data table
 
   PathMove move_;  // the running or last one
   bool move_rapid_ = false;
@@ -146,7 +146,7 @@ class ControlledMachine {
   };
   std::deque<Pending> pending_;  // of the running block
   SpindleMotion spindle_;
-  Turn turn_ = Turn::off;
+  Rotation rotation_ = Rotation::off;
   bool oriented_ = false;
   double torque_ = 0.0;  // [N m] of the cut
 

@@ -23,19 +23,19 @@ class NcReader {
  public:
   NcReader(const std::string& text, const NcVariables& variables) : text_(text), variables_(variables) {}
 
-  bool done() const { return at_ == text_.size(); }
-  char peek() const { return done() ? '\0' : text_[at_]; }
-  char next() { return done() ? '\0' : text_[at_++]; }
+  bool done() const { return position_ == text_.size(); }
+  char peek() const { return done() ? '\0' : text_[position_]; }
+  char next() { return done() ? '\0' : text_[position_++]; }
   /// Consumes a word at the present position. @return whether it was there
-  bool take(const std::string& word);
+  bool accept(const std::string& word);
   /// The remaining text.
-  std::string rest() const { return text_.substr(at_); }
+  std::string rest() const { return text_.substr(position_); }
 
   /// Value after an address: a number, #n or [expression], with a sign.
   std::optional<double> value(const std::string& address);
   /// An integer 0..99999999.
-  std::optional<int> whole(const std::string& address);
-  /// As whole(), but not vacant.
+  std::optional<int> integer(const std::string& address);
+  /// As integer(), but not vacant.
   int number(const std::string& address);
   /// Sum of products after "#n=".
   std::optional<double> expression();
@@ -49,7 +49,7 @@ class NcReader {
 
   const std::string& text_;
   const NcVariables& variables_;
-  std::size_t at_ = 0;
+  std::size_t position_ = 0;
   int depth_ = 0;
 };
 

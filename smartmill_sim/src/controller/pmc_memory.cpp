@@ -51,7 +51,7 @@ PmcMemory::PmcMemory() {
   for (std::size_t i = 0; i < areas_.size(); ++i) {
     areas_[i].assign(SIZES[i], 0);
   }
-  show(PmcSignals{});
+  update(PmcSignals{});
 }
 
 std::uint8_t& PmcMemory::at(PmcArea area, std::size_t address) {
@@ -65,7 +65,7 @@ void PmcMemory::put(PmcArea area, std::size_t address, std::uint32_t value, std:
   }
 }
 
-void PmcMemory::show(const PmcSignals& s) {
+void PmcMemory::update(const PmcSignals& s) {
   const auto bit = [](bool on, std::uint8_t mask) { return static_cast<std::uint8_t>(on ? mask : 0); };
   at(PmcArea::f, F_OPERATION) =
       bit(s.operating, OP) | bit(!s.emergency, SA) | bit(s.started, STL) | bit(s.held, SPL);

@@ -29,7 +29,7 @@ class PmcMemory {
  public:
   PmcMemory();
   /// Updates the bytes of the signals.
-  void show(const PmcSignals& signals);
+  void update(const PmcSignals& signals);
   focas::EwCode read(focas::PmcArea area, int first, int last, focas::Bytes* bytes) const;
   focas::EwCode write(focas::PmcArea area, int first, const focas::Bytes& bytes);
 

@@ -20,7 +20,7 @@
 
 namespace smartmill::sim {
 
-constexpr double LOOK_AGAIN = 1e-3;  // [s]
+constexpr double POLL_PERIOD = 1e-3;  // [s]
 
 /// The simulated lathe on ROS: probes on daq/displacement, an accelerometer on daq/vibration, the spindle on
 /// spindle/angle; the fast tool servo follows control/command. Runs in wall-clock time.
@@ -65,9 +65,9 @@ class LatheNode {
       Lathe::Block block;
       {
         std::unique_lock<std::mutex> lock(mutex_);
-        if (parameters_.await_commands && !lathe_.commanded(size)) {
+        if (parameters_.await_commands && !lathe_.hasCommands(size)) {
           lock.unlock();
-          std::this_thread::sleep_for(std::chrono::duration<double>(LOOK_AGAIN));
+          std::this_thread::sleep_for(std::chrono::duration<double>(POLL_PERIOD));
           continue;
         }
         block = lathe_.advance(size);

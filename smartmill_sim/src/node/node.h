@@ -42,17 +42,17 @@ class Node {
   void publish(const World::Block& block);
   void serve();
   void listen();
-  bool lead(double now, double done);
-  void tellAlarms();
+  bool updateStates(double now, double done);
+  void logAlarms();
   void publishTruth();
   bool strike(smartmill_msgs::Strike::Request& request, smartmill_msgs::Strike::Response& response);
   void addTruth(const std::string& point, const std::string& direction, const ModalModel& modes);
   /// Advertises a key of the panel. @param press returns the reason of a refusal, empty: done
   using Press = std::function<std::string(const smartmill_msgs::PanelKey::Request&)>;
-  void offer(const std::string& key, std::size_t values, Press press);
-  void offerPanel();
+  void advertiseKey(const std::string& key, std::size_t values, Press press);
+  void advertisePanel();
   /// Manual actions of an operator: weights on the tool, change of the tool, another tap point.
-  void offerHands();
+  void advertiseManualActions();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   ros::NodeHandle nh_;
@@ -76,7 +76,7 @@ class Node {
   std::mutex axes_mutex_;  // of the track
   AxesTrack axes_;
   std::vector<MotionState> states_;
-  std::string told_alarm_;
+  std::string logged_alarm_;
 
   std::atomic<bool> stopping_{false};
   std::thread thread_;

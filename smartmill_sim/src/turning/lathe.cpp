@@ -85,9 +85,9 @@ double Lathe::servo() {
   }
   delayed_.push_front(commanded_);
   const auto delay = static_cast<std::size_t>(std::lround(traits_.servo_delay * traits_.rate));
-  const double taken = delayed_.size() > delay ? delayed_[delay] : 0.0;
+  const double delayed = delayed_.size() > delay ? delayed_[delay] : 0.0;
   if (delayed_.size() > delay + 1) delayed_.pop_back();
-  return servo_filter_.step(taken);
+  return servo_filter_.step(delayed);
 }
 
 double Lathe::force(double chip) const {
@@ -136,9 +136,9 @@ Lathe::Block Lathe::advance(std::size_t count) {
     last_force_ = acting;
     block.displacement.samples.push_back(deflection + traits_.probe_noise * normal_(random_));
     block.displacement.samples.push_back(tool_ + traits_.probe_noise * normal_(random_));
-    const double shaken = machine_.acceleration() + traits_.accelerometer_noise * normal_(random_);
-    block.displacement.samples.push_back(shaken);
-    block.vibration.samples.push_back(shaken);
+    const double acceleration = machine_.acceleration() + traits_.accelerometer_noise * normal_(random_);
+    block.displacement.samples.push_back(acceleration);
+    block.vibration.samples.push_back(acceleration);
     block.motion.push_back(motion);
     block.force.push_back(acting);
   }

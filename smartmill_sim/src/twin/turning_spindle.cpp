@@ -23,19 +23,19 @@ ModalModel TurningSpindle::at(double speed, const ModalModel& standing) const {
     mode.damping_ratio *= damping;
     mode.gain /= stiffness;
   }
-  const double apart = gyroscopic * share;
-  if (turning.modes.empty() || apart == 0.0) return turning;
-  const Mode whole = turning.modes.front();
-  const double middle = std::hypot(1.0, apart), backward = middle - apart, forward = middle + apart;
-  Mode parts[2] = {whole, whole};
+  const double split = gyroscopic * share;
+  if (turning.modes.empty() || split == 0.0) return turning;
+  const Mode original = turning.modes.front();
+  const double middle = std::hypot(1.0, split), backward = middle - split, forward = middle + split;
+  Mode whirl[2] = {original, original};
   for (int i = 0; i < 2; ++i) {
-    const double place = i == 0 ? backward : forward;
-    parts[i].frequency = whole.frequency * place;
-    parts[i].damping_ratio = whole.damping_ratio / middle;
-    parts[i].gain = whole.gain / (place * 2.0 * middle);
+    const double ratio = i == 0 ? backward : forward;
+    whirl[i].frequency = original.frequency * ratio;
+    whirl[i].damping_ratio = original.damping_ratio / middle;
+    whirl[i].gain = original.gain / (ratio * 2.0 * middle);
   }
-  turning.modes.front() = parts[0];
-  turning.modes.insert(turning.modes.begin() + 1, parts[1]);
+  turning.modes.front() = whirl[0];
+  turning.modes.insert(turning.modes.begin() + 1, whirl[1]);
   return turning;
 }
 

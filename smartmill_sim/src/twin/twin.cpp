@@ -21,7 +21,7 @@
 #include "smartmill_sim/twin/burst_times.h"
 #include "smartmill_sim/twin/cut_traces.h"
 #include "smartmill_sim/twin/cutting_machine.h"
-#include "smartmill_sim/twin/guide.h"
+#include "smartmill_sim/twin/tip_trajectory.h"
 
 namespace smartmill::sim {
 namespace {
@@ -30,7 +30,7 @@ const std::array<const char*, 2> TIP{{"tool_x", "tool_y"}};
 
 // Lead-in before a record of a running cut. The depth of cut grows over its first part: a sudden full cut
 // would excite a long transient.
-constexpr double LEAD = 0.4;           // [s]
+constexpr double LEAD_IN = 0.4;        // [s]
 constexpr double LEAST_STEADY = 0.1;   // [s] shorter times before the record are simulated as they are
 constexpr double GROWING_SHARE = 0.6;  // [1] of the lead-in
 constexpr double LEAST_GROWTH = 0.01;  // [1] of the depth at the beginning
@@ -53,7 +53,7 @@ double growth(double x) {
 }
 
 // Whether this twin simulates a column: inputs and channels of the measuring chain.
-bool gives(const std::string& column, const CampaignTest& test) {
+bool isSimulated(const std::string& column, const CampaignTest& test) {
   if (column == "spindle_angle" || column == "hammer" || motionAxis(column)) return true;
   // The position of these sensors is known only for a tap: at the hit point.
   if (column == channelName(DISPLACEMENT) || column == channelName(ACCELERATION))
@@ -80,20 +80,21 @@ CuttingMachine::Clock clockOf(const MachineModel& model, const CampaignTest& tes
     const EffectKind* kind = findEffect(effect.name);
     if (!kind || !actsIn(kind->stage, test.kind)) continue;
     const bool shows = kind->stage != Stage::drive || record.has("load_meter");
-    const char* lacks = nullptr;
-    if (kind->has(EffectNeed::start_time) && shows && !test.start_time) lacks = "start_time_s";
+    const char* missing = nullptr;
+    if (kind->has(EffectNeed::start_time) && shows && !test.start_time) missing = "start_time_s";
     const auto clock = effect.words.find("clock");
-    if (clock != effect.words.end() && clock->second == "machine" && !test.start_time) lacks = "start_time_s";
-    if (kind->has(EffectNeed::cut_time) && !test.cut_time_before) lacks = "cut_time_before_s";
-    if (lacks)
-      throw Error("test " + test.name + ": " + lacks + " is missing (effect " + effect.name + " needs it)");
+    if (clock != effect.words.end() && clock->second == "machine" && !test.start_time)
+      missing = "start_time_s";
+    if (kind->has(EffectNeed::cut_time) && !test.cut_time_before) missing = "cut_time_before_s";
+    if (missing)
+      throw Error("test " + test.name + ": " + missing + " is missing (effect " + effect.name + " needs it)");
   }
   return {test.start_time.value_or(0.0), test.cut_time_before.value_or(0.0), true};
 }
 
 // Estimates the phases of tones from the residual of the twin without them: joint least squares of sine and
 // cosine over the channels of the tones, with their means removed. Clipped samples are ignored.
-void findPhases(const Record& recorded, const std::array<std::vector<double>*, CHANNEL_COUNT>& early,
+void findPhases(const Record& recorded, const std::array<std::vector<double>*, CHANNEL_COUNT>& raw,
                 double rate, double speed, const CuttingMachine& machine, const std::vector<Tone*>& tones) {
   const ChannelValues limits = machine.limits();
   const auto n = static_cast<Eigen::Index>(2 * tones.size());
@@ -110,23 +111,23 @@ void findPhases(const Record& recorded, const std::array<std::vector<double>*, C
   for (std::size_t c = 0; c < CHANNEL_COUNT; ++c) {
     bool in_channel = false;
     for (Eigen::Index k = 0; k < n / 2; ++k) in_channel = in_channel || amplitudeOf(k, c) != 0.0;
-    if (!in_channel || !early[c] || !recorded.has(channelName(c))) continue;
-    const std::vector<double>& shown = recorded.column(channelName(c));
+    if (!in_channel || !raw[c] || !recorded.has(channelName(c))) continue;
+    const std::vector<double>& measured = recorded.column(channelName(c));
     Eigen::MatrixXd square = Eigen::MatrixXd::Zero(n + 1, n + 1);  // last: the mean
     Eigen::VectorXd product = Eigen::VectorXd::Zero(n + 1), row = Eigen::VectorXd::Ones(n + 1);
-    for (std::size_t i = 0; i < shown.size(); ++i) {
-      if (std::abs(shown[i]) > 0.98 * limits[c]) continue;
+    for (std::size_t i = 0; i < measured.size(); ++i) {
+      if (std::abs(measured[i]) > 0.98 * limits[c]) continue;
       const double t = static_cast<double>(i) / rate;
       ChannelValues values{};
-      values[c] = (*early[c])[i];
-      machine.finish(t, values);
+      values[c] = (*raw[c])[i];
+      machine.applySignalEffects(t, values);
       for (Eigen::Index k = 0; k < n / 2; ++k) {
         const double a = tones[static_cast<std::size_t>(k)]->rate(speed) * t;
         row(2 * k) = amplitudeOf(k, c) * std::sin(a);
         row(2 * k + 1) = amplitudeOf(k, c) * std::cos(a);
       }
       square += row * row.transpose();
-      product += row * (shown[i] - values[c]);
+      product += row * (measured[i] - values[c]);
     }
     if (square(n, n) <= 0.0) continue;
     const Eigen::VectorXd mean = square.col(n) / square(n, n);
@@ -152,7 +153,7 @@ TapTarget targetOf(const Record& record, std::size_t axis) {
   const auto louder = [](double a, double b) { return std::abs(a) < std::abs(b); };
   const auto hit =
       static_cast<std::size_t>(std::max_element(hammer.begin(), hammer.end(), louder) - hammer.begin());
-  const auto answers = [&](const char* channel) {
+  const auto responds = [&](const char* channel) {
     constexpr std::size_t LEAST_QUIET = 20;
     if (!record.has(channel) || hit < 2 * LEAST_QUIET) return false;
     const std::vector<double>& x = record.column(channel);
@@ -162,9 +163,9 @@ TapTarget targetOf(const Record& record, std::size_t axis) {
                                        [&](double a, double b) { return louder(a - level, b - level); });
     return std::abs(*peak - level) > 10.0 * deviation;
   };
-  TapTarget target{false, answers(channelName(FX + axis))};
+  TapTarget target{false, responds(channelName(FX + axis))};
   if (axis < 2)
-    target.tip = answers(channelName(TOOL_X + axis)) || answers("displacement") || answers("acceleration");
+    target.tip = responds(channelName(TOOL_X + axis)) || responds("displacement") || responds("acceleration");
   if (!target.tip && !target.sensor) {
     // No response: the target follows from the measured channels.
     target.tip =
@@ -174,18 +175,18 @@ TapTarget targetOf(const Record& record, std::size_t axis) {
   return target;
 }
 
-using Rows = CuttingMachine::EarlyRows;
+using Rows = CuttingMachine::ChannelRows;
 
 // Simulates step by step: channels before the signal stage at each sample, with substeps between the samples.
 // input(i, share): input between sample i (share 0) and the next one (share 1).
 template <class Input>
-void stepThrough(CuttingMachine& machine, std::size_t samples, int substeps, const Input& input,
-                 const Rows& out) {
+void simulateByStep(CuttingMachine& machine, std::size_t samples, int substeps, const Input& input,
+                    const Rows& out) {
   CuttingMachine::Output now, between;
   for (std::size_t i = 0; i < samples; ++i) {
     machine.step(input(i, 0.0), now);
     for (std::size_t c = 0; c < CHANNEL_COUNT; ++c) {
-      if (out[c]) (*out[c])[i] = now.early[c];
+      if (out[c]) (*out[c])[i] = now.raw[c];
     }
     for (int s = 1; s < substeps; ++s) machine.step(input(i, static_cast<double>(s) / substeps), between);
   }
@@ -193,8 +194,8 @@ void stepThrough(CuttingMachine& machine, std::size_t samples, int substeps, con
 
 // Simulates stage by stage. input(i, share, input): updates the input of a step.
 template <class Input>
-void passThrough(CuttingMachine& machine, std::size_t samples, int substeps, const Input& input,
-                 const Rows& out) {
+void simulateByStage(CuttingMachine& machine, std::size_t samples, int substeps, const Input& input,
+                     const Rows& out) {
   const auto every = static_cast<std::size_t>(substeps);
   std::array<std::vector<double>, CHANNEL_COUNT> fine;
   Rows rows = out;
@@ -226,13 +227,13 @@ void run(const MachineModel& model, const CampaignTest& test, const SimulationOp
     if (!test.running_before) machine.resetLoadMeter(test.spindle_speed);
   }
   Rows out{};
-  std::vector<std::size_t> shown;
+  std::vector<std::size_t> simulated_channels;
   for (std::size_t c = 0; c < CHANNEL_COUNT; ++c) {
     if (!record.has(channelName(c))) continue;
     out[c] = &record.add(channelName(c));
-    shown.push_back(c);
+    simulated_channels.push_back(c);
   }
-  if (options.channels) machine.showOnly(shown);
+  if (options.channels) machine.selectChannels(simulated_channels);
   move(out);
 
   if (model.force_sensor.mean_samples) {
@@ -252,10 +253,10 @@ void run(const MachineModel& model, const CampaignTest& test, const SimulationOp
     }
   }
   findBursts(recorded && !options.random_phases ? recorded : nullptr, out, test.sample_rate, machine, random);
-  for (std::size_t i = 0; i < record.size() && (options.noise || machine.finishes()); ++i) {
+  for (std::size_t i = 0; i < record.size() && (options.noise || machine.hasSignalEffects()); ++i) {
     ChannelValues values{};
-    for (const std::size_t c : shown) values[c] = (*out[c])[i];
-    machine.finish(static_cast<double>(i) / test.sample_rate, values);
+    for (const std::size_t c : simulated_channels) values[c] = (*out[c])[i];
+    machine.applySignalEffects(static_cast<double>(i) / test.sample_rate, values);
     if (options.noise) {
       for (const std::size_t c : {FX, FY, FZ}) {
         if (out[c] && model.force_sensor.noise_rms)
@@ -263,7 +264,7 @@ void run(const MachineModel& model, const CampaignTest& test, const SimulationOp
       }
       values[LOAD_METER] = machine.rounded(values[LOAD_METER]);
     }
-    for (const std::size_t c : shown) (*out[c])[i] = values[c];
+    for (const std::size_t c : simulated_channels) (*out[c])[i] = values[c];
   }
 }
 
@@ -283,7 +284,7 @@ Record simulateTap(const MachineModel& model, const CampaignTest& test, const Re
   const std::size_t samples = record.size();
   run(
       model, test, options, machine,
-      [&](const Rows& out) { stepThrough(machine, samples, options.substeps, input, out); }, recorded,
+      [&](const Rows& out) { simulateByStep(machine, samples, options.substeps, input, out); }, recorded,
       record);
   return record;
 }
@@ -323,9 +324,9 @@ class SteadyTest {
   }
 
   // Simulates the lead-in before the record.
-  void lead() {
+  void leadIn() {
     // Independent of the model, so that differences between models are smooth.
-    const double time = *test_.running_before < LEAST_STEADY ? *test_.running_before : LEAD;
+    const double time = *test_.running_before < LEAST_STEADY ? *test_.running_before : LEAD_IN;
     const auto steps = static_cast<long>(time * test_.sample_rate * substeps_);
     const double step = 1.0 / test_.sample_rate / substeps_;
     CuttingMachine::Input input;
@@ -371,12 +372,13 @@ void fillAngle(Record& record, double phase, double speed) {
   }
 }
 
-std::optional<Guide> guideOf(const CampaignTest& test, const Record* recorded,
-                             const SimulationOptions& options, const CuttingMachine& machine) {
+std::optional<TipTrajectory> tipTrajectoryOf(const CampaignTest& test, const Record* recorded,
+                                             const SimulationOptions& options,
+                                             const CuttingMachine& machine) {
   if (!options.guided || test.kind != TestKind::cut || test.running_before || !machine.vibrates() ||
-      !recorded || !Guide::canBe(*recorded))
+      !recorded || !TipTrajectory::isAvailable(*recorded))
     return {};
-  return Guide(machine.model(), *recorded, test.sample_rate);
+  return TipTrajectory(machine.model(), *recorded, test.sample_rate);
 }
 
 std::optional<AxisMotion> motionOf(const MachineModel& model, const CampaignTest& test,
@@ -390,8 +392,8 @@ std::optional<AxisMotion> motionOf(const MachineModel& model, const CampaignTest
 }
 
 Record simulateOn(CuttingMachine& machine, const MachineModel& model, const CampaignTest& test,
-                  const Record* recorded, Record record, double phase, const std::optional<Guide>& guide,
-                  const SimulationOptions& options) {
+                  const Record* recorded, Record record, double phase,
+                  const std::optional<TipTrajectory>& trajectory, const SimulationOptions& options) {
   if (test.kind == TestKind::tap)
     return simulateTap(model, test, recorded, std::move(record), options, machine);
   fillAngle(record, phase, test.spindle_speed);
@@ -399,19 +401,19 @@ Record simulateOn(CuttingMachine& machine, const MachineModel& model, const Camp
   if (test.running_before) {
     machine.setClock(clockOf(model, test, record));
     if (record.has("load_meter")) machine.resetLoadMeter(test.spindle_speed);
-    steady.lead();
+    steady.leadIn();
   }
   const double dt = 1.0 / test.sample_rate;
   const std::optional<AxisMotion> motion = motionOf(model, test, recorded, options);
   const auto input = [&](std::size_t i, double share, CuttingMachine::Input& at) {
     steady.next(record.time[i] + share * dt, at);
-    if (guide) at.tip = guide->at(i, share);
+    if (trajectory) at.tip = trajectory->at(i, share);
     if (motion) at.axis_acceleration = motion->acceleration(i, share);
   };
   run(
       model, test, options, machine,
-      [&](const Rows& out) { passThrough(machine, record.size(), options.substeps, input, out); }, recorded,
-      record);
+      [&](const Rows& out) { simulateByStage(machine, record.size(), options.substeps, input, out); },
+      recorded, record);
   return record;
 }
 
@@ -420,24 +422,24 @@ Record simulate(const MachineModel& model, const CampaignTest& test, const Recor
   if (options.substeps < 1) throw Error("simulation: substeps below 1");
   CuttingMachine machine(model, 1.0 / (test.sample_rate * options.substeps), Feed::steady,
                          options.corner_slices);
-  const std::optional<Guide> guide = guideOf(test, recorded, options, machine);
-  if (guide) machine.guide();
+  const std::optional<TipTrajectory> trajectory = tipTrajectoryOf(test, recorded, options, machine);
+  if (trajectory) machine.prescribeTip();
   const auto simulated = [&] {
-    return simulateOn(machine, model, test, recorded, std::move(record), phase, guide, options);
+    return simulateOn(machine, model, test, recorded, std::move(record), phase, trajectory, options);
   };
   if (!options.traces || !(test.kind == TestKind::cut || machine.vibrates())) return simulated();
   // If the motion of the tip follows from the forces, it depends on the sensor and the tool's modes.
-  std::vector<double> values = guide && Guide::byForce(*recorded)
+  std::vector<double> values = trajectory && TipTrajectory::isFromForce(*recorded)
                                    ? valuesOfRecord(model, test.kind)
-                                   : valuesOfTrace(model, test.kind, guide.has_value());
-  if (const auto held = options.traces->find(values)) {
-    machine.follow(held.get());
+                                   : valuesOfTrace(model, test.kind, trajectory.has_value());
+  if (const auto cached = options.traces->find(values)) {
+    machine.replayTrace(cached.get());
     return simulated();
   }
-  const auto kept = std::make_shared<CutTrace>();
-  machine.keep(kept.get());
+  const auto recorded_trace = std::make_shared<CutTrace>();
+  machine.recordTrace(recorded_trace.get());
   Record result = simulated();
-  options.traces->hold(std::move(values), kept);
+  options.traces->insert(std::move(values), recorded_trace);
   return result;
 }
 
@@ -466,12 +468,12 @@ Record simulateTest(const MachineModel& model, const CampaignTest& test, const R
   // Grid of the sample rate: times in a file are rounded.
   for (std::size_t i = 0; i < recorded.size(); ++i)
     record.time.push_back(recorded.time[0] + static_cast<double>(i) / test.sample_rate);
-  const auto asked = [&](const std::string& name) {
+  const auto requested = [&](const std::string& name) {
     return name == "hammer" || motionAxis(name) || !options.channels ||
            std::find(options.channels->begin(), options.channels->end(), name) != options.channels->end();
   };
   for (const std::string& name : recorded.names) {
-    if (gives(name, test) && asked(name)) record.add(name) = recorded.column(name);
+    if (isSimulated(name, test) && requested(name)) record.add(name) = recorded.column(name);
   }
   const double phase = options.phase ? *options.phase : recordedPhase(test, recorded);
   return simulate(model, test, &recorded, std::move(record), phase, options);

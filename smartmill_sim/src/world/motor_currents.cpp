@@ -10,8 +10,8 @@
 namespace smartmill::sim {
 namespace {
 
-constexpr double REFERENCE = 20.0;  // [deg C] of the constants
-constexpr double MOVES = 1e-7;      // [m/s]
+constexpr double REFERENCE = 20.0;    // [deg C] of the constants
+constexpr double LEAST_SPEED = 1e-7;  // [m/s]
 
 }  // namespace
 
@@ -63,19 +63,19 @@ void MotorTraits::declare(ParameterTable& table) {
 }
 
 std::array<AxisDrive, 3> MotorTraits::drives() const {
-  std::array<AxisDrive, 3> made;
-  if (!currents) return made;
+  std::array<AxisDrive, 3> drives;
+  if (!currents) return drives;
   for (std::size_t a = 0; a < 3; ++a) {
-    made[a].mass = mass[a];
-    made[a].coulomb = coulomb[a];
-    made[a].viscous = viscous[a];
-    made[a].stribeck = stribeck[a];
-    made[a].stribeck_velocity = stribeck_velocity;
-    made[a].weight = weight[a];
-    made[a].disturbance = disturbance[a];
-    made[a].disturbance_period = disturbance_period[a];
+    drives[a].mass = mass[a];
+    drives[a].coulomb = coulomb[a];
+    drives[a].viscous = viscous[a];
+    drives[a].stribeck = stribeck[a];
+    drives[a].stribeck_velocity = stribeck_velocity;
+    drives[a].weight = weight[a];
+    drives[a].disturbance = disturbance[a];
+    drives[a].disturbance_period = disturbance_period[a];
   }
-  return made;
+  return drives;
 }
 
 MotorCurrents::MotorCurrents(const MotorTraits& traits, const Spindle& spindle, std::uint64_t seed)
@@ -101,11 +101,11 @@ double MotorCurrents::phase(double range, double periods) {
 }
 
 void MotorCurrents::push(const Input& input) {
-  At now;
+  DriveState now;
   now.time = input.time;
   now.position = input.motion.position;
   now.speed = input.motion.spindle_speed;
-  if (any_) {
+  if (started_) {
     now.turns =
         last_.turns + std::remainder(input.motion.spindle_angle - last_angle_, units::TWO_PI) / units::TWO_PI;
   }
@@ -113,19 +113,19 @@ void MotorCurrents::push(const Input& input) {
   for (std::size_t a = 0; a < 3; ++a) cut_[a] += input.force[a];
   torque_ += input.torque;
   count_ += 1.0;
-  if (!any_) {
+  if (!started_) {
     index_ = static_cast<std::uint64_t>(std::ceil(input.time * SAMPLE_RATE - 1e-9));
-    any_ = true;
+    started_ = true;
     last_ = sampled_ = now;
   }
   // Skipped samples are a jump of the index.
   if (static_cast<double>(index_ + 1) / SAMPLE_RATE <= input.time)
     index_ = static_cast<std::uint64_t>(input.time * SAMPLE_RATE);
-  const double due = static_cast<double>(index_) / SAMPLE_RATE;
-  if (due <= input.time + 1e-12) {
-    const double span = now.time - last_.time, share = span > 0.0 ? (due - last_.time) / span : 1.0;
-    At at = now;
-    at.time = due;
+  const double sample_time = static_cast<double>(index_) / SAMPLE_RATE;
+  if (sample_time <= input.time + 1e-12) {
+    const double span = now.time - last_.time, share = span > 0.0 ? (sample_time - last_.time) / span : 1.0;
+    DriveState at = now;
+    at.time = sample_time;
     for (std::size_t a = 0; a < 3; ++a) {
       at.position[a] = last_.position[a] + share * (now.position[a] - last_.position[a]);
     }
@@ -135,7 +135,7 @@ void MotorCurrents::push(const Input& input) {
   last_ = now;
 }
 
-void MotorCurrents::sample(const At& at) {
+void MotorCurrents::sample(const DriveState& at) {
   const double step = at.time - sampled_.time;
   const double follow = 1.0 - std::exp(-units::TWO_PI * traits_.bandwidth / SAMPLE_RATE);
   const double friction_factor =
@@ -148,14 +148,14 @@ void MotorCurrents::sample(const At& at) {
     const double acceleration = step > 0.0 ? (velocity - velocity_[a]) / step : 0.0;
     const double cut = cut_[a] / count_;
     double load = 0.0;
-    if (std::abs(velocity) > MOVES) {
+    if (std::abs(velocity) > LEAST_SPEED) {
       load = drives_[a].force(at.position[a], velocity, acceleration, cut, friction_factor);
       power += std::abs(drives_[a].friction(velocity, friction_factor) * velocity);
     } else {
       // At rest dry friction carries the load up to its limit, the motor the excess.
-      const double held = friction_factor * (drives_[a].coulomb + drives_[a].stribeck);
+      const double dry_friction = friction_factor * (drives_[a].coulomb + drives_[a].stribeck);
       load = drives_[a].weight - cut;
-      load -= std::clamp(load, -held, held);
+      load -= std::clamp(load, -dry_friction, dry_friction);
     }
     velocity_[a] = velocity;
     load_[a] += follow * (load - load_[a]);
@@ -167,10 +167,11 @@ void MotorCurrents::sample(const At& at) {
       speed, 0.0, friction_factor);
   torque_load_ += follow * (torque_ / count_ + friction - torque_load_);
   power += friction * speed;
-  slipped_ += traits_.spindle_slip * torque_load_ * std::abs(at.turns - sampled_.turns);
-  samples_.push_back(speed > 0.0 ? phase(spindleRange(torque_load_, speed),
-                                         traits_.spindle_phase_per_revolution * (at.turns + slipped_))
-                                 : traits_.noise * normal_(random_));
+  slip_revolutions_ += traits_.spindle_slip * torque_load_ * std::abs(at.turns - sampled_.turns);
+  samples_.push_back(speed > 0.0
+                         ? phase(spindleRange(torque_load_, speed),
+                                 traits_.spindle_phase_per_revolution * (at.turns + slip_revolutions_))
+                         : traits_.noise * normal_(random_));
   temperature_ += std::max(0.0, step) / traits_.warm_up_time *
                   (traits_.temperature + traits_.warm_up * power - temperature_);
   cut_ = {};

@@ -91,30 +91,30 @@ Plate::Plate(const PlateTraits& traits, double step, std::uint64_t seed) : trait
   transition_ = e.topLeftCorner<12, 12>();
   from_before_ = e.block<12, 6>(0, 12);
   from_change_ = e.block<12, 6>(0, 18);
-  shown_ << k, fast * c;
+  output_ << k, fast * c;
 }
 
 void Plate::step(const std::array<double, 3>& cut, const std::array<double, 3>& cut_point,
-                 const std::array<double, 3>& blow, const std::array<double, 3>& blow_point) {
+                 const std::array<double, 3>& hit, const std::array<double, 3>& hit_point) {
   Eigen::Matrix<double, 6, 1> wrench;
   const Eigen::Vector3d f = vectorOf(cut), r = vectorOf(cut_point) - vectorOf(traits_.origin);
-  const Eigen::Vector3d b = vectorOf(blow);
-  wrench << f + b, cross(r) * f + cross(vectorOf(blow_point)) * b;
+  const Eigen::Vector3d b = vectorOf(hit);
+  wrench << f + b, cross(r) * f + cross(vectorOf(hit_point)) * b;
   state_ = transition_ * state_ + from_before_ * last_ + from_change_ * (wrench - last_);
   last_ = wrench;
-  sum_ += shown_ * state_;
+  sum_ += output_ * state_;
   ++steps_;
 }
 
 std::array<double, 6> Plate::read() {
-  std::array<double, 6> shown{};
+  std::array<double, 6> output{};
   for (std::size_t i = 0; i < 6; ++i) {
     const double noise = i < 3 ? traits_.force_noise : traits_.moment_noise;
-    shown[i] = sum_(static_cast<Eigen::Index>(i)) / std::max(1, steps_) + noise * normal_(random_);
+    output[i] = sum_(static_cast<Eigen::Index>(i)) / std::max(1, steps_) + noise * normal_(random_);
   }
   sum_.setZero();
   steps_ = 0;
-  return shown;
+  return output;
 }
 
 }  // namespace smartmill::sim

@@ -101,17 +101,17 @@ SpindleSensor::SpindleSensor(const SpindleSensorTraits& traits, double step, dou
   traits_.validate();
   for (double& z : zero_) z = traits_.zero * normal_(random_);
   for (double& d : drift_) d = traits_.drift * normal_(random_);
-  layOut();
+  updateModes();
 }
 
 void SpindleSensor::setLength(double length) {
   if (!(length >= 0.02 && length <= 0.5))
     throw Error("tool length: " + std::to_string(length / units::MM) + " mm, expected 20 .. 500 mm");
   length_ = length;
-  layOut();
+  updateModes();
 }
 
-void SpindleSensor::layOut() {
+void SpindleSensor::updateModes() {
   const double ratio = std::pow(traits_.reference_length / length_, traits_.length_exponent);
   modes_ = {modesOf(traits_.x_frequency, traits_.x_damping, traits_.x_share, ratio),
             modesOf(traits_.y_frequency, traits_.y_damping, traits_.y_share, ratio),
@@ -152,32 +152,32 @@ void SpindleSensor::step(const std::array<double, 3>& force, double angle, doubl
 }
 
 std::array<double, 6> SpindleSensor::read() {
-  std::array<double, 3> felt{};
-  for (std::size_t axis = 0; axis < 3; ++axis) felt[axis] = moment_sum_[axis] / std::max(1, steps_);
+  std::array<double, 3> filtered{};
+  for (std::size_t axis = 0; axis < 3; ++axis) filtered[axis] = moment_sum_[axis] / std::max(1, steps_);
   moment_sum_ = {};
   steps_ = 0;
   time_ += sample_;
   const double turning = speed_ / REFERENCE_SPEED;
-  std::array<double, 6> shown{};
+  std::array<double, 6> output{};
   for (std::size_t pair = 0; pair < 3; ++pair) {
     const double lever = traits_.bending[pair] * (length_ + traits_.reach[pair]);
-    const double bend =
-        lever * (std::sin(traits_.pair_angle[pair]) * felt[0] + std::cos(traits_.pair_angle[pair]) * felt[1]);
+    const double bend = lever * (std::sin(traits_.pair_angle[pair]) * filtered[0] +
+                                 std::cos(traits_.pair_angle[pair]) * filtered[1]);
     for (std::size_t k = 0; k < 2; ++k) {
       const std::size_t i = 2 * pair + k;
       // The sign of pair y follows its second sensor (eq. 3-1).
       const double side = (k == 0 ? 1.0 : -1.0) * (pair == 1 ? -1.0 : 1.0);
       const double sensitivity = 1.0 + (k == 0 ? traits_.mismatch[pair] : -traits_.mismatch[pair]);
-      const double signal = sensitivity * (side * bend + traits_.axial * felt[2]);
+      const double signal = sensitivity * (side * bend + traits_.axial * filtered[2]);
       const double rms =
           std::hypot(traits_.noise, traits_.noise_turning * turning, traits_.noise_cut * signal);
-      double& s = shown[i];
+      double& s = output[i];
       s = signal + zero_[i] + drift_[i] * time_ + traits_.thermal * warm_ + rms * normal_(random_);
       s += traits_.bearing * turning * std::sin(bearing_angle_ + static_cast<double>(i) * units::PI / 3.0);
       s = std::clamp(s, -traits_.preload[pair], traits_.range_limit - traits_.preload[pair]);
     }
   }
-  return shown;
+  return output;
 }
 
 }  // namespace smartmill::sim

@@ -36,17 +36,17 @@ Element stiffnessOf(const RoundBeam& beam, const Section& s, double l) {
 }
 
 Element massOf(const RoundBeam& beam, const Section& s, double l) {
-  Element across, turning;
+  Element across, rotary;
   across << 156.0, 22.0 * l, 54.0, -13.0 * l,         //
       22.0 * l, 4.0 * l * l, 13.0 * l, -3.0 * l * l,  //
       54.0, 13.0 * l, 156.0, -22.0 * l,               //
       -13.0 * l, -3.0 * l * l, -22.0 * l, 4.0 * l * l;
-  turning << 36.0, 3.0 * l, -36.0, 3.0 * l,    //
+  rotary << 36.0, 3.0 * l, -36.0, 3.0 * l,     //
       3.0 * l, 4.0 * l * l, -3.0 * l, -l * l,  //
       -36.0, -3.0 * l, 36.0, -3.0 * l,         //
       3.0 * l, -l * l, -3.0 * l, 4.0 * l * l;
   Element m = beam.density * s.area * l / 420.0 * across;
-  if (beam.shear) m += beam.density * s.inertia / (30.0 * l) * turning;
+  if (beam.shear) m += beam.density * s.inertia / (30.0 * l) * rotary;
   return m;
 }
 

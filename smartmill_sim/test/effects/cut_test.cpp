@@ -246,8 +246,8 @@ TEST(Effects, cornerRadiusIsTheSameWithHistory) {
   CuttingLaw law;
   law.coefficients = *model.cutting;
   const double speed = 300.0, dt = TWO_PI / speed / 1024.0;
-  Cutter tables(*model.tool, law, dt, {}, 4e-3, 0.0, Cutter::Way::tables),
-      history(*model.tool, law, dt, {}, 4e-3, 0.0, Cutter::Way::history);
+  Cutter tables(*model.tool, law, dt, {}, 4e-3, 0.0, Cutter::Method::tables),
+      history(*model.tool, law, dt, {}, 4e-3, 0.0, Cutter::Method::history);
   ToolMotion motion;
   motion.speed = speed;
   motion.velocity[0] = 3e-4 * speed / TWO_PI;
@@ -263,7 +263,7 @@ TEST(Effects, cornerRadiusIsTheSameWithHistory) {
       history.setDepths({depth});
     }
     const CuttingForce a = tables.step(motion), b = history.step(motion);
-    history.settle({{0.0, 0.0}});
+    history.endStep({{0.0, 0.0}});
     most = std::max({most, std::abs(a.fx)});
     ASSERT_NEAR(a.fx, b.fx, 1e-4 * most + 1e-9) << i;
     ASSERT_NEAR(a.fz, b.fz, 1e-4 * most + 1e-9) << i;
@@ -352,7 +352,7 @@ TEST(Effects, processDampingOpposesTheMotionIntoTheWork) {
     motion.angle = 0.5 * PI - speed * dt;
     process.engage({{0.0, PI, depth}}, motion);
     process.step(motion);
-    process.settle({{0.0, 0.0}});
+    process.endStep({{0.0, 0.0}});
     motion.angle = 0.5 * PI;
     motion.displacement[0] = v * dt;
     motion.rate[0] = v;

@@ -30,7 +30,7 @@ class CollisionWatch {
   /// The body that the tool intersects at a position [m]; nullptr: none. A tool at rest may face the body
   /// with the space between two flutes, so that only its core counts. @param turning whether the spindle
   /// turns
-  const Body* touched(const Axes3& position, bool turning) const;
+  const Body* collidingBody(const Axes3& position, bool turning) const;
 
   double tool_radius = 0.0;  ///< [m] over the edges
   double core_radius = 0.0;  ///< [m] between the flutes

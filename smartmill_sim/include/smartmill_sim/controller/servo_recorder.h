@@ -37,7 +37,7 @@ class ServoRecorder {
  private:
   std::array<AxisDrive, 3> drives_;
   int trigger_;
-  bool triggered_ = false, any_ = false;
+  bool triggered_ = false, started_ = false;
   std::uint64_t index_ = 0, block_index_ = 0;
   double last_time_ = 0.0;
   std::array<double, 3> last_velocity_{{0, 0, 0}}, current_{{0, 0, 0}}, cut_{{0, 0, 0}};

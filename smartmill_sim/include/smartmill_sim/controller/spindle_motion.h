@@ -22,9 +22,9 @@ class SpindleMotion {
   /// it.
   void orient(double time, double angle, double turn_speed);
 
-  double settled() const { return phases_.back().start; }  ///< [s] from which on the speed is constant
-  double speed(double time) const;                         ///< [rad/s]
-  double angle(double time) const;                         ///< [rad] 0 <= angle < 2 pi
+  double settleTime() const { return phases_.back().start; }  ///< [s] from which on the speed is constant
+  double speed(double time) const;                            ///< [rad/s]
+  double angle(double time) const;                            ///< [rad] 0 <= angle < 2 pi
   bool overloaded() const { return up_ <= 0.0; }
 
  private:
@@ -33,7 +33,7 @@ class SpindleMotion {
     double start, angle, speed, acceleration;
   };
   const Phase& phaseAt(double time) const;
-  void begin(double time);
+  void restart(double time);
   void append(double duration, double acceleration, double end_speed);
   void plan(double time);
 

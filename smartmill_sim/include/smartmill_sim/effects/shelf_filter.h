@@ -14,7 +14,8 @@ class ShelfFilter {
 
  private:
   Shelf shelf_;
-  double keep_, now_, before_;  // weights of the low-pass state, of the present and of the previous input
+  double decay_, weight_now_,
+      weight_before_;  // weights of the low-pass state, of the present and of the previous input
   double low_ = 0.0, last_ = 0.0;
 };
 

@@ -60,7 +60,7 @@ class Lathe {
   Block advance(std::size_t count);
 
   /// Whether commands for the next samples have arrived, or none at all.
-  bool commanded(std::size_t count) const { return newest_ == 0 || newest_ + 1 >= index_ + count; }
+  bool hasCommands(std::size_t count) const { return newest_ == 0 || newest_ + 1 >= index_ + count; }
 
   std::uint64_t late() const { return late_; }  ///< commands that arrived after their sample
 

@@ -13,8 +13,8 @@ namespace smartmill::sim {
 /// Sets the begin of the burst trains in a machine's signals. With a record it is estimated from the residual
 /// of the twin without bursts: matched filter over the residual folded at the period of the train. Without a
 /// record it is drawn.
-/// @param early channels before the signal stage; nullptr: not simulated @param rate [Hz]
-void findBursts(const Record* recorded, const std::array<std::vector<double>*, CHANNEL_COUNT>& early,
+/// @param raw channels before the signal stage; nullptr: not simulated @param rate [Hz]
+void findBursts(const Record* recorded, const std::array<std::vector<double>*, CHANNEL_COUNT>& raw,
                 double rate, CuttingMachine& machine, std::mt19937_64& random);
 
 }  // namespace smartmill::sim

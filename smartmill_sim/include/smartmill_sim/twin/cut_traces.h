@@ -18,31 +18,31 @@ namespace smartmill::sim {
 std::vector<double> valuesOfRecord(const MachineModel& model, TestKind kind);
 
 /// Whether the channels of a record are independent of each other, i.e. no effect (as cross talk) mixes them.
-bool channelsApart(const MachineModel& model);
+bool channelsAreIndependent(const MachineModel& model);
 
 /// As valuesOfRecord(), for one channel (ChannelIndex) of a record with independent channels.
 std::vector<double> valuesOfChannel(const MachineModel& model, TestKind kind, std::size_t channel);
 
-/// As valuesOfRecord(), for the CutTrace of the test. @param guided whether the motion of the tip is
+/// As valuesOfRecord(), for the CutTrace of the test. @param tip_prescribed whether the motion of the tip is
 /// prescribed
-std::vector<double> valuesOfTrace(const MachineModel& model, TestKind kind, bool guided);
+std::vector<double> valuesOfTrace(const MachineModel& model, TestKind kind, bool tip_prescribed);
 
 /// Cache of the CutTrace of one test for the last few models: most models of a search differ from the
 /// previous one only in the stages after cut and tool. Thread-safe.
 class CutTraces {
  public:
-  /// @param most >= 1 number of traces
-  explicit CutTraces(std::size_t most) : most_(most) {}
+  /// @param capacity >= 1 number of traces
+  explicit CutTraces(std::size_t capacity) : capacity_(capacity) {}
 
   /// @return nullptr: not in the cache
   std::shared_ptr<const CutTrace> find(const std::vector<double>& values);
-  void hold(std::vector<double> values, std::shared_ptr<const CutTrace> trace);
+  void insert(std::vector<double> values, std::shared_ptr<const CutTrace> trace);
   void clear();
 
  private:
-  std::size_t most_;
+  std::size_t capacity_;
   std::mutex mutex_;
-  std::deque<std::pair<std::vector<double>, std::shared_ptr<const CutTrace>>> held_;  // newest use first
+  std::deque<std::pair<std::vector<double>, std::shared_ptr<const CutTrace>>> entries_;  // newest use first
 };
 
 }  // namespace smartmill::sim

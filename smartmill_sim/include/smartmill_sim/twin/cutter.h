@@ -12,16 +12,17 @@
 namespace smartmill::sim {
 
 /// Response of the tip to the force of the present step.
-struct TipYield {
-  std::array<double, 2> assumed{{0, 0}};  ///< [N] cutting force on which the rate in the motion is based
-  std::array<double, 2> rate{{0, 0}};     ///< [m/s/N] change of the rate per newton
+struct TipMobility {
+  std::array<double, 2> assumed_force{
+      {0, 0}};  ///< [N] cutting force on which the rate in the motion is based
+  std::array<double, 2> rate_per_force{{0, 0}};  ///< [m/s/N] change of the rate per newton
 };
 
 /// Cutting force of a tool: one straight mill or, for a corner radius, a stack of straight mills.
 class Cutter {
  public:
   /// How the forces are computed.
-  enum class Way {
+  enum class Method {
     history,  ///< from the history of the tool's motion and vibration (MillingProcess)
     tables    ///< from tables over a revolution (RigidCut): steady and rigid
   };
@@ -29,7 +30,7 @@ class Cutter {
   /// @param radius_offset [m] of each tooth @param corner_radius [m] 0: none @throws Error on an invalid tool
   /// or corner radius.
   Cutter(const ToolGeometry& tool, const CuttingLaw& law, double time_step,
-         const std::vector<double>& radius_offset, double corner_radius, double path_share, Way way,
+         const std::vector<double>& radius_offset, double corner_radius, double path_share, Method method,
          int corner_slices = CORNER_SLICES);
 
   /// Sets the contact from now on, see MillingProcess and RigidCut.
@@ -38,21 +39,21 @@ class Cutter {
   void setDepths(const std::vector<double>& depths);
   void setLaw(const CuttingLaw& law);
 
-  Way way() const { return way_; }
+  Method method() const { return method_; }
   /// With tables or a prescribed motion of the tip: record the sums of each further step, or replay sums that
   /// a cutter with other coefficients and factors of the law recorded over the same steps. @param sums must
   /// outlive the steps
-  void keep(std::vector<CutSums>* sums) { kept_ = sums; }
-  void follow(const std::vector<CutSums>* sums) { followed_ = sums; }
+  void recordSums(std::vector<CutSums>* sums) { recorded_ = sums; }
+  void replaySums(const std::vector<CutSums>* sums) { replayed_ = sums; }
 
   /// Force on the tool with the tip displaced as in this motion. With a mobility the rate of the tip is
   /// solved together with the force: otherwise rubbing edges would excite a light mode that they damp.
-  CuttingForce step(const ToolMotion& now, const TipYield& yield = {});
+  CuttingForce step(const ToolMotion& now, const TipMobility& mobility = {});
   /// Ends the step. @param displacement [m] of the tip
-  void settle(const std::array<double, 2>& displacement);
+  void endStep(const std::array<double, 2>& displacement);
 
  private:
-  struct Part {
+  struct StraightMill {
     EdgeSlice slice;
     double top = 0.0;  // [m] upper end of the engaged height
     EdgeSlice actual;  // means over the engaged height
@@ -61,22 +62,22 @@ class Cutter {
     std::size_t arcs = 0;  // number of arcs at this height
     CutSums sums;          // of the present step
   };
-  void place(Part& part);
-  ToolMotion motionOf(const Part& part, const ToolMotion& now) const;
-  CutSums sumsOf(Part& part, const ToolMotion& now) const;
+  void updateContact(StraightMill& mill);
+  ToolMotion motionOf(const StraightMill& mill, const ToolMotion& now) const;
+  CutSums sumsOf(StraightMill& mill, const ToolMotion& now) const;
   CuttingForce force() const;  // from the sums
-  void yieldTo(const ToolMotion& now, const TipYield& yield);
+  void solveRubbing(const ToolMotion& now, const TipMobility& mobility);
 
-  Way way_;
+  Method method_;
   double corner_radius_, lag_;
   CuttingLaw law_;
-  std::vector<Part> parts_;
+  std::vector<StraightMill> mills_;
   std::vector<ContactArc> arcs_;
   ToolMotion now_;
-  std::vector<CutSums>* kept_ = nullptr;
-  const std::vector<CutSums>* followed_ = nullptr;
-  std::size_t place_ = 0;  // next index in followed_
-  bool fresh_ = false;     // the arcs differ from those of the last step
+  std::vector<CutSums>* recorded_ = nullptr;
+  const std::vector<CutSums>* replayed_ = nullptr;
+  std::size_t replay_index_ = 0;  // next index in replayed_
+  bool arcs_changed_ = false;     // the arcs differ from those of the last step
 };
 
 }  // namespace smartmill::sim

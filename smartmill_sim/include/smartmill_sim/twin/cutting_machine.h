@@ -14,8 +14,8 @@
 #include "smartmill_sim/effects/shelf_filter.h"
 #include "smartmill_sim/twin/cutter.h"
 #include "smartmill_sim/twin/edge_layers.h"
-#include "smartmill_sim/twin/guide.h"
 #include "smartmill_sim/twin/spindle_drive.h"
+#include "smartmill_sim/twin/tip_trajectory.h"
 
 namespace smartmill::sim {
 
@@ -47,7 +47,7 @@ class CuttingMachine {
     std::array<double, 3> sensor_force{{0, 0, 0}};  ///< [N] force on the sensor in addition to cutting
     Axes3 axis_acceleration{{0, 0, 0}};             ///< [m/s2] of the machine axes
     /// Prescribed motion of the tip: the chip follows from it instead of the structure's response.
-    std::optional<TipPlace> tip;
+    std::optional<TipMotion> tip;
   };
   /// Output at the end of a step.
   struct Output {
@@ -56,7 +56,7 @@ class CuttingMachine {
     std::array<double, 3> sensor{{0, 0, 0}};     ///< [N] signal of the force sensor, without noise
     std::array<double, 2> displacement{{0, 0}};  ///< [m] measured displacement of the tip
     double load_meter = 0.0;                     ///< [V] before rounding; 0 without a spindle section
-    ChannelValues early{};  ///< channels before the signal stage (drift, hum, saturation)
+    ChannelValues raw{};  ///< channels before the signal stage (drift, hum, saturation)
   };
   /// Times for effects in time. Live: both times advance from here, edge_time only during cutting.
   struct Clock {
@@ -94,8 +94,10 @@ class CuttingMachine {
   std::vector<BurstTrain*> bursts() { return effects_.bursts(); }
   /// Applies the signal stage (drift, hum, saturation) to the channels at a time since the begin of the
   /// record [s].
-  void finish(double record_time, ChannelValues& channels) const;
-  bool finishes() const { return effects_.has(Stage::signal); }  ///< whether the model has a signal stage
+  void applySignalEffects(double record_time, ChannelValues& channels) const;
+  bool hasSignalEffects() const {
+    return effects_.has(Stage::signal);
+  }  ///< whether the model has a signal stage
 
   /// Largest magnitude that each channel can indicate; infinity: unlimited.
   ChannelValues limits() const { return effects_.limits(); }
@@ -104,22 +106,22 @@ class CuttingMachine {
   void setProbe(std::size_t axis) { probe_ = axis; }
 
   /// The input of every step will prescribe the motion of the tip.
-  void guide() { guided_ = true; }
+  void prescribeTip() { tip_prescribed_ = true; }
 
   /// From here on the trace of cut and tool is recorded, or replayed from a machine that recorded it over the
   /// same steps and differs only in later stages (without modes or with a prescribed motion of the tip: also
   /// in coefficients and factors of the law and in the tool's modes). @param trace must outlive the steps
-  void keep(CutTrace* trace) {
-    kept_ = trace;
-    if (keepsSums()) cutter_->keep(&trace->sums);
+  void recordTrace(CutTrace* trace) {
+    recorded_ = trace;
+    if (tracesSums()) cutter_->recordSums(&trace->sums);
   }
-  void follow(const CutTrace* trace) {
-    followed_ = trace;
-    if (keepsSums()) cutter_->follow(&trace->sums);
+  void replayTrace(const CutTrace* trace) {
+    replayed_ = trace;
+    if (tracesSums()) cutter_->replaySums(&trace->sums);
   }
 
   /// Of forces and load meter only these channels are simulated; the others are invalid from here on.
-  void showOnly(const std::vector<std::size_t>& channels);
+  void selectChannels(const std::vector<std::size_t>& channels);
 
   /// Sets the load meter to its steady value in an air cut.
   void resetLoadMeter(double spindle_speed);
@@ -129,11 +131,11 @@ class CuttingMachine {
   void step(const Input& input, Output& output);
 
   /// Channels of many steps before the signal stage: one row each; nullptr: not requested.
-  using EarlyRows = std::array<std::vector<double>*, CHANNEL_COUNT>;
+  using ChannelRows = std::array<std::vector<double>*, CHANNEL_COUNT>;
   /// Simulates many steps at constant speed, without probe and external forces: the same result as step(),
-  /// computed stage by stage. @param next updates the input of a step, may call engage() @param early rows of
+  /// computed stage by stage. @param next updates the input of a step, may call engage() @param raw rows of
   /// one value per step, or nullptr
-  void run(std::size_t steps, const std::function<void(std::size_t, Input&)>& next, const EarlyRows& early);
+  void run(std::size_t steps, const std::function<void(std::size_t, Input&)>& next, const ChannelRows& raw);
 
   /// Voltage rounded to the load meter's resolution [V].
   double rounded(double voltage) const { return drive_ ? drive_->rounded(voltage) : voltage; }
@@ -141,37 +143,37 @@ class CuttingMachine {
  private:
   void update(const Input& input);
   // Stages of a step, in this order.
-  void takeOver(const Input& input);  // state of the effects
-  CuttingForce cut(const Input& input);
-  void moveTip(const Input& input, Output& out);
-  void settleTip(const Input& input, Output& out);
-  void showForce(Output& out);
-  void showLoad(double speed, Output& out);
-  void passOn(Output& out);  // resonances, shelves and delays of the channels
-  void passTime(const ToolMotion& motion, std::size_t steps = 1);
+  void applyEffects(const Input& input);  // state of the effects
+  CuttingForce cuttingForce(const Input& input);
+  void updateTip(const Input& input, Output& out);
+  void integrateTip(const Input& input, Output& out);
+  void measureForce(Output& out);
+  void measureLoad(double speed, Output& out);
+  void filterChannels(Output& out);  // resonances, shelves and delays of the channels
+  void advanceTime(const ToolMotion& motion, std::size_t steps = 1);
   // The same stages for many steps.
-  struct Course {
+  struct StepHistory {
     std::array<double, 3> before{{0, 0, 0}};  // [N] cutting force before the first step
     std::vector<CuttingForce> force;
     std::vector<std::array<double, 3>> applied;  // [N] force on the sensor; empty: the cutting force alone
     std::vector<std::pair<std::size_t, double>> jumps;  // steps with a jump of the force, share of the jump
     std::vector<Instant> instants;                      // where effects need them
   };
-  void cutAll(std::size_t steps, const std::function<void(std::size_t, Input&)>& next, const EarlyRows& early,
-              Course& course);
-  bool stepsAlike() const;
-  void replay(std::size_t from, const EarlyRows& early, Course& course);
-  void showAll(const Course& course, const EarlyRows& early);
-  void measureAll(const Course& course, const EarlyRows& early) const;
-  void passAllOn(std::size_t steps, const EarlyRows& early);
+  void simulateCut(std::size_t steps, const std::function<void(std::size_t, Input&)>& next,
+                   const ChannelRows& raw, StepHistory& history);
+  bool replaysWithoutUpdates() const;
+  void replayRest(std::size_t from, const ChannelRows& raw, StepHistory& history);
+  void measureSensors(const StepHistory& history, const ChannelRows& raw);
+  void applyOutputEffects(const StepHistory& history, const ChannelRows& raw) const;
+  void filterRows(std::size_t steps, const ChannelRows& raw);
 
-  bool rigid() const { return cutter_ && cutter_->way() == Cutter::Way::tables; }
-  bool keepsSums() const { return cutter_ && (rigid() || guided_); }
+  bool rigid() const { return cutter_ && cutter_->method() == Cutter::Method::tables; }
+  bool tracesSums() const { return cutter_ && (rigid() || tip_prescribed_); }
   // Whether cut and tool are replayed step by step from a trace.
-  bool replayed() const { return followed_ && !keepsSums(); }
+  bool replaysTrace() const { return replayed_ && !tracesSums(); }
   double actualDepth(double commanded) const;  // [m]
   void setActualDepths();
-  ToolMotion fed(const ToolMotion& commanded) const;
+  ToolMotion actualMotion(const ToolMotion& commanded) const;
 
   EffectSet effects_;
   MachineModel model_;  // as changed by the effects
@@ -182,13 +184,13 @@ class CuttingMachine {
   int steps_to_update_ = 0;
   std::optional<Cutter> cutter_;
   EdgeLayers layers_;
-  bool vibrates_ = false, guided_ = false;
-  CutTrace* kept_ = nullptr;
-  const CutTrace* followed_ = nullptr;
-  std::size_t place_ = 0;  // next step of followed_
+  bool vibrates_ = false, tip_prescribed_ = false;
+  CutTrace* recorded_ = nullptr;
+  const CutTrace* replayed_ = nullptr;
+  std::size_t replay_index_ = 0;  // next step of replayed_
   std::optional<std::size_t> probe_;
-  std::array<bool, 3> shows_force_{{true, true, true}};
-  bool shows_load_ = true;
+  std::array<bool, 3> force_selected_{{true, true, true}};
+  bool load_selected_ = true;
   std::vector<ContactArc> arcs_;                     // as commanded
   double depth_extra_ = 0.0;                         // [m] contained in the present depths
   double feed_path_ = 0.0;                           // [m] since engagement
@@ -203,12 +205,12 @@ class CuttingMachine {
   std::vector<std::pair<std::size_t, DelayLine>> delays_;
   std::array<std::array<double, 2>, 2> tip_history_{};  // [N] total force on the tip one and two steps ago
   std::array<double, 3> last_cut_{{0, 0, 0}};           // [N] cutting force at the last step
-  std::array<double, 3> chip_of_{{0, 0, 0}};            // velocity and speed that give chip_
+  std::array<double, 3> chip_motion_{{0, 0, 0}};        // velocity and speed that give chip_
   double chip_ = 0.0;                                   // [m]
   double last_torque_ = 0.0;
-  bool engaged_ = false;  // contact began or ended since the last step
-  double jump_ = 0.0;     // [1] share of the change in force that is a jump at this step
-  double sign_;
+  bool contact_changed_ = false;  // contact began or ended since the last step
+  double jump_ = 0.0;             // [1] share of the change in force that is a jump at this step
+  double force_sign_;
 };
 
 }  // namespace smartmill::sim

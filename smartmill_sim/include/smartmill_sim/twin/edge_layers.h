@@ -28,11 +28,11 @@ class EdgeLayers {
   void setLaw(const CuttingLaw& law);
   void add(const ToolMotion& now, CuttingForce& sum);
   /// Ends the step of a tool that may vibrate. @param displacement [m] of the tip
-  void settle(const std::array<double, 2>& displacement);
+  void endStep(const std::array<double, 2>& displacement);
 
  private:
   struct Layer {
-    EdgeLayer of;
+    EdgeLayer definition;
     std::optional<RigidCut> rigid;
     std::optional<MillingProcess> process;
   };

@@ -59,7 +59,7 @@ class MillingProcess {
   void setDepths(const std::vector<double>& depths);
   void setLaw(const CuttingLaw& law) { law_ = law; }
   /// From here on returns the force of this tooth alone; all teeth cut.
-  void showOnly(int tooth) { only_tooth_ = tooth; }
+  void selectTooth(int tooth) { only_tooth_ = tooth; }
 
   /// Force on the tool with the tip displaced as in this motion.
   CuttingForce step(const ToolMotion& now) { return force(sumsAt(now)); }
@@ -69,11 +69,11 @@ class MillingProcess {
   /// Sums for the contact of the last sumsAt() with another rate of the tip [m/s], at a speed [rad/s].
   RubbingSums rubbing(const std::array<double, 2>& rate, double speed) const;
   /// Ends the step. @param displacement [m] of the tip
-  void settle(const std::array<double, 2>& displacement);
+  void endStep(const std::array<double, 2>& displacement);
 
  private:
   /// Interpolation point of the history.
-  struct Place {
+  struct HistoryPoint {
     double ago = 0.0;                 // [steps]
     std::size_t steps = 0;            // whole steps of ago
     std::array<double, 4> weights{};  // of the samples steps + 2, steps + 1, steps, steps - 1 ago
@@ -81,53 +81,53 @@ class MillingProcess {
   /// Delay by an angle of the spindle.
   struct Delay {
     double turn = 0.0;  // [rad]
-    Place at;
-    long of_regime = -1;                   // regime of position and fed
-    long of_step = -1;                     // step of the other values
-    bool known = false;                    // within the history
+    HistoryPoint point;
+    long valid_regime = -1;  // regime of position and fed
+    long updated_at = -1;    // step of the other values
+    bool within_history = false;
     std::array<double, 2> displacement{};  // [m] at that time
     std::array<double, 2> fed{};           // [m] feed since then
   };
   /// Surface of an earlier pass as one tooth meets it.
   struct Pass {
     std::size_t delay = 0;
-    double step = 0.0;    // [m] difference of the radii, relative to the first pass
-    long of_regime = -1;  // regime of the shapes
-    ChipShape still;      // the chip without vibration
-    ChipShape behind;     // excess of the chip thickness over the first pass
-    double bend = 0.0;    // curvature bound of behind
-    double beside = 0.0;  // [rad] angle of its tooth off the ray, solved at the last contact
+    double step = 0.0;       // [m] difference of the radii, relative to the first pass
+    long valid_regime = -1;  // regime of the shapes
+    ChipShape rigid;         // the chip without vibration
+    ChipShape excess;        // excess of the chip thickness over the first pass
+    double bend = 0.0;       // curvature bound of excess
+    double offset = 0.0;     // [rad] angle of its tooth off the ray, solved at the last contact
   };
   void clear(const ToolMotion& now);
   void advance(const ToolMotion& now);
-  bool steadySince(double turn) const;
+  bool isSteadyOver(double turn) const;
   Pass& passOf(int tooth, int n) {
     std::vector<Pass>& passes = passes_[static_cast<std::size_t>(tooth)];
     if (passes.size() < static_cast<std::size_t>(n)) addPass(tooth);
     Pass& pass = passes[static_cast<std::size_t>(n) - 1];
-    if (pass.of_regime != regime_ || regime_ != 0) shapePass(tooth, n, pass);
+    if (pass.valid_regime != regime_ || regime_ != 0) shapePass(tooth, n, pass);
     return pass;
   }
-  const Delay& back(std::size_t delay) {
-    return delays_[delay].of_step == count_ ? delays_[delay] : lookBack(delays_[delay]);
+  const Delay& delayAt(std::size_t delay) {
+    return delays_[delay].updated_at == count_ ? delays_[delay] : updateDelay(delays_[delay]);
   }
   void addPass(int tooth);
-  Delay& lookBack(Delay& delay);
-  static Place placeOf(double steps);
-  static std::array<double, 4> slopesOf(const Place& at);
+  Delay& updateDelay(Delay& delay);
+  static HistoryPoint historyPointAt(double steps);
+  static std::array<double, 4> weightSlopes(const HistoryPoint& at);
   template <class Step>
-  void forEachStep(const Place& at, Step&& step) const;
-  void search(Delay& delay);
+  void forEachStep(const HistoryPoint& at, Step&& step) const;
+  void searchHistory(Delay& delay);
   void shapePass(int tooth, int n, Pass& pass);
-  double beside(double vibrated, double fed) const;
-  double besides(const Delay& delay, const Stretch& cell) const;
-  double mostBeside(double turn) const;
-  void lookBeside(const Delay& delay, const Delay& first, const Stretch& cell, Pass& pass,
-                  ChipShape* shape) const;
-  bool gather(int tooth, const Stretch& cell, bool& certain);
+  double pathMargin(double vibrated, double fed) const;
+  double pathMarginAt(const Delay& delay, const Stretch& cell) const;
+  double largestPathMargin(double turn) const;
+  void correctForPath(const Delay& delay, const Delay& first, const Stretch& cell, Pass& pass,
+                      ChipShape* shape) const;
+  bool collectShapes(int tooth, const Stretch& cell, bool& certain);
   void cut(int tooth, const Stretch& cell, double height, CutSums& sums);
   void add(const ChipShape& shape, const Stretch& over, double height, CutSums& sums);
-  void grow();
+  void growHistory();
 
   ToolGeometry tool_;
   ChipRule rule_;
@@ -141,16 +141,16 @@ class MillingProcess {
 
   // Ring buffers of each step since the first contact, newest at count_ - 1.
   std::vector<std::array<double, 2>> displacement_, centre_;  // [m]
-  std::vector<double> turned_;                                // [rad] since the first step
+  std::vector<double> rotation_;                              // [rad] since the first step
   long count_ = 0;
-  double turned_now_ = 0.0;
-  std::size_t deepest_ = 0;  // longest delay so far [steps]
+  double rotation_now_ = 0.0;
+  std::size_t longest_delay_ = 0;  // longest delay so far [steps]
   // [m] Largest deflection and largest change per step, in the present and in the previous cycle of the ring.
-  std::array<double, 2> largest_{{0, 0}}, fastest_{{0, 0}};
-  double steepest_ = 0.0;  // [m/rad] largest slope of the vibration
+  std::array<double, 2> largest_deflection_{{0, 0}}, largest_change_{{0, 0}};
+  double largest_slope_ = 0.0;  // [m/rad] largest slope of the vibration
   // Speed and feed are constant within a regime.
   long regime_ = 0;
-  double regime_began_ = 0.0;  // [rad]
+  double regime_start_ = 0.0;  // [rad]
 
   std::vector<std::vector<Pass>> passes_;  // of each tooth
   std::vector<Delay> delays_;
@@ -158,7 +158,7 @@ class MillingProcess {
   // [m] Moments of the rubbing edges over their length in contact at this step.
   struct {
     double sine2 = 0.0, sine_cosine = 0.0, cosine2 = 0.0, sine = 0.0, cosine = 0.0;
-  } rubs_;
+  } rubbing_moments_;
 };
 
 }  // namespace smartmill::sim

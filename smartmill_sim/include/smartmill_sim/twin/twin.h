@@ -24,12 +24,13 @@ struct SimulationOptions {
   /// [samples] Mean advance of the rise of the cutting force over engage_time and engagementRise().
   double early_entry = 0.0;
   /// For a tool with modes: the chip follows from the measured displacement of the tip (or from the
-  /// displacement under the measured forces, see Guide), and the structure only responds to the forces. The
-  /// simulation cannot become unstable, follows a chattering cut, and its residual is a prediction error.
+  /// displacement under the measured forces, see TipTrajectory), and the structure only responds to the
+  /// forces. The simulation cannot become unstable, follows a chattering cut, and its residual is a
+  /// prediction error.
   bool guided = false;
   /// Phases of tones (mains hum) are drawn from the seed instead of estimated from the record.
   bool random_phases = false;
-  /// Channels of the record to simulate; nullptr: all. Requires channelsApart().
+  /// Channels of the record to simulate; nullptr: all. Requires channelsAreIndependent().
   const std::vector<std::string>* channels = nullptr;
   /// [s] standard deviation of the Gaussian weights of the axis acceleration (smoothedDerivative()): the -3
   /// dB frequency of 58 Hz is above the bandwidth of a feed drive's position loop, and the quantisation of an

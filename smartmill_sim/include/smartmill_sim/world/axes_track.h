@@ -17,7 +17,7 @@ class AxesTrack {
   void push(const SampleBlock& block);
   /// No samples until a time [s]: the axes are at rest from the last sample on and resume at the position of
   /// the next one.
-  void stand(double until);
+  void holdUntil(double until);
   /// [s] time of the last sample; nullopt: none yet.
   std::optional<double> newest() const;
   /// @param time [s], not after newest(), not before that of an earlier call
@@ -28,8 +28,8 @@ class AxesTrack {
     double time = 0.0;
     std::array<double, 3> position{};
     double revolutions = 0.0;
-    bool jump = false;    // no motion from the previous point to here
-    bool stands = false;  // added by stand()
+    bool jump = false;  // no motion from the previous point to here
+    bool held = false;  // added by holdUntil()
   };
   std::deque<Point> points_;
 };

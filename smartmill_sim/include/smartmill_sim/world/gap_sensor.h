@@ -19,17 +19,17 @@ class ToolSurface {
   /// from +y] with the spindle at `angle` [rad], at a height [m] above the tip; edges lag by the helix.
   double retreat(double angle, double height, double facing) const;
   /// Offset [m] of the tool axis towards `facing` by eccentricity.
-  double throwTo(double angle, double facing) const;
+  double eccentricityTowards(double angle, double facing) const;
   double radius() const { return tool_.radius(); }
 
  private:
-  double behind(double off) const;
+  double recess(double off) const;
 
   ToolGeometry tool_;
   double depth_;
   double rake_, relief_, land_;
   bool insert_;
-  std::vector<double> low_;
+  std::vector<double> tooth_distance_;
   double eccentricity_, eccentricity_angle_;
 };
 
@@ -43,9 +43,9 @@ class GapSensor {
   GapSensor(const StationTraits& traits, const smartmill::HammerStation& station, double facing);
 
   /// Sets the target of the sensor. @param angle [rad] of the spindle @param above [m] height of the sensor's
-  /// centre above the tip @param beside [m] lateral offset of the tool axis from the sensor axis, against the
-  /// sense of the angle
-  void face(const ToolSurface& surface, double angle, double above, double beside);
+  /// centre above the tip @param lateral [m] lateral offset of the tool axis from the sensor axis, against
+  /// the sense of the angle
+  void setTarget(const ToolSurface& surface, double angle, double above, double lateral);
 
   /// Voltage [V], clipped, without noise. @param gap [m] from the sensor's face to the cutting circle
   double voltage(double gap) const;
@@ -59,8 +59,8 @@ class GapSensor {
   };
   std::vector<Spot> spots_;
   std::vector<double>
-      behind_;  // [m] distance of the surface from the foremost line of the cutting circle, by spot
-  double facing_, gain_, gap_, range_, bend_;
+      surface_distance_;  // [m] distance of the surface from the foremost line of the cutting circle, by spot
+  double facing_, gain_, gap_, range_, nonlinearity_;
 };
 
 }  // namespace smartmill::sim

@@ -16,7 +16,7 @@
 namespace smartmill::sim {
 
 /// Automatic hammer and capacitive displacement sensor on the table, for a tool at rest (Dunwoody fig. 4.1).
-/// Calls per sample: stand(), then push() and hear() for each integration step, then read().
+/// Calls per sample: setPose(), then push() and addDisplacement() for each integration step, then read().
 class HammerStation {
  public:
   /// @param step [s] of integration @throws Error if the model lacks tool or hammer, or if stickout, offset
@@ -36,13 +36,13 @@ class HammerStation {
   void fire(std::size_t axis, double now, double touch, std::mt19937_64& random);
   bool busy(double time) const { return fired_ && !solenoid_.over(time); }
   /// Skips a time [s].
-  void shift(double time) { solenoid_.shift(time); }
+  void skipTime(double time) { solenoid_.skipTime(time); }
 
-  struct Place {
+  struct Pose {
     std::array<double, 3> position{};  ///< [m] machine position of the tip
     double angle = 0.0, speed = 0.0;   ///< [rad], [rad/s] of the spindle
   };
-  void stand(const Place& place, std::mt19937_64& random);
+  void setPose(const Pose& pose, std::mt19937_64& random);
 
   struct Push {
     double force = 0.0;                       ///< [N] of the hammer
@@ -51,12 +51,12 @@ class HammerStation {
   };
   Push push(double time);
   /// Adds a step to the sensors' means. @param displacement [m] of the tip, without that of push()
-  void hear(const std::array<double, 2>& displacement);
+  void addDisplacement(const std::array<double, 2>& displacement);
 
-  struct Reading {
+  struct Sample {
     double force = 0.0, gap = 0.0, cross = 0.0;  ///< [N], [V], [V]; means over the steps, with noise
   };
-  Reading read(double time, std::mt19937_64& random);
+  Sample read(double time, std::mt19937_64& random);
   bool hasCross() const { return traits_.cross_sensor; }
 
   /// Whether the tool touched a sensor in this sample.
@@ -64,16 +64,16 @@ class HammerStation {
   /// Least distance [m] of the tool from the sensors' faces since it faced them.
   double closest() const { return closest_; }
   /// Distance [m] of the surface at the hammer from the cutting circle.
-  double struckRetreat(const Place& place, std::size_t axis) const;
+  double struckRetreat(const Pose& pose, std::size_t axis) const;
 
  private:
-  struct Way {                           // responses to a hit in one axis
+  struct ResponsePath {                  // responses to a hit in one axis
     std::vector<ModalFilter> read, tip;  // by axis
   };
   std::array<double, 2> gaps(const std::array<double, 2>& displacement) const;
-  double rigid(double height) const;
-  void standBy(std::size_t axis);
-  void settle(const Place& place, std::mt19937_64& random);
+  double rigidRatio(double height) const;
+  void updateFilters(std::size_t axis);
+  void updatePositionError(const Pose& pose, std::mt19937_64& random);
 
   smartmill::HammerStation station_;
   ToolGeometry tool_;
@@ -82,27 +82,27 @@ class HammerStation {
   std::array<GapSensor, 2> sensor_;  // in x, y
   Solenoid solenoid_;
   std::optional<ToolStructure> structure_;
-  std::vector<Way> ways_;                     // by struck axis; of a beam, at the height of the last hit
-  std::array<double, 2> way_height_{{0, 0}};  // [m] height of the sensor above the tip for each
-  double step_;                               // [s]
-  bool turns_ = false;                        // a rigid tool turns about its pivot
-  double height_ = 0.0;                       // [m] height of the sensor's centre above the tip
+  std::vector<ResponsePath> paths_;            // by struck axis; of a beam, at the height of the last hit
+  std::array<double, 2> path_height_{{0, 0}};  // [m] height of the sensor above the tip for each
+  double step_;                                // [s]
+  bool pivots_ = false;                        // a rigid tool turns about its pivot
+  double height_ = 0.0;                        // [m] height of the sensor's centre above the tip
 
   bool fired_ = false;
   std::size_t fired_axis_ = 0;
-  std::optional<std::size_t> before_;  // axis of the station that the tool faces
-  Place place_;
-  std::optional<Place> faced_;
-  int since_faced_ = 0;
+  std::optional<std::size_t> facing_axis_;  // axis of the station that the tool faces
+  Pose pose_;
+  std::optional<Pose> surface_pose_;
+  int samples_since_update_ = 0;
   bool moving_ = false;
-  std::array<double, 2> unseen_{{0, 0}};  // [m] positioning error of x and y
+  std::array<double, 2> position_error_{{0, 0}};  // [m] positioning error of x and y
   std::array<double, 3> stopped_{};
-  std::array<double, 2> now_{{0, 0}};  // [m] displacement of the structure at the sensor
-  struct Seen {                        // sensor values of the present surface at one gap
+  std::array<double, 2> sensor_displacement_{{0, 0}};  // [m] displacement of the structure at the sensor
+  struct GapCache {                                    // sensor values of the present surface at one gap
     double gap = -1.0, clearance = 1.0, volt = 0.0;
   };
-  std::array<Seen, 2> seen_;
-  double rings_until_ = -1.0;  // [s]
+  std::array<GapCache, 2> gap_cache_;
+  double vibrates_until_ = -1.0;  // [s]
   bool touched_ = false;
   double closest_ = 1.0;
   int steps_ = 0;

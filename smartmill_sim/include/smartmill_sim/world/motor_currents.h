@@ -48,8 +48,8 @@ struct MotorTraits {
 };
 
 /// Phase currents of the motors at 1 kHz: a sine over the electrical angle, whose range (twice the amplitude)
-/// follows the motor's load. At rest static friction carries the load up to its limit, and the current is
-/// constant.
+/// follows the motor's load. At rest static friction carries the load up to its limit, and the
+/// current is constant.
 class MotorCurrents {
  public:
   static constexpr double SAMPLE_RATE = 1000.0;  ///< [Hz]
@@ -73,13 +73,13 @@ class MotorCurrents {
   double temperature() const { return temperature_; }  ///< [deg C] present temperature of the drives
 
  private:
-  struct At {
+  struct DriveState {
     double time = 0.0;
     std::array<double, 3> position{{0, 0, 0}};
     double turns = 0.0;  // [1] of the spindle
     double speed = 0.0;  // [rad/s]
   };
-  void sample(const At& at);
+  void sample(const DriveState& at);
   double phase(double range, double periods);
 
   MotorTraits traits_;
@@ -87,11 +87,11 @@ class MotorCurrents {
   Spindle spindle_;
   std::mt19937_64 random_;
   std::normal_distribution<double> normal_;
-  bool any_ = false;
-  At last_, sampled_;
+  bool started_ = false;
+  DriveState last_, sampled_;
   double last_angle_ = 0.0;
   std::array<double, 3> cut_{{0, 0, 0}}, load_{{0, 0, 0}}, velocity_{{0, 0, 0}};
-  double torque_ = 0.0, torque_load_ = 0.0, slipped_ = 0.0, count_ = 0.0;
+  double torque_ = 0.0, torque_load_ = 0.0, slip_revolutions_ = 0.0, count_ = 0.0;
   double temperature_;
   std::uint64_t index_ = 0, block_index_ = 0;
   std::vector<double> samples_;

@@ -35,10 +35,10 @@ class Plate {
  public:
   Plate(const PlateTraits& traits, double step, std::uint64_t seed);
 
-  /// One integration step. @param cut [N] cutting force @param cut_point [m] machine coordinates @param blow
-  /// [N] force of a hit @param blow_point [m] from the plate's origin
+  /// One integration step. @param cut [N] cutting force @param cut_point [m] machine coordinates @param hit
+  /// [N] force of a hit @param hit_point [m] from the plate's origin
   void step(const std::array<double, 3>& cut, const std::array<double, 3>& cut_point,
-            const std::array<double, 3>& blow, const std::array<double, 3>& blow_point);
+            const std::array<double, 3>& hit, const std::array<double, 3>& hit_point);
   /// The sample of these steps: means over them, with noise. @return forces [N], moments [N m]
   std::array<double, 6> read();
 
@@ -46,7 +46,7 @@ class Plate {
   PlateTraits traits_;
   Eigen::Matrix<double, 12, 12> transition_;
   Eigen::Matrix<double, 12, 6> from_before_, from_change_;
-  Eigen::Matrix<double, 6, 12> shown_;
+  Eigen::Matrix<double, 6, 12> output_;
   Eigen::Matrix<double, 12, 1> state_ = Eigen::Matrix<double, 12, 1>::Zero();
   Eigen::Matrix<double, 6, 1> last_ = Eigen::Matrix<double, 6, 1>::Zero();
   Eigen::Matrix<double, 6, 1> sum_ = Eigen::Matrix<double, 6, 1>::Zero();

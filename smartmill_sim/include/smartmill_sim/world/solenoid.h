@@ -10,7 +10,7 @@ namespace smartmill::sim {
 
 /// One contact of a hammer: peak sin(pi u^(1 + skew)) over the relative contact time u; skew 0 is the half
 /// sine of Dunwoody section 4.3.1.
-struct Blow {
+struct Hit {
   double begin = 0.0;    ///< [s]
   double peak = 0.0;     ///< [N]
   double contact = 0.0;  ///< [s] > 0
@@ -31,16 +31,16 @@ class Solenoid {
   /// Fires the hammer. @param now [s] time of the command @param touch [s] time of the first contact
   void fire(double now, double touch, std::mt19937_64& random);
   /// Skips a time [s].
-  void shift(double time);
+  void skipTime(double time);
 
   double force(double time) const;    ///< [N] of the hammer on its target
   double current(double time) const;  ///< [1] relative to its final value
-  bool over(double time) const { return blows_.empty() || blows_.back().over(time); }
+  bool over(double time) const { return hits_.empty() || hits_.back().over(time); }
 
  private:
   StationTraits traits_;
   double peak_, contact_, force_scatter_;
-  std::vector<Blow> blows_;
+  std::vector<Hit> hits_;
   double fired_ = 0.0;
 };
 

@@ -74,10 +74,10 @@ class SpindleSensor {
   /// compression. @return x1 .. z2 [N]
   std::array<double, 6> read();
   /// Skips a time [s].
-  void lose(double time) { time_ += time; }
+  void skipTime(double time) { time_ += time; }
 
  private:
-  void layOut();
+  void updateModes();
 
   SpindleSensorTraits traits_;
   double step_, sample_;  // [s]

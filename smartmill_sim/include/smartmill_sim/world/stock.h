@@ -23,13 +23,13 @@ class Stock {
                                   const std::array<double, 3>& velocity) const;
 
   /// Whether there is material above the tip within the tool's circle.
-  bool above(const std::array<double, 3>& position) const;
+  bool hasMaterialAbove(const std::array<double, 3>& position) const;
 
   /// The cutting tool has reached a position [m]: the stock along its path is removed, effective once it
   /// leaves the present line.
-  void pass(const std::array<double, 3>& position);
-  /// The tool is out of contact: the next slot begins at the next pass().
-  void leave() { open_ = false; }
+  void cutTo(const std::array<double, 3>& position);
+  /// The tool is out of contact: the next slot begins at the next cutTo().
+  void endSlot() { slot_open_ = false; }
 
  private:
   /// Slot cut along a straight line.
@@ -38,13 +38,13 @@ class Stock {
     double bottom;                   // [m] z of the tip
   };
   double depthAt(double x, double y, double z, std::size_t slots) const;
-  bool along(const std::array<double, 3>& velocity) const;
-  bool inLine(const std::array<double, 3>& position) const;
+  bool continuesSlot(const std::array<double, 3>& velocity) const;
+  bool continuesLine(const std::array<double, 3>& position) const;
 
   Workpiece box_;
   double radius_;
   std::vector<Slot> slots_;
-  bool open_ = false;  // the last slot is still being cut
+  bool slot_open_ = false;  // the last slot is still being cut
 };
 
 }  // namespace smartmill::sim

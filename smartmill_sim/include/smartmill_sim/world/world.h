@@ -113,7 +113,7 @@ class World {
   void advance(Block& block, const std::vector<MotionState>& states);
 
   /// Skips samples: the index advances, the machine does not move.
-  void lose(std::uint64_t samples);
+  void skipSamples(std::uint64_t samples);
 
  private:
   class Impl;
