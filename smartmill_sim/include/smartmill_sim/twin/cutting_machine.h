@@ -95,9 +95,8 @@ class CuttingMachine {
   /// Applies the signal stage (drift, hum, saturation) to the channels at a time since the begin of the
   /// record [s].
   void applySignalEffects(double record_time, ChannelValues& channels) const;
-  bool hasSignalEffects() const {
-    return effects_.has(Stage::signal);
-  }  ///< whether the model has a signal stage
+  /// Whether the model has effects of the signal stage.
+  bool hasSignalEffects() const { return effects_.has(Stage::signal); }
 
   /// Largest magnitude that each channel can indicate; infinity: unlimited.
   ChannelValues limits() const { return effects_.limits(); }

@@ -82,7 +82,7 @@ class MillingProcess {
   struct Delay {
     double turn = 0.0;  // [rad]
     HistoryPoint point;
-    long valid_regime = -1;  // regime of position and fed
+    long valid_regime = -1;  // regime of point and fed
     long updated_at = -1;    // step of the other values
     bool within_history = false;
     std::array<double, 2> displacement{};  // [m] at that time
@@ -133,7 +133,7 @@ class MillingProcess {
   ChipRule rule_;
   CuttingLaw law_;
   double time_step_, lag_;
-  double path_share_;  // [1]
+  double path_share_;  // [1] weight of the path correction
   int only_tooth_ = -1;
   std::vector<ContactArc> arcs_;
   ToolMotion now_;
