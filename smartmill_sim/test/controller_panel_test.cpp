@@ -15,9 +15,9 @@ std::array<double, 3> mm(double x, double y, double z) {
   return {x * 1e-3, y * 1e-3, z * 1e-3};
 }
 
-void expectAt(const Machine& m, const std::array<double, 3>& due, const std::string& what) {
+void expectAt(const Machine& m, const std::array<double, 3>& expected, const std::string& what) {
   for (std::size_t i = 0; i < 3; ++i) {
-    EXPECT_NEAR(m.controller.motion().position[i], due[i], 1e-9) << what << " axis " << i;
+    EXPECT_NEAR(m.controller.motion().position[i], expected[i], 1e-9) << what << " axis " << i;
   }
 }
 

@@ -24,12 +24,12 @@ TEST(Axes, LongMoveTakesDistanceOverFeedPlusFeedOverAcceleration) {
   m.start("G1 X60 Y80 F6000\n");  // 0.1 m at 0.1 m/s: 1 s + 0.1 / 2 s
   m.run(0.5);
   // After the ramp (v^2 / 2a behind v t) along the line 3:4.
-  const double way = 0.1 * 0.5 - 0.1 * 0.1 / (2.0 * 2.0);
-  EXPECT_NEAR(m.states.back().position[0], 0.6 * way, ROUND);
-  EXPECT_NEAR(m.states.back().position[1], 0.8 * way, ROUND);
+  const double distance = 0.1 * 0.5 - 0.1 * 0.1 / (2.0 * 2.0);
+  EXPECT_NEAR(m.states.back().position[0], 0.6 * distance, ROUND);
+  EXPECT_NEAR(m.states.back().position[1], 0.8 * distance, ROUND);
   EXPECT_NEAR(m.states.back().velocity[0], 0.06, ROUND);
   EXPECT_NEAR(m.controller.actualFeed(), 6000.0, 1e-8);
-  EXPECT_NEAR(m.controller.distanceToGo()[0], 60.0 - 600.0 * way, 1e-9);
+  EXPECT_NEAR(m.controller.distanceToGo()[0], 60.0 - 600.0 * distance, 1e-9);
   EXPECT_EQ(m.controller.distanceToGo()[2], 0.0);
   EXPECT_EQ(m.controller.status().motion, focas::MOTION_MOVES);
   EXPECT_NEAR(0.5 + m.runToEnd(1e-5), 1.05, 1.1e-5);
@@ -72,8 +72,8 @@ TEST(Axes, RapidRelativeAndWorkOffset) {
   EXPECT_EQ(m.controller.machinePosition(), (std::vector<double>{50.0, 0.0, -30.0}));
   EXPECT_NEAR(m.controller.absolutePosition()[2], 70.0, 1e-9);
   m.start("N10 G0 X0\n");
-  const double way = 0.04;  // from 50 to 10 mm, triangle below 0.5^2 / 2 = 0.125 m
-  EXPECT_NEAR(m.runToEnd(1e-5), 2.0 * std::sqrt(way / 2.0), 1.1e-5);
+  const double distance = 0.04;  // from 50 to 10 mm, triangle below 0.5^2 / 2 = 0.125 m
+  EXPECT_NEAR(m.runToEnd(1e-5), 2.0 * std::sqrt(distance / 2.0), 1.1e-5);
   m.send("G91 Y-5 Z2.5\nY-5\nG90 G1 F3000 Z71\r\n");
   m.runToEnd();
   EXPECT_NEAR(m.controller.motion().position[0], 0.01, ROUND);
@@ -194,15 +194,15 @@ TEST(Session, BufferIsBoundedAndEmptiesAsBlocksRun) {
 TEST(Session, MarkerIsSetAfterEveryBlockBeforeIt) {
   Machine m;
   m.start("%\nG1 X10 F600\n#100=7\n");
-  bool seen = false;
-  for (int i = 0; i < 2000 && !seen; ++i) {
+  bool marker_set = false;
+  for (int i = 0; i < 2000 && !marker_set; ++i) {
     m.run(DT);
-    seen = m.macro(100).has_value();
-    if (!seen) {
+    marker_set = m.macro(100).has_value();
+    if (!marker_set) {
       EXPECT_LT(m.controller.motion().position[0], 0.01);
     }
   }
-  EXPECT_TRUE(seen);
+  EXPECT_TRUE(marker_set);
   EXPECT_EQ(m.controller.motion().position[0], 0.01);
   EXPECT_EQ(m.controller.executingBlock(), "");
   EXPECT_EQ(m.controller.status().run, focas::RUN_STOP);

@@ -30,12 +30,12 @@ std::array<double, 3> means(const std::array<double, 6>& s) {
 }
 
 std::array<double, 3> meansUnder(SpindleSensor& sensor, const std::array<double, 3>& force) {
-  std::array<double, 6> shown{};
+  std::array<double, 6> output{};
   for (int i = 0; i < 20000; ++i) {
     sensor.step(force, 0.0, 0.0);
-    shown = sensor.read();
+    output = sensor.read();
   }
-  return means(shown);
+  return means(output);
 }
 
 // Burzoni Table 3 at the 139 mm of his Table 2; three digits of the defaults.
@@ -56,14 +56,14 @@ TEST(SpindleSensor, MatchesTable3AtItsLength) {
 // constant, is not.
 TEST(SpindleSensor, MeasuredForceIsLinearInTheLength) {
   SpindleSensor sensor(quiet(), STEP, RATE, 1);
-  std::array<double, 3> shown{};
+  std::array<double, 3> output{};
   for (std::size_t k = 0; k < 3; ++k) {
     sensor.setLength(0.1 + 0.04 * static_cast<double>(k));
-    shown[k] = meansUnder(sensor, {0.0, 100.0, 0.0})[1];
+    output[k] = meansUnder(sensor, {0.0, 100.0, 0.0})[1];
   }
-  EXPECT_NEAR(shown[1], 0.5 * (shown[0] + shown[2]), 1e-9);
-  EXPECT_NEAR(shown[2] / shown[0], (0.18 + 0.146) / (0.1 + 0.146), 1e-9);
-  EXPECT_GT(std::abs(0.5 * (1.0 / shown[0] + 1.0 / shown[2]) * shown[1] - 1.0), 0.01);
+  EXPECT_NEAR(output[1], 0.5 * (output[0] + output[2]), 1e-9);
+  EXPECT_NEAR(output[2] / output[0], (0.18 + 0.146) / (0.1 + 0.146), 1e-9);
+  EXPECT_GT(std::abs(0.5 * (1.0 / output[0] + 1.0 / output[2]) * output[1] - 1.0), 0.01);
   EXPECT_THROW(sensor.setLength(1.0), Error);
 }
 
@@ -75,13 +75,13 @@ TEST(SpindleSensor, ModesFallWithLengthAndWashersUnload) {
   const double before = sensor.modes(0).modes[0].frequency;
   sensor.setLength(0.278);
   EXPECT_NEAR(sensor.modes(0).modes[0].frequency, before * std::pow(0.5, 0.6), 1e-9);
-  std::array<double, 6> shown{};
+  std::array<double, 6> output{};
   for (int i = 0; i < 20000; ++i) {
     sensor.step({0.0, 5000.0, 0.0}, 0.0, 0.0);
-    shown = sensor.read();
+    output = sensor.read();
   }
-  EXPECT_DOUBLE_EQ(shown[2], -50.0);
-  EXPECT_GT(shown[3], 100.0);
+  EXPECT_DOUBLE_EQ(output[2], -50.0);
+  EXPECT_GT(output[3], 100.0);
 }
 
 TEST(SpindleSensor, NoiseGrowsFromRestToAirToCut) {
@@ -112,16 +112,16 @@ TEST(Plate, CarriesTheWrenchAndResonatesAtItsFrequency) {
   traits.force_noise = traits.moment_noise = 0.0;
   traits.centre = {0.0, 0.0, 0.0};
   Plate plate(traits, STEP, 1);
-  std::array<double, 6> shown{};
+  std::array<double, 6> output{};
   std::complex<double> line = 0.0;
   for (int i = 0; i < 60000; ++i) {
     plate.step({100.0, -50.0, 30.0}, {0.02, 0.01, -0.17}, {}, {});
-    shown = plate.read();
+    output = plate.read();
   }
   // M = r x F about the origin, r = (0.02, 0.01, 0.03).
   const std::array<double, 6> expected{
       100.0, -50.0, 30.0, 0.01 * 30.0 + 0.03 * 50.0, 0.03 * 100.0 - 0.02 * 30.0, -0.02 * 50.0 - 0.01 * 100.0};
-  for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(shown[i], expected[i], 1e-6) << i;
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(output[i], expected[i], 1e-6) << i;
   // Along z through the centre at the natural frequency: (1 + 2 i zeta) / (2 i zeta).
   Plate other(traits, STEP, 1);
   constexpr int N = 25600;

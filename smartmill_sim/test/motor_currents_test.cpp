@@ -30,7 +30,7 @@ std::array<std::vector<double>, 4> run(MotorCurrents& motors, const std::array<d
                                        const std::array<double, 3>& force, double torque, double speed,
                                        double duration = 3.0) {
   constexpr double RATE = 25600.0;
-  std::array<std::vector<double>, 4> shown;
+  std::array<std::vector<double>, 4> currents;
   const auto steps = static_cast<int>(duration * RATE);
   for (int i = 0; i < steps; ++i) {
     MotorCurrents::Input input;
@@ -47,8 +47,8 @@ std::array<std::vector<double>, 4> run(MotorCurrents& motors, const std::array<d
   }
   const SampleBlock block = motors.take();
   for (std::size_t i = block.size() / 3; i < block.size(); ++i)
-    for (std::size_t c = 0; c < 4; ++c) shown[c].push_back(block.at(i, c));
-  return shown;
+    for (std::size_t c = 0; c < 4; ++c) currents[c].push_back(block.at(i, c));
+  return currents;
 }
 
 double rangeOf(const std::vector<double>& samples) {
@@ -96,8 +96,8 @@ TEST(MotorCurrents, spindleIsMagnetisedAndWeakensItsField) {
   EXPECT_NEAR(motors.spindleRange(9.6, 100.0), std::hypot(6.0, 8.0), 1e-12);
   EXPECT_NEAR(motors.spindleRange(9.6, 330.0), std::hypot(3.0, 16.0), 1e-12);
   MotorCurrents turning(traits, spindle(), 1);
-  const auto shown = run(turning, {0, 0, 0}, {0, 0, 0}, 9.0, 100.0);
-  EXPECT_NEAR(rangeOf(shown[3]), motors.spindleRange(9.0 + 0.4 + 0.2, 100.0), 0.05);
+  const auto currents = run(turning, {0, 0, 0}, {0, 0, 0}, 9.0, 100.0);
+  EXPECT_NEAR(rangeOf(currents[3]), motors.spindleRange(9.0 + 0.4 + 0.2, 100.0), 0.05);
 }
 
 // Broms: temperature changes the constants. 20 K more: 16 % less friction, 2.2 % less force per ampere.
@@ -106,8 +106,8 @@ TEST(MotorCurrents, temperatureChangesFrictionAndConstants) {
   warm.temperature = 40.0;
   MotorCurrents motors(warm, spindle(), 1);
   const double v = 20e-3;
-  const auto shown = run(motors, {v, 0, 0}, {0, 0, 0}, 0.0, 100.0);
-  EXPECT_NEAR(rangeOf(shown[0]) * 200.0, 0.84 * (150.0 + 600.0 * v) / 0.978, 2.0);
+  const auto currents = run(motors, {v, 0, 0}, {0, 0, 0}, 0.0, 100.0);
+  EXPECT_NEAR(rangeOf(currents[0]) * 200.0, 0.84 * (150.0 + 600.0 * v) / 0.978, 2.0);
   MotorTraits warming = quiet();
   warming.warm_up = 0.05;
   warming.warm_up_time = 1.0;

@@ -105,10 +105,10 @@ TEST(Stock, ASlotIsAir) {
   ASSERT_EQ(deeper.size(), 1u);
   EXPECT_NEAR(deeper[0].depth, 1e-3, 1e-9);
   // Offset by 12 mm: the tool overlaps the slot from 12 - 8 = 4 mm off its axis on.
-  const std::vector<ContactArc> beside = stock.contact({0.0, 12e-3, -2e-3}, {0.01, 0.0, 0.0});
-  ASSERT_EQ(beside.size(), 1u);
-  EXPECT_NEAR(beside[0].entry, 0.0, 1e-9);
-  EXPECT_NEAR(beside[0].exit, PI - std::acos(4e-3 / RADIUS), 1e-6);
+  const std::vector<ContactArc> side_cut = stock.contact({0.0, 12e-3, -2e-3}, {0.01, 0.0, 0.0});
+  ASSERT_EQ(side_cut.size(), 1u);
+  EXPECT_NEAR(side_cut[0].entry, 0.0, 1e-9);
+  EXPECT_NEAR(side_cut[0].exit, PI - std::acos(4e-3 / RADIUS), 1e-6);
   EXPECT_FALSE(stock.hasMaterialAbove({0.0, 0.0, -2e-3}));
   EXPECT_TRUE(stock.hasMaterialAbove({0.0, 0.0, -2.1e-3}));
   EXPECT_TRUE(stock.hasMaterialAbove({0.0, 12e-3, -2e-3}));

@@ -70,10 +70,10 @@ void EffectSet::measure(Stage stage, const Instant& now, ChannelValues& channels
 }
 
 ChannelValues EffectSet::limits() const {
-  ChannelValues most;
-  most.fill(std::numeric_limits<double>::infinity());
-  for (const Member& m : effects_) m.effect->applyLimit(most);
-  return most;
+  ChannelValues limits;
+  limits.fill(std::numeric_limits<double>::infinity());
+  for (const Member& m : effects_) m.effect->applyLimit(limits);
+  return limits;
 }
 
 std::vector<Tone*> EffectSet::tones() {

@@ -99,11 +99,11 @@ double Lathe::force(double chip) const {
 
 double Lathe::pastSurface() const {
   const double back = units::TWO_PI / traits_.spindle_speed * traits_.rate;
-  const auto whole = static_cast<std::size_t>(back);
-  if (whole >= surface_.size()) return 0.0;
+  const auto whole_steps = static_cast<std::size_t>(back);
+  if (whole_steps >= surface_.size()) return 0.0;
   // surface_[k] is k + 1 samples old.
-  const double share = back - static_cast<double>(whole);
-  return surface_[whole - 1] + share * (surface_[whole] - surface_[whole - 1]);
+  const double share = back - static_cast<double>(whole_steps);
+  return surface_[whole_steps - 1] + share * (surface_[whole_steps] - surface_[whole_steps - 1]);
 }
 
 Lathe::Block Lathe::advance(std::size_t count) {

@@ -78,9 +78,9 @@ void Cutter::setDepths(const std::vector<double>& depths) {
 void Cutter::setLaw(const CuttingLaw& law) {
   law_ = law;
   for (StraightMill& mill : mills_) {
-    const CuttingLaw own = lawOf(mill.actual, law);
-    if (mill.process) mill.process->setLaw(own);
-    if (mill.rigid) mill.rigid->setLaw(own);
+    const CuttingLaw adapted = lawOf(mill.actual, law);
+    if (mill.process) mill.process->setLaw(adapted);
+    if (mill.rigid) mill.rigid->setLaw(adapted);
   }
 }
 

@@ -186,11 +186,11 @@ void CuttingMachine::step(const Input& input, Output& out) {
   contact_changed_ = false;
   if (effects_.has(Stage::sensor_output)) effects_.measure(Stage::sensor_output, now_, out.raw);
   filterChannels(out);
-  ChannelValues shown = out.raw;
-  if (effects_.has(Stage::signal)) effects_.measure(Stage::signal, now_, shown);
-  out.sensor = {{shown[FX], shown[FY], shown[FZ]}};
-  out.load_meter = shown[LOAD_METER];
-  out.displacement = {{shown[TOOL_X], shown[TOOL_Y]}};
+  ChannelValues measured = out.raw;
+  if (effects_.has(Stage::signal)) effects_.measure(Stage::signal, now_, measured);
+  out.sensor = {{measured[FX], measured[FY], measured[FZ]}};
+  out.load_meter = measured[LOAD_METER];
+  out.displacement = {{measured[TOOL_X], measured[TOOL_Y]}};
   advanceTime(input.motion);
 }
 
@@ -369,12 +369,12 @@ void CuttingMachine::run(std::size_t steps, const std::function<void(std::size_t
                          const ChannelRows& raw) {
   // Channels that are not requested may act on requested ones.
   const bool mixes = effects_.has(Stage::sensor_output) || !resonances_.empty();
-  std::array<std::vector<double>, LOAD_METER + 1> own;
+  std::array<std::vector<double>, LOAD_METER + 1> unrequested;
   ChannelRows rows = raw;
-  for (std::size_t c = 0; c < own.size() && mixes; ++c) {
+  for (std::size_t c = 0; c < unrequested.size() && mixes; ++c) {
     if (rows[c]) continue;
-    own[c].resize(steps);
-    rows[c] = &own[c];
+    unrequested[c].resize(steps);
+    rows[c] = &unrequested[c];
   }
   StepHistory history;
   simulateCut(steps, next, rows, history);

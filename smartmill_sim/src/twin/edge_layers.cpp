@@ -44,19 +44,19 @@ EdgeLayers::EdgeLayers(const TwinSetup& setup, const CuttingLaw& law, double tim
 
 void EdgeLayers::engage(const std::vector<ContactArc>& arcs, const ToolMotion& now) {
   for (Layer& layer : layers_) {
-    std::vector<ContactArc> own = arcs;
-    for (ContactArc& a : own) a.depth = depthOf(layer.definition, a.depth);
-    if (layer.rigid) layer.rigid->engage(own, feedOf(now));
-    if (layer.process) layer.process->engage(own, now);
+    std::vector<ContactArc> adapted = arcs;
+    for (ContactArc& a : adapted) a.depth = depthOf(layer.definition, a.depth);
+    if (layer.rigid) layer.rigid->engage(adapted, feedOf(now));
+    if (layer.process) layer.process->engage(adapted, now);
   }
 }
 
 void EdgeLayers::setDepths(const std::vector<double>& depths) {
   for (Layer& layer : layers_) {
-    std::vector<double> own;
-    for (const double d : depths) own.push_back(depthOf(layer.definition, d));
-    if (layer.rigid) layer.rigid->setDepths(own);
-    if (layer.process) layer.process->setDepths(own);
+    std::vector<double> adapted;
+    for (const double d : depths) adapted.push_back(depthOf(layer.definition, d));
+    if (layer.rigid) layer.rigid->setDepths(adapted);
+    if (layer.process) layer.process->setDepths(adapted);
   }
 }
 

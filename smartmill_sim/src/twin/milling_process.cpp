@@ -89,9 +89,10 @@ bool MillingProcess::isSteadyOver(double turn) const {
 /// Interpolation point so many steps ago: cubic through the four steps around it.
 MillingProcess::HistoryPoint MillingProcess::historyPointAt(double steps) {
   steps = std::max(2.0, steps);
-  const auto whole = static_cast<std::size_t>(steps);
-  const double f = steps - static_cast<double>(whole), g = f - 1.0, h = f - 2.0, across = (f + 1.0) * f;
-  return {steps, whole, {{across * g / 6.0, -across * h / 2.0, (f + 1.0) * g * h / 2.0, -f * g * h / 6.0}}};
+  const auto whole_steps = static_cast<std::size_t>(steps);
+  const double f = steps - static_cast<double>(whole_steps), g = f - 1.0, h = f - 2.0, across = (f + 1.0) * f;
+  return {
+      steps, whole_steps, {{across * g / 6.0, -across * h / 2.0, (f + 1.0) * g * h / 2.0, -f * g * h / 6.0}}};
 }
 
 /// Derivatives of these weights per step farther back.

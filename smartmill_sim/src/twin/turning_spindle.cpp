@@ -7,7 +7,7 @@
 
 namespace smartmill::sim {
 
-ModalModel TurningSpindle::at(double speed, const ModalModel& standing) const {
+ModalModel TurningSpindle::at(double speed, const ModalModel& at_rest) const {
   if (!(reference_speed > 0.0))
     throw Error(formatted("reference_speed: %g, expected a value above 0", reference_speed));
   const double share = speed / reference_speed;
@@ -17,7 +17,7 @@ ModalModel TurningSpindle::at(double speed, const ModalModel& standing) const {
         formatted("spindle speed %g rad/s: softening, damping_rise or gyroscopic out of range (stiffness and "
                   "damping must stay above 0)",
                   speed));
-  ModalModel turning = standing;
+  ModalModel turning = at_rest;
   for (Mode& mode : turning.modes) {
     mode.frequency *= std::sqrt(stiffness);
     mode.damping_ratio *= damping;
@@ -39,10 +39,10 @@ ModalModel TurningSpindle::at(double speed, const ModalModel& standing) const {
   return turning;
 }
 
-MachineModel TurningSpindle::at(double speed, const MachineModel& standing) const {
-  MachineModel turning = standing;
-  turning.tool_tip.x = at(speed, standing.tool_tip.x);
-  turning.tool_tip.y = at(speed, standing.tool_tip.y);
+MachineModel TurningSpindle::at(double speed, const MachineModel& at_rest) const {
+  MachineModel turning = at_rest;
+  turning.tool_tip.x = at(speed, at_rest.tool_tip.x);
+  turning.tool_tip.y = at(speed, at_rest.tool_tip.y);
   return turning;
 }
 

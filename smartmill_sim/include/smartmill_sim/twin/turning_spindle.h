@@ -20,9 +20,9 @@ struct TurningSpindle {
   /// modes at sqrt(w0^2 + d^2) -+ d with d = g / 2m, gains k^-1 w0^2 / (w (w_b + w_f)), damping ratios
   /// 2 zeta w0 / (w_b + w_f). The cross FRF of the two axes is neglected.
   /// @throws Error on a parameter out of range.
-  ModalModel at(double speed, const ModalModel& standing) const;
+  ModalModel at(double speed, const ModalModel& at_rest) const;
   /// The model with the modes of its tool tip at a speed [rad/s].
-  MachineModel at(double speed, const MachineModel& standing) const;
+  MachineModel at(double speed, const MachineModel& at_rest) const;
 };
 
 }  // namespace smartmill::sim
