@@ -15,7 +15,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 using Row = std::vector<std::string>;
 
-std::string shown(const char* format, double value) {
+std::string cell(const char* format, double value) {
   if (std::isnan(value)) return "-";
   return formatted(format, value);
 }
@@ -49,7 +49,7 @@ std::string verdictOf(const Figure& figure) {
 
 std::string targetText(const Target& target) {
   if (std::isnan(target.percent)) return "";
-  return shown(target.at_least ? ">= %.1f %%" : "<= %.1f %%", target.percent);
+  return cell(target.at_least ? ">= %.1f %%" : "<= %.1f %%", target.percent);
 }
 
 /// JSON knows neither NaN nor infinity.
@@ -74,8 +74,8 @@ std::string markdown(const Report& report) {
     std::vector<Row> rows{
         {"quantity", "unit", "measured", "std", "true", "diff %", "diff/std", "target", "verdict"}};
     for (const Figure& f : section.figures) {
-      rows.push_back({f.name, f.unit, shown("%.6g", f.estimate), shown("%.2g", f.std_dev),
-                      shown("%.6g", f.truth), shown("%+.3f", f.percent()), shown("%+.2f", f.sigmas()),
+      rows.push_back({f.name, f.unit, cell("%.6g", f.estimate), cell("%.2g", f.std_dev),
+                      cell("%.6g", f.truth), cell("%+.3f", f.percent()), cell("%+.2f", f.sigmas()),
                       targetText(f.target), verdictOf(f)});
     }
     out << "\n## " << section.title << "\n\n" << aligned(rows);
@@ -85,11 +85,11 @@ std::string markdown(const Report& report) {
                            "detector", "windows", "chatter Hz", "non-periodic share of true force",
                            "verdict"}};
     for (const CutCheck& cut : report.cuts) {
-      rows.push_back({cut.name, shown("%.0f", units::rpmFromRadPerSec(cut.spindle_speed)),
-                      shown("%.3f", cut.axial_depth / units::MM), shown("%.3f", cut.limit / units::MM),
-                      shown("%.3f", cut.true_limit / units::MM), wordOf(cut.due), wordOf(cut.verdict.kind),
+      rows.push_back({cut.name, cell("%.0f", units::rpmFromRadPerSec(cut.spindle_speed)),
+                      cell("%.3f", cut.axial_depth / units::MM), cell("%.3f", cut.limit / units::MM),
+                      cell("%.3f", cut.true_limit / units::MM), wordOf(cut.due), wordOf(cut.verdict.kind),
                       std::to_string(cut.verdict.chattering) + " of " + std::to_string(cut.verdict.windows),
-                      shown("%.1f", cut.verdict.frequency), shown("%.4f", cut.nonperiodic),
+                      cell("%.1f", cut.verdict.frequency), cell("%.4f", cut.nonperiodic),
                       cut.met() ? "met" : "MISSED"});
     }
     out << "\n## Cuts that check the chart\n\n" << aligned(rows);

@@ -221,7 +221,7 @@ CutCheck checkOf(const SessionRecording& recording, const RecordedCut& cut, doub
   check.spindle_speed = cut.condition.spindle_speed;
   check.axial_depth = cut.condition.engagement.axial_depth;
   check.true_limit = true_limit;
-  check.verdict = session::judge(cut.windows);
+  check.verdict = session::cutVerdict(cut.windows);
   if (recording.chart) {
     check.limit =
         interpolate(recording.chart->limit.spindle_speed, recording.chart->limit.depth, check.spindle_speed);

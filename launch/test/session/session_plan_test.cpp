@@ -193,7 +193,7 @@ TEST(SessionPlan, RefusesWhatDoesNotFitWithOneLine) {
   PlanParameters parameters;
   MachineModel model = mill();
   parameters.slot_feeds.assign(12, 1e-4);
-  EXPECT_NE(refusal(model, parameters).find("15 are due"), std::string::npos) << refusal(model, parameters);
+  EXPECT_NE(refusal(model, parameters).find("expected 15"), std::string::npos) << refusal(model, parameters);
   parameters = PlanParameters();
   parameters.slot_speed = radPerSecFromRpm(20500.0);
   EXPECT_NE(refusal(model, parameters).find("20500 rpm"), std::string::npos);
@@ -207,7 +207,7 @@ TEST(SessionPlan, RefusesWhatDoesNotFitWithOneLine) {
   parameters = PlanParameters();
   parameters.slot_feeds[3] = 1e-3;  // 267 mm/s: the stock's 260 mm last less than a second
   parameters.least_slot_time = 1.5;
-  EXPECT_NE(refusal(model, parameters).find("1.50 s are due"), std::string::npos)
+  EXPECT_NE(refusal(model, parameters).find("expected at least 1.50 s"), std::string::npos)
       << refusal(model, parameters);
   parameters = PlanParameters();
   model.axes->travel[0][0] = -0.16;
@@ -238,11 +238,11 @@ TEST(Judge, ATenthForgivenHalfIsChatterFewSayNothing) {
       out.push_back({i < chatter, i < chatter ? 800.0 + i : NOT_A_NUMBER, 1.0 * i});
     return out;
   };
-  EXPECT_EQ(judge({}).kind, CutVerdict::Kind::unknown);
-  EXPECT_EQ(judge(windows(1, 1)).kind, CutVerdict::Kind::unknown);
-  EXPECT_EQ(judge(windows(1, 10)).kind, CutVerdict::Kind::stable);
-  EXPECT_EQ(judge(windows(2, 10)).kind, CutVerdict::Kind::undecided);
-  const CutVerdict chatter = judge(windows(5, 10));
+  EXPECT_EQ(cutVerdict({}).kind, CutVerdict::Kind::unknown);
+  EXPECT_EQ(cutVerdict(windows(1, 1)).kind, CutVerdict::Kind::unknown);
+  EXPECT_EQ(cutVerdict(windows(1, 10)).kind, CutVerdict::Kind::stable);
+  EXPECT_EQ(cutVerdict(windows(2, 10)).kind, CutVerdict::Kind::undecided);
+  const CutVerdict chatter = cutVerdict(windows(5, 10));
   EXPECT_EQ(chatter.kind, CutVerdict::Kind::chatter);
   EXPECT_DOUBLE_EQ(chatter.frequency, 802.0);  // median of 800..804
   EXPECT_DOUBLE_EQ(chatter.severity, 9.0);
