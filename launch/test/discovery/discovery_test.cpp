@@ -110,7 +110,7 @@ TEST(Explained, aSuggestedTestMustFitMachineAndStock) {
   EXPECT_EQ(planSuggestedTest(planner, air, p.slotRequest("suggested", 9), 1.0).feed, 0.0);
 }
 
-TEST(InstalledModel, keepsTheModelBefore) {
+TEST(InstalledModel, keepsThePreviousModel) {
   const TemporaryFolder folder;
   const std::string believed = written(folder, "believed.yaml", "old"),
                     better = written(folder, "better.yaml", "new"),
@@ -179,7 +179,7 @@ TEST(Child, returnsTheExitCode) {
   EXPECT_THROW(session::runChild({"true"}, folder.file("none/log"), never), Error);
 }
 
-TEST(Parameters, theShippedFileIsTheTable) {
+TEST(Parameters, theShippedFileMatchesTheDeclaration) {
   expectShipped<DiscoveryParameters>("config/discover.yaml", "smartmill_launch discover_node");
 }
 
