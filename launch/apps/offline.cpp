@@ -165,9 +165,9 @@ bool compareOne(const Request& request, const SessionRecording& live, const Comp
 }
 
 int run(const Request& request) {
-  std::error_code error;
-  fs::create_directories(request.out, error);
-  if (error) throw Error(request.out + ": " + error.message());
+  std::error_code folder_error;
+  fs::create_directories(request.out, folder_error);
+  if (folder_error) throw Error(request.out + ": " + folder_error.message());
   const SessionRecording live = readSession(request.bag, {});
   const fs::path out(request.out);
   const std::vector<Comparison> comparisons{{{"frf", "the FRF and modes of the hits"},

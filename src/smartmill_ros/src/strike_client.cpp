@@ -20,8 +20,8 @@ void StrikeClient::strike(const std::string& direction) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (calling_) {
-      fault_ =
-          Answer{Answer::Kind::failed, std::string(names::STRIKE) + ": the last call has not been answered"};
+      fault_ = Answer{Answer::Kind::failed,
+                      std::string(names::STRIKE) + ": the previous call is not answered yet"};
       return;
     }
     calling_ = true;
