@@ -23,7 +23,7 @@ namespace {
 using Result = smartmill_msgs::DiscoverResult;
 using Client = actionlib::SimpleActionClient<smartmill_msgs::DiscoverAction>;
 
-constexpr double PATIENCE = 300.0;  // [s] time limit on a busy computer
+constexpr double TIMEOUT = 300.0;  // [s] time limit on a busy computer
 
 class Discover : public testing::Test {
  protected:
@@ -35,12 +35,12 @@ class Discover : public testing::Test {
           armed_ = m.armed;
         }));
     ros::NodeHandle("~").getParam("folder", folder_);
-    EXPECT_TRUE(client_.waitForServer(ros::Duration(PATIENCE)));
+    EXPECT_TRUE(client_.waitForServer(ros::Duration(TIMEOUT)));
     EXPECT_TRUE(wait([this] { return connected_.load(); }));
   }
 
   static bool wait(const std::function<bool()>& condition) {
-    const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(PATIENCE);
+    const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(TIMEOUT);
     while (!condition() && ros::WallTime::now() < end) ros::WallDuration(0.02).sleep();
     return condition();
   }
@@ -61,7 +61,7 @@ class Discover : public testing::Test {
                      [this](const smartmill_msgs::DiscoverFeedbackConstPtr& f) { cuts_ = f->cuts_done; });
   }
   Result result() {
-    EXPECT_TRUE(client_.waitForResult(ros::Duration(PATIENCE)));
+    EXPECT_TRUE(client_.waitForResult(ros::Duration(TIMEOUT)));
     return client_.getResult() ? *client_.getResult() : Result();
   }
 
@@ -86,8 +86,8 @@ TEST_F(Discover, isSafeAfterCancellation) {
   ASSERT_TRUE(wait([this] { return cuts_ >= 1; }));
   // A second goal is rejected.
   Client other(names::absolute(names::DISCOVER), true);
-  ASSERT_TRUE(other.waitForServer(ros::Duration(PATIENCE)));
-  EXPECT_EQ(other.sendGoalAndWait({}, ros::Duration(PATIENCE)), actionlib::SimpleClientGoalState::REJECTED);
+  ASSERT_TRUE(other.waitForServer(ros::Duration(TIMEOUT)));
+  EXPECT_EQ(other.sendGoalAndWait({}, ros::Duration(TIMEOUT)), actionlib::SimpleClientGoalState::REJECTED);
   EXPECT_EQ(other.getResult()->code, Result::BUSY);
   client_.cancelGoal();
   const Result r = result();

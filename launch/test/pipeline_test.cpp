@@ -24,7 +24,7 @@
 
 namespace {
 
-constexpr double PATIENCE = 120.0;  // [s] time limit on a busy computer
+constexpr double TIMEOUT = 120.0;  // [s] time limit on a busy computer
 
 bool waitFor(const std::function<bool()>& condition, double seconds) {
   const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(seconds);
@@ -42,7 +42,7 @@ TEST(Pipeline, EveryNodeAcceptsItsParametersAndRuns) {
     nodes.push_back(smartmill::names::absolute(name));
   smartmill::Followers followers(nodes);
   // A node that refuses a parameter ends before it answers.
-  EXPECT_NO_THROW(followers.begin(PATIENCE));
+  EXPECT_NO_THROW(followers.begin(TIMEOUT));
   EXPECT_NO_THROW(followers.leave());
 }
 
@@ -69,7 +69,7 @@ TEST(Pipeline, StreamsFlowAtTheirRates) {
       [&] {
         return count[smartmill::names::CNC_STATE] > 100 && count[smartmill::names::FORCE_COMPENSATED] > 200;
       },
-      PATIENCE));
+      TIMEOUT));
   const auto rate = [&](const char* topic) { return (count[topic] - 1) / (last[topic] - first[topic]); };
   // Blocks of 256 samples at 25600 Hz; stamps are of the sample clock, independent of the load of the
   // computer.
@@ -84,14 +84,14 @@ TEST(Pipeline, StreamsFlowAtTheirRates) {
         if (count[smartmill::names::CNC_STATE] > 200) count[smartmill::names::CNC_STATE] = 0;
         return false;
       },
-      PATIENCE));
+      TIMEOUT));
 }
 
 TEST(Pipeline, FramesAreConnected) {
   tf2_ros::Buffer buffer;
   const tf2_ros::TransformListener listener(buffer);
   for (const char* frame : {"spindle", "tool_tip", "table", "dynamometer", "hammer"}) {
-    EXPECT_TRUE(waitFor([&] { return buffer.canTransform("machine", frame, ros::Time(0)); }, PATIENCE))
+    EXPECT_TRUE(waitFor([&] { return buffer.canTransform("machine", frame, ros::Time(0)); }, TIMEOUT))
         << frame;
   }
 }
@@ -102,7 +102,7 @@ TEST(Pipeline, PredictionWithoutChartReturnsNoChart) {
   service.request.spindle_speed = 1000.0;
   service.request.axial_depth = 1e-3;
   ASSERT_TRUE(ros::service::waitForService(smartmill::names::absolute(smartmill::names::PREDICT_STABILITY),
-                                           static_cast<int>(1e3 * PATIENCE)));
+                                           static_cast<int>(1e3 * TIMEOUT)));
   ASSERT_TRUE(
       nh.serviceClient<smartmill_msgs::PredictStability>(smartmill::names::PREDICT_STABILITY).call(service));
   EXPECT_EQ(service.response.code, smartmill_msgs::PredictStability::Response::NO_CHART);

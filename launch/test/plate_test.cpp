@@ -30,7 +30,7 @@ using Calibrate = actionlib::SimpleActionClient<smartmill_msgs::CalibrateForceSe
 using Measure = actionlib::SimpleActionClient<smartmill_msgs::MeasureFrfAction>;
 using Point = std::array<double, 3>;
 
-constexpr double PATIENCE = 120.0;  // [s] time limit on a busy computer
+constexpr double TIMEOUT = 120.0;  // [s] time limit on a busy computer
 constexpr int HITS = 2;
 
 class Plate : public testing::Test {
@@ -38,21 +38,21 @@ class Plate : public testing::Test {
   Plate()
       : calibrate(smartmill::names::CALIBRATE_SENSOR, true),
         measure(smartmill::names::MEASURE_SENSOR_FRF, true) {
-    EXPECT_TRUE(calibrate.waitForServer(ros::Duration(PATIENCE)));
-    EXPECT_TRUE(measure.waitForServer(ros::Duration(PATIENCE)));
+    EXPECT_TRUE(calibrate.waitForServer(ros::Duration(TIMEOUT)));
+    EXPECT_TRUE(measure.waitForServer(ros::Duration(TIMEOUT)));
   }
 
   smartmill_msgs::CalibrateForceSensorResult calibrationResult(CalibrateForceSensorGoal goal) {
     goal.header.stamp = ros::Time::now();
     calibrate.sendGoal(goal);
-    EXPECT_TRUE(calibrate.waitForResult(ros::Duration(PATIENCE)));
+    EXPECT_TRUE(calibrate.waitForResult(ros::Duration(TIMEOUT)));
     return *calibrate.getResult();
   }
 
   /// Hits along an axis at a point of the workpiece, which is stated to the calibration first.
   void tap(const Point& at, const std::string& direction) {
     ros::ServiceClient hammer_position = nh.serviceClient<smartmill_msgs::PanelKey>("sim/panel/tap_point");
-    ASSERT_TRUE(hammer_position.waitForExistence(ros::Duration(PATIENCE)));
+    ASSERT_TRUE(hammer_position.waitForExistence(ros::Duration(TIMEOUT)));
     smartmill_msgs::PanelKey key;
     key.request.values = {at[0], at[1], at[2]};
     ASSERT_TRUE(hammer_position.call(key));
@@ -67,7 +67,7 @@ class Plate : public testing::Test {
     taps.direction = direction;
     taps.hits = HITS;
     measure.sendGoal(taps);
-    ASSERT_TRUE(measure.waitForResult(ros::Duration(PATIENCE)));
+    ASSERT_TRUE(measure.waitForResult(ros::Duration(TIMEOUT)));
     ASSERT_EQ(measure.getResult()->code, smartmill_msgs::MeasureFrfResult::OK)
         << measure.getResult()->message;
   }

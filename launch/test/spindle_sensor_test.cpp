@@ -25,11 +25,11 @@ using smartmill_msgs::CalibrateForceSensorGoal;
 using Calibrate = actionlib::SimpleActionClient<smartmill_msgs::CalibrateForceSensorAction>;
 using Measure = actionlib::SimpleActionClient<smartmill_msgs::MeasureFrfAction>;
 
-constexpr double PATIENCE = 120.0;  // [s] time limit on a busy computer
+constexpr double TIMEOUT = 120.0;  // [s] time limit on a busy computer
 
 bool pressKey(ros::NodeHandle& nh, const std::string& key, const std::vector<double>& values) {
   ros::ServiceClient client = nh.serviceClient<smartmill_msgs::PanelKey>("sim/panel/" + key);
-  if (!client.waitForExistence(ros::Duration(PATIENCE))) return false;
+  if (!client.waitForExistence(ros::Duration(TIMEOUT))) return false;
   smartmill_msgs::PanelKey call;
   call.request.values = values;
   return client.call(call) && call.response.code == smartmill_msgs::PanelKey::Response::OK;
@@ -39,7 +39,7 @@ smartmill_msgs::CalibrateForceSensorResult calibrationResult(Calibrate& client,
                                                              CalibrateForceSensorGoal goal) {
   goal.header.stamp = ros::Time::now();
   client.sendGoal(goal);
-  EXPECT_TRUE(client.waitForResult(ros::Duration(PATIENCE)));
+  EXPECT_TRUE(client.waitForResult(ros::Duration(TIMEOUT)));
   return *client.getResult();
 }
 
@@ -66,7 +66,7 @@ void measureLoads(ros::NodeHandle& nh, Calibrate& client, double length, bool re
 TEST(SpindleSensor, IsCalibratedOnTheRunningMachine) {
   ros::NodeHandle nh;
   Calibrate calibrate(nh, smartmill::names::CALIBRATE_SENSOR, true);
-  ASSERT_TRUE(calibrate.waitForServer(ros::Duration(PATIENCE)));
+  ASSERT_TRUE(calibrate.waitForServer(ros::Duration(TIMEOUT)));
   ros::Publisher conditions =
       nh.advertise<smartmill_msgs::CuttingCondition>(smartmill::names::CUTTING_CONDITION, 1, true);
   smartmill_msgs::CuttingCondition air;
@@ -102,14 +102,14 @@ TEST(SpindleSensor, IsCalibratedOnTheRunningMachine) {
   EXPECT_TRUE(pressKey(nh, "tool_length", {0.139}));
   ros::Duration(0.5).sleep();
   Measure measure(nh, smartmill::names::MEASURE_SENSOR_FRF, true);
-  ASSERT_TRUE(measure.waitForServer(ros::Duration(PATIENCE)));
+  ASSERT_TRUE(measure.waitForServer(ros::Duration(TIMEOUT)));
   smartmill_msgs::MeasureFrfGoal taps;
   taps.header.stamp = ros::Time::now();
   taps.point = "force_sensor";
   taps.direction = "y";
   taps.hits = 4;
   measure.sendGoal(taps);
-  ASSERT_TRUE(measure.waitForResult(ros::Duration(PATIENCE)));
+  ASSERT_TRUE(measure.waitForResult(ros::Duration(TIMEOUT)));
   const auto& modes = *measure.getResult();
   ASSERT_EQ(modes.code, modes.OK) << modes.message;
   ASSERT_GE(modes.modes.modes.size(), 2u);
@@ -133,7 +133,7 @@ TEST(SpindleSensor, IsCalibratedOnTheRunningMachine) {
   EXPECT_TRUE(pressKey(nh, "hang_weight", {200.0, 0.0, 0.0}));
   ros::Duration(0.5).sleep();
   const auto block = ros::topic::waitForMessage<smartmill_msgs::ForceBlock>(
-      smartmill::names::FORCE_COMPENSATED, nh, ros::Duration(PATIENCE));
+      smartmill::names::FORCE_COMPENSATED, nh, ros::Duration(TIMEOUT));
   ASSERT_TRUE(block);
   double mean = 0.0;
   for (const double f : block->fx) mean += f / static_cast<double>(block->fx.size());

@@ -136,9 +136,9 @@ double nonperiodicShare(const std::vector<double>& values, double samples_per_re
     double sum = 0.0, squares = 0.0, repeating = 0.0;
     for (int angle = 0; angle < ANGLES; ++angle) {
       double angle_sum = 0.0;
-      for (int turn = 0; turn < revolutions; ++turn) {
+      for (int revolution = 0; revolution < revolutions; ++revolution) {
         const double value =
-            at(start + (turn + static_cast<double>(angle) / ANGLES) * samples_per_revolution);
+            at(start + (revolution + static_cast<double>(angle) / ANGLES) * samples_per_revolution);
         angle_sum += value;
         squares += value * value;
       }

@@ -112,38 +112,38 @@ TEST(Explained, aSuggestedTestMustFitMachineAndStock) {
 
 TEST(InstalledModel, keepsThePreviousModel) {
   const TemporaryFolder folder;
-  const std::string believed = written(folder, "believed.yaml", "old"),
+  const std::string nominal = written(folder, "nominal.yaml", "old"),
                     better = written(folder, "better.yaml", "new"),
                     best = written(folder, "best.yaml", "newest");
-  InstalledModel installed(folder.file("kept"), believed);
+  InstalledModel installed(folder.file("models"), nominal);
   installed.install(better);
-  EXPECT_EQ(installed.inUse(), folder.file("kept/installed.yaml"));
+  EXPECT_EQ(installed.inUse(), folder.file("models/installed.yaml"));
   EXPECT_EQ(contentOf(installed.inUse()), "new");
-  EXPECT_EQ(contentOf(folder.file("kept/replaced_1.yaml")), "old");
-  EXPECT_EQ(contentOf(believed), "old");  // the user's file is unchanged
+  EXPECT_EQ(contentOf(folder.file("models/replaced_1.yaml")), "old");
+  EXPECT_EQ(contentOf(nominal), "old");  // the user's file is unchanged
   installed.install(best);
   EXPECT_EQ(contentOf(installed.inUse()), "newest");
   EXPECT_EQ(contentOf(installed.replaced()), "new");
   installed.undo();
   EXPECT_EQ(contentOf(installed.inUse()), "new");
-  EXPECT_FALSE(fs::exists(folder.file("kept/replaced_2.yaml")));
+  EXPECT_FALSE(fs::exists(folder.file("models/replaced_2.yaml")));
 }
 
 TEST(InstalledModel, changesNothingWhereItCannotWrite) {
   const TemporaryFolder folder;
-  const std::string believed = written(folder, "believed.yaml", "old"),
+  const std::string nominal = written(folder, "nominal.yaml", "old"),
                     better = written(folder, "better.yaml", "new");
-  InstalledModel installed(folder.file("kept"), believed);
-  fs::create_directories(folder.file("kept/installed.yaml/in_the_way"));
+  InstalledModel installed(folder.file("models"), nominal);
+  fs::create_directories(folder.file("models/installed.yaml/in_the_way"));
   try {
     installed.install(better);
     ADD_FAILURE();
   } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("kept/installed.yaml: cannot be written"), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find("models/installed.yaml: cannot be written"), std::string::npos);
   }
-  EXPECT_EQ(installed.inUse(), believed);
-  EXPECT_FALSE(fs::exists(folder.file("kept/replaced_1.yaml")));
-  InstalledModel nowhere("/proc/none", believed);
+  EXPECT_EQ(installed.inUse(), nominal);
+  EXPECT_FALSE(fs::exists(folder.file("models/replaced_1.yaml")));
+  InstalledModel nowhere("/proc/none", nominal);
   EXPECT_THROW(nowhere.install(better), Error);
 }
 

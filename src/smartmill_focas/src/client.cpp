@@ -74,7 +74,7 @@ Bytes Client::Impl::request(const std::string& call, const SubRequest& request) 
 std::vector<double> Client::Impl::values(const std::string& call, const Bytes& data, std::size_t at_most) {
   return decode(call, data, [&](Reader& reader) {
     std::vector<double> result;
-    while (result.size() < at_most && reader.left() >= 8) {
+    while (result.size() < at_most && reader.remaining() >= 8) {
       result.push_back(reader.value8().toDouble());
     }
     if (result.empty() && at_most > 0) {

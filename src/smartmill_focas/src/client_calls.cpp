@@ -145,7 +145,7 @@ std::vector<AlarmMessage> Client::alarmMessages() {
   const Bytes data = impl_->request("cnc_rdalmmsg2", SubRequest(OP_ALARM_MESSAGES, -1, MOST, 2, TEXT_WIDTH));
   return impl_->decode("cnc_rdalmmsg2", data, [&](Reader& reader) {
     std::vector<AlarmMessage> alarms;
-    while (reader.left() >= ENTRY) {
+    while (reader.remaining() >= ENTRY) {
       AlarmMessage alarm;
       alarm.number = reader.i32();
       alarm.type = reader.i32();
@@ -179,7 +179,7 @@ std::string Client::executingBlock() {
                        impl_->request("cnc_rdexecprog", SubRequest(OP_EXECUTING_BLOCK, MOST)),
                        [](Reader& reader) {
                          reader.skip(4);
-                         return reader.text(reader.left());
+                         return reader.text(reader.remaining());
                        });
 }
 
@@ -205,7 +205,7 @@ Status decodeStatus(Reader& reader) {
 std::vector<std::string> decodeNames(const SubReply& reply, std::size_t at_most) {
   std::vector<std::string> names;
   Reader reader(reply.data);
-  while (reply.code == EW_OK && names.size() < at_most && reader.left() >= NAME_WIDTH) {
+  while (reply.code == EW_OK && names.size() < at_most && reader.remaining() >= NAME_WIDTH) {
     names.push_back(name(reader));
   }
   return names;
@@ -214,7 +214,7 @@ std::vector<std::string> decodeNames(const SubReply& reply, std::size_t at_most)
 std::vector<double> decodeValues(const SubReply& reply, std::size_t at_most) {
   std::vector<double> values;
   Reader reader(reply.data);
-  while (reply.code == EW_OK && values.size() < at_most && reader.left() >= 8) {
+  while (reply.code == EW_OK && values.size() < at_most && reader.remaining() >= 8) {
     values.push_back(reader.value8().toDouble());
   }
   return values;

@@ -122,9 +122,9 @@ Writer& Writer::text(std::string_view text, std::size_t width, char fill) {
 }
 
 const std::uint8_t* Reader::take(std::size_t count) {
-  if (count > left()) {
+  if (count > remaining()) {
     throw WireError("FOCAS data end early: expected " + std::to_string(count) + " bytes, found " +
-                    std::to_string(left()));
+                    std::to_string(remaining()));
   }
   const std::uint8_t* start = data_ + position_;
   position_ += count;
@@ -219,7 +219,7 @@ std::optional<Frame> FrameReader::next() {
   frame.type = reader.u8();
   frame.direction = reader.u8();
   const std::size_t body_size = reader.u16();
-  if (reader.left() < body_size) {
+  if (reader.remaining() < body_size) {
     return std::nullopt;
   }
   frame.body = reader.bytes(body_size);
@@ -234,14 +234,14 @@ Bytes encodeErrorBody(const ErrorBody& error) {
 ErrorBody decodeErrorBody(const Bytes& body) {
   ErrorBody error;
   Reader reader(body);
-  if (reader.left() < 4) {
+  if (reader.remaining() < 4) {
     error.code = EW_PROTOCOL;
     return error;
   }
   error.location = reader.i16();
   error.code = reader.i16();
-  error.detail1 = reader.left() >= 2 ? reader.i16() : std::int16_t{0};
-  error.detail2 = reader.left() >= 2 ? reader.i16() : std::int16_t{0};
+  error.detail1 = reader.remaining() >= 2 ? reader.i16() : std::int16_t{0};
+  error.detail2 = reader.remaining() >= 2 ? reader.i16() : std::int16_t{0};
   return error;
 }
 
@@ -289,7 +289,7 @@ std::vector<SubRequest> decodeRequests(const Bytes& body) {
     // v5 is the length of the extra bytes, but 0 or a value in some calls; the length of the packet is
     // reliable.
     (void)extra;
-    request.extra = sub.bytes(sub.left());
+    request.extra = sub.bytes(sub.remaining());
     requests.push_back(std::move(request));
   }
   return requests;
@@ -332,7 +332,7 @@ std::vector<SubReply> decodeReplies(const Bytes& body) {
     reply.code = sub.i16();
     reply.detail = sub.i16();
     const std::size_t size = sub.skip(2).u16();
-    reply.data = sub.bytes(std::min(size, sub.left()));
+    reply.data = sub.bytes(std::min(size, sub.remaining()));
     replies.push_back(std::move(reply));
   }
   return replies;

@@ -155,7 +155,7 @@ void Followers::keepUp(std::uint64_t max_behind) {
       last_progress = ros::WallTime::now();
       continue;
     }
-    if (!ros::ok() || (ros::WallTime::now() - last_progress).toSec() > PATIENCE)
+    if (!ros::ok() || (ros::WallTime::now() - last_progress).toSec() > TIMEOUT)
       throw Error(std::to_string(behind()) + " messages are not processed by a node");
     ros::WallDuration(POLL).sleep();
   }

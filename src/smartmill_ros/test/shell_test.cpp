@@ -24,11 +24,11 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr double PATIENCE = 120.0;  // [s] time limit on a busy computer
+constexpr double TIMEOUT = 120.0;  // [s] time limit on a busy computer
 
 template <class Condition>
 bool eventually(Condition condition) {
-  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(PATIENCE);
+  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(TIMEOUT);
   while (ros::ok() && !condition() && ros::WallTime::now() < end) {
     ros::spinOnce();
     ros::WallDuration(0.01).sleep();
@@ -227,7 +227,7 @@ TEST(StrikeClient, ReturnsEachFaultOnce) {
   const auto hasFault = [&] { return (fault = caller.takeFault()).has_value(); };
   caller.strike("x");
   ASSERT_TRUE(eventually([&] { return fault || hasFault(); }));
-  EXPECT_EQ(fault->kind, Kind::nobody);
+  EXPECT_EQ(fault->kind, Kind::no_answer);
 
   std::string struck;
   std::uint8_t code = Strike::Response::OK;

@@ -243,7 +243,7 @@ class Reader {
   /// As text(), with '?' for characters that are not printable.
   std::string line(std::size_t width);
   Reader& skip(std::size_t count);
-  std::size_t left() const { return size_ - position_; }
+  std::size_t remaining() const { return size_ - position_; }
 
  private:
   const std::uint8_t* take(std::size_t count);

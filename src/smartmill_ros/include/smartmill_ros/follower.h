@@ -32,15 +32,15 @@ class Followers {
 
   /// Waits until every node runs and is connected to every publisher of its inputs.
   /// @throws Error naming what is missing after the timeout [s]
-  void begin(double timeout = PATIENCE);
+  void begin(double timeout = TIMEOUT);
 
   /// Waits until every node that subscribes to the topic is connected to this publisher.
   /// @throws Error as begin()
-  void expect(const ros::Publisher& publisher, double timeout = PATIENCE);
+  void expect(const ros::Publisher& publisher, double timeout = TIMEOUT);
 
   /// Waits until this subscriber is connected to a publisher, so that it receives all later messages.
   /// @throws Error as begin()
-  void expect(const ros::Subscriber& subscriber, double timeout = PATIENCE);
+  void expect(const ros::Subscriber& subscriber, double timeout = TIMEOUT);
 
   /// Counts a message that was published on a topic.
   void sent(const std::string& topic) { ++sent_[topic]; }
@@ -66,7 +66,7 @@ class Followers {
   /// Ends the flow control without an end of data: the nodes again detect missing messages.
   void leave();
 
-  static constexpr double PATIENCE = 120.0;  ///< [s] time limit without progress
+  static constexpr double TIMEOUT = 120.0;  ///< [s] time limit without progress
   static constexpr std::uint64_t AHEAD =
       500;  ///< messages that a node may be behind; far below any queue size
 

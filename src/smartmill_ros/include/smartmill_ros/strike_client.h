@@ -13,7 +13,7 @@ namespace smartmill {
 class StrikeClient {
  public:
   struct Answer {
-    enum class Kind { failed, no_hammer, nobody };
+    enum class Kind { failed, no_hammer, no_answer };
     Kind kind;
     std::string message;  ///< one line
   };
