@@ -9,13 +9,13 @@
 #include "smartmill_core/cutting/cutting_law.h"
 #include "smartmill_core/math/sine_cosine.h"
 
-// Where an edge is in contact, and with which of the surfaces before it: the least of some ChipShapes over a
-// stretch of immersion angles, cut at the angles at which another one becomes the least or the chip begins or
+// Where an edge is in contact, and with which of the earlier surfaces: the smallest of several ChipShapes
+// over an interval of immersion angles, split where another shape becomes the smallest or the chip begins or
 // ends.
 
 namespace smartmill {
 
-/// A stretch of immersion angles about its middle.
+/// An interval of immersion angles, by middle and half width.
 struct Stretch {
   double middle, half;  ///< [rad]
   SineCosine at;        ///< of the middle
@@ -28,7 +28,7 @@ struct Stretch {
   double high() const { return middle + half; }
 };
 
-/// [m] The least and the most that a shape can be over a stretch.
+/// [m] Lower and upper bound of a shape over an interval.
 struct ChipBounds {
   double low, high;
 };
@@ -43,13 +43,14 @@ inline ChipBounds bounds(const ChipShape& shape, const Stretch& over) {
 }
 
 constexpr double WIDEST_CELL =
-    0.2;  ///< [rad] looked at as one: two-point Gauss errs by 4e-7 of a smooth force
+    0.2;  ///< [rad] of one cell; two-point Gauss has an error of 4e-7 of a smooth force
 
 namespace contact_detail {
 
-constexpr double STRAIGHT = 0.015;  // [rad] half: so short that a difference of two chips has one zero
+constexpr double STRAIGHT =
+    0.015;  // [rad] half width so small that a difference of two chips has at most one zero
 
-/// Where a shape that is `left` and `right` at the ends, of different sign, is zero.
+/// Zero of a shape whose end values `left` and `right` differ in sign.
 inline double zeroOf(const ChipShape& shape, const Stretch& over, double left, double right) {
   double low = over.low(), high = over.high(), at = 0.0;
   const bool rises = right > left;
@@ -60,22 +61,22 @@ inline double zeroOf(const ChipShape& shape, const Stretch& over, double left, d
     (rises == (value > 0.0) ? high : low) = at;
     double next = slope != 0.0 ? at - value / slope : low;
     if (!(next >= low && next <= high)) next = 0.5 * (low + high);
-    const bool close = std::abs(next - at) < 1e-5;  // and the next one nearer by its square
+    const bool close = std::abs(next - at) < 1e-5;  // the next step converges quadratically
     at = next;
     if (close) break;
   }
   return at;
 }
 
-/// Whether the values at the ends tell the sign in between, of a function with a bounded second derivative:
-/// it stays within half of bend half^2 of its chord, and has one zero when the ends differ in sign.
+/// Whether the end values determine the sign in between, for a function with a bounded second derivative: it
+/// deviates from its chord by at most bend half^2 / 2, and has one zero when the end values differ in sign.
 inline bool chordTells(double left, double right, double bend, double half) {
   const double most = 2.0 * bend * half * half;
   if (left * right < 0.0) return std::abs(left - right) >= most;
   return std::max(std::abs(left), std::abs(right)) >= most;
 }
 
-/// The parts of a stretch in which one shape is positive.
+/// The segments of an interval in which one shape is positive.
 template <class Part>
 void positive(const ChipShape& shape, const Stretch& over, Part&& part) {
   const double bend = shape.bend();
@@ -100,11 +101,11 @@ void positive(const ChipShape& shape, const Stretch& over, Part&& part) {
 
 }  // namespace contact_detail
 
-/// Calls part(shape, stretch) for every stretch of a cell in which that shape is the least of all and
+/// Calls visit(shape, interval) for every interval of a cell in which that shape is the smallest of all and
 /// positive. Reorders the shapes. @param count >= 1 @param over no wider than WIDEST_CELL
 template <class Part>
 void leastPositive(ChipShape* shapes, std::size_t count, const Stretch& over, Part&& part) {
-  // First the least in the middle, then those that come below it somewhere.
+  // First the smallest at the middle, then those that are smaller somewhere.
   const double s = over.at.sine, c = over.at.cosine;
   double least = shapes[0].at(s, c);
   for (std::size_t k = 1; k < count; ++k) {
@@ -122,7 +123,7 @@ void leastPositive(ChipShape* shapes, std::size_t count, const Stretch& over, Pa
     return;
   }
   if (bounds(shapes[0], over).high <= 0.0) return;
-  // The one that is least on the left gives way to the one that is least on the right.
+  // The smallest shape at the left end is replaced by the smallest at the right end.
   const SineCosine l = turned(over.at, -over.half), r = turned(over.at, over.half);
   std::size_t first = 0, last = 0;
   for (std::size_t k = 1; k < near; ++k) {
@@ -147,8 +148,8 @@ void leastPositive(ChipShape* shapes, std::size_t count, const Stretch& over, Pa
   }
 }
 
-/// Calls cell(stretch) for stretches no wider than WIDEST_CELL that make up immersion angles from..to [rad,
-/// 0..4 pi].
+/// Calls cell(interval) for intervals no wider than WIDEST_CELL that cover the immersion angles from..to
+/// [rad, 0..4 pi].
 template <class Cell>
 void forEachCell(double from, double to, Cell&& cell) {
   if (to - from <= WIDEST_CELL) {
@@ -160,7 +161,7 @@ void forEachCell(double from, double to, Cell&& cell) {
   for (int n = 0; n < cells; ++n) cell(Stretch::between(from + n * width, from + (n + 1) * width));
 }
 
-/// leastPositive() over immersion angles from..to.
+/// leastPositive() over the immersion angles from..to.
 template <class Part>
 void forEachContact(ChipShape* shapes, std::size_t count, double from, double to, Part&& part) {
   forEachCell(from, to, [&](const Stretch& cell) { leastPositive(shapes, count, cell, part); });

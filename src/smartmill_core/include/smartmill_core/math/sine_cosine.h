@@ -13,10 +13,10 @@ struct SineCosine {
 constexpr std::size_t TURN_NODES = 2048;
 constexpr double TURN_NODE_ANGLE = units::TWO_PI / TURN_NODES;
 
-/// At TURN_NODES + 1 angles over a turn, both ends included.
+/// Sine and cosine at TURN_NODES + 1 angles over a revolution, both ends included.
 const SineCosine* turnTable();
 
-/// Of 0 <= angle <= 4 pi, within 1e-12: third order about the nearest node.
+/// For 0 <= angle <= 4 pi, within 1e-12: third-order expansion about the nearest node.
 inline SineCosine sineCosine(double angle) {
   static const SineCosine* const TABLE = turnTable();
   const auto node = static_cast<std::size_t>(angle * (1.0 / TURN_NODE_ANGLE) + 0.5);
@@ -26,7 +26,7 @@ inline SineCosine sineCosine(double angle) {
   return {at.sine * c + at.cosine * s, at.cosine * c - at.sine * s};
 }
 
-/// Of the sum of an angle and a small one (|d| <= 0.2), within 1e-11 of it.
+/// Sine and cosine of an angle plus a small angle d (|d| <= 0.2), within 1e-11.
 inline SineCosine turned(const SineCosine& at, double d) {
   const double d2 = d * d;
   const double c = 1.0 - 0.5 * d2 * (1.0 - d2 * (1.0 / 12.0) * (1.0 - d2 * (1.0 / 30.0) * (1.0 - d2 / 56.0)));
