@@ -14,7 +14,7 @@ std::string startedAs(int argc, const char* const* argv) {
   return argc > 0 ? std::filesystem::path(argv[0]).filename().string() : "program";
 }
 
-/// Damerau-Levenshtein distance without a second edit of a transposed pair.
+/// Damerau-Levenshtein distance (optimal string alignment).
 std::size_t distance(const std::string& a, const std::string& b) {
   std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
   for (std::size_t i = 0; i <= a.size(); ++i) d[i][0] = i;

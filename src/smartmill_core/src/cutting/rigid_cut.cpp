@@ -13,10 +13,10 @@ namespace {
 
 using units::TWO_PI;
 
-constexpr std::size_t NODES = TURN_NODES;  // linear between them errs by 1e-6 of the integrand
+constexpr std::size_t NODES = TURN_NODES;  // linear interpolation has an error of 1e-6 of the integrand
 constexpr double NODE_ANGLE = TURN_NODE_ANGLE;
 constexpr std::size_t MOST_TEETH = 20;
-constexpr double LEAST_CHIP = 1e-15;  // [m] at the ends of a contact, which still rub
+constexpr double LEAST_CHIP = 1e-15;  // [m] at the ends of a contact, where edge forces still act
 
 ContactArc arcOf(const Engagement& engagement) {
   return {engagement.entry, std::min(engagement.exit, TWO_PI), engagement.axial_depth};
@@ -78,8 +78,8 @@ std::vector<EdgeSums> RigidCut::integrals(std::vector<ChipShape> shapes) const {
   return table;
 }
 
-// A pass older than a revolution lies behind what the same tooth left a revolution later, wherever there is a
-// chip.
+// Wherever there is a chip, a pass older than a revolution is farther away than the surface that the same
+// tooth left one revolution later.
 void RigidCut::shape() {
   tables_.clear();
   shapes_.assign(rule_.alike() ? 1 : static_cast<std::size_t>(rule_.teeth()), {});

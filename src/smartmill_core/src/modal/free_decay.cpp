@@ -16,10 +16,10 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr std::size_t ORDER = 32, ROWS_A_COEFFICIENT = 3;
-/// Samples of a stretch.
+/// Samples of a segment.
 constexpr std::size_t STRETCH = 8;
-/// What is unforeseen must be so many times the usual, and this share of the largest: of a sample, of a
-/// stretch.
+/// An unpredicted deviation counts from this multiple of the usual deviation and this share of the largest
+/// value: for a sample, for a segment.
 constexpr double SUDDEN = 12.0, SUDDEN_SHARE = 0.08;
 constexpr double STRANGE = 6.0, STRANGE_SHARE = 0.004;
 
@@ -32,7 +32,7 @@ std::vector<double> averaged(const std::vector<double>& values, std::size_t from
   return result;
 }
 
-/// Coefficients of y[n] = sum a[k] y[n - 1 - k] over the rows that take part.
+/// Coefficients of y[n] = sum a[k] y[n - 1 - k] over the selected rows.
 VectorXd prediction(const std::vector<double>& y, std::size_t order, const std::vector<bool>& rows,
                     double noise) {
   const auto p = static_cast<Index>(order);
@@ -72,7 +72,7 @@ FreeDecayBreak breakAt(const std::vector<double>& y, std::size_t group, double l
   if (order < 8) return {};
   std::vector<bool> rows(y.size(), true);
   std::vector<double> left = unforeseen(y, order, prediction(y, order, rows, noise));
-  // Once more without what stood out: it bends the prediction.
+  // Again without outliers, which bias the prediction.
   const double first = usual(left, order);
   for (std::size_t n = order; n < y.size(); ++n) rows[n] = std::abs(left[n]) < SUDDEN * first;
   left = unforeseen(y, order, prediction(y, order, rows, noise));
@@ -88,7 +88,7 @@ FreeDecayBreak breakAt(const std::vector<double>& y, std::size_t group, double l
     double sum = 0.0;
     for (std::size_t i = n; i < n + STRETCH; ++i) sum += left[i] * left[i];
     const double size = std::sqrt(sum / static_cast<double>(STRETCH));
-    // What is not foretold (a curved sensor) fades with the ringing and does not come again.
+    // A deviation by sensor nonlinearity decays with the ringing and does not recur.
     if (size > std::max({STRANGE * std::max(even, std::isfinite(calmest) ? calmest : size),
                          STRANGE_SHARE * largest, found.size}))
       found = {n, size, false};
@@ -117,7 +117,7 @@ double unforeseenRise(const std::vector<double>& response, std::size_t from, std
       for (std::size_t i = a; i < b; ++i) sum += left[i] * left[i] / static_cast<double>(b - a);
       return std::sqrt(sum);
     };
-    // The later half of what was learned from: the early ringing leaves more.
+    // The later half of the training samples, since the early ringing has larger residuals.
     most = std::max(most, power(first, last) / std::max(power((order + first) / 2, first), even));
   }
   return most;

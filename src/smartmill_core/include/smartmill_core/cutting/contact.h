@@ -101,7 +101,7 @@ void positive(const ChipShape& shape, const Stretch& over, Part&& part) {
 
 }  // namespace contact_detail
 
-/// Calls visit(shape, interval) for every interval of a cell in which that shape is the smallest of all and
+/// Calls visit(shape, interval) for each interval of a cell in which that shape is the smallest of all and
 /// positive. Reorders the shapes. @param count >= 1 @param over no wider than WIDEST_CELL
 template <class Part>
 void leastPositive(ChipShape* shapes, std::size_t count, const Stretch& over, Part&& part) {

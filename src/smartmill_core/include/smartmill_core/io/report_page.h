@@ -20,7 +20,7 @@ class ReportPage {
   /// Embeds a picture. @throws Error when it cannot be read
   void picture(const std::string& file, const std::string& caption);
   /// The subset of Markdown that the project's reports use: headings, paragraphs, tables, lists, pictures
-  /// (from a folder), **bold** and `code`. A first-level title is skipped.
+  /// (from a folder), **bold** and `code`. A first-level title replaces the title of the page.
   void markdown(const std::string& text, const std::string& folder);
 
   std::string text() const;
