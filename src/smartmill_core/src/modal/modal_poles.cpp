@@ -17,16 +17,16 @@ using Eigen::Index;
 using Eigen::MatrixXcd;
 using Eigen::VectorXcd;
 
-/// Angle of z over the lines: beyond their ends there is room for poles that are not.
+/// Angle of z over the lines; the remaining angle is left for computational poles.
 constexpr double TURN = 0.95 * units::PI;
-/// How far a pole may wander from order to order and be the same.
+/// Largest relative change of a pole between orders within a track.
 constexpr double SAME_FREQUENCY = 0.003;
-/// The same for the diagram's sake: of frequency, of damping.
+/// Largest relative change of frequency and damping of a stable pole in the diagram.
 constexpr double STABLE_FREQUENCY = 0.01, STABLE_DAMPING = 0.2;
-/// Orders over which a pole must stay.
+/// Least number of orders of a persistent pole.
 constexpr std::size_t LEAST_SEEN = 3;
 
-/// Sums over the lines of one FRF, of which the normal equations of every order are made.
+/// Sums over the lines of one FRF, from which the normal equations of every order are built.
 struct LineSums {
   VectorXcd plain, mixed, mixed_back, power;  // sum w z^m, -w h z^m, -w h z^-m, w |h|^2 z^m
 };
@@ -94,7 +94,7 @@ bool samePlace(const Pole& a, const Pole& b) {
          std::abs(a.damping_ratio - b.damping_ratio) < STABLE_DAMPING * b.damping_ratio + 2e-5;
 }
 
-/// The same pole through the orders.
+/// One pole through the orders.
 struct Track {
   std::vector<Pole> seen;
 

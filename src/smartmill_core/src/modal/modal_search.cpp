@@ -11,35 +11,34 @@ namespace {
 using Complex = std::complex<double>;
 using Eigen::Index;
 
-/// A window reaches so many half widths, and at least so many lines, to either side of its modes.
+/// Reach of a window on either side of its modes: in half widths, and least number of lines.
 constexpr double REACH = 8.0, LEAST_LINES = 20.0;
-/// Modes nearer than this many times their half widths are fitted together.
+/// Modes nearer than this multiple of their half widths are fitted together.
 constexpr double TOGETHER = 4.0;
 constexpr std::size_t MOST_TOGETHER = 6, MOST_AT_START = 32;
-/// A mode must stand so many lines, and half widths, inside the band: of a peak that is cut nothing is
-/// proven.
+/// Least distance of a mode from the ends of the band, in lines and in half widths: a truncated peak is not
+/// significant.
 constexpr double FROM_END = 2.5, HALF_WIDTHS_FROM_END = 1.5;
-/// Widest peak that still is one: beyond, the parabola under the modes shows the same.
+/// Largest damping ratio: wider peaks are indistinguishable from the background parabola.
 constexpr double WIDEST_DAMPING = 0.25;
 constexpr std::size_t MOST_TRIES = 20;
-/// A peak so many times as high as the lines about it (a stretch to either side) is a mode whatever its
-/// phase.
+/// A peak with this multiple of the magnitude around it is a mode whatever its phase.
 constexpr double CLEAR_PEAK = 12.0;
 constexpr std::size_t ABOUT = 50;
-/// Damping ratios that are weighed where a magnitude tells them.
+/// Number of damping ratios of the average for a mode fitted to the magnitude.
 constexpr int DAMPINGS = 120;
-/// Evidence from which a mode is proven, more than one because the misfit of real records is no even noise;
-/// above the second it stays in the fit as a doubt, so that what it explains does not stand against the
-/// others.
+/// Evidence from which a mode is significant; above 1 because the misfit of real records is not uniform
+/// noise. Above the second value it stays in the fit as a doubt, so that its share does not count as misfit
+/// of the others.
 constexpr double PROVEN = 2.5, DOUBTFUL = 0.35;
-/// Of start values, before any fit: below it one stands on another.
+/// Least relative distance of start values; nearer ones are duplicates.
 constexpr double DUPLICATE = 0.02;
 constexpr int STEPS = 8, LAST_STEPS = 25;
 constexpr double ROUGHLY = 1e-4, CLOSELY = 1e-8;  // relative change of the squares that ends a fit
-/// Lines on a half width that are enough for the search, and for the last fit: more are averaged in groups.
+/// Lines per half width for the search and for the last fit; more lines are averaged in groups.
 constexpr double SEARCH_LINES = 6.0, FIT_LINES = 40.0;
 
-/// Groups of lines as one, weighted.
+/// Weighted averages over groups of lines.
 WeightedLines thinned(const WeightedLines& lines, std::size_t group) {
   if (group < 2) return lines;
   WeightedLines result;
@@ -113,7 +112,7 @@ ModalSearch::Span ModalSearch::spanOf(const std::vector<EstimatedMode>& members)
   const auto begin = lines_.frequency.begin(), end = lines_.frequency.end();
   Span span{static_cast<std::size_t>(std::lower_bound(begin, end, low) - begin),
             static_cast<std::size_t>(std::upper_bound(begin, end, high) - begin)};
-  // At an end of the band the window keeps its lines.
+  // At the ends of the band the window keeps its number of lines.
   const auto least = static_cast<std::size_t>(2.0 * LEAST_LINES);
   if (span.last - span.first < least) {
     span.last = std::min(lines_.size(), span.first + least);
@@ -139,7 +138,7 @@ std::vector<std::size_t> ModalSearch::neighbours(double frequency, double dampin
   return members;
 }
 
-// What is left and the members' own.
+// The residual plus the responses of the members.
 WeightedLines ModalSearch::window(const Span& span, const std::vector<std::size_t>& members) const {
   const auto cut = [&](const auto& values) {
     using Values = std::decay_t<decltype(values)>;
@@ -175,7 +174,7 @@ void ModalSearch::subtract(const EstimatedMode& mode, double sign) {
   }
 }
 
-// What a candidate alone explains of what is left about it.
+// Share of the residual around a candidate that it explains alone.
 double ModalSearch::score(const Pole& candidate) const {
   EstimatedMode m;
   m.frequency = candidate.frequency;
@@ -196,7 +195,7 @@ void ModalSearch::take(const std::vector<std::size_t>& members, const ModalWindo
   }
 }
 
-// Fits members, and one more, together; drops the weakest while it is not proven.
+// Fits the members and one more mode together; drops the weakest while it is not significant.
 bool ModalSearch::refit(const std::vector<std::size_t>& members, const EstimatedMode* more, bool last) {
   std::vector<EstimatedMode> all;
   PoleList poles;
@@ -212,14 +211,15 @@ bool ModalSearch::refit(const std::vector<std::size_t>& members, const Estimated
   if (w.addMisfit(fit)) fit = fitted(fit.poles);
   const Index before = static_cast<Index>(members.size());
   for (Index k = worst(fit, DOUBTFUL); k >= 0; k = worst(fit, DOUBTFUL)) {
-    if (more && (k == before || fit.poles.modes() <= before)) return false;  // no more modes than there were
+    if (more && (k == before || fit.poles.modes() <= before))
+      return false;  // the number of modes did not increase
     fit = fitted(fit.poles.without(k));
   }
   take(members, w, fit);
   return true;
 }
 
-// What goes first; -1: all stay.
+// The mode to be dropped first; -1: none.
 Index ModalSearch::worst(const WindowFit& fit, double least) const {
   const auto evidence = [&](Index k) { return fit.evidence[static_cast<std::size_t>(k)]; };
   Index found = -1;
@@ -256,12 +256,12 @@ void ModalSearch::fitCluster(const std::vector<Pole>& cluster) {
 bool ModalSearch::startWith(std::vector<Pole> candidates) {
   std::sort(candidates.begin(), candidates.end(),
             [](const Pole& a, const Pole& b) { return a.frequency < b.frequency; });
-  // Twice: what stood in the light of strong neighbours shows when they are taken off.
+  // Twice: modes masked by strong neighbours appear after these are subtracted.
   for (int pass = 0; pass < 2; ++pass) {
     std::vector<Pole> cluster;
     for (const Pole& p : candidates) {
       if (!inBand(p.frequency, 0.0) || p.damping_ratio > WIDEST_DAMPING || taken(p)) continue;
-      // A window holds a number of lines at least, however narrow its modes: what stands in it belongs to it.
+      // A window has a least number of lines, however narrow its modes, and includes all modes inside.
       const auto width = [&](const Pole& q) { return std::max(q.halfWidth(), 2.0 * lines_.step()); };
       const bool apart = !cluster.empty() && p.frequency - cluster.back().frequency >
                                                  TOGETHER * (width(p) + width(cluster.back()));
@@ -277,7 +277,7 @@ bool ModalSearch::startWith(std::vector<Pole> candidates) {
   return true;
 }
 
-// A mode stands there already.
+// Whether a mode exists already at this pole.
 bool ModalSearch::taken(const Pole& p) const {
   return std::any_of(modes_.begin(), modes_.end(), [&](const EstimatedMode& m) {
     return std::abs(m.frequency - p.frequency) < std::max(m.frequency * m.damping_ratio, p.halfWidth());
@@ -310,7 +310,7 @@ bool ModalSearch::addCandidates(std::vector<Pole> candidates) {
   std::vector<double> scores;
   for (const Pole& c : candidates) scores.push_back(score(c));
   const std::size_t all = candidates.size();
-  // However many candidates: as many tries as modes could come of them, and some.
+  // Limits the number of tries, whatever the number of candidates.
   for (std::size_t tries = 2 * modes_.size() + MOST_TRIES; tries > 0 && !candidates.empty(); --tries) {
     if (!goOn(0.25 + 0.45 * (1.0 - static_cast<double>(candidates.size()) / static_cast<double>(all))))
       return false;
@@ -329,13 +329,13 @@ bool ModalSearch::addCandidates(std::vector<Pole> candidates) {
   return true;
 }
 
-// The line about which most is left, in noise; 0: no more than chance gives.
+// Frequency of the largest residual relative to the noise; 0: not larger than by chance.
 double ModalSearch::loudest() const {
   const std::size_t n = lines_.size();
   std::vector<double> power(n, 0.0);
   for (std::size_t o = 0; o < lines_.frfs(); ++o) {
     for (std::size_t i = 1; i + 1 < n; ++i) {
-      // Smooth flanks are the parabola's.
+      // Smooth residuals belong to the background parabola.
       const Complex bend = 2.0 * left_[o][i] - left_[o][i - 1] - left_[o][i + 1];
       power[i] += std::norm(lines_.weight[o][i] * bend);
     }
@@ -396,7 +396,7 @@ void ModalSearch::addByMagnitude() {
     if (magnitude[i] < *std::max_element(begin, end) || magnitude[i] < CLEAR_PEAK * median({begin, end}))
       continue;
     const double f = lines_.frequency[i], room = 4.0 * lines_.step();
-    // Where the force has no power, noise stands up like a peak.
+    // Where the force has no power, noise looks like a peak.
     double noise = 0.0;
     for (std::size_t o = 0; o < lines_.frfs(); ++o)
       noise += 2.0 / (lines_.weight[o][i] * lines_.weight[o][i]);
@@ -424,7 +424,7 @@ bool ModalSearch::fitMagnitude(const std::vector<double>& magnitude, std::size_t
       static_cast<std::size_t>(std::lower_bound(lines_.frequency.begin(), lines_.frequency.end(), f.front()) -
                                lines_.frequency.begin());
   const auto count = static_cast<Index>(f.size());
-  // log |H| = log a + log |unitMode|, a where it fits best
+  // log |H| = log a + log |unitMode|, with the best a
   const fit::FunctionResiduals residuals(count, [&](const Eigen::VectorXd& at, Eigen::VectorXd& left) {
     for (Index i = 0; i < count; ++i) {
       const auto k = static_cast<std::size_t>(i);
@@ -447,8 +447,8 @@ bool ModalSearch::fitMagnitude(const std::vector<double>& magnitude, std::size_t
   const double height = plain[static_cast<Index>(peak - first)];
   const double evidence = (plain.squaredNorm() - height * height - found.squares) / variance / w.limit(2);
   if (!(evidence >= PROVEN)) return false;
-  // A peak narrower than the lines bounds the damping from above only: its mean over all that the misfit
-  // allows.
+  // A peak narrower than the line spacing only gives an upper bound of the damping: the mean over all values
+  // weighted by the misfit.
   double weights = 0.0, mean = 0.0, square = 0.0;
   for (int i = 0; i <= DAMPINGS; ++i) {
     const double damping = narrowest + (widest - narrowest) * i / DAMPINGS;

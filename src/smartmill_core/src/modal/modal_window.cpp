@@ -16,9 +16,9 @@ using Eigen::VectorXd;
 
 constexpr double MIN_DAMPING = 1e-6, MAX_DAMPING = 0.5;
 constexpr Index POWERS = 3, BACKGROUND = 2 * POWERS;  // of the parabola: real and imaginary part
-/// A mode that chance shows in one of so many records is none; the bound used is five times as strict.
+/// Probability of a false mode in a record; the bound used is five times as strict.
 constexpr double CHANCE = 0.05;
-/// Misfit over noise, as powers, above which the misfit is more than noise.
+/// Ratio of the powers of misfit and noise above which the misfit is more than noise.
 constexpr double MORE_THAN_NOISE = 2.0;
 
 Eigen::Index at(std::size_t i) {
@@ -140,7 +140,7 @@ bool ModalWindow::evaluate(const VectorXd& at_poles, VectorXd* residual, MatrixX
     if (!s.left.allFinite()) return false;
     residual->segment(at(o) * rows, rows) = s.left;
     if (!jacobian) continue;
-    // Kaufman's form: how the shares follow the poles beyond their own columns is left out.
+    // Kaufman's approximation: neglects the change of the shares outside the span of the columns.
     const MatrixXd d = slopes(o, poles, s);
     jacobian->middleRows(at(o) * rows, rows) = s.columns * (s.inverse * (s.columns.transpose() * d)) - d;
   }
@@ -148,8 +148,8 @@ bool ModalWindow::evaluate(const VectorXd& at_poles, VectorXd* residual, MatrixX
 }
 
 double ModalWindow::limit(std::size_t shares) const {
-  // Largest chi-square of so many degrees that chance gives (bound of Laurent and Massart, 2000); frequency
-  // and damping were sought too.
+  // Largest chi-square by chance (bound of Laurent and Massart, 2000); frequency and damping add two degrees
+  // of freedom.
   const auto degrees = static_cast<double>(2 + shares);
   return degrees + 2.0 * std::sqrt(degrees * chance_) + 2.0 * chance_;
 }
@@ -187,7 +187,7 @@ WindowFit ModalWindow::judged(const PoleList& poles) const {
   WindowFit f;
   f.poles = poles;
   const Index m = poles.modes();
-  std::vector<MatrixXd> follows;  // how shares follow the poles
+  std::vector<MatrixXd> follows;  // derivatives of the shares with respect to the poles
   MatrixXd information = MatrixXd::Zero(2 * m, 2 * m);
   for (std::size_t o = 0; o < lines_.frfs(); ++o) {
     f.frfs.push_back(shares(o, poles));
@@ -210,7 +210,8 @@ WindowFit ModalWindow::judged(const PoleList& poles) const {
   return f;
 }
 
-// Misfit where a mode acts, with the correlation from line to line: coloured misfit tells less.
+// Variance of the misfit around a mode, including its correlation from line to line, which reduces the
+// information.
 double ModalWindow::localVariance(const WindowFit& fit, Index mode) const {
   const std::size_t n = lines_.size();
   const double f0 = fit.poles.frequency(mode),
@@ -233,8 +234,8 @@ double ModalWindow::localVariance(const WindowFit& fit, Index mode) const {
   return std::max(variance, 1e-30) * (1.0 + correlation) / (1.0 - correlation) * fit.alike;
 }
 
-// Misfit that the FRFs share (a hammer's ripple is in all of them) tells no more in many of them than in one:
-// n over the effective number of FRFs, sum of the squared correlations of their misfits.
+// Misfit common to all FRFs (for example a hammer's ripple) carries no more information than in one. Number
+// of FRFs over their effective number, from the sum of the squared correlations of their misfits.
 double ModalWindow::alike(const WindowFit& fit) const {
   const std::size_t n = lines_.frfs();
   double sum = 0.0;
@@ -249,7 +250,7 @@ double ModalWindow::alike(const WindowFit& fit) const {
   return std::max(1.0, sum / static_cast<double>(n));
 }
 
-// What the other modes cannot stand in for: near 0 where two sit on one another or cancel.
+// Share of a mode that the other modes cannot represent: near 0 where two coincide or cancel.
 double ModalWindow::apart(const WindowFit& fit, Index mode) const {
   const Index per = sharesPerMode();
   const auto contribution = [&](const WindowShares& s, Index k) -> VectorXd {
@@ -273,7 +274,7 @@ double ModalWindow::apart(const WindowFit& fit, Index mode) const {
   return least;
 }
 
-// Share of a mode that one single line carries: hum, a spike.
+// Share of a mode in a single line, as with hum or a spike.
 double ModalWindow::onOneLine(const WindowFit& fit, Index mode) const {
   const Index per = sharesPerMode();
   double all = 0.0, largest = 0.0;

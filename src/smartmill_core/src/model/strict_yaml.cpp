@@ -15,7 +15,7 @@ namespace smartmill {
 
 namespace {
 
-// The value as it stands in the file, in one line.
+// A value of the file for messages, in one line.
 std::string shown(const YAML::Node& node) {
   switch (node.Type()) {
     case YAML::NodeType::Scalar:
@@ -33,7 +33,7 @@ bool quoted(const YAML::Node& node) {
   return node.Tag() == "!";
 }
 
-// YAML's plain numbers; no hexadecimal, no words.
+// YAML's decimal numbers; no hexadecimal, no words.
 bool parse(const YAML::Node& node, double* value) {
   if (!node.IsScalar() || quoted(node)) return false;
   const std::string& text = node.Scalar();
@@ -71,7 +71,7 @@ struct StrictYaml::Impl {
     std::set<std::string> seen;
     for (const auto& entry : node) {
       const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : "?";
-      if (!seen.insert(key).second) throw Error(file + ": " + path + key + ": the key stands twice");
+      if (!seen.insert(key).second) throw Error(file + ": " + path + key + ": the key occurs twice");
     }
     return impl;
   }
@@ -92,7 +92,7 @@ StrictYaml StrictYaml::fromFile(const std::string& file) {
     throw Error(file + ": not a YAML file: " + lineOf(error.what()));
   }
   if (root.IsNull()) throw Error(file + ": is empty");
-  if (!root.IsMap()) throw Error(file + ": keys are due, but it is " + shown(root));
+  if (!root.IsMap()) throw Error(file + ": expected a map of keys, found " + shown(root));
   return StrictYaml(Impl::make(root, file, ""));
 }
 
@@ -131,7 +131,7 @@ double StrictYaml::number(const std::string& key, const Range& range) const {
 
 int StrictYaml::integer(const std::string& key, int low, int high) const {
   const double value = number(key, {static_cast<double>(low), static_cast<double>(high), false, false});
-  if (value != std::floor(value)) fail(key, shortNumber(value) + " is not a whole number");
+  if (value != std::floor(value)) fail(key, shortNumber(value) + " is not an integer");
   return static_cast<int>(value);
 }
 
@@ -160,8 +160,8 @@ std::vector<double> StrictYaml::numbers(const std::string& key, std::size_t coun
   impl_->read.insert(key);
   if (!node.IsSequence()) fail(key, shown(node) + " is not a list of numbers");
   if (count == 0 ? node.size() == 0 : node.size() != count) {
-    fail(key, "a list of " + std::to_string(node.size()) + ", " +
-                  (count ? std::to_string(count) : "one or more") + " numbers are due");
+    fail(key, "a list of " + std::to_string(node.size()) + ", expected " +
+                  (count ? std::to_string(count) : "one or more") + " numbers");
   }
   std::vector<double> values;
   for (std::size_t i = 0; i < node.size(); ++i) {
@@ -216,7 +216,7 @@ void StrictYaml::finish() const {
 
 namespace {
 
-// YAML 1.1 takes 5e-05 for a word: a point is due.
+// YAML 1.1 parses 5e-05 as a word: a point is required.
 std::string withPoint(std::string number) {
   if (number.find_first_of(".n") == std::string::npos) {
     const std::size_t exponent = number.find('e');

@@ -43,7 +43,7 @@ ParameterValue typed(const YAML::Node& node) {
 
 std::string describe(const ParameterValue& value) {
   if (const bool* flag = std::get_if<bool>(&value.value))
-    return *flag ? "'true' is a truth value" : "'false' is a truth value";
+    return *flag ? "'true' is a boolean" : "'false' is a boolean";
   if (const int* integer = std::get_if<int>(&value.value))
     return "'" + std::to_string(*integer) + "' is an integer";
   if (const double* real = std::get_if<double>(&value.value))

@@ -12,7 +12,7 @@ namespace smartmill {
 namespace {
 
 constexpr std::size_t WIDTH = 140;       // of a line of the file
-constexpr std::size_t LAST_COLUMN = 36;  // of comments; a longer value pushes its own comment on
+constexpr std::size_t LAST_COLUMN = 36;  // of comments; a longer value moves its comment to the right
 
 std::string joined(const std::vector<std::string>& words, const std::string& between) {
   std::string text;
@@ -69,7 +69,7 @@ std::string bounds(const Range& range) {
   return closed && both ? shortNumber(range.low) + ".." + shortNumber(range.high) : text;
 }
 
-// Words of a comment in lines that stay within the width, each behind the same begin.
+// Wraps a comment within the width; further lines are indented like the first.
 void wrap(std::ostream& out, const std::string& text, std::string begin) {
   const std::string further = std::string(begin.size(), ' ') + "# ";
   begin += "# ";
