@@ -12,7 +12,7 @@
 namespace smartmill {
 namespace {
 
-TEST(SineCosine, areTheLibrarys) {
+TEST(SineCosine, equalsTheStandardLibrary) {
   for (double angle = 0.0; angle < 12.5; angle += 0.00713) {
     EXPECT_NEAR(sineCosine(angle).sine, std::sin(angle), 1e-12);
     EXPECT_NEAR(sineCosine(angle).cosine, std::cos(angle), 1e-12);
@@ -27,7 +27,7 @@ ChipShape drawn(std::mt19937& random, double size) {
   return {normal(random), normal(random), normal(random), 0.1 * normal(random), 0.1 * normal(random)};
 }
 
-TEST(ChipShape, slopeAndBoundsHold) {
+TEST(ChipShape, slopeAndBoundsAreCorrect) {
   std::mt19937 random(5);
   for (int trial = 0; trial < 200; ++trial) {
     const ChipShape shape = drawn(random, 1.0);
@@ -47,9 +47,9 @@ TEST(ChipShape, slopeAndBoundsHold) {
   }
 }
 
-// Pieces of the least of some random chips, against a fine grid: every angle where the least is positive is
-// in a piece of that very shape, no other is.
-TEST(Contact, findsEveryPieceInWhichAChipIsTheLeastAndPositive) {
+// Segments of the smallest of several random chips, compared with a fine grid: exactly the angles where the
+// smallest chip is positive lie in a segment of that shape.
+TEST(Contact, findsEverySegmentInWhichAChipIsSmallestAndPositive) {
   std::mt19937 random(11);
   std::uniform_real_distribution<double> uniform;
   for (int trial = 0; trial < 300; ++trial) {
@@ -81,8 +81,8 @@ TEST(Contact, findsEveryPieceInWhichAChipIsTheLeastAndPositive) {
   }
 }
 
-// A contact that begins within a cell does so to the digit: edge forces are all there at once.
-TEST(Contact, beginsWhereTheChipDoes) {
+// The start of a contact within a cell is exact, since edge forces set in at once.
+TEST(Contact, beginsWhereTheChipBegins) {
   ChipShape shape;
   shape.sine = 60e-6;
   shape.level = -20e-6;
@@ -96,7 +96,7 @@ TEST(Contact, beginsWhereTheChipDoes) {
 }
 
 // The formula of formats.md, feed along x.
-TEST(ChipRule, isTheFormula) {
+TEST(ChipRule, equalsTheFormula) {
   ToolGeometry tool{3, 12e-3, 0.5, {}};
   tool.pitch = {2.0, 2.2, units::TWO_PI - 4.2};
   const std::vector<double> r{3e-6, -5e-6, 1e-6};

@@ -29,7 +29,7 @@ UffFunction receptance(bool even) {
   return f;
 }
 
-TEST(Uff, ReadsWhatItWrote) {
+TEST(Uff, ReadsBackWhatWasWritten) {
   const TemporaryFolder folder;
   const std::string file = folder.file("frf.uff");
   for (const bool binary : {false, true}) {
@@ -53,8 +53,8 @@ TEST(Uff, ReadsWhatItWrote) {
   }
 }
 
-// As the description of dataset 58 lays it out: single precision in 13 columns that touch one another, other
-// datasets between, D exponents.
+// As in the description of dataset 58: single precision in adjacent fields of 13 columns, other datasets in
+// between, D exponents.
 TEST(Uff, ReadsSinglePrecisionText) {
   const TemporaryFolder folder;
   const std::string file = folder.file("old.unv");
@@ -76,7 +76,7 @@ TEST(Uff, ReadsSinglePrecisionText) {
   EXPECT_DOUBLE_EQ(found[0].abscissa[4], 4e-3);
 }
 
-TEST(Uff, NamesWhatIsWrong) {
+TEST(Uff, ErrorsNameDatasetAndFault) {
   const TemporaryFolder folder;
   const std::string file = folder.file("short.uff");
   writeUff({receptance(true)}, file, true);

@@ -17,8 +17,7 @@ namespace {
 constexpr double RATE = 25600.0;
 constexpr std::size_t BEGIN = 256;
 
-// A half-sine blow of 0.3 ms and the acceleration of two modes, with noise; `change` spoils force or
-// response.
+// A half-sine hit of 0.3 ms and the acceleration of two modes, with noise.
 Hit blow(unsigned seed, const std::function<double(double)>& second = {}) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
@@ -40,12 +39,12 @@ Hit blow(unsigned seed, const std::function<double(double)>& second = {}) {
   return hit;
 }
 
-TEST(HitJudge, TakesCleanHits) {
+TEST(HitCheck, AcceptsCleanHits) {
   for (unsigned seed = 1; seed <= 100; ++seed) EXPECT_EQ(hitFault(blow(seed), {}).text, "") << seed;
 }
 
-// A structure that hardly decays within the record, which begins with the hit: its ringing is no noise.
-TEST(HitJudge, TakesHitsThatRingOn) {
+// A structure that hardly decays within the record, which begins with the hit: its ringing is not noise.
+TEST(HitCheck, AcceptsHitsOfLongDecay) {
   std::mt19937 random(2);
   std::normal_distribution<double> normal;
   Hit hit;
@@ -62,7 +61,7 @@ TEST(HitJudge, TakesHitsThatRingOn) {
   EXPECT_NEAR(noiseUnderRinging({hit.response.end() - 2560, hit.response.end()}), 0.02, 0.004);
 }
 
-TEST(HitJudge, RefusesDoubleHits) {
+TEST(HitCheck, RejectsDoubleHits) {
   for (unsigned seed = 1; seed <= 60; ++seed) {
     std::mt19937 random(seed);
     const double size = std::uniform_real_distribution<double>(0.2, 0.6)(random);
@@ -75,7 +74,7 @@ TEST(HitJudge, RefusesDoubleHits) {
   }
 }
 
-TEST(HitJudge, NamesEachFault) {
+TEST(HitCheck, NamesEachFault) {
   const auto reason = [](const std::function<void(Hit&)>& spoil, HitCheckOptions options = {}) {
     Hit hit = blow(7);
     spoil(hit);
@@ -126,7 +125,7 @@ TEST(HitJudge, NamesEachFault) {
   EXPECT_EQ(reason([](Hit&) {}, {0.0, 0.1, 0.0, 2000.0}), "");
 }
 
-TEST(HitJudge, ComparesHits) {
+TEST(HitCheck, ComparesHits) {
   std::vector<Hit> hits;
   for (unsigned seed = 1; seed <= 5; ++seed) hits.push_back(blow(seed));
   const std::vector<bool> all(5, true);

@@ -72,10 +72,10 @@ TEST(ModalFilter, firstOrderRampIsExact) {
   }
 }
 
-// A sampled harmonic joined by straight lines holds sinc^2(f / rate) of the harmonic; what else it holds lies
-// near multiples of the rate, where the modes do not answer (600 Hz: image 41 times higher, answer below 1e-3
+// A sampled harmonic with linear interpolation contains sinc^2(f / rate) of the harmonic. Its images are near
+// multiples of the rate, where the modes hardly respond (600 Hz: image 41 times higher, response below 1e-3
 // of 1e-3).
-TEST(ModalFilter, firstOrderFollowsAHarmonic) {
+TEST(ModalFilter, firstOrderReproducesAHarmonic) {
   const double f = 600.0;
   ModalModel one;
   one.modes = {{930.0, 0.03, 1.0}};
@@ -91,7 +91,7 @@ TEST(ModalFilter, firstOrderFollowsAHarmonic) {
   }
 }
 
-TEST(ModalFilter, staysInTheStaticStateOfItsReset) {
+TEST(ModalFilter, staysInTheStaticStateAfterReset) {
   for (const Hold hold : {Hold::zero_order, Hold::first_order}) {
     ModalFilter filter(model(), RATE, hold);
     filter.reset(7.0);
@@ -101,7 +101,7 @@ TEST(ModalFilter, staysInTheStaticStateOfItsReset) {
   }
 }
 
-TEST(ModalFilter, refusesImpossibleModes) {
+TEST(ModalFilter, rejectsInvalidModes) {
   ModalModel bad;
   bad.modes = {{100.0, 1.0, 1.0}};
   EXPECT_THROW(ModalFilter(bad, RATE, Hold::zero_order), Error);
@@ -123,7 +123,7 @@ TEST(StateSpace, hasTheFrequencyResponseOfTheModes) {
 }
 
 // Zero-order hold by the matrix exponential of state and input together.
-TEST(StateSpace, discretisedItIsTheZeroOrderFilter) {
+TEST(StateSpace, discretisedEqualsTheZeroOrderFilter) {
   StateSpace system = stateSpace(model());
   Eigen::MatrixXd joint = Eigen::MatrixXd::Zero(7, 7);
   joint << system.a, system.b, Eigen::MatrixXd::Zero(1, 7);
@@ -168,8 +168,8 @@ TEST(DiscretiseNoise, integratorChain) {
 }
 
 TEST(DiscretiseNoise, decayOverAnyStep) {
-  // x' = -r x + w: variance q (1 - exp(-2 r dt)) / (2 r); at r dt = 50 exp(+50) would drown every digit of
-  // the plain form.
+  // x' = -r x + w: variance q (1 - exp(-2 r dt)) / (2 r); at r dt = 50 the direct form loses all digits to
+  // exp(+50).
   for (const double rate_step : {1e-6, 0.1, 5.0, 50.0}) {
     const Eigen::MatrixXd a = Eigen::MatrixXd::Constant(1, 1, -100.0),
                           q = Eigen::MatrixXd::Constant(1, 1, 3.0);

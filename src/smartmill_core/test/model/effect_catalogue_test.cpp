@@ -111,7 +111,7 @@ TEST(EffectCatalogue, hasTheNamesThatOtherProgramsUse) {
   EXPECT_EQ(findEffect("saturation")->parameters.at(0).unit, "N");
 }
 
-TEST(EffectCatalogue, anglesDifferByTheShorterWay) {
+TEST(EffectCatalogue, anglesHaveTheShorterDifference) {
   const EffectKind &order = *findEffect("spindle_order"), &runout = *findEffect("runout");
   EXPECT_NEAR(parameterOf(order, "y_deg").difference(359.0, 2.0), -3.0, 1e-12);
   EXPECT_NEAR(parameterOf(order, "y_deg").scale(10.0), 57.29577951308232, 1e-12);  // one radian
@@ -235,7 +235,7 @@ TEST(EffectCatalogue, coordinatesAndEntriesAreInverse) {
 }
 
 // Closed forms of the coordinates.
-TEST(EffectCoordinates, areTheirClosedForms) {
+TEST(EffectCoordinates, equalTheirClosedForms) {
   EffectForm vector({planar("size", "angle_deg", 10.0, 1e-3, 1.0)});
   EXPECT_NEAR(vector.entry({-3.0, -4.0}).numbers.at("size"), 5.0, 1e-12);
   EXPECT_NEAR(vector.entry({0.0, -4.0}).numbers.at("angle_deg"), 270.0, 1e-12);

@@ -1,4 +1,4 @@
-// The helpers of the tests: an evidence that cannot fail is none.
+// Tests of the test helpers: they must be able to fail.
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -13,7 +13,7 @@
 namespace smartmill {
 namespace {
 
-/// @param stated what an estimate says of itself over its true standard deviation
+/// @param stated stated over true standard deviation of the estimates
 Coverage estimates(int count, double stated) {
   std::mt19937 random(7);
   std::normal_distribution<double> normal;
@@ -22,7 +22,7 @@ Coverage estimates(int count, double stated) {
   return coverage;
 }
 
-TEST(Coverage, holdsHonestDeviationsOnly) {
+TEST(Coverage, acceptsCalibratedDeviationsOnly) {
   for (const int count : {Coverage::RUNS, 600, 2000}) {
     EXPECT_TRUE(estimates(count, 1.0).honest()) << count;
     EXPECT_FALSE(estimates(count, 1.0 / 1.5).honest()) << count;
@@ -33,9 +33,9 @@ TEST(Coverage, holdsHonestDeviationsOnly) {
   EXPECT_TRUE(estimates(2000, 1.1).honest(Coverage::RUNS));
 }
 
-TEST(Coverage, refusesNothingAndNoDeviation) {
+TEST(Coverage, rejectsEmptyInputAndZeroDeviations) {
   EXPECT_FALSE(Coverage().honest());
-  EXPECT_FALSE(estimates(Coverage::RUNS - 10, 1.0).honest());  // too few to tell
+  EXPECT_FALSE(estimates(Coverage::RUNS - 10, 1.0).honest());  // too few
   EXPECT_FALSE(estimates(2000, 1.0).honest(Coverage::RUNS - 10.0));
   EXPECT_FALSE(estimates(60, 1.0).honest(0.0, 2.0));
   EXPECT_TRUE(estimates(72, 1.0).honest(0.0, 2.0));
@@ -45,7 +45,7 @@ TEST(Coverage, refusesNothingAndNoDeviation) {
 }
 
 // Chi-square of 200 degrees of freedom at the probabilities of -4 and 4 normal deviations: 129.78 and 290.18.
-// A mean square just inside is honest, one just outside is not.
+// A mean square just inside is calibrated, one just outside is not.
 TEST(Coverage, hasTheLimitsOfTheTables) {
   const auto of = [](int count, double sum) {
     Coverage coverage;
@@ -63,7 +63,7 @@ void testThatNeedsData(std::string& found) {
   found = file;
 }
 
-TEST(SharedData, isFoundWhereTheEnvironmentSays) {
+TEST(SharedData, isFoundInTheFolderOfTheEnvironmentVariable) {
   const char* const before = std::getenv("SMARTMILL_SHARED");
   const std::string kept = before ? before : "";
   const TemporaryFolder folder;
