@@ -204,7 +204,7 @@ double MillingProcess::pathMargin(double vibrated, double fed) const {
          0.5 * share * std::max(fed * fed - moved * moved, 0.0);
 }
 
-double MillingProcess::pathMarginAt(const Delay& delay, const Stretch& cell) const {
+double MillingProcess::pathMarginAt(const Delay& delay, const AngleInterval& cell) const {
   const auto across = [&](double x, double y) { return x * cell.at.cosine - y * cell.at.sine; };
   return pathMargin(
       across(now_.displacement[0] - delay.displacement[0], now_.displacement[1] - delay.displacement[1]),
@@ -222,8 +222,8 @@ double MillingProcess::largestPathMargin(double turn) const {
 // The surface on the ray at phi was cut by a tooth at psi = phi + D.t / R, with the motion D of the axis
 // since then and t across the ray; its distance is R - D(psi).e - (D.t)^2 / (2 R). One Newton step from the
 // solution of the last contact.
-void MillingProcess::correctForPath(const Delay& delay, const Delay& first, const Stretch& cell, Pass& pass,
-                                    ChipShape* shape) const {
+void MillingProcess::correctForPath(const Delay& delay, const Delay& first, const AngleInterval& cell,
+                                    Pass& pass, ChipShape* shape) const {
   constexpr double MOST = 0.25;         // [rad] bound on the angle
   constexpr double LEAST_SLOPE = 0.25;  // [1] bound on the slope of the equation
   const double radius = tool_.radius(), steps = 1.0 / (now_.speed * time_step_);  // [m], [1/rad]
@@ -257,7 +257,7 @@ void MillingProcess::correctForPath(const Delay& delay, const Delay& first, cons
 /// Collects the passes that may bound a tooth's chip over a cell of its edge: from the last one back until no
 /// older pass can be nearer.
 /// @param certain receives whether a single pass is in contact all along @return whether there may be contact
-bool MillingProcess::collectShapes(int tooth, const Stretch& cell, bool& certain) {
+bool MillingProcess::collectShapes(int tooth, const AngleInterval& cell, bool& certain) {
   shapes_.clear();
   const std::size_t last = passOf(tooth, 1).delay;
   const std::array<double, 2> then = delayAt(last).displacement;
@@ -311,7 +311,7 @@ bool MillingProcess::collectShapes(int tooth, const Stretch& cell, bool& certain
 }
 
 /// Adds the sums over a segment of an edge in contact with one shape, integrated over the immersion angle.
-void MillingProcess::add(const ChipShape& shape, const Stretch& over, double height, CutSums& sums) {
+void MillingProcess::add(const ChipShape& shape, const AngleInterval& over, double height, CutSums& sums) {
   constexpr double LEAST_CHIP = 1e-15;  // [m] at the ends of a contact, where the edge still rubs
   gauss(over, [&](double weight, double s, double c) {
     const double chip = std::max(shape.at(s, c), LEAST_CHIP), w = height * weight;
@@ -332,14 +332,14 @@ void MillingProcess::add(const ChipShape& shape, const Stretch& over, double hei
 }
 
 /// Adds the sums of one edge over one of its cells.
-void MillingProcess::cut(int tooth, const Stretch& cell, double height, CutSums& sums) {
+void MillingProcess::cut(int tooth, const AngleInterval& cell, double height, CutSums& sums) {
   bool certain = false;
   if (!collectShapes(tooth, cell, certain)) return;
   if (certain) {
     add(shapes_[0], cell, height, sums);
   } else {
     leastPositive(shapes_.data(), shapes_.size(), cell,
-                  [&](const ChipShape& shape, const Stretch& over) { add(shape, over, height, sums); });
+                  [&](const ChipShape& shape, const AngleInterval& over) { add(shape, over, height, sums); });
   }
 }
 
@@ -356,7 +356,7 @@ CutSums MillingProcess::sumsAt(const ToolMotion& now) {
     const double from = part.straight ? part.to : part.from,
                  to = part.straight ? part.to + LEAST_LAG : part.to;
     const double height = part.straight ? part.height / LEAST_LAG : part.height;
-    forEachCell(from, to, [&](const Stretch& cell) { cut(part.tooth, cell, height, sums); });
+    forEachCell(from, to, [&](const AngleInterval& cell) { cut(part.tooth, cell, height, sums); });
   });
   if (law_.damping != 0.0) sums.rubbing = rubbing(now.rate, now.speed);
   return sums;

@@ -83,7 +83,7 @@ TEST(AxisInertia, needsTheMotionOfItsAxis) {
   for (const EffectParameter& p : kind.parameters) keys.push_back(p.key);
   EXPECT_EQ(keys, (std::vector<std::string>{"axis", "mass_kg"}));
   const MachineModel model = mill(4, 30.0);
-  EXPECT_EQ(lackingFor(kind, {model, {"fx", "fy"}}), std::string());
+  EXPECT_EQ(missingNeed(kind, {model, {"fx", "fy"}}), std::string());
   const std::vector<EffectForm> forms = formsOf(kind, {model, {"fx", "fy"}, {"y", "z"}});
   ASSERT_EQ(forms.size(), 1u);
   EXPECT_EQ(forms.front().variant, "y");

@@ -141,7 +141,8 @@ void ChatterDetector::handle(const CuttingCondition& condition) {
   condition_ = condition;
   said_invalid_ = false;
   // Turns are counted from here on: the digits of a verdict must not depend on how long the node has run.
-  if (!angles_.empty()) angles_.assign(1, {angles_.back().time, angles_.back().shown, angles_.back().shown});
+  if (!angles_.empty())
+    angles_.assign(1, {angles_.back().time, angles_.back().measured, angles_.back().measured});
   notSteady(condition.stamp);
 }
 

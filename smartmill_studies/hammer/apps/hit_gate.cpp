@@ -52,7 +52,7 @@ Tally count(HitClass kind, const Request& request, int first, int step) {
     HitCheckOptions options;
     options.weak_force = drawn.weak_force;
     options.high = drawn.high;
-    const std::vector<HitFault> faults = judgeHits(drawn.hits, options);
+    const std::vector<HitFault> faults = checkHits(drawn.hits, options);
     for (std::size_t h = 0; h < faults.size(); ++h) {
       const std::string& text = faults[h].text;
       if (!clean && h != drawn.at_fault) {

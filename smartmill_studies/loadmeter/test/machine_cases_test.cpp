@@ -77,7 +77,7 @@ TEST(Cases, ktcIsWithinThreeAndSixPercentAndHonest) {
   std::sort(errors.begin(), errors.end());
   EXPECT_LT(errors[count / 2], 0.03);
   EXPECT_LT(errors[static_cast<std::size_t>(0.95 * count)], 0.06);
-  EXPECT_TRUE(ktc.honest(0.0, 2.0));
+  EXPECT_TRUE(ktc.isCalibrated(0.0, 2.0));
 }
 
 }  // namespace

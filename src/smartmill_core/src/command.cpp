@@ -85,10 +85,10 @@ std::string CommandProgram::nearest(const std::string& word) const {
   std::size_t least = std::max<std::size_t>(2, word.size() / 2) + 1;
   for (const CommandTopic& topic : topics) {
     for (const Command& one : topic.commands) {
-      std::size_t apart = std::min(distance(word, one.name), distance(word, one.tool));
-      if (!word.empty() && one.name.rfind(word, 0) == 0) apart = std::min<std::size_t>(apart, 1);
-      if (apart >= least) continue;
-      least = apart;
+      std::size_t edits = std::min(distance(word, one.name), distance(word, one.tool));
+      if (!word.empty() && one.name.rfind(word, 0) == 0) edits = std::min<std::size_t>(edits, 1);
+      if (edits >= least) continue;
+      least = edits;
       closest = one.name;
     }
   }

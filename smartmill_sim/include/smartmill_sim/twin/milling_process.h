@@ -120,13 +120,13 @@ class MillingProcess {
   void searchHistory(Delay& delay);
   void shapePass(int tooth, int n, Pass& pass);
   double pathMargin(double vibrated, double fed) const;
-  double pathMarginAt(const Delay& delay, const Stretch& cell) const;
+  double pathMarginAt(const Delay& delay, const AngleInterval& cell) const;
   double largestPathMargin(double turn) const;
-  void correctForPath(const Delay& delay, const Delay& first, const Stretch& cell, Pass& pass,
+  void correctForPath(const Delay& delay, const Delay& first, const AngleInterval& cell, Pass& pass,
                       ChipShape* shape) const;
-  bool collectShapes(int tooth, const Stretch& cell, bool& certain);
-  void cut(int tooth, const Stretch& cell, double height, CutSums& sums);
-  void add(const ChipShape& shape, const Stretch& over, double height, CutSums& sums);
+  bool collectShapes(int tooth, const AngleInterval& cell, bool& certain);
+  void cut(int tooth, const AngleInterval& cell, double height, CutSums& sums);
+  void add(const ChipShape& shape, const AngleInterval& over, double height, CutSums& sums);
   void growHistory();
 
   ToolGeometry tool_;

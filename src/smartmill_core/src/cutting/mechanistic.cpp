@@ -16,8 +16,8 @@ namespace {
 using units::PI;
 using units::TWO_PI;
 
-[[noreturn]] void refuse(const char* what, double value, const char* unit, const char* due) {
-  throw Error(formatted("%s: %g %s is out of range (%s)", what, value, unit, due));
+[[noreturn]] void refuse(const char* what, double value, const char* unit, const char* range) {
+  throw Error(formatted("%s: %g %s is out of range (%s)", what, value, unit, range));
 }
 
 double sinc(double x) {

@@ -12,8 +12,8 @@ using Eigen::Index;
 using Eigen::VectorXd;
 
 // Minimum over the free elements with the others fixed.
-VectorXd wanted(const Eigen::MatrixXd& h, const VectorXd& b, const VectorXd& x,
-                const std::vector<Index>& free) {
+VectorXd freeMinimum(const Eigen::MatrixXd& h, const VectorXd& b, const VectorXd& x,
+                     const std::vector<Index>& free) {
   const Eigen::Map<const Eigen::Matrix<Index, Eigen::Dynamic, 1>> at(free.data(),
                                                                      static_cast<Index>(free.size()));
   VectorXd staying = x;
@@ -25,7 +25,8 @@ VectorXd wanted(const Eigen::MatrixXd& h, const VectorXd& b, const VectorXd& x,
 
 }  // namespace
 
-VectorXd leastWithin(const Eigen::MatrixXd& h, const VectorXd& b, const VectorXd& low, const VectorXd& high) {
+VectorXd minimiseWithin(const Eigen::MatrixXd& h, const VectorXd& b, const VectorXd& low,
+                        const VectorXd& high) {
   const Index n = b.size();
   VectorXd x = linear::solveSymmetric(h, b).cwiseMax(low).cwiseMin(high);
   std::vector<bool> held(static_cast<std::size_t>(n));
@@ -37,7 +38,7 @@ VectorXd leastWithin(const Eigen::MatrixXd& h, const VectorXd& b, const VectorXd
     for (Index i = 0; i < n; ++i) {
       if (!held[static_cast<std::size_t>(i)]) free.push_back(i);
     }
-    const VectorXd to = wanted(h, b, x, free);
+    const VectorXd to = freeMinimum(h, b, x, free);
     double share = 1.0;  // feasible share of the step
     Index stops = -1;
     for (std::size_t k = 0; k < free.size(); ++k) {

@@ -23,7 +23,7 @@ using Eigen::VectorXd;
 // Distance to a bound, as share of the unknown's scale, that counts as at the bound.
 constexpr double AT_BOUND = 1e-9;
 // Share of an unknown in undetermined directions from which it counts as undetermined itself.
-constexpr double UNTOLD = 1e-6;
+constexpr double UNDETERMINED_SHARE = 1e-6;
 
 /// Reports progress to the caller; ends the fit on its request or after a failure.
 class Reporter : public ceres::IterationCallback {
@@ -59,7 +59,7 @@ ceres::Solver::Options solverOptions(const Options& options, Reporter* reporter)
   solver.parameter_tolerance = options.parameter_tolerance;
   solver.gradient_tolerance = options.gradient_tolerance;
   solver.initial_trust_region_radius = options.trust_radius;
-  if (options.dear_derivatives) {
+  if (options.costly_derivatives) {
     solver.line_search_interpolation_type = ceres::QUADRATIC;
     solver.max_num_line_search_step_size_iterations = 4;
   }
@@ -111,7 +111,7 @@ Ending endingOf(const ceres::Solver::Summary& summary, bool cancelled) {
 /// A result with the state to continue from it.
 struct Solved {
   Result result;
-  std::vector<bool> pressed;  // per unknown: at a bound, with the gradient pointing outwards
+  std::vector<bool> at_active_bound;  // per unknown: at a bound, with the gradient pointing outwards
 };
 
 /// Residuals and derivatives at the solution.
@@ -136,7 +136,7 @@ void describe(const ScaledResiduals& scaled, const ceres::CostFunction& cost,
     const Parameter& p = parameters[static_cast<std::size_t>(i)];
     const double at = result.value[i], margin = AT_BOUND * p.scale;
     const bool low = at <= p.low + margin, high = at >= p.high - margin;
-    solved->pressed[static_cast<std::size_t>(i)] =
+    solved->at_active_bound[static_cast<std::size_t>(i)] =
         (low && gradient[column] > 0.0) || (high && gradient[column] < 0.0);
     result.moves[static_cast<std::size_t>(i)] = !low && !high;
     if (!low && !high) result.jacobian.col(i) = jacobian.col(column) / p.scale;
@@ -153,7 +153,7 @@ Solved solve(const Residuals& residuals, const std::vector<Parameter>& parameter
   result.jacobian = MatrixXd::Zero(residuals.count(), static_cast<Index>(parameters.size()));
   result.squares = result.residual.squaredNorm();
   result.moves.assign(parameters.size(), false);
-  solved.pressed = result.moves;
+  solved.at_active_bound = result.moves;
   if (x.empty()) {
     result.ending = Ending::converged;
     result.message = "all unknowns are fixed";
@@ -205,13 +205,13 @@ Covariance covarianceOf(const MatrixXd& jacobian, double tolerance) {
     if (size[i] > 0.0) unit.col(i).head(jacobian.rows()) = jacobian.col(i) / size[i];
   }
   const linear::Svd svd = linear::svd(linear::triangleOf(unit));
-  VectorXd untold = VectorXd::Zero(n);
+  VectorXd undetermined_share = VectorXd::Zero(n);
   for (Index k = 0; k < n; ++k) {
     if (svd.values[k] > tolerance * svd.values[0]) {
       result.matrix += svd.v.col(k) * svd.v.col(k).transpose() / (svd.values[k] * svd.values[k]);
       ++result.rank;
     } else {
-      untold += svd.v.col(k).cwiseAbs2();
+      undetermined_share += svd.v.col(k).cwiseAbs2();
     }
   }
   for (Index i = 0; i < n; ++i) {
@@ -220,7 +220,7 @@ Covariance covarianceOf(const MatrixXd& jacobian, double tolerance) {
     }
   }
   for (Index i = 0; i < n; ++i) {
-    if (untold[i] < UNTOLD) continue;
+    if (undetermined_share[i] < UNDETERMINED_SHARE) continue;
     result.undetermined[static_cast<std::size_t>(i)] = true;
     result.matrix.row(i).setZero();
     result.matrix.col(i).setZero();
@@ -273,15 +273,15 @@ Result minimise(const Residuals& residuals, const std::vector<Parameter>& parame
                 const Options& options) {
   silence();
   const Solved first = solve(residuals, parameters, options);
-  const auto pressed = std::count(first.pressed.begin(), first.pressed.end(), true);
-  if (!options.finish_at_bounds || pressed == 0 || first.result.ending != Ending::converged)
+  const auto at_active_bound = std::count(first.at_active_bound.begin(), first.at_active_bound.end(), true);
+  if (!options.finish_at_bounds || at_active_bound == 0 || first.result.ending != Ending::converged)
     return first.result;
   // Ceres evaluates its steps by their predicted decrease without bounds, and ends early where unknowns are
   // pushed against theirs. The fit continues with the other unknowns.
   std::vector<Parameter> held = parameters;
   for (std::size_t i = 0; i < held.size(); ++i) {
     held[i].start = first.result.value[static_cast<Index>(i)];
-    if (first.pressed[i]) held[i].low = held[i].high = held[i].start;
+    if (first.at_active_bound[i]) held[i].low = held[i].high = held[i].start;
   }
   Result second = solve(residuals, held, options).result;
   if (!second.usable() || second.squares > first.result.squares) return first.result;

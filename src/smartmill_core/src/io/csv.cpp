@@ -160,21 +160,21 @@ NumberTable readNumberTable(const std::string& file) {
   return table;
 }
 
-std::vector<std::vector<double>> readColumns(const std::string& file, const std::vector<std::string>& due) {
+std::vector<std::vector<double>> readColumns(const std::string& file, const std::vector<std::string>& names) {
   CsvReader reader(file);
   std::vector<std::string_view> cells;
   if (!reader.next(&cells)) throw Error(file + ": is empty");
-  std::vector<std::size_t> place;
-  for (const std::string& name : due) {
+  std::vector<std::size_t> position;
+  for (const std::string& name : names) {
     const auto at = std::find(cells.begin(), cells.end(), name);
     if (at == cells.end()) throw Error(file + ": column " + name + " is missing");
-    place.push_back(static_cast<std::size_t>(at - cells.begin()));
+    position.push_back(static_cast<std::size_t>(at - cells.begin()));
   }
-  std::vector<std::vector<double>> columns(due.size());
+  std::vector<std::vector<double>> columns(names.size());
   std::size_t rows = 0;
   for (; reader.nextFilled(&cells); ++rows) {
-    for (std::size_t c = 0; c < due.size(); ++c)
-      columns[c].push_back(reader.number(place[c] < cells.size() ? cells[place[c]] : "", due[c]));
+    for (std::size_t c = 0; c < names.size(); ++c)
+      columns[c].push_back(reader.number(position[c] < cells.size() ? cells[position[c]] : "", names[c]));
   }
   if (rows == 0) throw Error(file + ": no rows");
   return columns;

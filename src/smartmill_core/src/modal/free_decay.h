@@ -19,7 +19,7 @@ FreeDecayBreak freeDecayBreak(const std::vector<double>& response, std::size_t f
 
 /// Unpredicted power of the samples begin .. end, relative to that of the ringing before them: near 1 for
 /// beating modes, larger for other motion. 0: too few samples before.
-double unforeseenRise(const std::vector<double>& response, std::size_t from, std::size_t begin,
-                      std::size_t end, double noise);
+double unpredictedRise(const std::vector<double>& response, std::size_t from, std::size_t begin,
+                       std::size_t end, double noise);
 
 }  // namespace smartmill

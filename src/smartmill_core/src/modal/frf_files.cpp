@@ -92,7 +92,7 @@ ModalEstimate estimateOf(const ModalModel& model) {
     mode.evidence = UNKNOWN;
     estimate.modes.push_back(mode);
   }
-  estimate.flanks.push_back({model.direct, 0.0});
+  estimate.residual_terms.push_back({model.direct, 0.0});
   return estimate;
 }
 

@@ -56,12 +56,12 @@ constexpr double BY_NOISE = 3.0;
 /// Range and step of the shifts [samples]; lines from this share of the strongest are used.
 constexpr double MOST_SKEW = 6.0, SKEW_STEP = 0.1, STRONG_FORCE = 0.2;
 
-struct Quiet {
+struct Background {
   double level = 0.0, noise = 0.0, scatter = 0.0;
 };
 
 /// Baseline and noise before the hit, or at the record's end where it begins with the hit.
-Quiet quietOf(const std::vector<double>& values, std::size_t before) {
+Background backgroundOf(const std::vector<double>& values, std::size_t before) {
   const std::size_t n = before - before / 4;
   const auto first = values.begin();
   const std::vector<double> part =
@@ -79,12 +79,12 @@ struct Channel {
 };
 
 Channel channelOf(const std::vector<double>& values, std::size_t before) {
-  const Quiet quiet = quietOf(values, before);
+  const Background background = backgroundOf(values, before);
   // Where the record begins with the hit and still rings at its end, the mean there is not a baseline.
-  const bool rings = before - before / 4 < LEAST_QUIET && quiet.scatter > 3.0 * quiet.noise;
-  Channel c{values, quiet.noise, 0.0};
+  const bool rings = before - before / 4 < LEAST_QUIET && background.scatter > 3.0 * background.noise;
+  Channel c{values, background.noise, 0.0};
   for (double& v : c.values) {
-    v -= rings ? 0.0 : quiet.level;
+    v -= rings ? 0.0 : background.level;
     c.largest = std::max(c.largest, std::abs(v));
   }
   return c;
@@ -101,7 +101,7 @@ std::size_t longestRun(const std::vector<double>& values, double least) {
 
 /// Clipped before the converter, equal within the noise: a flat around the largest sample that ends in
 /// corners. Next to a round crest, however broad, each step down is larger than the one before.
-bool cornered(const Channel& c, double sign) {
+bool hasFlatTop(const Channel& c, double sign) {
   const auto n = static_cast<std::ptrdiff_t>(c.values.size());
   const auto at = [&](std::ptrdiff_t i) { return sign * c.values[static_cast<std::size_t>(i)]; };
   const double width = std::max(FLAT_NOISE * c.noise, FLAT_SHARE * c.largest);
@@ -109,18 +109,20 @@ bool cornered(const Channel& c, double sign) {
   for (std::ptrdiff_t i = 1; i < n; ++i) top = at(i) > at(top) ? i : top;
   std::ptrdiff_t ends[2] = {top, top};
   for (const int side : {0, 1}) {
-    const std::ptrdiff_t way = side == 0 ? -1 : 1;
-    while (ends[side] + 4 * way >= 0 && ends[side] + 4 * way < n && at(top) - at(ends[side] + way) < width)
-      ends[side] += way;
+    const std::ptrdiff_t direction = side == 0 ? -1 : 1;
+    while (ends[side] + 4 * direction >= 0 && ends[side] + 4 * direction < n &&
+           at(top) - at(ends[side] + direction) < width)
+      ends[side] += direction;
   }
   const auto length = static_cast<double>(ends[1] - ends[0] + 1);
   if (length < FLAT) return false;
   for (const int side : {0, 1}) {
-    const std::ptrdiff_t way = side == 0 ? -1 : 1, end = ends[side];
-    if (end + 4 * way < 0 || end + 4 * way >= n) return false;
-    const double second = at(end + way) - at(end + 2 * way), third = at(end + 2 * way) - at(end + 3 * way);
+    const std::ptrdiff_t direction = side == 0 ? -1 : 1, end = ends[side];
+    if (end + 4 * direction < 0 || end + 4 * direction >= n) return false;
+    const double second = at(end + direction) - at(end + 2 * direction),
+                 third = at(end + 2 * direction) - at(end + 3 * direction);
     const double round = width * std::pow(1.0 + 4.0 / length, 2);  // fall of a parabola of this width
-    const double fall = (at(top) - at(end + 2 * way)) / round;
+    const double fall = (at(top) - at(end + 2 * direction)) / round;
     if (fall < SHARP || (third > ROUND * second && fall < VERY_SHARP)) return false;
   }
   return true;
@@ -128,7 +130,7 @@ bool cornered(const Channel& c, double sign) {
 
 /// Many crests of equal height: a round crest has at most 1.4 times as many samples in a band at its top as
 /// in the two below it.
-bool crowded(const Channel& c, double sign) {
+bool hasEqualCrests(const Channel& c, double sign) {
   const double width = std::max(FLAT_NOISE * c.noise, FLAT_SHARE * c.largest);
   double top = 0.0;
   for (const double v : c.values) top = std::max(top, sign * v);
@@ -143,7 +145,7 @@ bool crowded(const Channel& c, double sign) {
 
 /// Clipped on both sides: an amplifier has the same range in both directions, while the crests of a decay
 /// fall from one to the next. Minimum and maximum have equal magnitude, and samples accumulate there.
-bool mirrored(const Channel& c) {
+bool clippedOnBothSides(const Channel& c) {
   const double width = std::max(FLAT_NOISE * c.noise, FLAT_SHARE * c.largest);
   const auto [low, high] = std::minmax_element(c.values.begin(), c.values.end());
   if (std::abs(*high + *low) >= width) return false;
@@ -196,8 +198,9 @@ bool clipped(const Channel& c, bool both_ways) {
         (top.crests >= 2 && top.equal >= top.below))
       return true;
   }
-  if ((up.equal >= 2 && down.equal >= 2) || cornered(c, 1.0)) return true;
-  return both_ways && (cornered(c, -1.0) || crowded(c, 1.0) || crowded(c, -1.0) || mirrored(c));
+  if ((up.equal >= 2 && down.equal >= 2) || hasFlatTop(c, 1.0)) return true;
+  return both_ways &&
+         (hasFlatTop(c, -1.0) || hasEqualCrests(c, 1.0) || hasEqualCrests(c, -1.0) || clippedOnBothSides(c));
 }
 
 /// A rise of the force after it has fallen from the main peak, or before the peak.
@@ -205,16 +208,17 @@ std::string secondHit(const Channel& force, double rate, double share) {
   const auto top = std::max_element(force.values.begin(), force.values.end()) - force.values.begin();
   const double peak = force.values[static_cast<std::size_t>(top)];
   const double rise = std::max(share * peak, ABOVE_NOISE * force.noise);
-  const auto soonest = static_cast<std::ptrdiff_t>(SOONEST_SECOND * rate);
-  for (const int way : {1, -1}) {
+  const auto least_distance = static_cast<std::ptrdiff_t>(SOONEST_SECOND * rate);
+  for (const int direction : {1, -1}) {
     double lowest = peak;
-    for (std::ptrdiff_t i = top; i >= 0 && i < static_cast<std::ptrdiff_t>(force.values.size()); i += way) {
+    for (std::ptrdiff_t i = top; i >= 0 && i < static_cast<std::ptrdiff_t>(force.values.size());
+         i += direction) {
       const double f = force.values[static_cast<std::size_t>(i)];
       lowest = std::min(lowest, std::max(f, 0.0));
-      if (f - lowest > rise && std::abs(i - top) >= soonest) {
+      if (f - lowest > rise && std::abs(i - top) >= least_distance) {
         return formatted("double hit: the force rises again by %.0f %% of its peak, %.2f ms %s it",
                          100.0 * (f - lowest) / peak, 1e3 * static_cast<double>(std::abs(i - top)) / rate,
-                         way > 0 ? "after" : "before");
+                         direction > 0 ? "after" : "before");
       }
     }
   }
@@ -250,9 +254,9 @@ std::string brokenPulse(const Channel& force) {
     if (std::min(f[i - 1], std::max(f[i + 1], f[i + 2])) - f[i] > least)
       return formatted("dropout: sample %zu of the force drops during the contact", i);
   }
-  const double beside =
+  const double neighbour =
       top > 0 && top + 2 < f.size() ? std::max({f[top - 1], f[top + 1], f[top + 2]}) : f[top];
-  if (f[top] > LONE_TOP * beside)
+  if (f[top] > LONE_TOP * neighbour)
     return formatted("dropout: sample %zu of the force deviates from its neighbours", top);
   return "";
 }
@@ -292,7 +296,7 @@ std::size_t contactEnd(const Channel& force) {
 
 /// The ringing rises again: by a large factor, or by a smaller one with a deviation from its prediction
 /// (beating modes are predicted).
-std::string swelling(const Channel& response, std::size_t from, double rate) {
+std::string lateBump(const Channel& response, std::size_t from, double rate) {
   const auto block = static_cast<std::size_t>(BLOCK * rate);
   const std::size_t blocks = (response.values.size() - from) / block;
   double loudest = 0.0, softest = INFINITY;
@@ -304,7 +308,7 @@ std::string swelling(const Channel& response, std::size_t from, double rate) {
     const bool clear = level > std::max({BUMP * softest, BUMP_SHARE * loudest, ABOVE_NOISE * response.noise});
     const bool some = level > std::max({RISE * softest, RISE_SHARE * loudest, ABOVE_NOISE * response.noise});
     if (clear ||
-        (some && unforeseenRise(response.values, from, begin, begin + block, response.noise) > FOREIGN))
+        (some && unpredictedRise(response.values, from, begin, begin + block, response.noise) > FOREIGN))
       return formatted("late bump: %.0f ms after the hit the response rises again by a factor %.1f",
                        1e3 * static_cast<double>(b * block) / rate, level / softest);
     softest = std::min(softest, level);
@@ -312,7 +316,7 @@ std::string swelling(const Channel& response, std::size_t from, double rate) {
   return "";
 }
 
-std::string strange(const Channel& force, const Channel& response) {
+std::string decayDeviation(const Channel& force, const Channel& response) {
   const FreeDecayBreak found = freeDecayBreak(response.values, contactEnd(force) + 2, response.noise);
   if (found.sample == 0) return "";
   return formatted(
@@ -379,17 +383,18 @@ Lines linesOf(const Hit& hit) {
 }
 
 /// A hit's response relative to the one predicted from its force with the FRF of the others.
-struct Beside {
+struct Comparison {
   double gain = 1.0, shift = 0.0;          ///< [1], [samples] of the response
   double gain_std = 0.0, shift_std = 0.0;  ///< by the noise
   double jump() const { return std::abs(std::log(gain)) / (GAIN_JUMP + BY_NOISE * gain_std); }
   double skew() const { return std::abs(shift) / (SKEW + BY_NOISE * shift_std); }
-  double badness() const { return std::max(jump(), skew()); }
+  double severity() const { return std::max(jump(), skew()); }
 };
 
-Beside besideOthers(const std::vector<Lines>& lines, const std::vector<std::size_t>& members, std::size_t h) {
+Comparison compareWithOthers(const std::vector<Lines>& lines, const std::vector<std::size_t>& members,
+                             std::size_t h) {
   const std::vector<Complex>& force = lines[h].force;
-  double strongest = 0.0, power = 0.0, turned = 0.0, noise = 0.0;
+  double strongest = 0.0, power = 0.0, slope_power = 0.0, noise = 0.0;
   const double turn = units::PI / static_cast<double>(force.size() - 1);
   for (const Complex& f : force) strongest = std::max(strongest, std::abs(f));
   std::vector<Complex> product(force.size());
@@ -402,15 +407,15 @@ Beside besideOthers(const std::vector<Lines>& lines, const std::vector<std::size
       cross += std::conj(lines[o].force[k]) * lines[o].response[k];
       squares += std::norm(lines[o].force[k]);
     }
-    const Complex due = force[k] * cross / squares;
-    product[k] = std::conj(due) * lines[h].response[k];
+    const Complex predicted = force[k] * cross / squares;
+    product[k] = std::conj(predicted) * lines[h].response[k];
     // The prediction contains a share of the others' noise, which is not part of its power.
     const double of_noise = std::norm(force[k]) * lines[h].noise / squares;
-    power += std::norm(due) - of_noise;
-    turned += std::pow(turn * static_cast<double>(k), 2) * (std::norm(due) - of_noise);
+    power += std::norm(predicted) - of_noise;
+    slope_power += std::pow(turn * static_cast<double>(k), 2) * (std::norm(predicted) - of_noise);
     noise = std::max(noise, lines[h].noise * (1.0 + std::norm(force[k]) / squares));
   }
-  if (!(power > 0.0 && turned > 0.0)) return {1.0, 0.0, INFINITY, INFINITY};
+  if (!(power > 0.0 && slope_power > 0.0)) return {1.0, 0.0, INFINITY, INFINITY};
   // The shift of largest correlation, and the gain there.
   const auto along = [&](double shift) {
     double sum = 0.0;
@@ -420,8 +425,8 @@ Beside besideOthers(const std::vector<Lines>& lines, const std::vector<std::size
     }
     return sum / power;
   };
-  const double gain_std = std::sqrt(0.5 * noise / power), shift_std = std::sqrt(0.5 * noise / turned);
-  Beside found{along(0.0), 0.0, gain_std, shift_std};
+  const double gain_std = std::sqrt(0.5 * noise / power), shift_std = std::sqrt(0.5 * noise / slope_power);
+  Comparison found{along(0.0), 0.0, gain_std, shift_std};
   for (double shift = -MOST_SKEW; shift <= MOST_SKEW; shift += SKEW_STEP) {
     const double gain = along(shift);
     if (gain > found.gain) found = {gain, shift, gain_std, shift_std};
@@ -457,13 +462,13 @@ HitFault hitFault(const Hit& hit, const HitCheckOptions& options) {
        {brokenPulse(force), spike(force, "force", contactEnd(force) + 2, force.values.size()),
         spike(response, "response", 0, hit.pre_trigger),
         spike(response, "response", contactEnd(force) + 2, response.values.size()),
-        swelling(response, contactEnd(force) + 2, hit.sample_rate), strange(force, response)}) {
+        lateBump(response, contactEnd(force) + 2, hit.sample_rate), decayDeviation(force, response)}) {
     if (!found.empty()) return {found, true};
   }
   return {options.high > 0.0 ? dull(force, hit.sample_rate, options.high) : "", false};
 }
 
-std::vector<HitFault> faultsBeside(const std::vector<Hit>& hits, const std::vector<bool>& usable) {
+std::vector<HitFault> faultsAmongHits(const std::vector<Hit>& hits, const std::vector<bool>& usable) {
   std::vector<HitFault> faults(hits.size());
   std::vector<Lines> lines(hits.size());
   std::vector<std::size_t> members;
@@ -475,13 +480,13 @@ std::vector<HitFault> faultsBeside(const std::vector<Hit>& hits, const std::vect
   }
   // The worst is removed first, since it affects the reference of the others.
   while (members.size() >= 3) {
-    Beside worst;
+    Comparison worst;
     std::size_t at = members.front();
     for (const std::size_t h : members) {
-      const Beside found = besideOthers(lines, members, h);
-      if (found.badness() > worst.badness()) worst = found, at = h;
+      const Comparison found = compareWithOthers(lines, members, h);
+      if (found.severity() > worst.severity()) worst = found, at = h;
     }
-    if (worst.badness() <= 1.0) break;
+    if (worst.severity() <= 1.0) break;
     faults[at] = {
         worst.skew() > worst.jump()
             ? formatted("trigger skew: the channels are shifted by %.2f samples relative to the other hits",
@@ -493,16 +498,16 @@ std::vector<HitFault> faultsBeside(const std::vector<Hit>& hits, const std::vect
   return faults;
 }
 
-std::vector<HitFault> judgeHits(const std::vector<Hit>& hits, const HitCheckOptions& options) {
+std::vector<HitFault> checkHits(const std::vector<Hit>& hits, const HitCheckOptions& options) {
   std::vector<HitFault> faults;
   std::vector<bool> usable;
   for (const Hit& hit : hits) {
     faults.push_back(hitFault(hit, options));
     usable.push_back(faults.back().text.empty());
   }
-  const std::vector<HitFault> beside = faultsBeside(hits, usable);
+  const std::vector<HitFault> relative = faultsAmongHits(hits, usable);
   for (std::size_t h = 0; h < hits.size(); ++h) {
-    if (usable[h]) faults[h] = beside[h];
+    if (usable[h]) faults[h] = relative[h];
   }
   return faults;
 }

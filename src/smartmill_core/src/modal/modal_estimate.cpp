@@ -150,10 +150,10 @@ bool begin(ModalSearch& search, const std::vector<Pole>& candidates, int largest
     if (p.order * STEADY_SHARE >= largest_order) steady.push_back(p);
   }
   ModalSearch dense = search;
-  if (!search.startWith(steady) || !search.settle(1, false)) return false;
-  if (search.unmet(steady) == 0 || steady.size() == candidates.size()) return true;
-  if (!dense.startWith(candidates) || !dense.settle(1, false)) return false;
-  if (dense.unmet(steady) < search.unmet(steady)) search.goOnFrom(std::move(dense));
+  if (!search.startWith(steady) || !search.refitAll(1, false)) return false;
+  if (search.countUnmatched(steady) == 0 || steady.size() == candidates.size()) return true;
+  if (!dense.startWith(candidates) || !dense.refitAll(1, false)) return false;
+  if (dense.countUnmatched(steady) < search.countUnmatched(steady)) search.continueFrom(std::move(dense));
   return true;
 }
 
@@ -186,22 +186,22 @@ void doubtIncoherent(const std::vector<FrequencyResponse>& bands, ModalEstimate&
 }
 
 /// Lower and upper residual terms of the residual of modes and doubts, by least squares.
-ResidualTerms flanksOf(const WeightedLines& lines, const ModalEstimate& estimate, std::size_t o) {
+ResidualTerms residualTermsOf(const WeightedLines& lines, const ModalEstimate& estimate, std::size_t o) {
   const double reference = units::TWO_PI * lines.frequency[lines.size() / 2];
   double a = 0.0, b = 0.0, c = 0.0;  // normal equations of (1, -(reference / w)^2)
   Complex one, two;
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const double w = lines.weight[o][i] * lines.weight[o][i];
     const double mass = -std::pow(reference / (units::TWO_PI * lines.frequency[i]), 2);
-    Complex left = lines.value[o][i];
+    Complex residual = lines.value[o][i];
     for (const std::vector<EstimatedMode>* modes : {&estimate.modes, &estimate.doubts}) {
-      for (const EstimatedMode& m : *modes) left -= m.response(o, lines.frequency[i]);
+      for (const EstimatedMode& m : *modes) residual -= m.response(o, lines.frequency[i]);
     }
     a += w;
     b += w * mass;
     c += w * mass * mass;
-    one += w * left;
-    two += w * mass * left;
+    one += w * residual;
+    two += w * mass * residual;
   }
   const double determinant = a * c - b * b;
   if (!(determinant > 1e-12 * a * c)) return {one / a, 0.0};
@@ -216,7 +216,7 @@ Complex ResidualTerms::response(double f) const {
 }
 
 Complex fittedResponse(const ModalEstimate& estimate, std::size_t frf, double f) {
-  Complex sum = estimate.flanks[frf].response(f);
+  Complex sum = estimate.residual_terms[frf].response(f);
   for (const EstimatedMode& m : estimate.modes) sum += m.response(frf, f);
   for (const EstimatedMode& m : estimate.doubts) sum += m.response(frf, f);
   return estimate.conjugated ? std::conj(sum) : sum;
@@ -244,7 +244,7 @@ std::vector<double> lineNoise(const std::vector<Complex>& value) {
   return noise;
 }
 
-bool turnsBackwards(const std::vector<FrequencyResponse>& frfs) {
+bool hasReversedPhase(const std::vector<FrequencyResponse>& frfs) {
   double clearest = 0.0;
   // The curvature of wide peaks is below the noise of single lines: averages over 1, 2, 4, ... lines.
   for (std::size_t group = 1; group <= 256; group *= 2) {
@@ -271,7 +271,7 @@ ModalEstimate estimateModes(const std::vector<FrequencyResponse>& frfs, const Mo
   std::vector<FrequencyResponse> bands;
   for (const FrequencyResponse& frf : frfs)
     bands.push_back(frf.band(options.low, options.high > 0.0 ? options.high : INFINITY));
-  result.conjugated = turnsBackwards(bands);
+  result.conjugated = hasReversedPhase(bands);
   const WeightedLines lines = weighted(frfs, options, result.conjugated);
   const WeightedLines start = tempered(lines);
   const int most = static_cast<int>(lines.size() / 4);
@@ -282,12 +282,13 @@ ModalEstimate estimateModes(const std::vector<FrequencyResponse>& frfs, const Mo
   ModalSearch search(searched, options);
   result.cancelled =
       !(addParts(start, options, candidates) && begin(search, candidates, whole.largest_order) &&
-        search.addCandidates(candidates) && search.addLoudest(10) && search.settle(2, true));
+        search.addCandidates(candidates) && search.addAtLargestResidual(10) && search.refitAll(2, true));
   search.addByMagnitude();
   result.modes = search.results(true);
   result.doubts = search.results(false);
   doubtIncoherent(bands, result);
-  for (std::size_t o = 0; o < lines.frfs(); ++o) result.flanks.push_back(flanksOf(start, result, o));
+  for (std::size_t o = 0; o < lines.frfs(); ++o)
+    result.residual_terms.push_back(residualTermsOf(start, result, o));
   return result;
 }
 

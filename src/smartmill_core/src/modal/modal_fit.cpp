@@ -24,7 +24,7 @@ constexpr double LEAST_GAIN = 1e-6;
 // The equivalent mode above the band is at least a few percent above the last line.
 constexpr double MOST_BENT = 0.94;
 // The standard deviation of an undetermined value, as multiple of the value.
-constexpr double NOT_TOLD = 10.0;
+constexpr double UNDETERMINED = 10.0;
 // Range of correlated misfit, in lines; upper bound of the leverage correction.
 constexpr Eigen::Index NEIGHBOURS = 3;
 constexpr double MOST_LEVERAGE = 0.8;
@@ -57,9 +57,9 @@ void solveLinear(const ModalLines& problem, Solution& solution) {
     }
     if (problem.direct)
       set(column, problem.scale * problem.bent(problem.frequency[i], solution.parameters.back()));
-    const Complex due = problem.value[i] - (problem.unit_static_gain ? 1.0 : 0.0);
-    b(row) = w * due.real();
-    b(row + 1) = w * due.imag();
+    const Complex target = problem.value[i] - (problem.unit_static_gain ? 1.0 : 0.0);
+    b(row) = w * target.real();
+    b(row + 1) = w * target.imag();
   }
   const Eigen::VectorXd x = linear::solveSymmetric(a.transpose() * a, Eigen::VectorXd(a.transpose() * b));
   if (!x.allFinite()) return;
@@ -237,7 +237,7 @@ ModalFit describe(const ModalLines& problem, const Solution& solution) {
     Mode& mode = fit.model.modes[k];
     const auto deviation = [&](int i, double value) {
       const double d = std::sqrt(fit.covariance(3 * k + i, 3 * k + i));
-      return std::isfinite(d) ? d : NOT_TOLD * std::abs(value);
+      return std::isfinite(d) ? d : UNDETERMINED * std::abs(value);
     };
     mode.frequency_std = deviation(0, mode.frequency);
     mode.damping_ratio_std = deviation(1, mode.damping_ratio);
@@ -248,7 +248,7 @@ ModalFit describe(const ModalLines& problem, const Solution& solution) {
                      : problem.direct         ? problem.scale * solution.parameters[3 * solution.modes]
                                               : 0.0;
   fit.model.direct_std = std::sqrt(fit.covariance(outer - 1, outer - 1));
-  if (!std::isfinite(fit.model.direct_std)) fit.model.direct_std = NOT_TOLD * std::abs(fit.model.direct);
+  if (!std::isfinite(fit.model.direct_std)) fit.model.direct_std = UNDETERMINED * std::abs(fit.model.direct);
   double error = 0.0, norm = 0.0;
   for (std::size_t i = 0; i < problem.lines(); ++i) {
     error +=

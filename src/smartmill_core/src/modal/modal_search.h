@@ -21,16 +21,16 @@ class ModalSearch {
   /// false: cancelled
   bool startWith(std::vector<Pole> candidates);
   /// Number of candidates without a significant mode nearby.
-  std::size_t unmet(const std::vector<Pole>& candidates) const;
+  std::size_t countUnmatched(const std::vector<Pole>& candidates) const;
   /// Takes over the state of another search of the same lines.
-  void goOnFrom(ModalSearch other);
+  void continueFrom(ModalSearch other);
   /// Tries candidates in the order of the share that each explains alone. @return false: cancelled
   bool addCandidates(std::vector<Pole> candidates);
   /// Tries modes at the largest residual.
-  bool addLoudest(int rounds);
+  bool addAtLargestResidual(int rounds);
   /// Refits every mode with its present neighbours, and drops modes that are no longer significant. @param
   /// last with all lines and to full convergence
-  bool settle(int sweeps, bool last);
+  bool refitAll(int sweeps, bool last);
 
   /// Adds modes of clear peaks whose phase does not identify a mode (few lines on a peak, random excitation),
   /// fitted to the logarithm of the magnitude.
@@ -55,20 +55,20 @@ class ModalSearch {
   bool tryPole(double frequency, double damping);
   bool refit(const std::vector<std::size_t>& members, const EstimatedMode* more, bool last);
   Eigen::Index worst(const WindowFit& fit, double least) const;
-  bool taken(const Pole& p) const;
+  bool hasModeAt(const Pole& p) const;
   void fitCluster(const std::vector<Pole>& cluster);
-  void take(const std::vector<std::size_t>& members, const ModalWindow& window, const WindowFit& fit);
+  void replaceModes(const std::vector<std::size_t>& members, const ModalWindow& window, const WindowFit& fit);
   void subtract(const EstimatedMode& mode, double sign);
   bool fitMagnitude(const std::vector<double>& magnitude, std::size_t peak);
   bool inBand(double frequency, double damping) const;
-  double loudest() const;
-  bool goOn(double share) const;
+  double frequencyOfLargestResidual() const;
+  bool reportProgress(double share) const;
 
   const WeightedLines& lines_;
   const ModalEstimateOptions& options_;
-  std::vector<std::vector<std::complex<double>>> left_;  // measured minus all modes
+  std::vector<std::vector<std::complex<double>>> residual_;  // measured minus all modes
   std::vector<EstimatedMode> modes_;
-  std::vector<double> tried_;  // [Hz] frequencies that addLoudest() has tried
+  std::vector<double> tried_frequencies_;  // [Hz] frequencies that addAtLargestResidual() has tried
 };
 
 }  // namespace smartmill

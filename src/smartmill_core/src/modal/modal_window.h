@@ -28,10 +28,10 @@ std::complex<double> unitMode(double f, double f0, double zeta);
 /// Linear parameters of one FRF for given poles: gain and phase part of each mode, (gain + i phase_part f /
 /// f_n) unitMode, and a complex parabola as background of everything outside the window.
 struct WindowShares {
-  Eigen::MatrixXd columns;  // 2 lines x shares, weighted; real and imaginary part of each line
-  Eigen::VectorXd share;    // [unit]
-  Eigen::VectorXd left;     // weighted (measured - fitted)
-  Eigen::MatrixXd inverse;  // of the normal equations
+  Eigen::MatrixXd columns;   // 2 lines x shares, weighted; real and imaginary part of each line
+  Eigen::VectorXd share;     // [unit]
+  Eigen::VectorXd residual;  // weighted (measured - fitted)
+  Eigen::MatrixXd inverse;   // of the normal equations
 };
 
 /// A fit over the lines of a few modes, with their evidence.
@@ -39,7 +39,7 @@ struct WindowFit {
   PoleList poles;
   std::vector<WindowShares> frfs;
   double squares = 0.0;                     // sum of squared residuals
-  double alike = 1.0;                       // number of FRFs over the effective number of independent ones
+  double redundancy = 1.0;                  // number of FRFs over the effective number of independent ones
   Eigen::MatrixXd pole_covariance;          // for residuals of variance 1
   std::vector<Eigen::MatrixXd> covariance;  // of each FRF's shares, including the contribution of the poles
   std::vector<double> variance;  // [1] of the misfit around each mode, times the number of correlated lines
@@ -69,7 +69,7 @@ class ModalWindow : public fit::Residuals {
   double explained(double frequency, double damping) const;
   /// Poles of least misfit.
   PoleList refined(const PoleList& start, int iterations, double tolerance) const;
-  WindowFit judged(const PoleList& poles) const;
+  WindowFit assess(const PoleList& poles) const;
   /// Includes the misfit in the weights where it exceeds the noise, as repeatable misfit of uniform size in
   /// the window.
   /// @return whether weights changed
@@ -78,10 +78,10 @@ class ModalWindow : public fit::Residuals {
  private:
   Eigen::MatrixXd slopes(std::size_t frf, const PoleList& poles, const WindowShares& shares) const;
   double localVariance(const WindowFit& fit, Eigen::Index mode) const;
-  double alike(const WindowFit& fit) const;
+  double redundancy(const WindowFit& fit) const;
   double evidence(const WindowFit& fit, Eigen::Index mode) const;
-  double apart(const WindowFit& fit, Eigen::Index mode) const;
-  double onOneLine(const WindowFit& fit, Eigen::Index mode) const;
+  double separability(const WindowFit& fit, Eigen::Index mode) const;
+  double singleLineShare(const WindowFit& fit, Eigen::Index mode) const;
 
   WeightedLines lines_;
   bool real_modes_;

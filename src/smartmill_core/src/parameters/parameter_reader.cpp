@@ -161,7 +161,7 @@ void ParameterReader::read(const std::string& key, std::array<double, 3>& value)
 void ParameterReader::read(const ParameterTable& table) {
   for (const Parameter& parameter : table.parameters()) {
     if (parameter.where == Parameter::Where::internal) continue;
-    std::visit([&](auto* place) { read(parameter.key, *place); }, parameter.place);
+    std::visit([&](auto* address) { read(parameter.key, *address); }, parameter.address);
   }
   try {
     table.check();

@@ -50,12 +50,12 @@ std::string written(const std::array<double, 3>& values) {
 }
 
 // Numbers of a value, for the bounds; none of text and flags.
-std::vector<double> numbers(const Parameter::Place& place) {
-  if (const auto* value = std::get_if<double*>(&place)) return {**value};
-  if (const auto* value = std::get_if<int*>(&place)) return {static_cast<double>(**value)};
-  if (const auto* value = std::get_if<std::uint64_t*>(&place)) return {static_cast<double>(**value)};
-  if (const auto* value = std::get_if<std::vector<double>*>(&place)) return **value;
-  if (const auto* value = std::get_if<std::array<double, 3>*>(&place))
+std::vector<double> numbers(const Parameter::Address& address) {
+  if (const auto* value = std::get_if<double*>(&address)) return {**value};
+  if (const auto* value = std::get_if<int*>(&address)) return {static_cast<double>(**value)};
+  if (const auto* value = std::get_if<std::uint64_t*>(&address)) return {static_cast<double>(**value)};
+  if (const auto* value = std::get_if<std::vector<double>*>(&address)) return **value;
+  if (const auto* value = std::get_if<std::array<double, 3>*>(&address))
     return {(*value)->begin(), (*value)->end()};
   return {};
 }
@@ -91,7 +91,7 @@ void wrap(std::ostream& out, const std::string& text, std::string begin) {
 }  // namespace
 
 std::string Parameter::value() const {
-  return std::visit([](const auto* it) { return written(*it); }, place);
+  return std::visit([](const auto* it) { return written(*it); }, address);
 }
 
 std::string Parameter::description() const {
@@ -100,10 +100,10 @@ std::string Parameter::description() const {
 }
 
 void Parameter::check() const {
-  for (const double number : numbers(place)) {
+  for (const double number : numbers(address)) {
     if (!range.contains(number)) throw Error(key + ": " + outOfRange(number, range, unit));
   }
-  const auto* text = std::get_if<std::string*>(&place);
+  const auto* text = std::get_if<std::string*>(&address);
   if (!text || words.empty() || std::find(words.begin(), words.end(), **text) != words.end()) return;
   throw Error(key + ": '" + **text + "' is not one of " + joined(words, " | "));
 }

@@ -54,17 +54,17 @@ std::shared_ptr<const Plan> planOf(std::size_t n, double* real, fftw_complex* co
   constexpr std::size_t KEPT = 16;
   using Key = std::pair<std::size_t, bool>;
   static std::mutex mutex;
-  static std::deque<std::pair<Key, std::shared_ptr<const Plan>>> kept;  // most recently used first
+  static std::deque<std::pair<Key, std::shared_ptr<const Plan>>> cache;  // most recently used first
   const Key key{n, forward};
   const std::lock_guard<std::mutex> lock(mutex);
-  const auto found = std::find_if(kept.begin(), kept.end(), [&](const auto& k) { return k.first == key; });
-  if (found != kept.end()) {
-    std::rotate(kept.begin(), found, found + 1);
-    return kept.front().second;
+  const auto found = std::find_if(cache.begin(), cache.end(), [&](const auto& k) { return k.first == key; });
+  if (found != cache.end()) {
+    std::rotate(cache.begin(), found, found + 1);
+    return cache.front().second;
   }
-  kept.emplace_front(key, std::make_shared<const Plan>(n, real, complex, forward));
-  if (kept.size() > KEPT) kept.pop_back();
-  return kept.front().second;
+  cache.emplace_front(key, std::make_shared<const Plan>(n, real, complex, forward));
+  if (cache.size() > KEPT) cache.pop_back();
+  return cache.front().second;
 }
 
 }  // namespace

@@ -31,7 +31,7 @@ TEST(ChipShape, slopeAndBoundsAreCorrect) {
   std::mt19937 random(5);
   for (int trial = 0; trial < 200; ++trial) {
     const ChipShape shape = drawn(random, 1.0);
-    const Stretch over = Stretch::between(0.03 * trial, 0.03 * trial + 0.2);
+    const AngleInterval over = AngleInterval::between(0.03 * trial, 0.03 * trial + 0.2);
     const ChipBounds b = bounds(shape, over);
     for (double phi = over.low(); phi <= over.high(); phi += 0.002) {
       const double s = std::sin(phi), c = std::cos(phi), value = shape.at(s, c);
@@ -59,25 +59,26 @@ TEST(Contact, findsEverySegmentInWhichAChipIsSmallestAndPositive) {
     const double from = 6.0 * uniform(random), to = from + 6.0 * uniform(random) * uniform(random);
     std::vector<ChipShape> used = shapes;
     double covered = 0.0, end = from;
-    forEachContact(used.data(), used.size(), from, to, [&](const ChipShape& shape, const Stretch& over) {
-      EXPECT_GE(over.low(), end - 1e-12);
-      end = over.high();
-      covered += 2.0 * over.half;
-      for (const double at : {0.01, 0.3, 0.7, 0.99}) {
-        const double phi = over.low() + at * 2.0 * over.half, s = std::sin(phi), c = std::cos(phi);
-        EXPECT_GE(shape.at(s, c), -1e-6);
-        for (const ChipShape& other : shapes) EXPECT_LE(shape.at(s, c), other.at(s, c) + 2e-5);
-      }
-    });
-    double due = 0.0;
+    forEachContact(
+        used.data(), used.size(), from, to, [&](const ChipShape& shape, const AngleInterval& over) {
+          EXPECT_GE(over.low(), end - 1e-12);
+          end = over.high();
+          covered += 2.0 * over.half;
+          for (const double at : {0.01, 0.3, 0.7, 0.99}) {
+            const double phi = over.low() + at * 2.0 * over.half, s = std::sin(phi), c = std::cos(phi);
+            EXPECT_GE(shape.at(s, c), -1e-6);
+            for (const ChipShape& other : shapes) EXPECT_LE(shape.at(s, c), other.at(s, c) + 2e-5);
+          }
+        });
+    double expected = 0.0;
     const int steps = 20000;
     for (int i = 0; i < steps; ++i) {
       const double phi = from + (to - from) * (i + 0.5) / steps, s = std::sin(phi), c = std::cos(phi);
       double least = 1e300;
       for (const ChipShape& shape : shapes) least = std::min(least, shape.at(s, c));
-      due += least > 0.0 ? (to - from) / steps : 0.0;
+      expected += least > 0.0 ? (to - from) / steps : 0.0;
     }
-    EXPECT_NEAR(covered, due, 4.0 * (to - from) / steps + 2e-4) << trial;
+    EXPECT_NEAR(covered, expected, 4.0 * (to - from) / steps + 2e-4) << trial;
   }
 }
 
@@ -87,7 +88,7 @@ TEST(Contact, beginsWhereTheChipBegins) {
   shape.sine = 60e-6;
   shape.level = -20e-6;
   double begin = -1.0, end = 0.0;
-  forEachContact(&shape, 1, 0.0, units::PI, [&](const ChipShape&, const Stretch& over) {
+  forEachContact(&shape, 1, 0.0, units::PI, [&](const ChipShape&, const AngleInterval& over) {
     if (begin < 0.0) begin = over.low();
     end = over.high();
   });

@@ -118,12 +118,12 @@ TEST(MechanisticForce, oneStraightToothGivesTheElementaryForce) {
   const Engagement e{0.0, PI, 0.001, 1e-4};
   const MechanisticForce model(t, ALUMINIUM, e);
   const double phi = 0.7, h = 1e-4 * std::sin(phi), a = e.axial_depth;
-  const CuttingForce due =
+  const CuttingForce expected =
       toolForce((ALUMINIUM.ktc * h + ALUMINIUM.kte) * a, (ALUMINIUM.krc * h + ALUMINIUM.kre) * a,
                 (ALUMINIUM.kac * h + ALUMINIUM.kae) * a, phi, t.radius());
-  expectNear(model.at(phi), due, 1e-9, t.radius());
+  expectNear(model.at(phi), expected, 1e-9, t.radius());
   expectNear(model.at(phi + PI), CuttingForce{}, 0.0, 1.0);
-  expectNear(model.at(phi - 6.0 * PI), due, 1e-9, t.radius());
+  expectNear(model.at(phi - 6.0 * PI), expected, 1e-9, t.radius());
 }
 
 TEST(MechanisticForce, smallHelixConvergesToZeroHelix) {

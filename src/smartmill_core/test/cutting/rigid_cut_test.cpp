@@ -75,7 +75,7 @@ TEST(RigidCut, equalsTheClosedFormWithoutRunout) {
           std::max(difference, largestDifference(rigid.at(angle), closed.at(angle), s.tool.radius()));
     }
     EXPECT_LT(difference, 2e-5 * largest) << s.tool.teeth << " teeth, depth " << s.cut.axial_depth;
-    const auto [chip, edge] = rigid.meanParts();
+    const auto [chip, edge] = rigid.meanTerms();
     const CuttingForce sum{chip.fx + edge.fx, chip.fy + edge.fy, chip.fz + edge.fz,
                            chip.torque + edge.torque};
     EXPECT_LT(largestDifference(sum, closed.mean(), s.tool.radius()),
@@ -95,7 +95,7 @@ TEST(RigidCut, chipAndEdgeForcesSumToTheForce) {
     double largest = 0.0, difference = 0.0;
     for (int i = 0; i < 700; ++i) {
       const double angle = 0.009 * i;
-      const auto [chip, edge] = rigid.partsAt(angle);
+      const auto [chip, edge] = rigid.termsAt(angle);
       const CuttingForce sum{1.3 * chip.fx + 0.7 * edge.fx, 1.3 * chip.fy + 0.7 * edge.fy,
                              1.3 * chip.fz + 0.7 * edge.fz, 1.3 * chip.torque + 0.7 * edge.torque};
       largest = std::max(largest, size(sum));
@@ -103,7 +103,7 @@ TEST(RigidCut, chipAndEdgeForcesSumToTheForce) {
     }
     // Error of a quarter of the edge force over a table cell in which a contact begins; a straight edge has
     // no tables.
-    const double cell = s.tool.helix > 0.0 ? TURN_NODE_ANGLE / s.tool.lag() : 1e-9;
+    const double cell = s.tool.helix > 0.0 ? REVOLUTION_NODE_ANGLE / s.tool.lag() : 1e-9;
     EXPECT_LT(difference, 0.25 * 30.8e3 * cell + 2e-5 * largest) << s.tool.teeth << ", " << s.cut.axial_depth;
   }
 }
@@ -128,9 +128,9 @@ TEST(RigidCut, equalsTheRuleSummedOverDiscs) {
     double largest = 0.0, difference = 0.0;
     for (int i = 0; i < 60; ++i) {
       const double angle = 0.05 + TWO_PI * i / 60.0;
-      const CuttingForce due = reference.force(angle, s.cut.entry, s.cut.exit, s.cut.axial_depth, thin);
-      largest = std::max(largest, size(due));
-      difference = std::max(difference, largestDifference(rigid.at(angle), due, s.tool.radius()));
+      const CuttingForce expected = reference.force(angle, s.cut.entry, s.cut.exit, s.cut.axial_depth, thin);
+      largest = std::max(largest, size(expected));
+      difference = std::max(difference, largestDifference(rigid.at(angle), expected, s.tool.radius()));
     }
     // At the ends of the contacts whole discs are in or out, several of them at the same time.
     const double chip = s.cut.feed_per_tooth * s.tool.teeth + 40e-6;
@@ -231,7 +231,7 @@ TEST(RigidCut, aThinArcHasItsShareOfTheForce) {
     const double chip = whole.chip(j, middle + 0.5 * width);
     if (chip > 0.0) torque += 9.525e-3 * (796e6 * chip + 27.7e3) * 2e-3 * width / TWO_PI;
   }
-  const auto [chip, edge] = thin.meanParts();
+  const auto [chip, edge] = thin.meanTerms();
   EXPECT_NEAR((chip.torque + edge.torque) / torque, 1.0, 1e-6);
 }
 
@@ -246,7 +246,7 @@ TEST(RigidCut, theWorkEqualsThatOfTheRemovedVolume) {
   const double volume = feed * radius * (std::cos(cut.entry) - std::cos(cut.exit)) * cut.axial_depth;
   const auto work = [&](const std::vector<double>& offset) {
     return TWO_PI *
-           RigidCut(mill(4, 30.0, {80.0, 100.0, 85.0, 95.0}), law, cut, offset).meanParts()[0].torque;
+           RigidCut(mill(4, 30.0, {80.0, 100.0, 85.0, 95.0}), law, cut, offset).meanTerms()[0].torque;
   };
   EXPECT_NEAR(work({}) / (800e6 * volume), 1.0, 1e-6);
   // Each tooth still meets the last pass.

@@ -34,8 +34,8 @@ TEST(Uff, ReadsBackWhatWasWritten) {
   const std::string file = folder.file("frf.uff");
   for (const bool binary : {false, true}) {
     for (const bool even : {false, true}) {
-      const UffFunction due = receptance(even);
-      writeUff({due, due}, file, binary);
+      const UffFunction expected = receptance(even);
+      writeUff({expected, expected}, file, binary);
       EXPECT_TRUE(isUff(file));
       const std::vector<UffFunction> found = readUff(file);
       ASSERT_EQ(found.size(), 2u);
@@ -44,10 +44,10 @@ TEST(Uff, ReadsBackWhatWasWritten) {
       EXPECT_EQ(found[1].reference_direction, -3);
       EXPECT_EQ(found[1].numerator, uff::DISPLACEMENT);
       EXPECT_EQ(found[1].unit, "m");
-      ASSERT_EQ(found[1].value.size(), due.value.size());
-      for (std::size_t i = 0; i < due.value.size(); ++i) {
-        EXPECT_NEAR(found[1].abscissa[i], due.abscissa[i], 1e-5);
-        EXPECT_NEAR(std::abs(found[1].value[i] - due.value[i]), 0.0, 1e-18);
+      ASSERT_EQ(found[1].value.size(), expected.value.size());
+      for (std::size_t i = 0; i < expected.value.size(); ++i) {
+        EXPECT_NEAR(found[1].abscissa[i], expected.abscissa[i], 1e-5);
+        EXPECT_NEAR(std::abs(found[1].value[i] - expected.value[i]), 0.0, 1e-18);
       }
     }
   }

@@ -129,12 +129,12 @@ TEST(HitCheck, ComparesHits) {
   std::vector<Hit> hits;
   for (unsigned seed = 1; seed <= 5; ++seed) hits.push_back(blow(seed));
   const std::vector<bool> all(5, true);
-  for (const HitFault& fault : faultsBeside(hits, all)) EXPECT_EQ(fault.text, "");
+  for (const HitFault& fault : faultsAmongHits(hits, all)) EXPECT_EQ(fault.text, "");
   for (double& r : hits[3].response) r *= 1.3;
-  EXPECT_NE(faultsBeside(hits, all)[3].text.find("gain jump"), std::string::npos);
+  EXPECT_NE(faultsAmongHits(hits, all)[3].text.find("gain jump"), std::string::npos);
   for (double& r : hits[3].response) r /= 1.3;
   std::rotate(hits[1].response.begin(), hits[1].response.end() - 2, hits[1].response.end());
-  EXPECT_NE(faultsBeside(hits, all)[1].text.find("skew"), std::string::npos);
+  EXPECT_NE(faultsAmongHits(hits, all)[1].text.find("skew"), std::string::npos);
 }
 
 }  // namespace

@@ -150,31 +150,31 @@ TEST(ModalEstimate, FindsEveryModeOfAFreeBeam) {
   for (const double damping : {1e-4, 5e-5}) {
     std::mt19937 random(3);
     std::normal_distribution<double> normal;
-    std::vector<double> due;
+    std::vector<double> expected;
     for (int n = 1; n <= 16; ++n) {
       double b = (n + 0.5) * units::PI;
       for (int i = 0; i < 30; ++i)
         b -= (std::cos(b) - 1.0 / std::cosh(b)) / (-std::sin(b) + std::tanh(b) / std::cosh(b));
-      due.push_back(60.0 * std::pow(b / 4.730040744862704, 2));
+      expected.push_back(60.0 * std::pow(b / 4.730040744862704, 2));
     }
     FrequencyResponse frf;
     frf.unit = "m/N";
     const double mass = 2.0;
     for (double f = 1.0; f <= 6400.0; f += 1.0) {
       std::complex<double> accelerance = 4.0 / mass;
-      for (const double at : due)
+      for (const double at : expected)
         accelerance -= 4.0 / mass * f * f / std::complex<double>(at * at - f * f, 2.0 * damping * at * f);
       accelerance += 0.02 * std::complex<double>(normal(random), normal(random));
       frf.frequency.push_back(f);
       frf.value.push_back(-accelerance / std::pow(units::TWO_PI * f, 2));
     }
     const ModalEstimate estimate = estimateModes({frf}, {});
-    due.pop_back();  // above the lines
-    ASSERT_EQ(estimate.modes.size(), due.size());
-    for (std::size_t k = 0; k < due.size(); ++k) {
-      EXPECT_NEAR(estimate.modes[k].frequency, due[k], 1e-5 * due[k]);
+    expected.pop_back();  // above the lines
+    ASSERT_EQ(estimate.modes.size(), expected.size());
+    for (std::size_t k = 0; k < expected.size(); ++k) {
+      EXPECT_NEAR(estimate.modes[k].frequency, expected[k], 1e-5 * expected[k]);
       if (k == 0) continue;
-      EXPECT_NEAR(estimate.modes[k].damping_ratio, damping, 0.05 * damping) << due[k];
+      EXPECT_NEAR(estimate.modes[k].damping_ratio, damping, 0.05 * damping) << expected[k];
     }
   }
 }
@@ -228,14 +228,14 @@ TEST(ModalEstimate, StatesCalibratedErrors) {
     const ModalEstimate estimate = estimateModes({measured(truth, seed)}, options);
     ASSERT_EQ(estimate.modes.size(), 2u);
     const EstimatedMode& m = estimate.modes[seed % 2];
-    const Mode& due = truth.modes[seed % 2];
-    frequency.add(m.frequency - due.frequency, m.frequency_std);
-    damping.add(m.damping_ratio - due.damping_ratio, m.damping_ratio_std);
-    gain.add(m.gain[0] - due.gain, m.gain_std[0]);
+    const Mode& expected = truth.modes[seed % 2];
+    frequency.add(m.frequency - expected.frequency, m.frequency_std);
+    damping.add(m.damping_ratio - expected.damping_ratio, m.damping_ratio_std);
+    gain.add(m.gain[0] - expected.gain, m.gain_std[0]);
   }
-  EXPECT_TRUE(frequency.honest());
-  EXPECT_TRUE(damping.honest());
-  EXPECT_TRUE(gain.honest());
+  EXPECT_TRUE(frequency.isCalibrated());
+  EXPECT_TRUE(damping.isCalibrated());
+  EXPECT_TRUE(gain.isCalibrated());
 }
 
 TEST(ModalEstimate, ReportsProgressAndEndsOnRequest) {
@@ -268,18 +268,18 @@ TEST(ModalWindow, SlopeOfTheSquaresAgreesWithDifferences) {
   WeightedLines lines{frf.frequency, {frf.value}, {std::vector<double>(frf.size(), 1e9)}};
   const ModalWindow window(lines, false, frf.size());
   const PoleList at = PoleList().with(990.0, 0.025).with(1090.0, 0.02);
-  Eigen::VectorXd left(window.count());
+  Eigen::VectorXd residual(window.count());
   Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(window.count(), 4);
-  ASSERT_TRUE(window.evaluate(at.p, &left, &jacobian));
-  const Eigen::VectorXd slope = 2.0 * jacobian.transpose() * left;
+  ASSERT_TRUE(window.evaluate(at.p, &residual, &jacobian));
+  const Eigen::VectorXd slope = 2.0 * jacobian.transpose() * residual;
   for (Eigen::Index i = 0; i < 4; ++i) {
     constexpr double STEP = 1e-5;
     double squares[2];
     for (const int side : {0, 1}) {
       Eigen::VectorXd moved = at.p;
       moved[i] += side ? STEP : -STEP;
-      ASSERT_TRUE(window.evaluate(moved, &left, nullptr));
-      squares[side] = left.squaredNorm();
+      ASSERT_TRUE(window.evaluate(moved, &residual, nullptr));
+      squares[side] = residual.squaredNorm();
     }
     EXPECT_NEAR((squares[1] - squares[0]) / (2.0 * STEP) / slope[i], 1.0, 1e-5) << i;
   }

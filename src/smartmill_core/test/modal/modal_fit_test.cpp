@@ -87,10 +87,10 @@ TEST(ModalFit, standardDeviationsAreCalibrated) {
     const ModalFit fit = fitModes(measured(truth, 0.05, seed), options);
     for (std::size_t k = 0; k < 2; ++k) {
       const Mode& found = fit.model.modes[k];
-      const Mode& due = truth.modes[k];
-      squares += std::pow((found.frequency - due.frequency) / found.frequency_std, 2) +
-                 std::pow((found.damping_ratio - due.damping_ratio) / found.damping_ratio_std, 2) +
-                 std::pow((found.gain - due.gain) / found.gain_std, 2);
+      const Mode& expected = truth.modes[k];
+      squares += std::pow((found.frequency - expected.frequency) / found.frequency_std, 2) +
+                 std::pow((found.damping_ratio - expected.damping_ratio) / found.damping_ratio_std, 2) +
+                 std::pow((found.gain - expected.gain) / found.gain_std, 2);
       count += 3;
     }
   }

@@ -60,7 +60,7 @@ TEST(EffectCatalogue, everyEntryIsComplete) {
     EXPECT_FALSE(kind.source.empty()) << kind.name;
     EXPECT_FALSE(kind.parameters.empty()) << kind.name;
     EXPECT_FALSE(formsOf(kind, scopeOf(model)).empty()) << kind.name;
-    EXPECT_FALSE(lackingFor(kind, scopeOf(model))) << kind.name;
+    EXPECT_FALSE(missingNeed(kind, scopeOf(model))) << kind.name;
   }
   EXPECT_EQ(findEffect("magic"), nullptr);
   // In the order in which they act.
@@ -281,7 +281,7 @@ TEST(EffectCatalogue, givesTheReasonWhyAnEffectIsNotTried) {
   model.tool_tip = {};
   EffectScope scope = scopeOf(model);
   scope.start_times = scope.cut_times = false;
-  const auto lacking = [&](const char* name) { return lackingFor(*findEffect(name), scope); };
+  const auto lacking = [&](const char* name) { return missingNeed(*findEffect(name), scope); };
   EXPECT_EQ(lacking("tool_wear").value(), "cut_time_before_s is not stated");
   EXPECT_EQ(lacking("friction_warmup").value(), "start_time_s is not stated");
   EXPECT_EQ(lacking("process_damping").value(), "the model's tool is rigid");

@@ -100,7 +100,7 @@ TEST(ParameterTable, RejectsARepeatedKey) {
 TEST(ParameterTable, PointsIntoItsStruct) {
   Everything e;
   const ParameterTable table = tableOf(e);
-  *std::get<double*>(table.find("filter_bandwidth")->place) = 7.0;
+  *std::get<double*>(table.find("filter_bandwidth")->address) = 7.0;
   EXPECT_EQ(e.filter.bandwidth, 7.0);
 }
 

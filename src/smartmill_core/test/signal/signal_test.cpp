@@ -34,12 +34,12 @@ TEST(Fourier, equalsItsDefinition) {
     const std::vector<Complex> spectrum = fourier(signal);
     ASSERT_EQ(spectrum.size(), n / 2 + 1);
     for (std::size_t k = 0; k < spectrum.size(); ++k) {
-      Complex due = 0.0;
+      Complex expected = 0.0;
       for (std::size_t i = 0; i < n; ++i) {
-        due +=
+        expected +=
             signal[i] * std::polar(1.0, -units::TWO_PI * static_cast<double>(i * k) / static_cast<double>(n));
       }
-      EXPECT_NEAR(std::abs(spectrum[k] - due), 0.0, 1e-12) << n << " samples, line " << k;
+      EXPECT_NEAR(std::abs(spectrum[k] - expected), 0.0, 1e-12) << n << " samples, line " << k;
     }
   }
 }
@@ -61,12 +61,12 @@ TEST(Fourier, conservesEnergyAndIsInvertible) {
 
 TEST(Fourier, isThreadSafe) {
   const std::vector<double> signal = noise(4099, 1.0, 3);
-  const std::vector<Complex> due = fourier(signal);
+  const std::vector<Complex> expected = fourier(signal);
   std::vector<int> differing(4, 0);
   std::vector<std::thread> threads;
   for (int t = 0; t < 4; ++t) {
     threads.emplace_back([&, t] {
-      for (int i = 0; i < 20; ++i) differing[static_cast<std::size_t>(t)] += fourier(signal) != due;
+      for (int i = 0; i < 20; ++i) differing[static_cast<std::size_t>(t)] += fourier(signal) != expected;
     });
   }
   for (std::thread& thread : threads) thread.join();

@@ -216,11 +216,12 @@ TEST(StreamSorter, sixThousandShuffledMessagesAreDeliveredInOrder) {
     EXPECT_EQ(got.size(), items.size());
     if (reference.empty()) {
       reference = got;
-      std::vector<Item> due = items;
-      std::stable_sort(due.begin(), due.end(), [](const Item& l, const Item& r) {
+      std::vector<Item> expected = items;
+      std::stable_sort(expected.begin(), expected.end(), [](const Item& l, const Item& r) {
         return std::make_pair(l.stamp, l.stream) < std::make_pair(r.stamp, r.stream);
       });
-      for (std::size_t i = 0; i < due.size(); ++i) EXPECT_EQ(got[i], 10.0 * due[i].stamp + due[i].stream);
+      for (std::size_t i = 0; i < expected.size(); ++i)
+        EXPECT_EQ(got[i], 10.0 * expected[i].stamp + expected[i].stream);
     }
     EXPECT_EQ(got, reference);
   }

@@ -31,13 +31,13 @@ struct EffectiveChipCurve {
 /// effects.md).
 struct CuttingLaw {
   CuttingCoefficients coefficients;
-  double chip_factor = 1.0;                    ///< [1] on ktc, krc, kac
-  double edge_factor = 1.0;                    ///< [1] on kte, kre, kae
-  double edge_chip = 0.0;                      ///< [m] over which the edge terms build up; 0: at once
-  double size_exponent = 0.0;                  ///< [1]
-  double size_reference = 1e-4;                ///< [m]
-  const EffectiveChipCurve* course = nullptr;  ///< not owned; nullptr: h itself
-  double damping = 0.0;                        ///< [N/m]
+  double chip_factor = 1.0;                        ///< [1] on ktc, krc, kac
+  double edge_factor = 1.0;                        ///< [1] on kte, kre, kae
+  double edge_chip = 0.0;                          ///< [m] over which the edge terms build up; 0: at once
+  double size_exponent = 0.0;                      ///< [1]
+  double size_reference = 1e-4;                    ///< [m]
+  const EffectiveChipCurve* chip_curve = nullptr;  ///< not owned; nullptr: h itself
+  double damping = 0.0;                            ///< [N/m]
   double damping_radial =
       1.0;  ///< [1] share of d across the tool; below 1 where the edge is inclined (corner.h)
   double damping_axial = 0.0;  ///< [1] share of d along the tool
@@ -48,7 +48,7 @@ inline constexpr double TANGENTIAL_DAMPING = 0.3;
 
 /// [m] h' of a chip h > 0.
 inline double effectiveChip(const CuttingLaw& law, double chip) {
-  const double h = law.course ? law.course->at(chip) : chip;
+  const double h = law.chip_curve ? law.chip_curve->at(chip) : chip;
   return law.size_exponent == 0.0 ? h : h * std::pow(chip / law.size_reference, -law.size_exponent);
 }
 

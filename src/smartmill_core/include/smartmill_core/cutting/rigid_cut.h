@@ -59,9 +59,9 @@ class RigidCut {
   /// Forces of the chip coefficients and of the edge coefficients alone, without the factors of the law.
   /// Integrates without tables: faster for fewer than a few thousand angles, and exact where an edge force
   /// begins.
-  std::array<CuttingForce, 2> partsAt(double angle) const;
+  std::array<CuttingForce, 2> termsAt(double angle) const;
   /// The mean of these over a revolution.
-  std::array<CuttingForce, 2> meanParts() const;
+  std::array<CuttingForce, 2> meanTerms() const;
 
  private:
   void shape();
@@ -77,7 +77,7 @@ class RigidCut {
     return {-tangential * cosine - radial * sine, tangential * sine - radial * cosine, axial * plain,
             tangential * plain * tool_.radius()};
   }
-  std::array<CuttingForce, 2> parts(const EdgeSums& sums) const;
+  std::array<CuttingForce, 2> terms(const EdgeSums& sums) const;
   std::size_t tableOf(int tooth) const { return rule_.alike() ? 0 : static_cast<std::size_t>(tooth); }
 
   ToolGeometry tool_;

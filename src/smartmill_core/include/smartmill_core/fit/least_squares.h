@@ -67,7 +67,7 @@ struct Options {
   bool orthogonal = false;
   /// Derivatives cost much more than residuals: with bounds, a step that does not reach its predicted
   /// decrease is shortened by evaluating residuals only.
-  bool dear_derivatives = false;
+  bool costly_derivatives = false;
   /// A second run without the unknowns that are pushed against a bound, where Ceres ends early.
   bool finish_at_bounds = true;
   /// Called after every iteration. @return false to stop at the best point so far

@@ -68,7 +68,7 @@ NumberTable readNumberTable(const std::string& file);
 /// The named columns in the given order, with the exact names of the file and a number in every row. Other
 /// columns may contain anything.
 /// @throws Error naming file, line and column: missing column, not a number, no rows.
-std::vector<std::vector<double>> readColumns(const std::string& file, const std::vector<std::string>& due);
+std::vector<std::vector<double>> readColumns(const std::string& file, const std::vector<std::string>& names);
 
 /// Writes a table row by row; numbers that are not finite give an empty cell, words are quoted where
 /// necessary.

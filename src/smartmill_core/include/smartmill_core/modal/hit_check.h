@@ -20,9 +20,9 @@ HitFault hitFault(const Hit& hit, const HitCheckOptions& options);
 /// Faults of hits relative to the other hits: a different gain, or a shift between the channels. Each hit's
 /// FRF is compared with that of all others where the force is strong; needs three hits. One entry per hit.
 /// @param usable hits that take part
-std::vector<HitFault> faultsBeside(const std::vector<Hit>& hits, const std::vector<bool>& usable);
+std::vector<HitFault> faultsAmongHits(const std::vector<Hit>& hits, const std::vector<bool>& usable);
 
-/// hitFault(), then faultsBeside(); one entry per hit.
-std::vector<HitFault> judgeHits(const std::vector<Hit>& hits, const HitCheckOptions& options);
+/// hitFault(), then faultsAmongHits(); one entry per hit.
+std::vector<HitFault> checkHits(const std::vector<Hit>& hits, const HitCheckOptions& options);
 
 }  // namespace smartmill

@@ -40,10 +40,10 @@ struct ResidualTerms {
 };
 
 struct ModalEstimate {
-  std::vector<EstimatedMode> modes;   ///< significant, lowest frequency first
-  std::vector<EstimatedMode> doubts;  ///< candidates that are not significant
-  std::vector<ResidualTerms> flanks;  ///< per FRF, in addition to modes and doubts
-  std::vector<Pole> diagram;          ///< stabilization diagram of the whole band
+  std::vector<EstimatedMode> modes;           ///< significant, lowest frequency first
+  std::vector<EstimatedMode> doubts;          ///< candidates that are not significant
+  std::vector<ResidualTerms> residual_terms;  ///< per FRF, in addition to modes and doubts
+  std::vector<Pole> diagram;                  ///< stabilization diagram of the whole band
   /// Phase rises through resonances (e^{-i w t}): the record was conjugated before the fit.
   bool conjugated = false;
   bool cancelled = false;
@@ -57,7 +57,7 @@ std::complex<double> fittedResponse(const ModalEstimate& estimate, std::size_t f
 std::vector<double> lineNoise(const std::vector<std::complex<double>>& value);
 
 /// Whether the phase rises through the resonances: sign convention e^{-i w t}.
-bool turnsBackwards(const std::vector<FrequencyResponse>& frfs);
+bool hasReversedPhase(const std::vector<FrequencyResponse>& frfs);
 
 /// Modes of FRFs on common lines, with common poles. Start values come from the poly-reference least-squares
 /// complex frequency method over the band and its segments, selected by stability. Each candidate is then

@@ -167,7 +167,7 @@ const EffectParameter& parameterOf(const EffectKind& kind, const std::string& na
 
 /// Why an effect cannot be tried in a campaign: nothing when it can; an empty text when the campaign does not
 /// measure the channels concerned.
-std::optional<std::string> lackingFor(const EffectKind& kind, const EffectScope& scope);
+std::optional<std::string> missingNeed(const EffectKind& kind, const EffectScope& scope);
 
 /// The forms of an effect, labelled with its name, whether its needs are met or not.
 std::vector<EffectForm> formsOf(const EffectKind& kind, const EffectScope& scope);

@@ -12,12 +12,12 @@ namespace smartmill {
 
 /// One parameter of a program: the address of its value and its description.
 struct Parameter {
-  using Place = std::variant<double*, int*, std::uint64_t*, bool*, std::string*, std::vector<double>*,
-                             std::array<double, 3>*>;
+  using Address = std::variant<double*, int*, std::uint64_t*, bool*, std::string*, std::vector<double>*,
+                               std::array<double, 3>*>;
   std::string key;
   std::string unit;     ///< "1" for a number without unit, empty for other types
   std::string comment;  ///< meaning, for the shipped file and --help
-  Place place;
+  Address address;
   Range range = {};                     ///< of a number, or of every number of a list
   std::vector<std::string> words = {};  ///< allowed words; empty: any text
   /// shipped: in the node's file; at_launch: set by the launch file, a comment in the shipped file; internal:

@@ -10,7 +10,7 @@ namespace smartmill {
 
 /// A sample of the spindle angle, unwrapped over revolutions.
 struct UnwrappedAngle {
-  double time, turned, shown;  ///< [s], [rad] unwrapped, [rad] as measured
+  double time, turned, measured;  ///< [s], [rad] unwrapped, [rad] as measured
 
   /// The next sample in time: its speed determines the number of full revolutions in between.
   UnwrappedAngle next(const SpindleAngle& angle) const {

@@ -28,7 +28,7 @@ class Coverage {
   /// are dependent.
   /// @param factor of the deviations that must be detectable; above 1.5 only where each error is expensive
   /// and a study computes more
-  ::testing::AssertionResult honest(double independent = 0.0, double told = 1.5) const;
+  ::testing::AssertionResult isCalibrated(double independent = 0.0, double factor = 1.5) const;
 
  private:
   std::size_t count_ = 0;
