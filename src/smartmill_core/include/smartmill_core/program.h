@@ -31,7 +31,7 @@ struct OptionEntry {
   std::vector<std::string> choice;  ///< the allowed words, if any
   bool argument = false;            ///< positional
   bool required = false;
-  bool several = false;  ///< takes more than one value
+  bool several = false;  ///< accepts several values
 };
 
 /// A command line, or one of its commands.

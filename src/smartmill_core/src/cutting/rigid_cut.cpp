@@ -186,7 +186,7 @@ std::array<CuttingForce, 2> RigidCut::termsAt(double angle) const {
 std::array<CuttingForce, 2> RigidCut::meanTerms() const {
   EdgeSums sums;
   for (const ContactArc& arc : arcs_) {
-    // One entry of shapes serves all teeth when they are alike.
+    // A single entry of shapes is for all teeth.
     const double share = arc.depth / TWO_PI * (rule_.alike() ? rule_.teeth() : 1);
     for (const std::vector<ChipShape>& shapes : shapes_) integrate(shapes, arc.entry, arc.exit, share, sums);
   }

@@ -158,7 +158,7 @@ bool begin(ModalSearch& search, const std::vector<Pole>& candidates, int largest
 }
 
 bool isCoherent(const std::vector<FrequencyResponse>& bands, const EstimatedMode& mode) {
-  bool told = false;
+  bool incoherent = false;
   for (const FrequencyResponse& band : bands) {
     if (band.coherence.size() != band.size() || band.size() < 2) continue;
     const double step = band.frequency[1] - band.frequency[0];
@@ -170,9 +170,9 @@ bool isCoherent(const std::vector<FrequencyResponse>& bands, const EstimatedMode
     }
     if (about.empty()) continue;
     if (median(about) >= COHERENT) return true;
-    told = true;
+    incoherent = true;
   }
-  return !told;
+  return !incoherent;
 }
 
 /// Significant modes on lines without coherence become doubts.

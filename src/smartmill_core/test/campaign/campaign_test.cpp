@@ -90,13 +90,13 @@ TEST(Campaign, channelsMayHaveTheirOwnSampleRate) {
 
 TEST(Campaign, rejectsSlowChannelsWithoutATest) {
   const TemporaryFolder folder;
-  const auto refuses = [&](const char* entry, const char* hasMessage) {
+  const auto refuses = [&](const char* entry, const char* message) {
     folder.write("campaign.yaml", CAMPAIGN + std::string("slow_channels:\n- {") + entry + "}\n");
     try {
       readCampaign(folder.file("."));
       ADD_FAILURE() << entry;
     } catch (const Error& error) {
-      EXPECT_THAT(error.what(), HasSubstr(hasMessage));
+      EXPECT_THAT(error.what(), HasSubstr(message));
     }
   };
   refuses("test: none, channel: load_meter, file: a.csv, sample_rate_hz: 50", "'none' is not a test");

@@ -101,7 +101,7 @@ TEST(LeastSquares, ReportsUndeterminedUnknowns) {
   const MatrixXd of_map = propagated(map, covariance.matrix);
   EXPECT_NEAR(of_map(0, 0), 2.25, 1e-8);
   EXPECT_TRUE(std::isinf(of_map(1, 1)));
-  // A column of zeros, fewer residuals than unknowns, nothing at all.
+  // A column of zeros, fewer residuals than unknowns, an empty matrix.
   EXPECT_EQ(covarianceOf(MatrixXd::Zero(3, 2)).rank, 0);
   EXPECT_EQ(covarianceOf(MatrixXd::Ones(1, 2)).undetermined, (std::vector<bool>{true, true}));
   EXPECT_TRUE(covarianceOf(MatrixXd(3, 0)).complete());

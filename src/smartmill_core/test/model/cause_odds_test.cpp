@@ -31,7 +31,7 @@ TEST(CauseOdds, readsBackWhatWasWritten) {
 }
 
 struct Bad {
-  const char *from, *to, *hasMessage;
+  const char *from, *to, *message;
 };
 
 TEST(CauseOdds, errorsNameTheKeyInOneLine) {
@@ -56,7 +56,7 @@ TEST(CauseOdds, errorsNameTheKeyInOneLine) {
       ADD_FAILURE() << text;
     } catch (const Error& error) {
       const std::string line = error.what();
-      EXPECT_THAT(line, HasSubstr(bad.hasMessage)) << text;
+      EXPECT_THAT(line, HasSubstr(bad.message)) << text;
       EXPECT_EQ(line.rfind(file, 0), 0u) << line;
       EXPECT_EQ(line.find('\n'), std::string::npos) << line;
     }

@@ -13,7 +13,7 @@ namespace smartmill {
 /// cos(angle - position of the tooth). The offset points to a tooth at that angle (effects.md, runout).
 std::vector<double> runoutRadii(const ToolGeometry& tool, double offset, double angle);
 
-/// Chip thickness [m] of a tooth against one surface, over the immersion angle phi of a piece of its edge:
+/// Chip thickness [m] of a tooth against one surface, over the immersion angle phi of a segment of its edge:
 /// level + sine sin(phi) + cosine cos(phi) + sine2 sin(2 phi) + cosine2 cos(2 phi).
 struct ChipShape {
   double level = 0.0, sine = 0.0, cosine = 0.0, sine2 = 0.0, cosine2 = 0.0;

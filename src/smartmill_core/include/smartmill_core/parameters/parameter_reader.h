@@ -55,7 +55,7 @@ class ParameterReader {
   void finish() const;
 
   /// Reads all parameters into a struct that declares itself; absent ones keep their default.
-  /// @throws Error on an unknown key, a wrong type, a value out of its bounds or one that validate() refuses.
+  /// @throws Error on an unknown key, a wrong type, a value out of its bounds or one that validate() rejects.
   template <class Parameters>
   Parameters readAll() {
     Parameters parameters;
