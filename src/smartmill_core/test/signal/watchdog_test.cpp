@@ -12,7 +12,7 @@ TEST(Watchdog, silenceCountsFromTheStartOrTheLastMessage) {
   EXPECT_FALSE(dog.dead());
   dog.tick(0.125);
   EXPECT_TRUE(dog.dead());
-  dog.received();
+  dog.heard();
   EXPECT_TRUE(dog.ever());
   EXPECT_FALSE(dog.dead());
   dog.tick(0.5);
@@ -23,13 +23,13 @@ TEST(Watchdog, anEndIsReportedOnceForEachActivePeriod) {
   Watchdog dog(1.0);
   dog.tick(5.0);
   EXPECT_FALSE(dog.ended());  // nothing has begun
-  dog.received();
+  dog.heard();
   dog.tick(0.5);
   EXPECT_FALSE(dog.ended());
   dog.tick(1.0);
   EXPECT_TRUE(dog.ended());
   EXPECT_FALSE(dog.ended());
-  dog.received();
+  dog.heard();
   EXPECT_FALSE(dog.ended());
   dog.tick(2.0);
   EXPECT_TRUE(dog.ended());
@@ -39,12 +39,12 @@ TEST(Watchdog, theProducerMayReportTheEnd) {
   Watchdog dog(1.0);
   dog.end();
   EXPECT_FALSE(dog.ended());  // nothing was received
-  dog.received();
+  dog.heard();
   dog.end();
   EXPECT_TRUE(dog.dead());
   EXPECT_TRUE(dog.ended());
   EXPECT_FALSE(dog.ended());
-  dog.received();
+  dog.heard();
   EXPECT_FALSE(dog.dead());
 }
 
