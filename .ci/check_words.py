@@ -48,7 +48,7 @@ PENDING = (
     "smartmill_stability/", "smartmill_cnc/", "smartmill_panel/", "smartmill_msgs/", "smartmill_studies/",
     "docs/discrepancy_figures.md", "docs/results.md",
     # Parameter files printed by nodes whose packages are listed above.
-    "launch/config/cnc.yaml", "launch/config/hammer.yaml", "launch/config/kalman.yaml", "launch/config/panel.yaml",
+    "launch/config/cnc.yaml", "launch/config/panel.yaml",
     "launch/config/stability.yaml",
 )
 EXTENSIONS = (".md", ".cpp", ".h", ".py", ".yaml", ".yml", ".launch", ".msg", ".srv", ".action", ".js", ".html", ".css", ".cmake",
