@@ -42,6 +42,7 @@ class ModalFilter {
 
   /// Rate of that output [unit/s x unit of input].
   double peekRate(double input) const;
+  /// Increase of that rate per unit of this input [unit/s].
   double rateOfInput() const;
 
   /// Resets to rest, or to the static state of a constant input.

@@ -10,7 +10,7 @@ namespace smartmill {
 /// is 1; it is larger for deviations stated too small and smaller for inflated ones, and both fail.
 class Coverage {
  public:
-  /// Required number of independent errors. A calibrated deviation then fails one time in thirty thousand
+  /// Required number of independent errors. A calibrated deviation then fails one time in fifteen thousand
   /// (hardly once in the hundred or so checks of all tests), and one that is 1.5 times or two thirds of the
   /// true one passes no more often. The number of runs of a test is fixed in advance, independent of its
   /// result.
@@ -22,8 +22,9 @@ class Coverage {
   /// Root of the mean square of error over deviation.
   double rms() const;
 
-  /// Whether the root mean square is within its 1 - 1/30000 interval by chance (chi-square). Fails also with
-  /// too few errors to detect deviations that are wrong by the given factor.
+  /// Whether the root mean square is inside the interval that calibrated deviations leave with probability
+  /// 1/30000 on each side (chi-square). Fails also with too few errors to detect deviations that are wrong by
+  /// the given factor.
   /// @param independent how many of the errors are independent of each other; 0: all. Estimates of one fit
   /// are dependent.
   /// @param factor of the deviations that must be detectable; above 1.5 only where each error is expensive
