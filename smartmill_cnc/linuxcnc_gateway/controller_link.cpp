@@ -21,7 +21,7 @@ namespace {
 
 using Code = Reply::Code;
 
-constexpr std::chrono::milliseconds LOOK{1};
+constexpr std::chrono::milliseconds POLL_PERIOD{1};
 constexpr std::chrono::milliseconds REATTACH{500};                 // between two attempts to find it
 constexpr double ANSWER = 1.0, HOMING = 3.0, COMES_TO_REST = 0.3;  // [s]
 constexpr std::uint32_t SETTLED = 4;  // servo cycles of an idle task after a program
@@ -52,10 +52,10 @@ struct ControllerLink::Channels {
 };
 
 ControllerLink::ControllerLink(std::string nml_file, std::string program_file,
-                               std::function<void()> meanwhile)
+                               std::function<void()> while_waiting)
     : nml_file_(std::move(nml_file)),
       program_file_(std::move(program_file)),
-      meanwhile_(std::move(meanwhile)) {
+      while_waiting_(std::move(while_waiting)) {
   set_rcs_print_destination(RCS_PRINT_TO_NULL);
 }
 
@@ -73,7 +73,7 @@ void ControllerLink::attach() {
   }
 }
 
-void ControllerLink::look() {
+void ControllerLink::poll() {
   if (!channels_ || (!status_.alive && Clock::now() - attached_ > REATTACH)) {
     attach();
   }
@@ -85,26 +85,26 @@ void ControllerLink::look() {
   const std::uint32_t heartbeat = channels_->stat().motion.heartbeat;
   const bool beats = heartbeat != 0 && heartbeat != status_.heartbeat;
   if (beats) {
-    fill();
-    dropOrphan();
+    readStatus();
+    abortOrphan();
   }
   takeErrors();
-  judge(beats);
-  noticeEnd();
+  checkLiveness(beats);
+  detectProgramEnd();
 }
 
 /// What runs when this gateway first sees the controller was begun through one that has died.
-void ControllerLink::dropOrphan() {
-  if (status_.alive && !std::exchange(met_, true) && status_.busy &&
+void ControllerLink::abortOrphan() {
+  if (status_.alive && !std::exchange(first_contact_, true) && status_.busy &&
       status_.mode == MachineStatus::Mode::mdi) {
     EMC_TASK_ABORT message;
     channels_->command.write(&message);
   }
 }
 
-void ControllerLink::judge(bool beats) {
+void ControllerLink::checkLiveness(bool beats) {
   const double now = std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
-  const Liveness::Verdict verdict = liveness_.look(beats, processes_, now);
+  const Liveness::Verdict verdict = liveness_.update(beats, processes_, now);
   status_.starved = liveness_.starved();
   if (verdict == Liveness::Verdict::lives || !status_.alive) {
     return;
@@ -116,7 +116,7 @@ void ControllerLink::judge(bool beats) {
                                                          : "the computer gives it no processor";
 }
 
-void ControllerLink::fill() {
+void ControllerLink::readStatus() {
   const EMC_STAT& s = channels_->stat();
   const EMC_TRAJ_STAT& t = s.motion.traj;
   // The first heartbeat that is seen may be of a controller that has gone; the second one counts.
@@ -166,7 +166,7 @@ void ControllerLink::takeErrors() {
 }
 
 /// A program has come to its end when the task has been done with it for some cycles and no error came.
-void ControllerLink::noticeEnd() {
+void ControllerLink::detectProgramEnd() {
   if (!program_ || !status_.alive) {
     return;
   }
@@ -192,16 +192,16 @@ bool ControllerLink::waitFor(const std::function<bool()>& so, double seconds) {
     if (Clock::now() > end) {
       return false;
     }
-    std::this_thread::sleep_for(LOOK);
-    look();
-    meanwhile_();
+    std::this_thread::sleep_for(POLL_PERIOD);
+    poll();
+    while_waiting_();
   }
   return channels_ != nullptr;
 }
 
 /// @return the command's serial number once the task has taken it.
 template <class NmlMessage>
-std::optional<int> ControllerLink::tell(NmlMessage& message) {
+std::optional<int> ControllerLink::sendCommand(NmlMessage& message) {
   if (!channels_ || channels_->command.write(&message) != 0) {
     return std::nullopt;
   }
@@ -212,8 +212,8 @@ std::optional<int> ControllerLink::tell(NmlMessage& message) {
 
 /// Tells and waits until the task is done with it.
 template <class NmlMessage>
-Reply ControllerLink::done(NmlMessage& message, const char* what) {
-  const std::optional<int> serial = tell(message);
+Reply ControllerLink::execute(NmlMessage& message, const char* what) {
+  const std::optional<int> serial = sendCommand(message);
   if (!serial) {
     return {Code::lost, std::string(what) + ": the controller does not answer"};
   }
@@ -238,7 +238,7 @@ Reply ControllerLink::refusal(Code code, const std::string& what) const {
 Reply ControllerLink::setState(int state) {
   EMC_TASK_SET_STATE message;
   message.state = static_cast<EMC_TASK_STATE_ENUM>(state);
-  return done(message, "machine state");
+  return execute(message, "machine state");
 }
 
 Reply ControllerLink::setMode(int mode) {
@@ -247,7 +247,7 @@ Reply ControllerLink::setMode(int mode) {
   }
   EMC_TASK_SET_MODE message;
   message.mode = static_cast<EMC_TASK_MODE_ENUM>(mode);
-  const Reply reply = done(message, "mode");
+  const Reply reply = execute(message, "mode");
   if (reply.code != Code::done) {
     return reply;
   }
@@ -283,13 +283,13 @@ Reply ControllerLink::home() {
   }
   EMC_TRAJ_SET_TELEOP_ENABLE joints;
   joints.enable = 0;
-  const Reply free = done(joints, "joint mode");
+  const Reply free = execute(joints, "joint mode");
   if (free.code != Code::done) {
     return free;
   }
   EMC_JOINT_HOME all;
   all.joint = -1;
-  const Reply homing = done(all, "homing");
+  const Reply homing = execute(all, "homing");
   if (homing.code != Code::done) {
     return homing;
   }
@@ -298,7 +298,7 @@ Reply ControllerLink::home() {
 }
 
 /// Why no program can be taken.
-std::optional<Reply> ControllerLink::unfit() const {
+std::optional<Reply> ControllerLink::notReady() const {
   if (!status_.alive) {
     return Reply{Code::lost, "the controller has gone"};
   }
@@ -315,7 +315,7 @@ std::optional<Reply> ControllerLink::unfit() const {
 }
 
 Reply ControllerLink::open() {
-  if (const std::optional<Reply> no = unfit()) {
+  if (const std::optional<Reply> no = notReady()) {
     return *no;
   }
   if (status_.mode == MachineStatus::Mode::automatic && status_.busy) {
@@ -331,11 +331,11 @@ Reply ControllerLink::open() {
 Reply ControllerLink::immediate(const char* text, const char* what) {
   EMC_TASK_PLAN_EXECUTE message;
   std::snprintf(message.command, sizeof message.command, "%s", text);
-  return done(message, what);
+  return execute(message, what);
 }
 
 Reply ControllerLink::run(const Command& command) {
-  if (const std::optional<Reply> no = unfit()) {
+  if (const std::optional<Reply> no = notReady()) {
     return *no;
   }
   if (status_.mode != MachineStatus::Mode::mdi) {
@@ -357,7 +357,7 @@ Reply ControllerLink::run(const Command& command) {
   status_.running = command.number;
   status_.done = 0;
   idle_at_.reset();
-  program_ = tell(message);
+  program_ = sendCommand(message);
   if (!program_) {
     return {Code::lost, "program: the controller does not answer"};
   }
@@ -366,14 +366,14 @@ Reply ControllerLink::run(const Command& command) {
 
 Reply ControllerLink::close() {
   // Where nothing can be taken, nothing turns either.
-  if (unfit() || status_.mode != MachineStatus::Mode::mdi || status_.busy) {
+  if (notReady() || status_.mode != MachineStatus::Mode::mdi || status_.busy) {
     return {};
   }
   return immediate("M5", "spindle stop");
 }
 
 Reply ControllerLink::variable(const Command& command) {
-  if (const std::optional<Reply> no = unfit()) {
+  if (const std::optional<Reply> no = notReady()) {
     return *no;
   }
   if (status_.mode != MachineStatus::Mode::mdi || status_.busy) {
@@ -385,38 +385,38 @@ Reply ControllerLink::variable(const Command& command) {
 }
 
 Reply ControllerLink::carryOut(const Command& command) {
-  look();
+  poll();
   if (!status_.alive) {
     return {Code::lost, "the controller has gone"};
   }
-  switch (command.word) {
-    case Word::ready:
+  switch (command.code) {
+    case CommandCode::ready:
       return makeReady();
-    case Word::open:
+    case CommandCode::open:
       return open();
-    case Word::run:
+    case CommandCode::run:
       return run(command);
-    case Word::close:
+    case CommandCode::close:
       return close();
-    case Word::abort: {
+    case CommandCode::abort: {
       program_.reset();
       EMC_TASK_ABORT message;
-      return done(message, "abort");
+      return execute(message, "abort");
     }
-    case Word::estop:
+    case CommandCode::estop:
       program_.reset();
       return setState(EMC_TASK_STATE_ESTOP);
-    case Word::hold: {
+    case CommandCode::hold: {
       EMC_TASK_PLAN_PAUSE message;
-      return tell(message) ? Reply{} : Reply{Code::lost, "feed hold: the controller does not answer"};
+      return sendCommand(message) ? Reply{} : Reply{Code::lost, "feed hold: the controller does not answer"};
     }
-    case Word::resume: {
+    case CommandCode::resume: {
       EMC_TASK_PLAN_RESUME message;
-      return tell(message) ? Reply{} : Reply{Code::lost, "resume: the controller does not answer"};
+      return sendCommand(message) ? Reply{} : Reply{Code::lost, "resume: the controller does not answer"};
     }
-    case Word::variable:
+    case CommandCode::variable:
       return variable(command);
-    case Word::guard:
+    case CommandCode::guard:
       return {};
   }
   return {Code::refused, "unknown command"};

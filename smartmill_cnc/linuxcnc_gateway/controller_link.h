@@ -18,17 +18,17 @@ namespace smartmill::cnc::linuxcnc {
 class ControllerLink {
  public:
   /// @param nml_file of the controller @param program_file that `o<piece> call` reads
-  /// @param meanwhile is called again and again while a command waits for the controller
-  ControllerLink(std::string nml_file, std::string program_file, std::function<void()> meanwhile);
+  /// @param while_waiting is called again and again while a command waits for the controller
+  ControllerLink(std::string nml_file, std::string program_file, std::function<void()> while_waiting);
   ~ControllerLink();
   ControllerLink(const ControllerLink&) = delete;
   ControllerLink& operator=(const ControllerLink&) = delete;
 
   /// Looks at the controller; finds it again when it was started anew. To be called every few milliseconds.
-  void look();
+  void poll();
   const MachineStatus& status() const { return status_; }
 
-  /// Waits for the controller's answer, a second at most (homing three), looking at it meanwhile.
+  /// Waits for the controller's answer, a second at most (homing three), looking at it while_waiting.
   Reply carryOut(const Command& command);
 
  private:
@@ -36,17 +36,17 @@ class ControllerLink {
   using Clock = std::chrono::steady_clock;
 
   void attach();
-  void dropOrphan();
-  void judge(bool beats);
-  void fill();
+  void abortOrphan();
+  void checkLiveness(bool beats);
+  void readStatus();
   void takeErrors();
-  void noticeEnd();
+  void detectProgramEnd();
   /// Looks until it is so. @return whether it came to it
   bool waitFor(const std::function<bool()>& so, double seconds);
   template <class NmlMessage>
-  std::optional<int> tell(NmlMessage& message);
+  std::optional<int> sendCommand(NmlMessage& message);
   template <class NmlMessage>
-  Reply done(NmlMessage& message, const char* what);
+  Reply execute(NmlMessage& message, const char* what);
   Reply setState(int state);
   Reply setMode(int mode);
   Reply immediate(const char* text, const char* what);
@@ -57,14 +57,14 @@ class ControllerLink {
   Reply close();
   Reply variable(const Command& command);
   Reply refusal(Reply::Code code, const std::string& what) const;
-  std::optional<Reply> unfit() const;
+  std::optional<Reply> notReady() const;
 
   const std::string nml_file_, program_file_;
-  const std::function<void()> meanwhile_;
+  const std::function<void()> while_waiting_;
   std::unique_ptr<Channels> channels_;
   MachineStatus status_;
   Clock::time_point attached_;  // when the channels were opened
-  bool met_ = false;            // a controller that lives has been seen
+  bool first_contact_ = false;            // a controller that lives has been seen
   Liveness liveness_;
   ProcessWatch processes_;
   std::optional<int> program_;            // serial number of the one that runs

@@ -28,7 +28,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int LOOK_EVERY = 2;  // [ms]
+constexpr int POLL_PERIOD = 2;  // [ms]
 constexpr std::size_t MOST_CLIENTS = 8, MOST_WAITING = 8;
 
 /// What is known of the process that permits motion.
@@ -48,7 +48,7 @@ struct Client {
 class Gateway {
  public:
   explicit Gateway(const std::string& folder)
-      : link_(folder + "/mill.nml", folder + "/sub/piece.ngc", [this] { hear(); }),
+      : link_(folder + "/mill.nml", folder + "/sub/piece.ngc", [this] { receiveAll(); }),
         listener_(listenAt(folder + "/" + GATEWAY_SOCKET)) {}
 
   void step() {
@@ -56,14 +56,14 @@ class Gateway {
     for (const Client& client : clients_) {
       entries.push_back({client.connection.descriptor(), POLLIN, 0});
     }
-    ::poll(entries.data(), entries.size(), LOOK_EVERY);
-    link_.look();
+    ::poll(entries.data(), entries.size(), POLL_PERIOD);
+    link_.poll();
     if (std::optional<LocalConnection> connection = acceptFrom(listener_)) {
       if (clients_.size() < MOST_CLIENTS) {
         clients_.push_back({std::move(*connection), false, nullptr, {}});
       }
     }
-    hear();
+    receiveAll();
     for (Client& client : clients_) {
       while (!client.waiting.empty()) {
         const Received received = std::move(client.waiting.front());
@@ -72,13 +72,13 @@ class Gateway {
       }
     }
     for (Client& client : clients_) {
-      watch(client);
+      checkGuard(client);
     }
-    clients_.remove_if([this](const Client& client) { return left(client); });
+    clients_.remove_if([this](const Client& client) { return removed(client); });
   }
 
   /// Nobody watches any more what runs.
-  void leave() {
+  void stopAll() {
     for (const Client& client : clients_) {
       stopFor(client);
     }
@@ -86,7 +86,7 @@ class Gateway {
 
  private:
   /// Questions are answered at once, also while a command is carried out; commands wait for their turn.
-  void hear() {
+  void receiveAll() {
     for (Client& client : clients_) {
       client.connection.receive();
       while (std::optional<Received> received = client.connection.next()) {
@@ -105,13 +105,13 @@ class Gateway {
   }
 
   /// A guard that is silent, though it does not wait for a processor, counts as gone.
-  static void watch(Client& client) {
+  static void checkGuard(Client& client) {
     if (!client.guard) {
       return;
     }
     Guard& guard = *client.guard;
     const double now = std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
-    if (guard.liveness.look(std::exchange(guard.heard, false), guard.process, now) !=
+    if (guard.liveness.update(std::exchange(guard.heard, false), guard.process, now) !=
         Liveness::Verdict::lives) {
       client.connection.close();
     }
@@ -119,20 +119,20 @@ class Gateway {
 
   void carryOut(Client& client, const Command& command, std::uint16_t sequence) {
     const Reply reply = link_.carryOut(command);
-    if (command.word == Word::open && reply.code == Reply::Code::done) {
+    if (command.code == CommandCode::open && reply.code == Reply::Code::done) {
       client.drives = true;
     }
-    if (command.word == Word::close) {
+    if (command.code == CommandCode::close) {
       client.drives = false;
     }
-    if (command.word == Word::guard) {
+    if (command.code == CommandCode::guard) {
       client.guard = std::make_unique<Guard>();
-      client.guard->process.only(client.connection.peer());
+      client.guard->process.watch(client.connection.peer());
     }
     client.connection.send(reply, sequence);
   }
 
-  bool left(const Client& client) {
+  bool removed(const Client& client) {
     if (client.connection.open()) {
       return false;
     }
@@ -142,9 +142,9 @@ class Gateway {
 
   void stopFor(const Client& client) {
     if (client.guard) {
-      link_.carryOut({Word::estop, 0, 0.0, {}});
+      link_.carryOut({CommandCode::estop, 0, 0.0, {}});
     } else if (client.drives) {
-      link_.carryOut({Word::abort, 0, 0.0, {}});
+      link_.carryOut({CommandCode::abort, 0, 0.0, {}});
     }
   }
 
@@ -167,6 +167,6 @@ int main(int argc, char** argv) {
     while (!stopRequested()) {
       gateway.step();
     }
-    gateway.leave();
+    gateway.stopAll();
   });
 }

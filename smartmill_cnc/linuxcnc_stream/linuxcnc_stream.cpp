@@ -17,7 +17,7 @@
 #include "smartmill_cnc/linuxcnc/configuration.h"
 #include "smartmill_cnc/linuxcnc/liveness.h"
 #include "smartmill_cnc/linuxcnc/local_socket.h"
-#include "smartmill_cnc/linuxcnc/stillness.h"
+#include "smartmill_cnc/linuxcnc/silence_timer.h"
 #include "smartmill_cnc/linuxcnc/stop_signal.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/program.h"
@@ -29,8 +29,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr int HAL_SEGMENT = 0x48414c32, SAMPLER_FIFO = 0x48534130;  // keys that LinuxCNC's sources fix
-constexpr int READ_EVERY = 3;                                       // [ms]
-constexpr std::chrono::milliseconds ASK_EVERY{30}, TRY_EVERY{100}, LOADING{10000};
+constexpr int READ_PERIOD = 3;                                       // [ms]
+constexpr std::chrono::milliseconds REQUEST_PERIOD{30}, RETRY_PERIOD{100}, LOADING{10000};
 constexpr double SILENT = 0.5;  // [s]
 constexpr int GONE = 3;         // exit code: the controller has
 
@@ -61,8 +61,8 @@ class Component {
                   BEAT_SIGNAL + "'");
     }
     // A signal that the drive writes itself is left to it.
-    loads_ = ::hal_link((prefix_ + ".load").c_str(), LOAD_SIGNAL) == 0;
-    overrides_ = ::hal_link((prefix_ + ".feed-override").c_str(), FEED_SIGNAL) == 0 &&
+    has_load_signal_ = ::hal_link((prefix_ + ".load").c_str(), LOAD_SIGNAL) == 0;
+    has_override_signals_ = ::hal_link((prefix_ + ".feed-override").c_str(), FEED_SIGNAL) == 0 &&
                  ::hal_link((prefix_ + ".spindle-override").c_str(), SPINDLE_SIGNAL) == 0;
     setOverrides({});
     if (::hal_stream_attach(&stream_, id_, SAMPLER_FIFO, SAMPLER_PINS) < 0) {
@@ -87,7 +87,7 @@ class Component {
   ServoBlock read() {
     ServoBlock block;
     while (block.samples.size() < ServoBlock::MOST) {
-      if (!ahead_ && !readOne()) {
+      if (!sample_pending_ && !readOne()) {
         break;
       }
       if (block.samples.empty()) {
@@ -96,7 +96,7 @@ class Component {
         break;
       }
       block.samples.push_back(sample_);
-      ahead_ = false;
+      sample_pending_ = false;
     }
     return block;
   }
@@ -107,7 +107,7 @@ class Component {
   }
   /// motion.adaptive-feed goes up to 1. @return why not
   Reply setOverrides(const SetOverrides& wanted) {
-    if (!overrides_) {
+    if (!has_override_signals_) {
       return {Reply::Code::refused, std::string("the controller's configuration has no signals '") +
                                         FEED_SIGNAL + "' and '" + SPINDLE_SIGNAL + "'"};
     }
@@ -116,7 +116,7 @@ class Component {
     return {};
   }
   void setLoad(double load) {
-    if (loads_) {
+    if (has_load_signal_) {
       *pins_->load = load;
     }
   }
@@ -143,33 +143,33 @@ class Component {
     sample_.distance_to_go = d[6].f * units::MM;
     sample_.spindle_load = d[7].f;
     sample_.marker = d[8].f;
-    return ahead_ = true;
+    return sample_pending_ = true;
   }
 
   const std::string prefix_;
   const int id_;
   Pins* pins_ = nullptr;
-  bool loads_ = false, overrides_ = false;
+  bool has_load_signal_ = false, has_override_signals_ = false;
   hal_stream_t stream_{};
-  bool ahead_ = false;  // a sample that was read and not handed out
+  bool sample_pending_ = false;  // a sample that was read and not handed out
   std::uint32_t number_ = 0;
   ServoSample sample_;
 };
 
 /// Asks the gateway whether it and the controller's task live: only then may the machine move.
-class Watch {
+class GatewayWatch {
  public:
-  explicit Watch(std::string path) : path_(std::move(path)) {}
+  explicit GatewayWatch(std::string path) : path_(std::move(path)) {}
 
   bool alive() {
     const Clock::time_point now = Clock::now();
-    if (!gateway_.open() && now - tried_ > TRY_EVERY) {
-      tried_ = now;
+    if (!gateway_.open() && now - last_attempt_ > RETRY_PERIOD) {
+      last_attempt_ = now;
       try {
         gateway_ = LocalConnection::to(path_);
-        process_.only(gateway_.peer());
+        process_.watch(gateway_.peer());
         liveness_ = Liveness();
-        gateway_.send(Command{Word::guard, 0, 0.0, {}});
+        gateway_.send(Command{CommandCode::guard, 0, 0.0, {}});
       } catch (const Error&) {
       }
     }
@@ -181,9 +181,9 @@ class Watch {
         starved_ = status->starved > 0.0;
       }
     }
-    const Liveness::Verdict verdict = liveness_.look(good, process_, seconds());
-    if (now - asked_ > ASK_EVERY) {
-      asked_ = now;
+    const Liveness::Verdict verdict = liveness_.update(good, process_, seconds());
+    if (now - last_request_ > REQUEST_PERIOD) {
+      last_request_ = now;
       gateway_.send(Ask{});
     }
     return gateway_.open() && alive_ && verdict == Liveness::Verdict::lives;
@@ -195,7 +195,7 @@ class Watch {
  private:
   const std::string path_;
   LocalConnection gateway_;
-  Clock::time_point tried_, asked_;
+  Clock::time_point last_attempt_, last_request_;
   bool alive_ = false, starved_ = false;
   ProcessWatch process_;
   Liveness liveness_;
@@ -220,17 +220,17 @@ class Server {
           if (Clock::now() - found > LOADING) throw;
         }
       }
-      std::this_thread::sleep_for(TRY_EVERY);
+      std::this_thread::sleep_for(RETRY_PERIOD);
     }
     return nullptr;
   }
 
   /// @return the exit code
   int serve(Component& component) {
-    Stillness silence;
+    SilenceTimer silence;
     while (!stopRequested()) {
       pollfd entry{listener_.get(), POLLIN, 0};
-      ::poll(&entry, 1, READ_EVERY);
+      ::poll(&entry, 1, READ_PERIOD);
       if (std::optional<LocalConnection> connection = acceptFrom(listener_)) {
         clients_.push_back(std::move(*connection));
       }
@@ -246,7 +246,7 @@ class Server {
         listen(client, component);
       }
       clients_.remove_if([](const LocalConnection& client) { return !client.open(); });
-      if (silence.look(heard || watch_.starved(), seconds()) > SILENT) {
+      if (silence.update(heard || watch_.starved(), seconds()) > SILENT) {
         std::cerr << "linuxcnc_stream: the controller has fallen silent\n";
         return GONE;
       }
@@ -268,7 +268,7 @@ class Server {
   }
 
   LocalDescriptor listener_;
-  Watch watch_;
+  GatewayWatch watch_;
   std::list<LocalConnection> clients_;
 };
 

@@ -34,7 +34,7 @@ void Bridge::fetch(double now) {
 
 void Bridge::step(double now) {
   load_.reset();
-  if (const std::optional<Reading> reading = poller_.take()) {
+  if (const std::optional<Reading> reading = poller_.takeReading()) {
     state_ = reading->state;
     state_.connected = true;
     load_ = reading->load;
@@ -54,13 +54,13 @@ void Bridge::step(double now) {
 
 void Bridge::endWithoutConnection(double now) {
   state_.connected = false;
-  poller_.failed(motion_.lost(poller_.lastError(), now));
-  poller_.lost();
+  poller_.setError(motion_.lost(poller_.lastError(), now));
+  poller_.reportDisconnected();
 }
 
 void Bridge::notice(const Status& status) {
   if (status.lost()) {
-    poller_.failed(status.failure().message);
+    poller_.setError(status.failure().message);
   }
 }
 

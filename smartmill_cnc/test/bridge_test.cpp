@@ -36,7 +36,7 @@ TEST_F(BridgeTest, StateAndLoadInSi) {
   EXPECT_DOUBLE_EQ(bridge_->load()->spindle_load, 0.1234);
   EXPECT_DOUBLE_EQ(bridge_->load()->spindle_speed, 200.0 * units::PI);
   EXPECT_EQ(bridge_->load()->axis_load, (std::vector<double>{0.015, 0.025, 0.035}));
-  EXPECT_TRUE(noted("connected to the controller 127.0.0.1:"));
+  EXPECT_TRUE(logged("connected to the controller 127.0.0.1:"));
 }
 
 TEST_F(BridgeTest, ProgramRunsToItsEnd) {
@@ -273,14 +273,14 @@ TEST_F(BridgeTest, LostInMidProgramAndBackAgain) {
   EXPECT_FALSE(bridge_->load());
   EXPECT_EQ(bridge_->takeConditions().size(), 2u);
   // One line in all, not one a period.
-  EXPECT_EQ(std::count_if(notes_.begin(), notes_.end(),
-                          [](const std::string& note) { return note.find("lost") != std::string::npos; }),
+  EXPECT_EQ(std::count_if(log_lines_.begin(), log_lines_.end(),
+                          [](const std::string& entry) { return entry.find("lost") != std::string::npos; }),
             1);
-  notes_.clear();
+  log_lines_.clear();
   for (int i = 0; i < 200; ++i) {
     cycle();
   }
-  EXPECT_EQ(notes_.size(), 0u);
+  EXPECT_EQ(log_lines_.size(), 0u);
   startServer(port_);
   EXPECT_TRUE(cycleUntil([&] { return bridge_->state().connected; }));
   EXPECT_EQ(bridge_->jog("x", 0.01, 0.0)->code, MotionCode::not_armed);
@@ -383,13 +383,13 @@ TEST(BridgeConnect, ClosedPortIsOneLine) {
   FocasParameters focas;
   focas.port = 1;
   Bridge bridge(makeFocasController(focas), 1.0, goodMotion());
-  std::vector<Note> notes;
+  std::vector<LogEntry> notes;
   for (int i = 0; i < 500; ++i) {
     bridge.fetch(i * 0.02);
     bridge.step(i * 0.02);
     EXPECT_FALSE(bridge.state().connected);
-    for (const Note& note : bridge.takeNotes()) {
-      notes.push_back(note);
+    for (const LogEntry& entry : bridge.takeLogEntries()) {
+      notes.push_back(entry);
     }
   }
   ASSERT_EQ(notes.size(), 1u);
@@ -438,7 +438,7 @@ TEST_F(BridgeTest, OverridesGoToTheDataTableWhileAProgramRunsAndComeBack) {
   cycle();
   EXPECT_EQ(table(500), 100);
   EXPECT_EQ(table(501), 100);
-  EXPECT_TRUE(noted("feed 40 %, spindle 95.0 %: chatter"));
+  EXPECT_TRUE(logged("feed 40 %, spindle 95.0 %: chatter"));
 }
 
 TEST_F(BridgeTest, OverridesThatTheControllerRefusesGiveOneLine) {

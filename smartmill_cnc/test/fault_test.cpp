@@ -36,7 +36,7 @@ class FaultTest : public BridgeTest {
   }
   static constexpr std::size_t STEPS = 6;
 
-  void expectStandsStill(const std::string& after) {
+  void expectStandstill(const std::string& after) {
     // The controller learns of a lost connection in its own thread.
     for (int i = 0; i < 2000 && machine_.streaming(); ++i) {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -62,8 +62,8 @@ class FaultTest : public BridgeTest {
     EXPECT_EQ(finish().code, MotionCode::ok) << after;
   }
   std::size_t lines(const std::string& part) const {
-    return static_cast<std::size_t>(std::count_if(notes_.begin(), notes_.end(), [&](const std::string& note) {
-      return note.find(part) != std::string::npos;
+    return static_cast<std::size_t>(std::count_if(log_lines_.begin(), log_lines_.end(), [&](const std::string& entry) {
+      return entry.find(part) != std::string::npos;
     }));
   }
 };
@@ -81,7 +81,7 @@ TEST_F(FaultTest, ServerKilledAndRestartedAtEachStepOfTheHammerSequence) {
       for (int i = early ? 0 : 3; i > 0; --i) {
         cycle();
       }
-      notes_.clear();
+      log_lines_.clear();
       server_.reset();
       const Outcome outcome = finish();
       EXPECT_EQ(outcome.code, MotionCode::lost) << what;
@@ -91,7 +91,7 @@ TEST_F(FaultTest, ServerKilledAndRestartedAtEachStepOfTheHammerSequence) {
       machine_.advance(1.0);
       machine_.change([](TestMachine& m) { m.speed = 0.0; });
       startServer(port_);
-      expectStandsStill(what);
+      expectStandstill(what);
       expectWorksAgain(what);
     }
   }
@@ -118,7 +118,7 @@ TEST_F(FaultTest, ConnectionCutInMidFrame) {
     EXPECT_EQ(outcome.code, MotionCode::lost) << left;
     EXPECT_NE(outcome.message.find("the controller closed it"), std::string::npos) << outcome.message;
     cut = false;
-    expectStandsStill("cut after " + std::to_string(left));
+    expectStandstill("cut after " + std::to_string(left));
     expectWorksAgain("cut after " + std::to_string(left));
   }
 }
@@ -202,7 +202,7 @@ TEST_F(FaultTest, RepliesThatAreWrongEndTheConnectionAndNothingElse) {
     wrong = true;
     EXPECT_EQ(finish().code, MotionCode::lost) << what;
     wrong = false;
-    expectStandsStill(what);
+    expectStandstill(what);
     expectWorksAgain(what);
   }
 }
@@ -222,7 +222,7 @@ TEST_F(FaultTest, EveryErrorCodeOfAStartIsToldAndMovesNothing) {
     EXPECT_FALSE(bridge_->state().armed) << code;
   }
   machine_.change([](TestMachine& m) { m.refuse_start = focas::EW_OK; });
-  expectStandsStill("refused starts");
+  expectStandstill("refused starts");
   expectWorksAgain("refused starts");
 }
 
@@ -249,7 +249,7 @@ TEST_F(FaultTest, ResetAndEmergencyStopInMidDnc) {
     if (emergency) {
       EXPECT_EQ(bridge_->arm(true).code, ArmCode::alarm);
     }
-    expectStandsStill("emergency or reset");
+    expectStandstill("emergency or reset");
     machine_.change([](TestMachine& m) { m.state.emergency = 0; });
     expectWorksAgain("emergency or reset");
     bridge_->arm(false);
@@ -269,7 +269,7 @@ TEST_F(FaultTest, AlarmInMidJogIsPublishedTypedAndStops) {
   ASSERT_EQ(bridge_->alarms().size(), 2u);
   EXPECT_EQ(bridge_->alarms()[0].number, 3003);
   EXPECT_EQ(bridge_->alarms()[1].axis, 1);
-  expectStandsStill("alarm");
+  expectStandstill("alarm");
   machine_.change([](TestMachine& m) {
     m.alarm_bits = 0;
     m.state.alarm = 0;
@@ -290,7 +290,7 @@ TEST_F(FaultTest, TheSixthSessionIsToldThatAllAreTaken) {
   connectBridge(port_);
   cycle();
   EXPECT_FALSE(bridge_->state().connected);
-  EXPECT_TRUE(noted("all its sessions may be taken"));
+  EXPECT_TRUE(logged("all its sessions may be taken"));
   others.clear();
   now_ += 10.0;
   EXPECT_TRUE(cycleUntil([&] {
@@ -333,7 +333,7 @@ TEST_F(FaultTest, AHalfOpenDncCircuitIsFound) {
       ASSERT_FALSE(bridge_->runProgram("slow", "G91 G1 X0.5 F1\nX-0.5\n", {}));
       cycleUntil([&] { return bridge_->state().motion; });
     }
-    notes_.clear();
+    log_lines_.clear();
     // What is on its way arrives: one who has gone does not send it again and again.
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
     proxy.deaf = true;
@@ -346,12 +346,12 @@ TEST_F(FaultTest, AHalfOpenDncCircuitIsFound) {
     RecordProperty(
         in_motion ? "found_in_motion_ms" : "found_idle_ms",
         static_cast<int>((std::chrono::steady_clock::now() - began) / std::chrono::milliseconds(1)));
-    EXPECT_TRUE(noted("nothing comes back on its DNC circuit")) << what;
+    EXPECT_TRUE(logged("nothing comes back on its DNC circuit")) << what;
     EXPECT_FALSE(bridge_->state().armed) << what;
     if (in_motion) {
       EXPECT_EQ(finish().code, MotionCode::lost);
     }
-    expectStandsStill(what);
+    expectStandstill(what);
     expectWorksAgain(what);
   }
 }
@@ -379,7 +379,7 @@ TEST_F(FaultTest, ADncCircuitThatSwallowsItsTextIsTold) {
   outcome = finish();
   EXPECT_EQ(outcome.code, MotionCode::cancelled) << outcome.message;
   EXPECT_NE(outcome.message.find("stopped at"), std::string::npos) << outcome.message;
-  expectStandsStill("swallowed");
+  expectStandstill("swallowed");
 }
 
 TEST_F(FaultTest, AClockThatJumpsEndsNothingAndHangsNothing) {
@@ -398,8 +398,8 @@ TEST_F(FaultTest, AClockThatJumpsEndsNothingAndHangsNothing) {
     std::optional<Outcome> outcome;
     ASSERT_TRUE(cycleUntil([&] { return (outcome = bridge_->takeOutcome()).has_value(); }, 400)) << jump;
     EXPECT_EQ(outcome->code, MotionCode::ok) << outcome->message;
-    EXPECT_TRUE(noted("the clock jumped"));
-    notes_.clear();
+    EXPECT_TRUE(logged("the clock jumped"));
+    log_lines_.clear();
   }
 }
 

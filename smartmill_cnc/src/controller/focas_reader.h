@@ -29,9 +29,9 @@ class FocasReader {
   int decimals() const { return decimals_; }
 
  private:
-  class Questions;
-  std::vector<focas::SubReply> ask();
-  void askAllAtOnce(bool all_at_once);
+  class PollRequests;
+  std::vector<focas::SubReply> exchange();
+  void setAllAtOnce(bool all_at_once);
   void readState(const std::vector<focas::SubReply>& replies, std::size_t axes, Reading& reading);
   void readPositions(const std::vector<focas::SubReply>& replies, std::size_t axes, Reading& reading);
   void readAlarms(std::uint32_t bits, CncState& state);
@@ -39,9 +39,9 @@ class FocasReader {
 
   focas::Client& client_;
   FocasParameters parameters_;
-  std::unique_ptr<Questions> questions_;
+  std::unique_ptr<PollRequests> poll_requests_;
   bool all_at_once_ = true;
-  bool asked_ = false, answered_ = false;
+  bool requested_ = false, answered_ = false;
   std::uint32_t alarm_bits_ = 0;
   std::string alarm_text_;
   std::vector<ControllerAlarm> alarms_;

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "smartmill_cnc/linuxcnc/gateway_client.h"
-#include "smartmill_cnc/linuxcnc/stillness.h"
+#include "smartmill_cnc/linuxcnc/silence_timer.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
@@ -16,7 +16,7 @@ namespace {
 
 constexpr int DECIMALS = 4;            // of mm; LinuxCNC computes in doubles
 constexpr double INCREMENT = 1e-7;     // [m]
-constexpr double NO_WAY = 1e-9;        // [m] a distance to go below this is none
+constexpr double ZERO_DISTANCE = 1e-9;        // [m] a distance to go below this is none
 constexpr double STREAM_SILENT = 0.4;  // [s]
 constexpr int ORIENT_MACRO = 1133;     // what M119 turns to, 0 .. 4095, as on a Fanuc
 constexpr const char* UNMARK = "M68 E0 Q0\n";
@@ -110,14 +110,14 @@ class LinuxCncController : public Controller {
     const std::uint64_t count = stream_->count();
     // A controller that waits for a processor is silent without having stopped.
     const bool heard = std::exchange(servo_count_, count) != count || status_.starved > 0.0;
-    const double silence = silence_.look(heard, now_());
+    const double silence = silence_.update(heard, now_());
     if (!servo || silence > STREAM_SILENT) {
       return lost("connection to the " + name() + " lost: its servo stream is silent");
     }
     return readingOf(*servo);
   }
 
-  Status setVariable(int number, double value) override { return tell({Word::variable, number, value, {}}); }
+  Status setVariable(int number, double value) override { return execute({CommandCode::variable, number, value, {}}); }
 
   DialectOptions dialect() const override {
     DialectOptions options;
@@ -128,7 +128,7 @@ class LinuxCncController : public Controller {
   std::string orientProgram(double angle) const override { return cnc::orientProgram(angle, ORIENT_MACRO); }
 
   Status openPrograms() override {
-    const Status opened = tell({Word::open, 0, 0.0, {}});
+    const Status opened = execute({CommandCode::open, 0, 0.0, {}});
     open_ = static_cast<bool>(opened);
     if (open_) {
       status_.mode = MachineStatus::Mode::mdi;
@@ -144,7 +144,7 @@ class LinuxCncController : public Controller {
     return Failure{Failure::Kind::wrong_mode, "the controller has been taken out of MDI"};
   }
   Status closePrograms() override {
-    return std::exchange(open_, false) ? tell({Word::close, 0, 0.0, {}}) : Status();
+    return std::exchange(open_, false) ? execute({CommandCode::close, 0, 0.0, {}}) : Status();
   }
 
   void begin(const std::string& program) override {
@@ -153,7 +153,7 @@ class LinuxCncController : public Controller {
     complete_ = false;
   }
   Status send() override {
-    const Status taken = tell({Word::run, number_, 0.0, text_});
+    const Status taken = execute({CommandCode::run, number_, 0.0, text_});
     complete_ = static_cast<bool>(taken);
     if (!taken && taken.failure().kind == Failure::Kind::not_yet) {
       return {};
@@ -164,19 +164,19 @@ class LinuxCncController : public Controller {
   Transfer transfer() const override { return {complete_ ? text_.size() : 0, text_.size(), complete_}; }
   Status abandonPrograms() override {
     open_ = false;
-    return tell({Word::abort, 0, 0.0, {}});
+    return execute({CommandCode::abort, 0, 0.0, {}});
   }
   Status abort() override { return abandonPrograms(); }
   bool takesOverrides() const override { return true; }
   Result<Overrides> setOverrides(const Overrides& wanted) override {
     const Overrides taken{std::min(1.0, wanted.feed), wanted.spindle};
-    const Reply reply = askStream(SetOverrides{taken.feed, taken.spindle});
+    const Reply reply = sendToStream(SetOverrides{taken.feed, taken.spindle});
     if (reply.code != Reply::Code::done) {
       return Failure{kindOf(reply.code), reply.text};
     }
     return taken;
   }
-  Status hold() override { return tell({Word::hold, 0, 0.0, {}}); }
+  Status hold() override { return execute({CommandCode::hold, 0, 0.0, {}}); }
 
  private:
   Failure lost(const std::string& why) {
@@ -186,7 +186,7 @@ class LinuxCncController : public Controller {
   }
 
   /// By a connection of its own, since that of the servo cycles is read elsewhere.
-  Reply askStream(const SetOverrides& overrides) const {
+  Reply sendToStream(const SetOverrides& overrides) const {
     try {
       GatewayClient stream(folder_, timeout_, STREAM_SOCKET);
       stream.connect();
@@ -196,7 +196,7 @@ class LinuxCncController : public Controller {
     }
   }
 
-  Status tell(const Command& command) {
+  Status execute(const Command& command) {
     try {
       const Reply reply = client_.carryOut(command);
       if (reply.code == Reply::Code::done) {
@@ -242,7 +242,7 @@ class LinuxCncController : public Controller {
     state.position.assign(status_.position.begin(), status_.position.end());
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double left = status_.distance_to_go[axis];
-      state.distance_to_go.push_back(std::abs(left) < NO_WAY ? 0.0 : left);
+      state.distance_to_go.push_back(std::abs(left) < ZERO_DISTANCE ? 0.0 : left);
       reading.absolute.push_back(status_.position[axis] - status_.offset[axis]);
     }
     state.spindle_speed = std::abs(servo.spindle_speed);
@@ -264,7 +264,7 @@ class LinuxCncController : public Controller {
   GatewayClient client_;
   std::shared_ptr<const ServoStream> stream_;
   double (*now_)();
-  Stillness silence_;
+  SilenceTimer silence_;
   std::uint64_t servo_count_ = 0;
   MachineStatus status_;
   bool open_ = false, complete_ = false;

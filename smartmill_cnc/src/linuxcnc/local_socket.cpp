@@ -148,13 +148,13 @@ void LocalConnection::flush() {
 
 LocalDescriptor listenAt(const std::string& path) {
   const sockaddr_un address = addressOf(path);
-  bool taken = true;
+  bool in_use = true;
   try {
     LocalConnection::to(path);
   } catch (const Error&) {
-    taken = false;
+    in_use = false;
   }
-  if (taken) {
+  if (in_use) {
     throw Error(path + ": somebody listens there already");
   }
   ::unlink(path.c_str());

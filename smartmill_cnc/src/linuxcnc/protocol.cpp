@@ -73,7 +73,7 @@ class Unpacker {
   }
   bool flag() { return number<std::uint8_t>() != 0; }
   template <class Enum>
-  Enum word(int first, int last) {
+  Enum enumeration(int first, int last) {
     const int value = number<std::uint8_t>();
     if (value < first || value > last) {
       throw Error("a frame holds the unknown word " + std::to_string(value));
@@ -116,14 +116,14 @@ void pack(const Command& m, Packer& p) {
     throw Error("a program of " + std::to_string(m.text.size()) + " bytes is longer than " +
                 std::to_string(LONGEST_PROGRAM));
   }
-  p.number(static_cast<std::uint8_t>(m.word));
+  p.number(static_cast<std::uint8_t>(m.code));
   p.number(m.number);
   p.number(m.value);
   p.text(m.text, LONGEST_PROGRAM);
 }
 
 void unpack(Command& m, Unpacker& u) {
-  m.word = u.word<Word>(1, 10);
+  m.code = u.enumeration<CommandCode>(1, 10);
   m.number = u.number<std::int32_t>();
   m.value = u.finite();
   m.text = u.text();
@@ -135,7 +135,7 @@ void pack(const Reply& m, Packer& p) {
 }
 
 void unpack(Reply& m, Unpacker& u) {
-  m.code = u.word<Reply::Code>(0, 5);
+  m.code = u.enumeration<Reply::Code>(0, 5);
   m.text = u.text();
 }
 
@@ -166,8 +166,8 @@ void pack(const MachineStatus& m, Packer& p) {
 
 void unpack(MachineStatus& m, Unpacker& u) {
   m.alive = u.flag();
-  m.state = u.word<MachineStatus::State>(1, 4);
-  m.mode = u.word<MachineStatus::Mode>(1, 3);
+  m.state = u.enumeration<MachineStatus::State>(1, 4);
+  m.mode = u.enumeration<MachineStatus::Mode>(1, 3);
   for (bool* flag : {&m.busy, &m.held, &m.homed, &m.in_position}) {
     *flag = u.flag();
   }

@@ -32,14 +32,14 @@ Status MotionMachine::step(const Reading& reading, double now) {
   followClock(now);
   reading_ = reading;
   now_ = now;
-  const Status watched = watch();
+  const Status watched = checkController();
   if (!watched) {
     return watched;
   }
   switch (phase_) {
     case Phase::opening: {
       // A program that follows another at once begins with 100 % as well.
-      const Status back = putOverridesBack();
+      const Status back = resetOverrides();
       return back ? open() : back;
     }
     case Phase::sending:
@@ -50,7 +50,7 @@ Status MotionMachine::step(const Reading& reading, double now) {
       endStop();
       return {};
     case Phase::idle:
-      return putOverridesBack();
+      return resetOverrides();
   }
   return {};
 }
@@ -117,7 +117,7 @@ Result<OverrideAnswer> MotionMachine::setOverrides(const Overrides& wanted, cons
   return answer;
 }
 
-Status MotionMachine::putOverridesBack() {
+Status MotionMachine::resetOverrides() {
   if (!std::exchange(overridden_, false)) {
     return {};
   }
@@ -369,16 +369,16 @@ Status MotionMachine::cancel(const std::string& why) {
 }
 
 /// What ends a motion from the controller's side.
-Status MotionMachine::watch() {
+Status MotionMachine::checkController() {
   if (!armed_) {
     return {};
   }
   const CncState& state = reading_->state;
   if (state.emergency || state.alarm) {
-    return giveUp(MotionCode::alarm, alarmLine());
+    return abandonMotion(MotionCode::alarm, alarmLine());
   }
   if (state.mode != CncMode::dnc) {
-    return giveUp(MotionCode::wrong_mode, modeLine());
+    return abandonMotion(MotionCode::wrong_mode, modeLine());
   }
   if (!controller_.programsOpen() || phase_ == Phase::stopping) {
     return {};
@@ -387,10 +387,10 @@ Status MotionMachine::watch() {
   if (open || open.lost()) {
     return open;
   }
-  return giveUp(codeOf(open.failure(), MotionCode::cancelled), open.failure().message);
+  return abandonMotion(codeOf(open.failure(), MotionCode::cancelled), open.failure().message);
 }
 
-Status MotionMachine::giveUp(MotionCode code, const std::string& why) {
+Status MotionMachine::abandonMotion(MotionCode code, const std::string& why) {
   log_.warning("motion is disarmed: " + why);
   armed_ = false;
   const Status aborted = controller_.programsOpen() ? controller_.abandonPrograms() : Status();
@@ -409,8 +409,8 @@ Status MotionMachine::stop(Outcome outcome) {
 
 void MotionMachine::endStop() {
   const CncState& state = reading_->state;
-  const bool stands = reading_->at_rest && state.position == stall_.position;
-  stall_.position = state.position;
+  const bool stands = reading_->at_rest && state.position == last_progress_.position;
+  last_progress_.position = state.position;
   if (!stands && now_ - entered_ <= parameters_.stop_timeout) {
     return;
   }
@@ -468,12 +468,12 @@ Status MotionMachine::open() {
   }
   controller_.begin(motion_.program);
   enter(Phase::sending);
-  tellCondition();
+  announceCondition();
   return send();
 }
 
 /// Told ahead: it is with everybody when its time has come, and nothing of it has begun before.
-void MotionMachine::tellCondition() {
+void MotionMachine::announceCondition() {
   condition_from_ = condition_to_ = now_;
   if (motion_.condition) {
     condition_from_ += parameters_.condition_lead;
@@ -494,7 +494,7 @@ Status MotionMachine::send() {
     return sent;
   }
   if (!sent) {
-    return giveUp(codeOf(sent.failure(), MotionCode::cancelled), lineOf(sent.failure()));
+    return abandonMotion(codeOf(sent.failure(), MotionCode::cancelled), lineOf(sent.failure()));
   }
   const Transfer transfer = controller_.transfer();
   if (transfer.complete) {
@@ -541,11 +541,11 @@ Status MotionMachine::run() {
 
 Status MotionMachine::checkStall() {
   const CncState& state = reading_->state;
-  if (!reading_->at_rest || state.run == CncRun::hold || state.sequence != stall_.sequence ||
-      state.spindle_speed != stall_.spindle_speed || state.position != stall_.position) {
+  if (!reading_->at_rest || state.run == CncRun::hold || state.sequence != last_progress_.sequence ||
+      state.spindle_speed != last_progress_.spindle_speed || state.position != last_progress_.position) {
     progressed_ = now_;
   }
-  stall_ = state;
+  last_progress_ = state;
   if (now_ - progressed_ <= parameters_.stall_timeout) {
     return {};
   }

@@ -51,7 +51,7 @@ class CncNode {
   void post(Job job);
   /// Runs in the bridge's thread; nothing when that takes longer than a caller should wait.
   template <class Result>
-  std::optional<Result> ask(std::function<Result()> question);
+  std::optional<Result> callInThread(std::function<Result()> call);
 
   template <class Action, class Start, class Feedback>
   std::unique_ptr<Server<Action>> serve(ros::NodeHandle& nh, const std::string& name, Start start,
@@ -72,8 +72,7 @@ class CncNode {
   const std::shared_ptr<linuxcnc::ServoStream> stream_;      // of a LinuxCNC
   Bridge bridge_;                                            // the bridge's thread only
   std::optional<Active> active_;                             // the bridge's thread only
-  std::string last_note_;                                    // the bridge's thread only
-  std::optional<std::vector<ControllerAlarm>> told_alarms_;  // the bridge's thread only
+  std::optional<std::vector<ControllerAlarm>> published_alarms_;  // the bridge's thread only
 
   ros::Publisher state_publisher_, load_publisher_, condition_publisher_, alarms_publisher_;
   tf2_ros::TransformBroadcaster broadcaster_;
@@ -86,9 +85,9 @@ class CncNode {
 
   std::mutex mutex_;  // of what follows
   std::vector<Job> jobs_;
-  CncState seen_;  // for diagnostics
-  std::string seen_note_;
-  Poller::Counts seen_connections_;
+  CncState diagnosed_state_;  // for diagnostics
+  std::string diagnosed_line_;
+  Poller::Counts diagnosed_connections_;
 
   std::atomic<double> round_trip_{0.0};  // [s] decays
   std::atomic<bool> stopping_{false};

@@ -25,12 +25,12 @@ class ServoPublisher {
 
  private:
   void run();
-  void publish(const linuxcnc::ServoStretch& stretch);
+  void publish(const linuxcnc::ServoSegment& segment);
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   std::shared_ptr<linuxcnc::ServoStream> stream_;
   ros::Publisher servo_, angle_;
-  std::uint64_t told_ = 0;  // samples at the last diagnostics
+  std::uint64_t reported_samples_ = 0;  // samples at the last diagnostics
   std::atomic<bool> stopping_{false};
   std::thread thread_;
 };

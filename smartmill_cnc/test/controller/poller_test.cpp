@@ -13,9 +13,9 @@ class PollerTest : public ::testing::Test {
   // One period as the bridge goes through it.
   bool cycle(double now) {
     poller_.fetch(now);
-    const bool read = poller_.take().has_value();
-    if (!controller_.connected()) poller_.lost();
-    for (const Note& note : log_.take()) notes_.push_back(note.text);
+    const bool read = poller_.takeReading().has_value();
+    if (!controller_.connected()) poller_.reportDisconnected();
+    for (const LogEntry& entry : log_.take()) log_lines_.push_back(entry.text);
     return read;
   }
 
@@ -24,23 +24,23 @@ class PollerTest : public ::testing::Test {
     cycle(0.0);
     controller_.is_connected = false;
     controller_.connecting = afterwards;
-    poller_.failed("the wire is cut");
-    poller_.lost();
+    poller_.setError("the wire is cut");
+    poller_.reportDisconnected();
     for (int i = 0; i < 200; ++i) cycle(1.0 + 0.02 * i);
   }
 
   ScriptedController controller_;
   Log log_;
   Poller poller_{controller_, 1.0, log_};
-  std::vector<std::string> notes_;
+  std::vector<std::string> log_lines_;
 };
 
 TEST_F(PollerTest, ConnectsReadsAndSaysSoOnce) {
   for (int i = 0; i < 10; ++i) EXPECT_TRUE(cycle(0.02 * i));
-  EXPECT_EQ(notes_, std::vector<std::string>{"connected to the scripted controller: type S, axes X Y Z"});
+  EXPECT_EQ(log_lines_, std::vector<std::string>{"connected to the scripted controller: type S, axes X Y Z"});
   EXPECT_EQ(controller_.count("connect"), 1u);
   // What was read is given once.
-  EXPECT_FALSE(poller_.take());
+  EXPECT_FALSE(poller_.takeReading());
 }
 
 TEST_F(PollerTest, AttemptsGetRarerAndAreToldInOneLine) {
@@ -48,11 +48,11 @@ TEST_F(PollerTest, AttemptsGetRarerAndAreToldInOneLine) {
   for (int i = 0; i < 1600; ++i) EXPECT_FALSE(cycle(0.02 * i));
   // At 0, 1, 3, 7, 15, 23, 31 s.
   EXPECT_EQ(controller_.count("connect"), 7u);
-  EXPECT_EQ(notes_, std::vector<std::string>{"nobody there; trying again every 1.0 to 8.0 s"});
+  EXPECT_EQ(log_lines_, std::vector<std::string>{"nobody there; trying again every 1.0 to 8.0 s"});
   // A refusal of another kind is news.
   controller_.connecting = Failure{Failure::Kind::refused, "wrong password"};
   for (int i = 1600; i < 2100; ++i) cycle(0.02 * i);
-  EXPECT_EQ(notes_.size(), 2u);
+  EXPECT_EQ(log_lines_.size(), 2u);
   // A connection that came about begins anew.
   controller_.connecting.reset();
   cycle(50.0);
@@ -75,23 +75,23 @@ TEST_F(PollerTest, TimeThatJumpsBackDoesNotPutTheNextAttemptOff) {
 TEST_F(PollerTest, LossIsOneLineAndSoIsTheReturn) {
   loseConnection({Failure::Kind::lost, "connection refused"});
   EXPECT_EQ(log_.take().size(), 0u);
-  ASSERT_EQ(notes_.size(), 2u);
-  EXPECT_EQ(notes_[1], "the wire is cut; trying again every 1.0 to 8.0 s");
+  ASSERT_EQ(log_lines_.size(), 2u);
+  EXPECT_EQ(log_lines_[1], "the wire is cut; trying again every 1.0 to 8.0 s");
   controller_.connecting.reset();
   cycle(20.0);
-  EXPECT_EQ(notes_.size(), 3u);
+  EXPECT_EQ(log_lines_.size(), 3u);
 }
 
 TEST_F(PollerTest, ThatAllSessionsAreTakenAfterALossIsNews) {
   loseConnection({Failure::Kind::refused, "all sessions are taken"});
-  ASSERT_EQ(notes_.size(), 3u);
-  EXPECT_EQ(notes_[2], "all sessions are taken; trying again every 1.0 to 8.0 s");
+  ASSERT_EQ(log_lines_.size(), 3u);
+  EXPECT_EQ(log_lines_[2], "all sessions are taken; trying again every 1.0 to 8.0 s");
 }
 
 TEST_F(PollerTest, ACommandThatFindsTheConnectionDeadVoidsWhatWasRead) {
   poller_.fetch(0.0);
   controller_.is_connected = false;
-  EXPECT_FALSE(poller_.take());
+  EXPECT_FALSE(poller_.takeReading());
 }
 
 }  // namespace

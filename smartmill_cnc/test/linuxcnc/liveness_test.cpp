@@ -21,16 +21,16 @@ using Verdict = Liveness::Verdict;
 
 constexpr double LOOK = 0.002;  // [s]
 
-/// [s] from the last cycle to the verdict when nothing but this evidence is seen.
-double verdictAfter(Verdict due, const Liveness::Evidence& evidence, double step) {
+/// [s] from the last cycle to the verdict when nothing but this evidence is waits.
+double verdictAfter(Verdict expected, const Liveness::Evidence& evidence, double step) {
   Liveness liveness;
   double now = 100.0;
-  liveness.look(Liveness::Evidence{true, false, false}, now);
+  liveness.update(Liveness::Evidence{true, false, false}, now);
   for (;;) {
     now += step;
-    const Verdict verdict = liveness.look(evidence, now);
+    const Verdict verdict = liveness.update(evidence, now);
     if (verdict != Verdict::lives) {
-      EXPECT_EQ(verdict, due);
+      EXPECT_EQ(verdict, expected);
       return now - 100.0;
     }
   }
@@ -52,10 +52,10 @@ TEST(Liveness, AnObserverThatWaitedItselfBlamesNobody) {
   // Looks 0.3 s apart: 0.05 s of each count as the controller's, and 2 s are over before 0.4 s of these.
   EXPECT_NEAR(verdictAfter(Verdict::starves, {false, false, false}, 0.3), 2.1, 1e-9);
   Liveness liveness;
-  liveness.look(Liveness::Evidence{true, false, false}, 0.0);
-  EXPECT_EQ(liveness.look(Liveness::Evidence{false, false, false}, 1.0), Verdict::lives);
+  liveness.update(Liveness::Evidence{true, false, false}, 0.0);
+  EXPECT_EQ(liveness.update(Liveness::Evidence{false, false, false}, 1.0), Verdict::lives);
   EXPECT_NEAR(liveness.starved(), 0.95, 1e-12);
-  EXPECT_EQ(liveness.look(Liveness::Evidence{true, false, false}, 1.1), Verdict::lives);
+  EXPECT_EQ(liveness.update(Liveness::Evidence{true, false, false}, 1.1), Verdict::lives);
   EXPECT_EQ(liveness.starved(), 0.0);
 }
 
@@ -95,13 +95,13 @@ double now() {
 }
 
 /// The watch's answers over some time.
-int waitsSeen(ProcessWatch& watch, int looks) {
-  int seen = 0;
+int countWaits(ProcessWatch& watch, int looks) {
+  int waits = 0;
   for (int i = 0; i < looks; ++i) {
     std::this_thread::sleep_for(std::chrono::duration<double>(1.2 * ProcessWatch::WINDOW));
-    seen += watch.waits(now()) ? 1 : 0;
+    waits += watch.waitsForProcessor(now()) ? 1 : 0;
   }
-  return seen;
+  return waits;
 }
 
 TEST(ProcessWatch, SeesWhoEnds) {
@@ -136,13 +136,13 @@ TEST(ProcessWatch, SeesWhoWaitsForAProcessorAndWhoSleeps) {
   }
   {
     const Child rival("smw_rival", true), another("smw_rival", true);
-    EXPECT_GT(waitsSeen(watch, 40), 10);
-    EXPECT_EQ(waitsSeen(other, 5), 0);
+    EXPECT_GT(countWaits(watch, 40), 10);
+    EXPECT_EQ(countWaits(other, 5), 0);
   }
   ::kill(waits.pid(), SIGSTOP);
   ASSERT_EQ(::waitpid(waits.pid(), nullptr, WUNTRACED), waits.pid());
-  waitsSeen(watch, 1);
-  EXPECT_EQ(waitsSeen(watch, 5), 0);  // one that is stopped waits for nothing
+  countWaits(watch, 1);
+  EXPECT_EQ(countWaits(watch, 5), 0);  // one that is stopped waits for nothing
 }
 
 }  // namespace

@@ -83,7 +83,7 @@ std::vector<pid_t> processes(const std::string& word, const std::string& other) 
 class LinuxCncMachine : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    if (!whyNot().empty()) {
+    if (!skipReason().empty()) {
       return;
     }
     folder_ = "/dev/shm/smartmill_test_" + std::to_string(::getpid());
@@ -92,7 +92,7 @@ class LinuxCncMachine : public ::testing::Test {
   static void TearDownTestSuite() { stop(); }
 
   void SetUp() override {
-    const std::string why = whyNot();
+    const std::string why = skipReason();
     if (!why.empty()) {
       GTEST_SKIP() << why;
     }
@@ -111,7 +111,7 @@ class LinuxCncMachine : public ::testing::Test {
     ASSERT_EQ(armed.code, ArmCode::ok) << armed.message;
   }
 
-  static std::string whyNot() {
+  static std::string skipReason() {
     if (::access("/usr/bin/linuxcnc", X_OK) != 0 || !fs::exists(program("linuxcnc_gateway"))) {
       return "LinuxCNC is not installed (./setup --with-linuxcnc)";
     }
@@ -152,7 +152,7 @@ class LinuxCncMachine : public ::testing::Test {
       try {
         GatewayClient panel(folder_, 20.0);
         panel.connect();
-        const Reply reply = panel.carryOut({Word::ready, 0, 0.0, {}});
+        const Reply reply = panel.carryOut({CommandCode::ready, 0, 0.0, {}});
         if (reply.code == Reply::Code::done) {
           return;
         }
@@ -163,10 +163,10 @@ class LinuxCncMachine : public ::testing::Test {
       ASSERT_LT(now(), end) << why;
     }
   }
-  static Reply atPanel(Word word) {
+  static Reply atPanel(CommandCode code) {
     GatewayClient panel(folder_, 20.0);
     panel.connect();
-    return panel.carryOut({word, 0, 0.0, {}});
+    return panel.carryOut({code, 0, 0.0, {}});
   }
 
   /// The bridge's periods until something is so.
@@ -180,8 +180,8 @@ class LinuxCncMachine : public ::testing::Test {
     return true;
   }
   void period() {
-    for (ServoStretch& stretch : stream_->step(0.005, now)) {
-      for (const ServoSample& s : stretch.samples) {
+    for (ServoSegment& segment : stream_->step(0.005, now)) {
+      for (const ServoSample& s : segment.samples) {
         samples_.push_back(s);
       }
     }
@@ -208,15 +208,15 @@ class LinuxCncMachine : public ::testing::Test {
     }));
   }
   /// [s] until something is told.
-  double took(const std::function<bool()>& so) {
+  double timeUntil(const std::function<bool()>& so) {
     const double begin = now();
     EXPECT_TRUE(until(so));
     const double seconds = now() - begin;
-    RecordProperty("told_after_ms", static_cast<int>(1e3 * seconds));
+    RecordProperty("detected_after_ms", static_cast<int>(1e3 * seconds));
     return seconds;
   }
   /// Axes and spindle stand, and stay so.
-  void expectStanding() {
+  void expectStandstill() {
     EXPECT_TRUE(
         until([&] { return samples_.back().velocity == 0.0 && samples_.back().spindle_speed == 0.0; }, 2.0));
     const ServoSample then = samples_.back();
@@ -249,7 +249,7 @@ TEST_F(LinuxCncMachine, RunsAProgramWhoseMovesAreMarkedInTheStream) {
   EXPECT_NEAR(bridge_->state().position[1], -5e-3, 1e-9);
   EXPECT_EQ(bridge_->state().spindle_speed, 0.0);  // M30 waits for the spindle, as on a Fanuc
 
-  std::size_t first = 0, second = 0, beside = 0;
+  std::size_t first = 0, second = 0, unmarked = 0;
   for (std::size_t i = 1; i < samples_.size(); ++i) {
     const ServoSample &a = samples_[i - 1], &b = samples_[i];
     // The angle is the integral of the speed, to the servo period.
@@ -257,11 +257,11 @@ TEST_F(LinuxCncMachine, RunsAProgramWhoseMovesAreMarkedInTheStream) {
     // Line 4 of the text (G90 before the program's first) is the move along x, line 5 the one along y.
     first += b.marker == 4.0 ? 1 : 0;
     second += b.marker == 5.0 ? 1 : 0;
-    beside += b.position[0] != a.position[0] && b.marker != 4.0 ? 1 : 0;
-    beside += b.position[1] != a.position[1] && b.marker != 5.0 ? 1 : 0;
+    unmarked += b.position[0] != a.position[0] && b.marker != 4.0 ? 1 : 0;
+    unmarked += b.position[1] != a.position[1] && b.marker != 5.0 ? 1 : 0;
   }
   // The marker leads by the cycles that the controller interpolates.
-  EXPECT_LE(beside, 6u);
+  EXPECT_LE(unmarked, 6u);
   // 12.3456 mm at 20 mm/s and 5 mm at 10 mm/s, with 5 m/s2 at both ends.
   EXPECT_NEAR(static_cast<double>(first), 617.3 + 4.0, 6.0);
   EXPECT_NEAR(static_cast<double>(second), 500.0 + 2.0, 6.0);
@@ -286,8 +286,8 @@ TEST_F(LinuxCncMachine, NothingBeyondALimitMoves) {
   // Behind the bridge's back the controller refuses it itself; the panel has to clear that.
   GatewayClient other(folder_, 20.0);
   other.connect();
-  ASSERT_EQ(other.carryOut({Word::run, 77, 0.0, "G1 F600 X251\n"}).code, Reply::Code::done);
-  EXPECT_LT(took([&] { return bridge_->state().alarm; }), soon());
+  ASSERT_EQ(other.carryOut({CommandCode::run, 77, 0.0, "G1 F600 X251\n"}).code, Reply::Code::done);
+  EXPECT_LT(timeUntil([&] { return bridge_->state().alarm; }), soon());
   EXPECT_NE(bridge_->state().alarm_text.find("limit"), std::string::npos) << bridge_->state().alarm_text;
   EXPECT_FALSE(bridge_->state().armed);
   EXPECT_EQ(bridge_->state().position[0], 0.0);
@@ -298,7 +298,7 @@ TEST_F(LinuxCncMachine, FeedHoldStandsAndGoesOnWhereItStood) {
   cut();
   const Answer<HoldCode> answer = bridge_->hold();
   ASSERT_EQ(answer.code, HoldCode::ok) << answer.message;
-  EXPECT_LT(took([&] { return bridge_->state().run == CncRun::hold; }), soon());
+  EXPECT_LT(timeUntil([&] { return bridge_->state().run == CncRun::hold; }), soon());
   ASSERT_TRUE(until([&] { return samples_.back().velocity == 0.0; }, soon()));
   until([] { return false; }, 0.05);  // the position comes a servo period after the planner's velocity
   const std::array<double, 3> held = samples_.back().position;
@@ -306,7 +306,7 @@ TEST_F(LinuxCncMachine, FeedHoldStandsAndGoesOnWhereItStood) {
   EXPECT_EQ(samples_.back().position, held);
   EXPECT_NEAR(samples_.back().spindle_speed, units::radPerSecFromRpm(3000.0), 1e-6);  // it goes on turning
   EXPECT_TRUE(bridge_->busy());
-  ASSERT_EQ(atPanel(Word::resume).code, Reply::Code::done);
+  ASSERT_EQ(atPanel(CommandCode::resume).code, Reply::Code::done);
   EXPECT_TRUE(until([&] { return samples_.back().position[0] > held[0] + 1e-3; }, 2.0));
   bridge_->cancel();
   EXPECT_EQ(outcome().code, MotionCode::cancelled);
@@ -346,7 +346,7 @@ TEST_F(LinuxCncMachine, AnAbortStopsAxesAndSpindleAndTheNextProgramRuns) {
   const double begin = now();
   EXPECT_EQ(outcome().code, MotionCode::cancelled);
   EXPECT_LT(now() - begin, soon());
-  expectStanding();
+  expectStandstill();
   EXPECT_TRUE(bridge_->state().armed);
   const Outcome next = run("G90 G0 X0\n");
   EXPECT_EQ(next.code, MotionCode::ok) << next.message;
@@ -354,10 +354,10 @@ TEST_F(LinuxCncMachine, AnAbortStopsAxesAndSpindleAndTheNextProgramRuns) {
 
 TEST_F(LinuxCncMachine, AnEmergencyStopDisarmsUntilThePanelIsReady) {
   cut();
-  ASSERT_EQ(atPanel(Word::estop).code, Reply::Code::done);
-  EXPECT_LT(took([&] { return bridge_->state().emergency && !bridge_->state().armed; }), soon());
+  ASSERT_EQ(atPanel(CommandCode::estop).code, Reply::Code::done);
+  EXPECT_LT(timeUntil([&] { return bridge_->state().emergency && !bridge_->state().armed; }), soon());
   EXPECT_EQ(outcome().code, MotionCode::alarm);
-  expectStanding();
+  expectStandstill();
   EXPECT_EQ(bridge_->arm(true).code, ArmCode::alarm);
   ready();
   until([] { return false; }, 0.1);
@@ -373,9 +373,9 @@ TEST_F(LinuxCncMachine, WithoutItsGatewayTheMachineStops) {
   const std::vector<pid_t> gateway = processes("linuxcnc_gateway", folder_);
   ASSERT_EQ(gateway.size(), 1u);
   ::kill(gateway.front(), SIGKILL);
-  EXPECT_LT(took([&] { return !bridge_->state().connected; }), soon());
+  EXPECT_LT(timeUntil([&] { return !bridge_->state().connected; }), soon());
   EXPECT_EQ(outcome().code, MotionCode::lost);
-  expectStanding();
+  expectStandstill();
   // It comes again by itself; the machine does not.
   ASSERT_TRUE(until([&] { return bridge_->state().connected; }));
   EXPECT_TRUE(bridge_->state().emergency || bridge_->state().alarm);
@@ -405,12 +405,12 @@ TEST_F(LinuxCncMachine, WithoutItsStreamTheMachineStops) {
   ASSERT_EQ(stream.size(), 1u);
   ::kill(stream.front(), SIGKILL);
   // Its beat stops, and the emergency stop chain falls.
-  EXPECT_LT(took([&] { return !bridge_->state().armed; }), soon());
+  EXPECT_LT(timeUntil([&] { return !bridge_->state().armed; }), soon());
   const MotionCode code = outcome().code;
   EXPECT_TRUE(code == MotionCode::alarm || code == MotionCode::lost);
   ASSERT_TRUE(until([&] { return bridge_->state().connected; }));
   EXPECT_TRUE(bridge_->state().emergency || bridge_->state().alarm);
-  expectStanding();
+  expectStandstill();
 }
 
 TEST_F(LinuxCncMachine, AControllerThatWaitsForAProcessorIsNotTakenForDead) {
@@ -419,7 +419,7 @@ TEST_F(LinuxCncMachine, AControllerThatWaitsForAProcessorIsNotTakenForDead) {
   }
   const std::vector<pid_t> gateway = processes("linuxcnc_gateway", folder_);
   ASSERT_EQ(gateway.size(), 1u);
-  const auto room = [](pid_t pid) { return fs::read_symlink("/proc/" + std::to_string(pid) + "/ns/pid"); };
+  const auto namespaceOf = [](pid_t pid) { return fs::read_symlink("/proc/" + std::to_string(pid) + "/ns/pid"); };
   cpu_set_t first, all;
   CPU_ZERO(&first);
   CPU_SET(0, &first);
@@ -427,7 +427,7 @@ TEST_F(LinuxCncMachine, AControllerThatWaitsForAProcessorIsNotTakenForDead) {
   std::vector<pid_t> threads;  // of the servo thread's process in this machine's namespace
   for (const pid_t pid : processes("rtapi_app", "")) {
     for (const auto& entry : fs::directory_iterator("/proc/" + std::to_string(pid) + "/task")) {
-      if (room(pid) == room(gateway.front())) {
+      if (namespaceOf(pid) == namespaceOf(gateway.front())) {
         threads.push_back(static_cast<pid_t>(std::stol(entry.path().filename())));
       }
     }
@@ -476,12 +476,12 @@ TEST_F(LinuxCncMachine, AStreamThatHangsStopsTheMachine) {
   const std::vector<pid_t> stream = processes("linuxcnc_stream", folder_);
   ASSERT_EQ(stream.size(), 1u);
   ::kill(stream.front(), SIGSTOP);
-  EXPECT_LT(took([&] { return !bridge_->state().armed; }), soon());
+  EXPECT_LT(timeUntil([&] { return !bridge_->state().armed; }), soon());
   ::kill(stream.front(), SIGCONT);
   outcome();
   ASSERT_TRUE(until([&] { return bridge_->state().connected; }));
   EXPECT_TRUE(bridge_->state().emergency || bridge_->state().alarm);
-  expectStanding();
+  expectStandstill();
 }
 
 TEST_F(LinuxCncMachine, AControllerThatHangsIsTold) {
@@ -491,15 +491,15 @@ TEST_F(LinuxCncMachine, AControllerThatHangsIsTold) {
   for (const pid_t pid : task) {
     ::kill(pid, SIGSTOP);
   }
-  EXPECT_LT(took([&] { return !bridge_->state().connected; }), soon());
+  EXPECT_LT(timeUntil([&] { return !bridge_->state().connected; }), soon());
   EXPECT_EQ(outcome().code, MotionCode::lost);
-  expectStanding();
+  expectStandstill();
   for (const pid_t pid : task) {
     ::kill(pid, SIGCONT);
   }
   ASSERT_TRUE(until([&] { return bridge_->state().connected; }));
   EXPECT_FALSE(bridge_->state().armed);
-  expectStanding();
+  expectStandstill();
   ready();
   until([] { return false; }, 0.1);
   const Answer<ArmCode> again = bridge_->arm(true);
@@ -514,10 +514,10 @@ TEST_F(LinuxCncMachine, WithoutItsControllerNothingGoesOnAndTheNextOneStartsClea
   for (const pid_t pid : task) {
     ::kill(pid, SIGKILL);
   }
-  EXPECT_LT(took([&] { return !bridge_->state().connected; }), soon());
+  EXPECT_LT(timeUntil([&] { return !bridge_->state().connected; }), soon());
   EXPECT_EQ(outcome().code, MotionCode::lost);
   // The servo thread lives, the permit does not.
-  expectStanding();
+  expectStandstill();
   bridge_.reset();
   stop();
   EXPECT_TRUE(processes("rtapi_app", folder_).empty() && processes("linuxcnc_", folder_).empty());

@@ -42,7 +42,7 @@ ServoBlock someBlock(std::size_t count) {
 }
 
 std::vector<Message> everyKind() {
-  return {Command{Word::run, 5, 1.5, "G1 X1\n"},
+  return {Command{CommandCode::run, 5, 1.5, "G1 X1\n"},
           Reply{Reply::Code::not_yet, "later"},
           Ask{},
           someStatus(),
@@ -127,10 +127,10 @@ TEST(Protocol, WhatIsNoFrameIsRefusedInOneLine) {
 }
 
 TEST(Protocol, BoundsHold) {
-  EXPECT_THROW(encode(Command{Word::run, 1, 0.0, std::string(LONGEST_PROGRAM + 1, 'x')}), Error);
+  EXPECT_THROW(encode(Command{CommandCode::run, 1, 0.0, std::string(LONGEST_PROGRAM + 1, 'x')}), Error);
   EXPECT_THROW(encode(someBlock(ServoBlock::MOST + 1)), Error);
   EXPECT_EQ(refusalOf(encode(someBlock(ServoBlock::MOST))), "");
-  EXPECT_EQ(refusalOf(encode(Command{Word::run, 1, 0.0, std::string(LONGEST_PROGRAM, 'x')})), "");
+  EXPECT_EQ(refusalOf(encode(Command{CommandCode::run, 1, 0.0, std::string(LONGEST_PROGRAM, 'x')})), "");
   // A text that is too long for its kind is cut off, not refused: it is one for people.
   EXPECT_EQ(refusalOf(encode(Reply{Reply::Code::refused, std::string(100'000, 'x')})), "");
 }

@@ -177,7 +177,7 @@ TEST_F(MotionMachineTest, ControllerThatPutsProgramsOffIsAskedAgainForAWhile) {
   controller_.reading.program_done = true;
   stepsUntilEnd(20);
   EXPECT_EQ(outcome().code, MotionCode::ok);
-  // What it refuses for good is not asked again.
+  // What it refuses for good is not start again.
   controller_.is_open = false;
   controller_.opening = ALARM;
   ASSERT_FALSE(machine_.jog("x", 0.05, 0.01));
@@ -258,24 +258,24 @@ TEST_F(MotionMachineTest, ConditionIsToldAheadAndEndsWithTheMotion) {
   CuttingCondition cut;
   cut.kind = CuttingCondition::Kind::cut;
   cut.name = "slot";
-  const double asked = now_;
+  const double start = now_;
   ASSERT_FALSE(machine_.runProgram("slot", "G1 X10 F600\n", cut));
   ASSERT_TRUE(step());
   // Nothing has moved before its time.
   EXPECT_EQ(controller_.count("send"), 0u);
-  std::vector<CuttingCondition> told = machine_.takeConditions();
-  ASSERT_EQ(told.size(), 1u);
-  EXPECT_NEAR(told[0].stamp, asked + PERIOD + 0.3, 1e-9);
+  std::vector<CuttingCondition> conditions = machine_.takeConditions();
+  ASSERT_EQ(conditions.size(), 1u);
+  EXPECT_NEAR(conditions[0].stamp, start + PERIOD + 0.3, 1e-9);
   while (controller_.count("send") == 0) {
     ASSERT_TRUE(step());
   }
-  EXPECT_GE(now_, told[0].stamp);
+  EXPECT_GE(now_, conditions[0].stamp);
   controller_.reading.program_done = true;
   stepsUntilEnd(100);
-  told = machine_.takeConditions();
-  ASSERT_EQ(told.size(), 1u);
-  EXPECT_EQ(told[0].kind, CuttingCondition::Kind::none);
-  EXPECT_LE(told[0].stamp, now_ + 1e-9);
+  conditions = machine_.takeConditions();
+  ASSERT_EQ(conditions.size(), 1u);
+  EXPECT_EQ(conditions[0].kind, CuttingCondition::Kind::none);
+  EXPECT_LE(conditions[0].stamp, now_ + 1e-9);
 }
 
 TEST_F(MotionMachineTest, LimitsAxesAndGoalsAreCheckedBeforeAnythingIsSent) {

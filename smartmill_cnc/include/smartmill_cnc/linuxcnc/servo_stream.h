@@ -21,7 +21,7 @@ class ServoClock {
   explicit ServoClock(double period) : period_(period) {}
 
   /// A sample has come. @param arrival [s]
-  void saw(std::uint64_t number, double arrival);
+  void addArrival(std::uint64_t number, double arrival);
   /// Enough has been seen to say times.
   bool settled() const { return settled_; }
   double timeOf(std::uint64_t number) const {
@@ -30,8 +30,8 @@ class ServoClock {
 
  private:
   double period_, zero_ = 0.0, begun_ = 0.0, window_begun_ = 0.0, last_ = 0.0;
-  double window_ = std::numeric_limits<double>::infinity(), before_ = window_;
-  bool begun_at_all_ = false, settled_ = false;
+  double window_ = std::numeric_limits<double>::infinity(), previous_window_ = window_;
+  bool started_ = false, settled_ = false;
 };
 
 /// How the samples have come so far.
@@ -41,7 +41,7 @@ struct ServoStatistics {
 };
 
 /// Samples that follow one another, with their times.
-struct ServoStretch {
+struct ServoSegment {
   double stamp = 0.0;       ///< [s] of the first
   std::uint64_t first = 0;  ///< running index of the first, of one start of the controller
   std::vector<ServoSample> samples;
@@ -51,15 +51,15 @@ struct ServoStretch {
 /// step(), others that look.
 class ServoStream {
  public:
-  static constexpr std::size_t STRETCH = 10;  ///< samples handed out together
+  static constexpr std::size_t SEGMENT_LENGTH = 10;  ///< samples handed out together
 
   /// @param folder of the machine
   explicit ServoStream(const std::string& folder);
 
   /// Connects when it is time to, waits for at most that long, reads. @param now [s] of arrival
-  std::vector<ServoStretch> step(double wait, double (*now)());
+  std::vector<ServoSegment> step(double wait, double (*now)());
   /// What step() does with a block, for itself.
-  std::vector<ServoStretch> take(const ServoBlock& block, double arrival);
+  std::vector<ServoSegment> addBlock(const ServoBlock& block, double arrival);
 
   std::optional<ServoSample> latest() const;  ///< none before the first
   std::uint64_t count() const;                ///< samples that have come
@@ -74,11 +74,11 @@ class ServoStream {
 
   const std::string path_;
   LocalConnection connection_;
-  double tried_ = -std::numeric_limits<double>::infinity();
+  double last_attempt_ = -std::numeric_limits<double>::infinity();
   ServoClock clock_{1e-3};
   std::uint64_t next_ = 0;  // running index due
   bool begun_ = false;
-  ServoStretch stretch_;
+  ServoSegment segment_;
 
   mutable std::mutex mutex_;  // of what follows
   ServoStatistics statistics_;

@@ -136,17 +136,17 @@ class MotionMachine {
   std::optional<std::size_t> axisIndex(int axis) const;
   std::string alarmLine() const;
   std::string overrideFault(const Overrides& wanted) const;
-  Status putOverridesBack();
+  Status resetOverrides();
   std::string modeLine() const;
   std::string lineOf(const Failure& failure) const;
   void setArmed(bool armed);
   void enter(Phase phase);
   void followClock(double now);
-  Status watch();
-  Status giveUp(MotionCode code, const std::string& why);
+  Status checkController();
+  Status abandonMotion(MotionCode code, const std::string& why);
   Status stop(Outcome outcome);
   Status open();
-  void tellCondition();
+  void announceCondition();
   Status send();
   Status run();
   bool ended() const;
@@ -168,7 +168,7 @@ class MotionMachine {
   double entered_ = 0.0;     // [s] into the phase
   double progressed_ = 0.0;  // [s]
   std::optional<double> still_since_;
-  CncState stall_;  // where the machine was when it last got on
+  CncState last_progress_;  // where the machine was when it last got on
   Outcome stopping_outcome_;
   std::optional<Outcome> outcome_;
   std::vector<CuttingCondition> conditions_;
