@@ -1,4 +1,4 @@
-// Speaks LinuxCNC's NML on one side and smartmill_cnc's local protocol on the other.
+// Gateway between LinuxCNC's NML and smartmill_cnc's local protocol.
 //
 // Copyright (c) SmartMill developers.
 // SPDX-License-Identifier: GPL-2.0-or-later
@@ -29,9 +29,9 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr int POLL_PERIOD = 2;  // [ms]
-constexpr std::size_t MOST_CLIENTS = 8, MOST_WAITING = 8;
+constexpr std::size_t MAX_CLIENTS = 8, MAX_QUEUED = 8;
 
-/// What is known of the process that permits motion.
+/// Observation of the process that permits motion (linuxcnc_stream).
 struct Guard {
   ProcessWatch process;
   Liveness liveness;
@@ -40,9 +40,9 @@ struct Guard {
 
 struct Client {
   LocalConnection connection;
-  bool drives = false;           // has opened programs: what runs is its
-  std::unique_ptr<Guard> guard;  // it is linuxcnc_stream
-  std::deque<Received> waiting;  // commands
+  bool drives = false;           // it has opened programs and owns the running motion
+  std::unique_ptr<Guard> guard;  // of linuxcnc_stream only
+  std::deque<Received> waiting;  // queued commands
 };
 
 class Gateway {
@@ -59,7 +59,7 @@ class Gateway {
     ::poll(entries.data(), entries.size(), POLL_PERIOD);
     link_.poll();
     if (std::optional<LocalConnection> connection = acceptFrom(listener_)) {
-      if (clients_.size() < MOST_CLIENTS) {
+      if (clients_.size() < MAX_CLIENTS) {
         clients_.push_back({std::move(*connection), false, nullptr, {}});
       }
     }
@@ -77,7 +77,7 @@ class Gateway {
     clients_.remove_if([this](const Client& client) { return removed(client); });
   }
 
-  /// Nobody watches any more what runs.
+  /// Stops the motions of all clients, at the end of the process.
   void stopAll() {
     for (const Client& client : clients_) {
       stopFor(client);
@@ -85,7 +85,7 @@ class Gateway {
   }
 
  private:
-  /// Questions are answered at once, also while a command is carried out; commands wait for their turn.
+  /// Answers status requests at once, also during a command; queues commands.
   void receiveAll() {
     for (Client& client : clients_) {
       client.connection.receive();
@@ -96,7 +96,7 @@ class Gateway {
         if (std::holds_alternative<Ask>(received->message)) {
           client.connection.send(link_.status(), received->sequence);
         } else if (std::holds_alternative<Command>(received->message) &&
-                   client.waiting.size() < MOST_WAITING) {
+                   client.waiting.size() < MAX_QUEUED) {
           client.waiting.push_back(std::move(*received));
         }
       }
@@ -104,7 +104,7 @@ class Gateway {
     }
   }
 
-  /// A guard that is silent, though it does not wait for a processor, counts as gone.
+  /// A guard that is silent without waiting for a processor is disconnected.
   static void checkGuard(Client& client) {
     if (!client.guard) {
       return;
@@ -132,6 +132,7 @@ class Gateway {
     client.connection.send(reply, sequence);
   }
 
+  /// Whether the client has disconnected; stops its motion then.
   bool removed(const Client& client) {
     if (client.connection.open()) {
       return false;
@@ -159,8 +160,8 @@ class Gateway {
 int main(int argc, char** argv) {
   using namespace smartmill::cnc::linuxcnc;
   std::string folder;
-  smartmill::CommandLine line{"Speaks to the LinuxCNC whose mill.nml stands in a folder (docs/linuxcnc.md)."};
-  line.option("folder", folder, "of the machine: its gateway.socket is served").required();
+  smartmill::CommandLine line{"Gateway to the LinuxCNC of a folder with its mill.nml (docs/linuxcnc.md)."};
+  line.option("folder", folder, "folder of the machine; gateway.socket is created there").required();
   return smartmill::runProgram(line, argc, argv, [&] {
     catchStopSignals();
     Gateway gateway(folder);

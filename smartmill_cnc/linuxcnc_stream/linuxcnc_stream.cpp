@@ -1,5 +1,5 @@
-// Reads LinuxCNC's servo cycles from a HAL sampler and serves them on a local socket; writes a drive's load
-// and the permit of motion. A process of its own: LinuxCNC's end ends every HAL component.
+// Reads LinuxCNC's servo cycles from a HAL sampler and publishes them on a local socket; writes the spindle load, the
+// overrides and the permit of motion. A separate process, because the end of LinuxCNC ends every HAL component.
 
 #include <hal.h>
 #include <poll.h>
@@ -28,23 +28,23 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int HAL_SEGMENT = 0x48414c32, SAMPLER_FIFO = 0x48534130;  // keys that LinuxCNC's sources fix
+constexpr int HAL_SEGMENT = 0x48414c32, SAMPLER_FIFO = 0x48534130;  // keys fixed in LinuxCNC's sources
 constexpr int READ_PERIOD = 3;                                       // [ms]
 constexpr std::chrono::milliseconds REQUEST_PERIOD{30}, RETRY_PERIOD{100}, LOADING{10000};
-constexpr double SILENT = 0.5;  // [s]
-constexpr int GONE = 3;         // exit code: the controller has
+constexpr double SILENCE_TIMEOUT = 0.5;  // [s]
+constexpr int CONTROLLER_ENDED = 3;      // exit code
 
 double seconds() {
   return std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
 }
 
-/// This process as a component of HAL. Its pins are bidirectional: what a dead one has left does not bar the
-/// next.
+/// This process as a HAL component. Its pins are bidirectional, so that signals still linked to an ended process do
+/// not block the next one.
 class Component {
  public:
   Component() : prefix_("smartmill-" + std::to_string(::getpid())), id_(::hal_init(prefix_.c_str())) {
     if (id_ < 0) {
-      throw Error("no component of HAL can be made (code " + std::to_string(id_) + ")");
+      throw Error("cannot create a HAL component (code " + std::to_string(id_) + ")");
     }
     pins_ = static_cast<Pins*>(::hal_malloc(sizeof(Pins)));
     const bool made =
@@ -60,7 +60,7 @@ class Component {
       throw Error("the controller's configuration has no signals '" + std::string(PERMIT_SIGNAL) + "' and '" +
                   BEAT_SIGNAL + "'");
     }
-    // A signal that the drive writes itself is left to it.
+    // The link fails if the drive writes the signal itself.
     has_load_signal_ = ::hal_link((prefix_ + ".load").c_str(), LOAD_SIGNAL) == 0;
     has_override_signals_ = ::hal_link((prefix_ + ".feed-override").c_str(), FEED_SIGNAL) == 0 &&
                  ::hal_link((prefix_ + ".spindle-override").c_str(), SPINDLE_SIGNAL) == 0;
@@ -69,7 +69,7 @@ class Component {
       ::hal_exit(id_);
       throw Error("the controller's configuration has no sampler '" + std::string(SAMPLER_PINS) + "'");
     }
-    // Stale: a full FIFO drops the newest.
+    // Discards stale samples: a full FIFO drops the newest.
     unsigned number = 0;
     hal_stream_data data[HAL_STREAM_MAX_PINS];
     while (::hal_stream_readable(&stream_) && ::hal_stream_read(&stream_, data, &number) >= 0) {
@@ -83,7 +83,7 @@ class Component {
   Component(const Component&) = delete;
   Component& operator=(const Component&) = delete;
 
-  /// Samples that follow one another without a gap, as many as there are; none when there are none.
+  /// All available samples up to the next gap.
   ServoBlock read() {
     ServoBlock block;
     while (block.samples.size() < ServoBlock::MOST) {
@@ -105,7 +105,7 @@ class Component {
     *pins_->permit = on;
     *pins_->beat = !*pins_->beat;
   }
-  /// motion.adaptive-feed goes up to 1. @return why not
+  /// The feed override is at most 1 (motion.adaptive-feed). @return refused without the signals
   Reply setOverrides(const SetOverrides& wanted) {
     if (!has_override_signals_) {
       return {Reply::Code::refused, std::string("the controller's configuration has no signals '") +
@@ -151,12 +151,12 @@ class Component {
   Pins* pins_ = nullptr;
   bool has_load_signal_ = false, has_override_signals_ = false;
   hal_stream_t stream_{};
-  bool sample_pending_ = false;  // a sample that was read and not handed out
+  bool sample_pending_ = false;  // a sample is read but not yet returned
   std::uint32_t number_ = 0;
   ServoSample sample_;
 };
 
-/// Asks the gateway whether it and the controller's task live: only then may the machine move.
+/// Monitors the gateway and, through it, the controller's task: motion is permitted only while both are alive.
 class GatewayWatch {
  public:
   explicit GatewayWatch(std::string path) : path_(std::move(path)) {}
@@ -174,14 +174,14 @@ class GatewayWatch {
       }
     }
     gateway_.receive();
-    bool good = false;
+    bool updated = false;
     while (const std::optional<Received> received = gateway_.next()) {
       if (const auto* status = std::get_if<MachineStatus>(&received->message)) {
-        good = alive_ = status->alive;
+        updated = alive_ = status->alive;
         starved_ = status->starved > 0.0;
       }
     }
-    const Liveness::Verdict verdict = liveness_.update(good, process_, seconds());
+    const Liveness::Verdict verdict = liveness_.update(updated, process_, seconds());
     if (now - last_request_ > REQUEST_PERIOD) {
       last_request_ = now;
       gateway_.send(Ask{});
@@ -189,7 +189,7 @@ class GatewayWatch {
     return gateway_.open() && alive_ && verdict == Liveness::Verdict::lives;
   }
 
-  /// The controller is silent because the computer gives it no processor.
+  /// Whether the controller is silent because it waits for a processor.
   bool starved() const { return starved_; }
 
  private:
@@ -206,11 +206,11 @@ class Server {
   explicit Server(const std::string& folder)
       : listener_(listenAt(folder + "/" + STREAM_SOCKET)), watch_(folder + "/" + GATEWAY_SOCKET) {}
 
-  /// Waits for a controller whose configuration is loaded; none when it is to end before.
+  /// Waits for a controller with loaded configuration; null if the process is to end.
   std::unique_ptr<Component> component() const {
     Clock::time_point found = Clock::now();
     while (!stopRequested()) {
-      // hal_init() by itself would make the segment, with the wrong owner.
+      // hal_init() would create a missing segment with the wrong owner.
       if (::shmget(HAL_SEGMENT, 0, 0) < 0) {
         found = Clock::now();
       } else {
@@ -246,9 +246,9 @@ class Server {
         listen(client, component);
       }
       clients_.remove_if([](const LocalConnection& client) { return !client.open(); });
-      if (silence.update(heard || watch_.starved(), seconds()) > SILENT) {
-        std::cerr << "linuxcnc_stream: the controller has fallen silent\n";
-        return GONE;
+      if (silence.update(heard || watch_.starved(), seconds()) > SILENCE_TIMEOUT) {
+        std::cerr << "linuxcnc_stream: the controller is silent\n";
+        return CONTROLLER_ENDED;
       }
     }
     return 0;
@@ -279,9 +279,9 @@ int main(int argc, char** argv) {
   using namespace smartmill::cnc::linuxcnc;
   std::string folder;
   smartmill::CommandLine line{
-      "Reads every servo cycle of the LinuxCNC on this computer (docs/linuxcnc.md); ends with code 3 when it "
-      "goes."};
-  line.option("folder", folder, "of the machine: its stream.socket is served").required();
+      "Publishes every servo cycle of the LinuxCNC on this computer (docs/linuxcnc.md); exits with code 3 when "
+      "it ends."};
+  line.option("folder", folder, "folder of the machine; stream.socket is created there").required();
   return smartmill::runProgram(line, argc, argv, [&]() -> int {
     catchStopSignals();
     rtapi_set_msg_level(RTAPI_MSG_NONE);
