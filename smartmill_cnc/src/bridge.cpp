@@ -10,7 +10,7 @@ namespace {
 
 double checkedPeriod(double period) {
   if (!(period > 0.0) || !std::isfinite(period)) {
-    throw Error("reconnect_period: " + fixedDecimals(period, 3) + " is not above 0");
+    throw Error("reconnect_period: " + fixedDecimals(period, 3) + ", expected a finite period above 0");
   }
   return period;
 }
@@ -89,12 +89,12 @@ OverrideAnswer Bridge::setOverrides(const Overrides& wanted, const std::string& 
   if (!controller_->connected() || !state_.connected) {
     return answer;
   }
-  const Result<OverrideAnswer> said = motion_.setOverrides(wanted, reason);
-  if (said) {
-    return *said;
+  const Result<OverrideAnswer> result = motion_.setOverrides(wanted, reason);
+  if (result) {
+    return *result;
   }
-  notice(said.failure());
-  answer.message = said.failure().message;
+  notice(result.failure());
+  answer.message = result.failure().message;
   return answer;
 }
 
@@ -103,12 +103,12 @@ Answer<HoldCode> Bridge::hold() {
     return {HoldCode::not_connected, "no connection to the " + controller_->name()};
   }
   if (!motion_.armed()) {
-    return {HoldCode::not_armed, "motion is not armed: the machine's own feed hold is due"};
+    return {HoldCode::not_armed, "motion is not armed: use the machine's own feed hold"};
   }
   const Status held = controller_->hold();
   notice(held);
   if (held) {
-    return {HoldCode::ok, "feed hold: the axes stand, it goes on at the machine's own key"};
+    return {HoldCode::ok, "feed hold: the axes are stopped; release it at the machine's own key"};
   }
   return {held.lost() ? HoldCode::not_connected : HoldCode::refused, held.failure().message};
 }

@@ -40,7 +40,7 @@ int decimalsOf(const SubReply& reply) {
   return first.base == 10 && first.exp >= 0 ? std::min<int>(first.exp, MAX_DECIMALS) : DEFAULT_DECIMALS;
 }
 
-/// Teaching counts as the mode it happens in; what has no name must not pass for DNC.
+/// A teaching mode counts as its base mode; an unknown mode must not count as DNC.
 CncMode modeOf(int aut) {
   switch (aut) {
     case focas::AUT_MEM:
@@ -62,7 +62,7 @@ CncMode modeOf(int aut) {
 
 }  // namespace
 
-/// What is asked of the controller in every period.
+/// Requests to the controller in every period.
 class FocasReader::PollRequests {
  public:
   PollRequests(const focas::ControllerInfo& info, int marker_macro, bool all_at_once) {
@@ -110,7 +110,7 @@ class FocasReader::PollRequests {
         if (!client.connected() || starts_.size() == 1) {
           throw;
         }
-        // One refused question leaves the others standing.
+        // A refused request does not affect the others.
         SubReply refused;
         refused.code = static_cast<std::int16_t>(e.code());
         replies.insert(replies.end(), part.size(), refused);
@@ -146,11 +146,11 @@ FocasReader::FocasReader(focas::Client& client, const FocasParameters& parameter
 FocasReader::~FocasReader() = default;
 
 void FocasReader::connected() {
-  // A controller that went away at the first large question may like small ones better.
-  const bool went_away = requested_ && !answered_;
+  // After a disconnection at the first request, tries the other size of requests.
+  const bool disconnected = requested_ && !answered_;
   requested_ = true;
   answered_ = false;
-  setAllAtOnce(all_at_once_ != went_away);
+  setAllAtOnce(all_at_once_ != disconnected);
 }
 
 void FocasReader::setAllAtOnce(bool all_at_once) {
@@ -175,7 +175,7 @@ Reading FocasReader::read() {
   const PollRequests& q = *poll_requests_;
   for (const std::size_t required : {q.status, q.machine, q.distance}) {
     if (replies[required].code != focas::EW_OK) {
-      throw FocasError("it refuses its status or positions", focas::EW_FUNC);
+      throw FocasError("the controller refuses its status or positions", focas::EW_FUNC);
     }
   }
   answered_ = true;
@@ -223,7 +223,7 @@ void FocasReader::readPositions(const std::vector<SubReply>& replies, std::size_
   }
   for (const std::vector<double>* values : {&state.position, &state.distance_to_go, &reading.absolute}) {
     if (values->size() != axes) {
-      throw FocasError("it tells positions of fewer axes than it has", focas::EW_LENGTH);
+      throw FocasError("the controller reports positions of fewer axes than it has", focas::EW_LENGTH);
     }
   }
   decimals_ = decimalsOf(replies[q.machine]);
@@ -249,7 +249,7 @@ void FocasReader::readAlarms(std::uint32_t bits, CncState& state) {
       if (!client_.connected()) {
         throw;
       }
-      // The bits below say as much as the controller tells.
+      // Without messages the alarm bits are reported below.
     }
     if (alarm_text_.empty()) {
       alarm_text_ = "alarm bits " + std::to_string(bits);

@@ -12,16 +12,16 @@
 
 namespace smartmill::cnc {
 
-/// Asks a FOCAS controller for its state in one PDU, or in several when it does not take them all at once.
+/// Reads the state of a FOCAS controller in one PDU, or in several if it does not accept one.
 class FocasReader {
  public:
   FocasReader(focas::Client& client, const FocasParameters& parameters);
   ~FocasReader();
 
-  /// Anew after each connection.
+  /// To be called after each connection.
   void connected();
 
-  /// @throws FocasError, ConnectionError, WireError: the connection is of no use any more.
+  /// @throws FocasError, ConnectionError, WireError: the connection is unusable.
   Reading read();
   /// Value of the marker variable in the last reading; NaN: vacant.
   double marker() const { return marker_; }

@@ -12,15 +12,14 @@
 namespace smartmill::cnc::linuxcnc {
 namespace {
 
-constexpr double SPEED_TOLERANCE = 10.0;  // [rpm] counts as at speed, besides 1 %
-constexpr double LIMIT_MARGIN = 1e-3;   // [mm] limits beyond the travel: a home at its end rounds to either side
+constexpr double SPEED_TOLERANCE = 10.0;  // [rpm] of spindle at speed, in addition to 1 %
+constexpr double LIMIT_MARGIN = 1e-3;   // [mm] of the limits: a home at the end of travel may round to either side
 constexpr double STANDSTILL = 0.5;  // [rpm]
 constexpr double ORIENT_GAIN = 20.0;       // [1/s]
 constexpr double ORIENT_MAX_SPEED = 5.0;        // [rev/s]
 constexpr double ORIENT_TOLERANCE = 0.02;  // [deg]
-// [s] of servo cycles. Their thread makes good in a moment what it has missed for want of a processor,
-// without a beat in between: it must not take that for the death of linuxcnc_stream, which the gateway sees
-// at once.
+// [s] of servo cycles. A servo thread that has waited for a processor catches up without a beat in between, which must
+// not count as the end of linuxcnc_stream; the gateway detects that end at once.
 constexpr double BEAT_LASTS = Liveness::STARVES + 0.2;
 
 std::string number(double value) {
@@ -124,8 +123,8 @@ std::string halOf(double spindle_acceleration) {
          "net dtg motion.distance-to-go => sampler.0.pin.6\n"
       << "net " << LOAD_SIGNAL << " sampler.0.pin.7\n"
       << "net marker motion.analog-out-00 => sampler.0.pin.8\n"
-         "# linuxcnc_stream lives and permits: else no axis and no spindle moves, and the emergency stop "
-         "falls\n"
+         "# Without the beat and the permit of linuxcnc_stream no axis and no spindle moves, and the emergency "
+         "stop is set\n"
       << "net " << BEAT_SIGNAL << " lives.in\nnet lives lives.out => may.in0\nnet " << PERMIT_SIGNAL
       << " may.in1\nnet may may.out => motion.enable chain.in0\n"
          "net estop iocontrol.0.user-enable-out => chain.in1\n"
@@ -142,7 +141,7 @@ std::map<std::string, std::string> configurationOf(const MachineModel& model, co
   const Spindle& spindle = model.needSpindle("configure LinuxCNC");
   if (!spindle.max_speed || !spindle.acceleration) {
     throw Error(model.file +
-                ": spindle.max_speed_rpm and acceleration_rpm_per_s are due to configure LinuxCNC");
+                ": spindle.max_speed_rpm and acceleration_rpm_per_s are required to configure LinuxCNC");
   }
   return {{"mill.ini", iniOf(axes, units::rpmFromRadPerSec(*spindle.max_speed), folder)},
           {"mill.hal", halOf(units::rpmFromRadPerSec(*spindle.acceleration))},

@@ -31,7 +31,7 @@ Answer GatewayClient::exchange(const Message& request) {
     const double remaining = timeout_ - std::chrono::duration<double>(Clock::now() - begin).count();
     if (remaining <= 0.0) {
       connection_.close();
-      throw Error(path_ + ": no answer in time");
+      throw Error(path_ + ": no reply within the timeout");
     }
     connection_.wait(connection_.unsent() ? std::min(remaining, 0.005) : remaining);
   }

@@ -10,9 +10,9 @@
 namespace smartmill::cnc::linuxcnc {
 namespace {
 
-static_assert(sizeof(double) == 8, "doubles travel as their eight bytes");
+static_assert(sizeof(double) == 8, "doubles are sent as eight bytes");
 
-/// The kinds by their place in Message, from 1, and how long their payloads may be.
+/// Longest payload of each kind; kinds are numbered from 1 in the order of Message.
 constexpr std::size_t SAMPLE = 9 * sizeof(double);  // [byte]
 constexpr std::array<std::size_t, std::variant_size_v<Message>> LONGEST{
     LONGEST_PROGRAM + 32, LONGEST_TEXT + 32, 0, LONGEST_TEXT + 256, 16 + ServoBlock::MOST* SAMPLE, 8, 16};
@@ -67,7 +67,7 @@ class Unpacker {
   double finite() {
     const double value = number<double>();
     if (!std::isfinite(value)) {
-      throw Error("a frame holds a number that is not finite");
+      throw Error("a frame contains a number that is not finite");
     }
     return value;
   }
@@ -76,7 +76,7 @@ class Unpacker {
   Enum enumeration(int first, int last) {
     const int value = number<std::uint8_t>();
     if (value < first || value > last) {
-      throw Error("a frame holds the unknown word " + std::to_string(value));
+      throw Error("a frame contains the unknown value " + std::to_string(value));
     }
     return static_cast<Enum>(value);
   }
@@ -99,7 +99,7 @@ class Unpacker {
  private:
   const char* take(std::size_t size) {
     if (size > left_) {
-      throw Error("a frame is too short for what it says to hold");
+      throw Error("a frame is too short for its contents");
     }
     const char* at = data_;
     data_ += size;
@@ -186,7 +186,7 @@ void unpack(MachineStatus& m, Unpacker& u) {
 
 void pack(const ServoBlock& m, Packer& p) {
   if (m.samples.size() > ServoBlock::MOST) {
-    throw Error("a block of " + std::to_string(m.samples.size()) + " servo samples is too long");
+    throw Error("a block of " + std::to_string(m.samples.size()) + " servo samples: expected at most " + std::to_string(ServoBlock::MOST));
   }
   p.number(m.first);
   p.number(m.period_ns);
@@ -204,7 +204,7 @@ void unpack(ServoBlock& m, Unpacker& u) {
   const auto count = u.number<std::uint32_t>();
   if (count > ServoBlock::MOST || m.period_ns == 0) {
     throw Error("a block of " + std::to_string(count) + " servo samples, " + std::to_string(m.period_ns) +
-                " ns apart");
+                " ns apart: expected at most " + std::to_string(ServoBlock::MOST) + " and a period above 0");
   }
   m.samples.resize(count);
   for (ServoSample& s : m.samples) {
@@ -234,19 +234,19 @@ void unpack(SetOverrides& m, Unpacker& u) {
   m.spindle = u.finite();
 }
 
-/// The message of a kind, by its place in Message.
-template <std::size_t PLACE = 0>
-Message messageOf(std::size_t place, Unpacker& unpacker) {
-  if constexpr (PLACE < std::variant_size_v<Message>) {
-    if (place != PLACE) {
-      return messageOf<PLACE + 1>(place, unpacker);
+/// Unpacks the message of a kind. @param index in Message
+template <std::size_t INDEX = 0>
+Message messageOf(std::size_t index, Unpacker& unpacker) {
+  if constexpr (INDEX < std::variant_size_v<Message>) {
+    if (index != INDEX) {
+      return messageOf<INDEX + 1>(index, unpacker);
     }
-    std::variant_alternative_t<PLACE, Message> message;
+    std::variant_alternative_t<INDEX, Message> message;
     unpack(message, unpacker);
     unpacker.end();
     return message;
   } else {
-    throw Error("a frame of the unknown kind " + std::to_string(place + 1));
+    throw Error("a frame of the unknown kind " + std::to_string(index + 1));
   }
 }
 
@@ -279,8 +279,8 @@ std::optional<Received> FrameDecoder::next() {
   Received received;
   received.sequence = header.number<std::uint16_t>();
   if (version != PROTOCOL_VERSION) {
-    throw Error("a frame of version " + std::to_string(version) + ", " + std::to_string(PROTOCOL_VERSION) +
-                " is due");
+    throw Error("a frame of version " + std::to_string(version) + ", expected " +
+                std::to_string(PROTOCOL_VERSION));
   }
   if (kind < 1 || kind > LONGEST.size()) {
     throw Error("a frame of the unknown kind " + std::to_string(kind));

@@ -8,12 +8,12 @@
 namespace smartmill::cnc::linuxcnc {
 namespace {
 
-constexpr double SETTLING = 0.5;           // [s] of arrivals before times are told
-constexpr double WINDOW = 10.0;            // [s] in which some sample has waited for nobody
-constexpr double SLEW = 1e-4;              // [1] the zero follows by at most this
+constexpr double SETTLING = 0.5;           // [s] of arrivals before times are defined
+constexpr double WINDOW = 10.0;            // [s] that contains a sample without delay
+constexpr double SLEW = 1e-4;              // [1] largest correction of the time of sample 0, per time
 constexpr double LATE_BIN = 1e-4;          // [s]
 constexpr double TRY_EVERY = 0.2;          // [s]
-constexpr std::uint64_t RESTART = 60'000;  // samples; a larger jump is another start of the controller
+constexpr std::uint64_t RESTART = 60'000;  // [samples] a larger gap is a restart of the controller
 
 }  // namespace
 
@@ -48,7 +48,7 @@ std::vector<ServoSegment> ServoStream::step(double wait, double (*now)()) {
     try {
       connection_ = LocalConnection::to(path_);
     } catch (const Error&) {
-      // Who reads the machine tells that its stream is silent.
+      // The controller's reader reports a silent stream.
     }
   }
   {
@@ -84,7 +84,7 @@ std::vector<ServoSegment> ServoStream::addBlock(const ServoBlock& block, double 
     return segments;
   }
   const std::lock_guard<std::mutex> lock(mutex_);
-  const std::uint32_t gap = block.first - static_cast<std::uint32_t>(next_);  // modulo 2^32, as it counts
+  const std::uint32_t gap = block.first - static_cast<std::uint32_t>(next_);  // modulo 2^32, as the controller counts
   if (!begun_ || gap > RESTART) {
     statistics_.restarts += statistics_.samples > 0 ? 1 : 0;
     restart(block);
@@ -145,13 +145,13 @@ ServoStatistics ServoStream::statistics() const {
     all += n;
   }
   for (std::size_t bin = 0; bin < LATE_BINS; ++bin) {
-    const bool median_due = 2 * below < all, last_due = 100 * below < 99 * all;
+    const bool below_median = 2 * below < all, below_99 = 100 * below < 99 * all;
     below += late_[bin];
     const double end = static_cast<double>(bin + 1) * LATE_BIN;
-    if (median_due && 2 * below >= all) {
+    if (below_median && 2 * below >= all) {
       result.late_median = end;
     }
-    if (last_due && 100 * below >= 99 * all) {
+    if (below_99 && 100 * below >= 99 * all) {
       result.late_99 = end;
     }
   }

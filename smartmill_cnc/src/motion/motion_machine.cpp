@@ -10,7 +10,7 @@ namespace smartmill::cnc {
 namespace {
 
 constexpr const char* AXES = "XYZ";
-constexpr double CLOCK_JUMP = 5.0;  // [s] between two steps: the clock was set, or the computer slept
+constexpr double CLOCK_JUMP = 5.0;  // [s] between two steps: the clock was set, or the computer was suspended
 
 MotionCode codeOf(const Failure& failure, MotionCode otherwise) {
   return failure.kind == Failure::Kind::alarm ? MotionCode::alarm : otherwise;
@@ -38,7 +38,7 @@ Status MotionMachine::step(const Reading& reading, double now) {
   }
   switch (phase_) {
     case Phase::opening: {
-      // A program that follows another at once begins with 100 % as well.
+      // Every program starts with 100 %, also directly after another.
       const Status back = resetOverrides();
       return back ? open() : back;
     }
@@ -63,8 +63,8 @@ std::string MotionMachine::overrideFault(const Overrides& wanted) const {
     const bool within = value >= low && value <= high;
     return within ? std::string()
                   : std::string(what) + " override " + fixedDecimals(100.0 * value, 1) +
-                        " %: " + fixedDecimals(100.0 * low, 0) + " .. " + fixedDecimals(100.0 * high, 0) +
-                        " % is allowed";
+                        " %: expected " + fixedDecimals(100.0 * low, 0) + " .. " +
+                        fixedDecimals(100.0 * high, 0) + " %";
   };
   std::string fault = outside("feed", wanted.feed, limits.min_feed_override, limits.max_feed_override);
   if (fault.empty()) {
@@ -130,18 +130,18 @@ Status MotionMachine::resetOverrides() {
     overridden_ = true;
     return taken.failure();
   }
-  log_.warning("overrides are not put back to 100 %: " + taken.failure().message);
+  log_.warning("overrides are not reset to 100 %: " + taken.failure().message);
   return {};
 }
 
-/// A clock that jumps takes the times kept here along: nothing runs out of time, or waits, by it.
+/// Shifts all stored times with a jump of the clock, so that it causes neither a timeout nor a wait.
 void MotionMachine::followClock(double now) {
   const double jump = now - now_;
   if (jump >= 0.0 && (jump <= CLOCK_JUMP || !reading_)) {
     return;
   }
   if (busy()) {
-    log_.warning("the clock jumped by " + fixedDecimals(jump, 3) + " s in mid-motion");
+    log_.warning("the clock jumped by " + fixedDecimals(jump, 3) + " s during a motion");
   }
   for (double* time : {&entered_, &progressed_, &condition_from_, &condition_to_}) {
     *time += jump;
@@ -190,7 +190,7 @@ Result<Answer<ArmCode>> MotionMachine::arm() {
                            "motion is not armed: " + lineOf(opened.failure())};
   }
   setArmed(true);
-  // Whoever drove it before may have left some.
+  // An earlier client may have left overrides.
   overridden_ = controller_.takesOverrides();
   return Answer<ArmCode>{ArmCode::ok, "motion is armed"};
 }
@@ -203,7 +203,7 @@ Status MotionMachine::disarm() {
   }
   const Status closed = controller_.closePrograms();
   if (!closed && !closed.lost()) {
-    // The controller has ended the session itself: what was wanted.
+    // The controller has already ended the session.
     log_.info("end of the DNC session: " + closed.failure().message);
     return {};
   }
@@ -238,11 +238,11 @@ std::optional<Outcome> MotionMachine::jog(const std::string& axis, double distan
     }
   }
   if (motion.axis < 0) {
-    return Outcome{MotionCode::bad_goal, "jog: axis '" + axis + "', x, y or z is due"};
+    return Outcome{MotionCode::bad_goal, "jog: axis '" + axis + "', expected x, y or z"};
   }
   if (!std::isfinite(distance) || !std::isfinite(feed) || feed < 0.0) {
     return Outcome{MotionCode::bad_goal,
-                   "jog " + axis + ": a finite distance and a feed of 0 or more are due"};
+                   "jog " + axis + ": expected a finite distance and a feed of 0 or more"};
   }
   if (std::abs(distance) > parameters_.limits.max_jog) {
     return Outcome{MotionCode::limit, "jog " + axis + ": " + fixedDecimals(distance / units::MM, 3) +
@@ -312,7 +312,7 @@ std::optional<Outcome> MotionMachine::start(Motion motion, const std::string& pr
   return std::nullopt;
 }
 
-/// Where the controller keeps x (0), y (1), z (2).
+/// Index of x (0), y (1), z (2) among the controller's axes.
 std::optional<std::size_t> MotionMachine::axisIndex(int axis) const {
   if (!reading_) {
     return std::nullopt;
@@ -368,7 +368,7 @@ Status MotionMachine::cancel(const std::string& why) {
   return {};
 }
 
-/// What ends a motion from the controller's side.
+/// Ends the motion on an alarm, a change of mode or the end of the DNC session.
 Status MotionMachine::checkController() {
   if (!armed_) {
     return {};
@@ -409,13 +409,13 @@ Status MotionMachine::stop(Outcome outcome) {
 
 void MotionMachine::endStop() {
   const CncState& state = reading_->state;
-  const bool stands = reading_->at_rest && state.position == last_progress_.position;
+  const bool stopped = reading_->at_rest && state.position == last_progress_.position;
   last_progress_.position = state.position;
-  if (!stands && now_ - entered_ <= parameters_.stop_timeout) {
+  if (!stopped && now_ - entered_ <= parameters_.stop_timeout) {
     return;
   }
   Outcome outcome = stopping_outcome_;
-  if (!stands) {
+  if (!stopped) {
     outcome.message += "; the machine STILL MOVES: use the panel";
   } else {
     outcome.message += "; stopped at";
@@ -472,7 +472,7 @@ Status MotionMachine::open() {
   return send();
 }
 
-/// Told ahead: it is with everybody when its time has come, and nothing of it has begun before.
+/// Announces the condition in advance, so that every subscriber has it when the motion starts.
 void MotionMachine::announceCondition() {
   condition_from_ = condition_to_ = now_;
   if (motion_.condition) {
@@ -482,7 +482,7 @@ void MotionMachine::announceCondition() {
   }
 }
 
-/// Text that the controller does not take now waits for the next step.
+/// The rest of the text that the controller does not accept yet is sent in the next step.
 Status MotionMachine::send() {
   if (now_ < condition_from_) {
     progressed_ = now_;
@@ -527,7 +527,7 @@ Status MotionMachine::run() {
     return {};
   }
   if (motion_.condition) {
-    // Its end is told ahead too; the outcome waits for it, so that whoever asks for results asks after it.
+    // Its end is announced in advance too; the outcome follows after it.
     CuttingCondition none;
     none.stamp = condition_to_ = now_ + parameters_.condition_lead;
     conditions_.push_back(none);

@@ -17,7 +17,7 @@ namespace smartmill::cnc {
 namespace {
 
 constexpr const char* AXES = "XYZ";
-constexpr int ORIENT_STEPS = 4096;  // of one turn
+constexpr int ORIENT_STEPS = 4096;  // [1] per revolution
 constexpr std::size_t MAX_BLOCK = 200;
 constexpr double POSITION_TOLERANCE = 1e-9;  // [m] rounding of decimal input
 
@@ -27,7 +27,7 @@ struct Word {
   std::string digits;
 };
 
-/// A block that cannot be sent; kept inside this file, the caller gets an NcCheck.
+/// Exception for a block that must not be sent; converted to an NcCheck in this file.
 struct Refusal {
   NcVerdict verdict;
   std::string message;
@@ -68,7 +68,7 @@ std::string withoutComments(const std::string& line) {
   return text;
 }
 
-/// Digits with at most one point and a sign, no exponent: what a control reads.
+/// A number as a control reads it: digits with at most one point and a sign, no exponent.
 std::string number(const std::string& text, std::size_t& at) {
   const std::size_t start = at;
   if (at < text.size() && (text[at] == '+' || text[at] == '-')) {
@@ -80,7 +80,7 @@ std::string number(const std::string& text, std::size_t& at) {
     ++at;
   }
   if (digits == 0 || points > 1 || digits > 12) {
-    notUnderstood("'" + text.substr(start, std::max<std::size_t>(at - start, 1)) + "' is no number");
+    notUnderstood("'" + text.substr(start, std::max<std::size_t>(at - start, 1)) + "' is not a number");
   }
   return text.substr(start, at - start);
 }
@@ -99,7 +99,7 @@ std::vector<Word> wordsOf(const std::string& text) {
   return words;
 }
 
-/// Follows a program block by block.
+/// Interprets a program block by block and tracks its position.
 class ProgramInterpreter {
  public:
   ProgramInterpreter(const StartPosition& start, const MotionLimits& limits, const DialectOptions& options)
@@ -138,12 +138,12 @@ class ProgramInterpreter {
     const std::string name = number(content, at);
     if (equals == std::string::npos || at != equals ||
         name.find_first_not_of("0123456789") != std::string::npos) {
-      notUnderstood("'" + content + "' is not understood: #n=value is due");
+      notUnderstood("'" + content + "' is not understood: expected #n=value");
     }
     ++at;
     const std::string value = number(content, at);
     if (at != content.size()) {
-      notUnderstood("'" + content + "' is not understood: #n=value is due");
+      notUnderstood("'" + content + "' is not understood: expected #n=value");
     }
     if (std::atoi(name.c_str()) == options_.marker_macro) {
       notUnderstood("#" + name + " is the bridge's own variable");
@@ -233,8 +233,8 @@ class ProgramInterpreter {
 
   static int wholeNumber(const Word& word, int most) {
     if (word.value < 0.0 || word.value > most || word.value != std::floor(word.value)) {
-      notUnderstood(std::string("word ") + word.letter + word.digits + ": a wholeNumber number from 0 to " +
-                    std::to_string(most) + " is due");
+      notUnderstood(std::string("word ") + word.letter + word.digits + ": expected an integer from 0 to " +
+                    std::to_string(most));
     }
     return static_cast<int>(word.value);
   }
@@ -275,7 +275,7 @@ class ProgramInterpreter {
 
   std::string feedWord(double feed) {
     if (feed <= 0.0) {
-      notUnderstood("F" + numberText(feed) + ": a feed above 0 is due");
+      notUnderstood("F" + numberText(feed) + ": expected a feed above 0");
     }
     const double most = limits_.max_feed / units::MM * 60.0;
     if (feed > most * (1.0 + 1e-9)) {
@@ -287,7 +287,7 @@ class ProgramInterpreter {
 
   std::string speedWord(double speed, const std::vector<Word>& words) const {
     if (speed < 0.0) {
-      notUnderstood("S" + numberText(speed) + ": a speed of 0 or more is due");
+      notUnderstood("S" + numberText(speed) + ": expected a speed of 0 or more");
     }
     const double most = units::rpmFromRadPerSec(limits_.max_spindle_speed);
     if (speed > most * (1.0 + 1e-9)) {
@@ -315,7 +315,7 @@ class ProgramInterpreter {
       const double length = *axis[i] * units::MM;
       position_[i] = relative_ ? position_[i] + length : length + offset_[i];
       if (!std::isfinite(position_[i])) {
-        outside(std::string("the controller does not tell where ") + AXES[i] + " stands");
+        outside(std::string("the controller reports no position of ") + AXES[i]);
       }
       const std::array<double, 2>& travel = limits_.travel[i];
       if (position_[i] < travel[0] - POSITION_TOLERANCE || position_[i] > travel[1] + POSITION_TOLERANCE) {
@@ -347,7 +347,7 @@ class ProgramInterpreter {
   std::array<double, 3> position_;  // [m] machine
   std::array<double, 3> offset_{{0, 0, 0}};
   bool relative_ = false;
-  int motion_ = -1;  // 0 or 1 once stated
+  int motion_ = -1;  // 0 or 1 after G0 or G1
   bool feed_known_ = false;
   bool ended_ = false;
   std::string text_;
@@ -359,7 +359,7 @@ void MotionLimits::validate() const {
   for (std::size_t i = 0; i < 3; ++i) {
     if (!(travel[i][0] < travel[i][1])) {
       throw Error(std::string("travel_") + "xyz"[i] + ": [" + numberText(travel[i][0]) + ", " +
-                  numberText(travel[i][1]) + "] m: the lower limit comes first");
+                  numberText(travel[i][1]) + "] m: expected the lower limit first");
     }
   }
   require("max_feed", max_feed, Range::positive(), "m/s");

@@ -44,22 +44,22 @@ std::unique_ptr<Controller> makeController(const NodeParameters& parameters,
                 : makeFocasController(parameters.controller);
 }
 
-/// Empty when the condition can be published.
+/// Why a condition cannot be published; empty: it can.
 std::string conditionFault(const smartmill_msgs::CuttingCondition& c) {
   if (c.kind > smartmill_msgs::CuttingCondition::CUT) {
-    return "condition.kind " + std::to_string(c.kind) + " is unknown";
+    return "condition.kind " + std::to_string(c.kind) + ": expected NONE, AIR or CUT";
   }
   if (c.kind == smartmill_msgs::CuttingCondition::NONE) {
     return {};
   }
   if (!(c.spindle_speed > 0.0)) {
-    return "condition.spindle_speed is not above 0";
+    return "condition.spindle_speed: expected a speed above 0";
   }
   if (c.kind == smartmill_msgs::CuttingCondition::CUT &&
       !(c.teeth > 0 && c.diameter > 0.0 && c.feed_per_tooth > 0.0 && c.axial_depth > 0.0 &&
         c.exit_angle > c.entry_angle)) {
-    return "condition: teeth, diameter, feed_per_tooth, axial_depth above 0 and exit_angle above entry_angle "
-           "are next";
+    return "condition: expected teeth, diameter, feed_per_tooth, axial_depth above 0 and exit_angle above "
+           "entry_angle";
   }
   return {};
 }
@@ -362,7 +362,7 @@ void CncNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   status.add("connections made", diagnosed_connections_.made);
   status.add("connections lost", diagnosed_connections_.lost);
   status.add("attempts to connect", diagnosed_connections_.attempts);
-  status.addf("longest poll of late [s]", "%.4f", round_trip_.load());
+  status.addf("longest recent poll [s]", "%.4f", round_trip_.load());
   status.add("alarm", diagnosed_state_.alarm_text);
 }
 

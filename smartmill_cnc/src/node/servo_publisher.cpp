@@ -14,7 +14,7 @@ namespace smartmill::cnc {
 namespace {
 
 constexpr const char* SERVO_TOPIC = "cnc/servo";
-constexpr double WAIT = 0.02;    // [s] for what comes next
+constexpr double WAIT = 0.02;    // [s] for the next block
 constexpr double PERIOD = 1e-3;  // [s] of the servo thread
 
 }  // namespace
@@ -50,7 +50,7 @@ void ServoPublisher::run() {
     for (const linuxcnc::ServoSegment& segment : stream_->step(WAIT, rosSeconds)) {
       publish(segment);
     }
-    // Without a connection nothing is waited for there.
+    // Without a connection step() does not wait.
     if (rosSeconds() - before < PERIOD) {
       std::this_thread::sleep_for(std::chrono::duration<double>(PERIOD));
     }
@@ -88,11 +88,11 @@ void ServoPublisher::diagnose(diagnostic_updater::DiagnosticStatusWrapper& statu
   } else if (statistics.lost > 0) {
     status.summary(Level::WARN, "samples were lost");
   } else {
-    status.summary(Level::OK, "every servo cycle has come");
+    status.summary(Level::OK, "all servo cycles received");
   }
   status.add("samples [1]", std::to_string(statistics.samples));
   status.add("lost [1]", std::to_string(statistics.lost));
-  status.add("starts of the controller statistics anew [1]", std::to_string(statistics.restarts));
+  status.add("restarts of the controller [1]", std::to_string(statistics.restarts));
   status.addf("late, median [ms]", "%.1f", 1e3 * statistics.late_median);
   status.addf("late, 99 % [ms]", "%.1f", 1e3 * statistics.late_99);
   status.addf("late, worst [ms]", "%.1f", 1e3 * statistics.late_worst);

@@ -12,11 +12,11 @@
 
 namespace smartmill::cnc {
 
-/// Publishes what a LinuxCNC does in every servo cycle: cnc/servo in blocks, spindle/angle one by one; hands
-/// the load of a meter outside the controller back to it. Tells loss and jitter in the diagnostics.
+/// Publishes every servo cycle of a LinuxCNC (cnc/servo in blocks, spindle/angle one by one) and forwards the load of an
+/// external load meter to it. The diagnostics contain lost samples and delays.
 class ServoPublisher {
  public:
-  /// @param load_input topic of that meter; empty: none
+  /// @param load_input topic of the load meter; empty: none
   ServoPublisher(ros::NodeHandle nh, NodeShell& shell, std::shared_ptr<linuxcnc::ServoStream> stream,
                  const std::string& load_input);
   ~ServoPublisher();
@@ -35,7 +35,7 @@ class ServoPublisher {
   std::thread thread_;
 };
 
-/// [s] of the clock that stamps are of.
+/// @return [s] ROS time
 double rosSeconds();
 
 }  // namespace smartmill::cnc
