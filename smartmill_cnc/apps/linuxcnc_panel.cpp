@@ -59,17 +59,18 @@ MachineStatus carryOut(GatewayClient& client, const std::optional<CommandCode>& 
 
 int main(int argc, char** argv) {
   const std::map<std::string, CommandCode> codes{{"ready", CommandCode::ready},
-                                          {"estop", CommandCode::estop},
-                                          {"hold", CommandCode::hold},
-                                          {"resume", CommandCode::resume},
-                                          {"abort", CommandCode::abort}};
+                                                 {"estop", CommandCode::estop},
+                                                 {"hold", CommandCode::hold},
+                                                 {"resume", CommandCode::resume},
+                                                 {"abort", CommandCode::abort}};
   std::string folder, command;
   double timeout = 0.0;
   CommandLine line{"The operator's panel of a LinuxCNC with linuxcnc_gateway."};
   line.option("folder", folder, "folder of the machine").required();
-  line.option("command", command,
-              "ready: resets emergency stop and errors, switches on, homes; estop; hold; resume; abort; show: "
-              "prints the status")
+  line.option(
+          "command", command,
+          "ready: resets emergency stop and errors, switches on, homes; estop; hold; resume; abort; show: "
+          "prints the status")
       .required()
       .oneOf({"ready", "estop", "hold", "resume", "abort", "show"});
   line.option("--wait", timeout, "[s] timeout for the controller to start").notNegative().showDefault();

@@ -22,7 +22,7 @@ namespace {
 using Code = Reply::Code;
 
 constexpr std::chrono::milliseconds POLL_PERIOD{1};
-constexpr std::chrono::milliseconds REATTACH{500};                 // between two attempts
+constexpr std::chrono::milliseconds REATTACH{500};                               // between two attempts
 constexpr double REPLY_TIMEOUT = 1.0, HOMING_TIMEOUT = 3.0, STOP_TIMEOUT = 0.3;  // [s]
 constexpr std::uint32_t SETTLED = 4;  // [servo cycles] of an idle task after a program
 constexpr const char* PIECE = "o<piece> call";
@@ -111,9 +111,10 @@ void ControllerLink::checkLiveness(bool beats) {
   }
   status_.alive = false;
   program_.reset();
-  status_.errors = verdict == Liveness::Verdict::ended   ? "its task has stopped: one of its processes has ended"
-                   : verdict == Liveness::Verdict::hangs ? "its task has stopped: no servo cycles are counted"
-                                                         : "it waits for a processor of an overloaded computer";
+  status_.errors =
+      verdict == Liveness::Verdict::ended   ? "its task has stopped: one of its processes has ended"
+      : verdict == Liveness::Verdict::hangs ? "its task has stopped: no servo cycles are counted"
+                                            : "it waits for a processor of an overloaded computer";
 }
 
 void ControllerLink::readStatus() {
@@ -206,7 +207,8 @@ std::optional<int> ControllerLink::sendCommand(NmlMessage& message) {
     return std::nullopt;
   }
   const int serial = message.serial_number;
-  const bool taken = waitFor([&] { return channels_->stat().echo_serial_number - serial >= 0; }, REPLY_TIMEOUT);
+  const bool taken =
+      waitFor([&] { return channels_->stat().echo_serial_number - serial >= 0; }, REPLY_TIMEOUT);
   return taken ? std::optional<int>(serial) : std::nullopt;
 }
 
@@ -294,7 +296,7 @@ Reply ControllerLink::home() {
     return homing;
   }
   return waitFor([&] { return status_.homed; }, HOMING_TIMEOUT) ? Reply{}
-                                                        : Reply{Code::refused, "homing: timeout"};
+                                                                : Reply{Code::refused, "homing: timeout"};
 }
 
 /// Why no program can be accepted; empty: the machine is ready.

@@ -24,7 +24,8 @@ class ControllerLink {
   ControllerLink(const ControllerLink&) = delete;
   ControllerLink& operator=(const ControllerLink&) = delete;
 
-  /// Reads the controller's status; reattaches to a restarted controller. To be called every few milliseconds.
+  /// Reads the controller's status; reattaches to a restarted controller. To be called every few
+  /// milliseconds.
   void poll();
   const MachineStatus& status() const { return status_; }
 
@@ -64,7 +65,7 @@ class ControllerLink {
   std::unique_ptr<Channels> channels_;
   MachineStatus status_;
   Clock::time_point attached_;  // last attempt to open the channels
-  bool first_contact_ = false;            // a running controller has been detected
+  bool first_contact_ = false;  // a running controller has been detected
   Liveness liveness_;
   ProcessWatch processes_;
   std::optional<int> program_;            // serial number of the running one

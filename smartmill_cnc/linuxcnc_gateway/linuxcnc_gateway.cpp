@@ -95,8 +95,7 @@ class Gateway {
         }
         if (std::holds_alternative<Ask>(received->message)) {
           client.connection.send(link_.status(), received->sequence);
-        } else if (std::holds_alternative<Command>(received->message) &&
-                   client.waiting.size() < MAX_QUEUED) {
+        } else if (std::holds_alternative<Command>(received->message) && client.waiting.size() < MAX_QUEUED) {
           client.waiting.push_back(std::move(*received));
         }
       }

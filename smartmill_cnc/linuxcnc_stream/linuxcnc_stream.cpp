@@ -1,5 +1,6 @@
-// Reads LinuxCNC's servo cycles from a HAL sampler and publishes them on a local socket; writes the spindle load, the
-// overrides and the permit of motion. A separate process, because the end of LinuxCNC ends every HAL component.
+// Reads LinuxCNC's servo cycles from a HAL sampler and publishes them on a local socket; writes the spindle
+// load, the overrides and the permit of motion. A separate process, because the end of LinuxCNC ends every
+// HAL component.
 
 #include <hal.h>
 #include <poll.h>
@@ -29,7 +30,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr int HAL_SEGMENT = 0x48414c32, SAMPLER_FIFO = 0x48534130;  // keys fixed in LinuxCNC's sources
-constexpr int READ_PERIOD = 3;                                       // [ms]
+constexpr int READ_PERIOD = 3;                                      // [ms]
 constexpr std::chrono::milliseconds REQUEST_PERIOD{30}, RETRY_PERIOD{100}, LOADING{10000};
 constexpr double SILENCE_TIMEOUT = 0.5;  // [s]
 constexpr int CONTROLLER_ENDED = 3;      // exit code
@@ -38,8 +39,8 @@ double seconds() {
   return std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
 }
 
-/// This process as a HAL component. Its pins are bidirectional, so that signals still linked to an ended process do
-/// not block the next one.
+/// This process as a HAL component. Its pins are bidirectional, so that signals still linked to an ended
+/// process do not block the next one.
 class Component {
  public:
   Component() : prefix_("smartmill-" + std::to_string(::getpid())), id_(::hal_init(prefix_.c_str())) {
@@ -63,7 +64,7 @@ class Component {
     // The link fails if the drive writes the signal itself.
     has_load_signal_ = ::hal_link((prefix_ + ".load").c_str(), LOAD_SIGNAL) == 0;
     has_override_signals_ = ::hal_link((prefix_ + ".feed-override").c_str(), FEED_SIGNAL) == 0 &&
-                 ::hal_link((prefix_ + ".spindle-override").c_str(), SPINDLE_SIGNAL) == 0;
+                            ::hal_link((prefix_ + ".spindle-override").c_str(), SPINDLE_SIGNAL) == 0;
     setOverrides({});
     if (::hal_stream_attach(&stream_, id_, SAMPLER_FIFO, SAMPLER_PINS) < 0) {
       ::hal_exit(id_);
@@ -156,7 +157,8 @@ class Component {
   ServoSample sample_;
 };
 
-/// Monitors the gateway and, through it, the controller's task: motion is permitted only while both are alive.
+/// Monitors the gateway and, through it, the controller's task: motion is permitted only while both are
+/// alive.
 class GatewayWatch {
  public:
   explicit GatewayWatch(std::string path) : path_(std::move(path)) {}
@@ -279,7 +281,8 @@ int main(int argc, char** argv) {
   using namespace smartmill::cnc::linuxcnc;
   std::string folder;
   smartmill::CommandLine line{
-      "Publishes every servo cycle of the LinuxCNC on this computer (docs/linuxcnc.md); exits with code 3 when "
+      "Publishes every servo cycle of the LinuxCNC on this computer (docs/linuxcnc.md); exits with code 3 "
+      "when "
       "it ends."};
   line.option("folder", folder, "folder of the machine; stream.socket is created there").required();
   return smartmill::runProgram(line, argc, argv, [&]() -> int {

@@ -54,7 +54,7 @@ class BridgeTest : public ::testing::Test {
     }
     machine_.advance(PERIOD);
     now_ += PERIOD;
-    // Text travels while the test's time stands: the server's thread gets the processor.
+    // Gives the server's thread time to transfer text; the test's own time does not advance here.
     std::this_thread::sleep_for(std::chrono::microseconds(200));
   }
 

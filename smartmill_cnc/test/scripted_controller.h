@@ -9,14 +9,14 @@
 
 namespace smartmill::cnc {
 
-/// A controller that does what a test says, without a wire: of another kind than the FOCAS one.
+/// A controller without a connection whose replies a test sets.
 class ScriptedController : public Controller {
  public:
   Reading reading;  ///< of the next read()
   std::optional<Failure> connecting, opening, checking, sending, closing, writing, aborting;
   bool is_connected = false, is_open = false;
   std::size_t taken_at_once = 1000;  ///< [byte] of a program by one send()
-  std::string program;               ///< begun last
+  std::string program;               ///< last begun
   std::vector<std::string> calls;    ///< in order, without read()
 
   ScriptedController() {

@@ -14,9 +14,9 @@
 
 namespace smartmill::cnc {
 
-/// The bridge to the controller: maintains the connection, reads the state, runs programs. Used by one thread:
-/// fetch(now), then step(time at which the replies arrived), at a fixed period; commands in between. Time is
-/// an argument; only the wait for a reply uses a clock, bounded by the controller's reply timeout.
+/// The bridge to the controller: maintains the connection, reads the state, runs programs. Used by one
+/// thread: fetch(now), then step(time at which the replies arrived), at a fixed period; commands in between.
+/// Time is an argument; only the wait for a reply uses a clock, bounded by the controller's reply timeout.
 class Bridge {
  public:
   /// @param reconnect_period [s] > 0 between two attempts to connect

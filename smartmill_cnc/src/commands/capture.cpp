@@ -77,8 +77,10 @@ Command captureCommand() {
   command.name = command.tool = "capture";
   command.summary = "records a session with a Fanuc controller and prints it decoded";
   command.description =
-      "Records a session with a Fanuc controller (FOCAS2 Ethernet) and prints it decoded, one line per request "
-      "and reply. Without --listen it requests all readable values and writes nothing to the controller; with "
+      "Records a session with a Fanuc controller (FOCAS2 Ethernet) and prints it decoded, one line per "
+      "request "
+      "and reply. Without --listen it requests all readable values and writes nothing to the controller; "
+      "with "
       "--listen it relays between any client and the controller until Ctrl-C.";
   command.examples = {
       {"192.168.1.10 -o machine.focas", "all readable values of a controller"},
@@ -89,10 +91,13 @@ Command captureCommand() {
     const auto a = std::make_shared<Arguments>();
     line.option("HOST", a->host, "name or address of the controller").required();
     line.option("--port", a->port, "FOCAS port of the controller").within(1, 65535).showDefault();
-    line.option("--listen", a->listen_port, "port on loopback for another client; 0: requests all values itself")
+    line.option("--listen", a->listen_port,
+                "port on loopback for another client; 0: requests all values itself")
         .within(0, 65535)
         .showDefault();
-    line.option("--timeout", a->timeout, "[s] timeout of connecting and of every reply").positive().showDefault();
+    line.option("--timeout", a->timeout, "[s] timeout of connecting and of every reply")
+        .positive()
+        .showDefault();
     line.option("-o,--out", a->file, "file to write (smartmill-focas-session/1)").showDefault();
     return commandBody(a, run);
   };

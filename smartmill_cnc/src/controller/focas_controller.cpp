@@ -214,8 +214,8 @@ class FocasController : public Controller {
   }
 
   Status abort() override {
-    // The DNC cancel alone may be delayed behind text in the stream. Not every controller permits a reset; then
-    // the cancel must suffice.
+    // The DNC cancel alone may be delayed behind text in the stream. Not every controller permits a reset;
+    // then the cancel must suffice.
     const Status reset = attempt(plainLine, [&] { client_.reset(); });
     return reset.lost() ? reset : abandonPrograms();
   }

@@ -13,13 +13,14 @@ namespace smartmill::cnc::linuxcnc {
 namespace {
 
 constexpr double SPEED_TOLERANCE = 10.0;  // [rpm] of spindle at speed, in addition to 1 %
-constexpr double LIMIT_MARGIN = 1e-3;   // [mm] of the limits: a home at the end of travel may round to either side
-constexpr double STANDSTILL = 0.5;  // [rpm]
+constexpr double LIMIT_MARGIN =
+    1e-3;  // [mm] of the limits: a home at the end of travel may round to either side
+constexpr double STANDSTILL = 0.5;         // [rpm]
 constexpr double ORIENT_GAIN = 20.0;       // [1/s]
-constexpr double ORIENT_MAX_SPEED = 5.0;        // [rev/s]
+constexpr double ORIENT_MAX_SPEED = 5.0;   // [rev/s]
 constexpr double ORIENT_TOLERANCE = 0.02;  // [deg]
-// [s] of servo cycles. A servo thread that has waited for a processor catches up without a beat in between, which must
-// not count as the end of linuxcnc_stream; the gateway detects that end at once.
+// [s] of servo cycles. A servo thread that has waited for a processor catches up without a beat in between,
+// which must not count as the end of linuxcnc_stream; the gateway detects that end at once.
 constexpr double BEAT_LASTS = Liveness::STARVES + 0.2;
 
 std::string number(double value) {
@@ -123,7 +124,8 @@ std::string halOf(double spindle_acceleration) {
          "net dtg motion.distance-to-go => sampler.0.pin.6\n"
       << "net " << LOAD_SIGNAL << " sampler.0.pin.7\n"
       << "net marker motion.analog-out-00 => sampler.0.pin.8\n"
-         "# Without the beat and the permit of linuxcnc_stream no axis and no spindle moves, and the emergency "
+         "# Without the beat and the permit of linuxcnc_stream no axis and no spindle moves, and the "
+         "emergency "
          "stop is set\n"
       << "net " << BEAT_SIGNAL << " lives.in\nnet lives lives.out => may.in0\nnet " << PERMIT_SIGNAL
       << " may.in1\nnet may may.out => motion.enable chain.in0\n"

@@ -14,11 +14,11 @@
 namespace smartmill::cnc::linuxcnc {
 namespace {
 
-constexpr int DECIMALS = 4;            // of lengths in mm; LinuxCNC computes in doubles
-constexpr double INCREMENT = 1e-7;     // [m]
-constexpr double ZERO_DISTANCE = 1e-9;        // [m] a smaller distance to go counts as zero
+constexpr int DECIMALS = 4;             // of lengths in mm; LinuxCNC computes in doubles
+constexpr double INCREMENT = 1e-7;      // [m]
+constexpr double ZERO_DISTANCE = 1e-9;  // [m] a smaller distance to go counts as zero
 constexpr double STREAM_TIMEOUT = 0.4;  // [s]
-constexpr int ORIENT_MACRO = 1133;     // angle of M119, 0 .. 4095, as on a Fanuc
+constexpr int ORIENT_MACRO = 1133;      // angle of M119, 0 .. 4095, as on a Fanuc
 constexpr const char* UNMARK = "M68 E0 Q0\n";
 constexpr const char* STOP = "M5\nM66 P0 L3 Q30\n";  // waits for the input of standstill
 
@@ -86,8 +86,9 @@ class LinuxCncController : public Controller {
       client_.connect();
       const MachineStatus status = client_.status();
       if (!status.alive || !status.homed) {
-        return lost("cannot connect to the " + name() +
-                    (status.alive ? ": it is not ready (run linuxcnc_panel FOLDER ready)" : ": it does not run"));
+        return lost(
+            "cannot connect to the " + name() +
+            (status.alive ? ": it is not ready (run linuxcnc_panel FOLDER ready)" : ": it does not run"));
       }
     } catch (const Error& e) {
       return lost(e.what());
@@ -117,7 +118,9 @@ class LinuxCncController : public Controller {
     return readingOf(*servo);
   }
 
-  Status setVariable(int number, double value) override { return execute({CommandCode::variable, number, value, {}}); }
+  Status setVariable(int number, double value) override {
+    return execute({CommandCode::variable, number, value, {}});
+  }
 
   DialectOptions dialect() const override {
     DialectOptions options;

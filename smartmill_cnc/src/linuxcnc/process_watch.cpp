@@ -95,11 +95,12 @@ bool ProcessWatch::waitsForProcessor(double now) {
     const std::string threads = "/proc/" + std::to_string(process.pid) + "/task/";
     for (const int thread : numbersIn(threads)) {
       const std::string folder = threads + std::to_string(thread);
-      // schedstat: run time [ns], waiting time, number of slices. The waiting time does not include a wait that
-      // still lasts.
+      // schedstat: run time [ns], waiting time, number of slices. The waiting time does not include a wait
+      // that still lasts.
       run_times[thread] = std::strtoull(lineOf(folder + "/schedstat").c_str(), nullptr, 10);
       const auto before = run_times_.find(thread);
-      waiting_ = waiting_ || (before != run_times_.end() && before->second == run_times[thread] && stateOf(folder) == 'R');
+      waiting_ = waiting_ || (before != run_times_.end() && before->second == run_times[thread] &&
+                              stateOf(folder) == 'R');
     }
   }
   run_times_ = std::move(run_times);

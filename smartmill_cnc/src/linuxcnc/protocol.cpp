@@ -186,7 +186,8 @@ void unpack(MachineStatus& m, Unpacker& u) {
 
 void pack(const ServoBlock& m, Packer& p) {
   if (m.samples.size() > ServoBlock::MOST) {
-    throw Error("a block of " + std::to_string(m.samples.size()) + " servo samples: expected at most " + std::to_string(ServoBlock::MOST));
+    throw Error("a block of " + std::to_string(m.samples.size()) + " servo samples: expected at most " +
+                std::to_string(ServoBlock::MOST));
   }
   p.number(m.first);
   p.number(m.period_ns);

@@ -84,7 +84,8 @@ std::vector<ServoSegment> ServoStream::addBlock(const ServoBlock& block, double 
     return segments;
   }
   const std::lock_guard<std::mutex> lock(mutex_);
-  const std::uint32_t gap = block.first - static_cast<std::uint32_t>(next_);  // modulo 2^32, as the controller counts
+  const std::uint32_t gap =
+      block.first - static_cast<std::uint32_t>(next_);  // modulo 2^32, as the controller counts
   if (!begun_ || gap > RESTART) {
     statistics_.restarts += statistics_.samples > 0 ? 1 : 0;
     restart(block);

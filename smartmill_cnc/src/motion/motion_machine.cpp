@@ -62,9 +62,8 @@ std::string MotionMachine::overrideFault(const Overrides& wanted) const {
   const auto outside = [](const char* what, double value, double low, double high) {
     const bool within = value >= low && value <= high;
     return within ? std::string()
-                  : std::string(what) + " override " + fixedDecimals(100.0 * value, 1) +
-                        " %: expected " + fixedDecimals(100.0 * low, 0) + " .. " +
-                        fixedDecimals(100.0 * high, 0) + " %";
+                  : std::string(what) + " override " + fixedDecimals(100.0 * value, 1) + " %: expected " +
+                        fixedDecimals(100.0 * low, 0) + " .. " + fixedDecimals(100.0 * high, 0) + " %";
   };
   std::string fault = outside("feed", wanted.feed, limits.min_feed_override, limits.max_feed_override);
   if (fault.empty()) {

@@ -319,8 +319,9 @@ class ProgramInterpreter {
       }
       const std::array<double, 2>& travel = limits_.travel[i];
       if (position_[i] < travel[0] - POSITION_TOLERANCE || position_[i] > travel[1] + POSITION_TOLERANCE) {
-        outside(std::string(1, AXES[i]) + " would go to " + numberText(position_[i] / units::MM) + " mm, limits " +
-                numberText(travel[0] / units::MM) + " to " + numberText(travel[1] / units::MM) + " mm (machine)");
+        outside(std::string(1, AXES[i]) + " would go to " + numberText(position_[i] / units::MM) +
+                " mm, limits " + numberText(travel[0] / units::MM) + " to " +
+                numberText(travel[1] / units::MM) + " mm (machine)");
       }
       out += AXES[i] + fixedDecimals(*axis[i], options_.decimals) + " ";
     }

@@ -350,11 +350,13 @@ void CncNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   if (!diagnosed_state_.connected) {
     status.summary(Level::ERROR, diagnosed_line_.empty() ? "not connected" : diagnosed_line_);
   } else if (diagnosed_state_.emergency || diagnosed_state_.alarm) {
-    status.summary(Level::ERROR, diagnosed_state_.emergency ? "emergency stop" : "alarm " + diagnosed_state_.alarm_text);
+    status.summary(Level::ERROR,
+                   diagnosed_state_.emergency ? "emergency stop" : "alarm " + diagnosed_state_.alarm_text);
   } else if (diagnosed_state_.mode != CncMode::dnc) {
     status.summary(Level::WARN, "connected; not in DNC mode, nothing can be moved");
   } else {
-    status.summary(Level::OK, diagnosed_state_.armed ? "connected, motion armed" : "connected, motion disarmed");
+    status.summary(Level::OK,
+                   diagnosed_state_.armed ? "connected, motion armed" : "connected, motion disarmed");
   }
   status.add("mode", static_cast<int>(diagnosed_state_.mode));
   status.add("armed", diagnosed_state_.armed);

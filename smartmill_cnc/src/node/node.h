@@ -69,9 +69,9 @@ class CncNode {
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   const NodeParameters parameters_;
-  const std::shared_ptr<linuxcnc::ServoStream> stream_;      // null without LinuxCNC
-  Bridge bridge_;                                            // the bridge's thread only
-  std::optional<Active> active_;                             // the bridge's thread only
+  const std::shared_ptr<linuxcnc::ServoStream> stream_;           // null without LinuxCNC
+  Bridge bridge_;                                                 // the bridge's thread only
+  std::optional<Active> active_;                                  // the bridge's thread only
   std::optional<std::vector<ControllerAlarm>> published_alarms_;  // the bridge's thread only
 
   ros::Publisher state_publisher_, load_publisher_, condition_publisher_, alarms_publisher_;
@@ -85,7 +85,7 @@ class CncNode {
 
   std::mutex mutex_;  // guards the members below
   std::vector<Job> jobs_;
-  CncState diagnosed_state_; 
+  CncState diagnosed_state_;
   std::string diagnosed_line_;
   Poller::Counts diagnosed_connections_;
 

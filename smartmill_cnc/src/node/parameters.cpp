@@ -43,10 +43,12 @@ void NodeParameters::declare(ParameterTable& table) {
                "time between the first two attempts to connect, then up to eight times as long");
   motion.declare(table);
   table.section(
-      "Limits of every motion, checked before anything is sent. An empty or zero value is taken from the axes and "
+      "Limits of every motion, checked before anything is sent. An empty or zero value is taken from the "
+      "axes and "
       "spindle sections of the machine model; every limit is required here or there.");
   table.text("model", model, "path of a smartmill-model/1 file");
-  table.list("travel_x", travel[0], "m", {}, "lowest and highest machine position, for example [-0.25, 0.25]");
+  table.list("travel_x", travel[0], "m", {},
+             "lowest and highest machine position, for example [-0.25, 0.25]");
   table.list("travel_y", travel[1], "m", {}, "of y");
   table.list("travel_z", travel[2], "m", {}, "of z");
   motion.limits.declare(table);
@@ -71,7 +73,8 @@ NodeParameters NodeParameters::completed() const {
   for (std::size_t i = 0; i < 3; ++i) {
     const std::vector<double>& ends = complete.travel[i];
     if (ends.size() != 2) {
-      throw Error(std::string("travel_") + "xyz"[i] + ": expected lowest and highest position [m]" + or_model);
+      throw Error(std::string("travel_") + "xyz"[i] + ": expected lowest and highest position [m]" +
+                  or_model);
     }
     limits.travel[i] = {ends[0], ends[1]};
   }

@@ -25,8 +25,8 @@ struct NodeParameters {
   void declare(ParameterTable& table);
   /// Checks the file alone. @throws Error naming key and value.
   void validate() const;
-  /// @return a copy with missing limits from the machine model. @throws Error naming key and value, also of a limit
-  /// that neither states.
+  /// @return a copy with missing limits from the machine model. @throws Error naming key and value, also of a
+  /// limit that neither states.
   NodeParameters completed() const;
 };
 

@@ -12,8 +12,8 @@
 
 namespace smartmill::cnc {
 
-/// Publishes every servo cycle of a LinuxCNC (cnc/servo in blocks, spindle/angle one by one) and forwards the load of an
-/// external load meter to it. The diagnostics contain lost samples and delays.
+/// Publishes every servo cycle of a LinuxCNC (cnc/servo in blocks, spindle/angle one by one) and forwards the
+/// load of an external load meter to it. The diagnostics contain lost samples and delays.
 class ServoPublisher {
  public:
   /// @param load_input topic of the load meter; empty: none

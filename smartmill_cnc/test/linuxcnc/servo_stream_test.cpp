@@ -23,13 +23,13 @@ ServoBlock blockOf(std::uint32_t first, std::size_t count) {
   return block;
 }
 
-/// Arrivals as they are on a busy computer: some at once, most late, by 3 ms on average, seldom by 80 ms.
+/// [s] delay on a busy computer: exponential with mean 3 ms, 80 ms in 1 % of the cases.
 double late(std::mt19937& random) {
   const double usual = std::exponential_distribution<double>(1.0 / 3e-3)(random);
   return std::bernoulli_distribution(0.01)(random) ? 0.08 : usual;
 }
 
-TEST(ServoClock, TimesAreThoseOfTheEarliestArrivals) {
+TEST(ServoClock, TimesFollowTheEarliestArrivals) {
   std::mt19937 random(3);
   ServoClock clock(PERIOD);
   for (std::uint64_t n = 0; n < 60'000; n += 3) {
@@ -40,7 +40,7 @@ TEST(ServoClock, TimesAreThoseOfTheEarliestArrivals) {
   }
 }
 
-TEST(ServoClock, FollowsAClockThatRunsFastOrSlowWithoutASteps) {
+TEST(ServoClock, TracksAFastOrSlowClockWithoutSteps) {
   for (const double drift : {5e-5, -5e-5}) {
     std::mt19937 random(4);
     ServoClock clock(PERIOD);
@@ -49,7 +49,7 @@ TEST(ServoClock, FollowsAClockThatRunsFastOrSlowWithoutASteps) {
       const double taken = 100.0 + PERIOD * (1.0 + drift) * static_cast<double>(n);
       clock.addArrival(n, taken + late(random));
       if (n > 60'000) {
-        // The earliest arrival of the two last windows of 10 s: at most 20 s of drift old.
+        // The earliest arrival of the last two windows of 10 s is at most 20 s old.
         EXPECT_NEAR(clock.timeOf(n), taken, 20.0 * std::abs(drift) + 1e-4) << n;
         EXPECT_NEAR(clock.timeOf(n) - before, 3.0 * PERIOD, 3.0 * PERIOD * 0.01 + 1e-4 * 0.1);
       }
@@ -58,10 +58,10 @@ TEST(ServoClock, FollowsAClockThatRunsFastOrSlowWithoutASteps) {
   }
 }
 
-TEST(ServoStream, HandsOutStretchesAndCountsLoss) {
+TEST(ServoStream, ReturnsSegmentsAndCountsLostSamples) {
   ServoStream stream("/nowhere");
   std::vector<ServoSegment> all;
-  std::uint32_t next = 4'294'966'000u;  // its count begins anew in between
+  std::uint32_t next = 4'294'966'000u;  // overflows during the test
   double now = 50.0;
   const auto feed = [&](std::uint32_t count) {
     now += PERIOD * count;
@@ -98,7 +98,7 @@ TEST(ServoStream, HandsOutStretchesAndCountsLoss) {
   EXPECT_EQ(stream.count(), 3300u);
 }
 
-TEST(ServoStream, AnotherStartOfTheControllerIsNoLoss) {
+TEST(ServoStream, RestartOfTheControllerIsNoLoss) {
   ServoStream stream("/nowhere");
   for (std::uint32_t i = 0; i < 100; ++i) {
     stream.addBlock(blockOf(100'000 + 10 * i, 10), 1.0 + 0.01 * i);
@@ -110,7 +110,7 @@ TEST(ServoStream, AnotherStartOfTheControllerIsNoLoss) {
   EXPECT_EQ(stream.statistics().restarts, 1u);
 }
 
-TEST(SilenceTimer, ThePausesOfTheObserverAreNotThoseOfTheWorld) {
+TEST(SilenceTimer, PausesOfTheObserverDoNotCount) {
   SilenceTimer timer;
   double now = 10.0;
   EXPECT_EQ(timer.update(true, now), 0.0);

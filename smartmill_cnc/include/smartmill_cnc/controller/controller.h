@@ -87,8 +87,8 @@ struct Transfer {
   bool complete = false;            ///< nothing is left to send
 };
 
-/// Interface of a machine's controller, independent of the protocol: its state, its variables, one program at a
-/// time. Expected errors are returned, not thrown. No call waits longer than the reply timeout of the
+/// Interface of a machine's controller, independent of the protocol: its state, its variables, one program at
+/// a time. Expected errors are returned, not thrown. No call waits longer than the reply timeout of the
 /// implementation. Used by one thread.
 class Controller {
  public:

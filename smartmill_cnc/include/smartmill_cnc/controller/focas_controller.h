@@ -30,7 +30,8 @@ struct FocasParameters {
     table.number(
         "override_data", override_data, "1", Range::closed(-1, 9998),
         "PMC data table: number of the byte D whose percentage the machine's ladder multiplies into the feed "
-        "override; the next byte is for the spindle; 0 means 100; -1: the ladder has no such rungs, overrides "
+        "override; the next byte is for the spindle; 0 means 100; -1: the ladder has no such rungs, "
+        "overrides "
         "are refused");
   }
 

@@ -15,9 +15,10 @@ constexpr const char* FEED_SIGNAL = "adaptive_feed";     ///< float: input of mo
 constexpr const char* SPINDLE_SIGNAL = "spindle_scale";  ///< float: factor on spindle.0.speed-out
 constexpr const char* SAMPLER_PINS = "fffffffff";
 
-/// Configuration of a LinuxCNC without hardware: ideal axes with the model's travel, rapid feed and acceleration; a
-/// spindle with the model's acceleration, orientation (M19) and a revolution counter. The emergency stop chain
-/// depends on the permit of linuxcnc_stream. @param folder of the files @return text by file name
+/// Configuration of a LinuxCNC without hardware: ideal axes with the model's travel, rapid feed and
+/// acceleration; a spindle with the model's acceleration, orientation (M19) and a revolution counter. The
+/// emergency stop chain depends on the permit of linuxcnc_stream. @param folder of the files @return text by
+/// file name
 /// @throws Error naming the missing value of the model.
 std::map<std::string, std::string> configurationOf(const MachineModel& model, const std::string& folder);
 

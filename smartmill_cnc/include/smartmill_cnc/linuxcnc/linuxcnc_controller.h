@@ -20,14 +20,14 @@ struct LinuxCncParameters {
   }
 };
 
-/// Translates a program of the bridge's dialect (output of checkProgram()) for LinuxCNC: dwells in seconds, an exact
-/// stop at the end of every block, M5 and M119 wait for the spindle as on a Fanuc, and M67 before every motion
-/// marks each servo sample with the line of the program.
+/// Translates a program of the bridge's dialect (output of checkProgram()) for LinuxCNC: dwells in seconds,
+/// an exact stop at the end of every block, M5 and M119 wait for the spindle as on a Fanuc, and M67 before
+/// every motion marks each servo sample with the line of the program.
 std::string linuxCncText(const std::string& program);
 
-/// LinuxCNC with linuxcnc_gateway and linuxcnc_stream. A program is a subroutine called by MDI. The reported mode is
-/// DNC while programs are accepted: in MDI, and in manual mode before arming. After an emergency stop or an error
-/// `linuxcnc_panel FOLDER ready` is required.
+/// LinuxCNC with linuxcnc_gateway and linuxcnc_stream. A program is a subroutine called by MDI. The reported
+/// mode is DNC while programs are accepted: in MDI, and in manual mode before arming. After an emergency stop
+/// or an error `linuxcnc_panel FOLDER ready` is required.
 /// @param stream of the same machine; step() is called elsewhere @param now [s] any steady time
 std::unique_ptr<Controller> makeLinuxCncController(const LinuxCncParameters& parameters,
                                                    std::shared_ptr<const ServoStream> stream,

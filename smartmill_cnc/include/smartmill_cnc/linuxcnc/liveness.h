@@ -7,8 +7,8 @@
 
 namespace smartmill::cnc::linuxcnc {
 
-/// Whether a controller that counts cycles is alive. If the count stops, the controller has ended, hangs, or waits
-/// for a processor on an overloaded computer; the evidence distinguishes these cases.
+/// Whether a controller that counts cycles is alive. If the count stops, the controller has ended, hangs, or
+/// waits for a processor on an overloaded computer; the evidence distinguishes these cases.
 class Liveness {
  public:
   static constexpr double HANGS = 0.4;       ///< [s] without a cycle although a processor is available
@@ -35,10 +35,10 @@ class Liveness {
       silent_ += evidence.waits ? 0.0 : std::min(step, LONGEST_STEP);
       starved_ += evidence.waits ? step : own;
     }
-    return evidence.ended                ? Verdict::ended
+    return evidence.ended                 ? Verdict::ended
            : silent_ > HANGS              ? Verdict::hangs
            : silent_ + starved_ > STARVES ? Verdict::starves
-                                         : Verdict::lives;
+                                          : Verdict::lives;
   }
   /// The same with evidence from its processes, checked only after SUSPICIOUS.
   Verdict update(bool beats, ProcessWatch& processes, double now) {

@@ -8,9 +8,9 @@
 #include <variant>
 #include <vector>
 
-/// Protocol of linuxcnc_gateway and linuxcnc_stream on their local sockets. A frame is a header of eight bytes
-/// (payload length u32, version u8, kind u8, sequence u16; little-endian) and the payload of a typed message, whose
-/// length is bounded by its kind. Invalid frames throw Error; their connection is closed.
+/// Protocol of linuxcnc_gateway and linuxcnc_stream on their local sockets. A frame is a header of eight
+/// bytes (payload length u32, version u8, kind u8, sequence u16; little-endian) and the payload of a typed
+/// message, whose length is bounded by its kind. Invalid frames throw Error; their connection is closed.
 namespace smartmill::cnc::linuxcnc {
 
 constexpr std::uint8_t PROTOCOL_VERSION = 2;
@@ -122,8 +122,8 @@ std::string encode(const Message& message, std::uint16_t sequence = 0);
 class FrameDecoder {
  public:
   void push(const char* data, std::size_t size);
-  /// The next complete message; empty if more bytes are needed. @throws Error (one line) on an invalid frame; the
-  /// stream is unusable then.
+  /// The next complete message; empty if more bytes are needed. @throws Error (one line) on an invalid frame;
+  /// the stream is unusable then.
   std::optional<Received> next();
   std::size_t waiting() const { return bytes_.size() - taken_; }  ///< [byte]
 

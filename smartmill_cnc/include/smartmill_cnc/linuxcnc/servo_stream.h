@@ -12,9 +12,9 @@
 
 namespace smartmill::cnc::linuxcnc {
 
-/// Assigns times to evenly sampled, numbered samples. No sample arrives before it is taken, and the earliest arrivals
-/// have no delay; they define the time of sample 0. It is tracked slowly (the two clocks differ by about 1e-5), so
-/// that neighbouring samples stay one period apart.
+/// Assigns times to evenly sampled, numbered samples. No sample arrives before it is taken, and the earliest
+/// arrivals have no delay; they define the time of sample 0. It is tracked slowly (the two clocks differ by
+/// about 1e-5), so that neighbouring samples stay one period apart.
 class ServoClock {
  public:
   /// @param period [s] of the samples
@@ -47,8 +47,8 @@ struct ServoSegment {
   std::vector<ServoSample> samples;
 };
 
-/// Every servo cycle of the controller, from linuxcnc_stream. One thread calls step(); the const functions and
-/// setLoad() may be called from any thread.
+/// Every servo cycle of the controller, from linuxcnc_stream. One thread calls step(); the const functions
+/// and setLoad() may be called from any thread.
 class ServoStream {
  public:
   static constexpr std::size_t SEGMENT_LENGTH = 10;  ///< [1] samples
@@ -56,7 +56,8 @@ class ServoStream {
   /// @param folder of the machine
   explicit ServoStream(const std::string& folder);
 
-  /// Connects if an attempt is scheduled, then waits for data and reads. @param wait [s] at most @param now clock [s]
+  /// Connects if an attempt is scheduled, then waits for data and reads. @param wait [s] at most @param now
+  /// clock [s]
   std::vector<ServoSegment> step(double wait, double (*now)());
   /// Processes one block; called by step().
   std::vector<ServoSegment> addBlock(const ServoBlock& block, double arrival);

@@ -5,8 +5,8 @@
 
 namespace smartmill::cnc::linuxcnc {
 
-/// Time since an event last happened, excluding pauses of the observer (a starved process, a suspended computer):
-/// every update adds at most LONGEST_STEP.
+/// Time since an event last happened, excluding pauses of the observer (a starved process, a suspended
+/// computer): every update adds at most LONGEST_STEP.
 class SilenceTimer {
  public:
   static constexpr double LONGEST_STEP = 0.05;  ///< [s] most that one update adds

@@ -29,12 +29,14 @@ struct MotionParameters {
     table.flag("read_only", read_only, "true: motion cannot be armed, nothing is written to the controller");
     table.number("condition_lead", condition_lead, "s", Range::closed(0.0, 10.0),
                  "time by which a cutting condition is announced before it begins or ends");
-    table.number("settle_time", settle_time, "s", Range::positive(), "standstill after which a motion has ended");
+    table.number("settle_time", settle_time, "s", Range::positive(),
+                 "standstill after which a motion has ended");
     table.number("standstill_speed", standstill_speed, "rad/s", Range::positive(),
                  "spindle speed below which the spindle counts as stopped");
     table.number("stall_timeout", stall_timeout, "s", Range::positive(),
                  "time without progress after which a motion is cancelled, except in feed hold");
-    table.number("stop_timeout", stop_timeout, "s", Range::positive(), "longest time for a cancelled motion to stop");
+    table.number("stop_timeout", stop_timeout, "s", Range::positive(),
+                 "longest time for a cancelled motion to stop");
     table.number("open_timeout", open_timeout, "s", Range::positive(),
                  "longest time in which the controller may refuse a program after a cancelled one");
   }
@@ -82,10 +84,11 @@ struct Progress {
   double distance_to_go = 0.0;  ///< [m] of the jogged axis
 };
 
-/// State machine of the motions: one at a time, only while armed; every program is checked against the limits before
-/// it is sent. Phases: opening (the controller prepares to accept programs), sending, running (ends when all blocks
-/// have been executed, the distance to go is zero and nothing has moved for settle_time; Dunwoody 6.2 and 7.1),
-/// stopping after a cancel. An alarm, a change of mode or a reset at the panel disarms.
+/// State machine of the motions: one at a time, only while armed; every program is checked against the limits
+/// before it is sent. Phases: opening (the controller prepares to accept programs), sending, running (ends
+/// when all blocks have been executed, the distance to go is zero and nothing has moved for settle_time;
+/// Dunwoody 6.2 and 7.1), stopping after a cancel. An alarm, a change of mode or a reset at the panel
+/// disarms.
 class MotionMachine {
  public:
   /// @throws Error of MotionParameters::validate().
@@ -109,8 +112,8 @@ class MotionMachine {
   std::optional<Outcome> jog(const std::string& axis, double distance, double feed);
   /// @param angle [rad]
   std::optional<Outcome> orient(double angle);
-  /// Sets the overrides of the running program; its end resets them to 1. @return a failure only if it lost the
-  /// connection.
+  /// Sets the overrides of the running program; its end resets them to 1. @return a failure only if it lost
+  /// the connection.
   Result<OverrideAnswer> setOverrides(const Overrides& wanted, const std::string& reason);
   /// Stops the running motion; its Outcome follows at standstill. @param why for the Outcome
   Status cancel(const std::string& why = "cancelled");

@@ -39,9 +39,8 @@ struct MotionLimits {
 
 /// Position at the start of a program.
 struct StartPosition {
-  std::array<double, 3> machine{{0, 0, 0}};  ///< [m]
-  std::array<double, 3> absolute{
-      {0, 0, 0}};  ///< [m] same position in workpiece coordinates (G90)
+  std::array<double, 3> machine{{0, 0, 0}};   ///< [m]
+  std::array<double, 3> absolute{{0, 0, 0}};  ///< [m] same position in workpiece coordinates (G90)
 };
 
 /// Properties of the controller's dialect.
@@ -59,10 +58,11 @@ struct NcCheck {
   std::array<double, 3> end{{0, 0, 0}};  ///< [m] machine position at the end
 };
 
-/// Checks and translates a program of the bridge's dialect (mm, mm/min, rpm): N; G0 G1 G4 (P ms or X s) G90 G91;
-/// X Y Z F S; M3 M5 M30 M2 M119; #n=value; comments in parentheses. A program starts in G90 (the text contains it)
-/// without a modal G0, G1 or F; every position is tracked from the start. M30 and M2 end the program and become M5,
-/// because the DNC session continues. Lengths have a decimal point, since a control may interpret X10 as 10 um.
+/// Checks and translates a program of the bridge's dialect (mm, mm/min, rpm): N; G0 G1 G4 (P ms or X s) G90
+/// G91; X Y Z F S; M3 M5 M30 M2 M119; #n=value; comments in parentheses. A program starts in G90 (the text
+/// contains it) without a modal G0, G1 or F; every position is tracked from the start. M30 and M2 end the
+/// program and become M5, because the DNC session continues. Lengths have a decimal point, since a control
+/// may interpret X10 as 10 um.
 NcCheck checkProgram(const std::string& program, const StartPosition& start, const MotionLimits& limits,
                      const DialectOptions& options);
 
