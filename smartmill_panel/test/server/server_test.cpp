@@ -64,13 +64,13 @@ class ServerTest : public ::testing::Test {
                                     const std::lock_guard<std::mutex> lock(mutex_);
                                     wanted ? (void)wanted_.insert(channel) : (void)wanted_.erase(channel);
                                   },
-                                  [](Question question, const Server::Respond& respond) {
-                                    respond({200, json({{"path", question.path},
-                                                        {"query", question.query},
-                                                        {"post", question.post},
-                                                        {"body", question.body},
-                                                        {"token", question.token},
-                                                        {"from", question.from}})
+                                  [](ApiRequest request, const Server::Respond& respond) {
+                                    respond({200, json({{"path", request.path},
+                                                        {"query", request.query},
+                                                        {"post", request.post},
+                                                        {"body", request.body},
+                                                        {"token", request.token},
+                                                        {"from", request.from}})
                                                       .dump()});
                                   }});
     server_->advertise({1, "/smartmill/cnc/state", "smartmill_msgs/CncState", "bool connected"});
@@ -454,7 +454,7 @@ TEST_F(ServerTest, IsUnderstoodByAnIndependentClient) {
 }
 
 TEST(CommandGate, IsClosedUnlessOpened) {
-  Question command;
+  ApiRequest command;
   command.post = true;
   command.token = "0123456789abcdef";
   const CommandGate closed;
