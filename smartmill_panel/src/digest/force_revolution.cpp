@@ -32,7 +32,7 @@ std::optional<double> AngleTrack::at(double time) const {
   if (std::abs(since) > REACH) return {};
   double turned = near.speed * since;
   if (after != readings_.end() && after != readings_.begin() && after->stamp - near.stamp <= REACH) {
-    // The whole turns between two readings are those that the speed foretells.
+    // The number of revolutions between two readings follows from the speed.
     const double between = after->stamp - near.stamp;
     const double predicted = 0.5 * (near.speed + after->speed) * between;
     const double measured = after->angle - near.angle;

@@ -192,7 +192,7 @@ class Server::Impl {
 
   Hub hub_;
   std::size_t connections_ = 0;
-  asio::io_context io_{1};  // its handlers hold clients and connections, which know the hub
+  asio::io_context io_{1};  // its handlers own clients and connections, which refer to the hub
   Tcp::acceptor acceptor_;
   int port_ = 0;
   std::thread thread_;

@@ -19,7 +19,7 @@ struct SpectrumParameters {
                  "newest samples that are transformed; 8192 at 25.6 kHz resolve 3.1 Hz");
     table.number("spectrum_lines", lines, "1", Range::closed(8, 16384),
                  "most lines of a message, each the maximum of neighbouring lines");
-    table.number("spectrum_highest", highest, "Hz", Range::positive(), "frequency used");
+    table.number("spectrum_highest", highest, "Hz", Range::positive(), "highest frequency of a message");
   }
 };
 
