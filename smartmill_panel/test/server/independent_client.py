@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""A client of the panel by another hand: WebSocket frames by python3-websockets, the protocol by its description.
-usage: independent_client.py PORT TOPIC COUNT; prints one JSON object: what it was told and what it received."""
+"""An independent client of the panel: WebSocket frames of python3-websockets, protocol from its specification.
+usage: independent_client.py PORT TOPIC COUNT; prints one JSON object with the received data."""
 import asyncio
 import json
 import struct
