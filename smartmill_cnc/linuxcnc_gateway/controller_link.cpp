@@ -95,7 +95,7 @@ void ControllerLink::poll() {
 
 /// A program that already runs at the first contact was started through a gateway that has ended.
 void ControllerLink::abortOrphan() {
-  if (status_.alive && !std::exchange(first_contact_, true) && status_.busy &&
+  if (status_.alive && !std::exchange(contacted_, true) && status_.busy &&
       status_.mode == MachineStatus::Mode::mdi) {
     EMC_TASK_ABORT message;
     channels_->command.write(&message);

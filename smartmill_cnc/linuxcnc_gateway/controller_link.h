@@ -65,7 +65,7 @@ class ControllerLink {
   std::unique_ptr<Channels> channels_;
   MachineStatus status_;
   Clock::time_point attached_;  // last attempt to open the channels
-  bool first_contact_ = false;  // a running controller has been detected
+  bool contacted_ = false;      // a running controller has been detected
   Liveness liveness_;
   ProcessWatch processes_;
   std::optional<int> program_;            // serial number of the running one
