@@ -93,7 +93,7 @@ class Gateway {
         if (client.guard) {
           client.guard->heard = true;
         }
-        if (std::holds_alternative<Ask>(received->message)) {
+        if (std::holds_alternative<StatusRequest>(received->message)) {
           client.connection.send(link_.status(), received->sequence);
         } else if (std::holds_alternative<Command>(received->message) && client.waiting.size() < MAX_QUEUED) {
           client.waiting.push_back(std::move(*received));

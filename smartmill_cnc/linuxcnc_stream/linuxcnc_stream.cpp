@@ -186,7 +186,7 @@ class GatewayWatch {
     const Liveness::Verdict verdict = liveness_.update(updated, process_, seconds());
     if (now - last_request_ > REQUEST_PERIOD) {
       last_request_ = now;
-      gateway_.send(Ask{});
+      gateway_.send(StatusRequest{});
     }
     return gateway_.open() && alive_ && verdict == Liveness::Verdict::lives;
   }

@@ -40,7 +40,7 @@ void Bridge::step(double now) {
     load_ = reading->load;
     alarms_ = reading->alarms;
     increment_ = reading->increment;
-    notice(motion_.step(*reading, now));
+    noteLoss(motion_.step(*reading, now));
   }
   if (!controller_->connected()) {
     endWithoutConnection(now);
@@ -58,7 +58,7 @@ void Bridge::endWithoutConnection(double now) {
   poller_.reportDisconnected();
 }
 
-void Bridge::notice(const Status& status) {
+void Bridge::noteLoss(const Status& status) {
   if (status.lost()) {
     poller_.setError(status.failure().message);
   }
@@ -66,7 +66,7 @@ void Bridge::notice(const Status& status) {
 
 Answer<ArmCode> Bridge::arm(bool on) {
   if (!on) {
-    notice(motion_.disarm());
+    noteLoss(motion_.disarm());
     state_.armed = false;
     return {ArmCode::ok, "motion is disarmed"};
   }
@@ -78,7 +78,7 @@ Answer<ArmCode> Bridge::arm(bool on) {
   if (answer) {
     return *answer;
   }
-  notice(answer.failure());
+  noteLoss(answer.failure());
   return {ArmCode::not_connected, "motion is not armed: " + answer.failure().message};
 }
 
@@ -93,7 +93,7 @@ OverrideAnswer Bridge::setOverrides(const Overrides& wanted, const std::string& 
   if (result) {
     return *result;
   }
-  notice(result.failure());
+  noteLoss(result.failure());
   answer.message = result.failure().message;
   return answer;
 }
@@ -106,7 +106,7 @@ Answer<HoldCode> Bridge::hold() {
     return {HoldCode::not_armed, "motion is not armed: use the machine's own feed hold"};
   }
   const Status held = controller_->hold();
-  notice(held);
+  noteLoss(held);
   if (held) {
     return {HoldCode::ok, "feed hold: the axes are stopped; release it at the machine's own key"};
   }
@@ -125,7 +125,7 @@ Answer<MacroCode> Bridge::setMacro(int number, double value) {
     return {MacroCode::refused, name + ": the value is not a finite number"};
   }
   const Status written = controller_->setVariable(number, value);
-  notice(written);
+  noteLoss(written);
   if (written) {
     return {MacroCode::ok, name + " is set"};
   }
@@ -133,15 +133,15 @@ Answer<MacroCode> Bridge::setMacro(int number, double value) {
 }
 
 void Bridge::cancel() {
-  notice(motion_.cancel());
+  noteLoss(motion_.cancel());
 }
 
 void Bridge::shutdown() {
   if (!controller_->connected()) {
     return;
   }
-  notice(motion_.cancel("the bridge ends"));
-  notice(motion_.disarm());
+  noteLoss(motion_.cancel("the bridge ends"));
+  noteLoss(motion_.disarm());
   if (controller_->connected()) {
     controller_->close();
   }

@@ -151,7 +151,7 @@ class Page {
     for (const [name, element] of Object.entries(this.views)) element.hidden = name !== this.current;
     for (const button of document.querySelectorAll('nav button[data-view]'))
       button.dataset.view === this.current ? button.setAttribute('aria-current', 'page') : button.removeAttribute('aria-current');
-    for (const part of this.parts) if (part.view === this.current) part.shown?.();
+    for (const part of this.parts) if (part.view === this.current) part.onShow?.();
     this.refresh();
   }
 

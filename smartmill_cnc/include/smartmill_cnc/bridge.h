@@ -78,7 +78,7 @@ class Bridge {
 
  private:
   /// Stores the reason of a lost connection.
-  void notice(const Status& status);
+  void noteLoss(const Status& status);
   void endWithoutConnection(double now);
 
   Log log_;

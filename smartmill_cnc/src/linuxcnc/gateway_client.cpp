@@ -39,7 +39,7 @@ Answer GatewayClient::exchange(const Message& request) {
 }
 
 MachineStatus GatewayClient::status() {
-  return exchange<MachineStatus>(Ask{});
+  return exchange<MachineStatus>(StatusRequest{});
 }
 
 Reply GatewayClient::carryOut(const Command& command) {

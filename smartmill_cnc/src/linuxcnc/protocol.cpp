@@ -139,9 +139,9 @@ void unpack(Reply& m, Unpacker& u) {
   m.text = u.text();
 }
 
-void pack(const Ask&, Packer&) {
+void pack(const StatusRequest&, Packer&) {
 }
-void unpack(Ask&, Unpacker&) {
+void unpack(StatusRequest&, Unpacker&) {
 }
 
 void pack(const MachineStatus& m, Packer& p) {

@@ -174,10 +174,10 @@ Result<Answer<ArmCode>> MotionMachine::arm() {
     return Answer<ArmCode>{ArmCode::ok, "motion is armed already"};
   }
   if (state.emergency || state.alarm) {
-    return Answer<ArmCode>{ArmCode::alarm, "motion is not armed: " + alarmLine()};
+    return Answer<ArmCode>{ArmCode::alarm, "motion is not armed: " + alarmText()};
   }
   if (state.mode != CncMode::dnc) {
-    return Answer<ArmCode>{ArmCode::wrong_mode, "motion is not armed: " + modeLine()};
+    return Answer<ArmCode>{ArmCode::wrong_mode, "motion is not armed: " + modeText()};
   }
   const Status opened = controller_.openPrograms();
   if (opened.lost()) {
@@ -186,7 +186,7 @@ Result<Answer<ArmCode>> MotionMachine::arm() {
   if (!opened) {
     const bool alarm = opened.failure().kind == Failure::Kind::alarm;
     return Answer<ArmCode>{alarm ? ArmCode::alarm : ArmCode::wrong_mode,
-                           "motion is not armed: " + lineOf(opened.failure())};
+                           "motion is not armed: " + failureText(opened.failure())};
   }
   setArmed(true);
   // An earlier client may have left overrides.
@@ -273,10 +273,10 @@ std::optional<Outcome> MotionMachine::refusal(const std::string& name) const {
     return refuse(MotionCode::busy, motion_.name + " is running");
   }
   if (reading_->state.emergency || reading_->state.alarm) {
-    return refuse(MotionCode::alarm, alarmLine());
+    return refuse(MotionCode::alarm, alarmText());
   }
   if (reading_->state.mode != CncMode::dnc) {
-    return refuse(MotionCode::wrong_mode, modeLine());
+    return refuse(MotionCode::wrong_mode, modeText());
   }
   if (!armed_) {
     return refuse(MotionCode::not_armed, "motion is not armed");
@@ -324,19 +324,19 @@ std::optional<std::size_t> MotionMachine::axisIndex(int axis) const {
   return static_cast<std::size_t>(found - axes.begin());
 }
 
-std::string MotionMachine::alarmLine() const {
+std::string MotionMachine::alarmText() const {
   const CncState& state = reading_->state;
   return (state.emergency ? "emergency stop" : "alarm") +
          (state.alarm_text.empty() ? std::string() : ": " + state.alarm_text);
 }
 
-std::string MotionMachine::modeLine() const {
+std::string MotionMachine::modeText() const {
   return "the controller is not in DNC mode at its panel (mode " +
          std::to_string(static_cast<int>(reading_->state.mode)) + ")";
 }
 
-std::string MotionMachine::lineOf(const Failure& failure) const {
-  return failure.kind == Failure::Kind::wrong_mode ? modeLine() : failure.message;
+std::string MotionMachine::failureText(const Failure& failure) const {
+  return failure.kind == Failure::Kind::wrong_mode ? modeText() : failure.message;
 }
 
 Progress MotionMachine::progress() const {
@@ -374,10 +374,10 @@ Status MotionMachine::checkController() {
   }
   const CncState& state = reading_->state;
   if (state.emergency || state.alarm) {
-    return abandonMotion(MotionCode::alarm, alarmLine());
+    return abandonMotion(MotionCode::alarm, alarmText());
   }
   if (state.mode != CncMode::dnc) {
-    return abandonMotion(MotionCode::wrong_mode, modeLine());
+    return abandonMotion(MotionCode::wrong_mode, modeText());
   }
   if (!controller_.programsOpen() || phase_ == Phase::stopping) {
     return {};
@@ -460,7 +460,7 @@ Status MotionMachine::open() {
       const bool later = opened.failure().kind == Failure::Kind::not_yet;
       if (!later || now_ - entered_ > parameters_.open_timeout) {
         finish({codeOf(opened.failure(), MotionCode::wrong_mode),
-                motion_.name + ": " + lineOf(opened.failure())});
+                motion_.name + ": " + failureText(opened.failure())});
       }
       return {};
     }
@@ -493,7 +493,7 @@ Status MotionMachine::send() {
     return sent;
   }
   if (!sent) {
-    return abandonMotion(codeOf(sent.failure(), MotionCode::cancelled), lineOf(sent.failure()));
+    return abandonMotion(codeOf(sent.failure(), MotionCode::cancelled), failureText(sent.failure()));
   }
   const Transfer transfer = controller_.transfer();
   if (transfer.complete) {

@@ -44,7 +44,7 @@ ServoBlock someBlock(std::size_t count) {
 std::vector<Message> everyKind() {
   return {Command{CommandCode::run, 5, 1.5, "G1 X1\n"},
           Reply{Reply::Code::not_yet, "later"},
-          Ask{},
+          StatusRequest{},
           someStatus(),
           someBlock(3),
           SetLoad{0.25},
@@ -100,7 +100,7 @@ TEST(Protocol, FieldsAreUnchanged) {
 }
 
 TEST(Protocol, InvalidFramesAreRefusedInOneLine) {
-  const std::string good = encode(Ask{});
+  const std::string good = encode(StatusRequest{});
   const auto with = [&](std::size_t place, char value) {
     std::string bytes = good;
     bytes[place] = value;

@@ -41,11 +41,11 @@ class CncNodeTest : public ::testing::Test {
     subscribers_.push_back(nh_.subscribe(names::CUTTING_CONDITION, 100, &CncNodeTest::onCondition, this));
     subscribers_.push_back(nh_.subscribe("/diagnostics", 100, &CncNodeTest::onDiagnostics, this));
     clock_ = std::thread([this] {
-      auto due = std::chrono::steady_clock::now();
+      auto next_step = std::chrono::steady_clock::now();
       while (!done_) {
         machine_.advance(0.005);
-        due += std::chrono::milliseconds(5);
-        std::this_thread::sleep_until(due);
+        next_step += std::chrono::milliseconds(5);
+        std::this_thread::sleep_until(next_step);
       }
     });
   }

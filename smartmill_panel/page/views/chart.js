@@ -68,9 +68,9 @@ export class ChartView {
   // Upper end of the depth axis: the recommended and running cuts, not the deepest pockets.
   highest() {
     const useful = this.message.recommended.map(p => MM * p.axial_depth);
-    const shown = [...useful, ...this.message.unstable.map(p => MM * p.axial_depth), this.live()?.y ?? 0];
+    const depths = [...useful, ...this.message.unstable.map(p => MM * p.axial_depth), this.live()?.y ?? 0];
     const limits = this.chart.limit.filter(Number.isFinite).sort((a, b) => a - b);
-    return 1.3 * Math.max(...shown, limits[Math.floor(0.5 * limits.length)] ?? 1);
+    return 1.3 * Math.max(...depths, limits[Math.floor(0.5 * limits.length)] ?? 1);
   }
 
   draw() {
@@ -137,7 +137,7 @@ export class ChartView {
     const live = JSON.stringify([this.live(), this.link.message('chatter/state')?.chatter]);
     if (live !== this.drawn) { this.drawn = live; this.draw(); }
   }
-  shown() { this.draw(); }
+  onShow() { this.draw(); }
 }
 
 export class PointsTable {

@@ -87,7 +87,7 @@ export class Dynamics {
     if (this.news) { this.news = false; this.draw(); }
     if (this.hits.news) { this.hits.news = false; this.drawHits(); }
   }
-  shown() { this.draw(); }
+  onShow() { this.draw(); }
 }
 
 // Hits from the feedback of the measurement: "hit 3 of 5", "hit thrown away: reason".

@@ -62,7 +62,7 @@ export class Revolution {
     this.plot.set({ series, marks });
   }
   refresh() { if (this.news) { this.news = false; this.draw(); } }
-  shown() { this.draw(); }
+  onShow() { this.draw(); }
 }
 
 export class Spectrum {
@@ -107,7 +107,7 @@ export class Spectrum {
     return [`${fixed(x, 1)} Hz: ${digits(line)} N`, turn > 0.5 ? `order ${fixed(x / turn, 2)}` : ''];
   }
   refresh() { if (this.news) { this.news = false; this.draw(); } }
-  shown() { this.draw(); }
+  onShow() { this.draw(); }
 }
 
 export class SpectrumCourse {
@@ -119,7 +119,7 @@ export class SpectrumCourse {
     });
   }
   refresh() { this.waterfall.draw(); }
-  shown() { this.waterfall.dirty = this.waterfall.empty.hidden; }
+  onShow() { this.waterfall.dirty = this.waterfall.empty.hidden; }
 }
 
 // Merges neighbouring bins of a strip until there are at most as many as columns.
@@ -185,5 +185,5 @@ export class Strips {
     });
   }
   refresh() { if (this.news && !this.paused) { this.news = false; this.draw(); } }
-  shown() { this.draw(); }
+  onShow() { this.draw(); }
 }

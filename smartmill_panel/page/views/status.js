@@ -8,7 +8,6 @@ export const STALE_AGE = 1.0;  // [s] of a state that is published several times
 export class StatusLine {
   constructor(element, link, name, short = false) {
     Object.assign(this, { element, link, name, short });
-    this.shown = '';
     for (const topic of ['cnc/state', 'chatter/state', 'cut/condition']) link.on(topic, () => {});
   }
 

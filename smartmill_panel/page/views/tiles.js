@@ -101,11 +101,11 @@ export class Tiles {
     } else {
       this.lamp.set('Stable', `${fixed(100 * last.energy_ratio, 1)} % of the energy off the harmonics`, old, 'good');
     }
-    const shown = this.verdicts.filter(v => v.valid).slice(-HISTORY);
-    const text = shown.map(v => v.chatter ? 'yes' : 'no').join();
+    const recent = this.verdicts.filter(v => v.valid).slice(-HISTORY);
+    const text = recent.map(v => v.chatter ? 'yes' : 'no').join();
     if (text === this.drawn) return;
     this.drawn = text;
-    this.history.replaceChildren(...shown.map(v => make('i', { class: v.chatter ? 'yes' : 'no' })));
+    this.history.replaceChildren(...recent.map(v => make('i', { class: v.chatter ? 'yes' : 'no' })));
   }
 
   showPlaces(state, stale) {

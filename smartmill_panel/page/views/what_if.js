@@ -22,11 +22,11 @@ export class WhatIf {
     this.answer = make('p', { class: 'dim', id: 'what-if-answer' }, 'Move a slider to change the chart.');
     card.append(this.answer);
     for (const s of SLIDERS) {
-      const shown = make('b');
+      const value_text = make('b');
       const input = make('input', { type: 'range', min: s.low, max: s.high, step: s.step, id: `what-if-${s.key}`, 'aria-label': s.name,
         oninput: () => { this.value[s.key] = +input.value; this.changed.add(s.key); this.label(s); this.fetchChart(); } });
-      this.inputs[s.key] = { input, shown };
-      card.append(make('label', {}, s.name, shown, input));
+      this.inputs[s.key] = { input, value_text };
+      card.append(make('label', {}, s.name, value_text, input));
     }
     this.side = make('button', { 'aria-pressed': 'true', onclick: () => { this.down = !this.down; this.side.textContent = this.down ? 'Down-milling' : 'Up-milling'; this.changed.add('width'); this.fetchChart(); } }, 'Down-milling');
     card.append(make('div', { class: 'row' }, this.side, make('button', { onclick: () => this.reset() }, 'Reset')));
@@ -48,9 +48,9 @@ export class WhatIf {
   }
 
   label(s) {
-    const { input, shown } = this.inputs[s.key];
+    const { input, value_text } = this.inputs[s.key];
     input.value = this.value[s.key];
-    shown.textContent = `${fixed(this.value[s.key], s.digits)} ${s.unit}`;
+    value_text.textContent = `${fixed(this.value[s.key], s.digits)} ${s.unit}`;
   }
 
   reset() {

@@ -436,22 +436,22 @@ TEST_F(ServerTest, WorksWithAnIndependentClient) {
   char part[65536];
   for (std::size_t n = 0; (n = fread(part, 1, sizeof part, pipe)) > 0;) output.append(part, n);
   ASSERT_EQ(pclose(pipe), 0);
-  const json seen = json::parse(output);
-  EXPECT_EQ(seen.at("subprotocol"), PROTOCOL);
-  EXPECT_EQ(seen.at("info").at("name"), "SmartMill");
-  EXPECT_EQ(seen.at("channel").at("schemaName"), "smartmill_msgs/StabilityChart");
-  ASSERT_EQ(seen.at("payloads").size(), 3u);
-  EXPECT_EQ(seen["payloads"][0][0], 1234567890123456789u);
+  const json received = json::parse(output);
+  EXPECT_EQ(received.at("subprotocol"), PROTOCOL);
+  EXPECT_EQ(received.at("info").at("name"), "SmartMill");
+  EXPECT_EQ(received.at("channel").at("schemaName"), "smartmill_msgs/StabilityChart");
+  ASSERT_EQ(received.at("payloads").size(), 3u);
+  EXPECT_EQ(received["payloads"][0][0], 1234567890123456789u);
   std::string hex;
   for (const unsigned char c : all) {
     char two[3];
     std::snprintf(two, sizeof two, "%02x", c);
     hex += two;
   }
-  EXPECT_EQ(seen["payloads"][0][1], hex);
-  EXPECT_EQ(seen["payloads"][1][1], "");
-  EXPECT_EQ(seen["payloads"][2][1].get<std::string>().size(), 2 * large.size());
-  EXPECT_EQ(seen.at("status").at("level"), 2);
+  EXPECT_EQ(received["payloads"][0][1], hex);
+  EXPECT_EQ(received["payloads"][1][1], "");
+  EXPECT_EQ(received["payloads"][2][1].get<std::string>().size(), 2 * large.size());
+  EXPECT_EQ(received.at("status").at("level"), 2);
 }
 
 TEST(CommandGate, RequiresTheToken) {

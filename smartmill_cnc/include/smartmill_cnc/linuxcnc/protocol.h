@@ -53,7 +53,7 @@ struct Reply {
 };
 
 /// Request of the status, to the gateway; answered by a MachineStatus.
-struct Ask {};
+struct StatusRequest {};
 
 /// Status of LinuxCNC at one moment.
 struct MachineStatus {
@@ -108,7 +108,7 @@ struct SetOverrides {
   double feed = 1.0, spindle = 1.0;  ///< [1] >= 0
 };
 
-using Message = std::variant<Command, Reply, Ask, MachineStatus, ServoBlock, SetLoad, SetOverrides>;
+using Message = std::variant<Command, Reply, StatusRequest, MachineStatus, ServoBlock, SetLoad, SetOverrides>;
 
 struct Received {
   std::uint16_t sequence = 0;

@@ -138,11 +138,11 @@ class MotionMachine {
   std::optional<Outcome> start(Motion motion, const std::string& program);
   std::optional<Outcome> refusal(const std::string& name) const;
   std::optional<std::size_t> axisIndex(int axis) const;
-  std::string alarmLine() const;
+  std::string alarmText() const;
   std::string overrideFault(const Overrides& wanted) const;
   Status resetOverrides();
-  std::string modeLine() const;
-  std::string lineOf(const Failure& failure) const;
+  std::string modeText() const;
+  std::string failureText(const Failure& failure) const;
   void setArmed(bool armed);
   void enter(Phase phase);
   void followClock(double now);
