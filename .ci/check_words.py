@@ -45,8 +45,10 @@ ALLOWED = (
 )
 # Folders and files whose older text is still to be rewritten: counted, not refused.
 PENDING = (
-    "smartmill_sim/", "smartmill_stability/", "smartmill_studies/", "launch/",
-    "src/smartmill_core/", "src/smartmill_focas/", "src/smartmill_ros/", "docs/discrepancy_figures.md", "docs/results.md",
+    "smartmill_stability/", "smartmill_studies/",
+    "src/smartmill_core/", "docs/discrepancy_figures.md", "docs/results.md",
+    # Parameter files printed by nodes whose packages are listed above.
+    "launch/config/hammer.yaml", "launch/config/kalman.yaml", "launch/config/stability.yaml",
 )
 EXTENSIONS = (".md", ".cpp", ".h", ".py", ".yaml", ".yml", ".launch", ".msg", ".srv", ".action", ".js", ".html", ".css", ".cmake",
               ".txt", ".toml", "")

@@ -8,7 +8,7 @@ import sys
 import xml.etree.ElementTree as ElementTree
 
 # What needs packages that are optional (./setup --with-linuxcnc, --with-fleet) may be skipped everywhere.
-OPTIONAL = ("LinuxCncMachine", "FleetDatabase", "StudiesEngine")
+OPTIONAL = ("LinuxCncMachine", "FleetDatabase", "FleetMessage", "StudiesEngine")
 
 
 def verdict(case):

@@ -7,12 +7,12 @@
 
 namespace smartmill::session {
 
-/// For people.
-inline std::string shown(double value, int decimals = 1) {
+/// For messages to the operator.
+inline std::string numberText(double value, int decimals = 1) {
   return formatted("%.*f", decimals, value);
 }
 inline std::string mm(double length) {
-  return shown(length / units::MM, 2) + " mm";
+  return numberText(length / units::MM, 2) + " mm";
 }
 
 }  // namespace smartmill::session
