@@ -1,4 +1,4 @@
-#include "node/questions.h"
+#include "node/service_queries.h"
 
 #include <cmath>
 #include <filesystem>
@@ -19,13 +19,13 @@ namespace {
 
 using nlohmann::json;
 
-// Who asks for what is not there yet has done nothing wrong: an answer without the thing, and why.
-constexpr int BAD_REQUEST = 400, NOT_THERE = 200;
+// Data that do not exist yet are no error of the client: the response contains the reason instead.
+constexpr int BAD_REQUEST = 400, UNAVAILABLE = 200;
 constexpr double NONE = std::numeric_limits<double>::quiet_NaN();
 
-double numberOf(const Question& question, const std::string& key, double otherwise) {
-  const auto found = question.query.find(key);
-  if (found == question.query.end() || found->second.empty()) return otherwise;
+double numberOf(const ApiRequest& request, const std::string& key, double otherwise) {
+  const auto found = request.query.find(key);
+  if (found == request.query.end() || found->second.empty()) return otherwise;
   std::size_t used = 0;
   double value = NONE;
   try {
@@ -34,18 +34,18 @@ double numberOf(const Question& question, const std::string& key, double otherwi
     used = 0;
   }
   if (used != found->second.size() || !std::isfinite(value))
-    throw Error(key + ": '" + oneLine(found->second, 40) + "' is no number");
+    throw Error(key + ": '" + oneLine(found->second, 40) + "' is not a number");
   return value;
 }
 
-std::uint32_t countOf(const Question& question, const std::string& key, double most) {
-  const double value = numberOf(question, key, 0.0);
+std::uint32_t countOf(const ApiRequest& request, const std::string& key, double most) {
+  const double value = numberOf(request, key, 0.0);
   if (value < 0.0 || value > most || value != std::floor(value))
-    throw Error(key + ": a whole number up to " + std::to_string(static_cast<int>(most)) + " is due");
+    throw Error(key + ": expected an integer from 0 to " + std::to_string(static_cast<int>(most)));
   return static_cast<std::uint32_t>(value);
 }
 
-/// JSON knows neither NaN nor infinity.
+/// Numbers that are not finite become null, since JSON has neither NaN nor infinity.
 json numbers(const std::vector<double>& values) {
   json list = json::array();
   for (const double value : values) list.push_back(std::isfinite(value) ? json(value) : json(nullptr));
@@ -58,23 +58,23 @@ json number(double value) {
 
 }  // namespace
 
-Answer askWhatIf(ros::NodeHandle& nh, const Question& question) {
+ApiResponse queryWhatIf(ros::NodeHandle& nh, const ApiRequest& request) {
   smartmill_msgs::WhatIf service;
-  auto& request = service.request;
-  request.teeth = countOf(question, "teeth", 20.0);
-  request.helix = numberOf(question, "helix", NONE);
-  request.entry_angle = numberOf(question, "entry_angle", NONE);
-  request.exit_angle = numberOf(question, "exit_angle", NONE);
-  request.feed_per_tooth = numberOf(question, "feed_per_tooth", NONE);
-  request.overhang = numberOf(question, "overhang", NONE);
-  request.axial_depth = numberOf(question, "axial_depth", NONE);
-  request.speeds = countOf(question, "speeds", 1000.0);
-  request.spread = countOf(question, "spread", 1.0) == 1;
+  auto& input = service.request;
+  input.teeth = countOf(request, "teeth", 20.0);
+  input.helix = numberOf(request, "helix", NONE);
+  input.entry_angle = numberOf(request, "entry_angle", NONE);
+  input.exit_angle = numberOf(request, "exit_angle", NONE);
+  input.feed_per_tooth = numberOf(request, "feed_per_tooth", NONE);
+  input.overhang = numberOf(request, "overhang", NONE);
+  input.axial_depth = numberOf(request, "axial_depth", NONE);
+  input.speeds = countOf(request, "speeds", 1000.0);
+  input.spread = countOf(request, "spread", 1.0) == 1;
   if (!nh.serviceClient<smartmill_msgs::WhatIf>(names::WHAT_IF).call(service))
-    return answerOf(NOT_THERE, "the stability node does not answer");
+    return messageResponse(UNAVAILABLE, "the stability node does not answer");
   const auto& found = service.response;
   if (found.code != found.OK)
-    return answerOf(found.code == found.BAD_REQUEST ? BAD_REQUEST : NOT_THERE, found.message);
+    return messageResponse(found.code == found.BAD_REQUEST ? BAD_REQUEST : UNAVAILABLE, found.message);
   const json answer = {{"spindle_speed", numbers(found.spindle_speed)},
                        {"depth_limit", numbers(found.depth_limit)},
                        {"chatter_frequency", numbers(found.chatter_frequency)},
@@ -89,30 +89,30 @@ Answer askWhatIf(ros::NodeHandle& nh, const Question& question) {
   return {200, answer.dump()};
 }
 
-Answer controlReplay(ros::NodeHandle& nh, const Question& question) {
+ApiResponse controlReplay(ros::NodeHandle& nh, const ApiRequest& request) {
   constexpr int NOT_ALLOWED = 405;
-  if (!question.post) return answerOf(NOT_ALLOWED, "a wish comes by POST");
+  if (!request.post) return messageResponse(NOT_ALLOWED, "replay control requires POST");
   smartmill_msgs::PlayControl service;
-  service.request.speed = numberOf(question, "speed", NONE);
-  service.request.paused = countOf(question, "paused", 1.0) == 1;
-  service.request.position = numberOf(question, "position", NONE);
+  service.request.speed = numberOf(request, "speed", NONE);
+  service.request.paused = countOf(request, "paused", 1.0) == 1;
+  service.request.position = numberOf(request, "position", NONE);
   if (!nh.serviceClient<smartmill_msgs::PlayControl>(names::REPLAY_CONTROL).call(service))
-    return answerOf(NOT_THERE, "no recording is played");
-  return answerOf(service.response.ok ? 200 : BAD_REQUEST, service.response.message);
+    return messageResponse(UNAVAILABLE, "no recording is played");
+  return messageResponse(service.response.ok ? 200 : BAD_REQUEST, service.response.message);
 }
 
-Answer askCoefficients(ros::NodeHandle& nh, const Question& question) {
+ApiResponse queryCoefficients(ros::NodeHandle& nh, const ApiRequest& request) {
   smartmill_msgs::FindCoefficients service;
   const auto word = [&](const char* key) {
-    const auto found = question.query.find(key);
-    return found == question.query.end() ? std::string() : found->second;
+    const auto found = request.query.find(key);
+    return found == request.query.end() ? std::string() : found->second;
   };
   service.request.tool = word("tool");
   service.request.material = word("material");
   if (!nh.serviceClient<smartmill_msgs::FindCoefficients>(names::FIND_COEFFICIENTS).call(service))
-    return answerOf(NOT_THERE, "the load meter node does not answer");
+    return messageResponse(UNAVAILABLE, "the load meter node does not answer");
   const auto& found = service.response;
-  if (found.code != found.OK) return answerOf(NOT_THERE, found.message);
+  if (found.code != found.OK) return messageResponse(UNAVAILABLE, found.message);
   const auto& c = found.coefficients;
   const json answer = {{"tool", c.tool},
                        {"material", c.material},
@@ -135,9 +135,9 @@ Answer askCoefficients(ros::NodeHandle& nh, const Question& question) {
   return {200, answer.dump(-1, ' ', false, json::error_handler_t::replace)};
 }
 
-Answer newestReport(const std::string& folder) {
+ApiResponse newestReport(const std::string& folder) {
   namespace fs = std::filesystem;
-  if (folder.empty()) return answerOf(NOT_THERE, "no folder of reports was given");
+  if (folder.empty()) return messageResponse(UNAVAILABLE, "no folder of reports is set");
   fs::path newest;
   fs::file_time_type when;
   std::error_code failed;
@@ -154,10 +154,10 @@ Answer newestReport(const std::string& folder) {
       when = time;
     }
   }
-  if (newest.empty()) return answerOf(NOT_THERE, "no report yet");
+  if (newest.empty()) return messageResponse(UNAVAILABLE, "no report yet");
   std::ifstream in(newest);
   const json report = json::parse(in, nullptr, false);
-  if (!report.is_object()) return answerOf(NOT_THERE, newest.string() + ": cannot be read");
+  if (!report.is_object()) return messageResponse(UNAVAILABLE, newest.string() + ": cannot be read");
   return {200, json({{"folder", newest.parent_path().filename().string()}, {"report", report}}).dump()};
 }
 
