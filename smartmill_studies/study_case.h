@@ -14,7 +14,7 @@
 
 namespace smartmill {
 
-/// One case of a study, as studies/run asks for it: --case K --cases N --seed S prints one line of JSON, the
+/// One case of a study, as smartmill_studies/runner/run asks for it: --case K --cases N --seed S prints one line of JSON, the
 /// same whenever and wherever it runs. The program's own --seed stays its own. --score LINES: the study's
 /// figures from all cases' lines.
 struct StudyCase {

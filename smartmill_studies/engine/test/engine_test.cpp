@@ -1,4 +1,4 @@
-// studies/run, case and collect: what is done is what stands there whole.
+// smartmill_studies/runner/run, case and collect: what is done is what stands there whole.
 #include <unistd.h>
 
 #include <cstdlib>
