@@ -13,7 +13,7 @@ namespace {
 using Complex = std::complex<double>;
 constexpr double STEP = 10.0, LAST = 5500.0, HIGH = 5000.0;  // [Hz]
 constexpr double ALL_MODES = 1e5;                            // [Hz] of the plant's beam
-/// Nearer than that a found mode is the true one; a mode that only the beam tells of may be farther off.
+/// Matching distance of found and true mode; a mode predicted only by the beam model may be farther off.
 constexpr double SAME = 0.01, SAME_UNSEEN = 0.1;
 
 double between(std::mt19937_64& random, double low, double high) {
@@ -110,7 +110,7 @@ FrequencyResponse crossFrf(const plant::ToolInSpindle& tool, double struck, doub
 }
 
 std::string nameOf(Way way) {
-  constexpr const char* NAMES[WAYS] = {"none", "eq. 4.44", "spindle and tool apart", "the same, two heights"};
+  constexpr const char* NAMES[WAYS] = {"none", "eq. 4.44", "receptance coupling", "the same, two heights"};
   return NAMES[static_cast<int>(way)];
 }
 

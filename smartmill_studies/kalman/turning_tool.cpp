@@ -32,7 +32,7 @@ std::vector<CampaignTest> TurningToolCase::tests(double speed) const {
 Record TurningToolCase::record(const CampaignTest& test, std::uint64_t seed) const {
   sim::SimulationOptions simulation;
   simulation.seed = seed;
-  // Columns to be simulated.
+  // Simulated columns.
   Record wanted;
   const auto size = static_cast<std::size_t>(duration * test.sample_rate);
   std::vector<double> angle;
@@ -43,7 +43,7 @@ Record TurningToolCase::record(const CampaignTest& test, std::uint64_t seed) con
   wanted.add("spindle_angle") = angle;
   for (const char* name : {"fx", "fy", "fz", "tool_x", "tool_y"}) wanted.add(name).assign(size, 0.0);
   Record cut = simulateTest(spindle.at(test.spindle_speed, model), test, wanted, simulation);
-  // The displacement sensors' own.
+  // Noise of the displacement sensors.
   std::mt19937_64 random(seed);
   std::normal_distribution<double> noise(0.0, displacement_noise);
   for (const char* name : {"tool_x", "tool_y"})

@@ -18,7 +18,7 @@ namespace {
 using nlohmann::json;
 
 constexpr int MACHINES = 50, MATERIALS = 6, TOOLS = 3, FIRST_CUTS = 4, MOST_CUTS = 12;
-constexpr double STATED = 0.01;  // [1] deviation that a record states
+constexpr double STATED = 0.01;  // [1] standard deviation stated by a record
 constexpr double NAMED = 0.9;    // [1] probability from which a machine is named
 const std::string LAST = "material " + std::to_string(MATERIALS - 1);
 
@@ -54,7 +54,7 @@ class Shop {
   static bool isNew(int machine) { return machine % 3 == 0; }  // never cut the last material
   static std::string nameOf(int machine) { return "mill " + std::to_string(machine); }
 
-  /// What the machine's next cuts of this group will scatter about.
+  /// Mean of the machine's next cuts of this group.
   double truth(int machine, int material, int tool) const {
     const auto g = static_cast<std::size_t>(material * TOOLS + tool);
     return groups_[g] + effects_[static_cast<std::size_t>(machine)] +
@@ -104,7 +104,7 @@ double share(const std::vector<double>& z) {
   return inside / static_cast<double>(z.size());
 }
 
-// A machine alone, before its first cut of a material: what it has seen of others.
+// Prediction by the machine alone before its first cut of a material: from its other materials.
 double loneGuess(const std::vector<FleetObservation>& seen, const std::string& machine) {
   double sum = 0.0, count = 0.0;
   for (const FleetObservation& o : seen) {
@@ -115,7 +115,7 @@ double loneGuess(const std::vector<FleetObservation>& seen, const std::string& m
   return count > 0.0 ? sum / count : std::log(1.2e9);
 }
 
-/// Machines that never cut the last material: its first cuts, by the fleet and alone.
+/// Machines that never cut the last material: predictions of its first cuts, by the fleet and by the machine alone.
 void firstCuts(Shop& shop, const std::vector<FleetObservation>& seen, json* line) {
   std::vector<FleetObservation> grown = seen;
   std::vector<double> mean(MACHINES, 0.0);
@@ -144,7 +144,7 @@ void firstCuts(Shop& shop, const std::vector<FleetObservation>& seen, json* line
   }
 }
 
-/// Who is odd among those with a history; and how many cuts a newcomer needs that is off by a quarter.
+/// Detection of outliers among machines with a history, and number of cuts to detect a new machine that is off by a quarter.
 void oddMachines(Shop& shop, const std::vector<FleetObservation>& seen, json* line) {
   const FleetModel model(seen);
   int found = 0, falsely = 0;
@@ -165,7 +165,7 @@ void oddMachines(Shop& shop, const std::vector<FleetObservation>& seen, json* li
   double odd = 0.0;
   while (cuts < MOST_CUTS && odd <= NAMED) {
     FleetObservation o = shop.cut(1, cuts % MATERIALS, 0);
-    // Off by a quarter from the fleet's middle, whatever the machine whose cuts these are is.
+    // Off by a quarter from the fleet mean, independent of the machine that supplies the cuts.
     o.value *= std::exp(std::log(1.25) - shop.effect(1));
     o.machine = "newcomer";
     grown.push_back(o);

@@ -28,7 +28,7 @@ inline std::size_t channelNumber(const std::string& name) {
   return static_cast<std::size_t>(at - names.begin());
 }
 
-/// From the force on the sensor to what its channels show.
+/// Force sensor: from applied forces to channels.
 class Sensor {
  public:
   Sensor(const Plant& plant, const Hidden& hidden, double rpm, double step) : direct_(plant.sensor_direct) {
@@ -100,7 +100,7 @@ class Drive {
   double speed_, friction_ = 0.0, keep_ = 0.0, value_ = 0.0;
 };
 
-/// What stands on a sensor besides the cut.
+/// Forces on the sensor other than cutting forces.
 class Disturbance {
  public:
   Disturbance(const Hidden& hidden, double speed)
@@ -164,7 +164,7 @@ class Chain {
       gain_[channelNumber(e->words.at("channel"))] *= e->numbers.at("gain");
   }
 
-  /// Every step: cross-talk and gains, which delays come after.
+  /// Called every step: crosstalk and gains, before the delays.
   void feed(const Channels& c) {
     Channels mixed = c;
     for (std::size_t a = 0; a < 3; ++a)
@@ -174,7 +174,7 @@ class Chain {
     while (late_.size() > longest_) late_.pop_front();
   }
 
-  /// What is written at this instant, without noise. @param angle [rad] of the spindle
+  /// The recorded values of this instant, without noise. @param angle [rad] of the spindle
   Channels shown(double time, double angle) const {
     Channels c = late_.back();
     if (delayed_) {
@@ -224,7 +224,7 @@ class Chain {
   double speed_, step_, hum_phase_, own_phase_;
   std::array<double, 4> delay_{};
   bool delayed_ = false;
-  std::size_t longest_ = 0;  // steps that the latest channel needs
+  std::size_t longest_ = 0;  // delay of the slowest channel [steps]
   std::array<std::array<double, 3>, 3> cross_talk_{};
   Channels gain_{1.0, 1.0, 1.0, 1.0};
   std::deque<Channels> late_;

@@ -9,7 +9,7 @@
 namespace smartmill::plant {
 namespace {
 
-// What a point of the plate moves along x, y, z with the plate's six coordinates (shift, small turns).
+// Displacement of a point of the plate along x, y, z by its six coordinates (translations, small rotations).
 Eigen::Matrix<double, 3, 6> motionAt(const std::array<double, 3>& r) {
   Eigen::Matrix<double, 3, 6> m;
   m << 1, 0, 0, 0, r[2], -r[1], 0, 1, 0, -r[2], 0, r[0], 0, 0, 1, r[1], -r[0], 0;

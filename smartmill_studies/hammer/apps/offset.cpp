@@ -29,11 +29,10 @@ struct Request {
   StudyCase one;
 };
 
-/// Modes below this share of the largest gain show in no chart.
+/// Modes below this share of the largest gain have no influence on a chart.
 constexpr double COUNTS = 0.03;
 
-/// [m/N] A slot is limited to a depth in proportion to -1 / (2 Re H) where Re H is most negative: what
-/// figure 4.8 compares.
+/// [m/N] The depth limit of a slot is proportional to -1 / (2 Re H) at the most negative Re H, as in figure 4.8.
 double softest(const FrequencyResponse& frf) {
   double least = 0.0;
   for (std::size_t i = 0; i < frf.size(); ++i) {
@@ -75,14 +74,14 @@ void save(const OffsetOutcome& outcome, const std::string& folder, int machine) 
             outcome.frf[2].std_dev[i], at(3).real(), at(3).imag());
   }
   csv.save(folder + "/machine_" + std::to_string(machine) + ".csv");
-  drawSlotLimits({{"struck and read at the tip", outcome.truth},
+  drawSlotLimits({{"direct, at the tip", outcome.truth},
                   {"no correction", outcome.frf[0]},
                   {"eq. 4.44", outcome.frf[1]},
-                  {"spindle and tool apart", outcome.frf[2]}},
+                  {"receptance coupling", outcome.frf[2]}},
                  folder + "/figure_4_8_machine_" + std::to_string(machine) + ".png");
 }
 
-/// One machine of its own seed.
+/// One machine with its own seed.
 void runOne(const Request& request) {
   request.one.check(request.machines);
   std::mt19937_64 random(seedOfCase(request.seed, request.one.number));
@@ -93,7 +92,7 @@ void runOne(const Request& request) {
     for (int w = 0; w < WAYS; ++w) {
       Tally tally;
       tally.add(outcome, w);
-      nlohmann::json modes = nlohmann::json::array();  // relative error of the gain, its deviation
+      nlohmann::json modes = nlohmann::json::array();  // relative error of the gain, and its standard deviation
       for (const GainError& e : outcome.modes[w])
         if (e.share >= COUNTS) modes.push_back({e.error, e.std});
       line[nameOf(static_cast<Way>(w))] = {
@@ -107,7 +106,7 @@ void runOne(const Request& request) {
 }
 
 void report(const Tally (&tallies)[WAYS], int machines, int failed) {
-  std::printf("%d machines, %d failed; modes below 5 kHz with %.0f %% of the largest gain and more\n",
+  std::printf("%d machines, %d failed; modes below 5 kHz with at least %.0f %% of the largest gain\n",
               machines, failed, 100.0 * COUNTS);
   if (failed == machines) return;
   std::printf("%-24s %-22s %-22s %-26s %s\n", "", "gain: median, 95 %", "FRF: median, 95 %",
@@ -169,11 +168,11 @@ void run(const Request& request) {
 int main(int argc, char** argv) {
   Request request;
   CommandLine line(
-      "The tip's FRF from one struck above it: no correction, Dunwoody's eq. 4.44, spindle and tool apart.");
-  request.one.addTo(line, "--machines,--cases", request.machines, "drawn tools and spindles");
+      "FRF of the tip from an FRF measured above it: no correction, Dunwoody's eq. 4.44, receptance coupling.");
+  request.one.addTo(line, "--machines,--cases", request.machines, "number of random tools and spindles");
   request.one.addScore(line);
   line.option("--seed", request.seed).showDefault();
-  line.option("--noise", request.noise, "of the FRF, a share of its rms").notNegative().showDefault();
+  line.option("--noise", request.noise, "noise of the FRF as a share of its RMS").notNegative().showDefault();
   line.option("-o,--out", request.out, "folder for the FRFs of the first ten as CSV, and figure 4.8 of each");
   return runProgram(line, argc, argv, [&] { run(request); });
 }

@@ -21,7 +21,7 @@ std::vector<MotorCut> day(const char* name, const MotorDay& one,
   return cuts;
 }
 
-/// Along X or Y only: there the cut always opposes the feed.
+/// Along X or Y only, where the cutting force always opposes the feed.
 MotorDay standardDay(unsigned seed, int cuts) {
   MotorDay one{20.0, seed, cuts};
   one.diagonal = false;
@@ -75,7 +75,7 @@ void run(int cuts, unsigned seed, double warmer, const std::string& out) {
        judgeDay(standard, calibration, day("another day", {20.0 + warmer, seed + 2, cuts}, calibration)));
   MotorDay no_lines{20.0 + warmer, seed + 2, cuts};
   no_lines.rapid_moves = false;
-  tell((name + ", lags not known: no lines").c_str(),
+  tell((name + ", lags unknown: no lines").c_str(),
        judgeDay(standard, calibration, day("no lines", no_lines, calibration)));
   MotorDay with_sensor{20.0 + warmer, seed + 2, cuts};
   with_sensor.force_sensor = true;
@@ -91,16 +91,14 @@ void run(int cuts, unsigned seed, double warmer, const std::string& out) {
 
 int main(int argc, char** argv) {
   CommandLine line(
-      "Motor currents of the simulated machine to forces: regression and ANFIS learnt on one day, tried on "
-      "another "
-      "of other warmth, and the one estimator of all sensors.");
+      "Forces from motor currents of the simulated machine: regression and ANFIS trained on one day and tested on a day with another temperature, and the estimator of all sensors.");
   int cuts = 60;
   unsigned seed = 1;
   double warmer = 15.0;
   std::string out;
-  line.option("--cuts", cuts, "a day").showDefault().within(24, 10000);
+  line.option("--cuts", cuts, "cuts per day").showDefault().within(24, 10000);
   line.option("--seed", seed, "of the first day").showDefault();
-  line.option("--warmer", warmer, "the other day, K").showDefault();
+  line.option("--warmer", warmer, "temperature difference of the other day [K]").showDefault();
   line.option("-o", out, "calibration file for loadmeter_node (motor_calibration)");
   return runProgram(line, argc, argv, [&] { run(cuts, seed, warmer, out); });
 }
