@@ -14,7 +14,9 @@
 
 namespace smartmill {
 
-/// Options of one case of a study, as used by smartmill_studies/runner/run: --case K --cases N --seed S prints one line of JSON, which is the same in every run on every host. --score LINES prints the figures of the study from the lines of all cases.
+/// Options of one case of a study, as used by smartmill_studies/runner/run: --case K --cases N --seed S
+/// prints one line of JSON, which is the same in every run on every host. --score LINES prints the figures of
+/// the study from the lines of all cases.
 struct StudyCase {
   int number = -1;  ///< -1: all cases
   std::string lines;

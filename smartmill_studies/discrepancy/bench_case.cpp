@@ -44,7 +44,8 @@ std::vector<double> scores(const FoundEffect& found, const EffectEntry& truth) {
   return all;
 }
 
-// Lower bound for any model: the gap between two runs of the plant over root 2, over the tests and channels that a gap counts.
+// Lower bound for any model: the gap between two runs of the plant over root 2, over the tests and channels
+// that a gap counts.
 double floorOf(const Dataset& data, bool heldout, const std::vector<Record>& one,
                const std::vector<Record>& other) {
   double squares = 0.0, count = 0.0;

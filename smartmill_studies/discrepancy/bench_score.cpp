@@ -68,7 +68,8 @@ void printShares(const std::vector<json>& lines) {
   std::printf("named where no effect of the catalogue was hidden: %d\n", false_effects);
   if (halved.all > 0)
     std::printf(
-        "causes outside the catalogue: held-out gap halved in %d of %d; its part above the plant's floor, where there is one, in %d of %d\n",
+        "causes outside the catalogue: held-out gap halved in %d of %d; its part above the plant's floor, "
+        "where there is one, in %d of %d\n",
         halved.right, halved.all, halved_above_floor.right, halved_above_floor.all);
   if (low_gap.all > 0)
     std::printf("held-out gap at most 1.1 of the plant's floor: %d of %d named cases\n", low_gap.right,

@@ -7,7 +7,9 @@
 
 namespace smartmill::discrepancy {
 
-/// Prints the number of correct cases of each kind (rigid and vibrating separately), held-out gaps compared with the plant's floor, and the parameters within their 95 % intervals. Draws confusion.png and reliability.png.
+/// Prints the number of correct cases of each kind (rigid and vibrating separately), held-out gaps compared
+/// with the plant's floor, and the parameters within their 95 % intervals. Draws confusion.png and
+/// reliability.png.
 /// @param lines of runBenchCase()
 void scoreBench(const std::vector<nlohmann::json>& lines, const std::string& folder);
 

@@ -12,8 +12,10 @@ namespace smartmill::discrepancy {
 /// 30 and 1.2 %. What the campaign hides (its truth.yaml) is given.
 /// @param chattering adds a cut like the deepest one, deep enough that it chatters
 /// @return case, campaign, chattering (fitted cuts that chatter), named (should be nothing),
-/// values (number of coefficients and modal parameters), within (number of them within 2 standard deviations), largest (largest error [standard deviations]), distance (root mean square error of all, by their covariance [standard deviations]), right (distance at most 2 and no effect named), gap_before, gap_after, heldout_after,
-/// seconds; or refused: the reason
+/// values (number of coefficients and modal parameters), within (number of them within 2 standard
+/// deviations), largest (largest error [standard deviations]), distance (root mean square error of all, by
+/// their covariance [standard deviations]), right (distance at most 2 and no effect named), gap_before,
+/// gap_after, heldout_after, seconds; or refused: the reason
 nlohmann::json runStart(const std::string& campaign, bool chattering, std::uint64_t seed, int number);
 
 }  // namespace smartmill::discrepancy

@@ -20,7 +20,7 @@ void channels(const std::uint8_t* data, std::size_t size) {
     ChannelFile channels = readTextTable(file);
     for (FileChannel& channel : channels.channels) {
       takeUnit(channel);
-      // As the files that hold single numbers next to their channels: .mat, HDF5.
+      // As files with scalar values next to their channels: .mat, HDF5.
       channels.numbers[channel.name] = channel.values.front();
     }
     told([&] { mapChannels(channels, choices, TestKind::cut, 1000.0); });

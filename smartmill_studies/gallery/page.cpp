@@ -9,7 +9,7 @@
 namespace smartmill::studies {
 namespace {
 
-/// On a phone a row stands as a block, each cell after its column's name.
+/// On a phone a row is a block, with the column name before each cell.
 constexpr const char* STYLE = R"(<style>
 main a { color: var(--x); }
 @media (max-width: 640px) {
@@ -27,10 +27,10 @@ std::string cell(const std::string& text, const std::string& name = "") {
   return (name.empty() ? "<td>" : "<td data-name=\"" + name + "\">") + escapedHtml(text) + "</td>";
 }
 
-/// A row, and the figure whose it is.
+/// A row and its figure.
 using Told = std::pair<const Figure*, const Compared*>;
 
-/// @param linked each row with a link to its figure
+/// @param linked whether each row has a link to its figure
 void table(ReportPage& page, const std::vector<Told>& rows, bool linked) {
   if (rows.empty()) return;
   page.html() << "<table><tr>" << (linked ? "<th>figure</th>" : "")
@@ -57,18 +57,18 @@ std::vector<Told> rowsOf(const std::vector<Shown>& shown, Verdict verdict) {
 }  // namespace
 
 void writePage(const std::vector<Shown>& shown, unsigned seed, const std::string& file) {
-  ReportPage page("The documents' figures and tables, redrawn");
+  ReportPage page("Figures and tables of the documents, reproduced");
   const auto agrees = rowsOf(shown, Verdict::agrees), better = rowsOf(shown, Verdict::better),
              differs = rowsOf(shown, Verdict::differs);
   page.html() << STYLE << "<p class=\"verdict\">"
               << formatted("%zu numbers agree, %zu are better here, %zu do not agree; %zu figures, seed %u.",
                            agrees.size(), better.size(), differs.size(), shown.size(), seed)
-              << "</p>\n<p><a href=\"#agrees\">what agrees</a>, <a href=\"#better\">what is better</a>, <a "
-                 "href=\"#differs\">what does not agree</a>, <a href=\"#figures\">the figures</a></p>\n";
+              << "</p>\n<p><a href=\"#agrees\">agreement</a>, <a href=\"#better\">better here</a>, <a "
+                 "href=\"#differs\">disagreement</a>, <a href=\"#figures\">the figures</a></p>\n";
   const std::tuple<Verdict, const char*, const std::vector<Told>*> parts[] = {
-      {Verdict::agrees, "What agrees", &agrees},
-      {Verdict::better, "What is better", &better},
-      {Verdict::differs, "What does not agree", &differs}};
+      {Verdict::agrees, "Agreement", &agrees},
+      {Verdict::better, "Better here", &better},
+      {Verdict::differs, "Disagreement", &differs}};
   for (const auto& [verdict, title, rows] : parts) {
     page.html() << "<h2 id=\"" << nameOf(verdict) << "\">" << title << "</h2>\n";
     if (rows->empty()) page.html() << "<p>Nothing.</p>\n";

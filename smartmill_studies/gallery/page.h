@@ -12,7 +12,7 @@ struct Shown {
   Drawn drawn;
 };
 
-/// One HTML file: opens with what differs, what is better and what agrees, then figure by figure.
+/// One HTML file: agreement, better results and disagreement, then all figures.
 /// @throws Error
 void writePage(const std::vector<Shown>& shown, unsigned seed, const std::string& file);
 

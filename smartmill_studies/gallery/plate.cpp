@@ -1,4 +1,4 @@
-// Bachrathy and Stepan: a plate dynamometer inverted with all its channels.
+// Bachrathy and Stepan: inversion of a plate dynamometer with all its channels.
 
 #include <algorithm>
 #include <array>
@@ -24,9 +24,9 @@ using Rows = std::vector<std::vector<double>>;
 using Forces = std::array<std::vector<double>, 3>;
 
 constexpr double RATE = 51200.0, BAND = 8000.0;                // [Hz]
-constexpr std::array<double, 3> POINT{{0.026, -0.020, 0.03}};  // [m] where nobody tapped
+constexpr std::array<double, 3> POINT{{0.026, -0.020, 0.03}};  // [m] not tapped
 
-/// The sensor, tapped at 14 points as in figure 1, three times each.
+/// The sensor with three taps at each of 14 points, as in figure 1.
 struct Plate {
   explicit Plate(unsigned seed)
       : random(seed),
@@ -120,13 +120,13 @@ Drawn bouncing(const std::string& folder, unsigned seed) {
   const double raw = rmsShare(measured[2], applied[2], FROM, TO),
                left = rmsShare(told[2], applied[2], FROM, TO);
   return {{png},
-          {{"bouncing hammer, compensated against hammer, figure 3", "\"almost the same signal\"",
+          {{"bouncing hammer, compensated force and hammer, figure 3", "\"almost the same signal\"",
             formatted("rms error %.1f %% (measured %.0f %%)", 100.0 * left, 100.0 * raw),
             left < 0.1 ? Verdict::agrees : Verdict::differs,
             "all frequencies; the band ends at 8 kHz, as theirs"}}};
 }
 
-/// Table 1.1 at a speed: force of the workpiece, what is measured, what is compensated.
+/// Table 1.1 at one speed: force on the workpiece, measured and compensated force.
 struct Milled {
   std::vector<double> angle;
   Forces applied;
@@ -194,7 +194,7 @@ Drawn twoSpeeds(const std::string& folder, unsigned seed) {
                           formatted("error %.1f %% (measured %.0f %%)", worst,
                                     std::max(error(m.measured[0], 0), error(m.measured[1], 1))),
                           worst < 5.0 ? Verdict::better : Verdict::differs,
-                          "no error is printed: theirs is judged by eye; the material is not told"});
+                          "no error is printed, only a visual judgement; the material is not stated"});
   }
   return drawn;
 }
@@ -223,7 +223,7 @@ std::string overAngle(const std::string& folder, unsigned seed) {
     }
     std::sort(rows.begin(), rows.end());
     plot.block(formatted("feed%zu", feeds.size()), rows);
-    feeds.push_back(formatted("%.3f mm a tooth", 1e3 * feed));
+    feeds.push_back(formatted("%.3f mm per tooth", 1e3 * feed));
   }
   plot
       << "set multiplot layout 3,1\nset grid\nset lmargin 10\nset key above horizontal samplen 2\nset xlabel "
@@ -296,8 +296,8 @@ Drawn forceOverChip(const std::string& folder, unsigned seed) {
                    way == 0 ? "radial" : "tangential"),
          "\"overlap with very small noise\"", formatted("rms %.1f %% off the material's law", 100.0 * error),
          error < 0.1 ? Verdict::agrees : Verdict::differs,
-         way == 0 ? "their radial force bends \"unexpectedly\"; the simulated material's is straight"
-                  : "a helical edge is taken at its mean lag, so the ends of the arc bend away"});
+         way == 0 ? "their radial force bends \"unexpectedly\"; that of the simulated material is straight"
+                  : "a helical edge is evaluated at its mean lag, so that the ends of the arc deviate"});
   }
   return drawn;
 }

@@ -10,7 +10,8 @@
 
 namespace smartmill::studies {
 
-/// A tool in a spindle of the benches' plant (Euler beam on a rigid spindle with two springs; the correction uses a shear beam on springs), its model as stated, and the offset of the station.
+/// A tool in a spindle of the benches' plant (Euler beam on a rigid spindle with two springs; the correction
+/// uses a shear beam on springs), its model as stated, and the offset of the station.
 struct OffsetCase {
   plant::ToolInSpindle truth;
   hammer::ToolBeam believed;
@@ -18,7 +19,8 @@ struct OffsetCase {
 };
 OffsetCase drawOffsetCase(std::mt19937_64& random);
 
-/// FRF of 20..5500 Hz, 10 Hz lines, with force and response at heights above the tip [m], with noise (as share of its RMS).
+/// FRF of 20..5500 Hz, 10 Hz lines, with force and response at heights above the tip [m], with noise (as
+/// share of its RMS).
 FrequencyResponse crossFrf(const plant::ToolInSpindle& tool, double struck, double read, double noise,
                            std::mt19937_64& random);
 

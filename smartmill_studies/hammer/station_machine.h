@@ -14,7 +14,8 @@
 
 namespace smartmill::hammer {
 
-/// Axes and spindle that move at constant speed after a latency, with the simulated hammer station: executes the commands of a HammerSequence and returns its inputs.
+/// Axes and spindle that move at constant speed after a latency, with the simulated hammer station: executes
+/// the commands of a HammerSequence and returns its inputs.
 class StationMachine {
  public:
   StationMachine(const DrawnStation& drawn, std::uint64_t seed);
@@ -29,9 +30,9 @@ class StationMachine {
   /// Advances by 10 ms.
   void block(Streams& streams);
 
-  double time() const { return time_; }             ///< [s]
-  double closest() const { return closest_; }       ///< [m] smallest distance of the tool to the face of a sensor
-  bool touched() const { return touched_; }         ///< a collision with a sensor
+  double time() const { return time_; }        ///< [s]
+  double closest() const { return closest_; }  ///< [m] smallest distance of the tool to the face of a sensor
+  bool touched() const { return touched_; }    ///< a collision with a sensor
   double struckRetreat() const { return struck_; }  ///< [m] behind the cutting circle, largest of all hits
   int strikes() const { return strikes_; }
   int searchMoves() const { return search_moves_; }  ///< spindle moves before the first hit
@@ -57,7 +58,8 @@ class StationMachine {
   double rest_volt_ = 0.0, volt_ = 0.0;
 };
 
-/// Inputs of the sequence: the tool as stated by the operator and the catalogue, the sensor as stated by its set-up.
+/// Inputs of the sequence: the tool as stated by the operator and the catalogue, the sensor as stated by its
+/// set-up.
 struct StationTask {
   HammerParameters parameters;
   MeasureFrfGoal goal;

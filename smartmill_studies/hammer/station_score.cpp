@@ -73,7 +73,8 @@ json modeLines(const Truth& truth, const MeasureFrfResult& result, double factor
     const bool counts = peak(tip) > SHOWS * tip_peak;
     if (!counts) continue;
     if (!found) {
-      // A mode that is invisible at the sensor or within the width of another is no fault of the fit, but is missing at the tip.
+      // A mode that is invisible at the sensor or within the width of another is no fault of the fit, but is
+      // missing at the tip.
       ++(peak(measured) > SHOWS * shown_peak ? missed : alone);
       continue;
     }
@@ -107,7 +108,9 @@ json modeLines(const Truth& truth, const MeasureFrfResult& result, double factor
   return modes;
 }
 
-/// [1] RMS error of a scaled FRF over the RMS of the truth, and relative error of its least real part, to which the least depth limit of a slot is inversely proportional (figure 4.8); from 100 Hz to the end of the band.
+/// [1] RMS error of a scaled FRF over the RMS of the truth, and relative error of its least real part, to
+/// which the least depth limit of a slot is inversely proportional (figure 4.8); from 100 Hz to the end of
+/// the band.
 struct FrfError {
   double frf = 0.0, depth = 0.0;
 };
@@ -125,7 +128,8 @@ FrfError errorOf(const FrequencyResponse& frf, double factor, const ModalModel& 
   return {std::sqrt(off / all), due / softest - 1.0};
 }
 
-/// [1] RMS over the lines of the band of the error in stated standard deviations, without the common scale of the sensor.
+/// [1] RMS over the lines of the band of the error in stated standard deviations, without the common scale of
+/// the sensor.
 double lineScatter(const FrequencyResponse& frf, const ModalModel& truth) {
   std::complex<double> both;
   double own = 0.0;

@@ -27,7 +27,8 @@ struct StationFrfs {
   FrequencyResponse tip;       ///< receptance coupling
 };
 
-/// Draws the machine with a number, measures it and compares the result with the truth. @return one line of the table
+/// Draws the machine with a number, measures it and compares the result with the truth. @return one line of
+/// the table
 /// @param frfs filled if not null
 nlohmann::json runStation(const StationStudy& study, int number, StationFrfs* frfs = nullptr);
 

@@ -15,7 +15,8 @@ namespace smartmill::kalman {
 /// Spindle speeds of his tables [rpm].
 constexpr std::array<double, 7> BURZONI_RPM{{1000, 4500, 6000, 8400, 9000, 11600, 17600}};
 
-/// Data of the sensor in the simulated spindle, calibrated and tapped by the steps of the product, in air and in seven slots.
+/// Data of the sensor in the simulated spindle, calibrated and tapped by the steps of the product, in air and
+/// in seven slots.
 struct BurzoniData {
   std::array<ModalModel, 2> sensor;
   std::array<ReferenceTaps, 2> taps;
@@ -51,7 +52,8 @@ struct BurzoniTable {
 BurzoniTable burzoniTable(const BurzoniData& data, std::size_t number, double band);
 constexpr std::size_t BURZONI_TABLES = 8;
 
-/// Static loads and unbalance (sections 3.2, 3.3) on the same machine, with the sensor calibrated by his weights.
+/// Static loads and unbalance (sections 3.2, 3.3) on the same machine, with the sensor calibrated by his
+/// weights.
 struct BurzoniStatics {
   SpindleSensorCalibration calibration;
   std::array<double, 3> verified{};                       ///< [1] error against the dynamometer at 120 mm

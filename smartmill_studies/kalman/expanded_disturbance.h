@@ -11,7 +11,9 @@
 namespace smartmill::kalman {
 
 /// Burzoni's expanded disturbance model (eq. 4-43..4-50): the force is a constant and an undamped oscillator
-/// at the tooth passing frequency, both driven by one noise w (theta_dc = theta_ac = 1), in addition to the modes of the sensor; discretised exactly (5-9), stationary gain (5-46), force after the measurement update (5-47).
+/// at the tooth passing frequency, both driven by one noise w (theta_dc = theta_ac = 1), in addition to the
+/// modes of the sensor; discretised exactly (5-9), stationary gain (5-46), force after the measurement update
+/// (5-47).
 class ExpandedDisturbanceFilter {
  public:
   /// @param tooth_passing [Hz] @param q [N2/s] intensity of w @param r [N2] of a sample. @throws Error.

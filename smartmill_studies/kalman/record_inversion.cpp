@@ -17,7 +17,8 @@ using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::MatrixXcd;
 
-/// Element of the matrix on the lines of a longer transform: the zero-padded impulse response. Lines above the band are faded out, since the taps do not excite them.
+/// Element of the matrix on the lines of a longer transform: the zero-padded impulse response. Lines above
+/// the band are faded out, since the taps do not excite them.
 std::vector<Complex> onLines(const std::vector<Complex>& element, double spacing, double bandwidth,
                              std::size_t length) {
   const std::size_t samples = 2 * (element.size() - 1);
@@ -76,8 +77,9 @@ struct LongMatrix {
   }
 };
 
-/// Inverse of a rigid body on force-measuring feet: (K + i w C - w^2 M) (K + i w C)^-1 = I - w^2 M Z^-1, Z = K +
-/// i w C nearly real. Each element is 1 or 0 at frequency zero, plus a real polynomial in w^2 and w^4 and an imaginary one in w^3 and w^5: four coefficients fitted to all lines.
+/// Inverse of a rigid body on force-measuring feet: (K + i w C - w^2 M) (K + i w C)^-1 = I - w^2 M Z^-1, Z =
+/// K + i w C nearly real. Each element is 1 or 0 at frequency zero, plus a real polynomial in w^2 and w^4 and
+/// an imaginary one in w^3 and w^5: four coefficients fitted to all lines.
 class RigidInverse {
  public:
   /// @param bandwidth [Hz] highest fitted line

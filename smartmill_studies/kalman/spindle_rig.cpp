@@ -11,8 +11,8 @@ namespace smartmill::kalman {
 namespace {
 
 constexpr double BLOCK_TIME = sim::World::BLOCK / sim::World::SAMPLE_RATE;  // [s]
-constexpr double SETTLES = 0.25;                                            // [s] settling after a change of load
-constexpr double READS = 0.25;                                              // [s] duration of a measurement
+constexpr double SETTLES = 0.25;  // [s] settling after a change of load
+constexpr double READS = 0.25;    // [s] duration of a measurement
 
 }  // namespace
 

@@ -11,7 +11,8 @@
 
 namespace smartmill::kalman {
 
-/// The simulated machine with its sensors and the CompensationPipeline of one of them: the streams of the nodes in one thread, without ROS.
+/// The simulated machine with its sensors and the CompensationPipeline of one of them: the streams of the
+/// nodes in one thread, without ROS.
 class SpindleRig {
  public:
   /// @param use_plate the dynamometer's blocks are compensated; false: those of the sensor in the spindle
@@ -64,13 +65,16 @@ class SpindleRig {
   Record record_;
 };
 
-/// A straight pass along x at a y [m], at constant speed; the record contains complete blocks from full engagement on.
+/// A straight pass along x at a y [m], at constant speed; the record contains complete blocks from full
+/// engagement on.
 /// @param speed [rad/s] @param air [s] before the cut @param through the tool cuts to the end of the stock
 SpindleRig::Record cutAlong(SpindleRig& rig, const MachineModel& model, double y,
                             const Engagement& engagement, double speed, double air, double seconds,
                             bool through);
 
-/// A straight slot through the stock of the model along x, at constant speed; the record contains complete blocks from full engagement on. @param speed [rad/s] @param depth [m] @param feed [m] per tooth @param air [s] before the cut
+/// A straight slot through the stock of the model along x, at constant speed; the record contains complete
+/// blocks from full engagement on. @param speed [rad/s] @param depth [m] @param feed [m] per tooth @param air
+/// [s] before the cut
 SpindleRig::Record cutSlot(SpindleRig& rig, const MachineModel& model, double speed, double depth,
                            double feed, double air, double seconds);
 

@@ -100,7 +100,8 @@ ReferenceTaps plantAt(const ReferenceTaps& taps, const FrequencyResponse& measur
     auto lines = fourier(response);
     const std::vector<double> frequency = fourierFrequencies(response.size(), sample_rate);
     for (std::size_t i = 1; i < lines.size() && i < measured.size(); ++i) {
-      if (measured.frequency[i] != frequency[i]) throw Error("confidence interval: the FRFs have different frequency lines");
+      if (measured.frequency[i] != frequency[i])
+        throw Error("confidence interval: the FRFs have different frequency lines");
       const double s = measured.std_dev.at(i) / std::abs(measured.value[i]);
       if (std::isfinite(s)) lines[i] *= std::polar(1.0 + k * std::min(s, 0.3), k * std::min(s, 0.3));
     }

@@ -10,7 +10,8 @@
 
 namespace smartmill::kalman {
 
-/// Burzoni's tuning: the force is a random walk of intensity q = 2^n [N2/s], n = 1..30 (eq. 6-2), scored by the RMSE of amplitude spectra at the harmonics of a spindle speed (eq. 6-1).
+/// Burzoni's tuning: the force is a random walk of intensity q = 2^n [N2/s], n = 1..30 (eq. 6-2), scored by
+/// the RMSE of amplitude spectra at the harmonics of a spindle speed (eq. 6-1).
 constexpr int LEAST_EXPONENT = 1, MOST_EXPONENT = 30;
 
 /// RMSE [N s] of every exponent (rows) at every spindle speed (columns).
@@ -25,7 +26,8 @@ struct TuningMap {
 std::vector<double> randomWalkForce(const std::vector<double>& measured, const ModalModel& sensor,
                                     double sample_rate, double q, double r);
 
-/// Map from taps: filtered sensor output compared with the hammer force, harmonics up to `band` [Hz], +- 1 Hz each. @param r [N2]
+/// Map from taps: filtered sensor output compared with the hammer force, harmonics up to `band` [Hz], +- 1 Hz
+/// each. @param r [N2]
 TuningMap tapMap(const ReferenceTaps& taps, const ModalModel& sensor, double sample_rate, double r,
                  const std::vector<double>& speeds, double band);
 
@@ -45,7 +47,9 @@ struct CutScore {
 CutScore scoreCut(const std::vector<double>& force, const std::vector<double>& truth, double sample_rate,
                   double spindle_speed, int flutes, std::size_t from, double band, double amplitude_band);
 
-/// Memory [revolutions] of the harmonics in each band, by the likelihood of a cut's innovations; it requires only the measured force. Noise comes from the sensor and from the uncertainty of its FRF. @param edges [Hz] between the bands, ascending @param frf measured, with std_dev
+/// Memory [revolutions] of the harmonics in each band, by the likelihood of a cut's innovations; it requires
+/// only the measured force. Noise comes from the sensor and from the uncertainty of its FRF. @param edges
+/// [Hz] between the bands, ascending @param frf measured, with std_dev
 struct BandTuning {
   std::vector<double> memory;  ///< [1] one per band
   double log_likelihood = 0.0;
@@ -66,8 +70,8 @@ struct NamedMap {
   TuningMap map;
   std::vector<std::pair<double, int>> cuts;
 };
-/// Draws maps next to each other with gnuplot, with the optimum of the taps as a line and the cuts as dots. @throws
-/// Error.
+/// Draws maps next to each other with gnuplot, with the optimum of the taps as a line and the cuts as dots.
+/// @throws Error.
 void drawMaps(const std::vector<NamedMap>& maps, const std::string& png);
 
 }  // namespace smartmill::kalman

@@ -35,7 +35,8 @@ struct TurningToolCase {
   void write(const std::string& folder, std::uint64_t seed) const;
 };
 
-/// The tool of the studies: 1200 and 1100 Hz, 12 um of runout; at 18,000 rpm 12 % less stiffness and a quarter more damping.
+/// The tool of the studies: 1200 and 1100 Hz, 12 um of runout; at 18,000 rpm 12 % less stiffness and a
+/// quarter more damping.
 TurningToolCase turningToolCase();
 
 }  // namespace smartmill::kalman

@@ -225,7 +225,8 @@ CaseErrors judge(const MachineCase& one, const Faults& faults) {
 
   LoadRecordOptions options;
   options.depth_uncertainty = faults.depth_error;
-  options.runout_uncertainty = faults.largest_runout / std::sqrt(3.0);  // of a uniform distribution up to the largest
+  options.runout_uncertainty =
+      faults.largest_runout / std::sqrt(3.0);  // of a uniform distribution up to the largest
   MachineModel model = one.model;
   if (faults.gain_error > 0.0) {
     options.spindle_uncertainty = true;

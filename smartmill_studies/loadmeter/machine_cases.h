@@ -41,8 +41,8 @@ struct CaseErrors {
   double thesis_ktc, thesis_kte;  ///< [1] procedure of the thesis (eq. 3.5..3.19)
   double ktc, kte;                ///< [1] this package
   double z_ktc, z_kte;            ///< [1] error over stated standard deviation
-  double z_beside_depth;  ///< [1] of Ktc, without the depth error in error and standard deviation
-  double depth;           ///< [1] drawn error of the depth
+  double z_beside_depth;          ///< [1] of Ktc, without the depth error in error and standard deviation
+  double depth;                   ///< [1] drawn error of the depth
   std::vector<std::string> terms;
 };
 CaseErrors judge(const MachineCase& one, const Faults& faults);

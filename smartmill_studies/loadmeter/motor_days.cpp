@@ -340,7 +340,8 @@ bool alone(const MotorCut& cut, std::size_t axis) {
   return cut.cut.range[axis] && cut.air.range[axis] && std::abs(cut.cut.velocity[1 - axis]) < 1e-9;
 }
 
-/// Inputs and outputs of an ANFIS for an axis (0, 1) or the spindle (2); the inputs that were best in the paper.
+/// Inputs and outputs of an ANFIS for an axis (0, 1) or the spindle (2); the inputs that were best in the
+/// paper.
 struct Samples {
   std::vector<std::vector<double>> inputs;
   std::vector<double> outputs;

@@ -38,7 +38,8 @@ struct MotorCut {
   std::optional<MotorCalibration> learnt;            ///< from the session, if it learns
 };
 
-/// Passes every sample to the estimator as the node does. @param calibration empty: currents only, no forces. @throws Error
+/// Passes every sample to the estimator as the node does. @param calibration empty: currents only, no forces.
+/// @throws Error
 std::vector<MotorCut> runDay(const MotorDay& day, const std::optional<MotorCalibration>& calibration,
                              const std::function<void(double share)>& progress = {});
 
@@ -50,7 +51,8 @@ struct DayErrors {
   std::array<double, 3> regression{}, anfis{},
       old_air{};  ///< old_air: regression with the first day's air cuts
   std::array<int, 3> count{};
-  /// For the estimated forces X, Y, Z: error and share within 1.96 standard deviations, of means and variations.
+  /// For the estimated forces X, Y, Z: error and share within 1.96 standard deviations, of means and
+  /// variations.
   std::array<double, 3> estimate{}, inside{}, inside_rms{};
   /// The same of the windows while a cut is steady.
   std::array<double, 3> window{}, inside_window{}, inside_window_rms{};

@@ -115,7 +115,8 @@ double loneGuess(const std::vector<FleetObservation>& seen, const std::string& m
   return count > 0.0 ? sum / count : std::log(1.2e9);
 }
 
-/// Machines that never cut the last material: predictions of its first cuts, by the fleet and by the machine alone.
+/// Machines that never cut the last material: predictions of its first cuts, by the fleet and by the machine
+/// alone.
 void firstCuts(Shop& shop, const std::vector<FleetObservation>& seen, json* line) {
   std::vector<FleetObservation> grown = seen;
   std::vector<double> mean(MACHINES, 0.0);
@@ -144,7 +145,8 @@ void firstCuts(Shop& shop, const std::vector<FleetObservation>& seen, json* line
   }
 }
 
-/// Detection of outliers among machines with a history, and number of cuts to detect a new machine that is off by a quarter.
+/// Detection of outliers among machines with a history, and number of cuts to detect a new machine that is
+/// off by a quarter.
 void oddMachines(Shop& shop, const std::vector<FleetObservation>& seen, json* line) {
   const FleetModel model(seen);
   int found = 0, falsely = 0;

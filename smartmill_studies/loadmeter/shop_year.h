@@ -27,7 +27,10 @@ struct ShopJob {
   double width = 0.0;   ///< [1] upper over lower
 };
 
-/// A year of a shop that starts with an empty database: each day has jobs with tools and materials of different frequency. Before each job the database is queried, then every cut is stored as by the node (running estimate of the job, RecursiveCoefficients). The true coefficients follow the shear zone (random stress and angles per material, rake and helix per tool) times a scatter of each pair, and edge wear.
+/// A year of a shop that starts with an empty database: each day has jobs with tools and materials of
+/// different frequency. Before each job the database is queried, then every cut is stored as by the node
+/// (running estimate of the job, RecursiveCoefficients). The true coefficients follow the shear zone (random
+/// stress and angles per material, rake and helix per tool) times a scatter of each pair, and edge wear.
 std::vector<ShopJob> shopYear(const ShopOptions& options, const std::function<void(double)>& progress = {});
 
 }  // namespace smartmill::loadmeter

@@ -192,7 +192,9 @@ struct Choice {
   double operator()(const TurningCut& c) const { return (*anfis)(array->of(c)); }
 };
 
-/// Trains one network per input array on the calibration tests and selects the array with the least error in `validation`, as in the paper. The calibration has only one material, where feed and depth determine the force; cross-validation within it would not reveal that this fails for others.
+/// Trains one network per input array on the calibration tests and selects the array with the least error in
+/// `validation`, as in the paper. The calibration has only one material, where feed and depth determine the
+/// force; cross-validation within it would not reveal that this fails for others.
 Choice chooseAnfis(const std::vector<TurningCut>& cuts, const std::vector<double>& output,
                    const std::vector<TurningCut>& validation, const std::vector<double>& truth,
                    const std::vector<InputArray>& arrays) {
@@ -217,7 +219,8 @@ Choice chooseAnfis(const std::vector<TurningCut>& cuts, const std::vector<double
   return best;
 }
 
-// The torque is learnt instead of the force, since the motor current depends on torque and the radius is known.
+// The torque is learnt instead of the force, since the motor current depends on torque and the radius is
+// known.
 const std::vector<InputArray>& torqueArrays() {
   static const std::vector<InputArray> ARRAYS{
       {"{dI, N}",
@@ -364,7 +367,8 @@ SlideLoad slideLoad(const Line& calibration, double air_current, double air_curr
 }
 
 VarianceSplit splitVariance(const std::vector<double>& dynamometer, const std::vector<double>& current) {
-  if (dynamometer.size() < 3 || current.size() < 3) throw Error("variance split: expected at least three replications");
+  if (dynamometer.size() < 3 || current.size() < 3)
+    throw Error("variance split: expected at least three replications");
   VarianceSplit s;
   s.process_mean = mean(dynamometer);
   s.current_mean = mean(current);

@@ -68,7 +68,7 @@ struct VarianceSplit {
   double sensor_variance = 0.0;  ///< [N2] of the measurement by current: the difference, not below 0
   double f_means = 0.0;          ///< [1] F of the difference of the means (1 and 2 n - 2 degrees of freedom)
   double p_means = 1.0;          ///< [1] probability of such an F without a difference
-  double p_variances = 1.0;      ///< [1] probability of such a ratio of variances without a difference, one-sided
+  double p_variances = 1.0;  ///< [1] probability of such a ratio of variances without a difference, one-sided
 };
 /// @throws Error with fewer than three replications on either side.
 VarianceSplit splitVariance(const std::vector<double>& dynamometer, const std::vector<double>& current);

@@ -17,7 +17,8 @@ struct CrossMode {
   double gain = 0.0;       ///< [m/N] share of the static compliance between both points
 };
 
-/// An end mill as a round Euler-Bernoulli beam in a spindle, which is a rigid body on a lateral and a tilting spring.
+/// An end mill as a round Euler-Bernoulli beam in a spindle, which is a rigid body on a lateral and a tilting
+/// spring.
 struct ToolInSpindle {
   double stickout = 0.0;        ///< [m]
   double shank_diameter = 0.0;  ///< [m]

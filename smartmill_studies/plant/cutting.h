@@ -144,7 +144,8 @@ class Cutting {
   }
 
  private:
-  // The workpiece extends from R cos(exit) to R cos(entry) across the feed; a full slot has walls on both sides.
+  // The workpiece extends from R cos(exit) to R cos(entry) across the feed; a full slot has walls on both
+  // sides.
   bool inWork(const Point& tip, double sin, double radius) const {
     if (sin < 0.0) return false;
     const bool from_wall = cut_.entry <= 1e-9, to_wall = cut_.exit >= units::PI - 1e-9;

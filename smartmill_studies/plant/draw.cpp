@@ -226,7 +226,8 @@ std::vector<CampaignTest> testsOf(const Plan& plan, double depth) {
   return tests.all();
 }
 
-// Ratio of the largest tip vibration in the last third to that in the second: a cut with more than 1.3 does not settle.
+// Ratio of the largest tip vibration in the last third to that in the second: a cut with more than 1.3 does
+// not settle.
 double growth(const Plant& plant, const CampaignTest& test, std::uint64_t seed) {
   Random random(seed);
   RunOptions options;

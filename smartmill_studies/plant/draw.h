@@ -40,7 +40,8 @@ struct Drawn {
 
 Drawn draw(const Case& hidden);
 
-/// Runs every test. @param second new draw of the random parts (noise, coefficient scatter, but not the spindle's phase) @throws Error.
+/// Runs every test. @param second new draw of the random parts (noise, coefficient scatter, but not the
+/// spindle's phase) @throws Error.
 std::vector<Record> runCampaign(const Drawn& drawn, const Case& hidden, bool second = false);
 
 /// Writes a campaign folder: model.yaml, campaign.yaml, records (one a test). @throws Error.

@@ -108,7 +108,8 @@ void Front::clip(Tooth& t, std::size_t begin, std::size_t next, const Point& tip
     for (; corner != next && outside(corner); corner = pool_[corner].after) kept = corner;
     kept = insertAfter(kept, crossing());
   }
-  // Inside, the corners on the axis side of the chord are removed; if the tip is still inside, all corners passed.
+  // Inside, the corners on the axis side of the chord are removed; if the tip is still inside, all corners
+  // passed.
   while (corner != next && (depth > 0.0 || !outside(corner))) {
     const std::size_t gone = corner;
     corner = pool_[corner].after;

@@ -9,7 +9,9 @@ struct Point {
   double x = 0.0, y = 0.0;  ///< [m] of the workpiece, x along the feed
 };
 
-/// Workpiece surface ahead of a slice of the tool: a polygon in workpiece coordinates, from which the tooth tips remove material. Chip thickness is the distance between a tip and the polygon along the ray from the tool axis; it needs no feed per tooth, earlier teeth or rules for them.
+/// Workpiece surface ahead of a slice of the tool: a polygon in workpiece coordinates, from which the tooth
+/// tips remove material. Chip thickness is the distance between a tip and the polygon along the ray from the
+/// tool axis; it needs no feed per tooth, earlier teeth or rules for them.
 ///
 /// The polygon is star-shaped about the tool axis, with its corners in the order of clockwise rotation.
 class Front {
@@ -18,7 +20,9 @@ class Front {
   /// corners
   Front(double radius, std::size_t teeth, double step);
 
-  /// Advances the tip of a tooth by less than half a revolution and removes the material it passes. @param axis current position of the tool axis @return chip thickness [m] along the ray from axis to tip; not positive where the tip is in air
+  /// Advances the tip of a tooth by less than half a revolution and removes the material it passes. @param
+  /// axis current position of the tool axis @return chip thickness [m] along the ray from axis to tip; not
+  /// positive where the tip is in air
   double pass(std::size_t tooth, const Point& axis, const Point& tip);
 
   std::size_t corners() const { return size_; }
@@ -37,7 +41,8 @@ class Front {
     bool moving = false;
   };
 
-  /// Removes the material between the last and the present tip of a tooth. @param begin corner before the last tip @param next first corner after the present tip @param depth [m] of the tip
+  /// Removes the material between the last and the present tip of a tooth. @param begin corner before the
+  /// last tip @param next first corner after the present tip @param depth [m] of the tip
   void clip(Tooth& tooth, std::size_t begin, std::size_t next, const Point& tip, double depth);
   std::size_t insertAfter(std::size_t corner, const Point& at);
   void remove(std::size_t corner);

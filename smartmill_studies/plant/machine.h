@@ -24,7 +24,9 @@ struct Outside {
 
 /// tone (place [Hz]), settling (place [s]) and half_order on a channel; bursts (place [s] between them);
 /// curve: a channel reads f (1 + size |f| / 1 kN); kink: specific force falls by size above a chip of place
-/// [m]; softer_with_time: chip coefficients 1 + size exp(-t / place) from engagement; hard_skin: the uppermost place [m] of the depth has coefficients 1 + size; lost_corner: the lowest place [m] of one tooth's edge is missing.
+/// [m]; softer_with_time: chip coefficients 1 + size exp(-t / place) from engagement; hard_skin: the
+/// uppermost place [m] of the depth has coefficients 1 + size; lost_corner: the lowest place [m] of one
+/// tooth's edge is missing.
 const std::vector<std::string>& outsideKinds();
 
 /// Small imperfections of real machines that no model contains.
@@ -34,8 +36,9 @@ struct Unsteadiness {
   double noise_colour = 0.0;         ///< [1] share of the noise's power below 300 Hz (first order)
 };
 
-/// An independent milling machine with measurement. It shares file formats with the product but no physics: chips are cut from polygons (front.h), structures follow the recurrence of Nigam and Jennings,
-/// the tool may be a beam (beam.h), the sensor a plate (plate.h).
+/// An independent milling machine with measurement. It shares file formats with the product but no physics:
+/// chips are cut from polygons (front.h), structures follow the recurrence of Nigam and Jennings, the tool
+/// may be a beam (beam.h), the sensor a plate (plate.h).
 struct Plant {
   ToolGeometry tool;
   CuttingCoefficients cutting;
@@ -63,7 +66,8 @@ struct RunOptions {
   bool noise = true;
 };
 
-/// Length of a record of a kind [samples]. In a move each axis travels forward and back in turn with the spindle stopped.
+/// Length of a record of a kind [samples]. In a move each axis travels forward and back in turn with the
+/// spindle stopped.
 std::size_t samplesOf(const CampaignTest& test);
 
 /// Runs one test. @return its record

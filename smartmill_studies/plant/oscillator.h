@@ -2,7 +2,8 @@
 
 namespace smartmill::plant {
 
-/// q'' + 2 zeta w q' + w^2 q = w^2 p: at rest q = p. Exact at the steps for a piecewise linear p (recurrence of Nigam and Jennings, 1969).
+/// q'' + 2 zeta w q' + w^2 q = w^2 p: at rest q = p. Exact at the steps for a piecewise linear p (recurrence
+/// of Nigam and Jennings, 1969).
 class Oscillator {
  public:
   /// @param frequency [Hz], undamped @param damping_ratio [1] 0..1 @param step [s]

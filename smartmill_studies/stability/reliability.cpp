@@ -43,8 +43,8 @@ std::array<double, 2> wilson(int k, int n) {
 std::vector<ReliabilityPoint> reliabilityStudy(const MachineModel& model, const RegenerativeSystem& system,
                                                const ReliabilityOptions& options,
                                                const std::function<void(double)>& progress) {
-  if (options.machines < 1) throw Error("machines: at least 1 is due");
-  if (options.draws < 1) throw Error("draws: at least 1 is due");
+  if (options.machines < 1) throw Error("machines: expected at least 1");
+  if (options.draws < 1) throw Error("draws: expected at least 1");
   options.validate();
   const UncertainSystem belief = UncertainSystem::of(model, system);
   const auto nominal = makeSolver(Method::collocation, system);
@@ -54,7 +54,7 @@ std::vector<ReliabilityPoint> reliabilityStudy(const MachineModel& model, const 
   std::vector<MachineModel> machines;
   std::vector<TwinCut> cuts;
   for (int tries = 0; static_cast<int>(points.size()) < options.machines; ++tries) {
-    if (tries > 50 * options.machines + 100) throw Error("reliability: no speed with a limit is found");
+    if (tries > 50 * options.machines + 100) throw Error("reliability: no speed with a limit found");
     ReliabilityPoint p;
     p.speed = options.speed_low + (options.speed_high - options.speed_low) * unit(random);
     const double limit = nominal->limit(p.speed, options.max_depth).depth;

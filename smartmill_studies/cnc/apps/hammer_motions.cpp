@@ -1,4 +1,7 @@
-// rosrun smartmill_studies cnc_hammer_motions: motions of the automatic hammer on the simulated machine with random tools, positions, model errors and faults. The tool must never touch sensor, hammer or table, no motion may leave the travel, and nothing may move after a motion is cancelled. Every refusal has a message and is counted.
+// rosrun smartmill_studies cnc_hammer_motions: motions of the automatic hammer on the simulated machine with
+// random tools, positions, model errors and faults. The tool must never touch sensor, hammer or table, no
+// motion may leave the travel, and nothing may move after a motion is cancelled. Every refusal has a message
+// and is counted.
 
 #include <cmath>
 #include <cstdio>
@@ -107,7 +110,8 @@ class Driver {
     }
     counts_.unfinished += result ? 0 : 1;
     ++counts_.results[result ? CODES[static_cast<std::size_t>(result->code)] : "no result"];
-    if (result && result->code != FrfCode::ok && result->message.empty()) ++counts_.results["without a message"];
+    if (result && result->code != FrfCode::ok && result->message.empty())
+      ++counts_.results["without a message"];
     standStill();
     judge();
   }
@@ -300,8 +304,8 @@ class Driver {
 };
 
 void print(const Counts& c) {
-  std::printf("%d runs: %d collisions, %d beyond limits, %d moved without a command, %d without a result\n", c.runs,
-              c.collisions, c.beyond_limits, c.moved_unasked, c.unfinished);
+  std::printf("%d runs: %d collisions, %d beyond limits, %d moved without a command, %d without a result\n",
+              c.runs, c.collisions, c.beyond_limits, c.moved_unasked, c.unfinished);
   std::printf("refused before anything was sent: %d by limits, %d by state\nresults:", c.refused_by_limits,
               c.refused_by_state);
   for (const auto& [name, count] : c.results) std::printf(" %s %d,", name.c_str(), count);
@@ -385,7 +389,8 @@ int main(int argc, char** argv) {
   CommandLine line{
       "Motions of the automatic hammer on the simulated machine with random tools, starts, model errors "
       "(station "
-      "0.1 mm, diameter 0.05 mm) and faults; exit code 1 if the tool touches anything, leaves its limits or moves without a command."};
+      "0.1 mm, diameter 0.05 mm) and faults; exit code 1 if the tool touches anything, leaves its limits or "
+      "moves without a command."};
   line.option("MODEL", request.model, "machine model with a hammer station").required();
   request.one.addTo(line, "--runs,--cases", request.runs, "number of runs");
   request.one.addScore(line);

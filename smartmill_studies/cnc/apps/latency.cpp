@@ -1,4 +1,6 @@
-// rosrun smartmill_studies cnc_latency: latency of requests to a controller on loopback, number of simultaneous sessions and cost of polling, for the simulated Fanuc or a running LinuxCNC (linuxcnc_machine).
+// rosrun smartmill_studies cnc_latency: latency of requests to a controller on loopback, number of
+// simultaneous sessions and cost of polling, for the simulated Fanuc or a running LinuxCNC
+// (linuxcnc_machine).
 
 #include <unistd.h>
 
@@ -83,8 +85,8 @@ void polled(cnc::Controller& controller, double seconds, const std::function<dou
     took.push_back(std::chrono::duration<double>(Clock::now() - before).count());
   }
   std::sort(took.begin(), took.end());
-  std::printf("read cycle at %.0f Hz    median %.3f ms, 99 %% %.3f ms; %.2f %% of a core, both sides\n",
-              RATE, 1e3 * took[took.size() / 2], 1e3 * took[took.size() * 99 / 100],
+  std::printf("read cycle at %.0f Hz    median %.3f ms, 99 %% %.3f ms; %.2f %% of a core, both sides\n", RATE,
+              1e3 * took[took.size() / 2], 1e3 * took[took.size() * 99 / 100],
               100.0 * (used() - cpu) / seconds);
 }
 
@@ -191,7 +193,8 @@ int main(int argc, char** argv) {
   CommandLine line{"Latency of a controller on loopback, number of sessions, and cost of polling at 50 Hz."};
   line.option("--count", count, "requests of each kind").positive().showDefault();
   line.option("--seconds", seconds, "[s] of polling").positive().showDefault();
-  line.option("--linuxcnc", folder, "socket folder of a linuxcnc_machine that is ready; it is measured instead");
+  line.option("--linuxcnc", folder,
+              "socket folder of a linuxcnc_machine that is ready; it is measured instead");
   return runProgram(line, argc, argv, [&] {
     if (folder.empty()) {
       measureFanuc(count, seconds);

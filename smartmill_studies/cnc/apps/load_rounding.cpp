@@ -1,4 +1,7 @@
-// rosrun smartmill_studies cnc_load_rounding: error of the cutting coefficients caused by the rounding of polled loads. Air cuts at four speeds give the friction, slots at one speed and several feeds the coefficients (Dunwoody chapter 3). Each voltage is the mean of values polled at 50 Hz, with the tooth passing ripple behind the first-order lag of the load meter.
+// rosrun smartmill_studies cnc_load_rounding: error of the cutting coefficients caused by the rounding of
+// polled loads. Air cuts at four speeds give the friction, slots at one speed and several feeds the
+// coefficients (Dunwoody chapter 3). Each voltage is the mean of values polled at 50 Hz, with the tooth
+// passing ripple behind the first-order lag of the load meter.
 
 #include <algorithm>
 #include <cmath>
@@ -41,7 +44,8 @@ struct Cell {
     const double mean =
         spindle.load_meter_gain * (torque + spindle.viscous * speed + spindle.coulomb) * speed;
     const double passing = tool.teeth * speed / units::TWO_PI;  // [Hz]
-    // The torque of a slot ripples by about its mean with two teeth, by less with more; the lag attenuates it.
+    // The torque of a slot ripples by about its mean with two teeth, by less with more; the lag attenuates
+    // it.
     const double ripple = spindle.load_meter_gain * torque * speed / tool.teeth /
                           std::hypot(1.0, passing / spindle.load_meter_bandwidth);
     std::uniform_real_distribution<double> phase(0.0, units::TWO_PI), late(0.0, JITTER);

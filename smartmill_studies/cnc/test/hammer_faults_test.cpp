@@ -1,4 +1,6 @@
-// Complete measurement of the automatic hammer through bridge and network. At each step the controller's server is killed and restarted: the measurement ends with a message, nothing moves without a command, and the tool can be retracted after the machine is armed again.
+// Complete measurement of the automatic hammer through bridge and network. At each step the controller's
+// server is killed and restarted: the measurement ends with a message, nothing moves without a command, and
+// the tool can be retracted after the machine is armed again.
 #include <gtest/gtest.h>
 
 #include <chrono>

@@ -1,4 +1,5 @@
-// rosrun smartmill_studies discrepancy_bench: hides causes in a machine that shares no physics with the twin, runs explain and scores its answers against the hidden truth.
+// rosrun smartmill_studies discrepancy_bench: hides causes in a machine that shares no physics with the twin,
+// runs explain and scores its answers against the hidden truth.
 
 #include <cstdio>
 #include <filesystem>
@@ -108,7 +109,8 @@ void run(const Options& o) {
 int main(int argc, char** argv) {
   Options o;
   CommandLine line{
-      "Blind bench of explain: hides causes in random machines whose physics differs from the twin's, and scores the named effects. Continues an earlier run in the same folder."};
+      "Blind bench of explain: hides causes in random machines whose physics differs from the twin's, and "
+      "scores the named effects. Continues an earlier run in the same folder."};
   line.option("-o,--out", o.out, "folder of cases and scores; optional with --case");
   line.option("--singles", o.counts.singles, "cases of each single effect");
   line.option("--pairs", o.counts.pairs, "pairs of effects");

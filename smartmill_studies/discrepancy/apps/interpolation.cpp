@@ -1,4 +1,7 @@
-// rosrun smartmill_studies discrepancy_interpolation CAMPAIGN: share of the held-out cuts of a campaign that a model can explain whose forces are linear in the feed. Each spindle order is interpolated separately in amplitude and phase. These models include every rigid geometry, every linear sensor with or without crosstalk, and all coefficients.
+// rosrun smartmill_studies discrepancy_interpolation CAMPAIGN: share of the held-out cuts of a campaign that
+// a model can explain whose forces are linear in the feed. Each spindle order is interpolated separately in
+// amplitude and phase. These models include every rigid geometry, every linear sensor with or without
+// crosstalk, and all coefficients.
 
 #include <array>
 #include <cmath>
@@ -64,7 +67,8 @@ Cut linesOf(const TestData& test) {
   return cut;
 }
 
-// Straight line over the feed: value = first + feed * second, by least squares over all cuts or the fitted ones.
+// Straight line over the feed: value = first + feed * second, by least squares over all cuts or the fitted
+// ones.
 std::array<Complex, 2> courseOf(const std::vector<Cut>& cuts, bool all, std::size_t axis, std::size_t k) {
   double n = 0.0, x = 0.0, xx = 0.0;
   Complex y, xy;
@@ -80,7 +84,8 @@ std::array<Complex, 2> courseOf(const std::vector<Cut>& cuts, bool all, std::siz
   return {(y - slope * x) / n, slope};
 }
 
-// Estimates the phase of each record in turn with the lines; the recorded angle is accurate to about a degree.
+// Estimates the phase of each record in turn with the lines; the recorded angle is accurate to about a
+// degree.
 void settlePhases(std::vector<Cut>& cuts) {
   for (int pass = 0; pass < PASSES; ++pass) {
     for (Cut& c : cuts) {
@@ -135,7 +140,8 @@ void run(const std::string& folder) {
 int main(int argc, char** argv) {
   std::string folder;
   CommandLine line{
-      "Share of the held-out cuts of a campaign, which differ in feed only, that a model can explain whose spindle orders are linear in the feed."};
+      "Share of the held-out cuts of a campaign, which differ in feed only, that a model can explain whose "
+      "spindle orders are linear in the feed."};
   line.option("CAMPAIGN", folder, "folder of the campaign").required();
   return runProgram(line, argc, argv, [&] { run(folder); });
 }

@@ -38,7 +38,8 @@ void run(const Options& o) {
 int main(int argc, char** argv) {
   Options o;
   CommandLine line{
-      "Fits campaigns from nominal values up to 50 % off the truth. One line of JSON per start: distance of the result from the truth in standard deviations."};
+      "Fits campaigns from nominal values up to 50 % off the truth. One line of JSON per start: distance of "
+      "the result from the truth in standard deviations."};
   line.option("CAMPAIGN", o.campaigns, "folders with truth.yaml, used in turn").required();
   o.one.addTo(line, "--cases", o.starts, "starts");
   line.option("--seed", o.seed, "of the starts");

@@ -1,4 +1,4 @@
-// smartmill_studies/runner/run, case and collect: what is done is what stands there whole.
+// The runner (run, case, collect): only complete result files count as done.
 #include <unistd.h>
 
 #include <cstdlib>
@@ -23,7 +23,7 @@ class StudiesEngine : public ::testing::Test {
     if (std::system("command -v parallel > /dev/null") != 0)
       GTEST_SKIP() << "./setup --with-fleet installs GNU parallel";
   }
-  /// @return its exit code; what it said: said().
+  /// @return exit code; its output is said().
   int call(const std::string& command) {
     return WEXITSTATUS(std::system((STUDIES "/" + command + " > " + folder_.file("said") + " 2>&1").c_str()));
   }
@@ -41,10 +41,10 @@ class StudiesEngine : public ::testing::Test {
 TEST_F(StudiesEngine, goesOnWhereItEndedAndGivesTheSameTable) {
   ASSERT_EQ(call("run self_test -j 2 --nice 0 -o " + at("a")), 0) << said();
   std::filesystem::remove(at("a/cases/2.json"));
-  // What an end left half written counts for nothing.
+  // A partly written result does not count.
   std::ofstream(at("a/cases/2.json.part.host.1")) << "{\"case\": 2, ";
   EXPECT_EQ(call("collect " + at("a")), 1);
-  EXPECT_THAT(said(), HasSubstr("3 of 4 cases are there"));
+  EXPECT_THAT(said(), HasSubstr("3 of 4 cases are done"));
   ASSERT_EQ(call("run self_test -j 1 --nice 0 -o " + at("a")), 0) << said();
   ASSERT_EQ(call("collect " + at("a")), 0) << said();
   EXPECT_THAT(said(), HasSubstr("4 of 4 cases"));
@@ -56,8 +56,8 @@ TEST_F(StudiesEngine, goesOnWhereItEndedAndGivesTheSameTable) {
   EXPECT_EQ(contentOf(at("a/lines.jsonl")), contentOf(at("b/lines.jsonl")));
 
   EXPECT_EQ(call("run self_test -j 1 --seed 5 -o " + at("a")), 1);
-  EXPECT_THAT(said(), HasSubstr("holds a run with another seed"));
-  // A case of another build is none of this study's.
+  EXPECT_THAT(said(), HasSubstr("contains a run with another seed"));
+  // A case of another build is refused.
   std::string manifest = contentOf(at("a/study.json"));
   manifest.replace(manifest.find("\"build\": \"") + 10, 4, "none");
   std::ofstream(at("a/study.json")) << manifest;
@@ -89,19 +89,19 @@ TEST_F(StudiesEngine, goesOnFromWhatAnotherMachineHasDone) {
   EXPECT_THAT(said(), HasSubstr("done.jsonl: line 1 is of another seed (1, not 5)"));
   std::ofstream(at("torn.jsonl")) << lines.substr(0, 40) << "\n";
   EXPECT_EQ(call("run self_test -j 1 --from " + at("torn.jsonl") + " -o " + at("d")), 1);
-  EXPECT_THAT(said(), HasSubstr("torn.jsonl: line 1 is no case of a study"));
+  EXPECT_THAT(said(), HasSubstr("torn.jsonl: line 1 is not a case of a study"));
   EXPECT_EQ(call("run self_test -j 1 --from " + at("none.jsonl") + " -o " + at("d")), 1);
   EXPECT_THAT(said(), HasSubstr("none.jsonl: cannot be read"));
 }
 
 TEST_F(StudiesEngine, refusesWhatItDoesNotKnow) {
   EXPECT_EQ(call("run nothing -o " + at("a")), 2);
-  EXPECT_THAT(said(), HasSubstr("'nothing' is no study, there are bench"));
+  EXPECT_THAT(said(), HasSubstr("'nothing' is not a study; expected one of bench"));
   EXPECT_EQ(call("collect " + at("nowhere")), 1);
-  EXPECT_THAT(said(), HasSubstr("study.json: is no study's"));
+  EXPECT_THAT(said(), HasSubstr("study.json: not a study"));
   std::ofstream(at("hosts")) << "two hosts\n";
   EXPECT_EQ(call("run self_test --hosts " + at("hosts") + " -o " + at("c")), 1);
-  EXPECT_THAT(said(), HasSubstr("SLOTS/HOST is due"));
+  EXPECT_THAT(said(), HasSubstr("expected SLOTS/HOST"));
 }
 
 }  // namespace

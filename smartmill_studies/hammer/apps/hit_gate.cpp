@@ -32,7 +32,8 @@ const std::map<HitClass, std::string> WORD = {
     {HitClass::weak, "weak"},          {HitClass::dull, "dull"},        {HitClass::trigger_skew, "skew"},
     {HitClass::gain_jump, "gain jump"}};
 
-/// Counts of a class: hits, rejected hits, hits rejected for the fault of the class, and rejected clean hits of the same records.
+/// Counts of a class: hits, rejected hits, hits rejected for the fault of the class, and rejected clean hits
+/// of the same records.
 struct Tally {
   int hits = 0, refused = 0, named = 0, beside = 0, beside_refused = 0;
 };

@@ -32,7 +32,8 @@ struct Request {
 /// Modes below this share of the largest gain have no influence on a chart.
 constexpr double COUNTS = 0.03;
 
-/// [m/N] The depth limit of a slot is proportional to -1 / (2 Re H) at the most negative Re H, as in figure 4.8.
+/// [m/N] The depth limit of a slot is proportional to -1 / (2 Re H) at the most negative Re H, as in
+/// figure 4.8.
 double softest(const FrequencyResponse& frf) {
   double least = 0.0;
   for (std::size_t i = 0; i < frf.size(); ++i) {
@@ -92,7 +93,8 @@ void runOne(const Request& request) {
     for (int w = 0; w < WAYS; ++w) {
       Tally tally;
       tally.add(outcome, w);
-      nlohmann::json modes = nlohmann::json::array();  // relative error of the gain, and its standard deviation
+      nlohmann::json modes =
+          nlohmann::json::array();  // relative error of the gain, and its standard deviation
       for (const GainError& e : outcome.modes[w])
         if (e.share >= COUNTS) modes.push_back({e.error, e.std});
       line[nameOf(static_cast<Way>(w))] = {
@@ -168,7 +170,8 @@ void run(const Request& request) {
 int main(int argc, char** argv) {
   Request request;
   CommandLine line(
-      "FRF of the tip from an FRF measured above it: no correction, Dunwoody's eq. 4.44, receptance coupling.");
+      "FRF of the tip from an FRF measured above it: no correction, Dunwoody's eq. 4.44, receptance "
+      "coupling.");
   request.one.addTo(line, "--machines,--cases", request.machines, "number of random tools and spindles");
   request.one.addScore(line);
   line.option("--seed", request.seed).showDefault();

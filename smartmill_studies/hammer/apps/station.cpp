@@ -1,4 +1,5 @@
-// rosrun smartmill_studies hammer_station: random tools in random machines at the simulated hammer station, measured by the hammer sequence and compared with the truth.
+// rosrun smartmill_studies hammer_station: random tools in random machines at the simulated hammer station,
+// measured by the hammer sequence and compared with the truth.
 
 #include <cstdio>
 #include <filesystem>
@@ -87,7 +88,8 @@ void run(const Options& o) {
 int main(int argc, char** argv) {
   Options o;
   CommandLine line{
-      "Measures random tools in random machines with the automatic hammer and scores the results. One line of JSON per machine in OUT/stations_SEED_HITS.jsonl; continues an earlier run; prints the "
+      "Measures random tools in random machines with the automatic hammer and scores the results. One line "
+      "of JSON per machine in OUT/stations_SEED_HITS.jsonl; continues an earlier run; prints the "
       "score."};
   o.one.addTo(line, "--machines,--cases", o.machines, "number of machines");
   o.one.addScore(line);
@@ -95,7 +97,8 @@ int main(int argc, char** argv) {
   line.option("--hits", o.study.hits, "hits per measurement").within(1, 100).showDefault();
   line.option("--figures", o.figures, "with --case: folder for figures 4.5 to 4.8 of the thesis");
   line.option("--repeats", o.repeats,
-              "only repeats each machine N times and compares scatter and stated uncertainty: one line per machine on standard output")
+              "only repeats each machine N times and compares scatter and stated uncertainty: one line per "
+              "machine on standard output")
       .within(3, 1000);
   line.option("-o,--out", o.out, "folder of the lines").showDefault();
   return runProgram(line, argc, argv, [&] { run(o); });

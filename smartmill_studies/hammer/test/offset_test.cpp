@@ -12,7 +12,8 @@
 namespace smartmill::studies {
 namespace {
 
-// Comparison with the plant, which shares no code with the correction. Required: gains within 3 % (median) and calibrated standard deviations; `rosrun smartmill_studies hammer_offset` runs more machines.
+// Comparison with the plant, which shares no code with the correction. Required: gains within 3 % (median)
+// and calibrated standard deviations; `rosrun smartmill_studies hammer_offset` runs more machines.
 TEST(OffsetCorrection, IsRightForSpindleAndToolModes) {
   std::mt19937_64 random(3);
   std::vector<double> gains[WAYS], frfs[WAYS];
@@ -39,7 +40,8 @@ TEST(OffsetCorrection, IsRightForSpindleAndToolModes) {
   EXPECT_GE(inside, 9 * stated / 10);
 }
 
-// Check of the plant with an almost rigid spindle: the tool is the cantilever of eq. 4.42 and 4.43, and its static compliance (sum of all modes) follows eq. 4.44.
+// Check of the plant with an almost rigid spindle: the tool is the cantilever of eq. 4.42 and 4.43, and its
+// static compliance (sum of all modes) follows eq. 4.44.
 TEST(OffsetCorrection, PlantIsTheThesisCantilever) {
   plant::ToolInSpindle t;
   t.stickout = 60e-3;

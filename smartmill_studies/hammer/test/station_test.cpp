@@ -37,7 +37,8 @@ TEST(Station, TheSameArgumentsGiveTheSameMachine) {
   EXPECT_NE(a.mounting, c.mounting);
 }
 
-// Required for 95 % of the modes: 0.2 % of frequency, 6 % of damping; here for each of the few. Gain at the tip from hits about 15 mm above it: 3 % in the median, each within four standard deviations.
+// Required for 95 % of the modes: 0.2 % of frequency, 6 % of damping; here for each of the few. Gain at the
+// tip from hits about 15 mm above it: 3 % in the median, each within four standard deviations.
 TEST(Station, MeasuresDrawnMachinesWithoutTouching) {
   const StationStudy study{SEED, 8};
   std::vector<double> tip;
@@ -67,7 +68,8 @@ TEST(Station, LinesScatterFromRunToRunAsTheyState) {
   EXPECT_GT(line["scatter"], 1.0 / 1.5);
 }
 
-// The tool has five unevenly spaced teeth and the flute found is not the first, so that the angles of the others are no more accurate.
+// The tool has five unevenly spaced teeth and the flute found is not the first, so that the angles of the
+// others are no more accurate.
 TEST(Station, UnevenTeethOfWhichAnyMayBeTheFluteThatWasFound) {
   const nlohmann::json line = runStation({16, 3}, 157);
   EXPECT_FALSE(line["touched"]);
@@ -75,7 +77,8 @@ TEST(Station, UnevenTeethOfWhichAnyMayBeTheFluteThatWasFound) {
   EXPECT_EQ(line["code"], 0) << line["message"];
 }
 
-// Force along one axis, response across it: compared with the cross receptance of the station on lines where it exceeds ten standard deviations.
+// Force along one axis, response across it: compared with the cross receptance of the station on lines where
+// it exceeds ten standard deviations.
 TEST(Station, TheCrossFrfIsThatOfTheStructure) {
   DrawnStation drawn = firstWith([](const DrawnStation& d) {
     return d.traits.cross_sensor && !d.out_of_range && d.traits.tooth == "flute";

@@ -87,7 +87,8 @@ void gaussian(const BurzoniData& data) {
       }
     }
     char text[64];
-    std::snprintf(text, sizeof text, "in the cut at %.0f rpm, minus the last revolution", kalman::BURZONI_RPM[k]);
+    std::snprintf(text, sizeof text, "in the cut at %.0f rpm, minus the last revolution",
+                  kalman::BURZONI_RPM[k]);
     line(text, left);
   }
 }

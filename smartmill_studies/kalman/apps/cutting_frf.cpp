@@ -149,7 +149,8 @@ void run(const Request& request) {
 int main(int argc, char** argv) {
   Request request;
   CommandLine line{
-      "Identification of a simulated tool with speed-dependent modes: modes from cuts around each of six speeds next to the true ones, with the coverage of their standard deviations over repeated runs."};
+      "Identification of a simulated tool with speed-dependent modes: modes from cuts around each of six "
+      "speeds next to the true ones, with the coverage of their standard deviations over repeated runs."};
   line.option("--repeats", request.repeats, "runs at each speed, each with its own noise").showDefault();
   line.option("--gyroscopic", request.gyroscopic,
               "half the distance of backward and forward whirl at 18,000 rpm, as share of the frequency")

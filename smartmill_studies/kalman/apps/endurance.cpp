@@ -23,7 +23,8 @@ std::atomic<long long> live{0}, made{0};
 
 }  // namespace
 
-// Counts all allocations of the program. The compiler inlines these operators and reports a mismatch of malloc and delete.
+// Counts all allocations of the program. The compiler inlines these operators and reports a mismatch of
+// malloc and delete.
 #pragma GCC diagnostic ignored "-Wmismatched-new-delete"
 void* operator new(std::size_t size) {
   void* place = std::malloc(size > 0 ? size : 1);
@@ -62,7 +63,8 @@ long resident() {
 constexpr std::size_t BLOCK = 256;  // 10 ms
 constexpr long BLOCKS_PER_MINUTE = 6000;
 
-/// Three axes at 25.6 kHz. The speed changes every minute, between four values, with a new cut; every five minutes the sample index has a gap.
+/// Three axes at 25.6 kHz. The speed changes every minute, between four values, with a new cut; every five
+/// minutes the sample index has a gap.
 class Machine {
  public:
   Machine() {

@@ -1,4 +1,5 @@
-// rosrun smartmill_studies kalman_latency: latency of three axes at 50 kHz in 10 ms blocks with all cores loaded.
+// rosrun smartmill_studies kalman_latency: latency of three axes at 50 kHz in 10 ms blocks with all cores
+// loaded.
 
 #include <algorithm>
 #include <atomic>
@@ -28,7 +29,8 @@ constexpr double SPEED = units::TWO_PI * 150.0;  // 9000 rpm: 33 harmonics up to
 constexpr int STATES = 6 + 1 + 2 * 33;
 
 struct Took {
-  std::vector<double> work, delay;  // [us] duration of the call; delay from the nominal time of the block to its output
+  std::vector<double> work,
+      delay;  // [us] duration of the call; delay from the nominal time of the block to its output
 };
 
 void print(const char* name, Took took) {
@@ -37,7 +39,8 @@ void print(const char* name, Took took) {
     return v[std::min(v.size() - 1, static_cast<std::size_t>(share * static_cast<double>(v.size())))];
   };
   std::printf(
-      "%-34s  in to out: median %8.1f  99 %% %8.1f  max %8.1f us   from nominal time: median %8.1f  99 %% %8.1f us\n",
+      "%-34s  in to out: median %8.1f  99 %% %8.1f  max %8.1f us   from nominal time: median %8.1f  99 %% "
+      "%8.1f us\n",
       name, at(took.work, 0.5), at(took.work, 0.99), at(took.work, 1.0), at(took.delay, 0.5),
       at(took.delay, 0.99));
 }

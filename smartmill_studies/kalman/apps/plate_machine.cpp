@@ -1,4 +1,5 @@
-// rosrun smartmill_studies kalman_plate_machine: Bachrathy and Stepan on the simulated machine: taps, streaming inversion of the matrix at 5,000 and 20,000 rpm, force over chip thickness.
+// rosrun smartmill_studies kalman_plate_machine: Bachrathy and Stepan on the simulated machine: taps,
+// streaming inversion of the matrix at 5,000 and 20,000 rpm, force over chip thickness.
 
 #include <array>
 #include <cmath>
@@ -120,7 +121,8 @@ void bistable(const ForceCurve& law, int teeth, const std::string& picture) {
     sum += (1.0 - p.large / p.small) / static_cast<double>(points.size());
   }
   std::printf(
-      "radial law of 5000 rpm on a tool of 800 Hz, 2 %%, 10 N/um, 0.1 mm per tooth, one tooth always in cut: large vibrations persist below the limit of small ones over %.0f %% of the depth, at most %.0f %%\n",
+      "radial law of 5000 rpm on a tool of 800 Hz, 2 %%, 10 N/um, 0.1 mm per tooth, one tooth always in cut: "
+      "large vibrations persist below the limit of small ones over %.0f %% of the depth, at most %.0f %%\n",
       100.0 * sum, 100.0 * widest);
   if (!picture.empty()) kalman::drawBistable(points, picture);
 }
@@ -164,8 +166,9 @@ ForceCurves chips(const std::vector<SpindleRig::Record>& passes, const MachineMo
     }
     std::printf("\n");
   }
-  std::printf("residual %.2f N compensated, %.2f N measured; largest error from 0.05 mm on: %.1f %%, %.1f %%\n\n",
-              good.rms, raw.rms, 100.0 * worst, 100.0 * worst_raw);
+  std::printf(
+      "residual %.2f N compensated, %.2f N measured; largest error from 0.05 mm on: %.1f %%, %.1f %%\n\n",
+      good.rms, raw.rms, 100.0 * worst, 100.0 * worst_raw);
   return good;
 }
 

@@ -76,7 +76,8 @@ void bounce(const kalman::PlateSensor& plate, const kalman::TransferMatrix& thre
 
 void milling(const kalman::PlateSensor& plate, const kalman::TransferMatrix& three,
              const kalman::TransferMatrix& six, double rpm, std::mt19937& random) {
-  // Table 1.1: D 12 mm, 2 flutes, 30 deg, half immersion, 2 mm deep, 0.2 mm per tooth, down-milling. The material is not stated: coefficients of the reference cut.
+  // Table 1.1: D 12 mm, 2 flutes, 30 deg, half immersion, 2 mm deep, 0.2 mm per tooth, down-milling. The
+  // material is not stated: coefficients of the reference cut.
   const MechanisticForce process({2, 12e-3, units::radFromDeg(30.0), {}},
                                  {800e6, 250e6, 80e6, 20e3, 20e3, 5e3},
                                  {0.5 * units::PI, units::PI, 2e-3, 2e-4});

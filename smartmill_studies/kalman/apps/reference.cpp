@@ -1,4 +1,5 @@
-// rosrun smartmill_studies kalman_reference: errors of the compensation in the reference cut, next to their targets.
+// rosrun smartmill_studies kalman_reference: errors of the compensation in the reference cut, next to their
+// targets.
 
 #include <cmath>
 #include <cstdio>
@@ -85,7 +86,8 @@ void row(double rpm, const char* name, const Errors& e, const char* target) {
               100.0 * e.entry_3k, 100.0 * e.entry_5k, target);
 }
 
-/// The plain augmented Kalman filter with a random-walk force; its intensity is the best of a grid, chosen by the truth.
+/// The plain augmented Kalman filter with a random-walk force; its intensity is the best of a grid, chosen by
+/// the truth.
 Errors randomWalk(const ReferenceCase& reference, const ReferenceRecord& record, bool smooth) {
   Errors best;
   best.to_5k = 1e9;
@@ -171,7 +173,8 @@ void runForceModels(const std::vector<double>& speeds, double duration) {
   }
 }
 
-/// Without a tachometer: the speed as a state, compared with a tachometer and with the commanded speed. Errors to 3 kHz over the last 0.3 s; speed error at the end.
+/// Without a tachometer: the speed as a state, compared with a tachometer and with the commanded speed.
+/// Errors to 3 kHz over the last 0.3 s; speed error at the end.
 void runSpeeds(const std::vector<double>& speeds, double duration) {
   std::printf("no tachometer: error of the force to 3 / 5 kHz [%%] over the last 0.3 s, worst of x and y\n");
   std::printf(
@@ -303,7 +306,8 @@ void runErrors(const std::vector<double>& speeds, double duration) {
   }
 }
 
-/// Burzoni's tables 8..15 and maps: q from the taps compared with the best q of the cut (chosen by the truth), and the harmonic form by its default design and with a memory per band from the likelihood.
+/// Burzoni's tables 8..15 and maps: q from the taps compared with the best q of the cut (chosen by the
+/// truth), and the harmonic form by its default design and with a memory per band from the likelihood.
 class TuningStudy {
  public:
   explicit TuningStudy(double duration) {

@@ -1,4 +1,5 @@
-// rosrun smartmill_studies kalman_spindle_sensor: Burzoni's sensor on the simulated machine, calibrated by the steps of the product, and its force compared with that of the table dynamometer.
+// rosrun smartmill_studies kalman_spindle_sensor: Burzoni's sensor on the simulated machine, calibrated by
+// the steps of the product, and its force compared with that of the table dynamometer.
 
 #include <cmath>
 #include <cstdio>
@@ -56,7 +57,8 @@ void calibrate(SpindleRig& rig, const Request& request) {
 
 void cuts(SpindleRig& rig, const MachineModel& model, double band) {
   std::printf(
-      "slots 0.8 mm deep, 0.1 mm per tooth: RMS of the difference to the true force up to %.0f Hz, %% of it\n",
+      "slots 0.8 mm deep, 0.1 mm per tooth: RMS of the difference to the true force up to %.0f Hz, %% of "
+      "it\n",
       band);
   std::printf("%6s %24s %24s %24s %24s\n", "rpm", "sensor, static", "sensor, compensated",
               "table dynamometer", "compensated to dynam.");

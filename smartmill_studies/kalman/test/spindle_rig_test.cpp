@@ -16,7 +16,8 @@ namespace {
 
 constexpr double LENGTH = 0.139;  // [m]
 
-// Weights, reference, taps and a cut: the spindle sensor of the simulated machine through the steps of the product.
+// Weights, reference, taps and a cut: the spindle sensor of the simulated machine through the steps of the
+// product.
 TEST(SpindleRig, ShowsTheForceOfACutAfterItsCalibration) {
   const MachineModel model = readMachineModel("../../launch/models/mill_twin.yaml");
   sim::WorldOptions world;
@@ -63,7 +64,8 @@ TEST(SpindleRig, ShowsTheForceOfACutAfterItsCalibration) {
   EXPECT_THROW(SpindleForceSensor(*found, LENGTH).handle(block), Error);
 }
 
-// Eq. 4-43: a constant and an oscillation at tooth passing are estimated without error; another harmonic is not.
+// Eq. 4-43: a constant and an oscillation at tooth passing are estimated without error; another harmonic is
+// not.
 TEST(ExpandedDisturbance, TellsWhatItIsMadeFor) {
   constexpr double RATE = 25600.0;
   ModalModel sensor;
@@ -98,7 +100,8 @@ ForceCurve law(double power) {
   return curve;
 }
 
-// Linear law: the critical limit is 1 / (2 K zeta (1 + zeta) gain) (Tlusty), with almost no bistable zone; a digressive law has one.
+// Linear law: the critical limit is 1 / (2 K zeta (1 + zeta) gain) (Tlusty), with almost no bistable zone; a
+// digressive law has one.
 TEST(Bistable, LinearLawHasTheTextbookLimitAndADigressiveOneARange) {
   Mode mode;
   mode.frequency = 800.0;

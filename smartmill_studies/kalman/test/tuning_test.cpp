@@ -56,7 +56,8 @@ TEST(Tuning, PlantsLieAtTheEdgeOfTheConfidenceInterval) {
     EXPECT_LT(std::abs(after[line] / before[line] - std::polar(0.97, -0.03)), 1e-9);
 }
 
-// The optimum of the map of the taps is within 2^1 .. 2^30, and gives errors of the tooth harmonics of at most 5 % (Burzoni: 10 .. 30 %).
+// The optimum of the map of the taps is within 2^1 .. 2^30, and gives errors of the tooth harmonics of at
+// most 5 % (Burzoni: 10 .. 30 %).
 TEST(Tuning, QOfTheTapsServesTheCut) {
   std::vector<double> speeds;
   for (const double rpm : {1000.0, 3700.0, 9300.0, 17600.0}) speeds.push_back(units::radPerSecFromRpm(rpm));
@@ -81,7 +82,8 @@ TEST(Tuning, QOfTheTapsServesTheCut) {
   }
 }
 
-// By the likelihood alone, varying amplitudes get a short memory and constant ones a long one, each in its band.
+// By the likelihood alone, varying amplitudes get a short memory and constant ones a long one, each in its
+// band.
 TEST(Tuning, LikelihoodTellsEachBandsMemory) {
   ModalModel ideal;
   ideal.direct = 1.0;

@@ -1,4 +1,6 @@
-// rosrun smartmill_studies loadmeter_causes: number of tests needed to identify the cause of a machine, with and without the causes found before in its shop. The signature of each cause in each test comes from reports of `explain`; the sizes are random and scale the signatures.
+// rosrun smartmill_studies loadmeter_causes: number of tests needed to identify the cause of a machine, with
+// and without the causes found before in its shop. The signature of each cause in each test comes from
+// reports of `explain`; the sizes are random and scale the signatures.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -45,7 +47,9 @@ class Draw {
     return static_cast<std::size_t>(
         std::count_if(weights_.begin(), weights_.end(), [&](double w) { return w > weights_[cause]; }));
   }
-  /// Signature of a machine over the complete plan: the squares over the noise are proportional to the squared size, with variance 4 m / n about their mean m over n samples (noncentral chi-square). Each square may differ from the report by a random factor (log-normal).
+  /// Signature of a machine over the complete plan: the squares over the noise are proportional to the
+  /// squared size, with variance 4 m / n about their mean m over n samples (noncentral chi-square). Each
+  /// square may differ from the report by a random factor (log-normal).
   ModelImprovement machine(const std::string& name, std::size_t cause) {
     const double size =
         std::exp(std::uniform_real_distribution<double>(std::log(0.1), std::log(1.5))(random_));
@@ -85,7 +89,8 @@ struct Count {
 
 enum class Way { fleet, alone, plan };
 
-/// @param search new @param expected index of the truth among the fleet's causes; causes.size() + 1: none of these
+/// @param search initial state of the search @param expected index of the truth among the fleet's causes;
+/// causes.size() + 1: none of these
 void tell(CauseSearch search, const std::vector<std::string>& tests, const ModelImprovement& machine,
           std::size_t expected, Way way, const std::vector<Count*>& counts) {
   std::map<std::string, Outcome> shows;
@@ -133,7 +138,8 @@ void run(const Options& o) {
       const auto at = std::find_if(fleet.causes.begin(), fleet.causes.end(),
                                    [&](const FleetCause& c) { return c.name == name; });
       const bool met = at != fleet.causes.end();
-      const auto expected = met ? static_cast<std::size_t>(at - fleet.causes.begin()) : fleet.causes.size() + 1;
+      const auto expected =
+          met ? static_cast<std::size_t>(at - fleet.causes.begin()) : fleet.causes.size() + 1;
       for (const Way way : {Way::fleet, Way::alone, Way::plan}) {
         tell(way == Way::fleet ? by_fleet : by_none, fleet.tests, machine, expected, way,
              {&all[way], &(!met                     ? unmet
@@ -142,8 +148,9 @@ void run(const Options& o) {
       }
     }
   }
-  std::printf("%zu causes, %d shops, %d machines explained in each, %d more to identify\n%-44s %6s %6s %6s %8s\n",
-              causes.size(), o.shops, o.explained, o.newcomers, "", "all", "right", "wrong", "tests");
+  std::printf(
+      "%zu causes, %d shops, %d machines explained in each, %d more to identify\n%-44s %6s %6s %6s %8s\n",
+      causes.size(), o.shops, o.explained, o.newcomers, "", "all", "right", "wrong", "tests");
   struct Group {
     std::string name;
     std::map<Way, Count>& counts;
@@ -161,7 +168,8 @@ void run(const Options& o) {
 int main(int argc, char** argv) {
   Options o;
   CommandLine line(
-      "Number of tests needed to identify the cause of a machine, with and without the causes found in its shop.");
+      "Number of tests needed to identify the cause of a machine, with and without the causes found in its "
+      "shop.");
   line.option("REPORT", o.reports, "of `explain`, each naming one cause").required();
   line.option("--shops", o.shops).showDefault().within(1, 100000);
   line.option("--explained", o.explained, "machines of a shop explained before")

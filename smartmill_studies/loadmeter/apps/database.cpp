@@ -1,4 +1,5 @@
-// The database under load: `lookup` among many records compared with baselines; `crash` kills writers while they write.
+// The database under load: `lookup` among many records compared with baselines; `crash` kills writers while
+// they write.
 #include <signal.h>
 #include <sqlite3.h>
 #include <sys/wait.h>
@@ -204,8 +205,8 @@ int main(int argc, char** argv) {
   const CommandOptions look =
       line.command("lookup", "time of a look-up among many records, compared with baselines");
   look.option("--records", records).showDefault().within(1000, 10000000);
-  const CommandOptions kills =
-      line.command("crash", "kills writers while they write, and checks that every acknowledged record is stored");
+  const CommandOptions kills = line.command(
+      "crash", "kills writers while they write, and checks that every acknowledged record is stored");
   kills.option("--writers", writers).showDefault().within(1, 64);
   kills.option("--seconds", seconds).showDefault().positive();
   kills.option("--kill-every", every, "s").showDefault().positive();

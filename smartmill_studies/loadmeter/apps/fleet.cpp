@@ -325,9 +325,10 @@ bool fullDisk(const Options& o) {
     const FleetTransfer rest = push(local, server.url("mill"));
     good = !said.empty() && there >= acknowledged && behind == 60000 - acknowledged &&
            CoefficientDatabase(server.url("mill")).size() == 60000;
-    std::printf("full disk: %zu acknowledged, %zu stored, %zu pending; after the disk is enlarged %s: %s\n    \"%s\"\n",
-                acknowledged, there, behind, freshOf(rest).c_str(), good ? "nothing lost" : "WRONG",
-                said.c_str());
+    std::printf(
+        "full disk: %zu acknowledged, %zu stored, %zu pending; after the disk is enlarged %s: %s\n    "
+        "\"%s\"\n",
+        acknowledged, there, behind, freshOf(rest).c_str(), good ? "nothing lost" : "WRONG", said.c_str());
   }
   if (std::system(("umount -l " + mount).c_str()) != 0)
     std::fprintf(stderr, "%s stays mounted\n", mount.c_str());

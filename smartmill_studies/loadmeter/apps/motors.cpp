@@ -91,7 +91,8 @@ void run(int cuts, unsigned seed, double warmer, const std::string& out) {
 
 int main(int argc, char** argv) {
   CommandLine line(
-      "Forces from motor currents of the simulated machine: regression and ANFIS trained on one day and tested on a day with another temperature, and the estimator of all sensors.");
+      "Forces from motor currents of the simulated machine: regression and ANFIS trained on one day and "
+      "tested on a day with another temperature, and the estimator of all sensors.");
   int cuts = 60;
   unsigned seed = 1;
   double warmer = 15.0;

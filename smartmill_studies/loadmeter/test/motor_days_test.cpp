@@ -8,7 +8,8 @@
 namespace smartmill::loadmeter {
 namespace {
 
-// The complete chain: motors of the twin, phase currents at 1 kHz, ranges, standard cuts, forces; then a day 15 K warmer with the calibration of the first.
+// The complete chain: motors of the twin, phase currents at 1 kHz, ranges, standard cuts, forces; then a day
+// 15 K warmer with the calibration of the first.
 TEST(MotorDays, currentsOfTheTwinBecomeForces) {
   MotorDay day;
   day.cuts = 40;
@@ -37,7 +38,8 @@ TEST(MotorDays, currentsOfTheTwinBecomeForces) {
     EXPECT_GT(errors.inside_window[a], 0.8);
     EXPECT_GT(errors.inside_window_rms[a], 0.8);
   }
-  // The drives follow up to 60 Hz, as identified by rapid moves; the variation of moving axes is then accurate to a few newtons (8 N by mean forces and mechanics alone), as stated.
+  // The drives follow up to 60 Hz, as identified by rapid moves; the variation of moving axes is then
+  // accurate to a few newtons (8 N by mean forces and mechanics alone), as stated.
   for (std::size_t a = 0; a < 2; ++a) {
     ASSERT_TRUE(warm.back().bandwidth[a]);
     EXPECT_NEAR(warm.back().bandwidth[a]->value, 60.0, 3.0 * warm.back().bandwidth[a]->std_dev);
@@ -63,7 +65,8 @@ TEST(MotorDays, currentsOfTheTwinBecomeForces) {
   }
 }
 
-// No standard cuts: slots of the session with the dynamometer of the twin, by the Hall sensors and by a record of Servo Guide that begins at the feed block.
+// No standard cuts: slots of the session with the dynamometer of the twin, by the Hall sensors and by a
+// record of Servo Guide that begins at the feed block.
 TEST(MotorDays, aSessionCalibratesItself) {
   for (const bool servo : {false, true}) {
     MotorDay day;

@@ -84,7 +84,8 @@ TEST(TurningScene, errorsAndVariancesAreThoseThatWerePutIn) {
   EXPECT_LT(r.fy.p_variances, 1e-6);
 }
 
-// The 120 cuts of the turning centre as two tables: forces of the remote dynamometer and currents of this machine.
+// The 120 cuts of the turning centre as two tables: forces of the remote dynamometer and currents of this
+// machine.
 struct Tables {
   TurningCentre centre{3, {}};
   std::string standard, currents;
@@ -126,7 +127,8 @@ TEST(StandardCuts, giveTheLawsOfTheTurningCentre) {
               4.0 * c.drive[0]->newton_per_ampere.std_dev + 6.0);
   EXPECT_NEAR(c.drive[2]->newton_per_ampere.value, 215.9, 4.0 * c.drive[2]->newton_per_ampere.std_dev);
   EXPECT_EQ(c.drive[2]->newton_per_ampere.value, made.drive[2]->newton_per_ampere.value);  // 17 digits
-  // 300 cuts outside the calibration: the stated scatter agrees with the observed one. Table 2: sensor 260 N2 for Fz.
+  // 300 cuts outside the calibration: the stated scatter agrees with the observed one. Table 2: sensor 260 N2
+  // for Fz.
   double squares = 0.0, n = 0.0, torque2 = 0.0, all = 0.0;
   for (const TurningCut& cut : tables.centre.predictionTests(300)) {
     if (cut.moves_z) {

@@ -23,7 +23,8 @@ namespace {
 
 constexpr double RADIUS = 10e-3, STEP = 1e-3;  // [m], [rad]
 
-/// A tool without vibration over some revolutions: chip thickness [m] of each tooth over its angle in the last one.
+/// A tool without vibration over some revolutions: chip thickness [m] of each tooth over its angle in the
+/// last one.
 std::vector<std::vector<double>> chipsOf(const std::vector<double>& offsets, double feed_per_tooth) {
   const std::size_t teeth = offsets.size();
   Front front(RADIUS, teeth, STEP);
@@ -159,7 +160,8 @@ Plant rigidPlant() {
   return p;
 }
 
-// Mean forces of a slot (Altintas): Fx = -N a (Krc c / 4 + Kre / pi) and so on; they neglect the true tooth path, which contributes about 0.1 %.
+// Mean forces of a slot (Altintas): Fx = -N a (Krc c / 4 + Kre / pi) and so on; they neglect the true tooth
+// path, which contributes about 0.1 %.
 TEST(Machine, MeanForcesOfASlot) {
   std::mt19937_64 random(1);
   RunOptions o;
@@ -213,7 +215,8 @@ TEST(Machine, MeanForcesOfABullNoseInASlot) {
   }
 }
 
-// Records of an independent program with the classical chip thickness; the true tooth path differs by 0.2 % of a chip at 0.1 mm per tooth. Noise: 1 N, 0.05 um.
+// Records of an independent program with the classical chip thickness; the true tooth path differs by 0.2 %
+// of a chip at 0.1 mm per tooth. Noise: 1 N, 0.05 um.
 TEST(Machine, MeetsRecordsOfAnotherProgram) {
   SMARTMILL_SHARED_DATA(folder, "campaigns/vibrating_none");
   const Campaign campaign = readCampaign(folder);
@@ -238,7 +241,8 @@ TEST(Machine, MeetsRecordsOfAnotherProgram) {
   }
 }
 
-// Weight of the true tooth path in the twin, from the rule of formats.md (0) to the true path (1): a slot with large vibration per rotation angle.
+// Weight of the true tooth path in the twin, from the rule of formats.md (0) to the true path (1): a slot
+// with large vibration per rotation angle.
 TEST(Machine, LeavesTheSurfaceOfTheTeethsPath) {
   MachineModel model;
   model.tool = rigidPlant().tool;

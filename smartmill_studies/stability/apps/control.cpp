@@ -52,8 +52,8 @@ void print(const std::vector<stability::ControlCut>& cuts) {
   }
   const auto ended = static_cast<double>(after_onset.size());
   std::printf(
-      "%zu cuts that chatter: overrides asked for in %d, chatter ended in %.0f (%d by one move), not ended "
-      "%d; of these a next cut was said for %d, stable in %d\n",
+      "%zu cuts that chatter: overrides requested in %d, chatter ended in %.0f (%d by one change), not ended "
+      "%d; of these a next cut was recommended for %d, stable in %d\n",
       cuts.size(), asked, ended, once, floor, said, next);
   std::printf(
       "revolutions from the onset to the end: median %.0f, 95 %% %.0f; from the first request: median %.0f, "
@@ -64,7 +64,7 @@ void print(const std::vector<stability::ControlCut>& cuts) {
       "removal rate over the programmed one, all cuts: %.3f, an operator who halves the depth: %.3f (times "
       "%.2f); where ended: %.3f against %.3f\n",
       removal, careful, removal / careful, ended_removal / ended, ended_careful / ended);
-  std::printf("thinking, an advice: median %.2f s, longest %.2f s\n", quantile(thinking, 0.5),
+  std::printf("computing time of an advice: median %.2f s, longest %.2f s\n", quantile(thinking, 0.5),
               quantile(thinking, 1.0));
 }
 
@@ -158,11 +158,10 @@ void run(const Request& request) {
 int main(int argc, char** argv) {
   Request request;
   CommandLine line{
-      "Chatter control of simulated cuts on machines that differ from the believed one: overrides of spindle "
-      "and feed "
-      "end the chatter, against an operator who halves the depth."};
+      "Chatter control of simulated cuts on machines that differ from their model: overrides of spindle and "
+      "feed that end the chatter, compared with an operator who halves the depth."};
   request.addTo(line);
-  request.one.addTo(line, "--cuts,--cases", request.cuts, "how many");
+  request.one.addTo(line, "--cuts,--cases", request.cuts, "number of cuts");
   request.one.addScore(line);
   line.option("--frequency-percent", request.frequency, "standard deviation of the modes' frequencies (2)");
   line.option("--gain-percent", request.gain, "of damping, compliance and coefficients (5)");

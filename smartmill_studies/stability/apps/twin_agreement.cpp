@@ -61,8 +61,8 @@ bool report(const Request& request, const std::vector<stability::AgreementPoint>
                   p.depth / units::MM, p.limit / units::MM, p.radius, word(p.chatters()), word(p.seen));
   }
   const double share = 100.0 * agree / static_cast<double>(points.size());
-  std::printf("%d of %zu points agree (%.2f %%), %d of them chatter; those that differ stand above\n", agree,
-              points.size(), share, chatter);
+  std::printf("%d of %zu points agree (%.2f %%), %d of them chatter; those that differ are listed above\n",
+              agree, points.size(), share, chatter);
   if (!request.out.empty()) {
     std::ofstream csv(request.out);
     csv.precision(8);
@@ -118,17 +118,18 @@ bool run(const Request& request) {
 int main(int argc, char** argv) {
   Request request;
   CommandLine line{
-      "Compares the solver with the simulator in time at random speeds and depths outside a band around the "
-      "boundary. Exit code 0: they agree often enough, 3: they do not."};
+      "Compares the solver with the time-domain simulator at random speeds and depths outside a band around "
+      "the boundary. Exit code 0: agreement reaches --least, else 3."};
   request.addTo(line);
-  request.one.addTo(line, "--points,--cases", request.points, "how many");
+  request.one.addTo(line, "--points,--cases", request.points, "number of points");
   request.one.addScore(line);
-  line.option("--band", request.band_percent, "around the boundary, without points [% of the depth] (5)");
-  line.option("--least", request.least_percent, "agreement due [%] (98)");
+  line.option("--band", request.band_percent,
+              "width of the excluded band around the boundary [% of the depth] (5)");
+  line.option("--least", request.least_percent, "required agreement [%] (98)");
   line.option("--helix-deg", request.helix_deg, "instead of the model's [deg]");
-  line.option("--pitch-deg", request.pitch_deg, "instead of the model's, one a tooth [deg]").commas();
+  line.option("--pitch-deg", request.pitch_deg, "instead of the model's, one per tooth [deg]").commas();
   line.flag("--linear-chips", request.linear,
-            "uneven pitch: the solver takes every tooth to cut all along its arc, as linear theory has it");
+            "uneven pitch: the solver assumes that every tooth cuts along its complete arc (linear theory)");
   line.option("--feed-mm", request.feed_mm, "per tooth [mm] (0.1)");
   line.option("--revolutions", request.revolutions, "of a cut (180)");
   line.option("-o,--out", request.out, "CSV of all points");

@@ -7,8 +7,8 @@
 namespace smartmill::stability {
 namespace {
 
-// Machines 2 % off in frequency: chatter is ended by the override in the time domain, and what is said of the
-// next cut is so.
+// Machines 2 % off in frequency: the override ends the chatter in the time domain, and the recommended next
+// cut is stable.
 TEST(ChatterControl, endsChatterInTheTwin) {
   MachineModel model = readMachineModel(MODEL_FOLDER "/stiff.yaml");
   model.uncertainty.frequency = 2.0;

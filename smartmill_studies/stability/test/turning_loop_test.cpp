@@ -11,7 +11,7 @@
 namespace smartmill::stability {
 namespace {
 
-// Free: the growth of the linear process' dominant root, until the tool leaves the cut.
+// Without control: growth by the dominant root of the linear process, until the tool leaves the cut.
 TEST(TurningLoop, theFreeLatheGrowsAsItsRootAndThenLeavesTheCut) {
   TurningLoop loop = kimLoop(1.0);
   loop.controlled = false;
@@ -26,7 +26,7 @@ TEST(TurningLoop, theFreeLatheGrowsAsItsRootAndThenLeavesTheCut) {
   EXPECT_EQ(least, 0.0);
 }
 
-// Through blocks that are late, a servo with a bandwidth and a chip force that is not proportional.
+// With delayed blocks, a servo with finite bandwidth and a nonlinear chip force.
 TEST(TurningLoop, chatterEndsOverATopicsDelay) {
   for (const double exponent : {1.0, 0.7}) {
     TurningLoop loop = kimLoop(2.0);
