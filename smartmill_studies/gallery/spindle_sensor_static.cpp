@@ -69,7 +69,7 @@ Drawn constants(const std::string& folder, unsigned seed) {
           "[mm]'\n";
   for (std::size_t k = 0; k < all.size(); ++k)
     plot << "set ylabel '" << all[k].name << " [1]'\nplot $line" << k
-         << " using 1:2 with lines lw 4 lc rgb '#b0b0b0' title 'table 3', $told" << k
+         << " using 1:2 with lines lw 4 lc rgb '#b0b0b0' title 'table 3', $points" << k
          << " using 1:2 with points pt 7 ps 1.5 lc rgb '#c02020' title 'table 2', $line" << k
          << " using 1:3 with lines lw 1.5 lc rgb '#2060c0' title 'calibrated here'\n";
   plot << "unset multiplot\n";

@@ -114,7 +114,7 @@ class Shop {
     std::vector<double> scaled = cut;
     for (double& v : scaled) v /= size;
     mix(scaled, 0.6);
-    // Chip noise and load noise through resonances of machine and room.
+    // Chip noise and load noise through resonances of machine and workshop.
     std::vector<double> chips = noise(cut.size());
     for (std::size_t i = 0; i < chips.size(); ++i) chips[i] *= 0.3 + std::abs(scaled[i]);
     for (int k = 0; k < 3; ++k) {

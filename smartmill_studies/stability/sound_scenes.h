@@ -39,7 +39,7 @@ struct SoundScene {
 };
 
 /// Scenes from a generator that is independent of the detector: the cut is simulated in the time domain
-/// (smartmill_sim), its sound is the tip acceleration through resonances of machine and room; the rest is
+/// (smartmill_sim), its sound is the tip acceleration through resonances of machine and workshop; the rest is
 /// synthesised. @param speeds range of the spindle and largest depth
 std::vector<SoundScene> soundScenes(const MachineModel& model, const RegenerativeSystem& system,
                                     const StudyRange& range, const std::vector<SoundKind>& kinds);

@@ -1,4 +1,4 @@
-"""Processes of the project under a ROS master of their own, each of which can be killed and started anew."""
+"""Processes of the project under a separate ROS master, each of which can be killed and restarted."""
 import logging
 import os
 import pathlib
@@ -7,7 +7,7 @@ import socket
 import subprocess
 import time
 
-PATIENCE = 60.0  # [s] generous: the computer may be slow
+PATIENCE = 60.0  # [s] long, since the computer may be slow
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
@@ -25,22 +25,22 @@ def until(condition, seconds=PATIENCE):
     return True
 
 
-class House:
-    """The processes; what they say stands in FOLDER/NAME.log."""
+class RosProcesses:
+    """The processes, with their output in FOLDER/NAME.log."""
 
     def __init__(self, folder):
         self.folder, self.children = pathlib.Path(folder), {}
         os.environ.update(ROS_MASTER_URI=f"http://localhost:{free_port()}", ROS_HOSTNAME="localhost", ROS_LOG_DIR=folder,
                           ROS_HOME=folder)
         self.run("master", ["rosmaster", "--core", "-p", os.environ["ROS_MASTER_URI"].rsplit(":", 1)[1]])
-        # Read the master's address where they are imported.
+        # These modules read the master's address at import.
         import rosgraph
         import rospy
         self.rospy = rospy
         until(rosgraph.is_master_online)
 
     def join(self, name):
-        """This process becomes a node too."""
+        """Makes this process a node."""
         self.rospy.init_node(name, disable_signals=True)
         logging.getLogger("rosout").setLevel(logging.CRITICAL)
 
@@ -57,7 +57,7 @@ class House:
             self.children[name].wait(PATIENCE)
 
     def end(self, gently=""):
-        """gently: one that has children of its own and ends them"""
+        """gently: name of a process that ends its children, and gets SIGTERM"""
         for name, child in reversed(list(self.children.items())):
             if child.poll() is None:
                 child.send_signal(signal.SIGCONT)
