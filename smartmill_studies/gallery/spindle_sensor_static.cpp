@@ -61,7 +61,7 @@ Drawn constants(const std::string& folder, unsigned seed) {
       rows.push_back(
           {1e3 * length, all[k].table_3->at(length), all[k].found ? all[k].found->at(length) : std::nan("")});
     plot.block(formatted("line%zu", k), rows);
-    plot.block(formatted("told%zu", k), {{138.0, all[k].printed}});
+    plot.block(formatted("points%zu", k), {{138.0, all[k].printed}});
   }
   plot << "set multiplot layout 3,2\nset grid\nset key above horizontal samplen 2\nset xtics 20\nset xlabel "
           "'tool and "
