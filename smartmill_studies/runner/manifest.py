@@ -8,7 +8,7 @@ import sys
 import tomllib
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-SAME = ("program", "arguments", "cases", "seed", "build")  # what of a study makes its cases
+SAME = ("program", "arguments", "cases", "seed", "build")  # the parameters that determine the cases
 
 
 def fail(what, code=1):
@@ -34,17 +34,17 @@ def digest(path):
 
 def libraries(path):
     """The project's own libraries that a program loads."""
-    listed = subprocess.run(["ldd", path], check=True, capture_output=True, text=True).stdout
-    own = [word for word in listed.split() if word.startswith(str(ROOT))]
+    output = subprocess.run(["ldd", path], check=True, capture_output=True, text=True).stdout
+    own = [word for word in output.split() if word.startswith(str(ROOT))]
     return sorted(pathlib.Path(word) for word in own)
 
 
 def build_of(path):
-    """One digest of a program and of the project's libraries that it loads: what makes a case's result."""
-    whole = hashlib.sha256()
+    """Digest of a program and the project's libraries that it loads, which determine the result of a case."""
+    combined = hashlib.sha256()
     for file in [path, *libraries(path)]:
-        whole.update(digest(file).encode())
-    return whole.hexdigest()[:16]
+        combined.update(digest(file).encode())
+    return combined.hexdigest()[:16]
 
 
 def commit():
@@ -58,13 +58,13 @@ def commit():
 
 
 def write_whole(path, text):
-    """The file is there whole or not at all."""
-    part = pathlib.Path(f"{path}.part.{os.uname().nodename}.{os.getpid()}")
-    with open(part, "w", encoding="utf-8") as file:
+    """Writes a file atomically."""
+    partial = pathlib.Path(f"{path}.part.{os.uname().nodename}.{os.getpid()}")
+    with open(partial, "w", encoding="utf-8") as file:
         file.write(text)
         file.flush()
         os.fsync(file.fileno())
-    os.replace(part, path)
+    os.replace(partial, path)
 
 
 def read(out):
@@ -72,7 +72,7 @@ def read(out):
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        fail(f"{path}: is no study's ({error})")
+        fail(f"{path}: not a study ({error})")
 
 
 def case_file(out, number):
@@ -80,6 +80,6 @@ def case_file(out, number):
 
 
 def done(out, study):
-    """Numbers of the cases that are there."""
+    """Numbers of the completed cases."""
     found = {int(p.stem) for p in (pathlib.Path(out) / "cases").glob("*.json") if p.stem.isdigit()}
     return {k for k in found if k < study["cases"]}
