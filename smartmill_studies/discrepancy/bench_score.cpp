@@ -161,7 +161,7 @@ void drawReliability(const std::vector<json>& lines, const std::string& folder) 
   std::string data;
   std::ofstream csv(folder + "/reliability.csv");
   csv << "from,to,stated,right,low,high,named_right,named,resembling_right,resembling\n";
-  std::printf("stated confidence  mean    hidden (95 %% interval)  named    only resembling\n");
+  std::printf("stated confidence  mean    hidden (95 %% interval)         named    only resembling\n");
   for (std::size_t b = 0; b < bins.size(); ++b) {
     const Bin& bin = bins[b];
     if (bin.all() == 0.0) continue;

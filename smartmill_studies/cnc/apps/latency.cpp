@@ -85,8 +85,8 @@ void polled(cnc::Controller& controller, double seconds, const std::function<dou
     took.push_back(std::chrono::duration<double>(Clock::now() - before).count());
   }
   std::sort(took.begin(), took.end());
-  std::printf("read cycle at %.0f Hz    median %.3f ms, 99 %% %.3f ms; %.2f %% of a core, both sides\n", RATE,
-              1e3 * took[took.size() / 2], 1e3 * took[took.size() * 99 / 100],
+  std::printf("read cycle at %.0f Hz          median %.3f ms, 99 %% %.3f ms; %.2f %% of a core, both sides\n",
+              RATE, 1e3 * took[took.size() / 2], 1e3 * took[took.size() * 99 / 100],
               100.0 * (used() - cpu) / seconds);
 }
 

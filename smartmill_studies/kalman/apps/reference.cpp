@@ -326,7 +326,7 @@ class TuningStudy {
         "amplitude error of the tooth harmonics to 3 kHz [%%], worst of x and y\n",
         r_taps_);
     std::printf(
-        "        |        random walk (Burzoni)                     |   harmonics, default       |  "
+        "        |        random walk (Burzoni)                     |   harmonics, default      |  "
         "memory per band by likelihood\n");
     std::printf(
         "    rpm | R of air   q of taps  RMSE   ampl.  best q  RMSE |      RMSE   ampl.         |  "

@@ -91,8 +91,8 @@ enum class Way { fleet, alone, plan };
 
 /// @param search initial state of the search @param expected index of the truth among the fleet's causes;
 /// causes.size() + 1: none of these
-void tell(CauseSearch search, const std::vector<std::string>& tests, const ModelImprovement& machine,
-          std::size_t expected, Way way, const std::vector<Count*>& counts) {
+void identify(CauseSearch search, const std::vector<std::string>& tests, const ModelImprovement& machine,
+              std::size_t expected, Way way, const std::vector<Count*>& counts) {
   std::map<std::string, Outcome> shows;
   for (const TestEvidence& t : evidenceOf(machine)) shows[t.test] = outcomeOf(t);
   for (Count* count : counts) ++count->machines;
@@ -141,10 +141,10 @@ void run(const Options& o) {
       const auto expected =
           met ? static_cast<std::size_t>(at - fleet.causes.begin()) : fleet.causes.size() + 1;
       for (const Way way : {Way::fleet, Way::alone, Way::plan}) {
-        tell(way == Way::fleet ? by_fleet : by_none, fleet.tests, machine, expected, way,
-             {&all[way], &(!met                     ? unmet
-                           : draw.rankOf(truth) < 2 ? frequent
-                                                    : rare)[way]});
+        identify(way == Way::fleet ? by_fleet : by_none, fleet.tests, machine, expected, way,
+                 {&all[way], &(!met                     ? unmet
+                               : draw.rankOf(truth) < 2 ? frequent
+                                                        : rare)[way]});
       }
     }
   }
