@@ -407,7 +407,7 @@ def of_the_wire(rig):
                "closed it|DNC|127.0.0.1", "closed it")
     for what, change, reply_error in (("version 0", set_at(5, 0), "reply with version 0"),
                                ("a length beyond the frame", set_at(12, 0xFF), "data end early"),
-                               ("a length of zero", set_at(12, 0, 0), "says it has 0 bytes"),
+                               ("a length of zero", set_at(12, 0, 0), "states a length of 0 bytes"),
                                ("a wrong opcode", wrong_opcode, "answers another request"),
                                ("fewer replies than requested", set_at(11, 1), "1 replies to"),
                                ("no valid frame", set_at(1, 0), "not a FOCAS frame")):
