@@ -69,8 +69,8 @@ Dataset loaded(const std::string& folder) {
   return loadDataset(campaign, readMachineModel(campaign.modelPath()));
 }
 
-Explanation look(const Dataset& data, const std::string& folder,
-                 const std::function<void(const std::string&)>& progress) {
+Explanation explainCase(const Dataset& data, const std::string& folder,
+                        const std::function<void(const std::string&)>& progress) {
   ExplainOptions options;
   options.bench.threads = 1;
   options.search.on_log = progress;
@@ -166,7 +166,7 @@ json runBenchCase(const plant::Case& hidden, int number, const std::string& fold
     const std::vector<Record> again = plant::runCampaign(drawn, hidden, true);
     line["floor"] = floorOf(data, false, records, again);
     line["heldout_floor"] = floorOf(data, true, records, again);
-    score(hidden, drawn, look(data, folder, progress), &line);
+    score(hidden, drawn, explainCase(data, folder, progress), &line);
   } catch (const Error& error) {
     line["verdict"] = std::string("refused: ") + error.what();
   }

@@ -14,7 +14,7 @@ const std::string& inputFile(const std::uint8_t* data, std::size_t size);
 
 /// A reader may refuse only with an error message.
 template <class Read>
-void told(const Read& read) {
+void readOrRefuse(const Read& read) {
   try {
     read();
   } catch (const Error&) {

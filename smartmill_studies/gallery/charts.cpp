@@ -55,13 +55,13 @@ void draw(const std::string& png, const std::vector<StabilityLimit>& limits,
     rows.push_back({units::rpmFromRadPerSec(limits[0].spindle_speed[i])});
     for (const StabilityLimit& limit : limits) rows.back().push_back(1e3 * limit.depth[i]);
   }
-  const char* looks[] = {"lw 4 lc rgb '#b0b0b0'", "lw 1.5 lc rgb '#c08040'", "lw 1.5 lc rgb '#2060c0'"};
+  const char* styles[] = {"lw 4 lc rgb '#b0b0b0'", "lw 1.5 lc rgb '#c08040'", "lw 1.5 lc rgb '#2060c0'"};
   Gnuplot plot(png, 900, 500, 12);
   plot.block("rows", rows);
   plot << "set grid\nset key above horizontal samplen 2\nset xlabel 'spindle speed [rpm]'\nset ylabel 'limit "
           "of a slot [mm]'\nset yrange [0:*]\n";
   for (std::size_t k = 0; k < limits.size(); ++k)
-    plot << (k == 0 ? "plot" : ",") << " $rows using 1:" << k + 2 << " with lines " << looks[k] << " title "
+    plot << (k == 0 ? "plot" : ",") << " $rows using 1:" << k + 2 << " with lines " << styles[k] << " title "
          << Gnuplot::quoted(names[k]);
   plot << "\n";
   plot.draw();
@@ -101,12 +101,14 @@ Chain chainOf(std::mt19937_64& random) {
   const auto limitOf = [](const FrequencyResponse& frf, double kt, double radial) {
     return stability::zeroOrderLimit(slot(kt, radial), stability::responseOf(frf, frf), speeds());
   };
-  const auto way = [&](Way w) -> const FrequencyResponse& { return outcome.frf[static_cast<int>(w)]; };
+  const auto frfOf = [&](TipMethod w) -> const FrequencyResponse& {
+    return outcome.frf[static_cast<int>(w)];
+  };
   Chain chain;
   chain.art = limitOf(outcome.truth, KT, 0.21);
   // Procedure of the thesis: eq. 4.44, eq. 3.20 over 3.22, and 0.3 for any radial ratio.
-  chain.thesis = limitOf(way(Way::thesis), 1.11 * KT, 0.3);
-  chain.ours = limitOf(way(Way::two_heights), KT, 0.21);
+  chain.thesis = limitOf(frfOf(TipMethod::thesis), 1.11 * KT, 0.3);
+  chain.ours = limitOf(frfOf(TipMethod::two_heights), KT, 0.21);
   chain.thesis_off = std::abs(least(chain.thesis) / least(chain.art) - 1.0);
   chain.ours_off = std::abs(least(chain.ours) / least(chain.art) - 1.0);
   const auto lowest = std::min_element(chain.art.depth.begin(), chain.art.depth.end());

@@ -145,10 +145,10 @@ Drawn transferFunctions(const std::string& folder, unsigned) {
   return drawn;
 }
 
-double waveformError(const Cut& cut, const std::vector<double>& told) {
+double waveformError(const Cut& cut, const std::vector<double>& estimated) {
   double error = 0.0, norm = 0.0;
-  for (std::size_t i = 0; i < told.size(); ++i) {
-    error += std::pow(told[i] - cut.truth[i], 2);
+  for (std::size_t i = 0; i < estimated.size(); ++i) {
+    error += std::pow(estimated[i] - cut.truth[i], 2);
     norm += std::pow(cut.truth[i], 2);
   }
   return std::sqrt(error / norm);

@@ -66,11 +66,11 @@ hammer::StationFrfs stationFrfs(unsigned seed) {
 }
 
 /// Norm of the difference over the norm [1], 250 to 4900 Hz.
-double apart(const FrequencyResponse& told, const FrequencyResponse& truth) {
+double apart(const FrequencyResponse& estimated, const FrequencyResponse& truth) {
   double difference = 0.0, whole = 0.0;
   for (std::size_t i = 0; i < truth.size(); ++i) {
     if (truth.frequency[i] < hammer::BAND_LOW || truth.frequency[i] > hammer::BAND_HIGH) continue;
-    difference += std::norm(told.value[i] - truth.value[i]);
+    difference += std::norm(estimated.value[i] - truth.value[i]);
     whole += std::norm(truth.value[i]);
   }
   return std::sqrt(difference / whole);

@@ -160,14 +160,14 @@ Drawn sensitivity(const std::string& folder, unsigned seed) {
   std::vector<Compared> rows{compareNumber("K, figure 3.2 [V/W]", K, slope, 0.0, 0.01,
                                            "the machine has the constant of the thesis")};
   // Eq. 3.12 at 2 and 3 N m.
-  for (const auto& [share, told] : {std::pair(0.10, 35.0), std::pair(0.01, 350.0)}) {
+  for (const auto& [share, estimated] : {std::pair(0.10, 35.0), std::pair(0.01, 350.0)}) {
     const auto speed = [s = share](double torque) {
       return units::rpmFromRadPerSec(STEP / (K * s * torque));
     };
-    const bool holds = told >= 0.9 * speed(3.0) && told <= 1.1 * speed(2.0);
+    const bool holds = estimated >= 0.9 * speed(3.0) && estimated <= 1.1 * speed(2.0);
     rows.push_back({formatted("speed at which a step of the meter is %.0f %% of 2..3 N m, eq. 3.12 [rpm]",
                               100.0 * share),
-                    formatted("%.0f", told), formatted("%.0f .. %.0f", speed(3.0), speed(2.0)),
+                    formatted("%.0f", estimated), formatted("%.0f .. %.0f", speed(3.0), speed(2.0)),
                     holds ? Verdict::agrees : Verdict::differs, "closed form"});
   }
   return {{png}, rows};
@@ -186,11 +186,11 @@ Drawn exitOfTheCut(const std::string& folder, unsigned seed) {
   for (int i = 0; i < 400; ++i) {
     const double t = i / RATE, torque = t < LEAVES ? TORQUE : 0.0;
     const double v = drive.rounded(drive.step(torque, SPEED) + normal(random));
-    const double told = v / (K * SPEED) - spindle.viscous * SPEED - spindle.coulomb;
-    rows.push_back({t, torque, told});
+    const double estimated = v / (K * SPEED) - spindle.viscous * SPEED - spindle.coulomb;
+    rows.push_back({t, torque, estimated});
     // The logarithm of a first-order decay is a line.
-    if (t < LEAVES + 0.002 || told < 0.1 * TORQUE) continue;
-    const double y = std::log(told / TORQUE), at = t - LEAVES;
+    if (t < LEAVES + 0.002 || estimated < 0.1 * TORQUE) continue;
+    const double y = std::log(estimated / TORQUE), at = t - LEAVES;
     n += 1.0, st += at, sy += y, stt += at * at, sty += at * y;
   }
   const double bandwidth = -(n * sty - st * sy) / (n * stt - st * st) / units::TWO_PI;
@@ -225,7 +225,7 @@ Drawn coefficients(const std::string& folder, unsigned seed) {
   constexpr int TEETH = 2;
   Meter meter(seed);
   const Idle idle = idleOf(meter);
-  std::vector<double> feeds, told, truth;
+  std::vector<double> feeds, estimated, truth;
   Rows points;
   const double w = units::radPerSecFromRpm(RPM);
   for (double feed = 4e-5; feed < 2.1e-4; feed += 2e-5) {
@@ -235,10 +235,10 @@ Drawn coefficients(const std::string& folder, unsigned seed) {
                               .torque;
     feeds.push_back(feed);
     truth.push_back(torque);
-    told.push_back((meter.mean(torque, w) - idle.fit.at(w)) / (K * w));  // eq. 3.5
-    points.push_back({1e3 * feed, torque, told.back()});
+    estimated.push_back((meter.mean(torque, w) - idle.fit.at(w)) / (K * w));  // eq. 3.5
+    points.push_back({1e3 * feed, torque, estimated.back()});
   }
-  const Straight line = straight(feeds, told);
+  const Straight line = straight(feeds, estimated);
   const double scale = RADIUS * TEETH * DEPTH;  // eq. 3.19
   const double ktc = line.slope * units::PI / scale, kte = line.level * 2.0 / scale;
   const std::string png = folder + "/dunwoody_3_5.png";

@@ -80,7 +80,7 @@ std::string drawAgreement(const std::string& folder, const TurningResult& r, con
   for (std::size_t axis = 0; axis < 3; ++axis) {
     Rows rows;
     for (std::size_t i = 0; i < r.truth[axis].size(); ++i) {
-      rows.push_back({r.truth[axis][i], r.told[axis][i]});
+      rows.push_back({r.truth[axis][i], r.predicted[axis][i]});
       most = std::max(most, r.truth[axis][i]);
     }
     plot.block(names[axis], rows);
@@ -101,12 +101,12 @@ std::string drawAgreement(const std::string& folder, const TurningResult& r, con
 }
 
 loadmeter::Line pooled(const TurningResult& r) {
-  std::vector<double> truth, told;
+  std::vector<double> truth, predicted;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     truth.insert(truth.end(), r.truth[axis].begin(), r.truth[axis].end());
-    told.insert(told.end(), r.told[axis].begin(), r.told[axis].end());
+    predicted.insert(predicted.end(), r.predicted[axis].begin(), r.predicted[axis].end());
   }
-  return loadmeter::fitLine(truth, told);
+  return loadmeter::fitLine(truth, predicted);
 }
 
 /// Table 1 and figure 6.

@@ -106,11 +106,11 @@ Drawn spectra(const std::string& folder, unsigned seed) {
   const auto from = force.size() - static_cast<std::size_t>(std::lround(
                                        std::floor(0.75 * static_cast<double>(force.size()) / turn) * turn));
   const auto is = amplitudes(cut.truth[AXIS], from), told = amplitudes(force, from),
-             shown = amplitudes(cut.measured[AXIS], from);
+             measured_lines = amplitudes(cut.measured[AXIS], from);
   const double apart = BURZONI_RATE / static_cast<double>(force.size() - from);
   Rows rows, taps;
   for (std::size_t i = 1; static_cast<double>(i) * apart < BURZONI_BAND; ++i)
-    rows.push_back({static_cast<double>(i) * apart, is[i], shown[i], told[i]});
+    rows.push_back({static_cast<double>(i) * apart, is[i], measured_lines[i], told[i]});
   const auto& hammer = data.taps[AXIS].hammer.front();
   const auto hit = fourier(hammer);
   const auto answer = fourier(kalman::expandedDisturbanceForce(

@@ -97,8 +97,8 @@ Drawn verification(const std::string& folder, unsigned seed) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     Rows rows;
     for (std::size_t i = 0; i < s.hung[axis].size(); ++i) {
-      rows.push_back({s.hung[axis][i], s.told[axis][i]});
-      worst = std::max(worst, std::abs(s.told[axis][i] - s.hung[axis][i]) / 311.5);
+      rows.push_back({s.hung[axis][i], s.sensor_output[axis][i]});
+      worst = std::max(worst, std::abs(s.sensor_output[axis][i] - s.hung[axis][i]) / 311.5);
     }
     plot.block(formatted("hung%zu", axis), rows);
   }

@@ -25,9 +25,9 @@ FrequencyResponse crossFrf(const plant::ToolInSpindle& tool, double struck, doub
                            std::mt19937_64& random);
 
 /// Methods to get the tip FRF from the measured cross FRF.
-enum class Way { none, thesis, one_height, two_heights };
-constexpr int WAYS = 4;
-std::string nameOf(Way way);
+enum class TipMethod { none, thesis, one_height, two_heights };
+constexpr int TIP_METHODS = 4;
+std::string nameOf(TipMethod method);
 
 /// Result of a method for one true mode below 5 kHz.
 struct GainError {
@@ -38,9 +38,9 @@ struct GainError {
 };
 
 struct OffsetOutcome {
-  std::vector<GainError> modes[WAYS];
-  FrequencyResponse frf[WAYS], truth;
-  double frf_error[WAYS] = {};  ///< [1] norm of the error over the norm, 100..5000 Hz
+  std::vector<GainError> modes[TIP_METHODS];
+  FrequencyResponse frf[TIP_METHODS], truth;
+  double frf_error[TIP_METHODS] = {};  ///< [1] norm of the error over the norm, 100..5000 Hz
 };
 
 /// Measures at one height and at two, with noise (share of the RMS), and corrects. @throws Error when no

@@ -281,13 +281,14 @@ double within(const std::vector<json>& modes, const char* key) {
 json scoreStations(const std::vector<json>& lines) {
   std::vector<json> modes, measured;
   std::vector<double> moves, thesis, seconds, cpu, closest;
-  int good = 0, due = 0, told = 0, away = 0, touched = 0, missed = 0, unseen = 0, spurious = 0, gullet = 0;
+  int good = 0, due = 0, reported = 0, away = 0, touched = 0, missed = 0, unseen = 0, spurious = 0,
+      gullet = 0;
   for (const json& line : lines) {
     cpu.push_back(line["cpu"]);
     if (line["touched"]) ++touched;
     if (line["out_of_range"]) {
       ++away;
-      if (line["code"] == static_cast<int>(FrfCode::no_flute)) ++told;
+      if (line["code"] == static_cast<int>(FrfCode::no_flute)) ++reported;
       continue;
     }
     ++due;
@@ -306,7 +307,7 @@ json scoreStations(const std::vector<json>& lines) {
   }
   json score{{"machines", lines.size()},  {"due", due},
              {"measured", good},          {"out_of_range", away},
-             {"told_so", told},           {"collisions", touched},
+             {"told_so", reported},       {"collisions", touched},
              {"struck_a_gullet", gullet}, {"missed_modes", missed},
              {"modes_unseen", unseen},    {"spurious_modes", spurious},
              {"modes", modes.size()}};

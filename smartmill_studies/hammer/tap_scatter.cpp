@@ -59,12 +59,12 @@ std::vector<double> lineRatios(const Runs& runs, const std::vector<std::size_t>&
   const auto count = static_cast<double>(runs.size());
   std::vector<double> ratios;
   for (const std::size_t i : lines) {
-    double seen = 0.0, stated = 0.0;
+    double observed = 0.0, stated = 0.0;
     for (const MeasureFrfResult& run : runs) {
-      seen += std::norm(run.measured_frf.value[i] - mean[i]) / (count - 1.0);
+      observed += std::norm(run.measured_frf.value[i] - mean[i]) / (count - 1.0);
       stated += std::pow(run.measured_frf.std_dev[i], 2) / count;
     }
-    ratios.push_back(std::sqrt(seen / stated));
+    ratios.push_back(std::sqrt(observed / stated));
   }
   return ratios;
 }

@@ -124,7 +124,7 @@ std::unique_ptr<SpindleRig> rigOf(const MachineModel& model, std::uint64_t seed,
   taps.fit_high = band;
   auto rig = std::make_unique<SpindleRig>(model, world, filter, taps, false);
   rig->sorted().setSpindleSensorLength(LENGTH);
-  rig->tell(CuttingCondition::Kind::none);
+  rig->publishCondition(CuttingCondition::Kind::none);
   return rig;
 }
 
@@ -166,14 +166,15 @@ std::vector<double> weights() {
 /// His weights at the length of the tool; zero and drift from the first and last measurement without load.
 void hang(SpindleRig& rig, BurzoniStatics& found) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    std::vector<double>& told = found.told[axis];
+    std::vector<double>& sensor_output = found.sensor_output[axis];
     for (const double load : weights()) {
       found.hung[axis].push_back(load);
-      told.push_back(mean(shownForce(pulled(rig, axis, load, false), found.calibration, axis)));
+      sensor_output.push_back(mean(shownForce(pulled(rig, axis, load, false), found.calibration, axis)));
     }
-    const double first = told.front(), last = told.back();
-    for (std::size_t i = 0; i < told.size(); ++i)
-      told[i] -= first + (last - first) * static_cast<double>(i) / static_cast<double>(told.size() - 1);
+    const double first = sensor_output.front(), last = sensor_output.back();
+    for (std::size_t i = 0; i < sensor_output.size(); ++i)
+      sensor_output[i] -=
+          first + (last - first) * static_cast<double>(i) / static_cast<double>(sensor_output.size() - 1);
     rig.world().pull({}, false);
   }
 }
@@ -183,9 +184,9 @@ void press(SpindleRig& rig, BurzoniStatics& found) {
   for (std::size_t axis = 0; axis < 2; ++axis) {
     for (const double load : {0.0, 50.0, 100.0, 150.0, 200.0, 250.0, 300.0, 0.0}) {
       const SpindleRig::Record held = pulled(rig, axis, load, true);
-      const std::vector<double> told = shownForce(held, found.calibration, axis),
+      const std::vector<double> sensor_output = shownForce(held, found.calibration, axis),
                                 &below = held.dynamometer[axis];
-      found.pressed[axis].insert(found.pressed[axis].end(), told.begin(), told.end());
+      found.pressed[axis].insert(found.pressed[axis].end(), sensor_output.begin(), sensor_output.end());
       found.on_table[axis].insert(found.on_table[axis].end(), below.begin(), below.end());
     }
     rig.world().pull({}, false);
@@ -197,7 +198,7 @@ void turn(SpindleRig& rig, BurzoniStatics& found) {
   for (const double rpm : found.turning) {
     rig.spin(units::radPerSecFromRpm(rpm));
     for (int k = 0; k < 2; ++k) {
-      rig.tell(CuttingCondition::Kind::air);
+      rig.publishCondition(CuttingCondition::Kind::air);
       rig.run(1.0);
     }
     rig.start();
@@ -256,13 +257,13 @@ BurzoniData gatherBurzoni(const MachineModel& model, std::uint64_t seed, double 
   rig.run(1.0);
   auto quiet = rig.take();
   rig.spin(units::radPerSecFromRpm(9000.0));
-  rig.tell(CuttingCondition::Kind::air);
+  rig.publishCondition(CuttingCondition::Kind::air);
   rig.run(0.3);
   rig.start();
   rig.run(1.0);
   auto raw = rig.take();  // unbalance not identified yet
   rig.run(1.0);
-  rig.tell(CuttingCondition::Kind::air);
+  rig.publishCondition(CuttingCondition::Kind::air);
   rig.run(0.3);
   rig.start();
   rig.run(1.0);

@@ -56,11 +56,11 @@ constexpr std::size_t BURZONI_TABLES = 8;
 /// weights.
 struct BurzoniStatics {
   SpindleSensorCalibration calibration;
-  std::array<double, 3> verified{};                       ///< [1] error against the dynamometer at 120 mm
-  std::array<std::vector<double>, 3> hung, told;          ///< [N] weights at 139 mm, and the sensor's output
-  std::array<std::vector<double>, 2> pressed, on_table;   ///< [N] tool against the workpiece along x, y
-  std::vector<double> turning;                            ///< [rpm] in air
-  std::vector<std::vector<double>> unbalanced, balanced;  ///< [N] along x at each, with and without
+  std::array<double, 3> verified{};                        ///< [1] error against the dynamometer at 120 mm
+  std::array<std::vector<double>, 3> hung, sensor_output;  ///< [N] weights at 139 mm, and the sensor's output
+  std::array<std::vector<double>, 2> pressed, on_table;    ///< [N] tool against the workpiece along x, y
+  std::vector<double> turning;                             ///< [rpm] in air
+  std::vector<std::vector<double>> unbalanced, balanced;   ///< [N] along x at each, with and without
 };
 /// @throws Error
 BurzoniStatics gatherStatics(const MachineModel& model, std::uint64_t seed);

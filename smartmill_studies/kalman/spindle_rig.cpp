@@ -84,7 +84,7 @@ void SpindleRig::hear(const sim::World::Block& block) {
   sorted_->push(use_plate_ ? block.dynamometer : block.spindle_force);
 }
 
-void SpindleRig::tell(CuttingCondition::Kind kind, const Engagement& engagement) {
+void SpindleRig::publishCondition(CuttingCondition::Kind kind, const Engagement& engagement) {
   CuttingCondition condition;
   condition.stamp = now_;
   condition.kind = kind;
@@ -162,10 +162,10 @@ SpindleRig::Record cutAlong(SpindleRig& rig, const MachineModel& model, double y
   const Workpiece& stock = model.workpiece.value();
   const double advance = engagement.feed_per_tooth * tool.teeth * speed / units::TWO_PI;  // [m/s]
   rig.spin(speed);
-  rig.tell(CuttingCondition::Kind::air);
+  rig.publishCondition(CuttingCondition::Kind::air);
   rig.place({stock.low[0] - tool.radius() - 1e-3, y, stock.high[2] + 10e-3});
   rig.run(air);
-  rig.tell(CuttingCondition::Kind::cut, engagement);
+  rig.publishCondition(CuttingCondition::Kind::cut, engagement);
   rig.place({stock.low[0] - tool.radius() - 0.1e-3, y, stock.high[2] - engagement.axial_depth});
   rig.run((tool.radius() + 0.5e-3) / advance + 0.1, {advance, 0.0, 0.0});
   rig.start();
@@ -176,7 +176,7 @@ SpindleRig::Record cutAlong(SpindleRig& rig, const MachineModel& model, double y
     rig.run(way / advance - seconds, {advance, 0.0, 0.0});
   }
   rig.place({stock.low[0], y, stock.high[2] + 10e-3});
-  rig.tell(CuttingCondition::Kind::none);
+  rig.publishCondition(CuttingCondition::Kind::none);
   // Skips blocks that were held back.
   for (auto* force : {&cut.truth, &cut.measured, &cut.dynamometer}) {
     for (auto& axis : *force) axis.resize(std::min(axis.size(), cut.compensated[2].size()));

@@ -27,7 +27,7 @@ class SpindleRig {
   void run(double seconds, const std::array<double, 3>& velocity = {});
   void place(const std::array<double, 3>& position) { position_ = position; }
   void spin(double speed) { speed_ = speed; }  ///< [rad/s]
-  void tell(CuttingCondition::Kind kind, const Engagement& engagement = {});
+  void publishCondition(CuttingCondition::Kind kind, const Engagement& engagement = {});
 
   /// Weights as Burzoni hangs them (3.2), or the tool against the workpiece (3.2.1).
   void readStatic(const std::vector<double>& lengths, const std::vector<double>& loads, bool reference);

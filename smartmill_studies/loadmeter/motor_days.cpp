@@ -82,7 +82,7 @@ class Shop {
     for (std::size_t b = 0; b < blocks; ++b) {
       sim::World::Block block;
       world.advance(block, statesOf(pass, b));
-      tell(pass, block);
+      publish(pass, block);
       if (b < blocks / 2) continue;
       for (std::size_t i = 0; i < sim::World::BLOCK; ++i, ++count) {
         for (std::size_t a = 0; a < 3; ++a) {
@@ -188,7 +188,7 @@ class Shop {
     length_ = length;
   }
 
-  void tell(const Pass& pass, const sim::World::Block& block) {
+  void publish(const Pass& pass, const sim::World::Block& block) {
     // One block later, when all its samples are measured.
     time_ = begin_ + block.dynamometer.timeOf(sim::World::BLOCK);
     const double t = time_ - begin_, way = std::min(length_, velocity(pass) * t);

@@ -71,18 +71,18 @@ class Shop {
             0.0};
   }
   std::vector<FleetObservation> history() {
-    std::vector<FleetObservation> seen;
+    std::vector<FleetObservation> observations;
     for (int m = 0; m < MACHINES; ++m) {
       for (int j = 0; j < MATERIALS; ++j) {
         if (j == MATERIALS - 1 && isNew(m)) continue;
         for (int t = 0; t < TOOLS; ++t) {
           if (between(0.0, 1.0) > 0.4) continue;
           const int cuts = 1 + static_cast<int>(between(0.0, 3.0));
-          for (int c = 0; c < cuts; ++c) seen.push_back(cut(m, j, t));
+          for (int c = 0; c < cuts; ++c) observations.push_back(cut(m, j, t));
         }
       }
     }
-    return seen;
+    return observations;
   }
 
  private:
@@ -105,9 +105,9 @@ double share(const std::vector<double>& z) {
 }
 
 // Prediction by the machine alone before its first cut of a material: from its other materials.
-double loneGuess(const std::vector<FleetObservation>& seen, const std::string& machine) {
+double loneGuess(const std::vector<FleetObservation>& observations, const std::string& machine) {
   double sum = 0.0, count = 0.0;
-  for (const FleetObservation& o : seen) {
+  for (const FleetObservation& o : observations) {
     if (o.machine != machine) continue;
     sum += std::log(o.value);
     ++count;
@@ -117,8 +117,8 @@ double loneGuess(const std::vector<FleetObservation>& seen, const std::string& m
 
 /// Machines that never cut the last material: predictions of its first cuts, by the fleet and by the machine
 /// alone.
-void firstCuts(Shop& shop, const std::vector<FleetObservation>& seen, json* line) {
-  std::vector<FleetObservation> grown = seen;
+void firstCuts(Shop& shop, const std::vector<FleetObservation>& observations, json* line) {
+  std::vector<FleetObservation> grown = observations;
   std::vector<double> mean(MACHINES, 0.0);
   for (int cuts = 0; cuts <= FIRST_CUTS; ++cuts) {
     const FleetModel model(grown);
@@ -128,7 +128,8 @@ void firstCuts(Shop& shop, const std::vector<FleetObservation>& seen, json* line
       const double truth = shop.truth(m, MATERIALS - 1, 0), error = std::log(p->value) - truth;
       fleet.push_back(100.0 * std::abs(error));
       z.push_back(error / p->log_std);
-      const double guess = cuts == 0 ? loneGuess(seen, Shop::nameOf(m)) : mean[static_cast<std::size_t>(m)];
+      const double guess =
+          cuts == 0 ? loneGuess(observations, Shop::nameOf(m)) : mean[static_cast<std::size_t>(m)];
       alone.push_back(100.0 * std::abs(guess - truth));
     }
     const std::string after = "after_" + std::to_string(cuts);
@@ -147,8 +148,8 @@ void firstCuts(Shop& shop, const std::vector<FleetObservation>& seen, json* line
 
 /// Detection of outliers among machines with a history, and number of cuts to detect a new machine that is
 /// off by a quarter.
-void oddMachines(Shop& shop, const std::vector<FleetObservation>& seen, json* line) {
-  const FleetModel model(seen);
+void oddMachines(Shop& shop, const std::vector<FleetObservation>& observations, json* line) {
+  const FleetModel model(observations);
   int found = 0, falsely = 0;
   std::vector<double> z;
   for (const MachineEffect& effect : model.machines()) {
@@ -162,7 +163,7 @@ void oddMachines(Shop& shop, const std::vector<FleetObservation>& seen, json* li
   (*line)["odd_falsely"] = falsely;
   (*line)["effects_z2"] = meanSquare(z);
   (*line)["effects_inside"] = share(z);
-  std::vector<FleetObservation> grown = seen;
+  std::vector<FleetObservation> grown = observations;
   int cuts = 0;
   double odd = 0.0;
   while (cuts < MOST_CUTS && odd <= NAMED) {
@@ -183,10 +184,10 @@ void oddMachines(Shop& shop, const std::vector<FleetObservation>& seen, json* li
 
 json runShop(std::uint64_t seed, int number) {
   Shop shop(seed, number);
-  const std::vector<FleetObservation> seen = shop.history();
-  json line{{"case", number}, {"records", seen.size()}};
-  firstCuts(shop, seen, &line);
-  oddMachines(shop, seen, &line);
+  const std::vector<FleetObservation> observations = shop.history();
+  json line{{"case", number}, {"records", observations.size()}};
+  firstCuts(shop, observations, &line);
+  oddMachines(shop, observations, &line);
   return line;
 }
 

@@ -97,16 +97,16 @@ TurningCut TurningCentre::cut(double kc, bool x, bool z, double speed_rpm, doubl
   for (std::size_t a = 0; a < 3; ++a) {
     c.force[a] = std::max(20.0, nominal[a] + std::sqrt(variances_.process[a]) * normal_(random_));
   }
-  const auto seen = [&](std::size_t a) {
+  const auto forceWithNoise = [&](std::size_t a) {
     return std::max(15.0, c.force[a] + std::sqrt(variances_.sensor[a]) * normal_(random_));
   };
   c.current = {AT_REST, AT_REST, AT_REST};
   if (x) {
     // Not below zero: a range has no sign.
-    c.current[0] = measured(std::abs(currentX(seen(0))), phaseOf(0, speed_rpm, feed));
+    c.current[0] = measured(std::abs(currentX(forceWithNoise(0))), phaseOf(0, speed_rpm, feed));
   }
-  if (z) c.current[2] = measured(std::abs(currentZ(seen(2))), phaseOf(2, speed_rpm, feed));
-  const double torque = seen(1) * (radius + 0.5 * depth);
+  if (z) c.current[2] = measured(std::abs(currentZ(forceWithNoise(2))), phaseOf(2, speed_rpm, feed));
+  const double torque = forceWithNoise(1) * (radius + 0.5 * depth);
   const double rise = std::pow(torque / lawA(speed_rpm), 1.0 / lawB(speed_rpm));
   const double air = 4.0 + 1.5 * speed_rpm / 2400.0;
   const double frequency = phaseOf(1, speed_rpm, feed);
@@ -315,7 +315,7 @@ void compare(const Calibration& calibration, const std::vector<TurningCut>& test
     tally(truth[a], anfis[a], a, &result->anfis);
   }
   result->truth = truth;
-  result->told = regression;
+  result->predicted = regression;
 }
 
 void compareVariances(const Calibration& calibration, const std::vector<TurningCut>& replications,

@@ -82,13 +82,13 @@ struct Agreement {
 /// RMSE of the two thirds of the prediction tests that were not used for selection.
 /// All results of the paper for one calibration and one prediction set.
 struct TurningResult {
-  Line x, z;                                       ///< F = m I + c
-  Agreement regression;                            ///< of the prediction tests
-  Agreement anfis;                                 ///< Fy and Fz (0, 1, 2 as above; Fx: the line)
-  std::string fy_inputs, fz_inputs;                ///< the selected input arrays
-  double fit_x = 0.0, fit_y = 0.0, fit_z = 0.0;    ///< R2 of the calibration
-  VarianceSplit fy, fz;                            ///< of the replications
-  std::array<std::vector<double>, 3> truth, told;  ///< [N] of the prediction tests, by regression
+  Line x, z;                                            ///< F = m I + c
+  Agreement regression;                                 ///< of the prediction tests
+  Agreement anfis;                                      ///< Fy and Fz (0, 1, 2 as above; Fx: the line)
+  std::string fy_inputs, fz_inputs;                     ///< the selected input arrays
+  double fit_x = 0.0, fit_y = 0.0, fit_z = 0.0;         ///< R2 of the calibration
+  VarianceSplit fy, fz;                                 ///< of the replications
+  std::array<std::vector<double>, 3> truth, predicted;  ///< [N] of the prediction tests, by regression
 };
 TurningResult studyTurning(unsigned seed, const TurningVariances& variances, std::size_t replications);
 

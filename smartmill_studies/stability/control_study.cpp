@@ -31,12 +31,12 @@ class Repetition {
 
   /// @param angle [rad] turned @param tip [m]
   void at(double angle, const std::array<double, 2>& tip) {
-    const double shown = angle * places_ / units::TWO_PI;
-    const auto place = static_cast<long>(shown);
-    if (place > place_ && shown > shown_)
-      look(place, tip, (static_cast<double>(place) - shown_) / (shown - shown_));
+    const double travelled = angle * places_ / units::TWO_PI;
+    const auto place = static_cast<long>(travelled);
+    if (place > place_ && travelled > last_travelled_)
+      evaluate(place, tip, (static_cast<double>(place) - last_travelled_) / (travelled - last_travelled_));
     place_ = place;
-    shown_ = shown;
+    last_travelled_ = travelled;
     tip_ = tip;
   }
   bool repeats(std::size_t turn) const { return std::sqrt(change_[turn]) < STILL * FEED; }
@@ -50,7 +50,7 @@ class Repetition {
 
  private:
   /// Interpolated between the last step and this one.
-  void look(long place, const std::array<double, 2>& tip, double share) {
+  void evaluate(long place, const std::array<double, 2>& tip, double share) {
     const auto turn = static_cast<std::size_t>(place / places_);
     if (change_.size() <= turn) change_.resize(turn + 1, 0.0);
     std::array<double, 2>& before = last_[static_cast<std::size_t>(place % PLACES)];
@@ -62,7 +62,7 @@ class Repetition {
 
   int places_;
   long place_ = 0;
-  double shown_ = 0.0;                 // [positions] at the last step
+  double last_travelled_ = 0.0;        // [positions] at the last step
   std::array<double, 2> tip_{{0, 0}};  // [m] then
   std::vector<std::array<double, 2>> last_;
   std::vector<double> change_;
@@ -183,8 +183,8 @@ class ControlledCut {
     advisor_.handle(state);
     const auto request = control_.takeRequest();
     if (!request) return;
-    if (cut_.moves++ == 0) cut_.asked = turned_ / units::TWO_PI;
-    cut_.said = request->reason;
+    if (cut_.moves++ == 0) cut_.requested = turned_ / units::TWO_PI;
+    cut_.reason = request->reason;
     cut_.spindle = request->spindle;
     cut_.feed = request->feed;
     cut_.next_speed = request->next_speed;
@@ -259,7 +259,7 @@ std::vector<ControlCut> controlStudy(const MachineModel& model, const Regenerati
     if (!std::isfinite(cut.limit)) continue;
     cut.depth = share * cut.limit;
     if (truth->multiplier(cut.speed, cut.depth).radius() <= 1.05) continue;
-    cut.asked = std::numeric_limits<double>::quiet_NaN();
+    cut.requested = std::numeric_limits<double>::quiet_NaN();
     ControlledCut(machineOf(model, drawn), model, system, options, cut,
                   options.seed + 31u * static_cast<unsigned>(cuts.size()))
         .run();

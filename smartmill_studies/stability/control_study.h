@@ -25,7 +25,7 @@ struct ControlCut {
   double speed = 0.0, depth = 0.0;  ///< [rad/s], [m] programmed
   double limit = 0.0;               ///< [m] of the true machine there
   double onset = 0.0;               ///< [revolutions] at which the motion of the tip stops repeating
-  double asked = 0.0;               ///< [revolutions] of the first override request; NaN: none
+  double requested = 0.0;           ///< [revolutions] of the first override request; NaN: none
   double ended = 0.0;               ///< [revolutions] from which it repeats to the end; NaN: never
   int moves = 0;
   double spindle = 1.0, feed = 1.0;  ///< [1] overrides at the end
@@ -35,7 +35,7 @@ struct ControlCut {
   double next_speed = 0.0, next_depth = 0.0;  ///< [rad/s], [m] recommended for the next cut; 0: none
   bool next_stable = false;                   ///< on the true machine
   double thinking = 0.0;                      ///< [s] computing time of all advice
-  std::string said;                           ///< the reason of the last request
+  std::string reason;                         ///< the reason of the last request
   bool end() const { return ended >= 0.0; }
 };
 

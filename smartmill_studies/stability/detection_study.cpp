@@ -145,11 +145,11 @@ void take(const std::vector<ChatterState>& states, DetectionCut& cut) {
     cut.alternation = std::max(cut.alternation, s.alternation);
     cut.energy = std::max(cut.energy, s.energy_ratio);
   }
-  const auto seen = episodes(states);
-  if (seen.empty()) return;
+  const auto detections = episodes(states);
+  if (detections.empty()) return;
   cut.found = true;
-  cut.detected = seen.front().detected;
-  cut.found_frequency = seen.back().frequency;
+  cut.detected = detections.front().detected;
+  cut.found_frequency = detections.back().frequency;
 }
 
 }  // namespace

@@ -80,7 +80,8 @@ std::vector<ReliabilityPoint> reliabilityStudy(const MachineModel& model, const 
     runTwinCuts(
         machines, cuts, {{"tool_x", "tool_y"}},
         [&](std::size_t i, const Record& record) {
-          points[i].seen = repeatsNoMore(record, samples, period, cuts[i].engagement.feed_per_tooth);
+          points[i].observed_chatter =
+              repeatsNoMore(record, samples, period, cuts[i].engagement.feed_per_tooth);
         },
         [&](double share) {
           if (progress) progress(0.5 + 0.5 * share);
@@ -97,7 +98,7 @@ std::vector<ReliabilityBin> reliabilityBins(const std::vector<ReliabilityPoint>&
         found[static_cast<std::size_t>(std::min(bins - 1, static_cast<int>(p.predicted * bins)))];
     ++bin.count;
     bin.predicted += p.predicted;
-    bin.observed += by_twin ? p.seen : p.chatters;
+    bin.observed += by_twin ? p.observed_chatter : p.chatters;
   }
   for (ReliabilityBin& bin : found) {
     if (bin.count == 0) continue;
@@ -113,7 +114,7 @@ std::vector<ReliabilityBin> reliabilityBins(const std::vector<ReliabilityPoint>&
 double reliabilityScore(const std::vector<ReliabilityPoint>& points, bool by_twin) {
   double difference = 0.0, variance = 0.0;
   for (const ReliabilityPoint& p : points) {
-    difference += (by_twin ? p.seen : p.chatters) - p.predicted;
+    difference += (by_twin ? p.observed_chatter : p.chatters) - p.predicted;
     variance += p.predicted * (1.0 - p.predicted);
   }
   return variance > 0.0 ? difference / std::sqrt(variance) : 0.0;

@@ -24,7 +24,7 @@ struct ReliabilityPoint {
   double speed = 0.0, depth = 0.0;  ///< [rad/s], [m]
   double predicted = 0.0;           ///< [1] probability of chatter by the model
   bool chatters = false;            ///< of the drawn machine by the solver
-  bool seen = false;                ///< and by the simulator
+  bool observed_chatter = false;    ///< and by the simulator
 };
 
 /// Predicted and observed share in one bin.
@@ -41,7 +41,7 @@ std::vector<ReliabilityPoint> reliabilityStudy(const MachineModel& model, const 
                                                const ReliabilityOptions& options,
                                                const std::function<void(double)>& progress = {});
 
-/// Bins of equal width in the predicted probability. @param by_twin observed: seen, else chatters
+/// Bins of equal width in the predicted probability. @param by_twin observed: observed_chatter, else chatters
 std::vector<ReliabilityBin> reliabilityBins(const std::vector<ReliabilityPoint>& points, int bins,
                                             bool by_twin);
 

@@ -229,7 +229,7 @@ std::vector<SoundScene> soundScenes(const MachineModel& model, const Regenerativ
       if ((m.radius() > 1.02) == chatters(kind) && (m.radius() > 1.0) == chatters(kind)) break;
     }
     const bool off = kind == SoundKind::speed_error || kind == SoundKind::chatter_shop;
-    scene.told_speed = scene.speed * (1.0 + (off ? 0.015 : 0.003) * (2.0 * unit(random) - 1.0));
+    scene.stated_speed = scene.speed * (1.0 + (off ? 0.015 : 0.003) * (2.0 * unit(random) - 1.0));
     if (cuts(kind)) {
       const int turns = static_cast<int>(CUT * scene.speed / units::TWO_PI);
       plan.push_back({scene.speed, {system.entry, system.exit, scene.depth, FEED}, samples, turns, 0});

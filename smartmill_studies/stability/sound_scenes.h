@@ -32,10 +32,10 @@ const char* nameOf(SoundKind kind);
 struct SoundScene {
   SoundKind kind{};
   Recording recording;
-  double told_speed = 0.0;  ///< [rad/s]
-  double speed = 0.0;       ///< [rad/s]
-  double depth = 0.0;       ///< [m]
-  bool chatters = false;    ///< the simulated tip motion does not repeat
+  double stated_speed = 0.0;  ///< [rad/s]
+  double speed = 0.0;         ///< [rad/s]
+  double depth = 0.0;         ///< [m]
+  bool chatters = false;      ///< the simulated tip motion does not repeat
 };
 
 /// Scenes from a generator that is independent of the detector: the cut is simulated in the time domain

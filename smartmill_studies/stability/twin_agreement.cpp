@@ -86,7 +86,7 @@ std::vector<AgreementPoint> agreementWithTwin(const MachineModel& model, const R
   runTwinCuts(
       {model}, cuts, {{"tool_x", "tool_y"}},
       [&](std::size_t i, const Record& record) {
-        points[i].seen = repeatsNoMore(record, samples, period, options.feed);
+        points[i].observed_chatter = repeatsNoMore(record, samples, period, options.feed);
       },
       progress);
   return points;

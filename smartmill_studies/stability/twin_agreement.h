@@ -26,9 +26,9 @@ struct AgreementPoint {
   double radius = 0.0;  ///< [1] of the dominant multiplier
   double limit = 0.0;   ///< [m] first loss of stability at this speed
   Kind kind = Kind::none;
-  bool seen = false;  ///< the simulated record chatters
+  bool observed_chatter = false;  ///< the simulated record chatters
   bool chatters() const { return radius > 1.0; }
-  bool agrees() const { return chatters() == seen; }
+  bool agrees() const { return chatters() == observed_chatter; }
 };
 
 /// Once-per-period sampling of a record of a steady cut: whether the part that does not repeat with a period

@@ -44,15 +44,16 @@ double processSeconds() {
 
 template <class Ask>
 void timed(const char* name, int count, const Ask& ask) {
-  std::vector<double> took;
+  std::vector<double> durations;
   for (int i = 0; i < count; ++i) {
     const Clock::time_point before = Clock::now();
     ask();
-    took.push_back(std::chrono::duration<double>(Clock::now() - before).count());
+    durations.push_back(std::chrono::duration<double>(Clock::now() - before).count());
   }
-  std::sort(took.begin(), took.end());
+  std::sort(durations.begin(), durations.end());
   std::printf("%-28s median %.3f ms, 99 %% %.3f ms, longest %.3f ms (%d)\n", name,
-              1e3 * took[took.size() / 2], 1e3 * took[took.size() * 99 / 100], 1e3 * took.back(), count);
+              1e3 * durations[durations.size() / 2], 1e3 * durations[durations.size() * 99 / 100],
+              1e3 * durations.back(), count);
 }
 
 /// [s] CPU time of another process: user and system time from proc(5).
@@ -74,7 +75,7 @@ double secondsOf(int pid) {
 void polled(cnc::Controller& controller, double seconds, const std::function<double()>& used) {
   const double cpu = used();
   const Clock::time_point began = Clock::now();
-  std::vector<double> took;
+  std::vector<double> durations;
   for (int i = 0; i < static_cast<int>(seconds * RATE); ++i) {
     std::this_thread::sleep_until(began + std::chrono::duration_cast<Clock::duration>(
                                               std::chrono::duration<double>(static_cast<double>(i) / RATE)));
@@ -82,11 +83,11 @@ void polled(cnc::Controller& controller, double seconds, const std::function<dou
     if (!controller.read()) {
       throw Error("a read cycle failed");
     }
-    took.push_back(std::chrono::duration<double>(Clock::now() - before).count());
+    durations.push_back(std::chrono::duration<double>(Clock::now() - before).count());
   }
-  std::sort(took.begin(), took.end());
+  std::sort(durations.begin(), durations.end());
   std::printf("read cycle at %.0f Hz          median %.3f ms, 99 %% %.3f ms; %.2f %% of a core, both sides\n",
-              RATE, 1e3 * took[took.size() / 2], 1e3 * took[took.size() * 99 / 100],
+              RATE, 1e3 * durations[durations.size() / 2], 1e3 * durations[durations.size() * 99 / 100],
               100.0 * (used() - cpu) / seconds);
 }
 

@@ -29,9 +29,9 @@ constexpr int PASSES = 100;       // alternating between phases and lines
 // One cut: complex amplitudes at orders 1.. of each force, with a free phase of the record.
 struct Cut {
   const TestData* test = nullptr;
-  double feed = 0.0, phase = 0.0;               // [m], [rad]
-  std::array<std::vector<Complex>, 3> line;     // [N] of order k + 1
-  std::array<double, 3> variance{}, besides{};  // [N^2] of the samples, of the asynchronous part
+  double feed = 0.0, phase = 0.0;                    // [m], [rad]
+  std::array<std::vector<Complex>, 3> line;          // [N] of order k + 1
+  std::array<double, 3> variance{}, asynchronous{};  // [N^2] of the samples, of the asynchronous part
 
   Complex at(std::size_t axis, std::size_t k) const {
     return line[axis][k] * std::polar(1.0, -phase * static_cast<double>(k + 1));
@@ -61,7 +61,8 @@ Cut linesOf(const TestData& test) {
     const Eigen::VectorXd values = Eigen::Map<const Eigen::VectorXd>(f.data() + test.first_cut, n);
     const Eigen::VectorXd found = normal.solve(columns.transpose() * values);
     cut.variance[axis] = (values.array() - values.mean()).square().mean();
-    cut.besides[axis] = (values - columns * found).squaredNorm() / static_cast<double>(n - 2 * orders - 1);
+    cut.asynchronous[axis] =
+        (values - columns * found).squaredNorm() / static_cast<double>(n - 2 * orders - 1);
     for (Eigen::Index k = 1; k <= orders; ++k) cut.line[axis].emplace_back(found[2 * k - 1], -found[2 * k]);
   }
   return cut;
@@ -103,18 +104,18 @@ void settlePhases(std::vector<Cut>& cuts) {
   }
 }
 
-void tell(const std::vector<Cut>& cuts) {
+void report(const std::vector<Cut>& cuts) {
   for (const Cut& c : cuts) {
     std::printf("%-16s %s", c.test->test.name.c_str(), c.test->heldout ? "held out" : "fitted  ");
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      double left = c.besides[axis];
+      double left = c.asynchronous[axis];
       for (std::size_t k = 0; k < c.line[axis].size(); ++k) {
         const auto [first, slope] = courseOf(cuts, false, axis, k);
         left += 0.5 * std::norm(c.at(axis, k) - first - c.feed * slope);
       }
       std::printf("  %s %.2f %% (repeats %.2f %%)", FORCES[axis].c_str(),
                   100.0 * (1.0 - left / c.variance[axis]),
-                  100.0 * (1.0 - c.besides[axis] / c.variance[axis]));
+                  100.0 * (1.0 - c.asynchronous[axis] / c.variance[axis]));
     }
     std::printf("\n");
   }
@@ -132,7 +133,7 @@ void run(const std::string& folder) {
   }
   if (fitted < 3) throw Error(folder + ": expected at least three fitted cuts");
   settlePhases(cuts);
-  tell(cuts);
+  report(cuts);
 }
 
 }  // namespace

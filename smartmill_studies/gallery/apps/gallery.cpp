@@ -35,20 +35,20 @@ void list() {
 
 void run(const std::vector<Figure>& figures, const std::string& folder, unsigned seed) {
   std::filesystem::create_directories(folder);
-  std::vector<Shown> shown;
+  std::vector<DrawnFigure> drawn_figures;
   for (const Figure& figure : figures) {
-    std::fprintf(stderr, "%zu of %zu: %s\n", shown.size() + 1, figures.size(), figure.name.c_str());
+    std::fprintf(stderr, "%zu of %zu: %s\n", drawn_figures.size() + 1, figures.size(), figure.name.c_str());
     try {
-      shown.push_back({figure, figure.draw(folder, seed)});
+      drawn_figures.push_back({figure, figure.draw(folder, seed)});
     } catch (const Error& error) {
       throw Error(figure.name + ": " + error.what());
     }
-    for (const Compared& row : shown.back().drawn.rows)
+    for (const Compared& row : drawn_figures.back().drawn.rows)
       std::printf("%-8s %s: seed %s, here %s\n", nameOf(row.verdict), row.what.c_str(), row.seed.c_str(),
                   row.ours.c_str());
   }
   const std::string page = folder + "/gallery.html";
-  writePage(shown, seed, page);
+  writePage(drawn_figures, seed, page);
   std::printf("%s\n", page.c_str());
 }
 

@@ -16,12 +16,12 @@ namespace {
 // and calibrated standard deviations; `rosrun smartmill_studies hammer_offset` runs more machines.
 TEST(OffsetCorrection, IsRightForSpindleAndToolModes) {
   std::mt19937_64 random(3);
-  std::vector<double> gains[WAYS], frfs[WAYS];
+  std::vector<double> gains[TIP_METHODS], frfs[TIP_METHODS];
   int stated = 0, inside = 0;
   for (int i = 0; i < 12; ++i) {
     const OffsetCase drawn = drawOffsetCase(random);
     const OffsetOutcome outcome = judgeOffset(drawn, 0.005, random);
-    for (int w = 0; w < WAYS; ++w) {
+    for (int w = 0; w < TIP_METHODS; ++w) {
       frfs[w].push_back(outcome.frf_error[w]);
       for (const GainError& e : outcome.modes[w]) {
         if (e.share < 0.03) continue;

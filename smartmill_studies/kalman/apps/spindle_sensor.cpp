@@ -28,7 +28,7 @@ struct Request {
 
 void calibrate(SpindleRig& rig, const Request& request) {
   rig.spin(0.0);
-  rig.tell(CuttingCondition::Kind::none);
+  rig.publishCondition(CuttingCondition::Kind::none);
   std::vector<double> weights;
   for (const int hung : {0, 1, 2, 3, 4, 5, 6, 7, 0}) weights.push_back(44.5 * hung);  // 10 lbs each
   std::fprintf(stderr, "weights at three lengths\n");

@@ -87,12 +87,12 @@ struct Count {
   }
 };
 
-enum class Way { fleet, alone, plan };
+enum class TestOrder { fleet, alone, plan };
 
 /// @param search initial state of the search @param expected index of the truth among the fleet's causes;
 /// causes.size() + 1: none of these
 void identify(CauseSearch search, const std::vector<std::string>& tests, const ModelImprovement& machine,
-              std::size_t expected, Way way, const std::vector<Count*>& counts) {
+              std::size_t expected, TestOrder order, const std::vector<Count*>& counts) {
   std::map<std::string, Outcome> shows;
   for (const TestEvidence& t : evidenceOf(machine)) shows[t.test] = outcomeOf(t);
   for (Count* count : counts) ++count->machines;
@@ -104,7 +104,7 @@ void identify(CauseSearch search, const std::vector<std::string>& tests, const M
       }
       return;
     }
-    const auto test = way == Way::plan ? std::optional<std::size_t>(made) : search.next();
+    const auto test = order == TestOrder::plan ? std::optional<std::size_t>(made) : search.next();
     if (!test || *test >= tests.size()) return;
     search.addOutcome(*test, shows[tests[*test]]);
   }
@@ -120,7 +120,7 @@ void run(const Options& o) {
     causes.push_back(i);
   }
   Draw draw(causes, o);
-  std::map<Way, Count> all, frequent, rare, unmet;
+  std::map<TestOrder, Count> all, frequent, rare, unmet;
   for (int s = 0; s < o.shops; ++s) {
     draw.newShop();
     std::vector<ModelImprovement> known;
@@ -140,11 +140,11 @@ void run(const Options& o) {
       const bool met = at != fleet.causes.end();
       const auto expected =
           met ? static_cast<std::size_t>(at - fleet.causes.begin()) : fleet.causes.size() + 1;
-      for (const Way way : {Way::fleet, Way::alone, Way::plan}) {
-        identify(way == Way::fleet ? by_fleet : by_none, fleet.tests, machine, expected, way,
-                 {&all[way], &(!met                     ? unmet
-                               : draw.rankOf(truth) < 2 ? frequent
-                                                        : rare)[way]});
+      for (const TestOrder order : {TestOrder::fleet, TestOrder::alone, TestOrder::plan}) {
+        identify(order == TestOrder::fleet ? by_fleet : by_none, fleet.tests, machine, expected, order,
+                 {&all[order], &(!met                     ? unmet
+                                 : draw.rankOf(truth) < 2 ? frequent
+                                                          : rare)[order]});
       }
     }
   }
@@ -153,13 +153,13 @@ void run(const Options& o) {
       causes.size(), o.shops, o.explained, o.newcomers, "", "all", "right", "wrong", "tests");
   struct Group {
     std::string name;
-    std::map<Way, Count>& counts;
+    std::map<TestOrder, Count>& counts;
   };
   for (const Group& group : {Group{"all", all}, Group{"the two most frequent causes", frequent},
                              Group{"rarer ones", rare}, Group{"never met before", unmet}}) {
-    group.counts[Way::fleet].print((group.name + ", tests by the fleet's prior").c_str());
-    group.counts[Way::alone].print((group.name + ", each cause as likely").c_str());
-    group.counts[Way::plan].print((group.name + ", in the plan's order").c_str());
+    group.counts[TestOrder::fleet].print((group.name + ", tests by the fleet's prior").c_str());
+    group.counts[TestOrder::alone].print((group.name + ", each cause as likely").c_str());
+    group.counts[TestOrder::plan].print((group.name + ", in the plan's order").c_str());
   }
 }
 

@@ -138,7 +138,7 @@ void pushKilled(const Shop& shop, int machine, std::size_t after) {
 }
 
 /// Kills the server within a batch after a number of acknowledged ones. @return acknowledged records
-std::size_t pushIntoDeath(Shop& shop, int machine, int batches, std::string* said) {
+std::size_t pushIntoDeath(Shop& shop, int machine, int batches, std::string* error_text) {
   CoefficientDatabase local(shop.file(machine));
   std::size_t acknowledged = 0;
   int done = 0;
@@ -156,7 +156,7 @@ std::size_t pushIntoDeath(Shop& shop, int machine, int batches, std::string* sai
       if (++done == batches) killSoon();
     });
   } catch (const Error& error) {
-    *said = error.what();
+    *error_text = error.what();
   }
   if (killer.joinable()) killer.join();
   return acknowledged;
@@ -188,8 +188,8 @@ bool kills(Shop& shop, const Options& o) {
       records.push_back(drawRecord(machine, 2000000 + 100000 * batches + i, random));
     local.add(records);
     const std::size_t had = shop.inShop(machine);
-    std::string said;
-    const std::size_t acknowledged = pushIntoDeath(shop, machine, batches, &said);
+    std::string error_text;
+    const std::size_t acknowledged = pushIntoDeath(shop, machine, batches, &error_text);
     const double down = seconds([&] { shop.server().start(); });
     const std::size_t kept = shop.inShop(machine);
     const FleetTransfer again = push(local, shop.url(machine));
@@ -200,7 +200,7 @@ bool kills(Shop& shop, const Options& o) {
         "server killed after %d batches: %zu acknowledged, %zu stored, restarted in %.1f s, then %s: %s\n "
         "   \"%s\"\n",
         batches, acknowledged, kept - had, down, freshOf(again).c_str(),
-        whole ? "nothing lost, nothing twice" : "WRONG", said.c_str());
+        whole ? "nothing lost, nothing twice" : "WRONG", error_text.c_str());
   }
   return good;
 }
@@ -230,14 +230,14 @@ bool away(Shop& shop, const Options& o) {
   shop.server().stop();
   CoefficientDatabase local(shop.file(6));
   std::mt19937 random(o.seed + 6);
-  std::string said;
+  std::string error_text;
   const double time = seconds([&] {
     for (int hour = 0; hour < 24; ++hour) {
       for (int i = 0; i < 10; ++i) local.add(drawRecord(6, 4000000 + 10 * hour + i, random));
       try {
         push(local, shop.url(6));
       } catch (const Error& error) {
-        said = error.what();
+        error_text = error.what();
       }
     }
   });
@@ -247,7 +247,7 @@ bool away(Shop& shop, const Options& o) {
   std::printf(
       "network away for 24 tries (%.2f s in all), 240 records kept locally: %zu pending, then %s\n    "
       "\"%s\"\n",
-      time, behind, freshOf(done).c_str(), said.c_str());
+      time, behind, freshOf(done).c_str(), error_text.c_str());
   return behind == 240 && done.fresh == 240;
 }
 
@@ -309,11 +309,11 @@ bool fullDisk(const Options& o) {
     for (int i = 0; i < 60000; ++i) records.push_back(drawRecord(0, i, random));
     local.add(records);
     std::size_t acknowledged = 0;
-    std::string said;
+    std::string error_text;
     try {
       push(local, server.url("mill"), [&](const FleetTransfer& done) { acknowledged = done.offered; });
     } catch (const Error& error) {
-      said = error.what();
+      error_text = error.what();
     }
     std::size_t there = 0;
     const std::size_t behind = local.unsentCount(local.lastFleet());
@@ -323,12 +323,13 @@ bool fullDisk(const Options& o) {
     server.start();
     there = CoefficientDatabase(server.url("mill")).size();
     const FleetTransfer rest = push(local, server.url("mill"));
-    good = !said.empty() && there >= acknowledged && behind == 60000 - acknowledged &&
+    good = !error_text.empty() && there >= acknowledged && behind == 60000 - acknowledged &&
            CoefficientDatabase(server.url("mill")).size() == 60000;
     std::printf(
         "full disk: %zu acknowledged, %zu stored, %zu pending; after the disk is enlarged %s: %s\n    "
         "\"%s\"\n",
-        acknowledged, there, behind, freshOf(rest).c_str(), good ? "nothing lost" : "WRONG", said.c_str());
+        acknowledged, there, behind, freshOf(rest).c_str(), good ? "nothing lost" : "WRONG",
+        error_text.c_str());
   }
   if (std::system(("umount -l " + mount).c_str()) != 0)
     std::fprintf(stderr, "%s stays mounted\n", mount.c_str());

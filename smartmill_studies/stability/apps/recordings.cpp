@@ -27,10 +27,10 @@ struct Request : stability::StudyRequest {
 };
 
 struct Count {
-  int all = 0, said = 0, right = 0;
+  int all = 0, verdicts = 0, right = 0;
   void add(bool chatter, bool truth) {
     ++all;
-    said += chatter;
+    verdicts += chatter;
     right += chatter == truth;
   }
 };
@@ -43,7 +43,7 @@ void print(const Counts& counts) {
     const auto found = counts.find(nameOf(kind));
     if (found == counts.end()) continue;
     const Count& count = found->second;
-    std::printf("%-38s %6d %12d %6d\n", nameOf(kind), count.all, count.said, count.right);
+    std::printf("%-38s %6d %12d %6d\n", nameOf(kind), count.all, count.verdicts, count.right);
     right += count.right;
     all += count.all;
   }
@@ -52,13 +52,13 @@ void print(const Counts& counts) {
 
 stability::RecordingVerdict judged(const Request& request, const MachineModel& model,
                                    const stability::SoundScene& scene) {
-  stability::RecordingRequest asked;
-  asked.speed = scene.told_speed;
-  asked.teeth = model.tool->teeth;
+  stability::RecordingRequest recording_request;
+  recording_request.speed = scene.stated_speed;
+  recording_request.teeth = model.tool->teeth;
   if (request.modes)
     for (const ModalModel* axis : {&model.tool_tip.x, &model.tool_tip.y})
-      for (const Mode& mode : axis->modes) asked.modes.push_back(mode.frequency);
-  return judgeRecording(scene.recording, asked);
+      for (const Mode& mode : axis->modes) recording_request.modes.push_back(mode.frequency);
+  return judgeRecording(scene.recording, recording_request);
 }
 
 /// One scene; the kinds alternate.
@@ -104,14 +104,15 @@ void run(const Request& request) {
     if (verdict.chatter != scene.chatters)
       std::printf("scene %zu, %s, %s, %.0f rpm (stated %.0f), %.2f mm: %s\n", k, nameOf(scene.kind),
                   scene.chatters ? "chatters" : "does not", units::rpmFromRadPerSec(scene.speed),
-                  units::rpmFromRadPerSec(scene.told_speed), scene.depth / units::MM, verdict.text().c_str());
+                  units::rpmFromRadPerSec(scene.stated_speed), scene.depth / units::MM,
+                  verdict.text().c_str());
     if (request.out.empty()) continue;
     SoundFile sound{scene.recording.sample_rate, scene.recording.channels};
     for (double& v : sound.channels[0]) v *= 0.2;
     const std::string file = request.out + formatted("/scene_%03zu.wav", k);
     writeWav(sound, file);
     list +=
-        formatted("%s %.2f %.2f %d %s\n", file.c_str(), units::rpmFromRadPerSec(scene.told_speed),
+        formatted("%s %.2f %.2f %d %s\n", file.c_str(), units::rpmFromRadPerSec(scene.stated_speed),
                   units::rpmFromRadPerSec(scene.speed), static_cast<int>(scene.chatters), nameOf(scene.kind));
   }
   if (!request.out.empty()) std::ofstream(request.out + "/scenes.txt") << list;

@@ -35,7 +35,7 @@ void runOne(const Request& request, const MachineModel& model, stability::Reliab
                      {"depth_mm", p.depth / units::MM},
                      {"predicted", p.predicted},
                      {"chatters", p.chatters},
-                     {"seen", p.seen}});
+                     {"seen", p.observed_chatter}});
 }
 
 /// Points from the printed lines of the cases.
@@ -47,7 +47,7 @@ std::vector<stability::ReliabilityPoint> pointsOf(const std::string& file) {
     p.depth = line.at("depth_mm").get<double>() * units::MM;
     p.predicted = line.at("predicted");
     p.chatters = line.at("chatters");
-    p.seen = line.at("seen");
+    p.observed_chatter = line.at("seen");
     points.push_back(p);
   }
   return points;

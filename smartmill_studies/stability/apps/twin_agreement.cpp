@@ -33,7 +33,7 @@ nlohmann::json lineOf(int number, const stability::AgreementPoint& p) {
           {"depth_mm", p.depth / units::MM},
           {"limit_mm", p.limit / units::MM},
           {"multiplier", p.radius},
-          {"seen", p.seen},
+          {"seen", p.observed_chatter},
           {"agrees", p.agrees()}};
 }
 
@@ -43,7 +43,7 @@ stability::AgreementPoint pointOf(const nlohmann::json& line) {
   p.depth = line.at("depth_mm").get<double>() * units::MM;
   p.limit = numberOf(line, "limit_mm") * units::MM;
   p.radius = line.at("multiplier");
-  p.seen = line.at("seen");
+  p.observed_chatter = line.at("seen");
   return p;
 }
 
@@ -58,7 +58,8 @@ bool report(const Request& request, const std::vector<stability::AgreementPoint>
     chatter += p.chatters();
     if (!p.agrees())
       std::printf("%10.1f %10.4f %10.4f %11.4f %10s %10s\n", units::rpmFromRadPerSec(p.speed),
-                  p.depth / units::MM, p.limit / units::MM, p.radius, word(p.chatters()), word(p.seen));
+                  p.depth / units::MM, p.limit / units::MM, p.radius, word(p.chatters()),
+                  word(p.observed_chatter));
   }
   const double share = 100.0 * agree / static_cast<double>(points.size());
   std::printf("%d of %zu points agree (%.2f %%), %d of them chatter; those that differ are listed above\n",
@@ -69,7 +70,7 @@ bool report(const Request& request, const std::vector<stability::AgreementPoint>
     csv << "rpm,depth_mm,limit_mm,multiplier,solver,twin\n";
     for (const stability::AgreementPoint& p : points)
       csv << units::rpmFromRadPerSec(p.speed) << ',' << p.depth / units::MM << ',' << p.limit / units::MM
-          << ',' << p.radius << ',' << word(p.chatters()) << ',' << word(p.seen) << '\n';
+          << ',' << p.radius << ',' << word(p.chatters()) << ',' << word(p.observed_chatter) << '\n';
     csv.close();
     if (!csv) throw Error(request.out + ": cannot be written");
   }
