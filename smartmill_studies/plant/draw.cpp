@@ -111,10 +111,10 @@ MachineModel believedOf(const Plant& plant, Random& random) {
     // The main mode of the sensor along that axis; the rest of its response is taken as direct.
     const auto main = std::max_element(plant.sensor.begin(), plant.sensor.end(),
                                        [&](const SensorMode& x, const SensorMode& y) {
-                                         return x.driven[a] * x.shown[a] < y.driven[a] * y.shown[a];
+                                         return x.input[a] * x.output[a] < y.input[a] * y.output[a];
                                        });
     const Mode mode = believedMode(main->frequency, main->damping_ratio,
-                                   std::min(1.0, main->driven[a] * main->shown[a]), 0.0, u, random);
+                                   std::min(1.0, main->input[a] * main->output[a]), 0.0, u, random);
     m.force_sensor.axis[a].modes = {mode};
     m.force_sensor.axis[a].direct = 1.0 - mode.gain;
   }

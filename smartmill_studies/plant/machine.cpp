@@ -198,14 +198,14 @@ class TestRun {
     force[test_.direction == "y" ? 1 : test_.direction == "z" ? 2 : 0] += hammer(t);
     sensor_.step(force);
     if (drive_) drive_->step(chip.torque);
-    const std::array<double, 3> shown = sensor_.shown();
-    chain_.feed({shown[0], shown[1], shown[2], drive_ ? drive_->value() : 0.0});
+    const std::array<double, 3> output = sensor_.output();
+    chain_.feed({output[0], output[1], output[2], drive_ ? drive_->value() : 0.0});
   }
 
   double normal(double rms) { return options_.noise ? rms * normal_(random_) : 0.0; }
 
   void show(double t) {
-    const Channels c = chain_.shown(t, angle(t));
+    const Channels c = chain_.output(t, angle(t));
     time_.push_back(t);
     angles_.push_back(std::fmod(angle(t), units::TWO_PI));
     for (std::size_t a = 0; a < 3; ++a)
@@ -285,8 +285,8 @@ Plant plantOf(const MachineModel& model) {
       SensorMode mode;
       mode.frequency = m.frequency;
       mode.damping_ratio = m.damping_ratio;
-      mode.driven[a] = m.gain;
-      mode.shown[a] = 1.0;
+      mode.input[a] = m.gain;
+      mode.output[a] = 1.0;
       p.sensor.push_back(mode);
     }
   }

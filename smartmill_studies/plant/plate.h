@@ -9,7 +9,7 @@ namespace smartmill::plant {
 struct SensorMode {
   double frequency = 0.0;                   ///< [Hz]
   double damping_ratio = 0.0;               ///< [1]
-  std::array<double, 3> driven{}, shown{};  ///< static response of channel c to force a: shown[c] driven[a]
+  std::array<double, 3> input{}, output{};  ///< static response of channel c to force a: output[c] input[a]
 };
 
 /// A plate dynamometer: a rigid plate on four equal three-axis springs at its corners; the channels add up

@@ -23,10 +23,10 @@ constexpr double LAST_PART = 0.7;  // start of the last part, as share of the ye
 /// Queries of one part of the year.
 struct Part {
   std::vector<double> errors;
-  int asked = 0, inside = 0;
+  int queries = 0, inside = 0;
 
   void add(const ShopJob& job) {
-    ++asked;
+    ++queries;
     if (!job.answered) return;
     errors.push_back(100.0 * job.error);
     inside += job.inside;
@@ -38,7 +38,7 @@ struct Part {
   }
   void print(const char* name) {
     const double count = static_cast<double>(errors.size());
-    std::printf("%-28s %5d %8zu %8.1f %8.1f %8.1f %%\n", name, asked, errors.size(), at(0.5), at(0.95),
+    std::printf("%-28s %5d %8zu %8.1f %8.1f %8.1f %%\n", name, queries, errors.size(), at(0.5), at(0.95),
                 errors.empty() ? std::nan("") : 100.0 * inside / count);
   }
 };
@@ -86,7 +86,7 @@ nlohmann::json lineOf(int number, const std::vector<ShopJob>& jobs, int days) {
     for (const ShopJob& job : jobs)
       if (belongs(job)) part.add(job);
     const auto answered = static_cast<double>(part.errors.size());
-    line[name] = {{"jobs", part.asked},
+    line[name] = {{"jobs", part.queries},
                   {"answered", part.errors.size()},
                   {"median_percent", part.at(0.5)},
                   {"percent_95", part.at(0.95)},

@@ -116,7 +116,7 @@ TEST(PlateSensor, ShowsAForceAtRestAsItIs) {
   for (std::size_t c = 0; c < 3; ++c) {
     for (std::size_t a = 0; a < 3; ++a) {
       double sum = 0.0;
-      for (const SensorMode& m : modesOf(p)) sum += m.shown[c] * m.driven[a];
+      for (const SensorMode& m : modesOf(p)) sum += m.output[c] * m.input[a];
       EXPECT_NEAR(sum, c == a ? 1.0 : 0.0, 1e-9);
     }
   }
