@@ -25,6 +25,8 @@ import reference_pages  # noqa: E402
 
 # Pages from outside docs/, by their place in the site.
 PAGES = {"README.md": "index.md", "CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
+WIDE = {"effects.md", "formats.md", "results.md", "discrepancy_figures.md"}  # tables take the place of the table of contents
+HIDE_CONTENTS = "---\nhide: [toc]\n---\n"
 COPIED = {".md", ".png", ".svg", ".css"}
 LINK = re.compile(r"(\]\()([^)#:\s]+)((?:#[^)]*)?\))")
 
@@ -68,15 +70,16 @@ class Collector:
     def page(self, source, place):
         """Text of a page with the links of its new place. Code is left as it is."""
         parts = re.split(r"(^```.*?^```$|`[^`\n]*`(?!\]))", source.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
-        return "".join(part if part.startswith("`") else LINK.sub(functools.partial(self.link, source, place), part)
+        text = "".join(part if part.startswith("`") else LINK.sub(functools.partial(self.link, source, place), part)
                        for part in parts)
+        return HIDE_CONTENTS + text if place.name in WIDE else text
 
     def link(self, source, place, match):
         linked = (source.parent / match[2]).resolve()
         if not linked.exists():
             fail(f"{source.relative_to(ROOT)}: {match[2]}: no such file")
         if linked.is_dir():
-            return "](" + "#)"
+            fail(f"{source.relative_to(ROOT)}: {match[2]}: is a folder, expected a file")
         return match[1] + os.path.relpath(self.places.get(linked) or self.source_file(linked), place.parent) + match[3]
 
     def source_file(self, path):

@@ -287,7 +287,7 @@ def parameter_file(path):
         out.append("")
     for title, rows in groups:
         if title:
-            out.append(f"{cell(title)}\n")
+            out.append(f"**{cell(title)}**\n")
         if rows:
             out.append(table(("parameter", "shipped value", "meaning"), [(code(k), code(v), cell(m)) for k, v, m in rows]))
     return "\n".join(out)
@@ -308,7 +308,8 @@ def api(root):
         manifest = folder.parent.parent / "package.xml"
         description = ElementTree.parse(manifest).getroot().findtext("description") if manifest.exists() else ""
         rows.append((code(folder.name), str(len(list(folder.rglob("*.h")))), cell(description or "")))
-    return ("# C++ interface\n\nThe public headers of the libraries, by doxygen: <a href=\"../api/index.html\">classes, functions and files</a>, with a search of its own. "
+    return ("# C++ interface\n\nThe public headers of the libraries, by doxygen, with a search of its own: "
+            "<a href=\"../api/annotated.html\">classes</a>, <a href=\"../api/namespaces.html\">namespaces</a>, <a href=\"../api/files.html\">files</a>. "
             "Docstrings state units, shapes, errors and sources. [Architecture](../architecture.md) lists where each concept is implemented.\n\n"
             + table(("package", "headers", "contents"), rows)
             + "\nThe Python interface is described in [Python module](../python.md).\n")
