@@ -183,11 +183,11 @@ class Graph:
         for kind, member in re.findall(rf"LatchedTopic<{messages}> (\w+)", folder):
             for word in re.findall(rf"\b{member}\(nh_?, {NAME}\)", text):
                 self.add(self.topics, self.name(word, folder), kind, publishers=users)
-        for kind, word in re.findall(rf"\b(?:feed|on)<(?:smartmill_msgs::)?(\w+)>\(\s*(?:[\w()]+,\s*)?{NAME}", text):
-            self.add(self.topics, self.name(word, folder), "", readers=users)
-        for word in re.findall(rf"\bsubscribe(?:<[^;(]*>)?\(\s*{NAME}", text):
-            if self.kind.get(self.name(word, folder)) == "topic":
-                self.add(self.topics, self.name(word, folder), "", readers=users)
+        # The topic may be chosen by a parameter: every name in front of the callback counts.
+        for call in re.findall(r"\b(?:(?:feed|on)<[\w:]+>|subscribe(?:<[^;(]*>)?)\(([^;{\[]*)", text):
+            for word in re.findall(NAME, call):
+                if self.kind.get(self.name(word, folder), "topic") == "topic":
+                    self.add(self.topics, self.name(word, folder), "", readers=users)
         for word, handler in re.findall(rf"advertiseService\(\s*{NAME}\)?,\s*&\w+::(\w+)", text):
             kind = re.search(rf"bool {handler}\(smartmill_msgs::(\w+)::Request", folder)
             self.add(self.services, self.name(word, folder), kind[1] if kind else "", publishers=users)
