@@ -8,7 +8,7 @@ import sys
 import xml.etree.ElementTree as ElementTree
 
 # What needs packages that are optional (./setup --with-linuxcnc, --with-fleet, --with-docs) may be skipped everywhere.
-OPTIONAL = ("LinuxCncMachine", "FleetDatabase", "StudiesEngine", "site_test.SiteTest")
+OPTIONAL = ("LinuxCncMachine", "FleetDatabase", "FleetMessage", "StudiesEngine", "site_test.SiteTest")
 
 
 def verdict(case):

@@ -14,11 +14,11 @@ namespace {
 
 using namespace smartmill::loadmeter;
 
-py::array covarianceOf(const IdentifiedCoefficients& found) {
+py::array_t<double> covarianceOf(const IdentifiedCoefficients& found) {
   py::array_t<double> covariance({6, 6});
   for (Eigen::Index i = 0; i < 6; ++i)
     for (Eigen::Index j = 0; j < 6; ++j) covariance.mutable_at(i, j) = found.covariance(i, j);
-  return std::move(covariance);
+  return covariance;
 }
 
 py::object resultOf(const IdentifiedCoefficients& found) {

@@ -105,12 +105,12 @@ void StationMachine::moveOn(double dt) {
 
 void StationMachine::sample(Streams& streams) {
   moveOn(1.0 / RATE);
-  station_.stand({position_, spindle_ + drawn_.mounting, spindle_speed_}, random_);
+  station_.setPose({position_, spindle_ + drawn_.mounting, spindle_speed_}, random_);
   for (int s = 0; s < STEPS; ++s) {
     station_.push(time_ + ((s + 0.5) / STEPS - 0.5) / RATE);
-    station_.hear({{0, 0}});
+    station_.addDisplacement({{0, 0}});
   }
-  const sim::HammerStation::Reading reading = station_.read(time_, random_);
+  const sim::HammerStation::Sample reading = station_.read(time_, random_);
   volt_ = reading.gap;
   touched_ = touched_ || station_.touched();
   closest_ = std::min(closest_, station_.closest());

@@ -58,7 +58,7 @@ TEST(AxisMotion, theMassOfTheTableIsFoundAndTheGapFalls) {
   EXPECT_EQ(data.tests[0].channels, (std::vector<std::string>{"fx", "fy", "fz"}));
   EXPECT_EQ(data.tests[0].record.size(), 29250u - 1878u);
   const std::vector<Hypothesis> hypotheses = catalogueHypotheses(data, nullptr);
-  const Hypothesis& inertia = inertiaOf(hypotheses, "x");
+  const Hypothesis inertia = inertiaOf(hypotheses, "x");
   const double mass = massIn(data, inertia);
   EXPECT_NEAR(mass, 37.3, 0.5);
   MachineModel model = data.nominal;

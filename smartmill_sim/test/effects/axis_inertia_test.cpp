@@ -1,4 +1,4 @@
-// Inertia of what moves with the force sensor against its closed form.
+// Inertia force of the moving force sensor against its closed form.
 
 #include <cmath>
 #include <complex>
@@ -42,7 +42,7 @@ Record simulated(const MachineModel& model, const Record& recorded) {
   return simulateTest(model, test, recorded, options);
 }
 
-// Away from the ends of the record, where no acceleration is known.
+// Away from the ends of the record, where the acceleration is not defined.
 TEST(AxisInertia, isMinusMassTimesAcceleration) {
   const double w = units::TWO_PI * 2.0, peak = MASS * AMPLITUDE * w * w;
   for (const bool as_velocity : {true, false}) {
@@ -67,7 +67,7 @@ TEST(AxisInertia, passesTheModesOfTheSensor) {
   sensor.modes = {{20.0, 0.2, 0.9}};
   sensor.direct = 0.1;
   const Record recorded = moveOfY(FREQUENCY, true);
-  const std::vector<double>& fy = simulated(model, recorded).column("fy");
+  const std::vector<double> fy = simulated(model, recorded).column("fy");
   // Half a second, four periods, after the transient.
   const double w = units::TWO_PI * FREQUENCY;
   std::complex<double> line;

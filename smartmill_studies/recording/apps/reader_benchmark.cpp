@@ -91,7 +91,7 @@ void counters(benchmark::State& state, const std::string& path, std::size_t mess
 
 /// This project's reader; blocks become those of the core.
 void smartmillReader(benchmark::State& state, const std::string& ending, RecordingCompression compression) {
-  const std::string& path = recording(ending, compression);
+  const std::string path = recording(ending, compression);
   std::size_t messages = 0, samples = 0;
   for (auto _ : state) {
     messages = samples = 0;
@@ -110,7 +110,7 @@ void smartmillReader(benchmark::State& state, const std::string& ending, Recordi
 
 /// The reader of ROS; blocks become messages.
 void rosbagView(benchmark::State& state, RecordingCompression compression) {
-  const std::string& path = recording(".bag", compression);
+  const std::string path = recording(".bag", compression);
   std::size_t messages = 0, samples = 0;
   for (auto _ : state) {
     messages = samples = 0;

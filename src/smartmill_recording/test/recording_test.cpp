@@ -177,7 +177,9 @@ TEST_P(Reference, CutOffAnywhereIsRefusedWithFileAndPosition) {
       ADD_FAILURE() << size << " bytes of " << content.size() << " were read";
     } catch (const Error& error) {
       EXPECT_THAT(error.what(), StartsWith("cut.mcap: "));
-      if (size > 40) EXPECT_THAT(error.what(), HasSubstr("at byte ")) << size;
+      if (size > 40) {
+        EXPECT_THAT(error.what(), HasSubstr("at byte ")) << size;
+      }
     }
   }
 }
@@ -194,7 +196,9 @@ TEST_P(Reference, AFlippedBitGivesAnErrorOrTheSameMessages) {
     try {
       const std::vector<Held> held = messagesOf(*openRecording(bytesOf(flipped), "flipped.mcap"));
       // Without checksums a damaged sample goes unnoticed.
-      if (kind != "bare") EXPECT_EQ(held, whole) << at;
+      if (kind != "bare") {
+        EXPECT_EQ(held, whole) << at;
+      }
       ++same;
     } catch (const Error& error) {
       EXPECT_THAT(error.what(), StartsWith("flipped.mcap: "));
@@ -207,7 +211,7 @@ TEST_P(Reference, AFlippedBitGivesAnErrorOrTheSameMessages) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Mcap, Reference, ::testing::Values("chunks", "loose", "bare"),
-                         [](const auto& info) { return std::string(info.param); });
+                         [](const auto& instance) { return std::string(instance.param); });
 
 TEST_F(Recordings, OfAnotherTypeOrEncodingAreRefused) {
   const std::string path = reference("chunks");
