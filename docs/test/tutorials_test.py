@@ -4,6 +4,7 @@ $SMARTMILL is the program. Numbers agree within console.TOLERANCE.
 """
 import os
 import pathlib
+import shutil
 import signal
 import socket
 import subprocess
@@ -12,7 +13,8 @@ import unittest
 
 import console
 
-TUTORIALS = pathlib.Path(__file__).resolve().parents[1] / "tutorials"
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+TUTORIALS = ROOT / "docs/tutorials"
 FOCAS_PORT = "8193"  # in the text; here a free one
 
 
@@ -73,6 +75,19 @@ class TutorialsTest(unittest.TestCase):
         self.addCleanup(process.send_signal, signal.SIGINT)
         printed = [process.stdout.readline().rstrip("\n") for _ in expected]
         self.assertEqual(console.difference(expected, printed), "", where)
+
+    @unittest.skipUnless(shutil.which("c++"), "c++ is not installed")
+    def test_add_effect(self):
+        """The files of the effect compile; what they do was tried by hand."""
+        files = [step for step in console.steps(TUTORIALS / "add_effect.md") if isinstance(step, console.File)]
+        self.assertEqual([pathlib.Path(file.name).name for file in files], ["amplifier_bend.cpp", "amplifier_bend_test.cpp"])
+        for file in files:
+            core = ROOT / "src/smartmill_core"
+            folders = [core / "include", core / "src", core / "testing/include", ROOT / "smartmill_sim/include", ROOT / pathlib.Path(file.name).parent,
+                       "/usr/include/eigen3"]
+            done = subprocess.run(["c++", "-std=c++17", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", *(f"-I{f}" for f in folders), "-x", "c++", "-"],
+                                  input=file.text, capture_output=True, text=True)
+            self.assertEqual(done.returncode, 0, done.stderr)
 
     def test_tap_test(self):
         self.run_tutorial("tap_test")
