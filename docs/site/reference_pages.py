@@ -296,8 +296,7 @@ def parameter_file(path):
 def parameters(root):
     files = sorted((root / "launch/config").glob("*.yaml")) + sorted(root.glob("smartmill_*/config/*.yaml"))
     return ("# Parameters\n\nThe shipped parameter files, one a node. Unknown keys, wrong types and values out of range are refused in one line. A number that may "
-            "have a fraction needs a point, its exponent a sign: `1.0e-2`, never `1e-2`. Where a file of a package and one of `launch/config` have the same keys, the launch file "
-            "names the one that it loads.\n\n" + "\n".join(parameter_file(path) for path in files))
+            "have a fraction needs a point, its exponent a sign: `1.0e-2`, never `1e-2`.\n\n" + "\n".join(parameter_file(path) for path in files))
 
 
 def api(root):

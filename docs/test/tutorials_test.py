@@ -78,7 +78,7 @@ class TutorialsTest(unittest.TestCase):
 
     @unittest.skipUnless(shutil.which("c++"), "c++ is not installed")
     def test_add_effect(self):
-        """The files of the effect compile; what they do was tried by hand."""
+        """The files of the effect compile."""
         files = [step for step in console.steps(TUTORIALS / "add_effect.md") if isinstance(step, console.File)]
         self.assertEqual([pathlib.Path(file.name).name for file in files], ["amplifier_bend.cpp", "amplifier_bend_test.cpp"])
         for file in files:
