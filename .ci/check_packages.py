@@ -44,8 +44,10 @@ EFFECTS = pathlib.Path("src/smartmill_core/src/effects")
 def faults_of_effects(paths):
     """Each file is one effect: it defines the function of its name and includes nothing but the core and the vocabulary of effects."""
     for path in paths:
-        if not re.search(rf"^EffectKind {path.stem}\(\)", text(path), re.MULTILINE):
-            yield f"{path}: expected a function EffectKind {path.stem}()"
+        first, *words = path.stem.split("_")
+        name = first + "".join(word.capitalize() for word in words)
+        if not re.search(rf"^EffectKind {name}\(\)", text(path), re.MULTILINE):
+            yield f"{path}: expected a function EffectKind {name}()"
         for header in includes(path):
             if "/" in header and header != "model/effect_declaration.h" and not header.startswith("smartmill_core/"):
                 yield f"{path}: {header}: an effect depends on the core only"

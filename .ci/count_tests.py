@@ -7,8 +7,8 @@ import pathlib
 import sys
 import xml.etree.ElementTree as ElementTree
 
-# What needs packages that are optional (./setup --with-linuxcnc, --with-fleet) may be skipped everywhere.
-OPTIONAL = ("LinuxCncMachine", "FleetDatabase", "FleetMessage", "StudiesEngine")
+# What needs packages that are optional (./setup --with-linuxcnc, --with-fleet, --with-docs) may be skipped everywhere.
+OPTIONAL = ("LinuxCncMachine", "FleetDatabase", "FleetMessage", "StudiesEngine", "site_test.SiteTest")
 
 
 def verdict(case):

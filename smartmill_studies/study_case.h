@@ -14,33 +14,33 @@
 
 namespace smartmill {
 
-/// One case of a study, as studies/run asks for it: --case K --cases N --seed S prints one line of JSON, the
-/// same whenever and wherever it runs. The program's own --seed stays its own. --score LINES: the study's
-/// figures from all cases' lines.
+/// Options of one case of a study, as used by smartmill_studies/runner/run: --case K --cases N --seed S
+/// prints one line of JSON, which is the same in every run on every host. --score LINES prints the figures of
+/// the study from the lines of all cases.
 struct StudyCase {
-  int number = -1;  ///< -1: all of them, as the program does without the engine
+  int number = -1;  ///< -1: all cases
   std::string lines;
 
   bool one() const { return number >= 0; }
   bool scores() const { return !lines.empty(); }
 
-  /// @param cases what the program counts them in
+  /// @param cases number of cases
   void addTo(const CommandLine& line, const std::string& names, int& cases, const std::string& help) {
     line.option(names, cases, help).showDefault().within(1, 1000000);
-    line.option("--case", number, "only this one of them, 0.., its line of JSON on standard output");
+    line.option("--case", number, "only this case (0..): prints its line of JSON");
   }
   void addScore(const CommandLine& line) {
-    line.option("--score", lines, "figures from a file of all cases' lines, nothing else is done")
+    line.option("--score", lines, "only prints the figures from a file with the lines of all cases")
         .existingFile();
   }
-  /// @throws Error when the case is none of these.
+  /// @throws UsageError when the case is out of range.
   void check(int cases) const {
-    if (number >= cases) throw UsageError("--case: 0.." + std::to_string(cases - 1) + " is due");
+    if (number >= cases) throw UsageError("--case: expected 0.." + std::to_string(cases - 1));
   }
   void print(const nlohmann::json& line) const { std::printf("%s\n", line.dump().c_str()); }
 };
 
-/// A seed of its own for each case of a study.
+/// Seed of one case of a study.
 inline std::uint64_t seedOfCase(std::uint64_t seed, int number) {
   std::seed_seq mixed{static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32),
                       static_cast<std::uint32_t>(number)};
@@ -49,7 +49,7 @@ inline std::uint64_t seedOfCase(std::uint64_t seed, int number) {
   return (static_cast<std::uint64_t>(words[0]) << 32) | words[1];
 }
 
-/// Lines of JSON; one that was cut off by an end is left out.
+/// Lines of JSON; an incomplete line is skipped.
 inline std::vector<nlohmann::json> readJsonLines(const std::string& file) {
   std::vector<nlohmann::json> lines;
   std::ifstream in(file);
@@ -60,7 +60,7 @@ inline std::vector<nlohmann::json> readJsonLines(const std::string& file) {
   return lines;
 }
 
-/// A number of a line; null, as NaN and infinity are written: NaN.
+/// A number of a line; NaN for null, which represents NaN and infinity.
 inline double numberOf(const nlohmann::json& line, const char* name) {
   const nlohmann::json& value = line.at(name);
   return value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.get<double>();

@@ -18,7 +18,7 @@ namespace {
 using namespace smartmill;
 using namespace smartmill::session;
 
-/// Keys are made of stamps with every digit, so that results of equal times meet.
+/// Key with the full stamp, so that results of equal stamps match.
 std::string keyOf(const plain::Header& header, const std::string& about) {
   return about + (about.empty() ? "" : " ") + "at " +
          formatted("%u.%09u", header.stamp.sec, header.stamp.nsec);
@@ -117,12 +117,12 @@ struct Topic {
 template <class Message>
 std::unique_ptr<Topic> topic(const char* name, double slack) {
   auto topic = std::make_unique<Topic>(Topic{name, TopicComparison(slack), {}});
-  topic->attach = [at = topic.get()](RecordingReader& bag, bool first) {
-    bag.on<Message>(at->name, [at, first](const Message& message, double) {
+  topic->attach = [target = topic.get()](RecordingReader& bag, bool first) {
+    bag.on<Message>(target->name, [target, first](const Message& message, double) {
       if (first) {
-        at->comparison.addFirst(recordOf(message));
+        target->comparison.addFirst(recordOf(message));
       } else {
-        at->comparison.addSecond(recordOf(message));
+        target->comparison.addSecond(recordOf(message));
       }
     });
   };
@@ -130,7 +130,7 @@ std::unique_ptr<Topic> topic(const char* name, double slack) {
 }
 
 int run(const std::string& first, const std::string& second, double slack, double most_lost) {
-  // A result that comes once must be in both; of what flows all the time a recorder may miss the ends.
+  // Single results must be in both recordings; of streams a recorder may miss the ends.
   std::vector<std::unique_ptr<Topic>> topics;
   topics.push_back(topic<plain::Frf>(names::TOOL_FRF, 0.0));
   topics.push_back(topic<plain::ModalModel>(names::TOOL_MODES, 0.0));
@@ -142,19 +142,19 @@ int run(const std::string& first, const std::string& second, double slack, doubl
   topics.push_back(topic<plain::ChatterState>(names::CHATTER_STATE, slack));
   for (const bool is_first : {true, false}) {
     RecordingReader bag(is_first ? first : second);
-    for (const auto& each : topics) each->attach(bag, is_first);
+    for (const auto& topic : topics) topic->attach(bag, is_first);
     bag.run();
   }
   bool same = true;
   std::size_t common = 0;
-  for (const auto& each : topics) {
-    const TopicDifference difference = each->comparison.result();
-    std::printf("%s\n", difference.text(each->name).c_str());
-    const bool stream = each->name.rfind("force/", 0) == 0 || each->name == names::CHATTER_STATE;
-    same = same && (stream ? difference.sameButFor(most_lost) : difference.same());
+  for (const auto& topic : topics) {
+    const TopicDifference difference = topic->comparison.result();
+    std::printf("%s\n", difference.text(topic->name).c_str());
+    const bool is_stream = topic->name.rfind("force/", 0) == 0 || topic->name == names::CHATTER_STATE;
+    same = same && (is_stream ? difference.sameButFor(most_lost) : difference.same());
     common += difference.common;
   }
-  if (common == 0) throw Error(first + " and " + second + ": no result is in both");
+  if (common == 0) throw Error(first + " and " + second + ": no common result");
   return same ? 0 : 1;
 }
 
@@ -165,16 +165,15 @@ int main(int argc, char** argv) {
   double slack = 1.0, most_lost = 0.0;
   CommandLine line{
       "Compares the results in two recordings (a session and its replay) to the last digit; exit code 1 on "
-      "any "
-      "difference."};
+      "any difference."};
   line.option("first", first, "bag").required();
   line.option("second", second, "bag").required();
   line.option("--slack", slack,
-              "seconds at begin and end that a recorder may have missed of forces and verdicts")
+              "seconds of forces and verdicts that a recording may lack at its start and end")
       .showDefault()
       .notNegative();
   line.option("--most-lost", most_lost,
-              "share of forces and verdicts that a recorder may have lost in between, as a busy one does")
+              "share of forces and verdicts that a recording may lack in between (busy computer)")
       .showDefault()
       .within(0.0, 1.0);
   return runProgram(line, argc, argv, [&] { return run(first, second, slack, most_lost); });

@@ -1,4 +1,5 @@
-// rosrun smartmill_launch discover: arms, asks the running machine for a discovery, and says what came of it.
+// rosrun smartmill_launch discover: sends a goal to the action `discover` of the running machine and prints
+// its result.
 
 #include <atomic>
 #include <cmath>
@@ -28,7 +29,7 @@ using Feedback = smartmill_msgs::DiscoverFeedback;
 using Json = nlohmann::ordered_json;
 
 constexpr int INTERRUPTED = 130;      // exit status
-constexpr double CANCEL_WAIT = 30.0;  // [s] for the machine to be safe
+constexpr double CANCEL_WAIT = 30.0;  // [s] until the machine is safe
 
 std::atomic<bool> stop{false};
 void onSignal(int) {
@@ -52,7 +53,7 @@ void arm(bool on) {
 }
 
 Json number(double value) {
-  return std::isfinite(value) ? Json(value) : Json(nullptr);  // JSON knows no NaN
+  return std::isfinite(value) ? Json(value) : Json(nullptr);  // JSON has no NaN
 }
 
 void write(const Result& r, const std::string& file) {
@@ -65,7 +66,7 @@ void write(const Result& r, const std::string& file) {
                   {"gap_after", number(r.gap_after)},
                   {"report", r.report},
                   {"model", r.model}};
-  std::error_code ignored;  // the stream will tell
+  std::error_code ignored;  // the stream reports the failure
   std::filesystem::create_directories(std::filesystem::absolute(file).parent_path(), ignored);
   std::ofstream out(file);
   out << json.dump(2) << "\n";
@@ -73,15 +74,15 @@ void write(const Result& r, const std::string& file) {
   if (!out) throw Error(file + ": cannot be written");
 }
 
-class Asking {
+class DiscoverClient {
  public:
-  explicit Asking(const Request& request)
+  explicit DiscoverClient(const Request& request)
       : request_(request), client_(names::absolute(names::DISCOVER), true), begin_(ros::WallTime::now()) {
     if (!client_.waitForServer(ros::Duration(request.ready)))
-      throw Error("action " + names::absolute(names::DISCOVER) + ": nobody offers it");
+      throw Error("action " + names::absolute(names::DISCOVER) + ": no node offers it");
   }
 
-  // The controller may still be on its way up.
+  // The controller may still be starting.
   void armWhenConnected() const {
     const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(request_.ready);
     for (;;) {
@@ -100,7 +101,7 @@ class Asking {
     goal.header.stamp = ros::Time::now();
     goal.most_tests = static_cast<std::uint32_t>(request_.tests);
     goal.install = request_.install;
-    client_.sendGoal(goal, {}, {}, [this](const smartmill_msgs::DiscoverFeedbackConstPtr& f) { say(*f); });
+    client_.sendGoal(goal, {}, {}, [this](const smartmill_msgs::DiscoverFeedbackConstPtr& f) { print(*f); });
     bool ended = false;
     while (!ended && !stop && (ros::WallTime::now() - begin_).toSec() < request_.timeout)
       ended = client_.waitForResult(ros::Duration(0.1));
@@ -113,7 +114,7 @@ class Asking {
   }
 
  private:
-  void say(const Feedback& f) const {
+  void print(const Feedback& f) const {
     std::printf("discover [%6.1f s] %s\n", (ros::WallTime::now() - begin_).toSec(), f.stage.c_str());
     std::fflush(stdout);
   }
@@ -125,12 +126,12 @@ class Asking {
 
 // @return exit status
 int run(const Request& request) {
-  Asking asking(request);
-  if (request.arm) asking.armWhenConnected();
-  const Result result = asking.result();
+  DiscoverClient client(request);
+  if (request.arm) client.armWhenConnected();
+  const Result result = client.result();
   if (request.arm && result.code == Result::OK) arm(false);
   std::printf("discover: %s\n", result.message.c_str());
-  for (const std::string& test : result.tests) std::printf("discover: test asked for: %s\n", test.c_str());
+  for (const std::string& test : result.tests) std::printf("discover: suggested test: %s\n", test.c_str());
   std::fflush(stdout);
   if (!request.out.empty()) write(result, request.out);
   return stop ? INTERRUPTED : result.code == Result::OK ? 0 : 1;
@@ -143,19 +144,21 @@ int main(int argc, char** argv) {
   std::signal(SIGINT, onSignal);
   std::signal(SIGTERM, onSignal);
   Request request;
-  smartmill::CommandLine line{"Asks the running machine to find out why it differs from its model."};
+  smartmill::CommandLine line{
+      "Makes the running machine identify why it differs from its model (action discover)."};
   line.option("-o,--out", request.out, "JSON file for the result");
-  line.option("--tests", request.tests, "suggested tests that may be made").within(0, 100);
-  line.option("--timeout", request.timeout, "[s] of the whole").positive();
-  line.flag("--arm", request.arm, "arm motion before and disarm after; else the operator does");
-  line.flag("!--no-install", request.install, "leave the model as it is");
-  // What roslaunch adds (__name:= and the like) is no option.
+  line.option("--tests", request.tests, "maximum number of suggested tests").within(0, 100);
+  line.option("--timeout", request.timeout, "[s] time limit").positive();
+  line.flag("--arm", request.arm,
+            "arm motion before and disarm it afterwards; without it the operator does both");
+  line.flag("!--no-install", request.install, "do not install the improved model");
+  // Without the arguments that roslaunch adds (__name:=).
   std::vector<std::string> words;
   ros::removeROSArgs(argc, argv, words);
-  std::vector<const char*> left;
-  for (const std::string& word : words) left.push_back(word.c_str());
-  return smartmill::runProgram(line, static_cast<int>(left.size()), left.data(), [&] {
-    const ros::NodeHandle keep;
+  std::vector<const char*> arguments;
+  for (const std::string& word : words) arguments.push_back(word.c_str());
+  return smartmill::runProgram(line, static_cast<int>(arguments.size()), arguments.data(), [&] {
+    const ros::NodeHandle keep_ros_running;
     return run(request);
   });
 }

@@ -1,4 +1,4 @@
-// rosrun smartmill_launch discovery_report discovery.json [--hidden MODEL]: what a discovery found.
+// rosrun smartmill_launch discovery_report discovery.json [--hidden MODEL]: result of a discovery.
 
 #include <cstdio>
 #include <fstream>
@@ -21,7 +21,8 @@ using namespace smartmill::discovery;
 int run(const std::string& file, const std::string& hidden, const std::string& out) {
   const nlohmann::json result = nlohmann::json::parse(readText(file), nullptr, false);
   for (const char* key : {"code", "message", "report", "tests"})
-    if (!result.is_object() || !result.contains(key)) throw Error(file + ": no result of a discovery");
+    if (!result.is_object() || !result.contains(key))
+      throw Error(file + ": expected the result of a discovery (keys code, message, report, tests)");
   if (result["code"] != 0) throw Error(file + ": " + result["message"].get<std::string>());
   const Explained explained = readExplained(result["report"].get<std::string>() + "/report.json");
   const std::vector<EffectEntry> effects =
@@ -41,9 +42,11 @@ int run(const std::string& file, const std::string& hidden, const std::string& o
 
 int main(int argc, char** argv) {
   std::string file, hidden, out;
-  smartmill::CommandLine line{"Says what a discovery found, beside what a simulated machine hides."};
+  smartmill::CommandLine line{
+      "Prints the result of a discovery, compared with the hidden effects of a simulated machine."};
   line.option("result", file, "JSON file of `discover`").required();
-  line.option("--hidden", hidden, "model of the machine; exit status 1 when its effects were not named");
-  line.option("--append", out, "Markdown file that gets the tables too");
+  line.option("--hidden", hidden,
+              "true model of the machine; exit code 1 if its effects were not named or the gap did not fall");
+  line.option("--append", out, "Markdown file to which the tables are appended");
   return smartmill::runProgram(line, argc, argv, [&] { return run(file, hidden, out); });
 }

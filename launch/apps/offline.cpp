@@ -27,9 +27,9 @@ using namespace smartmill;
 using namespace smartmill::report;
 namespace fs = std::filesystem;
 
-// Half a unit of the last digit that the tools print: ten digits, of forces six.
+// Half a unit of the last printed digit: ten digits, forces six.
 constexpr double TEN_DIGITS = 6e-10, SIX_DIGITS = 6e-6;
-// Blocks of force that the recorder of a busy machine may have lost.
+// Share of the force blocks that a recorder may lose on a busy computer.
 constexpr double MOST_LOST = 0.05;  // [1]
 
 struct Request {
@@ -93,7 +93,7 @@ Agreement compareForces(const SessionRecording& live, const fs::path& folder) {
     const NumberTable table = readNumberTable(folder / (cut.condition.name + ".csv"));
     const std::vector<double>& time = table.column("time");
     if (time.empty() || cut.compensated.empty()) continue;
-    // By time: the tool leaves out what was lost.
+    // Compared by time: the tool omits lost samples.
     std::vector<double> stamps;
     for (const double t : time) stamps.push_back(cut.condition.stamp + t);
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -115,7 +115,7 @@ Agreement compareChart(const SessionRecording& live, const std::string& file) {
   return agreement;
 }
 
-/// [s] that ended child processes have computed.
+/// CPU time of the ended child processes [s].
 double childrenTime() {
   rusage usage{};
   getrusage(RUSAGE_CHILDREN, &usage);
@@ -131,11 +131,12 @@ struct Comparison {
   std::string parameters;
   fs::path out;
   double printed;  // [1] tolerance
-  double lost;     // [1] share that may be on one side only
+  double lost;     // [1] tolerated share of numbers on one side only
   std::function<Agreement(const SessionRecording&, const fs::path&)> compare;
 };
 
-/// One line of the table. @return same results, fast enough. @throws Error when the tool failed.
+/// Prints one line of the table. @return whether the results agree and the tool is fast enough. @throws Error
+/// if the tool fails.
 bool compareOne(const Request& request, const SessionRecording& live, const Comparison& comparison) {
   const std::string& name = comparison.tool.subcommand;
   const std::string log = (fs::path(request.out) / (name + ".txt")).string();
@@ -150,12 +151,12 @@ bool compareOne(const Request& request, const SessionRecording& live, const Comp
   }
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   const double computed = childrenTime() - computed_before;
-  // Where others use the machine too, the tool's own CPU time shows how fast it is.
+  // On a busy computer the tool's CPU time is the measure of its speed.
   const double ratio = live.duration / std::min(seconds, computed);
   const Agreement agreement = comparison.compare(live, comparison.out);
   const bool same = agreement.same(comparison.printed, comparison.lost), fast = ratio >= request.least_ratio;
   std::printf("%-14s %8.2f %8.2f %8.1f %10zu %12.2g  %s%s\n", name.c_str(), seconds, computed, ratio,
-              agreement.compared, agreement.largest, same ? "same to printed digits" : "DIFFERENT",
+              agreement.compared, agreement.largest, same ? "same in all printed digits" : "DIFFERENT",
               fast ? "" : ", SLOW");
   if (agreement.missing > 0) {
     std::printf("%14s %zu numbers are on one side only\n", "", agreement.missing);
@@ -164,9 +165,9 @@ bool compareOne(const Request& request, const SessionRecording& live, const Comp
 }
 
 int run(const Request& request) {
-  std::error_code error;
-  fs::create_directories(request.out, error);
-  if (error) throw Error(request.out + ": " + error.message());
+  std::error_code folder_error;
+  fs::create_directories(request.out, folder_error);
+  if (folder_error) throw Error(request.out + ": " + folder_error.message());
   const SessionRecording live = readSession(request.bag, {});
   const fs::path out(request.out);
   const std::vector<Comparison> comparisons{{{"frf", "the FRF and modes of the hits"},
@@ -220,14 +221,13 @@ int main(int argc, char** argv) {
   request.model = package + "/models/mill.yaml";
   request.config = package + "/config";
   CommandLine line{
-      "Puts a recorded session through the offline tools, times them and holds their results against those "
-      "of the "
-      "nodes; exit code 1 when one differs in its printed digits or is slower than asked for."};
+      "Runs the offline tools on a recorded session, measures their time and compares their results with "
+      "those of the nodes; exit code 1 if a printed digit differs or a tool is slower than --least-ratio."};
   line.option("bag", request.bag, "recorded session").required().existingFile();
-  line.option("-o,--out", request.out, "folder for what the tools write").showDefault();
-  line.option("--model", request.model, "machine model that the session ran with").showDefault();
-  line.option("--config", request.config, "folder with the nodes' parameter files").showDefault();
-  line.option("--least-ratio", request.least_ratio, "times real time that each tool must reach")
+  line.option("-o,--out", request.out, "folder for the output of the tools").showDefault();
+  line.option("--model", request.model, "machine model of the session").showDefault();
+  line.option("--config", request.config, "folder with the parameter files of the nodes").showDefault();
+  line.option("--least-ratio", request.least_ratio, "minimum speed of each tool, in multiples of real time")
       .showDefault();
   return runProgram(line, argc, argv, [&] { return run(request); });
 }

@@ -13,14 +13,15 @@ int main(int argc, char** argv) {
   double rate = 1.0;
   bool stay = false;
   smartmill::CommandLine line(
-      "Plays topics of a recording, with its clock, to nodes of SmartMill: it waits for them, so that "
-      "nothing "
-      "is lost on a busy computer, and tells them the end.");
+      "Plays topics of a recording, with its clock, to nodes of SmartMill. It waits for slow nodes, so that "
+      "no message is lost on a busy computer, and announces the end.");
   line.option("recording", path, "bag or MCAP file").required();
   line.option("--topics", topics, "full names").required();
-  line.option("--nodes", nodes, "full names of the nodes that follow").required();
-  line.option("--rate", rate, "times real time; 0: as fast as the nodes follow").showDefault().notNegative();
-  line.flag("--stay", stay, "at the end: for who wants to jump back (service replay/control)");
+  line.option("--nodes", nodes, "full names of the receiving nodes").required();
+  line.option("--rate", rate, "multiple of real time; 0: as fast as the nodes process the data")
+      .showDefault()
+      .notNegative();
+  line.flag("--stay", stay, "wait at the end for a jump back (service replay/control)");
   return smartmill::runProgram(line, argc, argv, [&] {
     smartmill::session::BagPlayer(ros::NodeHandle(), path, topics, nodes).run(rate, stay);
   });

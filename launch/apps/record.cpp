@@ -10,16 +10,17 @@
 
 namespace {
 
-void run(const std::string& path, const std::vector<std::string>& patterns, const std::atomic<bool>& ended) {
-  constexpr double LOOK_EVERY = 0.5, STEP = 0.1;  // [s] of wall time
+void run(const std::string& path, const std::vector<std::string>& patterns,
+         const std::atomic<bool>& shutdown) {
+  constexpr double SUBSCRIBE_PERIOD = 0.5, STEP = 0.1;  // [s] of wall time
   smartmill::session::BagRecorder recorder(ros::NodeHandle(), path, patterns);
-  ros::WallTime looked;
-  while (!ended && ros::ok()) {
-    if ((ros::WallTime::now() - looked).toSec() > LOOK_EVERY) {
-      recorder.look();
-      looked = ros::WallTime::now();
+  ros::WallTime subscribed;
+  while (!shutdown && ros::ok()) {
+    if ((ros::WallTime::now() - subscribed).toSec() > SUBSCRIBE_PERIOD) {
+      recorder.subscribe();
+      subscribed = ros::WallTime::now();
     }
-    recorder.take(STEP);
+    recorder.record(STEP);
   }
   recorder.finish();
 }
@@ -27,14 +28,15 @@ void run(const std::string& path, const std::vector<std::string>& patterns, cons
 }  // namespace
 
 int main(int argc, char** argv) {
-  // What waits when the end is asked for is still written.
+  // Messages that are queued when the shutdown is requested are still written.
   ros::init(argc, argv, "record", ros::init_options::NoSigintHandler);
-  const std::atomic<bool>& ended = smartmill::session::catchShutdownRequest();
+  const std::atomic<bool>& shutdown = smartmill::session::catchShutdownRequest();
   std::string path;
   std::vector<std::string> patterns;
   smartmill::CommandLine line(
-      "Records topics to a bag or an MCAP file without losing messages on a busy computer; Ctrl-C ends it.");
+      "Records topics to a bag or an MCAP file without losing messages on a busy computer; Ctrl-C ends the "
+      "recording.");
   line.option("-o,--out", path, "file to write, *.bag or *.mcap").required();
-  line.option("patterns", patterns, "regular expressions of whole topic names").required();
-  return smartmill::runProgram(line, argc, argv, [&] { run(path, patterns, ended); });
+  line.option("patterns", patterns, "regular expressions that match full topic names").required();
+  return smartmill::runProgram(line, argc, argv, [&] { run(path, patterns, shutdown); });
 }

@@ -25,12 +25,12 @@ using namespace smartmill;
 using namespace smartmill::report;
 namespace fs = std::filesystem;
 
-/// The limit of the true machine, by the tool that makes charts of models and by another solver than the
-/// session's chart: collocation is exact where the zero-order solution averages, so that the check can tell
-/// both errors, of the measured FRF and of the method.
+/// Stability limit of the true machine, from the tool `lobes` with another solver than the session's chart:
+/// collocation does not average the directional coefficients as the zero-order solution does. The check thus
+/// covers the error of the measured FRF and the error of the method.
 class TrueLimit {
  public:
-  /// @param model file of the true machine @param folder for what the tool writes
+  /// @param model file of the true machine @param folder for the output of the tool
   TrueLimit(std::string model, fs::path folder, const StabilityChart& chart)
       : model_(std::move(model)), folder_(std::move(folder)), chart_(chart) {}
 
@@ -88,7 +88,7 @@ class TrueLimit {
   StabilityChart chart_;
 };
 
-/// The true machine as a model file; empty where the recording does not tell.
+/// Model file of the true machine; empty if the recording lacks its parameters.
 std::string trueModel(const SessionRecording& recording, const fs::path& folder) {
   const MeasuredModes* x = recording.modal(true, POINT_TOOL_TIP, "x");
   const MeasuredModes* y = recording.modal(true, POINT_TOOL_TIP, "y");
@@ -102,15 +102,15 @@ std::string trueModel(const SessionRecording& recording, const fs::path& folder)
   return file;
 }
 
-/// Whatever fails here leaves its targets unchecked, not the report unwritten.
+/// A failure leaves the targets unchecked; the report is written all the same.
 TrueStability trueStability(const SessionRecording& recording, const TrueLimit& limit) {
   TrueStability truth;
   try {
     const std::vector<double>& speeds = recording.chart->limit.spindle_speed;
     truth.chart = limit.over(speeds.front(), speeds.back(), speeds.size());
     for (const RecordedCut& cut : recording.cuts) {
-      const bool checks = cut.condition.name.rfind("verify_", 0) == 0;
-      truth.limits.push_back(checks ? limit.at(cut.condition.spindle_speed) : NOT_A_NUMBER);
+      const bool verifies = cut.condition.name.rfind("verify_", 0) == 0;
+      truth.limits.push_back(verifies ? limit.at(cut.condition.spindle_speed) : NOT_A_NUMBER);
     }
   } catch (const Error& error) {
     truth.failure = error.what();
@@ -139,9 +139,10 @@ void write(const fs::path& file, const std::string& text) {
 }
 
 std::string captionOf(const std::string& picture) {
-  if (picture == "frf.png") return "The tool's measured FRF beside the true one, with the coherence";
-  if (picture == "chart.png") return "Stability limit, measured and true, and the two cuts that check it";
-  return "Force over three revolutions, teeth passing at the sensor's resonance: raw, compensated, true";
+  if (picture == "frf.png") return "Measured and true FRF of the tool, with the coherence";
+  if (picture == "chart.png") return "Stability limit, measured and true, and the two cuts that verify it";
+  return "Force over three revolutions, tooth passing frequency at the sensor's resonance: raw, compensated, "
+         "true";
 }
 
 int run(const Request& request) {
@@ -162,7 +163,7 @@ int run(const Request& request) {
   Report report = makeReport(recording, truth);
   report.unchecked = notMeasured(recording, session);
   if (report.sections.empty() && report.cuts.empty() && report.unchecked.empty())
-    throw Error(request.bag + ": no results are in it");
+    throw Error(request.bag + ": contains no results");
   const std::string text = markdown(report);
   write(folder / "summary.md", text);
   write(folder / "summary.json", json(report, session));
@@ -185,13 +186,12 @@ int run(const Request& request) {
 int main(int argc, char** argv) {
   Request request;
   CommandLine line{
-      "Tells what a recorded session measured, beside the truth where a simulator has recorded it: tables, a "
-      "summary "
-      "file and pictures."};
+      "Reports the results of a recorded session, compared with the truth if a simulator recorded it: "
+      "tables, a summary file and pictures."};
   line.option("bag", request.bag, "recorded session").required();
-  line.option("--session", request.session, "JSON summary of the session node, kept in summary.json");
+  line.option("--session", request.session, "JSON summary of the session node, included in summary.json");
   line.option("-o,--out", request.out, "folder for summary.md, summary.json and pictures").showDefault();
-  line.flag("--check", request.check, "exit code 1 when a target is missed");
+  line.flag("--check", request.check, "exit code 1 if a target is missed");
   line.flag("!--no-pictures", request.pictures, "tables only");
   return runProgram(line, argc, argv, [&] { return run(request); });
 }

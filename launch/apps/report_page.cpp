@@ -10,8 +10,7 @@
 
 int main(int argc, char** argv) {
   std::string file, out;
-  smartmill::CommandLine line{
-      "Makes one HTML file, which needs no other, of a report in Markdown and its pictures."};
+  smartmill::CommandLine line{"Converts a Markdown report and its pictures to a self-contained HTML file."};
   line.option("report", file, "Markdown file").required().existingFile();
   line.option("-o,--out", out, "HTML file").required();
   return smartmill::runProgram(line, argc, argv, [&] {

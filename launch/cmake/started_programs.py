@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""CMake targets of the programs that a script starts: nodes of its roslaunch calls, as roslaunch itself resolves their
-arguments and includes, its rosrun calls, and the program of the offline tools.
+"""CMake targets of the programs that a script starts: nodes of its roslaunch calls, with arguments and includes
+resolved by roslaunch, its rosrun calls, and the program of the offline tools.
 
 usage: started_programs.py SCRIPT WORKSPACE [--only FILE.launch | --without FILE.launch]
 """
@@ -16,7 +16,7 @@ TOOL_PROGRAM = "smartmill"  # what launch/src/session/child.h starts as `smartmi
 
 
 def target(package, program):
-    """The name that smartmill_executable() gives the target."""
+    """Name of a target of smartmill_executable()."""
     return f"{package}_{program}"
 
 
@@ -44,7 +44,7 @@ def main():
     for name, rest in ROSLAUNCH.findall(text):
         if options.only not in (None, name) or options.without == name:
             continue
-        # A variable of the shell may hold anything that is not empty.
+        # Shell variables are replaced by a value that is not empty.
         arguments = [re.sub(r'"|\$\w+', "x", word) for word in rest.split() if ":=" in word]
         arguments = [re.sub(r"^port:=.*", "port:=1", word) for word in arguments]
         found |= nodes(options.workspace / "launch" / "launch" / name, arguments)

@@ -1,5 +1,5 @@
-// The action `discover` on the simulated machine with its monitor: one that is not armed, one that is
-// cancelled midway, one that goes through to the installed model.
+// The action `discover` on the simulated machine with its monitor: without armed motion, cancelled after a
+// cut, and complete up to the installed model.
 
 #include <atomic>
 #include <filesystem>
@@ -23,7 +23,7 @@ namespace {
 using Result = smartmill_msgs::DiscoverResult;
 using Client = actionlib::SimpleActionClient<smartmill_msgs::DiscoverAction>;
 
-constexpr double PATIENCE = 300.0;  // [s] of a busy machine
+constexpr double TIMEOUT = 300.0;  // [s] time limit on a busy computer
 
 class Discover : public testing::Test {
  protected:
@@ -35,14 +35,14 @@ class Discover : public testing::Test {
           armed_ = m.armed;
         }));
     ros::NodeHandle("~").getParam("folder", folder_);
-    EXPECT_TRUE(client_.waitForServer(ros::Duration(PATIENCE)));
+    EXPECT_TRUE(client_.waitForServer(ros::Duration(TIMEOUT)));
     EXPECT_TRUE(wait([this] { return connected_.load(); }));
   }
 
-  static bool wait(const std::function<bool()>& reached) {
-    const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(PATIENCE);
-    while (!reached() && ros::WallTime::now() < end) ros::WallDuration(0.02).sleep();
-    return reached();
+  static bool wait(const std::function<bool()>& condition) {
+    const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(TIMEOUT);
+    while (!condition() && ros::WallTime::now() < end) ros::WallDuration(0.02).sleep();
+    return condition();
   }
   void arm() {
     smartmill_msgs::ArmMotion service;
@@ -61,7 +61,7 @@ class Discover : public testing::Test {
                      [this](const smartmill_msgs::DiscoverFeedbackConstPtr& f) { cuts_ = f->cuts_done; });
   }
   Result result() {
-    EXPECT_TRUE(client_.waitForResult(ros::Duration(PATIENCE)));
+    EXPECT_TRUE(client_.waitForResult(ros::Duration(TIMEOUT)));
     return client_.getResult() ? *client_.getResult() : Result();
   }
 
@@ -73,30 +73,30 @@ class Discover : public testing::Test {
   std::string folder_;
 };
 
-TEST_F(Discover, withoutArmingNothingMoves) {
+TEST_F(Discover, doesNotMoveUnlessArmed) {
   send();
   const Result r = result();
   EXPECT_EQ(r.code, Result::NOT_ARMED);
   EXPECT_EQ(r.message, "motion is not armed (service cnc/arm_motion); nothing has moved");
 }
 
-TEST_F(Discover, cancelledMidwayItIsSafe) {
+TEST_F(Discover, isSafeAfterCancellation) {
   arm();
   send();
   ASSERT_TRUE(wait([this] { return cuts_ >= 1; }));
-  // Another one is not begun beside it.
+  // A second goal is rejected.
   Client other(names::absolute(names::DISCOVER), true);
-  ASSERT_TRUE(other.waitForServer(ros::Duration(PATIENCE)));
-  EXPECT_EQ(other.sendGoalAndWait({}, ros::Duration(PATIENCE)), actionlib::SimpleClientGoalState::REJECTED);
+  ASSERT_TRUE(other.waitForServer(ros::Duration(TIMEOUT)));
+  EXPECT_EQ(other.sendGoalAndWait({}, ros::Duration(TIMEOUT)), actionlib::SimpleClientGoalState::REJECTED);
   EXPECT_EQ(other.getResult()->code, Result::BUSY);
   client_.cancelGoal();
   const Result r = result();
   EXPECT_EQ(r.code, Result::CANCELLED);
-  EXPECT_EQ(r.message, "cancelled; what was recorded and explained until then is kept; motion is disarmed");
+  EXPECT_EQ(r.message, "cancelled; records and explanations up to now are kept; motion is disarmed");
   EXPECT_TRUE(wait([this] { return !armed_; }));
 }
 
-TEST_F(Discover, findsWhatTheMachineHides) {
+TEST_F(Discover, identifiesTheHiddenEffect) {
   arm();
   send();
   const Result r = result();
@@ -107,13 +107,13 @@ TEST_F(Discover, findsWhatTheMachineHides) {
   EXPECT_GT(r.gap_before, 1.5);
   EXPECT_NEAR(r.gap_after, 1.0, 0.1);
   EXPECT_TRUE(std::filesystem::exists(r.report + "/report.html"));
-  // Installed, the model before kept.
+  // The improved model is installed, the previous one is kept.
   EXPECT_EQ(r.model, folder_ + "/installed.yaml");
   const MachineModel now = readMachineModel(r.model), before = readMachineModel(folder_ + "/replaced_1.yaml");
   ASSERT_EQ(now.effects.size(), 1u);
   EXPECT_NEAR(now.effects[0].numbers.at("gain"), 1.12, 0.01);
   EXPECT_TRUE(before.effects.empty());
-  // The monitor keeps the model that it has when the next one is none.
+  // The monitor keeps its model if the next one is invalid.
   smartmill_msgs::InstallModel service;
   service.request.file = folder_ + "/none.yaml";
   ASSERT_TRUE(ros::service::call(names::absolute(names::INSTALL_MODEL), service));

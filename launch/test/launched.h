@@ -12,10 +12,10 @@
 
 #include <gtest/gtest.h>
 
-/// What tests need that start a roslaunch of their own.
+/// Helpers of tests that start their own roslaunch.
 namespace smartmill::testing {
 
-/// Beneath the ports that the system gives away by itself, so that it is still free when it is used.
+/// A port below the ephemeral range of the system, so that it stays free until it is used.
 inline std::string freePort() {
   static int next = getpid() % 12000;
   for (int i = 0; i < 12000; ++i) {
@@ -40,7 +40,7 @@ inline std::string contentOf(const std::string& file) {
   return text.str();
 }
 
-/// Exit code of a command; what it said goes to a file.
+/// Runs a command with its output in a file. @return its exit code
 inline int run(const std::string& command, const std::string& log) {
   return std::system(("timeout --signal=INT 400 " + command + " >'" + log + "' 2>&1").c_str());
 }

@@ -1,5 +1,5 @@
-// A short session through a real LinuxCNC, headless, in namespaces of its own, which leads the twin's axes.
-// Skipped where it is not installed (./setup --with-linuxcnc) or where no such namespaces can be made.
+// A short session with a real LinuxCNC, headless and in its own namespaces, that moves the axes of the twin.
+// Skipped if LinuxCNC is not installed (./setup --with-linuxcnc) or the namespaces cannot be created.
 
 #include <unistd.h>
 
@@ -21,7 +21,7 @@ using namespace smartmill::testing;
 
 TEST(LinuxCncMachine, AShortSessionFindsTheTwinsCoefficients) {
   if (::access("/usr/bin/linuxcnc", X_OK) != 0) GTEST_SKIP() << "LinuxCNC is not installed";
-  if (::geteuid() != 0) GTEST_SKIP() << "namespaces for a LinuxCNC of its own need root";
+  if (::geteuid() != 0) GTEST_SKIP() << "the namespaces of LinuxCNC require root";
   const TemporaryFolder folder;
   setenv("ROS_HOSTNAME", "localhost", 1);
   setenv("ROS_HOME", folder.file("ros_home").c_str(), 1);
@@ -29,10 +29,10 @@ TEST(LinuxCncMachine, AShortSessionFindsTheTwinsCoefficients) {
   const std::string summary = folder.file("session.json"), log = folder.file("log.txt");
   run("roslaunch -p " + freePort() + " " SESSION " folder:=" + machine + " summary:=" + summary, log);
   std::filesystem::remove_all(machine);
-  const std::string said = contentOf(summary);
-  ASSERT_NE(said.find("\"completed\": true"), std::string::npos) << contentOf(log);
+  const std::string summary_text = contentOf(summary);
+  ASSERT_NE(summary_text.find("\"completed\": true"), std::string::npos) << contentOf(log);
   std::smatch ktc;
-  ASSERT_TRUE(std::regex_search(said, ktc, std::regex("Ktc ([0-9.]+)"))) << said;
+  ASSERT_TRUE(std::regex_search(summary_text, ktc, std::regex("Ktc ([0-9.]+)"))) << summary_text;
   // N/mm2; three percent as for a whole session (docs/pipeline.md).
   const double truth = 1e-6 * smartmill::readMachineModel("models/mill_twin.yaml").cutting->ktc;
   EXPECT_NEAR(std::stod(ktc[1]), truth, 0.03 * truth);

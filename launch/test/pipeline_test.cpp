@@ -1,5 +1,4 @@
-// The whole graph with the shipped parameter files and models, as `roslaunch smartmill_launch
-// pipeline.launch` starts it.
+// The complete graph with the shipped parameter files and models, as started by pipeline.launch.
 
 #include <algorithm>
 #include <map>
@@ -25,11 +24,11 @@
 
 namespace {
 
-constexpr double PATIENCE = 120.0;  // [s] of a busy machine
+constexpr double TIMEOUT = 120.0;  // [s] time limit on a busy computer
 
-bool waitFor(const std::function<bool()>& there, double seconds) {
+bool waitFor(const std::function<bool()>& condition, double seconds) {
   const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(seconds);
-  while (!there()) {
+  while (!condition()) {
     if (ros::WallTime::now() > end || !ros::ok()) return false;
     ros::spinOnce();
     ros::WallDuration(0.02).sleep();
@@ -37,14 +36,14 @@ bool waitFor(const std::function<bool()>& there, double seconds) {
   return true;
 }
 
-TEST(Pipeline, EveryNodeTakesItsParametersAndStays) {
+TEST(Pipeline, EveryNodeAcceptsItsParametersAndRuns) {
   std::vector<std::string> nodes;
   for (const char* name : {"cnc", "hammer", "loadmeter", "kalman", "stability", "sim"})
     nodes.push_back(smartmill::names::absolute(name));
-  smartmill::Followers due(nodes);
-  // A node that dislikes a parameter is gone before it answers.
-  EXPECT_NO_THROW(due.begin(PATIENCE));
-  EXPECT_NO_THROW(due.leave());
+  smartmill::Followers followers(nodes);
+  // A node that refuses a parameter ends before it answers.
+  EXPECT_NO_THROW(followers.begin(TIMEOUT));
+  EXPECT_NO_THROW(followers.leave());
 }
 
 TEST(Pipeline, StreamsFlowAtTheirRates) {
@@ -70,39 +69,40 @@ TEST(Pipeline, StreamsFlowAtTheirRates) {
       [&] {
         return count[smartmill::names::CNC_STATE] > 100 && count[smartmill::names::FORCE_COMPENSATED] > 200;
       },
-      PATIENCE));
+      TIMEOUT));
   const auto rate = [&](const char* topic) { return (count[topic] - 1) / (last[topic] - first[topic]); };
-  // Blocks of 256 samples at 25600 Hz; stamps come from the sample clock, whatever the machine's load is.
+  // Blocks of 256 samples at 25600 Hz; stamps are of the sample clock, independent of the load of the
+  // computer.
   EXPECT_NEAR(rate(smartmill::names::HAMMER), 100.0, 1.0);
   EXPECT_NEAR(rate(smartmill::names::DYNAMOMETER), 100.0, 1.0);
   EXPECT_NEAR(rate(smartmill::names::FORCE_COMPENSATED), 100.0, 1.0);
   EXPECT_GE(rate(smartmill::names::SPINDLE_ANGLE), 100.0);
-  // The controller is asked by the clock: a busy computer asks less often for a while.
+  // The controller is polled by wall time: less often while the computer is busy.
   EXPECT_TRUE(waitFor(
       [&] {
         if (rate(smartmill::names::CNC_STATE) >= 20.0) return true;
         if (count[smartmill::names::CNC_STATE] > 200) count[smartmill::names::CNC_STATE] = 0;
         return false;
       },
-      PATIENCE));
+      TIMEOUT));
 }
 
-TEST(Pipeline, FramesHangTogether) {
+TEST(Pipeline, FramesAreConnected) {
   tf2_ros::Buffer buffer;
   const tf2_ros::TransformListener listener(buffer);
   for (const char* frame : {"spindle", "tool_tip", "table", "dynamometer", "hammer"}) {
-    EXPECT_TRUE(waitFor([&] { return buffer.canTransform("machine", frame, ros::Time(0)); }, PATIENCE))
+    EXPECT_TRUE(waitFor([&] { return buffer.canTransform("machine", frame, ros::Time(0)); }, TIMEOUT))
         << frame;
   }
 }
 
-TEST(Pipeline, AnUnmadeChartIsSaidSo) {
+TEST(Pipeline, PredictionWithoutChartReturnsNoChart) {
   ros::NodeHandle nh("smartmill");
   smartmill_msgs::PredictStability service;
   service.request.spindle_speed = 1000.0;
   service.request.axial_depth = 1e-3;
   ASSERT_TRUE(ros::service::waitForService(smartmill::names::absolute(smartmill::names::PREDICT_STABILITY),
-                                           static_cast<int>(1e3 * PATIENCE)));
+                                           static_cast<int>(1e3 * TIMEOUT)));
   ASSERT_TRUE(
       nh.serviceClient<smartmill_msgs::PredictStability>(smartmill::names::PREDICT_STABILITY).call(service));
   EXPECT_EQ(service.response.code, smartmill_msgs::PredictStability::Response::NO_CHART);
@@ -111,7 +111,7 @@ TEST(Pipeline, AnUnmadeChartIsSaidSo) {
 TEST(ShippedFiles, SessionParametersAndModelsAreRead) {
   const std::string package = ros::package::getPath("smartmill_launch");
   smartmill::session::SessionParameters parameters;
-  // The model comes from the launch file; everything else stands in the YAML.
+  // The model is set by the launch file, all other parameters by the YAML file.
   try {
     parameters = smartmill::ParameterReader::fromFile(package + "/config/session.yaml")
                      .readAll<smartmill::session::SessionParameters>();
@@ -121,7 +121,7 @@ TEST(ShippedFiles, SessionParametersAndModelsAreRead) {
   }
   const smartmill::MachineModel machine = smartmill::readMachineModel(package + "/models/mill.yaml");
   const smartmill::MachineModel twin = smartmill::readMachineModel(package + "/models/mill_twin.yaml");
-  // What is believed says nothing about what the session finds out.
+  // The nominal model contains nothing that the session identifies.
   EXPECT_FALSE(machine.cutting);
   EXPECT_TRUE(machine.tool_tip.x.modes.empty() && machine.tool_tip.y.modes.empty());
   EXPECT_TRUE(twin.cutting);
@@ -132,7 +132,7 @@ TEST(ShippedFiles, SessionParametersAndModelsAreRead) {
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "pipeline_test");
-  ros::NodeHandle keep;
+  ros::NodeHandle keep_ros_running;
   ::testing::InitGoogleTest(&argc, argv);
   return RUN_ALL_TESTS();
 }

@@ -1,5 +1,4 @@
-// The six-channel plate of the simulated machine, tapped and calibrated by the product's own actions while it
-// runs.
+// The six-channel plate of the simulated machine, tapped and calibrated by the actions of kalman_node.
 
 #include <algorithm>
 #include <array>
@@ -31,7 +30,7 @@ using Calibrate = actionlib::SimpleActionClient<smartmill_msgs::CalibrateForceSe
 using Measure = actionlib::SimpleActionClient<smartmill_msgs::MeasureFrfAction>;
 using Point = std::array<double, 3>;
 
-constexpr double PATIENCE = 120.0;  // [s] of a busy machine
+constexpr double TIMEOUT = 120.0;  // [s] time limit on a busy computer
 constexpr int HITS = 2;
 
 class Plate : public testing::Test {
@@ -39,36 +38,36 @@ class Plate : public testing::Test {
   Plate()
       : calibrate(smartmill::names::CALIBRATE_SENSOR, true),
         measure(smartmill::names::MEASURE_SENSOR_FRF, true) {
-    EXPECT_TRUE(calibrate.waitForServer(ros::Duration(PATIENCE)));
-    EXPECT_TRUE(measure.waitForServer(ros::Duration(PATIENCE)));
+    EXPECT_TRUE(calibrate.waitForServer(ros::Duration(TIMEOUT)));
+    EXPECT_TRUE(measure.waitForServer(ros::Duration(TIMEOUT)));
   }
 
-  smartmill_msgs::CalibrateForceSensorResult ask(CalibrateForceSensorGoal goal) {
+  smartmill_msgs::CalibrateForceSensorResult calibrationResult(CalibrateForceSensorGoal goal) {
     goal.header.stamp = ros::Time::now();
     calibrate.sendGoal(goal);
-    EXPECT_TRUE(calibrate.waitForResult(ros::Duration(PATIENCE)));
+    EXPECT_TRUE(calibrate.waitForResult(ros::Duration(TIMEOUT)));
     return *calibrate.getResult();
   }
 
-  /// Blows along an axis at a point of the workpiece: the operator goes there, and says where he is.
+  /// Hits along an axis at a point of the workpiece, which is stated to the calibration first.
   void tap(const Point& at, const std::string& direction) {
-    ros::ServiceClient hand = nh.serviceClient<smartmill_msgs::PanelKey>("sim/panel/tap_point");
-    ASSERT_TRUE(hand.waitForExistence(ros::Duration(PATIENCE)));
+    ros::ServiceClient hammer_position = nh.serviceClient<smartmill_msgs::PanelKey>("sim/panel/tap_point");
+    ASSERT_TRUE(hammer_position.waitForExistence(ros::Duration(TIMEOUT)));
     smartmill_msgs::PanelKey key;
     key.request.values = {at[0], at[1], at[2]};
-    ASSERT_TRUE(hand.call(key));
+    ASSERT_TRUE(hammer_position.call(key));
     ASSERT_EQ(key.response.code, smartmill_msgs::PanelKey::Response::OK) << key.response.message;
     CalibrateForceSensorGoal point;
     point.step = point.POINT;
     point.point.x = at[0], point.point.y = at[1], point.point.z = at[2];
-    ASSERT_EQ(ask(point).code, smartmill_msgs::CalibrateForceSensorResult::OK);
+    ASSERT_EQ(calibrationResult(point).code, smartmill_msgs::CalibrateForceSensorResult::OK);
     smartmill_msgs::MeasureFrfGoal taps;
     taps.header.stamp = ros::Time::now();
     taps.point = "force_sensor";
     taps.direction = direction;
     taps.hits = HITS;
     measure.sendGoal(taps);
-    ASSERT_TRUE(measure.waitForResult(ros::Duration(PATIENCE)));
+    ASSERT_TRUE(measure.waitForResult(ros::Duration(TIMEOUT)));
     ASSERT_EQ(measure.getResult()->code, smartmill_msgs::MeasureFrfResult::OK)
         << measure.getResult()->message;
   }
@@ -86,24 +85,25 @@ class Peak {
     if (window_.size() > LENGTH) window_.erase(window_.begin());
     double sum = 0.0;
     for (const double v : window_) sum += v / LENGTH;
-    most_ = std::max(most_, std::abs(sum));
+    value_ = std::max(value_, std::abs(sum));
   }
-  double most() const { return most_; }
+  double value() const { return value_; }
 
  private:
   static constexpr std::size_t LENGTH = 26;
   std::vector<double> window_;
-  double most_ = 0.0;
+  double value_ = 0.0;
 };
 
-TEST_F(Plate, IsTappedPointByPointAndShowsTheForceOfABlow) {
+TEST_F(Plate, MeasuresTheForceOfAHitAfterCalibrationAtSeveralPoints) {
   CalibrateForceSensorGoal fit;
   fit.step = fit.FIT;
-  EXPECT_EQ(ask(fit).code, smartmill_msgs::CalibrateForceSensorResult::FIT_FAILED);  // nothing was tapped
-  CalibrateForceSensorGoal nowhere;
-  nowhere.step = nowhere.POINT;
-  nowhere.point.x = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(ask(nowhere).code, smartmill_msgs::CalibrateForceSensorResult::BAD_GOAL);
+  EXPECT_EQ(calibrationResult(fit).code,
+            smartmill_msgs::CalibrateForceSensorResult::FIT_FAILED);  // nothing was tapped
+  CalibrateForceSensorGoal invalid;
+  invalid.step = invalid.POINT;
+  invalid.point.x = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(calibrationResult(invalid).code, smartmill_msgs::CalibrateForceSensorResult::BAD_GOAL);
 
   const std::vector<std::pair<Point, const char*>> points{
       {{-0.03, -0.025, 0.03}, "z"}, {{-0.03, 0.025, 0.03}, "z"},  {{0.03, -0.025, 0.03}, "z"},
@@ -113,7 +113,7 @@ TEST_F(Plate, IsTappedPointByPointAndShowsTheForceOfABlow) {
   if (HasFatalFailure()) return;
   const smartmill::TemporaryFolder folder;
   fit.file = folder.file("plate.yaml");
-  const auto found = ask(fit);
+  const auto found = calibrationResult(fit);
   ASSERT_EQ(found.code, found.OK) << found.message;
   EXPECT_EQ(found.readings, HITS * points.size());
   std::string format;
@@ -121,21 +121,21 @@ TEST_F(Plate, IsTappedPointByPointAndShowsTheForceOfABlow) {
   EXPECT_EQ(format, "format: smartmill-taps/1");
   EXPECT_TRUE(std::ifstream(folder.file("plate_16.csv")).good());
 
-  // Another point: the force of the blow as the hammer tells it.
+  // At another point the compensated force equals that of the hammer.
   std::mutex mutex;
-  Peak hammer, force, shown;
-  std::array<Peak*, 2> peaks{{&force, &shown}};
-  const auto into = [&](std::size_t which) {
+  Peak hammer, compensated, measured;
+  std::array<Peak*, 2> peaks{{&compensated, &measured}};
+  const auto addTo = [&](std::size_t which) {
     return [&, which](const smartmill_msgs::ForceBlock::ConstPtr& m) {
       const std::lock_guard<std::mutex> lock(mutex);
       for (const double f : m->fx) peaks[which]->add(f);
     };
   };
-  const ros::Subscriber one =
-      nh.subscribe<smartmill_msgs::ForceBlock>(smartmill::names::FORCE_COMPENSATED, 1000, into(0));
-  const ros::Subscriber two =
-      nh.subscribe<smartmill_msgs::ForceBlock>(smartmill::names::FORCE_MEASURED, 1000, into(1));
-  const ros::Subscriber three = nh.subscribe<smartmill_msgs::SampleBlock>(
+  const ros::Subscriber compensated_force =
+      nh.subscribe<smartmill_msgs::ForceBlock>(smartmill::names::FORCE_COMPENSATED, 1000, addTo(0));
+  const ros::Subscriber measured_force =
+      nh.subscribe<smartmill_msgs::ForceBlock>(smartmill::names::FORCE_MEASURED, 1000, addTo(1));
+  const ros::Subscriber hammer_force = nh.subscribe<smartmill_msgs::SampleBlock>(
       smartmill::names::HAMMER, 1000, [&](const smartmill_msgs::SampleBlock::ConstPtr& m) {
         const std::lock_guard<std::mutex> lock(mutex);
         const std::size_t n = m->channels.size();
@@ -147,11 +147,12 @@ TEST_F(Plate, IsTappedPointByPointAndShowsTheForceOfABlow) {
   tap({0.045, 0.0, 0.02}, "x");
   ros::Duration(0.5).sleep();
   const std::lock_guard<std::mutex> lock(mutex);
-  ASSERT_GT(hammer.most(), 5.0);
-  std::printf("%s; blow of %.2f N (mean of 0.5 ms): compensated %.2f N, as shown %.2f N\n",
-              found.message.c_str(), hammer.most(), force.most(), shown.most());
-  EXPECT_NEAR(force.most(), hammer.most(), 0.03 * hammer.most());
-  EXPECT_GT(std::abs(shown.most() - hammer.most()), 2.0 * std::abs(force.most() - hammer.most()));
+  ASSERT_GT(hammer.value(), 5.0);
+  std::printf("%s; hit of %.2f N (mean of 0.5 ms): compensated %.2f N, measured %.2f N\n",
+              found.message.c_str(), hammer.value(), compensated.value(), measured.value());
+  EXPECT_NEAR(compensated.value(), hammer.value(), 0.03 * hammer.value());
+  EXPECT_GT(std::abs(measured.value() - hammer.value()),
+            2.0 * std::abs(compensated.value() - hammer.value()));
 }
 
 }  // namespace
@@ -159,7 +160,7 @@ TEST_F(Plate, IsTappedPointByPointAndShowsTheForceOfABlow) {
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);
   ros::init(argc, argv, "plate_test");
-  ros::NodeHandle keep;
+  ros::NodeHandle keep_ros_running;
   ros::AsyncSpinner spinner(1);
   spinner.start();
   return RUN_ALL_TESTS();

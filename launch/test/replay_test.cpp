@@ -1,5 +1,5 @@
-// A short session is recorded from the simulated machine; its replay must give the same results to the last
-// digit. A browser looks at both.
+// Records a short session of the simulated machine; its replay must give the same results to the last digit.
+// The page of the panel is checked in a browser during both.
 
 #include <cstdio>
 #include <cstdlib>
@@ -18,19 +18,19 @@ namespace {
 using smartmill::TemporaryFolder;
 using namespace smartmill::testing;
 
-/// A page in the browser that looks on (watch.py) while a command runs.
-class Onlooker {
+/// Checks the page of the panel in a browser (watch.py) while a command runs.
+class PageCheck {
  public:
-  /// @param topics that the page must have got
-  Onlooker(const std::string& port, const std::string& name, const std::string& topics)
+  /// @param topics that the page must receive
+  PageCheck(const std::string& port, const std::string& name, const std::string& topics)
       : log_(std::string(SCREENSHOTS) + "/" + name + ".txt") {
     std::filesystem::create_directories(SCREENSHOTS);
     thread_ = std::thread([this, command = "timeout 400 /usr/bin/python3 " WATCH " " + port +
                                            " " SCREENSHOTS "/" + name + ".png " + topics + " >'" + log_ +
                                            "' 2>&1"] { code_ = std::system(command.c_str()); });
   }
-  /// What went wrong; empty: nothing.
-  std::string verdict() {
+  /// Waits for the end of the check. @return what failed; empty: nothing
+  std::string fault() {
     thread_.join();
     return code_ == 0 ? "" : contentOf(log_);
   }
@@ -41,10 +41,10 @@ class Onlooker {
   std::thread thread_;
 };
 
-bool browserThere() {
+bool browserIsInstalled() {
   return std::system("command -v chromium >/dev/null && command -v chromedriver >/dev/null") == 0;
 }
-std::string page_live, page_replayed;  // what the page lacked
+std::string page_live, page_replayed;  // faults of the page
 
 TEST(Replay, OfAShortSessionIsTheSameToTheLastDigit) {
   const TemporaryFolder folder;
@@ -53,34 +53,35 @@ TEST(Replay, OfAShortSessionIsTheSameToTheLastDigit) {
   const std::string live = folder.file("live.mcap"), again = folder.file("again.bag");  // both formats
   const std::string summary = folder.file("session.json"), log = folder.file("log.txt");
 
-  const bool look = browserThere();
-  const std::string page = freePort(), shown = look ? " panel:=true panel_port:=" + page : "";
-  std::optional<Onlooker> onlooker;
-  if (look)
-    onlooker.emplace(page, "live",
-                     "tool/frf panel/revolution panel/spectrum panel/strip session/state cnc/load");
-  // A roslaunch that the launch test framework has not started needs a master of its own.
+  const bool with_page = browserIsInstalled();
+  const std::string page = freePort(), panel = with_page ? " panel:=true panel_port:=" + page : "";
+  std::optional<PageCheck> page_check;
+  if (with_page)
+    page_check.emplace(page, "live",
+                       "tool/frf panel/revolution panel/spectrum panel/strip session/state cnc/load");
+  // A roslaunch outside the launch test framework needs its own master.
   run("roslaunch -p " + freePort() + " " SHORT_SESSION " port:=" + freePort() + " bag:=" + live +
-          " summary:=" + summary + " motor_currents:=true" + shown,
+          " summary:=" + summary + " motor_currents:=true" + panel,
       log);
-  if (onlooker) page_live = onlooker->verdict();
-  onlooker.reset();
+  if (page_check) page_live = page_check->fault();
+  page_check.reset();
   ASSERT_NE(contentOf(summary).find("\"completed\": true"), std::string::npos) << contentOf(log);
-  // No calibration was given: the session's moves in air and its slots along X made it, and it says so.
-  const std::string told = contentOf(summary);
-  const std::size_t motors = told.find("motors: X ");
-  ASSERT_NE(motors, std::string::npos) << told;
+  // Without a given calibration the session calibrates the motors by its moves in air and its slots along X.
+  const std::string summary_text = contentOf(summary);
+  const std::size_t motors = summary_text.find("motors: X ");
+  ASSERT_NE(motors, std::string::npos) << summary_text;
   double constant = 0.0, deviation = 0.0;
-  ASSERT_EQ(std::sscanf(told.c_str() + motors, "motors: X %lf +- %lf N/A", &constant, &deviation), 2) << told;
+  ASSERT_EQ(std::sscanf(summary_text.c_str() + motors, "motors: X %lf +- %lf N/A", &constant, &deviation), 2)
+      << summary_text;
   EXPECT_NEAR(constant, 200.0, 3.0 * deviation);
   EXPECT_LT(deviation, 0.15 * constant);
-  EXPECT_NE(told.find("bandwidth", motors), std::string::npos) << told;
-  if (look)
-    onlooker.emplace(page, "replayed", "tool/frf panel/revolution panel/spectrum panel/strip cnc/load");
+  EXPECT_NE(summary_text.find("bandwidth", motors), std::string::npos) << summary_text;
+  if (with_page)
+    page_check.emplace(page, "replayed", "tool/frf panel/revolution panel/spectrum panel/strip cnc/load");
   run("roslaunch -p " + freePort() + " smartmill_launch replay.launch rate:=0 motor_currents:=true bag:=" +
-          live + " out:=" + again + shown,
+          live + " out:=" + again + panel,
       log);
-  if (onlooker) page_replayed = onlooker->verdict();
+  if (page_check) page_replayed = page_check->fault();
   const std::string replayed = contentOf(log);
   const int code = run("rosrun smartmill_launch compare_bags " + live + " " + again, log);
   const std::string verdict = contentOf(log);
@@ -93,8 +94,8 @@ TEST(Replay, OfAShortSessionIsTheSameToTheLastDigit) {
   }
 }
 
-TEST(Replay, IsShownByThePageLikeTheSession) {
-  if (!browserThere()) GTEST_SKIP() << "chromium and chromium-driver are not installed";
+TEST(Replay, ThePageShowsSessionAndReplay) {
+  if (!browserIsInstalled()) GTEST_SKIP() << "chromium and chromium-driver are not installed";
   EXPECT_EQ(page_live, "");
   EXPECT_EQ(page_replayed, "");
 }

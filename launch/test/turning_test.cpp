@@ -15,7 +15,7 @@
 namespace smartmill {
 namespace {
 
-/// Root mean square of deflection less tool about its mean, over a tenth of a second each.
+/// RMS about the mean of the deflection minus the tool motion, per tenth of a second.
 class Vibration {
  public:
   void add(const SampleBlock& block) {
@@ -26,7 +26,7 @@ class Vibration {
       const double mean = sum_ / count_;
       const std::lock_guard<std::mutex> lock(mutex_);
       last_ = std::sqrt(std::max(0.0, squares_ / count_ - mean * mean));
-      most_ = std::max(most_, last_);
+      max_ = std::max(max_, last_);
       sum_ = squares_ = count_ = 0.0;
     }
   }
@@ -34,17 +34,17 @@ class Vibration {
     const std::lock_guard<std::mutex> lock(mutex_);
     return last_;
   }
-  double most() const {
+  double max() const {
     const std::lock_guard<std::mutex> lock(mutex_);
-    return most_;
+    return max_;
   }
 
  private:
   mutable std::mutex mutex_;
-  double sum_ = 0.0, squares_ = 0.0, count_ = 0.0, last_ = 1.0, most_ = 0.0;
+  double sum_ = 0.0, squares_ = 0.0, count_ = 0.0, last_ = 1.0, max_ = 0.0;
 };
 
-TEST(Turning, chatterIsLearntAndEndedThroughTopics) {
+TEST(Turning, theMachineIsIdentifiedAndChatterSuppressed) {
   ros::NodeHandle nh;
   Vibration vibration;
   const ros::Subscriber probes = nh.subscribe<smartmill_msgs::SampleBlock>(
@@ -53,16 +53,16 @@ TEST(Turning, chatterIsLearntAndEndedThroughTopics) {
           [&](const auto& m) { vibration.add(fromMsg(*m)); }));
   ros::AsyncSpinner spinner(1);
   spinner.start();
-  const auto learnt = ros::topic::waitForMessage<smartmill_msgs::ModalModel>(names::CONTROL_MACHINE, nh,
-                                                                             ros::Duration(300.0));
-  ASSERT_TRUE(learnt);
-  const ModalModel machine = fromMsg(*learnt).model;
+  const auto identified = ros::topic::waitForMessage<smartmill_msgs::ModalModel>(names::CONTROL_MACHINE, nh,
+                                                                                 ros::Duration(300.0));
+  ASSERT_TRUE(identified);
+  const ModalModel machine = fromMsg(*identified).model;
   ASSERT_EQ(machine.modes.size(), 1u);
   EXPECT_NEAR(machine.modes[0].frequency * units::TWO_PI, 350.0, 3.5);
   EXPECT_NEAR(machine.modes[0].damping_ratio, 0.02, 0.004);
-  // It had grown beyond 4 um (the first answer to the chip is half of that) and falls below a thousandth.
+  // Chatter grows beyond 4 um (the first response to the chip is half of that) and then falls below 0.1 um.
   for (int i = 0; i < 3000 && !(vibration.last() < 0.1e-6); ++i) ros::Duration(0.1).sleep();
-  EXPECT_GT(vibration.most(), 4e-6);
+  EXPECT_GT(vibration.max(), 4e-6);
   EXPECT_LT(vibration.last(), 0.1e-6);
 }
 

@@ -1,5 +1,4 @@
-// rosrun smartmill_cnc linuxcnc_config MODEL -o FOLDER: a configuration of LinuxCNC for a machine without
-// hardware.
+// rosrun smartmill_cnc linuxcnc_config MODEL -o FOLDER: configuration of a LinuxCNC without hardware.
 
 #include <filesystem>
 #include <fstream>
@@ -12,11 +11,10 @@ int main(int argc, char** argv) {
   using namespace smartmill;
   std::string model, folder;
   CommandLine line{
-      "Writes a configuration of LinuxCNC: ideal axes and spindle with the travel, speeds and accelerations "
-      "of a "
-      "machine\nmodel, for linuxcnc_machine to start (docs/linuxcnc.md)."};
-  line.option("model", model, "machine model file: its sections axes and spindle").required();
-  line.option("-o,--out", folder, "folder to write to; made where it is missing").required();
+      "Writes a configuration of LinuxCNC for linuxcnc_machine (docs/linuxcnc.md): ideal axes and spindle\n"
+      "with the travel, speeds and accelerations of a machine model."};
+  line.option("model", model, "machine model file with the sections axes and spindle").required();
+  line.option("-o,--out", folder, "output folder, created if missing").required();
   return runProgram(line, argc, argv, [&] {
     folder = std::filesystem::absolute(folder).string();
     std::filesystem::create_directories(folder);

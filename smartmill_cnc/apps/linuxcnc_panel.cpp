@@ -1,4 +1,4 @@
-// rosrun smartmill_cnc linuxcnc_panel FOLDER WORD: what an operator does at the panel of a LinuxCNC.
+// rosrun smartmill_cnc linuxcnc_panel FOLDER COMMAND: the operator's panel of a LinuxCNC.
 
 #include <chrono>
 #include <cstdio>
@@ -18,12 +18,12 @@ namespace {
 using namespace smartmill;
 using namespace smartmill::cnc::linuxcnc;
 
-constexpr double ANSWER = 8.0;  // [s] homing included
+constexpr double REPLY_TIMEOUT = 8.0;  // [s] including homing
 
 void show(const MachineStatus& s) {
   const char* states[] = {"", "emergency stop", "reset", "off", "on"};
   const char* modes[] = {"", "manual", "automatic", "mdi"};
-  std::printf("%s, %s, %s%s%s, x %.4f y %.4f z %.4f mm, %.1f mm/min%s%s\n", s.alive ? "alive" : "gone",
+  std::printf("%s, %s, %s%s%s, x %.4f y %.4f z %.4f mm, %.1f mm/min%s%s\n", s.alive ? "alive" : "not running",
               states[static_cast<int>(s.state)], modes[static_cast<int>(s.mode)], s.homed ? ", homed" : "",
               s.held   ? ", feed hold"
               : s.busy ? ", busy"
@@ -32,15 +32,15 @@ void show(const MachineStatus& s) {
               s.errors.empty() ? "" : ", ", s.errors.c_str());
 }
 
-/// One word; what does not come about is tried again while there is patience: everything may just be
-/// starting.
-MachineStatus carryOut(GatewayClient& client, const std::optional<Word>& word, double patience) {
-  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(patience);
+/// Executes a command (none: reads the status). Retries failures until the timeout, since the controller may
+/// still be starting. @param timeout [s]
+MachineStatus carryOut(GatewayClient& client, const std::optional<CommandCode>& command, double timeout) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(timeout);
   for (;;) {
     try {
       client.connect();
-      if (word) {
-        const Reply reply = client.carryOut({*word, 0, 0.0, {}});
+      if (command) {
+        const Reply reply = client.carryOut({*command, 0, 0.0, {}});
         if (reply.code != Reply::Code::done) {
           throw Error(reply.text);
         }
@@ -58,29 +58,31 @@ MachineStatus carryOut(GatewayClient& client, const std::optional<Word>& word, d
 }  // namespace
 
 int main(int argc, char** argv) {
-  const std::map<std::string, Word> words{{"ready", Word::ready},
-                                          {"estop", Word::estop},
-                                          {"hold", Word::hold},
-                                          {"resume", Word::resume},
-                                          {"abort", Word::abort}};
-  std::string folder, word;
-  double patience = 0.0;
-  CommandLine line{"The panel of a LinuxCNC behind linuxcnc_gateway."};
-  line.option("folder", folder, "of the machine").required();
+  const std::map<std::string, CommandCode> codes{{"ready", CommandCode::ready},
+                                                 {"estop", CommandCode::estop},
+                                                 {"hold", CommandCode::hold},
+                                                 {"resume", CommandCode::resume},
+                                                 {"abort", CommandCode::abort}};
+  std::string folder, command;
+  double timeout = 0.0;
+  CommandLine line{"The operator's panel of a LinuxCNC with linuxcnc_gateway."};
+  line.option("folder", folder, "folder of the machine").required();
   line.option(
-          "word", word,
-          "ready: resets the emergency stop and errors, switches on, homes; estop, hold, resume, abort; show")
+          "command", command,
+          "ready: resets emergency stop and errors, switches on, homes; estop; hold; resume; abort; show: "
+          "prints the status")
       .required()
       .oneOf({"ready", "estop", "hold", "resume", "abort", "show"});
-  line.option("--wait", patience, "[s] for the controller to be there").notNegative().showDefault();
-  std::vector<std::string> due;  // without those of roslaunch
-  ros::removeROSArgs(argc, argv, due);
+  line.option("--wait", timeout, "[s] timeout for the controller to start").notNegative().showDefault();
+  std::vector<std::string> own_arguments;  // without those of roslaunch
+  ros::removeROSArgs(argc, argv, own_arguments);
   std::vector<const char*> arguments;
-  for (const std::string& argument : due) {
+  for (const std::string& argument : own_arguments) {
     arguments.push_back(argument.c_str());
   }
   return runProgram(line, static_cast<int>(arguments.size()), arguments.data(), [&] {
-    GatewayClient client(folder, ANSWER);
-    show(carryOut(client, word == "show" ? std::nullopt : std::optional<Word>(words.at(word)), patience));
+    GatewayClient client(folder, REPLY_TIMEOUT);
+    const auto code = command == "show" ? std::nullopt : std::optional<CommandCode>(codes.at(command));
+    show(carryOut(client, code, timeout));
   });
 }

@@ -3,7 +3,7 @@
 #include "controller_link.h"
 
 #include <rcs.hh>
-// in this order
+// LinuxCNC's headers require this order
 #include <emc.hh>
 #include <emc_nml.hh>
 #include <nml_oi.hh>
@@ -21,14 +21,14 @@ namespace {
 
 using Code = Reply::Code;
 
-constexpr std::chrono::milliseconds LOOK{1};
-constexpr std::chrono::milliseconds REATTACH{500};                 // between two attempts to find it
-constexpr double ANSWER = 1.0, HOMING = 3.0, COMES_TO_REST = 0.3;  // [s]
-constexpr std::uint32_t SETTLED = 4;  // servo cycles of an idle task after a program
+constexpr std::chrono::milliseconds POLL_PERIOD{1};
+constexpr std::chrono::milliseconds REATTACH{500};                               // between two attempts
+constexpr double REPLY_TIMEOUT = 1.0, HOMING_TIMEOUT = 3.0, STOP_TIMEOUT = 0.3;  // [s]
+constexpr std::uint32_t SETTLED = 4;  // [servo cycles] of an idle task after a program
 constexpr const char* PIECE = "o<piece> call";
 
 char* writable(const std::string& text) {
-  return const_cast<char*>(text.c_str());  // NML's interface; it only reads
+  return const_cast<char*>(text.c_str());  // NML takes char* and only reads it
 }
 
 std::array<double, 3> metres(const EmcPose& pose, double units_per_mm) {
@@ -52,10 +52,10 @@ struct ControllerLink::Channels {
 };
 
 ControllerLink::ControllerLink(std::string nml_file, std::string program_file,
-                               std::function<void()> meanwhile)
+                               std::function<void()> while_waiting)
     : nml_file_(std::move(nml_file)),
       program_file_(std::move(program_file)),
-      meanwhile_(std::move(meanwhile)) {
+      while_waiting_(std::move(while_waiting)) {
   set_rcs_print_destination(RCS_PRINT_TO_NULL);
 }
 
@@ -73,7 +73,7 @@ void ControllerLink::attach() {
   }
 }
 
-void ControllerLink::look() {
+void ControllerLink::poll() {
   if (!channels_ || (!status_.alive && Clock::now() - attached_ > REATTACH)) {
     attach();
   }
@@ -85,41 +85,42 @@ void ControllerLink::look() {
   const std::uint32_t heartbeat = channels_->stat().motion.heartbeat;
   const bool beats = heartbeat != 0 && heartbeat != status_.heartbeat;
   if (beats) {
-    fill();
-    dropOrphan();
+    readStatus();
+    abortOrphan();
   }
   takeErrors();
-  judge(beats);
-  noticeEnd();
+  checkLiveness(beats);
+  detectProgramEnd();
 }
 
-/// What runs when this gateway first sees the controller was begun through one that has died.
-void ControllerLink::dropOrphan() {
-  if (status_.alive && !std::exchange(met_, true) && status_.busy &&
+/// A program that already runs at the first contact was started through a gateway that has ended.
+void ControllerLink::abortOrphan() {
+  if (status_.alive && !std::exchange(contacted_, true) && status_.busy &&
       status_.mode == MachineStatus::Mode::mdi) {
     EMC_TASK_ABORT message;
     channels_->command.write(&message);
   }
 }
 
-void ControllerLink::judge(bool beats) {
+void ControllerLink::checkLiveness(bool beats) {
   const double now = std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
-  const Liveness::Verdict verdict = liveness_.look(beats, processes_, now);
+  const Liveness::Verdict verdict = liveness_.update(beats, processes_, now);
   status_.starved = liveness_.starved();
   if (verdict == Liveness::Verdict::lives || !status_.alive) {
     return;
   }
   status_.alive = false;
   program_.reset();
-  status_.errors = verdict == Liveness::Verdict::ended   ? "its task has stopped: a process of it has ended"
-                   : verdict == Liveness::Verdict::hangs ? "its task has stopped: it counts no servo cycles"
-                                                         : "the computer gives it no processor";
+  status_.errors =
+      verdict == Liveness::Verdict::ended   ? "its task has stopped: one of its processes has ended"
+      : verdict == Liveness::Verdict::hangs ? "its task has stopped: no servo cycles are counted"
+                                            : "it waits for a processor of an overloaded computer";
 }
 
-void ControllerLink::fill() {
+void ControllerLink::readStatus() {
   const EMC_STAT& s = channels_->stat();
   const EMC_TRAJ_STAT& t = s.motion.traj;
-  // The first heartbeat that is seen may be of a controller that has gone; the second one counts.
+  // The first heartbeat may be left from an ended controller; a second one confirms a running one.
   if (!status_.alive && status_.heartbeat != 0) {
     status_.alive = true;
     processes_.find({"milltask", "rtapi_app"});
@@ -148,7 +149,7 @@ void ControllerLink::fill() {
   }
 }
 
-/// What one reader takes no other sees: all of it is kept, up to what a frame carries.
+/// Each message reaches only one reader: all are stored, up to the length of a frame.
 void ControllerLink::takeErrors() {
   for (NMLTYPE type = channels_->error.read(); type > 0; type = channels_->error.read()) {
     const NMLmsg* message = channels_->error.get_address();
@@ -156,7 +157,7 @@ void ControllerLink::takeErrors() {
                            ? static_cast<const EMC_OPERATOR_ERROR*>(message)->error
                        : type == NML_ERROR_TYPE ? static_cast<const NML_ERROR*>(message)->error
                                                 : nullptr;
-    // What the controller calls a note is none, though it comes as an error.
+    // Notes arrive as errors and are ignored.
     if (text && std::string(text).rfind("Note:", 0) != 0 && status_.errors.size() < LONGEST_TEXT / 2) {
       std::string line(text);
       std::replace(line.begin(), line.end(), '\n', ' ');
@@ -165,8 +166,8 @@ void ControllerLink::takeErrors() {
   }
 }
 
-/// A program has come to its end when the task has been done with it for some cycles and no error came.
-void ControllerLink::noticeEnd() {
+/// A program has ended when the task has been idle for some cycles without an error.
+void ControllerLink::detectProgramEnd() {
   if (!program_ || !status_.alive) {
     return;
   }
@@ -184,36 +185,37 @@ void ControllerLink::noticeEnd() {
   }
 }
 
-bool ControllerLink::waitFor(const std::function<bool()>& so, double seconds) {
+bool ControllerLink::waitFor(const std::function<bool()>& condition, double timeout) {
   const Clock::time_point end =
-      Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
-  // Looking may find that the controller has gone, and its channels with it.
-  while (channels_ && !so()) {
+      Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(timeout));
+  // poll() may find that the controller has ended and close the channels.
+  while (channels_ && !condition()) {
     if (Clock::now() > end) {
       return false;
     }
-    std::this_thread::sleep_for(LOOK);
-    look();
-    meanwhile_();
+    std::this_thread::sleep_for(POLL_PERIOD);
+    poll();
+    while_waiting_();
   }
   return channels_ != nullptr;
 }
 
-/// @return the command's serial number once the task has taken it.
+/// @return the command's serial number once the task has accepted it.
 template <class NmlMessage>
-std::optional<int> ControllerLink::tell(NmlMessage& message) {
+std::optional<int> ControllerLink::sendCommand(NmlMessage& message) {
   if (!channels_ || channels_->command.write(&message) != 0) {
     return std::nullopt;
   }
   const int serial = message.serial_number;
-  const bool taken = waitFor([&] { return channels_->stat().echo_serial_number - serial >= 0; }, ANSWER);
+  const bool taken =
+      waitFor([&] { return channels_->stat().echo_serial_number - serial >= 0; }, REPLY_TIMEOUT);
   return taken ? std::optional<int>(serial) : std::nullopt;
 }
 
-/// Tells and waits until the task is done with it.
+/// Sends a command and waits for its completion.
 template <class NmlMessage>
-Reply ControllerLink::done(NmlMessage& message, const char* what) {
-  const std::optional<int> serial = tell(message);
+Reply ControllerLink::execute(NmlMessage& message, const char* what) {
+  const std::optional<int> serial = sendCommand(message);
   if (!serial) {
     return {Code::lost, std::string(what) + ": the controller does not answer"};
   }
@@ -221,7 +223,7 @@ Reply ControllerLink::done(NmlMessage& message, const char* what) {
     const EMC_STAT& s = channels_->stat();
     return s.echo_serial_number - *serial > 0 || s.status != RCS_EXEC;
   };
-  if (!waitFor(ended, ANSWER)) {
+  if (!waitFor(ended, REPLY_TIMEOUT)) {
     return {Code::not_yet, std::string(what) + ": not done within a second"};
   }
   if (channels_->stat().status == RCS_ERROR) {
@@ -238,7 +240,7 @@ Reply ControllerLink::refusal(Code code, const std::string& what) const {
 Reply ControllerLink::setState(int state) {
   EMC_TASK_SET_STATE message;
   message.state = static_cast<EMC_TASK_STATE_ENUM>(state);
-  return done(message, "machine state");
+  return execute(message, "machine state");
 }
 
 Reply ControllerLink::setMode(int mode) {
@@ -247,11 +249,11 @@ Reply ControllerLink::setMode(int mode) {
   }
   EMC_TASK_SET_MODE message;
   message.mode = static_cast<EMC_TASK_MODE_ENUM>(mode);
-  const Reply reply = done(message, "mode");
+  const Reply reply = execute(message, "mode");
   if (reply.code != Code::done) {
     return reply;
   }
-  const bool changed = waitFor([&] { return channels_->stat().task.mode == mode; }, ANSWER);
+  const bool changed = waitFor([&] { return channels_->stat().task.mode == mode; }, REPLY_TIMEOUT);
   return changed ? Reply{} : Reply{Code::not_yet, "the controller stays in its mode"};
 }
 
@@ -262,15 +264,15 @@ Reply ControllerLink::makeReady() {
   if (reset.code != Code::done) {
     return reset;
   }
-  // It says done even where the emergency stop is held from outside.
-  if (!waitFor([&] { return status_.state != MachineStatus::State::emergency; }, ANSWER)) {
-    return {Code::emergency, "the emergency stop cannot be reset: it is held outside the controller"};
+  // The reply is "done" even if the emergency stop is held externally.
+  if (!waitFor([&] { return status_.state != MachineStatus::State::emergency; }, REPLY_TIMEOUT)) {
+    return {Code::emergency, "the emergency stop cannot be reset: it is held externally"};
   }
   const Reply on = setState(EMC_TASK_STATE_ON);
   if (on.code != Code::done) {
     return on;
   }
-  if (!waitFor([&] { return status_.state == MachineStatus::State::on; }, ANSWER)) {
+  if (!waitFor([&] { return status_.state == MachineStatus::State::on; }, REPLY_TIMEOUT)) {
     return {Code::refused, "the machine cannot be switched on"};
   }
   return status_.homed ? Reply{} : home();
@@ -283,24 +285,24 @@ Reply ControllerLink::home() {
   }
   EMC_TRAJ_SET_TELEOP_ENABLE joints;
   joints.enable = 0;
-  const Reply free = done(joints, "joint mode");
+  const Reply free = execute(joints, "joint mode");
   if (free.code != Code::done) {
     return free;
   }
   EMC_JOINT_HOME all;
   all.joint = -1;
-  const Reply homing = done(all, "homing");
+  const Reply homing = execute(all, "homing");
   if (homing.code != Code::done) {
     return homing;
   }
-  return waitFor([&] { return status_.homed; }, HOMING) ? Reply{}
-                                                        : Reply{Code::refused, "homing does not end"};
+  return waitFor([&] { return status_.homed; }, HOMING_TIMEOUT) ? Reply{}
+                                                                : Reply{Code::refused, "homing: timeout"};
 }
 
-/// Why no program can be taken.
-std::optional<Reply> ControllerLink::unfit() const {
+/// Why no program can be accepted; empty: the machine is ready.
+std::optional<Reply> ControllerLink::notReady() const {
   if (!status_.alive) {
-    return Reply{Code::lost, "the controller has gone"};
+    return Reply{Code::lost, "the controller does not run"};
   }
   if (status_.state == MachineStatus::State::emergency) {
     return Reply{Code::emergency, "emergency stop" + (status_.errors.empty() ? "" : ": " + status_.errors)};
@@ -315,14 +317,14 @@ std::optional<Reply> ControllerLink::unfit() const {
 }
 
 Reply ControllerLink::open() {
-  if (const std::optional<Reply> no = unfit()) {
-    return *no;
+  if (const std::optional<Reply> fault = notReady()) {
+    return *fault;
   }
   if (status_.mode == MachineStatus::Mode::automatic && status_.busy) {
     return {Code::wrong_mode, "the controller runs a program of its own"};
   }
-  // What was stopped a moment ago comes to rest.
-  if (!waitFor([&] { return !status_.busy && status_.in_position; }, COMES_TO_REST)) {
+  // An aborted motion may still be stopping.
+  if (!waitFor([&] { return !status_.busy && status_.in_position; }, STOP_TIMEOUT)) {
     return {Code::not_yet, "the machine still moves"};
   }
   return setMode(EMC_TASK_MODE_MDI);
@@ -331,12 +333,12 @@ Reply ControllerLink::open() {
 Reply ControllerLink::immediate(const char* text, const char* what) {
   EMC_TASK_PLAN_EXECUTE message;
   std::snprintf(message.command, sizeof message.command, "%s", text);
-  return done(message, what);
+  return execute(message, what);
 }
 
 Reply ControllerLink::run(const Command& command) {
-  if (const std::optional<Reply> no = unfit()) {
-    return *no;
+  if (const std::optional<Reply> fault = notReady()) {
+    return *fault;
   }
   if (status_.mode != MachineStatus::Mode::mdi) {
     return {Code::wrong_mode, "the controller is not in MDI"};
@@ -357,7 +359,7 @@ Reply ControllerLink::run(const Command& command) {
   status_.running = command.number;
   status_.done = 0;
   idle_at_.reset();
-  program_ = tell(message);
+  program_ = sendCommand(message);
   if (!program_) {
     return {Code::lost, "program: the controller does not answer"};
   }
@@ -365,16 +367,16 @@ Reply ControllerLink::run(const Command& command) {
 }
 
 Reply ControllerLink::close() {
-  // Where nothing can be taken, nothing turns either.
-  if (unfit() || status_.mode != MachineStatus::Mode::mdi || status_.busy) {
+  // The spindle turns only in a machine that is ready.
+  if (notReady() || status_.mode != MachineStatus::Mode::mdi || status_.busy) {
     return {};
   }
   return immediate("M5", "spindle stop");
 }
 
 Reply ControllerLink::variable(const Command& command) {
-  if (const std::optional<Reply> no = unfit()) {
-    return *no;
+  if (const std::optional<Reply> fault = notReady()) {
+    return *fault;
   }
   if (status_.mode != MachineStatus::Mode::mdi || status_.busy) {
     return {Code::wrong_mode, "variables are written while motion is armed and nothing runs"};
@@ -385,38 +387,38 @@ Reply ControllerLink::variable(const Command& command) {
 }
 
 Reply ControllerLink::carryOut(const Command& command) {
-  look();
+  poll();
   if (!status_.alive) {
-    return {Code::lost, "the controller has gone"};
+    return {Code::lost, "the controller does not run"};
   }
-  switch (command.word) {
-    case Word::ready:
+  switch (command.code) {
+    case CommandCode::ready:
       return makeReady();
-    case Word::open:
+    case CommandCode::open:
       return open();
-    case Word::run:
+    case CommandCode::run:
       return run(command);
-    case Word::close:
+    case CommandCode::close:
       return close();
-    case Word::abort: {
+    case CommandCode::abort: {
       program_.reset();
       EMC_TASK_ABORT message;
-      return done(message, "abort");
+      return execute(message, "abort");
     }
-    case Word::estop:
+    case CommandCode::estop:
       program_.reset();
       return setState(EMC_TASK_STATE_ESTOP);
-    case Word::hold: {
+    case CommandCode::hold: {
       EMC_TASK_PLAN_PAUSE message;
-      return tell(message) ? Reply{} : Reply{Code::lost, "feed hold: the controller does not answer"};
+      return sendCommand(message) ? Reply{} : Reply{Code::lost, "feed hold: the controller does not answer"};
     }
-    case Word::resume: {
+    case CommandCode::resume: {
       EMC_TASK_PLAN_RESUME message;
-      return tell(message) ? Reply{} : Reply{Code::lost, "resume: the controller does not answer"};
+      return sendCommand(message) ? Reply{} : Reply{Code::lost, "resume: the controller does not answer"};
     }
-    case Word::variable:
+    case CommandCode::variable:
       return variable(command);
-    case Word::guard:
+    case CommandCode::guard:
       return {};
   }
   return {Code::refused, "unknown command"};

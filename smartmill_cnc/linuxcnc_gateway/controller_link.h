@@ -14,21 +14,22 @@
 
 namespace smartmill::cnc::linuxcnc {
 
-/// LinuxCNC's task over NML: one command at a time, status whenever it is looked at.
+/// Connection to LinuxCNC's task over NML: one command at a time, status at every poll.
 class ControllerLink {
  public:
-  /// @param nml_file of the controller @param program_file that `o<piece> call` reads
-  /// @param meanwhile is called again and again while a command waits for the controller
-  ControllerLink(std::string nml_file, std::string program_file, std::function<void()> meanwhile);
+  /// @param nml_file of the controller @param program_file read by `o<piece> call`
+  /// @param while_waiting called repeatedly while a command waits for the controller
+  ControllerLink(std::string nml_file, std::string program_file, std::function<void()> while_waiting);
   ~ControllerLink();
   ControllerLink(const ControllerLink&) = delete;
   ControllerLink& operator=(const ControllerLink&) = delete;
 
-  /// Looks at the controller; finds it again when it was started anew. To be called every few milliseconds.
-  void look();
+  /// Reads the controller's status; reattaches to a restarted controller. To be called every few
+  /// milliseconds.
+  void poll();
   const MachineStatus& status() const { return status_; }
 
-  /// Waits for the controller's answer, a second at most (homing three), looking at it meanwhile.
+  /// Executes a command: waits for the controller's reply for at most 1 s (homing 3 s), polling meanwhile.
   Reply carryOut(const Command& command);
 
  private:
@@ -36,17 +37,17 @@ class ControllerLink {
   using Clock = std::chrono::steady_clock;
 
   void attach();
-  void dropOrphan();
-  void judge(bool beats);
-  void fill();
+  void abortOrphan();
+  void checkLiveness(bool beats);
+  void readStatus();
   void takeErrors();
-  void noticeEnd();
-  /// Looks until it is so. @return whether it came to it
-  bool waitFor(const std::function<bool()>& so, double seconds);
+  void detectProgramEnd();
+  /// Polls until the condition holds. @return false after the timeout or a lost controller
+  bool waitFor(const std::function<bool()>& condition, double timeout);
   template <class NmlMessage>
-  std::optional<int> tell(NmlMessage& message);
+  std::optional<int> sendCommand(NmlMessage& message);
   template <class NmlMessage>
-  Reply done(NmlMessage& message, const char* what);
+  Reply execute(NmlMessage& message, const char* what);
   Reply setState(int state);
   Reply setMode(int mode);
   Reply immediate(const char* text, const char* what);
@@ -57,18 +58,18 @@ class ControllerLink {
   Reply close();
   Reply variable(const Command& command);
   Reply refusal(Reply::Code code, const std::string& what) const;
-  std::optional<Reply> unfit() const;
+  std::optional<Reply> notReady() const;
 
   const std::string nml_file_, program_file_;
-  const std::function<void()> meanwhile_;
+  const std::function<void()> while_waiting_;
   std::unique_ptr<Channels> channels_;
   MachineStatus status_;
-  Clock::time_point attached_;  // when the channels were opened
-  bool met_ = false;            // a controller that lives has been seen
+  Clock::time_point attached_;  // last attempt to open the channels
+  bool contacted_ = false;      // a running controller has been detected
   Liveness liveness_;
   ProcessWatch processes_;
-  std::optional<int> program_;            // serial number of the one that runs
-  std::optional<std::uint32_t> idle_at_;  // heartbeat since when nothing of it is left
+  std::optional<int> program_;            // serial number of the running one
+  std::optional<std::uint32_t> idle_at_;  // heartbeat since which the program is finished
 };
 
 }  // namespace smartmill::cnc::linuxcnc

@@ -1,4 +1,4 @@
-// Speaks LinuxCNC's NML on one side and smartmill_cnc's local protocol on the other.
+// Gateway between LinuxCNC's NML and smartmill_cnc's local protocol.
 //
 // Copyright (c) SmartMill developers.
 // SPDX-License-Identifier: GPL-2.0-or-later
@@ -28,10 +28,10 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int LOOK_EVERY = 2;  // [ms]
-constexpr std::size_t MOST_CLIENTS = 8, MOST_WAITING = 8;
+constexpr int POLL_PERIOD = 2;  // [ms]
+constexpr std::size_t MAX_CLIENTS = 8, MAX_QUEUED = 8;
 
-/// What is known of the process that permits motion.
+/// Observation of the process that permits motion (linuxcnc_stream).
 struct Guard {
   ProcessWatch process;
   Liveness liveness;
@@ -40,15 +40,15 @@ struct Guard {
 
 struct Client {
   LocalConnection connection;
-  bool drives = false;           // has opened programs: what runs is its
-  std::unique_ptr<Guard> guard;  // it is linuxcnc_stream
-  std::deque<Received> waiting;  // commands
+  bool drives = false;           // it has opened programs and owns the running motion
+  std::unique_ptr<Guard> guard;  // of linuxcnc_stream only
+  std::deque<Received> waiting;  // queued commands
 };
 
 class Gateway {
  public:
   explicit Gateway(const std::string& folder)
-      : link_(folder + "/mill.nml", folder + "/sub/piece.ngc", [this] { hear(); }),
+      : link_(folder + "/mill.nml", folder + "/sub/piece.ngc", [this] { receiveAll(); }),
         listener_(listenAt(folder + "/" + GATEWAY_SOCKET)) {}
 
   void step() {
@@ -56,14 +56,14 @@ class Gateway {
     for (const Client& client : clients_) {
       entries.push_back({client.connection.descriptor(), POLLIN, 0});
     }
-    ::poll(entries.data(), entries.size(), LOOK_EVERY);
-    link_.look();
+    ::poll(entries.data(), entries.size(), POLL_PERIOD);
+    link_.poll();
     if (std::optional<LocalConnection> connection = acceptFrom(listener_)) {
-      if (clients_.size() < MOST_CLIENTS) {
+      if (clients_.size() < MAX_CLIENTS) {
         clients_.push_back({std::move(*connection), false, nullptr, {}});
       }
     }
-    hear();
+    receiveAll();
     for (Client& client : clients_) {
       while (!client.waiting.empty()) {
         const Received received = std::move(client.waiting.front());
@@ -72,31 +72,30 @@ class Gateway {
       }
     }
     for (Client& client : clients_) {
-      watch(client);
+      checkGuard(client);
     }
-    clients_.remove_if([this](const Client& client) { return left(client); });
+    clients_.remove_if([this](const Client& client) { return removed(client); });
   }
 
-  /// Nobody watches any more what runs.
-  void leave() {
+  /// Stops the motions of all clients, at the end of the process.
+  void stopAll() {
     for (const Client& client : clients_) {
       stopFor(client);
     }
   }
 
  private:
-  /// Questions are answered at once, also while a command is carried out; commands wait for their turn.
-  void hear() {
+  /// Answers status requests at once, also during a command; queues commands.
+  void receiveAll() {
     for (Client& client : clients_) {
       client.connection.receive();
       while (std::optional<Received> received = client.connection.next()) {
         if (client.guard) {
           client.guard->heard = true;
         }
-        if (std::holds_alternative<Ask>(received->message)) {
+        if (std::holds_alternative<StatusRequest>(received->message)) {
           client.connection.send(link_.status(), received->sequence);
-        } else if (std::holds_alternative<Command>(received->message) &&
-                   client.waiting.size() < MOST_WAITING) {
+        } else if (std::holds_alternative<Command>(received->message) && client.waiting.size() < MAX_QUEUED) {
           client.waiting.push_back(std::move(*received));
         }
       }
@@ -104,14 +103,14 @@ class Gateway {
     }
   }
 
-  /// A guard that is silent, though it does not wait for a processor, counts as gone.
-  static void watch(Client& client) {
+  /// A guard that is silent without waiting for a processor is disconnected.
+  static void checkGuard(Client& client) {
     if (!client.guard) {
       return;
     }
     Guard& guard = *client.guard;
     const double now = std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
-    if (guard.liveness.look(std::exchange(guard.heard, false), guard.process, now) !=
+    if (guard.liveness.update(std::exchange(guard.heard, false), guard.process, now) !=
         Liveness::Verdict::lives) {
       client.connection.close();
     }
@@ -119,20 +118,21 @@ class Gateway {
 
   void carryOut(Client& client, const Command& command, std::uint16_t sequence) {
     const Reply reply = link_.carryOut(command);
-    if (command.word == Word::open && reply.code == Reply::Code::done) {
+    if (command.code == CommandCode::open && reply.code == Reply::Code::done) {
       client.drives = true;
     }
-    if (command.word == Word::close) {
+    if (command.code == CommandCode::close) {
       client.drives = false;
     }
-    if (command.word == Word::guard) {
+    if (command.code == CommandCode::guard) {
       client.guard = std::make_unique<Guard>();
-      client.guard->process.only(client.connection.peer());
+      client.guard->process.watch(client.connection.peer());
     }
     client.connection.send(reply, sequence);
   }
 
-  bool left(const Client& client) {
+  /// Whether the client has disconnected; stops its motion then.
+  bool removed(const Client& client) {
     if (client.connection.open()) {
       return false;
     }
@@ -142,9 +142,9 @@ class Gateway {
 
   void stopFor(const Client& client) {
     if (client.guard) {
-      link_.carryOut({Word::estop, 0, 0.0, {}});
+      link_.carryOut({CommandCode::estop, 0, 0.0, {}});
     } else if (client.drives) {
-      link_.carryOut({Word::abort, 0, 0.0, {}});
+      link_.carryOut({CommandCode::abort, 0, 0.0, {}});
     }
   }
 
@@ -159,14 +159,14 @@ class Gateway {
 int main(int argc, char** argv) {
   using namespace smartmill::cnc::linuxcnc;
   std::string folder;
-  smartmill::CommandLine line{"Speaks to the LinuxCNC whose mill.nml stands in a folder (docs/linuxcnc.md)."};
-  line.option("folder", folder, "of the machine: its gateway.socket is served").required();
+  smartmill::CommandLine line{"Gateway to the LinuxCNC of a folder with its mill.nml (docs/linuxcnc.md)."};
+  line.option("folder", folder, "folder of the machine; gateway.socket is created there").required();
   return smartmill::runProgram(line, argc, argv, [&] {
     catchStopSignals();
     Gateway gateway(folder);
     while (!stopRequested()) {
       gateway.step();
     }
-    gateway.leave();
+    gateway.stopAll();
   });
 }

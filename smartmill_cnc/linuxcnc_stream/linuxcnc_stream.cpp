@@ -1,5 +1,6 @@
-// Reads LinuxCNC's servo cycles from a HAL sampler and serves them on a local socket; writes a drive's load
-// and the permit of motion. A process of its own: LinuxCNC's end ends every HAL component.
+// Reads LinuxCNC's servo cycles from a HAL sampler and publishes them on a local socket; writes the spindle
+// load, the overrides and the permit of motion. A separate process, because the end of LinuxCNC ends every
+// HAL component.
 
 #include <hal.h>
 #include <poll.h>
@@ -17,7 +18,7 @@
 #include "smartmill_cnc/linuxcnc/configuration.h"
 #include "smartmill_cnc/linuxcnc/liveness.h"
 #include "smartmill_cnc/linuxcnc/local_socket.h"
-#include "smartmill_cnc/linuxcnc/stillness.h"
+#include "smartmill_cnc/linuxcnc/silence_timer.h"
 #include "smartmill_cnc/linuxcnc/stop_signal.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/program.h"
@@ -28,23 +29,23 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int HAL_SEGMENT = 0x48414c32, SAMPLER_FIFO = 0x48534130;  // keys that LinuxCNC's sources fix
-constexpr int READ_EVERY = 3;                                       // [ms]
-constexpr std::chrono::milliseconds ASK_EVERY{30}, TRY_EVERY{100}, LOADING{10000};
-constexpr double SILENT = 0.5;  // [s]
-constexpr int GONE = 3;         // exit code: the controller has
+constexpr int HAL_SEGMENT = 0x48414c32, SAMPLER_FIFO = 0x48534130;  // keys fixed in LinuxCNC's sources
+constexpr int READ_PERIOD = 3;                                      // [ms]
+constexpr std::chrono::milliseconds REQUEST_PERIOD{30}, RETRY_PERIOD{100}, LOADING{10000};
+constexpr double SILENCE_TIMEOUT = 0.5;  // [s]
+constexpr int CONTROLLER_ENDED = 3;      // exit code
 
 double seconds() {
   return std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
 }
 
-/// This process as a component of HAL. Its pins are bidirectional: what a dead one has left does not bar the
-/// next.
+/// This process as a HAL component. Its pins are bidirectional, so that signals still linked to an ended
+/// process do not block the next one.
 class Component {
  public:
   Component() : prefix_("smartmill-" + std::to_string(::getpid())), id_(::hal_init(prefix_.c_str())) {
     if (id_ < 0) {
-      throw Error("no component of HAL can be made (code " + std::to_string(id_) + ")");
+      throw Error("cannot create a HAL component (code " + std::to_string(id_) + ")");
     }
     pins_ = static_cast<Pins*>(::hal_malloc(sizeof(Pins)));
     const bool made =
@@ -60,16 +61,16 @@ class Component {
       throw Error("the controller's configuration has no signals '" + std::string(PERMIT_SIGNAL) + "' and '" +
                   BEAT_SIGNAL + "'");
     }
-    // A signal that the drive writes itself is left to it.
-    loads_ = ::hal_link((prefix_ + ".load").c_str(), LOAD_SIGNAL) == 0;
-    overrides_ = ::hal_link((prefix_ + ".feed-override").c_str(), FEED_SIGNAL) == 0 &&
-                 ::hal_link((prefix_ + ".spindle-override").c_str(), SPINDLE_SIGNAL) == 0;
+    // The link fails if the drive writes the signal itself.
+    has_load_signal_ = ::hal_link((prefix_ + ".load").c_str(), LOAD_SIGNAL) == 0;
+    has_override_signals_ = ::hal_link((prefix_ + ".feed-override").c_str(), FEED_SIGNAL) == 0 &&
+                            ::hal_link((prefix_ + ".spindle-override").c_str(), SPINDLE_SIGNAL) == 0;
     setOverrides({});
     if (::hal_stream_attach(&stream_, id_, SAMPLER_FIFO, SAMPLER_PINS) < 0) {
       ::hal_exit(id_);
       throw Error("the controller's configuration has no sampler '" + std::string(SAMPLER_PINS) + "'");
     }
-    // Stale: a full FIFO drops the newest.
+    // Discards stale samples: a full FIFO drops the newest.
     unsigned number = 0;
     hal_stream_data data[HAL_STREAM_MAX_PINS];
     while (::hal_stream_readable(&stream_) && ::hal_stream_read(&stream_, data, &number) >= 0) {
@@ -83,11 +84,11 @@ class Component {
   Component(const Component&) = delete;
   Component& operator=(const Component&) = delete;
 
-  /// Samples that follow one another without a gap, as many as there are; none when there are none.
+  /// All available samples up to the next gap.
   ServoBlock read() {
     ServoBlock block;
     while (block.samples.size() < ServoBlock::MOST) {
-      if (!ahead_ && !readOne()) {
+      if (!sample_pending_ && !readOne()) {
         break;
       }
       if (block.samples.empty()) {
@@ -96,7 +97,7 @@ class Component {
         break;
       }
       block.samples.push_back(sample_);
-      ahead_ = false;
+      sample_pending_ = false;
     }
     return block;
   }
@@ -105,9 +106,9 @@ class Component {
     *pins_->permit = on;
     *pins_->beat = !*pins_->beat;
   }
-  /// motion.adaptive-feed goes up to 1. @return why not
+  /// The feed override is at most 1 (motion.adaptive-feed). @return refused without the signals
   Reply setOverrides(const SetOverrides& wanted) {
-    if (!overrides_) {
+    if (!has_override_signals_) {
       return {Reply::Code::refused, std::string("the controller's configuration has no signals '") +
                                         FEED_SIGNAL + "' and '" + SPINDLE_SIGNAL + "'"};
     }
@@ -116,7 +117,7 @@ class Component {
     return {};
   }
   void setLoad(double load) {
-    if (loads_) {
+    if (has_load_signal_) {
       *pins_->load = load;
     }
   }
@@ -143,59 +144,60 @@ class Component {
     sample_.distance_to_go = d[6].f * units::MM;
     sample_.spindle_load = d[7].f;
     sample_.marker = d[8].f;
-    return ahead_ = true;
+    return sample_pending_ = true;
   }
 
   const std::string prefix_;
   const int id_;
   Pins* pins_ = nullptr;
-  bool loads_ = false, overrides_ = false;
+  bool has_load_signal_ = false, has_override_signals_ = false;
   hal_stream_t stream_{};
-  bool ahead_ = false;  // a sample that was read and not handed out
+  bool sample_pending_ = false;  // a sample is read but not yet returned
   std::uint32_t number_ = 0;
   ServoSample sample_;
 };
 
-/// Asks the gateway whether it and the controller's task live: only then may the machine move.
-class Watch {
+/// Monitors the gateway and, through it, the controller's task: motion is permitted only while both are
+/// alive.
+class GatewayWatch {
  public:
-  explicit Watch(std::string path) : path_(std::move(path)) {}
+  explicit GatewayWatch(std::string path) : path_(std::move(path)) {}
 
   bool alive() {
     const Clock::time_point now = Clock::now();
-    if (!gateway_.open() && now - tried_ > TRY_EVERY) {
-      tried_ = now;
+    if (!gateway_.open() && now - last_attempt_ > RETRY_PERIOD) {
+      last_attempt_ = now;
       try {
         gateway_ = LocalConnection::to(path_);
-        process_.only(gateway_.peer());
+        process_.watch(gateway_.peer());
         liveness_ = Liveness();
-        gateway_.send(Command{Word::guard, 0, 0.0, {}});
+        gateway_.send(Command{CommandCode::guard, 0, 0.0, {}});
       } catch (const Error&) {
       }
     }
     gateway_.receive();
-    bool good = false;
+    bool updated = false;
     while (const std::optional<Received> received = gateway_.next()) {
       if (const auto* status = std::get_if<MachineStatus>(&received->message)) {
-        good = alive_ = status->alive;
+        updated = alive_ = status->alive;
         starved_ = status->starved > 0.0;
       }
     }
-    const Liveness::Verdict verdict = liveness_.look(good, process_, seconds());
-    if (now - asked_ > ASK_EVERY) {
-      asked_ = now;
-      gateway_.send(Ask{});
+    const Liveness::Verdict verdict = liveness_.update(updated, process_, seconds());
+    if (now - last_request_ > REQUEST_PERIOD) {
+      last_request_ = now;
+      gateway_.send(StatusRequest{});
     }
     return gateway_.open() && alive_ && verdict == Liveness::Verdict::lives;
   }
 
-  /// The controller is silent because the computer gives it no processor.
+  /// Whether the controller is silent because it waits for a processor.
   bool starved() const { return starved_; }
 
  private:
   const std::string path_;
   LocalConnection gateway_;
-  Clock::time_point tried_, asked_;
+  Clock::time_point last_attempt_, last_request_;
   bool alive_ = false, starved_ = false;
   ProcessWatch process_;
   Liveness liveness_;
@@ -206,11 +208,11 @@ class Server {
   explicit Server(const std::string& folder)
       : listener_(listenAt(folder + "/" + STREAM_SOCKET)), watch_(folder + "/" + GATEWAY_SOCKET) {}
 
-  /// Waits for a controller whose configuration is loaded; none when it is to end before.
+  /// Waits for a controller with loaded configuration; null if the process is to end.
   std::unique_ptr<Component> component() const {
     Clock::time_point found = Clock::now();
     while (!stopRequested()) {
-      // hal_init() by itself would make the segment, with the wrong owner.
+      // hal_init() would create a missing segment with the wrong owner.
       if (::shmget(HAL_SEGMENT, 0, 0) < 0) {
         found = Clock::now();
       } else {
@@ -220,17 +222,17 @@ class Server {
           if (Clock::now() - found > LOADING) throw;
         }
       }
-      std::this_thread::sleep_for(TRY_EVERY);
+      std::this_thread::sleep_for(RETRY_PERIOD);
     }
     return nullptr;
   }
 
   /// @return the exit code
   int serve(Component& component) {
-    Stillness silence;
+    SilenceTimer silence;
     while (!stopRequested()) {
       pollfd entry{listener_.get(), POLLIN, 0};
-      ::poll(&entry, 1, READ_EVERY);
+      ::poll(&entry, 1, READ_PERIOD);
       if (std::optional<LocalConnection> connection = acceptFrom(listener_)) {
         clients_.push_back(std::move(*connection));
       }
@@ -246,9 +248,9 @@ class Server {
         listen(client, component);
       }
       clients_.remove_if([](const LocalConnection& client) { return !client.open(); });
-      if (silence.look(heard || watch_.starved(), seconds()) > SILENT) {
-        std::cerr << "linuxcnc_stream: the controller has fallen silent\n";
-        return GONE;
+      if (silence.update(heard || watch_.starved(), seconds()) > SILENCE_TIMEOUT) {
+        std::cerr << "linuxcnc_stream: the controller is silent\n";
+        return CONTROLLER_ENDED;
       }
     }
     return 0;
@@ -268,7 +270,7 @@ class Server {
   }
 
   LocalDescriptor listener_;
-  Watch watch_;
+  GatewayWatch watch_;
   std::list<LocalConnection> clients_;
 };
 
@@ -279,9 +281,10 @@ int main(int argc, char** argv) {
   using namespace smartmill::cnc::linuxcnc;
   std::string folder;
   smartmill::CommandLine line{
-      "Reads every servo cycle of the LinuxCNC on this computer (docs/linuxcnc.md); ends with code 3 when it "
-      "goes."};
-  line.option("folder", folder, "of the machine: its stream.socket is served").required();
+      "Publishes every servo cycle of the LinuxCNC on this computer (docs/linuxcnc.md); exits with code 3 "
+      "when "
+      "it ends."};
+  line.option("folder", folder, "folder of the machine; stream.socket is created there").required();
   return smartmill::runProgram(line, argc, argv, [&]() -> int {
     catchStopSignals();
     rtapi_set_msg_level(RTAPI_MSG_NONE);

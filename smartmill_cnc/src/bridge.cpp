@@ -10,7 +10,7 @@ namespace {
 
 double checkedPeriod(double period) {
   if (!(period > 0.0) || !std::isfinite(period)) {
-    throw Error("reconnect_period: " + fixedDecimals(period, 3) + " is not above 0");
+    throw Error("reconnect_period: " + fixedDecimals(period, 3) + ", expected a finite period above 0");
   }
   return period;
 }
@@ -34,13 +34,13 @@ void Bridge::fetch(double now) {
 
 void Bridge::step(double now) {
   load_.reset();
-  if (const std::optional<Reading> reading = poller_.take()) {
+  if (const std::optional<Reading> reading = poller_.takeReading()) {
     state_ = reading->state;
     state_.connected = true;
     load_ = reading->load;
     alarms_ = reading->alarms;
     increment_ = reading->increment;
-    notice(motion_.step(*reading, now));
+    noteLoss(motion_.step(*reading, now));
   }
   if (!controller_->connected()) {
     endWithoutConnection(now);
@@ -54,19 +54,19 @@ void Bridge::step(double now) {
 
 void Bridge::endWithoutConnection(double now) {
   state_.connected = false;
-  poller_.failed(motion_.lost(poller_.lastError(), now));
-  poller_.lost();
+  poller_.setError(motion_.lost(poller_.lastError(), now));
+  poller_.reportDisconnected();
 }
 
-void Bridge::notice(const Status& status) {
+void Bridge::noteLoss(const Status& status) {
   if (status.lost()) {
-    poller_.failed(status.failure().message);
+    poller_.setError(status.failure().message);
   }
 }
 
 Answer<ArmCode> Bridge::arm(bool on) {
   if (!on) {
-    notice(motion_.disarm());
+    noteLoss(motion_.disarm());
     state_.armed = false;
     return {ArmCode::ok, "motion is disarmed"};
   }
@@ -78,7 +78,7 @@ Answer<ArmCode> Bridge::arm(bool on) {
   if (answer) {
     return *answer;
   }
-  notice(answer.failure());
+  noteLoss(answer.failure());
   return {ArmCode::not_connected, "motion is not armed: " + answer.failure().message};
 }
 
@@ -89,12 +89,12 @@ OverrideAnswer Bridge::setOverrides(const Overrides& wanted, const std::string& 
   if (!controller_->connected() || !state_.connected) {
     return answer;
   }
-  const Result<OverrideAnswer> said = motion_.setOverrides(wanted, reason);
-  if (said) {
-    return *said;
+  const Result<OverrideAnswer> result = motion_.setOverrides(wanted, reason);
+  if (result) {
+    return *result;
   }
-  notice(said.failure());
-  answer.message = said.failure().message;
+  noteLoss(result.failure());
+  answer.message = result.failure().message;
   return answer;
 }
 
@@ -103,12 +103,12 @@ Answer<HoldCode> Bridge::hold() {
     return {HoldCode::not_connected, "no connection to the " + controller_->name()};
   }
   if (!motion_.armed()) {
-    return {HoldCode::not_armed, "motion is not armed: the machine's own feed hold is due"};
+    return {HoldCode::not_armed, "motion is not armed: use the machine's own feed hold"};
   }
   const Status held = controller_->hold();
-  notice(held);
+  noteLoss(held);
   if (held) {
-    return {HoldCode::ok, "feed hold: the axes stand, it goes on at the machine's own key"};
+    return {HoldCode::ok, "feed hold: the axes are stopped; release it at the machine's own key"};
   }
   return {held.lost() ? HoldCode::not_connected : HoldCode::refused, held.failure().message};
 }
@@ -125,7 +125,7 @@ Answer<MacroCode> Bridge::setMacro(int number, double value) {
     return {MacroCode::refused, name + ": the value is not a finite number"};
   }
   const Status written = controller_->setVariable(number, value);
-  notice(written);
+  noteLoss(written);
   if (written) {
     return {MacroCode::ok, name + " is set"};
   }
@@ -133,15 +133,15 @@ Answer<MacroCode> Bridge::setMacro(int number, double value) {
 }
 
 void Bridge::cancel() {
-  notice(motion_.cancel());
+  noteLoss(motion_.cancel());
 }
 
 void Bridge::shutdown() {
   if (!controller_->connected()) {
     return;
   }
-  notice(motion_.cancel("the bridge ends"));
-  notice(motion_.disarm());
+  noteLoss(motion_.cancel("the bridge ends"));
+  noteLoss(motion_.disarm());
   if (controller_->connected()) {
     controller_->close();
   }

@@ -49,12 +49,12 @@ class BridgeTest : public ::testing::Test {
   void cycle() {
     bridge_->fetch(now_);
     bridge_->step(now_);
-    for (Note& note : bridge_->takeNotes()) {
-      notes_.push_back(note.text);
+    for (LogEntry& entry : bridge_->takeLogEntries()) {
+      log_lines_.push_back(entry.text);
     }
     machine_.advance(PERIOD);
     now_ += PERIOD;
-    // Text travels while the test's time stands: the server's thread gets the processor.
+    // Gives the server's thread time to transfer text; the test's own time does not advance here.
     std::this_thread::sleep_for(std::chrono::microseconds(200));
   }
 
@@ -82,9 +82,9 @@ class BridgeTest : public ::testing::Test {
     ASSERT_TRUE(bridge_->state().armed);
   }
 
-  bool noted(const std::string& part) const {
-    return std::any_of(notes_.begin(), notes_.end(),
-                       [&](const std::string& note) { return note.find(part) != std::string::npos; });
+  bool logged(const std::string& part) const {
+    return std::any_of(log_lines_.begin(), log_lines_.end(),
+                       [&](const std::string& entry) { return entry.find(part) != std::string::npos; });
   }
 
   TestMachine machine_;
@@ -93,7 +93,7 @@ class BridgeTest : public ::testing::Test {
   std::unique_ptr<Bridge> bridge_;
   int override_data_ = -1;
   double now_ = 100.0;  // [s]
-  std::vector<std::string> notes_;
+  std::vector<std::string> log_lines_;
 };
 
 }  // namespace smartmill::cnc

@@ -1,4 +1,4 @@
-// The bridge against a machine on the real wire; the machine's time is the test's own.
+// The bridge with a simulated machine over the FOCAS protocol; the test advances the machine's time.
 #include "smartmill_cnc/bridge.h"
 
 #include <gtest/gtest.h>
@@ -36,7 +36,7 @@ TEST_F(BridgeTest, StateAndLoadInSi) {
   EXPECT_DOUBLE_EQ(bridge_->load()->spindle_load, 0.1234);
   EXPECT_DOUBLE_EQ(bridge_->load()->spindle_speed, 200.0 * units::PI);
   EXPECT_EQ(bridge_->load()->axis_load, (std::vector<double>{0.015, 0.025, 0.035}));
-  EXPECT_TRUE(noted("connected to the controller 127.0.0.1:"));
+  EXPECT_TRUE(logged("connected to the controller 127.0.0.1:"));
 }
 
 TEST_F(BridgeTest, ProgramRunsToItsEnd) {
@@ -69,7 +69,7 @@ TEST_F(BridgeTest, ProgramRunsToItsEnd) {
   const std::vector<CuttingCondition> conditions = bridge_->takeConditions();
   ASSERT_EQ(conditions.size(), 2u);
   EXPECT_EQ(conditions[0].name, "slot_1");
-  // Told 0.3 s ahead.
+  // Announced 0.3 s in advance.
   EXPECT_GE(conditions[0].stamp, start + 0.3);
   EXPECT_LT(conditions[0].stamp, start + 0.4);
   EXPECT_EQ(conditions[1].kind, CuttingCondition::Kind::none);
@@ -87,7 +87,7 @@ TEST_F(BridgeTest, LongProgramThroughASmallBuffer) {
   ASSERT_FALSE(bridge_->runProgram("zigzag", program, {}));
   cycle();
   cycle();
-  // Far from all of it is on its way while the machine is busy with the first blocks.
+  // Only a part has been sent while the machine runs the first blocks.
   EXPECT_LT(bridge_->progress().bytes_sent, bridge_->progress().bytes_total);
   EXPECT_EQ(bridge_->progress().stage, "sending");
   EXPECT_EQ(finish().code, MotionCode::ok);
@@ -110,7 +110,7 @@ TEST_F(BridgeTest, JogAndOrient) {
   EXPECT_EQ(finish().code, MotionCode::ok);
   EXPECT_EQ(machine_.get(machine_.macros)[1133], 1024.0);
   EXPECT_EQ(bridge_->state().spindle_speed, 0.0);
-  // One session for all of them.
+  // One DNC session for all motions.
   EXPECT_EQ(machine_.get(machine_.starts), 1);
   EXPECT_EQ(bridge_->jog("w", 0.1, 0.0)->code, MotionCode::bad_goal);
   EXPECT_EQ(bridge_->jog("x", 0.1, -1.0)->code, MotionCode::bad_goal);
@@ -118,7 +118,7 @@ TEST_F(BridgeTest, JogAndOrient) {
   EXPECT_EQ(bridge_->orient(NAN)->code, MotionCode::bad_goal);
 }
 
-// FOCAS has no feed hold: it says so, and what runs goes on.
+// FOCAS has no feed hold: it is refused and the motion continues.
 TEST_F(BridgeTest, FeedHoldIsForArmedMotionAndForControllersThatHaveIt) {
   EXPECT_EQ(bridge_->hold().code, HoldCode::not_connected);
   cycle();
@@ -201,7 +201,7 @@ TEST_F(BridgeTest, CancelStopsAndTheNextMotionWorks) {
   EXPECT_EQ(machine_.get(machine_.resets), 1);
 }
 
-TEST_F(BridgeTest, CancelIsQuickEvenWithTextUnderWay) {
+TEST_F(BridgeTest, CancelIsQuickDuringATransfer) {
   arm();
   std::string program = "G91 G1 F60\n";
   for (int i = 0; i < 5000; ++i) {
@@ -257,7 +257,7 @@ TEST_F(BridgeTest, AlarmResetAndModeEndTheMotion) {
   EXPECT_FALSE(bridge_->state().armed);
 }
 
-TEST_F(BridgeTest, LostInMidProgramAndBackAgain) {
+TEST_F(BridgeTest, ConnectionLostDuringAProgramAndRestored) {
   arm();
   CuttingCondition condition;
   condition.kind = CuttingCondition::Kind::air;
@@ -272,15 +272,15 @@ TEST_F(BridgeTest, LostInMidProgramAndBackAgain) {
   EXPECT_FALSE(bridge_->state().armed);
   EXPECT_FALSE(bridge_->load());
   EXPECT_EQ(bridge_->takeConditions().size(), 2u);
-  // One line in all, not one a period.
-  EXPECT_EQ(std::count_if(notes_.begin(), notes_.end(),
-                          [](const std::string& note) { return note.find("lost") != std::string::npos; }),
+  // Logged once, not in every period.
+  EXPECT_EQ(std::count_if(log_lines_.begin(), log_lines_.end(),
+                          [](const std::string& entry) { return entry.find("lost") != std::string::npos; }),
             1);
-  notes_.clear();
+  log_lines_.clear();
   for (int i = 0; i < 200; ++i) {
     cycle();
   }
-  EXPECT_EQ(notes_.size(), 0u);
+  EXPECT_EQ(log_lines_.size(), 0u);
   startServer(port_);
   EXPECT_TRUE(cycleUntil([&] { return bridge_->state().connected; }));
   EXPECT_EQ(bridge_->jog("x", 0.01, 0.0)->code, MotionCode::not_armed);
@@ -318,7 +318,7 @@ TEST_F(BridgeTest, DisarmEndsTheSessionProperly) {
 
 TEST_F(BridgeTest, StallEndsTheMotion) {
   arm();
-  // Text without end of block: the machine waits for ever.
+  // Text without an end of block: the machine waits forever.
   machine_.change([](TestMachine& m) { m.buffer_size = 3; });
   ASSERT_FALSE(bridge_->jog("x", 0.05, 0.001));
   const Outcome outcome = finish();
@@ -326,11 +326,11 @@ TEST_F(BridgeTest, StallEndsTheMotion) {
   EXPECT_NE(outcome.message.find("nothing has moved for 60 s"), std::string::npos) << outcome.message;
 }
 
-/// Does not like large questions: refuses them, or hangs up.
-FaultProxy::Judge narrow(std::size_t most, bool hang_up) {
+/// A controller that refuses requests with more than most parts, or hangs up.
+FaultProxy::Judge limited(std::size_t most, bool hang_up) {
   return [most, hang_up](const focas::Frame& frame) {
     if (frame.type != focas::FRAME_DATA || focas::decodeRequests(frame.body).size() <= most) {
-      return FaultProxy::handOn(frame);
+      return FaultProxy::forward(frame);
     }
     focas::ErrorBody error;
     error.code = focas::EW_LENGTH;
@@ -340,9 +340,9 @@ FaultProxy::Judge narrow(std::size_t most, bool hang_up) {
   };
 }
 
-TEST_F(BridgeTest, SmallQuestionsForANarrowController) {
+TEST_F(BridgeTest, SplitsRequestsForALimitedController) {
   for (const bool hang_up : {false, true}) {
-    FaultProxy controller(port_, narrow(5, hang_up));
+    FaultProxy controller(port_, limited(5, hang_up));
     connectBridge(controller.port);
     ASSERT_TRUE(cycleUntil([&] { return bridge_->state().connected; }, 1000));
     ASSERT_TRUE(bridge_->load());
@@ -351,8 +351,8 @@ TEST_F(BridgeTest, SmallQuestionsForANarrowController) {
     ASSERT_FALSE(bridge_->jog("x", 0.001, 0.01));
     EXPECT_EQ(finish().code, MotionCode::ok);
   }
-  // So narrow that the load meters are refused altogether: the rest works.
-  FaultProxy controller(port_, narrow(3, false));
+  // With a smaller limit the load meters are refused; the rest works.
+  FaultProxy controller(port_, limited(3, false));
   connectBridge(controller.port);
   ASSERT_TRUE(cycleUntil([&] { return bridge_->state().connected; }, 1000));
   EXPECT_FALSE(bridge_->load());
@@ -367,7 +367,7 @@ MotionParameters goodMotion() {
   return motion;
 }
 
-TEST(BridgeParameters, AreChecked) {
+TEST(BridgeParameters, AreValidated) {
   FocasParameters focas;
   EXPECT_NO_THROW(focas.validate());
   focas.port = 70000;
@@ -379,17 +379,17 @@ TEST(BridgeParameters, AreChecked) {
   EXPECT_THROW(Bridge(makeFocasController({}), 0.0, goodMotion()), Error);
 }
 
-TEST(BridgeConnect, ClosedPortIsOneLine) {
+TEST(BridgeConnect, ClosedPortIsLoggedOnce) {
   FocasParameters focas;
   focas.port = 1;
   Bridge bridge(makeFocasController(focas), 1.0, goodMotion());
-  std::vector<Note> notes;
+  std::vector<LogEntry> notes;
   for (int i = 0; i < 500; ++i) {
     bridge.fetch(i * 0.02);
     bridge.step(i * 0.02);
     EXPECT_FALSE(bridge.state().connected);
-    for (const Note& note : bridge.takeNotes()) {
-      notes.push_back(note);
+    for (const LogEntry& entry : bridge.takeLogEntries()) {
+      notes.push_back(entry);
     }
   }
   ASSERT_EQ(notes.size(), 1u);
@@ -398,7 +398,7 @@ TEST(BridgeConnect, ClosedPortIsOneLine) {
       "cannot connect to the controller at 127.0.0.1:1: Connection refused; trying again every 1.0 to 8.0 s");
 }
 
-TEST_F(BridgeTest, OverridesGoToTheDataTableWhileAProgramRunsAndComeBack) {
+TEST_F(BridgeTest, OverridesAreWrittenToTheDataTableWhileAProgramRunsAndReset) {
   override_data_ = 500;
   connectBridge(port_);
   const auto table = [&](int number) {
@@ -410,7 +410,7 @@ TEST_F(BridgeTest, OverridesGoToTheDataTableWhileAProgramRunsAndComeBack) {
   EXPECT_EQ(bridge_->setOverrides({0.9, 0.9}, "").code, OverrideCode::not_armed);
   arm();
   cycle();
-  EXPECT_EQ(table(500), 100);  // whatever was left there
+  EXPECT_EQ(table(500), 100);  // reset when armed
   EXPECT_EQ(bridge_->setOverrides({0.9, 0.9}, "").message, "overrides: no program runs");
   CuttingCondition condition;
   condition.kind = CuttingCondition::Kind::cut;
@@ -438,10 +438,10 @@ TEST_F(BridgeTest, OverridesGoToTheDataTableWhileAProgramRunsAndComeBack) {
   cycle();
   EXPECT_EQ(table(500), 100);
   EXPECT_EQ(table(501), 100);
-  EXPECT_TRUE(noted("feed 40 %, spindle 95.0 %: chatter"));
+  EXPECT_TRUE(logged("feed 40 %, spindle 95.0 %: chatter"));
 }
 
-TEST_F(BridgeTest, OverridesThatTheControllerRefusesGiveOneLine) {
+TEST_F(BridgeTest, OverridesRefusedByTheControllerGiveOneLine) {
   arm();
   ASSERT_FALSE(bridge_->runProgram("slot", "N20 G1 X40 F1200\nM30\n", {}));
   cycleUntil([&] { return bridge_->state().feed > 0.0; });

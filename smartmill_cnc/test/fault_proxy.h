@@ -20,10 +20,10 @@
 
 namespace smartmill::cnc {
 
-/// Stands between bridge and server and does with their frames what a test says.
+/// Proxy between bridge and server that modifies their frames as a test requires.
 class FaultProxy {
  public:
-  /// What becomes of a frame.
+  /// Bytes sent instead of a frame.
   struct Verdict {
     focas::Bytes to_server, to_client;
     bool hang_up = false;
@@ -33,11 +33,11 @@ class FaultProxy {
   static focas::Bytes bytesOf(const focas::Frame& f) {
     return focas::encodeFrame(f.type, f.direction, f.body, f.version);
   }
-  static Verdict handOn(const focas::Frame& frame) { return {bytesOf(frame), {}, false}; }
-  static Verdict handBack(const focas::Frame& frame) { return {{}, bytesOf(frame), false}; }
+  static Verdict forward(const focas::Frame& frame) { return {bytesOf(frame), {}, false}; }
+  static Verdict forwardReply(const focas::Frame& frame) { return {{}, bytesOf(frame), false}; }
 
-  /// @param up judges the bridge's frames @param down the server's
-  explicit FaultProxy(std::uint16_t target, Judge up = handOn, Judge down = handBack)
+  /// @param up for frames of the bridge @param down for frames of the server
+  explicit FaultProxy(std::uint16_t target, Judge up = forward, Judge down = forwardReply)
       : target_(target), up_(std::move(up)), down_(std::move(down)) {
     listener_ = ::socket(AF_INET, SOCK_STREAM, 0);
     sockaddr_in address = loopback(0);
@@ -55,10 +55,10 @@ class FaultProxy {
   }
 
   std::uint16_t port = 0;
-  std::atomic<bool> stalled{false};  ///< takes all and hands nothing on: half-open
+  std::atomic<bool> stalled{false};  ///< reads all frames and forwards none: half-open
   std::atomic<bool> byte_by_byte{false};
-  /// The bridge's oldest connection, its DNC circuit: what comes on it from now on the kernel throws away
-  /// unseen, as if the other computer had gone.
+  /// The kernel discards all further packets of the bridge's oldest connection, its DNC circuit, as if the
+  /// other computer had been switched off.
   std::atomic<bool> deaf{false};
 
  private:

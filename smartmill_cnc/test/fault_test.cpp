@@ -1,5 +1,5 @@
-// What can go wrong on the wire and at the panel: each is told in one line, ends the motion, disarms, and
-// nothing moves afterwards that nobody asked for.
+// Faults of the connection and at the panel: each is logged in one line, ends the motion and disarms; nothing
+// moves afterwards without a request.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -36,8 +36,8 @@ class FaultTest : public BridgeTest {
   }
   static constexpr std::size_t STEPS = 6;
 
-  void expectStandsStill(const std::string& after) {
-    // The controller learns of a lost connection in its own thread.
+  void expectStandstill(const std::string& after) {
+    // The controller detects a lost connection in its own thread.
     for (int i = 0; i < 2000 && machine_.streaming(); ++i) {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
@@ -51,7 +51,7 @@ class FaultTest : public BridgeTest {
     EXPECT_EQ(machine_.get(machine_.all_text), text) << after;
     EXPECT_EQ(machine_.get(machine_.speed), 0.0) << after;
   }
-  /// A jog works again once it is armed anew.
+  /// Arms again; a jog works then.
   void expectWorksAgain(const std::string& after) {
     cycle();
     EXPECT_TRUE(cycleUntil([&] { return bridge_->state().connected; })) << after;
@@ -62,9 +62,9 @@ class FaultTest : public BridgeTest {
     EXPECT_EQ(finish().code, MotionCode::ok) << after;
   }
   std::size_t lines(const std::string& part) const {
-    return static_cast<std::size_t>(std::count_if(notes_.begin(), notes_.end(), [&](const std::string& note) {
-      return note.find(part) != std::string::npos;
-    }));
+    return static_cast<std::size_t>(
+        std::count_if(log_lines_.begin(), log_lines_.end(),
+                      [&](const std::string& entry) { return entry.find(part) != std::string::npos; }));
   }
 };
 
@@ -81,7 +81,7 @@ TEST_F(FaultTest, ServerKilledAndRestartedAtEachStepOfTheHammerSequence) {
       for (int i = early ? 0 : 3; i > 0; --i) {
         cycle();
       }
-      notes_.clear();
+      log_lines_.clear();
       server_.reset();
       const Outcome outcome = finish();
       EXPECT_EQ(outcome.code, MotionCode::lost) << what;
@@ -91,16 +91,16 @@ TEST_F(FaultTest, ServerKilledAndRestartedAtEachStepOfTheHammerSequence) {
       machine_.advance(1.0);
       machine_.change([](TestMachine& m) { m.speed = 0.0; });
       startServer(port_);
-      expectStandsStill(what);
+      expectStandstill(what);
       expectWorksAgain(what);
     }
   }
 }
 
-TEST_F(FaultTest, ConnectionCutInMidFrame) {
+TEST_F(FaultTest, ConnectionCutWithinAFrame) {
   for (const std::size_t left : {1u, 9u, 10u, 11u, 40u}) {
     std::atomic<bool> cut{false};
-    FaultProxy proxy(port_, FaultProxy::handOn, [&](const Frame& frame) {
+    FaultProxy proxy(port_, FaultProxy::forward, [&](const Frame& frame) {
       Bytes bytes = FaultProxy::bytesOf(frame);
       if (!cut || frame.type != focas::FRAME_DATA) {
         return FaultProxy::Verdict{{}, bytes, false};
@@ -118,12 +118,12 @@ TEST_F(FaultTest, ConnectionCutInMidFrame) {
     EXPECT_EQ(outcome.code, MotionCode::lost) << left;
     EXPECT_NE(outcome.message.find("the controller closed it"), std::string::npos) << outcome.message;
     cut = false;
-    expectStandsStill("cut after " + std::to_string(left));
+    expectStandstill("cut after " + std::to_string(left));
     expectWorksAgain("cut after " + std::to_string(left));
   }
 }
 
-TEST_F(FaultTest, RepliesByteByByteAreAsGood) {
+TEST_F(FaultTest, RepliesByteByByteAreAccepted) {
   FaultProxy proxy(port_);
   proxy.byte_by_byte = true;
   connectBridge(proxy.port);
@@ -135,10 +135,10 @@ TEST_F(FaultTest, RepliesByteByByteAreAsGood) {
 
 TEST_F(FaultTest, TenThousandBytesInFrontOfAReplyDoNotMoveTheMachine) {
   std::atomic<bool> flood{false};
-  FaultProxy proxy(port_, FaultProxy::handOn, [&](const Frame& frame) {
+  FaultProxy proxy(port_, FaultProxy::forward, [&](const Frame& frame) {
     Bytes bytes;
     if (flood && frame.type == focas::FRAME_DATA) {
-      // Frames that nobody asked for, then the reply, all in one.
+      // Unrequested frames, then the reply, in one block.
       const Bytes other = focas::encodeFrame(0x33, 2, Bytes(90, 7), 3);
       while (bytes.size() < 10000) {
         bytes.insert(bytes.end(), other.begin(), other.end());
@@ -156,8 +156,8 @@ TEST_F(FaultTest, TenThousandBytesInFrontOfAReplyDoNotMoveTheMachine) {
   EXPECT_EQ(finish().code, MotionCode::ok);
 }
 
-/// Wrong version, length, opcode, count, magic, error bodies: each ends the connection with a line.
-TEST_F(FaultTest, RepliesThatAreWrongEndTheConnectionAndNothingElse) {
+/// Wrong version, length, opcode, count and magic number: each ends the connection with one line.
+TEST_F(FaultTest, WrongRepliesEndTheConnection) {
   const std::map<std::string, std::function<Bytes(Frame)>> wrongs{{"version 0",
                                                                    [](Frame f) {
                                                                      f.version = 0;
@@ -168,7 +168,7 @@ TEST_F(FaultTest, RepliesThatAreWrongEndTheConnectionAndNothingElse) {
                                                                      f.body.at(2) = 0xff;
                                                                      return FaultProxy::bytesOf(f);
                                                                    }},
-                                                                  {"a length of nothing",
+                                                                  {"a length of 0",
                                                                    [](Frame f) {
                                                                      f.body.at(2) = f.body.at(3) = 0;
                                                                      return FaultProxy::bytesOf(f);
@@ -190,7 +190,7 @@ TEST_F(FaultTest, RepliesThatAreWrongEndTheConnectionAndNothingElse) {
                                                                    }}};
   for (const auto& [what, spoil] : wrongs) {
     std::atomic<bool> wrong{false};
-    FaultProxy proxy(port_, FaultProxy::handOn, [&, &make = spoil](const Frame& frame) {
+    FaultProxy proxy(port_, FaultProxy::forward, [&, &make = spoil](const Frame& frame) {
       const bool now = wrong && frame.type == focas::FRAME_DATA;
       return FaultProxy::Verdict{{}, now ? make(frame) : FaultProxy::bytesOf(frame), false};
     });
@@ -202,12 +202,12 @@ TEST_F(FaultTest, RepliesThatAreWrongEndTheConnectionAndNothingElse) {
     wrong = true;
     EXPECT_EQ(finish().code, MotionCode::lost) << what;
     wrong = false;
-    expectStandsStill(what);
+    expectStandstill(what);
     expectWorksAgain(what);
   }
 }
 
-TEST_F(FaultTest, EveryErrorCodeOfAStartIsToldAndMovesNothing) {
+TEST_F(FaultTest, EveryErrorCodeOfAStartIsReportedAndMovesNothing) {
   arm();
   bridge_->arm(false);
   for (int code = -17; code <= 18; ++code) {
@@ -222,11 +222,11 @@ TEST_F(FaultTest, EveryErrorCodeOfAStartIsToldAndMovesNothing) {
     EXPECT_FALSE(bridge_->state().armed) << code;
   }
   machine_.change([](TestMachine& m) { m.refuse_start = focas::EW_OK; });
-  expectStandsStill("refused starts");
+  expectStandstill("refused starts");
   expectWorksAgain("refused starts");
 }
 
-TEST_F(FaultTest, ResetAndEmergencyStopInMidDnc) {
+TEST_F(FaultTest, ResetAndEmergencyStopDuringDnc) {
   std::string program = "G91 G1 F30000\n";
   for (int i = 0; i < 2000; ++i) {
     program += i % 2 == 0 ? "X0.5\n" : "X-0.5\n";
@@ -249,14 +249,14 @@ TEST_F(FaultTest, ResetAndEmergencyStopInMidDnc) {
     if (emergency) {
       EXPECT_EQ(bridge_->arm(true).code, ArmCode::alarm);
     }
-    expectStandsStill("emergency or reset");
+    expectStandstill("emergency or reset");
     machine_.change([](TestMachine& m) { m.state.emergency = 0; });
     expectWorksAgain("emergency or reset");
     bridge_->arm(false);
   }
 }
 
-TEST_F(FaultTest, AlarmInMidJogIsPublishedTypedAndStops) {
+TEST_F(FaultTest, AlarmDuringAJogIsPublishedTypedAndStops) {
   arm();
   ASSERT_FALSE(bridge_->jog("x", 0.05, 0.01));
   cycleUntil([&] { return bridge_->state().motion; });
@@ -269,7 +269,7 @@ TEST_F(FaultTest, AlarmInMidJogIsPublishedTypedAndStops) {
   ASSERT_EQ(bridge_->alarms().size(), 2u);
   EXPECT_EQ(bridge_->alarms()[0].number, 3003);
   EXPECT_EQ(bridge_->alarms()[1].axis, 1);
-  expectStandsStill("alarm");
+  expectStandstill("alarm");
   machine_.change([](TestMachine& m) {
     m.alarm_bits = 0;
     m.state.alarm = 0;
@@ -279,7 +279,7 @@ TEST_F(FaultTest, AlarmInMidJogIsPublishedTypedAndStops) {
   EXPECT_TRUE(bridge_->alarms().empty());
 }
 
-TEST_F(FaultTest, TheSixthSessionIsToldThatAllAreTaken) {
+TEST_F(FaultTest, TheSixthSessionIsRefusedWithTheReason) {
   std::list<std::unique_ptr<Bridge>> others;
   std::swap(others.emplace_back(), bridge_);
   for (int i = 0; i < 5; ++i) {
@@ -290,7 +290,7 @@ TEST_F(FaultTest, TheSixthSessionIsToldThatAllAreTaken) {
   connectBridge(port_);
   cycle();
   EXPECT_FALSE(bridge_->state().connected);
-  EXPECT_TRUE(noted("all its sessions may be taken"));
+  EXPECT_TRUE(logged("all its sessions may be taken"));
   others.clear();
   now_ += 10.0;
   EXPECT_TRUE(cycleUntil([&] {
@@ -299,7 +299,7 @@ TEST_F(FaultTest, TheSixthSessionIsToldThatAllAreTaken) {
   }));
 }
 
-TEST_F(FaultTest, AHalfOpenConnectionIsFoundWithinTwoSeconds) {
+TEST_F(FaultTest, AHalfOpenConnectionIsDetectedWithinTwoSeconds) {
   FaultProxy proxy(port_);
   connectBridge(proxy.port, 0.5);  // as shipped
   ASSERT_TRUE(cycleUntil([&] { return bridge_->state().connected; }));
@@ -307,8 +307,7 @@ TEST_F(FaultTest, AHalfOpenConnectionIsFoundWithinTwoSeconds) {
   ASSERT_FALSE(bridge_->jog("x", 0.05, 0.01));
   cycleUntil([&] { return bridge_->state().motion; });
   proxy.stalled = true;
-  // No test's verdict hangs on the computer's speed: what is counted is polls, each bounded by the reply
-  // timeout.
+  // Independent of the computer's speed: counts polls, each bounded by the reply timeout.
   int polls = 0;
   std::optional<Outcome> outcome;
   while (!(outcome = bridge_->takeOutcome()) && polls < 100) {
@@ -321,8 +320,8 @@ TEST_F(FaultTest, AHalfOpenConnectionIsFoundWithinTwoSeconds) {
   EXPECT_NE(outcome->message.find("no answer in time"), std::string::npos) << outcome->message;
 }
 
-/// The DNC circuit leads nowhere any more, the data circuit answers.
-TEST_F(FaultTest, AHalfOpenDncCircuitIsFound) {
+/// The DNC circuit is cut while the data circuit works.
+TEST_F(FaultTest, AHalfOpenDncCircuitIsDetected) {
   for (const bool in_motion : {false, true}) {
     const std::string what = in_motion ? "in a motion" : "idle";
     FaultProxy proxy(port_);
@@ -333,56 +332,56 @@ TEST_F(FaultTest, AHalfOpenDncCircuitIsFound) {
       ASSERT_FALSE(bridge_->runProgram("slow", "G91 G1 X0.5 F1\nX-0.5\n", {}));
       cycleUntil([&] { return bridge_->state().motion; });
     }
-    notes_.clear();
-    // What is on its way arrives: one who has gone does not send it again and again.
+    log_lines_.clear();
+    // Data in transit arrive first, so that they are not retransmitted.
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
     proxy.deaf = true;
-    // The kernel's own time, 1.8 s, of which this test's does not know.
+    // The kernel's timeout of 1.8 s does not follow the test's time.
     const auto began = std::chrono::steady_clock::now();
     while (bridge_->state().connected && std::chrono::steady_clock::now() - began < std::chrono::minutes(1)) {
       cycle();
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     }
     RecordProperty(
-        in_motion ? "found_in_motion_ms" : "found_idle_ms",
+        in_motion ? "detected_in_motion_ms" : "detected_idle_ms",
         static_cast<int>((std::chrono::steady_clock::now() - began) / std::chrono::milliseconds(1)));
-    EXPECT_TRUE(noted("nothing comes back on its DNC circuit")) << what;
+    EXPECT_TRUE(logged("no reply on its DNC circuit")) << what;
     EXPECT_FALSE(bridge_->state().armed) << what;
     if (in_motion) {
       EXPECT_EQ(finish().code, MotionCode::lost);
     }
-    expectStandsStill(what);
+    expectStandstill(what);
     expectWorksAgain(what);
   }
 }
 
-/// Text that is swallowed on its way moves nothing, and the cancel goes the other way.
-TEST_F(FaultTest, ADncCircuitThatSwallowsItsTextIsTold) {
-  std::atomic<bool> swallows{false};
+/// Text lost in transit moves nothing; the cancel uses the data circuit.
+TEST_F(FaultTest, TextLostOnTheDncCircuitIsDetected) {
+  std::atomic<bool> discards{false};
   FaultProxy proxy(port_, [&](const Frame& frame) {
     const bool streamed = frame.type >= focas::FRAME_DNC_START && frame.type <= focas::FRAME_DNC_CANCEL;
-    return swallows && streamed ? FaultProxy::Verdict{} : FaultProxy::handOn(frame);
+    return discards && streamed ? FaultProxy::Verdict{} : FaultProxy::forward(frame);
   });
   connectBridge(proxy.port);
   ASSERT_TRUE(cycleUntil([&] { return bridge_->state().connected; }));
   arm();
-  swallows = true;
+  discards = true;
   ASSERT_FALSE(bridge_->runProgram("there", "G91 G1 X2 F600\n", {}));
   Outcome outcome = finish();
   EXPECT_EQ(outcome.code, MotionCode::cancelled);
   EXPECT_NE(outcome.message.find("nothing has moved for"), std::string::npos) << outcome.message;
-  swallows = false;
+  discards = false;
   ASSERT_FALSE(bridge_->runProgram("there and back", "G91 G1 X2 F600\nX-2\n", {}));
   cycleUntil([&] { return bridge_->state().motion; });
-  swallows = true;
+  discards = true;
   bridge_->cancel();
   outcome = finish();
   EXPECT_EQ(outcome.code, MotionCode::cancelled) << outcome.message;
   EXPECT_NE(outcome.message.find("stopped at"), std::string::npos) << outcome.message;
-  expectStandsStill("swallowed");
+  expectStandstill("lost text");
 }
 
-TEST_F(FaultTest, AClockThatJumpsEndsNothingAndHangsNothing) {
+TEST_F(FaultTest, AJumpOfTheClockNeitherEndsNorDelaysAMotion) {
   for (const double jump : {3600.0, -3600.0, 1e9, -1e9}) {
     cycle();
     if (!bridge_->state().armed) {
@@ -394,22 +393,22 @@ TEST_F(FaultTest, AClockThatJumpsEndsNothingAndHangsNothing) {
     for (int i = 0; i < 5; ++i) {
       cycle();
     }
-    now_ += jump;  // the wall clock is set while the condition's lead runs
+    now_ += jump;  // the wall clock is set during the lead of the condition
     std::optional<Outcome> outcome;
     ASSERT_TRUE(cycleUntil([&] { return (outcome = bridge_->takeOutcome()).has_value(); }, 400)) << jump;
     EXPECT_EQ(outcome->code, MotionCode::ok) << outcome->message;
-    EXPECT_TRUE(noted("the clock jumped"));
-    notes_.clear();
+    EXPECT_TRUE(logged("the clock jumped"));
+    log_lines_.clear();
   }
 }
 
-TEST_F(FaultTest, ReadOnlySendsNothingThatWrites) {
+TEST_F(FaultTest, ReadOnlySendsNoWriteRequest) {
   std::mutex mutex;
   std::vector<Frame> sent;
   FaultProxy proxy(port_, [&](const Frame& frame) {
     const std::lock_guard<std::mutex> lock(mutex);
     sent.push_back(frame);
-    return FaultProxy::handOn(frame);
+    return FaultProxy::forward(frame);
   });
   FocasParameters focas;
   focas.port = proxy.port;

@@ -9,14 +9,14 @@
 
 namespace smartmill::cnc {
 
-/// A controller that does what a test says, without a wire: of another kind than the FOCAS one.
+/// A controller without a connection whose replies a test sets.
 class ScriptedController : public Controller {
  public:
   Reading reading;  ///< of the next read()
   std::optional<Failure> connecting, opening, checking, sending, closing, writing, aborting;
   bool is_connected = false, is_open = false;
   std::size_t taken_at_once = 1000;  ///< [byte] of a program by one send()
-  std::string program;               ///< begun last
+  std::string program;               ///< last begun
   std::vector<std::string> calls;    ///< in order, without read()
 
   ScriptedController() {
@@ -45,28 +45,28 @@ class ScriptedController : public Controller {
     }
     return reading;
   }
-  Status setVariable(int, double) override { return told(writing); }
+  Status setVariable(int, double) override { return resultOf(writing); }
   DialectOptions dialect() const override { return {}; }
   std::string orientProgram(double) const override { return "M119\n"; }
   Status openPrograms() override {
     calls.push_back("open");
     is_open = !opening;
-    return told(opening);
+    return resultOf(opening);
   }
   bool programsOpen() const override { return is_open; }
   Status checkPrograms() override {
     is_open = is_open && !checking;
-    return told(checking);
+    return resultOf(checking);
   }
   Status closePrograms() override {
     calls.push_back("close programs");
     is_open = false;
-    return told(closing);
+    return resultOf(closing);
   }
   Status abandonPrograms() override {
     calls.push_back("abandon");
     is_open = false;
-    return told(aborting);
+    return resultOf(aborting);
   }
   void begin(const std::string& text) override {
     calls.push_back("begin");
@@ -79,13 +79,13 @@ class ScriptedController : public Controller {
     if (!sending) {
       sent_ = std::min(program.size(), sent_ + taken_at_once);
     }
-    return told(sending);
+    return resultOf(sending);
   }
   Transfer transfer() const override { return {sent_, program.size(), sent_ == program.size()}; }
   Status abort() override {
     calls.push_back("abort");
     is_open = false;
-    return told(aborting);
+    return resultOf(aborting);
   }
 
   std::size_t count(const std::string& call) const {
@@ -93,7 +93,7 @@ class ScriptedController : public Controller {
   }
 
  private:
-  Status told(const std::optional<Failure>& failure) {
+  Status resultOf(const std::optional<Failure>& failure) {
     if (failure && failure->kind == Failure::Kind::lost) {
       is_connected = is_open = false;
     }

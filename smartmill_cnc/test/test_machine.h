@@ -14,7 +14,7 @@
 
 namespace smartmill::cnc {
 
-/// A machine small enough for a test: runs the dialect at constant speeds in steps of a test's own time.
+/// A minimal simulated machine: runs the dialect at constant speeds in time steps of the test.
 class TestMachine : public focas::ControllerInterface {
  public:
   focas::SysInfo info;
@@ -44,7 +44,7 @@ class TestMachine : public focas::ControllerInterface {
     return value;
   }
 
-  /// What an operator's RESET key does.
+  /// The RESET key of the panel.
   void resetKey() {
     const std::lock_guard<std::mutex> lock(mutex_);
     halt();

@@ -1,6 +1,6 @@
-// The panel: one page for one machine. It shows topics as they come and commands nothing unless it was allowed to.
-import { Beside, Link } from './link.js';
-import { kept, make } from './format.js';
+// The panel: one page for one machine. It shows topics as they arrive; commands only if the panel allows them.
+import { NamespaceLink, Link } from './link.js';
+import { persistent, make } from './format.js';
 import { StatusLine } from './views/status.js';
 import { Tiles } from './views/tiles.js';
 import { ChartView, PointsTable } from './views/chart.js';
@@ -12,13 +12,13 @@ import { Commands } from './views/commands.js';
 import { Discrepancy, Report, Database, Diagnostics } from './views/model.js';
 import { Fleet } from './views/fleet.js';
 
-const REFRESH = 100;  // [ms] ten times a second, as controllers' own panels do
+const REFRESH = 100;  // [ms]
 
 const VIEWS = {
   overview: 'Overview', forces: 'Forces', stability: 'Stability', dynamics: 'Dynamics', session: 'Session', model: 'Model', fleet: 'Fleet',
 };
 
-// A card with a headline.
+// A card with a title.
 function card(title, extra = '') {
   const aside = make('span', { class: 'aside' });
   const element = make('section', { class: `card ${extra}` }, make('h2', {}, title, aside));
@@ -26,7 +26,7 @@ function card(title, extra = '') {
   return element;
 }
 
-// A machine without a name of its own has that of its namespace.
+// Default name of a machine, from its namespace.
 const nameOf = namespace => namespace.replace(/\/smartmill$/, '').slice(1) || 'SmartMill';
 
 class Page {
@@ -35,7 +35,7 @@ class Page {
     this.parts = [];
     const scheme = location.protocol === 'https:' ? 'wss' : 'ws';
     this.link = new Link(`${scheme}://${location.host}/`, config.namespace);
-    this.store = kept('layout', { view: 'overview', axis: 'x', source: 1, part: 'magnitude' });
+    this.store = persistent('layout', { view: 'overview', axis: 'x', source: 1, part: 'magnitude' });
     this.status = new StatusLine(document.querySelector('#status'), this.link, config.name === 'SmartMill' ? nameOf(config.namespace) : config.name);
     this.parts.push(this.status);
     this.buildMachines();
@@ -46,8 +46,8 @@ class Page {
     setInterval(() => this.refresh(), REFRESH);
   }
 
-  // Other machines: each its status line; its own page is one touch away. Those of other panels by their addresses,
-  // those beside this one (in other namespaces of the same ROS master) by themselves.
+  // Status lines of other machines, with links to their pages: those of other panels by their addresses, those in other
+  // namespaces of the same ROS master automatically.
   buildMachines() {
     for (const address of this.config.machines)
       this.addMachine(new URL(address).host, new Link(address.replace(/^http/, 'ws'), this.config.namespace), () => address);
@@ -56,12 +56,12 @@ class Page {
       const namespace = topic.match(/^(.+)\/cnc\/state$/)?.[1];
       if (!namespace || found.has(namespace)) return;
       found.add(namespace);
-      this.addMachine(nameOf(namespace), new Beside(this.link, namespace), async () => (await (await fetch('api/config')).json()).panels[namespace]);
+      this.addMachine(nameOf(namespace), new NamespaceLink(this.link, namespace), async () => (await (await fetch('api/config')).json()).panels[namespace]);
     };
   }
 
   addMachine(name, link, addressOf) {
-    const button = make('button', { 'data-machine': name, title: `To the page of ${name}`, onclick: async () => {
+    const button = make('button', { 'data-machine': name, title: `Open the page of ${name}`, onclick: async () => {
       const address = await addressOf();
       if (address) location.href = address; else button.title = `${name} has no panel of its own: roslaunch smartmill_launch panel.launch in its namespace`;
     } });
@@ -102,31 +102,31 @@ class Page {
       this.add('overview', element, build(element));
     }
 
-    const notes = card('Notes', 'tools-free'), orders = card('Commands', 'tools-free');
+    const notes = card('Notes', 'tools-free'), commands = card('Commands', 'tools-free');
     const log = new Notes(notes, link);
-    place('forces', 'Forces, the last minute', 'wide', e => new Strips(e, link, store, log));
+    place('forces', 'Forces of the last minute', 'wide', e => new Strips(e, link, store, log));
     place('forces', 'Spectrum', '', e => new Spectrum(e, link, store));
-    place('forces', 'One revolution', '', e => new Revolution(e, link, store, false));
-    place('forces', 'The last minute', '', e => new SpectrumCourse(e, link, store));
+    place('forces', 'Force over one revolution', '', e => new Revolution(e, link, store, false));
+    place('forces', 'Spectrum of the last minute', '', e => new SpectrumCourse(e, link, store));
 
     let chart = null;
     place('stability', 'Stability', '', e => chart = new ChartView(e, link, 'stability'));
     place('stability', 'What if', 'side what-if tools-free', e => new WhatIf(e, link, chart));
-    place('stability', 'Points to cut at', 'wide tools-free', e => new PointsTable(e, link));
+    place('stability', 'Recommended points', 'wide tools-free', e => new PointsTable(e, link));
 
     const dynamics = new Dynamics(this.views.dynamics, link, card, store);
     this.add('dynamics', null, dynamics);
 
     place('session', 'Session', 'tools-free', e => new Session(e, link));
-    const beside = make('div', { style: 'display: grid; gap: 12px' });
-    this.views.session.append(beside);
-    beside.append(notes, orders);
-    this.add('session', orders, new Commands(orders, link, this.config));
+    const column = make('div', { style: 'display: grid; gap: 12px' });
+    this.views.session.append(column);
+    column.append(notes, commands);
+    this.add('session', commands, new Commands(commands, link, this.config));
     this.add(null, notes, log);
     this.add(null, null, new Replay(document.querySelector('#replay'), link));
     this.add(null, null, new Progress(document.querySelector('#foot'), link));
 
-    place('model', 'Does the model fit', 'tools-free', e => [new Discrepancy(e, link), new Report(e, link)]);
+    place('model', 'Model fit', 'tools-free', e => [new Discrepancy(e, link), new Report(e, link)]);
     const more = make('div', { style: 'display: grid; gap: 12px' });
     this.views.model.append(more);
     for (const [title, build] of [['Cutting coefficients', e => new Database(e, link)], ['Nodes', e => new Diagnostics(e, link)]]) {
@@ -151,7 +151,7 @@ class Page {
     for (const [name, element] of Object.entries(this.views)) element.hidden = name !== this.current;
     for (const button of document.querySelectorAll('nav button[data-view]'))
       button.dataset.view === this.current ? button.setAttribute('aria-current', 'page') : button.removeAttribute('aria-current');
-    for (const part of this.parts) if (part.view === this.current) part.shown?.();
+    for (const part of this.parts) if (part.view === this.current) part.onShow?.();
     this.refresh();
   }
 

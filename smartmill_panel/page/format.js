@@ -1,4 +1,4 @@
-// Numbers for people.
+// Formatted numbers, and helpers for elements.
 export const rpm = speed => 60 * speed / (2 * Math.PI);
 export const radPerSec = value => 2 * Math.PI * value / 60;
 export const deg = angle => 180 * angle / Math.PI;
@@ -7,7 +7,7 @@ export function fixed(value, digits = 0, none = '–') {
   return Number.isFinite(value) ? value.toFixed(digits) : none;
 }
 
-// Three digits that count, in plain notation.
+// Significant digits in fixed notation.
 export function digits(value, count = 3, none = '–') {
   if (value === Infinity) return '∞';
   if (!Number.isFinite(value)) return none;
@@ -16,7 +16,7 @@ export function digits(value, count = 3, none = '–') {
   return value.toFixed(Math.min(places, 12));
 }
 
-// value ± standard deviation, to the deviation's first digit (a one and the next).
+// value ± standard deviation, rounded to the deviation's first significant digit (to two if the first is 1).
 export function withDeviation(value, deviation) {
   if (!Number.isFinite(value)) return '–';
   if (!(deviation > 0)) return digits(value, 4);
@@ -59,10 +59,10 @@ export function save(name, content, type) {
   setTimeout(() => URL.revokeObjectURL(url), 1000);
 }
 
-// What stays from one visit to the next: an object whose members are written back as they change.
-export function kept(name, defaults) {
+// An object whose members are stored in localStorage at every change.
+export function persistent(name, defaults) {
   let found = {};
-  try { found = JSON.parse(localStorage.getItem(name)) ?? {}; } catch { /* what is not readable is forgotten */ }
+  try { found = JSON.parse(localStorage.getItem(name)) ?? {}; } catch { /* unreadable: defaults */ }
   return new Proxy({ ...defaults, ...found }, {
     set(object, key, value) {
       object[key] = value;

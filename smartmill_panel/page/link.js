@@ -1,10 +1,10 @@
-// The page's end of the Foxglove WebSocket protocol: topics in, nothing out.
+// Client of the Foxglove WebSocket protocol: receives topics, sends none.
 import { readerOf } from './ros1.js';
 
 const PROTOCOL = 'foxglove.websocket.v1';
 const MESSAGE = 1, TIME = 2;
-const SILENCE = 1500;  // [ms] the server's clock ticks every 500
-const AGAIN = 700;     // [ms] until the next try
+const SILENCE = 1500;  // [ms] without a message; the server sends the time every 500
+const RETRY = 700;     // [ms] until the next attempt
 
 export class Link {
   constructor(address, namespace = '/smartmill') {
@@ -12,15 +12,15 @@ export class Link {
     this.namespace = namespace;
     this.listeners = new Map();  // topic -> functions
     this.last = new Map();       // topic -> {message, stamp}
-    this.clock = null;           // server's time [s] and when it came [ms]
+    this.clock = null;           // server's time [s] and its arrival [ms]
     this.bytes = 0;
-    this.lost = false;           // the server dropped messages for us
+    this.lost = false;           // the server has dropped messages to this page
     this.connect();
   }
 
   full(topic) { return topic.startsWith('/') ? topic : `${this.namespace}/${topic}`; }
 
-  // topic relative to the namespace; the listener gets (message, stamp of reception by the server [s]).
+  // topic relative to the namespace; the listener receives (message, time of its arrival at the server [s]).
   on(topic, listener) {
     const name = this.full(topic);
     if (!this.listeners.has(name)) this.listeners.set(name, []);
@@ -28,15 +28,15 @@ export class Link {
     this.subscribe();
   }
 
-  // Whether server and page hear each other now.
+  // Whether the connection works.
   get alive() {
     return this.socket?.readyState === WebSocket.OPEN && this.clock !== null && performance.now() - this.clock.at < SILENCE;
   }
 
-  // [s] the server's time now.
+  // [s] current time of the server.
   now() { return this.clock ? this.clock.time + 1e-3 * (performance.now() - this.clock.at) : NaN; }
 
-  // [s] since the last message of a topic; infinite: none yet.
+  // [s] since the last message of a topic; Infinity: none yet.
   age(topic) {
     const last = this.last.get(this.full(topic));
     return last && this.clock ? Math.max(0, this.now() - last.stamp) : Infinity;
@@ -50,19 +50,19 @@ export class Link {
     socket.binaryType = 'arraybuffer';
     socket.onmessage = event => {
       if (this.socket !== socket) return;
-      if (typeof event.data === 'string') this.told(JSON.parse(event.data)); else this.received(event.data);
+      if (typeof event.data === 'string') this.handleText(JSON.parse(event.data)); else this.handleData(event.data);
     };
     socket.onclose = () => {
-      if (this.socket === socket) setTimeout(() => this.connect(), AGAIN);
+      if (this.socket === socket) setTimeout(() => this.connect(), RETRY);
     };
-    // A server that hangs closes nothing.
+    // A hanging server does not close the connection.
     const watch = setInterval(() => {
       if (socket.readyState === WebSocket.CLOSED || this.socket !== socket) clearInterval(watch);
       else if (this.clock && socket.readyState === WebSocket.OPEN && performance.now() - this.clock.at > 4 * SILENCE) socket.close();
     }, SILENCE);
   }
 
-  told(text) {
+  handleText(text) {
     if (text.op === 'advertise') {
       for (const channel of text.channels) {
         this.channels.set(channel.topic, channel);
@@ -87,7 +87,7 @@ export class Link {
     if (news.length) this.socket.send(JSON.stringify({ op: 'subscribe', subscriptions: news }));
   }
 
-  received(data) {
+  handleData(data) {
     this.bytes += data.byteLength;
     const view = new DataView(data), kind = view.getUint8(0);
     if (kind === TIME) {
@@ -103,8 +103,8 @@ export class Link {
   }
 }
 
-// Another machine's topics that come by the same way.
-export class Beside {
+// Topics of another machine over the same connection.
+export class NamespaceLink {
   constructor(link, namespace) { Object.assign(this, { link, namespace }); }
   get alive() { return this.link.alive; }
   on(topic, listener) { this.link.on(`${this.namespace}/${topic}`, listener); }

@@ -1,4 +1,4 @@
-// Plots on a plain canvas: lines, bands, points and marks on two axes, a cursor, zoom, export.
+// Plots on a canvas: lines, bands, points and marks on two axes, cursor, zoom, export.
 import { digits, make, save } from './format.js';
 
 const FONT = 12, LEFT = 56, RIGHT = 14, TOP = 10;
@@ -31,11 +31,11 @@ function tickText(value, log) {
 
 const linked = new Map();  // group -> plots
 
-// Buttons that save what is seen.
+// Buttons that save a plot.
 function exportsOf(plot) {
   return make('div', { class: 'tools' },
-    make('button', { title: 'Save as picture', onclick: () => plot.savePicture() }, 'PNG'),
-    make('button', { title: 'Save the numbers', onclick: () => plot.saveNumbers() }, 'CSV'));
+    make('button', { title: 'Save as PNG', onclick: () => plot.savePicture() }, 'PNG'),
+    make('button', { title: 'Save as CSV', onclick: () => plot.saveNumbers() }, 'CSV'));
 }
 
 function saveCanvas(canvas, name) {
@@ -45,7 +45,7 @@ function saveCanvas(canvas, name) {
 }
 
 export class Plot {
-  // options: name (of exported files), x and y: {label, log, low, high}, group: linked zoom and cursor,
+  // options: name (of exported files), x and y: {label, log, low, high}, group: plots with common zoom and cursor,
   // read(x, y): lines of text at the cursor
   constructor(parent, options) {
     this.options = options;
@@ -68,8 +68,8 @@ export class Plot {
     document.addEventListener('theme', () => this.dirty());
   }
 
-  // {series, marks, points}: what is drawn from now on. A series: {x, y, y2, kind: 'line' or 'band', color, label,
-  // width, dash, alpha}; y2 with a band. marks: {x or y, label, color}. points: {x, y, label, color, radius, hollow}.
+  // Sets the content {series, marks, points}. series: {x, y, y2, kind: 'line' or 'band', color, label, width, dash,
+  // alpha}; y2 of a band. marks: {x or y, label, color}. points: {x, y, label, color, radius, hollow}.
   set(content) {
     Object.assign(this, { series: [], marks: [], points: [] }, content);
     this.dirty();
@@ -204,7 +204,7 @@ export class Plot {
   drawBand(c, g, s) {
     c.fillStyle = s.color; c.globalAlpha = s.alpha ?? 0.2;
     const clamp = v => Math.max(-1e4, Math.min(1e4, v));
-    // Whole stretches without gaps, each at least a pixel high.
+    // Segments without gaps, each at least one pixel high.
     for (let i = 0; i < s.x.length;) {
       if (!Number.isFinite(s.y[i]) || !Number.isFinite(s.y2[i])) { ++i; continue; }
       let end = i;
@@ -220,7 +220,7 @@ export class Plot {
 
   drawMarks(c, g) {
     c.textBaseline = 'top'; c.textAlign = 'left';
-    const ends = [-1e9, -1e9, -1e9];  // of the labels in each row; one that has no room is left out
+    const ends = [-1e9, -1e9, -1e9];  // of the labels in each row; a label without space is omitted
     for (const m of [...this.marks].sort((a, b) => (a.x ?? 0) - (b.x ?? 0))) {
       c.strokeStyle = c.fillStyle = m.color ?? colour('dim');
       c.lineWidth = m.width ?? 1;
@@ -284,7 +284,7 @@ export class Plot {
     this.labelX(c, g, at);
   }
 
-  // Where the legend leaves room.
+  // Only if the legend leaves enough space.
   labelX(c, g, from) {
     const { label, hidden } = this.options.x;
     if (hidden || g.width - RIGHT - c.measureText(label).width < from) return;
@@ -302,7 +302,7 @@ export class Plot {
     this.note.style[g.x.to(this.cursor.x) > g.width / 2 ? 'left' : 'right'] = 'auto';
   }
 
-  // ------------------------------------------------------------------------------------------ hands
+  // ------------------------------------------------------------------------------------------ input
 
   listen() {
     const place = event => {
@@ -348,7 +348,7 @@ export class Plot {
   saveNumbers() { save(`${this.options.name}.csv`, this.csv(), 'text/csv'); }
 }
 
-// The course of a spectrum over the last minute: one column a line of time, brighter is stronger.
+// Spectrum over time: one column per spectrum, brighter is larger.
 export class Waterfall {
   constructor(parent, columns = 300) {
     this.columns = columns;
@@ -357,9 +357,9 @@ export class Waterfall {
     this.label = make('div', { class: 'axis' });
     parent.append(make('div', { class: 'plot' }, this.canvas, this.empty, this.label, exportsOf(this)));
     this.image = make('canvas');
-    this.lines = [];  // the amplitudes that are shown, with their times
+    this.lines = [];  // shown amplitudes with their times
   }
-  // amplitudes of one moment [s], up to highest [Hz]
+  // amplitudes at a time [s], up to highest [Hz]
   push(amplitudes, highest, time) {
     this.lines.push({ time, highest, amplitudes });
     if (this.lines.length > this.columns) this.lines.shift();
@@ -378,7 +378,7 @@ export class Waterfall {
       column.data[at + 3] = 255;
     }
     c.putImageData(column, this.columns - 1, 0);
-    this.label.textContent = `0 to ${digits(highest / 1000, 2)} kHz upwards, 60 dB, the newest on the right`;
+    this.label.textContent = `0 to ${digits(highest / 1000, 2)} kHz from bottom to top, 60 dB, newest on the right`;
     this.empty.hidden = true;
     this.dirty = true;
   }

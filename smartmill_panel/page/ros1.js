@@ -1,4 +1,4 @@
-// Reads ROS 1 messages by the text of their definition, as the panel's server advertises it.
+// Decodes ROS 1 messages from their definition, as advertised by the panel's server.
 
 const NUMBERS = {
   bool: ['getUint8', 1], int8: ['getInt8', 1], byte: ['getInt8', 1], uint8: ['getUint8', 1], char: ['getUint8', 1],
@@ -21,7 +21,7 @@ function fieldsOf(text) {
   return fields;
 }
 
-// {type: fields} of a definition and all that it contains.
+// {type: fields} of a definition including its nested types.
 function typesOf(definition, type) {
   const types = {};
   definition.split(/^={10,}$/m).forEach((part, index) => {
@@ -45,7 +45,7 @@ class Cursor {
     this.at += length;
     return value;
   }
-  // Copied: an array of doubles may lie anywhere.
+  // Copied, because typed arrays require alignment.
   array(type, count) {
     const begin = this.view.byteOffset + this.at, size = count * NUMBERS[type][1];
     this.at += size;
@@ -53,7 +53,7 @@ class Cursor {
   }
 }
 
-// A function from DataView to object.
+// @return a function that decodes a DataView to an object
 export function readerOf(definition, type) {
   const types = typesOf(definition, type);
   const resolve = (name, from) => {

@@ -9,7 +9,8 @@
 namespace smartmill::sim {
 namespace {
 
-/// At 1 kHz from a time on: x at 20 mm/s, 100 revolutions a second, from given places.
+/// Samples at 1 kHz: x moves at 20 mm/s, the spindle at 100 revolutions per second, from given initial
+/// values.
 SampleBlock block(double stamp, std::size_t count, double x = 0.0, double revolutions = 0.0) {
   SampleBlock b;
   b.stamp = stamp;
@@ -23,7 +24,7 @@ SampleBlock block(double stamp, std::size_t count, double x = 0.0, double revolu
   return b;
 }
 
-TEST(AxesTrack, LeadsInStraightLinesBetweenSamples) {
+TEST(AxesTrack, InterpolatesLinearlyBetweenSamples) {
   AxesTrack track;
   track.push(block(10.0, 11));
   const MotionState state = track.at(10.0 + 3.3e-3);
@@ -35,7 +36,7 @@ TEST(AxesTrack, LeadsInStraightLinesBetweenSamples) {
   EXPECT_NEAR(*track.newest(), 10.010, 1e-12);
 }
 
-TEST(AxesTrack, WhatIsNotNewerIsLeftOut) {
+TEST(AxesTrack, SamplesThatAreNotNewerAreIgnored) {
   AxesTrack track;
   track.push(block(10.0, 11));
   track.push(block(10.005, 11, 7.0));
@@ -43,7 +44,7 @@ TEST(AxesTrack, WhatIsNotNewerIsLeftOut) {
   EXPECT_NEAR(*track.newest(), 10.015, 1e-9);
 }
 
-TEST(AxesTrack, StandsOverAGapAndGoesOnFromWhereTheNextSampleIs) {
+TEST(AxesTrack, IsAtRestOverAGapAndResumesAtTheNextSample) {
   AxesTrack track;
   track.push(block(10.0, 11));
   track.push(block(11.0, 11, 0.1));
@@ -53,14 +54,14 @@ TEST(AxesTrack, StandsOverAGapAndGoesOnFromWhereTheNextSampleIs) {
   EXPECT_NEAR(track.at(11.0005).position[0], 0.1 + 0.02 * 5e-4, 1e-12);
 }
 
-TEST(AxesTrack, ASilentControllersAxesStand) {
+TEST(AxesTrack, AxesOfASilentControllerAreAtRest) {
   AxesTrack track;
   EXPECT_EQ(track.at(3.0).position[0], 0.0);
   track.push(block(10.0, 11));
-  track.stand(10.2);
+  track.holdUntil(10.2);
   EXPECT_EQ(*track.newest(), 10.2);
   EXPECT_EQ(track.at(10.1).velocity[0], 0.0);
-  // Started anew somewhere else, a sample later: no way leads there.
+  // The motion restarts at another position: nothing is interpolated to it.
   track.push(block(10.2005, 5, 0.3));
   const MotionState between = track.at(10.2003);
   EXPECT_EQ(between.velocity[0], 0.0);

@@ -1,4 +1,4 @@
-// The whole program subset, the operator's panel, the memory and the watch over obstacles.
+// The program dialect, the operator's panel, the memory and the collision check.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,13 +15,13 @@ std::array<double, 3> mm(double x, double y, double z) {
   return {x * 1e-3, y * 1e-3, z * 1e-3};
 }
 
-void expectAt(const Machine& m, const std::array<double, 3>& due, const std::string& what) {
+void expectAt(const Machine& m, const std::array<double, 3>& expected, const std::string& what) {
   for (std::size_t i = 0; i < 3; ++i) {
-    EXPECT_NEAR(m.controller.motion().position[i], due[i], 1e-9) << what << " axis " << i;
+    EXPECT_NEAR(m.controller.motion().position[i], expected[i], 1e-9) << what << " axis " << i;
   }
 }
 
-TEST(Program, EveryWordOfTheSubsetGoesWhereItSays) {
+TEST(Program, EveryWordOfTheDialectMovesToItsTarget) {
   struct Case {
     std::string text;
     std::array<double, 3> end;
@@ -44,9 +44,9 @@ TEST(Program, EveryWordOfTheSubsetGoesWhereItSays) {
            {"#1=3\n#2=[#1+4]*2\nG91 G0 X#2 Y-#1 Z-[SQRT[#1*3]/2]\n", mm(14, -3, -1.5)},
            {"#101=10*SIN[30]\nG91 G0 X#101 Y[10*COS[60]]\n", mm(5, 5, 0)},
            {"#1=1\n#[100+#1]=7\nG91 G0 X##1\n", mm(1, 0, 0)},  // ##1 is #1, which is 1
-           {"G91 G0 X#33 Y2\n", mm(0, 2, 0)},                  // a vacant variable is no word
-           {"#9=4\n#9=#0\nG91 G0 X#9 Y2\n", mm(0, 2, 0)},      // #0 has no value, ever
-           {"G91 G2 X0 R5 F6000\nG0 Y1\n", mm(0, 1, 0)},       // an arc of no angle
+           {"G91 G0 X#33 Y2\n", mm(0, 2, 0)},                  // a word with a vacant variable is ignored
+           {"#9=4\n#9=#0\nG91 G0 X#9 Y2\n", mm(0, 2, 0)},      // #0 is always vacant
+           {"G91 G2 X0 R5 F6000\nG0 Y1\n", mm(0, 1, 0)},       // an arc of angle 0
            {"N10 #1=4\nN0020 #2=#1*2\nG91 G0 X#2\n", mm(8, 0, 0)},
            {"O0042(SLOT)\nN7 G94 G21 G17 G90\nG91 G0 X1 (COMMENT)\n%\n", mm(1, 0, 0)},
        }) {
@@ -74,7 +74,7 @@ TEST(Program, ArcKeepsItsRadiusAndItsAcceleration) {
   expectAt(m, mm(0, 20, 0), "half circle");
 }
 
-TEST(Program, MachineCoordinatesAreReachedInRapidTraverseWhateverMotionIsInForce) {
+TEST(Program, MachineCoordinatesAreApproachedInRapidTraverseInAnyMode) {
   Machine m;
   m.start("G90 G1 F60 X1\nG53 X51\n");
   // A millimetre at 1 mm/s, then 50 mm at 0.5 m/s and 2 m/s2, a triangle of 2 sqrt(s / a).
@@ -90,7 +90,7 @@ TEST(Program, ArcThatBulgesOutOfTheTravelIsRefused) {
   EXPECT_NE(m.alarmText().find("OVERTRAVEL X"), std::string::npos) << m.alarmText();
 }
 
-TEST(Program, FlowAndOtherUnknownThingsAreRefusedByName) {
+TEST(Program, ControlFlowAndUnknownWordsAreRefusedByName) {
   for (const std::string word : {"IF", "WHILE", "GOTO"}) {
     Machine m;
     m.start(word + "[#1EQ1]10\n");
@@ -107,7 +107,7 @@ TEST(Program, FlowAndOtherUnknownThingsAreRefusedByName) {
   }
 }
 
-TEST(Panel, FeedHoldStopsOnThePathAndCycleStartGoesOn) {
+TEST(Panel, FeedHoldStopsOnThePathAndCycleStartResumes) {
   Machine m;
   m.start("G3 X0 Y40 I0 J20 F3000\nG4 X1.\n#100=1\n");
   m.run(0.5);
@@ -130,7 +130,7 @@ TEST(Panel, FeedHoldStopsOnThePathAndCycleStartGoesOn) {
   m.runToEnd();
   EXPECT_EQ(m.macro(100), 1.0);
   expectAt(m, mm(0, 40, 0), "end");
-  // RESET in hold drops the rest.
+  // RESET in feed hold drops the rest.
   m.send("G90 G1 X100 F3000\n");
   m.run(0.5);
   m.controller.feedHold();
@@ -156,7 +156,7 @@ TEST(Panel, OverridesActAtOnce) {
   EXPECT_EQ(m.controller.actualFeed(), 0.0);
   EXPECT_EQ(m.controller.status().run, focas::RUN_START);
   m.controller.setOverrides(1.0, 1.0, 1.0);
-  // From outside, by the data table: its share multiplies the panel's, 0 says nothing.
+  // External override in the data table: multiplies the panel's; 0: no effect.
   EXPECT_EQ(m.controller.writePmc(focas::PmcArea::d, 500, {40, 90}), focas::EW_OK);
   m.run(0.5);
   EXPECT_NEAR(m.controller.actualFeed(), 1200.0, 1e-6);
@@ -207,7 +207,7 @@ TEST(Spindle, LoadSlowsTheRampAndStallsBeyondTheDrivesTorque) {
   EXPECT_NEAR(m.states.back().spindle_speed, (20.0 - 5.0) / 0.04, 1e-6);
   m.run(4.0);
   EXPECT_NEAR(m.states.back().spindle_speed, 12000.0 * RPM, 1e-9);
-  m.controller.setSpindleTorque(24.0);  // 4 N m more than it has
+  m.controller.setSpindleTorque(24.0);  // 4 N m above the torque limit
   m.run(1.0);
   EXPECT_NEAR(m.states.back().spindle_speed, 12000.0 * RPM - 4.0 / 0.04, 1e-6);
   m.controller.setSpindleTorque(0.0);
@@ -215,7 +215,7 @@ TEST(Spindle, LoadSlowsTheRampAndStallsBeyondTheDrivesTorque) {
   EXPECT_NEAR(m.states.back().spindle_speed, 12000.0 * RPM, 1e-9);
 }
 
-TEST(Memory, ProgramsAreStoredRunAndGivenBack) {
+TEST(Memory, ProgramsAreStoredRunAndFetched) {
   Machine m;
   m.controller.setMode(focas::AUT_MEM);
   EXPECT_EQ(m.controller.storePrograms("\nO1234(SLOT 1)\nG91 G0 X1\nM30\n%"), focas::EW_OK);
@@ -237,7 +237,7 @@ TEST(Memory, ProgramsAreStoredRunAndGivenBack) {
   expectAt(m, mm(1, 0, 0), "run from memory");
   EXPECT_EQ(m.controller.cycleStart(), focas::EW_OK);
   m.runToEnd();
-  expectAt(m, mm(2, 0, 0), "run again from its head");
+  expectAt(m, mm(2, 0, 0), "run again from its first block");
   EXPECT_EQ(m.controller.deleteProgram(1234), focas::EW_OK);
   EXPECT_EQ(m.controller.programs().size(), 1u);  // the resident one
   EXPECT_EQ(m.controller.cycleStart(), focas::EW_DATA);
@@ -258,7 +258,7 @@ TEST(Memory, PmcShowsTheSignalsOfTheConnectionManual) {
   EXPECT_EQ(byte(focas::PmcArea::f, 45), 0x08);         // SAR
   EXPECT_EQ(byte(focas::PmcArea::g, 12), 0xff & ~100);  // *FV
   EXPECT_EQ(m.controller.writePmc(focas::PmcArea::g, 12, {0}), focas::EW_OK);
-  EXPECT_EQ(byte(focas::PmcArea::g, 12), 0xff & ~100) << "the ladder writes it anew";
+  EXPECT_EQ(byte(focas::PmcArea::g, 12), 0xff & ~100) << "overwritten by the PMC program";
   EXPECT_EQ(m.controller.writePmc(focas::PmcArea::d, 100, {1, 2}), focas::EW_OK);
   EXPECT_EQ(byte(focas::PmcArea::d, 101), 2);
   m.controller.emergency(true);
@@ -267,7 +267,7 @@ TEST(Memory, PmcShowsTheSignalsOfTheConnectionManual) {
   EXPECT_EQ(m.controller.readPmc(focas::PmcArea::d, 9999, 10000, &bytes), focas::EW_NUMBER);
 }
 
-TEST(Memory, ClockIsSetAndGoesOn) {
+TEST(Memory, ClockIsSetAndRuns) {
   ControllerOptions options = testOptions();
   std::int64_t now = 1000000000;  // 2001-09-09 01:46:40
   options.wall_clock = [&] { return now; };
@@ -304,7 +304,7 @@ TEST(Load, PolledLoadsAreRoundedToTheControllersStep) {
   }
 }
 
-TEST(Collision, ToolThatMeetsAnObstacleStopsWithAnAlarm) {
+TEST(Collision, CollisionWithAnObstacleStopsWithAnAlarm) {
   MachineModel model;
   model.tool.emplace();
   model.tool->diameter = 0.02;
@@ -337,8 +337,8 @@ TEST(Collision, ToolThatMeetsAnObstacleStopsWithAnAlarm) {
   }
 }
 
-// The room between two flutes lets a standing tool nearer; then it may not turn.
-TEST(Collision, TheSpindleMayNotTurnWhereOnlyTheCoreHasRoom) {
+// At rest the space between two flutes permits a closer position, in which the spindle must not turn.
+TEST(Collision, SpindleMustNotTurnWhereOnlyTheCoreFits) {
   ControllerOptions options = testOptions();
   options.obstacles.tool_radius = 0.010;
   options.obstacles.core_radius = 0.009;
@@ -368,7 +368,7 @@ TEST(ServoGuide, CurrentsLoadAndTriggerAtABlock) {
   ASSERT_EQ(block.samples.size(), 6u * 2500u);
   const auto at = [&](std::size_t k, std::size_t channel) { return block.samples[6 * k + channel]; };
   const AxisDrive drive;
-  // At 0.1 m/s friction alone; while it speeds up with 2 m/s2 the mass as well.
+  // At 0.1 m/s friction alone; during the acceleration of 2 m/s2 the mass as well.
   const double friction = (drive.viscous * 0.1 + drive.coulomb) / drive.force_per_ampere;
   EXPECT_NEAR(at(300, 1), friction, 1e-9);
   EXPECT_NEAR(at(25, 1), (drive.mass * 2.0 + drive.viscous * 0.05 + drive.coulomb) / drive.force_per_ampere,

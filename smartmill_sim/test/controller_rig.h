@@ -26,7 +26,7 @@ inline ControllerOptions testOptions() {
   return options;
 }
 
-/// A controller, and a client that is already in the room.
+/// A controller with a client in the same process.
 struct Machine {
   explicit Machine(const ControllerOptions& options = testOptions()) : controller(options) {}
 
@@ -44,7 +44,7 @@ struct Machine {
     EXPECT_EQ(controller.readMacro(number, &value), focas::EW_OK);
     return value;
   }
-  /// [s] until nothing runs any more, to one step.
+  /// Runs until the program ends. @return [s] time, to one step
   double runToEnd(double dt = DT, double most = 60.0) {
     for (double time = 0.0; time < most;) {
       run(dt, dt);

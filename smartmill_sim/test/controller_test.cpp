@@ -19,17 +19,17 @@
 namespace smartmill::sim {
 namespace {
 
-TEST(Axes, LongMoveTakesDistanceOverFeedAndFeedOverAcceleration) {
+TEST(Axes, LongMoveTakesDistanceOverFeedPlusFeedOverAcceleration) {
   Machine m;
   m.start("G1 X60 Y80 F6000\n");  // 0.1 m at 0.1 m/s: 1 s + 0.1 / 2 s
   m.run(0.5);
   // After the ramp (v^2 / 2a behind v t) along the line 3:4.
-  const double way = 0.1 * 0.5 - 0.1 * 0.1 / (2.0 * 2.0);
-  EXPECT_NEAR(m.states.back().position[0], 0.6 * way, ROUND);
-  EXPECT_NEAR(m.states.back().position[1], 0.8 * way, ROUND);
+  const double distance = 0.1 * 0.5 - 0.1 * 0.1 / (2.0 * 2.0);
+  EXPECT_NEAR(m.states.back().position[0], 0.6 * distance, ROUND);
+  EXPECT_NEAR(m.states.back().position[1], 0.8 * distance, ROUND);
   EXPECT_NEAR(m.states.back().velocity[0], 0.06, ROUND);
   EXPECT_NEAR(m.controller.actualFeed(), 6000.0, 1e-8);
-  EXPECT_NEAR(m.controller.distanceToGo()[0], 60.0 - 600.0 * way, 1e-9);
+  EXPECT_NEAR(m.controller.distanceToGo()[0], 60.0 - 600.0 * distance, 1e-9);
   EXPECT_EQ(m.controller.distanceToGo()[2], 0.0);
   EXPECT_EQ(m.controller.status().motion, focas::MOTION_MOVES);
   EXPECT_NEAR(0.5 + m.runToEnd(1e-5), 1.05, 1.1e-5);
@@ -38,7 +38,7 @@ TEST(Axes, LongMoveTakesDistanceOverFeedAndFeedOverAcceleration) {
   EXPECT_EQ(m.controller.status().motion, focas::MOTION_NONE);
 }
 
-TEST(Axes, ShortMoveIsATriangle) {
+TEST(Axes, ShortMoveHasATriangularProfile) {
   Machine m;
   m.start("G01F6000Z-1.125\n");  // F reaches 0.1 m/s only from 5 mm on
   const double time = 2.0 * std::sqrt(1.125e-3 / 2.0);
@@ -49,7 +49,7 @@ TEST(Axes, ShortMoveIsATriangle) {
   EXPECT_EQ(m.controller.motion().position[2], -1.125 * 1e-3);
 }
 
-TEST(Axes, BlocksFollowEachOtherAtTheirExactTimesWhateverTheStep) {
+TEST(Axes, BlockTimesAreExactAtAnyStep) {
   const std::string program = "G0 X12.5 Y-3\nG91 G1 X-2.25 F900\nG4 P37\nG90 Y1.5 Z-20\n";
   Machine fine, coarse;
   fine.start(program);
@@ -72,8 +72,8 @@ TEST(Axes, RapidRelativeAndWorkOffset) {
   EXPECT_EQ(m.controller.machinePosition(), (std::vector<double>{50.0, 0.0, -30.0}));
   EXPECT_NEAR(m.controller.absolutePosition()[2], 70.0, 1e-9);
   m.start("N10 G0 X0\n");
-  const double way = 0.04;  // from 50 to 10 mm, triangle below 0.5^2 / 2 = 0.125 m
-  EXPECT_NEAR(m.runToEnd(1e-5), 2.0 * std::sqrt(way / 2.0), 1.1e-5);
+  const double distance = 0.04;  // from 50 to 10 mm, triangle below 0.5^2 / 2 = 0.125 m
+  EXPECT_NEAR(m.runToEnd(1e-5), 2.0 * std::sqrt(distance / 2.0), 1.1e-5);
   m.send("G91 Y-5 Z2.5\nY-5\nG90 G1 F3000 Z71\r\n");
   m.runToEnd();
   EXPECT_NEAR(m.controller.motion().position[0], 0.01, ROUND);
@@ -105,7 +105,7 @@ TEST(SpindleDrive, AngleDoesNotDriftInAMillionSteps) {
   for (int second = 0; second < 40; ++second) {
     m.controller.advance(dt, 25600, m.states);
   }
-  // 8000 turns in 40 s less the ramp; time and angle are rounded to 1e-15 of themselves: 5e4 rad.
+  // 8000 turns in 40 s less the ramp; relative rounding of 1e-15 at 5e4 rad.
   const double angle = speed * (40.0 - 0.5 * speed / 500.0);
   EXPECT_NEAR(std::remainder(m.states.back().spindle_angle - angle, units::TWO_PI), 0.0, 1e-9);
 }
@@ -159,7 +159,7 @@ TEST(SpindleDrive, SpeedIsLimitedAndProgramEndStops) {
   m.runToEnd();
   EXPECT_EQ(m.states.back().spindle_speed, 0.0);
   EXPECT_EQ(m.macro(100), 1.0);
-  m.send("G1 X1\n");  // F went with the program
+  m.send("G1 X1\n");  // F is reset at the end of the program
   m.run(0.1);
   EXPECT_NE(m.alarmText().find("FEED ZERO"), std::string::npos) << m.alarmText();
 }
@@ -173,7 +173,7 @@ TEST(Session, BufferIsBoundedAndEmptiesAsBlocksRun) {
   std::size_t sent = m.controller.dncData(text.data(), text.size());
   EXPECT_EQ(sent, 32u);
   EXPECT_EQ(m.controller.dncData(text.data() + sent, text.size() - sent), 0u);
-  m.run(0.01);  // the first block runs, its text has left the buffer
+  m.run(0.01);  // the first block runs and is no longer in the buffer
   const std::size_t more = m.controller.dncData(text.data() + sent, text.size() - sent);
   EXPECT_EQ(more, 11u);
   for (sent += more; sent < text.size(); m.run(0.01)) {
@@ -194,15 +194,15 @@ TEST(Session, BufferIsBoundedAndEmptiesAsBlocksRun) {
 TEST(Session, MarkerIsSetAfterEveryBlockBeforeIt) {
   Machine m;
   m.start("%\nG1 X10 F600\n#100=7\n");
-  bool seen = false;
-  for (int i = 0; i < 2000 && !seen; ++i) {
+  bool marker_set = false;
+  for (int i = 0; i < 2000 && !marker_set; ++i) {
     m.run(DT);
-    seen = m.macro(100).has_value();
-    if (!seen) {
+    marker_set = m.macro(100).has_value();
+    if (!marker_set) {
       EXPECT_LT(m.controller.motion().position[0], 0.01);
     }
   }
-  EXPECT_TRUE(seen);
+  EXPECT_TRUE(marker_set);
   EXPECT_EQ(m.controller.motion().position[0], 0.01);
   EXPECT_EQ(m.controller.executingBlock(), "");
   EXPECT_EQ(m.controller.status().run, focas::RUN_STOP);
@@ -223,7 +223,7 @@ TEST(Session, LastBlockNeedsNoLineEndAndEndRunsTheRest) {
   EXPECT_EQ(m.controller.dncStart(), focas::EW_BUSY);
 }
 
-TEST(Session, ResetBrakesDropsAndSaysSoOnce) {
+TEST(Session, ResetBrakesDropsTheProgramAndIsReportedOnce) {
   Machine m;
   m.start("S600 M3\nG1 X100 F6000\n#100=1\n");
   m.run(0.5);
@@ -242,7 +242,7 @@ TEST(Session, ResetBrakesDropsAndSaysSoOnce) {
   EXPECT_NEAR(m.controller.motion().position[0], x + 0.0025 + 0.001, ROUND);
 }
 
-TEST(Session, CancelStopsAndNeedsNoExcuse) {
+TEST(Session, CancelStopsWithoutAnError) {
   Machine m;
   m.start("G1 X100 F6000\n");
   m.run(0.5);
@@ -268,7 +268,7 @@ TEST(Panel, OnlyDncModeRunsAndLeavingItStops) {
   EXPECT_EQ(m.states.back().velocity[0], 0.0);
 }
 
-TEST(Panel, AlarmAndEmergencyStopAndRefuse) {
+TEST(Panel, AlarmAndEmergencyStopAndBlockTheStart) {
   Machine m;
   m.start("G1 X100 F600\n");
   m.run(0.5);
@@ -351,8 +351,8 @@ TEST(Options, AreChecked) {
   EXPECT_NO_THROW(Controller{ControllerOptions::ofModel(MachineModel{})});
 }
 
-/// Over the wire: server and client on loopback, the machine runs a hundred times faster than the clock.
-TEST(Wire, ProgramStreamsAndMarkerComesBack) {
+/// Server and client on loopback; the machine runs a hundred times faster than real time.
+TEST(Wire, ProgramIsStreamedAndMarkerIsRead) {
   Machine m;
   focas::ServerOptions options;
   options.port = 0;
@@ -362,7 +362,7 @@ TEST(Wire, ProgramStreamsAndMarkerComesBack) {
   client.writeMacro(1133, 1024.0);
   client.dncStart();
   std::string text = "\nS3000 M3\nG1 F6000\n";
-  for (int i = 0; i < 400; ++i) {  // more than buffer and wire hold
+  for (int i = 0; i < 400; ++i) {  // more than the capacity of buffer and socket
     text += "N" + std::to_string(i) + " X" + std::to_string(i % 2) + ".25 (some words to make it longer)\n";
   }
   text += "M119\n#100=42\n%\n";

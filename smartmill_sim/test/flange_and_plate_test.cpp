@@ -30,16 +30,16 @@ std::array<double, 3> means(const std::array<double, 6>& s) {
 }
 
 std::array<double, 3> meansUnder(SpindleSensor& sensor, const std::array<double, 3>& force) {
-  std::array<double, 6> shown{};
+  std::array<double, 6> output{};
   for (int i = 0; i < 20000; ++i) {
     sensor.step(force, 0.0, 0.0);
-    shown = sensor.read();
+    output = sensor.read();
   }
-  return means(shown);
+  return means(output);
 }
 
 // Burzoni Table 3 at the 139 mm of his Table 2; three digits of the defaults.
-TEST(SpindleSensor, ShowsTable3AtItsLength) {
+TEST(SpindleSensor, MatchesTable3AtItsLength) {
   SpindleSensor sensor(quiet(), STEP, RATE, 1);
   const auto x = meansUnder(sensor, {100.0, 0.0, 0.0});
   const auto y = meansUnder(sensor, {0.0, 100.0, 0.0});
@@ -52,21 +52,22 @@ TEST(SpindleSensor, ShowsTable3AtItsLength) {
   EXPECT_NEAR(100.0 / z[2], 62.46, 0.1);
 }
 
-// The moment at the ring is force times lever: what is shown, not the constant, is a line in the length.
-TEST(SpindleSensor, ShownForceIsALineInTheLength) {
+// The moment at the ring is force times lever: the output is linear in the length, its reciprocal, the
+// constant, is not.
+TEST(SpindleSensor, MeasuredForceIsLinearInTheLength) {
   SpindleSensor sensor(quiet(), STEP, RATE, 1);
-  std::array<double, 3> shown{};
+  std::array<double, 3> output{};
   for (std::size_t k = 0; k < 3; ++k) {
     sensor.setLength(0.1 + 0.04 * static_cast<double>(k));
-    shown[k] = meansUnder(sensor, {0.0, 100.0, 0.0})[1];
+    output[k] = meansUnder(sensor, {0.0, 100.0, 0.0})[1];
   }
-  EXPECT_NEAR(shown[1], 0.5 * (shown[0] + shown[2]), 1e-9);
-  EXPECT_NEAR(shown[2] / shown[0], (0.18 + 0.146) / (0.1 + 0.146), 1e-9);
-  EXPECT_GT(std::abs(0.5 * (1.0 / shown[0] + 1.0 / shown[2]) * shown[1] - 1.0), 0.01);
+  EXPECT_NEAR(output[1], 0.5 * (output[0] + output[2]), 1e-9);
+  EXPECT_NEAR(output[2] / output[0], (0.18 + 0.146) / (0.1 + 0.146), 1e-9);
+  EXPECT_GT(std::abs(0.5 * (1.0 / output[0] + 1.0 / output[2]) * output[1] - 1.0), 0.01);
   EXPECT_THROW(sensor.setLength(1.0), Error);
 }
 
-// A longer tool hangs on softer modes; a washer without compression shows no less.
+// A longer tool lowers the modes; the output of a washer is limited where its compression ends.
 TEST(SpindleSensor, ModesFallWithLengthAndWashersUnload) {
   SpindleSensorTraits traits = quiet();
   traits.preload = {50.0, 50.0, 50.0};
@@ -74,13 +75,13 @@ TEST(SpindleSensor, ModesFallWithLengthAndWashersUnload) {
   const double before = sensor.modes(0).modes[0].frequency;
   sensor.setLength(0.278);
   EXPECT_NEAR(sensor.modes(0).modes[0].frequency, before * std::pow(0.5, 0.6), 1e-9);
-  std::array<double, 6> shown{};
+  std::array<double, 6> output{};
   for (int i = 0; i < 20000; ++i) {
     sensor.step({0.0, 5000.0, 0.0}, 0.0, 0.0);
-    shown = sensor.read();
+    output = sensor.read();
   }
-  EXPECT_DOUBLE_EQ(shown[2], -50.0);
-  EXPECT_GT(shown[3], 100.0);
+  EXPECT_DOUBLE_EQ(output[2], -50.0);
+  EXPECT_GT(output[3], 100.0);
 }
 
 TEST(SpindleSensor, NoiseGrowsFromRestToAirToCut) {
@@ -104,23 +105,23 @@ TEST(SpindleSensor, NoiseGrowsFromRestToAirToCut) {
   EXPECT_NEAR(rms(1000.0, 900.0), std::hypot(0.03, 0.25, 0.01 * 900.0 * 0.195 * 0.285), 0.012);
 }
 
-// Statically the feet carry the wrench, wherever the force acts; along z the mode of a plate that cannot turn
-// is that of its mass on its springs.
-TEST(Plate, CarriesTheWrenchAndSwingsAtItsFrequency) {
+// Statically the feet carry the wrench of a force at any point; along z, without rotation, the natural
+// frequency is that of the mass on its springs.
+TEST(Plate, CarriesTheWrenchAndResonatesAtItsFrequency) {
   PlateTraits traits;
   traits.force_noise = traits.moment_noise = 0.0;
   traits.centre = {0.0, 0.0, 0.0};
   Plate plate(traits, STEP, 1);
-  std::array<double, 6> shown{};
+  std::array<double, 6> output{};
   std::complex<double> line = 0.0;
   for (int i = 0; i < 60000; ++i) {
     plate.step({100.0, -50.0, 30.0}, {0.02, 0.01, -0.17}, {}, {});
-    shown = plate.read();
+    output = plate.read();
   }
   // M = r x F about the origin, r = (0.02, 0.01, 0.03).
-  const std::array<double, 6> due{
+  const std::array<double, 6> expected{
       100.0, -50.0, 30.0, 0.01 * 30.0 + 0.03 * 50.0, 0.03 * 100.0 - 0.02 * 30.0, -0.02 * 50.0 - 0.01 * 100.0};
-  for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(shown[i], due[i], 1e-6) << i;
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(output[i], expected[i], 1e-6) << i;
   // Along z through the centre at the natural frequency: (1 + 2 i zeta) / (2 i zeta).
   Plate other(traits, STEP, 1);
   constexpr int N = 25600;
@@ -136,7 +137,7 @@ TEST(Plate, CarriesTheWrenchAndSwingsAtItsFrequency) {
   EXPECT_NEAR(std::abs(line), std::abs((1.0 + i2z) / i2z) * std::pow(std::sin(x) / x, 2), 0.3);
 }
 
-TEST(SpindleSensor, RefusesModesThatDoNotAgree) {
+TEST(SpindleSensor, RefusesListsOfDifferentLength) {
   WorldOptions options;
   options.spindle_sensor.x_damping = {0.1};
   EXPECT_THROW(options.validate(), Error);

@@ -60,7 +60,7 @@ double largestError(const ToolGeometry& tool, const Engagement& cut, double rpm,
   for (int i = 0; i < 3 * steps_per_rev; ++i) {
     const ToolMotion motion = motionAt(i * dt, speed, feed);
     const CuttingForce f = process.step(motion), e = closed.at(motion.angle);
-    process.settle({{0.0, 0.0}});
+    process.endStep({{0.0, 0.0}});
     worst = std::max(worst, largestDifference(f, e, tool.radius()));
     largest = std::max({largest, std::abs(e.fx), std::abs(e.fy)});
   }
@@ -75,12 +75,12 @@ TEST(MillingProcess, rigidSteadyCutMatchesTheClosedForm) {
   EXPECT_LT(largestError(endMill(1, 45.0), {1.2, 1.3, 10e-3, 5e-5}, 600.0, 3973), 2e-6);
   EXPECT_LT(largestError(endMill(2, 0.0), {0.4, 2.2, 3e-3, 1e-4}, 6000.0, 1001), 2e-6);
   EXPECT_LT(largestError(endMill(4, 45.0), {0.0, PI, 70e-3, 5e-5}, 6000.0, 1001),
-            2e-6);  // lags by over a turn
+            2e-6);  // lags by more than a revolution
 }
 
-/// A way to mill: all of it by the angle that the spindle has turned.
-struct Way {
-  std::function<double(double)> time;                                 // [s]
+/// A prescribed motion of spindle and tool.
+struct PrescribedMotion {
+  std::function<double(double)> time;                                 // [s] by angle of the spindle [rad]
   std::function<std::array<double, 2>(double)> centre, displacement;  // [m] by time
   std::function<double(double)> speed;                                // [rad/s] by time
   std::function<double(double)> turned;                               // [rad] by time
@@ -91,34 +91,35 @@ double derivative(const std::function<double(double)>& f, double t) {
   return (f(t + H) - f(t - H)) / (2.0 * H);
 }
 
-/// Largest difference of a prescribed way from the rule (share 0) or from the teeth's path, summed over
-/// discs, as a share of the largest force.
-double differenceOnTheWay(const Way& way, const ToolGeometry& tool, const std::vector<double>& radius,
-                          const CuttingLaw& law, double duration, double share = 0.0, bool by_path = false) {
+/// Largest deviation from a sum over discs under a prescribed motion, relative to the largest force: with the
+/// ChipRule (share 0) or with the paths of the teeth.
+double largestDeviation(const PrescribedMotion& path, const ToolGeometry& tool,
+                        const std::vector<double>& radius, const CuttingLaw& law, double duration,
+                        double share = 0.0, bool by_path = false) {
   testing::DiscMill reference{tool, law, radius, [&](double turned) {
-                                const double t = way.time(turned);
-                                testing::DiscMill::State state{turned, way.centre(t), {{0.0, 0.0}}};
-                                state.speed = way.speed(t);
+                                const double t = path.time(turned);
+                                testing::DiscMill::State state{turned, path.centre(t), {{0.0, 0.0}}};
+                                state.speed = path.speed(t);
                                 if (t < 0.0) return state;
-                                state.displacement = way.displacement(t);
+                                state.displacement = path.displacement(t);
                                 for (std::size_t i = 0; i < 2; ++i)
                                   state.rate[i] =
-                                      derivative([&](double s) { return way.displacement(s)[i]; }, t);
+                                      derivative([&](double s) { return path.displacement(s)[i]; }, t);
                                 return state;
                               }};
   reference.by_path = by_path;
-  if (by_path) reference.passes = 6;  // nothing that is left so long ago is met
+  if (by_path) reference.passes = 6;  // older surfaces are not in contact
   const double dt = 1e-5, depth = 1.5e-3;
   const auto motionOf = [&](double t) {
     ToolMotion motion;
-    motion.angle = way.turned(t);
-    motion.speed = way.speed(t);
-    motion.centre = way.centre(t);
+    motion.angle = path.turned(t);
+    motion.speed = path.speed(t);
+    motion.centre = path.centre(t);
     for (std::size_t i = 0; i < 2; ++i)
-      motion.velocity[i] = derivative([&](double s) { return way.centre(s)[i]; }, t);
-    motion.displacement = way.displacement(t);
+      motion.velocity[i] = derivative([&](double s) { return path.centre(s)[i]; }, t);
+    motion.displacement = path.displacement(t);
     for (std::size_t i = 0; i < 2; ++i)
-      motion.rate[i] = derivative([&](double s) { return way.displacement(s)[i]; }, t);
+      motion.rate[i] = derivative([&](double s) { return path.displacement(s)[i]; }, t);
     return motion;
   };
   MillingProcess process(tool, law, dt, radius, share);
@@ -128,11 +129,11 @@ double differenceOnTheWay(const Way& way, const ToolGeometry& tool, const std::v
   for (int i = 0; i < steps; ++i) {
     const ToolMotion motion = motionOf(i * dt);
     const CuttingForce force = process.step(motion);
-    process.settle(motion.displacement);
+    process.endStep(motion.displacement);
     if (i % 41 != 7) continue;
-    const CuttingForce due = reference.force(motion.angle, 0.1, 2.9, depth, 300);
-    worst = std::max(worst, largestDifference(force, due, tool.radius()));
-    largest = std::max({largest, std::abs(due.fx), std::abs(due.fy)});
+    const CuttingForce expected = reference.force(motion.angle, 0.1, 2.9, depth, 300);
+    worst = std::max(worst, largestDifference(force, expected, tool.radius()));
+    largest = std::max({largest, std::abs(expected.fx), std::abs(expected.fy)});
   }
   return worst / largest;
 }
@@ -142,8 +143,8 @@ std::array<double, 2> shaking(double t) {
            12e-6 * std::sin(7300.0 * t + 1.0) - 10e-6}};
 }
 
-// @param feed [m] a turn
-Way steadyWay(double feed, std::function<std::array<double, 2>(double)> displacement) {
+// @param feed [m] per revolution
+PrescribedMotion steadyPath(double feed, std::function<std::array<double, 2>(double)> displacement) {
   constexpr double SPEED = 471.0;  // [rad/s]
   return {[](double turned) { return turned / SPEED; },
           [=](double t) {
@@ -152,42 +153,41 @@ Way steadyWay(double feed, std::function<std::array<double, 2>(double)> displace
           std::move(displacement), [](double) { return SPEED; }, [](double t) { return SPEED * t; }};
 }
 
-// Any vibration, runout and pitch: what earlier teeth left stays until the feed, or the roundness of the
-// tool, has taken it away.
-TEST(MillingProcess, isTheRuleSummedOverDiscs) {
-  const Way way = steadyWay(4.0 * 3e-5, shaking);
+// Any vibration, runout and pitch: the surface of earlier teeth remains until the feed or the tool's
+// curvature has removed it.
+TEST(MillingProcess, matchesTheChipRuleSummedOverDiscs) {
+  const PrescribedMotion path = steadyPath(4.0 * 3e-5, shaking);
   ToolGeometry tool = endMill(4, 30.0);
-  EXPECT_LT(differenceOnTheWay(way, tool, {0, 0, 0, 0}, aluminium(), 0.12), 0.01);
+  EXPECT_LT(largestDeviation(path, tool, {0, 0, 0, 0}, aluminium(), 0.12), 0.01);
   tool.pitch = {1.5, 1.65, 1.55, TWO_PI - 4.7};
   CuttingLaw law = aluminium();
   law.damping = 2e5;
   law.size_exponent = 0.15;
   law.edge_chip = 4e-6;
-  EXPECT_LT(differenceOnTheWay(way, tool, {0.0, 14e-6, -6e-6, 5e-6}, law, 0.12), 0.01);
+  EXPECT_LT(largestDeviation(path, tool, {0.0, 14e-6, -6e-6, 5e-6}, law, 0.12), 0.01);
 }
 
 std::array<double, 2> swinging(double t) {
   return {{60e-6 * std::sin(5200.0 * t), 90e-6 * std::sin(4700.0 * t)}};
 }
 
-// Before the whole of its path, what a tooth left is met where it was when it passed beside the ray.
-TEST(MillingProcess, whatTeethLeaveByTheirPath) {
-  const Way way = steadyWay(4.0 * 2e-4, swinging);
+// With the full path of the teeth: a surface is met at the angle at which its tooth crossed the ray.
+TEST(MillingProcess, surfacesFollowThePathsOfTheTeeth) {
+  const PrescribedMotion path = steadyPath(4.0 * 2e-4, swinging);
   ToolGeometry tool = endMill(4, 30.0);
   const std::vector<double> even(4, 0.0);
-  EXPECT_LT(differenceOnTheWay(way, tool, even, aluminium(), 0.06, 1.0, true), 0.01);
-  const double by_rule = differenceOnTheWay(way, tool, even, aluminium(), 0.06, 0.0, true);
+  EXPECT_LT(largestDeviation(path, tool, even, aluminium(), 0.06, 1.0, true), 0.01);
+  const double by_rule = largestDeviation(path, tool, even, aluminium(), 0.06, 0.0, true);
   EXPECT_GT(by_rule, 0.1);
-  EXPECT_NEAR(differenceOnTheWay(way, tool, even, aluminium(), 0.06, 0.5, true), 0.5 * by_rule,
-              0.1 * by_rule);
+  EXPECT_NEAR(largestDeviation(path, tool, even, aluminium(), 0.06, 0.5, true), 0.5 * by_rule, 0.1 * by_rule);
   tool.pitch = {1.5, 1.65, 1.55, TWO_PI - 4.7};
-  EXPECT_LT(differenceOnTheWay(way, tool, {0.0, 14e-6, -6e-6, 5e-6}, aluminium(), 0.06, 1.0, true), 0.01);
+  EXPECT_LT(largestDeviation(path, tool, {0.0, 14e-6, -6e-6, 5e-6}, aluminium(), 0.06, 1.0, true), 0.01);
 }
 
 // The spindle runs up and the feed turns into a curve at the same time.
 TEST(MillingProcess, speedAndFeedMayChange) {
   const double begin = 400.0, rise = 1200.0, feed = 9e-3, bend = 4.0;
-  // turned = begin t + rise t^2 / 2; before the beginning all went on as at it.
+  // turned = begin t + rise t^2 / 2; constant speed and feed before t = 0.
   const auto speed = [=](double t) { return t < 0.0 ? begin : begin + rise * t; };
   const auto turned = [=](double t) { return t < 0.0 ? begin * t : begin * t + 0.5 * rise * t * t; };
   const auto time = [=](double angle) {
@@ -198,16 +198,14 @@ TEST(MillingProcess, speedAndFeedMayChange) {
     return std::array<double, 2>{
         {feed / bend * std::sin(bend * t), feed / bend * (1.0 - std::cos(bend * t))}};
   };
-  const Way way{time, centre, shaking, speed, turned};
-  EXPECT_LT(differenceOnTheWay(way, endMill(4, 30.0), {0.0, 14e-6, -6e-6, 5e-6}, aluminium(), 0.12), 0.01);
-  const Way wide{time, centre, swinging, speed, turned};
-  EXPECT_LT(
-      differenceOnTheWay(wide, endMill(4, 30.0), {0.0, 14e-6, -6e-6, 5e-6}, aluminium(), 0.06, 1.0, true),
-      0.01);
+  const PrescribedMotion path{time, centre, shaking, speed, turned};
+  EXPECT_LT(largestDeviation(path, endMill(4, 30.0), {0.0, 14e-6, -6e-6, 5e-6}, aluminium(), 0.12), 0.01);
+  const PrescribedMotion wide{time, centre, swinging, speed, turned};
+  EXPECT_LT(largestDeviation(wide, endMill(4, 30.0), {0.0, 14e-6, -6e-6, 5e-6}, aluminium(), 0.06, 1.0, true),
+            0.01);
 }
 
-// A steady stretch after a change is the same as one without it, once the teeth no longer meet what was
-// before.
+// Steady cutting after a change equals that without it, once the earlier surfaces are cut away.
 TEST(MillingProcess, aChangeIsForgotten) {
   const double speed = 500.0, dt = 1e-5, feed = 4.0 * 5e-5 * speed / TWO_PI;
   const ToolGeometry tool = endMill(4, 30.0);
@@ -225,15 +223,15 @@ TEST(MillingProcess, aChangeIsForgotten) {
     slower.centre[0] -= 0.6 * feed * std::min(t, 4000 * dt);
     motion.displacement = slower.displacement = shaking(t);
     const CuttingForce a = steady.step(motion), b = changed.step(slower);
-    steady.settle(motion.displacement);
-    changed.settle(slower.displacement);
+    steady.endStep(motion.displacement);
+    changed.endStep(slower.displacement);
     if (i > 14000) {
       ASSERT_LT(largestDifference(a, b, tool.radius()), 1e-3) << i;
     }
   }
 }
 
-/// Growth of the vibration of a tool with one mode: size over the last quarter of a cut over that over the
+/// Growth of the vibration of a tool with one mode: its norm in the last quarter of a cut over that in the
 /// second quarter.
 double growth(double depth, double rpm, bool both_axes, int steps_per_rev, Feed steadiness = Feed::any) {
   // Insperger's benchmark: m 0.03993 kg, 922 Hz, damping ratio 0.011, 2 teeth, Kt 6e8, Kn 2e8 N/m2.
@@ -245,7 +243,7 @@ double growth(double depth, double rpm, bool both_axes, int steps_per_rev, Feed 
   if (both_axes) model.tool_tip.y.modes = {mode};
   const double speed = units::radPerSecFromRpm(rpm), dt = TWO_PI / speed / steps_per_rev;
   CuttingMachine machine(model, dt, steadiness);
-  const double feed = 2e-4 * 2.0 * speed / TWO_PI;  // large: the tool must not leave the cut
+  const double feed = 2e-4 * 2.0 * speed / TWO_PI;  // large, so that the tool does not leave the cut
   CuttingMachine::Input input;
   input.motion = motionAt(0.0, speed, feed);
   machine.engage({{0.0, PI, depth}}, input.motion);
@@ -253,11 +251,11 @@ double growth(double depth, double rpm, bool both_axes, int steps_per_rev, Feed 
   std::vector<double> x;
   for (int i = 0; i < revolutions * steps_per_rev; ++i) {
     input.motion = motionAt(i * dt, speed, feed);
-    // A push in the first revolution.
+    // A force pulse in the first revolution.
     input.tip_force[0] = i < steps_per_rev / 8 ? 1.0 : 0.0;
     x.push_back(machine.step(input).displacement[0]);
   }
-  // What does not repeat from revolution to revolution is the vibration that grows or dies.
+  // The difference between revolutions is the vibration that grows or decays.
   const auto size = [&](int from, int to) {
     double sum = 0.0;
     for (int i = from * steps_per_rev; i < to * steps_per_rev; ++i) {
@@ -269,8 +267,7 @@ double growth(double depth, double rpm, bool both_axes, int steps_per_rev, Feed 
   return size(3 * revolutions / 4, revolutions) / size(revolutions / 4, revolutions / 2);
 }
 
-// First limits of the oracle (converged Chebyshev collocation; see the stability oracles): slot, one mode in
-// x.
+// Stability limits by converged Chebyshev collocation (see the stability oracles): slot, one mode in x.
 TEST(CuttingMachine, chattersAboveTheStabilityLimitOnly) {
   struct Case {
     double rpm, limit;
@@ -298,8 +295,8 @@ TEST(CuttingMachine, steadyFeedChattersAtTheSameLimits) {
   EXPECT_GT(growth(1.02 * 0.0483482e-3, 6000.0, true, 2000, Feed::steady), 1.0);
 }
 
-// Four straight teeth in a slot: the squares of their sines sum to 2 of them, so that edges that only rub are
-// a damper of C b / v_c in x. The mode is overdamped, c/m times a step 2.5 and 1.3.
+// Four straight teeth in a slot: the squares of the sines of the two engaged ones sum to 1, so that rubbing
+// edges are a damper of C b / v_c in x. The mode is overdamped: c/m times the step is 2.5 and 1.3.
 TEST(CuttingMachine, rubbingEdgesAreADamper) {
   constexpr double DAMPING = 640e3, DEPTH = 2e-3, STIFFNESS = 13e6, FREQUENCY = 5000.0, RATIO = 0.03;
   MachineModel model;
@@ -317,19 +314,19 @@ TEST(CuttingMachine, rubbingEdgesAreADamper) {
     CuttingMachine::Input input;
     input.motion = motionAt(0.0, speed, 1e-2);
     machine.engage({{0.0, PI, DEPTH}}, input.motion);
-    std::complex<double> shown = 0.0;
+    std::complex<double> response = 0.0;
     const auto steps = static_cast<int>(0.2 * rate);
     for (int i = 0; i < steps; ++i) {
       input.motion = motionAt(i / rate, speed, 1e-2);
       input.tip_force[0] = std::cos(w * i / rate);
       const double x = machine.step(input).displacement[0];
-      if (2 * i >= steps) shown += x * std::polar(4.0 / steps, -w * i / rate);
+      if (2 * i >= steps) response += x * std::polar(4.0 / steps, -w * i / rate);
     }
-    EXPECT_LT(std::abs(shown / compliance - 1.0), 0.02) << rate;
+    EXPECT_LT(std::abs(response / compliance - 1.0), 0.02) << rate;
   }
 }
 
-TEST(MillingProcess, runoutLetsOneToothOfTwoDoAllTheWork) {
+TEST(MillingProcess, runoutLeavesTheCutToOneToothOfTwo) {
   // Offset over half the feed: tooth 1 takes the chip of both, tooth 2 never touches.
   CuttingLaw law;
   law.coefficients = {1e9, 0.0, 0.0, 0.0, 0.0, 0.0};
@@ -341,18 +338,18 @@ TEST(MillingProcess, runoutLetsOneToothOfTwoDoAllTheWork) {
   for (int i = 0; i < 5000; ++i) {
     const ToolMotion motion = motionAt(i * dt, speed, feed);
     const CuttingForce force = process.step(motion);
-    process.settle({{0.0, 0.0}});
+    process.endStep({{0.0, 0.0}});
     const double angle = std::fmod(motion.angle, TWO_PI);
     double& peak = angle < PI ? first : second;
     peak = std::max(peak, force.torque);
   }
-  // Where the chip is thickest, ahead of the tool, its roundness adds nothing.
+  // At the thickest chip, in feed direction, the tool's curvature has no effect.
   EXPECT_NEAR(first, 1e9 * 2.0 * f * depth * 0.5 * 19.05e-3, 1e-4 * first);
   EXPECT_EQ(second, 0.0);
 }
 
-// By tables and by history the forces of a rigid tool with runout and uneven pitch are the same.
-TEST(MillingProcess, isRigidCutWithoutVibration) {
+// Tables and history give the same forces for a rigid tool with runout and variable pitch.
+TEST(MillingProcess, equalsRigidCutWithoutVibration) {
   MachineModel model;
   model.tool = ToolGeometry{3, 12e-3, units::radFromDeg(35.0), {2.0, 2.2, TWO_PI - 4.2}};
   model.cutting = CuttingCoefficients{953e6, 357e6, 188e6, 17.3e3, 17.7e3, 0.72e3};
@@ -376,15 +373,16 @@ TEST(MillingProcess, isRigidCutWithoutVibration) {
   EXPECT_LT(std::sqrt(squares / steps), 0.02);
 }
 
-TEST(MillingProcess, refusesContactThatCannotBe) {
+TEST(MillingProcess, refusesInvalidContact) {
   CuttingLaw law;
   MillingProcess process(endMill(2, 0.0), law, 1e-5);
   const ToolMotion turning = motionAt(0.0, 100.0, 0.0);
   EXPECT_THROW(process.engage({{0.5, 0.5, 1e-3}}, turning), Error);
   EXPECT_THROW(process.engage({{0.0, 7.0, 1e-3}}, turning), Error);
   EXPECT_THROW(process.engage({{0.0, 1.0, 0.0}}, turning), Error);
-  EXPECT_THROW(process.engage({{0.0, PI, 1e-3}}, {}), Error);                            // the spindle stands
-  EXPECT_THROW(process.engage({{0.0, PI, 1e-3}}, motionAt(0.0, 200000.0, 0.0)), Error);  // two steps a tooth
+  EXPECT_THROW(process.engage({{0.0, PI, 1e-3}}, {}), Error);  // the spindle is at rest
+  EXPECT_THROW(process.engage({{0.0, PI, 1e-3}}, motionAt(0.0, 200000.0, 0.0)),
+               Error);  // less than two steps per tooth
   EXPECT_THROW(MillingProcess(endMill(2, 0.0), law, 1e-5, {1e-6}), Error);
 }
 

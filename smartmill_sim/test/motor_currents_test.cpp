@@ -25,12 +25,12 @@ MotorTraits quiet() {
   return t;
 }
 
-/// Runs at constant velocity under a constant cut. @return channel by channel [A].
+/// Runs at constant velocity under constant forces. @return samples by channel [A]
 std::array<std::vector<double>, 4> run(MotorCurrents& motors, const std::array<double, 3>& velocity,
                                        const std::array<double, 3>& force, double torque, double speed,
                                        double duration = 3.0) {
   constexpr double RATE = 25600.0;
-  std::array<std::vector<double>, 4> shown;
+  std::array<std::vector<double>, 4> currents;
   const auto steps = static_cast<int>(duration * RATE);
   for (int i = 0; i < steps; ++i) {
     MotorCurrents::Input input;
@@ -47,8 +47,8 @@ std::array<std::vector<double>, 4> run(MotorCurrents& motors, const std::array<d
   }
   const SampleBlock block = motors.take();
   for (std::size_t i = block.size() / 3; i < block.size(); ++i)
-    for (std::size_t c = 0; c < 4; ++c) shown[c].push_back(block.at(i, c));
-  return shown;
+    for (std::size_t c = 0; c < 4; ++c) currents[c].push_back(block.at(i, c));
+  return currents;
 }
 
 double rangeOf(const std::vector<double>& samples) {
@@ -58,8 +58,8 @@ double rangeOf(const std::vector<double>& samples) {
   return 2.0 * std::sqrt(2.0 * squares);  // of a sine over many periods
 }
 
-// Cheng & Venuvinod eq. 2 and 3: the range shows weight, friction and the cut that opposes the motion, over
-// m.
+// Cheng & Venuvinod eq. 2 and 3: the range is proportional to weight, friction and the cutting force against
+// the motion.
 TEST(MotorCurrents, rangeIsTheLoadOfTheDrive) {
   MotorTraits traits = quiet();
   traits.weight = {0.0, 300.0, 0.0};
@@ -67,16 +67,16 @@ TEST(MotorCurrents, rangeIsTheLoadOfTheDrive) {
   MotorCurrents air(traits, spindle(), 1), cut(traits, spindle(), 1);
   const auto in_air = run(air, {v, v, 0.0}, {0, 0, 0}, 0.0, 200.0);
   const auto in_cut = run(cut, {v, v, 0.0}, {-250.0, -100.0, 80.0}, 0.0, 200.0);
-  const double friction = 150.0 + 600.0 * v;  // Stribeck's share is gone at ten times its velocity
+  const double friction = 150.0 + 600.0 * v;  // the Stribeck term is negligible at ten times its velocity
   EXPECT_NEAR(rangeOf(in_air[0]) * 200.0, friction, 2.0);
   EXPECT_NEAR(rangeOf(in_air[1]) * 200.0, friction + 300.0, 5.0);
   EXPECT_NEAR((rangeOf(in_cut[0]) - rangeOf(in_air[0])) * 200.0, 250.0, 3.0);
   EXPECT_NEAR((rangeOf(in_cut[1]) - rangeOf(in_air[1])) * 200.0, 100.0, 5.0);
-  // An axis at rest shows nothing (section 5).
+  // At rest there is no current range (section 5).
   EXPECT_NEAR(rangeOf(in_cut[2]), 0.0, 1e-9);
 }
 
-TEST(MotorCurrents, slowSlidesRubMore) {
+TEST(MotorCurrents, slowSlidesHaveMoreFriction) {
   const MotorTraits traits = quiet();
   const auto at = [&](double v) {
     MotorCurrents motors(traits, spindle(), 1);
@@ -87,7 +87,8 @@ TEST(MotorCurrents, slowSlidesRubMore) {
   EXPECT_NEAR(quick, 150.0 + 600.0 * 16e-3, 3.0);
 }
 
-// Below base speed torque over ampere is constant; above it both currents go with the speed (constant power).
+// Below base speed the torque per ampere is constant; above it both currents change with the speed (constant
+// power).
 TEST(MotorCurrents, spindleIsMagnetisedAndWeakensItsField) {
   const MotorTraits traits = quiet();
   const MotorCurrents motors(traits, spindle(), 1);
@@ -95,31 +96,31 @@ TEST(MotorCurrents, spindleIsMagnetisedAndWeakensItsField) {
   EXPECT_NEAR(motors.spindleRange(9.6, 100.0), std::hypot(6.0, 8.0), 1e-12);
   EXPECT_NEAR(motors.spindleRange(9.6, 330.0), std::hypot(3.0, 16.0), 1e-12);
   MotorCurrents turning(traits, spindle(), 1);
-  const auto shown = run(turning, {0, 0, 0}, {0, 0, 0}, 9.0, 100.0);
-  EXPECT_NEAR(rangeOf(shown[3]), motors.spindleRange(9.0 + 0.4 + 0.2, 100.0), 0.05);
+  const auto currents = run(turning, {0, 0, 0}, {0, 0, 0}, 9.0, 100.0);
+  EXPECT_NEAR(rangeOf(currents[3]), motors.spindleRange(9.0 + 0.4 + 0.2, 100.0), 0.05);
 }
 
-// Broms: warmth moves the constants. 20 K more: 16 % less friction, 2.2 % less force an ampere.
-TEST(MotorCurrents, aWarmDayMovesFrictionAndConstants) {
+// Broms: temperature changes the constants. 20 K more: 16 % less friction, 2.2 % less force per ampere.
+TEST(MotorCurrents, temperatureChangesFrictionAndConstants) {
   MotorTraits warm = quiet();
   warm.temperature = 40.0;
   MotorCurrents motors(warm, spindle(), 1);
   const double v = 20e-3;
-  const auto shown = run(motors, {v, 0, 0}, {0, 0, 0}, 0.0, 100.0);
-  EXPECT_NEAR(rangeOf(shown[0]) * 200.0, 0.84 * (150.0 + 600.0 * v) / 0.978, 2.0);
+  const auto currents = run(motors, {v, 0, 0}, {0, 0, 0}, 0.0, 100.0);
+  EXPECT_NEAR(rangeOf(currents[0]) * 200.0, 0.84 * (150.0 + 600.0 * v) / 0.978, 2.0);
   MotorTraits warming = quiet();
   warming.warm_up = 0.05;
   warming.warm_up_time = 1.0;
   MotorCurrents busy(warming, spindle(), 1);
   run(busy, {0, 0, 0}, {0, 0, 0}, 0.0, 500.0, 8.0);
-  // Power of friction: (1.0 + 0.4) N m x 500 rad/s, less by what it warms: T = 20 + 0.05 P (1 - 0.008 (T -
+  // Friction power: (1.0 + 0.4) N m x 500 rad/s, reduced by its own warming: T = 20 + 0.05 P (1 - 0.008 (T -
   // 20)).
   const double power = (2e-3 * 500.0 + 0.4) * 500.0;
   const double rise = 0.05 * power / (1.0 + 0.05 * power * 0.008);
   EXPECT_NEAR(busy.temperature(), 20.0 + rise, 0.05 * rise);
 }
 
-TEST(MotorCurrents, samplesStandAtOneKilohertz) {
+TEST(MotorCurrents, samplesAreAtOneKilohertz) {
   MotorCurrents motors(quiet(), spindle(), 1);
   MotorCurrents::Input input;
   std::uint64_t next = 0;

@@ -1,4 +1,5 @@
-// Wiring of sim_node: blocks without a hole, one clock for both sensors, blows, truth for late subscribers.
+// Interfaces of sim_node: blocks without gaps, a common clock of both sensors, hits, true values for late
+// subscribers.
 
 #include <cmath>
 #include <functional>
@@ -28,7 +29,7 @@ class SimNode : public testing::Test {
  protected:
   SimNode() : spinner(2) { spinner.start(); }
 
-  /// Shared with the callback, which may run until the subscriber is gone.
+  /// Shared with the callback, which may run until the subscriber is destroyed.
   template <class Message>
   std::shared_ptr<std::vector<Message>> collect(const std::string& topic) {
     const auto into = std::make_shared<std::vector<Message>>();
@@ -41,7 +42,7 @@ class SimNode : public testing::Test {
     return into;
   }
 
-  /// Patience is wall time, what is asserted is not.
+  /// Waits in wall time; the assertions do not depend on it.
   bool until(const std::function<bool()>& done) {
     for (int k = 0; k < 12000 && ros::ok(); ++k) {
       {
@@ -72,7 +73,7 @@ class SimNode : public testing::Test {
   ros::AsyncSpinner spinner;
 };
 
-TEST_F(SimNode, blocksHaveNoHolesAndShareOneClock) {
+TEST_F(SimNode, blocksHaveNoGapsAndShareOneClock) {
   const auto hammer_ = collect<smartmill_msgs::SampleBlock>(names::HAMMER);
   auto& hammer = *hammer_;
   const auto dynamometer_ = collect<smartmill_msgs::SampleBlock>(names::DYNAMOMETER);
@@ -107,7 +108,7 @@ TEST_F(SimNode, blocksHaveNoHolesAndShareOneClock) {
     ASSERT_NEAR((angle[i].header.stamp - angle[i - 1].header.stamp).toSec(), 0.005, 2e-6);
 }
 
-TEST_F(SimNode, aBlowOnTheSensorIsSeenByBoth) {
+TEST_F(SimNode, aHitOnTheSensorActsOnBothChannels) {
   const auto hammer_ = collect<smartmill_msgs::SampleBlock>(names::HAMMER);
   auto& hammer = *hammer_;
   const auto dynamometer_ = collect<smartmill_msgs::SampleBlock>(names::DYNAMOMETER);
@@ -127,7 +128,7 @@ TEST_F(SimNode, aBlowOnTheSensorIsSeenByBoth) {
       << " N, " << force << " N";
 }
 
-TEST_F(SimNode, aBlowThatCannotBeIsRefusedInOneLine) {
+TEST_F(SimNode, anInvalidHitIsRefusedInOneLine) {
   const auto nonsense = strike(names::STRIKE, "moon", "x");
   EXPECT_EQ(nonsense.response.code, smartmill_msgs::Strike::Response::FAILED);
   EXPECT_NE(nonsense.response.message.find("moon"), std::string::npos);
@@ -135,7 +136,7 @@ TEST_F(SimNode, aBlowThatCannotBeIsRefusedInOneLine) {
   EXPECT_EQ(strike(names::STRIKE, "tool", "x").response.code, smartmill_msgs::Strike::Response::FAILED);
 }
 
-TEST_F(SimNode, anOperatorIsAskedAndHits) {
+TEST_F(SimNode, anOperatorHitsByHand) {
   const auto dynamometer_ = collect<smartmill_msgs::SampleBlock>("by_hand/dynamometer");
   auto& dynamometer = *dynamometer_;
   ASSERT_TRUE(until([&] { return dynamometer.size() > 2; }));
@@ -151,7 +152,7 @@ TEST_F(SimNode, anOperatorIsAskedAndHits) {
   }));
 }
 
-TEST_F(SimNode, servoStreamHasNoHolesAtOneKilohertz) {
+TEST_F(SimNode, servoStreamHasNoGapsAtOneKilohertz) {
   const auto blocks = collect<smartmill_msgs::SampleBlock>(names::daq("servo"));
   ASSERT_TRUE(until([&] { return blocks->size() > 100; }));
   const std::lock_guard<std::mutex> lock(mutex);
@@ -164,7 +165,7 @@ TEST_F(SimNode, servoStreamHasNoHolesAtOneKilohertz) {
   }
 }
 
-TEST_F(SimNode, thePanelsKeysAnswerAndRefuse) {
+TEST_F(SimNode, panelKeysActOrRefuse) {
   const auto press = [&](const std::string& key, const std::vector<double>& values) {
     ros::ServiceClient client = nh.serviceClient<smartmill_msgs::PanelKey>("sim/panel/" + key);
     EXPECT_TRUE(client.waitForExistence(ros::Duration(120.0)));
@@ -175,7 +176,7 @@ TEST_F(SimNode, thePanelsKeysAnswerAndRefuse) {
   };
   EXPECT_EQ(press("mode", {1.0}).message, "mode: done");
   EXPECT_EQ(press("mode", {77.0}).code, smartmill_msgs::PanelKey::Response::REFUSED);
-  EXPECT_EQ(press("mode", {}).message, "mode: 0 values, 1 due");
+  EXPECT_EQ(press("mode", {}).message, "mode: 0 values, expected 1");
   EXPECT_EQ(press("emergency_stop", {1.0}).message, "emergency_stop: done");
   EXPECT_EQ(press("cycle_start", {}).message, "cycle_start: EW_ALARM");
   EXPECT_EQ(press("emergency_stop", {0.0}).message, "emergency_stop: done");
@@ -187,7 +188,7 @@ TEST_F(SimNode, thePanelsKeysAnswerAndRefuse) {
   EXPECT_EQ(press("mode", {10.0}).message, "mode: done");
 }
 
-TEST_F(SimNode, lateSubscribersGetAllOfTheTruth) {
+TEST_F(SimNode, lateSubscribersGetAllTrueValues) {
   const auto modes_ = collect<smartmill_msgs::ModalModel>(names::TRUE_MODES);
   auto& modes = *modes_;
   const auto frfs_ = collect<smartmill_msgs::Frf>(names::TRUE_FRF);

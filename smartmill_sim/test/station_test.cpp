@@ -1,4 +1,4 @@
-// The hammer station: the tool as a beam on its spindle, the sensor before a round and fluted tool, the
+// The hammer station: the tool as a beam on its spindle, the sensor in front of a round, fluted tool, the
 // solenoid.
 
 #include <algorithm>
@@ -23,7 +23,7 @@ namespace {
 
 constexpr double PI = units::PI;
 
-// A carbide tool of 12 mm, 60 mm out.
+// A carbide tool, diameter 12 mm, stickout 60 mm.
 RoundBeam slender() {
   RoundBeam beam;
   beam.length = 60e-3;
@@ -41,7 +41,7 @@ double massPerLength(const RoundBeam& b) {
   return b.density * 0.25 * PI * b.shank_diameter * b.shank_diameter;
 }
 
-/// [Hz] of the beam, `held` degrees of freedom of the first node fixed.
+/// Natural frequencies [Hz] of the beam with `held` fixed degrees of freedom at the first node.
 std::vector<double> frequencies(const RoundBeam& beam, Eigen::Index held) {
   const RoundBeam::Matrices m = beam.matrices(24);
   const Eigen::Index n = m.mass.rows() - held;
@@ -55,7 +55,7 @@ std::vector<double> frequencies(const RoundBeam& beam, Eigen::Index held) {
 }
 
 // Euler and Bernoulli: cos b cosh b = 1 free, -1 clamped (Blevins).
-TEST(RoundBeam, HasTheClosedFormsFrequencies) {
+TEST(RoundBeam, HasTheClosedFormFrequencies) {
   const RoundBeam beam = slender();
   const double unit =
       std::sqrt(beam.young * inertiaOf(beam) / massPerLength(beam)) / (2.0 * PI * beam.length * beam.length);
@@ -74,7 +74,7 @@ TEST(RoundBeam, HasTheClosedFormsFrequencies) {
 }
 
 // F L^3 / 3 E I, and with shear F L / (kappa G A) more; two sections by the unit load theorem.
-TEST(RoundBeam, BendsAsTheClosedForms) {
+TEST(RoundBeam, HasTheClosedFormCompliance) {
   for (const bool shear : {false, true}) {
     RoundBeam beam = slender();
     beam.shear = shear;
@@ -97,14 +97,14 @@ TEST(RoundBeam, BendsAsTheClosedForms) {
   }
 }
 
-// A tool that does not bend, on one mode that does not turn: the mass stands on the mode.
-TEST(CoupledTool, ARigidToolAddsItsMass) {
+// A rigid tool on one mode without rotation: its mass adds to the modal mass.
+TEST(CoupledTool, RigidToolAddsItsMass) {
   RoundBeam beam = slender();
   beam.young = 1e16;
   const FaceMode mode{800.0, 0.02, 5e7, 0.0};
   const CoupledTool tool(beam, {mode}, {1e13, 1e9, 0.0}, 0.0);
   const double mass = 5e7 / std::pow(2.0 * PI * 800.0, 2), more = massPerLength(beam) * beam.length;
-  // Joint and tool give by 1e-5 of the mode's stiffness.
+  // The compliance of joint and tool is 1e-5 of the mode's.
   EXPECT_NEAR(tool.frequencies()[0], std::sqrt(5e7 / (mass + more)) / (2.0 * PI), 0.01);
   // c stays, so the ratio falls with the root of k m.
   const ModalModel tip = tool.between(0.0, 0.0, 5000.0);
@@ -133,14 +133,14 @@ Eigen::Matrix4d freeReceptance(const RoundBeam& beam, double f) {
         return Eigen::RowVector4d(scale * Eigen::RowVector4d(s, -c, sh, ch));
     }
   };
-  Eigen::Matrix4d load, place;
+  Eigen::Matrix4d load, deflection;
   load << ei * derivative(3, 0.0), -ei * derivative(2, 0.0), -ei * derivative(3, l), ei * derivative(2, l);
-  place << derivative(0, 0.0), derivative(1, 0.0), derivative(0, l), derivative(1, l);
-  return place * load.inverse();
+  deflection << derivative(0, 0.0), derivative(1, 0.0), derivative(0, l), derivative(1, l);
+  return deflection * load.inverse();
 }
 
-// Receptance coupling with the closed form of the beam against the sum of modes.
-TEST(CoupledTool, MeetsReceptanceCouplingOfClosedForms) {
+// The sum of modes against receptance coupling with the closed form of the beam.
+TEST(CoupledTool, MatchesReceptanceCouplingOfClosedForms) {
   const RoundBeam beam = slender();
   const std::vector<FaceMode> spindle{{650.0, 1e-5, 9e7, 6.0}, {1400.0, 1e-5, 7e7, -12.0}};
   const Joint joint{2e8, 5e4, 0.0};
@@ -173,8 +173,8 @@ ToolGeometry mill(int teeth, double diameter) {
   return tool;
 }
 
-// Why eq. 4.44 errs: it takes every mode to bend as a cantilever.
-TEST(ToolStructure, ModesDifferInHowTheyShowAtTheHammer) {
+// Error of eq. 4.44: it assumes the shape of a cantilever for every mode.
+TEST(ToolStructure, ModesDifferInTheirRatioOfTipToHammer) {
   StationTraits traits;
   traits.structure = "beam";
   traits.plane_turn = 0.1;
@@ -209,8 +209,8 @@ smartmill::HammerStation stationModel() {
   return h;
 }
 
-// A disc before a cylinder: C ~ integral of dA / (g + R - sqrt(R^2 - y^2)), here by Simpson's rule.
-TEST(GapSensor, SeesRoundness) {
+// A disc in front of a cylinder: C ~ integral of dA / (g + R - sqrt(R^2 - y^2)), here by Simpson's rule.
+TEST(GapSensor, IntegratesOverACylinder) {
   StationTraits traits;
   traits.electrode = 3e-3;
   smartmill::HammerStation station = stationModel();
@@ -219,7 +219,7 @@ TEST(GapSensor, SeesRoundness) {
   for (const double diameter : {40e-3, 20e-3, 10e-3, 6e-3}) {
     const ToolSurface surface(traits, mill(4, diameter), 0.0);
     GapSensor sensor(traits, station, 0.5 * PI);
-    sensor.face(surface, 0.3, 0.0, 0.0);
+    sensor.setTarget(surface, 0.3, 0.0, 0.0);
     const double r = 1.5e-3, R = 0.5 * diameter, g = 200e-6;
     double capacity = 0.0;
     constexpr int STEPS = 4000;
@@ -237,20 +237,21 @@ TEST(GapSensor, SeesRoundness) {
   }
 }
 
-TEST(GapSensor, APointBeforeAFluteShowsTheNominalCurve) {
+TEST(GapSensor, APointSensorAtAnEdgeHasTheNominalCurve) {
   const StationTraits traits;
   const smartmill::HammerStation station = stationModel();
   const ToolSurface surface(traits, mill(4, 19e-3), station.flute_depth);
   GapSensor sensor(traits, station, 0.5 * PI);
-  sensor.face(surface, 0.5 * PI, 0.0, 0.0);
+  sensor.setTarget(surface, 0.5 * PI, 0.0, 0.0);
   for (const double gap : {150e-6, 250e-6, 500e-6})
     EXPECT_NEAR(sensor.voltage(gap), 10.0 * (250e-6 / gap - 1.0), 1e-9);
-  // Halfway to the next tooth: the floor, or nearly.
-  sensor.face(surface, 0.25 * PI, 0.0, 0.0);
+  // Halfway to the next tooth: nearly the floor of the flute.
+  sensor.setTarget(surface, 0.25 * PI, 0.0, 0.0);
   EXPECT_NEAR(sensor.clearance(100e-6), 1.1e-3, 0.02e-3);
-  // The helix: at a height z the flute stands where the spindle has turned on by z tan(helix) / R.
+  // Helix: at a height z the edge faces the sensor after a further rotation of the spindle by z tan(helix) /
+  // R.
   const double lag = 7.5e-3 * std::tan(units::radFromDeg(30.0)) / 9.5e-3;
-  sensor.face(surface, 0.5 * PI + lag, 7.5e-3, 0.0);
+  sensor.setTarget(surface, 0.5 * PI + lag, 7.5e-3, 0.0);
   EXPECT_NEAR(sensor.clearance(100e-6), 100e-6, 1e-9);
 }
 
@@ -262,11 +263,11 @@ TEST(GapSensor, LowTeethEccentricityAndHousing) {
   const smartmill::HammerStation station = stationModel();
   const ToolSurface surface(traits, mill(4, 19e-3), station.flute_depth);
   GapSensor sensor(traits, station, 0.0);
-  sensor.face(surface, 0.0, 0.0, 0.0);  // tooth 1, thrown out
+  sensor.setTarget(surface, 0.0, 0.0, 0.0);  // tooth 1, at the eccentric side
   EXPECT_NEAR(sensor.clearance(100e-6), 80e-6, 1e-9);
-  sensor.face(surface, -0.5 * PI, 0.0, 0.0);  // tooth 2
+  sensor.setTarget(surface, -0.5 * PI, 0.0, 0.0);  // tooth 2
   EXPECT_NEAR(sensor.clearance(100e-6), 130e-6, 1e-6);
-  // Ten teeth: between two of them the sensor's middle sees the floor, its housing meets the edges.
+  // Ten teeth: between two of them the sensor's centre faces the floor, its housing the edges.
   StationTraits round;
   round.housing = 10e-3;
   round.rake_flank = round.relief_flank = 0.1;
@@ -274,12 +275,12 @@ TEST(GapSensor, LowTeethEccentricityAndHousing) {
   straight.helix = 0.0;
   const ToolSurface many(round, straight, 1e-3);
   GapSensor between(round, station, 0.0);
-  between.face(many, units::radFromDeg(18.0), 0.0, 0.0);
+  between.setTarget(many, units::radFromDeg(18.0), 0.0, 0.0);
   const double edge = 9.5e-3 * (1.0 - std::cos(units::radFromDeg(18.0)));
-  EXPECT_NEAR(between.clearance(0.0), edge, 60e-6);  // spots of 0.3 mm, steep there
+  EXPECT_NEAR(between.clearance(0.0), edge, 60e-6);  // spots of 0.3 mm on a steep flank
   EXPECT_LT(between.voltage(250e-6), -7.0);
-  // The helix turns an edge by 17.4 degrees of these 18 before the housing's upper end.
-  between.face(ToolSurface(round, mill(10, 19e-3), 1e-3), units::radFromDeg(18.0), 0.0, 0.0);
+  // Up to the upper end of the housing the helix shifts an edge by 17.4 of these 18 degrees.
+  between.setTarget(ToolSurface(round, mill(10, 19e-3), 1e-3), units::radFromDeg(18.0), 0.0, 0.0);
   EXPECT_NEAR(between.clearance(0.0), 0.0, 30e-6);
 }
 
@@ -315,12 +316,12 @@ TEST(Solenoid, HalfSineBounceAndCurrent) {
   EXPECT_NEAR(mean(first), 200.0, 3.0);  // 4 sigma of 200: 2.8 N
   EXPECT_NEAR(mean(second), 80.0, 5.0);
   EXPECT_GT(*std::max_element(first.begin(), first.end()), 215.0);
-  // The current has its final value when the hammer touches, then dies away.
+  // The current reaches its final value at the contact, then decays.
   EXPECT_NEAR(plain.current(0.003), 1.0 - std::exp(-1.0), 1e-9);
   EXPECT_NEAR(plain.current(0.033), (1.0 - std::exp(-10.0)) * std::exp(-1.0), 1e-9);
 }
 
-TEST(StationTraits, NameWhatContradicts) {
+TEST(StationTraits, ErrorNamesTheInconsistentKey) {
   StationTraits traits;
   traits.spindle_slope.pop_back();
   try {

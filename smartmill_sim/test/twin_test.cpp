@@ -54,7 +54,7 @@ TEST(SpindleDrive, frictionIsZeroBelowItsSpeed) {
   EXPECT_NEAR(drive.friction(1000.0), 0.45, 1e-12);
 }
 
-// Whole revolutions of a slot: mean forces and torque are the closed forms N a / 4 ..., eq. 3.19.
+// Complete revolutions of a slot: mean forces and torque in closed form (eq. 3.19).
 TEST(Twin, meanForceOfASlotIsTheClosedForm) {
   SimulationOptions options;
   options.noise = false;
@@ -67,10 +67,10 @@ TEST(Twin, meanForceOfASlotIsTheClosedForm) {
   const double speed = slot().spindle_speed;
   const double steady = 4e-4 * (torque + 4e-4 * speed + 0.05) * speed;
   EXPECT_NEAR(record.column("load_meter").back() / steady, 1.0,
-              2e-3);  // ripple of the tooth passing through 7 Hz
+              2e-3);  // tooth passing ripple through 7 Hz
 }
 
-TEST(Twin, nothingBeforeTheEngagement) {
+TEST(Twin, noForceBeforeTheEngagement) {
   CampaignTest test = slot();
   test.engage_time = 0.02;
   SimulationOptions options;
@@ -80,7 +80,7 @@ TEST(Twin, nothingBeforeTheEngagement) {
   EXPECT_GT(std::abs(record.column("fy")[530]), 1.0);
 }
 
-// A smooth hit; a record that shows an answer of a channel says what was hit.
+// A smooth hit; the responding channel identifies the target.
 Record tapOf(const std::string& answering) {
   Record record;
   const std::size_t samples = 4096, hit = 200;
@@ -88,7 +88,7 @@ Record tapOf(const std::string& answering) {
   for (const char* c : {"hammer", "fx", "tool_x", "acceleration"}) {
     std::vector<double>& column = record.add(c);
     column.assign(samples, 0.0);
-    for (std::size_t i = 0; i < samples; ++i) column[i] = i % 2 == 0 ? 1e-9 : -1e-9;  // quiet, not dead
+    for (std::size_t i = 0; i < samples; ++i) column[i] = i % 2 == 0 ? 1e-9 : -1e-9;  // noise, not zero
     if (c == answering) column[hit + 5] = 1.0;
   }
   for (std::size_t i = 0; i < 20; ++i)
@@ -112,9 +112,9 @@ MachineModel flexibleMill() {
   return model;
 }
 
-// What cut and tool did for one model serves others that differ behind the tool, and of a rigid tool in
-// coefficients and wear: to the digit.
-TEST(Twin, heldTracesChangeNothing) {
+// A cached trace of one model gives identical records for models that differ after the tool, for a rigid tool
+// also in coefficients and wear.
+TEST(Twin, cachedTracesGiveIdenticalRecords) {
   MachineModel rigid = flexibleMill();
   rigid.tool_tip = {};
   for (const MachineModel& first : {rigid, flexibleMill()}) {
@@ -141,9 +141,9 @@ TEST(Twin, heldTracesChangeNothing) {
   }
 }
 
-// The same of a tool that its displacement guides: in coefficients, wear, damping and the tool's own modes.
-// Damping and geometry are the cut's: none of the others stands for them.
-TEST(Twin, heldSumsOfAGuidedToolChangeNothing) {
+// The same with a prescribed motion of the tip: models may differ in coefficients, wear and the tool's modes.
+// Damping and geometry belong to the cut and are not shared.
+TEST(Twin, cachedSumsOfAGuidedToolGiveIdenticalRecords) {
   CampaignTest test = slot();
   test.engage_time = 0.01;
   test.cut_time_before = 10.0;
@@ -172,8 +172,9 @@ TEST(Twin, heldSumsOfAGuidedToolChangeNothing) {
   EXPECT_NE(valuesOfTrace(harder, TestKind::cut, true), valuesOfTrace(cornered, TestKind::cut, true));
 }
 
-// A channel asked for alone shows what it shows among all; its values tell when it shows something else.
-TEST(Twin, channelsAskedForAloneAreThoseOfTheRecord) {
+// A channel simulated alone equals the same channel of the whole record; its key changes if and only if the
+// channel does.
+TEST(Twin, singleChannelsEqualThoseOfTheRecord) {
   CampaignTest test = slot();
   test.engage_time = 0.01;
   const MachineModel first = flexibleMill();
@@ -181,18 +182,18 @@ TEST(Twin, channelsAskedForAloneAreThoseOfTheRecord) {
   sensor.force_sensor.axis[0].modes.front().frequency *= 1.1;
   delayed.effects = {effectEntry("channel_delay", {{"delay_us", 30.0}}, {{"channel", "fy"}})};
   mixed.effects = {effectEntry("cross_talk", {{"xy", 0.1}})};
-  EXPECT_FALSE(channelsApart(mixed));
+  EXPECT_FALSE(channelsAreIndependent(mixed));
   mixed.effects = {effectEntry("empirical:resonance",
                                {{"frequency_hz", 870.0}, {"damping_ratio", 0.03}, {"gain", 0.3}},
                                {{"channel", "fz"}, {"from", "fx"}})};
-  EXPECT_FALSE(channelsApart(mixed));
+  EXPECT_FALSE(channelsAreIndependent(mixed));
   SimulationOptions options;
   options.noise = false;
   options.phase = 1.0;
   const std::vector<std::string> channels{"fx", "fy", "fz", "tool_x", "tool_y"};
   const Record nominal = simulateTest(first, test, blank(), options);
   for (const MachineModel& model : {sensor, delayed}) {
-    ASSERT_TRUE(channelsApart(model));
+    ASSERT_TRUE(channelsAreIndependent(model));
     options.channels = nullptr;
     const Record all = simulateTest(model, test, blank(), options);
     for (const std::string& c : channels) {
@@ -208,9 +209,9 @@ TEST(Twin, channelsAskedForAloneAreThoseOfTheRecord) {
   }
 }
 
-// Guided by the displacement that was measured, forces are those of the cut whatever is believed of the
-// structure, which shows in the displacement alone; with what is true of it that is the measured one.
-TEST(Twin, guidedByItsDisplacementTheStructureOnlyShows) {
+// With the measured displacement the forces are independent of the modelled structure, which changes the
+// displacement alone; with the true structure it equals the measured one.
+TEST(Twin, guidedByDisplacementForcesDoNotDependOnTheStructure) {
   CampaignTest test = slot();
   test.engage_time = 0.01;
   SimulationOptions options;
@@ -236,9 +237,9 @@ TEST(Twin, guidedByItsDisplacementTheStructureOnlyShows) {
   EXPECT_LT(std::sqrt(shift / displacement), 0.01);
 }
 
-// Without these channels the force that was measured, through sensor and structure, says where the tip was:
-// what is true of the cut follows the record, and what is wrong of it stays finite where it would run away.
-TEST(Twin, guidedByItsForcesNothingRunsAway) {
+// Without these channels the motion of the tip follows from the measured force through sensor and structure:
+// a true model reproduces the record, a wrong one stays finite where a free simulation would be unstable.
+TEST(Twin, guidedByForcesAWrongModelStaysFinite) {
   CampaignTest test = slot();
   test.engage_time = 0.01;
   MachineModel truth = flexibleMill();
@@ -254,7 +255,7 @@ TEST(Twin, guidedByItsForcesNothingRunsAway) {
   for (const char* c : {"spindle_angle", "fx", "fy", "fz"}) forces.add(c).assign(forces.time.size(), 0.0);
   const Record measured = simulateTest(truth, test, forces, options);
   options.noise = false;
-  const auto left = [&](const MachineModel& model, bool guided) {
+  const auto residual = [&](const MachineModel& model, bool guided) {
     options.guided = guided;
     const Record simulated = simulateTest(model, test, measured, options);
     double squares = 0.0;
@@ -264,20 +265,20 @@ TEST(Twin, guidedByItsForcesNothingRunsAway) {
     }
     return std::sqrt(squares / (2.0 * static_cast<double>(measured.size())));  // [N]
   };
-  EXPECT_LT(left(truth, false), 1.05);
-  EXPECT_LT(left(truth, true), 1.5);
+  EXPECT_LT(residual(truth, false), 1.05);
+  EXPECT_LT(residual(truth, true), 1.5);
   MachineModel wrong = truth;
   wrong.cutting->ktc *= 4.0;
   wrong.cutting->krc *= 4.0;
   double size = 0.0;
   for (const double f : measured.column("fx")) size = std::max(size, std::abs(f));
-  EXPECT_GT(left(wrong, false), 2.0 * left(wrong, true));
-  EXPECT_LT(left(wrong, true), 4.0 * size);
+  EXPECT_GT(residual(wrong, false), 2.0 * residual(wrong, true));
+  EXPECT_LT(residual(wrong, true), 4.0 * size);
 }
 
-// A record out of the midst of a cut begins in the steady state: it comes again with every tooth from its
-// first sample on, and is what a record with the engagement in it settles to.
-TEST(Twin, aRecordOutOfARunningCutIsSteady) {
+// A record from the middle of a cut begins in the steady state: it is periodic from its first sample on and
+// equals the final state of a record that includes the engagement.
+TEST(Twin, aRecordOfARunningCutIsSteady) {
   MachineModel model = mill();
   model.tool_tip.x.modes = {{1210.0, 0.031, 1.0 / 28e6}};
   model.tool_tip.y.modes = {{1180.0, 0.029, 1.0 / 31e6}};
@@ -297,8 +298,8 @@ TEST(Twin, aRecordOutOfARunningCutIsSteady) {
     const std::vector<double>&a = settled.column(channel), &b = running.column(channel);
     double largest = 0.0;
     for (const double v : a) largest = std::max(largest, std::abs(v));
-    // 50 revolutions of 256 samples lie between the two. Four time constants of the load meter after the cut
-    // has come to its full depth a hundredth of the last of its growth is left.
+    // 50 revolutions of 256 samples lie between the two. The transient of the load meter has decayed to a
+    // hundredth: four time constants since the full depth.
     for (std::size_t i = 0; i < b.size(); ++i)
       ASSERT_NEAR(b[i], a[i + 50 * 256], 2e-3 * largest) << channel << i;
   }
@@ -311,7 +312,7 @@ TEST(Twin, meanSamplesAreMeansOverTheirIntervals) {
   CampaignTest air = slot();
   air.kind = TestKind::air;
   air.engagement.reset();
-  air.sample_rate = 2000.0;  // twenty samples a turn
+  air.sample_rate = 2000.0;  // twenty samples per revolution
   SimulationOptions options;
   options.noise = false;
   options.phase = 0.0;
@@ -319,11 +320,11 @@ TEST(Twin, meanSamplesAreMeansOverTheirIntervals) {
   model.force_sensor.mean_samples = true;
   const Record mean = simulateTest(model, air, 0.2, options);
   const double x = units::PI * 100.0 / 2000.0, expected = std::sin(x) / x;
-  // Left out: of the order of x^4 / 20.
+  // Error of the order of x^4 / 20.
   EXPECT_NEAR(rms(mean.column("fx")) / rms(instant.column("fx")), expected, 5e-5);
 }
 
-TEST(Twin, tapActsOnWhatAnswers) {
+TEST(Twin, tapActsOnTheRespondingTarget) {
   MachineModel model = mill();
   model.tool_tip.x.modes = {{700.0, 0.03, 1.0 / 28e6}};
   CampaignTest test = slot();
@@ -343,7 +344,7 @@ TEST(Twin, tapActsOnWhatAnswers) {
   // derivative.
   const double impulse = mean(tip.column("hammer")) * static_cast<double>(tip.size()) / 25600.0;
   const double w = units::TWO_PI * 700.0, z = 0.03, wd = w * std::sqrt(1.0 - z * z);
-  // Of a 0.8 ms hit the mode sees a part, the hit's spectrum at its frequency: the same one in x and x''.
+  // A 0.8 ms hit excites the mode by its spectrum at the natural frequency, equally in x and x''.
   const std::vector<double>& x = tip.column("tool_x");
   const std::vector<double>& a = tip.column("acceleration");
   double largest = 0.0;
@@ -356,7 +357,7 @@ TEST(Twin, tapActsOnWhatAnswers) {
   }
 }
 
-TEST(Twin, refusesWhatItCannotRun) {
+TEST(Twin, refusesIncompleteModels) {
   MachineModel model = mill();
   model.effects.push_back({});
   EXPECT_THROW(simulateTest(model, slot(), 0.1, {}), Error);
@@ -365,7 +366,7 @@ TEST(Twin, refusesWhatItCannotRun) {
   EXPECT_THROW(simulateTest(model, slot(), 0.1, {}), Error);
 }
 
-/// What an independent program hid in its campaigns.
+/// Effects of the campaigns that an independent program generated.
 std::map<std::string, std::vector<EffectEntry>> hiddenEffects() {
   return {{"none", {}},
           {"runout", {effectEntry("runout", {{"offset_um", 21.08}, {"angle_deg", 261.8}})}},
@@ -379,29 +380,29 @@ std::map<std::string, std::vector<EffectEntry>> hiddenEffects() {
           {"vibrating_runout", {effectEntry("runout", {{"offset_um", 21.98}, {"angle_deg", 217.9}})}}};
 }
 
-/// RMS of what the true model leaves of a channel, in units of its noise, from some samples on.
-struct Left {
+/// Residual of a channel with the true model, in units of its noise.
+struct Residual {
   double squares = 0.0;
   std::size_t samples = 0;
 
-  void add(const Left& other) {
+  void add(const Residual& other) {
     squares += other.squares;
     samples += other.samples;
   }
   double gap() const { return std::sqrt(squares / static_cast<double>(samples)); }
-  /// 1.05, and four standard deviations of so few samples' noise.
+  /// At least 1.05; four standard deviations of the gap of so few samples.
   double limit() const { return std::max(1.05, 1.0 + 4.0 / std::sqrt(2.0 * static_cast<double>(samples))); }
 };
 
-Left leftOf(const Record& measured, const Record& simulated, const std::string& channel, double noise,
-            std::size_t from, std::size_t to) {
-  Left left;
+Residual residualOf(const Record& measured, const Record& simulated, const std::string& channel, double noise,
+                    std::size_t from, std::size_t to) {
+  Residual residual;
   const std::vector<double>&m = measured.column(channel), &s = simulated.column(channel);
   for (std::size_t i = from; i < std::min(to, m.size()); ++i) {
-    left.squares += std::pow((m[i] - s[i]) / noise, 2);
-    ++left.samples;
+    residual.squares += std::pow((m[i] - s[i]) / noise, 2);
+    ++residual.samples;
   }
-  return left;
+  return residual;
 }
 
 /// Noise RMS that the campaigns state: 1 N, 0.22 mV with the rounding, 0.05 um.
@@ -411,12 +412,13 @@ const std::map<std::string, double>& statedNoise() {
   return NOISE;
 }
 
-/// Largest gap of a channel of one test: 1.05, but for one cut near its stability limit. There any difference
-/// of two solutions of the same equations lives on as the tool's own motion (1131 Hz, multiplier 0.985 a
-/// turn) and becomes 15 times as large in seven turns: so do this twin's at 4 and at 16 steps a sample (0.15
-/// of the noise), and so does what is left, which lies on that line, below the noise in the first turns. This
-/// twin's steps make a tenth of its squares, the digits of the hidden runout a twentieth; the 0.04 N to which
-/// the other program states to have converged would, fifteenfold, make 0.6 N, and 0.5 N are left.
+/// Largest gap of a channel of one test: 1.05, except for one cut near its stability limit. There the
+/// difference of two solutions of the same equations persists as the tool's own motion (1131 Hz, multiplier
+/// 0.985 per revolution) and grows 15 times in seven revolutions: so does the difference of this twin at 4
+/// and at 16 steps per sample (0.15 of the noise), and so does the residual, which is at that frequency and
+/// below the noise in the first revolutions. The steps of this twin contribute a tenth of its squares, the
+/// rounding of the hidden runout a twentieth; the stated convergence of the other program, 0.04 N, amounts to
+/// 0.6 N after this growth; the residual is 0.5 N.
 double allowedGap(const std::string& campaign, const CampaignTest& test, const std::string& channel) {
   static const std::map<std::string, double> NEAR_ITS_LIMIT{
       {"fx", 1.13}, {"fy", 1.09}, {"tool_x", 1.07}, {"tool_y", 1.23}};
@@ -425,9 +427,9 @@ double allowedGap(const std::string& campaign, const CampaignTest& test, const s
   return allowed == NEAR_ITS_LIMIT.end() ? 1.05 : allowed->second;
 }
 
-// Campaigns made by another program, its models and effects exact: what is left must be its noise, on every
+// Campaigns of another program with its exact models and effects: the residual must be its noise on every
 // channel of every test, from the first revolutions after the engagement on.
-TEST(Twin, leavesOnlyTheNoiseOfIndependentCampaigns) {
+TEST(Twin, residualOfIndependentCampaignsIsTheirNoise) {
   SMARTMILL_SHARED_DATA(folder, "campaigns");
   for (const auto& [name, effects] : hiddenEffects()) {
     const Campaign campaign = readCampaign(folder + "/" + name);
@@ -435,35 +437,35 @@ TEST(Twin, leavesOnlyTheNoiseOfIndependentCampaigns) {
     model.effects = effects;
     SimulationOptions options;
     options.noise = false;
-    std::map<std::string, Left> whole;
+    std::map<std::string, Residual> whole;
     std::size_t checked = 0;
     for (const CampaignTest& test : campaign.tests) {
       const Record measured = readRecord(campaign, test);
       const Record simulated = simulateTest(model, test, measured, options);
       for (const auto& [channel, noise] : statedNoise()) {
         if (!measured.has(channel)) continue;
-        const Left left = leftOf(measured, simulated, channel, noise, 0, measured.size());
-        whole[channel].add(left);
-        EXPECT_LE(left.gap(), allowedGap(name, test, channel)) << name << " " << test.name << " " << channel;
+        const Residual residual = residualOf(measured, simulated, channel, noise, 0, measured.size());
+        whole[channel].add(residual);
+        EXPECT_LE(residual.gap(), allowedGap(name, test, channel))
+            << name << " " << test.name << " " << channel;
         ++checked;
         if (test.kind != TestKind::cut) continue;
         const auto begin = static_cast<std::size_t>(*test.engage_time * test.sample_rate);
         const double turn = units::TWO_PI / test.spindle_speed * test.sample_rate;
-        const Left first =
-            leftOf(measured, simulated, channel, noise, begin, begin + static_cast<std::size_t>(2.0 * turn));
+        const Residual first = residualOf(measured, simulated, channel, noise, begin,
+                                          begin + static_cast<std::size_t>(2.0 * turn));
         EXPECT_LE(first.gap(), first.limit())
             << name << " " << test.name << " " << channel << ", first revolutions";
       }
     }
     const bool vibrates = !model.tool_tip.x.modes.empty();
     EXPECT_EQ(checked, vibrates ? 21u * 3u + 18u + 12u * 2u : 21u * 3u + 18u) << name;
-    for (const auto& [channel, left] : whole) EXPECT_LE(left.gap(), 1.02) << name << " " << channel;
+    for (const auto& [channel, residual] : whole) EXPECT_LE(residual.gap(), 1.02) << name << " " << channel;
   }
 }
 
-// Without an effect that the motion acts through, a move has no force; its axes are inputs, as the spindle
-// angle is.
-TEST(Twin, aMoveOfTheAxesIsWithoutForce) {
+// Without an effect of the axis motion a move has no force; its axes are inputs, as the spindle angle.
+TEST(Twin, aMoveOfTheAxesHasNoForce) {
   CampaignTest test;
   test.name = "move";
   test.kind = TestKind::move;
@@ -485,8 +487,8 @@ TEST(Twin, aMoveOfTheAxesIsWithoutForce) {
   EXPECT_THROW(simulateTest(mill(4), test, 0.1, options), Error);
 }
 
-// The steps of the integration are no part of the answer.
-TEST(Twin, leavesTheSameWithFinerSteps) {
+// The result is independent of the integration steps.
+TEST(Twin, resultConvergesWithFinerSteps) {
   SMARTMILL_SHARED_DATA(folder, "campaigns/vibrating_runout");
   const Campaign campaign = readCampaign(folder);
   MachineModel model = readMachineModel(campaign.modelPath());

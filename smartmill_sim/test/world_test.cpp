@@ -83,12 +83,12 @@ TEST(Stock, FeedInMinusYWrapsOverZero) {
   EXPECT_NEAR(plus[1].exit, 0.5 * PI, 1e-9);
 }
 
-TEST(Stock, ASlotMadeIsAir) {
+TEST(Stock, ASlotIsAir) {
   Stock stock(box(), RADIUS);
   for (int k = 0; k <= 200; ++k) {
     const std::array<double, 3> at{-60e-3 + 0.6e-3 * k, 0.0, -2e-3};
-    stock.pass(at);
-    // Its own slot is no air to the tool that makes it.
+    stock.cutTo(at);
+    // The slot being cut is material for the tool in front.
     if (std::abs(at[0]) < 40e-3) {
       const std::vector<ContactArc> arcs = stock.contact(at, {0.01, 0.0, 0.0});
       ASSERT_EQ(arcs.size(), 1u);
@@ -98,29 +98,29 @@ TEST(Stock, ASlotMadeIsAir) {
   }
   // Back through it.
   EXPECT_TRUE(stock.contact({40e-3, 0.0, -2e-3}, {-0.01, 0.0, 0.0}).empty());
-  stock.pass({40e-3, 0.0, 1e-3});
-  // Again through it at the same depth and with more: only what is below is left.
+  stock.cutTo({40e-3, 0.0, 1e-3});
+  // Again at the same depth and deeper: only the material below remains.
   EXPECT_TRUE(stock.contact({0.0, 0.0, -2e-3}, {0.01, 0.0, 0.0}).empty());
   const std::vector<ContactArc> deeper = stock.contact({0.0, 0.0, -3e-3}, {0.01, 0.0, 0.0});
   ASSERT_EQ(deeper.size(), 1u);
   EXPECT_NEAR(deeper[0].depth, 1e-3, 1e-9);
-  // Beside it by 12 mm: 12 - 8 = 4 mm of the tool's width towards the slot are air.
-  const std::vector<ContactArc> beside = stock.contact({0.0, 12e-3, -2e-3}, {0.01, 0.0, 0.0});
-  ASSERT_EQ(beside.size(), 1u);
-  EXPECT_NEAR(beside[0].entry, 0.0, 1e-9);
-  EXPECT_NEAR(beside[0].exit, PI - std::acos(4e-3 / RADIUS), 1e-6);
-  EXPECT_FALSE(stock.above({0.0, 0.0, -2e-3}));
-  EXPECT_TRUE(stock.above({0.0, 0.0, -2.1e-3}));
-  EXPECT_TRUE(stock.above({0.0, 12e-3, -2e-3}));
+  // Offset by 12 mm: the tool overlaps the slot from 12 - 8 = 4 mm off its axis on.
+  const std::vector<ContactArc> side_cut = stock.contact({0.0, 12e-3, -2e-3}, {0.01, 0.0, 0.0});
+  ASSERT_EQ(side_cut.size(), 1u);
+  EXPECT_NEAR(side_cut[0].entry, 0.0, 1e-9);
+  EXPECT_NEAR(side_cut[0].exit, PI - std::acos(4e-3 / RADIUS), 1e-6);
+  EXPECT_FALSE(stock.hasMaterialAbove({0.0, 0.0, -2e-3}));
+  EXPECT_TRUE(stock.hasMaterialAbove({0.0, 0.0, -2.1e-3}));
+  EXPECT_TRUE(stock.hasMaterialAbove({0.0, 12e-3, -2e-3}));
 }
 
-// Out of the stock at one end and in again at the other, at the same depth: nothing between is gone.
+// Exit at one end and entry at another, at the same depth: the material between remains.
 TEST(Stock, ASlotEndsWhereTheToolLeaves) {
   Stock stock(box(), RADIUS);
-  stock.pass({-40e-3, 40e-3, -2e-3});
-  stock.pass({60e-3, 40e-3, -2e-3});
-  stock.leave();
-  stock.pass({-60e-3, 20e-3, -2e-3});
+  stock.cutTo({-40e-3, 40e-3, -2e-3});
+  stock.cutTo({60e-3, 40e-3, -2e-3});
+  stock.endSlot();
+  stock.cutTo({-60e-3, 20e-3, -2e-3});
   const std::vector<ContactArc> arcs = stock.contact({0.0, 24e-3, -2e-3}, {0.0, -0.01, 0.0});
   ASSERT_EQ(arcs.size(), 1u);
   EXPECT_NEAR(arcs[0].entry, 0.5 * PI, 1e-9);
@@ -162,14 +162,14 @@ MachineModel mill() {
   return m;
 }
 
-/// The hammer's sensor would stand where these tests cut.
+/// Without the hammer station, which would be in the way of these cuts.
 MachineModel millThatCuts() {
   MachineModel m = mill();
   m.hammer.reset();
   return m;
 }
 
-/// Runs a DNC program and gathers everything until the controller is idle.
+/// Runs a DNC program and collects the signals.
 class Machine {
  public:
   explicit Machine(const MachineModel& model, const WorldOptions& options = {}) : world(model, options) {}
@@ -214,7 +214,7 @@ double mean(const std::vector<double>& v, std::size_t from, std::size_t to) {
 TEST(World, ASlotByNcTextGivesClosedFormForceAndLoad) {
   const MachineModel model = millThatCuts();
   Machine machine(model);
-  // 6000 rpm, 4 teeth, 0.1 mm: 2400 mm/min. From 60 mm beside to the middle of the stock.
+  // 6000 rpm, 4 teeth, 0.1 mm: 2400 mm/min. From x = -60 mm through the stock.
   machine.program("G90\nG0 X-60\nS6000 M3\nG4 P500\nG1 F6000 Z-1\nG1 F2400 X40\nG1 F6000 Z20\nM5\n");
   // 0.2 s rapid, 0.5 s dwell, 0.55 s down, then 2.5 s of feed: 2.0 .. 3.0 s is well inside.
   machine.run(3.5);
@@ -223,7 +223,7 @@ TEST(World, ASlotByNcTextGivesClosedFormForceAndLoad) {
   const Engagement slot{0.0, PI, 1e-3, 0.1e-3};
   const MechanisticForce closed(*model.tool, *model.cutting, slot);
   const CuttingForce expected = closed.mean();
-  // Samples, 256 a revolution, and the sum over them.
+  // Error of 256 samples per revolution.
   EXPECT_NEAR(mean(machine.force[0], from, to), expected.fx, 1e-3 * std::abs(expected.fx));
   EXPECT_NEAR(mean(machine.force[1], from, to), expected.fy, 1e-3 * std::abs(expected.fy));
   EXPECT_NEAR(mean(machine.force[2], from, to), expected.fz, 1e-3 * std::abs(expected.fz));
@@ -237,12 +237,12 @@ TEST(World, ASlotByNcTextGivesClosedFormForceAndLoad) {
   const double volt = s.load_meter_gain * (expected.torque + s.viscous * omega + s.coulomb) * omega;
   const double percent = mean(machine.load, from / 256, to / 256);
   EXPECT_NEAR(percent, 100.0 * volt / *s.load_meter_full_scale, 2e-3 * percent);
-  // Before the tool meets the stock nothing is cut.
+  // No force before the contact.
   EXPECT_EQ(mean(machine.force[0], 0, static_cast<std::size_t>(1.2 * World::SAMPLE_RATE)), 0.0);
 }
 
-// Servo Guide's start trigger at a block (Dunwoody section 6.1): it rises when that block begins, which is
-// where the blocks before it end, and stays.
+// Servo Guide's start trigger at a block (Dunwoody section 6.1): it rises at the begin of that block, i.e. at
+// the end of the blocks before it, and stays.
 TEST(World, TheServoRecordIsTriggeredByItsBlock) {
   WorldOptions options;
   options.servo_trigger = 30;
@@ -271,15 +271,15 @@ TEST(World, TheServoRecordIsTriggeredByItsBlock) {
         after.push_back(b.servo.at(i, b.servo.channel("current_x")));
     }
   }
-  // 40 mm at 0.5 m/s and 5 m/s2: 0.18 s; the spindle is not waited for; dwell 0.5 s. Samples of 1 ms.
+  // 40 mm at 0.5 m/s and 5 m/s2: 0.18 s; no wait for the spindle; dwell 0.5 s. Samples of 1 ms.
   EXPECT_NEAR(risen, 0.18 + 0.5, 4e-3);
   EXPECT_NEAR(before.back(), 0.0, 1e-9);
   // At 0.1 m/s the drive carries friction, 150 N + 600 N s/m x 0.1 m/s, and the screw's 15 N at most.
   EXPECT_NEAR(mean(after, 0, after.size()) * 628.0, 210.0, 16.0);
 }
 
-// The force follows the angle that the encoder tells.
-TEST(World, ForceAndAngleBelongTogether) {
+// The force matches the encoder's angle.
+TEST(World, ForceMatchesTheAngle) {
   MachineModel model = millThatCuts();
   model.tool->helix = 0.0;
   Machine machine(model);
@@ -289,12 +289,12 @@ TEST(World, ForceAndAngleBelongTogether) {
   int compared = 0;
   for (std::size_t k = machine.angle.size() - 40; k < machine.angle.size(); ++k) {
     const SpindleAngle& a = machine.angle[k];
-    // The reading is half a sample after a sample.
+    // The angle is measured half a sample after a sample.
     const auto i = static_cast<std::size_t>(std::floor(a.stamp * World::SAMPLE_RATE));
     const double angle = a.angle - 0.5 * a.speed / World::SAMPLE_RATE;
-    // Not where a tooth enters or leaves in this very sample.
-    const double place = std::fmod(angle + 2.0 * PI, 0.5 * PI);
-    if (place < 0.05 || place > 0.5 * PI - 0.05) continue;
+    // Except where a tooth enters or exits within the sample.
+    const double tooth_angle = std::fmod(angle + 2.0 * PI, 0.5 * PI);
+    if (tooth_angle < 0.05 || tooth_angle > 0.5 * PI - 0.05) continue;
     const CuttingForce f = closed.at(angle);
     EXPECT_NEAR(machine.force[0][i], f.fx, 2e-3 * 200.0);
     EXPECT_NEAR(machine.force[1][i], f.fy, 2e-3 * 200.0);
@@ -303,13 +303,13 @@ TEST(World, ForceAndAngleBelongTogether) {
   EXPECT_GT(compared, 10);
 }
 
-TEST(World, TheSpindleAtRestMayNotCut) {
+TEST(World, CuttingWithTheSpindleAtRestIsRefused) {
   Machine machine(millThatCuts());
   machine.program("G90\nG0 X-60\nG1 F6000 Z-1\nG1 F2400 X40\n");
   machine.run(2.0);
   ASSERT_EQ(machine.world.controller().status().alarm, 1);
   EXPECT_NE(machine.world.controller().alarmMessages().at(0).text.find("SPINDLE AT REST"), std::string::npos);
-  // It stopped where it met the stock, not 90 mm further on.
+  // It stopped at the contact with the stock, not 90 mm farther.
   EXPECT_LT(machine.position.back()[0], -50e-3 - RADIUS + 5e-3);
 }
 
@@ -323,19 +323,19 @@ TEST(World, PlungingIsRefused) {
 
 // ---- hammer station
 
-// Force 15 mm above the tip of a rigid tool that turns about a point 250 mm above it: 235 / 250 of the tip's
-// own receptance.
-TEST(World, ABlowMovesTheTipAwayByTheTurningToolsShare) {
+// Force 15 mm above the tip of a rigid tool that rotates about a point 250 mm above it: 235 / 250 of the
+// tip's receptance.
+TEST(World, AHitMovesTheTipOfARotatingRigidTool) {
   MachineModel model = mill();
   model.tool_tip.x.modes = {{3000.0, 0.03, 1.0 / 30e6, NOT_A_NUMBER, NOT_A_NUMBER, NOT_A_NUMBER}};
-  model.hammer->contact_time = 20e-3;  // slow against the mode: the tool follows statically
+  model.hammer->contact_time = 20e-3;  // slow compared with the mode: static deflection
   WorldOptions options;
   options.force_scatter = 0.0;
   Machine machine(model, options);
   machine.run(0.02);
   const double rest = machine.gap.back();
   std::string message;
-  // Between two flutes or at one: the voltage's own curve tells the gap.
+  // At any angle of the flutes the gap follows from the voltage curve.
   ASSERT_EQ(machine.world.strike("tool", "x", message), World::StrikeAnswer::ok) << message;
   EXPECT_EQ(machine.world.strike("tool", "x", message), World::StrikeAnswer::failed);
   machine.run(0.1);
@@ -347,12 +347,12 @@ TEST(World, ABlowMovesTheTipAwayByTheTurningToolsShare) {
   EXPECT_NEAR(away, expected, 0.01 * expected);
 }
 
-// Force and answer pass the same anti-aliasing filter: what a blow of 0.4 ms has above half the sample rate,
-// 1 % of its spectrum at 12.8 kHz, would else change the receptance by 0.3 % of random phase.
-TEST(World, AShortBlowTellsTheReceptance) {
+// Force and response pass the same anti-aliasing filter: otherwise the spectrum of a 0.4 ms hit above half
+// the sample rate, 1 % at 12.8 kHz, would change the receptance by 0.3 % with random phase.
+TEST(World, AShortHitGivesTheReceptance) {
   MachineModel model = mill();
   model.stickout = 50e-3;
-  model.hammer->offset = 0.0;  // at the tip: the direct receptance
+  model.hammer->offset = 0.0;  // at the tip: the drive-point receptance
   model.hammer->contact_time = 0.4e-3;
   const double unknown = NOT_A_NUMBER;
   model.tool_tip.x.modes = {{1210.0, 0.03, 1.0 / 28e6, unknown, unknown, unknown},
@@ -371,7 +371,7 @@ TEST(World, AShortBlowTellsTheReceptance) {
         const std::complex<double> turn =
             std::polar(1.0, -2.0 * PI * f * static_cast<double>(i) / World::SAMPLE_RATE);
         force += machine.hammer[i] * turn;
-        answer -= machine.tip[i] * turn;  // the blow comes from the sensor's side
+        answer -= machine.tip[i] * turn;  // the hit comes from the sensor's side
       }
       const std::complex<double> expected = model.tool_tip.x.response(f);
       EXPECT_NEAR(std::abs(answer / force / expected - 1.0), 0.0, 1e-3) << f << " Hz, seed " << seed;
@@ -379,7 +379,7 @@ TEST(World, AShortBlowTellsTheReceptance) {
   }
 }
 
-TEST(World, ASensorTapShowsOnHammerAndDynamometer) {
+TEST(World, ASensorTapActsOnHammerAndDynamometer) {
   WorldOptions options;
   options.operator_delay = 0.5;
   Machine machine(mill(), options);
@@ -389,7 +389,7 @@ TEST(World, ASensorTapShowsOnHammerAndDynamometer) {
   const auto top = std::max_element(machine.hammer.begin(), machine.hammer.end()) - machine.hammer.begin();
   EXPECT_NEAR(static_cast<double>(top) / World::SAMPLE_RATE, 0.5, 1e-3);
   EXPECT_GT(machine.hammer[static_cast<std::size_t>(top)], 200.0);
-  // An ideal sensor shows the blow itself, in its direction only.
+  // An ideal sensor measures the force of the hit, in its direction only.
   EXPECT_NEAR(machine.sensor[1][static_cast<std::size_t>(top)], machine.hammer[static_cast<std::size_t>(top)],
               1e-6);
   EXPECT_NEAR(machine.sensor[0][static_cast<std::size_t>(top)], 0.0, 1e-9);
@@ -401,14 +401,14 @@ TEST(World, LostSamplesAreAJumpOfTheIndex) {
   World::Block b;
   world.advance(b);
   EXPECT_EQ(b.hammer.first_index, 0u);
-  world.lose(1000);
+  world.skipSamples(1000);
   world.advance(b);
   EXPECT_EQ(b.hammer.first_index, 1256u);
   EXPECT_EQ(b.dynamometer.first_index, 1256u);
   EXPECT_NEAR(b.hammer.stamp, 1256.0 / World::SAMPLE_RATE, 1e-12);
 }
 
-TEST(World, RefusesWhatItCannotBe) {
+TEST(World, RefusesIncompleteModels) {
   const auto line = [](const MachineModel& model, const WorldOptions& options) -> std::string {
     try {
       World world(model, options);

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Whether every servo cycle of a LinuxCNC comes as spindle/angle and in cnc/servo: linuxcnc_machine and cnc_node under a ROS master of
-their own, the spindle at 6000 rpm, programs of 5 s one after the other, for MINUTES.
+"""Checks that every servo cycle of a LinuxCNC is published as spindle/angle and in cnc/servo: linuxcnc_machine and cnc_node under a
+separate ROS master, with the spindle at 6000 rpm and consecutive programs of 5 s, for MINUTES.
 
 usage: devel/env.sh smartmill_studies/cnc/linuxcnc_stream_check.py [MINUTES]   (default 10; in the repository's folder)
-Exit code 1: a sample was lost, a step was no millisecond, or a program did not come to its end.
+Exit code 1: a sample was lost, a step was not a millisecond, or a program did not complete.
 """
 import os
 import struct
@@ -12,14 +12,14 @@ import sys
 import tempfile
 import time
 
-from ros_house import PATIENCE, ROOT, House, until
+from ros_processes import PATIENCE, ROOT, RosProcesses, until
 
 PERIOD = 1e-3  # [s]
-STEP_TOLERANCE = 5e-6  # [s] from block to block the stamps follow the controller's clock, by at most 1e-4 of the time
+STEP_TOLERANCE = 5e-6  # [s] the stamps follow the controller's clock by at most 1e-4 of the time from block to block
 
 
 class Angles:
-    """spindle/angle as its bytes say (SpindleAngle: sequence, seconds, nanoseconds, frame, angle, speed)."""
+    """Decodes spindle/angle (SpindleAngle: sequence, seconds, nanoseconds, frame, angle, speed)."""
 
     def __init__(self):
         self.count, self.odd, self.last, self.late = 0, 0, None, []
@@ -46,19 +46,19 @@ class Blocks:
         self.count += size
 
 
-def start(house, folder):
+def start(processes, folder):
     model = ROOT / "launch/models/mill.yaml"
-    house.rospy.set_param("/smartmill/cnc", {"model": str(model), "controller": "linuxcnc", "linuxcnc_folder": folder,
+    processes.rospy.set_param("/smartmill/cnc", {"model": str(model), "controller": "linuxcnc", "linuxcnc_folder": folder,
                                              "read_only": False, "reconnect_period": 0.2})
     programs = ROOT / "devel/lib/smartmill_cnc"
-    house.run("linuxcnc", [str(ROOT / "smartmill_cnc/scripts/linuxcnc_machine"), str(model), folder], {"SMARTMILL_CNC_BIN": str(programs)})
+    processes.run("linuxcnc", [str(ROOT / "smartmill_cnc/scripts/linuxcnc_machine"), str(model), folder], {"SMARTMILL_CNC_BIN": str(programs)})
     subprocess.run([str(programs / "linuxcnc_panel"), folder, "ready", "--wait", "60"], check=True, stdout=subprocess.DEVNULL)
-    house.node("cnc", "smartmill_cnc", "cnc_node")
-    house.join("linuxcnc_stream_check")
+    processes.node("cnc", "smartmill_cnc", "cnc_node")
+    processes.join("linuxcnc_stream_check")
 
 
 def follow(rospy, minutes):
-    """(programs begun, programs to their end)"""
+    """(started programs, completed programs)"""
     import actionlib
     from smartmill_msgs.msg import RunProgramAction, RunProgramGoal
     from smartmill_msgs.srv import ArmMotion
@@ -71,14 +71,14 @@ def follow(rospy, minutes):
     begun = done = 0
     end = time.monotonic() + 60.0 * minutes
     while time.monotonic() < end:
-        goal = RunProgramGoal(name="to and fro", program="S6000 M3\nG91 G1 X10 F240\nX-10\n")
+        goal = RunProgramGoal(name="forward and back", program="S6000 M3\nG91 G1 X10 F240\nX-10\n")
         goal.header.stamp = rospy.Time.now()
         client.send_goal(goal)
         begun += 1
         if until(lambda: client.simple_state == 2) and client.get_result().code == 0:
             done += 1
         else:
-            print("program: " + (client.get_result().message if client.get_result() else "no end"), flush=True)
+            print("program: " + (client.get_result().message if client.get_result() else "no result"), flush=True)
             arm(arm=True)
     return begun, done
 
@@ -86,25 +86,25 @@ def follow(rospy, minutes):
 def main():
     minutes = float(sys.argv[1]) if len(sys.argv) > 1 else 10.0
     with tempfile.TemporaryDirectory(prefix="linuxcnc_check") as logs, tempfile.TemporaryDirectory(dir="/dev/shm") as folder:
-        os.chmod(folder, 0o755)  # root's LinuxCNC runs as nobody
-        house = House(logs)
+        os.chmod(folder, 0o755)  # root runs LinuxCNC as an unprivileged user
+        processes = RosProcesses(logs)
         try:
-            start(house, folder + "/machine")
+            start(processes, folder + "/machine")
             from smartmill_msgs.msg import SampleBlock
             angles, blocks = Angles(), Blocks()
-            house.rospy.Subscriber("/smartmill/spindle/angle", house.rospy.AnyMsg, angles.take, queue_size=None)
-            house.rospy.Subscriber("/smartmill/cnc/servo", SampleBlock, blocks.take, queue_size=None)
+            processes.rospy.Subscriber("/smartmill/spindle/angle", processes.rospy.AnyMsg, angles.take, queue_size=None)
+            processes.rospy.Subscriber("/smartmill/cnc/servo", SampleBlock, blocks.take, queue_size=None)
             if not until(lambda: blocks.count > 0):
-                raise SystemExit("cnc/servo is silent: " + house.log("cnc")[-500:])
-            begun, done = follow(house.rospy, minutes)
+                raise SystemExit("cnc/servo is silent: " + processes.log("cnc")[-500:])
+            begun, done = follow(processes.rospy, minutes)
             load = os.getloadavg()[1]
         finally:
-            house.end(gently="linuxcnc")
+            processes.end(gently="linuxcnc")
     late = sorted(angles.late)
     print(f"spindle/angle: {angles.count} samples, {angles.odd} steps other than 1 ms; late {1e3 * late[len(late) // 2]:.1f} ms median, "
-          f"{1e3 * late[len(late) * 99 // 100]:.1f} ms 99 %, {1e3 * late[-1]:.0f} ms worst (as Python sees it)")
-    print(f"cnc/servo: {blocks.count} samples, {blocks.lost} lost; programs {done} of {begun} to their end; load {load:.1f}", flush=True)
-    os._exit(1 if angles.odd or blocks.lost or done != begun else 0)  # rospy's threads wait for a master that has gone
+          f"{1e3 * late[len(late) * 99 // 100]:.1f} ms 99 %, {1e3 * late[-1]:.0f} ms worst (measured in Python)")
+    print(f"cnc/servo: {blocks.count} samples, {blocks.lost} lost; programs {done} of {begun} completed; load {load:.1f}", flush=True)
+    os._exit(1 if angles.odd or blocks.lost or done != begun else 0)  # rospy's threads wait for the stopped master
 
 
 main()

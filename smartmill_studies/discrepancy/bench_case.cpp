@@ -22,7 +22,7 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-// explain says that the tests do not tell these two apart, or they are the same.
+// Whether two effects are equal, or reported by explain as an unidentifiable pair.
 bool standsFor(const Explanation& e, const std::string& named, const std::string& hidden) {
   return named == hidden || std::any_of(e.not_separable.begin(), e.not_separable.end(),
                                         [&](const std::vector<std::string>& group) {
@@ -30,7 +30,7 @@ bool standsFor(const Explanation& e, const std::string& named, const std::string
                                         });
 }
 
-// Distances of found parameters from the truth, in their standard deviations.
+// Errors of the found parameters in their standard deviations.
 std::vector<double> scores(const FoundEffect& found, const EffectEntry& truth) {
   std::vector<double> all;
   const auto numbers = numbersOf(truth);
@@ -44,8 +44,8 @@ std::vector<double> scores(const FoundEffect& found, const EffectEntry& truth) {
   return all;
 }
 
-// What no model can get below: the gap between two runs of the plant, each of which strays by as much, over
-// the tests and channels that a gap counts.
+// Lower bound for any model: the gap between two runs of the plant over root 2, over the tests and channels
+// that a gap counts.
 double floorOf(const Dataset& data, bool heldout, const std::vector<Record>& one,
                const std::vector<Record>& other) {
   double squares = 0.0, count = 0.0;
@@ -69,8 +69,8 @@ Dataset loaded(const std::string& folder) {
   return loadDataset(campaign, readMachineModel(campaign.modelPath()));
 }
 
-Explanation look(const Dataset& data, const std::string& folder,
-                 const std::function<void(const std::string&)>& progress) {
+Explanation explainCase(const Dataset& data, const std::string& folder,
+                        const std::function<void(const std::string&)>& progress) {
   ExplainOptions options;
   options.bench.threads = 1;
   options.search.on_log = progress;
@@ -86,7 +86,7 @@ bool isEmpirical(const FoundEffect& f) {
 
 bool isRight(const plant::Case& hidden, const Explanation& e) {
   if (hidden.kind == "none") return e.effects.empty();
-  // Of a cause without a name none is right; something must be left to be told.
+  // No name is correct for a cause outside the catalogue; the residual must be reported.
   if (hidden.kind == "outside")
     return std::all_of(e.effects.begin(), e.effects.end(), isEmpirical) &&
            e.verdict == Verdict::unknown_effect;
@@ -96,7 +96,7 @@ bool isRight(const plant::Case& hidden, const Explanation& e) {
   };
   if (!std::all_of(hidden.names.begin(), hidden.names.end(), found)) return false;
   if (hidden.kind != "single") return true;
-  // The name that explains most is the first.
+  // The first name explains most.
   const auto first =
       std::max_element(e.effects.begin(), e.effects.end(),
                        [](const FoundEffect& a, const FoundEffect& b) { return a.delta_bic < b.delta_bic; });
@@ -166,7 +166,7 @@ json runBenchCase(const plant::Case& hidden, int number, const std::string& fold
     const std::vector<Record> again = plant::runCampaign(drawn, hidden, true);
     line["floor"] = floorOf(data, false, records, again);
     line["heldout_floor"] = floorOf(data, true, records, again);
-    score(hidden, drawn, look(data, folder, progress), &line);
+    score(hidden, drawn, explainCase(data, folder, progress), &line);
   } catch (const Error& error) {
     line["verdict"] = std::string("refused: ") + error.what();
   }

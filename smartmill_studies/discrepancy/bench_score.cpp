@@ -25,7 +25,7 @@ struct Share {
   }
 };
 
-// Lower and upper end of Wilson's 95 % interval of a share.
+// Wilson's 95 % interval of a share.
 std::pair<double, double> wilson(double share, double count) {
   const double z2 = 3.84, middle = (share + z2 / (2.0 * count)) / (1.0 + z2 / count);
   const double half =
@@ -37,7 +37,7 @@ bool hidesNames(const json& line) {
   return line["kind"] == "single" || line["kind"] == "pair" || line["kind"] == "triple";
 }
 
-// Of the held-out tests; an older bench told that of all cuts and air cuts, without their load meter.
+// Of the held-out tests; older benches reported the floor of all cuts and air cuts without load meter.
 double floorOf(const json& line) {
   return line.contains("heldout_floor") ? line["heldout_floor"] : line["floor"];
 }
@@ -51,7 +51,7 @@ void printShares(const std::vector<json>& lines) {
     kinds[kind + (line["vibrating"] ? ", vibrating" : ", rigid")].add(line["right"]);
     kinds[kind].add(line["right"]);
     if (line["kind"] == "outside" && line.contains("heldout_before")) {
-      // What repeats of a gap is what stands above that of two runs of the plant.
+      // The repeatable part of a gap exceeds the gap between two runs of the plant.
       const double before = line["heldout_before"], after = line["heldout_after"], floor = floorOf(line);
       halved.add(after <= 0.5 * before);
       if (before > floor)
@@ -68,8 +68,8 @@ void printShares(const std::vector<json>& lines) {
   std::printf("named where no effect of the catalogue was hidden: %d\n", false_effects);
   if (halved.all > 0)
     std::printf(
-        "causes outside the catalogue: held-out gap halved in %d of %d; what of it stands above the "
-        "plant's floor, where any does, in %d of %d\n",
+        "causes outside the catalogue: held-out gap halved in %d of %d; its part above the plant's floor, "
+        "where there is one, in %d of %d\n",
         halved.right, halved.all, halved_above_floor.right, halved_above_floor.all);
   if (low_gap.all > 0)
     std::printf("held-out gap at most 1.1 of the plant's floor: %d of %d named cases\n", low_gap.right,
@@ -91,7 +91,7 @@ std::size_t place(std::vector<std::string>& names, const std::string& name) {
   return names.size() - 1;
 }
 
-// Rows: what was hidden; columns: what was named; the share of the row's cases.
+// Rows: hidden effects; columns: named effects; values: share of the row's cases.
 void drawConfusion(const std::vector<json>& lines, const std::string& png) {
   std::vector<std::string> hidden, named;
   std::map<std::pair<std::size_t, std::size_t>, int> count;
@@ -149,19 +149,19 @@ std::vector<Bin> binsOf(const std::vector<json>& lines) {
   };
   for (const json& line : lines) {
     for (const json& effect : line["named"]) add(effect, &Bin::named);
-    if (!line.contains("resembling")) continue;  // a line of an older bench
+    if (!line.contains("resembling")) continue;  // line of an older bench
     for (const json& effect : line["resembling"]) add(effect, &Bin::resembling);
   }
   return bins;
 }
 
-// Stated confidence of each effect, named or only resembling, against the share that was really hidden.
+// Stated confidence of each effect, named or only resembling, compared with the share that was hidden.
 void drawReliability(const std::vector<json>& lines, const std::string& folder) {
   const std::vector<Bin> bins = binsOf(lines);
   std::string data;
   std::ofstream csv(folder + "/reliability.csv");
   csv << "from,to,stated,right,low,high,named_right,named,resembling_right,resembling\n";
-  std::printf("stated confidence  mean    really hidden (95 %% interval)  named    only resembling\n");
+  std::printf("stated confidence  mean    hidden (95 %% interval)         named    only resembling\n");
   for (std::size_t b = 0; b < bins.size(); ++b) {
     const Bin& bin = bins[b];
     if (bin.all() == 0.0) continue;

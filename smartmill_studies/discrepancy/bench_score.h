@@ -7,8 +7,8 @@
 
 namespace smartmill::discrepancy {
 
-/// Prints how many cases of each kind were right, rigid and vibrating apart, held-out gaps against the
-/// plant's own floor, how many parameters lie within their 95 % intervals; draws confusion.png and
+/// Prints the number of correct cases of each kind (rigid and vibrating separately), held-out gaps compared
+/// with the plant's floor, and the parameters within their 95 % intervals. Draws confusion.png and
 /// reliability.png.
 /// @param lines of runBenchCase()
 void scoreBench(const std::vector<nlohmann::json>& lines, const std::string& folder);

@@ -1,10 +1,10 @@
 #!/bin/sh
 # smartmill_studies/discrepancy/live_friction.sh OUT [BREAKAWAY_NM] [SPEED_RPM]
-# The simulated mill hides friction of its spindle that grows as it turns slower. A session runs on it, the monitor keeps
-# what does not fit its model, loads as the controller tells them among it, and explain is asked what that is.
-# Ends with 0 when it names the friction with both values within three of its standard deviations.
+# The simulated mill hides spindle friction that increases at low speed (Stribeck). A session runs on it, the monitor stores
+# the records that disagree with its model, including the controller's loads, and explain looks for the cause.
+# Exit code 0 if it names the friction with both values within three standard deviations.
 set -eu
-out=$(realpath -m "${1:?OUT: folder for everything}")
+out=$(realpath -m "${1:?OUT: folder for all results}")
 breakaway=${2:-0.4}
 speed=${3:-2500}
 models=$(rospack find smartmill_launch)/models
@@ -12,7 +12,7 @@ mkdir -p "$out"
 rm -rf "$out/kept"
 sed "\$a effects: [{name: stribeck_friction, breakaway_nm: $breakaway, speed_rpm: $speed}]" \
   "$models/mill_twin.yaml" > "$out/hidden.yaml"
-# 600, 1200, 2400, 4000, 6000, 9000 rpm in air; nothing that has no part in it.
+# Air cuts at 600, 1200, 2400, 4000, 6000, 9000 rpm; unneeded steps are off.
 sed -e 's/^air_speeds:.*/air_speeds: [62.83, 125.66, 251.33, 418.88, 628.32, 942.48]/' \
     -e 's/^verify:.*/verify: false/' -e 's/^resonance_speed:.*/resonance_speed: 0.0/' \
     -e 's/^hits:.*/hits: 3/' -e 's/^sensor_hits:.*/sensor_hits: 3/' \

@@ -44,7 +44,7 @@ bool isCompared(const std::string& coordinate) {
   return coordinate.rfind("cutting.", 0) == 0 || coordinate.rfind("tool_tip.", 0) == 0;
 }
 
-// Logarithms of the factors by which the start is off, one a coordinate.
+// Logarithms of the start's error factors, one per coordinate.
 std::vector<double> drawFactors(const NominalFreedom& freedom, Random& random) {
   std::vector<double> logs;
   for (const Coordinate& c : freedom.coordinates()) {
@@ -55,7 +55,7 @@ std::vector<double> drawFactors(const NominalFreedom& freedom, Random& random) {
   return logs;
 }
 
-// The deepest cut, deeper and deeper until it chatters.
+// The deepest cut, with its depth increased until it chatters.
 void addChatteringCut(const MachineModel& truth, const std::string& folder, Random& random,
                       Campaign* campaign) {
   constexpr int TRIALS = 8;
@@ -81,7 +81,7 @@ void addChatteringCut(const MachineModel& truth, const std::string& folder, Rand
   throw Error(campaign->folder + ": no depth at which the deepest cut chatters");
 }
 
-// A campaign of its own in a folder: the records, and the start as its nominal model.
+// Writes a campaign folder with the records and the start as nominal model.
 Campaign copyOf(const Campaign& campaign, const std::string& folder) {
   for (const CampaignTest& t : campaign.tests)
     std::filesystem::create_symlink(std::filesystem::absolute(campaign.pathOf(t)), folder + "/" + t.file);

@@ -9,7 +9,7 @@
 
 namespace smartmill::fuzz {
 
-/// All whole frames of the bytes, which come in pieces.
+/// All complete frames of the bytes, which arrive in pieces.
 template <class Take>
 void eachFrame(const std::uint8_t* data, std::size_t size, const Take& take) {
   focas::FrameReader reader;

@@ -1,4 +1,4 @@
-// libFuzzer's entry; which target it is says the macro FUZZ_TARGET (.ci/fuzz).
+// Entry point for libFuzzer; the macro FUZZ_TARGET selects the target (.ci/fuzz).
 #include "fuzz/targets.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

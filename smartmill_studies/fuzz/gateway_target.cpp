@@ -10,7 +10,7 @@ namespace {
 
 using namespace cnc::linuxcnc;
 
-/// What was understood once is understood again the same way.
+/// An accepted frame is decoded to the same content after encoding.
 void roundTrip(const Received& received) {
   const std::string bytes = encode(received.message, received.sequence);
   FrameDecoder decoder;

@@ -15,16 +15,16 @@ void channels(const std::uint8_t* data, std::size_t size) {
   const std::string stated(data, line_end);
   const std::uint8_t* const table = line_end == end ? end : line_end + 1;
   const std::string& file = inputFile(table, static_cast<std::size_t>(end - table));
-  told([&] {
+  readOrRefuse([&] {
     const ChannelChoices choices = channelChoices(stated);
     ChannelFile channels = readTextTable(file);
     for (FileChannel& channel : channels.channels) {
       takeUnit(channel);
-      // As the files that hold single numbers next to their channels: .mat, HDF5.
+      // As files with scalar values next to their channels: .mat, HDF5.
       channels.numbers[channel.name] = channel.values.front();
     }
-    told([&] { mapChannels(channels, choices, TestKind::cut, 1000.0); });
-    told([&] { mapChannels(channels, choices, TestKind::tap, std::nullopt); });
+    readOrRefuse([&] { mapChannels(channels, choices, TestKind::cut, 1000.0); });
+    readOrRefuse([&] { mapChannels(channels, choices, TestKind::tap, std::nullopt); });
     takeSampleRate(channels);
     mapChannels(channels, choices, std::nullopt, std::nullopt);
   });
@@ -32,7 +32,7 @@ void channels(const std::uint8_t* data, std::size_t size) {
 
 void import_plan(const std::uint8_t* data, std::size_t size) {
   const std::string& file = inputFile(data, size);
-  told([&] { readImport(file).settingsOf("cut.csv"); });
+  readOrRefuse([&] { readImport(file).settingsOf("cut.csv"); });
 }
 
 }  // namespace smartmill::fuzz

@@ -1,4 +1,4 @@
-// In place of smartmill_core/io/text_file.cpp: every file that is read holds what the fuzzer made.
+// Replaces smartmill_core/io/text_file.cpp: every file contains the input of the fuzzer.
 #include "fuzz/input_file.h"
 #include "smartmill_core/io/text_file.h"
 

@@ -6,7 +6,7 @@ namespace smartmill::fuzz {
 
 void model(const std::uint8_t* data, std::size_t size) {
   const std::string& file = inputFile(data, size);
-  told([&] { readMachineModel(file); });
+  readOrRefuse([&] { readMachineModel(file); });
 }
 
 }  // namespace smartmill::fuzz

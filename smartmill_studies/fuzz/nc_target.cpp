@@ -10,9 +10,10 @@
 namespace smartmill::fuzz {
 namespace {
 
-constexpr double STEP = 0.05;           // [s]
-constexpr int MOST_STEPS = 40;          // of a program
-constexpr double TOLERANCE = 1e-6;      // [m] of the wire's decimals, summed over a program's relative moves
+constexpr double STEP = 0.05;   // [s]
+constexpr int MOST_STEPS = 40;  // of a program
+constexpr double TOLERANCE =
+    1e-6;  // [m] rounding of transmitted values, summed over the relative moves of a program
 constexpr std::size_t MOST_TEXT = 900;  // [byte]
 
 sim::ControllerOptions makeOptions() {
@@ -30,7 +31,7 @@ const sim::ControllerOptions& options() {
   return OPTIONS;
 }
 
-/// Runs a text; the axes may never leave their travel.
+/// Runs a program; the axes must not leave their travel.
 void run(sim::Controller& controller, const std::string& text) {
   static std::vector<sim::MotionState> states;
   if (controller.dncStart() != focas::EW_OK) {
@@ -60,7 +61,7 @@ void nc(const std::uint8_t* data, std::size_t size) {
     sim::Controller controller(options());
     run(controller, text);
   }
-  // What the bridge lets pass, the control runs without leaving the travel.
+  // A program that passes the check of the bridge runs without leaving the travel.
   cnc::MotionLimits limits;
   limits.travel = options().axes.travel;
   limits.max_feed = options().axes.rapid;

@@ -11,7 +11,7 @@ void recording(const std::uint8_t* data, std::size_t size) {
       focas::describe(frame);
     }
   } catch (const focas::WireError&) {
-    // Told with file and line.
+    // The error states file and line.
   }
 }
 

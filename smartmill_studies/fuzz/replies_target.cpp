@@ -18,7 +18,7 @@ void replies(const std::uint8_t* data, std::size_t size) {
         focas::decodeStatus(reader);
       }
     } catch (const focas::WireError&) {
-      // Told.
+      // The error is reported.
     }
   });
 }

@@ -38,7 +38,7 @@ void requests(const std::uint8_t* data, std::size_t size) {
       }
       focas::encodeReplies(answers);
     } catch (const focas::WireError&) {
-      // A whole-PDU failure.
+      // Failure of a complete PDU.
     }
   });
 }

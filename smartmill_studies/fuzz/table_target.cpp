@@ -6,9 +6,9 @@ namespace smartmill::fuzz {
 
 void dynoware(const std::uint8_t* data, std::size_t size) {
   const std::string& file = inputFile(data, size);
-  told([&] { readDynoware(file, {}); });
-  told([&] { readDynoware(file, {{"fx", "Fy"}, {"fz", "Fz"}}); });
-  told([&] { readCsv(file); });
+  readOrRefuse([&] { readDynoware(file, {}); });
+  readOrRefuse([&] { readDynoware(file, {{"fx", "Fy"}, {"fz", "Fz"}}); });
+  readOrRefuse([&] { readCsv(file); });
 }
 
 }  // namespace smartmill::fuzz

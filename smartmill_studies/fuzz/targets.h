@@ -8,8 +8,8 @@
 
 namespace smartmill::fuzz {
 
-/// Takes any bytes; what they break throws something else than the readers' own errors, or the sanitizers
-/// find it.
+/// Each target accepts any bytes. A fault throws something other than an error of the reader, or is found by
+/// the sanitizers.
 using Target = std::function<void(const std::uint8_t* data, std::size_t size)>;
 
 void replies(const std::uint8_t* data, std::size_t size);   ///< frames as a client reads them
@@ -27,7 +27,7 @@ void mcap(const std::uint8_t* data, std::size_t size);       ///< recorded MCAP 
 void channels(const std::uint8_t* data, std::size_t size);
 void import_plan(const std::uint8_t* data, std::size_t size);  ///< import.yaml
 
-/// By name; the corpus of each is the folder corpus/NAME.
+/// By name; the corpus of each is the folder NAME of corpus.tar.gz.
 inline const std::map<std::string, Target>& targets() {
   static const std::map<std::string, Target> TARGETS{{"replies", replies},
                                                      {"requests", requests},

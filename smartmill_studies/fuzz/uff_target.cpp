@@ -6,7 +6,7 @@ namespace smartmill::fuzz {
 
 void uff(const std::uint8_t* data, std::size_t size) {
   const std::string& file = inputFile(data, size);
-  told([&] { readUff(file); });
+  readOrRefuse([&] { readUff(file); });
 }
 
 }  // namespace smartmill::fuzz

@@ -37,7 +37,7 @@ double least(const StabilityLimit& limit) {
   return *std::min_element(limit.depth.begin(), limit.depth.end());
 }
 
-/// [rpm] of the deepest place between two speeds.
+/// [rpm] of the deepest point between two speeds.
 double pocket(const StabilityLimit& limit, double from, double to) {
   std::size_t best = 0;
   for (std::size_t i = 0; i < limit.depth.size(); ++i) {
@@ -55,13 +55,13 @@ void draw(const std::string& png, const std::vector<StabilityLimit>& limits,
     rows.push_back({units::rpmFromRadPerSec(limits[0].spindle_speed[i])});
     for (const StabilityLimit& limit : limits) rows.back().push_back(1e3 * limit.depth[i]);
   }
-  const char* looks[] = {"lw 4 lc rgb '#b0b0b0'", "lw 1.5 lc rgb '#c08040'", "lw 1.5 lc rgb '#2060c0'"};
+  const char* styles[] = {"lw 4 lc rgb '#b0b0b0'", "lw 1.5 lc rgb '#c08040'", "lw 1.5 lc rgb '#2060c0'"};
   Gnuplot plot(png, 900, 500, 12);
   plot.block("rows", rows);
   plot << "set grid\nset key above horizontal samplen 2\nset xlabel 'spindle speed [rpm]'\nset ylabel 'limit "
           "of a slot [mm]'\nset yrange [0:*]\n";
   for (std::size_t k = 0; k < limits.size(); ++k)
-    plot << (k == 0 ? "plot" : ",") << " $rows using 1:" << k + 2 << " with lines " << looks[k] << " title "
+    plot << (k == 0 ? "plot" : ",") << " $rows using 1:" << k + 2 << " with lines " << styles[k] << " title "
          << Gnuplot::quoted(names[k]);
   plot << "\n";
   plot.draw();
@@ -69,7 +69,7 @@ void draw(const std::string& png, const std::vector<StabilityLimit>& limits,
 
 /// Figure 6.2: radial ratio 0.25 and 0.5.
 Drawn radialRatio(const std::string& folder, unsigned) {
-  // The thesis prints neither its FRF; a spindle mode and the tool's mode near 2400 Hz, stiff for 6 mm.
+  // The thesis prints no FRF: a spindle mode and a tool mode near 2400 Hz, stiff enough for 6 mm.
   ModalModel tip;
   tip.modes = {{720.0, 0.035, 1.0 / 70e6}, {2400.0, 0.02, 1.0 / 38e6}};
   const auto response = stability::responseOf(tip, tip, 50.0, 6000.0, 4000);
@@ -83,16 +83,16 @@ Drawn radialRatio(const std::string& folder, unsigned) {
   return {{png},
           {{"least limit with Kr 0.5 over that with Kr 0.25, figure 6.2", "1.00 (6 mm both)",
             formatted("%.2f", ratio), std::abs(ratio - 1.0) < 0.1 ? Verdict::agrees : Verdict::differs,
-            "x and y alike here; the thesis' FRFs are not printed"},
+            "x and y are equal here; the thesis prints no FRFs"},
            {"speed of the deepest pocket, 6,000 .. 14,000 rpm, with Kr 0.5 over Kr 0.25", "\"very similar\"",
             formatted("%.3f", second / first),
             std::abs(second / first - 1.0) < 0.05 ? Verdict::agrees : Verdict::differs, ""}}};
 }
 
-/// A machine's chart by three ways.
+/// The chart of a machine by three methods.
 struct Chain {
   StabilityLimit art, thesis, ours;
-  double thesis_off = 0.0, ours_off = 0.0;  ///< [1] of the least limit against the art's
+  double thesis_off = 0.0, ours_off = 0.0;  ///< [1] error of the least limit relative to the state of the art
   double frequency = 0.0;                   ///< [Hz] of the chatter there
 };
 
@@ -101,12 +101,14 @@ Chain chainOf(std::mt19937_64& random) {
   const auto limitOf = [](const FrequencyResponse& frf, double kt, double radial) {
     return stability::zeroOrderLimit(slot(kt, radial), stability::responseOf(frf, frf), speeds());
   };
-  const auto way = [&](Way w) -> const FrequencyResponse& { return outcome.frf[static_cast<int>(w)]; };
+  const auto frfOf = [&](TipMethod w) -> const FrequencyResponse& {
+    return outcome.frf[static_cast<int>(w)];
+  };
   Chain chain;
   chain.art = limitOf(outcome.truth, KT, 0.21);
-  // What the thesis has: eq. 4.44, eq. 3.20 over 3.22, and 0.3 for any radial ratio.
-  chain.thesis = limitOf(way(Way::thesis), 1.11 * KT, 0.3);
-  chain.ours = limitOf(way(Way::two_heights), KT, 0.21);
+  // Procedure of the thesis: eq. 4.44, eq. 3.20 over 3.22, and 0.3 for any radial ratio.
+  chain.thesis = limitOf(frfOf(TipMethod::thesis), 1.11 * KT, 0.3);
+  chain.ours = limitOf(frfOf(TipMethod::two_heights), KT, 0.21);
   chain.thesis_off = std::abs(least(chain.thesis) / least(chain.art) - 1.0);
   chain.ours_off = std::abs(least(chain.ours) / least(chain.art) - 1.0);
   const auto lowest = std::min_element(chain.art.depth.begin(), chain.art.depth.end());
@@ -114,17 +116,17 @@ Chain chainOf(std::mt19937_64& random) {
   return chain;
 }
 
-/// Figure 6.3 (and 4.8): the automatic chain, with the coefficient of a load meter, beside a tap test at the
-/// tip and coefficients of a dynamometer.
+/// Figure 6.3 (and 4.8): the automatic chain with the coefficient of a load meter, compared with a tap test
+/// at the tip and the coefficients of a dynamometer.
 Drawn automaticChain(const std::string& folder, unsigned seed) {
   constexpr int MACHINES = 21;
-  constexpr double HIGHEST = 5000.0;  // [Hz] of what a hammer is asked
+  constexpr double HIGHEST = 5000.0;  // [Hz] of the hammer's band
   std::mt19937_64 random(seed);
   std::vector<Chain> chains;
   int beyond = 0;
   for (int i = 0; i < MACHINES; ++i) {
     const Chain chain = chainOf(random);
-    // A mode that limits beyond the hammer's band is told with a deviation of its own size.
+    // A limiting mode beyond the hammer's band has an uncertainty as large as its value.
     if (chain.frequency > HIGHEST)
       ++beyond;
     else
@@ -146,25 +148,24 @@ Drawn automaticChain(const std::string& folder, unsigned seed) {
   };
   return {
       {png},
-      {{formatted(
-            "least limit of the automatic chain off tap test and dynamometer, %zu drawn machines, figures "
-            "4.8, 6.3",
-            chains.size()),
+      {{formatted("least limit, error of the automatic chain relative to tap test and dynamometer, %zu "
+                  "random machines, figures 4.8, 6.3",
+                  chains.size()),
         "\"gross features\"; their procedure here: " + say(theirs), say(mine),
         percentile(mine, 0.5) < percentile(theirs, 0.5) && percentile(mine, 0.95) < percentile(theirs, 0.95)
             ? Verdict::better
             : Verdict::differs,
-        formatted("taps at two heights; %d machines more are limited by a mode beyond 5 kHz; drawn: the one "
-                  "in the middle",
+        formatted("taps at two heights; %d more machines are limited by a mode beyond 5 kHz; the median "
+                  "machine is drawn",
                   beyond)}}};
 }
 
 }  // namespace
 
 std::vector<Figure> chartFigures() {
-  return {{"dunwoody_6_2", "Dunwoody figure 6.2: charts with two radial ratios", radialRatio},
-          {"dunwoody_6_3", "Dunwoody figure 6.3: the automatic chain beside the state of the art",
-           automaticChain}};
+  return {
+      {"dunwoody_6_2", "Dunwoody figure 6.2: charts with two radial ratios", radialRatio},
+      {"dunwoody_6_3", "Dunwoody figure 6.3: the automatic chain and the state of the art", automaticChain}};
 }
 
 }  // namespace smartmill::studies

@@ -30,7 +30,7 @@ constexpr double RATE = 25600.0;
 constexpr std::size_t OVERSAMPLED = 4;
 constexpr const char* AXES[] = {"x", "y"};
 
-/// One dominant mode an axis, x at 930 Hz as told in section 5.3, and a higher one; the rest is not printed.
+/// One dominant mode per axis, x at 930 Hz as in section 5.3, and a higher one; the rest is not printed.
 ModalModel dynamometer(std::size_t axis) {
   ModalModel sensor;
   sensor.modes = axis == 0 ? std::vector<Mode>{{930.0, 0.03, 0.85}, {2450.0, 0.04, 0.10}}
@@ -50,7 +50,7 @@ double along(const CuttingForce& force, std::size_t axis) {
   return axis == 0 ? force.fx : force.fy;
 }
 
-/// Truth, measured and compensated of a steady slot at a spindle speed, over the spindle's angle [rad].
+/// True, measured and compensated force of a steady slot over the spindle angle [rad].
 struct Cut {
   std::vector<double> angle, truth, measured, compensated;
 };
@@ -83,7 +83,7 @@ Cut cutAt(double rpm, std::size_t axis, const ModalModel& believed, unsigned see
   return cut;
 }
 
-/// Sensor models from nine taps an axis, as the product identifies them.
+/// Sensor models from nine taps per axis, identified by the product.
 ModalModel identified(std::size_t axis, FrequencyResponse* measured = nullptr) {
   ReferenceCase reference;
   reference.sensor = dynamometer(axis);
@@ -98,7 +98,7 @@ Drawn transferFunctions(const std::string& folder, unsigned) {
   for (std::size_t axis = 0; axis < 2; ++axis) {
     FrequencyResponse frf;
     const ModalModel sensor = identified(axis, &frf);
-    // Always quick: linear and time-invariant, so a blow tells all.
+    // Linear and time-invariant: an impulse response gives the complete FRF.
     HarmonicFilterParameters parameters;
     parameters.memory_revolutions = parameters.settling_revolutions;
     HarmonicFilter filter(sensor, units::TWO_PI * 930.0 / 4.0, RATE, parameters);
@@ -145,10 +145,10 @@ Drawn transferFunctions(const std::string& folder, unsigned) {
   return drawn;
 }
 
-double waveformError(const Cut& cut, const std::vector<double>& told) {
+double waveformError(const Cut& cut, const std::vector<double>& estimated) {
   double error = 0.0, norm = 0.0;
-  for (std::size_t i = 0; i < told.size(); ++i) {
-    error += std::pow(told[i] - cut.truth[i], 2);
+  for (std::size_t i = 0; i < estimated.size(); ++i) {
+    error += std::pow(estimated[i] - cut.truth[i], 2);
     norm += std::pow(cut.truth[i], 2);
   }
   return std::sqrt(error / norm);
@@ -191,9 +191,8 @@ Drawn atResonance(const std::string& folder, unsigned seed) {
                           formatted("rms error %.1f %% (measured %.0f %%)", 100.0 * error,
                                     100.0 * waveformError(fast, fast.measured)),
                           error < 0.10 ? Verdict::better : Verdict::differs,
-                          "harmonics to 5 kHz and both modes are in the filter; the thesis' sensor could not "
-                          "be modelled above its "
-                          "first mode"});
+                          "the filter contains harmonics to 5 kHz and both modes; the sensor of the thesis "
+                          "could not be modelled above its first mode"});
   }
   return drawn;
 }

@@ -29,9 +29,9 @@ std::vector<Figure> allFigures() {
 Compared compareNumber(const std::string& what, double seed, double ours, double ours_std, double share,
                        const std::string& why) {
   const bool near = std::abs(ours - seed) <= std::max(share * std::abs(seed), 1.96 * ours_std);
-  const std::string told =
+  const std::string our_text =
       ours_std > 0.0 ? formatted("%.4g +- %.2g", ours, ours_std) : formatted("%.4g", ours);
-  return {what, formatted("%.4g", seed), told, near ? Verdict::agrees : Verdict::differs, why};
+  return {what, formatted("%.4g", seed), our_text, near ? Verdict::agrees : Verdict::differs, why};
 }
 
 }  // namespace smartmill::studies

@@ -6,29 +6,29 @@
 
 namespace smartmill::studies {
 
-/// Whether what is found here bears out what a document prints.
+/// Whether a result confirms the printed value of a document.
 enum class Verdict { agrees, better, differs };
 const char* nameOf(Verdict verdict);
 
-/// A number of a document beside ours. Texts, as a document's "about 30 %" is no number.
+/// A printed value of a document and the one computed here, as texts, since "about 30 %" is no number.
 struct Compared {
   std::string what;  ///< with its unit
   std::string seed;  ///< as printed
-  std::string ours;  ///< as found in this run
-  Verdict verdict;   ///< told by the figure's own rule, never by hand
-  std::string why;   ///< of a difference, or what the comparison is worth
+  std::string ours;  ///< computed in this run
+  Verdict verdict;   ///< by the rule of the figure, never by hand
+  std::string why;   ///< reason of a difference, or limits of the comparison
 };
 
-/// What a figure or table of a document has become.
+/// Result of reproducing a figure or table of a document.
 struct Drawn {
-  std::vector<std::string> pictures;  ///< files, in the folder that was given
+  std::vector<std::string> pictures;  ///< files in the output folder
   std::vector<Compared> rows;
 };
 
-/// One figure or table, or a few that show the same run.
+/// One figure or table, or several of the same run.
 struct Figure {
-  std::string name;   ///< of the command line and the picture: dunwoody_3_5
-  std::string title;  ///< the document's numbers of it, and what it shows
+  std::string name;   ///< for command line and picture: dunwoody_3_5
+  std::string title;  ///< its numbers in the document, and its content
   std::function<Drawn(const std::string& folder, unsigned seed)> draw;
 };
 
@@ -44,7 +44,7 @@ std::vector<Figure> spindleSensorFigures();  ///< Burzoni
 std::vector<Figure> plateFigures();          ///< Bachrathy and Stepan
 std::vector<Figure> motorFigures();          ///< Cheng and Venuvinod
 
-/// Agrees within a share of the document's number, or within 1.96 standard deviations of ours.
+/// Agrees within a share of the printed value, or within 1.96 standard deviations of ours.
 Compared compareNumber(const std::string& what, double seed, double ours, double ours_std, double share,
                        const std::string& why);
 

@@ -48,12 +48,12 @@ Drawn forceWindow(const std::string& folder, unsigned seed) {
   plot.draw();
   return {
       {png},
-      {{"error of the windowed spectrum over the raw one's, section 4.3.1", "6 %",
+      {{"error of the windowed spectrum over that of the raw one, section 4.3.1", "6 %",
         formatted("%.1f %%", 100.0 * left), std::abs(left - 0.06) < 0.01 ? Verdict::agrees : Verdict::differs,
-        "eq. 4.16 with this window; the thesis does not tell the pulse's shape, a half sine here"}}};
+        "eq. 4.16 with this window; the thesis does not state the pulse shape, a half sine here"}}};
 }
 
-/// First of the drawn machines that the station measures.
+/// The first random machine that the station measures.
 hammer::StationFrfs stationFrfs(unsigned seed) {
   hammer::StationStudy study;
   study.seed = seed;
@@ -62,15 +62,15 @@ hammer::StationFrfs stationFrfs(unsigned seed) {
     hammer::runStation(study, number, &frfs);
     if (frfs.measured.size() > 0) return frfs;
   }
-  throw Error("none of twenty drawn stations was measured");
+  throw Error("none of twenty random stations was measured");
 }
 
 /// Norm of the difference over the norm [1], 250 to 4900 Hz.
-double apart(const FrequencyResponse& told, const FrequencyResponse& truth) {
+double apart(const FrequencyResponse& estimated, const FrequencyResponse& truth) {
   double difference = 0.0, whole = 0.0;
   for (std::size_t i = 0; i < truth.size(); ++i) {
     if (truth.frequency[i] < hammer::BAND_LOW || truth.frequency[i] > hammer::BAND_HIGH) continue;
-    difference += std::norm(told.value[i] - truth.value[i]);
+    difference += std::norm(estimated.value[i] - truth.value[i]);
     whole += std::norm(truth.value[i]);
   }
   return std::sqrt(difference / whole);
@@ -87,7 +87,7 @@ double least(const StabilityLimit& limit) {
   return *std::min_element(limit.depth.begin(), limit.depth.end());
 }
 
-/// [rpm] of the deepest place above 10,000 rpm.
+/// [rpm] of the deepest point above 10,000 rpm.
 double pocket(const StabilityLimit& limit) {
   std::size_t best = limit.depth.size() - 1;
   for (std::size_t i = 0; i < limit.depth.size(); ++i)
@@ -96,12 +96,11 @@ double pocket(const StabilityLimit& limit) {
   return units::rpmFromRadPerSec(limit.spindle_speed[best]);
 }
 
-/// Figures 4.5 to 4.8: a drawn tool in a drawn machine before the simulated station.
+/// Figures 4.5 to 4.8: a random tool in a random machine at the simulated station.
 Drawn automaticHammer(const std::string& folder, unsigned seed) {
   const hammer::StationFrfs f = stationFrfs(seed);
-  const TipCurve direct{"struck and read at the tip", f.direct},
-      measured{"measured, no correction", f.measured}, thesis{"eq. 4.44", f.thesis},
-      tip{"spindle and tool apart", f.tip};
+  const TipCurve direct{"direct, at the tip", f.direct}, measured{"measured, no correction", f.measured},
+      thesis{"eq. 4.44", f.thesis}, tip{"receptance coupling", f.tip};
   Drawn drawn;
   for (const char* number : {"5", "6", "7", "8"})
     drawn.pictures.push_back(folder + "/dunwoody_4_" + number + ".png");
@@ -111,24 +110,22 @@ Drawn automaticHammer(const std::string& folder, unsigned seed) {
   const auto limits = drawSlotLimits({direct, measured, thesis, tip}, drawn.pictures[3]);
   const double across = apart(f.measured, f.across), raw = apart(f.measured, f.direct),
                corrected = apart(f.thesis, f.direct), ours = apart(f.tip, f.direct);
-  drawn.rows.push_back({"automatic hammer against the true FRF of the same two heights, figure 4.5",
+  drawn.rows.push_back({"automatic hammer and true FRF of the same two heights, figure 4.5",
                         "\"very similar\"", formatted("%.1f %% rms", 100.0 * across),
                         across < 0.1 ? Verdict::agrees : Verdict::differs,
-                        "250 to 4900 Hz; theirs beside a hammer held by hand"});
+                        "250 to 4900 Hz; the thesis compares with a manual hammer"});
   const double stiffer = peak(f.measured) / peak(f.direct);
-  drawn.rows.push_back({"largest peak, struck above the tip over struck at it, figure 4.6",
-                        "stiffer: below 1", formatted("%.2f", stiffer),
-                        stiffer < 1.0 ? Verdict::agrees : Verdict::differs,
+  drawn.rows.push_back({"largest peak, hit above the tip over hit at the tip, figure 4.6", "stiffer: below 1",
+                        formatted("%.2f", stiffer), stiffer < 1.0 ? Verdict::agrees : Verdict::differs,
                         "theirs at 2400 Hz; neither tool nor spindle is printed"});
   drawn.rows.push_back(
-      {"corrected against the tip's own FRF, figure 4.7", "\"matches more closely\"",
+      {"corrected FRF and true FRF of the tip, figure 4.7", "\"matches more closely\"",
        formatted("eq. 4.44 %.0f %%, uncorrected %.0f %% rms", 100.0 * corrected, 100.0 * raw),
        corrected < raw ? Verdict::agrees : Verdict::differs,
-       "eq. 4.44 multiplies every mode alike, the spindle's too"});
-  drawn.rows.push_back({"the same by spindle and tool apart", "\"matches more closely\"",
-                        formatted("%.1f %% rms", 100.0 * ours),
-                        ours < corrected ? Verdict::better : Verdict::differs,
-                        "the beam's shape mode by mode"});
+       "eq. 4.44 scales all modes equally, including that of the spindle"});
+  drawn.rows.push_back(
+      {"the same by receptance coupling", "\"matches more closely\"", formatted("%.1f %% rms", 100.0 * ours),
+       ours < corrected ? Verdict::better : Verdict::differs, "by the mode shapes of the beam"});
   const double high = least(limits[1]) / least(limits[0]), right = least(limits[3]) / least(limits[0]);
   drawn.rows.push_back(
       {"least limit of a slot, uncorrected over the tip's, figure 4.8", "much higher",
@@ -145,8 +142,8 @@ Drawn automaticHammer(const std::string& folder, unsigned seed) {
 }  // namespace
 
 std::vector<Figure> hammerFigures() {
-  return {{"dunwoody_4_3", "Dunwoody figure 4.3: the force's window", forceWindow},
-          {"dunwoody_4_5", "Dunwoody figures 4.5 to 4.8: the automatic hammer beside the tip's FRF",
+  return {{"dunwoody_4_3", "Dunwoody figure 4.3: the window of the force", forceWindow},
+          {"dunwoody_4_5", "Dunwoody figures 4.5 to 4.8: the automatic hammer and the FRF of the tip",
            automaticHammer}};
 }
 

@@ -1,4 +1,4 @@
-// Kim: turning whose controller learns the machine.
+// Kim: adaptive control of turning.
 
 #include <cmath>
 #include <string>
@@ -27,7 +27,8 @@ Drawn turning(const std::string& folder, unsigned) {
          formatted("%.1f rad/s, %.4f", ours.frequency, ours.damping_ratio),
          off(ours.frequency, ours.damping_ratio) < off(printed[s][0], printed[s][1]) ? Verdict::better
                                                                                      : Verdict::differs,
-         "spectra are compared with those of the model's own answer, so the window's leakage is in both"});
+         "spectra are compared with those of the model output, so that both contain the leakage of the "
+         "window"});
   }
   drawn.rows.push_back(
       {"K / K_m as learnt after period 1, section 4 (true 0.1)", "0.15",
@@ -37,7 +38,7 @@ Drawn turning(const std::string& folder, unsigned) {
   drawn.rows.push_back({"the machine by his update after period 2 (he estimates 332, 0.11 before it)",
                         "335 rad/s, 0.06", formatted("%.0f rad/s, %.2f", read.frequency, read.damping_ratio),
                         std::abs(read.frequency / 335.0 - 1.0) < 0.05 ? Verdict::agrees : Verdict::differs,
-                        "eq. 16 as printed, run here, read off its peak and half-power width"});
+                        "eq. 16 as printed, computed here, from its peak and half-power width"});
   const double free = stability::lastVibration(f.free), ours = stability::lastVibration(f.ours),
                kim = stability::lastVibration(f.kim.trace);
   drawn.rows.push_back(

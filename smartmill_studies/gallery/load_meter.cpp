@@ -22,12 +22,12 @@ namespace {
 using Rows = std::vector<std::vector<double>>;
 using loadmeter::AirCut;
 
-/// What the thesis prints of the Mori-Seiki NMV-5000 (eq. 3.10, 3.11, 3.12, section 3.2.1).
+/// Printed values of the Mori-Seiki NMV-5000 (eq. 3.10, 3.11, 3.12, section 3.2.1).
 constexpr double KB = 1.43e-7, KTCF = -2.51e-5, K = 3.88e-4, STEP = 3e-4, BANDWIDTH = 7.0;
-/// Below 2000 rpm Stribeck's friction rises, where the thesis shows it in figure 3.4 and takes none for true.
+/// Below 2000 rpm friction rises (Stribeck), as in figure 3.4 of the thesis, which assumes none.
 constexpr double ZERO_BELOW_RPM = 2000.0, BREAKAWAY = 0.15, STRIBECK_RPM = 900.0;
-constexpr double NOISE = 2e-4;  // [V] rms of a reading before it is rounded
-constexpr int READINGS = 50;    // a mean: one second at 50 Hz
+constexpr double NOISE = 2e-4;  // [V] RMS of a measurement before rounding
+constexpr int READINGS = 50;    // per mean: one second at 50 Hz
 
 Spindle moriSeiki() {
   Spindle spindle;
@@ -39,7 +39,7 @@ Spindle moriSeiki() {
   return spindle;
 }
 
-/// The machine with its meter: mean of what the controller tells in a steady cut [V].
+/// The machine with its load meter: mean of the controller's values in a steady cut [V].
 class Meter {
  public:
   explicit Meter(unsigned seed) : drive_(moriSeiki(), 0.02), random_(seed) {}
@@ -55,7 +55,7 @@ class Meter {
     return sum / READINGS;
   }
 
-  /// [N m] of friction as the machine has it.
+  /// [N m] true friction torque of the machine.
   double friction(double speed) {
     const double stribeck = BREAKAWAY * std::exp(-std::pow(units::rpmFromRadPerSec(speed) / STRIBECK_RPM, 2));
     return moriSeiki().viscous * speed + moriSeiki().coulomb + stribeck;
@@ -106,16 +106,16 @@ Drawn airCutting(const std::string& folder, unsigned seed) {
           "[rpm]'\nset ylabel 'load meter in air [V]'\n"
           "plot $fits using 1:3 with lines lw 4 lc rgb '#b0b0b0' title 'thesis, eq. 3.6 with 3.11', "
           "$fits using 1:2 with lines lw 1.5 lc rgb '#2060c0' title 'fitted here', "
-          "$volts using 1:2 with points pt 7 lc rgb '#c02020' title 'readings'\n"
+          "$volts using 1:2 with points pt 7 lc rgb '#c02020' title 'measured'\n"
           "set ylabel 'torque in air [N m]'\nset yrange [-0.2:1]\n"
           "plot $fits using 1:5 with lines lw 4 lc rgb '#b0b0b0' title 'thesis, eq. 3.11', "
           "$fits using 1:6 with lines dt 2 lc rgb '#606060' title 'the machine, with Stribeck', "
           "$fits using 1:4 with lines lw 1.5 lc rgb '#2060c0' title 'fitted here', "
-          "$torques using 1:2 with points pt 7 lc rgb '#c02020' title 'readings'\nunset multiplot\n";
+          "$torques using 1:2 with points pt 7 lc rgb '#c02020' title 'measured'\nunset multiplot\n";
   plot.draw();
   const std::string why =
-      "the simulated machine has the thesis' constants: what is shown is that air cuts "
-      "read in steps of 3e-4 V tell them";
+      "the simulated machine has the constants of the thesis, which are recovered from air cuts with a "
+      "resolution of 3e-4 V";
   const auto& f = idle.fit;
   return {{png},
           {compareNumber("Kb, figure 3.1 [V s2/rad2]", KB, f.kb.value, f.kb.std_dev, 0.02, why),
@@ -125,7 +125,7 @@ Drawn airCutting(const std::string& folder, unsigned seed) {
            compareNumber("Tcf, eq. 3.11 [N m]", -0.0647, f.ktcf.value / K, f.ktcf.std_dev / K, 0.10, why)}};
 }
 
-/// A slot of about 2.5 N m: the thesis tells "between 2-3 Nm".
+/// A slot of about 2.5 N m: the thesis states "between 2-3 Nm".
 constexpr double TORQUE = 2.5;  // [N m]
 
 Drawn sensitivity(const std::string& folder, unsigned seed) {
@@ -157,17 +157,17 @@ Drawn sensitivity(const std::string& folder, unsigned seed) {
           "$lines using 1:2 with lines lw 1.5 lc rgb '#2060c0' title 'fitted here', "
           "$points using 1:2 with points pt 7 lc rgb '#c02020' title 'slots, 1000 to 20,000 rpm'\n";
   plot.draw();
-  std::vector<Compared> rows{
-      compareNumber("K, figure 3.2 [V/W]", K, slope, 0.0, 0.01, "the machine has the thesis' constant")};
+  std::vector<Compared> rows{compareNumber("K, figure 3.2 [V/W]", K, slope, 0.0, 0.01,
+                                           "the machine has the constant of the thesis")};
   // Eq. 3.12 at 2 and 3 N m.
-  for (const auto& [share, told] : {std::pair(0.10, 35.0), std::pair(0.01, 350.0)}) {
+  for (const auto& [share, estimated] : {std::pair(0.10, 35.0), std::pair(0.01, 350.0)}) {
     const auto speed = [s = share](double torque) {
       return units::rpmFromRadPerSec(STEP / (K * s * torque));
     };
-    const bool holds = told >= 0.9 * speed(3.0) && told <= 1.1 * speed(2.0);
+    const bool holds = estimated >= 0.9 * speed(3.0) && estimated <= 1.1 * speed(2.0);
     rows.push_back({formatted("speed at which a step of the meter is %.0f %% of 2..3 N m, eq. 3.12 [rpm]",
                               100.0 * share),
-                    formatted("%.0f", told), formatted("%.0f .. %.0f", speed(3.0), speed(2.0)),
+                    formatted("%.0f", estimated), formatted("%.0f .. %.0f", speed(3.0), speed(2.0)),
                     holds ? Verdict::agrees : Verdict::differs, "closed form"});
   }
   return {{png}, rows};
@@ -186,11 +186,11 @@ Drawn exitOfTheCut(const std::string& folder, unsigned seed) {
   for (int i = 0; i < 400; ++i) {
     const double t = i / RATE, torque = t < LEAVES ? TORQUE : 0.0;
     const double v = drive.rounded(drive.step(torque, SPEED) + normal(random));
-    const double told = v / (K * SPEED) - spindle.viscous * SPEED - spindle.coulomb;
-    rows.push_back({t, torque, told});
+    const double estimated = v / (K * SPEED) - spindle.viscous * SPEED - spindle.coulomb;
+    rows.push_back({t, torque, estimated});
     // The logarithm of a first-order decay is a line.
-    if (t < LEAVES + 0.002 || told < 0.1 * TORQUE) continue;
-    const double y = std::log(told / TORQUE), at = t - LEAVES;
+    if (t < LEAVES + 0.002 || estimated < 0.1 * TORQUE) continue;
+    const double y = std::log(estimated / TORQUE), at = t - LEAVES;
     n += 1.0, st += at, sy += y, stt += at * at, sty += at * y;
   }
   const double bandwidth = -(n * sty - st * sy) / (n * stt - st * st) / units::TWO_PI;
@@ -201,11 +201,11 @@ Drawn exitOfTheCut(const std::string& folder, unsigned seed) {
           "m]'\nplot $torque using 1:2 with lines lw "
           "3 lc "
           "rgb '#b0b0b0' title 'cutting torque: the tool leaves', $torque using 1:3 with lines lw 1.5 lc rgb "
-          "'#2060c0' title 'told by the load meter'\n";
+          "'#2060c0' title 'by the load meter'\n";
   plot.draw();
   return {{png},
           {compareNumber("bandwidth of the load meter, figure 3.3 [Hz]", BANDWIDTH, bandwidth, 0.0, 0.05,
-                         "the machine's lag is of 7 Hz; read off its step here")}};
+                         "the machine has a lag of 7 Hz; here from its step response")}};
 }
 
 /// Straight line, least squares.
@@ -220,12 +220,12 @@ Straight straight(const std::vector<double>& x, const std::vector<double>& y) {
 }
 
 Drawn coefficients(const std::string& folder, unsigned seed) {
-  // Eq. 3.22, 3.23: what the dynamometer told is what the machine cuts with here.
+  // Eq. 3.22, 3.23: the machine cuts with the coefficients from the dynamometer.
   constexpr double KTC = 936e6, KTE = 13.9e3, RADIUS = 10e-3, DEPTH = 3e-3, RPM = 5000.0;
   constexpr int TEETH = 2;
   Meter meter(seed);
   const Idle idle = idleOf(meter);
-  std::vector<double> feeds, told, truth;
+  std::vector<double> feeds, estimated, truth;
   Rows points;
   const double w = units::radPerSecFromRpm(RPM);
   for (double feed = 4e-5; feed < 2.1e-4; feed += 2e-5) {
@@ -235,10 +235,10 @@ Drawn coefficients(const std::string& folder, unsigned seed) {
                               .torque;
     feeds.push_back(feed);
     truth.push_back(torque);
-    told.push_back((meter.mean(torque, w) - idle.fit.at(w)) / (K * w));  // eq. 3.5
-    points.push_back({1e3 * feed, torque, told.back()});
+    estimated.push_back((meter.mean(torque, w) - idle.fit.at(w)) / (K * w));  // eq. 3.5
+    points.push_back({1e3 * feed, torque, estimated.back()});
   }
-  const Straight line = straight(feeds, told);
+  const Straight line = straight(feeds, estimated);
   const double scale = RADIUS * TEETH * DEPTH;  // eq. 3.19
   const double ktc = line.slope * units::PI / scale, kte = line.level * 2.0 / scale;
   const std::string png = folder + "/dunwoody_3_5.png";
@@ -254,8 +254,8 @@ Drawn coefficients(const std::string& folder, unsigned seed) {
   const auto off = [](double x) { return formatted("%.2f %% off", 100.0 * std::abs(x)); };
   const double here = ktc / KTC - 1.0, here_edge = kte / KTE - 1.0;
   const std::string why =
-      "same procedure, on a machine whose only faults are steps, noise and Stribeck friction; "
-      "the next figure has faults as real machines do";
+      "same procedure, on a machine with resolution, noise and Stribeck friction only; the next figure has "
+      "the imperfections of real machines";
   return {{png},
           {{"Ktc by load meter over dynamometer, eq. 3.20, 3.22", "11 % off (1040, 936 N/mm2)", off(here),
             std::abs(here) < 0.11 ? Verdict::better : Verdict::differs, why},
@@ -285,11 +285,11 @@ Drawn manyMachines(const std::string& folder, unsigned seed) {
       << "set grid\nset key above horizontal samplen 2\nset logscale x\nset xlabel '|error| [%]'\nset ylabel "
          "'share of "
          "machines'\n"
-         "plot $rows using 2:1 with lines lw 2 lc rgb '#c08040' title 'Ktc, thesis to the letter', $rows "
+         "plot $rows using 2:1 with lines lw 2 lc rgb '#c08040' title 'Ktc, thesis procedure', $rows "
          "using "
          "3:1 with lines lw 2 lc rgb '#2060c0' title 'Ktc, here', $rows using 4:1 with lines dt 2 lw 2 lc "
          "rgb "
-         "'#c08040' title 'Kte, thesis to the letter', $rows using 5:1 with lines dt 2 lw 2 lc rgb '#2060c0' "
+         "'#c08040' title 'Kte, thesis procedure', $rows using 5:1 with lines dt 2 lw 2 lc rgb '#2060c0' "
          "title 'Kte, here'\n";
   plot.draw();
   const auto say = [](const std::vector<double>& e) {
@@ -312,7 +312,7 @@ std::vector<Figure> loadMeterFigures() {
           {"dunwoody_3_2", "Dunwoody figure 3.2: sensitivity of the load meter over speed", sensitivity},
           {"dunwoody_3_3", "Dunwoody figure 3.3: the load meter when the tool leaves the cut", exitOfTheCut},
           {"dunwoody_3_5", "Dunwoody figure 3.5: torque over feed per tooth", coefficients},
-          {"dunwoody_3_5_machines", "Beside figure 3.5: the same on machines with faults", manyMachines}};
+          {"dunwoody_3_5_machines", "Supplement to figure 3.5: machines with imperfections", manyMachines}};
 }
 
 }  // namespace smartmill::studies

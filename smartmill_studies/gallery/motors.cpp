@@ -19,9 +19,9 @@ using loadmeter::TurningResult;
 using Rows = std::vector<std::vector<double>>;
 
 const std::string SAME = "the simulated centre has the paper's laws and the variances of its table 2";
-const std::string HELD_OUT = "two thirds of 300 prediction tests that took no part in a choice";
+const std::string HELD_OUT = "two thirds of 300 prediction tests, not used for selection";
 
-/// Figure 5: the tool enters the work half way.
+/// Figure 5: the tool enters the workpiece at half of the record.
 Drawn current(const std::string& folder, unsigned seed) {
   constexpr double RATE = 1000.0, FREQUENCY = 8.0, AIR = 0.4;  // [Hz], [Hz] of the phase, [A]
   constexpr double SLOPE = 215.9, FORCE = 325.78;              // table 1 [N/A], table 2 [N]
@@ -70,7 +70,7 @@ Drawn current(const std::string& folder, unsigned seed) {
                          0.02, "the mean of table 2, the slope of table 1")}};
 }
 
-/// Figure 6: told over measured, all three forces.
+/// Figure 6: predicted over measured, all three forces.
 std::string drawAgreement(const std::string& folder, const TurningResult& r, const loadmeter::Line& line) {
   const std::string png = folder + "/cheng_6.png";
   Gnuplot plot(png, 900, 700, 12);
@@ -80,7 +80,7 @@ std::string drawAgreement(const std::string& folder, const TurningResult& r, con
   for (std::size_t axis = 0; axis < 3; ++axis) {
     Rows rows;
     for (std::size_t i = 0; i < r.truth[axis].size(); ++i) {
-      rows.push_back({r.truth[axis][i], r.told[axis][i]});
+      rows.push_back({r.truth[axis][i], r.predicted[axis][i]});
       most = std::max(most, r.truth[axis][i]);
     }
     plot.block(names[axis], rows);
@@ -101,12 +101,12 @@ std::string drawAgreement(const std::string& folder, const TurningResult& r, con
 }
 
 loadmeter::Line pooled(const TurningResult& r) {
-  std::vector<double> truth, told;
+  std::vector<double> truth, predicted;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     truth.insert(truth.end(), r.truth[axis].begin(), r.truth[axis].end());
-    told.insert(told.end(), r.told[axis].begin(), r.told[axis].end());
+    predicted.insert(predicted.end(), r.predicted[axis].begin(), r.predicted[axis].end());
   }
-  return loadmeter::fitLine(truth, told);
+  return loadmeter::fitLine(truth, predicted);
 }
 
 /// Table 1 and figure 6.
@@ -138,12 +138,12 @@ Drawn calibrationAndPrediction(const std::string& folder, unsigned seed) {
   row("rms error of Fy by ANFIS, table 1 [N]", 34.0, r.anfis.rmse[1]);
   row("rms error of Fz by ANFIS, table 1 [N]", 21.0, r.anfis.rmse[2]);
   share("R2 of the prediction of Fx by regression, table 1", 0.837, r.regression.r_squared[0],
-        "forces of 60 to 190 N alone: less to explain, though the rms error is the smaller one");
+        "only forces of 60 to 190 N: less variance to explain, although the RMS error is smaller");
   share("R2 of the prediction of Fy by regression, table 1", 0.9587, r.regression.r_squared[1], HELD_OUT);
   share("R2 of the prediction of Fz by regression, table 1", 0.9427, r.regression.r_squared[2], HELD_OUT);
   share("R2 of the prediction of Fy by ANFIS, table 1", 0.96, r.anfis.r_squared[1], HELD_OUT);
   share("R2 of the prediction of Fz by ANFIS, table 1", 0.94, r.anfis.r_squared[2], HELD_OUT);
-  drawn.rows.push_back(compareNumber("slope of told over measured, figure 6", 1.0, line.slope.value,
+  drawn.rows.push_back(compareNumber("slope of predicted over measured, figure 6", 1.0, line.slope.value,
                                      line.slope.std_dev, 0.03, "\"nearly equal to 1\""));
   drawn.rows.push_back({"level of that line, figure 6 [N]", "-6", formatted("%.1f", line.level.value),
                         std::abs(line.level.value) <= 6.0 ? Verdict::better : Verdict::differs,
@@ -164,7 +164,7 @@ Drawn variances(const std::string&, unsigned seed) {
                       twelve = loadmeter::studyTurning(seed, put_in, 12);
   Drawn drawn;
   const std::string many =
-      "400 replications; with the paper's twelve a variance is only known to a factor of two";
+      "400 replications; the twelve of the paper give a variance only within a factor of two";
   const auto row = [&](const char* what, const char* name, double printed, double ours, double part,
                        const std::string& why) {
     drawn.rows.push_back(compareNumber(formatted("%s %s", what, name), printed, ours, 0.0, part, why));
@@ -173,19 +173,18 @@ Drawn variances(const std::string&, unsigned seed) {
                         const loadmeter::VarianceSplit& split, const loadmeter::VarianceSplit& few,
                         bool differ) {
     row("mean by the dynamometer, table 2 [N],", name, printed[0], split.process_mean, 0.05,
-        "the simulated cut of aluminium is near the paper's in its main force, larger in its feed force");
+        "the simulated cut of aluminium has about the main force of the paper, and a larger feed force");
     row("mean by the current, table 2 [N],", name, printed[1], split.current_mean, 0.05,
-        "as the dynamometer's: what is compared is how far the two are apart");
+        "as for the dynamometer: the difference of the two is compared");
     row("variance by the dynamometer, table 2 [N2],", name, printed[2], split.process_variance, 0.25, many);
     row("variance by the current, table 2 [N2],", name, printed[3], split.current_variance, 0.25, many);
-    row("variance of the current's way of measuring, table 2 [N2],", name, printed[4], split.sensor_variance,
+    row("variance of the measurement by current, table 2 [N2],", name, printed[4], split.sensor_variance,
         0.25, many);
     const bool here = few.p_means < 0.05;
-    drawn.rows.push_back(
-        {formatted("means of twelve differ at 5 %%, section 12, %s", name), differ ? "yes" : "no",
-         formatted("%s (p %.2f)", here ? "yes" : "no", few.p_means),
-         here == differ ? Verdict::agrees : Verdict::differs,
-         "theirs is a law of the spindle learnt on another material; the simulated one is the same"});
+    drawn.rows.push_back({formatted("means of twelve differ at 5 %%, section 12, %s", name),
+                          differ ? "yes" : "no", formatted("%s (p %.2f)", here ? "yes" : "no", few.p_means),
+                          here == differ ? Verdict::agrees : Verdict::differs,
+                          "their spindle law is from another material; the simulated one is the same"});
   };
   axis("Fy", {485.78, 465.21, 84.0, 425.0, 383.0}, r.fy, twelve.fy, true);
   axis("Fz", {325.78, 326.87, 320.0, 580.0, 260.0}, r.fz, twelve.fz, false);

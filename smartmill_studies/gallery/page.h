@@ -7,13 +7,13 @@
 
 namespace smartmill::studies {
 
-struct Shown {
+struct DrawnFigure {
   Figure figure;
   Drawn drawn;
 };
 
-/// One HTML file: opens with what differs, what is better and what agrees, then figure by figure.
+/// One HTML file: agreement, better results and disagreement, then all figures.
 /// @throws Error
-void writePage(const std::vector<Shown>& shown, unsigned seed, const std::string& file);
+void writePage(const std::vector<DrawnFigure>& drawn_figures, unsigned seed, const std::string& file);
 
 }  // namespace smartmill::studies

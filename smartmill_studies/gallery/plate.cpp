@@ -1,4 +1,4 @@
-// Bachrathy and Stepan: a plate dynamometer inverted with all its channels.
+// Bachrathy and Stepan: inversion of a plate dynamometer with all its channels.
 
 #include <algorithm>
 #include <array>
@@ -24,9 +24,9 @@ using Rows = std::vector<std::vector<double>>;
 using Forces = std::array<std::vector<double>, 3>;
 
 constexpr double RATE = 51200.0, BAND = 8000.0;                // [Hz]
-constexpr std::array<double, 3> POINT{{0.026, -0.020, 0.03}};  // [m] where nobody tapped
+constexpr std::array<double, 3> POINT{{0.026, -0.020, 0.03}};  // [m] not tapped
 
-/// The sensor, tapped at 14 points as in figure 1, three times each.
+/// The sensor with three taps at each of 14 points, as in figure 1.
 struct Plate {
   explicit Plate(unsigned seed)
       : random(seed),
@@ -82,11 +82,11 @@ Drawn matrix(const std::string& folder, unsigned seed) {
         low_beside < 0.1 ? Verdict::agrees : Verdict::differs, ""}}};
 }
 
-double rmsShare(const std::vector<double>& told, const std::vector<double>& truth, std::size_t from,
+double rmsShare(const std::vector<double>& estimated, const std::vector<double>& truth, std::size_t from,
                 std::size_t to) {
   double error = 0.0, whole = 0.0;
   for (std::size_t i = from; i < to; ++i) {
-    error += std::pow(told[i] - truth[i], 2);
+    error += std::pow(estimated[i] - truth[i], 2);
     whole += std::pow(truth[i], 2);
   }
   return std::sqrt(error / whole);
@@ -100,11 +100,11 @@ Drawn bouncing(const std::string& folder, unsigned seed) {
   for (std::size_t axis = 0; axis < 3; ++axis)
     for (const double f : contact) applied[axis].push_back(f * direction[axis]);
   const auto measured = plate.sensor.measure(applied, POINT, RATE, 6, plate.random);
-  const auto told = kalman::invertRecord(plate.six, measured, RATE, BAND);
+  const auto estimated = kalman::invertRecord(plate.six, measured, RATE, BAND);
   constexpr std::size_t FROM = 256, TO = 2304;  // 5 .. 45 ms
   Rows rows;
   for (std::size_t i = FROM; i < TO; ++i)
-    rows.push_back({1e3 * static_cast<double>(i) / RATE, -applied[2][i], -measured[2][i], -told[2][i]});
+    rows.push_back({1e3 * static_cast<double>(i) / RATE, -applied[2][i], -measured[2][i], -estimated[2][i]});
   const std::string png = folder + "/bachrathy_3.png";
   Gnuplot plot(png, 900, 800, 12);
   plot.block("rows", rows);
@@ -118,19 +118,19 @@ Drawn bouncing(const std::string& folder, unsigned seed) {
           "'#2060c0' title 'six channels compensated'\nunset multiplot\n";
   plot.draw();
   const double raw = rmsShare(measured[2], applied[2], FROM, TO),
-               left = rmsShare(told[2], applied[2], FROM, TO);
+               left = rmsShare(estimated[2], applied[2], FROM, TO);
   return {{png},
-          {{"bouncing hammer, compensated against hammer, figure 3", "\"almost the same signal\"",
+          {{"bouncing hammer, compensated force and hammer, figure 3", "\"almost the same signal\"",
             formatted("rms error %.1f %% (measured %.0f %%)", 100.0 * left, 100.0 * raw),
             left < 0.1 ? Verdict::agrees : Verdict::differs,
             "all frequencies; the band ends at 8 kHz, as theirs"}}};
 }
 
-/// Table 1.1 at a speed: force of the workpiece, what is measured, what is compensated.
+/// Table 1.1 at one speed: force on the workpiece, measured and compensated force.
 struct Milled {
   std::vector<double> angle;
   Forces applied;
-  std::vector<std::vector<double>> measured, told;
+  std::vector<std::vector<double>> measured, estimated;
 };
 
 const ToolGeometry& toolOfTable() {
@@ -156,7 +156,7 @@ Milled mill(Plate& plate, double rpm, double feed) {
     milled.applied[2].push_back(-share * f.fz);
   }
   milled.measured = plate.sensor.measure(milled.applied, POINT, RATE, 6, plate.random);
-  milled.told = kalman::invertRecord(plate.six, milled.measured, RATE, BAND);
+  milled.estimated = kalman::invertRecord(plate.six, milled.measured, RATE, BAND);
   return milled;
 }
 
@@ -171,7 +171,7 @@ Drawn twoSpeeds(const std::string& folder, unsigned seed) {
                to = from + static_cast<std::size_t>(120.0 / rpm * RATE);
     for (std::size_t i = from; i < to; ++i)
       rows.push_back({units::degFromRad(m.angle[i] - m.angle[from]), m.applied[0][i], m.measured[0][i],
-                      m.told[0][i], m.applied[1][i], m.measured[1][i], m.told[1][i]});
+                      m.estimated[0][i], m.applied[1][i], m.measured[1][i], m.estimated[1][i]});
     Gnuplot plot(png, 900, 800, 12);
     plot.block("rows", rows);
     plot << "set multiplot layout 2,1\nset grid\nset key above horizontal samplen 2\nset xlabel 'spindle "
@@ -188,13 +188,13 @@ Drawn twoSpeeds(const std::string& folder, unsigned seed) {
     const auto error = [&](const std::vector<double>& x, std::size_t axis) {
       return 100.0 * bandError(x, m.applied[axis], RATE, 2560, 22528, BAND);
     };
-    const double worst = std::max(error(m.told[0], 0), error(m.told[1], 1));
+    const double worst = std::max(error(m.estimated[0], 0), error(m.estimated[1], 1));
     drawn.rows.push_back({formatted("milling at %.0f rpm, worst of x and y to 8 kHz, figure 4", rpm),
                           rpm < 1e4 ? "\"a better function\"" : "\"an acceptable result\"",
                           formatted("error %.1f %% (measured %.0f %%)", worst,
                                     std::max(error(m.measured[0], 0), error(m.measured[1], 1))),
                           worst < 5.0 ? Verdict::better : Verdict::differs,
-                          "no error is printed: theirs is judged by eye; the material is not told"});
+                          "no error is printed, only a visual judgement; the material is not stated"});
   }
   return drawn;
 }
@@ -219,11 +219,11 @@ std::string overAngle(const std::string& folder, unsigned seed) {
       double chip = 0.0;
       for (const double tooth : {angle, std::fmod(angle + units::PI, units::TWO_PI)})
         if (tooth > cut.entry && tooth < cut.exit) chip += feed * std::sin(tooth);
-      rows.push_back({units::degFromRad(angle), m.told[0][i], m.told[1][i], 1e3 * chip});
+      rows.push_back({units::degFromRad(angle), m.estimated[0][i], m.estimated[1][i], 1e3 * chip});
     }
     std::sort(rows.begin(), rows.end());
     plot.block(formatted("feed%zu", feeds.size()), rows);
-    feeds.push_back(formatted("%.3f mm a tooth", 1e3 * feed));
+    feeds.push_back(formatted("%.3f mm per tooth", 1e3 * feed));
   }
   plot
       << "set multiplot layout 3,1\nset grid\nset lmargin 10\nset key above horizontal samplen 2\nset xlabel "
@@ -252,8 +252,8 @@ Drawn forceOverChip(const std::string& folder, unsigned seed) {
     const Milled m = mill(plate, 20000.0, feed);
     std::vector<double> fx, fy, angle;
     for (std::size_t i = 10240; i < 20480; ++i) {  // 0.2 .. 0.4 s, well within the cut
-      fx.push_back(-m.told[0][i]);
-      fy.push_back(-m.told[1][i]);
+      fx.push_back(-m.estimated[0][i]);
+      fy.push_back(-m.estimated[1][i]);
       angle.push_back(m.angle[i]);
     }
     Rows rows;
@@ -296,8 +296,8 @@ Drawn forceOverChip(const std::string& folder, unsigned seed) {
                    way == 0 ? "radial" : "tangential"),
          "\"overlap with very small noise\"", formatted("rms %.1f %% off the material's law", 100.0 * error),
          error < 0.1 ? Verdict::agrees : Verdict::differs,
-         way == 0 ? "their radial force bends \"unexpectedly\"; the simulated material's is straight"
-                  : "a helical edge is taken at its mean lag, so the ends of the arc bend away"});
+         way == 0 ? "their radial force bends \"unexpectedly\"; that of the simulated material is straight"
+                  : "a helical edge is evaluated at its mean lag, so that the ends of the arc deviate"});
   }
   return drawn;
 }

@@ -1,4 +1,4 @@
-// Burzoni: force sensors in the spindle; what his figures share.
+// Burzoni: force sensors in the spindle; data shared by his figures.
 
 #include "gallery/spindle_sensor.h"
 

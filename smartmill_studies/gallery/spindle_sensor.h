@@ -8,9 +8,9 @@
 
 namespace smartmill::studies {
 
-/// What Burzoni's figures share: one run of the simulated machine a seed, kept for the figures after it.
+/// Data shared by Burzoni's figures: one run of the simulated machine per seed, cached for later figures.
 const kalman::BurzoniData& burzoniData(unsigned seed);
-/// Table 8 + number of it, likewise.
+/// Table 8 + number of it, also cached.
 const kalman::BurzoniTable& burzoniTableOf(unsigned seed, std::size_t number);
 
 constexpr double BURZONI_BAND = 2500.0;                   ///< [Hz]

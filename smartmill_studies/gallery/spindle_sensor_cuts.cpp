@@ -21,10 +21,10 @@ using Rows = std::vector<std::vector<double>>;
 using kalman::BurzoniData;
 using kalman::BurzoniTable;
 
-/// A cut of a table through his filter.
+/// A cut of a table with the output of his filter.
 struct Compensated {
   double rpm = 0.0, turn = 0.0;  ///< [rpm], [samples]
-  std::vector<double> truth, measured, told, harmonics;
+  std::vector<double> truth, measured, filtered, harmonics;
   std::size_t from = 0;  ///< settled
 };
 
@@ -46,13 +46,13 @@ Compensated compensated(unsigned seed, std::size_t number, std::size_t speed, do
                 {},
                 cut.compensated[table.axis],
                 0};
-  c.told = kalman::expandedDisturbanceForce(c.measured, data.sensor[table.axis], BURZONI_RATE,
-                                            data.flutes * rpm / 60.0, q, table.r_cut);
+  c.filtered = kalman::expandedDisturbanceForce(c.measured, data.sensor[table.axis], BURZONI_RATE,
+                                                data.flutes * rpm / 60.0, q, table.r_cut);
   c.from = c.truth.size() / 2;
   return c;
 }
 
-/// [N] of the mean revolution, from the 5th to the 95th of a hundred parts.
+/// [N] of the mean revolution, from the 5 % to the 95 % quantile.
 double range(const Compensated& c, const std::vector<double>& force) {
   constexpr std::size_t BINS = 90;
   std::vector<double> sum(BINS, 0.0), count(BINS, 0.0);
@@ -71,7 +71,7 @@ double rangeError(const Compensated& c, const std::vector<double>& force) {
   return 100.0 * (range(c, force) / range(c, c.truth) - 1.0);
 }
 
-/// [%] rms over the true force's, to the band's end.
+/// [%] RMS error over the RMS of the true force, up to the end of the band.
 double waveError(const Compensated& c, const std::vector<double>& force) {
   return 100.0 *
          bandError(force, c.truth, BURZONI_RATE, c.from, force.size() - force.size() / 10, BURZONI_BAND);
@@ -82,7 +82,7 @@ void block(Gnuplot& plot, const std::string& name, const Compensated& c) {
   Rows rows;
   for (std::size_t i = 0; i < static_cast<std::size_t>(2.5 * c.turn); ++i) {
     const std::size_t at = c.from + i;
-    rows.push_back({1e3 * static_cast<double>(i) / BURZONI_RATE, c.truth[at], c.measured[at], c.told[at],
+    rows.push_back({1e3 * static_cast<double>(i) / BURZONI_RATE, c.truth[at], c.measured[at], c.filtered[at],
                     c.harmonics[at]});
   }
   plot.block(name, rows);
@@ -106,29 +106,30 @@ Drawn inTime(const std::string& folder, unsigned seed) {
   plot << "set multiplot layout 4,1\n" << FRAME;
   Drawn drawn{{png}, {}};
   const BurzoniTable& table = burzoniTableOf(seed, 0);
-  struct Shown {
+  struct PrintedCut {
     std::size_t speed;
     const char* printed;
-    double least, most;  ///< [%] what his words mean
+    double least, most;  ///< [%] meaning of his words
   };
-  for (const Shown& s : {Shown{4, "drawn, no number", -30.0, 30.0}, Shown{1, "about 10 % off", -15.0, 15.0},
-                         Shown{3, "underestimated", -100.0, 0.0}, Shown{5, "up to 30 % off", -30.0, 30.0}}) {
+  for (const PrintedCut& s :
+       {PrintedCut{4, "plotted, no number", -30.0, 30.0}, PrintedCut{1, "about 10 % off", -15.0, 15.0},
+        PrintedCut{3, "underestimated", -100.0, 0.0}, PrintedCut{5, "up to 30 % off", -30.0, 30.0}}) {
     const Compensated c = compensated(seed, 0, s.speed, printedQ(table, s.speed));
     const Compensated best = compensated(seed, 0, s.speed, std::pow(2.0, table.rows[s.speed].cut_exponent));
     const std::string name = formatted("cut%zu", s.speed);
     block(plot, name, c);
     panel(plot, name, formatted("x at %.0f rpm", c.rpm));
-    const double his = rangeError(c, c.told), ours = rangeError(c, c.harmonics);
+    const double his = rangeError(c, c.filtered), ours = rangeError(c, c.harmonics);
     drawn.rows.push_back(
         {formatted("amplitude by his filter, %.0f rpm, x, figures 39 to 42", c.rpm), s.printed,
-         formatted("%+.0f %%; with the cut's best Q %+.0f %%", his, rangeError(best, best.told)),
+         formatted("%+.0f %%; with the cut's best Q %+.0f %%", his, rangeError(best, best.filtered)),
          his >= s.least && his <= s.most ? Verdict::agrees : Verdict::differs,
          "Q over R as printed; range of the mean revolution; another sensor and cut"});
     drawn.rows.push_back(
         {formatted("the same by this package, %.0f rpm", c.rpm), s.printed, formatted("%+.1f %%", ours),
          std::abs(ours) < std::abs(his) ? Verdict::better : Verdict::differs,
-         formatted("wave %.1f %% off, his %.0f, with the cut's best Q %.0f %%", waveError(c, c.harmonics),
-                   waveError(c, c.told), waveError(best, best.told))});
+         formatted("waveform error %.1f %%, his %.0f, with the best Q of the cut %.0f %%",
+                   waveError(c, c.harmonics), waveError(c, c.filtered), waveError(best, best.filtered))});
   }
   plot << "unset multiplot\n";
   plot.draw();
@@ -148,10 +149,11 @@ Drawn lowNoise(const std::string& folder, unsigned seed) {
     return std::pair(sizes, BURZONI_RATE / static_cast<double>(whole));
   };
   const auto [is, apart] = lines(c.truth);
-  const auto shown = lines(c.measured).first, told = lines(c.told).first, ours = lines(c.harmonics).first;
+  const auto measured_lines = lines(c.measured).first, filtered = lines(c.filtered).first,
+             ours = lines(c.harmonics).first;
   Rows rows;
   for (std::size_t i = 1; static_cast<double>(i) * apart < BURZONI_BAND; ++i)
-    rows.push_back({static_cast<double>(i) * apart, is[i], shown[i], told[i], ours[i]});
+    rows.push_back({static_cast<double>(i) * apart, is[i], measured_lines[i], filtered[i], ours[i]});
   const std::string png = folder + "/burzoni_46.png";
   Gnuplot plot(png, 900, 900, 12);
   plot.block("lines", rows);
@@ -168,10 +170,10 @@ Drawn lowNoise(const std::string& folder, unsigned seed) {
       {{"RMSE at 9000 rpm, R of the taps in both, x, table 9, figure 46 [N]",
         formatted("%.3f, the worst", r.rmse_printed), formatted("%.3f; his filter %.3f", r.harmonics, r.rmse),
         r.harmonics < r.rmse_printed ? Verdict::better : Verdict::differs,
-        "his sensor passes next to nothing at 500 .. 700 Hz; the simulated one has no such gap there"}}};
+        "his sensor has almost no response at 500 .. 700 Hz; the simulated one has no such gap"}}};
 }
 
-/// Figure 57: y at 17,600 rpm by R, and what Q beside the best does.
+/// Figure 57: y at 17,600 rpm by R, and the effect of a Q other than the best.
 Drawn fastest(const std::string& folder, unsigned seed) {
   constexpr std::size_t SPEED = 6, HIGH = 4, LOW = 5;  // tables 12 and 13
   const BurzoniTable &cut_high = burzoniTableOf(seed, HIGH), &cut_low = burzoniTableOf(seed, LOW);
@@ -197,9 +199,9 @@ Drawn fastest(const std::string& folder, unsigned seed) {
   }
   const int best = cut_high.rows[SPEED].cut_exponent;
   const Compensated above = compensated(seed, HIGH, SPEED, std::pow(2.0, best + 6));
-  const double left = rangeError(high, high.told), right = rangeError(above, above.told);
+  const double left = rangeError(high, high.filtered), right = rangeError(above, above.filtered);
   drawn.rows.push_back(
-      {"amplitude with Q left and right of the cut's best, y at 17,600 rpm, section 6.4",
+      {"amplitude with Q below and above the best of the cut, y at 17,600 rpm, section 6.4",
        "too small, too large",
        formatted("%+.0f %% (Q over R as printed), %+.0f %% (64 times the best)", left, right),
        left < 0.0 && right > 0.0 ? Verdict::agrees : Verdict::differs,

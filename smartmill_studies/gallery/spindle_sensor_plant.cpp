@@ -31,7 +31,7 @@ FrequencyResponse tapped(const BurzoniData& data, std::size_t axis) {
       .band(20.0, BURZONI_BAND);
 }
 
-/// Figures 21, 31, 32: measured and fitted FRF, with the measured one's confidence.
+/// Figures 21, 31, 32: measured and fitted FRF, with confidence bands of the measured one.
 Drawn plant(const std::string& folder, unsigned seed) {
   const BurzoniData& data = burzoniData(seed);
   Drawn drawn;
@@ -42,7 +42,8 @@ Drawn plant(const std::string& folder, unsigned seed) {
     int inside_2 = 0, inside_3 = 0;
     for (std::size_t i = 0; i < frf.size(); ++i) {
       const std::complex<double> fit = data.sensor[axis].response(frf.frequency[i]);
-      // The deviation is that of a complex line: half its square lies along the magnitude (eq. 6-3).
+      // The standard deviation is that of a complex value: half of the variance is along the magnitude (eq.
+      // 6-3).
       const double size = std::abs(frf.value[i]), s = frf.std_dev[i] / std::sqrt(2.0);
       rows.push_back({frf.frequency[i], size, std::abs(fit), std::max(size - 3.0 * s, 1e-4), size + 3.0 * s,
                       std::max(size - 2.0 * s, 1e-4), size + 2.0 * s,
@@ -68,15 +69,16 @@ Drawn plant(const std::string& folder, unsigned seed) {
     plot.draw();
     drawn.pictures.push_back(png);
     const double off = std::sqrt(squares / whole);
-    drawn.rows.push_back({formatted("fitted against measured FRF to 2.5 kHz, %s, figure 21", AXES[axis]),
-                          "drawn, no number", formatted("%.1f %% rms", 100.0 * off),
-                          off < 0.05 ? Verdict::agrees : Verdict::differs, "three modes an axis, nine taps"});
+    drawn.rows.push_back({formatted("fitted and measured FRF to 2.5 kHz, %s, figure 21", AXES[axis]),
+                          "plotted, no number", formatted("%.1f %% rms", 100.0 * off),
+                          off < 0.05 ? Verdict::agrees : Verdict::differs,
+                          "three modes per axis, nine taps"});
     const double n = static_cast<double>(frf.size());
     drawn.rows.push_back(
         {formatted("lines within 2, 3 standard deviations of the fit, %s, figures 31, 32", AXES[axis]),
          "95.5, 99.7 %", formatted("%.1f, %.1f %%", 100.0 * inside_2 / n, 100.0 * inside_3 / n),
          inside_2 / n > 0.90 && inside_3 / n > 0.97 ? Verdict::agrees : Verdict::differs,
-         "eq. 6-3 on nine taps: a deviation from so few is itself known to a quarter"});
+         "eq. 6-3 on nine taps: their standard deviation is uncertain by a quarter"});
   }
   return drawn;
 }
@@ -104,11 +106,11 @@ Drawn spectra(const std::string& folder, unsigned seed) {
   const auto from = force.size() - static_cast<std::size_t>(std::lround(
                                        std::floor(0.75 * static_cast<double>(force.size()) / turn) * turn));
   const auto is = amplitudes(cut.truth[AXIS], from), told = amplitudes(force, from),
-             shown = amplitudes(cut.measured[AXIS], from);
+             measured_lines = amplitudes(cut.measured[AXIS], from);
   const double apart = BURZONI_RATE / static_cast<double>(force.size() - from);
   Rows rows, taps;
   for (std::size_t i = 1; static_cast<double>(i) * apart < BURZONI_BAND; ++i)
-    rows.push_back({static_cast<double>(i) * apart, is[i], shown[i], told[i]});
+    rows.push_back({static_cast<double>(i) * apart, is[i], measured_lines[i], told[i]});
   const auto& hammer = data.taps[AXIS].hammer.front();
   const auto hit = fourier(hammer);
   const auto answer = fourier(kalman::expandedDisturbanceForce(
@@ -156,12 +158,12 @@ TuningMap mapOf(const BurzoniData& data, const ReferenceTaps& taps, std::size_t 
                                 BURZONI_BAND);
 }
 
-/// Whether what is tried has a least error within, not at its end.
+/// Whether the least error is inside the range of exponents, not at its end.
 bool ends(int exponent) {
   return exponent < kalman::MOST_EXPONENT;
 }
 
-/// Exponent of the best Q less that of another map, at the speeds where that other one has a best.
+/// Exponent of the best Q minus that of another map, at the speeds where the other map has an optimum.
 std::vector<double> shifts(const TuningMap& map, const TuningMap& other) {
   std::vector<double> all;
   for (const double speed : map.speed) {
@@ -170,7 +172,7 @@ std::vector<double> shifts(const TuningMap& map, const TuningMap& other) {
   return all;
 }
 
-/// Speed and exponent of each cut's own best Q.
+/// Speed and exponent of the best Q of each cut.
 std::vector<std::pair<double, int>> dots(const BurzoniTable& table) {
   std::vector<std::pair<double, int>> all;
   for (const kalman::BurzoniRow& row : table.rows)
@@ -210,14 +212,13 @@ Drawn maps(const std::string& folder, unsigned seed) {
          formatted("x 2^%.1f, R x 2^%.1f (%zu of %zu speeds)", shift, expected, found.size(),
                    quiet.speed.size()),
          std::abs(shift - expected) <= 1.0 ? Verdict::agrees : Verdict::differs,
-         "a filter is told by Q over R alone: Q rises as R does (his R by 67); at the other speeds no Q "
-         "below 2^30 "
-         "is best: these taps stand 300 N over 0.4 N of noise"});
+         "a filter depends only on Q over R: Q increases with R (his R by 67); at the other speeds the "
+         "optimum is above 2^30: these taps have 300 N and a noise of 0.4 N"});
   }
   return drawn;
 }
 
-/// Figure 29: the taps' map at the speeds of the cuts alone.
+/// Figure 29: map of the taps, only at the speeds of the cuts.
 Drawn overSpeed(const std::string& folder, unsigned seed) {
   const BurzoniTable& table = burzoniTableOf(seed, 0);
   std::vector<double> speeds;
@@ -265,9 +266,8 @@ Drawn overSpeed(const std::string& folder, unsigned seed) {
         ends(most) ? formatted("2^%d .. 2^%d", least, most) : formatted("2^%d and more", least),
         least > std::log2(low->q_printed) - 3.0 && most < std::log2(high->q_printed) + 3.0 ? Verdict::agrees
                                                                                            : Verdict::differs,
-        "that it hangs on speed comes again; taps with little noise and a sensor known to half a per cent "
-        "let "
-        "Q be large: at the faster speeds no Q below 2^30 is best"}}};
+        "the dependence on speed is reproduced; taps with little noise and a sensor accurate to half a per "
+        "cent permit a large Q: at the higher speeds the optimum is above 2^30"}}};
 }
 
 /// Tables 6 and 7.
@@ -305,18 +305,18 @@ Drawn variedPlants(const std::string& folder, unsigned seed) {
     drawn.rows.push_back(
         {formatted("best Q of a plant 2, 3 deviations off, %s, table %zu", AXES[axis], 6 + axis),
          "a slight shift to higher Q",
-         formatted("%s shown less than believed, %s shown more", told(smaller).c_str(), told(larger).c_str()),
+         formatted("%s with a smaller gain than the model, %s with a larger one", told(smaller).c_str(),
+                   told(larger).c_str()),
          right ? Verdict::agrees : Verdict::differs,
-         "at the speeds where the taps have a best Q; a sensor that shows less wants more gain, one that "
-         "shows "
-         "more wants less"});
+         "at the speeds where the taps have a best Q; a sensor with a smaller gain requires a larger filter "
+         "gain, and vice versa"});
     const double most = larger.empty() ? 0.0 : std::max(median(smaller), median(larger));
     drawn.rows.push_back(
         {formatted("best Q of the cuts over that of the taps, %s, tables 6 and 7", AXES[axis]),
-         "higher, by more than plants explain", told(cuts),
+         "higher, by more than the plants explain", told(cuts),
          !cuts.empty() && median(cuts) > most ? Verdict::agrees : Verdict::differs,
-         "with R of air in the cut and of rest in the taps, as his; at the other speeds the taps have no "
-         "best Q"});
+         "with R of the air cut in the cut and of rest in the taps, as his; at the other speeds the taps "
+         "have no best Q"});
   }
   return drawn;
 }

@@ -24,7 +24,7 @@ using kalman::BurzoniStatics;
 using kalman::LengthDependence;
 using kalman::SpindleSensorCalibration;
 
-constexpr double LENGTH = 0.139;  // [m] 138 mm told in section 6.3
+constexpr double LENGTH = 0.139;  // [m] 138 mm in section 6.3
 constexpr const char* AXES[] = {"x", "y", "z"};
 
 const BurzoniStatics& statics(unsigned seed) {
@@ -61,7 +61,7 @@ Drawn constants(const std::string& folder, unsigned seed) {
       rows.push_back(
           {1e3 * length, all[k].table_3->at(length), all[k].found ? all[k].found->at(length) : std::nan("")});
     plot.block(formatted("line%zu", k), rows);
-    plot.block(formatted("told%zu", k), {{138.0, all[k].printed}});
+    plot.block(formatted("points%zu", k), {{138.0, all[k].printed}});
   }
   plot << "set multiplot layout 3,2\nset grid\nset key above horizontal samplen 2\nset xtics 20\nset xlabel "
           "'tool and "
@@ -69,7 +69,7 @@ Drawn constants(const std::string& folder, unsigned seed) {
           "[mm]'\n";
   for (std::size_t k = 0; k < all.size(); ++k)
     plot << "set ylabel '" << all[k].name << " [1]'\nplot $line" << k
-         << " using 1:2 with lines lw 4 lc rgb '#b0b0b0' title 'table 3', $told" << k
+         << " using 1:2 with lines lw 4 lc rgb '#b0b0b0' title 'table 3', $points" << k
          << " using 1:2 with points pt 7 ps 1.5 lc rgb '#c02020' title 'table 2', $line" << k
          << " using 1:3 with lines lw 1.5 lc rgb '#2060c0' title 'calibrated here'\n";
   plot << "unset multiplot\n";
@@ -78,12 +78,12 @@ Drawn constants(const std::string& folder, unsigned seed) {
   for (const Constant& c : all) {
     drawn.rows.push_back(compareNumber(
         formatted("%s by the line of table 3 at 139 mm, tables 2 and 3", c.name), c.printed,
-        c.table_3->at(LENGTH), 0.0, 0.02, "the document's own tables do not agree where this does not"));
+        c.table_3->at(LENGTH), 0.0, 0.02, "a disagreement here is one between the tables of the document"));
     if (!c.found) continue;
-    drawn.rows.push_back(compareNumber(
-        formatted("%s calibrated with his weights, table 3 at 139 mm", c.name), c.table_3->at(LENGTH),
-        c.found->at(LENGTH), 0.0, 0.03,
-        "the simulated ring shows his constants at 139 mm; over length it bends as a beam does"));
+    drawn.rows.push_back(
+        compareNumber(formatted("%s calibrated with his weights, table 3 at 139 mm", c.name),
+                      c.table_3->at(LENGTH), c.found->at(LENGTH), 0.0, 0.03,
+                      "the simulated ring has his constants at 139 mm; over length it bends as a beam"));
   }
   return drawn;
 }
@@ -97,8 +97,8 @@ Drawn verification(const std::string& folder, unsigned seed) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     Rows rows;
     for (std::size_t i = 0; i < s.hung[axis].size(); ++i) {
-      rows.push_back({s.hung[axis][i], s.told[axis][i]});
-      worst = std::max(worst, std::abs(s.told[axis][i] - s.hung[axis][i]) / 311.5);
+      rows.push_back({s.hung[axis][i], s.sensor_output[axis][i]});
+      worst = std::max(worst, std::abs(s.sensor_output[axis][i] - s.hung[axis][i]) / 311.5);
     }
     plot.block(formatted("hung%zu", axis), rows);
   }
@@ -111,7 +111,7 @@ Drawn verification(const std::string& folder, unsigned seed) {
   }
   plot << "set multiplot layout 3,1\nset grid\nset key above horizontal\nset xlabel 'weight hung [N]'\nset "
           "ylabel "
-          "'told by the sensor [N]'\nplot x with lines lw 4 lc rgb '#b0b0b0' title 'as hung'";
+          "'by the sensor [N]'\nplot x with lines lw 4 lc rgb '#b0b0b0' title 'equal'";
   for (std::size_t axis = 0; axis < 3; ++axis)
     plot << ", $hung" << axis << " using 1:2 with points pt " << 5 + 2 * axis << " ps 1.2 lc rgb '"
          << BURZONI_COLOURS[axis] << "' title '" << AXES[axis] << "'";
@@ -128,13 +128,13 @@ Drawn verification(const std::string& folder, unsigned seed) {
                     ours < 0.05 ? Verdict::agrees : Verdict::differs, why};
   };
   return {{png},
-          {row("weights told against weights hung, x, y, z, figure 13", "on the line", worst,
-               "of the largest weight; drift taken out between first and last reading"),
-           row("tool against the workpiece, sensor against dynamometer, figure 15", "less than 5 %", verified,
-               "the product's own verification, at 120 mm, a length that no weight was hung at")}};
+          {row("measured and applied weights, x, y, z, figure 13", "on the line", worst,
+               "of the largest weight; drift removed between first and last measurement"),
+           row("tool pressed against the workpiece, sensor and dynamometer, figure 15", "less than 5 %",
+               verified, "the verification of the product at 120 mm, a length without weights")}};
 }
 
-/// [N] of what turns once with the spindle.
+/// [N] amplitude of spindle order 1.
 double onceARevolution(const std::vector<double>& force, double rpm) {
   std::complex<double> sum = 0.0;
   const double turns = std::floor(static_cast<double>(force.size()) / BURZONI_RATE * rpm / 60.0);
@@ -161,7 +161,7 @@ Drawn unbalance(const std::string& folder, unsigned seed) {
     plot.block(formatted("turn%zu", k), rows);
     plot << "set ylabel 'x cutting air at " << s.turning[k] << " rpm [N]'\nplot $turn" << k
          << " using 1:2 with lines lw 1.5 lc rgb '#c08040' title 'measured', $turn" << k
-         << " using 1:3 with lines lw 1.5 lc rgb '#2060c0' title 'unbalance taken off'\n";
+         << " using 1:3 with lines lw 1.5 lc rgb '#2060c0' title 'without unbalance'\n";
   }
   plot << "unset multiplot\n";
   plot.draw();
@@ -174,13 +174,13 @@ Drawn unbalance(const std::string& folder, unsigned seed) {
   const double deviation = standardDeviation(s.unbalanced[0]) / std::sqrt(0.5 * BURZONI_RATE);  // white noise
   drawn.rows.push_back(compareNumber("unbalance at 10,000 over that at 1000 rpm, eq. 3-6", 100.0,
                                      raw[2] / raw[0], raw[2] / raw[0] * deviation / raw[0], 0.15,
-                                     "once a revolution; at 1000 rpm a fifth of a newton in the noise"));
-  drawn.rows.push_back({"unbalance left at 17,600 rpm, figure 16", "subtracted",
+                                     "order 1; at 1000 rpm a fifth of a newton in the noise"));
+  drawn.rows.push_back({"residual unbalance at 17,600 rpm, figure 16", "subtracted",
                         formatted("%.2f of %.2f N", left[3], raw[3]),
                         left[3] < 0.05 * raw[3] ? Verdict::agrees : Verdict::differs,
-                        "learnt cutting air at other speeds, as mass times radius"});
+                        "identified in air cuts at other speeds, as mass times radius"});
   const double noise = standardDeviation(s.balanced[1]);
-  drawn.rows.push_back({"noise against unbalance at 4500 rpm, figure 16", "\"noise is dominating\"",
+  drawn.rows.push_back({"noise and unbalance at 4500 rpm, figure 16", "\"noise is dominating\"",
                         formatted("noise %.2f N, unbalance %.2f N rms", noise, raw[1] / std::sqrt(2.0)),
                         noise > raw[1] / std::sqrt(2.0) ? Verdict::agrees : Verdict::differs,
                         "the simulated spindle's unbalance is 20 g mm"});

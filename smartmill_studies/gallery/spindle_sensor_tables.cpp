@@ -1,4 +1,4 @@
-// Burzoni section 6.4: what R and Q of the taps make of the cuts, tables 8 to 15.
+// Burzoni section 6.4: cuts with R and Q of the taps, tables 8 to 15.
 
 #include <algorithm>
 #include <array>
@@ -20,7 +20,8 @@ using kalman::BurzoniRow;
 using kalman::BurzoniTable;
 
 constexpr const char* AXES[] = {"x", "y"};
-const std::string OTHER_CUT = "another machine, cut and force than his: the same filter errs less here, too";
+const std::string OTHER_CUT =
+    "another machine, cut and force than his: the same filter has smaller errors here, too";
 
 Rows curveOf(const BurzoniRow& row) {
   Rows rows;
@@ -29,7 +30,8 @@ Rows curveOf(const BurzoniRow& row) {
   return rows;
 }
 
-/// Upper half: each cut's RMSE over Q, with the taps' Q as dots; lower half: over speed, printed and here.
+/// Upper half: RMSE of each cut over Q, with Q of the taps as dots; lower half: RMSE over speed, printed and
+/// here.
 void drawTable(const BurzoniTable& table, const std::string& png) {
   Gnuplot plot(png, 900, 950, 12);
   Rows dots, speeds;
@@ -120,7 +122,7 @@ Drawn noise(const std::string& folder, unsigned seed) {
     const double worst = std::max(std::abs(ours[0] / printed - 1.0), std::abs(ours[1] / printed - 1.0));
     drawn.rows.push_back({what, formatted("%g", printed), formatted("x %.2f, y %.2f", ours[0], ours[1]),
                           worst < 0.5 ? Verdict::agrees : Verdict::differs,
-                          "the simulated sensor's noise is laid out after these two numbers"});
+                          "the noise of the simulated sensor is designed for these two values"});
   };
   row("R before taps, section 6.2 [N2]", 0.15, data.r_tap);
   row("R cutting air, section 6.2 [N2]", 10.0, data.r_air);
@@ -128,11 +130,11 @@ Drawn noise(const std::string& folder, unsigned seed) {
     drawn.rows.push_back(compareNumber(what, 3.0, kalman::kurtosis(values), 0.0, 0.1, "of a Gaussian"));
   };
   kurtosis("kurtosis at rest, eq. 5-17", data.still[0]);
-  kurtosis("kurtosis cutting air, unbalance taken off, eq. 5-17", data.air[0]);
+  kurtosis("kurtosis in an air cut, without unbalance, eq. 5-17", data.air[0]);
   return drawn;
 }
 
-/// Figures 43 and 44, of y 51 and 52: the cuts' own curves by R.
+/// Figures 43 and 44, of y 51 and 52: curves of the cuts by R.
 Drawn byNoise(const std::string& folder, unsigned seed, std::size_t axis) {
   const BurzoniTable &high = burzoniTableOf(seed, HYPOTHESES * axis),
                      &low = burzoniTableOf(seed, HYPOTHESES * axis + 1);
@@ -161,8 +163,8 @@ Drawn byNoise(const std::string& folder, unsigned seed, std::size_t axis) {
          << " using 1:2 with lines lw 2 dt 2 lc rgb '" << BURZONI_COLOURS[k] << "' notitle";
   plot
       << "\nunset logscale\nset format x '%g'\nset xlabel 'spindle speed [rpm]'\nset ylabel 'RMSE with the "
-         "cut''s "
-         "own best Q [N]'\nset xrange [0:18000]\nset yrange [0:*]\nplot $bars using 1:2 with linespoints pt "
+         "best Q of the cut [N]'\nset xrange [0:18000]\nset yrange [0:*]\nplot $bars using 1:2 with "
+         "linespoints pt "
          "6 ps "
          "1.4 lc rgb '#c08040' title 'R of the taps', $bars using 1:3 with linespoints pt 7 lc rgb '#2060c0' "
          "title 'R of cutting air'\nunset multiplot\n";
@@ -174,9 +176,9 @@ Drawn byNoise(const std::string& folder, unsigned seed, std::size_t axis) {
                   figure),
         "\"lower Q\"", formatted("/ 2^%.1f (R / 2^%.1f)", median(shift), std::log2(high.r_cut / low.r_cut)),
         median(shift) > 0.0 ? Verdict::agrees : Verdict::differs, "median of seven speeds"},
-       {formatted("RMSE at each R's own best Q, %s, figure %zu", AXES[axis], figure + 1),
+       {formatted("RMSE at the best Q of each R, %s, figure %zu", AXES[axis], figure + 1),
         "\"almost unchanged\"", formatted("within %.0f %%", 100.0 * most),
-        most < 0.1 ? Verdict::agrees : Verdict::differs, "a filter is told by Q over R alone"}}};
+        most < 0.1 ? Verdict::agrees : Verdict::differs, "a filter depends only on Q over R"}}};
 }
 
 double worstOf(const BurzoniTable& table, double BurzoniRow::*what) {
@@ -185,7 +187,7 @@ double worstOf(const BurzoniTable& table, double BurzoniRow::*what) {
   return worst;
 }
 
-/// Figure 49, of y 56: the hypotheses beside each other.
+/// Figure 49, of y 56: comparison of the hypotheses.
 Drawn overview(const std::string& folder, unsigned seed, std::size_t axis) {
   const std::size_t figure = axis == 0 ? 49 : 56;
   const std::string png = folder + formatted("/burzoni_%zu.png", figure);
@@ -229,8 +231,8 @@ Drawn overview(const std::string& folder, unsigned seed, std::size_t axis) {
             "largest RMSE by R of taps and cuts (0.15, 10; 0.15, 0.15; 10, 10; 2, 10), %s, figure %zu [N]",
             AXES[axis], figure),
         told(printed) + ": the first is best", told(here), first ? Verdict::agrees : Verdict::differs,
-        "his advice rests on noise in the cut that taps do not show; where Q over R of the taps serves the "
-        "cut, equal R serve as well"}}};
+        "his advice is based on noise in the cut that is absent in taps; if Q over R of the taps suits the "
+        "cut, equal R suit as well"}}};
 }
 
 }  // namespace
@@ -246,13 +248,13 @@ std::vector<Figure> sensorTableFigures() {
          [number](const std::string& folder, unsigned seed) { return tableOf(folder, seed, number); }});
   for (std::size_t axis = 0; axis < 2; ++axis) {
     all.push_back({axis == 0 ? "burzoni_43" : "burzoni_51",
-                   axis == 0 ? "Burzoni figures 43 and 44: the cuts' own best Q by R, x"
-                             : "Burzoni figures 51 and 52: the cuts' own best Q by R, y",
+                   axis == 0 ? "Burzoni figures 43 and 44: best Q of the cuts by R, x"
+                             : "Burzoni figures 51 and 52: best Q of the cuts by R, y",
                    [axis](const std::string& folder, unsigned seed) { return byNoise(folder, seed, axis); }});
     all.push_back(
         {axis == 0 ? "burzoni_49" : "burzoni_56",
-         axis == 0 ? "Burzoni figure 49: the hypotheses for R beside each other, x"
-                   : "Burzoni figure 56: the hypotheses for R beside each other, y",
+         axis == 0 ? "Burzoni figure 49: comparison of the hypotheses for R, x"
+                   : "Burzoni figure 56: comparison of the hypotheses for R, y",
          [axis](const std::string& folder, unsigned seed) { return overview(folder, seed, axis); }});
   }
   return all;

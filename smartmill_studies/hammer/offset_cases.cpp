@@ -13,7 +13,7 @@ namespace {
 using Complex = std::complex<double>;
 constexpr double STEP = 10.0, LAST = 5500.0, HIGH = 5000.0;  // [Hz]
 constexpr double ALL_MODES = 1e5;                            // [Hz] of the plant's beam
-/// Nearer than that a found mode is the true one; a mode that only the beam tells of may be farther off.
+/// Matching distance of found and true mode; a mode predicted only by the beam model may be farther off.
 constexpr double SAME = 0.01, SAME_UNSEEN = 0.1;
 
 double between(std::mt19937_64& random, double low, double high) {
@@ -109,9 +109,10 @@ FrequencyResponse crossFrf(const plant::ToolInSpindle& tool, double struck, doub
   return frf;
 }
 
-std::string nameOf(Way way) {
-  constexpr const char* NAMES[WAYS] = {"none", "eq. 4.44", "spindle and tool apart", "the same, two heights"};
-  return NAMES[static_cast<int>(way)];
+std::string nameOf(TipMethod method) {
+  constexpr const char* NAMES[TIP_METHODS] = {"none", "eq. 4.44", "receptance coupling",
+                                              "the same, two heights"};
+  return NAMES[static_cast<int>(method)];
 }
 
 OffsetOutcome judgeOffset(const OffsetCase& drawn, double noise, std::mt19937_64& random) {
@@ -140,7 +141,7 @@ OffsetOutcome judgeOffset(const OffsetCase& drawn, double noise, std::mt19937_64
   for (Complex& v : outcome.frf[1].value) v *= factor;
   outcome.frf[2] = hammer::tipResponse(low, one);
   outcome.frf[3] = hammer::tipResponse(low, two);
-  for (int w = 0; w < WAYS; ++w) outcome.frf_error[w] = errorOf(outcome.frf[w], outcome.truth);
+  for (int w = 0; w < TIP_METHODS; ++w) outcome.frf_error[w] = errorOf(outcome.frf[w], outcome.truth);
   return outcome;
 }
 

@@ -10,8 +10,8 @@
 
 namespace smartmill::studies {
 
-/// A tool in a spindle of the benches' own plant (Euler beam on a rigid spindle with two springs; the
-/// correction's beam shears and sits in springs), what is believed of it, and the station's offset.
+/// A tool in a spindle of the benches' plant (Euler beam on a rigid spindle with two springs; the correction
+/// uses a shear beam on springs), its model as stated, and the offset of the station.
 struct OffsetCase {
   plant::ToolInSpindle truth;
   hammer::ToolBeam believed;
@@ -19,31 +19,31 @@ struct OffsetCase {
 };
 OffsetCase drawOffsetCase(std::mt19937_64& random);
 
-/// FRF of 20..5500 Hz, 10 Hz lines, struck and read at heights above the tip [m], with noise (a share of its
-/// rms).
+/// FRF of 20..5500 Hz, 10 Hz lines, with force and response at heights above the tip [m], with noise (as
+/// share of its RMS).
 FrequencyResponse crossFrf(const plant::ToolInSpindle& tool, double struck, double read, double noise,
                            std::mt19937_64& random);
 
-/// Ways to come from the measured cross FRF to the tip's.
-enum class Way { none, thesis, one_height, two_heights };
-constexpr int WAYS = 4;
-std::string nameOf(Way way);
+/// Methods to get the tip FRF from the measured cross FRF.
+enum class TipMethod { none, thesis, one_height, two_heights };
+constexpr int TIP_METHODS = 4;
+std::string nameOf(TipMethod method);
 
-/// What a way says of one true mode below 5 kHz.
+/// Result of a method for one true mode below 5 kHz.
 struct GainError {
   double frequency = 0.0;  ///< [Hz]
   double share = 0.0;      ///< [1] of the largest gain of the tip
-  double error = 1.0;      ///< [1] relative, of the gain (of 1 / stiffness); 1: not shown
-  double std = 0.0;        ///< [1] stated, over the true gain; 0: none
+  double error = 1.0;      ///< [1] relative, of the gain (1 / stiffness); 1: mode not found
+  double std = 0.0;        ///< [1] stated standard deviation over the true gain; 0: none
 };
 
 struct OffsetOutcome {
-  std::vector<GainError> modes[WAYS];
-  FrequencyResponse frf[WAYS], truth;
-  double frf_error[WAYS] = {};  ///< [1] norm of the error over the norm, 100..5000 Hz
+  std::vector<GainError> modes[TIP_METHODS];
+  FrequencyResponse frf[TIP_METHODS], truth;
+  double frf_error[TIP_METHODS] = {};  ///< [1] norm of the error over the norm, 100..5000 Hz
 };
 
-/// Measures with noise (a share of the rms) at one height and at two, and corrects. @throws Error when no
+/// Measures at one height and at two, with noise (share of the RMS), and corrects. @throws Error when no
 /// mode is found
 OffsetOutcome judgeOffset(const OffsetCase& drawn, double noise, std::mt19937_64& random);
 

@@ -66,7 +66,7 @@ void drawStructure(Dice& dice, const ToolGeometry& tool, double stickout, sim::S
   t.joint_rotation = dice.logBetween(1.0, 4.0) * 5e4 * std::pow(tool.diameter / 16e-3, 2);
   t.joint_damping = dice.between(0.02, 0.08);
   t.plane_ratio = dice.between(0.93, 1.07);
-  t.plane_turn = dice.between(-0.05, 0.05);  // a mode of the other plane shows by 0.25 % at most
+  t.plane_turn = dice.between(-0.05, 0.05);  // a mode of the other plane contributes at most 0.25 %
 }
 
 void drawSensor(Dice& dice, const ToolGeometry& tool, double depth, sim::StationTraits& t) {
@@ -97,8 +97,8 @@ void drawSolenoid(Dice& dice, sim::StationTraits& t) {
   t.bounce_delay = dice.between(0.5e-3, 4e-3);
   t.coil_time = dice.between(1e-3, 5e-3);
   t.coil_force = dice.between(-4.0, 4.0);
-  t.coil_volt = dice.between(-2e-3, 2e-3);  // the thesis saw none in the displacement
-  t.axis_scatter = 0.07e-6;  // a distance then within 0.1 um, as the thesis's interferometer saw
+  t.coil_volt = dice.between(-2e-3, 2e-3);  // the thesis reports none in the displacement
+  t.axis_scatter = 0.07e-6;  // distance within 0.1 um, as the thesis measured by interferometer
 }
 
 smartmill::HammerStation drawStand(Dice& dice, const ToolGeometry& tool) {
@@ -134,7 +134,7 @@ DrawnStation drawStation(std::uint64_t seed, int number) {
   d.mounting = dice.between(0.0, units::TWO_PI);
   d.direction = dice.chance(0.5) ? "x" : "y";
   for (double& off : d.set_up) off = std::clamp(dice.normal(40e-6), -100e-6, 100e-6);
-  // A tool of another length or none: nothing stands before the sensor.
+  // A tool of wrong length or no tool: nothing is in front of the sensor.
   d.out_of_range = dice.chance(0.03);
   d.stickout_error = std::clamp(dice.normal(0.4e-3), -1e-3, 1e-3);
   d.fluted_error = std::clamp(dice.normal(0.8e-3), -2e-3, 2e-3);

@@ -8,21 +8,21 @@
 
 namespace smartmill::hammer {
 
-/// A drawn tool in a drawn machine before a hammer station.
+/// A random tool in a random machine at a hammer station.
 struct DrawnStation {
-  MachineModel believed;    ///< what the sequence is told
-  MachineModel true_model;  ///< what stands there: the same but for how the station was set up
+  MachineModel believed;    ///< as passed to the sequence
+  MachineModel true_model;  ///< the true one; it differs by the errors of the station's set-up
   sim::StationTraits traits;
   double force_scatter = 0.05;           ///< [1]
   double mounting = 0.0;                 ///< [rad] of the tool in the spindle
-  std::array<double, 2> set_up{{0, 0}};  ///< [m] by which the sensors stand off where they are believed
-  bool out_of_range = false;             ///< nothing stands before the sensor
-  double stickout_error = 0.0;           ///< [m] of what the operator says
+  std::array<double, 2> set_up{{0, 0}};  ///< [m] error of the stated position of the sensors
+  bool out_of_range = false;             ///< nothing is in front of the sensor
+  double stickout_error = 0.0;           ///< [m] of the operator's value
   double fluted_error = 0.0;             ///< [m]
   std::string direction = "x";
 };
 
-/// The machine of that number; the same arguments give the same one.
+/// The machine with a number; the same arguments give the same machine.
 DrawnStation drawStation(std::uint64_t seed, int number);
 
 }  // namespace smartmill::hammer

@@ -12,14 +12,14 @@ namespace {
 
 constexpr double RATE = 25600.0;        // [Hz]
 constexpr std::size_t BLOCK = 256;      // samples
-constexpr int STEPS = 8;                // a sample; a first-order hold of so many is 0.1 % low at 4 kHz
+constexpr int STEPS = 8;                // per sample; the first-order hold is then 0.1 % low at 4 kHz
 constexpr double LATENCY = 0.05;        // [s]
 constexpr double RAPID = 0.4;           // [m/s]
 constexpr double TURNING = 12.0;        // [rad/s] of an orientation
 constexpr double HAMMER_DELAY = 0.03;   // [s]
 constexpr double LONGEST = 1200.0;      // [s] of a measurement
-constexpr double FIT_HIGH = 8000.0;     // [Hz] a mode above the band that counts bends its upper end
-constexpr double HEIGHT_STEP = 0.5e-3;  // [m] to which the sensor's height is told
+constexpr double FIT_HIGH = 8000.0;     // [Hz] a mode above the scored band affects its upper end
+constexpr double HEIGHT_STEP = 0.5e-3;  // [m] resolution of the stated sensor height
 
 double stamp(double time) {
   return std::round(time * 1e9) * 1e-9;
@@ -105,12 +105,12 @@ void StationMachine::moveOn(double dt) {
 
 void StationMachine::sample(Streams& streams) {
   moveOn(1.0 / RATE);
-  station_.stand({position_, spindle_ + drawn_.mounting, spindle_speed_}, random_);
+  station_.setPose({position_, spindle_ + drawn_.mounting, spindle_speed_}, random_);
   for (int s = 0; s < STEPS; ++s) {
     station_.push(time_ + ((s + 0.5) / STEPS - 0.5) / RATE);
-    station_.hear({{0, 0}});
+    station_.addDisplacement({{0, 0}});
   }
-  const sim::HammerStation::Reading reading = station_.read(time_, random_);
+  const sim::HammerStation::Sample reading = station_.read(time_, random_);
   volt_ = reading.gap;
   touched_ = touched_ || station_.touched();
   closest_ = std::min(closest_, station_.closest());

@@ -14,8 +14,8 @@
 
 namespace smartmill::hammer {
 
-/// Axes and spindle that move at constant speed after a latency, before the simulator's hammer station: what
-/// a HammerSequence commands and hears.
+/// Axes and spindle that move at constant speed after a latency, with the simulated hammer station: executes
+/// the commands of a HammerSequence and returns its inputs.
 class StationMachine {
  public:
   StationMachine(const DrawnStation& drawn, std::uint64_t seed);
@@ -27,16 +27,16 @@ class StationMachine {
     SpindleAngle angle;
     CncState state;
   };
-  /// The next 10 ms.
+  /// Advances by 10 ms.
   void block(Streams& streams);
 
-  double time() const { return time_; }             ///< [s]
-  double closest() const { return closest_; }       ///< [m] of the tool to a sensor's face, ever
-  bool touched() const { return touched_; }         ///< a collision with a sensor
-  double struckRetreat() const { return struck_; }  ///< [m] behind the cutting circle, largest over the blows
+  double time() const { return time_; }        ///< [s]
+  double closest() const { return closest_; }  ///< [m] smallest distance of the tool to the face of a sensor
+  bool touched() const { return touched_; }    ///< a collision with a sensor
+  double struckRetreat() const { return struck_; }  ///< [m] behind the cutting circle, largest of all hits
   int strikes() const { return strikes_; }
-  int searchMoves() const { return search_moves_; }  ///< of the spindle before the first blow
-  double restVolt() const { return rest_volt_; }     ///< [V] of the sensor when the last blow was asked for
+  int searchMoves() const { return search_moves_; }  ///< spindle moves before the first hit
+  double restVolt() const { return rest_volt_; }     ///< [V] of the sensor at the command of the last hit
 
  private:
   void moveOn(double dt);
@@ -58,17 +58,17 @@ class StationMachine {
   double rest_volt_ = 0.0, volt_ = 0.0;
 };
 
-/// What the sequence is told, and what it is asked for: the tool as the operator and the catalogue tell it,
-/// the sensor as whoever set it up.
+/// Inputs of the sequence: the tool as stated by the operator and the catalogue, the sensor as stated by its
+/// set-up.
 struct StationTask {
   HammerParameters parameters;
   MeasureFrfGoal goal;
 };
-/// What is asked for, without the stick-out.
+/// The request without the stick-out.
 MeasureFrfGoal goalOf(const DrawnStation& drawn, int hits);
 StationTask taskOf(const DrawnStation& drawn, int hits);
 
-/// A whole measurement. @param seconds [s] of machine time it took
+/// Runs a complete measurement. @param seconds [s] its duration in machine time
 MeasureFrfResult measure(StationMachine& machine, const HammerParameters& parameters,
                          const MachineModel& believed, const MeasureFrfGoal& goal, double& seconds);
 

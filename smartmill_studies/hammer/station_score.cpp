@@ -17,7 +17,7 @@ namespace {
 using nlohmann::json;
 
 constexpr double SAME_MODE = 0.015;  // [1] of the frequency
-constexpr double SHOWS = 0.05;       // [1] of the largest peak: a mode that counts
+constexpr double SHOWS = 0.05;       // [1] of the largest peak, for a mode to be scored
 
 struct Truth {
   ModalModel tip, measured;  // the same modes
@@ -35,7 +35,7 @@ double largestPeak(const ModalModel& model) {
   return largest;
 }
 
-/// The fitted mode that a true one shows as; not where a stronger true mode is as near to it.
+/// The fitted mode that matches a true one, unless a stronger true mode is as near to it.
 std::optional<std::size_t> shownAs(const Truth& truth, std::size_t k, const std::vector<Mode>& fitted) {
   const Mode& mode = truth.measured.modes[k];
   for (std::size_t j = 0; j < truth.measured.modes.size(); ++j) {
@@ -51,7 +51,7 @@ std::optional<std::size_t> shownAs(const Truth& truth, std::size_t k, const std:
   return best;
 }
 
-/// The corrected mode that a measured one has become.
+/// The corrected mode of a measured one.
 const Mode* atTip(const std::vector<Mode>& tip, const Mode& measured) {
   for (const Mode& m : tip) {
     if (m.frequency == measured.frequency) return &m;
@@ -73,7 +73,8 @@ json modeLines(const Truth& truth, const MeasureFrfResult& result, double factor
     const bool counts = peak(tip) > SHOWS * tip_peak;
     if (!counts) continue;
     if (!found) {
-      // Not shown at the sensor, or within another's width, is not the fit's fault; still no mode of the tip.
+      // A mode that is invisible at the sensor or within the width of another is no fault of the fit, but is
+      // missing at the tip.
       ++(peak(measured) > SHOWS * shown_peak ? missed : alone);
       continue;
     }
@@ -107,8 +108,9 @@ json modeLines(const Truth& truth, const MeasureFrfResult& result, double factor
   return modes;
 }
 
-/// [1] rms of what a scaled FRF is off the truth over the truth's, and how far its least real part is off,
-/// to which the least depth of a slot is inverse (what figure 4.8 compares); 100 Hz up to the band's end.
+/// [1] RMS error of a scaled FRF over the RMS of the truth, and relative error of its least real part, to
+/// which the least depth limit of a slot is inversely proportional (figure 4.8); from 100 Hz to the end of
+/// the band.
 struct FrfError {
   double frf = 0.0, depth = 0.0;
 };
@@ -126,8 +128,8 @@ FrfError errorOf(const FrequencyResponse& frf, double factor, const ModalModel& 
   return {std::sqrt(off / all), due / softest - 1.0};
 }
 
-/// [1] rms over the band's lines of the error in stated deviations, less a common scale, which is the
-/// sensor's.
+/// [1] RMS over the lines of the band of the error in stated standard deviations, without the common scale of
+/// the sensor.
 double lineScatter(const FrequencyResponse& frf, const ModalModel& truth) {
   std::complex<double> both;
   double own = 0.0;
@@ -164,7 +166,7 @@ void frfLines(const Truth& truth, const MeasureFrfResult& result, double factor,
   line["line_scatter"] = lineScatter(result.measured_frf, truth.measured);
 }
 
-/// [1] spindle moves of the thesis's search: golden section alone.
+/// [1] spindle moves of the search in the thesis (golden section only).
 int thesisMoves(const StationStudy& study, int number, const DrawnStation& drawn, HammerParameters parameters,
                 const MeasureFrfGoal& goal) {
   parameters.golden_only = 1;
@@ -253,11 +255,11 @@ double quantile(std::vector<double> values, double share) {
   return values[low] + (at - static_cast<double>(low)) * (values[high] - values[low]);
 }
 
-/// Median and 95 % bound of the sizes; of deviations the share within 1.96.
+/// Median and 95 % quantile of the magnitudes; share of normalised errors within 1.96.
 json spread(const std::vector<json>& modes, const char* key) {
   std::vector<double> sizes;
   for (const json& mode : modes) {
-    // A machine whose truth has no limit in the band has no error of it.
+    // Undefined for a machine without a limit in the band.
     if (mode[key].is_number() && std::isfinite(mode[key].get<double>()))
       sizes.push_back(std::abs(mode[key].get<double>()));
   }
@@ -279,13 +281,14 @@ double within(const std::vector<json>& modes, const char* key) {
 json scoreStations(const std::vector<json>& lines) {
   std::vector<json> modes, measured;
   std::vector<double> moves, thesis, seconds, cpu, closest;
-  int good = 0, due = 0, told = 0, away = 0, touched = 0, missed = 0, unseen = 0, spurious = 0, gullet = 0;
+  int good = 0, due = 0, reported = 0, away = 0, touched = 0, missed = 0, unseen = 0, spurious = 0,
+      gullet = 0;
   for (const json& line : lines) {
     cpu.push_back(line["cpu"]);
     if (line["touched"]) ++touched;
     if (line["out_of_range"]) {
       ++away;
-      if (line["code"] == static_cast<int>(FrfCode::no_flute)) ++told;
+      if (line["code"] == static_cast<int>(FrfCode::no_flute)) ++reported;
       continue;
     }
     ++due;
@@ -304,7 +307,7 @@ json scoreStations(const std::vector<json>& lines) {
   }
   json score{{"machines", lines.size()},  {"due", due},
              {"measured", good},          {"out_of_range", away},
-             {"told_so", told},           {"collisions", touched},
+             {"told_so", reported},       {"collisions", touched},
              {"struck_a_gullet", gullet}, {"missed_modes", missed},
              {"modes_unseen", unseen},    {"spurious_modes", spurious},
              {"modes", modes.size()}};

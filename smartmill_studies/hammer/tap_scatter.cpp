@@ -21,7 +21,7 @@ constexpr double SAME_MODE = 0.005;  // [1] of the frequency
 
 using Runs = std::vector<MeasureFrfResult>;
 
-/// Places of the lines that count.
+/// Indices of the scored lines.
 std::vector<std::size_t> bandOf(const FrequencyResponse& frf) {
   std::vector<std::size_t> lines;
   for (std::size_t i = 0; i < frf.size(); ++i) {
@@ -39,7 +39,7 @@ std::vector<std::complex<double>> meanOf(const Runs& runs) {
   return mean;
 }
 
-/// Each run over the scale by which it is nearest to the mean of all.
+/// Each run divided by its least-squares scale to the mean of all.
 void takeScalesOff(Runs* runs, const std::vector<std::size_t>& lines) {
   const std::vector<std::complex<double>> mean = meanOf(*runs);
   for (MeasureFrfResult& run : *runs) {
@@ -53,23 +53,23 @@ void takeScalesOff(Runs* runs, const std::vector<std::size_t>& lines) {
   }
 }
 
-/// [1] of every line, the runs' deviation over the stated one.
+/// [1] for every line: standard deviation of the runs over the stated one.
 std::vector<double> lineRatios(const Runs& runs, const std::vector<std::size_t>& lines) {
   const std::vector<std::complex<double>> mean = meanOf(runs);
   const auto count = static_cast<double>(runs.size());
   std::vector<double> ratios;
   for (const std::size_t i : lines) {
-    double seen = 0.0, stated = 0.0;
+    double observed = 0.0, stated = 0.0;
     for (const MeasureFrfResult& run : runs) {
-      seen += std::norm(run.measured_frf.value[i] - mean[i]) / (count - 1.0);
+      observed += std::norm(run.measured_frf.value[i] - mean[i]) / (count - 1.0);
       stated += std::pow(run.measured_frf.std_dev[i], 2) / count;
     }
-    ratios.push_back(std::sqrt(seen / stated));
+    ratios.push_back(std::sqrt(observed / stated));
   }
   return ratios;
 }
 
-/// [1] deviation of the values over the root of their mean stated variance.
+/// [1] standard deviation of the values over the root of their mean stated variance.
 double ratioOf(const std::vector<double>& values, const std::vector<double>& stated) {
   return standardDeviation(values) / rms(stated);
 }
@@ -110,7 +110,7 @@ json tapScatter(const StationStudy& study, int number, int repeats) {
   json line{{"machine", number}, {"out_of_range", drawn.out_of_range}, {"runs", runs.size()}};
   if (drawn.out_of_range) return line;
   if (runs.size() < 3)
-    throw Error("machine " + std::to_string(number) + ": fewer than three runs have an answer");
+    throw Error("machine " + std::to_string(number) + ": fewer than three runs have a result");
   const std::vector<std::size_t> lines = bandOf(runs.front().measured_frf);
   takeScalesOff(&runs, lines);
   double sum = 0.0, within = 0.0;

@@ -10,27 +10,26 @@
 namespace smartmill::kalman {
 namespace {
 
-constexpr int PERIODS = 250;     // of the tooth, of each run
-constexpr int LOOKED = 30;       // at its end, and in its middle
-constexpr double DYING = 0.8;    // [1] of the middle's, below which what is left at the end dies
-constexpr int LEAST_STEPS = 40;  // of the mode's own period
+constexpr int PERIODS = 250;     // tooth periods per run
+constexpr int LOOKED = 30;       // evaluated periods at the end and in the middle
+constexpr double DYING = 0.8;    // [1] ratio of the final to the middle vibration, below which it decays
+constexpr int LEAST_STEPS = 40;  // per period of the mode
 constexpr double SMALL = 1e-3;   // [1] of the feed
-constexpr double STAYS = 0.05;   // [1] of the feed, from which a large vibration has not died
-constexpr double CLOSE = 1e-3;   // [1] of a depth, that ends the search
+constexpr double STAYS = 0.05;   // [1] of the feed, from which a large vibration persists
+constexpr double CLOSE = 1e-3;   // [1] relative tolerance of the depth
 
 /// Peak to peak in the middle and in the last periods [m].
 struct Vibration {
   double middle = 0.0, last = 0.0;
 };
 
-/// The tool begins at its deflection under the steady chip, off by
-/// `kick` [m].
+/// The tool starts at its deflection under the steady chip plus `kick` [m].
 Vibration vibration(const ForceCurve& law, const Mode& mode, double period, double feed, double depth,
                     double kick) {
   const double w = units::TWO_PI * mode.frequency;
   const int steps = std::max(LEAST_STEPS, static_cast<int>(std::ceil(LEAST_STEPS * mode.frequency * period)));
   const double dt = period / steps, rest = mode.gain * depth * law.at(feed);
-  // The surface of one period before, in the frame of the tool's commanded way.
+  // The surface one period earlier, in the frame of the commanded path.
   std::vector<double> surface(static_cast<std::size_t>(steps), feed + rest);
   double x = rest + kick, v = 0.0;
   std::array<double, 2> low{1e9, 1e9}, high{-1e9, -1e9};
@@ -50,7 +49,7 @@ Vibration vibration(const ForceCurve& law, const Mode& mode, double period, doub
   return {high[0] - low[0], high[1] - low[1]};
 }
 
-/// Least depth at which it vibrates in the end.
+/// Least depth at which the vibration persists.
 template <class Vibrates>
 double limit(double deepest, Vibrates vibrates) {
   double stable = 0.0, chatter = deepest;

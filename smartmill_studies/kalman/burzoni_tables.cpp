@@ -16,7 +16,7 @@ constexpr double LENGTH = 0.139, RATE = sim::World::SAMPLE_RATE;
 constexpr const auto& RPM = BURZONI_RPM;
 using Row = std::array<double, 7>;
 
-/// A table of his: R of taps and of cuts [N2], Q of the taps, RMSE of the cuts with that Q.
+/// One of his tables: R of taps and of cuts [N2], Q of the taps, RMSE of the cuts with that Q.
 struct Printed {
   const char* name;
   std::size_t axis;
@@ -72,7 +72,7 @@ const std::array<Printed, 8> PRINTED{{{"Table 8",
                                        {16380, 16380, 16380, 16380, 4096, 16380, 16380},
                                        {0.705, 1.493, 1.703, 1.557, 1.363, 3.628, 1.599}}}};
 
-/// Blows of a stretch in which the spindle stood: 10 ms before to 190 ms after.
+/// Hits of a segment with the spindle stopped: 10 ms before to 190 ms after.
 ReferenceTaps blowsOf(const SpindleRig::Record& record, std::size_t axis) {
   ReferenceTaps taps;
   const auto before = static_cast<std::size_t>(0.01 * RATE), length = static_cast<std::size_t>(0.2 * RATE);
@@ -107,7 +107,7 @@ void cutAll(SpindleRig& rig, const MachineModel& model, BurzoniData& data) {
   }
 }
 
-/// R as printed is that of the taps, of air, or a fifth of air's.
+/// The printed R is that of the taps, of the air cut, or a fifth of the latter.
 double noiseOf(const BurzoniData& data, std::size_t axis, double printed) {
   if (printed < 1.0) return data.r_tap[axis];
   return printed > 5.0 ? data.r_air[axis] : 0.2 * data.r_air[axis];
@@ -124,7 +124,7 @@ std::unique_ptr<SpindleRig> rigOf(const MachineModel& model, std::uint64_t seed,
   taps.fit_high = band;
   auto rig = std::make_unique<SpindleRig>(model, world, filter, taps, false);
   rig->sorted().setSpindleSensorLength(LENGTH);
-  rig->tell(CuttingCondition::Kind::none);
+  rig->publishCondition(CuttingCondition::Kind::none);
   return rig;
 }
 
@@ -134,7 +134,7 @@ CalibrationGoal step(CalibrationGoal::Step which) {
   return goal;
 }
 
-/// [N] of the six sensors as calibrated statically: with zero, drift and unbalance in it.
+/// [N] from the six sensors with static calibration, including zero offset, drift and unbalance.
 std::vector<double> shownForce(const SpindleRig::Record& record, const SpindleSensorCalibration& calibration,
                                std::size_t axis) {
   std::vector<double> force;
@@ -146,7 +146,7 @@ std::vector<double> shownForce(const SpindleRig::Record& record, const SpindleSe
   return force;
 }
 
-/// Record of a load that stands for some time; it is still on afterwards.
+/// Record of a constant load, which stays applied.
 SpindleRig::Record pulled(SpindleRig& rig, std::size_t axis, double load, bool on_table) {
   std::array<double, 3> force{};
   force[axis] = load;
@@ -163,41 +163,42 @@ std::vector<double> weights() {
   return loads;
 }
 
-/// His weights at the tool's length; zero and drift are those of the readings without load, first and last.
+/// His weights at the length of the tool; zero and drift from the first and last measurement without load.
 void hang(SpindleRig& rig, BurzoniStatics& found) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    std::vector<double>& told = found.told[axis];
+    std::vector<double>& sensor_output = found.sensor_output[axis];
     for (const double load : weights()) {
       found.hung[axis].push_back(load);
-      told.push_back(mean(shownForce(pulled(rig, axis, load, false), found.calibration, axis)));
+      sensor_output.push_back(mean(shownForce(pulled(rig, axis, load, false), found.calibration, axis)));
     }
-    const double first = told.front(), last = told.back();
-    for (std::size_t i = 0; i < told.size(); ++i)
-      told[i] -= first + (last - first) * static_cast<double>(i) / static_cast<double>(told.size() - 1);
+    const double first = sensor_output.front(), last = sensor_output.back();
+    for (std::size_t i = 0; i < sensor_output.size(); ++i)
+      sensor_output[i] -=
+          first + (last - first) * static_cast<double>(i) / static_cast<double>(sensor_output.size() - 1);
     rig.world().pull({}, false);
   }
 }
 
-/// The tool against the workpiece in small steps, told by the sensor and by the dynamometer below.
+/// The tool pressed against the workpiece in small steps, measured by the sensor and by the dynamometer.
 void press(SpindleRig& rig, BurzoniStatics& found) {
   for (std::size_t axis = 0; axis < 2; ++axis) {
     for (const double load : {0.0, 50.0, 100.0, 150.0, 200.0, 250.0, 300.0, 0.0}) {
       const SpindleRig::Record held = pulled(rig, axis, load, true);
-      const std::vector<double> told = shownForce(held, found.calibration, axis),
+      const std::vector<double> sensor_output = shownForce(held, found.calibration, axis),
                                 &below = held.dynamometer[axis];
-      found.pressed[axis].insert(found.pressed[axis].end(), told.begin(), told.end());
+      found.pressed[axis].insert(found.pressed[axis].end(), sensor_output.begin(), sensor_output.end());
       found.on_table[axis].insert(found.on_table[axis].end(), below.begin(), below.end());
     }
     rig.world().pull({}, false);
   }
 }
 
-/// A second along x at each speed cutting air, with the unbalance that earlier speeds have told taken off.
+/// One second of air cut along x at each speed, minus the unbalance identified at earlier speeds.
 void turn(SpindleRig& rig, BurzoniStatics& found) {
   for (const double rpm : found.turning) {
     rig.spin(units::radPerSecFromRpm(rpm));
     for (int k = 0; k < 2; ++k) {
-      rig.tell(CuttingCondition::Kind::air);
+      rig.publishCondition(CuttingCondition::Kind::air);
       rig.run(1.0);
     }
     rig.start();
@@ -256,13 +257,13 @@ BurzoniData gatherBurzoni(const MachineModel& model, std::uint64_t seed, double 
   rig.run(1.0);
   auto quiet = rig.take();
   rig.spin(units::radPerSecFromRpm(9000.0));
-  rig.tell(CuttingCondition::Kind::air);
+  rig.publishCondition(CuttingCondition::Kind::air);
   rig.run(0.3);
   rig.start();
   rig.run(1.0);
-  auto raw = rig.take();  // nothing has told the unbalance yet
+  auto raw = rig.take();  // unbalance not identified yet
   rig.run(1.0);
-  rig.tell(CuttingCondition::Kind::air);
+  rig.publishCondition(CuttingCondition::Kind::air);
   rig.run(0.3);
   rig.start();
   rig.run(1.0);

@@ -15,28 +15,28 @@ namespace smartmill::kalman {
 /// Spindle speeds of his tables [rpm].
 constexpr std::array<double, 7> BURZONI_RPM{{1000, 4500, 6000, 8400, 9000, 11600, 17600}};
 
-/// The sensor in the simulated spindle, calibrated and tapped by the product's own steps, in air and in seven
-/// slots.
+/// Data of the sensor in the simulated spindle, calibrated and tapped by the steps of the product, in air and
+/// in seven slots.
 struct BurzoniData {
   std::array<ModalModel, 2> sensor;
   std::array<ReferenceTaps, 2> taps;
-  std::array<double, 2> r_tap{}, r_air{};      ///< [N2] before the blows; cutting air at 9000 rpm
+  std::array<double, 2> r_tap{}, r_air{};      ///< [N2] before the hits; air cut at 9000 rpm
   std::array<std::vector<double>, 2> air;      ///< [N] at 9000 rpm, unbalance off
   std::array<std::vector<double>, 2> air_raw;  ///< [N] with it
   std::array<std::vector<double>, 2> still;    ///< [N] at rest
-  std::vector<SpindleRig::Record> cuts;        ///< one a speed
+  std::vector<SpindleRig::Record> cuts;        ///< one per speed
   int flutes = 0;
 };
-/// @param band [Hz] up to which harmonics count @throws Error
+/// @param band [Hz] highest harmonic @throws Error
 BurzoniData gatherBurzoni(const MachineModel& model, std::uint64_t seed, double band);
 
-/// A speed of one of tables 8 to 15.
+/// One speed of one of tables 8 to 15.
 struct BurzoniRow {
   double rpm = 0.0;
   double q_printed = 0.0, rmse_printed = 0.0;    ///< [N2/s], [N]
-  int exponent = 0;                              ///< of the Q that the taps tell, 2^n
+  int exponent = 0;                              ///< of the Q from the taps, 2^n
   double rmse = 0.0;                             ///< [N] of the cut with that Q
-  int cut_exponent = 0;                          ///< of the cut's own best Q
+  int cut_exponent = 0;                          ///< of the best Q of the cut
   double cut_rmse = 0.0, cut_wave = 0.0;         ///< [N], [%] with it
   double walk = 0.0;                             ///< [N] force as a random walk, same Q
   double harmonics = 0.0, harmonics_wave = 0.0;  ///< [N], [%] of this package's filter
@@ -52,15 +52,15 @@ struct BurzoniTable {
 BurzoniTable burzoniTable(const BurzoniData& data, std::size_t number, double band);
 constexpr std::size_t BURZONI_TABLES = 8;
 
-/// Static loads and unbalance (sections 3.2, 3.3) on the same machine, its sensor calibrated with his
+/// Static loads and unbalance (sections 3.2, 3.3) on the same machine, with the sensor calibrated by his
 /// weights.
 struct BurzoniStatics {
   SpindleSensorCalibration calibration;
-  std::array<double, 3> verified{};                       ///< [1] error against the dynamometer at 120 mm
-  std::array<std::vector<double>, 3> hung, told;          ///< [N] weights at 139 mm, what the sensor tells
-  std::array<std::vector<double>, 2> pressed, on_table;   ///< [N] tool against the workpiece along x, y
-  std::vector<double> turning;                            ///< [rpm] in air
-  std::vector<std::vector<double>> unbalanced, balanced;  ///< [N] along x at each, with and without
+  std::array<double, 3> verified{};                        ///< [1] error against the dynamometer at 120 mm
+  std::array<std::vector<double>, 3> hung, sensor_output;  ///< [N] weights at 139 mm, and the sensor's output
+  std::array<std::vector<double>, 2> pressed, on_table;    ///< [N] tool against the workpiece along x, y
+  std::vector<double> turning;                             ///< [rpm] in air
+  std::vector<std::vector<double>> unbalanced, balanced;   ///< [N] along x at each, with and without
 };
 /// @throws Error
 BurzoniStatics gatherStatics(const MachineModel& model, std::uint64_t seed);

@@ -18,7 +18,7 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr std::size_t SHARE_OF_TRANSIENT = 4;  // a quarter of a cut's record is not scored
+constexpr std::size_t SHARE_OF_TRANSIENT = 4;  // the first quarter of a record is not scored
 
 double rmseOf(const std::vector<double>& force, const std::vector<double>& truth, double sample_rate,
               double spindle_speed, int flutes, double band) {
@@ -79,7 +79,7 @@ std::vector<double> expandedDisturbanceForce(const std::vector<double>& measured
   return force;
 }
 
-// The filter is linear: its answer to a tap is its response times the tap's spectrum.
+// The filter is linear: its output for a tap is its FRF times the spectrum of the tap.
 TuningMap expandedTapMap(const ReferenceTaps& taps, const ModalModel& sensor, double sample_rate, double r,
                          const std::vector<double>& speeds, int flutes, double band) {
   const auto lines = static_cast<std::size_t>(std::lround(sample_rate));  // 1 Hz apart

@@ -11,8 +11,9 @@
 namespace smartmill::kalman {
 
 /// Burzoni's expanded disturbance model (eq. 4-43..4-50): the force is a constant and an undamped oscillator
-/// at the tooth passing frequency, both driven by one noise w (theta_dc = theta_ac = 1), beside the sensor's
-/// modes; discretised exactly (5-9), stationary gain (5-46), force after the measurement update (5-47).
+/// at the tooth passing frequency, both driven by one noise w (theta_dc = theta_ac = 1), in addition to the
+/// modes of the sensor; discretised exactly (5-9), stationary gain (5-46), force after the measurement update
+/// (5-47).
 class ExpandedDisturbanceFilter {
  public:
   /// @param tooth_passing [Hz] @param q [N2/s] intensity of w @param r [N2] of a sample. @throws Error.
@@ -20,7 +21,7 @@ class ExpandedDisturbanceFilter {
                             double r);
   /// @param measured [N] @return applied force [N] at this sample.
   double step(double measured);
-  /// From the measured to the estimated force at f [Hz].
+  /// FRF from measured to estimated force at f [Hz].
   std::complex<double> response(double f) const;
 
  private:
@@ -34,7 +35,7 @@ class ExpandedDisturbanceFilter {
 std::vector<double> expandedDisturbanceForce(const std::vector<double>& measured, const ModalModel& sensor,
                                              double sample_rate, double tooth_passing, double q, double r);
 
-/// tapMap() with that filter, which is another one at every spindle speed.
+/// tapMap() with this filter, which depends on the spindle speed.
 TuningMap expandedTapMap(const ReferenceTaps& taps, const ModalModel& sensor, double sample_rate, double r,
                          const std::vector<double>& speeds, int flutes, double band);
 

@@ -17,8 +17,8 @@ using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::MatrixXcd;
 
-/// Element of the matrix on the lines of a longer transform: the impulse response, with nothing between its
-/// end and its beginning. Lines above the band are faded out, for no tap has told them.
+/// Element of the matrix on the lines of a longer transform: the zero-padded impulse response. Lines above
+/// the band are faded out, since the taps do not excite them.
 std::vector<Complex> onLines(const std::vector<Complex>& element, double spacing, double bandwidth,
                              std::size_t length) {
   const std::size_t samples = 2 * (element.size() - 1);
@@ -31,7 +31,7 @@ std::vector<Complex> onLines(const std::vector<Complex>& element, double spacing
   faded.back() = faded.back().real();
   const std::vector<double> impulse = inverseFourier(faded, samples);
   std::vector<double> longer(length, 0.0);
-  const std::size_t early = samples / 8;  // fading leaves a little before the beginning
+  const std::size_t early = samples / 8;  // fading makes the response slightly acausal
   std::copy(impulse.begin(), impulse.end() - static_cast<std::ptrdiff_t>(early), longer.begin());
   std::copy(impulse.end() - static_cast<std::ptrdiff_t>(early), impulse.end(),
             longer.end() - static_cast<std::ptrdiff_t>(early));
@@ -44,7 +44,7 @@ double passed(double frequency, double bandwidth) {
   return 0.5 * (1.0 + std::cos(units::PI * beyond));
 }
 
-/// Misfit of a sensor that is a rigid body.
+/// Misfit of the rigid-body model of the sensor.
 constexpr double RIGID = 1.5;
 
 /// Forward matrix, scaled, on the lines of a transform of a longer record.
@@ -77,12 +77,12 @@ struct LongMatrix {
   }
 };
 
-/// Inverse of a rigid body on feet that measure: (K + i w C - w^2 M) (K + i w C)^-1 = I - w^2 M Z^-1, Z = K +
-/// i w C nearly real. So each element is 1 or 0 at rest, the real part of the rest a polynomial in w^2 and
-/// w^4, the imaginary in w^3 and w^5: four numbers told by all lines together, where a line alone tells two.
+/// Inverse of a rigid body on force-measuring feet: (K + i w C - w^2 M) (K + i w C)^-1 = I - w^2 M Z^-1, Z =
+/// K + i w C nearly real. Each element is 1 or 0 at frequency zero, plus a real polynomial in w^2 and w^4 and
+/// an imaginary one in w^3 and w^5: four coefficients fitted to all lines.
 class RigidInverse {
  public:
-  /// @param bandwidth [Hz] up to which the lines count
+  /// @param bandwidth [Hz] highest fitted line
   RigidInverse(const TransferMatrix& matrix, const Eigen::VectorXd& scale, double bandwidth)
       : size_(scale.size()), unit_(bandwidth) {
     for (Index i = 0; i < size_; ++i) {
@@ -102,7 +102,7 @@ class RigidInverse {
     }
   }
 
-  /// Mean square of what it leaves over, over the variance of the lines: 1 for a rigid body.
+  /// Mean square of the residual over the variance of the lines: 1 for a rigid body.
   double misfit() const { return count_ > 0.0 ? squares_ / count_ : HUGE_VAL; }
   MatrixXcd at(double frequency) const {
     MatrixXcd here = MatrixXcd::Identity(size_, size_);
@@ -148,7 +148,7 @@ void checkFits(const TransferMatrix& matrix, const std::vector<std::vector<doubl
                double sample_rate) {
   if (measured.size() != matrix.channels || matrix.frequency.size() < 2 || matrix.frequency.front() != 0.0) {
     throw Error("transfer matrix: " + std::to_string(measured.size()) + " records, " +
-                std::to_string(matrix.channels) + " and all lines of the matrix are due");
+                std::to_string(matrix.channels) + " and all lines of the matrix are required");
   }
   const double top = matrix.frequency[1] * 2.0 * static_cast<double>(matrix.frequency.size() - 1);
   if (std::abs(top / sample_rate - 1.0) > 1e-9)
@@ -168,7 +168,7 @@ std::vector<std::vector<double>> invertRecord(const TransferMatrix& matrix,
   const auto size = static_cast<Index>(matrix.channels);
   const std::size_t samples = measured.front().size(), lines = matrix.frequency.size();
   const double spacing = matrix.frequency[1];
-  // Behind the record room for what the inverse rings, so that the end does not come round to the beginning.
+  // Zero padding for the ringing of the inverse, to avoid circular wrap-around.
   std::size_t length = 1;
   while (length < samples + 2 * lines) length *= 2;
   std::vector<std::vector<Complex>> spectra;

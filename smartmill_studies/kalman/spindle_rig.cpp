@@ -11,8 +11,8 @@ namespace smartmill::kalman {
 namespace {
 
 constexpr double BLOCK_TIME = sim::World::BLOCK / sim::World::SAMPLE_RATE;  // [s]
-constexpr double SETTLES = 0.25;                                            // [s] after another load
-constexpr double READS = 0.25;                                              // [s] a reading
+constexpr double SETTLES = 0.25;  // [s] settling after a change of load
+constexpr double READS = 0.25;    // [s] duration of a measurement
 
 }  // namespace
 
@@ -35,7 +35,7 @@ SpindleRig::SpindleRig(const MachineModel& model, const sim::WorldOptions& optio
   };
   outputs.result = [this](const SensorResult& result) { tapped_ = result; };
   outputs.calibration = [this](const CalibrationResult& result) { calibration_ = result; };
-  // Without hold-back every block comes out as it goes in.
+  // Without hold-back every block is output at once.
   sorted_ = std::make_unique<CompensationPipeline>(filter, taps, ideal, 0.0, outputs);
   sorted_->allowUncalibrated();
 }
@@ -84,7 +84,7 @@ void SpindleRig::hear(const sim::World::Block& block) {
   sorted_->push(use_plate_ ? block.dynamometer : block.spindle_force);
 }
 
-void SpindleRig::tell(CuttingCondition::Kind kind, const Engagement& engagement) {
+void SpindleRig::publishCondition(CuttingCondition::Kind kind, const Engagement& engagement) {
   CuttingCondition condition;
   condition.stamp = now_;
   condition.kind = kind;
@@ -101,7 +101,7 @@ CalibrationResult SpindleRig::ask(const CalibrationGoal& goal) {
   stamped.stamp = now_;
   sorted_->push(stamped);
   for (int k = 0; k < 400 && !calibration_; ++k) run(BLOCK_TIME);
-  if (!calibration_) throw Error("rig: no answer to a step of the calibration");
+  if (!calibration_) throw Error("rig: no result of a calibration step");
   if (calibration_->code == CalibrationResult::Code::ok || goal.step == CalibrationGoal::Step::verify)
     return *calibration_;
   throw Error("rig: " + calibration_->message);
@@ -137,7 +137,7 @@ SensorResult SpindleRig::tap(const std::string& direction, int hits) {
   goal.hits = hits;
   sorted_->push(goal);
   for (int k = 0; k < 100 * (hits + 10) && !tapped_; ++k) run(BLOCK_TIME);
-  if (!tapped_) throw Error("rig: no answer to taps along " + direction);
+  if (!tapped_) throw Error("rig: no result of taps along " + direction);
   return *tapped_;
 }
 
@@ -162,10 +162,10 @@ SpindleRig::Record cutAlong(SpindleRig& rig, const MachineModel& model, double y
   const Workpiece& stock = model.workpiece.value();
   const double advance = engagement.feed_per_tooth * tool.teeth * speed / units::TWO_PI;  // [m/s]
   rig.spin(speed);
-  rig.tell(CuttingCondition::Kind::air);
+  rig.publishCondition(CuttingCondition::Kind::air);
   rig.place({stock.low[0] - tool.radius() - 1e-3, y, stock.high[2] + 10e-3});
   rig.run(air);
-  rig.tell(CuttingCondition::Kind::cut, engagement);
+  rig.publishCondition(CuttingCondition::Kind::cut, engagement);
   rig.place({stock.low[0] - tool.radius() - 0.1e-3, y, stock.high[2] - engagement.axial_depth});
   rig.run((tool.radius() + 0.5e-3) / advance + 0.1, {advance, 0.0, 0.0});
   rig.start();
@@ -176,8 +176,8 @@ SpindleRig::Record cutAlong(SpindleRig& rig, const MachineModel& model, double y
     rig.run(way / advance - seconds, {advance, 0.0, 0.0});
   }
   rig.place({stock.low[0], y, stock.high[2] + 10e-3});
-  rig.tell(CuttingCondition::Kind::none);
-  // Blocks that waited for what came after them are left out.
+  rig.publishCondition(CuttingCondition::Kind::none);
+  // Skips blocks that were held back.
   for (auto* force : {&cut.truth, &cut.measured, &cut.dynamometer}) {
     for (auto& axis : *force) axis.resize(std::min(axis.size(), cut.compensated[2].size()));
   }
@@ -187,7 +187,7 @@ SpindleRig::Record cutAlong(SpindleRig& rig, const MachineModel& model, double y
 SpindleRig::Record cutSlot(SpindleRig& rig, const MachineModel& model, double speed, double depth,
                            double feed, double air, double seconds) {
   const Workpiece& stock = model.workpiece.value();
-  // Every slot beside the ones before.
+  // Each slot cuts fresh material.
   const double pitch = 1.15 * model.needTool("cut").diameter;
   const int rows = static_cast<int>((stock.high[1] - stock.low[1]) / pitch);
   const double y = stock.low[1] + pitch * (rig.slots() % rows + 0.5);

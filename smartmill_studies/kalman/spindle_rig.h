@@ -11,8 +11,8 @@
 
 namespace smartmill::kalman {
 
-/// The simulated machine with its sensors, led by hand without ROS, and what CompensationPipeline makes of
-/// one of them: the streams that the nodes would exchange, in one thread.
+/// The simulated machine with its sensors and the CompensationPipeline of one of them: the streams of the
+/// nodes in one thread, without ROS.
 class SpindleRig {
  public:
   /// @param use_plate the dynamometer's blocks are compensated; false: those of the sensor in the spindle
@@ -23,29 +23,29 @@ class SpindleRig {
   sim::World& world() { return world_; }
   double now() const { return now_; }  ///< [s]
 
-  /// The machine stands or moves on. @param velocity [m/s] of the tool
+  /// Advances the machine. @param velocity [m/s] of the tool
   void run(double seconds, const std::array<double, 3>& velocity = {});
   void place(const std::array<double, 3>& position) { position_ = position; }
   void spin(double speed) { speed_ = speed; }  ///< [rad/s]
-  void tell(CuttingCondition::Kind kind, const Engagement& engagement = {});
+  void publishCondition(CuttingCondition::Kind kind, const Engagement& engagement = {});
 
   /// Weights as Burzoni hangs them (3.2), or the tool against the workpiece (3.2.1).
   void readStatic(const std::vector<double>& lengths, const std::vector<double>& loads, bool reference);
-  /// The answer to a step of the calibration. @throws Error when none comes.
+  /// Result of a calibration step. @throws Error without a result.
   CalibrationResult ask(const CalibrationGoal& goal);
-  /// Taps of kalman/measure_frf. @throws Error when none comes.
+  /// Result of the taps of kalman/measure_frf. @throws Error without a result.
   SensorResult tap(const std::string& direction, int hits);
 
-  /// What the sensors showed, what was made of it and what was true, from start() to take().
+  /// Measured, compensated and true forces from start() to take().
   struct Record {
     std::array<std::vector<double>, 3> truth, measured, compensated, dynamometer;
     std::array<std::vector<double>, 6> sensors;
     std::vector<double> hammer;  ///< [N]
     std::vector<double> angle;   ///< [rad] of tooth 1
   };
-  int slots();  ///< asked for before
+  int slots();  ///< number of slots so far
   void start();
-  /// Ends it.
+  /// Ends the record.
   Record take();
 
  private:
@@ -65,16 +65,16 @@ class SpindleRig {
   Record record_;
 };
 
-/// A straight pass along x at a y [m], at constant speed; the record holds whole blocks from full engagement
-/// on.
-/// @param speed [rad/s] @param air [s] before it @param through the tool goes on to the stock's end
+/// A straight pass along x at a y [m], at constant speed; the record contains complete blocks from full
+/// engagement on.
+/// @param speed [rad/s] @param air [s] before the cut @param through the tool cuts to the end of the stock
 SpindleRig::Record cutAlong(SpindleRig& rig, const MachineModel& model, double y,
                             const Engagement& engagement, double speed, double air, double seconds,
                             bool through);
 
-/// A straight slot through the stock of the model along x, at constant speed; the record holds whole blocks
-/// from full engagement on. @param speed [rad/s] @param depth [m] @param feed [m] a tooth @param air [s]
-/// before it
+/// A straight slot through the stock of the model along x, at constant speed; the record contains complete
+/// blocks from full engagement on. @param speed [rad/s] @param depth [m] @param feed [m] per tooth @param air
+/// [s] before the cut
 SpindleRig::Record cutSlot(SpindleRig& rig, const MachineModel& model, double speed, double depth,
                            double feed, double air, double seconds);
 

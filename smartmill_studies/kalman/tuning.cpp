@@ -16,9 +16,9 @@ namespace {
 
 using Complex = std::complex<double>;
 
-/// Memories that are tried [revolutions].
+/// Candidate memories [revolutions].
 constexpr double MEMORIES[] = {0.2, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0};
-/// Revolutions after which a record's innovations count.
+/// Revolutions after which the innovations of a record are used.
 constexpr double SETTLED = 20.0;
 /// Shortest memory of a harmonic [revolutions].
 constexpr double QUICKEST = 0.2;
@@ -49,8 +49,8 @@ int TuningMap::best(double wanted) const {
 
 std::vector<double> randomWalkForce(const std::vector<double>& measured, const ModalModel& sensor,
                                     double sample_rate, double q, double r) {
-  // The layout's q is r dt / tau^2.
-  constexpr double SPEED = units::TWO_PI;  // of no meaning: one revolution a second
+  // The design has q = r dt / tau^2.
+  constexpr double SPEED = units::TWO_PI;  // arbitrary: one revolution per second
   HarmonicFilterParameters parameters;
   parameters.max_harmonics = 0;
   parameters.noise_rms = std::sqrt(r);
@@ -100,7 +100,8 @@ ReferenceTaps plantAt(const ReferenceTaps& taps, const FrequencyResponse& measur
     auto lines = fourier(response);
     const std::vector<double> frequency = fourierFrequencies(response.size(), sample_rate);
     for (std::size_t i = 1; i < lines.size() && i < measured.size(); ++i) {
-      if (measured.frequency[i] != frequency[i]) throw Error("confidence interval: the FRF has other lines");
+      if (measured.frequency[i] != frequency[i])
+        throw Error("confidence interval: the FRFs have different frequency lines");
       const double s = measured.std_dev.at(i) / std::abs(measured.value[i]);
       if (std::isfinite(s)) lines[i] *= std::polar(1.0 + k * std::min(s, 0.3), k * std::min(s, 0.3));
     }
@@ -115,7 +116,7 @@ double noiseBefore(const ReferenceTaps& taps, double sample_rate, double before)
   for (const auto& response : taps.response) {
     for (std::size_t i = 0; i < count; ++i) sum += response.at(i) * response[i];
   }
-  if (!(sum > 0.0)) throw Error("tuning: nothing stands before the blows, R cannot be told");
+  if (!(sum > 0.0)) throw Error("tuning: no signal before the hits, R is undefined");
   return sum / static_cast<double>(count * taps.response.size());
 }
 
@@ -138,7 +139,7 @@ CutScore scoreCut(const std::vector<double>& force, const std::vector<double>& t
     squares += std::pow(std::abs(found) - std::abs(is), 2);
     if (n % flutes != 0 || n * spindle_speed > units::TWO_PI * amplitude_band) continue;
     largest = std::max(largest, std::abs(is));
-    // A harmonic below a fiftieth of the largest is no amplitude to be right about.
+    // Harmonics below a fiftieth of the largest are not scored.
     if (std::abs(is) > 0.02 * largest)
       score.amplitude = std::max(score.amplitude, std::abs(std::abs(found) / std::abs(is) - 1.0));
   }
@@ -155,7 +156,7 @@ std::vector<double> bandForce(const std::vector<double>& measured, const ModalMo
       std::clamp(static_cast<int>(std::min(5000.0, 0.45 * sample_rate) * revolution), 1, max_harmonics);
   std::vector<double> settling;
   for (int n = 0; n <= harmonics; ++n) {
-    // A harmonic that the sensor hardly passes is slow already.
+    // Harmonics that the sensor attenuates strongly are slow already.
     const double passed = std::min(1.0, 2.0 * std::abs(sensor.response(n / revolution)));
     settling.push_back(std::max(passed * memory.at(bandOf(n / revolution, edges)), QUICKEST) * revolution);
   }
@@ -177,7 +178,7 @@ std::vector<double> bandForce(const std::vector<double>& measured, const ModalMo
 BandTuning tuneBands(const std::vector<double>& measured, const ModalModel& sensor, double spindle_speed,
                      double sample_rate, double noise_rms, const std::vector<double>& edges,
                      const FrequencyResponse& frf, int max_harmonics) {
-  // What the FRF's uncertainty makes of the measured harmonics is noise to the filter.
+  // The effect of the FRF's uncertainty on the measured harmonics is noise for the filter.
   double variance = noise_rms * noise_rms;
   const std::size_t half = measured.size() / 2;
   for (int n = 1; n * spindle_speed / units::TWO_PI < std::min(5000.0, frf.frequency.back()); ++n) {

@@ -10,8 +10,8 @@
 
 namespace smartmill::kalman {
 
-/// Burzoni's tuning: the force is a random walk of intensity q = 2^n [N2/s], n = 1..30 (eq. 6-2), and what
-/// counts is the RMSE of amplitude spectra at the harmonics of a spindle speed (eq. 6-1).
+/// Burzoni's tuning: the force is a random walk of intensity q = 2^n [N2/s], n = 1..30 (eq. 6-2), scored by
+/// the RMSE of amplitude spectra at the harmonics of a spindle speed (eq. 6-1).
 constexpr int LEAST_EXPONENT = 1, MOST_EXPONENT = 30;
 
 /// RMSE [N s] of every exponent (rows) at every spindle speed (columns).
@@ -26,17 +26,17 @@ struct TuningMap {
 std::vector<double> randomWalkForce(const std::vector<double>& measured, const ModalModel& sensor,
                                     double sample_rate, double q, double r);
 
-/// Map from taps: filter on the sensor's answer against the hammer's force, harmonics up to `band` [Hz],
-/// +- 1 Hz each. @param r [N2]
+/// Map from taps: filtered sensor output compared with the hammer force, harmonics up to `band` [Hz], +- 1 Hz
+/// each. @param r [N2]
 TuningMap tapMap(const ReferenceTaps& taps, const ModalModel& sensor, double sample_rate, double r,
                  const std::vector<double>& speeds, double band);
 
-/// Taps of a sensor at the edge of its confidence interval (eq. 6-3, 6-4): the answers' spectra times
+/// Taps of a sensor at the edge of its confidence interval (eq. 6-3, 6-4): the output spectra times
 /// (1 + k s) exp(i k s), s the relative standard deviation of the measured FRF. @param k -3 .. 3
 ReferenceTaps plantAt(const ReferenceTaps& taps, const FrequencyResponse& measured, double sample_rate,
                       double k);
 
-/// Mean square of what stands before the blows [N2]: R of a tap test. @param before [s]
+/// Mean square of the signal before the hits [N2]: R of a tap test. @param before [s]
 double noiseBefore(const ReferenceTaps& taps, double sample_rate, double before);
 
 /// RMSE [N] of the amplitudes of all spindle harmonics up to `band`, over whole revolutions.
@@ -47,31 +47,31 @@ struct CutScore {
 CutScore scoreCut(const std::vector<double>& force, const std::vector<double>& truth, double sample_rate,
                   double spindle_speed, int flutes, std::size_t from, double band, double amplitude_band);
 
-/// Memory [revolutions] of the harmonics in each band, told by the likelihood of a cut's innovations: nothing
-/// but the measured force is needed. The noise is the sensor's and what the uncertainty of its FRF makes of
-/// the harmonics. @param edges [Hz] between the bands, rising @param frf measured, with std_dev
+/// Memory [revolutions] of the harmonics in each band, by the likelihood of a cut's innovations; it requires
+/// only the measured force. Noise comes from the sensor and from the uncertainty of its FRF. @param edges
+/// [Hz] between the bands, ascending @param frf measured, with std_dev
 struct BandTuning {
-  std::vector<double> memory;  ///< [1] a band each
+  std::vector<double> memory;  ///< [1] one per band
   double log_likelihood = 0.0;
 };
 BandTuning tuneBands(const std::vector<double>& measured, const ModalModel& sensor, double spindle_speed,
                      double sample_rate, double noise_rms, const std::vector<double>& edges,
                      const FrequencyResponse& frf, int max_harmonics);
 
-/// Filter of fixed gains with a memory a band; force of the record.
+/// Force of a record through the filter with a memory per band.
 std::vector<double> bandForce(const std::vector<double>& measured, const ModalModel& sensor,
                               double spindle_speed, double sample_rate, double noise_rms,
                               const std::vector<double>& edges, const std::vector<double>& memory,
                               int max_harmonics, double* log_likelihood = nullptr);
 
-/// A map, and the best exponents of cuts [rad/s] to lay over it.
+/// A map, and the best exponents of cuts [rad/s] as overlay.
 struct NamedMap {
   std::string name;
   TuningMap map;
   std::vector<std::pair<double, int>> cuts;
 };
-/// Side by side with gnuplot, each with the optimum of the taps as a line and the cuts as dots. @throws
-/// Error.
+/// Draws maps next to each other with gnuplot, with the optimum of the taps as a line and the cuts as dots.
+/// @throws Error.
 void drawMaps(const std::vector<NamedMap>& maps, const std::string& png);
 
 }  // namespace smartmill::kalman

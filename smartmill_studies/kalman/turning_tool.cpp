@@ -32,18 +32,18 @@ std::vector<CampaignTest> TurningToolCase::tests(double speed) const {
 Record TurningToolCase::record(const CampaignTest& test, std::uint64_t seed) const {
   sim::SimulationOptions simulation;
   simulation.seed = seed;
-  // Columns to be simulated.
-  Record wanted;
+  // Simulated columns.
+  Record columns;
   const auto size = static_cast<std::size_t>(duration * test.sample_rate);
   std::vector<double> angle;
   for (std::size_t i = 0; i < size; ++i) {
-    wanted.time.push_back(static_cast<double>(i) / test.sample_rate);
-    angle.push_back(std::fmod(test.spindle_speed * wanted.time.back(), units::TWO_PI));
+    columns.time.push_back(static_cast<double>(i) / test.sample_rate);
+    angle.push_back(std::fmod(test.spindle_speed * columns.time.back(), units::TWO_PI));
   }
-  wanted.add("spindle_angle") = angle;
-  for (const char* name : {"fx", "fy", "fz", "tool_x", "tool_y"}) wanted.add(name).assign(size, 0.0);
-  Record cut = simulateTest(spindle.at(test.spindle_speed, model), test, wanted, simulation);
-  // The displacement sensors' own.
+  columns.add("spindle_angle") = angle;
+  for (const char* name : {"fx", "fy", "fz", "tool_x", "tool_y"}) columns.add(name).assign(size, 0.0);
+  Record cut = simulateTest(spindle.at(test.spindle_speed, model), test, columns, simulation);
+  // Noise of the displacement sensors.
   std::mt19937_64 random(seed);
   std::normal_distribution<double> noise(0.0, displacement_noise);
   for (const char* name : {"tool_x", "tool_y"})

@@ -13,12 +13,12 @@
 
 namespace smartmill::kalman {
 
-/// Cuts on the simulated machine whose tool's modes change with the spindle's speed.
+/// Cuts on a simulated machine with speed-dependent modes of the tool.
 struct TurningToolCase {
-  MachineModel model;  ///< standing, with runout among its effects
+  MachineModel model;  ///< at speed zero, with runout among its effects
   sim::TurningSpindle spindle;
-  std::vector<double> speeds;                       ///< [rad/s] middles of groups of cuts
-  int cuts = 9;                                     ///< of a group, evenly over +-width
+  std::vector<double> speeds;                       ///< [rad/s] centre speeds of the groups of cuts
+  int cuts = 9;                                     ///< per group, evenly over +-width
   double width = 0.06;                              ///< [1] of speed
   double duration = 0.4;                            ///< [s] of a cut's record
   double depth = 0.5e-3, feed_per_tooth = 0.06e-3;  ///< [m]
@@ -27,16 +27,16 @@ struct TurningToolCase {
 
   /// The slots of a group, as a campaign's tests; entry at 0.02 s.
   std::vector<CampaignTest> tests(double speed) const;
-  /// Simulated, the tool as it is at that cut's speed.
+  /// Simulated records, with the tool at the speed of each cut.
   Record record(const CampaignTest& test, std::uint64_t seed) const;
   /// FRFs of x and y of every group, tool displacement against the force sensor's force.
   std::array<std::vector<SpeedFrf>, 2> identify(std::uint64_t seed) const;
-  /// A folder with all cuts of all groups, for the product's program.
+  /// Writes a campaign folder with all cuts of all groups.
   void write(const std::string& folder, std::uint64_t seed) const;
 };
 
-/// The tool of the studies: 1200 and 1100 Hz, 12 um of runout; at 18,000 rpm 12 % of the stiffness is lost
-/// and a quarter more damping there.
+/// The tool of the studies: 1200 and 1100 Hz, 12 um of runout; at 18,000 rpm 12 % less stiffness and a
+/// quarter more damping.
 TurningToolCase turningToolCase();
 
 }  // namespace smartmill::kalman

@@ -16,7 +16,7 @@ void check(const std::vector<std::vector<double>>& inputs, const std::vector<dou
            const Anfis::Parameters& parameters) {
   if (parameters.memberships < 2 || parameters.memberships > 5 || parameters.epochs < 1 ||
       !(parameters.step > 0.0) || !(parameters.ridge >= 0.0)) {
-    throw Error("anfis: memberships 2..5, epochs >= 1, step > 0 and ridge >= 0 are due");
+    throw Error("anfis: expected memberships 2..5, epochs >= 1, step > 0 and ridge >= 0");
   }
   const std::size_t width = inputs.empty() ? 0 : inputs.front().size();
   if (inputs.size() != outputs.size() || inputs.size() < width + 2) {
@@ -201,7 +201,7 @@ double Anfis::squares(const std::vector<std::vector<double>>& x, const std::vect
 }
 
 double Anfis::operator()(const std::vector<double>& input) const {
-  if (input.size() != inputs_) throw Error("anfis: " + std::to_string(inputs_) + " inputs are due");
+  if (input.size() != inputs_) throw Error("anfis: expected " + std::to_string(inputs_) + " inputs");
   return out_middle_ + out_span_ * answerTo(scaled(input)).out;
 }
 

@@ -12,13 +12,13 @@ namespace smartmill::loadmeter {
 class Anfis {
  public:
   struct Parameters {
-    int memberships = 2;  ///< 2..5 an input
+    int memberships = 2;  ///< 2..5 per input
     int epochs = 40;      ///< >= 1
-    double step = 0.02;   ///< > 0, first length of a step of the memberships, of the range
-    double ridge = 1e-4;  ///< >= 0, keeps rules that hardly fire near nothing
+    double step = 0.02;   ///< > 0, initial step of the memberships, as share of the range
+    double ridge = 1e-4;  ///< >= 0, keeps rules with little firing near zero
   };
 
-  /// @param inputs one vector a sample. @throws Error with fewer samples than a rule has unknowns, unequal
+  /// @param inputs one vector per sample. @throws Error with fewer samples than a rule has unknowns, unequal
   /// lengths, or a parameter out of range.
   Anfis(const std::vector<std::vector<double>>& inputs, const std::vector<double>& outputs,
         const Parameters& parameters);
@@ -30,18 +30,18 @@ class Anfis {
   struct Bell {
     double a, b, c;
   };
-  /// What the rules say of one scaled input.
+  /// Output of the rules for one scaled input.
   struct Answer {
     std::vector<double> normalised;  // firing of each rule, sum 1
     std::vector<double> line;        // value of each rule's line
     double out = 0.0;
   };
   std::size_t rules() const;
-  /// Bells evenly over the range of each input.
+  /// Bells at even distances over the range of each input.
   void spread(const std::vector<std::vector<double>>& inputs);
   void learn(const std::vector<std::vector<double>>& x, const std::vector<double>& y,
              const Parameters& parameters);
-  /// Backward pass: of the squares to a, b, c of every bell, the lines held.
+  /// Backward pass: gradient of the squared error over a, b, c of every bell with fixed lines.
   std::vector<double> gradient(const std::vector<std::vector<double>>& x, const std::vector<double>& y) const;
   Answer answerTo(const std::vector<double>& x) const;
   std::vector<double> scaled(const std::vector<double>& input) const;

@@ -20,7 +20,7 @@ constexpr double LENGTH = 1.6;   // [s] of a record
 constexpr double ENGAGE = 0.4;   // [s]
 constexpr int SUBSTEPS = 10;
 constexpr std::size_t ANGLES = 360;
-constexpr double ZERO_BELOW_RPM = 2000.0;  // the thesis takes friction as zero below
+constexpr double ZERO_BELOW_RPM = 2000.0;  // the thesis assumes zero friction below
 
 }  // namespace
 
@@ -48,7 +48,7 @@ std::vector<double> torqueOverARevolution(const ToolGeometry& tool, const Engage
 
 namespace {
 
-/// One stream of random numbers for a whole case.
+/// Random numbers of one case.
 struct Draws {
   explicit Draws(unsigned seed) : random(seed) {}
   double normal() { return normal_distribution(random); }
@@ -93,7 +93,7 @@ FrictionLaw drawFriction(Draws& draw, const Spindle& nominal, const Faults& faul
   return law;
 }
 
-/// The machine as it is, which cuts one test after the other.
+/// The true machine, which runs one test after the other.
 struct TrueMachine {
   const Faults& faults;
   ToolGeometry tool;
@@ -178,7 +178,7 @@ MachineCase drawCase(unsigned seed, const Faults& faults) {
        {1000.0, 1500.0, 2000.0, 3000.0, 4500.0, 6000.0, 8000.0, 10000.0, 12500.0, 15000.0}) {
     run(TestKind::air, units::radPerSecFromRpm(rpm), {});
   }
-  // Depth for a torque that such a spindle carries.
+  // Depth for a torque within the limit of the spindle.
   const double torque_per_metre = tool.radius() * tool.teeth * (c.truth.ktc * 8e-5 / PI + c.truth.kte / 2.0);
   const double depth = std::min(2.5 / torque_per_metre, 0.004);
   const double slow = units::radPerSecFromRpm(draw.between(2500.0, 4000.0));
@@ -225,7 +225,8 @@ CaseErrors judge(const MachineCase& one, const Faults& faults) {
 
   LoadRecordOptions options;
   options.depth_uncertainty = faults.depth_error;
-  options.runout_uncertainty = faults.largest_runout / std::sqrt(3.0);  // of an even spread up to the largest
+  options.runout_uncertainty =
+      faults.largest_runout / std::sqrt(3.0);  // of a uniform distribution up to the largest
   MachineModel model = one.model;
   if (faults.gain_error > 0.0) {
     options.spindle_uncertainty = true;

@@ -7,7 +7,7 @@
 
 namespace smartmill::loadmeter {
 
-/// Real-world faults of a scene; zero: off.
+/// Imperfections of a case; zero: off.
 struct Faults {
   double resolution = 3e-4;       ///< [V] of the load meter
   double noise = 2e-4;            ///< [V] RMS before rounding
@@ -21,7 +21,7 @@ struct Faults {
 
 /// One machine, tool and material, drawn at random, with its air cuts and slots.
 struct MachineCase {
-  MachineModel model;  ///< what is believed: load meter, nominal friction, tool
+  MachineModel model;  ///< stated values: load meter, nominal friction, tool
   CuttingCoefficients truth;
   double depth = 0.0;  ///< [1] relative error of the axial depth of all its cuts
   std::vector<TestRecord> tests;
@@ -31,18 +31,18 @@ struct MachineCase {
 MachineCase drawCase(unsigned seed, const Faults& faults);
 
 /// Torque of a rigid tool over one revolution with cutter-axis offset, at even angles: h of a tooth is the
-/// least distance to any surface that earlier teeth left (effects.md, runout); helix in slices.
+/// least distance to the surface left by any earlier tooth (effects.md, runout); helix in slices.
 std::vector<double> torqueOverARevolution(const ToolGeometry& tool, const Engagement& engagement,
                                           const CuttingCoefficients& k, double offset, double angle,
                                           std::size_t steps);
 
 /// Errors of Ktc and Kte against the truth, relative.
 struct CaseErrors {
-  double thesis_ktc, thesis_kte;  ///< [1] the thesis' procedure to the letter (eq. 3.5..3.19)
+  double thesis_ktc, thesis_kte;  ///< [1] procedure of the thesis (eq. 3.5..3.19)
   double ktc, kte;                ///< [1] this package
   double z_ktc, z_kte;            ///< [1] error over stated standard deviation
-  double z_beside_depth;  ///< [1] of Ktc with the depth error that was drawn taken out of error and std
-  double depth;           ///< [1] error of the depth that was drawn
+  double z_beside_depth;          ///< [1] of Ktc, without the depth error in error and standard deviation
+  double depth;                   ///< [1] drawn error of the depth
   std::vector<std::string> terms;
 };
 CaseErrors judge(const MachineCase& one, const Faults& faults);

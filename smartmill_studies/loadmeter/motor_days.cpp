@@ -63,7 +63,7 @@ struct Pass {
   double speed = 0.0, feed = 0.0, depth = 0.0, heading = 0.0;  // [rad/s], [m], [m], [rad]
 };
 
-/// One machine from pass to pass; what it says goes to the estimator in stamp order.
+/// One machine over all passes; its samples are passed to the estimator in stamp order.
 class Shop {
  public:
   Shop(const MotorDay& day, const MachineModel& model, LoadMeterIdentification& estimator)
@@ -82,7 +82,7 @@ class Shop {
     for (std::size_t b = 0; b < blocks; ++b) {
       sim::World::Block block;
       world.advance(block, statesOf(pass, b));
-      tell(pass, block);
+      publish(pass, block);
       if (b < blocks / 2) continue;
       for (std::size_t i = 0; i < sim::World::BLOCK; ++i, ++count) {
         for (std::size_t a = 0; a < 3; ++a) {
@@ -146,7 +146,7 @@ class Shop {
     options.servo_trigger = FEED_BLOCK;
     options.motor.currents = true;
     options.motor.temperature = day_.temperature;
-    options.motor.warm_up_time = 1e6;  // a pass is short: the machine is as warm as the day has made it
+    options.motor.warm_up_time = 1e6;  // a pass is short: the temperature is constant
     return options;
   }
 
@@ -162,7 +162,7 @@ class Shop {
       for (std::size_t a = 0; a < 3; ++a) {
         if (std::abs(s.velocity[a]) < 1e-12) s.velocity[a] = 0.0;
       }
-      // The spindle turns before the tool is in.
+      // The spindle rotates before the tool engages.
       s.position = {s.velocity[0] * t, s.velocity[1] * t, pass.air || b == 0 ? 5e-3 : -pass.depth};
       s.spindle_speed = pass.speed;
       s.sequence = b == 0 ? 1 : FEED_BLOCK;
@@ -188,8 +188,8 @@ class Shop {
     length_ = length;
   }
 
-  void tell(const Pass& pass, const sim::World::Block& block) {
-    // A block later, so that what it holds has been measured.
+  void publish(const Pass& pass, const sim::World::Block& block) {
+    // One block later, when all its samples are measured.
     time_ = begin_ + block.dynamometer.timeOf(sim::World::BLOCK);
     const double t = time_ - begin_, way = std::min(length_, velocity(pass) * t);
     tellState({way * std::cos(pass.heading), way * std::sin(pass.heading), pass.air ? 5e-3 : -pass.depth},
@@ -275,7 +275,7 @@ std::vector<MotorCut> runDay(const MotorDay& day, const std::optional<MotorCalib
         shop->rapid(a, day.seed + static_cast<unsigned>(2 * i + static_cast<int>(a)));
     }
     Pass pass;
-    // Whole revolutions of the block's clock do not matter: means are over half a pass.
+    // Incomplete revolutions are negligible: means are over half a pass.
     pass.speed =
         units::radPerSecFromRpm(uniform(0.0, 1.0) < 0.5 ? uniform(1000.0, 1500.0) : uniform(1700.0, 3500.0));
     pass.feed = uniform(0.06e-3, 0.2e-3);
@@ -295,7 +295,7 @@ std::vector<MotorCut> runDay(const MotorDay& day, const std::optional<MotorCalib
     MotorCut cut = shop->run(pass, metal, static_cast<unsigned>(random()));
     shop->end();
     if (estimator->cuts().empty() || !estimator->cuts().back().motor || !estimator->airCuts().back().motor)
-      throw Error("a pass without a motor reading");
+      throw Error("a pass without a motor measurement");
     cut.cut = *estimator->cuts().back().motor;
     cut.air = *estimator->airCuts().back().motor;
     cut.motors = estimator->cuts().back().force;
@@ -335,12 +335,13 @@ MotorCalibration calibrationOf(const std::vector<MotorCut>& cuts) {
 
 namespace {
 
-/// Whether a drive was read in a cut along its own axis, as the paper's longitudinal and facing cuts.
+/// Whether a drive was measured in a cut along its own axis, as in the paper's longitudinal and facing cuts.
 bool alone(const MotorCut& cut, std::size_t axis) {
   return cut.cut.range[axis] && cut.air.range[axis] && std::abs(cut.cut.velocity[1 - axis]) < 1e-9;
 }
 
-/// Inputs and outputs of an ANFIS for an axis (0, 1) or the spindle (2); the array that the paper found best.
+/// Inputs and outputs of an ANFIS for an axis (0, 1) or the spindle (2); the inputs that were best in the
+/// paper.
 struct Samples {
   std::vector<std::vector<double>> inputs;
   std::vector<double> outputs;
@@ -422,7 +423,7 @@ DayErrors judgeDay(const std::vector<MotorCut>& learnt, const MotorCalibration& 
   for (std::size_t which = 0; which < 3; ++which) {
     const Samples train = samplesOf(learnt, which), test = samplesOf(cuts, which);
     const Anfis anfis(train.inputs, train.outputs, {});
-    // Air currents of the first day: the mean there stands for that of the second.
+    // Air currents of the first day replace those of the second.
     double old_air = 0.0, old_count = 0.0;
     for (const MotorCut& cut : learnt) {
       if (which < 2 && cut.air.range[which]) old_air += *cut.air.range[which], old_count += 1.0;

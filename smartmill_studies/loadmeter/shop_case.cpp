@@ -18,7 +18,7 @@ namespace {
 using nlohmann::json;
 
 constexpr int MACHINES = 50, MATERIALS = 6, TOOLS = 3, FIRST_CUTS = 4, MOST_CUTS = 12;
-constexpr double STATED = 0.01;  // [1] deviation that a record states
+constexpr double STATED = 0.01;  // [1] standard deviation stated by a record
 constexpr double NAMED = 0.9;    // [1] probability from which a machine is named
 const std::string LAST = "material " + std::to_string(MATERIALS - 1);
 
@@ -54,7 +54,7 @@ class Shop {
   static bool isNew(int machine) { return machine % 3 == 0; }  // never cut the last material
   static std::string nameOf(int machine) { return "mill " + std::to_string(machine); }
 
-  /// What the machine's next cuts of this group will scatter about.
+  /// Mean of the machine's next cuts of this group.
   double truth(int machine, int material, int tool) const {
     const auto g = static_cast<std::size_t>(material * TOOLS + tool);
     return groups_[g] + effects_[static_cast<std::size_t>(machine)] +
@@ -71,18 +71,18 @@ class Shop {
             0.0};
   }
   std::vector<FleetObservation> history() {
-    std::vector<FleetObservation> seen;
+    std::vector<FleetObservation> observations;
     for (int m = 0; m < MACHINES; ++m) {
       for (int j = 0; j < MATERIALS; ++j) {
         if (j == MATERIALS - 1 && isNew(m)) continue;
         for (int t = 0; t < TOOLS; ++t) {
           if (between(0.0, 1.0) > 0.4) continue;
           const int cuts = 1 + static_cast<int>(between(0.0, 3.0));
-          for (int c = 0; c < cuts; ++c) seen.push_back(cut(m, j, t));
+          for (int c = 0; c < cuts; ++c) observations.push_back(cut(m, j, t));
         }
       }
     }
-    return seen;
+    return observations;
   }
 
  private:
@@ -104,10 +104,10 @@ double share(const std::vector<double>& z) {
   return inside / static_cast<double>(z.size());
 }
 
-// A machine alone, before its first cut of a material: what it has seen of others.
-double loneGuess(const std::vector<FleetObservation>& seen, const std::string& machine) {
+// Prediction by the machine alone before its first cut of a material: from its other materials.
+double loneGuess(const std::vector<FleetObservation>& observations, const std::string& machine) {
   double sum = 0.0, count = 0.0;
-  for (const FleetObservation& o : seen) {
+  for (const FleetObservation& o : observations) {
     if (o.machine != machine) continue;
     sum += std::log(o.value);
     ++count;
@@ -115,9 +115,10 @@ double loneGuess(const std::vector<FleetObservation>& seen, const std::string& m
   return count > 0.0 ? sum / count : std::log(1.2e9);
 }
 
-/// Machines that never cut the last material: its first cuts, by the fleet and alone.
-void firstCuts(Shop& shop, const std::vector<FleetObservation>& seen, json* line) {
-  std::vector<FleetObservation> grown = seen;
+/// Machines that never cut the last material: predictions of its first cuts, by the fleet and by the machine
+/// alone.
+void firstCuts(Shop& shop, const std::vector<FleetObservation>& observations, json* line) {
+  std::vector<FleetObservation> grown = observations;
   std::vector<double> mean(MACHINES, 0.0);
   for (int cuts = 0; cuts <= FIRST_CUTS; ++cuts) {
     const FleetModel model(grown);
@@ -127,7 +128,8 @@ void firstCuts(Shop& shop, const std::vector<FleetObservation>& seen, json* line
       const double truth = shop.truth(m, MATERIALS - 1, 0), error = std::log(p->value) - truth;
       fleet.push_back(100.0 * std::abs(error));
       z.push_back(error / p->log_std);
-      const double guess = cuts == 0 ? loneGuess(seen, Shop::nameOf(m)) : mean[static_cast<std::size_t>(m)];
+      const double guess =
+          cuts == 0 ? loneGuess(observations, Shop::nameOf(m)) : mean[static_cast<std::size_t>(m)];
       alone.push_back(100.0 * std::abs(guess - truth));
     }
     const std::string after = "after_" + std::to_string(cuts);
@@ -144,9 +146,10 @@ void firstCuts(Shop& shop, const std::vector<FleetObservation>& seen, json* line
   }
 }
 
-/// Who is odd among those with a history; and how many cuts a newcomer needs that is off by a quarter.
-void oddMachines(Shop& shop, const std::vector<FleetObservation>& seen, json* line) {
-  const FleetModel model(seen);
+/// Detection of outliers among machines with a history, and number of cuts to detect a new machine that is
+/// off by a quarter.
+void oddMachines(Shop& shop, const std::vector<FleetObservation>& observations, json* line) {
+  const FleetModel model(observations);
   int found = 0, falsely = 0;
   std::vector<double> z;
   for (const MachineEffect& effect : model.machines()) {
@@ -160,12 +163,12 @@ void oddMachines(Shop& shop, const std::vector<FleetObservation>& seen, json* li
   (*line)["odd_falsely"] = falsely;
   (*line)["effects_z2"] = meanSquare(z);
   (*line)["effects_inside"] = share(z);
-  std::vector<FleetObservation> grown = seen;
+  std::vector<FleetObservation> grown = observations;
   int cuts = 0;
   double odd = 0.0;
   while (cuts < MOST_CUTS && odd <= NAMED) {
     FleetObservation o = shop.cut(1, cuts % MATERIALS, 0);
-    // Off by a quarter from the fleet's middle, whatever the machine whose cuts these are is.
+    // Off by a quarter from the fleet mean, independent of the machine that supplies the cuts.
     o.value *= std::exp(std::log(1.25) - shop.effect(1));
     o.machine = "newcomer";
     grown.push_back(o);
@@ -181,10 +184,10 @@ void oddMachines(Shop& shop, const std::vector<FleetObservation>& seen, json* li
 
 json runShop(std::uint64_t seed, int number) {
   Shop shop(seed, number);
-  const std::vector<FleetObservation> seen = shop.history();
-  json line{{"case", number}, {"records", seen.size()}};
-  firstCuts(shop, seen, &line);
-  oddMachines(shop, seen, &line);
+  const std::vector<FleetObservation> observations = shop.history();
+  json line{{"case", number}, {"records", observations.size()}};
+  firstCuts(shop, observations, &line);
+  oddMachines(shop, observations, &line);
   return line;
 }
 

@@ -24,7 +24,7 @@ struct ShopTool {
 };
 struct ShopMaterial {
   std::string name;
-  ShearZone zone;  // at no rake
+  ShearZone zone;  // at zero rake
   double friction_slope = 0.0, shear_slope = 0.0;
   double edge_force = 0.0;  // [N/m]
 };
@@ -77,7 +77,7 @@ class Shop {
 
  private:
   double uniform(double low, double high) { return low + (high - low) * unit_(random_); }
-  /// Some come often, some seldom.
+  /// Frequencies differ between tools and materials.
   std::size_t often(std::size_t count) {
     const double u = unit_(random_);
     return std::min(count - 1, static_cast<std::size_t>(static_cast<double>(count) * u * u));
@@ -115,7 +115,7 @@ class Shop {
       reading.torque_std = options_.reading_error * torque;
       reading.cutting_time = TIME;
       running.update(reading);
-      tool.edge_age = std::fmod(tool.edge_age + TIME, LIFE);  // then it is ground
+      tool.edge_age = std::fmod(tool.edge_age + TIME, LIFE);  // then it is reground
       CoefficientRecord record;
       record.set.stamp = 86400.0 * day + 600.0 * ++count_;
       record.set.tool = tool.name;
@@ -149,9 +149,9 @@ class Shop {
 
 void ShopOptions::validate() const {
   for (const int value : {tools, materials, days, jobs, cuts})
-    if (value < 1) throw Error("shop: tools, materials, days, jobs and cuts of at least 1 are due");
+    if (value < 1) throw Error("shop: expected at least 1 tool, material, day, job and cut");
   if (!(pair_scatter >= 0.0) || !(reading_error > 0.0))
-    throw Error("shop: a scatter of at least 0 and an error above 0 are due");
+    throw Error("shop: expected a scatter of at least 0 and an error above 0");
 }
 
 std::vector<ShopJob> shopYear(const ShopOptions& options, const std::function<void(double)>& progress) {

@@ -24,19 +24,19 @@ constexpr std::size_t SAMPLES = 2048;
 constexpr double HALL_NOISE = 0.15;  // [A] RMS: 0.1 V/A
 constexpr double AT_REST = std::numeric_limits<double>::quiet_NaN();
 
-/// [1] chance that an F with these degrees of freedom is larger.
+/// [1] probability of a larger F with these degrees of freedom.
 double upperTail(double f, double numerator, double denominator) {
   return cdf(complement(boost::math::fisher_f(numerator, denominator), f));
 }
 
-// The machine's own laws, Table 1: slide X is pulled by its weight.
+// True laws of the machine, Table 1: slide X is pulled by its weight.
 double currentX(double force) {
   return (force - 258.0) / -198.45;
 }
 double currentZ(double force) {
   return (force - 0.003) / 215.9;
 }
-// Spindle torque T = a dI^b: full torque below base speed, less of it a speed above (constant power).
+// Spindle torque T = a dI^b: full torque below base speed, decreasing above (constant power).
 double lawA(double rpm) {
   return rpm <= TurningCentre::BASE_SPEED ? 7.5 - 0.6 * (rpm - 800.0) / 770.0
                                           : 6.9 * std::pow(TurningCentre::BASE_SPEED / rpm, 0.8);
@@ -63,7 +63,7 @@ std::vector<double> TurningCentre::phaseCurrent(const std::vector<double>& range
   const double phase = uniform(random_), other = uniform(random_);
   for (std::size_t i = 0; i < signal.size(); ++i) {
     const double t = static_cast<double>(i) / RATE;
-    // Inverter: fifth and seventh harmonic, and its switching folded down.
+    // Inverter: fifth and seventh harmonic, and aliased switching.
     signal[i] = 0.5 * range[i] *
                     (std::sin(TWO_PI * frequency * t + phase) +
                      0.06 * std::sin(5.0 * TWO_PI * frequency * t + other) +
@@ -86,27 +86,27 @@ TurningCut TurningCentre::cut(double kc, bool x, bool z, double speed_rpm, doubl
   c.feed = feed;
   c.depth = depth;
   c.radius = radius;
-  // Specific force falls with feed; feed and passive force are shares of it. Facing swaps X and Z.
+  // The specific force decreases with feed; feed and passive force are shares of it. Facing swaps X and Z.
   const double power_force = kc * depth * 1e3 * std::pow(feed * 1e3, 0.78);
   const double feed_force = 0.55 * kc * depth * 1e3 * std::pow(feed * 1e3, 0.45);
   const double passive = 0.30 * kc * depth * 1e3 * std::pow(feed * 1e3, 0.5);
   std::array<double, 3> nominal{x && !z ? feed_force : passive, power_force, z ? feed_force : passive};
   if (x && z) nominal[0] = 0.7 * feed_force;
-  // Beyond 258 N the X motor would have to push: the range of its current could not tell.
+  // Beyond 258 N the current of the X motor changes sign, which its range does not show.
   if (x) nominal[0] = std::min(nominal[0], 190.0);
   for (std::size_t a = 0; a < 3; ++a) {
     c.force[a] = std::max(20.0, nominal[a] + std::sqrt(variances_.process[a]) * normal_(random_));
   }
-  const auto seen = [&](std::size_t a) {
+  const auto forceWithNoise = [&](std::size_t a) {
     return std::max(15.0, c.force[a] + std::sqrt(variances_.sensor[a]) * normal_(random_));
   };
   c.current = {AT_REST, AT_REST, AT_REST};
   if (x) {
-    // Without magnitude below nothing: a range has no sign.
-    c.current[0] = measured(std::abs(currentX(seen(0))), phaseOf(0, speed_rpm, feed));
+    // Not below zero: a range has no sign.
+    c.current[0] = measured(std::abs(currentX(forceWithNoise(0))), phaseOf(0, speed_rpm, feed));
   }
-  if (z) c.current[2] = measured(std::abs(currentZ(seen(2))), phaseOf(2, speed_rpm, feed));
-  const double torque = seen(1) * (radius + 0.5 * depth);
+  if (z) c.current[2] = measured(std::abs(currentZ(forceWithNoise(2))), phaseOf(2, speed_rpm, feed));
+  const double torque = forceWithNoise(1) * (radius + 0.5 * depth);
   const double rise = std::pow(torque / lawA(speed_rpm), 1.0 / lawB(speed_rpm));
   const double air = 4.0 + 1.5 * speed_rpm / 2400.0;
   const double frequency = phaseOf(1, speed_rpm, feed);
@@ -125,7 +125,7 @@ std::vector<TurningCut> TurningCentre::calibrationTests(std::size_t count) {
     const bool facing = i % 8 == 7;
     const double depth = facing ? 0.0003 + 0.0007 * uniform(random_) : depths[(i / 7) % 4];
     const double feed = facing ? 3e-5 + 1.2e-4 * uniform(random_) : feeds[(i / 28) % 4];
-    const double kc = i % 20 == 0 ? 1850.0 : 1700.0;  // a second tool now and then
+    const double kc = i % 20 == 0 ? 1850.0 : 1700.0;  // a second tool in one of 20 cuts
     cuts.push_back(cut(facing ? 0.45 * kc : kc, facing, !facing, speeds[i % 7], feed, depth,
                        0.015 + 0.02 * uniform(random_)));
   }
@@ -184,7 +184,7 @@ struct InputArray {
   Inputs of;
 };
 
-/// A third of the prediction tests chooses among the arrays, as the paper does.
+/// A third of the prediction tests selects among the input arrays, as in the paper.
 struct Choice {
   const InputArray* array = nullptr;
   std::unique_ptr<Anfis> anfis;
@@ -192,9 +192,9 @@ struct Choice {
   double operator()(const TurningCut& c) const { return (*anfis)(array->of(c)); }
 };
 
-/// Learnt from the calibration tests, one of each array; the array with the least error in `validation`, as
-/// the paper chooses. One material only in the calibration: feed and depth tell the force there and mislead
-/// elsewhere, which cross-validation of it could not see.
+/// Trains one network per input array on the calibration tests and selects the array with the least error in
+/// `validation`, as in the paper. The calibration has only one material, where feed and depth determine the
+/// force; cross-validation within it would not reveal that this fails for others.
 Choice chooseAnfis(const std::vector<TurningCut>& cuts, const std::vector<double>& output,
                    const std::vector<TurningCut>& validation, const std::vector<double>& truth,
                    const std::vector<InputArray>& arrays) {
@@ -219,7 +219,8 @@ Choice chooseAnfis(const std::vector<TurningCut>& cuts, const std::vector<double
   return best;
 }
 
-// Torque rather than force is learnt: the work's radius is known, the motor does not feel it.
+// The torque is learnt instead of the force, since the motor current depends on torque and the radius is
+// known.
 const std::vector<InputArray>& torqueArrays() {
   static const std::vector<InputArray> ARRAYS{
       {"{dI, N}",
@@ -261,8 +262,7 @@ double torqueOf(const TurningCut& c) {
   return c.force[1] * lever(c);
 }
 
-/// What the calibration tests teach: lines for the slides, a law of torque over power for the spindle, and
-/// the networks.
+/// Models from the calibration tests: lines for the slides, torque law of the spindle, and the networks.
 struct Calibration {
   Line x, z;
   TorquePowerLaw law;
@@ -315,7 +315,7 @@ void compare(const Calibration& calibration, const std::vector<TurningCut>& test
     tally(truth[a], anfis[a], a, &result->anfis);
   }
   result->truth = truth;
-  result->told = regression;
+  result->predicted = regression;
 }
 
 void compareVariances(const Calibration& calibration, const std::vector<TurningCut>& replications,
@@ -367,7 +367,8 @@ SlideLoad slideLoad(const Line& calibration, double air_current, double air_curr
 }
 
 VarianceSplit splitVariance(const std::vector<double>& dynamometer, const std::vector<double>& current) {
-  if (dynamometer.size() < 3 || current.size() < 3) throw Error("variance split: three replications are due");
+  if (dynamometer.size() < 3 || current.size() < 3)
+    throw Error("variance split: expected at least three replications");
   VarianceSplit s;
   s.process_mean = mean(dynamometer);
   s.current_mean = mean(current);

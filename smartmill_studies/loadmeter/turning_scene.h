@@ -16,11 +16,11 @@ struct TurningVariances {
   std::array<double, 3> sensor{{260.0, 383.0, 260.0}};  ///< [N2] Table 2 (Fx: as Fz)
 };
 
-/// One cut as the machine and the dynamometer saw it.
+/// One cut with the measurements of machine and dynamometer.
 struct TurningCut {
   bool moves_x = false, moves_z = false;
   double speed_rpm = 0.0, feed = 0.0, depth = 0.0;  ///< [rpm], [m/rev], [m]
-  double radius = 0.0;                              ///< [m] of the work
+  double radius = 0.0;                              ///< [m] of the workpiece
   std::array<double, 3> force{};                    ///< [N] dynamometer: Fx, Fy, Fz
   std::array<double, 3> current{};  ///< [A] phase ranges X, Y, Z out of the signal chain; NaN: axis at rest
   double spindle_air = 0.0;         ///< [A] range of the spindle's current in air at this speed
@@ -32,9 +32,9 @@ class TurningCentre {
 
   /// Longitudinal and facing cuts, one material, two tools (Table 1: 105 and 13 + 2).
   std::vector<TurningCut> calibrationTests(std::size_t count);
-  /// Three materials, three tools; tapers and contours, where all axes move, too.
+  /// Three materials, three tools; also tapers and contours, where all axes move.
   std::vector<TurningCut> predictionTests(std::size_t count);
-  /// The cut of Table 2: 1000 rpm, 2 mm, 0.2 mm/rev, again and again.
+  /// The cut of Table 2: 1000 rpm, 2 mm, 0.2 mm/rev, repeated.
   std::vector<TurningCut> replications(std::size_t count);
 
   /// [A] Phase current at 1000 Hz of a range [A] over time, with the inverter's harmonics and the sensor's
@@ -52,7 +52,7 @@ class TurningCentre {
   TurningVariances variances_;
 };
 
-/// What a drive's line says of its slide, from air cuts in both directions (section 9, ii): in the direction
+/// Load of a slide from its drive's line and air cuts in both directions (section 9, ii): in the direction
 /// of the calibration m I = W + R, against it |m| I' = |W| + R.
 struct SlideLoad {
   Estimate weight;    ///< [N] W, opposing the calibrated motion; negative: aids it
@@ -61,14 +61,14 @@ struct SlideLoad {
 SlideLoad slideLoad(const Line& calibration, double air_current, double air_current_reverse,
                     double current_std);
 
-/// Section 12: replications of one cut, seen by the dynamometer (the process alone) and by the current.
+/// Section 12: replications of one cut, measured by the dynamometer (process only) and by the current.
 struct VarianceSplit {
   double process_mean = 0.0, current_mean = 0.0;          ///< [N]
   double process_variance = 0.0, current_variance = 0.0;  ///< [N2]
-  double sensor_variance = 0.0;  ///< [N2] of the current's way of measuring: the difference, not below 0
+  double sensor_variance = 0.0;  ///< [N2] of the measurement by current: the difference, not below 0
   double f_means = 0.0;          ///< [1] F of the difference of the means (1 and 2 n - 2 degrees of freedom)
-  double p_means = 1.0;          ///< [1] chance of such an F without a difference
-  double p_variances = 1.0;      ///< [1] chance of such a ratio of variances without a difference, one-sided
+  double p_means = 1.0;          ///< [1] probability of such an F without a difference
+  double p_variances = 1.0;  ///< [1] probability of such a ratio of variances without a difference, one-sided
 };
 /// @throws Error with fewer than three replications on either side.
 VarianceSplit splitVariance(const std::vector<double>& dynamometer, const std::vector<double>& current);
@@ -79,16 +79,16 @@ struct Agreement {
   std::array<int, 3> count{};
 };
 
-/// RMSE is that of the two thirds of the prediction tests that took no part in a choice.
-/// Everything the paper does with one calibration and one prediction set.
+/// RMSE of the two thirds of the prediction tests that were not used for selection.
+/// All results of the paper for one calibration and one prediction set.
 struct TurningResult {
-  Line x, z;                                       ///< F = m I + c
-  Agreement regression;                            ///< of the prediction tests
-  Agreement anfis;                                 ///< Fy and Fz (0, 1, 2 as above; Fx: the line)
-  std::string fy_inputs, fz_inputs;                ///< the arrays that a third of the prediction tests chose
-  double fit_x = 0.0, fit_y = 0.0, fit_z = 0.0;    ///< R2 of the calibration
-  VarianceSplit fy, fz;                            ///< of the replications
-  std::array<std::vector<double>, 3> truth, told;  ///< [N] of the prediction tests, by regression
+  Line x, z;                                            ///< F = m I + c
+  Agreement regression;                                 ///< of the prediction tests
+  Agreement anfis;                                      ///< Fy and Fz (0, 1, 2 as above; Fx: the line)
+  std::string fy_inputs, fz_inputs;                     ///< the selected input arrays
+  double fit_x = 0.0, fit_y = 0.0, fit_z = 0.0;         ///< R2 of the calibration
+  VarianceSplit fy, fz;                                 ///< of the replications
+  std::array<std::vector<double>, 3> truth, predicted;  ///< [N] of the prediction tests, by regression
 };
 TurningResult studyTurning(unsigned seed, const TurningVariances& variances, std::size_t replications);
 

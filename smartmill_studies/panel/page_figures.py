@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""How late the panel's page is, in headless Chromium, and what it costs.
-usage: devel/env.sh smartmill_studies/panel/page_figures.py strips MINUTES      25.6 kHz x 6 before panel and page
+"""Latency and CPU load of the panel's page in headless Chromium.
+usage: devel/env.sh smartmill_studies/panel/page_figures.py strips MINUTES      25.6 kHz x 6 to panel and page
        devel/env.sh smartmill_studies/panel/page_figures.py what-if BAG N       N moves of sliders on a recorded session
 """
 import math
@@ -17,7 +17,7 @@ RATE, BLOCK = 25600.0, 256  # [Hz], [samples]
 SPEED = 418.879  # [rad/s]
 CLOCK_TICK = os.sysconf("SC_CLK_TCK")
 STRIPS = "window.smartmill.parts.find(p => p.strips)"
-# Two frames after a draw its picture is shown.
+# A drawing is displayed two frames later.
 WATCH_STRIPS = """((s) => { window.lags = []; const draw = s.draw.bind(s); s.draw = () => { draw();
   const newest = s.strips.filter(m => m.source === s.store.source).at(-1);
   if (!newest || newest === s.seen) return; s.seen = newest;
@@ -30,7 +30,7 @@ MOVE_SLIDER = """((k) => { const names = ['helix', 'feed', 'overhang', 'depth', 
 
 
 class Launch:
-    """A launch file of smartmill_launch at a master of its own."""
+    """A launch file of smartmill_launch with a separate master."""
 
     def __init__(self, file, *arguments):
         master = free_port()
@@ -77,25 +77,25 @@ def memory(process):  # [MB]
         return int(statm.read().split()[1]) * os.sysconf("SC_PAGESIZE") / 1e6
 
 
-def told(name, seconds):
+def report(name, seconds):
     ordered = sorted(seconds)
     print(f"{name}: median {1e3 * ordered[len(ordered) // 2]:.0f} ms, 99 % {1e3 * ordered[int(0.99 * len(ordered))]:.0f} ms, "
           f"largest {1e3 * ordered[-1]:.0f} ms, of {len(ordered)}")
 
 
-def show(page, url):
+def open_page(page, url):
     page.resize(1280, 800)
     while True:
         try:
             page.open(url)
             break
-        except AssertionError:  # the panel is not there yet
+        except AssertionError:  # the panel is not ready yet
             time.sleep(0.5)
     page.wait("!!window.smartmill")
 
 
 class Source(threading.Thread):
-    """Measured and compensated force of a machine that cuts, as blocks whose last sample is of now."""
+    """Measured and compensated force of a cutting machine, as blocks that end at the present time."""
 
     def __init__(self):
         super().__init__(daemon=True)
@@ -133,7 +133,7 @@ def strips(minutes):
     with Launch("panel.launch", f"port:={port}") as launch, Browser() as page:
         node = launch.node("panel_node")
         Source().start()
-        show(page, f"http://127.0.0.1:{port}/#forces")
+        open_page(page, f"http://127.0.0.1:{port}/#forces")
         page.wait(f"{STRIPS}?.strips.length > 20")
         page.js(f"{WATCH_STRIPS}({STRIPS})")
         browser = below(page.driver.pid)
@@ -146,7 +146,7 @@ def strips(minutes):
             if took >= 60.0 * minutes:
                 break
             time.sleep(min(30.0, 60.0 * minutes - took))
-        told("sample to drawn strip", page.js("window.lags"))
+        report("sample to drawn strip", page.js("window.lags"))
         print(f"node {100.0 * (cpu(node) - node_cpu) / took:.1f} % of a core, browser {100.0 * (sum(map(cpu, browser)) - page_cpu) / took:.1f} %, "
               f"{(page.js('window.smartmill.link.bytes') - bytes_before) / took / 1e3:.0f} kB/s, lost {page.js('window.smartmill.link.lost')}")
         print("errors of the page:", page.errors())
@@ -155,7 +155,7 @@ def strips(minutes):
 def what_if(bag, questions):
     port = free_port()
     with Launch("replay.launch", f"bag:={bag}", "panel:=true", f"panel_port:={port}", "stay:=true", "rate:=0"), Browser() as page:
-        show(page, f"http://127.0.0.1:{port}/#stability")
+        open_page(page, f"http://127.0.0.1:{port}/#stability")
         page.wait("window.smartmill.link.message('stability/chart') !== undefined", seconds=600)
         page.wait("(s => s && s.position >= s.length - 0.5)(window.smartmill.link.message('replay/state'))", seconds=1200)
         computed = []
@@ -163,8 +163,8 @@ def what_if(bag, questions):
             page.js(MOVE_SLIDER, k)
             page.wait(f"window.smartmill.parts.find(p => p.times).times.length > {k}")
             computed.append(float(page.text("#what-if-answer").rsplit("(", 1)[1].split()[0]) / 1e3)
-        told("slider to drawn chart", [t / 1e3 for t in page.js("window.smartmill.parts.find(p => p.times).times")])
-        told("computed in the node", computed)
+        report("slider to drawn chart", [t / 1e3 for t in page.js("window.smartmill.parts.find(p => p.times).times")])
+        report("computed in the node", computed)
         print(f"load {os.getloadavg()[0]:.1f}; errors of the page: {page.errors()}")
 
 

@@ -31,7 +31,7 @@ namespace {
 
 constexpr int SIZE = 2 * (ELEMENTS + 1);
 
-/// Squares of the angular frequencies, and shapes normalised to the mass.
+/// Squared angular frequencies and mass-normalised shapes.
 struct Shapes {
   Eigen::VectorXd squares;
   Eigen::MatrixXd shapes;

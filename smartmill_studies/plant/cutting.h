@@ -13,7 +13,7 @@
 
 namespace smartmill::plant {
 
-/// Where the teeth stand and how far they reach.
+/// Angles and radii of the teeth.
 struct Teeth {
   std::vector<double> angle;   // [rad] against tooth 1
   std::vector<double> radius;  // [m]
@@ -22,7 +22,7 @@ struct Teeth {
 
 Teeth teethOf(const Plant& plant, const Hidden& hidden);
 
-/// From a chip to the forces on a length of edge.
+/// Force law: forces per edge length from chip thickness.
 class Law {
  public:
   Law(const Plant& plant, const Hidden& hidden, const CampaignTest& test)
@@ -46,7 +46,7 @@ class Law {
                               -hidden("cutting_speed", "exponent"));
   }
 
-  /// What holds at a time: unsteadiness [1] of the chip coefficients, time since engagement [s].
+  /// Time-dependent inputs: factor [1] of the chip coefficients, time since engagement [s].
   void setTime(double unsteadiness, double in_cut) {
     now_ = chip_factor_ * (1.0 + unsteadiness);
     if (isOutside(plant_, "softer_with_time"))
@@ -86,10 +86,10 @@ struct Slab {
   double inset = 0.0;                // [m] of the radius
 };
 
-/// Up to a height; those of a round corner turn the normal by the same angle each.
+/// Slices up to a height; those of a round corner cover equal angles of the normal.
 std::vector<Slab> slabsOf(double corner_radius, double height, double thickness);
 
-/// Slices of the tool in the work.
+/// Slices of the tool in the workpiece.
 class Cutting {
  public:
   struct Result {
@@ -132,7 +132,7 @@ class Cutting {
         if (chip <= 0.0 || !inWork(tip, sin, local)) continue;
         const auto [ft, normal, fa] =
             law_.force(chip, (rate.x * sin + rate.y * cos) * slab.across, height, depth);
-        // Against the edge's normal and beside it.
+        // Against the normal of the edge, and perpendicular to it.
         const double fr = normal * slab.across - fa * slab.along, length = rise * slab.length;
         sum.force[0] += (-ft * cos - fr * sin) * length;
         sum.force[1] += (ft * sin - fr * cos) * length;
@@ -144,7 +144,8 @@ class Cutting {
   }
 
  private:
-  // The work reaches from R cos(exit) to R cos(entry) across the feed; a full slot has walls on both sides.
+  // The workpiece extends from R cos(exit) to R cos(entry) across the feed; a full slot has walls on both
+  // sides.
   bool inWork(const Point& tip, double sin, double radius) const {
     if (sin < 0.0) return false;
     const bool from_wall = cut_.entry <= 1e-9, to_wall = cut_.exit >= units::PI - 1e-9;

@@ -25,7 +25,7 @@ const T& oneOf(Random& random, const std::vector<T>& choices) {
   return choices[std::uniform_int_distribution<std::size_t>(0, choices.size() - 1)(random)];
 }
 
-// Steel block on a sensor's plate; springs so that the first mode across lies where dynamometers' do.
+// Steel block on a sensor plate, with springs that give a first lateral mode as of real dynamometers.
 Plate drawPlate(Random& random) {
   Plate p;
   p.mass = between(random, 10.0, 25.0);
@@ -84,7 +84,7 @@ Plant drawPlant(bool vibrating, Random& random) {
   return p;
 }
 
-// A value as it is believed: off by its uncertainty [percent].
+// A value as stated in the model: its error is drawn from its uncertainty [percent].
 double believed(double value, double percent, Random& random) {
   return value * (1.0 + percent / 100.0 * std::normal_distribution<double>()(random));
 }
@@ -98,7 +98,7 @@ Mode believedMode(double frequency, double damping_ratio, double gain, double ga
   return m;
 }
 
-// What a user of the machine has measured and read in tables.
+// The model of a user, from measurements and tables.
 MachineModel believedOf(const Plant& plant, Random& random) {
   MachineModel m;
   const Uncertainty u = m.uncertainty;
@@ -108,13 +108,13 @@ MachineModel believedOf(const Plant& plant, Random& random) {
     *value = believed(*value, u.cutting, random);
   m.cutting = c;
   for (std::size_t a = 0; a < 3; ++a) {
-    // The sensor's main mode along that axis; the rest of its response passes for direct.
+    // The main mode of the sensor along that axis; the rest of its response is taken as direct.
     const auto main = std::max_element(plant.sensor.begin(), plant.sensor.end(),
                                        [&](const SensorMode& x, const SensorMode& y) {
-                                         return x.driven[a] * x.shown[a] < y.driven[a] * y.shown[a];
+                                         return x.input[a] * x.output[a] < y.input[a] * y.output[a];
                                        });
     const Mode mode = believedMode(main->frequency, main->damping_ratio,
-                                   std::min(1.0, main->driven[a] * main->shown[a]), 0.0, u, random);
+                                   std::min(1.0, main->input[a] * main->output[a]), 0.0, u, random);
     m.force_sensor.axis[a].modes = {mode};
     m.force_sensor.axis[a].direct = 1.0 - mode.gain;
   }
@@ -135,7 +135,7 @@ MachineModel believedOf(const Plant& plant, Random& random) {
   return m;
 }
 
-/// How the machine is tested: the usual plan, or one of what people have instead.
+/// Test plan: the usual one or a common alternative.
 struct Plan {
   double sample_rate = 25600.0;
   bool taps = true, angle = true, few = false, moves = false;
@@ -226,8 +226,8 @@ std::vector<CampaignTest> testsOf(const Plan& plan, double depth) {
   return tests.all();
 }
 
-// Largest vibration of the tip over the last third against that of the second: above 1.3 a cut does not
-// settle.
+// Ratio of the largest tip vibration in the last third to that in the second: a cut with more than 1.3 does
+// not settle.
 double growth(const Plant& plant, const CampaignTest& test, std::uint64_t seed) {
   Random random(seed);
   RunOptions options;
@@ -259,7 +259,7 @@ bool vibrates(const Plant& plant) {
          });
 }
 
-// A depth at which every cut of the plan settles.
+// A depth at which all cuts of the plan settle.
 double depthFor(const Plant& plant, const Plan& plan, std::uint64_t seed) {
   if (!vibrates(plant)) return 2e-3;
   double depth = 1.5e-3;

@@ -12,12 +12,12 @@
 
 namespace smartmill::plant {
 
-/// One case of a bench: what is hidden, in a machine with a rigid or a vibrating tool.
+/// One case of a bench: the hidden effects, in a machine with a rigid or a vibrating tool.
 struct Case {
   std::string kind;                ///< single, pair, triple, none, outside
-  std::vector<std::string> names;  ///< effects of the catalogue; of an outside cause its kind
+  std::vector<std::string> names;  ///< effects of the catalogue, or the kind of an outside cause
   bool vibrating = false;
-  std::uint64_t seed = 0;  ///< everything else follows from it
+  std::uint64_t seed = 0;  ///< determines everything else
 };
 
 /// How many cases of each kind.
@@ -30,24 +30,24 @@ struct Counts {
 /// @param names effects to draw from
 std::vector<Case> drawCases(const Counts& counts, const std::vector<std::string>& names, std::uint64_t seed);
 
-/// A machine, what is believed of it and how it is tested.
+/// A machine, its nominal model and its tests.
 struct Drawn {
   Plant plant;
-  MachineModel nominal;  ///< with values off by their stated uncertainty, without what is hidden
+  MachineModel nominal;  ///< with errors drawn from the stated uncertainties, without the hidden effects
   Campaign campaign;     ///< tests; files are not written
   bool angle = true;     ///< the spindle angle is recorded
 };
 
 Drawn draw(const Case& hidden);
 
-/// Runs every test. @param second another draw of what differs from run to run (noise, unsteadiness, not the
+/// Runs every test. @param second new draw of the random parts (noise, coefficient scatter, but not the
 /// spindle's phase) @throws Error.
 std::vector<Record> runCampaign(const Drawn& drawn, const Case& hidden, bool second = false);
 
 /// Writes a campaign folder: model.yaml, campaign.yaml, records (one a test). @throws Error.
 void writeCampaignOf(const Drawn& drawn, const std::vector<Record>& records, const std::string& folder);
 
-/// What is hidden, as YAML (for the scorer). @throws Error.
+/// The hidden effects as YAML (for the scorer). @throws Error.
 void writeTruth(const Drawn& drawn, const std::string& file);
 
 }  // namespace smartmill::plant

@@ -7,7 +7,7 @@
 
 namespace smartmill::plant {
 
-/// Draws the spindle that a tool stands in; the tool is left as it is.
+/// Draws the spindle of a tool; the tool is not changed.
 inline void drawSpindle(std::mt19937_64& random, ToolInSpindle& tool) {
   const auto between = [&](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random);

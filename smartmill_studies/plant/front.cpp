@@ -14,12 +14,12 @@ Point operator-(const Point& a, const Point& b) {
   return {a.x - b.x, a.y - b.y};
 }
 
-// A tool that turns clockwise comes to b after a (less than half a turn apart).
+// A tool that rotates clockwise passes a before b (less than half a revolution apart).
 bool isLater(const Point& b, const Point& a) {
   return cross(a, b) < 0.0;
 }
 
-// Corners further than this behind the axis, in radii, are walls that no tooth reaches any more.
+// Distance behind the axis, in radii, beyond which no tooth reaches a corner.
 constexpr double FORGOTTEN = 0.3;
 
 }  // namespace
@@ -103,12 +103,13 @@ void Front::clip(Tooth& t, std::size_t begin, std::size_t next, const Point& tip
   };
   const auto outside = [&](std::size_t corner) { return cross(chord, pool_[corner].at - t.tip) > 0.0; };
   std::size_t corner = begin == END ? first_ : pool_[begin].after;
-  std::size_t kept = begin;  // the last corner that stays, on whose far side new ones come
-  if (t.depth <= 0.0) {      // into the work: corners before the crossing stay
+  std::size_t kept = begin;  // the last remaining corner, after which new ones are inserted
+  if (t.depth <= 0.0) {      // into the workpiece: corners before the crossing remain
     for (; corner != next && outside(corner); corner = pool_[corner].after) kept = corner;
     kept = insertAfter(kept, crossing());
   }
-  // Inside, what the chord leaves on the axis' side goes; with a tip still inside, all that was passed.
+  // Inside, the corners on the axis side of the chord are removed; if the tip is still inside, all corners
+  // passed.
   while (corner != next && (depth > 0.0 || !outside(corner))) {
     const std::size_t gone = corner;
     corner = pool_[corner].after;

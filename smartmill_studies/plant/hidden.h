@@ -42,7 +42,7 @@ class Hidden {
   const Plant& plant_;
 };
 
-/// Whether that cause outside the catalogue acts.
+/// Whether a cause outside the catalogue acts.
 inline bool isOutside(const Plant& plant, const std::string& kind) {
   return plant.outside && plant.outside->kind == kind;
 }

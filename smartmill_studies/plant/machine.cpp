@@ -30,7 +30,7 @@ class Tip {
   Point now() const {
     return sum([](const Oscillator& o, double) { return o.value(); });
   }
-  /// At the next step's end if the force [N] stays.
+  /// At the end of the next step with constant force [N].
   Point next() const {
     return sum([](const Oscillator& o, double p) { return o.valueIf(p); });
   }
@@ -60,7 +60,7 @@ class Tip {
   std::array<double, 3> force_{};
 };
 
-/// Angle of a spindle whose speed ripples, and how the chip coefficients scatter from turn to turn.
+/// Angle of a spindle with speed ripple, and scatter of the chip coefficients from revolution to revolution.
 class Turning {
  public:
   Turning(double speed, double phase, const Unsteadiness& u, Random& random)
@@ -77,7 +77,7 @@ class Turning {
            speed_ * (time - ripple_ / ripple_speed_ *
                                 (std::cos(ripple_speed_ * time + ripple_phase_) - std::cos(ripple_phase_)));
   }
-  /// [1] straight between the turns' own values
+  /// [1] linear between the values of the revolutions
   double unsteadiness(double angle) const {
     const double turns = angle / units::TWO_PI + 1000.0;
     const std::size_t whole = static_cast<std::size_t>(turns);
@@ -90,13 +90,13 @@ class Turning {
   std::array<double, 499> scatter_{};
 };
 
-// A blow of a hammer: fast rise, slower fall, 0.8 ms.
+// Force of a hammer hit: fast rise, slower fall, 0.8 ms.
 double blow(double peak, double since) {
   const double share = since / 0.8e-3;
   return share <= 0.0 || share >= 1.0 ? 0.0 : peak * 6.75 * share * (1.0 - share) * (1.0 - share);
 }
 
-// To and fro along each axis in turn, with rests between the strokes; jerk and its rate are continuous.
+// Forward and back along each axis in turn, with rests between the strokes; jerk and its rate are continuous.
 class AxisMoves {
  public:
   static constexpr double LENGTH = 0.8;  // [s]
@@ -171,7 +171,7 @@ class TestRun {
   double angle(double t) const { return turns() ? turning_.angle(t) : 0.0; }
   double hammer(double t) const { return isTap() ? blow(peak_, t - 5e-3) : 0.0; }
 
-  // The work as earlier revolutions of a tool at rest left it; its axis has come from behind.
+  // The surface as left by earlier revolutions of a tool without vibration.
   void prepareWork() {
     cutting_.emplace(plant_, hidden_, test_, options_.slice, test_.spindle_speed * step_);
     engage_ = test_.engage_time.value_or(0.0);
@@ -198,14 +198,14 @@ class TestRun {
     force[test_.direction == "y" ? 1 : test_.direction == "z" ? 2 : 0] += hammer(t);
     sensor_.step(force);
     if (drive_) drive_->step(chip.torque);
-    const std::array<double, 3> shown = sensor_.shown();
-    chain_.feed({shown[0], shown[1], shown[2], drive_ ? drive_->value() : 0.0});
+    const std::array<double, 3> output = sensor_.output();
+    chain_.feed({output[0], output[1], output[2], drive_ ? drive_->value() : 0.0});
   }
 
   double normal(double rms) { return options_.noise ? rms * normal_(random_) : 0.0; }
 
   void show(double t) {
-    const Channels c = chain_.shown(t, angle(t));
+    const Channels c = chain_.output(t, angle(t));
     time_.push_back(t);
     angles_.push_back(std::fmod(angle(t), units::TWO_PI));
     for (std::size_t a = 0; a < 3; ++a)
@@ -260,7 +260,7 @@ class TestRun {
   std::vector<Noise> noise_;
   std::normal_distribution<double> normal_;
   std::optional<Cutting> cutting_;
-  double engage_ = 0.0, feed_ = 0.0, came_ = 0.0;  // [s], [m/s], [m] of the axis until engagement
+  double engage_ = 0.0, feed_ = 0.0, came_ = 0.0;  // [s], [m/s], [m] travel of the axis until engagement
   std::vector<double> time_, angles_, hammer_, load_, tip_x_, tip_y_;
   std::array<std::vector<double>, 3> force_, axes_;
 };
@@ -285,8 +285,8 @@ Plant plantOf(const MachineModel& model) {
       SensorMode mode;
       mode.frequency = m.frequency;
       mode.damping_ratio = m.damping_ratio;
-      mode.driven[a] = m.gain;
-      mode.shown[a] = 1.0;
+      mode.input[a] = m.gain;
+      mode.output[a] = 1.0;
       p.sensor.push_back(mode);
     }
   }

@@ -19,26 +19,26 @@ struct Outside {
   std::string kind;     ///< one of outsideKinds()
   std::string channel;  ///< fx, fy, fz of those that act on a channel
   double size = 0.0;    ///< [N] on a channel, else [1]
-  double place = 0.0;   ///< [Hz], order, [s] or [m], as the kind says
+  double place = 0.0;   ///< [Hz], order, [s] or [m], depending on the kind
 };
 
 /// tone (place [Hz]), settling (place [s]) and half_order on a channel; bursts (place [s] between them);
 /// curve: a channel reads f (1 + size |f| / 1 kN); kink: specific force falls by size above a chip of place
 /// [m]; softer_with_time: chip coefficients 1 + size exp(-t / place) from engagement; hard_skin: the
-/// uppermost place [m] of the depth costs 1 + size; lost_corner: the lowest place [m] of one tooth's edge is
-/// gone.
+/// uppermost place [m] of the depth has coefficients 1 + size; lost_corner: the lowest place [m] of one
+/// tooth's edge is missing.
 const std::vector<std::string>& outsideKinds();
 
-/// What a real machine has a little of and no model says.
+/// Small imperfections of real machines that no model contains.
 struct Unsteadiness {
   double coefficient_scatter = 0.0;  ///< [1] of the chip coefficients from revolution to revolution
   double speed_ripple = 0.0;         ///< [1] of the spindle's speed, at a frequency of its own
   double noise_colour = 0.0;         ///< [1] share of the noise's power below 300 Hz (first order)
 };
 
-/// A milling machine that mills, measures and is known to nobody. It shares file formats with the product and
-/// no physics: chips are cut from polygons (front.h), structures follow the recurrence of Nigam and Jennings,
-/// the tool may be a beam (beam.h), the sensor a plate (plate.h).
+/// An independent milling machine with measurement. It shares file formats with the product but no physics:
+/// chips are cut from polygons (front.h), structures follow the recurrence of Nigam and Jennings, the tool
+/// may be a beam (beam.h), the sensor a plate (plate.h).
 struct Plant {
   ToolGeometry tool;
   CuttingCoefficients cutting;
@@ -50,11 +50,11 @@ struct Plant {
   double tip_noise = 5e-8;                         ///< [m]
   std::optional<Spindle> spindle;
   Unsteadiness unsteadiness;
-  std::vector<EffectEntry> effects;  ///< of the catalogue, done by the plant's own means
+  std::vector<EffectEntry> effects;  ///< of the catalogue, implemented independently of the twin
   std::optional<Outside> outside;
 };
 
-/// A plant that is just what a model says, for comparison with others.
+/// A plant equal to a model, for comparison with other programs.
 Plant plantOf(const MachineModel& model);
 
 struct RunOptions {
@@ -66,11 +66,11 @@ struct RunOptions {
   bool noise = true;
 };
 
-/// Length of a record of that kind [samples]. In a move each axis goes to and fro in turn while the spindle
-/// stands still.
+/// Length of a record of a kind [samples]. In a move each axis travels forward and back in turn with the
+/// spindle stopped.
 std::size_t samplesOf(const CampaignTest& test);
 
-/// Runs one test and measures.
+/// Runs one test. @return its record
 Record run(const Plant& plant, const CampaignTest& test, const RunOptions& options, std::mt19937_64& random);
 
 }  // namespace smartmill::plant

@@ -28,7 +28,7 @@ inline std::size_t channelNumber(const std::string& name) {
   return static_cast<std::size_t>(at - names.begin());
 }
 
-/// From the force on the sensor to what its channels show.
+/// Force sensor: from applied forces to channels.
 class Sensor {
  public:
   Sensor(const Plant& plant, const Hidden& hidden, double rpm, double step) : direct_(plant.sensor_direct) {
@@ -38,16 +38,16 @@ class Sensor {
       SensorMode extra;
       extra.frequency = e->numbers.at("frequency_hz");
       extra.damping_ratio = e->numbers.at("damping_ratio");
-      extra.driven[a] = e->numbers.at("gain");
-      extra.shown[a] = 1.0;
+      extra.input[a] = e->numbers.at("gain");
+      extra.output[a] = 1.0;
       modes.push_back(extra);
-      direct_[a] -= extra.driven[a];
+      direct_[a] -= extra.input[a];
     }
     const double loaded = 1.0 / std::sqrt(1.0 + hidden("mass_loading", "mass_ratio"));
     const double softened = 1.0 - hidden("speed_dependent_mode", "softening_per_krpm") * rpm / 1000.0;
     for (std::size_t a = 0; a < 3; ++a) {
       const auto main = std::find_if(modes.begin(), modes.end(),
-                                     [&](const SensorMode& m) { return m.driven[a] * m.shown[a] > 0.3; });
+                                     [&](const SensorMode& m) { return m.input[a] * m.output[a] > 0.3; });
       if (main != modes.end()) main->frequency *= loaded * softened;
     }
     for (const SensorMode& m : modes) modes_.emplace_back(Oscillator(m.frequency, m.damping_ratio, step), m);
@@ -56,13 +56,13 @@ class Sensor {
   void step(const std::array<double, 3>& force) {
     force_ = force;
     for (auto& [oscillator, mode] : modes_)
-      oscillator.step(mode.driven[0] * force[0] + mode.driven[1] * force[1] + mode.driven[2] * force[2]);
+      oscillator.step(mode.input[0] * force[0] + mode.input[1] * force[1] + mode.input[2] * force[2]);
   }
-  std::array<double, 3> shown() const {
+  std::array<double, 3> output() const {
     std::array<double, 3> sum{};
     for (std::size_t a = 0; a < 3; ++a) {
       sum[a] = direct_[a] * force_[a];
-      for (const auto& [oscillator, mode] : modes_) sum[a] += mode.shown[a] * oscillator.value();
+      for (const auto& [oscillator, mode] : modes_) sum[a] += mode.output[a] * oscillator.value();
     }
     return sum;
   }
@@ -100,7 +100,7 @@ class Drive {
   double speed_, friction_ = 0.0, keep_ = 0.0, value_ = 0.0;
 };
 
-/// What stands on a sensor besides the cut.
+/// Forces on the sensor other than cutting forces.
 class Disturbance {
  public:
   Disturbance(const Hidden& hidden, double speed)
@@ -164,7 +164,7 @@ class Chain {
       gain_[channelNumber(e->words.at("channel"))] *= e->numbers.at("gain");
   }
 
-  /// Every step: cross-talk and gains, which delays come after.
+  /// Called every step: crosstalk and gains, before the delays.
   void feed(const Channels& c) {
     Channels mixed = c;
     for (std::size_t a = 0; a < 3; ++a)
@@ -174,8 +174,8 @@ class Chain {
     while (late_.size() > longest_) late_.pop_front();
   }
 
-  /// What is written at this instant, without noise. @param angle [rad] of the spindle
-  Channels shown(double time, double angle) const {
+  /// The recorded values of this instant, without noise. @param angle [rad] of the spindle
+  Channels output(double time, double angle) const {
     Channels c = late_.back();
     if (delayed_) {
       for (std::size_t k = 0; k < c.size(); ++k) c[k] = lateValue(k);
@@ -224,7 +224,7 @@ class Chain {
   double speed_, step_, hum_phase_, own_phase_;
   std::array<double, 4> delay_{};
   bool delayed_ = false;
-  std::size_t longest_ = 0;  // steps that the latest channel needs
+  std::size_t longest_ = 0;  // delay of the slowest channel [steps]
   std::array<std::array<double, 3>, 3> cross_talk_{};
   Channels gain_{1.0, 1.0, 1.0, 1.0};
   std::deque<Channels> late_;

@@ -2,8 +2,8 @@
 
 namespace smartmill::plant {
 
-/// q'' + 2 zeta w q' + w^2 q = w^2 p: at rest q = p. Exact from step to step for a p that is straight between
-/// them (recurrence of Nigam and Jennings, 1969).
+/// q'' + 2 zeta w q' + w^2 q = w^2 p: at rest q = p. Exact at the steps for a piecewise linear p (recurrence
+/// of Nigam and Jennings, 1969).
 class Oscillator {
  public:
   /// @param frequency [Hz], undamped @param damping_ratio [1] 0..1 @param step [s]
@@ -11,7 +11,7 @@ class Oscillator {
 
   double value() const { return value_; }
   double rate() const { return rate_; }
-  /// Value at the step's end if p goes to this; nothing moves.
+  /// Value at the end of a step to p, without advancing the state.
   double valueIf(double p) const { return value_ * a_ + rate_ * b_ + p_ * c_ + p * d_; }
   double rateIf(double p) const { return value_ * e_ + rate_ * f_ + p_ * g_ + p * h_; }
   void step(double p);

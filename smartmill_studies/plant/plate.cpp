@@ -9,7 +9,7 @@
 namespace smartmill::plant {
 namespace {
 
-// What a point of the plate moves along x, y, z with the plate's six coordinates (shift, small turns).
+// Displacement of a point of the plate along x, y, z by its six coordinates (translations, small rotations).
 Eigen::Matrix<double, 3, 6> motionAt(const std::array<double, 3>& r) {
   Eigen::Matrix<double, 3, 6> m;
   m << 1, 0, 0, 0, r[2], -r[1], 0, 1, 0, -r[2], 0, r[0], 0, 0, 1, r[1], -r[0], 0;
@@ -24,15 +24,15 @@ std::vector<SensorMode> modesOf(const Plate& p) {
   inertia << p.mass, p.mass, p.mass, p.mass / 12.0 * (s[1] * s[1] + s[2] * s[2]),
       p.mass / 12.0 * (s[0] * s[0] + s[2] * s[2]), p.mass / 12.0 * (s[0] * s[0] + s[1] * s[1]);
   const Eigen::Matrix3d spring = Eigen::Vector3d(p.stiffness[0], p.stiffness[1], p.stiffness[2]).asDiagonal();
-  Eigen::MatrixXd stiffness = Eigen::MatrixXd::Zero(6, 6), shown = Eigen::MatrixXd::Zero(3, 6);
+  Eigen::MatrixXd stiffness = Eigen::MatrixXd::Zero(6, 6), output = Eigen::MatrixXd::Zero(3, 6);
   for (const double x : {-p.springs[0], p.springs[0]}) {
     for (const double y : {-p.springs[1], p.springs[1]}) {
       const Eigen::Matrix<double, 3, 6> m = motionAt({x, y, -p.springs[2]});
       stiffness += m.transpose() * spring * m;
-      shown += spring * m;
+      output += spring * m;
     }
   }
-  const Eigen::MatrixXd driven = motionAt(p.force_point);
+  const Eigen::MatrixXd input = motionAt(p.force_point);
   const Eigen::VectorXd root = inertia.cwiseSqrt().cwiseInverse();
   const linear::SymmetricEigensystem modes =
       linear::symmetricEigensystem(root.asDiagonal() * stiffness * root.asDiagonal());
@@ -44,8 +44,8 @@ std::vector<SensorMode> modesOf(const Plate& p) {
     mode.frequency = std::sqrt(square) / units::TWO_PI;
     mode.damping_ratio = p.damping_ratio;
     for (int a = 0; a < 3; ++a) {
-      mode.driven[a] = driven.row(a).dot(shape) / square;
-      mode.shown[a] = shown.row(a).dot(shape);
+      mode.input[a] = input.row(a).dot(shape) / square;
+      mode.output[a] = output.row(a).dot(shape);
     }
     found.push_back(mode);
   }

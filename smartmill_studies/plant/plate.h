@@ -5,11 +5,11 @@
 
 namespace smartmill::plant {
 
-/// One mode of a force sensor: what drives it and what it shows.
+/// One mode of a force sensor.
 struct SensorMode {
   double frequency = 0.0;                   ///< [Hz]
   double damping_ratio = 0.0;               ///< [1]
-  std::array<double, 3> driven{}, shown{};  ///< static response of channel c to force a: shown[c] driven[a]
+  std::array<double, 3> input{}, output{};  ///< static response of channel c to force a: output[c] input[a]
 };
 
 /// A plate dynamometer: a rigid plate on four equal three-axis springs at its corners; the channels add up
@@ -18,7 +18,7 @@ struct Plate {
   double mass = 0.0;                  ///< [kg]
   std::array<double, 3> size{};       ///< [m] of a homogeneous block
   std::array<double, 3> stiffness{};  ///< [N/m] of each spring along x, y, z
-  std::array<double, 3> springs{};    ///< [m] x, y half distances of the springs; z how far below the centre
+  std::array<double, 3> springs{};    ///< [m] x, y half distances of the springs; z distance below the centre
   std::array<double, 3> force_point{};  ///< [m] from the plate's centre
   double damping_ratio = 0.0;           ///< [1]
 };

@@ -10,8 +10,8 @@ namespace smartmill::stability {
 namespace {
 
 constexpr double HIGHEST = 20e3;  // [Hz] of the modes
-constexpr double COUNTS = 0.003;  // [1] of the softest mode's compliance: stiffer ones limit no cut
-constexpr int DRAWS = 100;        // behind a probability
+constexpr double COUNTS = 0.003;  // [1] of the softest mode's compliance: stiffer modes are ignored
+constexpr int DRAWS = 100;        // per probability
 
 double between(std::mt19937_64& random, double low, double high) {
   return std::uniform_real_distribution<double>(low, high)(random);
@@ -33,7 +33,7 @@ ModalModel trueModes(const plant::ToolInSpindle& tool) {
   return model;
 }
 
-/// A positive quantity as it is measured, log-normal with the deviation given.
+/// Measured value of a positive quantity: log-normal with a standard deviation.
 double measured(double value, double share, std::mt19937_64& random) {
   const double log_std = std::sqrt(std::log1p(share * share));
   return value * std::exp(log_std * std::normal_distribution<double>()(random));

@@ -16,12 +16,12 @@
 namespace smartmill::stability {
 namespace {
 
-constexpr int SAMPLES = 180, SUBSTEPS = 2;  // a programmed revolution
-constexpr int PLACES = 8;                   // a tooth passing at which the tip is looked at
-constexpr int QUIET = 25;                   // revolutions that repeat: the chatter has ended
+constexpr int SAMPLES = 180, SUBSTEPS = 2;  // per programmed revolution
+constexpr int PLACES = 8;                   // evaluated tip positions per tooth passing
+constexpr int QUIET = 25;                   // repeating revolutions after which the chatter has ended
 constexpr std::size_t BLOCK = 256;
 constexpr double FEED = 0.1e-3;  // [m] per tooth
-constexpr double STILL = 0.05;   // [1] of the feed per tooth: change of the motion that is none
+constexpr double STILL = 0.05;   // [1] of the feed per tooth: changes of the motion below it are ignored
 constexpr double ANGLE_EVERY = 0.005, STATE_EVERY = 0.02;  // [s]
 
 /// Whether the tip's motion repeats with the tooth passing, revolution by revolution, at any speed.
@@ -31,12 +31,12 @@ class Repetition {
 
   /// @param angle [rad] turned @param tip [m]
   void at(double angle, const std::array<double, 2>& tip) {
-    const double shown = angle * places_ / units::TWO_PI;
-    const auto place = static_cast<long>(shown);
-    if (place > place_ && shown > shown_)
-      look(place, tip, (static_cast<double>(place) - shown_) / (shown - shown_));
+    const double travelled = angle * places_ / units::TWO_PI;
+    const auto place = static_cast<long>(travelled);
+    if (place > place_ && travelled > last_travelled_)
+      evaluate(place, tip, (static_cast<double>(place) - last_travelled_) / (travelled - last_travelled_));
     place_ = place;
-    shown_ = shown;
+    last_travelled_ = travelled;
     tip_ = tip;
   }
   bool repeats(std::size_t turn) const { return std::sqrt(change_[turn]) < STILL * FEED; }
@@ -49,8 +49,8 @@ class Repetition {
   }
 
  private:
-  /// At a place between the step before and this one.
-  void look(long place, const std::array<double, 2>& tip, double share) {
+  /// Interpolated between the last step and this one.
+  void evaluate(long place, const std::array<double, 2>& tip, double share) {
     const auto turn = static_cast<std::size_t>(place / places_);
     if (change_.size() <= turn) change_.resize(turn + 1, 0.0);
     std::array<double, 2>& before = last_[static_cast<std::size_t>(place % PLACES)];
@@ -62,13 +62,13 @@ class Repetition {
 
   int places_;
   long place_ = 0;
-  double shown_ = 0.0;                 // [places] turned at the step before
+  double last_travelled_ = 0.0;        // [positions] at the last step
   std::array<double, 2> tip_{{0, 0}};  // [m] then
   std::vector<std::array<double, 2>> last_;
   std::vector<double> change_;
 };
 
-/// A machine that cuts, what is measured of it and what is done about it.
+/// A cutting machine with its measurement and control.
 class ControlledCut {
  public:
   ControlledCut(const MachineModel& truth, const MachineModel& model, const RegenerativeSystem& believed,
@@ -86,7 +86,7 @@ class ControlledCut {
             options.control.spindle_low * cut.speed, options.control.spindle_high * cut.speed, believed.teeth,
             [believed](const CuttingCondition&) { return believed; }, [](const ChatterAdvice&) {},
             [this](const ChatterAdvice& advice) {
-              // What follows, limits for people to read, nobody waits for.
+              // The following limits are only for display.
               control_.handle(advice);
               const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - judging_;
               cut_.thinking += passed.count();
@@ -131,7 +131,7 @@ class ControlledCut {
   }
 
  private:
-  /// The spindle follows its override, the feed at once.
+  /// The spindle follows its override with limited acceleration, the feed at once.
   void turn() {
     if (asked_ && time_ >= taken_at_) {
       wanted_ = asked_->spindle * cut_.speed;
@@ -183,8 +183,8 @@ class ControlledCut {
     advisor_.handle(state);
     const auto request = control_.takeRequest();
     if (!request) return;
-    if (cut_.moves++ == 0) cut_.asked = turned_ / units::TWO_PI;
-    cut_.said = request->reason;
+    if (cut_.moves++ == 0) cut_.requested = turned_ / units::TWO_PI;
+    cut_.reason = request->reason;
     cut_.spindle = request->spindle;
     cut_.feed = request->feed;
     cut_.next_speed = request->next_speed;
@@ -193,7 +193,7 @@ class ControlledCut {
     taken_at_ = time_ + options_.reaction;
   }
 
-  /// Nothing more will happen: it has been quiet since the last move, or the control has given up.
+  /// The cut is decided: stable since the last override, or the control has given up.
   bool done() const {
     if (asked_ || cut_.moves == 0 || repetition_.turns() < 1) return false;
     const auto since = static_cast<double>(repetition_.turns()) - taken_at_ * cut_.speed / units::TWO_PI;
@@ -230,7 +230,7 @@ class ControlledCut {
   double feed_ = 1.0, fed_ = 0.0;                                           // [1], [m]
 };
 
-/// [1] of the programmed removal rate, of who halves the depth until the machine is stable.
+/// [1] of the programmed removal rate, by an operator who halves the depth until the cut is stable.
 double halved(const FloquetSolver& truth, const ControlCut& cut) {
   double share = 1.0;
   while (truth.multiplier(cut.speed, share * cut.depth).radius() > 1.0 && share > 1e-3) share *= 0.5;
@@ -243,13 +243,13 @@ std::vector<ControlCut> controlStudy(const MachineModel& model, const Regenerati
                                      const ControlOptions& options,
                                      const std::function<void(double)>& progress) {
   options.validate();
-  if (options.cuts < 1) throw Error("cuts: at least 1 is due");
+  if (options.cuts < 1) throw Error("cuts: expected at least 1");
   const UncertainSystem belief = UncertainSystem::of(model, system);
   std::mt19937_64 random(options.seed);
   std::uniform_real_distribution<double> unit;
   std::vector<ControlCut> cuts;
   for (int tries = 0; static_cast<int>(cuts.size()) < options.cuts; ++tries) {
-    if (tries > 100 * options.cuts + 1000) throw Error("control study: no cuts that chatter are found");
+    if (tries > 100 * options.cuts + 1000) throw Error("control study: no cuts with chatter found");
     ControlCut cut;
     cut.speed = options.speed_low + (options.speed_high - options.speed_low) * unit(random);
     const double share = 1.2 + 0.8 * unit(random);
@@ -259,14 +259,14 @@ std::vector<ControlCut> controlStudy(const MachineModel& model, const Regenerati
     if (!std::isfinite(cut.limit)) continue;
     cut.depth = share * cut.limit;
     if (truth->multiplier(cut.speed, cut.depth).radius() <= 1.05) continue;
-    cut.asked = std::numeric_limits<double>::quiet_NaN();
+    cut.requested = std::numeric_limits<double>::quiet_NaN();
     ControlledCut(machineOf(model, drawn), model, system, options, cut,
                   options.seed + 31u * static_cast<unsigned>(cuts.size()))
         .run();
     cut.careful = halved(*truth, cut);
     cut.next_stable =
         cut.next_speed > 0.0 && truth->multiplier(cut.next_speed, cut.next_depth).radius() < 1.0;
-    // Whose next cut chatters again has to halve the depth as well.
+    // If the next cut chatters too, the depth is halved as well.
     cut.removal = cut.end()         ? cut.feed
                   : cut.next_stable ? cut.next_speed * cut.next_depth / (cut.speed * cut.depth)
                                     : cut.careful;

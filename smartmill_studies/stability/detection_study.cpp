@@ -15,9 +15,9 @@ namespace {
 constexpr int SAMPLES = 180, REVOLUTIONS = 150, AIR = 10, LATE = 60;
 constexpr std::size_t BLOCK = 256;
 constexpr double FEED = 0.1e-3;  // [m] per tooth
-constexpr double STILL = 0.05;   // [1] of the feed per tooth: change of the motion that is none
+constexpr double STILL = 0.05;   // [1] of the feed per tooth: changes of the motion below it are ignored
 
-/// Up to three channels of a record as the detector's sensor gives them.
+/// Up to three channels of a record as from the sensor of the detector.
 std::vector<std::vector<double>> signalOf(const Record& record, const std::string& kind, double rate) {
   if (kind == "force") return {record.column("fx"), record.column("fy"), record.column("fz")};
   std::vector<std::vector<double>> acceleration;
@@ -28,8 +28,8 @@ std::vector<std::vector<double>> signalOf(const Record& record, const std::strin
     acceleration.push_back(a);
   }
   if (kind == "vibration") return acceleration;
-  if (kind != "sound") throw Error("signal " + kind + ": force, vibration or sound is due");
-  // A body that shakes as a whole radiates pressure in step with its acceleration; the microphone hears both
+  if (kind != "sound") throw Error("signal " + kind + ": expected force, vibration or sound");
+  // A rigid vibrating body radiates pressure in proportion to its acceleration; the microphone records both
   // axes.
   std::vector<double> pressure(acceleration[0].size());
   for (std::size_t i = 0; i < pressure.size(); ++i)
@@ -37,7 +37,7 @@ std::vector<std::vector<double>> signalOf(const Record& record, const std::strin
   return {pressure};
 }
 
-/// The last turns of a record, whole periods.
+/// The last revolutions of a record, complete periods.
 std::vector<std::vector<double>> lateOf(std::vector<std::vector<double>> signal, std::size_t period) {
   const std::size_t count = LATE * static_cast<std::size_t>(SAMPLES) / period * period;
   for (std::vector<double>& channel : signal)
@@ -45,7 +45,7 @@ std::vector<std::vector<double>> lateOf(std::vector<std::vector<double>> signal,
   return signal;
 }
 
-/// Of the noise of each channel. The force's is in the record already.
+/// Noise RMS of each channel; that of the force is already in the record.
 std::vector<double> noiseOf(const std::vector<std::vector<double>>& signal, const DetectionOptions& options) {
   std::vector<double> sigma;
   for (const std::vector<double>& channel : signal) {
@@ -56,7 +56,7 @@ std::vector<double> noiseOf(const std::vector<std::vector<double>>& signal, cons
   return sigma;
 }
 
-/// The record through the detector.
+/// Runs the detector over the record.
 std::vector<ChatterState> verdicts(const std::vector<std::vector<double>>& signal, const DetectionCut& cut,
                                    const MachineModel& model, const DetectionOptions& options, double rate,
                                    unsigned seed) {
@@ -73,7 +73,7 @@ std::vector<ChatterState> verdicts(const std::vector<std::vector<double>>& signa
     block.channels.push_back("channel_" + std::to_string(c));
     block.units.emplace_back("1");
   }
-  // Then the tool leaves the stock at once and the sensors see their noise alone.
+  // Then the tool leaves the stock and the sensors contain only noise.
   const std::size_t total = cutting + static_cast<std::size_t>(AIR * SAMPLES);
   for (std::size_t i = 0; i < total; ++i) {
     const double t = static_cast<double>(i) / rate;
@@ -90,14 +90,14 @@ std::vector<ChatterState> verdicts(const std::vector<std::vector<double>>& signa
   return states;
 }
 
-/// Cuts clearly below and clearly above their limit, by turns.
+/// Cuts clearly below and clearly above their limit, alternating.
 std::vector<DetectionCut> drawCuts(const RegenerativeSystem& system, const DetectionOptions& options) {
   const auto solver = makeFloquetSolver(Method::collocation, system);
   std::mt19937_64 random(options.seed);
   std::uniform_real_distribution<double> unit;
   std::vector<DetectionCut> cuts;
   for (int tries = 0; static_cast<int>(cuts.size()) < options.cuts; ++tries) {
-    if (tries > 100 * options.cuts + 1000) throw Error("detection study: no cuts beside the limit are found");
+    if (tries > 100 * options.cuts + 1000) throw Error("detection study: no cuts near the limit found");
     DetectionCut cut;
     cut.speed = options.speed_low + (options.speed_high - options.speed_low) * unit(random);
     const double limit = solver->limit(cut.speed, options.max_depth).depth;
@@ -107,7 +107,7 @@ std::vector<DetectionCut> drawCuts(const RegenerativeSystem& system, const Detec
     cut.depth = limit * (below ? 0.4 + 0.5 * share : 1.2 + 0.8 * share);
     const auto at = solver->at(cut.speed);
     cut.radius = at->multiplier(cut.depth).radius();
-    // Beyond a first loss a pocket may follow; ask for clear cases.
+    // A pocket may follow the first loss of stability: only clear cases are used.
     const bool clear = (at->multiplier(1.1 * cut.depth).radius() > 1.0) == cut.chattersBySolver() &&
                        (at->multiplier(0.9 * cut.depth).radius() > 1.0) == cut.chattersBySolver();
     if (clear) cuts.push_back(cut);
@@ -115,7 +115,7 @@ std::vector<DetectionCut> drawCuts(const RegenerativeSystem& system, const Detec
   return cuts;
 }
 
-/// The truth about the motion, from a record without noise and effects. @param period in samples
+/// True motion, from a record without noise and effects. @param period in samples
 void observe(const Record& record, int samples, int period, const std::string& signal, DetectionCut& cut) {
   const double rate = samples * cut.speed / units::TWO_PI;
   cut.chatters = repeatsNoMore(record, samples, period, FEED);
@@ -138,18 +138,18 @@ void observe(const Record& record, int samples, int period, const std::string& s
   cut.frequency = strongestLine(lateOf(signalOf(record, signal, rate), turn), turn, rate);
 }
 
-/// What the detector made of it.
+/// Result of the detector.
 void take(const std::vector<ChatterState>& states, DetectionCut& cut) {
   for (const ChatterState& s : states) {
     if (!s.valid) continue;
     cut.alternation = std::max(cut.alternation, s.alternation);
     cut.energy = std::max(cut.energy, s.energy_ratio);
   }
-  const auto seen = episodes(states);
-  if (seen.empty()) return;
+  const auto detections = episodes(states);
+  if (detections.empty()) return;
   cut.found = true;
-  cut.detected = seen.front().detected;
-  cut.found_frequency = seen.back().frequency;
+  cut.detected = detections.front().detected;
+  cut.found_frequency = detections.back().frequency;
 }
 
 }  // namespace
@@ -158,8 +158,8 @@ std::vector<DetectionCut> detectionStudy(const MachineModel& model, const Regene
                                          const DetectionOptions& options,
                                          const std::function<void(double)>& progress) {
   options.validate();
-  if (options.cuts < 1) throw Error("cuts: at least 1 is due");
-  if (!(options.signal_noise >= 0.0)) throw Error("signal noise: at least 0 is due");
+  if (options.cuts < 1) throw Error("cuts: expected at least 1");
+  if (!(options.signal_noise >= 0.0)) throw Error("signal noise: expected at least 0");
   std::vector<DetectionCut> cuts = drawCuts(system, options);
   const int samples = wholeTeeth(SAMPLES, system.teeth);
   std::vector<TwinCut> plan;
@@ -170,8 +170,8 @@ std::vector<DetectionCut> detectionStudy(const MachineModel& model, const Regene
       if (progress) progress(done + 0.5 * share);
     };
   };
-  // First without noise and effects. Runout repeats every revolution, and a flip of an even number of teeth
-  // does so too; with teeth that are alike the tooth's period shows it.
+  // First without noise and effects. Runout repeats every revolution, as does a flip with an even number of
+  // teeth; with equal teeth sampling by the tooth period reveals the flip.
   MachineModel plain = model;
   plain.effects.clear();
   const int period = system.evenPitch() ? samples / system.teeth : samples;

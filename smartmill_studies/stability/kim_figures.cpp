@@ -16,7 +16,7 @@ std::vector<std::vector<double>> history(const TurningTrace& trace) {
   return rows;
 }
 
-/// Figures 4 and 5: motion of the tool against the work, one panel a run.
+/// Figures 4 and 5: motion of the tool relative to the workpiece, one panel per run.
 void drawHistory(const std::string& png,
                  const std::vector<std::pair<std::string, const TurningTrace*>>& runs) {
   Gnuplot plot(png, 900, 80 + 370 * static_cast<int>(runs.size()), 12);
@@ -33,7 +33,7 @@ void drawHistory(const std::string& png,
   plot.draw();
 }
 
-/// Figures 6 and 7: what was learnt by the end of a segment.
+/// Figures 6 and 7: estimates at the end of a segment.
 void drawTransfer(const std::string& png, const std::string& title, const KimRun& kim, std::size_t segment,
                   const SecondOrder& learnt, const SecondOrder& truth, const SecondOrder& printed) {
   std::vector<std::vector<double>> lines, curves;

@@ -7,8 +7,8 @@
 
 namespace smartmill::stability {
 
-/// Kim's machine free, under this package's control, and under his own update, and his figures 4 to 7 of
-/// them.
+/// Kim's machine without control, with the control of this package and with his update, and his figures 4 to
+/// 7 of them.
 struct KimFigures {
   SecondOrder truth{0.1, 350.0, 0.02};
   TurningTrace free, ours;

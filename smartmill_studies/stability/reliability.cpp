@@ -43,8 +43,8 @@ std::array<double, 2> wilson(int k, int n) {
 std::vector<ReliabilityPoint> reliabilityStudy(const MachineModel& model, const RegenerativeSystem& system,
                                                const ReliabilityOptions& options,
                                                const std::function<void(double)>& progress) {
-  if (options.machines < 1) throw Error("machines: at least 1 is due");
-  if (options.draws < 1) throw Error("draws: at least 1 is due");
+  if (options.machines < 1) throw Error("machines: expected at least 1");
+  if (options.draws < 1) throw Error("draws: expected at least 1");
   options.validate();
   const UncertainSystem belief = UncertainSystem::of(model, system);
   const auto nominal = makeSolver(Method::collocation, system);
@@ -54,7 +54,7 @@ std::vector<ReliabilityPoint> reliabilityStudy(const MachineModel& model, const 
   std::vector<MachineModel> machines;
   std::vector<TwinCut> cuts;
   for (int tries = 0; static_cast<int>(points.size()) < options.machines; ++tries) {
-    if (tries > 50 * options.machines + 100) throw Error("reliability: no speed with a limit is found");
+    if (tries > 50 * options.machines + 100) throw Error("reliability: no speed with a limit found");
     ReliabilityPoint p;
     p.speed = options.speed_low + (options.speed_high - options.speed_low) * unit(random);
     const double limit = nominal->limit(p.speed, options.max_depth).depth;
@@ -80,7 +80,8 @@ std::vector<ReliabilityPoint> reliabilityStudy(const MachineModel& model, const 
     runTwinCuts(
         machines, cuts, {{"tool_x", "tool_y"}},
         [&](std::size_t i, const Record& record) {
-          points[i].seen = repeatsNoMore(record, samples, period, cuts[i].engagement.feed_per_tooth);
+          points[i].observed_chatter =
+              repeatsNoMore(record, samples, period, cuts[i].engagement.feed_per_tooth);
         },
         [&](double share) {
           if (progress) progress(0.5 + 0.5 * share);
@@ -97,7 +98,7 @@ std::vector<ReliabilityBin> reliabilityBins(const std::vector<ReliabilityPoint>&
         found[static_cast<std::size_t>(std::min(bins - 1, static_cast<int>(p.predicted * bins)))];
     ++bin.count;
     bin.predicted += p.predicted;
-    bin.observed += by_twin ? p.seen : p.chatters;
+    bin.observed += by_twin ? p.observed_chatter : p.chatters;
   }
   for (ReliabilityBin& bin : found) {
     if (bin.count == 0) continue;
@@ -113,7 +114,7 @@ std::vector<ReliabilityBin> reliabilityBins(const std::vector<ReliabilityPoint>&
 double reliabilityScore(const std::vector<ReliabilityPoint>& points, bool by_twin) {
   double difference = 0.0, variance = 0.0;
   for (const ReliabilityPoint& p : points) {
-    difference += (by_twin ? p.seen : p.chatters) - p.predicted;
+    difference += (by_twin ? p.observed_chatter : p.chatters) - p.predicted;
     variance += p.predicted * (1.0 - p.predicted);
   }
   return variance > 0.0 ? difference / std::sqrt(variance) : 0.0;

@@ -15,19 +15,19 @@ MachineModel machineOf(const MachineModel& model, const RegenerativeSystem& draw
 
 struct ReliabilityOptions : StudyRange {
   int machines = 200;
-  int draws = 200;      ///< [1] behind each prediction
-  bool by_twin = true;  ///< each machine cuts once in the simulator
+  int draws = 200;      ///< [1] per prediction
+  bool by_twin = true;  ///< one simulated cut per machine
 };
 
-/// One machine drawn from the belief, with a cut at a random speed near the believed limit.
+/// One machine drawn from the model, with a cut at a random speed near the limit of the model.
 struct ReliabilityPoint {
   double speed = 0.0, depth = 0.0;  ///< [rad/s], [m]
-  double predicted = 0.0;           ///< [1] probability of chatter by the belief
-  bool chatters = false;            ///< what the drawn machine does in the solver's sense
-  bool seen = false;                ///< and in the simulator's records
+  double predicted = 0.0;           ///< [1] probability of chatter by the model
+  bool chatters = false;            ///< of the drawn machine by the solver
+  bool observed_chatter = false;    ///< and by the simulator
 };
 
-/// Predicted against observed share in one bin.
+/// Predicted and observed share in one bin.
 struct ReliabilityBin {
   int count = 0;
   double predicted = 0.0;        ///< [1] mean
@@ -36,17 +36,17 @@ struct ReliabilityBin {
   bool holds() const { return count == 0 || (predicted >= low && predicted <= high); }
 };
 
-/// Machines drawn from the model's standard deviations, each cut once.
+/// Machines drawn from the standard deviations of the model, with one cut each.
 std::vector<ReliabilityPoint> reliabilityStudy(const MachineModel& model, const RegenerativeSystem& system,
                                                const ReliabilityOptions& options,
                                                const std::function<void(double)>& progress = {});
 
-/// Bins of equal width in the predicted probability. @param by_twin observed: seen, else chatters
+/// Bins of equal width in the predicted probability. @param by_twin observed: observed_chatter, else chatters
 std::vector<ReliabilityBin> reliabilityBins(const std::vector<ReliabilityPoint>& points, int bins,
                                             bool by_twin);
 
-/// Standard score of the number of chattering machines against the sum of the predictions: 0 +- 1 when
-/// honest.
+/// Standard score of the number of chattering machines relative to the sum of the predictions: 0 +- 1 if
+/// calibrated.
 double reliabilityScore(const std::vector<ReliabilityPoint>& points, bool by_twin);
 
 /// Wilson's interval of a share k of n at 95 %.

@@ -66,7 +66,7 @@ class Shop {
   }
   void background(double level) { add(noise(sound_.size()), level); }
 
-  /// Orders of the turn, and a bearing whose tone is none of them; the speed rises over the first seconds.
+  /// Spindle orders and a bearing tone that is not an order; the speed rises over the first seconds.
   void spindle(double speed, double level, double run_up = 0.0) {
     std::vector<double> gain, phase;
     constexpr int ORDERS = 14;
@@ -104,7 +104,7 @@ class Shop {
     add(hiss, level, from);
   }
 
-  /// What the cut sounds like, of unit size, in place.
+  /// Sound of the cut with unit amplitude, in place.
   std::vector<double> heard(const std::vector<double>& cut) {
     std::vector<double> sum(cut.size(), 0.0);
     const auto mix = [&](const std::vector<double>& part, double gain) {
@@ -114,7 +114,7 @@ class Shop {
     std::vector<double> scaled = cut;
     for (double& v : scaled) v /= size;
     mix(scaled, 0.6);
-    // Chips, and the noise of the load, ring in machine and room.
+    // Chip noise and load noise through resonances of machine and workshop.
     std::vector<double> chips = noise(cut.size());
     for (std::size_t i = 0; i < chips.size(); ++i) chips[i] *= 0.3 + std::abs(scaled[i]);
     for (int k = 0; k < 3; ++k) {
@@ -141,7 +141,7 @@ class Shop {
   std::vector<double> sound_;
 };
 
-/// Pressure of a record of the tip, which goes with its acceleration, at the microphone's rate.
+/// Pressure from the tip acceleration of a record, at the rate of the microphone.
 std::vector<double> pressureOf(const Record& record, double rate) {
   const std::vector<double>&x = record.column("tool_x"), &y = record.column("tool_y");
   std::vector<double> slow(x.size(), 0.0);
@@ -219,17 +219,17 @@ std::vector<SoundScene> soundScenes(const MachineModel& model, const Regenerativ
     SoundScene scene;
     scene.kind = kind;
     for (int tries = 0;; ++tries) {
-      if (tries > 1000) throw Error("sound scenes: no cuts beside the limit are found");
+      if (tries > 1000) throw Error("sound scenes: no cuts near the limit found");
       scene.speed = range.speed_low + (range.speed_high - range.speed_low) * unit(random);
       const double limit = solver->limit(scene.speed, range.max_depth).depth, share = unit(random);
       if (!std::isfinite(limit)) continue;
       scene.depth = limit * (chatters(kind) ? 1.2 + 0.8 * share : 0.4 + 0.4 * share);
-      // A flip of an even number of teeth is not what is asked here.
+      // Flips with an even number of teeth are excluded.
       const CharacteristicMultiplier m = solver->multiplier(scene.speed, scene.depth);
       if ((m.radius() > 1.02) == chatters(kind) && (m.radius() > 1.0) == chatters(kind)) break;
     }
     const bool off = kind == SoundKind::speed_error || kind == SoundKind::chatter_shop;
-    scene.told_speed = scene.speed * (1.0 + (off ? 0.015 : 0.003) * (2.0 * unit(random) - 1.0));
+    scene.stated_speed = scene.speed * (1.0 + (off ? 0.015 : 0.003) * (2.0 * unit(random) - 1.0));
     if (cuts(kind)) {
       const int turns = static_cast<int>(CUT * scene.speed / units::TWO_PI);
       plan.push_back({scene.speed, {system.entry, system.exit, scene.depth, FEED}, samples, turns, 0});

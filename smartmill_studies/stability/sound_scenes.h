@@ -11,19 +11,19 @@
 
 namespace smartmill::stability {
 
-/// What is heard in a shop.
+/// Kinds of sound in a workshop.
 enum class SoundKind {
-  idle,            ///< a spindle that turns in air: orders of its turn, a bearing, noise
+  idle,            ///< spindle in air: its orders, a bearing, noise
   broadband,       ///< coolant and air, switched on and off
   other_machine,   ///< tones of another machine throughout, the spindle idles
   run_up,          ///< the spindle runs up, then idles
-  stable,          ///< strong tooth passings, chip noise through resonances, while it cuts
-  stable_tone,     ///< the same beside another machine's tones, without any air in the recording
-  speed_error,     ///< stable, the spindle turns otherwise than is told
+  stable,          ///< stable cut: strong tooth passing, chip noise through resonances
+  stable_tone,     ///< the same with tones of another machine, without air in the recording
+  speed_error,     ///< stable, with a wrong stated speed
   interrupted,     ///< stable, several short cuts
   chatter,         ///< 1.2 .. 2 times the limit
-  chatter_no_air,  ///< the same without any air in the recording
-  chatter_shop,    ///< chatter beside another machine's tones, and another speed than told
+  chatter_no_air,  ///< the same without air in the recording
+  chatter_shop,    ///< chatter with tones of another machine and a wrong stated speed
   chatter_interrupted
 };
 std::vector<SoundKind> soundKinds();
@@ -32,15 +32,15 @@ const char* nameOf(SoundKind kind);
 struct SoundScene {
   SoundKind kind{};
   Recording recording;
-  double told_speed = 0.0;  ///< [rad/s]
-  double speed = 0.0;       ///< [rad/s]
-  double depth = 0.0;       ///< [m]
-  bool chatters = false;    ///< the tip's motion in the simulator repeats no more
+  double stated_speed = 0.0;  ///< [rad/s]
+  double speed = 0.0;         ///< [rad/s]
+  double depth = 0.0;         ///< [m]
+  bool chatters = false;      ///< the simulated tip motion does not repeat
 };
 
-/// Scenes made by a generator that knows nothing of who judges them: the cut is simulated in the time domain
-/// (smartmill_sim), its sound goes with the tip's acceleration through resonances of machine and room; the
-/// rest is synthesised. @param speeds range of the spindle and largest depth
+/// Scenes from a generator that is independent of the detector: the cut is simulated in the time domain
+/// (smartmill_sim), its sound is the tip acceleration through resonances of machine and workshop; the rest is
+/// synthesised. @param speeds range of the spindle and largest depth
 std::vector<SoundScene> soundScenes(const MachineModel& model, const RegenerativeSystem& system,
                                     const StudyRange& range, const std::vector<SoundKind>& kinds);
 

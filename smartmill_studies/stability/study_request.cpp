@@ -8,13 +8,13 @@
 namespace smartmill::stability {
 
 void StudyRange::validate() const {
-  if (!(speed_low > 0.0) || !(speed_high > speed_low)) throw Error("speeds: 0 < low < high is due");
-  if (!(max_depth > 0.0)) throw Error("largest depth: above 0 is due");
+  if (!(speed_low > 0.0) || !(speed_high > speed_low)) throw Error("speeds: expected 0 < low < high");
+  if (!(max_depth > 0.0)) throw Error("largest depth: expected above 0");
 }
 
 void StudyRequest::addTo(CommandLine& line) {
   CutRequest::addTo(line, "LO:HI");
-  line.option("--max-depth-mm", max_depth_mm, "limits are looked for up to here [mm]").required();
+  line.option("--max-depth-mm", max_depth_mm, "largest depth of the search for limits [mm]").required();
   line.option("--seed", seed, "of the draws (1)");
 }
 
@@ -28,7 +28,7 @@ StudyRange StudyRequest::range() const {
   double low = 0.0, high = 0.0;
   char rest = 0;
   if (std::sscanf(speeds.c_str(), "%lf:%lf%c", &low, &high, &rest) != 2)
-    throw Error("--speeds " + speeds + ": LO:HI is due");
+    throw Error("--speeds " + speeds + ": expected LO:HI");
   return {units::radPerSecFromRpm(low), units::radPerSecFromRpm(high), max_depth_mm * units::MM, seed};
 }
 

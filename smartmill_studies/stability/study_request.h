@@ -7,7 +7,7 @@
 
 namespace smartmill::stability {
 
-/// What every study of this folder is asked on its command line: a machine, an arc, a range.
+/// Command line options of every study in this folder: machine, arc, range.
 struct StudyRequest : CutRequest {
   double max_depth_mm = 0.0;
   unsigned seed = 1;
@@ -16,7 +16,7 @@ struct StudyRequest : CutRequest {
 
   /// @throws Error on a model without a tool.
   MachineModel machine() const;
-  /// @throws Error on speeds that are not LO:HI.
+  /// @throws Error on speeds other than LO:HI.
   StudyRange range() const;
 };
 

@@ -18,7 +18,7 @@ using Complex = std::complex<double>;
 using units::TWO_PI;
 constexpr int LENGTH = 512, SEGMENT_SAMPLES = 2048;  // at 1 ms
 constexpr double LINE = TWO_PI * 1000.0 / LENGTH;    // [rad/s]
-constexpr double LOW = 200.0, HIGH = 500.0;          // [rad/s] where the machine is looked for
+constexpr double LOW = 200.0, HIGH = 500.0;          // [rad/s] search range of the machine's mode
 
 SampleBlock commandBlock(std::uint64_t index, double rate, double value) {
   SampleBlock block;
@@ -108,9 +108,9 @@ TurningLoop kimLoop(double logarithm) {
   loop.lathe.spindle_speed = TWO_PI / process.period;
   loop.lathe.chip = process.chip;
   loop.control.controller.chip = process.chip;
-  // A block is sampled, and some are on their way, before the first command of it can act.
+  // Delay of a command: one block is sampled and others are in transit.
   loop.control.controller.lead = static_cast<double>(loop.block * (loop.way + 1)) / loop.lathe.rate;
-  // Of a second order servo well below its frequency: 2 zeta / w.
+  // Delay of a second-order servo well below its natural frequency: 2 zeta / w.
   loop.control.controller.actuator_delay =
       2.0 * loop.lathe.servo_damping / (TWO_PI * loop.lathe.servo_frequency);
   return loop;
@@ -145,8 +145,8 @@ SecondOrder readOff(const std::vector<double>& frequency, const std::vector<Comp
 
 namespace {
 
-/// A segment's estimates, those before it known. @param tool_before spectra of tool over chip of the segment
-/// before, then of this
+/// Estimates of a segment from those before it. @param tool_before spectra of tool over chip of the last
+/// segment, then of this one
 KimSegment kimSegment(const std::vector<double>& chips, const std::vector<double>& deflections,
                       const std::vector<double>& tools, const std::vector<KimSegment>& earlier,
                       std::vector<Complex>* tool_before) {
@@ -170,7 +170,7 @@ KimSegment kimSegment(const std::vector<double>& chips, const std::vector<double
     }
   }
   segment.read = readOff(segment.frequency, segment.used, LOW, HIGH);
-  // K / K_m is that of the first estimate throughout (section 4).
+  // K / K_m remains that of the first estimate (section 4).
   if (!earlier.empty()) segment.read.gain = earlier.front().read.gain;
   *tool_before = tool_now;
   return segment;

@@ -9,20 +9,21 @@
 
 namespace smartmill::stability {
 
-/// The twin's lathe under the product's control, block by block as the nodes exchange them, without a clock.
+/// The simulated lathe with the control of the product, block by block as between the nodes, without wall
+/// time.
 struct TurningLoop {
   sim::LatheTraits lathe;
   ControlStreamParameters control;
   bool controlled = true;
   std::size_t block = 50;   ///< samples published together
-  std::size_t way = 2;      ///< blocks that a command is late: transport and computing
+  std::size_t way = 2;      ///< delay of a command in blocks: transport and computing
   double duration = 6.144;  ///< [s]
 };
 
 struct TurningTrace {
   std::vector<double> time, motion, deflection, force;  ///< [s], [m], [m], [N]
   std::vector<LearntMachine> learnt;
-  std::uint64_t late = 0;  ///< commands that came after their sample
+  std::uint64_t late = 0;  ///< commands that arrived after their sample
 
   /// Root mean square of the motion about its mean [m], from begin to end [s].
   double vibration(double begin, double end) const;
@@ -31,11 +32,11 @@ struct TurningTrace {
 TurningTrace runTurning(const TurningLoop& loop);
 
 /// Kim's machine (K/K_m 0.1, damping 0.02, 350 rad/s) at a speed at which the free vibration grows by
-/// exp(logarithm) a segment of 2.048 s, with the lead that the way of the blocks needs.
+/// exp(logarithm) per segment of 2.048 s, with the lead that compensates the delay of the blocks.
 TurningLoop kimLoop(double logarithm);
 
 /// Kim's own update (eq. 11 to 16), line by line: G_j = G_j-1 + (Y_w - Y_t)_j-1 / (Y_t,j-1 - Y_t,j-2) (G_j-1
-/// - G_j-2), and the second order system that is read off its peak and half-power width, as he states them.
+/// - G_j-2), and the second-order system from its peak and half-power width, as he states.
 /// The first two estimates are the plain ratio of the spectra of deflection and chip.
 struct KimSegment {
   std::vector<double> frequency;                  ///< [rad/s]
@@ -46,7 +47,7 @@ struct KimRun {
   std::vector<KimSegment> segments;
   TurningTrace trace;
 };
-/// The same lathe under Kim's controller, which gets every sample at once (block and way are not read).
+/// The same lathe with Kim's controller, which gets every sample without delay (block and way are not used).
 KimRun runKim(const TurningLoop& loop);
 
 /// Peak and half-power width of a receptance about its largest line between two frequencies [rad/s].

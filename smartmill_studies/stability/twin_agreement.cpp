@@ -10,10 +10,9 @@
 namespace smartmill::stability {
 namespace {
 
-constexpr int SAMPLES = 180;  // a revolution, rounded up to a multiple of the teeth
-constexpr int WINDOW = 25;    // revolutions: longer than the beats of a quasi-periodic motion
-constexpr double GONE =
-    1e-3;  // [1] of the scale: what the start threw up has died out, a record has six digits
+constexpr int SAMPLES = 180;   // per revolution, rounded up to a multiple of the teeth
+constexpr int WINDOW = 25;     // revolutions: longer than the beats of a quasi-periodic motion
+constexpr double GONE = 1e-3;  // [1] of the scale: the initial transient has decayed; a record has six digits
 
 }  // namespace
 
@@ -22,10 +21,10 @@ void AgreementOptions::validate() const {
     if (!good) throw Error(std::string("agreement: ") + what);
   };
   StudyRange::validate();
-  due(band >= 0.0 && band < 0.5, "a band of 0..50 % is due");
-  due(feed > 0.0, "a feed per tooth above 0 is due");
-  due(points >= 1, "at least one point is due");
-  due(revolutions >= 4 * WINDOW, "at least 100 revolutions are due");
+  due(band >= 0.0 && band < 0.5, "expected a band of 0..50 %");
+  due(feed > 0.0, "expected a feed per tooth above 0");
+  due(points >= 1, "expected at least one point");
+  due(revolutions >= 4 * WINDOW, "expected at least 100 revolutions");
 }
 
 bool repeatsNoMore(const Record& record, int samples, int period, double scale) {
@@ -61,9 +60,9 @@ std::vector<AgreementPoint> agreementWithTwin(const MachineModel& model, const R
   std::vector<AgreementPoint> points;
   std::vector<TwinCut> cuts;
   const int samples = wholeTeeth(SAMPLES, system.teeth);
-  // Where no speed has a limit no point would ever be found.
+  // Ends the search if no speed has a limit.
   for (int tries = 0; static_cast<int>(points.size()) < options.points; ++tries) {
-    if (tries > 100 * options.points + 1000) throw Error("agreement: no points outside the band are found");
+    if (tries > 100 * options.points + 1000) throw Error("agreement: no points outside the band found");
     AgreementPoint p;
     p.speed = options.speed_low + (options.speed_high - options.speed_low) * unit(random);
     const Limit limit = places->limit(p.speed, options.max_depth);
@@ -74,7 +73,7 @@ std::vector<AgreementPoint> agreementWithTwin(const MachineModel& model, const R
     const CharacteristicMultiplier m = at->multiplier(p.depth);
     p.radius = m.radius();
     p.kind = m.kind();
-    // Outside the band: deeper and shallower by it are alike.
+    // Outside the band: the stability is the same at the depth plus and minus the band.
     bool alike = true;
     for (const double side : {1.0 - options.band, 1.0 + options.band})
       alike = alike && (at->multiplier(side * p.depth).radius() > 1.0) == p.chatters();
@@ -87,7 +86,7 @@ std::vector<AgreementPoint> agreementWithTwin(const MachineModel& model, const R
   runTwinCuts(
       {model}, cuts, {{"tool_x", "tool_y"}},
       [&](std::size_t i, const Record& record) {
-        points[i].seen = repeatsNoMore(record, samples, period, options.feed);
+        points[i].observed_chatter = repeatsNoMore(record, samples, period, options.feed);
       },
       progress);
   return points;

@@ -11,7 +11,7 @@
 namespace smartmill::stability {
 
 struct AgreementOptions : StudyRange {
-  double band = 0.05;    ///< [1] of the depth around the boundary, no points there
+  double band = 0.05;    ///< [1] of the depth, excluded around the boundary
   double feed = 0.1e-3;  ///< [m] per tooth
   int points = 400;
   int revolutions = 180;  ///< [1] in cut
@@ -26,20 +26,20 @@ struct AgreementPoint {
   double radius = 0.0;  ///< [1] of the dominant multiplier
   double limit = 0.0;   ///< [m] first loss of stability at this speed
   Kind kind = Kind::none;
-  bool seen = false;  ///< the simulated record chatters
+  bool observed_chatter = false;  ///< the simulated record chatters
   bool chatters() const { return radius > 1.0; }
-  bool agrees() const { return chatters() == seen; }
+  bool agrees() const { return chatters() == observed_chatter; }
 };
 
-/// Once-per-period sampling of a record of a steady cut: whether what does not repeat with a period of so
-/// many samples stays or grows over the second half. @param scale [m] of what counts: a twentieth will not
-/// die any more, a thousandth has died.
+/// Once-per-period sampling of a record of a steady cut: whether the part that does not repeat with a period
+/// [samples] persists or grows over the second half. @param scale [m] a twentieth of it counts as persistent,
+/// a thousandth as decayed.
 bool repeatsNoMore(const Record& record, int samples, int period, double scale);
 
-/// Random points outside the band, uniform in speed and in depth over the first limit (0.4 .. 1.6): stable or
-/// not by the default solver and by the simulator's records.
-/// @param system of the model (helix, pitch, arc); with a chip geometry its contact counts, and the first
-/// limits from which points are drawn stay those of the system without (they take longer)
+/// Random points outside the band, uniform in speed and in depth over the first limit (0.4 .. 1.6): stability
+/// by the default solver and by the simulated records.
+/// @param system of the model (helix, pitch, arc); with a chip geometry its contact is used; the first
+/// limits, from which points are drawn, are those without it (for speed)
 std::vector<AgreementPoint> agreementWithTwin(const MachineModel& model, const RegenerativeSystem& system,
                                               const AgreementOptions& options,
                                               const std::function<void(double)>& progress = {});

@@ -12,7 +12,7 @@
 namespace smartmill::stability {
 namespace {
 
-/// Between two samples tooth 1 stands at +y: a sample (or a step of the simulator, a quarter of one) right at
+/// Tooth 1 passes +y between two samples: a sample (or a step of the simulator, a quarter of it) exactly at
 /// an entry would be in or out of cut by rounding.
 constexpr double BETWEEN = 0.137;  // [1] of a sample
 
@@ -26,7 +26,7 @@ CampaignTest testOf(const TwinCut& cut) {
   return test;
 }
 
-/// Sample times and columns that the simulator fills.
+/// Sample times and columns, filled by the simulator.
 Record planned(const TwinCut& cut, const std::vector<std::string>& columns) {
   const double turn = units::TWO_PI / cut.speed;
   Record record;
@@ -42,7 +42,7 @@ void runTwinCuts(const std::vector<MachineModel>& models, const std::vector<Twin
                  const TwinRequest& request, const std::function<void(std::size_t, const Record&)>& judge,
                  const std::function<void(double)>& progress) {
   if (models.size() != 1 && models.size() != cuts.size())
-    throw Error("simulator: one machine or one a cut is due");
+    throw Error("simulator: expected one model or one per cut");
   const auto simulated = [&](std::size_t i) {
     sim::SimulationOptions options;
     options.noise = request.noise;

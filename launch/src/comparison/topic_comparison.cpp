@@ -44,10 +44,10 @@ std::string TopicDifference::text(const std::string& topic) const {
   };
   add(first_only, "only in the first");
   add(second_only, "only in the second");
-  if (!missing.empty()) out += " (the first of them: " + missing + ")";
-  add(contradictions, "that contradict themselves");
-  add(first_ends, "of the first beyond the other's ends");
-  add(second_ends, "of the second beyond the other's ends");
+  if (!missing.empty()) out += " (first: " + missing + ")";
+  add(contradictions, "contradictory within one recording");
+  add(first_ends, "of the first outside the time of the second");
+  add(second_ends, "of the second outside the time of the first");
   return out;
 }
 
@@ -56,12 +56,12 @@ TopicComparison::TopicComparison(double slack)
 }
 
 void TopicComparison::addFirst(ResultRecord record) {
-  const auto place = first_.find(record.key);
-  if (place == first_.end()) {
+  const auto existing = first_.find(record.key);
+  if (existing == first_.end()) {
     std::string key = record.key;
     first_.emplace(std::move(key), std::move(record));
-  } else if (!equal(place->second, record)) {
-    ++found_.contradictions;
+  } else if (!equal(existing->second, record)) {
+    ++difference_.contradictions;
   }
 }
 
@@ -72,27 +72,27 @@ void TopicComparison::addSecond(const ResultRecord& record) {
     return;
   }
   const ResultRecord& other = match->second;
-  // A result that was said again (to a late listener) counts once; said differently, it is a difference.
-  const bool again = !seen_.insert(record.key).second;
-  if (!again) ++found_.common;
+  // A repeated result (latched topic) counts once; a repetition that differs is a difference.
+  const bool repeated = !matched_.insert(record.key).second;
+  if (!repeated) ++difference_.common;
   common_from_ = std::min(common_from_, record.stamp);
   common_to_ = std::max(common_to_, record.stamp);
   const std::size_t size = std::min(record.values.size(), other.values.size());
   for (std::size_t i = 0; i < size; ++i) {
     const double a = other.values[i], b = record.values[i];
-    if (std::isfinite(a)) found_.scale = std::max(found_.scale, std::abs(a));
+    if (std::isfinite(a)) difference_.scale = std::max(difference_.scale, std::abs(a));
     if (equal(a, b)) continue;
-    found_.largest = std::max(found_.largest, std::isfinite(a - b) ? std::abs(a - b) : INFINITE);
+    difference_.largest = std::max(difference_.largest, std::isfinite(a - b) ? std::abs(a - b) : INFINITE);
   }
   if (equal(other, record)) return;
-  ++found_.different;
-  if (found_.where.empty()) found_.where = record.key;
+  ++difference_.different;
+  if (difference_.where.empty()) difference_.where = record.key;
 }
 
 TopicDifference TopicComparison::result() const {
-  TopicDifference difference = found_;
+  TopicDifference difference = difference_;
   double earliest = INFINITE;
-  const auto sortOut = [&](const std::string& key, double stamp, std::size_t& within, std::size_t& ends) {
+  const auto classify = [&](const std::string& key, double stamp, std::size_t& within, std::size_t& ends) {
     const bool begin = stamp < common_from_ && stamp >= common_from_ - slack_;
     const bool end = stamp > common_to_ && stamp <= common_to_ + slack_;
     ++(begin || end ? ends : within);
@@ -101,10 +101,10 @@ TopicDifference TopicComparison::result() const {
     difference.missing = key;
   };
   for (const auto& [key, record] : first_) {
-    if (!seen_.count(key)) sortOut(key, record.stamp, difference.first_only, difference.first_ends);
+    if (!matched_.count(key)) classify(key, record.stamp, difference.first_only, difference.first_ends);
   }
   for (const auto& [key, stamp] : second_only_) {
-    sortOut(key, stamp, difference.second_only, difference.second_ends);
+    classify(key, stamp, difference.second_only, difference.second_ends);
   }
   return difference;
 }

@@ -6,7 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "session/shown.h"
+#include "session/number_text.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
 
@@ -15,14 +15,14 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double SHOWS_NOTHING = 1.05;  // [1] gap; by chance it varies by some hundredths
-constexpr double BETTER = 0.98;         // [1] of the gap, from which on another model is worth having
-constexpr double SAME_ANGLE = 1e-3;     // [rad]
+constexpr double NO_DISAGREEMENT = 1.05;  // [1] gap; by chance it varies by some hundredths
+constexpr double BETTER = 0.98;           // [1] of the gap, below which another model is an improvement
+constexpr double SAME_ANGLE = 1e-3;       // [rad]
 
 Explained::Effect effectOf(const Json& json) {
   Explained::Effect effect;
   effect.name = json.at("name");
-  // A cause without a name is told by where it acts and its form.
+  // An empirical residual model is described by its stage and form.
   for (const char* key : {"stage", "form"}) {
     if (json.contains(key)) effect.parameters.push_back({key, 0.0, 0.0, json.at(key)});
   }
@@ -31,18 +31,18 @@ Explained::Effect effectOf(const Json& json) {
   return effect;
 }
 
-Explained::Wanted wantedOf(const Json& report) {
+Explained::SuggestedTest suggestedTestOf(const Json& report) {
   const Json& json = report.at("suggested_cut");
-  Explained::Wanted wanted;
-  wanted.text = report.at("suggested_test");
-  wanted.cut = json.at("kind") == "cut";
-  wanted.speed = units::radPerSecFromRpm(json.at("spindle_speed_rpm"));
-  if (!wanted.cut) return wanted;
-  wanted.engagement.feed_per_tooth = units::MM * json.at("feed_per_tooth_mm").get<double>();
-  wanted.engagement.axial_depth = units::MM * json.at("axial_depth_mm").get<double>();
-  wanted.engagement.entry = units::radFromDeg(json.at("entry_deg"));
-  wanted.engagement.exit = units::radFromDeg(json.at("exit_deg"));
-  return wanted;
+  Explained::SuggestedTest suggested_test;
+  suggested_test.text = report.at("suggested_test");
+  suggested_test.cut = json.at("kind") == "cut";
+  suggested_test.speed = units::radPerSecFromRpm(json.at("spindle_speed_rpm"));
+  if (!suggested_test.cut) return suggested_test;
+  suggested_test.engagement.feed_per_tooth = units::MM * json.at("feed_per_tooth_mm").get<double>();
+  suggested_test.engagement.axial_depth = units::MM * json.at("axial_depth_mm").get<double>();
+  suggested_test.engagement.entry = units::radFromDeg(json.at("entry_deg"));
+  suggested_test.engagement.exit = units::radFromDeg(json.at("exit_deg"));
+  return suggested_test;
 }
 
 Explained explainedOf(const Json& report) {
@@ -54,17 +54,17 @@ Explained explainedOf(const Json& report) {
     for (const Json& name : pair) text += (text.empty() ? "" : " or ") + name.get<std::string>();
     e.rivals.push_back(text);
   }
-  if (report.contains("suggested_cut")) e.wanted = wantedOf(report);
+  if (report.contains("suggested_cut")) e.suggested_test = suggestedTestOf(report);
   const Json& gap = report.at("gap");
-  const auto number = [&gap](const char* when, const char* over) {
-    return gap.at(when).at(over).get<double>();
+  const auto number = [&gap](const char* when, const char* tests) {
+    return gap.at(when).at(tests).get<double>();
   };
-  // Of few tests none is held out (0), or one in air, which shows nothing.
-  const char* const over = number("before", "heldout") > SHOWS_NOTHING ? "heldout" : "fit";
-  e.gap_before = number("before", over);
-  e.gap_after = number("after", over);
+  // With few tests none is held out (gap 0), or only an air cut, which shows no disagreement.
+  const char* const tests = number("before", "heldout") > NO_DISAGREEMENT ? "heldout" : "fit";
+  e.gap_before = number("before", tests);
+  e.gap_after = number("after", tests);
   e.better = number("after", "fit") < BETTER * number("before", "fit") &&
-             number("after", "heldout") <= SHOWS_NOTHING * number("before", "heldout");
+             number("after", "heldout") <= NO_DISAGREEMENT * number("before", "heldout");
   return e;
 }
 
@@ -84,24 +84,26 @@ Explained readExplained(const std::string& file) {
   }
 }
 
-session::PlannedCut planWanted(const session::CutPlanner& planner, const Explained::Wanted& wanted,
-                               const session::SlotWish& frame, double air_time) {
-  if (!wanted.cut) {
-    session::PlannedCut air = planner.air(wanted.speed, air_time);
-    air.condition.name = frame.name;
+session::PlannedCut planSuggestedTest(const session::CutPlanner& planner,
+                                      const Explained::SuggestedTest& suggested_test,
+                                      const session::SlotRequest& slot, double air_time) {
+  if (!suggested_test.cut) {
+    session::PlannedCut air = planner.air(suggested_test.speed, air_time);
+    air.condition.name = slot.name;
     return air;
   }
-  const Engagement& e = wanted.engagement;
+  const Engagement& e = suggested_test.engagement;
   if (e.entry > SAME_ANGLE || std::abs(e.exit - units::PI) > SAME_ANGLE) {
-    throw Error(frame.name + ": from " + session::shown(units::degFromRad(e.entry), 0) + " to " +
-                session::shown(units::degFromRad(e.exit), 0) + " deg, only full slots are cut here");
+    throw Error(slot.name + ": from " + session::numberText(units::degFromRad(e.entry), 0) + " to " +
+                session::numberText(units::degFromRad(e.exit), 0) +
+                " deg, expected a full slot (0 to 180 deg)");
   }
-  session::SlotWish wish = frame;
-  planner.needLanes(wish.lane + 1, "the next slot's place is used up");
-  wish.speed = wanted.speed;
-  wish.depth = e.axial_depth;
-  wish.feed_per_tooth = e.feed_per_tooth;
-  return planner.slot(wish);
+  session::SlotRequest request = slot;
+  planner.requireLanes(request.lane + 1, "no lane is left for the suggested test");
+  request.speed = suggested_test.speed;
+  request.depth = e.axial_depth;
+  request.feed_per_tooth = e.feed_per_tooth;
+  return planner.slot(request);
 }
 
 }  // namespace smartmill::discovery

@@ -18,10 +18,10 @@ namespace smartmill::session {
 namespace {
 
 constexpr double CLOCK_STEP = 0.01;  // [s] of the recording
-constexpr double SELDOM = 1.5;       // [Hz] topics below are events
+constexpr double EVENT_RATE = 1.5;   // [Hz] topics below are events
 constexpr std::uint32_t UNLIMITED = 0;
-constexpr double TELL_PERIOD = 0.2;  // [s] of the state
-constexpr double NAP = 0.05;         // [s] after which a wish is heard
+constexpr double STATE_PERIOD = 0.2;  // [s] of the published state
+constexpr double POLL = 0.05;         // [s] of control requests
 
 ros::Time timeOf(const RecordingFile::Entry& entry) {
   ros::Time time;
@@ -39,12 +39,13 @@ BagPlayer::BagPlayer(ros::NodeHandle nh, const std::string& path, const std::vec
       followers_(std::move(nodes)),
       clock_(nh_.advertise<rosgraph_msgs::Clock>("/clock", UNLIMITED, true)),
       state_(nh_.advertise<smartmill_msgs::PlayState>(names::absolute(names::REPLAY_STATE), 10, true)),
-      control_(nh_.advertiseService(names::absolute(names::REPLAY_CONTROL), &BagPlayer::control, this)) {
-  survey();
+      control_service_(
+          nh_.advertiseService(names::absolute(names::REPLAY_CONTROL), &BagPlayer::onControl, this)) {
+  scanFile();
 }
 
-// Publishers, span of time and topics of events. @throws Error
-void BagPlayer::survey() {
+// Finds the topics, the time span and the event topics. @throws Error
+void BagPlayer::scanFile() {
   const std::unique_ptr<RecordingFile> file = openRecording(path_);
   std::map<std::string, std::size_t> count;
   for (RecordingFile::Entry entry; file->next(&entry);) {
@@ -54,13 +55,13 @@ void BagPlayer::survey() {
     last_ = timeOf(entry);
     if (count[connection.topic]++ == 0) advertise(connection);
   }
-  if (count.empty()) throw Error(path_ + ": holds none of the topics to be played");
+  if (count.empty()) throw Error(path_ + ": contains none of the topics to play");
   for (const auto& [topic, messages] : count) {
-    if (static_cast<double>(messages) <= SELDOM * length()) seldom_.insert(topic);
+    if (static_cast<double>(messages) <= EVENT_RATE * length()) event_topics_.insert(topic);
   }
 }
 
-// As it was recorded: type by its description, latched or not.
+// With type and latching as recorded.
 void BagPlayer::advertise(const RecordedConnection& connection) {
   if (connection.encoding != "ros1")
     throw Error(path_ + ": topic " + connection.topic + " is encoded as " + connection.encoding +
@@ -72,91 +73,92 @@ void BagPlayer::advertise(const RecordedConnection& connection) {
   publishers_[connection.topic] = nh_.advertise(options);
 }
 
-// The clock begins before anybody is waited for: some wait for it themselves.
+// The clock starts before the nodes are waited for, since some of them wait for the clock.
 void BagPlayer::connect() {
-  tick(first_);
+  publishClock(first_);
   followers_.begin();
   for (const auto& [topic, publisher] : publishers_) followers_.expect(publisher);
 }
 
-void BagPlayer::tick(const ros::Time& time) {
-  if (!told_.isZero() && (time - told_).toSec() < CLOCK_STEP) return;
+void BagPlayer::publishClock(const ros::Time& time) {
+  if (!clock_time_.isZero() && (time - clock_time_).toSec() < CLOCK_STEP) return;
   rosgraph_msgs::Clock message;
-  message.clock = told_ = time;
+  message.clock = clock_time_ = time;
   clock_.publish(message);
 }
 
-bool BagPlayer::control(smartmill_msgs::PlayControl::Request& request,
-                        smartmill_msgs::PlayControl::Response& response) {
-  constexpr double MOST = 1000.0;
-  if (request.speed < 0.0 || request.speed > MOST || request.position < 0.0) {
-    response.message = "speed 0..1000 and a position from 0 are due";
+bool BagPlayer::onControl(smartmill_msgs::PlayControl::Request& request,
+                          smartmill_msgs::PlayControl::Response& response) {
+  constexpr double MAX_SPEED = 1000.0;
+  if (request.speed < 0.0 || request.speed > MAX_SPEED || request.position < 0.0) {
+    response.message = "expected a speed of 0..1000 and a position >= 0 s";
     return true;
   }
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (!std::isnan(request.speed)) wish_.speed = request.speed;
-  wish_.paused = request.paused;
-  if (!std::isnan(request.position)) wish_.jump = std::min(request.position, length());
+  if (!std::isnan(request.speed)) control_.speed = request.speed;
+  control_.paused = request.paused;
+  if (!std::isnan(request.position)) control_.jump = std::min(request.position, length());
   response.ok = true;
   return true;
 }
 
-void BagPlayer::tell(bool now) {
+void BagPlayer::publishState(bool now) {
   const ros::WallTime time = ros::WallTime::now();
-  if (!now && (time - told_at_).toSec() < TELL_PERIOD) return;
-  told_at_ = time;
+  if (!now && (time - state_time_).toSec() < STATE_PERIOD) return;
+  state_time_ = time;
   smartmill_msgs::PlayState message;
   message.header.stamp = first_ + ros::Duration(position_);
   message.name = name_;
   message.position = position_;
   message.length = length();
   const std::lock_guard<std::mutex> lock(mutex_);
-  message.speed = wish_.speed;
-  message.paused = wish_.paused;
+  message.speed = control_.speed;
+  message.paused = control_.paused;
   state_.publish(message);
 }
 
-// A jump ahead is played through at once. @return true: back, from the begin
-bool BagPlayer::jumps() {
+// Forward jumps are played at full speed. @return true: backward jump, play from the start
+bool BagPlayer::takeJump() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (std::isnan(wish_.jump)) return false;
-  fast_until_ = wish_.jump;
-  wish_.jump = NO_JUMP;
+  if (std::isnan(control_.jump)) return false;
+  fast_until_ = control_.jump;
+  control_.jump = NO_JUMP;
   return fast_until_ < position_;
 }
 
-// Until a message is due. @return false: somebody wants to go back
-bool BagPlayer::await(const ros::Time& time) {
+// Waits until a message is to be published. @return false: backward jump
+bool BagPlayer::waitFor(const ros::Time& time) {
   const double at = (time - first_).toSec();
   for (;;) {
-    if (jumps()) return false;
-    tell(false);
-    Wish wish;
+    if (takeJump()) return false;
+    publishState(false);
+    Control control;
     {
       const std::lock_guard<std::mutex> lock(mutex_);
-      wish = wish_;
+      control = control_;
     }
-    const bool fast = at < fast_until_ || wish.speed == 0.0;
-    if (fast || wish.paused || wish.speed != paced_speed_) {
+    const bool fast = at < fast_until_ || control.speed == 0.0;
+    if (fast || control.paused || control.speed != paced_speed_) {
       paced_from_ = ros::WallTime::now();
       paced_position_ = at;
-      paced_speed_ = wish.speed;
+      paced_speed_ = control.speed;
     }
-    if (at < fast_until_ || (fast && !wish.paused)) break;
-    const double due = (at - paced_position_) / wish.speed - (ros::WallTime::now() - paced_from_).toSec();
-    if (!wish.paused && due <= 0.0) break;
-    if (!ros::ok()) throw Error("ended while playing");
-    // Their own silence is no end of data for the nodes.
-    if (wish.paused) followers_.settle();
-    ros::WallDuration(wish.paused ? NAP : std::min(due, NAP)).sleep();
+    if (at < fast_until_ || (fast && !control.paused)) break;
+    const double remaining =
+        (at - paced_position_) / control.speed - (ros::WallTime::now() - paced_from_).toSec();
+    if (!control.paused && remaining <= 0.0) break;
+    if (!ros::ok()) throw Error("interrupted by the shutdown of ROS");
+    // The nodes do not take a pause for the end of the data.
+    if (control.paused) followers_.settle();
+    ros::WallDuration(control.paused ? POLL : std::min(remaining, POLL)).sleep();
   }
   position_ = at;
   return true;
 }
 
-// @return false: somebody wants to go back
+// @return false: backward jump
 bool BagPlayer::play() {
-  told_ = ros::Time();
+  clock_time_ = ros::Time();
   position_ = paced_position_ = 0.0;
   paced_from_ = ros::WallTime::now();
   const std::unique_ptr<RecordingFile> file = openRecording(path_);
@@ -164,29 +166,29 @@ bool BagPlayer::play() {
   for (RecordingFile::Entry entry; file->next(&entry);) {
     const RecordedConnection& connection = file->connection(entry);
     if (topics_.count(connection.topic) == 0) continue;
-    if (!await(timeOf(entry))) return false;
-    tick(timeOf(entry));
+    if (!waitFor(timeOf(entry))) return false;
+    publishClock(timeOf(entry));
     message.morph(connection.md5sum, connection.type, connection.definition, "");
-    // The stream is read only; its type has no constant form.
+    // IStream has no constant form; the data are only read.
     ros::serialization::IStream stream(const_cast<std::uint8_t*>(file->data(entry)), entry.size);
     message.read(stream);
     followers_.publish(publishers_.at(connection.topic), message);
-    if (seldom_.count(connection.topic)) followers_.settle();
+    if (event_topics_.count(connection.topic)) followers_.settle();
   }
   return true;
 }
 
 void BagPlayer::run(double rate, bool stay) {
-  wish_.speed = paced_speed_ = rate;
+  control_.speed = paced_speed_ = rate;
   ros::AsyncSpinner spinner(1);
   spinner.start();
   connect();
   for (;;) {
     while (!play()) continue;
     followers_.end();
-    tell(true);
+    publishState(true);
     if (!stay) return;
-    while (ros::ok() && !jumps()) ros::WallDuration(NAP).sleep();
+    while (ros::ok() && !takeJump()) ros::WallDuration(POLL).sleep();
     if (!ros::ok()) return;
     followers_.begin();
   }

@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::uint32_t UNLIMITED = 0;
 constexpr double QUIET = 0.3,
-                 PATIENCE = 8.0;  // [s] without a message, and at most, before the file is closed
+                 CLOSE_TIMEOUT = 8.0;  // [s] without a message, and at most, before the file is closed
 
 }  // namespace
 
@@ -23,7 +23,7 @@ BagRecorder::BagRecorder(const ros::NodeHandle& nh, const std::string& path,
   follow_ = private_nh.advertiseService(FOLLOW, &BagRecorder::follow, this);
 }
 
-void BagRecorder::look() {
+void BagRecorder::subscribe() {
   ros::master::V_TopicInfo topics;
   ros::master::getTopics(topics);
   for (const ros::master::TopicInfo& topic : topics) {
@@ -35,23 +35,23 @@ void BagRecorder::look() {
   }
 }
 
-void BagRecorder::take(double patience) {
-  queue_.callAvailable(ros::WallDuration(patience));
+void BagRecorder::record(double timeout) {
+  queue_.callAvailable(ros::WallDuration(timeout));
 }
 
 void BagRecorder::finish() {
   const ros::WallTime begin = ros::WallTime::now();
-  std::size_t before = written_ + 1;
-  while (before != written_ && (ros::WallTime::now() - begin).toSec() < PATIENCE) {
-    before = written_;
-    take(QUIET);
+  std::size_t previous = written_ + 1;
+  while (previous != written_ && (ros::WallTime::now() - begin).toSec() < CLOSE_TIMEOUT) {
+    previous = written_;
+    record(QUIET);
   }
   writer_->close();
 }
 
 std::uint32_t BagRecorder::connectionOf(const std::string& topic, Event event) {
-  const auto [known, is_new] = connections_.try_emplace({topic, event.getPublisherName()}, 0);
-  if (!is_new) return known->second;
+  const auto [connection_id, is_new] = connections_.try_emplace({topic, event.getPublisherName()}, 0);
+  if (!is_new) return connection_id->second;
   const topic_tools::ShapeShifter& message = *event.getMessage();
   RecordedConnection connection;
   connection.topic = topic;
@@ -62,11 +62,11 @@ std::uint32_t BagRecorder::connectionOf(const std::string& topic, Event event) {
   const ros::M_string& header = event.getConnectionHeader();
   if (const auto latching = header.find("latching"); latching != header.end())
     connection.more["latching"] = latching->second;
-  return known->second = writer_->connect(connection);
+  return connection_id->second = writer_->connect(connection);
 }
 
 void BagRecorder::write(const std::string& topic, Event event) {
-  // Simulated time may not have begun.
+  // Simulated time may still be zero.
   const ros::Time time = std::max(event.getReceiptTime(), ros::TIME_MIN);
   const topic_tools::ShapeShifter& message = *event.getMessage();
   bytes_.resize(message.size());
@@ -78,7 +78,7 @@ void BagRecorder::write(const std::string& topic, Event event) {
 }
 
 bool BagRecorder::follow(smartmill_msgs::Follow::Request&, smartmill_msgs::Follow::Response& response) {
-  look();
+  subscribe();
   for (const auto& [topic, recorded] : topics_) {
     response.topics.push_back(topic);
     response.taken.push_back(recorded.messages);

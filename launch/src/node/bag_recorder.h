@@ -16,20 +16,21 @@
 
 namespace smartmill::session {
 
-/// Records topics to a bag or an MCAP file. No message that arrives is lost: where the computer is too busy
-/// to write, messages wait (rosbag record keeps 100 of a topic and drops the rest). Its service `follow`
-/// reports to publishers which topics it is subscribed to (smartmill_ros/follower.h).
+/// Records topics to a bag or an MCAP file. No received message is lost: on a busy computer
+/// messages are queued without limit (rosbag record keeps 100 per topic and drops the rest). Its service
+/// `follow` reports to publishers which topics it is subscribed to (smartmill_ros/follower.h).
 class BagRecorder {
  public:
-  /// @param path ends in .bag or .mcap @param patterns regular expressions (ECMAScript) of whole topic names
-  /// @throws Error when the file cannot be written
+  /// @param path ends in .bag or .mcap @param patterns regular expressions (ECMAScript) that match full topic
+  /// names
+  /// @throws Error if the file cannot be written
   BagRecorder(const ros::NodeHandle& nh, const std::string& path, const std::vector<std::string>& patterns);
 
-  /// Subscribes to matching topics that have come up.
-  void look();
-  /// Takes what has come. @param patience [s] of wall time to wait when nothing is there
-  void take(double patience);
-  /// Takes what is still on its way, for some seconds at most, and closes the file.
+  /// Subscribes to new topics that match.
+  void subscribe();
+  /// Writes the queued messages. @param timeout [s] of wall time to wait for a message if the queue is empty
+  void record(double timeout);
+  /// Writes messages still in transit, for some seconds at most, and closes the file.
   void finish();
 
  private:

@@ -6,13 +6,13 @@
 
 namespace smartmill::session {
 
-/// Takes Ctrl-C and kill from ROS (ros::init with NoSigintHandler): goals, spindle or file are brought to
-/// their end by the program itself, while ROS is still there.
-/// @return true once the end was asked for
+/// Handles SIGINT and SIGTERM in place of ROS (ros::init with NoSigintHandler), so that the program can end
+/// its goals, the spindle or a file while ROS is still running.
+/// @return true once a shutdown is requested
 inline const std::atomic<bool>& catchShutdownRequest() {
-  static std::atomic<bool> asked{false};
-  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { asked = true; });
-  return asked;
+  static std::atomic<bool> requested{false};
+  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { requested = true; });
+  return requested;
 }
 
 }  // namespace smartmill::session

@@ -15,9 +15,9 @@ namespace smartmill::report {
 namespace {
 
 constexpr double SETTLE_REVOLUTIONS = 10.0;
-constexpr double SHOWN_REVOLUTIONS = 3.0;
+constexpr double DRAWN_REVOLUTIONS = 3.0;
 
-/// A table that gnuplot reads; what is infinite is left out of the picture.
+/// A table for gnuplot; infinite values are not drawn.
 class Table {
  public:
   explicit Table(const std::filesystem::path& file) : file_(file), out_(file) { out_.precision(9); }
@@ -54,7 +54,7 @@ std::string number(double value) {
   return formatted("%.9g", value);
 }
 
-/// -270..90: a receptance's phase goes from 0 to -180 and must not jump there.
+/// -270..90 deg, so that the phase of a receptance, 0 to -180 deg, does not wrap.
 double degrees(const std::complex<double>& value) {
   const double phase = units::degFromRad(std::arg(value));
   return phase > 90.0 ? phase - 360.0 : phase;
@@ -92,27 +92,28 @@ bool drawFrf(const SessionRecording& recording, const std::filesystem::path& fol
   const bool with_truth = true_files.size() == files.size();
   std::string commands = "set multiplot layout 3," + std::to_string(files.size()) +
                          "\nset xrange [100:" + number(highest) + "]\n";
-  struct Part {
+  struct Panel {
     const char* label;
     const char* settings;
     int column;
-    bool true_too;
+    bool with_true_frf;
   };
-  for (const Part& part :
-       {Part{"magnitude [um/N]", "set logscale y\nset format y '10^{%T}'\nset autoscale y", 2, true},
-        Part{"phase [deg]", "unset logscale y\nset format y '%g'\nset yrange [-270:90]\nset ytics 90", 3,
-             true},
-        Part{"coherence [1]", "unset logscale y\nset yrange [0:1.05]\nset ytics 0.2", 4, false}}) {
-    commands += std::string(part.settings) + "\nset ylabel '" + part.label + "'\n";
+  for (const Panel& panel :
+       {Panel{"magnitude [um/N]", "set logscale y\nset format y '10^{%T}'\nset autoscale y", 2, true},
+        Panel{"phase [deg]", "unset logscale y\nset format y '%g'\nset yrange [-270:90]\nset ytics 90", 3,
+              true},
+        Panel{"coherence [1]", "unset logscale y\nset yrange [0:1.05]\nset ytics 0.2", 4, false}}) {
+    commands += std::string(panel.settings) + "\nset ylabel '" + panel.label + "'\n";
     for (std::size_t i = 0; i < files.size(); ++i) {
-      commands += part.column == 2 ? "set title 'tool tip, " + measured[i]->direction + "'\n" : "set title\n";
-      commands += part.column == 4 ? "set xlabel 'frequency [Hz]'\n" : "set xlabel\n";
+      commands +=
+          panel.column == 2 ? "set title 'tool tip, " + measured[i]->direction + "'\n" : "set title\n";
+      commands += panel.column == 4 ? "set xlabel 'frequency [Hz]'\n" : "set xlabel\n";
       commands += "plot ";
-      if (with_truth && part.true_too) {
-        commands += true_files[i] + " using 1:" + std::to_string(part.column) +
+      if (with_truth && panel.with_true_frf) {
+        commands += true_files[i] + " using 1:" + std::to_string(panel.column) +
                     " with lines lw 3 lc rgb '#bbbbbb' title 'true', ";
       }
-      commands += files[i] + " using 1:" + std::to_string(part.column) +
+      commands += files[i] + " using 1:" + std::to_string(panel.column) +
                   " with lines lw 1 lc rgb '#0044aa' title 'measured'\n";
     }
   }
@@ -120,7 +121,7 @@ bool drawFrf(const SessionRecording& recording, const std::filesystem::path& fol
   return true;
 }
 
-/// The margin to both flanks of the lobe, at the recommended depth.
+/// Margin to both flanks of the lobe at the recommended depth.
 std::string marginOf(const StabilityChart& chart, const std::filesystem::path& folder) {
   const StabilityPoint& best = chart.recommended.front();
   const auto [below, above] = lobeFlanks(chart.limit, best.spindle_speed, best.axial_depth);
@@ -156,14 +157,14 @@ bool drawChart(const SessionRecording& recording, const Report& report,
     plot += true_table.close() +
             " using 1:2 with lines lw 4 lc rgb '#bbbbbb' title 'limit of the true machine', ";
   }
-  plot += file + " using 1:2 with lines lw 1.5 lc rgb '#0044aa' title 'limit as measured'";
-  const auto some = [](const std::vector<double>& values) {
+  plot += file + " using 1:2 with lines lw 1.5 lc rgb '#0044aa' title 'measured limit'";
+  const auto anyFinite = [](const std::vector<double>& values) {
     return std::any_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
   };
-  if (some(chart.torque_depth_limit)) {
+  if (anyFinite(chart.torque_depth_limit)) {
     plot += ", " + file + " using 1:3 with lines dt 2 lw 1.5 lc rgb '#cc7700' title 'spindle torque'";
   }
-  if (some(chart.power_depth_limit)) {
+  if (anyFinite(chart.power_depth_limit)) {
     plot += ", " + file + " using 1:4 with lines dt 3 lw 1.5 lc rgb '#aa00aa' title 'spindle power'";
   }
   if (!chart.recommended.empty()) {
@@ -179,7 +180,7 @@ bool drawChart(const SessionRecording& recording, const Report& report,
     plot += ", " + point.close() + " using 1:2 with points ps 2.5 lw 3 pt " +
             (stable    ? "7 lc rgb '#008800' title 'cut: stable'"
              : chatter ? "2 lc rgb '#cc0000' title 'cut: chatter'"
-                       : "4 lc rgb '#555555' title 'cut: not judged'");
+                       : "4 lc rgb '#555555' title 'cut: no verdict'");
   }
   draw(folder / "chart.png", 1300, 700,
        "set key outside below\nset xlabel 'spindle speed [rpm]'\nset ylabel 'axial depth [mm]'\nset yrange "
@@ -189,21 +190,21 @@ bool drawChart(const SessionRecording& recording, const Report& report,
 }
 
 bool drawForce(const RecordedCut& cut, const std::filesystem::path& folder) {
-  const auto [from, end] = judgedSamples(cut, SETTLE_REVOLUTIONS);
+  const auto [from, end] = evaluatedSamples(cut, SETTLE_REVOLUTIONS);
   const double rate = cut.compensated.sampleRate();
-  const auto shown =
-      static_cast<std::uint64_t>(SHOWN_REVOLUTIONS * units::TWO_PI / cut.condition.spindle_speed * rate);
-  if (from + shown > end || shown == 0) return false;
-  const std::uint64_t to = from + shown;
+  const auto drawn =
+      static_cast<std::uint64_t>(DRAWN_REVOLUTIONS * units::TWO_PI / cut.condition.spindle_speed * rate);
+  if (from + drawn > end || drawn == 0) return false;
+  const std::uint64_t to = from + drawn;
   std::vector<std::vector<double>> columns;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     for (const ForceTrack* track : {&cut.raw, &cut.compensated, &cut.truth}) {
-      columns.push_back(track->empty() ? std::vector<double>(shown, NOT_A_NUMBER)
+      columns.push_back(track->empty() ? std::vector<double>(drawn, NOT_A_NUMBER)
                                        : track->axis(axis, from, to));
     }
   }
   Table table(folder / "data" / "force.dat");
-  for (std::uint64_t i = 0; i < shown; ++i) {
+  for (std::uint64_t i = 0; i < drawn; ++i) {
     std::vector<double> row{static_cast<double>(i) / rate * 1e3};
     for (const auto& column : columns) row.push_back(column[i]);
     table.row(row);

@@ -19,8 +19,8 @@ double Figure::sigmas() const {
 
 std::optional<bool> Figure::met() const {
   if (std::isnan(target.percent) || std::isnan(truth)) return std::nullopt;
-  const double off = std::abs(percent());
-  return target.at_least ? off >= target.percent : off <= target.percent;
+  const double difference = std::abs(percent());
+  return target.at_least ? difference >= target.percent : difference <= target.percent;
 }
 
 std::pair<double, double> stiffnessOf(const Mode& mode) {
@@ -95,12 +95,12 @@ std::vector<double> ForceTrack::axis(std::size_t axis, std::uint64_t from, std::
 }
 
 std::uint64_t ForceTrack::indexAt(double stamp) const {
-  if (empty()) throw Error("no force has been recorded");
+  if (empty()) throw Error("the recording contains no force");
   const ForceBlock* nearest = &blocks_.begin()->second;
   for (const auto& [index, block] : blocks_) {
     if (block.stamp <= stamp) nearest = &block;
   }
-  // Stamps carry rounding of a few thousandths of a sample.
+  // Stamps are rounded by a few thousandths of a sample.
   const double samples = std::ceil((stamp - nearest->stamp) * sample_rate_ - 0.05);
   return nearest->first_index + static_cast<std::uint64_t>(std::max(samples, 0.0));
 }
@@ -122,22 +122,23 @@ double middleRange(const std::vector<double>& values) {
   return percentile(values, 0.9) - percentile(values, 0.1);
 }
 
-double nonperiodicShare(const std::vector<double>& values, double samples_a_revolution, int revolutions) {
+double nonperiodicShare(const std::vector<double>& values, double samples_per_revolution, int revolutions) {
   constexpr int ANGLES = 360;
-  const double window = samples_a_revolution * revolutions;
+  const double window = samples_per_revolution * revolutions;
   if (values.size() < 2 || !(window > 0.0)) return NOT_A_NUMBER;
   const auto at = [&](double position) {
     const auto index = static_cast<std::size_t>(position);
     const double share = position - static_cast<double>(index);
     return values[index] + share * (values[index + 1] - values[index]);
   };
-  double all = 0.0, rest = 0.0;
+  double all = 0.0, nonperiodic = 0.0;
   for (double start = 0.0; start + window < static_cast<double>(values.size() - 1); start += window) {
     double sum = 0.0, squares = 0.0, repeating = 0.0;
     for (int angle = 0; angle < ANGLES; ++angle) {
       double angle_sum = 0.0;
-      for (int turn = 0; turn < revolutions; ++turn) {
-        const double value = at(start + (turn + static_cast<double>(angle) / ANGLES) * samples_a_revolution);
+      for (int revolution = 0; revolution < revolutions; ++revolution) {
+        const double value =
+            at(start + (revolution + static_cast<double>(angle) / ANGLES) * samples_per_revolution);
         angle_sum += value;
         squares += value * value;
       }
@@ -145,26 +146,28 @@ double nonperiodicShare(const std::vector<double>& values, double samples_a_revo
       repeating += angle_sum * angle_sum / revolutions;
     }
     const double energy = squares - sum * sum / (ANGLES * revolutions);
-    rest += squares - repeating;
+    nonperiodic += squares - repeating;
     all += energy;
   }
-  return all > 0.0 ? rest / all : NOT_A_NUMBER;
+  return all > 0.0 ? nonperiodic / all : NOT_A_NUMBER;
 }
 
 // ---------------------------------------------------------------------------------------------- chart
 
 std::vector<Pocket> pockets(const std::vector<double>& speeds, const std::vector<double>& depths,
                             double factor, double ceiling) {
-  if (speeds.size() != depths.size()) throw Error("a chart with unequal numbers of speeds and depths");
-  constexpr double TOP = 0.9;  // [1] of the highest depth belongs to the pocket's top
+  if (speeds.size() != depths.size())
+    throw Error("stability chart: " + std::to_string(speeds.size()) + " speeds and " +
+                std::to_string(depths.size()) + " depths, expected equal numbers");
+  constexpr double TOP = 0.9;  // [1] of the maximum depth, from which on a point belongs to the plateau
   const auto depth = [&](std::size_t i) { return std::min(depths[i], ceiling); };
   std::vector<Pocket> found;
-  bool rising = false;  // the chart's begin is no pocket
+  bool rising = false;  // the start of the chart is no pocket
   std::size_t extreme = 0;
   for (std::size_t i = 1; i < depths.size(); ++i) {
     if (rising ? depth(i) > depth(extreme) : depth(i) < depth(extreme)) extreme = i;
-    const bool turned = rising ? depth(i) * factor < depth(extreme) : depth(i) > depth(extreme) * factor;
-    if (!turned) continue;
+    const bool reversed = rising ? depth(i) * factor < depth(extreme) : depth(i) > depth(extreme) * factor;
+    if (!reversed) continue;
     if (rising) {
       std::size_t low = extreme, high = extreme;
       while (low > 0 && depth(low - 1) >= TOP * depth(extreme)) --low;
@@ -178,7 +181,9 @@ std::vector<Pocket> pockets(const std::vector<double>& speeds, const std::vector
 }
 
 double interpolate(const std::vector<double>& x, const std::vector<double>& y, double at) {
-  if (x.size() != y.size()) throw Error("a curve with unequal numbers of x and y");
+  if (x.size() != y.size())
+    throw Error("curve: " + std::to_string(x.size()) + " values of x and " + std::to_string(y.size()) +
+                " of y, expected equal numbers");
   const auto above = std::lower_bound(x.begin(), x.end(), at);
   if (above == x.end()) return NOT_A_NUMBER;
   const auto i = static_cast<std::size_t>(above - x.begin());

@@ -15,7 +15,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 using Row = std::vector<std::string>;
 
-std::string shown(const char* format, double value) {
+std::string cell(const char* format, double value) {
   if (std::isnan(value)) return "-";
   return formatted(format, value);
 }
@@ -49,10 +49,10 @@ std::string verdictOf(const Figure& figure) {
 
 std::string targetText(const Target& target) {
   if (std::isnan(target.percent)) return "";
-  return shown(target.at_least ? ">= %.1f %%" : "<= %.1f %%", target.percent);
+  return cell(target.at_least ? ">= %.1f %%" : "<= %.1f %%", target.percent);
 }
 
-/// JSON knows neither NaN nor infinity.
+/// JSON has neither NaN nor infinity.
 Json number(double value) {
   return std::isfinite(value) ? Json(value) : Json(nullptr);
 }
@@ -61,7 +61,7 @@ Json parsed(const std::string& session) {
   try {
     return Json::parse(session);
   } catch (const Json::exception&) {
-    throw Error("the session's summary is not JSON");
+    throw Error("summary of the session: expected JSON");
   }
 }
 
@@ -74,29 +74,29 @@ std::string markdown(const Report& report) {
     std::vector<Row> rows{
         {"quantity", "unit", "measured", "std", "true", "diff %", "diff/std", "target", "verdict"}};
     for (const Figure& f : section.figures) {
-      rows.push_back({f.name, f.unit, shown("%.6g", f.estimate), shown("%.2g", f.std_dev),
-                      shown("%.6g", f.truth), shown("%+.3f", f.percent()), shown("%+.2f", f.sigmas()),
+      rows.push_back({f.name, f.unit, cell("%.6g", f.estimate), cell("%.2g", f.std_dev),
+                      cell("%.6g", f.truth), cell("%+.3f", f.percent()), cell("%+.2f", f.sigmas()),
                       targetText(f.target), verdictOf(f)});
     }
     out << "\n## " << section.title << "\n\n" << aligned(rows);
   }
   if (!report.cuts.empty()) {
-    std::vector<Row> rows{{"cut", "rpm", "depth mm", "chart's limit mm", "true limit mm", "chart says",
-                           "detector", "windows", "chatter Hz", "non-periodic share of true force",
+    std::vector<Row> rows{{"cut", "rpm", "depth mm", "chart's limit mm", "true limit mm", "predicted",
+                           "detected", "windows", "chatter Hz", "non-periodic share of true force",
                            "verdict"}};
     for (const CutCheck& cut : report.cuts) {
-      rows.push_back({cut.name, shown("%.0f", units::rpmFromRadPerSec(cut.spindle_speed)),
-                      shown("%.3f", cut.axial_depth / units::MM), shown("%.3f", cut.limit / units::MM),
-                      shown("%.3f", cut.true_limit / units::MM), wordOf(cut.due), wordOf(cut.verdict.kind),
-                      std::to_string(cut.verdict.chattering) + " of " + std::to_string(cut.verdict.windows),
-                      shown("%.1f", cut.verdict.frequency), shown("%.4f", cut.nonperiodic),
-                      cut.met() ? "met" : "MISSED"});
+      rows.push_back(
+          {cut.name, cell("%.0f", units::rpmFromRadPerSec(cut.spindle_speed)),
+           cell("%.3f", cut.axial_depth / units::MM), cell("%.3f", cut.limit / units::MM),
+           cell("%.3f", cut.true_limit / units::MM), wordOf(cut.predicted), wordOf(cut.verdict.kind),
+           std::to_string(cut.verdict.chattering) + " of " + std::to_string(cut.verdict.windows),
+           cell("%.1f", cut.verdict.frequency), cell("%.4f", cut.nonperiodic), cut.met() ? "met" : "MISSED"});
     }
-    out << "\n## Cuts that check the chart\n\n" << aligned(rows);
+    out << "\n## Cuts that verify the chart\n\n" << aligned(rows);
   }
   out << "\n";
   for (const std::string& note : report.notes) out << "- " << note << "\n";
-  for (const std::string& what : report.unchecked) out << "- NOT CHECKED: " << what << "\n";
+  for (const std::string& result : report.unchecked) out << "- NOT CHECKED: " << result << "\n";
   out << "\n" << report.met() << " of " << report.targets() << " targets met\n";
   return out.str();
 }
@@ -110,8 +110,8 @@ std::vector<std::string> notMeasured(const SessionRecording& recording, const st
       missing.push_back("step '" + step.value("name", "") + "' failed: " + step.value("detail", ""));
   }
   if (missing.empty()) return missing;
-  const auto require = [&](bool there, const std::string& what) {
-    if (!there) missing.push_back(what + ": not in the recording");
+  const auto require = [&](bool present, const std::string& name) {
+    if (!present) missing.push_back(name + ": not in the recording");
   };
   require(recording.coefficients.has_value(), "cutting coefficients");
   require(recording.modal(false, POINT_TOOL_TIP, "x"), "tool-tip modes in x");
@@ -152,7 +152,7 @@ std::string json(const Report& report, const std::string& session) {
                            {"axial_depth_m", cut.axial_depth},
                            {"depth_limit_m", number(cut.limit)},
                            {"true_depth_limit_m", number(cut.true_limit)},
-                           {"chart_says", wordOf(cut.due)},
+                           {"chart_says", wordOf(cut.predicted)},
                            {"detector_says", wordOf(cut.verdict.kind)},
                            {"windows", cut.verdict.windows},
                            {"chattering_windows", cut.verdict.chattering},

@@ -13,19 +13,20 @@ namespace {
 constexpr double PATH_TOLERANCE = 1e-3;   // [m]
 constexpr double SPEED_TOLERANCE = 0.01;  // [1]
 
-/// Gathers messages in the order of their reception.
-class Gatherer {
+/// Fills a SessionRecording from the messages of a bag, in the order of their reception.
+class SessionRecordingBuilder {
  public:
-  explicit Gatherer(SessionRecording& recording) : recording_(recording) {}
+  explicit SessionRecordingBuilder(SessionRecording& recording) : recording_(recording) {}
 
   void attach(RecordingReader& bag) {
-    bag.on<MeasuredFrf>(names::TOOL_FRF, [this](const auto& frf, double) { keep(recording_.frfs, frf); });
+    bag.on<MeasuredFrf>(names::TOOL_FRF,
+                        [this](const auto& frf, double) { replaceOrAdd(recording_.frfs, frf); });
     bag.on<MeasuredFrf>(names::TRUE_FRF,
-                        [this](const auto& frf, double) { keep(recording_.true_frfs, frf); });
+                        [this](const auto& frf, double) { replaceOrAdd(recording_.true_frfs, frf); });
     bag.on<MeasuredModes>(names::TOOL_MODES,
-                          [this](const auto& modes, double) { keep(recording_.modes, modes); });
+                          [this](const auto& modes, double) { replaceOrAdd(recording_.modes, modes); });
     bag.on<MeasuredModes>(names::TRUE_MODES,
-                          [this](const auto& modes, double) { keep(recording_.true_modes, modes); });
+                          [this](const auto& modes, double) { replaceOrAdd(recording_.true_modes, modes); });
     bag.on<CoefficientSet>(names::COEFFICIENTS,
                            [this](const auto& set, double) { recording_.coefficients = set; });
     bag.on<CoefficientSet>(names::TRUE_COEFFICIENTS,
@@ -33,9 +34,9 @@ class Gatherer {
     bag.on<StabilityChart>(names::STABILITY_CHART,
                            [this](const auto& chart, double) { recording_.chart = chart; });
     bag.on<CuttingCondition>(names::CUTTING_CONDITION,
-                             [this](const auto& condition, double) { take(condition); });
-    bag.on<CncState>(names::CNC_STATE, [this](const auto& state, double) { take(state); });
-    bag.on<plain::ChatterState>(names::CHATTER_STATE, [this](const auto& state, double) { take(state); });
+                             [this](const auto& condition, double) { add(condition); });
+    bag.on<CncState>(names::CNC_STATE, [this](const auto& state, double) { add(state); });
+    bag.on<plain::ChatterState>(names::CHATTER_STATE, [this](const auto& state, double) { add(state); });
     const auto force = [&](const char* topic, ForceTrack RecordedCut::*track) {
       bag.on<ForceBlock>(topic, [this, track](const auto& block, double) {
         RecordedCut* cut = cutAt(block.stamp);
@@ -48,9 +49,9 @@ class Gatherer {
   }
 
  private:
-  /// The newest of each point and direction stands.
+  /// Replaces an earlier item of the same point and direction.
   template <class Item>
-  static void keep(std::vector<Item>& items, const Item& item) {
+  static void replaceOrAdd(std::vector<Item>& items, const Item& item) {
     for (Item& other : items) {
       if (other.point == item.point && other.direction == item.direction) {
         other = item;
@@ -60,7 +61,7 @@ class Gatherer {
     items.push_back(item);
   }
 
-  void take(const CuttingCondition& condition) {
+  void add(const CuttingCondition& condition) {
     if (!recording_.cuts.empty()) {
       RecordedCut& last = recording_.cuts.back();
       if (last.condition.stamp == condition.stamp && last.condition.name == condition.name)
@@ -72,7 +73,7 @@ class Gatherer {
     recording_.cuts.back().condition = condition;
   }
 
-  void take(const CncState& state) {
+  void add(const CncState& state) {
     RecordedCut* cut = cutAt(state.stamp);
     if (!cut || !onSteadyPath(cut->condition, state, PATH_TOLERANCE)) return;
     const double speed = cut->condition.spindle_speed;
@@ -81,7 +82,7 @@ class Gatherer {
     cut->steady_to = state.stamp;
   }
 
-  void take(const plain::ChatterState& m) {
+  void add(const plain::ChatterState& m) {
     if (!m.valid) return;
     for (RecordedCut& cut : recording_.cuts) {
       if (cut.condition.name == m.condition) {
@@ -105,8 +106,8 @@ class Gatherer {
 SessionRecording readSession(const std::string& bag, const std::function<void(double)>& progress) {
   SessionRecording recording;
   RecordingReader reader(bag);
-  Gatherer gatherer(recording);
-  gatherer.attach(reader);
+  SessionRecordingBuilder builder(recording);
+  builder.attach(reader);
   reader.run(progress);
   recording.duration = reader.duration();
   return recording;

@@ -7,9 +7,7 @@
 
 namespace smartmill::report {
 
-/// Reads what the report needs from a recorded session. Forces are kept of the cuts `verify_*` and
-/// `resonance`.
-/// @throws Error naming the bag.
+/// Reads the results and the cuts of a recorded session. @throws Error naming the bag.
 SessionRecording readSession(const std::string& bag, const std::function<void(double)>& progress);
 
 }  // namespace smartmill::report

@@ -14,12 +14,12 @@ namespace {
 
 using session::CutVerdict;
 
-// Targets [percent]: Ktc (Dunwoody reached 11), tool modes, pockets' speeds, range of the compensated force,
-// and how far off the raw force is where compensation is needed.
+// Targets [percent]: Ktc (Dunwoody reached 11), tool modes, speeds of pockets, range of the compensated
+// force, and minimum error of the raw force at the resonance of the sensor.
 constexpr double KTC_TARGET = 3.0, FREQUENCY_TARGET = 0.5, STIFFNESS_TARGET = 5.0, POCKET_TARGET = 1.0;
 constexpr double RANGE_TARGET = 5.0, RAW_TARGET = 30.0;
-constexpr double LEAST_RANGE = 0.2;      // [1] of the largest axis: axes with less carry no target
-constexpr double POCKET_FACTOR = 1.3;    // [1] over the valleys beside it
+constexpr double LEAST_RANGE = 0.2;      // [1] of the largest axis; axes below have no target
+constexpr double POCKET_FACTOR = 1.3;    // [1] over the adjacent minima
 constexpr double POCKET_CEILING = 20.0;  // [1] of the absolute limit
 constexpr int MOST_POCKETS = 4;
 constexpr double SETTLE_REVOLUTIONS = 10.0;
@@ -109,7 +109,7 @@ Section modeSection(const SessionRecording& recording, const std::string& point)
 /// Length of measured minus true over that of true, on the measured lines in the band.
 std::string frfNote(const MeasuredFrf& measured, const MeasuredFrf* truth) {
   constexpr double LOW = 200.0, HIGH = 3500.0;  // [Hz] band of the hammer's fits
-  constexpr double COHERENT = 0.9;              // [1] lines below say more about noise than about the tool
+  constexpr double COHERENT = 0.9;              // [1] lines below are dominated by noise
   const FrequencyResponse band = measured.frf.band(LOW, HIGH);
   double error = 0.0, all = 0.0;
   std::vector<double> coherence;
@@ -163,8 +163,9 @@ Section chartSection(const SessionRecording& recording, const TrueStability& tru
   if (chart.limit.depth.empty()) return section;
   const std::vector<Pocket> measured = pocketsOf(chart);
   const std::vector<Pocket> truth = true_chart ? pocketsOf(*true_chart) : std::vector<Pocket>{};
-  int shown_pockets = 0;
-  for (auto pocket = measured.rbegin(); pocket != measured.rend() && shown_pockets < MOST_POCKETS; ++pocket) {
+  int listed_pockets = 0;
+  for (auto pocket = measured.rbegin(); pocket != measured.rend() && listed_pockets < MOST_POCKETS;
+       ++pocket) {
     double nearest = NOT_A_NUMBER;
     for (const Pocket& other : truth) {
       if (std::isnan(nearest) ||
@@ -172,7 +173,7 @@ Section chartSection(const SessionRecording& recording, const TrueStability& tru
         nearest = other.spindle_speed;
       }
     }
-    section.figures.push_back({"pocket " + std::to_string(++shown_pockets),
+    section.figures.push_back({"pocket " + std::to_string(++listed_pockets),
                                "rpm",
                                units::rpmFromRadPerSec(pocket->spindle_speed),
                                NOT_A_NUMBER,
@@ -184,8 +185,9 @@ Section chartSection(const SessionRecording& recording, const TrueStability& tru
 }
 
 Section forceSection(const RecordedCut& cut, std::vector<std::string>& notes) {
-  Section section{"Range of the force, 10th to 90th percentile, teeth passing at the sensor's resonance", {}};
-  const auto [from, to] = judgedSamples(cut, SETTLE_REVOLUTIONS);
+  Section section{
+      "Range of the force, 10th to 90th percentile, tooth passing frequency at the sensor's resonance", {}};
+  const auto [from, to] = evaluatedSamples(cut, SETTLE_REVOLUTIONS);
   if (from == to) {
     notes.push_back("cut " + cut.condition.name + ": no steady samples with settled compensation");
     return section;
@@ -200,7 +202,7 @@ Section forceSection(const RecordedCut& cut, std::vector<std::string>& notes) {
     Figure raw{name + " raw", "N", middleRange(cut.raw.axis(axis, from, to)), NOT_A_NUMBER, truth[axis], {}};
     Figure compensated{name + " compensated", "N",         middleRange(cut.compensated.axis(axis, from, to)),
                        NOT_A_NUMBER,          truth[axis], {}};
-    // Where hardly any force acts the range is that of the sensor's noise.
+    // With a small force the range is that of the sensor noise.
     if (truth[axis] >= LEAST_RANGE * largest) {
       compensated.target = {RANGE_TARGET, false};
       raw.target = {RAW_TARGET, true};
@@ -221,11 +223,11 @@ CutCheck checkOf(const SessionRecording& recording, const RecordedCut& cut, doub
   check.spindle_speed = cut.condition.spindle_speed;
   check.axial_depth = cut.condition.engagement.axial_depth;
   check.true_limit = true_limit;
-  check.verdict = session::judge(cut.windows);
+  check.verdict = session::cutVerdict(cut.windows);
   if (recording.chart) {
     check.limit =
         interpolate(recording.chart->limit.spindle_speed, recording.chart->limit.depth, check.spindle_speed);
-    check.due = check.axial_depth < check.limit ? CutVerdict::Kind::stable : CutVerdict::Kind::chatter;
+    check.predicted = check.axial_depth < check.limit ? CutVerdict::Kind::stable : CutVerdict::Kind::chatter;
   }
   if (!cut.truth.empty() && std::isfinite(cut.steady_from)) {
     const auto [from, to] =
@@ -256,7 +258,7 @@ const RecordedCut* SessionRecording::cut(const std::string& name) const {
   return nullptr;
 }
 
-std::pair<std::uint64_t, std::uint64_t> judgedSamples(const RecordedCut& cut, double settle_revolutions) {
+std::pair<std::uint64_t, std::uint64_t> evaluatedSamples(const RecordedCut& cut, double settle_revolutions) {
   if (!std::isfinite(cut.steady_from) || cut.raw.empty() || cut.compensated.empty()) return {0, 0};
   const double settle = settle_revolutions * units::TWO_PI / cut.condition.spindle_speed;
   if (cut.steady_from + settle >= cut.steady_to) return {0, 0};

@@ -18,12 +18,12 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds POLL(20);
-constexpr std::chrono::seconds GRACE(5);  // for what a program does on Ctrl-C
+constexpr std::chrono::seconds GRACE(5);  // for the cleanup of a program after SIGINT
 constexpr int NOT_STARTED = 127;
 constexpr int USAGE = 2;  // exit status of a command line that a subcommand does not accept
 
-[[noreturn]] void become(const std::vector<std::string>& command, int log) {
-  // A group of its own: whatever it starts hears the signals too, and no Ctrl-C but ours reaches it.
+[[noreturn]] void executeCommand(const std::vector<std::string>& command, int log) {
+  // Its own process group: its children get the signals too, and it gets no Ctrl-C from the terminal.
   setpgid(0, 0);
   dup2(log, STDOUT_FILENO);
   dup2(log, STDERR_FILENO);
@@ -43,20 +43,20 @@ int runChild(const std::vector<std::string>& command, const std::string& log,
   const int out = open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   if (out < 0) throw Error(log + ": " + std::strerror(errno));
   const pid_t child = fork();
-  if (child == 0) become(command, out);
+  if (child == 0) executeCommand(command, out);
   close(out);
   if (child < 0) throw Error(command.front() + ": " + std::strerror(errno));
   setpgid(child, child);
-  bool asked = false;
-  Clock::time_point since;
+  bool interrupted = false;
+  Clock::time_point interrupt_time;
   int status = 0;
   while (waitpid(child, &status, WNOHANG) == 0) {
-    if (!asked && stopped()) {
-      asked = true;
-      since = Clock::now();
+    if (!interrupted && stopped()) {
+      interrupted = true;
+      interrupt_time = Clock::now();
       kill(-child, SIGINT);
     }
-    if (asked && Clock::now() > since + GRACE) kill(-child, SIGKILL);
+    if (interrupted && Clock::now() > interrupt_time + GRACE) kill(-child, SIGKILL);
     std::this_thread::sleep_for(POLL);
   }
   const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);

@@ -6,9 +6,9 @@
 
 namespace smartmill::session {
 
-/// Runs a program found on PATH to its end. @param log file that gets all its output
-/// @param stopped asked again and again; then the program gets SIGINT, and SIGKILL when it does not end
-/// @return exit status, 128 + signal where one ended it. @throws Error when it cannot be started.
+/// Runs a program on PATH to its end. @param log file for all its output
+/// @param stopped polled; once it returns true, the program gets SIGINT, and SIGKILL if it does not end
+/// @return exit code, 128 + signal if a signal ended it. @throws Error if it cannot be started.
 int runChild(
     const std::vector<std::string>& command, const std::string& log,
     const std::function<bool()>& stopped = [] { return false; });
@@ -16,14 +16,14 @@ int runChild(
 /// The program whose subcommands are the offline tools.
 constexpr const char* TOOL_PROGRAM = "smartmill";
 
-/// A subcommand of TOOL_PROGRAM, and what the caller needs it for, in the words of an error message.
+/// A subcommand of TOOL_PROGRAM and its purpose for the caller, for error messages.
 struct Tool {
   std::string subcommand, purpose;
 };
 
 /// Runs a tool to its end, as runChild().
-/// @return exit status. @throws Error naming the tool and its purpose: program not found, command line
-/// refused.
+/// @return exit code. @throws Error naming the tool and its purpose if the program is not found or refuses
+/// the command line.
 int runTool(
     const Tool& tool, const std::vector<std::string>& arguments, const std::string& log,
     const std::function<bool()>& stopped = [] { return false; });

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <optional>
 
-#include "session/shown.h"
+#include "session/number_text.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
 
@@ -12,11 +12,11 @@ namespace smartmill::session {
 namespace {
 
 constexpr int DECIMALS = 3;                                   // of lengths in mm: the controller's increment
-constexpr double EXIT_MARGIN = 1e-3;                          // [m] kept from the stock's far side
-constexpr double RUN_OUT_TIME = 0.1;                          // [s] of feed beyond the steady stretch
+constexpr double EXIT_MARGIN = 1e-3;                          // [m] from the far side of the stock
+constexpr double RUN_OUT_TIME = 0.1;                          // [s] of feed beyond the steady segment
 constexpr double SPIN_UP_RESERVE = 1.2, SPIN_UP_EXTRA = 0.3;  // [1], [s]
 
-/// The controller takes whole revolutions a minute.
+/// The controller accepts integer revolutions per minute.
 double wholeRpm(double speed) {
   return std::round(units::rpmFromRadPerSec(speed));
 }
@@ -28,22 +28,23 @@ double PlannedCut::duration() const {
 }
 
 void PathParameters::declareNames(ParameterTable& table) {
-  table.text("tool", tool, "name under which everything about the tool is filed");
-  table.text("material", material, "of the stock; empty: the model's workpiece.material");
+  table.text("tool", tool, "name of the tool in all results");
+  table.text("material", material, "material of the stock; empty: workpiece.material of the model");
 }
 
 void PathParameters::declarePaths(ParameterTable& table) {
   table.section("Paths.");
-  table.number("lane_margin", lane_margin, "m", Range::positive(), "of stock left between two slots");
+  table.number("lane_margin", lane_margin, "m", Range::positive(), "width of the stock between two slots");
   table.number("clearance", clearance, "m", Range::positive(),
-               "between tool and stock where the tool goes down");
+               "distance between tool and stock where the tool descends");
   table.number("safe_height", safe_height, "m", Range::positive(),
-               "above the stock: sideways motion is safe there");
-  table.number("plunge_feed", plunge_feed, "m/s", Range::positive(), "down into the material");
+               "height above the stock at which lateral motion is safe");
+  table.number("plunge_feed", plunge_feed, "m/s", Range::positive(),
+               "feed of the descent to the cutting height");
   table.number("spin_up_time", spin_up_time, "s", Range::positive(),
-               "to any speed, where the model has no spindle acceleration");
+               "spin-up time to any speed, if the model has no spindle acceleration");
   table.number("feed_block", feed_block, "1", Range::closed(0, 99999),
-               "N word of the block that feeds along, at which a record of Servo Guide may begin; 0: none");
+               "N word of the feed block, as a trigger for a record of Servo Guide; 0: none");
 }
 
 CutPlanner::CutPlanner(const MachineModel& model, const PathParameters& parameters)
@@ -63,11 +64,11 @@ CutPlanner::CutPlanner(const MachineModel& model, const PathParameters& paramete
   }
 }
 
-void CutPlanner::needLanes(std::size_t needed, const std::string& what) const {
+void CutPlanner::requireLanes(std::size_t needed, const std::string& purpose) const {
   if (needed <= lanes_) return;
-  throw Error(file_ + ": the stock is " + mm(stock_.high[1] - stock_.low[1]) + " wide in y and holds " +
-              std::to_string(lanes_) + " slots of " + mm(tool_.diameter) + " side by side, " +
-              std::to_string(needed) + " are due (" + what + ")");
+  throw Error(file_ + ": the stock is " + mm(stock_.high[1] - stock_.low[1]) +
+              " wide in y and has space for " + std::to_string(lanes_) + " slots of " + mm(tool_.diameter) +
+              ", expected " + std::to_string(needed) + " (" + purpose + ")");
 }
 
 double CutPlanner::laneY(std::size_t lane) const {
@@ -82,8 +83,8 @@ double CutPlanner::spinUp(double speed) const {
 
 void CutPlanner::checkSpeed(const std::string& name, double speed) const {
   if (spindle_.max_speed && wholeRpm(speed) > units::rpmFromRadPerSec(*spindle_.max_speed) * (1.0 + 1e-9)) {
-    throw Error(name + ": " + shown(wholeRpm(speed), 0) + " rpm, the spindle of " + file_ +
-                " turns at most " + shown(units::rpmFromRadPerSec(*spindle_.max_speed), 0) + " rpm");
+    throw Error(name + ": " + numberText(wholeRpm(speed), 0) + " rpm, the maximum speed of the spindle of " +
+                file_ + " is " + numberText(units::rpmFromRadPerSec(*spindle_.max_speed), 0) + " rpm");
   }
 }
 
@@ -91,7 +92,7 @@ PlannedCut CutPlanner::air(double speed, double time) const {
   PlannedCut air;
   const double rpm = wholeRpm(speed);
   air.condition.kind = CuttingCondition::Kind::air;
-  air.condition.name = "air_" + shown(rpm, 0);
+  air.condition.name = "air_" + numberText(rpm, 0);
   air.condition.material = material_;
   air.condition.tool_name = parameters_.tool;
   air.condition.tool = tool_;
@@ -103,43 +104,43 @@ PlannedCut CutPlanner::air(double speed, double time) const {
   return air;
 }
 
-PlannedCut CutPlanner::slot(const SlotWish& wish) const {
-  checkSpeed(wish.name, wish.speed);
-  if (!(wish.depth > 0.0) || wish.depth > stock_.high[2] - stock_.low[2]) {
-    throw Error(wish.name + ": a depth of " + mm(wish.depth) + " in a stock " +
-                mm(stock_.high[2] - stock_.low[2]) + " high");
+PlannedCut CutPlanner::slot(const SlotRequest& request) const {
+  checkSpeed(request.name, request.speed);
+  if (!(request.depth > 0.0) || request.depth > stock_.high[2] - stock_.low[2]) {
+    throw Error(request.name + ": a depth of " + mm(request.depth) + ", the height of the stock is " +
+                mm(stock_.high[2] - stock_.low[2]));
   }
-  const double rpm = wholeRpm(wish.speed);
-  const double feed_a_turn = wish.feed_per_tooth * tool_.teeth;
+  const double rpm = wholeRpm(request.speed);
+  const double feed_per_revolution = request.feed_per_tooth * tool_.teeth;
   PlannedCut planned;
-  planned.feed = feed_a_turn * rpm / 60.0;
+  planned.feed = feed_per_revolution * rpm / 60.0;
   if (planned.feed > axes_.rapid) {
-    throw Error(wish.name + ": a feed of " + shown(planned.feed / units::MM * 60.0) +
-                " mm/min, the axes of " + file_ + " do at most " + shown(axes_.rapid / units::MM * 60.0) +
-                " mm/min");
+    throw Error(request.name + ": a feed of " + numberText(planned.feed / units::MM * 60.0) +
+                " mm/min, the maximum feed of the axes of " + file_ + " is " +
+                numberText(axes_.rapid / units::MM * 60.0) + " mm/min");
   }
-  planned.spin_up = spinUp(wish.speed);
-  const double y = laneY(wish.lane), z = stock_.high[2] - wish.depth;
+  planned.spin_up = spinUp(request.speed);
+  const double y = laneY(request.lane), z = stock_.high[2] - request.depth;
   planned.from = {stock_.low[0] - tool_.radius() - parameters_.clearance, y, z};
-  const double steady_from = stock_.low[0] + tool_.radius() + feed_a_turn;
+  const double steady_from = stock_.low[0] + tool_.radius() + feed_per_revolution;
   const double far_end = stock_.high[0] - tool_.radius() - EXIT_MARGIN;
   const double run_out = planned.feed * RUN_OUT_TIME;
-  const double steady_to = std::min(far_end, steady_from + planned.feed * wish.time);
+  const double steady_to = std::min(far_end, steady_from + planned.feed * request.time);
   const double time = (steady_to - steady_from) / planned.feed;
-  if (!(time >= std::min(wish.least_time, wish.time))) {
-    throw Error(wish.name + ": cuts steadily for " + shown(std::max(time, 0.0), 2) + " s along the stock's " +
-                mm(stock_.high[0] - stock_.low[0]) + ", " + shown(wish.least_time, 2) +
-                " s are due (slower feed or longer stock)");
+  if (!(time >= std::min(request.least_time, request.time))) {
+    throw Error(request.name + ": steady cutting for " + numberText(std::max(time, 0.0), 2) + " s along " +
+                mm(stock_.high[0] - stock_.low[0]) + " of stock, expected at least " +
+                numberText(request.least_time, 2) + " s (reduce the feed or use a longer stock)");
   }
   planned.to = {steady_to + run_out, y, z};
   CuttingCondition& condition = planned.condition;
   condition.kind = CuttingCondition::Kind::cut;
-  condition.name = wish.name;
+  condition.name = request.name;
   condition.material = material_;
   condition.tool_name = parameters_.tool;
   condition.tool = tool_;
   condition.tool.pitch.clear();
-  condition.engagement = {0.0, units::PI, wish.depth, wish.feed_per_tooth};
+  condition.engagement = {0.0, units::PI, request.depth, request.feed_per_tooth};
   condition.spindle_speed = units::radPerSecFromRpm(rpm);
   condition.steady_from = {steady_from, y, z};
   condition.steady_to = {steady_to, y, z};
@@ -148,28 +149,29 @@ PlannedCut CutPlanner::slot(const SlotWish& wish) const {
 }
 
 void CutPlanner::checkTravel(const PlannedCut& cut) const {
-  for (const std::array<double, 3>& place : {cut.from, cut.to}) {
+  for (const std::array<double, 3>& point : {cut.from, cut.to}) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (place[axis] < axes_.travel[axis][0] || place[axis] > axes_.travel[axis][1]) {
-        throw Error(cut.condition.name + ": " + "xyz"[axis] + " = " + mm(place[axis]) +
+      if (point[axis] < axes_.travel[axis][0] || point[axis] > axes_.travel[axis][1]) {
+        throw Error(cut.condition.name + ": " + "xyz"[axis] + " = " + mm(point[axis]) +
                     " is beyond the machine's travel");
       }
     }
   }
 }
 
-PlannedCut CutPlanner::airMove(double speed, double feed, double time, double way) const {
+PlannedCut CutPlanner::airMove(double speed, double feed, double time, double distance) const {
   PlannedCut planned = air(speed, 0.0);
   CuttingCondition& condition = planned.condition;
-  condition.name = "air_x_" + shown(feed / units::MM * 60.0, 0);
+  condition.name = "air_x_" + numberText(feed / units::MM * 60.0, 0);
   if (feed > axes_.rapid) {
-    throw Error(condition.name + ": a feed of " + shown(feed / units::MM * 60.0) + " mm/min, the axes of " +
-                file_ + " do at most " + shown(axes_.rapid / units::MM * 60.0) + " mm/min");
+    throw Error(condition.name + ": a feed of " + numberText(feed / units::MM * 60.0) +
+                " mm/min, the maximum feed of the axes of " + file_ + " is " +
+                numberText(axes_.rapid / units::MM * 60.0) + " mm/min");
   }
   planned.feed = feed;
   const double run_in = feed * RUN_OUT_TIME, y = laneY(0), z = stock_.high[2] + parameters_.safe_height;
   condition.steady_from = {stock_.low[0] + run_in, y, z};
-  condition.steady_to = {condition.steady_from[0] + std::max(way, feed * time), y, z};
+  condition.steady_to = {condition.steady_from[0] + std::max(distance, feed * time), y, z};
   planned.from = {stock_.low[0], y, z};
   planned.to = {condition.steady_to[0] + run_in, y, z};
   checkTravel(planned);
@@ -178,7 +180,7 @@ PlannedCut CutPlanner::airMove(double speed, double feed, double time, double wa
 
 std::string CutPlanner::program(const PlannedCut& cut, const std::array<double, 3>& position) const {
   std::string text = "(" + cut.condition.name + ")\nG91\n";
-  // Rounding does not add up: every increment leads to a whole number of the controller's steps from the
+  // Rounding errors do not accumulate: every target is an integer number of controller increments from the
   // start.
   std::array<long, 3> at{{0, 0, 0}};
   const double step = units::MM * std::pow(10.0, -DECIMALS);
@@ -189,15 +191,15 @@ std::string CutPlanner::program(const PlannedCut& cut, const std::array<double, 
       const long goal = std::lround((*target[axis] - position[axis]) / step);
       if (goal == at[axis]) continue;
       words += " " + std::string(1, "XYZ"[axis]) +
-               shown(static_cast<double>(goal - at[axis]) * step / units::MM, DECIMALS);
+               numberText(static_cast<double>(goal - at[axis]) * step / units::MM, DECIMALS);
       at[axis] = goal;
     }
     if (words.empty()) return;
-    text +=
-        feed > 0.0 ? "G1 F" + shown(feed / units::MM * 60.0, DECIMALS) + words + "\n" : "G0" + words + "\n";
+    text += feed > 0.0 ? "G1 F" + numberText(feed / units::MM * 60.0, DECIMALS) + words + "\n"
+                       : "G0" + words + "\n";
   };
   const auto dwell = [&](double time) { text += "G4 P" + std::to_string(std::lround(time * 1000.0)) + "\n"; };
-  const std::string speed = shown(units::rpmFromRadPerSec(cut.condition.spindle_speed), 0);
+  const std::string speed = numberText(units::rpmFromRadPerSec(cut.condition.spindle_speed), 0);
   if (!(cut.feed > 0.0)) {
     text += "S" + speed + " M3\n";
     dwell(cut.spin_up + cut.dwell);

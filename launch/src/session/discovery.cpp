@@ -23,9 +23,9 @@ namespace {
 namespace fs = std::filesystem;
 using discovery::Explained;
 
-std::string joined(const std::vector<std::string>& parts) {
+std::string joined(const std::vector<std::string>& texts) {
   std::string text;
-  for (const std::string& part : parts) text += (text.empty() ? "" : "; ") + part;
+  for (const std::string& item : texts) text += (text.empty() ? "" : "; ") + item;
   return text;
 }
 
@@ -36,18 +36,18 @@ Discovery::Discovery(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
       parameters_(parametersFromServer(private_nh).readAll<Parameters>()),
       model_(readMachineModel(parameters_.model)),
       planner_(model_, parameters_.paths),
-      place_(parameters_.folder, parameters_.model),
+      installed_model_(parameters_.folder, parameters_.model),
       driver_(nh_, [this] { return cancel_.load(); }),
       coefficients_(nh_.advertise<smartmill_msgs::CuttingCoefficients>(names::COEFFICIENTS, 10, true)),
       modes_(nh_, names::TOOL_MODES) {
-  parameters_.watched(planner_, "", 0);
+  parameters_.initialCuts(planner_, "", 0);
   if (!parameters_.prior.empty()) readCauseOdds(parameters_.prior);
   states_ = nh_.subscribe<smartmill_msgs::DiscrepancyState>(
       names::DISCREPANCY_STATE, 100,
       boost::function<void(const smartmill_msgs::DiscrepancyState&)>([this](const auto& m) {
         const std::lock_guard<std::mutex> lock(mutex_);
-        judged_.insert(m.condition);
-        last_judged_ = ros::WallTime::now();
+        monitored_.insert(m.condition);
+        last_monitored_ = ros::WallTime::now();
       }));
   server_ = std::make_unique<Server>(
       nh_, names::DISCOVER, boost::function<void(Handle)>([this](Handle handle) { onGoal(handle); }),
@@ -75,7 +75,7 @@ void Discovery::onGoal(Handle handle) {
     handle.setRejected(busy, busy.message);
     return;
   }
-  if (thread_.joinable()) thread_.join();  // it has nothing left to do
+  if (thread_.joinable()) thread_.join();  // it has finished its goal
   handle.setAccepted();
   active_ = handle;
   cancel_ = false;
@@ -104,10 +104,10 @@ void Discovery::work(Handle handle) {
     discover(*handle.getGoal(), result);
   } catch (const Interrupted&) {
     result.code = Result::CANCELLED;
-    result.message = "cancelled; what was recorded and explained until then is kept";
+    result.message = "cancelled; records and explanations up to now are kept";
   } catch (const Failure& failure) {
     result.code = failure.code;
-    result.message = failure.why;
+    result.message = failure.message;
   } catch (const std::exception& error) {
     result.code = Result::CUT_FAILED;
     result.message = error.what();
@@ -144,21 +144,22 @@ void Discovery::makeSafe(Result& result) {
 // ---------------------------------------------------------------------------------------------- the steps
 
 void Discovery::discover(const smartmill_msgs::DiscoverGoal& goal, Result& result) {
-  ready();
-  watch();
+  waitUntilReady();
+  makeInitialCuts();
   Explained explained = explain(result);
-  while (explained.wanted && makeWanted(*explained.wanted, goal, result)) explained = explain(result);
-  std::vector<std::string> said{explained.verdict};
-  for (const std::string& effect : result.effects) said.push_back(effect);
-  for (const std::string& rivals : explained.rivals) said.push_back("not told apart: " + rivals);
+  while (explained.suggested_test && makeSuggestedTest(*explained.suggested_test, goal, result))
+    explained = explain(result);
+  std::vector<std::string> messages{explained.verdict};
+  for (const std::string& effect : result.effects) messages.push_back(effect);
+  for (const std::string& rivals : explained.rivals) messages.push_back("not distinguished: " + rivals);
   if (goal.install && explained.better) {
     install(result);
-    said.push_back("installed, the model before is kept in " + place_.kept());
+    messages.push_back("installed, the previous model is kept in " + installed_model_.replaced());
   }
-  result.message = joined(said);
+  result.message = joined(messages);
 }
 
-void Discovery::ready() {
+void Discovery::waitUntilReady() {
   stage("waiting for nodes and controller");
   const ros::Time now = ros::Time::now();
   const auto missing = [&] {
@@ -171,7 +172,7 @@ void Discovery::ready() {
   };
   if (!driver_.waitUntil([&] { return missing().empty(); }, parameters_.ready_timeout)) {
     throw Failure{Result::NOT_READY,
-                  "after " + shown(parameters_.ready_timeout, 0) + " s still missing: " + missing()};
+                  "after " + numberText(parameters_.ready_timeout, 0) + " s still missing: " + missing()};
   }
   if (!driver_.state().armed) {
     throw Failure{Result::NOT_ARMED,
@@ -179,10 +180,11 @@ void Discovery::ready() {
   }
 }
 
-void Discovery::watch() {
+void Discovery::makeInitialCuts() {
   std::vector<PlannedCut> cuts;
   try {
-    cuts = parameters_.watched(planner_, goals_ == 1 ? "" : "again_" + std::to_string(goals_) + "_", lane_);
+    cuts =
+        parameters_.initialCuts(planner_, goals_ == 1 ? "" : "again_" + std::to_string(goals_) + "_", lane_);
   } catch (const Error& error) {
     throw Failure{Result::CUT_FAILED, error.what()};
   }
@@ -196,12 +198,12 @@ void Discovery::cut(const PlannedCut& planned) {
   if (planned.feed > 0.0) ++lane_;
   try {
     driver_.run(planner_, planned, parameters_.program_timeout);
-    const auto judged = [&] {
+    const auto monitored = [&] {
       const std::lock_guard<std::mutex> lock(mutex_);
-      return judged_.count(name) > 0;
+      return monitored_.count(name) > 0;
     };
-    if (!driver_.waitUntil(judged, parameters_.judged_timeout))
-      throw Error("the monitor has judged no stretch of it");
+    if (!driver_.waitUntil(monitored, parameters_.judged_timeout))
+      throw Error("no result of the monitor within " + numberText(parameters_.judged_timeout, 0) + " s");
   } catch (const Error& error) {
     throw Failure{Result::CUT_FAILED, "cut " + name + ": " + error.what()};
   }
@@ -210,18 +212,18 @@ void Discovery::cut(const PlannedCut& planned) {
 
 Explained Discovery::explain(Result& result) {
   const std::string out = parameters_.folder + "/explain_" + std::to_string(++explained_);
-  // The monitor may be at the last stretch yet.
+  // The monitor may still be processing the last segment.
   driver_.waitUntil(
       [&] {
         const std::lock_guard<std::mutex> lock(mutex_);
-        return (ros::WallTime::now() - last_judged_).toSec() > parameters_.quiet_time;
+        return (ros::WallTime::now() - last_monitored_).toSec() > parameters_.quiet_time;
       },
       parameters_.judged_timeout + parameters_.quiet_time);
   stage("explaining " + std::to_string(feedback_.cuts_done) + " cuts");
   if (!fs::exists(parameters_.record_folder + "/campaign.yaml")) {
-    throw Failure{
-        Result::EXPLAIN_FAILED,
-        parameters_.record_folder + ": the monitor has kept nothing there (record_folder, record_all)"};
+    throw Failure{Result::EXPLAIN_FAILED,
+                  parameters_.record_folder +
+                      ": no records of the monitor (its parameters record_folder and record_all)"};
   }
   std::error_code failed;
   fs::create_directories(out, failed);
@@ -231,7 +233,7 @@ Explained Discovery::explain(Result& result) {
   int code = 0;
   try {
     std::vector<std::string> arguments{
-        parameters_.record_folder,          "--model", place_.inUse(), "-o", out, "--threads",
+        parameters_.record_folder,          "--model", installed_model_.inUse(), "-o", out, "--threads",
         std::to_string(parameters_.threads)};
     if (!parameters_.prior.empty()) arguments.insert(arguments.end(), {"--prior", parameters_.prior});
     code = runTool({"explain", "the cause of the disagreement"}, arguments, log,
@@ -241,7 +243,7 @@ Explained Discovery::explain(Result& result) {
   }
   driver_.checkStop();
   if (code == 1)
-    throw Failure{Result::EXPLAIN_FAILED, "explain: the records cannot be worked with, see " + log};
+    throw Failure{Result::EXPLAIN_FAILED, "explain: the records cannot be evaluated, see " + log};
   try {
     const Explained explained = discovery::readExplained(out + "/report.json");
     result.verdict = explained.verdict;
@@ -256,59 +258,62 @@ Explained Discovery::explain(Result& result) {
   }
 }
 
-bool Discovery::makeWanted(const Explained::Wanted& wanted, const smartmill_msgs::DiscoverGoal& goal,
-                           Result& result) {
+bool Discovery::makeSuggestedTest(const Explained::SuggestedTest& suggested_test,
+                                  const smartmill_msgs::DiscoverGoal& goal, Result& result) {
   if (feedback_.tests_done >= goal.most_tests) {
-    result.tests.push_back("not made, the tests are used up: " + wanted.text);
+    result.tests.push_back("not made, maximum number of tests reached: " + suggested_test.text);
     return false;
   }
-  const std::string name = "asked_" + std::to_string(goals_) + "_" + std::to_string(feedback_.tests_done + 1);
+  const std::string name =
+      "suggested_" + std::to_string(goals_) + "_" + std::to_string(feedback_.tests_done + 1);
   PlannedCut planned;
   try {
-    planned = planWanted(planner_, wanted, parameters_.frame(name, lane_), parameters_.air_time);
+    planned = planSuggestedTest(planner_, suggested_test, parameters_.slotRequest(name, lane_),
+                                parameters_.air_time);
   } catch (const Error& error) {
-    result.tests.push_back("refused, " + std::string(error.what()) + ": " + wanted.text);
+    result.tests.push_back("refused, " + std::string(error.what()) + ": " + suggested_test.text);
     stage(result.tests.back());
     return false;
   }
-  stage("asked for " + wanted.text);
+  stage("suggested test " + suggested_test.text);
   cut(planned);
   ++feedback_.tests_done;
-  result.tests.push_back("made: " + wanted.text);
+  result.tests.push_back("made: " + suggested_test.text);
   return true;
 }
 
 void Discovery::install(Result& result) {
   stage("installing the improved model");
   try {
-    place_.install(result.report + "/model.yaml");
+    installed_model_.install(result.report + "/model.yaml");
   } catch (const Error& error) {
     throw Failure{Result::NOT_INSTALLED, error.what()};
   }
   smartmill_msgs::InstallModel service;
-  service.request.file = place_.inUse();
-  const bool answered = driver_.ask(names::INSTALL_MODEL, service, MachineDriver::SERVICE_WAIT);
+  service.request.file = installed_model_.inUse();
+  const bool answered = driver_.callService(names::INSTALL_MODEL, service, MachineDriver::SERVICE_WAIT);
   if (!answered || service.response.code != smartmill_msgs::InstallModel::Response::OK) {
-    place_.undo();
+    installed_model_.undo();
     throw Failure{Result::NOT_INSTALLED,
                   std::string(names::INSTALL_MODEL) + ": " +
                       (answered ? service.response.message : std::string("no answer"))};
   }
-  result.model = place_.inUse();
-  // In the thread of the callbacks, which hands late subscribers what was said.
-  const MachineModel installed = readMachineModel(place_.inUse());
-  tell_ = nh_.createWallTimer(
-      ros::WallDuration(0.0), [this, installed](const ros::WallTimerEvent&) { tellCharts(installed); }, true);
+  result.model = installed_model_.inUse();
+  // In the thread of the callbacks, which serves the latched topics.
+  const MachineModel installed = readMachineModel(installed_model_.inUse());
+  publish_timer_ = nh_.createWallTimer(
+      ros::WallDuration(0.0), [this, installed](const ros::WallTimerEvent&) { publishModel(installed); },
+      true);
 }
 
-// Charts are made of what these topics say.
-void Discovery::tellCharts(const MachineModel& model) {
+// Publishes the inputs of the stability charts.
+void Discovery::publishModel(const MachineModel& model) {
   CoefficientSet set;
   set.stamp = toSec(ros::Time::now());
   set.tool = parameters_.paths.tool;
   set.material = planner_.material();
   set.source = "force";
-  set.value = model.needCutting("tell the charts");
+  set.value = model.needCutting("publish it for the stability charts");
   set.std_dev = NOT_IDENTIFIED;
   coefficients_.publish(toMsg(set));
   for (const char axis : {'x', 'y'}) {

@@ -19,32 +19,32 @@
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_launch/discovery/discovery_parameters.h"
 #include "smartmill_launch/discovery/explained.h"
-#include "smartmill_launch/discovery/model_place.h"
+#include "smartmill_launch/discovery/installed_model.h"
 #include "smartmill_ros/latched_topic.h"
 
 namespace smartmill::session {
 
-/// The action `discover`: cuts while the monitor watches, lets `explain` say why the machine differs, makes
-/// the tests that it asks for, and installs the improved model. One goal at a time, in a thread of its own.
+/// The action `discover`: runs cuts that the monitor records, runs `explain` on the records, makes the tests
+/// that it suggests, and installs the improved model. One goal at a time, in its own thread.
 class Discovery {
  public:
   using Parameters = discovery::DiscoveryParameters;
-  /// @throws Error on a wrong parameter or model, or cuts that do not fit.
+  /// @throws Error on an invalid parameter or model, or cuts that do not fit machine or stock.
   Discovery(ros::NodeHandle nh, const ros::NodeHandle& private_nh);
   ~Discovery() { stop(); }
 
-  /// The program is to end: a running discovery is cancelled, the machine made safe. Callbacks go on
-  /// meanwhile.
+  /// Cancels a running discovery and makes the machine safe, before the program ends. Requires running
+  /// callbacks.
   void stop();
 
  private:
   using Server = actionlib::ActionServer<smartmill_msgs::DiscoverAction>;
   using Handle = Server::GoalHandle;
   using Result = smartmill_msgs::DiscoverResult;
-  /// An end that is not OK.
+  /// Ends a discovery with a code other than OK.
   struct Failure {
     std::uint8_t code;
-    std::string why;
+    std::string message;
   };
 
   void onGoal(Handle handle);
@@ -53,32 +53,32 @@ class Discovery {
   void discover(const smartmill_msgs::DiscoverGoal& goal, Result& result);
   void finish(Handle& handle, const Result& result);
 
-  void ready();
-  void watch();
+  void waitUntilReady();
+  void makeInitialCuts();
   void cut(const PlannedCut& cut);
   discovery::Explained explain(Result& result);
-  bool makeWanted(const discovery::Explained::Wanted& wanted, const smartmill_msgs::DiscoverGoal& goal,
-                  Result& result);
+  bool makeSuggestedTest(const discovery::Explained::SuggestedTest& suggested_test,
+                         const smartmill_msgs::DiscoverGoal& goal, Result& result);
   void install(Result& result);
-  void tellCharts(const MachineModel& model);
+  void publishModel(const MachineModel& model);
   void makeSafe(Result& result);
   void stage(const std::string& text);
 
   ros::NodeHandle nh_;
   Parameters parameters_;
-  MachineModel model_;  // as believed when the node started
+  MachineModel model_;  // nominal model at the start of the node
   CutPlanner planner_;
-  discovery::ModelPlace place_;
+  discovery::InstalledModel installed_model_;
   MachineDriver driver_;
 
-  std::mutex mutex_;              // of what the callbacks share with the thread
-  std::set<std::string> judged_;  // conditions
-  ros::WallTime last_judged_;
+  std::mutex mutex_;                 // guards the members up to thread_
+  std::set<std::string> monitored_;  // conditions with a result of the monitor
+  ros::WallTime last_monitored_;
   std::optional<Handle> active_;
   std::atomic<bool> cancel_{false}, stopping_{false};
   std::thread thread_;
 
-  // Of the thread.
+  // Used by the thread only.
   std::size_t lane_ = 0, explained_ = 0, goals_ = 0;
   bool moved_ = false;
   smartmill_msgs::DiscoverFeedback feedback_;
@@ -86,7 +86,7 @@ class Discovery {
   ros::Subscriber states_;
   ros::Publisher coefficients_;
   LatchedTopic<smartmill_msgs::ModalModel> modes_;
-  ros::WallTimer tell_;
+  ros::WallTimer publish_timer_;
   std::unique_ptr<Server> server_;
 };
 

@@ -14,8 +14,8 @@
 namespace smartmill::session {
 namespace {
 
-constexpr double HURRY = 0.4;          // [s] of each thing done when the program is to end
-constexpr double STOP_TIMEOUT = 10.0;  // [s] for the spindle's stop after a failure
+constexpr double HURRY = 0.4;          // [s] for each step when the program must end
+constexpr double STOP_TIMEOUT = 10.0;  // [s] to stop the spindle after a failure
 
 }  // namespace
 
@@ -51,42 +51,46 @@ bool MachineDriver::waitUntil(const std::function<bool()>& ready, double seconds
 std::string MachineDriver::arm(bool on, double timeout) {
   smartmill_msgs::ArmMotion service;
   service.request.arm = on;
-  if (!ask(names::ARM_MOTION, service, timeout)) throw Error(std::string(names::ARM_MOTION) + ": no answer");
+  if (!callService(names::ARM_MOTION, service, timeout))
+    throw Error(std::string(names::ARM_MOTION) + ": no answer");
   if (service.response.code != smartmill_msgs::ArmMotion::Response::OK) throw Error(service.response.message);
   return service.response.message;
 }
 
-// The place where the last motion has ended: a state asked for after it.
-std::array<double, 3> MachineDriver::standing() const {
+// Position after the last motion, from a controller state that is newer than the call.
+std::array<double, 3> MachineDriver::restPosition() const {
   const ros::Time now = ros::Time::now();
   std::array<double, 3> position{};
-  const auto stands = [&] {
-    const smartmill_msgs::CncState seen = state();
-    if (seen.header.stamp < now || !seen.connected || seen.motion) return false;
+  const auto at_rest = [&] {
+    const smartmill_msgs::CncState current = state();
+    if (current.header.stamp < now || !current.connected || current.motion) return false;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto name = std::find(seen.axes.begin(), seen.axes.end(), std::string(1, "XYZ"[axis]));
-      const auto index = static_cast<std::size_t>(name - seen.axes.begin());
-      if (index >= seen.position.size()) return false;
-      position[axis] = seen.position[index];
+      const auto name = std::find(current.axes.begin(), current.axes.end(), std::string(1, "XYZ"[axis]));
+      const auto index = static_cast<std::size_t>(name - current.axes.begin());
+      if (index >= current.position.size()) return false;
+      position[axis] = current.position[index];
     }
     return true;
   };
-  if (!waitUntil(stands, SERVICE_WAIT)) throw Error("cnc/state: no standing X, Y and Z axes are reported");
+  if (!waitUntil(at_rest, SERVICE_WAIT))
+    throw Error(
+        "cnc/state: expected a state with connected controller and X, Y and Z axes at rest, received none");
   return position;
 }
 
-std::string MachineDriver::run(const CutPlanner& planner, const PlannedCut& cut, double patience) {
-  const std::array<double, 3> position = standing();
+std::string MachineDriver::run(const CutPlanner& planner, const PlannedCut& cut, double extra_time) {
+  const std::array<double, 3> position = restPosition();
   smartmill_msgs::RunProgramGoal goal;
   goal.name = cut.condition.name;
   goal.program = planner.program(cut, position);
   goal.condition = toMsg(cut.condition);
-  call(program_, names::RUN_PROGRAM, goal, cut.duration() + patience);
-  std::string text = shown(units::rpmFromRadPerSec(cut.condition.spindle_speed), 0) + " rpm";
+  call(program_, names::RUN_PROGRAM, goal, cut.duration() + extra_time);
+  std::string text = numberText(units::rpmFromRadPerSec(cut.condition.spindle_speed), 0) + " rpm";
   if (cut.feed > 0.0) {
     const Engagement& engagement = cut.condition.engagement;
-    text += ", " + mm(engagement.axial_depth) + " deep, " + shown(engagement.feed_per_tooth / units::MM, 3) +
-            " mm a tooth, " + shown(cut.feed / units::MM * 60.0, 0) + " mm/min";
+    text += ", " + mm(engagement.axial_depth) + " deep, " +
+            numberText(engagement.feed_per_tooth / units::MM, 3) + " mm per tooth, " +
+            numberText(cut.feed / units::MM * 60.0, 0) + " mm/min";
   }
   return text;
 }

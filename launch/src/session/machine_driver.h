@@ -13,51 +13,53 @@
 #include <smartmill_msgs/CncState.h>
 #include <smartmill_msgs/RunProgramAction.h>
 
-#include "session/shown.h"
+#include "session/number_text.h"
 #include "smartmill_core/error.h"
 #include "smartmill_launch/session/cut_planner.h"
 
 namespace smartmill::session {
 
-/// Who asked for the work wants it ended; no failure of a step.
+/// The caller cancels the work; not a failure of a step.
 struct Interrupted {};
 
 template <class Action>
 using Client = actionlib::SimpleActionClient<Action>;
 
-/// Speaks the actions and services of the nodes for one who takes steps in order: waits with an end, a cause
-/// and an ear for being stopped; leads cuts through cnc/run_program.
+/// Client of the actions and services of the nodes for a sequence of steps. Every wait has a time limit,
+/// reports its cause and can be interrupted. Runs cuts by cnc/run_program.
 class MachineDriver {
  public:
   static constexpr double POLL = 0.01;         // [s]
   static constexpr double SERVICE_WAIT = 5.0;  // [s]
 
-  /// @param stopped asked again and again from the waiting thread @param subscriptions in whose queue the
-  /// controller's state is heard, from another thread
+  /// @param nh its callback queue, served by another thread, receives the controller state
+  /// @param stopped polled by the waiting thread; true interrupts it
   MachineDriver(ros::NodeHandle nh, std::function<bool()> stopped);
 
+  /// @throws Interrupted if stopped
   void checkStop() const;
-  /// @throws Interrupted
+  /// @return false: not ready in time. @throws Interrupted
   bool waitUntil(const std::function<bool()>& ready, double seconds) const;
 
-  /// @throws Error naming the action when it fails; Interrupted, the goal cancelled
+  /// @throws Error naming the action if it fails; Interrupted after cancelling the goal
   template <class Action, class Goal>
   auto call(Client<Action>& client, const std::string& name, Goal goal, double timeout) const;
   /// @return false: no answer in time
   template <class Service>
-  bool ask(const std::string& name, Service& service, double timeout) const;
+  bool callService(const std::string& name, Service& service, double timeout) const;
 
   bool reachable() const { return program_.isServerConnected(); }  ///< cnc/run_program
   smartmill_msgs::CncState state() const;
 
   std::string arm(bool on, double timeout = SERVICE_WAIT);
-  /// From wherever the machine stands. @param patience [s] beyond the cut's own time @return what it was
-  std::string run(const CutPlanner& planner, const PlannedCut& cut, double patience);
-  /// Stops the spindle and disarms. @param hurry the program is to end
+  /// Runs a cut from the current position. @param extra_time [s] beyond the duration of the cut @return its
+  /// conditions
+  std::string run(const CutPlanner& planner, const PlannedCut& cut, double extra_time);
+  /// Stops the spindle and disarms. @param hurry the program must end: short time limits
   std::string makeSafe(bool hurry);
 
  private:
-  std::array<double, 3> standing() const;
+  std::array<double, 3> restPosition() const;
 
   ros::NodeHandle nh_;
   std::function<bool()> stopped_;
@@ -69,10 +71,10 @@ class MachineDriver {
 
 template <class Action, class Goal>
 auto MachineDriver::call(Client<Action>& client, const std::string& name, Goal goal, double timeout) const {
-  static constexpr double GOAL_LEAD = 0.2;    // [s] a goal is with its node when its time comes
+  static constexpr double GOAL_LEAD = 0.2;    // [s] from the present to the goal's stamp, for its delivery
   static constexpr double CANCEL_WAIT = 0.8;  // [s] for a cancelled goal to end
   checkStop();
-  if (!client.isServerConnected()) throw Error(name + ": its node is gone");
+  if (!client.isServerConnected()) throw Error(name + ": its node has ended");
   goal.header.stamp = ros::Time::now() + ros::Duration(GOAL_LEAD);
   client.sendGoal(goal);
   bool ended = false;
@@ -80,7 +82,7 @@ auto MachineDriver::call(Client<Action>& client, const std::string& name, Goal g
   try {
     ended = waitUntil(
         [&] {
-          if (!client.isServerConnected()) fault = "its node is gone";
+          if (!client.isServerConnected()) fault = "its node has ended";
           return !fault.empty() || client.getState().isDone();
         },
         timeout);
@@ -94,7 +96,7 @@ auto MachineDriver::call(Client<Action>& client, const std::string& name, Goal g
   if (!fault.empty()) throw Error(name + ": " + fault);
   if (!ended) {
     client.cancelGoal();
-    throw Error(name + ": no result within " + shown(timeout, 0) + " s");
+    throw Error(name + ": no result within " + numberText(timeout, 0) + " s");
   }
   const auto result = client.getResult();
   const auto state = client.getState();
@@ -106,8 +108,8 @@ auto MachineDriver::call(Client<Action>& client, const std::string& name, Goal g
 }
 
 template <class Service>
-bool MachineDriver::ask(const std::string& name, Service& service, double timeout) const {
-  // A call cannot be given a time limit: it is left behind in its thread when it takes too long.
+bool MachineDriver::callService(const std::string& name, Service& service, double timeout) const {
+  // A service call has no time limit: if it takes too long, it continues in its detached thread.
   auto shared = std::make_shared<Service>(service);
   auto promise = std::make_shared<std::promise<bool>>();
   std::future<bool> answer = promise->get_future();

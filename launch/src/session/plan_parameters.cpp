@@ -5,39 +5,41 @@ namespace smartmill::session {
 namespace {
 
 void declareTests(PlanParameters& p, ParameterTable& table) {
-  table.section("Air cuts: the spindle's friction.");
+  table.section("Air cuts: friction of the spindle.");
   table.list("air_speeds", p.air_speeds, "rad/s", Range::positive(),
-             "3000, 6000, 9000, 12000 rpm; four or more");
-  table.number("air_time", p.air_time, "s", Range::positive(), "at speed");
+             "spindle speeds, four or more (3000, 6000, 9000, 12000 rpm)");
+  table.number("air_time", p.air_time, "s", Range::positive(), "time at speed");
   table.list(
       "air_feeds", p.air_feeds, "m/s", Range::positive(),
-      "moves in air along +x, for the feed drives' friction where motor currents are read; empty: none");
-  table.number("air_move_time", p.air_move_time, "s", Range::positive(), "of such a move");
+      "feeds of moves in air along +x, for the friction of the feed drives from motor currents; empty: none");
+  table.number("air_move_time", p.air_move_time, "s", Range::positive(), "minimum time of such a move");
   table.number("air_way", p.air_way, "m", Range::positive(),
-               "that it goes at least: three periods of a motor's current");
-  table.section("Slot tests: the cutting coefficients. Each in a lane of its own.");
-  table.number("slot_speed", p.slot_speed, "rad/s", Range::positive(), "4000 rpm");
-  table.number("slot_depth", p.slot_depth, "m", Range::positive(), "shallow: no chatter is wanted");
-  table.list("slot_feeds", p.slot_feeds, "m", Range::positive(), "a tooth; three or more");
-  table.number("slot_time", p.slot_time, "s", Range::positive(), "longest steady stretch");
+               "minimum distance of such a move: three periods of a motor's current");
+  table.section("Slot tests: cutting coefficients. Each slot has its own lane.");
+  table.number("slot_speed", p.slot_speed, "rad/s", Range::positive(), "spindle speed (4000 rpm)");
+  table.number("slot_depth", p.slot_depth, "m", Range::positive(), "axial depth, shallow to avoid chatter");
+  table.list("slot_feeds", p.slot_feeds, "m", Range::positive(), "feeds per tooth, three or more");
+  table.number("slot_time", p.slot_time, "s", Range::positive(), "maximum time of steady cutting");
   table.number("least_slot_time", p.least_slot_time, "s", Range::positive(),
-               "shortest; the load meter's settling takes about 0.2 s of it");
+               "minimum time of steady cutting; the load meter settles in about 0.2 s");
 }
 
 void declareChecks(PlanParameters& p, ParameterTable& table) {
-  table.section("The cuts that verify the chart, at the chart's feed per tooth.");
+  table.section("Cuts that verify the stability chart, at its feed per tooth.");
   table.number("stable_time", p.stable_time, "s", Range::positive(),
-               "longest steady stretch at the recommended point");
-  table.number("unstable_time", p.unstable_time, "s", Range::positive(), "at the unstable point");
+               "maximum time of steady cutting at the recommended point");
+  table.number("unstable_time", p.unstable_time, "s", Range::positive(),
+               "maximum time of steady cutting at the unstable point");
   table.number("least_revolutions", p.least_revolutions, "1", Range::positive(),
-               "of the spindle in a steady stretch, else the point is not taken");
+               "minimum spindle revolutions of steady cutting; points with fewer are skipped");
   table.section(
-      "A light cut whose teeth pass at the dynamometer's resonance: raw against compensated force.");
+      "A light cut with the tooth passing frequency at the resonance of the dynamometer: raw and compensated "
+      "force.");
   table.number("resonance_speed", p.resonance_speed, "rad/s", Range::notNegative(),
-               "13950 rpm, 4 teeth pass at 930 Hz; 0.0: none");
-  table.number("resonance_depth", p.resonance_depth, "m", Range::positive(), "of that cut");
-  table.number("resonance_feed", p.resonance_feed, "m", Range::positive(), "a tooth");
-  table.number("resonance_time", p.resonance_time, "s", Range::positive(), "longest steady stretch");
+               "spindle speed (13950 rpm: 4 teeth pass at 930 Hz); 0.0: no such cut");
+  table.number("resonance_depth", p.resonance_depth, "m", Range::positive(), "axial depth");
+  table.number("resonance_feed", p.resonance_feed, "m", Range::positive(), "feed per tooth");
+  table.number("resonance_time", p.resonance_time, "s", Range::positive(), "maximum time of steady cutting");
 }
 
 }  // namespace
@@ -51,11 +53,11 @@ void PlanParameters::declare(ParameterTable& table) {
 
 void PlanParameters::validate() const {
   checkBounds(*this);
-  if (tool.empty()) throw Error("tool: a name is due");
+  if (tool.empty()) throw Error("tool: empty, expected a name");
   if (air_speeds.size() < 4)
-    throw Error("air_speeds: " + std::to_string(air_speeds.size()) + " speeds, 4 or more are due");
+    throw Error("air_speeds: " + std::to_string(air_speeds.size()) + " speeds, expected 4 or more");
   if (slot_feeds.size() < 3)
-    throw Error("slot_feeds: " + std::to_string(slot_feeds.size()) + " feeds, 3 or more are due");
+    throw Error("slot_feeds: " + std::to_string(slot_feeds.size()) + " feeds, expected 3 or more");
 }
 
 }  // namespace smartmill::session

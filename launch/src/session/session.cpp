@@ -67,10 +67,10 @@ Session::Session(ros::NodeHandle nh, const ros::NodeHandle& private_nh, const st
     using Message = decltype(example);
     const boost::function<void(const Message&)> callback = [this, topic, use](const Message& message) {
       const std::lock_guard<std::mutex> lock(mutex_);
-      heard_[topic] = ros::WallTime::now();
+      last_received_[topic] = ros::WallTime::now();
       use(message);
     };
-    heard_[topic] = ros::WallTime(0);
+    last_received_[topic] = ros::WallTime(0);
     subscribers_.push_back(nh_.subscribe<Message>(topic, 200, callback));
   };
   subscribe(names::CNC_STATE, smartmill_msgs::CncState(), [](const auto&) {});
@@ -99,33 +99,34 @@ Session::~Session() {
   spinner_->stop();
 }
 
-// ---------------------------------------------------------------------------------------------- the job
+// ---------------------------------------------------------------------------------------------- all steps
 
 int Session::run() {
   int code = 1;
   try {
-    job();
+    runSteps();
     summary_.completed = true;
     code = 0;
   } catch (const Interrupted&) {
-    say("stop", "interrupted", armed_ ? "goals cancelled, motion is being disarmed" : "goals cancelled");
+    recordStep("stop", "interrupted",
+               armed_ ? "goals cancelled, motion is being disarmed" : "goals cancelled");
   } catch (const std::exception& error) {
-    say("FAIL", "session", error.what());
+    recordStep("FAIL", "session", error.what());
   }
   if (code != 0) makeSafe();
-  tell("", true);
+  publishState("", true);
   if (!parameters_.summary.empty()) {
     try {
       summary_.write(parameters_.summary);
     } catch (const Error& error) {
-      say("FAIL", "summary", error.what());
+      recordStep("FAIL", "summary", error.what());
       code = 1;
     }
   }
   return code;
 }
 
-void Session::job() {
+void Session::runSteps() {
   using smartmill_msgs::MeasureFrfAction;
   step("connect", [&] { return waitReady(); });
   step("arm motion", [&] { return arm(true); });
@@ -141,7 +142,7 @@ void Session::job() {
                      parameters_.sensor_hits, parameters_.sensor_modes);
     });
   }
-  step("forget earlier tests", [&] { return identify(true); });
+  step("discard earlier tests", [&] { return identify(true); });
   for (const PlannedCut& air : plan_.airCuts()) {
     step("air cut " + air.condition.name, [&] { return runCut(air); });
   }
@@ -154,7 +155,7 @@ void Session::job() {
   step("cutting coefficients", [&] { return identify(false); });
   if (parameters_.verify) {
     step("stability chart", [&] { return waitChart(); });
-    step("points to verify", [&] { return choose(); });
+    step("points to verify", [&] { return choosePoints(); });
     const double feed = used_chart_.feed_per_tooth;
     step("cut at the recommended point",
          [&] { return verify("stable", plan_.stable(stable_, feed), CutVerdict::Kind::stable); });
@@ -172,16 +173,16 @@ void Session::job() {
 
 void Session::step(const std::string& name, const std::function<std::string()>& work) {
   driver_.checkStop();
-  tell(name);
+  publishState(name);
   try {
     const std::string detail = work();
-    say("ok", name, detail);
+    recordStep("ok", name, detail);
   } catch (const Error& error) {
     throw Error(name + ": " + error.what());
   }
 }
 
-void Session::say(const char* mark, const std::string& name, const std::string& detail) {
+void Session::recordStep(const char* mark, const std::string& name, const std::string& detail) {
   const double elapsed = (ros::WallTime::now() - begin_).toSec();
   std::printf("session [%6.1f s] %-4s %s%s%s\n", elapsed, mark, name.c_str(), detail.empty() ? "" : ": ",
               detail.c_str());
@@ -191,8 +192,8 @@ void Session::say(const char* mark, const std::string& name, const std::string& 
   outcomes_.push_back(summary_.steps.back().done ? Step::DONE : *mark == 's' ? Step::STOPPED : Step::FAILED);
 }
 
-void Session::tell(const std::string& running, bool ended) {
-  constexpr double SENDING = 0.2;  // [s] that a latched message needs to leave before the program does
+void Session::publishState(const std::string& running, bool ended) {
+  constexpr double SENDING = 0.2;  // [s] for the transmission of the last message before the program ends
   smartmill_msgs::SessionState message;
   message.header.stamp = ros::Time::now();
   message.tool = summary_.tool;
@@ -238,7 +239,7 @@ std::string Session::missing() const {
   server(sensor_frf_.isServerConnected(), names::MEASURE_SENSOR_FRF);
   server(identify_.isServerConnected(), names::IDENTIFY_COEFFICIENTS);
   const std::lock_guard<std::mutex> lock(mutex_);
-  for (const auto& [topic, time] : heard_) {
+  for (const auto& [topic, time] : last_received_) {
     if ((ros::WallTime::now() - time).toSec() > FRESH) add("data on " + topic);
   }
   if (!driver_.state().connected) add("the controller's connection");
@@ -249,10 +250,10 @@ std::string Session::missing() const {
 std::string Session::recorderMissing() const {
   if (parameters_.recorder.empty()) return {};
   smartmill_msgs::Follow service;
-  if (!driver_.ask(parameters_.recorder + "/" + FOLLOW, service, MachineDriver::SERVICE_WAIT))
+  if (!driver_.callService(parameters_.recorder + "/" + FOLLOW, service, MachineDriver::SERVICE_WAIT))
     return "the recorder";
   const std::string topics = unconnected(service.response);
-  return topics.empty() ? "" : "the recorder's connection with " + topics;
+  return topics.empty() ? "" : "the recorder's subscription to " + topics;
 }
 
 // ---------------------------------------------------------------------------------------------- the steps
@@ -261,13 +262,13 @@ std::string Session::waitReady() {
   if (!waitUntil([&] { return missing().empty(); }, parameters_.ready_timeout)) {
     throw Error(formatted("after %.0f s still missing: ", parameters_.ready_timeout) + missing());
   }
-  // A recorder that misses something is no reason to leave the job.
+  // An incomplete recording does not prevent the session.
   std::string recorder;
   waitUntil([&] { return (recorder = recorderMissing()).empty(); }, parameters_.ready_timeout);
   pause(parameters_.start_delay);
-  return formatted("nodes, sensors and controller are there; the stock holds %.0f lanes",
+  return formatted("nodes, sensors and controller are available; the stock has space for %.0f lanes",
                    static_cast<double>(plan_.planner().lanes())) +
-         (recorder.empty() ? "" : "; not there: " + recorder);
+         (recorder.empty() ? "" : "; missing: " + recorder);
 }
 
 std::string Session::arm(bool on) {
@@ -297,15 +298,15 @@ std::string Session::runCut(const PlannedCut& cut) {
   return driver_.run(plan_.planner(), cut, parameters_.program_timeout);
 }
 
-// The detector says at once that a condition has ended; it does so when it has seen all before.
+// The detector reports the end of a condition after it has processed all data before it.
 void Session::waitVerdict() {
   const auto passed = [&] {
     const std::lock_guard<std::mutex> lock(mutex_);
     return verdict_ && verdict_->condition.empty() && verdict_->header.stamp > cut_from_;
   };
   if (!waitUntil(passed, parameters_.program_timeout)) {
-    throw Error(
-        formatted("chatter/state: %.0f s after the cut its end is not judged", parameters_.program_timeout));
+    throw Error(formatted("chatter/state: no verdict on the end of the cut within %.0f s",
+                          parameters_.program_timeout));
   }
 }
 
@@ -339,36 +340,39 @@ std::string Session::waitChart() {
                    static_cast<double>(used_chart_.recommended.size()));
 }
 
-std::string Session::choose() {
-  std::string why;
+std::string Session::choosePoints() {
+  std::string reasons;
   const double feed = used_chart_.feed_per_tooth;
-  const auto stable = plan_.firstStable(pointsOf(used_chart_.recommended), feed, why);
-  if (!stable) throw Error("no recommended point fits machine and stock" + (why.empty() ? "" : ": " + why));
-  why.clear();
-  const auto unstable = plan_.firstUnstable(pointsOf(used_chart_.unstable), feed, why);
-  if (!unstable) throw Error("no unstable point fits machine and stock" + (why.empty() ? "" : ": " + why));
+  const auto stable = plan_.firstStable(pointsOf(used_chart_.recommended), feed, reasons);
+  if (!stable)
+    throw Error("no recommended point fits machine and stock" + (reasons.empty() ? "" : ": " + reasons));
+  reasons.clear();
+  const auto unstable = plan_.firstUnstable(pointsOf(used_chart_.unstable), feed, reasons);
+  if (!unstable)
+    throw Error("no unstable point fits machine and stock" + (reasons.empty() ? "" : ": " + reasons));
   stable_ = *stable;
   unstable_ = *unstable;
   return "recommended " + pointText(stable_) + ", unstable " + pointText(unstable_);
 }
 
-std::string Session::verify(const char* role, const PlannedCut& cut, CutVerdict::Kind due) {
+std::string Session::verify(const char* role, const PlannedCut& cut, CutVerdict::Kind predicted) {
   const std::string detail = runCut(cut);
   waitVerdict();
   SessionSummary::Verified verified;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    verified.verdict = judge(windows_[cut.condition.name]);
+    verified.verdict = cutVerdict(windows_[cut.condition.name]);
   }
-  const Point& point = due == CutVerdict::Kind::stable ? stable_ : unstable_;
+  const Point& point = predicted == CutVerdict::Kind::stable ? stable_ : unstable_;
   verified.role = role;
   verified.spindle_speed = cut.condition.spindle_speed;
   verified.axial_depth = point.axial_depth;
   verified.depth_limit = point.depth_limit;
-  verified.as_predicted = verified.verdict.kind == due;
+  verified.as_predicted = verified.verdict.kind == predicted;
   summary_.verified.push_back(verified);
   return detail + "; " + verified.verdict.text() +
-         (verified.as_predicted ? ", as the chart says" : ", the chart says " + std::string(role));
+         (verified.as_predicted ? ", as predicted by the chart"
+                                : ", the chart predicts " + std::string(role));
 }
 
 // ---------------------------------------------------------------------------------------------- the end
@@ -376,10 +380,10 @@ std::string Session::verify(const char* role, const PlannedCut& cut, CutVerdict:
 void Session::makeSafe() {
   if (!armed_ || !ros::ok()) return;
   try {
-    say("stop", "disarm motion", driver_.makeSafe(stop_));
+    recordStep("stop", "disarm motion", driver_.makeSafe(stop_));
     armed_ = false;
   } catch (const Error& error) {
-    say("FAIL", "disarm motion", error.what());
+    recordStep("FAIL", "disarm motion", error.what());
   }
 }
 

@@ -24,11 +24,11 @@
 
 namespace smartmill::session {
 
-/// Takes the whole job through in order, speaking only actions and services of the other nodes.
+/// Runs all steps of a session in order, by actions and services of the other nodes.
 class Session {
  public:
-  /// @param stop set by a signal: goals are cancelled, motion disarmed. @throws Error on a wrong parameter or
-  /// a job that does not fit the machine.
+  /// @param stop set by a signal handler: goals are cancelled, motion is disarmed. @throws Error on an
+  /// invalid parameter or a session that does not fit the machine.
   Session(ros::NodeHandle nh, const ros::NodeHandle& private_nh, const std::atomic<bool>& stop);
   ~Session();
 
@@ -36,11 +36,11 @@ class Session {
   int run();
 
  private:
-  void job();
+  void runSteps();
   void step(const std::string& name, const std::function<std::string()>& work);
-  void say(const char* mark, const std::string& name, const std::string& detail);
-  /// The steps so far for who looks on. @param running name of a step that has begun; empty: none
-  void tell(const std::string& running, bool ended = false);
+  void recordStep(const char* mark, const std::string& name, const std::string& detail);
+  /// Publishes the steps so far. @param running name of the step in progress; empty: none
+  void publishState(const std::string& running, bool ended = false);
   void pause(double seconds) const;
   bool waitUntil(const std::function<bool()>& ready, double seconds) const;
 
@@ -52,8 +52,8 @@ class Session {
   void waitVerdict();
   std::string identify(bool reset);
   std::string waitChart();
-  std::string choose();
-  std::string verify(const char* role, const PlannedCut& cut, CutVerdict::Kind due);
+  std::string choosePoints();
+  std::string verify(const char* role, const PlannedCut& cut, CutVerdict::Kind predicted);
   void makeSafe();
   std::string missing() const;
   std::string recorderMissing() const;
@@ -75,11 +75,11 @@ class Session {
   std::vector<std::uint8_t> outcomes_;  // SessionStep.DONE, ... of the summary's steps
   std::unique_ptr<ros::AsyncSpinner> spinner_;
 
-  mutable std::mutex mutex_;  // of what subscribers write
-  std::map<std::string, ros::WallTime> heard_;
+  mutable std::mutex mutex_;                            // guards the members that subscribers write
+  std::map<std::string, ros::WallTime> last_received_;  // by topic
   std::optional<smartmill_msgs::StabilityChart> chart_;
   std::map<std::string, std::vector<ChatterWindow>> windows_;  // by condition
-  std::optional<smartmill_msgs::ChatterState> verdict_;        // the newest
+  std::optional<smartmill_msgs::ChatterState> verdict_;        // the latest
 
   ros::Time cut_from_;
   ros::Time coefficients_stamp_;

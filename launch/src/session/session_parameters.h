@@ -6,7 +6,7 @@
 
 namespace smartmill::session {
 
-/// Everything that session_node is told.
+/// Parameters of session_node.
 struct SessionParameters {
   std::string model;
   std::string summary;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "session/shown.h"
+#include "session/number_text.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
 
@@ -21,23 +21,23 @@ const PlanParameters& checked(const PlanParameters& parameters) {
 
 SessionPlan::SessionPlan(const MachineModel& model, const PlanParameters& parameters)
     : parameters_(checked(parameters)), planner_(model, parameters) {
-  const std::size_t verify = parameters_.slot_feeds.size();
+  const std::size_t slots = parameters_.slot_feeds.size();
   const bool with_resonance = parameters_.resonance_speed > 0.0;
-  const std::size_t needed = verify + VERIFYING_CUTS + (with_resonance ? 1 : 0);
-  planner_.needLanes(
-      needed, std::to_string(verify) + " slot tests, " + std::to_string(needed - verify) + " verifying cuts");
+  const std::size_t needed = slots + VERIFYING_CUTS + (with_resonance ? 1 : 0);
+  planner_.requireLanes(
+      needed, std::to_string(slots) + " slot tests, " + std::to_string(needed - slots) + " verifying cuts");
   for (double speed : parameters_.air_speeds) air_cuts_.push_back(planner_.air(speed, parameters_.air_time));
   for (double feed : parameters_.air_feeds)
     air_moves_.push_back(
         planner_.airMove(parameters_.slot_speed, feed, parameters_.air_move_time, parameters_.air_way));
-  for (std::size_t i = 0; i < verify; ++i) {
+  for (std::size_t i = 0; i < slots; ++i) {
     slots_.push_back(
         planner_.slot({"slot_" + std::to_string(i + 1), i, parameters_.slot_speed, parameters_.slot_depth,
                        parameters_.slot_feeds[i], parameters_.slot_time, parameters_.least_slot_time}));
   }
   if (with_resonance) {
     const double least = parameters_.least_revolutions * units::TWO_PI / parameters_.resonance_speed;
-    resonance_ = planner_.slot({"resonance", verify + VERIFYING_CUTS, parameters_.resonance_speed,
+    resonance_ = planner_.slot({"resonance", slots + VERIFYING_CUTS, parameters_.resonance_speed,
                                 parameters_.resonance_depth, parameters_.resonance_feed,
                                 parameters_.resonance_time, least});
   }
@@ -56,26 +56,26 @@ PlannedCut SessionPlan::unstable(const Point& point, double feed_per_tooth) cons
 }
 
 std::optional<Point> SessionPlan::firstStable(const std::vector<Point>& points, double feed_per_tooth,
-                                              std::string& why) const {
+                                              std::string& reasons) const {
   for (const Point& point : points) {
     try {
       stable(point, feed_per_tooth);
       return point;
     } catch (const Error& error) {
-      why += (why.empty() ? "" : "; ") + std::string(error.what());
+      reasons += (reasons.empty() ? "" : "; ") + std::string(error.what());
     }
   }
   return std::nullopt;
 }
 
 std::optional<Point> SessionPlan::firstUnstable(const std::vector<Point>& points, double feed_per_tooth,
-                                                std::string& why) const {
+                                                std::string& reasons) const {
   for (const Point& point : points) {
     try {
       unstable(point, feed_per_tooth);
       return point;
     } catch (const Error& error) {
-      why += (why.empty() ? "" : "; ") + std::string(error.what());
+      reasons += (reasons.empty() ? "" : "; ") + std::string(error.what());
     }
   }
   return std::nullopt;
@@ -102,16 +102,16 @@ std::string CutVerdict::text() const {
     case Kind::stable:
       return "stable" + share;
     case Kind::chatter:
-      return "chatter at " + shown(frequency) + " Hz, " + shown(severity, 0) + " N rms" + share;
+      return "chatter at " + numberText(frequency) + " Hz, " + numberText(severity, 0) + " N rms" + share;
     case Kind::undecided:
       return "undecided" + share;
     case Kind::unknown:
       break;
   }
-  return "not judged: " + std::to_string(windows) + " steady windows seen";
+  return "no verdict: " + std::to_string(windows) + " windows of steady cutting, expected two or more";
 }
 
-CutVerdict judge(const std::vector<ChatterWindow>& windows) {
+CutVerdict cutVerdict(const std::vector<ChatterWindow>& windows) {
   CutVerdict verdict;
   verdict.windows = windows.size();
   std::vector<double> frequencies;

@@ -9,20 +9,20 @@
 
 namespace smartmill::session {
 
-/// What a session did and found, measured values only; written as JSON.
+/// Steps and measured values of a session, written as JSON.
 struct SessionSummary {
   struct Step {
     std::string name, detail;
-    double elapsed = 0.0;  ///< [s] since the session's begin, at the step's end
-    bool done = true;      ///< false: it failed, detail says why
+    double elapsed = 0.0;  ///< [s] from the start of the session to the end of the step
+    bool done = true;      ///< false: failed, with the reason in detail
   };
   struct Verified {
-    std::string role;  ///< stable or unstable: what the chart says
+    std::string role;  ///< prediction of the chart: stable or unstable
     double spindle_speed = 0.0, axial_depth = 0.0, depth_limit = 0.0;  ///< [rad/s], [m], [m]
     CutVerdict verdict;
     bool as_predicted = false;
   };
-  bool completed = false;  ///< every step was done
+  bool completed = false;  ///< all steps are done
   std::string tool, material;
   std::vector<Step> steps;
   std::vector<MeasuredModes> modes;

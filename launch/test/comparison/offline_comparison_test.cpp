@@ -10,7 +10,7 @@ namespace {
 
 constexpr double NONE = std::numeric_limits<double>::infinity();
 
-TEST(Agreement, DifferencesCountAgainstTheLargestOfASeries) {
+TEST(Agreement, DifferencesAreRelativeToTheLargestOfASeries) {
   Agreement agreement;
   agreement.add({1.0, -200.0, 3.0}, {1.0, -200.0, 3.0 + 2e-7});
   EXPECT_EQ(agreement.compared, 3u);
@@ -19,9 +19,9 @@ TEST(Agreement, DifferencesCountAgainstTheLargestOfASeries) {
   EXPECT_FALSE(agreement.same(0.5e-9));
 }
 
-TEST(Agreement, WhatOnlyOneSideHasIsMissing) {
+TEST(Agreement, NumbersInOneSourceOnlyAreMissing) {
   Agreement agreement;
-  agreement.add({1.0, NONE, std::nan("")}, {1.0, std::nan(""), NONE});  // neither says a number: they agree
+  agreement.add({1.0, NONE, std::nan("")}, {1.0, std::nan(""), NONE});  // no finite number in either: equal
   EXPECT_TRUE(agreement.same(0.0));
   agreement.add({1.0, 2.0}, {1.0});
   EXPECT_EQ(agreement.missing, 1u);

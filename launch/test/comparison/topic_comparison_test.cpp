@@ -34,7 +34,7 @@ TEST(TopicComparison, SameInAnyOrderWithRepetitionsAndNaN) {
   EXPECT_EQ(same.common, 3u);
 }
 
-TEST(TopicComparison, TheLastDigitCounts) {
+TEST(TopicComparison, ADifferenceInTheLastDigitIsFound) {
   const double next = std::nextafter(1.0, 2.0);
   const TopicDifference difference = compare({block(1), block(2)}, {block(1), block(2, next)}, 0.0);
   EXPECT_FALSE(difference.same());
@@ -53,7 +53,7 @@ TEST(TopicComparison, NaNAgainstANumberAndOtherWordsDiffer) {
   EXPECT_FALSE(compare({block(1)}, {shorter}, 0.0).same());
 }
 
-TEST(TopicComparison, EndsAreForgivenWithinTheSlackOnly) {
+TEST(TopicComparison, EndsMayBeMissingWithinTheSlackOnly) {
   const TopicDifference ends = compare({block(1), block(2), block(3)}, {block(2), block(3), block(4)}, 0.015);
   EXPECT_TRUE(ends.same()) << ends.text("force");
   EXPECT_EQ(ends.first_ends, 1u);
@@ -74,14 +74,14 @@ TEST(TopicComparison, AMissingBlockInTheMiddleIsADifference) {
   EXPECT_EQ(two.missing, "sample 2");
 }
 
-TEST(TopicComparison, ABusyRecordersLossesMayBeForgivenDifferencesNot) {
+TEST(TopicComparison, AShareMayBeMissingButNotDifferent) {
   const TopicDifference hole = compare({block(1), block(2), block(3)}, {block(1), block(3)}, 0.0);
   EXPECT_TRUE(hole.sameButFor(0.34));  // one of three
   EXPECT_FALSE(hole.sameButFor(0.33));
   EXPECT_FALSE(compare({block(1), block(2)}, {block(1), block(2, 2.0)}, 0.0).sameButFor(1.0));
 }
 
-TEST(TopicComparison, NothingInCommonIsADifferenceNothingAtAllIsNot) {
+TEST(TopicComparison, NothingInCommonIsADifferenceUnlessBothAreEmpty) {
   EXPECT_FALSE(compare({block(1)}, {}, 10.0).same());
   EXPECT_FALSE(compare({}, {block(1)}, 10.0).same());
   EXPECT_TRUE(compare({}, {}, 10.0).same());

@@ -13,7 +13,7 @@
 #include "smartmill_launch/discovery/discovery_parameters.h"
 #include "smartmill_launch/discovery/discovery_report.h"
 #include "smartmill_launch/discovery/explained.h"
-#include "smartmill_launch/discovery/model_place.h"
+#include "smartmill_launch/discovery/installed_model.h"
 
 namespace smartmill::discovery {
 namespace {
@@ -65,10 +65,10 @@ TEST(Explained, isReadFromTheReport) {
   EXPECT_EQ(e.effects[0].text(), "runout: offset_um 9.02 +- 0.02, angle_deg 359 +- 1");
   EXPECT_EQ(e.effects[1].text(), "gain_error: gain 1.1 +- 0.01, channel fx");
   EXPECT_EQ(e.rivals, std::vector<std::string>{"runout or tooth_radius"});
-  ASSERT_TRUE(e.wanted);
-  EXPECT_TRUE(e.wanted->cut);
-  EXPECT_NEAR(e.wanted->speed, 753.98, 0.01);
-  EXPECT_NEAR(e.wanted->engagement.axial_depth, 3e-3, 1e-12);
+  ASSERT_TRUE(e.suggested_test);
+  EXPECT_TRUE(e.suggested_test->cut);
+  EXPECT_NEAR(e.suggested_test->speed, 753.98, 0.01);
+  EXPECT_NEAR(e.suggested_test->engagement.axial_depth, 3e-3, 1e-12);
   EXPECT_DOUBLE_EQ(e.gap_before, 21.0);
   EXPECT_DOUBLE_EQ(e.gap_after, 1.01);
   EXPECT_TRUE(e.better);
@@ -76,76 +76,78 @@ TEST(Explained, isReadFromTheReport) {
   EXPECT_THROW(readExplained(written(folder, "cut.json", "{\"verdict\": ")), Error);
 }
 
-TEST(Explained, aWantedTestKeepsToMachineAndStock) {
+TEST(Explained, aSuggestedTestMustFitMachineAndStock) {
   const TemporaryFolder folder;
   const session::CutPlanner planner(machine(), {});
-  const Explained::Wanted wanted = *readExplained(written(folder, "report.json", REPORT)).wanted;
+  const Explained::SuggestedTest suggested_test =
+      *readExplained(written(folder, "report.json", REPORT)).suggested_test;
   const DiscoveryParameters p;
-  const session::PlannedCut cut = planWanted(planner, wanted, p.frame("asked", 2), 1.0);
-  EXPECT_EQ(cut.condition.name, "asked");
+  const session::PlannedCut cut =
+      planSuggestedTest(planner, suggested_test, p.slotRequest("suggested", 2), 1.0);
+  EXPECT_EQ(cut.condition.name, "suggested");
   EXPECT_NEAR(cut.condition.engagement.axial_depth, 3e-3, 1e-12);
   EXPECT_NEAR(cut.from[2], -0.163, 1e-12);
   EXPECT_NEAR(cut.from[1], -0.06 + 2e-3 + 6e-3 + 2 * 14e-3, 1e-12);
   const auto refused = [&](auto change, std::size_t lane, const std::string& why) {
-    Explained::Wanted other = wanted;
+    Explained::SuggestedTest other = suggested_test;
     change(other);
     try {
-      planWanted(planner, other, p.frame("asked", lane), 1.0);
+      planSuggestedTest(planner, other, p.slotRequest("suggested", lane), 1.0);
       ADD_FAILURE() << why;
     } catch (const Error& error) {
       EXPECT_NE(std::string(error.what()).find(why), std::string::npos) << error.what();
     }
   };
   refused([](auto& w) { w.speed = 1100.0; }, 2,
-          "10504 rpm, the spindle of mill.yaml turns at most 10000 rpm");
+          "10504 rpm, the maximum speed of the spindle of mill.yaml is 10000 rpm");
   refused([](auto& w) { w.engagement.axial_depth = 0.05; }, 2,
-          "a depth of 50.00 mm in a stock 40.00 mm high");
-  refused([](auto& w) { w.engagement.exit = 1.0; }, 2, "from 0 to 57 deg, only full slots are cut here");
+          "a depth of 50.00 mm, the height of the stock is 40.00 mm");
+  refused([](auto& w) { w.engagement.exit = 1.0; }, 2, "from 0 to 57 deg, expected a full slot");
   refused([](auto& w) { w.engagement.feed_per_tooth = 2e-3; }, 2, "a feed of 57600.0 mm/min");
-  refused([](auto&) {}, 8, "holds 8 slots of 12.00 mm side by side, 9 are due");
-  Explained::Wanted air;
+  refused([](auto&) {}, 8, "has space for 8 slots of 12.00 mm, expected 9");
+  Explained::SuggestedTest air;
   air.speed = 500.0;
-  EXPECT_EQ(planWanted(planner, air, p.frame("asked", 9), 1.0).feed, 0.0);
+  EXPECT_EQ(planSuggestedTest(planner, air, p.slotRequest("suggested", 9), 1.0).feed, 0.0);
 }
 
-TEST(ModelPlace, keepsTheModelBefore) {
+TEST(InstalledModel, keepsThePreviousModel) {
   const TemporaryFolder folder;
-  const std::string believed = written(folder, "believed.yaml", "old"),
+  const std::string nominal = written(folder, "nominal.yaml", "old"),
                     better = written(folder, "better.yaml", "new"),
                     best = written(folder, "best.yaml", "newest");
-  ModelPlace place(folder.file("kept"), believed);
-  place.install(better);
-  EXPECT_EQ(place.inUse(), folder.file("kept/installed.yaml"));
-  EXPECT_EQ(contentOf(place.inUse()), "new");
-  EXPECT_EQ(contentOf(folder.file("kept/replaced_1.yaml")), "old");
-  EXPECT_EQ(contentOf(believed), "old");  // what the user gave stays as it is
-  place.install(best);
-  EXPECT_EQ(contentOf(place.inUse()), "newest");
-  EXPECT_EQ(contentOf(place.kept()), "new");
-  place.undo();
-  EXPECT_EQ(contentOf(place.inUse()), "new");
-  EXPECT_FALSE(fs::exists(folder.file("kept/replaced_2.yaml")));
+  InstalledModel installed(folder.file("models"), nominal);
+  installed.install(better);
+  EXPECT_EQ(installed.inUse(), folder.file("models/installed.yaml"));
+  EXPECT_EQ(contentOf(installed.inUse()), "new");
+  EXPECT_EQ(contentOf(folder.file("models/replaced_1.yaml")), "old");
+  EXPECT_EQ(contentOf(nominal), "old");  // the user's file is unchanged
+  installed.install(best);
+  EXPECT_EQ(contentOf(installed.inUse()), "newest");
+  EXPECT_EQ(contentOf(installed.replaced()), "new");
+  installed.undo();
+  EXPECT_EQ(contentOf(installed.inUse()), "new");
+  EXPECT_FALSE(fs::exists(folder.file("models/replaced_2.yaml")));
 }
 
-TEST(ModelPlace, changesNothingWhereItCannotWrite) {
+TEST(InstalledModel, changesNothingWhereItCannotWrite) {
   const TemporaryFolder folder;
-  const std::string believed = written(folder, "believed.yaml", "old"),
+  const std::string nominal = written(folder, "nominal.yaml", "old"),
                     better = written(folder, "better.yaml", "new");
-  ModelPlace place(folder.file("kept"), believed);
-  fs::create_directories(folder.file("kept/installed.yaml/in_the_way"));
+  InstalledModel installed(folder.file("models"), nominal);
+  fs::create_directories(folder.file("models/installed.yaml/in_the_way"));
   try {
-    place.install(better);
+    installed.install(better);
     ADD_FAILURE();
   } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("kept/installed.yaml: cannot be written"), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find("models/installed.yaml: cannot be written"), std::string::npos);
   }
-  EXPECT_EQ(place.inUse(), believed);
-  EXPECT_FALSE(fs::exists(folder.file("kept/replaced_1.yaml")));
-  ModelPlace nowhere("/proc/none", believed);
+  EXPECT_EQ(installed.inUse(), nominal);
+  EXPECT_FALSE(fs::exists(folder.file("models/replaced_1.yaml")));
+  InstalledModel nowhere("/proc/none", nominal);
   EXPECT_THROW(nowhere.install(better), Error);
 }
 
-TEST(Report, standsBesideWhatIsHidden) {
+TEST(Report, comparesIdentifiedWithHiddenEffects) {
   const TemporaryFolder folder;
   Explained e = readExplained(written(folder, "report.json", REPORT));
   const EffectEntry runout = effectEntry("runout", {{"offset_um", 9.0}, {"angle_deg", 1.0}}),
@@ -160,34 +162,34 @@ TEST(Report, standsBesideWhatIsHidden) {
   EXPECT_NE(r.text.find("| runout angle_deg | 359 +- 1 | 1 | -2.0 standard deviations |"), std::string::npos);
   EXPECT_NE(r.text.find("| gain_error channel | fx | fx |"), std::string::npos);
   EXPECT_NE(r.text.find("gap 21.000 -> 1.010"), std::string::npos);
-  EXPECT_NE(r.text.find("test asked for, made: a cut"), std::string::npos);
+  EXPECT_NE(r.text.find("suggested test made: a cut"), std::string::npos);
   r = reportOf(e, {}, {runout, helix});
   EXPECT_FALSE(r.named);
   EXPECT_NE(r.text.find("| helix helix_deg | - | 30 | not named |"), std::string::npos) << r.text;
   EXPECT_NE(r.text.find("not hidden"), std::string::npos);
 }
 
-TEST(Child, tellsHowAProgramEnded) {
+TEST(Child, returnsTheExitCode) {
   const TemporaryFolder folder;
-  const auto go = [] { return false; };
-  EXPECT_EQ(session::runChild({"sh", "-c", "echo said; exit 3"}, folder.file("log"), go), 3);
-  EXPECT_EQ(contentOf(folder.file("log")), "said\n");
+  const auto never = [] { return false; };
+  EXPECT_EQ(session::runChild({"sh", "-c", "echo output; exit 3"}, folder.file("log"), never), 3);
+  EXPECT_EQ(contentOf(folder.file("log")), "output\n");
   EXPECT_EQ(session::runChild({"sleep", "100"}, folder.file("log"), [] { return true; }), 128 + 2);
-  EXPECT_THROW(session::runChild({"no_such_program"}, folder.file("log"), go), Error);
-  EXPECT_THROW(session::runChild({"true"}, folder.file("none/log"), go), Error);
+  EXPECT_THROW(session::runChild({"no_such_program"}, folder.file("log"), never), Error);
+  EXPECT_THROW(session::runChild({"true"}, folder.file("none/log"), never), Error);
 }
 
-TEST(Parameters, theShippedFileIsTheTable) {
+TEST(Parameters, theShippedFileMatchesTheDeclaration) {
   expectShipped<DiscoveryParameters>("config/discover.yaml", "smartmill_launch discover_node");
 }
 
 TEST(Parameters, theShippedCutsFitTheShippedMachine) {
   const DiscoveryParameters p;
   const session::CutPlanner planner(readMachineModel("models/stub_mill.yaml"), p.paths);
-  const auto cuts = p.watched(planner, "", 0);
+  const auto cuts = p.initialCuts(planner, "", 0);
   EXPECT_EQ(cuts.size(), p.watch_air.size() + p.watch_speeds.size());
-  EXPECT_GE(planner.lanes(), 2 * p.watch_speeds.size());  // once more with the same stock
-  EXPECT_THROW(p.watched(planner, "", 9), Error);
+  EXPECT_GE(planner.lanes(), 2 * p.watch_speeds.size());  // a second discovery fits on the same stock
+  EXPECT_THROW(p.initialCuts(planner, "", 9), Error);
 }
 
 }  // namespace

@@ -40,7 +40,7 @@ TEST(Figure, DifferencesInPercentAndStandardDeviations) {
   EXPECT_TRUE(*figure.met());
   figure.estimate = 969.0;
   EXPECT_FALSE(*figure.met());
-  // A negative truth: more negative is below it.
+  // Relative to the magnitude of a negative truth.
   EXPECT_DOUBLE_EQ((Figure{"c", "N m", -11.0, 1.0, -10.0, {}}).percent(), -10.0);
 }
 
@@ -84,7 +84,7 @@ TEST(Modes, AnExtraOneHasNoPartner) {
   EXPECT_FALSE(matchModes({mode(100.0)}, {mode(1000.0)})[0]);
 }
 
-TEST(ForceTrack, SamplesMeetByIndexAcrossBlocks) {
+TEST(ForceTrack, AlignsSamplesByIndexAcrossBlocks) {
   ForceTrack track;
   track.add(block(110, 10));
   track.add(block(100, 10));
@@ -105,7 +105,7 @@ TEST(ForceTrack, SamplesMeetByIndexAcrossBlocks) {
   EXPECT_DOUBLE_EQ(begin[3], 101.0);
 }
 
-TEST(ForceTrack, LongestStretchWithoutGapAndOfOneStatus) {
+TEST(ForceTrack, LongestSegmentWithoutGapAndOfOneStatus) {
   ForceTrack track;
   track.add(block(100, 10));
   track.add(block(120, 10, ForceBlock::Status::settling));
@@ -122,28 +122,28 @@ TEST(MiddleRange, OfASineIsTwiceTheSineOf72Degrees) {
   // A sine spends a tenth of its time above sin(72 deg).
   std::vector<double> sine;
   for (int i = 0; i < 100000; ++i) sine.push_back(3.0 * std::sin(TWO_PI * i / 1000.0) + 40.0);
-  EXPECT_NEAR(middleRange(sine), 2.0 * 3.0 * std::sin(0.4 * units::PI), 0.01);  // steps of a thousandth turn
+  EXPECT_NEAR(middleRange(sine), 2.0 * 3.0 * std::sin(0.4 * units::PI), 0.01);  // 1000 samples per period
 }
 
 TEST(NonperiodicShare, ForcedVibrationHasNone) {
   std::vector<double> forced;
-  const double turn = 123.4;  // samples, not whole
+  const double period = 123.4;  // [samples] of a revolution, fractional
   for (int i = 0; i < 20000; ++i) {
-    forced.push_back(50.0 + 10.0 * std::sin(TWO_PI * i / turn) + 4.0 * std::cos(3.0 * TWO_PI * i / turn));
+    forced.push_back(50.0 + 10.0 * std::sin(TWO_PI * i / period) + 4.0 * std::cos(3.0 * TWO_PI * i / period));
   }
-  // Linear interpolation of the third harmonic at 41 samples a period leaves (2 pi / 41)^2 / 8 = 0.3 % of
-  // amplitude.
-  EXPECT_LT(nonperiodicShare(forced, turn, 16), 1e-4);
+  // Linear interpolation of the third harmonic at 41 samples per period has an error of (2 pi / 41)^2 / 8 =
+  // 0.3 % of the amplitude.
+  EXPECT_LT(nonperiodicShare(forced, period, 16), 1e-4);
 }
 
 TEST(NonperiodicShare, OfTwoLinesIsTheirEnergyRatio) {
-  // Energy of sines: half the amplitude squared. The chatter line stands clear of the harmonics.
+  // Energy of a sine: half the amplitude squared. The chatter line is far from the harmonics.
   std::vector<double> both;
-  const double turn = 400.0;
+  const double period = 400.0;
   for (int i = 0; i < 100000; ++i) {
-    both.push_back(10.0 * std::sin(TWO_PI * 2.0 * i / turn) + 5.0 * std::sin(TWO_PI * 5.37 * i / turn));
+    both.push_back(10.0 * std::sin(TWO_PI * 2.0 * i / period) + 5.0 * std::sin(TWO_PI * 5.37 * i / period));
   }
-  EXPECT_NEAR(nonperiodicShare(both, turn, 16), 25.0 / 125.0,
+  EXPECT_NEAR(nonperiodicShare(both, period, 16), 25.0 / 125.0,
               0.01);  // leakage into the mean over 16 revolutions
 }
 
@@ -152,12 +152,12 @@ TEST(NonperiodicShare, NoiseIsAllNonperiodic) {
   std::normal_distribution<double> normal;
   std::vector<double> noise;
   for (int i = 0; i < 100000; ++i) noise.push_back(normal(random));
-  // The mean over 16 revolutions takes one of 16 degrees of freedom; 4 sigma of 86,000 samples.
+  // The mean over 16 revolutions removes one of 16 degrees of freedom; tolerance 4 sigma of 86,000 samples.
   EXPECT_NEAR(nonperiodicShare(noise, 360.0, 16), 15.0 / 16.0, 0.005);
   EXPECT_TRUE(std::isnan(nonperiodicShare({1.0, 2.0}, 360.0, 16)));
 }
 
-TEST(Pockets, MaximaThatStandOut) {
+TEST(Pockets, MaximaAboveTheFactor) {
   std::vector<double> speeds, depths;
   for (int i = 0; i <= 1000; ++i) {
     speeds.push_back(100.0 + i);

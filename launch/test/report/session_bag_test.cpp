@@ -60,9 +60,9 @@ class SessionBag : public ::testing::Test {
     };
     using Kind = CuttingCondition::Kind;
     put(names::CUTTING_CONDITION, 10.0, condition(10.0, Kind::cut, "resonance"));
-    put(names::CUTTING_CONDITION, 10.01, condition(10.0, Kind::cut, "resonance"));  // latched, said again
-    put(names::CNC_STATE, 10.2, state(10.2, -0.05, SPEED));                         // not there yet
-    put(names::CNC_STATE, 10.4, state(10.4, 0.01, 0.9 * SPEED));                    // not at speed yet
+    put(names::CUTTING_CONDITION, 10.01, condition(10.0, Kind::cut, "resonance"));  // latched: repeated
+    put(names::CNC_STATE, 10.2, state(10.2, -0.05, SPEED));       // before the start of the steady path
+    put(names::CNC_STATE, 10.4, state(10.4, 0.01, 0.9 * SPEED));  // not at speed yet
     put(names::CNC_STATE, 10.6, state(10.6, 0.02, SPEED));
     put(names::CNC_STATE, 11.4, state(11.4, 0.09, SPEED));
     put(names::CNC_STATE, 11.6, state(11.6, 0.12, SPEED));  // past its end
@@ -77,7 +77,7 @@ class SessionBag : public ::testing::Test {
     window.valid = 0;
     put(names::CHATTER_STATE, 11.1, window);
     put(names::CUTTING_CONDITION, 12.0, condition(12.0, Kind::none));
-    // What the filter has held back arrives after the cut's end and belongs to it; what comes after does not.
+    // Delayed output of the filter: received after the end of the cut, stamped before it.
     put(names::FORCE_COMPENSATED, 12.05, force(11.99, 30464, 1.0));
     put(names::FORCE_COMPENSATED, 12.06, force(12.0, 30720, 1.0));
     CoefficientSet set;
@@ -100,7 +100,7 @@ class SessionBag : public ::testing::Test {
   const std::string file_ = folder_.file("session.bag");
 };
 
-TEST_F(SessionBag, CutsKnowTheirSteadyStretchAndTheirForces) {
+TEST_F(SessionBag, CutsHaveTheirSteadySegmentAndForces) {
   const SessionRecording recording = readSession(file_, {});
   ASSERT_EQ(recording.cuts.size(), 1u);
   const RecordedCut& cut = recording.cuts[0];
@@ -117,7 +117,7 @@ TEST_F(SessionBag, CutsKnowTheirSteadyStretchAndTheirForces) {
   EXPECT_TRUE(cut.raw.empty());
 }
 
-TEST_F(SessionBag, MeasuredAndTrueValuesAreKeptApart) {
+TEST_F(SessionBag, MeasuredAndTrueValuesAreSeparate) {
   const SessionRecording recording = readSession(file_, {});
   ASSERT_TRUE(recording.coefficients && recording.true_coefficients && recording.chart);
   EXPECT_DOUBLE_EQ(recording.coefficients->value.ktc, 8e8);

@@ -17,7 +17,7 @@ using session::CutVerdict;
 using units::TWO_PI;
 
 constexpr double RATE = 25600.0;          // [Hz]
-constexpr double SPEED = 100.0 * TWO_PI;  // [rad/s] 256 samples a revolution
+constexpr double SPEED = 100.0 * TWO_PI;  // [rad/s] 256 samples per revolution
 
 MeasuredModes modesOf(const std::string& direction, double frequency, double stiffness, double std_share) {
   MeasuredModes out;
@@ -55,9 +55,10 @@ ForceTrack sine(double amplitude, double line) {
     block.stamp = 10.0 + 0.5 * static_cast<double>(half);
     block.status = half == 0 ? ForceBlock::Status::settling : ForceBlock::Status::compensated;
     for (std::size_t i = 0; i < HALF; ++i) {
-      const double turned = static_cast<double>(block.first_index + i) / 256.0;
+      const double revolutions = static_cast<double>(block.first_index + i) / 256.0;
       for (std::size_t a = 0; a < 3; ++a)
-        block.force[a].push_back(amplitude * std::sin(TWO_PI * line * turned) / static_cast<double>(a + 1));
+        block.force[a].push_back(amplitude * std::sin(TWO_PI * line * revolutions) /
+                                 static_cast<double>(a + 1));
     }
     track.add(block);
   }
@@ -108,7 +109,7 @@ const Figure& figure(const Report& report, std::string_view name) {
   throw Error("no figure " + std::string(name));
 }
 
-TEST(SessionReport, FiguresStandBesideTheTruth) {
+TEST(SessionReport, ComparesFiguresWithTheTruth) {
   const Report report = makeReport(example(), {{}, {1.9e-3, 1.9e-3, NOT_A_NUMBER}, {}});
   const Figure& ktc = figure(report, "Ktc");
   EXPECT_NEAR(ktc.percent(), -1.0, 1e-9);
@@ -125,12 +126,12 @@ TEST(SessionReport, FiguresStandBesideTheTruth) {
   EXPECT_EQ(report.targets(), 11u);  // Ktc, frequency, stiffness, three ranges raw and compensated, two cuts
 }
 
-TEST(SessionReport, CutsAreHeldAgainstTheChart) {
+TEST(SessionReport, ComparesCutsWithTheChart) {
   SessionRecording recording = example();
   Report report = makeReport(recording, {});
   ASSERT_EQ(report.cuts.size(), 2u);
-  EXPECT_EQ(report.cuts[0].due, CutVerdict::Kind::stable);
-  EXPECT_EQ(report.cuts[1].due, CutVerdict::Kind::chatter);
+  EXPECT_EQ(report.cuts[0].predicted, CutVerdict::Kind::stable);
+  EXPECT_EQ(report.cuts[1].predicted, CutVerdict::Kind::chatter);
   EXPECT_TRUE(report.cuts[0].met() && report.cuts[1].met());
   EXPECT_LT(report.cuts[0].nonperiodic, 1e-3);
   EXPECT_GT(report.cuts[1].nonperiodic, 0.9);  // a line far from every harmonic
@@ -140,30 +141,30 @@ TEST(SessionReport, CutsAreHeldAgainstTheChart) {
   EXPECT_EQ(report.met() + 1, report.targets());
 }
 
-TEST(SessionReport, OnlySettledSamplesAreJudged) {
+TEST(SessionReport, EvaluatesSettledSamplesOnly) {
   const SessionRecording recording = example();
-  const auto [from, to] = judgedSamples(*recording.cut("resonance"), 10.0);
-  EXPECT_EQ(from, 12800u);  // the first block says that it is settling
+  const auto [from, to] = evaluatedSamples(*recording.cut("resonance"), 10.0);
+  EXPECT_EQ(from, 12800u);  // the first block is settling
   EXPECT_EQ(to, 24320u);    // 0.95 s
   RecordedCut never = *recording.cut("resonance");
   never.steady_from = never.steady_to = NOT_A_NUMBER;
-  EXPECT_EQ(judgedSamples(never, 10.0).first, judgedSamples(never, 10.0).second);
+  EXPECT_EQ(evaluatedSamples(never, 10.0).first, evaluatedSamples(never, 10.0).second);
 }
 
-TEST(SessionReport, AModeThatWasNotFoundIsAMiss) {
+TEST(SessionReport, AModeThatWasNotFoundMissesItsTargets) {
   SessionRecording recording = example();
   recording.true_modes[0].model.modes.push_back(modesOf("x", 3000.0, 40e6, 0.0).model.modes[0]);
   const Report report = makeReport(recording, {});
   EXPECT_FALSE(*figure(report, "x mode not found frequency").met());
 }
 
-TEST(SessionReport, WithoutTruthItTellsWhatItHas) {
+TEST(SessionReport, ReportsMeasuredValuesWithoutTruth) {
   SessionRecording recording = example();
   recording.true_modes.clear();
   recording.true_coefficients.reset();
   for (RecordedCut& c : recording.cuts) c.truth = ForceTrack();
   const Report report = makeReport(recording, {});
-  EXPECT_EQ(report.targets(), 2u);  // the cuts hold against the machine's own chart
+  EXPECT_EQ(report.targets(), 2u);  // the cuts, checked against the measured chart
   EXPECT_TRUE(std::isnan(figure(report, "Ktc").truth));
   EXPECT_NE(markdown(report).find("Ktc"), std::string::npos);
   EXPECT_NE(markdown(report).find("2 of 2 targets met"), std::string::npos);
@@ -193,7 +194,7 @@ TEST(SessionReport, ATrueLimitThatWasNotComputedLeavesItsTargetsUnchecked) {
   }
 }
 
-TEST(SessionReport, WhatAFailedSessionDidNotMeasureIsNotChecked) {
+TEST(SessionReport, ResultsThatAFailedSessionLacksAreNotChecked) {
   const std::string done = R"({"steps": [{"name": "connect", "done": true}]})";
   const std::string failed =
       R"({"steps": [{"name": "connect", "done": true}, {"name": "chart", "done": false, "detail": "no modes"}]})";
@@ -214,7 +215,7 @@ TEST(SessionReport, WhatAFailedSessionDidNotMeasureIsNotChecked) {
   EXPECT_EQ(nlohmann::json::parse(json(report, failed))["unchecked"].size(), report.unchecked.size());
 }
 
-TEST(SessionReport, SummaryForPrograms) {
+TEST(SessionReport, WritesAJsonSummary) {
   const Report report = makeReport(example(), {});
   const auto parsed = nlohmann::json::parse(json(report, R"({"tool": "end_mill"})"));
   EXPECT_EQ(parsed["session"]["tool"], "end_mill");

@@ -5,7 +5,7 @@
 namespace smartmill::session {
 namespace {
 
-TEST(Parameters, TheShippedFileIsTheTable) {
+TEST(Parameters, TheShippedFileMatchesTheDeclaration) {
   expectShipped<SessionParameters>("config/session.yaml", "smartmill_launch session_node");
 }
 

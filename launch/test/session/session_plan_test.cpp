@@ -36,24 +36,24 @@ std::string refusal(const MachineModel& model, const PlanParameters& parameters)
   return errorOf([&] { SessionPlan(model, parameters); });
 }
 
-/// Runs a program of increments: where the tool is after each line, in metres.
-struct Walk {
-  std::vector<std::array<double, 3>> places;
-  std::vector<double> feeds;  // [m/s], 0: rapid; one a place
-  double dwell = 0.0;         // [s]
-  double speed = 0.0;         // [rpm] of the last S
-  bool stopped = false;       // M5 at the end
+/// Path of the tool in an incremental NC program.
+struct ToolPath {
+  std::vector<std::array<double, 3>> points;  // [m] after each block with motion
+  std::vector<double> feeds;                  // [m/s] to each point, 0: rapid
+  double dwell = 0.0;                         // [s]
+  double speed = 0.0;                         // [rpm] of the last S
+  bool stopped = false;                       // M5 at the end
 };
 
-Walk walk(const std::string& program, std::array<double, 3> at) {
-  Walk out;
+ToolPath toolPathOf(const std::string& program, std::array<double, 3> at) {
+  ToolPath out;
   std::istringstream lines(program);
   std::string line;
   while (std::getline(lines, line)) {
     if (line.rfind("(", 0) == 0) continue;
     std::map<char, double> words;
-    std::istringstream parts(line);
-    for (std::string word; parts >> word;) words[word[0]] = std::stod(word.substr(1));
+    std::istringstream text(line);
+    for (std::string word; text >> word;) words[word[0]] = std::stod(word.substr(1));
     if (words.count('S')) out.speed = words['S'];
     if (words.count('P')) out.dwell += words['P'] / 1000.0;
     out.stopped = line == "M5";
@@ -64,13 +64,13 @@ Walk walk(const std::string& program, std::array<double, 3> at) {
       moved = true;
     }
     if (!moved) continue;
-    out.places.push_back(at);
+    out.points.push_back(at);
     out.feeds.push_back(words.count('F') ? words['F'] * MM / 60.0 : 0.0);
   }
   return out;
 }
 
-TEST(SessionPlan, FeedIsToothFeedTimesTeethTimesRevolutions) {
+TEST(SessionPlan, FeedIsFeedPerToothTimesTeethTimesSpeed) {
   PlanParameters parameters;
   parameters.slot_speed = radPerSecFromRpm(4000.0);
   const SessionPlan plan(mill(), parameters);
@@ -86,7 +86,7 @@ TEST(SessionPlan, FeedIsToothFeedTimesTeethTimesRevolutions) {
   }
 }
 
-TEST(SessionPlan, TheSteadyStretchIsFullyEngaged) {
+TEST(SessionPlan, TheSteadySegmentIsFullyEngaged) {
   const MachineModel model = mill();
   const SessionPlan plan(model, PlanParameters());
   const double radius = model.tool->radius();
@@ -97,19 +97,19 @@ TEST(SessionPlan, TheSteadyStretchIsFullyEngaged) {
   for (const PlannedCut& cut : cuts) {
     const auto& from = cut.condition.steady_from;
     const auto& to = cut.condition.steady_to;
-    // The whole front half of the tool is in the stock, and one turn's feed beyond: every tooth has cut.
+    // The front half of the tool is in the stock, advanced by the feed of a revolution: every tooth has cut.
     EXPECT_GE(from[0] - radius, model.workpiece->low[0]) << cut.condition.name;
     EXPECT_LE(to[0] + radius, model.workpiece->high[0]) << cut.condition.name;
     EXPECT_GT(to[0], from[0]);
     EXPECT_EQ(from[1], to[1]);
     EXPECT_NEAR(from[2], model.workpiece->high[2] - cut.condition.engagement.axial_depth, 1e-12);
-    // It comes down beside the stock and goes on a little after the stretch.
+    // The tool descends before the stock and moves on beyond the steady segment.
     EXPECT_LT(cut.from[0] + radius, model.workpiece->low[0]);
     EXPECT_GT(cut.to[0], to[0]);
   }
 }
 
-TEST(SessionPlan, LanesAreFullSlotsThatDoNotTouch) {
+TEST(SessionPlan, LanesAreSeparateFullSlots) {
   const MachineModel model = mill();
   const SessionPlan plan(model, PlanParameters());
   std::vector<PlannedCut> cuts = plan.slots();
@@ -125,27 +125,27 @@ TEST(SessionPlan, LanesAreFullSlotsThatDoNotTouch) {
   }
 }
 
-TEST(SessionPlan, ProgramEndsWhereThePlanSaysWithoutRoundingUp) {
+TEST(SessionPlan, ProgramEndsAtThePlannedPointWithoutAccumulatedRounding) {
   const SessionPlan plan(mill(), PlanParameters());
-  // A start that is no whole number of the controller's steps of 1 um.
+  // The start is no multiple of the controller increment of 1 um.
   const std::array<double, 3> start{0.1234567, -0.0123456, -0.0501234};
   for (const PlannedCut& cut : plan.slots()) {
-    const Walk path = walk(plan.planner().program(cut, start), start);
-    ASSERT_FALSE(path.places.empty());
+    const ToolPath path = toolPathOf(plan.planner().program(cut, start), start);
+    ASSERT_FALSE(path.points.empty());
     const double safe = -0.16 + PlanParameters().safe_height;
-    for (std::size_t axis = 0; axis < 2; ++axis) EXPECT_NEAR(path.places.back()[axis], cut.to[axis], 0.6e-6);
-    EXPECT_NEAR(path.places.back()[2], safe, 0.6e-6);
-    // Sideways only above the stock, except for the cut itself; down with the plunge feed.
+    for (std::size_t axis = 0; axis < 2; ++axis) EXPECT_NEAR(path.points.back()[axis], cut.to[axis], 0.6e-6);
+    EXPECT_NEAR(path.points.back()[2], safe, 0.6e-6);
+    // Lateral motion only above the stock, except for the cut; descent with the plunge feed.
     std::array<double, 3> last = start;
-    for (std::size_t i = 0; i < path.places.size(); ++i) {
-      const auto& place = path.places[i];
-      const bool sideways = std::abs(place[0] - last[0]) + std::abs(place[1] - last[1]) > 1e-9;
-      if (sideways && std::min(place[2], last[2]) < safe - 1e-6) {
+    for (std::size_t i = 0; i < path.points.size(); ++i) {
+      const auto& point = path.points[i];
+      const bool lateral = std::abs(point[0] - last[0]) + std::abs(point[1] - last[1]) > 1e-9;
+      if (lateral && std::min(point[2], last[2]) < safe - 1e-6) {
         EXPECT_NEAR(path.feeds[i], cut.feed, 1e-8);
-      } else if (place[2] < last[2] && place[2] < safe - 1e-6) {
+      } else if (point[2] < last[2] && point[2] < safe - 1e-6) {
         EXPECT_NEAR(path.feeds[i], PlanParameters().plunge_feed, 1e-8);
       }
-      last = place;
+      last = point;
     }
     EXPECT_DOUBLE_EQ(path.speed, 4000.0);
     // 0.4 s to 4000 rpm at 10000 rpm/s.
@@ -154,46 +154,46 @@ TEST(SessionPlan, ProgramEndsWhereThePlanSaysWithoutRoundingUp) {
   }
 }
 
-TEST(SessionPlan, ALowToolIsLiftedBeforeItMovesSideways) {
+TEST(SessionPlan, ALowToolIsLiftedBeforeLateralMotion) {
   const SessionPlan plan(mill(), PlanParameters());
   const std::array<double, 3> low{0.2, 0.0, -0.19};
-  const Walk path = walk(plan.planner().program(plan.slots()[0], low), low);
-  EXPECT_EQ(path.places[0][0], low[0]);
-  EXPECT_NEAR(path.places[0][2], -0.15, 1e-6);
+  const ToolPath path = toolPathOf(plan.planner().program(plan.slots()[0], low), low);
+  EXPECT_EQ(path.points[0][0], low[0]);
+  EXPECT_NEAR(path.points[0][2], -0.15, 1e-6);
 }
 
-TEST(SessionPlan, AirCutsTurnAtWholeRevolutionsAMinute) {
+TEST(SessionPlan, AirCutsHaveIntegerRpm) {
   PlanParameters parameters;
   const SessionPlan plan(mill(), parameters);
   ASSERT_EQ(plan.airCuts().size(), parameters.air_speeds.size());
   const PlannedCut& air = plan.airCuts()[0];
   EXPECT_NEAR(units::rpmFromRadPerSec(air.condition.spindle_speed), 3000.0, 1e-9);
-  const Walk path = walk(plan.planner().program(air, {0, 0, 0}), {0, 0, 0});
-  EXPECT_TRUE(path.places.empty());
+  const ToolPath path = toolPathOf(plan.planner().program(air, {0, 0, 0}), {0, 0, 0});
+  EXPECT_TRUE(path.points.empty());
   EXPECT_NEAR(path.dwell, air.spin_up + parameters.air_time, 1e-3);
   EXPECT_NEAR(air.duration(), path.dwell, 1e-3);
 }
 
 TEST(SessionPlan, ChoosesTheFirstPointThatFits) {
   const SessionPlan plan(mill(), PlanParameters());
-  std::string why;
+  std::string reasons;
   const Point too_fast{radPerSecFromRpm(25000.0), 1e-3, 2e-3, 1.0},
       too_deep{radPerSecFromRpm(9000.0), 0.05, 0.06, 1.0};
   const Point fits{radPerSecFromRpm(9000.0), 2e-3, 3e-3, 1.0};
-  const auto chosen = plan.firstStable({too_fast, too_deep, fits}, 1e-4, why);
+  const auto chosen = plan.firstStable({too_fast, too_deep, fits}, 1e-4, reasons);
   ASSERT_TRUE(chosen);
   EXPECT_DOUBLE_EQ(chosen->axial_depth, 2e-3);
-  EXPECT_NE(why.find("25000 rpm"), std::string::npos);
-  why.clear();
-  EXPECT_FALSE(plan.firstUnstable({too_fast, too_deep}, 1e-4, why));
-  EXPECT_NE(why.find("; "), std::string::npos);
+  EXPECT_NE(reasons.find("25000 rpm"), std::string::npos);
+  reasons.clear();
+  EXPECT_FALSE(plan.firstUnstable({too_fast, too_deep}, 1e-4, reasons));
+  EXPECT_NE(reasons.find("; "), std::string::npos);
 }
 
-TEST(SessionPlan, RefusesWhatDoesNotFitWithOneLine) {
+TEST(SessionPlan, RefusesCutsThatDoNotFitInOneLine) {
   PlanParameters parameters;
   MachineModel model = mill();
   parameters.slot_feeds.assign(12, 1e-4);
-  EXPECT_NE(refusal(model, parameters).find("15 are due"), std::string::npos) << refusal(model, parameters);
+  EXPECT_NE(refusal(model, parameters).find("expected 15"), std::string::npos) << refusal(model, parameters);
   parameters = PlanParameters();
   parameters.slot_speed = radPerSecFromRpm(20500.0);
   EXPECT_NE(refusal(model, parameters).find("20500 rpm"), std::string::npos);
@@ -207,7 +207,7 @@ TEST(SessionPlan, RefusesWhatDoesNotFitWithOneLine) {
   parameters = PlanParameters();
   parameters.slot_feeds[3] = 1e-3;  // 267 mm/s: the stock's 260 mm last less than a second
   parameters.least_slot_time = 1.5;
-  EXPECT_NE(refusal(model, parameters).find("1.50 s are due"), std::string::npos)
+  EXPECT_NE(refusal(model, parameters).find("expected at least 1.50 s"), std::string::npos)
       << refusal(model, parameters);
   parameters = PlanParameters();
   model.axes->travel[0][0] = -0.16;
@@ -231,18 +231,18 @@ TEST(PlanParameters, RefusesTooFewSpeedsAndFeedsAndValuesNotAboveZero) {
             std::string::npos);
 }
 
-TEST(Judge, ATenthForgivenHalfIsChatterFewSayNothing) {
+TEST(CutVerdict, StableToATenthChatterFromHalfUnknownForFewWindows) {
   const auto windows = [](int chatter, int all) {
     std::vector<ChatterWindow> out;
     for (int i = 0; i < all; ++i)
       out.push_back({i < chatter, i < chatter ? 800.0 + i : NOT_A_NUMBER, 1.0 * i});
     return out;
   };
-  EXPECT_EQ(judge({}).kind, CutVerdict::Kind::unknown);
-  EXPECT_EQ(judge(windows(1, 1)).kind, CutVerdict::Kind::unknown);
-  EXPECT_EQ(judge(windows(1, 10)).kind, CutVerdict::Kind::stable);
-  EXPECT_EQ(judge(windows(2, 10)).kind, CutVerdict::Kind::undecided);
-  const CutVerdict chatter = judge(windows(5, 10));
+  EXPECT_EQ(cutVerdict({}).kind, CutVerdict::Kind::unknown);
+  EXPECT_EQ(cutVerdict(windows(1, 1)).kind, CutVerdict::Kind::unknown);
+  EXPECT_EQ(cutVerdict(windows(1, 10)).kind, CutVerdict::Kind::stable);
+  EXPECT_EQ(cutVerdict(windows(2, 10)).kind, CutVerdict::Kind::undecided);
+  const CutVerdict chatter = cutVerdict(windows(5, 10));
   EXPECT_EQ(chatter.kind, CutVerdict::Kind::chatter);
   EXPECT_DOUBLE_EQ(chatter.frequency, 802.0);  // median of 800..804
   EXPECT_DOUBLE_EQ(chatter.severity, 9.0);

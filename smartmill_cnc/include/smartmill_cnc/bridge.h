@@ -14,10 +14,9 @@
 
 namespace smartmill::cnc {
 
-/// The bridge to the controller: keeps the connection, reads the state, runs programs. One thread drives it:
-/// fetch(now), then step(time at which the replies arrived), at a fixed period; the commands in between.
-/// Nothing here looks at a clock, except that waiting for an answer is bounded by the controller's reply
-/// timeout.
+/// The bridge to the controller: maintains the connection, reads the state, runs programs. Used by one
+/// thread: fetch(now), then step(time at which the replies arrived), at a fixed period; commands in between.
+/// Time is an argument; only the wait for a reply uses a clock, bounded by the controller's reply timeout.
 class Bridge {
  public:
   /// @param reconnect_period [s] > 0 between two attempts to connect
@@ -27,33 +26,33 @@ class Bridge {
   Bridge(const Bridge&) = delete;
   Bridge& operator=(const Bridge&) = delete;
 
-  /// Of log lines and diagnostics.
+  /// Name for log lines and diagnostics.
   std::string controllerName() const { return controller_->name(); }
 
-  /// Connects when it is time to, reads the controller. @param now [s] any steady time.
+  /// Connects if an attempt is scheduled, then reads the controller. @param now [s] any steady time.
   void fetch(double now);
-  /// Takes what fetch() read and goes on with the running motion. @param now [s] the stamp of what was read.
+  /// Processes the reading of fetch() and advances the running motion. @param now [s] stamp of the reading.
   void step(double now);
 
-  /// Last values; connected tells whether they are current.
+  /// Last values; current only if connected.
   const CncState& state() const { return state_; }
-  /// Read in the last step, nothing when not connected.
+  /// Load of the last step; empty without a connection.
   const std::optional<LoadSample>& load() const { return load_; }
-  /// Those that the controller shows; as of the last connection.
+  /// Active alarms, as of the last reading.
   const std::vector<ControllerAlarm>& alarms() const { return alarms_; }
-  /// Connections that came about and that were lost, since the start.
+  /// Connections made and lost since the start.
   Poller::Counts connections() const { return poller_.counts(); }
   /// [m] Increment of the controller's positions.
   double positionIncrement() const { return increment_; }
 
   Answer<ArmCode> arm(bool on);
-  /// Of the running program, while motion is armed. @param reason for the log
+  /// Sets the overrides of the running program while motion is armed. @param reason for the log
   OverrideAnswer setOverrides(const Overrides& wanted, const std::string& reason);
-  /// Feed hold, while motion is armed.
+  /// Feed hold while motion is armed.
   Answer<HoldCode> hold();
   Answer<MacroCode> setMacro(int number, double value);
 
-  /// Starts a motion; an Outcome now is a refusal, nothing was sent (MotionMachine).
+  /// Starts a motion. @return the refusal, if any; nothing was sent then.
   std::optional<Outcome> runProgram(const std::string& name, const std::string& program,
                                     const CuttingCondition& condition) {
     return motion_.runProgram(name, program, condition);
@@ -64,22 +63,22 @@ class Bridge {
   }
   /// @param angle [rad]
   std::optional<Outcome> orient(double angle) { return motion_.orient(angle); }
-  /// Stops the running motion; its Outcome follows when it stands.
+  /// Stops the running motion; its Outcome follows at standstill.
   void cancel();
-  /// Stops and closes at once: the program ends.
+  /// Stops any motion and closes the connection, at the end of the process.
   void shutdown();
 
   bool busy() const { return motion_.busy(); }
   Progress progress() const { return motion_.progress(); }
-  /// How the last motion ended, once.
+  /// Outcome of the last motion; returned once.
   std::optional<Outcome> takeOutcome() { return motion_.takeOutcome(); }
   /// Cutting conditions that began or ended since the last call, with their stamps.
   std::vector<CuttingCondition> takeConditions() { return motion_.takeConditions(); }
-  std::vector<Note> takeNotes() { return log_.take(); }
+  std::vector<LogEntry> takeLogEntries() { return log_.take(); }
 
  private:
-  /// Remembers why the connection went, when it did.
-  void notice(const Status& status);
+  /// Stores the reason of a lost connection.
+  void noteLoss(const Status& status);
   void endWithoutConnection(double now);
 
   Log log_;

@@ -4,7 +4,7 @@
 
 namespace smartmill::cnc {
 
-/// A recorded session with a Fanuc controller.
+/// Records a session with a Fanuc controller.
 Command captureCommand();
 
 }  // namespace smartmill::cnc

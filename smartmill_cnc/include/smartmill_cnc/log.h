@@ -6,23 +6,23 @@
 
 namespace smartmill::cnc {
 
-/// A line for the log.
-struct Note {
+/// One line of the log.
+struct LogEntry {
   enum class Level { info, warning, error };
   Level level = Level::info;
   std::string text;
 };
 
-/// Lines that wait for whoever logs them.
+/// Collects log lines until the caller publishes them.
 class Log {
  public:
-  void info(std::string text) { notes_.push_back({Note::Level::info, std::move(text)}); }
-  void warning(std::string text) { notes_.push_back({Note::Level::warning, std::move(text)}); }
-  void error(std::string text) { notes_.push_back({Note::Level::error, std::move(text)}); }
-  std::vector<Note> take() { return std::exchange(notes_, {}); }
+  void info(std::string text) { entries_.push_back({LogEntry::Level::info, std::move(text)}); }
+  void warning(std::string text) { entries_.push_back({LogEntry::Level::warning, std::move(text)}); }
+  void error(std::string text) { entries_.push_back({LogEntry::Level::error, std::move(text)}); }
+  std::vector<LogEntry> take() { return std::exchange(entries_, {}); }
 
  private:
-  std::vector<Note> notes_;
+  std::vector<LogEntry> entries_;
 };
 
 }  // namespace smartmill::cnc

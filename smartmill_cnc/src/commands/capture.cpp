@@ -28,19 +28,19 @@ struct Arguments {
   double timeout = 2.0;
 };
 
-/// Messages name the controller instead of the tap that relays to it.
-std::string inPlaceOf(const std::string& tap, const std::string& there, std::string message) {
+/// Replaces the address of the relaying tap by that of the controller.
+std::string withAddress(const std::string& tap, const std::string& controller, std::string message) {
   const std::size_t at = message.find(tap);
-  return at == std::string::npos ? message : message.replace(at, tap.size(), there);
+  return at == std::string::npos ? message : message.replace(at, tap.size(), controller);
 }
 
 void run(const Arguments& a) {
   std::ofstream out(a.file);
   if (!out) throw Error(a.file + ": cannot be written");
   focas::beginRecording(out);
-  std::atomic<bool> heard{false};  // a frame of the controller
-  const auto tell = [&](const focas::RecordedFrame& frame) {
-    heard = heard || !frame.from_client;
+  std::atomic<bool> replied{false};  // the controller has sent a frame
+  const auto record = [&](const focas::RecordedFrame& frame) {
+    replied = replied || !frame.from_client;
     focas::append(out, frame);
     std::printf("%s\n", focas::describe(frame).c_str());
     std::fflush(stdout);
@@ -48,7 +48,7 @@ void run(const Arguments& a) {
   std::signal(SIGINT, requestStop);
   std::signal(SIGTERM, requestStop);
   const focas::Tap tap(static_cast<std::uint16_t>(a.listen_port), a.host, static_cast<std::uint16_t>(a.port),
-                       a.timeout, tell);
+                       a.timeout, record);
   if (a.listen_port == 0) {
     try {
       focas::Client client;
@@ -56,9 +56,9 @@ void run(const Arguments& a) {
       focas::askEverything(client);
       client.close();
     } catch (const focas::FocasError& e) {
-      const std::string there = a.host + ":" + std::to_string(a.port);
-      const std::string why = inPlaceOf("127.0.0.1:" + std::to_string(tap.port()), there, e.what());
-      throw Error(heard ? why : there + " does not answer as a controller: " + why);
+      const std::string controller = a.host + ":" + std::to_string(a.port);
+      const std::string why = withAddress("127.0.0.1:" + std::to_string(tap.port()), controller, e.what());
+      throw Error(replied ? why : controller + " does not answer as a controller: " + why);
     }
   }
   while (a.listen_port != 0 && stop_requested == 0) {
@@ -79,10 +79,11 @@ Command captureCommand() {
   command.description =
       "Records a session with a Fanuc controller (FOCAS2 Ethernet) and prints it decoded, one line per "
       "request "
-      "and reply. By itself it requests all that can be read and writes nothing to the controller; with "
+      "and reply. Without --listen it requests all readable values and writes nothing to the controller; "
+      "with "
       "--listen it relays between any client and the controller until Ctrl-C.";
   command.examples = {
-      {"192.168.1.10 -o machine.focas", "everything that can be read from a controller"},
+      {"192.168.1.10 -o machine.focas", "all readable values of a controller"},
       {"192.168.1.10 --listen 8194", "relays the session of a client that connects to port 8194"}};
   command.files = {{"OUT", "the session, frame by frame (smartmill-focas-session/1)"}};
   command.exits = {{0, "done; with --listen: stopped by Ctrl-C or SIGTERM"}};
@@ -90,10 +91,13 @@ Command captureCommand() {
     const auto a = std::make_shared<Arguments>();
     line.option("HOST", a->host, "name or address of the controller").required();
     line.option("--port", a->port, "FOCAS port of the controller").within(1, 65535).showDefault();
-    line.option("--listen", a->listen_port, "port on loopback for other clients; 0: requests by itself")
+    line.option("--listen", a->listen_port,
+                "port on loopback for another client; 0: requests all values itself")
         .within(0, 65535)
         .showDefault();
-    line.option("--timeout", a->timeout, "[s] for connecting and for every reply").positive().showDefault();
+    line.option("--timeout", a->timeout, "[s] timeout of connecting and of every reply")
+        .positive()
+        .showDefault();
     line.option("-o,--out", a->file, "file to write (smartmill-focas-session/1)").showDefault();
     return commandBody(a, run);
   };

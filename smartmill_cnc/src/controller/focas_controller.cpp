@@ -16,7 +16,7 @@ namespace {
 
 using focas::FocasError;
 
-constexpr int MAX_MARKER = 9999999;  // seven digits are exact in any variable
+constexpr int MAX_MARKER = 9999999;  // seven digits are exact in every variable
 
 Failure::Kind kindOf(int code) {
   switch (code) {
@@ -35,7 +35,7 @@ Failure::Kind kindOf(int code) {
 std::string sessionLine(const FocasError& e) {
   switch (e.code()) {
     case focas::EW_REJECT:
-      return "the controller does not take a DNC session yet (press CYCLE START at its panel): " +
+      return "the controller does not accept a DNC session yet (press CYCLE START at its panel): " +
              std::string(e.what());
     case focas::EW_BUSY:
       return "another client has a DNC session: " + std::string(e.what());
@@ -104,15 +104,15 @@ class FocasController : public Controller {
   }
 
   bool takesOverrides() const override { return parameters_.override_data >= 0; }
-  // G12 and G30 themselves the ladder writes in each of its scans, from the panel's switches.
+  // Not written to G12 and G30 directly: the ladder overwrites them in every scan from the panel's switches.
   Result<Overrides> setOverrides(const Overrides& wanted) override {
     if (!takesOverrides()) {
       return Failure{Failure::Kind::refused,
-                     name() + " takes no overrides from outside: override_data names no rungs of its ladder"};
+                     name() + " takes no overrides from outside: parameter override_data is not set"};
     }
     constexpr std::int32_t DATA_TABLE = static_cast<std::int32_t>(focas::PmcArea::d), BYTES = 0;
-    const auto percent = [](double share) {
-      return static_cast<std::uint8_t>(std::clamp(std::lround(100.0 * share), 1L, 254L));
+    const auto percent = [](double factor) {
+      return static_cast<std::uint8_t>(std::clamp(std::lround(100.0 * factor), 1L, 254L));
     };
     const focas::Bytes bytes{percent(wanted.feed), percent(wanted.spindle)};
     const Status written = attempt(plainLine, [&] {
@@ -147,7 +147,7 @@ class FocasController : public Controller {
     if (!started) {
       return started;
     }
-    // A marker left from before must not end the first piece.
+    // The marker of an earlier session must not end the first program.
     const Status cleared = attempt(plainLine, [&] { client_.writeMacro(parameters_.marker_macro, 0.0); });
     if (!cleared) {
       return cleared.lost() ? cleared : attempt(plainLine, [&] {
@@ -164,9 +164,9 @@ class FocasController : public Controller {
 
   Status checkPrograms() override {
     if (client_.dncDeaf()) {
-      // What it has of the text it would still run; the data circuit stops it.
+      // The controller would run the text in its buffer; a reset through the data circuit stops it.
       const Status reset = attempt(plainLine, [&] { client_.reset(); });
-      return lost("connection to the " + name() + " lost: nothing comes back on its DNC circuit; " +
+      return lost("connection to the " + name() + " lost: no reply on its DNC circuit; " +
                   (reset ? "it was reset" : "it could not be reset: USE THE PANEL"));
     }
     const Status status = attempt(endedLine, [&] { client_.dncCheck(); });
@@ -190,7 +190,7 @@ class FocasController : public Controller {
 
   void begin(const std::string& program) override {
     marker_ = marker_ >= MAX_MARKER ? 1 : marker_ + 1;
-    // A control skips what comes before the first end of block.
+    // A control skips all text before the first end of block.
     text_ = (std::exchange(first_piece_, false) ? "\n" : "") + program + "#" +
             std::to_string(parameters_.marker_macro) + "=" + std::to_string(marker_) + "\n";
     sent_ = 0;
@@ -214,8 +214,8 @@ class FocasController : public Controller {
   }
 
   Status abort() override {
-    // The DNC cancel alone may come late behind text in the stream. Not every controller lets itself be
-    // reset: the cancel must do there.
+    // The DNC cancel alone may be delayed behind text in the stream. Not every controller permits a reset;
+    // then the cancel must suffice.
     const Status reset = attempt(plainLine, [&] { client_.reset(); });
     return reset.lost() ? reset : abandonPrograms();
   }
@@ -227,11 +227,11 @@ class FocasController : public Controller {
     return {Failure::Kind::lost, why};
   }
 
-  /// Talks to the controller: the one place where the client's exceptions become failures.
-  template <class Line, class Talk>
-  Status attempt(Line line, Talk&& talk) {
+  /// Calls the client and converts its exceptions to failures. @param line message of a FocasError
+  template <class Line, class Call>
+  Status attempt(Line line, Call&& call) {
     try {
-      talk();
+      call();
       return {};
     } catch (const focas::ConnectionError& e) {
       return lost(e.what());
@@ -255,7 +255,7 @@ class FocasController : public Controller {
 
 void FocasParameters::validate() const {
   if (host.empty()) {
-    throw Error("host: is empty");
+    throw Error("host: empty, expected a name or address");
   }
   checkBounds(*this);
   require(marker_macro != orient_macro, "marker_macro", marker_macro, "another variable than orient_macro");

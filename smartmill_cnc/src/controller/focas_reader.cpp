@@ -40,7 +40,7 @@ int decimalsOf(const SubReply& reply) {
   return first.base == 10 && first.exp >= 0 ? std::min<int>(first.exp, MAX_DECIMALS) : DEFAULT_DECIMALS;
 }
 
-/// Teaching counts as the mode it happens in; what has no name must not pass for DNC.
+/// A teaching mode counts as its base mode; an unknown mode must not count as DNC.
 CncMode modeOf(int aut) {
   switch (aut) {
     case focas::AUT_MEM:
@@ -62,10 +62,10 @@ CncMode modeOf(int aut) {
 
 }  // namespace
 
-/// What is asked of the controller in every period.
-class FocasReader::Questions {
+/// Requests to the controller in every period.
+class FocasReader::PollRequests {
  public:
-  Questions(const focas::ControllerInfo& info, int marker_macro, bool all_at_once) {
+  PollRequests(const focas::ControllerInfo& info, int marker_macro, bool all_at_once) {
     status = begin(focas::OP_STATUS);
     add(focas::OP_HDCK);
     add(focas::OP_TMMODE);
@@ -97,7 +97,7 @@ class FocasReader::Questions {
     }
   }
 
-  std::vector<SubReply> ask(focas::Client& client) const {
+  std::vector<SubReply> exchange(focas::Client& client) const {
     std::vector<SubReply> replies;
     for (std::size_t i = 0; i < starts_.size(); ++i) {
       const std::size_t end = i + 1 < starts_.size() ? starts_[i + 1] : requests_.size();
@@ -110,7 +110,7 @@ class FocasReader::Questions {
         if (!client.connected() || starts_.size() == 1) {
           throw;
         }
-        // One refused question leaves the others standing.
+        // A refused request does not affect the others.
         SubReply refused;
         refused.code = static_cast<std::int16_t>(e.code());
         replies.insert(replies.end(), part.size(), refused);
@@ -146,36 +146,36 @@ FocasReader::FocasReader(focas::Client& client, const FocasParameters& parameter
 FocasReader::~FocasReader() = default;
 
 void FocasReader::connected() {
-  // A controller that went away at the first large question may like small ones better.
-  const bool went_away = asked_ && !answered_;
-  asked_ = true;
+  // After a disconnection at the first request, tries the other size of requests.
+  const bool disconnected = requested_ && !answered_;
+  requested_ = true;
   answered_ = false;
-  askAllAtOnce(all_at_once_ != went_away);
+  setAllAtOnce(all_at_once_ != disconnected);
 }
 
-void FocasReader::askAllAtOnce(bool all_at_once) {
+void FocasReader::setAllAtOnce(bool all_at_once) {
   all_at_once_ = all_at_once;
-  questions_ = std::make_unique<Questions>(client_.info(), parameters_.marker_macro, all_at_once);
+  poll_requests_ = std::make_unique<PollRequests>(client_.info(), parameters_.marker_macro, all_at_once);
 }
 
-std::vector<SubReply> FocasReader::ask() {
+std::vector<SubReply> FocasReader::exchange() {
   try {
-    return questions_->ask(client_);
+    return poll_requests_->exchange(client_);
   } catch (const FocasError&) {
     if (!client_.connected() || !all_at_once_) {
       throw;
     }
   }
-  askAllAtOnce(false);
-  return questions_->ask(client_);
+  setAllAtOnce(false);
+  return poll_requests_->exchange(client_);
 }
 
 Reading FocasReader::read() {
-  const std::vector<SubReply> replies = ask();
-  const Questions& q = *questions_;
-  for (const std::size_t due : {q.status, q.machine, q.distance}) {
-    if (replies[due].code != focas::EW_OK) {
-      throw FocasError("it refuses its status or positions", focas::EW_FUNC);
+  const std::vector<SubReply> replies = exchange();
+  const PollRequests& q = *poll_requests_;
+  for (const std::size_t required : {q.status, q.machine, q.distance}) {
+    if (replies[required].code != focas::EW_OK) {
+      throw FocasError("the controller refuses its status or positions", focas::EW_FUNC);
     }
   }
   answered_ = true;
@@ -192,7 +192,7 @@ Reading FocasReader::read() {
 }
 
 void FocasReader::readState(const std::vector<SubReply>& replies, std::size_t axes, Reading& reading) {
-  const Questions& q = *questions_;
+  const PollRequests& q = *poll_requests_;
   focas::Reader reader(replies[q.status].data);
   const focas::Status status = focas::decodeStatus(reader);
   CncState& state = reading.state;
@@ -213,7 +213,7 @@ void FocasReader::readState(const std::vector<SubReply>& replies, std::size_t ax
 }
 
 void FocasReader::readPositions(const std::vector<SubReply>& replies, std::size_t axes, Reading& reading) {
-  const Questions& q = *questions_;
+  const PollRequests& q = *poll_requests_;
   CncState& state = reading.state;
   state.position = lengths(replies[q.machine], axes);
   state.distance_to_go = lengths(replies[q.distance], axes);
@@ -223,7 +223,7 @@ void FocasReader::readPositions(const std::vector<SubReply>& replies, std::size_
   }
   for (const std::vector<double>* values : {&state.position, &state.distance_to_go, &reading.absolute}) {
     if (values->size() != axes) {
-      throw FocasError("it tells positions of fewer axes than it has", focas::EW_LENGTH);
+      throw FocasError("the controller reports positions of fewer axes than it has", focas::EW_LENGTH);
     }
   }
   decimals_ = decimalsOf(replies[q.machine]);
@@ -249,7 +249,7 @@ void FocasReader::readAlarms(std::uint32_t bits, CncState& state) {
       if (!client_.connected()) {
         throw;
       }
-      // The bits below say as much as the controller tells.
+      // Without messages the alarm bits are reported below.
     }
     if (alarm_text_.empty()) {
       alarm_text_ = "alarm bits " + std::to_string(bits);
@@ -259,7 +259,7 @@ void FocasReader::readAlarms(std::uint32_t bits, CncState& state) {
 }
 
 void FocasReader::readLoad(const std::vector<SubReply>& replies, std::size_t axes, Reading& reading) const {
-  const Questions& q = *questions_;
+  const PollRequests& q = *poll_requests_;
   const std::size_t spindle = static_cast<std::size_t>(parameters_.spindle - 1);
   const std::vector<double> load = focas::decodeValues(replies[q.spindle_load], spindle + 1);
   const std::vector<double> speed = focas::decodeValues(replies[q.spindle_speed], spindle + 1);

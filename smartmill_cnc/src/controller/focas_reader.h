@@ -12,16 +12,16 @@
 
 namespace smartmill::cnc {
 
-/// Asks a FOCAS controller for its state in one PDU, or in several when it does not take them all at once.
+/// Reads the state of a FOCAS controller in one PDU, or in several if it does not accept one.
 class FocasReader {
  public:
   FocasReader(focas::Client& client, const FocasParameters& parameters);
   ~FocasReader();
 
-  /// Anew after each connection.
+  /// To be called after each connection.
   void connected();
 
-  /// @throws FocasError, ConnectionError, WireError: the connection is of no use any more.
+  /// @throws FocasError, ConnectionError, WireError: the connection is unusable.
   Reading read();
   /// Value of the marker variable in the last reading; NaN: vacant.
   double marker() const { return marker_; }
@@ -29,9 +29,9 @@ class FocasReader {
   int decimals() const { return decimals_; }
 
  private:
-  class Questions;
-  std::vector<focas::SubReply> ask();
-  void askAllAtOnce(bool all_at_once);
+  class PollRequests;
+  std::vector<focas::SubReply> exchange();
+  void setAllAtOnce(bool all_at_once);
   void readState(const std::vector<focas::SubReply>& replies, std::size_t axes, Reading& reading);
   void readPositions(const std::vector<focas::SubReply>& replies, std::size_t axes, Reading& reading);
   void readAlarms(std::uint32_t bits, CncState& state);
@@ -39,9 +39,9 @@ class FocasReader {
 
   focas::Client& client_;
   FocasParameters parameters_;
-  std::unique_ptr<Questions> questions_;
+  std::unique_ptr<PollRequests> poll_requests_;
   bool all_at_once_ = true;
-  bool asked_ = false, answered_ = false;
+  bool requested_ = false, answered_ = false;
   std::uint32_t alarm_bits_ = 0;
   std::string alarm_text_;
   std::vector<ControllerAlarm> alarms_;

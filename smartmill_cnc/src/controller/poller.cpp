@@ -7,7 +7,7 @@
 namespace smartmill::cnc {
 namespace {
 
-constexpr double LONGEST_WAIT = 8.0;  // times the first
+constexpr double LONGEST_WAIT = 8.0;  // [1] of the first wait
 constexpr int MANY_FAILURES = 10;
 
 }  // namespace
@@ -19,7 +19,7 @@ Poller::Poller(Controller& controller, double reconnect_period, Log& log)
 void Poller::fetch(double now) {
   reading_.reset();
   if (!controller_.connected()) {
-    // A time that jumps back must not put the next attempt off for ever.
+    // A clock that jumps back must not delay the next attempt.
     if (now < next_connect_ && now >= next_connect_ - wait_) {
       return;
     }
@@ -43,7 +43,7 @@ void Poller::fetch(double now) {
 void Poller::connect() {
   ++counts_.attempts;
   const Result<std::string> identity = controller_.connect();
-  turned_away_ = !identity && identity.failure().kind != Failure::Kind::lost;
+  refused_ = !identity && identity.failure().kind != Failure::Kind::lost;
   if (identity) {
     identity_ = *identity;
   } else {
@@ -51,14 +51,14 @@ void Poller::connect() {
   }
 }
 
-std::optional<Reading> Poller::take() {
-  // A command may have found the connection dead since.
+std::optional<Reading> Poller::takeReading() {
+  // A command may have lost the connection since.
   if (!reading_ || !controller_.connected()) {
     return std::nullopt;
   }
   if (!std::exchange(connected_, true)) {
     ++counts_.made;
-    told_error_.clear();
+    logged_error_.clear();
     std::string axes;
     for (const std::string& axis : reading_->state.axes) {
       axes += " " + axis;
@@ -68,17 +68,17 @@ std::optional<Reading> Poller::take() {
   return std::exchange(reading_, std::nullopt);
 }
 
-void Poller::lost() {
+void Poller::reportDisconnected() {
   const bool was_connected = std::exchange(connected_, false);
   counts_.lost += was_connected ? 1 : 0;
-  // That nothing can be reached after a loss is no news; that one is turned away is.
-  const bool expected = loss_told_ && !was_connected && !turned_away_;
-  if (was_connected || (last_error_ != told_error_ && !expected)) {
+  // Failing to reach the controller after a loss is expected and not logged; a refused connection is.
+  const bool expected = loss_logged_ && !was_connected && !refused_;
+  if (was_connected || (last_error_ != logged_error_ && !expected)) {
     log_.error(last_error_ + "; trying again every " + fixedDecimals(reconnect_period_, 1) + " to " +
                fixedDecimals(LONGEST_WAIT * reconnect_period_, 1) + " s");
   }
-  loss_told_ = was_connected || (loss_told_ && last_error_ == told_error_);
-  told_error_ = last_error_;
+  loss_logged_ = was_connected || (loss_logged_ && last_error_ == logged_error_);
+  logged_error_ = last_error_;
 }
 
 }  // namespace smartmill::cnc

@@ -12,15 +12,15 @@
 namespace smartmill::cnc::linuxcnc {
 namespace {
 
-constexpr double SPINDLE_NEAR = 10.0;  // [rpm] counts as at speed, besides 1 %
-constexpr double BESIDE = 1e-3;   // [mm] limits beyond the travel: a home at its end rounds to either side
-constexpr double STANDING = 0.5;  // [rpm]
+constexpr double SPEED_TOLERANCE = 10.0;  // [rpm] of spindle at speed, in addition to 1 %
+constexpr double LIMIT_MARGIN =
+    1e-3;  // [mm] of the limits: a home at the end of travel may round to either side
+constexpr double STANDSTILL = 0.5;         // [rpm]
 constexpr double ORIENT_GAIN = 20.0;       // [1/s]
-constexpr double ORIENT_MOST = 5.0;        // [rev/s]
+constexpr double ORIENT_MAX_SPEED = 5.0;   // [rev/s]
 constexpr double ORIENT_TOLERANCE = 0.02;  // [deg]
-// [s] of servo cycles. Their thread makes good in a moment what it has missed for want of a processor,
-// without a beat in between: it must not take that for the death of linuxcnc_stream, which the gateway sees
-// at once.
+// [s] of servo cycles. A servo thread that has waited for a processor catches up without a beat in between,
+// which must not count as the end of linuxcnc_stream; the gateway detects that end at once.
 constexpr double BEAT_LASTS = Liveness::STARVES + 0.2;
 
 std::string number(double value) {
@@ -31,8 +31,8 @@ std::string jointSection(const MachineAxes& axes, std::size_t axis) {
   const double mm = 1.0 / units::MM;
   std::string common = "MAX_VELOCITY = " + number(axes.rapid * mm) +
                        "\nMAX_ACCELERATION = " + number(axes.acceleration * mm) +
-                       "\nMIN_LIMIT = " + number(axes.travel[axis][0] * mm - BESIDE) +
-                       "\nMAX_LIMIT = " + number(axes.travel[axis][1] * mm + BESIDE) + "\n";
+                       "\nMIN_LIMIT = " + number(axes.travel[axis][0] * mm - LIMIT_MARGIN) +
+                       "\nMAX_LIMIT = " + number(axes.travel[axis][1] * mm + LIMIT_MARGIN) + "\n";
   const std::string home = number(axes.home[axis] * mm);
   return std::string("[AXIS_") + "XYZ"[axis] + "]\n" + common + "[JOINT_" + std::to_string(axis) + "]\n" +
          common + "TYPE = LINEAR\nFERROR = 1\nMIN_FERROR = 0.2\nHOME = " + home + "\nHOME_OFFSET = " + home +
@@ -64,18 +64,18 @@ void setp(std::ostringstream& hal, const char* pin, double value) {
 }
 
 void spindleOf(std::ostringstream& hal) {
-  hal << "net s-said spindle.0.speed-out => override.in0\n"
+  hal << "net s-programmed spindle.0.speed-out => override.in0\n"
       << "net " << SPINDLE_SIGNAL << " override.in1\nsets " << SPINDLE_SIGNAL << " 1\n"
       << "net " << FEED_SIGNAL << " motion.adaptive-feed\nsets " << FEED_SIGNAL << " 1\n"
       << "net s-cmd override.out => drive.in0 atspeed.in1\n"
          "net s-drive drive.out => power.in1\n"
          "net s-on motion.motion-enabled => power.sel\n"
          "net s-power power.out => ramp.in\n"
-         "net s-rpm ramp.out => spin.velocity-cmd rps.in atspeed.in2 stands.in2 sampler.0.pin.4\n"
+         "net s-rpm ramp.out => spin.velocity-cmd rps.in atspeed.in2 standstill.in2 sampler.0.pin.4\n"
          "net s-rps rps.out => spindle.0.speed-in\n"
          "net s-revs spin.position-fb => spindle.0.revs orient.position opid.feedback sampler.0.pin.3\n"
          "net s-at atspeed.out => spindle.0.at-speed\n"
-         "net s-stands stands.out => motion.digital-in-00\n"
+         "net s-standstill standstill.out => motion.digital-in-00\n"
          "net s-idx spindle.0.index-enable <=> spin.index-enable\n"
          "net o-on spindle.0.orient => orient.enable opid.enable drive.sel\n"
          "net o-angle spindle.0.orient-angle => orient.angle\n"
@@ -91,7 +91,7 @@ std::string halOf(double spindle_acceleration) {
   hal << "loadrt [KINS]KINEMATICS\n"
          "loadrt [EMCMOT]EMCMOT servo_period_nsec=[EMCMOT]SERVO_PERIOD num_joints=[KINS]JOINTS "
          "num_spindles=1\n"
-         "loadrt sim_spindle names=spin\nloadrt limit2 names=ramp\nloadrt near names=atspeed,stands\n"
+         "loadrt sim_spindle names=spin\nloadrt limit2 names=ramp\nloadrt near names=atspeed,standstill\n"
          "loadrt scale names=rps,rpm\nloadrt mult2 names=override\nloadrt mux2 names=drive,power\nloadrt "
          "orient names=orient\n"
          "loadrt pid names=opid\nloadrt oneshot names=lives\nloadrt and2 names=may,chain\n"
@@ -99,7 +99,7 @@ std::string halOf(double spindle_acceleration) {
       << SAMPLER_PINS << "\n";
   for (const char* function :
        {"lives", "may", "chain", "motion-command-handler", "motion-controller", "orient", "opid.do-pid-calcs",
-        "rpm", "override", "drive", "power", "ramp", "spin", "rps", "atspeed", "stands", "sampler.0"}) {
+        "rpm", "override", "drive", "power", "ramp", "spin", "rps", "atspeed", "standstill", "sampler.0"}) {
     hal << "addf " << function << " servo-thread\n";
   }
   setp(hal, "ramp.maxv", spindle_acceleration);
@@ -107,11 +107,11 @@ std::string halOf(double spindle_acceleration) {
   setp(hal, "rps.gain", 1.0 / 60.0);
   setp(hal, "rpm.gain", 60.0);
   setp(hal, "atspeed.scale", 1.01);
-  setp(hal, "atspeed.difference", SPINDLE_NEAR);
-  setp(hal, "stands.difference", STANDING);
+  setp(hal, "atspeed.difference", SPEED_TOLERANCE);
+  setp(hal, "standstill.difference", STANDSTILL);
   setp(hal, "orient.tolerance", ORIENT_TOLERANCE);
   setp(hal, "opid.Pgain", ORIENT_GAIN);
-  setp(hal, "opid.maxoutput", ORIENT_MOST);
+  setp(hal, "opid.maxoutput", ORIENT_MAX_SPEED);
   hal << "setp opid.error-previous-target 0\nsetp lives.falling 1\n";
   setp(hal, "lives.width", BEAT_LASTS);
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -124,8 +124,9 @@ std::string halOf(double spindle_acceleration) {
          "net dtg motion.distance-to-go => sampler.0.pin.6\n"
       << "net " << LOAD_SIGNAL << " sampler.0.pin.7\n"
       << "net marker motion.analog-out-00 => sampler.0.pin.8\n"
-         "# linuxcnc_stream lives and permits: else no axis and no spindle moves, and the emergency stop "
-         "falls\n"
+         "# Without the beat and the permit of linuxcnc_stream no axis and no spindle moves, and the "
+         "emergency "
+         "stop is set\n"
       << "net " << BEAT_SIGNAL << " lives.in\nnet lives lives.out => may.in0\nnet " << PERMIT_SIGNAL
       << " may.in1\nnet may may.out => motion.enable chain.in0\n"
          "net estop iocontrol.0.user-enable-out => chain.in1\n"
@@ -142,7 +143,7 @@ std::map<std::string, std::string> configurationOf(const MachineModel& model, co
   const Spindle& spindle = model.needSpindle("configure LinuxCNC");
   if (!spindle.max_speed || !spindle.acceleration) {
     throw Error(model.file +
-                ": spindle.max_speed_rpm and acceleration_rpm_per_s are due to configure LinuxCNC");
+                ": spindle.max_speed_rpm and acceleration_rpm_per_s are required to configure LinuxCNC");
   }
   return {{"mill.ini", iniOf(axes, units::rpmFromRadPerSec(*spindle.max_speed), folder)},
           {"mill.hal", halOf(units::rpmFromRadPerSec(*spindle.acceleration))},

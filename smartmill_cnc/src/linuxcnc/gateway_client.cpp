@@ -15,10 +15,10 @@ void GatewayClient::connect() {
 }
 
 template <class Answer>
-Answer GatewayClient::exchange(const Message& question) {
+Answer GatewayClient::exchange(const Message& request) {
   using Clock = std::chrono::steady_clock;
   const Clock::time_point begin = Clock::now();
-  connection_.send(question, ++sequence_);
+  connection_.send(request, ++sequence_);
   while (connection_.open()) {
     connection_.receive();
     while (std::optional<Received> received = connection_.next()) {
@@ -28,18 +28,18 @@ Answer GatewayClient::exchange(const Message& question) {
       }
     }
     connection_.flush();
-    const double left = timeout_ - std::chrono::duration<double>(Clock::now() - begin).count();
-    if (left <= 0.0) {
+    const double remaining = timeout_ - std::chrono::duration<double>(Clock::now() - begin).count();
+    if (remaining <= 0.0) {
       connection_.close();
-      throw Error(path_ + ": no answer in time");
+      throw Error(path_ + ": no reply within the timeout");
     }
-    connection_.wait(connection_.unsent() ? std::min(left, 0.005) : left);
+    connection_.wait(connection_.unsent() ? std::min(remaining, 0.005) : remaining);
   }
   throw Error(path_ + ": " + (connection_.fault().empty() ? "not connected" : connection_.fault()));
 }
 
 MachineStatus GatewayClient::status() {
-  return exchange<MachineStatus>(Ask{});
+  return exchange<MachineStatus>(StatusRequest{});
 }
 
 Reply GatewayClient::carryOut(const Command& command) {

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "smartmill_cnc/linuxcnc/gateway_client.h"
-#include "smartmill_cnc/linuxcnc/stillness.h"
+#include "smartmill_cnc/linuxcnc/silence_timer.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
@@ -14,19 +14,19 @@
 namespace smartmill::cnc::linuxcnc {
 namespace {
 
-constexpr int DECIMALS = 4;            // of mm; LinuxCNC computes in doubles
-constexpr double INCREMENT = 1e-7;     // [m]
-constexpr double NO_WAY = 1e-9;        // [m] a distance to go below this is none
-constexpr double STREAM_SILENT = 0.4;  // [s]
-constexpr int ORIENT_MACRO = 1133;     // what M119 turns to, 0 .. 4095, as on a Fanuc
+constexpr int DECIMALS = 4;             // of lengths in mm; LinuxCNC computes in doubles
+constexpr double INCREMENT = 1e-7;      // [m]
+constexpr double ZERO_DISTANCE = 1e-9;  // [m] a smaller distance to go counts as zero
+constexpr double STREAM_TIMEOUT = 0.4;  // [s]
+constexpr int ORIENT_MACRO = 1133;      // angle of M119, 0 .. 4095, as on a Fanuc
 constexpr const char* UNMARK = "M68 E0 Q0\n";
-constexpr const char* STOP = "M5\nM66 P0 L3 Q30\n";  // waits for the input "spindle stands"
+constexpr const char* STOP = "M5\nM66 P0 L3 Q30\n";  // waits for the input of standstill
 
 std::string number(double value) {
   return formatted("%.4f", value);
 }
 
-/// One block: its words are separated by blanks (checkProgram).
+/// Translates one block; checkProgram() separates its words by blanks.
 std::string blockText(const std::string& line, std::size_t count) {
   std::istringstream words(line);
   std::string word, out, tail;
@@ -86,8 +86,9 @@ class LinuxCncController : public Controller {
       client_.connect();
       const MachineStatus status = client_.status();
       if (!status.alive || !status.homed) {
-        return lost("cannot connect to the " + name() +
-                    (status.alive ? ": nobody has made it ready (linuxcnc_panel)" : ": it does not run"));
+        return lost(
+            "cannot connect to the " + name() +
+            (status.alive ? ": it is not ready (run linuxcnc_panel FOLDER ready)" : ": it does not run"));
       }
     } catch (const Error& e) {
       return lost(e.what());
@@ -108,27 +109,29 @@ class LinuxCncController : public Controller {
     }
     const std::optional<ServoSample> servo = stream_->latest();
     const std::uint64_t count = stream_->count();
-    // A controller that waits for a processor is silent without having stopped.
+    // Silence while the controller waits for a processor does not count.
     const bool heard = std::exchange(servo_count_, count) != count || status_.starved > 0.0;
-    const double silence = silence_.look(heard, now_());
-    if (!servo || silence > STREAM_SILENT) {
+    const double silence = silence_.update(heard, now_());
+    if (!servo || silence > STREAM_TIMEOUT) {
       return lost("connection to the " + name() + " lost: its servo stream is silent");
     }
     return readingOf(*servo);
   }
 
-  Status setVariable(int number, double value) override { return tell({Word::variable, number, value, {}}); }
+  Status setVariable(int number, double value) override {
+    return execute({CommandCode::variable, number, value, {}});
+  }
 
   DialectOptions dialect() const override {
     DialectOptions options;
-    options.marker_macro = 0;  // it needs none
+    options.marker_macro = 0;  // no marker variable needed
     options.decimals = DECIMALS;
     return options;
   }
   std::string orientProgram(double angle) const override { return cnc::orientProgram(angle, ORIENT_MACRO); }
 
   Status openPrograms() override {
-    const Status opened = tell({Word::open, 0, 0.0, {}});
+    const Status opened = execute({CommandCode::open, 0, 0.0, {}});
     open_ = static_cast<bool>(opened);
     if (open_) {
       status_.mode = MachineStatus::Mode::mdi;
@@ -141,10 +144,10 @@ class LinuxCncController : public Controller {
       return {};
     }
     open_ = false;
-    return Failure{Failure::Kind::wrong_mode, "the controller has been taken out of MDI"};
+    return Failure{Failure::Kind::wrong_mode, "the controller is no longer in MDI"};
   }
   Status closePrograms() override {
-    return std::exchange(open_, false) ? tell({Word::close, 0, 0.0, {}}) : Status();
+    return std::exchange(open_, false) ? execute({CommandCode::close, 0, 0.0, {}}) : Status();
   }
 
   void begin(const std::string& program) override {
@@ -153,7 +156,7 @@ class LinuxCncController : public Controller {
     complete_ = false;
   }
   Status send() override {
-    const Status taken = tell({Word::run, number_, 0.0, text_});
+    const Status taken = execute({CommandCode::run, number_, 0.0, text_});
     complete_ = static_cast<bool>(taken);
     if (!taken && taken.failure().kind == Failure::Kind::not_yet) {
       return {};
@@ -164,19 +167,19 @@ class LinuxCncController : public Controller {
   Transfer transfer() const override { return {complete_ ? text_.size() : 0, text_.size(), complete_}; }
   Status abandonPrograms() override {
     open_ = false;
-    return tell({Word::abort, 0, 0.0, {}});
+    return execute({CommandCode::abort, 0, 0.0, {}});
   }
   Status abort() override { return abandonPrograms(); }
   bool takesOverrides() const override { return true; }
   Result<Overrides> setOverrides(const Overrides& wanted) override {
     const Overrides taken{std::min(1.0, wanted.feed), wanted.spindle};
-    const Reply reply = askStream(SetOverrides{taken.feed, taken.spindle});
+    const Reply reply = sendToStream(SetOverrides{taken.feed, taken.spindle});
     if (reply.code != Reply::Code::done) {
       return Failure{kindOf(reply.code), reply.text};
     }
     return taken;
   }
-  Status hold() override { return tell({Word::hold, 0, 0.0, {}}); }
+  Status hold() override { return execute({CommandCode::hold, 0, 0.0, {}}); }
 
  private:
   Failure lost(const std::string& why) {
@@ -185,8 +188,8 @@ class LinuxCncController : public Controller {
     return {Failure::Kind::lost, why};
   }
 
-  /// By a connection of its own, since that of the servo cycles is read elsewhere.
-  Reply askStream(const SetOverrides& overrides) const {
+  /// Uses a connection of its own, since that of the servo cycles is read elsewhere.
+  Reply sendToStream(const SetOverrides& overrides) const {
     try {
       GatewayClient stream(folder_, timeout_, STREAM_SOCKET);
       stream.connect();
@@ -196,7 +199,7 @@ class LinuxCncController : public Controller {
     }
   }
 
-  Status tell(const Command& command) {
+  Status execute(const Command& command) {
     try {
       const Reply reply = client_.carryOut(command);
       if (reply.code == Reply::Code::done) {
@@ -208,7 +211,7 @@ class LinuxCncController : public Controller {
     }
   }
 
-  /// What arming and running look at: whether it takes programs from outside.
+  /// Mode for arming and running: DNC while programs are accepted.
   CncMode mode() const {
     switch (status_.mode) {
       case MachineStatus::Mode::mdi:
@@ -241,8 +244,8 @@ class LinuxCncController : public Controller {
     state.axes = {"X", "Y", "Z"};
     state.position.assign(status_.position.begin(), status_.position.end());
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double left = status_.distance_to_go[axis];
-      state.distance_to_go.push_back(std::abs(left) < NO_WAY ? 0.0 : left);
+      const double to_go = status_.distance_to_go[axis];
+      state.distance_to_go.push_back(std::abs(to_go) < ZERO_DISTANCE ? 0.0 : to_go);
       reading.absolute.push_back(status_.position[axis] - status_.offset[axis]);
     }
     state.spindle_speed = std::abs(servo.spindle_speed);
@@ -264,7 +267,7 @@ class LinuxCncController : public Controller {
   GatewayClient client_;
   std::shared_ptr<const ServoStream> stream_;
   double (*now_)();
-  Stillness silence_;
+  SilenceTimer silence_;
   std::uint64_t servo_count_ = 0;
   MachineStatus status_;
   bool open_ = false, complete_ = false;
@@ -287,7 +290,7 @@ std::unique_ptr<Controller> makeLinuxCncController(const LinuxCncParameters& par
                                                    std::shared_ptr<const ServoStream> stream,
                                                    double (*now)()) {
   if (parameters.folder.empty()) {
-    throw Error("linuxcnc_folder: the folder of the machine is due");
+    throw Error("linuxcnc_folder: empty, expected the folder of the machine");
   }
   return std::make_unique<LinuxCncController>(parameters, std::move(stream), now);
 }

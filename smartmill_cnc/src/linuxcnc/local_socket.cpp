@@ -15,7 +15,7 @@
 namespace smartmill::cnc::linuxcnc {
 namespace {
 
-constexpr std::size_t MOST_UNSENT = 4 << 20;  // [byte]
+constexpr std::size_t MAX_UNSENT = 4 << 20;  // [byte]
 constexpr int BACKLOG = 8;
 
 std::string errorText() {
@@ -26,7 +26,7 @@ sockaddr_un addressOf(const std::string& path) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   if (path.size() >= sizeof address.sun_path) {
-    throw Error(path + ": too long for the path of a socket, at most " +
+    throw Error(path + ": path too long for a socket, at most " +
                 std::to_string(sizeof address.sun_path - 1) + " characters");
   }
   std::memcpy(address.sun_path, path.c_str(), path.size() + 1);
@@ -36,7 +36,7 @@ sockaddr_un addressOf(const std::string& path) {
 LocalDescriptor makeSocket() {
   LocalDescriptor descriptor(::socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
   if (!descriptor.valid()) {
-    throw Error("no local socket: " + errorText());
+    throw Error("cannot create a local socket: " + errorText());
   }
   return descriptor;
 }
@@ -64,7 +64,7 @@ LocalConnection LocalConnection::to(const std::string& path) {
   const sockaddr_un address = addressOf(path);
   LocalDescriptor descriptor = makeSocket();
   if (::connect(descriptor.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-    throw Error("nobody answers at " + path + ": " + errorText());
+    throw Error("no server at " + path + ": " + errorText());
   }
   return LocalConnection(std::move(descriptor));
 }
@@ -92,7 +92,7 @@ void LocalConnection::receive() {
     const ssize_t got = ::recv(descriptor_.get(), bytes, sizeof bytes, 0);
     if (got > 0) {
       decoder_.push(bytes, static_cast<std::size_t>(got));
-      // What has come is decoded before more is read: a frame is bounded, what waits so too.
+      // Received bytes are decoded before more are read, which bounds the buffer.
       if (static_cast<std::size_t>(got) < sizeof bytes || decoder_.waiting() > LONGEST_PROGRAM) {
         return;
       }
@@ -101,7 +101,7 @@ void LocalConnection::receive() {
     } else if (got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) {
       return;
     } else {
-      fail(got == 0 ? "the other side has closed the connection" : errorText());
+      fail(got == 0 ? "the peer has closed the connection" : errorText());
     }
   }
 }
@@ -126,8 +126,8 @@ void LocalConnection::send(const Message& message, std::uint16_t sequence) {
   }
   outgoing_ += encode(message, sequence);
   flush();
-  if (outgoing_.size() > MOST_UNSENT) {
-    fail("the other side does not read");
+  if (outgoing_.size() > MAX_UNSENT) {
+    fail("the peer does not read");
   }
 }
 
@@ -148,14 +148,14 @@ void LocalConnection::flush() {
 
 LocalDescriptor listenAt(const std::string& path) {
   const sockaddr_un address = addressOf(path);
-  bool taken = true;
+  bool in_use = true;
   try {
     LocalConnection::to(path);
   } catch (const Error&) {
-    taken = false;
+    in_use = false;
   }
-  if (taken) {
-    throw Error(path + ": somebody listens there already");
+  if (in_use) {
+    throw Error(path + ": another server listens there");
   }
   ::unlink(path.c_str());
   LocalDescriptor descriptor = makeSocket();
@@ -163,7 +163,7 @@ LocalDescriptor listenAt(const std::string& path) {
   const int bound = ::bind(descriptor.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address);
   ::umask(before);
   if (bound != 0 || ::listen(descriptor.get(), BACKLOG) != 0) {
-    throw Error(path + ": cannot be listened on: " + errorText());
+    throw Error(path + ": cannot listen: " + errorText());
   }
   return descriptor;
 }

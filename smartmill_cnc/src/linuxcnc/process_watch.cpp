@@ -13,7 +13,7 @@
 namespace smartmill::cnc::linuxcnc {
 namespace {
 
-/// The numbers among a folder's names.
+/// Entries of a folder whose names are numbers.
 std::vector<int> numbersIn(const std::string& folder) {
   std::vector<int> numbers;
   const std::unique_ptr<DIR, int (*)(DIR*)> entries(::opendir(folder.c_str()), ::closedir);
@@ -26,7 +26,7 @@ std::vector<int> numbersIn(const std::string& folder) {
   return numbers;
 }
 
-/// The first line of a file of /proc; nothing when it has gone.
+/// First line of a file of /proc; empty if it no longer exists.
 std::string lineOf(const std::string& file) {
   char line[512] = "";
   const std::unique_ptr<FILE, int (*)(FILE*)> stream(std::fopen(file.c_str(), "r"), std::fclose);
@@ -36,7 +36,7 @@ std::string lineOf(const std::string& file) {
   return line;
 }
 
-/// proc(5): the state stands behind the name in parentheses.
+/// State of a thread, which follows the name in parentheses (proc(5)).
 char stateOf(const std::string& thread) {
   const std::string line = lineOf(thread + "/stat");
   const std::size_t name = line.rfind(')');
@@ -47,7 +47,7 @@ char stateOf(const std::string& thread) {
 
 void ProcessWatch::find(const std::vector<std::string>& names) {
   processes_.clear();
-  ran_.clear();
+  run_times_.clear();
   std::map<std::string, int> oldest;
   for (const int pid : numbersIn("/proc")) {
     const std::string folder = "/proc/" + std::to_string(pid);
@@ -63,9 +63,9 @@ void ProcessWatch::find(const std::vector<std::string>& names) {
   }
 }
 
-void ProcessWatch::only(int pid) {
+void ProcessWatch::watch(int pid) {
   processes_.clear();
-  ran_.clear();
+  run_times_.clear();
   add(pid);
 }
 
@@ -84,26 +84,27 @@ bool ProcessWatch::ended() const {
   });
 }
 
-bool ProcessWatch::waits(double now) {
-  if (now - looked_ < WINDOW) {
-    return waits_;
+bool ProcessWatch::waitsForProcessor(double now) {
+  if (now - last_check_ < WINDOW) {
+    return waiting_;
   }
-  looked_ = now;
-  waits_ = false;
-  std::map<int, std::uint64_t> ran;
+  last_check_ = now;
+  waiting_ = false;
+  std::map<int, std::uint64_t> run_times;
   for (const Process& process : processes_) {
     const std::string threads = "/proc/" + std::to_string(process.pid) + "/task/";
     for (const int thread : numbersIn(threads)) {
       const std::string folder = threads + std::to_string(thread);
-      // schedstat: what it has run [ns], what it has waited, how often. A thread that still waits is not yet
-      // in the second.
-      ran[thread] = std::strtoull(lineOf(folder + "/schedstat").c_str(), nullptr, 10);
-      const auto before = ran_.find(thread);
-      waits_ = waits_ || (before != ran_.end() && before->second == ran[thread] && stateOf(folder) == 'R');
+      // schedstat: run time [ns], waiting time, number of slices. The waiting time does not include a wait
+      // that still lasts.
+      run_times[thread] = std::strtoull(lineOf(folder + "/schedstat").c_str(), nullptr, 10);
+      const auto before = run_times_.find(thread);
+      waiting_ = waiting_ || (before != run_times_.end() && before->second == run_times[thread] &&
+                              stateOf(folder) == 'R');
     }
   }
-  ran_ = std::move(ran);
-  return waits_;
+  run_times_ = std::move(run_times);
+  return waiting_;
 }
 
 }  // namespace smartmill::cnc::linuxcnc

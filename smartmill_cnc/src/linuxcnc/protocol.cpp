@@ -10,9 +10,9 @@
 namespace smartmill::cnc::linuxcnc {
 namespace {
 
-static_assert(sizeof(double) == 8, "doubles travel as their eight bytes");
+static_assert(sizeof(double) == 8, "doubles are sent as eight bytes");
 
-/// The kinds by their place in Message, from 1, and how long their payloads may be.
+/// Longest payload of each kind; kinds are numbered from 1 in the order of Message.
 constexpr std::size_t SAMPLE = 9 * sizeof(double);  // [byte]
 constexpr std::array<std::size_t, std::variant_size_v<Message>> LONGEST{
     LONGEST_PROGRAM + 32, LONGEST_TEXT + 32, 0, LONGEST_TEXT + 256, 16 + ServoBlock::MOST* SAMPLE, 8, 16};
@@ -67,16 +67,16 @@ class Unpacker {
   double finite() {
     const double value = number<double>();
     if (!std::isfinite(value)) {
-      throw Error("a frame holds a number that is not finite");
+      throw Error("a frame contains a number that is not finite");
     }
     return value;
   }
   bool flag() { return number<std::uint8_t>() != 0; }
   template <class Enum>
-  Enum word(int first, int last) {
+  Enum enumeration(int first, int last) {
     const int value = number<std::uint8_t>();
     if (value < first || value > last) {
-      throw Error("a frame holds the unknown word " + std::to_string(value));
+      throw Error("a frame contains the unknown value " + std::to_string(value));
     }
     return static_cast<Enum>(value);
   }
@@ -99,7 +99,7 @@ class Unpacker {
  private:
   const char* take(std::size_t size) {
     if (size > left_) {
-      throw Error("a frame is too short for what it says to hold");
+      throw Error("a frame is too short for its contents");
     }
     const char* at = data_;
     data_ += size;
@@ -116,14 +116,14 @@ void pack(const Command& m, Packer& p) {
     throw Error("a program of " + std::to_string(m.text.size()) + " bytes is longer than " +
                 std::to_string(LONGEST_PROGRAM));
   }
-  p.number(static_cast<std::uint8_t>(m.word));
+  p.number(static_cast<std::uint8_t>(m.code));
   p.number(m.number);
   p.number(m.value);
   p.text(m.text, LONGEST_PROGRAM);
 }
 
 void unpack(Command& m, Unpacker& u) {
-  m.word = u.word<Word>(1, 10);
+  m.code = u.enumeration<CommandCode>(1, 10);
   m.number = u.number<std::int32_t>();
   m.value = u.finite();
   m.text = u.text();
@@ -135,13 +135,13 @@ void pack(const Reply& m, Packer& p) {
 }
 
 void unpack(Reply& m, Unpacker& u) {
-  m.code = u.word<Reply::Code>(0, 5);
+  m.code = u.enumeration<Reply::Code>(0, 5);
   m.text = u.text();
 }
 
-void pack(const Ask&, Packer&) {
+void pack(const StatusRequest&, Packer&) {
 }
-void unpack(Ask&, Unpacker&) {
+void unpack(StatusRequest&, Unpacker&) {
 }
 
 void pack(const MachineStatus& m, Packer& p) {
@@ -166,8 +166,8 @@ void pack(const MachineStatus& m, Packer& p) {
 
 void unpack(MachineStatus& m, Unpacker& u) {
   m.alive = u.flag();
-  m.state = u.word<MachineStatus::State>(1, 4);
-  m.mode = u.word<MachineStatus::Mode>(1, 3);
+  m.state = u.enumeration<MachineStatus::State>(1, 4);
+  m.mode = u.enumeration<MachineStatus::Mode>(1, 3);
   for (bool* flag : {&m.busy, &m.held, &m.homed, &m.in_position}) {
     *flag = u.flag();
   }
@@ -186,7 +186,8 @@ void unpack(MachineStatus& m, Unpacker& u) {
 
 void pack(const ServoBlock& m, Packer& p) {
   if (m.samples.size() > ServoBlock::MOST) {
-    throw Error("a block of " + std::to_string(m.samples.size()) + " servo samples is too long");
+    throw Error("a block of " + std::to_string(m.samples.size()) + " servo samples: expected at most " +
+                std::to_string(ServoBlock::MOST));
   }
   p.number(m.first);
   p.number(m.period_ns);
@@ -204,7 +205,7 @@ void unpack(ServoBlock& m, Unpacker& u) {
   const auto count = u.number<std::uint32_t>();
   if (count > ServoBlock::MOST || m.period_ns == 0) {
     throw Error("a block of " + std::to_string(count) + " servo samples, " + std::to_string(m.period_ns) +
-                " ns apart");
+                " ns apart: expected at most " + std::to_string(ServoBlock::MOST) + " and a period above 0");
   }
   m.samples.resize(count);
   for (ServoSample& s : m.samples) {
@@ -234,19 +235,19 @@ void unpack(SetOverrides& m, Unpacker& u) {
   m.spindle = u.finite();
 }
 
-/// The message of a kind, by its place in Message.
-template <std::size_t PLACE = 0>
-Message messageOf(std::size_t place, Unpacker& unpacker) {
-  if constexpr (PLACE < std::variant_size_v<Message>) {
-    if (place != PLACE) {
-      return messageOf<PLACE + 1>(place, unpacker);
+/// Unpacks the message of a kind. @param index in Message
+template <std::size_t INDEX = 0>
+Message messageOf(std::size_t index, Unpacker& unpacker) {
+  if constexpr (INDEX < std::variant_size_v<Message>) {
+    if (index != INDEX) {
+      return messageOf<INDEX + 1>(index, unpacker);
     }
-    std::variant_alternative_t<PLACE, Message> message;
+    std::variant_alternative_t<INDEX, Message> message;
     unpack(message, unpacker);
     unpacker.end();
     return message;
   } else {
-    throw Error("a frame of the unknown kind " + std::to_string(place + 1));
+    throw Error("a frame of the unknown kind " + std::to_string(index + 1));
   }
 }
 
@@ -279,8 +280,8 @@ std::optional<Received> FrameDecoder::next() {
   Received received;
   received.sequence = header.number<std::uint16_t>();
   if (version != PROTOCOL_VERSION) {
-    throw Error("a frame of version " + std::to_string(version) + ", " + std::to_string(PROTOCOL_VERSION) +
-                " is due");
+    throw Error("a frame of version " + std::to_string(version) + ", expected " +
+                std::to_string(PROTOCOL_VERSION));
   }
   if (kind < 1 || kind > LONGEST.size()) {
     throw Error("a frame of the unknown kind " + std::to_string(kind));

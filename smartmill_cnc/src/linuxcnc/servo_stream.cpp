@@ -8,23 +8,23 @@
 namespace smartmill::cnc::linuxcnc {
 namespace {
 
-constexpr double SETTLING = 0.5;           // [s] of arrivals before times are told
-constexpr double WINDOW = 10.0;            // [s] in which some sample has waited for nobody
-constexpr double SLEW = 1e-4;              // [1] the zero follows by at most this
+constexpr double SETTLING = 0.5;           // [s] of arrivals before times are defined
+constexpr double WINDOW = 10.0;            // [s] that contains a sample without delay
+constexpr double SLEW = 1e-4;              // [1] largest correction of the time of sample 0, per time
 constexpr double LATE_BIN = 1e-4;          // [s]
 constexpr double TRY_EVERY = 0.2;          // [s]
-constexpr std::uint64_t RESTART = 60'000;  // samples; a larger jump is another start of the controller
+constexpr std::uint64_t RESTART = 60'000;  // [samples] a larger gap is a restart of the controller
 
 }  // namespace
 
-void ServoClock::saw(std::uint64_t number, double arrival) {
+void ServoClock::addArrival(std::uint64_t number, double arrival) {
   const double zero = arrival - static_cast<double>(number) * period_;
-  if (!std::exchange(begun_at_all_, true)) {
+  if (!std::exchange(started_, true)) {
     begun_ = window_begun_ = last_ = arrival;
     zero_ = zero;
   }
   window_ = std::min(window_, zero);
-  const double earliest = std::min(window_, before_);
+  const double earliest = std::min(window_, previous_window_);
   if (settled_) {
     const double most = SLEW * std::max(0.0, arrival - last_);
     zero_ += std::clamp(earliest - zero_, -most, most);
@@ -35,20 +35,20 @@ void ServoClock::saw(std::uint64_t number, double arrival) {
   last_ = arrival;
   if (arrival - window_begun_ > WINDOW) {
     window_begun_ = arrival;
-    before_ = std::exchange(window_, std::numeric_limits<double>::infinity());
+    previous_window_ = std::exchange(window_, std::numeric_limits<double>::infinity());
   }
 }
 
 ServoStream::ServoStream(const std::string& folder) : path_(folder + "/" + STREAM_SOCKET) {
 }
 
-std::vector<ServoStretch> ServoStream::step(double wait, double (*now)()) {
-  if (!connection_.open() && (now() - tried_ > TRY_EVERY || now() < tried_)) {
-    tried_ = now();
+std::vector<ServoSegment> ServoStream::step(double wait, double (*now)()) {
+  if (!connection_.open() && (now() - last_attempt_ > TRY_EVERY || now() < last_attempt_)) {
+    last_attempt_ = now();
     try {
       connection_ = LocalConnection::to(path_);
     } catch (const Error&) {
-      // Who reads the machine tells that its stream is silent.
+      // The controller's reader reports a silent stream.
     }
   }
   {
@@ -57,45 +57,46 @@ std::vector<ServoStretch> ServoStream::step(double wait, double (*now)()) {
       connection_.send(SetLoad{*std::exchange(load_, std::nullopt)});
     }
   }
-  std::vector<ServoStretch> stretches;
+  std::vector<ServoSegment> segments;
   connection_.wait(wait);
   connection_.receive();
   const double arrival = now();
   while (const std::optional<Received> received = connection_.next()) {
     if (const auto* block = std::get_if<ServoBlock>(&received->message)) {
-      for (ServoStretch& stretch : take(*block, arrival)) {
-        stretches.push_back(std::move(stretch));
+      for (ServoSegment& segment : addBlock(*block, arrival)) {
+        segments.push_back(std::move(segment));
       }
     }
   }
-  return stretches;
+  return segments;
 }
 
 void ServoStream::restart(const ServoBlock& block) {
   clock_ = ServoClock(static_cast<double>(block.period_ns) * 1e-9);
   next_ = block.first;
-  stretch_ = {};
+  segment_ = {};
   begun_ = true;
 }
 
-std::vector<ServoStretch> ServoStream::take(const ServoBlock& block, double arrival) {
-  std::vector<ServoStretch> stretches;
+std::vector<ServoSegment> ServoStream::addBlock(const ServoBlock& block, double arrival) {
+  std::vector<ServoSegment> segments;
   if (block.samples.empty()) {
-    return stretches;
+    return segments;
   }
   const std::lock_guard<std::mutex> lock(mutex_);
-  const std::uint32_t gap = block.first - static_cast<std::uint32_t>(next_);  // modulo 2^32, as it counts
+  const std::uint32_t gap =
+      block.first - static_cast<std::uint32_t>(next_);  // modulo 2^32, as the controller counts
   if (!begun_ || gap > RESTART) {
     statistics_.restarts += statistics_.samples > 0 ? 1 : 0;
     restart(block);
   } else if (gap > 0) {
     statistics_.lost += gap;
     next_ += gap;
-    if (!stretch_.samples.empty()) {
-      stretches.push_back(std::exchange(stretch_, {}));
+    if (!segment_.samples.empty()) {
+      segments.push_back(std::exchange(segment_, {}));
     }
   }
-  clock_.saw(next_ + block.samples.size() - 1, arrival);
+  clock_.addArrival(next_ + block.samples.size() - 1, arrival);
   for (const ServoSample& sample : block.samples) {
     const std::uint64_t number = next_++;
     ++statistics_.samples;
@@ -103,17 +104,17 @@ std::vector<ServoStretch> ServoStream::take(const ServoBlock& block, double arri
       continue;
     }
     countLate(arrival - clock_.timeOf(number));
-    if (stretch_.samples.empty()) {
-      stretch_.first = number;
-      stretch_.stamp = clock_.timeOf(number);
+    if (segment_.samples.empty()) {
+      segment_.first = number;
+      segment_.stamp = clock_.timeOf(number);
     }
-    stretch_.samples.push_back(sample);
-    if (stretch_.samples.size() == STRETCH) {
-      stretches.push_back(std::exchange(stretch_, {}));
+    segment_.samples.push_back(sample);
+    if (segment_.samples.size() == SEGMENT_LENGTH) {
+      segments.push_back(std::exchange(segment_, {}));
     }
   }
   latest_ = block.samples.back();
-  return stretches;
+  return segments;
 }
 
 void ServoStream::countLate(double late) {
@@ -145,13 +146,13 @@ ServoStatistics ServoStream::statistics() const {
     all += n;
   }
   for (std::size_t bin = 0; bin < LATE_BINS; ++bin) {
-    const bool median_due = 2 * below < all, last_due = 100 * below < 99 * all;
+    const bool below_median = 2 * below < all, below_99 = 100 * below < 99 * all;
     below += late_[bin];
     const double end = static_cast<double>(bin + 1) * LATE_BIN;
-    if (median_due && 2 * below >= all) {
+    if (below_median && 2 * below >= all) {
       result.late_median = end;
     }
-    if (last_due && 100 * below >= 99 * all) {
+    if (below_99 && 100 * below >= 99 * all) {
       result.late_99 = end;
     }
   }

@@ -10,7 +10,7 @@ namespace smartmill::cnc {
 namespace {
 
 constexpr const char* AXES = "XYZ";
-constexpr double CLOCK_JUMP = 5.0;  // [s] between two steps: the clock was set, or the computer slept
+constexpr double CLOCK_JUMP = 5.0;  // [s] between two steps: the clock was set, or the computer was suspended
 
 MotionCode codeOf(const Failure& failure, MotionCode otherwise) {
   return failure.kind == Failure::Kind::alarm ? MotionCode::alarm : otherwise;
@@ -32,14 +32,14 @@ Status MotionMachine::step(const Reading& reading, double now) {
   followClock(now);
   reading_ = reading;
   now_ = now;
-  const Status watched = watch();
+  const Status watched = checkController();
   if (!watched) {
     return watched;
   }
   switch (phase_) {
     case Phase::opening: {
-      // A program that follows another at once begins with 100 % as well.
-      const Status back = putOverridesBack();
+      // Every program starts with 100 %, also directly after another.
+      const Status back = resetOverrides();
       return back ? open() : back;
     }
     case Phase::sending:
@@ -50,7 +50,7 @@ Status MotionMachine::step(const Reading& reading, double now) {
       endStop();
       return {};
     case Phase::idle:
-      return putOverridesBack();
+      return resetOverrides();
   }
   return {};
 }
@@ -62,9 +62,8 @@ std::string MotionMachine::overrideFault(const Overrides& wanted) const {
   const auto outside = [](const char* what, double value, double low, double high) {
     const bool within = value >= low && value <= high;
     return within ? std::string()
-                  : std::string(what) + " override " + fixedDecimals(100.0 * value, 1) +
-                        " %: " + fixedDecimals(100.0 * low, 0) + " .. " + fixedDecimals(100.0 * high, 0) +
-                        " % is allowed";
+                  : std::string(what) + " override " + fixedDecimals(100.0 * value, 1) + " %: expected " +
+                        fixedDecimals(100.0 * low, 0) + " .. " + fixedDecimals(100.0 * high, 0) + " %";
   };
   std::string fault = outside("feed", wanted.feed, limits.min_feed_override, limits.max_feed_override);
   if (fault.empty()) {
@@ -117,7 +116,7 @@ Result<OverrideAnswer> MotionMachine::setOverrides(const Overrides& wanted, cons
   return answer;
 }
 
-Status MotionMachine::putOverridesBack() {
+Status MotionMachine::resetOverrides() {
   if (!std::exchange(overridden_, false)) {
     return {};
   }
@@ -130,18 +129,18 @@ Status MotionMachine::putOverridesBack() {
     overridden_ = true;
     return taken.failure();
   }
-  log_.warning("overrides are not put back to 100 %: " + taken.failure().message);
+  log_.warning("overrides are not reset to 100 %: " + taken.failure().message);
   return {};
 }
 
-/// A clock that jumps takes the times kept here along: nothing runs out of time, or waits, by it.
+/// Shifts all stored times with a jump of the clock, so that it causes neither a timeout nor a wait.
 void MotionMachine::followClock(double now) {
   const double jump = now - now_;
   if (jump >= 0.0 && (jump <= CLOCK_JUMP || !reading_)) {
     return;
   }
   if (busy()) {
-    log_.warning("the clock jumped by " + fixedDecimals(jump, 3) + " s in mid-motion");
+    log_.warning("the clock jumped by " + fixedDecimals(jump, 3) + " s during a motion");
   }
   for (double* time : {&entered_, &progressed_, &condition_from_, &condition_to_}) {
     *time += jump;
@@ -175,10 +174,10 @@ Result<Answer<ArmCode>> MotionMachine::arm() {
     return Answer<ArmCode>{ArmCode::ok, "motion is armed already"};
   }
   if (state.emergency || state.alarm) {
-    return Answer<ArmCode>{ArmCode::alarm, "motion is not armed: " + alarmLine()};
+    return Answer<ArmCode>{ArmCode::alarm, "motion is not armed: " + alarmText()};
   }
   if (state.mode != CncMode::dnc) {
-    return Answer<ArmCode>{ArmCode::wrong_mode, "motion is not armed: " + modeLine()};
+    return Answer<ArmCode>{ArmCode::wrong_mode, "motion is not armed: " + modeText()};
   }
   const Status opened = controller_.openPrograms();
   if (opened.lost()) {
@@ -187,10 +186,10 @@ Result<Answer<ArmCode>> MotionMachine::arm() {
   if (!opened) {
     const bool alarm = opened.failure().kind == Failure::Kind::alarm;
     return Answer<ArmCode>{alarm ? ArmCode::alarm : ArmCode::wrong_mode,
-                           "motion is not armed: " + lineOf(opened.failure())};
+                           "motion is not armed: " + failureText(opened.failure())};
   }
   setArmed(true);
-  // Whoever drove it before may have left some.
+  // An earlier client may have left overrides.
   overridden_ = controller_.takesOverrides();
   return Answer<ArmCode>{ArmCode::ok, "motion is armed"};
 }
@@ -203,7 +202,7 @@ Status MotionMachine::disarm() {
   }
   const Status closed = controller_.closePrograms();
   if (!closed && !closed.lost()) {
-    // The controller has ended the session itself: what was wanted.
+    // The controller has already ended the session.
     log_.info("end of the DNC session: " + closed.failure().message);
     return {};
   }
@@ -238,11 +237,11 @@ std::optional<Outcome> MotionMachine::jog(const std::string& axis, double distan
     }
   }
   if (motion.axis < 0) {
-    return Outcome{MotionCode::bad_goal, "jog: axis '" + axis + "', x, y or z is due"};
+    return Outcome{MotionCode::bad_goal, "jog: axis '" + axis + "', expected x, y or z"};
   }
   if (!std::isfinite(distance) || !std::isfinite(feed) || feed < 0.0) {
     return Outcome{MotionCode::bad_goal,
-                   "jog " + axis + ": a finite distance and a feed of 0 or more are due"};
+                   "jog " + axis + ": expected a finite distance and a feed of 0 or more"};
   }
   if (std::abs(distance) > parameters_.limits.max_jog) {
     return Outcome{MotionCode::limit, "jog " + axis + ": " + fixedDecimals(distance / units::MM, 3) +
@@ -274,10 +273,10 @@ std::optional<Outcome> MotionMachine::refusal(const std::string& name) const {
     return refuse(MotionCode::busy, motion_.name + " is running");
   }
   if (reading_->state.emergency || reading_->state.alarm) {
-    return refuse(MotionCode::alarm, alarmLine());
+    return refuse(MotionCode::alarm, alarmText());
   }
   if (reading_->state.mode != CncMode::dnc) {
-    return refuse(MotionCode::wrong_mode, modeLine());
+    return refuse(MotionCode::wrong_mode, modeText());
   }
   if (!armed_) {
     return refuse(MotionCode::not_armed, "motion is not armed");
@@ -312,7 +311,7 @@ std::optional<Outcome> MotionMachine::start(Motion motion, const std::string& pr
   return std::nullopt;
 }
 
-/// Where the controller keeps x (0), y (1), z (2).
+/// Index of x (0), y (1), z (2) among the controller's axes.
 std::optional<std::size_t> MotionMachine::axisIndex(int axis) const {
   if (!reading_) {
     return std::nullopt;
@@ -325,19 +324,19 @@ std::optional<std::size_t> MotionMachine::axisIndex(int axis) const {
   return static_cast<std::size_t>(found - axes.begin());
 }
 
-std::string MotionMachine::alarmLine() const {
+std::string MotionMachine::alarmText() const {
   const CncState& state = reading_->state;
   return (state.emergency ? "emergency stop" : "alarm") +
          (state.alarm_text.empty() ? std::string() : ": " + state.alarm_text);
 }
 
-std::string MotionMachine::modeLine() const {
+std::string MotionMachine::modeText() const {
   return "the controller is not in DNC mode at its panel (mode " +
          std::to_string(static_cast<int>(reading_->state.mode)) + ")";
 }
 
-std::string MotionMachine::lineOf(const Failure& failure) const {
-  return failure.kind == Failure::Kind::wrong_mode ? modeLine() : failure.message;
+std::string MotionMachine::failureText(const Failure& failure) const {
+  return failure.kind == Failure::Kind::wrong_mode ? modeText() : failure.message;
 }
 
 Progress MotionMachine::progress() const {
@@ -368,17 +367,17 @@ Status MotionMachine::cancel(const std::string& why) {
   return {};
 }
 
-/// What ends a motion from the controller's side.
-Status MotionMachine::watch() {
+/// Ends the motion on an alarm, a change of mode or the end of the DNC session.
+Status MotionMachine::checkController() {
   if (!armed_) {
     return {};
   }
   const CncState& state = reading_->state;
   if (state.emergency || state.alarm) {
-    return giveUp(MotionCode::alarm, alarmLine());
+    return abandonMotion(MotionCode::alarm, alarmText());
   }
   if (state.mode != CncMode::dnc) {
-    return giveUp(MotionCode::wrong_mode, modeLine());
+    return abandonMotion(MotionCode::wrong_mode, modeText());
   }
   if (!controller_.programsOpen() || phase_ == Phase::stopping) {
     return {};
@@ -387,10 +386,10 @@ Status MotionMachine::watch() {
   if (open || open.lost()) {
     return open;
   }
-  return giveUp(codeOf(open.failure(), MotionCode::cancelled), open.failure().message);
+  return abandonMotion(codeOf(open.failure(), MotionCode::cancelled), open.failure().message);
 }
 
-Status MotionMachine::giveUp(MotionCode code, const std::string& why) {
+Status MotionMachine::abandonMotion(MotionCode code, const std::string& why) {
   log_.warning("motion is disarmed: " + why);
   armed_ = false;
   const Status aborted = controller_.programsOpen() ? controller_.abandonPrograms() : Status();
@@ -409,13 +408,13 @@ Status MotionMachine::stop(Outcome outcome) {
 
 void MotionMachine::endStop() {
   const CncState& state = reading_->state;
-  const bool stands = reading_->at_rest && state.position == stall_.position;
-  stall_.position = state.position;
-  if (!stands && now_ - entered_ <= parameters_.stop_timeout) {
+  const bool stopped = reading_->at_rest && state.position == last_progress_.position;
+  last_progress_.position = state.position;
+  if (!stopped && now_ - entered_ <= parameters_.stop_timeout) {
     return;
   }
   Outcome outcome = stopping_outcome_;
-  if (!stands) {
+  if (!stopped) {
     outcome.message += "; the machine STILL MOVES: use the panel";
   } else {
     outcome.message += "; stopped at";
@@ -461,19 +460,19 @@ Status MotionMachine::open() {
       const bool later = opened.failure().kind == Failure::Kind::not_yet;
       if (!later || now_ - entered_ > parameters_.open_timeout) {
         finish({codeOf(opened.failure(), MotionCode::wrong_mode),
-                motion_.name + ": " + lineOf(opened.failure())});
+                motion_.name + ": " + failureText(opened.failure())});
       }
       return {};
     }
   }
   controller_.begin(motion_.program);
   enter(Phase::sending);
-  tellCondition();
+  announceCondition();
   return send();
 }
 
-/// Told ahead: it is with everybody when its time has come, and nothing of it has begun before.
-void MotionMachine::tellCondition() {
+/// Announces the condition in advance, so that every subscriber has it when the motion starts.
+void MotionMachine::announceCondition() {
   condition_from_ = condition_to_ = now_;
   if (motion_.condition) {
     condition_from_ += parameters_.condition_lead;
@@ -482,7 +481,7 @@ void MotionMachine::tellCondition() {
   }
 }
 
-/// Text that the controller does not take now waits for the next step.
+/// The rest of the text that the controller does not accept yet is sent in the next step.
 Status MotionMachine::send() {
   if (now_ < condition_from_) {
     progressed_ = now_;
@@ -494,7 +493,7 @@ Status MotionMachine::send() {
     return sent;
   }
   if (!sent) {
-    return giveUp(codeOf(sent.failure(), MotionCode::cancelled), lineOf(sent.failure()));
+    return abandonMotion(codeOf(sent.failure(), MotionCode::cancelled), failureText(sent.failure()));
   }
   const Transfer transfer = controller_.transfer();
   if (transfer.complete) {
@@ -527,7 +526,7 @@ Status MotionMachine::run() {
     return {};
   }
   if (motion_.condition) {
-    // Its end is told ahead too; the outcome waits for it, so that whoever asks for results asks after it.
+    // Its end is announced in advance too; the outcome follows after it.
     CuttingCondition none;
     none.stamp = condition_to_ = now_ + parameters_.condition_lead;
     conditions_.push_back(none);
@@ -541,11 +540,11 @@ Status MotionMachine::run() {
 
 Status MotionMachine::checkStall() {
   const CncState& state = reading_->state;
-  if (!reading_->at_rest || state.run == CncRun::hold || state.sequence != stall_.sequence ||
-      state.spindle_speed != stall_.spindle_speed || state.position != stall_.position) {
+  if (!reading_->at_rest || state.run == CncRun::hold || state.sequence != last_progress_.sequence ||
+      state.spindle_speed != last_progress_.spindle_speed || state.position != last_progress_.position) {
     progressed_ = now_;
   }
-  stall_ = state;
+  last_progress_ = state;
   if (now_ - progressed_ <= parameters_.stall_timeout) {
     return {};
   }

@@ -17,7 +17,7 @@ namespace smartmill::cnc {
 namespace {
 
 constexpr const char* AXES = "XYZ";
-constexpr int ORIENT_STEPS = 4096;  // of one turn
+constexpr int ORIENT_STEPS = 4096;  // [1] per revolution
 constexpr std::size_t MAX_BLOCK = 200;
 constexpr double POSITION_TOLERANCE = 1e-9;  // [m] rounding of decimal input
 
@@ -27,7 +27,7 @@ struct Word {
   std::string digits;
 };
 
-/// A block that cannot be sent; kept inside this file, the caller gets an NcCheck.
+/// Exception for a block that must not be sent; converted to an NcCheck in this file.
 struct Refusal {
   NcVerdict verdict;
   std::string message;
@@ -40,7 +40,7 @@ struct Refusal {
   throw Refusal{NcVerdict::outside_limits, message};
 }
 
-std::string shown(double value) {
+std::string numberText(double value) {
   return formatted("%.6g", value);
 }
 
@@ -68,7 +68,7 @@ std::string withoutComments(const std::string& line) {
   return text;
 }
 
-/// Digits with at most one point and a sign, no exponent: what a control reads.
+/// A number as a control reads it: digits with at most one point and a sign, no exponent.
 std::string number(const std::string& text, std::size_t& at) {
   const std::size_t start = at;
   if (at < text.size() && (text[at] == '+' || text[at] == '-')) {
@@ -80,7 +80,7 @@ std::string number(const std::string& text, std::size_t& at) {
     ++at;
   }
   if (digits == 0 || points > 1 || digits > 12) {
-    notUnderstood("'" + text.substr(start, std::max<std::size_t>(at - start, 1)) + "' is no number");
+    notUnderstood("'" + text.substr(start, std::max<std::size_t>(at - start, 1)) + "' is not a number");
   }
   return text.substr(start, at - start);
 }
@@ -99,10 +99,10 @@ std::vector<Word> wordsOf(const std::string& text) {
   return words;
 }
 
-/// Follows a program block by block.
-class Follower {
+/// Interprets a program block by block and tracks its position.
+class ProgramInterpreter {
  public:
-  Follower(const StartPosition& start, const MotionLimits& limits, const DialectOptions& options)
+  ProgramInterpreter(const StartPosition& start, const MotionLimits& limits, const DialectOptions& options)
       : limits_(limits), options_(options), position_(start.machine) {
     for (std::size_t i = 0; i < 3; ++i) {
       offset_[i] = start.machine[i] - start.absolute[i];
@@ -124,7 +124,7 @@ class Follower {
     if (content[0] == '#') {
       assignment(content);
     } else {
-      words(wordsOf(content));
+      processWords(wordsOf(content));
     }
   }
 
@@ -138,12 +138,12 @@ class Follower {
     const std::string name = number(content, at);
     if (equals == std::string::npos || at != equals ||
         name.find_first_not_of("0123456789") != std::string::npos) {
-      notUnderstood("'" + content + "' is not understood: #n=value is due");
+      notUnderstood("'" + content + "' is not understood: expected #n=value");
     }
     ++at;
     const std::string value = number(content, at);
     if (at != content.size()) {
-      notUnderstood("'" + content + "' is not understood: #n=value is due");
+      notUnderstood("'" + content + "' is not understood: expected #n=value");
     }
     if (std::atoi(name.c_str()) == options_.marker_macro) {
       notUnderstood("#" + name + " is the bridge's own variable");
@@ -159,25 +159,25 @@ class Follower {
     std::string head;
   };
 
-  void words(const std::vector<Word>& words) {
+  void processWords(const std::vector<Word>& words) {
     Block block;
-    std::string seen;
+    std::string letters;
     for (const Word& word : words) {
       if (word.letter != 'G') {
-        if (seen.find(word.letter) != std::string::npos) {
+        if (letters.find(word.letter) != std::string::npos) {
           notUnderstood(std::string("two words ") + word.letter + " in one block");
         }
-        seen += word.letter;
+        letters += word.letter;
       }
-      take(word, block);
+      readWord(word, block);
     }
     write(block, words);
   }
 
-  void take(const Word& word, Block& block) {
+  void readWord(const Word& word, Block& block) {
     switch (word.letter) {
       case 'N':
-        block.head = "N" + std::to_string(whole(word, 99999)) + " " + block.head;
+        block.head = "N" + std::to_string(wholeNumber(word, 99999)) + " " + block.head;
         break;
       case 'G':
         gCode(word, block.dwell, block.head);
@@ -188,7 +188,7 @@ class Follower {
         block.axis[static_cast<std::size_t>(word.letter - 'X')] = word.value;
         break;
       case 'P':
-        block.dwell_p = whole(word, 99999999);
+        block.dwell_p = wholeNumber(word, 99999999);
         break;
       case 'F':
         block.feed = word.value;
@@ -197,7 +197,7 @@ class Follower {
         block.speed = word.value;
         break;
       case 'M':
-        block.m_code = whole(word, 999);
+        block.m_code = wholeNumber(word, 999);
         break;
       default:
         notUnderstood(std::string("word ") + word.letter + word.digits + " is not understood");
@@ -231,16 +231,16 @@ class Follower {
     }
   }
 
-  static int whole(const Word& word, int most) {
+  static int wholeNumber(const Word& word, int most) {
     if (word.value < 0.0 || word.value > most || word.value != std::floor(word.value)) {
-      notUnderstood(std::string("word ") + word.letter + word.digits + ": a whole number from 0 to " +
-                    std::to_string(most) + " is due");
+      notUnderstood(std::string("word ") + word.letter + word.digits + ": expected an integer from 0 to " +
+                    std::to_string(most));
     }
     return static_cast<int>(word.value);
   }
 
   void gCode(const Word& word, bool& dwell, std::string& head) {
-    const int code = whole(word, 999);
+    const int code = wholeNumber(word, 999);
     switch (code) {
       case 0:
       case 1:
@@ -268,18 +268,18 @@ class Follower {
       notUnderstood("G4 with a negative time");
     }
     if (seconds > limits_.max_dwell) {
-      outside("dwell of " + shown(seconds) + " s, at most " + shown(limits_.max_dwell) + " s");
+      outside("dwell of " + numberText(seconds) + " s, at most " + numberText(limits_.max_dwell) + " s");
     }
     return p ? "P" + std::to_string(static_cast<long>(*p)) + " " : "X" + fixedDecimals(*axis[0], 3) + " ";
   }
 
   std::string feedWord(double feed) {
     if (feed <= 0.0) {
-      notUnderstood("F" + shown(feed) + ": a feed above 0 is due");
+      notUnderstood("F" + numberText(feed) + ": expected a feed above 0");
     }
     const double most = limits_.max_feed / units::MM * 60.0;
     if (feed > most * (1.0 + 1e-9)) {
-      outside("F" + shown(feed) + " mm/min, at most " + shown(most) + " mm/min");
+      outside("F" + numberText(feed) + " mm/min, at most " + numberText(most) + " mm/min");
     }
     feed_known_ = true;
     return "F" + fixedDecimals(feed, options_.decimals) + " ";
@@ -287,11 +287,11 @@ class Follower {
 
   std::string speedWord(double speed, const std::vector<Word>& words) const {
     if (speed < 0.0) {
-      notUnderstood("S" + shown(speed) + ": a speed of 0 or more is due");
+      notUnderstood("S" + numberText(speed) + ": expected a speed of 0 or more");
     }
     const double most = units::rpmFromRadPerSec(limits_.max_spindle_speed);
     if (speed > most * (1.0 + 1e-9)) {
-      outside("S" + shown(speed) + " rpm, at most " + shown(most) + " rpm");
+      outside("S" + numberText(speed) + " rpm, at most " + numberText(most) + " rpm");
     }
     const auto word = std::find_if(words.begin(), words.end(), [](const Word& w) { return w.letter == 'S'; });
     return "S" + word->digits + " ";
@@ -315,12 +315,13 @@ class Follower {
       const double length = *axis[i] * units::MM;
       position_[i] = relative_ ? position_[i] + length : length + offset_[i];
       if (!std::isfinite(position_[i])) {
-        outside(std::string("the controller does not tell where ") + AXES[i] + " stands");
+        outside(std::string("the controller reports no position of ") + AXES[i]);
       }
       const std::array<double, 2>& travel = limits_.travel[i];
       if (position_[i] < travel[0] - POSITION_TOLERANCE || position_[i] > travel[1] + POSITION_TOLERANCE) {
-        outside(std::string(1, AXES[i]) + " would go to " + shown(position_[i] / units::MM) + " mm, limits " +
-                shown(travel[0] / units::MM) + " to " + shown(travel[1] / units::MM) + " mm (machine)");
+        outside(std::string(1, AXES[i]) + " would go to " + numberText(position_[i] / units::MM) +
+                " mm, limits " + numberText(travel[0] / units::MM) + " to " +
+                numberText(travel[1] / units::MM) + " mm (machine)");
       }
       out += AXES[i] + fixedDecimals(*axis[i], options_.decimals) + " ";
     }
@@ -347,7 +348,7 @@ class Follower {
   std::array<double, 3> position_;  // [m] machine
   std::array<double, 3> offset_{{0, 0, 0}};
   bool relative_ = false;
-  int motion_ = -1;  // 0 or 1 once stated
+  int motion_ = -1;  // 0 or 1 after G0 or G1
   bool feed_known_ = false;
   bool ended_ = false;
   std::string text_;
@@ -358,8 +359,8 @@ class Follower {
 void MotionLimits::validate() const {
   for (std::size_t i = 0; i < 3; ++i) {
     if (!(travel[i][0] < travel[i][1])) {
-      throw Error(std::string("travel_") + "xyz"[i] + ": [" + shown(travel[i][0]) + ", " +
-                  shown(travel[i][1]) + "] m: the lower limit comes first");
+      throw Error(std::string("travel_") + "xyz"[i] + ": [" + numberText(travel[i][0]) + ", " +
+                  numberText(travel[i][1]) + "] m: expected the lower limit first");
     }
   }
   require("max_feed", max_feed, Range::positive(), "m/s");
@@ -370,12 +371,12 @@ void MotionLimits::validate() const {
 NcCheck checkProgram(const std::string& program, const StartPosition& start, const MotionLimits& limits,
                      const DialectOptions& options) {
   NcCheck check;
-  Follower follower(start, limits, options);
+  ProgramInterpreter interpreter(start, limits, options);
   std::istringstream lines(program);
   std::string line;
   for (int count = 1; std::getline(lines, line); ++count) {
     try {
-      follower.block(line);
+      interpreter.block(line);
     } catch (const Refusal& refusal) {
       check.verdict = refusal.verdict;
       check.message = "line " + std::to_string(count) + ": " + refusal.message;
@@ -383,8 +384,8 @@ NcCheck checkProgram(const std::string& program, const StartPosition& start, con
       return check;
     }
   }
-  check.text = follower.text();
-  check.end = follower.position();
+  check.text = interpreter.text();
+  check.end = interpreter.position();
   return check;
 }
 

@@ -44,22 +44,22 @@ std::unique_ptr<Controller> makeController(const NodeParameters& parameters,
                 : makeFocasController(parameters.controller);
 }
 
-/// Empty when the condition can be published.
+/// Why a condition cannot be published; empty: it can.
 std::string conditionFault(const smartmill_msgs::CuttingCondition& c) {
   if (c.kind > smartmill_msgs::CuttingCondition::CUT) {
-    return "condition.kind " + std::to_string(c.kind) + " is unknown";
+    return "condition.kind " + std::to_string(c.kind) + ": expected NONE, AIR or CUT";
   }
   if (c.kind == smartmill_msgs::CuttingCondition::NONE) {
     return {};
   }
   if (!(c.spindle_speed > 0.0)) {
-    return "condition.spindle_speed is not above 0";
+    return "condition.spindle_speed: expected a speed above 0";
   }
   if (c.kind == smartmill_msgs::CuttingCondition::CUT &&
       !(c.teeth > 0 && c.diameter > 0.0 && c.feed_per_tooth > 0.0 && c.axial_depth > 0.0 &&
         c.exit_angle > c.entry_angle)) {
-    return "condition: teeth, diameter, feed_per_tooth, axial_depth above 0 and exit_angle above entry_angle "
-           "are due";
+    return "condition: expected teeth, diameter, feed_per_tooth, axial_depth above 0 and exit_angle above "
+           "entry_angle";
   }
   return {};
 }
@@ -140,7 +140,7 @@ CncNode::~CncNode() {
 void CncNode::run() {
   const auto period =
       std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / parameters_.rate));
-  Clock::time_point due = Clock::now();
+  Clock::time_point next = Clock::now();
   for (int count = 0; !stopping_; ++count) {
     std::vector<Job> jobs;
     {
@@ -150,9 +150,9 @@ void CncNode::run() {
     for (const Job& job : jobs) {
       job();
     }
-    const double asked = steadySeconds();
-    bridge_.fetch(asked);
-    round_trip_ = std::max(0.999 * round_trip_, steadySeconds() - asked);
+    const double request_time = steadySeconds();
+    bridge_.fetch(request_time);
+    round_trip_ = std::max(0.999 * round_trip_, steadySeconds() - request_time);
     const ros::Time stamp = ros::Time::now();
     bridge_.step(stamp.toSec());
     publish(stamp);
@@ -167,8 +167,8 @@ void CncNode::run() {
         ended->finish(*outcome);
       }
     }
-    due = std::max(due + period, Clock::now() - period);
-    std::this_thread::sleep_until(due);
+    next = std::max(next + period, Clock::now() - period);
+    std::this_thread::sleep_until(next);
   }
   bridge_.shutdown();
   publishConditions();
@@ -181,10 +181,10 @@ void CncNode::post(Job job) {
 }
 
 template <class Result>
-std::optional<Result> CncNode::ask(std::function<Result()> question) {
+std::optional<Result> CncNode::callInThread(std::function<Result()> call) {
   const auto answer = std::make_shared<std::promise<Result>>();
   std::future<Result> future = answer->get_future();
-  post([answer, question] { answer->set_value(question()); });
+  post([answer, call] { answer->set_value(call()); });
   if (future.wait_for(LONGEST_WAIT) != std::future_status::ready) {
     return std::nullopt;
   }
@@ -258,8 +258,8 @@ void CncNode::publish(const ros::Time& stamp) {
     broadcaster_.sendTransform(transform);
   }
   const std::lock_guard<std::mutex> lock(mutex_);
-  seen_ = state;
-  seen_connections_ = bridge_.connections();
+  diagnosed_state_ = state;
+  diagnosed_connections_ = bridge_.connections();
 }
 
 void CncNode::publishConditions() {
@@ -269,13 +269,13 @@ void CncNode::publishConditions() {
 }
 
 void CncNode::publishAlarms(const ros::Time& stamp) {
-  if (told_alarms_ == bridge_.alarms()) {
+  if (published_alarms_ == bridge_.alarms()) {
     return;
   }
-  told_alarms_ = bridge_.alarms();
+  published_alarms_ = bridge_.alarms();
   smartmill_msgs::CncAlarms message;
   message.header.stamp = stamp;
-  for (const ControllerAlarm& alarm : *told_alarms_) {
+  for (const ControllerAlarm& alarm : *published_alarms_) {
     smartmill_msgs::CncAlarm entry;
     entry.number = alarm.number;
     entry.type = alarm.type;
@@ -287,34 +287,34 @@ void CncNode::publishAlarms(const ros::Time& stamp) {
 }
 
 void CncNode::log() {
-  for (const Note& note : bridge_.takeNotes()) {
-    switch (note.level) {
-      case Note::Level::info:
-        ROS_INFO_STREAM(note.text);
+  for (const LogEntry& entry : bridge_.takeLogEntries()) {
+    switch (entry.level) {
+      case LogEntry::Level::info:
+        ROS_INFO_STREAM(entry.text);
         break;
-      case Note::Level::warning:
-        ROS_WARN_STREAM(note.text);
+      case LogEntry::Level::warning:
+        ROS_WARN_STREAM(entry.text);
         break;
-      case Note::Level::error:
-        ROS_ERROR_STREAM(note.text);
+      case LogEntry::Level::error:
+        ROS_ERROR_STREAM(entry.text);
         break;
     }
     const std::lock_guard<std::mutex> lock(mutex_);
-    seen_note_ = note.text;
+    diagnosed_line_ = entry.text;
   }
 }
 
 bool CncNode::armMotion(smartmill_msgs::ArmMotion::Request& request,
                         smartmill_msgs::ArmMotion::Response& response) {
   const bool on = request.arm != 0;
-  const auto answer = ask<Answer<ArmCode>>([this, on] { return bridge_.arm(on); });
+  const auto answer = callInThread<Answer<ArmCode>>([this, on] { return bridge_.arm(on); });
   response.code = static_cast<std::uint8_t>(answer ? answer->code : ArmCode::not_connected);
   response.message = answer ? answer->message : "the controller does not answer";
   return true;
 }
 
 bool CncNode::feedHold(smartmill_msgs::FeedHold::Request&, smartmill_msgs::FeedHold::Response& response) {
-  const auto answer = ask<Answer<HoldCode>>([this] { return bridge_.hold(); });
+  const auto answer = callInThread<Answer<HoldCode>>([this] { return bridge_.hold(); });
   response.code = static_cast<std::uint8_t>(answer ? answer->code : HoldCode::not_connected);
   response.message = answer ? answer->message : "the controller does not answer";
   return true;
@@ -325,7 +325,7 @@ bool CncNode::setMacro(smartmill_msgs::SetMacro::Request& request,
   const int number = request.number;
   const double value = request.value;
   const auto answer =
-      ask<Answer<MacroCode>>([this, number, value] { return bridge_.setMacro(number, value); });
+      callInThread<Answer<MacroCode>>([this, number, value] { return bridge_.setMacro(number, value); });
   response.code = static_cast<std::uint8_t>(answer ? answer->code : MacroCode::not_connected);
   response.message = answer ? answer->message : "the controller does not answer";
   return true;
@@ -336,7 +336,7 @@ bool CncNode::setOverrides(smartmill_msgs::SetOverrides::Request& request,
   const Overrides wanted{request.feed, request.spindle};
   const std::string reason = request.reason;
   const auto answer =
-      ask<OverrideAnswer>([this, wanted, reason] { return bridge_.setOverrides(wanted, reason); });
+      callInThread<OverrideAnswer>([this, wanted, reason] { return bridge_.setOverrides(wanted, reason); });
   response.code = static_cast<std::uint8_t>(answer ? answer->code : OverrideCode::not_connected);
   response.message = answer ? answer->message : "the controller does not answer";
   response.feed = answer ? answer->taken.feed : 1.0;
@@ -347,23 +347,25 @@ bool CncNode::setOverrides(smartmill_msgs::SetOverrides::Request& request,
 void CncNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   using Level = diagnostic_msgs::DiagnosticStatus;
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (!seen_.connected) {
-    status.summary(Level::ERROR, seen_note_.empty() ? "not connected" : seen_note_);
-  } else if (seen_.emergency || seen_.alarm) {
-    status.summary(Level::ERROR, seen_.emergency ? "emergency stop" : "alarm " + seen_.alarm_text);
-  } else if (seen_.mode != CncMode::dnc) {
+  if (!diagnosed_state_.connected) {
+    status.summary(Level::ERROR, diagnosed_line_.empty() ? "not connected" : diagnosed_line_);
+  } else if (diagnosed_state_.emergency || diagnosed_state_.alarm) {
+    status.summary(Level::ERROR,
+                   diagnosed_state_.emergency ? "emergency stop" : "alarm " + diagnosed_state_.alarm_text);
+  } else if (diagnosed_state_.mode != CncMode::dnc) {
     status.summary(Level::WARN, "connected; not in DNC mode, nothing can be moved");
   } else {
-    status.summary(Level::OK, seen_.armed ? "connected, motion armed" : "connected, motion disarmed");
+    status.summary(Level::OK,
+                   diagnosed_state_.armed ? "connected, motion armed" : "connected, motion disarmed");
   }
-  status.add("mode", static_cast<int>(seen_.mode));
-  status.add("armed", seen_.armed);
+  status.add("mode", static_cast<int>(diagnosed_state_.mode));
+  status.add("armed", diagnosed_state_.armed);
   status.add("read only", parameters_.motion.read_only);
-  status.add("connections made", seen_connections_.made);
-  status.add("connections lost", seen_connections_.lost);
-  status.add("attempts to connect", seen_connections_.attempts);
-  status.addf("longest poll of late [s]", "%.4f", round_trip_.load());
-  status.add("alarm", seen_.alarm_text);
+  status.add("connections made", diagnosed_connections_.made);
+  status.add("connections lost", diagnosed_connections_.lost);
+  status.add("attempts to connect", diagnosed_connections_.attempts);
+  status.addf("longest recent poll [s]", "%.4f", round_trip_.load());
+  status.add("alarm", diagnosed_state_.alarm_text);
 }
 
 }  // namespace smartmill::cnc

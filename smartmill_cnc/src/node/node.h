@@ -25,13 +25,13 @@
 
 namespace smartmill::cnc {
 
-/// Shell of the Bridge: its thread alone talks to the controller; callbacks hand it their wishes.
+/// ROS shell of the Bridge: one thread communicates with the controller; callbacks post jobs to it.
 class CncNode {
  public:
   using Parameters = NodeParameters;
-  /// @throws Error naming the parameter that is wrong.
+  /// @throws Error naming an invalid parameter.
   CncNode(ros::NodeHandle nh, ros::NodeHandle private_nh);
-  /// Stops a running motion, says goodbye to the controller.
+  /// Stops a running motion and closes the connection.
   ~CncNode();
 
  private:
@@ -39,7 +39,7 @@ class CncNode {
   template <class Action>
   using Server = actionlib::ActionServer<Action>;
 
-  /// The goal that has the machine now, whichever its action is.
+  /// The running goal, of any action.
   struct Active {
     std::string id;
     std::function<void(const Outcome&)> finish;
@@ -49,9 +49,9 @@ class CncNode {
   void serveActions(ros::NodeHandle& nh);
   void run();
   void post(Job job);
-  /// Runs in the bridge's thread; nothing when that takes longer than a caller should wait.
+  /// Calls a function in the bridge's thread. @return empty after LONGEST_WAIT
   template <class Result>
-  std::optional<Result> ask(std::function<Result()> question);
+  std::optional<Result> callInThread(std::function<Result()> call);
 
   template <class Action, class Start, class Feedback>
   std::unique_ptr<Server<Action>> serve(ros::NodeHandle& nh, const std::string& name, Start start,
@@ -69,11 +69,10 @@ class CncNode {
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   const NodeParameters parameters_;
-  const std::shared_ptr<linuxcnc::ServoStream> stream_;      // of a LinuxCNC
-  Bridge bridge_;                                            // the bridge's thread only
-  std::optional<Active> active_;                             // the bridge's thread only
-  std::string last_note_;                                    // the bridge's thread only
-  std::optional<std::vector<ControllerAlarm>> told_alarms_;  // the bridge's thread only
+  const std::shared_ptr<linuxcnc::ServoStream> stream_;           // null without LinuxCNC
+  Bridge bridge_;                                                 // the bridge's thread only
+  std::optional<Active> active_;                                  // the bridge's thread only
+  std::optional<std::vector<ControllerAlarm>> published_alarms_;  // the bridge's thread only
 
   ros::Publisher state_publisher_, load_publisher_, condition_publisher_, alarms_publisher_;
   tf2_ros::TransformBroadcaster broadcaster_;
@@ -84,13 +83,13 @@ class CncNode {
   NodeShell shell_;
   std::unique_ptr<ServoPublisher> servo_;
 
-  std::mutex mutex_;  // of what follows
+  std::mutex mutex_;  // guards the members below
   std::vector<Job> jobs_;
-  CncState seen_;  // for diagnostics
-  std::string seen_note_;
-  Poller::Counts seen_connections_;
+  CncState diagnosed_state_;
+  std::string diagnosed_line_;
+  Poller::Counts diagnosed_connections_;
 
-  std::atomic<double> round_trip_{0.0};  // [s] decays
+  std::atomic<double> round_trip_{0.0};  // [s] longest recent one
   std::atomic<bool> stopping_{false};
   std::thread thread_;
 };

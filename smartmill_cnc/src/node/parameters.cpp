@@ -6,7 +6,7 @@
 namespace smartmill::cnc {
 namespace {
 
-/// Limits that stand in the model and not in the file.
+/// Takes missing limits from the model.
 void fill(NodeParameters& parameters, const MachineModel& model) {
   MotionLimits& limits = parameters.motion.limits;
   if (model.axes) {
@@ -30,26 +30,27 @@ void NodeParameters::declare(ParameterTable& table) {
   table.title("Parameters of cnc_node (package smartmill_cnc): the bridge to the controller.");
   table.section();
   table.choice("controller", kind, {"fanuc", "linuxcnc"},
-               "what it is: over FOCAS Ethernet, or a LinuxCNC of this computer");
-  table.section("Of a Fanuc.");
+               "fanuc: over FOCAS Ethernet; linuxcnc: a LinuxCNC of this computer");
+  table.section("Fanuc.");
   controller.declare(table);
-  table.section("Of a LinuxCNC.");
+  table.section("LinuxCNC.");
   linuxcnc.declare(table);
   table.text("load_input", load_input,
-             "topic (LoadSample) of a load meter that the controller does not read itself; empty: none");
+             "topic (LoadSample) of a load meter outside the controller; empty: none");
   table.section();
-  table.number("rate", rate, "Hz", Range::closed(1.0, 200.0), "of cnc/state and cnc/load");
+  table.number("rate", rate, "Hz", Range::closed(1.0, 200.0), "rate of cnc/state and cnc/load");
   table.number("reconnect_period", reconnect_period, "s", Range::positive(),
-               "between two attempts to connect");
+               "time between the first two attempts to connect, then up to eight times as long");
   motion.declare(table);
   table.section(
-      "Limits of every motion, checked before anything is sent. What is empty or 0 here comes from the "
-      "machine model's "
-      "axes and spindle sections; a limit that neither states is refused.");
+      "Limits of every motion, checked before anything is sent. An empty or zero value is taken from the "
+      "axes and "
+      "spindle sections of the machine model; every limit is required here or there.");
   table.text("model", model, "path of a smartmill-model/1 file");
-  table.list("travel_x", travel[0], "m", {}, "lowest and highest machine position, e.g. [-0.25, 0.25]");
-  table.list("travel_y", travel[1], "m", {}, "the same of y");
-  table.list("travel_z", travel[2], "m", {}, "the same of z");
+  table.list("travel_x", travel[0], "m", {},
+             "lowest and highest machine position, for example [-0.25, 0.25]");
+  table.list("travel_y", travel[1], "m", {}, "of y");
+  table.list("travel_z", travel[2], "m", {}, "of z");
   motion.limits.declare(table);
 }
 
@@ -58,7 +59,7 @@ void NodeParameters::validate() const {
   if (kind == "fanuc") {
     controller.validate();
   } else if (linuxcnc.folder.empty()) {
-    throw Error("linuxcnc_folder: the folder of the machine is due");
+    throw Error("linuxcnc_folder: empty, expected the folder of the machine");
   }
 }
 
@@ -67,20 +68,21 @@ NodeParameters NodeParameters::completed() const {
   if (!model.empty()) {
     fill(complete, readMachineModel(model));
   }
-  const std::string or_model = " (or a model that has it)";
+  const std::string or_model = " (or a model with it)";
   MotionLimits& limits = complete.motion.limits;
   for (std::size_t i = 0; i < 3; ++i) {
     const std::vector<double>& ends = complete.travel[i];
     if (ends.size() != 2) {
-      throw Error(std::string("travel_") + "xyz"[i] + ": lowest and highest position [m] are due" + or_model);
+      throw Error(std::string("travel_") + "xyz"[i] + ": expected lowest and highest position [m]" +
+                  or_model);
     }
     limits.travel[i] = {ends[0], ends[1]};
   }
   if (limits.max_feed == 0.0) {
-    throw Error("max_feed: a feed above 0 [m/s] is due" + or_model);
+    throw Error("max_feed: expected a feed above 0 m/s" + or_model);
   }
   if (limits.max_spindle_speed == 0.0) {
-    throw Error("max_spindle_speed: a speed above 0 [rad/s] is due" + or_model);
+    throw Error("max_spindle_speed: expected a speed above 0 rad/s" + or_model);
   }
   complete.motion.validate();
   return complete;

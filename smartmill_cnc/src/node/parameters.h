@@ -23,10 +23,10 @@ struct NodeParameters {
   std::array<std::vector<double>, 3> travel;
 
   void declare(ParameterTable& table);
-  /// What holds of the file alone. @throws Error naming key and value.
+  /// Checks the file alone. @throws Error naming key and value.
   void validate() const;
-  /// What the file leaves to the machine model comes from there. @throws Error naming key and value; also on
-  /// a limit that neither states.
+  /// @return a copy with missing limits from the machine model. @throws Error naming key and value, also of a
+  /// limit that neither states.
   NodeParameters completed() const;
 };
 

@@ -14,7 +14,7 @@ namespace smartmill::cnc {
 namespace {
 
 constexpr const char* SERVO_TOPIC = "cnc/servo";
-constexpr double WAIT = 0.02;    // [s] for what comes next
+constexpr double WAIT = 0.02;    // [s] for the next block
 constexpr double PERIOD = 1e-3;  // [s] of the servo thread
 
 }  // namespace
@@ -47,31 +47,31 @@ ServoPublisher::~ServoPublisher() {
 void ServoPublisher::run() {
   while (!stopping_) {
     const double before = rosSeconds();
-    for (const linuxcnc::ServoStretch& stretch : stream_->step(WAIT, rosSeconds)) {
-      publish(stretch);
+    for (const linuxcnc::ServoSegment& segment : stream_->step(WAIT, rosSeconds)) {
+      publish(segment);
     }
-    // Without a connection nothing is waited for there.
+    // Without a connection step() does not wait.
     if (rosSeconds() - before < PERIOD) {
       std::this_thread::sleep_for(std::chrono::duration<double>(PERIOD));
     }
   }
 }
 
-void ServoPublisher::publish(const linuxcnc::ServoStretch& stretch) {
+void ServoPublisher::publish(const linuxcnc::ServoSegment& segment) {
   SampleBlock block;
-  block.stamp = stretch.stamp;
+  block.stamp = segment.stamp;
   block.sample_rate = 1.0 / PERIOD;
-  block.first_index = stretch.first;
+  block.first_index = segment.first;
   block.channels = {
       "x", "y", "z", "revolutions", "spindle_speed", "velocity", "distance_to_go", "spindle_load", "marker"};
   block.units = {"m", "m", "m", "1", "rad/s", "m/s", "m", "1", "1"};
   SpindleAngle angle;
-  for (const linuxcnc::ServoSample& s : stretch.samples) {
+  for (const linuxcnc::ServoSample& s : segment.samples) {
     block.samples.insert(block.samples.end(),
                          {s.position[0], s.position[1], s.position[2], s.revolutions, s.spindle_speed,
                           s.velocity, s.distance_to_go, s.spindle_load, s.marker});
     const auto index = static_cast<double>(block.size() - 1);
-    angle.stamp = stretch.stamp + index * PERIOD;
+    angle.stamp = segment.stamp + index * PERIOD;
     angle.angle = wrapped(units::TWO_PI * (s.revolutions - std::floor(s.revolutions)));
     angle.speed = std::abs(s.spindle_speed);
     angle_.publish(toMsg(angle));
@@ -81,21 +81,21 @@ void ServoPublisher::publish(const linuxcnc::ServoStretch& stretch) {
 
 void ServoPublisher::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   using Level = diagnostic_msgs::DiagnosticStatus;
-  const linuxcnc::ServoStatistics seen = stream_->statistics();
-  const std::uint64_t before = std::exchange(told_, seen.samples);
-  if (before == seen.samples) {
+  const linuxcnc::ServoStatistics statistics = stream_->statistics();
+  const std::uint64_t before = std::exchange(reported_samples_, statistics.samples);
+  if (before == statistics.samples) {
     status.summary(Level::ERROR, "silent");
-  } else if (seen.lost > 0) {
+  } else if (statistics.lost > 0) {
     status.summary(Level::WARN, "samples were lost");
   } else {
-    status.summary(Level::OK, "every servo cycle has come");
+    status.summary(Level::OK, "all servo cycles received");
   }
-  status.add("samples [1]", std::to_string(seen.samples));
-  status.add("lost [1]", std::to_string(seen.lost));
-  status.add("starts of the controller seen anew [1]", std::to_string(seen.restarts));
-  status.addf("late, median [ms]", "%.1f", 1e3 * seen.late_median);
-  status.addf("late, 99 % [ms]", "%.1f", 1e3 * seen.late_99);
-  status.addf("late, worst [ms]", "%.1f", 1e3 * seen.late_worst);
+  status.add("samples [1]", std::to_string(statistics.samples));
+  status.add("lost [1]", std::to_string(statistics.lost));
+  status.add("restarts of the controller [1]", std::to_string(statistics.restarts));
+  status.addf("late, median [ms]", "%.1f", 1e3 * statistics.late_median);
+  status.addf("late, 99 % [ms]", "%.1f", 1e3 * statistics.late_99);
+  status.addf("late, worst [ms]", "%.1f", 1e3 * statistics.late_worst);
 }
 
 }  // namespace smartmill::cnc

@@ -12,11 +12,11 @@
 
 namespace smartmill::cnc {
 
-/// Publishes what a LinuxCNC does in every servo cycle: cnc/servo in blocks, spindle/angle one by one; hands
-/// the load of a meter outside the controller back to it. Tells loss and jitter in the diagnostics.
+/// Publishes every servo cycle of a LinuxCNC (cnc/servo in blocks, spindle/angle one by one) and forwards the
+/// load of an external load meter to it. The diagnostics contain lost samples and delays.
 class ServoPublisher {
  public:
-  /// @param load_input topic of that meter; empty: none
+  /// @param load_input topic of the load meter; empty: none
   ServoPublisher(ros::NodeHandle nh, NodeShell& shell, std::shared_ptr<linuxcnc::ServoStream> stream,
                  const std::string& load_input);
   ~ServoPublisher();
@@ -25,17 +25,17 @@ class ServoPublisher {
 
  private:
   void run();
-  void publish(const linuxcnc::ServoStretch& stretch);
+  void publish(const linuxcnc::ServoSegment& segment);
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   std::shared_ptr<linuxcnc::ServoStream> stream_;
   ros::Publisher servo_, angle_;
-  std::uint64_t told_ = 0;  // samples at the last diagnostics
+  std::uint64_t reported_samples_ = 0;  // samples at the last diagnostics
   std::atomic<bool> stopping_{false};
   std::thread thread_;
 };
 
-/// [s] of the clock that stamps are of.
+/// @return [s] ROS time
 double rosSeconds();
 
 }  // namespace smartmill::cnc

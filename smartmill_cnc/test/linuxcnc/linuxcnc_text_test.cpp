@@ -23,8 +23,8 @@ std::string textOf(const std::string& program) {
   return linuxCncText(check.text);
 }
 
-// RS-274/NGC counts dwells in seconds; a Fanuc waits for a spindle that stops, M66 lets LinuxCNC do so.
-TEST(LinuxCncText, SaysTheSameInTheOtherDialect) {
+// RS-274/NGC has dwells in seconds; a Fanuc waits for the spindle to stop, LinuxCNC does so with M66.
+TEST(LinuxCncText, IsEquivalentInTheOtherDialect) {
   EXPECT_EQ(textOf("G91 G1 F600 X10.5\nG4 P1500\nG4 X2.5\nS4000 M3\nG0 Z-1\nM30\n"),
             "G21 G94 G61.1 M52 P1\n"
             "G90\n"
@@ -66,7 +66,7 @@ TEST(LinuxCncConfiguration, HasTheModelsLimits) {
   EXPECT_NE(files.at("mill.hal").find("setp ramp.maxv 10000\n"), std::string::npos);
 }
 
-TEST(LinuxCncConfiguration, NamesWhatTheModelLacks) {
+TEST(LinuxCncConfiguration, NamesAMissingValueOfTheModel) {
   MachineModel m = model();
   m.spindle->acceleration.reset();
   try {
@@ -77,7 +77,7 @@ TEST(LinuxCncConfiguration, NamesWhatTheModelLacks) {
   }
 }
 
-TEST(LinuxCncController, WithoutAGatewaySaysSo) {
+TEST(LinuxCncController, ReportsAMissingGateway) {
   EXPECT_THROW(makeLinuxCncController({}, nullptr, nullptr), Error);
   const auto controller =
       makeLinuxCncController({"/nowhere", 0.1}, std::make_shared<ServoStream>("/nowhere"), nullptr);

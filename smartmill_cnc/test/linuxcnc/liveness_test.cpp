@@ -1,4 +1,4 @@
-// A controller that has ended, one that hangs and one that waits for a processor are told apart.
+// Distinguishes a controller that has ended, one that hangs and one that waits for a processor.
 #include "smartmill_cnc/linuxcnc/liveness.h"
 
 #include <gtest/gtest.h>
@@ -19,48 +19,47 @@ namespace {
 
 using Verdict = Liveness::Verdict;
 
-constexpr double LOOK = 0.002;  // [s]
+constexpr double STEP = 0.002;  // [s]
 
-/// [s] from the last cycle to the verdict when nothing but this evidence is seen.
-double verdictAfter(Verdict due, const Liveness::Evidence& evidence, double step) {
+/// [s] from the last cycle to the verdict with constant evidence.
+double verdictAfter(Verdict expected, const Liveness::Evidence& evidence, double step) {
   Liveness liveness;
   double now = 100.0;
-  liveness.look(Liveness::Evidence{true, false, false}, now);
+  liveness.update(Liveness::Evidence{true, false, false}, now);
   for (;;) {
     now += step;
-    const Verdict verdict = liveness.look(evidence, now);
+    const Verdict verdict = liveness.update(evidence, now);
     if (verdict != Verdict::lives) {
-      EXPECT_EQ(verdict, due);
+      EXPECT_EQ(verdict, expected);
       return now - 100.0;
     }
   }
 }
 
-TEST(Liveness, OneThatHangsIsToldWithinHalfASecond) {
-  EXPECT_NEAR(verdictAfter(Verdict::hangs, {false, false, false}, LOOK), 0.4, 2 * LOOK);
+TEST(Liveness, HangIsDetectedWithinHalfASecond) {
+  EXPECT_NEAR(verdictAfter(Verdict::hangs, {false, false, false}, STEP), 0.4, 2 * STEP);
 }
 
-TEST(Liveness, OneThatHasEndedIsToldAtOnce) {
-  EXPECT_NEAR(verdictAfter(Verdict::ended, {false, true, false}, LOOK), LOOK, 1e-9);
+TEST(Liveness, EndIsDetectedAtOnce) {
+  EXPECT_NEAR(verdictAfter(Verdict::ended, {false, true, false}, STEP), STEP, 1e-9);
 }
 
-TEST(Liveness, OneThatWaitsForAProcessorLivesForTwoSeconds) {
-  EXPECT_NEAR(verdictAfter(Verdict::starves, {false, false, true}, LOOK), 2.0, 2 * LOOK);
+TEST(Liveness, WaitForAProcessorIsToleratedForTwoSeconds) {
+  EXPECT_NEAR(verdictAfter(Verdict::starves, {false, false, true}, STEP), 2.0, 2 * STEP);
 }
 
-TEST(Liveness, AnObserverThatWaitedItselfBlamesNobody) {
-  // Looks 0.3 s apart: 0.05 s of each count as the controller's, and 2 s are over before 0.4 s of these.
+TEST(Liveness, PausesOfTheObserverDoNotCount) {
+  // Updates 0.3 s apart: 0.05 s of each count for the controller, so that 2 s pass before these reach 0.4 s.
   EXPECT_NEAR(verdictAfter(Verdict::starves, {false, false, false}, 0.3), 2.1, 1e-9);
   Liveness liveness;
-  liveness.look(Liveness::Evidence{true, false, false}, 0.0);
-  EXPECT_EQ(liveness.look(Liveness::Evidence{false, false, false}, 1.0), Verdict::lives);
+  liveness.update(Liveness::Evidence{true, false, false}, 0.0);
+  EXPECT_EQ(liveness.update(Liveness::Evidence{false, false, false}, 1.0), Verdict::lives);
   EXPECT_NEAR(liveness.starved(), 0.95, 1e-12);
-  EXPECT_EQ(liveness.look(Liveness::Evidence{true, false, false}, 1.1), Verdict::lives);
+  EXPECT_EQ(liveness.update(Liveness::Evidence{true, false, false}, 1.1), Verdict::lives);
   EXPECT_EQ(liveness.starved(), 0.0);
 }
 
-/// A child that has a name of its own and does what it is told on one processor, together with this process'
-/// other children.
+/// A named child process that is busy or asleep on processor 0, which all children share.
 class Child {
  public:
   Child(const char* name, bool busy) : pid_(::fork()) {
@@ -94,17 +93,17 @@ double now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-/// The watch's answers over some time.
-int waitsSeen(ProcessWatch& watch, int looks) {
-  int seen = 0;
-  for (int i = 0; i < looks; ++i) {
+/// Number of checks in which a watched process waits for a processor.
+int countWaits(ProcessWatch& watch, int checks) {
+  int waits = 0;
+  for (int i = 0; i < checks; ++i) {
     std::this_thread::sleep_for(std::chrono::duration<double>(1.2 * ProcessWatch::WINDOW));
-    seen += watch.waits(now()) ? 1 : 0;
+    waits += watch.waitsForProcessor(now()) ? 1 : 0;
   }
-  return seen;
+  return waits;
 }
 
-TEST(ProcessWatch, SeesWhoEnds) {
+TEST(ProcessWatch, DetectsAnEndedProcess) {
   const std::string name = "smw_e_" + std::to_string(::getpid());
   ProcessWatch watch;
   {
@@ -118,16 +117,16 @@ TEST(ProcessWatch, SeesWhoEnds) {
     ::waitid(P_PID, static_cast<id_t>(child.pid()), &info, WEXITED | WNOWAIT);
     EXPECT_TRUE(watch.ended());
     watch.find({name});
-    EXPECT_EQ(watch.found(), 0u);  // not yet buried
+    EXPECT_EQ(watch.found(), 0u);  // a zombie does not count
   }
 }
 
-TEST(ProcessWatch, SeesWhoWaitsForAProcessorAndWhoSleeps) {
+TEST(ProcessWatch, DistinguishesWaitingFromSleeping) {
   const std::string name = "smw_w_" + std::to_string(::getpid()),
                     idle = "smw_i_" + std::to_string(::getpid());
   const Child waits(name.c_str(), true), sleeps(idle.c_str(), false);
   sched_param none{};
-  // Runs only when nobody else wants to.
+  // Runs only if no other process does.
   ASSERT_EQ(::sched_setscheduler(waits.pid(), SCHED_IDLE, &none), 0);
   ProcessWatch watch, other;
   while (watch.found() == 0 || other.found() == 0) {
@@ -136,13 +135,13 @@ TEST(ProcessWatch, SeesWhoWaitsForAProcessorAndWhoSleeps) {
   }
   {
     const Child rival("smw_rival", true), another("smw_rival", true);
-    EXPECT_GT(waitsSeen(watch, 40), 10);
-    EXPECT_EQ(waitsSeen(other, 5), 0);
+    EXPECT_GT(countWaits(watch, 40), 10);
+    EXPECT_EQ(countWaits(other, 5), 0);
   }
   ::kill(waits.pid(), SIGSTOP);
   ASSERT_EQ(::waitpid(waits.pid(), nullptr, WUNTRACED), waits.pid());
-  waitsSeen(watch, 1);
-  EXPECT_EQ(waitsSeen(watch, 5), 0);  // one that is stopped waits for nothing
+  countWaits(watch, 1);
+  EXPECT_EQ(countWaits(watch, 5), 0);  // a stopped process does not wait
 }
 
 }  // namespace

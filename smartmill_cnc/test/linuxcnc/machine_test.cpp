@@ -1,5 +1,6 @@
-// The bridge on a real LinuxCNC, headless, in namespaces of its own. Skipped where it is not installed
-// (./setup --with-linuxcnc) or where no such namespaces can be made.
+// The bridge with a real LinuxCNC, without display, in namespaces of its own. Skipped if LinuxCNC is not
+// installed
+// (./setup --with-linuxcnc) or if the namespaces cannot be created.
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
@@ -29,40 +30,42 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-constexpr double SOON = 0.5;       // [s] in which every fault is to be told
-constexpr double SOON_BUSY = 5.0;  // [s] the same where this program waits for a processor
-constexpr double PATIENCE = 60.0;  // [s] of a busy computer
+constexpr double LATENCY = 0.5;       // [s] to detect a fault
+constexpr double LATENCY_BUSY = 5.0;  // [s] the same if this program waits for a processor
+constexpr double PATIENCE = 60.0;     // [s] for a busy computer
 
 double now() {
   return std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
 }
 
-/// [s] SOON, unless more processes want to run than a test can compete with.
-double soon() {
+/// [s] LATENCY_BUSY on an overloaded computer.
+double latency() {
   double load = 0.0;
-  return ::getloadavg(&load, 1) == 1 && load > 2.0 * std::thread::hardware_concurrency() ? SOON_BUSY : SOON;
+  return ::getloadavg(&load, 1) == 1 && load > 2.0 * std::thread::hardware_concurrency() ? LATENCY_BUSY
+                                                                                         : LATENCY;
 }
 
 void pause(double seconds) {
   std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
 }
 
-/// Takes a processor away from everybody else for some time. @return whether the kernel let it
-bool hog(int processor, double seconds) {
-  bool could = false;
+/// Occupies a processor at real-time priority. @return false without permission
+bool occupy(int processor, double seconds) {
+  bool permitted = false;
   std::thread([&] {
     cpu_set_t one;
     CPU_ZERO(&one);
     CPU_SET(static_cast<unsigned>(processor), &one);
     const sched_param first{50};
-    could = ::sched_setaffinity(0, sizeof one, &one) == 0 && ::sched_setscheduler(0, SCHED_FIFO, &first) == 0;
-    for (const double end = now() + seconds; could && now() < end;) {
+    permitted =
+        ::sched_setaffinity(0, sizeof one, &one) == 0 && ::sched_setscheduler(0, SCHED_FIFO, &first) == 0;
+    for (const double end = now() + seconds; permitted && now() < end;) {
     }
   }).join();
-  return could;
+  return permitted;
 }
 
-/// Processes whose command line has both words.
+/// Processes whose command line contains both words.
 std::vector<pid_t> processes(const std::string& word, const std::string& other) {
   std::vector<pid_t> found;
   for (const auto& entry : fs::directory_iterator("/proc")) {
@@ -83,7 +86,7 @@ std::vector<pid_t> processes(const std::string& word, const std::string& other) 
 class LinuxCncMachine : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    if (!whyNot().empty()) {
+    if (!skipReason().empty()) {
       return;
     }
     folder_ = "/dev/shm/smartmill_test_" + std::to_string(::getpid());
@@ -92,7 +95,7 @@ class LinuxCncMachine : public ::testing::Test {
   static void TearDownTestSuite() { stop(); }
 
   void SetUp() override {
-    const std::string why = whyNot();
+    const std::string why = skipReason();
     if (!why.empty()) {
       GTEST_SKIP() << why;
     }
@@ -111,7 +114,7 @@ class LinuxCncMachine : public ::testing::Test {
     ASSERT_EQ(armed.code, ArmCode::ok) << armed.message;
   }
 
-  static std::string whyNot() {
+  static std::string skipReason() {
     if (::access("/usr/bin/linuxcnc", X_OK) != 0 || !fs::exists(program("linuxcnc_gateway"))) {
       return "LinuxCNC is not installed (./setup --with-linuxcnc)";
     }
@@ -121,7 +124,7 @@ class LinuxCncMachine : public ::testing::Test {
     return fs::canonical("/proc/self/exe").parent_path().string() + "/" + name;
   }
 
-  /// Tests run in the package's folder.
+  /// The working directory of tests is the package's folder.
   static void start() {
     machine_ = ::fork();
     if (machine_ == 0) {
@@ -145,14 +148,14 @@ class LinuxCncMachine : public ::testing::Test {
     return status;
   }
 
-  /// At the panel.
+  /// Makes the machine ready at its panel.
   static void ready() {
     const double end = now() + PATIENCE;
     for (std::string why = "not tried";; pause(0.05)) {
       try {
         GatewayClient panel(folder_, 20.0);
         panel.connect();
-        const Reply reply = panel.carryOut({Word::ready, 0, 0.0, {}});
+        const Reply reply = panel.carryOut({CommandCode::ready, 0, 0.0, {}});
         if (reply.code == Reply::Code::done) {
           return;
         }
@@ -163,15 +166,15 @@ class LinuxCncMachine : public ::testing::Test {
       ASSERT_LT(now(), end) << why;
     }
   }
-  static Reply atPanel(Word word) {
+  static Reply atPanel(CommandCode code) {
     GatewayClient panel(folder_, 20.0);
     panel.connect();
-    return panel.carryOut({word, 0, 0.0, {}});
+    return panel.carryOut({code, 0, 0.0, {}});
   }
 
-  /// The bridge's periods until something is so.
-  bool until(const std::function<bool()>& so, double seconds = PATIENCE) {
-    for (const double end = now() + seconds; !so();) {
+  /// Runs periods of the bridge until the condition holds. @return false on a timeout
+  bool until(const std::function<bool()>& condition, double seconds = PATIENCE) {
+    for (const double end = now() + seconds; !condition();) {
       if (now() > end) {
         return false;
       }
@@ -180,8 +183,8 @@ class LinuxCncMachine : public ::testing::Test {
     return true;
   }
   void period() {
-    for (ServoStretch& stretch : stream_->step(0.005, now)) {
-      for (const ServoSample& s : stretch.samples) {
+    for (ServoSegment& segment : stream_->step(0.005, now)) {
+      for (const ServoSample& s : segment.samples) {
         samples_.push_back(s);
       }
     }
@@ -199,7 +202,7 @@ class LinuxCncMachine : public ::testing::Test {
     until([&] { return (ended = bridge_->takeOutcome()).has_value(); });
     return ended.value_or(Outcome{MotionCode::busy, "no outcome"});
   }
-  /// A slow feed along x with the spindle on is under way.
+  /// Starts a slow feed along x with the spindle on.
   void cut() {
     ASSERT_EQ(run("G90 G0 X0 Y0 Z0\n").code, MotionCode::ok);
     ASSERT_FALSE(bridge_->runProgram("cut", "S3000 M3\nG1 F1200 X100\nX0\nM5\n", {}));
@@ -207,16 +210,16 @@ class LinuxCncMachine : public ::testing::Test {
       return !samples_.empty() && samples_.back().position[0] > 5e-3 && samples_.back().velocity > 0.019;
     }));
   }
-  /// [s] until something is told.
-  double took(const std::function<bool()>& so) {
+  /// [s] until the condition holds.
+  double timeUntil(const std::function<bool()>& condition) {
     const double begin = now();
-    EXPECT_TRUE(until(so));
+    EXPECT_TRUE(until(condition));
     const double seconds = now() - begin;
-    RecordProperty("told_after_ms", static_cast<int>(1e3 * seconds));
+    RecordProperty("detected_after_ms", static_cast<int>(1e3 * seconds));
     return seconds;
   }
-  /// Axes and spindle stand, and stay so.
-  void expectStanding() {
+  /// Axes and spindle stop and stay stopped.
+  void expectStandstill() {
     EXPECT_TRUE(
         until([&] { return samples_.back().velocity == 0.0 && samples_.back().spindle_speed == 0.0; }, 2.0));
     const ServoSample then = samples_.back();
@@ -249,19 +252,19 @@ TEST_F(LinuxCncMachine, RunsAProgramWhoseMovesAreMarkedInTheStream) {
   EXPECT_NEAR(bridge_->state().position[1], -5e-3, 1e-9);
   EXPECT_EQ(bridge_->state().spindle_speed, 0.0);  // M30 waits for the spindle, as on a Fanuc
 
-  std::size_t first = 0, second = 0, beside = 0;
+  std::size_t first = 0, second = 0, unmarked = 0;
   for (std::size_t i = 1; i < samples_.size(); ++i) {
     const ServoSample &a = samples_[i - 1], &b = samples_[i];
-    // The angle is the integral of the speed, to the servo period.
+    // The angle is the integral of the speed over the servo period.
     ASSERT_NEAR(b.revolutions - a.revolutions, b.spindle_speed / units::TWO_PI * 1e-3, 1e-9);
     // Line 4 of the text (G90 before the program's first) is the move along x, line 5 the one along y.
     first += b.marker == 4.0 ? 1 : 0;
     second += b.marker == 5.0 ? 1 : 0;
-    beside += b.position[0] != a.position[0] && b.marker != 4.0 ? 1 : 0;
-    beside += b.position[1] != a.position[1] && b.marker != 5.0 ? 1 : 0;
+    unmarked += b.position[0] != a.position[0] && b.marker != 4.0 ? 1 : 0;
+    unmarked += b.position[1] != a.position[1] && b.marker != 5.0 ? 1 : 0;
   }
-  // The marker leads by the cycles that the controller interpolates.
-  EXPECT_LE(beside, 6u);
+  // The marker leads by the interpolation cycles of the controller.
+  EXPECT_LE(unmarked, 6u);
   // 12.3456 mm at 20 mm/s and 5 mm at 10 mm/s, with 5 m/s2 at both ends.
   EXPECT_NEAR(static_cast<double>(first), 617.3 + 4.0, 6.0);
   EXPECT_NEAR(static_cast<double>(second), 500.0 + 2.0, 6.0);
@@ -274,7 +277,7 @@ TEST_F(LinuxCncMachine, TurnsTheSpindleToAnAngleAndHoldsIt) {
     ASSERT_EQ(outcome().code, MotionCode::ok);
     until([] { return false; }, 0.05);
     const double turns = samples_.back().revolutions;
-    // Steps of 1/4096 turn, and 0.02 deg at which the controller calls it oriented.
+    // Steps of 1/4096 revolution, and the controller's tolerance of 0.02 deg.
     EXPECT_NEAR(std::remainder(units::TWO_PI * turns - angle, units::TWO_PI), 0.0, 0.0008 + 0.0004);
     EXPECT_EQ(samples_.back().spindle_speed, 0.0);
   }
@@ -283,36 +286,36 @@ TEST_F(LinuxCncMachine, TurnsTheSpindleToAnAngleAndHoldsIt) {
 TEST_F(LinuxCncMachine, NothingBeyondALimitMoves) {
   ASSERT_EQ(run("G90 G0 X0 Y0 Z0\n").code, MotionCode::ok);
   EXPECT_EQ(run("G1 F600 X251\n").code, MotionCode::limit);
-  // Behind the bridge's back the controller refuses it itself; the panel has to clear that.
+  // Sent past the bridge, the controller refuses it itself; the panel has to reset the error.
   GatewayClient other(folder_, 20.0);
   other.connect();
-  ASSERT_EQ(other.carryOut({Word::run, 77, 0.0, "G1 F600 X251\n"}).code, Reply::Code::done);
-  EXPECT_LT(took([&] { return bridge_->state().alarm; }), soon());
+  ASSERT_EQ(other.carryOut({CommandCode::run, 77, 0.0, "G1 F600 X251\n"}).code, Reply::Code::done);
+  EXPECT_LT(timeUntil([&] { return bridge_->state().alarm; }), latency());
   EXPECT_NE(bridge_->state().alarm_text.find("limit"), std::string::npos) << bridge_->state().alarm_text;
   EXPECT_FALSE(bridge_->state().armed);
   EXPECT_EQ(bridge_->state().position[0], 0.0);
   EXPECT_EQ(bridge_->arm(true).code, ArmCode::alarm);
 }
 
-TEST_F(LinuxCncMachine, FeedHoldStandsAndGoesOnWhereItStood) {
+TEST_F(LinuxCncMachine, FeedHoldStopsAndResumesAtTheSamePosition) {
   cut();
   const Answer<HoldCode> answer = bridge_->hold();
   ASSERT_EQ(answer.code, HoldCode::ok) << answer.message;
-  EXPECT_LT(took([&] { return bridge_->state().run == CncRun::hold; }), soon());
-  ASSERT_TRUE(until([&] { return samples_.back().velocity == 0.0; }, soon()));
-  until([] { return false; }, 0.05);  // the position comes a servo period after the planner's velocity
+  EXPECT_LT(timeUntil([&] { return bridge_->state().run == CncRun::hold; }), latency());
+  ASSERT_TRUE(until([&] { return samples_.back().velocity == 0.0; }, latency()));
+  until([] { return false; }, 0.05);  // the position lags the planner's velocity by a servo period
   const std::array<double, 3> held = samples_.back().position;
   until([] { return false; }, 0.3);
   EXPECT_EQ(samples_.back().position, held);
-  EXPECT_NEAR(samples_.back().spindle_speed, units::radPerSecFromRpm(3000.0), 1e-6);  // it goes on turning
+  EXPECT_NEAR(samples_.back().spindle_speed, units::radPerSecFromRpm(3000.0), 1e-6);  // it keeps turning
   EXPECT_TRUE(bridge_->busy());
-  ASSERT_EQ(atPanel(Word::resume).code, Reply::Code::done);
+  ASSERT_EQ(atPanel(CommandCode::resume).code, Reply::Code::done);
   EXPECT_TRUE(until([&] { return samples_.back().position[0] > held[0] + 1e-3; }, 2.0));
   bridge_->cancel();
   EXPECT_EQ(outcome().code, MotionCode::cancelled);
 }
 
-TEST_F(LinuxCncMachine, OverridesActAtOnceAndGoBackWithTheProgram) {
+TEST_F(LinuxCncMachine, OverridesActAtOnceAndEndWithTheProgram) {
   cut();
   const OverrideAnswer answer = bridge_->setOverrides({0.5, 0.9}, "chatter");
   ASSERT_EQ(answer.code, OverrideCode::ok) << answer.message;
@@ -324,7 +327,7 @@ TEST_F(LinuxCncMachine, OverridesActAtOnceAndGoBackWithTheProgram) {
                std::abs(s.spindle_speed - units::radPerSecFromRpm(2700.0)) < 1e-3;
       },
       5.0));
-  // motion.adaptive-feed goes up to 1.
+  // motion.adaptive-feed is at most 1.
   EXPECT_EQ(bridge_->setOverrides({1.1, 1.1}, "").taken.feed, 1.0);
   EXPECT_TRUE(until(
       [&] {
@@ -345,8 +348,8 @@ TEST_F(LinuxCncMachine, AnAbortStopsAxesAndSpindleAndTheNextProgramRuns) {
   bridge_->cancel();
   const double begin = now();
   EXPECT_EQ(outcome().code, MotionCode::cancelled);
-  EXPECT_LT(now() - begin, soon());
-  expectStanding();
+  EXPECT_LT(now() - begin, latency());
+  expectStandstill();
   EXPECT_TRUE(bridge_->state().armed);
   const Outcome next = run("G90 G0 X0\n");
   EXPECT_EQ(next.code, MotionCode::ok) << next.message;
@@ -354,10 +357,10 @@ TEST_F(LinuxCncMachine, AnAbortStopsAxesAndSpindleAndTheNextProgramRuns) {
 
 TEST_F(LinuxCncMachine, AnEmergencyStopDisarmsUntilThePanelIsReady) {
   cut();
-  ASSERT_EQ(atPanel(Word::estop).code, Reply::Code::done);
-  EXPECT_LT(took([&] { return bridge_->state().emergency && !bridge_->state().armed; }), soon());
+  ASSERT_EQ(atPanel(CommandCode::estop).code, Reply::Code::done);
+  EXPECT_LT(timeUntil([&] { return bridge_->state().emergency && !bridge_->state().armed; }), latency());
   EXPECT_EQ(outcome().code, MotionCode::alarm);
-  expectStanding();
+  expectStandstill();
   EXPECT_EQ(bridge_->arm(true).code, ArmCode::alarm);
   ready();
   until([] { return false; }, 0.1);
@@ -373,10 +376,10 @@ TEST_F(LinuxCncMachine, WithoutItsGatewayTheMachineStops) {
   const std::vector<pid_t> gateway = processes("linuxcnc_gateway", folder_);
   ASSERT_EQ(gateway.size(), 1u);
   ::kill(gateway.front(), SIGKILL);
-  EXPECT_LT(took([&] { return !bridge_->state().connected; }), soon());
+  EXPECT_LT(timeUntil([&] { return !bridge_->state().connected; }), latency());
   EXPECT_EQ(outcome().code, MotionCode::lost);
-  expectStanding();
-  // It comes again by itself; the machine does not.
+  expectStandstill();
+  // The gateway restarts automatically; the machine stays stopped.
   ASSERT_TRUE(until([&] { return bridge_->state().connected; }));
   EXPECT_TRUE(bridge_->state().emergency || bridge_->state().alarm);
   ready();
@@ -396,7 +399,7 @@ TEST_F(LinuxCncMachine, WithoutItsBridgeTheMachineStops) {
   while ((other.status().busy || !other.status().in_position) && now() < begin + PATIENCE) {
     pause(0.01);
   }
-  EXPECT_LT(now() - begin, soon());
+  EXPECT_LT(now() - begin, latency());
 }
 
 TEST_F(LinuxCncMachine, WithoutItsStreamTheMachineStops) {
@@ -404,22 +407,24 @@ TEST_F(LinuxCncMachine, WithoutItsStreamTheMachineStops) {
   const std::vector<pid_t> stream = processes("linuxcnc_stream", folder_);
   ASSERT_EQ(stream.size(), 1u);
   ::kill(stream.front(), SIGKILL);
-  // Its beat stops, and the emergency stop chain falls.
-  EXPECT_LT(took([&] { return !bridge_->state().armed; }), soon());
+  // Its beat stops, which opens the emergency stop chain.
+  EXPECT_LT(timeUntil([&] { return !bridge_->state().armed; }), latency());
   const MotionCode code = outcome().code;
   EXPECT_TRUE(code == MotionCode::alarm || code == MotionCode::lost);
   ASSERT_TRUE(until([&] { return bridge_->state().connected; }));
   EXPECT_TRUE(bridge_->state().emergency || bridge_->state().alarm);
-  expectStanding();
+  expectStandstill();
 }
 
-TEST_F(LinuxCncMachine, AControllerThatWaitsForAProcessorIsNotTakenForDead) {
+TEST_F(LinuxCncMachine, AControllerThatWaitsForAProcessorIsNotLost) {
   if (std::thread::hardware_concurrency() < 2) {
-    GTEST_SKIP() << "one processor for the controller and one for its gateway are due";
+    GTEST_SKIP() << "needs one processor for the controller and one for its gateway";
   }
   const std::vector<pid_t> gateway = processes("linuxcnc_gateway", folder_);
   ASSERT_EQ(gateway.size(), 1u);
-  const auto room = [](pid_t pid) { return fs::read_symlink("/proc/" + std::to_string(pid) + "/ns/pid"); };
+  const auto namespaceOf = [](pid_t pid) {
+    return fs::read_symlink("/proc/" + std::to_string(pid) + "/ns/pid");
+  };
   cpu_set_t first, all;
   CPU_ZERO(&first);
   CPU_SET(0, &first);
@@ -427,7 +432,7 @@ TEST_F(LinuxCncMachine, AControllerThatWaitsForAProcessorIsNotTakenForDead) {
   std::vector<pid_t> threads;  // of the servo thread's process in this machine's namespace
   for (const pid_t pid : processes("rtapi_app", "")) {
     for (const auto& entry : fs::directory_iterator("/proc/" + std::to_string(pid) + "/task")) {
-      if (room(pid) == room(gateway.front())) {
+      if (namespaceOf(pid) == namespaceOf(gateway.front())) {
         threads.push_back(static_cast<pid_t>(std::stol(entry.path().filename())));
       }
     }
@@ -437,11 +442,11 @@ TEST_F(LinuxCncMachine, AControllerThatWaitsForAProcessorIsNotTakenForDead) {
   for (const pid_t thread : threads) {
     ::sched_setaffinity(thread, sizeof first, &first);
   }
-  // Longer than a hanging controller is given.
+  // Longer than Liveness::HANGS.
   std::atomic<bool> over{false};
-  bool could = false;
+  bool permitted = false;
   std::thread rival([&] {
-    could = hog(0, 0.6);
+    permitted = occupy(0, 0.6);
     over = true;
   });
   double silent = 0.0, heard = now();
@@ -458,11 +463,11 @@ TEST_F(LinuxCncMachine, AControllerThatWaitsForAProcessorIsNotTakenForDead) {
   for (const pid_t thread : threads) {
     ::sched_setaffinity(thread, sizeof all, &all);
   }
-  if (!could) {
-    GTEST_SKIP() << "no real-time priority can be had";
+  if (!permitted) {
+    GTEST_SKIP() << "no permission for real-time priority";
   }
   EXPECT_GT(silent, 0.45);
-  // The program goes on where it was.
+  // The program continues.
   const double before = samples_.back().position[0];
   EXPECT_TRUE(until([&] { return samples_.back().position[0] > before + 5e-3; }));
   EXPECT_TRUE(bridge_->state().connected && bridge_->state().armed);
@@ -471,35 +476,35 @@ TEST_F(LinuxCncMachine, AControllerThatWaitsForAProcessorIsNotTakenForDead) {
   EXPECT_EQ(outcome().code, MotionCode::cancelled);
 }
 
-TEST_F(LinuxCncMachine, AStreamThatHangsStopsTheMachine) {
+TEST_F(LinuxCncMachine, AHangingStreamStopsTheMachine) {
   cut();
   const std::vector<pid_t> stream = processes("linuxcnc_stream", folder_);
   ASSERT_EQ(stream.size(), 1u);
   ::kill(stream.front(), SIGSTOP);
-  EXPECT_LT(took([&] { return !bridge_->state().armed; }), soon());
+  EXPECT_LT(timeUntil([&] { return !bridge_->state().armed; }), latency());
   ::kill(stream.front(), SIGCONT);
   outcome();
   ASSERT_TRUE(until([&] { return bridge_->state().connected; }));
   EXPECT_TRUE(bridge_->state().emergency || bridge_->state().alarm);
-  expectStanding();
+  expectStandstill();
 }
 
-TEST_F(LinuxCncMachine, AControllerThatHangsIsTold) {
+TEST_F(LinuxCncMachine, AHangingControllerIsDetected) {
   cut();
   const std::vector<pid_t> task = processes("milltask", folder_);
   ASSERT_FALSE(task.empty());
   for (const pid_t pid : task) {
     ::kill(pid, SIGSTOP);
   }
-  EXPECT_LT(took([&] { return !bridge_->state().connected; }), soon());
+  EXPECT_LT(timeUntil([&] { return !bridge_->state().connected; }), latency());
   EXPECT_EQ(outcome().code, MotionCode::lost);
-  expectStanding();
+  expectStandstill();
   for (const pid_t pid : task) {
     ::kill(pid, SIGCONT);
   }
   ASSERT_TRUE(until([&] { return bridge_->state().connected; }));
   EXPECT_FALSE(bridge_->state().armed);
-  expectStanding();
+  expectStandstill();
   ready();
   until([] { return false; }, 0.1);
   const Answer<ArmCode> again = bridge_->arm(true);
@@ -507,17 +512,17 @@ TEST_F(LinuxCncMachine, AControllerThatHangsIsTold) {
   EXPECT_EQ(run("G90 G0 X0\n").code, MotionCode::ok);
 }
 
-TEST_F(LinuxCncMachine, WithoutItsControllerNothingGoesOnAndTheNextOneStartsClean) {
+TEST_F(LinuxCncMachine, WithoutItsControllerTheMachineStopsAndTheNextOneStartsClean) {
   cut();
   const std::vector<pid_t> task = processes("milltask", "mill.ini");
   ASSERT_FALSE(task.empty());
   for (const pid_t pid : task) {
     ::kill(pid, SIGKILL);
   }
-  EXPECT_LT(took([&] { return !bridge_->state().connected; }), soon());
+  EXPECT_LT(timeUntil([&] { return !bridge_->state().connected; }), latency());
   EXPECT_EQ(outcome().code, MotionCode::lost);
-  // The servo thread lives, the permit does not.
-  expectStanding();
+  // The servo thread still runs, without the permit.
+  expectStandstill();
   bridge_.reset();
   stop();
   EXPECT_TRUE(processes("rtapi_app", folder_).empty() && processes("linuxcnc_", folder_).empty());

@@ -42,9 +42,9 @@ ServoBlock someBlock(std::size_t count) {
 }
 
 std::vector<Message> everyKind() {
-  return {Command{Word::run, 5, 1.5, "G1 X1\n"},
+  return {Command{CommandCode::run, 5, 1.5, "G1 X1\n"},
           Reply{Reply::Code::not_yet, "later"},
-          Ask{},
+          StatusRequest{},
           someStatus(),
           someBlock(3),
           SetLoad{0.25},
@@ -62,13 +62,13 @@ std::string refusalOf(const std::string& bytes) {
   return {};
 }
 
-TEST(Protocol, EveryKindComesThroughByteByByte) {
+TEST(Protocol, EveryKindIsDecodedByteByByte) {
   FrameDecoder decoder;
   std::uint16_t sequence = 65530;
   for (const Message& message : everyKind()) {
     const std::string bytes = encode(message, ++sequence);
     for (std::size_t i = 0; i < bytes.size(); ++i) {
-      ASSERT_FALSE(decoder.next()) << "whole after " << i << " of " << bytes.size();
+      ASSERT_FALSE(decoder.next()) << "complete after " << i << " of " << bytes.size();
       decoder.push(&bytes[i], 1);
     }
     const std::optional<Received> received = decoder.next();
@@ -80,7 +80,7 @@ TEST(Protocol, EveryKindComesThroughByteByByte) {
   EXPECT_EQ(decoder.waiting(), 0u);
 }
 
-TEST(Protocol, FieldsKeepTheirPlaces) {
+TEST(Protocol, FieldsAreUnchanged) {
   FrameDecoder decoder;
   const std::string bytes = encode(someStatus()) + encode(someBlock(2));
   decoder.push(bytes.data(), bytes.size());
@@ -99,8 +99,8 @@ TEST(Protocol, FieldsKeepTheirPlaces) {
   EXPECT_EQ(block.samples.at(1).marker, 3.0);
 }
 
-TEST(Protocol, WhatIsNoFrameIsRefusedInOneLine) {
-  const std::string good = encode(Ask{});
+TEST(Protocol, InvalidFramesAreRefusedInOneLine) {
+  const std::string good = encode(StatusRequest{});
   const auto with = [&](std::size_t place, char value) {
     std::string bytes = good;
     bytes[place] = value;
@@ -109,33 +109,33 @@ TEST(Protocol, WhatIsNoFrameIsRefusedInOneLine) {
   EXPECT_NE(with(4, 1).find("version 1"), std::string::npos);
   EXPECT_NE(with(5, 0).find("kind 0"), std::string::npos);
   EXPECT_NE(with(5, 8).find("kind 8"), std::string::npos);
-  // Nothing waits for bytes that no frame of that kind may have.
+  // Too long a frame is refused before its payload arrives.
   EXPECT_NE(with(0, 1).find("at most 0"), std::string::npos);
   std::string endless = encode(Command{});
   endless[3] = 0x7f;
   EXPECT_NE(refusalOf(endless).find("at most"), std::string::npos);
   std::string load = encode(SetLoad{std::numeric_limits<double>::quiet_NaN()});
   EXPECT_NE(refusalOf(load).find("not finite"), std::string::npos);
-  std::string word = encode(Command{});
-  word[8] = 99;
-  EXPECT_NE(refusalOf(word).find("unknown word 99"), std::string::npos);
+  std::string code = encode(Command{});
+  code[8] = 99;
+  EXPECT_NE(refusalOf(code).find("unknown value 99"), std::string::npos);
   std::string text = encode(Reply{Reply::Code::done, "abc"});
-  text[9] = 4;  // says to be longer than the frame
+  text[9] = 4;  // longer than the frame
   EXPECT_NE(refusalOf(text).find("too short"), std::string::npos);
   text[9] = 2;
   EXPECT_NE(refusalOf(text).find("1 bytes too long"), std::string::npos);
 }
 
-TEST(Protocol, BoundsHold) {
-  EXPECT_THROW(encode(Command{Word::run, 1, 0.0, std::string(LONGEST_PROGRAM + 1, 'x')}), Error);
+TEST(Protocol, LengthsAreBounded) {
+  EXPECT_THROW(encode(Command{CommandCode::run, 1, 0.0, std::string(LONGEST_PROGRAM + 1, 'x')}), Error);
   EXPECT_THROW(encode(someBlock(ServoBlock::MOST + 1)), Error);
   EXPECT_EQ(refusalOf(encode(someBlock(ServoBlock::MOST))), "");
-  EXPECT_EQ(refusalOf(encode(Command{Word::run, 1, 0.0, std::string(LONGEST_PROGRAM, 'x')})), "");
-  // A text that is too long for its kind is cut off, not refused: it is one for people.
+  EXPECT_EQ(refusalOf(encode(Command{CommandCode::run, 1, 0.0, std::string(LONGEST_PROGRAM, 'x')})), "");
+  // The text of a reply is truncated, not refused.
   EXPECT_EQ(refusalOf(encode(Reply{Reply::Code::refused, std::string(100'000, 'x')})), "");
 }
 
-TEST(Protocol, AnythingIsDecodedOrRefused) {
+TEST(Protocol, RandomBytesAreDecodedOrRefused) {
   std::mt19937 random(7);
   std::uniform_int_distribution<int> byte(0, 255);
   for (int round = 0; round < 20'000; ++round) {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-#include "smartmill_cnc/linuxcnc/stillness.h"
+#include "smartmill_cnc/linuxcnc/silence_timer.h"
 
 namespace smartmill::cnc::linuxcnc {
 namespace {
@@ -23,33 +23,33 @@ ServoBlock blockOf(std::uint32_t first, std::size_t count) {
   return block;
 }
 
-/// Arrivals as they are on a busy computer: some at once, most late, by 3 ms on average, seldom by 80 ms.
+/// [s] delay on a busy computer: exponential with mean 3 ms, 80 ms in 1 % of the cases.
 double late(std::mt19937& random) {
   const double usual = std::exponential_distribution<double>(1.0 / 3e-3)(random);
   return std::bernoulli_distribution(0.01)(random) ? 0.08 : usual;
 }
 
-TEST(ServoClock, TimesAreThoseOfTheEarliestArrivals) {
+TEST(ServoClock, TimesFollowTheEarliestArrivals) {
   std::mt19937 random(3);
   ServoClock clock(PERIOD);
   for (std::uint64_t n = 0; n < 60'000; n += 3) {
-    clock.saw(n, 100.0 + PERIOD * static_cast<double>(n) + late(random));
+    clock.addArrival(n, 100.0 + PERIOD * static_cast<double>(n) + late(random));
     if (n > 10'000) {
       ASSERT_NEAR(clock.timeOf(n), 100.0 + PERIOD * static_cast<double>(n), 1e-4);
     }
   }
 }
 
-TEST(ServoClock, FollowsAClockThatRunsFastOrSlowWithoutASteps) {
+TEST(ServoClock, TracksAFastOrSlowClockWithoutSteps) {
   for (const double drift : {5e-5, -5e-5}) {
     std::mt19937 random(4);
     ServoClock clock(PERIOD);
     double before = 0.0;
     for (std::uint64_t n = 0; n < 300'000; n += 3) {
       const double taken = 100.0 + PERIOD * (1.0 + drift) * static_cast<double>(n);
-      clock.saw(n, taken + late(random));
+      clock.addArrival(n, taken + late(random));
       if (n > 60'000) {
-        // The earliest arrival of the two last windows of 10 s: at most 20 s of drift old.
+        // The earliest arrival of the last two windows of 10 s is at most 20 s old.
         EXPECT_NEAR(clock.timeOf(n), taken, 20.0 * std::abs(drift) + 1e-4) << n;
         EXPECT_NEAR(clock.timeOf(n) - before, 3.0 * PERIOD, 3.0 * PERIOD * 0.01 + 1e-4 * 0.1);
       }
@@ -58,14 +58,14 @@ TEST(ServoClock, FollowsAClockThatRunsFastOrSlowWithoutASteps) {
   }
 }
 
-TEST(ServoStream, HandsOutStretchesAndCountsLoss) {
+TEST(ServoStream, ReturnsSegmentsAndCountsLostSamples) {
   ServoStream stream("/nowhere");
-  std::vector<ServoStretch> all;
-  std::uint32_t next = 4'294'966'000u;  // its count begins anew in between
+  std::vector<ServoSegment> all;
+  std::uint32_t next = 4'294'966'000u;  // overflows during the test
   double now = 50.0;
   const auto feed = [&](std::uint32_t count) {
     now += PERIOD * count;
-    for (ServoStretch& s : stream.take(blockOf(next, count), now)) {
+    for (ServoSegment& s : stream.addBlock(blockOf(next, count), now)) {
       all.push_back(std::move(s));
     }
     next += count;
@@ -78,17 +78,17 @@ TEST(ServoStream, HandsOutStretchesAndCountsLoss) {
   for (int i = 0; i < 100; ++i) {
     feed(3);
   }
-  const ServoStatistics seen = stream.statistics();
-  EXPECT_EQ(seen.samples, 3300u);
-  EXPECT_EQ(seen.lost, 7u);
-  EXPECT_EQ(seen.restarts, 0u);
-  EXPECT_LE(seen.late_worst, 3.1 * PERIOD);  // samples wait for the end of their block
+  const ServoStatistics statistics = stream.statistics();
+  EXPECT_EQ(statistics.samples, 3300u);
+  EXPECT_EQ(statistics.lost, 7u);
+  EXPECT_EQ(statistics.restarts, 0u);
+  EXPECT_LE(statistics.late_worst, 3.1 * PERIOD);  // samples wait for the end of their block
   ASSERT_GT(all.size(), 100u);
   std::uint64_t lost = 0;
   for (std::size_t i = 1; i < all.size(); ++i) {
-    EXPECT_LE(all[i].samples.size(), ServoStream::STRETCH);
-    const std::uint64_t due = all[i - 1].first + all[i - 1].samples.size();
-    lost += all[i].first - due;
+    EXPECT_LE(all[i].samples.size(), ServoStream::SEGMENT_LENGTH);
+    const std::uint64_t expected = all[i - 1].first + all[i - 1].samples.size();
+    lost += all[i].first - expected;
     EXPECT_NEAR(all[i].stamp - all[i - 1].stamp,
                 PERIOD * static_cast<double>(all[i].first - all[i - 1].first), 1e-5);
   }
@@ -98,29 +98,29 @@ TEST(ServoStream, HandsOutStretchesAndCountsLoss) {
   EXPECT_EQ(stream.count(), 3300u);
 }
 
-TEST(ServoStream, AnotherStartOfTheControllerIsNoLoss) {
+TEST(ServoStream, RestartOfTheControllerIsNoLoss) {
   ServoStream stream("/nowhere");
   for (std::uint32_t i = 0; i < 100; ++i) {
-    stream.take(blockOf(100'000 + 10 * i, 10), 1.0 + 0.01 * i);
+    stream.addBlock(blockOf(100'000 + 10 * i, 10), 1.0 + 0.01 * i);
   }
   for (std::uint32_t i = 0; i < 100; ++i) {
-    stream.take(blockOf(10 * i, 10), 5.0 + 0.01 * i);
+    stream.addBlock(blockOf(10 * i, 10), 5.0 + 0.01 * i);
   }
   EXPECT_EQ(stream.statistics().lost, 0u);
   EXPECT_EQ(stream.statistics().restarts, 1u);
 }
 
-TEST(Stillness, ThePausesOfTheObserverAreNotThoseOfTheWorld) {
-  Stillness stillness;
+TEST(SilenceTimer, PausesOfTheObserverDoNotCount) {
+  SilenceTimer timer;
   double now = 10.0;
-  EXPECT_EQ(stillness.look(true, now), 0.0);
+  EXPECT_EQ(timer.update(true, now), 0.0);
   for (int i = 0; i < 20; ++i) {
-    stillness.look(false, now += 0.01);
+    timer.update(false, now += 0.01);
   }
-  EXPECT_NEAR(stillness.still(), 0.2, 1e-12);
-  EXPECT_NEAR(stillness.look(false, now += 30.0), 0.2 + Stillness::LONGEST_STEP, 1e-12);
-  EXPECT_NEAR(stillness.look(false, now -= 5.0), 0.2 + Stillness::LONGEST_STEP, 1e-12);
-  EXPECT_EQ(stillness.look(true, now + 0.01), 0.0);
+  EXPECT_NEAR(timer.silent(), 0.2, 1e-12);
+  EXPECT_NEAR(timer.update(false, now += 30.0), 0.2 + SilenceTimer::LONGEST_STEP, 1e-12);
+  EXPECT_NEAR(timer.update(false, now -= 5.0), 0.2 + SilenceTimer::LONGEST_STEP, 1e-12);
+  EXPECT_EQ(timer.update(true, now + 0.01), 0.0);
 }
 
 }  // namespace

@@ -1,5 +1,4 @@
-// The motion machine alone, against a controller that a test scripts: every way a motion can end in every
-// phase.
+// The motion machine with a scripted controller: every end of a motion in every phase.
 #include "smartmill_cnc/motion/motion_machine.h"
 
 #include <gtest/gtest.h>
@@ -43,7 +42,7 @@ class MotionMachineTest : public ::testing::Test {
     ASSERT_TRUE(answer);
     ASSERT_EQ(answer->code, ArmCode::ok) << answer->message;
   }
-  // Into a phase of a jog; by the name of its stage.
+  // Starts a jog and advances it to a phase. @param stage its name
   void bring(const std::string& stage) {
     arm();
     controller_.reading.program_done = false;
@@ -122,10 +121,10 @@ TEST_P(MotionPhaseTest, CancelEndsTheMotionOnce) {
   EXPECT_EQ(end.code, MotionCode::cancelled);
   EXPECT_EQ(end.message, stage == "opening" ? "jog x: cancelled before anything was sent"
                                             : "jog x: cancelled; stopped at X0.000 Y0.000 Z0.000 mm");
-  // Nothing was under way yet: nothing had to be stopped.
+  // Nothing was sent yet, so nothing is aborted.
   EXPECT_EQ(controller_.count("abort"), stage == "opening" ? 0u : 1u);
   EXPECT_TRUE(machine_.armed());
-  // The next motion opens anew and works.
+  // The next motion opens a new session and works.
   controller_.reading.program_done = true;
   controller_.taken_at_once = 1000;
   ASSERT_FALSE(machine_.jog("x", 0.01, 0.01));
@@ -143,7 +142,7 @@ TEST_P(MotionPhaseTest, DisarmCancelsAndLeavesNoSession) {
   EXPECT_EQ(outcome().code, MotionCode::cancelled);
 }
 
-TEST_F(MotionMachineTest, LossWhileItTalksIsToldToTheCaller) {
+TEST_F(MotionMachineTest, LossDuringACallIsReturnedToTheCaller) {
   bring("opening");
   controller_.is_open = false;
   controller_.opening = LOST;
@@ -163,21 +162,21 @@ TEST_F(MotionMachineTest, LossWhileItTalksIsToldToTheCaller) {
   EXPECT_TRUE(machine_.cancel().lost());
 }
 
-TEST_F(MotionMachineTest, ControllerThatPutsProgramsOffIsAskedAgainForAWhile) {
+TEST_F(MotionMachineTest, RetriesWhileTheControllerDelaysPrograms) {
   bring("opening");
   controller_.is_open = false;
   controller_.opening = NOT_YET;
   const double waited = stepsUntilEnd(1000);
   EXPECT_NEAR(waited, MotionParameters().open_timeout, 2.0 * PERIOD);
   EXPECT_EQ(outcome().message, "jog x: not now");
-  // In between it may come.
+  // The controller accepts within the timeout.
   ASSERT_FALSE(machine_.jog("x", 0.05, 0.01));
   ASSERT_TRUE(step());
   controller_.opening.reset();
   controller_.reading.program_done = true;
   stepsUntilEnd(20);
   EXPECT_EQ(outcome().code, MotionCode::ok);
-  // What it refuses for good is not asked again.
+  // Any other refusal is not retried.
   controller_.is_open = false;
   controller_.opening = ALARM;
   ASSERT_FALSE(machine_.jog("x", 0.05, 0.01));
@@ -218,7 +217,7 @@ TEST_F(MotionMachineTest, EndsOnlyWhenDoneAtRestAndSettled) {
   EXPECT_EQ(outcome().code, MotionCode::ok);
 }
 
-TEST_F(MotionMachineTest, OrientWaitsForTheSpindleToStand) {
+TEST_F(MotionMachineTest, OrientWaitsForStandstill) {
   arm();
   ASSERT_FALSE(machine_.orient(1.0));
   controller_.reading.program_done = true;
@@ -246,36 +245,36 @@ TEST_F(MotionMachineTest, StallTimeoutStopsAndFeedHoldDoesNot) {
   EXPECT_NE(outcome().message.find("nothing has moved for 60 s"), std::string::npos);
 }
 
-TEST_F(MotionMachineTest, StopThatDoesNotStandIsToldLoudly) {
+TEST_F(MotionMachineTest, MotionAfterTheStopTimeoutIsReported) {
   bring("stopping");
   const double waited = stepsUntilEnd(1000);
   EXPECT_NEAR(waited, MotionParameters().stop_timeout, 2.0 * PERIOD);
   EXPECT_NE(outcome().message.find("STILL MOVES"), std::string::npos);
 }
 
-TEST_F(MotionMachineTest, ConditionIsToldAheadAndEndsWithTheMotion) {
+TEST_F(MotionMachineTest, ConditionIsAnnouncedInAdvanceAndEndsWithTheMotion) {
   arm();
   CuttingCondition cut;
   cut.kind = CuttingCondition::Kind::cut;
   cut.name = "slot";
-  const double asked = now_;
+  const double start = now_;
   ASSERT_FALSE(machine_.runProgram("slot", "G1 X10 F600\n", cut));
   ASSERT_TRUE(step());
-  // Nothing has moved before its time.
+  // Nothing is sent before its time.
   EXPECT_EQ(controller_.count("send"), 0u);
-  std::vector<CuttingCondition> told = machine_.takeConditions();
-  ASSERT_EQ(told.size(), 1u);
-  EXPECT_NEAR(told[0].stamp, asked + PERIOD + 0.3, 1e-9);
+  std::vector<CuttingCondition> conditions = machine_.takeConditions();
+  ASSERT_EQ(conditions.size(), 1u);
+  EXPECT_NEAR(conditions[0].stamp, start + PERIOD + 0.3, 1e-9);
   while (controller_.count("send") == 0) {
     ASSERT_TRUE(step());
   }
-  EXPECT_GE(now_, told[0].stamp);
+  EXPECT_GE(now_, conditions[0].stamp);
   controller_.reading.program_done = true;
   stepsUntilEnd(100);
-  told = machine_.takeConditions();
-  ASSERT_EQ(told.size(), 1u);
-  EXPECT_EQ(told[0].kind, CuttingCondition::Kind::none);
-  EXPECT_LE(told[0].stamp, now_ + 1e-9);
+  conditions = machine_.takeConditions();
+  ASSERT_EQ(conditions.size(), 1u);
+  EXPECT_EQ(conditions[0].kind, CuttingCondition::Kind::none);
+  EXPECT_LE(conditions[0].stamp, now_ + 1e-9);
 }
 
 TEST_F(MotionMachineTest, LimitsAxesAndGoalsAreCheckedBeforeAnythingIsSent) {

@@ -48,14 +48,14 @@ TEST(NcProgram, WholeDialect) {
   EXPECT_NEAR(c.end[2], -0.002, 1e-12);
 }
 
-/// A controller may show a position as vacant.
-TEST(NcProgram, FromAPlaceThatIsNotKnownNothingMoves) {
+/// A controller may report a position as vacant.
+TEST(NcProgram, NothingMovesFromAnUnknownPosition) {
   StartPosition start;
   start.machine[1] = start.absolute[1] = std::numeric_limits<double>::quiet_NaN();
   for (const char* program : {"G0 X1 Y1", "G91 G0 Y0.1"}) {
     const NcCheck c = check(program, start);
     EXPECT_EQ(c.verdict, NcVerdict::outside_limits) << program;
-    EXPECT_EQ(c.message, "line 1: the controller does not tell where Y stands");
+    EXPECT_EQ(c.message, "line 1: the controller reports no position of Y");
   }
   EXPECT_EQ(check("G91 G0 X1\nS3000 M3\n", start).verdict, NcVerdict::good);
 }
@@ -69,15 +69,16 @@ TEST(NcProgram, NotUnderstoodNamesTheLine) {
        {Case{"G90\nG2 X1 Y1\n", "line 2: G2 is not understood"},
         Case{"T1 M6", "line 1: word T1 is not understood"}, Case{"M6", "line 1: M6 is not understood"},
         Case{"X1", "line 1: an axis word before G0 or G1"}, Case{"G1 X1", "line 1: G1 before F"},
-        Case{"G0 X1 X2", "line 1: two words X in one block"}, Case{"G0 X1..2", "line 1: '1..2' is no number"},
-        Case{"G0 X", "line 1: '' is no number"}, Case{"G0 X1e3", "line 1: word E3 is not understood"},
+        Case{"G0 X1 X2", "line 1: two words X in one block"},
+        Case{"G0 X1..2", "line 1: '1..2' is not a number"}, Case{"G0 X", "line 1: '' is not a number"},
+        Case{"G0 X1e3", "line 1: word E3 is not understood"},
         Case{"G4", "line 1: G4 needs P in ms or X in s, alone"},
         Case{"G0 X1 (open", "line 1: comment is not closed"},
         Case{"#100=5", "line 1: #100 is the bridge's own variable"},
-        Case{"#5=#6", "line 1: '#' is no number"}, Case{"\n\n%\n", "line 3: '%' is not understood"},
+        Case{"#5=#6", "line 1: '#' is not a number"}, Case{"\n\n%\n", "line 3: '%' is not understood"},
         Case{"M30\nG0 X1", "line 2: a block after the end of the program"},
-        Case{"G1 F0 X1", "line 1: F0: a feed above 0 is due"}, Case{"P5", "line 1: P without G4"},
-        Case{"N1.5 G0 X1", "line 1: word N1.5: a whole number from 0 to 99999 is due"}}) {
+        Case{"G1 F0 X1", "line 1: F0: expected a feed above 0"}, Case{"P5", "line 1: P without G4"},
+        Case{"N1.5 G0 X1", "line 1: word N1.5: expected an integer from 0 to 99999"}}) {
     const NcCheck result = check(c.program);
     EXPECT_EQ(result.verdict, NcVerdict::not_understood) << c.program;
     EXPECT_EQ(result.message, c.message);
@@ -98,13 +99,13 @@ TEST(NcProgram, LimitsOfEveryAxisFeedAndSpeed) {
             "line 4: X would go to 301 mm, limits -200 to 300 mm (machine)");
 }
 
-TEST(NcProgram, RelativeMovesAreFollowedFromThePresentPosition) {
+TEST(NcProgram, RelativeMovesStartAtTheCurrentPosition) {
   StartPosition start;
   start.machine = {0.25, 0.0, -0.1};
   start.absolute = start.machine;
   EXPECT_EQ(check("G91 G0 X50", start).verdict, NcVerdict::good);
   EXPECT_EQ(check("G91 G0 X50.1", start).verdict, NcVerdict::outside_limits);
-  // Down and up again is allowed, beyond in between is not.
+  // Returning to a valid position does not excuse leaving the limits in between.
   EXPECT_EQ(check("G91 G0 Z-150\nZ150", start).verdict, NcVerdict::good);
   EXPECT_EQ(check("G91 G0 Z-151\nZ151", start).verdict, NcVerdict::outside_limits);
 }
@@ -137,7 +138,7 @@ TEST(NcProgram, OrientAngles) {
   }
 }
 
-TEST(NcProgram, LimitsMustMakeSense) {
+TEST(NcProgram, LimitsAreValidated) {
   MotionLimits l = limits();
   l.travel[1] = {0.1, -0.1};
   EXPECT_THROW(l.validate(), Error);

@@ -1,4 +1,4 @@
-// The node's wiring: topics, actions and services against a machine on the real wire, which this test is.
+// Topics, actions and services of the node, with a simulated machine in this test over the FOCAS protocol.
 #include <actionlib/client/simple_action_client.h>
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <gtest/gtest.h>
@@ -29,7 +29,7 @@ namespace {
 using smartmill_msgs::CncState;
 using smartmill_msgs::RunProgramResult;
 
-constexpr double PATIENCE = 120.0;  // [s] generous: the computer may be slow
+constexpr double PATIENCE = 120.0;  // [s] for a busy computer
 
 class CncNodeTest : public ::testing::Test {
  protected:
@@ -41,11 +41,11 @@ class CncNodeTest : public ::testing::Test {
     subscribers_.push_back(nh_.subscribe(names::CUTTING_CONDITION, 100, &CncNodeTest::onCondition, this));
     subscribers_.push_back(nh_.subscribe("/diagnostics", 100, &CncNodeTest::onDiagnostics, this));
     clock_ = std::thread([this] {
-      auto due = std::chrono::steady_clock::now();
+      auto next_step = std::chrono::steady_clock::now();
       while (!done_) {
         machine_.advance(0.005);
-        due += std::chrono::milliseconds(5);
-        std::this_thread::sleep_until(due);
+        next_step += std::chrono::milliseconds(5);
+        std::this_thread::sleep_until(next_step);
       }
     });
   }
@@ -126,7 +126,7 @@ class CncNodeTest : public ::testing::Test {
   diagnostic_msgs::DiagnosticStatus diagnostic_;
 };
 
-TEST_F(CncNodeTest, ClosedPortIsSaidAndRetried) {
+TEST_F(CncNodeTest, ClosedPortIsReportedAndRetried) {
   ASSERT_TRUE(spinUntil(
       [&] { return !stamps_.empty() && diagnostic_.level == diagnostic_msgs::DiagnosticStatus::ERROR; }));
   EXPECT_FALSE(state_.connected);
@@ -163,9 +163,9 @@ TEST_F(CncNodeTest, StateLoadMacroAndTransform) {
   ASSERT_TRUE(spinUntil([&] { return buffer.canTransform("machine", "spindle", ros::Time(0)); }));
   EXPECT_NEAR(buffer.lookupTransform("machine", "spindle", ros::Time(0)).transform.translation.z, 0.030,
               1e-9);
-  // 50 Hz by the shorter half of two seconds' periods: a busy computer stretches some, a wrong rate all of
-  // them. One that is too busy has quieter seconds.
-  const auto halfOfThem = [&] {
+  // 50 Hz by the median period of two seconds: a busy computer delays some messages, a wrong rate all.
+  // Retried, since a very busy computer may need several attempts.
+  const auto medianPeriod = [&] {
     std::vector<double> periods;
     for (std::size_t i = stamps_.size() - 100; i < stamps_.size(); ++i)
       periods.push_back((stamps_[i] - stamps_[i - 1]).toSec());
@@ -173,7 +173,7 @@ TEST_F(CncNodeTest, StateLoadMacroAndTransform) {
     return periods[periods.size() / 2];
   };
   stamps_.clear();
-  EXPECT_TRUE(spinUntil([&] { return stamps_.size() > 100 && halfOfThem() < 0.03; }));
+  EXPECT_TRUE(spinUntil([&] { return stamps_.size() > 100 && medianPeriod() < 0.03; }));
 }
 
 TEST_F(CncNodeTest, MotionsAndConditions) {
@@ -184,11 +184,11 @@ TEST_F(CncNodeTest, MotionsAndConditions) {
   condition.spindle_speed = 314.159;
   const RunProgramResult result = program("S3000 M3\nG1 X20 F6000\nM5\nM30\n", {}, condition);
   EXPECT_EQ(result.code, RunProgramResult::OK) << result.message;
-  // The program's condition is told, and after it that there is none.
+  // The condition of the program is published, then NONE.
   EXPECT_TRUE(spinUntil([&] {
-    const auto told = std::find_if(conditions_.begin(), conditions_.end(),
-                                   [](const auto& c) { return c.name == "air_3000"; });
-    return conditions_.end() - told >= 2 && told[1].kind == smartmill_msgs::CuttingCondition::NONE;
+    const auto found = std::find_if(conditions_.begin(), conditions_.end(),
+                                    [](const auto& c) { return c.name == "air_3000"; });
+    return conditions_.end() - found >= 2 && found[1].kind == smartmill_msgs::CuttingCondition::NONE;
   }));
   smartmill_msgs::JogGoal jog;
   jog.axis = "z";
@@ -240,7 +240,7 @@ TEST_F(CncNodeTest, ArmingInTheWrongModeIsRefused) {
   EXPECT_EQ(program("G0 X1\n").code, RunProgramResult::WRONG_MODE);
 }
 
-TEST_F(CncNodeTest, ControllerGoneInMidProgram) {
+TEST_F(CncNodeTest, ControllerLostDuringAProgram) {
   connectAndArm();
   const RunProgramResult result = program("G91 G1 X100 F600\n", [&] {
     ASSERT_TRUE(spinUntil([&] { return state_.motion != 0; }));
@@ -254,7 +254,7 @@ TEST_F(CncNodeTest, ControllerGoneInMidProgram) {
 }
 
 TEST(CncNodeParameters, StringForNumberEndsTheNode) {
-  // What roslaunch makes of 1e-2: a string.
+  // roslaunch converts 1e-2 to a string.
   ros::param::set("/smartmill/cnc_bad/settle_time", std::string("1e-2"));
   FILE* const pipe = ::popen("rosrun smartmill_cnc cnc_node __ns:=/smartmill __name:=cnc_bad 2>&1", "r");
   ASSERT_NE(pipe, nullptr);
@@ -275,6 +275,6 @@ TEST(CncNodeParameters, StringForNumberEndsTheNode) {
 int main(int argc, char** argv) {
   ::testing::InitGoogleTest(&argc, argv);
   ros::init(argc, argv, "cnc_node_test");
-  // Action clients wait in callbacks of their own thread; services and topics are spun by the tests.
+  // Action clients have a callback thread of their own; the tests spin services and topics.
   return RUN_ALL_TESTS();
 }

@@ -31,7 +31,7 @@ std::string good() {
          "max_spindle_speed: 1256\n";
 }
 
-TEST(Parameters, ShippedFileIsKnownAndLeavesTheLimitsToTheModel) {
+TEST(Parameters, ShippedFileMatchesTheTableAndTakesTheLimitsFromTheModel) {
   expectShipped<NodeParameters>(SHIPPED, "smartmill_cnc cnc_node");
   try {
     ParameterReader::fromFile(SHIPPED).readAll<NodeParameters>().completed();
@@ -41,11 +41,11 @@ TEST(Parameters, ShippedFileIsKnownAndLeavesTheLimitsToTheModel) {
   }
 }
 
-TEST(Parameters, GoodOnesAreTaken) {
+TEST(Parameters, ValidOnesAreAccepted) {
   EXPECT_EQ(refusal(good()), "");
 }
 
-TEST(Parameters, BadOnesAreNamed) {
+TEST(Parameters, InvalidOnesAreNamed) {
   struct Case {
     const char* line;
     const char* key;

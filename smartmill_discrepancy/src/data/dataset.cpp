@@ -13,7 +13,7 @@
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
 #include "smartmill_discrepancy/data/alignment.h"
-#include "smartmill_sim/twin/guide.h"
+#include "smartmill_sim/twin/tip_trajectory.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -215,7 +215,7 @@ bool hasToolModes(const MachineModel& model) {
 
 bool canBeGuided(const TestData& test, const MachineModel& model) {
   return hasToolModes(model) && test.test.kind == TestKind::cut && !test.test.running_before &&
-         sim::Guide::canBe(test.record) && !sim::Guide::byForce(test.record);
+         sim::TipTrajectory::isAvailable(test.record) && !sim::TipTrajectory::isFromForce(test.record);
 }
 
 std::size_t Dataset::samples() const {

@@ -236,7 +236,8 @@ std::optional<VectorXd> CampaignCost::pointAt(const VectorXd& own) const {
   const VectorXd right =
       information * linearised_at - frozen_along_ + precision.cwiseProduct(null_(frozen_indices_));
   information.diagonal() += precision;
-  at(frozen_indices_) = fit::leastWithin(information, right, low_(frozen_indices_), high_(frozen_indices_));
+  at(frozen_indices_) =
+      fit::minimiseWithin(information, right, low_(frozen_indices_), high_(frozen_indices_));
   return at;
 }
 
@@ -269,7 +270,7 @@ std::optional<VectorXd> CampaignCost::linearOptimumFrom(const VectorXd& at) cons
   const VectorXd right = here->information * at - here->gradient + precision_.cwiseProduct(null_);
   MatrixXd information = here->information;
   information.diagonal() += precision_;
-  return fit::leastWithin(information, right, low_, high_);
+  return fit::minimiseWithin(information, right, low_, high_);
 }
 
 double CampaignCost::penaltyAt(const VectorXd& at) const {

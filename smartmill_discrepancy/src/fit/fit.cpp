@@ -65,7 +65,7 @@ std::optional<Eigen::VectorXd> solve(const CampaignCost& cost, const FitOptions&
   solver.iterations = cost.simulatesAll() ? options.iterations : CHEAP_STEP_FACTOR * options.iterations;
   solver.function_tolerance = 1e-15;  // StoppingRule decides
   solver.parameter_tolerance = 1e-7;
-  solver.dear_derivatives = true;
+  solver.costly_derivatives = true;
   solver.finish_at_bounds = false;  // simulations are expensive and later rounds refit
   std::vector<fit::Parameter> parameters = cost.parameters();
   Eigen::VectorXd own(static_cast<Index>(parameters.size()));

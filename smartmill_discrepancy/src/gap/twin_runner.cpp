@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "smartmill_sim/effects/effect_set.h"
-#include "smartmill_sim/twin/guide.h"
+#include "smartmill_sim/twin/tip_trajectory.h"
 #include "smartmill_sim/twin/twin.h"
 
 namespace smartmill::discrepancy {
@@ -212,7 +212,8 @@ SimulatedChannels TwinRunner::simulateOne(const MachineModel& model, std::size_t
   TestCache& cache = caches_[chosen];
   const std::size_t first = first_span_[chosen], count = first_span_[chosen + 1] - first;
   // Channels that are not separable depend on the complete record; guiding forces couple the channels.
-  const bool separable = sim::channelsApart(model) && !(guides(chosen) && sim::Guide::byForce(cache.record));
+  const bool separable = sim::channelsAreIndependent(model) &&
+                         !(guides(chosen) && sim::TipTrajectory::isFromForce(cache.record));
   SimulatedChannels result(count);
   std::vector<std::vector<double>> keys;
   std::vector<std::string> missing;

@@ -47,7 +47,7 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
   const EffectScope scope = scopeOf(data);
   std::vector<Hypothesis> all;
   for (const EffectKind& kind : effectCatalogue()) {
-    const std::optional<std::string> missing = lackingFor(kind, scope);
+    const std::optional<std::string> missing = missingNeed(kind, scope);
     if (!missing) {
       for (Hypothesis& form : formsOf(kind, scope)) all.push_back(std::move(form));
     } else if (!missing->empty() && notes) {
@@ -61,7 +61,7 @@ std::vector<Hypothesis> empiricalHypotheses(const Dataset& data) {
   const EffectScope scope = scopeOf(data);
   std::vector<Hypothesis> all;
   for (const EffectKind& kind : empiricalCatalogue()) {
-    if (lackingFor(kind, scope)) continue;
+    if (missingNeed(kind, scope)) continue;
     for (Hypothesis& form : formsOf(kind, scope)) all.push_back(std::move(form));
   }
   return all;

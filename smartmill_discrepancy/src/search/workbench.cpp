@@ -7,7 +7,7 @@
 #include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_discrepancy/data/alignment.h"
 #include "smartmill_discrepancy/gap/scale_evidence.h"
-#include "smartmill_sim/twin/guide.h"
+#include "smartmill_sim/twin/tip_trajectory.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -22,7 +22,7 @@ std::vector<std::size_t> testsOf(const Dataset& data, bool heldout) {
 
 bool isGuidable(const TestData& test, const MachineModel& nominal) {
   return hasToolModes(nominal) && test.test.kind == TestKind::cut && !test.heldout &&
-         !test.test.running_before && sim::Guide::canBe(test.record);
+         !test.test.running_before && sim::TipTrajectory::isAvailable(test.record);
 }
 
 constexpr int QUICK_SLICES = 4;  // of a tool's corner, for the quick twin

@@ -57,7 +57,7 @@ TEST(Fitter, DeviationsAreCalibrated) {
       coverage[k].add(values[k] - true_values[k], std::sqrt(fit.covariance(i, i)));
     }
   }
-  for (const Coverage& c : coverage) EXPECT_TRUE(c.honest());
+  for (const Coverage& c : coverage) EXPECT_TRUE(c.isCalibrated());
 }
 
 // Correlates the noise of air cuts: each sample contains a share of the previous one.
@@ -110,7 +110,7 @@ TEST(Fitter, DeviationsAreCalibratedWithCorrelatedNoise) {
     whitened.add(fit.state.members[0].values[0] - 0.4, std::sqrt(fit.covariance(0, 0)));
   }
   EXPECT_GT(unweighted.rms(), 2.0);
-  EXPECT_TRUE(whitened.honest());
+  EXPECT_TRUE(whitened.isCalibrated());
 }
 
 // Half the prior standard deviation equals four times the prior weight.
@@ -263,7 +263,7 @@ TEST(Fitter, EstimatesThePathShare) {
     coverage.add(fit.state.nominal[share] - off[share], std::sqrt(fit.covariance(i, i)));
     ASSERT_LT(std::sqrt(fit.covariance(i, i)), 0.1);
   }
-  EXPECT_TRUE(coverage.honest());
+  EXPECT_TRUE(coverage.isCalibrated());
 }
 
 // The path share is written as an entry if it is significant.

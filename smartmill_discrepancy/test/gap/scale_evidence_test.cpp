@@ -61,7 +61,7 @@ TEST(VarianceOfProducts, DeviationsOfFittedValuesAreCalibrated) {
     Coverage coverage;
     for (int run = 0; run < Coverage::RUNS; ++run)
       coverage.add(fitted(residual_size, random)[run % VALUES], 1.0);
-    EXPECT_TRUE(coverage.honest()) << residual_size;
+    EXPECT_TRUE(coverage.isCalibrated()) << residual_size;
   }
 }
 

@@ -68,8 +68,8 @@ TEST(Whitening, DeviationsAreCalibrated) {
       level.add(w.found[0], w.std_dev[0]);
       wave.add(w.found[1], w.std_dev[1]);
     }
-    EXPECT_TRUE(level.honest()) << share;
-    EXPECT_TRUE(wave.honest()) << share;
+    EXPECT_TRUE(level.isCalibrated()) << share;
+    EXPECT_TRUE(wave.isCalibrated()) << share;
   }
 }
 

@@ -69,7 +69,7 @@ TEST(EffectScale, DeviationsAreCalibrated) {
       const EffectScale evidence = effectScaleOf({Drawn(0.5, residual_size, 3000, random).evidence()});
       coverage.add(evidence.scale - 1.0, evidence.std_dev);
     }
-    EXPECT_TRUE(coverage.honest()) << residual_size;
+    EXPECT_TRUE(coverage.isCalibrated()) << residual_size;
   }
 }
 

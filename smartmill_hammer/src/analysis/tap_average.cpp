@@ -102,7 +102,7 @@ TapFrf averageTaps(const std::vector<TapRecord>& taps, const TapFrfOptions& opti
     }
     hits.push_back(tap.hit);
   }
-  const std::vector<HitFault> faults = judgeHits(hits, options.check);
+  const std::vector<HitFault> faults = checkHits(hits, options.check);
   ImpactOptions impact;
   impact.exponential_time = options.exponential_time;
   impact.unit = frfUnit(taps.front().kind);

@@ -90,7 +90,7 @@ void writeTip(const FrfOptions& options, const FrequencyResponse& frf, const Mod
     at.modes.modes.push_back(
         {m.frequency, m.damping_ratio, gain.value, m.frequency_std, m.damping_ratio_std, gain.std});
   }
-  at.modes.direct = estimate.flanks.front().upper.real();
+  at.modes.direct = estimate.residual_terms.front().upper.real();
   const double high = options.high > 0.0 ? options.high : std::min(5000.0, frf.frequency.back());
   const TipCorrection tip = correctToTip({at}, beamOf(options.tip), {}, high);
   std::printf("at the tip (struck %.1f mm above it, read %.1f mm):\n", options.tip.struck, options.tip.read);

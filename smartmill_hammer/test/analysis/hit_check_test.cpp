@@ -21,7 +21,7 @@ TEST(HitCheck, AcceptsCleanHitsAndRejectsEachFault) {
       HitCheckOptions options;
       options.weak_force = drawn.weak_force;
       options.high = drawn.high;
-      const std::vector<HitFault> faults = judgeHits(drawn.hits, options);
+      const std::vector<HitFault> faults = checkHits(drawn.hits, options);
       for (std::size_t h = 0; h < faults.size(); ++h) {
         if (!clean && h != drawn.at_fault) continue;
         ++hits;

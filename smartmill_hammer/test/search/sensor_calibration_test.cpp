@@ -92,7 +92,7 @@ TEST(SensorCalibration, StandardDeviationIsHonest) {
     const double truth = Sensor().sensitivity(o.gap + 0.0);
     sensitivity.add(o.calibration.sensitivity() - truth, o.calibration.sensitivityStd());
   }
-  EXPECT_TRUE(sensitivity.honest());
+  EXPECT_TRUE(sensitivity.isCalibrated());
 }
 
 TEST(SensorCalibration, RefusesWhatIsNoSensor) {

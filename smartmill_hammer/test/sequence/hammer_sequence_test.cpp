@@ -182,7 +182,7 @@ TEST(HammerSequence, StandardDeviationOfStiffnessIsCalibrated) {
     const Mode& mode = result.modes.model.modes[0];
     gain.add(mode.gain - machine.crossModel(0, 0.0).modes[0].gain, mode.gain_std);
   }
-  EXPECT_TRUE(gain.honest());
+  EXPECT_TRUE(gain.isCalibrated());
 }
 
 // The same streams, cut into other blocks and sorted from another order of arrival, give the same digits.

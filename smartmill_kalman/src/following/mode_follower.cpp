@@ -71,7 +71,7 @@ Basis harmonicsOf(const ToolGeometry& tool, const Engagement& engagement, const 
     const RigidCut cut(tool, law, engagement, radius);
     std::array<std::array<std::vector<double>, 2>, 2> force;  // of chip and edge, x and y
     for (std::size_t i = 0; i < POINTS; ++i) {
-      const auto parts = cut.partsAt(units::TWO_PI * static_cast<double>(i) / POINTS);
+      const auto parts = cut.termsAt(units::TWO_PI * static_cast<double>(i) / POINTS);
       for (std::size_t part = 0; part < 2; ++part) {
         force[part][0].push_back(parts[part].fx);
         force[part][1].push_back(parts[part].fy);

@@ -167,9 +167,9 @@ TEST(FitCrossTalk, StandardDeviationsAreHonest) {
     second.add(fit.modes[1].gain, fit.modes[1].gain_std);
     direct.add(fit.direct, fit.direct_std);
   }
-  EXPECT_TRUE(first.honest());
-  EXPECT_TRUE(second.honest());
-  EXPECT_TRUE(direct.honest());
+  EXPECT_TRUE(first.isCalibrated());
+  EXPECT_TRUE(second.isCalibrated());
+  EXPECT_TRUE(direct.isCalibrated());
 }
 
 }  // namespace

@@ -43,7 +43,7 @@ TEST(SpeedTracker, FindsTheSpeedAsWellAsLeastSquares) {
   const double best = std::sqrt(3.0) / (SLOPE / RATE * std::pow(COUNT, 1.5));
   EXPECT_LT(std::sqrt(squares), 1.3 * best);  // RMS of 200 runs: +- 5 % and a window of inflated noise
   EXPECT_GT(std::sqrt(squares), 0.7 * best);
-  EXPECT_TRUE(speed.honest());
+  EXPECT_TRUE(speed.isCalibrated());
 }
 
 TEST(SpeedTracker, LearnsNothingFromNoise) {

@@ -74,8 +74,8 @@ TEST(BlindMode, FindsTheModeWithAnHonestDeviation) {
     frequency.add(found.mode.frequency - 970.0, found.mode.frequency_std);
     damping.add(found.mode.damping_ratio - 0.02, found.mode.damping_ratio_std);
   }
-  EXPECT_TRUE(frequency.honest());
-  EXPECT_TRUE(damping.honest());
+  EXPECT_TRUE(frequency.isCalibrated());
+  EXPECT_TRUE(damping.isCalibrated());
 }
 
 TEST(BlindMode, SaysThatThereIsNone) {

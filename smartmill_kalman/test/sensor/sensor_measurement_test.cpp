@@ -118,9 +118,9 @@ TEST(SensorMeasurement, StandardDeviationsAreHonest) {
     damping.add(mode.damping_ratio - 0.03, mode.damping_ratio_std);
     gain.add(mode.gain - 0.9, mode.gain_std);
   }
-  EXPECT_TRUE(frequency.honest());
-  EXPECT_TRUE(damping.honest());
-  EXPECT_TRUE(gain.honest());
+  EXPECT_TRUE(frequency.isCalibrated());
+  EXPECT_TRUE(damping.isCalibrated());
+  EXPECT_TRUE(gain.isCalibrated());
 }
 
 TEST(SensorMeasurement, NamesWhatIsWrong) {

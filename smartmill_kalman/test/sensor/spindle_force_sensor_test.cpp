@@ -139,9 +139,9 @@ TEST(CalibrateStatic, StandardDeviationsAreHonest) {
     y.add(c.y.slope - TABLE.y.slope, c.y.slope_std);
     z.add(c.z.offset - TABLE.z.offset, c.z.offset_std);
   }
-  EXPECT_TRUE(x.honest());
-  EXPECT_TRUE(y.honest());
-  EXPECT_TRUE(z.honest());
+  EXPECT_TRUE(x.isCalibrated());
+  EXPECT_TRUE(y.isCalibrated());
+  EXPECT_TRUE(z.isCalibrated());
 }
 
 TEST(SpindleSensorCalibration, FileKeepsEverything) {
@@ -289,7 +289,7 @@ TEST(SpindleForceSensor, UnbalanceStandardDeviationIsHonest) {
       unbalance.add(error.imag(), part);
     }
   }
-  EXPECT_TRUE(unbalance.honest());
+  EXPECT_TRUE(unbalance.isCalibrated());
 }
 
 TEST(SpindleForceSensor, AForceThatUnloadsASensorIsNoMeasurement) {

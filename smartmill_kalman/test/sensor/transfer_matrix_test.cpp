@@ -112,9 +112,9 @@ TEST(TransferMatrix, StandardDeviationsAreHonest) {
     }
   }
   for (std::size_t p = 0; p < places.size(); ++p) {
-    EXPECT_TRUE(both[p].honest()) << places[p];
+    EXPECT_TRUE(both[p].isCalibrated()) << places[p];
     const Eigen::MatrixXcd truth = plate.response(places[p]).topLeftCorner(3, 3);
-    EXPECT_TRUE(both_of_inverse[p].honest(RUNS * independentParts(truth.inverse()))) << places[p];
+    EXPECT_TRUE(both_of_inverse[p].isCalibrated(RUNS * independentParts(truth.inverse()))) << places[p];
   }
 }
 

@@ -75,7 +75,8 @@ void ForceCurveIdentification::handle(const CuttingCondition& condition) {
   closeCut();
   condition_ = condition;
   // The rotation is counted from here, so that its rounding does not depend on the uptime.
-  if (!angles_.empty()) angles_.assign(1, {angles_.back().time, angles_.back().shown, angles_.back().shown});
+  if (!angles_.empty())
+    angles_.assign(1, {angles_.back().time, angles_.back().measured, angles_.back().measured});
 }
 
 void ForceCurveIdentification::handle(const CncState& state) {

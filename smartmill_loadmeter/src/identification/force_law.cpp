@@ -203,7 +203,7 @@ void forces(const ToolGeometry& tool, const Engagement& e, const CuttingCoeffici
   const RigidCut cut(tool, law, e, runoutRadii(tool, offset, offset_angle));
   for (std::size_t i = 0; i < ANGLES; ++i) {
     const double spindle = TWO_PI * (static_cast<double>(i) + 0.5) / static_cast<double>(ANGLES) + phase;
-    const auto [chip, edge] = cut.partsAt(spindle);
+    const auto [chip, edge] = cut.termsAt(spindle);
     (*out)[0][i] = chip.fx + edge.fx, (*out)[1][i] = chip.fy + edge.fy, (*out)[2][i] = chip.fz + edge.fz;
   }
 }

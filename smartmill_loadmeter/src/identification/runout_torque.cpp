@@ -18,12 +18,12 @@ RunoutTorque::RunoutTorque(const ToolGeometry& tool, const Engagement& engagemen
 }
 
 std::array<double, 2> RunoutTorque::at(double spindle_angle) const {
-  const auto parts = cut_.partsAt(spindle_angle);
+  const auto parts = cut_.termsAt(spindle_angle);
   return {parts[0].torque, parts[1].torque};
 }
 
 std::array<double, 2> RunoutTorque::mean() const {
-  const auto parts = cut_.meanParts();
+  const auto parts = cut_.meanTerms();
   return {parts[0].torque, parts[1].torque};
 }
 

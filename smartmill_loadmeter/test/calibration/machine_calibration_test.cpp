@@ -53,8 +53,8 @@ TEST(IdleVoltage, standardDeviationsAreCalibrated) {
     kb.add(idle.kb.value - KB, idle.kb.std_dev);
     ktcf.add(idle.ktcf.value - KTCF, idle.ktcf.std_dev);
   }
-  EXPECT_TRUE(kb.honest());
-  EXPECT_TRUE(ktcf.honest());
+  EXPECT_TRUE(kb.isCalibrated());
+  EXPECT_TRUE(ktcf.isCalibrated());
 }
 
 TEST(IdleVoltage, namesWhatIsMissing) {

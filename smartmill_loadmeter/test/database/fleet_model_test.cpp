@@ -158,9 +158,9 @@ TEST(FleetModel, bandsAreCalibratedForMachinesNewToAMaterial) {
       of_machines.add(m.effect - shop.effect[at], m.std_dev);
     }
   }
-  EXPECT_TRUE(first.honest());
+  EXPECT_TRUE(first.isCalibrated());
   // Machines of a shop share the uncertainty of its groups.
-  EXPECT_TRUE(of_machines.honest(Coverage::RUNS));
+  EXPECT_TRUE(of_machines.isCalibrated(Coverage::RUNS));
 }
 
 TEST(FleetModel, firstCutsNarrowTheBand) {

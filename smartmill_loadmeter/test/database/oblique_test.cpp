@@ -184,9 +184,9 @@ TEST(SemiInverse, standardDeviationsAreCalibrated) {
     krc.add(p.found.value.krc - p.truth.krc, p.found.std_dev.krc);
     kac.add(p.found.value.kac - p.truth.kac, p.found.std_dev.kac);
   }
-  EXPECT_TRUE(ktc.honest());
-  EXPECT_TRUE(krc.honest());
-  EXPECT_TRUE(kac.honest());
+  EXPECT_TRUE(ktc.isCalibrated());
+  EXPECT_TRUE(krc.isCalibrated());
+  EXPECT_TRUE(kac.isCalibrated());
 }
 
 TEST(SemiInverse, namesWhatIsMissing) {

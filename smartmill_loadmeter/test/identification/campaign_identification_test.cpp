@@ -103,8 +103,8 @@ TEST(LoadRecords, shortRecordsGiveTheTruthWithCalibratedStandardDeviations) {
     ktc.add(k.value.ktc - TRUTH.ktc, k.std_dev.ktc);
     kte.add(k.value.kte - TRUTH.kte, k.std_dev.kte);
   }
-  EXPECT_TRUE(ktc.honest());
-  EXPECT_TRUE(kte.honest());
+  EXPECT_TRUE(ktc.isCalibrated());
+  EXPECT_TRUE(kte.isCalibrated());
 }
 
 TEST(LoadRecords, withoutAirCutsTheModelsFrictionIsUsed) {

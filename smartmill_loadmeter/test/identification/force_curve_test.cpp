@@ -130,7 +130,7 @@ TEST(ForceCurve, AFileRestoresTheCurve) {
       folder.write("falling.yaml",
                    "format: smartmill-force-curve/1\nthickest_chip_mm: 0.1\nrms_n: 1.0\ntangential: "
                    "{coefficients_n_per_mm: [1.0, 2.0, 1.5, 3.0, 4.0], std_n_per_mm: [1.0, 1.0, 1.0]}\n");
-  EXPECT_NE(errorOf([&] { readForceCurves(falling); }).find("must not fall"), std::string::npos);
+  EXPECT_NE(errorOf([&] { readForceCurves(falling); }).find("do not decrease"), std::string::npos);
 }
 
 TEST(ForceCurve, RefusesARecordWithoutAChip) {

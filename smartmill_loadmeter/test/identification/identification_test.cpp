@@ -55,8 +55,8 @@ void checkCoverage(double rpm, double ktc_error, double kte_error) {
     ktc.add(k.value.ktc - TRUTH.ktc, k.std_dev.ktc);
     kte.add(k.value.kte - TRUTH.kte, k.std_dev.kte);
   }
-  EXPECT_TRUE(ktc.honest()) << rpm;
-  EXPECT_TRUE(kte.honest()) << rpm;
+  EXPECT_TRUE(ktc.isCalibrated()) << rpm;
+  EXPECT_TRUE(kte.isCalibrated()) << rpm;
 }
 
 TEST(LoadMeterIdentification, findsTheTruthWithCalibratedStandardDeviations) {

@@ -96,8 +96,8 @@ TEST(Recursive, standardDeviationsAreCalibrated) {
     ktc.add(recursive.ktc() - 953e6, still * recursive.ktcStd());
     kte.add(recursive.kte() - 17.3e3, still * recursive.kteStd());
   }
-  EXPECT_TRUE(ktc.honest());
-  EXPECT_TRUE(kte.honest());
+  EXPECT_TRUE(ktc.isCalibrated());
+  EXPECT_TRUE(kte.isCalibrated());
 }
 
 TEST(Recursive, followsEdgeWear) {

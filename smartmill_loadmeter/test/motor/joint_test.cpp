@@ -160,8 +160,8 @@ TEST(Joint, medianErrorsOfManyMachinesAreWithinTenPercentAndCalibrated) {
   std::sort(kac.begin(), kac.end());
   EXPECT_LT(krc[runs / 2], 0.10);
   EXPECT_LT(kac[runs / 2], 0.10);
-  EXPECT_TRUE(radial.honest());
-  EXPECT_TRUE(axial.honest());
+  EXPECT_TRUE(radial.isCalibrated());
+  EXPECT_TRUE(axial.isCalibrated());
 }
 
 }  // namespace

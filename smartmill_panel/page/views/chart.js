@@ -1,10 +1,10 @@
-// Where this tool cuts without chatter, and where it cuts now.
+// Stability chart with the running cut.
 import { digits, fixed, make, rpm, table } from '../format.js';
 import { Plot, colour } from '../plot.js';
 
 const MM = 1e3;
 
-// Share of the standard normal distribution below z (Abramowitz and Stegun 26.2.17, 7.5e-8).
+// Cumulative standard normal distribution (Abramowitz and Stegun 26.2.17, error 7.5e-8).
 function normal(z) {
   const t = 1 / (1 + 0.2316419 * Math.abs(z));
   const tail = Math.exp(-z * z / 2) / Math.sqrt(2 * Math.PI) *
@@ -15,7 +15,7 @@ function normal(z) {
 export const toMm = list => Array.from(list, v => v === null ? Infinity : MM * v);
 export const toRpm = list => Array.from(list, rpm);
 
-// Value of a list at x of a rising list, linear.
+// ys interpolated linearly at x; xs ascending.
 function at(xs, ys, x) {
   let i = xs.findIndex(v => v >= x);
   if (i < 0) return NaN;
@@ -29,13 +29,13 @@ export class ChartView {
     Object.assign(this, { card, link, what_if: null, spread: null });
     this.plot = new Plot(card, {
       name: `stability_${name}`, x: { label: 'Spindle speed [rpm]' }, y: { label: 'Axial depth [mm]', low: 0 },
-      empty: 'No chart yet: the tool\'s FRFs and the cutting coefficients make it', read: (x, y) => this.read(x, y),
+      empty: 'No chart yet: it requires the tool\'s FRFs and the cutting coefficients', read: (x, y) => this.read(x, y),
     });
-    link.on('stability/chart', chart => { this.take(chart); });
+    link.on('stability/chart', chart => { this.setChart(chart); });
     for (const topic of ['cut/condition', 'cnc/state', 'chatter/state']) link.on(topic, () => {});
   }
 
-  take(chart) {
+  setChart(chart) {
     this.chart = {
       speed: toRpm(chart.spindle_speed), limit: toMm(chart.depth_limit), frequency: chart.chatter_frequency,
       torque: toMm(chart.torque_depth_limit), power: toMm(chart.power_depth_limit),
@@ -44,12 +44,12 @@ export class ChartView {
     this.card.aside.textContent = `${chart.tool} in ${chart.material}, stable at any speed below ${digits(MM * chart.absolute_depth_limit)} mm`;
     const best = chart.recommended[0];
     this.rate = best ? best.material_removal_rate / (best.axial_depth * best.spindle_speed) : NaN;
-    this.askSpread();
+    this.fetchSpread();
     this.draw();
   }
 
-  // How far the limit may lie off, from the deviations of what was measured.
-  async askSpread() {
+  // Distribution of the limit from the standard deviations of the measurement.
+  async fetchSpread() {
     const answer = await fetch('api/what_if?spread=1').catch(() => null);
     const found = await answer?.json().catch(() => null);
     if (!found?.limit_low) return;
@@ -65,12 +65,12 @@ export class ChartView {
     return { x: rpm(state.spindle_speed > 1 ? state.spindle_speed : condition.spindle_speed), y: MM * condition.axial_depth };
   }
 
-  // Deep enough for what is of use, not for the pockets that no spindle carries.
+  // Upper end of the depth axis: the recommended and running cuts, not the deepest pockets.
   highest() {
     const useful = this.message.recommended.map(p => MM * p.axial_depth);
-    const shown = [...useful, ...this.message.unstable.map(p => MM * p.axial_depth), this.live()?.y ?? 0];
+    const depths = [...useful, ...this.message.unstable.map(p => MM * p.axial_depth), this.live()?.y ?? 0];
     const limits = this.chart.limit.filter(Number.isFinite).sort((a, b) => a - b);
-    return 1.3 * Math.max(...shown, limits[Math.floor(0.5 * limits.length)] ?? 1);
+    return 1.3 * Math.max(...depths, limits[Math.floor(0.5 * limits.length)] ?? 1);
   }
 
   draw() {
@@ -97,7 +97,7 @@ export class ChartView {
     this.plot.set({ series, points, marks: live ? [{ x: live.x, color: colour('warn') }, { y: live.y, color: colour('warn') }] : [] });
   }
 
-  // The limit of the other cut; below it, which mode holds it down.
+  // Limit of the modified cut; at the foot the mode that limits each speed.
   whatIfSeries(top) {
     const found = this.what_if, series = [], colours = ['x', 'y', 'z', 'warn', 'good', 'bad'];
     series.push({ x: found.speed, y: found.limit.map(v => Math.min(v, 4 * top)), color: colour('warn'), width: 2.5, label: 'what if' });
@@ -108,7 +108,7 @@ export class ChartView {
       const mode = found.mode[i], xs = found.speed.slice(i, Math.min(end + 2, found.speed.length));
       if (mode >= 0)
         series.push({ kind: 'band', free: true, x: xs, y: xs.map(() => 0), y2: xs.map(() => 0.025 * top), color: colour(colours[mode % 6]), alpha: 1,
-          label: named.has(mode) ? undefined : `held by ${found.modes[mode]}` });
+          label: named.has(mode) ? undefined : `limited by ${found.modes[mode]}` });
       named.add(mode);
       i = end + 1;
     }
@@ -128,7 +128,7 @@ export class ChartView {
     if (y > at(chart.speed, chart.power, x)) lines.push('beyond the spindle\'s power');
     if (this.what_if) {
       const mode = this.what_if.mode[this.what_if.speed.findIndex(v => v >= x)];
-      lines.push(`what if: limit ${digits(at(this.what_if.speed, this.what_if.limit, x))} mm` + (mode >= 0 ? `, held by ${this.what_if.modes[mode]}` : ''));
+      lines.push(`what if: limit ${digits(at(this.what_if.speed, this.what_if.limit, x))} mm` + (mode >= 0 ? `, limited by ${this.what_if.modes[mode]}` : ''));
     }
     return lines;
   }
@@ -137,7 +137,7 @@ export class ChartView {
     const live = JSON.stringify([this.live(), this.link.message('chatter/state')?.chatter]);
     if (live !== this.drawn) { this.drawn = live; this.draw(); }
   }
-  shown() { this.draw(); }
+  onShow() { this.draw(); }
 }
 
 export class PointsTable {
@@ -147,7 +147,7 @@ export class PointsTable {
     link.on('stability/chart', chart => {
       const rows = chart.recommended.map(p => [fixed(rpm(p.spindle_speed)), fixed(MM * p.axial_depth, 3), digits(MM * p.depth_limit), fixed(p.chatter_frequency),
         fixed(p.torque, 2), fixed(1e-3 * p.power, 2), fixed(60e6 * p.material_removal_rate, 1)]);
-      this.place.replaceChildren(table(['Speed [rpm]', 'Depth [mm]', 'Limit [mm]', 'Chatter would be at [Hz]', 'Torque [N m]', 'Power [kW]', 'Removal rate [cm³/min]'], rows, { id: 'points' }));
+      this.place.replaceChildren(table(['Speed [rpm]', 'Depth [mm]', 'Limit [mm]', 'Chatter frequency [Hz]', 'Torque [N m]', 'Power [kW]', 'Removal rate [cm³/min]'], rows, { id: 'points' }));
       this.place.className = '';
     });
   }

@@ -1,4 +1,4 @@
-// What the hammer measured, and the modes fitted to it.
+// Measured FRFs, fitted modes, and the hits of the measurement.
 import { clock, deg, digits, fixed, make, table, withDeviation } from '../format.js';
 import { Plot, colour } from '../plot.js';
 
@@ -6,7 +6,7 @@ const POINTS = { tool_tip: 'tool', force_sensor: 'force sensor' };
 
 const nameOf = m => `${POINTS[m.point] ?? m.point} ${m.direction}`;
 
-// direct + sum of gain w0^2 / (w0^2 - w^2 + 2 i z w0 w)
+// direct + sum over modes of gain w0^2 / (w0^2 - w^2 + 2 i z w0 w)
 function response(model, f) {
   let re = model.direct, im = 0;
   for (const m of model.modes) {
@@ -33,12 +33,12 @@ export class Dynamics {
     this.big = big;
     this.measured = make('span', { class: 'choice row' });
     this.parts = make('span', { class: 'choice row' }, ...Object.entries(PARTS).map(([key, p]) => make('button', { 'data-part': key, onclick: () => { store.part = key; this.draw(); } }, p.name)));
-    this.blows = make('div', { class: 'hits', id: 'hits' });
+    this.hit_list = make('div', { class: 'hits', id: 'hits' });
     big.append(make('div', { class: 'choices' }, this.measured, this.parts));
     this.plot = new Plot(big, { name: 'frf', group: 'frf', x: { label: 'Frequency [Hz]', low: 0 }, y: { label: '' }, empty: 'No FRF measured yet', read: (x, y) => [`${fixed(x, 1)} Hz`, digits(y)] });
-    this.coherence = new Plot(small, { name: 'coherence', group: 'frf', x: { label: 'Frequency [Hz]', low: 0 }, y: { label: 'Coherence', low: 0, high: 1 }, empty: 'Coherence needs two hits', read: (x, y) => [`${fixed(x, 1)} Hz`, fixed(y, 3)] });
+    this.coherence = new Plot(small, { name: 'coherence', group: 'frf', x: { label: 'Frequency [Hz]', low: 0 }, y: { label: 'Coherence', low: 0, high: 1 }, empty: 'Coherence requires two hits', read: (x, y) => [`${fixed(x, 1)} Hz`, fixed(y, 3)] });
     this.list = make('div', { class: 'dim' }, 'No modes yet');
-    side.append(this.list, this.blows);
+    side.append(this.list, this.hit_list);
     const key = nameOf;
     link.on('tool/frf', m => { this.frfs[key(m)] = m; this.picked ??= key(m); this.news = true; });
     link.on('tool/modes', m => { this.models[key(m)] = m; this.news = true; });
@@ -55,7 +55,7 @@ export class Dynamics {
     const scale = frf.unit === 'm/N' ? 1e6 : 1, unit = frf.unit === 'm/N' ? 'µm/N' : '1';
     const x = frf.frequency, of = (re, im) => part.plain ? part.of(re, im) : scale * part.of(re, im);
     const series = [{ x, y: Array.from(x, (_, k) => of(frf.real[k], frf.imag[k])), color: colour('measured'), width: 1.4, label: `measured, ${frf.averages} hits` }];
-    if (model) series.push({ x, y: Array.from(x, f => of(...response(model, f))), color: colour('x'), width: 2, label: `fitted, ${fixed(100 * model.relative_error, 1)} % off` });
+    if (model) series.push({ x, y: Array.from(x, f => of(...response(model, f))), color: colour('x'), width: 2, label: `fitted, ${fixed(100 * model.relative_error, 1)} % error` });
     Object.assign(this.plot.options.y, { label: part.label ?? `${part.name} [${unit}]`, log: !!part.log });
     this.plot.set({ series, marks: (model?.modes ?? []).map(m => ({ x: m.frequency, label: `${fixed(m.frequency)} Hz`, color: colour('x') })) });
     this.coherence.set({ series: frf.averages > 1 ? [{ x, y: frf.coherence, color: colour('z'), width: 1.3 }] : [] });
@@ -76,27 +76,27 @@ export class Dynamics {
   }
   drawHits() {
     const found = this.hits.of(this.picked);
-    if (!found) return this.blows.replaceChildren();
-    const taken = found.blows.filter(b => b.taken).length;
-    this.blows.replaceChildren(make('div', { class: 'dim' }, `Hits ${found.name}: ${taken} taken` + (taken < found.blows.length ? `, ${found.blows.length - taken} refused` : '')),
-      ...found.blows.map((b, k) => b.taken ? make('i', { title: `hit ${k + 1} at ${clock(b.time)}: taken` }) :
-        make('span', { class: 'word bad', title: clock(b.time) }, `hit ${k + 1} refused: ${b.why}`)),
+    if (!found) return this.hit_list.replaceChildren();
+    const accepted = found.hits.filter(b => b.accepted).length;
+    this.hit_list.replaceChildren(make('div', { class: 'dim' }, `Hits ${found.name}: ${accepted} accepted` + (accepted < found.hits.length ? `, ${found.hits.length - accepted} rejected` : '')),
+      ...found.hits.map((b, k) => b.accepted ? make('i', { title: `hit ${k + 1} at ${clock(b.time)}: accepted` }) :
+        make('span', { class: 'word bad', title: clock(b.time) }, `hit ${k + 1} rejected: ${b.why}`)),
       found.stage ? make('div', { class: 'dim' }, found.stage) : '');
   }
   refresh() {
     if (this.news) { this.news = false; this.draw(); }
     if (this.hits.news) { this.hits.news = false; this.drawHits(); }
   }
-  shown() { this.draw(); }
+  onShow() { this.draw(); }
 }
 
-// Blows of the hammer as the measurement's feedback tells them: "hit 3 of 5", "hit thrown away: why".
+// Hits from the feedback of the measurement: "hit 3 of 5", "hit thrown away: reason".
 class Hits {
   constructor(link) {
     this.goals = new Map();
     for (const action of ['hammer/measure_frf', 'kalman/measure_frf']) {
       link.on(`${action}/goal`, m => { Object.assign(this.goal(m.goal_id), { name: nameOf(m.goal) }); this.news = true; });
-      link.on(`${action}/feedback`, m => this.take(m));
+      link.on(`${action}/feedback`, m => this.addFeedback(m));
       link.on(`${action}/result`, m => {
         const goal = this.goal(m.status.goal_id);
         Object.assign(goal, { stage: m.result.code ? m.result.message : '', ended: true });
@@ -106,27 +106,27 @@ class Hits {
     }
   }
   goal(id) {
-    if (!this.goals.has(id.id)) this.goals.set(id.id, { blows: [], stage: '', name: '', time: id.stamp });
+    if (!this.goals.has(id.id)) this.goals.set(id.id, { hits: [], stage: '', name: '', time: id.stamp });
     return this.goals.get(id.id);
   }
-  // Kept ones may come in any order.
-  take(m) {
+  // Latched messages may arrive in any order.
+  addFeedback(m) {
     const goal = this.goal(m.status.goal_id), text = m.feedback.stage, why = text.match(/^hit thrown away: (.*)/)?.[1], time = m.header.stamp;
     if (!goal.ended && !(goal.heard > time)) Object.assign(goal, { stage: text, heard: time });
-    if ((why || /^hit \d+ of/.test(text)) && !goal.blows.some(b => b.time === time)) {
-      goal.blows.push({ taken: !why, why, time });
-      goal.blows.sort((a, b) => a.time - b.time);
+    if ((why || /^hit \d+ of/.test(text)) && !goal.hits.some(b => b.time === time)) {
+      goal.hits.push({ accepted: !why, why, time });
+      goal.hits.sort((a, b) => a.time - b.time);
     }
     if (time >= goal.heard) this.fill(goal, m.feedback.hits_done, time);
     this.news = true;
   }
-  // Feedback tells the newest alone: what it has passed over was taken.
-  fill(goal, taken, time) {
-    for (let missing = taken - goal.blows.filter(b => b.taken).length; missing > 0; --missing) goal.blows.push({ taken: true, time });
+  // Feedback may skip messages: hits missing in it were accepted.
+  fill(goal, accepted, time) {
+    for (let missing = accepted - goal.hits.filter(b => b.accepted).length; missing > 0; --missing) goal.hits.push({ accepted: true, time });
   }
-  // Of the newest measurement at a place, or of what runs.
+  // The running measurement, else the newest one at a point.
   of(name) {
-    const all = [...this.goals.values()].filter(g => g.blows.length || (g.stage && !g.ended)).sort((a, b) => b.time - a.time);
+    const all = [...this.goals.values()].filter(g => g.hits.length || (g.stage && !g.ended)).sort((a, b) => b.time - a.time);
     return all.find(g => !g.ended) ?? all.find(g => g.name === name) ?? null;
   }
 }

@@ -1,18 +1,18 @@
-// The shop's machines: what each knows, what they know together, who is odd, how far behind each push is.
+// The machines of a fleet: records, common estimates, outliers, age of the last push.
 import { age, digits, fixed, make, table, withDeviation } from '../format.js';
 
 const TOPIC = 'loadmeter/fleet';
-const ODD = 0.5;        // probability from which a machine is called odd
-const LEAST_REACH = 0.1;  // [1] of ln Ktc, half of the intervals' width at least
-const TELL = 1000;      // [ms] between two looks at the ages
-const NONE = 'This machine belongs to no fleet: loadmeter_node has no address of a server (parameter fleet).';
+const ODD = 0.5;        // [1] probability above which a machine counts as an outlier
+const LEAST_REACH = 0.1;  // [1] of ln Ktc: smallest half-width of the interval axis
+const REDRAW = 1000;      // [ms] between two updates of the ages
+const NONE = 'This machine belongs to no fleet: the parameter fleet of loadmeter_node is empty.';
 
 const percent = share => `${fixed(100 * share, share > 0.1 && share < 0.9 ? 0 : 1)} %`;
 const word = (kind, text) => make('span', { class: `word ${kind}` }, text);
 const dim = text => make('span', { class: 'dim' }, text);
 const scrolled = element => make('div', { class: 'scroll' }, element);
 
-// An effect with twice its deviation to both sides, zero in the middle.
+// Interval of effect ± two standard deviations, zero in the middle.
 function interval(effect, deviation, reach) {
   const at = value => `${50 + 50 * Math.max(-1, Math.min(1, value / reach))}%`;
   const [low, high] = [at(effect - 2 * deviation), at(effect + 2 * deviation)];
@@ -21,11 +21,11 @@ function interval(effect, deviation, reach) {
 }
 
 export class Fleet {
-  // The cards of a view: server, machines, what is known of each tool and material, by whom.
+  // Cards: server, machines, estimates by tool and material, records by machine.
   constructor(view, link, card) {
-    Object.assign(this, { link, told: 0 });
+    Object.assign(this, { link, drawn_at: 0 });
     this.places = {};
-    for (const [name, title, extra] of [['server', 'Fleet', 'wide'], ['machines', 'Machines', 'wide'], ['pairs', 'What the fleet knows', ''], ['knows', 'Who knows it', '']]) {
+    for (const [name, title, extra] of [['server', 'Fleet', 'wide'], ['machines', 'Machines', 'wide'], ['pairs', 'Estimates of the fleet', ''], ['knows', 'Records by machine', '']]) {
       const element = card(title, `tools-free ${extra}`);
       view.append(element);
       this.places[name] = make('div', { id: `fleet-${name}` });
@@ -37,8 +37,8 @@ export class Fleet {
   }
 
   refresh() {
-    if (!this.message || (!this.news && performance.now() - this.told < TELL)) return;
-    this.told = performance.now();
+    if (!this.message || (!this.news && performance.now() - this.drawn_at < REDRAW)) return;
+    this.drawn_at = performance.now();
     this.news = false;
     for (const [name, place] of Object.entries(this.places)) place.parentElement.hidden = name !== 'server' && !this.message.machines.length;
     this.showServer(this.message);
@@ -48,13 +48,13 @@ export class Fleet {
   }
 
   showServer(m) {
-    const waiting = m.behind ? word('warn', `${m.behind} of this machine's records wait here`) : word('good', 'nothing of this machine waits');
+    const waiting = m.behind ? word('warn', `${m.behind} of this machine's records are not sent yet`) : word('good', 'all records of this machine are sent');
     const odd = m.machines.filter(machine => machine.odd > ODD);
     const parts = ['machines', 'batches', 'tools', 'cuts'].map(name => Number.isFinite(m[`between_${name}`]) ? `${digits(100 * m[`between_${name}`], 2)} % between ${name}` : null).filter(Boolean);
     this.places.server.replaceChildren(
-      make('p', { class: 'sentence' }, m.reached ? word('good', `The server answers: ${m.message}`) : word('bad', `The server did not take the last push: ${m.message}`)),
-      make('p', { class: 'row' }, waiting, odd.length ? word('warn', `odd: ${odd.map(machine => machine.name).join(', ')}`) : m.machines.length ? word('good', 'no machine is odd') : null,
-        dim(`asked ${age(this.link.age(TOPIC))} ago${m.reached || !m.machines.length ? '' : '; what follows is what was known before'}`)),
+      make('p', { class: 'sentence' }, m.reached ? word('good', `The server answers: ${m.message}`) : word('bad', `The last push failed: ${m.message}`)),
+      make('p', { class: 'row' }, waiting, odd.length ? word('warn', `outliers: ${odd.map(machine => machine.name).join(', ')}`) : m.machines.length ? word('good', 'no outlier') : null,
+        dim(`updated ${age(this.link.age(TOPIC))} ago${m.reached || !m.machines.length ? '' : '; the values below are older'}`)),
       parts.length ? make('p', { class: 'dim' }, `Ktc scatters by ${parts.join(', ')}.`) : '');
   }
 
@@ -68,15 +68,15 @@ export class Fleet {
         !one.member || !Number.isFinite(one.silent) ? dim('–') : one.behind ? word('warn', `${one.behind}`) : word('good', '0'),
         one.member ? `${one.records}` : dim('–'), known ? `${withDeviation(100 * one.effect, 100 * one.effect_std)} %` : dim('–'),
         known ? interval(one.effect, one.effect_std, reach) : '',
-        !known ? dim('–') : one.odd > ODD ? word('bad', `odd, ${percent(one.odd)}${one.meaning ? `: ${one.meaning}` : ''}`) : dim(percent(one.odd))];
+        !known ? dim('–') : one.odd > ODD ? word('bad', `outlier, ${percent(one.odd)}${one.meaning ? `: ${one.meaning}` : ''}`) : dim(percent(one.odd))];
     });
     this.places.machines.replaceChildren(scrolled(table(
-      ['Machine', 'Last push', 'Behind then', 'Brought', 'Ktc beside the fleet', `± ${fixed(100 * reach)} %`, 'Odd with probability'], rows)));
+      ['Machine', 'Last push', 'Not sent then', 'Records', 'Ktc relative to the fleet', `± ${fixed(100 * reach)} %`, 'Outlier probability'], rows)));
   }
 
   showPairs(m) {
     this.places.pairs.replaceChildren(m.pairs.length ? scrolled(table(['Tool', 'Material', 'Records', 'Next cut here, Ktc [N/mm²]', ''], m.pairs.map(pair => [
-      pair.tool, pair.material, `${pair.records}`, withDeviation(1e-6 * pair.ktc, 1e-6 * pair.ktc_std), pair.own ? dim(`${pair.own} own`) : word('plain', 'none of its own')]))) : dim('No record yet'));
+      pair.tool, pair.material, `${pair.records}`, withDeviation(1e-6 * pair.ktc, 1e-6 * pair.ktc_std), pair.own ? dim(`${pair.own} own`) : word('plain', 'no own records')]))) : dim('No record yet'));
   }
 
   showKnows(m) {

@@ -7,7 +7,7 @@ const SOURCES = ['raw', 'compensated', 'twin'];
 const AXES = ['x', 'y', 'z'];
 const MINUTE = 60;
 
-// Buttons of which one is pressed, the same wherever they stand.
+// Buttons with one pressed; all groups with the same key are synchronised.
 function choice(card, store, key, values, changed) {
   const buttons = values.map(([value, name]) => make('button', { onclick: () => {
     store[key] = value;
@@ -19,10 +19,10 @@ function choice(card, store, key, values, changed) {
   card.querySelector('h2').append(make('span', { class: 'choice row' }, ...buttons));
 }
 
-// The newest of each source; while nothing cuts, that of the last steady cut.
+// The newest message of each source; without a steady cut, that of the last steady cut.
 class Newest {
   constructor() { this.all = {}; this.cut = {}; }
-  take(message) {
+  add(message) {
     this.all[message.source] = message;
     if (message.steady) this.cut[message.source] = message;
     this.cutting = message.steady;
@@ -31,7 +31,7 @@ class Newest {
 }
 
 const axes = AXES.map(a => [a, a]);
-const cut = (list, axis, n) => list.subarray(AXES.indexOf(axis) * n, (AXES.indexOf(axis) + 1) * n);
+const ofAxis = (list, axis, n) => list.subarray(AXES.indexOf(axis) * n, (AXES.indexOf(axis) + 1) * n);
 
 export class Revolution {
   constructor(card, link, store, choices = true) {
@@ -39,8 +39,8 @@ export class Revolution {
     if (choices) choice(card, store, 'axis', axes, () => this.draw());
     else document.addEventListener('choice', () => this.draw());
     this.plot = new Plot(card, { name: 'revolution', x: { label: 'Spindle angle [°]', low: 0, high: 360 }, y: { label: 'Force [N]' },
-      empty: 'No force yet: it comes with the first cut', read: (x, y) => [`${fixed(x)}°`, `${digits(y)} N`] });
-    link.on('panel/revolution', message => { this.found.take(message); this.news = true; });
+      empty: 'No force yet: it is shown from the first cut on', read: (x, y) => [`${fixed(x)}°`, `${digits(y)} N`] });
+    link.on('panel/revolution', message => { this.found.add(message); this.news = true; });
     link.on('cut/condition', () => {});
   }
 
@@ -52,8 +52,8 @@ export class Revolution {
       const m = this.found.get(source);
       if (!m || (source === TWIN && m.condition !== newest?.condition)) continue;
       const n = m.bins, x = Array.from({ length: n }, (_, k) => (k + 0.5) * 360 / n);
-      if (source === COMPENSATED) series.push({ kind: 'band', x, y: cut(m.low, axis, n), y2: cut(m.high, axis, n), color: colour(axis), alpha: 0.22 });
-      series.push({ x, y: cut(m.mean, axis, n), label: SOURCES[source], ...styles[source] });
+      if (source === COMPENSATED) series.push({ kind: 'band', x, y: ofAxis(m.low, axis, n), y2: ofAxis(m.high, axis, n), color: colour(axis), alpha: 0.22 });
+      series.push({ x, y: ofAxis(m.mean, axis, n), label: SOURCES[source], ...styles[source] });
     }
     if (newest) {
       for (let k = 0; k < (teeth || 0); ++k) marks.push({ x: (360 - 360 * k / teeth) % 360, label: `tooth ${k + 1}` });
@@ -62,7 +62,7 @@ export class Revolution {
     this.plot.set({ series, marks });
   }
   refresh() { if (this.news) { this.news = false; this.draw(); } }
-  shown() { this.draw(); }
+  onShow() { this.draw(); }
 }
 
 export class Spectrum {
@@ -71,8 +71,8 @@ export class Spectrum {
     choice(card, store, 'axis', axes, () => this.draw());
     choice(card, store, 'source', [[MEASURED, 'raw'], [COMPENSATED, 'compensated']], () => this.draw());
     this.plot = new Plot(card, { name: 'spectrum', x: { label: 'Frequency [Hz]', low: 0 }, y: { label: 'Amplitude [N]', log: true },
-      empty: 'No force yet: it comes with the first cut', read: (x, y) => this.read(x, y) });
-    link.on('panel/spectrum', message => { this.found.take(message); this.news = true; });
+      empty: 'No force yet: it is shown from the first cut on', read: (x, y) => this.read(x, y) });
+    link.on('panel/spectrum', message => { this.found.add(message); this.news = true; });
     link.on('tool/modes', message => { if (message.point === 'tool_tip') this.modes = { ...this.modes, [message.direction]: message.modes }; });
     link.on('chatter/state', () => {});
   }
@@ -107,7 +107,7 @@ export class Spectrum {
     return [`${fixed(x, 1)} Hz: ${digits(line)} N`, turn > 0.5 ? `order ${fixed(x / turn, 2)}` : ''];
   }
   refresh() { if (this.news) { this.news = false; this.draw(); } }
-  shown() { this.draw(); }
+  onShow() { this.draw(); }
 }
 
 export class SpectrumCourse {
@@ -119,11 +119,11 @@ export class SpectrumCourse {
     });
   }
   refresh() { this.waterfall.draw(); }
-  shown() { this.waterfall.dirty = this.waterfall.empty.hidden; }
+  onShow() { this.waterfall.dirty = this.waterfall.empty.hidden; }
 }
 
-// Bins of a strip joined until there are no more than columns of a picture.
-export function joined(bins, columns) {
+// Merges neighbouring bins of a strip until there are at most as many as columns.
+export function reduced(bins, columns) {
   if (bins.x.length <= columns) return bins;
   const step = Math.ceil(bins.x.length / columns), out = { x: [], low: [], high: [] };
   for (let i = 0; i < bins.x.length; i += step) {
@@ -138,24 +138,24 @@ export function joined(bins, columns) {
 }
 
 export class Strips {
-  // notes: with a list of {time, text}
+  // notes: has a list of {time, text}
   constructor(card, link, store, notes) {
     Object.assign(this, { card, link, store, notes, strips: [], paused: false });
     choice(card, store, 'source', [[MEASURED, 'raw'], [COMPENSATED, 'compensated'], [TWIN, 'twin']], () => this.draw());
-    const pause = make('button', { onclick: () => { this.paused = !this.paused; pause.textContent = this.paused ? 'Go on' : 'Pause'; this.draw(); } }, 'Pause');
+    const pause = make('button', { onclick: () => { this.paused = !this.paused; pause.textContent = this.paused ? 'Resume' : 'Pause'; this.draw(); } }, 'Pause');
     card.querySelector('h2').append(make('span', { class: 'choice row' }, pause));
     this.plots = AXES.map(axis => new Plot(card, { name: `strip_${axis}`, group: 'strips', x: { label: 'Time', text: clock, least: 1, hidden: axis !== 'z' }, y: { label: `F${axis} [N]` },
-      empty: 'No force yet: it comes with the first cut', read: (x, y) => [clock(x), `${digits(y)} N`] }));
+      empty: 'No force yet: it is shown from the first cut on', read: (x, y) => [clock(x), `${digits(y)} N`] }));
     for (const plot of this.plots) plot.frame.style.minHeight = '76px';
-    link.on('panel/strip', message => this.take(message));
+    link.on('panel/strip', message => this.addStrip(message));
     link.on('replay/state', message => {
       if (message.position < this.position) this.strips = [];
       this.position = message.position;
     });
   }
 
-  // Kept ones may come in any order.
-  take(strip) {
+  // Latched messages may arrive in any order.
+  addStrip(strip) {
     const begin = strip.header.stamp, last = this.strips.at(-1)?.header.stamp;
     this.strips.push(strip);
     if (begin < last) this.strips.sort((a, b) => a.header.stamp - b.header.stamp);
@@ -179,11 +179,11 @@ export class Strips {
 
   draw() {
     AXES.forEach((axis, k) => {
-      const bins = joined(this.bins(axis), Math.max(200, this.plots[k].frame.clientWidth));
+      const bins = reduced(this.bins(axis), Math.max(200, this.plots[k].frame.clientWidth));
       this.plots[k].set({ marks: this.notes.list.map(n => ({ x: n.time, label: k === 0 ? n.text : '', color: colour('warn') })),
         series: bins.x.length ? [{ kind: 'band', x: bins.x, y: bins.low, y2: bins.high, color: colour(axis), alpha: 0.85 }] : [] });
     });
   }
   refresh() { if (this.news && !this.paused) { this.news = false; this.draw(); } }
-  shown() { this.draw(); }
+  onShow() { this.draw(); }
 }

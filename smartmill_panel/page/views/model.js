@@ -1,21 +1,21 @@
-// Whether the model is true: the live gap, the last explanation, what is known of the material, how the nodes are.
+// Model fit (live gap), last explanation, cutting coefficients, state of the nodes.
 import { digits, fixed, make, table, withDeviation } from '../format.js';
 
-const OLD = 10;        // [s]
-const ASK_AGAIN = 5000;  // [ms] for a newer report
-const LEVELS = ['good', 'warn', 'bad', 'dim'], WORDS = ['fine', 'warning', 'error', 'silent'];
+const STALE_AGE = 10;        // [s]
+const REQUEST_PERIOD = 5000;  // [ms] for a newer report
+const LEVELS = ['good', 'warn', 'bad', 'dim'], WORDS = ['OK', 'warning', 'error', 'silent'];
 
 export class Discrepancy {
   constructor(card, link) {
     Object.assign(this, { card, link });
-    this.place = make('div', { id: 'gap', class: 'dim' }, 'No live gap: a monitor (monitor:=true) follows the cuts with a twin.');
+    this.place = make('div', { id: 'gap', class: 'dim' }, 'No live gap: start the monitor (monitor:=true), which compares the cuts with a twin.');
     card.append(this.place);
     link.on('discrepancy/state', message => { if (!this.message || message.header.stamp >= this.message.header.stamp) this.message = message; this.news = true; });
   }
   refresh() {
     const m = this.message;
     if (!m) return;
-    const old = !this.link.alive || this.link.age('discrepancy/state') > OLD;
+    const old = !this.link.alive || this.link.age('discrepancy/state') > STALE_AGE;
     this.place.classList.toggle('stale', old);
     if (!this.news) return;
     this.news = false;
@@ -26,25 +26,25 @@ export class Discrepancy {
       return [channel, fixed(m.gap[k], 2), bar];
     });
     this.place.replaceChildren(
-      make('p', { class: `sentence ${m.model_fits ? 'good' : 'bad'}` }, rows.length ? (m.model_fits ? 'The model fits.' : 'The model does not fit: something is missing in it.') : 'Not compared.'),
-      make('p', { class: 'dim' }, `${m.condition}: gap between twin and machine over the noise, 1 is the noise floor`), table(['Channel', 'Gap', ''], rows));
+      make('p', { class: `sentence ${m.model_fits ? 'good' : 'bad'}` }, rows.length ? (m.model_fits ? 'The model fits.' : 'The model does not fit: it lacks an effect.') : 'Not compared.'),
+      make('p', { class: 'dim' }, `${m.condition}: gap between twin and machine relative to the noise; 1 is the noise floor`), table(['Channel', 'Gap', ''], rows));
   }
 }
 
 export class Report {
   constructor(card, link) {
-    Object.assign(this, { link, asked: -Infinity });
+    Object.assign(this, { link, last_request: -Infinity });
     this.place = make('div', { id: 'report' });
     card.append(make('h2', { class: 'dim', style: 'font-size: 15px; margin: 18px 0 0' }, 'Last explanation'), this.place);
   }
   async refresh() {
-    if (performance.now() - this.asked < ASK_AGAIN || !this.link.alive) return;
-    this.asked = performance.now();
+    if (performance.now() - this.last_request < REQUEST_PERIOD || !this.link.alive) return;
+    this.last_request = performance.now();
     const answer = await fetch('api/report').catch(() => null);
     const found = await answer?.json().catch(() => null);
     const text = JSON.stringify(found);
-    if (!found || text === this.told) return;
-    this.told = text;
+    if (!found || text === this.shown_text) return;
+    this.shown_text = text;
     if (!found.report) { this.place.replaceChildren(make('p', { class: 'dim' }, found.message)); return; }
     this.show(found.report, found.folder);
   }
@@ -55,9 +55,9 @@ export class Report {
     this.place.replaceChildren(
       make('p', { class: 'sentence' }, report.sentence ?? report.verdict.replaceAll('_', ' ')),
       make('p', { class: 'dim' }, `${folder}: ${report.verdict.replaceAll('_', ' ')}`),
-      table(['Gap', 'in the fit', 'held out'], ['before', 'after'].map(k => [k, fixed(gap[k]?.fit, 2), fixed(gap[k]?.heldout, 2)])),
-      effects.length ? table(['Found', 'Size', 'Held-out gap less by', 'Instead'], effects) : '',
-      shares.length ? table(['Channel', 'explained'], shares.map(([c, s]) => [c, `${fixed(100 * s)} %`])) : '',
+      table(['Gap', 'Fit', 'Held out'], ['before', 'after'].map(k => [k, fixed(gap[k]?.fit, 2), fixed(gap[k]?.heldout, 2)])),
+      effects.length ? table(['Effect', 'Value', 'Reduction of the held-out gap', 'Alternatives'], effects) : '',
+      shares.length ? table(['Channel', 'Explained'], shares.map(([c, s]) => [c, `${fixed(100 * s)} %`])) : '',
       report.suggested_test ? make('p', {}, `Suggested test: ${report.suggested_test}`) : '');
   }
 }
@@ -67,13 +67,13 @@ export class Database {
     this.place = make('div', { class: 'dim' }, 'None identified yet');
     card.append(this.place);
     link.on('material/coefficients', m => this.show(m));
-    link.on('cut/condition', m => { if (!this.found && m.material) this.ask(m.tool, m.material); });
+    link.on('cut/condition', m => { if (!this.found && m.material) this.fetchStored(m.tool, m.material); });
   }
-  // What an earlier session found for this tool and material.
-  async ask(tool, material) {
+  // Coefficients of this tool and material from an earlier session.
+  async fetchStored(tool, material) {
     const pair = `${tool}/${material}`;
-    if (this.asked === pair) return;
-    this.asked = pair;
+    if (this.last_request === pair) return;
+    this.last_request = pair;
     const answer = await fetch(`api/coefficients?${new URLSearchParams({ tool, material })}`).catch(() => null);
     const found = await answer?.json().catch(() => null);
     if (found?.source && !this.found) this.show(found, 'from the database');

@@ -1,9 +1,9 @@
-// What an operator reads from two metres away.
+// Large values, legible from two metres.
 import { fixed, make, rpm } from '../format.js';
-import { OLD } from './status.js';
+import { STALE_AGE } from './status.js';
 
-const HISTORY = 60;  // windows of the chatter detection
-const CUT_OLD = 3.0;  // [s] of a verdict on a running cut
+const HISTORY = 60;  // [1] windows of the chatter detection
+const VERDICT_STALE_AGE = 3.0;  // [s] of a verdict on a running cut
 
 class Tile {
   constructor(parent, what, extra = '') {
@@ -16,8 +16,8 @@ class Tile {
   }
   set(value, more, stale, kind = '') {
     const text = JSON.stringify([value, more, stale, kind]);
-    if (text === this.told) return;
-    this.told = text;
+    if (text === this.drawn_text) return;
+    this.drawn_text = text;
     this.value.textContent = value;
     this.value.classList.toggle('stale', stale);
     this.more.textContent = more;
@@ -39,7 +39,7 @@ export class Tiles {
     const place = make('div', { class: 'tiles' });
     parent.append(place);
     this.lamp = new Tile(place, 'Cut', 'lamp');
-    this.history = make('div', { class: 'history', title: 'the last verdicts, the newest on the right' });
+    this.history = make('div', { class: 'history', title: 'last verdicts, newest on the right' });
     this.lamp.element.append(this.history, this.lamp.more);
     this.spindle = new Tile(place, 'Spindle [rpm]');
     this.spindleBar = bar();
@@ -49,20 +49,20 @@ export class Tiles {
     this.spindle.element.append(this.spindleBar, this.spindle.more);
     this.load.element.append(this.loadBar, this.load.more);
     this.feed.element.append(make('div', { style: 'height: 18px' }), this.feed.more);
-    this.places = new Tile(place, 'Position, to go [mm]', 'places');
+    this.places = new Tile(place, 'Position, distance to go [mm]', 'places');
     this.places.value.remove();
     this.axes = make('div', { class: 'axes' });
     this.places.element.append(this.axes);
     for (const topic of ['cnc/load', 'cut/condition', 'chatter/advice', 'stability/chart']) link.on(topic, () => {});
-    link.on('chatter/state', message => this.judged(message));
+    link.on('chatter/state', message => this.addVerdict(message));
     link.on('replay/state', message => {
       if (message.position < this.position) this.verdicts = [];
       this.position = message.position;
     });
   }
 
-  // Kept ones may come in any order.
-  judged(message) {
+  // Latched messages may arrive in any order.
+  addVerdict(message) {
     this.verdicts = this.verdicts.filter(v => v.header.stamp !== message.header.stamp);
     this.verdicts.push(message);
     this.verdicts.sort((a, b) => a.header.stamp - b.header.stamp);
@@ -71,14 +71,14 @@ export class Tiles {
 
   refresh() {
     const { link } = this, gone = !link.alive;
-    const stale = gone || link.age('cnc/state') > OLD, state = link.message('cnc/state');
+    const stale = gone || link.age('cnc/state') > STALE_AGE, state = link.message('cnc/state');
     const condition = link.message('cut/condition'), cutting = condition?.kind === 2;
     this.showLamp(gone, cutting);
     const most = link.message('stability/chart')?.spindle_speed.at(-1);
     this.spindle.set(state ? fixed(rpm(state.spindle_speed)) : '–',
       condition?.kind ? `commanded ${fixed(rpm(condition.spindle_speed))}` : most ? `up to ${fixed(rpm(most))}` : '', stale);
     this.spindle.setBar(this.spindleBar, stale ? 0 : state?.spindle_speed / most);
-    const load = link.message('cnc/load'), load_stale = gone || link.age('cnc/load') > OLD;
+    const load = link.message('cnc/load'), load_stale = gone || link.age('cnc/load') > STALE_AGE;
     this.load.set(load ? fixed(100 * load.spindle_load, 1) : '–',
       load ? load.axes.map((axis, k) => `${axis} ${fixed(100 * load.axis_load[k])} %`).join('   ') : '', load_stale,
       load?.spindle_load > 1 ? 'bad' : '');
@@ -90,7 +90,7 @@ export class Tiles {
 
   showLamp(gone, cutting) {
     const { link } = this, last = this.verdicts.at(-1), advice = link.message('chatter/advice');
-    const old = gone || (cutting && last?.valid && link.age('chatter/state') > CUT_OLD);
+    const old = gone || (cutting && last?.valid && link.age('chatter/state') > VERDICT_STALE_AGE);
     const name = link.message('cut/condition')?.name ?? '';
     if (!last || !last.valid || !cutting) {
       this.lamp.set(cutting ? 'Entering' : 'No cut', name, old, 'quiet');
@@ -99,20 +99,20 @@ export class Tiles {
       this.lamp.set('CHATTER', `${fixed(last.frequency)} Hz, ${fixed(last.severity)} N` +
         (speed ? `, try ${fixed(rpm(speed))} rpm` : ''), old, 'bad');
     } else {
-      this.lamp.set('Stable', `${fixed(100 * last.energy_ratio, 1)} % of the energy elsewhere`, old, 'good');
+      this.lamp.set('Stable', `${fixed(100 * last.energy_ratio, 1)} % of the energy off the harmonics`, old, 'good');
     }
-    const shown = this.verdicts.filter(v => v.valid).slice(-HISTORY);
-    const text = shown.map(v => v.chatter ? 'yes' : 'no').join();
+    const recent = this.verdicts.filter(v => v.valid).slice(-HISTORY);
+    const text = recent.map(v => v.chatter ? 'yes' : 'no').join();
     if (text === this.drawn) return;
     this.drawn = text;
-    this.history.replaceChildren(...shown.map(v => make('i', { class: v.chatter ? 'yes' : 'no' })));
+    this.history.replaceChildren(...recent.map(v => make('i', { class: v.chatter ? 'yes' : 'no' })));
   }
 
   showPlaces(state, stale) {
     const text = state ? state.axes.map((axis, k) => [axis, fixed(1e3 * state.position[k], 3), fixed(1e3 * state.distance_to_go[k], 3)]) : [];
-    const told = JSON.stringify([text, stale]);
-    if (told === this.placesTold) return;
-    this.placesTold = told;
+    const places_text = JSON.stringify([text, stale]);
+    if (places_text === this.drawn_places) return;
+    this.drawn_places = places_text;
     this.axes.classList.toggle('stale', stale);
     this.axes.replaceChildren(...text.flatMap(([axis, at, go]) => [make('span', { class: 'dim' }, axis.toUpperCase()), make('b', {}, at), make('span', { class: 'go' }, go)]));
   }

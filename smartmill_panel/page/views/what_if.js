@@ -1,63 +1,63 @@
-// Sliders that change the chart at once. Nothing is commanded.
+// Sliders of a modified cut, whose chart is computed at once. Commands no machine.
 import { deg, fixed, make } from '../format.js';
 import { toMm, toRpm } from './chart.js';
 
 const SLIDERS = [
   { key: 'depth', name: 'Axial depth', unit: 'mm', low: 0.1, high: 20, step: 0.1, digits: 1 },
   { key: 'width', name: 'Width of cut', unit: '% of ⌀', low: 2, high: 100, step: 1, digits: 0 },
-  { key: 'feed', name: 'Feed a tooth', unit: 'mm', low: 0.01, high: 0.4, step: 0.005, digits: 3 },
+  { key: 'feed', name: 'Feed per tooth', unit: 'mm', low: 0.01, high: 0.4, step: 0.005, digits: 3 },
   { key: 'teeth', name: 'Teeth', unit: '', low: 1, high: 12, step: 1, digits: 0 },
   { key: 'helix', name: 'Helix', unit: '°', low: 0, high: 60, step: 1, digits: 0 },
-  { key: 'overhang', name: 'Overhang, of the measured', unit: '%', low: 60, high: 160, step: 1, digits: 0 },
+  { key: 'overhang', name: 'Overhang ratio', unit: '%', low: 60, high: 160, step: 1, digits: 0 },
 ];
 
 export class WhatIf {
   constructor(card, link, chart) {
-    Object.assign(this, { chart, asked: false, busy: false, times: [] });
+    Object.assign(this, { chart, pending: false, busy: false, times: [] });
     this.base = { depth: 2, width: 100, feed: 0.1, teeth: 4, helix: 30, overhang: 100 };
     this.value = { ...this.base };
     this.changed = new Set();
     this.down = true;
     this.inputs = {};
-    this.answer = make('p', { class: 'dim', id: 'what-if-answer' }, 'Move a slider: the chart follows.');
+    this.answer = make('p', { class: 'dim', id: 'what-if-answer' }, 'Move a slider to change the chart.');
     card.append(this.answer);
     for (const s of SLIDERS) {
-      const shown = make('b');
+      const value_text = make('b');
       const input = make('input', { type: 'range', min: s.low, max: s.high, step: s.step, id: `what-if-${s.key}`, 'aria-label': s.name,
-        oninput: () => { this.value[s.key] = +input.value; this.changed.add(s.key); this.label(s); this.ask(); } });
-      this.inputs[s.key] = { input, shown };
-      card.append(make('label', {}, s.name, shown, input));
+        oninput: () => { this.value[s.key] = +input.value; this.changed.add(s.key); this.label(s); this.fetchChart(); } });
+      this.inputs[s.key] = { input, value_text };
+      card.append(make('label', {}, s.name, value_text, input));
     }
-    this.side = make('button', { 'aria-pressed': 'true', onclick: () => { this.down = !this.down; this.side.textContent = this.down ? 'Down-milling' : 'Up-milling'; this.changed.add('width'); this.ask(); } }, 'Down-milling');
-    card.append(make('div', { class: 'row' }, this.side, make('button', { onclick: () => this.reset() }, 'As it is')));
+    this.side = make('button', { 'aria-pressed': 'true', onclick: () => { this.down = !this.down; this.side.textContent = this.down ? 'Down-milling' : 'Up-milling'; this.changed.add('width'); this.fetchChart(); } }, 'Down-milling');
+    card.append(make('div', { class: 'row' }, this.side, make('button', { onclick: () => this.reset() }, 'Reset')));
     for (const s of SLIDERS) this.label(s);
     link.on('stability/chart', message => {
       this.base.feed = 1e3 * message.feed_per_tooth;
       this.base.depth = message.recommended.length ? 1e3 * message.recommended[0].axial_depth : this.base.depth;
       this.base.width = 50 * (Math.cos(message.entry_angle) - Math.cos(message.exit_angle));
-      this.take();
+      this.update();
     });
     link.on('cut/condition', message => {
-      if (message.teeth) { this.base.teeth = message.teeth; this.base.helix = deg(message.helix); this.take(); }
+      if (message.teeth) { this.base.teeth = message.teeth; this.base.helix = deg(message.helix); this.update(); }
     });
   }
 
-  // What nobody moved follows the machine.
-  take() {
+  // Sliders that were not moved follow the machine.
+  update() {
     for (const s of SLIDERS) if (!this.changed.has(s.key)) { this.value[s.key] = this.base[s.key]; this.label(s); }
   }
 
   label(s) {
-    const { input, shown } = this.inputs[s.key];
+    const { input, value_text } = this.inputs[s.key];
     input.value = this.value[s.key];
-    shown.textContent = `${fixed(this.value[s.key], s.digits)} ${s.unit}`;
+    value_text.textContent = `${fixed(this.value[s.key], s.digits)} ${s.unit}`;
   }
 
   reset() {
     this.changed.clear();
-    this.take();
+    this.update();
     this.chart.setWhatIf(null);
-    this.answer.textContent = 'Move a slider: the chart follows.';
+    this.answer.textContent = 'Move a slider to change the chart.';
   }
 
   query() {
@@ -74,9 +74,9 @@ export class WhatIf {
     return query;
   }
 
-  // One question at a time, then the newest.
-  async ask() {
-    if (this.busy) { this.asked = true; return; }
+  // One request at a time, then the newest.
+  async fetchChart() {
+    if (this.busy) { this.pending = true; return; }
     this.busy = true;
     const begin = performance.now();
     const answer = await fetch(`api/what_if?${this.query()}`).catch(() => null);
@@ -87,16 +87,16 @@ export class WhatIf {
     } else if (this.changed.size) {
       this.show(found, begin);
     }
-    if (this.asked) { this.asked = false; this.ask(); }
+    if (this.pending) { this.pending = false; this.fetchChart(); }
   }
 
   show(found, begin) {
     this.chart.setWhatIf({ speed: toRpm(found.spindle_speed), limit: toMm(found.depth_limit), mode: found.mode, modes: found.modes });
     requestAnimationFrame(() => requestAnimationFrame(() => this.times.push(performance.now() - begin)));
-    const held = new Map();
-    for (const mode of found.mode) held.set(mode, (held.get(mode) ?? 0) + 1);
-    const most = [...held].filter(([mode]) => mode >= 0).sort((a, b) => b[1] - a[1])[0];
+    const counts = new Map();
+    for (const mode of found.mode) counts.set(mode, (counts.get(mode) ?? 0) + 1);
+    const most = [...counts].filter(([mode]) => mode >= 0).sort((a, b) => b[1] - a[1])[0];
     this.answer.textContent = `${fixed(this.value.depth, 1)} mm is stable at ${fixed(100 * found.stable_share)} % of the speeds` +
-      (most ? `, ${found.modes[most[0]]} holds the limit at ${fixed(100 * most[1] / found.mode.length)} %` : '') + ` (${fixed(1e3 * found.seconds)} ms).`;
+      (most ? `, ${found.modes[most[0]]} limits the depth at ${fixed(100 * most[1] / found.mode.length)} %` : '') + ` (${fixed(1e3 * found.seconds)} ms).`;
   }
 }

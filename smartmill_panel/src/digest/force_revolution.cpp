@@ -16,11 +16,11 @@ constexpr float NO_FORCE = std::numeric_limits<float>::quiet_NaN();
 
 void AngleTrack::push(const SpindleAngle& reading) {
   if (!readings_.empty() && reading.stamp <= readings_.back().stamp) {
-    if (reading.stamp > readings_.back().stamp - KEPT) return;  // late or twice
+    if (reading.stamp > readings_.back().stamp - HISTORY) return;  // late or duplicate
     readings_.clear();
   }
   readings_.push_back(reading);
-  while (readings_.front().stamp < reading.stamp - KEPT) readings_.pop_front();
+  while (readings_.front().stamp < reading.stamp - HISTORY) readings_.pop_front();
 }
 
 std::optional<double> AngleTrack::at(double time) const {
@@ -32,12 +32,12 @@ std::optional<double> AngleTrack::at(double time) const {
   if (std::abs(since) > REACH) return {};
   double turned = near.speed * since;
   if (after != readings_.end() && after != readings_.begin() && after->stamp - near.stamp <= REACH) {
-    // The whole turns between two readings are those that the speed foretells.
+    // The number of revolutions between two readings follows from the speed.
     const double between = after->stamp - near.stamp;
-    const double foretold = 0.5 * (near.speed + after->speed) * between;
-    const double seen = after->angle - near.angle;
-    const double turns = std::round((foretold - seen) / units::TWO_PI);
-    turned = (seen + turns * units::TWO_PI) * since / between;
+    const double predicted = 0.5 * (near.speed + after->speed) * between;
+    const double measured = after->angle - near.angle;
+    const double turns = std::round((predicted - measured) / units::TWO_PI);
+    turned = (measured + turns * units::TWO_PI) * since / between;
   }
   return wrapped(near.angle + turned);
 }
@@ -45,10 +45,10 @@ std::optional<double> AngleTrack::at(double time) const {
 RevolutionMaker::RevolutionMaker(const RevolutionParameters& parameters)
     : bins_(static_cast<std::size_t>(parameters.bins)) {
   checkBounds(parameters);
-  forget();
+  reset();
 }
 
-void RevolutionMaker::forget() {
+void RevolutionMaker::reset() {
   turned_ = 0.0;
   sum_.assign(3 * bins_, 0.0);
   low_.assign(3 * bins_, NO_FORCE);
@@ -57,7 +57,7 @@ void RevolutionMaker::forget() {
 }
 
 void RevolutionMaker::push(const ForceBlock& block, const AngleTrack& angle) {
-  constexpr double LEAST_SPEED = 1.0;  // [rad/s] below it the spindle counts as standing
+  constexpr double LEAST_SPEED = 1.0;  // [rad/s] below it the spindle counts as stopped
   if (angle.speed() < LEAST_SPEED) return;
   speed_ = angle.speed();
   const std::size_t size = block.force[0].size();
@@ -93,7 +93,7 @@ std::optional<ForceRevolution> RevolutionMaker::take() {
   result.high = high_;
   for (std::size_t k = 0; k < sum_.size(); ++k)
     result.mean.push_back(count_[k] > 0 ? static_cast<float>(sum_[k] / count_[k]) : NO_FORCE);
-  forget();
+  reset();
   return result;
 }
 

@@ -21,7 +21,7 @@ SpectrumMaker::SpectrumMaker(const SpectrumParameters& parameters) : parameters_
 }
 
 void SpectrumMaker::push(const ForceBlock& block) {
-  if (block.first_index != expected_ || block.sample_rate != rate_) held_ = 0;
+  if (block.first_index != expected_ || block.sample_rate != rate_) available_ = 0;
   rate_ = block.sample_rate;
   const std::size_t size = block.force[0].size(), n = window_.size();
   expected_ = block.first_index + size;
@@ -31,22 +31,22 @@ void SpectrumMaker::push(const ForceBlock& block) {
       ring_[a][next_] = std::isnan(block.force[a][i]) ? 0.0 : block.force[a][i];
     next_ = (next_ + 1) % n;
   }
-  held_ = std::min(held_ + size, n);
+  available_ = std::min(available_ + size, n);
   stamp_ = block.stamp + static_cast<double>(size - 1) / rate_;
-  news_ = true;
+  has_new_samples_ = true;
 }
 
 std::optional<ForceSpectrum> SpectrumMaker::take() {
   const std::size_t n = window_.size();
-  if (!news_ || held_ < n) return {};
-  news_ = false;
+  if (!has_new_samples_ || available_ < n) return {};
+  has_new_samples_ = false;
   ForceSpectrum result;
   result.stamp = stamp_;
   result.resolution = rate_ / static_cast<double>(n);
   const double highest = std::min(parameters_.highest, 0.5 * rate_);
-  const auto shown = std::min(static_cast<std::size_t>(highest / result.resolution) + 1, n / 2 + 1);
+  const auto used = std::min(static_cast<std::size_t>(highest / result.resolution) + 1, n / 2 + 1);
   const auto lines = static_cast<std::size_t>(parameters_.lines);
-  const std::size_t joined = (shown + lines - 1) / lines;
+  const std::size_t joined = (used + lines - 1) / lines;
   result.step = static_cast<double>(joined) * result.resolution;
   std::vector<double> signal(n);
   for (std::size_t a = 0; a < 3; ++a) {
@@ -54,9 +54,9 @@ std::optional<ForceSpectrum> SpectrumMaker::take() {
     for (const double x : ring_[a]) mean += x / static_cast<double>(n);
     for (std::size_t i = 0; i < n; ++i) signal[i] = (ring_[a][(next_ + i) % n] - mean) * window_[i];
     const auto transformed = fourier(signal);
-    for (std::size_t k = 0; k < shown; k += joined) {
+    for (std::size_t k = 0; k < used; k += joined) {
       double largest = 0.0;
-      for (std::size_t j = k; j < std::min(k + joined, shown); ++j)
+      for (std::size_t j = k; j < std::min(k + joined, used); ++j)
         largest = std::max(largest, std::abs(transformed[j]));
       result.amplitude[a].push_back(static_cast<float>(largest));
     }

@@ -16,7 +16,7 @@ void StripMaker::open() {
   high_ = low_;
 }
 
-// Bins that no sample fell into are told as such, a long silence begins a new message.
+// Bins without samples are NaN; a long interval without samples starts a new message.
 void StripMaker::begin(std::int64_t bin) {
   const std::int64_t most = parameters_.bins;
   if (any_) {
@@ -42,7 +42,7 @@ void StripMaker::begin(std::int64_t bin) {
 void StripMaker::push(const ForceBlock& block) {
   const std::size_t size = block.force[0].size();
   for (std::size_t i = 0; i < size; ++i) {
-    // A sample on the edge belongs to the bin that it begins, rounding of the stamp or not.
+    // A sample on an edge belongs to the later bin despite rounding of the stamp.
     constexpr double EDGE = 1e-6;
     const double time = block.stamp + static_cast<double>(i) / block.sample_rate;
     const auto bin = static_cast<std::int64_t>(std::floor(time / parameters_.bin + EDGE));

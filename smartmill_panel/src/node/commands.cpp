@@ -24,7 +24,7 @@ using nlohmann::json;
 constexpr int BAD_REQUEST = 400, CONFLICT = 409;
 constexpr int HITS = 5;
 
-/// A word of what was asked, made fit for a line of the log; empty where there is none.
+/// String value of a key as one line for the log; empty if missing.
 std::string wordOf(const json& request, const char* key, std::size_t most = 200) {
   if (!request.is_object()) return {};
   const auto found = request.find(key);
@@ -45,13 +45,13 @@ void PanelLog::write(const std::string& who, const std::string& from, const std:
   ROS_INFO("panel: %s", line.data.c_str());
 }
 
-Answer takeNote(const Question& question, PanelLog& log) {
-  if (!question.post) return answerOf(BAD_REQUEST, "a note comes by POST");
-  const json note = json::parse(question.body, nullptr, false);
+ApiResponse takeNote(const ApiRequest& request, PanelLog& log) {
+  if (!request.post) return messageResponse(BAD_REQUEST, "a note requires POST");
+  const json note = json::parse(request.body, nullptr, false);
   const std::string who = wordOf(note, "who", 40), text = wordOf(note, "text");
-  if (text.empty()) return answerOf(BAD_REQUEST, "text: a note is due");
-  log.write(who.empty() ? "somebody" : who, question.from, "mark: " + text);
-  return answerOf(200, text);
+  if (text.empty()) return messageResponse(BAD_REQUEST, "text: expected a note");
+  log.write(who.empty() ? "anonymous" : who, request.from, "mark: " + text);
+  return messageResponse(200, text);
 }
 
 Commands::Commands(ros::NodeHandle nh, PanelLog& log)
@@ -65,12 +65,12 @@ Commands::Commands(ros::NodeHandle nh, PanelLog& log)
     cancels_[action] = nh_.advertise<actionlib_msgs::GoalID>(std::string(action) + "/cancel", 1);
 }
 
-Answer Commands::run(const Question& command) {
+ApiResponse Commands::run(const ApiRequest& command) {
   const json request = json::parse(command.body, nullptr, false);
-  if (!request.is_object()) return answerOf(BAD_REQUEST, "a JSON object is due");
+  if (!request.is_object()) return messageResponse(BAD_REQUEST, "expected a JSON object");
   const auto word = [&](const char* key) { return wordOf(request, key); };
   const std::string name = word("command"), who = wordOf(request, "who", 40);
-  if (who.empty()) return answerOf(BAD_REQUEST, "who: a name for the log is due");
+  if (who.empty()) return messageResponse(BAD_REQUEST, "who: expected a name for the log");
   std::string outcome;
   int status = 200;
   try {
@@ -87,26 +87,26 @@ Answer Commands::run(const Question& command) {
     else if (name == "identify")
       outcome = identify(word("tool"), word("material"));
     else
-      throw Error("'" + oneLine(name, 40) + "' is no command of the panel");
+      throw Error("'" + oneLine(name, 40) + "' is not a command of the panel");
   } catch (const Error& error) {
     outcome = error.what();
     status = CONFLICT;
   }
   log_.write(who, command.from, name + (status == 200 ? ": " : " REFUSED: ") + outcome);
-  return answerOf(status, outcome);
+  return messageResponse(status, outcome);
 }
 
-// An empty goal id cancels every goal of an action.
+// An empty goal id cancels all goals of an action.
 std::string Commands::cancel() {
   for (auto& [action, publisher] : cancels_) publisher.publish(actionlib_msgs::GoalID());
-  return "every running action is asked to end";
+  return "all running actions are cancelled";
 }
 
 std::string Commands::disarm() {
   smartmill_msgs::ArmMotion service;
   service.request.arm = false;
   if (!nh_.serviceClient<smartmill_msgs::ArmMotion>(names::ARM_MOTION).call(service))
-    throw Error("the controller's node does not answer");
+    throw Error("the node of the controller does not answer");
   if (service.response.code != service.response.OK) throw Error(service.response.message);
   return service.response.message;
 }
@@ -114,7 +114,7 @@ std::string Commands::disarm() {
 std::string Commands::hold() {
   smartmill_msgs::FeedHold service;
   if (!nh_.serviceClient<smartmill_msgs::FeedHold>(names::FEED_HOLD).call(service))
-    throw Error("the controller's node does not answer");
+    throw Error("the node of the controller does not answer");
   if (service.response.code != service.response.OK) throw Error(service.response.message);
   return service.response.message;
 }
@@ -129,8 +129,8 @@ std::string Commands::install(const std::string& file) {
 }
 
 std::string Commands::measure(const std::string& direction, const std::string& tool) {
-  if (direction != "x" && direction != "y") throw Error("direction: x or y is due");
-  if (measure_.getNumSubscribers() == 0) throw Error("the hammer's node is not there");
+  if (direction != "x" && direction != "y") throw Error("direction: expected x or y");
+  if (measure_.getNumSubscribers() == 0) throw Error("the hammer's node is not running");
   const auto state =
       ros::topic::waitForMessage<smartmill_msgs::CncState>(names::CNC_STATE, nh_, ros::Duration(2.0));
   if (!state || !state->connected || !state->armed) throw Error("motion is not armed");
@@ -143,11 +143,11 @@ std::string Commands::measure(const std::string& direction, const std::string& t
   goal.goal.direction = direction;
   goal.goal.hits = HITS;
   measure_.publish(goal);
-  return "asked for the tool's FRF in " + direction;
+  return "measurement of the tool's FRF in " + direction + " requested";
 }
 
 std::string Commands::identify(const std::string& tool, const std::string& material) {
-  if (identify_.getNumSubscribers() == 0) throw Error("the load meter's node is not there");
+  if (identify_.getNumSubscribers() == 0) throw Error("the load meter's node is not running");
   smartmill_msgs::IdentifyCoefficientsActionGoal goal;
   goal.header.stamp = goal.goal.header.stamp = ros::Time::now();
   goal.goal_id.id = "panel";
@@ -155,7 +155,7 @@ std::string Commands::identify(const std::string& tool, const std::string& mater
   goal.goal.tool = tool;
   goal.goal.material = material;
   identify_.publish(goal);
-  return "asked for the coefficients of " + material;
+  return "identification of the coefficients of " + material + " requested";
 }
 
 }  // namespace smartmill::panel

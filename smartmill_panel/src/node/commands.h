@@ -10,7 +10,7 @@
 
 namespace smartmill::panel {
 
-/// What people did and noted, on a topic.
+/// Publishes commands and notes of users on a topic.
 class PanelLog {
  public:
   explicit PanelLog(ros::NodeHandle nh);
@@ -21,18 +21,17 @@ class PanelLog {
   ros::Publisher publisher_;
 };
 
-/// A note of somebody who looks: it commands nothing and needs no token. @throws Error without a text
-Answer takeNote(const Question& question, PanelLog& log);
+/// Logs a note of a user; requires no token.
+ApiResponse takeNote(const ApiRequest& request, PanelLog& log);
 
-/// What the page may ask for where commands are allowed. Nothing here jogs or starts a spindle by itself:
-/// what moves the machine are the actions of the other nodes, and they refuse unless the operator has armed
-/// motion.
+/// Commands of the page, if they are allowed. None jogs or starts a spindle directly: the machine is moved
+/// only by actions of other nodes, which refuse unless the operator has armed motion.
 class Commands {
  public:
   Commands(ros::NodeHandle nh, PanelLog& log);
 
-  /// The gate has let it pass. Every one is logged with who and when.
-  Answer run(const Question& command);
+  /// Executes an authorised command and logs it with name and time.
+  ApiResponse run(const ApiRequest& command);
 
  private:
   std::string cancel();

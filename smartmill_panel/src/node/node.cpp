@@ -9,7 +9,7 @@
 #include <smartmill_msgs/ForceStrip.h>
 #include <nlohmann/json.hpp>
 
-#include "node/questions.h"
+#include "node/service_queries.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/names.h"
 #include "smartmill_ros/node_main.h"
@@ -22,13 +22,13 @@ namespace {
 constexpr double INPUT_TIMEOUT = 2.0;                        // [s]
 constexpr double DISCOVER_PERIOD = 0.5, CLOCK_PERIOD = 0.5;  // [s]
 
-constexpr const char* PLACE = "panel_at";  // parameter that tells where a panel is
+constexpr const char* ADDRESS_PARAMETER = "panel_at";  // parameter with the address of a panel
 
 using StripMessage = smartmill_msgs::ForceStrip;
 
 PanelParameters read(const ros::NodeHandle& private_nh) {
   PanelParameters parameters = parametersFromServer(private_nh).readAll<PanelParameters>();
-  if (parameters.page.empty()) throw Error("page: the folder of the page is due");
+  if (parameters.page.empty()) throw Error("page: empty, expected the folder of the page");
   return parameters;
 }
 
@@ -70,10 +70,10 @@ PanelNode::PanelNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
       log_(nh),
       server_(optionsOf(parameters_),
               {[this](std::uint32_t channel, bool wanted) {
-                 discovery_.post([this, channel, wanted] { bridge_.want(channel, wanted); });
+                 discovery_.post([this, channel, wanted] { bridge_.setWanted(channel, wanted); });
                },
-               [this](Question question, const Server::Respond& respond) {
-                 answer(std::move(question), respond);
+               [this](ApiRequest request, const Server::Respond& respond) {
+                 answer(std::move(request), respond);
                }}),
       bridge_(nh, server_) {
   if (gate_.open()) commands_ = std::make_unique<Commands>(nh, log_);
@@ -81,13 +81,13 @@ PanelNode::PanelNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   shell_.every(DISCOVER_PERIOD, [this] {
     if (!discovery_.busy()) discovery_.post([this] { bridge_.discover(); });
   });
-  shell_.every(CLOCK_PERIOD, [this] { server_.tell(ros::WallTime::now().toNSec()); });
+  shell_.every(CLOCK_PERIOD, [this] { server_.sendTime(ros::WallTime::now().toNSec()); });
   shell_.every(parameters_.digest_period, [this] {
     for (Digests& digests : digests_) publish(digests);
   });
   shell_.diagnose("panel", [this](auto& status) { diagnose(status); });
   const std::string host = parameters_.address == "0.0.0.0" ? "localhost" : parameters_.address;
-  nh.setParam(PLACE, "http://" + host + ":" + std::to_string(server_.port()) + "/");
+  nh.setParam(ADDRESS_PARAMETER, "http://" + host + ":" + std::to_string(server_.port()) + "/");
   std::printf("panel: look at http://%s:%d/%s\n", host.c_str(), server_.port(),
               gate_.open() ? " (commands are allowed, with the token)" : "");
   std::fflush(stdout);
@@ -105,7 +105,7 @@ void PanelNode::listen() {
   shell_.inputs().on<smartmill_msgs::CuttingCondition>(
       names::CUTTING_CONDITION, [this](const smartmill_msgs::CuttingCondition& message, double) {
         if (message.name != condition_)
-          for (Digests& digests : digests_) digests.revolution->forget();
+          for (Digests& digests : digests_) digests.revolution->reset();
         condition_ = message.name;
         if (message.kind != smartmill_msgs::CuttingCondition::CUT) steady_ = false;
         teeth_ = message.teeth;
@@ -174,47 +174,47 @@ void PanelNode::publish(Digests& digests) {
 }
 
 // In the server's thread.
-void PanelNode::answer(Question question, const Server::Respond& respond) {
+void PanelNode::answer(ApiRequest request, const Server::Respond& respond) {
   constexpr int BUSY = 503, BAD_REQUEST = 400;
-  const bool taken = worker_.post([this, question = std::move(question), respond] {
+  const bool taken = worker_.post([this, request = std::move(request), respond] {
     try {
-      respond(answerNow(question));
+      respond(answerNow(request));
     } catch (const Error& error) {
-      respond(answerOf(BAD_REQUEST, error.what()));
+      respond(messageResponse(BAD_REQUEST, error.what()));
     }
   });
-  if (!taken) respond(answerOf(BUSY, "too many questions at once"));
+  if (!taken) respond(messageResponse(BUSY, "too many requests at once"));
 }
 
-Answer PanelNode::answerNow(const Question& question) {
+ApiResponse PanelNode::answerNow(const ApiRequest& request) {
   constexpr int NOT_FOUND = 404;
-  if (question.path == "config") return {200, config()};
-  if (question.path == "what_if") return askWhatIf(nh_, question);
-  if (question.path == "coefficients") return askCoefficients(nh_, question);
-  if (question.path == "report") return newestReport(parameters_.reports);
-  if (question.path == "note") return takeNote(question, log_);
-  if (question.path == "replay") return controlReplay(nh_, question);
-  if (question.path == "command") {
-    if (const auto refusal = gate_.refusal(question)) {
-      ROS_WARN("panel: command from %s refused", question.from.c_str());
+  if (request.path == "config") return {200, config()};
+  if (request.path == "what_if") return queryWhatIf(nh_, request);
+  if (request.path == "coefficients") return queryCoefficients(nh_, request);
+  if (request.path == "report") return newestReport(parameters_.reports);
+  if (request.path == "note") return takeNote(request, log_);
+  if (request.path == "replay") return controlReplay(nh_, request);
+  if (request.path == "command") {
+    if (const auto refusal = gate_.refusal(request)) {
+      ROS_WARN("panel: command from %s refused", request.from.c_str());
       return *refusal;
     }
-    return commands_->run(question);
+    return commands_->run(request);
   }
-  return answerOf(NOT_FOUND, "nobody answers this");
+  return messageResponse(NOT_FOUND, "unknown request");
 }
 
 std::string PanelNode::config() const {
-  // Panels of other machines with the same master: each tells its place as it starts.
+  // Panels of other machines with the same master; each sets its address at its start.
   nlohmann::json panels = nlohmann::json::object();
   std::vector<std::string> keys;
   ros::param::getParamNames(keys);
-  const std::string ending = std::string("/") + PLACE;
+  const std::string ending = std::string("/") + ADDRESS_PARAMETER;
   for (const std::string& key : keys) {
-    std::string place;
+    std::string address;
     if (key.size() > ending.size() && key.compare(key.size() - ending.size(), ending.size(), ending) == 0 &&
-        ros::param::get(key, place))
-      panels[key.substr(0, key.size() - ending.size())] = place;
+        ros::param::get(key, address))
+      panels[key.substr(0, key.size() - ending.size())] = address;
   }
   return nlohmann::json({{"name", parameters_.name},
                          {"namespace", nh_.getNamespace()},

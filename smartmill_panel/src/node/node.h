@@ -17,19 +17,19 @@
 
 namespace smartmill::panel {
 
-/// Shell around server and digests: topics to the page, digests of the forces out as topics, questions of the
-/// page to the nodes that know.
+/// ROS shell of server and digests: forwards topics to the page, publishes digests of the forces, forwards
+/// requests of the page to other nodes.
 class PanelNode {
  public:
   using Parameters = PanelParameters;
-  /// @throws Error on a wrong parameter or a port that is taken.
+  /// @throws Error on an invalid parameter or a port in use.
   PanelNode(ros::NodeHandle nh, ros::NodeHandle private_nh);
   ~PanelNode();
   PanelNode(const PanelNode&) = delete;
   PanelNode& operator=(const PanelNode&) = delete;
 
  private:
-  /// Digests of one source of force (ForceStrip.MEASURED, ...).
+  /// Digests of one force source (ForceStrip.MEASURED, ...).
   struct Digests {
     std::uint8_t source = 0;
     std::unique_ptr<StripMaker> strip;
@@ -39,8 +39,8 @@ class PanelNode {
   void listen();
   void listen(const char* topic, std::size_t source);
   void publish(Digests& digests);
-  void answer(Question question, const Server::Respond& respond);
-  Answer answerNow(const Question& question);
+  void answer(ApiRequest request, const Server::Respond& respond);
+  ApiResponse answerNow(const ApiRequest& request);
   std::string config() const;
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
@@ -56,7 +56,7 @@ class PanelNode {
   ros::Publisher strip_, revolution_, spectrum_;
   PanelLog log_;
   std::unique_ptr<Commands> commands_;
-  Worker worker_, discovery_;  // the latter waits for the master, should that be away
+  Worker worker_, discovery_;  // discovery_ blocks while the master is unreachable
   Server server_;
   TopicBridge bridge_;
 };

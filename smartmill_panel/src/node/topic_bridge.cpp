@@ -33,18 +33,18 @@
 namespace smartmill::panel {
 namespace {
 
-constexpr std::uint32_t QUEUE = 1000;  // messages of a topic that wait for this node
-/// Of topics whose course a page draws: so many messages are kept.
+constexpr std::uint32_t QUEUE = 1000;  // [messages] of a topic
+/// Number of latched messages of topics that the page draws over time.
 constexpr std::uint64_t STRIPS_KEPT = 1200, STATES_KEPT = 600, LINES_KEPT = 200;
 
-/// Types of which the definition is known before the first message.
+/// Message types whose definition is available before the first message.
 template <class... Messages>
 std::map<std::string, std::string> definitionsOf() {
   return {{ros::message_traits::DataType<Messages>::value(),
            ros::message_traits::Definition<Messages>::value()}...};
 }
 
-const std::map<std::string, std::string>& known() {
+const std::map<std::string, std::string>& knownDefinitions() {
   using namespace smartmill_msgs;
   static const auto definitions =
       definitionsOf<ChatterAdvice, ChatterState, CncState, CuttingCoefficients, CuttingCondition,
@@ -59,13 +59,13 @@ bool is(const std::string& type) {
   return type == ros::message_traits::DataType<Message>::value();
 }
 
-bool stream(const std::string& type) {
+bool isStream(const std::string& type) {
   return is<smartmill_msgs::SampleBlock>(type) || is<smartmill_msgs::ForceBlock>(type) ||
          is<smartmill_msgs::SpindleAngle>(type);
 }
 
-/// Of a machine in another namespace what its status line needs.
-bool tellsStatus(const std::string& topic) {
+/// Whether a topic of a machine in another namespace is part of its status line.
+bool isStatusTopic(const std::string& topic) {
   for (const char* name : {names::CNC_STATE, names::CHATTER_STATE, names::CUTTING_CONDITION}) {
     const std::string ending = std::string("/") + name;
     if (topic.size() > ending.size() &&
@@ -75,7 +75,7 @@ bool tellsStatus(const std::string& topic) {
   return false;
 }
 
-std::string ring(std::uint64_t count, std::uint64_t most) {
+std::string ringKey(std::uint64_t count, std::uint64_t most) {
   return formatted("%06lu", static_cast<unsigned long>(count % most));
 }
 
@@ -88,9 +88,9 @@ void TopicBridge::discover() {
   ros::master::V_TopicInfo topics;
   if (!ros::master::getTopics(topics)) return;
   static const std::set<std::string> OTHERS{"/diagnostics", "/tf", "/tf_static"};
-  const std::string room = nh_.getNamespace() + "/";
+  const std::string prefix = nh_.getNamespace() + "/";
   for (const ros::master::TopicInfo& topic : topics)
-    if (topic.name.rfind(room, 0) == 0 || OTHERS.count(topic.name) || tellsStatus(topic.name))
+    if (topic.name.rfind(prefix, 0) == 0 || OTHERS.count(topic.name) || isStatusTopic(topic.name))
       add(topic.name, topic.datatype);
 }
 
@@ -100,26 +100,25 @@ void TopicBridge::add(const std::string& name, const std::string& type) {
   Topic& topic = topics_[name];
   topic.id = static_cast<std::uint32_t>(topics_.size());
   topic.type = type;
-  const auto definition = known().find(type);
-  topic.advertised = definition != known().end();
-  // Before the topic is subscribed: a latched message that came at once would have no channel yet, and be
-  // lost.
+  const auto definition = knownDefinitions().find(type);
+  topic.advertised = definition != knownDefinitions().end();
+  // Before the subscription: the channel must exist when a latched message arrives at once.
   if (topic.advertised) server_.advertise({topic.id, name, type, definition->second});
-  // Of an unknown type a stream cannot be told from the rest before the first message.
-  if (!stream(type)) topic.subscriber = subscribe(name);
+  // A stream of an unknown type is not recognised before its first message.
+  if (!isStream(type)) topic.subscriber = subscribe(name);
 }
 
-void TopicBridge::want(std::uint32_t channel, bool wanted) {
+void TopicBridge::setWanted(std::uint32_t channel, bool wanted) {
   const std::lock_guard<std::mutex> lock(mutex_);
   for (auto& [name, topic] : topics_) {
-    if (topic.id != channel || !stream(topic.type)) continue;
+    if (topic.id != channel || !isStream(topic.type)) continue;
     topic.subscriber = wanted ? subscribe(name) : ros::Subscriber();
   }
 }
 
 ros::Subscriber TopicBridge::subscribe(const std::string& name) {
   const boost::function<void(const topic_tools::ShapeShifter&)> callback =
-      [this, name](const topic_tools::ShapeShifter& message) { hand(name, message); };
+      [this, name](const topic_tools::ShapeShifter& message) { forward(name, message); };
   return nh_.subscribe<topic_tools::ShapeShifter>(name, QUEUE, callback, ros::VoidConstPtr(),
                                                   ros::TransportHints().tcpNoDelay());
 }
@@ -134,7 +133,7 @@ std::string TopicBridge::keyOf(const Topic& topic, const topic_tools::ShapeShift
     const auto modes = message.instantiate<smartmill_msgs::ModalModel>();
     return modes->point + modes->direction;
   }
-  // Of each source the newest, and the newest of a steady cut.
+  // The newest of each source, and the newest of a steady cut.
   const auto digest = [](const auto& found) {
     return std::to_string(found->source) + (found->steady ? " steady" : "");
   };
@@ -142,19 +141,19 @@ std::string TopicBridge::keyOf(const Topic& topic, const topic_tools::ShapeShift
     return digest(message.instantiate<smartmill_msgs::ForceRevolution>());
   if (is<smartmill_msgs::ForceSpectrum>(type))
     return digest(message.instantiate<smartmill_msgs::ForceSpectrum>());
-  if (is<smartmill_msgs::ForceStrip>(type)) return ring(topic.count, STRIPS_KEPT);
+  if (is<smartmill_msgs::ForceStrip>(type)) return ringKey(topic.count, STRIPS_KEPT);
   if (is<smartmill_msgs::ChatterState>(type) || is<smartmill_msgs::DiscrepancyState>(type))
-    return ring(topic.count, STATES_KEPT);
-  // Goals, hits taken and refused, results; the lines of the log.
+    return ringKey(topic.count, STATES_KEPT);
+  // Goals, accepted and rejected hits, results; log lines.
   if (type.rfind("smartmill_msgs/MeasureFrfAction", 0) == 0 || is<std_msgs::String>(type))
-    return ring(topic.count, LINES_KEPT);
+    return ringKey(topic.count, LINES_KEPT);
   return {};
 }
 
-void TopicBridge::hand(const std::string& name, const topic_tools::ShapeShifter& message) {
+void TopicBridge::forward(const std::string& name, const topic_tools::ShapeShifter& message) {
   std::optional<Channel> news;
   std::uint32_t id = 0;
-  bool kept = false;
+  bool latched = false;
   std::string key;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -165,15 +164,15 @@ void TopicBridge::hand(const std::string& name, const topic_tools::ShapeShifter&
       news = Channel{topic.id, name, topic.type, message.getMessageDefinition()};
     }
     id = topic.id;
-    kept = !stream(topic.type);
-    if (kept) key = keyOf(topic, message);
+    latched = !isStream(topic.type);
+    if (latched) key = keyOf(topic, message);
     ++topic.count;
   }
   if (news) server_.advertise(*news);
   std::string data(message.size(), '\0');
   ros::serialization::OStream out(reinterpret_cast<std::uint8_t*>(data.data()), message.size());
   message.write(out);
-  server_.publish(id, ros::WallTime::now().toNSec(), std::move(data), kept, key);
+  server_.publish(id, ros::WallTime::now().toNSec(), std::move(data), latched, key);
 }
 
 }  // namespace smartmill::panel

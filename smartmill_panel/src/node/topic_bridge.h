@@ -13,17 +13,17 @@
 
 namespace smartmill::panel {
 
-/// Topics as they are, handed to the server: bytes untouched. Streams are subscribed to only while somebody
-/// looks at them; of all else the last messages are kept, so that a page that comes later, or after the nodes
-/// have gone, shows them at once.
+/// Forwards topics to the server with unmodified bytes. Streams are subscribed to only while a client uses
+/// them; of all other topics the last messages are latched, so that a page opened later, or after the nodes
+/// have ended, shows them at once.
 class TopicBridge {
  public:
   TopicBridge(ros::NodeHandle nh, Server& server);
 
-  /// Looks for new topics; from time to time.
+  /// Searches for new topics; to be called periodically.
   void discover();
-  /// As Server::Handlers::wanted; from one thread.
-  void want(std::uint32_t channel, bool wanted);
+  /// Subscribes to a stream or ends it, as Server::Handlers::wanted; called from one thread.
+  void setWanted(std::uint32_t channel, bool wanted);
 
  private:
   struct Topic {
@@ -35,7 +35,7 @@ class TopicBridge {
   };
   void add(const std::string& name, const std::string& type);
   ros::Subscriber subscribe(const std::string& name);
-  void hand(const std::string& name, const topic_tools::ShapeShifter& message);
+  void forward(const std::string& name, const topic_tools::ShapeShifter& message);
   static std::string keyOf(const Topic& topic, const topic_tools::ShapeShifter& message);
 
   ros::NodeHandle nh_;

@@ -13,41 +13,41 @@ void Worker::stop() {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     end_ = true;
-    works_.clear();
+    tasks_.clear();
   }
-  news_.notify_one();
+  wake_.notify_one();
   if (thread_.joinable()) thread_.join();
 }
 
-bool Worker::post(std::function<void()> work) {
+bool Worker::post(std::function<void()> task) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (end_ || works_.size() >= MOST) return false;
-    works_.push_back(std::move(work));
+    if (end_ || tasks_.size() >= MAX_QUEUED) return false;
+    tasks_.push_back(std::move(task));
   }
-  news_.notify_one();
+  wake_.notify_one();
   return true;
 }
 
 bool Worker::busy() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  return runs_ || !works_.empty();
+  return running_ || !tasks_.empty();
 }
 
 void Worker::run() {
   for (;;) {
-    std::function<void()> work;
+    std::function<void()> task;
     {
       std::unique_lock<std::mutex> lock(mutex_);
-      runs_ = false;
-      news_.wait(lock, [this] { return end_ || !works_.empty(); });
+      running_ = false;
+      wake_.wait(lock, [this] { return end_ || !tasks_.empty(); });
       if (end_) return;
-      work = std::move(works_.front());
-      works_.pop_front();
-      runs_ = true;
+      task = std::move(tasks_.front());
+      tasks_.pop_front();
+      running_ = true;
     }
     try {
-      work();
+      task();
     } catch (const std::exception& error) {
       ROS_ERROR("panel: %s", error.what());
     }

@@ -8,7 +8,7 @@
 
 namespace smartmill::panel {
 
-/// A thread for what takes its time: services of other nodes, the master.
+/// A thread for blocking calls: services of other nodes, the master.
 class Worker {
  public:
   Worker();
@@ -16,20 +16,20 @@ class Worker {
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
-  static constexpr std::size_t MOST = 256;
-  /// @return false: too much waits already, or it has ended
-  bool post(std::function<void()> work);
-  bool busy();  ///< something runs or waits
-  /// What runs is waited for, what waits is forgotten.
+  static constexpr std::size_t MAX_QUEUED = 256;
+  /// @return false if the queue is full or the worker has ended
+  bool post(std::function<void()> task);
+  bool busy();  ///< a task runs or is queued
+  /// Waits for the running task and discards queued ones.
   void stop();
 
  private:
   void run();
 
   std::mutex mutex_;
-  std::condition_variable news_;
-  std::deque<std::function<void()>> works_;
-  bool end_ = false, runs_ = false;
+  std::condition_variable wake_;
+  std::deque<std::function<void()>> tasks_;
+  bool end_ = false, running_ = false;
   std::thread thread_;
 };
 

@@ -10,9 +10,9 @@ namespace websocket = beast::websocket;
 using nlohmann::json;
 
 constexpr const char* PROTOCOLS[] = {"foxglove.sdk.v1", "foxglove.websocket.v1"};
-constexpr std::size_t LONGEST_REQUEST = 64u << 10;  // [bytes] of a client's message
-constexpr std::uint8_t MESSAGE = 1, TIME = 2;       // binary frames of the protocol
-constexpr int WARNING = 1, FAULT = 2;               // levels of its status
+constexpr std::size_t LONGEST_REQUEST = 64u << 10;  // [bytes] of a message of a client
+constexpr std::uint8_t MESSAGE = 1, TIME = 2;       // opcodes of binary frames
+constexpr int WARNING = 1, FAULT = 2;               // levels of a status
 
 std::string littleEndian(std::uint64_t value, int count) {
   std::string out;
@@ -25,7 +25,7 @@ json advertised(const Channel& c) {
           {"schemaName", c.type}, {"schema", c.definition}, {"schemaEncoding", "ros1msg"}};
 }
 
-/// The first of our protocols that a client offers, empty: none.
+/// First supported protocol among those that a client offers; empty: none.
 std::string chosenOf(const std::string& offered) {
   for (const char* protocol : PROTOCOLS)
     for (const auto& word : http::token_list(offered))
@@ -49,11 +49,11 @@ void Hub::advertise(const Channel& channel) {
   for (const auto& client : clients_) client->text(news);
 }
 
-void Hub::publish(std::uint32_t id, std::uint64_t stamp, const Bytes& data, bool kept,
+void Hub::publish(std::uint32_t id, std::uint64_t stamp, const Bytes& data, bool latched,
                   const std::string& key) {
   const auto entry = channels_.find(id);
   if (entry == channels_.end()) return;
-  if (kept) entry->second.kept[key] = {stamp, data};
+  if (latched) entry->second.latched[key] = {stamp, data};
   if (entry->second.listeners == 0) return;
   for (const auto& client : clients_) {
     const auto found = client->subscriptions.find(id);
@@ -61,7 +61,7 @@ void Hub::publish(std::uint32_t id, std::uint64_t stamp, const Bytes& data, bool
   }
 }
 
-void Hub::tell(std::uint64_t now) {
+void Hub::sendTime(std::uint64_t now) {
   for (const auto& client : clients_) client->clock(now);
 }
 
@@ -83,7 +83,7 @@ bool Hub::subscribe(Client& client, std::uint32_t id, std::uint32_t subscription
   if (entry == channels_.end()) return false;
   const bool again = client.subscriptions.count(id) > 0;
   client.subscriptions[id] = subscription;
-  for (const auto& [key, message] : entry->second.kept)
+  for (const auto& [key, message] : entry->second.latched)
     client.message(subscription, message.stamp, message.data);
   if (!again && entry->second.listeners++ == 0) handlers.wanted(id, true);
   return true;
@@ -106,7 +106,7 @@ void Client::start(const http::request<http::string_body>& request) {
   const std::string chosen = chosenOf(std::string(offered));
   if (chosen.empty()) {
     ++hub_.refused;
-    return;  // closes
+    return;  // closes the connection
   }
   stream_.set_option(websocket::stream_base::timeout::suggested(beast::role_type::server));
   stream_.set_option(websocket::stream_base::decorator([chosen](websocket::response_type& response) {
@@ -126,7 +126,7 @@ void Client::open() {
     ++hub_.refused;
     return;
   }
-  // Without clientPublish, parameters and services among the capabilities a client can only look.
+  // Clients are read-only: no clientPublish, parameters or services among the capabilities.
   text({{"op", "serverInfo"},
         {"name", hub_.options.name},
         {"capabilities", json::array({"time"})},
@@ -154,12 +154,13 @@ void Client::send(Frame frame) {
   if (waiting_ + frame.size() > hub_.options.queue) {
     ++hub_.dropped;
     if (!frame.binary) {
-      close();  // its picture of the channels would be wrong
-    } else if (!told_) {
-      told_ = true;
-      // In the room that is kept for it: the queue is full.
-      const json line = {
-          {"op", "status"}, {"level", WARNING}, {"message", "messages are dropped: you read too slowly"}};
+      close();  // its list of channels would be wrong
+    } else if (!drop_reported_) {
+      drop_reported_ = true;
+      // Exceeds the full queue by this one message.
+      const json line = {{"op", "status"},
+                         {"level", WARNING},
+                         {"message", "messages are dropped: the client reads too slowly"}};
       queue_.push_back({false, {}, std::make_shared<std::string>(line.dump())});
       waiting_ += queue_.back().size();
     }
@@ -184,7 +185,7 @@ void Client::write() {
     self->waiting_ -= self->queue_.front().size();
     self->queue_.pop_front();
     if (self->queue_.empty()) {
-      self->told_ = false;
+      self->drop_reported_ = false;
     } else {
       self->write();
     }
@@ -198,7 +199,7 @@ void Client::close() {
   end();
 }
 
-// Not at once: the hub may be going through its clients.
+// Deferred, since the hub may be iterating over its clients.
 void Client::end() {
   closing_ = true;
   asio::post(stream_.get_executor(), [self = shared_from_this()] { self->hub_.leave(self); });

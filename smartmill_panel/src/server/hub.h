@@ -20,20 +20,21 @@ using Bytes = std::shared_ptr<const std::string>;
 
 class Client;
 
-/// Channels and who listens to them. In the server's thread only, but for the counts.
+/// Channels and their subscribers. Used in the server's thread only, except for the counters.
 class Hub {
  public:
   Hub(ServerOptions server_options, Server::Handlers server_handlers)
       : options(std::move(server_options)), handlers(std::move(server_handlers)) {}
 
   void advertise(const Channel& channel);
-  void publish(std::uint32_t id, std::uint64_t stamp, const Bytes& data, bool kept, const std::string& key);
-  void tell(std::uint64_t now);
+  void publish(std::uint32_t id, std::uint64_t stamp, const Bytes& data, bool latched,
+               const std::string& key);
+  void sendTime(std::uint64_t now);
 
-  /// @return false: there are too many
+  /// @return false if there are too many
   bool enter(const std::shared_ptr<Client>& client);
   void leave(const std::shared_ptr<Client>& client);
-  /// @return false: no such channel
+  /// @return false if the channel does not exist
   bool subscribe(Client& client, std::uint32_t id, std::uint32_t subscription);
   void unsubscribe(std::uint32_t id);
   nlohmann::json advertisement() const;
@@ -51,14 +52,15 @@ class Hub {
   };
   struct Entry {
     Channel channel;
-    std::map<std::string, Message> kept;
+    std::map<std::string, Message> latched;
     std::size_t listeners = 0;
   };
   std::map<std::uint32_t, Entry> channels_;
   std::set<std::shared_ptr<Client>> clients_;
 };
 
-/// One WebSocket. What waits for it is bounded: a client that stops reading loses messages, the others none.
+/// One WebSocket client. Its queue is bounded: a client that stops reading loses messages, other clients lose
+/// none.
 class Client : public std::enable_shared_from_this<Client> {
  public:
   Client(boost::asio::ip::tcp::socket socket, Hub& hub) : stream_(std::move(socket)), hub_(hub) {}
@@ -92,8 +94,8 @@ class Client : public std::enable_shared_from_this<Client> {
   Hub& hub_;
   boost::beast::flat_buffer buffer_;
   std::deque<Frame> queue_;
-  std::size_t waiting_ = 0;  // [bytes]
-  bool told_ = false;        // that messages are dropped, since the queue was empty last
+  std::size_t waiting_ = 0;     // [bytes]
+  bool drop_reported_ = false;  // since the queue was last empty
   bool closing_ = false;
 };
 

@@ -4,7 +4,7 @@
 
 namespace smartmill::panel {
 
-/// Of a file that a page consists of; empty: of no such file.
+/// Media type of a file of the page; empty: not served.
 inline std::string mediaTypeOf(const std::string& path) {
   const std::string end = path.substr(path.rfind('.') + 1);
   if (end == "html") return "text/html; charset=utf-8";

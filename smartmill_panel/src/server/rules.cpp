@@ -1,4 +1,4 @@
-// What may be asked, by whom.
+// Access rules: permitted origins, hosts and files.
 #include <algorithm>
 #include <cctype>
 #include <cstdlib>
@@ -14,7 +14,7 @@ bool contains(const std::vector<std::string>& list, const std::string& word) {
   return std::find(list.begin(), list.end(), word) != list.end();
 }
 
-// Without the port; [::1]:8090 keeps its brackets.
+// Host name without the port; the brackets of [::1]:8090 stay.
 std::string nameOf(const std::string& host) {
   const auto colon = host.rfind(':');
   const auto bracket = host.rfind(']');
@@ -51,8 +51,8 @@ std::string decoded(const std::string& text) {
 
 bool originAllowed(const std::string& origin, const std::string& host, const ServerOptions& options) {
   const std::string name = nameOf(host);
-  const bool ours = name == "localhost" || plainAddress(name) || contains(options.names, name);
-  if (!ours) return false;
+  const bool permitted = name == "localhost" || plainAddress(name) || contains(options.names, name);
+  if (!permitted) return false;
   return origin.empty() || origin == "http://" + host || contains(options.origins, origin);
 }
 

@@ -20,19 +20,19 @@ namespace http = beast::http;
 using Tcp = asio::ip::tcp;
 
 constexpr std::size_t LONGEST_BODY = 16u << 10, LONGEST_HEAD = 8u << 10;  // [bytes] of a request
-constexpr std::chrono::seconds PATIENCE(30);                              // with a slow or silent browser
+constexpr std::chrono::seconds PATIENCE(30);  // timeout of a slow or silent browser
 constexpr const char* API = "/api/";
 
-/// One connection of a browser until it becomes a WebSocket.
-class Visitor : public std::enable_shared_from_this<Visitor> {
+/// One HTTP connection; an upgrade hands its socket to a WebSocket client.
+class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
  public:
-  Visitor(Tcp::socket socket, Hub& hub, std::size_t& open)
+  HttpConnection(Tcp::socket socket, Hub& hub, std::size_t& open)
       : stream_(std::move(socket)), hub_(hub), open_(open) {
     ++open_;
   }
-  ~Visitor() { --open_; }
-  Visitor(const Visitor&) = delete;
-  Visitor& operator=(const Visitor&) = delete;
+  ~HttpConnection() { --open_; }
+  HttpConnection(const HttpConnection&) = delete;
+  HttpConnection& operator=(const HttpConnection&) = delete;
 
   void read() {
     parser_.emplace();
@@ -72,18 +72,18 @@ class Visitor : public std::enable_shared_from_this<Visitor> {
   void ask(const std::string& target) {
     const bool post = request_.method() == http::verb::post;
     if (!post && request_.method() != http::verb::get) return refuse(http::status::method_not_allowed);
-    Question question;
+    ApiRequest request;
     const std::size_t begin = std::string(API).size();
-    question.path = target.substr(begin, target.find_first_of("?#") - begin);
-    question.query = queryOf(target);
-    question.post = post;
-    question.body = request_.body();
-    question.token = std::string(request_["X-SmartMill-Token"]);
+    request.path = target.substr(begin, target.find_first_of("?#") - begin);
+    request.query = queryOf(target);
+    request.post = post;
+    request.body = request_.body();
+    request.token = std::string(request_["X-SmartMill-Token"]);
     beast::error_code failed;
     const auto from = stream_.socket().remote_endpoint(failed);
-    question.from = failed ? "unknown" : from.address().to_string();
+    request.from = failed ? "unknown" : from.address().to_string();
     stream_.expires_after(PATIENCE);
-    hub_.handlers.ask(std::move(question), [self = shared_from_this()](Answer answer) {
+    hub_.handlers.request(std::move(request), [self = shared_from_this()](ApiResponse answer) {
       asio::post(self->stream_.get_executor(), [self, answer = std::move(answer)]() mutable {
         self->respond(static_cast<http::status>(answer.status), "application/json", std::move(answer.body));
       });
@@ -142,17 +142,17 @@ class Server::Impl {
   Impl(ServerOptions options, Handlers handlers)
       : hub_(std::move(options), std::move(handlers)), acceptor_(io_) {
     if (!std::filesystem::is_directory(hub_.options.folder))
-      throw Error(hub_.options.folder + ": no folder of a page");
-    const std::string place = hub_.options.address + ":" + std::to_string(hub_.options.port);
+      throw Error(hub_.options.folder + ": expected the folder of the page");
+    const std::string name = hub_.options.address + ":" + std::to_string(hub_.options.port);
     beast::error_code failed;
     const auto address = asio::ip::make_address(hub_.options.address, failed);
-    if (failed) throw Error(hub_.options.address + ": no address");
+    if (failed) throw Error(hub_.options.address + ": expected an IP address");
     const Tcp::endpoint endpoint(address, static_cast<unsigned short>(hub_.options.port));
     acceptor_.open(endpoint.protocol(), failed);
     if (!failed) acceptor_.set_option(asio::socket_base::reuse_address(true), failed);
     if (!failed) acceptor_.bind(endpoint, failed);
     if (!failed) acceptor_.listen(asio::socket_base::max_listen_connections, failed);
-    if (failed) throw Error(place + ": cannot be listened at: " + failed.message());
+    if (failed) throw Error(name + ": cannot listen: " + failed.message());
     port_ = acceptor_.local_endpoint().port();
     accept();
     thread_ = std::thread([this] { io_.run(); });
@@ -183,16 +183,16 @@ class Server::Impl {
   void accept() {
     acceptor_.async_accept([this](beast::error_code failed, Tcp::socket socket) {
       if (!acceptor_.is_open()) return;
-      // Two connections for each client: who only opens them is turned away.
-      if (!failed && visitors_ < 2 * hub_.options.most_clients)
-        std::make_shared<Visitor>(std::move(socket), hub_, visitors_)->read();
+      // At most two connections per client; further ones are closed.
+      if (!failed && connections_ < 2 * hub_.options.most_clients)
+        std::make_shared<HttpConnection>(std::move(socket), hub_, connections_)->read();
       accept();
     });
   }
 
   Hub hub_;
-  std::size_t visitors_ = 0;
-  asio::io_context io_{1};  // its handlers hold clients and visitors, which know the hub
+  std::size_t connections_ = 0;
+  asio::io_context io_{1};  // its handlers own clients and connections, which refer to the hub
   Tcp::acceptor acceptor_;
   int port_ = 0;
   std::thread thread_;
@@ -212,16 +212,16 @@ void Server::advertise(const Channel& channel) {
   impl_->post([impl = impl_.get(), channel] { impl->hub().advertise(channel); });
 }
 
-void Server::publish(std::uint32_t channel, std::uint64_t stamp, std::string data, bool kept,
+void Server::publish(std::uint32_t channel, std::uint64_t stamp, std::string data, bool latched,
                      const std::string& key) {
   const Bytes bytes = std::make_shared<const std::string>(std::move(data));
-  impl_->post([impl = impl_.get(), channel, stamp, bytes, kept, key] {
-    impl->hub().publish(channel, stamp, bytes, kept, key);
+  impl_->post([impl = impl_.get(), channel, stamp, bytes, latched, key] {
+    impl->hub().publish(channel, stamp, bytes, latched, key);
   });
 }
 
-void Server::tell(std::uint64_t now) {
-  impl_->post([impl = impl_.get(), now] { impl->hub().tell(now); });
+void Server::sendTime(std::uint64_t now) {
+  impl_->post([impl = impl_.get(), now] { impl->hub().sendTime(now); });
 }
 
 ServerStatistics Server::statistics() const {

@@ -14,7 +14,7 @@ namespace {
 constexpr double RATE = 25600.0;
 constexpr std::size_t BLOCK = 256;
 
-// Blocks of f(time), begun at a whole second.
+// Passes blocks of force(time, axis) from the time begin to use.
 template <class Force, class Use>
 void feed(double begin, std::size_t blocks, const Force& force, const Use& use) {
   for (std::size_t b = 0; b < blocks; ++b) {
@@ -30,7 +30,7 @@ void feed(double begin, std::size_t blocks, const Force& force, const Use& use) 
   }
 }
 
-TEST(ForceStrip, HoldsTheOnlyPeak) {
+TEST(ForceStrip, ContainsASinglePeak) {
   // One sample of 1000 N in two seconds: every nth sample would miss it, a mean would flatten it.
   std::vector<ForceStrip> strips;
   StripMaker maker({}, [&](const ForceStrip& strip) { strips.push_back(strip); });
@@ -64,7 +64,7 @@ TEST(ForceStrip, HoldsTheOnlyPeak) {
   EXPECT_GT(when + 0.005, 1000.0 + at - 1.0 / RATE);
 }
 
-TEST(ForceStrip, ShowsTheEnvelopeOfASine) {
+TEST(ForceStrip, IsTheEnvelopeOfASine) {
   // A bin of 5 ms holds 4.65 periods of 930 Hz: both extremes, to the nearest sample's phase.
   const double amplitude = 120.0, frequency = 930.0;
   const double nearest = std::cos(units::PI * frequency / RATE);
@@ -82,7 +82,7 @@ TEST(ForceStrip, ShowsTheEnvelopeOfASine) {
   EXPECT_GE(bins, 180u);
 }
 
-TEST(ForceStrip, TellsOfSilenceAndOfTimeThatGoesBack) {
+TEST(ForceStrip, HandlesMissingSamplesAndABackwardJumpOfTime) {
   std::vector<ForceStrip> strips;
   StripMaker maker({}, [&](const ForceStrip& strip) { strips.push_back(strip); });
   const auto push = [&](double stamp, double value) {
@@ -93,7 +93,7 @@ TEST(ForceStrip, TellsOfSilenceAndOfTimeThatGoesBack) {
     maker.push(block);
   };
   push(100.0, 1.0);
-  push(100.02, NOT_A_NUMBER);  // three bins of silence, one of no valid sample
+  push(100.02, NOT_A_NUMBER);  // three bins without samples, one without a valid sample
   push(50.0, 2.0);
   maker.flush();
   ASSERT_EQ(strips.size(), 2u);
@@ -104,8 +104,8 @@ TEST(ForceStrip, TellsOfSilenceAndOfTimeThatGoesBack) {
   EXPECT_EQ(strips[1].high[0], 2.0f);
 }
 
-TEST(AngleTrack, GoesThroughReadingsThatAreSeveralTurnsApart) {
-  // 1234.5 rad/s read every 20 ms: 3.9 turns between two readings.
+TEST(AngleTrack, InterpolatesReadingsSeveralRevolutionsApart) {
+  // 1234.5 rad/s read every 20 ms: 3.9 revolutions between two readings.
   AngleTrack track;
   const double speed = 1234.5, begin = 1.8e9;
   const auto truth = [&](double t) { return std::fmod(0.3 + speed * t, units::TWO_PI); };
@@ -120,8 +120,8 @@ TEST(AngleTrack, GoesThroughReadingsThatAreSeveralTurnsApart) {
   EXPECT_FALSE(AngleTrack().at(0.0));
 }
 
-TEST(ForceRevolution, FindsForceOverTheAngle) {
-  // fx = 50 + 80 cos(4 phi) comes again every revolution, fy alternates from one to the next.
+TEST(ForceRevolution, IsTheForceOverTheAngle) {
+  // fx = 50 + 80 cos(4 phi) is synchronous with the spindle, fy alternates between revolutions.
   const double speed = units::radPerSecFromRpm(4500.0), begin = 500.0;
   AngleTrack track;
   for (int k = 0; k <= 100; ++k)
@@ -154,8 +154,8 @@ TEST(ForceRevolution, FindsForceOverTheAngle) {
   EXPECT_FALSE(maker.take());
 }
 
-TEST(ForceSpectrum, ShowsAmplitudesAtTheirFrequencies) {
-  // Lines lie 3.125 Hz apart: 300 and 1200 Hz stand on lines, 931.25 as well.
+TEST(ForceSpectrum, HasAmplitudesAtTheirFrequencies) {
+  // The line spacing is 3.125 Hz: 300 and 931.25 Hz are on lines.
   SpectrumMaker maker({});
   feed(
       10.0, 40,
@@ -173,11 +173,11 @@ TEST(ForceSpectrum, ShowsAmplitudesAtTheirFrequencies) {
   EXPECT_NEAR(found->amplitude[1][line(300.0)], 100.0, 0.01);
   EXPECT_NEAR(found->amplitude[0][line(931.25)], 7.0, 0.01);
   EXPECT_LT(found->amplitude[1][line(931.25)], 0.01);
-  EXPECT_LT(found->amplitude[2][0], 0.01);  // the mean is no line
+  EXPECT_LT(found->amplitude[2][0], 0.01);  // the mean is removed
   EXPECT_FALSE(maker.take());               // nothing new
 }
 
-TEST(ForceSpectrum, LosesNoPeakBetweenJoinedLines) {
+TEST(ForceSpectrum, ReductionOfLinesLosesNoPeak) {
   SpectrumParameters coarse;
   coarse.lines = 40;
   SpectrumMaker maker(coarse);
@@ -187,16 +187,16 @@ TEST(ForceSpectrum, LosesNoPeakBetweenJoinedLines) {
   const auto found = maker.take();
   ASSERT_TRUE(found);
   EXPECT_LE(found->amplitude[0].size(), 40u);
-  // Between two lines Hann's window shows at least 84.9 %.
+  // Between two lines the amplitude with a Hann window is at least 84.9 %.
   EXPECT_GT(found->amplitude[0][static_cast<std::size_t>(1234.0 / found->step)], 0.849 * 30.0);
 }
 
-TEST(ForceSpectrum, BeginsAnewAfterLostSamples) {
+TEST(ForceSpectrum, RestartsAfterLostSamples) {
   SpectrumMaker maker({});
   const auto sine = [](double t, std::size_t) { return std::sin(t); };
   feed(10.0, 31, sine, [&](const ForceBlock& block) { maker.push(block); });
   EXPECT_FALSE(maker.take());
-  feed(10.0, 31, sine, [&](const ForceBlock& block) { maker.push(block); });  // the index begins again
+  feed(10.0, 31, sine, [&](const ForceBlock& block) { maker.push(block); });  // the index starts again
   EXPECT_FALSE(maker.take());
 }
 

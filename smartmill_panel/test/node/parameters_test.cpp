@@ -8,7 +8,7 @@
 namespace smartmill::panel {
 namespace {
 
-TEST(Parameters, TheShippedFileIsTheTable) {
+TEST(Parameters, ShippedFileMatchesTheTable) {
   std::ifstream in(LAUNCH_CONFIG_FOLDER "/panel.yaml");
   std::stringstream shipped;
   shipped << in.rdbuf();

@@ -1,4 +1,4 @@
-"""A browser for tests: Debian's chromium and chromedriver, Python's standard library, nothing else."""
+"""A browser for tests: Debian's chromium and chromedriver with Python's standard library only."""
 import base64
 import json
 import shutil
@@ -12,7 +12,7 @@ import urllib.request
 FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
          "--disable-component-update", "--disable-sync", "--disable-dev-shm-usage", "--hide-scrollbars"]
 ELEMENT = "element-6066-11e4-a52e-4f735466cecf"
-PATIENCE = 60.0  # [s] for what a busy computer takes its time for
+PATIENCE = 60.0  # [s] for a busy computer
 
 
 def free_port():
@@ -52,7 +52,7 @@ class Browser:
     def __exit__(self, *_):
         try:
             self.call("DELETE", "")
-        except Exception:  # it may be gone already
+        except Exception:  # the session may have ended
             pass
         self.driver.terminate()
         self.driver.wait()
@@ -80,7 +80,7 @@ class Browser:
             if value:
                 return value
             if time.time() > end:
-                raise AssertionError("never true: " + code)
+                raise AssertionError("timeout: " + code)
             time.sleep(0.05)
 
     def click(self, css):
@@ -91,7 +91,7 @@ class Browser:
         return self.js("document.querySelector(arguments[0])?.textContent", css)
 
     def resize(self, width, height):
-        """The page's own size, whatever the window has around it."""
+        """Sets the size of the page, independent of the window."""
         emulated = {"cmd": "Emulation.setDeviceMetricsOverride",
                     "params": {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600}}
         self.call("POST", "/goog/cdp/execute", emulated)

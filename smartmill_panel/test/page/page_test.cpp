@@ -1,4 +1,4 @@
-// The page in a real browser (page_test.py, once for all cases); its screenshots stay in SCREENSHOTS.
+// The page in a real browser (page_test.py, run once for all cases); screenshots are stored in SCREENSHOTS.
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -19,7 +19,7 @@ std::string contentOf(const std::string& file) {
   return text.str();
 }
 
-/// What page_test.py opens as report.html.
+/// Writes report.html, which page_test.py opens.
 void makeReport(const std::string& folder) {
   // A chessboard of 48 x 24 pixels.
   static const char PICTURE[] =
@@ -37,8 +37,8 @@ void makeReport(const std::string& folder) {
   page.write(folder + "/report.html");
 }
 
-// One look: the colours of reports are those of the page.
-TEST(Look, ReportsHaveThePagesColours) {
+// Reports use the colours of the page.
+TEST(Style, ReportsHaveTheColoursOfThePage) {
   const std::string style = contentOf(PAGE "/style.css"), report = smartmill::ReportPage("t").text();
   int colours = 0;
   for (std::size_t at = report.find("--"); at != std::string::npos; at = report.find("--", at + 2)) {
@@ -64,23 +64,23 @@ class PageTest : public ::testing::Test {
             .c_str());
     results_ = nlohmann::json::parse(contentOf(out + "/results.json"), nullptr, false);
     if (code != 0 || !results_.is_object())
-      told_ = contentOf(out + "/script.txt") + contentOf(out + "/log.txt");
+      failure_ = contentOf(out + "/script.txt") + contentOf(out + "/log.txt");
   }
   static void check(const std::string& name) {
     if (!browser_) GTEST_SKIP() << "chromium and chromium-driver are not installed";
-    ASSERT_TRUE(told_.empty()) << told_;
+    ASSERT_TRUE(failure_.empty()) << failure_;
     ASSERT_TRUE(results_.contains(name)) << results_.dump();
     EXPECT_EQ(results_[name].get<std::string>(), "");
   }
 
   static bool browser_;
   static nlohmann::json results_;
-  static std::string told_;
+  static std::string failure_;
 };
 
 bool PageTest::browser_ = false;
 nlohmann::json PageTest::results_;
-std::string PageTest::told_;
+std::string PageTest::failure_;
 
 TEST_F(PageTest, ValuesAreTheTopics) {
   check("ValuesAreTheTopics");
@@ -94,8 +94,8 @@ TEST_F(PageTest, ForceAndSpectrumAreThoseOfTheMachine) {
 TEST_F(PageTest, EveryViewIsDrawn) {
   check("EveryViewIsDrawn");
 }
-TEST_F(PageTest, TheFleetIsTold) {
-  check("TheFleetIsTold");
+TEST_F(PageTest, TheFleetIsShown) {
+  check("TheFleetIsShown");
 }
 TEST_F(PageTest, SilenceTurnsValuesGrey) {
   check("SilenceTurnsValuesGrey");
@@ -109,8 +109,8 @@ TEST_F(PageTest, ThePageCommandsAfterAnUnlock) {
 TEST_F(PageTest, ANoteIsKeptInTheLogForEveryPage) {
   check("ANoteIsKeptInTheLogForEveryPage");
 }
-TEST_F(PageTest, HitsTakenAndRefusedAreTold) {
-  check("HitsTakenAndRefusedAreTold");
+TEST_F(PageTest, AcceptedAndRejectedHitsAreShown) {
+  check("AcceptedAndRejectedHitsAreShown");
 }
 TEST_F(PageTest, EveryPlotIsSavedAsPictureAndNumbers) {
   check("EveryPlotIsSavedAsPictureAndNumbers");
@@ -127,8 +127,8 @@ TEST_F(PageTest, ReportsSortAndZoomWithoutAServer) {
 TEST_F(PageTest, NoErrorOnTheConsole) {
   check("NoErrorOnTheConsole");
 }
-TEST_F(PageTest, ADeadNodeIsToldAndOneThatIsBackShows) {
-  check("ADeadNodeIsToldAndOneThatIsBackShows");
+TEST_F(PageTest, ALostNodeIsReportedAndARestartedOneIsShown) {
+  check("ALostNodeIsReportedAndARestartedOneIsShown");
 }
 
 }  // namespace

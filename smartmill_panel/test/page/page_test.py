@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""The page in a real browser, before a panel node and topics of a machine made here, so that each value is known.
-usage: page_test.py NODE PAGE OUT: writes OUT/results.json, {case: what failed or ""}, and a screenshot of each size."""
+"""Tests the page in a real browser with a panel node and the topics of a simulated machine, so that each value is known.
+usage: page_test.py NODE PAGE OUT: writes OUT/results.json, {case: failure or ""}, and screenshots in each size."""
 import json
 import math
 import os
@@ -19,11 +19,11 @@ NODE, PAGE, OUT = sys.argv[1:4]
 TOKEN = "a token that is long enough"
 SIZES = {"1280x800": (1280, 800), "1920x1080": (1920, 1080), "phone": (390, 844)}
 VIEWS = ["overview", "forces", "stability", "dynamics", "session", "model", "fleet"]
-GONE = 2.0  # [s] within which the page must say that the node is gone
+LOSS_TIMEOUT = 2.0  # [s] in which the page must report a lost node
 
 
 class Machine:
-    """Topics of a machine that stands in a cut, ten times a second."""
+    """Topics of a machine in a cut, ten times a second."""
 
     def __init__(self):
         import rospy
@@ -34,7 +34,7 @@ class Machine:
         self.last = {}
         self.others = []  # (publisher, state) of other machines
         self.once()
-        for topic, kind in (("goal", msg.MeasureFrfActionGoal), ("feedback", msg.MeasureFrfActionFeedback)):  # as an action's ends do
+        for topic, kind in (("goal", msg.MeasureFrfActionGoal), ("feedback", msg.MeasureFrfActionFeedback)):  # as an action's client and server
             name = "hammer/measure_frf/" + topic
             self.publishers[name] = rospy.Publisher("/smartmill/" + name, kind, queue_size=10)
         self.thread = threading.Thread(target=self.run, daemon=True)
@@ -76,7 +76,7 @@ class Machine:
         self.fleet()
 
     def fleet(self, reached=True, message="2 new of 2 sent to postgresql://mill_07@shop/fleet"):
-        """A shop of twelve machines: mill 3 shows 24 % more, mill 7 is this one, mill 9 never pushed."""
+        """A fleet of twelve machines: Ktc of mill 3 is 24 % larger, mill 7 is this one, mill 9 has never pushed."""
         m, nan = self.msg, math.nan
         pairs = [m.FleetPair(tool="end_mill", material="al7050", records=220, own=14, ktc=796.4e6, ktc_std=9.1e6),
                  m.FleetPair(tool="end_mill_16", material="1045 steel", records=85, own=0, ktc=1893e6, ktc_std=61e6)]
@@ -162,19 +162,19 @@ class Bench:
             self.failed[name] = ""
         except Exception:
             self.failed[name] = traceback.format_exc()
-            print(name, self.failed[name], flush=True)  # the rest may be cut short
+            print(name, self.failed[name], flush=True)  # before the other cases, in case of a timeout
 
 
-def equal(found, due):
-    assert found == due, f"{found!r} instead of {due!r}"
+def equal(found, expected):
+    assert found == expected, f"{found!r}, expected {expected!r}"
 
 
-def becomes(read, due):
-    """A busy computer takes its time."""
+def becomes(read, expected):
+    """Waits for a value."""
     end = time.time() + PATIENCE
-    while read() != due and time.time() < end:
+    while read() != expected and time.time() < end:
         time.sleep(0.05)
-    equal(read(), due)
+    equal(read(), expected)
 
 
 def tile(browser, what):
@@ -223,7 +223,7 @@ def compare(page, sent, where):
         assert abs(page - sent.to_sec()) < 1e-6, where
     elif hasattr(sent, "__slots__"):
         for name in sent.__slots__:
-            if name != "seq":  # counted by the publisher as it sends
+            if name != "seq":  # set by the publisher
                 compare(page[name], getattr(sent, name), where + "." + name)
     elif isinstance(sent, (list, tuple)):
         equal(len(page), len(sent))
@@ -232,7 +232,7 @@ def compare(page, sent, where):
     elif isinstance(sent, float) and not math.isfinite(sent):
         equal(page, {"nan": "NaN", "inf": "Infinity", "-inf": "-Infinity"}[str(sent)])
     else:
-        assert page == sent, f"{where}: {page!r} instead of {sent!r}"
+        assert page == sent, f"{where}: {page!r}, expected {sent!r}"
 
 
 def every_view_is_drawn(browser):
@@ -255,7 +255,7 @@ def every_view_is_drawn(browser):
 
 
 def force_and_spectrum_are_those_of_the_machine(browser):
-    # 300 Hz of 40 N about 100 N: a line on the spectrum, the least and largest of every strip.
+    # 40 N at 300 Hz about a mean of 100 N: a line of the spectrum, minimum and maximum of every strip.
     line = browser.wait("(m => m && [m.fx[Math.floor(300 / m.step)], m.resolution])(window.smartmill.link.message('panel/spectrum'))")
     assert abs(line[0] - 40.0) < 0.5, line
     strip = browser.js("(m => [Math.min(...m.low.filter((v, i) => i % 3 == 0 && v == v)), Math.max(...m.high.filter((v, i) => i % 3 == 0 && v == v))])"
@@ -263,13 +263,13 @@ def force_and_spectrum_are_those_of_the_machine(browser):
     assert abs(strip[0] - 60.0) < 0.5 and abs(strip[1] - 140.0) < 0.5, strip
 
 
-def the_fleet_is_told(browser, machine):
+def the_fleet_is_shown(browser, machine):
     browser.js("(location.hash = 'fleet', 1)")
     browser.wait("document.querySelectorAll('#fleet-machines tbody tr').length == 12")
     rows = browser.js("[...document.querySelectorAll('#fleet-machines tbody tr')].map(r => [...r.children].map(e => e.textContent))")
-    equal(rows[0][0], "mill 3")  # the odd one first
+    equal(rows[0][0], "mill 3")  # outliers first
     equal(rows[0][4], "21.5 ± 0.9 %")
-    equal(rows[0][6], "odd, 98.1 %: the same in all cuts: a wrong load-meter constant")
+    equal(rows[0][6], "outlier, 98.1 %: the same in all cuts: a wrong load-meter constant")
     equal([r[0] for r in rows[1:4]], ["mill 1", "mill 2", "mill 4"])
     by_name = {r[0]: r for r in rows}
     equal(by_name["mill 5"][2:4], ["17", "25"])
@@ -278,18 +278,18 @@ def the_fleet_is_told(browser, machine):
     assert by_name["mill 2"][1].endswith(" min ago"), by_name["mill 2"]
     assert "mill 7 this one" in by_name, list(by_name)
     equal(browser.js("[...document.querySelectorAll('#fleet-pairs tbody td')].map(e => e.textContent)"),
-          ["end_mill", "al7050", "220", "796 ± 9", "14 own", "end_mill_16", "1045 steel", "85", "1893 ± 61", "none of its own"])
+          ["end_mill", "al7050", "220", "796 ± 9", "14 own", "end_mill_16", "1045 steel", "85", "1893 ± 61", "no own records"])
     equal(browser.js("[...document.querySelectorAll('#fleet-knows tbody tr:nth-child(7) td')].map(e => e.textContent)"), ["mill 7", "18", "·"])
-    said = browser.text("#fleet-server")
-    for words in ("The server answers: 2 new of 2 sent", "odd: mill 3", "2.1 % between machines"):
-        assert words in said, said
+    text = browser.text("#fleet-server")
+    for words in ("The server answers: 2 new of 2 sent", "outliers: mill 3", "2.1 % between machines"):
+        assert words in text, text
     browser.picture(OUT + "/fleet.png")
     why = 'postgresql://mill_07@shop/fleet: connection to server at "shop", port 5432 failed: FATAL: password authentication failed for user "mill_07"'
     machine.fleet(False, why)
     browser.wait("document.querySelector('#fleet-server .word.bad')")
-    equal(browser.text("#fleet-server .word.bad"), "The server did not take the last push: " + why)
-    assert "3 of this machine's records wait here" in browser.text("#fleet-server")
-    assert "what was known before" in browser.text("#fleet-server")
+    equal(browser.text("#fleet-server .word.bad"), "The last push failed: " + why)
+    assert "3 of this machine's records are not sent yet" in browser.text("#fleet-server")
+    assert "the values below are older" in browser.text("#fleet-server")
     browser.resize(*SIZES["phone"])
     browser.picture(OUT + "/fleet_away_phone.png")
     wide = browser.js("document.documentElement.scrollWidth")
@@ -308,19 +308,19 @@ def silence_turns_values_grey(browser, machine):
     browser.wait("document.querySelector('#status').textContent.includes('Connected')")
 
 
-def a_dead_node_is_told_and_one_that_is_back_shows(browser, bench):
+def a_lost_node_is_reported_and_a_restarted_one_is_shown(browser, bench):
     browser.js("(location.hash = 'overview', 1)")
     bench.node.kill()
     bench.node.wait()
     begin = time.time()
     browser.wait("document.querySelector('#status').textContent.includes('Panel does not answer')")
-    said = time.time() - begin
-    assert said < GONE, f"{said:.1f} s"
+    seconds = time.time() - begin
+    assert seconds < LOSS_TIMEOUT, f"{seconds:.1f} s"
     browser.wait("[...document.querySelectorAll('.tile .value')].every(e => e.classList.contains('stale'))")
     bench.start_node()
     browser.wait("document.querySelector('#status').textContent.includes('Connected')")
     browser.wait("!document.querySelector('.tile .value.stale')")
-    browser.errors()  # that nobody answered is known
+    browser.errors()  # discards the expected connection errors
 
 
 def status_of(address, body=None, **headers):
@@ -356,9 +356,9 @@ def the_page_commands_after_an_unlock(browser):
     browser.click("[data-command=disarm]")
     browser.wait("document.querySelector('#command-answer').textContent.includes('does not answer')")
     browser.wait("window.smartmill.link.message('panel/log')?.data.includes('a tester')")
-    said = browser.js("window.smartmill.link.message('panel/log').data")
-    assert "disarm REFUSED" in said, said
-    browser.js("(window.smartmill.parts.find(p => p.unlocked).until = 0, 1)")  # a minute later
+    text = browser.js("window.smartmill.link.message('panel/log').data")
+    assert "disarm REFUSED" in text, text
+    browser.js("(window.smartmill.parts.find(p => p.unlocked).until = 0, 1)")  # as after a minute
     browser.wait("!document.querySelector('[data-command=disarm]').checkVisibility()")
 
 
@@ -372,7 +372,7 @@ def a_note_is_kept_in_the_log_for_every_page(browser, bench):
     browser.wait("window.smartmill?.parts.find(p => p.strips)?.plots[0].marks.some(m => m.label.includes('whistles'))")
 
 
-def hits_taken_and_refused_are_told(browser, machine):
+def accepted_and_rejected_hits_are_shown(browser, machine):
     m, now = machine.msg, machine.rospy.Time.now
     for topic in ("goal", "feedback"):
         becomes(lambda: machine.publishers["hammer/measure_frf/" + topic].get_num_connections(), 1)
@@ -387,9 +387,9 @@ def hits_taken_and_refused_are_told(browser, machine):
         time.sleep(0.05)
     browser.js("(location.hash = 'dynamics', 1)")
     becomes(lambda: browser.js("[...document.querySelectorAll('#hits .word')].map(e => e.textContent)"),
-            ["hit 2 refused: a second blow after 1.3 ms"])
+            ["hit 2 rejected: a second blow after 1.3 ms"])
     equal(browser.js("document.querySelectorAll('#hits i').length"), 2)
-    becomes(lambda: "Hits tool x: 2 taken, 1 refused" in browser.text("#hits"), True)
+    becomes(lambda: "Hits tool x: 2 accepted, 1 rejected" in browser.text("#hits"), True)
 
 
 def every_plot_is_saved_as_picture_and_numbers(browser):
@@ -404,7 +404,7 @@ def every_plot_is_saved_as_picture_and_numbers(browser):
     found = browser.js("window.saved")
     equal(len([f for f in found if f[0] == "image/png" and f[1] > 1000]), plots)
     equal(len([f for f in found if f[0] == "text/csv" and f[1] > 200]), plots)
-    # The chart's numbers are the topic's.
+    # The exported numbers are those of the topic.
     line = browser.js("window.smartmill.parts.find(p => p.plot?.options.name == 'stability_stability').plot.csv().split('\\n').find(l => l.startsWith('chatter limit'))")
     speed, depth = (float(x) for x in line.split(",")[1:3])
     assert abs(speed - 200.0 * 30 / math.pi) < 1e-6 and abs(depth - 2.0) < 1e-9, line
@@ -423,7 +423,7 @@ def the_layout_is_kept(browser, bench):
 
 
 def machines_of_other_namespaces_have_their_status_lines(browser, bench, machine):
-    """Two pipelines, one ROS master: the second in a namespace of its own, with a panel of its own."""
+    """Two pipelines with one ROS master: the second has its own namespace and panel."""
     other = bench.start_node("/mill2/smartmill", "Mill 2")
     try:
         state = machine.msg.CncState(connected=True, alarm=True, alarm_text="1010", mode=10, run=1, axes=["x"], position=[0.0], distance_to_go=[0.0])
@@ -432,7 +432,7 @@ def machines_of_other_namespaces_have_their_status_lines(browser, bench, machine
         line = "document.querySelector('[data-machine=mill2]')"
         browser.wait(line + "?.textContent.includes('Alarm 1010')")
         browser.picture(OUT + "/machines.png")
-        assert "1010" not in browser.text("#status"), "the own line shows the other's alarm"
+        assert "1010" not in browser.text("#status"), "the status line shows the alarm of the other machine"
         machine.others.clear()
         browser.wait(line + ".textContent.includes('Controller silent')")
         machine.others.append((publisher, state))
@@ -446,12 +446,12 @@ def machines_of_other_namespaces_have_their_status_lines(browser, bench, machine
 
 
 def reports_sort_and_zoom_without_a_server(browser):
-    """report.html, made by page_test.cpp with what every report of the project is made with."""
+    """report.html, written by page_test.cpp with the report writer of the project."""
     browser.open("file://" + OUT + "/report.html")
     column = "[...document.querySelectorAll('tr td:first-child')].map(e => e.textContent)"
     equal(browser.js(column), ["b", "c", "a", "d"])
     browser.click("th:nth-child(2)")
-    equal(browser.js(column), ["a", "b", "d", "c"])  # by number: 9, 10.5 +- 2, 1e3; what has none is last
+    equal(browser.js(column), ["a", "b", "d", "c"])  # by number: 9, 10.5 +- 2, 1e3; rows without a number are last
     browser.click("th:nth-child(2)")
     equal(browser.js(column), ["d", "b", "a", "c"])
     browser.click("figure img")
@@ -471,7 +471,7 @@ def reports_sort_and_zoom_without_a_server(browser):
 
 
 def no_error_on_the_console(browser):
-    errors = [e for e in browser.errors() if "/api/command" not in e]  # the refusal above was meant
+    errors = [e for e in browser.errors() if "/api/command" not in e]  # the refusals above are expected
     assert not errors, errors
 
 
@@ -487,19 +487,19 @@ def main():
             bench.case(messages_are_decoded_as_by_ros, browser, machine)
             bench.case(force_and_spectrum_are_those_of_the_machine, browser)
             bench.case(every_view_is_drawn, browser)
-            bench.case(the_fleet_is_told, browser, machine)
+            bench.case(the_fleet_is_shown, browser, machine)
             bench.case(silence_turns_values_grey, browser, machine)
             bench.case(hostile_origins_and_commands_without_token_are_refused, bench)
             bench.case(the_page_commands_after_an_unlock, browser)
             bench.case(a_note_is_kept_in_the_log_for_every_page, browser, bench)
-            bench.case(hits_taken_and_refused_are_told, browser, machine)
+            bench.case(accepted_and_rejected_hits_are_shown, browser, machine)
             bench.case(every_plot_is_saved_as_picture_and_numbers, browser)
             bench.case(the_layout_is_kept, browser, bench)
             bench.case(machines_of_other_namespaces_have_their_status_lines, browser, bench, machine)
             bench.case(reports_sort_and_zoom_without_a_server, browser)
             browser.open(bench.address)
             bench.case(no_error_on_the_console, browser)
-            bench.case(a_dead_node_is_told_and_one_that_is_back_shows, browser, bench)
+            bench.case(a_lost_node_is_reported_and_a_restarted_one_is_shown, browser, bench)
     finally:
         bench.stop()
         with open(OUT + "/results.json", "w") as out:

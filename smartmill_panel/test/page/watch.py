@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Looks at a panel while a session or a replay goes on, until it has drawn what comes of it.
-usage: watch.py PORT PICTURE [TOPIC...]: exit code 0 once the views are drawn and the topics have come, without an error on
-the console."""
+"""Opens a panel during a session or a replay and waits until it has drawn the results.
+usage: watch.py PORT PICTURE [TOPIC...]: exit code 0 once the topics have arrived and the views are drawn, without an error
+on the console."""
 import sys
 import time
 import urllib.request
@@ -36,7 +36,7 @@ def main():
             browser.wait(DRAWN, view)
         browser.js("(location.hash = 'overview', 1)")
         browser.picture(PICTURE)
-        # The panel may end with the replay before this does.
+        # The panel may end with the replay before this script.
         errors = [e for e in browser.errors() if "WebSocket" not in e and "ERR_CONNECTION" not in e]
         assert not errors, errors
         print(status)

@@ -64,13 +64,13 @@ class ServerTest : public ::testing::Test {
                                     const std::lock_guard<std::mutex> lock(mutex_);
                                     wanted ? (void)wanted_.insert(channel) : (void)wanted_.erase(channel);
                                   },
-                                  [](Question question, const Server::Respond& respond) {
-                                    respond({200, json({{"path", question.path},
-                                                        {"query", question.query},
-                                                        {"post", question.post},
-                                                        {"body", question.body},
-                                                        {"token", question.token},
-                                                        {"from", question.from}})
+                                  [](ApiRequest request, const Server::Respond& respond) {
+                                    respond({200, json({{"path", request.path},
+                                                        {"query", request.query},
+                                                        {"post", request.post},
+                                                        {"body", request.body},
+                                                        {"token", request.token},
+                                                        {"from", request.from}})
                                                       .dump()});
                                   }});
     server_->advertise({1, "/smartmill/cnc/state", "smartmill_msgs/CncState", "bool connected"});
@@ -81,7 +81,7 @@ class ServerTest : public ::testing::Test {
     const std::lock_guard<std::mutex> lock(mutex_);
     return wanted_;
   }
-  // Without a limit: a test that hangs is ended by its runner.
+  // Without a timeout: the test runner ends a hanging test.
   template <class Condition>
   static void until(const Condition& condition) {
     while (!condition()) std::this_thread::sleep_for(std::chrono::milliseconds(2));
@@ -121,7 +121,7 @@ class ServerTest : public ::testing::Test {
   std::unique_ptr<Server> server_;
 };
 
-// A client that waits for each answer.
+// A client with blocking calls.
 class TestClient {
  public:
   explicit TestClient(int port, const std::string& origin = {}, const std::string& protocol = PROTOCOL,
@@ -141,7 +141,7 @@ class TestClient {
   bool connected() const { return !failed_; }
   const std::string& chosen() const { return chosen_; }
   void send(const json& request) { sendText(request.dump()); }
-  // The server may close while it is still written to; the next read tells.
+  // The server may close the connection during a write; the next read reports it.
   void sendText(const std::string& text) {
     stream_.text(true);
     stream_.write(asio::buffer(text), failed_);
@@ -191,7 +191,7 @@ class TestClient {
   std::string chosen_;
 };
 
-TEST_F(ServerTest, GreetsAsTheProtocolSays) {
+TEST_F(ServerTest, GreetsAsTheProtocolRequires) {
   start();
   for (const char* protocol : {"foxglove.websocket.v1", "foxglove.sdk.v1"}) {
     TestClient client(server_->port(), "", protocol);
@@ -211,7 +211,7 @@ TEST_F(ServerTest, GreetsAsTheProtocolSays) {
   EXPECT_FALSE(TestClient(server_->port(), "", "").connected());
 }
 
-TEST_F(ServerTest, SendsWhatIsSubscribedAndKeepsWhatIsKept) {
+TEST_F(ServerTest, SendsSubscribedAndLatchedMessages) {
   start();
   server_->publish(2, 7, "old chart", true);
   server_->publish(2, 8, "chart", true);
@@ -236,7 +236,7 @@ TEST_F(ServerTest, SendsWhatIsSubscribedAndKeepsWhatIsKept) {
   EXPECT_EQ(client.readMessage(70), "new chart");
 }
 
-TEST_F(ServerTest, NobodyWantsWhatALostClientWanted) {
+TEST_F(ServerTest, ALostClientIsUnsubscribed) {
   start();
   {
     TestClient client(server_->port());
@@ -248,7 +248,7 @@ TEST_F(ServerTest, NobodyWantsWhatALostClientWanted) {
   until([&] { return server_->statistics().clients == 0; });
 }
 
-TEST_F(ServerTest, IsReadOnlyAndBearsNonsense) {
+TEST_F(ServerTest, IsReadOnlyAndToleratesInvalidRequests) {
   start();
   TestClient client(server_->port());
   client.greet();
@@ -272,11 +272,11 @@ TEST_F(ServerTest, IsReadOnlyAndBearsNonsense) {
   until([&] { return wanted().count(1) == 1; });
   server_->publish(1, 1, "still there");
   EXPECT_EQ(client.readMessage(5), "still there");
-  client.sendText(std::string(100000, ' '));  // more than a request may hold
+  client.sendText(std::string(100000, ' '));  // longer than a permitted request
   EXPECT_EQ(client.readMessage(5), "closed");
 }
 
-TEST_F(ServerTest, OneThatStopsReadingCostsTheOthersNothing) {
+TEST_F(ServerTest, AClientThatStopsReadingDoesNotAffectOthers) {
   constexpr std::size_t QUEUE = 256u << 10;
   start(QUEUE);
   TestClient asleep(server_->port());
@@ -293,7 +293,7 @@ TEST_F(ServerTest, OneThatStopsReadingCostsTheOthersNothing) {
     others.back()->greet();
     others.back()->subscribe(1, 1);
     server_->publish(2, 1, "x", true);
-    others.back()->subscribe(2, 2);  // answered: the first subscription stands as well
+    others.back()->subscribe(2, 2);  // its latched message confirms that the first subscription is active
     EXPECT_EQ(others.back()->readMessage(2), "x");
   }
   for (std::size_t c = 0; c < others.size(); ++c) {
@@ -305,7 +305,7 @@ TEST_F(ServerTest, OneThatStopsReadingCostsTheOthersNothing) {
       }
     });
   }
-  // 20 kB each, no faster than the slowest of the nine reads.
+  // 20 kB each, no faster than the slowest of the nine clients reads.
   for (int k = 0; k < MESSAGES; ++k) {
     until([&] {
       return std::all_of(received.begin(), received.end(), [&](const auto& of) { return of > k - 5; });
@@ -319,17 +319,17 @@ TEST_F(ServerTest, OneThatStopsReadingCostsTheOthersNothing) {
   const ServerStatistics statistics = server_->statistics();
   EXPECT_GT(statistics.dropped, 0u);
   EXPECT_EQ(statistics.clients, 10u);
-  // It wakes: what was kept for it comes, then that it has lost some.
-  bool told = false;
-  while (!told) {
+  // The stopped client reads again: the queued messages arrive, then the status of the dropped ones.
+  bool dropped = false;
+  while (!dropped) {
     const TestClient::Frame frame = asleep.read();
     ASSERT_TRUE(asleep.connected());
-    told = !frame.binary && json::parse(frame.data).at("op") == "status";
+    dropped = !frame.binary && json::parse(frame.data).at("op") == "status";
   }
-  EXPECT_TRUE(told);
+  EXPECT_TRUE(dropped);
 }
 
-TEST_F(ServerTest, TooManyClientsAreTurnedAway) {
+TEST_F(ServerTest, TooManyClientsAreRefused) {
   start(4u << 20, 2);
   TestClient a(server_->port()), b(server_->port());
   a.greet();
@@ -348,7 +348,8 @@ TEST_F(ServerTest, RefusesHostileOrigins) {
     EXPECT_FALSE(TestClient(server_->port(), origin).connected()) << origin;
     EXPECT_EQ(request(http::verb::get, "/", own, origin, "", true).result_int(), 403u) << origin;
   }
-  // A name that an attacker's name server turns to this computer: origin and host agree, and are not ours.
+  // DNS rebinding, a foreign name that resolves to this computer: origin and host agree but are not
+  // permitted.
   TestClient rebound(server_->port(), "http://evil.example:8090", PROTOCOL, "evil.example:8090");
   EXPECT_FALSE(rebound.connected());
   EXPECT_EQ(request(http::verb::get, "/", "evil.example").result_int(), 403u);
@@ -371,15 +372,15 @@ TEST_F(ServerTest, ServesThePageAndNothingElse) {
   EXPECT_EQ(request(http::verb::post, "/index.html").result_int(), 405u);
 }
 
-TEST_F(ServerTest, HandsOnQuestions) {
+TEST_F(ServerTest, ForwardsRequests) {
   start();
   const auto answer = request(http::verb::get, "/api/what_if?teeth=4&text=a%20b%2Fc+d&empty");
   EXPECT_EQ(answer.result_int(), 200u);
-  const json told = json::parse(answer.body());
-  EXPECT_EQ(told.at("path"), "what_if");
-  EXPECT_EQ(told.at("query").at("teeth"), "4");
-  EXPECT_EQ(told.at("query").at("text"), "a b/c d");
-  EXPECT_EQ(told.at("query").at("empty"), "");
+  const json forwarded = json::parse(answer.body());
+  EXPECT_EQ(forwarded.at("path"), "what_if");
+  EXPECT_EQ(forwarded.at("query").at("teeth"), "4");
+  EXPECT_EQ(forwarded.at("query").at("text"), "a b/c d");
+  EXPECT_EQ(forwarded.at("query").at("empty"), "");
   const json posted = json::parse(request(http::verb::post, "/api/command", "localhost", "", "body").body());
   EXPECT_TRUE(posted.at("post"));
   EXPECT_EQ(posted.at("body"), "body");
@@ -393,7 +394,7 @@ TEST_F(ServerTest, BoundsRequests) {
     try {
       return request(http::verb::post, target, "localhost", "", body).result_int() != 200u;
     } catch (const boost::system::system_error&) {
-      return true;  // cut off
+      return true;  // the server closes the connection
     }
   };
   EXPECT_TRUE(tooLong("/api/command", std::string(1u << 20, 'x')));
@@ -401,7 +402,7 @@ TEST_F(ServerTest, BoundsRequests) {
   EXPECT_FALSE(tooLong("/api/command", "short"));
 }
 
-TEST_F(ServerTest, SaysWhyItCannotStart) {
+TEST_F(ServerTest, ReportsWhyItCannotStart) {
   start();
   ServerOptions options;
   options.folder = folder_.path + "/page";
@@ -417,7 +418,7 @@ TEST_F(ServerTest, SaysWhyItCannotStart) {
   EXPECT_THROW(Server(options, {}), Error);
 }
 
-TEST_F(ServerTest, IsUnderstoodByAnIndependentClient) {
+TEST_F(ServerTest, WorksWithAnIndependentClient) {
   if (std::system("/usr/bin/python3 -c 'import websockets' 2>/dev/null") != 0)
     GTEST_SKIP() << "python3-websockets is not installed";
   start();
@@ -435,26 +436,26 @@ TEST_F(ServerTest, IsUnderstoodByAnIndependentClient) {
   char part[65536];
   for (std::size_t n = 0; (n = fread(part, 1, sizeof part, pipe)) > 0;) output.append(part, n);
   ASSERT_EQ(pclose(pipe), 0);
-  const json seen = json::parse(output);
-  EXPECT_EQ(seen.at("subprotocol"), PROTOCOL);
-  EXPECT_EQ(seen.at("info").at("name"), "SmartMill");
-  EXPECT_EQ(seen.at("channel").at("schemaName"), "smartmill_msgs/StabilityChart");
-  ASSERT_EQ(seen.at("payloads").size(), 3u);
-  EXPECT_EQ(seen["payloads"][0][0], 1234567890123456789u);
+  const json received = json::parse(output);
+  EXPECT_EQ(received.at("subprotocol"), PROTOCOL);
+  EXPECT_EQ(received.at("info").at("name"), "SmartMill");
+  EXPECT_EQ(received.at("channel").at("schemaName"), "smartmill_msgs/StabilityChart");
+  ASSERT_EQ(received.at("payloads").size(), 3u);
+  EXPECT_EQ(received["payloads"][0][0], 1234567890123456789u);
   std::string hex;
   for (const unsigned char c : all) {
     char two[3];
     std::snprintf(two, sizeof two, "%02x", c);
     hex += two;
   }
-  EXPECT_EQ(seen["payloads"][0][1], hex);
-  EXPECT_EQ(seen["payloads"][1][1], "");
-  EXPECT_EQ(seen["payloads"][2][1].get<std::string>().size(), 2 * large.size());
-  EXPECT_EQ(seen.at("status").at("level"), 2);
+  EXPECT_EQ(received["payloads"][0][1], hex);
+  EXPECT_EQ(received["payloads"][1][1], "");
+  EXPECT_EQ(received["payloads"][2][1].get<std::string>().size(), 2 * large.size());
+  EXPECT_EQ(received.at("status").at("level"), 2);
 }
 
-TEST(CommandGate, IsClosedUnlessOpened) {
-  Question command;
+TEST(CommandGate, RequiresTheToken) {
+  ApiRequest command;
   command.post = true;
   command.token = "0123456789abcdef";
   const CommandGate closed;

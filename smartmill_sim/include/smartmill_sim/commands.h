@@ -4,11 +4,11 @@
 
 namespace smartmill::sim {
 
-/// Simulates a campaign from its model and plan.
+/// Command `simulate`: simulates a campaign from its model and plan.
 Command simulateCommand();
-/// Draws a machine that has an effect its model lacks.
+/// Command `hide`: draws a machine with an effect that its model lacks.
 Command hideCommand();
-/// The simulated Fanuc controller, in wall-clock time.
+/// Command `controller`: runs the simulated Fanuc controller in wall-clock time.
 Command controllerCommand();
 
 }  // namespace smartmill::sim

@@ -19,9 +19,8 @@ namespace {
 using namespace smartmill;
 using Clock = std::chrono::steady_clock;
 
-constexpr double STEP = 1e-3;  // [s]
-// [s] After a longer pause of the computer the machine goes on where it was.
-constexpr double MOST_BEHIND = 0.5;
+constexpr double STEP = 1e-3;        // [s]
+constexpr double MOST_BEHIND = 0.5;  // [s] after a longer pause of the computer the elapsed time is skipped
 
 const std::map<std::string, int> MODES{{"mdi", focas::AUT_MDI},       {"mem", focas::AUT_MEM},
                                        {"edit", focas::AUT_EDIT},     {"handle", focas::AUT_HANDLE},
@@ -80,11 +79,12 @@ Command controllerCommand() {
   command.description =
       "Simulated Fanuc controller of a three-axis mill: FOCAS2 over Ethernet, in wall-clock time, until "
       "Ctrl-C.\n"
-      "Without a model: travel x -250..250, y -200..200, z -300..0 mm, start at 0 0 0, rapid 30 m/min, 5 "
+      "Defaults without a model: travel x -250..250, y -200..200, z -300..0 mm, start at 0 0 0, rapid 30 "
+      "m/min, 5 "
       "m/s2,\n"
       "spindle to 20000 rpm at 10000 rpm/s.";
   command.examples = {{"--port 8193 --mode dnc", "listens on loopback; clients may run programs"},
-                      {"--port 0 --model mill.yaml", "any free port, axes and spindle of a model"}};
+                      {"--port 0 --model mill.yaml", "any free port; axes and spindle of a model"}};
   command.files = {{"MODEL", "machine model file: its sections axes and spindle"}};
   command.exits = {{0, "stopped by Ctrl-C or SIGTERM"}};
   command.declare = [](CommandLine& line) -> std::function<int()> {
@@ -98,7 +98,7 @@ Command controllerCommand() {
                 "programs)")
         .oneOf(modes)
         .showDefault();
-    line.option("--type", a->type, "type of control that it reports").oneOf({"30", "31"}).showDefault();
+    line.option("--type", a->type, "control type that it reports").oneOf({"30", "31"}).showDefault();
     line.option("--model", a->model, "machine model file: its sections axes and spindle");
     return commandBody(a, run);
   };

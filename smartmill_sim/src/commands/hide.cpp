@@ -13,9 +13,9 @@ namespace {
 
 using namespace smartmill;
 
-// Whether the force sensor sees it in some seconds of cutting with a stiff tool.
+// Whether some seconds of cutting with a stiff tool show it in the force signals.
 bool isShort(const EffectKind& kind) {
-  // Drift and tilt count from a record's begin or a cut's; a limit may never be reached.
+  // Drift and tilt develop slowly within a record or a cut; a limit may never be reached.
   static const std::vector<std::string> SLOW{"charge_drift", "depth_tilt", "saturation"};
   return std::find(SLOW.begin(), SLOW.end(), kind.name) == SLOW.end() && kind.stage != EffectStage::drive &&
          kind.stage != EffectStage::structure && !kind.has(EffectNeed::start_time) &&
@@ -45,7 +45,7 @@ void run(const Arguments& a) {
   MachineModel model = readMachineModel(a.model);
   model.needTool("hide an effect");
   std::mt19937_64 random(a.seed);
-  // No machine is just what is believed of it.
+  // A real machine deviates from its model.
   model.needCutting("hide an effect");
   for (const CuttingKey& key : cuttingKeys()) {
     double& value = (*model.cutting).*key.coefficient;
@@ -72,8 +72,8 @@ Command hideCommand() {
   command.files = {{"OUT", "model file of the machine, with the effect in its section effects"}};
   command.declare = [](CommandLine& line) -> std::function<int()> {
     const auto a = std::make_shared<Arguments>();
-    line.option("MODEL", a->model, "model file of the machine as it is assumed to be").required();
-    line.option("-o,--out", a->out, "model file of the machine as it is").required();
+    line.option("MODEL", a->model, "model file of the machine as assumed").required();
+    line.option("-o,--out", a->out, "model file of the actual machine").required();
     line.option("--effect", a->effect, "name of the effect (default: drawn)");
     line.option("--seed", a->seed, "seed of the draw").showDefault();
     return commandBody(a, run);

@@ -31,10 +31,10 @@ void run(const Arguments& a) {
   sim::SimulationOptions options = a.options;
   options.noise = a.noise == "on";
   if (fs::exists(out) && fs::equivalent(out, campaign.folder)) {
-    throw Error(out + ": the campaign's own folder would be overwritten");
+    throw Error(out + ": this is the campaign's own folder, choose another one");
   }
   fs::create_directories(out);
-  double simulated = 0.0, used = 0.0;  // [s] of records, of the processor
+  double simulated = 0.0, used = 0.0;  // [s] duration of the records, processor time
   for (CampaignTest& test : campaign.tests) {
     std::fprintf(stderr, "simulating %s\n", test.name.c_str());
     const Record recorded = aligned(readRecord(campaign, test), test);
@@ -43,7 +43,7 @@ void run(const Arguments& a) {
     used += static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
     simulated += static_cast<double>(record.size()) / test.sample_rate;
     ++options.seed;
-    // Written as smartmill CSV whatever the recorded format was.
+    // The output is smartmill CSV for any recorded format.
     test.file_format.clear();
     test.channels.clear();
     test.stream_offset.clear();
@@ -67,19 +67,18 @@ Command simulateCommand() {
   command.name = command.tool = "simulate";
   command.summary = "simulates a campaign from a machine model and the campaign's plan";
   command.description = "Simulates a campaign from a machine model and the campaign's plan.";
-  command.examples = {
-      {"mill.yaml campaigns/runout -o simulated", "the campaign as this machine would record it"},
-      {"mill.yaml campaigns/runout -o exact --noise off", "without noise and rounding"}};
+  command.examples = {{"mill.yaml campaigns/runout -o simulated", "the campaign as recorded on this machine"},
+                      {"mill.yaml campaigns/runout -o exact --noise off", "without noise and rounding"}};
   command.files = {{"OUT/campaign.yaml", "the plan of the new campaign"},
                    {"OUT/model.yaml", "the machine model"},
-                   {"OUT/*.csv", "its records, at the paths of the original ones"}};
+                   {"OUT/*.csv", "the records, at the paths of the original ones"}};
   command.declare = [](CommandLine& line) -> std::function<int()> {
     const auto a = std::make_shared<Arguments>();
     line.option("MODEL", a->model, "machine model file").required();
     line.option("CAMPAIGN", a->campaign, "campaign folder: plan, sample times, spindle phase, hammer forces")
         .required();
     line.option("-o,--out", a->out, "folder of the new campaign").required();
-    line.option("--noise", a->noise, "on, or off: neither noise nor rounding")
+    line.option("--noise", a->noise, "on; off: neither noise nor rounding")
         .oneOf({"on", "off"})
         .showDefault();
     line.option("--seed", a->options.seed, "seed of the noise").showDefault();

@@ -6,8 +6,8 @@
 namespace smartmill::sim {
 namespace {
 
-// Room that sensor and hammer take, as in Dunwoody fig. 4.1: a probe of 10 mm and a solenoid of 20 mm, 60 mm
-// long; the hammer rests as far behind the sensor's face as its plunger goes.
+// Size of sensor and hammer as in Dunwoody fig. 4.1: a probe of 10 mm and a solenoid of 20 mm, 60 mm long;
+// the hammer at rest is behind the sensor's face by the stroke of its plunger.
 constexpr double SENSOR_HALF_WIDTH = 5e-3, SENSOR_ABOVE_TIP = 5e-3;  // [m]
 constexpr double HAMMER_HALF_WIDTH = 10e-3, PLUNGER = 3e-3;          // [m]
 constexpr double BODY_LENGTH = 60e-3;                                // [m]
@@ -28,25 +28,25 @@ CollisionWatch CollisionWatch::ofModel(const MachineModel& model) {
     const HammerStation& station = *model.hammer;
     for (const auto& entry : station.position) {
       const std::string& direction = entry.first;
-      const Axes3& place = entry.second;
+      const Axes3& station_position = entry.second;
       const std::size_t along = direction == "y" ? 1 : 0;
       const std::size_t across = 1 - along;
       const auto body = [&](const std::string& name, double behind, double half_width, double low,
                             double high) {
-        Body b{name + " " + direction, place, place};
-        b.low[along] = place[along] + watch.tool_radius + behind;
+        Body b{name + " " + direction, station_position, station_position};
+        b.low[along] = station_position[along] + watch.tool_radius + behind;
         b.high[along] = b.low[along] + BODY_LENGTH;
-        b.low[across] = place[across] - half_width;
-        b.high[across] = place[across] + half_width;
+        b.low[across] = station_position[across] - half_width;
+        b.high[across] = station_position[across] + half_width;
         b.low[2] = low;
         b.high[2] = high;
         watch.add(b);
       };
       const double face = FACE_GAPS * station.gap_at_zero_volt;
-      // Nearer than the face there may be nothing: the tool's flutes turn there.
-      body("SENSOR", face, SENSOR_HALF_WIDTH, -FAR, place[2] + SENSOR_ABOVE_TIP);
-      body("HAMMER", face + PLUNGER, HAMMER_HALF_WIDTH, place[2] + SENSOR_ABOVE_TIP,
-           place[2] + station.offset + HAMMER_HALF_WIDTH);
+      // No body in front of the face: the tool turns there.
+      body("SENSOR", face, SENSOR_HALF_WIDTH, -FAR, station_position[2] + SENSOR_ABOVE_TIP);
+      body("HAMMER", face + PLUNGER, HAMMER_HALF_WIDTH, station_position[2] + SENSOR_ABOVE_TIP,
+           station_position[2] + station.offset + HAMMER_HALF_WIDTH);
     }
   }
   if (model.workpiece) {
@@ -55,11 +55,11 @@ CollisionWatch CollisionWatch::ofModel(const MachineModel& model) {
   return watch;
 }
 
-const CollisionWatch::Body* CollisionWatch::touched(const Axes3& position, bool turning) const {
+const CollisionWatch::Body* CollisionWatch::collidingBody(const Axes3& position, bool turning) const {
   const double radius = turning ? tool_radius : core_radius;
   for (const Body& body : bodies_) {
     if (position[2] >= body.high[2]) {
-      continue;  // the tip is above it, so is all of the tool
+      continue;  // the whole tool is above it
     }
     double square = 0.0;
     for (std::size_t i = 0; i < 2; ++i) {

@@ -18,8 +18,8 @@ using focas::EwCode;
 using Lock = std::lock_guard<std::mutex>;
 
 constexpr double MM_PER_MIN = units::MM / 60.0;
-constexpr double SCREW_LEAD = 10.0 * units::MM;  // [m] a turn of an axis' motor
-constexpr double LOAD_METER_STEP_VOLT = 3.0e-4;  // [V] as the thesis saw the load meter (Dunwoody 3.2.1)
+constexpr double SCREW_LEAD = 10.0 * units::MM;  // [m] per revolution of an axis motor
+constexpr double LOAD_METER_STEP_VOLT = 3.0e-4;  // [V] resolution of the load meter (Dunwoody 3.2.1)
 
 std::vector<double> inMm(const std::array<double, 3>& v) {
   return {v[0] / units::MM, v[1] / units::MM, v[2] / units::MM};
@@ -47,7 +47,7 @@ std::int64_t secondsOf(const focas::DateTime& at) {
   return timegm(&parts);
 }
 
-/// The computer's wall clock as its calendar shows it.
+/// Wall clock of the computer in local time.
 std::int64_t localSeconds() {
   const std::time_t now = std::time(nullptr);
   std::tm parts{};
@@ -84,7 +84,8 @@ focas::SysInfo ControllerOptions::fineInfo() {
 void ControllerOptions::validate() const {
   const auto positive = [](const char* key, double value) {
     if (!(value > 0.0) || !std::isfinite(value)) {
-      throw Error(std::string("controller: ") + key + " is " + numberText(value) + ", above 0 is due");
+      throw Error(std::string("controller: ") + key + " is " + numberText(value) +
+                  ", expected a value above 0");
     }
   };
   for (std::size_t i = 0; i < 3; ++i) {
@@ -113,7 +114,7 @@ void ControllerOptions::validate() const {
   }
 }
 
-/// Everything under one lock.
+/// The machine and its lock.
 class Controller::Impl {
  public:
   explicit Impl(const ControllerOptions& options) : machine(options) {}
@@ -375,7 +376,7 @@ EwCode Controller::setDateTime(const focas::DateTime& date_time) {
 
 EwCode Controller::readPmc(focas::PmcArea area, int first, int last, focas::Bytes* bytes) const {
   const Lock lock(impl_->mutex);
-  impl_->machine.pmc.show(impl_->machine.signals());
+  impl_->machine.pmc.update(impl_->machine.signals());
   return impl_->machine.pmc.read(area, first, last, bytes);
 }
 
@@ -383,7 +384,7 @@ EwCode Controller::writePmc(focas::PmcArea area, int first, const focas::Bytes& 
   const Lock lock(impl_->mutex);
   const EwCode code = impl_->machine.pmc.write(area, first, bytes);
   if (area == focas::PmcArea::d) {
-    impl_->machine.followDataTable();
+    impl_->machine.updateDataTableOverrides();
   }
   return code;
 }
@@ -405,7 +406,7 @@ EwCode Controller::deleteProgram(int number) {
 
 EwCode Controller::rewindProgram() {
   const Lock lock(impl_->mutex);
-  // Every start begins at the head of the program.
+  // Every start begins at the first block of the program.
   return impl_->machine.status().run == focas::RUN_START ? focas::EW_BUSY : focas::EW_OK;
 }
 
@@ -437,27 +438,27 @@ EwCode Controller::reset() {
 
 EwCode Controller::dncStart() {
   const Lock lock(impl_->mutex);
-  return impl_->machine.open();
+  return impl_->machine.openSession();
 }
 
 std::size_t Controller::dncData(const char* data, std::size_t size) {
   const Lock lock(impl_->mutex);
-  return impl_->machine.take(data, size);
+  return impl_->machine.receive(data, size);
 }
 
 EwCode Controller::dncEnd() {
   const Lock lock(impl_->mutex);
-  return impl_->machine.end();
+  return impl_->machine.closeSession();
 }
 
 void Controller::dncCancel(int /*result*/) {
   const Lock lock(impl_->mutex);
-  impl_->machine.cancel();
+  impl_->machine.cancelSession();
 }
 
 EwCode Controller::dncAbort() {
   const Lock lock(impl_->mutex);
-  return impl_->machine.abort();
+  return impl_->machine.takeAbortCode();
 }
 
 }  // namespace smartmill::sim

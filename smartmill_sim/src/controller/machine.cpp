@@ -13,15 +13,15 @@ namespace {
 
 using focas::EwCode;
 
-constexpr double ORIENT_STEPS = 4096;  // of one turn
-constexpr double ORIENT_SPEED = 20.0;  // [rad/s] about 190 rpm, as spindles orient
+constexpr double ORIENT_STEPS = 4096;  // per revolution
+constexpr double ORIENT_SPEED = 20.0;  // [rad/s] about 190 rpm, typical of spindles
 constexpr double MINUTE = 60.0;        // [s]
 constexpr double INCH = 25.4 * units::MM;
 constexpr double TRAVEL_TOLERANCE = 1e-9;  // [m] rounding of decimal input
-constexpr double ARC_TOLERANCE = 20e-6;    // [m] by which start and end may differ in their distance to I, J
-constexpr double LOOK = 2e-3;              // [s] between two looks at the obstacles
-constexpr double AT_SPEED = 0.05;          // [1] of the commanded speed
-constexpr std::size_t TEXT_AHEAD = 4096;   // [byte] of the program that is shown
+constexpr double ARC_TOLERANCE = 20e-6;    // [m] difference of the start and end radius
+constexpr double CHECK_PERIOD = 2e-3;      // [s] between two checks of the obstacles
+constexpr double AT_SPEED = 0.05;          // [1] tolerance, relative to the commanded speed
+constexpr std::size_t TEXT_AHEAD = 4096;   // [byte] of the indicated program text
 constexpr double NEVER = std::numeric_limits<double>::infinity();
 
 constexpr int PS_BLOCK_TOO_LONG = 3;
@@ -38,32 +38,32 @@ constexpr const char* RESIDENT_PROGRAM = "O0001(PARK)\nG21 G90 G94\nG53 G0 Z0\nM
 }  // namespace
 
 void BlockBuffer::append(const char* text, std::size_t size) {
-  if (at_ > 0 && at_ >= text_.size() / 2) {
-    text_.erase(0, at_);
-    at_ = 0;
+  if (position_ > 0 && position_ >= text_.size() / 2) {
+    text_.erase(0, position_);
+    position_ = 0;
   }
   text_.append(text, size);
 }
 
 void BlockBuffer::clear() {
   text_.clear();
-  at_ = 0;
+  position_ = 0;
 }
 
 std::optional<std::string> BlockBuffer::takeLine() {
-  const std::size_t end = text_.find_first_of("\r\n", at_);
+  const std::size_t end = text_.find_first_of("\r\n", position_);
   if (end == std::string::npos) {
     return std::nullopt;
   }
-  std::string line = text_.substr(at_, end - at_);
-  at_ = end + 1;
+  std::string line = text_.substr(position_, end - position_);
+  position_ = end + 1;
   return line;
 }
 
 ControlledMachine::ControlledMachine(const ControllerOptions& o)
     : options(o), mode_(o.mode), move_(o.axes.home), spindle_(o.spindle_acceleration) {
   variables.offsets[0] = o.work_offset;
-  // As every control has programs in its memory; the one that is selected parks the machine.
+  // Every control has programs in its memory; the selected one parks the machine.
   memory.store(RESIDENT_PROGRAM, 0, focas::DateTime());
   main_program_ = 1;
 }
@@ -74,7 +74,7 @@ void ControlledMachine::step(double dt) {
     dt_ = dt;
     steps_ = 0;
   }
-  // A product, not a sum: rounding does not add up.
+  // A product instead of a sum: rounding errors do not accumulate.
   const double end = base_ + static_cast<double>(++steps_) * dt_;
   double time = now_;
   while (!held_ && !stopped_ && (running_ || takeBlock(time))) {
@@ -83,22 +83,22 @@ void ControlledMachine::step(double dt) {
     }
     if (running_) {
       time = std::max(time, wait_until_);
-      goOn(time);
+      continueBlock(time);
     }
   }
   now_ = end;
-  if (now_ - looked_ >= LOOK) {
-    watchObstacles();
+  if (now_ - checked_ >= CHECK_PERIOD) {
+    checkCollision();
   }
 }
 
-void ControlledMachine::watchObstacles() {
-  looked_ = now_;
+void ControlledMachine::checkCollision() {
+  checked_ = now_;
   const bool turning = spindle_.speed(now_) != 0.0;
   if (!moving() && !turning) {
     return;
   }
-  if (const CollisionWatch::Body* body = options.obstacles.touched(position(), turning)) {
+  if (const CollisionWatch::Body* body = options.obstacles.collidingBody(position(), turning)) {
     if (alarms.empty()) {
       alarm({EX_COLLISION, ALARM_EX, 0, "TOOL MET " + body->name});
     }
@@ -118,12 +118,12 @@ std::array<double, 3> ControlledMachine::workPosition() const {
 }
 
 std::array<double, 3> ControlledMachine::distanceToGo() const {
-  std::array<double, 3> left = pending_.empty() ? move_.target() : pending_.back().move.target();
+  std::array<double, 3> remaining = pending_.empty() ? move_.target() : pending_.back().move.target();
   const std::array<double, 3> at = position();
   for (std::size_t i = 0; i < 3; ++i) {
-    left[i] -= at[i];
+    remaining[i] -= at[i];
   }
-  return left;
+  return remaining;
 }
 
 focas::Status ControlledMachine::status() const {
@@ -143,8 +143,8 @@ focas::Status ControlledMachine::status() const {
 
 std::string ControlledMachine::programText() const {
   if (running_ || session_ || from_memory_) {
-    const std::string ahead = buffer_.ahead(TEXT_AHEAD);
-    return block_text.empty() ? ahead : block_text + "\n" + ahead;
+    const std::string preview = buffer_.preview(TEXT_AHEAD);
+    return block_text.empty() ? preview : block_text + "\n" + preview;
   }
   return memory.text(main_program_).value_or("");
 }
@@ -159,14 +159,14 @@ PmcSignals ControlledMachine::signals() const {
   s.alarm = !alarms.empty();
   s.emergency = emergency_;
   s.at_rest = speed == 0.0;
-  s.at_speed =
-      turn_ != Turn::off && std::abs(speed - commandedSpeed()) <= AT_SPEED * std::abs(commandedSpeed());
-  s.oriented = oriented_ && speed == 0.0 && now_ >= spindle_.settled();
+  s.at_speed = rotation_ != Rotation::off &&
+               std::abs(speed - commandedSpeed()) <= AT_SPEED * std::abs(commandedSpeed());
+  s.oriented = oriented_ && speed == 0.0 && now_ >= spindle_.settleTime();
   s.m_code = last_m_;
   s.s_code = static_cast<int>(std::lround(units::rpmFromRadPerSec(modal_.speed)));
   s.spindle_speed = units::rpmFromRadPerSec(speed);
-  s.feed_override = feed_override_ * feed_share_;
-  s.spindle_override = spindle_override_ * spindle_share_;
+  s.feed_override = feed_override_ * data_feed_override_;
+  s.spindle_override = spindle_override_ * data_spindle_override_;
   return s;
 }
 
@@ -180,11 +180,11 @@ void ControlledMachine::haltAt(double time, EwCode why) {
   if (time < move_.end()) {
     move_.stop(time, options.axes.acceleration);
   } else if (move_.held()) {
-    move_ = PathMove(move_.position(time));  // it stands in feed hold: the rest of its way is dropped
+    move_ = PathMove(move_.position(time));  // at rest in feed hold: the rest of its path is dropped
   }
   pending_.clear();
   spindle_.ramp(time, 0.0);
-  turn_ = Turn::off;
+  rotation_ = Rotation::off;
   running_ = held_ = stopped_ = from_memory_ = false;
   running_program_ = 0;
   buffer_.clear();
@@ -231,14 +231,14 @@ void ControlledMachine::feedHold() {
   }
 }
 
-void ControlledMachine::followDataTable() {
+void ControlledMachine::updateDataTableOverrides() {
   focas::Bytes bytes;
   pmc.read(focas::PmcArea::d, OVERRIDE_DATA, OVERRIDE_DATA + 1, &bytes);
   const auto share = [](std::uint8_t percent) { return percent == 0 ? 1.0 : 0.01 * percent; };
-  feed_share_ = share(bytes[0]);
-  if (share(bytes[1]) != spindle_share_) {
-    spindle_share_ = share(bytes[1]);
-    if (turn_ != Turn::off) {
+  data_feed_override_ = share(bytes[0]);
+  if (share(bytes[1]) != data_spindle_override_) {
+    data_spindle_override_ = share(bytes[1]);
+    if (rotation_ != Rotation::off) {
       spindle_.ramp(now_, commandedSpeed());
     }
   }
@@ -252,7 +252,7 @@ void ControlledMachine::setOverrides(double feed, double rapid, double spindle) 
   rapid_override_ = rapid;
   if (spindle != spindle_override_) {
     spindle_override_ = spindle;
-    if (turn_ != Turn::off) {
+    if (rotation_ != Rotation::off) {
       spindle_.ramp(now_, commandedSpeed());
     }
   }
@@ -261,7 +261,7 @@ void ControlledMachine::setOverrides(double feed, double rapid, double spindle) 
   }
 }
 
-/// The running move goes on with the feed that holds now.
+/// Replans the running move for the present overrides.
 void ControlledMachine::replan() {
   if (running_ && (moving() || move_.held())) {
     move_.plan(now_, feedOf(move_, move_rapid_), options.axes.acceleration);
@@ -302,7 +302,7 @@ void ControlledMachine::setSpindleTorque(double torque) {
     return;
   }
   torque_ = torque;
-  // The drive's limit accelerates the inertia and carries the cut, which helps to brake.
+  // The drive's torque limit accelerates the inertia and carries the cut; the cut assists braking.
   const double share = torque / options.spindle_torque;
   const double drive = options.spindle_acceleration;
   spindle_.setAccelerations(now_, drive * (1.0 - share), drive * std::max(1.0 + share, 0.01));
@@ -310,7 +310,7 @@ void ControlledMachine::setSpindleTorque(double torque) {
 
 // --- the DNC session
 
-EwCode ControlledMachine::open() {
+EwCode ControlledMachine::openSession() {
   if (emergency_ || !alarms.empty()) {
     return focas::EW_ALARM;
   }
@@ -326,9 +326,9 @@ EwCode ControlledMachine::open() {
   return focas::EW_OK;
 }
 
-std::size_t ControlledMachine::take(const char* data, std::size_t size) {
+std::size_t ControlledMachine::receive(const char* data, std::size_t size) {
   if (!session_) {
-    return size;  // of a session that has ended: thrown away
+    return size;  // data of a closed session is discarded
   }
   const std::size_t taken =
       std::min(size, options.buffer_size - std::min(options.buffer_size, buffer_.size()));
@@ -336,9 +336,9 @@ std::size_t ControlledMachine::take(const char* data, std::size_t size) {
   return taken;
 }
 
-EwCode ControlledMachine::end() {
+EwCode ControlledMachine::closeSession() {
   if (abort_ != focas::EW_OK) {
-    return abort();
+    return takeAbortCode();
   }
   if (!session_) {
     return focas::EW_FUNC;
@@ -350,12 +350,12 @@ EwCode ControlledMachine::end() {
   return focas::EW_OK;
 }
 
-void ControlledMachine::cancel() {
+void ControlledMachine::cancelSession() {
   session_ = false;
   halt(focas::EW_OK);
 }
 
-EwCode ControlledMachine::abort() {
+EwCode ControlledMachine::takeAbortCode() {
   return std::exchange(abort_, focas::EW_OK);
 }
 
@@ -401,7 +401,7 @@ void ControlledMachine::beginProgram() {
   variables.clearLocals();
 }
 
-/// Starts the next block at a time. @return whether there was one (or an alarm).
+/// Starts the next block at a time [s]. @return whether there was one (or an alarm).
 bool ControlledMachine::takeBlock(double time) {
   try {
     const std::optional<std::string> line = buffer_.takeLine();
@@ -422,12 +422,12 @@ bool ControlledMachine::takeBlock(double time) {
             }));
     }
   } catch (const NcAlarm& e) {
-    refuse(time, e);
+    raiseProgramAlarm(time, e);
   }
   return true;
 }
 
-void ControlledMachine::refuse(double time, const NcAlarm& e) {
+void ControlledMachine::raiseProgramAlarm(double time, const NcAlarm& e) {
   alarms.push_back({e.number(), e.type(), e.axis(), std::string(e.what()) + ": " + block_text});
   haltAt(time, focas::EW_ALARM);
 }
@@ -464,8 +464,9 @@ void ControlledMachine::start(double time, const NcBlock& block) {
 }
 
 double ControlledMachine::commandedSpeed() const {
-  const double speed = std::min(modal_.speed * spindle_override_ * spindle_share_, options.spindle_max_speed);
-  return turn_ == Turn::backwards ? -speed : speed;
+  const double speed =
+      std::min(modal_.speed * spindle_override_ * data_spindle_override_, options.spindle_max_speed);
+  return rotation_ == Rotation::backwards ? -speed : speed;
 }
 
 void ControlledMachine::startSpindle(double time, const NcBlock& block) {
@@ -475,11 +476,11 @@ void ControlledMachine::startSpindle(double time, const NcBlock& block) {
   const int m_code = block.m_code.value_or(0);
   const bool begins = m_code == 3 || m_code == 4;
   if (begins) {
-    turn_ = m_code == 3 ? Turn::forwards : Turn::backwards;
+    rotation_ = m_code == 3 ? Rotation::forwards : Rotation::backwards;
     oriented_ = false;
     last_m_ = m_code;
   }
-  if (turn_ != Turn::off && (block.speed || begins)) {
+  if (rotation_ != Rotation::off && (block.speed || begins)) {
     spindle_.ramp(time, commandedSpeed());
   }
 }
@@ -506,7 +507,7 @@ void ControlledMachine::planPath(const NcBlock& block) {
   const std::array<double, 3> to = targetOf(block, from);
   pending_.clear();
   if (block.reference) {
-    // Through the point written to the reference position, the axes that are named.
+    // Through the programmed point to the reference position of the named axes.
     std::array<double, 3> home = to;
     for (std::size_t i = 0; i < 3; ++i) {
       home[i] = block.axis[i] ? options.axes.home[i] : to[i];
@@ -517,8 +518,8 @@ void ControlledMachine::planPath(const NcBlock& block) {
     const bool clockwise = modal_.motion == 2;
     append(PathMove::arc(from, to, centreOf(block, from, to), clockwise), false);
   } else {
-    // In machine coordinates a control goes in rapid traverse, whatever motion is in force; an arc of a
-    // radius that ends where it begins is none.
+    // Machine coordinates are approached in rapid traverse in any motion mode; a radius arc that ends at its
+    // start is no motion.
     append(PathMove::line(from, to), modal_.motion == 0 || block.machine);
   }
 }
@@ -526,7 +527,7 @@ void ControlledMachine::planPath(const NcBlock& block) {
 std::array<double, 2> ControlledMachine::centreOf(const NcBlock& block, const std::array<double, 3>& from,
                                                   const std::array<double, 3>& to) const {
   if (block.radius) {
-    // Two circles pass through start and end; a positive R means the shorter arc.
+    // Two circles pass through start and end; a positive R selects the shorter arc.
     const double r = *block.radius * unit();
     const double dx = to[0] - from[0], dy = to[1] - from[1], chord = std::hypot(dx, dy);
     const double square = r * r - 0.25 * chord * chord;
@@ -580,7 +581,7 @@ void ControlledMachine::append(const PathMove& move, bool rapid) {
   pending_.push_back({move, rapid});
 }
 
-/// [m/s] that override, rapid traverse and the axes' acceleration on a curve leave.
+/// Feed [m/s], limited by override, rapid traverse and the centripetal acceleration of a curve.
 double ControlledMachine::feedOf(const PathMove& move, bool rapid) const {
   if (rapid) {
     return options.axes.rapid * rapid_override_;
@@ -589,7 +590,7 @@ double ControlledMachine::feedOf(const PathMove& move, bool rapid) const {
   if (modal_.per_turn) {
     feed = modal_.feed * unit() * std::abs(commandedSpeed()) / units::TWO_PI;
   }
-  return std::min({feed * feed_override_ * feed_share_, options.axes.rapid,
+  return std::min({feed * feed_override_ * data_feed_override_, options.axes.rapid,
                    move.curveFeed(options.axes.acceleration).value_or(options.axes.rapid)});
 }
 
@@ -601,8 +602,8 @@ void ControlledMachine::beginMove(double time) {
   wait_until_ = move_.held() ? NEVER : move_.end();
 }
 
-/// The block's next piece of path, if there is one.
-bool ControlledMachine::followMove(double time) {
+/// Begins the next segment of the block's path, if any.
+bool ControlledMachine::beginNextMove(double time) {
   if (pending_.empty()) {
     return false;
   }
@@ -610,10 +611,9 @@ bool ControlledMachine::followMove(double time) {
   return true;
 }
 
-/// What the block waited for has come: the rest of its path, its M word that comes after the motion, or its
-/// end.
-void ControlledMachine::goOn(double time) {
-  if (followMove(time)) {
+/// The wait of the block is over: its next segment, its M word after the motion, or its end.
+void ControlledMachine::continueBlock(double time) {
+  if (beginNextMove(time)) {
     return;
   }
   const int m_code = block_.m_code.value_or(-1);
@@ -621,7 +621,7 @@ void ControlledMachine::goOn(double time) {
   last_m_ = m_code >= 0 ? m_code : last_m_;
   if (m_code == 5 || m_code == 30 || m_code == 2) {
     spindle_.ramp(time, 0.0);
-    turn_ = Turn::off;
+    rotation_ = Rotation::off;
   } else if (m_code == 19 || m_code == 119) {
     orient(time, m_code == 19 ? 0.0 : readVariable(Variables::ORIENT).value_or(-1.0));
   } else {
@@ -635,15 +635,15 @@ void ControlledMachine::goOn(double time) {
       buffer_.clear();
     }
   }
-  wait_until_ = spindle_.settled();
+  wait_until_ = spindle_.settleTime();
 }
 
 void ControlledMachine::orient(double time, double steps) {
   if (!(steps >= 0.0 && steps <= ORIENT_STEPS - 1)) {
-    refuse(time, NcAlarm(PS_MACRO_FORMAT, ALARM_PS, "#1133 IS NOT 0 TO 4095"));
+    raiseProgramAlarm(time, NcAlarm(PS_MACRO_FORMAT, ALARM_PS, "#1133 IS NOT 0 TO 4095"));
     return;
   }
-  turn_ = Turn::off;
+  rotation_ = Rotation::off;
   oriented_ = true;
   spindle_.orient(time, units::TWO_PI * steps / ORIENT_STEPS, ORIENT_SPEED);
 }

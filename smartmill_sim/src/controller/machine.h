@@ -16,24 +16,24 @@
 
 namespace smartmill::sim {
 
-/// Text of the program that has come and has not run.
+/// Received program text that has not run.
 class BlockBuffer {
  public:
-  std::size_t size() const { return text_.size() - at_; }
+  std::size_t size() const { return text_.size() - position_; }
   void append(const char* text, std::size_t size);
   void clear();
-  bool hasLine() const { return text_.find_first_of("\r\n", at_) != std::string::npos; }
-  /// The next line without its end; nothing: none is whole.
+  bool hasLine() const { return text_.find_first_of("\r\n", position_) != std::string::npos; }
+  /// The next line without its end; nullopt: no complete line.
   std::optional<std::string> takeLine();
-  /// At most so much of what waits. [byte]
-  std::string ahead(std::size_t most) const { return text_.substr(at_, most); }
+  /// The next text, at most `most` bytes.
+  std::string preview(std::size_t most) const { return text_.substr(position_, most); }
 
  private:
   std::string text_;
-  std::size_t at_ = 0;
+  std::size_t position_ = 0;
 };
 
-/// The machine behind a Controller: panel, programs, axes, spindle. Knows no lock.
+/// The machine behind a Controller: panel, programs, axes, spindle. Not thread-safe.
 class ControlledMachine {
  public:
   explicit ControlledMachine(const ControllerOptions& options);
@@ -41,7 +41,7 @@ class ControlledMachine {
   void step(double dt);
   MotionState motion() const;
 
-  // What the screen shows.
+  // Indicated state.
   std::array<double, 3> position() const { return move_.position(now_); }
   std::array<double, 3> workPosition() const;
   std::array<double, 3> distanceToGo() const;
@@ -62,18 +62,18 @@ class ControlledMachine {
   void reset();
   void feedHold();
   void setOverrides(double feed, double rapid, double spindle);
-  /// The rungs of the ladder that multiply what the data table holds into the panel's overrides.
-  void followDataTable();
+  /// PMC program: multiplies the overrides of the panel by the percentages of the data table.
+  void updateDataTableOverrides();
   focas::EwCode cycleStart();
   void alarm(const focas::AlarmMessage& message);
   void setSpindleTorque(double torque);
 
   // The DNC session.
-  focas::EwCode open();
-  std::size_t take(const char* data, std::size_t size);
-  focas::EwCode end();
-  void cancel();
-  focas::EwCode abort();
+  focas::EwCode openSession();
+  std::size_t receive(const char* data, std::size_t size);
+  focas::EwCode closeSession();
+  void cancelSession();
+  focas::EwCode takeAbortCode();
 
   // Memory.
   std::optional<double> readVariable(int number) const;
@@ -97,16 +97,16 @@ class ControlledMachine {
     int motion = 1;  // G1
     bool relative = false, inch = false, per_turn = false;
     std::size_t work = 0;
-    double feed = 0.0;   // in the text's unit a minute or a turn
+    double feed = 0.0;   // in units of the text, per minute or per revolution
     double speed = 0.0;  // [rad/s] commanded, without sign and override
   };
-  enum class Turn { off, forwards, backwards };
+  enum class Rotation { off, forwards, backwards };
 
   bool busy() const { return running_ || buffer_.hasLine(); }
   bool moving() const { return now_ < move_.end(); }
   void halt(focas::EwCode why);
   void haltAt(double time, focas::EwCode why);
-  void refuse(double time, const NcAlarm& alarm);
+  void raiseProgramAlarm(double time, const NcAlarm& alarm);
   void beginProgram();
   bool takeBlock(double time);
   void start(double time, const NcBlock& block);
@@ -121,24 +121,24 @@ class ControlledMachine {
   double unit() const;
   void beginMove(double time);
   void replan();
-  void goOn(double time);
-  bool followMove(double time);
+  void continueBlock(double time);
+  bool beginNextMove(double time);
   void orient(double time, double steps);
   double commandedSpeed() const;
-  void watchObstacles();
+  void checkCollision();
 
   // Time is base_ + steps_ dt_ [s].
   double now_ = 0.0, base_ = 0.0, dt_ = 0.0;
   std::uint64_t steps_ = 0;
-  double looked_ = -1.0;  // [s] for obstacles
+  double checked_ = -1.0;  // [s] last check of the obstacles
 
   int mode_;
   bool emergency_ = false, held_ = false, stopped_ = false;                     // stopped: M0
   double held_since_ = 0.0;                                                     // [s]
-  double feed_override_ = 1.0, rapid_override_ = 1.0, spindle_override_ = 1.0;  // of the panel
-  double feed_share_ = 1.0, spindle_share_ = 1.0;                               // of the data table
+  double feed_override_ = 1.0, rapid_override_ = 1.0, spindle_override_ = 1.0;  // set at the panel
+  double data_feed_override_ = 1.0, data_spindle_override_ = 1.0;               // from the data table
 
-  PathMove move_;  // the last one, maybe over
+  PathMove move_;  // the running or last one
   bool move_rapid_ = false;
   struct Pending {
     PathMove move;
@@ -146,17 +146,17 @@ class ControlledMachine {
   };
   std::deque<Pending> pending_;  // of the running block
   SpindleMotion spindle_;
-  Turn turn_ = Turn::off;
+  Rotation rotation_ = Rotation::off;
   bool oriented_ = false;
   double torque_ = 0.0;  // [N m] of the cut
 
   Modal modal_;
   bool session_ = false, from_memory_ = false;
-  focas::EwCode abort_ = focas::EW_OK;  // why the session ended, not yet told
+  focas::EwCode abort_ = focas::EW_OK;  // why the session ended, until reported
   BlockBuffer buffer_;
   bool running_ = false;
-  NcBlock block_;            // the running one
-  double wait_until_ = 0.0;  // [s] it goes on then
+  NcBlock block_;            // the running block
+  double wait_until_ = 0.0;  // [s] end of the running block's wait
   int running_program_ = 0, main_program_ = 0;
   int last_m_ = 0;
 };

@@ -11,7 +11,7 @@ using focas::NumberedType;
 using focas::NumberedValue;
 
 constexpr double MM_PER_MIN = units::MM / 60.0;
-constexpr double AMBIENT = 25.0;  // [deg C] motors that are not modelled to get warm
+constexpr double AMBIENT = 25.0;  // [deg C] motors without a thermal model
 constexpr double POSITION_STEPS = 4096.0;
 
 NumberedValue ofAxes(int number, NumberedType type, std::vector<double> values, int decimals = 0) {
@@ -44,13 +44,13 @@ std::vector<NumberedValue> machineParameters(const ControllerOptions& o) {
     home.push_back(at / units::MM);
   }
   return {
-      single(0, NumberedType::bits, 0x02),                               // ISO code
-      single(20, NumberedType::byte, 9),                                 // I/O channel: embedded Ethernet
-      single(1001, NumberedType::bits, 0),                               // millimetre machine
-      ofAxes(1020, NumberedType::byte, {88, 89, 90}),                    // axis names X Y Z
-      ofAxes(1022, NumberedType::byte, {1, 2, 3}),                       // of the basic system of axes
-      ofAxes(1023, NumberedType::double_word, {1, 2, 3}),                // servo axis numbers
-      ofAxes(1240, NumberedType::real, home, o.info.position_decimals),  // first reference position [mm]
+      single(0, NumberedType::bits, 0x02),                 // ISO code
+      single(20, NumberedType::byte, 9),                   // I/O channel: embedded Ethernet
+      single(1001, NumberedType::bits, 0),                 // millimetre machine
+      ofAxes(1020, NumberedType::byte, {88, 89, 90}),      // axis names X Y Z
+      ofAxes(1022, NumberedType::byte, {1, 2, 3}),         // axes of the basic coordinate system
+      ofAxes(1023, NumberedType::double_word, {1, 2, 3}),  // servo axis numbers
+      ofAxes(1240, NumberedType::real, home, o.info.position_decimals),       // first reference position [mm]
       ofAxes(1320, NumberedType::real, travel(1), o.info.position_decimals),  // stroke limits [mm]
       ofAxes(1321, NumberedType::real, travel(0), o.info.position_decimals),
       single(1410, NumberedType::real, rapid, 1),                // dry run [mm/min]
@@ -67,16 +67,17 @@ std::vector<NumberedValue> machineParameters(const ControllerOptions& o) {
 std::vector<NumberedValue> machineDiagnoses(const DiagnosisState& state) {
   const double steps = state.spindle_angle / units::TWO_PI * POSITION_STEPS;
   return {
-      single(0, NumberedType::byte, state.waits_for_m ? 1 : 0),         // waits for FIN
-      single(1, NumberedType::byte, state.moves ? 1 : 0),               // motion
-      single(2, NumberedType::byte, state.dwells ? 1 : 0),              // dwell
-      single(5, NumberedType::byte, state.at_zero_feed ? 1 : 0),        // feed override 0 %
-      ofAxes(300, NumberedType::double_word, all(0.0)),                 // servo error: an ideal follower
-      ofAxes(308, NumberedType::byte, all(AMBIENT)),                    // servo motor temperature [deg C]
-      ofAxes(309, NumberedType::byte, all(AMBIENT)),                    // encoder temperature [deg C]
-      single(403, NumberedType::byte, AMBIENT),                         // spindle motor temperature [deg C]
-      single(410, NumberedType::real, state.spindle_load, 2),           // spindle load meter [percent]
-      single(445, NumberedType::double_word, static_cast<int>(steps)),  // spindle position, 4096 a turn
+      single(0, NumberedType::byte, state.waits_for_m ? 1 : 0),   // waits for FIN
+      single(1, NumberedType::byte, state.moves ? 1 : 0),         // motion
+      single(2, NumberedType::byte, state.dwells ? 1 : 0),        // dwell
+      single(5, NumberedType::byte, state.at_zero_feed ? 1 : 0),  // feed override 0 %
+      ofAxes(300, NumberedType::double_word, all(0.0)),           // servo error: ideal axes
+      ofAxes(308, NumberedType::byte, all(AMBIENT)),              // servo motor temperature [deg C]
+      ofAxes(309, NumberedType::byte, all(AMBIENT)),              // encoder temperature [deg C]
+      single(403, NumberedType::byte, AMBIENT),                   // spindle motor temperature [deg C]
+      single(410, NumberedType::real, state.spindle_load, 2),     // spindle load meter [percent]
+      single(445, NumberedType::double_word,
+             static_cast<int>(steps)),  // spindle position, 4096 per revolution
   };
 }
 

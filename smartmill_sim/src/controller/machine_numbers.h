@@ -6,18 +6,18 @@
 
 namespace smartmill::sim {
 
-constexpr double LOOP_GAIN = 3000.0;  ///< [0.01/s] of the axes' position loops, as machines of this kind have
+constexpr double LOOP_GAIN = 3000.0;  ///< [0.01/s] of the axes' position loops, a typical value
 
-/// What the diagnosis numbers tell of now.
+/// State behind the diagnosis numbers.
 struct DiagnosisState {
   bool waits_for_m = false, moves = false, dwells = false, at_zero_feed = false;
   double spindle_load = 0.0;   ///< [percent]
   double spindle_angle = 0.0;  ///< [rad]
 };
 
-/// Parameters of a 30i that follow from how the machine is made.
+/// Parameters of a 30i that follow from the machine's options.
 std::vector<focas::NumberedValue> machineParameters(const ControllerOptions& options);
-/// Diagnosis numbers of a 30i.
+/// Diagnosis numbers of a 30i for a state.
 std::vector<focas::NumberedValue> machineDiagnoses(const DiagnosisState& state);
 
 /// Those with numbers from first to last.

@@ -7,8 +7,8 @@
 namespace smartmill::sim {
 namespace {
 
-/// Only what the control looks at: no blanks, no comments, upper case.
-std::string significant(const std::string& line) {
+/// The line without blanks and comments, in upper case.
+std::string significantText(const std::string& line) {
   std::string text;
   bool comment = false;
   for (const char c : line) {
@@ -26,64 +26,64 @@ std::string significant(const std::string& line) {
   return text;
 }
 
-void once(bool already, char address) {
+void refuseRepeated(bool already, char address) {
   if (already) {
     illegalAddress(std::string("TWICE ") + address);
   }
 }
 
 template <class T>
-void setOnce(std::optional<T>& word, const std::optional<T>& content, char address) {
-  once(word.has_value(), address);
+void setWord(std::optional<T>& word, const std::optional<T>& content, char address) {
+  refuseRepeated(word.has_value(), address);
   word = content;
 }
 
-void gCode(int code, NcBlock& block, bool& dwell) {
+void readGCode(int code, NcBlock& block, bool& dwell) {
   switch (code) {
     case 0:
     case 1:
     case 2:
     case 3:
-      once(dwell, 'G');
-      setOnce<int>(block.motion, code, 'G');
+      refuseRepeated(dwell, 'G');
+      setWord<int>(block.motion, code, 'G');
       return;
     case 4:
-      once(block.motion.has_value() || dwell, 'G');
+      refuseRepeated(block.motion.has_value() || dwell, 'G');
       dwell = true;
       return;
     case 17:
       return;  // the only plane of arcs
     case 20:
     case 21:
-      setOnce<bool>(block.inch, code == 20, 'G');
+      setWord<bool>(block.inch, code == 20, 'G');
       return;
     case 28:
-      once(block.reference || block.machine, 'G');
+      refuseRepeated(block.reference || block.machine, 'G');
       block.reference = true;
       return;
     case 53:
-      once(block.reference || block.machine, 'G');
+      refuseRepeated(block.reference || block.machine, 'G');
       block.machine = true;
       return;
     case 90:
     case 91:
-      setOnce<bool>(block.relative, code == 91, 'G');
+      setWord<bool>(block.relative, code == 91, 'G');
       return;
     case 94:
     case 95:
-      setOnce<bool>(block.per_turn, code == 95, 'G');
+      setWord<bool>(block.per_turn, code == 95, 'G');
       return;
     default:
       if (code >= 54 && code <= 59) {
-        setOnce<int>(block.work, code - 54, 'G');
+        setWord<int>(block.work, code - 54, 'G');
         return;
       }
       throw NcAlarm(PS_IMPROPER_G, ALARM_PS, "IMPROPER G-CODE G" + std::to_string(code));
   }
 }
 
-void mCode(int code, NcBlock& block) {
-  once(block.m_code.has_value(), 'M');
+void readMCode(int code, NcBlock& block) {
+  refuseRepeated(block.m_code.has_value(), 'M');
   for (const int known : {0, 2, 3, 4, 5, 19, 30, 119}) {
     if (code == known) {
       block.m_code = code;
@@ -94,7 +94,7 @@ void mCode(int code, NcBlock& block) {
 }
 
 /// In G4 the words X (s) and P (ms) are times.
-void takeDwell(NcBlock& block, const std::optional<double>& milliseconds) {
+void readDwell(NcBlock& block, const std::optional<double>& milliseconds) {
   if (block.axis[1] || block.axis[2] || block.axis[0].has_value() == milliseconds.has_value()) {
     illegalAddress("IN G4");
   }
@@ -107,8 +107,8 @@ void takeDwell(NcBlock& block, const std::optional<double>& milliseconds) {
 
 NcBlock parseAssignment(NcReader& reader) {
   NcBlock block;
-  if (reader.take("N")) {
-    block.sequence = reader.whole("N");
+  if (reader.accept("N")) {
+    block.sequence = reader.integer("N");
   }
   reader.next();
   block.macro = reader.number("#");
@@ -122,52 +122,52 @@ NcBlock parseAssignment(NcReader& reader) {
   return block;
 }
 
-/// Words of a macro program's flow, which this control does not have.
+/// Refuses control flow of macro programs, which this control does not support.
 void refuseFlow(NcReader& reader) {
   for (const char* word : {"IF", "WHILE", "GOTO", "DO", "END", "THEN"}) {
-    if (reader.take(word)) {
+    if (reader.accept(word)) {
       throw NcAlarm(PS_MACRO_FORMAT, ALARM_PS, std::string(word) + " IS NOT KNOWN");
     }
   }
 }
 
-void takeWord(char address, NcReader& reader, NcBlock& block, bool& dwell,
+void readWord(char address, NcReader& reader, NcBlock& block, bool& dwell,
               std::optional<double>& milliseconds) {
   const std::string name(1, address);
   switch (address) {
     case 'O':
     case ':':
-      setOnce(block.program, reader.whole(name), address);
+      setWord(block.program, reader.integer(name), address);
       break;
     case 'N':
-      setOnce(block.sequence, reader.whole(name), address);
+      setWord(block.sequence, reader.integer(name), address);
       break;
     case 'G':
-      gCode(reader.number(name), block, dwell);
+      readGCode(reader.number(name), block, dwell);
       break;
     case 'X':
     case 'Y':
     case 'Z':
-      setOnce(block.axis[static_cast<std::size_t>(address - 'X')], reader.value(name), address);
+      setWord(block.axis[static_cast<std::size_t>(address - 'X')], reader.value(name), address);
       break;
     case 'I':
     case 'J':
-      setOnce(block.centre[static_cast<std::size_t>(address - 'I')], reader.value(name), address);
+      setWord(block.centre[static_cast<std::size_t>(address - 'I')], reader.value(name), address);
       break;
     case 'R':
-      setOnce(block.radius, reader.value(name), address);
+      setWord(block.radius, reader.value(name), address);
       break;
     case 'P':
-      setOnce(milliseconds, reader.value(name), address);
+      setWord(milliseconds, reader.value(name), address);
       break;
     case 'F':
-      setOnce(block.feed, reader.value(name), address);
+      setWord(block.feed, reader.value(name), address);
       break;
     case 'S':
-      setOnce(block.speed, reader.value(name), address);
+      setWord(block.speed, reader.value(name), address);
       break;
     case 'M':
-      mCode(reader.number(name), block);
+      readMCode(reader.number(name), block);
       break;
     default:
       illegalAddress(name);
@@ -180,10 +180,10 @@ NcBlock parseWords(NcReader& reader) {
   std::optional<double> milliseconds;
   while (!reader.done()) {
     refuseFlow(reader);
-    takeWord(reader.next(), reader, block, dwell, milliseconds);
+    readWord(reader.next(), reader, block, dwell, milliseconds);
   }
   if (dwell) {
-    takeDwell(block, milliseconds);
+    readDwell(block, milliseconds);
   } else if (milliseconds) {
     illegalAddress("P");
   }
@@ -200,11 +200,11 @@ NcAlarm::NcAlarm(int number, int type, const std::string& text, int axis)
 }
 
 NcBlock parseBlock(const std::string& line, const NcVariables& variables) {
-  const std::string text = significant(line);
+  const std::string text = significantText(line);
   if (text.empty() || text[0] == '%') {
     return {};
   }
-  // A sequence number may stand before an assignment.
+  // A sequence number may precede an assignment.
   const std::size_t first = text[0] == 'N' ? text.find_first_not_of("0123456789", 1) : 0;
   NcReader reader(text, variables);
   return first != std::string::npos && text[first] == '#' && first != 1 ? parseAssignment(reader)

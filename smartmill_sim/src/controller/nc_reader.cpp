@@ -11,7 +11,7 @@ namespace smartmill::sim {
 namespace {
 
 constexpr std::size_t MAX_DIGITS = 12;
-constexpr int MAX_DEPTH = 5;  // of brackets, as a 30i has it
+constexpr int MAX_DEPTH = 5;  // of brackets, as on a 30i
 constexpr double MAX_WHOLE = 99999999.0;
 
 [[noreturn]] void badFormat() {
@@ -24,17 +24,17 @@ void illegalAddress(const std::string& what) {
   throw NcAlarm(PS_ILLEGAL_ADDRESS, ALARM_PS, "IMPROPER NC ADDRESS " + what);
 }
 
-bool NcReader::take(const std::string& word) {
-  if (text_.compare(at_, word.size(), word) != 0) {
+bool NcReader::accept(const std::string& word) {
+  if (text_.compare(position_, word.size(), word) != 0) {
     return false;
   }
-  at_ += word.size();
+  position_ += word.size();
   return true;
 }
 
 std::optional<double> NcReader::value(const std::string& address) {
   const std::size_t sign = peek() == '-' || peek() == '+' ? 1 : 0;
-  const char first = at_ + sign < text_.size() ? text_[at_ + sign] : '\0';
+  const char first = position_ + sign < text_.size() ? text_[position_ + sign] : '\0';
   if (first != '#' && first != '[') {
     return literal(address);
   }
@@ -43,7 +43,7 @@ std::optional<double> NcReader::value(const std::string& address) {
   return content && minus ? std::optional<double>(-*content) : content;
 }
 
-std::optional<int> NcReader::whole(const std::string& address) {
+std::optional<int> NcReader::integer(const std::string& address) {
   const std::optional<double> content = value(address);
   if (!content) {
     return std::nullopt;
@@ -55,7 +55,7 @@ std::optional<int> NcReader::whole(const std::string& address) {
 }
 
 int NcReader::number(const std::string& address) {
-  const std::optional<int> content = whole(address);
+  const std::optional<int> content = integer(address);
   if (!content) {
     illegalAddress(address);
   }
@@ -101,16 +101,16 @@ std::optional<double> NcReader::term() {
   if (peek() == '[') {
     return bracket();
   }
-  if (take("SIN[")) {
-    --at_;
+  if (accept("SIN[")) {
+    --position_;
     return std::sin(bracket() * units::PI / 180.0);
   }
-  if (take("COS[")) {
-    --at_;
+  if (accept("COS[")) {
+    --position_;
     return std::cos(bracket() * units::PI / 180.0);
   }
-  if (take("SQRT[")) {
-    --at_;
+  if (accept("SQRT[")) {
+    --position_;
     const double content = bracket();
     if (content < 0.0) {
       throw NcAlarm(PS_ILLEGAL_ARGUMENT, ALARM_PS, "ILLEGAL ARGUMENT");
@@ -155,19 +155,19 @@ double NcReader::bracket() {
 
 /// Sign, digits, at most one point; no exponent.
 double NcReader::literal(const std::string& address) {
-  const std::size_t start = at_;
-  at_ += !done() && (peek() == '-' || peek() == '+') ? 1 : 0;
+  const std::size_t start = position_;
+  position_ += !done() && (peek() == '-' || peek() == '+') ? 1 : 0;
   std::size_t digits = 0, points = 0;
-  for (; !done(); ++at_) {
-    if (std::isdigit(static_cast<unsigned char>(text_[at_])) != 0) {
+  for (; !done(); ++position_) {
+    if (std::isdigit(static_cast<unsigned char>(text_[position_])) != 0) {
       ++digits;
-    } else if (text_[at_] == '.') {
+    } else if (text_[position_] == '.') {
       ++points;
     } else {
       break;
     }
   }
-  const std::string written = text_.substr(start, at_ - start);
+  const std::string written = text_.substr(start, position_ - start);
   if (digits == 0 || points > 1) {
     illegalAddress(address + written);
   }

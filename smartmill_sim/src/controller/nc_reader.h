@@ -7,7 +7,7 @@
 
 namespace smartmill::sim {
 
-// Numbers of program alarms, as a 30i has them.
+// Numbers of program alarms of a 30i.
 constexpr int PS_TOO_MANY_DIGITS = 3;
 constexpr int PS_ILLEGAL_ADDRESS = 9;
 constexpr int PS_IMPROPER_G = 10;
@@ -17,27 +17,27 @@ constexpr int PS_ILLEGAL_ARGUMENT = 119;
 
 [[noreturn]] void illegalAddress(const std::string& what);
 
-/// Walks over the significant characters of a block and reads values. A value is empty when it is a vacant
-/// variable alone; within an expression a vacant variable is 0.
+/// Reads values from the significant characters of a block. The value of a single vacant variable is empty;
+/// within an expression a vacant variable is 0.
 class NcReader {
  public:
   NcReader(const std::string& text, const NcVariables& variables) : text_(text), variables_(variables) {}
 
-  bool done() const { return at_ == text_.size(); }
-  char peek() const { return done() ? '\0' : text_[at_]; }
-  char next() { return done() ? '\0' : text_[at_++]; }
-  /// Takes the word when it stands here.
-  bool take(const std::string& word);
-  /// What is left.
-  std::string rest() const { return text_.substr(at_); }
+  bool done() const { return position_ == text_.size(); }
+  char peek() const { return done() ? '\0' : text_[position_]; }
+  char next() { return done() ? '\0' : text_[position_++]; }
+  /// Consumes a word at the present position. @return whether it was there
+  bool accept(const std::string& word);
+  /// The remaining text.
+  std::string rest() const { return text_.substr(position_); }
 
-  /// Behind an address: a number, #n or [expression], with a sign.
+  /// Value after an address: a number, #n or [expression], with a sign.
   std::optional<double> value(const std::string& address);
-  /// A whole number from 0 on; at most 99999999.
-  std::optional<int> whole(const std::string& address);
-  /// The same that must not be vacant.
+  /// An integer 0..99999999.
+  std::optional<int> integer(const std::string& address);
+  /// As integer(), but not vacant.
   int number(const std::string& address);
-  /// Sum of products behind "#n=".
+  /// Sum of products after "#n=".
   std::optional<double> expression();
 
  private:
@@ -49,7 +49,7 @@ class NcReader {
 
   const std::string& text_;
   const NcVariables& variables_;
-  std::size_t at_ = 0;
+  std::size_t position_ = 0;
   int depth_ = 0;
 };
 

@@ -38,13 +38,13 @@ PathMove PathMove::arc(const Point& start, const Point& target, const std::array
 
 void PathMove::plan(double time, double feed, double acceleration) {
   const double done = distance(time), now = speed(time);
-  const double left = std::max(0.0, length_ - done);
+  const double remaining = std::max(0.0, length_ - done);
   begin_ = time;
   from_distance_ = done;
   acceleration_ = acceleration;
   first_ = now;
-  // The ramps alone take (peak^2 - first^2) / 2a and peak^2 / 2a; a shorter way has a triangle of speed.
-  peak_ = std::min(feed, std::sqrt(left * acceleration + 0.5 * now * now));
+  // The ramps need (peak^2 - first^2) / 2a and peak^2 / 2a; a shorter path has a triangular profile.
+  peak_ = std::min(feed, std::sqrt(remaining * acceleration + 0.5 * now * now));
   if (feed <= 0.0) {
     peak_ = now;
     ramp_ = steady_ = 0.0;
@@ -56,7 +56,7 @@ void PathMove::plan(double time, double feed, double acceleration) {
     end_distance_ = length_;
     ramp_ = std::abs(peak_ - now) / acceleration;
     const double ramps = 0.5 * (std::abs(peak_ * peak_ - now * now) + peak_ * peak_) / acceleration;
-    steady_ = peak_ > 0.0 ? std::max(0.0, (left - ramps) / peak_) : 0.0;
+    steady_ = peak_ > 0.0 ? std::max(0.0, (remaining - ramps) / peak_) : 0.0;
   }
   down_ = peak_ / acceleration;
   duration_ = ramp_ + steady_ + down_;
@@ -73,13 +73,13 @@ void PathMove::stop(double time, double acceleration) {
 
 double PathMove::distance(double time) const {
   const double since = time - begin_;
-  const double left = duration_ - since;
-  if (left <= 0.0) {
+  const double remaining = duration_ - since;
+  if (remaining <= 0.0) {
     return end_distance_;
   }
-  // From the nearer end, so that both are exact.
-  if (left < down_) {
-    return end_distance_ - 0.5 * acceleration_ * left * left;
+  // Measured from the nearer end, so that both ends are exact.
+  if (remaining < down_) {
+    return end_distance_ - 0.5 * acceleration_ * remaining * remaining;
   }
   const double a = std::copysign(acceleration_, peak_ - first_);
   if (since < ramp_) {
@@ -90,12 +90,12 @@ double PathMove::distance(double time) const {
 
 double PathMove::speed(double time) const {
   const double since = time - begin_;
-  const double left = duration_ - since;
-  if (left <= 0.0) {
+  const double remaining = duration_ - since;
+  if (remaining <= 0.0) {
     return 0.0;
   }
-  if (left < down_) {
-    return acceleration_ * left;
+  if (remaining < down_) {
+    return acceleration_ * remaining;
   }
   return since < ramp_ ? first_ + std::copysign(acceleration_, peak_ - first_) * since : peak_;
 }
@@ -109,7 +109,7 @@ PathMove::Point PathMove::at(double distance) const {
   }
   const double share = distance / length_;
   Point point;
-  // From the nearer end.
+  // Measured from the nearer end.
   for (std::size_t i = 0; i < 3; ++i) {
     point[i] = share < 0.5 ? start_[i] + share * (target_[i] - start_[i])
                            : target_[i] - (1.0 - share) * (target_[i] - start_[i]);
@@ -162,7 +162,7 @@ std::array<std::array<double, 2>, 2> PathMove::extent() const {
   if (radius_ == 0.0) {
     return ends;
   }
-  // Where the arc crosses an axis through its centre it is farthest out.
+  // Extrema of an arc: crossings of the axes through its centre.
   for (int quarter = -8; quarter <= 8; ++quarter) {
     const double angle = 0.5 * units::PI * quarter;
     const double share = (angle - start_angle_) / sweep_;

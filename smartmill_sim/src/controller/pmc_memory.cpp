@@ -51,21 +51,21 @@ PmcMemory::PmcMemory() {
   for (std::size_t i = 0; i < areas_.size(); ++i) {
     areas_[i].assign(SIZES[i], 0);
   }
-  show(PmcSignals{});
+  update(PmcSignals{});
 }
 
 std::uint8_t& PmcMemory::at(PmcArea area, std::size_t address) {
   return areas_[static_cast<std::size_t>(area)][address];
 }
 
-/// The low byte stands first.
+/// Little-endian.
 void PmcMemory::put(PmcArea area, std::size_t address, std::uint32_t value, std::size_t bytes) {
   for (std::size_t i = 0; i < bytes; ++i) {
     at(area, address + i) = static_cast<std::uint8_t>(value >> (8 * i));
   }
 }
 
-void PmcMemory::show(const PmcSignals& s) {
+void PmcMemory::update(const PmcSignals& s) {
   const auto bit = [](bool on, std::uint8_t mask) { return static_cast<std::uint8_t>(on ? mask : 0); };
   at(PmcArea::f, F_OPERATION) =
       bit(s.operating, OP) | bit(!s.emergency, SA) | bit(s.started, STL) | bit(s.held, SPL);

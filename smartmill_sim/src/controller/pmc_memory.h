@@ -8,7 +8,7 @@
 
 namespace smartmill::sim {
 
-/// What the control and its panel tell the PMC now.
+/// Present signals of the control and its panel to the PMC.
 struct PmcSignals {
   int mode = focas::AUT_MDI;
   bool operating = false, started = false, held = false, alarm = false, emergency = false;
@@ -19,17 +19,17 @@ struct PmcSignals {
   double feed_override = 1.0, spindle_override = 1.0;
 };
 
-/// Of the data table: percent that the ladder multiplies into the feed override; the next one into the
-/// spindle's. 0: nothing.
+/// Address in the data table: percentage on the feed override, next address: on the spindle override; 0: no
+/// effect.
 constexpr int OVERRIDE_DATA = 500;
 
-/// Addresses of the PMC of a 30i (sizes of its first path). Signals of the control (F) and of the panel (G,
-/// X) stand for themselves: what is written there the ladder overwrites at once.
+/// Memory of the PMC of a 30i (area sizes of its first path). The PMC program overwrites signals of the
+/// control (F) and of the panel (G, X) at once.
 class PmcMemory {
  public:
   PmcMemory();
-  /// Brings the signals' bytes up to date.
-  void show(const PmcSignals& signals);
+  /// Updates the bytes of the signals.
+  void update(const PmcSignals& signals);
   focas::EwCode read(focas::PmcArea area, int first, int last, focas::Bytes* bytes) const;
   focas::EwCode write(focas::PmcArea area, int first, const focas::Bytes& bytes);
 

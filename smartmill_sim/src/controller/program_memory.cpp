@@ -8,7 +8,7 @@
 namespace smartmill::sim {
 namespace {
 
-/// O number at the start of a line; nothing: the line is of another kind.
+/// O number at the start of a line; nullopt: another line.
 std::optional<int> numberOf(const std::string& line) {
   if (line.empty() || (line[0] != 'O' && line[0] != 'o' && line[0] != ':')) {
     return std::nullopt;

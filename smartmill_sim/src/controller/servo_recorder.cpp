@@ -10,11 +10,11 @@ void ServoRecorder::push(const Input& input) {
     cut_[i] += input.force[i];
   }
   ++cut_count_;
-  const std::uint64_t due = static_cast<std::uint64_t>(std::floor(input.time * SAMPLE_RATE + 1e-9));
-  if (any_ && due < index_) {
+  const std::uint64_t index = static_cast<std::uint64_t>(std::floor(input.time * SAMPLE_RATE + 1e-9));
+  if (started_ && index < index_) {
     return;
   }
-  const double step = any_ ? input.time - last_time_ : 0.0;
+  const double step = started_ ? input.time - last_time_ : 0.0;
   for (std::size_t i = 0; i < 3; ++i) {
     const double v = input.motion.velocity[i];
     const double acceleration = step > 0.0 ? (v - last_velocity_[i]) / step : 0.0;
@@ -29,10 +29,10 @@ void ServoRecorder::push(const Input& input) {
   triggered_ = triggered_ || (trigger_ > 0 && input.motion.sequence == trigger_ && sequence_ != trigger_);
   sequence_ = input.motion.sequence;
   if (samples_.empty()) {
-    block_index_ = due;
+    block_index_ = index;
   }
-  index_ = due + 1;
-  any_ = true;
+  index_ = index + 1;
+  started_ = true;
   samples_.push_back(input.spindle_load);
   samples_.insert(samples_.end(), current_.begin(), current_.end());
   samples_.push_back(sequence_);

@@ -30,13 +30,13 @@ void SpindleMotion::ramp(double time, double speed) {
 }
 
 void SpindleMotion::plan(double time) {
-  begin(time);
+  restart(time);
   double now = phases_.back().speed;
   const bool slower = std::abs(target_) < std::abs(now) || target_ * now < 0.0;
   if (slower && now != 0.0) {
-    const double rest = target_ * now > 0.0 ? target_ : 0.0;
-    append(std::abs(now - rest) / down_, std::copysign(down_, rest - now), rest);
-    now = rest;
+    const double next_speed = target_ * now > 0.0 ? target_ : 0.0;
+    append(std::abs(now - next_speed) / down_, std::copysign(down_, next_speed - now), next_speed);
+    now = next_speed;
   }
   if (overloaded()) {
     if (now != 0.0 && up_ < 0.0) {
@@ -51,12 +51,12 @@ void SpindleMotion::orient(double time, double angle, double turn_speed) {
   up_ = down_ = drive_;
   ramp(time, 0.0);
   orienting_ = true;
-  const double way = wrapped(angle - phases_.back().angle);
-  if (way > 0.0) {
-    const double peak = std::min(turn_speed, std::sqrt(way * drive_));
+  const double rotation = wrapped(angle - phases_.back().angle);
+  if (rotation > 0.0) {
+    const double peak = std::min(turn_speed, std::sqrt(rotation * drive_));
     const double ramp_time = peak / drive_;
     append(ramp_time, drive_, peak);
-    append(std::max(0.0, way / peak - ramp_time), 0.0, peak);
+    append(std::max(0.0, rotation / peak - ramp_time), 0.0, peak);
     append(ramp_time, -drive_, 0.0);
   }
   phases_.back().angle = angle;
@@ -81,8 +81,8 @@ const SpindleMotion::Phase& SpindleMotion::phaseAt(double time) const {
   return phases_[i];
 }
 
-/// Forgets what was planned: one phase from the state at time on.
-void SpindleMotion::begin(double time) {
+/// Drops the plan: one phase that begins with the state at a time [s].
+void SpindleMotion::restart(double time) {
   const Phase now{time, angle(time), speed(time), 0.0};
   phases_.assign(1, now);
 }

@@ -9,7 +9,7 @@ constexpr int LAST_LOCAL = 33;
 constexpr int BLOCK_END = 5001, MACHINE = 5021, WORK = 5041;  // first of three
 constexpr int OFFSETS = 5221, OFFSET_STRIDE = 20;
 
-/// Axis of a variable of a group of three; nothing: not of it.
+/// Axis of a variable in a group of three; nullopt: not in the group.
 std::optional<std::size_t> axisOf(int number, int first) {
   return number >= first && number < first + 3 ? std::optional<std::size_t>(number - first) : std::nullopt;
 }

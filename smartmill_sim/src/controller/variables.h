@@ -6,17 +6,17 @@
 
 namespace smartmill::sim {
 
-/// Macro variables: local #1..#33, common #100..#199 and #500..#999, #1133 that M119 reads, work offsets
-/// #5221..#5323 (mm, 20 a system), and read-only positions of x, y, z (mm): #5001.. end of the last block,
-/// #5021.. machine, #5041.. workpiece.
+/// Macro variables: local #1..#33, common #100..#199 and #500..#999, #1133 (angle of M119), work offsets
+/// #5221..#5323 (mm, 20 numbers per system), and read-only positions of x, y, z (mm): #5001.. end of the last
+/// block, #5021.. machine, #5041.. workpiece.
 class Variables {
  public:
   using Point = std::array<double, 3>;
   static constexpr int ORIENT = 1133;  // Dunwoody 6.2
-  static constexpr int VACANT = 0;     // programs may read it, it has no value
+  static constexpr int VACANT = 0;     // readable, without a value
   static constexpr std::size_t SYSTEMS = 6;
 
-  /// Positions [m] of now; offsets are kept here.
+  /// Present positions [m].
   struct Positions {
     Point end{{0, 0, 0}}, machine{{0, 0, 0}}, work{{0, 0, 0}};
   };
@@ -26,7 +26,7 @@ class Variables {
   static bool exists(int number);
   static bool writable(int number);
   std::optional<double> read(int number, const Positions& positions) const;
-  /// Of a writable one; nothing: vacant (an offset becomes 0).
+  /// Writes a writable variable; nullopt: vacant (an offset becomes 0).
   void write(int number, std::optional<double> value);
   void clearLocals();
 

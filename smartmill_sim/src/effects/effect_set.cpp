@@ -30,7 +30,7 @@ EffectSet::EffectSet(const MachineModel& model) {
     if (!kind) throw Error(model.file + ": effects: '" + entry.name + "' is not an effect of the catalogue");
     listed.emplace_back(kind, &entry);
   }
-  // Within a stage empirical effects come first: nothing acts after the clipping of a signal.
+  // Within a stage empirical effects act first, so that the clipping of a signal is last.
   std::stable_sort(listed.begin(), listed.end(), [](const Listed& a, const Listed& b) {
     const auto order = [](const EffectKind& kind) {
       return std::make_tuple(kind.stage, !kind.empirical(), kind.rank, kind.name);
@@ -70,10 +70,10 @@ void EffectSet::measure(Stage stage, const Instant& now, ChannelValues& channels
 }
 
 ChannelValues EffectSet::limits() const {
-  ChannelValues most;
-  most.fill(std::numeric_limits<double>::infinity());
-  for (const Member& m : effects_) m.effect->applyLimit(most);
-  return most;
+  ChannelValues limits;
+  limits.fill(std::numeric_limits<double>::infinity());
+  for (const Member& m : effects_) m.effect->applyLimit(limits);
+  return limits;
 }
 
 std::vector<Tone*> EffectSet::tones() {

@@ -5,14 +5,14 @@
 namespace smartmill::sim {
 
 ShelfFilter::ShelfFilter(const Shelf& shelf, double time_step) : shelf_(shelf) {
-  const double turned = units::TWO_PI * shelf.corner * time_step, lost = -std::expm1(-turned);
-  keep_ = 1.0 - lost;
-  now_ = 1.0 - lost / turned;
-  before_ = lost / turned - keep_;
+  const double angle = units::TWO_PI * shelf.corner * time_step, loss = -std::expm1(-angle);
+  decay_ = 1.0 - loss;
+  weight_now_ = 1.0 - loss / angle;
+  weight_before_ = loss / angle - decay_;
 }
 
 double ShelfFilter::step(double value) {
-  low_ = keep_ * low_ + now_ * value + before_ * last_;
+  low_ = decay_ * low_ + weight_now_ * value + weight_before_ * last_;
   last_ = value;
   return shelf_.above * value + (shelf_.below - shelf_.above) * low_;
 }

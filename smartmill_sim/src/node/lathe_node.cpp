@@ -20,10 +20,10 @@
 
 namespace smartmill::sim {
 
-constexpr double LOOK_AGAIN = 1e-3;  // [s]
+constexpr double POLL_PERIOD = 1e-3;  // [s]
 
 /// The simulated lathe on ROS: probes on daq/displacement, an accelerometer on daq/vibration, the spindle on
-/// spindle/angle; a fast tool servo that takes control/command. Paced by the clock.
+/// spindle/angle; the fast tool servo follows control/command. Runs in wall-clock time.
 class LatheNode {
  public:
   using Parameters = LatheParameters;
@@ -36,7 +36,7 @@ class LatheNode {
         angle_(nh.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, STREAM_QUEUE)),
         shell_(nh, private_nh, "simulated lathe", 1.0) {
     if (ros::Time::isSimTime())
-      throw Error("/use_sim_time is set: the simulated machine runs by the real clock");
+      throw Error("/use_sim_time is set: the simulated machine runs in wall-clock time");
     shell_.inputs().on<smartmill_msgs::SampleBlock>(names::CONTROL_COMMAND,
                                                     [this](const smartmill_msgs::SampleBlock& block, double) {
                                                       const std::lock_guard<std::mutex> lock(mutex_);
@@ -65,9 +65,9 @@ class LatheNode {
       Lathe::Block block;
       {
         std::unique_lock<std::mutex> lock(mutex_);
-        if (parameters_.await_commands && !lathe_.commanded(size)) {
+        if (parameters_.await_commands && !lathe_.hasCommands(size)) {
           lock.unlock();
-          std::this_thread::sleep_for(std::chrono::duration<double>(LOOK_AGAIN));
+          std::this_thread::sleep_for(std::chrono::duration<double>(POLL_PERIOD));
           continue;
         }
         block = lathe_.advance(size);
@@ -89,9 +89,9 @@ class LatheNode {
   }
 
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
-    status.summary(diagnostic_msgs::DiagnosticStatus::OK, "turns");
-    status.addf("commands that came late", "%llu", static_cast<unsigned long long>(late_.load()));
-    status.addf("motion of the tool against the work, root mean square of a block [m]", "%.3g",
+    status.summary(diagnostic_msgs::DiagnosticStatus::OK, "running");
+    status.addf("late commands [1]", "%llu", static_cast<unsigned long long>(late_.load()));
+    status.addf("relative motion of tool and work, standard deviation over a block [m]", "%.3g",
                 motion_.load());
   }
 

@@ -17,11 +17,10 @@ struct LatheParameters {
         "units throughout.");
     lathe.declare(table);
     table.section();
-    table.number("block", block, "s", Range::closed(1e-4, 0.1), "of samples that are published together");
-    table.flag(
-        "await_commands", await_commands,
-        "time stands until commands have come for the samples that follow (on a computer with other work); "
-        "no real lathe waits");
+    table.number("block", block, "s", Range::closed(1e-4, 0.1), "duration of a published block");
+    table.flag("await_commands", await_commands,
+               "the simulation waits for the commands of the next samples (for a loaded computer); a real "
+               "lathe does not wait");
   }
   /// @throws Error naming key and value.
   void validate() const {

@@ -24,14 +24,14 @@ namespace {
 
 constexpr double TRUTH_STEP = 2.0, TRUTH_END = 6000.0;  // [Hz] lines of the true FRFs
 constexpr double BLOCK_TIME = World::BLOCK / World::SAMPLE_RATE;
-constexpr double LOOK_AGAIN = 2e-3;  // [s]
-constexpr double MOST_WAIT = 0.8;    // [1] of most_behind, for where the axes are led
+constexpr double POLL_PERIOD = 2e-3;  // [s]
+constexpr double WAIT_SHARE = 0.8;    // [1] of most_behind: wait for an external controller
 
 NodeParameters read(const ros::NodeHandle& private_nh) {
   NodeParameters parameters = parametersFromServer(private_nh).readAll<NodeParameters>();
-  if (parameters.model.empty()) throw Error("model: the path of a smartmill-model/1 file is due");
+  if (parameters.model.empty()) throw Error("model: empty, expected the path of a smartmill-model/1 file");
   if (ros::Time::isSimTime())
-    throw Error("/use_sim_time is set: the simulated machine runs by the real clock");
+    throw Error("/use_sim_time is set: the simulated machine runs in wall-clock time");
   return parameters;
 }
 
@@ -62,7 +62,7 @@ Node::Node(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
 
   start_ = toSec(ros::Time::now());
   publishTruth();
-  offerHands();
+  advertiseManualActions();
   strike_server_ = nh_.advertiseService(names::STRIKE, &Node::strike, this);
   shell_.diagnose("simulated machine", [this](auto& status) { diagnose(status); });
   thread_ = std::thread([this] { run(); });
@@ -73,7 +73,7 @@ void Node::serve() {
   options.port = static_cast<std::uint16_t>(parameters_.port);
   options.bind_address = parameters_.bind;
   server_ = std::make_unique<focas::Server>(options, world_->controller());
-  offerPanel();
+  advertisePanel();
   angle_ = nh_.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, STREAM_QUEUE);
   ROS_INFO("sim: controller listens on %s:%d", parameters_.bind.c_str(), server_->port());
 }
@@ -136,7 +136,7 @@ void Node::publish(const World::Block& block) {
   };
   hammer_.publish(toMsg(shifted(block.hammer)));
   dynamometer_.publish(toMsg(shifted(block.dynamometer), frames::DYNAMOMETER));
-  // The ring in the flange does not turn with the spindle.
+  // The ring in the flange is fixed to the spindle housing.
   if (!block.spindle_force.channels.empty())
     spindle_force_.publish(toMsg(shifted(block.spindle_force), frames::MACHINE));
   if (server_) {
@@ -161,18 +161,18 @@ void Node::run() {
     const double now = toSec(ros::Time::now()) - start_;
     if (now - done > parameters_.most_behind) {
       const auto blocks = static_cast<std::uint64_t>((now - done) / BLOCK_TIME);
-      world_->lose(blocks * World::BLOCK);
+      world_->skipSamples(blocks * World::BLOCK);
       done += static_cast<double>(blocks) * BLOCK_TIME;
       lost_ += blocks * World::BLOCK;
-      ROS_WARN("sim: the twin fell behind the clock, %.2f s of samples are lost",
+      ROS_WARN("sim: the simulation fell behind the clock, %.2f s of samples lost",
                static_cast<double>(blocks) * BLOCK_TIME);
     }
     if (now < done + BLOCK_TIME) {
       std::this_thread::sleep_for(std::chrono::duration<double>(done + BLOCK_TIME - now));
       continue;
     }
-    if (!server_ && !lead(now, done)) {
-      std::this_thread::sleep_for(std::chrono::duration<double>(LOOK_AGAIN));
+    if (!server_ && !updateStates(now, done)) {
+      std::this_thread::sleep_for(std::chrono::duration<double>(POLL_PERIOD));
       continue;
     }
     const auto before = std::chrono::steady_clock::now();
@@ -180,23 +180,23 @@ void Node::run() {
       world_->advance(block);
     } else {
       world_->advance(block, states_);
-      tellAlarms();
+      logAlarms();
     }
-    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - before;
-    load_ = 0.98 * load_ + 0.02 * took.count() / BLOCK_TIME;
+    const std::chrono::duration<double> duration = std::chrono::steady_clock::now() - before;
+    load_ = 0.98 * load_ + 0.02 * duration.count() / BLOCK_TIME;
     publish(block);
     done += BLOCK_TIME;
   }
 }
 
-/// Where the controller elsewhere leads the machine in the next block, once that is known.
-bool Node::lead(double now, double done) {
+/// States of the next block under the external controller. @return whether they are available
+bool Node::updateStates(double now, double done) {
   const std::lock_guard<std::mutex> lock(axes_mutex_);
   const double end = start_ + done + BLOCK_TIME;
   if (!(axes_.newest() >= end)) {
-    // Nothing comes: without a command every drive stands.
-    if (now - done < MOST_WAIT * parameters_.most_behind) return false;
-    axes_.stand(end);
+    // No samples: without commands the axes are at rest.
+    if (now - done < WAIT_SHARE * parameters_.most_behind) return false;
+    axes_.holdUntil(end);
   }
   states_.resize(World::BLOCK);
   for (std::size_t i = 0; i < World::BLOCK; ++i) {
@@ -205,12 +205,12 @@ bool Node::lead(double now, double done) {
   return true;
 }
 
-/// The machine's own controller, which leads nothing then, is where collisions are noticed.
-void Node::tellAlarms() {
+/// Under an external controller collisions raise alarms in the machine's own controller, which is idle then.
+void Node::logAlarms() {
   std::string text;
   for (const focas::AlarmMessage& alarm : world_->controller().alarmMessages()) text += " " + alarm.text;
-  if (text != told_alarm_ && !text.empty()) ROS_ERROR_STREAM("sim:" << text);
-  told_alarm_ = text;
+  if (text != logged_alarm_ && !text.empty()) ROS_ERROR_STREAM("sim:" << text);
+  logged_alarm_ = text;
 }
 
 bool Node::strike(smartmill_msgs::Strike::Request& request, smartmill_msgs::Strike::Response& response) {
@@ -228,14 +228,14 @@ bool Node::strike(smartmill_msgs::Strike::Request& request, smartmill_msgs::Stri
   return true;
 }
 
-void Node::offer(const std::string& key, std::size_t values, Press press) {
+void Node::advertiseKey(const std::string& key, std::size_t values, Press press) {
   using Request = smartmill_msgs::PanelKey::Request;
   using Response = smartmill_msgs::PanelKey::Response;
   const boost::function<bool(Request&, Response&)> answer = [key, values, press = std::move(press)](
                                                                 const Request& request, Response& response) {
     response.message = request.values.size() == values ? press(request)
-                                                       : std::to_string(request.values.size()) + " values, " +
-                                                             std::to_string(values) + " due";
+                                                       : std::to_string(request.values.size()) +
+                                                             " values, expected " + std::to_string(values);
     response.code = response.message.empty() ? Response::OK : Response::REFUSED;
     response.message = key + ": " + (response.message.empty() ? "done" : response.message);
     return true;
@@ -243,58 +243,58 @@ void Node::offer(const std::string& key, std::size_t values, Press press) {
   panel_.push_back(nh_.advertiseService("sim/panel/" + key, answer));
 }
 
-void Node::offerPanel() {
+void Node::advertisePanel() {
   using Request = smartmill_msgs::PanelKey::Request;
   Controller& controller = world_->controller();
-  offer("mode", 1, [&controller](const Request& request) -> std::string {
+  advertiseKey("mode", 1, [&controller](const Request& request) -> std::string {
     const int mode = static_cast<int>(request.values[0]);
     if (mode != request.values[0] || mode < focas::AUT_MDI || mode > focas::AUT_REMOTE) {
-      return "one of MODE_* of CncState is due";
+      return "expected one of MODE_* of CncState";
     }
     controller.setMode(mode);
     return {};
   });
-  offer("emergency_stop", 1, [&controller](const Request& request) -> std::string {
+  advertiseKey("emergency_stop", 1, [&controller](const Request& request) -> std::string {
     controller.emergency(request.values[0] != 0.0);
     return {};
   });
-  offer("reset", 0, [&controller](const Request&) -> std::string {
+  advertiseKey("reset", 0, [&controller](const Request&) -> std::string {
     controller.reset();
     return {};
   });
-  offer("feed_hold", 0, [&controller](const Request&) -> std::string {
+  advertiseKey("feed_hold", 0, [&controller](const Request&) -> std::string {
     controller.feedHold();
     return {};
   });
-  offer("cycle_start", 0, [&controller](const Request&) -> std::string {
+  advertiseKey("cycle_start", 0, [&controller](const Request&) -> std::string {
     const focas::EwCode code = controller.cycleStart();
     return code == focas::EW_OK ? std::string() : focas::ewName(code);
   });
-  offer("overrides", 3, [&controller](const Request& request) -> std::string {
+  advertiseKey("overrides", 3, [&controller](const Request& request) -> std::string {
     controller.setOverrides(request.values[0], request.values[1], request.values[2]);
     return {};
   });
-  offer("alarm", 1, [&controller](const Request& request) -> std::string {
+  advertiseKey("alarm", 1, [&controller](const Request& request) -> std::string {
     controller.raiseAlarm(static_cast<int>(request.values[0]), request.text);
     return {};
   });
 }
 
-void Node::offerHands() {
+void Node::advertiseManualActions() {
   using Request = smartmill_msgs::PanelKey::Request;
   const auto triple = [](const Request& r) {
     return std::array<double, 3>{r.values[0], r.values[1], r.values[2]};
   };
   if (parameters_.world.spindle_sensor.present) {
-    offer("hang_weight", 3, [this, triple](const Request& request) -> std::string {
+    advertiseKey("hang_weight", 3, [this, triple](const Request& request) -> std::string {
       world_->pull(triple(request), false);
       return {};
     });
-    offer("press_workpiece", 3, [this, triple](const Request& request) -> std::string {
+    advertiseKey("press_workpiece", 3, [this, triple](const Request& request) -> std::string {
       world_->pull(triple(request), true);
       return {};
     });
-    offer("tool_length", 1, [this](const Request& request) -> std::string {
+    advertiseKey("tool_length", 1, [this](const Request& request) -> std::string {
       try {
         world_->setToolLength(request.values[0]);
       } catch (const Error& e) {
@@ -304,7 +304,7 @@ void Node::offerHands() {
     });
   }
   if (parameters_.world.plate.present) {
-    offer("tap_point", 3, [this, triple](const Request& request) -> std::string {
+    advertiseKey("tap_point", 3, [this, triple](const Request& request) -> std::string {
       world_->setTapPoint(triple(request));
       return {};
     });
@@ -313,11 +313,11 @@ void Node::offerHands() {
 
 void Node::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   if (lost_ > 0) {
-    status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "samples were lost: the computer is too slow");
+    status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "samples lost: the computer is too slow");
   } else {
-    status.summary(diagnostic_msgs::DiagnosticStatus::OK, "runs");
+    status.summary(diagnostic_msgs::DiagnosticStatus::OK, "running");
   }
-  status.addf("share of real time needed [1]", "%.3f", load_.load());
+  status.addf("processor time per real time [1]", "%.3f", load_.load());
   status.addf("samples lost [1]", "%llu", static_cast<unsigned long long>(lost_.load()));
 }
 

@@ -25,8 +25,9 @@
 
 namespace smartmill::sim {
 
-/// The simulated machine on ROS: the controller on its port, sensors on daq/* and spindle/angle, the hammers
-/// behind daq/strike, truth on sim/truth/*, the operator's panel behind sim/panel/*. Paced by the clock.
+/// The simulated machine on ROS: the controller on its port, sensors on daq/* and spindle/angle, hammers by
+/// the service daq/strike, true values on sim/truth/*, the operator's panel by services sim/panel/*. Runs in
+/// wall-clock time.
 class Node {
  public:
   using Parameters = NodeParameters;
@@ -41,17 +42,17 @@ class Node {
   void publish(const World::Block& block);
   void serve();
   void listen();
-  bool lead(double now, double done);
-  void tellAlarms();
+  bool updateStates(double now, double done);
+  void logAlarms();
   void publishTruth();
   bool strike(smartmill_msgs::Strike::Request& request, smartmill_msgs::Strike::Response& response);
   void addTruth(const std::string& point, const std::string& direction, const ModalModel& modes);
-  /// Offers a key of the panel. @param press returns why it refuses, empty: done
+  /// Advertises a key of the panel. @param press returns the reason of a refusal, empty: done
   using Press = std::function<std::string(const smartmill_msgs::PanelKey::Request&)>;
-  void offer(const std::string& key, std::size_t values, Press press);
-  void offerPanel();
-  /// What an operator does by hand: hangs weights on the tool, changes it, taps elsewhere.
-  void offerHands();
+  void advertiseKey(const std::string& key, std::size_t values, Press press);
+  void advertisePanel();
+  /// Manual actions of an operator: weights on the tool, change of the tool, another tap point.
+  void advertiseManualActions();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   ros::NodeHandle nh_;
@@ -68,14 +69,14 @@ class Node {
   ros::ServiceServer strike_server_;
   std::vector<ros::ServiceServer> panel_;
   NodeShell shell_;
-  std::atomic<double> load_{0.0};  // [1] share of real time that the twin needs
+  std::atomic<double> load_{0.0};  // [1] processor time per real time
   std::atomic<std::uint64_t> lost_{0};
 
-  // Axes and spindle that a controller elsewhere leads.
+  // Axes and spindle under an external controller.
   std::mutex axes_mutex_;  // of the track
   AxesTrack axes_;
   std::vector<MotionState> states_;
-  std::string told_alarm_;
+  std::string logged_alarm_;
 
   std::atomic<bool> stopping_{false};
   std::thread thread_;

@@ -21,15 +21,14 @@ struct NodeParameters {
         "Parameters of sim_node (package smartmill_sim): the simulated machine. SI units throughout.");
     table.atLaunch("model", model, "path of a smartmill-model/1 file");
     table.section();
-    table.number("port", port, "1", Range::closed(0, 65535), "FOCAS port of the controller, 0: any free one");
-    table.text("bind", bind, "address it listens on");
-    table.text(
-        "axes_input", axes_input,
-        "topic (SampleBlock: x, y, z, revolutions) of a controller elsewhere that leads axes and spindle; "
-        "empty: the own one");
+    table.number("port", port, "1", Range::closed(0, 65535), "FOCAS port of the controller; 0: any free one");
+    table.text("bind", bind, "address to listen on");
+    table.text("axes_input", axes_input,
+               "topic (SampleBlock: x, y, z, revolutions) of an external controller of axes and spindle; "
+               "empty: the simulated controller");
     world.declare(table);
     table.number("most_behind", most_behind, "s", Range::atLeast(0.05),
-                 "of lag behind the clock; beyond it samples are lost, as a real device loses them");
+                 "largest lag behind the clock; beyond it samples are lost, as with a real device");
   }
   /// @throws Error naming key and value.
   void validate() const { checkBounds(*this); }

@@ -19,28 +19,29 @@ ModalModel machineOf(const LatheTraits& t) {
 }  // namespace
 
 void LatheTraits::declare(ParameterTable& table) {
-  table.number("seed", seed, "1", Range::notNegative(), "of noise");
-  table.number("rate", rate, "Hz", Range::closed(1000.0, 1e5), "of the samples");
+  table.number("seed", seed, "1", Range::notNegative(), "seed of the noise");
+  table.number("rate", rate, "Hz", Range::closed(1000.0, 1e5), "sample rate");
   table.section("Cut.");
   table.number("spindle_speed", spindle_speed, "rad/s", Range::openLow(0.0, 1000.0), "of the workpiece");
-  table.number("chip", chip, "m", Range::openLow(0.0, 1e-2), "nominal chip thickness, feed a revolution");
-  table.number("overlap", overlap, "1", Range::closed(0.0, 1.0), "of the cut with the one before");
+  table.number("chip", chip, "m", Range::openLow(0.0, 1e-2), "nominal chip thickness, feed per revolution");
+  table.number("overlap", overlap, "1", Range::closed(0.0, 1.0), "overlap of successive cuts");
   table.number("cutting_stiffness", cutting_stiffness, "N/m", Range::openLow(0.0, 1e10),
-               "slope of the force at the nominal chip");
+               "slope of the force at the nominal chip thickness");
   table.number("chip_exponent", chip_exponent, "1", Range::closed(0.3, 1.5),
-               "force goes with this power of the chip; 1: proportional");
-  table.section("Machine: modes between edge and workpiece.");
+               "exponent of the force over the chip thickness; 1: proportional");
+  table.section("Machine: modes between cutting edge and workpiece.");
   table.list("frequency", frequency, "Hz", Range::openLow(0.0, 1e4), "of each mode");
   table.list("damping_ratio", damping_ratio, "1", Range::open(0.0, 1.0), "of each");
   table.list("stiffness", stiffness, "N/m", Range::openLow(0.0, 1e12), "of each");
   table.section("Fast tool servo and sensors.");
-  table.number("servo_frequency", servo_frequency, "Hz", Range::openLow(0.0, 1e5), "natural, of the servo");
-  table.number("servo_damping", servo_damping, "1", Range::open(0.0, 1.0), "ratio");
-  table.number("servo_delay", servo_delay, "s", Range::closed(0.0, 0.1), "before it begins to follow");
-  table.number("servo_stroke", servo_stroke, "m", Range::openLow(0.0, 0.1), "to either side");
-  table.number("probe_noise", probe_noise, "m", Range::notNegative(),
-               "root mean square of the displacement probes");
-  table.number("accelerometer_noise", accelerometer_noise, "m/s2", Range::notNegative(), "root mean square");
+  table.number("servo_frequency", servo_frequency, "Hz", Range::openLow(0.0, 1e5),
+               "natural frequency of the servo");
+  table.number("servo_damping", servo_damping, "1", Range::open(0.0, 1.0), "damping ratio of the servo");
+  table.number("servo_delay", servo_delay, "s", Range::closed(0.0, 0.1), "delay of the servo");
+  table.number("servo_stroke", servo_stroke, "m", Range::openLow(0.0, 0.1), "limit in either direction");
+  table.number("probe_noise", probe_noise, "m", Range::notNegative(), "RMS of the displacement probes");
+  table.number("accelerometer_noise", accelerometer_noise, "m/s2", Range::notNegative(),
+               "RMS of the accelerometer");
 }
 
 void LatheTraits::validate() const {
@@ -48,9 +49,10 @@ void LatheTraits::validate() const {
   if (frequency.empty() || damping_ratio.size() != frequency.size() || stiffness.size() != frequency.size())
     throw Error("frequency, damping_ratio, stiffness: " + std::to_string(frequency.size()) + ", " +
                 std::to_string(damping_ratio.size()) + ", " + std::to_string(stiffness.size()) +
-                " values, one of each a mode is due");
+                " values, expected one of each per mode");
   if (rate * units::TWO_PI / spindle_speed < 3.0)
-    throw Error("spindle_speed: " + std::to_string(spindle_speed) + " is too fast for the rate");
+    throw Error("spindle_speed: " + std::to_string(spindle_speed) +
+                " rad/s is too fast, expected at least three samples per revolution");
 }
 
 Lathe::Lathe(const LatheTraits& traits)
@@ -64,7 +66,7 @@ Lathe::Lathe(const LatheTraits& traits)
 void Lathe::command(const SampleBlock& commands) {
   const std::size_t channel = commands.channel("command");
   if (commands.units.at(channel) != "m")
-    throw Error("command: the unit is " + commands.units.at(channel) + ", m is due");
+    throw Error("command: the unit is " + commands.units.at(channel) + ", expected m");
   for (std::size_t i = 0; i < commands.size(); ++i) {
     const std::uint64_t index = commands.first_index + i;
     const double value = commands.at(i, channel);
@@ -75,7 +77,7 @@ void Lathe::command(const SampleBlock& commands) {
   }
 }
 
-// Tool displacement at the next sample.
+// Tool position at the next sample.
 double Lathe::servo() {
   while (!commands_.empty() && commands_.begin()->first < index_) {
     commanded_ = std::clamp(commands_.begin()->second, -traits_.servo_stroke, traits_.servo_stroke);
@@ -83,9 +85,9 @@ double Lathe::servo() {
   }
   delayed_.push_front(commanded_);
   const auto delay = static_cast<std::size_t>(std::lround(traits_.servo_delay * traits_.rate));
-  const double taken = delayed_.size() > delay ? delayed_[delay] : 0.0;
+  const double delayed = delayed_.size() > delay ? delayed_[delay] : 0.0;
   if (delayed_.size() > delay + 1) delayed_.pop_back();
-  return servo_filter_.step(taken);
+  return servo_filter_.step(delayed);
 }
 
 double Lathe::force(double chip) const {
@@ -97,11 +99,11 @@ double Lathe::force(double chip) const {
 
 double Lathe::pastSurface() const {
   const double back = units::TWO_PI / traits_.spindle_speed * traits_.rate;
-  const auto whole = static_cast<std::size_t>(back);
-  if (whole >= surface_.size()) return 0.0;
+  const auto whole_steps = static_cast<std::size_t>(back);
+  if (whole_steps >= surface_.size()) return 0.0;
   // surface_[k] is k + 1 samples old.
-  const double share = back - static_cast<double>(whole);
-  return surface_[whole - 1] + share * (surface_[whole] - surface_[whole - 1]);
+  const double share = back - static_cast<double>(whole_steps);
+  return surface_[whole_steps - 1] + share * (surface_[whole_steps] - surface_[whole_steps - 1]);
 }
 
 Lathe::Block Lathe::advance(std::size_t count) {
@@ -121,21 +123,22 @@ Lathe::Block Lathe::advance(std::size_t count) {
   for (std::size_t i = 0; i < count; ++i, ++index_) {
     tool_ = servo();
     const double past = traits_.overlap * pastSurface();
-    // The chip of this sample moves the machine within it: a few turns, each a hundredth of the one before.
+    // Fixed-point iteration: the force depends on the deflection in the same sample; each pass reduces the
+    // error to about 1 %.
     double acting = last_force_;
     for (int turn = 0; turn < 4; ++turn)
       acting = force(traits_.chip - (machine_.peek(acting) - tool_) + past);
     const double deflection = machine_.step(acting);
     const double motion = deflection - tool_;
-    // Where the tool is out of the cut the old surface stays, one feed further off.
+    // Out of the cut the old surface remains, one feed farther away.
     surface_.push_front(acting > 0.0 ? motion : traits_.chip + past);
     if (surface_.size() > longest) surface_.pop_back();
     last_force_ = acting;
     block.displacement.samples.push_back(deflection + traits_.probe_noise * normal_(random_));
     block.displacement.samples.push_back(tool_ + traits_.probe_noise * normal_(random_));
-    const double shaken = machine_.acceleration() + traits_.accelerometer_noise * normal_(random_);
-    block.displacement.samples.push_back(shaken);
-    block.vibration.samples.push_back(shaken);
+    const double acceleration = machine_.acceleration() + traits_.accelerometer_noise * normal_(random_);
+    block.displacement.samples.push_back(acceleration);
+    block.vibration.samples.push_back(acceleration);
     block.motion.push_back(motion);
     block.force.push_back(acting);
   }

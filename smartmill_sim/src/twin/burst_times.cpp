@@ -8,33 +8,33 @@
 namespace smartmill::sim {
 namespace {
 
-constexpr double BINS_A_CYCLE = 24.0;  // of the ringing
+constexpr double BINS_A_CYCLE = 24.0;  // per period of the oscillation
 constexpr double MOST_BINS = 8192.0;
-constexpr double DECAYS = 5.0;  // that a burst is looked at
+constexpr double DECAYS = 5.0;  // length of the burst template, in decay times
 
-// What is left of a record, folded at a period.
+// Residual of a record, folded at a period.
 struct Folded {
   std::vector<double> sum, count;
 };
 
-Folded fold(const std::vector<double>& left, double rate, double period, std::size_t bins) {
+Folded fold(const std::vector<double>& residual, double rate, double period, std::size_t bins) {
   Folded folded{std::vector<double>(bins, 0.0), std::vector<double>(bins, 0.0)};
   const double scale = static_cast<double>(bins) / period;
-  for (std::size_t i = 0; i < left.size(); ++i) {
+  for (std::size_t i = 0; i < residual.size(); ++i) {
     const double at = std::fmod(static_cast<double>(i) / rate, period) * scale;
     const std::size_t bin = std::min(static_cast<std::size_t>(at), bins - 1);
-    folded.sum[bin] += left[i];
+    folded.sum[bin] += residual[i];
     folded.count[bin] += 1.0;
   }
   return folded;
 }
 
-// [s] at which bursts begin that take most squares from what is left.
-double bestFirst(const std::vector<double>& left, double rate, const BurstTrain& train) {
+// Begin [s] of the bursts that reduce the sum of squares of the residual most.
+double bestBegin(const std::vector<double>& residual, double rate, const BurstTrain& train) {
   const auto bins = static_cast<std::size_t>(
       std::clamp(std::ceil(BINS_A_CYCLE * train.frequency * train.period), 16.0, MOST_BINS));
   const double width = train.period / static_cast<double>(bins);
-  const Folded folded = fold(left, rate, train.period, bins);
+  const Folded folded = fold(residual, rate, train.period, bins);
   std::vector<double> shape;
   for (double t = 0.5 * width; t < std::min(DECAYS * train.decay, train.period); t += width)
     shape.push_back(train.shape(t));
@@ -58,25 +58,25 @@ double bestFirst(const std::vector<double>& left, double rate, const BurstTrain&
 
 }  // namespace
 
-void findBursts(const Record* recorded, const std::array<std::vector<double>*, CHANNEL_COUNT>& early,
+void findBursts(const Record* recorded, const std::array<std::vector<double>*, CHANNEL_COUNT>& raw,
                 double rate, CuttingMachine& machine, std::mt19937_64& random) {
   for (BurstTrain* train : machine.bursts()) {
     const std::size_t c = train->channel;
     if (!recorded) {
       train->first = std::uniform_real_distribution<double>(0.0, train->period)(random);
-    } else if (early[c] && recorded->has(channelName(c))) {
+    } else if (raw[c] && recorded->has(channelName(c))) {
       const double amplitude = train->amplitude;
       train->amplitude = 0.0;
-      std::vector<double> left = recorded->column(channelName(c));
-      for (std::size_t i = 0; i < left.size(); ++i) {
+      std::vector<double> residual = recorded->column(channelName(c));
+      for (std::size_t i = 0; i < residual.size(); ++i) {
         ChannelValues values{};
-        values[c] = (*early[c])[i];
-        machine.finish(static_cast<double>(i) / rate, values);
-        left[i] -= values[c];
+        values[c] = (*raw[c])[i];
+        machine.applySignalEffects(static_cast<double>(i) / rate, values);
+        residual[i] -= values[c];
       }
-      const double level = mean(left);
-      for (double& v : left) v -= level;
-      train->first = bestFirst(left, rate, *train);
+      const double level = mean(residual);
+      for (double& v : residual) v -= level;
+      train->first = bestBegin(residual, rate, *train);
       train->amplitude = amplitude;
     }
   }

@@ -11,7 +11,7 @@ namespace {
 
 using Values = std::vector<double>;
 
-double nameOf(const std::string& text) {
+double hashOf(const std::string& text) {
   return static_cast<double>(std::hash<std::string>()(text));
 }
 
@@ -22,11 +22,11 @@ void append(Values& values, const ModalModel& modes) {
 }
 
 void append(Values& values, const EffectEntry& effect) {
-  values.push_back(nameOf(effect.name));
-  for (const auto& [name, value] : effect.numbers) values.insert(values.end(), {nameOf(name), value});
-  for (const auto& [name, word] : effect.words) values.push_back(nameOf(name + "=" + word));
+  values.push_back(hashOf(effect.name));
+  for (const auto& [name, value] : effect.numbers) values.insert(values.end(), {hashOf(name), value});
+  for (const auto& [name, word] : effect.words) values.push_back(hashOf(name + "=" + word));
   for (const auto& [name, list] : effect.lists) {
-    values.push_back(nameOf(name));
+    values.push_back(hashOf(name));
     values.insert(values.end(), list.begin(), list.end());
   }
   append(values, effect.flexibility.x);
@@ -60,23 +60,23 @@ void appendCut(Values& values, const MachineModel& model, TestKind kind) {
   append(values, model.tool_tip.y);
 }
 
-bool ofTheTool(Stage stage) {
+bool actsOnCut(Stage stage) {
   return stage == Stage::geometry || stage == Stage::motion || stage == Stage::cutting_law ||
          stage == Stage::structure;
 }
 
-// Whether an effect may act on a channel, of effects that leave the channels apart.
+// Whether an effect may act on a channel, for effects that do not mix channels.
 bool actsOn(const EffectEntry& effect, Stage stage, std::size_t channel) {
-  const auto says = [&](const char* key, const std::string& word) {
+  const auto matches = [&](const char* key, const std::string& word) {
     const auto found = effect.words.find(key);
     return found == effect.words.end() || found->second == word;
   };
   const bool force = channel <= FZ;
-  if (ofTheTool(stage)) return true;
+  if (actsOnCut(stage)) return true;
   if (stage == Stage::drive) return channel == LOAD_METER;
   if (stage == Stage::sensor || stage == Stage::sensor_force)
-    return force && says("axis", std::string(1, "xyz"[channel]));
-  return says("channel", channelName(channel));
+    return force && matches("axis", std::string(1, "xyz"[channel]));
+  return matches("channel", channelName(channel));
 }
 
 }  // namespace
@@ -93,14 +93,14 @@ Values valuesOfRecord(const MachineModel& model, TestKind kind) {
   return values;
 }
 
-bool channelsApart(const MachineModel& model) {
+bool channelsAreIndependent(const MachineModel& model) {
   return std::none_of(model.effects.begin(), model.effects.end(), [](const EffectEntry& effect) {
     const EffectKind* known = findEffect(effect.name);
     if (!known) return true;
-    const bool shown =
+    const bool acts_on_channels =
         known->stage == Stage::sensor_output || known->stage == Stage::delay || known->stage == Stage::signal;
     const bool from_another = effect.words.count("from") > 0;
-    return shown && (from_another || effect.words.count("channel") == 0);
+    return acts_on_channels && (from_another || effect.words.count("channel") == 0);
   });
 }
 
@@ -116,22 +116,22 @@ Values valuesOfChannel(const MachineModel& model, TestKind kind, std::size_t cha
   return values;
 }
 
-Values valuesOfTrace(const MachineModel& model, TestKind kind, bool guided) {
+Values valuesOfTrace(const MachineModel& model, TestKind kind, bool tip_prescribed) {
   Values values;
   const bool cut = kind == TestKind::cut;
   bool rigid = model.tool_tip.x.modes.empty() && model.tool_tip.y.modes.empty();
   for (const EffectEntry& effect : model.effects)
     rigid = rigid && effect.flexibility.x.modes.empty() && effect.flexibility.y.modes.empty();
-  const bool sums = rigid || guided;
+  const bool sums = rigid || tip_prescribed;
   values.push_back(sums ? 1.0 : 0.0);
   if (cut) appendTool(values, model);
   if (cut && !sums) appendCutting(values, model);
-  if (!guided) append(values, model.tool_tip.x);
-  if (!guided) append(values, model.tool_tip.y);
+  if (!tip_prescribed) append(values, model.tool_tip.x);
+  if (!tip_prescribed) append(values, model.tool_tip.y);
   for (const EffectEntry& effect : model.effects) {
     const EffectKind* known = findEffect(effect.name);
-    if (known && (!ofTheTool(known->stage) || !actsIn(known->stage, kind))) continue;
-    if (known && guided && known->stage == Stage::structure) continue;
+    if (known && (!actsOnCut(known->stage) || !actsIn(known->stage, kind))) continue;
+    if (known && tip_prescribed && known->stage == Stage::structure) continue;
     if (sums && known && known->stage == Stage::cutting_law && makeEffect(effect)->scalesForce()) continue;
     append(values, effect);
   }
@@ -140,25 +140,25 @@ Values valuesOfTrace(const MachineModel& model, TestKind kind, bool guided) {
 
 std::shared_ptr<const CutTrace> CutTraces::find(const Values& values) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  for (std::size_t k = 0; k < held_.size(); ++k) {
-    if (held_[k].first != values) continue;
-    auto found = std::move(held_[k]);
-    held_.erase(held_.begin() + static_cast<std::ptrdiff_t>(k));
-    held_.push_front(std::move(found));
-    return held_.front().second;
+  for (std::size_t k = 0; k < entries_.size(); ++k) {
+    if (entries_[k].first != values) continue;
+    auto found = std::move(entries_[k]);
+    entries_.erase(entries_.begin() + static_cast<std::ptrdiff_t>(k));
+    entries_.push_front(std::move(found));
+    return entries_.front().second;
   }
   return nullptr;
 }
 
-void CutTraces::hold(Values values, std::shared_ptr<const CutTrace> trace) {
+void CutTraces::insert(Values values, std::shared_ptr<const CutTrace> trace) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  held_.emplace_front(std::move(values), std::move(trace));
-  if (held_.size() > most_) held_.pop_back();
+  entries_.emplace_front(std::move(values), std::move(trace));
+  if (entries_.size() > capacity_) entries_.pop_back();
 }
 
 void CutTraces::clear() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  held_.clear();
+  entries_.clear();
 }
 
 }  // namespace smartmill::sim

@@ -8,133 +8,135 @@
 namespace smartmill::sim {
 
 Cutter::Cutter(const ToolGeometry& tool, const CuttingLaw& law, double time_step,
-               const std::vector<double>& radius_offset, double corner_radius, double path_share, Way way,
-               int corner_slices)
-    : way_(way), corner_radius_(corner_radius), lag_(tool.lag()), law_(law) {
+               const std::vector<double>& radius_offset, double corner_radius, double path_share,
+               Method method, int corner_slices)
+    : method_(method), corner_radius_(corner_radius), lag_(tool.lag()), law_(law) {
   for (const EdgeSlice& slice : edgeSlices(tool, corner_radius, corner_slices)) {
-    Part part;
-    part.slice = part.actual = slice;
-    part.top = slice.high;
+    StraightMill mill;
+    mill.slice = mill.actual = slice;
+    mill.top = slice.high;
     const ToolGeometry straight = toolOf(slice, tool);
-    if (way == Way::tables) {
-      part.rigid.emplace(straight, lawOf(slice, law), radius_offset, path_share);
+    if (method == Method::tables) {
+      mill.rigid.emplace(straight, lawOf(slice, law), radius_offset, path_share);
     } else {
-      part.process.emplace(straight, lawOf(slice, law), time_step, radius_offset, path_share);
+      mill.process.emplace(straight, lawOf(slice, law), time_step, radius_offset, path_share);
     }
-    parts_.push_back(std::move(part));
+    mills_.push_back(std::move(mill));
   }
 }
 
-// The edge of a slice stands where a tip would that lags so far.
-ToolMotion Cutter::motionOf(const Part& part, const ToolMotion& now) const {
+// The edge of a slice is the edge of a tip whose angle lags accordingly.
+ToolMotion Cutter::motionOf(const StraightMill& mill, const ToolMotion& now) const {
   ToolMotion motion = now;
-  motion.angle -= lag_ * part.slice.low;
+  motion.angle -= lag_ * mill.slice.low;
   return motion;
 }
 
-// What of the arcs' heights lies in a slice.
-void Cutter::place(Part& part) {
+// Intersects the arcs with the height of a slice.
+void Cutter::updateContact(StraightMill& mill) {
   std::vector<ContactArc> arcs;
   double top = 0.0;
   for (const ContactArc& arc : arcs_) {
-    const double height = std::min(arc.depth, part.slice.high);
-    if (height <= part.slice.low) continue;
-    arcs.push_back({arc.entry, arc.exit, height - part.slice.low});
+    const double height = std::min(arc.depth, mill.slice.high);
+    if (height <= mill.slice.low) continue;
+    arcs.push_back({arc.entry, arc.exit, height - mill.slice.low});
     top = std::max(top, height);
   }
-  const bool leans = part.slice.high <= corner_radius_ * (1.0 + 1e-9);
-  if (leans && !arcs.empty() && top != part.top) {
-    part.top = top;
-    part.actual = top == part.slice.high ? part.slice : upTo(top, part.slice, corner_radius_);
-    const CuttingLaw law = lawOf(part.actual, law_);
-    if (part.process) part.process->setLaw(law);
-    if (part.rigid) part.rigid->setLaw(law);
+  const bool leans = mill.slice.high <= corner_radius_ * (1.0 + 1e-9);
+  if (leans && !arcs.empty() && top != mill.top) {
+    mill.top = top;
+    mill.actual = top == mill.slice.high ? mill.slice : upTo(top, mill.slice, corner_radius_);
+    const CuttingLaw law = lawOf(mill.actual, law_);
+    if (mill.process) mill.process->setLaw(law);
+    if (mill.rigid) mill.rigid->setLaw(law);
   }
-  if (fresh_ || arcs.size() != part.arcs) {
-    if (part.process) part.process->engage(arcs, motionOf(part, now_));
-    if (part.rigid) part.rigid->engage(arcs, feedOf(now_));
-    part.arcs = arcs.size();
+  if (arcs_changed_ || arcs.size() != mill.arcs) {
+    if (mill.process) mill.process->engage(arcs, motionOf(mill, now_));
+    if (mill.rigid) mill.rigid->engage(arcs, feedOf(now_));
+    mill.arcs = arcs.size();
     return;
   }
   std::vector<double> depths;
   for (const ContactArc& arc : arcs) depths.push_back(arc.depth);
-  if (part.process) part.process->setDepths(depths);
-  if (part.rigid) part.rigid->setDepths(depths);
+  if (mill.process) mill.process->setDepths(depths);
+  if (mill.rigid) mill.rigid->setDepths(depths);
 }
 
 void Cutter::engage(const std::vector<ContactArc>& arcs, const ToolMotion& now) {
   arcs_ = arcs;
   now_ = now;
-  fresh_ = true;
-  for (Part& part : parts_) place(part);
-  fresh_ = false;
+  arcs_changed_ = true;
+  for (StraightMill& mill : mills_) updateContact(mill);
+  arcs_changed_ = false;
 }
 
 void Cutter::setDepths(const std::vector<double>& depths) {
   for (std::size_t a = 0; a < arcs_.size(); ++a) arcs_[a].depth = depths.at(a);
-  for (Part& part : parts_) place(part);
+  for (StraightMill& mill : mills_) updateContact(mill);
 }
 
 void Cutter::setLaw(const CuttingLaw& law) {
   law_ = law;
-  for (Part& part : parts_) {
-    const CuttingLaw own = lawOf(part.actual, law);
-    if (part.process) part.process->setLaw(own);
-    if (part.rigid) part.rigid->setLaw(own);
+  for (StraightMill& mill : mills_) {
+    const CuttingLaw adapted = lawOf(mill.actual, law);
+    if (mill.process) mill.process->setLaw(adapted);
+    if (mill.rigid) mill.rigid->setLaw(adapted);
   }
 }
 
-CutSums Cutter::sumsOf(Part& part, const ToolMotion& now) const {
-  if (part.process) return part.process->sumsAt(part.slice.low == 0.0 ? now : motionOf(part, now));
+CutSums Cutter::sumsOf(StraightMill& mill, const ToolMotion& now) const {
+  if (mill.process) return mill.process->sumsAt(mill.slice.low == 0.0 ? now : motionOf(mill, now));
   CutSums sums;
-  sums.edges = part.rigid->sumsAt(now.angle - lag_ * part.slice.low);
+  sums.edges = mill.rigid->sumsAt(now.angle - lag_ * mill.slice.low);
   return sums;
 }
 
 CuttingForce Cutter::force() const {
   CuttingForce sum;
-  for (const Part& part : parts_) {
-    if (part.arcs == 0) continue;
-    sum.add(part.rigid ? part.rigid->force(part.sums.edges) : part.process->force(part.sums));
+  for (const StraightMill& mill : mills_) {
+    if (mill.arcs == 0) continue;
+    sum.add(mill.rigid ? mill.rigid->force(mill.sums.edges) : mill.process->force(mill.sums));
   }
   return sum;
 }
 
-// The force is linear in the rate, and the rate in the force.
-void Cutter::yieldTo(const ToolMotion& now, const TipYield& yield) {
+// The force is linear in the rate and the rate in the force: a linear system of two equations.
+void Cutter::solveRubbing(const ToolMotion& now, const TipMobility& mobility) {
   const auto forceAt = [&](const Eigen::Vector2d& rate) -> Eigen::Vector2d {
-    for (Part& part : parts_) {
-      if (part.arcs > 0) part.sums.rubbing = part.process->rubbing({{rate[0], rate[1]}}, now.speed);
+    for (StraightMill& mill : mills_) {
+      if (mill.arcs > 0) mill.sums.rubbing = mill.process->rubbing({{rate[0], rate[1]}}, now.speed);
     }
     const CuttingForce f = force();
     return {f.fx, f.fy};
   };
-  const Eigen::Vector2d assumed(yield.assumed[0], yield.assumed[1]), told(now.rate[0], now.rate[1]);
-  const Eigen::DiagonalMatrix<double, 2> gives(yield.rate[0], yield.rate[1]);
-  const Eigen::Vector2d still = forceAt({0.0, 0.0});
-  Eigen::Matrix2d rises;
-  rises << forceAt({1.0, 0.0}) - still, forceAt({0.0, 1.0}) - still;
-  const Eigen::Matrix2d whole = Eigen::Matrix2d::Identity() - gives * rises;
-  forceAt(whole.inverse() * (told + gives * (still - assumed)));
+  const Eigen::Vector2d assumed(mobility.assumed_force[0], mobility.assumed_force[1]),
+      rate(now.rate[0], now.rate[1]);
+  const Eigen::DiagonalMatrix<double, 2> rate_per_force(mobility.rate_per_force[0],
+                                                        mobility.rate_per_force[1]);
+  const Eigen::Vector2d force_at_rest = forceAt({0.0, 0.0});
+  Eigen::Matrix2d force_slope;
+  force_slope << forceAt({1.0, 0.0}) - force_at_rest, forceAt({0.0, 1.0}) - force_at_rest;
+  const Eigen::Matrix2d system = Eigen::Matrix2d::Identity() - rate_per_force * force_slope;
+  forceAt(system.inverse() * (rate + rate_per_force * (force_at_rest - assumed)));
 }
 
-CuttingForce Cutter::step(const ToolMotion& now, const TipYield& yield) {
-  if (parts_.size() > 1) now_ = now;  // where depths change, another part may engage
-  for (Part& part : parts_) {
-    if (part.arcs == 0) continue;
-    part.sums = followed_ ? followed_->at(place_++) : sumsOf(part, now);
+CuttingForce Cutter::step(const ToolMotion& now, const TipMobility& mobility) {
+  if (mills_.size() > 1) now_ = now;  // a change of depth may engage another slice
+  for (StraightMill& mill : mills_) {
+    if (mill.arcs == 0) continue;
+    mill.sums = replayed_ ? replayed_->at(replay_index_++) : sumsOf(mill, now);
   }
-  const bool yields = yield.rate[0] != 0.0 || yield.rate[1] != 0.0;
-  if (!followed_ && yields && law_.damping != 0.0) yieldTo(now, yield);
-  for (const Part& part : parts_) {
-    if (kept_ && part.arcs > 0) kept_->push_back(part.sums);
+  const bool is_mobile = mobility.rate_per_force[0] != 0.0 || mobility.rate_per_force[1] != 0.0;
+  if (!replayed_ && is_mobile && law_.damping != 0.0) solveRubbing(now, mobility);
+  for (const StraightMill& mill : mills_) {
+    if (recorded_ && mill.arcs > 0) recorded_->push_back(mill.sums);
   }
   return force();
 }
 
-void Cutter::settle(const std::array<double, 2>& displacement) {
-  for (Part& part : parts_) {
-    if (part.process && !followed_) part.process->settle(displacement);
+void Cutter::endStep(const std::array<double, 2>& displacement) {
+  for (StraightMill& mill : mills_) {
+    if (mill.process && !replayed_) mill.process->endStep(displacement);
   }
 }
 

@@ -9,16 +9,16 @@
 namespace smartmill::sim {
 namespace {
 
-constexpr int UPDATE_STEPS = 16;           // between looks at what changes slowly with time
-constexpr double SENSOR_TOLERANCE = 1e-5;  // share by which a sensor mode moves before its filter follows
-constexpr double LEAST_DEPTH = 1e-9;       // [m] a cut that would end in air
+constexpr int UPDATE_STEPS = 16;           // between updates of slow changes
+constexpr double SENSOR_TOLERANCE = 1e-5;  // relative change of a sensor mode that updates its filter
+constexpr double LEAST_DEPTH = 1e-9;       // [m] instead of a depth <= 0
 
 ModalModel firstModeAt(ModalModel axis, double factor) {
   if (!axis.modes.empty()) axis.modes.front().frequency *= factor;
   return axis;
 }
 
-// What a resonance adds to its channel.
+// Output that a resonance adds to its channel.
 double resonated(const Resonance& resonance, ModalFilter& filter, double from) {
   const double itself = resonance.channel == resonance.from ? resonance.mode.gain * from : 0.0;
   return filter.step(from) - itself;
@@ -30,7 +30,7 @@ CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed
     : effects_(model),
       model_(model),
       time_step_(time_step),
-      sign_(model.force_sensor.measures_workpiece ? -1.0 : 1.0) {
+      force_sign_(model.force_sensor.measures_workpiece ? -1.0 : 1.0) {
   TwinSetup setup = setUpOf(std::move(model_), effects_);
   model_ = std::move(setup.model);
 
@@ -41,7 +41,8 @@ CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed
     nominal_.law.coefficients = model_.needCutting("simulate a cut");
     const bool tables = feed == Feed::steady && !vibrates_;
     cutter_.emplace(*model_.tool, nominal_.law, time_step, setup.radius_offset, setup.corner_radius,
-                    setup.path_share, tables ? Cutter::Way::tables : Cutter::Way::history, corner_slices);
+                    setup.path_share, tables ? Cutter::Method::tables : Cutter::Method::history,
+                    corner_slices);
     layers_ = EdgeLayers(setup, nominal_.law, time_step, tables);
   }
   state_ = nominal_;
@@ -69,7 +70,7 @@ void CuttingMachine::setClock(const Clock& clock) {
   steps_to_update_ = 0;
 }
 
-ToolMotion CuttingMachine::fed(const ToolMotion& commanded) const {
+ToolMotion CuttingMachine::actualMotion(const ToolMotion& commanded) const {
   ToolMotion actual = commanded;
   if (state_.feed_ratio == 1.0 || !feed_start_) return actual;
   for (std::size_t a = 0; a < 2; ++a) {
@@ -88,16 +89,16 @@ void CuttingMachine::engage(const std::vector<ContactArc>& arcs, const ToolMotio
   input.motion = now;
   update(input);
   if (arcs_.empty()) feed_path_ = 0.0;
-  // Contact that only moves on changes the force little by little.
-  engaged_ = arcs_.empty() != arcs.empty();
+  // A contact that only shifts changes the force gradually.
+  contact_changed_ = arcs_.empty() != arcs.empty();
   jump_ = 1.0 - rise;
   arcs_ = arcs;
   std::vector<ContactArc> actual = arcs;
   for (ContactArc& a : actual) a.depth = actualDepth(a.depth);
   depth_extra_ = state_.depth_extra;
-  if (replayed()) return;
-  cutter_->engage(actual, fed(now));
-  layers_.engage(actual, fed(now));
+  if (replaysTrace()) return;
+  cutter_->engage(actual, actualMotion(now));
+  layers_.engage(actual, actualMotion(now));
 }
 
 double CuttingMachine::actualDepth(double commanded) const {
@@ -109,7 +110,7 @@ void CuttingMachine::setActualDepths() {
   std::vector<double> depths;
   for (const ContactArc& a : arcs_) depths.push_back(actualDepth(a.depth));
   depth_extra_ = state_.depth_extra;
-  if (!cutter_ || replayed()) return;
+  if (!cutter_ || replaysTrace()) return;
   cutter_->setDepths(depths);
   layers_.setDepths(depths);
 }
@@ -120,12 +121,12 @@ void CuttingMachine::setDepth(double depth, double passed_over) {
   setActualDepths();
 }
 
-void CuttingMachine::showOnly(const std::vector<std::size_t>& channels) {
-  const auto asked = [&](std::size_t channel) {
+void CuttingMachine::selectChannels(const std::vector<std::size_t>& channels) {
+  const auto selected = [&](std::size_t channel) {
     return std::find(channels.begin(), channels.end(), channel) != channels.end();
   };
-  shows_force_ = {{asked(FX), asked(FY), asked(FZ)}};
-  shows_load_ = asked(LOAD_METER);
+  force_selected_ = {{selected(FX), selected(FY), selected(FZ)}};
+  load_selected_ = selected(LOAD_METER);
 }
 
 void CuttingMachine::resetLoadMeter(double spindle_speed) {
@@ -153,7 +154,7 @@ void CuttingMachine::update(const Input& input) {
   if (cutter_) cutter_->setLaw(state_.law);
   layers_.setLaw(state_.law);
   if (drive_) drive_->setFriction(state_.friction_extra, state_.friction_factor);
-  // The first time exactly, then only when it has moved.
+  // The first update is exact, later ones follow the tolerance.
   const double moved = std::abs(state_.sensor_frequency / sensor_frequency_ - 1.0);
   if (moved > SENSOR_TOLERANCE || (sensor_frequency_ == 1.0 && moved > 0.0)) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -173,27 +174,27 @@ CuttingMachine::Output CuttingMachine::step(const Input& input) {
 }
 
 void CuttingMachine::step(const Input& input, Output& out) {
-  takeOver(input);
-  out.force = cut(input);
+  applyEffects(input);
+  out.force = cuttingForce(input);
   out.applied = {{out.force.fx + input.sensor_force[0], out.force.fy + input.sensor_force[1],
                   out.force.fz + input.sensor_force[2]}};
   if (effects_.has(Stage::sensor_force)) effects_.addForce(now_, out.applied);
-  moveTip(input, out);
-  showForce(out);
-  showLoad(input.motion.speed, out);
+  updateTip(input, out);
+  measureForce(out);
+  measureLoad(input.motion.speed, out);
   jump_ = 0.0;
-  engaged_ = false;
-  if (effects_.has(Stage::sensor_output)) effects_.measure(Stage::sensor_output, now_, out.early);
-  passOn(out);
-  ChannelValues shown = out.early;
-  if (effects_.has(Stage::signal)) effects_.measure(Stage::signal, now_, shown);
-  out.sensor = {{shown[FX], shown[FY], shown[FZ]}};
-  out.load_meter = shown[LOAD_METER];
-  out.displacement = {{shown[TOOL_X], shown[TOOL_Y]}};
-  passTime(input.motion);
+  contact_changed_ = false;
+  if (effects_.has(Stage::sensor_output)) effects_.measure(Stage::sensor_output, now_, out.raw);
+  filterChannels(out);
+  ChannelValues measured = out.raw;
+  if (effects_.has(Stage::signal)) effects_.measure(Stage::signal, now_, measured);
+  out.sensor = {{measured[FX], measured[FY], measured[FZ]}};
+  out.load_meter = measured[LOAD_METER];
+  out.displacement = {{measured[TOOL_X], measured[TOOL_Y]}};
+  advanceTime(input.motion);
 }
 
-void CuttingMachine::takeOver(const Input& input) {
+void CuttingMachine::applyEffects(const Input& input) {
   if (!effects_.empty() && (steps_to_update_ <= 0 || input.motion.speed != now_.speed)) {
     update(input);
     steps_to_update_ = UPDATE_STEPS;
@@ -207,75 +208,75 @@ void CuttingMachine::takeOver(const Input& input) {
   now_.chip = now_.depth = 0.0;
   if (!cutting() || now_.speed == 0.0) return;
   const std::array<double, 2>& feed = input.motion.velocity;
-  if (feed[0] != chip_of_[0] || feed[1] != chip_of_[1] || now_.speed != chip_of_[2]) {
-    chip_of_ = {{feed[0], feed[1], now_.speed}};
+  if (feed[0] != chip_motion_[0] || feed[1] != chip_motion_[1] || now_.speed != chip_motion_[2]) {
+    chip_motion_ = {{feed[0], feed[1], now_.speed}};
     chip_ = std::hypot(feed[0], feed[1]) * units::TWO_PI / (std::abs(now_.speed) * model_.tool->teeth);
   }
   now_.chip = chip_;
   now_.depth = arcs_.front().depth;
 }
 
-CuttingForce CuttingMachine::cut(const Input& input) {
-  if (replayed()) return followed_->steps.at(place_).force;
+CuttingForce CuttingMachine::cuttingForce(const Input& input) {
+  if (replaysTrace()) return replayed_->steps.at(replay_index_).force;
   if (!cutter_) return {};
   if (rigid() && state_.feed_ratio == 1.0) {
     CuttingForce force = cutter_->step(input.motion);
     layers_.add(input.motion, force);
     return force;
   }
-  ToolMotion motion = fed(input.motion);
+  ToolMotion motion = actualMotion(input.motion);
   if (input.tip) {
     motion.displacement = input.tip->displacement;
     motion.rate = input.tip->rate;
   }
-  // The tip's place needs this step's force and the force needs the place: the force is first taken to go
-  // on in a straight line, which errs by the square of the step.
-  TipYield yield;
+  // The displacement of the tip depends on the force of this step and vice versa: the force is first
+  // extrapolated linearly, with an error of second order in the step.
+  TipMobility mobility;
   for (std::size_t axis = 0; axis < 2 && vibrates_ && !input.tip; ++axis) {
     const std::array<double, 2>& f = tip_history_[axis];
     const double force = 2.0 * f[0] - f[1];
     motion.displacement[axis] = tip_[axis].peek(force);
     if (state_.law.damping == 0.0) continue;
     motion.rate[axis] = tip_[axis].peekRate(force);
-    yield.rate[axis] = tip_[axis].rateOfInput();
-    yield.assumed[axis] = force - input.tip_force[axis];
+    mobility.rate_per_force[axis] = tip_[axis].rateOfInput();
+    mobility.assumed_force[axis] = force - input.tip_force[axis];
   }
   CuttingForce layers;
   layers_.add(motion, layers);
-  yield.assumed[0] -= layers.fx;
-  yield.assumed[1] -= layers.fy;
-  layers.add(cutter_->step(motion, yield));
+  mobility.assumed_force[0] -= layers.fx;
+  mobility.assumed_force[1] -= layers.fy;
+  layers.add(cutter_->step(motion, mobility));
   return layers;
 }
 
-void CuttingMachine::moveTip(const Input& input, Output& out) {
+void CuttingMachine::updateTip(const Input& input, Output& out) {
   if (rigid()) return;
-  ChannelValues& channels = out.early;
+  ChannelValues& channels = out.raw;
   double acceleration = 0.0;
-  if (replayed()) {
-    const CutTrace::Step& step = followed_->steps.at(place_++);
+  if (replaysTrace()) {
+    const CutTrace::Step& step = replayed_->steps.at(replay_index_++);
     channels[TOOL_X] = step.displacement[0];
     channels[TOOL_Y] = step.displacement[1];
     acceleration = step.acceleration;
   } else {
-    settleTip(input, out);
+    integrateTip(input, out);
     if (probe_) acceleration = tip_[*probe_].acceleration();
-    if (kept_ && !guided_)
-      kept_->steps.push_back({out.force, {{channels[TOOL_X], channels[TOOL_Y]}}, acceleration});
+    if (recorded_ && !tip_prescribed_)
+      recorded_->steps.push_back({out.force, {{channels[TOOL_X], channels[TOOL_Y]}}, acceleration});
   }
   if (!probe_) return;
   channels[DISPLACEMENT] = channels[TOOL_X + *probe_];
   channels[ACCELERATION] = acceleration;
 }
 
-void CuttingMachine::settleTip(const Input& input, Output& out) {
+void CuttingMachine::integrateTip(const Input& input, Output& out) {
   const std::array<double, 2> tip{{out.force.fx + input.tip_force[0], out.force.fy + input.tip_force[1]}};
-  ChannelValues& channels = out.early;
+  ChannelValues& channels = out.raw;
   for (std::size_t axis = 0; axis < 2 && vibrates_; ++axis) {
     const double before = tip[axis] - jump_ * ((axis == 0 ? out.force.fx : out.force.fy) - last_cut_[axis]);
     channels[TOOL_X + axis] = jump_ != 0.0 ? tip_[axis].jump(before, tip[axis]) : tip_[axis].step(before);
-    // A jump does not go on.
-    tip_history_[axis] = {{tip[axis], engaged_ ? tip[axis] : tip_history_[axis][0]}};
+    // A jump is not extrapolated.
+    tip_history_[axis] = {{tip[axis], contact_changed_ ? tip[axis] : tip_history_[axis][0]}};
   }
   if (!cutter_) return;
   std::array<double, 2> at{};
@@ -284,40 +285,40 @@ void CuttingMachine::settleTip(const Input& input, Output& out) {
   } else if (vibrates_) {
     at = {{channels[TOOL_X], channels[TOOL_Y]}};
   }
-  cutter_->settle(at);
-  layers_.settle(at);
+  cutter_->endStep(at);
+  layers_.endStep(at);
 }
 
-void CuttingMachine::showForce(Output& out) {
+void CuttingMachine::measureForce(Output& out) {
   const std::array<double, 3> cut{{out.force.fx, out.force.fy, out.force.fz}};
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    if (!shows_force_[axis]) continue;
+    if (!force_selected_[axis]) continue;
     const double before = out.applied[axis] - jump_ * (cut[axis] - last_cut_[axis]);
-    out.early[FX + axis] =
-        sign_ * (jump_ != 0.0 ? sensor_[axis].jump(before, out.applied[axis]) : sensor_[axis].step(before));
+    out.raw[FX + axis] = force_sign_ * (jump_ != 0.0 ? sensor_[axis].jump(before, out.applied[axis])
+                                                     : sensor_[axis].step(before));
   }
   last_cut_ = cut;
 }
 
-void CuttingMachine::showLoad(double speed, Output& out) {
-  out.early[LOAD_METER] = 0.0;
-  if (!drive_ || !shows_load_) return;
+void CuttingMachine::measureLoad(double speed, Output& out) {
+  out.raw[LOAD_METER] = 0.0;
+  if (!drive_ || !load_selected_) return;
   const double mean_torque = last_torque_ + 0.5 * (1.0 - jump_) * (out.force.torque - last_torque_);
-  out.early[LOAD_METER] = drive_->step(mean_torque, speed);
+  out.raw[LOAD_METER] = drive_->step(mean_torque, speed);
   last_torque_ = out.force.torque;
 }
 
-void CuttingMachine::passOn(Output& out) {
+void CuttingMachine::filterChannels(Output& out) {
   if (!resonances_.empty()) {
-    const ChannelValues before = out.early;
+    const ChannelValues before = out.raw;
     for (auto& [resonance, filter] : resonances_)
-      out.early[resonance.channel] += resonated(resonance, filter, before[resonance.from]);
+      out.raw[resonance.channel] += resonated(resonance, filter, before[resonance.from]);
   }
-  for (auto& [channel, shelf] : shelves_) out.early[channel] = shelf.step(out.early[channel]);
-  for (auto& [channel, line] : delays_) out.early[channel] = line.step(out.early[channel]);
+  for (auto& [channel, shelf] : shelves_) out.raw[channel] = shelf.step(out.raw[channel]);
+  for (auto& [channel, line] : delays_) out.raw[channel] = line.step(out.raw[channel]);
 }
 
-void CuttingMachine::passTime(const ToolMotion& motion, std::size_t steps) {
+void CuttingMachine::advanceTime(const ToolMotion& motion, std::size_t steps) {
   const double time = static_cast<double>(steps) * time_step_;
   now_.record_time += time;
   if (clock_.record || cutting()) clock_.edge_time += time;
@@ -329,23 +330,23 @@ void CuttingMachine::passTime(const ToolMotion& motion, std::size_t steps) {
   }
 }
 
-// Whether a step sets nothing anew and nothing asks where it is.
-bool CuttingMachine::stepsAlike() const {
+// Whether no effect changes the state from step to step or depends on the instant of a step.
+bool CuttingMachine::replaysWithoutUpdates() const {
   return layers_.empty() && !probe_ &&
          !(effects_.has(Stage::motion) || effects_.has(Stage::cutting_law) || effects_.has(Stage::sensor) ||
            effects_.has(Stage::sensor_force) || effects_.has(Stage::drive) ||
            effects_.has(Stage::sensor_output));
 }
 
-// The rest of what is followed, in a cut that goes on.
-void CuttingMachine::replay(std::size_t from, const EarlyRows& early, Course& course) {
-  std::vector<double>* const x = early[TOOL_X];
-  std::vector<double>* const y = early[TOOL_Y];
-  const std::size_t steps = course.force.size();
-  if (replayed()) {
+// Replays the remaining steps of a continuing cut.
+void CuttingMachine::replayRest(std::size_t from, const ChannelRows& raw, StepHistory& history) {
+  std::vector<double>* const x = raw[TOOL_X];
+  std::vector<double>* const y = raw[TOOL_Y];
+  const std::size_t steps = history.force.size();
+  if (replaysTrace()) {
     for (std::size_t k = from; k < steps; ++k) {
-      const CutTrace::Step& step = followed_->steps.at(place_++);
-      course.force[k] = step.force;
+      const CutTrace::Step& step = replayed_->steps.at(replay_index_++);
+      history.force[k] = step.force;
       if (x) (*x)[k] = step.displacement[0];
       if (y) (*y)[k] = step.displacement[1];
     }
@@ -353,99 +354,100 @@ void CuttingMachine::replay(std::size_t from, const EarlyRows& early, Course& co
     const Input input;
     Output out;
     for (std::size_t k = from; k < steps; ++k) {
-      out.force = course.force[k] = cutter_->step(input.motion);
+      out.force = history.force[k] = cutter_->step(input.motion);
       if (!vibrates_ || !(x || y)) continue;
-      settleTip(input, out);
-      if (x) (*x)[k] = out.early[TOOL_X];
-      if (y) (*y)[k] = out.early[TOOL_Y];
+      integrateTip(input, out);
+      if (x) (*x)[k] = out.raw[TOOL_X];
+      if (y) (*y)[k] = out.raw[TOOL_Y];
     }
   }
-  const CuttingForce& last = course.force.back();
+  const CuttingForce& last = history.force.back();
   last_cut_ = {{last.fx, last.fy, last.fz}};
 }
 
 void CuttingMachine::run(std::size_t steps, const std::function<void(std::size_t, Input&)>& next,
-                         const EarlyRows& early) {
-  // What is not asked for may still show in what is.
+                         const ChannelRows& raw) {
+  // Channels that are not requested may act on requested ones.
   const bool mixes = effects_.has(Stage::sensor_output) || !resonances_.empty();
-  std::array<std::vector<double>, LOAD_METER + 1> own;
-  EarlyRows rows = early;
-  for (std::size_t c = 0; c < own.size() && mixes; ++c) {
+  std::array<std::vector<double>, LOAD_METER + 1> unrequested;
+  ChannelRows rows = raw;
+  for (std::size_t c = 0; c < unrequested.size() && mixes; ++c) {
     if (rows[c]) continue;
-    own[c].resize(steps);
-    rows[c] = &own[c];
+    unrequested[c].resize(steps);
+    rows[c] = &unrequested[c];
   }
-  Course course;
-  cutAll(steps, next, rows, course);
-  showAll(course, rows);
-  if (effects_.has(Stage::sensor_output)) measureAll(course, rows);
-  passAllOn(steps, rows);
+  StepHistory history;
+  simulateCut(steps, next, rows, history);
+  measureSensors(history, rows);
+  if (effects_.has(Stage::sensor_output)) applyOutputEffects(history, rows);
+  filterRows(steps, rows);
 }
 
-void CuttingMachine::cutAll(std::size_t steps, const std::function<void(std::size_t, Input&)>& next,
-                            const EarlyRows& early, Course& course) {
-  const bool pushed = effects_.has(Stage::sensor_force), measured = effects_.has(Stage::sensor_output);
-  course.before = last_cut_;
-  course.force.resize(steps);
-  if (pushed) course.applied.resize(steps);
-  if (measured) course.instants.resize(steps);
-  if (kept_) (keepsSums() ? kept_->sums.reserve(steps) : kept_->steps.reserve(steps));
+void CuttingMachine::simulateCut(std::size_t steps, const std::function<void(std::size_t, Input&)>& next,
+                                 const ChannelRows& raw, StepHistory& history) {
+  const bool has_sensor_force = effects_.has(Stage::sensor_force),
+             has_output_effects = effects_.has(Stage::sensor_output);
+  history.before = last_cut_;
+  history.force.resize(steps);
+  if (has_sensor_force) history.applied.resize(steps);
+  if (has_output_effects) history.instants.resize(steps);
+  if (recorded_) (tracesSums() ? recorded_->sums.reserve(steps) : recorded_->steps.reserve(steps));
   Input input;
   Output out;
-  const bool alike = followed_ && stepsAlike();
+  const bool replays_rest = replayed_ && replaysWithoutUpdates();
   for (std::size_t k = 0; k < steps; ++k) {
-    if (alike && cutting() && jump_ == 0.0) {
-      replay(k, early, course);
+    if (replays_rest && cutting() && jump_ == 0.0) {
+      replayRest(k, raw, history);
       next(steps - 1, input);
       now_.angle = input.motion.angle;
-      passTime(input.motion, steps - k);
+      advanceTime(input.motion, steps - k);
       return;
     }
     next(k, input);
-    takeOver(input);
-    if (measured) course.instants[k] = now_;
-    out.force = course.force[k] = cut(input);
-    if (pushed) {
-      course.applied[k] = {{out.force.fx, out.force.fy, out.force.fz}};
-      effects_.addForce(now_, course.applied[k]);
+    applyEffects(input);
+    if (has_output_effects) history.instants[k] = now_;
+    out.force = history.force[k] = cuttingForce(input);
+    if (has_sensor_force) {
+      history.applied[k] = {{out.force.fx, out.force.fy, out.force.fz}};
+      effects_.addForce(now_, history.applied[k]);
     }
-    moveTip(input, out);
+    updateTip(input, out);
     for (const std::size_t c : {TOOL_X, TOOL_Y}) {
-      if (early[c]) (*early[c])[k] = out.early[c];
+      if (raw[c]) (*raw[c])[k] = out.raw[c];
     }
     last_cut_ = {{out.force.fx, out.force.fy, out.force.fz}};
-    if (jump_ != 0.0) course.jumps.emplace_back(k, jump_);
+    if (jump_ != 0.0) history.jumps.emplace_back(k, jump_);
     jump_ = 0.0;
-    engaged_ = false;
-    passTime(input.motion);
+    contact_changed_ = false;
+    advanceTime(input.motion);
   }
 }
 
-// Each filter waits for its own last step only: side by side they take little longer than one.
-void CuttingMachine::showAll(const Course& course, const EarlyRows& early) {
-  struct Shown {
+// The filters are independent of each other and run in parallel on one core (instruction-level parallelism).
+void CuttingMachine::measureSensors(const StepHistory& history, const ChannelRows& raw) {
+  struct ForceRow {
     std::size_t axis;
     double CuttingForce::*of;
     double* row;
   };
   constexpr std::array<double CuttingForce::*, 3> OF_AXIS{
       {&CuttingForce::fx, &CuttingForce::fy, &CuttingForce::fz}};
-  std::vector<Shown> forces;
+  std::vector<ForceRow> forces;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    if (shows_force_[axis] && early[FX + axis])
-      forces.push_back({axis, OF_AXIS[axis], early[FX + axis]->data()});
+    if (force_selected_[axis] && raw[FX + axis])
+      forces.push_back({axis, OF_AXIS[axis], raw[FX + axis]->data()});
   }
-  double* const load = drive_ && shows_load_ && early[LOAD_METER] ? early[LOAD_METER]->data() : nullptr;
-  auto jump = course.jumps.begin();
-  CuttingForce last{course.before[0], course.before[1], course.before[2]};
-  for (std::size_t k = 0; k < course.force.size(); ++k) {
-    const CuttingForce& now = course.force[k];
-    const double jumps = jump != course.jumps.end() && jump->first == k ? (jump++)->second : 0.0;
-    for (const Shown& s : forces) {
-      const double cut = now.*s.of, applied = course.applied.empty() ? cut : course.applied[k][s.axis];
+  double* const load = drive_ && load_selected_ && raw[LOAD_METER] ? raw[LOAD_METER]->data() : nullptr;
+  auto jump = history.jumps.begin();
+  CuttingForce last{history.before[0], history.before[1], history.before[2]};
+  for (std::size_t k = 0; k < history.force.size(); ++k) {
+    const CuttingForce& now = history.force[k];
+    const double jumps = jump != history.jumps.end() && jump->first == k ? (jump++)->second : 0.0;
+    for (const ForceRow& s : forces) {
+      const double cut = now.*s.of, applied = history.applied.empty() ? cut : history.applied[k][s.axis];
       ModalFilter& sensor = sensor_[s.axis];
-      s.row[k] = sign_ * (jumps == 0.0 ? sensor.step(applied)
-                                       : sensor.jump(applied - jumps * (cut - last.*s.of), applied));
+      s.row[k] = force_sign_ * (jumps == 0.0 ? sensor.step(applied)
+                                             : sensor.jump(applied - jumps * (cut - last.*s.of), applied));
     }
     if (load) {
       load[k] = drive_->step(last_torque_ + 0.5 * (1.0 - jumps) * (now.torque - last_torque_), now_.speed);
@@ -455,37 +457,37 @@ void CuttingMachine::showAll(const Course& course, const EarlyRows& early) {
   }
 }
 
-void CuttingMachine::measureAll(const Course& course, const EarlyRows& early) const {
-  for (std::size_t k = 0; k < course.instants.size(); ++k) {
+void CuttingMachine::applyOutputEffects(const StepHistory& history, const ChannelRows& raw) const {
+  for (std::size_t k = 0; k < history.instants.size(); ++k) {
     ChannelValues values{};
     for (std::size_t c = 0; c < CHANNEL_COUNT; ++c) {
-      if (early[c]) values[c] = (*early[c])[k];
+      if (raw[c]) values[c] = (*raw[c])[k];
     }
-    effects_.measure(Stage::sensor_output, course.instants[k], values);
+    effects_.measure(Stage::sensor_output, history.instants[k], values);
     for (std::size_t c = 0; c < CHANNEL_COUNT; ++c) {
-      if (early[c]) (*early[c])[k] = values[c];
+      if (raw[c]) (*raw[c])[k] = values[c];
     }
   }
 }
 
-void CuttingMachine::passAllOn(std::size_t steps, const EarlyRows& early) {
+void CuttingMachine::filterRows(std::size_t steps, const ChannelRows& raw) {
   for (std::size_t k = 0; k < steps && !resonances_.empty(); ++k) {
     ChannelValues before{};
-    for (const auto& [resonance, filter] : resonances_) before[resonance.from] = (*early[resonance.from])[k];
+    for (const auto& [resonance, filter] : resonances_) before[resonance.from] = (*raw[resonance.from])[k];
     for (auto& [resonance, filter] : resonances_)
-      (*early[resonance.channel])[k] += resonated(resonance, filter, before[resonance.from]);
+      (*raw[resonance.channel])[k] += resonated(resonance, filter, before[resonance.from]);
   }
   for (auto& [channel, shelf] : shelves_) {
-    if (!early[channel]) continue;
-    for (double& v : *early[channel]) v = shelf.step(v);
+    if (!raw[channel]) continue;
+    for (double& v : *raw[channel]) v = shelf.step(v);
   }
   for (auto& [channel, line] : delays_) {
-    if (!early[channel]) continue;
-    for (double& v : *early[channel]) v = line.step(v);
+    if (!raw[channel]) continue;
+    for (double& v : *raw[channel]) v = line.step(v);
   }
 }
 
-void CuttingMachine::finish(double record_time, ChannelValues& channels) const {
+void CuttingMachine::applySignalEffects(double record_time, ChannelValues& channels) const {
   Instant at = now_;
   at.record_time = record_time;
   effects_.measure(Stage::signal, at, channels);

@@ -6,8 +6,8 @@
 namespace smartmill::sim {
 namespace {
 
-constexpr double LEAST_DEPTH = 1e-9;  // [m] of a layer that reaches nowhere
-constexpr double GONE = 1e-3;         // [m] by which a missing edge lies behind: deeper than any feed
+constexpr double LEAST_DEPTH = 1e-9;  // [m] instead of a depth <= 0
+constexpr double GONE = 1e-3;         // [m] radius reduction of a missing edge, more than any feed
 
 double depthOf(const EdgeLayer& layer, double depth) {
   return std::max(layer.from_surface ? depth - layer.height : std::min(layer.height, depth), LEAST_DEPTH);
@@ -25,18 +25,18 @@ CuttingLaw lawOf(const EdgeLayer& layer, CuttingLaw law) {
 }  // namespace
 
 EdgeLayers::EdgeLayers(const TwinSetup& setup, const CuttingLaw& law, double time_step, bool rigid) {
-  for (const EdgeLayer& of : setup.layers) {
-    if (of.weight == 0.0) continue;
+  for (const EdgeLayer& definition : setup.layers) {
+    if (definition.weight == 0.0) continue;
     std::vector<double> radius = setup.radius_offset;
-    if (of.missing_tooth >= 0) radius.at(static_cast<std::size_t>(of.missing_tooth)) -= GONE;
-    Layer layer{of, {}, {}};
-    // Tables do not tell one tooth from the next.
-    if (rigid && of.only_tooth < 0) {
-      layer.rigid.emplace(*setup.model.tool, lawOf(of, law), std::move(radius), setup.path_share);
+    if (definition.missing_tooth >= 0) radius.at(static_cast<std::size_t>(definition.missing_tooth)) -= GONE;
+    Layer layer{definition, {}, {}};
+    // Tables do not separate the teeth.
+    if (rigid && definition.only_tooth < 0) {
+      layer.rigid.emplace(*setup.model.tool, lawOf(definition, law), std::move(radius), setup.path_share);
     } else {
-      layer.process.emplace(*setup.model.tool, lawOf(of, law), time_step, std::move(radius),
+      layer.process.emplace(*setup.model.tool, lawOf(definition, law), time_step, std::move(radius),
                             setup.path_share);
-      if (of.only_tooth >= 0) layer.process->showOnly(of.only_tooth);
+      if (definition.only_tooth >= 0) layer.process->selectTooth(definition.only_tooth);
     }
     layers_.push_back(std::move(layer));
   }
@@ -44,38 +44,38 @@ EdgeLayers::EdgeLayers(const TwinSetup& setup, const CuttingLaw& law, double tim
 
 void EdgeLayers::engage(const std::vector<ContactArc>& arcs, const ToolMotion& now) {
   for (Layer& layer : layers_) {
-    std::vector<ContactArc> own = arcs;
-    for (ContactArc& a : own) a.depth = depthOf(layer.of, a.depth);
-    if (layer.rigid) layer.rigid->engage(own, feedOf(now));
-    if (layer.process) layer.process->engage(own, now);
+    std::vector<ContactArc> adapted = arcs;
+    for (ContactArc& a : adapted) a.depth = depthOf(layer.definition, a.depth);
+    if (layer.rigid) layer.rigid->engage(adapted, feedOf(now));
+    if (layer.process) layer.process->engage(adapted, now);
   }
 }
 
 void EdgeLayers::setDepths(const std::vector<double>& depths) {
   for (Layer& layer : layers_) {
-    std::vector<double> own;
-    for (const double d : depths) own.push_back(depthOf(layer.of, d));
-    if (layer.rigid) layer.rigid->setDepths(own);
-    if (layer.process) layer.process->setDepths(own);
+    std::vector<double> adapted;
+    for (const double d : depths) adapted.push_back(depthOf(layer.definition, d));
+    if (layer.rigid) layer.rigid->setDepths(adapted);
+    if (layer.process) layer.process->setDepths(adapted);
   }
 }
 
 void EdgeLayers::setLaw(const CuttingLaw& law) {
   for (Layer& layer : layers_) {
-    if (layer.rigid) layer.rigid->setLaw(lawOf(layer.of, law));
-    if (layer.process) layer.process->setLaw(lawOf(layer.of, law));
+    if (layer.rigid) layer.rigid->setLaw(lawOf(layer.definition, law));
+    if (layer.process) layer.process->setLaw(lawOf(layer.definition, law));
   }
 }
 
 void EdgeLayers::add(const ToolMotion& now, CuttingForce& sum) {
   for (Layer& layer : layers_) {
-    sum.add(layer.rigid ? layer.rigid->at(now.angle) : layer.process->step(now), layer.of.weight);
+    sum.add(layer.rigid ? layer.rigid->at(now.angle) : layer.process->step(now), layer.definition.weight);
   }
 }
 
-void EdgeLayers::settle(const std::array<double, 2>& displacement) {
+void EdgeLayers::endStep(const std::array<double, 2>& displacement) {
   for (Layer& layer : layers_) {
-    if (layer.process) layer.process->settle(displacement);
+    if (layer.process) layer.process->endStep(displacement);
   }
 }
 

@@ -21,22 +21,22 @@
 #include "smartmill_sim/twin/burst_times.h"
 #include "smartmill_sim/twin/cut_traces.h"
 #include "smartmill_sim/twin/cutting_machine.h"
-#include "smartmill_sim/twin/guide.h"
+#include "smartmill_sim/twin/tip_trajectory.h"
 
 namespace smartmill::sim {
 namespace {
 
 const std::array<const char*, 2> TIP{{"tool_x", "tool_y"}};
 
-// What ran before the record: so much of it is simulated, the depth of cut growing over the first part, since
-// full cut at once makes the tool ring for long.
-constexpr double LEAD = 0.4;           // [s]
-constexpr double LEAST_STEADY = 0.1;   // [s] of running before a record that make it steady
-constexpr double GROWING_SHARE = 0.6;  // [1] of the lead
+// Lead-in before a record of a running cut. The depth of cut grows over its first part: a sudden full cut
+// would excite a long transient.
+constexpr double LEAD_IN = 0.4;        // [s]
+constexpr double LEAST_STEADY = 0.1;   // [s] shorter times before the record are simulated as they are
+constexpr double GROWING_SHARE = 0.6;  // [1] of the lead-in
 constexpr double LEAST_GROWTH = 0.01;  // [1] of the depth at the beginning
 constexpr long GROWTH_STEPS = 32;      // between two depths
 
-// Means over the samples' intervals: x + x'' dt^2 / 24, good to the fourth order of frequency over sample
+// Means over the sample intervals: x + x'' dt^2 / 24, with an error of fourth order in frequency over sample
 // rate.
 void average(std::vector<double>& x) {
   double before = x.front();
@@ -47,15 +47,15 @@ void average(std::vector<double>& x) {
   }
 }
 
-// From 0 at 0 smoothly to 1 at 1.
+// Smooth step from 0 at 0 to 1 at 1.
 double growth(double x) {
   return x >= 1.0 ? 1.0 : x * x * (3.0 - 2.0 * x);
 }
 
-// Columns that this twin gives: inputs and the channels of the measuring chain.
-bool gives(const std::string& column, const CampaignTest& test) {
+// Whether this twin simulates a column: inputs and channels of the measuring chain.
+bool isSimulated(const std::string& column, const CampaignTest& test) {
   if (column == "spindle_angle" || column == "hammer" || motionAxis(column)) return true;
-  // Where such a sensor stands is known of a tap only: where it is hit.
+  // The position of these sensors is known only for a tap: at the hit point.
   if (column == channelName(DISPLACEMENT) || column == channelName(ACCELERATION))
     return test.kind == TestKind::tap && test.direction != "z";
   for (std::size_t c = 0; c < CHANNEL_COUNT; ++c) {
@@ -64,8 +64,8 @@ bool gives(const std::string& column, const CampaignTest& test) {
   return false;
 }
 
-// The force of a tap: zero outside the contact (Dunwoody section 4.3.1), where the record shows only noise,
-// which would ring in the sensor's modes. A record with further hits stays as it is.
+// Force of a tap: zero outside the contact (Dunwoody section 4.3.1), where the record contains only noise,
+// which would excite the sensor's modes. A record with further hits is left unchanged.
 std::vector<double> contactForce(const std::vector<double>& hammer) {
   constexpr double SECOND_HIT = 0.05;
   if (hasSecondHit(hammer, SECOND_HIT)) return hammer;
@@ -74,27 +74,27 @@ std::vector<double> contactForce(const std::vector<double>& hammer) {
   return force;
 }
 
-// Times of a test that effects in time need.
+// Times of a test for effects in time.
 CuttingMachine::Clock clockOf(const MachineModel& model, const CampaignTest& test, const Record& record) {
   for (const EffectEntry& effect : model.effects) {
     const EffectKind* kind = findEffect(effect.name);
     if (!kind || !actsIn(kind->stage, test.kind)) continue;
     const bool shows = kind->stage != Stage::drive || record.has("load_meter");
-    const char* lacks = nullptr;
-    if (kind->has(EffectNeed::start_time) && shows && !test.start_time) lacks = "start_time_s";
+    const char* missing = nullptr;
+    if (kind->has(EffectNeed::start_time) && shows && !test.start_time) missing = "start_time_s";
     const auto clock = effect.words.find("clock");
-    if (clock != effect.words.end() && clock->second == "machine" && !test.start_time) lacks = "start_time_s";
-    if (kind->has(EffectNeed::cut_time) && !test.cut_time_before) lacks = "cut_time_before_s";
-    if (lacks)
-      throw Error("test " + test.name + ": " + lacks + " is missing (effect " + effect.name + " needs it)");
+    if (clock != effect.words.end() && clock->second == "machine" && !test.start_time)
+      missing = "start_time_s";
+    if (kind->has(EffectNeed::cut_time) && !test.cut_time_before) missing = "cut_time_before_s";
+    if (missing)
+      throw Error("test " + test.name + ": " + missing + " is missing (effect " + effect.name + " needs it)");
   }
   return {test.start_time.value_or(0.0), test.cut_time_before.value_or(0.0), true};
 }
 
-// Phases of tones that no model knows, from what the record shows beyond the twin without them: joint least
-// squares of sine and cosine on every channel that a tone is in, about the means. Clipped samples do not
-// count.
-void findPhases(const Record& recorded, const std::array<std::vector<double>*, CHANNEL_COUNT>& early,
+// Estimates the phases of tones from the residual of the twin without them: joint least squares of sine and
+// cosine over the channels of the tones, with their means removed. Clipped samples are ignored.
+void findPhases(const Record& recorded, const std::array<std::vector<double>*, CHANNEL_COUNT>& raw,
                 double rate, double speed, const CuttingMachine& machine, const std::vector<Tone*>& tones) {
   const ChannelValues limits = machine.limits();
   const auto n = static_cast<Eigen::Index>(2 * tones.size());
@@ -111,23 +111,23 @@ void findPhases(const Record& recorded, const std::array<std::vector<double>*, C
   for (std::size_t c = 0; c < CHANNEL_COUNT; ++c) {
     bool in_channel = false;
     for (Eigen::Index k = 0; k < n / 2; ++k) in_channel = in_channel || amplitudeOf(k, c) != 0.0;
-    if (!in_channel || !early[c] || !recorded.has(channelName(c))) continue;
-    const std::vector<double>& shown = recorded.column(channelName(c));
+    if (!in_channel || !raw[c] || !recorded.has(channelName(c))) continue;
+    const std::vector<double>& measured = recorded.column(channelName(c));
     Eigen::MatrixXd square = Eigen::MatrixXd::Zero(n + 1, n + 1);  // last: the mean
     Eigen::VectorXd product = Eigen::VectorXd::Zero(n + 1), row = Eigen::VectorXd::Ones(n + 1);
-    for (std::size_t i = 0; i < shown.size(); ++i) {
-      if (std::abs(shown[i]) > 0.98 * limits[c]) continue;
+    for (std::size_t i = 0; i < measured.size(); ++i) {
+      if (std::abs(measured[i]) > 0.98 * limits[c]) continue;
       const double t = static_cast<double>(i) / rate;
       ChannelValues values{};
-      values[c] = (*early[c])[i];
-      machine.finish(t, values);
+      values[c] = (*raw[c])[i];
+      machine.applySignalEffects(t, values);
       for (Eigen::Index k = 0; k < n / 2; ++k) {
         const double a = tones[static_cast<std::size_t>(k)]->rate(speed) * t;
         row(2 * k) = amplitudeOf(k, c) * std::sin(a);
         row(2 * k + 1) = amplitudeOf(k, c) * std::cos(a);
       }
       square += row * row.transpose();
-      product += row * (shown[i] - values[c]);
+      product += row * (measured[i] - values[c]);
     }
     if (square(n, n) <= 0.0) continue;
     const Eigen::VectorXd mean = square.col(n) / square(n, n);
@@ -142,8 +142,8 @@ void findPhases(const Record& recorded, const std::array<std::vector<double>*, C
   }
 }
 
-// What a tap hits: the tool tip, the sensor or (when a program shows both answers in one record) both. A
-// channel answers when it stands out of its noise after the hit.
+// Target of a tap: the tool tip, the sensor or (if a record contains both responses) both. A channel responds
+// if its peak after the hit exceeds its noise.
 struct TapTarget {
   bool tip, sensor;
 };
@@ -153,7 +153,7 @@ TapTarget targetOf(const Record& record, std::size_t axis) {
   const auto louder = [](double a, double b) { return std::abs(a) < std::abs(b); };
   const auto hit =
       static_cast<std::size_t>(std::max_element(hammer.begin(), hammer.end(), louder) - hammer.begin());
-  const auto answers = [&](const char* channel) {
+  const auto responds = [&](const char* channel) {
     constexpr std::size_t LEAST_QUIET = 20;
     if (!record.has(channel) || hit < 2 * LEAST_QUIET) return false;
     const std::vector<double>& x = record.column(channel);
@@ -163,11 +163,11 @@ TapTarget targetOf(const Record& record, std::size_t axis) {
                                        [&](double a, double b) { return louder(a - level, b - level); });
     return std::abs(*peak - level) > 10.0 * deviation;
   };
-  TapTarget target{false, answers(channelName(FX + axis))};
+  TapTarget target{false, responds(channelName(FX + axis))};
   if (axis < 2)
-    target.tip = answers(channelName(TOOL_X + axis)) || answers("displacement") || answers("acceleration");
+    target.tip = responds(channelName(TOOL_X + axis)) || responds("displacement") || responds("acceleration");
   if (!target.tip && !target.sensor) {
-    // Silent channels: by what was measured at all.
+    // No response: the target follows from the measured channels.
     target.tip =
         axis < 2 && (record.has(TIP[axis]) || record.has("displacement") || record.has("acceleration"));
     target.sensor = !target.tip;
@@ -175,27 +175,27 @@ TapTarget targetOf(const Record& record, std::size_t axis) {
   return target;
 }
 
-using Rows = CuttingMachine::EarlyRows;
+using Rows = CuttingMachine::ChannelRows;
 
-// Step after step: early channels of each sample, with substeps between the samples.
-// input(i, share): what happens at a share 0..1 of the way from sample i to the next.
+// Simulates step by step: channels before the signal stage at each sample, with substeps between the samples.
+// input(i, share): input between sample i (share 0) and the next one (share 1).
 template <class Input>
-void stepThrough(CuttingMachine& machine, std::size_t samples, int substeps, const Input& input,
-                 const Rows& out) {
+void simulateByStep(CuttingMachine& machine, std::size_t samples, int substeps, const Input& input,
+                    const Rows& out) {
   CuttingMachine::Output now, between;
   for (std::size_t i = 0; i < samples; ++i) {
     machine.step(input(i, 0.0), now);
     for (std::size_t c = 0; c < CHANNEL_COUNT; ++c) {
-      if (out[c]) (*out[c])[i] = now.early[c];
+      if (out[c]) (*out[c])[i] = now.raw[c];
     }
     for (int s = 1; s < substeps; ++s) machine.step(input(i, static_cast<double>(s) / substeps), between);
   }
 }
 
-// The same stage after stage. input(i, share, input): sets what moves on.
+// Simulates stage by stage. input(i, share, input): updates the input of a step.
 template <class Input>
-void passThrough(CuttingMachine& machine, std::size_t samples, int substeps, const Input& input,
-                 const Rows& out) {
+void simulateByStage(CuttingMachine& machine, std::size_t samples, int substeps, const Input& input,
+                     const Rows& out) {
   const auto every = static_cast<std::size_t>(substeps);
   std::array<std::vector<double>, CHANNEL_COUNT> fine;
   Rows rows = out;
@@ -216,8 +216,8 @@ void passThrough(CuttingMachine& machine, std::size_t samples, int substeps, con
   }
 }
 
-// Runs the machine over the record; recorded columns are kept.
-// move(rows): writes early channels of each sample. recorded: nullptr when there is none.
+// Runs the machine over the record. move(rows): writes the channels before the signal stage at each sample;
+// recorded: nullptr if there is none.
 template <class Move>
 void run(const MachineModel& model, const CampaignTest& test, const SimulationOptions& options,
          CuttingMachine& machine, const Move& move, const Record* recorded, Record& record) {
@@ -227,13 +227,13 @@ void run(const MachineModel& model, const CampaignTest& test, const SimulationOp
     if (!test.running_before) machine.resetLoadMeter(test.spindle_speed);
   }
   Rows out{};
-  std::vector<std::size_t> shown;
+  std::vector<std::size_t> simulated_channels;
   for (std::size_t c = 0; c < CHANNEL_COUNT; ++c) {
     if (!record.has(channelName(c))) continue;
     out[c] = &record.add(channelName(c));
-    shown.push_back(c);
+    simulated_channels.push_back(c);
   }
-  if (options.channels) machine.showOnly(shown);
+  if (options.channels) machine.selectChannels(simulated_channels);
   move(out);
 
   if (model.force_sensor.mean_samples) {
@@ -253,10 +253,10 @@ void run(const MachineModel& model, const CampaignTest& test, const SimulationOp
     }
   }
   findBursts(recorded && !options.random_phases ? recorded : nullptr, out, test.sample_rate, machine, random);
-  for (std::size_t i = 0; i < record.size() && (options.noise || machine.finishes()); ++i) {
+  for (std::size_t i = 0; i < record.size() && (options.noise || machine.hasSignalEffects()); ++i) {
     ChannelValues values{};
-    for (const std::size_t c : shown) values[c] = (*out[c])[i];
-    machine.finish(static_cast<double>(i) / test.sample_rate, values);
+    for (const std::size_t c : simulated_channels) values[c] = (*out[c])[i];
+    machine.applySignalEffects(static_cast<double>(i) / test.sample_rate, values);
     if (options.noise) {
       for (const std::size_t c : {FX, FY, FZ}) {
         if (out[c] && model.force_sensor.noise_rms)
@@ -264,7 +264,7 @@ void run(const MachineModel& model, const CampaignTest& test, const SimulationOp
       }
       values[LOAD_METER] = machine.rounded(values[LOAD_METER]);
     }
-    for (const std::size_t c : shown) (*out[c])[i] = values[c];
+    for (const std::size_t c : simulated_channels) (*out[c])[i] = values[c];
   }
 }
 
@@ -284,25 +284,25 @@ Record simulateTap(const MachineModel& model, const CampaignTest& test, const Re
   const std::size_t samples = record.size();
   run(
       model, test, options, machine,
-      [&](const Rows& out) { stepThrough(machine, samples, options.substeps, input, out); }, recorded,
+      [&](const Rows& out) { simulateByStep(machine, samples, options.substeps, input, out); }, recorded,
       record);
   return record;
 }
 
-// A spindle that turns steadily and, in a cut, a tool that is fed into its work.
+// Constant spindle speed and, in a cut, constant feed.
 class SteadyTest {
  public:
-  // @param phase of tooth 1 [rad] at the time `begin` [s] of the first sample
+  // @param phase [rad] angle of tooth 1 at the time `begin` [s] of the first sample
   SteadyTest(const MachineModel& model, const CampaignTest& test, double phase, double begin,
              const SimulationOptions& options, CuttingMachine& machine)
       : test_(test),
         phase_(phase),
         begin_(begin),
         substeps_(options.substeps),
-        // Half of what comes on linearly is there before the step ends.
+        // A linear rise is on average half a step before the end of the step.
         rise_(engagementRise(machine.vibrates()) + 2.0 * options.early_entry),
         machine_(machine),
-        // A rounded time stamp must not put the sample of engagement on the wrong side.
+        // Tolerance for a rounded time stamp of the engagement.
         start_(test.engage_time.value_or(begin - 1.0) - 1e-3 / test.sample_rate) {
     if (!cut()) return;
     model.needCutting("simulate a cut");
@@ -317,16 +317,16 @@ class SteadyTest {
     input.motion.centre[0] = feed_ * (t - begin_);
   }
 
-  // The same in a record; the tool engages when its time has come.
+  // As inputAt(), within a record: the tool engages at its time.
   void next(double t, CuttingMachine::Input& input) {
     inputAt(t, input);
     if (!engaged_ && cut() && t >= start_) engage(input.motion, test_.engagement->axial_depth);
   }
 
-  // What ran before the record.
-  void lead() {
-    // The same for every model, or what is compared would jump between models.
-    const double time = *test_.running_before < LEAST_STEADY ? *test_.running_before : LEAD;
+  // Simulates the lead-in before the record.
+  void leadIn() {
+    // Independent of the model, so that differences between models are smooth.
+    const double time = *test_.running_before < LEAST_STEADY ? *test_.running_before : LEAD_IN;
     const auto steps = static_cast<long>(time * test_.sample_rate * substeps_);
     const double step = 1.0 / test_.sample_rate / substeps_;
     CuttingMachine::Input input;
@@ -357,12 +357,12 @@ class SteadyTest {
   int substeps_;
   double rise_;  // [samples]
   CuttingMachine& machine_;
-  double start_;       // [s] from which the tool is in cut
+  double start_;       // [s] begin of the cut
   double feed_ = 0.0;  // [m/s]
   bool engaged_ = false;
 };
 
-// The angle of a spindle that turns steadily, where a record asks for it.
+// Fills the spindle angle of a record at constant speed.
 void fillAngle(Record& record, double phase, double speed) {
   if (!record.has("spindle_angle")) return;
   std::vector<double>& angle = record.add("spindle_angle");
@@ -372,12 +372,13 @@ void fillAngle(Record& record, double phase, double speed) {
   }
 }
 
-std::optional<Guide> guideOf(const CampaignTest& test, const Record* recorded,
-                             const SimulationOptions& options, const CuttingMachine& machine) {
+std::optional<TipTrajectory> tipTrajectoryOf(const CampaignTest& test, const Record* recorded,
+                                             const SimulationOptions& options,
+                                             const CuttingMachine& machine) {
   if (!options.guided || test.kind != TestKind::cut || test.running_before || !machine.vibrates() ||
-      !recorded || !Guide::canBe(*recorded))
+      !recorded || !TipTrajectory::isAvailable(*recorded))
     return {};
-  return Guide(machine.model(), *recorded, test.sample_rate);
+  return TipTrajectory(machine.model(), *recorded, test.sample_rate);
 }
 
 std::optional<AxisMotion> motionOf(const MachineModel& model, const CampaignTest& test,
@@ -391,8 +392,8 @@ std::optional<AxisMotion> motionOf(const MachineModel& model, const CampaignTest
 }
 
 Record simulateOn(CuttingMachine& machine, const MachineModel& model, const CampaignTest& test,
-                  const Record* recorded, Record record, double phase, const std::optional<Guide>& guide,
-                  const SimulationOptions& options) {
+                  const Record* recorded, Record record, double phase,
+                  const std::optional<TipTrajectory>& trajectory, const SimulationOptions& options) {
   if (test.kind == TestKind::tap)
     return simulateTap(model, test, recorded, std::move(record), options, machine);
   fillAngle(record, phase, test.spindle_speed);
@@ -400,19 +401,19 @@ Record simulateOn(CuttingMachine& machine, const MachineModel& model, const Camp
   if (test.running_before) {
     machine.setClock(clockOf(model, test, record));
     if (record.has("load_meter")) machine.resetLoadMeter(test.spindle_speed);
-    steady.lead();
+    steady.leadIn();
   }
   const double dt = 1.0 / test.sample_rate;
   const std::optional<AxisMotion> motion = motionOf(model, test, recorded, options);
   const auto input = [&](std::size_t i, double share, CuttingMachine::Input& at) {
     steady.next(record.time[i] + share * dt, at);
-    if (guide) at.tip = guide->at(i, share);
+    if (trajectory) at.tip = trajectory->at(i, share);
     if (motion) at.axis_acceleration = motion->acceleration(i, share);
   };
   run(
       model, test, options, machine,
-      [&](const Rows& out) { passThrough(machine, record.size(), options.substeps, input, out); }, recorded,
-      record);
+      [&](const Rows& out) { simulateByStage(machine, record.size(), options.substeps, input, out); },
+      recorded, record);
   return record;
 }
 
@@ -421,24 +422,24 @@ Record simulate(const MachineModel& model, const CampaignTest& test, const Recor
   if (options.substeps < 1) throw Error("simulation: substeps below 1");
   CuttingMachine machine(model, 1.0 / (test.sample_rate * options.substeps), Feed::steady,
                          options.corner_slices);
-  const std::optional<Guide> guide = guideOf(test, recorded, options, machine);
-  if (guide) machine.guide();
+  const std::optional<TipTrajectory> trajectory = tipTrajectoryOf(test, recorded, options, machine);
+  if (trajectory) machine.prescribeTip();
   const auto simulated = [&] {
-    return simulateOn(machine, model, test, recorded, std::move(record), phase, guide, options);
+    return simulateOn(machine, model, test, recorded, std::move(record), phase, trajectory, options);
   };
   if (!options.traces || !(test.kind == TestKind::cut || machine.vibrates())) return simulated();
-  // Where forces tell the place of the tip, the sensor and the tool's modes enter it.
-  std::vector<double> values = guide && Guide::byForce(*recorded)
+  // If the motion of the tip follows from the forces, it depends on the sensor and the tool's modes.
+  std::vector<double> values = trajectory && TipTrajectory::isFromForce(*recorded)
                                    ? valuesOfRecord(model, test.kind)
-                                   : valuesOfTrace(model, test.kind, guide.has_value());
-  if (const auto held = options.traces->find(values)) {
-    machine.follow(held.get());
+                                   : valuesOfTrace(model, test.kind, trajectory.has_value());
+  if (const auto cached = options.traces->find(values)) {
+    machine.replayTrace(cached.get());
     return simulated();
   }
-  const auto kept = std::make_shared<CutTrace>();
-  machine.keep(kept.get());
+  const auto recorded_trace = std::make_shared<CutTrace>();
+  machine.recordTrace(recorded_trace.get());
   Record result = simulated();
-  options.traces->hold(std::move(values), kept);
+  options.traces->insert(std::move(values), recorded_trace);
   return result;
 }
 
@@ -449,13 +450,13 @@ double recordedPhase(const CampaignTest& test, const Record& recorded) {
   const std::vector<double>& angle = recorded.column("spindle_angle");
   double s = 0.0, c = 0.0;
   for (std::size_t i = 0; i < angle.size(); ++i) {
-    // On the grid of the sample rate, as the test is simulated.
+    // On the grid of the sample rate, as in the simulation.
     const double turned = test.spindle_speed * static_cast<double>(i) / test.sample_rate;
     s += std::sin(angle[i] - turned);
     c += std::cos(angle[i] - turned);
   }
-  // A line of no whole order tells one turn from the next: the record's own count, 0..2 pi at its first
-  // sample.
+  // A line of non-integer order distinguishes revolutions: the result is on the revolution of the record's
+  // first sample, 0..2 pi.
   return angle[0] + std::remainder(std::atan2(s, c) - angle[0], units::TWO_PI);
 }
 
@@ -464,15 +465,15 @@ Record simulateTest(const MachineModel& model, const CampaignTest& test, const R
   if (recorded.size() == 0) throw Error(recorded.file + ": no samples");
   Record record;
   record.file = recorded.file;
-  // The grid of the sample rate; a file's times are rounded to its printed digits.
+  // Grid of the sample rate: times in a file are rounded.
   for (std::size_t i = 0; i < recorded.size(); ++i)
     record.time.push_back(recorded.time[0] + static_cast<double>(i) / test.sample_rate);
-  const auto asked = [&](const std::string& name) {
+  const auto requested = [&](const std::string& name) {
     return name == "hammer" || motionAxis(name) || !options.channels ||
            std::find(options.channels->begin(), options.channels->end(), name) != options.channels->end();
   };
   for (const std::string& name : recorded.names) {
-    if (gives(name, test) && asked(name)) record.add(name) = recorded.column(name);
+    if (isSimulated(name, test) && requested(name)) record.add(name) = recorded.column(name);
   }
   const double phase = options.phase ? *options.phase : recordedPhase(test, recorded);
   return simulate(model, test, &recorded, std::move(record), phase, options);

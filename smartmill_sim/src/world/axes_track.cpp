@@ -8,7 +8,7 @@
 namespace smartmill::sim {
 namespace {
 
-constexpr double GAP = 0.02;  // [s] between samples; no machine is led over more in one straight line
+constexpr double GAP = 0.02;  // [s] between samples; longer intervals are gaps
 
 }  // namespace
 
@@ -21,17 +21,17 @@ void AxesTrack::push(const SampleBlock& block) {
     if (!points_.empty() && !(point.time > points_.back().time)) continue;
     for (std::size_t k = 0; k < 3; ++k) point.position[k] = block.at(i, axis[k]);
     point.revolutions = block.at(i, revolutions);
-    point.jump = !points_.empty() && (points_.back().stands || point.time - points_.back().time > GAP);
+    point.jump = !points_.empty() && (points_.back().held || point.time - points_.back().time > GAP);
     points_.push_back(point);
   }
 }
 
-void AxesTrack::stand(double until) {
+void AxesTrack::holdUntil(double until) {
   if (points_.empty() || until <= points_.back().time) return;
   Point point = points_.back();
   point.time = until;
   point.jump = false;
-  point.stands = true;
+  point.held = true;
   points_.push_back(point);
 }
 

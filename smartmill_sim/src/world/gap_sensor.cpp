@@ -9,9 +9,9 @@
 namespace smartmill::sim {
 namespace {
 
-constexpr int ACROSS = 9, ALONG = 5;  // spots of an electrode's diameter, across and along the tool
+constexpr int ACROSS = 9, ALONG = 5;  // spots over the electrode, across and along the tool
 constexpr int HOUSING = 10;           // spots on the housing's radius
-constexpr double TOUCHING = 0.5e-6;   // [m] gap that a voltage is still told of
+constexpr double TOUCHING = 0.5e-6;   // [m] least gap for which a voltage is computed
 
 }  // namespace
 
@@ -22,14 +22,15 @@ ToolSurface::ToolSurface(const StationTraits& traits, const ToolGeometry& tool, 
       relief_(traits.relief_flank),
       land_(traits.land),
       insert_(traits.tooth == "insert"),
-      low_(traits.tooth_low),
+      tooth_distance_(traits.tooth_low),
       eccentricity_(traits.eccentricity),
       eccentricity_angle_(traits.eccentricity_angle) {
-  low_.resize(static_cast<std::size_t>(tool.teeth), 0.0);
+  tooth_distance_.resize(static_cast<std::size_t>(tool.teeth), 0.0);
 }
 
-/// Of one tooth, `off` [rad] ahead of the direction looked at: then its relief is seen.
-double ToolSurface::behind(double off) const {
+/// Recess [m] of the surface at a tooth that is `off` [rad] ahead of the direction; off > 0: on its relief
+/// flank.
+double ToolSurface::recess(double off) const {
   const double past = off > 0.0 ? std::max(0.0, off - land_) : off;
   const double width = past > 0.0 ? relief_ : rake_;
   if (insert_ && past > 0.0) return std::min(depth_, depth_ * past / width);
@@ -41,12 +42,12 @@ double ToolSurface::retreat(double angle, double height, double facing) const {
   for (int tooth = 0; tooth < tool_.teeth; ++tooth) {
     const double off =
         std::remainder(angle + tool_.toothAngle(tooth) - tool_.lag() * height - facing, units::TWO_PI);
-    least = std::min(least, low_[static_cast<std::size_t>(tooth)] + behind(off));
+    least = std::min(least, tooth_distance_[static_cast<std::size_t>(tooth)] + recess(off));
   }
   return std::min(least, depth_);
 }
 
-double ToolSurface::throwTo(double angle, double facing) const {
+double ToolSurface::eccentricityTowards(double angle, double facing) const {
   return eccentricity_ * std::cos(angle + eccentricity_angle_ - facing);
 }
 
@@ -55,13 +56,13 @@ GapSensor::GapSensor(const StationTraits& traits, const smartmill::HammerStation
       gain_(station.gain_volt * (1.0 + traits.gain_error)),
       gap_(station.gap_at_zero_volt),
       range_(station.range_volt),
-      bend_(traits.bend) {
+      nonlinearity_(traits.bend) {
   const double radius = 0.5 * traits.electrode;
   if (radius <= 0.0) {
     spots_.push_back({0.0, 0.0, 1.0});
   } else {
     double sum = 0.0;
-    // Even in the angle about the disc's middle: the chord's end needs no fine steps.
+    // Uniform in the angle about the disc's centre: accurate at the ends of the chord.
     for (int i = 0; i < ACROSS; ++i) {
       const double turn = units::PI * (i + 0.5) / ACROSS, chord = radius * std::sin(turn);
       const double share = chord * chord;
@@ -77,35 +78,35 @@ GapSensor::GapSensor(const StationTraits& traits, const smartmill::HammerStation
     for (int k = -HOUSING; k <= HOUSING; ++k)
       if (i * i + k * k <= HOUSING * HOUSING) spots_.push_back({step * i, step * k, 0.0});
   }
-  behind_.assign(spots_.size(), 0.0);
+  surface_distance_.assign(spots_.size(), 0.0);
 }
 
-void GapSensor::face(const ToolSurface& surface, double angle, double above, double beside) {
-  const double radius = surface.radius(), towards = surface.throwTo(angle, facing_);
+void GapSensor::setTarget(const ToolSurface& surface, double angle, double above, double lateral) {
+  const double radius = surface.radius(), towards = surface.eccentricityTowards(angle, facing_);
   for (std::size_t i = 0; i < spots_.size(); ++i) {
-    const double across = (spots_[i].lateral + beside) / radius;
-    const bool below = spots_[i].share == 0.0 && above + spots_[i].height < 0.0;  // the tool's tip
-    if (std::abs(across) >= 1.0 || below) {                                       // beside the tool
-      behind_[i] = radius;
+    const double across = (spots_[i].lateral + lateral) / radius;
+    const bool below = spots_[i].share == 0.0 && above + spots_[i].height < 0.0;  // below the tool tip
+    if (std::abs(across) >= 1.0 || below) {                                       // next to the tool
+      surface_distance_[i] = radius;
       continue;
     }
     const double turn = std::asin(across);
     const double retreat = surface.retreat(angle, above + spots_[i].height, facing_ + turn);
-    behind_[i] = radius - (radius - retreat) * std::cos(turn) - towards;
+    surface_distance_[i] = radius - (radius - retreat) * std::cos(turn) - towards;
   }
 }
 
 double GapSensor::voltage(double gap) const {
   double capacity = 0.0;  // [1/m] over that of a flat target at 1 m
   for (std::size_t i = 0; i < spots_.size(); ++i) {
-    if (spots_[i].share > 0.0) capacity += spots_[i].share / std::max(gap + behind_[i], TOUCHING);
+    if (spots_[i].share > 0.0) capacity += spots_[i].share / std::max(gap + surface_distance_[i], TOUCHING);
   }
   const double straight = gain_ * (gap_ * capacity - 1.0);
-  return clipped(straight + bend_ * straight * straight / range_);
+  return clipped(straight + nonlinearity_ * straight * straight / range_);
 }
 
 double GapSensor::clearance(double gap) const {
-  return gap + *std::min_element(behind_.begin(), behind_.end());
+  return gap + *std::min_element(surface_distance_.begin(), surface_distance_.end());
 }
 
 double GapSensor::clipped(double voltage) const {

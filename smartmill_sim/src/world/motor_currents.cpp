@@ -10,71 +10,72 @@
 namespace smartmill::sim {
 namespace {
 
-constexpr double REFERENCE = 20.0;  // [deg C] at which the constants hold
-constexpr double MOVES = 1e-7;      // [m/s]
+constexpr double REFERENCE = 20.0;    // [deg C] of the constants
+constexpr double LEAST_SPEED = 1e-7;  // [m/s]
 
 }  // namespace
 
 void MotorTraits::declare(ParameterTable& table) {
-  table.section("Motors: what Hall sensors round one phase of each show (daq/motor_current).");
+  table.section("Motors: signals of a Hall sensor at one phase of each (daq/motor_current).");
   table.flag("currents", currents,
-             "whether daq/motor_current is published; the drives below then also make daq/servo");
+             "whether daq/motor_current is published; daq/servo then uses the drives below too");
   table.list("mass", mass, "kg", Range::openLow(0.0, 1e5),
-             "that X, Y, Z move, inertia of the motor included");
+             "moved mass of X, Y, Z, inertia of the motor included");
   table.list("coulomb", coulomb, "N", Range::closed(0.0, 1e4), "dry friction of X, Y, Z");
-  table.list("viscous", viscous, "N s/m", Range::closed(0.0, 1e6), "of X, Y, Z");
+  table.list("viscous", viscous, "N s/m", Range::closed(0.0, 1e6), "viscous friction of X, Y, Z");
   table.list("stribeck", stribeck, "N", Range::closed(0.0, 1e4),
-             "dry friction at the least speed above coulomb");
+             "excess of the dry friction at vanishing speed over coulomb");
   table.number("stribeck_velocity", stribeck_velocity, "m/s", Range::openLow(0.0, 1.0),
-               "over which that falls to 1/e");
+               "speed at which this excess has fallen to 1/e");
   table.list("weight", weight, "N", Range::closed(-1e5, 1e5),
              "of the slide, towards the negative end of X, Y, Z");
   table.list("disturbance", disturbance, "N", Range::closed(0.0, 1e4),
-             "amplitude that repeats with the position");
+             "amplitude of a force periodic in the position");
   table.list("disturbance_period", disturbance_period, "m", Range::openLow(0.0, 10.0), "lead of the screws");
   table.list("newton_per_ampere", newton_per_ampere, "N/A", Range::openLow(0.0, 1e6),
-             "of the range of a phase's current");
+             "force over the range of the phase current");
   table.list("phase_per_metre", phase_per_metre, "1/m", Range::openLow(0.0, 1e7),
-             "electrical periods, pole pairs / lead");
+             "electrical periods per length, pole pairs / lead");
   table.number("spindle_torque_per_ampere", spindle_torque_per_ampere, "N m/A", Range::openLow(0.0, 1e4),
-               "of the range, below base speed");
+               "torque over the range of the phase current, below base speed");
   table.number("spindle_magnetising", spindle_magnetising, "A", Range::closed(0.0, 1e4),
-               "range without load, below base speed");
+               "range of the phase current without load, below base speed");
   table.number("spindle_base_speed", spindle_base_speed, "rad/s", Range::openLow(0.0, 1e4),
-               "above it constant power");
+               "base speed; constant power above it");
   table.number("spindle_phase_per_revolution", spindle_phase_per_revolution, "1", Range::openLow(0.0, 1000.0),
-               "electrical periods, pole pairs");
+               "electrical periods per revolution, pole pairs");
   table.number("spindle_slip", spindle_slip, "1/(N m)", Range::closed(0.0, 0.1),
-               "of the phase's frequency above the speed's");
+               "relative excess of the electrical frequency over the speed, per torque");
   table.number("bandwidth", bandwidth, "Hz", Range::openLow(0.0, 480.0),
-               "to which the drives follow their load");
+               "bandwidth of the currents over the load");
   table.number("temperature", temperature, "1", Range::closed(-20.0, 80.0),
-               "[deg C] of shop and cold machine");
+               "[deg C] temperature of shop and cold machine");
   table.number("warm_up", warm_up, "1", Range::closed(0.0, 10.0),
-               "[K/W] of the drives above that, by the power of friction");
-  table.number("warm_up_time", warm_up_time, "s", Range::openLow(0.0, 1e6), "time constant");
+               "[K/W] temperature rise of the drives over the friction power");
+  table.number("warm_up_time", warm_up_time, "s", Range::openLow(0.0, 1e6), "time constant of the warm-up");
   table.number("friction_per_kelvin", friction_per_kelvin, "1", Range::closed(0.0, 0.05),
-               "[1/K] less friction above 20 deg C");
+               "[1/K] relative decrease of friction above 20 deg C");
   table.number("gain_per_kelvin", gain_per_kelvin, "1", Range::closed(0.0, 0.02),
-               "[1/K] less force and torque an ampere above 20 deg C");
-  table.number("harmonic", harmonic, "1", Range::closed(0.0, 0.5), "share of the fifth harmonic in a phase");
-  table.number("noise", noise, "A", Range::closed(0.0, 100.0), "root mean square of a Hall sensor");
+               "[1/K] relative decrease of force and torque per ampere above 20 deg C");
+  table.number("harmonic", harmonic, "1", Range::closed(0.0, 0.5),
+               "relative amplitude of the fifth harmonic of a phase");
+  table.number("noise", noise, "A", Range::closed(0.0, 100.0), "RMS of a Hall sensor");
 }
 
 std::array<AxisDrive, 3> MotorTraits::drives() const {
-  std::array<AxisDrive, 3> made;
-  if (!currents) return made;
+  std::array<AxisDrive, 3> drives;
+  if (!currents) return drives;
   for (std::size_t a = 0; a < 3; ++a) {
-    made[a].mass = mass[a];
-    made[a].coulomb = coulomb[a];
-    made[a].viscous = viscous[a];
-    made[a].stribeck = stribeck[a];
-    made[a].stribeck_velocity = stribeck_velocity;
-    made[a].weight = weight[a];
-    made[a].disturbance = disturbance[a];
-    made[a].disturbance_period = disturbance_period[a];
+    drives[a].mass = mass[a];
+    drives[a].coulomb = coulomb[a];
+    drives[a].viscous = viscous[a];
+    drives[a].stribeck = stribeck[a];
+    drives[a].stribeck_velocity = stribeck_velocity;
+    drives[a].weight = weight[a];
+    drives[a].disturbance = disturbance[a];
+    drives[a].disturbance_period = disturbance_period[a];
   }
-  return made;
+  return drives;
 }
 
 MotorCurrents::MotorCurrents(const MotorTraits& traits, const Spindle& spindle, std::uint64_t seed)
@@ -86,7 +87,7 @@ MotorCurrents::MotorCurrents(const MotorTraits& traits, const Spindle& spindle, 
 }
 
 double MotorCurrents::spindleRange(double torque, double speed) const {
-  // Weaker field above base speed: less torque an ampere, less magnetising current (constant power).
+  // Field weakening above base speed: less torque per ampere, less magnetising current (constant power).
   const double field = std::min(1.0, traits_.spindle_base_speed / std::max(std::abs(speed), 1e-9));
   const double gain = 1.0 - traits_.gain_per_kelvin * (temperature_ - REFERENCE);
   return std::hypot(traits_.spindle_magnetising * field,
@@ -100,11 +101,11 @@ double MotorCurrents::phase(double range, double periods) {
 }
 
 void MotorCurrents::push(const Input& input) {
-  At now;
+  DriveState now;
   now.time = input.time;
   now.position = input.motion.position;
   now.speed = input.motion.spindle_speed;
-  if (any_) {
+  if (started_) {
     now.turns =
         last_.turns + std::remainder(input.motion.spindle_angle - last_angle_, units::TWO_PI) / units::TWO_PI;
   }
@@ -112,19 +113,19 @@ void MotorCurrents::push(const Input& input) {
   for (std::size_t a = 0; a < 3; ++a) cut_[a] += input.force[a];
   torque_ += input.torque;
   count_ += 1.0;
-  if (!any_) {
+  if (!started_) {
     index_ = static_cast<std::uint64_t>(std::ceil(input.time * SAMPLE_RATE - 1e-9));
-    any_ = true;
+    started_ = true;
     last_ = sampled_ = now;
   }
-  // Samples that nobody took are a jump of the index.
+  // Skipped samples are a jump of the index.
   if (static_cast<double>(index_ + 1) / SAMPLE_RATE <= input.time)
     index_ = static_cast<std::uint64_t>(input.time * SAMPLE_RATE);
-  const double due = static_cast<double>(index_) / SAMPLE_RATE;
-  if (due <= input.time + 1e-12) {
-    const double span = now.time - last_.time, share = span > 0.0 ? (due - last_.time) / span : 1.0;
-    At at = now;
-    at.time = due;
+  const double sample_time = static_cast<double>(index_) / SAMPLE_RATE;
+  if (sample_time <= input.time + 1e-12) {
+    const double span = now.time - last_.time, share = span > 0.0 ? (sample_time - last_.time) / span : 1.0;
+    DriveState at = now;
+    at.time = sample_time;
     for (std::size_t a = 0; a < 3; ++a) {
       at.position[a] = last_.position[a] + share * (now.position[a] - last_.position[a]);
     }
@@ -134,7 +135,7 @@ void MotorCurrents::push(const Input& input) {
   last_ = now;
 }
 
-void MotorCurrents::sample(const At& at) {
+void MotorCurrents::sample(const DriveState& at) {
   const double step = at.time - sampled_.time;
   const double follow = 1.0 - std::exp(-units::TWO_PI * traits_.bandwidth / SAMPLE_RATE);
   const double friction_factor =
@@ -147,14 +148,14 @@ void MotorCurrents::sample(const At& at) {
     const double acceleration = step > 0.0 ? (velocity - velocity_[a]) / step : 0.0;
     const double cut = cut_[a] / count_;
     double load = 0.0;
-    if (std::abs(velocity) > MOVES) {
+    if (std::abs(velocity) > LEAST_SPEED) {
       load = drives_[a].force(at.position[a], velocity, acceleration, cut, friction_factor);
       power += std::abs(drives_[a].friction(velocity, friction_factor) * velocity);
     } else {
-      // At rest dry friction carries the cut, the motor only what is beyond it.
-      const double held = friction_factor * (drives_[a].coulomb + drives_[a].stribeck);
+      // At rest dry friction carries the load up to its limit, the motor the excess.
+      const double dry_friction = friction_factor * (drives_[a].coulomb + drives_[a].stribeck);
       load = drives_[a].weight - cut;
-      load -= std::clamp(load, -held, held);
+      load -= std::clamp(load, -dry_friction, dry_friction);
     }
     velocity_[a] = velocity;
     load_[a] += follow * (load - load_[a]);
@@ -166,10 +167,11 @@ void MotorCurrents::sample(const At& at) {
       speed, 0.0, friction_factor);
   torque_load_ += follow * (torque_ / count_ + friction - torque_load_);
   power += friction * speed;
-  slipped_ += traits_.spindle_slip * torque_load_ * std::abs(at.turns - sampled_.turns);
-  samples_.push_back(speed > 0.0 ? phase(spindleRange(torque_load_, speed),
-                                         traits_.spindle_phase_per_revolution * (at.turns + slipped_))
-                                 : traits_.noise * normal_(random_));
+  slip_revolutions_ += traits_.spindle_slip * torque_load_ * std::abs(at.turns - sampled_.turns);
+  samples_.push_back(speed > 0.0
+                         ? phase(spindleRange(torque_load_, speed),
+                                 traits_.spindle_phase_per_revolution * (at.turns + slip_revolutions_))
+                         : traits_.noise * normal_(random_));
   temperature_ += std::max(0.0, step) / traits_.warm_up_time *
                   (traits_.temperature + traits_.warm_up * power - temperature_);
   cut_ = {};

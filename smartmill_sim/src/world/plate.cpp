@@ -23,7 +23,7 @@ Eigen::Vector3d vectorOf(const std::array<double, 3>& v) {
 
 Matrix6 massOf(const PlateTraits& p) {
   const Eigen::Vector3d c = vectorOf(p.centre);
-  Eigen::Vector3d inertia;  // of a block about its own centre
+  Eigen::Vector3d inertia;  // of a cuboid about its centre
   for (Eigen::Index i = 0; i < 3; ++i) {
     const double a = p.size[static_cast<std::size_t>((i + 1) % 3)];
     const double b = p.size[static_cast<std::size_t>((i + 2) % 3)];
@@ -35,8 +35,8 @@ Matrix6 massOf(const PlateTraits& p) {
   return mass;
 }
 
-/// Of the feet, whose constants along x, y, z are given: a foot at r moves by u + rotation x r and pushes
-/// back.
+/// Stiffness or damping matrix of the feet with constants along x, y, z: a foot at r moves by u + rotation x
+/// r.
 Matrix6 ofFeet(const PlateTraits& p, const Eigen::Vector3d& each) {
   Matrix6 sum = Matrix6::Zero();
   for (const double x : {-p.foot, p.foot}) {
@@ -53,20 +53,21 @@ Matrix6 ofFeet(const PlateTraits& p, const Eigen::Vector3d& each) {
 
 void PlateTraits::declare(ParameterTable& table) {
   table.section(
-      "Dynamometer of six channels (fx fy fz mx my mz) in the place of the model's force sensor: a rigid "
-      "plate "
-      "on four feet.");
-  table.flag("present", present, "it stands under the workpiece");
-  table.list("origin", origin, "m", Range{}, "of its moments, machine coordinates, in the feet's plane");
-  table.number("mass", mass, "kg", Range::open(0.0, 1e4), "that moves: plate and workpiece");
-  table.list("centre", centre, "m", Range::closed(-1.0, 1.0), "of mass from the origin");
-  table.list("size", size, "m", Range::open(0.0, 2.0), "of a block with its inertia");
-  table.list("frequency", frequency, "Hz", Range::closed(100.0, 10000.0), "along x, y, z, if nothing turned");
+      "Six-channel dynamometer (fx fy fz mx my mz) instead of the model's force sensor: a rigid plate on "
+      "four feet.");
+  table.flag("present", present, "whether it is under the workpiece");
+  table.list("origin", origin, "m", Range{},
+             "origin of the moments in the plane of the feet, machine coordinates");
+  table.number("mass", mass, "kg", Range::open(0.0, 1e4), "moving mass of plate and workpiece");
+  table.list("centre", centre, "m", Range::closed(-1.0, 1.0), "centre of mass, relative to the origin");
+  table.list("size", size, "m", Range::open(0.0, 2.0), "edges of a cuboid with the same inertia");
+  table.list("frequency", frequency, "Hz", Range::closed(100.0, 10000.0),
+             "natural frequencies along x, y, z without rotation");
   table.number("foot", foot, "m", Range::open(0.0, 1.0),
-               "distance of each foot from x and y through the origin");
-  table.number("damping", damping, "1", Range::open(0.0, 0.5), "ratio at these frequencies");
-  table.number("force_noise", force_noise, "N", Range::notNegative(), "of a sample, RMS");
-  table.number("moment_noise", moment_noise, "N m", Range::notNegative(), "of a sample, RMS");
+               "distance of each foot from the x and y axes through the origin");
+  table.number("damping", damping, "1", Range::open(0.0, 0.5), "damping ratio at these frequencies");
+  table.number("force_noise", force_noise, "N", Range::notNegative(), "RMS of the forces");
+  table.number("moment_noise", moment_noise, "N m", Range::notNegative(), "RMS of the moments");
 }
 
 Plate::Plate(const PlateTraits& traits, double step, std::uint64_t seed) : traits_(traits), random_(seed) {
@@ -78,7 +79,7 @@ Plate::Plate(const PlateTraits& traits, double step, std::uint64_t seed) : trait
   }
   const Matrix6 k = ofFeet(traits, stiffness), c = ofFeet(traits, damping);
   const Eigen::MatrixXd inverse = linear::inverseSymmetric(Eigen::MatrixXd(massOf(traits)));
-  // Velocities over the fastest mode's frequency, so that all states are of one size.
+  // Velocities are scaled by the highest natural frequency, for states of equal size.
   const double fast = units::TWO_PI * *std::max_element(traits.frequency.begin(), traits.frequency.end());
   Eigen::MatrixXd a = Eigen::MatrixXd::Zero(24, 24);  // states, input, its change over the step
   a.block<6, 6>(0, 6) = fast * step * Matrix6::Identity();
@@ -90,30 +91,30 @@ Plate::Plate(const PlateTraits& traits, double step, std::uint64_t seed) : trait
   transition_ = e.topLeftCorner<12, 12>();
   from_before_ = e.block<12, 6>(0, 12);
   from_change_ = e.block<12, 6>(0, 18);
-  shown_ << k, fast * c;
+  output_ << k, fast * c;
 }
 
 void Plate::step(const std::array<double, 3>& cut, const std::array<double, 3>& cut_point,
-                 const std::array<double, 3>& blow, const std::array<double, 3>& blow_point) {
+                 const std::array<double, 3>& hit, const std::array<double, 3>& hit_point) {
   Eigen::Matrix<double, 6, 1> wrench;
   const Eigen::Vector3d f = vectorOf(cut), r = vectorOf(cut_point) - vectorOf(traits_.origin);
-  const Eigen::Vector3d b = vectorOf(blow);
-  wrench << f + b, cross(r) * f + cross(vectorOf(blow_point)) * b;
+  const Eigen::Vector3d b = vectorOf(hit);
+  wrench << f + b, cross(r) * f + cross(vectorOf(hit_point)) * b;
   state_ = transition_ * state_ + from_before_ * last_ + from_change_ * (wrench - last_);
   last_ = wrench;
-  sum_ += shown_ * state_;
+  sum_ += output_ * state_;
   ++steps_;
 }
 
 std::array<double, 6> Plate::read() {
-  std::array<double, 6> shown{};
+  std::array<double, 6> output{};
   for (std::size_t i = 0; i < 6; ++i) {
     const double noise = i < 3 ? traits_.force_noise : traits_.moment_noise;
-    shown[i] = sum_(static_cast<Eigen::Index>(i)) / std::max(1, steps_) + noise * normal_(random_);
+    output[i] = sum_(static_cast<Eigen::Index>(i)) / std::max(1, steps_) + noise * normal_(random_);
   }
   sum_.setZero();
   steps_ = 0;
-  return shown;
+  return output;
 }
 
 }  // namespace smartmill::sim

@@ -7,7 +7,7 @@
 
 namespace smartmill::sim {
 
-double Blow::force(double time) const {
+double Hit::force(double time) const {
   const double u = (time - begin) / contact;
   if (u <= 0.0 || u >= 1.0) return 0.0;
   return peak * std::sin(units::PI * (skew == 0.0 ? u : std::pow(u, 1.0 + skew)));
@@ -23,35 +23,35 @@ Solenoid::Solenoid(const StationTraits& traits, const smartmill::HammerStation& 
 void Solenoid::fire(double now, double touch, std::mt19937_64& random) {
   std::normal_distribution<double> normal;
   const auto about = [&](double scatter) { return std::clamp(1.0 + scatter * normal(random), 0.5, 1.5); };
-  Blow first;
+  Hit first;
   first.begin = touch;
   first.peak = peak_ * about(force_scatter_);
   first.contact = contact_ * about(traits_.contact_scatter);
   first.skew = std::clamp(traits_.pulse_skew + traits_.pulse_scatter * normal(random), -0.6, 0.6);
-  blows_ = {first};
+  hits_ = {first};
   fired_ = now;
   if (std::uniform_real_distribution<double>(0.0, 1.0)(random) >= traits_.bounce_chance) return;
-  Blow second = first;
+  Hit second = first;
   second.begin = first.end() + traits_.bounce_delay * about(0.2);
   second.peak = first.peak * traits_.bounce_share * about(0.2);
-  blows_.push_back(second);
+  hits_.push_back(second);
 }
 
-void Solenoid::shift(double time) {
+void Solenoid::skipTime(double time) {
   fired_ += time;
-  for (Blow& blow : blows_) blow.begin += time;
+  for (Hit& hit : hits_) hit.begin += time;
 }
 
 double Solenoid::force(double time) const {
   double sum = 0.0;
-  for (const Blow& blow : blows_) sum += blow.force(time);
+  for (const Hit& hit : hits_) sum += hit.force(time);
   return sum;
 }
 
 double Solenoid::current(double time) const {
-  if (blows_.empty() || time <= fired_) return 0.0;
+  if (hits_.empty() || time <= fired_) return 0.0;
   const auto risen = [&](double until) { return -std::expm1(-(until - fired_) / traits_.coil_time); };
-  const double touch = blows_.front().begin;
+  const double touch = hits_.front().begin;
   return time <= touch ? risen(time) : risen(touch) * std::exp(-(time - touch) / traits_.coil_time);
 }
 

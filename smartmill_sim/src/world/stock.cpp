@@ -11,13 +11,13 @@ namespace {
 
 using units::TWO_PI;
 
-constexpr int LOOKS = 360;               // over the front half; finer details of the stock are overlooked
-constexpr double LEAST_ARC = 1e-6;       // [rad]
-constexpr double LEAST_DEPTH = 1e-7;     // [m] controllers' increment
-constexpr double LEAST_SPEED = 1e-7;     // [m/s]
-constexpr double ON_WALL = 1e-9;         // [m] a point this near to a slot's wall is on it: not material
-constexpr double SAME_WAY = 1.0 - 1e-9;  // [1] cosine
-constexpr double OFF_LINE = 1e-9;        // [m]
+constexpr int SCAN_STEPS = 360;  // scanned angles of the front half; finer details of the stock are ignored
+constexpr double LEAST_ARC = 1e-6;    // [rad]
+constexpr double LEAST_DEPTH = 1e-7;  // [m] position increment of a controller
+constexpr double LEAST_SPEED = 1e-7;  // [m/s]
+constexpr double ON_WALL = 1e-9;      // [m] a point closer to a slot's wall is on the wall: no material
+constexpr double SAME_DIRECTION = 1.0 - 1e-9;  // [1] cosine
+constexpr double OFF_LINE = 1e-9;              // [m]
 
 double distanceToLine(double x, double y, const std::array<double, 2>& from,
                       const std::array<double, 2>& to) {
@@ -32,7 +32,7 @@ double distanceToLine(double x, double y, const std::array<double, 2>& from,
 Stock::Stock(const Workpiece& workpiece, double radius) : box_(workpiece), radius_(radius) {
 }
 
-/// [m] height of the material above z at a point that the first so many slots left, 0 without.
+/// Height [m] of the material above z at a point after the first `slots` slots; 0: none.
 double Stock::depthAt(double x, double y, double z, std::size_t slots) const {
   if (x < box_.low[0] || x > box_.high[0] || y < box_.low[1] || y > box_.high[1]) return 0.0;
   double top = box_.high[2];
@@ -47,8 +47,8 @@ std::vector<ContactArc> Stock::contact(const std::array<double, 3>& position,
                                        const std::array<double, 3>& velocity) const {
   std::vector<ContactArc> arcs;
   if (std::hypot(velocity[0], velocity[1]) < LEAST_SPEED || position[2] >= box_.high[2]) return arcs;
-  // The slot that this motion is making ends at the tool's own front.
-  const std::size_t slots = slots_.size() - (along(velocity) ? 1 : 0);
+  // The slot being cut by this motion is excluded: it ends at the front of the tool.
+  const std::size_t slots = slots_.size() - (continuesSlot(velocity) ? 1 : 0);
   const double heading = std::atan2(velocity[0], velocity[1]), first = heading - 0.5 * units::PI;
   const auto depth = [&](double offset) {
     const double angle = first + offset;
@@ -66,8 +66,8 @@ std::vector<ContactArc> Stock::contact(const std::array<double, 3>& position,
     if (exit - TWO_PI >= LEAST_ARC) arcs.push_back({0.0, exit - TWO_PI, height});
   };
   double begin = 0.0, height = depth(0.0), last = 0.0;
-  for (int k = 1; k <= LOOKS; ++k) {
-    const double here = units::PI * k / LOOKS, now = depth(here);
+  for (int k = 1; k <= SCAN_STEPS; ++k) {
+    const double here = units::PI * k / SCAN_STEPS, now = depth(here);
     if (now != height) {
       double low = last, high = here;
       while (high - low > 1e-10) {
@@ -84,7 +84,7 @@ std::vector<ContactArc> Stock::contact(const std::array<double, 3>& position,
   return arcs;
 }
 
-bool Stock::above(const std::array<double, 3>& position) const {
+bool Stock::hasMaterialAbove(const std::array<double, 3>& position) const {
   if (position[2] >= box_.high[2]) return false;
   for (const double share : {0.0, 0.5, 0.999}) {
     for (int k = 0; k < 16; ++k) {
@@ -97,36 +97,38 @@ bool Stock::above(const std::array<double, 3>& position) const {
   return false;
 }
 
-/// Whether a motion goes on with the slot that is being made.
-bool Stock::along(const std::array<double, 3>& velocity) const {
-  if (!open_) return false;
+/// Whether a motion continues the open slot.
+bool Stock::continuesSlot(const std::array<double, 3>& velocity) const {
+  if (!slot_open_) return false;
   const Slot& slot = slots_.back();
   const double lx = slot.to[0] - slot.from[0], ly = slot.to[1] - slot.from[1], length = std::hypot(lx, ly);
   if (length == 0.0) return true;
-  return velocity[0] * lx + velocity[1] * ly >= SAME_WAY * length * std::hypot(velocity[0], velocity[1]);
+  return velocity[0] * lx + velocity[1] * ly >=
+         SAME_DIRECTION * length * std::hypot(velocity[0], velocity[1]);
 }
 
-bool Stock::inLine(const std::array<double, 3>& position) const {
+bool Stock::continuesLine(const std::array<double, 3>& position) const {
   const Slot& slot = slots_.back();
   if (position[2] != slot.bottom) return false;
   const double dx = position[0] - slot.from[0], dy = position[1] - slot.from[1];
   const double lx = slot.to[0] - slot.from[0], ly = slot.to[1] - slot.from[1];
   const double length = std::hypot(lx, ly);
   if (length == 0.0) return true;
-  const double along = (dx * lx + dy * ly) / length, beside = (dx * ly - dy * lx) / length;
-  return std::abs(beside) <= OFF_LINE && along >= length;
+  const double along = (dx * lx + dy * ly) / length, lateral = (dx * ly - dy * lx) / length;
+  return std::abs(lateral) <= OFF_LINE && along >= length;
 }
 
-void Stock::pass(const std::array<double, 3>& position) {
+void Stock::cutTo(const std::array<double, 3>& position) {
   const std::array<double, 2> here{{position[0], position[1]}};
   if (position[2] >= box_.high[2]) {
-    open_ = false;
-  } else if (open_ && inLine(position)) {
+    slot_open_ = false;
+  } else if (slot_open_ && continuesLine(position)) {
     slots_.back().to = here;
   } else {
-    const std::array<double, 2> from = open_ && slots_.back().bottom == position[2] ? slots_.back().to : here;
+    const std::array<double, 2> from =
+        slot_open_ && slots_.back().bottom == position[2] ? slots_.back().to : here;
     slots_.push_back({from, here, position[2]});
-    open_ = true;
+    slot_open_ = true;
   }
 }
 

@@ -11,7 +11,7 @@ namespace smartmill::sim {
 namespace {
 
 constexpr int ELEMENTS = 24;
-constexpr double NO_GAIN = 1e-9;  // of the largest: a mode that does not show
+constexpr double NO_GAIN = 1e-9;  // relative to the largest gain: a negligible mode
 
 using Element = Eigen::Matrix4d;
 
@@ -36,21 +36,21 @@ Element stiffnessOf(const RoundBeam& beam, const Section& s, double l) {
 }
 
 Element massOf(const RoundBeam& beam, const Section& s, double l) {
-  Element across, turning;
+  Element across, rotary;
   across << 156.0, 22.0 * l, 54.0, -13.0 * l,         //
       22.0 * l, 4.0 * l * l, 13.0 * l, -3.0 * l * l,  //
       54.0, 13.0 * l, 156.0, -22.0 * l,               //
       -13.0 * l, -3.0 * l * l, -22.0 * l, 4.0 * l * l;
-  turning << 36.0, 3.0 * l, -36.0, 3.0 * l,    //
+  rotary << 36.0, 3.0 * l, -36.0, 3.0 * l,     //
       3.0 * l, 4.0 * l * l, -3.0 * l, -l * l,  //
       -36.0, -3.0 * l, 36.0, -3.0 * l,         //
       3.0 * l, -l * l, -3.0 * l, 4.0 * l * l;
   Element m = beam.density * s.area * l / 420.0 * across;
-  if (beam.shear) m += beam.density * s.inertia / (30.0 * l) * turning;
+  if (beam.shear) m += beam.density * s.inertia / (30.0 * l) * rotary;
   return m;
 }
 
-/// Cubic shapes of an element of length l at the share u.
+/// Cubic shape functions of an element of length l [m] at the relative position u.
 Eigen::Vector4d cubic(double u, double l) {
   return {1.0 - 3.0 * u * u + 2.0 * u * u * u, l * u * (1.0 - u) * (1.0 - u), u * u * (3.0 - 2.0 * u),
           l * u * u * (u - 1.0)};
@@ -60,7 +60,7 @@ Eigen::Vector4d cubic(double u, double l) {
 
 RoundBeam::Matrices RoundBeam::matrices(int elements) const {
   const double shank = length - fluted;
-  // As even as the step between the sections allows.
+  // Element lengths as equal as the section boundary allows.
   int first = fluted <= 0.0 ? elements : static_cast<int>(std::lround(elements * shank / length));
   if (fluted > 0.0) first = shank > 0.0 ? std::clamp(first, 1, elements - 1) : 0;
   Matrices out;
@@ -151,7 +151,7 @@ namespace {
 RoundBeam beamOf(const StationTraits& t, const ToolGeometry& tool, double stickout) {
   if (t.flute_length > stickout) {
     throw Error("hammer_flute_length: " + std::to_string(t.flute_length / units::MM) +
-                " mm is longer than the tool's stickout");
+                " mm, expected at most the tool's stickout");
   }
   RoundBeam beam;
   beam.length = stickout;
@@ -186,7 +186,7 @@ ModalModel ToolStructure::between(std::size_t read_axis, double read, std::size_
                                   double struck) const {
   ModalModel sum;
   for (std::size_t p = 0; p < 2; ++p) {
-    // Share of the axes in this plane's direction.
+    // Direction cosines of this plane.
     const double angle = turn_ + (p == 0 ? 0.0 : 0.5 * units::PI);
     const std::array<double, 2> along{{std::cos(angle), std::sin(angle)}};
     const double share = along[read_axis] * along[struck_axis];

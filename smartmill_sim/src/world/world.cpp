@@ -18,21 +18,21 @@
 namespace smartmill::sim {
 namespace {
 
-constexpr std::size_t LOOK = 64;       // samples between two looks at where the tool meets stock
-constexpr double HAMMER_DELAY = 0.03;  // [s] of the solenoid
-constexpr double TURNING = 1.0;        // [rad/s] a slower spindle cannot cut
-constexpr double SAME_ANGLE = 1e-7;    // [rad]
-constexpr std::uint64_t FLANGE_SEED = 0x1000, PLATE_SEED = 0x2000;  // apart from the world's own
+constexpr std::size_t CONTACT_UPDATE = 64;  // samples between two updates of the contact with the stock
+constexpr double HAMMER_DELAY = 0.03;       // [s] of the solenoid
+constexpr double TURNING = 1.0;             // [rad/s] a slower spindle cannot cut
+constexpr double SAME_ANGLE = 1e-7;         // [rad]
+constexpr std::uint64_t FLANGE_SEED = 0x1000, PLATE_SEED = 0x2000;  // offsets from the seed of the world
 constexpr int TOUCHED = 3001, PLUNGED = 3002, SENSOR = 3003;        // external alarms
 
-bool same(const std::vector<ContactArc>& a, const std::vector<ContactArc>& b) {
+bool isSameContact(const std::vector<ContactArc>& a, const std::vector<ContactArc>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const ContactArc& p, const ContactArc& q) {
     return std::abs(p.entry - q.entry) < SAME_ANGLE && std::abs(p.exit - q.exit) < SAME_ANGLE &&
            p.depth == q.depth;
   });
 }
 
-/// The model with the tool's structure that the hammer station's traits give it.
+/// The model with the tool structure of the hammer station, if it defines one.
 MachineModel withStructure(MachineModel model, const std::optional<HammerStation>& station) {
   if (station) {
     if (const std::optional<ToolTip> tip = station->tip()) model.tool_tip = *tip;
@@ -90,24 +90,24 @@ class World::Impl {
     const std::lock_guard<std::mutex> lock(mutex_);
     const std::size_t axis = direction == "x" ? 0 : direction == "y" ? 1 : direction == "z" ? 2 : 3;
     const double now = static_cast<double>(index_) / SAMPLE_RATE;
-    if ((blow_ && !blow_->over(now)) || (tip_blow_ && !tip_blow_->over(now)) ||
+    if ((workpiece_hit_ && !workpiece_hit_->over(now)) || (tool_hit_ && !tool_hit_->over(now)) ||
         (station_ && station_->busy(now))) {
-      message = "a blow is still under way";
+      message = "the previous hit is still in progress";
       return StrikeAnswer::failed;
     }
     const bool tool = point == "tool";
     const bool before_hammer = station_ && axis < 2 && (!flange_ || station_->facing(last_.position) == axis);
     if (tool && before_hammer) {
-      // Between two samples anywhere, as a real one.
+      // At a random time between two samples.
       station_->fire(axis, now, now + HAMMER_DELAY + uniform() / SAMPLE_RATE, random_);
       message = "hammer fired in " + direction;
     } else if (tool && flange_ && axis < 3) {
-      tip_blow_ = blowBy(now);
-      tip_blow_axis_ = axis;
+      tool_hit_ = drawHit(now);
+      tool_hit_axis_ = axis;
       message = "hammer fired on the tool's tip in " + direction;
     } else if (point == "force_sensor" && axis < 3) {
-      blow_ = blowBy(now);
-      blow_axis_ = axis;
+      workpiece_hit_ = drawHit(now);
+      workpiece_hit_axis_ = axis;
       message = options_.operator_delay > 0.0 ? "hit the workpiece by hand in " + direction
                                               : "hammer fired on the workpiece in " + direction;
     } else {
@@ -120,7 +120,7 @@ class World::Impl {
   void advance(Block& block) {
     const std::lock_guard<std::mutex> lock(mutex_);
     controller_.advance(1.0 / SAMPLE_RATE, BLOCK, states_);
-    follow(block, states_);
+    simulateBlock(block, states_);
     controller_.setSpindleLoad(100.0 * load_meter_ / *spindle_.load_meter_full_scale);
     controller_.setSpindleTorque(torque_ / BLOCK);
     controller_.setServoCurrent(servo_.current());
@@ -129,7 +129,7 @@ class World::Impl {
 
   void advance(Block& block, const std::vector<MotionState>& states) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    follow(block, states);
+    simulateBlock(block, states);
   }
 
   void pull(const std::array<double, 3>& force, bool on_table) {
@@ -149,23 +149,23 @@ class World::Impl {
     tap_point_ = point;
   }
 
-  void lose(std::uint64_t samples) {
+  void skipSamples(std::uint64_t samples) {
     const std::lock_guard<std::mutex> lock(mutex_);
     index_ += samples;
     const double time = static_cast<double>(samples) / SAMPLE_RATE;
-    if (blow_) blow_->begin += time;
-    if (tip_blow_) tip_blow_->begin += time;
-    if (flange_) flange_->lose(time);
-    if (station_) station_->shift(time);
+    if (workpiece_hit_) workpiece_hit_->begin += time;
+    if (tool_hit_) tool_hit_->begin += time;
+    if (flange_) flange_->skipTime(time);
+    if (station_) station_->skipTime(time);
   }
 
  private:
   static ControllerOptions controllerOptions(const MachineModel& model, const WorldOptions& options) {
-    ControllerOptions made = ControllerOptions::ofModel(model);
+    ControllerOptions controller_options = ControllerOptions::ofModel(model);
     if (model.spindle->load_meter_full_scale) {
-      made.load_step = 100.0 * options.load_step / *model.spindle->load_meter_full_scale;
+      controller_options.load_step = 100.0 * options.load_step / *model.spindle->load_meter_full_scale;
     }
-    return made;
+    return controller_options;
   }
 
   double uniform() { return std::uniform_real_distribution<double>(0.0, 1.0)(random_); }
@@ -173,18 +173,18 @@ class World::Impl {
     return peak * std::clamp(1.0 + options_.force_scatter * normal_(random_), 0.5, 1.5);
   }
   double noise(double rms) { return rms * normal_(random_); }
-  /// Of an automatic hammer or of a person.
-  Blow blowBy(double now) {
+  /// Hit by an automatic hammer or by hand.
+  Hit drawHit(double now) {
     const double delay = options_.operator_delay > 0.0 ? options_.operator_delay : HAMMER_DELAY;
     const double begin = now + delay + uniform() / SAMPLE_RATE;
     return {begin, scattered(options_.tap_peak), options_.tap_contact, 0.0};
   }
 
-  void follow(Block& block, const std::vector<MotionState>& states) {
-    begin(block);
+  void simulateBlock(Block& block, const std::vector<MotionState>& states) {
+    prepareBlock(block);
     torque_ = 0.0;
     for (std::size_t i = 0; i < BLOCK; ++i) {
-      if ((index_ + i) % LOOK == 0) look(states[i]);
+      if ((index_ + i) % CONTACT_UPDATE == 0) updateContact(states[i]);
       sample(static_cast<double>(index_ + i) / SAMPLE_RATE, states[i], block);
       last_ = states[i];
     }
@@ -199,7 +199,7 @@ class World::Impl {
     block.spindle_load = machine_.rounded(load_meter_) / *spindle_.load_meter_full_scale;
   }
 
-  void begin(Block& block) const {
+  void prepareBlock(Block& block) const {
     const double stamp = static_cast<double>(index_) / SAMPLE_RATE;
     const auto prepare = [&](SampleBlock& b, std::vector<std::string> channels,
                              std::vector<std::string> units) {
@@ -242,50 +242,50 @@ class World::Impl {
     return motion;
   }
 
-  /// Where the tool meets stock now.
-  void look(const MotionState& state) {
+  /// Updates the contact of tool and stock.
+  void updateContact(const MotionState& state) {
     if (!stock_) return;
     std::vector<ContactArc> arcs = stock_->contact(state.position, state.velocity);
     if (!arcs.empty() && state.spindle_speed < TURNING) {
-      refuse(TOUCHED, "TOOL MET STOCK WITH SPINDLE AT REST");
+      raiseAlarm(TOUCHED, "TOOL MET STOCK WITH SPINDLE AT REST");
       arcs.clear();
     }
-    if (state.velocity[2] < 0.0 && stock_->above(state.position)) {
-      refuse(PLUNGED, "TOOL PLUNGED INTO STOCK");
+    if (state.velocity[2] < 0.0 && stock_->hasMaterialAbove(state.position)) {
+      raiseAlarm(PLUNGED, "TOOL PLUNGED INTO STOCK");
       arcs.clear();
     }
     if (!arcs.empty() || machine_.cutting()) {
-      stock_->pass(state.position);
+      stock_->cutTo(state.position);
     } else {
-      stock_->leave();
+      stock_->endSlot();
     }
-    if (!same(arcs, arcs_)) {
+    if (!isSameContact(arcs, arcs_)) {
       arcs_ = arcs;
       machine_.engage(arcs, between(state, 0.0));
     }
   }
 
-  void refuse(int number, const char* text) {
+  void raiseAlarm(int number, const char* text) {
     if (controller_.status().alarm == 0) controller_.raiseAlarm(number, text);
   }
 
-  /// What acts on the tool besides cut and station [N]: weights and blows by hand.
-  std::array<double, 3> byHand(double at, CuttingMachine::Input& input, double& tap) const {
+  /// Forces on the tool in addition to cut and station [N]: weights and manual hits.
+  std::array<double, 3> manualForces(double at, CuttingMachine::Input& input, double& tap) const {
     std::array<double, 3> tip = pull_;
-    if (tip_blow_) {
-      const double hit = tip_blow_->force(at);
-      tip[tip_blow_axis_] += hit;
-      if (tip_blow_axis_ < 2) input.tip_force[tip_blow_axis_] += hit;
+    if (tool_hit_) {
+      const double hit = tool_hit_->force(at);
+      tip[tool_hit_axis_] += hit;
+      if (tool_hit_axis_ < 2) input.tip_force[tool_hit_axis_] += hit;
       tap += hit;
     }
     for (std::size_t axis = 0; axis < 3 && pull_on_table_; ++axis) input.sensor_force[axis] += pull_[axis];
     return tip;
   }
 
-  /// The step in the flange's sensors and in the plate.
-  void showFurther(const CuttingMachine::Input& input, const HammerStation::Push& push,
-                   const std::array<double, 3>& tip, const std::array<double, 3>& blow, double height,
-                   const CuttingMachine::Output& out) {
+  /// Steps the sensors in the flange and the plate.
+  void stepFurtherSensors(const CuttingMachine::Input& input, const HammerStation::Push& push,
+                          const std::array<double, 3>& tip, const std::array<double, 3>& workpiece_force,
+                          double height, const CuttingMachine::Output& out) {
     if (flange_) {
       flange_->step({out.force.fx + push.tip_force[0] + tip[0], out.force.fy + push.tip_force[1] + tip[1],
                      out.force.fz + tip[2]},
@@ -293,15 +293,15 @@ class World::Impl {
     }
     if (!plate_) return;
     std::array<double, 3> cut = out.applied;
-    for (std::size_t axis = 0; axis < 3; ++axis) cut[axis] -= blow[axis];
-    plate_->step(cut, {input.motion.centre[0], input.motion.centre[1], height}, blow, tap_point_);
+    for (std::size_t axis = 0; axis < 3; ++axis) cut[axis] -= workpiece_force[axis];
+    plate_->step(cut, {input.motion.centre[0], input.motion.centre[1], height}, workpiece_force, tap_point_);
   }
 
-  /// Sensors are averaged over the sample's own interval, centred on it, as a converter with an anti-aliasing
-  /// filter does: what a short blow has above half the sample rate would else fold into its spectrum, another
-  /// way in force and in answer. @param now state half a sample after it
+  /// Simulates a sample. Sensor signals are averaged over the interval centred on the sample, as by an
+  /// anti-aliasing filter: otherwise the spectrum of a short hit above half the sample rate would alias
+  /// differently in force and response. @param now state half a sample after the sample
   void sample(double time, const MotionState& now, Block& block) {
-    if (station_) station_->stand({now.position, now.spindle_angle, now.spindle_speed}, random_);
+    if (station_) station_->setPose({now.position, now.spindle_angle, now.spindle_speed}, random_);
     std::array<double, 3> sensor{}, force{};
     std::array<double, 2> displacement{};
     double tap = 0.0, torque = 0.0;
@@ -312,12 +312,12 @@ class World::Impl {
       HammerStation::Push push;
       if (station_) push = station_->push(at);
       input.tip_force = push.tip_force;
-      if (blow_) tap += input.sensor_force[blow_axis_] = blow_->force(at);
-      const std::array<double, 3> blow = input.sensor_force;
-      const std::array<double, 3> tip = byHand(at, input, tap);
+      if (workpiece_hit_) tap += input.sensor_force[workpiece_hit_axis_] = workpiece_hit_->force(at);
+      const std::array<double, 3> workpiece_force = input.sensor_force;
+      const std::array<double, 3> tip = manualForces(at, input, tap);
       const CuttingMachine::Output out = machine_.step(input);
-      showFurther(input, push, tip, blow, now.position[2], out);
-      if (station_) station_->hear(out.displacement);
+      stepFurtherSensors(input, push, tip, workpiece_force, now.position[2], out);
+      if (station_) station_->addDisplacement(out.displacement);
       for (std::size_t axis = 0; axis < 3; ++axis) sensor[axis] += out.sensor[axis];
       for (std::size_t axis = 0; axis < 2; ++axis)
         displacement[axis] += out.displacement[axis] + push.tip[axis];
@@ -335,24 +335,24 @@ class World::Impl {
                  {share * force[0], share * force[1], share * force[2]}});
     if (motors_)
       motors_->push({time, now, {share * force[0], share * force[1], share * force[2]}, share * torque});
-    HammerStation::Reading reading;
-    if (station_) reading = station_->read(time, random_);
-    if (station_ && station_->touched()) refuse(SENSOR, "TOOL MET THE DISPLACEMENT SENSOR");
-    block.hammer.samples.push_back(share * tap + reading.force);
-    block.hammer.samples.push_back(reading.gap);
-    if (block.hammer.channels.size() > 2) block.hammer.samples.push_back(reading.cross);
+    HammerStation::Sample station_sample;
+    if (station_) station_sample = station_->read(time, random_);
+    if (station_ && station_->touched()) raiseAlarm(SENSOR, "TOOL MET THE DISPLACEMENT SENSOR");
+    block.hammer.samples.push_back(share * tap + station_sample.force);
+    block.hammer.samples.push_back(station_sample.gap);
+    if (block.hammer.channels.size() > 2) block.hammer.samples.push_back(station_sample.cross);
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (!plate_) block.dynamometer.samples.push_back(share * sensor[axis] + noise(force_noise_[axis]));
       block.force.force[axis].push_back(share * force[axis]);
     }
-    const auto append = [](SampleBlock& to, const std::array<double, 6>& shown) {
-      to.samples.insert(to.samples.end(), shown.begin(), shown.end());
+    const auto append = [](SampleBlock& to, const std::array<double, 6>& values) {
+      to.samples.insert(to.samples.end(), values.begin(), values.end());
     };
     if (plate_) append(block.dynamometer, plate_->read());
     if (flange_) append(block.spindle_force, flange_->read());
     for (double d : displacement) block.vibration.samples.push_back(share * d);
-    if (blow_ && blow_->over(time)) blow_.reset();
-    if (tip_blow_ && tip_blow_->over(time)) tip_blow_.reset();
+    if (workpiece_hit_ && workpiece_hit_->over(time)) workpiece_hit_.reset();
+    if (tool_hit_ && tool_hit_->over(time)) tool_hit_.reset();
   }
 
   WorldOptions options_;
@@ -373,17 +373,17 @@ class World::Impl {
   MotionState last_;  // half a sample after the last sample
   std::vector<MotionState> states_;
   std::vector<ContactArc> arcs_;
-  std::optional<Blow> blow_;  // on the workpiece
-  std::size_t blow_axis_ = 0;
-  std::array<double, 3> tap_point_{};  // [m] of it, from the plate's origin
-  std::optional<Blow> tip_blow_;       // on the tool, by hand
-  std::size_t tip_blow_axis_ = 0;
+  std::optional<Hit> workpiece_hit_;  // on the workpiece
+  std::size_t workpiece_hit_axis_ = 0;
+  std::array<double, 3> tap_point_{};  // [m] point of the hit, from the plate's origin
+  std::optional<Hit> tool_hit_;        // manual hit on the tool
+  std::size_t tool_hit_axis_ = 0;
   std::array<double, 3> pull_{};  // [N] at the tool's tip
   bool pull_on_table_ = false;
   std::optional<SpindleSensor> flange_;
   std::optional<Plate> plate_;
   double load_meter_ = 0.0;  // [V]
-  double torque_ = 0.0;      // [N m] of the cut, summed over the samples of a block
+  double torque_ = 0.0;      // [N m] cutting torque, summed over the samples of a block
 };
 
 World::World(const MachineModel& model, const WorldOptions& options) {
@@ -423,12 +423,13 @@ void World::advance(Block& block) {
 }
 
 void World::advance(Block& block, const std::vector<MotionState>& states) {
-  if (states.size() != BLOCK) throw Error("axes: " + std::to_string(states.size()) + " states for one block");
+  if (states.size() != BLOCK)
+    throw Error("axes: " + std::to_string(states.size()) + " states, expected one block");
   impl_->advance(block, states);
 }
 
-void World::lose(std::uint64_t samples) {
-  impl_->lose(samples);
+void World::skipSamples(std::uint64_t samples) {
+  impl_->skipSamples(samples);
 }
 
 }  // namespace smartmill::sim

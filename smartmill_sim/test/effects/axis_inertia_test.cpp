@@ -1,4 +1,4 @@
-// Inertia of what moves with the force sensor against its closed form.
+// Inertia force of the moving force sensor against its closed form.
 
 #include <cmath>
 #include <complex>
@@ -42,7 +42,7 @@ Record simulated(const MachineModel& model, const Record& recorded) {
   return simulateTest(model, test, recorded, options);
 }
 
-// Away from the ends of the record, where no acceleration is known.
+// Away from the ends of the record, where the acceleration is not defined.
 TEST(AxisInertia, isMinusMassTimesAcceleration) {
   const double w = units::TWO_PI * 2.0, peak = MASS * AMPLITUDE * w * w;
   for (const bool as_velocity : {true, false}) {
@@ -83,7 +83,7 @@ TEST(AxisInertia, needsTheMotionOfItsAxis) {
   for (const EffectParameter& p : kind.parameters) keys.push_back(p.key);
   EXPECT_EQ(keys, (std::vector<std::string>{"axis", "mass_kg"}));
   const MachineModel model = mill(4, 30.0);
-  EXPECT_EQ(lackingFor(kind, {model, {"fx", "fy"}}), std::string());
+  EXPECT_EQ(missingNeed(kind, {model, {"fx", "fy"}}), std::string());
   const std::vector<EffectForm> forms = formsOf(kind, {model, {"fx", "fy"}, {"y", "z"}});
   ASSERT_EQ(forms.size(), 1u);
   EXPECT_EQ(forms.front().variant, "y");

@@ -236,7 +236,7 @@ TEST(Effects, saturationClipsTheForces) {
     clipped = clipped || std::abs(pure.column("fy")[i]) > 150.0;
   }
   EXPECT_TRUE(clipped);
-  // The narrower one of two; no other channel has a limit.
+  // The lower of two limits applies; no other channel has a limit.
   const ChannelValues limits =
       EffectSet(with(mill(4, 30.0), {effectEntry("saturation", {{"limit_n", 150.0}}),
                                      effectEntry("saturation", {{"limit_n", 120.0}})}))
@@ -266,8 +266,8 @@ TEST(Effects, zeroOffsetIsOnEverySample) {
   EXPECT_EQ(record.column("fz")[2000], -1.0);
 }
 
-// Values that a bench draws are valid for the physics.
-TEST(Effects, everyDrawnEntryHasItsPhysics) {
+// Drawn values are valid for the effect.
+TEST(Effects, everyDrawnEntryMakesAnEffect) {
   EffectKind::Random random(5);
   for (const EffectKind& kind : effectCatalogue())
     EXPECT_NO_THROW(makeEffect(drawEffect(kind.name, sensorMill(), random))) << kind.name;

@@ -43,7 +43,7 @@ TEST(Effects, runoutBeyondTheFeedLeavesTheCutToOneTooth) {
   const MachineModel model =
       with(mill(2, 0.0), {effectEntry("runout", {{"offset_um", 60.0}, {"angle_deg", 0.0}})});
   const Record record = run(model, slotCut(EVEN_RPM, 2e-3, 1e-4), 0.1);
-  // Tooth 1 takes the feed of the whole revolution: its own last pass is the nearest surface.
+  // Tooth 1 cuts the feed of the whole revolution: its own last pass is the nearest surface.
   EXPECT_NEAR(chipOf(at(record, "fz", 0.5 * PI, EVEN_SPEED), model, 2e-3), 2e-4, 1e-9);
   EXPECT_EQ(at(record, "fz", 1.5 * PI, EVEN_SPEED), 0.0);
 }
@@ -108,7 +108,7 @@ TEST(Effects, chipCoefficientsAddToTheNominal) {
   EXPECT_NEAR(at(record, "fz", 0.5 * PI, EVEN_SPEED), (150e6 * 1e-4 + 3e3) * 2e-3, 1e-6);
 }
 
-// By the twin's tables and by its history of passes.
+// With tables and with the history of passes.
 TEST(Effects, edgeBuildupGrowsWithTheChip) {
   MachineModel model = with(mill(2, 0.0), {effectEntry("edge_buildup", {{"chip_um", 30.0}})});
   const auto expected = [](double h) { return (200e6 * h + 3e3 * (1.0 - std::exp(-h / 30e-6))) * 2e-3; };
@@ -147,7 +147,7 @@ TEST(Effects, cuttingSpeedScalesTheChipForceOnly) {
   EXPECT_NEAR(at(record, "fz", 0.5 * PI, EVEN_SPEED), fz, 1e-9 * fz);
 }
 
-TEST(Effects, unevenPitchSharesTheFeedByPitch) {
+TEST(Effects, unevenPitchDistributesTheFeedByPitch) {
   const EffectEntry pitch = effectEntry("uneven_pitch", {}, {}, {{"pitch_deg", {157.5, 202.5}}});
   const MachineModel model = with(mill(2, 0.0), {pitch});
   const double depth = 2e-3, feed = 1e-4;
@@ -161,7 +161,7 @@ TEST(Effects, unevenPitchSharesTheFeedByPitch) {
   EXPECT_THROW(run(with(mill(2, 0.0), {wrong}), slotCut(EVEN_RPM), 0.1), std::runtime_error);
 }
 
-TEST(Effects, helixIsThatOfAnotherTool) {
+TEST(Effects, helixReplacesThatOfTheTool) {
   const Record record =
       run(with(mill(4, 10.0), {effectEntry("helix", {{"helix_deg", 45.0}})}), slotCut(EVEN_RPM), 0.05);
   const MachineModel other = mill(4, 45.0);
@@ -173,7 +173,7 @@ TEST(Effects, helixIsThatOfAnotherTool) {
   }
 }
 
-// One upright edge of a ball end, in over its whole radius: quarter circles in closed form.
+// One straight edge of a ball end, engaged over its whole radius: quarter circles in closed form.
 TEST(Effects, cornerRadiusTurnsTheForcesOfABallEnd) {
   const MachineModel model = with(mill(2, 0.0), {effectEntry("corner_radius", {{"corner_radius_mm", 10.0}})});
   const double r = 10e-3, c = 1e-4;
@@ -186,8 +186,8 @@ TEST(Effects, cornerRadiusTurnsTheForcesOfABallEnd) {
   EXPECT_NEAR(indicated("fz"), k.krc * c * r / 2.0 + k.kre * r + k.kac * c * r * PI / 4.0 + k.kae * r, 1e-6);
 }
 
-// A bull-nose mill with helix against elements of its edge: normal n = (sin kappa, -cos kappa) across and
-// along the tool, Fr against it, Fa across it.
+// A bull-nose mill with helix as a sum over elements of its edge: normal n = (sin kappa, -cos kappa) across
+// and along the tool, Fr opposite to n, Fa perpendicular to n.
 CuttingForce bullNose(const MachineModel& model, double corner, const CampaignTest& test, double angle,
                       double size_exponent) {
   const CuttingCoefficients& k = *model.cutting;
@@ -235,19 +235,19 @@ TEST(Effects, cornerRadiusIsTheSumOverTheElementsOfTheEdge) {
                         std::abs(record.column("fy")[i] - expected.fy),
                         std::abs(record.column("fz")[i] - expected.fz)});
     }
-    // Twelve slices in which the turn by the helix is even: most where an edge comes in or leaves.
+    // Error of twelve slices with a linear lag: largest where an edge enters or exits.
     EXPECT_LT(error, 2.5e-3 * most) << corner << " " << exponent;
   }
 }
 
-// By tables and by the history of passes, the same tool also where its depth changes within the corner.
-TEST(Effects, cornerRadiusIsTheSameByHistory) {
+// Tables and history of passes agree, also for a change of depth within the corner.
+TEST(Effects, cornerRadiusIsTheSameWithHistory) {
   const MachineModel model = mill(3, 35.0);
   CuttingLaw law;
   law.coefficients = *model.cutting;
   const double speed = 300.0, dt = TWO_PI / speed / 1024.0;
-  Cutter tables(*model.tool, law, dt, {}, 4e-3, 0.0, Cutter::Way::tables),
-      history(*model.tool, law, dt, {}, 4e-3, 0.0, Cutter::Way::history);
+  Cutter tables(*model.tool, law, dt, {}, 4e-3, 0.0, Cutter::Method::tables),
+      history(*model.tool, law, dt, {}, 4e-3, 0.0, Cutter::Method::history);
   ToolMotion motion;
   motion.speed = speed;
   motion.velocity[0] = 3e-4 * speed / TWO_PI;
@@ -263,7 +263,7 @@ TEST(Effects, cornerRadiusIsTheSameByHistory) {
       history.setDepths({depth});
     }
     const CuttingForce a = tables.step(motion), b = history.step(motion);
-    history.settle({{0.0, 0.0}});
+    history.endStep({{0.0, 0.0}});
     most = std::max({most, std::abs(a.fx)});
     ASSERT_NEAR(a.fx, b.fx, 1e-4 * most + 1e-9) << i;
     ASSERT_NEAR(a.fz, b.fz, 1e-4 * most + 1e-9) << i;
@@ -271,7 +271,7 @@ TEST(Effects, cornerRadiusIsTheSameByHistory) {
   }
 }
 
-TEST(Effects, cornerRadiusFitsItsTool) {
+TEST(Effects, cornerRadiusIsAtMostTheToolRadius) {
   EXPECT_THROW(run(with(mill(2, 0.0), {effectEntry("corner_radius", {{"corner_radius_mm", 10.5}})}),
                    slotCut(EVEN_RPM), 0.1),
                std::runtime_error);
@@ -352,7 +352,7 @@ TEST(Effects, processDampingOpposesTheMotionIntoTheWork) {
     motion.angle = 0.5 * PI - speed * dt;
     process.engage({{0.0, PI, depth}}, motion);
     process.step(motion);
-    process.settle({{0.0, 0.0}});
+    process.endStep({{0.0, 0.0}});
     motion.angle = 0.5 * PI;
     motion.displacement[0] = v * dt;
     motion.rate[0] = v;

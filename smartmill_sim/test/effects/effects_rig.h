@@ -30,7 +30,7 @@ inline CampaignTest airCut(double rpm) {
   return test;
 }
 
-/// A slot in cut throughout.
+/// A slot, in cut over the whole record.
 inline CampaignTest slotCut(double rpm, double depth = 2e-3, double feed = 1e-4) {
   CampaignTest test = airCut(rpm);
   test.name = "slot";
@@ -40,7 +40,7 @@ inline CampaignTest slotCut(double rpm, double depth = 2e-3, double feed = 1e-4)
   return test;
 }
 
-/// Noise off, tooth 1 at phase [rad] at the first sample.
+/// Simulates without noise; tooth 1 is at phase [rad] at the first sample.
 inline Record run(const MachineModel& model, const CampaignTest& test, double duration, double phase = 0.0) {
   SimulationOptions options;
   options.noise = false;

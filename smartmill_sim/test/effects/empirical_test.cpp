@@ -27,13 +27,13 @@ EffectEntry profile(const char* from, double height_mm, double factor) {
                      {{"from", from}});
 }
 
-// Straight edge, one of two teeth in cut: Fz of a chip over a height.
+// Straight edge, one of two teeth in cut: axial force of a chip over a height.
 double axialForce(const MachineModel& model, double effective_chip, double height) {
   return (model.cutting->kac * effective_chip + model.cutting->kae) * height;
 }
 
-TEST(EmpiricalEffects, forceFollowsTheCourseOverTheChip) {
-  // Chip times factor: 40 um at 40 um, 72 um at 120 um, straight between and on.
+TEST(EmpiricalEffects, forceFollowsTheCurveOverTheChip) {
+  // Chip times factor: 40 um at 40 um, 72 um at 120 um, linear between and beyond.
   const MachineModel model = with(mill(2, 0.0), {chipEntry({40.0, 120.0}, {1.0, 0.6})});
   const Record record = run(model, slotCut(RATE / 360.0 * 60.0, DEPTH, FEED), 0.1);
   const double speed = RATE / 360.0 * TWO_PI;
@@ -45,7 +45,7 @@ TEST(EmpiricalEffects, forceFollowsTheCourseOverTheChip) {
   EXPECT_NEAR(at(thick, "fz", 0.5 * PI, speed), axialForce(model, 88e-6, DEPTH), 1e-6);
 }
 
-TEST(EmpiricalEffects, aCourseThatFallsIsRefused) {
+TEST(EmpiricalEffects, aDecreasingCurveIsRefused) {
   EXPECT_THROW(makeEffect(chipEntry({40.0, 80.0}, {1.0, 0.4})), Error);
   EXPECT_THROW(makeEffect(chipEntry({40.0, 30.0}, {1.0, 1.0})), Error);
   EXPECT_THROW(makeEffect(chipEntry({40.0}, {1.0})), Error);
@@ -75,7 +75,7 @@ TEST(EmpiricalEffects, aHeightOfTheEdgeCutsHarder) {
                 axialForce(model, FEED, DEPTH) + 0.4 * model.cutting->kac * FEED * 0.5e-3, 1e-6)
         << from;
   }
-  // Lower and upper layer together are the whole edge, wherever it is twisted.
+  // Lower and upper layer together are the whole edge, with helix.
   MachineModel harder = mill(4, 30.0);
   for (double CuttingCoefficients::*k :
        {&CuttingCoefficients::ktc, &CuttingCoefficients::krc, &CuttingCoefficients::kac})
@@ -85,15 +85,15 @@ TEST(EmpiricalEffects, aHeightOfTheEdgeCutsHarder) {
                            slotCut(EVEN_RPM, DEPTH, FEED), 0.1);
   const Record tip =
       run(with(mill(4, 30.0), {profile("tip", 1.2, 1.3)}), slotCut(EVEN_RPM, DEPTH, FEED), 0.1);
-  double apart = 0.0;
+  double largest_difference = 0.0;
   for (std::size_t i = 0; i < whole.size(); i += 37) {
     for (const char* c : {"fx", "fy", "fz"}) EXPECT_NEAR(parts.column(c)[i], whole.column(c)[i], 1e-6);
-    apart = std::max(apart, std::abs(tip.column("fy")[i] - whole.column("fy")[i]));
+    largest_difference = std::max(largest_difference, std::abs(tip.column("fy")[i] - whole.column("fy")[i]));
   }
-  EXPECT_GT(apart, 5.0);
+  EXPECT_GT(largest_difference, 5.0);
 }
 
-TEST(EmpiricalEffects, theNextToothTakesTheChipOfALostCorner) {
+TEST(EmpiricalEffects, theNextToothCutsTheChipOfALostCorner) {
   const EffectEntry lost = effectEntry("empirical:lost_edge", {{"tooth", 1.0}, {"height_mm", 0.5}});
   const MachineModel model = with(mill(2, 0.0), {lost});
   const Record record = run(model, slotCut(EVEN_RPM, DEPTH, FEED), 0.1);
@@ -106,7 +106,7 @@ TEST(EmpiricalEffects, theNextToothTakesTheChipOfALostCorner) {
       Error);
 }
 
-// The tool that may vibrate has another kernel; a stiff one cuts as the rigid one does.
+// Flexible tools use another algorithm; a stiff one gives the force of the rigid one.
 TEST(EmpiricalEffects, aStiffToolCutsAsARigidOne) {
   const std::vector<EffectEntry> effects{
       effectEntry("empirical:lost_edge", {{"tooth", 2.0}, {"height_mm", 0.7}}), profile("surface", 0.4, 1.3),
@@ -121,7 +121,7 @@ TEST(EmpiricalEffects, aStiffToolCutsAsARigidOne) {
   }
 }
 
-TEST(EmpiricalEffects, aBentCharacteristicActsOnOneChannel) {
+TEST(EmpiricalEffects, aNonlinearCharacteristicActsOnOneChannel) {
   const Record pure = run(mill(4, 30.0), slotCut(EVEN_RPM), 0.1);
   const Record bent = run(
       with(mill(4, 30.0), {effectEntry("empirical:curve",
@@ -172,7 +172,7 @@ TEST(EmpiricalEffects, linesTakeTheirPhaseFromTheRecord) {
               0.5 * EVEN_SPEED);
 }
 
-// Straight edges: one tooth at a time, by turns.
+// Straight edges: one tooth in cut at a time.
 TEST(EmpiricalEffects, eachToothHasItsFactor) {
   const auto table = [](const char* of) {
     return effectEntry("empirical:tooth_factor", {}, {{"of", of}}, {{"factor", {1.0, 1.3}}});
@@ -183,7 +183,7 @@ TEST(EmpiricalEffects, eachToothHasItsFactor) {
   EXPECT_NEAR(at(chip, "fz", 1.5 * PI, EVEN_SPEED), (1.3 * k.kac * FEED + k.kae) * DEPTH, 1e-6);
   const Record edge = run(with(mill(2, 0.0), {table("edge")}), slotCut(EVEN_RPM, DEPTH, FEED), 0.1);
   EXPECT_NEAR(at(edge, "fz", 1.5 * PI, EVEN_SPEED), (k.kac * FEED + 1.3 * k.kae) * DEPTH, 1e-6);
-  // All alike is another coefficient.
+  // Equal factors are a change of the coefficients.
   const Record alike =
       run(with(mill(3, 30.0),
                {effectEntry("empirical:tooth_factor", {}, {{"of", "chip"}}, {{"factor", {0.8, 0.8, 0.8}}})}),
@@ -196,7 +196,7 @@ TEST(EmpiricalEffects, eachToothHasItsFactor) {
   EXPECT_THROW(run(with(mill(4, 0.0), {table("chip")}), slotCut(EVEN_RPM), 0.1), Error);
 }
 
-TEST(EmpiricalEffects, theEdgeIsRunInWithTheTimeItHasCut) {
+TEST(EmpiricalEffects, theEdgeRunsInWithItsCuttingTime) {
   const MachineModel model =
       with(mill(2, 0.0), {effectEntry("empirical:edge_life", {{"amplitude", 0.4}, {"time_constant_s", 90.0}},
                                       {{"of", "chip"}})});
@@ -233,7 +233,7 @@ TEST(EmpiricalEffects, channelsStepAndDriftByTheirClock) {
 }
 
 // Above x + (below - above) / (1 + i f / corner) x.
-TEST(EmpiricalEffects, aShelfPassesSlowAndQuickWithGainsOfTheirOwn) {
+TEST(EmpiricalEffects, aShelfHasDifferentGainsBelowAndAboveItsCorner) {
   const Shelf shelf{200.0, 0.7, 1.4};
   for (const double f : {2.0, 60.0, 200.0, 900.0}) {
     ShelfFilter filter(shelf, 1.0 / RATE);
@@ -261,8 +261,8 @@ TEST(EmpiricalEffects, aShelfPassesSlowAndQuickWithGainsOfTheirOwn) {
   }
 }
 
-// Added to the channel: gain / (1 - q^2 + 2 i zeta q) of the other one.
-TEST(EmpiricalEffects, aModePassesOneForceOnToAnother) {
+// Added to the channel: the other channel times gain / (1 - q^2 + 2 i zeta q).
+TEST(EmpiricalEffects, aModeTransmitsOneForceToAnother) {
   const auto resonance = [](const char* to) {
     return effectEntry("empirical:resonance",
                        {{"frequency_hz", 640.0}, {"damping_ratio", 0.05}, {"gain", 0.8}},
@@ -289,7 +289,7 @@ TEST(EmpiricalEffects, aModePassesOneForceOnToAnother) {
   }
 }
 
-// When they come is no value of the model.
+// The begin of the bursts is not a value of the model.
 TEST(EmpiricalEffects, burstsTakeTheirTimesFromTheRecord) {
   const CampaignTest test = slotCut(EVEN_RPM);
   const EffectEntry bursts =
@@ -315,7 +315,8 @@ TEST(EmpiricalEffects, burstsTakeTheirTimesFromTheRecord) {
   }
 }
 
-// 3 cos(0) + 4 sin(0) always there, 1 cos(2 a) + 2 sin(2 a) at 0.1 mm a tooth, twice that at 0.2 mm.
+// 3 cos(a) + 4 sin(a) independent of the feed, cos(2 a) + 2 sin(2 a) at 0.1 mm per tooth, twice that at 0.2
+// mm.
 TEST(EmpiricalEffects, aForceOverTheRevolutionGrowsWithTheFeed) {
   const MachineModel machine = mill(2, 0.0);
   const EffectEntry table = effectEntry(
@@ -335,7 +336,7 @@ TEST(EmpiricalEffects, aForceOverTheRevolutionGrowsWithTheFeed) {
     EXPECT_NEAR(added(slotCut(EVEN_RPM, DEPTH, 1e-4), angle), 0.5 * (always + growing), 1e-6);
     EXPECT_NEAR(added(slotCut(EVEN_RPM, DEPTH, 2e-4), angle), 0.5 * (always + 2.0 * growing), 1e-6);
   }
-  // Nothing is known of other depths and speeds, nor of air.
+  // Zero at other depths and speeds, and in air.
   EXPECT_EQ(added(slotCut(EVEN_RPM, 1.5 * DEPTH, 1e-4), 0.5 * PI), 0.0);
   EXPECT_EQ(added(slotCut(1.5 * EVEN_RPM, DEPTH, 1e-4), 0.5 * PI), 0.0);
   EXPECT_EQ(added(airCut(EVEN_RPM), 0.5 * PI), 0.0);
@@ -372,7 +373,7 @@ TEST(EmpiricalEffects, aForceOverTheRevolutionBendsOverTheFeed) {
   EXPECT_THROW(makeEffect(table), Error);
 }
 
-TEST(EmpiricalEffects, everyFormHasItsClassAndCanDoNothing) {
+TEST(EmpiricalEffects, everyFormHasItsClassAndANullEffect) {
   const MachineModel model = mill(4, 30.0);
   const EffectScope scope{model, {"fx", "fy", "fz", "load_meter"}};
   const Record pure = run(model, slotCut(4200.0), 0.03);

@@ -141,7 +141,8 @@ void ChatterDetector::handle(const CuttingCondition& condition) {
   condition_ = condition;
   reported_invalid_ = false;
   // The angle is accumulated from here on, so that rounding does not depend on how long the node has run.
-  if (!angles_.empty()) angles_.assign(1, {angles_.back().time, angles_.back().shown, angles_.back().shown});
+  if (!angles_.empty())
+    angles_.assign(1, {angles_.back().time, angles_.back().measured, angles_.back().measured});
   notSteady(condition.stamp);
 }
 

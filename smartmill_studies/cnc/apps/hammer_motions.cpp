@@ -1,7 +1,7 @@
-// rosrun smartmill_studies cnc_hammer_motions: the automatic hammer's motions on the simulated machine, over
-// and over with drawn tools, places, errors of belief and troubles. What may never happen: that the tool
-// meets sensor, hammer or table, that a motion goes beyond the travel, that anything moves after the motion
-// was taken away. What is refused is refused with a line, and counted.
+// rosrun smartmill_studies cnc_hammer_motions: motions of the automatic hammer on the simulated machine with
+// random tools, positions, model errors and faults. The tool must never touch sensor, hammer or table, no
+// motion may leave the travel, and nothing may move after a motion is cancelled. Every refusal has a message
+// and is counted.
 
 #include <cmath>
 #include <cstdio>
@@ -61,7 +61,7 @@ Draw drawRun(const MachineModel& model, std::mt19937_64& random, double trouble_
   d.truth.tool->diameter = uniform(random, 10.0, 25.0) * MM;
   d.truth.tool->helix = units::radFromDeg(uniform(random, 0.0, 40.0));
   d.believed = d.truth;
-  // The place of the station is set up by hand, the tool measured with a gauge.
+  // The station is positioned by hand, the tool is measured with a gauge.
   for (auto& [direction, place] : d.believed.hammer->position) {
     for (double& at : place) at += uniform(random, -0.1, 0.1) * MM;
   }
@@ -78,7 +78,7 @@ Draw drawRun(const MachineModel& model, std::mt19937_64& random, double trouble_
     d.trouble_time = uniform(random, 0.5, 40.0);
   }
   if (uniform(random, 0.0, 1.0) < NARROW_SHARE) {
-    // Limits that do not reach the station: a motion there is to be refused before it is sent.
+    // Limits that exclude the station: the bridge must refuse the motion before it sends it.
     d.believed.axes->travel[0][1] = d.believed.hammer->position.at("x")[0] - 5.0 * MM;
   }
   const auto& travel = d.believed.axes->travel;
@@ -87,7 +87,7 @@ Draw drawRun(const MachineModel& model, std::mt19937_64& random, double trouble_
   return d;
 }
 
-/// Obeys the sequence as the bridge would: armed once, every program checked, one at a time.
+/// Executes the commands of the sequence as the bridge does: armed once, one checked program at a time.
 class Driver {
  public:
   Driver(const Draw& draw, std::uint64_t seed, Counts& counts)
@@ -109,8 +109,9 @@ class Driver {
       result = sequence_.takeResult();
     }
     counts_.unfinished += result ? 0 : 1;
-    ++counts_.results[result ? CODES[static_cast<std::size_t>(result->code)] : "no end"];
-    if (result && result->code != FrfCode::ok && result->message.empty()) ++counts_.results["without a line"];
+    ++counts_.results[result ? CODES[static_cast<std::size_t>(result->code)] : "no result"];
+    if (result && result->code != FrfCode::ok && result->message.empty())
+      ++counts_.results["without a message"];
     standStill();
     judge();
   }
@@ -176,13 +177,13 @@ class Driver {
     for (const hammer::Command& command : sequence_.takeCommands()) obey(command);
   }
 
-  /// Text that the controller did not take yet.
+  /// Program text that the controller has not accepted yet.
   void feed() {
     if (!session_ || text_.empty()) return;
     text_.erase(0, controller().dncData(text_.data(), text_.size()));
   }
 
-  /// What the bridge sees of the machine's own end.
+  /// State that the bridge reads when the machine ends a motion by itself.
   void watch() {
     const focas::Status status = controller().status();
     const focas::EwCode code = controller().dncAbort();
@@ -191,7 +192,7 @@ class Driver {
     if (taken && armed_) {
       armed_ = session_ = false;
       text_.clear();
-      sequence_.commandFailed(time_, "the controller ended it: " + focas::ewName(code));
+      sequence_.commandFailed(time_, "ended by the controller: " + focas::ewName(code));
     }
     const sim::MotionState motion = controller().motion();
     for (std::size_t i = 0; i < 3; ++i) {
@@ -260,14 +261,14 @@ class Driver {
     }
     if (!session_ && controller().dncStart() != focas::EW_OK) {
       ++counts_.refused_by_state;
-      sequence_.commandFailed(time_, "the controller takes no program");
+      sequence_.commandFailed(time_, "the controller accepts no program");
       return;
     }
     session_ = true;
     text_ += check.text;
   }
 
-  /// Nothing moves once the measurement is over and its last command done.
+  /// Checks that nothing moves after the last command of the measurement.
   void standStill() {
     sim::World::Block block;
     for (int i = 0; i < 100; ++i) world_.advance(block);
@@ -303,8 +304,8 @@ class Driver {
 };
 
 void print(const Counts& c) {
-  std::printf("%d runs: %d collisions, %d beyond limits, %d moved unasked, %d without an end\n", c.runs,
-              c.collisions, c.beyond_limits, c.moved_unasked, c.unfinished);
+  std::printf("%d runs: %d collisions, %d beyond limits, %d moved without a command, %d without a result\n",
+              c.runs, c.collisions, c.beyond_limits, c.moved_unasked, c.unfinished);
   std::printf("refused before anything was sent: %d by limits, %d by state\nresults:", c.refused_by_limits,
               c.refused_by_state);
   for (const auto& [name, count] : c.results) std::printf(" %s %d,", name.c_str(), count);
@@ -386,15 +387,14 @@ int run(const Request& request) {
 int main(int argc, char** argv) {
   Request request;
   CommandLine line{
-      "The automatic hammer's motions on the simulated machine with drawn tools, starts, errors of belief "
+      "Motions of the automatic hammer on the simulated machine with random tools, starts, model errors "
       "(station "
-      "0.1 mm, diameter 0.05 mm) and troubles; exit code 1 when the tool met anything, went beyond its "
-      "limits or "
-      "moved unasked."};
+      "0.1 mm, diameter 0.05 mm) and faults; exit code 1 if the tool touches anything, leaves its limits or "
+      "moves without a command."};
   line.option("MODEL", request.model, "machine model with a hammer station").required();
-  request.one.addTo(line, "--runs,--cases", request.runs, "how many");
+  request.one.addTo(line, "--runs,--cases", request.runs, "number of runs");
   request.one.addScore(line);
-  line.option("--seed", request.seed, "of the first run; each further one takes the next").showDefault();
+  line.option("--seed", request.seed, "of the first run; each further run uses the next one").showDefault();
   line.option("--troubles", request.trouble_share,
               "share of runs with an alarm, stop, reset, hold, cancel or change of mode")
       .within(0.0, 1.0)

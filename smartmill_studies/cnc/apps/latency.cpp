@@ -1,5 +1,5 @@
-// rosrun smartmill_studies cnc_latency: how long questions to a controller take on loopback, how many
-// sessions it serves at once, and what polling costs; the simulated Fanuc, or a LinuxCNC that runs
+// rosrun smartmill_studies cnc_latency: latency of requests to a controller on loopback, number of
+// simultaneous sessions and cost of polling, for the simulated Fanuc or a running LinuxCNC
 // (linuxcnc_machine).
 
 #include <unistd.h>
@@ -44,18 +44,19 @@ double processSeconds() {
 
 template <class Ask>
 void timed(const char* name, int count, const Ask& ask) {
-  std::vector<double> took;
+  std::vector<double> durations;
   for (int i = 0; i < count; ++i) {
     const Clock::time_point before = Clock::now();
     ask();
-    took.push_back(std::chrono::duration<double>(Clock::now() - before).count());
+    durations.push_back(std::chrono::duration<double>(Clock::now() - before).count());
   }
-  std::sort(took.begin(), took.end());
+  std::sort(durations.begin(), durations.end());
   std::printf("%-28s median %.3f ms, 99 %% %.3f ms, longest %.3f ms (%d)\n", name,
-              1e3 * took[took.size() / 2], 1e3 * took[took.size() * 99 / 100], 1e3 * took.back(), count);
+              1e3 * durations[durations.size() / 2], 1e3 * durations[durations.size() * 99 / 100],
+              1e3 * durations.back(), count);
 }
 
-/// [s] of a processor that another process has had: user and system time in proc(5).
+/// [s] CPU time of another process: user and system time from proc(5).
 double secondsOf(int pid) {
   std::ifstream file("/proc/" + std::to_string(pid) + "/stat");
   std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
@@ -69,24 +70,24 @@ double secondsOf(int pid) {
   return (user + system) / static_cast<double>(::sysconf(_SC_CLK_TCK));
 }
 
-/// Whole readings of the bridge at its rate: their time and the share of one core of both sides.
-/// @param used [s] of a processor by all who take part
+/// Complete read cycles of the bridge at its rate: duration, and CPU load of both sides as share of one core.
+/// @param used [s] CPU time of both sides
 void polled(cnc::Controller& controller, double seconds, const std::function<double()>& used) {
   const double cpu = used();
   const Clock::time_point began = Clock::now();
-  std::vector<double> took;
+  std::vector<double> durations;
   for (int i = 0; i < static_cast<int>(seconds * RATE); ++i) {
     std::this_thread::sleep_until(began + std::chrono::duration_cast<Clock::duration>(
                                               std::chrono::duration<double>(static_cast<double>(i) / RATE)));
     const Clock::time_point before = Clock::now();
     if (!controller.read()) {
-      throw Error("a reading failed");
+      throw Error("a read cycle failed");
     }
-    took.push_back(std::chrono::duration<double>(Clock::now() - before).count());
+    durations.push_back(std::chrono::duration<double>(Clock::now() - before).count());
   }
-  std::sort(took.begin(), took.end());
-  std::printf("bridge's reading at %.0f Hz    median %.3f ms, 99 %% %.3f ms; %.2f %% of a core, both sides\n",
-              RATE, 1e3 * took[took.size() / 2], 1e3 * took[took.size() * 99 / 100],
+  std::sort(durations.begin(), durations.end());
+  std::printf("read cycle at %.0f Hz          median %.3f ms, 99 %% %.3f ms; %.2f %% of a core, both sides\n",
+              RATE, 1e3 * durations[durations.size() / 2], 1e3 * durations[durations.size() * 99 / 100],
               100.0 * (used() - cpu) / seconds);
 }
 
@@ -115,16 +116,16 @@ void measureFanuc(int count, double seconds) {
   timed("cnc_statinfo (3 requests)", count, [&] { client.statusInfo(); });
   timed("cnc_rdspmeter (5 requests)", count, [&] { client.spindleMeter(); });
   client.close();
-  std::printf("sessions at once: %d\n", sessions(server.port()));
+  std::printf("simultaneous sessions: %d\n", sessions(server.port()));
   cnc::FocasParameters parameters;
   parameters.port = server.port();
   const std::unique_ptr<cnc::Controller> controller = cnc::makeFocasController(parameters);
   const Clock::time_point until = Clock::now() + std::chrono::seconds(5);
   while (!controller->connect() && Clock::now() < until) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));  // the sessions above are being closed
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));  // until the sessions above are closed
   }
-  timed("bridge's whole reading", count, [&] {
-    if (!controller->read()) throw Error("a reading failed");
+  timed("read cycle of the bridge", count, [&] {
+    if (!controller->read()) throw Error("a read cycle failed");
   });
   polled(*controller, seconds, processSeconds);
 }
@@ -146,13 +147,13 @@ int gatewaySessions(const std::string& folder) {
   }
 }
 
-/// The LinuxCNC whose sockets stand in a folder, made ready.
+/// A LinuxCNC that is ready, by the folder of its sockets.
 void measureLinuxCnc(const std::string& folder, int count, double seconds) {
   using namespace cnc::linuxcnc;
   const int gateway = LocalConnection::to(folder + "/" + GATEWAY_SOCKET).peer();
   const int reader = LocalConnection::to(folder + "/" + STREAM_SOCKET).peer();
-  std::printf("sessions at once, besides linuxcnc_stream: %d\n", gatewaySessions(folder));
-  std::this_thread::sleep_for(std::chrono::milliseconds(100));  // they are being closed
+  std::printf("simultaneous sessions, in addition to linuxcnc_stream: %d\n", gatewaySessions(folder));
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));  // until they are closed
   {
     GatewayClient client(folder, 2.0);
     client.connect();
@@ -173,8 +174,8 @@ void measureLinuxCnc(const std::string& folder, int count, double seconds) {
     std::this_thread::sleep_for(std::chrono::milliseconds(500));
     const auto connected = controller->connect();
     if (!connected) throw Error(connected.failure().message);
-    timed("bridge's whole reading", count, [&] {
-      if (!controller->read()) throw Error("a reading failed");
+    timed("read cycle of the bridge", count, [&] {
+      if (!controller->read()) throw Error("a read cycle failed");
     });
     polled(*controller, seconds, [&] { return processSeconds() + secondsOf(gateway) + secondsOf(reader); });
   } catch (...) {
@@ -190,10 +191,11 @@ int main(int argc, char** argv) {
   int count = 5000;
   double seconds = 20.0;
   std::string folder;
-  CommandLine line{"Latency of a controller on loopback, sessions, and the cost of polling at 50 Hz."};
-  line.option("--count", count, "questions of each kind").positive().showDefault();
+  CommandLine line{"Latency of a controller on loopback, number of sessions, and cost of polling at 50 Hz."};
+  line.option("--count", count, "requests of each kind").positive().showDefault();
   line.option("--seconds", seconds, "[s] of polling").positive().showDefault();
-  line.option("--linuxcnc", folder, "of a linuxcnc_machine that has been made ready: it instead");
+  line.option("--linuxcnc", folder,
+              "socket folder of a linuxcnc_machine that is ready; it is measured instead");
   return runProgram(line, argc, argv, [&] {
     if (folder.empty()) {
       measureFanuc(count, seconds);

@@ -1,7 +1,7 @@
-// rosrun smartmill_studies cnc_load_rounding: what the rounding of polled loads costs the cutting
-// coefficients. Air cuts at four speeds give the friction, slots at one speed and several feeds the
-// coefficients (Dunwoody chapter 3); each voltage is the mean of what a controller tells at 50 Hz while the
-// tooth passing, behind the load meter's first-order lag, still ripples it.
+// rosrun smartmill_studies cnc_load_rounding: error of the cutting coefficients caused by the rounding of
+// polled loads. Air cuts at four speeds give the friction, slots at one speed and several feeds the
+// coefficients (Dunwoody chapter 3). Each voltage is the mean of values polled at 50 Hz, with the tooth
+// passing ripple behind the first-order lag of the load meter.
 
 #include <algorithm>
 #include <cmath>
@@ -39,12 +39,13 @@ struct Cell {
 
   double rounded(double volt) const { return step > 0.0 ? step * std::round(volt / step) : volt; }
 
-  /// Mean voltage that is polled in a cut with a mean torque [N m], at a speed [rad/s].
+  /// Mean polled voltage of a cut with a mean torque [N m] at a speed [rad/s].
   double polled(double torque, double speed) {
     const double mean =
         spindle.load_meter_gain * (torque + spindle.viscous * speed + spindle.coulomb) * speed;
     const double passing = tool.teeth * speed / units::TWO_PI;  // [Hz]
-    // A slot's torque ripples by about its own mean at two teeth, less at more; the lag leaves a trace.
+    // The torque of a slot ripples by about its mean with two teeth, by less with more; the lag attenuates
+    // it.
     const double ripple = spindle.load_meter_gain * torque * speed / tool.teeth /
                           std::hypot(1.0, passing / spindle.load_meter_bandwidth);
     std::uniform_real_distribution<double> phase(0.0, units::TWO_PI), late(0.0, JITTER);
@@ -78,7 +79,7 @@ struct Cell {
       const double volt = polled(a(i, 0) * ktc + a(i, 1) * kte, speed);
       b(i, 0) = volt / (spindle.load_meter_gain * speed) - air(0, 0) * speed - air(1, 0);
     }
-    // In units near 1 for both unknowns.
+    // Scaled so that both unknowns are near 1.
     Eigen::MatrixXd scaled = a;
     scaled.col(0) *= ktc;
     scaled.col(1) *= kte;
@@ -86,7 +87,7 @@ struct Cell {
   }
 };
 
-/// A machine with a step of its load meter, before a coefficient is drawn.
+/// A machine with a resolution of its load meter, before a coefficient is drawn.
 Cell cellOf(const MachineModel& model, double step, std::uint64_t seed) {
   return {model.needSpindle("draw machines"),
           model.needTool("draw machines"),
@@ -119,7 +120,7 @@ void runOne(const StudyCase& one, const MachineModel& model, std::uint64_t seed)
 
 void print(double step, std::vector<double> errors) {
   std::sort(errors.begin(), errors.end());
-  std::printf("step %6.1f mV: Ktc off by %.3f %% (median), %.3f %% (95 %%)\n", 1e3 * step,
+  std::printf("step %6.1f mV: error of Ktc %.3f %% (median), %.3f %% (95 %%)\n", 1e3 * step,
               100.0 * errors[errors.size() / 2], 100.0 * errors[errors.size() * 95 / 100]);
 }
 
@@ -141,9 +142,9 @@ int main(int argc, char** argv) {
   std::uint64_t seed = 1;
   StudyCase one;
   CommandLine line{
-      "Error of Ktc from polled loads over their rounding: drawn coefficients on a model's machine."};
+      "Error of Ktc from polled loads over their resolution, with random coefficients on a model's machine."};
   line.option("MODEL", model_file, "machine model with tool and spindle").required();
-  one.addTo(line, "--machines,--cases", machines, "drawn machines for each step");
+  one.addTo(line, "--machines,--cases", machines, "random machines for each resolution");
   one.addScore(line);
   line.option("--seed", seed, "of the draws").showDefault();
   return runProgram(line, argc, argv, [&] {

@@ -1,6 +1,6 @@
-// The automatic hammer's whole measurement through the bridge and the wire, and at each of its steps the
-// controller's server is killed and started anew: the measurement ends with a line, nothing moves that nobody
-// asked for, and after being armed anew the tool can be taken away.
+// Complete measurement of the automatic hammer through bridge and network. At each step the controller's
+// server is killed and restarted: the measurement ends with a message, nothing moves without a command, and
+// the tool can be retracted after the machine is armed again.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -26,7 +26,7 @@ namespace {
 constexpr double BLOCK_TIME = sim::World::BLOCK / sim::World::SAMPLE_RATE;  // [s]
 constexpr double MOST_TIME = 240.0;                                         // [s] of a measurement
 
-/// What hammer_node and cnc_node do between their topics and actions.
+/// The logic of hammer_node and cnc_node without topics and actions.
 class Rig {
  public:
   explicit Rig(const MachineModel& model) : world_(model, worldOptions()), sequence_({}, model) {
@@ -68,7 +68,7 @@ class Rig {
     bridge_->fetch(time_);
     bridge_->step(time_);
     if (bridge_->busy()) {
-      // Text travels while the test's time stands.
+      // Program text is transferred while the simulated time is stopped.
       std::this_thread::sleep_for(std::chrono::microseconds(200));
     }
     sequence_.handle(bridge_->state());
@@ -95,7 +95,7 @@ class Rig {
     }
   }
 
-  /// Until the sequence says that it is at a step; false: it ended before.
+  /// Runs until the sequence reports a step. @return false if it ended before
   bool reach(const std::string& stage) {
     for (const double end = time_ + MOST_TIME; time_ < end && !result_; step()) {
       if (stage_.rfind(stage, 0) == 0) {
@@ -118,7 +118,7 @@ class Rig {
     return outcome_;
   }
 
-  std::string ended() const { return result_ ? result_->message : "no end"; }
+  std::string ended() const { return result_ ? result_->message : "no result"; }
   cnc::Bridge& bridge() { return *bridge_; }
   sim::MotionState motion() { return world_.controller().motion(); }
   std::vector<focas::AlarmMessage> alarms() { return world_.controller().alarmMessages(); }
@@ -131,7 +131,7 @@ class Rig {
     return options;
   }
 
-  /// As the hammer's node: one motion at a time, a stop takes away what runs and what waits.
+  /// As in hammer_node: one motion at a time; a stop cancels the running and the queued motion.
   void obey() {
     using Kind = hammer::Command::Kind;
     if (const std::optional<cnc::Outcome> outcome = bridge_->takeOutcome()) {
@@ -187,7 +187,7 @@ MachineModel model() {
   return readMachineModel("../../launch/models/mill_twin.yaml");
 }
 
-/// A step by what it tells, and how long it has lasted then [s].
+/// A step by its progress text, and the delay of the fault after it [s].
 class HammerFaults : public ::testing::TestWithParam<std::tuple<const char*, double>> {};
 
 TEST_P(HammerFaults, AServerKilledAndRestartedEndsTheMeasurementAndMovesNothing) {
@@ -201,7 +201,7 @@ TEST_P(HammerFaults, AServerKilledAndRestartedEndsTheMeasurementAndMovesNothing)
   rig.killServer();
   rig.steps(0.5);
   EXPECT_FALSE(rig.bridge().state().connected || rig.bridge().state().armed);
-  // What was on its way has braked; whatever the sequence still wants does not reach the machine.
+  // The motion in progress has stopped; further commands of the sequence do not reach the machine.
   const sim::MotionState stood = rig.motion();
   const int blocks = rig.blocks();
   rig.startServer();
@@ -215,12 +215,12 @@ TEST_P(HammerFaults, AServerKilledAndRestartedEndsTheMeasurementAndMovesNothing)
   EXPECT_EQ(rig.motion().spindle_speed, 0.0);
   EXPECT_EQ(rig.blocks(), blocks);
   EXPECT_TRUE(rig.alarms().empty());
-  // It is there again, disarmed; the operator takes the tool away.
+  // The controller is back, disarmed; the operator retracts the tool.
   EXPECT_TRUE(rig.bridge().state().connected);
   EXPECT_FALSE(rig.bridge().state().armed);
   EXPECT_EQ(rig.bridge().jog("z", 1e-3, 1e-3)->code, cnc::MotionCode::not_armed);
   ASSERT_EQ(rig.bridge().arm(true).code, cnc::ArmCode::ok);
-  const int up = static_cast<int>(std::floor(-1e3 * stood.position[2]));  // [mm] to the end of its travel
+  const int up = static_cast<int>(std::floor(-1e3 * stood.position[2]));  // [mm] to the end of the travel
   const std::optional<cnc::Outcome> retracted = rig.program("G91 G0 Z" + std::to_string(up) + "\n");
   ASSERT_TRUE(retracted);
   EXPECT_EQ(retracted->code, cnc::MotionCode::ok) << retracted->message;

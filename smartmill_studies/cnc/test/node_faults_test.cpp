@@ -1,4 +1,4 @@
-// Faults with the real processes, those that take least time; node_faults.py alone goes through all of them.
+// The quickest of the faults with real processes; node_faults.py runs all of them.
 #include <gtest/gtest.h>
 
 #include <cstdlib>

@@ -1,5 +1,5 @@
-// rosrun smartmill_studies discrepancy_bench: a machine that shares no physics with the twin hides causes,
-// explain looks for them, the seal is opened and the answers are scored.
+// rosrun smartmill_studies discrepancy_bench: hides causes in a machine that shares no physics with the twin,
+// runs explain and scores its answers against the hidden truth.
 
 #include <cstdio>
 #include <filesystem>
@@ -43,20 +43,20 @@ std::vector<std::string> namesOf(const Options& o) {
   if (!o.only.empty()) return o.only;
   std::vector<std::string> names;
   for (const EffectKind& kind : effectCatalogue()) {
-    // The plan of a drawn campaign has moves only where such an effect is hidden, which would give it away.
+    // Only campaigns with a hidden motion effect contain moves, which would reveal it.
     if (!kind.has(EffectNeed::axis_motion)) names.push_back(kind.name);
   }
   return names;
 }
 
-// What an earlier run of the same bench has left, by case.
+// Results of an earlier run of the same bench, by case.
 std::map<int, json> readLines(const std::string& file) {
   std::map<int, json> lines;
   for (const json& line : readJsonLines(file)) lines[line["case"]] = line;
   return lines;
 }
 
-// Without a folder that is named, only the line stays.
+// Without a folder only the line is stored.
 void runOne(const Options& o, const plant::Case& hidden) {
   const TemporaryFolder scratch;
   const auto progress = [](const std::string& line) { std::fprintf(stderr, "%s\n", line.c_str()); };
@@ -76,7 +76,7 @@ void run(const Options& o) {
   if (o.cases > 0) cases.resize(static_cast<std::size_t>(o.cases));
   o.one.check(static_cast<int>(cases.size()));
   if (o.one.one()) return runOne(o, cases[static_cast<std::size_t>(o.one.number)]);
-  if (o.out.empty()) throw UsageError("--out: a folder of cases and scores is due");
+  if (o.out.empty()) throw UsageError("--out: expected a folder for cases and scores");
   std::filesystem::create_directories(o.out);
   const std::string file = o.out + "/cases.jsonl";
   std::map<int, json> lines = readLines(file);
@@ -109,21 +109,20 @@ void run(const Options& o) {
 int main(int argc, char** argv) {
   Options o;
   CommandLine line{
-      "Blind bench of explain: hides causes in drawn machines, whose physics is another one than the twin's, "
-      "and "
-      "scores what is named. Goes on where an earlier run into the same folder ended."};
-  line.option("-o,--out", o.out, "folder of cases and scores; with --case it may be left out");
+      "Blind bench of explain: hides causes in random machines whose physics differs from the twin's, and "
+      "scores the named effects. Continues an earlier run in the same folder."};
+  line.option("-o,--out", o.out, "folder of cases and scores; optional with --case");
   line.option("--singles", o.counts.singles, "cases of each single effect");
   line.option("--pairs", o.counts.pairs, "pairs of effects");
   line.option("--triples", o.counts.triples, "cases of three effects");
   line.option("--none", o.counts.none, "cases with nothing hidden");
   line.option("--outside", o.counts.outside, "cases with a cause outside the catalogue");
   line.option("--only", o.only, "effects to draw from, comma separated").commas();
-  line.option("--cases", o.cases, "the first of those drawn (default: all)").notNegative();
-  line.option("--case", o.one.number, "only this case of those drawn, its progress on standard error");
+  line.option("--cases", o.cases, "number of cases, from the first (default: all)").notNegative();
+  line.option("--case", o.one.number, "only this case, with progress on standard error");
   o.one.addScore(line);
-  line.option("--seed", o.seed, "of everything drawn");
-  line.option("--threads", o.threads, "cases at a time").within(1, 64);
-  line.flag("--keep", o.keep, "keep the campaigns of right cases too");
+  line.option("--seed", o.seed, "seed of all random draws");
+  line.option("--threads", o.threads, "parallel cases").within(1, 64);
+  line.flag("--keep", o.keep, "keep also the campaigns of correct cases");
   return runProgram(line, argc, argv, [&] { run(o); });
 }

@@ -1,7 +1,7 @@
-// rosrun smartmill_studies discrepancy_interpolation CAMPAIGN: how much of the held-out cuts of a campaign
-// any model can explain whose forces are straight lines over the feed. Each line at an order of the spindle
-// is interpolated by itself, in size and phase, so that any rigid geometry, any sensor that is linear, with
-// cross-talk or not, and any coefficients are among these models.
+// rosrun smartmill_studies discrepancy_interpolation CAMPAIGN: share of the held-out cuts of a campaign that
+// a model can explain whose forces are linear in the feed. Each spindle order is interpolated separately in
+// amplitude and phase. These models include every rigid geometry, every linear sensor with or without
+// crosstalk, and all coefficients.
 
 #include <array>
 #include <cmath>
@@ -24,14 +24,14 @@ using namespace smartmill::discrepancy;
 using Complex = std::complex<double>;
 
 constexpr double HIGHEST = 0.49;  // of the sample rate
-constexpr int PASSES = 100;       // of phases and lines in turn
+constexpr int PASSES = 100;       // alternating between phases and lines
 
-// One cut: lines at orders 1.. of each force, with a phase of the record that is free.
+// One cut: complex amplitudes at orders 1.. of each force, with a free phase of the record.
 struct Cut {
   const TestData* test = nullptr;
-  double feed = 0.0, phase = 0.0;               // [m], [rad]
-  std::array<std::vector<Complex>, 3> line;     // [N] of order k + 1
-  std::array<double, 3> variance{}, besides{};  // [N^2] of the samples, of what no line holds
+  double feed = 0.0, phase = 0.0;                    // [m], [rad]
+  std::array<std::vector<Complex>, 3> line;          // [N] of order k + 1
+  std::array<double, 3> variance{}, asynchronous{};  // [N^2] of the samples, of the asynchronous part
 
   Complex at(std::size_t axis, std::size_t k) const {
     return line[axis][k] * std::polar(1.0, -phase * static_cast<double>(k + 1));
@@ -61,13 +61,15 @@ Cut linesOf(const TestData& test) {
     const Eigen::VectorXd values = Eigen::Map<const Eigen::VectorXd>(f.data() + test.first_cut, n);
     const Eigen::VectorXd found = normal.solve(columns.transpose() * values);
     cut.variance[axis] = (values.array() - values.mean()).square().mean();
-    cut.besides[axis] = (values - columns * found).squaredNorm() / static_cast<double>(n - 2 * orders - 1);
+    cut.asynchronous[axis] =
+        (values - columns * found).squaredNorm() / static_cast<double>(n - 2 * orders - 1);
     for (Eigen::Index k = 1; k <= orders; ++k) cut.line[axis].emplace_back(found[2 * k - 1], -found[2 * k]);
   }
   return cut;
 }
 
-// A line over the feed: value = first + feed * second, by least squares over all cuts or those to be fitted.
+// Straight line over the feed: value = first + feed * second, by least squares over all cuts or the fitted
+// ones.
 std::array<Complex, 2> courseOf(const std::vector<Cut>& cuts, bool all, std::size_t axis, std::size_t k) {
   double n = 0.0, x = 0.0, xx = 0.0;
   Complex y, xy;
@@ -83,8 +85,8 @@ std::array<Complex, 2> courseOf(const std::vector<Cut>& cuts, bool all, std::siz
   return {(y - slope * x) / n, slope};
 }
 
-// The phase of each record in turn with the lines, to where all of them agree best: the angle is known to a
-// degree or so.
+// Estimates the phase of each record in turn with the lines; the recorded angle is accurate to about a
+// degree.
 void settlePhases(std::vector<Cut>& cuts) {
   for (int pass = 0; pass < PASSES; ++pass) {
     for (Cut& c : cuts) {
@@ -102,18 +104,18 @@ void settlePhases(std::vector<Cut>& cuts) {
   }
 }
 
-void tell(const std::vector<Cut>& cuts) {
+void report(const std::vector<Cut>& cuts) {
   for (const Cut& c : cuts) {
     std::printf("%-16s %s", c.test->test.name.c_str(), c.test->heldout ? "held out" : "fitted  ");
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      double left = c.besides[axis];
+      double left = c.asynchronous[axis];
       for (std::size_t k = 0; k < c.line[axis].size(); ++k) {
         const auto [first, slope] = courseOf(cuts, false, axis, k);
         left += 0.5 * std::norm(c.at(axis, k) - first - c.feed * slope);
       }
       std::printf("  %s %.2f %% (repeats %.2f %%)", FORCES[axis].c_str(),
                   100.0 * (1.0 - left / c.variance[axis]),
-                  100.0 * (1.0 - c.besides[axis] / c.variance[axis]));
+                  100.0 * (1.0 - c.asynchronous[axis] / c.variance[axis]));
     }
     std::printf("\n");
   }
@@ -129,9 +131,9 @@ void run(const std::string& folder) {
     cuts.push_back(linesOf(t));
     fitted += t.heldout ? 0 : 1;
   }
-  if (fitted < 3) throw Error(folder + ": three cuts to be fitted are due");
+  if (fitted < 3) throw Error(folder + ": expected at least three fitted cuts");
   settlePhases(cuts);
-  tell(cuts);
+  report(cuts);
 }
 
 }  // namespace
@@ -139,9 +141,8 @@ void run(const std::string& folder) {
 int main(int argc, char** argv) {
   std::string folder;
   CommandLine line{
-      "How much of the held-out cuts of a campaign, which differ in feed only, any model can explain whose "
-      "lines at "
-      "orders of the spindle are straight over the feed."};
+      "Share of the held-out cuts of a campaign, which differ in feed only, that a model can explain whose "
+      "spindle orders are linear in the feed."};
   line.option("CAMPAIGN", folder, "folder of the campaign").required();
   return runProgram(line, argc, argv, [&] { run(folder); });
 }

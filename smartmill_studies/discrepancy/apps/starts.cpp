@@ -1,5 +1,4 @@
-// rosrun smartmill_studies discrepancy_starts: whether fits of vibrating cuts end at the truth wherever they
-// begin.
+// rosrun smartmill_studies discrepancy_starts: convergence of fits of vibrating cuts from distant starts.
 
 #include <string>
 #include <vector>
@@ -21,7 +20,7 @@ struct Options {
   std::uint64_t seed = 1;
 };
 
-// The campaigns in turn, each as it is and then with a chattering cut.
+// The campaigns in turn, each first unchanged and then with a chattering cut.
 void runOne(const Options& o, int number) {
   const auto turn = static_cast<std::size_t>(number);
   const std::size_t count = o.campaigns.size();
@@ -39,10 +38,9 @@ void run(const Options& o) {
 int main(int argc, char** argv) {
   Options o;
   CommandLine line{
-      "Fits campaigns whose nominal model is the truth from nominal values up to 50 % off it. One line of "
-      "JSON a "
-      "start: how far from the truth it ended, in standard deviations."};
-  line.option("CAMPAIGN", o.campaigns, "folders with truth.yaml, taken in turn").required();
+      "Fits campaigns from nominal values up to 50 % off the truth. One line of JSON per start: distance of "
+      "the result from the truth in standard deviations."};
+  line.option("CAMPAIGN", o.campaigns, "folders with truth.yaml, used in turn").required();
   o.one.addTo(line, "--cases", o.starts, "starts");
   line.option("--seed", o.seed, "of the starts");
   return runProgram(line, argc, argv, [&] { run(o); });

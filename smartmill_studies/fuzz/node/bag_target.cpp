@@ -20,7 +20,7 @@ void recordingOf(const std::uint8_t* data, std::size_t size) {
       std::memcpy(to, data + at, count);
     }
   };
-  told([&] {
+  readOrRefuse([&] {
     RecordingReader reader(bytes, "fuzzed");
     hear<SampleBlock>(reader, names::HAMMER);
     hear<SpindleAngle>(reader, names::SPINDLE_ANGLE);

@@ -1,4 +1,4 @@
-// The corpora of the fuzzers, and what they once broke, through every reader.
+// Replays the fuzzing corpora, which include every input that once broke a reader.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -11,9 +11,9 @@
 namespace smartmill::fuzz {
 namespace {
 
-TEST(Fuzz, CorporaAreTakenOrRefusedWithALine) {
+TEST(Fuzz, everyInputIsReadOrRefusedWithAnError) {
   for (const auto& [name, target] : targets()) {
-    const std::filesystem::path folder = std::filesystem::path("corpus") / name;  // tests run in their folder
+    const std::filesystem::path folder = std::filesystem::path(CORPUS) / name;
     ASSERT_TRUE(std::filesystem::is_directory(folder)) << folder;
     int count = 0;
     for (const auto& entry : std::filesystem::directory_iterator(folder)) {

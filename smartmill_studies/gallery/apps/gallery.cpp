@@ -1,4 +1,4 @@
-// rosrun smartmill_studies gallery -o DIR: the documents' figures and tables, redrawn.
+// rosrun smartmill_studies gallery -o DIR: reproduces the figures and tables of the documents.
 
 #include <algorithm>
 #include <cstdio>
@@ -22,7 +22,7 @@ std::vector<Figure> chosen(const std::vector<std::string>& names) {
   std::vector<Figure> some;
   for (const std::string& name : names) {
     const auto at = std::find_if(all.begin(), all.end(), [&](const Figure& f) { return f.name == name; });
-    if (at == all.end()) throw UsageError("no figure is called \"" + name + "\"; --list tells them");
+    if (at == all.end()) throw UsageError("no figure has the name \"" + name + "\"; --list prints all names");
     some.push_back(*at);
   }
   return some;
@@ -35,20 +35,20 @@ void list() {
 
 void run(const std::vector<Figure>& figures, const std::string& folder, unsigned seed) {
   std::filesystem::create_directories(folder);
-  std::vector<Shown> shown;
+  std::vector<DrawnFigure> drawn_figures;
   for (const Figure& figure : figures) {
-    std::fprintf(stderr, "%zu of %zu: %s\n", shown.size() + 1, figures.size(), figure.name.c_str());
+    std::fprintf(stderr, "%zu of %zu: %s\n", drawn_figures.size() + 1, figures.size(), figure.name.c_str());
     try {
-      shown.push_back({figure, figure.draw(folder, seed)});
+      drawn_figures.push_back({figure, figure.draw(folder, seed)});
     } catch (const Error& error) {
       throw Error(figure.name + ": " + error.what());
     }
-    for (const Compared& row : shown.back().drawn.rows)
+    for (const Compared& row : drawn_figures.back().drawn.rows)
       std::printf("%-8s %s: seed %s, here %s\n", nameOf(row.verdict), row.what.c_str(), row.seed.c_str(),
                   row.ours.c_str());
   }
   const std::string page = folder + "/gallery.html";
-  writePage(shown, seed, page);
+  writePage(drawn_figures, seed, page);
   std::printf("%s\n", page.c_str());
 }
 
@@ -61,11 +61,11 @@ int main(int argc, char** argv) {
   unsigned seed = 1;
   bool only_list = false;
   CommandLine line(
-      "The figures and tables of the documents this project builds on, redrawn, with their numbers beside "
-      "those found here: pictures and gallery.html.");
+      "Reproduces the figures and tables of the source documents of this project, with their numbers next to "
+      "those computed here: pictures and gallery.html.");
   line.option("-o,--out", folder, "folder").showDefault();
-  line.option("--only", names, "these figures alone");
+  line.option("--only", names, "only these figures");
   line.option("--seed", seed).showDefault();
-  line.flag("--list", only_list, "names of the figures");
+  line.flag("--list", only_list, "print the names of the figures");
   return runProgram(line, argc, argv, [&] { only_list ? list() : run(chosen(names), folder, seed); });
 }

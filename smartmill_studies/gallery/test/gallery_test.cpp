@@ -30,7 +30,7 @@ TEST(Gallery, aNumberAgreesWithinItsShareAlone) {
   EXPECT_EQ(compareNumber("a", -10.0, 10.0, 0.0, 0.05, "").verdict, Verdict::differs);
 }
 
-// What the thesis prints of its load meter (eq. 3.11, section 3.2.1), found again from steps of 3e-4 V.
+// Constants of the thesis's load meter (eq. 3.11, section 3.2.1), recovered with a resolution of 3e-4 V.
 TEST(Gallery, theLoadMetersNumbersComeBack) {
   const TemporaryFolder folder;
   for (const Figure& figure : loadMeterFigures()) {
@@ -45,11 +45,11 @@ TEST(Gallery, theLoadMetersNumbersComeBack) {
 Drawn drawn(const std::string& name, const std::string& folder, unsigned seed) {
   for (const Figure& figure : allFigures())
     if (figure.name == name) return figure.draw(folder, seed);
-  ADD_FAILURE() << "no figure is called " << name;
+  ADD_FAILURE() << "no figure has the name " << name;
   return {};
 }
 
-// Weights, the table dynamometer and the square of the speed (Burzoni eq. 3-6) tell what is right.
+// References: weights, the table dynamometer and the square of the speed (Burzoni eq. 3-6).
 TEST(Gallery, theSpindleSensorTellsWeightsAndUnbalance) {
   const TemporaryFolder folder;
   for (const char* name : {"burzoni_13", "burzoni_16"}) {
@@ -62,14 +62,14 @@ TEST(Gallery, theSpindleSensorTellsWeightsAndUnbalance) {
   }
 }
 
-// The force behind the current is put in.
+// The true force is an input of the simulation.
 TEST(Gallery, theCurrentTellsTheForce) {
   const TemporaryFolder folder;
   for (const Compared& row : drawn("cheng_5", folder.file(""), 2).rows)
     EXPECT_EQ(row.verdict, Verdict::agrees) << row.what << ": " << row.ours;
 }
 
-// Struck above its tip a tool shows stiffer than it is; the beam's shape tells how much, mode by mode.
+// A tool hit above its tip appears stiffer; the factor of each mode follows from its beam shape.
 TEST(Gallery, theHammersOffsetStiffens) {
   const TemporaryFolder folder;
   const Drawn found = drawn("dunwoody_4_5", folder.file(""), 2);
@@ -88,7 +88,7 @@ TEST(Gallery, thePageOpensWithTheCounts) {
   EXPECT_THAT(text, HasSubstr("1 numbers agree, 0 are better here, 1 do not agree; 1 figures, seed 7."));
   EXPECT_THAT(text, HasSubstr("&lt;why&gt;"));
   EXPECT_THAT(text, HasSubstr("A &lt;figure&gt;"));
-  EXPECT_LT(text.find("What agrees"), text.find("What does not agree"));
+  EXPECT_LT(text.find("Agreement"), text.find("Disagreement"));
 }
 
 }  // namespace

@@ -25,15 +25,15 @@ struct Request {
   int cases = 1;
 };
 
-/// Word of a reason that names the class's fault.
+/// Word of the rejection reason that identifies the fault of the class.
 const std::map<HitClass, std::string> WORD = {
     {HitClass::double_hit, "double"},  {HitClass::clipping, "clipped"}, {HitClass::dropout, "dropout"},
     {HitClass::drift, "baseline"},     {HitClass::stuck, "stuck"},      {HitClass::late_bump, "late bump"},
     {HitClass::weak, "weak"},          {HitClass::dull, "dull"},        {HitClass::trigger_skew, "skew"},
     {HitClass::gain_jump, "gain jump"}};
 
-/// Of a class: hits looked at, refused, refused by the class's own name, and clean ones beside that were
-/// refused.
+/// Counts of a class: hits, rejected hits, hits rejected for the fault of the class, and rejected clean hits
+/// of the same records.
 struct Tally {
   int hits = 0, refused = 0, named = 0, beside = 0, beside_refused = 0;
 };
@@ -42,7 +42,7 @@ bool isClean(HitClass kind) {
   return WORD.count(kind) == 0;
 }
 
-/// @param first, step which of the records
+/// @param first, step selection of the records
 Tally count(HitClass kind, const Request& request, int first, int step) {
   Tally tally;
   const bool clean = isClean(kind);
@@ -52,7 +52,7 @@ Tally count(HitClass kind, const Request& request, int first, int step) {
     HitCheckOptions options;
     options.weak_force = drawn.weak_force;
     options.high = drawn.high;
-    const std::vector<HitFault> faults = judgeHits(drawn.hits, options);
+    const std::vector<HitFault> faults = checkHits(drawn.hits, options);
     for (std::size_t h = 0; h < faults.size(); ++h) {
       const std::string& text = faults[h].text;
       if (!clean && h != drawn.at_fault) {
@@ -101,7 +101,7 @@ Tallies sumOf(const std::vector<nlohmann::json>& lines) {
 int report(const Tallies& tallies) {
   bool good = true;
   std::printf("%-20s %6s %9s %9s %7s  %s\n", "class", "hits", "accepted", "refused", "named",
-              "clean beside it refused");
+              "clean hits refused");
   for (const auto& [kind, t] : tallies) {
     const double refused = 100.0 * t.refused / t.hits;
     std::printf("%-20s %6d %7.1f %% %7.1f %% %5.1f %%", nameOf(kind).c_str(), t.hits, 100.0 - refused,
@@ -110,7 +110,7 @@ int report(const Tallies& tallies) {
     std::printf("\n");
     good = good && (isClean(kind) ? refused <= 1.0 : refused >= 98.0);
   }
-  std::printf("due: clean accepted 99 %%, each fault refused 98 %%: %s\n", good ? "met" : "missed");
+  std::printf("required: clean accepted 99 %%, each fault refused 98 %%: %s\n", good ? "met" : "missed");
   return good ? 0 : 1;
 }
 
@@ -134,12 +134,12 @@ int run(const Request& request) {
 int main(int argc, char** argv) {
   Request request;
   CommandLine line(
-      "Counts the judge of hits over drawn records: clean ones accepted, each kind of fault refused "
+      "Acceptance of hits over random records: clean hits accepted, each kind of fault refused "
       "(smartmill_hammer_testing/hit_records.h).");
-  line.option("--records", request.records, "of each class").positive().showDefault();
+  line.option("--records", request.records, "records of each class").positive().showDefault();
   line.option("--seed", request.seed, "of the records").showDefault();
   request.one.addTo(line, "--cases", request.cases, "shares of the records");
   request.one.addScore(line);
-  line.flag("--list", request.list, "every record judged wrongly, with its seed");
+  line.flag("--list", request.list, "list every misjudged record with its seed");
   return runProgram(line, argc, argv, [&] { return run(request); });
 }

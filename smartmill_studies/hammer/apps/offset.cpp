@@ -29,11 +29,11 @@ struct Request {
   StudyCase one;
 };
 
-/// Modes below this share of the largest gain show in no chart.
+/// Modes below this share of the largest gain have no influence on a chart.
 constexpr double COUNTS = 0.03;
 
-/// [m/N] A slot is limited to a depth in proportion to -1 / (2 Re H) where Re H is most negative: what
-/// figure 4.8 compares.
+/// [m/N] The depth limit of a slot is proportional to -1 / (2 Re H) at the most negative Re H, as in
+/// figure 4.8.
 double softest(const FrequencyResponse& frf) {
   double least = 0.0;
   for (std::size_t i = 0; i < frf.size(); ++i) {
@@ -52,12 +52,12 @@ struct Tally {
     inside += std > 0.0 && std::abs(gain) < 1.96 * std;
   }
 
-  void add(const OffsetOutcome& outcome, int way) {
-    frfs.push_back(outcome.frf_error[way]);
-    for (const GainError& e : outcome.modes[way]) {
+  void add(const OffsetOutcome& outcome, int method) {
+    frfs.push_back(outcome.frf_error[method]);
+    for (const GainError& e : outcome.modes[method]) {
       if (e.share >= COUNTS) add(e.error, e.std);
     }
-    depths.push_back(std::abs(softest(outcome.truth) / softest(outcome.frf[way]) - 1.0));
+    depths.push_back(std::abs(softest(outcome.truth) / softest(outcome.frf[method]) - 1.0));
   }
 };
 
@@ -75,14 +75,14 @@ void save(const OffsetOutcome& outcome, const std::string& folder, int machine) 
             outcome.frf[2].std_dev[i], at(3).real(), at(3).imag());
   }
   csv.save(folder + "/machine_" + std::to_string(machine) + ".csv");
-  drawSlotLimits({{"struck and read at the tip", outcome.truth},
+  drawSlotLimits({{"direct, at the tip", outcome.truth},
                   {"no correction", outcome.frf[0]},
                   {"eq. 4.44", outcome.frf[1]},
-                  {"spindle and tool apart", outcome.frf[2]}},
+                  {"receptance coupling", outcome.frf[2]}},
                  folder + "/figure_4_8_machine_" + std::to_string(machine) + ".png");
 }
 
-/// One machine of its own seed.
+/// One machine with its own seed.
 void runOne(const Request& request) {
   request.one.check(request.machines);
   std::mt19937_64 random(seedOfCase(request.seed, request.one.number));
@@ -90,13 +90,14 @@ void runOne(const Request& request) {
   nlohmann::json line{{"case", request.one.number}, {"failed", false}};
   try {
     const OffsetOutcome outcome = judgeOffset(drawn, request.noise, random);
-    for (int w = 0; w < WAYS; ++w) {
+    for (int w = 0; w < TIP_METHODS; ++w) {
       Tally tally;
       tally.add(outcome, w);
-      nlohmann::json modes = nlohmann::json::array();  // relative error of the gain, its deviation
+      nlohmann::json modes =
+          nlohmann::json::array();  // relative error of the gain, and its standard deviation
       for (const GainError& e : outcome.modes[w])
         if (e.share >= COUNTS) modes.push_back({e.error, e.std});
-      line[nameOf(static_cast<Way>(w))] = {
+      line[nameOf(static_cast<TipMethod>(w))] = {
           {"modes", modes}, {"frf", tally.frfs.front()}, {"least_depth", tally.depths.front()}};
     }
   } catch (const Error& error) {
@@ -106,18 +107,18 @@ void runOne(const Request& request) {
   request.one.print(line);
 }
 
-void report(const Tally (&tallies)[WAYS], int machines, int failed) {
-  std::printf("%d machines, %d failed; modes below 5 kHz with %.0f %% of the largest gain and more\n",
+void report(const Tally (&tallies)[TIP_METHODS], int machines, int failed) {
+  std::printf("%d machines, %d failed; modes below 5 kHz with at least %.0f %% of the largest gain\n",
               machines, failed, 100.0 * COUNTS);
   if (failed == machines) return;
   std::printf("%-24s %-22s %-22s %-26s %s\n", "", "gain: median, 95 %", "FRF: median, 95 %",
               "least depth: median, 95 %", "within 1.96 deviations");
-  for (int w = 0; w < WAYS; ++w) {
+  for (int w = 0; w < TIP_METHODS; ++w) {
     const Tally& t = tallies[w];
     const auto show = [](const std::vector<double>& x) {
       return formatted("%.1f %%, %.1f %%", 100.0 * percentile(x, 0.5), 100.0 * percentile(x, 0.95));
     };
-    std::printf("%-24s %-22s %-22s %-26s", nameOf(static_cast<Way>(w)).c_str(), show(t.gains).c_str(),
+    std::printf("%-24s %-22s %-22s %-26s", nameOf(static_cast<TipMethod>(w)).c_str(), show(t.gains).c_str(),
                 show(t.frfs).c_str(), show(t.depths).c_str());
     if (w >= 2 && t.stated > 0)
       std::printf(" %d of %d (%.0f %%)", t.inside, t.stated, 100.0 * t.inside / t.stated);
@@ -126,17 +127,17 @@ void report(const Tally (&tallies)[WAYS], int machines, int failed) {
 }
 
 void score(const std::string& file) {
-  Tally tallies[WAYS];
+  Tally tallies[TIP_METHODS];
   int machines = 0, failed = 0;
   for (const nlohmann::json& line : readJsonLines(file)) {
     ++machines;
     failed += line.at("failed").get<bool>();
     if (line.at("failed")) continue;
-    for (int w = 0; w < WAYS; ++w) {
-      const nlohmann::json& way = line.at(nameOf(static_cast<Way>(w)));
-      for (const nlohmann::json& mode : way.at("modes")) tallies[w].add(mode.at(0), mode.at(1));
-      tallies[w].frfs.push_back(way.at("frf"));
-      tallies[w].depths.push_back(way.at("least_depth"));
+    for (int w = 0; w < TIP_METHODS; ++w) {
+      const nlohmann::json& method = line.at(nameOf(static_cast<TipMethod>(w)));
+      for (const nlohmann::json& mode : method.at("modes")) tallies[w].add(mode.at(0), mode.at(1));
+      tallies[w].frfs.push_back(method.at("frf"));
+      tallies[w].depths.push_back(method.at("least_depth"));
     }
   }
   if (machines == 0) throw Error(file + ": no case");
@@ -147,13 +148,13 @@ void run(const Request& request) {
   if (request.one.scores()) return score(request.one.lines);
   if (request.one.one()) return runOne(request);
   std::mt19937_64 random(request.seed);
-  Tally tallies[WAYS];
+  Tally tallies[TIP_METHODS];
   int failed = 0;
   for (int i = 0; i < request.machines; ++i) {
     const OffsetCase drawn = drawOffsetCase(random);
     try {
       const OffsetOutcome outcome = judgeOffset(drawn, request.noise, random);
-      for (int w = 0; w < WAYS; ++w) tallies[w].add(outcome, w);
+      for (int w = 0; w < TIP_METHODS; ++w) tallies[w].add(outcome, w);
       if (!request.out.empty() && i < 10) save(outcome, request.out, i);
     } catch (const Error& error) {
       ++failed;
@@ -169,11 +170,12 @@ void run(const Request& request) {
 int main(int argc, char** argv) {
   Request request;
   CommandLine line(
-      "The tip's FRF from one struck above it: no correction, Dunwoody's eq. 4.44, spindle and tool apart.");
-  request.one.addTo(line, "--machines,--cases", request.machines, "drawn tools and spindles");
+      "FRF of the tip from an FRF measured above it: no correction, Dunwoody's eq. 4.44, receptance "
+      "coupling.");
+  request.one.addTo(line, "--machines,--cases", request.machines, "number of random tools and spindles");
   request.one.addScore(line);
   line.option("--seed", request.seed).showDefault();
-  line.option("--noise", request.noise, "of the FRF, a share of its rms").notNegative().showDefault();
+  line.option("--noise", request.noise, "noise of the FRF as a share of its RMS").notNegative().showDefault();
   line.option("-o,--out", request.out, "folder for the FRFs of the first ten as CSV, and figure 4.8 of each");
   return runProgram(line, argc, argv, [&] { run(request); });
 }

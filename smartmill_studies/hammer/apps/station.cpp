@@ -1,5 +1,5 @@
-// rosrun smartmill_studies hammer_station: drawn tools in drawn machines before the simulated hammer station,
-// measured by the hammer's own sequence and held against their truth.
+// rosrun smartmill_studies hammer_station: random tools in random machines at the simulated hammer station,
+// measured by the hammer sequence and compared with the truth.
 
 #include <cstdio>
 #include <filesystem>
@@ -30,9 +30,9 @@ struct Options {
 /// One machine's figures 4.5 to 4.8 of the thesis.
 void draw(const hammer::StationFrfs& f, const std::string& folder) {
   if (f.measured.size() == 0) return;
-  const studies::TipCurve direct{"struck and read at the tip", f.direct};
+  const studies::TipCurve direct{"direct, at the tip", f.direct};
   const studies::TipCurve measured{"measured, no correction", f.measured}, thesis{"eq. 4.44", f.thesis},
-      tip{"spindle and tool apart", f.tip};
+      tip{"receptance coupling", f.tip};
   studies::drawParts({{"true, at the heights of hammer and sensor", f.across}, measured},
                      folder + "/figure_4_5.png");
   studies::drawParts({direct, measured}, folder + "/figure_4_6.png");
@@ -40,7 +40,7 @@ void draw(const hammer::StationFrfs& f, const std::string& folder) {
   studies::drawSlotLimits({direct, measured, thesis, tip}, folder + "/figure_4_8.png");
 }
 
-/// Each machine, or one, measured again and again.
+/// Repeated measurements of each machine, or of one.
 void repeat(const Options& o) {
   for (int number = o.one.one() ? o.one.number : 0; number < o.machines; ++number) {
     o.one.print(hammer::tapScatter(o.study, number, o.repeats));
@@ -88,17 +88,17 @@ void run(const Options& o) {
 int main(int argc, char** argv) {
   Options o;
   CommandLine line{
-      "Measures drawn tools in drawn machines with the automatic hammer and scores the answers. One line of "
-      "JSON a machine in OUT/stations_SEED_HITS.jsonl; goes on where an earlier run ended; prints the "
+      "Measures random tools in random machines with the automatic hammer and scores the results. One line "
+      "of JSON per machine in OUT/stations_SEED_HITS.jsonl; continues an earlier run; prints the "
       "score."};
-  o.one.addTo(line, "--machines,--cases", o.machines, "to draw");
+  o.one.addTo(line, "--machines,--cases", o.machines, "number of machines");
   o.one.addScore(line);
-  line.option("--seed", o.study.seed, "of everything drawn").showDefault();
-  line.option("--hits", o.study.hits, "a measurement").within(1, 100).showDefault();
-  line.option("--figures", o.figures, "with --case: folder for the thesis's figures 4.5 to 4.8 of it");
+  line.option("--seed", o.study.seed, "seed of all random draws").showDefault();
+  line.option("--hits", o.study.hits, "hits per measurement").within(1, 100).showDefault();
+  line.option("--figures", o.figures, "with --case: folder for figures 4.5 to 4.8 of the thesis");
   line.option("--repeats", o.repeats,
-              "each machine so often, what the runs differ by against what they state: a line a machine on "
-              "standard output, nothing else is done")
+              "only repeats each machine N times and compares scatter and stated uncertainty: one line per "
+              "machine on standard output")
       .within(3, 1000);
   line.option("-o,--out", o.out, "folder of the lines").showDefault();
   return runProgram(line, argc, argv, [&] { run(o); });

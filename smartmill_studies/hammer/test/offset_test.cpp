@@ -12,16 +12,16 @@
 namespace smartmill::studies {
 namespace {
 
-// Against the plant, which shares no code with the correction. Due: gains within 3 % (median), deviations
-// honest; `rosrun smartmill_studies hammer_offset` counts more machines.
+// Comparison with the plant, which shares no code with the correction. Required: gains within 3 % (median)
+// and calibrated standard deviations; `rosrun smartmill_studies hammer_offset` runs more machines.
 TEST(OffsetCorrection, IsRightForSpindleAndToolModes) {
   std::mt19937_64 random(3);
-  std::vector<double> gains[WAYS], frfs[WAYS];
+  std::vector<double> gains[TIP_METHODS], frfs[TIP_METHODS];
   int stated = 0, inside = 0;
   for (int i = 0; i < 12; ++i) {
     const OffsetCase drawn = drawOffsetCase(random);
     const OffsetOutcome outcome = judgeOffset(drawn, 0.005, random);
-    for (int w = 0; w < WAYS; ++w) {
+    for (int w = 0; w < TIP_METHODS; ++w) {
       frfs[w].push_back(outcome.frf_error[w]);
       for (const GainError& e : outcome.modes[w]) {
         if (e.share < 0.03) continue;
@@ -40,8 +40,8 @@ TEST(OffsetCorrection, IsRightForSpindleAndToolModes) {
   EXPECT_GE(inside, 9 * stated / 10);
 }
 
-// A spindle that is all but rigid: the tool is the cantilever of eq. 4.42 and 4.43, and its static share (all
-// modes together) grows by eq. 4.44. The plant's own check.
+// Check of the plant with an almost rigid spindle: the tool is the cantilever of eq. 4.42 and 4.43, and its
+// static compliance (sum of all modes) follows eq. 4.44.
 TEST(OffsetCorrection, PlantIsTheThesisCantilever) {
   plant::ToolInSpindle t;
   t.stickout = 60e-3;

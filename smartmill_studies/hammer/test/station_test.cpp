@@ -1,4 +1,4 @@
-// The hammer's sequence before the simulated station, whose physics is not the sequence's own.
+// The hammer sequence at the simulated station, whose physics is independent of the sequence.
 
 #include "hammer/station_score.h"
 
@@ -21,7 +21,7 @@ namespace {
 
 constexpr std::uint64_t SEED = 3;
 
-/// The first drawn machine that fulfils a condition.
+/// The first random machine that fulfils a condition.
 template <class Condition>
 DrawnStation firstWith(Condition condition) {
   for (int number = 0;; ++number) {
@@ -37,8 +37,8 @@ TEST(Station, TheSameArgumentsGiveTheSameMachine) {
   EXPECT_NE(a.mounting, c.mounting);
 }
 
-// Bounds of the task for 95 % of the modes: 0.2 % of frequency, 6 % of damping; every one of these few. The
-// tip's gain, struck some 15 mm above it: 3 % in the median, each within four of its deviations.
+// Required for 95 % of the modes: 0.2 % of frequency, 6 % of damping; here for each of the few. Gain at the
+// tip from hits about 15 mm above it: 3 % in the median, each within four standard deviations.
 TEST(Station, MeasuresDrawnMachinesWithoutTouching) {
   const StationStudy study{SEED, 8};
   std::vector<double> tip;
@@ -60,8 +60,7 @@ TEST(Station, MeasuresDrawnMachinesWithoutTouching) {
   EXPECT_LT(median(tip), 0.03);
 }
 
-// What the lines state is what they scatter by when one machine is measured again: within the task's 1.5,
-// from both sides.
+// Stated and observed scatter of repeated measurements agree within a factor of 1.5.
 TEST(Station, LinesScatterFromRunToRunAsTheyState) {
   const nlohmann::json line = tapScatter({SEED, 8}, 0, 5);
   ASSERT_EQ(line["runs"], 5);
@@ -69,8 +68,8 @@ TEST(Station, LinesScatterFromRunToRunAsTheyState) {
   EXPECT_GT(line["scatter"], 1.0 / 1.5);
 }
 
-// Of this one's five uneven teeth the flute that was found is not the first: where the others stand is not
-// known better than that.
+// The tool has five unevenly spaced teeth and the flute found is not the first, so that the angles of the
+// others are no more accurate.
 TEST(Station, UnevenTeethOfWhichAnyMayBeTheFluteThatWasFound) {
   const nlohmann::json line = runStation({16, 3}, 157);
   EXPECT_FALSE(line["touched"]);
@@ -78,8 +77,8 @@ TEST(Station, UnevenTeethOfWhichAnyMayBeTheFluteThatWasFound) {
   EXPECT_EQ(line["code"], 0) << line["message"];
 }
 
-// Struck along one axis, read across it: against the station's own cross receptance, in the lines where that
-// stands ten of their deviations above zero.
+// Force along one axis, response across it: compared with the cross receptance of the station on lines where
+// it exceeds ten standard deviations.
 TEST(Station, TheCrossFrfIsThatOfTheStructure) {
   DrawnStation drawn = firstWith([](const DrawnStation& d) {
     return d.traits.cross_sensor && !d.out_of_range && d.traits.tooth == "flute";
@@ -124,7 +123,7 @@ TEST(Station, SaysThatNothingStandsThere) {
   EXPECT_LT(seconds, 60.0);
 }
 
-// A sensor set up far too near, or a tool far too large: stopped on the way, nothing touched.
+// A sensor much too near or a tool much too large: the approach stops before contact.
 TEST(Station, ATooLargeToolStopsBeforeTheSensor) {
   DrawnStation drawn = firstWith([](const DrawnStation& d) { return !d.out_of_range; });
   for (auto& [name, place] : drawn.true_model.hammer->position) {
@@ -141,7 +140,7 @@ TEST(Station, ATooLargeToolStopsBeforeTheSensor) {
   EXPECT_FALSE(machine.touched());
 }
 
-// A hammer that always bounces: the reason is the message's.
+// A hammer that always bounces: the message states the reason.
 TEST(Station, RefusedHitsEndTheMeasurementWithTheirReason) {
   DrawnStation drawn = firstWith([](const DrawnStation& d) { return !d.out_of_range; });
   drawn.traits.bounce_chance = 1.0;
@@ -158,7 +157,7 @@ TEST(Station, RefusedHitsEndTheMeasurementWithTheirReason) {
   EXPECT_EQ(machine.strikes(), 4);
 }
 
-// From the first to the last stage: each cancel ends the measurement, retracted.
+// A cancel at any stage ends the measurement with the tool retracted.
 TEST(Station, ACancelAtEveryStageRetracts) {
   const DrawnStation drawn =
       firstWith([](const DrawnStation& d) { return d.traits.cross_sensor && !d.out_of_range; });
@@ -194,7 +193,7 @@ TEST(Station, ACancelAtEveryStageRetracts) {
       result = sequence.takeResult();
     }
     ASSERT_TRUE(result) << stop_at;
-    if (stop_at == 0) stages = 8;  // at least so many on the way to the first blow
+    if (stop_at == 0) stages = 8;  // minimum number before the first hit
     if (result->code == FrfCode::ok) break;
     EXPECT_EQ(result->code, FrfCode::cancelled) << result->message;
     EXPECT_LT(machine.time() - cancelled, 15.0) << seen.back();

@@ -1,5 +1,5 @@
 // rosrun smartmill_studies kalman_burzoni: chapters 5 and 6 of Burzoni on the sensor in the simulated
-// spindle: how Q and R are chosen from taps, Tables 8 to 15, beside his printed values.
+// spindle: Q and R from taps, Tables 8 to 15, next to the printed values.
 
 #include <array>
 #include <cmath>
@@ -51,7 +51,7 @@ void samplingTime(const ModalModel& sensor) {
     StateSpace discrete = space;
     discrete.a = discretiseNoise(space.a, Eigen::MatrixXd::Zero(space.a.rows(), space.a.rows()), dt).first;
     const kalman::StateSpaceCheck check = kalman::checkStateSpace(discrete, "discrete");
-    // A force held over each step: the continuous response times the hold's.
+    // Zero-order hold of the force: the continuous response times that of the hold.
     double worst = 0.0;
     for (double f = 10.0; f <= 2500.0; f += 10.0) {
       const double x = units::PI * f * dt;
@@ -72,7 +72,7 @@ void gaussian(const BurzoniData& data) {
   line("cutting air at 9000 rpm, with unbalance", data.air_raw);
   line("cutting air at 9000 rpm, unbalance off", data.air);
   for (std::size_t k : {1u, 4u, 6u}) {
-    // What does not repeat from revolution to revolution is the cut's noise.
+    // The noise of the cut is its asynchronous part.
     std::array<std::vector<double>, 2> left;
     const SpindleRig::Record& cut = data.cuts[k];
     const double turn = 60.0 / kalman::BURZONI_RPM[k] * RATE;
@@ -87,7 +87,8 @@ void gaussian(const BurzoniData& data) {
       }
     }
     char text[64];
-    std::snprintf(text, sizeof text, "in the cut at %.0f rpm, less the turn before", kalman::BURZONI_RPM[k]);
+    std::snprintf(text, sizeof text, "in the cut at %.0f rpm, minus the last revolution",
+                  kalman::BURZONI_RPM[k]);
     line(text, left);
   }
 }
@@ -101,7 +102,7 @@ int main(int argc, char** argv) {
   CommandLine line{"Burzoni's tuning of Q and R on the sensor in the simulated spindle (Tables 8 to 15)."};
   line.option("MODEL", file, "smartmill-model/1 of the simulated machine").required();
   line.option("--seed", seed, "of noise and scatter").showDefault();
-  line.option("--bandwidth-hz", band, "up to which harmonics count").showDefault();
+  line.option("--bandwidth-hz", band, "highest harmonic [Hz]").showDefault();
   return runProgram(line, argc, argv, [&] {
     const MachineModel model = readMachineModel(file);
     const BurzoniData data = kalman::gatherBurzoni(model, seed, band);

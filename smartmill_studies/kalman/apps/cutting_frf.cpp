@@ -1,4 +1,4 @@
-// rosrun smartmill_studies kalman_cutting_frf: modes that change with the spindle's speed, from cuts alone.
+// rosrun smartmill_studies kalman_cutting_frf: identification of speed-dependent modes from cuts.
 
 #include <array>
 #include <cmath>
@@ -23,14 +23,14 @@ struct Request {
   std::uint64_t seed = 17;
 };
 
-/// Over repeated runs at one speed, one mode of one axis.
+/// One mode of one axis in repeated runs at one speed.
 struct Seen {
   double rpm = 0.0;
   Mode truth;
   std::vector<Mode> found;
 };
 
-/// Error over deviation: root mean square, and the share within 1.96.
+/// Error over standard deviation: RMS and share within 1.96.
 std::array<double, 2> coverage(const Seen& seen, double Mode::*value, double Mode::*std_dev) {
   double squares = 0.0, inside = 0.0;
   for (const Mode& mode : seen.found) {
@@ -103,7 +103,7 @@ void draw(const kalman::TurningToolCase& c, const std::array<std::vector<Seen>, 
   plot.draw();
 }
 
-/// Of each speed in turn the modes of an axis, lowest first.
+/// The modes of an axis for each speed in turn, lowest first.
 std::array<std::vector<Seen>, 2> truths(const kalman::TurningToolCase& c) {
   std::array<std::vector<Seen>, 2> axes;
   for (std::size_t a = 0; a < 2; ++a)
@@ -113,14 +113,14 @@ std::array<std::vector<Seen>, 2> truths(const kalman::TurningToolCase& c) {
   return axes;
 }
 
-/// Adds what a run found of an axis, where it found as many modes as there are.
+/// Adds the modes found by a run for an axis, if their number is correct.
 void collect(const kalman::TurningToolCase& c, std::size_t axis, const std::vector<kalman::SpeedFrf>& found,
              std::vector<Seen>& seen) {
   const std::size_t modes = seen.size() / c.speeds.size();
   for (std::size_t g = 0; g < found.size(); ++g) {
     if (!found[g].fit || found[g].fit->model.modes.size() != modes) {
       std::fprintf(stderr, "%c %.0f rpm: %s\n", axis == 0 ? 'x' : 'y', seen[g * modes].rpm,
-                   found[g].fit ? "another number of modes" : found[g].reason.c_str());
+                   found[g].fit ? "wrong number of modes" : found[g].reason.c_str());
       continue;
     }
     for (std::size_t m = 0; m < modes; ++m) seen[g * modes + m].found.push_back(found[g].fit->model.modes[m]);
@@ -149,15 +149,15 @@ void run(const Request& request) {
 int main(int argc, char** argv) {
   Request request;
   CommandLine line{
-      "A simulated tool whose modes change with the spindle's speed: modes from cuts around each of six "
-      "speeds beside the true ones, with the coverage of their deviations over repeated runs."};
+      "Identification of a simulated tool with speed-dependent modes: modes from cuts around each of six "
+      "speeds next to the true ones, with the coverage of their standard deviations over repeated runs."};
   line.option("--repeats", request.repeats, "runs at each speed, each with its own noise").showDefault();
   line.option("--gyroscopic", request.gyroscopic,
-              "half the distance of backward and forward whirl at 18,000 rpm, of the frequency")
+              "half the distance of backward and forward whirl at 18,000 rpm, as share of the frequency")
       .showDefault();
   line.option("--seed", request.seed, "").showDefault();
   line.option("-o,--out", request.out, "folder for cutting_frf.png");
   line.option("--campaign", request.campaign,
-              "folder: the cuts as a campaign, for smartmill_kalman cutting_frf");
+              "folder for the cuts as a campaign, for smartmill_kalman cutting_frf");
   return runProgram(line, argc, argv, [&] { run(request); });
 }

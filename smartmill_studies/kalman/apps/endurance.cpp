@@ -1,5 +1,4 @@
-// rosrun smartmill_studies kalman_endurance: an hour of samples through the estimator; memory and
-// allocations.
+// rosrun smartmill_studies kalman_endurance: memory and allocations of the estimator over an hour of samples.
 
 #include <unistd.h>
 
@@ -24,8 +23,8 @@ std::atomic<long long> live{0}, made{0};
 
 }  // namespace
 
-// Counts what the whole program asks for. The compiler inlines these and then takes malloc and delete for a
-// mismatch.
+// Counts all allocations of the program. The compiler inlines these operators and reports a mismatch of
+// malloc and delete.
 #pragma GCC diagnostic ignored "-Wmismatched-new-delete"
 void* operator new(std::size_t size) {
   void* place = std::malloc(size > 0 ? size : 1);
@@ -64,8 +63,8 @@ long resident() {
 constexpr std::size_t BLOCK = 256;  // 10 ms
 constexpr long BLOCKS_PER_MINUTE = 6000;
 
-/// Three axes at 25.6 kHz. Every minute another of four speeds and a new cut; every five minutes a gap of the
-/// index.
+/// Three axes at 25.6 kHz. The speed changes every minute, between four values, with a new cut; every five
+/// minutes the sample index has a gap.
 class Machine {
  public:
   Machine() {
@@ -104,7 +103,7 @@ class Machine {
   double angle_ = 0.0;  // [rad]
 };
 
-/// A row every twelfth of the time: what stands in memory, what was asked for since the last row.
+/// A row every twelfth of the duration: memory, and allocations since the last row.
 class Account {
  public:
   explicit Account(long blocks) : every_(std::max(1L, blocks / 12)) {

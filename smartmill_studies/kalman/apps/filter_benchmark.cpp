@@ -1,4 +1,4 @@
-// Cost of a sample: 3 modes and 12 harmonics, beside the same filter as one dense fixed-size product.
+// Cost per sample: 3 modes and 12 harmonics, compared with the same filter as one dense fixed-size product.
 
 #include <algorithm>
 #include <chrono>
@@ -31,7 +31,7 @@ void blockStructured(benchmark::State& state) {
     sample = 1.0 - sample;
     benchmark::DoNotOptimize(filter.step(sample));
   }
-  // How many times faster than a plain augmented filter in Python, 44 us a sample.
+  // Speed-up over a plain augmented filter in Python (44 us per sample).
   state.counters["python_44us_over"] =
       benchmark::Counter(44e-6, benchmark::Counter::kIsIterationInvariantRate);
 }
@@ -40,7 +40,7 @@ BENCHMARK(blockStructured);
 void denseFixedSize(benchmark::State& state) {
   using Matrix = Eigen::Matrix<double, STATES, STATES>;
   using Vector = Eigen::Matrix<double, STATES, 1>;
-  // The numbers do not matter for the cost; a contraction keeps them finite.
+  // The values have no influence on the cost; a contraction keeps them finite.
   Matrix transition = 0.02 * Matrix::Random();
   const Vector gain = 0.1 * Vector::Random(), output = Vector::Random(), force = Vector::Random();
   Vector x = Vector::Zero();
@@ -55,7 +55,7 @@ void denseFixedSize(benchmark::State& state) {
 }
 BENCHMARK(denseFixedSize);
 
-// From block in to block out: three axes at 50 kHz, 10 ms a block.
+// Time per block: three axes at 50 kHz, blocks of 10 ms.
 void blockOfThreeAxesAt50kHz(benchmark::State& state) {
   constexpr double FAST = 50000.0;
   constexpr std::size_t SAMPLES = 500;
@@ -71,7 +71,7 @@ void blockOfThreeAxesAt50kHz(benchmark::State& state) {
     block.samples.insert(block.samples.end(), {force, -force, 1.0});
   }
   compensation.handle(SpindleAngle{0.0, 0.0, SPEED});
-  compensation.handle(block);  // lays out
+  compensation.handle(block);  // computes the design
   std::vector<double> took;
   for (auto _ : state) {
     const auto begin = std::chrono::steady_clock::now();

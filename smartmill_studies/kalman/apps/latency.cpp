@@ -1,5 +1,5 @@
-// rosrun smartmill_studies kalman_latency: block in to block out, three axes at 50 kHz in 10 ms blocks, all
-// cores loaded.
+// rosrun smartmill_studies kalman_latency: latency of three axes at 50 kHz in 10 ms blocks with all cores
+// loaded.
 
 #include <algorithm>
 #include <atomic>
@@ -29,7 +29,8 @@ constexpr double SPEED = units::TWO_PI * 150.0;  // 9000 rpm: 33 harmonics up to
 constexpr int STATES = 6 + 1 + 2 * 33;
 
 struct Took {
-  std::vector<double> work, due;  // [us] of the call; from when the block was due to when it was out
+  std::vector<double> work,
+      delay;  // [us] duration of the call; delay from the nominal time of the block to its output
 };
 
 void print(const char* name, Took took) {
@@ -38,9 +39,10 @@ void print(const char* name, Took took) {
     return v[std::min(v.size() - 1, static_cast<std::size_t>(share * static_cast<double>(v.size())))];
   };
   std::printf(
-      "%-34s  in to out: median %8.1f  99 %% %8.1f  max %8.1f us   from due: median %8.1f  99 %% %8.1f us\n",
-      name, at(took.work, 0.5), at(took.work, 0.99), at(took.work, 1.0), at(took.due, 0.5),
-      at(took.due, 0.99));
+      "%-34s  in to out: median %8.1f  99 %% %8.1f  max %8.1f us   from nominal time: median %8.1f  99 %% "
+      "%8.1f us\n",
+      name, at(took.work, 0.5), at(took.work, 0.99), at(took.work, 1.0), at(took.delay, 0.5),
+      at(took.delay, 0.99));
 }
 
 SampleBlock blockOf(std::uint64_t number) {
@@ -58,26 +60,26 @@ SampleBlock blockOf(std::uint64_t number) {
   return block;
 }
 
-/// Blocks become due every 10 ms, as a device delivers them.
+/// A block every 10 ms, as from a device.
 template <typename Handle>
 Took run(int blocks, Handle handle) {
   Took took;
-  handle(blockOf(0));  // lays out
+  handle(blockOf(0));  // computes the design
   const auto start = Clock::now() + std::chrono::milliseconds(10);
   for (int b = 1; b <= blocks; ++b) {
     const SampleBlock block = blockOf(static_cast<std::uint64_t>(b));
-    const auto due = start + b * std::chrono::milliseconds(10);
-    std::this_thread::sleep_until(due);
+    const auto nominal = start + b * std::chrono::milliseconds(10);
+    std::this_thread::sleep_until(nominal);
     const auto begin = Clock::now();
     handle(block);
     const auto end = Clock::now();
     took.work.push_back(1e6 * std::chrono::duration<double>(end - begin).count());
-    took.due.push_back(1e6 * std::chrono::duration<double>(end - due).count());
+    took.delay.push_back(1e6 * std::chrono::duration<double>(end - nominal).count());
   }
   return took;
 }
 
-/// Threads that keep cores busy while it lives.
+/// Threads that keep cores busy during its lifetime.
 class Load {
  public:
   explicit Load(int threads) {
@@ -121,7 +123,7 @@ Took runDense(int blocks, double& sum) {
   using Matrix = Eigen::Matrix<double, STATES, STATES>;
   using Vector = Eigen::Matrix<double, STATES, 1>;
   struct Dense {
-    Matrix transition = 0.02 * Matrix::Random();  // the numbers do not matter for the cost
+    Matrix transition = 0.02 * Matrix::Random();  // the values have no influence on the cost
     Vector gain = 0.1 * Vector::Random(), output = Vector::Random(), force = Vector::Random(),
            x = Vector::Zero();
   };
@@ -163,6 +165,6 @@ int main(int argc, char** argv) {
       "Latency of three axes at 50 kHz in 10 ms blocks with every core busy; baseline: the same filters as "
       "dense fixed-size products."};
   line.option("--seconds", seconds, "of each run").showDefault().within(0.1, 1000.0);
-  line.option("--loads", loads, "busy threads beside it").showDefault().within(0, 256);
+  line.option("--loads", loads, "number of busy threads").showDefault().within(0, 256);
   return runProgram(line, argc, argv, [&] { compare(seconds, loads); });
 }

@@ -1,5 +1,5 @@
-// rosrun smartmill_studies kalman_plate_machine: Bachrathy and Stepan on the simulated machine: taps, the
-// matrix inverted in the stream at 5,000 and 20,000 rpm, force against chip thickness.
+// rosrun smartmill_studies kalman_plate_machine: Bachrathy and Stepan on the simulated machine: taps,
+// streaming inversion of the matrix at 5,000 and 20,000 rpm, force over chip thickness.
 
 #include <array>
 #include <cmath>
@@ -26,7 +26,7 @@ constexpr std::array<double, 6> FEEDS{{0.1e-3, 0.15e-3, 0.2e-3, 0.25e-3, 0.3e-3,
 
 /// Fourteen points on the workpiece (his fig. 1), three taps each.
 std::vector<kalman::MatrixTap> tapAll(SpindleRig& rig, std::size_t channels) {
-  std::vector<std::pair<std::array<double, 3>, std::size_t>> points;  // where, along which axis
+  std::vector<std::pair<std::array<double, 3>, std::size_t>> points;  // position, axis
   for (const double x : {-0.03, 0.0, 0.03}) {
     for (const double y : {-0.025, 0.025}) points.push_back({{x, y, 0.03}, 2});
   }
@@ -63,7 +63,7 @@ std::vector<kalman::MatrixTap> tapAll(SpindleRig& rig, std::size_t channels) {
   return taps;
 }
 
-/// A whole record through the streaming inverse, its latency taken out.
+/// A complete record through the streaming inverse, without its latency.
 std::array<std::vector<double>, 3> inverted(const kalman::TransferMatrix& matrix,
                                             const SpindleRig::Record& record) {
   kalman::MatrixInverse inverse(matrix, BANDWIDTH);
@@ -77,7 +77,7 @@ std::array<std::vector<double>, 3> inverted(const kalman::TransferMatrix& matrix
   return force;
 }
 
-/// Down milling, every pass beside the ones before.
+/// Down-milling; each pass cuts fresh material.
 SpindleRig::Record pass(SpindleRig& rig, const MachineModel& model, double rpm, double feed, double seconds) {
   const Workpiece& stock = model.workpiece.value();
   const double y = stock.high[1] + model.needTool("cut").radius() - WIDTH * (rig.slots() + 1);
@@ -87,7 +87,7 @@ SpindleRig::Record pass(SpindleRig& rig, const MachineModel& model, double rpm, 
 
 void errors(const SpindleRig::Record& r, const kalman::TransferMatrix& three, double rpm) {
   const auto by_three = inverted(three, r);
-  std::printf("%.0f rpm, 0.2 mm a tooth: error up to a frequency, %%\n%6s %24s %24s %24s\n", rpm, "kHz",
+  std::printf("%.0f rpm, 0.2 mm per tooth: error up to a frequency, %%\n%6s %24s %24s %24s\n", rpm, "kHz",
               "measured x y z", "3 channels", "6 channels, node's");
   for (const double khz : {1.0, 2.0, 3.0, 4.0, 6.0, 8.0}) {
     std::printf("%6.0f", khz);
@@ -106,7 +106,7 @@ void errors(const SpindleRig::Record& r, const kalman::TransferMatrix& three, do
   }
 }
 
-/// Depths between which a tool that cuts with this law may stand still or chatter.
+/// Bistable range of depths of a tool with this force law.
 void bistable(const ForceCurve& law, int teeth, const std::string& picture) {
   Mode mode;
   mode.frequency = 800.0;
@@ -121,8 +121,8 @@ void bistable(const ForceCurve& law, int teeth, const std::string& picture) {
     sum += (1.0 - p.large / p.small) / static_cast<double>(points.size());
   }
   std::printf(
-      "radial law of 5000 rpm on a tool of 800 Hz, 2 %%, 10 N/um, 0.1 mm a tooth, one tooth always in cut: "
-      "below the limit of small vibrations large ones stay over %.0f %% of the depth, at most %.0f %%\n",
+      "radial law of 5000 rpm on a tool of 800 Hz, 2 %%, 10 N/um, 0.1 mm per tooth, one tooth always in cut: "
+      "large vibrations persist below the limit of small ones over %.0f %% of the depth, at most %.0f %%\n",
       100.0 * sum, 100.0 * widest);
   if (!picture.empty()) kalman::drawBistable(points, picture);
 }
@@ -166,8 +166,9 @@ ForceCurves chips(const std::vector<SpindleRig::Record>& passes, const MachineMo
     }
     std::printf("\n");
   }
-  std::printf("left %.2f N compensated, %.2f N measured; largest error from 0.05 mm on: %.1f %%, %.1f %%\n\n",
-              good.rms, raw.rms, 100.0 * worst, 100.0 * worst_raw);
+  std::printf(
+      "residual %.2f N compensated, %.2f N measured; largest error from 0.05 mm on: %.1f %%, %.1f %%\n\n",
+      good.rms, raw.rms, 100.0 * worst, 100.0 * worst_raw);
   return good;
 }
 
@@ -195,7 +196,7 @@ int main(int argc, char** argv) {
       machine.sorted().useTransferMatrix(six, BANDWIDTH);
       std::vector<SpindleRig::Record> passes;
       for (const double feed : FEEDS) {
-        std::fprintf(stderr, "%.0f rpm, %.3f mm a tooth\n", rpm, 1e3 * feed);
+        std::fprintf(stderr, "%.0f rpm, %.3f mm per tooth\n", rpm, 1e3 * feed);
         passes.push_back(pass(machine, model, rpm, feed, 0.3));
       }
       errors(passes[2], three, rpm);

@@ -47,7 +47,7 @@ void bounce(const kalman::PlateSensor& plate, const kalman::TransferMatrix& thre
   for (std::size_t i = 1; i < contact.size(); ++i) {
     if (contact[i] > 0.0 && contact[i - 1] == 0.0) begins.push_back(1e3 * static_cast<double>(i) / RATE);
   }
-  std::printf("Bouncing hammer (2.3), pressed with %.0f N at a point that was not tapped; contact begins at",
+  std::printf("Bouncing hammer (2.3), pressed with %.0f N at an untapped point; contact begins at",
               contact.back());
   for (const double t : begins) std::printf(" %.1f", t);
   std::printf(" ms\n%-4s %9s %26s %26s %26s\n", "", "truth", "measured", "3 channels", "6 channels");
@@ -76,8 +76,8 @@ void bounce(const kalman::PlateSensor& plate, const kalman::TransferMatrix& thre
 
 void milling(const kalman::PlateSensor& plate, const kalman::TransferMatrix& three,
              const kalman::TransferMatrix& six, double rpm, std::mt19937& random) {
-  // Table 1.1: D 12 mm, 2 flutes, 30 deg, half immersion, 2 mm deep, 0.2 mm a tooth, down milling; the
-  // material is not told: coefficients of the reference cut.
+  // Table 1.1: D 12 mm, 2 flutes, 30 deg, half immersion, 2 mm deep, 0.2 mm per tooth, down-milling. The
+  // material is not stated: coefficients of the reference cut.
   const MechanisticForce process({2, 12e-3, units::radFromDeg(30.0), {}},
                                  {800e6, 250e6, 80e6, 20e3, 20e3, 5e3},
                                  {0.5 * units::PI, units::PI, 2e-3, 2e-4});
@@ -86,10 +86,10 @@ void milling(const kalman::PlateSensor& plate, const kalman::TransferMatrix& thr
   Forces applied;
   for (int i = 0; i < SAMPLES; ++i) {
     const double t = i / RATE;
-    // The tool enters and leaves within the record.
+    // The record includes entry and exit of the tool.
     const double share = std::clamp(std::min(t - 0.02, 0.46 - t) / 0.005, 0.0, 1.0);
     const CuttingForce f = process.at(speed * t);
-    applied[0].push_back(-share * f.fx);  // the workpiece gets the reaction
+    applied[0].push_back(-share * f.fx);  // reaction on the workpiece
     applied[1].push_back(-share * f.fy);
     applied[2].push_back(-share * f.fz);
   }

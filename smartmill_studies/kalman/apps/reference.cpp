@@ -1,5 +1,5 @@
-// rosrun smartmill_studies kalman_reference: errors of the compensation in the project's reference cut,
-// beside their targets.
+// rosrun smartmill_studies kalman_reference: errors of the compensation in the reference cut, next to their
+// targets.
 
 #include <cmath>
 #include <cstdio>
@@ -64,14 +64,14 @@ ReferenceCase caseAt(double rpm, double duration) {
   return reference;
 }
 
-/// Harmonics up to the limit of the sample rate.
+/// As many harmonics as the sample rate permits.
 CompensationParameters allHarmonics() {
   CompensationParameters parameters;
   parameters.filter.max_harmonics = 200;
   return parameters;
 }
 
-/// [%] worst of x and y from a sample on.
+/// Worst error of x and y from a sample on.
 double worstError(const std::array<std::vector<double>, 2>& force, const ReferenceCase& reference,
                   const ReferenceRecord& record, std::size_t from, std::size_t to, double band) {
   double worst = 0.0;
@@ -86,8 +86,8 @@ void row(double rpm, const char* name, const Errors& e, const char* target) {
               100.0 * e.entry_3k, 100.0 * e.entry_5k, target);
 }
 
-/// The plain augmented Kalman filter: the force is a random walk; its best intensity over a grid, by the
-/// truth.
+/// The plain augmented Kalman filter with a random-walk force; its intensity is the best of a grid, chosen by
+/// the truth.
 Errors randomWalk(const ReferenceCase& reference, const ReferenceRecord& record, bool smooth) {
   Errors best;
   best.to_5k = 1e9;
@@ -135,7 +135,7 @@ void run(const std::vector<double>& speeds, double duration) {
   }
 }
 
-/// Fourier series and F(t) = F(t - T) side by side: error, states, time of a sample and of the layout.
+/// Comparison of Fourier series and F(t) = F(t - T): error, states, time per sample and of the design.
 void runForceModels(const std::vector<double>& speeds, double duration) {
   const auto seconds = [](std::clock_t since) {
     return static_cast<double>(std::clock() - since) / CLOCKS_PER_SEC;
@@ -173,8 +173,8 @@ void runForceModels(const std::vector<double>& speeds, double duration) {
   }
 }
 
-/// Without a tachometer: the speed as a state, beside the tachometer and beside the commanded speed taken for
-/// true. Errors to 3 kHz over the last 0.3 s; speed error at the end.
+/// Without a tachometer: the speed as a state, compared with a tachometer and with the commanded speed.
+/// Errors to 3 kHz over the last 0.3 s; speed error at the end.
 void runSpeeds(const std::vector<double>& speeds, double duration) {
   std::printf("no tachometer: error of the force to 3 / 5 kHz [%%] over the last 0.3 s, worst of x and y\n");
   std::printf(
@@ -190,7 +190,7 @@ void runSpeeds(const std::vector<double>& speeds, double duration) {
       const auto error = [&](const ReferenceCase& told, bool track) {
         CompensationParameters parameters = allHarmonics();
         parameters.track_speed = track;
-        parameters.filter.memory_revolutions = 2.0;  // without a tachometer a longer memory errs more
+        parameters.filter.memory_revolutions = 2.0;  // without a tachometer a longer memory has larger errors
         const auto force = runCompensation(told, record, reference.sensor, parameters);
         const std::size_t to = force[0].size();
         const auto from = to - static_cast<std::size_t>(0.3 * reference.sample_rate);
@@ -209,7 +209,7 @@ void runSpeeds(const std::vector<double>& speeds, double duration) {
   }
 }
 
-/// What a known latency buys: error over lag, from causal to the whole record.
+/// Error over lag, from causal to the complete record.
 void runLags(const std::vector<double>& speeds, double duration) {
   std::printf(
       "fixed lag: error of the force to 3 / 5 kHz [%%] from 0.1 s after engagement, worst of x and y\n");
@@ -230,11 +230,11 @@ void runLags(const std::vector<double>& speeds, double duration) {
   }
 }
 
-/// Sensor that is not what it is believed to be.
+/// Sensor that differs from its model.
 struct Wrong {
   const char* name;
-  std::function<ModalModel(ModalModel)> change;  // of the sensor that measures
-  bool drifts;                                   // during the cut, from 0.3 to 0.8 s
+  std::function<ModalModel(ModalModel)> change;  // of the true sensor
+  bool drifts;                                   // changes during the cut, from 0.3 to 0.8 s
 };
 
 const std::vector<Wrong>& wrongs() {
@@ -265,7 +265,7 @@ const std::vector<Wrong>& wrongs() {
                                          return sensor;
                                        },
                                        true},
-                                      // Half the moving mass is the workpiece's.
+                                      // The workpiece is half of the moving mass.
                                       {"workpiece 20 % lighter in the cut",
                                        [](ModalModel sensor) {
                                          for (Mode& mode : sensor.modes) mode.frequency /= std::sqrt(0.9);
@@ -306,9 +306,8 @@ void runErrors(const std::vector<double>& speeds, double duration) {
   }
 }
 
-/// Burzoni's tables 8..15 and his maps: what a q from the taps alone loses against the best q of the cut,
-/// told by the truth of the cut; and the harmonic form, as laid out and with a memory a band from the
-/// likelihood.
+/// Burzoni's tables 8..15 and maps: q from the taps compared with the best q of the cut (chosen by the
+/// truth), and the harmonic form by its default design and with a memory per band from the likelihood.
 class TuningStudy {
  public:
   explicit TuningStudy(double duration) {
@@ -323,12 +322,12 @@ class TuningStudy {
 
   void run() {
     std::printf(
-        "sensor from nine taps; R from before the blows %.3f N2; RMSE of the harmonics' amplitudes [N], "
+        "sensor from nine taps; R from before the hits %.3f N2; RMSE of the harmonics' amplitudes [N], "
         "amplitude error of the tooth harmonics to 3 kHz [%%], worst of x and y\n",
         r_taps_);
     std::printf(
-        "        |        random walk (Burzoni)                     |   harmonics, as laid out  |  "
-        "memory a band from the likelihood\n");
+        "        |        random walk (Burzoni)                     |   harmonics, default      |  "
+        "memory per band by likelihood\n");
     std::printf(
         "    rpm | R of air   q of taps  RMSE   ampl.  best q  RMSE |      RMSE   ampl.         |  "
         "RMSE   ampl.   revolutions\n");
@@ -346,7 +345,7 @@ class TuningStudy {
                   maps.back().map.best(units::radPerSecFromRpm(17600.0)));
     }
     drawMaps(maps, picture);
-    std::printf("maps drawn to %s\n", picture.c_str());
+    std::printf("maps written to %s\n", picture.c_str());
   }
 
  private:
@@ -439,14 +438,14 @@ int main(int argc, char** argv) {
   double duration = 1.0;
   std::string picture;
   bool errors = false, tuning = false, force_models = false, track = false, lags = false;
-  CommandLine line{"Errors of the force compensation in the reference cut, beside their targets."};
+  CommandLine line{"Errors of the force compensation in the reference cut, next to their targets."};
   line.option("--speed-rpm", speeds, "spindle speeds").within(500.0, 60000.0);
   line.option("--duration-s", duration, "length of a record").within(0.3, 100.0);
-  line.flag("--model-errors", errors, "a sensor that is not what it is believed to be: frozen and following");
-  line.flag("--force-models", force_models, "Fourier series beside F(t) = F(t - T): error and cost");
-  line.flag("--track-speed", track, "no tachometer: the speed as a state beside the tachometer");
+  line.flag("--model-errors", errors, "a sensor that differs from its model: frozen and following filter");
+  line.flag("--force-models", force_models, "Fourier series and F(t) = F(t - T): error and cost");
+  line.flag("--track-speed", track, "no tachometer: the speed as a state, compared with a tachometer");
   line.flag("--lags", lags, "error of the fixed-lag smoother over its lag");
-  line.flag("--tuning", tuning, "seven speeds: laid out from the taps against the best q of the cut");
+  line.flag("--tuning", tuning, "seven speeds: q from the taps compared with the best q of the cut");
   line.option("--picture", picture, "with --tuning: PNG of the maps q over speed, with confidence plants");
   return runProgram(line, argc, argv, [&] {
     if (force_models) {

@@ -1,5 +1,5 @@
 // rosrun smartmill_studies kalman_spindle_sensor: Burzoni's sensor on the simulated machine, calibrated by
-// the product's own steps, and its force beside that of the table dynamometer.
+// the steps of the product, and its force compared with that of the table dynamometer.
 
 #include <cmath>
 #include <cstdio>
@@ -28,7 +28,7 @@ struct Request {
 
 void calibrate(SpindleRig& rig, const Request& request) {
   rig.spin(0.0);
-  rig.tell(CuttingCondition::Kind::none);
+  rig.publishCondition(CuttingCondition::Kind::none);
   std::vector<double> weights;
   for (const int hung : {0, 1, 2, 3, 4, 5, 6, 7, 0}) weights.push_back(44.5 * hung);  // 10 lbs each
   std::fprintf(stderr, "weights at three lengths\n");
@@ -57,7 +57,8 @@ void calibrate(SpindleRig& rig, const Request& request) {
 
 void cuts(SpindleRig& rig, const MachineModel& model, double band) {
   std::printf(
-      "slots 0.8 mm deep, 0.1 mm a tooth: RMS of the difference to the true force up to %.0f Hz, %% of it\n",
+      "slots 0.8 mm deep, 0.1 mm per tooth: RMS of the difference to the true force up to %.0f Hz, %% of "
+      "it\n",
       band);
   std::printf("%6s %24s %24s %24s %24s\n", "rpm", "sensor, static", "sensor, compensated",
               "table dynamometer", "compensated to dynam.");

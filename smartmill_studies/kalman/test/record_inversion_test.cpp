@@ -15,13 +15,13 @@ namespace {
 
 constexpr double RATE = 51200.0;  // [Hz]
 
-// Section 2.1: three channels hold only near the taps; section 2.2: six hold everywhere.
+// Section 2.1: three channels are valid only near the taps; section 2.2: six are valid everywhere.
 TEST(RecordInversion, SixChannelsRestoreABouncingHammerWhereNobodyTapped) {
   const PlateSensor plate;
   std::mt19937 random(6);
   const std::array<double, 3> point{{0.026, -0.020, 0.03}}, direction{{0.30, 0.20, -0.9327}};
   const std::vector<double> contact = bouncingContact(RATE, 0.12, 0.01);
-  // It bounces, then stands with the 40 N of its push.
+  // The hammer bounces, then rests with a force of 40 N.
   int bounces = 0;
   for (std::size_t i = 1; i < contact.size(); ++i) bounces += contact[i] > 0.0 && contact[i - 1] == 0.0;
   EXPECT_GE(bounces, 3);
@@ -35,7 +35,7 @@ TEST(RecordInversion, SixChannelsRestoreABouncingHammerWhereNobodyTapped) {
   const auto measured = plate.measure(applied, point, RATE, 6, random);
   const auto restored = invertRecord(six, measured, RATE, 8000.0);
   const auto by_three = invertRecord(three, {measured[0], measured[1], measured[2]}, RATE, 8000.0);
-  // Over the bounces, 5 to 45 ms: RMS of the difference over that of the truth.
+  // During the bounces, 5 to 45 ms: RMS of the difference over that of the truth.
   const auto error = [&](const std::vector<double>& f, std::size_t axis) {
     double sum = 0.0, whole = 0.0;
     for (std::size_t i = 256; i < 2304; ++i) {
@@ -49,7 +49,7 @@ TEST(RecordInversion, SixChannelsRestoreABouncingHammerWhereNobodyTapped) {
     EXPECT_LT(error(restored[axis], axis), 0.05) << axis;
     EXPECT_LT(error(restored[axis], axis), 0.5 * error(by_three[axis], axis)) << axis;
   }
-  // Where it presses, from force and moment at rest.
+  // Position of the force, from static force and moment.
   std::array<double, 3> force{}, moment{};
   for (std::size_t i = 5000; i < 5600; ++i) {
     for (std::size_t c = 0; c < 3; ++c) {
@@ -62,7 +62,7 @@ TEST(RecordInversion, SixChannelsRestoreABouncingHammerWhereNobodyTapped) {
   EXPECT_NEAR(place[1], point[1], 2e-4);
 }
 
-// The small force beside two large ones: all lines of the taps together know the matrix well enough for it.
+// A small force next to two large ones requires the accuracy of the fit to all lines.
 TEST(RecordInversion, ASmallForceBesideLargeOnes) {
   const PlateSensor plate;
   std::mt19937 random(7);

@@ -16,8 +16,8 @@ namespace {
 
 constexpr double LENGTH = 0.139;  // [m]
 
-// Weights, the reference, taps, a cut: the sensor in the spindle of the simulated machine through the
-// product's steps.
+// Weights, reference, taps and a cut: the spindle sensor of the simulated machine through the steps of the
+// product.
 TEST(SpindleRig, ShowsTheForceOfACutAfterItsCalibration) {
   const MachineModel model = readMachineModel("../../launch/models/mill_twin.yaml");
   sim::WorldOptions world;
@@ -28,16 +28,16 @@ TEST(SpindleRig, ShowsTheForceOfACutAfterItsCalibration) {
   taps.fit_high = 2500.0;
   SpindleRig rig(model, world, filter, taps, false);
   rig.sorted().setSpindleSensorLength(LENGTH);
-  rig.tell(CuttingCondition::Kind::none);
+  rig.publishCondition(CuttingCondition::Kind::none);
   rig.readStatic({0.110, LENGTH, 0.170}, {0.0, 150.0, 300.0, 0.0}, false);
   CalibrationGoal fit;
   fit.step = CalibrationGoal::Step::fit;
   const auto found = rig.ask(fit).calibration;
   ASSERT_TRUE(found);
-  // A beam's reciprocal is the line, and the readings prove it.
+  // The reciprocal sensitivity of a beam is linear in the length; the fit agrees with the measurements.
   EXPECT_TRUE(found->x.reciprocal);
   EXPECT_NEAR(found->x.at(LENGTH), 18.0, 0.2);  // Burzoni Table 2
-  // Beyond its lengths it does not serve.
+  // No extrapolation beyond the calibrated lengths.
   EXPECT_THROW(SpindleForceSensor(*found, 0.25), Error);
   rig.readStatic({0.125}, {0.0, 150.0, 300.0, 0.0}, true);
   CalibrationGoal verify;
@@ -57,14 +57,15 @@ TEST(SpindleRig, ShowsTheForceOfACutAfterItsCalibration) {
     EXPECT_GT(error(cut.measured), 0.08);
     EXPECT_LT(error(cut.compensated), 0.04);
   }
-  // A missing channel is one line.
+  // A missing channel gives an error message.
   SampleBlock block;
   block.channels = {"x1", "x2", "y1", "y2", "z1"};
   block.units.assign(5, "N");
   EXPECT_THROW(SpindleForceSensor(*found, LENGTH).handle(block), Error);
 }
 
-// Eq. 4-43: a constant and an oscillation at tooth passing are told without error; another harmonic is not.
+// Eq. 4-43: a constant and an oscillation at tooth passing are estimated without error; another harmonic is
+// not.
 TEST(ExpandedDisturbance, TellsWhatItIsMadeFor) {
   constexpr double RATE = 25600.0;
   ModalModel sensor;
@@ -91,7 +92,7 @@ ForceCurve law(double power) {
   ForceCurve curve;
   for (int k = 0; k <= 8; ++k) curve.knots.push_back(1e-3 * k / 8);
   curve.std_dev.assign(9, 0.0);
-  // Greville's abscissae: a straight law is told without error.
+  // Greville's abscissae: a linear law is represented exactly.
   for (int k = 0; k < 11; ++k) {
     const double x = (std::clamp(k - 2, 0, 8) + std::clamp(k - 1, 0, 8) + std::clamp(k, 0, 8)) / 24.0 * 1e-3;
     curve.value.push_back(100e3 * std::pow(x / 1e-4, power));
@@ -99,8 +100,8 @@ ForceCurve law(double power) {
   return curve;
 }
 
-// Linear: the limit is the textbook's 1 / (2 K zeta (1 + zeta) gain) at its worst speed (Tlusty), and there
-// is hardly a range; a digressive law has one.
+// Linear law: the critical limit is 1 / (2 K zeta (1 + zeta) gain) (Tlusty), with almost no bistable zone; a
+// digressive law has one.
 TEST(Bistable, LinearLawHasTheTextbookLimitAndADigressiveOneARange) {
   Mode mode;
   mode.frequency = 800.0;

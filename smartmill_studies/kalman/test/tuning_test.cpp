@@ -29,7 +29,7 @@ const ModalModel& tapped() {
   return result;
 }
 
-// Through an ideal sensor the filter of a random walk is exponential smoothing, its gain in closed form:
+// For an ideal sensor the random-walk filter is exponential smoothing with a gain in closed form:
 // p^2 = q dt (p + r), K = p / (p + r).
 TEST(Tuning, RandomWalkIsExponentialSmoothing) {
   ModalModel ideal;
@@ -42,7 +42,7 @@ TEST(Tuning, RandomWalkIsExponentialSmoothing) {
 }
 
 TEST(Tuning, NoiseIsToldFromBeforeTheBlows) {
-  // 9 taps of 230 samples of 1 N: the variance is known to 1 / sqrt(1035) = 3.1 %.
+  // 9 taps of 230 samples of 1 N: the standard deviation of the variance is 1 / sqrt(1035) = 3.1 %.
   EXPECT_NEAR(noiseBefore(taps(), RATE, 0.009), 1.0, 0.1);
   EXPECT_THROW(noiseBefore({{{0.0, 1.0}}, {{0.0, 0.0}}}, RATE, 1.0 / RATE), Error);
 }
@@ -56,7 +56,7 @@ TEST(Tuning, PlantsLieAtTheEdgeOfTheConfidenceInterval) {
     EXPECT_LT(std::abs(after[line] / before[line] - std::polar(0.97, -0.03)), 1e-9);
 }
 
-// The optimum of the taps' map lies inside 2^1 .. 2^30, and with it the tooth harmonics of the cut err by at
+// The optimum of the map of the taps is within 2^1 .. 2^30, and gives errors of the tooth harmonics of at
 // most 5 % (Burzoni: 10 .. 30 %).
 TEST(Tuning, QOfTheTapsServesTheCut) {
   std::vector<double> speeds;
@@ -82,8 +82,8 @@ TEST(Tuning, QOfTheTapsServesTheCut) {
   }
 }
 
-// Likelihood alone, no truth: amplitudes that wander ask for a short memory, steady ones for a long one, each
-// in its own band.
+// By the likelihood alone, varying amplitudes get a short memory and constant ones a long one, each in its
+// band.
 TEST(Tuning, LikelihoodTellsEachBandsMemory) {
   ModalModel ideal;
   ideal.direct = 1.0;

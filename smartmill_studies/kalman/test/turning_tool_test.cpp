@@ -30,7 +30,7 @@ TEST(TurningSpindle, IsTheDirectFrfOfARotor) {
   }
 }
 
-// Cuts at three speeds: the softened tool, not the one that the tap at rest has shown.
+// Cuts at three speeds identify the softened tool, which differs from the tap at rest.
 TEST(TurningTool, CutsTellTheModesOfTheTurningSpindle) {
   TurningToolCase c = turningToolCase();
   c.speeds = {c.speeds[2], c.speeds[3], c.speeds[4]};
@@ -47,7 +47,7 @@ TEST(TurningTool, CutsTellTheModesOfTheTurningSpindle) {
       EXPECT_NEAR(mode.damping_ratio, truth.damping_ratio, 0.05 * truth.damping_ratio);
       EXPECT_NEAR(mode.gain, truth.gain, 0.02 * truth.gain);
     }
-    // At rest it is another tool: fifty hertz at the highest speed.
+    // The difference from rest is 50 Hz at the highest speed.
     EXPECT_LT(found[axis][2].fit->model.modes[0].frequency, standing.modes[0].frequency - 40.0);
   }
 }

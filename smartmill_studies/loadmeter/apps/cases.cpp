@@ -50,9 +50,9 @@ void machines(unsigned first, int count) {
       "%d cases: rounding 3e-4 V, noise 0.2 mV, lag 7 Hz, warm-up, Stribeck, depth 2 %%, runout to 12 um\n",
       count);
   std::printf("%-34s %8s %8s %8s   %s\n", "|error| [%]", "median", "95 %", "worst", "inside 1.96 std");
-  row("Ktc, thesis to the letter", thesis_ktc, -1.0);
+  row("Ktc, thesis procedure", thesis_ktc, -1.0);
   row("Ktc, records with law by evidence", ktc, inside_ktc / count);
-  row("Kte, thesis to the letter", thesis_kte, -1.0);
+  row("Kte, thesis procedure", thesis_kte, -1.0);
   row("Kte, records with law by evidence", kte, inside_kte / count);
   std::printf(
       "mean square of the z-score: Ktc %.2f, Kte %.2f; Ktc with the true depth %.2f; of the depth errors "
@@ -64,7 +64,7 @@ void machines(unsigned first, int count) {
   std::printf("\n");
 }
 
-// The same machine as in the whole study of that seed.
+// The same machine as in the complete study with that seed.
 nlohmann::json lineOf(unsigned first, int number) {
   const Faults faults;
   const CaseErrors e = judge(drawCase(first + static_cast<unsigned>(number), faults), faults);
@@ -110,11 +110,11 @@ void turning(unsigned seed) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CommandLine line("Randomised cases with known truth: what the estimators reach.");
+  CommandLine line("Accuracy of the estimators in random cases with known truth.");
   int count = 200;
   unsigned first = 1;
   StudyCase one;
-  one.addTo(line, "--cases", count, "how many");
+  one.addTo(line, "--cases", count, "number of cases");
   line.option("--seed", first, "of the first case").showDefault();
   return runProgram(line, argc, argv, [&] {
     one.check(count);

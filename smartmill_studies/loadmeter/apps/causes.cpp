@@ -1,6 +1,6 @@
-// rosrun smartmill_studies loadmeter_causes: tests needed to tell a machine's cause, with and without what
-// its shop was found to have before. What each cause shows in which test comes from real reports of
-// `explain`; the sizes are drawn, and what a test shows scales with them.
+// rosrun smartmill_studies loadmeter_causes: number of tests needed to identify the cause of a machine, with
+// and without the causes found before in its shop. The signature of each cause in each test comes from
+// reports of `explain`; the sizes are random and scale the signatures.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -37,7 +37,7 @@ class Draw {
       : causes_(causes), random_(o.seed), scatter_(o.scatter) {
     for (std::size_t c = 0; c < causes.size(); ++c) weights_.push_back(std::pow(o.ratio, double(c)));
   }
-  /// Which causes are frequent differs from shop to shop.
+  /// The frequencies of the causes differ from shop to shop.
   void newShop() { std::shuffle(weights_.begin(), weights_.end(), random_); }
   std::size_t cause() {
     return std::discrete_distribution<std::size_t>(weights_.begin(), weights_.end())(random_);
@@ -47,9 +47,9 @@ class Draw {
     return static_cast<std::size_t>(
         std::count_if(weights_.begin(), weights_.end(), [&](double w) { return w > weights_[cause]; }));
   }
-  /// What an explanation of the whole plan would show: squares over the noise grow with the size's square,
-  /// and scatter by 4 m / n about their mean m over n samples (noncentral chi-square). Its profile may differ
-  /// from the report's, each square by a logarithm of its own.
+  /// Signature of a machine over the complete plan: the squares over the noise are proportional to the
+  /// squared size, with variance 4 m / n about their mean m over n samples (noncentral chi-square). Each
+  /// square may differ from the report by a random factor (log-normal).
   ModelImprovement machine(const std::string& name, std::size_t cause) {
     const double size =
         std::exp(std::uniform_real_distribution<double>(std::log(0.1), std::log(1.5))(random_));
@@ -77,34 +77,34 @@ class Draw {
   std::vector<double> weights_;
 };
 
-/// Of one way to choose tests.
+/// Counts of one method to choose tests.
 struct Count {
   int machines = 0, right = 0, wrong = 0;
-  double tests = 0.0;  // of those named right
+  double tests = 0.0;  // of correctly named machines
 
   void print(const char* name) const {
     std::printf("%-44s %6d %6d %6d %8.2f\n", name, machines, right, wrong, right ? tests / right : 0.0);
   }
 };
 
-enum class Way { fleet, alone, plan };
+enum class TestOrder { fleet, alone, plan };
 
-/// @param search fresh @param due the truth's place among the fleet's causes; causes.size() + 1: none of
-/// these
-void tell(CauseSearch search, const std::vector<std::string>& tests, const ModelImprovement& machine,
-          std::size_t due, Way way, const std::vector<Count*>& counts) {
+/// @param search initial state of the search @param expected index of the truth among the fleet's causes;
+/// causes.size() + 1: none of these
+void identify(CauseSearch search, const std::vector<std::string>& tests, const ModelImprovement& machine,
+              std::size_t expected, TestOrder order, const std::vector<Count*>& counts) {
   std::map<std::string, Outcome> shows;
   for (const TestEvidence& t : evidenceOf(machine)) shows[t.test] = outcomeOf(t);
   for (Count* count : counts) ++count->machines;
   for (std::size_t made = 0; made <= tests.size(); ++made) {
     if (const auto alone = search.acceptedHypothesis()) {
       for (Count* count : counts) {
-        (*alone == due ? count->right : count->wrong) += 1;
-        if (*alone == due) count->tests += static_cast<double>(made);
+        (*alone == expected ? count->right : count->wrong) += 1;
+        if (*alone == expected) count->tests += static_cast<double>(made);
       }
       return;
     }
-    const auto test = way == Way::plan ? std::optional<std::size_t>(made) : search.next();
+    const auto test = order == TestOrder::plan ? std::optional<std::size_t>(made) : search.next();
     if (!test || *test >= tests.size()) return;
     search.addOutcome(*test, shows[tests[*test]]);
   }
@@ -116,11 +116,11 @@ void run(const Options& o) {
     const ModelImprovement i = readImprovement(report);
     const auto named = causesOf(i);
     if (named.size() != 1)
-      throw Error(report + ": names " + std::to_string(named.size()) + " causes, one is due");
+      throw Error(report + ": names " + std::to_string(named.size()) + " causes, expected one");
     causes.push_back(i);
   }
   Draw draw(causes, o);
-  std::map<Way, Count> all, frequent, rare, unmet;
+  std::map<TestOrder, Count> all, frequent, rare, unmet;
   for (int s = 0; s < o.shops; ++s) {
     draw.newShop();
     std::vector<ModelImprovement> known;
@@ -138,26 +138,28 @@ void run(const Options& o) {
       const auto at = std::find_if(fleet.causes.begin(), fleet.causes.end(),
                                    [&](const FleetCause& c) { return c.name == name; });
       const bool met = at != fleet.causes.end();
-      const auto due = met ? static_cast<std::size_t>(at - fleet.causes.begin()) : fleet.causes.size() + 1;
-      for (const Way way : {Way::fleet, Way::alone, Way::plan}) {
-        tell(way == Way::fleet ? by_fleet : by_none, fleet.tests, machine, due, way,
-             {&all[way], &(!met                     ? unmet
-                           : draw.rankOf(truth) < 2 ? frequent
-                                                    : rare)[way]});
+      const auto expected =
+          met ? static_cast<std::size_t>(at - fleet.causes.begin()) : fleet.causes.size() + 1;
+      for (const TestOrder order : {TestOrder::fleet, TestOrder::alone, TestOrder::plan}) {
+        identify(order == TestOrder::fleet ? by_fleet : by_none, fleet.tests, machine, expected, order,
+                 {&all[order], &(!met                     ? unmet
+                                 : draw.rankOf(truth) < 2 ? frequent
+                                                          : rare)[order]});
       }
     }
   }
-  std::printf("%zu causes, %d shops, %d machines explained in each, %d more to tell\n%-44s %6s %6s %6s %8s\n",
-              causes.size(), o.shops, o.explained, o.newcomers, "", "all", "right", "wrong", "tests");
+  std::printf(
+      "%zu causes, %d shops, %d machines explained in each, %d more to identify\n%-44s %6s %6s %6s %8s\n",
+      causes.size(), o.shops, o.explained, o.newcomers, "", "all", "right", "wrong", "tests");
   struct Group {
     std::string name;
-    std::map<Way, Count>& counts;
+    std::map<TestOrder, Count>& counts;
   };
   for (const Group& group : {Group{"all", all}, Group{"the two most frequent causes", frequent},
                              Group{"rarer ones", rare}, Group{"never met before", unmet}}) {
-    group.counts[Way::fleet].print((group.name + ", tests by the fleet's prior").c_str());
-    group.counts[Way::alone].print((group.name + ", each cause as likely").c_str());
-    group.counts[Way::plan].print((group.name + ", in the plan's order").c_str());
+    group.counts[TestOrder::fleet].print((group.name + ", tests by the fleet's prior").c_str());
+    group.counts[TestOrder::alone].print((group.name + ", each cause as likely").c_str());
+    group.counts[TestOrder::plan].print((group.name + ", in the plan's order").c_str());
   }
 }
 
@@ -166,18 +168,19 @@ void run(const Options& o) {
 int main(int argc, char** argv) {
   Options o;
   CommandLine line(
-      "Tests needed to tell a machine's cause, with what its shop was found to have, and without.");
+      "Number of tests needed to identify the cause of a machine, with and without the causes found in its "
+      "shop.");
   line.option("REPORT", o.reports, "of `explain`, each naming one cause").required();
   line.option("--shops", o.shops).showDefault().within(1, 100000);
   line.option("--explained", o.explained, "machines of a shop explained before")
       .showDefault()
       .within(1, 1000);
-  line.option("--newcomers", o.newcomers, "machines of a shop to tell").showDefault().within(1, 1000);
+  line.option("--newcomers", o.newcomers, "machines of a shop to identify").showDefault().within(1, 1000);
   line.option("--ratio", o.ratio, "frequency of each cause to the next more frequent one")
       .showDefault()
       .within(0.01, 1.0);
   line.option("--scatter", o.scatter,
-              "of a machine's squares about the report's, standard deviation of the logarithm")
+              "standard deviation of the logarithm of a machine's squares over the report's")
       .showDefault()
       .within(0.0, 3.0);
   line.option("--seed", o.seed, "of the draws").showDefault();

@@ -1,4 +1,4 @@
-// The database under load: `lookup` among many records beside a named baseline; `crash`, writers killed while
+// The database under load: `lookup` among many records compared with baselines; `crash` kills writers while
 // they write.
 #include <signal.h>
 #include <sqlite3.h>
@@ -73,7 +73,7 @@ void lookup(const std::string& file, int records) {
     const auto found = database.estimate(query);
     const auto newest = database.find(query.tool, query.material);
     ours.push_back(since(begin));
-    if (!found || !newest) throw Error("a pair that is there was not found");
+    if (!found || !newest) throw Error("an existing pair was not found");
     if (i % 5) continue;  // both kinds of pair
     // "+" keeps the index out: every row is read.
     const std::string sql =
@@ -87,7 +87,7 @@ void lookup(const std::string& file, int records) {
     begin = Clock::now();
     const auto all = database.records(query.tool, query.material);
     memory.push_back(since(begin));
-    if (all.empty()) throw Error("a pair that is there was not read");
+    if (all.empty()) throw Error("an existing pair was not read");
   }
   sqlite3_close(db);
   std::printf("%d records in a file, half of them one work-tool pair\n", records);
@@ -96,7 +96,7 @@ void lookup(const std::string& file, int records) {
   report("baseline: every record of the pair read into memory", memory);
 }
 
-/// Processes that write records without end and say the stamp of each into a pipe once it is acknowledged.
+/// Processes that write records continuously and report the stamp of each acknowledged record through a pipe.
 class Writers {
  public:
   explicit Writers(const std::string& file) : file_(file) {
@@ -111,7 +111,7 @@ class Writers {
     running_.push_back(pid);
   }
 
-  /// Kills the oldest.
+  /// Kills the oldest process.
   void kill() {
     ::kill(running_.front(), SIGKILL);
     int status = 0;
@@ -120,7 +120,7 @@ class Writers {
     running_.pop_front();
   }
 
-  /// The pipe is read all the time, or full it would hold the writers up.
+  /// Reads the pipe continuously, since a full pipe blocks the writers.
   void readFor(double time) {
     const Clock::time_point start = Clock::now();
     for (double left = time; left > 0.0; left = time - since(start)) {
@@ -135,7 +135,7 @@ class Writers {
     }
   }
 
-  /// Kills all and reads what they still had said.
+  /// Kills all processes and reads the rest of the pipe.
   void end() {
     while (!running_.empty()) kill();
     close(ends_[1]);
@@ -203,10 +203,10 @@ int main(int argc, char** argv) {
   int records = 100000, writers = 8;
   double seconds = 60.0, every = 1.0;
   const CommandOptions look =
-      line.command("lookup", "time of a look-up among many records, beside baselines");
+      line.command("lookup", "time of a look-up among many records, compared with baselines");
   look.option("--records", records).showDefault().within(1000, 10000000);
-  const CommandOptions kills =
-      line.command("crash", "writers killed while they write: is every acknowledged record there?");
+  const CommandOptions kills = line.command(
+      "crash", "kills writers while they write, and checks that every acknowledged record is stored");
   kills.option("--writers", writers).showDefault().within(1, 64);
   kills.option("--seconds", seconds).showDefault().positive();
   kills.option("--kill-every", every, "s").showDefault().positive();

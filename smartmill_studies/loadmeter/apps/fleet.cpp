@@ -1,5 +1,4 @@
-// A shop's machines and their server: how long records take there and back, and what is left when either is
-// killed.
+// Machines of a shop and their server: times of push and pull, and the records after either is killed.
 #include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -72,7 +71,7 @@ CoefficientRecord drawRecord(int machine, int number, std::mt19937& random) {
   return r;
 }
 
-/// The shop: a server that keeps what it acknowledges, and a file a machine.
+/// The shop: a server that stores what it acknowledges, and one file per machine.
 class Shop {
  public:
   explicit Shop(const Options& options) : options_(options), server_(std::make_unique<PrivateServer>(true)) {
@@ -110,7 +109,7 @@ std::string freshOf(const FleetTransfer& t) {
   return std::to_string(t.fresh) + " new of " + std::to_string(t.offered);
 }
 
-/// Machines of one shop bring their files; one at a time.
+/// Machines of one shop push their files one after the other.
 FleetTransfer pushAll(const Shop& shop, int first, int last, bool all) {
   FleetTransfer sum;
   for (int m = first; m < last; ++m) {
@@ -122,7 +121,7 @@ FleetTransfer pushAll(const Shop& shop, int first, int last, bool all) {
   return sum;
 }
 
-/// A push in a process of its own, killed after so many records were acknowledged.
+/// A push in a separate process, killed after a number of acknowledged records.
 void pushKilled(const Shop& shop, int machine, std::size_t after) {
   const pid_t client = fork();
   if (client < 0) throw Error("no process");
@@ -138,8 +137,8 @@ void pushKilled(const Shop& shop, int machine, std::size_t after) {
   if (!WIFSIGNALED(status)) throw Error("the client ended by itself");
 }
 
-/// The server dies within the batch that follows so many acknowledged ones. @return records acknowledged.
-std::size_t pushIntoDeath(Shop& shop, int machine, int batches, std::string* said) {
+/// Kills the server within a batch after a number of acknowledged ones. @return acknowledged records
+std::size_t pushIntoDeath(Shop& shop, int machine, int batches, std::string* error_text) {
   CoefficientDatabase local(shop.file(machine));
   std::size_t acknowledged = 0;
   int done = 0;
@@ -157,7 +156,7 @@ std::size_t pushIntoDeath(Shop& shop, int machine, int batches, std::string* sai
       if (++done == batches) killSoon();
     });
   } catch (const Error& error) {
-    *said = error.what();
+    *error_text = error.what();
   }
   if (killer.joinable()) killer.join();
   return acknowledged;
@@ -179,7 +178,7 @@ bool kills(Shop& shop, const Options& o) {
   CoefficientDatabase local(shop.file(machine));
   const FleetTransfer rest = push(local, shop.url(machine));
   good = good && between + rest.fresh == before + 20000;
-  std::printf("client killed after 6000 of 20000: %zu there, then %s\n", between - before,
+  std::printf("client killed after 6000 of 20000: %zu stored, then %s\n", between - before,
               freshOf(rest).c_str());
 
   for (const int batches : {0, 1, 3, 6, 9}) {
@@ -189,8 +188,8 @@ bool kills(Shop& shop, const Options& o) {
       records.push_back(drawRecord(machine, 2000000 + 100000 * batches + i, random));
     local.add(records);
     const std::size_t had = shop.inShop(machine);
-    std::string said;
-    const std::size_t acknowledged = pushIntoDeath(shop, machine, batches, &said);
+    std::string error_text;
+    const std::size_t acknowledged = pushIntoDeath(shop, machine, batches, &error_text);
     const double down = seconds([&] { shop.server().start(); });
     const std::size_t kept = shop.inShop(machine);
     const FleetTransfer again = push(local, shop.url(machine));
@@ -198,10 +197,10 @@ bool kills(Shop& shop, const Options& o) {
                        shop.inShop(machine) == had + 20000;
     good = good && whole;
     std::printf(
-        "server killed after %d batches: %zu acknowledged, %zu there, started again in %.1f s, then %s: %s\n "
+        "server killed after %d batches: %zu acknowledged, %zu stored, restarted in %.1f s, then %s: %s\n "
         "   \"%s\"\n",
         batches, acknowledged, kept - had, down, freshOf(again).c_str(),
-        whole ? "nothing lost, nothing twice" : "WRONG", said.c_str());
+        whole ? "nothing lost, nothing twice" : "WRONG", error_text.c_str());
   }
   return good;
 }
@@ -231,14 +230,14 @@ bool away(Shop& shop, const Options& o) {
   shop.server().stop();
   CoefficientDatabase local(shop.file(6));
   std::mt19937 random(o.seed + 6);
-  std::string said;
+  std::string error_text;
   const double time = seconds([&] {
     for (int hour = 0; hour < 24; ++hour) {
       for (int i = 0; i < 10; ++i) local.add(drawRecord(6, 4000000 + 10 * hour + i, random));
       try {
         push(local, shop.url(6));
       } catch (const Error& error) {
-        said = error.what();
+        error_text = error.what();
       }
     }
   });
@@ -246,9 +245,9 @@ bool away(Shop& shop, const Options& o) {
   shop.server().start();
   const FleetTransfer done = push(local, shop.url(6));
   std::printf(
-      "network away for 24 tries (%.2f s in all), 240 records kept meanwhile: %zu behind, then %s\n    "
+      "network away for 24 tries (%.2f s in all), 240 records kept locally: %zu pending, then %s\n    "
       "\"%s\"\n",
-      time, behind, freshOf(done).c_str(), said.c_str());
+      time, behind, freshOf(done).c_str(), error_text.c_str());
   return behind == 240 && done.fresh == 240;
 }
 
@@ -290,7 +289,7 @@ bool fullDisk(const Options& o) {
   std::filesystem::create_directory(mount);
   if (getuid() != 0 ||
       std::system(("mount -t tmpfs -o size=72m tmpfs " + mount + " 2> /dev/null").c_str()) != 0) {
-    std::printf("full disk: not tried, no small file system can be made here\n");
+    std::printf("full disk: skipped, no small file system can be mounted here\n");
     return true;
   }
   std::filesystem::permissions(folder.file(""),
@@ -310,25 +309,27 @@ bool fullDisk(const Options& o) {
     for (int i = 0; i < 60000; ++i) records.push_back(drawRecord(0, i, random));
     local.add(records);
     std::size_t acknowledged = 0;
-    std::string said;
+    std::string error_text;
     try {
       push(local, server.url("mill"), [&](const FleetTransfer& done) { acknowledged = done.offered; });
     } catch (const Error& error) {
-      said = error.what();
+      error_text = error.what();
     }
     std::size_t there = 0;
     const std::size_t behind = local.unsentCount(local.lastFleet());
     if (std::system(("mount -o remount,size=400m " + mount).c_str()) != 0) throw Error("no remount");
-    // It may have ended by itself, or still run.
+    // The server may have ended by itself or still run.
     server.stop();
     server.start();
     there = CoefficientDatabase(server.url("mill")).size();
     const FleetTransfer rest = push(local, server.url("mill"));
-    good = !said.empty() && there >= acknowledged && behind == 60000 - acknowledged &&
+    good = !error_text.empty() && there >= acknowledged && behind == 60000 - acknowledged &&
            CoefficientDatabase(server.url("mill")).size() == 60000;
-    std::printf("full disk: %zu acknowledged, %zu there, %zu behind; with room again %s: %s\n    \"%s\"\n",
-                acknowledged, there, behind, freshOf(rest).c_str(), good ? "nothing lost" : "WRONG",
-                said.c_str());
+    std::printf(
+        "full disk: %zu acknowledged, %zu stored, %zu pending; after the disk is enlarged %s: %s\n    "
+        "\"%s\"\n",
+        acknowledged, there, behind, freshOf(rest).c_str(), good ? "nothing lost" : "WRONG",
+        error_text.c_str());
   }
   if (std::system(("umount -l " + mount).c_str()) != 0)
     std::fprintf(stderr, "%s stays mounted\n", mount.c_str());
@@ -375,11 +376,11 @@ bool run(const Options& o) {
 
 int main(int argc, char** argv) {
   Options o;
-  CommandLine line("A shop's machines and their server: times there and back, and what kills leave.");
+  CommandLine line("Machines of a shop and their server: times of push and pull, and records after kills.");
   line.option("--machines", o.machines).showDefault().within(8, 90);
-  line.option("--records", o.records, "of all machines together").showDefault().within(1000, 10000000);
+  line.option("--records", o.records, "total number of all machines").showDefault().within(1000, 10000000);
   line.option("--lookups", o.lookups).showDefault().within(10, 1000000);
-  line.flag("--only-lookups", o.only_lookups, "push and look-ups alone, no kills");
+  line.flag("--only-lookups", o.only_lookups, "push and look-ups only, without kills");
   line.option("--seed", o.seed, "of the records").showDefault();
   return runProgram(line, argc, argv, [&] { return run(o) ? 0 : 1; });
 }

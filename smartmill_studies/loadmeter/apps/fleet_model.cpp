@@ -1,5 +1,4 @@
-// rosrun smartmill_studies loadmeter_fleet_model: what machines learn from each other, on drawn shops with
-// known truth.
+// rosrun smartmill_studies loadmeter_fleet_model: learning across machines, in random shops with known truth.
 #include <cstdio>
 #include <vector>
 
@@ -53,13 +52,13 @@ void report(const std::vector<json>& lines) {
 
 int main(int argc, char** argv) {
   CommandLine line(
-      "Learning across machines: drawn shops of 50 machines, two of them odd in three shops of four.");
+      "Learning across machines: random shops of 50 machines, with two outliers in three of four shops.");
   int cases = 200;
   std::uint64_t seed = 1;
   StudyCase one;
   one.addTo(line, "--cases", cases, "shops");
   one.addScore(line);
-  line.option("--seed", seed, "of all that is drawn").showDefault();
+  line.option("--seed", seed, "of all random draws").showDefault();
   return runProgram(line, argc, argv, [&] {
     one.check(cases);
     if (one.scores()) return report(readJsonLines(one.lines));

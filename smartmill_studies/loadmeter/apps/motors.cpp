@@ -21,7 +21,7 @@ std::vector<MotorCut> day(const char* name, const MotorDay& one,
   return cuts;
 }
 
-/// Along X or Y only: there the cut always opposes the feed.
+/// Along X or Y only, where the cutting force always opposes the feed.
 MotorDay standardDay(unsigned seed, int cuts) {
   MotorDay one{20.0, seed, cuts};
   one.diagonal = false;
@@ -39,7 +39,7 @@ void variation(const DayErrors::Variation& v) {
               100 * v.half[1], 100 * v.half[2]);
 }
 
-void tell(const char* name, const DayErrors& e) {
+void report(const char* name, const DayErrors& e) {
   std::printf("%s (%d, %d, %d cuts)\n", name, e.count[0], e.count[1], e.count[2]);
   row("regression, RMSE X, Y, tangential [N]", e.regression);
   row("ANFIS", e.anfis);
@@ -68,19 +68,19 @@ void run(int cuts, unsigned seed, double warmer, const std::string& out) {
                 calibration.drive[a]->newton_per_ampere.value,
                 calibration.drive[a]->newton_per_ampere.std_dev, calibration.drive[a]->scatter);
   std::printf("spindle: scatter %.3f N m\n", calibration.spindle->scatter());
-  tell("the same day, other cuts",
-       judgeDay(standard, calibration, day("same day", {20.0, seed + 1, cuts}, calibration)));
+  report("the same day, other cuts",
+         judgeDay(standard, calibration, day("same day", {20.0, seed + 1, cuts}, calibration)));
   const std::string name = "another day, " + std::to_string(static_cast<int>(warmer)) + " K warmer";
-  tell(name.c_str(),
-       judgeDay(standard, calibration, day("another day", {20.0 + warmer, seed + 2, cuts}, calibration)));
+  report(name.c_str(),
+         judgeDay(standard, calibration, day("another day", {20.0 + warmer, seed + 2, cuts}, calibration)));
   MotorDay no_lines{20.0 + warmer, seed + 2, cuts};
   no_lines.rapid_moves = false;
-  tell((name + ", lags not known: no lines").c_str(),
-       judgeDay(standard, calibration, day("no lines", no_lines, calibration)));
+  report((name + ", lags unknown: no lines").c_str(),
+         judgeDay(standard, calibration, day("no lines", no_lines, calibration)));
   MotorDay with_sensor{20.0 + warmer, seed + 2, cuts};
   with_sensor.force_sensor = true;
-  tell((name + ", with a force sensor").c_str(),
-       judgeDay(standard, calibration, day("with sensor", with_sensor, calibration)));
+  report((name + ", with a force sensor").c_str(),
+         judgeDay(standard, calibration, day("with sensor", with_sensor, calibration)));
   std::printf(
       "Cheng & Venuvinod, Table 1, turning centre: regression Fx 29, Fy (tangential) 36, Fz 27 N; ANFIS Fy "
       "34, Fz "
@@ -91,16 +91,15 @@ void run(int cuts, unsigned seed, double warmer, const std::string& out) {
 
 int main(int argc, char** argv) {
   CommandLine line(
-      "Motor currents of the simulated machine to forces: regression and ANFIS learnt on one day, tried on "
-      "another "
-      "of other warmth, and the one estimator of all sensors.");
+      "Forces from motor currents of the simulated machine: regression and ANFIS trained on one day and "
+      "tested on a day with another temperature, and the estimator of all sensors.");
   int cuts = 60;
   unsigned seed = 1;
   double warmer = 15.0;
   std::string out;
-  line.option("--cuts", cuts, "a day").showDefault().within(24, 10000);
+  line.option("--cuts", cuts, "cuts per day").showDefault().within(24, 10000);
   line.option("--seed", seed, "of the first day").showDefault();
-  line.option("--warmer", warmer, "the other day, K").showDefault();
+  line.option("--warmer", warmer, "temperature difference of the other day [K]").showDefault();
   line.option("-o", out, "calibration file for loadmeter_node (motor_calibration)");
   return runProgram(line, argc, argv, [&] { run(cuts, seed, warmer, out); });
 }

@@ -44,12 +44,12 @@ struct Request {
   StudyCase one;
 };
 
-/// One drawn machine at one step. @param millivolt of the rounding
+/// One random machine at one resolution. @param millivolt resolution
 void tryMachine(const Request& request, double millivolt, int number, Step& step) {
   Faults faults;
   faults.resolution = millivolt * MILLIVOLT;
   faults.noise = request.noise_mv * MILLIVOLT;
-  faults.depth_error = 0.0;  // what remains is the meter's
+  faults.depth_error = 0.0;  // only the load meter has errors
   const CaseErrors e = judge(drawCase(request.seed + static_cast<unsigned>(number), faults), faults);
   step.add(100.0 * std::abs(e.thesis_ktc), 100.0 * std::abs(e.ktc), std::abs(e.z_ktc) < 1.96);
 }
@@ -86,7 +86,7 @@ void report(const Request& request, const std::vector<Step>& steps) {
   plot.block("steps", rows);
   plot << "set grid\nset logscale xy\nset key top left\nset xlabel 'Rounding of the load meter [mV]'\n"
           "set ylabel 'Error of Ktc [%]'\nset arrow from 0.3, graph 0 to 0.3, graph 1 nohead dt 2 lc 'gray'\n"
-          "plot $steps using 1:2 with linespoints lc 'gray' lw 2 title 'thesis to the letter, median', "
+          "plot $steps using 1:2 with linespoints lc 'gray' lw 2 title 'thesis procedure, median', "
           "$steps using 1:3 with linespoints lc 'gray' dt 2 title '95 %', "
           "$steps using 1:4 with linespoints lc rgb '#0060ad' lw 2 title 'this package, median', "
           "$steps using 1:5 with linespoints lc rgb '#0060ad' dt 2 title '95 %'\n";
@@ -121,12 +121,12 @@ void run(const Request& request) {
 
 int main(int argc, char** argv) {
   CommandLine line(
-      "Error of Ktc over the rounding of the load meter (0.3 mV as the thesis has it, and coarser).");
+      "Error of Ktc over the resolution of the load meter (0.3 mV as in the thesis, and coarser).");
   Request request;
-  request.one.addTo(line, "--cases", request.cases, "drawn machines for each step");
+  request.one.addTo(line, "--cases", request.cases, "random machines for each resolution");
   request.one.addScore(line);
   line.option("--seed", request.seed, "of the first").showDefault();
-  line.option("--noise-mv", request.noise_mv, "before rounding, root mean square")
+  line.option("--noise-mv", request.noise_mv, "RMS noise before rounding [mV]")
       .showDefault()
       .within(0.0, 1000.0);
   line.option("-o", request.folder, "folder of the picture").required();

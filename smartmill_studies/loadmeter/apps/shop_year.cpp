@@ -1,4 +1,4 @@
-// rosrun smartmill_studies loadmeter_shop_year: does a database that compiles itself learn?
+// rosrun smartmill_studies loadmeter_shop_year: learning of a database that is filled by the cuts.
 
 #include <algorithm>
 #include <cmath>
@@ -18,15 +18,15 @@ namespace {
 using namespace smartmill;             // NOLINT
 using namespace smartmill::loadmeter;  // NOLINT
 
-constexpr double LAST_PART = 0.7;  // of the year's days, from there on
+constexpr double LAST_PART = 0.7;  // start of the last part, as share of the year
 
-/// What was asked in some part of the year.
+/// Queries of one part of the year.
 struct Part {
   std::vector<double> errors;
-  int asked = 0, inside = 0;
+  int queries = 0, inside = 0;
 
   void add(const ShopJob& job) {
-    ++asked;
+    ++queries;
     if (!job.answered) return;
     errors.push_back(100.0 * job.error);
     inside += job.inside;
@@ -38,14 +38,14 @@ struct Part {
   }
   void print(const char* name) {
     const double count = static_cast<double>(errors.size());
-    std::printf("%-28s %5d %8zu %8.1f %8.1f %8.1f %%\n", name, asked, errors.size(), at(0.5), at(0.95),
+    std::printf("%-28s %5d %8zu %8.1f %8.1f %8.1f %%\n", name, queries, errors.size(), at(0.5), at(0.95),
                 errors.empty() ? std::nan("") : 100.0 * inside / count);
   }
 };
 
 void print(const std::vector<ShopJob>& jobs, int days) {
   constexpr double ENDS[] = {0.0, 0.02,      0.06, 0.16,
-                             0.4, LAST_PART, 1.0};  // of the year: most is learnt early
+                             0.4, LAST_PART, 1.0};  // as shares of the year: most is learnt early
   std::printf("%-28s %5s %8s %8s %8s %10s\n", "days", "jobs", "answered", "median %", "95 % [%]",
               "inside 95 %");
   for (std::size_t part = 0; part + 1 < std::size(ENDS); ++part) {
@@ -78,7 +78,7 @@ void save(const std::vector<ShopJob>& jobs, const std::string& file) {
   csv.save(file);
 }
 
-/// What a year came to, of all jobs and of those of its last part.
+/// Results of a year, for all jobs and for those of its last part.
 nlohmann::json lineOf(int number, const std::vector<ShopJob>& jobs, int days) {
   nlohmann::json line{{"case", number}};
   const auto add = [&](const std::string& name, const auto& belongs) {
@@ -86,7 +86,7 @@ nlohmann::json lineOf(int number, const std::vector<ShopJob>& jobs, int days) {
     for (const ShopJob& job : jobs)
       if (belongs(job)) part.add(job);
     const auto answered = static_cast<double>(part.errors.size());
-    line[name] = {{"jobs", part.asked},
+    line[name] = {{"jobs", part.queries},
                   {"answered", part.errors.size()},
                   {"median_percent", part.at(0.5)},
                   {"percent_95", part.at(0.95)},
@@ -122,16 +122,16 @@ void report(const std::vector<nlohmann::json>& lines) {
 
 int main(int argc, char** argv) {
   CommandLine line(
-      "A year of a shop whose database starts empty and keeps every cut: how wrong its answers are.");
+      "A year of a shop whose database starts empty and stores every cut: errors of its estimates.");
   ShopOptions options;
   std::string out;
   int shops = 1;
   StudyCase one;
-  one.addTo(line, "--cases", shops, "shops, for --case: each a year of its own");
+  one.addTo(line, "--cases", shops, "number of shops, for --case");
   one.addScore(line);
   line.option("--days", options.days, "working days (250)");
-  line.option("--jobs", options.jobs, "a day (4)");
-  line.option("--cuts", options.cuts, "a job (4)");
+  line.option("--jobs", options.jobs, "jobs per day (4)");
+  line.option("--cuts", options.cuts, "cuts per job (4)");
   line.option("--tools", options.tools, "(8)");
   line.option("--materials", options.materials, "(6)");
   line.option("--seed", options.seed, "(1)");
@@ -143,7 +143,7 @@ int main(int argc, char** argv) {
       options.seed = static_cast<unsigned>(seedOfCase(options.seed, one.number));
       return one.print(lineOf(one.number, shopYear(options), options.days));
     }
-    if (shops > 1) throw UsageError("--cases: goes with --case");
+    if (shops > 1) throw UsageError("--cases: requires --case");
     const auto jobs =
         shopYear(options, [](double share) { std::fprintf(stderr, "\r%3.0f %%", 100.0 * share); });
     std::fprintf(stderr, "\n");

@@ -34,7 +34,7 @@ TEST(Scene, runoutMovesMaterialFromToothToToothWhileAllCut) {
   EXPECT_NE(straight[200], offset[200]);
 }
 
-// Against summed slices, teeth that miss part of their arc among them.
+// Comparison with summed slices, including teeth that miss a segment of their arc.
 TEST(RunoutTorque, isTheTorqueOfTheSlices) {
   for (const double offset : {0.0, 8e-6, 40e-6, 90e-6}) {
     for (const double helix : {0.0, 0.5}) {
@@ -56,7 +56,7 @@ TEST(RunoutTorque, isTheTorqueOfTheSlices) {
           const double at = unit * closed.at(units::TWO_PI * static_cast<double>(i) / STEPS)[u];
           error2 += (at - slices[i]) * (at - slices[i]) / STEPS;
         }
-        // 24 slices: a step of the edge's torque at each entry and exit.
+        // 24 slices give a step of the edge torque at each entry and exit.
         EXPECT_LT(std::sqrt(error2), 0.03 * mean) << offset << " " << helix;
       }
     }
@@ -77,7 +77,7 @@ TEST(Cases, ktcIsWithinThreeAndSixPercentAndHonest) {
   std::sort(errors.begin(), errors.end());
   EXPECT_LT(errors[count / 2], 0.03);
   EXPECT_LT(errors[static_cast<std::size_t>(0.95 * count)], 0.06);
-  EXPECT_TRUE(ktc.honest(0.0, 2.0));
+  EXPECT_TRUE(ktc.isCalibrated(0.0, 2.0));
 }
 
 }  // namespace

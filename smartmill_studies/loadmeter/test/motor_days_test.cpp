@@ -8,8 +8,8 @@
 namespace smartmill::loadmeter {
 namespace {
 
-// The chain whole: the twin's motors, phase currents at 1 kHz, ranges, standard cuts, forces; then a day 15 K
-// warmer with the calibration of the first.
+// The complete chain: motors of the twin, phase currents at 1 kHz, ranges, standard cuts, forces; then a day
+// 15 K warmer with the calibration of the first.
 TEST(MotorDays, currentsOfTheTwinBecomeForces) {
   MotorDay day;
   day.cuts = 40;
@@ -31,15 +31,15 @@ TEST(MotorDays, currentsOfTheTwinBecomeForces) {
     std::printf("regression %.1f, ANFIS %.1f, old air %.1f N; estimate %.1f N, inside %.2f, dynamic %.2f\n",
                 errors.regression[a], errors.anfis[a], errors.old_air[a], errors.estimate[a],
                 errors.inside[a], errors.inside_rms[a]);
-  // Windows of one cut share their errors: 12 cuts, each inside with 95 %.
+  // Windows of one cut share their errors: 12 cuts with a coverage of 95 % each.
   for (std::size_t a = 0; a < 3; ++a) {
     std::printf("windows: %.1f N, inside %.2f, dynamic %.2f\n", errors.window[a], errors.inside_window[a],
                 errors.inside_window_rms[a]);
     EXPECT_GT(errors.inside_window[a], 0.8);
     EXPECT_GT(errors.inside_window_rms[a], 0.8);
   }
-  // The drives follow to 60 Hz, as moves in rapid traverse told; the variation of the axes that move is known
-  // to few newtons then (8 N by mean forces and mechanics alone), and as well as it is stated.
+  // The drives follow up to 60 Hz, as identified by rapid moves; the variation of moving axes is then
+  // accurate to a few newtons (8 N by mean forces and mechanics alone), as stated.
   for (std::size_t a = 0; a < 2; ++a) {
     ASSERT_TRUE(warm.back().bandwidth[a]);
     EXPECT_NEAR(warm.back().bandwidth[a]->value, 60.0, 3.0 * warm.back().bandwidth[a]->std_dev);
@@ -52,7 +52,7 @@ TEST(MotorDays, currentsOfTheTwinBecomeForces) {
   EXPECT_LT(errors.regression[0], 10.0);
   EXPECT_LT(errors.regression[1], 10.0);
   EXPECT_LT(errors.regression[2], 36.0);
-  // Friction of the warm day taken for that of the cold one costs its change, 12 % of 150 N.
+  // Using the friction of the wrong day adds its change, 12 % of 150 N.
   EXPECT_GT(errors.old_air[0], errors.regression[0]);
   for (const MotorCut& cut : warm) {
     ASSERT_TRUE(cut.estimate);
@@ -65,8 +65,8 @@ TEST(MotorDays, currentsOfTheTwinBecomeForces) {
   }
 }
 
-// No standard cuts: the session's own slots beside the twin's dynamometer, by the Hall sensors and by a
-// record of Servo Guide that begins at the block which feeds.
+// No standard cuts: slots of the session with the dynamometer of the twin, by the Hall sensors and by a
+// record of Servo Guide that begins at the feed block.
 TEST(MotorDays, aSessionCalibratesItself) {
   for (const bool servo : {false, true}) {
     MotorDay day;
@@ -81,7 +81,7 @@ TEST(MotorDays, aSessionCalibratesItself) {
       const auto& drive = cuts.back().learnt->drive[a];
       if (!drive) continue;
       ++drives;
-      // AxisDrive has 628 N/A of the current that makes force, MotorTraits 200 N/A of a phase's range.
+      // AxisDrive has 628 N/A of the force-producing current, MotorTraits 200 N/A of the range of a phase.
       const double truth = servo ? 628.0 : 200.0;
       EXPECT_NEAR(drive->newton_per_ampere.value, truth, 3.0 * drive->newton_per_ampere.std_dev)
           << servo << a;

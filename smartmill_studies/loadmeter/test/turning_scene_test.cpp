@@ -48,7 +48,7 @@ TEST(AnfisLearning, hybridRuleLearnsWhatALineCannot) {
   double squares = 0.0;
   for (std::size_t i = 0; i < unseen.size(); ++i) squares += std::pow(trained(unseen[i]) - truth[i], 2);
   EXPECT_LT(std::sqrt(squares / 200.0), 0.25);  // of a range of 30
-  EXPECT_THAT(errorOf([&] { trained({1.0}); }), HasSubstr("2 inputs are due"));
+  EXPECT_THAT(errorOf([&] { trained({1.0}); }), HasSubstr("expected 2 inputs"));
 }
 
 TEST(Variances, splitAndFTestAreThoseOfTheFormulas) {
@@ -67,16 +67,16 @@ TEST(TurningScene, errorsAndVariancesAreThoseThatWerePutIn) {
   const TurningResult r = studyTurning(3, v, 200);
   EXPECT_NEAR(r.z.slope.value, 215.9, 0.03 * 215.9);
   EXPECT_NEAR(r.x.slope.value, -198.45,
-              0.25 * 198.45);  // 15 cuts; noise of the current flattens a regression
+              0.25 * 198.45);  // 15 cuts; noise of the current reduces the slope
   EXPECT_GT(r.fit_y, 0.98);
-  // The sensor's noise is the floor of the prediction, the paper's errors are the ceiling.
+  // The error of the prediction is between the noise of the sensor and the errors of the paper.
   EXPECT_GT(r.regression.rmse[1], 0.9 * std::sqrt(v.sensor[1]));
   EXPECT_LT(r.regression.rmse[0], 29.0);
   EXPECT_LT(r.regression.rmse[1], 36.0);
   EXPECT_LT(r.regression.rmse[2], 27.0);
   EXPECT_LT(r.anfis.rmse[1], 34.0);
   EXPECT_LT(r.anfis.rmse[2], 21.0);
-  // 200 replications know a variance to 10 %; the difference of two to about 20 %.
+  // 200 replications give a variance to 10 %, and the difference of two to about 20 %.
   EXPECT_NEAR(r.fy.process_variance, v.process[1], 0.3 * v.process[1]);
   EXPECT_NEAR(r.fz.process_variance, v.process[2], 0.3 * v.process[2]);
   EXPECT_NEAR(r.fy.sensor_variance, v.sensor[1], 0.6 * v.sensor[1]);
@@ -84,7 +84,8 @@ TEST(TurningScene, errorsAndVariancesAreThoseThatWerePutIn) {
   EXPECT_LT(r.fy.p_variances, 1e-6);
 }
 
-// The turning centre's 120 cuts as the two tables: forces of the remote dynamometer, this machine's currents.
+// The 120 cuts of the turning centre as two tables: forces of the remote dynamometer and currents of this
+// machine.
 struct Tables {
   TurningCentre centre{3, {}};
   std::string standard, currents;
@@ -99,7 +100,7 @@ struct Tables {
     int number = 0;
     for (const TurningCut& c : centre.calibrationTests(120)) {
       const std::string name = "c" + std::to_string(number++);
-      // The dynamometer shows the passive force too; the axis at rest has no current beside it.
+      // The dynamometer measures also the passive force; the axis at rest has no current.
       forces << name << "," << c.force[0] << "," << c.force[2] << ","
              << c.force[1] * (c.radius + 0.5 * c.depth) << "\n";
       machine << name << "," << c.speed_rpm << ",";
@@ -121,12 +122,13 @@ TEST(StandardCuts, giveTheLawsOfTheTurningCentre) {
   const MotorCalibration c = readMotorCalibration(folder.file("motors.yaml"));
   ASSERT_TRUE(c.drive[0] && c.drive[2] && c.spindle);
   EXPECT_FALSE(c.drive[1]);
-  // Table 1: weight pulls the X slide, its slope is negative. Noise of the current flattens slopes a little.
+  // Table 1: weight pulls the X slide, its slope is negative. Noise of the current reduces slopes slightly.
   EXPECT_NEAR(c.drive[0]->newton_per_ampere.value, -198.45,
               4.0 * c.drive[0]->newton_per_ampere.std_dev + 6.0);
   EXPECT_NEAR(c.drive[2]->newton_per_ampere.value, 215.9, 4.0 * c.drive[2]->newton_per_ampere.std_dev);
   EXPECT_EQ(c.drive[2]->newton_per_ampere.value, made.drive[2]->newton_per_ampere.value);  // 17 digits
-  // 300 cuts the calibration has not seen: scatter stated is scatter met. Table 2: sensor 260 N2 for Fz.
+  // 300 cuts outside the calibration: the stated scatter agrees with the observed one. Table 2: sensor 260 N2
+  // for Fz.
   double squares = 0.0, n = 0.0, torque2 = 0.0, all = 0.0;
   for (const TurningCut& cut : tables.centre.predictionTests(300)) {
     if (cut.moves_z) {

@@ -23,7 +23,8 @@ namespace {
 
 constexpr double RADIUS = 10e-3, STEP = 1e-3;  // [m], [rad]
 
-/// A tool at rest in its axis over some turns: chips [m] of each tooth over the last one's angle.
+/// A tool without vibration over some revolutions: chip thickness [m] of each tooth over its angle in the
+/// last one.
 std::vector<std::vector<double>> chipsOf(const std::vector<double>& offsets, double feed_per_tooth) {
   const std::size_t teeth = offsets.size();
   Front front(RADIUS, teeth, STEP);
@@ -45,7 +46,7 @@ double largest(const std::vector<double>& values) {
   return *std::max_element(values.begin(), values.end());
 }
 
-// What teeth take away in a turn is what the tool moved on, whatever each of them takes.
+// The area removed per revolution equals the feed times the width, whatever the share of each tooth.
 TEST(Front, TeethTakeAwayWhatTheToolMovesOn) {
   for (const std::vector<double>& offsets : {std::vector<double>{0, 0, 0, 0}, {12e-6, 0, -12e-6, 0}, {0}}) {
     const double feed = 0.06e-3;
@@ -115,7 +116,7 @@ TEST(PlateSensor, ShowsAForceAtRestAsItIs) {
   for (std::size_t c = 0; c < 3; ++c) {
     for (std::size_t a = 0; a < 3; ++a) {
       double sum = 0.0;
-      for (const SensorMode& m : modesOf(p)) sum += m.shown[c] * m.driven[a];
+      for (const SensorMode& m : modesOf(p)) sum += m.output[c] * m.input[a];
       EXPECT_NEAR(sum, c == a ? 1.0 : 0.0, 1e-9);
     }
   }
@@ -159,8 +160,8 @@ Plant rigidPlant() {
   return p;
 }
 
-// Mean forces of a slot (Altintas): Fx = -N a (Krc c / 4 + Kre / pi) and so on; the true path of the teeth is
-// left out there and worth some 0.1 %.
+// Mean forces of a slot (Altintas): Fx = -N a (Krc c / 4 + Kre / pi) and so on; they neglect the true tooth
+// path, which contributes about 0.1 %.
 TEST(Machine, MeanForcesOfASlot) {
   std::mt19937_64 random(1);
   RunOptions o;
@@ -185,7 +186,7 @@ TEST(Machine, MeanForcesOfASlot) {
   }
 }
 
-// The same of a bull-nose mill: its edge and what a chip gets, along a quarter of a circle in closed form.
+// The same for a bull-nose mill: integrals over its quarter-circle edge in closed form.
 TEST(Machine, MeanForcesOfABullNoseInASlot) {
   std::mt19937_64 random(1);
   RunOptions o;
@@ -214,8 +215,8 @@ TEST(Machine, MeanForcesOfABullNoseInASlot) {
   }
 }
 
-// Records of another independent program, which follows the classical rule for chips: the true path of the
-// teeth differs by 0.2 % of a chip at 0.1 mm a tooth. Noise: 1 N, 0.05 um.
+// Records of an independent program with the classical chip thickness; the true tooth path differs by 0.2 %
+// of a chip at 0.1 mm per tooth. Noise: 1 N, 0.05 um.
 TEST(Machine, MeetsRecordsOfAnotherProgram) {
   SMARTMILL_SHARED_DATA(folder, "campaigns/vibrating_none");
   const Campaign campaign = readCampaign(folder);
@@ -240,8 +241,8 @@ TEST(Machine, MeetsRecordsOfAnotherProgram) {
   }
 }
 
-// The twin's share of the teeth's path, from the rule of formats.md (0) to what lies on a machine (1): a slot
-// in which the tool swings far while it turns little.
+// Weight of the true tooth path in the twin, from the rule of formats.md (0) to the true path (1): a slot
+// with large vibration per rotation angle.
 TEST(Machine, LeavesTheSurfaceOfTheTeethsPath) {
   MachineModel model;
   model.tool = rigidPlant().tool;
@@ -278,7 +279,7 @@ TEST(Machine, LeavesTheSurfaceOfTheTeethsPath) {
   }
 }
 
-// The plant knows its acceleration in closed form, the twin derives it from the recorded position.
+// The plant has its acceleration in closed form, the twin derives it from the recorded position.
 TEST(Machine, MovesAMassAsTheTwinDoes) {
   MachineModel model;
   model.tool = rigidPlant().tool;
@@ -309,7 +310,7 @@ TEST(Machine, MovesAMassAsTheTwinDoes) {
   for (const char* still : {"fx", "fz"}) EXPECT_NEAR(plant.column(still)[4000], 0.0, 1e-9);
 }
 
-// The effects act by the plant's own means, each in one of these tests at least.
+// Each effect of the plant's own implementation acts in at least one of these tests.
 TEST(Machine, HasEveryEffectOfTheCatalogue) {
   MachineModel model;
   model.tool = rigidPlant().tool;

@@ -1,7 +1,6 @@
-// How long it takes to read a session: every message of a recording of 473 MB is decoded, by this project's
-// reader and by that of ROS (rosbag::View). 473 MB and 6128 messages are the size of the bag with which
-// embag's authors compare readers (3.3 s in C++, lz4; github.com/embarktrucks/embag). The file is in the page
-// cache.
+// Time to read a session: decodes every message of a recording of 473 MB with the reader of this project and
+// with that of ROS (rosbag::View). 473 MB and 6128 messages are the size of the bag with which embag's
+// authors compare readers (3.3 s in C++, lz4; github.com/embarktrucks/embag). The file is in the page cache.
 
 #include <cmath>
 #include <cstdint>
@@ -48,10 +47,10 @@ SampleBlock blockOf(std::size_t number, std::size_t samples, std::mt19937& rando
   return block;
 }
 
-/// [byte] of a file with so many messages
+/// [byte] size of a file with a number of messages
 std::uint64_t write(const std::string& path, RecordingCompression compression, std::size_t messages,
                     std::size_t samples) {
-  // A few blocks in turn: the file must be large, not the time to simulate it.
+  // A few blocks in turn, to save simulation time.
   constexpr std::size_t DIFFERENT = 50;
   std::mt19937 random(1);
   std::vector<SampleBlock> blocks;
@@ -63,14 +62,14 @@ std::uint64_t write(const std::string& path, RecordingCompression compression, s
   return std::filesystem::file_size(path);
 }
 
-/// The recording of an ending and a compression; made at the first call.
+/// The recording for a file extension and a compression; made at the first call.
 const std::string& recording(const std::string& ending, RecordingCompression compression) {
   static const TemporaryFolder FOLDER;
   static std::map<std::pair<std::string, RecordingCompression>, std::string> made;
   std::string& path = made[{ending, compression}];
   if (!path.empty()) return path;
   path = FOLDER.file("session" + std::to_string(made.size()) + ending);
-  // The samples in a block are chosen such that the compressed file has its size.
+  // The number of samples per block gives the compressed file its size.
   constexpr std::size_t FEW = 200, TRIAL = 3000;
   const std::uint64_t trial = write(path, compression, FEW, TRIAL);
   const double byte_each = static_cast<double>(trial) / FEW / TRIAL;
@@ -79,7 +78,7 @@ const std::string& recording(const std::string& ending, RecordingCompression com
   return path;
 }
 
-/// @param samples that were decoded, all channels
+/// @param samples decoded samples of all channels
 void counters(benchmark::State& state, const std::string& path, std::size_t messages, std::size_t samples) {
   const auto size = static_cast<double>(std::filesystem::file_size(path));
   state.counters["file_MB"] = size / 1e6;

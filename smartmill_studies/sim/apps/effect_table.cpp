@@ -1,5 +1,5 @@
 // rosrun smartmill_studies sim_effect_table docs/effects.md: writes the catalogue of effects into the
-// document that people read.
+// documentation.
 
 #include <string>
 

@@ -1,5 +1,4 @@
-// How much faster than the machine the twin runs on one core: real_time_factor is seconds of record per
-// second.
+// Speed of the twin on one core: real_time_factor is seconds of record per second.
 
 #include <benchmark/benchmark.h>
 

@@ -42,7 +42,7 @@ struct Request {
     p.risk = risk;
     return p;
   }
-  /// [m] of a case, evenly from the shortest to the longest.
+  /// [m] overhang of a case, at even distances from the shortest to the longest.
   double overhang(int number) const {
     const auto [low, high] = pairOf("--overhangs-mm", overhangs);
     return (low + (high - low) * number / std::max(1, cases - 1)) * units::MM;
@@ -51,19 +51,19 @@ struct Request {
     double low = 0.0, high = 0.0;
     char rest = 0;
     if (std::sscanf(text.c_str(), "%lf:%lf%c", &low, &high, &rest) != 2 || !(low > 0.0) || !(high > low))
-      throw UsageError(std::string(option) + " " + text + ": LO:HI is due, 0 < LO < HI");
+      throw UsageError(std::string(option) + " " + text + ": expected LO:HI with 0 < LO < HI");
     return {low, high};
   }
 };
 
-/// Numbers of a line with so many digits as matter.
+/// Numbers of a line with their significant digits.
 double rounded(double value) {
   return std::isfinite(value) ? std::stod(formatted("%.6g", value)) : value;
 }
 
 json lineOf(const Request& request, int number) {
   const bool swept = !request.overhangs.empty();
-  // A tool whose overhang is swept is one tool, measured once and for all with the same errors.
+  // The cases of an overhang sweep share one tool with the same measurement errors.
   std::mt19937_64 random(swept ? request.seed : seedOfCase(request.seed, number));
   stability::ChartMachine machine = stability::drawChartMachine(random);
   if (swept) machine.setOverhang(request.overhang(number));
@@ -82,7 +82,7 @@ json lineOf(const Request& request, int number) {
     limits.push_back(rounded(found.chart.limit.depth[k] / units::MM));
   }
   line["speeds_rpm"] = speeds;
-  line["limits_mm"] = limits;  // null: none down to the deepest cut that is looked at
+  line["limits_mm"] = limits;  // null: stable at the largest depth of the search
   if (found.chart.recommended.empty()) return line;
   const StabilityPoint& best = found.chart.recommended.front();
   line["best"] = {{"speed_rpm", rounded(units::rpmFromRadPerSec(best.spindle_speed))},
@@ -111,7 +111,7 @@ void report(const std::vector<json>& lines) {
   if (count == 0) return;
   std::printf("best removal rate [cm3/min]: median %.1f, 5 %% %.1f, 95 %% %.1f\n", median(removal),
               percentile(removal, 0.05), percentile(removal, 0.95));
-  std::printf("its depth over the depth stable at any speed: median %.2f, 95 %% %.2f\n", median(gain),
+  std::printf("its depth over the critical limit: median %.2f, 95 %% %.2f\n", median(gain),
               percentile(gain, 0.95));
   const auto interval = stability::wilson(chatter, count);
   std::printf(
@@ -137,19 +137,18 @@ void run(const Request& request) {
 int main(int argc, char** argv) {
   Request request;
   CommandLine line{
-      "Stability charts in bulk: of many drawn machines, or of one drawn machine over its tool's overhang. "
-      "Each is measured with errors; the chart's best point is tried on the true machine."};
-  request.one.addTo(line, "--cases", request.cases, "machines, or overhangs");
+      "Stability charts in bulk: of many random machines, or of one random machine over the overhang of its "
+      "tool. Each is measured with errors; the best point of the chart is tested on the true machine."};
+  request.one.addTo(line, "--cases", request.cases, "number of machines or overhangs");
   request.one.addScore(line);
-  line.option("--seed", request.seed, "of the machines and of what is measured of them").showDefault();
-  line.option("--overhangs-mm", request.overhangs,
-              "LO:HI one machine, a chart for each of so many overhangs");
+  line.option("--seed", request.seed, "of the machines and of their measurement").showDefault();
+  line.option("--overhangs-mm", request.overhangs, "LO:HI one machine, one chart for each overhang");
   line.option("--speeds", request.range, "LO:HI [rpm]").showDefault();
-  line.option("--lines", request.speeds, "speeds of a chart").within(2, 100000).showDefault();
+  line.option("--lines", request.speeds, "number of speeds of a chart").within(2, 100000).showDefault();
   line.option("--entry-deg", request.entry_deg, "immersion angle at which a tooth enters").showDefault();
   line.option("--exit-deg", request.exit_deg, "immersion angle at which a tooth leaves").showDefault();
   line.option("--method", request.method, "of the chart: zero_order or collocation").showDefault();
-  line.option("--risk", request.risk, "of chatter that a recommended point may have")
+  line.option("--risk", request.risk, "largest probability of chatter of a recommended point")
       .within(0.0, 0.5)
       .showDefault();
   return runProgram(line, argc, argv, [&] { run(request); });

@@ -34,11 +34,11 @@ double quantile(std::vector<double> values, double share) {
 void print(const std::vector<stability::ControlCut>& cuts) {
   std::vector<double> after_onset, after_request, thinking;
   double removal = 0.0, careful = 0.0, ended_removal = 0.0, ended_careful = 0.0;
-  int asked = 0, once = 0, floor = 0, said = 0, next = 0;
+  int requested = 0, once = 0, floor = 0, said = 0, next = 0;
   for (const stability::ControlCut& cut : cuts) {
     removal += cut.removal / static_cast<double>(cuts.size());
     careful += cut.careful / static_cast<double>(cuts.size());
-    asked += cut.moves > 0;
+    requested += cut.moves > 0;
     if (cut.moves > 0) thinking.push_back(cut.thinking / cut.moves);
     floor += !cut.end();
     said += !cut.end() && cut.next_speed > 0.0;
@@ -48,13 +48,13 @@ void print(const std::vector<stability::ControlCut>& cuts) {
     ended_removal += cut.removal;
     ended_careful += cut.careful;
     after_onset.push_back(cut.ended - cut.onset);
-    after_request.push_back(cut.ended - cut.asked);
+    after_request.push_back(cut.ended - cut.requested);
   }
   const auto ended = static_cast<double>(after_onset.size());
   std::printf(
-      "%zu cuts that chatter: overrides asked for in %d, chatter ended in %.0f (%d by one move), not ended "
-      "%d; of these a next cut was said for %d, stable in %d\n",
-      cuts.size(), asked, ended, once, floor, said, next);
+      "%zu cuts that chatter: overrides requested in %d, chatter ended in %.0f (%d by one change), not ended "
+      "%d; of these a next cut was recommended for %d, stable in %d\n",
+      cuts.size(), requested, ended, once, floor, said, next);
   std::printf(
       "revolutions from the onset to the end: median %.0f, 95 %% %.0f; from the first request: median %.0f, "
       "95 %% %.0f\n",
@@ -64,7 +64,7 @@ void print(const std::vector<stability::ControlCut>& cuts) {
       "removal rate over the programmed one, all cuts: %.3f, an operator who halves the depth: %.3f (times "
       "%.2f); where ended: %.3f against %.3f\n",
       removal, careful, removal / careful, ended_removal / ended, ended_careful / ended);
-  std::printf("thinking, an advice: median %.2f s, longest %.2f s\n", quantile(thinking, 0.5),
+  std::printf("computing time of an advice: median %.2f s, longest %.2f s\n", quantile(thinking, 0.5),
               quantile(thinking, 1.0));
 }
 
@@ -74,9 +74,9 @@ void save(const std::vector<stability::ControlCut>& cuts, const std::string& fil
       "mm,next_stable,said",
       7);
   for (const stability::ControlCut& c : cuts)
-    csv.row(units::rpmFromRadPerSec(c.speed), c.depth / units::MM, c.limit / units::MM, c.onset, c.asked,
+    csv.row(units::rpmFromRadPerSec(c.speed), c.depth / units::MM, c.limit / units::MM, c.onset, c.requested,
             c.ended, c.moves, c.spindle, c.feed, c.removal, c.careful, units::rpmFromRadPerSec(c.next_speed),
-            c.next_depth / units::MM, static_cast<int>(c.next_stable), c.said);
+            c.next_depth / units::MM, static_cast<int>(c.next_stable), c.reason);
   csv.save(file);
 }
 
@@ -86,7 +86,7 @@ nlohmann::json lineOf(int number, const stability::ControlCut& c) {
           {"depth_mm", c.depth / units::MM},
           {"limit_mm", c.limit / units::MM},
           {"onset_rev", c.onset},
-          {"asked_rev", c.asked},
+          {"asked_rev", c.requested},
           {"ended_rev", c.ended},
           {"ended", c.end()},
           {"moves", c.moves},
@@ -97,7 +97,7 @@ nlohmann::json lineOf(int number, const stability::ControlCut& c) {
           {"next_rpm", units::rpmFromRadPerSec(c.next_speed)},
           {"next_mm", c.next_depth / units::MM},
           {"next_stable", c.next_stable},
-          {"said", c.said},
+          {"said", c.reason},
           {"thinking", c.thinking}};
 }
 
@@ -107,7 +107,7 @@ stability::ControlCut cutOf(const nlohmann::json& line) {
   c.depth = line.at("depth_mm").get<double>() * units::MM;
   c.limit = line.at("limit_mm").get<double>() * units::MM;
   c.onset = line.at("onset_rev");
-  c.asked = numberOf(line, "asked_rev");
+  c.requested = numberOf(line, "asked_rev");
   c.ended = numberOf(line, "ended_rev");
   c.moves = line.at("moves");
   c.spindle = line.at("spindle");
@@ -117,7 +117,7 @@ stability::ControlCut cutOf(const nlohmann::json& line) {
   c.next_speed = units::radPerSecFromRpm(line.at("next_rpm"));
   c.next_depth = line.at("next_mm").get<double>() * units::MM;
   c.next_stable = line.at("next_stable");
-  c.said = line.at("said");
+  c.reason = line.at("said");
   c.thinking = line.at("thinking");
   return c;
 }
@@ -158,11 +158,10 @@ void run(const Request& request) {
 int main(int argc, char** argv) {
   Request request;
   CommandLine line{
-      "Chatter control of simulated cuts on machines that differ from the believed one: overrides of spindle "
-      "and feed "
-      "end the chatter, against an operator who halves the depth."};
+      "Chatter control of simulated cuts on machines that differ from their model: overrides of spindle and "
+      "feed that end the chatter, compared with an operator who halves the depth."};
   request.addTo(line);
-  request.one.addTo(line, "--cuts,--cases", request.cuts, "how many");
+  request.one.addTo(line, "--cuts,--cases", request.cuts, "number of cuts");
   request.one.addScore(line);
   line.option("--frequency-percent", request.frequency, "standard deviation of the modes' frequencies (2)");
   line.option("--gain-percent", request.gain, "of damping, compliance and coefficients (5)");

@@ -42,7 +42,7 @@ MachineModel machineOf(const Request& request) {
   return model;
 }
 
-/// Counts over the cuts; what went wrong is printed as it comes.
+/// Counts over the cuts; errors are printed at once.
 struct Tally {
   int stable = 0, alarms = 0, chattering = 0, found = 0, near = 0;
   double most_alternation = 0.0, energy_stable = 0.0, energy_chatter = 1.0;
@@ -55,7 +55,7 @@ struct Tally {
     const auto percent = [](int part, int of) { return of ? 100.0 * part / of : 0.0; };
     std::printf(
         "%s: %d false alarms in %d stable cuts (%.2f %%); %d of %d chattering cuts found (%.1f %%), median "
-        "%.1f revolutions after the motion stopped repeating; frequency within 1 %% in %d of %d (%.1f %%)\n",
+        "%.1f revolutions after the onset; frequency within 1 %% in %d of %d (%.1f %%)\n",
         signal.c_str(), alarms, stable, percent(alarms, stable), found, chattering,
         percent(found, chattering), delays.empty() ? std::nan("") : delays[delays.size() / 2], near, found,
         percent(near, found));
@@ -92,7 +92,7 @@ struct Tally {
     const bool right = std::abs(cut.found_frequency - cut.frequency) < 0.01 * cut.frequency;
     near += right;
     if (right) return;
-    say("another frequency", cut);
+    say("wrong frequency", cut);
     std::printf("%.1f Hz, the noiseless record %.1f Hz\n", cut.found_frequency, cut.frequency);
   }
 };
@@ -185,15 +185,15 @@ int main(int argc, char** argv) {
   Request request;
   CommandLine line{
       "Chatter detection over simulated cuts with noise, runout and sudden entry and exit. Exit code 0: at "
-      "most 1 % false alarms and at least 98 % found, 3: not so."};
+      "most 1 % false alarms and at least 98 % found, else 3."};
   request.addTo(line);
-  request.one.addTo(line, "--cuts,--cases", request.cuts, "how many");
+  request.one.addTo(line, "--cuts,--cases", request.cuts, "number of cuts");
   request.one.addScore(line);
   line.option("--teeth", request.teeth, "instead of the model's");
   line.option("--signal", request.signal, "force, vibration or sound (force)");
   line.option("--runout-um", request.runout_um, "offset of the tool's axis [um] (5)");
   line.option("--noise-n", request.noise_n, "of the force sensor, rms [N] (3)");
-  line.option("--severity", request.severity, "least severity of a verdict [N or the signal's unit]");
+  line.option("--severity", request.severity, "least severity of a detection [N or unit of the signal]");
   line.option("-o,--out", request.out, "CSV of all cuts");
   return runProgram(line, argc, argv, [&] { return run(request) ? 0 : 3; });
 }

@@ -27,10 +27,10 @@ struct Request : stability::StudyRequest {
 };
 
 struct Count {
-  int all = 0, said = 0, right = 0;
+  int all = 0, verdicts = 0, right = 0;
   void add(bool chatter, bool truth) {
     ++all;
-    said += chatter;
+    verdicts += chatter;
     right += chatter == truth;
   }
 };
@@ -38,12 +38,12 @@ using Counts = std::map<std::string, Count>;  // by kind
 
 void print(const Counts& counts) {
   int right = 0, all = 0;
-  std::printf("%-38s %6s %12s %6s\n", "kind", "scenes", "said chatter", "right");
+  std::printf("%-38s %6s %12s %6s\n", "kind", "scenes", "chatter", "right");
   for (const stability::SoundKind kind : stability::soundKinds()) {
     const auto found = counts.find(nameOf(kind));
     if (found == counts.end()) continue;
     const Count& count = found->second;
-    std::printf("%-38s %6d %12d %6d\n", nameOf(kind), count.all, count.said, count.right);
+    std::printf("%-38s %6d %12d %6d\n", nameOf(kind), count.all, count.verdicts, count.right);
     right += count.right;
     all += count.all;
   }
@@ -52,16 +52,16 @@ void print(const Counts& counts) {
 
 stability::RecordingVerdict judged(const Request& request, const MachineModel& model,
                                    const stability::SoundScene& scene) {
-  stability::RecordingRequest asked;
-  asked.speed = scene.told_speed;
-  asked.teeth = model.tool->teeth;
+  stability::RecordingRequest recording_request;
+  recording_request.speed = scene.stated_speed;
+  recording_request.teeth = model.tool->teeth;
   if (request.modes)
     for (const ModalModel* axis : {&model.tool_tip.x, &model.tool_tip.y})
-      for (const Mode& mode : axis->modes) asked.modes.push_back(mode.frequency);
-  return judgeRecording(scene.recording, asked);
+      for (const Mode& mode : axis->modes) recording_request.modes.push_back(mode.frequency);
+  return judgeRecording(scene.recording, recording_request);
 }
 
-/// One scene, its kind by turns.
+/// One scene; the kinds alternate.
 void runOne(const Request& request, const MachineModel& model, int cases) {
   request.one.check(cases);
   const auto kinds = stability::soundKinds();
@@ -93,25 +93,26 @@ void run(const Request& request) {
     kinds.insert(kinds.end(), static_cast<std::size_t>(request.each), kind);
   const int cases = request.cases > 0 ? request.cases : static_cast<int>(kinds.size());
   if (request.one.one()) return runOne(request, model, cases);
-  if (request.cases > 0) throw UsageError("--cases: goes with --case, --each says how many of each kind");
+  if (request.cases > 0) throw UsageError("--cases: requires --case; --each is the number of each kind");
   const auto scenes = soundScenes(model, request.system(model), request.range(), kinds);
   Counts counts;
-  std::string list;  // file, told and true speed [rpm], truth, kind
+  std::string list;  // file, stated and true speed [rpm], truth, kind
   for (std::size_t k = 0; k < scenes.size(); ++k) {
     const stability::SoundScene& scene = scenes[k];
     const stability::RecordingVerdict verdict = judged(request, model, scene);
     counts[nameOf(scene.kind)].add(verdict.chatter, scene.chatters);
     if (verdict.chatter != scene.chatters)
-      std::printf("scene %zu, %s, %s, %.0f rpm (told %.0f), %.2f mm: %s\n", k, nameOf(scene.kind),
+      std::printf("scene %zu, %s, %s, %.0f rpm (stated %.0f), %.2f mm: %s\n", k, nameOf(scene.kind),
                   scene.chatters ? "chatters" : "does not", units::rpmFromRadPerSec(scene.speed),
-                  units::rpmFromRadPerSec(scene.told_speed), scene.depth / units::MM, verdict.text().c_str());
+                  units::rpmFromRadPerSec(scene.stated_speed), scene.depth / units::MM,
+                  verdict.text().c_str());
     if (request.out.empty()) continue;
     SoundFile sound{scene.recording.sample_rate, scene.recording.channels};
     for (double& v : sound.channels[0]) v *= 0.2;
     const std::string file = request.out + formatted("/scene_%03zu.wav", k);
     writeWav(sound, file);
     list +=
-        formatted("%s %.2f %.2f %d %s\n", file.c_str(), units::rpmFromRadPerSec(scene.told_speed),
+        formatted("%s %.2f %.2f %d %s\n", file.c_str(), units::rpmFromRadPerSec(scene.stated_speed),
                   units::rpmFromRadPerSec(scene.speed), static_cast<int>(scene.chatters), nameOf(scene.kind));
   }
   if (!request.out.empty()) std::ofstream(request.out + "/scenes.txt") << list;
@@ -122,15 +123,14 @@ void run(const Request& request) {
 
 int main(int argc, char** argv) {
   Request request;
-  CommandLine line{"Recorded sound of many kinds, synthesised, through the judge of recordings."};
+  CommandLine line{"Chatter verdicts on synthesised sound recordings of many kinds."};
   request.addTo(line);
   line.option("--each", request.each, "scenes of each kind (10)").within(1, 1000000);
-  line.option("--cases", request.cases, "scenes, of each kind by turns, for --case (12 x EACH)")
+  line.option("--cases", request.cases, "number of scenes, with alternating kinds, for --case (12 x EACH)")
       .within(1, 1000000);
-  line.option("--case", request.one.number,
-              "only this one of them, 0.., its line of JSON on standard output");
+  line.option("--case", request.one.number, "only this case (0..): prints its line of JSON");
   request.one.addScore(line);
-  line.flag("--modes", request.modes, "the judge knows the machine's modes");
-  line.option("-o,--out", request.out, "folder that is there, for the scenes as WAV files");
+  line.flag("--modes", request.modes, "pass the modes of the machine to the verdict");
+  line.option("-o,--out", request.out, "existing folder for the scenes as WAV files");
   return runProgram(line, argc, argv, [&] { run(request); });
 }

@@ -24,7 +24,7 @@ struct Request : stability::StudyRequest {
   StudyCase one;
 };
 
-/// One machine, drawn by a seed of its own.
+/// One random machine with its own seed.
 void runOne(const Request& request, const MachineModel& model, stability::ReliabilityOptions options) {
   request.one.check(request.machines);
   options.machines = 1;
@@ -35,10 +35,10 @@ void runOne(const Request& request, const MachineModel& model, stability::Reliab
                      {"depth_mm", p.depth / units::MM},
                      {"predicted", p.predicted},
                      {"chatters", p.chatters},
-                     {"seen", p.seen}});
+                     {"seen", p.observed_chatter}});
 }
 
-/// Points of the lines that cases printed.
+/// Points from the printed lines of the cases.
 std::vector<stability::ReliabilityPoint> pointsOf(const std::string& file) {
   std::vector<stability::ReliabilityPoint> points;
   for (const nlohmann::json& line : readJsonLines(file)) {
@@ -47,7 +47,7 @@ std::vector<stability::ReliabilityPoint> pointsOf(const std::string& file) {
     p.depth = line.at("depth_mm").get<double>() * units::MM;
     p.predicted = line.at("predicted");
     p.chatters = line.at("chatters");
-    p.seen = line.at("seen");
+    p.observed_chatter = line.at("seen");
     points.push_back(p);
   }
   return points;
@@ -85,7 +85,7 @@ void report(const Request& request, const std::vector<stability::ReliabilityPoin
 void run(const Request& request) {
   const MachineModel model = request.machine();
   stability::ReliabilityOptions options{request.range()};
-  if (request.bins < 1 || request.bins > 100) throw Error("--bins: 1..100 is due");
+  if (request.bins < 1 || request.bins > 100) throw Error("--bins: expected 1..100");
   options.machines = request.machines;
   options.draws = request.draws;
   options.by_twin = !request.solver_only;
@@ -103,14 +103,14 @@ void run(const Request& request) {
 int main(int argc, char** argv) {
   Request request;
   CommandLine line{
-      "Reliability diagram of the probability of chatter: machines drawn from the model's standard "
-      "deviations, each cut once in the simulator."};
+      "Reliability diagram of the probability of chatter: machines drawn from the standard deviations of the "
+      "model, with one simulated cut each."};
   request.addTo(line);
   request.one.addTo(line, "--machines,--cases", request.machines, "drawn");
   request.one.addScore(line);
-  line.option("--draws", request.draws, "behind each prediction (200)");
-  line.option("--bins", request.bins, "of the predicted probability (4)");
-  line.flag("--solver-only", request.solver_only, "the solver is the observer too, no simulator");
+  line.option("--draws", request.draws, "draws per prediction (200)");
+  line.option("--bins", request.bins, "bins of the predicted probability (4)");
+  line.flag("--solver-only", request.solver_only, "observe by the solver instead of the simulator");
   request.addOutTo(line, "the diagram");
   return runProgram(line, argc, argv, [&] { run(request); });
 }

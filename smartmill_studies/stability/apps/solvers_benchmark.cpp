@@ -1,4 +1,4 @@
-// Cost of the solvers on the benchmark system. Times to compare with (same benchmark, one core, published or
+// Cost of the solvers on the benchmark system. Reference times (same benchmark, one core, published or
 // measured elsewhere): full discretization in Octave 24.1 s and semi-discretization 112.6 s for 101 x 51
 // points, about 1760 s for 401 x 201; numba 652 s for 400 x 200; zero-order from 8001 lines in Octave 620 ms.
 
@@ -62,7 +62,7 @@ void Boundary401(benchmark::State& state) {
 }
 BENCHMARK(Boundary401)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond);
 
-/// All multipliers of a 401 x 201 grid, as the peers count.
+/// All multipliers of a 401 x 201 grid, as in the reference times.
 void Grid401x201(benchmark::State& state) {
   const auto solver = makeFloquetSolver(Method::collocation, slot(state.range(0) == 2));
   const std::vector<double> at = speeds(401);

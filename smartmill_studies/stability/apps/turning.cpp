@@ -27,7 +27,7 @@ void run(double growth, const std::string& folder) {
   for (std::size_t s = 0; s < 3 && s < f.ours.learnt.size(); ++s) {
     std::printf("segment %zu\n", s + 1);
     row("this package", f.ours.learnt[s].machine, "");
-    row("Kim's update, read off", f.kim.segments[s].read, printed[s]);
+    row("Kim's update, peak and width", f.kim.segments[s].read, printed[s]);
   }
   std::printf(
       "vibration, rms of the last half second [um]: free %.4g, this package %.4g, Kim's update %.4g; "
@@ -40,7 +40,8 @@ void run(double growth, const std::string& folder) {
 
 int main(int argc, char** argv) {
   CommandLine line(
-      "Figures 4 to 7 of Kim's paper on the simulated lathe: his own update beside this package's control.");
+      "Figures 4 to 7 of Kim's paper on the simulated lathe: his update compared with the control of this "
+      "package.");
   double growth = 1.0;
   std::string folder;
   line.option("--growth", growth, "logarithm of the free vibration's growth over a segment of 2.048 s")

@@ -33,7 +33,7 @@ nlohmann::json lineOf(int number, const stability::AgreementPoint& p) {
           {"depth_mm", p.depth / units::MM},
           {"limit_mm", p.limit / units::MM},
           {"multiplier", p.radius},
-          {"seen", p.seen},
+          {"seen", p.observed_chatter},
           {"agrees", p.agrees()}};
 }
 
@@ -43,7 +43,7 @@ stability::AgreementPoint pointOf(const nlohmann::json& line) {
   p.depth = line.at("depth_mm").get<double>() * units::MM;
   p.limit = numberOf(line, "limit_mm") * units::MM;
   p.radius = line.at("multiplier");
-  p.seen = line.at("seen");
+  p.observed_chatter = line.at("seen");
   return p;
 }
 
@@ -58,18 +58,19 @@ bool report(const Request& request, const std::vector<stability::AgreementPoint>
     chatter += p.chatters();
     if (!p.agrees())
       std::printf("%10.1f %10.4f %10.4f %11.4f %10s %10s\n", units::rpmFromRadPerSec(p.speed),
-                  p.depth / units::MM, p.limit / units::MM, p.radius, word(p.chatters()), word(p.seen));
+                  p.depth / units::MM, p.limit / units::MM, p.radius, word(p.chatters()),
+                  word(p.observed_chatter));
   }
   const double share = 100.0 * agree / static_cast<double>(points.size());
-  std::printf("%d of %zu points agree (%.2f %%), %d of them chatter; those that differ stand above\n", agree,
-              points.size(), share, chatter);
+  std::printf("%d of %zu points agree (%.2f %%), %d of them chatter; those that differ are listed above\n",
+              agree, points.size(), share, chatter);
   if (!request.out.empty()) {
     std::ofstream csv(request.out);
     csv.precision(8);
     csv << "rpm,depth_mm,limit_mm,multiplier,solver,twin\n";
     for (const stability::AgreementPoint& p : points)
       csv << units::rpmFromRadPerSec(p.speed) << ',' << p.depth / units::MM << ',' << p.limit / units::MM
-          << ',' << p.radius << ',' << word(p.chatters()) << ',' << word(p.seen) << '\n';
+          << ',' << p.radius << ',' << word(p.chatters()) << ',' << word(p.observed_chatter) << '\n';
     csv.close();
     if (!csv) throw Error(request.out + ": cannot be written");
   }
@@ -118,17 +119,18 @@ bool run(const Request& request) {
 int main(int argc, char** argv) {
   Request request;
   CommandLine line{
-      "Compares the solver with the simulator in time at random speeds and depths outside a band around the "
-      "boundary. Exit code 0: they agree often enough, 3: they do not."};
+      "Compares the solver with the time-domain simulator at random speeds and depths outside a band around "
+      "the boundary. Exit code 0: agreement reaches --least, else 3."};
   request.addTo(line);
-  request.one.addTo(line, "--points,--cases", request.points, "how many");
+  request.one.addTo(line, "--points,--cases", request.points, "number of points");
   request.one.addScore(line);
-  line.option("--band", request.band_percent, "around the boundary, without points [% of the depth] (5)");
-  line.option("--least", request.least_percent, "agreement due [%] (98)");
+  line.option("--band", request.band_percent,
+              "width of the excluded band around the boundary [% of the depth] (5)");
+  line.option("--least", request.least_percent, "required agreement [%] (98)");
   line.option("--helix-deg", request.helix_deg, "instead of the model's [deg]");
-  line.option("--pitch-deg", request.pitch_deg, "instead of the model's, one a tooth [deg]").commas();
+  line.option("--pitch-deg", request.pitch_deg, "instead of the model's, one per tooth [deg]").commas();
   line.flag("--linear-chips", request.linear,
-            "uneven pitch: the solver takes every tooth to cut all along its arc, as linear theory has it");
+            "uneven pitch: the solver assumes that every tooth cuts along its complete arc (linear theory)");
   line.option("--feed-mm", request.feed_mm, "per tooth [mm] (0.1)");
   line.option("--revolutions", request.revolutions, "of a cut (180)");
   line.option("-o,--out", request.out, "CSV of all points");

@@ -1,4 +1,4 @@
-// Charts in bulk: what they must show whatever machine is drawn.
+// Properties of bulk charts for any random machine.
 #include "stability/bulk_charts.h"
 
 #include <cmath>
@@ -25,9 +25,9 @@ ChartParameters parameters() {
   return p;
 }
 
-// Cantilever: the tip's compliance goes with the cube of the overhang, and so, against it, does the depth
-// that is stable at every speed (Altintas and Budak, eq. 2: in proportion to 1 / (Kt G)). The spindle's own
-// compliance keeps it below the cube, the damping of both directions is one.
+// Cantilever: the tip compliance is proportional to the cube of the overhang, and the critical limit to its
+// inverse (Altintas and Budak, eq. 2: proportional to 1 / (Kt G)). The compliance of the spindle keeps it
+// below the cube; the damping of both directions is equal.
 TEST(BulkCharts, aLongerToolBearsLess) {
   std::mt19937_64 random(5);
   ChartMachine machine = drawChartMachine(random);
@@ -44,10 +44,11 @@ TEST(BulkCharts, aLongerToolBearsLess) {
     EXPECT_LE(first[k], first[k - 1]);
   }
   EXPECT_GT(least[2],
-            least[0] / 8.0 / 2.0);  // the cube from 4 to 8 diameters, and as much again for the flutes
+            least[0] / 8.0 / 2.0);  // the cube from 4 to 8 diameters, and a factor 2 for the flutes
 }
 
-// A machine that is known is cut where it is stable; one that is not chatters with the probability told.
+// A machine with exact measurements gets a stable point; one with errors chatters with the stated
+// probability.
 TEST(BulkCharts, whatIsKnownExactlyDoesNotChatter) {
   for (unsigned seed = 1; seed <= 6; ++seed) {
     std::mt19937_64 random(seed);
@@ -58,7 +59,7 @@ TEST(BulkCharts, whatIsKnownExactlyDoesNotChatter) {
   }
 }
 
-// Case 116 of the study: 1.93 mm by zero-order theory, 0.84 mm by collocation, at the fastest speed, where
+// Case 116 of the study: 1.93 mm by zero-order theory, 0.84 mm by collocation, at the highest speed, where
 // the best point of the zero-order chart chattered on the true machine and on every drawn one.
 TEST(BulkCharts, aLossThatZeroOrderTheoryDoesNotSeeIsRecommendedToNobody) {
   std::mt19937_64 random(seedOfCase(1, 116));

@@ -7,8 +7,8 @@
 namespace smartmill::stability {
 namespace {
 
-// Machines 2 % off in frequency: chatter is ended by the override in the time domain, and what is said of the
-// next cut is so.
+// Machines 2 % off in frequency: the override ends the chatter in the time domain, and the recommended next
+// cut is stable.
 TEST(ChatterControl, endsChatterInTheTwin) {
   MachineModel model = readMachineModel(MODEL_FOLDER "/stiff.yaml");
   model.uncertainty.frequency = 2.0;
@@ -23,13 +23,13 @@ TEST(ChatterControl, endsChatterInTheTwin) {
   const auto cuts = controlStudy(model, systemOf(model, 90.0, 180.0), options);
   int ended = 0;
   for (const ControlCut& cut : cuts) {
-    ASSERT_EQ(cut.moves, 1) << cut.said;
+    ASSERT_EQ(cut.moves, 1) << cut.reason;
     ended += cut.end();
     if (cut.end()) {
-      EXPECT_LT(cut.ended - cut.asked, 150.0);
+      EXPECT_LT(cut.ended - cut.requested, 150.0);
       EXPECT_GT(cut.removal, cut.careful);
     } else {
-      EXPECT_TRUE(cut.next_stable) << cut.said;
+      EXPECT_TRUE(cut.next_stable) << cut.reason;
     }
   }
   EXPECT_GE(ended, 1);

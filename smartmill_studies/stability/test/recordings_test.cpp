@@ -18,7 +18,7 @@ TEST(Recordings, soundsOfTheShopAreToldFromChatter) {
   const auto scenes = soundScenes(model, systemOf(model, 90.0, 180.0), range, soundKinds());
   for (const SoundScene& scene : scenes) {
     RecordingRequest request;
-    request.speed = scene.told_speed;
+    request.speed = scene.stated_speed;
     request.teeth = model.tool->teeth;
     const RecordingVerdict verdict = judgeRecording(scene.recording, request);
     EXPECT_EQ(verdict.chatter, scene.chatters) << nameOf(scene.kind) << ": " << verdict.text();

@@ -40,7 +40,7 @@ TEST(Reliability, anHonestBeliefIsConfirmedAndAFalseOneIsNot) {
   int count = 0;
   for (const ReliabilityBin& bin : reliabilityBins(points, 4, false)) count += bin.count;
   EXPECT_EQ(count, 60);
-  // Predictions that are far too sure of themselves.
+  // Overconfident predictions.
   for (ReliabilityPoint& p : points) p.predicted = p.predicted > 0.5 ? 0.999 : 0.001;
   EXPECT_GT(std::abs(reliabilityScore(points, false)), 3.0);
 }

@@ -11,7 +11,7 @@
 namespace smartmill::stability {
 namespace {
 
-// Free: the growth of the linear process' dominant root, until the tool leaves the cut.
+// Without control: growth by the dominant root of the linear process, until the tool leaves the cut.
 TEST(TurningLoop, theFreeLatheGrowsAsItsRootAndThenLeavesTheCut) {
   TurningLoop loop = kimLoop(1.0);
   loop.controlled = false;
@@ -26,7 +26,7 @@ TEST(TurningLoop, theFreeLatheGrowsAsItsRootAndThenLeavesTheCut) {
   EXPECT_EQ(least, 0.0);
 }
 
-// Through blocks that are late, a servo with a bandwidth and a chip force that is not proportional.
+// With delayed blocks, a servo with finite bandwidth and a nonlinear chip force.
 TEST(TurningLoop, chatterEndsOverATopicsDelay) {
   for (const double exponent : {1.0, 0.7}) {
     TurningLoop loop = kimLoop(2.0);
@@ -69,14 +69,14 @@ TEST(Lathe, refusesWhatIsWrong) {
   sim::LatheTraits traits;
   traits.stiffness = {2e7, 3e7};
   EXPECT_EQ(error([&] { sim::Lathe lathe(traits); }),
-            "frequency, damping_ratio, stiffness: 1, 1, 2 values, one of each a mode is due");
+            "frequency, damping_ratio, stiffness: 1, 1, 2 values, expected one of each per mode");
   sim::Lathe lathe({});
   SampleBlock commands;
   commands.sample_rate = 1e4;
   commands.channels = {"command"};
   commands.units = {"V"};
   commands.samples = {1e-6};
-  EXPECT_EQ(error([&] { lathe.command(commands); }), "command: the unit is V, m is due");
+  EXPECT_EQ(error([&] { lathe.command(commands); }), "command: the unit is V, expected m");
   commands.units = {"m"};
   commands.samples = {std::nan("")};
   EXPECT_EQ(error([&] { lathe.command(commands); }), "command: a value is not finite");

@@ -19,8 +19,8 @@ AgreementOptions options() {
   return o;
 }
 
-// The simulator of smartmill_sim knows nothing of this package: what it records judges the solver. The study
-// over 400 points is rosrun smartmill_studies stability_twin_agreement.
+// The simulator of smartmill_sim is independent of smartmill_stability, so that its records validate the
+// solver. rosrun smartmill_studies stability_twin_agreement runs 400 points.
 TEST(TwinAgreement, twelveCutsOfTheSimulator) {
   MachineModel model = readMachineModel(MODEL_FILE);
   model.tool->helix = units::radFromDeg(30.0);
@@ -36,7 +36,7 @@ TEST(TwinAgreement, twelveCutsOfTheSimulator) {
   EXPECT_LT(chatter, 10);
 }
 
-// 5 % immersion, 20,000 rpm: a flip at 3.250386 mm in the tables where zero-order says 6.850 mm.
+// 5 % immersion, 20,000 rpm: flip at 3.250386 mm in the tables, where zero-order theory gives 6.850 mm.
 TEST(TwinAgreement, theSimulatorFindsTheFlipThatZeroOrderMisses) {
   const MachineModel model = readMachineModel(MODEL_FILE);
   std::vector<TwinCut> cuts(2);

@@ -14,7 +14,7 @@ std::string startedAs(int argc, const char* const* argv) {
   return argc > 0 ? std::filesystem::path(argv[0]).filename().string() : "program";
 }
 
-/// Damerau-Levenshtein distance without a second edit of a transposed pair.
+/// Damerau-Levenshtein distance (optimal string alignment).
 std::size_t distance(const std::string& a, const std::string& b) {
   std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
   for (std::size_t i = 0; i <= a.size(); ++i) d[i][0] = i;
@@ -85,10 +85,10 @@ std::string CommandProgram::nearest(const std::string& word) const {
   std::size_t least = std::max<std::size_t>(2, word.size() / 2) + 1;
   for (const CommandTopic& topic : topics) {
     for (const Command& one : topic.commands) {
-      std::size_t apart = std::min(distance(word, one.name), distance(word, one.tool));
-      if (!word.empty() && one.name.rfind(word, 0) == 0) apart = std::min<std::size_t>(apart, 1);
-      if (apart >= least) continue;
-      least = apart;
+      std::size_t edits = std::min(distance(word, one.name), distance(word, one.tool));
+      if (!word.empty() && one.name.rfind(word, 0) == 0) edits = std::min<std::size_t>(edits, 1);
+      if (edits >= least) continue;
+      least = edits;
       closest = one.name;
     }
   }

@@ -91,15 +91,15 @@ const Option& Option::number(const std::string& allowed, const std::function<boo
 }
 
 const Option& Option::oneOf(const std::vector<std::string>& words) const {
-  std::string shown;
-  for (const std::string& word : words) shown += (shown.empty() ? "{" : ",") + word;
+  std::string list;
+  for (const std::string& word : words) list += (list.empty() ? "{" : ",") + word;
   option_->check(CLI::Validator(
       [words](const std::string& text) {
         return std::find(words.begin(), words.end(), text) != words.end()
                    ? std::string()
                    : text + ": expected " + alternatives(words);
       },
-      shown + "}"));
+      list + "}"));
   (*allowed_)[option_] = {alternatives(words), words};
   return *this;
 }
@@ -188,8 +188,8 @@ CommandLine::Stop CommandLine::parse(int argc, const char* const* argv) {
   root_->name(program_);
   try {
     root_->parse(argc, argv);
-  } catch (const CLI::Success& wanted) {
-    return {true, root_->exit(wanted)};
+  } catch (const CLI::Success& request) {
+    return {true, root_->exit(request)};
   } catch (const CLI::ParseError& error) {
     std::string what = error.what();
     std::replace(what.begin(), what.end(), '\n', ' ');

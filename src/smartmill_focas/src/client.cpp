@@ -24,7 +24,7 @@ void Client::Impl::connect(const std::string& host, std::uint16_t port, double t
 }
 
 std::vector<SubReply> Client::Impl::exchange(const std::vector<SubRequest>& requests) {
-  connection.need();
+  connection.requireConnected();
   try {
     Connection::queue(connection.data, FRAME_DATA, DIR_REQUEST, encodeRequests(requests));
     const Clock::time_point deadline = deadlineIn(connection.timeout());
@@ -60,32 +60,32 @@ std::vector<SubReply> Client::Impl::receiveReplies(const std::vector<SubRequest>
   return replies;
 }
 
-const Bytes& Client::Impl::good(const std::string& call, const SubReply& reply) {
+const Bytes& Client::Impl::dataOf(const std::string& call, const SubReply& reply) {
   if (reply.code != EW_OK) {
     throw FocasError(failureLine(call, reply.code, reply.detail), reply.code, reply.detail);
   }
   return reply.data;
 }
 
-Bytes Client::Impl::ask(const std::string& call, const SubRequest& request) {
-  return good(call, exchange({request}).front());
+Bytes Client::Impl::request(const std::string& call, const SubRequest& request) {
+  return dataOf(call, exchange({request}).front());
 }
 
 std::vector<double> Client::Impl::values(const std::string& call, const Bytes& data, std::size_t at_most) {
   return decode(call, data, [&](Reader& reader) {
     std::vector<double> result;
-    while (result.size() < at_most && reader.left() >= 8) {
+    while (result.size() < at_most && reader.remaining() >= 8) {
       result.push_back(reader.value8().toDouble());
     }
     if (result.empty() && at_most > 0) {
-      reader.skip(8);  // says what is missing
+      reader.skip(8);  // throws with the missing size
     }
     return result;
   });
 }
 
 void Client::Impl::readSystemInfo(const OpenReply& open_reply) {
-  const Bytes data = ask("cnc_sysinfo", SubRequest(OP_SYSTEM_INFO));
+  const Bytes data = request("cnc_sysinfo", SubRequest(OP_SYSTEM_INFO));
   decode("cnc_sysinfo", data, [&](Reader& reader) {
     reader.skip(4);
     info.cnc_type = reader.line(2);
@@ -151,7 +151,7 @@ bool Client::dncOpen() const {
   return impl_->dnc.isOpen();
 }
 bool Client::dncDeaf() const {
-  return impl_->dnc.deaf();
+  return impl_->dnc.unresponsive();
 }
 
 void Client::dncCheck() {

@@ -9,7 +9,7 @@
 
 namespace smartmill::focas {
 
-/// Connection, questions and answers; what is asked stands in client_calls.cpp.
+/// Connection and exchange of requests and replies; the single calls are in client_calls.cpp.
 class Client::Impl {
  public:
   Connection connection;
@@ -19,11 +19,12 @@ class Client::Impl {
   void connect(const std::string& host, std::uint16_t port, double timeout);
   std::vector<SubReply> exchange(const std::vector<SubRequest>& requests);
 
-  /// Data of one reply. @throws FocasError naming the call.
-  static const Bytes& good(const std::string& call, const SubReply& reply);
-  Bytes ask(const std::string& call, const SubRequest& request);
+  /// Data of one reply. @throws FocasError naming the call if the reply is an error.
+  static const Bytes& dataOf(const std::string& call, const SubReply& reply);
+  /// Sends one request. @return data of the reply. @throws FocasError as dataOf()
+  Bytes request(const std::string& call, const SubRequest& request);
 
-  /// Decodes with what the reader throws turned into a FocasError of this call.
+  /// Decodes data and turns a WireError into a FocasError that names the call.
   template <class Decode>
   static auto decode(const std::string& call, const Bytes& data, Decode&& decoder) {
     try {
@@ -33,7 +34,7 @@ class Client::Impl {
       throw FocasError(call + ": " + e.what(), EW_LENGTH);
     }
   }
-  /// @throws FocasError when there is not one value.
+  /// @throws FocasError if there is no value.
   static std::vector<double> values(const std::string& call, const Bytes& data, std::size_t at_most);
 
   std::size_t axes() const { return static_cast<std::size_t>(info.axes); }

@@ -15,7 +15,7 @@ constexpr std::size_t OPEN_REPLY_FIXED = 40;
 constexpr std::size_t OPEN_REPLY_PATH = 32;
 
 void appendTo(Bytes& target, const Bytes& data) {
-  // Grown first, copied after: insert() at the end of an empty vector trips gcc's -Wstringop-overflow.
+  // Resize and copy, since insert() at the end of an empty vector causes a false -Wstringop-overflow of GCC.
   const std::size_t start = target.size();
   target.resize(start + data.size());
   std::copy(data.begin(), data.end(), target.begin() + static_cast<std::ptrdiff_t>(start));
@@ -122,9 +122,9 @@ Writer& Writer::text(std::string_view text, std::size_t width, char fill) {
 }
 
 const std::uint8_t* Reader::take(std::size_t count) {
-  if (count > left()) {
-    throw WireError("FOCAS data end early: " + std::to_string(count) + " bytes wanted, " +
-                    std::to_string(left()) + " left");
+  if (count > remaining()) {
+    throw WireError("FOCAS data end early: expected " + std::to_string(count) + " bytes, found " +
+                    std::to_string(remaining()));
   }
   const std::uint8_t* start = data_ + position_;
   position_ += count;
@@ -207,7 +207,7 @@ std::optional<Frame> FrameReader::next() {
   for (std::size_t i = 0; i < std::min<std::size_t>(available, 4); ++i) {
     if (head[i] != 0xa0) {
       throw WireError("not a FOCAS frame: byte " + std::to_string(i) + " is " + std::to_string(head[i]) +
-                      ", a0 (160) is due");
+                      ", expected a0 (160)");
     }
   }
   if (available < HEADER_SIZE) {
@@ -219,7 +219,7 @@ std::optional<Frame> FrameReader::next() {
   frame.type = reader.u8();
   frame.direction = reader.u8();
   const std::size_t body_size = reader.u16();
-  if (reader.left() < body_size) {
+  if (reader.remaining() < body_size) {
     return std::nullopt;
   }
   frame.body = reader.bytes(body_size);
@@ -234,14 +234,14 @@ Bytes encodeErrorBody(const ErrorBody& error) {
 ErrorBody decodeErrorBody(const Bytes& body) {
   ErrorBody error;
   Reader reader(body);
-  if (reader.left() < 4) {
+  if (reader.remaining() < 4) {
     error.code = EW_PROTOCOL;
     return error;
   }
   error.location = reader.i16();
   error.code = reader.i16();
-  error.detail1 = reader.left() >= 2 ? reader.i16() : std::int16_t{0};
-  error.detail2 = reader.left() >= 2 ? reader.i16() : std::int16_t{0};
+  error.detail1 = reader.remaining() >= 2 ? reader.i16() : std::int16_t{0};
+  error.detail2 = reader.remaining() >= 2 ? reader.i16() : std::int16_t{0};
   return error;
 }
 
@@ -273,7 +273,7 @@ std::vector<SubRequest> decodeRequests(const Bytes& body) {
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t length = reader.u16();
     if (length < SUB_REQUEST_SIZE) {
-      throw WireError("FOCAS request " + std::to_string(i) + " says it has " + std::to_string(length) +
+      throw WireError("FOCAS request " + std::to_string(i) + " states a length of " + std::to_string(length) +
                       " bytes");
     }
     const Bytes content = reader.bytes(length - 2);
@@ -286,10 +286,10 @@ std::vector<SubRequest> decodeRequests(const Bytes& body) {
       v = sub.i32();
     }
     const std::int32_t extra = sub.i32();
-    // v5 is the length of the extra bytes; some calls leave it 0 or use it as a value: the packet's length
-    // decides.
+    // v5 is the length of the extra bytes, but 0 or a value in some calls; the length of the packet is
+    // reliable.
     (void)extra;
-    request.extra = sub.bytes(sub.left());
+    request.extra = sub.bytes(sub.remaining());
     requests.push_back(std::move(request));
   }
   return requests;
@@ -320,7 +320,7 @@ std::vector<SubReply> decodeReplies(const Bytes& body) {
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t length = reader.u16();
     if (length < SUB_REPLY_SIZE) {
-      throw WireError("FOCAS reply " + std::to_string(i) + " says it has " + std::to_string(length) +
+      throw WireError("FOCAS reply " + std::to_string(i) + " states a length of " + std::to_string(length) +
                       " bytes");
     }
     const Bytes content = reader.bytes(length - 2);
@@ -332,7 +332,7 @@ std::vector<SubReply> decodeReplies(const Bytes& body) {
     reply.code = sub.i16();
     reply.detail = sub.i16();
     const std::size_t size = sub.skip(2).u16();
-    reply.data = sub.bytes(std::min(size, sub.left()));
+    reply.data = sub.bytes(std::min(size, sub.remaining()));
     replies.push_back(std::move(reply));
   }
   return replies;

@@ -12,7 +12,7 @@
 namespace smartmill::focas {
 namespace {
 
-constexpr int STREAM_SEND_BUFFER = 4096;  // [byte] little text on its way, so that a cancel is soon heard
+constexpr int STREAM_SEND_BUFFER = 4096;  // [byte] small, so that a cancel is delivered soon
 constexpr double CLOSE_TIMEOUT = 0.2;     // [s]
 constexpr std::size_t READ_STEP = 1 << 17;
 
@@ -23,8 +23,9 @@ std::string failureLine(const std::string& call, int code, int detail) {
 }
 
 int millisecondsUntil(Clock::time_point deadline) {
-  const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now()).count();
-  return static_cast<int>(std::clamp<long long>(left + 1, 0, 3600000));
+  const auto remaining =
+      std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now()).count();
+  return static_cast<int>(std::clamp<long long>(remaining + 1, 0, 3600000));
 }
 
 namespace {
@@ -66,22 +67,22 @@ void Connection::close() {
       while (receive(*circuit, deadline).type != FRAME_CLOSE) {
       }
     } catch (const std::exception&) {
-      // Gone already: nothing to say goodbye to.
+      // The connection is already lost.
     }
   }
   drop();
 }
 
-void Connection::need() {
+void Connection::requireConnected() {
   if (!valid()) {
     drop();
     throw ConnectionError("not connected to the controller at " + where());
   }
 }
 
-void Connection::lost(const std::string& why) {
+void Connection::fail(const std::string& reason) {
   drop();
-  throw ConnectionError("connection to the controller at " + where() + " lost: " + why);
+  throw ConnectionError("connection to the controller at " + where() + " lost: " + reason);
 }
 
 OpenReply Connection::open(Circuit& circuit) {
@@ -108,9 +109,9 @@ OpenReply Connection::open(Circuit& circuit) {
   }
 }
 
-void Connection::cannotConnect(const std::string& why) {
+void Connection::failToConnect(const std::string& reason) {
   drop();
-  throw ConnectionError("cannot connect to the controller at " + where() + ": " + why);
+  throw ConnectionError("cannot connect to the controller at " + where() + ": " + reason);
 }
 
 void Connection::connectSocket(Circuit& circuit, Clock::time_point deadline) {
@@ -120,13 +121,13 @@ void Connection::connectSocket(Circuit& circuit, Clock::time_point deadline) {
   addrinfo* found = nullptr;
   const int resolved = ::getaddrinfo(host_.c_str(), std::to_string(port_).c_str(), &hints, &found);
   if (resolved != 0) {
-    cannotConnect(::gai_strerror(resolved));
+    failToConnect(::gai_strerror(resolved));
   }
   circuit.socket = Descriptor(::socket(AF_INET, SOCK_STREAM, 0));
   int error = circuit.socket.valid() ? 0 : errno;
   if (error == 0) {
     prepareSocket(circuit.socket.get());
-    keepAlive(circuit.socket.get(), &circuit == &stream ? DEAF_PROBES : KEEP_ALIVE_PROBES);
+    keepAlive(circuit.socket.get(), &circuit == &stream ? UNRESPONSIVE_PROBES : KEEP_ALIVE_PROBES);
     if (&circuit == &stream) {
       ::setsockopt(circuit.socket.get(), SOL_SOCKET, SO_SNDBUF, &STREAM_SEND_BUFFER,
                    sizeof STREAM_SEND_BUFFER);
@@ -140,7 +141,7 @@ void Connection::connectSocket(Circuit& circuit, Clock::time_point deadline) {
     error = waitForConnect(circuit.socket.get(), deadline);
   }
   if (error != 0) {
-    cannotConnect(errorText(error));
+    failToConnect(errorText(error));
   }
 }
 
@@ -151,7 +152,7 @@ int Connection::waitForConnect(int socket, Clock::time_point deadline) {
     ready = ::poll(&wait, 1, millisecondsUntil(deadline));
   } while (ready < 0 && errno == EINTR);
   if (ready == 0) {
-    cannotConnect("no answer in time");
+    failToConnect("no answer in time");
   }
   int error = 0;
   socklen_t size = sizeof error;
@@ -167,7 +168,7 @@ void Connection::queue(Circuit& circuit, std::uint8_t type, std::uint8_t directi
 bool Connection::flush(Circuit& circuit) {
   const Transfer result = writeSome(circuit.socket.get(), circuit.unsent);
   if (result == Transfer::closed) {
-    lost("the controller closed it");
+    fail("the controller closed it");
   }
   return result == Transfer::done;
 }
@@ -175,7 +176,7 @@ bool Connection::flush(Circuit& circuit) {
 void Connection::flushUntil(Circuit& circuit, Clock::time_point deadline) {
   while (!flush(circuit)) {
     if (Clock::now() >= deadline) {
-      lost("it takes no data");
+      fail("the controller accepts no data");
     }
     pollfd wait{circuit.socket.get(), POLLOUT, 0};
     ::poll(&wait, 1, millisecondsUntil(deadline));
@@ -190,7 +191,7 @@ std::optional<Frame> Connection::poll(Circuit& circuit) {
   const Transfer result = readSome(circuit.socket.get(), circuit.reader, READ_STEP);
   frame = circuit.reader.next();
   if (!frame && result == Transfer::closed) {
-    lost("the controller closed it");
+    fail("the controller closed it");
   }
   return frame;
 }
@@ -199,16 +200,16 @@ std::optional<Frame> Connection::pollOrDrop(Circuit& circuit) {
   try {
     return poll(circuit);
   } catch (const WireError& e) {
-    lost(e.what());
+    fail(e.what());
   }
 }
 
 Frame Connection::receive(Circuit& circuit, Clock::time_point deadline) {
   for (;;) {
     if (std::optional<Frame> frame = poll(circuit)) {
-      // A peer that talks without end of other things does not answer either.
+      // Endless other frames are no answer either.
       if (Clock::now() >= deadline + secondsAsDuration(timeout_)) {
-        lost("no answer in time");
+        fail("no answer in time");
       }
       if (frame->version < 1) {
         throw WireError("reply with version 0");
@@ -216,7 +217,7 @@ Frame Connection::receive(Circuit& circuit, Clock::time_point deadline) {
       return std::move(*frame);
     }
     if (Clock::now() >= deadline) {
-      lost("no answer in time");
+      fail("no answer in time");
     }
     pollfd wait{circuit.socket.get(), POLLIN, 0};
     ::poll(&wait, 1, millisecondsUntil(deadline));

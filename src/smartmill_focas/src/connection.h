@@ -31,42 +31,43 @@ struct Circuit {
   }
 };
 
-/// The two circuits to a controller and the frames on them; nothing of what the frames mean. When one is
-/// lost, both are dropped. Functions throw ConnectionError then, and WireError on bytes that are no frame.
+/// The two circuits to a controller and the transport of frames, independent of their contents. If one is
+/// lost, both are dropped and functions throw ConnectionError; bytes that are no frame throw WireError.
 class Connection {
  public:
   Circuit stream, data;
 
-  /// Where connectCircuit() will go. @param timeout [s] of every answer
+  /// Sets the address for open(). @param timeout [s] of every reply
   void setTarget(const std::string& host, std::uint16_t port, double timeout);
   std::string where() const;
   double timeout() const { return timeout_; }
 
   bool valid() const { return stream.valid() && data.valid(); }
   void drop();
-  /// Says goodbye (0201 on both) within a bounded time, drops.
+  /// Sends the close request (0201) on both circuits, waits for the replies for a limited time, and drops.
   void close();
-  /// @throws ConnectionError "not connected ..." when one circuit is gone.
-  void need();
+  /// @throws ConnectionError "not connected ..." if a circuit is not open.
+  void requireConnected();
 
-  /// Opens one of the two; its open reply.
+  /// Opens one of the two circuits. @return its open reply
   OpenReply open(Circuit& circuit);
 
   static void queue(Circuit& circuit, std::uint8_t type, std::uint8_t direction, const Bytes& body);
-  /// True when all went out.
+  /// @return whether all queued bytes are sent
   bool flush(Circuit& circuit);
   void flushUntil(Circuit& circuit, Clock::time_point deadline);
-  /// A frame that is there now.
+  /// The next received frame; empty: none.
   std::optional<Frame> poll(Circuit& circuit);
-  /// The same; bytes that are no frame are a loss.
+  /// As poll(); drops the connection on bytes that are no frame.
   std::optional<Frame> pollOrDrop(Circuit& circuit);
   Frame receive(Circuit& circuit, Clock::time_point deadline);
 
-  [[noreturn]] void lost(const std::string& why);
+  /// Drops both circuits and throws ConnectionError.
+  [[noreturn]] void fail(const std::string& reason);
 
  private:
   void connectSocket(Circuit& circuit, Clock::time_point deadline);
-  [[noreturn]] void cannotConnect(const std::string& why);
+  [[noreturn]] void failToConnect(const std::string& reason);
   int waitForConnect(int socket, Clock::time_point deadline);
 
   std::string host_;

@@ -14,7 +14,7 @@ constexpr std::size_t PATH_WIDTH = 256;    // [byte]
 constexpr std::size_t PROGRAM_WIDTH = 36;  // [byte]
 constexpr int MAX_BLOCK_TEXT = 4096;       // [byte]
 constexpr int MAX_MESSAGE_TEXT = 256;      // [byte]
-constexpr std::uint32_t DISPLAYED = 7;     // disp flags of an axis that is shown
+constexpr std::uint32_t DISPLAYED = 7;     // disp flags of a displayed axis
 constexpr int UNIT_MM_PER_MIN = 3;         // unit codes of rdspeed: the unit is the code - 3
 constexpr int UNIT_RPM = 5;
 
@@ -47,8 +47,8 @@ SubReply DataCalls::answer(const SubRequest& request) {
       code = EW_FUNC;
     } else if (request.c2 != 1) {
       code = EW_PATH;
-    } else if (const std::optional<int> kept = memory_.call(request, out)) {
-      code = *kept;
+    } else if (const std::optional<int> memory_code = memory_.call(request, out)) {
+      code = *memory_code;
     } else {
       code = call(request, out);
     }
@@ -89,20 +89,21 @@ int DataCalls::call(const SubRequest& request, Writer& out) {
     case OP_ALARM_MESSAGES:
       return alarmMessages(request, out);
     default:
-      return tellsState(request, out) || tellsProgram(request, out) || tellsMachine(request, out) ? EW_OK
-                                                                                                  : EW_FUNC;
+      return answerState(request, out) || answerProgram(request, out) || answerMachine(request, out)
+                 ? EW_OK
+                 : EW_FUNC;
   }
 }
 
-/// What the controller does now.
-bool DataCalls::tellsState(const SubRequest& request, Writer& out) const {
+/// State of the controller. @return whether it is such a request
+bool DataCalls::answerState(const SubRequest& request, Writer& out) const {
   switch (request.c3) {
     case OP_STATUS:
       status(controller_.status(), out);
       return true;
     case OP_STATUS2:
-      // ODBST2 without hdck and tmmode, which have requests of their own: statinfo's seven, then warning,
-      // o3dchk, ext_opt and restart.
+      // ODBST2 without hdck and tmmode, which have separate requests: the seven values of statinfo, then
+      // warning, o3dchk, ext_opt and restart.
       status(controller_.status(), out);
       out.zeros(8);
       return true;
@@ -134,8 +135,8 @@ bool DataCalls::tellsState(const SubRequest& request, Writer& out) const {
   }
 }
 
-/// The program that it runs.
-bool DataCalls::tellsProgram(const SubRequest& request, Writer& out) const {
+/// The running program. @return whether it is such a request
+bool DataCalls::answerProgram(const SubRequest& request, Writer& out) const {
   switch (request.c3) {
     case OP_PROGRAM_NUMBER:
       out.i32(controller_.runningProgram()).i32(controller_.mainProgram());
@@ -156,8 +157,8 @@ bool DataCalls::tellsProgram(const SubRequest& request, Writer& out) const {
       return true;
     case OP_EXECUTING_BLOCK: {
       const std::string text = controller_.programText();
-      const int room = std::clamp(request.v[0], 0, MAX_BLOCK_TEXT);
-      out.i32(controller_.blockCount()).text(text, std::min(text.size(), static_cast<std::size_t>(room)));
+      const int max_size = std::clamp(request.v[0], 0, MAX_BLOCK_TEXT);
+      out.i32(controller_.blockCount()).text(text, std::min(text.size(), static_cast<std::size_t>(max_size)));
       return true;
     }
     default:
@@ -165,8 +166,8 @@ bool DataCalls::tellsProgram(const SubRequest& request, Writer& out) const {
   }
 }
 
-/// What it is made of.
-bool DataCalls::tellsMachine(const SubRequest& request, Writer& out) const {
+/// Axes, spindles and versions of the controller. @return whether it is such a request
+bool DataCalls::answerMachine(const SubRequest& request, Writer& out) const {
   switch (request.c3) {
     case OP_SYSTEM_INFO: {
       const std::size_t axes = info_.axes.size();
@@ -176,8 +177,7 @@ bool DataCalls::tellsMachine(const SubRequest& request, Writer& out) const {
       return true;
     }
     case OP_LOCK:
-      // a4 frames the calls that read several things and tells how many elements there are: 1 spindles, 3
-      // rdspeed.
+      // a4 encloses calls that read several values and returns the number of elements: 1 spindles, 3 rdspeed.
       out.i16(static_cast<std::int16_t>(request.v[0] == 1   ? info_.spindles.size()
                                         : request.v[0] == 3 ? 1
                                                             : info_.axes.size()));
@@ -240,7 +240,7 @@ int DataCalls::position(const SubRequest& request, Writer& out) const {
       break;
     case POSITION_SERVO_DELAY:
     case POSITION_ACCELERATION_DELAY:
-      // Positions are those of an ideal follower.
+      // The positions are those of an ideal servo without following error.
       break;
     default:
       return EW_NUMBER;
@@ -402,15 +402,15 @@ int DataCalls::writeMacroDoubles(const SubRequest& request) {
 
 int DataCalls::alarmMessages(const SubRequest& request, Writer& out) const {
   const std::size_t width = static_cast<std::size_t>(std::clamp(request.v[3], 0, MAX_MESSAGE_TEXT));
-  int left = request.v[1];
+  int remaining = request.v[1];
   for (const AlarmMessage& alarm : controller_.alarmMessages()) {
-    if (left <= 0) {
+    if (remaining <= 0) {
       break;
     }
     if (request.v[0] != -1 && request.v[0] != alarm.type) {
       continue;
     }
-    --left;
+    --remaining;
     out.i32(alarm.number).i32(alarm.type).i32(alarm.axis);
     out.i32(static_cast<std::int32_t>(std::min(alarm.text.size(), width))).text(alarm.text, width);
   }

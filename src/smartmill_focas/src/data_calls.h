@@ -14,15 +14,14 @@ class DataCalls {
   DataCalls& operator=(const DataCalls&) = delete;
 
   const SysInfo& sysInfo() const { return info_; }
-  /// Never throws: what the controller does not know is EW_FUNC, malformed arguments EW_LENGTH, EW_NUMBER,
-  /// EW_ATTRIB.
+  /// Does not throw: unknown calls return EW_FUNC, malformed arguments EW_LENGTH, EW_NUMBER or EW_ATTRIB.
   SubReply answer(const SubRequest& request);
 
  private:
   int call(const SubRequest& request, Writer& out);
-  bool tellsState(const SubRequest& request, Writer& out) const;
-  bool tellsProgram(const SubRequest& request, Writer& out) const;
-  bool tellsMachine(const SubRequest& request, Writer& out) const;
+  bool answerState(const SubRequest& request, Writer& out) const;
+  bool answerProgram(const SubRequest& request, Writer& out) const;
+  bool answerMachine(const SubRequest& request, Writer& out) const;
   int spindleNames(const SubRequest& request, Writer& out) const;
   int position(const SubRequest& request, Writer& out) const;
   int spindle(const SubRequest& request, Writer& out) const;

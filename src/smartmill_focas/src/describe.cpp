@@ -8,10 +8,10 @@
 namespace smartmill::focas {
 namespace {
 
-constexpr std::size_t MOST_TEXT = 60;    // [byte] of a text that is shown
-constexpr std::size_t MOST_VALUES = 12;  // of a list that is shown
+constexpr std::size_t MOST_TEXT = 60;    // [byte] of a text, at most
+constexpr std::size_t MOST_VALUES = 12;  // of a list, at most
 
-/// How the data of a reply are laid out.
+/// Layout of the data of a reply.
 enum class Layout { words, longs, values, doubles, names, text, numbered, hexadecimal };
 
 struct Call {
@@ -246,8 +246,8 @@ std::string describe(const Frame& frame) {
   if (frame.direction == DIR_STREAM) {
     return type + " " + std::to_string(frame.body.size()) + " bytes \"" + inText(frame.body) + "\"";
   }
-  const std::string way = frame.direction == DIR_REQUEST ? "" : " answered";
-  return type + way + (frame.body.empty() ? "" : " (" + std::to_string(frame.body.size()) + " bytes)");
+  const std::string suffix = frame.direction == DIR_REQUEST ? "" : " answered";
+  return type + suffix + (frame.body.empty() ? "" : " (" + std::to_string(frame.body.size()) + " bytes)");
 }
 
 }  // namespace smartmill::focas

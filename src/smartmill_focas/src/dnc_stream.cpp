@@ -14,10 +14,10 @@
 namespace smartmill::focas {
 namespace {
 
-constexpr int MOST_UNASKED = 1000;  // frames that nobody asked for, one after the other
-constexpr int ARRIVAL_MS = 50;      // longer than TCP puts off saying that something has arrived
+constexpr int MAX_UNSOLICITED = 1000;  // unsolicited frames in sequence
+constexpr int ARRIVAL_MS = 50;         // longer than the delayed acknowledgement of TCP
 
-/// Whether all that was sent has reached the controller's side; what waits here, it does not take.
+/// Whether the controller's side has acknowledged all bytes sent; if not, its receive buffer is full.
 bool hasArrived(int fd) {
   for (int i = 0; i < ARRIVAL_MS; ++i) {
     int waiting = 0;
@@ -31,23 +31,23 @@ bool hasArrived(int fd) {
 
 }  // namespace
 
-void DncStream::needSession(const std::string& call) {
-  connection_.need();
+void DncStream::requireSession(const std::string& call) {
+  connection_.requireConnected();
   if (!isOpen()) {
     throw FocasError(call + ": no DNC session is open", EW_FUNC);
   }
 }
 
 void DncStream::start() {
-  connection_.need();
+  connection_.requireConnected();
   open_ = false;
   Circuit& stream = connection_.stream;
   const Clock::time_point deadline = deadlineIn(connection_.timeout());
   try {
-    // What a former session left (an abort nobody asked for) must not answer this one.
+    // Discards frames of a previous session, e.g. an unsolicited abort.
     for (int count = 0; connection_.poll(stream); ++count) {
-      if (count > MOST_UNASKED) {
-        connection_.lost("it sends frames without end");
+      if (count > MAX_UNSOLICITED) {
+        connection_.fail("too many unsolicited frames");
       }
     }
     Connection::queue(stream, FRAME_DNC_START, DIR_REQUEST,
@@ -71,38 +71,38 @@ void DncStream::start() {
 }
 
 std::size_t DncStream::send(const char* text, std::size_t size) {
-  needSession("cnc_dnc2");
+  requireSession("cnc_dnc2");
   check();
   std::size_t taken = 0;
   while (taken < size) {
-    // Text that is held back stays held back until the next call: cancel() can tell by it.
+    // Unsent text remains queued until the next call, so that cancel() can detect it.
     if (!connection_.flush(connection_.stream)) {
       return taken;
     }
-    const std::size_t piece = std::min(size - taken, DNC_CHUNK);
+    const std::size_t chunk = std::min(size - taken, DNC_CHUNK);
     Connection::queue(connection_.stream, FRAME_DNC_DATA, DIR_STREAM,
-                      Bytes(text + taken, text + taken + piece));
-    taken += piece;
+                      Bytes(text + taken, text + taken + chunk));
+    taken += chunk;
   }
   connection_.flush(connection_.stream);
   return taken;
 }
 
 std::size_t DncStream::flush() {
-  needSession("cnc_dnc2");
+  requireSession("cnc_dnc2");
   check();
   connection_.flush(connection_.stream);
   return connection_.stream.unsent.size();
 }
 
 void DncStream::endBegin() {
-  needSession("cnc_dncend2");
+  requireSession("cnc_dncend2");
   Connection::queue(connection_.stream, FRAME_DNC_END, DIR_REQUEST, {});
   connection_.flush(connection_.stream);
 }
 
 bool DncStream::endDone() {
-  needSession("cnc_dncend2");
+  requireSession("cnc_dncend2");
   connection_.flush(connection_.stream);
   while (const std::optional<Frame> frame = connection_.pollOrDrop(connection_.stream)) {
     if (frame->is(FRAME_DNC_END, DIR_REPLY)) {
@@ -135,13 +135,13 @@ void DncStream::cancel(DncResult result) {
   }
   open_ = false;
   Circuit& stream = connection_.stream;
-  const bool held_back = !stream.unsent.empty() || !hasArrived(stream.socket.get());
-  if (!held_back) {
+  const bool blocked = !stream.unsent.empty() || !hasArrived(stream.socket.get());
+  if (!blocked) {
     Connection::queue(stream, FRAME_DNC_CANCEL, DIR_STREAM, Writer().i16(0).i16(result).i16(0).i16(0).data());
   }
-  if (held_back || !connection_.flush(stream)) {
-    // A word, and the end of the connection too, would come behind the text that the controller does not
-    // take: with nothing to linger for, the end comes at once.
+  if (blocked || !connection_.flush(stream)) {
+    // A cancel frame and the normal end of the connection would be queued after the text that the controller
+    // does not accept. With zero linger time the connection is reset at once.
     const linger at_once{1, 0};
     ::setsockopt(stream.socket.get(), SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);
     connection_.open(stream);
@@ -149,17 +149,17 @@ void DncStream::cancel(DncResult result) {
 }
 
 void DncStream::check() {
-  connection_.need();
+  connection_.requireConnected();
   int count = 0;
   while (const std::optional<Frame> frame = connection_.pollOrDrop(connection_.stream)) {
     throwIfAbort(*frame, "cnc_dnc2");
-    if (++count > MOST_UNASKED) {
-      connection_.lost("it sends frames without end");
+    if (++count > MAX_UNSOLICITED) {
+      connection_.fail("too many unsolicited frames");
     }
   }
 }
 
-/// The controller's own end of a session: 1903, 1a03 or 1b03.
+/// End of a session by the controller: 1903, 1a03 or 1b03.
 void DncStream::throwIfAbort(const Frame& frame, const std::string& call) {
   if (frame.direction != DIR_ERROR || !open_ ||
       (frame.type != FRAME_DNC_START && frame.type != FRAME_DNC_DATA && frame.type != FRAME_DNC_END)) {
@@ -168,7 +168,8 @@ void DncStream::throwIfAbort(const Frame& frame, const std::string& call) {
   const ErrorBody error = decodeErrorBody(frame.body);
   open_ = false;
   if (!connection_.stream.unsent.empty()) {
-    // A frame may be half out; the controller drops the session's text anyway, but must get whole frames.
+    // A frame may be partly sent. The controller discards the text of the session, but must get complete
+    // frames.
     connection_.flush(connection_.stream);
   }
   throw FocasError(failureLine(call, error.code, error.detail1), error.code, error.detail1);

@@ -21,10 +21,10 @@ class DncStream {
   void cancel(DncResult result);
   void check();
   bool isOpen() const { return open_ && connection_.valid(); }
-  bool deaf() const { return isOpen() && isDeaf(connection_.stream.socket.get()); }
+  bool unresponsive() const { return isOpen() && isUnresponsive(connection_.stream.socket.get()); }
 
  private:
-  void needSession(const std::string& call);
+  void requireSession(const std::string& call);
   void throwIfAbort(const Frame& frame, const std::string& call);
 
   Connection& connection_;

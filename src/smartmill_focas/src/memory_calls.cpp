@@ -18,7 +18,8 @@ constexpr int MAX_LISTED = 400;
 constexpr int ALL_AXES = -1;
 constexpr int MAX_PMC_BYTES = 60000;
 
-/// Diagnosis numbers name their types otherwise than parameters do: 0 byte, 1 word, 2 double word, 3 bits.
+/// The type codes of diagnosis numbers differ from those of parameters: 0 byte, 1 word, 2 double word, 3
+/// bits.
 int diagnosisType(NumberedType type) {
   switch (type) {
     case NumberedType::bits:
@@ -38,7 +39,7 @@ std::string upper(std::string text) {
   return text;
 }
 
-/// A folder's path, upper case, with one slash at its end.
+/// Path of a folder in upper case, with one slash at the end.
 std::string folderPath(const Bytes& extra) {
   Reader reader(extra);
   std::string path = upper(reader.text(extra.size()));
@@ -48,7 +49,7 @@ std::string folderPath(const Bytes& extra) {
   return path + "/";
 }
 
-/// Names of the folders in a folder; nothing when there is no such folder.
+/// Names of the subfolders of a folder; empty: no such folder.
 std::optional<std::vector<std::string>> foldersIn(const std::string& path, const std::string& programs) {
   const std::string whole = upper(programs);
   if (path == whole) {
@@ -91,7 +92,7 @@ std::optional<int> MemoryCalls::call(const SubRequest& request, Writer& out) {
     case OP_PARAMETER:
       return numbered(request, true, false, out);
     case OP_PARAMETER_LEGACY:
-      // A live 31i-B refuses the old opcode; clients of the 16i's time still ask the 30i with it.
+      // A 31i-B refuses the legacy opcode; clients for the 16i use it on the 30i.
       return info_.cnc_type == "31" ? int{EW_FUNC} : numbered(request, true, true, out);
     case OP_DIAGNOSIS:
       return numbered(request, false, false, out);
@@ -130,8 +131,8 @@ std::optional<int> MemoryCalls::programCall(const SubRequest& request, Writer& o
   }
 }
 
-/// Each number: i32 number, i16 axis, u16 type, then MAX_AXIS slots of 8 bytes (30i) or 4 (legacy). Of one
-/// axis the first slot holds the value.
+/// Each number: i32 number, i16 axis, u16 type, then MAX_AXIS slots of 8 bytes (30i) or 4 (legacy). The value
+/// of a single axis is in the first slot.
 int MemoryCalls::numbered(const SubRequest& request, bool parameters, bool legacy, Writer& out) const {
   const int axis = request.v[2];
   const int axes = static_cast<int>(info_.axes.size());
@@ -150,7 +151,7 @@ int MemoryCalls::numbered(const SubRequest& request, bool parameters, bool legac
   for (std::size_t i = 0; i < count; ++i) {
     const NumberedValue& entry = entries[i];
     if (count == 1 && entry.of_axis && axis == 0) {
-      return EW_ATTRIB;  // it has a value an axis, none of its own
+      return EW_ATTRIB;  // a number with one value per axis requires an axis
     }
     std::vector<double> values = entry.values;
     if (entry.of_axis && axis > 0) {
@@ -180,7 +181,7 @@ int MemoryCalls::clock(const SubRequest& request, Writer& out) const {
   if (!now) {
     return EW_FUNC;
   }
-  putDateTime(*now, out);  // the date stands in the first half, the time in the second, whichever was asked
+  putDateTime(*now, out);  // always the date in the first half, the time in the second
   return EW_OK;
 }
 
@@ -211,7 +212,7 @@ int MemoryCalls::setClock(const SubRequest& request) {
   return good ? int{controller_.setDateTime(*now)} : int{EW_DATA};
 }
 
-/// Elements of words and double words are big-endian on the wire; in the PMC the low byte stands first.
+/// Words and double words are big-endian on the wire and little-endian in the PMC.
 int MemoryCalls::readPmc(const SubRequest& request, Writer& out) const {
   const int first = request.v[0], last = request.v[1], area = request.v[2], type = request.v[3];
   if (area < 0 || area > static_cast<int>(PmcArea::d) || type < 0 || type > 2) {
@@ -258,14 +259,14 @@ int MemoryCalls::writePmc(const SubRequest& request) {
   return controller_.writePmc(static_cast<PmcArea>(area), first, bytes);
 }
 
-/// Programs from a number on: u32 number, u32 size, comment. No entry is the list's end.
+/// Programs from a number on: u32 number, u32 size, comment. An empty list is the end.
 int MemoryCalls::programList(const SubRequest& request, Writer& out) const {
-  int left = std::clamp(request.v[1], 0, MAX_LISTED);
+  int remaining = std::clamp(request.v[1], 0, MAX_LISTED);
   for (const StoredProgram& program : controller_.programs()) {
-    if (program.number < request.v[0] || left <= 0) {
+    if (program.number < request.v[0] || remaining <= 0) {
       continue;
     }
-    --left;
+    --remaining;
     out.u32(static_cast<std::uint32_t>(program.number)).u32(static_cast<std::uint32_t>(program.size));
     out.text(program.comment, COMMENT_WIDTH);
   }
@@ -284,8 +285,9 @@ int MemoryCalls::folderCount(const SubRequest& request, Writer& out) const {
   return EW_OK;
 }
 
-/// Entries first.. of a folder, 128 bytes each: i16 kind (0 folder, 1 program), 6 x u16 date and time, 6
-/// unknown, u32 size, u32 attributes, name, comment, 12 of the time of the last run.
+/// Entries of a folder from the first requested on, 128 bytes each: i16 kind (0 folder, 1 program), 6 x u16
+/// date and time, 6 unknown bytes, u32 size, u32 attributes, name, comment, 12 bytes with the time of the
+/// last run.
 int MemoryCalls::folderList(const SubRequest& request, Writer& out) const {
   const std::string path = folderPath(request.extra);
   const auto folders = foldersIn(path, controller_.programFolder());

@@ -7,12 +7,12 @@
 
 namespace smartmill::focas {
 
-/// Answers the requests for what a controller keeps: parameters, diagnosis numbers, clock, PMC, programs.
+/// Answers requests for stored data of a controller: parameters, diagnosis numbers, clock, PMC, programs.
 class MemoryCalls {
  public:
   MemoryCalls(ControllerInterface& controller, const SysInfo& info) : controller_(controller), info_(info) {}
 
-  /// @return EwCode, nothing when the opcode is not one of these. @throws WireError on short arguments.
+  /// @return EwCode; empty: another opcode. @throws WireError on short arguments.
   std::optional<int> call(const SubRequest& request, Writer& out);
 
  private:
@@ -31,7 +31,7 @@ class MemoryCalls {
   const SysInfo& info_;
 };
 
-/// O number of a program's name or path ("O1234", "//CNC_MEM/USER/PATH1/O1234", "1234"); nothing: no number.
+/// O number of a program's name or path ("O1234", "//CNC_MEM/USER/PATH1/O1234", "1234"); empty: no number.
 std::optional<int> programNumber(const std::string& name);
 
 }  // namespace smartmill::focas

@@ -9,7 +9,7 @@ namespace smartmill::focas {
 namespace {
 
 constexpr std::size_t MAX_TEXT = 1 << 20;    // [byte] of one download
-constexpr std::size_t UPLOAD_CHUNK = 0x500;  // [byte] as a 16i pushes it
+constexpr std::size_t UPLOAD_CHUNK = 0x500;  // [byte] as of a 16i
 constexpr std::chrono::milliseconds PUSH_PERIOD{4};
 
 void refuse(const ProgramTransfer::Send& send, std::uint8_t type, int code) {
@@ -18,7 +18,7 @@ void refuse(const ProgramTransfer::Send& send, std::uint8_t type, int code) {
   send(type, DIR_ERROR, encodeErrorBody(error));
 }
 
-/// "N:PATH" or "O1234-O5678" behind the first four bytes of a start's body.
+/// "N:PATH" or "O1234-O5678" after the first four bytes of the body of a start frame.
 std::string nameIn(const Bytes& body) {
   if (body.size() <= 4) {
     return {};
@@ -49,8 +49,8 @@ bool ProgramTransfer::handle(const Frame& frame, ControllerInterface& controller
   } else if (frame.is(FRAME_UPLOAD_START, DIR_REQUEST)) {
     upload(frame, controller, send);
   } else if (frame.is(FRAME_UPLOAD_END, DIR_REQUEST)) {
-    waiting_.clear();
-    send(FRAME_UPLOAD_END, DIR_REPLY, {});  // a client that gives up before the end has come
+    queue_.clear();
+    send(FRAME_UPLOAD_END, DIR_REPLY, {});  // the client ends the upload early
   } else {
     return frame.is(FRAME_UPLOAD_END, DIR_REPLY);
   }
@@ -85,22 +85,22 @@ void ProgramTransfer::upload(const Frame& frame, const ControllerInterface& cont
   }
   send(FRAME_UPLOAD_START, DIR_REPLY, {});
   pushed_ = std::chrono::steady_clock::now();
-  waiting_.clear();
+  queue_.clear();
   for (std::size_t at = 0; at < text.size(); at += UPLOAD_CHUNK) {
     const std::size_t size = std::min(UPLOAD_CHUNK, text.size() - at);
-    waiting_.push_back({FRAME_UPLOAD_DATA, DIR_STREAM, Bytes(text.data() + at, text.data() + at + size)});
+    queue_.push_back({FRAME_UPLOAD_DATA, DIR_STREAM, Bytes(text.data() + at, text.data() + at + size)});
   }
-  waiting_.push_back({FRAME_UPLOAD_END, DIR_REQUEST, {}});
+  queue_.push_back({FRAME_UPLOAD_END, DIR_REQUEST, {}});
 }
 
 void ProgramTransfer::push(const Send& send) {
   const auto now = std::chrono::steady_clock::now();
-  if (waiting_.empty() || now - pushed_ < PUSH_PERIOD) {
+  if (queue_.empty() || now - pushed_ < PUSH_PERIOD) {
     return;
   }
   pushed_ = now;
-  send(waiting_.front().type, waiting_.front().direction, waiting_.front().body);
-  waiting_.pop_front();
+  send(queue_.front().type, queue_.front().direction, queue_.front().body);
+  queue_.pop_front();
 }
 
 }  // namespace smartmill::focas

@@ -9,22 +9,22 @@
 
 namespace smartmill::focas {
 
-/// Programs to and from the controller's memory on one stream circuit (cnc_download4, cnc_upload4 and their
-/// forerunners).
+/// Transfer of programs to and from the memory of the controller on one stream circuit (cnc_download4,
+/// cnc_upload4 and their predecessors).
 class ProgramTransfer {
  public:
   using Send = std::function<void(std::uint8_t type, Direction direction, const Bytes& body)>;
 
-  /// @return whether the frame belongs to a transfer; its answers went to send.
+  /// @param send receives the replies @return whether the frame belongs to a transfer
   bool handle(const Frame& frame, ControllerInterface& controller, const Send& send);
 
-  /// An upload goes out a frame at a time, as a control sends it, so that a client which takes what one
-  /// recv() brings for one frame is served too.
-  bool uploading() const { return !waiting_.empty(); }
+  /// An upload is sent one frame at a time, as a control does, so that clients that expect one frame per
+  /// recv() work.
+  bool uploading() const { return !queue_.empty(); }
   void push(const Send& send);
 
  private:
-  struct Waiting {
+  struct QueuedFrame {
     std::uint8_t type;
     Direction direction;
     Bytes body;
@@ -34,7 +34,7 @@ class ProgramTransfer {
 
   bool receiving_ = false, too_long_ = false;
   std::string text_;
-  std::deque<Waiting> waiting_;
+  std::deque<QueuedFrame> queue_;
   std::chrono::steady_clock::time_point pushed_{};
 };
 

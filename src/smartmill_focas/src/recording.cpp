@@ -21,7 +21,7 @@ int digitOf(char c) {
   return c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
 }
 
-/// What stands before the next blank, which is taken off.
+/// Removes the next word from the text and returns it.
 std::string_view takeWord(std::string_view& text) {
   constexpr const char* BLANK = " \t\r\v\f";
   text.remove_prefix(std::min(text.find_first_not_of(BLANK), text.size()));
@@ -30,7 +30,7 @@ std::string_view takeWord(std::string_view& text) {
   return word;
 }
 
-/// The whole word as a number.
+/// Parses the whole word as a number. @return success
 template <class Number>
 bool isNumber(std::string_view word, Number* value) {
   const auto [end, code] = std::from_chars(word.data(), word.data() + word.size(), *value);
@@ -39,18 +39,20 @@ bool isNumber(std::string_view word, Number* value) {
 
 RecordedFrame parseLine(std::string_view line) {
   RecordedFrame recorded;
-  const std::string_view time = takeWord(line), connection = takeWord(line), way = takeWord(line),
+  const std::string_view time = takeWord(line), connection = takeWord(line), direction = takeWord(line),
                          digits = takeWord(line);
   if (!isNumber(time, &recorded.time) || !isNumber(connection, &recorded.connection) ||
-      (way != ">" && way != "<") || digits.empty() || digits.size() % 2 != 0 || !takeWord(line).empty()) {
-    throw WireError("TIME CONNECTION > HEX is due");
+      (direction != ">" && direction != "<") || digits.empty() || digits.size() % 2 != 0 ||
+      !takeWord(line).empty()) {
+    throw WireError("expected TIME CONNECTION > HEX (or <)");
   }
-  recorded.from_client = way == ">";
+  recorded.from_client = direction == ">";
   Bytes bytes;
   for (std::size_t i = 0; i < digits.size(); i += 2) {
     const int high = digitOf(digits[i]), low = digitOf(digits[i + 1]);
     if (high < 0 || low < 0) {
-      throw WireError("'" + std::string(digits.substr(i, 2)) + "' is no byte");
+      throw WireError("'" + std::string(digits.substr(i, 2)) +
+                      "', expected a byte of two hexadecimal digits");
     }
     bytes.push_back(static_cast<std::uint8_t>(16 * high + low));
   }
@@ -58,21 +60,21 @@ RecordedFrame parseLine(std::string_view line) {
   reader.append(bytes.data(), bytes.size());
   std::optional<Frame> frame = reader.next();
   if (!frame || reader.buffered() != 0) {
-    throw WireError("not one whole frame");
+    throw WireError("expected one complete frame");
   }
   recorded.frame = std::move(*frame);
   return recorded;
 }
 
-/// What it refuses is no reason to stop.
-template <class Ask>
-void tried(const Ask& ask) {
+/// Makes a call and ignores its refusal, but not a lost connection.
+template <class Call>
+void callIgnoringRefusal(const Call& call) {
   try {
-    ask();
+    call();
   } catch (const ConnectionError&) {
     throw;
   } catch (const FocasError&) {
-    // Recorded as it is.
+    // The refusal is recorded.
   }
 }
 
@@ -128,7 +130,7 @@ std::vector<RecordedFrame> parseRecording(std::string_view text, const std::stri
     text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
     if (number == 1) {
       if (line != FORMAT) {
-        throw WireError(file + ": not a file of format smartmill-focas-session/1");
+        throw WireError(file + ": expected a file of format smartmill-focas-session/1");
       }
       continue;
     }
@@ -145,48 +147,50 @@ std::vector<RecordedFrame> parseRecording(std::string_view text, const std::stri
 }
 
 void askEverything(Client& client) {
-  tried([&] { client.statusInfo(); });
-  tried([&] { client.exchange({SubRequest(OP_STATUS2), SubRequest(OP_HDCK), SubRequest(OP_TMMODE)}); });
+  callIgnoringRefusal([&] { client.statusInfo(); });
+  callIgnoringRefusal([&] {
+    client.exchange({SubRequest(OP_STATUS2), SubRequest(OP_HDCK), SubRequest(OP_TMMODE)});
+  });
   for (const PositionKind kind :
        {POSITION_MACHINE, POSITION_ABSOLUTE, POSITION_RELATIVE, POSITION_DISTANCE}) {
-    tried([&] { client.position(kind); });
+    callIgnoringRefusal([&] { client.position(kind); });
   }
-  tried([&] { client.actualFeed(); });
-  tried([&] { client.actualSpeed(); });
-  tried([&] { client.actualSpeeds(); });
-  tried([&] { client.spindleLoad(); });
-  tried([&] { client.spindleMeter(); });
-  tried([&] { client.servoMeter(); });
-  tried([&] { client.exchange({SubRequest(OP_SERVO, 3)}); });
-  tried([&] { client.readMacro(100); });
-  tried([&] { client.readMacros(500, 10); });
-  tried([&] { client.alarmBits(); });
-  tried([&] { client.alarmMessages(); });
-  tried([&] {
+  callIgnoringRefusal([&] { client.actualFeed(); });
+  callIgnoringRefusal([&] { client.actualSpeed(); });
+  callIgnoringRefusal([&] { client.actualSpeeds(); });
+  callIgnoringRefusal([&] { client.spindleLoad(); });
+  callIgnoringRefusal([&] { client.spindleMeter(); });
+  callIgnoringRefusal([&] { client.servoMeter(); });
+  callIgnoringRefusal([&] { client.exchange({SubRequest(OP_SERVO, 3)}); });
+  callIgnoringRefusal([&] { client.readMacro(100); });
+  callIgnoringRefusal([&] { client.readMacros(500, 10); });
+  callIgnoringRefusal([&] { client.alarmBits(); });
+  callIgnoringRefusal([&] { client.alarmMessages(); });
+  callIgnoringRefusal([&] {
     int running = 0, main_program = 0;
     client.programNumber(&running, &main_program);
   });
-  tried([&] { client.sequenceNumber(); });
-  tried([&] { client.executingBlock(); });
-  tried([&] {
+  callIgnoringRefusal([&] { client.sequenceNumber(); });
+  callIgnoringRefusal([&] { client.executingBlock(); });
+  callIgnoringRefusal([&] {
     client.exchange({SubRequest(OP_MAIN_PROGRAM), SubRequest(OP_EXECUTING_PROGRAM), SubRequest(OP_FOLDER, 1),
                      SubRequest(OP_CLOCK, 0), SubRequest(OP_CLOCK, 1), SubRequest(OP_CNC_ID)});
   });
-  tried([&] {
+  callIgnoringRefusal([&] {
     const Bytes folder = path("//CNC_MEM/USER/PATH1/");
     client.exchange({SubRequest(OP_FOLDER_COUNT, 0, 0, 0, 0, folder)});
     client.exchange({SubRequest(OP_FOLDER_LIST, 0, 10, 0, 1, folder)});
   });
   for (const int number : {1020, 1320, 1321, 1420, 3741}) {
     const int axis = number < 3000 ? -1 : 0;
-    tried([&] { client.exchange({SubRequest(OP_PARAMETER, number, number, axis)}); });
+    callIgnoringRefusal([&] { client.exchange({SubRequest(OP_PARAMETER, number, number, axis)}); });
   }
   for (const int number : {300, 308, 410, 445}) {
     const int axis = number < 400 ? -1 : 0;
-    tried([&] { client.exchange({SubRequest(OP_DIAGNOSIS, number, number, axis)}); });
+    callIgnoringRefusal([&] { client.exchange({SubRequest(OP_DIAGNOSIS, number, number, axis)}); });
   }
   for (const int area : {0, 1, 3}) {
-    tried([&] { client.exchange({pmcRead(0, 49, area)}); });
+    callIgnoringRefusal([&] { client.exchange({pmcRead(0, 49, area)}); });
   }
 }
 

@@ -23,15 +23,16 @@
 namespace smartmill::focas {
 namespace {
 
-constexpr std::size_t READ_STEP = 8192;  // [byte] most read from one connection before its frames are served
+constexpr std::size_t READ_STEP =
+    8192;  // [byte] maximum to read from a connection before its frames are served
 constexpr std::size_t MAX_UNSENT =
-    1 << 18;  // [byte] replies a client leaves unread before it is not served any more
+    1 << 18;  // [byte] of replies that a client has not read, above which it is not served
 constexpr int IDLE_POLL_MS = 200;
-constexpr int SESSION_POLL_MS = 5;  // the machine is asked for an abort this often
-constexpr int BLOCKED_POLL_MS = 2;  // text that the machine's buffer did not take is offered this often
+constexpr int SESSION_POLL_MS = 5;  // period of dncAbort()
+constexpr int BLOCKED_POLL_MS = 2;  // period of offering text to a full buffer of the machine
 constexpr int LISTEN_BACKLOG = 64;
-// [byte] of an Ethernet packet. Loopback's own are of 64 kB, and a client's kernel holds back twenty of them
-// (tcp_sndbuf_expand of Linux), so that it would feel the machine's pace megabytes late.
+// [byte] of an Ethernet packet. Loopback packets have 64 kB, and the kernel of a client buffers twenty of
+// them (tcp_sndbuf_expand of Linux), so that the client would run megabytes ahead of the machine.
 constexpr int SEGMENT = 1460;
 
 enum class Dnc { none, open, aborted };
@@ -40,7 +41,7 @@ struct Connection {
   Descriptor socket;
   FrameReader reader;
   std::deque<Frame> frames;    // read, not yet served
-  std::size_t text_taken = 0;  // [byte] of the front frame's DNC text that the machine has
+  std::size_t text_taken = 0;  // [byte] of the DNC text of the first frame that the machine has accepted
   Bytes unsent;
   int circuit = 0;  // 0: not opened
   Dnc dnc = Dnc::none;
@@ -80,7 +81,7 @@ class Server::Impl {
     stopping_ = true;
     const char byte = 0;
     if (::write(wake_write_.get(), &byte, 1) < 0) {
-      // The poll's own period ends the thread then.
+      // The thread then ends after the poll period.
     }
     thread_.join();
   }
@@ -91,8 +92,8 @@ class Server::Impl {
  private:
   void listen(std::uint16_t port) {
     const std::string where = options_.bind_address + ":" + std::to_string(port);
-    const auto fail = [&](const std::string& why) {
-      throw std::runtime_error("FOCAS server: cannot listen on " + where + ": " + why);
+    const auto fail = [&](const std::string& reason) {
+      throw std::runtime_error("FOCAS server: cannot listen on " + where + ": " + reason);
     };
     sockaddr_in address{};
     address.sin_family = AF_INET;
@@ -126,20 +127,20 @@ class Server::Impl {
       waits.clear();
       waits.push_back({wake_read_.get(), POLLIN, 0});
       watchListener();
-      waits.push_back({listener_.get(), POLLIN, 0});  // -1 is passed over
+      waits.push_back({listener_.get(), POLLIN, 0});  // -1 is ignored
       int timeout = IDLE_POLL_MS;
       for (const Connection& c : connections_) {
         short events = 0;
         if (!c.peer_closed) {
-          // While text waits for the machine's buffer nothing is read, so that TCP stops the client; its
-          // going away is still seen.
+          // While the buffer of the machine is full, the client is not read, so that TCP stops it; a
+          // disconnect is still detected.
           events =
               static_cast<short>(c.blocked || c.unsent.size() > MAX_UNSENT ? POLLRDHUP : POLLIN | POLLRDHUP);
         }
         if (!c.unsent.empty()) {
           events = static_cast<short>(events | POLLOUT);
         }
-        // A closed peer would end every poll at once.
+        // poll() would return at once for a closed peer.
         waits.push_back({c.peer_closed ? -1 : c.socket.get(), events, 0});
         if (c.transfer.uploading()) {
           timeout = std::min(timeout, SESSION_POLL_MS);
@@ -170,7 +171,7 @@ class Server::Impl {
     open_count_ = 0;
   }
 
-  /// With all connections taken nothing listens: the next one is refused by TCP itself.
+  /// Stops listening at the maximum number of connections, so that TCP refuses further ones.
   void watchListener() {
     const bool full = connections_.size() >= static_cast<std::size_t>(options_.max_connections);
     if (full) {
@@ -179,7 +180,7 @@ class Server::Impl {
       try {
         listen(port_);
       } catch (const std::runtime_error&) {
-        listener_.reset();  // somebody took the port meanwhile: again at the next turn
+        listener_.reset();  // the port is in use; retried in the next cycle
       }
     }
   }
@@ -220,8 +221,8 @@ class Server::Impl {
         }
       }
       if ((events & (POLLIN | POLLRDHUP | POLLHUP)) != 0 && !c.peer_closed) {
-        // A client that has gone sends no more: what is left of it is at most one receive buffer, read at
-        // once so that its end is known even while text waits.
+        // Of a disconnected client at most one receive buffer remains; it is read at once, so that the end is
+        // detected even while the buffer of the machine is full.
         const bool leaving = (events & (POLLRDHUP | POLLHUP)) != 0;
         if (readSome(c.socket.get(), c.reader, leaving ? SIZE_MAX : READ_STEP) == Transfer::closed) {
           c.peer_closed = true;
@@ -230,7 +231,7 @@ class Server::Impl {
           c.frames.push_back(std::move(*frame));
         }
       }
-      if (c.peer_closed && c.dnc == Dnc::open && !endWaits(c)) {
+      if (c.peer_closed && c.dnc == Dnc::open && !endIsQueued(c)) {
         drop(c);
         return;
       }
@@ -247,12 +248,12 @@ class Server::Impl {
         drop(c);
       }
     } catch (const std::exception&) {
-      // Not FOCAS: the connection cannot be understood any further.
+      // No FOCAS data: the connection is unusable.
       drop(c);
     }
   }
 
-  static bool endWaits(const Connection& c) {
+  static bool endIsQueued(const Connection& c) {
     return std::any_of(c.frames.begin(), c.frames.end(), [](const Frame& frame) {
       return frame.type == FRAME_DNC_END || frame.type == FRAME_DNC_CANCEL;
     });
@@ -270,7 +271,7 @@ class Server::Impl {
     }
   }
 
-  /// False when the frame must wait for the machine's buffer.
+  /// @return false: the frame must wait for the buffer of the machine
   bool serveFrame(Connection& c, const Frame& frame) {
     const std::uint8_t type = frame.type;
     if (frame.is(FRAME_OPEN, DIR_REQUEST)) {
@@ -323,7 +324,7 @@ class Server::Impl {
       return &other != &c && other.circuit == circuit;
     });
     if ((circuit != STREAM_CIRCUIT && circuit != DATA_CIRCUIT) || same >= options_.max_sessions) {
-      // The refusal seen on a live 31i carries code 2 for its sixth session.
+      // A 31i refuses the sixth session with code 2.
       sendError(c, FRAME_OPEN, 2);
       c.close_when_sent = true;
       return;
@@ -407,7 +408,7 @@ class Server::Impl {
   DataCalls calls_;
   Descriptor listener_, wake_read_, wake_write_;
   std::uint16_t port_ = 0;
-  std::list<Connection> connections_;  // touched by the thread only
+  std::list<Connection> connections_;  // used by the thread only
   std::atomic<bool> stopping_{false};
   std::atomic<int> open_count_{0};
   std::thread thread_;

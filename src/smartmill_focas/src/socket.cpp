@@ -29,7 +29,7 @@ void prepareSocket(int fd) {
 }
 
 namespace {
-constexpr int IDLE = 1;  // [s] without a word of the other side, then it is asked
+constexpr int IDLE = 1;  // [s] of silence of the peer before the first probe
 }
 
 void keepAlive(int fd, int probes) {
@@ -40,8 +40,8 @@ void keepAlive(int fd, int probes) {
   ::setsockopt(fd, IPPROTO_TCP, TCP_KEEPCNT, &probes, sizeof probes);
 }
 
-bool isDeaf(int fd) {
-  constexpr std::uint32_t DEAF_MS = 1800, ASKED_EVERY_MS = 250;
+bool isUnresponsive(int fd) {
+  constexpr std::uint32_t UNRESPONSIVE_MS = 1800, PROBE_PERIOD_MS = 250;
   tcp_info info{};
   socklen_t size = sizeof info;
   int waiting = 0;
@@ -51,16 +51,16 @@ bool isDeaf(int fd) {
   const std::uint32_t silent = info.tcpi_last_ack_recv;  // [ms]
   if (info.tcpi_unacked == 0) {
     if (waiting > 0) {
-      return false;  // with text held back the other side is asked ever more rarely whether it has room
+      return false;  // the peer's window is full: TCP probes it at increasing intervals
     }
-    const std::uint32_t asked_from = 1000 * IDLE;
-    if (silent > asked_from && info.tcpi_probes <= (silent - asked_from) / ASKED_EVERY_MS) {
-      // Set anew, it makes Linux ask at once (tcp_sock_set_keepidle), not only each second.
+    const std::uint32_t probes_from = 1000 * IDLE;
+    if (silent > probes_from && info.tcpi_probes <= (silent - probes_from) / PROBE_PERIOD_MS) {
+      // Setting it again makes Linux send a probe at once (tcp_sock_set_keepidle) instead of once a second.
       const int idle = IDLE;
       ::setsockopt(fd, IPPROTO_TCP, TCP_KEEPIDLE, &idle, sizeof idle);
     }
   }
-  return silent > DEAF_MS;
+  return silent > UNRESPONSIVE_MS;
 }
 
 Transfer readSome(int fd, FrameReader& reader, std::size_t max_bytes) {

@@ -31,27 +31,28 @@ class Descriptor {
   int fd_ = -1;
 };
 
-/// What one read or write on a non-blocking socket did.
+/// Result of a read or write on a non-blocking socket.
 enum class Transfer { done, would_block, closed };
 
-/// No blocking, no Nagle, not inherited by child processes.
+/// Non-blocking, without Nagle's algorithm, not inherited by child processes.
 void prepareSocket(int fd);
 
 constexpr int KEEP_ALIVE_PROBES = 2;
-/// A peer that has gone without a word is an error of an idle socket one second after so many questions of a
-/// second each; one lost packet is none.
+/// TCP keep-alive: an idle socket fails if the peer does not answer this many probes at intervals of 1 s,
+/// after 1 s of silence.
 void keepAlive(int fd, int probes = KEEP_ALIVE_PROBES);
 
-constexpr int DEAF_PROBES = 5;  ///< that keepAlive() needs for isDeaf()
-/// Nothing has come back from the other side for 1.8 s: no word that what was sent has arrived, or none to
-/// the questions that are put to it after one second of silence, four a second (a lost packet or two are
-/// none). A side that takes nothing for want of room still answers. To be asked many times a second.
-bool isDeaf(int fd);
+constexpr int UNRESPONSIVE_PROBES = 5;  ///< for keepAlive(), required by isUnresponsive()
+/// Whether the peer has sent nothing for 1.8 s: neither an acknowledgement of data nor an answer to the
+/// probes, which are sent four times a second after 1 s of silence (so that one or two lost packets do not
+/// count). A peer with a full receive buffer still answers. To be called many times a second, since it
+/// triggers the probes.
+bool isUnresponsive(int fd);
 
 /// Reads at most max_bytes into the reader.
 Transfer readSome(int fd, FrameReader& reader, std::size_t max_bytes);
 
-/// Writes from the front of pending and removes what went out; done only when all of it went.
+/// Writes from the front of pending and removes the written bytes; done only if all are written.
 Transfer writeSome(int fd, Bytes& pending);
 
 /// strerror, thread-safe.

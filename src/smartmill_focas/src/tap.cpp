@@ -17,20 +17,21 @@ namespace smartmill::focas {
 namespace {
 
 constexpr int POLL_MS = 20;
-constexpr std::size_t READ_STEP = 8192;      // [byte]
-constexpr std::size_t MOST_WAITING = 65536;  // [byte] on their way to one side
+constexpr std::size_t READ_STEP = 8192;    // [byte]
+constexpr std::size_t MAX_QUEUED = 65536;  // [byte] queued in one direction
 
 /// One direction of one connection.
-struct Way {
-  Bytes waiting;  // to be handed on
+struct Channel {
+  Bytes queued;  // to be forwarded
   FrameReader frames;
-  bool understood = true;
+  bool decodable = true;
 };
 
+/// Connection of a client and the corresponding connection to the controller.
 struct Pair {
   int number = 0;
   Descriptor client, controller;
-  Way up, down;
+  Channel up, down;
   bool dead = false;
 };
 
@@ -56,7 +57,7 @@ class Tap::Impl {
     }
     ::getsockname(socket_.get(), reinterpret_cast<sockaddr*>(&address), &size);
     port_ = ntohs(address.sin_port);
-    began_ = Clock::now();
+    start_ = Clock::now();
     thread_ = std::thread([this] { run(); });
   }
   ~Impl() {
@@ -76,17 +77,17 @@ class Tap::Impl {
       }
       ::poll(waits.data(), waits.size(), POLL_MS);
       for (Pair& pair : pairs_) {
-        pass(pair, pair.client, pair.controller, pair.up, true);
-        pass(pair, pair.controller, pair.client, pair.down, false);
+        forward(pair, pair.client, pair.controller, pair.up, true);
+        forward(pair, pair.controller, pair.client, pair.down, false);
       }
       pairs_.remove_if([](const Pair& pair) { return pair.dead; });
       accept();
     }
   }
 
-  static short eventsOf(const Way& from, const Way& to) {
-    const short read = from.waiting.size() < MOST_WAITING ? POLLIN : 0;
-    return static_cast<short>(read | (to.waiting.empty() ? 0 : POLLOUT));
+  static short eventsOf(const Channel& from, const Channel& to) {
+    const short read = from.queued.size() < MAX_QUEUED ? POLLIN : 0;
+    return static_cast<short>(read | (to.queued.empty() ? 0 : POLLOUT));
   }
 
   void accept() {
@@ -97,10 +98,10 @@ class Tap::Impl {
     prepareSocket(client.get());
     Descriptor controller = connect();
     if (!controller.valid()) {
-      return;  // the client sees its connection end, as it would without the tap
+      return;  // closes the connection of the client, as without the tap
     }
     pairs_.emplace_back();
-    pairs_.back().number = ++made_;
+    pairs_.back().number = ++connections_made_;
     pairs_.back().client = std::move(client);
     pairs_.back().controller = std::move(controller);
   }
@@ -128,38 +129,38 @@ class Tap::Impl {
     return error == 0 ? std::move(socket) : Descriptor();
   }
 
-  void pass(Pair& pair, const Descriptor& from, const Descriptor& to, Way& way, bool from_client) {
+  void forward(Pair& pair, const Descriptor& from, const Descriptor& to, Channel& channel, bool from_client) {
     if (pair.dead) {
       return;
     }
     Bytes chunk(READ_STEP);
     Transfer read = Transfer::would_block;
-    if (way.waiting.size() < MOST_WAITING) {
+    if (channel.queued.size() < MAX_QUEUED) {
       const ssize_t got = ::recv(from.get(), chunk.data(), chunk.size(), 0);
       const bool later = got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR);
       read = got > 0 ? Transfer::done : later ? Transfer::would_block : Transfer::closed;
       chunk.resize(got > 0 ? static_cast<std::size_t>(got) : 0);
     }
     if (read == Transfer::done) {
-      tell(pair, way, chunk, from_client);
-      way.waiting.insert(way.waiting.end(), chunk.begin(), chunk.end());
+      report(pair, channel, chunk, from_client);
+      channel.queued.insert(channel.queued.end(), chunk.begin(), chunk.end());
     }
-    const Transfer wrote = way.waiting.empty() ? Transfer::done : writeSome(to.get(), way.waiting);
+    const Transfer wrote = channel.queued.empty() ? Transfer::done : writeSome(to.get(), channel.queued);
     pair.dead = read == Transfer::closed || wrote == Transfer::closed;
   }
 
-  void tell(const Pair& pair, Way& way, const Bytes& chunk, bool from_client) {
-    if (!way.understood) {
+  void report(const Pair& pair, Channel& channel, const Bytes& chunk, bool from_client) {
+    if (!channel.decodable) {
       return;
     }
     try {
-      way.frames.append(chunk.data(), chunk.size());
-      while (std::optional<Frame> frame = way.frames.next()) {
-        const double time = std::chrono::duration<double>(Clock::now() - began_).count();
+      channel.frames.append(chunk.data(), chunk.size());
+      while (std::optional<Frame> frame = channel.frames.next()) {
+        const double time = std::chrono::duration<double>(Clock::now() - start_).count();
         listener_({time, pair.number, from_client, std::move(*frame)});
       }
     } catch (const WireError&) {
-      way.understood = false;
+      channel.decodable = false;
     }
   }
 
@@ -168,9 +169,9 @@ class Tap::Impl {
   double timeout_;
   Listener listener_;
   Descriptor socket_;
-  Clock::time_point began_;
+  Clock::time_point start_;
   std::list<Pair> pairs_;
-  int made_ = 0;
+  int connections_made_ = 0;
   std::atomic<bool> stopping_{false};
   std::thread thread_;
 };

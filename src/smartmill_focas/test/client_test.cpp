@@ -1,4 +1,4 @@
-// The client against bare sockets (printed bytes, broken servers) and against the server.
+// The client against plain sockets (documented bytes, faulty servers) and against the server.
 #include "smartmill_focas/client.h"
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@
 namespace smartmill::focas {
 namespace {
 
-constexpr double TIMEOUT = 60.0;  // [s] generous: tests must not depend on the computer's speed
+constexpr double TIMEOUT = 60.0;  // [s] long, so that the tests do not depend on the speed of the computer
 
 const char* const OPEN_REPLY_BODY = "00000000 00000003 0001 0001 Z8 0001 Z6 0001 Z10 0001 Z30";
 const char* const SYSINFO_REPLY =
@@ -22,7 +22,7 @@ const char* const SYSINFO_REPLY =
     "\"01.0\" "
     "\"03\"";
 
-/// Answers requests with printed bytes and keeps what it was asked. Replies may be sent byte by byte.
+/// Answers requests with given bytes, optionally byte by byte, and records the requests.
 class ScriptedServer {
  public:
   using Answers = std::map<std::string, std::string>;
@@ -44,9 +44,9 @@ class ScriptedServer {
     thread_.join();
   }
   std::uint16_t port() const { return listener_.port(); }
-  std::vector<std::string> asked() {
+  std::vector<std::string> requests() {
     const std::lock_guard<std::mutex> lock(mutex_);
-    return asked_;
+    return requests_;
   }
 
  private:
@@ -80,7 +80,7 @@ class ScriptedServer {
     const std::string request = show(encodeFrame(frame->type, frame->direction, frame->body, frame->version));
     {
       const std::lock_guard<std::mutex> lock(mutex_);
-      asked_.push_back(request);
+      requests_.push_back(request);
     }
     const auto found = table_.find(request);
     if (found != table_.end() && piecewise_) {
@@ -99,16 +99,16 @@ class ScriptedServer {
   bool piecewise_;
   std::atomic<bool> done_{false};
   std::mutex mutex_;
-  std::vector<std::string> asked_;
+  std::vector<std::string> requests_;
   std::thread thread_;
 };
 
-TEST(ClientBytes, PrintedRequestsAndReplies) {
+TEST(ClientBytes, DocumentedRequestsAndReplies) {
   for (const bool piecewise : {false, true}) {
     ScriptedServer server(
         {{"a0a0a0a0 0001 2101 0056 0003 001c 0001 0001 0019 Z20 001c 0001 0001 00e1 Z20 001c 0001 0001 0098 "
           "Z20",
-          // hdck refused: the rest counts
+          // hdck refused, the other replies are used
           "a0a0a0a0 0003 2102 0042 0003 001e 0001 0001 0019 000000000000 000e 000a 0003 0001 0000 0000 0001 "
           "0000 0010 "
           "0001 0001 00e1 0001 0000 0000 0000 0012 0001 0001 0098 000000000000 0002 0001"},
@@ -121,7 +121,7 @@ TEST(ClientBytes, PrintedRequestsAndReplies) {
           "000000000000 0008 "
           "00000bb8 000a 0000 0012 00010001 00a4 000000000000 0002 0001"},
          {"a0a0a0a0 0001 2101 001e 0001 001c 0001 0001 0026 00000007 ffffffff Z12",
-          // more slots than axes: the surplus is garbage
+          // more slots than axes: the surplus is invalid
           "a0a0a0a0 0003 2102 0032 0001 0030 0001 0001 0026 000000000000 0020 00000064 000a 0003 ffffff9c "
           "000a 0002 "
           "00000003 000a 0000 deadbeef dead beef"},
@@ -161,9 +161,10 @@ TEST(ClientBytes, PrintedRequestsAndReplies) {
     client.dncCancel();
     client.close();
     EXPECT_FALSE(client.connected());
-    // The stream's frames: three full ones and the rest, no acknowledgement; the cancel with its result.
+    // Frames of the stream: three full ones and the remainder, without acknowledgement; the cancel with its
+    // result.
     std::vector<std::string> stream;
-    for (const std::string& request : server.asked()) {
+    for (const std::string& request : server.requests()) {
       if (request.substr(12, 4) == "1a04" || request.substr(12, 4) == "1c04" ||
           request.substr(12, 2) == "02") {
         stream.push_back(request);
@@ -219,7 +220,7 @@ TEST(ClientBytes, WholePduFailureAndShortReplies) {
     EXPECT_STREQ(e.what(), "cnc_rdseqnum: EW_NOOPT (6), detail 3");
   }
   EXPECT_TRUE(client.connected());
-  // A body that lies about its length: the connection cannot be trusted any more.
+  // A body with a wrong length makes the connection unusable.
   EXPECT_THROW(client.alarmBits(), ConnectionError);
   EXPECT_FALSE(client.connected());
   EXPECT_THROW(client.alarmBits(), ConnectionError);
@@ -229,7 +230,7 @@ TEST(ClientBytes, SilentServerIsATimeout) {
   RawListener listener;
   std::thread peer([&] {
     RawSocket socket(listener.accept());
-    socket.closedByPeer();  // reads, never answers
+    socket.closedByPeer();  // reads without an answer
     socket.closedByPeer();
     socket.receive(1000, 2000);
   });
@@ -259,7 +260,7 @@ TEST(ClientBytes, ClosedPortIsOneLine) {
   }
 }
 
-TEST(ClientBytes, SomethingElseOnThePort) {
+TEST(ClientBytes, AnotherProtocolOnThePort) {
   RawListener listener;
   std::thread peer([&] {
     RawSocket socket(listener.accept());
@@ -307,7 +308,7 @@ TEST_F(ClientServerTest, EveryTypedCall) {
   EXPECT_EQ(client_.actualFeed(), 1234.0);
   EXPECT_EQ(client_.actualSpeed(), 5000.0);
   EXPECT_EQ(client_.actualSpeeds(), std::vector<double>{5000.0});
-  EXPECT_EQ(client_.spindleLoad(), std::vector<double>{12.0});  // whole percent
+  EXPECT_EQ(client_.spindleLoad(), std::vector<double>{12.0});  // integer percent
   const LoadMeter meter = client_.spindleMeter();
   EXPECT_EQ(meter.names, std::vector<std::string>{"S1"});
   EXPECT_EQ(meter.load, std::vector<double>{12.34});
@@ -352,14 +353,14 @@ TEST_F(ClientServerTest, SeveralRequestsInOnePdu) {
 }
 
 TEST_F(ClientServerTest, DncWithBackPressureLosesNothing) {
-  controller_.change([](TestController& c) { c.room = 0; });
+  controller_.change([](TestController& c) { c.free_space = 0; });
   client_.dncStart();
   EXPECT_TRUE(client_.dncOpen());
   std::string text;
   for (int i = 0; i < 40000; ++i) {
     text += "N" + std::to_string(i) + " X" + std::to_string(i % 11) + "\n";
   }
-  // A machine that takes nothing stops the client long before the program's end.
+  // A machine that accepts no text stops the client long before the end of the program.
   std::size_t sent = 0;
   ASSERT_TRUE(eventually([&] {
     const std::size_t taken = client_.dncSend(text.data() + sent, text.size() - sent);
@@ -368,9 +369,9 @@ TEST_F(ClientServerTest, DncWithBackPressureLosesNothing) {
   }));
   EXPECT_LT(sent, 65536u);
   EXPECT_EQ(controller_.locked(controller_.text).size(), 0u);
-  // The data circuit stays free meanwhile.
+  // The data circuit still works.
   EXPECT_EQ(client_.actualSpeed(), 5000.0);
-  controller_.change([](TestController& c) { c.room = 1 << 30; });
+  controller_.change([](TestController& c) { c.free_space = 1 << 30; });
   ASSERT_TRUE(eventually([&] {
     sent += client_.dncSend(text.data() + sent, text.size() - sent);
     return sent == text.size();
@@ -396,7 +397,7 @@ TEST_F(ClientServerTest, StartRefusals) {
 }
 
 TEST_F(ClientServerTest, AbortReachesTheSender) {
-  controller_.change([](TestController& c) { c.room = 100; });
+  controller_.change([](TestController& c) { c.free_space = 100; });
   client_.dncStart();
   const std::string text(20000, 'X');
   client_.dncSend(text.data(), text.size());
@@ -411,11 +412,11 @@ TEST_F(ClientServerTest, AbortReachesTheSender) {
     return code != EW_OK;
   }));
   EXPECT_EQ(code, EW_RESET);
-  // Half a frame may have been on its way: the next session starts clean all the same.
+  // Even if a frame was partly sent, the next session starts without its remainder.
   controller_.change([](TestController& c) {
     c.abort_code = EW_OK;
     c.text.clear();
-    c.room = 1 << 20;
+    c.free_space = 1 << 20;
   });
   client_.dncStart();
   client_.dncSend("X1\n", 3);
@@ -433,7 +434,7 @@ TEST_F(ClientServerTest, AbortAnswersTheEnd) {
   } catch (const FocasError& e) {
     EXPECT_EQ(e.code(), EW_ALARM);
   }
-  // The answer to the end that came after the abort must not disturb the next session.
+  // The reply to the end, received after the abort, must not disturb the next session.
   controller_.change([](TestController& c) { c.abort_code = EW_OK; });
   client_.dncStart();
   client_.dncSend("X2\n", 3);
@@ -441,11 +442,11 @@ TEST_F(ClientServerTest, AbortAnswersTheEnd) {
   EXPECT_EQ(controller_.locked(controller_.text), "X2\n");
 }
 
-TEST_F(ClientServerTest, CancelIsHeardEvenWhenTheStreamIsFull) {
+TEST_F(ClientServerTest, CancelTakesEffectWhenTheStreamIsFull) {
   client_.dncStart();
   client_.dncCancel();
   ASSERT_TRUE(eventually([&] { return controller_.locked(controller_.cancels) == 1; }));
-  controller_.change([](TestController& c) { c.room = 0; });
+  controller_.change([](TestController& c) { c.free_space = 0; });
   client_.dncStart();
   const std::string text(100000, 'X');
   std::size_t sent = 0;
@@ -459,7 +460,7 @@ TEST_F(ClientServerTest, CancelIsHeardEvenWhenTheStreamIsFull) {
   EXPECT_TRUE(client_.dncOpen());
 }
 
-TEST_F(ClientServerTest, ServerGone) {
+TEST_F(ClientServerTest, AStoppedServerIsALostConnection) {
   client_.dncStart();
   server_->stop();
   EXPECT_EQ(controller_.locked(controller_.disconnects), 1);
@@ -469,7 +470,7 @@ TEST_F(ClientServerTest, ServerGone) {
   EXPECT_THROW(client_.connect("127.0.0.1", server_->port(), TIMEOUT), ConnectionError);
 }
 
-TEST_F(ClientServerTest, ServerGoneIsSeenByTheSenderToo) {
+TEST_F(ClientServerTest, AStoppedServerIsDetectedInADncSession) {
   client_.dncStart();
   server_->stop();
   EXPECT_THROW(client_.dncCheck(), ConnectionError);

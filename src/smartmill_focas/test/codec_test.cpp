@@ -11,20 +11,20 @@
 namespace smartmill::focas {
 namespace {
 
-// The byte strings here are those of the interoperability notes on the wire.
+// The byte strings are those of the interoperability notes.
 TEST(Codec, OpenRequest) {
   EXPECT_EQ(show(encodeFrame(FRAME_OPEN, DIR_REQUEST, Writer().u16(1).data(), REQUEST_VERSION)),
             show(hex("a0a0a0a0 0001 0101 0002 0001")));
 }
 
-TEST(Codec, OpenReplyIsTheWorkingBody) {
-  Bytes due(72, 0);
-  due[7] = 3;
+TEST(Codec, OpenReplyHasTheBodyOfTheNotes) {
+  Bytes expected(72, 0);
+  expected[7] = 3;
   for (int i : {9, 11, 21, 29, 41}) {
-    due[static_cast<std::size_t>(i)] = 1;
+    expected[static_cast<std::size_t>(i)] = 1;
   }
-  EXPECT_EQ(show(encodeOpenReply(OpenReply())), show(due));
-  const OpenReply back = decodeOpenReply(due);
+  EXPECT_EQ(show(encodeOpenReply(OpenReply())), show(expected));
+  const OpenReply back = decodeOpenReply(expected);
   EXPECT_EQ(back.axes, 3);
   EXPECT_EQ(back.spindles, 1);
   EXPECT_EQ(back.paths, 1);
@@ -35,7 +35,7 @@ TEST(Codec, OpenReplyIsTheWorkingBody) {
 
 TEST(Codec, RequestBytes) {
   struct Case {
-    std::string due;
+    std::string expected;
     std::vector<SubRequest> requests;
   };
   const Bytes value = Writer().value8({123456, 10, 3}).data();
@@ -56,7 +56,7 @@ TEST(Codec, RequestBytes) {
   for (const Case& c : cases) {
     const Bytes body = encodeRequests(c.requests);
     EXPECT_EQ(show(encodeFrame(FRAME_DATA, DIR_REQUEST, body, REQUEST_VERSION)),
-              show(hex("a0a0a0a0 0001 2101" + c.due)));
+              show(hex("a0a0a0a0 0001 2101" + c.expected)));
     const std::vector<SubRequest> back = decodeRequests(body);
     ASSERT_EQ(back.size(), c.requests.size());
     for (std::size_t i = 0; i < back.size(); ++i) {
@@ -106,7 +106,7 @@ TEST(Codec, Value8) {
   const Value8 macro = Value8::fromMacro(123.456);
   EXPECT_EQ(macro.value, 123456);
   EXPECT_EQ(macro.exp, 3);
-  // Nine significant digits: half a unit of the ninth is the most that rounding may cost.
+  // Nine significant digits: the rounding error is at most half a unit of the ninth.
   std::mt19937 random(1);
   std::uniform_real_distribution<double> exponent(-6.0, 8.9), sign(-1.0, 1.0);
   for (int i = 0; i < 1000; ++i) {
@@ -125,7 +125,7 @@ TEST(Codec, NumbersAreBigEndian) {
   EXPECT_THROW(reader.u8(), WireError);
 }
 
-TEST(Codec, FramesComeTogetherFromPieces) {
+TEST(Codec, FramesAreAssembledFromChunks) {
   Bytes wire;
   for (int i = 0; i < 5; ++i) {
     const Bytes frame =
@@ -147,7 +147,7 @@ TEST(Codec, FramesComeTogetherFromPieces) {
   }
 }
 
-TEST(Codec, BadMagicIsKnownFromItsFirstByte) {
+TEST(Codec, AWrongMagicNumberIsDetectedAtItsFirstByte) {
   FrameReader reader;
   const std::uint8_t bytes[] = {0xa0, 0xa0, 0x47};
   reader.append(bytes, 2);
@@ -166,8 +166,8 @@ TEST(Codec, LengthsThatDoNotFitAreRefused) {
   EXPECT_EQ(decodeReplies(hex("0001 0010 0001 0001 0018 0000 0000 0000 ffff"))[0].data.size(), 0u);
 }
 
-// Random bytes and random damage to good ones: everything either decodes or throws WireError.
-TEST(Codec, MalformedInputNeverEscapes) {
+// Random bytes and randomly damaged frames are decoded or throw WireError.
+TEST(Codec, MalformedInputThrowsWireErrorOnly) {
   std::mt19937 random(7);
   const Bytes good =
       encodeRequests({SubRequest(OP_STATUS), SubRequest(OP_WRITE_MACRO, 1, 1, 0, 0, Bytes(8, 1))});

@@ -1,5 +1,5 @@
-// Calls beyond motion, byte by byte as the interoperability notes and public descriptions of the wire
-// (pyfanuc's README, compare_read_diag.md) print them.
+// Calls other than motion, byte by byte as in the interoperability notes and public descriptions of the
+// protocol (README of pyfanuc, compare_read_diag.md).
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -36,32 +36,32 @@ TEST_F(ConformanceTest, ParametersAndDiagnosisOfA30i) {
                   "0108 00000528 ffff 0004 0003d090 000a 0003 00030f34 000a 0003 "
                   "ffffffff 000a 0003" +
                   fill);
-  // Of one axis its value stands in the first slot.
+  // The value of a single axis is in the first slot.
   expectReply(
       *data, "001e 0001 001c 0001 0001 008d 000003fc 000003fc 00000002 Z8",
       "011a 0001 0118 0001 0001 008d" + OK6 + "0108 000003fc 0002 0001 00000059 000a 0000" + zeroValues(31));
   expectReply(
       *data, "001e 0001 001c 0001 0001 008d 00000e9d 00000e9d 00000000 Z8",
       "011a 0001 0118 0001 0001 008d" + OK6 + "0108 00000e9d 0000 0003 00004e20 000a 0000" + zeroValues(31));
-  // pyfanuc's sample of a live 30i: #308 of all axes, type 0.
+  // Sample of a 30i in pyfanuc: #308 of all axes, type 0.
   expectReply(*data, "001e 0001 001c 0001 0001 0093 00000134 00000134 ffffffff Z8",
               "011a 0001 0118 0001 0001 0093" + OK6 +
                   "0108 00000134 ffff 0000 0000001c 000a 0000 0000001c 000a 0000 "
                   "0000002c 000a 0000" +
                   zeroValues(29));
-  // A number that is not there, an axis that is not there, an axis parameter asked without one.
+  // A missing number, a missing axis, an axis parameter without axis.
   expectReply(*data, "001e 0001 001c 0001 0001 008d 00000001 00000001 00000000 Z8",
               "0012 0001 0010 0001 0001 008d 0003 0000 0000 0000");
   expectReply(*data, "001e 0001 001c 0001 0001 008d 00000528 00000528 00000009 Z8",
               "0012 0001 0010 0001 0001 008d 0004 0000 0000 0000");
   expectReply(*data, "001e 0001 001c 0001 0001 008d 00000528 00000528 00000000 Z8",
               "0012 0001 0010 0001 0001 008d 0004 0000 0000 0000");
-  // The forerunner's opcode: slots of four bytes, lengths in their least increment.
+  // The legacy opcode: slots of four bytes, lengths in the least increment.
   expectReply(*data, "001e 0001 001c 0001 0001 000e 00000528 00000528 00000001 Z8",
               "009a 0001 0098 0001 0001 000e" + OK6 + "0088 00000528 0001 0004 0003d090 Z124");
 }
 
-TEST(Conformance31i, RefusesTheForerunnersParameterOpcode) {
+TEST(Conformance31i, RefusesTheLegacyParameterOpcode) {
   TestController controller;
   controller.info.cnc_type = "31";
   ServerOptions options;
@@ -89,7 +89,7 @@ TEST_F(ConformanceTest, ClockIsReadAndSet) {
   expectReply(*data, "002a 0001 0028 0001 0001 0046 00000001 Z12 0000000c Z6 0018 003b 0001",
               "0012 0001 0010 0001 0001 0046 0005 0000 0000 0000");  // 24 o'clock
   expectReply(*data, "001e 0001 001c 0001 0001 0046 00000001 Z16",
-              "0012 0001 0010 0001 0001 0046 0002 0000 0000 0000");  // nothing given
+              "0012 0001 0010 0001 0001 0046 0002 0000 0000 0000");  // no data
 }
 
 TEST_F(ConformanceTest, DoublesAreWrittenAllOrNone) {
@@ -97,7 +97,7 @@ TEST_F(ConformanceTest, DoublesAreWrittenAllOrNone) {
   const std::string one = "3ff0000000000000", request = " 0001 0001 00a8 000001f4 Z12 ";
   const std::string answer = "0012 0001 0010 0001 0001 00a8 ";
   controller_.change([](TestController& c) { c.macros[500] = 7.0; });
-  // No whole double, an infinite one, numbers beyond those that are there.
+  // An incomplete double, an infinite one, missing numbers.
   expectReply(*data, "0029 0001 0027" + request + "0000000b" + one + "Z3", answer + "0002 0000 0000 0000");
   expectReply(*data, "002e 0001 002c" + request + "00000010" + one + "7ff0000000000000",
               answer + "0005 0000 0000 0000");
@@ -118,7 +118,7 @@ TEST_F(ConformanceTest, PmcRangesAreBigEndianOnTheWireAndLowByteFirstInMemory) {
               "0016 0001 0014 0002 0001 8001" + OK6 + "0004 0304 0102");
   expectReply(*data, "001e 0001 001c 0002 0001 8001 00000064 00000067 00000009 00000002 00000000",
               "0016 0001 0014 0002 0001 8001" + OK6 + "0004 01020304");
-  // Beyond the memory, a kind that is not there, a length that is no whole element, another PMC call.
+  // Beyond the memory, an unknown kind, a partial element, another PMC call.
   expectReply(*data, "001e 0001 001c 0002 0001 8001 000000c8 000000c8 00000009 Z8",
               "0012 0001 0010 0002 0001 8001 0003 0000 0000 0000");
   expectReply(*data, "001e 0001 001c 0002 0001 8001 00000000 00000000 0000000a Z8",
@@ -131,8 +131,8 @@ TEST_F(ConformanceTest, PmcRangesAreBigEndianOnTheWireAndLowByteFirstInMemory) {
 
 TEST_F(ConformanceTest, ProgramListsAndFolders) {
   const auto data = open(2);
-  // pyfanuc's listprog: 19 from a number on, u32 number, u32 size, 64 bytes of comment; an empty list ends
-  // it.
+  // listprog of pyfanuc: 19 programs from a number on, u32 number, u32 size, 64 bytes of comment; ended by an
+  // empty list.
   expectReply(*data, "001e 0001 001c 0001 0001 0006 00000002 00000013 00000002 Z8",
               "005a 0001 0058 0001 0001 0006" + OK6 + "0048 000004d2 00000064 \"(SLOT)\" Z58");
   expectReply(*data, "001e 0001 001c 0001 0001 0006 000004d3 00000013 00000002 Z8",
@@ -159,7 +159,7 @@ TEST_F(ConformanceTest, ProgramListsAndFolders) {
               "0012 0001 0010 0001 0001 0005 0005 0000 0000 0000");
   expectReply(*data, "001e 0001 001c 0001 0001 001f Z20", "0012 0001 0010 0001 0001 001f" + OK6 + "0000");
   expectReply(*data, "001e 0001 001c 0001 0001 0001 Z20",
-              "0012 0001 0010 0001 0001 0001 0001 0000 0000 0000");  // a controller that does not start
+              "0012 0001 0010 0001 0001 0001 0001 0000 0000 0000");  // a controller without cycle start
   // The running block, and servo currents in A.
   expectReply(*data, "001e 0001 001c 0001 0001 0020 00000006 Z16",
               "001c 0001 001a 0001 0001 0020" + OK6 + "000a 00000058 \"N77 G1\"");
@@ -168,7 +168,7 @@ TEST_F(ConformanceTest, ProgramListsAndFolders) {
                   "0018 000005dc 000a 0003 ffffff06 000a 0003 00000000 000a 0003");
 }
 
-TEST_F(ConformanceTest, DownloadAsCncDwnstart4AndItsForerunner) {
+TEST_F(ConformanceTest, DownloadAsCncDwnstart4AndItsPredecessor) {
   const auto stream = open(1);
   for (const std::string name : {"\"N://CNC_MEM/USER/PATH1/\" Z489", "Z512"}) {
     stream->send(hex("a0a0a0a0 0001 1101 0204 00000001 " + name));
@@ -192,7 +192,7 @@ TEST_F(ConformanceTest, DownloadAsCncDwnstart4AndItsForerunner) {
   EXPECT_EQ(show(data->receive(18)), show(hex("a0a0a0a0 0003 1103 0008 0000 0001 0000 0000")));
 }
 
-TEST_F(ConformanceTest, UploadAsCncUpstart4AndItsForerunner) {
+TEST_F(ConformanceTest, UploadAsCncUpstart4AndItsPredecessor) {
   const auto stream = open(1);
   for (const std::string name : {"\"N://CNC_MEM/USER/PATH1/O1234\" Z484", "\"O1234-O1234\" Z501"}) {
     stream->send(hex("a0a0a0a0 0001 1501 0204 00000001 " + name));
@@ -211,7 +211,7 @@ TEST_F(ConformanceTest, UploadAsCncUpstart4AndItsForerunner) {
   EXPECT_EQ(show(stream->receive(18)), show(hex("a0a0a0a0 0003 1503 0008 0000 0005 0000 0000")));
 }
 
-TEST_F(ConformanceTest, TheThirtyFirstConnectionIsRefusedByTcpAndRoomIsFoundAgain) {
+TEST_F(ConformanceTest, TheThirtyFirstConnectionIsRefusedByTcpUntilOthersClose) {
   std::vector<std::unique_ptr<RawSocket>> sockets;
   for (int i = 0; i < 30; ++i) {
     sockets.push_back(std::make_unique<RawSocket>(RawSocket::connectTo(server_.port())));
@@ -244,21 +244,21 @@ TEST_F(ConformanceTest, TenThousandBytesOfMergedRequestsAreAnsweredInOrder) {
   for (int i = 0; i < count; ++i) {
     const Frame frame = nextFrame(*data);
     ASSERT_TRUE(frame.is(FRAME_DATA, DIR_REPLY)) << i;
-    const double due[] = {2.5, std::numeric_limits<double>::quiet_NaN(), -7.0};
+    const double expected[] = {2.5, std::numeric_limits<double>::quiet_NaN(), -7.0};
     const std::vector<SubReply> replies = decodeReplies(frame.body);
     Reader reader(replies.at(0).data);
     const double value = reader.value8().toDouble();
-    EXPECT_TRUE(value == due[i % 3] || (i % 3 == 1 && std::isnan(value))) << i;
+    EXPECT_TRUE(value == expected[i % 3] || (i % 3 == 1 && std::isnan(value))) << i;
   }
 }
 
-TEST(Describe, NamesThatAreNoTextStayInTheLine) {
+TEST(Describe, UnprintableNamesAreReplaced) {
   const Frame frame{REPLY_VERSION, FRAME_DATA, DIR_REPLY,
                     hex("0001 0018 0001 0001 0089 000000000000 0008 580a1b5b ff000000")};
   EXPECT_EQ(describe(frame), "axis names = X??[ ?");
 }
 
-TEST(Describe, OneLineTellsWhatAFrameSays) {
+TEST(Describe, AFrameIsOneLine) {
   const auto line = [](const std::string& bytes) {
     const Bytes data = hex(bytes);
     FrameReader reader;
@@ -275,7 +275,7 @@ TEST(Describe, OneLineTellsWhatAFrameSays) {
   EXPECT_EQ(line("a0a0a0a0 0003 1903 0008 0000 000c 0000 0000"), "dnc start refused: EW_MODE (12), detail 0");
   EXPECT_EQ(line("a0a0a0a0 0001 1a04 0006 0a \"G0 X\" 0a"), "dnc 6 bytes \"|G0 X|\"");
   EXPECT_EQ(line("a0a0a0a0 0001 2101 0004 0001 ffff"),
-            "data: FOCAS data end early: 65533 bytes wanted, 0 left");
+            "data: FOCAS data end early: expected 65533 bytes, found 0");
 }
 
 }  // namespace

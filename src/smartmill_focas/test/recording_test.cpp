@@ -1,4 +1,4 @@
-// A session through the tap into a file, and recorded sessions played back to the client and to the server.
+// Recording of a session by the tap, and replay of recorded sessions to the client and the server.
 #include "smartmill_focas/recording.h"
 
 #include <gtest/gtest.h>
@@ -16,22 +16,22 @@ namespace smartmill::focas {
 namespace {
 
 constexpr double TIMEOUT = 60.0;                                    // [s]
-const char* const SIMULATED = "test/sessions/simulated_30i.focas";  // tests run in the package's folder
+const char* const SIMULATED = "test/sessions/simulated_30i.focas";  // relative to the package
 
 Bytes wire(const Frame& f) {
   return encodeFrame(f.type, f.direction, f.body, f.version);
 }
 
-/// A controller that answers a recorded connection's frames in their order and nothing else.
-class Replayed {
+/// A controller that replays the replies of a recording and checks the requests.
+class ReplayController {
  public:
-  explicit Replayed(const std::vector<RecordedFrame>& frames) {
+  explicit ReplayController(const std::vector<RecordedFrame>& frames) {
     for (const RecordedFrame& frame : frames) {
       connections_[frame.connection].push_back(frame);
     }
     thread_ = std::thread([this] { run(); });
   }
-  ~Replayed() { thread_.join(); }
+  ~ReplayController() { thread_.join(); }
   std::uint16_t port() const { return listener_.port(); }
   int answered() const { return answered_; }
   std::string fault() const { return fault_; }
@@ -49,16 +49,16 @@ class Replayed {
   }
   void play(RawSocket& socket, const std::vector<RecordedFrame>& frames) {
     for (const RecordedFrame& frame : frames) {
-      const Bytes due = wire(frame.frame);
+      const Bytes expected = wire(frame.frame);
       if (!frame.from_client) {
-        socket.send(due);
+        socket.send(expected);
         ++answered_;
         continue;
       }
-      const Bytes came = socket.receive(due.size());
-      if (came != due) {
+      const Bytes received = socket.receive(expected.size());
+      if (received != expected) {
         const std::lock_guard<std::mutex> lock(mutex_);
-        fault_ += "asked " + show(came) + "\nwhere " + show(due) + " was recorded\n";
+        fault_ += "request " + show(received) + "\nexpected " + show(expected) + "\n";
         return;
       }
     }
@@ -72,9 +72,9 @@ class Replayed {
   std::thread thread_;
 };
 
-TEST_F(ServerTest, TapHandsOnEveryByteAndTellsEveryFrame) {
+TEST_F(ServerTest, TapForwardsEveryByteAndReportsEveryFrame) {
   const std::string file = (std::filesystem::temp_directory_path() / "smartmill_tap_test.focas").string();
-  std::size_t told = 0;
+  std::size_t reported = 0;
   {
     std::ofstream out(file);
     beginRecording(out);
@@ -82,7 +82,7 @@ TEST_F(ServerTest, TapHandsOnEveryByteAndTellsEveryFrame) {
     Tap tap(0, "127.0.0.1", server_.port(), TIMEOUT, [&](const RecordedFrame& frame) {
       const std::lock_guard<std::mutex> lock(mutex);
       append(out, frame);
-      ++told;
+      ++reported;
     });
     Client client;
     client.connect("127.0.0.1", tap.port(), TIMEOUT);
@@ -94,16 +94,17 @@ TEST_F(ServerTest, TapHandsOnEveryByteAndTellsEveryFrame) {
   }
   EXPECT_EQ(controller_.locked(controller_.text), "\nG1 X1\n%");
   const std::vector<RecordedFrame> frames = readRecording(file);
-  EXPECT_EQ(frames.size(), told);
-  // Every request but the DNC text has its answer.
-  const auto asked = std::count_if(frames.begin(), frames.end(), [](const auto& f) { return f.from_client; });
-  EXPECT_EQ(2 * asked - 1, static_cast<long>(frames.size()));
+  EXPECT_EQ(frames.size(), reported);
+  // Every request except the DNC text has a reply.
+  const auto requests =
+      std::count_if(frames.begin(), frames.end(), [](const auto& f) { return f.from_client; });
+  EXPECT_EQ(2 * requests - 1, static_cast<long>(frames.size()));
   std::remove(file.c_str());
 }
 
-TEST(Recording, ClientAsksAndReadsAsInTheRecordedSession) {
+TEST(Recording, ClientRepeatsTheRecordedSession) {
   const std::vector<RecordedFrame> frames = readRecording(SIMULATED);
-  Replayed controller(frames);
+  ReplayController controller(frames);
   {
     Client client;
     client.connect("127.0.0.1", controller.port(), TIMEOUT);
@@ -116,8 +117,9 @@ TEST(Recording, ClientAsksAndReadsAsInTheRecordedSession) {
   EXPECT_EQ(controller.fault(), "");
 }
 
-/// The requests of a recording get replies of the same shape from the server: same calls, codes and lengths.
-TEST_F(ServerTest, ServerAnswersTheRecordedRequestsInTheSameShape) {
+/// The replies of the server to recorded requests have the same type, direction, version and calls, and the
+/// same length except for data.
+TEST_F(ServerTest, ServerAnswersTheRecordedRequestsInTheSameLayout) {
   std::map<int, std::unique_ptr<RawSocket>> sockets;
   for (const RecordedFrame& recorded : readRecording(SIMULATED)) {
     auto& socket = sockets[recorded.connection];
@@ -136,15 +138,16 @@ TEST_F(ServerTest, ServerAnswersTheRecordedRequestsInTheSameShape) {
       EXPECT_EQ(reply.body.size(), recorded.frame.body.size());
       continue;
     }
-    const std::vector<SubReply> due = decodeReplies(recorded.frame.body), got = decodeReplies(reply.body);
-    ASSERT_EQ(got.size(), due.size());
-    for (std::size_t i = 0; i < got.size(); ++i) {
-      EXPECT_EQ(got[i].c3, due[i].c3);
+    const std::vector<SubReply> expected = decodeReplies(recorded.frame.body),
+                                actual = decodeReplies(reply.body);
+    ASSERT_EQ(actual.size(), expected.size());
+    for (std::size_t i = 0; i < actual.size(); ++i) {
+      EXPECT_EQ(actual[i].c3, expected[i].c3);
     }
   }
 }
 
-TEST(Recording, WhatIsNoRecordingIsNamedWithItsLine) {
+TEST(Recording, InvalidFilesAreRefusedWithTheLine) {
   const std::string file = (std::filesystem::temp_directory_path() / "smartmill_no_recording.focas").string();
   const auto fault = [&](const std::string& content) {
     std::ofstream(file) << content;
@@ -156,10 +159,10 @@ TEST(Recording, WhatIsNoRecordingIsNamedWithItsLine) {
     return std::string();
   };
   const std::string head = "# smartmill-focas-session/1\n";
-  EXPECT_NE(fault("something else\n").find("not a file of format"), std::string::npos);
-  EXPECT_NE(fault(head + "0.1 1 > a0a0\n").find(":2: not one whole frame"), std::string::npos);
-  EXPECT_NE(fault(head + "# x\n0.1 1 ? a0a0\n").find(":3: TIME CONNECTION"), std::string::npos);
-  EXPECT_NE(fault(head + "0.1 1 > zz\n").find("'zz' is no byte"), std::string::npos);
+  EXPECT_NE(fault("something else\n").find("expected a file of format"), std::string::npos);
+  EXPECT_NE(fault(head + "0.1 1 > a0a0\n").find(":2: expected one complete frame"), std::string::npos);
+  EXPECT_NE(fault(head + "# x\n0.1 1 ? a0a0\n").find(":3: expected TIME CONNECTION"), std::string::npos);
+  EXPECT_NE(fault(head + "0.1 1 > zz\n").find("'zz', expected a byte"), std::string::npos);
   EXPECT_EQ(fault(head + "0.1 1 > a0a0a0a0000102010000\n"), "");
   std::remove(file.c_str());
 }

@@ -11,7 +11,7 @@
 
 namespace smartmill::focas {
 
-/// A server with a TestController in DNC mode, and bare sockets to it.
+/// A server with a TestController in DNC mode, and plain sockets to it.
 class ServerTest : public ::testing::Test {
  protected:
   ServerTest() : server_(options(), controller_) {
@@ -29,18 +29,18 @@ class ServerTest : public ::testing::Test {
     EXPECT_EQ(show(Bytes(reply.begin(), reply.begin() + 10)), show(hex("a0a0a0a0 0003 0102 0048")));
     return socket;
   }
-  /// Sends one data PDU, checks the reply's body.
-  void expectReply(RawSocket& socket, const std::string& request, const std::string& due) {
+  /// Sends one data PDU and checks the body of the reply.
+  void expectReply(RawSocket& socket, const std::string& request, const std::string& expected) {
     const Bytes out = hex("a0a0a0a0 0001 2101" + request);
     socket.send(out);
-    const Bytes reply = hex("a0a0a0a0 0003 2102" + due);
+    const Bytes reply = hex("a0a0a0a0 0003 2102" + expected);
     EXPECT_EQ(show(socket.receive(reply.size())), show(reply)) << request;
   }
   static std::string dncStartFrame() { return "a0a0a0a0 0001 1901 0204 00000001 Z512"; }
   static Bytes dncText(const std::string& text) {
     return encodeFrame(FRAME_DNC_DATA, DIR_STREAM, Bytes(text.begin(), text.end()), 1);
   }
-  /// The next frame of a socket, read as a stranger would: head, then body.
+  /// The next frame of a socket: header, then body.
   static Frame nextFrame(RawSocket& socket) {
     FrameReader reader;
     Bytes bytes = socket.receive(HEADER_SIZE);

@@ -1,4 +1,4 @@
-// The server against bare sockets: the bytes of the interoperability notes in, the bytes of the notes out.
+// The server against plain sockets: requests and replies as documented in the interoperability notes.
 #include "smartmill_focas/server.h"
 
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 namespace smartmill::focas {
 namespace {
 
-TEST_F(ServerTest, PrintedBytes) {
+TEST_F(ServerTest, DocumentedBytes) {
   const auto stream = open(1);
   const auto data = open(2);
   expectReply(
@@ -42,7 +42,7 @@ TEST_F(ServerTest, PrintedBytes) {
               "0044 0003 001e 0001 0001 0019 000000000000 000e 000a Z12 0012 0001 0001 00e1 000000000000 "
               "0002 0000 0012 "
               "0001 0001 0098 000000000000 0002 0000");
-  // Errors: an axis and a macro that do not exist, an opcode nobody knows, another path, the PMC.
+  // Errors: a missing axis and macro, an unknown opcode, another path.
   expectReply(*data, "001e 0001 001c 0001 0001 0026 00000001 00000009 Z12",
               "0012 0001 0010 0001 0001 0026 0004 0000 0000 0000");
   expectReply(*data, "001e 0001 001c 0001 0001 0015 000003e7 000003e7 Z12",
@@ -51,14 +51,14 @@ TEST_F(ServerTest, PrintedBytes) {
               "0012 0001 0010 0001 0001 7777 0001 0000 0000 0000");
   expectReply(*data, "001e 0001 001c 0001 0002 0019 Z20",
               "0012 0001 0010 0001 0002 0019 000b 0000 0000 0000");
-  // Goodbye as the reference client says it: first the stream, then the data circuit, then TCP.
+  // Closed in the order of the reference client: stream circuit, data circuit, TCP.
   for (RawSocket* socket : {stream.get(), data.get()}) {
     socket->send(hex("a0a0a0a0 0001 0201 0000"));
     EXPECT_EQ(show(socket->receive(10)), show(hex("a0a0a0a0 0003 0202 0000")));
   }
 }
 
-TEST_F(ServerTest, EveryCallAnswersInItsShape) {
+TEST_F(ServerTest, EveryReplyHasItsLayout) {
   const auto data = open(2);
   struct Case {
     SubRequest request;
@@ -133,7 +133,7 @@ TEST_F(ServerTest, DncSession) {
   controller_.change([](TestController& c) { c.state.aut = AUT_REMOTE; });
   stream->send(hex(dncStartFrame()));
   EXPECT_EQ(show(stream->receive(10)), show(hex("a0a0a0a0 0003 1902 0000")));
-  // Second start, also from another connection.
+  // A second start, also from another connection.
   stream->send(hex(dncStartFrame()));
   EXPECT_EQ(show(stream->receive(18)), show(hex("a0a0a0a0 0003 1903 0008 0000 ffff 0000 0000")));
   const auto second = open(1);
@@ -154,13 +154,13 @@ TEST_F(ServerTest, DncSession) {
   stream->send(hex("a0a0a0a0 0001 1c04 0008 0000 8000 0000 0000"));
   EXPECT_TRUE(eventually([&] { return controller_.locked(controller_.cancels) == 1; }));
   EXPECT_EQ(controller_.locked(controller_.cancel_result), DNC_CANCEL);
-  // A data circuit carries no DNC.
+  // No DNC on a data circuit.
   data->send(hex(dncStartFrame()));
   EXPECT_EQ(show(data->receive(18)), show(hex("a0a0a0a0 0003 1903 0008 0000 0001 0000 0000")));
 }
 
 TEST_F(ServerTest, BackPressureLosesNothing) {
-  controller_.change([](TestController& c) { c.room = 100; });
+  controller_.change([](TestController& c) { c.free_space = 100; });
   const auto stream = open(1);
   stream->send(hex(dncStartFrame()));
   stream->receive(10);
@@ -174,21 +174,21 @@ TEST_F(ServerTest, BackPressureLosesNothing) {
     }
     stream->send(hex("a0a0a0a0 0001 1b01 0000"));
   });
-  // With a full buffer at most a socket buffer's worth leaves the client.
+  // With a full buffer the client sends at most the size of a socket buffer.
   EXPECT_TRUE(eventually([&] { return controller_.locked(controller_.text).size() == 100; }));
   for (int i = 0; i < 50; ++i) {
-    controller_.change([](TestController& c) { c.room += 1000; });
+    controller_.change([](TestController& c) { c.free_space += 1000; });
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
-  controller_.change([](TestController& c) { c.room = 1 << 30; });
+  controller_.change([](TestController& c) { c.free_space = 1 << 30; });
   writer.join();
   EXPECT_EQ(show(stream->receive(10)), show(hex("a0a0a0a0 0003 1b02 0000")));
   EXPECT_EQ(controller_.locked(controller_.text), text);
 }
 
-/// Loopback's own packets would let a client's kernel take megabytes before it feels the machine.
-TEST_F(ServerTest, AClientOfDefaultBuffersIsHeldBackSoon) {
-  controller_.change([](TestController& c) { c.room = 100; });
+/// With loopback packets of default size the kernel of a client would buffer megabytes.
+TEST_F(ServerTest, AClientWithDefaultBuffersIsStoppedSoon) {
+  controller_.change([](TestController& c) { c.free_space = 100; });
   const auto stream = open(1);
   stream->send(hex(dncStartFrame()));
   stream->receive(10);
@@ -203,16 +203,16 @@ TEST_F(ServerTest, AClientOfDefaultBuffersIsHeldBackSoon) {
   EXPECT_LT(taken, 300000u);
 }
 
-TEST_F(ServerTest, AbortIsToldUnasked) {
+TEST_F(ServerTest, AbortSendsAnUnsolicitedErrorFrame) {
   const auto stream = open(1);
-  controller_.change([](TestController& c) { c.room = 10; });
+  controller_.change([](TestController& c) { c.free_space = 10; });
   stream->send(hex(dncStartFrame()));
   stream->receive(10);
   stream->send(dncText(std::string(1000, 'X')));
   EXPECT_TRUE(eventually([&] { return controller_.locked(controller_.text).size() == 10; }));
   controller_.change([](TestController& c) { c.abort_code = EW_RESET; });
   EXPECT_EQ(show(stream->receive(18)), show(hex("a0a0a0a0 0003 1a03 0008 0000 fffe 0000 0000")));
-  // What is still under way is thrown away, the end answers with the code, the next start works.
+  // Data in transit are discarded, the end returns the code, the next start works.
   stream->send(dncText("X1\n"));
   stream->send(hex("a0a0a0a0 0001 1b01 0000"));
   EXPECT_EQ(show(stream->receive(18)), show(hex("a0a0a0a0 0003 1b03 0008 0000 fffe 0000 0000")));
@@ -222,7 +222,7 @@ TEST_F(ServerTest, AbortIsToldUnasked) {
 }
 
 TEST_F(ServerTest, LostClientEndsTheSessionEvenWhenBlocked) {
-  controller_.change([](TestController& c) { c.room = 10; });
+  controller_.change([](TestController& c) { c.free_space = 10; });
   auto stream = open(1);
   stream->send(hex(dncStartFrame()));
   stream->receive(10);
@@ -230,7 +230,7 @@ TEST_F(ServerTest, LostClientEndsTheSessionEvenWhenBlocked) {
   EXPECT_TRUE(eventually([&] { return controller_.locked(controller_.text).size() == 10; }));
   stream->close();
   EXPECT_TRUE(eventually([&] { return controller_.locked(controller_.disconnects) == 1; }));
-  // A client that has sent its end before it left is served to the end.
+  // A client that has sent the end before disconnecting is served completely.
   stream = open(1);
   stream->send(hex(dncStartFrame()));
   stream->receive(10);
@@ -239,7 +239,7 @@ TEST_F(ServerTest, LostClientEndsTheSessionEvenWhenBlocked) {
   stream->shutdownSend();
   std::this_thread::sleep_for(std::chrono::milliseconds(30));
   EXPECT_EQ(controller_.locked(controller_.disconnects), 1);
-  controller_.change([](TestController& c) { c.room = 1 << 20; });
+  controller_.change([](TestController& c) { c.free_space = 1 << 20; });
   EXPECT_EQ(show(stream->receive(10)), show(hex("a0a0a0a0 0003 1b02 0000")));
   EXPECT_EQ(controller_.locked(controller_.ends), 1);
 }
@@ -265,13 +265,13 @@ TEST_F(ServerTest, DataBeforeOpenIsRefused) {
   EXPECT_EQ(show(socket.receive(18)), show(hex("a0a0a0a0 0003 2103 0008 0000 fff8 0000 0000")));
 }
 
-TEST_F(ServerTest, MalformedPduIsAnErrorFrameAndTheConnectionLives) {
+TEST_F(ServerTest, MalformedPduIsAnErrorFrameAndTheConnectionRemains) {
   const auto data = open(2);
   data->send(hex("a0a0a0a0 0001 2101 0004 0001 ffff"));
   EXPECT_EQ(show(data->receive(18)), show(hex("a0a0a0a0 0003 2103 0008 0000 0002 0000 0000")));
   expectReply(*data, "001e 0001 001c 0001 0001 0025 Z20",
               "001a 0001 0018 0001 0001 0025 000000000000 0008 00001388 000a 0000");
-  // A write whose number is missing.
+  // A write without value.
   expectReply(*data, "001e 0001 001c 0001 0001 0016 000001f4 000001f4 Z12",
               "0012 0001 0010 0001 0001 0016 0002 0000 0000 0000");
 }
@@ -286,7 +286,7 @@ TEST_F(ServerTest, GarbageClosesOnlyItsOwnConnection) {
       byte = static_cast<std::uint8_t>(random());
     }
     if (i % 3 == 0) {
-      // A good open, then a frame with random type, direction and body.
+      // A valid open, then a frame with random type, direction and body.
       socket.send(hex("a0a0a0a0 0001 0101 0002 0002"));
       garbage = encodeFrame(garbage[0], static_cast<std::uint8_t>(random() % 5), garbage, 1);
     }
@@ -300,7 +300,7 @@ TEST_F(ServerTest, GarbageClosesOnlyItsOwnConnection) {
               "001a 0001 0018 0001 0001 0025 000000000000 0008 00001388 000a 0000");
 }
 
-TEST_F(ServerTest, PiecewiseRequestIsPutTogether) {
+TEST_F(ServerTest, ARequestInSingleBytesIsAssembled) {
   const auto data = open(2);
   for (std::uint8_t byte : hex("a0a0a0a0 0001 2101 001e 0001 001c 0001 0001 0025 Z20")) {
     data->send({byte});

@@ -10,7 +10,7 @@
 
 namespace smartmill::focas {
 
-/// A controller with settable values and a DNC buffer that empties only when a test says so.
+/// A controller with settable values and a DNC buffer that is emptied by the test only.
 class TestController : public ControllerInterface {
  public:
   mutable std::mutex mutex;
@@ -28,8 +28,8 @@ class TestController : public ControllerInterface {
   std::string stored;  ///< last download
   std::vector<AlarmMessage> alarms;
   bool session = false;
-  std::size_t room = 1 << 30;  ///< [byte] that the buffer still takes
-  std::string text;            ///< all that was taken
+  std::size_t free_space = 1 << 30;  ///< [byte] of the buffer
+  std::string text;                  ///< all accepted text
   int starts = 0, ends = 0, cancels = 0, disconnects = 0, cancel_result = 0;
   EwCode abort_code = EW_OK;
   EwCode refuse_start = EW_OK;
@@ -135,8 +135,8 @@ class TestController : public ControllerInterface {
   }
   std::size_t dncData(const char* data, std::size_t size) override {
     const std::lock_guard<std::mutex> lock(mutex);
-    const std::size_t taken = std::min(size, room);
-    room -= taken;
+    const std::size_t taken = std::min(size, free_space);
+    free_space -= taken;
     text.append(data, taken);
     return taken;
   }

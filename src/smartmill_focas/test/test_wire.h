@@ -16,8 +16,7 @@
 
 namespace smartmill::focas {
 
-/// "a0a0 0001 ..." to bytes; blanks are skipped, text in quotes is taken as it is, Zn stands for n zero
-/// bytes.
+/// Converts "a0a0 0001 ..." to bytes; blanks are skipped, text in quotes is copied, Zn is n zero bytes.
 inline Bytes hex(const std::string& text) {
   Bytes bytes;
   for (std::size_t i = 0; i < text.size();) {
@@ -51,7 +50,7 @@ inline std::string show(const Bytes& bytes) {
   return text;
 }
 
-/// Waits until a condition holds; generous, so that a slow computer passes too.
+/// Waits until a condition is true; with a long time limit for slow computers.
 inline bool eventually(const std::function<bool()>& condition, double seconds = 120.0) {
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
   while (!condition()) {
@@ -71,7 +70,7 @@ inline sockaddr_in loopback(std::uint16_t port) {
   return address;
 }
 
-/// A file descriptor that is closed with it.
+/// Owner of a file descriptor.
 class OwnedDescriptor {
  public:
   explicit OwnedDescriptor(int fd) : fd_(fd) {}
@@ -88,7 +87,7 @@ class OwnedDescriptor {
   int fd_;
 };
 
-/// A blocking TCP socket that knows nothing of FOCAS.
+/// A blocking TCP socket without FOCAS.
 class RawSocket : public OwnedDescriptor {
  public:
   using OwnedDescriptor::OwnedDescriptor;
@@ -111,12 +110,12 @@ class RawSocket : public OwnedDescriptor {
     }
     return true;
   }
-  /// What the kernel takes at once. [byte]
+  /// Sends without blocking. @return [byte] accepted by the kernel
   std::size_t sendSome(const Bytes& bytes) {
     const ssize_t put = ::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
     return put > 0 ? static_cast<std::size_t>(put) : 0;
   }
-  /// That many bytes, fewer when the peer closes or nothing comes for two minutes.
+  /// Receives count bytes; fewer if the peer closes or the timeout passes.
   Bytes receive(std::size_t count, int timeout_ms = 120000) {
     Bytes bytes;
     while (bytes.size() < count) {
@@ -133,14 +132,14 @@ class RawSocket : public OwnedDescriptor {
     }
     return bytes;
   }
-  /// What is there, at most a few kilobytes; waits for it no longer than the timeout.
+  /// Receives available bytes, at most 4096, after waiting for up to the timeout.
   Bytes receiveSome(int timeout_ms) {
     pollfd wait{fd_, POLLIN, 0};
     std::uint8_t buffer[4096];
     const ssize_t got = ::poll(&wait, 1, timeout_ms) > 0 ? ::recv(fd_, buffer, sizeof buffer, 0) : 0;
     return Bytes(buffer, buffer + (got > 0 ? got : 0));
   }
-  /// True when the peer has closed (nothing more comes).
+  /// Waits for the next byte. @return whether the peer has closed the connection
   bool closedByPeer() { return receive(1).empty(); }
   void shutdownSend() { ::shutdown(fd_, SHUT_WR); }
 };

@@ -15,29 +15,29 @@ namespace {
 
 using Request = smartmill_msgs::Follow::Request;
 
-constexpr double POLL = 0.02;  // [s] between two questions while nobody moves
-/// So many answers of every node: what was on its way through sockets, threads and queues has arrived.
+constexpr double POLL = 0.02;  // [s] without progress
+/// Answers of every node after which messages in sockets, threads and queues are delivered.
 constexpr int ROUNDS = 5;
 
-/// [1] publishers of each topic that the master knows.
-std::map<std::string, std::uint32_t> publishersKnown() {
+/// [1] publishers of each topic, registered at the master.
+std::map<std::string, std::uint32_t> registeredPublishers() {
   XmlRpc::XmlRpcValue request, response, state;
   request[0] = ros::this_node::getName();
-  std::map<std::string, std::uint32_t> known;
-  if (!ros::master::execute("getSystemState", request, response, state, false)) return known;
+  std::map<std::string, std::uint32_t> count;
+  if (!ros::master::execute("getSystemState", request, response, state, false)) return count;
   for (int i = 0; i < state[0].size(); ++i)
-    known[std::string(state[0][i][0])] = static_cast<std::uint32_t>(state[0][i][1].size());
-  return known;
+    count[std::string(state[0][i][0])] = static_cast<std::uint32_t>(state[0][i][1].size());
+  return count;
 }
 
 }  // namespace
 
 std::string unconnected(const smartmill_msgs::Follow::Response& inputs) {
-  const std::map<std::string, std::uint32_t> known = publishersKnown();
+  const std::map<std::string, std::uint32_t> registered = registeredPublishers();
   std::string text;
   for (std::size_t i = 0; i < inputs.topics.size(); ++i) {
-    const auto publishers = known.find(inputs.topics[i]);
-    if (publishers == known.end() || inputs.publishers[i] >= publishers->second) continue;
+    const auto publishers = registered.find(inputs.topics[i]);
+    if (publishers == registered.end() || inputs.publishers[i] >= publishers->second) continue;
     text += (text.empty() ? "" : ", ") + inputs.topics[i];
   }
   return text;
@@ -47,138 +47,139 @@ Followers::Followers(std::vector<std::string> nodes) {
   for (std::string& name : nodes) nodes_.push_back({std::move(name), {}, {}, {}});
 }
 
-bool Followers::answers(Node& node, std::uint8_t phase, Response& response) {
+bool Followers::tryCall(Node& node, std::uint8_t phase, Response& response) {
   const std::string service = node.name + "/" + FOLLOW;
   if (!node.client.isValid()) {
     if (!ros::service::exists(service, false)) return false;
     node.client = ros::NodeHandle().serviceClient<smartmill_msgs::Follow>(service, true);
   }
-  smartmill_msgs::Follow call;
-  call.request.phase = phase;
-  if (!node.client.call(call)) return false;
-  response = call.response;
+  smartmill_msgs::Follow message;
+  message.request.phase = phase;
+  if (!node.client.call(message)) return false;
+  response = message.response;
   node.taken.clear();
   for (std::size_t i = 0; i < response.topics.size(); ++i) node.taken[response.topics[i]] = response.taken[i];
   return true;
 }
 
-Followers::Response Followers::ask(Node& node, std::uint8_t phase) {
+Followers::Response Followers::call(Node& node, std::uint8_t phase) {
   Response response;
-  if (!answers(node, phase, response)) throw Error(node.name + " answers no more");
+  if (!tryCall(node, phase, response)) throw Error(node.name + " no longer answers (service " + FOLLOW + ")");
   return response;
 }
 
-void Followers::waitFor(const std::function<std::string()>& missing, double patience) {
-  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(patience);
+void Followers::waitFor(const std::function<std::string()>& missing, double timeout) {
+  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(timeout);
   for (std::string text = missing(); !text.empty(); text = missing()) {
-    if (!ros::ok()) throw Error("ended while waiting: " + text);
+    if (!ros::ok()) throw Error("interrupted by the shutdown of ROS: " + text);
     if (ros::WallTime::now() > end) throw Error(text);
     ros::WallDuration(POLL).sleep();
   }
 }
 
-void Followers::begin(double patience) {
+void Followers::begin(double timeout) {
   sent_.clear();
   for (Node& node : nodes_) {
     waitFor(
         [&]() -> std::string {
           Response response;
-          if (!answers(node, Request::BEGIN, response)) return node.name + " is not there";
+          if (!tryCall(node, Request::BEGIN, response)) return node.name + " is not running";
           const std::string topics = unconnected(response);
-          return topics.empty() ? "" : node.name + " is not connected with " + topics;
+          return topics.empty() ? "" : node.name + " is not connected to all publishers of " + topics;
         },
-        patience);
-    node.begun = node.taken;
+        timeout);
+    node.taken_at_begin = node.taken;
   }
-  lookOften();
-  for (Node& node : nodes_) node.begun = node.taken;
+  waitForDelivery();
+  for (Node& node : nodes_) node.taken_at_begin = node.taken;
 }
 
-void Followers::expect(const ros::Publisher& publisher, double patience) {
+void Followers::expect(const ros::Publisher& publisher, double timeout) {
   const std::string topic = publisher.getTopic();
-  const auto due = static_cast<std::uint32_t>(std::count_if(
+  const auto expected = static_cast<std::uint32_t>(std::count_if(
       nodes_.begin(), nodes_.end(), [&](const Node& node) { return node.taken.count(topic) > 0; }));
   waitFor(
       [&]() -> std::string {
-        return publisher.getNumSubscribers() >= due ? "" : topic + ": a node has not connected";
+        return publisher.getNumSubscribers() >= expected ? "" : topic + ": a node has not connected";
       },
-      patience);
+      timeout);
 }
 
-// A subscriber counts its publisher when it has asked for the connection; the publisher's thread that takes
-// the request answers the questions too.
-void Followers::expect(const ros::Subscriber& listener, double patience) {
+// A subscriber counts a publisher once it has requested the connection. The thread of the publisher that
+// handles the request also answers the service, so that an answer shows that the connection is made.
+void Followers::expect(const ros::Subscriber& subscriber, double timeout) {
   waitFor(
       [&]() -> std::string {
-        return listener.getNumPublishers() > 0 ? "" : listener.getTopic() + ": nobody publishes";
+        return subscriber.getNumPublishers() > 0 ? "" : subscriber.getTopic() + ": no publisher";
       },
-      patience);
-  lookOften();
+      timeout);
+  waitForDelivery();
 }
 
-void Followers::lookOften() {
-  for (int round = 0; round < ROUNDS; ++round) look();
+void Followers::waitForDelivery() {
+  for (int round = 0; round < ROUNDS; ++round) updateCounts();
 }
 
-std::uint64_t Followers::look() {
+// @return [1] messages that all nodes have processed
+std::uint64_t Followers::updateCounts() {
   std::uint64_t taken = 0;
   for (Node& node : nodes_) {
-    ask(node, Request::LOOK);
+    call(node, Request::LOOK);
     for (const auto& [topic, count] : node.taken) taken += count;
   }
   return taken;
 }
 
 std::uint64_t Followers::behind() const {
-  std::uint64_t most = 0;
+  std::uint64_t max_behind = 0;
   for (const Node& node : nodes_) {
     std::uint64_t waiting = 0;
     for (const auto& [topic, count] : node.taken) {
-      const auto sent = sent_.find(topic), begun = node.begun.find(topic);
+      const auto sent = sent_.find(topic), at_begin = node.taken_at_begin.find(topic);
       if (sent == sent_.end()) continue;
-      const std::uint64_t since = count - (begun == node.begun.end() ? 0 : begun->second);
+      const std::uint64_t since = count - (at_begin == node.taken_at_begin.end() ? 0 : at_begin->second);
       waiting += sent->second - std::min(sent->second, since);
     }
-    most = std::max(most, waiting);
+    max_behind = std::max(max_behind, waiting);
   }
-  return most;
+  return max_behind;
 }
 
-void Followers::keepUp(std::uint64_t most) {
-  std::uint64_t before = 0;
-  ros::WallTime moved = ros::WallTime::now();
-  while (behind() > most) {
-    const std::uint64_t taken = look();
-    if (taken != before) {
-      before = taken;
-      moved = ros::WallTime::now();
+void Followers::keepUp(std::uint64_t max_behind) {
+  std::uint64_t previous = 0;
+  ros::WallTime last_progress = ros::WallTime::now();
+  while (behind() > max_behind) {
+    const std::uint64_t taken = updateCounts();
+    if (taken != previous) {
+      previous = taken;
+      last_progress = ros::WallTime::now();
       continue;
     }
-    if (!ros::ok() || (ros::WallTime::now() - moved).toSec() > PATIENCE)
-      throw Error(std::to_string(behind()) + " messages are not taken by their nodes");
+    if (!ros::ok() || (ros::WallTime::now() - last_progress).toSec() > TIMEOUT)
+      throw Error(std::to_string(behind()) + " messages are not processed by a node");
     ros::WallDuration(POLL).sleep();
   }
 }
 
 void Followers::settle() {
   keepUp(0);
-  std::uint64_t before = look();
+  std::uint64_t previous = updateCounts();
   for (int round = 0; round < ROUNDS; ++round) {
-    const std::uint64_t taken = look();
-    if (taken != before) round = -1;
-    before = taken;
+    const std::uint64_t taken = updateCounts();
+    if (taken != previous) round = -1;
+    previous = taken;
   }
 }
 
 void Followers::leave() {
   settle();
-  for (Node& node : nodes_) ask(node, Request::LEAVE);
+  for (Node& node : nodes_) call(node, Request::LEAVE);
 }
 
 void Followers::end() {
   for (Node& node : nodes_) {
     settle();
-    ask(node, Request::END);
+    call(node, Request::END);
   }
   settle();
 }

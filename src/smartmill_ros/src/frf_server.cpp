@@ -21,7 +21,7 @@ namespace {
 using Server = actionlib::ActionServer<smartmill_msgs::MeasureFrfAction>;
 using Handle = Server::GoalHandle;
 
-smartmill_msgs::MeasureFrfResult answer(FrfCode code, const std::string& text) {
+smartmill_msgs::MeasureFrfResult resultWithoutFrf(FrfCode code, const std::string& text) {
   smartmill_msgs::MeasureFrfResult result;
   result.code = static_cast<std::uint8_t>(code);
   result.message = text;
@@ -37,9 +37,9 @@ struct FrfServer::Impl {
     ros::WallTime since;
     bool answered = false;
 
-    void reject(FrfCode code, const std::string& why) {
+    void reject(FrfCode code, const std::string& reason) {
       answered = true;
-      handle.setRejected(answer(code, why), why);
+      handle.setRejected(resultWithoutFrf(code, reason), reason);
     }
   };
 
@@ -66,7 +66,7 @@ struct FrfServer::Impl {
     waiting.erase(std::remove(waiting.begin(), waiting.end(), pending), waiting.end());
     if (pending->answered) return false;
     if (pending->handle.getGoalStatus().status == actionlib_msgs::GoalStatus::RECALLING) {
-      const auto recalled = answer(FrfCode::cancelled, "cancelled before it began");
+      const auto recalled = resultWithoutFrf(FrfCode::cancelled, "cancelled before its start");
       pending->answered = true;
       pending->handle.setCanceled(recalled, recalled.message);
       return false;
@@ -117,7 +117,7 @@ void FrfServer::feedback(const std::string& stage, double progress, int hits_don
 }
 
 void FrfServer::finish(const Result& result) {
-  smartmill_msgs::MeasureFrfResult message = answer(result.code, result.message);
+  smartmill_msgs::MeasureFrfResult message = resultWithoutFrf(result.code, result.message);
   message.sensitivity = result.sensitivity;
   message.sensitivity_std = result.sensitivity_std;
   message.flute_sure = result.flute_sure;
@@ -147,22 +147,22 @@ void FrfServer::finish(const Result& result) {
 }
 
 void FrfServer::restart() {
-  ROS_WARN("%s: time went back, starting afresh", impl_->node.c_str());
+  ROS_WARN("%s: time jumped back, results and goals are discarded", impl_->node.c_str());
   impl_->frf.forget();
   impl_->modes.forget();
-  const auto gone = answer(FrfCode::cancelled, "time went back: the bag was restarted");
-  if (impl_->active) impl_->active->setAborted(gone, gone.message);
+  const auto discarded = resultWithoutFrf(FrfCode::cancelled, "time jumped back: the bag was restarted");
+  if (impl_->active) impl_->active->setAborted(discarded, discarded.message);
   impl_->active.reset();
   for (const auto& pending : impl_->waiting) {
-    if (!pending->answered) pending->reject(FrfCode::cancelled, gone.message);
+    if (!pending->answered) pending->reject(FrfCode::cancelled, discarded.message);
   }
   impl_->waiting.clear();
 }
 
-void FrfServer::refuseWaiting(const std::string& why, double patience) {
+void FrfServer::refuseWaiting(const std::string& reason, double timeout) {
   for (const auto& pending : impl_->waiting) {
-    if (pending->answered || (ros::WallTime::now() - pending->since).toSec() < patience) continue;
-    pending->reject(FrfCode::bad_data, why);
+    if (pending->answered || (ros::WallTime::now() - pending->since).toSec() < timeout) continue;
+    pending->reject(FrfCode::bad_data, reason);
   }
 }
 

@@ -8,8 +8,8 @@
 namespace smartmill {
 namespace {
 
-constexpr double SAY_EVERY = 5.0;  // [s] of lines in the log about one input
-constexpr double HOLD = 120.0;     // [s] without a question after which a player counts as gone
+constexpr double LOG_PERIOD = 5.0;  // [s] between lines in the log about one input
+constexpr double HOLD = 120.0;      // [s] without a call after which a player has ended
 
 }  // namespace
 
@@ -18,23 +18,23 @@ std::string InputHealth::take(double now, const std::function<void()>& handle) {
   ++taken_;
   try {
     handle();
-    standing_ = false;
+    last_refused_ = false;
     return {};
   } catch (const std::exception& error) {
     problem_ = error.what();
     ++refused_;
-    standing_ = true;
-    told_ = false;
+    last_refused_ = true;
+    reported_ = false;
   }
-  if (now - said_ < SAY_EVERY) return {};
-  said_ = now;
+  if (now - logged_ < LOG_PERIOD) return {};
+  logged_ = now;
   return topic_ + ": " + problem_;
 }
 
 std::string InputHealth::takeProblem() {
-  // Told at least once, and as long as it lasts.
-  if (told_ && !standing_) return {};
-  told_ = true;
+  // Returned at least once, and as long as it persists.
+  if (reported_ && !last_refused_) return {};
+  reported_ = true;
   return problem_;
 }
 
@@ -42,8 +42,8 @@ Inputs::Inputs(ros::NodeHandle nh, double timeout) : nh_(std::move(nh)), timeout
 }
 
 void Inputs::tick(double period) {
-  if (held_ > 0.0) {
-    held_ -= period;
+  if (hold_ > 0.0) {
+    hold_ -= period;
     return;
   }
   any_.tick(period);
@@ -83,8 +83,8 @@ const InputHealth* Inputs::dead(std::initializer_list<const char*> topics) {
 void Inputs::follow(const smartmill_msgs::Follow::Request& request,
                     smartmill_msgs::Follow::Response& response) {
   using Request = smartmill_msgs::Follow::Request;
-  if (request.phase == Request::BEGIN || held_ > 0.0) held_ = HOLD;
-  if (request.phase == Request::END || request.phase == Request::LEAVE) held_ = 0.0;
+  if (request.phase == Request::BEGIN || hold_ > 0.0) hold_ = HOLD;
+  if (request.phase == Request::END || request.phase == Request::LEAVE) hold_ = 0.0;
   if (request.phase == Request::END) {
     any_.end();
     for (InputHealth& input : inputs_) input.watchdog().end();
@@ -98,7 +98,7 @@ void Inputs::follow(const smartmill_msgs::Follow::Request& request,
 
 void Inputs::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   using Level = diagnostic_msgs::DiagnosticStatus;
-  status.summary(Level::OK, "inputs are read");
+  status.summary(Level::OK, "inputs without errors");
   for (InputHealth& input : inputs_) {
     const std::string problem = input.takeProblem();
     if (!problem.empty()) status.mergeSummary(Level::ERROR, input.topic() + ": " + problem);
@@ -106,7 +106,7 @@ void Inputs::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
       status.addf(input.topic(), "%.2f s since the last message, %zu refused", input.watchdog().silent(),
                   input.refused());
     } else {
-      status.add(input.topic(), "nothing yet");
+      status.add(input.topic(), "no message yet");
     }
   }
 }

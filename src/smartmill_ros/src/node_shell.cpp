@@ -33,23 +33,23 @@ void NodeShell::diagnose(const std::string& name,
   diagnostics_.add(name, std::move(task));
 }
 
-void NodeShell::every(double period, std::function<void()> work) {
-  works_.push_back([work = std::move(work)] {
+void NodeShell::every(double period, std::function<void()> task) {
+  tasks_.push_back([task = std::move(task)] {
     try {
-      work();
+      task();
     } catch (const std::exception& error) {
       ROS_ERROR_STREAM_THROTTLE(5.0, error.what());
     }
   });
   timers_.push_back(nh_.createWallTimer(ros::WallDuration(period),
-                                        [work = works_.back()](const ros::WallTimerEvent&) { work(); }));
+                                        [task = tasks_.back()](const ros::WallTimerEvent&) { task(); }));
 }
 
 bool NodeShell::follow(smartmill_msgs::Follow::Request& request, smartmill_msgs::Follow::Response& response) {
   inputs_.follow(request, response);
-  // The work of watching finds the end, and hands out what waits.
+  // The tasks detect the end of data and release delayed results.
   if (request.phase == smartmill_msgs::Follow::Request::END) {
-    for (const auto& work : works_) work();
+    for (const auto& task : tasks_) task();
   }
   return true;
 }

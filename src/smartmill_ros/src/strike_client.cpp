@@ -20,8 +20,8 @@ void StrikeClient::strike(const std::string& direction) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (calling_) {
-      fault_ =
-          Answer{Answer::Kind::failed, std::string(names::STRIKE) + ": the last call has not been answered"};
+      fault_ = Answer{Answer::Kind::failed,
+                      std::string(names::STRIKE) + ": the previous call is not answered yet"};
       return;
     }
     calling_ = true;
@@ -40,7 +40,7 @@ void StrikeClient::call(const std::string& direction) {
   calling_ = false;
   const std::string service = names::STRIKE;
   if (!answered) {
-    fault_ = Answer{Answer::Kind::nobody, service + ": no answer (is the driver of the sensors running?)"};
+    fault_ = Answer{Answer::Kind::no_answer, service + ": no answer (is the driver of the sensors running?)"};
   } else if (strike.response.code != Response::OK) {
     const bool no_hammer = strike.response.code == Response::NO_HAMMER;
     fault_ = Answer{no_hammer ? Answer::Kind::no_hammer : Answer::Kind::failed,

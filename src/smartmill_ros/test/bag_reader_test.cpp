@@ -1,5 +1,5 @@
-// Bags with damaged bytes: every one is read, or refused with a line that names the file; none takes memory
-// for a length that it does not have.
+// Bags with damaged bytes: each is read, or refused with one line that names the file; a false length
+// allocates no memory.
 #include "smartmill_recording/recording_reader.h"
 
 #include <gtest/gtest.h>
@@ -40,7 +40,7 @@ class DamagedBag : public ::testing::Test {
     std::ifstream in(file_, std::ios::binary);
     bytes_.assign(std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>());
   }
-  /// What a reader says of these bytes; empty: it reads them.
+  /// Error of a reader of these bytes; empty: none.
   std::string fault(const std::vector<char>& bytes) const {
     std::ofstream(file_, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
     try {
@@ -60,7 +60,7 @@ class DamagedBag : public ::testing::Test {
   std::vector<char> bytes_;
 };
 
-TEST_F(DamagedBag, ALengthBeyondTheFileIsRefusedBeforeMemoryIsTaken) {
+TEST_F(DamagedBag, ALengthBeyondTheFileIsRefusedWithoutAllocation) {
   EXPECT_EQ(fault(bytes_), "");
   std::vector<char> bytes = bytes_;
   for (std::size_t i = 13; i < 17; ++i) {
@@ -70,12 +70,12 @@ TEST_F(DamagedBag, ALengthBeyondTheFileIsRefusedBeforeMemoryIsTaken) {
                               " states 2139062143 bytes");
 }
 
-TEST_F(DamagedBag, PackedBagsAreReadTheSame) {
-  for (const rosbag::compression::CompressionType packing :
+TEST_F(DamagedBag, CompressedBagsAreRead) {
+  for (const rosbag::compression::CompressionType compression :
        {rosbag::compression::BZ2, rosbag::compression::LZ4}) {
     {
       rosbag::Bag bag(file_, rosbag::bagmode::Write);
-      bag.setCompression(packing);
+      bag.setCompression(compression);
       bag.setChunkThreshold(2000);  // several chunks
       smartmill_msgs::SpindleAngle angle;
       for (int i = 0; i < 500; ++i) {
@@ -84,29 +84,29 @@ TEST_F(DamagedBag, PackedBagsAreReadTheSame) {
       }
       bag.close();
     }
-    // In the order of their reception, not of the file.
+    // In the order of reception, not of the file.
     RecordingReader reader(file_);
-    std::vector<double> seen;
+    std::vector<double> angles;
     reader.on<SpindleAngle>(names::SPINDLE_ANGLE, [&](const auto& m, double time) {
-      EXPECT_EQ(time, 2.0 + static_cast<double>(seen.size()) - 1.0);
-      seen.push_back(m.angle);
+      EXPECT_EQ(time, 2.0 + static_cast<double>(angles.size()) - 1.0);
+      angles.push_back(m.angle);
     });
     reader.run();
-    ASSERT_EQ(seen.size(), 500u);
+    ASSERT_EQ(angles.size(), 500u);
     for (int i = 0; i < 500; ++i) {
-      ASSERT_EQ(seen[static_cast<std::size_t>(i)], i ^ 1);
+      ASSERT_EQ(angles[static_cast<std::size_t>(i)], i ^ 1);
     }
   }
 }
 
-/// The reader of ROS takes what this project writes.
+/// The reader of ROS reads bags of this project.
 TEST(WrittenBag, IsReadByRosbag) {
   const TemporaryFolder folder;
-  for (const RecordingCompression packing : {RecordingCompression::none, RecordingCompression::lz4}) {
+  for (const RecordingCompression compression : {RecordingCompression::none, RecordingCompression::lz4}) {
     const std::string file = folder.file("written.bag");
     constexpr int COUNT = 5000;  // several chunks
     {
-      const auto writer = createRecording(file, packing);
+      const auto writer = createRecording(file, compression);
       SampleBlock block;
       block.sample_rate = 100.0;
       block.channels = block.units = {"N"};
@@ -138,7 +138,7 @@ TEST(WrittenBag, IsReadByRosbag) {
   }
 }
 
-TEST_F(DamagedBag, APackedChunkOfAnotherChecksumIsRefused) {
+TEST_F(DamagedBag, ACompressedChunkWithAWrongChecksumIsRefused) {
   {
     rosbag::Bag bag(file_, rosbag::bagmode::Write);
     bag.setCompression(rosbag::compression::LZ4);
@@ -149,17 +149,17 @@ TEST_F(DamagedBag, APackedChunkOfAnotherChecksumIsRefused) {
   std::ifstream in(file_, std::ios::binary);
   std::vector<char> bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
   ASSERT_EQ(fault(bytes), "");
-  const std::string magic = "\x04\x22\x4d\x18";  // of a frame; its length stands before it
+  const std::string magic = "\x04\x22\x4d\x18";  // of a frame, preceded by its length
   const auto frame = std::search(bytes.begin(), bytes.end(), magic.begin(), magic.end());
   ASSERT_NE(frame, bytes.end());
   std::uint32_t length = 0;
   std::memcpy(&length, &*frame - sizeof length, sizeof length);
-  *(frame + length - 1) ^= 1;  // the last of its checksum
+  *(frame + length - 1) ^= 1;  // last byte of the checksum
   EXPECT_NE(fault(bytes).find("checksum mismatch"), std::string::npos) << fault(bytes);
 }
 
-// Where a chunk begins is believed of the index, but looked at.
-TEST_F(DamagedBag, AnIndexThatTellsLaterTimesIsRefused) {
+// The start times of the index are checked against the messages.
+TEST_F(DamagedBag, AnIndexWithLaterTimesIsRefused) {
   const std::string key = "start_time=";
   std::vector<char> bytes = bytes_;
   const auto at = std::search(bytes.begin(), bytes.end(), key.begin(), key.end());
@@ -171,8 +171,8 @@ TEST_F(DamagedBag, AnIndexThatTellsLaterTimesIsRefused) {
   EXPECT_EQ(fault(bytes), "");
 }
 
-TEST_F(DamagedBag, AVectorLongerThanItsMessageTakesNoMemory) {
-  // The samples' count is the last of its kind in the message: four doubles follow.
+TEST_F(DamagedBag, AVectorLongerThanItsMessageIsRefusedWithoutAllocation) {
+  // The count of the samples is the last count in the message; four doubles follow.
   std::vector<char> bytes = bytes_;
   const std::vector<char> count{4, 0, 0, 0, 0, 0, 0, 0, 0, 0, '\xf0', '\x3f'};  // 4, then 1.0
   const auto at = std::search(bytes.begin(), bytes.end(), count.begin(), count.end());
@@ -181,7 +181,7 @@ TEST_F(DamagedBag, AVectorLongerThanItsMessageTakesNoMemory) {
   EXPECT_NE(fault(bytes).find("the message ends too early or is damaged"), std::string::npos) << fault(bytes);
 }
 
-TEST_F(DamagedBag, AnyDamagedByteIsReadOrRefusedWithTheFilesName) {
+TEST_F(DamagedBag, AnyDamagedByteIsReadOrRefusedWithTheNameOfTheFile) {
   std::mt19937 random(5);
   int refused = 0;
   for (int i = 0; i < 300; ++i) {

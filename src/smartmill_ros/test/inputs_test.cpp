@@ -11,32 +11,32 @@ void refuse() {
   throw Error("channel fx is missing");
 }
 
-TEST(InputHealth, WhatAHandlerThrowsStaysThereAndIsSaidNowAndThen) {
+TEST(InputHealth, ExceptionsOfAHandlerAreCaughtAndLoggedAtIntervals) {
   InputHealth input("daq/dynamometer", 1.0);
   int handled = 0;
   EXPECT_EQ(input.take(10.0, [&] { ++handled; }), "");
   EXPECT_EQ(input.take(10.1, refuse), "daq/dynamometer: channel fx is missing");
-  EXPECT_EQ(input.take(10.2, refuse), "");  // the same again and again fills no log
+  EXPECT_EQ(input.take(10.2, refuse), "");  // not logged again at once
   EXPECT_EQ(input.take(16.0, refuse), "daq/dynamometer: channel fx is missing");
   EXPECT_EQ(input.take(16.1, [] { throw std::runtime_error("anything"); }), "");
   EXPECT_EQ(input.refused(), 4u);
   EXPECT_EQ(handled, 1);
 }
 
-TEST(InputHealth, TheDiagnosticsHearOfEveryProblemAtLeastOnce) {
+TEST(InputHealth, EveryProblemIsReportedAtLeastOnce) {
   InputHealth input("daq/dynamometer", 1.0);
   input.take(1.0, refuse);
   input.take(1.1, [] {});
-  EXPECT_EQ(input.takeProblem(), "channel fx is missing");  // though it is over
+  EXPECT_EQ(input.takeProblem(), "channel fx is missing");  // although it is over
   EXPECT_EQ(input.takeProblem(), "");
   input.take(2.0, refuse);
   EXPECT_EQ(input.takeProblem(), "channel fx is missing");
-  EXPECT_EQ(input.takeProblem(), "channel fx is missing");  // it lasts
+  EXPECT_EQ(input.takeProblem(), "channel fx is missing");  // it persists
   input.take(2.1, [] {});
   EXPECT_EQ(input.takeProblem(), "");
 }
 
-TEST(InputHealth, ARefusedMessageIsHeardAllTheSame) {
+TEST(InputHealth, ARefusedMessageResetsTheWatchdog) {
   InputHealth input("daq/dynamometer", 1.0);
   input.take(5.0, refuse);
   input.watchdog().tick(0.5);

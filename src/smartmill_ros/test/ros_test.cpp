@@ -35,13 +35,13 @@ TEST(Conversions, stampsAreStableAfterTheFirstConversion) {
     const double first = toSec(ros::Time(1763700000, ns));
     const double second = toSec(fromSec(first));
     EXPECT_EQ(first, second);
-    EXPECT_NEAR(first - 1763700000.0, ns * 1e-9, 1.3e-7);  // half a step of a double there
+    EXPECT_NEAR(first - 1763700000.0, ns * 1e-9, 1.3e-7);  // half the resolution of a double at this value
   }
   EXPECT_THROW(fromSec(NAN), Error);
   EXPECT_THROW(fromSec(-1.0), Error);
 }
 
-TEST(Conversions, aBlockComesBackUnchanged) {
+TEST(Conversions, aBlockIsUnchangedAfterTheRoundTrip) {
   const SampleBlock b = block(), back = fromMsg(toMsg(b, "dynamometer"));
   EXPECT_EQ(back.stamp, b.stamp);
   EXPECT_EQ(back.first_index, b.first_index);
@@ -49,7 +49,7 @@ TEST(Conversions, aBlockComesBackUnchanged) {
   EXPECT_EQ(back.channels, b.channels);
 }
 
-TEST(Conversions, contradictionsAreRefusedByName) {
+TEST(Conversions, inconsistentFieldsAreRefusedByName) {
   smartmill_msgs::SampleBlock m = toMsg(block());
   m.samples.pop_back();
   EXPECT_NE(errorOf([&] { fromMsg(m); }).find("samples"), std::string::npos);
@@ -65,7 +65,7 @@ TEST(Conversions, contradictionsAreRefusedByName) {
   EXPECT_NE(errorOf([&] { fromMsg(s); }).find("position"), std::string::npos);
 }
 
-TEST(Conversions, conditionAndModesComeBackUnchanged) {
+TEST(Conversions, conditionAndModesAreUnchangedAfterTheRoundTrip) {
   CuttingCondition c;
   c.stamp = 10.5;
   c.kind = CuttingCondition::Kind::cut;
@@ -90,7 +90,7 @@ TEST(Conversions, conditionAndModesComeBackUnchanged) {
   EXPECT_EQ(fromMsg(message).frf.value, frf.frf.value);
 }
 
-TEST(Conversions, aChartComesBackUnchanged) {
+TEST(Conversions, aChartIsUnchangedAfterTheRoundTrip) {
   StabilityChart chart;
   chart.stamp = toSec(ros::Time(1763700000, 5));
   chart.tool = "end_mill";
@@ -135,7 +135,7 @@ class Files : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
-TEST_F(Files, parametersHaveRoslaunchsTypes) {
+TEST_F(Files, parametersHaveTheTypesOfRoslaunch) {
   const std::string file =
       folder_.write("p.yaml", "a: 1.0e-2\nb: 3\nc: true\nd: text\ne: [1.0, 2]\nf: 1e-2\n");
   ParameterReader reader = ParameterReader::fromFile(file);
@@ -144,7 +144,7 @@ TEST_F(Files, parametersHaveRoslaunchsTypes) {
   std::string d;
   std::vector<double> e;
   reader.read("a", a);
-  reader.read("b", b);  // an integer serves as a number
+  reader.read("b", b);  // an integer is accepted as a number
   reader.read("c", c);
   reader.read("d", d);
   reader.read("e", e);

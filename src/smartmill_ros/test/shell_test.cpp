@@ -24,11 +24,11 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr double PATIENCE = 120.0;  // [s], for a busy machine
+constexpr double TIMEOUT = 120.0;  // [s] time limit on a busy computer
 
 template <class Condition>
 bool eventually(Condition condition) {
-  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(PATIENCE);
+  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(TIMEOUT);
   while (ros::ok() && !condition() && ros::WallTime::now() < end) {
     ros::spinOnce();
     ros::WallDuration(0.01).sleep();
@@ -36,26 +36,26 @@ bool eventually(Condition condition) {
   return condition();
 }
 
-TEST(NodeShell, AHandlerThatThrowsLeavesADiagnosticAndTheNodeGoesOn) {
+TEST(NodeShell, AnExceptionOfAHandlerIsReportedAndTheNodeContinues) {
   ros::NodeHandle nh, private_nh("~");
   NodeShell shell(nh, private_nh, "none", 1.0);
-  int good = 0, worked = 0;
+  int accepted = 0, task_calls = 0;
   shell.inputs().on<smartmill_msgs::SpindleAngle>(
       names::SPINDLE_ANGLE, [&](const smartmill_msgs::SpindleAngle& m, double received) {
         if (m.speed < 0.0) throw Error("speed is below 0");
         EXPECT_GT(received, 0.0);
-        ++good;
+        ++accepted;
       });
   shell.every(0.01, [&] {
-    ++worked;
-    throw Error("work that fails");
+    ++task_calls;
+    throw Error("task failed");
   });
-  std::string told;
+  std::string reported;
   const boost::function<void(const diagnostic_msgs::DiagnosticArray&)> listen =
       [&](const diagnostic_msgs::DiagnosticArray& array) {
         for (const auto& status : array.status) {
           if (status.level == diagnostic_msgs::DiagnosticStatus::ERROR)
-            told = status.name + ": " + status.message;
+            reported = status.name + ": " + status.message;
         }
       };
   const ros::Subscriber diagnostics =
@@ -67,17 +67,17 @@ TEST(NodeShell, AHandlerThatThrowsLeavesADiagnosticAndTheNodeGoesOn) {
   smartmill_msgs::SpindleAngle message;
   message.speed = -1.0;
   angle.publish(message);
-  ASSERT_TRUE(eventually([&] { return !told.empty(); }));
-  EXPECT_THAT(told, HasSubstr("inputs"));
-  EXPECT_THAT(told, HasSubstr("spindle/angle: speed is below 0"));
-  EXPECT_EQ(good, 0);
+  ASSERT_TRUE(eventually([&] { return !reported.empty(); }));
+  EXPECT_THAT(reported, HasSubstr("inputs"));
+  EXPECT_THAT(reported, HasSubstr("spindle/angle: speed is below 0"));
+  EXPECT_EQ(accepted, 0);
   message.speed = 1.0;
   angle.publish(message);
-  EXPECT_TRUE(eventually([&] { return good == 1; }));
+  EXPECT_TRUE(eventually([&] { return accepted == 1; }));
   EXPECT_TRUE(shell.inputs().watchdog(names::SPINDLE_ANGLE).ever());
   EXPECT_THROW(shell.inputs().watchdog(names::CNC_STATE), std::out_of_range);
-  EXPECT_TRUE(eventually([&] { return worked > 3; }));
-  // Silence: told once.
+  EXPECT_TRUE(eventually([&] { return task_calls > 3; }));
+  // The end of data is reported once.
   int ends = 0;
   EXPECT_TRUE(eventually([&] { return (ends += shell.inputs().any().ended()) > 0; }));
   EXPECT_EQ(ends, 1);
@@ -86,7 +86,7 @@ TEST(NodeShell, AHandlerThatThrowsLeavesADiagnosticAndTheNodeGoesOn) {
   EXPECT_EQ(dead->topic(), names::SPINDLE_ANGLE);
 }
 
-TEST(Followers, WhoPlaysLosesNothingAndItsPausesAreNoEnd) {
+TEST(Followers, APlayerLosesNoMessageAndItsPausesAreNoEnd) {
   ros::NodeHandle nh, private_nh("~");
   NodeShell shell(nh, private_nh, "none", 0.1);
   std::vector<double> taken;
@@ -107,7 +107,7 @@ TEST(Followers, WhoPlaysLosesNothingAndItsPausesAreNoEnd) {
   followers.begin();
   followers.expect(publisher);
   smartmill_msgs::SpindleAngle message;
-  // More than the publisher's queue holds, faster than they are taken.
+  // More than the queue of the publisher, faster than the node processes them.
   for (int i = 0; i < 5000; ++i) {
     message.angle = i;
     followers.publish(publisher, message);
@@ -120,7 +120,7 @@ TEST(Followers, WhoPlaysLosesNothingAndItsPausesAreNoEnd) {
   EXPECT_EQ(ends, 0);
   followers.end();
   EXPECT_EQ(ends, 1);
-  EXPECT_THROW(Followers({"/nobody"}).begin(0.1), Error);
+  EXPECT_THROW(Followers({"/no_node"}).begin(0.1), Error);
   spinner.stop();
 }
 
@@ -133,17 +133,17 @@ TEST(LatchedTopic, ALateSubscriberGetsTheLastOfEveryKey) {
     frf.header.stamp += ros::Duration(1.0);
     topic.publish(direction, frf);
   }
-  std::map<std::string, double> got;
+  std::map<std::string, double> received;
   const boost::function<void(const smartmill_msgs::Frf&)> listen = [&](const smartmill_msgs::Frf& m) {
-    got[m.direction] = m.header.stamp.toSec();
+    received[m.direction] = m.header.stamp.toSec();
   };
   const ros::Subscriber subscriber = nh.subscribe<smartmill_msgs::Frf>(names::TOOL_FRF, 10, listen);
-  ASSERT_TRUE(eventually([&] { return got.size() == 2; }));
-  EXPECT_EQ(got["x"], 3.0);
-  EXPECT_EQ(got["y"], 2.0);
+  ASSERT_TRUE(eventually([&] { return received.size() == 2; }));
+  EXPECT_EQ(received["x"], 3.0);
+  EXPECT_EQ(received["y"], 2.0);
 }
 
-// An action's client, without the library: goals and cancels out, results in.
+// Client of an action without actionlib.
 class Client {
  public:
   explicit Client(ros::NodeHandle& nh)
@@ -177,39 +177,39 @@ class Client {
   ros::Subscriber results_;
 };
 
-TEST(FrfServer, OneGoalAtATimeEachWithItsAnswer) {
+TEST(FrfServer, MeasuresOneGoalAtATimeAndAnswersEach) {
   using Status = actionlib_msgs::GoalStatus;
   ros::NodeHandle nh;
   std::map<std::string, std::function<bool(bool)>> begin;
-  std::function<bool()> cancel_due;
+  std::function<bool()> still_active;
   FrfServer server(
       nh, "test/measure_frf", "test",
       {[&](const MeasureFrfGoal& goal, std::function<bool(bool)> at) { begin[goal.direction] = at; },
-       [&](std::function<bool()> due) { cancel_due = due; }});
+       [&](std::function<bool()> query) { still_active = query; }});
   Client client(nh);
   ASSERT_TRUE(eventually([&] { return client.connected(); }));
   for (const char* id : {"x", "y", "z"}) client.send(id);
   ASSERT_TRUE(eventually([&] { return begin.size() == 3; }));
   EXPECT_TRUE(begin["x"](true));
-  EXPECT_FALSE(begin["y"](false));  // another one runs
+  EXPECT_FALSE(begin["y"](false));  // another measurement is running
   EXPECT_TRUE(eventually([&] { return client.statusOf("y") == Status::REJECTED; }));
   client.cancel("x");
-  ASSERT_TRUE(eventually([&] { return static_cast<bool>(cancel_due); }));
-  EXPECT_TRUE(cancel_due());
+  ASSERT_TRUE(eventually([&] { return static_cast<bool>(still_active); }));
+  EXPECT_TRUE(still_active());
   server.feedback("stage", 0.5, 3);
   FrfServer::Result result;
   result.message = "measured";
   result.frf.direction = "x";
   server.finish(result);
-  EXPECT_FALSE(cancel_due());
+  EXPECT_FALSE(still_active());
   EXPECT_TRUE(eventually([&] { return client.statusOf("x") == Status::SUCCEEDED; }));
   EXPECT_EQ(server.lastMessage(), "measured");
 
-  server.refuseWaiting("daq/hammer is silent", 1e3);  // patience
+  server.refuseWaiting("daq/hammer is silent", 1e3);  // before the timeout
   server.refuseWaiting("daq/hammer is silent", 0.0);
   EXPECT_TRUE(eventually([&] { return client.statusOf("z") == Status::REJECTED; }));
   EXPECT_EQ(client.results["z"].result.message, "daq/hammer is silent");
-  EXPECT_FALSE(begin["z"](true));  // it has its answer
+  EXPECT_FALSE(begin["z"](true));  // already answered
 
   client.send("again");
   ASSERT_TRUE(eventually([&] { return begin.count("again") > 0; }));
@@ -218,16 +218,16 @@ TEST(FrfServer, OneGoalAtATimeEachWithItsAnswer) {
   EXPECT_TRUE(eventually([&] { return client.statusOf("again") == Status::ABORTED; }));
 }
 
-TEST(StrikeClient, TellsWhatWentWrongOnce) {
+TEST(StrikeClient, ReturnsEachFaultOnce) {
   using Kind = StrikeClient::Answer::Kind;
   using Strike = smartmill_msgs::Strike;
   ros::NodeHandle nh;
   StrikeClient caller(nh, "tool");
   std::optional<StrikeClient::Answer> fault;
-  const auto told = [&] { return (fault = caller.takeFault()).has_value(); };
+  const auto hasFault = [&] { return (fault = caller.takeFault()).has_value(); };
   caller.strike("x");
-  ASSERT_TRUE(eventually([&] { return fault || told(); }));
-  EXPECT_EQ(fault->kind, Kind::nobody);
+  ASSERT_TRUE(eventually([&] { return fault || hasFault(); }));
+  EXPECT_EQ(fault->kind, Kind::no_answer);
 
   std::string struck;
   std::uint8_t code = Strike::Response::OK;
@@ -235,7 +235,7 @@ TEST(StrikeClient, TellsWhatWentWrongOnce) {
                                                                                Strike::Response& response) {
     struck = request.point + " " + request.direction;
     response.code = code;
-    response.message = "said";
+    response.message = "message";
     return true;
   };
   const ros::ServiceServer server =
@@ -249,9 +249,9 @@ TEST(StrikeClient, TellsWhatWentWrongOnce) {
     code = answer;
     fault.reset();
     caller.strike("z");
-    ASSERT_TRUE(eventually([&] { return fault || told(); }));
+    ASSERT_TRUE(eventually([&] { return fault || hasFault(); }));
     EXPECT_EQ(fault->kind, kind);
-    EXPECT_EQ(fault->message, "daq/strike: said");
+    EXPECT_EQ(fault->message, "daq/strike: message");
   }
 }
 

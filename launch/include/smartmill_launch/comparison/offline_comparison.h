@@ -5,20 +5,20 @@
 
 namespace smartmill::report {
 
-/// How far the numbers of two sources part.
+/// Agreement of the numbers of two sources.
 struct Agreement {
   std::size_t compared = 0;
-  std::size_t missing = 0;  ///< numbers that only one of them has
+  std::size_t missing = 0;  ///< numbers in one source only
   double largest = 0.0;     ///< [1] largest difference over the largest number of its series
   /// @param tolerance [1] half a unit of the last digit printed
-  /// @param most_missing [1] of what was compared may be on one side only
+  /// @param most_missing [1] tolerated share, of the compared numbers, in one source only
   bool same(double tolerance, double most_missing = 0.0) const {
     return compared > 0 && static_cast<double>(missing) <= most_missing * static_cast<double>(compared) &&
            largest <= tolerance;
   }
 
-  /// A series whose numbers are of one kind: differences count against its largest number. NaN and infinity
-  /// must stand on both sides.
+  /// Adds a series of one quantity: differences are relative to its largest number. NaN and infinity must be
+  /// in both sources.
   void add(const std::vector<double>& live, const std::vector<double>& offline);
 };
 

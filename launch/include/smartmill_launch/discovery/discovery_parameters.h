@@ -7,7 +7,7 @@
 
 namespace smartmill::discovery {
 
-/// Everything that discover_node is told.
+/// Parameters of discover_node.
 struct DiscoveryParameters {
   std::string model;
   std::string record_folder;
@@ -34,12 +34,12 @@ struct DiscoveryParameters {
   /// @throws Error naming key and value.
   void validate() const;
 
-  /// The cuts that are watched first, in order, slots from a lane on. @param prefix of their names
-  /// @throws Error saying what does not fit machine or stock.
-  std::vector<session::PlannedCut> watched(const session::CutPlanner& planner, const std::string& prefix,
-                                           std::size_t lane) const;
-  /// A slot's frame: its name and lane, times.
-  session::SlotWish frame(const std::string& name, std::size_t lane) const;
+  /// The initial cuts, in order. @param prefix of their names @param lane of the first slot
+  /// @throws Error if a cut does not fit machine or stock.
+  std::vector<session::PlannedCut> initialCuts(const session::CutPlanner& planner, const std::string& prefix,
+                                               std::size_t lane) const;
+  /// A slot with name, lane and times; cutting conditions not set.
+  session::SlotRequest slotRequest(const std::string& name, std::size_t lane) const;
 };
 
 }  // namespace smartmill::discovery

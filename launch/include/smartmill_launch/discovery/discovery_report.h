@@ -8,14 +8,15 @@
 
 namespace smartmill::discovery {
 
-/// What a discovery found, beside what the machine hides where that is known.
+/// Result of a discovery, compared with the hidden effects of a simulated machine.
 struct DiscoveryReport {
   std::string text;       ///< Markdown
-  bool named = false;     ///< exactly the hidden effects were named
+  bool named = false;     ///< the named effects are exactly the hidden ones
   bool improved = false;  ///< the held-out gap fell
 };
 
-/// @param tests that were asked for, as the action says them @param hidden the machine's effects
+/// @param tests suggested tests, as in the result of the action @param hidden effects of the machine; empty:
+/// unknown
 DiscoveryReport reportOf(const Explained& explained, const std::vector<std::string>& tests,
                          const std::vector<EffectEntry>& hidden);
 

@@ -10,15 +10,15 @@
 
 namespace smartmill::discovery {
 
-/// What a report.json of `explain` says (formats.md, smartmill-report/1), as far as a discovery needs it.
+/// The part of the report.json of `explain` (formats.md, smartmill-report/1) that a discovery uses.
 struct Explained {
   struct Effect {
     std::string name;
     std::vector<ReportedParameter> parameters;
     std::string text() const;  ///< "runout: offset_um 9.02 +- 0.02, angle_deg 41 +- 1"
   };
-  /// A test that would tell rivals apart.
-  struct Wanted {
+  /// A test that would distinguish effects the records do not distinguish.
+  struct SuggestedTest {
     std::string text;
     bool cut = false;       ///< false: air
     double speed = 0.0;     ///< [rad/s]
@@ -27,18 +27,19 @@ struct Explained {
   std::string verdict;
   std::vector<Effect> effects;
   std::vector<std::string> rivals;  ///< "runout or tooth_radius"
-  std::optional<Wanted> wanted;
+  std::optional<SuggestedTest> suggested_test;
   double gap_before = NOT_A_NUMBER,
-         gap_after = NOT_A_NUMBER;  ///< [1] held out; of the fit where no test is, or none shows anything
-  bool better = false;              ///< the improved model fits better, and the held-out tests no worse
+         gap_after =
+             NOT_A_NUMBER;  ///< [1] held-out tests; fitted tests if no held-out test shows a disagreement
+  bool better = false;  ///< the gap of the fitted tests falls and that of the held-out tests does not grow
 };
 
-/// @throws Error naming file and fault.
+/// @throws Error with the file and what is wrong in it.
 Explained readExplained(const std::string& file);
 
-/// The wanted test as a slot or an air cut. @throws Error saying what of machine, stock or cutter it does not
-/// fit.
-session::PlannedCut planWanted(const session::CutPlanner& planner, const Explained::Wanted& wanted,
-                               const session::SlotWish& frame, double air_time);
+/// The suggested test as a slot or an air cut. @throws Error if it does not fit machine, stock or tool.
+session::PlannedCut planSuggestedTest(const session::CutPlanner& planner,
+                                      const Explained::SuggestedTest& suggested_test,
+                                      const session::SlotRequest& slot, double air_time);
 
 }  // namespace smartmill::discovery

@@ -15,23 +15,23 @@
 
 namespace smartmill::report {
 
-/// What a figure has to reach.
+/// Limit on the difference of a figure from the truth.
 struct Target {
   double percent = NOT_A_NUMBER;  ///< [percent] of the truth; NaN: none
-  bool at_least = false;          ///< the difference must exceed it: shows what compensation is good for
+  bool at_least = false;  ///< the difference must exceed it (raw force: shows that compensation is needed)
 };
 
-/// One estimated number beside the truth, in the unit shown.
+/// An estimate and its true value, in the unit of the report.
 struct Figure {
   std::string name, unit;
   double estimate = NOT_A_NUMBER;
-  double std_dev = NOT_A_NUMBER;  ///< NaN: not known
-  double truth = NOT_A_NUMBER;    ///< NaN: not known, a real machine
+  double std_dev = NOT_A_NUMBER;  ///< NaN: unknown
+  double truth = NOT_A_NUMBER;    ///< NaN: unknown (real machine)
   Target target;
   bool unchecked = false;  ///< the truth exists, but was not computed
 
-  double percent() const;           ///< [percent] (estimate - truth) / |truth|; NaN where not known
-  double sigmas() const;            ///< [1] (estimate - truth) / std_dev; NaN where not known
+  double percent() const;           ///< [percent] (estimate - truth) / |truth|; NaN if unknown
+  double sigmas() const;            ///< [1] (estimate - truth) / std_dev; NaN if unknown
   std::optional<bool> met() const;  ///< empty: no target or no truth
 };
 
@@ -43,11 +43,11 @@ std::pair<double, double> stiffnessOf(const Mode& mode);
 std::vector<std::optional<std::size_t>> matchModes(const std::vector<Mode>& measured,
                                                    const std::vector<Mode>& truth);
 
-/// Samples of a force gathered from blocks by running index, so that two recordings of one sensor meet sample
-/// by sample.
+/// Samples of a force from blocks, by running index, so that two recordings of one sensor align sample by
+/// sample.
 class ForceTrack {
  public:
-  /// Blocks that overlap say the same; only whole blocks are taken.
+  /// A block with the first index of an earlier one replaces it.
   void add(const ForceBlock& block);
   bool empty() const { return blocks_.empty(); }
   double sampleRate() const { return sample_rate_; }
@@ -60,8 +60,7 @@ class ForceTrack {
   std::vector<double> axisAt(std::size_t axis, const std::vector<double>& times) const;
   /// Index of the first sample not before a time [s]. @throws Error on an empty track.
   std::uint64_t indexAt(double stamp) const;
-  /// Longest stretch without a gap inside from <= index < to; status, where given, must be that of every
-  /// block.
+  /// Longest segment without a gap within from <= index < to. @param status of its blocks; empty: any
   std::pair<std::uint64_t, std::uint64_t> covered(std::uint64_t from, std::uint64_t to,
                                                   std::optional<ForceBlock::Status> status = {}) const;
 
@@ -73,20 +72,20 @@ class ForceTrack {
 /// Range from the 10th to the 90th percentile.
 double middleRange(const std::vector<double>& values);
 
-/// Share of the energy (without the mean) that does not repeat every revolution: windows of whole
-/// revolutions, in each the mean over its revolutions at every angle is what repeats. 0 for a forced
-/// vibration, towards 1 for chatter. NaN when the series holds no window.
-/// @param samples_a_revolution need not be whole @param revolutions of a window, 2 or more
-double nonperiodicShare(const std::vector<double>& values, double samples_a_revolution, int revolutions);
+/// Share of the energy (without the mean) that is not synchronous with the spindle. In each window of whole
+/// revolutions the synchronous part is the mean over the revolutions at every angle. 0 for a forced
+/// vibration, towards 1 for chatter; NaN if the series is shorter than a window.
+/// @param samples_per_revolution may be fractional @param revolutions of a window, 2 or more
+double nonperiodicShare(const std::vector<double>& values, double samples_per_revolution, int revolutions);
 
-/// One high place of a stability chart.
+/// Local maximum of a stability limit.
 struct Pocket {
   double spindle_speed = 0.0;  ///< [rad/s]
   double depth = 0.0;          ///< [m]
 };
 
-/// Local maxima of a limit that stand out by a factor (> 1) over the valleys on both sides; the chart's ends
-/// are no pockets. Infinite depths count as `ceiling` [m]; a plateau is taken at its middle.
+/// Local maxima of a limit that exceed the minima on both sides by a factor (> 1); the ends of the chart are
+/// no pockets. Infinite depths count as `ceiling` [m]; of a plateau the middle is returned.
 std::vector<Pocket> pockets(const std::vector<double>& speeds, const std::vector<double>& depths,
                             double factor, double ceiling);
 

@@ -14,17 +14,17 @@
 
 namespace smartmill::report {
 
-/// A cut of the session and what was seen of it.
+/// A cut of the session and its measurements.
 struct RecordedCut {
   CuttingCondition condition;
-  double ends = NOT_A_NUMBER;  ///< [s] stamp of the condition after it; NaN: none came
+  double ends = NOT_A_NUMBER;  ///< [s] stamp of the next condition; NaN: none
   double steady_from = NOT_A_NUMBER,
          steady_to = NOT_A_NUMBER;  ///< [s] at speed on the steady path; NaN: never
   std::vector<session::ChatterWindow> windows;
-  ForceTrack raw, compensated, truth;  ///< while it ran
+  ForceTrack raw, compensated, truth;  ///< during the cut
 };
 
-/// Everything that the report needs of a recorded session.
+/// Contents of a recorded session that the report uses.
 struct SessionRecording {
   std::vector<MeasuredFrf> frfs, true_frfs;
   std::vector<MeasuredModes> modes, true_modes;
@@ -38,15 +38,16 @@ struct SessionRecording {
   const RecordedCut* cut(const std::string& name) const;
 };
 
-/// A cut that checks the chart.
+/// A cut that verifies the chart.
 struct CutCheck {
   std::string name;
-  double spindle_speed = 0.0, axial_depth = 0.0;                       ///< [rad/s], [m]
-  double limit = NOT_A_NUMBER, true_limit = NOT_A_NUMBER;              ///< [m]
-  session::CutVerdict::Kind due = session::CutVerdict::Kind::unknown;  ///< what the chart says
-  session::CutVerdict verdict;                                         ///< what the detector said
-  double nonperiodic = NOT_A_NUMBER;  ///< [1] share of the true force that does not repeat every revolution
-  bool met() const { return verdict.kind == due; }
+  double spindle_speed = 0.0, axial_depth = 0.0;                             ///< [rad/s], [m]
+  double limit = NOT_A_NUMBER, true_limit = NOT_A_NUMBER;                    ///< [m]
+  session::CutVerdict::Kind predicted = session::CutVerdict::Kind::unknown;  ///< by the chart
+  session::CutVerdict verdict;                                               ///< of the detector
+  double nonperiodic =
+      NOT_A_NUMBER;  ///< [1] share of the true force that is not synchronous with the spindle
+  bool met() const { return verdict.kind == predicted; }
 };
 
 struct Section {
@@ -54,35 +55,35 @@ struct Section {
   std::vector<Figure> figures;
 };
 
-/// Stability limit computed from the truth that a simulator has recorded.
+/// Stability limit computed from the true machine of a simulator's recording.
 struct TrueStability {
-  std::optional<StabilityChart> chart;  ///< empty: no truth recorded, or not computed
-  std::vector<double> limits;           ///< [m] at the speed of each recorded cut; NaN or empty: not known
-  std::string failure;  ///< why it was not computed although the truth is known; empty: it was
+  std::optional<StabilityChart> chart;  ///< empty: truth not recorded, or limit not computed
+  std::vector<double> limits;           ///< [m] at the speed of each recorded cut; NaN or empty: unknown
+  std::string failure;  ///< why the limit of a known truth was not computed; empty: no failure
 };
 
 struct Report {
   std::vector<Section> sections;
   std::vector<CutCheck> cuts;
   std::vector<std::string> notes;
-  std::vector<std::string> unchecked;  ///< what a session that failed did not measure: each one target
-  std::size_t targets() const;         ///< figures with a verdict or not checked, cuts, what is unchecked
+  std::vector<std::string> unchecked;  ///< results that a failed session lacks: one target each
+  std::size_t targets() const;         ///< figures with a verdict or not checked, cuts and unchecked results
   std::size_t met() const;             ///< of these
 };
 
-/// The samples that a cut is judged by: in its steady stretch, there in all three recordings, compensation
-/// settled. Empty (first == second) when there are none.
-std::pair<std::uint64_t, std::uint64_t> judgedSamples(const RecordedCut& cut, double settle_revolutions);
+/// Samples on which a cut is evaluated: during steady cutting, in all recorded forces, compensation settled.
+/// Empty (first == second) if there are none.
+std::pair<std::uint64_t, std::uint64_t> evaluatedSamples(const RecordedCut& cut, double settle_revolutions);
 
-/// Steps that failed, with the reason; then what the recording lacks for them. Empty when no step failed.
-/// @param session JSON text that the session wrote @throws Error when it is not JSON
+/// Failed steps with the reason, then the results that the recording lacks. Empty if no step failed.
+/// @param session JSON text of the session @throws Error if it is not JSON
 std::vector<std::string> notMeasured(const SessionRecording& recording, const std::string& session);
 
 Report makeReport(const SessionRecording& recording, const TrueStability& truth);
 
-/// Tables for people, in markdown with aligned columns.
+/// Tables in Markdown with aligned columns.
 std::string markdown(const Report& report);
-/// The same for programs. @param session JSON text that the session wrote; empty: none
+/// The report as JSON. @param session JSON text of the session, included; empty: none
 std::string json(const Report& report, const std::string& session);
 
 }  // namespace smartmill::report

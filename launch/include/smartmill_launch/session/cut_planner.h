@@ -10,7 +10,7 @@
 
 namespace smartmill::session {
 
-/// How cuts are led through the stock.
+/// Parameters of the paths through the stock.
 struct PathParameters {
   std::string tool = "end_mill";
   std::string material;
@@ -26,45 +26,46 @@ struct PathParameters {
   void declarePaths(ParameterTable& table);
 };
 
-/// One test or cut, ready to be sent.
+/// One test or cut, ready for execution.
 struct PlannedCut {
   CuttingCondition condition;
-  std::array<double, 3> from{{0, 0, 0}};  ///< [m] tool tip beside the stock at cutting height; machine frame
-  std::array<double, 3> to{{0, 0, 0}};    ///< [m] where the feed ends
+  std::array<double, 3> from{{0, 0, 0}};  ///< [m] tool tip before the stock at cutting height; machine frame
+  std::array<double, 3> to{{0, 0, 0}};    ///< [m] end of the feed motion
   double feed = 0.0;                      ///< [m/s]; 0: in air, no motion
-  double spin_up = 0.0;                   ///< [s] waited after M3
+  double spin_up = 0.0;                   ///< [s] dwell after M3
   double dwell = 0.0;                     ///< [s] at speed, in air
   double duration() const;                ///< [s] of spin-up, feed and dwell, without rapid motion
 };
 
 /// A full slot along +x.
-struct SlotWish {
+struct SlotRequest {
   std::string name;
   std::size_t lane = 0;
   double speed = 0.0, depth = 0.0, feed_per_tooth = 0.0;  ///< [rad/s], [m], [m]
-  double time = 0.0, least_time = 0.0;                    ///< [s] steady: longest, shortest
+  double time = 0.0, least_time = 0.0;                    ///< [s] steady cutting: maximum, minimum
 };
 
-/// Paths of single cuts in the stock of the believed model: full slots along +x in lanes side by side in y.
-/// All positions are of the tool tip's centre in the machine frame.
+/// Paths of single cuts in the stock of the nominal model: full slots along +x in parallel lanes, spaced in
+/// y. All positions are of the centre of the tool tip in the machine frame.
 class CutPlanner {
  public:
-  /// @throws Error of one line when the model lacks something.
+  /// @throws Error of one line if the model lacks tool, spindle, axes or workpiece.
   CutPlanner(const MachineModel& model, const PathParameters& parameters);
 
   const std::string& material() const { return material_; }
-  std::size_t lanes() const { return lanes_; }  ///< that the stock holds
-  /// @throws Error when the stock holds fewer. @param what they are for
-  void needLanes(std::size_t needed, const std::string& what) const;
+  std::size_t lanes() const { return lanes_; }  ///< lanes in the stock
+  /// @throws Error if the stock has fewer lanes. @param purpose of the lanes, for the error
+  void requireLanes(std::size_t needed, const std::string& purpose) const;
 
-  /// @throws Error saying what does not fit machine or stock.
-  PlannedCut slot(const SlotWish& wish) const;
+  /// @throws Error if the slot does not fit machine or stock.
+  PlannedCut slot(const SlotRequest& request) const;
   PlannedCut air(double speed, double time) const;
-  /// Along +x above the stock, as long as the time or the way asks, for the feed drives' friction.
-  PlannedCut airMove(double speed, double feed, double time, double way) const;
+  /// Move along +x above the stock for the friction of the feed drives, over at least a time [s] and a
+  /// distance [m].
+  PlannedCut airMove(double speed, double feed, double time, double distance) const;
 
-  /// NC program of a cut (dialect of smartmill_cnc), in increments from where the machine stands, free of
-  /// work offsets. @param position [m] of the machine before it.
+  /// NC program of a cut (dialect of smartmill_cnc), incremental from the current position, independent of
+  /// work offsets. @param position [m] of the machine at its start.
   std::string program(const PlannedCut& cut, const std::array<double, 3>& position) const;
 
  private:

@@ -12,7 +12,7 @@
 
 namespace smartmill::session {
 
-/// What the job is made of.
+/// Parameters of the tests and cuts of a session.
 struct PlanParameters : PathParameters {
   std::vector<double> air_speeds{314.2, 628.3, 942.5, 1256.6};
   double air_time = 1.5;
@@ -45,30 +45,30 @@ struct Point {
   double chatter_frequency = NOT_A_NUMBER;  ///< [Hz] at the limit
 };
 
-/// The paths of the whole job in the stock of the believed model: each cut in a lane of its own along +x,
-/// full slots, lanes side by side in y. All positions are of the tool tip's centre in the machine frame.
+/// Paths of all cuts of a session in the stock of the nominal model: full slots along +x, each in its own
+/// lane, lanes spaced in y. All positions are of the centre of the tool tip in the machine frame.
 class SessionPlan {
  public:
-  /// @throws Error of one line when the model lacks something or the job does not fit machine or stock.
+  /// @throws Error of one line if the model is incomplete or a cut does not fit machine or stock.
   SessionPlan(const MachineModel& model, const PlanParameters& parameters);
 
   const std::string& material() const { return planner_.material(); }
   const std::vector<PlannedCut>& airCuts() const { return air_cuts_; }
-  /// Moves in air along +x at the feeds that were asked for; none as shipped.
+  /// Moves in air along +x at the feeds of air_feeds; none by default.
   const std::vector<PlannedCut>& airMoves() const { return air_moves_; }
   const std::vector<PlannedCut>& slots() const { return slots_; }
   const std::optional<PlannedCut>& resonance() const { return resonance_; }
 
-  /// The verifying cuts have lanes of their own. @throws Error saying what does not fit.
+  /// Cuts that verify the chart, each in its own lane. @throws Error if a cut does not fit machine or stock.
   PlannedCut stable(const Point& point, double feed_per_tooth) const;
   PlannedCut unstable(const Point& point, double feed_per_tooth) const;
 
-  /// First of the points that stable() or unstable() would take. @param why reasons of those refused, one
-  /// line.
+  /// First of the points that stable() or unstable() accepts. @param reasons why the points before it were
+  /// refused, in one line.
   std::optional<Point> firstStable(const std::vector<Point>& points, double feed_per_tooth,
-                                   std::string& why) const;
+                                   std::string& reasons) const;
   std::optional<Point> firstUnstable(const std::vector<Point>& points, double feed_per_tooth,
-                                     std::string& why) const;
+                                     std::string& reasons) const;
 
   const CutPlanner& planner() const { return planner_; }
 
@@ -79,14 +79,14 @@ class SessionPlan {
   std::optional<PlannedCut> resonance_;
 };
 
-/// A verdict of the chatter detector on one window of a cut.
+/// Result of the chatter detector for one window of a cut.
 struct ChatterWindow {
   bool chatter = false;
   double frequency = NOT_A_NUMBER;  ///< [Hz]
   double severity = 0.0;            ///< [N]
 };
 
-/// What the windows of one cut say together.
+/// Verdict on a cut from all its windows.
 struct CutVerdict {
   enum class Kind { unknown, stable, undecided, chatter };
   Kind kind = Kind::unknown;
@@ -99,8 +99,9 @@ struct CutVerdict {
 /// stable, chatter, undecided or unknown.
 const char* wordOf(CutVerdict::Kind kind);
 
-/// Stable when at most a tenth of the windows chatters, chatter from half on: it takes time to grow, and one
-/// window may hold a disturbance. Fewer than two windows say nothing.
-CutVerdict judge(const std::vector<ChatterWindow>& windows);
+/// Stable if at most a tenth of the windows chatters, since a window may contain a disturbance; chatter from
+/// half of them on, since chatter takes time to grow; undecided in between; unknown with fewer than two
+/// windows.
+CutVerdict cutVerdict(const std::vector<ChatterWindow>& windows);
 
 }  // namespace smartmill::session

@@ -12,33 +12,33 @@
 
 namespace smartmill::cnc {
 
-/// Why a controller did not do what was asked of it.
+/// Why a controller did not carry out a request.
 struct Failure {
   enum class Kind {
-    lost,        ///< the connection is gone; only connect() helps
+    lost,        ///< connection lost; recover with connect()
     alarm,       ///< alarm or emergency stop
-    wrong_mode,  ///< its panel does not let programs in from outside
-    not_yet,     ///< busy or not ready: the same may be taken a moment later
-    refused      ///< anything else that it does not do
+    wrong_mode,  ///< its mode does not accept remote programs
+    not_yet,     ///< busy or not ready: a retry may succeed
+    refused      ///< any other refusal
   };
   Kind kind = Kind::refused;
   std::string message;  ///< one line
 };
 
-/// Done, or why not.
+/// Success, or the reason of the failure.
 class [[nodiscard]] Status {
  public:
   Status() = default;
   Status(Failure failure) : failure_(std::move(failure)) {}
   explicit operator bool() const { return !failure_; }
-  const Failure& failure() const { return *failure_; }  ///< only of what is not done
+  const Failure& failure() const { return *failure_; }  ///< precondition: not successful
   bool lost() const { return failure_ && failure_->kind == Failure::Kind::lost; }
 
  private:
   std::optional<Failure> failure_;
 };
 
-/// A value, or why there is none.
+/// A value, or the reason of its absence.
 template <class Value>
 class [[nodiscard]] Result {
  public:
@@ -47,16 +47,16 @@ class [[nodiscard]] Result {
   explicit operator bool() const { return content_.index() == 0; }
   const Value& operator*() const { return std::get<0>(content_); }
   const Value* operator->() const { return &std::get<0>(content_); }
-  const Failure& failure() const { return std::get<1>(content_); }  ///< only without a value
+  const Failure& failure() const { return std::get<1>(content_); }  ///< precondition: no value
 
  private:
   std::variant<Value, Failure> content_;
 };
 
-/// An alarm as the controller shows it.
+/// An alarm of the controller.
 struct ControllerAlarm {
   int number = 0;
-  int type = 0;  ///< the controller's own kind of alarm
+  int type = 0;  ///< the controller's alarm type
   int axis = 0;  ///< 1-based, 0: none
   std::string text;
 };
@@ -65,82 +65,81 @@ inline bool operator==(const ControllerAlarm& a, const ControllerAlarm& b) {
   return a.number == b.number && a.type == b.type && a.axis == b.axis && a.text == b.text;
 }
 
-/// What a controller tells at one moment.
+/// State of a controller at one moment.
 struct Reading {
-  CncState state;                  ///< stamp, connected and armed are the bridge's to fill in
-  std::optional<LoadSample> load;  ///< stamp as well; nothing when the controller does not tell loads
+  CncState state;                  ///< without stamp, connected and armed, which the bridge sets
+  std::optional<LoadSample> load;  ///< without stamp; empty if the controller reports no load
   std::vector<ControllerAlarm> alarms;
   std::vector<double> absolute;  ///< [m] positions in workpiece coordinates, order of state.axes
   double increment = 1e-6;       ///< [m] of its positions
   bool at_rest = true;           ///< neither axes move nor a dwell runs
-  bool program_done = false;     ///< every block of the program begun last has been executed
+  bool program_done = false;     ///< every block of the last program has been executed
 };
 
-/// Factors on what a program says.
+/// Factors on the programmed values.
 struct Overrides {
   double feed = 1.0, spindle = 1.0;  ///< [1]
 };
 
-/// How much of a program is with the controller.
+/// Progress of the transfer of a program to the controller.
 struct Transfer {
   std::size_t sent = 0, total = 0;  ///< [byte]
-  bool complete = false;            ///< nothing waits on this side any more
+  bool complete = false;            ///< nothing is left to send
 };
 
-/// A machine's controller as the bridge needs it, whatever wire leads there: its state, its variables, and
-/// one program at a time. Nothing throws where an error is to be expected, nothing waits longer than the
-/// reply timeout that the implementation was made with. One thread drives it.
+/// Interface of a machine's controller, independent of the protocol: its state, its variables, one program at
+/// a time. Expected errors are returned, not thrown. No call waits longer than the reply timeout of the
+/// implementation. Used by one thread.
 class Controller {
  public:
   virtual ~Controller() = default;
 
-  /// Of log lines, for example "controller 127.0.0.1:8193".
+  /// Name for log lines, for example "controller 127.0.0.1:8193".
   virtual std::string name() const = 0;
 
-  /// @return what the controller says of itself.
+  /// @return the controller's description of itself.
   virtual Result<std::string> connect() = 0;
   virtual bool connected() const = 0;
-  /// Takes leave.
+  /// Ends the session and closes the connection.
   virtual void close() = 0;
 
-  /// Every failure of it is Failure::Kind::lost: without its state a machine cannot be driven.
+  /// Every failure is Failure::Kind::lost: a machine without known state is not moved.
   virtual Result<Reading> read() = 0;
 
   /// Writes a variable of the controller's programs.
   virtual Status setVariable(int number, double value) = 0;
 
-  /// What the controller's dialect asks of a program; the increment is the one of the last reading.
+  /// Requirements of the controller's dialect; the decimals follow the increment of the last reading.
   virtual DialectOptions dialect() const = 0;
-  /// A program that turns the spindle to an angle of tooth 1 [rad] and holds it there.
+  /// @return a program that orients the spindle. @param angle [rad] of tooth 1
   virtual std::string orientProgram(double angle) const = 0;
 
-  /// Makes the controller ready to take programs; it stays so until closePrograms() or abort().
+  /// Makes the controller accept programs until closePrograms() or abort().
   virtual Status openPrograms() = 0;
   virtual bool programsOpen() const = 0;
-  /// Whether it still takes programs. After a failure it does not.
+  /// Whether it still accepts programs. After a failure it does not.
   virtual Status checkPrograms() = 0;
-  /// Ends this properly.
+  /// Ends the acceptance of programs after the last block.
   virtual Status closePrograms() = 0;
-  /// Ends this at once; what the controller has not executed yet it forgets.
+  /// Ends it at once; blocks not yet executed are discarded.
   virtual Status abandonPrograms() = 0;
 
-  /// Takes a program that checkProgram() has passed; nothing of it moves before send().
+  /// Sets the next program, accepted by checkProgram(); nothing moves before send().
   virtual void begin(const std::string& program) = 0;
-  /// Hands over what the controller takes now of the program begun last.
+  /// Sends as much of the program as the controller accepts now.
   virtual Status send() = 0;
   virtual Transfer transfer() const = 0;
   /// Stops the axes at once, then abandonPrograms().
   virtual Status abort() = 0;
-  /// Whether it lets overrides be written from outside.
+  /// Whether it accepts overrides over its interface.
   virtual bool takesOverrides() const { return false; }
-  /// @return what it took: it may round, or not go as far.
+  /// @return the accepted values, possibly rounded or limited.
   virtual Result<Overrides> setOverrides(const Overrides& /*wanted*/) {
     return Failure{Failure::Kind::refused, name() + " takes no overrides from outside"};
   }
-  /// Feed hold: the axes stand where they are, the program goes on at the machine's own key. Not every wire
-  /// has it.
+  /// Feed hold: stops the axes; released at the machine's panel. Not every interface supports it.
   virtual Status hold() {
-    return Failure{Failure::Kind::refused, name() + " takes no feed hold from outside: its own key is due"};
+    return Failure{Failure::Kind::refused, name() + " takes no feed hold from outside: use its own key"};
   }
 };
 

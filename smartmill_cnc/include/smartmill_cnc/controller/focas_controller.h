@@ -18,28 +18,29 @@ struct FocasParameters {
   int override_data = -1;
 
   void declare(ParameterTable& table) {
-    table.text("host", host, "controller's name or address; a real one or the simulated one");
-    table.number("port", port, "1", Range::closed(1, 65535), "its FOCAS port");
+    table.text("host", host, "name or address of the controller, real or simulated");
+    table.number("port", port, "1", Range::closed(1, 65535), "FOCAS port");
     table.number("reply_timeout", reply_timeout, "s", Range::positive(),
-                 "for connecting and for every answer; longer is a lost connection");
-    table.number("spindle", spindle, "1", Range::positive(), "which spindle is the milling spindle, from 1");
+                 "timeout of connecting and of every reply; then the connection counts as lost");
+    table.number("spindle", spindle, "1", Range::positive(), "number of the milling spindle, from 1");
     table.number("marker_macro", marker_macro, "1", Range::closed(1, 99999),
-                 "variable #n that tells the end of a program; programs must leave it alone");
+                 "variable #n that marks the end of a program; programs must not use it");
     table.number("orient_macro", orient_macro, "1", Range::closed(1, 99999),
-                 "variable that M119 reads the spindle's angle from, 0 .. 4095");
+                 "variable from which M119 reads the spindle angle, 0 .. 4095");
     table.number(
         "override_data", override_data, "1", Range::closed(-1, 9998),
-        "PMC data table: the byte D of this number is a percentage that the machine's ladder multiplies "
-        "into the feed override, the next byte into the spindle's, 0 and 100 alike; -1: the ladder has "
-        "no such rungs, overrides are refused");
+        "PMC data table: number of the byte D whose percentage the machine's ladder multiplies into the feed "
+        "override; the next byte is for the spindle; 0 means 100; -1: the ladder has no such rungs, "
+        "overrides "
+        "are refused");
   }
 
   /// @throws Error naming key and value.
   void validate() const;
 };
 
-/// A Fanuc controller over FOCAS2 Ethernet. A program goes to it as a piece of one long DNC session: its
-/// text, then #marker=k; all of it has been executed when the variable is set (Dunwoody 6.2 and 7.1).
+/// A Fanuc controller over FOCAS2 Ethernet. Programs are pieces of one long DNC session: the text, then
+/// #marker=k; a program has been executed when the variable has this value (Dunwoody 6.2 and 7.1).
 /// @throws Error of FocasParameters::validate().
 std::unique_ptr<Controller> makeFocasController(const FocasParameters& parameters);
 

@@ -9,28 +9,27 @@
 
 namespace smartmill::cnc {
 
-/// Keeps the connection to a controller and reads it once a period. A loss, or that no connection comes
-/// about, is told in one line, not in one a period.
+/// Maintains the connection to a controller and reads it once per period. A loss or a failure to connect is
+/// logged once, not in every period.
 class Poller {
  public:
   struct Counts {
     int made = 0, lost = 0, attempts = 0;
   };
 
-  /// @param reconnect_period [s] between the first two attempts; each further one waits twice as long, at
-  /// most eight times
+  /// @param reconnect_period [s] between the first two attempts; the interval doubles up to eight times this
   Poller(Controller& controller, double reconnect_period, Log& log);
 
-  /// Connects when it is time to, reads. @param now [s] any steady time.
+  /// Connects if an attempt is scheduled, then reads. @param now [s] any steady time.
   void fetch(double now);
-  /// What fetch() read, once; nothing without connection. Tells of a connection that came about.
-  std::optional<Reading> take();
+  /// The reading of fetch(), once; empty without a connection. Logs a new connection.
+  std::optional<Reading> takeReading();
 
-  /// The connection went while somebody talked; why, in one line.
-  void failed(const std::string& why) { last_error_ = why; }
+  /// Stores why the connection was lost during a command. @param why one line
+  void setError(const std::string& why) { last_error_ = why; }
   const std::string& lastError() const { return last_error_; }
-  /// There is no connection in this period. Tells of it, when that is news.
-  void lost();
+  /// To be called in a period without a connection; logs a new loss or a new reason.
+  void reportDisconnected();
   const Counts& counts() const { return counts_; }
 
  private:
@@ -38,15 +37,15 @@ class Poller {
 
   Controller& controller_;
   double reconnect_period_;
-  double wait_;       // [s] from the last attempt to the next
-  int failures_ = 0;  // one after the other
+  double wait_;       // [s] between the last attempt and the next
+  int failures_ = 0;  // consecutive
   Counts counts_;
   Log& log_;
   std::optional<Reading> reading_;
   std::string identity_;
   double next_connect_ = -std::numeric_limits<double>::infinity();  // [s]
-  bool connected_ = false, loss_told_ = false, turned_away_ = false;
-  std::string last_error_ = "not connected yet", told_error_ = "not connected yet";
+  bool connected_ = false, loss_logged_ = false, refused_ = false;
+  std::string last_error_ = "not connected yet", logged_error_ = "not connected yet";
 };
 
 }  // namespace smartmill::cnc

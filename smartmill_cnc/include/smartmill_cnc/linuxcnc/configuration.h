@@ -8,17 +8,18 @@
 namespace smartmill::cnc::linuxcnc {
 
 /// Names that the generated configuration and linuxcnc_stream share.
-constexpr const char* PERMIT_SIGNAL = "permit";          ///< bit: the machine may move
-constexpr const char* BEAT_SIGNAL = "beat";              ///< bit: changes while linuxcnc_stream lives
+constexpr const char* PERMIT_SIGNAL = "permit";          ///< bit: motion is permitted
+constexpr const char* BEAT_SIGNAL = "beat";              ///< bit: toggles while linuxcnc_stream runs
 constexpr const char* LOAD_SIGNAL = "load";              ///< float: spindle load, 1 is full scale
-constexpr const char* FEED_SIGNAL = "adaptive_feed";     ///< float: to motion.adaptive-feed (M52)
+constexpr const char* FEED_SIGNAL = "adaptive_feed";     ///< float: input of motion.adaptive-feed (M52)
 constexpr const char* SPINDLE_SIGNAL = "spindle_scale";  ///< float: factor on spindle.0.speed-out
 constexpr const char* SAMPLER_PINS = "fffffffff";
 
-/// A configuration of LinuxCNC for a machine without any hardware: ideal axes with the model's travel, rapid
-/// and acceleration, a spindle that keeps the model's acceleration, turns to an angle (M19) and counts its
-/// revolutions. The permit of linuxcnc_stream is its emergency stop chain. Of files by their names.
-/// @param folder where they will stand @throws Error naming what the model lacks.
+/// Configuration of a LinuxCNC without hardware: ideal axes with the model's travel, rapid feed and
+/// acceleration; a spindle with the model's acceleration, orientation (M19) and a revolution counter. The
+/// emergency stop chain depends on the permit of linuxcnc_stream. @param folder of the files @return text by
+/// file name
+/// @throws Error naming the missing value of the model.
 std::map<std::string, std::string> configurationOf(const MachineModel& model, const std::string& folder);
 
 }  // namespace smartmill::cnc::linuxcnc

@@ -7,26 +7,26 @@
 
 namespace smartmill::cnc::linuxcnc {
 
-/// Speaks to linuxcnc_gateway; every question is answered before the next.
+/// Client of linuxcnc_gateway; waits for each reply before the next request.
 class GatewayClient {
  public:
-  /// @param folder of the machine @param timeout [s] > 0 of every answer @param socket that of the gateway,
-  /// or of linuxcnc_stream
+  /// @param folder of the machine @param timeout [s] > 0 of every reply @param socket of the gateway or of
+  /// linuxcnc_stream
   GatewayClient(const std::string& folder, double timeout, const char* socket = GATEWAY_SOCKET);
 
-  /// @throws Error of one line.
+  /// @throws Error (one line).
   void connect();
   bool connected() const { return connection_.open(); }
   void close() { connection_.close(); }
 
-  /// @throws Error of one line when no answer comes in time; the connection is closed then.
+  /// @throws Error (one line) on a timeout, which also closes the connection.
   MachineStatus status();
   Reply carryOut(const Command& command);
-  Reply carryOut(const SetOverrides& overrides);  ///< by linuxcnc_stream
+  Reply carryOut(const SetOverrides& overrides);  ///< for linuxcnc_stream
 
  private:
   template <class Answer>
-  Answer exchange(const Message& question);
+  Answer exchange(const Message& request);
 
   const std::string path_;
   const double timeout_;

@@ -14,21 +14,21 @@ struct LinuxCncParameters {
   double timeout = 1.5;
 
   void declare(ParameterTable& table) {
-    table.text("linuxcnc_folder", folder, "of the machine: where linuxcnc_machine has its sockets");
+    table.text("linuxcnc_folder", folder, "folder of the machine, with the sockets of linuxcnc_machine");
     table.number("linuxcnc_timeout", timeout, "s", Range::positive(),
-                 "for every answer of its gateway; longer is a lost connection");
+                 "timeout of every reply of the gateway; then the connection counts as lost");
   }
 };
 
-/// The text that LinuxCNC runs for a program of the bridge's dialect as checkProgram() writes it: dwells in
-/// seconds, an exact stop at the end of every block, M5 and M119 waited for as a Fanuc does, and before every
-/// motion M67, so that each servo sample tells by its marker which line of the program it belongs to.
+/// Translates a program of the bridge's dialect (output of checkProgram()) for LinuxCNC: dwells in seconds,
+/// an exact stop at the end of every block, M5 and M119 wait for the spindle as on a Fanuc, and M67 before
+/// every motion marks each servo sample with the line of the program.
 std::string linuxCncText(const std::string& program);
 
-/// LinuxCNC behind linuxcnc_gateway and linuxcnc_stream. A program goes to it as a subroutine that is called
-/// by MDI. Its mode passes for DNC while it takes programs from outside: in MDI, and before arming in manual
-/// too. After an emergency stop or an error the panel (`linuxcnc_panel FOLDER ready`) has to make it ready.
-/// @param stream of the same machine; others may drive it
+/// LinuxCNC with linuxcnc_gateway and linuxcnc_stream. A program is a subroutine called by MDI. The reported
+/// mode is DNC while programs are accepted: in MDI, and in manual mode before arming. After an emergency stop
+/// or an error `linuxcnc_panel FOLDER ready` is required.
+/// @param stream of the same machine; step() is called elsewhere @param now [s] any steady time
 std::unique_ptr<Controller> makeLinuxCncController(const LinuxCncParameters& parameters,
                                                    std::shared_ptr<const ServoStream> stream,
                                                    double (*now)());

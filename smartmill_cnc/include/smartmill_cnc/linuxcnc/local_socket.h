@@ -28,33 +28,32 @@ class LocalDescriptor {
   int fd_ = -1;
 };
 
-/// One end of a connection over a Unix socket that carries frames. Nothing waits but wait().
+/// One end of a connection over a Unix socket that carries frames. Only wait() blocks.
 class LocalConnection {
  public:
   LocalConnection() = default;
   explicit LocalConnection(LocalDescriptor descriptor);
-  /// @throws Error of one line when nobody listens there.
+  /// @throws Error (one line) when no server listens there.
   static LocalConnection to(const std::string& path);
 
   bool open() const { return descriptor_.valid(); }
   int descriptor() const { return descriptor_.get(); }
-  int peer() const;  ///< number of the process at the other end; 0: unknown
+  int peer() const;  ///< process number of the peer; 0: unknown
   void close();
-  /// Why it is closed, when the other side or what it sent is to blame.
+  /// Why it was closed, if the peer or an invalid frame is the cause.
   const std::string& fault() const { return fault_; }
 
-  /// Reads what has come. The connection is closed when the other side has closed it or sent what is no
-  /// frame.
+  /// Reads the available bytes. Closes the connection if the peer has closed it or sent an invalid frame.
   void receive();
-  /// A message that has come; closes the connection at what is no frame.
+  /// The next received message; closes the connection on an invalid frame.
   std::optional<Received> next();
-  /// @param seconds to wait for bytes; true when some may be there
+  /// @param seconds to wait for bytes @return whether some may be available
   bool wait(double seconds) const;
 
-  /// Sends, now or when the other side reads; closes the connection to a side that does not read.
+  /// Sends now or when the peer reads; closes the connection to a peer that does not read.
   /// @throws Error of encode().
   void send(const Message& message, std::uint16_t sequence = 0);
-  /// Sends what still waits.
+  /// Sends queued bytes.
   void flush();
   bool unsent() const { return !outgoing_.empty(); }
 
@@ -66,10 +65,10 @@ class LocalConnection {
   std::string outgoing_, fault_;
 };
 
-/// Listens on a path; a socket that nobody listens on any more is replaced. Only the own user may connect.
-/// @throws Error of one line, also when somebody listens there.
+/// Listens on a path and replaces a stale socket. Only the same user may connect.
+/// @throws Error (one line), also if another server listens there.
 LocalDescriptor listenAt(const std::string& path);
-/// Who wants to connect now, or none.
+/// Accepts a waiting client; empty: none waits.
 std::optional<LocalConnection> acceptFrom(const LocalDescriptor& listener);
 
 }  // namespace smartmill::cnc::linuxcnc

@@ -10,24 +10,24 @@
 
 namespace smartmill::cnc::linuxcnc {
 
-/// What the kernel tells of other processes: that they have ended, that they wait for a processor.
+/// Detects through the kernel (/proc) that other processes have ended or wait for a processor.
 class ProcessWatch {
  public:
-  static constexpr double WINDOW = 0.02;  ///< [s] longer than the kernel takes to account what has run
+  static constexpr double WINDOW = 0.02;  ///< [s] longer than the kernel takes to account run time
 
-  /// Of each of these names (/proc/PID/comm) the process with the lowest number: what it starts for a moment
-  /// under its own name is not meant.
+  /// Watches the process with the lowest number of each name (/proc/PID/comm), which excludes its short-lived
+  /// children of the same name.
   void find(const std::vector<std::string>& names);
-  /// This one, and no other.
-  void only(int pid);
+  /// Watches this process only.
+  void watch(int pid);
   std::size_t found() const { return processes_.size(); }
 
-  /// One of them has ended since it was found.
+  /// Whether a watched process has ended.
   bool ended() const;
 
-  /// In the last window one of their threads was runnable and did not run. The first call only begins to
-  /// look. @param now [s]
-  bool waits(double now);
+  /// Whether one of their threads was runnable in the last window and did not run. The first call only starts
+  /// the window. @param now [s]
+  bool waitsForProcessor(double now);
 
  private:
   struct Process {
@@ -38,9 +38,9 @@ class ProcessWatch {
   void add(int pid);
 
   std::vector<Process> processes_;
-  std::map<int, std::uint64_t> ran_;  // [ns] by thread
-  double looked_ = -std::numeric_limits<double>::infinity();
-  bool waits_ = false;
+  std::map<int, std::uint64_t> run_times_;  // [ns] by thread
+  double last_check_ = -std::numeric_limits<double>::infinity();
+  bool waiting_ = false;
 };
 
 }  // namespace smartmill::cnc::linuxcnc

@@ -8,10 +8,9 @@
 #include <variant>
 #include <vector>
 
-/// What linuxcnc_gateway and linuxcnc_stream say on their local sockets. A frame is a header of eight bytes
-/// (length of the payload u32, version u8, kind u8, sequence u16; little-endian) and a payload of a typed
-/// message, whose length has a bound of its kind. What does not fit throws Error; its connection then is
-/// closed.
+/// Protocol of linuxcnc_gateway and linuxcnc_stream on their local sockets. A frame is a header of eight
+/// bytes (payload length u32, version u8, kind u8, sequence u16; little-endian) and the payload of a typed
+/// message, whose length is bounded by its kind. Invalid frames throw Error; their connection is closed.
 namespace smartmill::cnc::linuxcnc {
 
 constexpr std::uint8_t PROTOCOL_VERSION = 2;
@@ -19,22 +18,22 @@ constexpr std::size_t FRAME_HEADER = 8;           ///< [byte]
 constexpr std::size_t LONGEST_PROGRAM = 1 << 20;  ///< [byte]
 constexpr std::size_t LONGEST_TEXT = 4096;        ///< [byte] of any other text
 
-enum class Word : std::uint8_t {
-  ready = 1,     ///< the panel's: emergency stop reset, drives on, homed
-  open = 2,      ///< to where programs come in from outside (MDI)
-  run = 3,       ///< text is a program, number its own, counted up by whoever sends it
-  close = 4,     ///< what open() began ends; the spindle stops
-  abort = 5,     ///< axes and spindle stop, the program is forgotten
+enum class CommandCode : std::uint8_t {
+  ready = 1,     ///< by the panel: resets the emergency stop, switches the drives on, homes
+  open = 2,      ///< switches to the mode that accepts programs (MDI)
+  run = 3,       ///< runs the program in text; number identifies it, incremented by the sender
+  close = 4,     ///< ends open; the spindle stops
+  abort = 5,     ///< stops axes and spindle, discards the program
   estop = 6,     ///< emergency stop
   hold = 7,      ///< feed hold
-  resume = 8,    ///< from feed hold
-  variable = 9,  ///< #number = value
-  guard = 10     ///< from linuxcnc_stream: when it goes or falls silent, emergency stop
+  resume = 8,    ///< releases the feed hold
+  variable = 9,  ///< sets #number to value
+  guard = 10     ///< from linuxcnc_stream: emergency stop if its connection ends or is silent
 };
 
-/// To the gateway; every one is answered by a Reply with the same sequence number.
+/// To the gateway; answered by a Reply with the same sequence number.
 struct Command {
-  Word word = Word::abort;
+  CommandCode code = CommandCode::abort;
   std::int32_t number = 0;
   double value = 0.0;
   std::string text;
@@ -53,79 +52,78 @@ struct Reply {
   std::string text;  ///< one line
 };
 
-/// To the gateway; answered by a MachineStatus.
-struct Ask {};
+/// Request of the status, to the gateway; answered by a MachineStatus.
+struct StatusRequest {};
 
-/// How LinuxCNC stands, of one moment.
+/// Status of LinuxCNC at one moment.
 struct MachineStatus {
   enum class State : std::uint8_t { emergency = 1, reset = 2, off = 3, on = 4 };
   enum class Mode : std::uint8_t { manual = 1, automatic = 2, mdi = 3 };
-  bool alive = false;  ///< its task still counts its cycles; if not, what follows is the last that was seen
+  bool alive = false;  ///< its task counts cycles; otherwise the fields below are the last ones
   State state = State::emergency;
   Mode mode = Mode::manual;
-  bool busy = false;  ///< a program runs or waits
+  bool busy = false;  ///< a program runs or is queued
   bool held = false;  ///< feed hold
   bool homed = false;
-  bool in_position = true;                 ///< no axis is on its way
+  bool in_position = true;                 ///< no axis moves
   double dwell_left = 0.0;                 ///< [s]
-  std::int32_t line = 0;                   ///< of the program that motion is at
-  std::int32_t running = 0;                ///< number of the program taken last
-  std::int32_t done = 0;                   ///< number of the program carried out last, to its end
+  std::int32_t line = 0;                   ///< line of the program in motion
+  std::int32_t running = 0;                ///< number of the last accepted program
+  std::int32_t done = 0;                   ///< number of the last completed program
   double velocity = 0.0;                   ///< [m/s] along the path
   std::array<double, 3> position{};        ///< [m] machine
   std::array<double, 3> distance_to_go{};  ///< [m]
   std::array<double, 3> offset{};          ///< [m] machine minus workpiece coordinates
-  std::uint32_t heartbeat = 0;             ///< servo cycles that the task has seen
-  double starved = 0.0;  ///< [s] that it has not counted for want of a processor; 0 once it counts again
-  std::string errors;    ///< since a program or ready was asked for last, joined by "; "; why it is not alive
+  std::uint32_t heartbeat = 0;             ///< servo cycles counted by the task
+  double starved = 0.0;  ///< [s] without a count because it waits for a processor; 0 while it counts
+  std::string errors;    ///< since the last run or ready, joined by "; "; or why it is not alive
 };
 
-/// What the stream reads at every servo cycle, in this order, and its units.
+/// Values of one servo cycle, in the order of the stream.
 struct ServoSample {
   std::array<double, 3> position{};  ///< [m] machine, commanded
-  double revolutions = 0.0;          ///< [1] of the spindle, tooth 1 at +y at every whole one
+  double revolutions = 0.0;          ///< [1] of the spindle; tooth 1 is at +y at every integer
   double spindle_speed = 0.0;        ///< [rad/s]
   double velocity = 0.0;             ///< [m/s] along the path
   double distance_to_go = 0.0;       ///< [m] of the move
-  double spindle_load = 0.0;         ///< [1] of full scale, what the drive or its stand-in tells
-  double marker = 0.0;               ///< of the program's move (M67 E0)
+  double spindle_load = 0.0;         ///< [1] of full scale, from the drive or its replacement (SetLoad)
+  double marker = 0.0;               ///< line of the program's move (M67 E0)
 };
 
-/// From the stream, without being asked: samples first, first + 1 ... of the controller's own count.
+/// Published by the stream: samples first, first + 1, ... of the controller's count.
 struct ServoBlock {
   std::uint32_t first = 0;
   std::uint32_t period_ns = 1000000;
   std::vector<ServoSample> samples;
-  static constexpr std::size_t MOST = 250;  ///< samples a block
+  static constexpr std::size_t MOST = 250;  ///< samples per block
 };
 
-/// To the stream: the spindle load that a stand-in for the drive tells. Answered by nothing.
+/// To the stream: spindle load of an external load meter, in place of the drive's. Not answered.
 struct SetLoad {
   double spindle_load = 0.0;  ///< [1]
 };
 
-/// To the stream: factors on the feed and on the spindle's speed. Answered by a Reply with the same sequence
-/// number.
+/// To the stream: factors on feed and spindle speed. Answered by a Reply with the same sequence number.
 struct SetOverrides {
   double feed = 1.0, spindle = 1.0;  ///< [1] >= 0
 };
 
-using Message = std::variant<Command, Reply, Ask, MachineStatus, ServoBlock, SetLoad, SetOverrides>;
+using Message = std::variant<Command, Reply, StatusRequest, MachineStatus, ServoBlock, SetLoad, SetOverrides>;
 
 struct Received {
   std::uint16_t sequence = 0;
   Message message;
 };
 
-/// @return the frame. @throws Error when the message has more than a frame may hold.
+/// @return the frame. @throws Error if the message is too long for its kind.
 std::string encode(const Message& message, std::uint16_t sequence = 0);
 
-/// Frames from bytes as they come, in any pieces.
+/// Decodes frames from a byte stream received in arbitrary pieces.
 class FrameDecoder {
  public:
   void push(const char* data, std::size_t size);
-  /// The next whole message; nothing when more bytes are due. @throws Error of one line on what is no frame;
-  /// nothing sensible comes after that.
+  /// The next complete message; empty if more bytes are needed. @throws Error (one line) on an invalid frame;
+  /// the stream is unusable then.
   std::optional<Received> next();
   std::size_t waiting() const { return bytes_.size() - taken_; }  ///< [byte]
 

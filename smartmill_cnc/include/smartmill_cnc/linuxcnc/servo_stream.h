@@ -12,17 +12,17 @@
 
 namespace smartmill::cnc::linuxcnc {
 
-/// Gives evenly counted samples their times: a sample cannot arrive before it was taken, and one that waited
-/// for nobody arrives at once. So the count's zero lies where the earliest arrivals say, followed slowly (the
-/// two clocks differ by some 1e-5), which leaves the times of neighbours one period apart.
+/// Assigns times to evenly sampled, numbered samples. No sample arrives before it is taken, and the earliest
+/// arrivals have no delay; they define the time of sample 0. It is tracked slowly (the two clocks differ by
+/// about 1e-5), so that neighbouring samples stay one period apart.
 class ServoClock {
  public:
   /// @param period [s] of the samples
   explicit ServoClock(double period) : period_(period) {}
 
-  /// A sample has come. @param arrival [s]
-  void saw(std::uint64_t number, double arrival);
-  /// Enough has been seen to say times.
+  /// @param number of a received sample @param arrival [s]
+  void addArrival(std::uint64_t number, double arrival);
+  /// Whether enough arrivals are known for timeOf().
   bool settled() const { return settled_; }
   double timeOf(std::uint64_t number) const {
     return zero_ + static_cast<double>(number) * period_;
@@ -30,39 +30,40 @@ class ServoClock {
 
  private:
   double period_, zero_ = 0.0, begun_ = 0.0, window_begun_ = 0.0, last_ = 0.0;
-  double window_ = std::numeric_limits<double>::infinity(), before_ = window_;
-  bool begun_at_all_ = false, settled_ = false;
+  double window_ = std::numeric_limits<double>::infinity(), previous_window_ = window_;
+  bool started_ = false, settled_ = false;
 };
 
-/// How the samples have come so far.
+/// Statistics of the received samples.
 struct ServoStatistics {
   std::uint64_t samples = 0, lost = 0, restarts = 0;
-  double late_median = 0.0, late_99 = 0.0, late_worst = 0.0;  ///< [s] arrival after the sample's own time
+  double late_median = 0.0, late_99 = 0.0, late_worst = 0.0;  ///< [s] delay of the arrival
 };
 
-/// Samples that follow one another, with their times.
-struct ServoStretch {
+/// Consecutive samples with their times.
+struct ServoSegment {
   double stamp = 0.0;       ///< [s] of the first
-  std::uint64_t first = 0;  ///< running index of the first, of one start of the controller
+  std::uint64_t first = 0;  ///< running index of the first since the controller's start
   std::vector<ServoSample> samples;
 };
 
-/// Every servo cycle of the controller, from linuxcnc_stream. May be used from two threads: one that calls
-/// step(), others that look.
+/// Every servo cycle of the controller, from linuxcnc_stream. One thread calls step(); the const functions
+/// and setLoad() may be called from any thread.
 class ServoStream {
  public:
-  static constexpr std::size_t STRETCH = 10;  ///< samples handed out together
+  static constexpr std::size_t SEGMENT_LENGTH = 10;  ///< [1] samples
 
   /// @param folder of the machine
   explicit ServoStream(const std::string& folder);
 
-  /// Connects when it is time to, waits for at most that long, reads. @param now [s] of arrival
-  std::vector<ServoStretch> step(double wait, double (*now)());
-  /// What step() does with a block, for itself.
-  std::vector<ServoStretch> take(const ServoBlock& block, double arrival);
+  /// Connects if an attempt is scheduled, then waits for data and reads. @param wait [s] at most @param now
+  /// clock [s]
+  std::vector<ServoSegment> step(double wait, double (*now)());
+  /// Processes one block; called by step().
+  std::vector<ServoSegment> addBlock(const ServoBlock& block, double arrival);
 
-  std::optional<ServoSample> latest() const;  ///< none before the first
-  std::uint64_t count() const;                ///< samples that have come
+  std::optional<ServoSample> latest() const;  ///< empty before the first
+  std::uint64_t count() const;                ///< [1] received samples
   void setLoad(double spindle_load);
   ServoStatistics statistics() const;
 
@@ -74,13 +75,13 @@ class ServoStream {
 
   const std::string path_;
   LocalConnection connection_;
-  double tried_ = -std::numeric_limits<double>::infinity();
+  double last_attempt_ = -std::numeric_limits<double>::infinity();
   ServoClock clock_{1e-3};
-  std::uint64_t next_ = 0;  // running index due
+  std::uint64_t next_ = 0;  // expected running index
   bool begun_ = false;
-  ServoStretch stretch_;
+  ServoSegment segment_;
 
-  mutable std::mutex mutex_;  // of what follows
+  mutable std::mutex mutex_;  // guards the members below
   ServoStatistics statistics_;
   std::array<std::uint64_t, LATE_BINS> late_{};
   std::optional<ServoSample> latest_;

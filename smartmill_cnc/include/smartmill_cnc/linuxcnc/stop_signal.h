@@ -2,7 +2,7 @@
 
 namespace smartmill::cnc::linuxcnc {
 
-/// From here on SIGINT and SIGTERM ask for the program's end instead of ending it.
+/// Installs handlers: SIGINT and SIGTERM set stopRequested() instead of ending the process.
 void catchStopSignals();
 bool stopRequested();
 

@@ -24,19 +24,21 @@ struct MotionParameters {
   double open_timeout = 3.0;
   MotionLimits limits;
 
-  /// Without the limits, which declare themselves.
+  /// Without the limits, which have their own declare().
   void declare(ParameterTable& table) {
     table.flag("read_only", read_only, "true: motion cannot be armed, nothing is written to the controller");
     table.number("condition_lead", condition_lead, "s", Range::closed(0.0, 10.0),
-                 "by which a cutting condition is told before it begins or ends");
-    table.number("settle_time", settle_time, "s", Range::positive(), "of standstill that ends a motion");
+                 "time by which a cutting condition is announced before it begins or ends");
+    table.number("settle_time", settle_time, "s", Range::positive(),
+                 "standstill after which a motion has ended");
     table.number("standstill_speed", standstill_speed, "rad/s", Range::positive(),
-                 "a spindle slower than this stands");
+                 "spindle speed below which the spindle counts as stopped");
     table.number("stall_timeout", stall_timeout, "s", Range::positive(),
-                 "without any progress (feed hold excepted) end a motion");
-    table.number("stop_timeout", stop_timeout, "s", Range::positive(), "a cancelled motion may take to stop");
+                 "time without progress after which a motion is cancelled, except in feed hold");
+    table.number("stop_timeout", stop_timeout, "s", Range::positive(),
+                 "longest time for a cancelled motion to stop");
     table.number("open_timeout", open_timeout, "s", Range::positive(),
-                 "the controller may put off to take programs after a cancelled one");
+                 "longest time in which the controller may refuse a program after a cancelled one");
   }
 
   /// @throws Error naming key and value.
@@ -58,8 +60,9 @@ enum class MotionCode : std::uint8_t {
 };
 /// Codes of the service SetOverrides.
 enum class OverrideCode : std::uint8_t { ok = 0, not_connected = 1, not_armed = 2, limit = 3, refused = 4 };
-/// Codes of the service ArmMotion.
+/// Codes of the service FeedHold.
 enum class HoldCode : std::uint8_t { ok = 0, not_connected = 1, not_armed = 2, refused = 3 };
+/// Codes of the service ArmMotion.
 enum class ArmCode : std::uint8_t { ok = 0, not_connected = 1, wrong_mode = 2, alarm = 3 };
 /// Codes of the service SetMacro.
 enum class MacroCode : std::uint8_t { ok = 0, not_connected = 1, refused = 2 };
@@ -72,28 +75,29 @@ struct Answer {
 using Outcome = Answer<MotionCode>;
 
 struct OverrideAnswer : Answer<OverrideCode> {
-  Overrides taken;  ///< only of OverrideCode::ok
+  Overrides taken;  ///< valid with OverrideCode::ok
 };
 
 struct Progress {
   std::size_t bytes_sent = 0, bytes_total = 0;
   std::string stage;            ///< opening, sending, running, stopping; empty when idle
-  double distance_to_go = 0.0;  ///< [m] of the axis of a jog
+  double distance_to_go = 0.0;  ///< [m] of the jogged axis
 };
 
-/// Moves the machine: one motion at a time, only while armed, everything checked against the limits before it
-/// is sent. A motion goes through opening (the controller gets ready to take programs), sending, running (it
-/// has ended when all has been executed, no distance is left and nothing has moved for settle_time; Dunwoody
-/// 6.2 and 7.1), or stopping after a cancel. An alarm, another mode or a reset at the panel disarms.
+/// State machine of the motions: one at a time, only while armed; every program is checked against the limits
+/// before it is sent. Phases: opening (the controller prepares to accept programs), sending, running (ends
+/// when all blocks have been executed, the distance to go is zero and nothing has moved for settle_time;
+/// Dunwoody 6.2 and 7.1), stopping after a cancel. An alarm, a change of mode or a reset at the panel
+/// disarms.
 class MotionMachine {
  public:
   /// @throws Error of MotionParameters::validate().
   MotionMachine(Controller& controller, const MotionParameters& parameters, Log& log);
 
-  /// Goes on with the running motion. @param reading of this period @param now [s] its stamp
-  /// @return a failure only when the connection went with it.
+  /// Advances the running motion. @param reading of this period @param now [s] its stamp
+  /// @return a failure only if it lost the connection.
   Status step(const Reading& reading, double now);
-  /// There is no connection: ends a running motion. @return why, naming the motion that it ended.
+  /// Ends a running motion after a lost connection. @return the reason, with the name of the ended motion.
   std::string lost(const std::string& why, double now);
 
   bool armed() const { return armed_; }
@@ -101,22 +105,22 @@ class MotionMachine {
   Result<Answer<ArmCode>> arm();
   Status disarm();
 
-  /// Starts a motion; an Outcome now is a refusal, nothing was sent.
+  /// Starts a motion. @return the refusal, if any; nothing was sent then.
   std::optional<Outcome> runProgram(const std::string& name, const std::string& program,
                                     const CuttingCondition& condition);
   /// @param distance [m]. @param feed [m/s], 0: rapid.
   std::optional<Outcome> jog(const std::string& axis, double distance, double feed);
   /// @param angle [rad]
   std::optional<Outcome> orient(double angle);
-  /// Of the running program; with its end they go back to 1. @return a failure only when the connection went
-  /// with it.
+  /// Sets the overrides of the running program; its end resets them to 1. @return a failure only if it lost
+  /// the connection.
   Result<OverrideAnswer> setOverrides(const Overrides& wanted, const std::string& reason);
-  /// Stops the running motion; its Outcome follows when it stands. @param why for the Outcome
+  /// Stops the running motion; its Outcome follows at standstill. @param why for the Outcome
   Status cancel(const std::string& why = "cancelled");
 
   bool busy() const { return phase_ != Phase::idle; }
   Progress progress() const;
-  /// How the last motion ended, once.
+  /// Outcome of the last motion; returned once.
   std::optional<Outcome> takeOutcome() { return std::exchange(outcome_, std::nullopt); }
   /// Cutting conditions that began or ended since the last call, with their stamps.
   std::vector<CuttingCondition> takeConditions() { return std::exchange(conditions_, {}); }
@@ -134,19 +138,19 @@ class MotionMachine {
   std::optional<Outcome> start(Motion motion, const std::string& program);
   std::optional<Outcome> refusal(const std::string& name) const;
   std::optional<std::size_t> axisIndex(int axis) const;
-  std::string alarmLine() const;
+  std::string alarmText() const;
   std::string overrideFault(const Overrides& wanted) const;
-  Status putOverridesBack();
-  std::string modeLine() const;
-  std::string lineOf(const Failure& failure) const;
+  Status resetOverrides();
+  std::string modeText() const;
+  std::string failureText(const Failure& failure) const;
   void setArmed(bool armed);
   void enter(Phase phase);
   void followClock(double now);
-  Status watch();
-  Status giveUp(MotionCode code, const std::string& why);
+  Status checkController();
+  Status abandonMotion(MotionCode code, const std::string& why);
   Status stop(Outcome outcome);
   Status open();
-  void tellCondition();
+  void announceCondition();
   Status send();
   Status run();
   bool ended() const;
@@ -159,16 +163,16 @@ class MotionMachine {
   Log& log_;
 
   bool armed_ = false;
-  bool overridden_ = false;         // overrides may differ from 1
-  Overrides overrides_;             // taken last
-  std::optional<Reading> reading_;  // of the last step, none before the first and after a loss
+  bool overridden_ = false;         // the controller's overrides may differ from 1
+  Overrides overrides_;             // last accepted
+  std::optional<Reading> reading_;  // of the last step; empty before the first and after a loss
   double now_ = 0.0;                // [s]
   Phase phase_ = Phase::idle;
   Motion motion_;
-  double entered_ = 0.0;     // [s] into the phase
+  double entered_ = 0.0;     // [s] start of the phase
   double progressed_ = 0.0;  // [s]
   std::optional<double> still_since_;
-  CncState stall_;  // where the machine was when it last got on
+  CncState last_progress_;  // state at the last progress
   Outcome stopping_outcome_;
   std::optional<Outcome> outcome_;
   std::vector<CuttingCondition> conditions_;

@@ -26,7 +26,7 @@ class CollectHits : public HitStep {
     std::vector<Hit>& cross = measurement_.cross.hits;
     hits.push_back(std::move(recorded.hit));
     if (recorded.cross && !measurement_.at_second_height) cross.push_back(std::move(*recorded.cross));
-    const std::vector<HitFault> faults = faultsBeside(hits, std::vector<bool>(hits.size(), true));
+    const std::vector<HitFault> faults = faultsAmongHits(hits, std::vector<bool>(hits.size(), true));
     for (std::size_t h = 0; h < hits.size(); ++h) {
       if (faults[h].text.empty()) continue;
       hits.erase(hits.begin() + static_cast<std::ptrdiff_t>(h));

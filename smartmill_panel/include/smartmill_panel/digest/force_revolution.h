@@ -15,33 +15,33 @@ struct RevolutionParameters {
 
   void declare(ParameterTable& table) {
     table.number("revolution_bins", bins, "1", Range::closed(8, 4096),
-                 "of the spindle's angle, over one revolution");
+                 "angle bins per revolution of the spindle");
   }
 };
 
-/// Angle of the spindle at any time, from readings that may come late: linear between two readings, by the
-/// nearest reading's speed beyond.
+/// Spindle angle at any time, from readings that may arrive late: interpolated linearly between two readings,
+/// extrapolated with the speed of the nearest one.
 class AngleTrack {
  public:
-  /// Time that goes back begins anew.
+  /// A backward jump of time resets the track.
   void push(const SpindleAngle& reading);
-  /// [rad] 0 .. 2 pi; empty: no reading near (REACH)
+  /// [rad] 0 .. 2 pi; empty: no reading within REACH
   std::optional<double> at(double time) const;
   /// [rad/s] of the newest reading; 0: none
   double speed() const { return readings_.empty() ? 0.0 : readings_.back().speed; }
 
-  static constexpr double KEPT = 5.0;   ///< [s] of readings
-  static constexpr double REACH = 0.5;  ///< [s] beyond the nearest reading
+  static constexpr double HISTORY = 5.0;  ///< [s] of stored readings
+  static constexpr double REACH = 0.5;    ///< [s] beyond the nearest reading
 
  private:
   std::deque<SpindleAngle> readings_;
 };
 
-/// Force over the spindle's angle: mean, least and largest of what fell into each bin.
+/// Force over the spindle angle: mean, minimum and maximum of the samples in each bin.
 struct ForceRevolution {
   double stamp = 0.0;          ///< [s] of the last sample
   double spindle_speed = 0.0;  ///< [rad/s]
-  double revolutions = 0.0;    ///< [1] that it was made of
+  double revolutions = 0.0;    ///< [1] number of revolutions used
   std::size_t bins = 0;
   std::vector<float> mean, low, high;  ///< [N] all bins of fx, then of fy, then of fz; NaN: no sample
 };
@@ -51,11 +51,11 @@ class RevolutionMaker {
   /// @throws Error on a parameter out of its bounds.
   explicit RevolutionMaker(const RevolutionParameters& parameters);
 
-  /// Samples without a known angle, or while the spindle stands, are left out.
+  /// Ignores samples without a known angle or with the spindle stopped.
   void push(const ForceBlock& block, const AngleTrack& angle);
-  /// What has gathered since the last call, once it is a whole revolution; empty before.
+  /// Result since the last call; empty before a full revolution.
   std::optional<ForceRevolution> take();
-  void forget();
+  void reset();
 
  private:
   std::size_t bins_;
@@ -63,7 +63,7 @@ class RevolutionMaker {
   double stamp_ = 0.0, speed_ = 0.0;
   std::vector<double> sum_;
   std::vector<float> low_, high_;
-  std::vector<int> count_;  // of the bin, the same for the three axes unless one is NaN
+  std::vector<int> count_;  // samples of each bin and axis
 };
 
 }  // namespace smartmill::panel

@@ -16,20 +16,20 @@ struct SpectrumParameters {
 
   void declare(ParameterTable& table) {
     table.number("spectrum_samples", samples, "1", Range::closed(64, 1 << 20),
-                 "of the newest stretch that is transformed; of 25.6 kHz 8192 resolve 3.1 Hz");
+                 "newest samples that are transformed; 8192 at 25.6 kHz resolve 3.1 Hz");
     table.number("spectrum_lines", lines, "1", Range::closed(8, 16384),
-                 "of the message, each the largest of its neighbours");
-    table.number("spectrum_highest", highest, "Hz", Range::positive(), "frequency shown");
+                 "most lines of a message, each the maximum of neighbouring lines");
+    table.number("spectrum_highest", highest, "Hz", Range::positive(), "highest frequency of a message");
   }
 };
 
-/// Amplitudes of the newest stretch, Hann window, mean taken off; a sine shows its amplitude (on a line
-/// exactly, between two lines up to 15 % less). Lines are joined to the largest of their neighbours, so that
-/// no peak is lost.
+/// Amplitude spectrum of the newest samples, Hann window, mean removed. A sine has its amplitude (exactly on
+/// a line, up to 15 % less between two lines). Neighbouring lines are reduced to their maximum, so that no
+/// peak is lost.
 struct ForceSpectrum {
   double stamp = 0.0;                           ///< [s] of the last sample
-  double resolution = 0.0;                      ///< [Hz] between lines before they were joined
-  double step = 0.0;                            ///< [Hz] line k stands for k * step up to (k + 1) * step
+  double resolution = 0.0;                      ///< [Hz] line spacing before the reduction
+  double step = 0.0;                            ///< [Hz] line k covers k * step to (k + 1) * step
   std::array<std::vector<float>, 3> amplitude;  ///< [N] fx, fy, fz
 };
 
@@ -38,19 +38,19 @@ class SpectrumMaker {
   /// @throws Error on a parameter out of its bounds.
   explicit SpectrumMaker(const SpectrumParameters& parameters);
 
-  /// A jump in the running index or another rate begins anew; NaN counts as 0.
+  /// A jump of the running index or a new sample rate resets the buffer; NaN counts as 0.
   void push(const ForceBlock& block);
-  /// Of the newest stretch; empty: it is not whole, or nothing new came since the last call.
+  /// Spectrum of the newest samples; empty: the buffer is not full, or no new samples since the last call.
   std::optional<ForceSpectrum> take();
 
  private:
   SpectrumParameters parameters_;
   std::vector<double> window_;
   std::array<std::vector<double>, 3> ring_;
-  std::size_t next_ = 0, held_ = 0;
+  std::size_t next_ = 0, available_ = 0;
   std::uint64_t expected_ = 0;  // index of the next sample
   double rate_ = 0.0, stamp_ = 0.0;
-  bool news_ = false;
+  bool has_new_samples_ = false;
 };
 
 }  // namespace smartmill::panel

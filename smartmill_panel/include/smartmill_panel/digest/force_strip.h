@@ -15,29 +15,29 @@ struct StripParameters {
   int bins = 20;
 
   void declare(ParameterTable& table) {
-    table.number("strip_bin", bin, "s", Range::closed(1.0e-4, 1.0), "length of a bin of the scrolling strip");
-    table.number("strip_bins", bins, "1", Range::closed(1, 10000), "of a message");
+    table.number("strip_bin", bin, "s", Range::closed(1.0e-4, 1.0), "length of a bin of the strip chart");
+    table.number("strip_bins", bins, "1", Range::closed(1, 10000), "bins of a message");
   }
 };
 
-/// Least and largest value of each short bin of time: a strip drawn of them hides no peak and invents none,
-/// as every nth sample (aliasing) and means (lost peaks) do.
+/// Minimum and maximum of each short time bin: a strip chart without aliasing (as with every nth sample) and
+/// without lost peaks (as with means).
 struct ForceStrip {
-  double stamp = 0.0;            ///< [s] begin of the first bin
+  double stamp = 0.0;            ///< [s] start of the first bin
   double bin = 0.0;              ///< [s]
-  std::vector<float> low, high;  ///< [N] fx fy fz of the first bin, of the second, ...; NaN: no sample
+  std::vector<float> low, high;  ///< [N] fx, fy, fz of the first bin, of the second, ...; NaN: no sample
 };
 
-/// Makes strips of blocks in the order of their stamps; time that goes back begins anew.
+/// Computes strips from blocks in the order of their stamps; a backward jump of time starts a new strip.
 class StripMaker {
  public:
   using Handler = std::function<void(const ForceStrip&)>;
   /// @throws Error on a parameter out of its bounds.
   StripMaker(const StripParameters& parameters, Handler handler);
 
-  /// Samples that are NaN belong to no bin.
+  /// Ignores NaN samples.
   void push(const ForceBlock& block);
-  /// Hands out what has gathered, however little.
+  /// Passes on an incomplete strip.
   void flush();
 
  private:
@@ -46,7 +46,7 @@ class StripMaker {
 
   StripParameters parameters_;
   Handler handler_;
-  std::int64_t bin_ = 0;  // the open one, counted from the epoch
+  std::int64_t bin_ = 0;  // index of the open bin since the epoch
   std::array<float, 3> low_{}, high_{};
   bool any_ = false;  // a bin is open
   ForceStrip strip_;

@@ -7,30 +7,30 @@
 
 namespace smartmill::panel {
 
-/// Who may command. A panel is read-only unless it was started otherwise, and then each command carries the
-/// token of a file that only the operator can read.
+/// Authorisation of commands. Closed by default; an open gate requires the token of a file that only the
+/// operator can read.
 class CommandGate {
  public:
   /// Closed.
   CommandGate() = default;
-  /// @param token_file its first line is the token. @throws Error naming the file when it cannot be read,
-  /// when others may read it, or when the token is shorter than LEAST characters
+  /// @param token_file its first line is the token. @throws Error naming the file if it cannot be read, if
+  /// others may read it, or if the token is shorter than MIN_LENGTH characters
   explicit CommandGate(const std::string& token_file);
 
-  static constexpr std::size_t LEAST = 16;
+  static constexpr std::size_t MIN_LENGTH = 16;
 
   bool open() const { return !token_.empty(); }
-  /// What a command is answered when it may not pass; empty: it may.
-  std::optional<Answer> refusal(const Question& command) const;
+  /// Response to an unauthorised command; empty: authorised.
+  std::optional<ApiResponse> refusal(const ApiRequest& command) const;
 
  private:
   std::string token_;
 };
 
-/// {"message": line}
-Answer answerOf(int status, const std::string& line);
+/// JSON response {"message": line}
+ApiResponse messageResponse(int status, const std::string& line);
 
-/// First line for people of what was sent: control characters are replaced, the rest is cut off.
-std::string oneLine(const std::string& text, std::size_t most = 200);
+/// Text as one line: control characters become blanks. @param length truncated to this
+std::string oneLine(const std::string& text, std::size_t length = 200);
 
 }  // namespace smartmill::panel

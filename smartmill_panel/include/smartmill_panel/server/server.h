@@ -9,22 +9,22 @@
 
 namespace smartmill::panel {
 
-/// A topic as clients see it; messages are its ROS 1 bytes, untouched.
+/// A topic as advertised to clients; messages are unmodified ROS 1 bytes.
 struct Channel {
   std::uint32_t id = 0;
   std::string topic;
-  std::string type;        ///< smartmill_msgs/CncState
-  std::string definition;  ///< of the message with all that it contains
+  std::string type;        ///< for example smartmill_msgs/CncState
+  std::string definition;  ///< message definition including all nested types
 };
 
-/// What a page asks beside its files: GET (questions) and POST (commands) below /api/.
-struct Question {
+/// A request of the page below /api/: GET (queries) and POST (commands).
+struct ApiRequest {
   std::string path;                          ///< without /api/
   std::map<std::string, std::string> query;  ///< decoded
   bool post = false;
   std::string body, token, from;  ///< token: header X-SmartMill-Token; from: address of the client
 };
-struct Answer {
+struct ApiResponse {
   int status = 200;
   std::string body;  ///< JSON
 };
@@ -32,12 +32,12 @@ struct Answer {
 struct ServerOptions {
   std::string address = "127.0.0.1";
   int port = 0;                      ///< 0: any free one
-  std::string folder;                ///< of the page; nothing outside of it is served
-  std::vector<std::string> origins;  ///< other sites that may connect, e.g. http://localhost:8080
-  std::vector<std::string> names;    ///< names of this computer under which browsers may ask
-  std::vector<std::string> others;   ///< other panels (http://host:port) that the page may look at
+  std::string folder;                ///< of the page; no file outside is served
+  std::vector<std::string> origins;  ///< other permitted origins, for example http://localhost:8080
+  std::vector<std::string> names;    ///< permitted host names of this computer
+  std::vector<std::string> others;   ///< other panels (http://host:port) to which the page may connect
   std::string name = "SmartMill";
-  std::size_t queue = 4u << 20;  ///< [bytes] that wait for a client before messages to it are dropped
+  std::size_t queue = 4u << 20;  ///< [bytes] queued for a client before its messages are dropped
   std::size_t most_clients = 64;
 };
 
@@ -45,34 +45,34 @@ struct ServerStatistics {
   std::size_t clients = 0;
   std::uint64_t sent = 0, dropped = 0;  ///< messages
   std::uint64_t bytes = 0;              ///< of the messages sent
-  std::uint64_t refused = 0;            ///< requests of hostile origins, wrong paths and the like
+  std::uint64_t refused = 0;            ///< requests with a forbidden origin, path or method
 };
 
-/// Page and WebSocket on one port, for browsers and for desktops that speak the Foxglove WebSocket protocol
-/// (foxglove.websocket.v1, foxglove.sdk.v1). Clients can subscribe and nothing else. It runs in a thread of
-/// its own; every function may be called from any thread.
+/// HTTP and WebSocket server on one port, for browsers and for programs with the Foxglove WebSocket protocol
+/// (foxglove.websocket.v1, foxglove.sdk.v1). WebSocket clients can only subscribe. Runs in a thread of its
+/// own; all functions are thread-safe.
 class Server {
  public:
-  using Respond = std::function<void(Answer)>;
+  using Respond = std::function<void(ApiResponse)>;
   struct Handlers {
-    /// Somebody wants a channel now, or nobody any more. Called in the server's thread.
+    /// The first client has subscribed to a channel, or the last one has left. Called in the server's thread.
     std::function<void(std::uint32_t channel, bool wanted)> wanted;
-    /// Called in the server's thread; respond may be called later and from any thread, while the server
-    /// lives.
-    std::function<void(Question, Respond)> ask;
+    /// Called in the server's thread; respond may be called later and from any thread while the server
+    /// exists.
+    std::function<void(ApiRequest, Respond)> request;
   };
 
-  /// @throws Error when the address cannot be listened at or the folder is not there.
+  /// @throws Error if the server cannot listen at the address or the folder does not exist.
   Server(ServerOptions options, Handlers handlers);
   ~Server();
 
   int port() const;
   void advertise(const Channel& channel);
-  /// @param stamp [ns] @param kept the message stays, one for each key, for who subscribes later
-  void publish(std::uint32_t channel, std::uint64_t stamp, std::string data, bool kept = false,
+  /// @param stamp [ns] @param latched stores the message, one per key, for later subscribers
+  void publish(std::uint32_t channel, std::uint64_t stamp, std::string data, bool latched = false,
                const std::string& key = {});
-  /// The clock, a sign of life for the page. @param now [ns]
-  void tell(std::uint64_t now);
+  /// Sends the time, which the page uses as a heartbeat. @param now [ns]
+  void sendTime(std::uint64_t now);
   ServerStatistics statistics() const;
 
  private:
@@ -80,16 +80,16 @@ class Server {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Whether a browser's page from origin may talk to a server that it asked for as host. Without an origin
-/// (desktops, rosrun) and from the page's own host: yes; a host must be loopback, a plain address (which no
-/// name server can turn to here) or one of names.
+/// Whether a page from origin may connect to the server under a host name. Permitted without an origin
+/// (desktop programs, rosrun) and from the page's own host; the host must be loopback, an IP address (safe
+/// against DNS rebinding) or one of names.
 bool originAllowed(const std::string& origin, const std::string& host, const ServerOptions& options);
 
-/// The file of a request's target below a folder; empty when there is none to serve: types that are no
-/// page's, hidden files, whatever leads out of the folder (links too).
+/// File of a request target below a folder; empty if not served: other file types, hidden files, paths and
+/// links that leave the folder.
 std::string fileOf(const std::string& folder, const std::string& target);
 
-/// name=value&... of a target, percent signs decoded.
+/// Query of a target (name=value&...), percent-decoded.
 std::map<std::string, std::string> queryOf(const std::string& target);
 
 }  // namespace smartmill::panel

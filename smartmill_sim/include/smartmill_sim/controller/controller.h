@@ -16,51 +16,53 @@
 namespace smartmill::sim {
 
 struct ControllerOptions {
-  MachineAxes axes;                              ///< travel, rapid, acceleration, home (where it starts)
-  double spindle_max_speed = 0.0;                ///< [rad/s] a higher S is taken as this
-  double spindle_acceleration = 0.0;             ///< [rad/s2] without load
-  double spindle_torque = 0.0;                   ///< [N m] limit of the drive; 0: no load slows it
+  MachineAxes axes;                   ///< travel, rapid, acceleration, home (where it starts)
+  double spindle_max_speed = 0.0;     ///< [rad/s] limits S
+  double spindle_acceleration = 0.0;  ///< [rad/s2] without load
+  double spindle_torque = 0.0;        ///< [N m] limit of the drive; 0: the load does not slow the spindle
   std::array<double, 3> work_offset{{0, 0, 0}};  ///< [m] machine minus absolute position, of G54
-  focas::SysInfo info = fineInfo();              ///< of the controller
-  int mode = focas::AUT_REMOTE;                  ///< focas::Aut, at its panel
-  std::size_t buffer_size = 1024;                ///< [byte] of DNC text not yet run
-  double load_step = 0.0;                        ///< [percent] polled loads are rounded to it; 0: are not
+  focas::SysInfo info = fineInfo();              ///< reported identification
+  int mode = focas::AUT_REMOTE;                  ///< focas::Aut, set at the panel
+  std::size_t buffer_size = 1024;                ///< [byte] of DNC text that has not run
+  double load_step = 0.0;                        ///< [percent] resolution of the polled loads; 0: not rounded
   CollisionWatch obstacles;
-  std::function<std::int64_t()> wall_clock;  ///< [s] since 1970, of its calendar; empty: the computer's
+  std::function<std::int64_t()>
+      wall_clock;  ///< [s] since 1970, of the controller's calendar; empty: the computer's clock
 
   /// @throws Error naming key and value.
   void validate() const;
 
-  /// [N m s2] of the spindle: what its drive accelerates so.
+  /// Moment of inertia [kg m2] of the spindle: torque over acceleration.
   double spindleInertia() const { return spindle_torque / spindle_acceleration; }
 
-  /// Of a model's sections axes, spindle, hammer, tool and workpiece. Loads are rounded to 0.3 mV of the load
-  /// meter's scale. What it leaves out: travel x -250..250, y -200..200, z -300..0
-  /// mm, home 0 0 0, rapid 30 m/min, 5 m/s2; spindle to 20000 rpm, 10000 rpm/s.
+  /// From a model's sections axes, spindle, hammer, tool and workpiece. Loads are rounded to 0.3 mV of the
+  /// load meter. Defaults: travel x -250..250, y -200..200, z -300..0 mm, home 0 0 0, rapid 30 m/min, 5 m/s2;
+  /// spindle up to 20000 rpm, 10000 rpm/s.
   static ControllerOptions ofModel(const MachineModel& model);
-  /// Positions in 0.1 um.
+  /// Identification with a position increment of 0.1 um.
   static focas::SysInfo fineInfo();
 };
 
-/// Where the machine is and how it moves.
+/// Position and velocity of the axes and the spindle.
 struct MotionState {
   std::array<double, 3> position{{0, 0, 0}};  ///< [m] machine position of x, y, z
   std::array<double, 3> velocity{{0, 0, 0}};  ///< [m/s]
-  double spindle_angle = 0.0;                 ///< [rad] of tooth 1, 0..2 pi
-  double spindle_speed = 0.0;                 ///< [rad/s] negative: backwards
-  int sequence = 0;                           ///< N word of the block that runs or ran last
+  double spindle_angle = 0.0;                 ///< [rad] angle of tooth 1, 0..2 pi
+  double spindle_speed = 0.0;                 ///< [rad/s] negative: counterclockwise (M4)
+  int sequence = 0;                           ///< N word of the running or last block
 };
 
-/// The simulated controller and the axes and the spindle that obey it exactly: blocks with trapezoidal speed
-/// and an exact stop at the end of each, a spindle whose drive has a torque to accelerate its inertia and to
-/// carry the cut. Time comes in through advance(). Every method may be called from any thread.
+/// The simulated controller with ideal axes and spindle: each block has a trapezoidal speed profile and ends
+/// with an exact stop; the torque of the spindle drive accelerates the inertia and carries the cut. advance()
+/// moves the time on. All methods are thread-safe.
 ///
 /// Dialect of the program text: see nc_block.h. A program begins in G90, G21, G94, G54 and G1 without F.
-/// `#n=` is done when all blocks before it are, M3 and M4 are not waited for, M5, M19, M119, M30 and M2 are;
-/// M0 waits for cycle start. A block that is not understood, would leave the travel or lacks F raises an
-/// alarm, which stops everything and ends the session; so does a tool that touches an obstacle.
+/// `#n=` is executed after all blocks before it. The program does not wait for M3 and M4; it waits for M5,
+/// M19, M119, M30 and M2; M0 waits for cycle start. A block that is not understood, leaves the travel or
+/// lacks F raises an alarm, which stops the machine and ends the session; so does a collision of the tool
+/// with an obstacle.
 ///
-/// Programs come by DNC, or from its memory: mode MEM, cycle start.
+/// Programs run by DNC or from the memory (mode MEM, cycle start).
 class Controller : public focas::ControllerInterface {
  public:
   /// @throws Error of ControllerOptions::validate().
@@ -69,26 +71,26 @@ class Controller : public focas::ControllerInterface {
   Controller(const Controller&) = delete;
   Controller& operator=(const Controller&) = delete;
 
-  /// Advances the machine. @param dt [s] one step. @param states becomes the states of the ends of the steps,
-  /// count of them.
+  /// Advances the machine by `count` steps. @param dt [s] one step @param states receives the state at the
+  /// end of each step
   void advance(double dt, std::size_t count, std::vector<MotionState>& states);
   MotionState motion() const;
 
-  /// What the load meters show. [percent]
+  /// Indicated loads [percent].
   void setSpindleLoad(double percent);
   void setServoLoad(const std::array<double, 3>& percent);
-  /// Currents of the axes' motors. [A]
+  /// Motor currents of the axes [A].
   void setServoCurrent(const std::array<double, 3>& amperes);
-  /// The cut's torque on the spindle. [N m]
+  /// Torque of the cut on the spindle [N m].
   void setSpindleTorque(double torque);
 
-  /// The panel. Leaving DNC (focas::AUT_REMOTE) while blocks run or a session is open stops everything and
-  /// ends the session (EW_MODE). @param aut focas::Aut
+  /// Mode at the panel. Leaving DNC (focas::AUT_REMOTE) while blocks run or a session is open stops the
+  /// machine and ends the session (EW_MODE). @param aut focas::Aut
   void setMode(int aut);
-  /// An alarm from outside (type EX); reset() clears it.
+  /// External alarm (type EX); reset() clears it.
   void raiseAlarm(int number, const std::string& text);
   void emergency(bool on);
-  /// On: axes brake on their path and stay; cycle start lets them go on.
+  /// The axes brake to rest on their path; cycle start resumes the motion.
   void feedHold();
   /// Factors on feed (0..2), rapid (0..1) and spindle speed (0.5..1.2).
   void setOverrides(double feed, double rapid, double spindle);
@@ -107,8 +109,8 @@ class Controller : public focas::ControllerInterface {
   std::vector<double> servoCurrent() const override;
   std::vector<double> servoSpeed() const override;
   std::vector<double> servoLoopGain() const override;
-  /// Variables 1..33, 100..199, 500..999 and 1133, vacant in the beginning; work offsets 5221..5323,
-  /// positions 5001.., 5021.., 5041.., which cannot be written.
+  /// Variables 1..33, 100..199, 500..999 and 1133, initially vacant; work offsets 5221..5323; read-only
+  /// positions 5001.., 5021.., 5041.. .
   focas::EwCode readMacro(int number, std::optional<double>* value) const override;
   focas::EwCode writeMacro(int number, std::optional<double> value) override;
   std::uint32_t alarmBits() const override;
@@ -132,7 +134,7 @@ class Controller : public focas::ControllerInterface {
   focas::EwCode rewindProgram() override;
   focas::EwCode storePrograms(const std::string& text) override;
   focas::EwCode fetchPrograms(int first, int last, std::string* text) const override;
-  /// In MEM runs the main program; goes on after M0 and feed hold.
+  /// Runs the main program in MEM; resumes after M0 and feed hold.
   focas::EwCode cycleStart() override;
   /// Stops axes and spindle, drops the program, ends the session (EW_RESET), clears alarms.
   focas::EwCode reset() override;

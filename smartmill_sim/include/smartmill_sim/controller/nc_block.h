@@ -10,7 +10,7 @@
 
 namespace smartmill::sim {
 
-/// A block that the control does not run; what() is the text of the alarm.
+/// A block that the control refuses; what() is the text of the alarm.
 class NcAlarm : public Error {
  public:
   /// @param type bit of the alarm word. @param axis 1-based, 0: none.
@@ -26,7 +26,7 @@ class NcAlarm : public Error {
 /// Bits of the alarm word of a 30i.
 enum AlarmType { ALARM_PS = 3, ALARM_OT = 4, ALARM_EX = 15 };
 
-/// What one block says, in the units of the text; what it leaves out is empty.
+/// Words of one block in the units of the text; empty: not in the block.
 struct NcBlock {
   std::optional<int> program;                   ///< O
   std::optional<int> sequence;                  ///< N
@@ -39,7 +39,7 @@ struct NcBlock {
   bool reference = false;                       ///< G28
   std::optional<double> dwell;                  ///< [s] G4
   std::array<std::optional<double>, 3> axis;    ///< X, Y, Z
-  std::array<std::optional<double>, 2> centre;  ///< I, J from the start
+  std::array<std::optional<double>, 2> centre;  ///< I, J relative to the start
   std::optional<double> radius;                 ///< R
   std::optional<double> feed;                   ///< F
   std::optional<double> speed;                  ///< [rpm] S
@@ -51,15 +51,14 @@ struct NcBlock {
   bool arc() const { return motion && *motion >= 2; }
 };
 
-/// Value of a variable #n, nothing: vacant. @throws NcAlarm when there is no such variable.
+/// Value of a variable #n; nullopt: vacant. @throws NcAlarm if the variable does not exist.
 using NcVariables = std::function<std::optional<double>(int)>;
 
-/// Reads one line. Dialect: O and N; G0 G1 G2 G3 (I J or R, plane G17) G4 (P in ms or X in s) G20 G21 G28 G53
-/// G54..G59 G90 G91 G94 G95; X Y Z F S; M0 M2 M3 M4 M5 M19 M30 M119; or #n=value. A value is a number, which
-/// needs no decimal point, #n, or an expression in brackets with + - * / SIN COS SQRT (degrees); a word with
-/// a vacant #n counts as not written. Blanks, comments in parentheses and lines that begin with % mean
-/// nothing.
-/// @throws NcAlarm (PS) for all else; IF, WHILE and GOTO are refused by name.
+/// Parses one line. Dialect: O and N; G0 G1 G2 G3 (I J or R, plane G17) G4 (P in ms or X in s) G20 G21 G28
+/// G53 G54..G59 G90 G91 G94 G95; X Y Z F S; M0 M2 M3 M4 M5 M19 M30 M119; or #n=value. A value is a number,
+/// which needs no decimal point, #n, or an expression in brackets with + - * / SIN COS SQRT (degrees); a word
+/// with a vacant #n is ignored. Blanks, comments in parentheses and lines that begin with % are ignored.
+/// @throws NcAlarm (PS) for everything else; the alarm names IF, WHILE and GOTO.
 NcBlock parseBlock(const std::string& line, const NcVariables& variables = {});
 
 }  // namespace smartmill::sim

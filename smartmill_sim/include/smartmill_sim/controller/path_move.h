@@ -5,37 +5,38 @@
 
 namespace smartmill::sim {
 
-/// A point's motion along a straight line or an arc in x and y (z in proportion), with trapezoidal speed:
-/// from the speed that it has to the feed, to rest exactly at the target. Closed form in time. Times [s] are
-/// those of the caller's clock and never go back.
+/// Motion of a point along a straight line or an arc in x and y (z proportional to the path), with a
+/// trapezoidal speed profile: from the present speed to the feed, to rest exactly at the target. Closed form
+/// in time. Times [s] are those of the caller's clock and do not decrease.
 class PathMove {
  public:
   using Point = std::array<double, 3>;
 
-  /// At rest at a point, over at once.
+  /// At rest at a point.
   explicit PathMove(const Point& point) : start_(point), target_(point) {}
   static PathMove line(const Point& start, const Point& target);
   /// @param centre [m] x, y @param clockwise seen from +z; a target equal to the start is a full circle
   static PathMove arc(const Point& start, const Point& target, const std::array<double, 2>& centre,
                       bool clockwise);
 
-  /// From time on with a feed [m/s]; 0: brakes to rest on the path, what is left of it is kept.
+  /// Plans the motion from a time on with a feed [m/s]; 0: brakes to rest on the path, and the rest of the
+  /// path remains.
   /// @param acceleration [m/s2] > 0
   void plan(double time, double feed, double acceleration);
-  /// Brakes to rest on the path; where that is becomes the target.
+  /// Brakes to rest on the path; the point of rest becomes the target.
   void stop(double time, double acceleration);
 
   double length() const { return length_; }          ///< [m]
-  double end() const { return begin_ + duration_; }  ///< [s] from when on it rests
-  /// Rests before the target.
+  double end() const { return begin_ + duration_; }  ///< [s] when it comes to rest
+  /// Whether it comes to rest before the target.
   bool held() const { return end_distance_ < length_; }
   const Point& target() const { return target_; }  ///< [m]
   Point position(double time) const;
   double speed(double time) const;    ///< [m/s] along the path
   Point velocity(double time) const;  ///< [m/s]
-  /// Highest feed [m/s] at which the acceleration keeps it on its curve; nothing on a line.
+  /// Highest feed [m/s] for a centripetal acceleration; nullopt on a line.
   std::optional<double> curveFeed(double acceleration) const;
-  /// Lowest and highest x and y on the way [m].
+  /// Lowest and highest x and y of the path [m].
   std::array<std::array<double, 2>, 2> extent() const;
 
  private:
@@ -45,11 +46,12 @@ class PathMove {
 
   Point start_{{0, 0, 0}}, target_{{0, 0, 0}};
   double length_ = 0.0;  // [m]
-  // Arc: angle of the start seen from the centre, signed sweep; radius 0: a line.
+  // Arc: angle of the start about the centre, signed sweep; radius 0: a line.
   std::array<double, 2> centre_{{0, 0}};
   double radius_ = 0.0, start_angle_ = 0.0, sweep_ = 0.0;
 
-  // Speed: from begin_ a ramp of ramp_ seconds from first_ to peak_, steady_ seconds, a ramp to rest.
+  // Speed profile: from begin_ a ramp of ramp_ seconds from first_ to peak_, constant for steady_ seconds, a
+  // ramp of down_ seconds to rest.
   double begin_ = 0.0, duration_ = 0.0;              // [s]
   double from_distance_ = 0.0, end_distance_ = 0.0;  // [m]
   double first_ = 0.0, peak_ = 0.0;                  // [m/s]

@@ -9,8 +9,8 @@
 
 namespace smartmill::sim {
 
-/// What Fanuc's Servo Guide records: load of the spindle and currents of the axes' motors at 1 kHz, with the
-/// block that runs and a trigger that begins with a block (N word).
+/// Record of Fanuc's Servo Guide: spindle load and motor currents of the axes at 1 kHz, the running block,
+/// and a trigger at the start of a block (N word).
 class ServoRecorder {
  public:
   static constexpr double SAMPLE_RATE = 1000.0;  ///< [Hz]
@@ -22,22 +22,22 @@ class ServoRecorder {
   struct Input {
     double time = 0.0;  ///< [s]
     MotionState motion;
-    double spindle_load = 0.0;               ///< [1] of full scale, not rounded
-    std::array<double, 3> force{{0, 0, 0}};  ///< [N] of the cut on the tool
+    double spindle_load = 0.0;               ///< [1] of full scale, unrounded
+    std::array<double, 3> force{{0, 0, 0}};  ///< [N] cutting force on the tool
   };
-  /// Inputs come at a rate of at least SAMPLE_RATE; a sample is taken of the first at or after its time.
+  /// Inputs at a rate of at least SAMPLE_RATE; each sample is the first input at or after its time.
   void push(const Input& input);
 
   /// Samples since the last call: channels spindle_load [1], current_x, current_y, current_z [A], sequence
   /// [1], trigger [1].
   SampleBlock take();
-  const std::array<double, 3>& current() const { return current_; }  ///< [A] now
+  const std::array<double, 3>& current() const { return current_; }  ///< [A] latest
   std::array<double, 3> load() const;                                ///< [percent] of the axes
 
  private:
   std::array<AxisDrive, 3> drives_;
   int trigger_;
-  bool triggered_ = false, any_ = false;
+  bool triggered_ = false, started_ = false;
   std::uint64_t index_ = 0, block_index_ = 0;
   double last_time_ = 0.0;
   std::array<double, 3> last_velocity_{{0, 0, 0}}, current_{{0, 0, 0}}, cut_{{0, 0, 0}};

@@ -5,7 +5,7 @@
 
 namespace smartmill::sim {
 
-/// A signal delayed by a constant time, linear between steps.
+/// Delays a signal by a constant time; linear between steps.
 class DelayLine {
  public:
   /// @param delay [s] >= 0 @param time_step [s] > 0 @param rest output until the start of the signal arrives
@@ -13,13 +13,13 @@ class DelayLine {
 
   double step(double value);
 
-  /// As if the signal had been constant before.
+  /// Sets the past of the signal to a constant value.
   void reset(double value);
 
  private:
   std::vector<double> past_;  // ring
   std::size_t next_ = 0;
-  double share_;  // of the older of two neighbours
+  double share_;  // weight of the older of two neighbours
 };
 
 }  // namespace smartmill::sim

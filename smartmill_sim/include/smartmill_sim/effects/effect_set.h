@@ -14,8 +14,8 @@ namespace smartmill::sim {
 
 using Stage = EffectStage;
 
-/// Whether effects of a stage act in tests of this kind: a tap has no chip and no turning spindle, a move no
-/// chip.
+/// Whether effects of a stage act in tests of this kind: a tap has neither chip nor spindle rotation, a move
+/// has no chip.
 bool actsIn(Stage stage, TestKind kind);
 
 /// The effects of one model, in the order of action.
@@ -46,8 +46,8 @@ class EffectSet {
   std::array<bool, static_cast<std::size_t>(Stage::signal) + 1> has_{};
 };
 
-/// The machine before it starts, as its effects change it.
-/// @throws Error as EffectSet()
+/// The initial machine with the changes by its effects.
+/// @throws Error as EffectSet() does.
 TwinSetup setUpOf(MachineModel model, const EffectSet& effects);
 
 }  // namespace smartmill::sim

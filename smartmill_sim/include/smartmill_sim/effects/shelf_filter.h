@@ -4,7 +4,7 @@
 
 namespace smartmill::sim {
 
-/// A Shelf in steps of constant length, from rest; its input runs straight between steps.
+/// A Shelf in constant steps, from rest; the input is linear between steps.
 class ShelfFilter {
  public:
   /// @param time_step [s] > 0
@@ -14,7 +14,8 @@ class ShelfFilter {
 
  private:
   Shelf shelf_;
-  double keep_, now_, before_;  // weights of what was low, of the value now and a step ago
+  double decay_, weight_now_,
+      weight_before_;  // weights of the low-pass state, of the present and of the previous input
   double low_ = 0.0, last_ = 0.0;
 };
 

@@ -13,9 +13,9 @@
 
 namespace smartmill::sim {
 
-/// Single-point turning after Kim (eq. 1 to 4, fig. 3), with what a real lathe adds: a chip force that is not
-/// proportional to the chip, a tool that leaves the cut, an actuator that has a bandwidth, a delay and a
-/// stroke, sensors with noise.
+/// Single-point turning after Kim (eq. 1 to 4, fig. 3) with the deviations of a real lathe: a cutting force
+/// that is not proportional to the chip thickness, a tool that may leave the cut, an actuator with bandwidth,
+/// delay and stroke, and sensor noise. Units and meaning: declare().
 struct LatheTraits {
   std::uint64_t seed = 1;
   double rate = 10000.0;
@@ -44,25 +44,25 @@ class Lathe {
   /// @throws Error on bad traits.
   explicit Lathe(const LatheTraits& traits);
 
-  /// Commands of the tool's position, one channel "command" [m]; first_index tells after which sample each is
-  /// to be taken up. What comes for samples that are past takes effect at once and is counted.
-  /// @throws Error without such a channel, or in another unit.
+  /// Commands of the tool position, one channel "command" [m]; a command takes effect after the sample of its
+  /// index. Commands for past samples take effect at once and are counted.
+  /// @throws Error without this channel, or in another unit.
   void command(const SampleBlock& commands);
 
-  /// What sensors show, and what is true.
+  /// Sensor signals and true values.
   struct Block {
     SampleBlock displacement;  ///< deflection, tool [m]: probes at workpiece and tool; headstock [m/s2]
     SampleBlock vibration;     ///< headstock [m/s2]
     SpindleAngle angle;        ///< at the first sample
-    std::vector<double> motion, force;  ///< true: deflection less tool [m], chip force [N]
+    std::vector<double> motion, force;  ///< true: deflection minus tool position [m], cutting force [N]
   };
   /// The next samples. @param count > 0
   Block advance(std::size_t count);
 
-  /// Whether commands are known for the next samples, or none has come at all.
-  bool commanded(std::size_t count) const { return newest_ == 0 || newest_ + 1 >= index_ + count; }
+  /// Whether commands for the next samples have arrived, or none at all.
+  bool hasCommands(std::size_t count) const { return newest_ == 0 || newest_ + 1 >= index_ + count; }
 
-  std::uint64_t late() const { return late_; }  ///< commands that came after their sample
+  std::uint64_t late() const { return late_; }  ///< commands that arrived after their sample
 
  private:
   double pastSurface() const;
@@ -73,8 +73,8 @@ class Lathe {
   ModalFilter machine_, servo_filter_;
   std::mt19937_64 random_;
   std::normal_distribution<double> normal_;
-  std::deque<double> surface_;  // [m] what the edge left, newest first
-  std::deque<double> delayed_;  // [m] commands on their way into the servo
+  std::deque<double> surface_;  // [m] surface left by the edge, newest first
+  std::deque<double> delayed_;  // [m] delayed commands of the servo
   std::map<std::uint64_t, double> commands_;
   double commanded_ = 0.0, tool_ = 0.0, last_force_ = 0.0;
   std::uint64_t index_ = 0, late_ = 0, newest_ = 0;

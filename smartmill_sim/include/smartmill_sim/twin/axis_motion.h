@@ -9,8 +9,8 @@
 
 namespace smartmill::sim {
 
-/// Acceleration of the machine axes in a record, by a smoothed derivative of their velocity (columns
-/// axis_vx..) or, without it, of their position (axis_x..).
+/// Acceleration of the machine axes in a record: smoothed derivative of their velocity (columns axis_vx..)
+/// or, without it, of their position (axis_x..).
 class AxisMotion {
  public:
   static bool isRecorded(const Record& record);
@@ -18,12 +18,12 @@ class AxisMotion {
   /// @param smoothing [s] of smoothedDerivative()
   AxisMotion(const Record& record, double sample_rate, double smoothing);
 
-  /// [m/s2] of x, y, z between sample i (share 0) and the next one (share 1), linear; 0 of axes without
-  /// columns.
+  /// [m/s2] of x, y, z, interpolated linearly between sample i (share 0) and the next one (share 1); 0 for
+  /// axes without columns.
   Axes3 acceleration(std::size_t i, double share) const;
 
  private:
-  std::array<std::vector<double>, 3> acceleration_;  // [m/s2] at the samples; empty: not recorded
+  std::array<std::vector<double>, 3> acceleration_;  // [m/s2] at each sample; empty: not recorded
 };
 
 }  // namespace smartmill::sim

@@ -10,10 +10,11 @@
 
 namespace smartmill::sim {
 
-/// Sets when the bursts of a machine's signals begin: where a record shows them best beyond what the twin
-/// shows without them, by the matched filter over the record folded at their period; without a record drawn.
-/// @param early of each channel, before the signal stage; nullptr: not shown @param rate [Hz]
-void findBursts(const Record* recorded, const std::array<std::vector<double>*, CHANNEL_COUNT>& early,
+/// Sets the begin of the burst trains in a machine's signals. With a record it is estimated from the residual
+/// of the twin without bursts: matched filter over the residual folded at the period of the train. Without a
+/// record it is drawn.
+/// @param raw channels before the signal stage; nullptr: not simulated @param rate [Hz]
+void findBursts(const Record* recorded, const std::array<std::vector<double>*, CHANNEL_COUNT>& raw,
                 double rate, CuttingMachine& machine, std::mt19937_64& random);
 
 }  // namespace smartmill::sim

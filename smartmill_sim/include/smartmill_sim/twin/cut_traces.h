@@ -13,35 +13,36 @@
 
 namespace smartmill::sim {
 
-/// Every value of a model that the record of a test of this kind depends on; two models with the same values
-/// give the same record. @param model of effects that the catalogue knows
+/// All values of a model on which the record of a test of this kind depends; two models with the same values
+/// give the same record. @param model whose effects are in the catalogue
 std::vector<double> valuesOfRecord(const MachineModel& model, TestKind kind);
 
-/// Whether each channel of a record shows what no other one has a part in (cross talk mixes them).
-bool channelsApart(const MachineModel& model);
+/// Whether the channels of a record are independent of each other, i.e. no effect (as cross talk) mixes them.
+bool channelsAreIndependent(const MachineModel& model);
 
-/// As valuesOfRecord(), of one channel (ChannelIndex) of a record whose channels are apart.
+/// As valuesOfRecord(), for one channel (ChannelIndex) of a record with independent channels.
 std::vector<double> valuesOfChannel(const MachineModel& model, TestKind kind, std::size_t channel);
 
-/// The same of what cut and tool do in it (CutTrace). @param guided CuttingMachine::guide()
-std::vector<double> valuesOfTrace(const MachineModel& model, TestKind kind, bool guided);
+/// As valuesOfRecord(), for the CutTrace of the test. @param tip_prescribed whether the motion of the tip is
+/// prescribed
+std::vector<double> valuesOfTrace(const MachineModel& model, TestKind kind, bool tip_prescribed);
 
-/// What cut and tool did in one test, for the last few models: most models of a search differ from the one
-/// before them in what comes after. For many threads.
+/// Cache of the CutTrace of one test for the last few models: most models of a search differ from the
+/// previous one only in the stages after cut and tool. Thread-safe.
 class CutTraces {
  public:
-  /// @param most >= 1 that are held
-  explicit CutTraces(std::size_t most) : most_(most) {}
+  /// @param capacity >= 1 number of traces
+  explicit CutTraces(std::size_t capacity) : capacity_(capacity) {}
 
-  /// @return nullptr: not held
+  /// @return nullptr: not in the cache
   std::shared_ptr<const CutTrace> find(const std::vector<double>& values);
-  void hold(std::vector<double> values, std::shared_ptr<const CutTrace> trace);
+  void insert(std::vector<double> values, std::shared_ptr<const CutTrace> trace);
   void clear();
 
  private:
-  std::size_t most_;
+  std::size_t capacity_;
   std::mutex mutex_;
-  std::deque<std::pair<std::vector<double>, std::shared_ptr<const CutTrace>>> held_;  // newest use first
+  std::deque<std::pair<std::vector<double>, std::shared_ptr<const CutTrace>>> entries_;  // newest use first
 };
 
 }  // namespace smartmill::sim

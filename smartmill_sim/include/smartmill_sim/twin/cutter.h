@@ -11,72 +11,73 @@
 
 namespace smartmill::sim {
 
-/// How a tip gives way to the force of the step that is being taken.
-struct TipYield {
-  std::array<double, 2> assumed{{0, 0}};  ///< [N] force of the cut with which it moves as the motion tells
-  std::array<double, 2> rate{{0, 0}};     ///< [m/s/N] that each newton more adds to its rate
+/// Response of the tip to the force of the present step.
+struct TipMobility {
+  std::array<double, 2> assumed_force{
+      {0, 0}};  ///< [N] cutting force on which the rate in the motion is based
+  std::array<double, 2> rate_per_force{{0, 0}};  ///< [m/s/N] change of the rate per newton
 };
 
-/// A tool in its work: a straight mill, or, where the tool has a corner radius, one a slice of its height.
+/// Cutting force of a tool: one straight mill or, for a corner radius, a stack of straight mills.
 class Cutter {
  public:
-  /// How the forces come about.
-  enum class Way {
-    history,  ///< of where the tool was and how it vibrated (MillingProcess)
-    tables    ///< over a revolution (RigidCut): steady, nothing vibrates
+  /// How the forces are computed.
+  enum class Method {
+    history,  ///< from the history of the tool's motion and vibration (MillingProcess)
+    tables    ///< from tables over a revolution (RigidCut): steady and rigid
   };
 
-  /// @param radius_offset [m] of each tooth @param corner_radius [m] 0: none. @throws Error on an impossible
-  /// tool or corner.
+  /// @param radius_offset [m] of each tooth @param corner_radius [m] 0: none @throws Error on an invalid tool
+  /// or corner radius.
   Cutter(const ToolGeometry& tool, const CuttingLaw& law, double time_step,
-         const std::vector<double>& radius_offset, double corner_radius, double path_share, Way way,
+         const std::vector<double>& radius_offset, double corner_radius, double path_share, Method method,
          int corner_slices = CORNER_SLICES);
 
-  /// Where there is material from now on, see MillingProcess and RigidCut.
+  /// Sets the contact from now on, see MillingProcess and RigidCut.
   void engage(const std::vector<ContactArc>& arcs, const ToolMotion& now);
   /// Depth of each arc [m] > 0.
   void setDepths(const std::vector<double>& depths);
   void setLaw(const CuttingLaw& law);
 
-  Way way() const { return way_; }
-  /// Of tables, or where something else displaces the tip: from here on the sums of each step are kept, or
-  /// taken from what was kept over the same steps by a cutter that differed in coefficients and factors of
-  /// the law only. @param sums must outlive the steps
-  void keep(std::vector<CutSums>* sums) { kept_ = sums; }
-  void follow(const std::vector<CutSums>* sums) { followed_ = sums; }
+  Method method() const { return method_; }
+  /// With tables or a prescribed motion of the tip: record the sums of each further step, or replay sums that
+  /// a cutter with other coefficients and factors of the law recorded over the same steps. @param sums must
+  /// outlive the steps
+  void recordSums(std::vector<CutSums>* sums) { recorded_ = sums; }
+  void replaySums(const std::vector<CutSums>* sums) { replayed_ = sums; }
 
-  /// Force on the tool with its tip displaced as in this motion. The rate is the one that comes of this very
-  /// force: edges that rub would else drive a light mode that they damp.
-  CuttingForce step(const ToolMotion& now, const TipYield& yield = {});
-  /// Ends the step with the tip there [m].
-  void settle(const std::array<double, 2>& displacement);
+  /// Force on the tool with the tip displaced as in this motion. With a mobility the rate of the tip is
+  /// solved together with the force: otherwise rubbing edges would excite a light mode that they damp.
+  CuttingForce step(const ToolMotion& now, const TipMobility& mobility = {});
+  /// Ends the step. @param displacement [m] of the tip
+  void endStep(const std::array<double, 2>& displacement);
 
  private:
-  struct Part {
+  struct StraightMill {
     EdgeSlice slice;
-    double top = 0.0;  // [m] up to which the slice's means hold
-    EdgeSlice actual;  // these
+    double top = 0.0;  // [m] upper end of the engaged height
+    EdgeSlice actual;  // means over the engaged height
     std::optional<MillingProcess> process;
     std::optional<RigidCut> rigid;
-    std::size_t arcs = 0;  // in which it stands
-    CutSums sums;          // of the step
+    std::size_t arcs = 0;  // number of arcs at this height
+    CutSums sums;          // of the present step
   };
-  void place(Part& part);
-  ToolMotion motionOf(const Part& part, const ToolMotion& now) const;
-  CutSums sumsOf(Part& part, const ToolMotion& now) const;
-  CuttingForce force() const;  // of the sums
-  void yieldTo(const ToolMotion& now, const TipYield& yield);
+  void updateContact(StraightMill& mill);
+  ToolMotion motionOf(const StraightMill& mill, const ToolMotion& now) const;
+  CutSums sumsOf(StraightMill& mill, const ToolMotion& now) const;
+  CuttingForce force() const;  // from the sums
+  void solveRubbing(const ToolMotion& now, const TipMobility& mobility);
 
-  Way way_;
+  Method method_;
   double corner_radius_, lag_;
   CuttingLaw law_;
-  std::vector<Part> parts_;
+  std::vector<StraightMill> mills_;
   std::vector<ContactArc> arcs_;
   ToolMotion now_;
-  std::vector<CutSums>* kept_ = nullptr;
-  const std::vector<CutSums>* followed_ = nullptr;
-  std::size_t place_ = 0;  // in what is followed
-  bool fresh_ = false;     // the arcs are other ones than those of the last step
+  std::vector<CutSums>* recorded_ = nullptr;
+  const std::vector<CutSums>* replayed_ = nullptr;
+  std::size_t replay_index_ = 0;  // next index in replayed_
+  bool arcs_changed_ = false;     // the arcs differ from those of the last step
 };
 
 }  // namespace smartmill::sim

@@ -13,13 +13,13 @@
 
 namespace smartmill::sim {
 
-/// What lower parts of the cutter's edges add to the force of the whole: each is a cutter of its own, as deep
-/// as the layer reaches, whose force counts with the layer's weight. So an edge that is not the same all
-/// along needs no other kernel: full depth less a lower part leaves the upper one.
+/// Forces of edge layers, added to the force of the whole edge: each layer is a cutter of its own down to the
+/// layer's depth, whose force is multiplied by the layer's weight. An edge that varies over its height is
+/// thus a sum of uniform ones: full depth minus a lower layer is the upper layer.
 class EdgeLayers {
  public:
   EdgeLayers() = default;
-  /// @param setup after all effects have changed it @param rigid a tool that does not vibrate, at steady feed
+  /// @param setup with the changes by all effects @param rigid a tool without vibration at steady feed
   EdgeLayers(const TwinSetup& setup, const CuttingLaw& law, double time_step, bool rigid);
 
   bool empty() const { return layers_.empty(); }
@@ -27,12 +27,12 @@ class EdgeLayers {
   void setDepths(const std::vector<double>& depths);
   void setLaw(const CuttingLaw& law);
   void add(const ToolMotion& now, CuttingForce& sum);
-  /// Of a tool that may vibrate: ends the step with the tip there [m].
-  void settle(const std::array<double, 2>& displacement);
+  /// Ends the step of a tool that may vibrate. @param displacement [m] of the tip
+  void endStep(const std::array<double, 2>& displacement);
 
  private:
   struct Layer {
-    EdgeLayer of;
+    EdgeLayer definition;
     std::optional<RigidCut> rigid;
     std::optional<MillingProcess> process;
   };

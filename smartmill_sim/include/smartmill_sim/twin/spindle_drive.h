@@ -18,23 +18,22 @@ class SpindleDrive {
                                                                                                factor_);
   }
 
-  /// Friction besides the model's [N m], and a factor on all of it.
+  /// Friction torque in addition to the model's [N m], and a factor on the total.
   void setFriction(double extra, double factor);
 
-  /// Load meter in steady air cutting at a speed [rad/s], [V].
+  /// Steady load meter voltage [V] in an air cut at a speed [rad/s].
   double steady(double speed) const;
-  /// To that value.
+  /// Sets the load meter to its steady value at a speed [rad/s].
   void reset(double speed);
 
-  /// Load meter [V], unrounded, after one time step under a cutting torque [N m] that is constant over it:
-  /// exact.
+  /// Load meter voltage [V], unrounded, after one time step under a constant cutting torque [N m]; exact.
   double step(double cutting_torque, double speed) {
     const double steady = spindle_.load_meter_gain * (cutting_torque + friction(speed)) * speed;
     voltage_ = steady + (voltage_ - steady) * decay_;
     return voltage_;
   }
 
-  /// The reading: rounded to the load meter's resolution [V].
+  /// Voltage rounded to the load meter's resolution [V].
   double rounded(double voltage) const;
 
  private:

@@ -16,57 +16,56 @@ class CutTraces;
 
 struct SimulationOptions {
   bool noise = true;       ///< sensor noise and rounding of the load meter
-  std::uint64_t seed = 1;  ///< of the noise and, without recorded angle, of the phase
-  int substeps = 4;        ///< integration steps a sample, >= 1
+  std::uint64_t seed = 1;  ///< of the noise and, without a recorded angle, of the phase
+  int substeps = 4;        ///< integration steps per sample, >= 1
   int corner_slices = CORNER_SLICES;
   /// [rad] spindle angle at the first sample, instead of the recorded angle's.
   std::optional<double> phase;
-  /// [samples] The force of a cut comes on so much earlier, in the mean, than engage_time and
-  /// engagementRise() say.
+  /// [samples] Mean advance of the rise of the cutting force over engage_time and engagementRise().
   double early_entry = 0.0;
-  /// Of a tool with modes, where a cut's record shows tool_x and tool_y: chips are those of the displacement
-  /// that was measured (or, without these channels, of the one to which the forces that were measured push
-  /// the tool, see Guide), the structure only shows what these forces do to it. Nothing can run away, a
-  /// chattering cut is followed, and what is left is an error of prediction.
+  /// For a tool with modes: the chip follows from the measured displacement of the tip (or from the
+  /// displacement under the measured forces, see TipTrajectory), and the structure only responds to the
+  /// forces. The simulation cannot become unstable, follows a chattering cut, and its residual is a
+  /// prediction error.
   bool guided = false;
-  /// Tones (mains hum) with a phase of the seed, not with the one that the recorded signals show.
+  /// Phases of tones (mains hum) are drawn from the seed instead of estimated from the record.
   bool random_phases = false;
-  /// Channels to give, of those that the record has; nullptr: all. Only where channelsApart().
+  /// Channels of the record to simulate; nullptr: all. Requires channelsAreIndependent().
   const std::vector<std::string>* channels = nullptr;
-  /// [s] deviation of the Gaussian weights by which the acceleration of the axes follows from their recorded
-  /// motion (smoothedDerivative()): passes frequencies up to 58 Hz (-3 dB), above the bandwidth of a feed
-  /// drive's position loop, and suppresses the resolution of an encoder.
+  /// [s] standard deviation of the Gaussian weights of the axis acceleration (smoothedDerivative()): the -3
+  /// dB frequency of 58 Hz is above the bandwidth of a feed drive's position loop, and the quantisation of an
+  /// encoder is suppressed.
   double axis_smoothing = 4e-3;
-  /// What cut and tool did in this very test (record, phase, substeps, slices) under other models: taken from
-  /// there where the model has the same values, and put there. nullptr: each simulation by itself.
+  /// Cache of cut and tool in the same test (record, phase, substeps, slices) under other models, read and
+  /// extended. nullptr: no cache.
   CutTraces* traces = nullptr;
 };
 
-/// [1] The force of a cut comes on over this part of a sample before the engagement: a step of the programs
-/// that make campaigns, who take many more of them where the tool vibrates.
+/// [1] Part of a sample before the engagement over which the cutting force rises: one step of the programs
+/// that generate campaigns, which use smaller steps if the tool vibrates.
 constexpr double engagementRise(bool vibrates) {
   return vibrates ? 1.0 / 64.0 : 1.0 / 6.0;
 }
 
-/// [rad] Spindle angle at a record's first sample: the phase that fits its angles best at the test's speed.
-/// 0 for a tap and for a record without spindle_angle.
+/// [rad] Spindle angle at the first sample of a record: best fit to its angles at the test's speed. 0 for a
+/// tap and for a record without spindle_angle.
 double recordedPhase(const CampaignTest& test, const Record& recorded);
 
 /// Simulates one test of a campaign: a record with the columns and sample times of the recorded one. The
-/// recorded spindle angle gives the phase (of a tap: stands as it is), the recorded hammer force drives a
-/// tap, the recorded motion of the machine axes gives their acceleration. The effects that the model lists
-/// act. What no model knows, the phase of a mains hum, is found in the recorded signals.
+/// recorded spindle angle gives the phase (in a tap it is copied), the recorded hammer force excites a tap,
+/// and the recorded motion of the machine axes gives their acceleration. All effects of the model act. Values
+/// that are not part of a model, as the phase of a mains hum, are estimated from the recorded signals.
 ///
-/// Before engage_time the tool is out of cut; from there full engagement with the surface that steady cutting
-/// leaves. The sensor begins at rest, the load meter at its air-cut value. With running_before the record
-/// begins in the steady state: the time before it is simulated, with the depth of cut growing, until the tool
-/// has settled.
-/// @param recorded gives columns, times, phase and hammer force
-/// @throws Error naming what the model lacks or what this twin cannot run.
+/// Before engage_time the tool is out of cut; from there it is fully engaged with the surface of steady
+/// cutting. The sensor begins at rest, the load meter at its air-cut value. With running_before the record
+/// begins in the steady state: a lead-in with growing depth of cut is simulated until transients have
+/// decayed.
+/// @param recorded columns, times, phase and hammer force
+/// @throws Error naming what the model lacks or what this twin does not support.
 Record simulateTest(const MachineModel& model, const CampaignTest& test, const Record& recorded,
                     const SimulationOptions& options);
 
-/// Without a record: a cut or an air cut of a duration [s] with every column that the model can give.
+/// Without a record: a cut or an air cut of a duration [s] with all columns that the model supports.
 Record simulateTest(const MachineModel& model, const CampaignTest& test, double duration,
                     const SimulationOptions& options);
 

@@ -9,18 +9,18 @@
 
 namespace smartmill::sim {
 
-/// Where a controller elsewhere leads axes and spindle: samples of x, y, z [m] and revolutions [1] with their
-/// times, straight lines between them. Over a gap everything stands.
+/// Motion of axes and spindle under an external controller: samples of x, y, z [m] and revolutions [1],
+/// linear between the samples. Over a gap axes and spindle are at rest.
 class AxesTrack {
  public:
-  /// @throws Error naming a channel that is missing. What is not newer than all before is left out.
+  /// @throws Error naming a missing channel. Samples that are not newer than all earlier ones are ignored.
   void push(const SampleBlock& block);
-  /// Nothing has come until a time [s]: the axes stand since the last sample, and go on from where the next
-  /// one is.
-  void stand(double until);
-  /// [s] of the last sample; nothing before the first.
+  /// No samples until a time [s]: the axes are at rest from the last sample on and resume at the position of
+  /// the next one.
+  void holdUntil(double until);
+  /// [s] time of the last sample; nullopt: none yet.
   std::optional<double> newest() const;
-  /// @param time [s], not after newest(), not before one asked for earlier
+  /// @param time [s], not after newest(), not before that of an earlier call
   MotionState at(double time);
 
  private:
@@ -28,8 +28,8 @@ class AxesTrack {
     double time = 0.0;
     std::array<double, 3> position{};
     double revolutions = 0.0;
-    bool jump = false;    // no way leads here from the point before
-    bool stands = false;  // made by stand()
+    bool jump = false;  // no motion from the previous point to here
+    bool held = false;  // added by holdUntil()
   };
   std::deque<Point> points_;
 };

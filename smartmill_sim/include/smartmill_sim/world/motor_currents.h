@@ -13,10 +13,10 @@
 
 namespace smartmill::sim {
 
-/// What the motors of feed drives and spindle are like, and the Hall sensors round one phase of each (Cheng &
-/// Venuvinod, sections 5 to 9; Broms for what warmth does to them). Feed drives: synchronous motors, current
-/// proportional to force. Spindle: an induction motor, magnetised without load too, of constant power above
-/// its base speed.
+/// Motors of feed drives and spindle, with a Hall sensor at one phase of each (Cheng & Venuvinod, sections 5
+/// to 9; Broms for the effect of temperature). Feed drives: synchronous motors, current proportional to
+/// force. Spindle: an induction motor with a magnetising current and constant power above its base speed.
+/// Units and meaning: declare().
 struct MotorTraits {
   bool currents = false;
   std::array<double, 3> mass{{400.0, 400.0, 400.0}};
@@ -47,8 +47,9 @@ struct MotorTraits {
   std::array<AxisDrive, 3> drives() const;
 };
 
-/// Phase currents of the motors at 1 kHz: a sine that turns with the axis, its range (twice the amplitude)
-/// what the motor carries. An axis at rest: friction holds what it can, the current stands.
+/// Phase currents of the motors at 1 kHz: a sine over the electrical angle, whose range (twice the amplitude)
+/// follows the motor's load. At rest static friction carries the load up to its limit, and the
+/// current is constant.
 class MotorCurrents {
  public:
   static constexpr double SAMPLE_RATE = 1000.0;  ///< [Hz]
@@ -58,27 +59,27 @@ class MotorCurrents {
   struct Input {
     double time = 0.0;  ///< [s]
     MotionState motion;
-    std::array<double, 3> force{{0, 0, 0}};  ///< [N] of the cut on the tool
-    double torque = 0.0;                     ///< [N m] of the cut
+    std::array<double, 3> force{{0, 0, 0}};  ///< [N] cutting force on the tool
+    double torque = 0.0;                     ///< [N m] cutting torque
   };
-  /// Inputs come at a rate of several times SAMPLE_RATE; loads are means between samples.
+  /// Inputs at several times SAMPLE_RATE; loads are means between samples.
   void push(const Input& input);
 
   /// Samples since the last call: channels x, y, z, spindle [A].
   SampleBlock take();
 
-  /// [A] range of the spindle's current under a torque at a speed [rad/s].
+  /// Range [A] of the spindle current under a torque [N m] at a speed [rad/s].
   double spindleRange(double torque, double speed) const;
-  double temperature() const { return temperature_; }  ///< [deg C] of the drives now
+  double temperature() const { return temperature_; }  ///< [deg C] present temperature of the drives
 
  private:
-  struct At {
+  struct DriveState {
     double time = 0.0;
     std::array<double, 3> position{{0, 0, 0}};
     double turns = 0.0;  // [1] of the spindle
     double speed = 0.0;  // [rad/s]
   };
-  void sample(const At& at);
+  void sample(const DriveState& at);
   double phase(double range, double periods);
 
   MotorTraits traits_;
@@ -86,11 +87,11 @@ class MotorCurrents {
   Spindle spindle_;
   std::mt19937_64 random_;
   std::normal_distribution<double> normal_;
-  bool any_ = false;
-  At last_, sampled_;
+  bool started_ = false;
+  DriveState last_, sampled_;
   double last_angle_ = 0.0;
   std::array<double, 3> cut_{{0, 0, 0}}, load_{{0, 0, 0}}, velocity_{{0, 0, 0}};
-  double torque_ = 0.0, torque_load_ = 0.0, slipped_ = 0.0, count_ = 0.0;
+  double torque_ = 0.0, torque_load_ = 0.0, slip_revolutions_ = 0.0, count_ = 0.0;
   double temperature_;
   std::uint64_t index_ = 0, block_index_ = 0;
   std::vector<double> samples_;

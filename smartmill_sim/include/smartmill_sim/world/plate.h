@@ -10,8 +10,9 @@
 
 namespace smartmill::sim {
 
-/// A dynamometer plate of six channels under the workpiece. Defaults: natural frequencies of the sensor of
-/// Bachrathy and Stepan (section 2), its centre of mass above its feet, so that forces turn it.
+/// A six-channel dynamometer plate under the workpiece. Defaults: natural frequencies of the sensor of
+/// Bachrathy and Stepan (section 2); the centre of mass is above the feet, so that forces couple into
+/// rotation. Units and meaning: declare().
 struct PlateTraits {
   bool present = false;
   std::array<double, 3> origin{{0.0, 0.0, -0.2}};
@@ -27,25 +28,25 @@ struct PlateTraits {
   void declare(ParameterTable& table);
 };
 
-/// Plate and workpiece as a rigid body on four feet that measure: M q'' + C q' + K q = w, w the wrench of the
-/// forces at their points about the origin in the feet's plane; shown is C q' + K q. Exact for forces linear
-/// between steps.
+/// Plate and workpiece as a rigid body on four sensing feet: M q'' + C q' + K q = w with the wrench w of the
+/// applied forces about the origin in the plane of the feet; the output is C q' + K q. Exact for forces that
+/// are linear between steps.
 class Plate {
  public:
   Plate(const PlateTraits& traits, double step, std::uint64_t seed);
 
-  /// One integration step. @param cut [N] @param cut_point [m] machine @param blow [N] @param blow_point [m]
-  /// from the plate's origin
+  /// One integration step. @param cut [N] cutting force @param cut_point [m] machine coordinates @param hit
+  /// [N] force of a hit @param hit_point [m] from the plate's origin
   void step(const std::array<double, 3>& cut, const std::array<double, 3>& cut_point,
-            const std::array<double, 3>& blow, const std::array<double, 3>& blow_point);
-  /// The sample that these steps make: means over them, with noise. @return forces [N], moments [N m]
+            const std::array<double, 3>& hit, const std::array<double, 3>& hit_point);
+  /// The sample of these steps: means over them, with noise. @return forces [N], moments [N m]
   std::array<double, 6> read();
 
  private:
   PlateTraits traits_;
   Eigen::Matrix<double, 12, 12> transition_;
   Eigen::Matrix<double, 12, 6> from_before_, from_change_;
-  Eigen::Matrix<double, 6, 12> shown_;
+  Eigen::Matrix<double, 6, 12> output_;
   Eigen::Matrix<double, 12, 1> state_ = Eigen::Matrix<double, 12, 1>::Zero();
   Eigen::Matrix<double, 6, 1> last_ = Eigen::Matrix<double, 6, 1>::Zero();
   Eigen::Matrix<double, 6, 1> sum_ = Eigen::Matrix<double, 6, 1>::Zero();

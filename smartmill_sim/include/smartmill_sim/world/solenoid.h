@@ -8,9 +8,9 @@
 
 namespace smartmill::sim {
 
-/// One touch of a hammer: sin(pi u^(1 + skew)) of the peak, u the share of the contact; skew 0 is the half
+/// One contact of a hammer: peak sin(pi u^(1 + skew)) over the relative contact time u; skew 0 is the half
 /// sine of Dunwoody section 4.3.1.
-struct Blow {
+struct Hit {
   double begin = 0.0;    ///< [s]
   double peak = 0.0;     ///< [N]
   double contact = 0.0;  ///< [s] > 0
@@ -21,26 +21,26 @@ struct Blow {
   bool over(double time) const { return time > end(); }
 };
 
-/// The solenoid: its current rises from the command until the hammer touches, which ends it; then the hammer
-/// falls back, or bounces.
+/// Solenoid of the hammer: the current rises from the command until the first contact and then decays; the
+/// hammer falls back or bounces.
 class Solenoid {
  public:
-  /// @param force_scatter [1] standard deviation of the peak over its nominal value
+  /// @param force_scatter [1] standard deviation of the peak, relative to its nominal value
   Solenoid(const StationTraits& traits, const smartmill::HammerStation& station, double force_scatter);
 
-  /// @param now [s] of the command @param touch [s] of the first contact
+  /// Fires the hammer. @param now [s] time of the command @param touch [s] time of the first contact
   void fire(double now, double touch, std::mt19937_64& random);
-  /// Time went on without it.
-  void shift(double time);
+  /// Skips a time [s].
+  void skipTime(double time);
 
-  double force(double time) const;    ///< [N] of the hammer on what it meets
-  double current(double time) const;  ///< [1] of its final value
-  bool over(double time) const { return blows_.empty() || blows_.back().over(time); }
+  double force(double time) const;    ///< [N] of the hammer on its target
+  double current(double time) const;  ///< [1] relative to its final value
+  bool over(double time) const { return hits_.empty() || hits_.back().over(time); }
 
  private:
   StationTraits traits_;
   double peak_, contact_, force_scatter_;
-  std::vector<Blow> blows_;
+  std::vector<Hit> hits_;
   double fired_ = 0.0;
 };
 

@@ -11,8 +11,8 @@
 
 namespace smartmill::sim {
 
-/// A ring of six preloaded quartz washers in the spindle's flange (Burzoni ch. 3). Defaults show, at a tool
-/// and holder of 139 mm, the constants of his Table 3.
+/// A ring of six preloaded quartz washers in the spindle flange (Burzoni ch. 3). With a tool and holder of
+/// 139 mm the defaults give the constants of his Table 3. Units and meaning: declare().
 struct SpindleSensorTraits {
   bool present = false;
   double length = 0.139;
@@ -48,35 +48,36 @@ struct SpindleSensorTraits {
   void validate() const;
 };
 
-/// The ring in motion: a force on the tool's tip bends the spindle, whose modes hang on tool and holder, and
-/// the moment at the ring presses one washer of each pair and frees the other: each shows (length + reach) F
-/// over a lever, a line in the length of tool and holder (so that a calibration constant, its reciprocal, is
-/// none). A pair beside the axis that it is called after and two washers that do not answer alike make
-/// cross-talk.
+/// Dynamics and output of the ring: a force on the tool tip excites the modes of spindle, holder and tool,
+/// and the moment at the ring loads one washer of each pair and unloads the other. Each output is
+/// proportional to (length + reach) F, linear in the length of tool and holder (its reciprocal, a calibration
+/// constant, is not). Cross-talk follows from the angle between a pair and its nominal axis and from unequal
+/// sensitivities of its two washers.
 class SpindleSensor {
  public:
-  /// @param step [s] of integration. @throws Error naming key and value.
+  /// @param step [s] of integration @throws Error naming key and value.
   SpindleSensor(const SpindleSensorTraits& traits, double step, double sample_rate, std::uint64_t seed);
 
-  /// Another tool and holder: the modes begin anew, at rest. @param length [m] @throws Error.
+  /// Changes tool and holder; the modes restart at rest. @param length [m] of tool and holder @throws Error
+  /// if it is out of range.
   void setLength(double length);
 
-  /// Shown over applied force of an axis, as the main pair alone shows it, principal planes not turned.
+  /// FRF of measured over applied force of an axis, for the main pair alone and unrotated principal planes.
   const ModalModel& modes(std::size_t axis) const { return modes_.at(axis); }
-  /// Pair's mean [row] over a static force along [column] [1].
+  /// Mean of a pair [row] over a static force along an axis [column] [1].
   std::array<std::array<double, 3>, 3> shares() const;
 
-  /// One integration step. @param force [N] on the tool besides the unbalance @param angle [rad], speed
-  /// [rad/s] of the spindle
+  /// One integration step. @param force [N] on the tool, without the unbalance @param angle [rad] of the
+  /// spindle @param speed [rad/s] of the spindle
   void step(const std::array<double, 3>& force, double angle, double speed);
-  /// The sample that these steps make: means over them, zero and drift, noise; a washer without compression
-  /// shows no less. @return x1 .. z2 [N]
+  /// The sample of these steps: means over them with zero, drift and noise; limited where a washer loses its
+  /// compression. @return x1 .. z2 [N]
   std::array<double, 6> read();
-  /// Time goes on without it.
-  void lose(double time) { time_ += time; }
+  /// Skips a time [s].
+  void skipTime(double time) { time_ += time; }
 
  private:
-  void layOut();
+  void updateModes();
 
   SpindleSensorTraits traits_;
   double step_, sample_;  // [s]
@@ -86,8 +87,8 @@ class SpindleSensor {
   std::mt19937_64 random_;
   std::normal_distribution<double> normal_;
   std::array<double, 6> zero_{}, drift_{};  // [N], [N/s]
-  double time_ = 0.0, warm_ = 0.0;          // [s], [1] of the spindle
-  std::array<double, 3> moment_sum_{};      // [N] what the modes make of the force, summed over steps
+  double time_ = 0.0, warm_ = 0.0;          // [s], [1] warming of the spindle
+  std::array<double, 3> moment_sum_{};      // [N] force filtered by the modes, summed over steps
   double angle_ = 0.0, speed_ = 0.0, bearing_angle_ = 0.0;
   int steps_ = 0;
 };

@@ -7,9 +7,10 @@
 
 namespace smartmill::sim {
 
-/// What a hammer station is like beyond the model's `hammer` section: how the tool bends between hammer,
-/// sensor and tip, what the sensor's electrode sees of it, and what the solenoid does wrong. The defaults are
-/// an ideal station: a point sensor, half-sine blows and the model's modes as those of a rigid tool.
+/// Properties of a hammer station beyond the model's `hammer` section: bending of the tool between hammer,
+/// sensor and tip, the sensor's electrode, and imperfections of the solenoid. The defaults are an ideal
+/// station: a point sensor, half-sine pulses and the model's modes with a rigid tool. Units and meaning:
+/// declare().
 struct StationTraits {
   std::string structure = "modes";
   double pivot = 0.25;
@@ -20,7 +21,7 @@ struct StationTraits {
   double young = 5.8e11;
   double density = 14500.0;
   double tool_damping = 0.004;
-  // Spindle and holder where the tool leaves the holder, and the joint.
+  // Spindle and holder at the holder's face, and the joint.
   std::vector<double> spindle_frequency{620.0, 1050.0, 1900.0};
   std::vector<double> spindle_damping{0.035, 0.03, 0.025};
   std::vector<double> spindle_stiffness{1.6e8, 1.2e8, 2.5e8};
@@ -59,7 +60,7 @@ struct StationTraits {
   double axis_scatter = 0.0;
 
   void declare(ParameterTable& table);
-  /// What bounds alone do not say. @throws Error naming key and value.
+  /// Bounds and consistency of the lists. @throws Error naming key and value.
   void validate() const;
 };
 

@@ -32,18 +32,21 @@ struct WorldOptions {
   PlateTraits plate;
 
   void declare(ParameterTable& table) {
-    table.number("seed", seed, "1", Range::notNegative(), "of noise and scatter");
-    table.number("substeps", substeps, "1", Range::closed(1, 64), "integration steps a sample of 1/25600 s");
-    table.number("tap_peak", tap_peak, "N", Range::closed(1.0, 1e5), "of a blow on the workpiece");
-    table.number("tap_contact", tap_contact, "s", Range::closed(1e-5, 1e-2), "of a blow on the workpiece");
+    table.number("seed", seed, "1", Range::notNegative(), "seed of noise and scatter");
+    table.number("substeps", substeps, "1", Range::closed(1, 64),
+                 "integration steps per sample of 1/25600 s");
+    table.number("tap_peak", tap_peak, "N", Range::closed(1.0, 1e5), "peak of a hit on the workpiece");
+    table.number("tap_contact", tap_contact, "s", Range::closed(1e-5, 1e-2),
+                 "contact time of a hit on the workpiece");
     table.number("operator_delay", operator_delay, "s", Range::closed(0.0, 60.0),
-                 "above 0 a person hits the workpiece, so long after being asked; 0: automatic");
+                 "delay of a manual hit on the workpiece after its request; 0: automatic hammer");
     table.number("force_scatter", force_scatter, "1", Range::closed(0.0, 0.5),
-                 "standard deviation of a blow's peak over its nominal value");
-    table.number("load_step", load_step, "V", Range::closed(0.0, 1.0),
-                 "of the load meter's scale, to which the controller rounds the loads that it tells; 0: not");
+                 "standard deviation of a hit's peak, relative to its nominal value");
+    table.number(
+        "load_step", load_step, "V", Range::closed(0.0, 1.0),
+        "resolution of the loads that the controller reports, on the load meter's scale; 0: not rounded");
     table.number("servo_trigger", servo_trigger, "1", Range::notNegative(),
-                 "N word of the block that starts the trigger in daq/servo; 0: none");
+                 "N word of the block that sets the trigger in daq/servo; 0: none");
     table.part("hammer_", hammer);
     table.part("motor_", motor);
     table.part("spindle_sensor_", spindle_sensor);
@@ -54,63 +57,63 @@ struct WorldOptions {
   void validate() const;
 };
 
-/// A whole machine that obeys its controller: axes, spindle, tool in stock, force sensor under it, hammer
-/// station beside it, load meter. In blocks of samples; time is the running sample index over the sample
-/// rate.
+/// A complete machine under its controller: axes, spindle, tool in stock, force sensor under the stock,
+/// hammer station next to it, load meter. It advances in sample blocks; time is the running sample index over
+/// the sample rate.
 class World {
  public:
   static constexpr double SAMPLE_RATE = 25600.0;  ///< [Hz]
   static constexpr std::size_t BLOCK = 256;       ///< samples
-  static constexpr std::size_t ANGLES = 2;        ///< readings of the spindle's angle a block
+  static constexpr std::size_t ANGLES = 2;        ///< samples of the spindle angle per block
 
-  /// What the sensors deliver and what is true; stamps [s] count from sample 0.
+  /// Sensor signals and true values; stamps [s] count from sample 0.
   struct Block {
-    SampleBlock hammer;       ///< hammer [N] positive in compression, gap [V]; gap_cross [V] where it stands
-    SampleBlock dynamometer;  ///< fx, fy, fz [N]; of a plate also mx, my, mz [N m]
-    SampleBlock spindle_force;  ///< x1 .. z2 [N]; without channels where the spindle has no such sensors
+    SampleBlock hammer;         ///< hammer [N] positive in compression, gap [V]; gap_cross [V] if present
+    SampleBlock dynamometer;    ///< fx, fy, fz [N]; with a plate also mx, my, mz [N m]
+    SampleBlock spindle_force;  ///< x1 .. z2 [N]; no channels without these sensors
     std::array<SpindleAngle, ANGLES> angle;
-    ForceBlock force;       ///< true force of the cut on the tool
-    SampleBlock vibration;  ///< true displacement of the tip, x, y [m]
-    SampleBlock servo;      ///< ServoRecorder's: spindle load and axis currents at 1 kHz
-    SampleBlock
-        motor_current;  ///< MotorCurrents': phase currents at 1 kHz; without channels where they are off
-    double spindle_load = 0.0;  ///< [1] what the load meter shows at the end, 1 is full scale
+    ForceBlock force;           ///< true cutting force on the tool
+    SampleBlock vibration;      ///< true displacement of the tip, x, y [m]
+    SampleBlock servo;          ///< ServoRecorder's: spindle load and axis currents at 1 kHz
+    SampleBlock motor_current;  ///< MotorCurrents': phase currents at 1 kHz; no channels if they are off
+    double spindle_load = 0.0;  ///< [1] indicated load at the end, 1 is full scale
   };
   enum class StrikeAnswer { ok, by_hand, failed };
 
-  /// @throws Error naming what the model lacks: tool, spindle, axes, cutting; hammer and workpiece only limit
-  /// what can be done.
+  /// @throws Error naming a missing section of the model: tool, spindle, axes or cutting. Hammer and
+  /// workpiece are optional.
   World(const MachineModel& model, const WorldOptions& options);
   ~World();
   World(const World&) = delete;
   World& operator=(const World&) = delete;
 
-  /// May be used from any thread.
+  /// The simulated controller; thread-safe.
   Controller& controller();
 
-  /// Direct receptances of the tool's tip, of the model or of the hammer station's beam.
+  /// Drive-point receptances of the tool tip, from the model or from the hammer station's beam.
   const ToolTip& toolTip() const;
 
-  /// Fires a hammer, once. May be called from any thread. @param point tool or force_sensor @param message
-  /// one line
+  /// Fires a hammer once. Thread-safe. @param point tool or force_sensor @param message receives one line of
+  /// text
   StrikeAnswer strike(const std::string& point, const std::string& direction, std::string& message);
 
-  /// Something pulls at the tool's tip from now on. @param force [N] on the tool @param on_table against the
-  /// workpiece: the force sensor under it feels it too. May be called from any thread, as the next two.
+  /// Applies a constant force at the tool tip from now on. @param force [N] on the tool @param on_table
+  /// whether it acts between tool and workpiece, so that the force sensor measures it too. Thread-safe, as
+  /// the next two.
   void pull(const std::array<double, 3>& force, bool on_table);
-  /// Another tool and holder in the spindle. @param length [m] @throws Error where nothing depends on it.
+  /// Changes tool and holder. @param length [m] of both @throws Error if the spindle has no force sensor.
   void setToolLength(double length);
-  /// Where blows on the workpiece go. @param point [m] from the plate's origin
+  /// Point of hits on the workpiece. @param point [m] from the plate's origin
   void setTapPoint(const std::array<double, 3>& point);
 
   /// The next BLOCK samples.
   void advance(Block& block);
-  /// The same with axes and spindle that obey a controller elsewhere. @param states of half a sample after
-  /// each sample, BLOCK of them
+  /// The same with axes and spindle under an external controller. @param states at half a sample after each
+  /// sample, BLOCK values
   void advance(Block& block, const std::vector<MotionState>& states);
 
-  /// Samples that nobody took: the index goes on, the machine does not move.
-  void lose(std::uint64_t samples);
+  /// Skips samples: the index advances, the machine does not move.
+  void skipSamples(std::uint64_t samples);
 
  private:
   class Impl;

@@ -10,7 +10,7 @@
 
 namespace smartmill {
 
-/// A command line that works, without the program's name, and what it does.
+/// An example: arguments without the program's name, and what the command then does.
 struct CommandExample {
   std::string arguments, what;
 };
@@ -34,13 +34,13 @@ struct Command {
   std::string description;  ///< one paragraph, the first thing in --help
   std::vector<CommandExample> examples;
   std::vector<CommandFile> files;
-  std::vector<ExitCode> exits;  ///< where they differ from exitCodes(), or are added to them
-  /// Declares the options. @return the body, which owns what the options are read into; it runs after the
-  /// command line was parsed and returns the exit code.
+  std::vector<ExitCode> exits;  ///< those that differ from, or are added to, exitCodes()
+  /// Declares the options. @return the body, which owns the option values; it runs after the command line is
+  /// parsed and returns the exit code.
   std::function<std::function<int()>(CommandLine&)> declare;
 };
 
-/// The body of a command that runs with its options and ends with exit code 0.
+/// Body of a command that calls run(options) and returns exit code 0.
 template <class Options>
 std::function<int()> commandBody(std::shared_ptr<Options> options, void (*run)(const Options&)) {
   return [options = std::move(options), run] {
@@ -49,8 +49,8 @@ std::function<int()> commandBody(std::shared_ptr<Options> options, void (*run)(c
   };
 }
 
-/// Exit codes of a command in rising order: 0 done, 1 error, 2 bad command line, 130 interrupted, and its
-/// own.
+/// Exit codes of a command in ascending order: 0 done, 1 error, 2 bad command line, 130 interrupted, and
+/// those of the command.
 std::vector<ExitCode> exitCodes(const Command& command);
 
 /// A command line with the command's options, its examples and exit codes at the end of --help.
@@ -59,7 +59,7 @@ class CommandRun {
   /// @param program the name in messages, e.g. "explain" or "smartmill explain"
   CommandRun(const Command& command, const std::string& program);
   CommandLine& line() { return line_; }
-  /// What the command itself put at the end of --help: its parameters.
+  /// The command's own text at the end of --help: its parameters.
   const std::string& notes() const { return notes_; }
   /// As runProgram: argv[0] is skipped. @return the exit code
   int run(int argc, const char* const* argv);
@@ -70,10 +70,10 @@ class CommandRun {
   std::string notes_;
 };
 
-/// main of a program that is one command, named as it was started.
+/// main of a program with a single command; messages use the name by which it was started.
 int runCommand(const Command& command, int argc, const char* const* argv);
 
-/// Commands of one subject, under its heading in --help.
+/// Commands of one topic, listed under its heading in --help.
 struct CommandTopic {
   std::string title;
   std::vector<Command> commands;
@@ -83,12 +83,12 @@ struct CommandTopic {
 struct CommandProgram {
   std::string name, summary, version;
   std::vector<CommandTopic> topics;
-  std::vector<Command> hidden;  ///< run like the others, missing from --help
+  std::vector<Command> hidden;  ///< runs like the others, not listed in --help
 
   /// nullptr if no command has the name.
   const Command* find(const std::string& command) const;
-  /// The command whose name, or whose tool's name, is nearest to a word that names none; empty if all are
-  /// far.
+  /// The command whose name or tool name is nearest to an unknown word by edit distance; empty when none is
+  /// near.
   std::string nearest(const std::string& word) const;
   /// The text of --help.
   std::string help() const;

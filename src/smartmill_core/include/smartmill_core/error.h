@@ -5,8 +5,8 @@
 
 namespace smartmill {
 
-/// What a user can mend: bad file, bad parameter, bad data. what() is one line that names what is wrong and
-/// where.
+/// An error that the user can correct: bad file, parameter or data. what() is one line that states what is
+/// wrong and where.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

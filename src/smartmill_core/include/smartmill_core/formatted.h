@@ -4,7 +4,7 @@
 
 namespace smartmill {
 
-/// What printf would print, of any length.
+/// The text that printf would print, of any length.
 std::string formatted(const char* format, ...) __attribute__((format(printf, 1, 2)));
 
 }  // namespace smartmill

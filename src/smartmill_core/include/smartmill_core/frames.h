@@ -16,7 +16,7 @@ constexpr const char* HAMMER = "hammer";
 /// a tf2 transform from source to target. @throws Error when the quaternion is not of unit length.
 std::array<double, 9> rotationMatrix(const std::array<double, 4>& quaternion);
 
-/// The same of a message's quaternion, whose members are x, y, z and w.
+/// The same for a message's quaternion with members x, y, z and w.
 template <class Quaternion>
 std::array<double, 9> rotationMatrix(const Quaternion& q) {
   return rotationMatrix(std::array<double, 4>{q.x, q.y, q.z, q.w});

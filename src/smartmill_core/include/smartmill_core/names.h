@@ -4,8 +4,7 @@
 
 namespace smartmill::names {
 
-// Topics, services and actions, relative to the namespace /smartmill; nodes, tools and tests say them by
-// these.
+// Topics, services and actions, relative to the namespace /smartmill.
 constexpr const char* NAMESPACE = "/smartmill";
 
 constexpr const char* HAMMER = "daq/hammer";
@@ -72,17 +71,17 @@ constexpr const char* PREDICT_STABILITY = "stability/predict";
 constexpr const char* WHAT_IF = "stability/what_if";
 constexpr const char* REPLAY_CONTROL = "replay/control";
 
-/// A signal of the data acquisition, by its own name: daq/vibration.
+/// Topic of a signal of the data acquisition, e.g. daq/vibration.
 inline std::string daq(const std::string& signal) {
   return "daq/" + signal;
 }
 
-/// The topic on which an action's goals stand in a recording.
+/// The topic of an action's goals in a recording.
 inline std::string goals(const std::string& action) {
   return action + "/goal";
 }
 
-/// With the namespace, for what is not started in it.
+/// With the namespace, for programs that run outside it.
 inline std::string absolute(const std::string& name) {
   return !name.empty() && name.front() == '/' ? name : std::string(NAMESPACE) + "/" + name;
 }

@@ -5,7 +5,7 @@
 
 namespace smartmill {
 
-/// Numbers that a key may take. Infinite bounds are open.
+/// Allowed numbers of a key. Infinite bounds are open.
 struct Range {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
@@ -25,10 +25,10 @@ struct Range {
   static Range openHigh(double low, double high) { return {low, high, false, true}; }
 };
 
-/// A number for a line that people read, at most ten digits.
+/// A number for messages, at most ten digits.
 std::string shortNumber(double value);
 
-/// "0.7 is out of range (0 <= value < 0.5)", what a message says after the key. @param unit "1": none
+/// "0.7 is out of range (0 <= value < 0.5)", the text after the key in a message. @param unit "1": none
 std::string outOfRange(double value, const Range& range, const std::string& unit = "1");
 
 }  // namespace smartmill

@@ -4,12 +4,12 @@
 
 namespace smartmill {
 
-/// @throws Error "KEY: VALUE is out of range (RANGE)" for a value outside the range or that is no finite
-/// number. @param unit of value and range for the message; "1": none
+/// @throws Error "KEY: VALUE is out of range (RANGE)" for a value outside the range or not finite. @param
+/// unit of value and range for the message; "1": none
 void require(const char* key, double value, const Range& range, const char* unit = "1");
 
-/// Where a range does not say it. @throws Error "KEY: VALUE, DUE is due" unless good and the value a finite
-/// number.
-void require(bool good, const char* key, double value, const char* due);
+/// For conditions that are not a range. @throws Error "KEY: VALUE, expected EXPECTED" unless good and the
+/// value is finite.
+void require(bool good, const char* key, double value, const char* expected);
 
 }  // namespace smartmill

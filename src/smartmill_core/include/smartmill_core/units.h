@@ -2,7 +2,7 @@
 
 namespace smartmill {
 
-/// Shop units <-> SI, used where files are read and written and where people read numbers; nowhere else.
+/// Shop units <-> SI, used only for files and displayed numbers.
 namespace units {
 
 constexpr double PI = 3.14159265358979323846;

@@ -63,12 +63,12 @@ CampaignTest readTest(const StrictYaml& map) {
     test.file_format = map.oneOf("file_format", {"dynoware", "sound"});
     const StrictYaml channels = map.map("channels");
     for (const std::string& key : channels.keys()) {
-      // A sound file may hold any column of a record; who reads it refuses others.
+      // A sound file may contain any column of a record; its reader rejects others.
       if (test.file_format == "sound" || key == "fx" || key == "fy" || key == "fz")
         test.channels[key] = channels.word(key);
     }
     channels.finish();
-    if (test.channels.empty()) map.fail("channels", "names no channel");
+    if (test.channels.empty()) map.fail("channels", "expected at least one channel");
   }
   const bool turns = test.kind == TestKind::cut || test.kind == TestKind::air;
   test.spindle_speed =
@@ -142,7 +142,7 @@ Campaign readCampaign(const std::string& path) {
   for (const StrictYaml& map : root.maps("tests")) {
     campaign.tests.push_back(readTest(map));
     if (!names.insert(campaign.tests.back().name).second) {
-      map.fail("name", "'" + campaign.tests.back().name + "' names two tests");
+      map.fail("name", "'" + campaign.tests.back().name + "' is the name of two tests");
     }
   }
   readSlowChannels(root, campaign.tests);

@@ -21,15 +21,15 @@ namespace {
 
 constexpr double POWERS[] = {1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12};
 
-/// The digits of printf's %.*g, of at most 9 digits. The usual sizes are rounded as whole numbers, where the
-/// product's own rounding cannot change the digit; std::to_chars does the others.
+/// Like printf's %.*g with at most 9 digits. Numbers of usual magnitude are rounded as integers where the
+/// rounding of the product cannot change a digit; std::to_chars formats the others.
 void appendGeneral(std::string& text, double value, int digits) {
-  constexpr double CERTAIN = 1e-4;  // from a half, where 1e9 is known to 1e-7
+  constexpr double CERTAIN = 1e-4;  // distance from a half; 1e9 is exact to 1e-7
   char written[40];
   char* const end = written + sizeof written;
   const double size = std::abs(value);
   if (size >= 1e-4 && size < 1e6) {
-    int decimals = digits + 3;  // of numbers from 1e-4 to 1e-3
+    int decimals = digits + 3;  // for numbers from 1e-4 to 1e-3
     for (double above = 1e-3; size >= above && decimals > digits; above *= 10.0) --decimals;
     for (double above = 1.0; size >= above; above *= 10.0) --decimals;
     const double scaled = size * POWERS[decimals], whole = std::floor(scaled), part = scaled - whole;
@@ -51,7 +51,7 @@ void appendGeneral(std::string& text, double value, int digits) {
   text.append(written, std::to_chars(written, end, value, std::chars_format::general, digits).ptr);
 }
 
-/// Where a column of the file goes; nullptr: it is left out.
+/// Destination of a column of the file; nullptr: skipped.
 struct Target {
   std::string name;
   std::vector<double>* values;
@@ -67,8 +67,8 @@ void readRows(CsvReader& reader, const std::vector<Target>& targets) {
       reader.fail("is empty");
     }
     if (cells.size() != targets.size())
-      reader.fail(std::to_string(cells.size()) + " values, " + std::to_string(targets.size()) +
-                  " columns are due");
+      reader.fail(std::to_string(cells.size()) + " values, expected " + std::to_string(targets.size()) +
+                  " (one per column)");
     for (std::size_t c = 0; c < targets.size(); ++c) {
       const Target& t = targets[c];
       if (t.values) t.values->push_back(reader.number(cells[c], t.name) * t.si);
@@ -81,19 +81,19 @@ void checkTime(const Record& record, int first_line, double sample_rate) {
   if (t.empty()) throw Error(record.file + ": no samples");
   if (t.size() < 2) return;
   if (const std::optional<UnevenStep> worst = unevenStep(t)) {
-    throw Error(record.file + formatted(": line %d: column time: a step of %g s, %g s are due",
+    throw Error(record.file + formatted(": line %d: column time: a step of %g s, expected %g s",
                                         first_line + 1 + static_cast<int>(worst->sample), worst->step,
                                         worst->usual));
   }
   const double step = (t.back() - t.front()) / static_cast<double>(t.size() - 1);
   if (sample_rate > 0.0 && std::abs(step * sample_rate - 1.0) > 1e-3) {
     throw Error(record.file +
-                formatted(": samples come at %.6g Hz, but the campaign's sample_rate_hz is %.6g", 1.0 / step,
-                          sample_rate));
+                formatted(": the sample rate is %.6g Hz, but the campaign's sample_rate_hz is %.6g",
+                          1.0 / step, sample_rate));
   }
 }
 
-// Which column each cell of the header names; nullptr: one that is not used, with a note.
+// The column of each header cell; nullptr for one that is not used, which adds a note.
 std::vector<const RecordColumn*> readHeader(const CsvReader& reader,
                                             const std::vector<std::string_view>& cells,
                                             std::vector<std::string>* notes) {
@@ -101,7 +101,7 @@ std::vector<const RecordColumn*> readHeader(const CsvReader& reader,
   for (const std::string_view cell : cells) {
     const std::size_t open = cell.find('[');
     if (open == std::string_view::npos || cell.back() != ']') {
-      reader.fail("column '" + std::string(cell) + "' is not name[unit]");
+      reader.fail("column '" + std::string(cell) + "': expected name[unit]");
     }
     const std::string_view name = cell.substr(0, cell.find_last_not_of(" \t", open - 1) + 1);
     const std::string_view unit = cell.substr(open + 1, cell.size() - open - 2);
@@ -109,10 +109,10 @@ std::vector<const RecordColumn*> readHeader(const CsvReader& reader,
     if (!kind) {
       notes->push_back(reader.file() + ": column " + std::string(cell) + " is not used");
     } else if (unit != kind->unit) {
-      reader.fail("column " + std::string(name) + ": the unit is '" + std::string(unit) + "', " + kind->unit +
-                  " is due");
+      reader.fail("column " + std::string(name) + ": the unit is '" + std::string(unit) + "', expected " +
+                  kind->unit);
     } else if (std::find(kinds.begin(), kinds.end(), kind) != kinds.end()) {
-      reader.fail("column " + std::string(name) + " stands twice");
+      reader.fail("column " + std::string(name) + " occurs twice");
     }
     kinds.push_back(kind);
   }
@@ -169,7 +169,7 @@ Record readDynowareAt(const std::string& file, const std::map<std::string, std::
   std::vector<std::string_view> units_row;
   if (!reader.next(&units_row)) throw Error(file + ": the row of units is missing");
   const int header_lines = reader.line();
-  if (units_row.size() != names.size()) reader.fail("a unit for every channel is due");
+  if (units_row.size() != names.size()) reader.fail("expected a unit for every channel");
 
   Record record;
   record.file = file;
@@ -177,8 +177,8 @@ Record readDynowareAt(const std::string& file, const std::map<std::string, std::
   std::vector<Target> targets(names.size(), {"", nullptr, 1.0});
   const auto check = [&](std::size_t c, const char* unit) {
     if (units_row[c] != unit) {
-      reader.fail("column " + names[c] + ": the unit is '" + std::string(units_row[c]) + "', " + unit +
-                  " is due");
+      reader.fail("column " + names[c] + ": the unit is '" + std::string(units_row[c]) + "', expected " +
+                  unit);
     }
   };
   check(0, "s");
@@ -187,10 +187,10 @@ Record readDynowareAt(const std::string& file, const std::map<std::string, std::
     const auto at = std::find(names.begin(), names.end(), channel);
     if (at == names.end()) throw Error(file + ": column " + channel + " is missing");
     const RecordColumn* kind = recordColumn(name);
-    if (!kind) throw Error(file + ": channels: '" + name + "' is no column name");
+    if (!kind) throw Error(file + ": channels: '" + name + "' is not a column name");
     const std::size_t c = static_cast<std::size_t>(at - names.begin());
     check(c, kind->unit);
-    if (targets[c].values) throw Error(file + ": channels: " + channel + " is named twice");
+    if (targets[c].values) throw Error(file + ": channels: " + channel + " occurs twice");
     targets[c] = {channel, &record.columns[record.names.size()], kind->si};
     record.names.push_back(name);
   }
@@ -232,7 +232,7 @@ std::optional<UnevenStep> unevenStep(const std::vector<double>& t) {
   const auto worst = std::max_element(steps.begin(), steps.end(), [usual](double l, double r) {
     return std::abs(l - usual) < std::abs(r - usual);
   });
-  // Two rates in one record: times have printed digits, all steps of the second rate are alike.
+  // Two rates in one record: times have few digits, so that all steps of the second rate count as equal.
   const double alike = 0.99 * std::abs(*worst - usual);
   const auto first =
       std::find_if(steps.begin(), steps.end(), [&](double step) { return std::abs(step - usual) >= alike; });
@@ -262,7 +262,7 @@ Record readRecord(const Campaign& campaign, const CampaignTest& test) {
   if (test.file_format != "sound") {
     Record record = readCsvAt(path, test.sample_rate);
     if (test.kind == TestKind::move && std::none_of(record.names.begin(), record.names.end(), motionAxis))
-      throw Error(path + ": a move needs a column axis_x[mm], axis_vx[mm/min] or the same of y or z");
+      throw Error(path + ": a move needs a column axis_x[mm], axis_vx[mm/min] or those of y or z");
     return record;
   }
   std::string channels;
@@ -291,8 +291,8 @@ Record readSoundRecord(const std::string& file, const std::vector<SoundChannel>&
   record.file = file;
   for (const SoundChannel& channel : channels) {
     if (!recordColumn(channel.name) || channel.name == "time")
-      throw Error(file + ": channel '" + channel.name + "' is no column of a record");
-    if (record.has(channel.name)) throw Error(file + ": channel '" + channel.name + "' stands twice");
+      throw Error(file + ": channel '" + channel.name + "' is not a column of a record");
+    if (record.has(channel.name)) throw Error(file + ": channel '" + channel.name + "' occurs twice");
     if (channel.number > sound.channels.size())
       throw Error(file + ": channel " + std::to_string(channel.number) + " (" + channel.name +
                   "): the file has " + std::to_string(sound.channels.size()));
@@ -318,9 +318,9 @@ void writeCsv(const Record& record, const std::string& file, int digits) {
   std::vector<double> si;
   for (std::size_t c = 0; c < record.names.size(); ++c) {
     const RecordColumn* kind = recordColumn(record.names[c]);
-    if (!kind) throw Error(file + ": '" + record.names[c] + "' is no column name");
+    if (!kind) throw Error(file + ": '" + record.names[c] + "' is not a column name");
     if (record.columns[c].size() != record.size())
-      throw Error(file + ": column " + record.names[c] + " is short");
+      throw Error(file + ": column " + record.names[c] + " has too few samples");
     text += "," + record.names[c] + "[" + kind->unit + "]";
     si.push_back(kind->si);
   }

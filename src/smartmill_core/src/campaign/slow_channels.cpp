@@ -22,8 +22,8 @@ SlowChannel readOne(const StrictYaml& map, const std::vector<CampaignTest>& test
   map.finish();
   const auto test =
       std::find_if(tests.begin(), tests.end(), [&](const CampaignTest& t) { return t.name == slow.test; });
-  if (test == tests.end()) map.fail("test", "'" + slow.test + "' is no test of the campaign");
-  if (test->kind == TestKind::tap) map.fail("test", "'" + slow.test + "' is a tap, whose spindle stands");
+  if (test == tests.end()) map.fail("test", "'" + slow.test + "' is not a test of the campaign");
+  if (test->kind == TestKind::tap) map.fail("test", "'" + slow.test + "' is a tap, without spindle rotation");
   return slow;
 }
 
@@ -38,14 +38,14 @@ std::vector<SlowChannel> readSlowChannels(const StrictYaml& root, const std::vec
     const auto same = std::count_if(all.begin(), all.end(), [&](const SlowChannel& other) {
       return other.test == slow.test && other.channel == slow.channel;
     });
-    if (same > 1) map.fail("channel", slow.channel + " of '" + slow.test + "' is named twice");
+    if (same > 1) map.fail("channel", slow.channel + " of '" + slow.test + "' occurs twice");
   }
   return all;
 }
 
 std::vector<SlowChannel> readSlowChannels(const Campaign& campaign) {
   const std::string file = (std::filesystem::path(campaign.folder) / "campaign.yaml").string();
-  if (!std::filesystem::exists(file)) return {};  // a campaign in memory only
+  if (!std::filesystem::exists(file)) return {};  // campaign that exists only in memory
   return readSlowChannels(StrictYaml::fromFile(file), campaign.tests);
 }
 
@@ -54,7 +54,7 @@ Record readRecord(const Campaign& campaign, const SlowChannel& slow) {
   as_test.file = slow.file;
   as_test.sample_rate = slow.sample_rate;
   Record record = readRecord(campaign, as_test);
-  record.column(slow.channel);  // must be there
+  record.column(slow.channel);  // throws if missing
   return record;
 }
 

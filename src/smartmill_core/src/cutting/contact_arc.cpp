@@ -7,7 +7,9 @@ namespace smartmill {
 
 void validate(const ContactArc& arc) {
   if (arc.entry >= 0.0 && arc.exit > arc.entry && arc.exit <= units::TWO_PI + 1e-9 && arc.depth > 0.0) return;
-  throw Error(formatted("contact from %g to %g rad over %g m is impossible", arc.entry, arc.exit, arc.depth));
+  throw Error(
+      formatted("contact arc from %g to %g rad over %g m: expected 0 <= entry < exit <= 2 pi, depth > 0",
+                arc.entry, arc.exit, arc.depth));
 }
 
 }  // namespace smartmill

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double ROUNDING = 1e-9;
 
-// Closed integrals along the arc from one angle kappa to another.
+// Integrals along the arc between two angles kappa, in closed form.
 EdgeSlice cornerSlice(double corner_radius, double from, double to) {
   const auto height = [&](double kappa) { return corner_radius * (1.0 - std::cos(kappa)); };
   EdgeSlice slice;

@@ -22,9 +22,9 @@ std::string inNewtonPerMillimetre(const std::vector<double>& values) {
 ForceCurve curveOf(const StrictYaml& yaml, double top) {
   ForceCurve curve;
   curve.value = yaml.numbers("coefficients_n_per_mm", 0);
-  if (curve.value.size() < 5) yaml.fail("coefficients_n_per_mm", "five numbers or more are due");
+  if (curve.value.size() < 5) yaml.fail("coefficients_n_per_mm", "expected five numbers or more");
   if (!std::is_sorted(curve.value.begin(), curve.value.end()))
-    yaml.fail("coefficients_n_per_mm", "the numbers must not fall");
+    yaml.fail("coefficients_n_per_mm", "expected numbers that do not decrease");
   const std::size_t breaks = curve.value.size() - 2;
   curve.std_dev = yaml.numbers("std_n_per_mm", breaks, Range::notNegative());
   yaml.finish();

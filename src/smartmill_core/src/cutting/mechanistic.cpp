@@ -16,28 +16,28 @@ namespace {
 using units::PI;
 using units::TWO_PI;
 
-[[noreturn]] void refuse(const char* what, double value, const char* unit, const char* due) {
-  throw Error(formatted("%s: %g %s is out of range (%s)", what, value, unit, due));
+[[noreturn]] void refuse(const char* what, double value, const char* unit, const char* range) {
+  throw Error(formatted("%s: %g %s is out of range (%s)", what, value, unit, range));
 }
 
 double sinc(double x) {
   return std::abs(x) < 1e-6 ? 1.0 - x * x / 6.0 : std::sin(x) / x;
 }
 
-/// Integrals over the immersion angle, or means over a piece of edge.
+/// Integrals over the immersion angle, or means over a segment of edge.
 struct Shares {
   double one = 0.0, s = 0.0, c = 0.0, ss = 0.0, sc = 0.0;
 };
 
-// Over an interval of width d around middle, divided by d: sums of sines become products, so that nothing
-// cancels when the interval is short (zero helix is the limit).
+// Mean over an interval of width d around middle. Differences are written as products, which avoids
+// cancellation in short intervals (zero helix is the limit).
 Shares meanOver(double middle, double d) {
   const double half = sinc(0.5 * d), full = sinc(d);
   return {1.0, half * std::sin(middle), half * std::cos(middle), 0.5 - 0.5 * full * std::cos(2.0 * middle),
           0.5 * full * std::sin(2.0 * middle)};
 }
 
-// Where the chip is not positive there is no force: only 0..pi of the engagement counts.
+// There is no force without a positive chip: only 0..pi of the engagement counts.
 double firstCut(const Engagement& e) {
   return std::max(e.entry, 0.0);
 }
@@ -63,7 +63,7 @@ void validate(const ToolGeometry& tool) {
   }
   if (tool.pitch.empty()) return;
   if (tool.pitch.size() != static_cast<std::size_t>(tool.teeth)) {
-    refuse("tool pitch", static_cast<double>(tool.pitch.size()), "values", "one a tooth");
+    refuse("tool pitch", static_cast<double>(tool.pitch.size()), "values", "one per tooth");
   }
   double sum = 0.0;
   for (const double p : tool.pitch) {
@@ -71,7 +71,7 @@ void validate(const ToolGeometry& tool) {
     sum += p;
   }
   // Pitches are written with a few digits in degrees.
-  if (std::abs(sum - TWO_PI) > 1e-4) refuse("tool pitch", sum, "rad in all", "sum 2 pi");
+  if (std::abs(sum - TWO_PI) > 1e-4) refuse("tool pitch", sum, "rad in total", "sum 2 pi");
 }
 
 void validate(const Engagement& engagement) {
@@ -113,7 +113,7 @@ CuttingForce MechanisticForce::at(double spindle_angle) const {
     const double chip = engagement_.feed_per_tooth * tool_.teeth * tool_.pitchOf(tooth) / TWO_PI;
     double tip = std::fmod(spindle_angle + tool_.toothAngle(tooth), TWO_PI);
     if (tip < 0.0) tip += TWO_PI;
-    // The edge spans the immersion angles tip - lag depth .. tip: whole turns of it may be in cut.
+    // The edge spans the immersion angles tip - lag depth .. tip, possibly several revolutions.
     for (; tip - lag * depth < exit; tip += TWO_PI) {
       if (tip < entry) continue;
       double low = 0.0, high = depth;
@@ -154,7 +154,8 @@ std::array<std::array<double, 6>, 4> meanForceMatrix(const ToolGeometry& tool, c
   if (exit <= entry || engagement.feed_per_tooth <= 0.0) return {};
   const double arc = exit - entry;
   const Shares m = meanOver(0.5 * (entry + exit), arc);
-  // Every element of the edge is in cut for arc of 2 pi; the teeth's chips add up to the feed a revolution.
+  // Every element of the edge is in the cut for arc / (2 pi) of the time; the chips of all teeth sum to the
+  // feed per revolution.
   const double edge = tool.teeth * engagement.axial_depth * arc / TWO_PI;
   const double chip = edge * engagement.feed_per_tooth;
   const double r = tool.radius();

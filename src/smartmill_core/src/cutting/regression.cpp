@@ -20,7 +20,7 @@ std::array<double*, 6> inOrder(CuttingCoefficients& k) {
   return {&k.ktc, &k.krc, &k.kac, &k.kte, &k.kre, &k.kae};
 }
 
-// Mean chip thickness over the arc, which is what separates Kc from Ke.
+// Mean chip thickness over the arc, which separates Kc from Ke.
 double meanChip(const std::array<std::array<double, 6>, 4>& m) {
   return m[2][2] / m[2][5];
 }
@@ -41,7 +41,7 @@ struct Fit {
   Eigen::VectorXd residual;  // unweighted
 };
 
-// Rows X beta = y over their standard deviations (none: as they are), columns scaled to unit length.
+// Rows X beta = y divided by their standard deviations if given, columns scaled to unit length.
 struct Scaled {
   Eigen::MatrixXd a;
   Eigen::VectorXd b;
@@ -59,14 +59,14 @@ Scaled scaled(const Eigen::MatrixXd& x, const Eigen::VectorXd& y, const Eigen::V
   }
   s.scale = s.a.colwise().norm().transpose();
   if (!(s.scale.minCoeff() > 0.0)) {
-    throw Error("regression of coefficients: the tests say nothing about one of them");
+    throw Error("regression of coefficients: one coefficient does not affect any test");
   }
   s.a = s.a * s.scale.cwiseInverse().asDiagonal();
   return s;
 }
 
-// Covariance from the residuals of unweighted rows: one variance a group from its residuals and its share of
-// the degrees of freedom, carried through the solution. @param inverse of the normal matrix
+// Covariance from the residuals of unweighted rows: one variance per group from its residuals and its share
+// of the degrees of freedom, propagated through the solution. @param inverse of the normal matrix
 Eigen::MatrixXd covarianceOfGroups(const Eigen::MatrixXd& a, const Eigen::VectorXd& rest,
                                    const Eigen::MatrixXd& inverse, const std::vector<int>& group) {
   const Eigen::Index n = a.rows(), p = a.cols();
@@ -80,7 +80,7 @@ Eigen::MatrixXd covarianceOfGroups(const Eigen::MatrixXd& a, const Eigen::Vector
     normal[static_cast<std::size_t>(g)] += a.row(i).transpose() * a.row(i);
   }
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(p, p);
-  // A group that a coefficient does not touch must not spoil it with NaN.
+  // A group that does not depend on a coefficient must not make it NaN.
   for (int g = 0; g < groups; ++g) {
     const double variance = freedom[g] > 1e-6 ? sum[g] / freedom[g] : NOT_KNOWN;
     const Eigen::MatrixXd part = inverse * normal[static_cast<std::size_t>(g)] * inverse;
@@ -95,12 +95,11 @@ Eigen::MatrixXd covarianceOfGroups(const Eigen::MatrixXd& a, const Eigen::Vector
 }
 
 // Least squares of rows X beta = y in groups (fx, fy, fz). With sigma of every row: weighted, covariance from
-// sigma, scaled up where the scatter says that sigma was too small. Without: unweighted,
-// covarianceOfGroups().
+// sigma, scaled up where the scatter exceeds it. Without: unweighted, covarianceOfGroups().
 Fit leastSquares(const Eigen::MatrixXd& x, const Eigen::VectorXd& y, const Eigen::VectorXd& sigma,
                  const std::vector<int>& group) {
-  // Columns differ by the chip thickness in metres: scaled to unit length the 6x6 normal matrix is well
-  // conditioned and the second pass on the residual takes the rounding out.
+  // Columns differ by the chip thickness in metres. Scaled to unit length the 6x6 normal matrix is well
+  // conditioned, and a second pass on the residual removes the rounding error.
   const Scaled s = scaled(x, y, sigma);
   const Eigen::Index n = x.rows(), p = x.cols();
   const Eigen::MatrixXd normal = s.a.transpose() * s.a;
@@ -167,7 +166,7 @@ IdentifiedCoefficients identifyFromForces(const std::vector<MeanForceTest>& test
   }
   if (differentChips(chips) < 2) {
     throw Error("coefficients from forces: " + std::to_string(tests.size()) + " tests at " +
-                std::to_string(differentChips(chips)) + " feed; at least two different feeds are due");
+                std::to_string(differentChips(chips)) + " feed; expected at least two different feeds");
   }
   const Fit fit = leastSquares(x, y, sigma, group);
   IdentifiedCoefficients result;

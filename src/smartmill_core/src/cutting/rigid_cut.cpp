@@ -13,10 +13,10 @@ namespace {
 
 using units::TWO_PI;
 
-constexpr std::size_t NODES = TURN_NODES;  // linear between them errs by 1e-6 of the integrand
-constexpr double NODE_ANGLE = TURN_NODE_ANGLE;
+constexpr std::size_t NODES = REVOLUTION_NODES;  // linear interpolation has an error of 1e-6 of the integrand
+constexpr double NODE_ANGLE = REVOLUTION_NODE_ANGLE;
 constexpr std::size_t MOST_TEETH = 20;
-constexpr double LEAST_CHIP = 1e-15;  // [m] at the ends of a contact, which still rub
+constexpr double LEAST_CHIP = 1e-15;  // [m] at the ends of a contact, where edge forces still act
 
 ContactArc arcOf(const Engagement& engagement) {
   return {engagement.entry, std::min(engagement.exit, TWO_PI), engagement.axial_depth};
@@ -63,23 +63,24 @@ void RigidCut::add(double weight, double thickness, const SineCosine& at, EdgeSu
 
 std::vector<EdgeSums> RigidCut::integrals(std::vector<ChipShape> shapes) const {
   std::vector<EdgeSums> table(NODES + 1);
-  forEachContact(shapes.data(), shapes.size(), 0.0, TWO_PI, [&](const ChipShape& shape, const Stretch& over) {
-    const auto first = static_cast<std::size_t>(over.low() / NODE_ANGLE);
-    for (std::size_t n = first; n < NODES && static_cast<double>(n) * NODE_ANGLE < over.high(); ++n) {
-      const double from = std::max(over.low(), static_cast<double>(n) * NODE_ANGLE);
-      const double to = std::min(over.high(), static_cast<double>(n + 1) * NODE_ANGLE);
-      if (to <= from) continue;
-      gauss(Stretch::between(from, to), [&](double weight, double s, double c) {
-        add(weight, shape.at(s, c), {s, c}, table[n + 1]);
+  forEachContact(
+      shapes.data(), shapes.size(), 0.0, TWO_PI, [&](const ChipShape& shape, const AngleInterval& over) {
+        const auto first = static_cast<std::size_t>(over.low() / NODE_ANGLE);
+        for (std::size_t n = first; n < NODES && static_cast<double>(n) * NODE_ANGLE < over.high(); ++n) {
+          const double from = std::max(over.low(), static_cast<double>(n) * NODE_ANGLE);
+          const double to = std::min(over.high(), static_cast<double>(n + 1) * NODE_ANGLE);
+          if (to <= from) continue;
+          gauss(AngleInterval::between(from, to), [&](double weight, double s, double c) {
+            add(weight, shape.at(s, c), {s, c}, table[n + 1]);
+          });
+        }
       });
-    }
-  });
   for (std::size_t n = 1; n <= NODES; ++n) addDifference({}, table[n - 1], 1.0, table[n]);
   return table;
 }
 
-// A pass older than a revolution lies behind what the same tooth left a revolution later, wherever there is a
-// chip.
+// Wherever there is a chip, a pass older than a revolution is farther away than the surface that the same
+// tooth left one revolution later.
 void RigidCut::shape() {
   tables_.clear();
   shapes_.assign(rule_.alike() ? 1 : static_cast<std::size_t>(rule_.teeth()), {});
@@ -108,7 +109,7 @@ void RigidCut::setDepths(const std::vector<double>& depths) {
 
 void RigidCut::setLaw(const CuttingLaw& law) {
   if (law.edge_chip != law_.edge_chip || law.size_exponent != law_.size_exponent ||
-      law.size_reference != law_.size_reference || law.course != law_.course)
+      law.size_reference != law_.size_reference || law.chip_curve != law_.chip_curve)
     tables_.clear();
   law_ = law;
 }
@@ -153,7 +154,7 @@ EdgeSums RigidCut::sumsAt(double angle) {
   return sums;
 }
 
-std::array<CuttingForce, 2> RigidCut::parts(const EdgeSums& s) const {
+std::array<CuttingForce, 2> RigidCut::terms(const EdgeSums& s) const {
   const CuttingCoefficients& k = law_.coefficients;
   return {forceOf(s.chip_sine, s.chip_cosine, s.chip, k.ktc, k.krc, k.kac),
           forceOf(s.edge_sine, s.edge_cosine, s.edge, k.kte, k.kre, k.kae)};
@@ -163,14 +164,14 @@ void RigidCut::integrate(const std::vector<ChipShape>& shapes, double from, doub
                          EdgeSums& sums) const {
   std::array<ChipShape, MOST_TEETH> own;
   std::copy(shapes.begin(), shapes.end(), own.begin());
-  forEachContact(own.data(), shapes.size(), from, to, [&](const ChipShape& shape, const Stretch& over) {
+  forEachContact(own.data(), shapes.size(), from, to, [&](const ChipShape& shape, const AngleInterval& over) {
     gauss(over, [&](double weight, double s, double c) {
       add(height * weight, shape.at(s, c), {s, c}, sums);
     });
   });
 }
 
-std::array<CuttingForce, 2> RigidCut::partsAt(double angle) const {
+std::array<CuttingForce, 2> RigidCut::termsAt(double angle) const {
   EdgeSums sums;
   forEachEdgeSegment(arcs_, lag_, rule_.toothAngle(), angle, [&](const EdgeSegment& part) {
     if (part.straight) {
@@ -179,17 +180,17 @@ std::array<CuttingForce, 2> RigidCut::partsAt(double angle) const {
       integrate(shapes_[tableOf(part.tooth)], part.from, part.to, part.height, sums);
     }
   });
-  return parts(sums);
+  return terms(sums);
 }
 
-std::array<CuttingForce, 2> RigidCut::meanParts() const {
+std::array<CuttingForce, 2> RigidCut::meanTerms() const {
   EdgeSums sums;
   for (const ContactArc& arc : arcs_) {
-    // One entry of shapes serves all teeth when they are alike.
+    // A single entry of shapes is for all teeth.
     const double share = arc.depth / TWO_PI * (rule_.alike() ? rule_.teeth() : 1);
     for (const std::vector<ChipShape>& shapes : shapes_) integrate(shapes, arc.entry, arc.exit, share, sums);
   }
-  return parts(sums);
+  return terms(sums);
 }
 
 }  // namespace smartmill

@@ -93,18 +93,19 @@ class ChipThickness : public Effect {
     if (chip.size() != factor.size() || chip.size() < 2)
       throw Error("h_um and factor: expected the same number of values in both, at least two");
     for (std::size_t k = 0; k < chip.size(); ++k) {
-      course_.chip.push_back(units::UM * chip[k]);
-      course_.effective.push_back(units::UM * chip[k] * factor[k]);
-      if (k > 0 && course_.chip[k] <= course_.chip[k - 1]) throw Error("h_um: expected rising values");
-      if (k > 0 && course_.effective[k] <= course_.effective[k - 1])
+      chip_curve_.chip.push_back(units::UM * chip[k]);
+      chip_curve_.effective.push_back(units::UM * chip[k] * factor[k]);
+      if (k > 0 && chip_curve_.chip[k] <= chip_curve_.chip[k - 1])
+        throw Error("h_um: expected rising values");
+      if (k > 0 && chip_curve_.effective[k] <= chip_curve_.effective[k - 1])
         throw Error("h_um times factor: expected rising values");
     }
   }
 
-  void update(const Instant&, TwinState& state) const override { state.law.course = &course_; }
+  void update(const Instant&, TwinState& state) const override { state.law.chip_curve = &chip_curve_; }
 
  private:
-  EffectiveChipCurve course_;
+  EffectiveChipCurve chip_curve_;
 };
 
 }  // namespace

@@ -5,7 +5,7 @@
 namespace smartmill::effects {
 namespace {
 
-// The nominal model may not know the direct share well, which bounds the gain.
+// The gain is bounded by the direct share, which may be uncertain in the nominal model.
 Forms modeForms(const Scope& scope) {
   Forms forms;
   for (std::size_t a = 0; a < axisNames().size(); ++a) {

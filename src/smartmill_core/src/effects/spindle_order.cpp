@@ -3,8 +3,8 @@
 namespace smartmill::effects {
 namespace {
 
-/// Force on the sensor that is locked to the spindle angle: x_n sin(order x spindle angle + x_deg), y and z
-/// alike.
+/// Force on the sensor that is locked to the spindle angle: x_n sin(order x spindle angle + x_deg), likewise
+/// for y and z.
 class SpindleOrder : public Effect {
  public:
   static EffectKind declaration() {

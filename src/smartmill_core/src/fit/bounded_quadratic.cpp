@@ -11,9 +11,9 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-// Where the free elements want to go while the others stay.
-VectorXd wanted(const Eigen::MatrixXd& h, const VectorXd& b, const VectorXd& x,
-                const std::vector<Index>& free) {
+// Minimum over the free elements with the others fixed.
+VectorXd freeMinimum(const Eigen::MatrixXd& h, const VectorXd& b, const VectorXd& x,
+                     const std::vector<Index>& free) {
   const Eigen::Map<const Eigen::Matrix<Index, Eigen::Dynamic, 1>> at(free.data(),
                                                                      static_cast<Index>(free.size()));
   VectorXd staying = x;
@@ -25,19 +25,21 @@ VectorXd wanted(const Eigen::MatrixXd& h, const VectorXd& b, const VectorXd& x,
 
 }  // namespace
 
-VectorXd leastWithin(const Eigen::MatrixXd& h, const VectorXd& b, const VectorXd& low, const VectorXd& high) {
+VectorXd minimiseWithin(const Eigen::MatrixXd& h, const VectorXd& b, const VectorXd& low,
+                        const VectorXd& high) {
   const Index n = b.size();
   VectorXd x = linear::solveSymmetric(h, b).cwiseMax(low).cwiseMin(high);
   std::vector<bool> held(static_cast<std::size_t>(n));
   for (Index i = 0; i < n; ++i) held[static_cast<std::size_t>(i)] = x[i] <= low[i] || x[i] >= high[i];
-  // Each set is visited once at most, since the value falls from one to the next; rounding may not see it.
+  // Each active set is visited at most once, since the value decreases from one to the next; the limit guards
+  // against rounding.
   for (Index round = 0; round < 20 * (n + 1); ++round) {
     std::vector<Index> free;
     for (Index i = 0; i < n; ++i) {
       if (!held[static_cast<std::size_t>(i)]) free.push_back(i);
     }
-    const VectorXd to = wanted(h, b, x, free);
-    double share = 1.0;  // of the way that is open
+    const VectorXd to = freeMinimum(h, b, x, free);
+    double share = 1.0;  // feasible share of the step
     Index stops = -1;
     for (std::size_t k = 0; k < free.size(); ++k) {
       const Index i = free[k];
@@ -54,7 +56,7 @@ VectorXd leastWithin(const Eigen::MatrixXd& h, const VectorXd& b, const VectorXd
       held[static_cast<std::size_t>(stops)] = true;
       continue;
     }
-    // The one that would gain most by leaving its bound.
+    // The element with the largest gain from leaving its bound.
     const VectorXd slope = b - h * x;
     Index leaves = -1;
     double most = 0.0;

@@ -9,7 +9,7 @@ namespace {
 
 using Eigen::Index;
 
-/// Keeps the last point with derivatives: the solution's are asked for again when the fit has ended.
+/// Caches the last point with derivatives, since those of the solution are evaluated again after the fit.
 class Analytic : public ceres::CostFunction {
  public:
   Analytic(const ScaledResiduals& scaled, Index count) : scaled_(scaled) {
@@ -79,7 +79,7 @@ bool ScaledResiduals::evaluate(const double* x, double* residual, double* jacobi
   if (jacobian) j.setZero(count, all);
   try {
     if (!residuals_.evaluate(valueOf(x), &r, jacobian ? &j : nullptr)) return false;
-  } catch (...) {  // Ceres is not made for exceptions passing through it
+  } catch (...) {  // exceptions must not pass through Ceres
     failure_ = std::current_exception();
     return false;
   }

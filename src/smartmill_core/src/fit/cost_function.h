@@ -10,15 +10,15 @@
 
 namespace smartmill::fit {
 
-/// Residuals as Ceres calls them: the unknowns that are free, in units of their scale.
+/// Residuals for Ceres, over the free unknowns in units of their scale.
 class ScaledResiduals {
  public:
   ScaledResiduals(const Residuals& residuals, const std::vector<Parameter>& parameters);
 
   const std::vector<Eigen::Index>& free() const { return free_; }
   Eigen::VectorXd valueOf(const double* x) const;
-  /// @param jacobian row by row over the free unknowns, or nullptr. @return false also where a number is not
-  /// finite or evaluate() has thrown: then failure() holds what
+  /// @param jacobian row by row over the free unknowns, or nullptr. @return false also when a number is not
+  /// finite or evaluate() has thrown; then failure() has the exception
   bool evaluate(const double* x, double* residual, double* jacobian) const;
   const std::exception_ptr& failure() const { return failure_; }
 
@@ -31,7 +31,7 @@ class ScaledResiduals {
 
 enum class Derivatives { given, central, ridders };
 
-/// For Ceres to own.
+/// Ceres takes ownership.
 ceres::CostFunction* costFunction(const ScaledResiduals& scaled, Eigen::Index count, Derivatives derivatives);
 
 }  // namespace smartmill::fit

@@ -22,7 +22,7 @@ DerivativeGap checkDerivatives(const Residuals& residuals, const Eigen::VectorXd
   const bool differenced = differences->Evaluate(blocks, residual.data(), jacobians);
   if (scaled.failure()) std::rethrow_exception(scaled.failure());
   if (!differenced || !residuals.evaluate(at, &residual, &given))
-    throw Error("derivative check: the point or one beside it is refused");
+    throw Error("derivative check: residuals are undefined at the point or near it");
   DerivativeGap worst;
   for (Eigen::Index c = 0; c < at.size(); ++c) {
     const double size = numeric.col(c).cwiseAbs().maxCoeff();

@@ -20,19 +20,19 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Part of an unknown's scale within which it stands at its bound.
+// Distance to a bound, as share of the unknown's scale, that counts as at the bound.
 constexpr double AT_BOUND = 1e-9;
-// Part of an unknown that lies in directions which are not told before it counts as undetermined itself.
-constexpr double UNTOLD = 1e-6;
+// Share of an unknown in undetermined directions from which it counts as undetermined itself.
+constexpr double UNDETERMINED_SHARE = 1e-6;
 
-/// Reports to the caller, and ends the fit when it or a failure says so.
+/// Reports progress to the caller; ends the fit on its request or after a failure.
 class Reporter : public ceres::IterationCallback {
  public:
   Reporter(const Options& options, const ScaledResiduals& scaled) : options_(options), scaled_(scaled) {}
 
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& now) override {
     if (scaled_.failure()) return ceres::SOLVER_ABORT;
-    squares_ = std::min(squares_, 2.0 * now.cost);  // a step that is not taken tells its own
+    squares_ = std::min(squares_, 2.0 * now.cost);  // a rejected step reports its own cost
     if (!options_.progress || options_.progress({now.iteration, squares_})) return ceres::SOLVER_CONTINUE;
     cancelled_ = true;
     return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
@@ -46,7 +46,7 @@ class Reporter : public ceres::IterationCallback {
   bool cancelled_ = false;
 };
 
-/// Ceres tells of steps that fail through glog, to the terminal: what matters stands in the result.
+/// Ceres logs failed steps through glog to the terminal; the result contains what matters.
 void silence() {
   FLAGS_minloglevel = google::GLOG_FATAL;
 }
@@ -59,7 +59,7 @@ ceres::Solver::Options solverOptions(const Options& options, Reporter* reporter)
   solver.parameter_tolerance = options.parameter_tolerance;
   solver.gradient_tolerance = options.gradient_tolerance;
   solver.initial_trust_region_radius = options.trust_radius;
-  if (options.dear_derivatives) {
+  if (options.costly_derivatives) {
     solver.line_search_interpolation_type = ceres::QUADRATIC;
     solver.max_num_line_search_step_size_iterations = 4;
   }
@@ -89,11 +89,11 @@ std::vector<double> startOf(const std::vector<Parameter>& parameters, const Scal
   return x;
 }
 
-/// The start must be a point that tells something.
+/// Residuals at the start. @throws Error where they are undefined
 VectorXd residualAtStart(const Residuals& residuals, const VectorXd& start, const std::string& name) {
   VectorXd residual(residuals.count());
   if (!residuals.evaluate(start, &residual, nullptr))
-    throw Error(name + ": nothing can be said of the point where it is to start");
+    throw Error(name + ": the residuals are undefined at the start");
   for (Index i = 0; i < residual.size(); ++i) {
     if (!std::isfinite(residual[i]))
       throw Error(name + ": residual " + std::to_string(i) + " of " + std::to_string(residual.size()) +
@@ -108,10 +108,10 @@ Ending endingOf(const ceres::Solver::Summary& summary, bool cancelled) {
   return summary.termination_type == ceres::NO_CONVERGENCE ? Ending::iterations_used : Ending::converged;
 }
 
-/// A result with what it takes to go on from it.
+/// A result with the state to continue from it.
 struct Solved {
   Result result;
-  std::vector<bool> pressed;  // per unknown: stands at a bound that the residuals push against
+  std::vector<bool> at_active_bound;  // per unknown: at a bound, with the gradient pointing outwards
 };
 
 /// Residuals and derivatives at the solution.
@@ -125,7 +125,7 @@ void describe(const ScaledResiduals& scaled, const ceres::CostFunction& cost,
   VectorXd residual(result.residual.size());
   if (!cost.Evaluate(blocks, residual.data(), jacobians)) {
     result.ending = Ending::failed;
-    result.message = "the point where it ended has no derivatives";
+    result.message = "the residuals have no derivatives at the final point";
     return;
   }
   result.residual = residual;
@@ -136,7 +136,7 @@ void describe(const ScaledResiduals& scaled, const ceres::CostFunction& cost,
     const Parameter& p = parameters[static_cast<std::size_t>(i)];
     const double at = result.value[i], margin = AT_BOUND * p.scale;
     const bool low = at <= p.low + margin, high = at >= p.high - margin;
-    solved->pressed[static_cast<std::size_t>(i)] =
+    solved->at_active_bound[static_cast<std::size_t>(i)] =
         (low && gradient[column] > 0.0) || (high && gradient[column] < 0.0);
     result.moves[static_cast<std::size_t>(i)] = !low && !high;
     if (!low && !high) result.jacobian.col(i) = jacobian.col(column) / p.scale;
@@ -153,10 +153,10 @@ Solved solve(const Residuals& residuals, const std::vector<Parameter>& parameter
   result.jacobian = MatrixXd::Zero(residuals.count(), static_cast<Index>(parameters.size()));
   result.squares = result.residual.squaredNorm();
   result.moves.assign(parameters.size(), false);
-  solved.pressed = result.moves;
+  solved.at_active_bound = result.moves;
   if (x.empty()) {
     result.ending = Ending::converged;
-    result.message = "nothing is free";
+    result.message = "all unknowns are fixed";
     return solved;
   }
   ceres::CostFunction* cost = costFunction(
@@ -205,13 +205,13 @@ Covariance covarianceOf(const MatrixXd& jacobian, double tolerance) {
     if (size[i] > 0.0) unit.col(i).head(jacobian.rows()) = jacobian.col(i) / size[i];
   }
   const linear::Svd svd = linear::svd(linear::triangleOf(unit));
-  VectorXd untold = VectorXd::Zero(n);
+  VectorXd undetermined_share = VectorXd::Zero(n);
   for (Index k = 0; k < n; ++k) {
     if (svd.values[k] > tolerance * svd.values[0]) {
       result.matrix += svd.v.col(k) * svd.v.col(k).transpose() / (svd.values[k] * svd.values[k]);
       ++result.rank;
     } else {
-      untold += svd.v.col(k).cwiseAbs2();
+      undetermined_share += svd.v.col(k).cwiseAbs2();
     }
   }
   for (Index i = 0; i < n; ++i) {
@@ -220,7 +220,7 @@ Covariance covarianceOf(const MatrixXd& jacobian, double tolerance) {
     }
   }
   for (Index i = 0; i < n; ++i) {
-    if (untold[i] < UNTOLD) continue;
+    if (undetermined_share[i] < UNDETERMINED_SHARE) continue;
     result.undetermined[static_cast<std::size_t>(i)] = true;
     result.matrix.row(i).setZero();
     result.matrix.col(i).setZero();
@@ -273,15 +273,15 @@ Result minimise(const Residuals& residuals, const std::vector<Parameter>& parame
                 const Options& options) {
   silence();
   const Solved first = solve(residuals, parameters, options);
-  const auto pressed = std::count(first.pressed.begin(), first.pressed.end(), true);
-  if (!options.finish_at_bounds || pressed == 0 || first.result.ending != Ending::converged)
+  const auto at_active_bound = std::count(first.at_active_bound.begin(), first.at_active_bound.end(), true);
+  if (!options.finish_at_bounds || at_active_bound == 0 || first.result.ending != Ending::converged)
     return first.result;
-  // Ceres judges its steps by what they would gain without bounds, and ends early where unknowns press
-  // against theirs: the others go on without them.
+  // Ceres evaluates its steps by their predicted decrease without bounds, and ends early where unknowns are
+  // pushed against theirs. The fit continues with the other unknowns.
   std::vector<Parameter> held = parameters;
   for (std::size_t i = 0; i < held.size(); ++i) {
     held[i].start = first.result.value[static_cast<Index>(i)];
-    if (first.pressed[i]) held[i].low = held[i].high = held[i].start;
+    if (first.at_active_bound[i]) held[i].low = held[i].high = held[i].start;
   }
   Result second = solve(residuals, held, options).result;
   if (!second.usable() || second.squares > first.result.squares) return first.result;

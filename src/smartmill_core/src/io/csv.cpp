@@ -40,7 +40,7 @@ bool CsvReader::nextLine(std::string_view* line) {
 bool CsvReader::next(std::vector<std::string_view>* cells) {
   cells->clear();
   unquoted_.clear();
-  if (separator_ == '\t') {  // blanks at the ends of such a line are no cells
+  if (separator_ == '\t') {  // blanks at the ends of such a line are not cells
     std::string_view line;
     if (!nextLine(&line)) return false;
     for (std::size_t begin = 0; begin <= line.size();) {
@@ -69,14 +69,14 @@ bool CsvReader::next(std::vector<std::string_view>* cells) {
     const char end = rest_.front();
     rest_.remove_prefix(1);
     if (end == '\n') return true;
-    if (rest_.empty()) {  // the file ends behind a separator
+    if (rest_.empty()) {  // the file ends with a separator
       cells->push_back({});
       return true;
     }
   }
 }
 
-// What follows an opening quote, up to the separator or the end of the line.
+// The cell after an opening quote, up to the separator or the end of the line.
 std::string_view CsvReader::quotedCell() {
   std::string& word = unquoted_.emplace_back();
   for (;;) {
@@ -92,7 +92,7 @@ std::string_view CsvReader::quotedCell() {
   const std::size_t end = std::min(rest_.find_first_not_of(" \t\r"), rest_.size());
   rest_.remove_prefix(end);
   if (!rest_.empty() && rest_.front() != separator_ && rest_.front() != '\n')
-    fail("something stands behind a quoted cell");
+    fail("text after a quoted cell (expected a separator)");
   return word;
 }
 
@@ -149,8 +149,8 @@ NumberTable readNumberTable(const std::string& file) {
   table.columns.resize(table.names.size());
   while (reader.nextFilled(&cells)) {
     if (cells.size() != table.names.size())
-      reader.fail(std::to_string(cells.size()) + " values, " + std::to_string(table.names.size()) +
-                  " columns are due");
+      reader.fail(std::to_string(cells.size()) + " values, expected " + std::to_string(table.names.size()) +
+                  " (one per column)");
     for (std::size_t c = 0; c < cells.size(); ++c) {
       table.columns[c].push_back(cells[c].empty() || cells[c] == "nan"
                                      ? std::numeric_limits<double>::quiet_NaN()
@@ -160,21 +160,21 @@ NumberTable readNumberTable(const std::string& file) {
   return table;
 }
 
-std::vector<std::vector<double>> readColumns(const std::string& file, const std::vector<std::string>& due) {
+std::vector<std::vector<double>> readColumns(const std::string& file, const std::vector<std::string>& names) {
   CsvReader reader(file);
   std::vector<std::string_view> cells;
   if (!reader.next(&cells)) throw Error(file + ": is empty");
-  std::vector<std::size_t> place;
-  for (const std::string& name : due) {
+  std::vector<std::size_t> position;
+  for (const std::string& name : names) {
     const auto at = std::find(cells.begin(), cells.end(), name);
     if (at == cells.end()) throw Error(file + ": column " + name + " is missing");
-    place.push_back(static_cast<std::size_t>(at - cells.begin()));
+    position.push_back(static_cast<std::size_t>(at - cells.begin()));
   }
-  std::vector<std::vector<double>> columns(due.size());
+  std::vector<std::vector<double>> columns(names.size());
   std::size_t rows = 0;
   for (; reader.nextFilled(&cells); ++rows) {
-    for (std::size_t c = 0; c < due.size(); ++c)
-      columns[c].push_back(reader.number(place[c] < cells.size() ? cells[place[c]] : "", due[c]));
+    for (std::size_t c = 0; c < names.size(); ++c)
+      columns[c].push_back(reader.number(position[c] < cells.size() ? cells[position[c]] : "", names[c]));
   }
   if (rows == 0) throw Error(file + ": no rows");
   return columns;

@@ -15,8 +15,8 @@
 namespace smartmill {
 namespace {
 
-/// A file that goes with its object: a script that gnuplot reads, rather than a pipe, so that what it
-/// complains of can be read.
+/// A temporary script file, removed with its object. gnuplot reads a file instead of a pipe, so that its
+/// messages can be read.
 class ScriptFile {
  public:
   explicit ScriptFile(const std::string& script)
@@ -35,7 +35,7 @@ class ScriptFile {
   std::string name_;
 };
 
-/// The line that tells what is wrong: gnuplot points at it with carets and names the place in the script.
+/// The line of gnuplot's output with the message, without carets and the position in the script.
 std::string complaint(const std::string& words, const std::string& script) {
   std::istringstream lines(words);
   std::string line, last;
@@ -87,7 +87,7 @@ void Gnuplot::draw() const {
 }
 
 std::string Gnuplot::quoted(const std::string& text) {
-  // In gnuplot's single quotes only the quote itself means something.
+  // In gnuplot's single quotes only the quote itself is special.
   std::string out = "'";
   for (const char c : text) out += c == '\'' ? std::string("''") : std::string(1, c);
   return out + "'";

@@ -69,7 +69,7 @@ for (const table of document.querySelectorAll('table')) {
       for (const other of head.cells) other.removeAttribute('aria-sort');
       cell.setAttribute('aria-sort', down ? 'descending' : 'ascending');
       const key = row => row.cells[k]?.textContent.trim() ?? '';
-      // What has no number stands last, whichever way.
+      // Cells without a number are last in both directions.
       const order = (a, b) => {
         const x = numberIn(key(a)), y = numberIn(key(b));
         if (Number.isNaN(x) !== Number.isNaN(y)) return Number.isNaN(x) ? 1 : -1;
@@ -130,7 +130,7 @@ bool begins(const std::string& text, std::string_view with) {
   return text.compare(0, with.size(), with) == 0;
 }
 
-/// Between a mark and the next one of its kind, as an element.
+/// Replaces text between two equal marks by an HTML element.
 std::string marked(std::string text, const std::string& mark, const std::string& element) {
   for (std::size_t at = 0; (at = text.find(mark, at)) != std::string::npos;) {
     const std::size_t end = text.find(mark, at + mark.size());

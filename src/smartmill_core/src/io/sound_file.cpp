@@ -39,7 +39,7 @@ SoundFile readSoundFile(const std::string& file) {
   SoundFile sound;
   sound.sample_rate = info.samplerate;
   sound.channels.resize(static_cast<std::size_t>(info.channels));
-  // Not by the length that its header tells: that may be anything.
+  // The length in the header may be wrong.
   constexpr sf_count_t PIECE = 16384;
   std::vector<double> piece(static_cast<std::size_t>(PIECE * info.channels));
   for (sf_count_t got = PIECE; got == PIECE;) {
@@ -47,7 +47,7 @@ SoundFile readSoundFile(const std::string& file) {
     for (sf_count_t i = 0; i < got; ++i)
       for (std::size_t c = 0; c < sound.channels.size(); ++c) {
         const double value = piece[static_cast<std::size_t>(i) * sound.channels.size() + c];
-        if (!std::isfinite(value)) throw Error(file + ": holds a sample that is not a finite number");
+        if (!std::isfinite(value)) throw Error(file + ": contains a sample that is not a finite number");
         sound.channels[c].push_back(value);
       }
   }
@@ -68,10 +68,10 @@ std::vector<SoundChannel> soundChannels(const std::string& text) {
                         (std::sscanf(part.c_str() + equals + 1, "%lf%c", &channel.scale, &rest) == 1 &&
                          channel.scale != 0.0 && std::isfinite(channel.scale));
     if (!numbered || channel.number < 1 || channel.name.empty() || !scaled)
-      throw Error("channel '" + part + "': NUMBER:NAME=SCALE is due, the number from 1, the scale not 0");
+      throw Error("channel '" + part + "': expected NUMBER:NAME=SCALE, the number from 1, the scale not 0");
     channels.push_back(channel);
   }
-  if (channels.empty()) throw Error("channels: NUMBER:NAME=SCALE,... is due");
+  if (channels.empty()) throw Error("channels: expected NUMBER:NAME=SCALE,...");
   return channels;
 }
 

@@ -11,7 +11,7 @@ std::string readText(const std::string& file) {
   std::ifstream stream(file, std::ios::binary | std::ios::ate);
   if (!stream) throw Error(file + ": cannot be read");
   const std::streamoff size = stream.tellg();
-  // A folder can be opened, and tells whatever size.
+  // A folder can be opened, with an arbitrary size.
   if (size < 0 || std::filesystem::is_directory(file)) throw Error(file + ": cannot be read");
   std::string text(static_cast<std::size_t>(size), '\0');
   stream.seekg(0);

@@ -22,7 +22,7 @@ std::string trimmed(const std::string& text) {
   return first == std::string::npos ? "" : text.substr(first, last - first + 1);
 }
 
-/// Walks through the file's bytes line by line.
+/// Reads the file's bytes line by line.
 class Bytes {
  public:
   explicit Bytes(const std::string& file) : file_(file), text_(readText(file)) {}
@@ -42,7 +42,7 @@ class Bytes {
     at_ += count;
     return text_.data() + at_ - count;
   }
-  /// The text up to the next mark, which is passed.
+  /// The text up to the next mark, which is skipped.
   std::string untilMark() {
     std::string all;
     while (!done()) {
@@ -63,7 +63,7 @@ class Bytes {
   int dataset_ = 0;
 };
 
-/// Numbers of a line, words between them passed over.
+/// Numbers of a line; words between them are skipped.
 std::vector<double> numbersOf(const std::string& text) {
   std::vector<double> numbers;
   const char* at = text.c_str();
@@ -108,13 +108,12 @@ Head readHead(Bytes& bytes) {
   f.reference_direction = field(lines[5], 76, 4);
   std::replace(lines[6].begin(), lines[6].end(), 'D', 'E');
   const std::vector<double> form = numbersOf(lines[6]);
-  if (form.size() < 5) bytes.fail("its seventh line is no form of data");
-  if (!(std::abs(form[0]) < 1e6)) bytes.fail("its seventh line tells no data type");
+  if (form.size() < 5) bytes.fail("its seventh line is not a data format");
+  if (!(std::abs(form[0]) < 1e6)) bytes.fail("its seventh line has no data type");
   head.data_type = static_cast<int>(form[0]);
   if (head.data_type != REAL_SINGLE && head.data_type != REAL_DOUBLE && !head.complex())
-    bytes.fail("data type " + std::to_string(head.data_type) + " is not known");
-  if (!(form[1] >= 1.0 && form[1] < 1e9))
-    bytes.fail("it says that it holds " + std::to_string(form[1]) + " values");
+    bytes.fail("data type " + std::to_string(head.data_type) + " is not supported");
+  if (!(form[1] >= 1.0 && form[1] < 1e9)) bytes.fail("it states " + std::to_string(form[1]) + " values");
   head.count = static_cast<std::size_t>(form[1]);
   head.even = form[2] != 0.0;
   head.first = form[3];
@@ -125,12 +124,11 @@ Head readHead(Bytes& bytes) {
   return head;
 }
 
-// Values in the order of the file: abscissa where uneven, real part, imaginary part where complex.
+// Values in the order of the file: abscissa if uneven, real part, imaginary part if complex.
 void fill(Head& head, const std::vector<double>& numbers, const Bytes& bytes) {
   const std::size_t each = (head.even ? 1u : 2u) + (head.complex() ? 1u : 0u);
   if (numbers.size() < each * head.count)
-    bytes.fail(std::to_string(numbers.size()) + " numbers, " + std::to_string(each * head.count) +
-               " are due");
+    bytes.fail(std::to_string(numbers.size()) + " numbers, expected " + std::to_string(each * head.count));
   UffFunction& f = head.function;
   for (std::size_t i = 0; i < head.count; ++i) {
     const double* v = numbers.data() + each * i;
@@ -160,18 +158,18 @@ UffFunction readText58(Bytes& bytes) {
 }
 
 UffFunction readBinary58(Bytes& bytes, const std::string& first) {
-  // "    58b", byte order (1 little, 2 big), form of numbers (2: IEEE 754), lines of the head, bytes that
+  // " 58b", byte order (1 little, 2 big), number format (2: IEEE 754), header lines, number of bytes that
   // follow
   const std::vector<double> form = numbersOf(first.substr(std::min(first.size(), first.find('b') + 1)));
-  if (form.size() < 4 || form[1] != 2.0) bytes.fail("its first line does not name IEEE numbers");
+  if (form.size() < 4 || form[1] != 2.0) bytes.fail("its first line does not state IEEE numbers");
   Head head = readHead(bytes);
   const std::size_t size = head.isDouble() ? 8 : 4;
-  if (!(form[3] >= 0.0 && form[3] < 1e12)) bytes.fail("its first line tells no length");
+  if (!(form[3] >= 0.0 && form[3] < 1e12)) bytes.fail("its first line has no length");
   const auto length = static_cast<std::size_t>(form[3]);
   const char* data = bytes.take(length);
   const bool swap = form[0] == 2.0;
   std::vector<double> numbers;
-  // An uneven abscissa is single precision beside single values, double beside double ones.
+  // An uneven abscissa has single precision with single values, double precision with double values.
   for (std::size_t at = 0; at + size <= length; at += size)
     numbers.push_back(size == 8 ? fromBytes<double>(data + at, swap) : fromBytes<float>(data + at, swap));
   fill(head, numbers, bytes);
@@ -198,7 +196,7 @@ std::string headOf(const UffFunction& f, bool even) {
   return text;
 }
 
-// Whether the head's digits give every place of the abscissa.
+// Whether start and increment in the header reproduce the abscissa.
 bool evenlySpaced(const UffFunction& f) {
   if (f.abscissa.size() < 2) return false;
   const double from = std::stod(formatted("%.5E", f.abscissa[0]));
@@ -234,7 +232,7 @@ std::vector<UffFunction> readUff(const std::string& file) {
       bytes.untilMark();
     }
   }
-  if (functions.empty()) throw Error(file + ": holds no dataset 58");
+  if (functions.empty()) throw Error(file + ": contains no dataset 58");
   return functions;
 }
 
@@ -242,7 +240,7 @@ void writeUff(const std::vector<UffFunction>& functions, const std::string& file
   std::string text;
   for (const UffFunction& f : functions) {
     if (f.abscissa.size() < 2 || f.abscissa.size() != f.value.size())
-      throw Error(file + ": " + f.name + ": fewer than two values, or not one a line");
+      throw Error(file + ": " + f.name + ": expected two values or more, one per abscissa");
     const bool even = evenlySpaced(f), complex = f.type != uff::TIME_RESPONSE;
     std::vector<double> numbers;
     for (std::size_t i = 0; i < f.value.size(); ++i) {
@@ -259,7 +257,7 @@ void writeUff(const std::vector<UffFunction>& functions, const std::string& file
       text += "\n";
     } else {
       text += "    58\n" + headOf(f, even);
-      // An uneven abscissa stands in 13 columns, values in 20.
+      // An uneven abscissa has 13 columns, values have 20.
       const std::size_t each = (even ? 1u : 2u) + (complex ? 1u : 0u), in_line = even ? 4u : each;
       for (std::size_t i = 0; i < numbers.size(); ++i) {
         text += formatted(!even && i % each == 0 ? "%13.7E" : "%20.11E", numbers[i]);

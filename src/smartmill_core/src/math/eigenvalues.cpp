@@ -24,7 +24,7 @@ Eigen::VectorXcd eigenvalues(const MatrixXd& a) {
 
 Eigensystem eigensystem(const MatrixXd& a) {
   const Eigen::EigenSolver<MatrixXd> made(a);
-  if (made.info() != Eigen::Success) throw Error("eigenvalues: the iteration does not end");
+  if (made.info() != Eigen::Success) throw Error("eigenvalues: the iteration does not converge");
   return {made.eigenvalues(), made.eigenvectors()};
 }
 

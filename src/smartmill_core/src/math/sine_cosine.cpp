@@ -5,12 +5,12 @@
 
 namespace smartmill {
 
-const SineCosine* turnTable() {
+const SineCosine* sineCosineTable() {
   static const std::vector<SineCosine> TABLE = [] {
-    std::vector<SineCosine> table(TURN_NODES + 1);
-    for (std::size_t n = 0; n <= TURN_NODES; ++n)
-      table[n] = {std::sin(static_cast<double>(n) * TURN_NODE_ANGLE),
-                  std::cos(static_cast<double>(n) * TURN_NODE_ANGLE)};
+    std::vector<SineCosine> table(REVOLUTION_NODES + 1);
+    for (std::size_t n = 0; n <= REVOLUTION_NODES; ++n)
+      table[n] = {std::sin(static_cast<double>(n) * REVOLUTION_NODE_ANGLE),
+                  std::cos(static_cast<double>(n) * REVOLUTION_NODE_ANGLE)};
     return table;
   }();
   return TABLE.data();

@@ -16,12 +16,12 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr std::size_t ORDER = 32, ROWS_A_COEFFICIENT = 3;
-/// Samples of a stretch.
-constexpr std::size_t STRETCH = 8;
-/// What is unforeseen must be so many times the usual, and this share of the largest: of a sample, of a
-/// stretch.
-constexpr double SUDDEN = 12.0, SUDDEN_SHARE = 0.08;
-constexpr double STRANGE = 6.0, STRANGE_SHARE = 0.004;
+/// Samples of a segment.
+constexpr std::size_t SEGMENT = 8;
+/// An unpredicted deviation counts from this multiple of the usual deviation and this share of the
+/// largest value: for a sample, for a segment.
+constexpr double OUTLIER = 12.0, OUTLIER_SHARE = 0.08;
+constexpr double DEVIATION = 6.0, DEVIATION_SHARE = 0.004;
 
 std::vector<double> averaged(const std::vector<double>& values, std::size_t from, std::size_t group) {
   std::vector<double> result((values.size() - from) / group);
@@ -32,7 +32,7 @@ std::vector<double> averaged(const std::vector<double>& values, std::size_t from
   return result;
 }
 
-/// Coefficients of y[n] = sum a[k] y[n - 1 - k] over the rows that take part.
+/// Coefficients of y[n] = sum a[k] y[n - 1 - k] over the selected rows.
 VectorXd prediction(const std::vector<double>& y, std::size_t order, const std::vector<bool>& rows,
                     double noise) {
   const auto p = static_cast<Index>(order);
@@ -52,18 +52,18 @@ VectorXd prediction(const std::vector<double>& y, std::size_t order, const std::
   return linear::solveSymmetric(normal, along);
 }
 
-std::vector<double> unforeseen(const std::vector<double>& y, std::size_t order, const VectorXd& a) {
-  std::vector<double> left(y.size(), 0.0);
+std::vector<double> predictionResidual(const std::vector<double>& y, std::size_t order, const VectorXd& a) {
+  std::vector<double> residual(y.size(), 0.0);
   for (std::size_t n = order; n < y.size(); ++n) {
-    left[n] = y[n];
-    for (std::size_t k = 0; k < order; ++k) left[n] -= a[static_cast<Index>(k)] * y[n - 1 - k];
+    residual[n] = y[n];
+    for (std::size_t k = 0; k < order; ++k) residual[n] -= a[static_cast<Index>(k)] * y[n - 1 - k];
   }
-  return left;
+  return residual;
 }
 
-double usual(const std::vector<double>& left, std::size_t order) {
+double robustDeviation(const std::vector<double>& residual, std::size_t order) {
   std::vector<double> sizes;
-  for (std::size_t n = order; n < left.size(); ++n) sizes.push_back(std::abs(left[n]));
+  for (std::size_t n = order; n < residual.size(); ++n) sizes.push_back(std::abs(residual[n]));
   return median(sizes) / 0.6745;
 }
 
@@ -71,36 +71,36 @@ FreeDecayBreak breakAt(const std::vector<double>& y, std::size_t group, double l
   const std::size_t order = std::min(ORDER, y.size() / (ROWS_A_COEFFICIENT + 1));
   if (order < 8) return {};
   std::vector<bool> rows(y.size(), true);
-  std::vector<double> left = unforeseen(y, order, prediction(y, order, rows, noise));
-  // Once more without what stood out: it bends the prediction.
-  const double first = usual(left, order);
-  for (std::size_t n = order; n < y.size(); ++n) rows[n] = std::abs(left[n]) < SUDDEN * first;
-  left = unforeseen(y, order, prediction(y, order, rows, noise));
-  const double even = std::max(usual(left, order), noise);
+  std::vector<double> residual = predictionResidual(y, order, prediction(y, order, rows, noise));
+  // Again without outliers, which bias the prediction.
+  const double first = robustDeviation(residual, order);
+  for (std::size_t n = order; n < y.size(); ++n) rows[n] = std::abs(residual[n]) < OUTLIER * first;
+  residual = predictionResidual(y, order, prediction(y, order, rows, noise));
+  const double noise_level = std::max(robustDeviation(residual, order), noise);
   FreeDecayBreak found;
-  for (std::size_t n = order; group == 1 && n < left.size(); ++n) {
-    if (std::abs(left[n]) > std::max({SUDDEN * even, SUDDEN_SHARE * largest, found.size}))
-      found = {n, std::abs(left[n]), true};
+  for (std::size_t n = order; group == 1 && n < residual.size(); ++n) {
+    if (std::abs(residual[n]) > std::max({OUTLIER * noise_level, OUTLIER_SHARE * largest, found.size}))
+      found = {n, std::abs(residual[n]), true};
   }
   if (found.sample > 0) return found;
-  double calmest = INFINITY;
-  for (std::size_t n = order; n + STRETCH <= left.size(); n += STRETCH / 2) {
+  double least_size = INFINITY;
+  for (std::size_t n = order; n + SEGMENT <= residual.size(); n += SEGMENT / 2) {
     double sum = 0.0;
-    for (std::size_t i = n; i < n + STRETCH; ++i) sum += left[i] * left[i];
-    const double size = std::sqrt(sum / static_cast<double>(STRETCH));
-    // What is not foretold (a curved sensor) fades with the ringing and does not come again.
-    if (size > std::max({STRANGE * std::max(even, std::isfinite(calmest) ? calmest : size),
-                         STRANGE_SHARE * largest, found.size}))
+    for (std::size_t i = n; i < n + SEGMENT; ++i) sum += residual[i] * residual[i];
+    const double size = std::sqrt(sum / static_cast<double>(SEGMENT));
+    // A deviation by sensor nonlinearity decays with the ringing and does not recur.
+    if (size > std::max({DEVIATION * std::max(noise_level, std::isfinite(least_size) ? least_size : size),
+                         DEVIATION_SHARE * largest, found.size}))
       found = {n, size, false};
-    calmest = std::min(calmest, size);
+    least_size = std::min(least_size, size);
   }
   return found;
 }
 
 }  // namespace
 
-double unforeseenRise(const std::vector<double>& response, std::size_t from, std::size_t begin,
-                      std::size_t end, double noise) {
+double unpredictedRise(const std::vector<double>& response, std::size_t from, std::size_t begin,
+                       std::size_t end, double noise) {
   double most = 0.0;
   for (const std::size_t group : {1, 4, 16}) {
     const std::vector<double> y = averaged(response, from, group);
@@ -110,15 +110,16 @@ double unforeseenRise(const std::vector<double>& response, std::size_t from, std
     std::vector<bool> rows(y.size(), false);
     std::fill(rows.begin() + static_cast<std::ptrdiff_t>(order),
               rows.begin() + static_cast<std::ptrdiff_t>(first), true);
-    const double even = noise / std::sqrt(static_cast<double>(group));
-    const std::vector<double> left = unforeseen(y, order, prediction(y, order, rows, even));
+    const double noise_level = noise / std::sqrt(static_cast<double>(group));
+    const std::vector<double> residual =
+        predictionResidual(y, order, prediction(y, order, rows, noise_level));
     const auto power = [&](std::size_t a, std::size_t b) {
       double sum = 0.0;
-      for (std::size_t i = a; i < b; ++i) sum += left[i] * left[i] / static_cast<double>(b - a);
+      for (std::size_t i = a; i < b; ++i) sum += residual[i] * residual[i] / static_cast<double>(b - a);
       return std::sqrt(sum);
     };
-    // The later half of what was learned from: the early ringing leaves more.
-    most = std::max(most, power(first, last) / std::max(power((order + first) / 2, first), even));
+    // The later half of the training samples, since the early ringing has larger residuals.
+    most = std::max(most, power(first, last) / std::max(power((order + first) / 2, first), noise_level));
   }
   return most;
 }

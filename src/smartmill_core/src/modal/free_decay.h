@@ -5,21 +5,21 @@
 
 namespace smartmill {
 
-/// Where a response that rings freely does something that its own past does not tell.
+/// Deviation of a freely decaying response from the prediction by its own past.
 struct FreeDecayBreak {
-  std::size_t sample = 0;  ///< 0: nowhere
-  double size = 0.0;       ///< [unit of the response] unforeseen there
-  bool sudden = false;     ///< one sample, not a stretch
+  std::size_t sample = 0;  ///< 0: none
+  double size = 0.0;       ///< [unit of the response] of the deviation
+  bool sudden = false;     ///< a single sample, not a segment
 };
 
-/// Free ringing of any modes is a sum of decaying sines, which a linear prediction from the last samples
-/// foretells to its noise. The record is seen at its own rate and averaged over 4 and 16 samples, where slow
-/// motions show. @param from first sample after the contact @param noise of a sample
+/// Free decay of any modes is a sum of decaying sines, which linear prediction from the last samples predicts
+/// to within the noise. The record is checked at its own rate and averaged over 4 and 16 samples, for slow
+/// motions. @param from first sample after the contact @param noise of one sample
 FreeDecayBreak freeDecayBreak(const std::vector<double>& response, std::size_t from, double noise);
 
-/// How much more the samples begin .. end hold that the ringing before them does not foretell than that
-/// ringing itself did: near 1 where modes beat, more where something else moves. 0: too little before.
-double unforeseenRise(const std::vector<double>& response, std::size_t from, std::size_t begin,
-                      std::size_t end, double noise);
+/// Unpredicted power of the samples begin .. end, relative to that of the ringing before them: near 1 for
+/// beating modes, larger for other motion. 0: too few samples before.
+double unpredictedRise(const std::vector<double>& response, std::size_t from, std::size_t begin,
+                       std::size_t end, double noise);
 
 }  // namespace smartmill

@@ -14,7 +14,7 @@ namespace {
 constexpr int DIGITS = 10, STD_DIGITS = 4;
 constexpr double UNKNOWN = NAN;
 
-/// A key of a mode's map, the first of them with `dash`.
+/// A line of a mode's map; the first one with `dash`.
 std::string row(const std::string& key, double value, int digits = DIGITS, bool dash = false) {
   return (dash ? "  - " : "    ") + key + ": " + yamlNumber(value, digits) + "\n";
 }
@@ -92,7 +92,7 @@ ModalEstimate estimateOf(const ModalModel& model) {
     mode.evidence = UNKNOWN;
     estimate.modes.push_back(mode);
   }
-  estimate.flanks.push_back({model.direct, 0.0});
+  estimate.residual_terms.push_back({model.direct, 0.0});
   return estimate;
 }
 

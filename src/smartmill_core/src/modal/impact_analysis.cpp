@@ -15,10 +15,10 @@
 namespace smartmill {
 namespace {
 
-/// Lines on each side over which the scatter's variance is averaged: a few hits alone give a variance that is
-/// itself scattered, and lines that happen to agree would get far too much weight in a fit.
+/// Lines on each side over which the variance is averaged. The variance from a few hits is itself uncertain,
+/// and lines that agree by chance would get far too much weight in a fit.
 constexpr std::size_t SMOOTH_LINES = 8;
-/// Samples before the hit that give a baseline and a noise worth having.
+/// Fewest samples before the hit for baseline and noise.
 constexpr std::size_t LEAST_QUIET = 48;
 
 std::vector<double> part(const std::vector<double>& values, std::size_t from, std::size_t to) {
@@ -35,8 +35,8 @@ double slopeAt(const std::vector<double>& values, std::size_t i) {
   return slope;
 }
 
-/// Bends a sensor's voltage v = x G / (G - x) straight. A mean over a time in which x runs by d holds
-/// v'' / 2 times the variance d^2 / 12 of a straight run, v'' / v' = 2 / (G - x).
+/// Linearises a sensor's voltage v = x G / (G - x). A mean over a time in which x moves linearly by d
+/// contains v'' / 2 times the variance d^2 / 12, with v'' / v' = 2 / (G - x).
 void straighten(std::vector<double>& response, double gain, double averaged_share) {
   for (double& r : response) r /= 1.0 + r / gain;
   if (averaged_share <= 0.0) return;
@@ -51,7 +51,7 @@ void straighten(std::vector<double>& response, double gain, double averaged_shar
 
 double noiseUnderRinging(const std::vector<double>& values) {
   constexpr double BINOMIAL[] = {1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0};
-  constexpr double SQUARES = 924.0;  // of these
+  constexpr double SQUARES = 924.0;  // sum of the squared coefficients
   constexpr std::size_t TAPS = 7;
   const double scatter = standardDeviation(values);
   if (values.size() < 4 * TAPS) return scatter;
@@ -76,13 +76,13 @@ void ImpactAnalysis::add(const Hit& hit) {
   }
   if (hit.sample_rate != sample_rate_ || hit.force.size() != samples_) {
     throw Error("hit " + std::to_string(hits_ + 1) + ": " + std::to_string(hit.force.size()) +
-                " samples at " + std::to_string(hit.sample_rate) + " Hz, the first hit has " +
+                " samples at " + std::to_string(hit.sample_rate) + " Hz, expected those of the first hit: " +
                 std::to_string(samples_) + " at " + std::to_string(sample_rate_) + " Hz");
   }
   std::vector<double> force = hit.force, response = hit.response;
   double force_noise = 0.0, response_noise = 0.0;
-  // The last quarter before the trigger may hold the foot of the hit. A record that begins with the hit shows
-  // its noise at its end, and has no baseline.
+  // The last quarter before the trigger may contain the onset of the hit. A record that begins with the hit
+  // has its noise at the end, and no baseline.
   const std::size_t quiet_samples = hit.pre_trigger - hit.pre_trigger / 4;
   if (quiet_samples >= LEAST_QUIET) {
     const std::vector<double> quiet_force = part(force, 0, quiet_samples);
@@ -110,7 +110,7 @@ void ImpactAnalysis::add(const Hit& hit) {
   }
   for (double& r : response) r *= options_.response_scale;
   if (options_.exponential_time > 0.0) {
-    // The same decay on both leaves H of the system with its poles moved by 1 / time.
+    // The same decay on both channels gives H of the system with its poles shifted by 1 / time.
     for (std::size_t i = 0; i < force.size(); ++i) {
       const double t = (static_cast<double>(i) - static_cast<double>(hit.pre_trigger)) / sample_rate_;
       const double decay = t > 0.0 ? std::exp(-t / options_.exponential_time) : 1.0;
@@ -136,8 +136,8 @@ FrequencyResponse ImpactAnalysis::frf(FrfAverage average) const {
     if (h.coherence[k] > 0.0) h.value[k] /= std::sqrt(h.coherence[k]);
   }
   const std::size_t lines = h.size();
-  // Eq. 4.39 for H1, 4.41 for H2 (with S_xx = S_ff |H1| |H2|), between them for Hv; with the noise seen
-  // before the hits. One hit: eq. 4.29.
+  // Eq. 4.39 for H1, 4.41 for H2 (with S_xx = S_ff |H1| |H2|), between them for Hv; with the noise before the
+  // hits. One hit: eq. 4.29.
   const double n = static_cast<double>(samples_), m = static_cast<double>(hits_);
   const double share = window_share_ / m, force_noise = force_noise_ / m,
                response_noise = response_noise_ / m;

@@ -16,25 +16,26 @@ namespace {
 
 using Complex = std::complex<double>;
 
-/// Lines on each side over which noise counts as even.
+/// Lines on each side over which noise counts as uniform.
 constexpr std::size_t SIDE = 25;
 constexpr std::size_t LEAST_LINES = 12;
-/// Lines of the smallest part of the band that is searched for itself, and the order there.
+/// Lines of the smallest segment of the band that is searched separately, and the order there.
 constexpr std::size_t LEAST_PART = 160;
 constexpr int PART_ORDER = 16, PART_ORDER_STEP = 2, PART_WORTH = 3;
-/// A pole that stays over this share of the orders is a start value at once.
+/// A pole that persists over 1 / this of the orders is a start value at once.
 constexpr int STEADY_SHARE = 5;
-/// A start value is held to no more accuracy than this share of the FRF: real ones carry repeatable misfit.
+/// Start values are fitted to at most this accuracy, as share of the FRF: real FRFs have repeatable misfit.
 constexpr double START_MISFIT = 0.01;
-/// First lines begin near zero when the last of them is so many times as high; their acceleration is one to
-/// this.
+/// The first lines begin near zero when the last of them has at least this multiple of the first frequency; a
+/// mass line has constant acceleration to within this share.
 constexpr double FROM_ZERO = 2.0, MASS_LINE = 0.3;
-/// How far the sense of rotation must stand out of its noise, in standard deviations.
+/// Significance of the sense of rotation, in standard deviations.
 constexpr double CLEARLY = 3.0;
-/// A resonance answers above the noise: where the median coherence within its width is less in every FRF, the
-/// force had no power there (between the lobes of a pulse), and what bends is the average's own bias.
+/// The response at a resonance exceeds the noise. Where the median coherence within its width is lower in
+/// every FRF, the force had no power there (between the lobes of a pulse), and the curvature is a bias of the
+/// average.
 constexpr double COHERENT = 0.3;
-/// Noise of a line is at least this share of the tallest: what digits of a file and of the solver leave.
+/// Least noise of a line, as share of the tallest: rounding in files and in the solver.
 constexpr double DIGITS = 1e-7;
 
 std::vector<double> noiseOf(const FrequencyResponse& band) {
@@ -55,7 +56,7 @@ WeightedLines weighted(const std::vector<FrequencyResponse>& frfs, const ModalEs
                   " and " + std::to_string(high) + " Hz are too few");
     }
     if (lines.frfs() > 0 && band.frequency != lines.frequency)
-      throw Error("modes: the FRFs stand on different lines");
+      throw Error("modes: expected FRFs with the same lines");
     lines.frequency = band.frequency;
     double tallest = 0.0;
     for (std::size_t i = 0; i < band.size(); ++i) {
@@ -74,7 +75,7 @@ WeightedLines weighted(const std::vector<FrequencyResponse>& frfs, const ModalEs
   return lines;
 }
 
-/// For start values: nothing is believed beyond START_MISFIT.
+/// Weights for start values, limited by START_MISFIT.
 WeightedLines tempered(const WeightedLines& lines) {
   WeightedLines result = lines;
   for (std::size_t o = 0; o < lines.frfs(); ++o) {
@@ -86,8 +87,8 @@ WeightedLines tempered(const WeightedLines& lines) {
   return result;
 }
 
-/// Without the mass line of a structure that hangs free: over its lowest narrow modes it bends more than the
-/// parabola under them. Seen where the first lines, from near zero on, all show one acceleration.
+/// Subtracts the mass line of a free structure, whose curvature over the lowest narrow modes exceeds that of
+/// the background parabola. It is recognised by a constant acceleration of the first lines, from near zero.
 WeightedLines withoutMassLine(const WeightedLines& lines) {
   WeightedLines result = lines;
   if (lines.frequency[LEAST_LINES - 1] < FROM_ZERO * lines.frequency[0]) return result;
@@ -115,7 +116,7 @@ void merge(std::vector<Pole>& all, const std::vector<Pole>& more, double line) {
   }
 }
 
-/// Stable poles of the band's halves, quarters .. that overlap by half; only those inside count.
+/// Stable poles of the band's halves, quarters, ..., which overlap by half; only poles inside count.
 bool addParts(const WeightedLines& lines, const ModalEstimateOptions& options,
               std::vector<Pole>& candidates) {
   const std::size_t n = lines.size();
@@ -131,7 +132,7 @@ bool addParts(const WeightedLines& lines, const ModalEstimateOptions& options,
       for (const Pole& p : persistentPoles(polesByOrder(lines, search), search)) {
         if (p.frequency < low || p.frequency > high) continue;
         inside.push_back(p);
-        // Over the same share of its few orders as over the many of the whole band.
+        // Converts the persistence over few orders to the scale of the whole band.
         inside.back().order = p.order * options.largest_order * PART_ORDER_STEP / PART_ORDER / PART_WORTH;
       }
       merge(candidates, inside, lines.step());
@@ -140,24 +141,24 @@ bool addParts(const WeightedLines& lines, const ModalEstimateOptions& options,
   return true;
 }
 
-/// Starts a search with the poles that are steady over the orders. Where that leaves some of them without a
-/// mode, all candidates start together beside it: in dense bands poles that are hardly seen are what the
-/// steady ones' neighbours lack. The start that meets more of the steady ones stays.
+/// Starts a search with the poles that persist over the orders. Where some of them remain without a mode, a
+/// second search starts with all candidates: in dense bands weak poles are the missing neighbours of the
+/// persistent ones. The search that matches more of the persistent poles is kept.
 bool begin(ModalSearch& search, const std::vector<Pole>& candidates, int largest_order) {
   std::vector<Pole> steady;
   for (const Pole& p : candidates) {
     if (p.order * STEADY_SHARE >= largest_order) steady.push_back(p);
   }
   ModalSearch dense = search;
-  if (!search.startWith(steady) || !search.settle(1, false)) return false;
-  if (search.unmet(steady) == 0 || steady.size() == candidates.size()) return true;
-  if (!dense.startWith(candidates) || !dense.settle(1, false)) return false;
-  if (dense.unmet(steady) < search.unmet(steady)) search.goOnFrom(std::move(dense));
+  if (!search.startWith(steady) || !search.refitAll(1, false)) return false;
+  if (search.countUnmatched(steady) == 0 || steady.size() == candidates.size()) return true;
+  if (!dense.startWith(candidates) || !dense.refitAll(1, false)) return false;
+  if (dense.countUnmatched(steady) < search.countUnmatched(steady)) search.continueFrom(std::move(dense));
   return true;
 }
 
 bool isCoherent(const std::vector<FrequencyResponse>& bands, const EstimatedMode& mode) {
-  bool told = false;
+  bool incoherent = false;
   for (const FrequencyResponse& band : bands) {
     if (band.coherence.size() != band.size() || band.size() < 2) continue;
     const double step = band.frequency[1] - band.frequency[0];
@@ -169,12 +170,12 @@ bool isCoherent(const std::vector<FrequencyResponse>& bands, const EstimatedMode
     }
     if (about.empty()) continue;
     if (median(about) >= COHERENT) return true;
-    told = true;
+    incoherent = true;
   }
-  return !told;
+  return !incoherent;
 }
 
-/// Proven modes on lines without coherence become doubts.
+/// Significant modes on lines without coherence become doubts.
 void doubtIncoherent(const std::vector<FrequencyResponse>& bands, ModalEstimate& estimate) {
   std::vector<EstimatedMode> proven;
   for (const EstimatedMode& m : estimate.modes)
@@ -184,23 +185,23 @@ void doubtIncoherent(const std::vector<FrequencyResponse>& bands, ModalEstimate&
             [](const EstimatedMode& a, const EstimatedMode& b) { return a.frequency < b.frequency; });
 }
 
-/// Lower and upper residual of what modes and doubts leave, by least squares.
-ResidualTerms flanksOf(const WeightedLines& lines, const ModalEstimate& estimate, std::size_t o) {
+/// Lower and upper residual terms of the residual of modes and doubts, by least squares.
+ResidualTerms residualTermsOf(const WeightedLines& lines, const ModalEstimate& estimate, std::size_t o) {
   const double reference = units::TWO_PI * lines.frequency[lines.size() / 2];
   double a = 0.0, b = 0.0, c = 0.0;  // normal equations of (1, -(reference / w)^2)
   Complex one, two;
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const double w = lines.weight[o][i] * lines.weight[o][i];
     const double mass = -std::pow(reference / (units::TWO_PI * lines.frequency[i]), 2);
-    Complex left = lines.value[o][i];
+    Complex residual = lines.value[o][i];
     for (const std::vector<EstimatedMode>* modes : {&estimate.modes, &estimate.doubts}) {
-      for (const EstimatedMode& m : *modes) left -= m.response(o, lines.frequency[i]);
+      for (const EstimatedMode& m : *modes) residual -= m.response(o, lines.frequency[i]);
     }
     a += w;
     b += w * mass;
     c += w * mass * mass;
-    one += w * left;
-    two += w * mass * left;
+    one += w * residual;
+    two += w * mass * residual;
   }
   const double determinant = a * c - b * b;
   if (!(determinant > 1e-12 * a * c)) return {one / a, 0.0};
@@ -215,7 +216,7 @@ Complex ResidualTerms::response(double f) const {
 }
 
 Complex fittedResponse(const ModalEstimate& estimate, std::size_t frf, double f) {
-  Complex sum = estimate.flanks[frf].response(f);
+  Complex sum = estimate.residual_terms[frf].response(f);
   for (const EstimatedMode& m : estimate.modes) sum += m.response(frf, f);
   for (const EstimatedMode& m : estimate.doubts) sum += m.response(frf, f);
   return estimate.conjugated ? std::conj(sum) : sum;
@@ -228,7 +229,7 @@ Complex EstimatedMode::response(std::size_t frf, double f) const {
 std::vector<double> lineNoise(const std::vector<Complex>& value) {
   const std::size_t n = value.size();
   std::vector<double> bend(n), noise(n);
-  // Third differences: a parabola through the neighbours leaves nothing.
+  // Third differences vanish for a parabola.
   for (std::size_t i = 1; i + 2 < n; ++i)
     bend[i] = std::abs(value[i + 2] - 3.0 * value[i + 1] + 3.0 * value[i] - value[i - 1]) / std::sqrt(20.0);
   if (n < 4) return noise;
@@ -237,22 +238,22 @@ std::vector<double> lineNoise(const std::vector<Complex>& value) {
   for (std::size_t i = 0; i < n; ++i) {
     const auto first = static_cast<std::ptrdiff_t>(i > SIDE ? i - SIDE : 0);
     const auto last = static_cast<std::ptrdiff_t>(std::min(n, i + SIDE + 1));
-    // The median of a Rayleigh variable is sqrt(ln 2) of its root mean square.
+    // The median of a Rayleigh variable is sqrt(ln 2) times its root mean square.
     noise[i] = median({bend.begin() + first, bend.begin() + last}) / std::sqrt(std::log(2.0));
   }
   return noise;
 }
 
-bool turnsBackwards(const std::vector<FrequencyResponse>& frfs) {
+bool hasReversedPhase(const std::vector<FrequencyResponse>& frfs) {
   double clearest = 0.0;
-  // Wide peaks bend over many lines, of which each alone is noise: averages over 1, 2, 4 .. lines.
+  // The curvature of wide peaks is below the noise of single lines: averages over 1, 2, 4, ... lines.
   for (std::size_t group = 1; group <= 256; group *= 2) {
     double turn = 0.0, squares = 0.0;
     for (const FrequencyResponse& frf : frfs) {
       std::vector<Complex> mean(frf.size() / group);
       for (std::size_t i = 0; i < mean.size() * group; ++i) mean[i / group] += frf.value[i];
       for (std::size_t i = 1; i + 1 < mean.size(); ++i) {
-        // The circle of a resonance bends to the right; a delay turns, but hardly bends.
+        // The circle of a resonance curves to the right; a delay rotates with little curvature.
         const double bend = (std::conj(mean[i] - mean[i - 1]) * (mean[i + 1] - mean[i])).imag();
         turn += bend;
         squares += bend * bend;
@@ -270,7 +271,7 @@ ModalEstimate estimateModes(const std::vector<FrequencyResponse>& frfs, const Mo
   std::vector<FrequencyResponse> bands;
   for (const FrequencyResponse& frf : frfs)
     bands.push_back(frf.band(options.low, options.high > 0.0 ? options.high : INFINITY));
-  result.conjugated = turnsBackwards(bands);
+  result.conjugated = hasReversedPhase(bands);
   const WeightedLines lines = weighted(frfs, options, result.conjugated);
   const WeightedLines start = tempered(lines);
   const int most = static_cast<int>(lines.size() / 4);
@@ -281,12 +282,13 @@ ModalEstimate estimateModes(const std::vector<FrequencyResponse>& frfs, const Mo
   ModalSearch search(searched, options);
   result.cancelled =
       !(addParts(start, options, candidates) && begin(search, candidates, whole.largest_order) &&
-        search.addCandidates(candidates) && search.addLoudest(10) && search.settle(2, true));
+        search.addCandidates(candidates) && search.addAtLargestResidual(10) && search.refitAll(2, true));
   search.addByMagnitude();
   result.modes = search.results(true);
   result.doubts = search.results(false);
   doubtIncoherent(bands, result);
-  for (std::size_t o = 0; o < lines.frfs(); ++o) result.flanks.push_back(flanksOf(start, result, o));
+  for (std::size_t o = 0; o < lines.frfs(); ++o)
+    result.residual_terms.push_back(residualTermsOf(start, result, o));
   return result;
 }
 

@@ -21,8 +21,8 @@ ModalFilter::ModalFilter(const ModalModel& model, double sample_rate, Hold hold)
     }
     const double w = units::TWO_PI * mode.frequency;
     const double angle = w / sample_rate;
-    // States: output, rate / w, input, rise of the input over the step; one exponential gives transition and
-    // both input shares without the cancellation of the closed quotients at small angles.
+    // States: output, rate / w, input, increment of the input over the step. One exponential gives the
+    // transition and both input terms, without the cancellation of the closed-form quotients at small angles.
     Eigen::MatrixXd joint = Eigen::MatrixXd::Zero(4, 4);
     joint(0, 1) = angle;
     joint(1, 0) = -angle;
@@ -96,7 +96,8 @@ double ModalFilter::acceleration() const {
 }
 
 void ModalFilter::continueFrom(const ModalFilter& before) {
-  if (before.sections_.size() != sections_.size()) throw Error("modal filter: continued from another model");
+  if (before.sections_.size() != sections_.size())
+    throw Error("modal filter: expected a filter with the same number of modes to continue from");
   for (std::size_t k = 0; k < sections_.size(); ++k) {
     sections_[k].x = before.sections_[k].x;
     sections_[k].v = before.sections_[k].v;

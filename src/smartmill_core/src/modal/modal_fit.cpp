@@ -19,13 +19,13 @@ using Complex = std::complex<double>;
 
 constexpr double MIN_DAMPING = 1e-6;
 constexpr double MAX_DAMPING = 0.5;
-// A gain below this share of the tallest line is none.
+// A gain below this share of the tallest line counts as zero.
 constexpr double LEAST_GAIN = 1e-6;
-// The modes above the band stand together no nearer than some percent above the last line.
+// The equivalent mode above the band is at least a few percent above the last line.
 constexpr double MOST_BENT = 0.94;
-// A deviation that the lines do not tell is stated as this many times the value.
-constexpr double NOT_TOLD = 10.0;
-// Lines whose misfit hangs together; a line that the fit goes through tells at most so much.
+// The standard deviation of an undetermined value, as multiple of the value.
+constexpr double UNDETERMINED = 10.0;
+// Range of correlated misfit, in lines; upper bound of the leverage correction.
 constexpr Eigen::Index NEIGHBOURS = 3;
 constexpr double MOST_LEVERAGE = 0.8;
 
@@ -35,7 +35,7 @@ struct Solution {
   double cost = std::numeric_limits<double>::infinity();  // sum of squared weighted residuals
 };
 
-// Gains and direct share that fit best for given frequencies and damping ratios.
+// Best gains and direct share for given frequencies and damping ratios.
 void solveLinear(const ModalLines& problem, Solution& solution) {
   const int free = problem.linear(solution.modes);
   if (free == 0) return;
@@ -57,9 +57,9 @@ void solveLinear(const ModalLines& problem, Solution& solution) {
     }
     if (problem.direct)
       set(column, problem.scale * problem.bent(problem.frequency[i], solution.parameters.back()));
-    const Complex due = problem.value[i] - (problem.unit_static_gain ? 1.0 : 0.0);
-    b(row) = w * due.real();
-    b(row + 1) = w * due.imag();
+    const Complex target = problem.value[i] - (problem.unit_static_gain ? 1.0 : 0.0);
+    b(row) = w * target.real();
+    b(row + 1) = w * target.imag();
   }
   const Eigen::VectorXd x = linear::solveSymmetric(a.transpose() * a, Eigen::VectorXd(a.transpose() * b));
   if (!x.allFinite()) return;
@@ -134,7 +134,8 @@ ModalLines prepare(const FrequencyResponse& frf, const ModalFitOptions& options)
   problem.weighted = known == problem.lines();
   if (problem.weighted) problem.weight = smoothedDeviation(problem.weight);
   for (double& weight : problem.weight) {
-    // std_dev is of the complex value; each part has it over sqrt(2). A vanishing one may not rule alone.
+    // std_dev is that of the complex value; real and imaginary part have std_dev / sqrt(2). The lower bound
+    // limits the weight of a single line.
     weight = problem.weighted ? std::sqrt(2.0) / std::max(weight, 1e-9 * largest) : 1.0 / largest;
   }
   return problem;
@@ -148,8 +149,8 @@ Solution without(const Solution& from, int mode) {
   return less;
 }
 
-// All modes at once, real and with what the options hold them to. Found ones that this leaves no share are
-// dropped, unless their number is given.
+// Fits all modes together, real and with the constraints of the options. Modes with zero gain are dropped,
+// unless their number is given.
 Solution fitTogether(const ModalLines& problem, const std::vector<EstimatedMode>& found, bool fixed) {
   Solution solution;
   solution.modes = static_cast<int>(found.size());
@@ -167,10 +168,10 @@ Solution fitTogether(const ModalLines& problem, const std::vector<EstimatedMode>
   return solution;
 }
 
-// Misfit of a measured FRF is no even noise: it gathers about the resonances, where few lines rule, and hangs
-// together from line to line. So each line's own misfit counts where it has leverage, set free of the fit's
-// pull (MacKinnon and White's HC3), with its neighbours (Newey and West's weights). What that adds to a
-// parameter's deviation enters the covariance; it never lessens it.
+// The misfit of a measured FRF is not uniform noise: it is concentrated at the resonances, where few lines
+// have most leverage, and correlated from line to line. The covariance therefore uses each line's own misfit,
+// corrected for leverage (MacKinnon and White's HC3), with its neighbours (Newey and West's weights). It can
+// only increase the standard deviations.
 Eigen::MatrixXd widened(const Eigen::MatrixXd& even, const Eigen::MatrixXd& inverse,
                         const Eigen::MatrixXd& jacobian, const Eigen::VectorXd& residuals) {
   if (!inverse.allFinite()) return even;
@@ -214,7 +215,7 @@ ModalFit describe(const ModalLines& problem, const Solution& solution) {
   std::iota(order.begin(), order.end(), 0);
   std::sort(order.begin(), order.end(),
             [&](int a, int b) { return solution.parameters[3 * a] < solution.parameters[3 * b]; });
-  // Rows of the map from the solver's parameters to the physical ones.
+  // Jacobian of the physical parameters with respect to the solver's.
   const int outer = 3 * solution.modes + 1;
   Eigen::MatrixXd map = Eigen::MatrixXd::Zero(outer, columns);
   for (int k = 0; k < solution.modes; ++k) {
@@ -236,7 +237,7 @@ ModalFit describe(const ModalLines& problem, const Solution& solution) {
     Mode& mode = fit.model.modes[k];
     const auto deviation = [&](int i, double value) {
       const double d = std::sqrt(fit.covariance(3 * k + i, 3 * k + i));
-      return std::isfinite(d) ? d : NOT_TOLD * std::abs(value);
+      return std::isfinite(d) ? d : UNDETERMINED * std::abs(value);
     };
     mode.frequency_std = deviation(0, mode.frequency);
     mode.damping_ratio_std = deviation(1, mode.damping_ratio);
@@ -247,7 +248,7 @@ ModalFit describe(const ModalLines& problem, const Solution& solution) {
                      : problem.direct         ? problem.scale * solution.parameters[3 * solution.modes]
                                               : 0.0;
   fit.model.direct_std = std::sqrt(fit.covariance(outer - 1, outer - 1));
-  if (!std::isfinite(fit.model.direct_std)) fit.model.direct_std = NOT_TOLD * std::abs(fit.model.direct);
+  if (!std::isfinite(fit.model.direct_std)) fit.model.direct_std = UNDETERMINED * std::abs(fit.model.direct);
   double error = 0.0, norm = 0.0;
   for (std::size_t i = 0; i < problem.lines(); ++i) {
     error +=
@@ -274,9 +275,9 @@ ModalFit fitModes(const FrequencyResponse& frf, const ModalFitOptions& options) 
     chosen.insert(chosen.end(), estimate.doubts.begin(), estimate.doubts.end());
   std::sort(chosen.begin(), chosen.end(),
             [](const EstimatedMode& a, const EstimatedMode& b) { return a.evidence > b.evidence; });
-  if (chosen.empty()) throw Error("modal fit: no mode is proven in the band");
+  if (chosen.empty()) throw Error("modal fit: no significant mode in the band");
   if (fixed && chosen.size() < most) {
-    throw Error("modal fit: " + std::to_string(most) + " modes are asked for, the band shows " +
+    throw Error("modal fit: " + std::to_string(most) + " modes are required, the band has " +
                 std::to_string(chosen.size()));
   }
   if (chosen.size() > most) chosen.resize(most);

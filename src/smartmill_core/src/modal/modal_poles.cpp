@@ -17,16 +17,16 @@ using Eigen::Index;
 using Eigen::MatrixXcd;
 using Eigen::VectorXcd;
 
-/// Angle of z over the lines: beyond their ends there is room for poles that are not.
+/// Angle of z over the lines; the remaining angle is left for computational poles.
 constexpr double TURN = 0.95 * units::PI;
-/// How far a pole may wander from order to order and be the same.
+/// Largest relative change of a pole between orders within a track.
 constexpr double SAME_FREQUENCY = 0.003;
-/// The same for the diagram's sake: of frequency, of damping.
+/// Largest relative change of frequency and damping of a stable pole in the diagram.
 constexpr double STABLE_FREQUENCY = 0.01, STABLE_DAMPING = 0.2;
-/// Orders over which a pole must stay.
-constexpr std::size_t LEAST_SEEN = 3;
+/// Least number of orders of a persistent pole.
+constexpr std::size_t LEAST_ORDERS = 3;
 
-/// Sums over the lines of one FRF, of which the normal equations of every order are made.
+/// Sums over the lines of one FRF, from which the normal equations of every order are built.
 struct LineSums {
   VectorXcd plain, mixed, mixed_back, power;  // sum w z^m, -w h z^m, -w h z^-m, w |h|^2 z^m
 };
@@ -89,17 +89,17 @@ VectorXcd denominator(const std::vector<LineSums>& sums, int order) {
   return a;
 }
 
-bool samePlace(const Pole& a, const Pole& b) {
+bool isSamePole(const Pole& a, const Pole& b) {
   return std::abs(a.frequency - b.frequency) < STABLE_FREQUENCY * b.frequency &&
          std::abs(a.damping_ratio - b.damping_ratio) < STABLE_DAMPING * b.damping_ratio + 2e-5;
 }
 
-/// The same pole through the orders.
+/// One pole through the orders.
 struct Track {
-  std::vector<Pole> seen;
+  std::vector<Pole> poles;
 
   double distance(const Pole& p) const {
-    const Pole& last = seen.back();
+    const Pole& last = poles.back();
     const double width = std::max(SAME_FREQUENCY * last.frequency, 0.5 * last.halfWidth());
     return std::hypot((p.frequency - last.frequency) / width,
                       (p.damping_ratio - last.damping_ratio) / (0.4 * last.damping_ratio + 3e-5));
@@ -107,11 +107,11 @@ struct Track {
   /// Medians over the upper half of the orders.
   Pole middle() const {
     std::vector<double> frequency, damping;
-    for (std::size_t k = seen.size() / 2; k < seen.size(); ++k) {
-      frequency.push_back(seen[k].frequency);
-      damping.push_back(seen[k].damping_ratio);
+    for (std::size_t k = poles.size() / 2; k < poles.size(); ++k) {
+      frequency.push_back(poles[k].frequency);
+      damping.push_back(poles[k].damping_ratio);
     }
-    return {static_cast<int>(seen.size()), median(frequency), median(damping), true};
+    return {static_cast<int>(poles.size()), median(frequency), median(damping), true};
   }
 };
 
@@ -126,7 +126,7 @@ void follow(std::vector<Track>& tracks, const std::vector<Pole>& now) {
     }
     if (at == now.size()) continue;
     used[at] = true;
-    track.seen.push_back(now[at]);
+    track.poles.push_back(now[at]);
   }
   for (std::size_t k = 0; k < now.size(); ++k) {
     if (!used[k]) tracks.push_back({{now[k]}});
@@ -153,7 +153,7 @@ std::vector<Pole> polesByOrder(const WeightedLines& lines, const PoleSearch& sea
       if (!(pole.real() < 0.0) || !(pole.imag() > low && pole.imag() < high)) continue;
       const double frequency = std::abs(pole);
       Pole p{order, frequency, -pole.real() / frequency, false};
-      p.stable = std::any_of(before.begin(), before.end(), [&](const Pole& b) { return samePlace(p, b); });
+      p.stable = std::any_of(before.begin(), before.end(), [&](const Pole& b) { return isSamePole(p, b); });
       now.push_back(p);
     }
     poles.insert(poles.end(), now.begin(), now.end());
@@ -171,10 +171,10 @@ std::vector<Pole> persistentPoles(const std::vector<Pole>& poles, const PoleSear
     follow(tracks, now);
   }
   std::stable_sort(tracks.begin(), tracks.end(),
-                   [](const Track& a, const Track& b) { return a.seen.size() > b.seen.size(); });
+                   [](const Track& a, const Track& b) { return a.poles.size() > b.poles.size(); });
   std::vector<Pole> found;
   for (const Track& track : tracks) {
-    if (track.seen.size() < LEAST_SEEN) break;
+    if (track.poles.size() < LEAST_ORDERS) break;
     const Pole p = track.middle();
     const bool known = std::any_of(found.begin(), found.end(), [&](const Pole& q) {
       return std::abs(q.frequency - p.frequency) < 0.3 * q.halfWidth() + 1e-5 * q.frequency;

@@ -9,7 +9,7 @@
 
 namespace smartmill {
 
-/// Lines of a modal fit, their weights, and which terms beside the modes are free.
+/// Lines of a modal fit, their weights, and the free terms in addition to the modes.
 struct ModalLines {
   std::vector<double> frequency;            // [Hz]
   std::vector<std::complex<double>> value;  // [unit]
@@ -24,21 +24,21 @@ struct ModalLines {
   std::size_t lines() const { return frequency.size(); }
   int parameters(int modes) const { return 3 * modes + (direct ? 2 : 0); }
   int linear(int modes) const { return modes + (direct ? 1 : 0); }  // of the parameters
-  /// What an even share makes at f [Hz] where modes above the band bend it: as one mode whose frequency is
-  /// the last line's over the root of `bend`; 0: not bent.
+  /// Frequency dependence of the direct share at f [Hz] by modes above the band: that of one mode at the last
+  /// line's frequency over the root of `bend`; 0: constant.
   double bent(double f, double bend) const { return 1.0 / (1.0 - bend * std::pow(f / frequency.back(), 2)); }
   double reference() const;
 };
 
-/// Standard deviations from the scatter of a few hits are themselves scattered, and lean towards lines that
-/// happen to agree: the root mean square over neighbours is the better weight.
+/// Root mean square over neighbouring lines. Standard deviations from the scatter of a few hits are
+/// themselves uncertain, and favour lines that agree by chance.
 std::vector<double> smoothedDeviation(const std::vector<double>& deviation);
 
 /// Weighted (fit - measured), real and imaginary part line by line, over log f0, log zeta, gain / scale of
 /// each mode, then direct / scale and its bend.
 class ModalResiduals : public fit::Residuals {
  public:
-  /// The lines must outlive this.
+  /// @param lines must outlive this
   ModalResiduals(const ModalLines& lines, int modes) : lines_(lines), modes_(modes) {}
 
   Eigen::Index count() const override { return static_cast<Eigen::Index>(2 * lines_.lines()); }

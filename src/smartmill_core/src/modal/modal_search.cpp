@@ -11,35 +11,34 @@ namespace {
 using Complex = std::complex<double>;
 using Eigen::Index;
 
-/// A window reaches so many half widths, and at least so many lines, to either side of its modes.
+/// Reach of a window on either side of its modes: in half widths, and least number of lines.
 constexpr double REACH = 8.0, LEAST_LINES = 20.0;
-/// Modes nearer than this many times their half widths are fitted together.
+/// Modes nearer than this multiple of their half widths are fitted together.
 constexpr double TOGETHER = 4.0;
 constexpr std::size_t MOST_TOGETHER = 6, MOST_AT_START = 32;
-/// A mode must stand so many lines, and half widths, inside the band: of a peak that is cut nothing is
-/// proven.
+/// Least distance of a mode from the ends of the band, in lines and in half widths: a truncated peak is not
+/// significant.
 constexpr double FROM_END = 2.5, HALF_WIDTHS_FROM_END = 1.5;
-/// Widest peak that still is one: beyond, the parabola under the modes shows the same.
+/// Largest damping ratio: wider peaks are indistinguishable from the background parabola.
 constexpr double WIDEST_DAMPING = 0.25;
 constexpr std::size_t MOST_TRIES = 20;
-/// A peak so many times as high as the lines about it (a stretch to either side) is a mode whatever its
-/// phase.
+/// A peak with this multiple of the magnitude around it is a mode whatever its phase.
 constexpr double CLEAR_PEAK = 12.0;
 constexpr std::size_t ABOUT = 50;
-/// Damping ratios that are weighed where a magnitude tells them.
+/// Number of damping ratios of the average for a mode fitted to the magnitude.
 constexpr int DAMPINGS = 120;
-/// Evidence from which a mode is proven, more than one because the misfit of real records is no even noise;
-/// above the second it stays in the fit as a doubt, so that what it explains does not stand against the
-/// others.
+/// Evidence from which a mode is significant; above 1 because the misfit of real records is not uniform
+/// noise. Above the second value it stays in the fit as a doubt, so that its share does not count as misfit
+/// of the others.
 constexpr double PROVEN = 2.5, DOUBTFUL = 0.35;
-/// Of start values, before any fit: below it one stands on another.
+/// Least relative distance of start values; nearer ones are duplicates.
 constexpr double DUPLICATE = 0.02;
 constexpr int STEPS = 8, LAST_STEPS = 25;
 constexpr double ROUGHLY = 1e-4, CLOSELY = 1e-8;  // relative change of the squares that ends a fit
-/// Lines on a half width that are enough for the search, and for the last fit: more are averaged in groups.
+/// Lines per half width for the search and for the last fit; more lines are averaged in groups.
 constexpr double SEARCH_LINES = 6.0, FIT_LINES = 40.0;
 
-/// Groups of lines as one, weighted.
+/// Weighted averages over groups of lines.
 WeightedLines thinned(const WeightedLines& lines, std::size_t group) {
   if (group < 2) return lines;
   WeightedLines result;
@@ -88,10 +87,10 @@ EstimatedMode describe(const ModalWindow& window, const WindowFit& f, Index k) {
 }  // namespace
 
 ModalSearch::ModalSearch(const WeightedLines& lines, const ModalEstimateOptions& options)
-    : lines_(lines), options_(options), left_(lines.value) {
+    : lines_(lines), options_(options), residual_(lines.value) {
 }
 
-bool ModalSearch::goOn(double share) const {
+bool ModalSearch::reportProgress(double share) const {
   return !options_.progress || options_.progress(share);
 }
 
@@ -100,8 +99,8 @@ double ModalSearch::reach(double frequency, double damping) const {
 }
 
 bool ModalSearch::inBand(double frequency, double damping) const {
-  const double room = std::max(FROM_END * lines_.step(), HALF_WIDTHS_FROM_END * damping * frequency);
-  return frequency > lines_.frequency.front() + room && frequency < lines_.frequency.back() - room;
+  const double margin = std::max(FROM_END * lines_.step(), HALF_WIDTHS_FROM_END * damping * frequency);
+  return frequency > lines_.frequency.front() + margin && frequency < lines_.frequency.back() - margin;
 }
 
 ModalSearch::Span ModalSearch::spanOf(const std::vector<EstimatedMode>& members) const {
@@ -113,7 +112,7 @@ ModalSearch::Span ModalSearch::spanOf(const std::vector<EstimatedMode>& members)
   const auto begin = lines_.frequency.begin(), end = lines_.frequency.end();
   Span span{static_cast<std::size_t>(std::lower_bound(begin, end, low) - begin),
             static_cast<std::size_t>(std::upper_bound(begin, end, high) - begin)};
-  // At an end of the band the window keeps its lines.
+  // At the ends of the band the window keeps its number of lines.
   const auto least = static_cast<std::size_t>(2.0 * LEAST_LINES);
   if (span.last - span.first < least) {
     span.last = std::min(lines_.size(), span.first + least);
@@ -139,7 +138,7 @@ std::vector<std::size_t> ModalSearch::neighbours(double frequency, double dampin
   return members;
 }
 
-// What is left and the members' own.
+// The residual plus the responses of the members.
 WeightedLines ModalSearch::window(const Span& span, const std::vector<std::size_t>& members) const {
   const auto cut = [&](const auto& values) {
     using Values = std::decay_t<decltype(values)>;
@@ -150,7 +149,7 @@ WeightedLines ModalSearch::window(const Span& span, const std::vector<std::size_
   part.frequency = cut(lines_.frequency);
   for (std::size_t o = 0; o < lines_.frfs(); ++o) {
     part.weight.push_back(cut(lines_.weight[o]));
-    part.value.push_back(cut(left_[o]));
+    part.value.push_back(cut(residual_[o]));
     for (const std::size_t k : members) {
       for (std::size_t i = 0; i < part.size(); ++i)
         part.value[o][i] += modes_[k].response(o, part.frequency[i]);
@@ -171,11 +170,11 @@ WeightedLines ModalSearch::cut(const std::vector<EstimatedMode>& all, const std:
 void ModalSearch::subtract(const EstimatedMode& mode, double sign) {
   for (std::size_t o = 0; o < lines_.frfs(); ++o) {
     for (std::size_t i = 0; i < lines_.size(); ++i)
-      left_[o][i] -= sign * mode.response(o, lines_.frequency[i]);
+      residual_[o][i] -= sign * mode.response(o, lines_.frequency[i]);
   }
 }
 
-// What a candidate alone explains of what is left about it.
+// Share of the residual around a candidate that it explains alone.
 double ModalSearch::score(const Pole& candidate) const {
   EstimatedMode m;
   m.frequency = candidate.frequency;
@@ -184,8 +183,8 @@ double ModalSearch::score(const Pole& candidate) const {
   return w.explained(m.frequency, m.damping_ratio);
 }
 
-void ModalSearch::take(const std::vector<std::size_t>& members, const ModalWindow& window,
-                       const WindowFit& fit) {
+void ModalSearch::replaceModes(const std::vector<std::size_t>& members, const ModalWindow& window,
+                               const WindowFit& fit) {
   for (auto k = members.rbegin(); k != members.rend(); ++k) {
     subtract(modes_[*k], -1.0);
     modes_.erase(modes_.begin() + static_cast<std::ptrdiff_t>(*k));
@@ -196,7 +195,7 @@ void ModalSearch::take(const std::vector<std::size_t>& members, const ModalWindo
   }
 }
 
-// Fits members, and one more, together; drops the weakest while it is not proven.
+// Fits the members and one more mode together; drops the weakest while it is not significant.
 bool ModalSearch::refit(const std::vector<std::size_t>& members, const EstimatedMode* more, bool last) {
   std::vector<EstimatedMode> all;
   PoleList poles;
@@ -206,20 +205,21 @@ bool ModalSearch::refit(const std::vector<std::size_t>& members, const Estimated
     poles = poles.with(m.frequency, std::clamp(m.damping_ratio, 3e-6, WIDEST_DAMPING));
   ModalWindow w(cut(all, members, last ? FIT_LINES : SEARCH_LINES), options_.real_modes, lines_.size());
   const auto fitted = [&](const PoleList& start) {
-    return w.judged(w.refined(start, last ? LAST_STEPS : STEPS, last ? CLOSELY : ROUGHLY));
+    return w.assess(w.refined(start, last ? LAST_STEPS : STEPS, last ? CLOSELY : ROUGHLY));
   };
   WindowFit fit = fitted(poles);
   if (w.addMisfit(fit)) fit = fitted(fit.poles);
   const Index before = static_cast<Index>(members.size());
   for (Index k = worst(fit, DOUBTFUL); k >= 0; k = worst(fit, DOUBTFUL)) {
-    if (more && (k == before || fit.poles.modes() <= before)) return false;  // no more modes than there were
+    if (more && (k == before || fit.poles.modes() <= before))
+      return false;  // the number of modes did not increase
     fit = fitted(fit.poles.without(k));
   }
-  take(members, w, fit);
+  replaceModes(members, w, fit);
   return true;
 }
 
-// What goes first; -1: all stay.
+// The mode to be dropped first; -1: none.
 Index ModalSearch::worst(const WindowFit& fit, double least) const {
   const auto evidence = [&](Index k) { return fit.evidence[static_cast<std::size_t>(k)]; };
   Index found = -1;
@@ -242,31 +242,31 @@ void ModalSearch::fitCluster(const std::vector<Pole>& cluster) {
     poles = poles.with(m.frequency, m.damping_ratio);
   }
   ModalWindow w(cut(all, {}, SEARCH_LINES), options_.real_modes, lines_.size());
-  WindowFit fit = w.judged(poles);
-  if (w.addMisfit(fit)) fit = w.judged(poles);
+  WindowFit fit = w.assess(poles);
+  if (w.addMisfit(fit)) fit = w.assess(poles);
   for (Index k = worst(fit, DUPLICATE); k >= 0; k = worst(fit, DUPLICATE))
-    fit = w.judged(fit.poles.without(k));
+    fit = w.assess(fit.poles.without(k));
   if (fit.poles.modes() == 0) return;
-  fit = w.judged(w.refined(fit.poles, STEPS, ROUGHLY));
+  fit = w.assess(w.refined(fit.poles, STEPS, ROUGHLY));
   for (Index k = worst(fit, DOUBTFUL); k >= 0; k = worst(fit, DOUBTFUL))
-    fit = w.judged(w.refined(fit.poles.without(k), STEPS, ROUGHLY));
-  take({}, w, fit);
+    fit = w.assess(w.refined(fit.poles.without(k), STEPS, ROUGHLY));
+  replaceModes({}, w, fit);
 }
 
 bool ModalSearch::startWith(std::vector<Pole> candidates) {
   std::sort(candidates.begin(), candidates.end(),
             [](const Pole& a, const Pole& b) { return a.frequency < b.frequency; });
-  // Twice: what stood in the light of strong neighbours shows when they are taken off.
+  // Twice: modes masked by strong neighbours appear after these are subtracted.
   for (int pass = 0; pass < 2; ++pass) {
     std::vector<Pole> cluster;
     for (const Pole& p : candidates) {
-      if (!inBand(p.frequency, 0.0) || p.damping_ratio > WIDEST_DAMPING || taken(p)) continue;
-      // A window holds a number of lines at least, however narrow its modes: what stands in it belongs to it.
+      if (!inBand(p.frequency, 0.0) || p.damping_ratio > WIDEST_DAMPING || hasModeAt(p)) continue;
+      // A window has a least number of lines, however narrow its modes, and includes all modes inside.
       const auto width = [&](const Pole& q) { return std::max(q.halfWidth(), 2.0 * lines_.step()); };
-      const bool apart = !cluster.empty() && p.frequency - cluster.back().frequency >
-                                                 TOGETHER * (width(p) + width(cluster.back()));
-      if (apart || cluster.size() >= MOST_AT_START) {
-        if (!goOn(0.1 + 0.05 * pass)) return false;
+      const bool separate = !cluster.empty() && p.frequency - cluster.back().frequency >
+                                                    TOGETHER * (width(p) + width(cluster.back()));
+      if (separate || cluster.size() >= MOST_AT_START) {
+        if (!reportProgress(0.1 + 0.05 * pass)) return false;
         fitCluster(cluster);
         cluster.clear();
       }
@@ -277,14 +277,14 @@ bool ModalSearch::startWith(std::vector<Pole> candidates) {
   return true;
 }
 
-// A mode stands there already.
-bool ModalSearch::taken(const Pole& p) const {
+// Whether a mode exists already at this pole.
+bool ModalSearch::hasModeAt(const Pole& p) const {
   return std::any_of(modes_.begin(), modes_.end(), [&](const EstimatedMode& m) {
     return std::abs(m.frequency - p.frequency) < std::max(m.frequency * m.damping_ratio, p.halfWidth());
   });
 }
 
-std::size_t ModalSearch::unmet(const std::vector<Pole>& candidates) const {
+std::size_t ModalSearch::countUnmatched(const std::vector<Pole>& candidates) const {
   return static_cast<std::size_t>(std::count_if(candidates.begin(), candidates.end(), [&](const Pole& p) {
     return std::none_of(modes_.begin(), modes_.end(), [&](const EstimatedMode& m) {
       return m.evidence >= PROVEN && std::abs(m.frequency - p.frequency) < p.halfWidth();
@@ -292,10 +292,10 @@ std::size_t ModalSearch::unmet(const std::vector<Pole>& candidates) const {
   }));
 }
 
-void ModalSearch::goOnFrom(ModalSearch other) {
-  left_ = std::move(other.left_);
+void ModalSearch::continueFrom(ModalSearch other) {
+  residual_ = std::move(other.residual_);
   modes_ = std::move(other.modes_);
-  tried_ = std::move(other.tried_);
+  tried_frequencies_ = std::move(other.tried_frequencies_);
 }
 
 bool ModalSearch::tryPole(double frequency, double damping) {
@@ -310,9 +310,10 @@ bool ModalSearch::addCandidates(std::vector<Pole> candidates) {
   std::vector<double> scores;
   for (const Pole& c : candidates) scores.push_back(score(c));
   const std::size_t all = candidates.size();
-  // However many candidates: as many tries as modes could come of them, and some.
+  // Limits the number of tries, whatever the number of candidates.
   for (std::size_t tries = 2 * modes_.size() + MOST_TRIES; tries > 0 && !candidates.empty(); --tries) {
-    if (!goOn(0.25 + 0.45 * (1.0 - static_cast<double>(candidates.size()) / static_cast<double>(all))))
+    if (!reportProgress(0.25 +
+                        0.45 * (1.0 - static_cast<double>(candidates.size()) / static_cast<double>(all))))
       return false;
     const auto best = std::max_element(scores.begin(), scores.end()) - scores.begin();
     if (!(scores[static_cast<std::size_t>(best)] > DOUBTFUL)) break;
@@ -329,14 +330,14 @@ bool ModalSearch::addCandidates(std::vector<Pole> candidates) {
   return true;
 }
 
-// The line about which most is left, in noise; 0: no more than chance gives.
-double ModalSearch::loudest() const {
+// Frequency of the largest residual relative to the noise; 0: not larger than by chance.
+double ModalSearch::frequencyOfLargestResidual() const {
   const std::size_t n = lines_.size();
   std::vector<double> power(n, 0.0);
   for (std::size_t o = 0; o < lines_.frfs(); ++o) {
     for (std::size_t i = 1; i + 1 < n; ++i) {
-      // Smooth flanks are the parabola's.
-      const Complex bend = 2.0 * left_[o][i] - left_[o][i - 1] - left_[o][i + 1];
+      // Smooth residuals belong to the background parabola.
+      const Complex bend = 2.0 * residual_[o][i] - residual_[o][i - 1] - residual_[o][i + 1];
       power[i] += std::norm(lines_.weight[o][i] * bend);
     }
   }
@@ -345,20 +346,22 @@ double ModalSearch::loudest() const {
   for (std::size_t i = 3; i + 3 < n; ++i) {
     const double f = lines_.frequency[i];
     if (!(power[i] > most)) continue;
-    const double room = std::max(3.0 * lines_.step(), 0.002 * f);
-    if (std::any_of(tried_.begin(), tried_.end(), [&](double t) { return std::abs(t - f) < room; })) continue;
+    const double margin = std::max(3.0 * lines_.step(), 0.002 * f);
+    if (std::any_of(tried_frequencies_.begin(), tried_frequencies_.end(),
+                    [&](double t) { return std::abs(t - f) < margin; }))
+      continue;
     most = power[i];
     where = f;
   }
   return where;
 }
 
-bool ModalSearch::addLoudest(int rounds) {
+bool ModalSearch::addAtLargestResidual(int rounds) {
   for (int round = 0; round < rounds; ++round) {
-    if (!goOn(0.7 + 0.15 * round / rounds)) return false;
-    const double f = loudest();
+    if (!reportProgress(0.7 + 0.15 * round / rounds)) return false;
+    const double f = frequencyOfLargestResidual();
     if (!(f > 0.0)) break;
-    tried_.push_back(f);
+    tried_frequencies_.push_back(f);
     for (const double damping : {3.0 * lines_.step() / f, 0.3 * lines_.step() / f}) {
       if (tryPole(f, std::min(damping, 0.1))) break;
     }
@@ -366,13 +369,13 @@ bool ModalSearch::addLoudest(int rounds) {
   return true;
 }
 
-bool ModalSearch::settle(int sweeps, bool last) {
+bool ModalSearch::refitAll(int sweeps, bool last) {
   for (int sweep = 0; sweep < sweeps; ++sweep) {
-    std::vector<double> due;
-    for (const EstimatedMode& m : modes_) due.push_back(m.frequency);
-    std::sort(due.begin(), due.end());
-    for (const double f : due) {
-      if (!goOn(last ? 0.85 + 0.07 * sweep : 0.2)) return false;
+    std::vector<double> frequencies;
+    for (const EstimatedMode& m : modes_) frequencies.push_back(m.frequency);
+    std::sort(frequencies.begin(), frequencies.end());
+    for (const double f : frequencies) {
+      if (!reportProgress(last ? 0.85 + 0.07 * sweep : 0.2)) return false;
       for (std::size_t k = 0; k < modes_.size(); ++k) {
         if (std::abs(modes_[k].frequency - f) > 0.1 * modes_[k].damping_ratio * f) continue;
         refit(neighbours(modes_[k].frequency, modes_[k].damping_ratio), nullptr, last && sweep + 1 == sweeps);
@@ -395,23 +398,23 @@ void ModalSearch::addByMagnitude() {
     const auto end = magnitude.begin() + static_cast<std::ptrdiff_t>(std::min(n, i + ABOUT + 1));
     if (magnitude[i] < *std::max_element(begin, end) || magnitude[i] < CLEAR_PEAK * median({begin, end}))
       continue;
-    const double f = lines_.frequency[i], room = 4.0 * lines_.step();
-    // Where the force has no power, noise stands up like a peak.
+    const double f = lines_.frequency[i], margin = 4.0 * lines_.step();
+    // Where the force has no power, noise looks like a peak.
     double noise = 0.0;
     for (std::size_t o = 0; o < lines_.frfs(); ++o)
       noise += 2.0 / (lines_.weight[o][i] * lines_.weight[o][i]);
     if (magnitude[i] < CLEAR_PEAK * std::sqrt(noise)) continue;
     const auto here = [&](const EstimatedMode& m) {
-      return std::abs(m.frequency - f) < room + m.frequency * m.damping_ratio;
+      return std::abs(m.frequency - f) < margin + m.frequency * m.damping_ratio;
     };
     if (std::any_of(modes_.begin(), modes_.end(),
                     [&](const EstimatedMode& m) { return here(m) && m.evidence >= PROVEN; }))
       continue;
     if (!fitMagnitude(magnitude, i)) continue;
-    const EstimatedMode kept = modes_.back();
+    const EstimatedMode fitted_mode = modes_.back();
     modes_.pop_back();
     modes_.erase(std::remove_if(modes_.begin(), modes_.end(), here), modes_.end());
-    modes_.push_back(kept);
+    modes_.push_back(fitted_mode);
   }
 }
 
@@ -424,21 +427,22 @@ bool ModalSearch::fitMagnitude(const std::vector<double>& magnitude, std::size_t
       static_cast<std::size_t>(std::lower_bound(lines_.frequency.begin(), lines_.frequency.end(), f.front()) -
                                lines_.frequency.begin());
   const auto count = static_cast<Index>(f.size());
-  // log |H| = log a + log |unitMode|, a where it fits best
-  const fit::FunctionResiduals residuals(count, [&](const Eigen::VectorXd& at, Eigen::VectorXd& left) {
+  // log |H| = log a + log |unitMode|, with the best a
+  const fit::FunctionResiduals residuals(count, [&](const Eigen::VectorXd& at, Eigen::VectorXd& difference) {
     for (Index i = 0; i < count; ++i) {
       const auto k = static_cast<std::size_t>(i);
-      left[i] = std::log(magnitude[first + k] / std::abs(unitMode(f[k], std::exp(at[0]), std::exp(at[1]))));
+      difference[i] =
+          std::log(magnitude[first + k] / std::abs(unitMode(f[k], std::exp(at[0]), std::exp(at[1]))));
     }
-    left.array() -= left.mean();
+    difference.array() -= difference.mean();
   });
   const double line = lines_.step() / m.frequency, at = std::log(m.frequency);
   const double narrowest = std::log(0.02 * line), widest = std::log(0.1);
   fit::Options options;
   options.name = "mode by magnitude";
-  const fit::Parameter place{at, at - 2.0 * line, at + 2.0 * line, line};
-  fit::Result found =
-      fit::minimise(residuals, {place, {std::log(0.5 * line), narrowest, widest, 0.3}}, options);
+  const fit::Parameter frequency_parameter{at, at - 2.0 * line, at + 2.0 * line, line};
+  fit::Result found = fit::minimise(
+      residuals, {frequency_parameter, {std::log(0.5 * line), narrowest, widest, 0.3}}, options);
   if (!found.usable()) return false;
   Eigen::VectorXd plain(count);
   for (Index i = 0; i < count; ++i) plain[i] = std::log(magnitude[first + static_cast<std::size_t>(i)]);
@@ -447,13 +451,14 @@ bool ModalSearch::fitMagnitude(const std::vector<double>& magnitude, std::size_t
   const double height = plain[static_cast<Index>(peak - first)];
   const double evidence = (plain.squaredNorm() - height * height - found.squares) / variance / w.limit(2);
   if (!(evidence >= PROVEN)) return false;
-  // A peak narrower than the lines bounds the damping from above only: its mean over all that the misfit
-  // allows.
+  // A peak narrower than the line spacing only gives an upper bound of the damping: the mean over all values
+  // weighted by the misfit.
   double weights = 0.0, mean = 0.0, square = 0.0;
   for (int i = 0; i <= DAMPINGS; ++i) {
     const double damping = narrowest + (widest - narrowest) * i / DAMPINGS;
     const double squares =
-        fit::minimise(residuals, {place, {damping, damping, damping, 1.0}}, options).squares - found.squares;
+        fit::minimise(residuals, {frequency_parameter, {damping, damping, damping, 1.0}}, options).squares -
+        found.squares;
     const double zeta = std::exp(damping), weight = zeta * std::exp(-0.5 * std::max(squares, 0.0) / variance);
     weights += weight;
     mean += weight * zeta;
@@ -462,9 +467,9 @@ bool ModalSearch::fitMagnitude(const std::vector<double>& magnitude, std::size_t
   mean /= weights;
   const fit::Covariance covariance = fit::covarianceOf(found.jacobian);
   found.value[1] = std::log(mean);
-  m = describe(w, w.judged(PoleList{found.value}), 0);
-  const double place_std = std::sqrt(variance) * covariance.deviation(0);
-  m.frequency_std = m.frequency * (place_std > 0.0 ? std::min(place_std, line) : line);
+  m = describe(w, w.assess(PoleList{found.value}), 0);
+  const double log_frequency_std = std::sqrt(variance) * covariance.deviation(0);
+  m.frequency_std = m.frequency * (log_frequency_std > 0.0 ? std::min(log_frequency_std, line) : line);
   m.damping_ratio_std = std::sqrt(std::max(square / weights - mean * mean, std::pow(0.01 * mean, 2)));
   m.evidence = evidence;
   modes_.push_back(m);

@@ -10,34 +10,34 @@
 
 namespace smartmill {
 
-/// Finds modes one after another in common lines: each in a window of its own with its neighbours, the others
-/// taken off.
+/// Finds modes one after another in common lines: each in its own window with its neighbours, after
+/// subtraction of the others.
 class ModalSearch {
  public:
   ModalSearch(const WeightedLines& lines, const ModalEstimateOptions& options);
 
-  /// Starts with candidates together, neighbours with neighbours, and drops the weakest until all that stay
-  /// are proven: in dense bands one mode alone proves nothing while the others are missing. @return false:
-  /// cancelled
+  /// Fits all candidates together, in groups of neighbours, and drops the weakest until all remaining ones
+  /// are significant: in dense bands a single mode is not significant while the others are missing. @return
+  /// false: cancelled
   bool startWith(std::vector<Pole> candidates);
-  /// How many of these stand where no mode is proven.
-  std::size_t unmet(const std::vector<Pole>& candidates) const;
-  /// Goes on from where another search of the same lines stands.
-  void goOnFrom(ModalSearch other);
-  /// Tries candidates in the order of what each alone explains. @return false: cancelled
+  /// Number of candidates without a significant mode nearby.
+  std::size_t countUnmatched(const std::vector<Pole>& candidates) const;
+  /// Takes over the state of another search of the same lines.
+  void continueFrom(ModalSearch other);
+  /// Tries candidates in the order of the share that each explains alone. @return false: cancelled
   bool addCandidates(std::vector<Pole> candidates);
-  /// Tries where most is left.
-  bool addLoudest(int rounds);
-  /// Fits every mode again with its neighbours as they are now, and drops what is no longer proven.
-  /// @param last with all lines and to the end
-  bool settle(int sweeps, bool last);
+  /// Tries modes at the largest residual.
+  bool addAtLargestResidual(int rounds);
+  /// Refits every mode with its present neighbours, and drops modes that are no longer significant. @param
+  /// last with all lines and to full convergence
+  bool refitAll(int sweeps, bool last);
 
-  /// Peaks that stand clear of all about them while their phase tells of no mode (few lines on a peak, random
-  /// excitation): a mode fitted to the logarithm of the magnitude.
+  /// Adds modes of clear peaks whose phase does not identify a mode (few lines on a peak, random excitation),
+  /// fitted to the logarithm of the magnitude.
   void addByMagnitude();
 
   std::size_t modes() const { return modes_.size(); }
-  /// Those that are proven, or those that are not; lowest frequency first.
+  /// The significant modes, or the others; lowest frequency first.
   std::vector<EstimatedMode> results(bool proven) const;
 
  private:
@@ -55,20 +55,20 @@ class ModalSearch {
   bool tryPole(double frequency, double damping);
   bool refit(const std::vector<std::size_t>& members, const EstimatedMode* more, bool last);
   Eigen::Index worst(const WindowFit& fit, double least) const;
-  bool taken(const Pole& p) const;
+  bool hasModeAt(const Pole& p) const;
   void fitCluster(const std::vector<Pole>& cluster);
-  void take(const std::vector<std::size_t>& members, const ModalWindow& window, const WindowFit& fit);
+  void replaceModes(const std::vector<std::size_t>& members, const ModalWindow& window, const WindowFit& fit);
   void subtract(const EstimatedMode& mode, double sign);
   bool fitMagnitude(const std::vector<double>& magnitude, std::size_t peak);
   bool inBand(double frequency, double damping) const;
-  double loudest() const;
-  bool goOn(double share) const;
+  double frequencyOfLargestResidual() const;
+  bool reportProgress(double share) const;
 
   const WeightedLines& lines_;
   const ModalEstimateOptions& options_;
-  std::vector<std::vector<std::complex<double>>> left_;  // measured less all modes
+  std::vector<std::vector<std::complex<double>>> residual_;  // measured minus all modes
   std::vector<EstimatedMode> modes_;
-  std::vector<double> tried_;  // [Hz] where addLoudest() has been
+  std::vector<double> tried_frequencies_;  // [Hz] frequencies that addAtLargestResidual() has tried
 };
 
 }  // namespace smartmill

@@ -16,9 +16,9 @@ using Eigen::VectorXd;
 
 constexpr double MIN_DAMPING = 1e-6, MAX_DAMPING = 0.5;
 constexpr Index POWERS = 3, BACKGROUND = 2 * POWERS;  // of the parabola: real and imaginary part
-/// A mode that chance shows in one of so many records is none; the bound used is five times as strict.
+/// Probability of a false mode in a record; the bound used is five times as strict.
 constexpr double CHANCE = 0.05;
-/// Misfit over noise, as powers, above which the misfit is more than noise.
+/// Ratio of the powers of misfit and noise above which the misfit is more than noise.
 constexpr double MORE_THAN_NOISE = 2.0;
 
 Eigen::Index at(std::size_t i) {
@@ -82,7 +82,7 @@ WindowShares ModalWindow::shares(std::size_t frf, const PoleList& poles) const {
   const Index m = poles.modes(), per = sharesPerMode(), rows = at(2 * lines_.size());
   WindowShares s;
   s.columns.resize(rows, m * per + BACKGROUND);
-  VectorXd due(rows);
+  VectorXd measured(rows);
   for (Index k = 0; k < m; ++k) {
     const double f0 = poles.frequency(k), zeta = poles.damping(k);
     for (std::size_t i = 0; i < lines_.size(); ++i) {
@@ -98,15 +98,15 @@ WindowShares ModalWindow::shares(std::size_t frf, const PoleList& poles) const {
   for (std::size_t i = 0; i < lines_.size(); ++i) {
     const double w = lines_.weight[frf][i];
     s.columns.block(at(2 * i), m * per, 2, BACKGROUND) = w * background_.middleRows(at(2 * i), 2);
-    due[at(2 * i)] = w * lines_.value[frf][i].real();
-    due[at(2 * i + 1)] = w * lines_.value[frf][i].imag();
+    measured[at(2 * i)] = w * lines_.value[frf][i].real();
+    measured[at(2 * i + 1)] = w * lines_.value[frf][i].imag();
   }
   const VectorXd size = s.columns.colwise().norm().cwiseMax(1e-300).cwiseInverse();
   MatrixXd normal = size.asDiagonal() * (s.columns.transpose() * s.columns) * size.asDiagonal();
   normal.diagonal().array() += 1e-12;
   s.inverse = size.asDiagonal() * linear::inverseSymmetric(normal) * size.asDiagonal();
-  s.share = s.inverse * (s.columns.transpose() * due);
-  s.left = due - s.columns * s.share;
+  s.share = s.inverse * (s.columns.transpose() * measured);
+  s.residual = measured - s.columns * s.share;
   return s;
 }
 
@@ -137,10 +137,10 @@ bool ModalWindow::evaluate(const VectorXd& at_poles, VectorXd* residual, MatrixX
   const PoleList poles{at_poles};
   for (std::size_t o = 0; o < lines_.frfs(); ++o) {
     const WindowShares s = shares(o, poles);
-    if (!s.left.allFinite()) return false;
-    residual->segment(at(o) * rows, rows) = s.left;
+    if (!s.residual.allFinite()) return false;
+    residual->segment(at(o) * rows, rows) = s.residual;
     if (!jacobian) continue;
-    // Kaufman's form: how the shares follow the poles beyond their own columns is left out.
+    // Kaufman's approximation: neglects the change of the shares outside the span of the columns.
     const MatrixXd d = slopes(o, poles, s);
     jacobian->middleRows(at(o) * rows, rows) = s.columns * (s.inverse * (s.columns.transpose() * d)) - d;
   }
@@ -148,8 +148,8 @@ bool ModalWindow::evaluate(const VectorXd& at_poles, VectorXd* residual, MatrixX
 }
 
 double ModalWindow::limit(std::size_t shares) const {
-  // Largest chi-square of so many degrees that chance gives (bound of Laurent and Massart, 2000); frequency
-  // and damping were sought too.
+  // Largest chi-square by chance (bound of Laurent and Massart, 2000); frequency and damping add two degrees
+  // of freedom.
   const auto degrees = static_cast<double>(2 + shares);
   return degrees + 2.0 * std::sqrt(degrees * chance_) + 2.0 * chance_;
 }
@@ -158,8 +158,8 @@ double ModalWindow::explained(double frequency, double damping) const {
   double with = 0.0, without = 0.0;
   const PoleList mode = PoleList().with(frequency, damping);
   for (std::size_t o = 0; o < lines_.frfs(); ++o) {
-    without += shares(o, PoleList()).left.squaredNorm();
-    with += shares(o, mode).left.squaredNorm();
+    without += shares(o, PoleList()).residual.squaredNorm();
+    with += shares(o, mode).residual.squaredNorm();
   }
   const double variance = std::max(with, 1e-30) / static_cast<double>(count());
   return (without - with) / variance / limit(static_cast<std::size_t>(sharesPerMode()) * lines_.frfs());
@@ -168,8 +168,8 @@ double ModalWindow::explained(double frequency, double damping) const {
 PoleList ModalWindow::refined(const PoleList& start, int iterations, double tolerance) const {
   std::vector<fit::Parameter> parameters(static_cast<std::size_t>(start.p.size()));
   for (Index k = 0; k < start.modes(); ++k) {
-    const double f = start.p[2 * k], zeta = start.damping(k), room = std::max(0.02, 2.0 * zeta);
-    parameters[static_cast<std::size_t>(2 * k)] = {f, f - room, f + room, std::max(1e-5, 0.1 * zeta)};
+    const double f = start.p[2 * k], zeta = start.damping(k), margin = std::max(0.02, 2.0 * zeta);
+    parameters[static_cast<std::size_t>(2 * k)] = {f, f - margin, f + margin, std::max(1e-5, 0.1 * zeta)};
     parameters[static_cast<std::size_t>(2 * k + 1)] = {start.p[2 * k + 1], std::log(MIN_DAMPING),
                                                        std::log(MAX_DAMPING), 0.1};
   }
@@ -183,19 +183,19 @@ PoleList ModalWindow::refined(const PoleList& start, int iterations, double tole
   return found.usable() ? PoleList{found.value} : start;
 }
 
-WindowFit ModalWindow::judged(const PoleList& poles) const {
+WindowFit ModalWindow::assess(const PoleList& poles) const {
   WindowFit f;
   f.poles = poles;
   const Index m = poles.modes();
-  std::vector<MatrixXd> follows;  // how shares follow the poles
+  std::vector<MatrixXd> share_slopes;  // derivatives of the shares with respect to the poles
   MatrixXd information = MatrixXd::Zero(2 * m, 2 * m);
   for (std::size_t o = 0; o < lines_.frfs(); ++o) {
     f.frfs.push_back(shares(o, poles));
     const WindowShares& s = f.frfs.back();
-    f.squares += s.left.squaredNorm();
+    f.squares += s.residual.squaredNorm();
     const MatrixXd d = slopes(o, poles, s), along = s.columns.transpose() * d;
-    follows.push_back(s.inverse * along);
-    information += d.transpose() * d - along.transpose() * follows.back();
+    share_slopes.push_back(s.inverse * along);
+    information += d.transpose() * d - along.transpose() * share_slopes.back();
   }
   if (m == 0) return f;
   const VectorXd size = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
@@ -203,14 +203,16 @@ WindowFit ModalWindow::judged(const PoleList& poles) const {
   scaled.diagonal().array() += 1e-10;
   f.pole_covariance = size.asDiagonal() * linear::inverseSymmetric(scaled) * size.asDiagonal();
   for (std::size_t o = 0; o < lines_.frfs(); ++o)
-    f.covariance.push_back(f.frfs[o].inverse + follows[o] * f.pole_covariance * follows[o].transpose());
-  f.alike = alike(f);
+    f.covariance.push_back(f.frfs[o].inverse +
+                           share_slopes[o] * f.pole_covariance * share_slopes[o].transpose());
+  f.redundancy = redundancy(f);
   for (Index k = 0; k < m; ++k) f.variance.push_back(localVariance(f, k));
   for (Index k = 0; k < m; ++k) f.evidence.push_back(evidence(f, k));
   return f;
 }
 
-// Misfit where a mode acts, with the correlation from line to line: coloured misfit tells less.
+// Variance of the misfit around a mode, including its correlation from line to line, which reduces the
+// information.
 double ModalWindow::localVariance(const WindowFit& fit, Index mode) const {
   const std::size_t n = lines_.size();
   const double f0 = fit.poles.frequency(mode),
@@ -220,9 +222,10 @@ double ModalWindow::localVariance(const WindowFit& fit, Index mode) const {
     for (std::size_t i = 0; i < n; ++i) {
       const double far = (lines_.frequency[i] - f0) / reach, share = 1.0 / (1.0 + far * far / 9.0);
       const Index row = at(2 * i);
-      power += share * (s.left[row] * s.left[row] + s.left[row + 1] * s.left[row + 1]);
+      power += share * (s.residual[row] * s.residual[row] + s.residual[row + 1] * s.residual[row + 1]);
       weight += 2.0 * share;
-      if (i + 1 < n) along += share * (s.left[row] * s.left[row + 2] + s.left[row + 1] * s.left[row + 3]);
+      if (i + 1 < n)
+        along += share * (s.residual[row] * s.residual[row + 2] + s.residual[row + 1] * s.residual[row + 3]);
     }
   }
   const double numbers = static_cast<double>(2 * n * lines_.frfs());
@@ -230,17 +233,17 @@ double ModalWindow::localVariance(const WindowFit& fit, Index mode) const {
       static_cast<double>(2 * fit.poles.modes() + at(lines_.frfs()) * fit.frfs[0].share.size());
   const double variance = power / weight * numbers / std::max(numbers - fitted, 0.1 * numbers);
   const double correlation = std::clamp(along / std::max(power, 1e-300), 0.0, 0.98);
-  return std::max(variance, 1e-30) * (1.0 + correlation) / (1.0 - correlation) * fit.alike;
+  return std::max(variance, 1e-30) * (1.0 + correlation) / (1.0 - correlation) * fit.redundancy;
 }
 
-// Misfit that the FRFs share (a hammer's ripple is in all of them) tells no more in many of them than in one:
-// n over the effective number of FRFs, sum of the squared correlations of their misfits.
-double ModalWindow::alike(const WindowFit& fit) const {
+// Misfit common to all FRFs (for example a hammer's ripple) carries no more information than in one. Number
+// of FRFs over their effective number, from the sum of the squared correlations of their misfits.
+double ModalWindow::redundancy(const WindowFit& fit) const {
   const std::size_t n = lines_.frfs();
   double sum = 0.0;
   for (std::size_t a = 0; a < n; ++a) {
     for (std::size_t b = 0; b < n; ++b) {
-      const VectorXd &p = fit.frfs[a].left, &q = fit.frfs[b].left;
+      const VectorXd &p = fit.frfs[a].residual, &q = fit.frfs[b].residual;
       Complex along;
       for (Index i = 0; i + 1 < p.size(); i += 2) along += Complex(p[i], -p[i + 1]) * Complex(q[i], q[i + 1]);
       sum += std::norm(along) / std::max(p.squaredNorm() * q.squaredNorm(), 1e-300);
@@ -249,8 +252,8 @@ double ModalWindow::alike(const WindowFit& fit) const {
   return std::max(1.0, sum / static_cast<double>(n));
 }
 
-// What the other modes cannot stand in for: near 0 where two sit on one another or cancel.
-double ModalWindow::apart(const WindowFit& fit, Index mode) const {
+// Share of a mode that the other modes cannot represent: near 0 where two coincide or cancel.
+double ModalWindow::separability(const WindowFit& fit, Index mode) const {
   const Index per = sharesPerMode();
   const auto contribution = [&](const WindowShares& s, Index k) -> VectorXd {
     return s.columns.middleCols(k * per, per) * s.share.segment(k * per, per);
@@ -273,8 +276,8 @@ double ModalWindow::apart(const WindowFit& fit, Index mode) const {
   return least;
 }
 
-// Share of a mode that one single line carries: hum, a spike.
-double ModalWindow::onOneLine(const WindowFit& fit, Index mode) const {
+// Share of a mode in a single line, as with hum or a spike.
+double ModalWindow::singleLineShare(const WindowFit& fit, Index mode) const {
   const Index per = sharesPerMode();
   double all = 0.0, largest = 0.0;
   VectorXd power = VectorXd::Zero(at(lines_.size()));
@@ -296,23 +299,24 @@ double ModalWindow::evidence(const WindowFit& fit, Index mode) const {
     const double part = x.dot(linear::solve(c, x));
     if (std::isfinite(part)) wald += part;
   }
-  wald *= apart(fit, mode) * (1.0 - onOneLine(fit, mode)) / fit.variance[static_cast<std::size_t>(mode)];
+  wald *= separability(fit, mode) * (1.0 - singleLineShare(fit, mode)) /
+          fit.variance[static_cast<std::size_t>(mode)];
   return wald / limit(static_cast<std::size_t>(per) * fit.frfs.size());
 }
 
 bool ModalWindow::addMisfit(const WindowFit& fit) {
   bool changed = false;
   for (std::size_t o = 0; o < lines_.frfs(); ++o) {
-    double left = 0.0, noise = 0.0;
+    double misfit = 0.0, noise = 0.0;
     for (std::size_t i = 0; i < lines_.size(); ++i) {
       const double square = lines_.weight[o][i] * lines_.weight[o][i];
-      left += fit.frfs[o].left.segment<2>(at(2 * i)).squaredNorm() / square;
+      misfit += fit.frfs[o].residual.segment<2>(at(2 * i)).squaredNorm() / square;
       noise += 2.0 / square;
     }
-    if (!(left > MORE_THAN_NOISE * noise) &&
-        !(fit.frfs[o].left.squaredNorm() > MORE_THAN_NOISE * static_cast<double>(2 * lines_.size())))
+    if (!(misfit > MORE_THAN_NOISE * noise) &&
+        !(fit.frfs[o].residual.squaredNorm() > MORE_THAN_NOISE * static_cast<double>(2 * lines_.size())))
       continue;
-    const double even = std::max(0.0, left - noise) / static_cast<double>(2 * lines_.size());
+    const double even = std::max(0.0, misfit - noise) / static_cast<double>(2 * lines_.size());
     for (double& w : lines_.weight[o]) w = 1.0 / std::sqrt(1.0 / (w * w) + even);
     changed = true;
   }

@@ -10,7 +10,7 @@
 
 namespace smartmill {
 
-/// Logarithms of frequency [Hz] and damping ratio of each mode in turn.
+/// Logarithms of frequency [Hz] and damping ratio of each mode.
 struct PoleList {
   Eigen::VectorXd p = Eigen::VectorXd(0);
 
@@ -25,34 +25,33 @@ struct PoleList {
 /// f_n^2 / (f_n^2 - f^2 + 2 i zeta f_n f)
 std::complex<double> unitMode(double f, double f0, double zeta);
 
-/// What stands linearly in one FRF once the poles are given: of each mode gain and phase part,
-/// (gain + i phase_part f / f_n) unitMode, and a complex parabola for all that lies outside the window.
+/// Linear parameters of one FRF for given poles: gain and phase part of each mode, (gain + i phase_part f /
+/// f_n) unitMode, and a complex parabola as background of everything outside the window.
 struct WindowShares {
-  Eigen::MatrixXd columns;  // 2 lines x shares, weighted; real and imaginary part of a line in turn
-  Eigen::VectorXd share;    // [unit]
-  Eigen::VectorXd left;     // weighted (measured - fitted)
-  Eigen::MatrixXd inverse;  // of the normal equations
+  Eigen::MatrixXd columns;   // 2 lines x shares, weighted; real and imaginary part of each line
+  Eigen::VectorXd share;     // [unit]
+  Eigen::VectorXd residual;  // weighted (measured - fitted)
+  Eigen::MatrixXd inverse;   // of the normal equations
 };
 
-/// A fit over a few modes' lines, with what it proves.
+/// A fit over the lines of a few modes, with their evidence.
 struct WindowFit {
   PoleList poles;
   std::vector<WindowShares> frfs;
-  double squares = 0.0;                     // of all that is left
-  double alike = 1.0;                       // FRFs over those whose misfit tells something of its own
+  double squares = 0.0;                     // sum of squared residuals
+  double redundancy = 1.0;                  // number of FRFs over the effective number of independent ones
   Eigen::MatrixXd pole_covariance;          // for residuals of variance 1
-  std::vector<Eigen::MatrixXd> covariance;  // of each FRF's shares, the poles' part included
-  std::vector<double>
-      variance;  // [1] of the misfit about each mode, times the lines over which it hangs together
-  std::vector<double> evidence;  // of each mode: Wald's statistic over what chance gives at most
+  std::vector<Eigen::MatrixXd> covariance;  // of each FRF's shares, including the contribution of the poles
+  std::vector<double> variance;  // [1] of the misfit around each mode, times the number of correlated lines
+  std::vector<double> evidence;  // of each mode: Wald statistic over its largest value by chance
 
   Eigen::Index weakest() const;
 };
 
-/// Modes in a stretch of lines. Variable projection: the search goes over the poles alone.
+/// Modes in an interval of lines, by variable projection: the search is over the poles only.
 class ModalWindow : public fit::Residuals {
  public:
-  /// @param lines_searched how many lines could have shown a mode by chance
+  /// @param lines_searched number of lines that could show a mode by chance
   ModalWindow(WeightedLines lines, bool real_modes, std::size_t lines_searched);
 
   Eigen::Index count() const override;
@@ -63,25 +62,26 @@ class ModalWindow : public fit::Residuals {
   const WeightedLines& lines() const { return lines_; }
 
   WindowShares shares(std::size_t frf, const PoleList& poles) const;
-  /// Most that a chi-square shows by chance where so many shares stand for a mode.
+  /// Largest chi-square by chance of a mode with this number of shares.
   double limit(std::size_t shares) const;
-  /// What one mode explains of the lines, over what chance gives; the misfit counted as noise without colour.
+  /// Share of the lines that one mode explains, over its largest value by chance, with the misfit as white
+  /// noise.
   double explained(double frequency, double damping) const;
-  /// Poles where the misfit is least.
+  /// Poles of least misfit.
   PoleList refined(const PoleList& start, int iterations, double tolerance) const;
-  WindowFit judged(const PoleList& poles) const;
-  /// Takes the misfit into the weights where it is more than noise: repeatable, as large all over the
-  /// window.
+  WindowFit assess(const PoleList& poles) const;
+  /// Includes the misfit in the weights where it exceeds the noise, as repeatable misfit of uniform size in
+  /// the window.
   /// @return whether weights changed
   bool addMisfit(const WindowFit& fit);
 
  private:
   Eigen::MatrixXd slopes(std::size_t frf, const PoleList& poles, const WindowShares& shares) const;
   double localVariance(const WindowFit& fit, Eigen::Index mode) const;
-  double alike(const WindowFit& fit) const;
+  double redundancy(const WindowFit& fit) const;
   double evidence(const WindowFit& fit, Eigen::Index mode) const;
-  double apart(const WindowFit& fit, Eigen::Index mode) const;
-  double onOneLine(const WindowFit& fit, Eigen::Index mode) const;
+  double separability(const WindowFit& fit, Eigen::Index mode) const;
+  double singleLineShare(const WindowFit& fit, Eigen::Index mode) const;
 
   WeightedLines lines_;
   bool real_modes_;

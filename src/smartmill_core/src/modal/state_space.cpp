@@ -25,7 +25,7 @@ StateSpace stateSpace(const ModalModel& model) {
 std::pair<Eigen::MatrixXd, Eigen::MatrixXd> discretiseNoise(const Eigen::MatrixXd& a,
                                                             const Eigen::MatrixXd& q, double dt) {
   const Eigen::Index n = a.rows();
-  // exp(-A dt) grows where exp(A dt) decays: a short step, doubled, loses no digits.
+  // exp(-A dt) grows where exp(A dt) decays; doubling from a short step avoids the loss of digits.
   int doublings = 0;
   double step = dt;
   while (a.size() > 0 && a.cwiseAbs().rowwise().sum().maxCoeff() * std::abs(step) > 0.5) {

@@ -38,7 +38,7 @@ CauseOdds readCauseOdds(const std::string& file) {
   odds.other = yaml.number("other_odds", Range::positive());
   if (const auto listed = yaml.optionalMap("odds")) {
     for (const std::string& effect : listed->keys()) {
-      if (!findEffect(effect)) listed->fail(effect, "is no effect of the catalogue");
+      if (!findEffect(effect)) listed->fail(effect, "is not an effect of the catalogue");
       odds.listed[effect] = listed->number(effect, Range::positive());
     }
     listed->finish();

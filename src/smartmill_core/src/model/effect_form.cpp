@@ -171,7 +171,7 @@ EffectCoordinates tipMode(char axis) {
            {"ln " + name + " damping_ratio", damping_ratio, std::log(0.003), std::log(0.4), 5e-4, 1.0},
            {name + " compliance_um_per_kn", 0.0, 0.0, 1000.0, 5e-3, 100.0}},
           [=](const double* v, EffectEntry& e) {
-            if (v[2] <= 0.0) return;  // without compliance there is no mode
+            if (v[2] <= 0.0) return;  // zero compliance: no mode
             Mode mode;
             mode.frequency = std::exp(v[0]);
             mode.damping_ratio = std::exp(v[1]);

@@ -31,7 +31,7 @@ bool anyModes(const ForceSensor& sensor) {
                      [](const ModalModel& axis) { return !axis.modes.empty(); });
 }
 
-std::optional<std::string> lackingFor(EffectNeed need, const EffectScope& scope) {
+std::optional<std::string> missingNeed(EffectNeed need, const EffectScope& scope) {
   const MachineModel& model = scope.nominal;
   const auto unless = [](bool met, const char* reason) {
     return met ? std::optional<std::string>() : std::string(reason);
@@ -135,10 +135,10 @@ const EffectParameter& parameterOf(const EffectKind& kind, const std::string& na
   return *parameter;
 }
 
-std::optional<std::string> lackingFor(const EffectKind& kind, const EffectScope& scope) {
+std::optional<std::string> missingNeed(const EffectKind& kind, const EffectScope& scope) {
   std::optional<std::string> reason;
   for (const EffectNeed need : kind.needs) {
-    const std::optional<std::string> lacking = lackingFor(need, scope);
+    const std::optional<std::string> lacking = missingNeed(need, scope);
     if (lacking && lacking->empty()) return lacking;  // reported before any other reason
     if (lacking && !reason) reason = lacking;
   }

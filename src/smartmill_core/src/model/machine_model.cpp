@@ -18,7 +18,7 @@ namespace {
 
 constexpr double NOT_KNOWN = std::numeric_limits<double>::quiet_NaN();
 constexpr const char* FORMAT = "smartmill-model/1";
-// A pitch list is written with a few digits.
+// Pitch lists have few digits.
 constexpr double PITCH_SUM_TOLERANCE_DEG = 1e-3;
 constexpr const char* AXES[3] = {"x", "y", "z"};
 
@@ -28,7 +28,7 @@ const Range NOT_NEGATIVE = Range::notNegative();
 const Range HELIX_DEG{0.0, 80.0, false, true};
 const Range DAMPING{0.0, 1.0, true, true};
 
-/// What the static share of a mode is called in the file.
+/// Key of a mode's static gain in the file.
 enum class ModeKind { stiffness, gain };
 
 double stdDev(const StrictYaml& map, const std::string& key) {
@@ -58,13 +58,13 @@ std::vector<Mode> readModes(const StrictYaml& parent, const std::string& key, Mo
   return modes;
 }
 
-// One value a tooth (any number of teeth: 0). @param sum of pitches
+// One value per tooth (teeth 0: any number). @param sum of the pitches
 std::vector<double> readPerTooth(const StrictYaml& map, const std::string& key, std::size_t teeth,
                                  const Range& range, std::optional<double> sum) {
   const std::vector<double> list = map.numbers(key, teeth, range);
   const double is = std::accumulate(list.begin(), list.end(), 0.0);
   if (sum && std::abs(is - *sum) > PITCH_SUM_TOLERANCE_DEG)
-    map.fail(key, "the pitches sum to " + yamlNumber(is) + ", " + shortNumber(*sum) + " is due");
+    map.fail(key, "the pitches sum to " + yamlNumber(is) + ", expected " + shortNumber(*sum));
   return list;
 }
 
@@ -106,7 +106,7 @@ void readForceSensor(const StrictYaml& map, ForceSensor& sensor) {
     sensor.axis[a].modes = readModes(map, AXES[a], ModeKind::gain);
     double sum = 0.0;
     for (const Mode& mode : sensor.axis[a].modes) sum += mode.gain;
-    // 0.9 + 0.1 in binary may pass one by a bit.
+    // 0.9 + 0.1 in binary may exceed 1 by rounding.
     if (sum > 1.0 + 1e-9) map.fail(AXES[a], "the gains sum to " + yamlNumber(sum) + ", out of range (<= 1)");
     sensor.axis[a].direct = 1.0 - sum;
   }
@@ -191,23 +191,25 @@ Workpiece readWorkpiece(const StrictYaml& map) {
   w.low = readPoint(map, "low_mm");
   w.high = readPoint(map, "high_mm");
   for (std::size_t a = 0; a < 3; ++a) {
-    if (!(w.high[a] > w.low[a])) map.fail("high_mm", "lies not above low_mm in " + std::string(AXES[a]));
+    if (!(w.high[a] > w.low[a]))
+      map.fail("high_mm", "expected a value above low_mm in " + std::string(AXES[a]));
   }
   map.finish();
   return w;
 }
 
-// The effect that an entry names; one without a name is told by stage and form.
+// The effect of an entry; an empirical one is identified by stage and form.
 const EffectKind& kindOf(const StrictYaml& map) {
   const std::string name = map.word("name");
   if (name == EMPIRICAL) {
     const std::string stage = map.word("stage"), form = map.word("form");
     const EffectKind* kind = findEmpirical(stage, form);
-    if (!kind) map.fail("form", "'" + form + "' is no form of an empirical effect of stage '" + stage + "'");
+    if (!kind)
+      map.fail("form", "'" + form + "' is not a form of an empirical effect of stage '" + stage + "'");
     return *kind;
   }
   const EffectKind* kind = findEffect(name);
-  if (!kind || kind->empirical()) map.fail("name", "'" + name + "' is no effect of the catalogue");
+  if (!kind || kind->empirical()) map.fail("name", "'" + name + "' is not an effect of the catalogue");
   return *kind;
 }
 
@@ -313,7 +315,7 @@ void writeModes(std::ostream& out, const std::string& indent, const std::string&
 
 void writeEffect(std::ostream& out, const EffectEntry& effect) {
   const EffectKind* kind = findEffect(effect.name);
-  if (!kind) throw Error("model: effects: '" + effect.name + "' is no effect of the catalogue");
+  if (!kind) throw Error("model: effects: '" + effect.name + "' is not an effect of the catalogue");
   out << "- name: " << (kind->empirical() ? EMPIRICAL : yamlWord(effect.name)) << "\n";
   if (kind->empirical())
     out << "  stage: " << yamlWord(kind->form_stage) << "\n  form: " << yamlWord(kind->form) << "\n";

@@ -15,8 +15,8 @@ namespace smartmill {
 
 namespace {
 
-// The value as it stands in the file, in one line.
-std::string shown(const YAML::Node& node) {
+// A value of the file for messages, in one line.
+std::string displayed(const YAML::Node& node) {
   switch (node.Type()) {
     case YAML::NodeType::Scalar:
       return "'" + node.Scalar() + "'";
@@ -33,7 +33,7 @@ bool quoted(const YAML::Node& node) {
   return node.Tag() == "!";
 }
 
-// YAML's plain numbers; no hexadecimal, no words.
+// YAML's decimal numbers; no hexadecimal, no words.
 bool parse(const YAML::Node& node, double* value) {
   if (!node.IsScalar() || quoted(node)) return false;
   const std::string& text = node.Scalar();
@@ -68,10 +68,10 @@ struct StrictYaml::Impl {
     impl->node.reset(node);
     impl->file = file;
     impl->path = path;
-    std::set<std::string> seen;
+    std::set<std::string> names;
     for (const auto& entry : node) {
       const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : "?";
-      if (!seen.insert(key).second) throw Error(file + ": " + path + key + ": the key stands twice");
+      if (!names.insert(key).second) throw Error(file + ": " + path + key + ": the key occurs twice");
     }
     return impl;
   }
@@ -92,7 +92,7 @@ StrictYaml StrictYaml::fromFile(const std::string& file) {
     throw Error(file + ": not a YAML file: " + lineOf(error.what()));
   }
   if (root.IsNull()) throw Error(file + ": is empty");
-  if (!root.IsMap()) throw Error(file + ": keys are due, but it is " + shown(root));
+  if (!root.IsMap()) throw Error(file + ": expected a map of keys, found " + displayed(root));
   return StrictYaml(Impl::make(root, file, ""));
 }
 
@@ -123,15 +123,15 @@ double StrictYaml::number(const std::string& key, const Range& range) const {
   if (!node.IsDefined()) fail(key, "is missing");
   impl_->read.insert(key);
   double value = 0.0;
-  if (!parse(node, &value)) fail(key, shown(node) + " is not a number");
-  if (!std::isfinite(value)) fail(key, shown(node) + " is not a finite number");
+  if (!parse(node, &value)) fail(key, displayed(node) + " is not a number");
+  if (!std::isfinite(value)) fail(key, displayed(node) + " is not a finite number");
   if (!range.contains(value)) fail(key, outOfRange(value, range));
   return value;
 }
 
 int StrictYaml::integer(const std::string& key, int low, int high) const {
   const double value = number(key, {static_cast<double>(low), static_cast<double>(high), false, false});
-  if (value != std::floor(value)) fail(key, shortNumber(value) + " is not a whole number");
+  if (value != std::floor(value)) fail(key, shortNumber(value) + " is not an integer");
   return static_cast<int>(value);
 }
 
@@ -139,37 +139,37 @@ std::string StrictYaml::word(const std::string& key) const {
   const YAML::Node node = impl_->find(key);
   if (!node.IsDefined()) fail(key, "is missing");
   impl_->read.insert(key);
-  if (!node.IsScalar()) fail(key, shown(node) + " is not a word");
+  if (!node.IsScalar()) fail(key, displayed(node) + " is not a word");
   if (node.Scalar().empty()) fail(key, "is empty");
   return node.Scalar();
 }
 
 std::string StrictYaml::oneOf(const std::string& key, const std::vector<std::string>& words) const {
   const std::string value = word(key);
-  std::string due;
+  std::string allowed;
   for (const std::string& candidate : words) {
     if (value == candidate) return value;
-    due += (due.empty() ? "" : " | ") + candidate;
+    allowed += (allowed.empty() ? "" : " | ") + candidate;
   }
-  fail(key, "'" + value + "' is not one of " + due);
+  fail(key, "'" + value + "' is not one of " + allowed);
 }
 
 std::vector<double> StrictYaml::numbers(const std::string& key, std::size_t count, const Range& range) const {
   const YAML::Node node = impl_->find(key);
   if (!node.IsDefined()) fail(key, "is missing");
   impl_->read.insert(key);
-  if (!node.IsSequence()) fail(key, shown(node) + " is not a list of numbers");
+  if (!node.IsSequence()) fail(key, displayed(node) + " is not a list of numbers");
   if (count == 0 ? node.size() == 0 : node.size() != count) {
-    fail(key, "a list of " + std::to_string(node.size()) + ", " +
-                  (count ? std::to_string(count) : "one or more") + " numbers are due");
+    fail(key, "a list of " + std::to_string(node.size()) + ", expected " +
+                  (count ? std::to_string(count) : "one or more") + " numbers");
   }
   std::vector<double> values;
   for (std::size_t i = 0; i < node.size(); ++i) {
-    const std::string place = key + "[" + std::to_string(i) + "]";
+    const std::string item = key + "[" + std::to_string(i) + "]";
     double value = 0.0;
-    if (!parse(node[i], &value)) fail(place, shown(node[i]) + " is not a number");
-    if (!std::isfinite(value)) fail(place, shown(node[i]) + " is not a finite number");
-    if (!range.contains(value)) fail(place, outOfRange(value, range));
+    if (!parse(node[i], &value)) fail(item, displayed(node[i]) + " is not a number");
+    if (!std::isfinite(value)) fail(item, displayed(node[i]) + " is not a finite number");
+    if (!range.contains(value)) fail(item, outOfRange(value, range));
     values.push_back(value);
   }
   return values;
@@ -179,7 +179,7 @@ StrictYaml StrictYaml::map(const std::string& key) const {
   const YAML::Node node = impl_->find(key);
   if (!node.IsDefined()) fail(key, "is missing");
   impl_->read.insert(key);
-  if (!node.IsMap()) fail(key, shown(node) + " is not a map of keys");
+  if (!node.IsMap()) fail(key, displayed(node) + " is not a map of keys");
   return StrictYaml(Impl::make(node, impl_->file, impl_->path + key + "."));
 }
 
@@ -187,12 +187,12 @@ std::vector<StrictYaml> StrictYaml::maps(const std::string& key) const {
   const YAML::Node node = impl_->find(key);
   if (!node.IsDefined()) fail(key, "is missing");
   impl_->read.insert(key);
-  if (!node.IsSequence()) fail(key, shown(node) + " is not a list");
+  if (!node.IsSequence()) fail(key, displayed(node) + " is not a list");
   std::vector<StrictYaml> list;
   for (std::size_t i = 0; i < node.size(); ++i) {
-    const std::string place = key + "[" + std::to_string(i) + "]";
-    if (!node[i].IsMap()) fail(place, shown(node[i]) + " is not a map of keys");
-    list.push_back(StrictYaml(Impl::make(node[i], impl_->file, impl_->path + place + ".")));
+    const std::string item = key + "[" + std::to_string(i) + "]";
+    if (!node[i].IsMap()) fail(item, displayed(node[i]) + " is not a map of keys");
+    list.push_back(StrictYaml(Impl::make(node[i], impl_->file, impl_->path + item + ".")));
   }
   return list;
 }
@@ -210,13 +210,13 @@ std::optional<StrictYaml> StrictYaml::optionalMap(const std::string& key) const 
 void StrictYaml::finish() const {
   for (const auto& entry : impl_->node) {
     const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : "?";
-    if (!impl_->read.count(key)) fail(key, "unknown key (its value: " + shown(entry.second) + ")");
+    if (!impl_->read.count(key)) fail(key, "unknown key (its value: " + displayed(entry.second) + ")");
   }
 }
 
 namespace {
 
-// YAML 1.1 takes 5e-05 for a word: a point is due.
+// YAML 1.1 parses 5e-05 as a word: a point is required.
 std::string withPoint(std::string number) {
   if (number.find_first_of(".n") == std::string::npos) {
     const std::size_t exponent = number.find('e');

@@ -17,12 +17,12 @@ void set(const Parameter& parameter, const std::string& option, const std::strin
     used = 0;
   }
   if (used != text.size()) throw Error(option + ": '" + text + "' is not a number");
-  if (const auto* place = std::get_if<double*>(&parameter.place)) {
-    **place = number;
+  if (const auto* address = std::get_if<double*>(&parameter.address)) {
+    **address = number;
   } else {
-    int* const place_of_int = std::get<int*>(parameter.place);
-    *place_of_int = static_cast<int>(number);
-    if (*place_of_int != number) throw Error(option + ": '" + text + "' is not a whole number");
+    int* const integer = std::get<int*>(parameter.address);
+    *integer = static_cast<int>(number);
+    if (*integer != number) throw Error(option + ": '" + text + "' is not an integer");
   }
 }
 
@@ -30,7 +30,7 @@ void set(const Parameter& parameter, const std::string& option, const std::strin
 
 ParameterOptions::ParameterOptions(CommandLine& line, const ParameterTable& table, const std::string& shipped)
     : line_(line), table_(table) {
-  line.option("--params", file_, "parameter file, as the node's (" + shipped + "; its keys below)");
+  line.option("--params", file_, "parameter file in the format of " + shipped + " (keys below)");
   line.footer("\n" + table.yaml());
 }
 

@@ -43,7 +43,7 @@ ParameterValue typed(const YAML::Node& node) {
 
 std::string describe(const ParameterValue& value) {
   if (const bool* flag = std::get_if<bool>(&value.value))
-    return *flag ? "'true' is a truth value" : "'false' is a truth value";
+    return *flag ? "'true' is a boolean" : "'false' is a boolean";
   if (const int* integer = std::get_if<int>(&value.value))
     return "'" + std::to_string(*integer) + "' is an integer";
   if (const double* real = std::get_if<double>(&value.value))
@@ -161,7 +161,7 @@ void ParameterReader::read(const std::string& key, std::array<double, 3>& value)
 void ParameterReader::read(const ParameterTable& table) {
   for (const Parameter& parameter : table.parameters()) {
     if (parameter.where == Parameter::Where::internal) continue;
-    std::visit([&](auto* place) { read(parameter.key, *place); }, parameter.place);
+    std::visit([&](auto* address) { read(parameter.key, *address); }, parameter.address);
   }
   try {
     table.check();

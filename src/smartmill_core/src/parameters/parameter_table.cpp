@@ -12,7 +12,7 @@ namespace smartmill {
 namespace {
 
 constexpr std::size_t WIDTH = 140;       // of a line of the file
-constexpr std::size_t LAST_COLUMN = 36;  // of comments; a longer value pushes its own comment on
+constexpr std::size_t LAST_COLUMN = 36;  // of comments; a longer value moves its comment to the right
 
 std::string joined(const std::vector<std::string>& words, const std::string& between) {
   std::string text;
@@ -50,12 +50,12 @@ std::string written(const std::array<double, 3>& values) {
 }
 
 // Numbers of a value, for the bounds; none of text and flags.
-std::vector<double> numbers(const Parameter::Place& place) {
-  if (const auto* value = std::get_if<double*>(&place)) return {**value};
-  if (const auto* value = std::get_if<int*>(&place)) return {static_cast<double>(**value)};
-  if (const auto* value = std::get_if<std::uint64_t*>(&place)) return {static_cast<double>(**value)};
-  if (const auto* value = std::get_if<std::vector<double>*>(&place)) return **value;
-  if (const auto* value = std::get_if<std::array<double, 3>*>(&place))
+std::vector<double> numbers(const Parameter::Address& address) {
+  if (const auto* value = std::get_if<double*>(&address)) return {**value};
+  if (const auto* value = std::get_if<int*>(&address)) return {static_cast<double>(**value)};
+  if (const auto* value = std::get_if<std::uint64_t*>(&address)) return {static_cast<double>(**value)};
+  if (const auto* value = std::get_if<std::vector<double>*>(&address)) return **value;
+  if (const auto* value = std::get_if<std::array<double, 3>*>(&address))
     return {(*value)->begin(), (*value)->end()};
   return {};
 }
@@ -69,7 +69,7 @@ std::string bounds(const Range& range) {
   return closed && both ? shortNumber(range.low) + ".." + shortNumber(range.high) : text;
 }
 
-// Words of a comment in lines that stay within the width, each behind the same begin.
+// Wraps a comment within the width; further lines are indented like the first.
 void wrap(std::ostream& out, const std::string& text, std::string begin) {
   const std::string further = std::string(begin.size(), ' ') + "# ";
   begin += "# ";
@@ -91,7 +91,7 @@ void wrap(std::ostream& out, const std::string& text, std::string begin) {
 }  // namespace
 
 std::string Parameter::value() const {
-  return std::visit([](const auto* it) { return written(*it); }, place);
+  return std::visit([](const auto* it) { return written(*it); }, address);
 }
 
 std::string Parameter::description() const {
@@ -100,10 +100,10 @@ std::string Parameter::description() const {
 }
 
 void Parameter::check() const {
-  for (const double number : numbers(place)) {
+  for (const double number : numbers(address)) {
     if (!range.contains(number)) throw Error(key + ": " + outOfRange(number, range, unit));
   }
-  const auto* text = std::get_if<std::string*>(&place);
+  const auto* text = std::get_if<std::string*>(&address);
   if (!text || words.empty() || std::find(words.begin(), words.end(), **text) != words.end()) return;
   throw Error(key + ": '" + **text + "' is not one of " + joined(words, " | "));
 }

@@ -31,7 +31,7 @@ class Plan {
   Plan(std::size_t n, double* real, fftw_complex* complex, bool forward) {
     const std::lock_guard<std::mutex> lock(planner_mutex);
     const int size = static_cast<int>(n);
-    // ESTIMATE: the same plan at every run, so that results repeat to the last digit.
+    // ESTIMATE: the same plan in every run, so that results are reproducible to the last digit.
     plan_ = forward ? fftw_plan_dft_r2c_1d(size, real, complex, FFTW_ESTIMATE)
                     : fftw_plan_dft_c2r_1d(size, complex, real, FFTW_ESTIMATE);
   }
@@ -48,23 +48,23 @@ class Plan {
   fftw_plan plan_;
 };
 
-// Of the lengths that were asked for last: a plan costs more than the transform. It serves any memory of
-// FFTW's own allocation.
+// Cache of the most recently used lengths: a plan costs more than the transform. It is valid for any memory
+// allocated by FFTW.
 std::shared_ptr<const Plan> planOf(std::size_t n, double* real, fftw_complex* complex, bool forward) {
   constexpr std::size_t KEPT = 16;
   using Key = std::pair<std::size_t, bool>;
   static std::mutex mutex;
-  static std::deque<std::pair<Key, std::shared_ptr<const Plan>>> kept;  // newest use first
+  static std::deque<std::pair<Key, std::shared_ptr<const Plan>>> cache;  // most recently used first
   const Key key{n, forward};
   const std::lock_guard<std::mutex> lock(mutex);
-  const auto found = std::find_if(kept.begin(), kept.end(), [&](const auto& k) { return k.first == key; });
-  if (found != kept.end()) {
-    std::rotate(kept.begin(), found, found + 1);
-    return kept.front().second;
+  const auto found = std::find_if(cache.begin(), cache.end(), [&](const auto& k) { return k.first == key; });
+  if (found != cache.end()) {
+    std::rotate(cache.begin(), found, found + 1);
+    return cache.front().second;
   }
-  kept.emplace_front(key, std::make_shared<const Plan>(n, real, complex, forward));
-  if (kept.size() > KEPT) kept.pop_back();
-  return kept.front().second;
+  cache.emplace_front(key, std::make_shared<const Plan>(n, real, complex, forward));
+  if (cache.size() > KEPT) cache.pop_back();
+  return cache.front().second;
 }
 
 }  // namespace

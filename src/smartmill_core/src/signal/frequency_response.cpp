@@ -62,7 +62,7 @@ FrfEstimator::FrfEstimator(double sample_rate, std::size_t samples)
 void FrfEstimator::add(const std::vector<double>& force, const std::vector<double>& response) {
   if (force.size() != samples_ || response.size() != samples_) {
     throw Error("FRF: hit " + std::to_string(hits_ + 1) + " has " + std::to_string(force.size()) + " and " +
-                std::to_string(response.size()) + " samples, " + std::to_string(samples_) + " are due");
+                std::to_string(response.size()) + " samples, expected " + std::to_string(samples_));
   }
   const std::size_t bad = std::min(firstNotFinite(force), firstNotFinite(response));
   if (bad < samples_) {
@@ -125,7 +125,7 @@ FrequencyResponse FrfEstimator::result(const std::string& unit, bool second) con
         frf.std_dev[k] = std::sqrt(power * (1.0 - coherence) / (coherence * (hits_ - 1)));
       }
     } else if (noise_known_) {
-      // Eq. 4.29; the window leaves only its power share of the force's noise (eq. 4.15).
+      // Eq. 4.29; the window passes only its power share of the force's noise (eq. 4.15).
       const double n = static_cast<double>(samples_);
       frf.std_dev[k] = std::sqrt(
           n / sff_[k] *

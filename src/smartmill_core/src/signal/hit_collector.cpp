@@ -10,7 +10,7 @@ namespace smartmill {
 HitCollector::HitCollector(const HitCollectorOptions& options) : options_(options) {
   if (!(options.trigger_force > 0.0 && options.pre_trigger > 0.0 &&
         options.record_length > options.pre_trigger)) {
-    throw Error("hit collector: trigger_force > 0 and 0 < pre_trigger < record_length are due, got " +
+    throw Error("hit collector: expected trigger_force > 0 and 0 < pre_trigger < record_length, got " +
                 std::to_string(options.trigger_force) + " N, " + std::to_string(options.pre_trigger) +
                 " and " + std::to_string(options.record_length) + " s");
   }
@@ -40,7 +40,7 @@ std::optional<HitCollector::Record> HitCollector::add(double time, std::uint64_t
                    ? "the sample rate changed within the record"
                    : "samples " + std::to_string(next_index_) + ".." + std::to_string(index) + " are missing";
     }
-    // What came before does not join on: no pre-trigger across a gap.
+    // No pre-trigger across a gap.
     force_before_.clear();
     volt_before_.clear();
     rate_ = rate;

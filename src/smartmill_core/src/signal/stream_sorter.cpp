@@ -16,7 +16,8 @@ constexpr double NEVER = -std::numeric_limits<double>::infinity();
 
 StreamSorter::StreamSorter(double hold_back) : hold_back_(hold_back), delivered_(NEVER) {
   if (!std::isfinite(hold_back) || hold_back < 0.0) {
-    throw Error("stream sorter: hold_back " + std::to_string(hold_back) + " s is below zero or not finite");
+    throw Error("stream sorter: hold_back " + std::to_string(hold_back) +
+                " s: expected a finite number >= 0");
   }
 }
 
@@ -95,7 +96,7 @@ std::string StreamSorter::waitingFor() const {
   return slowest ? slowest->name : std::string();
 }
 
-// The item is taken out before it runs: it may throw, or push further items.
+// The item is removed before it runs, since it may throw or push further items.
 void StreamSorter::release(double up_to) {
   while (!waiting_.empty() && waiting_.begin()->first.first.first + hold_back_ < up_to) {
     auto item = waiting_.extract(waiting_.begin());
@@ -104,7 +105,7 @@ void StreamSorter::release(double up_to) {
   }
 }
 
-// Strictly past: an item of the same stamp may still come on the stream that is there already. Without
+// Strictly past: an item of the same stamp may still arrive on the stream that has reached it. Without
 // regular streams the newest event counts.
 double StreamSorter::passed() const {
   double slowest = std::numeric_limits<double>::infinity();

@@ -9,7 +9,7 @@
 namespace smartmill {
 namespace {
 
-/// Fraction of the peak at which the hammer counts as touching (Dunwoody 4.3.1).
+/// Fraction of the peak from which the hammer counts as in contact (Dunwoody 4.3.1).
 constexpr double SHOULDER_LEVEL = 0.1;
 
 struct Shoulders {
@@ -32,7 +32,7 @@ Shoulders findShoulders(const std::vector<double>& force) {
   while (last + 1 < force.size() && force[last] > level) {
     ++last;
   }
-  // A hit at the very edge of the record has no shoulder there; one sample keeps the taper defined.
+  // A hit at the edge of the record has no shoulder there; one sample keeps the taper defined.
   return {peak, std::max(1.0, static_cast<double>(peak - first)),
           std::max(1.0, static_cast<double>(last - peak))};
 }

@@ -65,8 +65,8 @@ void expectCampaign(const Campaign& c, const std::string& folder) {
 const char* const SLOW =
     "slow_channels:\n- {test: air, channel: load_meter, file: load.csv, sample_rate_hz: 50}\n";
 
-// A channel that is read at a rate of its own stands in a file of its own; files without it read as before.
-TEST(Campaign, channelsMayHaveARateOfTheirOwn) {
+// A channel with its own sample rate has its own file; files without one are read as before.
+TEST(Campaign, channelsMayHaveTheirOwnSampleRate) {
   const TemporaryFolder folder;
   folder.write("campaign.yaml", CAMPAIGN);
   EXPECT_TRUE(readSlowChannels(readCampaign(folder.file("."))).empty());
@@ -88,18 +88,18 @@ TEST(Campaign, channelsMayHaveARateOfTheirOwn) {
   EXPECT_DOUBLE_EQ(slow[0].sample_rate, 50.0);
 }
 
-TEST(Campaign, slowChannelsOfNoTestAreRefused) {
+TEST(Campaign, rejectsSlowChannelsWithoutATest) {
   const TemporaryFolder folder;
-  const auto refuses = [&](const char* entry, const char* says) {
+  const auto refuses = [&](const char* entry, const char* message) {
     folder.write("campaign.yaml", CAMPAIGN + std::string("slow_channels:\n- {") + entry + "}\n");
     try {
       readCampaign(folder.file("."));
       ADD_FAILURE() << entry;
     } catch (const Error& error) {
-      EXPECT_THAT(error.what(), HasSubstr(says));
+      EXPECT_THAT(error.what(), HasSubstr(message));
     }
   };
-  refuses("test: none, channel: load_meter, file: a.csv, sample_rate_hz: 50", "'none' is no test");
+  refuses("test: none, channel: load_meter, file: a.csv, sample_rate_hz: 50", "'none' is not a test");
   refuses("test: tap, channel: load_meter, file: a.csv, sample_rate_hz: 50", "is a tap");
   refuses("test: air, channel: fx, file: a.csv, sample_rate_hz: 50", "'fx'");
   refuses("test: air, channel: load_meter, file: ../a.csv, sample_rate_hz: 50", "outside");
@@ -117,12 +117,12 @@ TEST(Campaign, readsAndWritesEveryKey) {
   expectCampaign(readCampaign(folder.file("copy")), folder.file("copy"));
 }
 
-TEST(Campaign, refusesWithFileKeyAndValue) {
+TEST(Campaign, errorsNameFileKeyAndValue) {
   const std::vector<Refusal> refusals{
       {"file: slot.csv", "file: ../slot.csv",
        "tests[0].file: '../slot.csv' lies outside the campaign's folder"},
       {"file: slot.csv", "file: /slot.csv", "tests[0].file: '/slot.csv' lies outside the campaign's folder"},
-      {"name: air", "name: slot", "tests[1].name: 'slot' names two tests"},
+      {"name: air", "name: slot", "tests[1].name: 'slot' is the name of two tests"},
       {"kind: air", "kind: ari", "tests[1].kind: 'ari' is not one of cut | air | tap | move"},
       {"spindle_speed_rpm: 1000", "spindle_speed_rpm: 0",
        "tests[1].spindle_speed_rpm: 0 is out of range (> 0)"},
@@ -184,8 +184,8 @@ TEST(Campaign, readsAndWritesMoves) {
               HasSubstr("needs a column axis_x[mm]"));
 }
 
-// A ramp in every column; the force is recorded three and a half samples later, the tool one sample earlier.
-TEST(Record, groupsWithAnOffsetAreAligned) {
+// A ramp in every column; the force is recorded 3.5 samples later, the tool one sample earlier.
+TEST(Record, alignsGroupsWithAnOffset) {
   CampaignTest test;
   test.sample_rate = 100.0;
   test.stream_offset = {{"force", 0.035}, {"tool", -0.01}};
@@ -210,7 +210,7 @@ TEST(Record, groupsWithAnOffsetAreAligned) {
   EXPECT_EQ(aligned(record, test).size(), record.size());
 }
 
-TEST(Record, readsColumnsInAnyOrderAndNotesTheUnknown) {
+TEST(Record, readsColumnsInAnyOrderAndNotesUnknownOnes) {
   const TemporaryFolder folder;
   const Record r = readCsv(folder.write(
       "a.csv",
@@ -243,7 +243,7 @@ TEST(Record, writesWhatItReads) {
   }
 }
 
-TEST(Record, writesTheDigitsOfPrintf) {
+TEST(Record, writesNumbersLikePrintf) {
   const TemporaryFolder folder;
   Record r;
   std::mt19937_64 random(3);
@@ -263,7 +263,7 @@ TEST(Record, writesTheDigitsOfPrintf) {
   }
 }
 
-TEST(Record, refusesWithLineAndColumn) {
+TEST(Record, errorsNameLineAndColumn) {
   const TemporaryFolder folder;
   const struct {
     const char *text, *message;
@@ -271,19 +271,19 @@ TEST(Record, refusesWithLineAndColumn) {
       {"time[s],fx[N]\n0,1\n0.1,nan\n0.2,3\n", "line 3: column fx: 'nan' is not a finite number"},
       {"time[s],fx[N]\n0,1\n0.1,x\n", "line 3: column fx: 'x' is not a number"},
       {"time[s],fx[N]\n0,1\n0.1,\n", "line 3: column fx: '' is not a number"},
-      {"time[s],fx[N]\n0,1\n0.1\n", "line 3: 1 values, 2 columns are due"},
-      {"time[s],fx[N]\n0,1,2\n", "line 2: 3 values, 2 columns are due"},
+      {"time[s],fx[N]\n0,1\n0.1\n", "line 3: 1 values, expected 2 (one per column)"},
+      {"time[s],fx[N]\n0,1,2\n", "line 2: 3 values, expected 2 (one per column)"},
       {"time[s],fx[N]\n0,1\n\n0.1,2\n", "line 3: is empty"},
-      {"time[s],fx[kN]\n0,1\n", "line 1: column fx: the unit is 'kN', N is due"},
-      {"time[s],fx\n0,1\n", "line 1: column 'fx' is not name[unit]"},
-      {"time[s],fx[N],fx[N]\n0,1,1\n", "line 1: column fx stands twice"},
+      {"time[s],fx[kN]\n0,1\n", "line 1: column fx: the unit is 'kN', expected N"},
+      {"time[s],fx\n0,1\n", "line 1: column 'fx': expected name[unit]"},
+      {"time[s],fx[N],fx[N]\n0,1,1\n", "line 1: column fx occurs twice"},
       {"fx[N]\n1\n", "column time is missing"},
       {"time[s],fx[N]\n", "no samples"},
       {"", "is empty"},
       {"time[s],fx[N]\n0,1\n0.1,1\n0.2,1\n0.4,1\n0.5,1\n",
-       "line 5: column time: a step of 0.2 s, 0.1 s are due"},
+       "line 5: column time: a step of 0.2 s, expected 0.1 s"},
       {"time[s],fx[N]\n0,1\n0.1,1\n0.05,1\n0.2,1\n0.3,1\n0.4,1\n",
-       "line 4: column time: a step of -0.05 s, 0.1 s are due"},
+       "line 4: column time: a step of -0.05 s, expected 0.1 s"},
   };
   for (const auto& c : cases) {
     const std::string file = folder.write("bad.csv", c.text);
@@ -292,7 +292,7 @@ TEST(Record, refusesWithLineAndColumn) {
   EXPECT_THAT(errorOf([&] { readCsv(folder.file("none.csv")); }), HasSubstr("none.csv: cannot be read"));
 }
 
-TEST(Record, checksTheRateAndTurnsAReaction) {
+TEST(Record, checksTheSampleRateAndReversesAReaction) {
   const TemporaryFolder folder;
   folder.write("campaign.yaml", CAMPAIGN);
   folder.write("slot.csv", "time[s],fx[N]\n0,1\n0.01,2\n0.02,3\n");
@@ -303,7 +303,7 @@ TEST(Record, checksTheRateAndTurnsAReaction) {
   EXPECT_DOUBLE_EQ(readRecord(campaign, campaign.tests[0], model).column("fx")[2], -3.0);
   folder.write("slot.csv", "time[s],fx[N]\n0,1\n0.02,2\n0.04,3\n");
   EXPECT_THAT(errorOf([&] { readRecord(campaign, campaign.tests[0]); }),
-              HasSubstr("samples come at 50 Hz, but the campaign's sample_rate_hz is 100"));
+              HasSubstr("the sample rate is 50 Hz, but the campaign's sample_rate_hz is 100"));
 }
 
 TEST(Record, readsADynowareExport) {
@@ -321,8 +321,7 @@ TEST(Record, readsADynowareExport) {
               HasSubstr("n.csv: line 1: not a DynoWare export"));
 }
 
-// The published coefficients of the same records, to every printed digit: the mean over all samples,
-// unweighted.
+// The published coefficients of the same records to every printed digit: unweighted means over all samples.
 TEST(MeasuredSlots, regressionGivesThePublishedCoefficients) {
   SMARTMILL_SHARED_DATA(folder, "measured/slot_6000");
   const Campaign campaign = readCampaign(folder);
@@ -346,7 +345,7 @@ TEST(MeasuredSlots, regressionGivesThePublishedCoefficients) {
   EXPECT_NEAR(k.kae / 1e3, 18.2075, 5.1e-5);
 }
 
-TEST(ExampleCampaigns, areAllRead) {
+TEST(ExampleCampaigns, canAllBeRead) {
   SMARTMILL_SHARED_DATA(folder, "campaigns");
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
     if (!entry.is_directory()) continue;

@@ -12,7 +12,7 @@
 namespace smartmill {
 namespace {
 
-TEST(SineCosine, areTheLibrarys) {
+TEST(SineCosine, equalsTheStandardLibrary) {
   for (double angle = 0.0; angle < 12.5; angle += 0.00713) {
     EXPECT_NEAR(sineCosine(angle).sine, std::sin(angle), 1e-12);
     EXPECT_NEAR(sineCosine(angle).cosine, std::cos(angle), 1e-12);
@@ -27,11 +27,11 @@ ChipShape drawn(std::mt19937& random, double size) {
   return {normal(random), normal(random), normal(random), 0.1 * normal(random), 0.1 * normal(random)};
 }
 
-TEST(ChipShape, slopeAndBoundsHold) {
+TEST(ChipShape, slopeAndBoundsAreCorrect) {
   std::mt19937 random(5);
   for (int trial = 0; trial < 200; ++trial) {
     const ChipShape shape = drawn(random, 1.0);
-    const Stretch over = Stretch::between(0.03 * trial, 0.03 * trial + 0.2);
+    const AngleInterval over = AngleInterval::between(0.03 * trial, 0.03 * trial + 0.2);
     const ChipBounds b = bounds(shape, over);
     for (double phi = over.low(); phi <= over.high(); phi += 0.002) {
       const double s = std::sin(phi), c = std::cos(phi), value = shape.at(s, c);
@@ -47,9 +47,9 @@ TEST(ChipShape, slopeAndBoundsHold) {
   }
 }
 
-// Pieces of the least of some random chips, against a fine grid: every angle where the least is positive is
-// in a piece of that very shape, no other is.
-TEST(Contact, findsEveryPieceInWhichAChipIsTheLeastAndPositive) {
+// Segments of the smallest of several random chips, compared with a fine grid: exactly the angles where the
+// smallest chip is positive lie in a segment of that shape.
+TEST(Contact, findsEverySegmentInWhichAChipIsSmallestAndPositive) {
   std::mt19937 random(11);
   std::uniform_real_distribution<double> uniform;
   for (int trial = 0; trial < 300; ++trial) {
@@ -59,35 +59,36 @@ TEST(Contact, findsEveryPieceInWhichAChipIsTheLeastAndPositive) {
     const double from = 6.0 * uniform(random), to = from + 6.0 * uniform(random) * uniform(random);
     std::vector<ChipShape> used = shapes;
     double covered = 0.0, end = from;
-    forEachContact(used.data(), used.size(), from, to, [&](const ChipShape& shape, const Stretch& over) {
-      EXPECT_GE(over.low(), end - 1e-12);
-      end = over.high();
-      covered += 2.0 * over.half;
-      for (const double at : {0.01, 0.3, 0.7, 0.99}) {
-        const double phi = over.low() + at * 2.0 * over.half, s = std::sin(phi), c = std::cos(phi);
-        EXPECT_GE(shape.at(s, c), -1e-6);
-        for (const ChipShape& other : shapes) EXPECT_LE(shape.at(s, c), other.at(s, c) + 2e-5);
-      }
-    });
-    double due = 0.0;
+    forEachContact(
+        used.data(), used.size(), from, to, [&](const ChipShape& shape, const AngleInterval& over) {
+          EXPECT_GE(over.low(), end - 1e-12);
+          end = over.high();
+          covered += 2.0 * over.half;
+          for (const double at : {0.01, 0.3, 0.7, 0.99}) {
+            const double phi = over.low() + at * 2.0 * over.half, s = std::sin(phi), c = std::cos(phi);
+            EXPECT_GE(shape.at(s, c), -1e-6);
+            for (const ChipShape& other : shapes) EXPECT_LE(shape.at(s, c), other.at(s, c) + 2e-5);
+          }
+        });
+    double expected = 0.0;
     const int steps = 20000;
     for (int i = 0; i < steps; ++i) {
       const double phi = from + (to - from) * (i + 0.5) / steps, s = std::sin(phi), c = std::cos(phi);
       double least = 1e300;
       for (const ChipShape& shape : shapes) least = std::min(least, shape.at(s, c));
-      due += least > 0.0 ? (to - from) / steps : 0.0;
+      expected += least > 0.0 ? (to - from) / steps : 0.0;
     }
-    EXPECT_NEAR(covered, due, 4.0 * (to - from) / steps + 2e-4) << trial;
+    EXPECT_NEAR(covered, expected, 4.0 * (to - from) / steps + 2e-4) << trial;
   }
 }
 
-// A contact that begins within a cell does so to the digit: edge forces are all there at once.
-TEST(Contact, beginsWhereTheChipDoes) {
+// The start of a contact within a cell is exact, since edge forces set in at once.
+TEST(Contact, beginsWhereTheChipBegins) {
   ChipShape shape;
   shape.sine = 60e-6;
   shape.level = -20e-6;
   double begin = -1.0, end = 0.0;
-  forEachContact(&shape, 1, 0.0, units::PI, [&](const ChipShape&, const Stretch& over) {
+  forEachContact(&shape, 1, 0.0, units::PI, [&](const ChipShape&, const AngleInterval& over) {
     if (begin < 0.0) begin = over.low();
     end = over.high();
   });
@@ -96,7 +97,7 @@ TEST(Contact, beginsWhereTheChipDoes) {
 }
 
 // The formula of formats.md, feed along x.
-TEST(ChipRule, isTheFormula) {
+TEST(ChipRule, equalsTheFormula) {
   ToolGeometry tool{3, 12e-3, 0.5, {}};
   tool.pitch = {2.0, 2.2, units::TWO_PI - 4.2};
   const std::vector<double> r{3e-6, -5e-6, 1e-6};

@@ -14,7 +14,7 @@ using units::PI;
 
 const ToolGeometry TOOL{2, 20e-3, units::radFromDeg(30.0), {}};
 
-TEST(Corner, slicesMakeUpTheEdge) {
+TEST(Corner, slicesSumToTheEdge) {
   for (const double corner : {0.5e-3, 4e-3, 10e-3}) {
     double length = 0.0, across = 0.0, height = 0.0;
     const std::vector<EdgeSlice> slices = edgeSlices(TOOL, corner);
@@ -28,11 +28,11 @@ TEST(Corner, slicesMakeUpTheEdge) {
     }
     EXPECT_NEAR(height, corner, 1e-15);
     EXPECT_NEAR(length, 0.5 * PI * corner, 1e-15);
-    EXPECT_NEAR(across, corner, 1e-15);  // out to the upright edge
+    EXPECT_NEAR(across, corner, 1e-15);  // up to the vertical edge
   }
 }
 
-TEST(Corner, anUprightEdgeIsAStraightMill) {
+TEST(Corner, aVerticalEdgeIsAStraightMill) {
   const std::vector<EdgeSlice> slices = edgeSlices(TOOL, 0.0);
   ASSERT_EQ(slices.size(), 1u);
   CuttingLaw law;
@@ -52,7 +52,7 @@ TEST(Corner, anUprightEdgeIsAStraightMill) {
 }
 
 // Near the tip Fr of an edge is axial; it pushes the tool out of the work.
-TEST(Corner, theNormalTurnsFromAxialToRadial) {
+TEST(Corner, theNormalRotatesFromAxialToRadial) {
   CuttingLaw law;
   law.coefficients = {0.0, 200e6, 0.0, 0.0, 10e3, 0.0};
   law.damping = 1.0;
@@ -70,7 +70,7 @@ TEST(Corner, theNormalTurnsFromAxialToRadial) {
   EXPECT_EQ(last, 0.0);
 }
 
-TEST(Corner, aSliceIsCutOffExactly) {
+TEST(Corner, aSliceIsTruncatedExactly) {
   const EdgeSlice slice = edgeSlices(TOOL, 4e-3)[3];
   const double middle = 0.5 * (slice.low + slice.high);
   const EdgeSlice below = upTo(middle, slice, 4e-3);
@@ -81,7 +81,7 @@ TEST(Corner, aSliceIsCutOffExactly) {
   EXPECT_NEAR(whole.inset, slice.inset, 1e-15);
 }
 
-TEST(Corner, largerThanTheToolIsRefused) {
+TEST(Corner, rejectsARadiusAboveTheTools) {
   EXPECT_NO_THROW(edgeSlices(TOOL, 10e-3));
   EXPECT_THROW(edgeSlices(TOOL, 10.1e-3), Error);
   EXPECT_THROW(edgeSlices(TOOL, -1e-3), Error);

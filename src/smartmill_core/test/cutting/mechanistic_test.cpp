@@ -21,7 +21,7 @@ ToolGeometry tool(int teeth, double diameter, double helix_deg) {
   return {teeth, diameter, radFromDeg(helix_deg), {}};
 }
 
-// The definition of formats.md, summed over thin discs: nothing shared with the closed form.
+// The definition of formats.md, summed over thin discs, independent of the closed form.
 CuttingForce quadrature(const ToolGeometry& t, const CuttingCoefficients& k, const Engagement& e,
                         double angle, int discs) {
   CuttingForce sum;
@@ -71,8 +71,8 @@ TEST(MechanisticForce, equalsQuadratureAlongTheHelixForAnyToolAndEngagement) {
     const MechanisticForce model(t, ALUMINIUM, e);
     const double angle = 40.0 * (u(random) - 0.5);
     const int discs = 20000;
-    // A disc at an edge of the engagement is in or out as a whole: two a tooth and turn of the helix, of the
-    // largest force a disc can carry.
+    // A disc at a limit of the engagement is in or out as a whole: an error of two discs per tooth and helix
+    // revolution, of the largest force of a disc.
     const double chip = e.feed_per_tooth * t.teeth;
     const double disc = (ALUMINIUM.ktc * chip + ALUMINIUM.kte) * e.axial_depth / discs;
     const double turns = 2.0 + t.lag() * e.axial_depth / TWO_PI;
@@ -93,13 +93,13 @@ TEST(MechanisticForce, meanOverARevolutionEqualsTheClosedFormAndIgnoresTheHelix)
       const CuttingForce f = model.at(TWO_PI * (i + 0.5) / n);
       sum.fx += f.fx / n, sum.fy += f.fy / n, sum.fz += f.fz / n, sum.torque += f.torque / n;
     }
-    // The midpoint rule misses half a step at each jump of straight teeth: a share 1/n of a force of some 500
-    // N.
+    // The midpoint rule has an error of half a step at each jump of straight teeth: 1/n of a force of about
+    // 500 N.
     expectNear(model.mean(), sum, 0.05, t.radius());
   }
 }
 
-TEST(MechanisticForce, slotMeansAreThePublishedForms) {
+TEST(MechanisticForce, slotMeansEqualThePublishedFormulas) {
   const ToolGeometry t = tool(4, 0.01905, 30.0);
   const Engagement e{0.0, PI, 0.002, 6e-5};
   const CuttingForce mean = MechanisticForce(t, ALUMINIUM, e).mean();
@@ -113,29 +113,29 @@ TEST(MechanisticForce, slotMeansAreThePublishedForms) {
   EXPECT_NEAR(mean.torque, t.radius() * n * a * k.ktc / PI * c + t.radius() * n * a * k.kte / 2.0, 1e-12);
 }
 
-TEST(MechanisticForce, oneStraightToothIsTheElementaryForce) {
+TEST(MechanisticForce, oneStraightToothGivesTheElementaryForce) {
   const ToolGeometry t = tool(1, 0.02, 0.0);
   const Engagement e{0.0, PI, 0.001, 1e-4};
   const MechanisticForce model(t, ALUMINIUM, e);
   const double phi = 0.7, h = 1e-4 * std::sin(phi), a = e.axial_depth;
-  const CuttingForce due =
+  const CuttingForce expected =
       toolForce((ALUMINIUM.ktc * h + ALUMINIUM.kte) * a, (ALUMINIUM.krc * h + ALUMINIUM.kre) * a,
                 (ALUMINIUM.kac * h + ALUMINIUM.kae) * a, phi, t.radius());
-  expectNear(model.at(phi), due, 1e-9, t.radius());
+  expectNear(model.at(phi), expected, 1e-9, t.radius());
   expectNear(model.at(phi + PI), CuttingForce{}, 0.0, 1.0);
-  expectNear(model.at(phi - 6.0 * PI), due, 1e-9, t.radius());
+  expectNear(model.at(phi - 6.0 * PI), expected, 1e-9, t.radius());
 }
 
-TEST(MechanisticForce, smallHelixGoesOverIntoZeroHelix) {
+TEST(MechanisticForce, smallHelixConvergesToZeroHelix) {
   const Engagement e{0.3, 2.0, 0.003, 5e-5};
   const CuttingForce straight = MechanisticForce(tool(2, 0.02, 0.0), ALUMINIUM, e).at(1.0);
   for (const double helix : {1e-3, 1e-7, 1e-12, 1e-300}) {
-    // The force changes by its slope (of the order of itself a radian) times half the lag.
+    // The force changes by its slope (about its own size per radian) times half the lag.
     expectNear(MechanisticForce(tool(2, 0.02, helix), ALUMINIUM, e).at(1.0), straight, 1e-6 + helix, 0.01);
   }
 }
 
-TEST(MechanisticForce, tinyImmersionKeepsItsDigits) {
+TEST(MechanisticForce, smallImmersionKeepsItsPrecision) {
   const ToolGeometry t = tool(2, 0.02, 30.0);
   const double arc = 1e-7;
   const Engagement e{PI - arc, PI, 0.002, 1e-4};
@@ -149,9 +149,9 @@ TEST(MechanisticForce, tinyImmersionKeepsItsDigits) {
               1e-8 * edge * ALUMINIUM.kte);
 }
 
-TEST(MechanisticForce, torqueTimesSpeedIsThePowerOfTheTangentialForces) {
-  // Energy: work of the tangential force along the tooth's path in one turn = mean torque x 2 pi, and the
-  // work per volume removed is Ktc when the edge terms are zero (specific cutting energy).
+TEST(MechanisticForce, torqueTimesSpeedEqualsThePowerOfTheTangentialForces) {
+  // Energy: work of the tangential force along the tooth's path in one revolution = mean torque x 2 pi, and
+  // the work per volume removed is Ktc when the edge terms are zero (specific cutting energy).
   CuttingCoefficients k = ALUMINIUM;
   k.kte = k.kre = k.kae = 0.0;
   const ToolGeometry t = tool(3, 0.016, 40.0);
@@ -163,7 +163,7 @@ TEST(MechanisticForce, torqueTimesSpeedIsThePowerOfTheTangentialForces) {
   EXPECT_NEAR(power, k.ktc * removal_rate, 1e-9 * power);
 }
 
-TEST(MechanisticForce, noForceWhereTheChipIsNotPositive) {
+TEST(MechanisticForce, hasNoForceWithoutAPositiveChip) {
   const MechanisticForce behind(tool(2, 0.02, 30.0), ALUMINIUM, {1.2 * PI, 1.9 * PI, 0.002, 1e-4});
   expectNear(behind.mean(), CuttingForce{}, 0.0, 1.0);
   const MechanisticForce no_feed(tool(2, 0.02, 30.0), ALUMINIUM, {0.0, PI, 0.002, 0.0});
@@ -179,7 +179,7 @@ std::string messageOf(const ToolGeometry& t, const Engagement& e, const CuttingC
   return "";
 }
 
-TEST(MechanisticForce, refusesTheImpossibleByName) {
+TEST(MechanisticForce, errorsNameTheInvalidQuantity) {
   const Engagement slot{0.0, PI, 0.002, 1e-4};
   EXPECT_NE(messageOf(tool(0, 0.02, 30.0), slot).find("teeth: 0"), std::string::npos);
   EXPECT_NE(messageOf(tool(2, -0.02, 30.0), slot).find("diameter: -0.02"), std::string::npos);

@@ -43,7 +43,7 @@ TEST(IdentifyFromForces, findsTheTruthFromExactMeans) {
 }
 
 // Published means of measured/slot_6000 (two decimals) and the published coefficients they lead to; the
-// means' rounding moves the coefficients in the fourth digit (0.005 N of a slope of 19 N).
+// rounding of the means changes the coefficients in the fourth digit (0.005 N of a slope of 19 N).
 TEST(IdentifyFromForces, findsThePublishedCoefficientsFromThePublishedMeans) {
   const double feed[] = {0.025e-3, 0.05e-3, 0.075e-3, 0.1e-3, 0.125e-3};
   const double fx[] = {-39.80, -60.05, -71.60, -76.75, -78.49};
@@ -64,12 +64,12 @@ TEST(IdentifyFromForces, findsThePublishedCoefficientsFromThePublishedMeans) {
   EXPECT_NEAR(found.value.kte, 15.7580e3, 5.0);
   EXPECT_NEAR(found.value.kre, 19.4337e3, 5.0);
   EXPECT_NEAR(found.value.kae, 18.2075e3, 5.0);
-  EXPECT_NEAR(found.r_squared_y, 0.997, 0.001);  // printed digits, partly cut off
+  EXPECT_NEAR(found.r_squared_y, 0.997, 0.001);  // printed digits, partly truncated
   EXPECT_NEAR(found.r_squared_x, 0.865, 0.001);
   EXPECT_NEAR(found.r_squared_z, 0.787, 0.001);
 }
 
-// Standard deviations are honest: the variance of the z-scores over seeded runs is near one.
+// Standard deviations are calibrated: the variance of the z-scores over seeded runs is near one.
 void coverage(bool weighted, bool slots_only) {
   std::mt19937 random(11);
   std::normal_distribution<double> normal;
@@ -94,21 +94,21 @@ void coverage(bool weighted, bool slots_only) {
       stated[i] += std_dev[i] * std_dev[i] / runs;
     }
   }
-  // Stated over true variance: 400 runs scatter by sqrt(2 / 400) = 7 %, 4 sigma; the weighted fit may state
-  // up to a quarter more because it scales up by a chance scatter above one.
+  // Stated over true variance: 400 runs scatter by sqrt(2 / 400) = 7 %, 4 sigma. The weighted fit may state
+  // up to a quarter more, because it scales up when the scatter exceeds one by chance.
   for (std::size_t i = 0; i < 6; ++i) {
     EXPECT_GT(stated[i] / squares[i], 0.72) << i;
     EXPECT_LT(stated[i] / squares[i], weighted ? 1.6 : 1.4) << i;
   }
 }
 
-TEST(IdentifyFromForces, standardDeviationsAreHonest) {
+TEST(IdentifyFromForces, standardDeviationsAreCalibrated) {
   coverage(false, true);
   coverage(true, true);
   coverage(true, false);
 }
 
-TEST(IdentifyFromForces, saysWhatIsMissing) {
+TEST(IdentifyFromForces, errorsNameWhatIsMissing) {
   std::vector<MeanForceTest> tests = forceTests(true);
   for (MeanForceTest& test : tests) test.engagement.feed_per_tooth = 5e-5;
   EXPECT_THROW(identifyFromForces(tests), Error);

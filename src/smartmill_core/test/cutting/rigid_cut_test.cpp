@@ -42,7 +42,7 @@ std::vector<Setting> settings() {
           {mill(4, 30.0), {0.5 * PI, PI, 4e-3, 8e-5}},
           {mill(1, 45.0), {1.2, 1.3, 10e-3, 5e-5}},
           {mill(2, 0.0), {0.4, 2.2, 3e-3, 1e-4}},
-          {mill(4, 45.0), {0.0, PI, 70e-3, 5e-5}},  // the edge lags by more than a turn
+          {mill(4, 45.0), {0.0, PI, 70e-3, 5e-5}},  // the edge lags by more than a revolution
           {mill(4, 30.0, {85.0, 95.0, 88.0, 92.0}), {0.0, PI, 2e-3, 6e-5}}};
 }
 
@@ -62,8 +62,8 @@ testing::DiscMill discs(const Setting& s, const CuttingLaw& law, const std::vect
           }};
 }
 
-// Without runout the chip is c sin(phi) and the integral is closed (eq. 3.13..3.15).
-TEST(RigidCut, isTheClosedFormWithoutRunout) {
+// Without runout the chip is c sin(phi), with a closed-form integral (eq. 3.13..3.15).
+TEST(RigidCut, equalsTheClosedFormWithoutRunout) {
   for (const Setting& s : settings()) {
     const MechanisticForce closed(s.tool, aluminium().coefficients, s.cut);
     RigidCut rigid(s.tool, aluminium(), s.cut);
@@ -75,7 +75,7 @@ TEST(RigidCut, isTheClosedFormWithoutRunout) {
           std::max(difference, largestDifference(rigid.at(angle), closed.at(angle), s.tool.radius()));
     }
     EXPECT_LT(difference, 2e-5 * largest) << s.tool.teeth << " teeth, depth " << s.cut.axial_depth;
-    const auto [chip, edge] = rigid.meanParts();
+    const auto [chip, edge] = rigid.meanTerms();
     const CuttingForce sum{chip.fx + edge.fx, chip.fy + edge.fy, chip.fz + edge.fz,
                            chip.torque + edge.torque};
     EXPECT_LT(largestDifference(sum, closed.mean(), s.tool.radius()),
@@ -83,8 +83,8 @@ TEST(RigidCut, isTheClosedFormWithoutRunout) {
   }
 }
 
-// The tables and the direct integral are the same force.
-TEST(RigidCut, itsPartsMakeTheForce) {
+// The tables and the direct integral give the same force.
+TEST(RigidCut, chipAndEdgeForcesSumToTheForce) {
   for (const Setting& s : settings()) {
     std::vector<double> radius;
     for (int j = 0; j < s.tool.teeth; ++j) radius.push_back(9e-6 * std::sin(2.0 + 3.0 * j));
@@ -95,21 +95,21 @@ TEST(RigidCut, itsPartsMakeTheForce) {
     double largest = 0.0, difference = 0.0;
     for (int i = 0; i < 700; ++i) {
       const double angle = 0.009 * i;
-      const auto [chip, edge] = rigid.partsAt(angle);
+      const auto [chip, edge] = rigid.termsAt(angle);
       const CuttingForce sum{1.3 * chip.fx + 0.7 * edge.fx, 1.3 * chip.fy + 0.7 * edge.fy,
                              1.3 * chip.fz + 0.7 * edge.fz, 1.3 * chip.torque + 0.7 * edge.torque};
       largest = std::max(largest, size(sum));
       difference = std::max(difference, largestDifference(rigid.at(angle), sum, s.tool.radius()));
     }
-    // A quarter of the edge force over a cell of the tables in which a contact begins; a straight edge has no
-    // tables.
-    const double cell = s.tool.helix > 0.0 ? TURN_NODE_ANGLE / s.tool.lag() : 1e-9;
+    // Error of a quarter of the edge force over a table cell in which a contact begins; a straight edge has
+    // no tables.
+    const double cell = s.tool.helix > 0.0 ? REVOLUTION_NODE_ANGLE / s.tool.lag() : 1e-9;
     EXPECT_LT(difference, 0.25 * 30.8e3 * cell + 2e-5 * largest) << s.tool.teeth << ", " << s.cut.axial_depth;
   }
 }
 
-// Any radii, any pitch, every term of the law: the rule of formats.md disc by disc.
-TEST(RigidCut, isTheRuleSummedOverDiscs) {
+// Any radii, any pitch, every term of the law: the rule of formats.md summed over discs.
+TEST(RigidCut, equalsTheRuleSummedOverDiscs) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> u(-20e-6, 20e-6);
   for (Setting s : settings()) {
@@ -128,11 +128,11 @@ TEST(RigidCut, isTheRuleSummedOverDiscs) {
     double largest = 0.0, difference = 0.0;
     for (int i = 0; i < 60; ++i) {
       const double angle = 0.05 + TWO_PI * i / 60.0;
-      const CuttingForce due = reference.force(angle, s.cut.entry, s.cut.exit, s.cut.axial_depth, thin);
-      largest = std::max(largest, size(due));
-      difference = std::max(difference, largestDifference(rigid.at(angle), due, s.tool.radius()));
+      const CuttingForce expected = reference.force(angle, s.cut.entry, s.cut.exit, s.cut.axial_depth, thin);
+      largest = std::max(largest, size(expected));
+      difference = std::max(difference, largestDifference(rigid.at(angle), expected, s.tool.radius()));
     }
-    // Discs are in or out as a whole at the ends of the contacts: some of them at once.
+    // At the ends of the contacts whole discs are in or out, several of them at the same time.
     const double chip = s.cut.feed_per_tooth * s.tool.teeth + 40e-6;
     const double disc =
         (1.2 * 796e6 * std::pow(chip / 1e-4, -0.2) * chip + 27.7e3) * s.cut.axial_depth / thin;
@@ -141,8 +141,8 @@ TEST(RigidCut, isTheRuleSummedOverDiscs) {
   }
 }
 
-// Which tooth is called the first is a matter of names.
-TEST(RigidCut, doesNotKnowTheNamesOfTheTeeth) {
+// The force does not depend on which tooth is numbered first.
+TEST(RigidCut, isInvariantUnderRenumberingOfTheTeeth) {
   const std::vector<double> pitch{85.0, 97.0, 88.0, 90.0}, radius{3e-6, -8e-6, 12e-6, 1e-6};
   const Engagement cut{0.2, 2.9, 3e-3, 5e-5};
   RigidCut rigid(mill(4, 35.0, pitch), aluminium(), cut, radius);
@@ -163,30 +163,30 @@ TEST(RigidCut, doesNotKnowTheNamesOfTheTeeth) {
   }
 }
 
-// The frame of the machine may be turned with feed and stock.
-TEST(RigidCut, doesNotKnowTheDirectionOfTheFeed) {
+// The force is invariant under a rotation of feed and stock.
+TEST(RigidCut, isInvariantUnderRotationOfTheFeed) {
   const ToolGeometry tool = mill(4, 30.0, {85.0, 95.0, 88.0, 92.0});
   const std::vector<double> radius{3e-6, -8e-6, 12e-6, 1e-6};
   RigidCut along_x(tool, aluminium(), radius), turned(tool, aluminium(), radius);
   const double feed = 4e-5, angle = 0.7;
   along_x.engage({{0.3, 2.5, 2e-3}}, {{feed, 0.0}});
-  // Immersion angles run clockwise: so does the turn.
+  // Immersion angles are clockwise, and so is the rotation.
   turned.engage({{0.3 + angle, 2.5 + angle, 2e-3}}, {{feed * std::cos(angle), -feed * std::sin(angle)}});
   for (int i = 0; i < 100; ++i) {
     const CuttingForce f = along_x.at(0.0631 * i), t = turned.at(0.0631 * i + angle);
     const CuttingForce back{t.fx * std::cos(angle) - t.fy * std::sin(angle),
                             t.fx * std::sin(angle) + t.fy * std::cos(angle), t.fz, t.torque};
-    EXPECT_LT(largestDifference(f, back, tool.radius()), 0.01);  // nodes of the tables stand elsewhere
+    EXPECT_LT(largestDifference(f, back, tool.radius()), 0.01);  // the nodes of the tables differ
   }
 }
 
-TEST(RigidCut, aToothAloneMeetsItsOwnSurfaceWhateverItsRadius) {
+TEST(RigidCut, aSingleToothMeetsItsOwnSurfaceWhateverItsRadius) {
   const Engagement cut{0.0, PI, 2e-3, 6e-5};
   RigidCut plain(mill(1, 30.0), aluminium(), cut), offset(mill(1, 30.0), aluminium(), cut, {25e-6});
   for (int i = 0; i < 50; ++i) EXPECT_EQ(plain.at(0.1 * i).fy, offset.at(0.1 * i).fy);
 }
 
-TEST(RigidCut, withoutFeedNothingIsCut) {
+TEST(RigidCut, cutsNothingWithoutFeed) {
   Engagement cut{0.0, PI, 2e-3, 0.0};
   RigidCut plain(mill(4, 30.0), aluminium(), cut),
       offset(mill(4, 30.0), aluminium(), cut, {0.0, 5e-6, -3e-6, 9e-6});
@@ -196,14 +196,14 @@ TEST(RigidCut, withoutFeedNothingIsCut) {
   }
 }
 
-// Against the feed there is no chip, though the arc reaches there.
-TEST(RigidCut, nothingIsCutBehindTheTool) {
+// There is no chip behind the tool, though the arc extends there.
+TEST(RigidCut, cutsNothingBehindTheTool) {
   const std::vector<double> radius{0.0, 5e-6, -3e-6, 9e-6};
   RigidCut half(mill(4, 0.0), aluminium(), Engagement{0.0, PI, 2e-3, 6e-5}, radius);
   RigidCut whole(mill(4, 0.0), aluminium(), Engagement{0.0, TWO_PI, 2e-3, 6e-5}, radius);
   for (int i = 0; i < 200; ++i) {
     const double angle = 0.01 + 0.0311 * i;
-    // Beside the walls a tooth that stands out scratches what one before it left.
+    // Near the walls a tooth of larger radius touches the surface of an earlier one.
     bool at_wall = false;
     for (int j = 0; j < 4; ++j) at_wall = at_wall || std::abs(std::sin(angle + 0.5 * PI * j)) < 0.3;
     if (at_wall) continue;
@@ -211,7 +211,7 @@ TEST(RigidCut, nothingIsCutBehindTheTool) {
   }
 }
 
-TEST(RigidCut, aStraightEdgeIsTheLimitOfALittleHelix) {
+TEST(RigidCut, aStraightEdgeIsTheLimitOfASmallHelix) {
   const std::vector<double> radius{0.0, 5e-6, -3e-6, 9e-6};
   const Engagement cut{0.3, 2.6, 2e-3, 6e-5};
   RigidCut straight(mill(4, 0.0), aluminium(), cut, radius), little(mill(4, 0.05), aluminium(), cut, radius);
@@ -221,7 +221,7 @@ TEST(RigidCut, aStraightEdgeIsTheLimitOfALittleHelix) {
   }
 }
 
-TEST(RigidCut, aThinArcGetsItsShareOfTheForce) {
+TEST(RigidCut, aThinArcHasItsShareOfTheForce) {
   const double middle = 1.1, width = 1e-3;
   const std::vector<double> radius{0.0, 5e-6, -3e-6, 9e-6};
   RigidCut whole(mill(4, 30.0), aluminium(), Engagement{0.0, PI, 2e-3, 6e-5}, radius);
@@ -231,13 +231,14 @@ TEST(RigidCut, aThinArcGetsItsShareOfTheForce) {
     const double chip = whole.chip(j, middle + 0.5 * width);
     if (chip > 0.0) torque += 9.525e-3 * (796e6 * chip + 27.7e3) * 2e-3 * width / TWO_PI;
   }
-  const auto [chip, edge] = thin.meanParts();
+  const auto [chip, edge] = thin.meanTerms();
   EXPECT_NEAR((chip.torque + edge.torque) / torque, 1.0, 1e-6);
 }
 
-// Work of a revolution is Ktc times the volume cut: feed a revolution x width x depth. What the roundness of
-// the tool adds where a pass is not the last one is of the order of feed over radius.
-TEST(RigidCut, theWorkIsThatOfTheVolumeRemoved) {
+// The work of a revolution is Ktc times the removed volume: feed per revolution x width x depth. Where the
+// surface is not that of the last pass, the roundness of the tool adds a share of the order of feed over
+// radius.
+TEST(RigidCut, theWorkEqualsThatOfTheRemovedVolume) {
   CuttingLaw law;
   law.coefficients.ktc = 800e6;
   const Engagement cut{0.3, 2.6, 2e-3, 5e-5};
@@ -245,33 +246,34 @@ TEST(RigidCut, theWorkIsThatOfTheVolumeRemoved) {
   const double volume = feed * radius * (std::cos(cut.entry) - std::cos(cut.exit)) * cut.axial_depth;
   const auto work = [&](const std::vector<double>& offset) {
     return TWO_PI *
-           RigidCut(mill(4, 30.0, {80.0, 100.0, 85.0, 95.0}), law, cut, offset).meanParts()[0].torque;
+           RigidCut(mill(4, 30.0, {80.0, 100.0, 85.0, 95.0}), law, cut, offset).meanTerms()[0].torque;
   };
   EXPECT_NEAR(work({}) / (800e6 * volume), 1.0, 1e-6);
-  // Each still meets the last pass.
+  // Each tooth still meets the last pass.
   EXPECT_NEAR(work({1e-6, 2e-6, -2e-6, 0.0}) / (800e6 * volume), 1.0, 1e-6);
   const double uneven = work({0.0, 25e-6, -10e-6, 40e-6}) / (800e6 * volume);
   EXPECT_GT(uneven, 1.0);
   EXPECT_LT(uneven, 1.0 + feed / radius);
 }
 
-// Paths of the teeth as they are, trochoids: the surface on the ray from the tool's centre is the outermost
-// of all their crossings with it. Against it the rule takes h_1 as c sin(phi) and a tooth's turn as that of
-// the spindle: F_1^2 cos^2(phi) / (2 R) and F F_n sin(phi) cos(phi) / R, F the feed a radian. The roundness
-// of the tool is sixteen times the first of these where a tooth meets its own mark of the turn before.
+// True paths of the teeth, trochoids: the surface on the ray from the tool's centre is the outermost of all
+// their intersections with it. Compared with this the rule takes h_1 as c sin(phi) and a tooth's rotation as
+// that of the spindle, which neglects F_1^2 cos^2(phi) / (2 R) and F F_n sin(phi) cos(phi) / R, F the feed
+// per radian. The roundness of the tool is sixteen times the first of these where a tooth meets its own
+// surface of the revolution before.
 TEST(RigidCut, chipsAreThoseOfTheTrochoids) {
   const int teeth = 4;
   const double radius = 9.525e-3, feed = 3e-5, per_rad = teeth * feed / TWO_PI;
   const std::vector<double> offset{20e-6, 0.0, 3e-6, -1e-6};
   RigidCut rigid(mill(teeth, 0.0), aluminium(), Engagement{0.0, PI, 1e-3, feed}, offset);
-  // Of the whole path what is left out is F_n^2 f / R^2, f the feed a radian.
+  // With the true path the neglected term is F_n^2 f / R^2, f the feed per radian.
   RigidCut by_path(mill(teeth, 0.0), aluminium(), offset, 1.0);
   by_path.engage({{0.0, PI, 1e-3}}, {{per_rad, 0.0}});
   int older = 0;
   for (int j = 0; j < teeth; ++j) {
     for (double phi = 0.002; phi < PI; phi += 0.0131) {
       const double s = std::sin(phi), c = std::cos(phi);
-      // Now tooth j stands at phi and the tool's centre at 0.
+      // At this time tooth j is at phi and the tool's centre at 0.
       double reach = 0.0;
       int nearest = 0;
       for (int n = 1; n <= 60; ++n) {
@@ -299,7 +301,7 @@ TEST(RigidCut, chipsAreThoseOfTheTrochoids) {
   EXPECT_GT(older, 20);
 }
 
-TEST(RigidCut, depthMayChangeAndTheImpossibleIsRefused) {
+TEST(RigidCut, acceptsAnotherDepthAndRejectsInvalidArcs) {
   const Engagement cut{0.0, PI, 2e-3, 6e-5};
   RigidCut shallow(mill(4, 30.0), aluminium(), cut);
   Engagement more = cut;

@@ -15,31 +15,31 @@ using Eigen::VectorXd;
 
 constexpr double INFINITE = std::numeric_limits<double>::infinity();
 
-// Two unknowns that lean on each other: held at its bound, the first moves the second.
-TEST(LeastWithin, holdsAtBoundsAndMovesTheRest) {
+// Two coupled unknowns: with the first at its bound, the second changes.
+TEST(MinimiseWithin, solvesForTheRestWithUnknownsAtBounds) {
   MatrixXd h(2, 2);
   h << 2.0, 1.0, 1.0, 2.0;
-  const VectorXd b = (VectorXd(2) << 6.0, 3.0).finished();  // freely: (3, 0)
+  const VectorXd b = (VectorXd(2) << 6.0, 3.0).finished();  // without bounds: (3, 0)
   const VectorXd open = VectorXd::Constant(2, INFINITE);
-  const VectorXd freely = leastWithin(h, b, -open, open);
+  const VectorXd freely = minimiseWithin(h, b, -open, open);
   EXPECT_NEAR(freely[0], 3.0, 1e-12);
   EXPECT_NEAR(freely[1], 0.0, 1e-12);
-  const VectorXd bound = leastWithin(h, b, -open, VectorXd::Constant(2, 1.0));
+  const VectorXd bound = minimiseWithin(h, b, -open, VectorXd::Constant(2, 1.0));
   EXPECT_DOUBLE_EQ(bound[0], 1.0);
-  EXPECT_NEAR(bound[1], 1.0, 1e-12);  // (3 - 1) / 2, at the bound as it happens
+  EXPECT_NEAR(bound[1], 1.0, 1e-12);  // (3 - 1) / 2, which is also the bound
   const VectorXd held =
-      leastWithin(h, b, (VectorXd(2) << 2.0, -9.0).finished(), (VectorXd(2) << 2.0, 9.0).finished());
+      minimiseWithin(h, b, (VectorXd(2) << 2.0, -9.0).finished(), (VectorXd(2) << 2.0, 9.0).finished());
   EXPECT_DOUBLE_EQ(held[0], 2.0);
   EXPECT_NEAR(held[1], 0.5, 1e-12);
 }
 
-TEST(LeastWithin, nothingIsNothing) {
-  EXPECT_EQ(leastWithin({}, {}, {}, {}).size(), 0);
+TEST(MinimiseWithin, acceptsAnEmptyProblem) {
+  EXPECT_EQ(minimiseWithin({}, {}, {}, {}).size(), 0);
 }
 
-// Karush, Kuhn and Tucker: free elements have no slope, at a bound it points outwards. Half of the problems
-// are narrow valleys (condition 1e8), with bounds everywhere.
-TEST(LeastWithin, slopesPointOutwardsOnly) {
+// Karush-Kuhn-Tucker conditions: the gradient vanishes for free elements and points outwards at a bound. Half
+// of the problems are ill-conditioned (1e8), with bounds on all elements.
+TEST(MinimiseWithin, satisfiesTheKarushKuhnTuckerConditions) {
   std::mt19937_64 random(5);
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> width(0.0, 2.0);
@@ -55,7 +55,7 @@ TEST(LeastWithin, slopesPointOutwardsOnly) {
       low[i] = -width(random);
       high[i] = low[i] + width(random);
     }
-    const VectorXd x = leastWithin(h, b, low, high), slope = b - h * x;
+    const VectorXd x = minimiseWithin(h, b, low, high), slope = b - h * x;
     for (Index i = 0; i < n; ++i) {
       const double outwards = 1e-7 * std::sqrt(h(i, i)) * b.norm();
       EXPECT_GE(x[i], low[i]);

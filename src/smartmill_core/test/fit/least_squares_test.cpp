@@ -16,7 +16,7 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Rosenbrock's valley: least at (1, 1), where both residuals vanish.
+// Rosenbrock's valley: minimum at (1, 1), where both residuals vanish.
 class Valley : public Residuals {
  public:
   explicit Valley(double wrong = 0.0) : wrong_(wrong) {}
@@ -63,8 +63,8 @@ TEST(LeastSquares, ChecksDerivatives) {
   EXPECT_EQ(gap.column, 0);
 }
 
-// A line y = a + b t: (X'X)^-1 by hand for t = 0, 1, 2, 3 is [14 -6; -6 4] / 20. Units of 1e9 and 1e-9 change
-// nothing.
+// A line y = a + b t: (X'X)^-1 by hand for t = 0, 1, 2, 3 is [14 -6; -6 4] / 20, also with units of 1e9 and
+// 1e-9.
 TEST(LeastSquares, StatesTheCovarianceOfALine) {
   for (const double unit : {1.0, 1e9, 1e-9}) {
     const FunctionResiduals line(4, [&](const VectorXd& at, VectorXd& r) {
@@ -83,8 +83,8 @@ TEST(LeastSquares, StatesTheCovarianceOfALine) {
   }
 }
 
-// Only a + b and c are told: a and b have no standard deviation, c has one.
-TEST(LeastSquares, SaysWhatIsNotDetermined) {
+// Only a + b and c are determined: a and b have no standard deviation, c has one.
+TEST(LeastSquares, ReportsUndeterminedUnknowns) {
   const FunctionResiduals sum(3, [](const VectorXd& at, VectorXd& r) {
     r << at[0] + at[1] - 1.0, 2.0 * at[2] - 1.0, 2.0 * (at[0] + at[1]) - 2.2;
   });
@@ -95,19 +95,19 @@ TEST(LeastSquares, SaysWhatIsNotDetermined) {
   EXPECT_TRUE(std::isinf(covariance.deviation(0)));
   EXPECT_EQ(covariance.matrix(0, 1), 0.0);
   EXPECT_NEAR(covariance.matrix(2, 2), 0.25, 1e-9);
-  // A number that does not ask for a or b keeps its standard deviation.
+  // A quantity that does not depend on a or b keeps its standard deviation.
   MatrixXd map(2, 3);
   map << 0.0, 0.0, 3.0, 1.0, 0.0, 1.0;
   const MatrixXd of_map = propagated(map, covariance.matrix);
   EXPECT_NEAR(of_map(0, 0), 2.25, 1e-8);
   EXPECT_TRUE(std::isinf(of_map(1, 1)));
-  // A column of zeros, fewer residuals than unknowns, nothing at all.
+  // A column of zeros, fewer residuals than unknowns, an empty matrix.
   EXPECT_EQ(covarianceOf(MatrixXd::Zero(3, 2)).rank, 0);
   EXPECT_EQ(covarianceOf(MatrixXd::Ones(1, 2)).undetermined, (std::vector<bool>{true, true}));
   EXPECT_TRUE(covarianceOf(MatrixXd(3, 0)).complete());
 }
 
-TEST(LeastSquares, StaysWithinBoundsAndHoldsWhatIsHeld) {
+TEST(LeastSquares, RespectsBoundsAndFixedUnknowns) {
   const FunctionResiduals pull(2, [](const VectorXd& at, VectorXd& r) { r << at[0] - 2.0, at[1] - at[2]; });
   std::vector<Parameter> parameters = from({9.0, 0.0, 5.0});
   parameters[0].low = -1.0;
@@ -115,7 +115,7 @@ TEST(LeastSquares, StaysWithinBoundsAndHoldsWhatIsHeld) {
   parameters[2].low = parameters[2].high = 5.0;
   const Result found = minimise(pull, parameters);
   EXPECT_EQ(found.value[0], 1.0);
-  EXPECT_NEAR(found.value[1], 5.0, 3e-6);  // squares of 1 end at a change of 1e-11
+  EXPECT_NEAR(found.value[1], 5.0, 3e-6);  // the fit ends at a relative change of 1e-11 of squares near 1
   EXPECT_EQ(found.value[2], 5.0);
   const Covariance covariance = found.covariance();
   EXPECT_EQ(covariance.deviation(0), 0.0);
@@ -125,7 +125,7 @@ TEST(LeastSquares, StaysWithinBoundsAndHoldsWhatIsHeld) {
   EXPECT_EQ(minimise(pull, parameters).ending, Ending::converged);
 }
 
-TEST(LeastSquares, RefusesAStartThatIsNoNumber) {
+TEST(LeastSquares, RejectsAStartThatIsNotFinite) {
   const FunctionResiduals bad(2, [](const VectorXd& at, VectorXd& r) { r << at[0], std::sqrt(at[0]); });
   Options options;
   options.name = "pull";
@@ -133,8 +133,8 @@ TEST(LeastSquares, RefusesAStartThatIsNoNumber) {
             "pull: residual 1 of 2 is not a finite number at the start");
 }
 
-// Steps into the half where the root is no number are not taken, and nothing is said on the terminal.
-TEST(LeastSquares, TurnsBackSilentlyWhereResidualsAreNoNumbers) {
+// Steps to negative arguments of the root are rejected, without output on the terminal.
+TEST(LeastSquares, RejectsStepsToResidualsThatAreNotFiniteSilently) {
   const FunctionResiduals root(1, [](const VectorXd& at, VectorXd& r) { r << std::sqrt(at[0]) - 0.01; });
   testing::internal::CaptureStderr();
   testing::internal::CaptureStdout();
@@ -145,7 +145,7 @@ TEST(LeastSquares, TurnsBackSilentlyWhereResidualsAreNoNumbers) {
   EXPECT_NEAR(found.value[0], 1e-4, 1e-8);
 }
 
-TEST(LeastSquares, EndsWhenTold) {
+TEST(LeastSquares, EndsOnRequest) {
   Options options;
   int called = 0;
   double last = 1e300;
@@ -164,18 +164,18 @@ TEST(LeastSquares, EndsWhenTold) {
   EXPECT_EQ(minimise(Valley(), from({-1.2, 1.0}), few).ending, Ending::iterations_used);
 }
 
-TEST(LeastSquares, PassesOnWhatTheResidualsThrow) {
+TEST(LeastSquares, PassesOnExceptionsOfTheResiduals) {
   int calls = 0;
   const FunctionResiduals fails(1, [&](const VectorXd& at, VectorXd& r) {
-    if (++calls > 5) throw std::runtime_error("the twin has gone");
+    if (++calls > 5) throw std::runtime_error("the twin has failed");
     r << at[0] * at[0] + 1.0;
   });
   EXPECT_THROW(minimise(fails, from({3.0})), std::runtime_error);
 }
 
 // Stated deviations against the scatter of 400 fits of a decay through noise: z-scores have variance 1 within
-// four of their own standard deviations sqrt(2 / 400), to either side.
-TEST(LeastSquares, StatesHonestDeviations) {
+// four standard deviations sqrt(2 / 400) on either side.
+TEST(LeastSquares, StatesCalibratedDeviations) {
   std::mt19937 random(1);
   std::normal_distribution<double> normal;
   constexpr int RUNS = 400;

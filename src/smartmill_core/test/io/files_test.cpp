@@ -17,18 +17,18 @@ namespace {
 
 using Cells = std::vector<std::string_view>;
 
-TEST(Require, NamesKeyValueAndWhatIsDue) {
+TEST(Require, NamesKeyValueAndTheExpected) {
   require(true, "speed", 3.0, "above 0");
   require("speed", 3.0, Range::positive());
   EXPECT_EQ(errorOf([] { require(false, "lag", -0.5, "less than the record"); }),
-            "lag: -0.5, less than the record is due");
+            "lag: -0.5, expected less than the record");
   EXPECT_EQ(errorOf([] { require("lag", -0.5, Range::closed(0.0, 10.0), "s"); }),
             "lag: -0.5 is out of range (0 <= value <= 10 s)");
   EXPECT_EQ(errorOf([] { require("noise_rms", 0.0, Range::positive()); }),
             "noise_rms: 0 is out of range (> 0)");
-  // What is no number is good for nothing, whatever the comparison says.
+  // NaN and infinity are rejected whatever the condition.
   EXPECT_EQ(errorOf([] { require(true, "a", std::numeric_limits<double>::quiet_NaN(), "a number"); }),
-            "a: nan, a number is due");
+            "a: nan, expected a number");
   EXPECT_NE(errorOf([] { require("a", std::numeric_limits<double>::infinity(), Range{}); }), "");
 }
 
@@ -53,7 +53,7 @@ TEST(Csv, ReadsCellsRowByRow) {
   EXPECT_FALSE(reader.next(&cells));
 }
 
-TEST(Csv, RefusesWhatIsNoNumber) {
+TEST(Csv, RejectsCellsThatAreNotNumbers) {
   const TemporaryFolder folder;
   const std::string file = folder.file("t.csv");
   folder.write("t.csv", "x[N],word\n1.5,a\n+2e3,b\n");
@@ -77,7 +77,7 @@ TEST(Csv, RefusesWhatIsNoNumber) {
             folder.file("none.csv") + ": cannot be read");
 }
 
-TEST(Csv, GivesBackWhatWasWritten) {
+TEST(Csv, ReadsBackWhatWasWritten) {
   const TemporaryFolder folder;
   CsvWriter csv("rpm,limit[mm],kind", 17);
   csv.row(4500.0, 0.1, "hopf");
@@ -122,7 +122,7 @@ TEST(Gnuplot, DrawsAPicture) {
   EXPECT_EQ(readText(png).substr(1, 3), "PNG");
 }
 
-TEST(Gnuplot, SaysWhatItDoesNotLikeInOneLine) {
+TEST(Gnuplot, ReportsAnErrorInOneLine) {
   const TemporaryFolder folder;
   Gnuplot plot(folder.file("a.png"), 200, 100);
   plot << "plott 1\n";

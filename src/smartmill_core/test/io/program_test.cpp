@@ -7,7 +7,7 @@
 namespace smartmill {
 namespace {
 
-/// Exit code of a program with one needed number.
+/// Exit code of a program with one required number.
 template <typename Run>
 int exitOf(const std::vector<const char*>& words, const Run& run) {
   CommandLine line("A program.");
@@ -16,18 +16,18 @@ int exitOf(const std::vector<const char*>& words, const Run& run) {
   return runProgram(line, static_cast<int>(words.size()), words.data(), [&] { return run(number); });
 }
 
-TEST(Program, EndsWithTheCodeOfWhatItRan) {
+TEST(Program, EndsWithTheCodeOfItsBody) {
   EXPECT_EQ(exitOf({"/bin/halve", "3"}, [](double n) { return static_cast<int>(n); }), 3);
   EXPECT_EQ(exitOf({"/bin/halve", "3"}, [](double) {}), 0);
 }
 
-TEST(Program, SaysAnErrorInOneLine) {
+TEST(Program, ReportsAnErrorInOneLine) {
   testing::internal::CaptureStderr();
   EXPECT_EQ(exitOf({"/bin/halve", "3"}, [](double) { throw Error("model.yaml: teeth: 0"); }), 1);
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "halve: model.yaml: teeth: 0\n");
 }
 
-TEST(Program, RefusesAWrongCommandLine) {
+TEST(Program, RejectsAWrongCommandLine) {
   testing::internal::CaptureStderr();
   testing::internal::CaptureStdout();
   EXPECT_EQ(exitOf({"halve"}, [](double) {}), 2);
@@ -37,7 +37,7 @@ TEST(Program, RefusesAWrongCommandLine) {
   EXPECT_NE(testing::internal::GetCapturedStderr(), "");
 }
 
-TEST(Program, HearsWhatItsOptionsSay) {
+TEST(Program, ReadsItsOptions) {
   CommandLine line("Cuts.");
   std::string kind = "slot";
   std::vector<double> speeds;
@@ -74,10 +74,10 @@ TEST(Program, HearsWhatItsOptionsSay) {
   EXPECT_NE(line.help().find("make"), std::string::npos);
 }
 
-TEST(Program, MayRefuseItsCommandLineLater) {
+TEST(Program, MayRejectItsCommandLineLater) {
   testing::internal::CaptureStderr();
-  EXPECT_EQ(exitOf({"/bin/halve", "3"}, [](double) { throw UsageError("a campaign is due"); }), 2);
-  EXPECT_EQ(testing::internal::GetCapturedStderr(), "halve: a campaign is due\n");
+  EXPECT_EQ(exitOf({"/bin/halve", "3"}, [](double) { throw UsageError("expected a campaign"); }), 2);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "halve: expected a campaign\n");
 }
 
 }  // namespace

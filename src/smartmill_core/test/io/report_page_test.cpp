@@ -23,11 +23,11 @@ TEST(ReportPage, MarkdownBecomesHtml) {
         "<tr><td>x<td>1 &lt; 2</tr>", "<td><code>3</code></tr>", "<ul><li>one</li>\n<li>two</li>",
         "<p>Two lines\nof text.\n</p>", "src=\"data:image/png;base64,TWFu\"", "<figcaption>how it went"})
     EXPECT_NE(text.find(part), std::string::npos) << part << " is missing in\n" << page.text();
-  EXPECT_EQ(text.find("<td>---"), std::string::npos);  // the line under a table's head
+  EXPECT_EQ(text.find("<td>---"), std::string::npos);  // the line below a table's header
 }
 
-// Whatever stands in a campaign's name is no markup.
-TEST(ReportPage, NamesAreNoMarkup) {
+// Text of a campaign's name is not markup.
+TEST(ReportPage, EscapesNames) {
   EXPECT_EQ(escapedHtml("<a href=\"x\">&"), "&lt;a href=&quot;x&quot;&gt;&amp;");
   ReportPage page("<script>alert(1)</script>");
   page.markdown("<b>no</b>\n", ".");
@@ -35,14 +35,14 @@ TEST(ReportPage, NamesAreNoMarkup) {
   EXPECT_EQ(page.text().find("<b>no"), std::string::npos);
 }
 
-// It opens without a server and without a network: nothing in it comes from elsewhere.
-TEST(ReportPage, NeedsNothingElse) {
+// The page opens without server and network: it has no external references.
+TEST(ReportPage, HasNoExternalReferences) {
   const std::string text = ReportPage("t").text();
   for (const char* from : {"http:", "https:", "src=\"/", "@import", "url("})
     EXPECT_EQ(text.find(from), std::string::npos) << from;
 }
 
-TEST(ReportPage, SaysWhatCannotBe) {
+TEST(ReportPage, RejectsMissingFiles) {
   ReportPage page("t");
   EXPECT_THROW(page.picture("/nowhere/p.png", "p"), Error);
   EXPECT_THROW(page.write("/nowhere/r.html"), Error);

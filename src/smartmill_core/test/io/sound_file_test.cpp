@@ -28,7 +28,7 @@ SoundFile tone() {
   return sound;
 }
 
-TEST(SoundFile, comesBackAsItWasWritten) {
+TEST(SoundFile, readsBackWhatWasWritten) {
   const std::string file = path("tone.wav");
   writeWav(tone(), file);
   const SoundFile back = readSoundFile(file);
@@ -41,7 +41,7 @@ TEST(SoundFile, comesBackAsItWasWritten) {
   EXPECT_FALSE(isSoundFile("a.csv"));
 }
 
-TEST(SoundFile, whatIsNoneIsOneLine) {
+TEST(SoundFile, rejectsOtherFilesInOneLine) {
   const std::string file = path("none.wav");
   std::ofstream(file) << "time[s],fx[N]\n";
   for (const std::string& bad : {file, path("missing.wav")}) {
@@ -69,8 +69,8 @@ TEST(SoundFile, channelsBecomeQuantities) {
   EXPECT_THROW(readSoundRecord(file, soundChannels("1:loudness")), Error);
 }
 
-// A lobe that rises by 1 mm over 100 rad/s and falls by 1 mm over 50.
-TEST(LobeFlanks, straightLinesBetweenTheChartsSpeeds) {
+// A lobe that rises by 1 mm over 100 rad/s and falls by 1 mm over 50 rad/s.
+TEST(LobeFlanks, areLinearBetweenTheChartsSpeeds) {
   const StabilityLimit limit{{900.0, 1000.0, 1050.0, 1100.0}, {1e-3, 2e-3, 1e-3, 1e-3}, {}};
   const auto room = lobeFlanks(limit, 1000.0, 1.5e-3);
   EXPECT_NEAR(room[0], 50.0, 1e-9);

@@ -29,13 +29,13 @@ UffFunction receptance(bool even) {
   return f;
 }
 
-TEST(Uff, ReadsWhatItWrote) {
+TEST(Uff, ReadsBackWhatWasWritten) {
   const TemporaryFolder folder;
   const std::string file = folder.file("frf.uff");
   for (const bool binary : {false, true}) {
     for (const bool even : {false, true}) {
-      const UffFunction due = receptance(even);
-      writeUff({due, due}, file, binary);
+      const UffFunction expected = receptance(even);
+      writeUff({expected, expected}, file, binary);
       EXPECT_TRUE(isUff(file));
       const std::vector<UffFunction> found = readUff(file);
       ASSERT_EQ(found.size(), 2u);
@@ -44,17 +44,17 @@ TEST(Uff, ReadsWhatItWrote) {
       EXPECT_EQ(found[1].reference_direction, -3);
       EXPECT_EQ(found[1].numerator, uff::DISPLACEMENT);
       EXPECT_EQ(found[1].unit, "m");
-      ASSERT_EQ(found[1].value.size(), due.value.size());
-      for (std::size_t i = 0; i < due.value.size(); ++i) {
-        EXPECT_NEAR(found[1].abscissa[i], due.abscissa[i], 1e-5);
-        EXPECT_NEAR(std::abs(found[1].value[i] - due.value[i]), 0.0, 1e-18);
+      ASSERT_EQ(found[1].value.size(), expected.value.size());
+      for (std::size_t i = 0; i < expected.value.size(); ++i) {
+        EXPECT_NEAR(found[1].abscissa[i], expected.abscissa[i], 1e-5);
+        EXPECT_NEAR(std::abs(found[1].value[i] - expected.value[i]), 0.0, 1e-18);
       }
     }
   }
 }
 
-// As the description of dataset 58 lays it out: single precision in 13 columns that touch one another, other
-// datasets between, D exponents.
+// As in the description of dataset 58: single precision in adjacent fields of 13 columns, other datasets in
+// between, D exponents.
 TEST(Uff, ReadsSinglePrecisionText) {
   const TemporaryFolder folder;
   const std::string file = folder.file("old.unv");
@@ -76,7 +76,7 @@ TEST(Uff, ReadsSinglePrecisionText) {
   EXPECT_DOUBLE_EQ(found[0].abscissa[4], 4e-3);
 }
 
-TEST(Uff, NamesWhatIsWrong) {
+TEST(Uff, ErrorsNameDatasetAndFault) {
   const TemporaryFolder folder;
   const std::string file = folder.file("short.uff");
   writeUff({receptance(true)}, file, true);

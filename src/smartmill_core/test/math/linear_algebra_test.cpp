@@ -19,7 +19,7 @@ using Eigen::VectorXd;
 using units::PI;
 using units::TWO_PI;
 
-TEST(Angle, IsWrappedIntoOneTurn) {
+TEST(Angle, IsWrappedIntoOneRevolution) {
   EXPECT_EQ(wrapped(0.0), 0.0);
   EXPECT_EQ(wrapped(1.5), 1.5);
   EXPECT_EQ(wrapped(TWO_PI), 0.0);
@@ -28,8 +28,8 @@ TEST(Angle, IsWrappedIntoOneTurn) {
   EXPECT_NEAR(wrapped(-1000.0 * TWO_PI - 3.0), TWO_PI - 3.0, 1e-11);
 }
 
-// Next to whole turns rounding leads to either side; no result may leave 0 <= angle < 2 pi.
-TEST(Angle, StaysInsideNextToWholeTurns) {
+// Near whole revolutions rounding goes either way; every result must satisfy 0 <= angle < 2 pi.
+TEST(Angle, StaysInRangeNearWholeRevolutions) {
   for (int turns = -2000; turns <= 2000; ++turns) {
     const double at = turns * TWO_PI;
     for (const double angle : {at, std::nextafter(at, -1e9), std::nextafter(at, 1e9), at - 1e-18}) {
@@ -56,7 +56,7 @@ MatrixXcd complexExample() {
   return a;
 }
 
-TEST(LinearAlgebra, SolvesWhatItSays) {
+TEST(LinearAlgebra, SolvesLinearEquations) {
   const VectorXd b = VectorXd::LinSpaced(3, 1.0, 2.0);
   const MatrixXd a = example();
   MatrixXd skew = a;
@@ -73,12 +73,12 @@ TEST(LinearAlgebra, SolvesWhatItSays) {
   EXPECT_LT((c * linear::inverseSymmetric(c) - MatrixXcd::Identity(3, 3)).norm(), 1e-14);
 }
 
-TEST(LinearAlgebra, TakesTheRootOfASymmetricMatrix) {
+TEST(LinearAlgebra, FactorsASymmetricMatrix) {
   const VectorXd b = VectorXd::LinSpaced(3, 1.0, 2.0);
   const linear::SymmetricRoot made = linear::symmetricRoot(example(), b);
   EXPECT_LT((made.root.transpose() * made.root - example()).norm(), 1e-14);
   EXPECT_LT((made.root.transpose() * made.along - b).norm(), 1e-14);
-  // One direction is not there: the root says so by a zero row.
+  // A singular direction gives a zero row of the root.
   MatrixXd singular = MatrixXd::Zero(2, 2);
   singular << 1.0, 2.0, 2.0, 4.0;
   const linear::SymmetricRoot flat = linear::symmetricRoot(singular, VectorXd::Zero(2));
@@ -86,7 +86,7 @@ TEST(LinearAlgebra, TakesTheRootOfASymmetricMatrix) {
   EXPECT_EQ(flat.along.norm(), 0.0);
 }
 
-// A line through points of a line: exactly found; two equal columns: rank one.
+// A line through collinear points is exact; two equal columns have rank one.
 TEST(LinearAlgebra, FindsLeastSquares) {
   MatrixXd a(4, 2);
   a << 1, 0, 1, 1, 1, 2, 1, 3;
@@ -97,7 +97,7 @@ TEST(LinearAlgebra, FindsLeastSquares) {
   EXPECT_NEAR(line.x(1, 0), -0.5, 1e-14);
   a.col(0) = a.col(1);
   EXPECT_EQ(linear::leastSquares(a, y).rank, 1);
-  // The columns are the same: of all x1 + x2 that fit as well, equal shares are the least.
+  // With equal columns the solution of minimum norm has equal elements.
   const VectorXd least = linear::leastNorm(a, y);
   EXPECT_NEAR(least[0], least[1], 1e-14);
   EXPECT_NEAR(least[0], a.col(0).dot(y.col(0)) / a.col(0).squaredNorm() / 2.0, 1e-14);
@@ -120,14 +120,14 @@ TEST(LinearAlgebra, FindsEigenvaluesAndSingularValues) {
   const linear::SymmetricEigensystem own = linear::symmetricEigensystem(example());
   EXPECT_LT((own.vectors * own.values.asDiagonal() * own.vectors.transpose() - example()).norm(), 1e-13);
   EXPECT_LE(own.values[0], own.values[1]);
-  // A Hermitian matrix that is positive has its eigenvalues as singular values.
+  // The singular values of a positive definite Hermitian matrix are its eigenvalues.
   const MatrixXcd c = complexExample();
   Eigen::VectorXd real = linear::eigenvalues(c).real();
   std::sort(real.data(), real.data() + real.size(), std::greater<>());
   EXPECT_LT((real - linear::singularValues(c)).norm(), 1e-13);
 }
 
-TEST(LinearAlgebra, TakesAMatrixApart) {
+TEST(LinearAlgebra, DecomposesAMatrix) {
   MatrixXd a(2, 3);
   a << 1, 2, 3, -1, 0.5, 2;
   const linear::Svd thin = linear::svd(a), full = linear::svd(a, true);
@@ -137,8 +137,8 @@ TEST(LinearAlgebra, TakesAMatrixApart) {
   EXPECT_LT((a * full.v.col(2)).norm(), 1e-14);
 }
 
-// exp of a rotation's generator is the rotation; of nothing, nothing.
-TEST(LinearAlgebra, TakesTheExponential) {
+// exp of a rotation's generator is the rotation; of an empty matrix, an empty matrix.
+TEST(LinearAlgebra, ComputesTheExponential) {
   MatrixXd generator(2, 2);
   generator << 0.0, -PI / 6.0, PI / 6.0, 0.0;
   const MatrixXd turn = linear::exponential(generator);

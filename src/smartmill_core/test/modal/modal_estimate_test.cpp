@@ -16,7 +16,7 @@ namespace {
 
 struct Truth {
   std::vector<Mode> modes;
-  double step, high, noise;  // noise: complex, of the FRF's root mean square
+  double step, high, noise;  // noise: complex, as share of the FRF's root mean square
 };
 
 FrequencyResponse measured(const Truth& truth, unsigned seed) {
@@ -52,23 +52,24 @@ const Truth REFERENCE = {
     4000.0,
     0.01};
 
-// The case of the published comparisons: pLSCF with poles picked by hand gives damping within 0.72 %.
+// The case of the published comparison, in which pLSCF with manually selected poles gives damping within 0.72
+// %.
 TEST(ModalEstimate, FindsTheReferenceCase) {
   for (unsigned seed = 1; seed <= 8; ++seed) expectModes(REFERENCE, 5e-4, 6e-3, seed);
 }
 
-TEST(ModalEstimate, PartsAClosePair) {
+TEST(ModalEstimate, SeparatesAClosePair) {
   for (const double second : {0.8e-8, -0.8e-8}) {
     expectModes({{{1000.0, 0.02, 1e-8}, {1020.0, 0.02, second}}, 0.8, 4000.0, 0.01}, 5e-4, 0.02);
   }
 }
 
-TEST(ModalEstimate, SeesAModeFortyDecibelsBelowItsNeighbour) {
+TEST(ModalEstimate, FindsAModeFortyDecibelsBelowItsNeighbour) {
   expectModes({{{1000.0, 0.02, 1e-8}, {1300.0, 0.02, 1e-10}}, 0.8, 4000.0, 1e-3}, 5e-4, 0.02);
 }
 
-/// Eight points of a structure of 14 modes, 1..6 % apart at damping of 1.2..2.8 %, each point with a ripple
-/// of 1 % of its own that hangs together over 20 lines, and noise of 0.3 % of its rms.
+/// Eight points of a structure with 14 modes, 1..6 % apart with damping of 1.2..2.8 %. Each point has its own
+/// ripple of 1 %, correlated over 20 lines, and noise of 0.3 % of its rms.
 std::vector<FrequencyResponse> denseBand(std::mt19937& random, std::vector<Mode>& truth) {
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> even(0.0, 1.0);
@@ -102,8 +103,8 @@ std::vector<FrequencyResponse> denseBand(std::mt19937& random, std::vector<Mode>
   return points;
 }
 
-// Steady poles alone left none of these modes: what they lacked beside them were poles hardly seen.
-TEST(ModalEstimate, KeepsTheModesOfADenseBand) {
+// Persistent poles alone give none of these modes, since their weak neighbours are missing.
+TEST(ModalEstimate, FindsTheModesOfADenseBand) {
   for (const unsigned seed : {3u, 5u}) {
     std::mt19937 random(seed);
     std::vector<Mode> truth;
@@ -116,7 +117,7 @@ TEST(ModalEstimate, KeepsTheModesOfADenseBand) {
   }
 }
 
-// Where the force had no power the average bends by its own bias, and the coherence says so.
+// Where the force has no power the bias of the average is curved, and the coherence is low.
 TEST(ModalEstimate, DoubtsAModeWithoutCoherence) {
   FrequencyResponse frf = measured({{{1000.0, 0.02, 1e-8}, {3000.0, 0.02, 1e-9}}, 0.8, 4000.0, 1e-3}, 1);
   for (const double f : frf.frequency) frf.coherence.push_back(std::abs(f - 3000.0) < 150.0 ? 0.1 : 0.98);
@@ -128,7 +129,7 @@ TEST(ModalEstimate, DoubtsAModeWithoutCoherence) {
 }
 
 // From a peak that is a tenth of a line wide to one that is 1250 lines wide.
-TEST(ModalEstimate, TakesAnyDamping) {
+TEST(ModalEstimate, FindsModesOfAnyDamping) {
   expectModes({{{100.0, 1e-4, 1e-8}, {1000.0, 1e-4, 1e-8}, {1700.4, 3e-4, 1e-8}, {3000.5, 1e-4, 1e-8}},
                1.0,
                4000.0,
@@ -137,62 +138,62 @@ TEST(ModalEstimate, TakesAnyDamping) {
   expectModes({{{700.0, 0.1, 1e-8}, {2000.0, 0.1, 1e-8}}, 0.8, 4000.0, 0.01}, 1e-3, 0.01);
 }
 
-// Lines so wide that each mode's window holds the other.
-TEST(ModalEstimate, SeesNeighboursOnFewLines) {
+// Line spacing so wide that each mode's window contains the other mode.
+TEST(ModalEstimate, FindsNeighboursOnFewLines) {
   expectModes({{{331.88, 0.0198, 1.09e-8}, {393.25, 0.0198, 1.2e-8}}, 10.0, 5500.0, 2e-3}, 5e-4, 0.02);
 }
 
-// A beam that hangs free, struck and read at its end: f_n = f_1 (b_n / b_1)^2 with cos b cosh b = 1, every
-// mode four times the mean accelerance there, and the rigid body's (Blevins, table 8.1). Damping 5e-5 ..
+// A free beam, excited and measured at its end: f_n = f_1 (b_n / b_1)^2 with cos b cosh b = 1, each mode with
+// four times the mean accelerance there, and the rigid-body accelerance (Blevins, table 8.1). Damping 5e-5 ..
 // 1e-4, lines of 1 Hz, the first mode on one of them; noise of an accelerometer.
 TEST(ModalEstimate, FindsEveryModeOfAFreeBeam) {
   for (const double damping : {1e-4, 5e-5}) {
     std::mt19937 random(3);
     std::normal_distribution<double> normal;
-    std::vector<double> due;
+    std::vector<double> expected;
     for (int n = 1; n <= 16; ++n) {
       double b = (n + 0.5) * units::PI;
       for (int i = 0; i < 30; ++i)
         b -= (std::cos(b) - 1.0 / std::cosh(b)) / (-std::sin(b) + std::tanh(b) / std::cosh(b));
-      due.push_back(60.0 * std::pow(b / 4.730040744862704, 2));
+      expected.push_back(60.0 * std::pow(b / 4.730040744862704, 2));
     }
     FrequencyResponse frf;
     frf.unit = "m/N";
     const double mass = 2.0;
     for (double f = 1.0; f <= 6400.0; f += 1.0) {
       std::complex<double> accelerance = 4.0 / mass;
-      for (const double at : due)
+      for (const double at : expected)
         accelerance -= 4.0 / mass * f * f / std::complex<double>(at * at - f * f, 2.0 * damping * at * f);
       accelerance += 0.02 * std::complex<double>(normal(random), normal(random));
       frf.frequency.push_back(f);
       frf.value.push_back(-accelerance / std::pow(units::TWO_PI * f, 2));
     }
     const ModalEstimate estimate = estimateModes({frf}, {});
-    due.pop_back();  // above the lines
-    ASSERT_EQ(estimate.modes.size(), due.size());
-    for (std::size_t k = 0; k < due.size(); ++k) {
-      EXPECT_NEAR(estimate.modes[k].frequency, due[k], 1e-5 * due[k]);
+    expected.pop_back();  // above the lines
+    ASSERT_EQ(estimate.modes.size(), expected.size());
+    for (std::size_t k = 0; k < expected.size(); ++k) {
+      EXPECT_NEAR(estimate.modes[k].frequency, expected[k], 1e-5 * expected[k]);
       if (k == 0) continue;
-      EXPECT_NEAR(estimate.modes[k].damping_ratio, damping, 0.05 * damping) << due[k];
+      EXPECT_NEAR(estimate.modes[k].damping_ratio, damping, 0.05 * damping) << expected[k];
     }
   }
 }
 
-TEST(ModalEstimate, ProvesNothingInNoise) {
+TEST(ModalEstimate, FindsNoModeInNoise) {
   Truth noise = REFERENCE;
   noise.noise = 1e3;
   for (unsigned seed = 1; seed <= 8; ++seed)
     EXPECT_EQ(estimateModes({measured(noise, seed)}, {}).modes.size(), 0u) << seed;
 }
 
-// Hum on one line is no mode.
-TEST(ModalEstimate, DoesNotTakeASpikeForAMode) {
+// Hum on one line is not a mode.
+TEST(ModalEstimate, DoesNotMistakeASpikeForAMode) {
   FrequencyResponse frf = measured(REFERENCE, 1);
   frf.value[2500] += 5e-7;
   EXPECT_EQ(estimateModes({frf}, {}).modes.size(), 4u);
 }
 
-TEST(ModalEstimate, TurnsTheOtherSignOfPhase) {
+TEST(ModalEstimate, DetectsTheOtherSignConvention) {
   FrequencyResponse frf = measured(REFERENCE, 1);
   for (auto& v : frf.value) v = std::conj(v);
   const ModalEstimate estimate = estimateModes({frf}, {});
@@ -201,7 +202,7 @@ TEST(ModalEstimate, TurnsTheOtherSignOfPhase) {
   EXPECT_NEAR(std::abs(fittedResponse(estimate, 0, 480.0) / frf.value[599] - 1.0), 0.0, 0.01);
 }
 
-// Complex residues: a share in quadrature is found again, and is left out where modes are to be real.
+// Complex residues: a quadrature share is identified, and omitted where modes are required to be real.
 TEST(ModalEstimate, FindsComplexResidues) {
   FrequencyResponse frf = measured({{{1000.0, 0.02, 1e-8}}, 1.0, 2000.0, 1e-4}, 1);
   const Mode mode{1000.0, 0.02, 1e-8};
@@ -218,7 +219,7 @@ TEST(ModalEstimate, FindsComplexResidues) {
   for (const EstimatedMode& m : real.modes) EXPECT_EQ(m.phase_part[0], 0.0);
 }
 
-TEST(ModalEstimate, StatesItsErrorsHonestly) {
+TEST(ModalEstimate, StatesCalibratedErrors) {
   Coverage frequency, damping, gain;
   ModalEstimateOptions options;
   options.largest_order = 20;
@@ -227,17 +228,17 @@ TEST(ModalEstimate, StatesItsErrorsHonestly) {
     const ModalEstimate estimate = estimateModes({measured(truth, seed)}, options);
     ASSERT_EQ(estimate.modes.size(), 2u);
     const EstimatedMode& m = estimate.modes[seed % 2];
-    const Mode& due = truth.modes[seed % 2];
-    frequency.add(m.frequency - due.frequency, m.frequency_std);
-    damping.add(m.damping_ratio - due.damping_ratio, m.damping_ratio_std);
-    gain.add(m.gain[0] - due.gain, m.gain_std[0]);
+    const Mode& expected = truth.modes[seed % 2];
+    frequency.add(m.frequency - expected.frequency, m.frequency_std);
+    damping.add(m.damping_ratio - expected.damping_ratio, m.damping_ratio_std);
+    gain.add(m.gain[0] - expected.gain, m.gain_std[0]);
   }
-  EXPECT_TRUE(frequency.honest());
-  EXPECT_TRUE(damping.honest());
-  EXPECT_TRUE(gain.honest());
+  EXPECT_TRUE(frequency.isCalibrated());
+  EXPECT_TRUE(damping.isCalibrated());
+  EXPECT_TRUE(gain.isCalibrated());
 }
 
-TEST(ModalEstimate, ReportsProgressAndEndsWhenTold) {
+TEST(ModalEstimate, ReportsProgressAndEndsOnRequest) {
   ModalEstimateOptions options;
   double last = 0.0;
   int calls = 0;
@@ -250,7 +251,7 @@ TEST(ModalEstimate, ReportsProgressAndEndsWhenTold) {
   EXPECT_EQ(calls, 25);
 }
 
-TEST(ModalEstimate, RefusesWhatItCannotRead) {
+TEST(ModalEstimate, RejectsInvalidInput) {
   FrequencyResponse frf = measured(REFERENCE, 1);
   frf.value[7] = NAN;
   EXPECT_THROW(estimateModes({frf}, {}), Error);
@@ -259,26 +260,26 @@ TEST(ModalEstimate, RefusesWhatItCannotRead) {
                Error);
 }
 
-// Kaufman's form leaves out a part that is orthogonal to the columns: of the squares' slope it misses
-// nothing.
+// Kaufman's approximation neglects a term orthogonal to the columns, so that the gradient of the squares is
+// exact.
 TEST(ModalWindow, SlopeOfTheSquaresAgreesWithDifferences) {
   const FrequencyResponse frf =
       measured({{{1000.0, 0.02, 1e-8}, {1080.0, 0.03, 5e-9}}, 4.0, 2000.0, 0.01}, 1);
   WeightedLines lines{frf.frequency, {frf.value}, {std::vector<double>(frf.size(), 1e9)}};
   const ModalWindow window(lines, false, frf.size());
   const PoleList at = PoleList().with(990.0, 0.025).with(1090.0, 0.02);
-  Eigen::VectorXd left(window.count());
+  Eigen::VectorXd residual(window.count());
   Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(window.count(), 4);
-  ASSERT_TRUE(window.evaluate(at.p, &left, &jacobian));
-  const Eigen::VectorXd slope = 2.0 * jacobian.transpose() * left;
+  ASSERT_TRUE(window.evaluate(at.p, &residual, &jacobian));
+  const Eigen::VectorXd slope = 2.0 * jacobian.transpose() * residual;
   for (Eigen::Index i = 0; i < 4; ++i) {
     constexpr double STEP = 1e-5;
     double squares[2];
     for (const int side : {0, 1}) {
       Eigen::VectorXd moved = at.p;
       moved[i] += side ? STEP : -STEP;
-      ASSERT_TRUE(window.evaluate(moved, &left, nullptr));
-      squares[side] = left.squaredNorm();
+      ASSERT_TRUE(window.evaluate(moved, &residual, nullptr));
+      squares[side] = residual.squaredNorm();
     }
     EXPECT_NEAR((squares[1] - squares[0]) / (2.0 * STEP) / slope[i], 1.0, 1e-5) << i;
   }

@@ -36,7 +36,7 @@ FrequencyResponse measured(const ModalModel& model, double std_dev, unsigned see
   return frf;
 }
 
-TEST(ModalFit, findsAnExactModelAgain) {
+TEST(ModalFit, recoversAnExactModel) {
   ModalFitOptions options;
   options.low = 100.0;
   options.high = 4000.0;
@@ -51,8 +51,8 @@ TEST(ModalFit, findsAnExactModelAgain) {
   EXPECT_LT(fit.relative_error, 1e-7);
 }
 
-// A negative mode (hit and response at different points) is left out when told that both are at one point.
-TEST(ModalFit, keepsGainsPositiveWhenAsked) {
+// A mode with negative gain (hit and response at different points) is omitted with positive_gains.
+TEST(ModalFit, keepsGainsPositiveAtADrivePoint) {
   ModalModel cross = sensor();
   cross.modes.push_back({3000.0, 0.02, -0.1});
   ModalFitOptions options;
@@ -74,7 +74,7 @@ TEST(ModalFit, choosesTheNumberOfModesByEvidence) {
   EXPECT_NEAR(fit.model.staticGain(), 1.0, 1e-12);
 }
 
-TEST(ModalFit, statedStandardDeviationsAreHonest) {
+TEST(ModalFit, standardDeviationsAreCalibrated) {
   ModalFitOptions options;
   options.low = 100.0;
   options.high = 4000.0;
@@ -87,10 +87,10 @@ TEST(ModalFit, statedStandardDeviationsAreHonest) {
     const ModalFit fit = fitModes(measured(truth, 0.05, seed), options);
     for (std::size_t k = 0; k < 2; ++k) {
       const Mode& found = fit.model.modes[k];
-      const Mode& due = truth.modes[k];
-      squares += std::pow((found.frequency - due.frequency) / found.frequency_std, 2) +
-                 std::pow((found.damping_ratio - due.damping_ratio) / found.damping_ratio_std, 2) +
-                 std::pow((found.gain - due.gain) / found.gain_std, 2);
+      const Mode& expected = truth.modes[k];
+      squares += std::pow((found.frequency - expected.frequency) / found.frequency_std, 2) +
+                 std::pow((found.damping_ratio - expected.damping_ratio) / found.damping_ratio_std, 2) +
+                 std::pow((found.gain - expected.gain) / found.gain_std, 2);
       count += 3;
     }
   }
@@ -112,7 +112,7 @@ TEST(ModalFit, separatesCloseModes) {
   EXPECT_NEAR(fit.model.modes[1].gain / 2e-8, 1.0, 1e-4);
 }
 
-TEST(ModalFit, refusesWhatCannotBeFitted) {
+TEST(ModalFit, rejectsInvalidInput) {
   ModalFitOptions options;
   options.low = 100.0;
   options.high = 110.0;
@@ -124,8 +124,8 @@ TEST(ModalFit, refusesWhatCannotBeFitted) {
   EXPECT_THROW(fitModes(bad, options), Error);
 }
 
-// A strong mode above the band bends what it leaves inside: 1.6 at the end of what it is at rest.
-TEST(ModalFit, aStrongModeAboveTheBandDoesNotPullAtTheOthers) {
+// A strong mode above the band has a curved residual inside: at the band's end 1.6 times its static value.
+TEST(ModalFit, aStrongModeAboveTheBandDoesNotBiasTheOthers) {
   ModalModel tool;
   tool.modes = {{900.0, 0.03, 0.1}, {2000.0, 0.02, 0.05}, {6500.0, 0.02, 1.0}};
   ModalFitOptions options;
@@ -134,7 +134,7 @@ TEST(ModalFit, aStrongModeAboveTheBandDoesNotPullAtTheOthers) {
   const ModalFit fit = fitModes(measured(tool, 0.0, 1), options);
   ASSERT_EQ(fit.model.modes.size(), 2u);
   for (std::size_t k = 0; k < 2; ++k) {
-    // What stays is its damping, which the bent share has not.
+    // The remaining error is from its damping, which the frequency-dependent direct share neglects.
     EXPECT_NEAR(fit.model.modes[k].damping_ratio / tool.modes[k].damping_ratio, 1.0, 0.03);
     EXPECT_NEAR(fit.model.modes[k].gain / tool.modes[k].gain, 1.0, 0.03);
   }

@@ -46,8 +46,8 @@ TEST(ModalModel, responseOfOneMode) {
   // At the natural frequency gain / (2 i zeta).
   EXPECT_NEAR(std::abs(mode.response(100.0) - Complex(0.0, -75.0)), 0.0, 1e-12);
   const double wn = TWO_PI * 100.0, w = TWO_PI * 130.0;
-  const Complex due = 3.0 * wn * wn / Complex(wn * wn - w * w, 2.0 * 0.02 * wn * w);
-  EXPECT_NEAR(std::abs(mode.response(130.0) / due - 1.0), 0.0, 1e-14);
+  const Complex expected = 3.0 * wn * wn / Complex(wn * wn - w * w, 2.0 * 0.02 * wn * w);
+  EXPECT_NEAR(std::abs(mode.response(130.0) / expected - 1.0), 0.0, 1e-14);
   EXPECT_DOUBLE_EQ(model().staticGain(), 1.0);
   EXPECT_NEAR(std::abs(model().response(0.0) - 1.0), 0.0, 1e-15);
 }
@@ -56,9 +56,9 @@ TEST(ModalFilter, zeroOrderStepIsExact) {
   ModalFilter filter(model(), RATE, Hold::zero_order);
   EXPECT_DOUBLE_EQ(filter.step(1.0), model().direct);  // no time has passed yet
   for (int i = 1; i < 5000; ++i) {
-    double due = model().direct;
-    for (const Mode& mode : model().modes) due += mode.gain * stepResponse(mode, i / RATE);
-    ASSERT_NEAR(filter.step(1.0), due, 1e-11) << i;
+    double expected = model().direct;
+    for (const Mode& mode : model().modes) expected += mode.gain * stepResponse(mode, i / RATE);
+    ASSERT_NEAR(filter.step(1.0), expected, 1e-11) << i;
   }
 }
 
@@ -66,32 +66,32 @@ TEST(ModalFilter, firstOrderRampIsExact) {
   ModalFilter filter(model(), RATE, Hold::first_order);
   for (int i = 0; i < 5000; ++i) {
     const double t = i / RATE;
-    double due = model().direct * t;
-    for (const Mode& mode : model().modes) due += mode.gain * rampResponse(mode, t);
-    ASSERT_NEAR(filter.step(t), due, 1e-12) << i;
+    double expected = model().direct * t;
+    for (const Mode& mode : model().modes) expected += mode.gain * rampResponse(mode, t);
+    ASSERT_NEAR(filter.step(t), expected, 1e-12) << i;
   }
 }
 
-// A sampled harmonic joined by straight lines holds sinc^2(f / rate) of the harmonic; what else it holds lies
-// near multiples of the rate, where the modes do not answer (600 Hz: image 41 times higher, answer below 1e-3
+// A sampled harmonic with linear interpolation contains sinc^2(f / rate) of the harmonic. Its images are near
+// multiples of the rate, where the modes hardly respond (600 Hz: image 41 times higher, response below 1e-3
 // of 1e-3).
-TEST(ModalFilter, firstOrderFollowsAHarmonic) {
+TEST(ModalFilter, firstOrderReproducesAHarmonic) {
   const double f = 600.0;
   ModalModel one;
   one.modes = {{930.0, 0.03, 1.0}};
   ModalFilter filter(one, RATE, Hold::first_order);
   const double x = units::PI * f / RATE, sinc = std::sin(x) / x;
-  const Complex due = one.response(f) * sinc * sinc;
+  const Complex expected = one.response(f) * sinc * sinc;
   for (int i = 0; i < 25600; ++i) {
     const Complex input = std::polar(1.0, TWO_PI * f * i / RATE);
     const double output = filter.step(input.real());
     if (i > 12800) {
-      ASSERT_NEAR(output, (due * input).real(), 1e-5);
+      ASSERT_NEAR(output, (expected * input).real(), 1e-5);
     }
   }
 }
 
-TEST(ModalFilter, staysInTheStaticStateOfItsReset) {
+TEST(ModalFilter, staysInTheStaticStateAfterReset) {
   for (const Hold hold : {Hold::zero_order, Hold::first_order}) {
     ModalFilter filter(model(), RATE, hold);
     filter.reset(7.0);
@@ -101,7 +101,7 @@ TEST(ModalFilter, staysInTheStaticStateOfItsReset) {
   }
 }
 
-TEST(ModalFilter, refusesImpossibleModes) {
+TEST(ModalFilter, rejectsInvalidModes) {
   ModalModel bad;
   bad.modes = {{100.0, 1.0, 1.0}};
   EXPECT_THROW(ModalFilter(bad, RATE, Hold::zero_order), Error);
@@ -123,7 +123,7 @@ TEST(StateSpace, hasTheFrequencyResponseOfTheModes) {
 }
 
 // Zero-order hold by the matrix exponential of state and input together.
-TEST(StateSpace, discretisedItIsTheZeroOrderFilter) {
+TEST(StateSpace, discretisedEqualsTheZeroOrderFilter) {
   StateSpace system = stateSpace(model());
   Eigen::MatrixXd joint = Eigen::MatrixXd::Zero(7, 7);
   joint << system.a, system.b, Eigen::MatrixXd::Zero(1, 7);
@@ -168,8 +168,8 @@ TEST(DiscretiseNoise, integratorChain) {
 }
 
 TEST(DiscretiseNoise, decayOverAnyStep) {
-  // x' = -r x + w: variance q (1 - exp(-2 r dt)) / (2 r); at r dt = 50 exp(+50) would drown every digit of
-  // the plain form.
+  // x' = -r x + w: variance q (1 - exp(-2 r dt)) / (2 r); at r dt = 50 the direct form loses all digits to
+  // exp(+50).
   for (const double rate_step : {1e-6, 0.1, 5.0, 50.0}) {
     const Eigen::MatrixXd a = Eigen::MatrixXd::Constant(1, 1, -100.0),
                           q = Eigen::MatrixXd::Constant(1, 1, 3.0);

@@ -11,7 +11,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-TEST(CauseOdds, writtenAndReadAgain) {
+TEST(CauseOdds, readsBackWhatWasWritten) {
   const TemporaryFolder folder;
   CauseOdds odds;
   odds.machines = 8;
@@ -31,16 +31,16 @@ TEST(CauseOdds, writtenAndReadAgain) {
 }
 
 struct Bad {
-  const char *from, *to, *says;
+  const char *from, *to, *message;
 };
 
-TEST(CauseOdds, whatIsWrongIsNamedInOneLine) {
+TEST(CauseOdds, errorsNameTheKeyInOneLine) {
   const std::string good =
       "format: smartmill-causes/1\nmachines: 8\nother_odds: 0.06\nodds:\n  runout: 0.4\n";
   const TemporaryFolder folder;
   EXPECT_NO_THROW(readCauseOdds(folder.write("good.yaml", good)));
   for (const Bad& bad :
-       {Bad{"runout", "runuot", "odds.runuot: is no effect of the catalogue"},
+       {Bad{"runout", "runuot", "odds.runuot: is not an effect of the catalogue"},
         Bad{"0.4", ".inf", "odds.runout"}, Bad{"0.4", ".nan", "odds.runout"},
         Bad{"0.4", "1e999", "odds.runout"}, Bad{"0.4", "0", "odds.runout"}, Bad{"0.4", "-1.0", "odds.runout"},
         Bad{"0.4", "often", "odds.runout"}, Bad{"other_odds: 0.06", "other_odds: 0", "other_odds"},
@@ -56,7 +56,7 @@ TEST(CauseOdds, whatIsWrongIsNamedInOneLine) {
       ADD_FAILURE() << text;
     } catch (const Error& error) {
       const std::string line = error.what();
-      EXPECT_THAT(line, HasSubstr(bad.says)) << text;
+      EXPECT_THAT(line, HasSubstr(bad.message)) << text;
       EXPECT_EQ(line.rfind(file, 0), 0u) << line;
       EXPECT_EQ(line.find('\n'), std::string::npos) << line;
     }

@@ -60,7 +60,7 @@ TEST(EffectCatalogue, everyEntryIsComplete) {
     EXPECT_FALSE(kind.source.empty()) << kind.name;
     EXPECT_FALSE(kind.parameters.empty()) << kind.name;
     EXPECT_FALSE(formsOf(kind, scopeOf(model)).empty()) << kind.name;
-    EXPECT_FALSE(lackingFor(kind, scopeOf(model))) << kind.name;
+    EXPECT_FALSE(missingNeed(kind, scopeOf(model))) << kind.name;
   }
   EXPECT_EQ(findEffect("magic"), nullptr);
   // In the order in which they act.
@@ -111,7 +111,7 @@ TEST(EffectCatalogue, hasTheNamesThatOtherProgramsUse) {
   EXPECT_EQ(findEffect("saturation")->parameters.at(0).unit, "N");
 }
 
-TEST(EffectCatalogue, anglesDifferByTheShorterWay) {
+TEST(EffectCatalogue, anglesHaveTheShorterDifference) {
   const EffectKind &order = *findEffect("spindle_order"), &runout = *findEffect("runout");
   EXPECT_NEAR(parameterOf(order, "y_deg").difference(359.0, 2.0), -3.0, 1e-12);
   EXPECT_NEAR(parameterOf(order, "y_deg").scale(10.0), 57.29577951308232, 1e-12);  // one radian
@@ -235,7 +235,7 @@ TEST(EffectCatalogue, coordinatesAndEntriesAreInverse) {
 }
 
 // Closed forms of the coordinates.
-TEST(EffectCoordinates, areTheirClosedForms) {
+TEST(EffectCoordinates, equalTheirClosedForms) {
   EffectForm vector({planar("size", "angle_deg", 10.0, 1e-3, 1.0)});
   EXPECT_NEAR(vector.entry({-3.0, -4.0}).numbers.at("size"), 5.0, 1e-12);
   EXPECT_NEAR(vector.entry({0.0, -4.0}).numbers.at("angle_deg"), 270.0, 1e-12);
@@ -281,7 +281,7 @@ TEST(EffectCatalogue, givesTheReasonWhyAnEffectIsNotTried) {
   model.tool_tip = {};
   EffectScope scope = scopeOf(model);
   scope.start_times = scope.cut_times = false;
-  const auto lacking = [&](const char* name) { return lackingFor(*findEffect(name), scope); };
+  const auto lacking = [&](const char* name) { return missingNeed(*findEffect(name), scope); };
   EXPECT_EQ(lacking("tool_wear").value(), "cut_time_before_s is not stated");
   EXPECT_EQ(lacking("friction_warmup").value(), "start_time_s is not stated");
   EXPECT_EQ(lacking("process_damping").value(), "the model's tool is rigid");

@@ -69,7 +69,7 @@ TEST(EmpiricalCatalogue, entriesAreReadBackUnderOneName) {
   }
 }
 
-TEST(EmpiricalCatalogue, unknownFormsAreRefused) {
+TEST(EmpiricalCatalogue, rejectsUnknownForms) {
   const TemporaryFolder folder;
   const std::string file = folder.file("model.yaml");
   const auto refuses = [&](const std::string& effect, const char* reason) {
@@ -83,7 +83,7 @@ TEST(EmpiricalCatalogue, unknownFormsAreRefused) {
   };
   refuses("{name: empirical, stage: chip, form: magic}", "'magic'");
   refuses("{name: empirical, stage: chip, form: tone}", "'tone'");
-  refuses("{name: 'empirical:tone', channel: fx, frequency_hz: 36, amplitude: 2}", "no effect");
+  refuses("{name: 'empirical:tone', channel: fx, frequency_hz: 36, amplitude: 2}", "not an effect");
   refuses("{name: empirical, stage: channel, form: tone, channel: fx, while: always, amplitude: 2}",
           "frequency_hz");
 }

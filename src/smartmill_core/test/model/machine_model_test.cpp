@@ -118,7 +118,7 @@ void expectModel(const MachineModel& m) {
   EXPECT_DOUBLE_EQ(m.effects[0].numbers.at("offset_um"), 8.1);
   EXPECT_DOUBLE_EQ(m.effects[0].std_devs.at("offset_um"), 0.2);
   EXPECT_DOUBLE_EQ(m.effects[1].numbers.at("xy"), 0.02);
-  EXPECT_DOUBLE_EQ(m.effects[1].numbers.at("zy"), 0.0);  // left out
+  EXPECT_DOUBLE_EQ(m.effects[1].numbers.at("zy"), 0.0);  // omitted
   EXPECT_EQ(m.effects[2].lists.at("pitch_deg"), (std::vector<double>{89.0, 91.0, 89.0, 91.0}));
   EXPECT_DOUBLE_EQ(m.effects[2].std_devs.at("pitch_deg[1]"), 0.02);
   EXPECT_EQ(m.effects[3].words.at("channel"), "fy");
@@ -135,7 +135,7 @@ TEST(MachineModel, readsAndWritesEveryKey) {
   expectModel(readMachineModel(folder.file("b.yaml")));
 }
 
-TEST(MachineModel, anEmptyModelIsAModelAndToolsRefuseByName) {
+TEST(MachineModel, anEmptyModelIsValidAndErrorsNameTheMissingSection) {
   const TemporaryFolder folder;
   const MachineModel model = readMachineModel(folder.write("m.yaml", "format: smartmill-model/1\n"));
   EXPECT_EQ(errorOf([&] { model.needTool("predict forces"); }),
@@ -148,7 +148,7 @@ TEST(MachineModel, anEmptyModelIsAModelAndToolsRefuseByName) {
             folder.file("p.yaml") + ": cutting.Krc_n_per_mm2 is missing (needed to simulate a cut)");
 }
 
-TEST(MachineModel, refusesWithFileKeyAndValue) {
+TEST(MachineModel, errorsNameFileKeyAndValue) {
   const TemporaryFolder folder;
   const std::vector<Refusal> refusals{
       {"diameter_mm: 19.05", "diameter_mm: -19.05", "tool.diameter_mm: -19.05 is out of range (> 0)"},
@@ -161,17 +161,17 @@ TEST(MachineModel, refusesWithFileKeyAndValue) {
       {"diameter_mm: 19.05", "diameter: 19.05", "tool.diameter_mm: is missing"},
       {"  stickout_mm: 51.0", "  stickout: 51.0", "tool.stickout: unknown key (its value: '51.0')"},
       {"teeth: 4", "teeth: 21", "tool.teeth: 21 is out of range (1 <= value <= 20)"},
-      {"teeth: 4", "teeth: 3.5", "tool.teeth: 3.5 is not a whole number"},
+      {"teeth: 4", "teeth: 3.5", "tool.teeth: 3.5 is not an integer"},
       {"helix_deg: 30.0", "helix_deg: 80", "tool.helix_deg: 80 is out of range (0 <= value < 80)"},
-      {"[88, 92, 88, 92]", "[88, 92, 88]", "tool.pitch_deg: a list of 3, 4 numbers are due"},
-      {"[88, 92, 88, 92]", "[88, 92, 88, 93]", "tool.pitch_deg: the pitches sum to 361.0, 360 is due"},
+      {"[88, 92, 88, 92]", "[88, 92, 88]", "tool.pitch_deg: a list of 3, expected 4 numbers"},
+      {"[88, 92, 88, 92]", "[88, 92, 88, 93]", "tool.pitch_deg: the pitches sum to 361.0, expected 360"},
       {"[88, 92, 88, 92]", "[88, -92, 88, 92]", "tool.pitch_deg[1]: -92 is out of range (> 0)"},
       {"Kre_n_per_mm: 30.8", "Kre_n_per_mm: -1", "cutting.Kre_n_per_mm: -1 is out of range (>= 0)"},
       {"damping_ratio: 0.031", "damping_ratio: 1.0",
        "tool_tip.x[0].damping_ratio: 1 is out of range (0 < value < 1)"},
       {"stiffness_n_per_um: 31.0", "stiffness: 31.0", "tool_tip.y[0].stiffness_n_per_um: is missing"},
       {"gain: 0.9", "gain: 1.1", "force_sensor.x: the gains sum to 1.1, out of range (<= 1)"},
-      {"[1.0, 1.0, 1.5]", "[1.0, 1.0]", "force_sensor.noise_rms_n: a list of 2, 3 numbers are due"},
+      {"[1.0, 1.0, 1.5]", "[1.0, 1.0]", "force_sensor.noise_rms_n: a list of 2, expected 3 numbers"},
       {"force_on_workpiece", "force_on_table",
        "force_sensor.measures: 'force_on_table' is not one of force_on_tool | force_on_workpiece"},
       {"viscous_nm_s_per_rad: 3.70e-4", "viscous_nm_s_per_rad: -1.0e-4",
@@ -179,8 +179,8 @@ TEST(MachineModel, refusesWithFileKeyAndValue) {
       {"x_travel_mm: [0, 500]", "x_travel_mm: [500, 0]",
        "axes.x_travel_mm: 500.0..0.0 is out of range (min < max)"},
       {"high_mm: [400, 250, -210]", "high_mm: [100, 250, -210]",
-       "workpiece.high_mm: lies not above low_mm in x"},
-      {"name: runout", "name: run_out", "effects[0].name: 'run_out' is no effect of the catalogue"},
+       "workpiece.high_mm: expected a value above low_mm in x"},
+      {"name: runout", "name: run_out", "effects[0].name: 'run_out' is not an effect of the catalogue"},
       {"offset_um: 8.1", "offset: 8.1", "effects[0].offset_um: is missing"},
       {"xy: 0.02", "xx: 0.02", "effects[1].xx: unknown key (its value: '0.02')"},
       {"channel: fy", "channel: fq",
@@ -191,7 +191,7 @@ TEST(MachineModel, refusesWithFileKeyAndValue) {
       {"smartmill-model/1", "smartmill-model/2",
        "format: 'smartmill-model/2' is not one of smartmill-model/1"},
       {"workpiece:", "work:", "work: unknown key (its value: a map)"},
-      {"spindle:\n", "tool:\n", "tool: the key stands twice"},
+      {"spindle:\n", "tool:\n", "tool: the key occurs twice"},
       {"tool:\n", "tool: 4\ntools:\n", "tool: '4' is not a map of keys"},
       {"effects:\n", "effects: {}\nmore:\n", "effects: a map is not a list"},
   };
@@ -205,7 +205,7 @@ TEST(MachineModel, refusesWithFileKeyAndValue) {
   EXPECT_THAT(errorOf([&] { writeMachineModel({}, "/nowhere/m.yaml"); }), HasSubstr("cannot be written"));
 }
 
-TEST(StrictYaml, writesNumbersThatEveryReaderTakesForNumbers) {
+TEST(StrictYaml, writesNumbersThatEveryReaderParsesAsNumbers) {
   EXPECT_EQ(yamlNumber(1e-5), "1.0e-05");
   EXPECT_EQ(yamlNumber(0.1), "0.1");
   EXPECT_EQ(yamlNumber(25600), "25600.0");

@@ -66,7 +66,7 @@ class ParameterFiles : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
-TEST_F(ParameterFiles, WhatTheTableWritesReadsBackAndChangesNothing) {
+TEST_F(ParameterFiles, TheFileOfTheTableReadsBackToTheDefaults) {
   Parameters shipped;
   const Parameters p = read(tableOf(shipped).yaml());
   EXPECT_EQ(p.bandwidth, 5000.0);
@@ -77,7 +77,7 @@ TEST_F(ParameterFiles, WhatTheTableWritesReadsBackAndChangesNothing) {
   EXPECT_EQ(p.part.share, 0.5);
 }
 
-TEST_F(ParameterFiles, ValuesComeIntoTheirPlaces) {
+TEST_F(ParameterFiles, ValuesAreAssignedToTheirMembers) {
   const Parameters p = read(
       "bandwidth: 800\nhits: 3\nseed: 7\nfollow: true\nmethod: exact\nspeeds: [5.0]\nper_metre: [1, 2.5, 3]\n"
       "part_share: 0.25\n");
@@ -92,7 +92,7 @@ TEST_F(ParameterFiles, ValuesComeIntoTheirPlaces) {
   EXPECT_EQ(read("").hits, 10);
 }
 
-TEST_F(ParameterFiles, EveryFaultIsOneLineWithKeyAndValue) {
+TEST_F(ParameterFiles, EveryErrorIsOneLineWithKeyAndValue) {
   EXPECT_THAT(errorOf("bandwith: 1.0\n"), HasSubstr("bandwith is unknown"));
   EXPECT_THAT(errorOf("memory: 0.1\n"), HasSubstr("memory is unknown"));
   EXPECT_THAT(errorOf("share: 0.1\n"), HasSubstr("share is unknown"));
@@ -141,7 +141,7 @@ class Options : public ParameterFiles {
   };
 };
 
-TEST_F(Options, StandOverTheFile) {
+TEST_F(Options, OverrideTheFile) {
   Tool tool;
   const std::string file = folder_.write("p.yaml", "bandwidth: 800.0\nfollow: true\n");
   EXPECT_EQ(tool.run("--bandwidth-hz 1e3 --hits 4 --params " + file), "");
@@ -150,15 +150,15 @@ TEST_F(Options, StandOverTheFile) {
   EXPECT_TRUE(tool.parameters.follow);
 }
 
-TEST_F(Options, KeepTheBoundsOfTheTable) {
+TEST_F(Options, AreCheckedAgainstTheBoundsOfTheTable) {
   EXPECT_EQ(Tool().run("--bandwidth-hz 0"), "--bandwidth-hz: bandwidth: 0 is out of range (> 0 Hz)");
   EXPECT_EQ(Tool().run("--bandwidth-hz 5k"), "--bandwidth-hz: '5k' is not a number");
-  EXPECT_EQ(Tool().run("--hits 2.5"), "--hits: '2.5' is not a whole number");
+  EXPECT_EQ(Tool().run("--hits 2.5"), "--hits: '2.5' is not an integer");
   EXPECT_THAT(Tool().run("--params " + folder_.write("p.yaml", "hits: 0\n")),
               HasSubstr("hits: 0 is out of range"));
 }
 
-TEST_F(Options, HelpSaysUnitBoundsMeaningAndDefault) {
+TEST_F(Options, HelpHasUnitBoundsMeaningAndDefault) {
   const std::string help = Tool().line.help();
   EXPECT_THAT(help, HasSubstr("[Hz] > 0, up to here (5000.0)"));
   EXPECT_THAT(help, HasSubstr("launch/config/x.yaml"));

@@ -63,11 +63,11 @@ std::string errorOf(const Everything& e) {
   return {};
 }
 
-TEST(ParameterTable, DefaultsKeepTheirBounds) {
+TEST(ParameterTable, DefaultsAreWithinTheirBounds) {
   EXPECT_EQ(errorOf(Everything()), "");
 }
 
-TEST(ParameterTable, WhatIsOutOfItsBoundsIsNamedInOneLine) {
+TEST(ParameterTable, ValuesOutOfBoundsAreNamedInOneLine) {
   const auto with = [](auto change) {
     Everything e;
     change(e);
@@ -87,7 +87,7 @@ TEST(ParameterTable, WhatIsOutOfItsBoundsIsNamedInOneLine) {
   EXPECT_EQ(with([](auto& e) { e.speeds.clear(); }), "");
 }
 
-TEST(ParameterTable, AKeyStandsOnce) {
+TEST(ParameterTable, RejectsARepeatedKey) {
   double value = 0.0;
   ParameterTable table;
   table.number("a", value, "1", {}, "");
@@ -97,14 +97,14 @@ TEST(ParameterTable, AKeyStandsOnce) {
   EXPECT_EQ(table.find("b"), nullptr);
 }
 
-TEST(ParameterTable, TheTablePointsIntoItsStruct) {
+TEST(ParameterTable, PointsIntoItsStruct) {
   Everything e;
   const ParameterTable table = tableOf(e);
-  *std::get<double*>(table.find("filter_bandwidth")->place) = 7.0;
+  *std::get<double*>(table.find("filter_bandwidth")->address) = 7.0;
   EXPECT_EQ(e.filter.bandwidth, 7.0);
 }
 
-TEST(ParameterTable, TheFileSaysEverythingAndReadsBack) {
+TEST(ParameterTable, TheFileIsCompleteAndReadsBack) {
   Everything e;
   const std::string text = tableOf(e).yaml();
   EXPECT_THAT(text, HasSubstr("# Parameters of a test.\n"));
@@ -130,7 +130,7 @@ TEST(ParameterTable, TheFileSaysEverythingAndReadsBack) {
   EXPECT_FALSE(node["memory"]);
 }
 
-TEST(ParameterTable, LongCommentsGoOnBelow) {
+TEST(ParameterTable, WrapsLongComments) {
   struct Long {
     double a = 1.0;
     void declare(ParameterTable& table) {

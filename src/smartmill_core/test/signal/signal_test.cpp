@@ -28,29 +28,29 @@ std::vector<double> noise(std::size_t n, double rms, unsigned seed) {
   return values;
 }
 
-TEST(Fourier, isTheSumOfItsDefinition) {
+TEST(Fourier, equalsItsDefinition) {
   for (const std::size_t n : {std::size_t{1}, std::size_t{2}, std::size_t{15}, std::size_t{64}}) {
     const std::vector<double> signal = noise(n, 1.0, 1);
     const std::vector<Complex> spectrum = fourier(signal);
     ASSERT_EQ(spectrum.size(), n / 2 + 1);
     for (std::size_t k = 0; k < spectrum.size(); ++k) {
-      Complex due = 0.0;
+      Complex expected = 0.0;
       for (std::size_t i = 0; i < n; ++i) {
-        due +=
+        expected +=
             signal[i] * std::polar(1.0, -units::TWO_PI * static_cast<double>(i * k) / static_cast<double>(n));
       }
-      EXPECT_NEAR(std::abs(spectrum[k] - due), 0.0, 1e-12) << n << " samples, line " << k;
+      EXPECT_NEAR(std::abs(spectrum[k] - expected), 0.0, 1e-12) << n << " samples, line " << k;
     }
   }
 }
 
-TEST(Fourier, keepsTheEnergyAndComesBack) {
+TEST(Fourier, conservesEnergyAndIsInvertible) {
   for (const std::size_t n : {std::size_t{1000}, std::size_t{1001}}) {
     const std::vector<double> signal = noise(n, 2.0, 2);
     const std::vector<Complex> spectrum = fourier(signal);
     double energy = 0.0;
     for (std::size_t k = 0; k < spectrum.size(); ++k) {
-      const bool single = k == 0 || 2 * k == n;  // the other lines stand for two each
+      const bool single = k == 0 || 2 * k == n;  // the other lines represent two each
       energy += (single ? 1.0 : 2.0) * std::norm(spectrum[k]) / static_cast<double>(n);
     }
     EXPECT_NEAR(energy / std::inner_product(signal.begin(), signal.end(), signal.begin(), 0.0), 1.0, 1e-13);
@@ -59,14 +59,14 @@ TEST(Fourier, keepsTheEnergyAndComesBack) {
   }
 }
 
-TEST(Fourier, answersTheSameFromSeveralThreads) {
+TEST(Fourier, isThreadSafe) {
   const std::vector<double> signal = noise(4099, 1.0, 3);
-  const std::vector<Complex> due = fourier(signal);
+  const std::vector<Complex> expected = fourier(signal);
   std::vector<int> differing(4, 0);
   std::vector<std::thread> threads;
   for (int t = 0; t < 4; ++t) {
     threads.emplace_back([&, t] {
-      for (int i = 0; i < 20; ++i) differing[static_cast<std::size_t>(t)] += fourier(signal) != due;
+      for (int i = 0; i < 20; ++i) differing[static_cast<std::size_t>(t)] += fourier(signal) != expected;
     });
   }
   for (std::thread& thread : threads) thread.join();
@@ -88,18 +88,18 @@ std::vector<double> halfSine(std::size_t n, std::size_t start, std::size_t width
   return force;
 }
 
-// Dunwoody 4.3.1: a hit of 0.4 ms at 50 kHz in a record of 0.2 s leaves "6 %" of the error (eq. 4.16); one
-// printed digit.
-TEST(ImpactWindow, leavesTheNoiseThatTheThesisStates) {
+// Dunwoody 4.3.1: for a hit of 0.4 ms at 50 kHz in a record of 0.2 s "6 %" of the error remain (eq. 4.16);
+// one printed digit.
+TEST(ImpactWindow, passesTheNoiseThatTheThesisStates) {
   const std::vector<double> window = impactWindow(halfSine(10000, 500, 20, 150.0));
   EXPECT_NEAR(rms(window), 0.06, 0.005);
 }
 
-TEST(ImpactWindow, isOneWhereTheHammerTouchesAndFallsSmoothly) {
+TEST(ImpactWindow, isOneDuringTheContactAndFallsSmoothly) {
   const std::vector<double> force = halfSine(1000, 300, 40, 100.0);
   const std::vector<double> window = impactWindow(force);
   for (std::size_t i = 300; i <= 340; ++i) EXPECT_EQ(window[i], 1.0) << i;
-  // The half-sine passes 10 % between 1 and 2 samples from its ends: shoulder 19, plateau 28.5, end 47.5
+  // The half-sine crosses 10 % between 1 and 2 samples from its ends: shoulder 19, plateau 28.5, end 47.5
   // samples.
   EXPECT_EQ(window[320 - 28], 1.0);
   EXPECT_LT(window[320 - 29], 1.0);
@@ -166,7 +166,7 @@ TEST(FrfEstimator, withoutNoiseBothEstimatesAreExact) {
 // Force noise of share q of the force's power lowers H1 to 1 / (1 + q); response noise of share p of the
 // response's raises H2 to 1 + p; coherence 1 / ((1 + q) (1 + p)). Means over 257 lines of 200 hits: error
 // about 1e-3.
-TEST(FrfEstimator, biasAndCoherenceAreThoseOfTheory) {
+TEST(FrfEstimator, biasAndCoherenceAgreeWithTheory) {
   const FrfEstimator input = hits(200, 0.5, 0.0, 2);
   EXPECT_NEAR(average(input.h1("1")).real(), 2.0 / 1.25, 0.01);
   EXPECT_NEAR(average(input.h2("1")).real(), 2.0, 0.01);
@@ -178,7 +178,7 @@ TEST(FrfEstimator, biasAndCoherenceAreThoseOfTheory) {
 
 // With response noise only, the stated standard deviation is that of the error: mean over many lines of
 // error^2 / std^2.
-TEST(FrfEstimator, standardDeviationFromScatterIsHonest) {
+TEST(FrfEstimator, standardDeviationFromScatterIsCalibrated) {
   double error = 0.0, stated = 0.0;
   for (unsigned seed = 10; seed < 30; ++seed) {
     const FrequencyResponse frf = hits(10, 0.0, 0.5, seed).h1("1");
@@ -187,8 +187,9 @@ TEST(FrfEstimator, standardDeviationFromScatterIsHonest) {
       stated += frf.std_dev[k] * frf.std_dev[k];
     }
   }
-  EXPECT_NEAR(error / stated, 1.0,
-              0.08);  // 5140 lines, each exponential: 4 sigma 5.6 %, and the stated one's scatter
+  EXPECT_NEAR(
+      error / stated, 1.0,
+      0.08);  // 5140 exponentially distributed lines: 4 sigma 5.6 %, plus the scatter of the stated one
 }
 
 TEST(FrfEstimator, standardDeviationOfASingleHitComesFromTheNoise) {
@@ -216,10 +217,10 @@ TEST(FrfEstimator, standardDeviationOfASingleHitComesFromTheNoise) {
       stated += frf.std_dev[k] * frf.std_dev[k];
     }
   }
-  EXPECT_NEAR(error / stated, 1.0, 0.1);  // 60 hits, force noise alike on neighbouring lines
+  EXPECT_NEAR(error / stated, 1.0, 0.1);  // 60 hits; the force noise is correlated between neighbouring lines
 }
 
-TEST(FrfEstimator, refusesBadHits) {
+TEST(FrfEstimator, rejectsInvalidHits) {
   FrfEstimator estimator(1000.0, 4);
   EXPECT_THROW(estimator.h1("1"), Error);
   EXPECT_THROW(estimator.add({1, 2, 3}, {1, 2, 3, 4}), Error);
@@ -286,7 +287,7 @@ TEST(SmoothedDerivative, isExactForPolynomials) {
   }
 }
 
-TEST(SmoothedDerivative, attenuatesASineAsItsWeightsSay) {
+TEST(SmoothedDerivative, attenuatesASineLikeItsWeights) {
   const double rate = 10000.0, smoothing = 4e-3;
   for (const double frequency : {5.0, 20.0, 57.5}) {
     const double w = units::TWO_PI * frequency, u = std::pow(w * smoothing, 2),
@@ -297,14 +298,14 @@ TEST(SmoothedDerivative, attenuatesASineAsItsWeightsSay) {
                               curvature = smoothedDerivative(sine, rate, 2, smoothing);
     for (const int i : {3000, 4021, 5555}) {
       const auto k = static_cast<std::size_t>(i);
-      // The weights end at 4.5 deviations, which changes the response at the highest frequency.
+      // The weights are truncated at 4.5 deviations, which changes the response at the highest frequency.
       EXPECT_NEAR(slope[k], attenuation * w * std::cos(w * i / rate), 2.5e-3 * w) << frequency;
       EXPECT_NEAR(curvature[k], -attenuation * w * w * std::sin(w * i / rate), 1e-2 * w * w) << frequency;
     }
   }
 }
 
-// A motion that goes on beyond the record, and one that rests.
+// A motion that continues beyond the record, and one at rest.
 TEST(SmoothedDerivative, tendsToZeroAtTheEnds) {
   std::vector<double> moving(300), resting(300, 7.0);
   for (std::size_t i = 0; i < moving.size(); ++i) moving[i] = 0.02 * static_cast<double>(i);

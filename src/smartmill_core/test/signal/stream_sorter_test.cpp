@@ -29,7 +29,7 @@ TEST(StreamSorter, holdsBackUntilEveryRegularStreamHasPassed) {
   EXPECT_EQ(sorter.late(), 0u);
 }
 
-TEST(StreamSorter, equalStampsGoInTheOrderOfTheStreamsThenOfArrival) {
+TEST(StreamSorter, equalStampsAreOrderedByStreamThenByArrival) {
   StreamSorter sorter(0.0);
   const auto a = sorter.addRegular("a"), b = sorter.addRegular("b");
   const auto events = sorter.addEvents("goal");
@@ -38,13 +38,13 @@ TEST(StreamSorter, equalStampsGoInTheOrderOfTheStreamsThenOfArrival) {
   sorter.push(b, 1.0, [&] { got += "b"; });
   sorter.push(a, 1.0, [&] { got += "1"; });
   sorter.push(a, 1.0, [&] { got += "2"; });
-  EXPECT_EQ(got, "");  // another of stamp 1 may still come
+  EXPECT_EQ(got, "");  // another item of stamp 1 may still arrive
   sorter.push(a, 2.0, [] {});
   sorter.push(b, 2.0, [] {});
   EXPECT_EQ(got, "12be");
 }
 
-TEST(StreamSorter, aStreamThatMayBeAbsentHoldsBackOnlyWhileItIsThere) {
+TEST(StreamSorter, aStreamDelaysTheOthersOnlyWhileItIsRegular) {
   StreamSorter sorter(0.0);
   const auto a = sorter.addRegular("a"), b = sorter.addEvents("b");
   std::string got;
@@ -55,7 +55,7 @@ TEST(StreamSorter, aStreamThatMayBeAbsentHoldsBackOnlyWhileItIsThere) {
   sorter.push(b, 2.0, [&] { got += "b"; });
   sorter.push(a, 4.0, [&] { got += "4"; });
   EXPECT_EQ(got, "1");
-  sorter.setRegular(b, false);  // it has died
+  sorter.setRegular(b, false);  // it has ended
   EXPECT_EQ(got, "12b");
 }
 
@@ -73,7 +73,7 @@ TEST(StreamSorter, anEventWithinTheHoldBackIsInOrderAndALaterOneIsCounted) {
   EXPECT_EQ(sorter.late(), 1u);
 }
 
-TEST(StreamSorter, resetForgetsStampsAndItems) {
+TEST(StreamSorter, resetDropsStampsAndItems) {
   StreamSorter sorter(0.0);
   const auto a = sorter.addRegular("a");
   std::string got;
@@ -87,7 +87,7 @@ TEST(StreamSorter, resetForgetsStampsAndItems) {
   EXPECT_EQ(sorter.late(), 0u);
 }
 
-TEST(StreamSorter, aJumpBackOfTimeStartsAfreshAndTellsSo) {
+TEST(StreamSorter, aBackwardJumpOfTimeRestartsAndIsReported) {
   StreamSorter sorter(0.0);
   const auto a = sorter.addRegular("a"), b = sorter.addRegular("b"), goals = sorter.addEvents("goal");
   std::string got;
@@ -106,7 +106,7 @@ TEST(StreamSorter, aJumpBackOfTimeStartsAfreshAndTellsSo) {
   EXPECT_EQ(got, "gL|123");
 }
 
-TEST(StreamSorter, aLatchedEventOfTheNewRunOutlivesTheRestart) {
+TEST(StreamSorter, aLatchedEventOfTheNewRunSurvivesTheRestart) {
   StreamSorter sorter(0.0);
   const auto a = sorter.addRegular("a"), condition = sorter.addLatched("condition");
   std::string got;
@@ -114,16 +114,16 @@ TEST(StreamSorter, aLatchedEventOfTheNewRunOutlivesTheRestart) {
   sorter.push(condition, 90.0, [&] { got += "old"; });
   sorter.push(a, 100.0, [&] { got += "x"; });
   sorter.push(a, 101.0, [&] { got += "y"; });
-  sorter.push(a, 10.0, [&] { got += "1"; });  // the condition of the old run is not of this one
+  sorter.push(a, 10.0, [&] { got += "1"; });  // the condition of the old run does not apply
   sorter.push(a, 200.0, [] {});
   EXPECT_EQ(got, "|1");
-  sorter.push(condition, 10.0, [&] { got += "c"; });  // came before its run's first sample
+  sorter.push(condition, 10.0, [&] { got += "c"; });  // arrived before its run's first sample
   sorter.push(a, 10.5, [&] { got += "1"; });
   sorter.push(a, 11.0, [&] { got += "2"; });
   EXPECT_EQ(got, "|c1");
 }
 
-TEST(StreamSorter, anEventWithoutAStampComesBehindTheSamplesThatHaveCome) {
+TEST(StreamSorter, anEventWithoutAStampFollowsTheSamplesReceivedSoFar) {
   StreamSorter sorter(0.0);
   const auto a = sorter.addRegular("a"), events = sorter.addEvents("fault");
   std::string got;
@@ -135,7 +135,7 @@ TEST(StreamSorter, anEventWithoutAStampComesBehindTheSamplesThatHaveCome) {
   EXPECT_EQ(got, "e1f");
 }
 
-TEST(StreamSorter, anOptionalStreamIsWaitedForFromItsFirstItemOnAnUnawaitedOneNever) {
+TEST(StreamSorter, anOptionalStreamIsAwaitedFromItsFirstItemAndAnUnawaitedOneNever) {
   StreamSorter sorter(0.0);
   const auto a = sorter.addRegular("a"), b = sorter.addOptional("b"), c = sorter.addUnawaited("c");
   std::string got;
@@ -146,7 +146,7 @@ TEST(StreamSorter, anOptionalStreamIsWaitedForFromItsFirstItemOnAnUnawaitedOneNe
   sorter.push(b, 2.0, [&] { got += "b"; });
   sorter.push(a, 4.0, [&] { got += "4"; });
   EXPECT_EQ(got, "c1");
-  sorter.setRegular(b, false);  // it has died
+  sorter.setRegular(b, false);  // it has ended
   EXPECT_EQ(got, "c12b");
 }
 
@@ -160,7 +160,7 @@ TEST(StreamSorter, eventsAloneAreSortedByTheHoldBack) {
   EXPECT_EQ(got, "12");
 }
 
-TEST(StreamSorter, anItemMayThrowOrPushWithoutHarm) {
+TEST(StreamSorter, anItemMayThrowOrPush) {
   StreamSorter sorter(0.0);
   const auto a = sorter.addRegular("a");
   std::string got;
@@ -171,7 +171,7 @@ TEST(StreamSorter, anItemMayThrowOrPushWithoutHarm) {
   EXPECT_EQ(got, "n3");
 }
 
-TEST(StreamSorter, refusesAStampThatIsNotANumber) {
+TEST(StreamSorter, rejectsAStampThatIsNotFinite) {
   StreamSorter sorter(0.0);
   const auto a = sorter.addRegular("daq/hammer");
   try {
@@ -183,9 +183,9 @@ TEST(StreamSorter, refusesAStampThatIsNotANumber) {
   EXPECT_THROW(StreamSorter(-1.0), Error);
 }
 
-// Two streams of 3,000 messages each and a hundred goals, every message delayed by up to 40 ms against the
-// others as roscpp does it: the order handed out is the order of the stamps, whatever the order of arrival.
-TEST(StreamSorter, sixThousandShuffledMessagesComeOutInOrder) {
+// Two streams of 3,000 messages each and a hundred goals, every message delayed by up to 40 ms as in roscpp:
+// items are delivered in the order of stamps, whatever the order of arrival.
+TEST(StreamSorter, sixThousandShuffledMessagesAreDeliveredInOrder) {
   struct Item {
     double stamp, arrival;
     std::size_t stream;
@@ -216,11 +216,12 @@ TEST(StreamSorter, sixThousandShuffledMessagesComeOutInOrder) {
     EXPECT_EQ(got.size(), items.size());
     if (reference.empty()) {
       reference = got;
-      std::vector<Item> due = items;
-      std::stable_sort(due.begin(), due.end(), [](const Item& l, const Item& r) {
+      std::vector<Item> expected = items;
+      std::stable_sort(expected.begin(), expected.end(), [](const Item& l, const Item& r) {
         return std::make_pair(l.stamp, l.stream) < std::make_pair(r.stamp, r.stream);
       });
-      for (std::size_t i = 0; i < due.size(); ++i) EXPECT_EQ(got[i], 10.0 * due[i].stamp + due[i].stream);
+      for (std::size_t i = 0; i < expected.size(); ++i)
+        EXPECT_EQ(got[i], 10.0 * expected[i].stamp + expected[i].stream);
     }
     EXPECT_EQ(got, reference);
   }

@@ -5,7 +5,7 @@
 namespace smartmill {
 namespace {
 
-TEST(Watchdog, silenceCountsFromTheStartOrTheLastThingHeard) {
+TEST(Watchdog, silenceCountsFromTheStartOrTheLastMessage) {
   Watchdog dog(1.0);
   EXPECT_FALSE(dog.ever());
   dog.tick(1.0);
@@ -19,7 +19,7 @@ TEST(Watchdog, silenceCountsFromTheStartOrTheLastThingHeard) {
   EXPECT_DOUBLE_EQ(dog.silent(), 0.5);
 }
 
-TEST(Watchdog, anEndIsToldOnceForEachStretchThatWasHeard) {
+TEST(Watchdog, anEndIsReportedOnceForEachActivePeriod) {
   Watchdog dog(1.0);
   dog.tick(5.0);
   EXPECT_FALSE(dog.ended());  // nothing has begun
@@ -35,10 +35,10 @@ TEST(Watchdog, anEndIsToldOnceForEachStretchThatWasHeard) {
   EXPECT_TRUE(dog.ended());
 }
 
-TEST(Watchdog, whoKnowsTellsTheEnd) {
+TEST(Watchdog, theProducerMayReportTheEnd) {
   Watchdog dog(1.0);
   dog.end();
-  EXPECT_FALSE(dog.ended());  // nothing was heard
+  EXPECT_FALSE(dog.ended());  // nothing was received
   dog.heard();
   dog.end();
   EXPECT_TRUE(dog.dead());

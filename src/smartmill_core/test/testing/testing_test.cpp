@@ -1,4 +1,4 @@
-// The helpers of the tests: an evidence that cannot fail is none.
+// Tests of the test helpers: they must be able to fail.
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -13,7 +13,7 @@
 namespace smartmill {
 namespace {
 
-/// @param stated what an estimate says of itself over its true standard deviation
+/// @param stated stated over true standard deviation of the estimates
 Coverage estimates(int count, double stated) {
   std::mt19937 random(7);
   std::normal_distribution<double> normal;
@@ -22,35 +22,35 @@ Coverage estimates(int count, double stated) {
   return coverage;
 }
 
-TEST(Coverage, holdsHonestDeviationsOnly) {
+TEST(Coverage, acceptsCalibratedDeviationsOnly) {
   for (const int count : {Coverage::RUNS, 600, 2000}) {
-    EXPECT_TRUE(estimates(count, 1.0).honest()) << count;
-    EXPECT_FALSE(estimates(count, 1.0 / 1.5).honest()) << count;
-    EXPECT_FALSE(estimates(count, 1.5).honest()) << count;
+    EXPECT_TRUE(estimates(count, 1.0).isCalibrated()) << count;
+    EXPECT_FALSE(estimates(count, 1.0 / 1.5).isCalibrated()) << count;
+    EXPECT_FALSE(estimates(count, 1.5).isCalibrated()) << count;
   }
-  EXPECT_FALSE(estimates(2000, 1.1).honest());
-  EXPECT_FALSE(estimates(2000, 0.9).honest());
-  EXPECT_TRUE(estimates(2000, 1.1).honest(Coverage::RUNS));
+  EXPECT_FALSE(estimates(2000, 1.1).isCalibrated());
+  EXPECT_FALSE(estimates(2000, 0.9).isCalibrated());
+  EXPECT_TRUE(estimates(2000, 1.1).isCalibrated(Coverage::RUNS));
 }
 
-TEST(Coverage, refusesNothingAndNoDeviation) {
-  EXPECT_FALSE(Coverage().honest());
-  EXPECT_FALSE(estimates(Coverage::RUNS - 10, 1.0).honest());  // too few to tell
-  EXPECT_FALSE(estimates(2000, 1.0).honest(Coverage::RUNS - 10.0));
-  EXPECT_FALSE(estimates(60, 1.0).honest(0.0, 2.0));
-  EXPECT_TRUE(estimates(72, 1.0).honest(0.0, 2.0));
+TEST(Coverage, rejectsEmptyInputAndZeroDeviations) {
+  EXPECT_FALSE(Coverage().isCalibrated());
+  EXPECT_FALSE(estimates(Coverage::RUNS - 10, 1.0).isCalibrated());  // too few
+  EXPECT_FALSE(estimates(2000, 1.0).isCalibrated(Coverage::RUNS - 10.0));
+  EXPECT_FALSE(estimates(60, 1.0).isCalibrated(0.0, 2.0));
+  EXPECT_TRUE(estimates(72, 1.0).isCalibrated(0.0, 2.0));
   Coverage coverage = estimates(Coverage::RUNS, 1.0);
   coverage.add(0.0, 0.0);
-  EXPECT_FALSE(coverage.honest());
+  EXPECT_FALSE(coverage.isCalibrated());
 }
 
 // Chi-square of 200 degrees of freedom at the probabilities of -4 and 4 normal deviations: 129.78 and 290.18.
-// A mean square just inside is honest, one just outside is not.
+// A mean square just inside is calibrated, one just outside is not.
 TEST(Coverage, hasTheLimitsOfTheTables) {
   const auto of = [](int count, double sum) {
     Coverage coverage;
     for (int i = 0; i < count; ++i) coverage.add(std::sqrt(sum / count), 1.0);
-    return static_cast<bool>(coverage.honest());
+    return static_cast<bool>(coverage.isCalibrated());
   };
   EXPECT_TRUE(of(200, 129.78 * 1.01));
   EXPECT_FALSE(of(200, 129.78 * 0.99));
@@ -63,9 +63,9 @@ void testThatNeedsData(std::string& found) {
   found = file;
 }
 
-TEST(SharedData, isFoundWhereTheEnvironmentSays) {
+TEST(SharedData, isFoundInTheFolderOfTheEnvironmentVariable) {
   const char* const before = std::getenv("SMARTMILL_SHARED");
-  const std::string kept = before ? before : "";
+  const std::string previous = before ? before : "";
   const TemporaryFolder folder;
   setenv("SMARTMILL_SHARED", folder.file(".").c_str(), 1);
   EXPECT_EQ(sharedData("inner/data.csv"), "");
@@ -74,7 +74,7 @@ TEST(SharedData, isFoundWhereTheEnvironmentSays) {
   std::string found;
   testThatNeedsData(found);
   EXPECT_EQ(found, folder.file(".") + "/inner/data.csv");
-  before ? setenv("SMARTMILL_SHARED", kept.c_str(), 1) : unsetenv("SMARTMILL_SHARED");
+  before ? setenv("SMARTMILL_SHARED", previous.c_str(), 1) : unsetenv("SMARTMILL_SHARED");
   EXPECT_NE(sharedFolder(), folder.file("."));
 }
 

@@ -27,15 +27,16 @@ double Coverage::rms() const {
   return std::sqrt(sum_ / static_cast<double>(count_));
 }
 
-::testing::AssertionResult Coverage::honest(double independent, double told) const {
-  constexpr double Z = 4.0;  // of the normal distribution, both sides
+::testing::AssertionResult Coverage::isCalibrated(double independent, double factor) const {
+  constexpr double Z = 4.0;  // quantile of the normal distribution, two-sided
   const double freedom = independent > 0.0 ? independent : static_cast<double>(count_);
   const double least = std::sqrt(chiSquareShare(freedom, -Z)), most = std::sqrt(chiSquareShare(freedom, Z));
-  if (!(most <= told * least))
-    return ::testing::AssertionFailure() << freedom << " independent errors tell no factor of " << told;
-  const bool good = rms() >= least && rms() <= most;  // NaN is not good
+  if (!(most <= factor * least))
+    return ::testing::AssertionFailure()
+           << freedom << " independent errors do not detect a factor of " << factor;
+  const bool good = rms() >= least && rms() <= most;  // false for NaN
   return (good ? ::testing::AssertionSuccess() : ::testing::AssertionFailure())
-         << "error over stated deviation has RMS " << rms() << " over " << count_ << " estimates, honest is "
+         << "error over stated deviation has RMS " << rms() << " over " << count_ << " estimates, expected "
          << least << " .. " << most;
 }
 

@@ -15,7 +15,7 @@ namespace smartmill {
 namespace {
 
 constexpr int FINER = 8;
-/// The sensor's parameters change in steps this short.
+/// Step of the change of the sensor's parameters.
 constexpr double DRIFT_STEP = 1e-3;  // [s]
 
 ModalModel between(const ModalModel& a, const ModalModel& b, double share) {
@@ -30,7 +30,7 @@ ModalModel between(const ModalModel& a, const ModalModel& b, double share) {
   return model;
 }
 
-/// A sensor whose parameters move: displacement and velocity of each mode go on.
+/// A sensor with changing parameters; displacement and velocity of each mode are continuous.
 class MovingSensor {
  public:
   explicit MovingSensor(double rate) : dt_(1.0 / rate) {}
@@ -150,7 +150,7 @@ ReferenceTaps simulateTaps(const ReferenceCase& reference, int taps) {
     MovingSensor sensor(fine);
     sensor.set(reference.sensor);
     std::vector<double> hammer, response;
-    // The blow falls anywhere between two samples.
+    // The hit is at varying times between two samples.
     const double start = BEFORE + static_cast<double>(tap) / taps / reference.sample_rate;
     for (std::size_t i = 0; i < samples; ++i) {
       double force = 0.0, out = 0.0;

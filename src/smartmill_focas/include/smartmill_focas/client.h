@@ -26,16 +26,16 @@ class FocasError : public std::runtime_error {
   int detail_;
 };
 
-/// The connection is gone (code EW_SOCKET) or never came about; the client must connect anew.
+/// The connection is lost or was not established (code EW_SOCKET); the client must connect again.
 class ConnectionError : public FocasError {
  public:
   explicit ConnectionError(const std::string& what) : FocasError(what, EW_SOCKET) {}
 };
 
-/// What the controller says of itself.
+/// System information of the controller.
 struct ControllerInfo {
   std::string cnc_type, mt_type, series, version;
-  int axes = 0;  ///< controlled axes: bounds every list by axis
+  int axes = 0;  ///< controlled axes; limits the length of every list by axis
   int spindles = 0;
   bool spindle_meter = false;
 };
@@ -47,18 +47,18 @@ struct LoadMeter {
   std::vector<double> speed;  ///< [rpm] spindles only
 };
 
-/// Data of one reply of Client::exchange. @throws WireError when it is too short.
+/// Data of one reply of Client::exchange(). @throws WireError if it is too short.
 Status decodeStatus(Reader& reader);
-/// Names of four bytes; empty when the reply is an error. Bounded by at_most: surplus entries of a reply are
-/// garbage.
+/// Names of four bytes; empty if the reply is an error. @param at_most entries, since surplus entries of a
+/// reply are invalid
 std::vector<std::string> decodeNames(const SubReply& reply, std::size_t at_most);
-/// Value8s as numbers (NaN: vacant); empty when the reply is an error.
+/// Value8s as numbers (NaN: vacant); empty if the reply is an error.
 std::vector<double> decodeValues(const SubReply& reply, std::size_t at_most);
 
-/// FOCAS client: a stream circuit for DNC and a data circuit for everything else. Not thread-safe: one thread
-/// at a time. Calls throw FocasError when the controller refuses, ConnectionError when the connection is lost
-/// or a reply takes longer than the timeout (the connection is closed then: a late reply must not answer the
-/// next question).
+/// FOCAS client: a stream circuit for DNC and a data circuit for all other calls. Not thread-safe. Calls
+/// throw FocasError if the controller refuses, and ConnectionError if the connection is lost or a reply
+/// exceeds the timeout (which closes the connection, so that a late reply is not taken for that of the next
+/// request).
 class Client {
  public:
   Client();
@@ -70,9 +70,9 @@ class Client {
   /// reply.
   void connect(const std::string& host, std::uint16_t port, double timeout);
   bool connected() const;
-  /// Says goodbye (0201 on both) without waiting longer than 0.2 s, closes.
+  /// Sends the close request (0201) on both circuits, waits at most 0.2 s and closes.
   void close();
-  /// Closes at once, without a word.
+  /// Closes at once, without a close request.
   void drop();
 
   const ControllerInfo& info() const;
@@ -81,7 +81,7 @@ class Client {
   std::vector<SubReply> exchange(const std::vector<SubRequest>& requests);
 
   Status statusInfo();
-  /// One value an axis [mm]. @param axis 1-based, -1 all.
+  /// One value per axis [mm]. @param axis 1-based, -1 all.
   std::vector<double> position(PositionKind kind, int axis = -1);
   double actualFeed();   ///< [mm/min]
   double actualSpeed();  ///< [rpm]
@@ -105,25 +105,27 @@ class Client {
 
   /// Opens a DNC session. @throws FocasError with EW_MODE, EW_BUSY, EW_REJECT ...
   void dncStart();
-  /// Sends text; returns how many bytes were taken (a part of them when the controller is slow, 0: EW_BUFFER,
-  /// try again later). What is taken arrives. @throws FocasError with the controller's code when it has ended
-  /// the session.
+  /// Sends text. @return [byte] accepted for delivery; fewer than size if the controller is slow, 0:
+  /// EW_BUFFER, try again later. @throws FocasError with the code of the controller if it has ended the
+  /// session.
   std::size_t dncSend(const char* data, std::size_t size);
-  /// Sends what dncSend has taken but the socket not yet. @return [byte] still to go.
+  /// Sends accepted text that the socket has not taken yet. @return [byte] still unsent.
   std::size_t dncFlush();
-  /// Ends the session normally: all data are sent. Waits for the answer, at most timeout [s], a default of
-  /// the connection's when negative. @throws FocasError.
+  /// Ends the session after all data are sent and waits for the reply. @param timeout [s]; negative: that of
+  /// connect(). @throws FocasError.
   void dncEnd(double timeout = -1.0);
-  /// dncEnd in two steps for a caller that must not wait: true once the answer is there.
+  /// dncEnd() in two steps, without waiting.
   void dncEndBegin();
+  /// @return true once the reply is received
   bool dncEndDone();
-  /// Gives up (result DNC_CANCEL, DNC_READERR ...); no answer awaited. When the stream is so full that the
-  /// word does not fit, the stream circuit is closed and opened anew.
+  /// Cancels the session (result DNC_CANCEL, DNC_READERR ...) without waiting for a reply. If the stream is
+  /// full, the stream circuit is closed and opened again.
   void dncCancel(DncResult result = DNC_CANCEL);
   bool dncOpen() const;
-  /// Looks for an error frame of the controller. @throws FocasError as dncSend.
+  /// Checks for an error frame of the controller. @throws FocasError as dncSend().
   void dncCheck();
-  /// Nothing comes back on the DNC circuit of an open session any more; the data circuit may be well.
+  /// Whether the controller no longer answers on the stream circuit of an open session; the data circuit may
+  /// still work.
   bool dncDeaf() const;
 
  private:

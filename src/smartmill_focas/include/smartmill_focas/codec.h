@@ -9,14 +9,13 @@
 #include <string_view>
 #include <vector>
 
-/// The FOCAS2 Ethernet wire (TCP 8193): frames, sub-packets and numbers, without any socket. All wire
-/// integers are big-endian. Decoding never reads beyond what it was given: what does not fit throws
-/// WireError.
+/// The FOCAS2 Ethernet protocol (TCP 8193): frames, sub-packets and numbers, without sockets. All integers on
+/// the wire are big-endian. Decoding does not read beyond its input; data that do not fit throw WireError.
 namespace smartmill::focas {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// Return codes of the FOCAS library, as they travel on the wire.
+/// Return codes of the FOCAS library, as on the wire.
 enum EwCode : std::int16_t {
   EW_PROTOCOL = -17,
   EW_SOCKET = -16,
@@ -52,10 +51,10 @@ enum EwCode : std::int16_t {
   EW_PMC = 18,
 };
 
-/// "EW_MODE" and so on; "code 42" for what has no name.
+/// Name of a code, e.g. "EW_MODE"; "code 42" for an unnamed one.
 std::string ewName(int code);
 
-/// How a DNC session ends (cnc_dncend2).
+/// Result of a DNC session (cnc_dncend2).
 enum DncResult : std::int16_t {
   DNC_NORMAL = -1,
   DNC_OPENERR = -514,
@@ -64,7 +63,7 @@ enum DncResult : std::int16_t {
   DNC_CANCEL = -32768,
 };
 
-/// Automatic mode and run state as statinfo gives them.
+/// Automatic mode and run state, as in statinfo.
 enum Aut : std::int16_t {
   AUT_MDI = 0,
   AUT_MEM = 1,
@@ -81,7 +80,7 @@ enum MotionState : std::int16_t { MOTION_NONE = 0, MOTION_MOVES = 1, MOTION_DWEL
 constexpr std::uint16_t DEFAULT_PORT = 8193;
 constexpr std::size_t HEADER_SIZE = 10;          ///< [byte] of a frame
 constexpr std::size_t MAX_BODY = 65535;          ///< [byte] of a frame
-constexpr std::size_t DNC_CHUNK = 1450;          ///< [byte] most text in one DNC frame of a client
+constexpr std::size_t DNC_CHUNK = 1450;          ///< [byte] maximum text in one DNC frame of a client
 constexpr std::size_t STREAM_NAME_BODY = 0x204;  ///< [byte] body of a stream's start
 constexpr std::uint16_t REQUEST_VERSION = 1;     ///< of every request
 constexpr std::uint16_t REPLY_VERSION = 3;       ///< of the replies of a 30i
@@ -184,7 +183,7 @@ enum SpindleKind : std::int32_t {
   SPINDLE_METER_SPEED = 5,
 };
 
-/// Bytes that are not FOCAS, or a reply that does not fit its request; what() is one line.
+/// Bytes that are no FOCAS data, or a reply that does not match its request; what() is one line.
 class WireError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -200,10 +199,9 @@ struct Value8 {
   /// NaN when vacant.
   double toDouble() const;
   static Value8 vacantValue() { return {0, 10, -1}; }
-  /// Rounded to that many decimals (0..9); a value beyond 32 bit saturates, NaN is vacant.
+  /// Rounded to a number of decimals (0..9); a value beyond 32 bit saturates, NaN is vacant.
   static Value8 fromDouble(double value, int decimals);
-  /// As many decimals as nine significant digits leave, trailing zeros dropped: how a macro variable is
-  /// shown.
+  /// Nine significant digits without trailing zeros, as the controller displays a macro variable.
   static Value8 fromMacro(std::optional<double> value);
 };
 
@@ -219,7 +217,7 @@ class Writer {
   Writer& value8(const Value8& value);
   Writer& zeros(std::size_t count);
   Writer& bytes(const Bytes& data);
-  /// Exactly width bytes: cut, or filled up.
+  /// Exactly width bytes, truncated or padded.
   Writer& text(std::string_view text, std::size_t width, char fill = '\0');
   const Bytes& data() const { return data_; }
 
@@ -227,7 +225,7 @@ class Writer {
   Bytes data_;
 };
 
-/// Reads big-endian numbers. @throws WireError when the data end.
+/// Reads big-endian numbers. @throws WireError at the end of the data.
 class Reader {
  public:
   Reader(const std::uint8_t* data, std::size_t size) : data_(data), size_(size) {}
@@ -242,10 +240,10 @@ class Reader {
   Bytes bytes(std::size_t count);
   /// Up to the first zero byte, at most width; always consumes width.
   std::string text(std::size_t width);
-  /// The same as part of a line: what cannot be printed comes as '?'.
+  /// As text(), with '?' for characters that are not printable.
   std::string line(std::size_t width);
   Reader& skip(std::size_t count);
-  std::size_t left() const { return size_ - position_; }
+  std::size_t remaining() const { return size_ - position_; }
 
  private:
   const std::uint8_t* take(std::size_t count);
@@ -263,14 +261,15 @@ struct Frame {
   bool is(FrameType t, Direction d) const { return type == t && direction == d; }
 };
 
-/// @throws WireError when the body is longer than MAX_BODY.
+/// @throws WireError if the body is longer than MAX_BODY.
 Bytes encodeFrame(std::uint8_t type, std::uint8_t direction, const Bytes& body, std::uint16_t version);
 
-/// Puts frames together from pieces of any size.
+/// Assembles frames from chunks of any size.
 class FrameReader {
  public:
   void append(const std::uint8_t* data, std::size_t size);
-  /// The next whole frame, or nothing yet. @throws WireError when the bytes are no frame (bad magic).
+  /// The next complete frame; empty: none yet. @throws WireError if the bytes are no frame (wrong magic
+  /// number).
   std::optional<Frame> next();
   std::size_t buffered() const { return buffer_.size() - start_; }  ///< [byte]
 
@@ -287,7 +286,7 @@ struct ErrorBody {
   std::int16_t detail2 = 0;
 };
 Bytes encodeErrorBody(const ErrorBody& error);
-/// Missing bytes count as zero; code EW_PROTOCOL when there is none at all.
+/// Missing bytes are zero; code EW_PROTOCOL if the code is missing.
 ErrorBody decodeErrorBody(const Bytes& body);
 
 /// One request of a data PDU.
@@ -304,7 +303,7 @@ struct SubRequest {
       : c3(opcode), v{{v1, v2, v3, v4}}, extra(std::move(extra_bytes)) {}
 };
 
-/// One reply of a data PDU; data are empty when code is not EW_OK.
+/// One reply of a data PDU; data are empty if code is not EW_OK.
 struct SubReply {
   std::uint16_t c1 = 1, c2 = 1, c3 = 0;
   std::int16_t code = EW_OK;
@@ -312,7 +311,7 @@ struct SubReply {
   Bytes data;
 };
 
-/// Bodies of FRAME_DATA. @throws WireError when they do not fit a frame (encode) or are malformed (decode).
+/// Bodies of FRAME_DATA. @throws WireError if they exceed a frame (encode) or are malformed (decode).
 Bytes encodeRequests(const std::vector<SubRequest>& requests);
 std::vector<SubRequest> decodeRequests(const Bytes& body);
 Bytes encodeReplies(const std::vector<SubReply>& replies);
@@ -323,11 +322,11 @@ struct OpenReply {
   int axes = 3;  ///< controlled axes
   int spindles = 1;
   int paths = 1;
-  bool spindle_meter = true;  ///< cnc_rdspmeter is offered
-  bool extended = true;       ///< rddynamic2, rdexecprog and others are offered
+  bool spindle_meter = true;  ///< cnc_rdspmeter is available
+  bool extended = true;       ///< rddynamic2, rdexecprog and others are available
 };
 Bytes encodeOpenReply(const OpenReply& reply);
-/// Any length: what is missing keeps its default, so that a short or legacy reply is still usable.
+/// Any length: missing values keep their defaults, so that a short or legacy reply is usable.
 OpenReply decodeOpenReply(const Bytes& body);
 
 }  // namespace smartmill::focas

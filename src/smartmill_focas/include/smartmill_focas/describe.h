@@ -6,7 +6,7 @@
 
 namespace smartmill::focas {
 
-/// A frame in one line for people: what is asked with its arguments, or what came back with its values.
+/// A frame as one line of text: request with arguments, or reply with values.
 std::string describe(const Frame& frame);
 
 }  // namespace smartmill::focas

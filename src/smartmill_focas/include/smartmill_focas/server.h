@@ -12,7 +12,7 @@
 
 namespace smartmill::focas {
 
-/// What the server tells of the controller; asked once, when the server is made.
+/// System information of the controller, queried once by the constructor of the server.
 struct SysInfo {
   std::string cnc_type = "30";
   std::string mt_type = " M";
@@ -26,14 +26,14 @@ struct SysInfo {
   std::array<std::uint32_t, 4> cnc_id{{0, 0, 0, 0}};
 };
 
-/// How a parameter or a diagnosis number is kept.
+/// Type of a parameter or a diagnosis number.
 enum class NumberedType : std::uint8_t { bits = 0, byte = 1, word = 2, double_word = 3, real = 4 };
 
 /// A parameter or a diagnosis number.
 struct NumberedValue {
   int number = 0;
   NumberedType type = NumberedType::double_word;
-  std::vector<double> values;  ///< one, or one an axis
+  std::vector<double> values;  ///< one, or one per axis
   bool of_axis = false;
   int decimals = 0;  ///< of a real
 };
@@ -45,13 +45,13 @@ struct DateTime {
 /// A program in the controller's memory.
 struct StoredProgram {
   int number = 0;
-  std::string name;      ///< of its file, for example O0001
+  std::string name;      ///< of its file, e.g. O0001
   std::string comment;   ///< of its first line
   std::size_t size = 0;  ///< [byte]
   DateTime changed;
 };
 
-/// Kinds of PMC addresses, as pmc_rdpmcrng numbers them.
+/// Kinds of PMC addresses, numbered as in pmc_rdpmcrng.
 enum class PmcArea : std::uint8_t { g = 0, f = 1, y = 2, x = 3, a = 4, r = 5, t = 6, k = 7, c = 8, d = 9 };
 
 /// Raw values of cnc_statinfo.
@@ -75,9 +75,9 @@ struct AlarmMessage {
   std::string text;
 };
 
-/// The machine behind a Server. Every method is called from the server's one thread while others may run the
-/// machine: the implementer locks. Calls must be short: all connections wait meanwhile. Values are those of
-/// the controller's screen (mm, mm/min, rpm, percent), as the wire carries them.
+/// The machine of a Server. All methods are called in the thread of the server, while other threads may run
+/// the machine: implementations must lock. Calls must be short, since all connections wait. Values have the
+/// units of the controller's screen (mm, mm/min, rpm, percent), as on the wire.
 class ControllerInterface {
  public:
   virtual ~ControllerInterface() = default;
@@ -99,9 +99,9 @@ class ControllerInterface {
     return {};
   }  ///< [rpm] of each axis' motor; empty: EW_FUNC
 
-  /// EW_OK and the value (nothing: vacant), or EW_NUMBER.
+  /// EW_OK and the value (empty: vacant), or EW_NUMBER.
   virtual EwCode readMacro(int number, std::optional<double>* value) const = 0;
-  /// EW_OK, EW_NUMBER, EW_PROT ...; nothing: becomes vacant.
+  /// EW_OK, EW_NUMBER, EW_PROT ... @param value empty: vacant
   virtual EwCode writeMacro(int number, std::optional<double> value) = 0;
 
   virtual std::uint32_t alarmBits() const = 0;
@@ -112,15 +112,15 @@ class ControllerInterface {
   virtual int blockCount() const = 0;
   virtual std::string programPath() const = 0;     ///< of the main program, e.g. //CNC_MEM/O0001
   virtual std::string executingBlock() const = 0;  ///< text of the running block
-  /// From the running block on, what is known of the program.
+  /// Text of the program from the running block on, as far as known.
   virtual std::string programText() const { return executingBlock(); }
 
   /// Parameters with their numbers from first to last, in order.
   virtual std::vector<NumberedValue> parameters(int /*first*/, int /*last*/) const { return {}; }
-  /// The same of diagnosis numbers.
+  /// Diagnosis numbers from first to last, in order.
   virtual std::vector<NumberedValue> diagnoses(int /*first*/, int /*last*/) const { return {}; }
   virtual std::vector<double> servoCurrent() const { return {}; }  ///< [A] of each axis; empty: EW_FUNC
-  /// Nothing: EW_FUNC.
+  /// Empty: EW_FUNC.
   virtual std::optional<DateTime> dateTime() const { return std::nullopt; }
   virtual EwCode setDateTime(const DateTime& /*date_time*/) { return EW_FUNC; }
   /// Bytes first..last of an area: EW_OK, EW_NUMBER (no such address), EW_FUNC (no PMC).
@@ -129,64 +129,63 @@ class ControllerInterface {
   }
   virtual EwCode writePmc(PmcArea /*area*/, int /*first*/, const Bytes& /*bytes*/) { return EW_FUNC; }
 
-  /// Programs in memory, by number.
+  /// Programs in memory, sorted by number.
   virtual std::vector<StoredProgram> programs() const { return {}; }
-  /// The folder that holds them, ends with a slash.
+  /// Folder of the programs, with a slash at the end.
   virtual std::string programFolder() const { return "//CNC_MEM/USER/PATH1/"; }
-  /// Makes it the main program: EW_OK, EW_DATA (there is none), EW_BUSY, EW_MODE.
+  /// Makes it the main program: EW_OK, EW_DATA (no such program), EW_BUSY, EW_MODE.
   virtual EwCode selectProgram(int /*number*/) { return EW_FUNC; }
   virtual EwCode deleteProgram(int /*number*/) { return EW_FUNC; }
   virtual EwCode rewindProgram() { return EW_FUNC; }
-  /// Text as it was downloaded, one or several programs. EW_OK, EW_DATA (no program number), EW_OVRFLOW (no
-  /// room), EW_BUSY (it runs).
+  /// Stores downloaded text with one or several programs. EW_OK, EW_DATA (no program number), EW_OVRFLOW
+  /// (memory full), EW_BUSY (program running).
   virtual EwCode storePrograms(const std::string& /*text*/) { return EW_FUNC; }
-  /// Text of programs first..last as it is uploaded. EW_OK, EW_DATA (there is none).
+  /// Text of programs first..last for an upload. EW_OK, EW_DATA (no such program).
   virtual EwCode fetchPrograms(int /*first*/, int /*last*/, std::string* /*text*/) const { return EW_FUNC; }
 
   virtual EwCode cycleStart() { return EW_FUNC; }  ///< opcode 01
-  /// Opcode 02, also what an operator's RESET does: stops motion, ends a DNC session (dncAbort then says
+  /// Opcode 02, as the RESET key of the operator: stops motion, ends a DNC session (dncAbort() then returns
   /// EW_RESET).
   virtual EwCode reset() { return EW_FUNC; }
 
-  /// A client opens a DNC session: EW_OK, EW_MODE (not in DNC mode), EW_BUSY (one is open), EW_REJECT,
-  /// EW_ALARM.
+  /// Opens a DNC session: EW_OK, EW_MODE (not in DNC mode), EW_BUSY (a session is open), EW_REJECT, EW_ALARM.
   virtual EwCode dncStart() = 0;
-  /// Program text; returns how much of it the buffer took now (0..size). The rest is offered again every few
-  /// milliseconds; meanwhile nothing more is read from the client, so that TCP stops it.
+  /// Program text. @return [byte] that the buffer accepts now (0..size). The rest is offered again every few
+  /// milliseconds; meanwhile the client is not read, so that TCP stops it.
   virtual std::size_t dncData(const char* data, std::size_t size) = 0;
-  /// All data are in; the machine runs what it has. EW_OK, or EW_FUNC without a session.
+  /// End of the data; the machine runs the buffered text to its end. EW_OK, or EW_FUNC without a session.
   virtual EwCode dncEnd() = 0;
-  /// The client gave up (DncResult): stop, drop what is buffered.
+  /// The client cancels the session (DncResult): stop, discard the buffer.
   virtual void dncCancel(int result) = 0;
-  /// The client's connection broke in mid-session.
+  /// The connection of the client is lost during a session.
   virtual void dncDisconnected() { dncCancel(DNC_READERR); }
-  /// Polled while a session is open: EW_OK while all is well; EW_RESET, EW_ALARM ... once the machine has
-  /// ended the session itself. The server then tells the client (unsolicited error frame) and throws the rest
-  /// of its data away.
+  /// Polled while a session is open: EW_OK in normal operation; EW_RESET, EW_ALARM ... after the machine has
+  /// ended the session. The server then sends the client an unsolicited error frame and discards its further
+  /// data.
   virtual EwCode dncAbort() = 0;
 };
 
 struct ServerOptions {
   std::string bind_address = "127.0.0.1";
-  std::uint16_t port = DEFAULT_PORT;  ///< 0: any free one
-  int max_sessions = 5;               ///< per kind of circuit; one more is refused with 0103
-  int max_connections = 30;           ///< TCP; one more gets ECONNREFUSED, as seen on a live 31i
-  int receive_buffer = 4096;  ///< [byte] SO_RCVBUF: how much the wire may hold beyond the machine's buffer
+  std::uint16_t port = DEFAULT_PORT;  ///< 0: any free port
+  int max_sessions = 5;               ///< per kind of circuit; further ones are refused with 0103
+  int max_connections = 30;           ///< TCP; further ones get ECONNREFUSED, as observed on a 31i
+  int receive_buffer = 4096;          ///< [byte] SO_RCVBUF: data in transit beyond the buffer of the machine
 };
 
-/// FOCAS server: accepts connections, each independent, all on one machine. Runs one thread of its own.
+/// FOCAS server: independent connections to one machine. Runs its own thread.
 class Server {
  public:
-  /// Listens when it returns. @throws std::runtime_error "FOCAS server: cannot listen on HOST:PORT: why".
+  /// Starts listening. @throws std::runtime_error "FOCAS server: cannot listen on HOST:PORT: REASON".
   Server(const ServerOptions& options, ControllerInterface& controller);
   ~Server();  ///< stop()
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
   std::uint16_t port() const;
-  /// Closes all connections and ends the thread; at once, any number of times.
+  /// Closes all connections and ends the thread. May be called repeatedly.
   void stop();
-  /// Open circuits now (stream and data), for tests and messages.
+  /// Number of open circuits (stream and data).
   int connections() const;
 
  private:

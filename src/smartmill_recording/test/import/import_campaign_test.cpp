@@ -236,7 +236,7 @@ TEST_F(Import, planIsStrict) {
               HasSubstr("'f' is not a column; expected one of time"));
   EXPECT_THAT(fault("defaults: {channels: {fx: {scale: 2.0, sensitivity_mv_per_n: 2.0}}}\n"),
               HasSubstr("contradicts scale"));
-  EXPECT_THAT(fault("tool: {teeth: 2.5}\n"), HasSubstr("tool.teeth: 2.5 is not a whole number"));
+  EXPECT_THAT(fault("tool: {teeth: 2.5}\n"), HasSubstr("tool.teeth: 2.5 is not an integer"));
   EXPECT_THAT(fault("files:\n- {file: a.csv}\n- {file: ./a.csv}\n"), HasSubstr("is listed twice"));
 }
 

@@ -22,14 +22,14 @@
 
 namespace smartmill {
 
-/// Seconds of a message stamp. A double near 1.8e9 s resolves 0.24 us: the same message gives the same double
-/// wherever it is read, and fromSec(toSec(t)) is stable from the first conversion on.
+/// Seconds of a message stamp. The resolution of a double near 1.8e9 s is 0.24 us; fromSec(toSec(t)) does not
+/// change after the first conversion.
 double toSec(const ros::Time& stamp);
-/// Nearest nanosecond. @throws Error when not finite or negative.
+/// Nearest nanosecond. @throws Error if not finite or negative.
 ros::Time fromSec(double stamp);
 
-// Both ways without loss. fromMsg throws Error naming the field when the content contradicts itself (sample
-// count, rate, unequal lengths, unknown enumerators); NaN samples pass, the estimators decide about them.
+// Lossless in both directions. fromMsg throws Error naming the field if the content is inconsistent (sample
+// count, rate, unequal lengths, unknown enumerators); NaN samples are passed on to the estimators.
 SampleBlock fromMsg(const smartmill_msgs::SampleBlock& message);
 smartmill_msgs::SampleBlock toMsg(const SampleBlock& block, const std::string& frame_id = "");
 SpindleAngle fromMsg(const smartmill_msgs::SpindleAngle& message);
@@ -55,7 +55,7 @@ smartmill_msgs::StabilityChart toMsg(const StabilityChart& chart);
 IdentifiedForceCurves fromMsg(const smartmill_msgs::ForceCurve& message);
 smartmill_msgs::ForceCurve toMsg(const IdentifiedForceCurves& curves);
 
-/// The message that carries a core type on a topic: MessageOf<SampleBlock>::Type; messages carry themselves.
+/// Message type of a core type, MessageOf<SampleBlock>::Type; of a message the message itself.
 template <class Data>
 struct MessageOf {
   using Type = Data;

@@ -17,34 +17,35 @@ namespace smartmill {
 /// Service of every node, in its private namespace (smartmill_msgs/Follow).
 constexpr const char* FOLLOW = "follow";
 
-/// What a node has said it listens to and is not connected with yet; empty: nothing. "Connected" means every
-/// publisher that the master knows.
+/// Topics of a node that lack a connection to one of the publishers registered at the master, separated by ",
+/// "; empty: none.
 std::string unconnected(const smartmill_msgs::Follow::Response& inputs);
 
-/// Nodes that take what somebody plays to them, and how far they are. Roscpp drops what a full queue cannot
-/// hold and keeps no order across topics; who plays asks here and waits, so that nothing is lost and nothing
-/// is late however busy the computer is. One thread only.
+/// Flow control of a player of recorded data: the nodes that receive the data, and how many messages they
+/// have processed. roscpp drops messages of a full queue and does not order messages across topics; the
+/// player therefore waits for the nodes, so that no message is lost or late on a busy computer. Not
+/// thread-safe.
 class Followers {
  public:
   /// @param nodes full names
   explicit Followers(std::vector<std::string> nodes);
 
-  /// Waits until every node is there and connected with every publisher of its inputs.
-  /// @throws Error naming what is missing when it takes longer than patience [s]
-  void begin(double patience = PATIENCE);
+  /// Waits until every node runs and is connected to every publisher of its inputs.
+  /// @throws Error naming what is missing after the timeout [s]
+  void begin(double timeout = TIMEOUT);
 
-  /// Waits until every node that listens to the topic is connected with this publisher.
+  /// Waits until every node that subscribes to the topic is connected to this publisher.
   /// @throws Error as begin()
-  void expect(const ros::Publisher& publisher, double patience = PATIENCE);
+  void expect(const ros::Publisher& publisher, double timeout = TIMEOUT);
 
-  /// Waits until this subscriber hears somebody: what a node says to it from now on arrives.
+  /// Waits until this subscriber is connected to a publisher, so that it receives all later messages.
   /// @throws Error as begin()
-  void expect(const ros::Subscriber& listener, double patience = PATIENCE);
+  void expect(const ros::Subscriber& subscriber, double timeout = TIMEOUT);
 
-  /// One message more was published on a topic.
+  /// Counts a message that was published on a topic.
   void sent(const std::string& topic) { ++sent_[topic]; }
 
-  /// Publishes, and waits where nodes are too far behind. @throws Error as keepUp()
+  /// Publishes, and waits while a node is more than AHEAD messages behind. @throws Error as keepUp()
   template <class Message>
   void publish(const ros::Publisher& publisher, const Message& message) {
     publisher.publish(message);
@@ -52,35 +53,36 @@ class Followers {
     keepUp(AHEAD);
   }
 
-  /// Waits while a node is more than this many messages behind. @throws Error when none moves any more
-  void keepUp(std::uint64_t most);
+  /// Waits while a node is more than this many messages behind. @throws Error if no node makes progress
+  void keepUp(std::uint64_t max_behind);
 
-  /// Waits until everything sent was taken, and what the nodes have said to each other of it too; so a goal
-  /// or a condition is there before what comes after it. @throws Error as keepUp()
+  /// Waits until all messages sent, and the messages between the nodes that result from them, are processed;
+  /// a goal or a condition then precedes all later data. @throws Error as keepUp()
   void settle();
 
-  /// No more will come: the nodes hand out what waits, one after the other.
+  /// Announces the end of the data: the nodes release delayed results, one node after the other.
   void end();
 
-  /// More may come, from somebody else: silence counts again.
+  /// Ends the flow control without an end of data: the nodes again detect missing messages.
   void leave();
 
-  static constexpr double PATIENCE = 120.0;    ///< [s] without any progress
-  static constexpr std::uint64_t AHEAD = 500;  ///< messages that a node may be behind; far below any queue
+  static constexpr double TIMEOUT = 120.0;  ///< [s] time limit without progress
+  static constexpr std::uint64_t AHEAD =
+      500;  ///< messages that a node may be behind; far below any queue size
 
  private:
   struct Node {
     std::string name;
     ros::ServiceClient client;
-    std::map<std::string, std::uint64_t> begun, taken;  // by topic
+    std::map<std::string, std::uint64_t> taken_at_begin, taken;  // [1] processed messages by topic
   };
   using Response = smartmill_msgs::Follow::Response;
-  Response ask(Node& node, std::uint8_t phase);
-  bool answers(Node& node, std::uint8_t phase, Response& response);
-  std::uint64_t look();
-  void lookOften();
+  Response call(Node& node, std::uint8_t phase);
+  bool tryCall(Node& node, std::uint8_t phase, Response& response);
+  std::uint64_t updateCounts();
+  void waitForDelivery();
   std::uint64_t behind() const;
-  void waitFor(const std::function<std::string()>& missing, double patience);
+  void waitFor(const std::function<std::string()>& missing, double timeout);
 
   std::vector<Node> nodes_;
   std::map<std::string, std::uint64_t> sent_;

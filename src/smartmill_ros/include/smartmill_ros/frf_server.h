@@ -11,24 +11,26 @@
 
 namespace smartmill {
 
-/// The action of a measurement of FRFs, for the node around the class that measures: one goal at a time, each
-/// begun at its turn among the streams; results go out on tool/frf and tool/modes as well, where a late
-/// subscriber gets every direction. All in the thread of the callbacks.
+/// Action server of FRF measurements: one goal at a time, started in stamp order with the streams. Results
+/// are also published on tool/frf and tool/modes, latched for every direction. Used in the thread of the
+/// callbacks only.
 class FrfServer {
  public:
   struct Handlers {
-    /// A goal has come: to be called at its turn with whether no measurement runs; true: measure it.
+    /// Receives a goal. `begin` is to be called at the goal's turn, with whether no measurement runs; it
+    /// returns true if the goal is to be measured.
     std::function<void(const MeasureFrfGoal& goal, std::function<bool(bool free)> begin)> goal;
-    /// A cancel has come: at its turn the running measurement ends when `due` still says so.
-    std::function<void(std::function<bool()> due)> cancel;
+    /// Receives a cancel request. At its turn the running measurement is to end if `still_active` returns
+    /// true.
+    std::function<void(std::function<bool()> still_active)> cancel;
   };
   struct Result {
     FrfCode code = FrfCode::ok;
     std::string message;
     MeasuredFrf frf;
     MeasuredModes modes;
-    MeasuredFrf cross;                      ///< read at right angles to the blow; empty: none
-    double sensitivity = NOT_A_NUMBER;      ///< [m/V] of the capacitive sensor, where there is one
+    MeasuredFrf cross;                      ///< response perpendicular to the hit; empty: none
+    double sensitivity = NOT_A_NUMBER;      ///< [m/V] of the capacitive sensor; NaN: none
     double sensitivity_std = NOT_A_NUMBER;  ///< [m/V]
     double flute_sure = NOT_A_NUMBER;       ///< [1]
     int spindle_moves = 0;                  ///< [1]
@@ -40,10 +42,10 @@ class FrfServer {
 
   void feedback(const std::string& stage, double progress, int hits_done);
   void finish(const Result& result);
-  /// Time went back: nothing that was measured or asked for is of this run.
+  /// After a jump back in time: discards results and goals.
   void restart();
-  /// Goals that wait for a dead stream would wait for ever. @param patience [s] of wall time since they came
-  void refuseWaiting(const std::string& why, double patience);
+  /// Rejects goals that wait for a dead stream. @param timeout [s] of wall time since their reception
+  void refuseWaiting(const std::string& reason, double timeout);
 
   const std::string& lastMessage() const;  ///< of the last result
 

@@ -6,7 +6,7 @@
 
 namespace smartmill {
 
-/// @param received [s] stands in for a missing stamp; only a stamped goal replays to the last digit
+/// @param received [s] replaces a missing stamp; only a goal with stamp has an identical replay
 MeasureFrfGoal goalFromMsg(const smartmill_msgs::MeasureFrfGoal& message, double received);
 
 }  // namespace smartmill

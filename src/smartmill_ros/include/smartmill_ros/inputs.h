@@ -18,26 +18,26 @@
 
 namespace smartmill {
 
-/// Messages of sampled streams that wait, in publishers and subscribers: 1000 s of blocks, so that a node
-/// that was starved catches up instead of losing.
+/// Queue size of sampled streams, in publishers and subscribers: 1000 s of blocks, so that a delayed node
+/// loses no messages.
 constexpr std::uint32_t STREAM_QUEUE = 100000;
 
-/// One input of a node: whether it is alive, and what its handler refused last.
+/// State of one input of a node: time since the last message and last error of its handler.
 class InputHealth {
  public:
   InputHealth(std::string topic, double timeout) : topic_(std::move(topic)), watchdog_(timeout) {}
 
-  /// Hands on what came; whatever that throws stays here. @param now [s] wall time
-  /// @return a line for the log, empty when there is nothing to say (again).
+  /// Calls the handler of a message and catches its exceptions. @param now [s] wall time
+  /// @return error for the log; empty: none, or logged recently
   std::string take(double now, const std::function<void()>& handle);
 
   const std::string& topic() const { return topic_; }
   const Watchdog& watchdog() const { return watchdog_; }
   Watchdog& watchdog() { return watchdog_; }
-  /// What was refused since it was asked for last; empty: nothing.
+  /// Error since the last call, or the present one; empty: none.
   std::string takeProblem();
-  std::size_t refused() const { return refused_; }  ///< [1] since the start
-  /// [1] messages since the start that the node is done with
+  std::size_t refused() const { return refused_; }  ///< [1] messages since the start
+  /// [1] messages since the start that the node has processed
   std::uint64_t taken() const {
     return taken_ - (waiting_ ? std::min<std::uint64_t>(taken_, waiting_()) : 0);
   }
@@ -46,23 +46,24 @@ class InputHealth {
  private:
   std::string topic_, problem_;
   Watchdog watchdog_;
-  bool told_ = false, standing_ = false;  // the problem was asked for; the newest message was refused
-  double said_ = -1e9;                    // [s] last line for the log
+  bool reported_ = false;      // the problem, by takeProblem()
+  bool last_refused_ = false;  // the last message
+  double logged_ = -1e9;       // [s] time of the last line for the log
   std::size_t refused_ = 0;
   std::uint64_t taken_ = 0;
   std::function<std::size_t()> waiting_;
 };
 
-/// What a node listens to. on() has the signature of RecordingReader's, so that one function can connect
-/// either to the class that thinks. A handler that throws leaves one line in the log and in the diagnostics,
-/// and the node goes on.
+/// Subscriptions of a node. on() has the signature of RecordingReader::on(), so that one function can connect
+/// an estimator to either. An exception of a handler is logged and reported in the diagnostics; the node
+/// continues.
 class Inputs {
  public:
-  /// @param timeout [s] of ticks without a message after which an input counts as dead
+  /// @param timeout [s] of ticks without a message after which an input is dead
   Inputs(ros::NodeHandle nh, double timeout);
 
-  /// @param Data a core type, converted from its message (a message that contradicts itself counts as
-  /// refused), or a message. The handler gets the data and the time of their reception [s].
+  /// @param Data a core type, converted from its message (an inconsistent message is refused), or a message.
+  /// The handler gets the data and the time of their reception [s].
   template <class Data>
   void on(const std::string& topic, std::function<void(const Data&, double)> handler) {
     using Message = typename MessageOf<Data>::Type;
@@ -80,27 +81,28 @@ class Inputs {
                                                   ros::TransportHints().tcpNoDelay()));
   }
 
-  /// Of one topic. @throws std::out_of_range when nobody listens to it.
+  /// Of one topic. @throws std::out_of_range if it is no input.
   Watchdog& watchdog(const std::string& topic);
   /// The first of these that is dead; nullptr: none. @throws std::out_of_range as watchdog().
   const InputHealth* dead(std::initializer_list<const char*> topics);
-  /// Of all inputs together. ended() is the end of data: nothing more will come to release what waits.
+  /// Of all inputs together. ended() is the end of data: delayed results are to be released.
   Watchdog& any() { return any_; }
 
-  /// @param waiting [1] messages of a topic that the node has put aside; who plays to it waits for them too.
-  /// @throws std::out_of_range when nobody listens to it.
+  /// @param waiting [1] received messages of a topic that the node has not processed yet; a player waits for
+  /// them.
+  /// @throws std::out_of_range if the topic is no input.
   void setWaiting(const std::string& topic, std::function<std::size_t()> waiting) {
     find(topic).setWaiting(std::move(waiting));
   }
 
-  /// From a wall timer of the thread that reads the inputs. @param period [s] of that timer
+  /// To be called by a wall timer in the thread of the inputs. @param period [s] of that timer
   void tick(double period);
 
-  /// A player of recorded data says how it stands and asks what was taken. While it asks, its own pauses are
-  /// no silence.
+  /// Service of a player of recorded data: receives its phase and returns the processed messages. While a
+  /// player calls it, pauses of the player are no end of data.
   void follow(const smartmill_msgs::Follow::Request& request, smartmill_msgs::Follow::Response& response);
 
-  /// What is silent and what was refused.
+  /// Diagnostics: time since the last message and errors of each input.
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
  private:
@@ -110,8 +112,8 @@ class Inputs {
 
   ros::NodeHandle nh_;
   double timeout_;
-  double held_ = 0.0;               // [s] of ticks that are no silence
-  std::deque<InputHealth> inputs_;  // their places stay
+  double hold_ = 0.0;               // [s] remaining ticks without timeouts
+  std::deque<InputHealth> inputs_;  // with stable addresses
   Watchdog any_;
   std::deque<ros::Subscriber> subscribers_;
 };

@@ -7,27 +7,27 @@
 
 namespace smartmill {
 
-/// A topic that hands a late subscriber the last message of every key (a direction): a latched topic would
-/// keep one message only.
+/// A topic that sends a new subscriber the last message of every key (a direction). A latched topic of ROS
+/// keeps one message only.
 template <class Message>
 class LatchedTopic {
  public:
   LatchedTopic(ros::NodeHandle& nh, const std::string& topic)
       : publisher_(nh.advertise<Message>(
             topic, 10, ros::SubscriberStatusCallback([this](const ros::SingleSubscriberPublisher& to) {
-              for (const auto& entry : kept_) to.publish(entry.second);
+              for (const auto& entry : last_messages_) to.publish(entry.second);
             }))) {}
   LatchedTopic(const LatchedTopic&) = delete;
   LatchedTopic& operator=(const LatchedTopic&) = delete;
 
   void publish(const std::string& key, const Message& message) {
-    kept_[key] = message;
+    last_messages_[key] = message;
     publisher_.publish(message);
   }
-  void forget() { kept_.clear(); }
+  void forget() { last_messages_.clear(); }
 
  private:
-  std::map<std::string, Message> kept_;
+  std::map<std::string, Message> last_messages_;
   ros::Publisher publisher_;
 };
 

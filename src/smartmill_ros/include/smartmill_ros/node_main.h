@@ -2,8 +2,8 @@
 
 namespace smartmill {
 
-/// All that main() of a node does. Every node's program defines it once, with runNode() (run_node.h) in the
-/// source of the node's class, so that the main need not read that class and ROS once more.
+/// Called by main() of a node. Defined once per node with runNode() (run_node.h), in the source of the node
+/// class, so that the source of main() includes neither that class nor ROS.
 int nodeMain(int argc, char** argv);
 
 }  // namespace smartmill

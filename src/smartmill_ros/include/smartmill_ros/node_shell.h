@@ -13,11 +13,11 @@
 
 namespace smartmill {
 
-/// What every node has around its class: inputs that catch, work on a wall timer, diagnostics once a second,
-/// the service `follow` for whoever plays data to it.
+/// Common parts of a node: inputs that catch exceptions, tasks on wall timers, diagnostics once a second and
+/// the service `follow` for a player of recorded data.
 class NodeShell {
  public:
-  /// @param hardware the id in the diagnostics @param input_timeout [s] see Inputs
+  /// @param hardware id in the diagnostics @param input_timeout [s] see Inputs
   NodeShell(ros::NodeHandle nh, ros::NodeHandle private_nh, const std::string& hardware,
             double input_timeout);
   NodeShell(const NodeShell&) = delete;
@@ -28,12 +28,12 @@ class NodeShell {
   /// Called for each publication of the diagnostics.
   void diagnose(const std::string& name,
                 std::function<void(diagnostic_updater::DiagnosticStatusWrapper&)> task);
-  /// The diagnostics now, for news that should not wait.
+  /// Publishes the diagnostics at once.
   void tell() { diagnostics_.force_update(); }
 
-  /// @param period [s] of wall time: it goes on when a recording's clock stands. What work throws is logged.
-  /// Timers wait behind the messages that have come.
-  void every(double period, std::function<void()> work);
+  /// Calls a task periodically and logs its exceptions. Received messages are processed first.
+  /// @param period [s] of wall time, so that a paused replay does not stop it
+  void every(double period, std::function<void()> task);
 
  private:
   bool follow(smartmill_msgs::Follow::Request& request, smartmill_msgs::Follow::Response& response);
@@ -41,7 +41,7 @@ class NodeShell {
   ros::NodeHandle nh_;
   Inputs inputs_;
   diagnostic_updater::Updater diagnostics_;
-  std::vector<std::function<void()>> works_;
+  std::vector<std::function<void()>> tasks_;
   std::vector<ros::WallTimer> timers_;
   ros::ServiceServer follow_;
 };

@@ -6,7 +6,7 @@
 
 namespace smartmill {
 
-/// All parameters below a private node handle. @throws Error when the namespace holds no table.
+/// All parameters in the namespace of a private node handle. @throws Error if it is no table.
 ParameterReader parametersFromServer(const ros::NodeHandle& private_nh);
 
 }  // namespace smartmill

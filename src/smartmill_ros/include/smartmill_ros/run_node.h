@@ -11,7 +11,7 @@
 namespace smartmill {
 
 /// `NODE --parameters` prints the node's parameter file: keys, defaults, units, bounds, meaning.
-/// @return whether that was asked for.
+/// @return whether the command line requests it.
 template <class Parameters>
 bool printsParameters(int argc, char** argv) {
   if (argc != 2 || std::strcmp(argv[1], "--parameters") != 0) return false;
@@ -20,12 +20,12 @@ bool printsParameters(int argc, char** argv) {
   return true;
 }
 
-/// main() of a node class that takes (nh, private_nh) and names its struct of parameters `Parameters`.
+/// main() of a node class with a constructor (nh, private_nh) and a type `Parameters`.
 template <class Node>
 int runNode(int argc, char** argv, const char* name) {
   if (printsParameters<typename Node::Parameters>(argc, argv)) return 0;
   ros::init(argc, argv, name);
-  // They outlive the node: the last line could not be logged after the last handle has shut ROS down.
+  // The handles outlive the node, since the last handle shuts ROS down and ends the log.
   const ros::NodeHandle nh, private_nh("~");
   try {
     Node node(nh, private_nh);

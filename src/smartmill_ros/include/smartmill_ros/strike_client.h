@@ -9,12 +9,11 @@
 
 namespace smartmill {
 
-/// Asks daq/strike for blows in a thread of its own: a service call blocks, and the streams must go on
-/// meanwhile.
+/// Requests hammer hits from daq/strike in its own thread, since a service call blocks.
 class StrikeClient {
  public:
   struct Answer {
-    enum class Kind { failed, no_hammer, nobody };
+    enum class Kind { failed, no_hammer, no_answer };
     Kind kind;
     std::string message;  ///< one line
   };
@@ -27,7 +26,7 @@ class StrikeClient {
 
   void strike(const std::string& direction);
 
-  /// What went wrong since it was asked for last; a blow that was struck shows in the hammer's samples.
+  /// Fault since the last call; a successful hit is detected in the samples of the hammer.
   std::optional<Answer> takeFault();
 
  private:
@@ -37,7 +36,7 @@ class StrikeClient {
   ros::ServiceClient client_;
   std::thread thread_;
   std::mutex mutex_;
-  bool calling_ = false;  // guarded, as the next
+  bool calling_ = false;  // guarded by mutex_, as fault_
   std::optional<Answer> fault_;
 };
 

@@ -10,7 +10,7 @@
 
 namespace smartmill {
 
-/// A move: axes move and nothing cuts; the spindle may stand still.
+/// A move: axes move and nothing cuts; the spindle may be at rest.
 enum class TestKind { cut, air, tap, move };
 /// As in campaign.yaml.
 const char* testKindName(TestKind kind);
@@ -26,7 +26,8 @@ struct CampaignTest {
   double spindle_speed = 0.0;                   ///< [rad/s]
   std::optional<Engagement> engagement;         ///< of a cut
   std::optional<double> engage_time;            ///< [s] absent: in cut throughout
-  std::optional<double> running_before;   ///< [s] of a cut or air: it ran like this before the record began
+  std::optional<double>
+      running_before;  ///< [s] of a cut or air: time at these conditions before the record began
   std::optional<double> start_time;       ///< [s]
   std::optional<double> cut_time_before;  ///< [s]
   std::string direction;                  ///< of a tap: x, y or z

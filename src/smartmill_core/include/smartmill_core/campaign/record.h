@@ -21,22 +21,22 @@ struct Record {
   const std::vector<double>& column(const std::string& name) const;
   std::vector<double>& add(const std::string& name);
   std::string file;                ///< for messages
-  std::vector<std::string> notes;  ///< what was left unread, one line each
+  std::vector<std::string> notes;  ///< columns not read, one line each
 };
 
 /// Reads a test's record in the campaign's folder, smartmill CSV or Kistler DynoWare export. Columns in any
 /// order.
-/// @throws Error naming file, line and column: missing column, wrong unit, NaN or text for a number, uneven
-/// time, no samples.
+/// @throws Error naming file, line and column: missing column, wrong unit, NaN or text instead of a number,
+/// uneven time, no samples.
 Record readRecord(const Campaign& campaign, const CampaignTest& test);
-/// The same, with the forces turned to those on the tool where the model says that its sensor shows the
-/// reaction.
+/// The same, with the sign of the forces reversed where the model states that its sensor measures the
+/// reaction on the workpiece.
 Record readRecord(const Campaign& campaign, const CampaignTest& test, const MachineModel& model);
 Record readCsv(const std::string& file);
 Record readDynoware(const std::string& file, const std::map<std::string, std::string>& channels);
 
-/// Writes name[unit] columns of formats.md; time with nine significant digits. @param digits significant ones
-/// of the other columns, at most 9. @throws Error.
+/// Writes name[unit] columns of formats.md; time with nine significant digits. @param digits significant
+/// digits of the other columns, at most 9. @throws Error.
 void writeCsv(const Record& record, const std::string& file, int digits = 6);
 
 }  // namespace smartmill

@@ -52,7 +52,7 @@ struct UnevenStep {
   double usual = 0.0;      ///< [s] median of all steps
 };
 
-/// The worst step of a time axis that is not even, the first of those alike, or nothing. Times are printed
+/// The worst step of an unevenly sampled time axis (the first of equal ones), or nothing. Times are printed
 /// with a few digits: a sample may be off the even grid by a quarter of a step; a lost sample moves its
 /// neighbours by half a step or more.
 std::optional<UnevenStep> unevenStep(const std::vector<double>& time);

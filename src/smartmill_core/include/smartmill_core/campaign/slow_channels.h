@@ -9,8 +9,8 @@
 
 namespace smartmill {
 
-/// A channel of one test that was read at a rate of its own, into a file of its own: the load that a
-/// controller tells some ten times a second. An optional key of campaign.yaml (formats.md section 2).
+/// A channel of one test that was sampled at its own rate into its own file, for example the load that a
+/// controller reports about ten times a second. An optional key of campaign.yaml (formats.md section 2).
 struct SlowChannel {
   std::string test;
   std::string channel;  ///< load_meter
@@ -21,15 +21,15 @@ struct SlowChannel {
 /// The key `file` of a map. @throws Error on a file outside the campaign's folder.
 std::string fileInside(const StrictYaml& map);
 
-/// Those that a campaign.yaml names. @param tests that it may speak of. @throws Error as readCampaign().
+/// The slow channels that campaign.yaml lists. @param tests of the campaign. @throws Error as readCampaign().
 std::vector<SlowChannel> readSlowChannels(const StrictYaml& root, const std::vector<CampaignTest>& tests);
-/// The same of a campaign in its folder.
+/// The same for a campaign in its folder.
 std::vector<SlowChannel> readSlowChannels(const Campaign& campaign);
 
-/// Readings of one. @throws Error as readRecord().
+/// Samples of one slow channel. @throws Error as readRecord().
 Record readRecord(const Campaign& campaign, const SlowChannel& channel);
 
-/// Writes FOLDER/campaign.yaml with them. @throws Error.
+/// Writes FOLDER/campaign.yaml with slow channels. @throws Error.
 void writeCampaign(const Campaign& campaign, const std::vector<SlowChannel>& slow, const std::string& folder);
 
 }  // namespace smartmill

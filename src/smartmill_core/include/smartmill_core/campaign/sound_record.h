@@ -9,7 +9,7 @@
 namespace smartmill {
 
 /// Channels of a sound file as a record: names as in formats.md, scaled to SI units. @throws Error naming the
-/// file: a channel that it has not, a name that is no column of a record or stands twice.
+/// file: a missing channel, a name that is not a column of a record, a repeated name.
 Record readSoundRecord(const std::string& file, const std::vector<SoundChannel>& channels);
 
 }  // namespace smartmill

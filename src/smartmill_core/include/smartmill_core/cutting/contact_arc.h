@@ -9,7 +9,7 @@
 
 namespace smartmill {
 
-/// A stretch of immersion angles at which the teeth meet material, over a height of the tool.
+/// An interval of immersion angles at which the teeth meet material, over a height of the tool.
 struct ContactArc {
   double entry = 0.0;  ///< [rad] 0..2 pi, clockwise from +y of the machine
   double exit = 0.0;   ///< [rad] > entry, <= 2 pi
@@ -19,17 +19,17 @@ struct ContactArc {
 /// @throws Error on an arc outside 0..2 pi or without height.
 void validate(const ContactArc& arc);
 
-/// What of a tooth's edge stands in an arc.
+/// Segment of a tooth's edge inside an arc.
 struct EdgeSegment {
   int tooth;
   double from, to;  ///< [rad] immersion angles that it covers
-  double height;    ///< [m/rad]; of a straight edge, which stands at `to`, [m]
+  double height;    ///< [m/rad]; of a straight edge, which is at `to`, [m]
   bool straight;
 };
 
 constexpr double LEAST_LAG = 1e-6;  ///< [rad] over the depth; below it the edge is straight
 
-/// @param lag [rad/m] of the edge with height @param tooth_angle [rad] of each tooth against the first
+/// @param lag [rad/m] of the edge with height @param tooth_angle [rad] of each tooth relative to the first
 /// @param angle [rad] of the first tooth at its tip
 template <class Visit>
 void forEachEdgeSegment(const std::vector<ContactArc>& arcs, double lag,
@@ -39,7 +39,7 @@ void forEachEdgeSegment(const std::vector<ContactArc>& arcs, double lag,
     const bool straight = spread < LEAST_LAG;
     const double height = straight ? arc.depth : 1.0 / lag;
     for (std::size_t j = 0; j < tooth_angle.size(); ++j) {
-      // The edge covers low..tip; a whole turn back it may reach into the arc again.
+      // The edge covers low..tip; one revolution earlier it may reach into the arc again.
       double tip = wrapped(angle + tooth_angle[j]);
       for (double low = tip - spread;; tip += units::TWO_PI, low += units::TWO_PI) {
         const double from = std::max(low, arc.entry), to = std::min(tip, arc.exit);

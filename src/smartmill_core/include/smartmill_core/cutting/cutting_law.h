@@ -8,8 +8,7 @@
 
 namespace smartmill {
 
-/// A course of the effective chip that no law gives: straight between its nodes, from nothing at no chip, and
-/// straight on behind the last one.
+/// Tabulated effective chip: piecewise linear from zero, extrapolated beyond the last node.
 struct EffectiveChipCurve {
   std::vector<double> chip;       ///< [m] > 0, rising; two or more
   std::vector<double> effective;  ///< [m] of each, rising
@@ -22,7 +21,7 @@ struct EffectiveChipCurve {
   }
 };
 
-/// How a chip turns into force. Per metre of edge and in the frame of the edge:
+/// Force of a chip, per metre of edge and in the frame of the edge:
 ///
 ///     Ft = chip_factor ktc h' + edge_factor kte e + 0.3 d      Fr = chip_factor krc h' + edge_factor kre e +
 ///     d Fa = chip_factor kac h' + edge_factor kae e
@@ -32,23 +31,24 @@ struct EffectiveChipCurve {
 /// effects.md).
 struct CuttingLaw {
   CuttingCoefficients coefficients;
-  double chip_factor = 1.0;                    ///< [1] on ktc, krc, kac
-  double edge_factor = 1.0;                    ///< [1] on kte, kre, kae
-  double edge_chip = 0.0;                      ///< [m] over which the edge terms come; 0: there at once
-  double size_exponent = 0.0;                  ///< [1]
-  double size_reference = 1e-4;                ///< [m]
-  const EffectiveChipCurve* course = nullptr;  ///< of another; none: h itself
-  double damping = 0.0;                        ///< [N/m]
-  double damping_radial = 1.0;  ///< [1] share of d across the tool; below 1 where the edge leans (corner.h)
-  double damping_axial = 0.0;   ///< [1] share of d along it
+  double chip_factor = 1.0;                        ///< [1] on ktc, krc, kac
+  double edge_factor = 1.0;                        ///< [1] on kte, kre, kae
+  double edge_chip = 0.0;                          ///< [m] over which the edge terms build up; 0: at once
+  double size_exponent = 0.0;                      ///< [1]
+  double size_reference = 1e-4;                    ///< [m]
+  const EffectiveChipCurve* chip_curve = nullptr;  ///< not owned; nullptr: h itself
+  double damping = 0.0;                            ///< [N/m]
+  double damping_radial =
+      1.0;  ///< [1] share of d across the tool; below 1 where the edge is inclined (corner.h)
+  double damping_axial = 0.0;  ///< [1] share of d along the tool
 };
 
-/// [1] Tangential over radial force of process damping.
+/// [1] Ratio of tangential to radial force of process damping.
 inline constexpr double TANGENTIAL_DAMPING = 0.3;
 
 /// [m] h' of a chip h > 0.
 inline double effectiveChip(const CuttingLaw& law, double chip) {
-  const double h = law.course ? law.course->at(chip) : chip;
+  const double h = law.chip_curve ? law.chip_curve->at(chip) : chip;
   return law.size_exponent == 0.0 ? h : h * std::pow(chip / law.size_reference, -law.size_exponent);
 }
 
@@ -57,7 +57,7 @@ inline double edgeShare(const CuttingLaw& law, double chip) {
   return law.edge_chip > 0.0 ? -std::expm1(-chip / law.edge_chip) : 1.0;
 }
 
-/// Of the frame of the machine: x, y, axial and tangential [N/m of edge].
+/// Force in the frame of the machine: x, y, axial and tangential [N/m of edge].
 struct EdgeForce {
   double fx = 0.0, fy = 0.0, fz = 0.0, ft = 0.0;
 

@@ -6,28 +6,29 @@
 
 namespace smartmill {
 
-/// Cubic B-splines over even breaks from 0 to top, the ends' knots threefold: pieces + 3 of them.
-/// @return the values of the four that are not 0 at x (0..top), the first's number in `first`
+/// Cubic B-splines over even breaks from 0 to top with triple knots at the ends: pieces + 3 of them.
+/// @return the values of the four splines that are nonzero at x (0..top); `first` is the index of the first
+/// of them
 std::array<double, 4> cubicSplines(double x, double top, int pieces, int& first);
 
-/// Force per depth of cut over chip thickness as a monotone spline: cubic, its coefficients never fall
-/// (Bachrathy and Stepan section 4 draw it point by point, for one tooth in cut).
+/// Force per depth of cut over chip thickness as a monotone cubic spline: its coefficients never decrease
+/// (Bachrathy and Stepan, section 4, determine it point by point with one tooth in the cut).
 struct ForceCurve {
-  std::vector<double> knots;        ///< [m] breaks, even, from 0 to the thickest chip
-  std::vector<double> value;        ///< [N/m] coefficients, rising; as many as breaks and two
+  std::vector<double> knots;        ///< [m] evenly spaced breaks from 0 to the thickest chip
+  std::vector<double> value;        ///< [N/m] coefficients, rising; two more than breaks
   std::vector<double> std_dev;      ///< [N/m] of the curve at the breaks
-  double at(double chip) const;     ///< [N/m]; 0 without chip, straight on beyond the last break
+  double at(double chip) const;     ///< [N/m]; 0 at zero chip, linear beyond the last break
   double slope(double chip) const;  ///< [N/m2]
   double stdAt(double chip) const;  ///< [N/m]
 };
 
 struct ForceCurves {
   ForceCurve tangential, radial;
-  double rms = 0.0;      ///< [N] of what is left in fx, fy
-  double scatter = 0.0;  ///< [1] of one cut's force against another's as a whole; not in the file
+  double rms = 0.0;      ///< [N] of the residual in fx, fy
+  double scatter = 0.0;  ///< [1] scatter of the force as a whole from cut to cut; not in the file
 };
 
-/// Curves with where they come from (topic material/force_curve).
+/// Force curves with their origin (topic material/force_curve).
 struct IdentifiedForceCurves {
   double stamp = 0.0;  ///< [s] end of the last cut used
   std::string tool, material;
@@ -38,7 +39,7 @@ struct IdentifiedForceCurves {
 
 /// YAML, format smartmill-force-curve/1. @throws Error.
 void writeForceCurves(const ForceCurves& curves, const std::string& file);
-/// @throws Error naming file and key: what is missing, falls, or does not fit together.
+/// @throws Error naming file and key: missing key, decreasing values, inconsistent sizes.
 ForceCurves readForceCurves(const std::string& file);
 
 }  // namespace smartmill

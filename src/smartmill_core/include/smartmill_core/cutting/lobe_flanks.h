@@ -10,8 +10,9 @@
 
 namespace smartmill {
 
-/// [rad/s] How far a cut's speed may fall and rise before its depth reaches the limit, by straight lines
-/// between the chart's speeds; to the chart's end where it never does; 0 of a cut above the limit.
+/// [rad/s] How far a cut's speed may fall and rise before its depth reaches the limit, with linear
+/// interpolation between the chart's speeds. Up to the end of the chart where the limit is not reached; 0 for
+/// a cut above the limit.
 inline std::array<double, 2> lobeFlanks(const StabilityLimit& limit, double speed, double depth) {
   const std::vector<double>&s = limit.spindle_speed, &d = limit.depth;
   if (s.empty() || speed < s.front() || speed > s.back()) return {{0.0, 0.0}};

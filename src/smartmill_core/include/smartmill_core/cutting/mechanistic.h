@@ -22,18 +22,19 @@ struct CuttingForce {
 /// Direction of the elementary forces (formats.md): Fx = -Ft cos - Fr sin, Fy = +Ft sin - Fr cos, Fz = +Fa.
 CuttingForce toolForce(double ft, double fr, double fa, double immersion_angle, double radius);
 
-/// Force of a rigid tool without runout at a spindle angle: chip thickness c sin(phi), integrated along the
-/// helix in closed form between the exact entry and exit of each tooth (Dunwoody eq. 3.13..3.15, 5.64..5.67).
+/// Force of a rigid tool without runout over the spindle angle: chip thickness c sin(phi), integrated along
+/// the helix in closed form between the exact entry and exit of each tooth (Dunwoody eq. 3.13..3.15,
+/// 5.64..5.67).
 class MechanisticForce {
  public:
-  /// @throws Error on an impossible tool, engagement or coefficient, naming it.
+  /// @throws Error naming an invalid tool, engagement or coefficient.
   MechanisticForce(const ToolGeometry& tool, const CuttingCoefficients& coefficients,
                    const Engagement& engagement);
 
   /// @param spindle_angle [rad] immersion angle of tooth 1 at its tip.
   CuttingForce at(double spindle_angle) const;
 
-  /// Mean over a revolution, closed form; independent of the helix.
+  /// Mean over a revolution in closed form; independent of the helix.
   CuttingForce mean() const;
 
  private:
@@ -46,8 +47,9 @@ class MechanisticForce {
 void validate(const ToolGeometry& tool);
 void validate(const Engagement& engagement);
 
-/// Linear map of the six coefficients (ktc, krc, kac, kte, kre, kae) to the mean force over a revolution:
-/// row 0..2 fx, fy, fz [N], row 3 torque [N m]. Even pitch or uneven: each tooth's feed is its pitch's share.
+/// Linear map of the six coefficients (ktc, krc, kac, kte, kre, kae) to the mean force over a revolution: row
+/// 0..2 fx, fy, fz [N], row 3 torque [N m]. With uneven pitch the feed of each tooth is in proportion to its
+/// pitch.
 std::array<std::array<double, 6>, 4> meanForceMatrix(const ToolGeometry& tool, const Engagement& engagement);
 
 }  // namespace smartmill

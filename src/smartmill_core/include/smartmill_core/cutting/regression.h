@@ -8,7 +8,7 @@
 
 namespace smartmill {
 
-/// One cut's means for the identification of coefficients.
+/// Mean forces of one cut, for the identification of coefficients.
 struct MeanForceTest {
   ToolGeometry tool;
   Engagement engagement;
@@ -25,9 +25,8 @@ struct IdentifiedCoefficients {
 };
 
 /// Mean-force regression over tests of at least two feeds (all three forces together).
-/// Unweighted when every std is zero: then the standard deviations come from the residuals of each axis'
-/// share.
-/// @throws Error with too few feeds or a rank-deficient plan, naming what is missing.
+/// Unweighted when every std is zero: then the standard deviations follow from the residuals of each axis.
+/// @throws Error with too few feeds or a rank-deficient plan.
 IdentifiedCoefficients identifyFromForces(const std::vector<MeanForceTest>& tests);
 
 }  // namespace smartmill

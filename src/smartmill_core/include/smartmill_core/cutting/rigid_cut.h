@@ -13,38 +13,38 @@
 
 namespace smartmill {
 
-/// What of the edges is in contact, sums over them that no coefficient nor factor of the law enters: the
-/// force is linear in both. With h' and e of CuttingLaw at immersion angles phi:
+/// Sums over the edges in contact. They do not depend on the coefficients and factors of the law, in which
+/// the force is linear. With h' and e of CuttingLaw at immersion angles phi:
 struct EdgeSums {
   double chip_sine = 0.0, chip_cosine = 0.0, chip = 0.0;  ///< [m2] of h' sin(phi), h' cos(phi), h'
   double edge_sine = 0.0, edge_cosine = 0.0, edge = 0.0;  ///< [m] of e sin(phi), e cos(phi), e
 };
 
-/// Milling with a tool that does not vibrate, at steady speed and feed, from tables over a revolution: each
-/// tooth's chips by ChipRule (runout, uneven pitch), their elementary forces integrated over the immersion
-/// angle once; the force of an edge is the difference of the integral between its ends in the arc
+/// Force of a tool that does not vibrate at steady speed and feed, from tables over a revolution. The chip of
+/// each tooth follows ChipRule (runout, uneven pitch); its elementary forces are integrated over the
+/// immersion angle once. The force of an edge is the difference of this integral between its ends in the arc
 /// (eq. 3.13..3.15 with any chip).
 class RigidCut {
  public:
   /// @param radius_offset [m] of each tooth (runout), empty: none. @param path_share [1] see ChipRule.
-  /// @throws Error on an impossible tool.
+  /// @throws Error on an invalid tool.
   RigidCut(const ToolGeometry& tool, const CuttingLaw& law, std::vector<double> radius_offset = {},
            double path_share = 0.0);
-  /// One arc, fed along x. @throws Error on an impossible engagement too.
+  /// One arc, feed along x. @throws Error also on an invalid engagement.
   RigidCut(const ToolGeometry& tool, const CuttingLaw& law, const Engagement& engagement,
            std::vector<double> radius_offset = {});
 
-  /// @param feed [m/rad] of the spindle, x and y. @throws Error on an impossible arc.
+  /// @param feed [m/rad] of the spindle, x and y. @throws Error on an invalid arc.
   void engage(const std::vector<ContactArc>& arcs, const std::array<double, 2>& feed);
   const std::vector<ContactArc>& arcs() const { return arcs_; }
   void setDepths(const std::vector<double>& depths);
 
-  /// Coefficients and factors act at once; how chips turn into h' and e makes new tables.
+  /// New coefficients and factors only scale the tables; parameters of h' and e rebuild them.
   void setLaw(const CuttingLaw& law);
 
-  /// Force on the tool when tooth 1 stands at an angle [rad].
+  /// Force on the tool with tooth 1 at an angle [rad].
   CuttingForce at(double angle) { return force(sumsAt(angle)); }
-  /// The same in two steps.
+  /// at() in two steps.
   EdgeSums sumsAt(double angle);
   CuttingForce force(const EdgeSums& sums) const {
     const CuttingCoefficients& k = law_.coefficients;
@@ -56,11 +56,12 @@ class RigidCut {
   }
   /// Chip of a tooth at an immersion angle [m], <= 0: no contact.
   double chip(int tooth, double phi) const;
-  /// What the chip coefficients and what the edge coefficients give alone, the factors of the law left out.
-  /// Without tables: quicker for less than some thousand angles, and to the digit where an edge force begins.
-  std::array<CuttingForce, 2> partsAt(double angle) const;
+  /// Forces of the chip coefficients and of the edge coefficients alone, without the factors of the law.
+  /// Integrates without tables: faster for fewer than a few thousand angles, and exact where an edge force
+  /// begins.
+  std::array<CuttingForce, 2> termsAt(double angle) const;
   /// The mean of these over a revolution.
-  std::array<CuttingForce, 2> meanParts() const;
+  std::array<CuttingForce, 2> meanTerms() const;
 
  private:
   void shape();
@@ -76,7 +77,7 @@ class RigidCut {
     return {-tangential * cosine - radial * sine, tangential * sine - radial * cosine, axial * plain,
             tangential * plain * tool_.radius()};
   }
-  std::array<CuttingForce, 2> parts(const EdgeSums& sums) const;
+  std::array<CuttingForce, 2> terms(const EdgeSums& sums) const;
   std::size_t tableOf(int tooth) const { return rule_.alike() ? 0 : static_cast<std::size_t>(tooth); }
 
   ToolGeometry tool_;
@@ -84,10 +85,11 @@ class RigidCut {
   CuttingLaw law_;
   double lag_, path_share_;
   std::vector<ContactArc> arcs_;
-  std::array<double, 2> feed_{{0, 0}};          // [m/rad]
-  std::vector<std::vector<ChipShape>> shapes_;  // what a tooth may meet; one entry when all teeth are alike
-  std::vector<std::vector<EdgeSums>> tables_;   // the same: integrals from 0 to each node, over the height of
-                                                // edge a radian, when needed
+  std::array<double, 2> feed_{{0, 0}};  // [m/rad]
+  std::vector<std::vector<ChipShape>>
+      shapes_;  // surfaces that a tooth may meet; one entry when all teeth are alike
+  std::vector<std::vector<EdgeSums>> tables_;  // in the same order: integrals from 0 to each node per height
+                                               // of edge in a radian, built when needed
 };
 
 }  // namespace smartmill

@@ -14,7 +14,7 @@ struct ToolGeometry {
   double radius() const { return 0.5 * diameter; }  ///< [m]
   /// [rad] pitch from tooth k to tooth k+1.
   double pitchOf(int k) const;
-  /// [rad] position of tooth k against tooth 0: the sum of the pitches before it.
+  /// [rad] position of tooth k relative to tooth 0: the sum of the pitches before it.
   double toothAngle(int k) const;
   /// [rad/m] lag of the edge with height above the tip: tan(helix) / R.
   double lag() const;

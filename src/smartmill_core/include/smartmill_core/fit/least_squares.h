@@ -13,29 +13,29 @@ namespace smartmill::fit {
 struct Parameter {
   double start = 0.0;
   double low = -std::numeric_limits<double>::infinity();
-  double high = std::numeric_limits<double>::infinity();  ///< equal to low: held at start
-  double scale = 1.0;  ///< > 0, typical size: the solver sees the unknown in units of it
+  double high = std::numeric_limits<double>::infinity();  ///< equal to low: fixed at start
+  double scale = 1.0;  ///< > 0, typical size; the solver works in units of it
 };
 
-/// What shall become small: residuals over unknowns.
+/// Residuals to be minimised, as a function of the unknowns.
 class Residuals {
  public:
   virtual ~Residuals() = default;
 
-  /// How many residuals there are.
+  /// Number of residuals.
   virtual Eigen::Index count() const = 0;
 
   /// @param residual has count() rows. @param jacobian nullptr, or count() x unknowns of zeros to fill with
-  /// the derivatives (rows: residuals). @return false: nothing can be said of this point, a step to it is not
-  /// taken
+  /// the derivatives (rows: residuals). @return false: the residuals are undefined here, and a step to this
+  /// point is rejected
   virtual bool evaluate(const Eigen::VectorXd& at, Eigen::VectorXd* residual,
                         Eigen::MatrixXd* jacobian) const = 0;
 
-  /// false: evaluate() is never asked for derivatives; central differences take their place.
+  /// false: evaluate() is called without a Jacobian, and central differences are used.
   virtual bool hasJacobian() const { return true; }
 };
 
-/// Residuals without derivatives: the function fills the vector it is given.
+/// Residuals without derivatives: the function fills the given vector.
 class FunctionResiduals : public Residuals {
  public:
   using Function = std::function<void(const Eigen::VectorXd& at, Eigen::VectorXd& residual)>;
@@ -53,24 +53,24 @@ class FunctionResiduals : public Residuals {
 
 struct Progress {
   int iteration = 0;
-  double squares = 0.0;  ///< sum of squared residuals now
+  double squares = 0.0;  ///< present sum of squared residuals
 };
 
 struct Options {
-  std::string name = "fit";  ///< begins the messages
+  std::string name = "fit";  ///< prefix of messages
   int iterations = 200;
-  double function_tolerance = 1e-11;   ///< relative change of the squares that ends it
+  double function_tolerance = 1e-11;   ///< relative change of the sum of squares that ends the fit
   double parameter_tolerance = 1e-12;  ///< relative
   double gradient_tolerance = 1e-10;   ///< in units of the scales
-  double trust_radius = 1e4;           ///< of the first step: the larger, the less it is damped
-  /// QR of the Jacobian in place of normal equations: slower, sees twice the digits.
+  double trust_radius = 1e4;           ///< of the first step: a larger radius damps less
+  /// QR of the Jacobian instead of normal equations: slower, with twice the digits.
   bool orthogonal = false;
-  /// Derivatives cost much beside residuals: between bounds a step that does not hold what it promised is
-  /// shortened from residuals alone.
-  bool dear_derivatives = false;
-  /// A second run without the unknowns that press against a bound, beside which Ceres ends early.
+  /// Derivatives cost much more than residuals: with bounds, a step that does not reach its predicted
+  /// decrease is shortened by evaluating residuals only.
+  bool costly_derivatives = false;
+  /// A second run without the unknowns that are pushed against a bound, where Ceres ends early.
   bool finish_at_bounds = true;
-  /// Called after every iteration. @return false to end with the best point so far
+  /// Called after every iteration. @return false to stop at the best point so far
   std::function<bool(const Progress&)> progress;
 };
 
@@ -80,8 +80,8 @@ enum class Ending { converged, iterations_used, cancelled, failed };
 struct Covariance {
   Eigen::MatrixXd matrix;
   Eigen::Index rank = 0;  ///< of J
-  /// Unknowns that the residuals do not tell, alone or apart from others: infinite on the diagonal, 0 beside
-  /// it.
+  /// Unknowns that the residuals do not determine, alone or separately from others: infinite on the diagonal,
+  /// 0 off it.
   std::vector<bool> undetermined;
 
   bool complete() const { return rank == matrix.cols(); }
@@ -89,35 +89,35 @@ struct Covariance {
 };
 
 /// Columns of any size; directions with less than `tolerance` of the largest singular value of the unit
-/// columns count as not told. A column of zeros is not told either.
+/// columns count as undetermined, as does a column of zeros.
 Covariance covarianceOf(const Eigen::MatrixXd& jacobian, double tolerance = 1e-10);
 
-/// Covariance of map x where x has the covariance given; an infinite variance passes only where the map asks
-/// for it.
+/// Covariance of map x, given the covariance of x; an infinite variance propagates only where its coefficient
+/// is nonzero.
 Eigen::MatrixXd propagated(const Eigen::MatrixXd& map, const Eigen::MatrixXd& covariance);
 
 struct Result {
   Eigen::VectorXd value;
   Eigen::VectorXd residual;  ///< at value
-  Eigen::MatrixXd jacobian;  ///< at value; zero columns where an unknown is held or stands at a bound
-  std::vector<bool> moves;   ///< per unknown: neither held nor at a bound
+  Eigen::MatrixXd jacobian;  ///< at value; zero columns where an unknown is fixed or at a bound
+  std::vector<bool> moves;   ///< per unknown: neither fixed nor at a bound
   double squares = 0.0;      ///< sum of squared residuals
   Ending ending = Ending::failed;
   int iterations = 0;
   std::string message;  ///< one line: how it ended
 
-  /// The value is the best point found: not after Ending::failed.
+  /// Whether value is the best point found; false after Ending::failed.
   bool usable() const { return ending != Ending::failed; }
 
-  /// Held unknowns and those at a bound count as known: variance 0, `undetermined` false; the others as
+  /// Fixed unknowns and those at a bound count as known: variance 0, `undetermined` false. The others as in
   /// covarianceOf().
   Covariance covariance() const;
 };
 
-/// Least squares within bounds by Ceres' Levenberg-Marquardt method, silent and in this thread. The start is
-/// moved into the bounds. Points where a residual is not finite are refused like those where evaluate() says
-/// false.
-/// @throws Error in one line when the start is such a point; what evaluate() throws.
+/// Least squares within bounds by Ceres' Levenberg-Marquardt method, without output and in the calling
+/// thread. The start is clamped to the bounds. Points with a residual that is not finite are rejected, like
+/// those where evaluate() returns false.
+/// @throws Error of one line when the start is such a point; passes on exceptions of evaluate().
 Result minimise(const Residuals& residuals, const std::vector<Parameter>& parameters,
                 const Options& options = {});
 

@@ -9,7 +9,7 @@
 namespace smartmill {
 
 /// Rows of a text table, cell by cell. Cells are trimmed; a cell in double quotes may hold separators, line
-/// breaks and doubled quotes. Every fault is one line "FILE: line N: what".
+/// breaks and doubled quotes. Every error is one line "FILE: line N: what".
 class CsvReader {
  public:
   /// @throws Error when the file cannot be read.
@@ -19,7 +19,7 @@ class CsvReader {
   /// at the end
   bool next(std::vector<std::string_view>* cells);
 
-  /// The same, blank lines skipped.
+  /// The same, skipping blank lines.
   bool nextFilled(std::vector<std::string_view>* cells);
 
   /// The next line as it is, without its end. @return false at the end
@@ -27,10 +27,10 @@ class CsvReader {
 
   void setSeparator(char separator) { separator_ = separator; }
 
-  /// Nothing but blank lines is left.
+  /// Whether only blank lines remain.
   bool restIsBlank() const;
 
-  /// Of the line that next() read last, from 1.
+  /// Number of the line that next() read last, from 1.
   int line() const { return number_; }
   const std::string& file() const { return file_; }
 
@@ -51,7 +51,7 @@ class CsvReader {
 
 bool isBlank(const std::vector<std::string_view>& cells);
 
-/// Columns of numbers under a row of names, name or name[unit].
+/// Columns of numbers below a header of names, name or name[unit].
 struct NumberTable {
   std::string file;
   std::vector<std::string> names;            ///< as in the file
@@ -62,19 +62,19 @@ struct NumberTable {
   const std::vector<double>& column(const std::string& name) const;
 };
 
-/// Every column holds numbers or nothing. @throws Error naming file, line and column.
+/// Every cell is a number or empty. @throws Error naming file, line and column.
 NumberTable readNumberTable(const std::string& file);
 
-/// Columns in the order asked for, named exactly so in the file, a number in every row; other columns may
-/// hold anything.
-/// @throws Error naming file, line and column: missing column, no number, no rows.
-std::vector<std::vector<double>> readColumns(const std::string& file, const std::vector<std::string>& due);
+/// The named columns in the given order, with the exact names of the file and a number in every row. Other
+/// columns may contain anything.
+/// @throws Error naming file, line and column: missing column, not a number, no rows.
+std::vector<std::vector<double>> readColumns(const std::string& file, const std::vector<std::string>& names);
 
-/// Writes a table row by row; numbers that are not finite leave their cell empty, words are quoted where they
-/// must be.
+/// Writes a table row by row; numbers that are not finite give an empty cell, words are quoted where
+/// necessary.
 class CsvWriter {
  public:
-  /// @param digits significant ones of a number
+  /// @param digits significant digits of a number
   explicit CsvWriter(const std::string& header, int digits = 9);
 
   template <typename... Cells>
@@ -88,7 +88,7 @@ class CsvWriter {
   CsvWriter& cell(const std::string& word);
   CsvWriter& cell(const char* word) { return cell(std::string(word)); }
   void endRow();
-  /// A blank line: parts curves for gnuplot.
+  /// A blank line, which separates curves for gnuplot.
   void gap();
 
   const std::string& text() const { return text_; }
@@ -103,7 +103,7 @@ class CsvWriter {
   bool begun_ = false;
 };
 
-/// A word as a cell: quoted where it holds a comma, a quote or a line break.
+/// A word as a cell: quoted where it contains a comma, a quote or a line break.
 std::string csvCell(const std::string& word);
 
 }  // namespace smartmill

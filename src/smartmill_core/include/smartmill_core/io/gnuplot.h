@@ -6,10 +6,10 @@
 
 namespace smartmill {
 
-/// One PNG picture drawn by gnuplot: commands are streamed in, data stand inline as named blocks or in files.
+/// One PNG picture drawn by gnuplot: commands are streamed in, data are inline named blocks or files.
 class Gnuplot {
  public:
-  /// @param size of the picture [pixel]. @param font size [points]; texts are shown as they are (noenhanced).
+  /// @param size of the picture [pixel]. @param font size [points]; texts are printed literally (noenhanced).
   Gnuplot(std::string png, int width, int height, int font = 11);
 
   template <typename T>
@@ -18,10 +18,10 @@ class Gnuplot {
     return *this;
   }
 
-  /// Data block $name: one line a row, what is not finite interrupts a line.
+  /// Data block $name: one line per row; a value that is not finite interrupts a line.
   void block(const std::string& name, const std::vector<std::vector<double>>& rows);
 
-  /// Runs gnuplot. @throws Error "PNG: gnuplot: what it complains of", "gnuplot cannot be started".
+  /// Runs gnuplot. @throws Error "PNG: gnuplot: MESSAGE" or "gnuplot cannot be started".
   void draw() const;
 
   /// A text or file name between gnuplot's single quotes.

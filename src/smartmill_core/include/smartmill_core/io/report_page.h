@@ -5,22 +5,22 @@
 
 namespace smartmill {
 
-/// Text as it stands in HTML.
+/// Text escaped for HTML.
 std::string escapedHtml(const std::string& text);
 
-/// A report as one HTML file that needs no server and no other file: every report of the project has this
-/// look (the panel's colours, dark or light), tables that sort by the head that is touched, and pictures that
-/// open large, zoom with wheel or fingers and move when dragged.
+/// A report as one self-contained HTML file. All reports of the project share its style (the panel's colours,
+/// dark or light), tables that sort by a click on a column head, and pictures that open large, zoom with
+/// wheel or fingers and pan when dragged.
 class ReportPage {
  public:
   explicit ReportPage(const std::string& title);
 
-  /// For what the calls below do not know: HTML.
+  /// Direct HTML output, for content without a method below.
   std::ostream& html() { return body_; }
-  /// A picture, embedded. @throws Error when it cannot be read
+  /// Embeds a picture. @throws Error when it cannot be read
   void picture(const std::string& file, const std::string& caption);
-  /// Of Markdown what the project's reports use: headings, paragraphs, tables, lists, pictures (from a
-  /// folder), **bold** and `code`. A title of the first level is the page's own.
+  /// The subset of Markdown that the project's reports use: headings, paragraphs, tables, lists, pictures
+  /// (from a folder), **bold** and `code`. A first-level title replaces the title of the page.
   void markdown(const std::string& text, const std::string& folder);
 
   std::string text() const;

@@ -4,9 +4,8 @@
 
 namespace smartmill::linear {
 
-/// Decompositions of dynamic matrices, compiled once: each costs a file that includes Eigen's own 10 to 50 s.
-/// All @throw nothing; what a matrix does not tell shows as numbers that are not finite, unless said
-/// otherwise.
+/// Decompositions of dynamic matrices, compiled once: each costs a file that includes Eigen's 10 to 50 s.
+/// They do not throw unless stated; a singular matrix gives numbers that are not finite.
 
 /// x of a x = b by LU with partial pivoting: a square and regular.
 Eigen::VectorXd solve(const Eigen::MatrixXd& a, const Eigen::VectorXd& b);
@@ -16,8 +15,8 @@ Eigen::MatrixXcd solve(const Eigen::MatrixXcd& a, const Eigen::MatrixXcd& b);
 Eigen::MatrixXd inverse(const Eigen::MatrixXd& a);
 Eigen::MatrixXcd inverse(const Eigen::MatrixXcd& a);
 
-/// x of a x = b by Cholesky's L D L': a symmetric (Hermitian) and not negative; only its lower triangle is
-/// read.
+/// x of a x = b by Cholesky's L D L': a symmetric (Hermitian) and positive semidefinite; only its lower
+/// triangle is read.
 Eigen::VectorXd solveSymmetric(const Eigen::MatrixXd& a, const Eigen::VectorXd& b);
 Eigen::MatrixXd solveSymmetric(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
 Eigen::VectorXcd solveSymmetric(const Eigen::MatrixXcd& a, const Eigen::VectorXcd& b);
@@ -25,8 +24,8 @@ Eigen::MatrixXcd solveSymmetric(const Eigen::MatrixXcd& a, const Eigen::MatrixXc
 Eigen::MatrixXd inverseSymmetric(const Eigen::MatrixXd& a);
 Eigen::MatrixXcd inverseSymmetric(const Eigen::MatrixXcd& a);
 
-/// R with a = R' R for a symmetric matrix that is not negative: sqrt(D) L' with its columns in a's order, and
-/// the permuted solution of R' y = b. Zero pivots give zero rows of R and zero in y.
+/// R with a = R' R for a symmetric positive semidefinite matrix: sqrt(D) L' with its columns in a's order,
+/// and the permuted solution of R' y = b. Zero pivots give zero rows of R and zero in y.
 struct SymmetricRoot {
   Eigen::MatrixXd root;
   Eigen::VectorXd along;
@@ -40,14 +39,14 @@ struct LeastSquares {
 };
 LeastSquares leastSquares(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
 
-/// The least x among those with the least a x - b (the pseudo-inverse of a times b), by complete orthogonal
-/// decomposition.
+/// The x of minimum norm among those that minimise |a x - b| (the pseudo-inverse of a times b), by complete
+/// orthogonal decomposition.
 Eigen::VectorXd leastNorm(const Eigen::MatrixXd& a, const Eigen::VectorXd& b);
 
 /// R of a = Q R: upper triangle, as many rows as a has columns (a has at least as many rows).
 Eigen::MatrixXd triangleOf(const Eigen::MatrixXd& a);
 
-/// Largest first.
+/// Singular values, largest first.
 Eigen::VectorXd singularValues(const Eigen::MatrixXd& a);
 Eigen::VectorXd singularValues(const Eigen::MatrixXcd& a);
 
@@ -62,7 +61,7 @@ Svd svd(const Eigen::MatrixXd& a, bool full_v = false);
 Eigen::VectorXcd eigenvalues(const Eigen::MatrixXd& a);
 Eigen::VectorXcd eigenvalues(const Eigen::MatrixXcd& a);
 
-/// a v = v diag(values). @throws Error when the iteration does not end.
+/// a v = v diag(values). @throws Error when the iteration does not converge.
 struct Eigensystem {
   Eigen::VectorXcd values;
   Eigen::MatrixXcd vectors;

@@ -4,8 +4,8 @@
 
 namespace smartmill {
 
-/// What every measurement by hammer blows is told: how a hit is recorded, and where its FRF is fitted. Who
-/// measures has defaults of its own.
+/// Parameters that all hammer measurements share: how a hit is recorded, and where its FRF is fitted. Each
+/// measurement has its own defaults.
 struct HitTestParameters {
   double trigger_force = 10.0;
   double weak_force = 20.0;
@@ -23,7 +23,7 @@ struct HitTestParameters {
 
   void declareHits(ParameterTable& table);
   void declareFit(ParameterTable& table);
-  /// What bounds alone do not say. @throws Error naming key and value.
+  /// Conditions between the values. @throws Error naming key and value.
   void validateHitTest() const;
 };
 

@@ -10,46 +10,47 @@
 
 namespace smartmill {
 
-/// Which average: H1 = S_fx / S_ff (Dunwoody eq. 4.26, noise of the force pulls it down), H2 = S_xx / S_fx*
-/// (eq. 4.27, noise of the response pulls it up), Hv between them: sqrt(|H1 H2|) with their phase.
+/// FRF estimator: H1 = S_fx / S_ff (Dunwoody eq. 4.26, biased low by noise of the force), H2 = S_xx / S_fx*
+/// (eq. 4.27, biased high by noise of the response), Hv between them: sqrt(|H1 H2|) with their phase.
 enum class FrfAverage { h1, h2, hv };
 
-/// Noise of a sample where a structure may still ring: its scatter, or, where that is less, what sixth
-/// differences leave, in which a slow ringing does not show.
+/// Noise of a sample where a structure may still ring: the smaller of its scatter and the noise from sixth
+/// differences, which suppress slow ringing.
 double noiseUnderRinging(const std::vector<double>& values);
 
-/// How hits become an FRF.
+/// Options of the FRF estimate.
 struct ImpactOptions {
   bool window_force = true;  ///< Dunwoody eq. 4.17..4.19
   double exponential_time =
       0.0;                      ///< [s] time constant of an exponential window on force and response; 0: none
   double response_scale = 1.0;  ///< [unit of FRF x N / unit of the response] e.g. -sensitivity
-  /// [V] gain of a sensor V = gain (gap0 / gap - 1): bends the response straight, v / (1 + v / (gain + V
-  /// before)), so that a strong mode's second harmonic does not show as another mode; response_scale is then
-  /// the slope at rest. 0: linear.
+  /// [V] gain of a sensor V = gain (gap0 / gap - 1): linearises the response, v / (1 + v / (gain + V
+  /// before)), so that the second harmonic of a strong mode does not appear as another mode; response_scale
+  /// is then the slope at rest. 0: linear sensor.
   double sensor_gain = 0.0;
-  /// [1] of the time between two samples, over which the converter averages such a sensor's bent voltage:
-  /// what a mode of a high frequency swings within it raises the mean. 0: it samples.
+  /// [1] of the sample interval, over which the converter averages the nonlinear voltage of such a sensor;
+  /// motion within this time raises the mean. 0: instantaneous samples.
   double averaged_share = 0.0;
   std::string unit = "m/N";  ///< of the FRF
 };
 
-/// Windows, transforms and averages hits of one point (Dunwoody eq. 4.15..4.27). Baselines before the trigger
-/// are taken off. Standard deviations: with several hits from their scatter, smoothed over neighbouring lines
-/// and never below what the noise before the hits gives (eq. 4.39, of H2 eq. 4.41); with one hit from that
-/// noise (eq. 4.29).
+/// Windows, transforms and averages hits of one point (Dunwoody eq. 4.15..4.27). The baseline before the
+/// trigger is subtracted. Standard deviations: with several hits from their scatter, smoothed over
+/// neighbouring lines and at least that of the noise before the hits (eq. 4.39; H2: eq. 4.41); with one hit
+/// from that noise (eq. 4.29).
 class ImpactAnalysis {
  public:
   explicit ImpactAnalysis(const ImpactOptions& options);
 
-  /// @throws Error on another length or sample rate than the first hit's, NaN, or no positive force.
+  /// @throws Error when length or sample rate differ from the first hit's, on NaN, or without a positive
+  /// force.
   void add(const Hit& hit);
   int hits() const { return hits_; }
 
-  /// Of all hits so far. @throws Error without a hit.
+  /// FRF of all hits so far. @throws Error without a hit.
   FrequencyResponse frf(FrfAverage average = FrfAverage::h1) const;
 
-  /// Takes the exponential window's damping off fitted modes: zeta -= 1 / (time 2 pi f).
+  /// Subtracts the damping of the exponential window from fitted modes: zeta -= 1 / (time 2 pi f).
   void removeWindowDamping(ModalModel& model) const;
 
  private:

@@ -7,20 +7,20 @@
 
 namespace smartmill {
 
-/// Course of the input between samples.
+/// Interpolation of the input between samples.
 enum class Hold { zero_order, first_order };
 
 /// Response of a ModalModel to a sampled input, exact for inputs that are constant (zero order) or linear
-/// (first order) between samples: closed matrix exponential of each 2x2 mode, started at rest. No allocation
-/// in step().
+/// (first order) between samples: closed-form matrix exponential of each 2x2 mode, initially at rest. step()
+/// does not allocate.
 class ModalFilter {
  public:
   /// @param sample_rate [Hz] > 0. @throws Error on a mode with frequency <= 0 or damping outside (0, 1).
   ModalFilter(const ModalModel& model, double sample_rate, Hold hold);
 
-  /// Output [unit x unit of input] at this sample. First order: the input runs linearly from the last
-  /// sample's to this one's. Zero order: the output at this sample knows the inputs of the samples before
-  /// (the direct share also this one's).
+  /// Output [unit x unit of input] at this sample. First order: the input is linear between the last sample
+  /// and this one. Zero order: the output depends on the inputs of earlier samples (its direct share also on
+  /// this one's).
   double step(double input) {
     double output = direct_ * input;
     for (Section& s : sections_) {
@@ -33,30 +33,33 @@ class ModalFilter {
     return output;
   }
 
-  /// step() with an input that came linearly to before and jumps now: output with the new input.
+  /// step() with an input that runs linearly to `before` and then jumps to `input`: output with the new
+  /// input.
   double jump(double before, double input);
 
-  /// What step() would give, without taking the step.
+  /// The output of step(), without changing the state.
   double peek(double input) const;
 
-  /// The rate of that output [unit/s x unit of input], and by how much a unit more of this input raises it.
+  /// Rate of that output [unit/s x unit of input].
   double peekRate(double input) const;
+  /// Increase of that rate per unit of this input [unit/s].
   double rateOfInput() const;
 
-  /// At rest, or in the static state of a constant input.
+  /// Resets to rest, or to the static state of a constant input.
   void reset(double constant_input = 0.0);
 
   /// Second derivative of the modes' output at the last step [unit/s2 x unit of input].
   double acceleration() const;
 
-  /// Goes on from the state of a filter with as many modes in the same order (whose modes have moved since).
+  /// Takes over the state of a filter with the same number of modes in the same order (whose parameters may
+  /// differ).
   void continueFrom(const ModalFilter& before);
 
  private:
   struct Section {
     double a11, a12, a21, a22;  // state transition: output [unit], its rate [unit/s]
-    double b1, b2;              // share of the input before
-    double c1, c2;              // share of this input (first order hold)
+    double b1, b2;              // of the previous input
+    double c1, c2;              // of this input (first-order hold)
     double gain;
     double x, v;
     double stiffness, damping;  // x'' = stiffness (input - x) - damping x'

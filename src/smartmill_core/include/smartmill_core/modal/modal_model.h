@@ -10,7 +10,7 @@ namespace smartmill {
 struct Mode {
   double frequency = 0.0;      ///< [Hz] natural frequency w_n / 2 pi
   double damping_ratio = 0.0;  ///< [1]
-  double gain = 0.0;           ///< [unit of the model] static share; of a receptance 1 / stiffness [m/N]
+  double gain = 0.0;           ///< [unit of the model] static gain; for a receptance 1 / stiffness [m/N]
   double frequency_std = std::numeric_limits<double>::quiet_NaN();      ///< [Hz]
   double damping_ratio_std = std::numeric_limits<double>::quiet_NaN();  ///< [1]
   double gain_std = std::numeric_limits<double>::quiet_NaN();           ///< [unit of the model]
@@ -22,7 +22,7 @@ struct Mode {
 /// = gain). Unit m/N (receptance of a tool tip) or 1 (force sensor: measured over applied force).
 struct ModalModel {
   std::vector<Mode> modes;
-  double direct = 0.0;  ///< [unit] responds without dynamics
+  double direct = 0.0;  ///< [unit] share without dynamics
   double direct_std = std::numeric_limits<double>::quiet_NaN();
 
   std::complex<double> response(double f) const;  ///< [unit] at f [Hz]

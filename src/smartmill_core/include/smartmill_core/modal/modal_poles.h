@@ -17,17 +17,17 @@ struct WeightedLines {
   double step() const { return (frequency.back() - frequency.front()) / static_cast<double>(size() - 1); }
 };
 
-/// A pole of a structure as one order of a model sees it.
+/// A pole of a structure in a model of one order.
 struct Pole {
   int order = 0;               ///< of the denominator
   double frequency = 0.0;      ///< [Hz] undamped
   double damping_ratio = 0.0;  ///< [1]
-  bool stable = false;         ///< the order before sees it in the same place
+  bool stable = false;         ///< the order before has nearly the same pole
 
   double halfWidth() const { return frequency * damping_ratio; }  ///< [Hz] of its peak
 };
 
-/// Which lines and orders polesByOrder() takes.
+/// Lines and orders that polesByOrder() uses.
 struct PoleSearch {
   std::size_t first = 0, last = 0;  ///< lines first .. last - 1
   int largest_order = 60;
@@ -36,12 +36,12 @@ struct PoleSearch {
 
 /// Poles by the poly-reference least-squares complex frequency method (Peeters, Van der Auweraer, Guillaume
 /// and Leuridan, 2004; here one common denominator with complex coefficients in z = exp(i turn (f - f0) /
-/// span), so that any stretch of the lines can be taken alone), for every order up to the largest: the points
-/// of a stabilization diagram. The lowest coefficient is 1, which gives the poles of noise negative damping;
-/// these are left out.
+/// span), so that any interval of the lines can be used alone), for every order up to the largest: the points
+/// of a stabilization diagram. The lowest coefficient is 1, which gives noise poles negative damping; these
+/// are omitted.
 std::vector<Pole> polesByOrder(const WeightedLines& lines, const PoleSearch& search);
 
-/// Poles that stay in place over the orders: `order` tells over how many, most persistent first.
+/// Poles that are stable over the orders; their `order` is the number of orders. Most persistent first.
 std::vector<Pole> persistentPoles(const std::vector<Pole>& poles, const PoleSearch& search);
 
 }  // namespace smartmill

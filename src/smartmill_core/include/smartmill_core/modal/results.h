@@ -13,7 +13,7 @@ namespace smartmill {
 constexpr const char* POINT_TOOL_TIP = "tool_tip";
 constexpr const char* POINT_FORCE_SENSOR = "force_sensor";
 
-/// What was measured where (topic tool/frf).
+/// A measured FRF with its location (topic tool/frf).
 struct MeasuredFrf {
   double stamp = 0.0;     ///< [s] of the last hit
   std::string tool;       ///< empty for a force sensor
@@ -31,14 +31,14 @@ struct MeasuredModes {
   double relative_error = 0.0;  ///< [1]
 };
 
-/// What is to be measured (goal of the action MeasureFrf).
+/// Goal of the action MeasureFrf.
 struct MeasureFrfGoal {
-  double stamp = 0.0;  ///< [s] sensor data before it are not used
+  double stamp = 0.0;  ///< [s] earlier sensor data are not used
   std::string tool, point, direction;
   int hits = 0;           ///< [1] to average
-  int modes = 0;          ///< [1] 0: by evidence
+  int modes = 0;          ///< [1] 0: chosen by significance
   double stickout = 0.0;  ///< [m] 0: no offset correction
-  int teeth = 0;          ///< [1] 0: as the model says
+  int teeth = 0;          ///< [1] 0: from the model
 };
 
 /// Codes of the action MeasureFrf.

@@ -6,11 +6,11 @@
 
 namespace smartmill {
 
-/// What is known beforehand of a machine's causes, from others like it: odds of each effect of the catalogue
-/// (docs/formats.md, smartmill-causes/1).
+/// Prior odds of each effect of the catalogue for a machine, from similar machines (docs/formats.md,
+/// smartmill-causes/1).
 struct CauseOdds {
-  std::size_t machines = 0;              ///< that tell
-  double other = 1.0;                    ///< of each effect that is not listed, > 0
+  std::size_t machines = 0;              ///< that contribute
+  double other = 1.0;                    ///< odds of each effect that is not listed, > 0
   std::map<std::string, double> listed;  ///< by the effect's name, > 0
 
   double of(const std::string& effect) const;
@@ -18,7 +18,7 @@ struct CauseOdds {
 
 /// YAML, format smartmill-causes/1. @throws Error.
 void writeCauseOdds(const CauseOdds& odds, const std::string& file);
-/// @throws Error naming file, key and what is due.
+/// @throws Error naming file, key and the expected value.
 CauseOdds readCauseOdds(const std::string& file);
 
 }  // namespace smartmill

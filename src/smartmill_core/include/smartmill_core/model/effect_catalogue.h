@@ -86,7 +86,7 @@ struct EffectParameter {
   bool allows(double number) const;
   /// The condition of allows(), for example "> 0" or "50 or 60".
   std::string rangeText() const;
-  /// number - other; of an angle the shorter way round.
+  /// number - other; of an angle the shorter difference.
   double difference(double number, double other) const;
   /// Scale of relative errors: the number itself; of an angle one radian.
   double scale(double number) const;
@@ -165,9 +165,9 @@ const EffectParameter* findParameter(const EffectKind& kind, const std::string& 
 /// @throws Error when the effect has no such key.
 const EffectParameter& parameterOf(const EffectKind& kind, const std::string& name);
 
-/// Why an effect cannot be tried in a campaign: nothing when it can; an empty text when the campaign measures
-/// nothing of the kind.
-std::optional<std::string> lackingFor(const EffectKind& kind, const EffectScope& scope);
+/// Why an effect cannot be tried in a campaign: nothing when it can; an empty text when the campaign does not
+/// measure the channels concerned.
+std::optional<std::string> missingNeed(const EffectKind& kind, const EffectScope& scope);
 
 /// The forms of an effect, labelled with its name, whether its needs are met or not.
 std::vector<EffectForm> formsOf(const EffectKind& kind, const EffectScope& scope);

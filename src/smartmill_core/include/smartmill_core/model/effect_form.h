@@ -110,8 +110,8 @@ struct EffectForm {
   EffectForm& startingAt(const Values& point);  ///< a fit starts there
   EffectForm& foundInEachRecord(int count);     ///< values that are not coordinates: a phase
   EffectForm& searchedBy(SearchStrategy how);
-  /// The effect consists of pieces that may be found one by one; those of this form, in the order of its
-  /// coordinates.
+  /// The effect consists of pieces that may be found separately; @param names of the pieces of this form, in
+  /// the order of its coordinates.
   EffectForm& of(const std::vector<std::string>& names);
 
   std::string effect;   ///< name in the catalogue

@@ -13,21 +13,21 @@ namespace smartmill {
 
 using Axes3 = std::array<double, 3>;
 
-/// Modes of the tool tip, receptance [m/N]; an axis that the file leaves out is rigid.
+/// Modes of the tool tip, receptance [m/N]. An axis that the file omits is rigid.
 struct ToolTip {
   ModalModel x, y;
 };
 
-/// Force sensor: measured over applied force, static gain 1 (direct = 1 - sum of gains); an axis left out is
-/// ideal.
+/// Force sensor: measured over applied force, static gain 1 (direct = 1 - sum of gains). An axis that the
+/// file omits is ideal.
 struct ForceSensor {
   ForceSensor() {
     for (ModalModel& a : axis) a.direct = 1.0;
   }
   std::array<ModalModel, 3> axis;
   std::optional<Axes3> noise_rms;   ///< [N]
-  bool measures_workpiece = false;  ///< the reaction on the workpiece; turned where samples enter
-  bool mean_samples = false;        ///< a sample is the mean over its interval, not an instant
+  bool measures_workpiece = false;  ///< measures the reaction on the workpiece; the sign is reversed on input
+  bool mean_samples = false;        ///< a sample is the mean over its interval, not instantaneous
 };
 
 /// Spindle friction, load meter and limits.
@@ -38,8 +38,8 @@ struct Spindle {
   double load_meter_bandwidth = 0.0;   ///< [Hz] first order
   double load_meter_resolution = 0.0;  ///< [V]
   double friction_zero_below = 0.0;    ///< [rad/s]
-  // What the controller and the chart need beyond the contract's keys (all optional in the file).
-  std::optional<double> load_meter_full_scale;  ///< [V] shown as 100 %
+  // For the controller and the chart; all optional in the file.
+  std::optional<double> load_meter_full_scale;  ///< [V] displayed as 100 %
   std::optional<double> max_speed;              ///< [rad/s]
   std::optional<double> rated_torque;           ///< [N m]
   std::optional<double> rated_power;            ///< [W]
@@ -65,10 +65,10 @@ struct HammerStation {
   double gain_volt = 0.0;          ///< [V]
   double range_volt = 0.0;         ///< [V]
   double voltage_noise_rms = 0.0;  ///< [V]
-  double flute_depth = 0.0;        ///< [m] how far the tool's surface falls back between two flutes
-  /// Tool centre (tip) in machine coordinates at which the sensor of that direction faces the tool at about
-  /// twice gap_at_zero_volt when a flute points at it. The tool nears the sensor in the direction's positive
-  /// sense.
+  double flute_depth = 0.0;        ///< [m] depth of the flutes below the tool's circumference
+  /// Tool centre (tip) in machine coordinates at which the sensor of that direction is about twice
+  /// gap_at_zero_volt from the tool when a flute faces it. The tool approaches the sensor in the positive
+  /// direction.
   std::map<std::string, Axes3> position;  ///< "x", "y" [m]
 };
 
@@ -82,25 +82,25 @@ struct Workpiece {
 struct EffectEntry {
   std::string name;
   std::map<std::string, double> numbers;
-  std::map<std::string, double> std_devs;    ///< of keys with _std beside them; of lists' items: pitch_deg[0]
+  std::map<std::string, double> std_devs;    ///< of keys that have a _std key; of list items: pitch_deg[0]
   std::map<std::string, std::string> words;  ///< channel, axis
-  std::map<std::string, std::vector<double>> lists;  ///< one value a tooth: pitch_deg
+  std::map<std::string, std::vector<double>> lists;  ///< one value per tooth: pitch_deg
   ToolTip flexibility;                               ///< modes
 };
 
-/// How well the nominal values are known, one standard deviation [percent].
+/// Standard deviations of the nominal values [percent].
 struct Uncertainty {
   double cutting = 3.0, frequency = 0.5, damping = 10.0, stiffness = 5.0, spindle = 3.0;
 };
 
-/// smartmill-model/1: what is believed of one machine, tool and material (formats.md). SI; optional sections
-/// are empty when the file lacks them.
+/// smartmill-model/1: nominal values of one machine, tool and material (formats.md), in SI units. Optional
+/// sections are empty when the file omits them.
 struct MachineModel {
   std::string file;  ///< for messages
   std::optional<ToolGeometry> tool;
   std::optional<double> stickout;                  ///< [m]
-  std::optional<CuttingCoefficients> cutting;      ///< NaN: the file lacks that key; needCutting() refuses it
-  std::optional<CuttingCoefficients> cutting_std;  ///< NaN: no _std key beside it; empty: none at all
+  std::optional<CuttingCoefficients> cutting;      ///< NaN: the file omits that key; needCutting() throws
+  std::optional<CuttingCoefficients> cutting_std;  ///< NaN: that key has no _std key; empty: none has
   ToolTip tool_tip;
   ForceSensor force_sensor;
   std::optional<Spindle> spindle;
@@ -110,7 +110,7 @@ struct MachineModel {
   std::vector<EffectEntry> effects;
   Uncertainty uncertainty;
 
-  /// What a tool needs, or Error "FILE: NAME is missing (needed to WHY)".
+  /// A section that a program needs. @throws Error "FILE: NAME is missing (needed to WHY)".
   const ToolGeometry& needTool(const std::string& why) const;
   const CuttingCoefficients& needCutting(const std::string& why) const;
   const Spindle& needSpindle(const std::string& why) const;
@@ -123,15 +123,15 @@ struct MachineModel {
 /// type, NaN, out of range.
 MachineModel readMachineModel(const std::string& file);
 
-/// A key of the section `cutting` and the coefficient it holds, in the order of the file.
+/// A key of the section `cutting` and its coefficient, in the order of the file.
 struct CuttingKey {
   const char* key;
   double CuttingCoefficients::*coefficient;
-  double unit;  ///< [N/m2] or [N/m] of one in the file
+  double unit;  ///< [N/m2] or [N/m] SI value of one in the file
 };
 const std::array<CuttingKey, 6>& cuttingKeys();
 
-/// The section `cutting:` with its standard deviations; values that are NaN are left out.
+/// The section `cutting:` with its standard deviations; NaN values are omitted.
 std::string cuttingSection(const CuttingCoefficients& value, const CuttingCoefficients& std_dev);
 
 /// Writes the model with the same keys, ten significant digits. @throws Error when the file cannot be

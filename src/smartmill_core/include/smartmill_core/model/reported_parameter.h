@@ -7,8 +7,8 @@
 
 namespace smartmill {
 
-/// A parameter of an effect as a report of `explain` tells it (docs/formats.md, smartmill-report/1), in the
-/// unit of its key.
+/// A parameter of an effect as in a report of `explain` (docs/formats.md, smartmill-report/1), in the unit of
+/// its key.
 struct ReportedParameter {
   std::string key;
   double value = 0.0, std_dev = 0.0;
@@ -19,8 +19,8 @@ struct ReportedParameter {
   }
 };
 
-/// @param parameters of an effect, as the JSON library has read them
-/// @throws what that library throws where they are not as told
+/// @param parameters of an effect, read by the JSON library
+/// @throws exceptions of that library when the format is not as documented
 template <typename Json>
 std::vector<ReportedParameter> reportedParameters(const Json& parameters) {
   std::vector<ReportedParameter> found;

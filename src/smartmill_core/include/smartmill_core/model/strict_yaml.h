@@ -9,11 +9,11 @@
 
 namespace smartmill {
 
-/// One map of a YAML file, read strictly: every key at most once, every value of the type and range asked
-/// for, every key read before finish(). Errors are one line "FILE: key.path: what", with the value.
+/// One map of a YAML file, read strictly: every key at most once, every value of the required type and range,
+/// every key read before finish(). Errors are one line "FILE: key.path: what", with the value.
 class StrictYaml {
  public:
-  /// @throws Error when the file cannot be read, is no YAML, is not a map or has a key twice.
+  /// @throws Error when the file cannot be read, is not YAML, is not a map or has a repeated key.
   static StrictYaml fromFile(const std::string& file);
 
   bool has(const std::string& key) const;
@@ -25,7 +25,7 @@ class StrictYaml {
   std::string word(const std::string& key) const;
   /// A word that must be one of these.
   std::string oneOf(const std::string& key, const std::vector<std::string>& words) const;
-  /// @param count how many are due; 0: any number but none.
+  /// @param count required number; 0: one or more.
   std::vector<double> numbers(const std::string& key, std::size_t count, const Range& range = {}) const;
   StrictYaml map(const std::string& key) const;
   std::vector<StrictYaml> maps(const std::string& key) const;
@@ -34,7 +34,7 @@ class StrictYaml {
   std::optional<double> optionalNumber(const std::string& key, const Range& range = {}) const;
   std::optional<StrictYaml> optionalMap(const std::string& key) const;
 
-  /// @throws Error naming the first key that nobody has read.
+  /// @throws Error naming the first key that was not read.
   void finish() const;
 
   /// @throws Error "FILE: path.key: what".
@@ -49,13 +49,13 @@ class StrictYaml {
   std::shared_ptr<Impl> impl_;
 };
 
-/// Number for a YAML file that every reader takes for a number (1.0e-05, not 1e-05).
+/// A number for a YAML file, in a form that every reader parses as a number (1.0e-05, not 1e-05).
 std::string yamlNumber(double value, int digits = 10);
 
-/// The same with as few digits as read back to the very value.
+/// The same with the fewest digits that read back to the exact value.
 std::string yamlNumberExact(double value);
 
-/// Word for a YAML file, quoted where it must be.
+/// A word for a YAML file, quoted where necessary.
 std::string yamlWord(const std::string& word);
 
 }  // namespace smartmill

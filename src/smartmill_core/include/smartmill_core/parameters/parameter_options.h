@@ -10,19 +10,19 @@
 
 namespace smartmill {
 
-/// The parameters of a node on the command line of a tool that does offline what the node does: `--params
-/// FILE`, options for single ones over it, and all of them with their defaults at the end of --help.
+/// Command-line options for the parameters of a node in its offline counterpart: `--params FILE`, options
+/// that override single parameters, and the list of all with their defaults at the end of --help.
 class ParameterOptions {
  public:
   /// @param table of the struct that the command line changes; both outlive this
-  /// @param shipped where the node's own file lies, for --help
+  /// @param shipped path of the node's own file, for --help
   ParameterOptions(CommandLine& line, const ParameterTable& table, const std::string& shipped);
 
   /// An option, e.g. "--bandwidth-hz", for the parameter of that key (a number); unit, bounds, meaning and
-  /// default in --help are the table's.
+  /// default in --help come from the table.
   void add(const std::string& option, const std::string& key);
 
-  /// After the command line was parsed: the file, then the options.
+  /// Reads the file, then the options; call it after the command line is parsed.
   /// @throws Error on an unknown key, a wrong type or a value out of its bounds.
   void apply();
 

@@ -10,39 +10,39 @@
 
 namespace smartmill {
 
-/// One parameter of a program: where its value lives and all that is said about it.
+/// One parameter of a program: the address of its value and its description.
 struct Parameter {
-  using Place = std::variant<double*, int*, std::uint64_t*, bool*, std::string*, std::vector<double>*,
-                             std::array<double, 3>*>;
+  using Address = std::variant<double*, int*, std::uint64_t*, bool*, std::string*, std::vector<double>*,
+                               std::array<double, 3>*>;
   std::string key;
-  std::string unit;     ///< "1" of a number without one, empty of what is no number
-  std::string comment;  ///< what it means, for the shipped file and --help
-  Place place;
-  Range range = {};                     ///< of a number, of every number of a list
+  std::string unit;     ///< "1" for a number without unit, empty for other types
+  std::string comment;  ///< meaning, for the shipped file and --help
+  Address address;
+  Range range = {};                     ///< of a number, or of every number of a list
   std::vector<std::string> words = {};  ///< allowed words; empty: any text
-  /// shipped: stands in the node's file; at_launch: the launch file gives it, the shipped one only says so;
-  /// internal: set by programs alone, but bounded like the others.
+  /// shipped: in the node's file; at_launch: set by the launch file, a comment in the shipped file; internal:
+  /// set by programs only, with bounds like the others.
   enum class Where { shipped, at_launch, internal } where = Where::shipped;
 
-  std::string value() const;        ///< as a YAML file writes it
+  std::string value() const;        ///< as written in a YAML file
   std::string description() const;  ///< "[unit] bounds, comment", one line
   /// @throws Error "KEY: VALUE is out of range (...)" or "KEY: 'WORD' is not one of ...".
   void check() const;
 };
 
-/// The one declaration of a struct's parameters: key, member, unit, bounds, comment; the default is the
-/// member's initialiser. Reader, validation, the commented file of a node and --help come from it.
+/// The single declaration of a struct's parameters: key, member, unit, bounds, comment; the default is the
+/// member's initialiser. Reader, validation, the commented file of a node and --help use it.
 ///
 /// A struct declares itself in a member function `void declare(ParameterTable& table)`; the table points into
-/// that very object and must not outlive it. Structs compose by declaring their parts in turn.
+/// that object and must not outlive it. Structs compose by declaring their members.
 class ParameterTable {
  public:
-  /// Head of the file.
+  /// Title of the file.
   void title(const std::string& text) { title_ = text; }
-  /// What follows stands in a paragraph of its own. @param text its headline; may be empty
+  /// Starts a new paragraph of the file. @param text its headline; may be empty
   void section(const std::string& text = "");
 
-  // @throws std::logic_error when the key stands already.
+  // @throws std::logic_error when the key exists already.
   void number(const std::string& key, double& value, const std::string& unit, const Range& range,
               const std::string& comment);
   void number(const std::string& key, int& value, const std::string& unit, const Range& range,
@@ -58,14 +58,14 @@ class ParameterTable {
   void text(const std::string& key, std::string& value, const std::string& comment);
   void choice(const std::string& key, std::string& value, const std::vector<std::string>& words,
               const std::string& comment);
-  /// A file or the like that belongs to the place, not to the node: the shipped file leaves it to the launch
+  /// A value that depends on the installation, for example a path: set by the launch file, not by the shipped
   /// file.
   void atLaunch(const std::string& key, std::string& value, const std::string& comment);
   void atLaunch(const std::string& key, bool& value, const std::string& comment);
   /// Bounds of a member that no file sets.
   void internal(const std::string& key, double& value, const std::string& unit, const Range& range);
 
-  /// The parameters of a part whose keys begin with a prefix here.
+  /// The parameters of a member struct, with a prefix to their keys.
   template <class Part>
   void part(const std::string& prefix, Part& part) {
     const std::string outer = prefix_;
@@ -78,7 +78,7 @@ class ParameterTable {
   /// nullptr when there is no such key.
   const Parameter* find(const std::string& key) const;
 
-  /// Every value against its bounds, in order. @throws Error naming key and value.
+  /// Checks every value against its bounds, in order. @throws Error naming key and value.
   void check() const;
 
   /// The commented file: every key with its value, unit, bounds and meaning; reads back to the same values.
@@ -86,7 +86,7 @@ class ParameterTable {
 
  private:
   struct Section {
-    std::size_t first;  // parameter that it stands before
+    std::size_t first;  // parameter that follows it
     std::string text;
   };
   void add(Parameter parameter);
@@ -103,7 +103,7 @@ ParameterTable tableOf(Parameters& parameters) {
   return table;
 }
 
-/// The bounds of a struct's own table. @throws Error naming key and value.
+/// Checks a struct against the bounds of its own table. @throws Error naming key and value.
 template <class Parameters>
 void checkBounds(const Parameters& parameters) {
   Parameters copy = parameters;  // a table points to members that may change

@@ -4,11 +4,11 @@
 
 namespace smartmill {
 
-/// Connects a topic to a class that sorts and evaluates. @param source the Inputs of a node or a
-/// RecordingReader: what both do alike is written once. @param Data core type that the topic carries
-template <class Data, class Source, class Sorted>
-void feed(Source& source, const std::string& topic, Sorted& sorted) {
-  source.template on<Data>(topic, [&sorted](const Data& data, double) { sorted.push(data); });
+/// Connects a topic to a pipeline. @param source the Inputs of a node or a RecordingReader. @tparam Data core
+/// type of the topic
+template <class Data, class Source, class Pipeline>
+void feed(Source& source, const std::string& topic, Pipeline& pipeline) {
+  source.template on<Data>(topic, [&pipeline](const Data& data, double) { pipeline.push(data); });
 }
 
 }  // namespace smartmill

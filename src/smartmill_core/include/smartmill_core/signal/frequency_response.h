@@ -23,15 +23,14 @@ struct FrequencyResponse {
   std::complex<double> at(double f) const;
 };
 
-/// Averages hits into H1, H2, coherence (Dunwoody eq. 4.20..4.27, 4.40).
-/// Standard deviation of H1 from the scatter over hits: |H|^2 (1 - C) / (C (M - 1)), for one hit from the
-/// noise given.
+/// Averages hits into H1, H2, coherence (Dunwoody eq. 4.20..4.27, 4.40). Variance of H1 from the scatter over
+/// hits: |H|^2 (1 - C) / (C (M - 1)); for one hit from the given noise.
 class FrfEstimator {
  public:
-  /// @param sample_rate [Hz] @param samples a hit
+  /// @param sample_rate [Hz] @param samples per hit
   FrfEstimator(double sample_rate, std::size_t samples);
 
-  /// Adds one hit. @param force [N], response [unit]: samples each, already windowed. @throws Error on wrong
+  /// Adds one hit. @param force [N], response [unit]: windowed, `samples` values each. @throws Error on wrong
   /// length or NaN.
   void add(const std::vector<double>& force, const std::vector<double>& response);
 

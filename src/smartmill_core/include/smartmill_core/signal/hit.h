@@ -18,7 +18,7 @@ struct Hit {
 /// Why a hit cannot be used (smartmill_core/modal/hit_check.h).
 struct HitFault {
   std::string text;       ///< one line; empty: the hit can be used
-  bool bad_data = false;  ///< clipped, NaN, lost samples; otherwise the blow itself was weak, dull or double
+  bool bad_data = false;  ///< clipped, NaN, lost samples; otherwise the hit itself was weak, dull or double
 };
 
 }  // namespace smartmill

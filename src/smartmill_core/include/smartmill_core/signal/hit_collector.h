@@ -11,17 +11,17 @@ namespace smartmill {
 
 struct HitCollectorOptions {
   double trigger_force = 10.0;  ///< [N] above the level before; > 0
-  double pre_trigger = 0.01;    ///< [s] kept before the trigger, > 0
+  double pre_trigger = 0.01;    ///< [s] recorded before the trigger, > 0
   double record_length = 0.2;   ///< [s] of a record, pre-trigger included, > pre_trigger
 };
 
-/// Cuts hits out of the running stream of hammer force and gap voltage, sample by sample. A record is
-/// complete when its last sample has come; missing or NaN samples inside it spoil it.
+/// Extracts hits from the stream of hammer force and gap voltage, sample by sample. A record is complete with
+/// its last sample; missing or NaN samples make it faulty.
 class HitCollector {
  public:
   explicit HitCollector(const HitCollectorOptions& options);
 
-  /// From now on the next force above the trigger starts a record.
+  /// The next force above the trigger starts a record.
   void arm();
   void disarm();
   bool armed() const { return armed_; }

@@ -11,8 +11,8 @@ double rms(const std::vector<double>& values);
 /// Sample standard deviation (n - 1); needs two values.
 double standardDeviation(const std::vector<double>& values);
 double median(std::vector<double> values);
-/// [1] 97.5 % quantile of Student's t over the normal's (Abramowitz and Stegun 26.7.5, which is 3 % short
-/// at two degrees of freedom and less beyond). @param freedom > 0
+/// [1] Ratio of the 97.5 % quantiles of Student's t and the normal distribution (Abramowitz and Stegun
+/// 26.7.5, which is 3 % short at two degrees of freedom and less beyond). @param freedom > 0
 double studentOverNormal(double freedom);
 /// @param share 0..1, linear interpolation between order statistics (10th percentile: 0.1).
 double percentile(std::vector<double> values, double share);

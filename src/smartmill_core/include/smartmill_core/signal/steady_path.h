@@ -4,8 +4,8 @@
 
 namespace smartmill {
 
-/// Whether the tool centre lies on the condition's line from steady_from to steady_to, at most tolerance [m]
-/// beside it. False when the state lacks one of the axes X, Y, Z or the line has no length.
+/// Whether the tool centre lies on the condition's line from steady_from to steady_to, within tolerance [m].
+/// False when the state lacks one of the axes X, Y, Z or the line has zero length.
 bool onSteadyPath(const CuttingCondition& condition, const CncState& state, double tolerance);
 
 }  // namespace smartmill

@@ -13,11 +13,11 @@ namespace smartmill {
 
 constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 
-/// Evenly sampled channels as a data acquisition delivers them, 5..20 ms a block.
+/// Evenly sampled channels from a data acquisition, 5..20 ms per block.
 struct SampleBlock {
   double stamp = 0.0;                 ///< [s] time of the first sample
   double sample_rate = 0.0;           ///< [Hz]
-  std::uint64_t first_index = 0;      ///< running index of the first sample; a jump tells of lost samples
+  std::uint64_t first_index = 0;      ///< running index of the first sample; a jump means lost samples
   std::vector<std::string> channels;  ///< e.g. fx fy fz; hammer gap
   std::vector<std::string> units;     ///< SI unit of each channel
   std::vector<double> samples;        ///< interleaved: samples[i * channels.size() + c]
@@ -31,14 +31,14 @@ struct SampleBlock {
   std::vector<double> column(const std::string& name) const;
 };
 
-/// Tachometer or encoder reading.
+/// Sample of a tachometer or encoder.
 struct SpindleAngle {
   double stamp = 0.0;  ///< [s]
   double angle = 0.0;  ///< [rad] of tooth 1, clockwise from +y
   double speed = 0.0;  ///< [rad/s]
 };
 
-/// Controller mode and state as FOCAS numbers them (statinfo aut, run).
+/// Controller mode and state with the numbers of FOCAS (statinfo aut, run).
 enum class CncMode : std::uint8_t {
   mdi = 0,
   mem = 1,
@@ -78,10 +78,10 @@ struct LoadSample {
   std::vector<double> axis_load;  ///< [1] of rated
 };
 
-/// What the machine is doing with the tool now (topic cut/condition).
+/// Present cutting condition (topic cut/condition).
 struct CuttingCondition {
   enum class Kind : std::uint8_t { none = 0, air = 1, cut = 2 };
-  double stamp = 0.0;  ///< [s] from when it holds
+  double stamp = 0.0;  ///< [s] from which it is valid
   Kind kind = Kind::none;
   std::string name;
   std::string material;
@@ -89,8 +89,8 @@ struct CuttingCondition {
   ToolGeometry tool;  ///< even pitch
   Engagement engagement;
   double spindle_speed = 0.0;                    ///< [rad/s] commanded
-  std::array<double, 3> steady_from{{0, 0, 0}};  ///< [m] tool centre in the machine frame; from here
-  std::array<double, 3> steady_to{{0, 0, 0}};    ///< [m] to here the tool is fully engaged at constant feed
+  std::array<double, 3> steady_from{{0, 0, 0}};  ///< [m] tool centre in the machine frame: from here ...
+  std::array<double, 3> steady_to{{0, 0, 0}};  ///< [m] ... to here the tool is fully engaged at constant feed
 };
 
 /// One block of force on the tool.

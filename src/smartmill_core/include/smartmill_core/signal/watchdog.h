@@ -4,9 +4,9 @@
 
 namespace smartmill {
 
-/// Tells when a source has fallen silent. Silence is counted in ticks of whoever reads the source, not on a
-/// clock: a reader that was starved finds what waits for it before its next tick, and does not take its own
-/// delay for silence.
+/// Detects that a source has fallen silent. Silence is counted in ticks of the reader, not on a clock: a
+/// starved reader first processes its backlog before its next tick, and does not mistake its own delay for
+/// silence.
 class Watchdog {
  public:
   /// @param timeout [s] of silence after which the source counts as dead
@@ -17,16 +17,16 @@ class Watchdog {
     ever_ = true;
     ended_ = false;
   }
-  /// Everything that waited was read; so much time has passed since the last tick. @param period [s]
+  /// Call after the backlog was read. @param period [s] since the last tick
   void tick(double period) { silent_ += period; }
-  /// Who feeds the source says that nothing more will come.
+  /// The producer reports the end of the source.
   void end() { silent_ = std::numeric_limits<double>::infinity(); }
 
-  bool ever() const { return ever_; }        ///< anything heard yet?
-  double silent() const { return silent_; }  ///< [s] since the last, or since the start
+  bool ever() const { return ever_; }        ///< whether anything was received
+  double silent() const { return silent_; }  ///< [s] since the last message, or since the start
   bool dead() const { return silent_ > timeout_; }
 
-  /// True once after each end of what was heard: nothing more will come to release what waits.
+  /// True once after each end of a source that had sent data: no later message will release waiting items.
   bool ended() {
     if (ended_ || !ever_ || !dead()) return false;
     return ended_ = true;

@@ -6,13 +6,14 @@
 
 namespace smartmill {
 
-/// Errors of estimates over the standard deviations that the estimates state. Where these are honest, the
-/// mean of the squares is 1: stated too small it is larger, inflated it is smaller, and both fail.
+/// Errors of estimates divided by their stated standard deviations. For calibrated deviations the mean square
+/// is 1; it is larger for deviations stated too small and smaller for inflated ones, and both fail.
 class Coverage {
  public:
-  /// Independent errors that are due: an honest deviation then fails one time in thirty thousand (of some
-  /// hundred such looks in all tests hardly one), and one that is half as much again as the true one, or two
-  /// thirds of it, passes no more often. How many runs a test makes is fixed by this, not by what it finds.
+  /// Required number of independent errors. A calibrated deviation then fails one time in fifteen thousand
+  /// (hardly once in the hundred or so checks of all tests), and one that is 1.5 times or two thirds of the
+  /// true one passes no more often. The number of runs of a test is fixed in advance, independent of its
+  /// result.
   static constexpr int RUNS = 200;
 
   void add(double error, double std_dev);
@@ -21,13 +22,14 @@ class Coverage {
   /// Root of the mean square of error over deviation.
   double rms() const;
 
-  /// Whether the root mean square lies where chance leaves it but one time in thirty thousand
-  /// (chi-square). Too few
-  /// errors to tell deviations that are wrong by that factor are no evidence and fail.
+  /// Whether the root mean square is inside the interval that calibrated deviations leave with probability
+  /// 1/30000 on each side (chi-square). Fails also with too few errors to detect deviations that are wrong by
+  /// the given factor.
   /// @param independent how many of the errors are independent of each other; 0: all. Estimates of one fit
-  /// are not.
-  /// @param told factor that must show; above 1.5 only where each error costs much and a study makes more
-  ::testing::AssertionResult honest(double independent = 0.0, double told = 1.5) const;
+  /// are dependent.
+  /// @param factor of the deviations that must be detectable; above 1.5 only where each error is expensive
+  /// and a study computes more
+  ::testing::AssertionResult isCalibrated(double independent = 0.0, double factor = 1.5) const;
 
  private:
   std::size_t count_ = 0;

@@ -12,12 +12,12 @@
 
 namespace smartmill::testing {
 
-/// The chip rule of formats.md summed over thin discs, as plainly as it is written there: nothing shared with
-/// the code that it judges but the structs of its input.
+/// The chip rule of formats.md summed over thin discs, independent of the code under test except for the
+/// input structs.
 struct DiscMill {
   struct State {
     double angle;                        ///< [rad] of tooth 1
-    std::array<double, 2> centre;        ///< [m] fed so far
+    std::array<double, 2> centre;        ///< [m] position by the feed
     std::array<double, 2> displacement;  ///< [m]
     std::array<double, 2> rate{{0, 0}};  ///< [m/s] of the displacement, for process damping
     double speed = 1.0;                  ///< [rad/s]
@@ -25,16 +25,16 @@ struct DiscMill {
   ToolGeometry tool;
   CuttingLaw law;
   std::vector<double> radius;                 ///< [m] of each tooth over the nominal one
-  std::function<State(double turned)> state;  ///< by the angle that the spindle has turned, negative ones too
+  std::function<State(double turned)> state;  ///< over the rotation of the spindle, negative included
   int passes = 40;
-  bool by_path = false;  ///< instead of the rule, what lies on the ray is what the teeth left on their way
+  bool by_path = false;  ///< true path of the teeth instead of the rule: the surface on the ray
 
   double pitch(int k) const {
     return tool.pitch.empty() ? 2.0 * M_PI / tool.teeth
                               : tool.pitch[static_cast<std::size_t>(k % tool.teeth)];
   }
 
-  /// [m] Chip of a tooth at an immersion angle when the spindle has turned so far.
+  /// [m] Chip of a tooth at an immersion angle after a rotation of the spindle.
   double chip(double turned, int tooth, double phi) const {
     return by_path ? chipByPath(turned, tooth, phi) : chipByRule(turned, tooth, phi);
   }

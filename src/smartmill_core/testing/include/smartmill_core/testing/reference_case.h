@@ -10,7 +10,7 @@
 
 namespace smartmill {
 
-/// The reference cut of the project's figures: slot, D 16 mm, 4 flutes, helix 30 deg, 2 mm deep, 0.06 mm a
+/// The reference cut of the project's figures: slot, D 16 mm, 4 flutes, helix 30 deg, 2 mm deep, 0.06 mm per
 /// tooth, Ktc 800, Krc 250 N/mm2, Kte = Kre = 20 N/mm, runout 8 um; sensor modes 1450, 2300, 3600 Hz on each
 /// axis; 1 N of noise; 25.6 kHz.
 struct ReferenceCase {
@@ -19,14 +19,14 @@ struct ReferenceCase {
   double engage_time = 0.02;     ///< [s] the tool is in the cut from here
   double noise_rms = 1.0;        ///< [N]
   double sample_rate = 25600.0;  ///< [Hz]
-  double speed_drop = 0.0;       ///< [1] share of speed that the cut's load takes ...
+  double speed_drop = 0.0;       ///< [1] relative drop of the speed under load ...
   double drop_time = 0.3;        ///< [s] ... with this time constant
-  double nominal_off = 0.0;      ///< [1] share by which the cutting condition's speed is off
+  double nominal_off = 0.0;      ///< [1] relative error of the speed of the cutting condition
   std::uint32_t seed = 1;
-  ModalModel sensor = exactSensor();  ///< that measures
-  ModalModel later = exactSensor();   ///< that measures at the end
+  ModalModel sensor = exactSensor();  ///< at the start
+  ModalModel later = exactSensor();   ///< at the end
   double drift_from = 1e9,
-         drift_to = 1e9;  ///< [s] between them the sensor's parameters go from the one to the other
+         drift_to = 1e9;  ///< [s] over which the sensor's parameters change from one to the other
 
   double speedAt(double time) const;  ///< [rad/s]
   double angleAt(double time) const;  ///< [rad] of the spindle, zero at time zero, not wrapped
@@ -42,16 +42,17 @@ struct ReferenceRecord {
   std::array<std::vector<double>, 2> measured;  ///< [N]
 };
 
-/// The sensor runs at eight times the sample rate, exactly for a force linear between those samples.
+/// The sensor is simulated at eight times the sample rate, exact for a force that is linear between those
+/// samples.
 ReferenceRecord simulate(const ReferenceCase& reference);
 
-/// Taps with a hammer: sin^2 blows of 0.2 ms and 500 N, one record a tap of 0.2 s.
+/// Hammer taps: sin^2 pulses of 0.2 ms and 500 N, one record of 0.2 s per tap.
 struct ReferenceTaps {
   std::vector<std::vector<double>> hammer, response;  ///< [N]
 };
 ReferenceTaps simulateTaps(const ReferenceCase& reference, int taps);
 
-/// Norm of the difference of the spectra over the norm of the truth's, 0 Hz up to the band limit, Hann
+/// Norm of the difference of the spectra over the norm of the true spectrum, 0 Hz up to the band limit, Hann
 /// window.
 /// @param from, to samples @param band [Hz]
 double bandError(const std::vector<double>& estimate, const std::vector<double>& truth, double sample_rate,

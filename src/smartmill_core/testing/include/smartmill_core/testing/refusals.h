@@ -9,19 +9,19 @@
 
 namespace smartmill {
 
-/// A fault that an edit of a good file makes, and what its reader says of it after "FILE: ".
+/// A faulty edit of a valid file, and the reader's message after "FILE: ".
 struct Refusal {
   const char *from, *to, *message;
 };
 
-/// A text with the first `from` in it replaced.
+/// A text with the first `from` replaced.
 inline std::string edited(std::string text, const std::string& from, const std::string& to) {
   const std::size_t at = text.find(from);
   EXPECT_NE(at, std::string::npos) << from;
   return at == std::string::npos ? text : text.replace(at, from.size(), to);
 }
 
-/// Expects that read(file) refuses every edit of a good text with its one line.
+/// Expects that read(file) rejects every edit of a valid text with its message.
 template <class Read>
 void expectRefusals(const std::string& good, const std::vector<Refusal>& refusals, const Read& read) {
   const TemporaryFolder folder;

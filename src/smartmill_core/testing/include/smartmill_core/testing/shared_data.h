@@ -6,16 +6,15 @@
 
 namespace smartmill {
 
-/// The folder of data that stand beside the repository and are no part of it: $SMARTMILL_SHARED, else
-/// ../shared.
+/// The folder of data next to the repository, not part of it: $SMARTMILL_SHARED, else ../shared.
 std::string sharedFolder();
 
-/// Path of a file or folder of it, empty where it is absent.
+/// Path of a file or folder in it; empty when absent.
 std::string sharedData(const std::string& name);
 
 }  // namespace smartmill
 
-/// In a test: declares the path of shared data, or ends the test as SKIPPED where they are absent.
+/// In a test: declares the path of shared data, or skips the test when absent.
 ///     SMARTMILL_SHARED_DATA(folder, "measured/slot_6000");
 #define SMARTMILL_SHARED_DATA(variable, name)                 \
   const std::string variable = ::smartmill::sharedData(name); \

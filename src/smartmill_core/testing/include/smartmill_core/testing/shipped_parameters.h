@@ -10,9 +10,9 @@
 
 namespace smartmill {
 
-/// The shipped file of a node is what the table of its parameters says, to the letter, and is read back
-/// without a fault. @param file seen from the folder of the package, in which tests run
-/// @param program that prints it anew with --parameters
+/// Expects that the shipped file of a node equals the text of its parameter table and can be read back.
+/// @param file relative to the folder of the package, in which tests run
+/// @param program that prints it with --parameters
 template <class Parameters>
 void expectShipped(const std::string& file, const std::string& program) {
   std::ifstream stream(file);

@@ -10,8 +10,8 @@
 
 namespace smartmill {
 
-/// For tests of any package. Tests of a campaign as a recorder of sound files would have kept them: forces
-/// and hammer in WAV files of 24 bits, read back through campaign.yaml. @param keep of a test's name
+/// For tests of any package. Converts tests of a campaign to sound files: forces and hammer in WAV files of
+/// 24 bits, read back through campaign.yaml. @param keep selects tests by name
 template <typename Keep>
 Campaign asSoundFiles(const Campaign& campaign, const std::string& folder, Keep keep) {
   Campaign sound;

@@ -22,10 +22,9 @@ inline ModalModel dynamometer() {
   return model;
 }
 
-/// A workpiece on a force sensor with known modes, an automatic hammer, and a spindle: samples as one
-/// synchronous device delivers them. Blows are sin^2 pulses, whose spectrum is gone
-/// above half the sample rate; forces run through the exact response of the sensor at
-/// eight times the sample rate.
+/// A workpiece on a force sensor with known modes, an automatic hammer, and a spindle: samples as from one
+/// synchronous device. Hits are sin^2 pulses, whose spectrum vanishes above half the sample rate; forces pass
+/// through the exact response of the sensor at eight times the sample rate.
 class TapRig {
  public:
   static constexpr double RATE = 25600.0;    // [Hz]
@@ -33,7 +32,7 @@ class TapRig {
   static constexpr int FINER = 8;
 
   /// @param matrix measured over applied force: response of sensor axis [row] to a force along [column];
-  /// absent: none
+  /// absent: zero
   using Matrix = std::array<std::array<std::optional<ModalModel>, 3>, 3>;
   static Matrix diagonal(const ModalModel& sensor) {
     Matrix matrix;
@@ -53,14 +52,14 @@ class TapRig {
 
   double noise = 1.0;                                // [N] rms of one sample of the sensor
   double hammer_noise = 0.1;                         // [N] rms
-  double peak = 300.0;                               // [N]; negative: the blow comes from the other side
+  double peak = 300.0;                               // [N]; negative: hit from the opposite side
   double contact = 0.4e-3;                           // [s]
   double speed = 0.0;                                // [rad/s]
-  std::function<std::array<double, 3>(double)> cut;  // [N] of the time since the start [s]
+  std::function<std::array<double, 3>(double)> cut;  // [N] over the time since the start [s]
 
   double now() const { return start_ + static_cast<double>(index_) / RATE; }
 
-  /// A blow soon.
+  /// Schedules a hit.
   void strike(std::size_t axis) {
     axis_ = axis;
     blow_ = static_cast<double>(index_) / RATE + 0.0301;

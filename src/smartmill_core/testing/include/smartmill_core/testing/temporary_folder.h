@@ -9,7 +9,7 @@
 
 namespace smartmill {
 
-/// For tests of any package. A folder of its own for a test's files, removed with it.
+/// For tests of any package. A temporary folder for a test's files, removed with the object.
 class TemporaryFolder {
  public:
   TemporaryFolder() {
@@ -34,7 +34,7 @@ class TemporaryFolder {
   std::string path_;
 };
 
-/// The one line of the Error that an action throws; empty when it throws none.
+/// The message of the Error that an action throws; empty when it throws none.
 template <typename Action>
 std::string errorOf(const Action& action) {
   try {

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <algorithm>
+#include <limits>
+
+namespace smartmill::cnc::linuxcnc {
+
+/// Time since an event last happened, excluding pauses of the observer (a starved process, a suspended
+/// computer): every update adds at most LONGEST_STEP.
+class SilenceTimer {
+ public:
+  static constexpr double LONGEST_STEP = 0.05;  ///< [s] most that one update adds
+
+  /// @param happened since the last update @param now [s] any steady time @return [s] since the last event
+  double update(bool happened, double now) {
+    silent_ = happened ? 0.0 : silent_ + std::clamp(now - last_, 0.0, LONGEST_STEP);
+    last_ = now;
+    return silent_;
+  }
+  double silent() const { return silent_; }  ///< [s] as of the last update
+
+ private:
+  double silent_ = 0.0, last_ = std::numeric_limits<double>::infinity();
+};
+
+}  // namespace smartmill::cnc::linuxcnc
