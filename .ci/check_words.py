@@ -43,8 +43,6 @@ ALLOWED = (
     "who knows C++", "let me know", "ask the operator", "asks the operator", "asked the operator", "--ask", "AskPass",
     "tests, asked, report",  # columns of a database
 )
-# Folders and files whose older text is still to be rewritten: counted, not refused.
-PENDING = ()
 EXTENSIONS = (".md", ".cpp", ".h", ".py", ".yaml", ".yml", ".launch", ".msg", ".srv", ".action", ".js", ".html", ".css", ".cmake",
               ".txt", ".toml", "")
 WORDS = {re.compile(rf"(?<![\w-])(?:{pattern})(?![\w])", re.IGNORECASE): instead for pattern, instead in BANNED.items()}
@@ -101,7 +99,7 @@ def main():
     arguments = sys.argv[1:]
     counting = "--count" in arguments
     folders = [a for a in arguments if not a.startswith("--")] or ["."]
-    counts, pending, faults = collections.Counter(), collections.Counter(), 0
+    counts, faults = collections.Counter(), 0
     for name, path in files(folders):
         try:
             text = path.read_text(encoding="utf-8")
@@ -109,23 +107,18 @@ def main():
             continue
         if not path.suffix and not text.startswith("#!"):
             continue
-        waiting = next((p for p in PENDING if name.startswith(p)), None)
         for number, piece in pieces(path, text):
             if any(phrase in piece for phrase in ALLOWED):
                 continue
             for word, instead in WORDS.items():
                 for match in word.finditer(piece):
                     counts[match.group(0).lower()] += 1
-                    if waiting:
-                        pending[waiting] += 1
-                    elif not counting:
+                    if not counting:
                         faults += 1
                         print(f"{name}:{number}: '{match.group(0)}': expected a plain term ({instead})")
     if counting:
         for word, count in counts.most_common():
             print(f"{count:6d} {word}")
-    for folder, count in pending.items():
-        print(f"words: {folder} is not yet rewritten ({count})")
     print(f"words: {sum(counts.values())} found, {faults} faults")
     return 1 if faults else 0
 

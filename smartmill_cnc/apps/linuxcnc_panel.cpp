@@ -3,7 +3,6 @@
 #include <chrono>
 #include <cstdio>
 #include <map>
-#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -32,9 +31,9 @@ void show(const MachineStatus& s) {
               s.errors.empty() ? "" : ", ", s.errors.c_str());
 }
 
-/// Executes a command (none: reads the status). Retries failures until the timeout, since the controller may
+/// Executes a command (null: reads the status). Retries failures until the timeout, since the controller may
 /// still be starting. @param timeout [s]
-MachineStatus carryOut(GatewayClient& client, const std::optional<CommandCode>& command, double timeout) {
+MachineStatus carryOut(GatewayClient& client, const CommandCode* command, double timeout) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(timeout);
   for (;;) {
     try {
@@ -82,7 +81,7 @@ int main(int argc, char** argv) {
   }
   return runProgram(line, static_cast<int>(arguments.size()), arguments.data(), [&] {
     GatewayClient client(folder, REPLY_TIMEOUT);
-    const auto code = command == "show" ? std::nullopt : std::optional<CommandCode>(codes.at(command));
-    show(carryOut(client, code, timeout));
+    const auto code = codes.find(command);
+    show(carryOut(client, code == codes.end() ? nullptr : &code->second, timeout));
   });
 }

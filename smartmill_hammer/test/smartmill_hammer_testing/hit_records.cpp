@@ -303,14 +303,14 @@ void dropOut(Random& random, Drawn& d) {
   const int count = std::uniform_int_distribution<int>(1, 3)(random);
   for (int done = 0, tries = 0; done < count && tries < 100000; ++tries) {
     const auto at = std::uniform_int_distribution<std::size_t>(20, values.size() - 20)(random);
-    const auto count = std::uniform_int_distribution<std::size_t>(1, 2)(random);
+    const auto length = std::uniform_int_distribution<std::size_t>(1, 2)(random);
     const int way = std::uniform_int_distribution<int>(0, 2)(random);
     const double full = largest(d, force) * (force ? d.scene.force : d.scene.response).full_scale;
     const double value = way == 0   ? 0.0
                          : way == 1 ? std::copysign(full, between(random, -1.0, 1.0))
                                     : level(d, force) + largest(d, force) * between(random, -1.0, 1.0);
     if (std::abs(values[at] - value) < 0.2 * largest(d, force)) continue;
-    for (std::size_t i = at; i < at + count; ++i) values[i] = value;
+    for (std::size_t i = at; i < at + length; ++i) values[i] = value;
     ++done;
   }
 }

@@ -22,8 +22,8 @@ void requireExists(const std::string& file) {
   if (!isServerUrl(file) && !std::filesystem::exists(file)) throw Error(file + ": cannot be read");
 }
 
-CommandOptions DatabaseCommands::add(const std::string& name, const std::string& help, Body body) {
-  commands_.emplace_back(line_.command(name, help), body);
+CommandOptions DatabaseCommands::add(const std::string& name, const std::string& help, Body run) {
+  commands_.emplace_back(line_.command(name, help), run);
   return commands_.back().first;
 }
 
