@@ -234,8 +234,8 @@ std::optional<UnevenStep> unevenStep(const std::vector<double>& t) {
   });
   // Two rates in one record: times have few digits, so that all steps of the second rate count as equal.
   const double alike = 0.99 * std::abs(*worst - usual);
-  const auto first =
-      std::find_if(steps.begin(), steps.end(), [&](double candidate) { return std::abs(candidate - usual) >= alike; });
+  const auto first = std::find_if(steps.begin(), steps.end(),
+                                  [&](double candidate) { return std::abs(candidate - usual) >= alike; });
   return UnevenStep{static_cast<std::size_t>(first - steps.begin()), *first, usual};
 }
 
