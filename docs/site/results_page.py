@@ -41,8 +41,8 @@ INTRODUCTION = """\
 
 Made by `docs/site/results_page.py` from the records in `smartmill_studies/records`; a change of this page is lost. The newest record of each
 study is shown with its command, figures, targets and verdicts. Every command exists after `./setup`. SHARED is the folder with measured
-records and independent campaigns; "shipped" means the parameters of `launch/config`. {count} studies; {missed} of {judged} figures with a target
-miss it.
+records and independent campaigns; "shipped" means the parameters of `launch/config`. {count} studies; {missed} of {judged} figures with a verdict
+miss their target; where no verdict was recorded, none is shown.
 
 Stability charts of a session come from the zero-order solution and measured FRFs; they are checked by collocation, another solver, on the true
 machine. Compensated forces, tool modes and coefficients of a session are checked against the simulated machine, whose physics is validated
@@ -138,7 +138,7 @@ def study_row(record):
     seed = str(record["seed"]) if record["seed"] is not None else None
     if seed and not re.search(rf"seeds?\W+{re.escape(seed)}", f"{parameters} {command}"):
         parameters += f"{'; ' if parameters else ''}seed {seed}"
-    about = [f"<a id=\"{record['study']}\"></a>**{record['title']}**", command, parameters, record["remark"]]
+    about = [f"<a id=\"{record['study']}\"></a>**{record['title']}**", command or "command not recorded", parameters, record["remark"]]
     figures = [figure_text(figure) for figure in record["figures"]] or ["table below"]
     origin = [record["date"] or "date not recorded", f"commit {record['commit'] or 'not recorded'}",
               f"machine {record['machine'] or 'not recorded'}"]
