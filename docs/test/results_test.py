@@ -3,6 +3,7 @@ import contextlib
 import io
 import json
 import pathlib
+import subprocess
 import sys
 import tempfile
 import unittest
@@ -94,6 +95,22 @@ class ResultsTest(unittest.TestCase):
         self.assertEqual(self.run_page("--check"), (0, ""))
         self.write("slot.json", title="another")
         self.assertIn("out of date", self.run_page("--check")[1])
+
+    def test_collect_writes_a_record(self):
+        run = self.folder / "run"
+        (run / "cases").mkdir(parents=True)
+        study = {"name": "tried", "program": "smartmill_studies/hammer_try", "arguments": ["--fast"], "cases": 3, "seed": 4, "build": "b",
+                 "commit": "abc", "score": [], "times": ["seconds"], "picture": ""}
+        (run / "study.json").write_text(json.dumps(study), encoding="utf-8")
+        for k in range(3):
+            case = {"case": k, "build": "b", "host": "here", "cpu": 1.0, "began": 86400.0 * 365, "seconds": 2.0,
+                    "result": {"case": k, "gap": 1.0 + k, "right": k > 0, "seconds": 9.0}}
+            (run / f"cases/{k}.json").write_text(json.dumps(case), encoding="utf-8")
+        subprocess.run([DOCS.parent / "smartmill_studies/runner/collect", run], check=True, capture_output=True)
+        record = results_page.read(run / "record.json")
+        self.assertEqual((record["package"], record["date"], record["commit"], record["seed"]), ("smartmill_hammer", "1971-01-01", "abc", 4))
+        self.assertEqual(record["command"], "rosrun smartmill_studies hammer_try --fast --cases 3 --seed 4")
+        self.assertEqual({f["name"]: f["value"] for f in record["figures"]}, {"gap": "2 (1.1, 2.9)", "right": "2 of 3"})
 
     def test_page_of_the_tree(self):
         self.assertEqual(results_page.main(["--check"]), 0)
