@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks that every program, launch file, test and linked file named in the documents exists."""
+"""Checks that every program, launch file, test and linked file named in the documents exists, and that results.md is made from valid records."""
 import pathlib
 import re
 import subprocess
@@ -134,6 +134,10 @@ def main():
             count += 1
     for fault in seed_faults(folders):
         print(f"docs/seeds.md: {fault}")
+        count += 1
+    results = subprocess.run([ROOT / "docs/site/results_page.py", "--check"], capture_output=True, text=True)
+    if results.returncode:
+        print(results.stderr, end="")
         count += 1
     print(f"documents: {len(names.stdout.split())} read, {count} faults")
     return 1 if count else 0
