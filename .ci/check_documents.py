@@ -1,9 +1,12 @@
 #!/usr/bin/env python3
-"""Checks that every program, launch file, test and linked file named in the documents exists, and that results.md is made from valid records."""
+"""Checks the documents: every program, launch file, test and linked file that they name exists, their walks through the code are true, and
+results.md is made from valid records."""
 import pathlib
 import re
 import subprocess
 import sys
+
+import walks
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
@@ -39,16 +42,16 @@ def tests(folders):
     return names
 
 
-def exists(path, folders):
-    """Whether a file of the tree, or a public header, has this path."""
+def find(path, folders):
+    """The file of the tree, or the public header, with this path; empty: none."""
     roots = [ROOT, *folders.values(), *(f / "include" for f in folders.values())]
-    return any((root / path).exists() for root in roots)
+    return next((root / path for root in roots if (root / path).exists()), None)
 
 
 def faults(document, folders, known_tests):
     text = document.read_text()
     for path in set(re.findall(r"`((?:src/)?(?:smartmill_|launch/)[\w/.]+\.(?:h|cpp|yaml|launch))`", text)):
-        if "/" in path and not exists(path, folders):
+        if "/" in path and not find(path, folders):
             yield f"{path}: there is no such file"
     for package, program in re.findall(r"rosrun (smartmill_\w+) (\w+)", text):
         if package not in folders or program not in programs(folders[package]):
@@ -127,9 +130,11 @@ def main():
     folders = packages()
     known_tests = tests(folders)
     names = subprocess.run(["git", "-C", ROOT, "ls-files", "*.md"], check=True, capture_output=True, text=True)
-    count = 0
+    count = claims = 0
     for name in names.stdout.split():
-        for fault in faults(ROOT / name, folders, known_tests):
+        wrong, checked = walks.faults((ROOT / name).read_text(), lambda path: find(path, folders))
+        claims += checked
+        for fault in [*faults(ROOT / name, folders, known_tests), *wrong]:
             print(f"{name}: {fault}")
             count += 1
     for fault in seed_faults(folders):
@@ -139,7 +144,7 @@ def main():
     if results.returncode:
         print(results.stderr, end="")
         count += 1
-    print(f"documents: {len(names.stdout.split())} read, {count} faults")
+    print(f"documents: {len(names.stdout.split())} read, {claims} claims of walks checked, {count} faults")
     return 1 if count else 0
 
 
