@@ -69,6 +69,16 @@ def faults(document, folders, known_tests):
         yield f"{number}: a reader cannot open it"
 
 
+def picture_faults():
+    """Names of functions and classes in the picture of the architecture are those of the text."""
+    text = " ".join(re.findall(r">([^<>\n]+)<", (ROOT / "docs/architecture.svg").read_text()))
+    text = text.replace("- ", "").replace(" ::", "::")
+    document = (ROOT / "docs/architecture.md").read_text()
+    for name in sorted(set(re.findall(r"\b[A-Za-z][a-z0-9]+[A-Z]\w*(?:::\w+)?", text))):
+        if name not in document:
+            yield f"{name} is not in architecture.md"
+
+
 # Numbers of the last equation, figure and table of each chapter of the five documents (0: numbered without chapters).
 # Burzoni: numbers of his list of figures, not of his captions.
 NUMBERED = {
@@ -137,9 +147,10 @@ def main():
         for fault in [*faults(ROOT / name, folders, known_tests), *wrong]:
             print(f"{name}: {fault}")
             count += 1
-    for fault in seed_faults(folders):
-        print(f"docs/seeds.md: {fault}")
-        count += 1
+    for name, found in (("seeds.md", seed_faults(folders)), ("architecture.svg", picture_faults())):
+        for fault in found:
+            print(f"docs/{name}: {fault}")
+            count += 1
     results = subprocess.run([ROOT / "docs/site/results_page.py", "--check"], capture_output=True, text=True)
     if results.returncode:
         print(results.stderr, end="")

@@ -46,7 +46,7 @@ def body_at(text, at):
 
 
 def definition(name, text):
-    """Text of the definitions of a function, class or constant of C++, all overloads; empty: none."""
+    """Text of the definitions of a function, class, test or constant of C++, all overloads; empty: none."""
     code = COMMENT_OR_STRING.sub(spaces, text)
     readable = without_comments(text)
     last = re.escape(name.split("::")[-1])
@@ -58,11 +58,14 @@ def definition(name, text):
                 found.append(readable[match.start():body[1]])
         return "\n".join(found)
 
-    if found := bodies(re.escape(name), 0, len(code)):
-        return found
     if "::" not in name:
         if match := re.search(rf"\b(?:class|struct|enum(?:\s+class)?)\s+{last}\b[^;{{()]*(\{{)", code):
             return readable[match.start():closing(code, match.start(1))]
+        if match := re.search(rf"\bTEST(?:_F|_P)?(\()\w+,\s*{last}\)", code):
+            return readable[match.start():closing(code, body_at(code, match.start(1))[0])]
+    if found := bodies(re.escape(name), 0, len(code)):
+        return found
+    if "::" not in name:
         # A declaration, a constant or an initialised member.
         match = re.search(rf"^[ \w:<>,&*]*[\w>&*][ &*]+{last}\s*[(={{;][^\n]*|^\s*{last}\s*=[^=][^\n]*", code, re.MULTILINE)
         return readable[match.start():match.end()] if match else ""

@@ -275,8 +275,8 @@ FittedProblem fitProblem(const Problem& problem) {
   return best;
 }
 
-/// Predictions of a fit: of each measured mode the direct gain and the factor, of each other mode frequency,
-/// direct gain and added gain.
+/// Predictions of a fit: of each measured mode the direct gain and the factor, gain(tip, tip) over
+/// gain(struck, read), the correction; of each other mode frequency, direct gain and added gain.
 struct Predictions {
   std::vector<double> direct, factor;                                // of measured modes
   std::vector<double> frequency, unmeasured_gain, unmeasured_added;  // of the others

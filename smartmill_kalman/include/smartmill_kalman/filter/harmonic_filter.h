@@ -13,7 +13,7 @@
 
 namespace smartmill::kalman {
 
-/// Settings of a filter's design.
+/// Settings of a filter's design. The initialisers are the defaults of the parameters.
 struct HarmonicFilterParameters {
   double bandwidth = 5000.0;
   int max_harmonics = 50;
