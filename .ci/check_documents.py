@@ -48,6 +48,13 @@ def find(path, folders):
     return next((root / path for root in roots if (root / path).exists()), None)
 
 
+def anchors(document):
+    """Identifiers of the sections of a document."""
+    text = document.read_text()
+    headings = re.findall(r"^#+ +(.*)$", text, re.MULTILINE)
+    return set(re.findall(r'<a id="([^"]+)">', text)) | {re.sub(r"[^\w\s-]", "", heading).strip().lower().replace(" ", "-") for heading in headings}
+
+
 def faults(document, folders, known_tests):
     text = document.read_text()
     for path in set(re.findall(r"`((?:src/)?(?:smartmill_|launch/)[\w/.]+\.(?:h|cpp|yaml|launch))`", text)):
@@ -62,9 +69,12 @@ def faults(document, folders, known_tests):
     for test in set(re.findall(r"`(smartmill_\w+_test)\b", text)):
         if test not in known_tests:
             yield f"{test}: there is no such test"
-    for link in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", text):
-        if not (document.parent / link).exists():
+    for link, _, section in re.findall(r"\]\(([^)#:]*)(#([^)]*))?\)", text):
+        linked = document.parent / link if link else document
+        if not linked.exists():
             yield f"{link}: there is no such file"
+        elif section and linked.suffix == ".md" and section not in anchors(linked):
+            yield f"{link}#{section}: there is no such section"
     for number in re.findall(r"\bissues? \d+", text, re.IGNORECASE):
         yield f"{number}: a reader cannot open it"
 
