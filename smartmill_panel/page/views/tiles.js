@@ -49,7 +49,7 @@ export class Tiles {
     this.spindle.element.append(this.spindleBar, this.spindle.more);
     this.load.element.append(this.loadBar, this.load.more);
     this.feed.element.append(make('div', { style: 'height: 18px' }), this.feed.more);
-    this.places = new Tile(place, 'Position, distance to go [mm]', 'places');
+    this.places = new Tile(place, 'Position, to go [mm]', 'places');
     this.places.value.remove();
     this.axes = make('div', { class: 'axes' });
     this.places.element.append(this.axes);
@@ -99,7 +99,7 @@ export class Tiles {
       this.lamp.set('CHATTER', `${fixed(last.frequency)} Hz, ${fixed(last.severity)} N` +
         (speed ? `, try ${fixed(rpm(speed))} rpm` : ''), old, 'bad');
     } else {
-      this.lamp.set('Stable', `${fixed(100 * last.energy_ratio, 1)} % of the energy off the harmonics`, old, 'good');
+      this.lamp.set('Stable', `${fixed(100 * last.energy_ratio, 1)} % off the harmonics`, old, 'good');
     }
     const recent = this.verdicts.filter(v => v.valid).slice(-HISTORY);
     const text = recent.map(v => v.chatter ? 'yes' : 'no').join();

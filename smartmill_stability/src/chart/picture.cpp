@@ -6,7 +6,7 @@
 
 namespace smartmill::stability {
 
-void drawBeside(const std::string& csv, std::string commands) {
+void drawPicture(const std::string& csv, std::string commands) {
   const std::string placeholder = "%FILE", file = Gnuplot::quoted(csv);
   for (std::size_t at = 0; (at = commands.find(placeholder, at)) != std::string::npos; at += file.size()) {
     commands.replace(at, placeholder.size(), file);

@@ -34,7 +34,7 @@ void write(const StabilityChart& chart, const std::string& file) {
             chart.power_depth_limit[i] / units::MM);
   }
   csv.save(file);
-  drawBeside(file,
+  drawPicture(file,
              "set xlabel 'Spindle speed [rpm]'\nset ylabel 'Axial depth [mm]'\nset yrange [0:]\n"
              "plot %FILE skip 1 using 1:2 with lines lw 2 title 'stability limit', "
              "%FILE skip 1 using 1:4 with lines title 'torque limit', "
@@ -55,7 +55,7 @@ void write(const BistableChart& chart, const std::string& file) {
     csv.row(units::rpmFromRadPerSec(b.speed), b.small.depth / units::MM, b.large.depth / units::MM,
             b.secant.depth / units::MM);
   csv.save(file);
-  drawBeside(file,
+  drawPicture(file,
              "set xlabel 'Spindle speed [rpm]'\nset ylabel 'Axial depth [mm]'\nset yrange [0:]\n"
              "plot %FILE skip 1 using 1:3:2 with filledcurves lc 'gold' title 'bistable', "
              "%FILE skip 1 using 1:2 with lines lw 2 lc 'black' title 'limit of small vibrations', "

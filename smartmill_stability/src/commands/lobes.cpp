@@ -79,7 +79,7 @@ void traceAll(const Request& request, const stability::FloquetSolver& solver,
       csv.row(c, units::rpmFromRadPerSec(p.speed), p.depth / units::MM, p.frequency, nameOf(p.kind));
   }
   csv.save(request.boundary);
-  stability::drawBeside(request.boundary,
+  stability::drawPicture(request.boundary,
                         axes(request.max_depth_mm) +
                             "plot %FILE skip 1 using 2:3 with lines lw 2 title 'boundary', "
                             "%FILE skip 1 using 2:(strcol(5) eq 'flip' ? $3 : NaN) with points "
@@ -132,7 +132,7 @@ void bistable(const Request& request, stability::Method method) {
     widest = std::max(widest, share);
   }
   csv.save(request.out);
-  stability::drawBeside(
+  stability::drawPicture(
       request.out, axes(request.max_depth_mm) +
                        "plot %FILE skip 1 using 1:5:2 with filledcurves lc 'gold' title 'bistable', "
                        "%FILE skip 1 using 1:2 with lines lw 2 lc 'black' title 'limit of small "
@@ -182,7 +182,7 @@ void run(const Request& request) {
     }
   }
   csv.save(request.out);
-  stability::drawBeside(
+  stability::drawPicture(
       request.out, axes(request.max_depth_mm) +
                        "plot %FILE skip 1 using 1:2 with lines lw 2 title 'first loss of stability (" +
                        std::string(nameOf(method)) +

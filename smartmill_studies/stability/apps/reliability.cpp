@@ -74,7 +74,7 @@ void report(const Request& request, const std::vector<stability::ReliabilityPoin
       "%zu machines, observed %s: all together %+.2f standard errors, %d bins outside their interval\n",
       points.size(), by_twin ? "in the simulator's records" : "by the solver",
       reliabilityScore(points, by_twin), outside);
-  stability::drawBeside(
+  stability::drawPicture(
       request.out,
       "set xlabel 'Predicted probability of chatter'\nset ylabel 'Observed share'\nset xrange [0:1]\nset "
       "yrange [0:1]\nset size square\nplot x with lines dt 2 lc 'gray' title 'as predicted', %FILE skip 1 "
