@@ -1,7 +1,8 @@
 #include "smartmill_sim/controller/collision_watch.h"
 
 #include <algorithm>
-#include <cmath>
+
+#include "smartmill_sim/controller/nc_alarm.h"
 
 namespace smartmill::sim {
 namespace {
@@ -53,6 +54,12 @@ CollisionWatch CollisionWatch::ofModel(const MachineModel& model) {
     watch.add({"TABLE", {-FAR, -FAR, -FAR}, {FAR, FAR, model.workpiece->low[2]}});
   }
   return watch;
+}
+
+std::optional<focas::AlarmMessage> CollisionWatch::check(const MotionState& state) const {
+  const Body* body = collidingBody(state.position, state.spindle_speed != 0.0);
+  if (!body) return std::nullopt;
+  return focas::AlarmMessage{EX_COLLISION, ALARM_EX, 0, "TOOL MET " + body->name};
 }
 
 const CollisionWatch::Body* CollisionWatch::collidingBody(const Axes3& position, bool turning) const {

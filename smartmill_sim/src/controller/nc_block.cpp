@@ -78,7 +78,7 @@ void readGCode(int code, NcBlock& block, bool& dwell) {
         setWord<int>(block.work, code - 54, 'G');
         return;
       }
-      throw NcAlarm(PS_IMPROPER_G, ALARM_PS, "IMPROPER G-CODE G" + std::to_string(code));
+      throw NcAlarm(PS_IMPROPER_G, "IMPROPER G-CODE G" + std::to_string(code));
   }
 }
 
@@ -113,11 +113,11 @@ NcBlock parseAssignment(NcReader& reader) {
   reader.next();
   block.macro = reader.number("#");
   if (reader.next() != '=') {
-    throw NcAlarm(PS_MACRO_FORMAT, ALARM_PS, "ILLEGAL EXPRESSION FORMAT");
+    throw NcAlarm(PS_MACRO_FORMAT, "ILLEGAL EXPRESSION FORMAT");
   }
   block.macro_value = reader.expression();
   if (!reader.done()) {
-    throw NcAlarm(PS_MACRO_FORMAT, ALARM_PS, "ILLEGAL EXPRESSION FORMAT");
+    throw NcAlarm(PS_MACRO_FORMAT, "ILLEGAL EXPRESSION FORMAT");
   }
   return block;
 }
@@ -126,7 +126,7 @@ NcBlock parseAssignment(NcReader& reader) {
 void refuseFlow(NcReader& reader) {
   for (const char* word : {"IF", "WHILE", "GOTO", "DO", "END", "THEN"}) {
     if (reader.accept(word)) {
-      throw NcAlarm(PS_MACRO_FORMAT, ALARM_PS, std::string(word) + " IS NOT KNOWN");
+      throw NcAlarm(PS_MACRO_FORMAT, std::string(word) + " IS NOT KNOWN");
     }
   }
 }
@@ -194,10 +194,6 @@ NcBlock parseWords(NcReader& reader) {
 }
 
 }  // namespace
-
-NcAlarm::NcAlarm(int number, int type, const std::string& text, int axis)
-    : Error(text), number_(number), type_(type), axis_(axis) {
-}
 
 NcBlock parseBlock(const std::string& line, const NcVariables& variables) {
   const std::string text = significantText(line);

@@ -15,13 +15,13 @@ constexpr int MAX_DEPTH = 5;  // of brackets, as on a 30i
 constexpr double MAX_WHOLE = 99999999.0;
 
 [[noreturn]] void badFormat() {
-  throw NcAlarm(PS_MACRO_FORMAT, ALARM_PS, "ILLEGAL EXPRESSION FORMAT");
+  throw NcAlarm(PS_MACRO_FORMAT, "ILLEGAL EXPRESSION FORMAT");
 }
 
 }  // namespace
 
 void illegalAddress(const std::string& what) {
-  throw NcAlarm(PS_ILLEGAL_ADDRESS, ALARM_PS, "IMPROPER NC ADDRESS " + what);
+  throw NcAlarm(PS_ILLEGAL_ADDRESS, "IMPROPER NC ADDRESS " + what);
 }
 
 bool NcReader::accept(const std::string& word) {
@@ -69,7 +69,7 @@ std::optional<double> NcReader::expression() {
     sum = sum.value_or(0.0) + sign * product().value_or(0.0);
   }
   if (sum && !std::isfinite(*sum)) {
-    throw NcAlarm(PS_ILLEGAL_ARGUMENT, ALARM_PS, "ILLEGAL ARGUMENT");
+    throw NcAlarm(PS_ILLEGAL_ARGUMENT, "ILLEGAL ARGUMENT");
   }
   return sum;
 }
@@ -80,7 +80,7 @@ std::optional<double> NcReader::product() {
     const bool division = next() == '/';
     const double factor = term().value_or(0.0);
     if (division && factor == 0.0) {
-      throw NcAlarm(PS_DIVIDED_BY_ZERO, ALARM_PS, "DIVIDED BY ZERO");
+      throw NcAlarm(PS_DIVIDED_BY_ZERO, "DIVIDED BY ZERO");
     }
     result = division ? result.value_or(0.0) / factor : result.value_or(0.0) * factor;
   }
@@ -113,7 +113,7 @@ std::optional<double> NcReader::term() {
     --position_;
     const double content = bracket();
     if (content < 0.0) {
-      throw NcAlarm(PS_ILLEGAL_ARGUMENT, ALARM_PS, "ILLEGAL ARGUMENT");
+      throw NcAlarm(PS_ILLEGAL_ARGUMENT, "ILLEGAL ARGUMENT");
     }
     return std::sqrt(content);
   }
@@ -172,7 +172,7 @@ double NcReader::literal(const std::string& address) {
     illegalAddress(address + written);
   }
   if (digits > MAX_DIGITS) {
-    throw NcAlarm(PS_TOO_MANY_DIGITS, ALARM_PS, "TOO MANY DIGITS " + address);
+    throw NcAlarm(PS_TOO_MANY_DIGITS, "TOO MANY DIGITS " + address);
   }
   return std::strtod(written.c_str(), nullptr);
 }

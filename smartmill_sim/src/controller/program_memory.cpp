@@ -40,7 +40,7 @@ std::string nameOf(int number) {
 
 }  // namespace
 
-focas::EwCode ProgramMemory::store(const std::string& text, int running, const focas::DateTime& now) {
+focas::EwCode ProgramMemory::store(const std::string& text, bool runs, const focas::DateTime& now) {
   std::map<int, Program> loaded;
   Program* current = nullptr;
   std::istringstream lines(text);
@@ -68,7 +68,7 @@ focas::EwCode ProgramMemory::store(const std::string& text, int running, const f
     size += loaded.count(number) != 0 ? 0 : program.text.size();
   }
   for (const auto& [number, program] : loaded) {
-    if (number == running) {
+    if (runs && number == selected_) {
       return focas::EW_BUSY;
     }
     size += program.text.size();
@@ -79,6 +79,21 @@ focas::EwCode ProgramMemory::store(const std::string& text, int running, const f
   for (auto& [number, program] : loaded) {
     programs_[number] = std::move(program);
   }
+  return focas::EW_OK;
+}
+
+focas::EwCode ProgramMemory::select(int number, bool runs) {
+  if (programs_.count(number) == 0) return focas::EW_DATA;
+  if (runs) return focas::EW_BUSY;
+  selected_ = number;
+  return focas::EW_OK;
+}
+
+focas::EwCode ProgramMemory::erase(int number, bool runs) {
+  if (programs_.count(number) == 0) return focas::EW_DATA;
+  if (runs && number == selected_) return focas::EW_BUSY;
+  programs_.erase(number);
+  if (number == selected_) selected_ = 0;
   return focas::EW_OK;
 }
 
