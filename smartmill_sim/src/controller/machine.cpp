@@ -67,7 +67,7 @@ focas::Status ControlledMachine::status() const {
   focas::Status status;
   status.aut = static_cast<std::int16_t>(mode_);
   const bool moving = axes.moving(now_);
-  status.run = program.held()                        ? focas::RUN_HOLD
+  status.run = program.held()                         ? focas::RUN_HOLD
                : program.busy() && !program.stopped() ? focas::RUN_START
                : session_ || program.stopped()        ? focas::RUN_STOP
                                                       : focas::RUN_RESET;

@@ -9,8 +9,8 @@
 
 namespace smartmill::sim {
 
-/// Part programs in the memory of a control, by O number; one is selected. `runs`: whether it runs, so that it
-/// must not change.
+/// Part programs in the memory of a control, by O number; one is selected. `runs`: whether it runs, so that
+/// it must not change.
 class ProgramMemory {
  public:
   static constexpr std::size_t CAPACITY = 512 * 1024;  ///< [byte]

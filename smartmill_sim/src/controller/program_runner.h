@@ -86,10 +86,10 @@ class ProgramRunner {
   Indicated indicated_;
   int number_ = 0;  // of the program, as it began
   bool from_memory_ = false, running_ = false, held_ = false, stopped_ = false;
-  NcBlock block_;                                           // the running block
-  double now_ = 0.0, time_ = 0.0;                           // [s] present time, time of the block
-  double wait_until_ = 0.0;                                 // [s] end of the running block's wait
-  double held_since_ = 0.0;                                 // [s]
+  NcBlock block_;                  // the running block
+  double now_ = 0.0, time_ = 0.0;  // [s] present time, time of the block
+  double wait_until_ = 0.0;        // [s] end of the running block's wait
+  double held_since_ = 0.0;        // [s]
 };
 
 }  // namespace smartmill::sim

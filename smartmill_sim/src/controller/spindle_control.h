@@ -6,17 +6,17 @@
 
 namespace smartmill::sim {
 
-/// The spindle under the words S, M3, M4, M5, M19 and M119 of a program, with override and load. Times [s] are
-/// those of the caller's clock and do not decrease.
+/// The spindle under the words S, M3, M4, M5, M19 and M119 of a program, with override and load. Times [s]
+/// are those of the caller's clock and do not decrease.
 class SpindleControl {
  public:
   SpindleControl(const ControllerOptions& options, const Overrides& overrides);
 
-  double speed(double time) const { return motion_.speed(time); }    ///< [rad/s]
-  double angle(double time) const { return motion_.angle(time); }    ///< [rad]
-  double settleTime() const { return motion_.settleTime(); }         ///< [s]
-  double programmed() const { return speed_; }                       ///< [rad/s] S, without sign and override
-  double commanded() const;                                          ///< [rad/s] with sign and override
+  double speed(double time) const { return motion_.speed(time); }  ///< [rad/s]
+  double angle(double time) const { return motion_.angle(time); }  ///< [rad]
+  double settleTime() const { return motion_.settleTime(); }       ///< [s]
+  double programmed() const { return speed_; }                     ///< [rad/s] S, without sign and override
+  double commanded() const;                                        ///< [rad/s] with sign and override
   bool atSpeed(double time) const;
   bool oriented(double time) const;
 
