@@ -54,7 +54,6 @@ class MillingProcess {
   /// Changes the contact. At a first contact the earlier motion is the present one without vibration.
   /// @throws Error on an invalid arc, a spindle at rest, a tooth period shorter than two steps.
   void engage(const std::vector<ContactArc>& arcs, const ToolMotion& now);
-  const std::vector<ContactArc>& arcs() const { return arcs_; }
   /// Depth of each arc [m] > 0.
   void setDepths(const std::vector<double>& depths);
   void setLaw(const CuttingLaw& law) { law_ = law; }
