@@ -19,9 +19,7 @@ constexpr double FAR = 10.0;       // [m]
 
 CollisionWatch CollisionWatch::ofModel(const MachineModel& model) {
   CollisionWatch watch;
-  if (!model.tool) {
-    return watch;
-  }
+  if (!model.tool) return watch;
   watch.tool_radius = model.tool->radius();
   watch.core_radius = watch.tool_radius;
   if (model.hammer) {
@@ -50,9 +48,7 @@ CollisionWatch CollisionWatch::ofModel(const MachineModel& model) {
            station_position[2] + station.offset + HAMMER_HALF_WIDTH);
     }
   }
-  if (model.workpiece) {
-    watch.add({"TABLE", {-FAR, -FAR, -FAR}, {FAR, FAR, model.workpiece->low[2]}});
-  }
+  if (model.workpiece) watch.add({"TABLE", {-FAR, -FAR, -FAR}, {FAR, FAR, model.workpiece->low[2]}});
   return watch;
 }
 
@@ -73,9 +69,7 @@ const CollisionWatch::Body* CollisionWatch::collidingBody(const Axes3& position,
       const double nearest = std::clamp(position[i], body.low[i], body.high[i]);
       square += (position[i] - nearest) * (position[i] - nearest);
     }
-    if (square < radius * radius) {
-      return &body;
-    }
+    if (square < radius * radius) return &body;
   }
   return nullptr;
 }

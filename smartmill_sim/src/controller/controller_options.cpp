@@ -28,9 +28,8 @@ ControllerOptions ControllerOptions::ofModel(const MachineModel& model) {
   options.spindle_max_speed = spindle.max_speed.value_or(units::radPerSecFromRpm(20000.0));
   options.spindle_acceleration = spindle.acceleration.value_or(units::radPerSecFromRpm(10000.0));
   options.spindle_torque = spindle.rated_torque.value_or(0.0);
-  if (spindle.load_meter_full_scale) {
+  if (spindle.load_meter_full_scale)
     options.load_step = 100.0 * LOAD_METER_STEP_VOLT / *spindle.load_meter_full_scale;
-  }
   options.watches.push_back(std::make_shared<CollisionWatch>(CollisionWatch::ofModel(model)));
   return options;
 }
@@ -59,20 +58,15 @@ void ControllerOptions::validate() const {
       throw Error("controller: home of " + axis + " at " + numberText(axes.home[i]) +
                   " m is outside the travel");
     }
-    if (!std::isfinite(work_offset[i])) {
-      throw Error("controller: work_offset of " + axis + " is not finite");
-    }
+    if (!std::isfinite(work_offset[i])) throw Error("controller: work_offset of " + axis + " is not finite");
   }
   positive("rapid", axes.rapid);
   positive("acceleration", axes.acceleration);
   positive("spindle_max_speed", spindle_max_speed);
   positive("spindle_acceleration", spindle_acceleration);
-  if (!(spindle_torque >= 0.0) || !(load_step >= 0.0)) {
+  if (!(spindle_torque >= 0.0) || !(load_step >= 0.0))
     throw Error("controller: spindle_torque and load_step must not be below 0");
-  }
-  if (buffer_size == 0) {
-    throw Error("controller: buffer_size is 0 bytes");
-  }
+  if (buffer_size == 0) throw Error("controller: buffer_size is 0 bytes");
 }
 
 }  // namespace smartmill::sim
