@@ -64,9 +64,8 @@ class HammerSensor : public BlockSensor {
   void read(const Sample& sample, World::Block& block) override {
     HammerStation::Sample at;
     if (station_) at = station_->read(sample.time, random_.engine);
-    std::vector<double> values{sample.share * std::exchange(force_, 0.0) + at.force, at.gap};
-    if (hasCross(station_)) values.push_back(at.cross);
-    append(values, block);
+    append(std::array<double, 2>{{sample.share * std::exchange(force_, 0.0) + at.force, at.gap}}, block);
+    if (hasCross(station_)) append(std::array<double, 1>{{at.cross}}, block);
   }
 
  private:
