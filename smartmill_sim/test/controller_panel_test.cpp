@@ -355,6 +355,26 @@ TEST(Collision, SpindleMustNotTurnWhereOnlyTheCoreFits) {
   EXPECT_EQ(m.alarmText(), "TOOL MET SENSOR");
 }
 
+// A fault of an axis is one class: the control knows only its alarm.
+TEST(MotionWatch, FaultOfAnAxisStopsTheMachine) {
+  struct ZAxisFault : MotionWatch {
+    std::optional<focas::AlarmMessage> check(const MotionState& state) const override {
+      if (state.position[2] > -0.05) return std::nullopt;
+      return focas::AlarmMessage{410, 6, 3, "SERVO ALARM: Z AXIS"};
+    }
+  };
+  ControllerOptions options = testOptions();
+  options.watches = {std::make_shared<ZAxisFault>()};
+  Machine m(options);
+  m.start("G91 G1 X10 F6000\nZ-100\n");
+  m.run(5.0);
+  EXPECT_EQ(m.alarmText(), "SERVO ALARM: Z AXIS");
+  EXPECT_EQ(m.controller.alarmBits(), 1U << 6);
+  // 0.1 m/s: at most one period of the check beyond the limit, and 2.5 mm of braking at 2 m/s2.
+  EXPECT_NEAR(m.controller.motion().position[2], -0.0525, 0.1 * 3.0 * DT);
+  EXPECT_EQ(m.controller.motion().velocity, (std::array<double, 3>{0, 0, 0}));
+}
+
 TEST(ServoGuide, CurrentsLoadAndTriggerAtABlock) {
   Machine m;
   ServoRecorder recorder(20);

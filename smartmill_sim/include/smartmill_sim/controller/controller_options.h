@@ -23,7 +23,7 @@ struct ControllerOptions {
   int mode = focas::AUT_REMOTE;                  ///< focas::Aut, set at the panel
   std::size_t buffer_size = 1024;                ///< [byte] of DNC text that has not run
   double load_step = 0.0;                        ///< [percent] resolution of the polled loads; 0: not rounded
-  std::vector<std::shared_ptr<const MotionWatch>> watches;  ///< asked in this order while the machine moves
+  std::vector<std::shared_ptr<const MotionWatch>> watches;  ///< called in this order while the machine moves
   std::function<std::int64_t()>
       wall_clock;  ///< [s] since 1970, of the controller's calendar; empty: the computer's clock
 
