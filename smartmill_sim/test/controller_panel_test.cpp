@@ -355,7 +355,7 @@ TEST(Collision, SpindleMustNotTurnWhereOnlyTheCoreFits) {
   EXPECT_EQ(m.alarmText(), "TOOL MET SENSOR");
 }
 
-// A fault of an axis is one class: the control knows only its alarm.
+// A fault of an axis is one class, which the control does not depend on.
 TEST(MotionWatch, FaultOfAnAxisStopsTheMachine) {
   struct ZAxisFault : MotionWatch {
     std::optional<focas::AlarmMessage> check(const MotionState& state) const override {

@@ -120,7 +120,7 @@ std::vector<double> Controller::machinePosition() const {
 
 std::vector<double> Controller::absolutePosition() const {
   const Impl::Access machine = impl_->locked();
-  return inMm(machine->program.workPosition(machine->now()));
+  return inMm(machine->executor.workPosition(machine->now()));
 }
 
 std::vector<double> Controller::relativePosition() const {
@@ -234,7 +234,7 @@ std::vector<focas::NumberedValue> Controller::diagnoses(int first, int last) con
   DiagnosisState state;
   state.waits_for_m = status.mstb != 0;
   state.moves = status.motion == focas::MOTION_MOVES;
-  state.dwells = machine->program.dwells(machine->now());
+  state.dwells = machine->executor.dwells(machine->now());
   state.at_zero_feed = status.run == focas::RUN_START && !state.moves &&
                        machine->axes.distanceToGo(machine->now()) != Variables::Point{};
   state.spindle_load = machine->spindleLoad();

@@ -22,7 +22,8 @@ ControlledMachine::ControlledMachine(const ControllerOptions& o)
       calendar(o.wall_clock),
       axes(options.axes),
       spindle(options, overrides),
-      program(options, overrides, variables, axes, spindle),
+      executor(options, overrides, variables, axes, spindle),
+      program(executor, options.buffer_size),
       mode_(o.mode) {
   variables.offsets[0] = o.work_offset;
   // Every control has programs in its memory; the selected one parks the machine.
@@ -71,17 +72,17 @@ focas::Status ControlledMachine::status() const {
                : program.busy() && !program.stopped() ? focas::RUN_START
                : session_ || program.stopped()        ? focas::RUN_STOP
                                                       : focas::RUN_RESET;
-  status.motion = moving                 ? focas::MOTION_MOVES
-                  : program.dwells(now_) ? focas::MOTION_DWELL
-                                         : focas::MOTION_NONE;
-  status.mstb = program.waitsForM() && !moving ? 1 : 0;
+  status.motion = moving                  ? focas::MOTION_MOVES
+                  : executor.dwells(now_) ? focas::MOTION_DWELL
+                                          : focas::MOTION_NONE;
+  status.mstb = executor.waitsForM() && !moving ? 1 : 0;
   status.emergency = emergency_ ? 1 : 0;
   status.alarm = alarms.empty() ? 0 : 1;
   return status;
 }
 
 std::string ControlledMachine::programText() const {
-  if (program.running() || session_ || program.fromMemory()) return program.text();
+  if (executor.running() || session_ || program.fromMemory()) return program.text();
   return memory.text(memory.selected()).value_or("");
 }
 
@@ -97,7 +98,7 @@ PmcSignals ControlledMachine::signals() const {
   s.at_rest = speed == 0.0;
   s.at_speed = spindle.atSpeed(now_);
   s.oriented = spindle.oriented(now_);
-  s.m_code = program.indicated().m_code;
+  s.m_code = executor.lastMCode();
   s.s_code = static_cast<int>(std::lround(units::rpmFromRadPerSec(spindle.programmed())));
   s.spindle_speed = units::rpmFromRadPerSec(speed);
   s.feed_override = overrides.feed(1.0);

@@ -6,14 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "controller/axes_motion.h"
 #include "controller/calendar_clock.h"
-#include "controller/overrides.h"
 #include "controller/pmc_memory.h"
 #include "controller/program_memory.h"
 #include "controller/program_runner.h"
-#include "controller/spindle_control.h"
-#include "controller/variables.h"
 #include "smartmill_sim/controller/controller.h"
 
 namespace smartmill::sim {
@@ -34,7 +30,7 @@ class ControlledMachine {
   focas::Status status() const;
   std::string programText() const;
   PmcSignals signals() const;
-  std::optional<double> variable(int number) const { return program.readVariable(number, now_); }
+  std::optional<double> variable(int number) const { return executor.readVariable(number, now_); }
   double spindleLoad() const;  ///< [percent] rounded to the resolution of the controller
 
   // The operator.
@@ -65,6 +61,7 @@ class ControlledMachine {
   Overrides overrides;
   AxesMotion axes;
   SpindleControl spindle;
+  BlockExecutor executor;
   ProgramRunner program;
 
  private:

@@ -1,25 +1,20 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
-#include <optional>
 #include <string>
 
-#include "controller/axes_motion.h"
 #include "controller/block_buffer.h"
-#include "controller/overrides.h"
-#include "controller/path_planner.h"
-#include "controller/spindle_control.h"
-#include "controller/variables.h"
+#include "controller/block_executor.h"
 
 namespace smartmill::sim {
 
-/// Executes the blocks of a program on axes and spindle. Times [s] are those of the caller's clock.
+/// Runs a program: takes its blocks from the text, holds, stops and ends. Times [s] are those of the caller's
+/// clock.
 class ProgramRunner {
  public:
-  /// The arguments must outlive the runner.
-  ProgramRunner(const ControllerOptions& options, const Overrides& overrides, Variables& variables,
-                AxesMotion& axes, SpindleControl& spindle);
+  /// The executor must outlive the runner. @param buffer_size [byte]
+  ProgramRunner(BlockExecutor& executor, std::size_t buffer_size)
+      : executor_(executor), buffer_size_(buffer_size) {}
 
   /// State that a program begins with. @param number of the program; 0: by DNC
   void begin(int number);
@@ -45,50 +40,30 @@ class ProgramRunner {
   /// Applies changed overrides to the present motion.
   void updateFeed(double now);
 
-  std::optional<double> readVariable(int number, double now) const;
-  std::array<double, 3> workPosition(double now) const;  ///< [m]
-
   bool fromMemory() const { return from_memory_; }
-  bool busy() const { return running_ || buffer_.hasLine(); }
-  bool running() const { return running_; }  ///< a block
+  bool busy() const { return executor_.running() || buffer_.hasLine(); }
   bool held() const { return held_; }
   bool stopped() const { return stopped_; }  ///< M0
-  bool dwells(double now) const { return running_ && block_.dwell && now < wait_until_; }
-  bool waitsForM() const { return running_ && block_.m_code; }
 
   /// Indicated state.
   struct Indicated {
     int program = 0, sequence = 0, blocks = 0;
     std::string block;
-    int m_code = 0;  ///< last one
   };
   const Indicated& indicated() const { return indicated_; }
   std::string text() const;  ///< the block and the text that follows
 
  private:
   bool takeBlock();
-  void start(const NcBlock& block);
-  void writeVariable(int number, std::optional<double> value);
-  void startSpindle(const NcBlock& block);
-  void planPath(const NcBlock& block);
-  double feedOf(const AxesMotion::Segment& segment) const;
-  void beginNextSegment();
-  void continueBlock();
+  void finishWait();
 
-  const ControllerOptions& options_;
-  const Overrides& overrides_;
-  Variables& variables_;
-  AxesMotion& axes_;
-  SpindleControl& spindle_;
-
+  BlockExecutor& executor_;
+  std::size_t buffer_size_;
   BlockBuffer buffer_;
-  NcModal modal_;
   Indicated indicated_;
   int number_ = 0;  // of the program, as it began
-  bool from_memory_ = false, running_ = false, held_ = false, stopped_ = false;
-  NcBlock block_;                  // the running block
+  bool from_memory_ = false, held_ = false, stopped_ = false;
   double now_ = 0.0, time_ = 0.0;  // [s] present time, time of the block
-  double wait_until_ = 0.0;        // [s] end of the running block's wait
   double held_since_ = 0.0;        // [s]
 };
 
