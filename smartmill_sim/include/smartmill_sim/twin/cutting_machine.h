@@ -8,44 +8,19 @@
 
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_sim/effects/effect_set.h"
-#include "smartmill_sim/twin/cutter.h"
-#include "smartmill_sim/twin/edge_layers.h"
+#include "smartmill_sim/twin/flexible_cut.h"
 #include "smartmill_sim/twin/measuring_chain.h"
-#include "smartmill_sim/twin/tip_structure.h"
-#include "smartmill_sim/twin/tip_trajectory.h"
-#include "smartmill_sim/twin/tool_contact.h"
 
 namespace smartmill::sim {
-
-/// How the tool is fed. steady: speed, feed and contact are constant while the tool cuts (a record of a
-/// campaign); without tool-tip modes the forces then come from tables over a revolution.
-enum class Feed { any, steady };
-
-/// Result of cut and tool structure in each step, before sensors, drive and signals.
-struct CutTrace {
-  struct Step {
-    CuttingForce force;
-    std::array<double, 2> displacement{{0, 0}};  ///< [m] of the tip
-    double acceleration = 0.0;                   ///< [m/s2] at the probe
-  };
-  /// For a tool without modes or with a prescribed motion of the tip; coefficients and factors of the law and
-  /// the response of the tip are applied on replay.
-  std::vector<CutSums> sums;
-  std::vector<Step> steps;  ///< for other tools
-};
 
 /// Cutting process, tool structure, force sensor, spindle drive and measuring chain of one machine with the
 /// effects of its model, in constant time steps.
 class CuttingMachine {
  public:
   /// Input over one step.
-  struct Input {
-    ToolMotion motion;  ///< displacement and rate are ignored: they follow from the structure
-    std::array<double, 2> tip_force{{0, 0}};  ///< [N] force on the tool in addition to cutting (a hammer)
+  struct Input : FlexibleCut::Input {
     std::array<double, 3> sensor_force{{0, 0, 0}};  ///< [N] force on the sensor in addition to cutting
     Axes3 axis_acceleration{{0, 0, 0}};             ///< [m/s2] of the machine axes
-    /// Prescribed motion of the tip: the chip follows from it instead of the structure's response.
-    std::optional<TipMotion> tip;
   };
   /// Output at the end of a step.
   struct Output {
@@ -71,13 +46,13 @@ class CuttingMachine {
   /// The model as changed by its effects.
   const MachineModel& model() const { return model_; }
   /// Whether the tip has modes, so that the chip regenerates.
-  bool vibrates() const { return tip_.vibrates(); }
+  bool vibrates() const { return cut_.vibrates(); }
 
   /// Changes the contact of tool and material, see MillingProcess.
   /// @param rise [1] share of the change in force that is linear over the step that ends now; the rest is a
   /// jump at its end.
   void engage(const std::vector<ContactArc>& arcs, const ToolMotion& now, double rise = 1.0);
-  bool cutting() const { return contact_.cutting(); }
+  bool cutting() const { return cut_.contact.cutting(); }
   /// Sets the axial depth [m] > 0 of every arc; the surface is unchanged. @param passed_over [m] feed path
   /// that is skipped
   void setDepth(double depth, double passed_over = 0.0);
@@ -89,22 +64,16 @@ class CuttingMachine {
   SignalStage signalStage() { return {effects_, now_}; }
 
   /// Displacement and acceleration sensors are at the tip, in x (0) or y (1).
-  void setProbe(std::size_t axis) { probe_ = axis; }
+  void setProbe(std::size_t axis) { cut_.setProbe(axis); }
 
   /// The input of every step will prescribe the motion of the tip.
-  void prescribeTip() { tip_prescribed_ = true; }
+  void prescribeTip() { cut_.prescribeTip(); }
 
   /// From here on the trace of cut and tool is recorded, or replayed from a machine that recorded it over the
   /// same steps and differs only in later stages (without modes or with a prescribed motion of the tip: also
   /// in coefficients and factors of the law and in the tool's modes). @param trace must outlive the steps
-  void recordTrace(CutTrace* trace) {
-    recorded_ = trace;
-    if (tracesSums()) cutter_->recordSums(&trace->sums);
-  }
-  void replayTrace(const CutTrace* trace) {
-    replayed_ = trace;
-    if (tracesSums()) cutter_->replaySums(&trace->sums);
-  }
+  void recordTrace(CutTrace* trace) { cut_.recordTrace(trace); }
+  void replayTrace(const CutTrace* trace) { cut_.replayTrace(trace); }
 
   /// Of forces and load meter only these channels are simulated; the others are invalid from here on.
   void selectChannels(const std::vector<std::size_t>& channels) { chain_.select(channels); }
@@ -129,28 +98,16 @@ class CuttingMachine {
                  int corner_slices);
 
   void update(const ToolMotion& motion);
-  // Stages of a step, in this order.
-  void applyEffects(const Input& input);  // state of the effects
-  CuttingForce cuttingForce(const Input& input);
-  void updateTip(const Input& input, Output& out);
-  void integrateTip(const Input& input, Output& out);
-  void endStep(const CuttingForce& force);
+  void applyEffects(const Input& input);
   void advanceTime(const ToolMotion& motion, std::size_t steps = 1);
-  // The same stages for many steps.
+  // step() for many steps.
   struct History : ForceHistory {
     std::vector<Instant> instants;  // where effects need them
   };
   void simulateCut(std::size_t steps, const std::function<void(std::size_t, Input&)>& next,
                    const ChannelRows& raw, History& history);
   bool replaysWithoutUpdates() const;
-  void replayRest(std::size_t from, const ChannelRows& raw, History& history);
   void applyOutputEffects(const std::vector<Instant>& instants, const ChannelRows& raw) const;
-
-  bool rigid() const { return cutter_ && cutter_->method() == Cutter::Method::tables; }
-  bool tracesSums() const { return cutter_ && (rigid() || tip_prescribed_); }
-  // Whether cut and tool are replayed step by step from a trace.
-  bool replaysTrace() const { return replayed_ && !tracesSums(); }
-  void setActualDepths();
 
   EffectSet effects_;
   MachineModel model_;  // as changed by the effects
@@ -159,17 +116,8 @@ class CuttingMachine {
   Instant now_;
   Clock clock_;
   int steps_to_update_ = 0;
-  ToolContact contact_;
-  std::optional<Cutter> cutter_;
-  EdgeLayers layers_;
-  TipStructure tip_;
+  FlexibleCut cut_;
   MeasuringChain chain_;
-  CuttingForce last_;  // at the last step
-  bool tip_prescribed_ = false;
-  CutTrace* recorded_ = nullptr;
-  const CutTrace* replayed_ = nullptr;
-  std::size_t replay_index_ = 0;  // next step of replayed_
-  std::optional<std::size_t> probe_;
 };
 
 }  // namespace smartmill::sim
