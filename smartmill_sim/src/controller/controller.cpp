@@ -309,11 +309,11 @@ EwCode Controller::dncStart() {
 }
 
 std::size_t Controller::dncData(const char* data, std::size_t size) {
-  return impl_->locked()->receive(data, size);
+  return impl_->locked()->session.receive(data, size);
 }
 
 EwCode Controller::dncEnd() {
-  return impl_->locked()->closeSession();
+  return impl_->locked()->session.close();
 }
 
 void Controller::dncCancel(int /*result*/) {
@@ -321,7 +321,7 @@ void Controller::dncCancel(int /*result*/) {
 }
 
 EwCode Controller::dncAbort() {
-  return impl_->locked()->takeAbortCode();
+  return impl_->locked()->session.takeAbortCode();
 }
 
 }  // namespace smartmill::sim

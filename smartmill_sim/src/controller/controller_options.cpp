@@ -12,10 +12,6 @@ namespace {
 
 constexpr double LOAD_METER_STEP_VOLT = 3.0e-4;  // [V] resolution of the load meter (Dunwoody 3.2.1)
 
-std::string numberText(double value) {
-  return std::to_string(value);
-}
-
 }  // namespace
 
 ControllerOptions ControllerOptions::ofModel(const MachineModel& model) {
@@ -44,18 +40,18 @@ focas::SysInfo ControllerOptions::fineInfo() {
 void ControllerOptions::validate() const {
   const auto positive = [](const char* key, double value) {
     if (!(value > 0.0) || !std::isfinite(value)) {
-      throw Error(std::string("controller: ") + key + " is " + numberText(value) +
+      throw Error(std::string("controller: ") + key + " is " + std::to_string(value) +
                   ", expected a value above 0");
     }
   };
   for (std::size_t i = 0; i < 3; ++i) {
     const std::string axis(1, "xyz"[i]);
     if (!(axes.travel[i][0] < axes.travel[i][1])) {
-      throw Error("controller: travel of " + axis + " from " + numberText(axes.travel[i][0]) + " to " +
-                  numberText(axes.travel[i][1]) + " m is empty");
+      throw Error("controller: travel of " + axis + " from " + std::to_string(axes.travel[i][0]) + " to " +
+                  std::to_string(axes.travel[i][1]) + " m is empty");
     }
     if (!(axes.home[i] >= axes.travel[i][0] && axes.home[i] <= axes.travel[i][1])) {
-      throw Error("controller: home of " + axis + " at " + numberText(axes.home[i]) +
+      throw Error("controller: home of " + axis + " at " + std::to_string(axes.home[i]) +
                   " m is outside the travel");
     }
     if (!std::isfinite(work_offset[i])) throw Error("controller: work_offset of " + axis + " is not finite");

@@ -1,8 +1,6 @@
 #include "controller/machine.h"
 
-#include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "smartmill_core/units.h"
 
@@ -24,6 +22,7 @@ ControlledMachine::ControlledMachine(const ControllerOptions& o)
       spindle(options, overrides),
       executor(options, overrides, variables, axes, spindle),
       program(executor, options.buffer_size),
+      session(program),
       mode_(o.mode) {
   variables.offsets[0] = o.work_offset;
   // Every control has programs in its memory; the selected one parks the machine.
@@ -68,10 +67,10 @@ focas::Status ControlledMachine::status() const {
   focas::Status status;
   status.aut = static_cast<std::int16_t>(mode_);
   const bool moving = axes.moving(now_);
-  status.run = program.held()                         ? focas::RUN_HOLD
-               : program.busy() && !program.stopped() ? focas::RUN_START
-               : session_ || program.stopped()        ? focas::RUN_STOP
-                                                      : focas::RUN_RESET;
+  status.run = program.held()                          ? focas::RUN_HOLD
+               : program.busy() && !program.stopped()  ? focas::RUN_START
+               : session.isOpen() || program.stopped() ? focas::RUN_STOP
+                                                       : focas::RUN_RESET;
   status.motion = moving                  ? focas::MOTION_MOVES
                   : executor.dwells(now_) ? focas::MOTION_DWELL
                                           : focas::MOTION_NONE;
@@ -82,7 +81,7 @@ focas::Status ControlledMachine::status() const {
 }
 
 std::string ControlledMachine::programText() const {
-  if (executor.running() || session_ || program.fromMemory()) return program.text();
+  if (executor.running() || session.isOpen() || program.fromMemory()) return program.text();
   return memory.text(memory.selected()).value_or("");
 }
 
@@ -90,7 +89,7 @@ PmcSignals ControlledMachine::signals() const {
   PmcSignals s;
   const double speed = spindle.speed(now_);
   s.mode = mode_;
-  s.operating = program.busy() || session_;
+  s.operating = program.busy() || session.isOpen();
   s.started = program.busy() && !program.held() && !program.stopped();
   s.held = program.held();
   s.alarm = !alarms.empty();
@@ -115,7 +114,7 @@ double ControlledMachine::spindleLoad() const {
 
 void ControlledMachine::halt(double time, EwCode why) {
   program.halt(time);
-  if (std::exchange(session_, false)) abort_ = why;
+  session.abort(why);
 }
 
 void ControlledMachine::alarmAt(double time, const focas::AlarmMessage& message) {
@@ -124,7 +123,7 @@ void ControlledMachine::alarmAt(double time, const focas::AlarmMessage& message)
 }
 
 void ControlledMachine::setMode(int aut) {
-  if (aut != mode_ && (program.busy() || session_ || program.held() || program.stopped()))
+  if (aut != mode_ && (program.busy() || session.isOpen() || program.held() || program.stopped()))
     halt(now_, focas::EW_MODE);
   mode_ = aut;
 }
@@ -170,34 +169,9 @@ EwCode ControlledMachine::cycleStart() {
 EwCode ControlledMachine::openSession() {
   if (emergency_ || !alarms.empty()) return focas::EW_ALARM;
   if (mode_ != focas::AUT_REMOTE) return focas::EW_MODE;
-  if (session_ || program.busy() || axes.moving(now_)) return focas::EW_BUSY;
-  session_ = true;
-  abort_ = focas::EW_OK;
-  program.begin(0);
+  if (session.isOpen() || program.busy() || axes.moving(now_)) return focas::EW_BUSY;
+  session.open();
   return focas::EW_OK;
-}
-
-std::size_t ControlledMachine::receive(const char* data, std::size_t size) {
-  if (!session_) return size;  // data of a closed session is discarded
-  const std::size_t taken = std::min(size, program.space());
-  program.append({data, taken});
-  return taken;
-}
-
-EwCode ControlledMachine::closeSession() {
-  if (abort_ != focas::EW_OK) return takeAbortCode();
-  if (!std::exchange(session_, false)) return focas::EW_FUNC;
-  program.endText();
-  return focas::EW_OK;
-}
-
-void ControlledMachine::cancelSession() {
-  session_ = false;
-  halt(now_, focas::EW_OK);
-}
-
-EwCode ControlledMachine::takeAbortCode() {
-  return std::exchange(abort_, focas::EW_OK);
 }
 
 }  // namespace smartmill::sim

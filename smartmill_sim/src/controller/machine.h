@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "controller/calendar_clock.h"
+#include "controller/dnc_session.h"
 #include "controller/pmc_memory.h"
 #include "controller/program_memory.h"
-#include "controller/program_runner.h"
 #include "smartmill_sim/controller/controller.h"
 
 namespace smartmill::sim {
@@ -45,10 +45,7 @@ class ControlledMachine {
 
   // The DNC session.
   focas::EwCode openSession();
-  std::size_t receive(const char* data, std::size_t size);
-  focas::EwCode closeSession();
-  void cancelSession();
-  focas::EwCode takeAbortCode();
+  void cancelSession() { halt(now_, focas::EW_OK); }
 
   const ControllerOptions options;
   Variables variables;
@@ -63,6 +60,7 @@ class ControlledMachine {
   SpindleControl spindle;
   BlockExecutor executor;
   ProgramRunner program;
+  DncSession session;
 
  private:
   void halt(double time, focas::EwCode why);
@@ -76,8 +74,6 @@ class ControlledMachine {
   double checked_ = -1.0;  // [s] last check of the motion
   int mode_;
   bool emergency_ = false;
-  bool session_ = false;
-  focas::EwCode abort_ = focas::EW_OK;  // why the session ended, until reported
 };
 
 }  // namespace smartmill::sim
