@@ -1,6 +1,5 @@
 #include "controller/nc_reader.h"
 
-#include <algorithm>
 #include <cctype>
 #include <cmath>
 #include <cstdlib>

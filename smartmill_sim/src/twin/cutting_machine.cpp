@@ -1,10 +1,6 @@
 #include "smartmill_sim/twin/cutting_machine.h"
 
-#include <algorithm>
-#include <cmath>
-
 #include "smartmill_core/error.h"
-#include "smartmill_core/units.h"
 
 namespace smartmill::sim {
 namespace {

@@ -6,7 +6,6 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/math/angle.h"
-#include "smartmill_core/units.h"
 
 namespace smartmill::sim {
 MillingProcess::MillingProcess(const ToolGeometry& tool, const CuttingLaw& law, double time_step,

@@ -1,8 +1,6 @@
 #pragma once
 
-#include <array>
 #include <random>
-#include <vector>
 
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/model/effect.h"
