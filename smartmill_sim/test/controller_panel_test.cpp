@@ -2,9 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <memory>
 
 #include "controller_rig.h"
 #include "smartmill_focas/server.h"
+#include "smartmill_sim/controller/collision_watch.h"
 #include "smartmill_sim/controller/nc_block.h"
 #include "smartmill_sim/controller/servo_recorder.h"
 
@@ -199,7 +201,6 @@ TEST(Panel, BackwardsAndOrientationByM19) {
 TEST(Spindle, LoadSlowsTheRampAndStallsBeyondTheDrivesTorque) {
   ControllerOptions options = testOptions();
   options.spindle_torque = 20.0;  // 500 rad/s2: 0.04 kg m2
-  EXPECT_NEAR(options.spindleInertia(), 0.04, ROUND);
   Machine m(options);
   m.controller.setSpindleTorque(5.0);
   m.start("S12000 M3\nG4 X60.\n");
@@ -315,7 +316,7 @@ TEST(Collision, CollisionWithAnObstacleStopsWithAnAlarm) {
   model.workpiece.emplace();
   model.workpiece->low = {-0.14, -0.08, -0.2};
   ControllerOptions options = testOptions();
-  options.obstacles = CollisionWatch::ofModel(model);
+  options.watches = {std::make_shared<CollisionWatch>(CollisionWatch::ofModel(model))};
   const struct {
     const char* text;
     const char* met;
@@ -340,9 +341,11 @@ TEST(Collision, CollisionWithAnObstacleStopsWithAnAlarm) {
 // At rest the space between two flutes permits a closer position, in which the spindle must not turn.
 TEST(Collision, SpindleMustNotTurnWhereOnlyTheCoreFits) {
   ControllerOptions options = testOptions();
-  options.obstacles.tool_radius = 0.010;
-  options.obstacles.core_radius = 0.009;
-  options.obstacles.add({"SENSOR", {0.02, -0.005, -1.0}, {0.08, 0.005, 1.0}});
+  CollisionWatch obstacles;
+  obstacles.tool_radius = 0.010;
+  obstacles.core_radius = 0.009;
+  obstacles.add({"SENSOR", {0.02, -0.005, -1.0}, {0.08, 0.005, 1.0}});
+  options.watches = {std::make_shared<CollisionWatch>(obstacles)};
   Machine m(options);
   m.start("G1 X10.5 F600\n");
   m.runToEnd();
@@ -350,6 +353,26 @@ TEST(Collision, SpindleMustNotTurnWhereOnlyTheCoreFits) {
   m.send("#1133=2048\nM119\n");
   m.run(0.1);
   EXPECT_EQ(m.alarmText(), "TOOL MET SENSOR");
+}
+
+// A fault of an axis is one class, which the control does not depend on.
+TEST(MotionWatch, FaultOfAnAxisStopsTheMachine) {
+  struct ZAxisFault : MotionWatch {
+    std::optional<focas::AlarmMessage> check(const MotionState& state) const override {
+      if (state.position[2] > -0.05) return std::nullopt;
+      return focas::AlarmMessage{410, 6, 3, "SERVO ALARM: Z AXIS"};
+    }
+  };
+  ControllerOptions options = testOptions();
+  options.watches = {std::make_shared<ZAxisFault>()};
+  Machine m(options);
+  m.start("G91 G1 X10 F6000\nZ-100\n");
+  m.run(5.0);
+  EXPECT_EQ(m.alarmText(), "SERVO ALARM: Z AXIS");
+  EXPECT_EQ(m.controller.alarmBits(), 1U << 6);
+  // 0.1 m/s: at most one period of the check beyond the limit, and 2.5 mm of braking at 2 m/s2.
+  EXPECT_NEAR(m.controller.motion().position[2], -0.0525, 0.1 * 3.0 * DT);
+  EXPECT_EQ(m.controller.motion().velocity, (std::array<double, 3>{0, 0, 0}));
 }
 
 TEST(ServoGuide, CurrentsLoadAndTriggerAtABlock) {

@@ -1,7 +1,8 @@
 #include "smartmill_sim/controller/collision_watch.h"
 
 #include <algorithm>
-#include <cmath>
+
+#include "smartmill_sim/controller/nc_alarm.h"
 
 namespace smartmill::sim {
 namespace {
@@ -18,9 +19,7 @@ constexpr double FAR = 10.0;       // [m]
 
 CollisionWatch CollisionWatch::ofModel(const MachineModel& model) {
   CollisionWatch watch;
-  if (!model.tool) {
-    return watch;
-  }
+  if (!model.tool) return watch;
   watch.tool_radius = model.tool->radius();
   watch.core_radius = watch.tool_radius;
   if (model.hammer) {
@@ -49,10 +48,14 @@ CollisionWatch CollisionWatch::ofModel(const MachineModel& model) {
            station_position[2] + station.offset + HAMMER_HALF_WIDTH);
     }
   }
-  if (model.workpiece) {
-    watch.add({"TABLE", {-FAR, -FAR, -FAR}, {FAR, FAR, model.workpiece->low[2]}});
-  }
+  if (model.workpiece) watch.add({"TABLE", {-FAR, -FAR, -FAR}, {FAR, FAR, model.workpiece->low[2]}});
   return watch;
+}
+
+std::optional<focas::AlarmMessage> CollisionWatch::check(const MotionState& state) const {
+  const Body* body = collidingBody(state.position, state.spindle_speed != 0.0);
+  if (!body) return std::nullopt;
+  return focas::AlarmMessage{EX_COLLISION, ALARM_EX, 0, "TOOL MET " + body->name};
 }
 
 const CollisionWatch::Body* CollisionWatch::collidingBody(const Axes3& position, bool turning) const {
@@ -66,9 +69,7 @@ const CollisionWatch::Body* CollisionWatch::collidingBody(const Axes3& position,
       const double nearest = std::clamp(position[i], body.low[i], body.high[i]);
       square += (position[i] - nearest) * (position[i] - nearest);
     }
-    if (square < radius * radius) {
-      return &body;
-    }
+    if (square < radius * radius) return &body;
   }
   return nullptr;
 }

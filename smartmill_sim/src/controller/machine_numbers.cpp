@@ -31,18 +31,14 @@ std::vector<double> all(double value) {
 std::vector<NumberedValue> machineParameters(const ControllerOptions& o) {
   const auto travel = [&](std::size_t end) {
     std::vector<double> values;
-    for (const std::array<double, 2>& axis : o.axes.travel) {
-      values.push_back(axis[end] / units::MM);
-    }
+    for (const std::array<double, 2>& axis : o.axes.travel) values.push_back(axis[end] / units::MM);
     return values;
   };
   const double rapid = o.axes.rapid / MM_PER_MIN;
   const double rapid_ramp = 1e3 * o.axes.rapid / o.axes.acceleration;  // [ms]
   const double max_speed = units::rpmFromRadPerSec(o.spindle_max_speed);
   std::vector<double> home;
-  for (const double at : o.axes.home) {
-    home.push_back(at / units::MM);
-  }
+  for (const double at : o.axes.home) home.push_back(at / units::MM);
   return {
       single(0, NumberedType::bits, 0x02),                 // ISO code
       single(20, NumberedType::byte, 9),                   // I/O channel: embedded Ethernet

@@ -20,16 +20,12 @@ std::string significantText(const std::string& line) {
       text += static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
     }
   }
-  if (comment) {
-    illegalAddress("(");
-  }
+  if (comment) illegalAddress("(");
   return text;
 }
 
 void refuseRepeated(bool already, char address) {
-  if (already) {
-    illegalAddress(std::string("TWICE ") + address);
-  }
+  if (already) illegalAddress(std::string("TWICE ") + address);
 }
 
 template <class T>
@@ -78,7 +74,7 @@ void readGCode(int code, NcBlock& block, bool& dwell) {
         setWord<int>(block.work, code - 54, 'G');
         return;
       }
-      throw NcAlarm(PS_IMPROPER_G, ALARM_PS, "IMPROPER G-CODE G" + std::to_string(code));
+      throw NcAlarm(PS_IMPROPER_G, "IMPROPER G-CODE G" + std::to_string(code));
   }
 }
 
@@ -95,39 +91,28 @@ void readMCode(int code, NcBlock& block) {
 
 /// In G4 the words X (s) and P (ms) are times.
 void readDwell(NcBlock& block, const std::optional<double>& milliseconds) {
-  if (block.axis[1] || block.axis[2] || block.axis[0].has_value() == milliseconds.has_value()) {
+  if (block.axis[1] || block.axis[2] || block.axis[0].has_value() == milliseconds.has_value())
     illegalAddress("IN G4");
-  }
   block.dwell = milliseconds ? *milliseconds * 1e-3 : *block.axis[0];
   block.axis[0].reset();
-  if (*block.dwell < 0.0) {
-    illegalAddress("IN G4");
-  }
+  if (*block.dwell < 0.0) illegalAddress("IN G4");
 }
 
 NcBlock parseAssignment(NcReader& reader) {
   NcBlock block;
-  if (reader.accept("N")) {
-    block.sequence = reader.integer("N");
-  }
+  if (reader.accept("N")) block.sequence = reader.integer("N");
   reader.next();
   block.macro = reader.number("#");
-  if (reader.next() != '=') {
-    throw NcAlarm(PS_MACRO_FORMAT, ALARM_PS, "ILLEGAL EXPRESSION FORMAT");
-  }
+  if (reader.next() != '=') throw NcAlarm(PS_MACRO_FORMAT, "ILLEGAL EXPRESSION FORMAT");
   block.macro_value = reader.expression();
-  if (!reader.done()) {
-    throw NcAlarm(PS_MACRO_FORMAT, ALARM_PS, "ILLEGAL EXPRESSION FORMAT");
-  }
+  if (!reader.done()) throw NcAlarm(PS_MACRO_FORMAT, "ILLEGAL EXPRESSION FORMAT");
   return block;
 }
 
 /// Refuses control flow of macro programs, which this control does not support.
 void refuseFlow(NcReader& reader) {
   for (const char* word : {"IF", "WHILE", "GOTO", "DO", "END", "THEN"}) {
-    if (reader.accept(word)) {
-      throw NcAlarm(PS_MACRO_FORMAT, ALARM_PS, std::string(word) + " IS NOT KNOWN");
-    }
+    if (reader.accept(word)) throw NcAlarm(PS_MACRO_FORMAT, std::string(word) + " IS NOT KNOWN");
   }
 }
 
@@ -187,23 +172,16 @@ NcBlock parseWords(NcReader& reader) {
   } else if (milliseconds) {
     illegalAddress("P");
   }
-  if ((block.feed && *block.feed < 0.0) || (block.speed && *block.speed < 0.0)) {
+  if ((block.feed && *block.feed < 0.0) || (block.speed && *block.speed < 0.0))
     illegalAddress(block.feed && *block.feed < 0.0 ? "F" : "S");
-  }
   return block;
 }
 
 }  // namespace
 
-NcAlarm::NcAlarm(int number, int type, const std::string& text, int axis)
-    : Error(text), number_(number), type_(type), axis_(axis) {
-}
-
 NcBlock parseBlock(const std::string& line, const NcVariables& variables) {
   const std::string text = significantText(line);
-  if (text.empty() || text[0] == '%') {
-    return {};
-  }
+  if (text.empty() || text[0] == '%') return {};
   // A sequence number may precede an assignment.
   const std::size_t first = text[0] == 'N' ? text.find_first_not_of("0123456789", 1) : 0;
   NcReader reader(text, variables);

@@ -1,6 +1,5 @@
 #include "controller/nc_reader.h"
 
-#include <algorithm>
 #include <cctype>
 #include <cmath>
 #include <cstdlib>
@@ -15,19 +14,17 @@ constexpr int MAX_DEPTH = 5;  // of brackets, as on a 30i
 constexpr double MAX_WHOLE = 99999999.0;
 
 [[noreturn]] void badFormat() {
-  throw NcAlarm(PS_MACRO_FORMAT, ALARM_PS, "ILLEGAL EXPRESSION FORMAT");
+  throw NcAlarm(PS_MACRO_FORMAT, "ILLEGAL EXPRESSION FORMAT");
 }
 
 }  // namespace
 
 void illegalAddress(const std::string& what) {
-  throw NcAlarm(PS_ILLEGAL_ADDRESS, ALARM_PS, "IMPROPER NC ADDRESS " + what);
+  throw NcAlarm(PS_ILLEGAL_ADDRESS, "IMPROPER NC ADDRESS " + what);
 }
 
 bool NcReader::accept(const std::string& word) {
-  if (text_.compare(position_, word.size(), word) != 0) {
-    return false;
-  }
+  if (text_.compare(position_, word.size(), word) != 0) return false;
   position_ += word.size();
   return true;
 }
@@ -35,9 +32,7 @@ bool NcReader::accept(const std::string& word) {
 std::optional<double> NcReader::value(const std::string& address) {
   const std::size_t sign = peek() == '-' || peek() == '+' ? 1 : 0;
   const char first = position_ + sign < text_.size() ? text_[position_ + sign] : '\0';
-  if (first != '#' && first != '[') {
-    return literal(address);
-  }
+  if (first != '#' && first != '[') return literal(address);
   const bool minus = sign == 1 && next() == '-';
   const std::optional<double> content = first == '#' ? variable() : std::optional<double>(bracket());
   return content && minus ? std::optional<double>(-*content) : content;
@@ -45,20 +40,15 @@ std::optional<double> NcReader::value(const std::string& address) {
 
 std::optional<int> NcReader::integer(const std::string& address) {
   const std::optional<double> content = value(address);
-  if (!content) {
-    return std::nullopt;
-  }
-  if (!(*content >= 0.0 && *content <= MAX_WHOLE) || *content != std::floor(*content)) {
+  if (!content) return std::nullopt;
+  if (!(*content >= 0.0 && *content <= MAX_WHOLE) || *content != std::floor(*content))
     illegalAddress(address);
-  }
   return static_cast<int>(*content);
 }
 
 int NcReader::number(const std::string& address) {
   const std::optional<int> content = integer(address);
-  if (!content) {
-    illegalAddress(address);
-  }
+  if (!content) illegalAddress(address);
   return *content;
 }
 
@@ -68,9 +58,7 @@ std::optional<double> NcReader::expression() {
     const double sign = next() == '-' ? -1.0 : 1.0;
     sum = sum.value_or(0.0) + sign * product().value_or(0.0);
   }
-  if (sum && !std::isfinite(*sum)) {
-    throw NcAlarm(PS_ILLEGAL_ARGUMENT, ALARM_PS, "ILLEGAL ARGUMENT");
-  }
+  if (sum && !std::isfinite(*sum)) throw NcAlarm(PS_ILLEGAL_ARGUMENT, "ILLEGAL ARGUMENT");
   return sum;
 }
 
@@ -79,9 +67,7 @@ std::optional<double> NcReader::product() {
   while (peek() == '*' || peek() == '/') {
     const bool division = next() == '/';
     const double factor = term().value_or(0.0);
-    if (division && factor == 0.0) {
-      throw NcAlarm(PS_DIVIDED_BY_ZERO, ALARM_PS, "DIVIDED BY ZERO");
-    }
+    if (division && factor == 0.0) throw NcAlarm(PS_DIVIDED_BY_ZERO, "DIVIDED BY ZERO");
     result = division ? result.value_or(0.0) / factor : result.value_or(0.0) * factor;
   }
   return result;
@@ -90,17 +76,11 @@ std::optional<double> NcReader::product() {
 std::optional<double> NcReader::term() {
   if (peek() == '-' || peek() == '+') {
     const double sign = next() == '-' ? -1.0 : 1.0;
-    if (peek() == '-' || peek() == '+') {
-      badFormat();
-    }
+    if (peek() == '-' || peek() == '+') badFormat();
     return sign * term().value_or(0.0);
   }
-  if (peek() == '#') {
-    return variable();
-  }
-  if (peek() == '[') {
-    return bracket();
-  }
+  if (peek() == '#') return variable();
+  if (peek() == '[') return bracket();
   if (accept("SIN[")) {
     --position_;
     return std::sin(bracket() * units::PI / 180.0);
@@ -112,14 +92,10 @@ std::optional<double> NcReader::term() {
   if (accept("SQRT[")) {
     --position_;
     const double content = bracket();
-    if (content < 0.0) {
-      throw NcAlarm(PS_ILLEGAL_ARGUMENT, ALARM_PS, "ILLEGAL ARGUMENT");
-    }
+    if (content < 0.0) throw NcAlarm(PS_ILLEGAL_ARGUMENT, "ILLEGAL ARGUMENT");
     return std::sqrt(content);
   }
-  if (std::isdigit(static_cast<unsigned char>(peek())) == 0 && peek() != '.') {
-    badFormat();
-  }
+  if (std::isdigit(static_cast<unsigned char>(peek())) == 0 && peek() != '.') badFormat();
   return literal("#=");
 }
 
@@ -127,28 +103,20 @@ std::optional<double> NcReader::variable() {
   next();
   std::optional<double> index;
   if (peek() == '#' || peek() == '[') {
-    if (++depth_ > MAX_DEPTH) {
-      badFormat();
-    }
+    if (++depth_ > MAX_DEPTH) badFormat();
     index = peek() == '#' ? variable() : std::optional<double>(bracket());
     --depth_;
   } else {
     index = literal("#");
   }
-  if (!index || *index < 0.0 || *index > MAX_WHOLE || *index != std::floor(*index)) {
-    badFormat();
-  }
+  if (!index || *index < 0.0 || *index > MAX_WHOLE || *index != std::floor(*index)) badFormat();
   return variables_ ? variables_(static_cast<int>(*index)) : std::nullopt;
 }
 
 double NcReader::bracket() {
-  if (next() != '[' || ++depth_ > MAX_DEPTH) {
-    badFormat();
-  }
+  if (next() != '[' || ++depth_ > MAX_DEPTH) badFormat();
   const double content = expression().value_or(0.0);
-  if (next() != ']') {
-    badFormat();
-  }
+  if (next() != ']') badFormat();
   --depth_;
   return content;
 }
@@ -168,12 +136,8 @@ double NcReader::literal(const std::string& address) {
     }
   }
   const std::string written = text_.substr(start, position_ - start);
-  if (digits == 0 || points > 1) {
-    illegalAddress(address + written);
-  }
-  if (digits > MAX_DIGITS) {
-    throw NcAlarm(PS_TOO_MANY_DIGITS, ALARM_PS, "TOO MANY DIGITS " + address);
-  }
+  if (digits == 0 || points > 1) illegalAddress(address + written);
+  if (digits > MAX_DIGITS) throw NcAlarm(PS_TOO_MANY_DIGITS, "TOO MANY DIGITS " + address);
   return std::strtod(written.c_str(), nullptr);
 }
 

@@ -7,14 +7,6 @@
 
 namespace smartmill::sim {
 
-// Numbers of program alarms of a 30i.
-constexpr int PS_TOO_MANY_DIGITS = 3;
-constexpr int PS_ILLEGAL_ADDRESS = 9;
-constexpr int PS_IMPROPER_G = 10;
-constexpr int PS_DIVIDED_BY_ZERO = 112;
-constexpr int PS_MACRO_FORMAT = 114;
-constexpr int PS_ILLEGAL_ARGUMENT = 119;
-
 [[noreturn]] void illegalAddress(const std::string& what);
 
 /// Reads values from the significant characters of a block. The value of a single vacant variable is empty;

@@ -24,9 +24,7 @@ PathMove PathMove::arc(const Point& start, const Point& target, const std::array
   const double end_angle = std::atan2(target[1] - centre[1], target[0] - centre[0]);
   double sweep = std::fmod(end_angle - move.start_angle_, units::TWO_PI);
   const bool closed = std::hypot(target[0] - start[0], target[1] - start[1]) < 1e-12;
-  if (closed) {
-    sweep = 0.0;
-  }
+  if (closed) sweep = 0.0;
   if (clockwise) {
     move.sweep_ = sweep < 0.0 ? sweep : sweep - units::TWO_PI;
   } else {
@@ -49,9 +47,7 @@ void PathMove::plan(double time, double feed, double acceleration) {
     peak_ = now;
     ramp_ = steady_ = 0.0;
     end_distance_ = std::min(length_, done + 0.5 * now * now / acceleration);
-    if (length_ - end_distance_ < 1e-12) {
-      end_distance_ = length_;
-    }
+    if (length_ - end_distance_ < 1e-12) end_distance_ = length_;
   } else {
     end_distance_ = length_;
     ramp_ = std::abs(peak_ - now) / acceleration;
@@ -74,39 +70,25 @@ void PathMove::stop(double time, double acceleration) {
 double PathMove::distance(double time) const {
   const double since = time - begin_;
   const double remaining = duration_ - since;
-  if (remaining <= 0.0) {
-    return end_distance_;
-  }
+  if (remaining <= 0.0) return end_distance_;
   // Measured from the nearer end, so that both ends are exact.
-  if (remaining < down_) {
-    return end_distance_ - 0.5 * acceleration_ * remaining * remaining;
-  }
+  if (remaining < down_) return end_distance_ - 0.5 * acceleration_ * remaining * remaining;
   const double a = std::copysign(acceleration_, peak_ - first_);
-  if (since < ramp_) {
-    return from_distance_ + since * (first_ + 0.5 * a * since);
-  }
+  if (since < ramp_) return from_distance_ + since * (first_ + 0.5 * a * since);
   return from_distance_ + 0.5 * ramp_ * (first_ + peak_) + peak_ * (since - ramp_);
 }
 
 double PathMove::speed(double time) const {
   const double since = time - begin_;
   const double remaining = duration_ - since;
-  if (remaining <= 0.0) {
-    return 0.0;
-  }
-  if (remaining < down_) {
-    return acceleration_ * remaining;
-  }
+  if (remaining <= 0.0) return 0.0;
+  if (remaining < down_) return acceleration_ * remaining;
   return since < ramp_ ? first_ + std::copysign(acceleration_, peak_ - first_) * since : peak_;
 }
 
 PathMove::Point PathMove::at(double distance) const {
-  if (distance <= 0.0 || length_ == 0.0) {
-    return start_;
-  }
-  if (distance >= length_) {
-    return target_;
-  }
+  if (distance <= 0.0 || length_ == 0.0) return start_;
+  if (distance >= length_) return target_;
   const double share = distance / length_;
   Point point;
   // Measured from the nearer end.
@@ -124,12 +106,8 @@ PathMove::Point PathMove::at(double distance) const {
 
 PathMove::Point PathMove::direction(double distance) const {
   Point along{{0, 0, 0}};
-  if (length_ == 0.0) {
-    return along;
-  }
-  for (std::size_t i = 0; i < 3; ++i) {
-    along[i] = (target_[i] - start_[i]) / length_;
-  }
+  if (length_ == 0.0) return along;
+  for (std::size_t i = 0; i < 3; ++i) along[i] = (target_[i] - start_[i]) / length_;
   if (radius_ > 0.0) {
     const double share = distance / length_;
     const double angle = start_angle_ + share * sweep_;
@@ -156,12 +134,9 @@ std::optional<double> PathMove::curveFeed(double acceleration) const {
 
 std::array<std::array<double, 2>, 2> PathMove::extent() const {
   std::array<std::array<double, 2>, 2> ends{};
-  for (std::size_t i = 0; i < 2; ++i) {
+  for (std::size_t i = 0; i < 2; ++i)
     ends[i] = {std::min(start_[i], target_[i]), std::max(start_[i], target_[i])};
-  }
-  if (radius_ == 0.0) {
-    return ends;
-  }
+  if (radius_ == 0.0) return ends;
   // Extrema of an arc: crossings of the axes through its centre.
   for (int quarter = -8; quarter <= 8; ++quarter) {
     const double angle = 0.5 * units::PI * quarter;
@@ -169,9 +144,8 @@ std::array<std::array<double, 2>, 2> PathMove::extent() const {
     if (share > 0.0 && share < 1.0) {
       const std::array<double, 2> point{centre_[0] + radius_ * std::cos(angle),
                                         centre_[1] + radius_ * std::sin(angle)};
-      for (std::size_t i = 0; i < 2; ++i) {
+      for (std::size_t i = 0; i < 2; ++i)
         ends[i] = {std::min(ends[i][0], point[i]), std::max(ends[i][1], point[i])};
-      }
     }
   }
   return ends;

@@ -48,9 +48,7 @@ std::uint8_t percent(double share) {
 }  // namespace
 
 PmcMemory::PmcMemory() {
-  for (std::size_t i = 0; i < areas_.size(); ++i) {
-    areas_[i].assign(SIZES[i], 0);
-  }
+  for (std::size_t i = 0; i < areas_.size(); ++i) areas_[i].assign(SIZES[i], 0);
   update(PmcSignals{});
 }
 
@@ -60,9 +58,7 @@ std::uint8_t& PmcMemory::at(PmcArea area, std::size_t address) {
 
 /// Little-endian.
 void PmcMemory::put(PmcArea area, std::size_t address, std::uint32_t value, std::size_t bytes) {
-  for (std::size_t i = 0; i < bytes; ++i) {
-    at(area, address + i) = static_cast<std::uint8_t>(value >> (8 * i));
-  }
+  for (std::size_t i = 0; i < bytes; ++i) at(area, address + i) = static_cast<std::uint8_t>(value >> (8 * i));
 }
 
 void PmcMemory::update(const PmcSignals& s) {
@@ -86,18 +82,14 @@ void PmcMemory::update(const PmcSignals& s) {
 
 focas::EwCode PmcMemory::read(PmcArea area, int first, int last, focas::Bytes* bytes) const {
   const std::vector<std::uint8_t>& memory = areas_[static_cast<std::size_t>(area)];
-  if (first < 0 || last < first || static_cast<std::size_t>(last) >= memory.size()) {
-    return focas::EW_NUMBER;
-  }
+  if (first < 0 || last < first || static_cast<std::size_t>(last) >= memory.size()) return focas::EW_NUMBER;
   bytes->assign(memory.begin() + first, memory.begin() + last + 1);
   return focas::EW_OK;
 }
 
 focas::EwCode PmcMemory::write(PmcArea area, int first, const focas::Bytes& bytes) {
   std::vector<std::uint8_t>& memory = areas_[static_cast<std::size_t>(area)];
-  if (first < 0 || static_cast<std::size_t>(first) + bytes.size() > memory.size()) {
-    return focas::EW_NUMBER;
-  }
+  if (first < 0 || static_cast<std::size_t>(first) + bytes.size() > memory.size()) return focas::EW_NUMBER;
   std::copy(bytes.begin(), bytes.end(), memory.begin() + first);
   return focas::EW_OK;
 }

@@ -6,14 +6,10 @@
 namespace smartmill::sim {
 
 void ServoRecorder::push(const Input& input) {
-  for (std::size_t i = 0; i < 3; ++i) {
-    cut_[i] += input.force[i];
-  }
+  for (std::size_t i = 0; i < 3; ++i) cut_[i] += input.force[i];
   ++cut_count_;
   const std::uint64_t index = static_cast<std::uint64_t>(std::floor(input.time * SAMPLE_RATE + 1e-9));
-  if (started_ && index < index_) {
-    return;
-  }
+  if (started_ && index < index_) return;
   const double step = started_ ? input.time - last_time_ : 0.0;
   for (std::size_t i = 0; i < 3; ++i) {
     const double v = input.motion.velocity[i];
@@ -28,9 +24,7 @@ void ServoRecorder::push(const Input& input) {
   last_time_ = input.time;
   triggered_ = triggered_ || (trigger_ > 0 && input.motion.sequence == trigger_ && sequence_ != trigger_);
   sequence_ = input.motion.sequence;
-  if (samples_.empty()) {
-    block_index_ = index;
-  }
+  if (samples_.empty()) block_index_ = index;
   index_ = index + 1;
   started_ = true;
   samples_.push_back(input.spindle_load);
@@ -52,9 +46,7 @@ SampleBlock ServoRecorder::take() {
 
 std::array<double, 3> ServoRecorder::load() const {
   std::array<double, 3> percent{};
-  for (std::size_t i = 0; i < 3; ++i) {
-    percent[i] = 100.0 * std::abs(current_[i]) / drives_[i].rated_current;
-  }
+  for (std::size_t i = 0; i < 3; ++i) percent[i] = 100.0 * std::abs(current_[i]) / drives_[i].rated_current;
   return percent;
 }
 

@@ -12,15 +12,11 @@ SpindleMotion::SpindleMotion(double acceleration)
 }
 
 void SpindleMotion::setAccelerations(double time, double up, double down) {
-  if (up == up_ && down == down_) {
-    return;
-  }
+  if (up == up_ && down == down_) return;
   const bool was_overloaded = overloaded();
   up_ = up;
   down_ = down;
-  if (!orienting_ && (was_overloaded || overloaded() || speed(time) != target_)) {
-    plan(time);
-  }
+  if (!orienting_ && (was_overloaded || overloaded() || speed(time) != target_)) plan(time);
 }
 
 void SpindleMotion::ramp(double time, double speed) {
@@ -39,9 +35,7 @@ void SpindleMotion::plan(double time) {
     now = next_speed;
   }
   if (overloaded()) {
-    if (now != 0.0 && up_ < 0.0) {
-      append(std::abs(now / up_), std::copysign(up_, -now), 0.0);
-    }
+    if (now != 0.0 && up_ < 0.0) append(std::abs(now / up_), std::copysign(up_, -now), 0.0);
   } else if (now != target_) {
     append(std::abs(target_ - now) / up_, std::copysign(up_, target_ - now), target_);
   }
@@ -75,9 +69,7 @@ double SpindleMotion::angle(double time) const {
 
 const SpindleMotion::Phase& SpindleMotion::phaseAt(double time) const {
   std::size_t i = phases_.size() - 1;
-  while (i > 0 && time < phases_[i].start) {
-    --i;
-  }
+  while (i > 0 && time < phases_[i].start) --i;
   return phases_[i];
 }
 

@@ -39,9 +39,7 @@ std::optional<double> Variables::read(int number, const Positions& positions) co
   }
   for (const auto& [first, point] :
        {std::pair{BLOCK_END, &positions.end}, {MACHINE, &positions.machine}, {WORK, &positions.work}}) {
-    if (const std::optional<std::size_t> axis = axisOf(number, first)) {
-      return (*point)[*axis] / units::MM;
-    }
+    if (const std::optional<std::size_t> axis = axisOf(number, first)) return (*point)[*axis] / units::MM;
   }
   const auto found = values_.find(number);
   return found == values_.end() ? std::nullopt : std::optional<double>(found->second);

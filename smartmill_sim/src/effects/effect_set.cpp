@@ -92,6 +92,12 @@ std::vector<BurstTrain*> EffectSet::bursts() {
   return all;
 }
 
+void SignalStage::apply(double record_time, ChannelValues& channels) const {
+  Instant at = now_;
+  at.record_time = record_time;
+  effects_.measure(Stage::signal, at, channels);
+}
+
 TwinSetup setUpOf(MachineModel model, const EffectSet& effects) {
   model.effects.clear();
   TwinSetup setup{std::move(model), {}, {}, 0.0, 0.0, {}, {}, {}};

@@ -51,6 +51,7 @@ Node::Node(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
       coefficients_(nh_.advertise<smartmill_msgs::CuttingCoefficients>(names::TRUE_COEFFICIENTS, 1, true)),
       frf_(nh_, names::TRUE_FRF),
       modes_(nh_, names::TRUE_MODES),
+      panel_(nh_),
       shell_(nh_, private_nh, "simulated mill", 1.0) {
   if (parameters_.world.motor.currents)
     motor_current_ = nh_.advertise<smartmill_msgs::SampleBlock>(names::MOTOR_CURRENT, STREAM_QUEUE);
@@ -62,7 +63,7 @@ Node::Node(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
 
   start_ = toSec(ros::Time::now());
   publishTruth();
-  advertiseManualActions();
+  panel_.advertiseManualActions(*world_, parameters_.world);
   strike_server_ = nh_.advertiseService(names::STRIKE, &Node::strike, this);
   shell_.diagnose("simulated machine", [this](auto& status) { diagnose(status); });
   thread_ = std::thread([this] { run(); });
@@ -73,7 +74,7 @@ void Node::serve() {
   options.port = static_cast<std::uint16_t>(parameters_.port);
   options.bind_address = parameters_.bind;
   server_ = std::make_unique<focas::Server>(options, world_->controller());
-  advertisePanel();
+  panel_.advertiseKeys(world_->controller());
   angle_ = nh_.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, STREAM_QUEUE);
   ROS_INFO("sim: controller listens on %s:%d", parameters_.bind.c_str(), server_->port());
 }
@@ -226,89 +227,6 @@ bool Node::strike(smartmill_msgs::Strike::Request& request, smartmill_msgs::Stri
       break;
   }
   return true;
-}
-
-void Node::advertiseKey(const std::string& key, std::size_t values, Press press) {
-  using Request = smartmill_msgs::PanelKey::Request;
-  using Response = smartmill_msgs::PanelKey::Response;
-  const boost::function<bool(Request&, Response&)> answer = [key, values, press = std::move(press)](
-                                                                const Request& request, Response& response) {
-    response.message = request.values.size() == values ? press(request)
-                                                       : std::to_string(request.values.size()) +
-                                                             " values, expected " + std::to_string(values);
-    response.code = response.message.empty() ? Response::OK : Response::REFUSED;
-    response.message = key + ": " + (response.message.empty() ? "done" : response.message);
-    return true;
-  };
-  panel_.push_back(nh_.advertiseService("sim/panel/" + key, answer));
-}
-
-void Node::advertisePanel() {
-  using Request = smartmill_msgs::PanelKey::Request;
-  Controller& controller = world_->controller();
-  advertiseKey("mode", 1, [&controller](const Request& request) -> std::string {
-    const int mode = static_cast<int>(request.values[0]);
-    if (mode != request.values[0] || mode < focas::AUT_MDI || mode > focas::AUT_REMOTE) {
-      return "expected one of MODE_* of CncState";
-    }
-    controller.setMode(mode);
-    return {};
-  });
-  advertiseKey("emergency_stop", 1, [&controller](const Request& request) -> std::string {
-    controller.emergency(request.values[0] != 0.0);
-    return {};
-  });
-  advertiseKey("reset", 0, [&controller](const Request&) -> std::string {
-    controller.reset();
-    return {};
-  });
-  advertiseKey("feed_hold", 0, [&controller](const Request&) -> std::string {
-    controller.feedHold();
-    return {};
-  });
-  advertiseKey("cycle_start", 0, [&controller](const Request&) -> std::string {
-    const focas::EwCode code = controller.cycleStart();
-    return code == focas::EW_OK ? std::string() : focas::ewName(code);
-  });
-  advertiseKey("overrides", 3, [&controller](const Request& request) -> std::string {
-    controller.setOverrides(request.values[0], request.values[1], request.values[2]);
-    return {};
-  });
-  advertiseKey("alarm", 1, [&controller](const Request& request) -> std::string {
-    controller.raiseAlarm(static_cast<int>(request.values[0]), request.text);
-    return {};
-  });
-}
-
-void Node::advertiseManualActions() {
-  using Request = smartmill_msgs::PanelKey::Request;
-  const auto triple = [](const Request& r) {
-    return std::array<double, 3>{r.values[0], r.values[1], r.values[2]};
-  };
-  if (parameters_.world.spindle_sensor.present) {
-    advertiseKey("hang_weight", 3, [this, triple](const Request& request) -> std::string {
-      world_->pull(triple(request), false);
-      return {};
-    });
-    advertiseKey("press_workpiece", 3, [this, triple](const Request& request) -> std::string {
-      world_->pull(triple(request), true);
-      return {};
-    });
-    advertiseKey("tool_length", 1, [this](const Request& request) -> std::string {
-      try {
-        world_->setToolLength(request.values[0]);
-      } catch (const Error& e) {
-        return e.what();
-      }
-      return {};
-    });
-  }
-  if (parameters_.world.plate.present) {
-    advertiseKey("tap_point", 3, [this, triple](const Request& request) -> std::string {
-      world_->setTapPoint(triple(request));
-      return {};
-    });
-  }
 }
 
 void Node::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <atomic>
-#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -11,9 +10,9 @@
 #include <ros/ros.h>
 #include <smartmill_msgs/Frf.h>
 #include <smartmill_msgs/ModalModel.h>
-#include <smartmill_msgs/PanelKey.h>
 #include <smartmill_msgs/Strike.h>
 
+#include "node/operator_panel.h"
 #include "node/parameters.h"
 #include "smartmill_core/modal/modal_model.h"
 #include "smartmill_core/model/machine_model.h"
@@ -47,12 +46,6 @@ class Node {
   void publishTruth();
   bool strike(smartmill_msgs::Strike::Request& request, smartmill_msgs::Strike::Response& response);
   void addTruth(const std::string& point, const std::string& direction, const ModalModel& modes);
-  /// Advertises a key of the panel. @param press returns the reason of a refusal, empty: done
-  using Press = std::function<std::string(const smartmill_msgs::PanelKey::Request&)>;
-  void advertiseKey(const std::string& key, std::size_t values, Press press);
-  void advertisePanel();
-  /// Manual actions of an operator: weights on the tool, change of the tool, another tap point.
-  void advertiseManualActions();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   ros::NodeHandle nh_;
@@ -67,7 +60,7 @@ class Node {
   LatchedTopic<smartmill_msgs::Frf> frf_;
   LatchedTopic<smartmill_msgs::ModalModel> modes_;
   ros::ServiceServer strike_server_;
-  std::vector<ros::ServiceServer> panel_;
+  OperatorPanel panel_;
   NodeShell shell_;
   std::atomic<double> load_{0.0};  // [1] processor time per real time
   std::atomic<std::uint64_t> lost_{0};

@@ -58,9 +58,9 @@ double bestBegin(const std::vector<double>& residual, double rate, const BurstTr
 
 }  // namespace
 
-void findBursts(const Record* recorded, const std::array<std::vector<double>*, CHANNEL_COUNT>& raw,
-                double rate, CuttingMachine& machine, std::mt19937_64& random) {
-  for (BurstTrain* train : machine.bursts()) {
+void findBursts(const Record* recorded, const ChannelRows& raw, double rate, const SignalStage& signals,
+                std::mt19937_64& random) {
+  for (BurstTrain* train : signals.bursts()) {
     const std::size_t c = train->channel;
     if (!recorded) {
       train->first = std::uniform_real_distribution<double>(0.0, train->period)(random);
@@ -71,7 +71,7 @@ void findBursts(const Record* recorded, const std::array<std::vector<double>*, C
       for (std::size_t i = 0; i < residual.size(); ++i) {
         ChannelValues values{};
         values[c] = (*raw[c])[i];
-        machine.applySignalEffects(static_cast<double>(i) / rate, values);
+        signals.apply(static_cast<double>(i) / rate, values);
         residual[i] -= values[c];
       }
       const double level = mean(residual);

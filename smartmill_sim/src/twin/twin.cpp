@@ -9,32 +9,21 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/Dense>
-
 #include "smartmill_core/campaign/record_columns.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/effect_catalogue.h"
-#include "smartmill_core/signal/statistics.h"
-#include "smartmill_core/signal/window.h"
 #include "smartmill_core/units.h"
 #include "smartmill_sim/twin/axis_motion.h"
 #include "smartmill_sim/twin/burst_times.h"
 #include "smartmill_sim/twin/cut_traces.h"
 #include "smartmill_sim/twin/cutting_machine.h"
 #include "smartmill_sim/twin/tip_trajectory.h"
+#include "twin/steady_test.h"
+#include "twin/tap_input.h"
+#include "twin/tone_phases.h"
 
 namespace smartmill::sim {
 namespace {
-
-const std::array<const char*, 2> TIP{{"tool_x", "tool_y"}};
-
-// Lead-in before a record of a running cut. The depth of cut grows over its first part: a sudden full cut
-// would excite a long transient.
-constexpr double LEAD_IN = 0.4;        // [s]
-constexpr double LEAST_STEADY = 0.1;   // [s] shorter times before the record are simulated as they are
-constexpr double GROWING_SHARE = 0.6;  // [1] of the lead-in
-constexpr double LEAST_GROWTH = 0.01;  // [1] of the depth at the beginning
-constexpr long GROWTH_STEPS = 32;      // between two depths
 
 // Means over the sample intervals: x + x'' dt^2 / 24, with an error of fourth order in frequency over sample
 // rate.
@@ -47,11 +36,6 @@ void average(std::vector<double>& x) {
   }
 }
 
-// Smooth step from 0 at 0 to 1 at 1.
-double growth(double x) {
-  return x >= 1.0 ? 1.0 : x * x * (3.0 - 2.0 * x);
-}
-
 // Whether this twin simulates a column: inputs and channels of the measuring chain.
 bool isSimulated(const std::string& column, const CampaignTest& test) {
   if (column == "spindle_angle" || column == "hammer" || motionAxis(column)) return true;
@@ -62,16 +46,6 @@ bool isSimulated(const std::string& column, const CampaignTest& test) {
     if (column == channelName(c)) return true;
   }
   return false;
-}
-
-// Force of a tap: zero outside the contact (Dunwoody section 4.3.1), where the record contains only noise,
-// which would excite the sensor's modes. A record with further hits is left unchanged.
-std::vector<double> contactForce(const std::vector<double>& hammer) {
-  constexpr double SECOND_HIT = 0.05;
-  if (hasSecondHit(hammer, SECOND_HIT)) return hammer;
-  std::vector<double> force = impactWindow(hammer);
-  for (std::size_t i = 0; i < force.size(); ++i) force[i] *= hammer[i];
-  return force;
 }
 
 // Times of a test for effects in time.
@@ -92,96 +66,11 @@ CuttingMachine::Clock clockOf(const MachineModel& model, const CampaignTest& tes
   return {test.start_time.value_or(0.0), test.cut_time_before.value_or(0.0), true};
 }
 
-// Estimates the phases of tones from the residual of the twin without them: joint least squares of sine and
-// cosine over the channels of the tones, with their means removed. Clipped samples are ignored.
-void findPhases(const Record& recorded, const std::array<std::vector<double>*, CHANNEL_COUNT>& raw,
-                double rate, double speed, const CuttingMachine& machine, const std::vector<Tone*>& tones) {
-  const ChannelValues limits = machine.limits();
-  const auto n = static_cast<Eigen::Index>(2 * tones.size());
-  std::vector<double> amplitude;
-  for (Tone* tone : tones) {
-    amplitude.insert(amplitude.end(), tone->amplitude.begin(), tone->amplitude.end());
-    tone->amplitude.fill(0.0);
-  }
-  const auto amplitudeOf = [&](Eigen::Index tone, std::size_t channel) {
-    return amplitude[static_cast<std::size_t>(tone) * CHANNEL_COUNT + channel];
-  };
-  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(n, n);
-  Eigen::VectorXd right = Eigen::VectorXd::Zero(n);
-  for (std::size_t c = 0; c < CHANNEL_COUNT; ++c) {
-    bool in_channel = false;
-    for (Eigen::Index k = 0; k < n / 2; ++k) in_channel = in_channel || amplitudeOf(k, c) != 0.0;
-    if (!in_channel || !raw[c] || !recorded.has(channelName(c))) continue;
-    const std::vector<double>& measured = recorded.column(channelName(c));
-    Eigen::MatrixXd square = Eigen::MatrixXd::Zero(n + 1, n + 1);  // last: the mean
-    Eigen::VectorXd product = Eigen::VectorXd::Zero(n + 1), row = Eigen::VectorXd::Ones(n + 1);
-    for (std::size_t i = 0; i < measured.size(); ++i) {
-      if (std::abs(measured[i]) > 0.98 * limits[c]) continue;
-      const double t = static_cast<double>(i) / rate;
-      ChannelValues values{};
-      values[c] = (*raw[c])[i];
-      machine.applySignalEffects(t, values);
-      for (Eigen::Index k = 0; k < n / 2; ++k) {
-        const double a = tones[static_cast<std::size_t>(k)]->rate(speed) * t;
-        row(2 * k) = amplitudeOf(k, c) * std::sin(a);
-        row(2 * k + 1) = amplitudeOf(k, c) * std::cos(a);
-      }
-      square += row * row.transpose();
-      product += row * (measured[i] - values[c]);
-    }
-    if (square(n, n) <= 0.0) continue;
-    const Eigen::VectorXd mean = square.col(n) / square(n, n);
-    normal += (square - mean * square.row(n)).topLeftCorner(n, n);
-    right += (product - mean * product(n)).head(n);
-  }
-  const Eigen::VectorXd wave = normal.completeOrthogonalDecomposition().solve(right);
-  for (Eigen::Index k = 0; k < n / 2; ++k) {
-    Tone& tone = *tones[static_cast<std::size_t>(k)];
-    for (std::size_t c = 0; c < CHANNEL_COUNT; ++c) tone.amplitude[c] = amplitudeOf(k, c);
-    tone.phase = std::atan2(wave(2 * k + 1), wave(2 * k));
-  }
-}
-
-// Target of a tap: the tool tip, the sensor or (if a record contains both responses) both. A channel responds
-// if its peak after the hit exceeds its noise.
-struct TapTarget {
-  bool tip, sensor;
-};
-
-TapTarget targetOf(const Record& record, std::size_t axis) {
-  const std::vector<double>& hammer = record.column("hammer");
-  const auto louder = [](double a, double b) { return std::abs(a) < std::abs(b); };
-  const auto hit =
-      static_cast<std::size_t>(std::max_element(hammer.begin(), hammer.end(), louder) - hammer.begin());
-  const auto responds = [&](const char* channel) {
-    constexpr std::size_t LEAST_QUIET = 20;
-    if (!record.has(channel) || hit < 2 * LEAST_QUIET) return false;
-    const std::vector<double>& x = record.column(channel);
-    const auto quiet_end = x.begin() + static_cast<std::ptrdiff_t>(hit - LEAST_QUIET);
-    const double deviation = standardDeviation({x.begin(), quiet_end}), level = mean({x.begin(), quiet_end});
-    const auto peak = std::max_element(quiet_end, x.end(),
-                                       [&](double a, double b) { return louder(a - level, b - level); });
-    return std::abs(*peak - level) > 10.0 * deviation;
-  };
-  TapTarget target{false, responds(channelName(FX + axis))};
-  if (axis < 2)
-    target.tip = responds(channelName(TOOL_X + axis)) || responds("displacement") || responds("acceleration");
-  if (!target.tip && !target.sensor) {
-    // No response: the target follows from the measured channels.
-    target.tip =
-        axis < 2 && (record.has(TIP[axis]) || record.has("displacement") || record.has("acceleration"));
-    target.sensor = !target.tip;
-  }
-  return target;
-}
-
-using Rows = CuttingMachine::ChannelRows;
-
 // Simulates step by step: channels before the signal stage at each sample, with substeps between the samples.
 // input(i, share): input between sample i (share 0) and the next one (share 1).
 template <class Input>
 void simulateByStep(CuttingMachine& machine, std::size_t samples, int substeps, const Input& input,
-                    const Rows& out) {
+                    const ChannelRows& out) {
   CuttingMachine::Output now, between;
   for (std::size_t i = 0; i < samples; ++i) {
     machine.step(input(i, 0.0), now);
@@ -195,10 +84,10 @@ void simulateByStep(CuttingMachine& machine, std::size_t samples, int substeps, 
 // Simulates stage by stage. input(i, share, input): updates the input of a step.
 template <class Input>
 void simulateByStage(CuttingMachine& machine, std::size_t samples, int substeps, const Input& input,
-                     const Rows& out) {
+                     const ChannelRows& out) {
   const auto every = static_cast<std::size_t>(substeps);
   std::array<std::vector<double>, CHANNEL_COUNT> fine;
-  Rows rows = out;
+  ChannelRows rows = out;
   for (std::size_t c = 0; c < CHANNEL_COUNT && every > 1; ++c) {
     if (!out[c]) continue;
     fine[c].resize(samples * every);
@@ -226,7 +115,7 @@ void run(const MachineModel& model, const CampaignTest& test, const SimulationOp
     model.needSpindle("simulate load_meter");
     if (!test.running_before) machine.resetLoadMeter(test.spindle_speed);
   }
-  Rows out{};
+  ChannelRows out{};
   std::vector<std::size_t> simulated_channels;
   for (std::size_t c = 0; c < CHANNEL_COUNT; ++c) {
     if (!record.has(channelName(c))) continue;
@@ -243,20 +132,14 @@ void run(const MachineModel& model, const CampaignTest& test, const SimulationOp
   }
   std::mt19937_64 random(options.seed);
   std::normal_distribution<double> normal;
-  const std::vector<Tone*> tones = machine.tones();
-  if (!tones.empty()) {
-    if (recorded && !options.random_phases) {
-      findPhases(*recorded, out, test.sample_rate, test.spindle_speed, machine, tones);
-    } else {
-      for (Tone* tone : tones)
-        tone->phase = std::uniform_real_distribution<double>(0.0, units::TWO_PI)(random);
-    }
-  }
-  findBursts(recorded && !options.random_phases ? recorded : nullptr, out, test.sample_rate, machine, random);
-  for (std::size_t i = 0; i < record.size() && (options.noise || machine.hasSignalEffects()); ++i) {
+  const SignalStage signals = machine.signalStage();
+  const Record* const phases = options.random_phases ? nullptr : recorded;
+  findPhases(phases, out, test.sample_rate, test.spindle_speed, signals, random);
+  findBursts(phases, out, test.sample_rate, signals, random);
+  for (std::size_t i = 0; i < record.size() && (options.noise || signals.acts()); ++i) {
     ChannelValues values{};
     for (const std::size_t c : simulated_channels) values[c] = (*out[c])[i];
-    machine.applySignalEffects(static_cast<double>(i) / test.sample_rate, values);
+    signals.apply(static_cast<double>(i) / test.sample_rate, values);
     if (options.noise) {
       for (const std::size_t c : {FX, FY, FZ}) {
         if (out[c] && model.force_sensor.noise_rms)
@@ -284,83 +167,10 @@ Record simulateTap(const MachineModel& model, const CampaignTest& test, const Re
   const std::size_t samples = record.size();
   run(
       model, test, options, machine,
-      [&](const Rows& out) { simulateByStep(machine, samples, options.substeps, input, out); }, recorded,
-      record);
+      [&](const ChannelRows& out) { simulateByStep(machine, samples, options.substeps, input, out); },
+      recorded, record);
   return record;
 }
-
-// Constant spindle speed and, in a cut, constant feed.
-class SteadyTest {
- public:
-  // @param phase [rad] angle of tooth 1 at the time `begin` [s] of the first sample
-  SteadyTest(const MachineModel& model, const CampaignTest& test, double phase, double begin,
-             const SimulationOptions& options, CuttingMachine& machine)
-      : test_(test),
-        phase_(phase),
-        begin_(begin),
-        substeps_(options.substeps),
-        // A linear rise is on average half a step before the end of the step.
-        rise_(engagementRise(machine.vibrates()) + 2.0 * options.early_entry),
-        machine_(machine),
-        // Tolerance for a rounded time stamp of the engagement.
-        start_(test.engage_time.value_or(begin - 1.0) - 1e-3 / test.sample_rate) {
-    if (!cut()) return;
-    model.needCutting("simulate a cut");
-    feed_ = test.engagement->feed_per_tooth * model.needTool("simulate a cut").teeth * test.spindle_speed /
-            units::TWO_PI;
-  }
-
-  void inputAt(double t, CuttingMachine::Input& input) const {
-    input.motion.angle = phase_ + test_.spindle_speed * (t - begin_);
-    input.motion.speed = test_.spindle_speed;
-    input.motion.velocity[0] = feed_;
-    input.motion.centre[0] = feed_ * (t - begin_);
-  }
-
-  // As inputAt(), within a record: the tool engages at its time.
-  void next(double t, CuttingMachine::Input& input) {
-    inputAt(t, input);
-    if (!engaged_ && cut() && t >= start_) engage(input.motion, test_.engagement->axial_depth);
-  }
-
-  // Simulates the lead-in before the record.
-  void leadIn() {
-    // Independent of the model, so that differences between models are smooth.
-    const double time = *test_.running_before < LEAST_STEADY ? *test_.running_before : LEAD_IN;
-    const auto steps = static_cast<long>(time * test_.sample_rate * substeps_);
-    const double step = 1.0 / test_.sample_rate / substeps_;
-    CuttingMachine::Input input;
-    CuttingMachine::Output out;
-    for (long k = steps; k > 0; --k) {
-      inputAt(begin_ - static_cast<double>(k) * step, input);
-      if (cut() && (k % GROWTH_STEPS == 0 || !engaged_)) {
-        const double share =
-            LEAST_GROWTH + (1.0 - LEAST_GROWTH) * growth(static_cast<double>(steps - k) /
-                                                         (GROWING_SHARE * static_cast<double>(steps)));
-        if (!engaged_) engage(input.motion, share * test_.engagement->axial_depth);
-        machine_.setDepth(share * test_.engagement->axial_depth);
-      }
-      machine_.step(input, out);
-    }
-    if (engaged_) machine_.setDepth(test_.engagement->axial_depth, feed_ * (*test_.running_before - time));
-  }
-
- private:
-  bool cut() const { return test_.kind == TestKind::cut; }
-  void engage(const ToolMotion& now, double depth) {
-    machine_.engage({{test_.engagement->entry, test_.engagement->exit, depth}}, now, rise_ * substeps_);
-    engaged_ = true;
-  }
-
-  const CampaignTest& test_;
-  double phase_, begin_;
-  int substeps_;
-  double rise_;  // [samples]
-  CuttingMachine& machine_;
-  double start_;       // [s] begin of the cut
-  double feed_ = 0.0;  // [m/s]
-  bool engaged_ = false;
-};
 
 // Fills the spindle angle of a record at constant speed.
 void fillAngle(Record& record, double phase, double speed) {
@@ -412,7 +222,7 @@ Record simulateOn(CuttingMachine& machine, const MachineModel& model, const Camp
   };
   run(
       model, test, options, machine,
-      [&](const Rows& out) { simulateByStage(machine, record.size(), options.substeps, input, out); },
+      [&](const ChannelRows& out) { simulateByStage(machine, record.size(), options.substeps, input, out); },
       recorded, record);
   return record;
 }

@@ -113,4 +113,19 @@ double GapSensor::clipped(double voltage) const {
   return std::clamp(voltage, -range_, range_);
 }
 
+void GapMean::setTarget(const ToolSurface& surface, double angle, double above, double lateral) {
+  sensor_.setTarget(surface, angle, above, lateral);
+  gap_ = -1.0;
+}
+
+double GapMean::add(double gap) {
+  if (gap != gap_) {
+    gap_ = gap;
+    clearance_ = sensor_.clearance(gap);
+    volt_ = clearance_ > 0.0 ? sensor_.voltage(gap) : contact_volt_;
+  }
+  sum_ += volt_;
+  return clearance_;
+}
+
 }  // namespace smartmill::sim

@@ -1,17 +1,17 @@
 #pragma once
 
-#include <array>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_sim/controller/motion_watch.h"
 
 namespace smartmill::sim {
 
 /// Obstacles on the table as boxes in machine coordinates of the tool tip. The tool is a cylinder whose tip
 /// has its centre at the machine position.
-class CollisionWatch {
+class CollisionWatch : public MotionWatch {
  public:
   struct Body {
     std::string name;                       ///< as named in the alarm
@@ -25,7 +25,8 @@ class CollisionWatch {
   static CollisionWatch ofModel(const MachineModel& model);
 
   void add(const Body& body) { bodies_.push_back(body); }
-  const std::vector<Body>& bodies() const { return bodies_; }
+  /// External alarm with the name of the body that the tool intersects.
+  std::optional<focas::AlarmMessage> check(const MotionState& state) const override;
 
   /// The body that the tool intersects at a position [m]; nullptr: none. A tool at rest may face the body
   /// with the space between two flutes, so that only its core counts. @param turning whether the spindle

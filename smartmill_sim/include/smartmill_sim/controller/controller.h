@@ -3,54 +3,16 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "smartmill_core/model/machine_model.h"
 #include "smartmill_focas/server.h"
-#include "smartmill_sim/controller/collision_watch.h"
+#include "smartmill_sim/controller/controller_options.h"
+#include "smartmill_sim/controller/motion_state.h"
 
 namespace smartmill::sim {
-
-struct ControllerOptions {
-  MachineAxes axes;                   ///< travel, rapid, acceleration, home (where it starts)
-  double spindle_max_speed = 0.0;     ///< [rad/s] limits S
-  double spindle_acceleration = 0.0;  ///< [rad/s2] without load
-  double spindle_torque = 0.0;        ///< [N m] limit of the drive; 0: the load does not slow the spindle
-  std::array<double, 3> work_offset{{0, 0, 0}};  ///< [m] machine minus absolute position, of G54
-  focas::SysInfo info = fineInfo();              ///< reported identification
-  int mode = focas::AUT_REMOTE;                  ///< focas::Aut, set at the panel
-  std::size_t buffer_size = 1024;                ///< [byte] of DNC text that has not run
-  double load_step = 0.0;                        ///< [percent] resolution of the polled loads; 0: not rounded
-  CollisionWatch obstacles;
-  std::function<std::int64_t()>
-      wall_clock;  ///< [s] since 1970, of the controller's calendar; empty: the computer's clock
-
-  /// @throws Error naming key and value.
-  void validate() const;
-
-  /// Moment of inertia [kg m2] of the spindle: torque over acceleration.
-  double spindleInertia() const { return spindle_torque / spindle_acceleration; }
-
-  /// From a model's sections axes, spindle, hammer, tool and workpiece. Loads are rounded to 0.3 mV of the
-  /// load meter. Defaults: travel x -250..250, y -200..200, z -300..0 mm, home 0 0 0, rapid 30 m/min, 5 m/s2;
-  /// spindle up to 20000 rpm, 10000 rpm/s.
-  static ControllerOptions ofModel(const MachineModel& model);
-  /// Identification with a position increment of 0.1 um.
-  static focas::SysInfo fineInfo();
-};
-
-/// Position and velocity of the axes and the spindle.
-struct MotionState {
-  std::array<double, 3> position{{0, 0, 0}};  ///< [m] machine position of x, y, z
-  std::array<double, 3> velocity{{0, 0, 0}};  ///< [m/s]
-  double spindle_angle = 0.0;                 ///< [rad] angle of tooth 1, 0..2 pi
-  double spindle_speed = 0.0;                 ///< [rad/s] negative: counterclockwise (M4)
-  int sequence = 0;                           ///< N word of the running or last block
-};
 
 /// The simulated controller with ideal axes and spindle: each block has a trapezoidal speed profile and ends
 /// with an exact stop; the torque of the spindle drive accelerates the inertia and carries the cut. advance()

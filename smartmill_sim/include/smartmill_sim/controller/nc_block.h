@@ -4,27 +4,10 @@
 #include <functional>
 #include <optional>
 #include <string>
-#include <vector>
 
-#include "smartmill_core/error.h"
+#include "smartmill_sim/controller/nc_alarm.h"
 
 namespace smartmill::sim {
-
-/// A block that the control refuses; what() is the text of the alarm.
-class NcAlarm : public Error {
- public:
-  /// @param type bit of the alarm word. @param axis 1-based, 0: none.
-  NcAlarm(int number, int type, const std::string& text, int axis = 0);
-  int number() const { return number_; }
-  int type() const { return type_; }
-  int axis() const { return axis_; }
-
- private:
-  int number_, type_, axis_;
-};
-
-/// Bits of the alarm word of a 30i.
-enum AlarmType { ALARM_PS = 3, ALARM_OT = 4, ALARM_EX = 15 };
 
 /// Words of one block in the units of the text; empty: not in the block.
 struct NcBlock {
@@ -48,7 +31,6 @@ struct NcBlock {
   std::optional<double> macro_value;
 
   bool moves() const { return axis[0] || axis[1] || axis[2]; }
-  bool arc() const { return motion && *motion >= 2; }
 };
 
 /// Value of a variable #n; nullopt: vacant. @throws NcAlarm if the variable does not exist.

@@ -46,6 +46,27 @@ class EffectSet {
   std::array<bool, static_cast<std::size_t>(Stage::signal) + 1> has_{};
 };
 
+/// The stage of the effects that act on the channels after their filters (drift, hum, saturation), at an
+/// instant of a record.
+class SignalStage {
+ public:
+  SignalStage(EffectSet& effects, const Instant& now) : effects_(effects), now_(now) {}
+
+  bool acts() const { return effects_.has(Stage::signal); }
+  /// Changes the channels at a time since the begin of the record [s].
+  void apply(double record_time, ChannelValues& channels) const;
+  /// Tones (mains hum); the caller sets their phases.
+  std::vector<Tone*> tones() const { return effects_.tones(); }
+  /// Burst trains; the caller sets their begin.
+  std::vector<BurstTrain*> bursts() const { return effects_.bursts(); }
+  /// Largest magnitude that each channel can indicate; infinity: unlimited.
+  ChannelValues limits() const { return effects_.limits(); }
+
+ private:
+  EffectSet& effects_;
+  Instant now_;
+};
+
 /// The initial machine with the changes by its effects.
 /// @throws Error as EffectSet() does.
 TwinSetup setUpOf(MachineModel model, const EffectSet& effects);

@@ -1,12 +1,11 @@
 #pragma once
 
-#include <array>
 #include <random>
-#include <vector>
 
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/model/effect.h"
-#include "smartmill_sim/twin/cutting_machine.h"
+#include "smartmill_sim/effects/effect_set.h"
+#include "smartmill_sim/twin/measuring_chain.h"
 
 namespace smartmill::sim {
 
@@ -14,7 +13,7 @@ namespace smartmill::sim {
 /// of the twin without bursts: matched filter over the residual folded at the period of the train. Without a
 /// record it is drawn.
 /// @param raw channels before the signal stage; nullptr: not simulated @param rate [Hz]
-void findBursts(const Record* recorded, const std::array<std::vector<double>*, CHANNEL_COUNT>& raw,
-                double rate, CuttingMachine& machine, std::mt19937_64& random);
+void findBursts(const Record* recorded, const ChannelRows& raw, double rate, const SignalStage& signals,
+                std::mt19937_64& random);
 
 }  // namespace smartmill::sim

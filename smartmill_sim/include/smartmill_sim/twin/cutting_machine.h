@@ -3,51 +3,23 @@
 #include <array>
 #include <cstddef>
 #include <functional>
-#include <optional>
-#include <utility>
 #include <vector>
 
-#include "smartmill_core/modal/modal_filter.h"
 #include "smartmill_core/model/machine_model.h"
-#include "smartmill_sim/effects/delay_line.h"
 #include "smartmill_sim/effects/effect_set.h"
-#include "smartmill_sim/effects/shelf_filter.h"
-#include "smartmill_sim/twin/cutter.h"
-#include "smartmill_sim/twin/edge_layers.h"
-#include "smartmill_sim/twin/spindle_drive.h"
-#include "smartmill_sim/twin/tip_trajectory.h"
+#include "smartmill_sim/twin/flexible_cut.h"
+#include "smartmill_sim/twin/measuring_chain.h"
 
 namespace smartmill::sim {
-
-/// How the tool is fed. steady: speed, feed and contact are constant while the tool cuts (a record of a
-/// campaign); without tool-tip modes the forces then come from tables over a revolution.
-enum class Feed { any, steady };
-
-/// Result of cut and tool structure in each step, before sensors, drive and signals.
-struct CutTrace {
-  struct Step {
-    CuttingForce force;
-    std::array<double, 2> displacement{{0, 0}};  ///< [m] of the tip
-    double acceleration = 0.0;                   ///< [m/s2] at the probe
-  };
-  /// For a tool without modes or with a prescribed motion of the tip; coefficients and factors of the law and
-  /// the response of the tip are applied on replay.
-  std::vector<CutSums> sums;
-  std::vector<Step> steps;  ///< for other tools
-};
 
 /// Cutting process, tool structure, force sensor, spindle drive and measuring chain of one machine with the
 /// effects of its model, in constant time steps.
 class CuttingMachine {
  public:
   /// Input over one step.
-  struct Input {
-    ToolMotion motion;  ///< displacement and rate are ignored: they follow from the structure
-    std::array<double, 2> tip_force{{0, 0}};  ///< [N] force on the tool in addition to cutting (a hammer)
+  struct Input : FlexibleCut::Input {
     std::array<double, 3> sensor_force{{0, 0, 0}};  ///< [N] force on the sensor in addition to cutting
     Axes3 axis_acceleration{{0, 0, 0}};             ///< [m/s2] of the machine axes
-    /// Prescribed motion of the tip: the chip follows from it instead of the structure's response.
-    std::optional<TipMotion> tip;
   };
   /// Output at the end of a step.
   struct Output {
@@ -73,54 +45,37 @@ class CuttingMachine {
   /// The model as changed by its effects.
   const MachineModel& model() const { return model_; }
   /// Whether the tip has modes, so that the chip regenerates.
-  bool vibrates() const { return vibrates_; }
+  bool vibrates() const { return cut_.vibrates(); }
 
   /// Changes the contact of tool and material, see MillingProcess.
   /// @param rise [1] share of the change in force that is linear over the step that ends now; the rest is a
   /// jump at its end.
   void engage(const std::vector<ContactArc>& arcs, const ToolMotion& now, double rise = 1.0);
-  bool cutting() const { return !arcs_.empty(); }
+  bool cutting() const { return cut_.contact.cutting(); }
   /// Sets the axial depth [m] > 0 of every arc; the surface is unchanged. @param passed_over [m] feed path
   /// that is skipped
   void setDepth(double depth, double passed_over = 0.0);
 
   /// Starts a record: drift and hum restart. A new edge has edge_time 0.
   void setClock(const Clock& clock);
-  const Clock& clock() const { return clock_; }
 
-  /// Tones in the signals (mains hum); the caller sets their phases.
-  std::vector<Tone*> tones() { return effects_.tones(); }
-  /// Burst trains in the signals; the caller sets their begin.
-  std::vector<BurstTrain*> bursts() { return effects_.bursts(); }
-  /// Applies the signal stage (drift, hum, saturation) to the channels at a time since the begin of the
-  /// record [s].
-  void applySignalEffects(double record_time, ChannelValues& channels) const;
-  /// Whether the model has effects of the signal stage.
-  bool hasSignalEffects() const { return effects_.has(Stage::signal); }
-
-  /// Largest magnitude that each channel can indicate; infinity: unlimited.
-  ChannelValues limits() const { return effects_.limits(); }
+  /// The signal stage at the present instant.
+  SignalStage signalStage() { return {effects_, now_}; }
 
   /// Displacement and acceleration sensors are at the tip, in x (0) or y (1).
-  void setProbe(std::size_t axis) { probe_ = axis; }
+  void setProbe(std::size_t axis) { cut_.setProbe(axis); }
 
   /// The input of every step will prescribe the motion of the tip.
-  void prescribeTip() { tip_prescribed_ = true; }
+  void prescribeTip() { cut_.prescribeTip(); }
 
   /// From here on the trace of cut and tool is recorded, or replayed from a machine that recorded it over the
   /// same steps and differs only in later stages (without modes or with a prescribed motion of the tip: also
   /// in coefficients and factors of the law and in the tool's modes). @param trace must outlive the steps
-  void recordTrace(CutTrace* trace) {
-    recorded_ = trace;
-    if (tracesSums()) cutter_->recordSums(&trace->sums);
-  }
-  void replayTrace(const CutTrace* trace) {
-    replayed_ = trace;
-    if (tracesSums()) cutter_->replaySums(&trace->sums);
-  }
+  void recordTrace(CutTrace* trace) { cut_.recordTrace(trace); }
+  void replayTrace(const CutTrace* trace) { cut_.replayTrace(trace); }
 
   /// Of forces and load meter only these channels are simulated; the others are invalid from here on.
-  void selectChannels(const std::vector<std::size_t>& channels);
+  void selectChannels(const std::vector<std::size_t>& channels) { chain_.select(channels); }
 
   /// Sets the load meter to its steady value in an air cut.
   void resetLoadMeter(double spindle_speed);
@@ -129,50 +84,29 @@ class CuttingMachine {
   /// As step() above, into an existing Output.
   void step(const Input& input, Output& output);
 
-  /// Channels of many steps before the signal stage: one row each; nullptr: not requested.
-  using ChannelRows = std::array<std::vector<double>*, CHANNEL_COUNT>;
   /// Simulates many steps at constant speed, without probe and external forces: the same result as step(),
   /// computed stage by stage. @param next updates the input of a step, may call engage() @param raw rows of
   /// one value per step, or nullptr
   void run(std::size_t steps, const std::function<void(std::size_t, Input&)>& next, const ChannelRows& raw);
 
   /// Voltage rounded to the load meter's resolution [V].
-  double rounded(double voltage) const { return drive_ ? drive_->rounded(voltage) : voltage; }
+  double rounded(double voltage) const { return chain_.rounded(voltage); }
 
  private:
-  void update(const Input& input);
-  // Stages of a step, in this order.
-  void applyEffects(const Input& input);  // state of the effects
-  CuttingForce cuttingForce(const Input& input);
-  void updateTip(const Input& input, Output& out);
-  void integrateTip(const Input& input, Output& out);
-  void measureForce(Output& out);
-  void measureLoad(double speed, Output& out);
-  void filterChannels(Output& out);  // resonances, shelves and delays of the channels
+  CuttingMachine(const MachineModel& model, const TwinSetup& setup, double time_step, Feed feed,
+                 int corner_slices);
+
+  void update(const ToolMotion& motion);
+  void applyEffects(const Input& input);
   void advanceTime(const ToolMotion& motion, std::size_t steps = 1);
-  // The same stages for many steps.
-  struct StepHistory {
-    std::array<double, 3> before{{0, 0, 0}};  // [N] cutting force before the first step
-    std::vector<CuttingForce> force;
-    std::vector<std::array<double, 3>> applied;  // [N] force on the sensor; empty: the cutting force alone
-    std::vector<std::pair<std::size_t, double>> jumps;  // steps with a jump of the force, share of the jump
-    std::vector<Instant> instants;                      // where effects need them
+  // step() for many steps.
+  struct History : ForceHistory {
+    std::vector<Instant> instants;  // where effects need them
   };
   void simulateCut(std::size_t steps, const std::function<void(std::size_t, Input&)>& next,
-                   const ChannelRows& raw, StepHistory& history);
+                   const ChannelRows& raw, History& history);
   bool replaysWithoutUpdates() const;
-  void replayRest(std::size_t from, const ChannelRows& raw, StepHistory& history);
-  void measureSensors(const StepHistory& history, const ChannelRows& raw);
-  void applyOutputEffects(const StepHistory& history, const ChannelRows& raw) const;
-  void filterRows(std::size_t steps, const ChannelRows& raw);
-
-  bool rigid() const { return cutter_ && cutter_->method() == Cutter::Method::tables; }
-  bool tracesSums() const { return cutter_ && (rigid() || tip_prescribed_); }
-  // Whether cut and tool are replayed step by step from a trace.
-  bool replaysTrace() const { return replayed_ && !tracesSums(); }
-  double actualDepth(double commanded) const;  // [m]
-  void setActualDepths();
-  ToolMotion actualMotion(const ToolMotion& commanded) const;
+  void applyOutputEffects(const std::vector<Instant>& instants, const ChannelRows& raw) const;
 
   EffectSet effects_;
   MachineModel model_;  // as changed by the effects
@@ -181,35 +115,8 @@ class CuttingMachine {
   Instant now_;
   Clock clock_;
   int steps_to_update_ = 0;
-  std::optional<Cutter> cutter_;
-  EdgeLayers layers_;
-  bool vibrates_ = false, tip_prescribed_ = false;
-  CutTrace* recorded_ = nullptr;
-  const CutTrace* replayed_ = nullptr;
-  std::size_t replay_index_ = 0;  // next step of replayed_
-  std::optional<std::size_t> probe_;
-  std::array<bool, 3> force_selected_{{true, true, true}};
-  bool load_selected_ = true;
-  std::vector<ContactArc> arcs_;                     // as commanded
-  double depth_extra_ = 0.0;                         // [m] contained in the present depths
-  double feed_path_ = 0.0;                           // [m] since engagement
-  double cut_time_ = 0.0;                            // [s] since engagement
-  std::optional<std::array<double, 2>> feed_start_;  // [m] start of the feed error
-  std::vector<ModalFilter> tip_;                     // x, y
-  std::vector<ModalFilter> sensor_;                  // x, y, z
-  double sensor_frequency_ = 1.0;                    // present frequency of the first modes over the model's
-  std::optional<SpindleDrive> drive_;
-  std::vector<std::pair<Resonance, ModalFilter>> resonances_;
-  std::vector<std::pair<std::size_t, ShelfFilter>> shelves_;
-  std::vector<std::pair<std::size_t, DelayLine>> delays_;
-  std::array<std::array<double, 2>, 2> tip_history_{};  // [N] total force on the tip one and two steps ago
-  std::array<double, 3> last_cut_{{0, 0, 0}};           // [N] cutting force at the last step
-  std::array<double, 3> chip_motion_{{0, 0, 0}};        // velocity and speed that give chip_
-  double chip_ = 0.0;                                   // [m]
-  double last_torque_ = 0.0;
-  bool contact_changed_ = false;  // contact began or ended since the last step
-  double jump_ = 0.0;             // [1] share of the change in force that is a jump at this step
-  double force_sign_;
+  FlexibleCut cut_;
+  MeasuringChain chain_;
 };
 
 }  // namespace smartmill::sim

@@ -10,18 +10,9 @@
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/cutting/rigid_cut.h"
 #include "smartmill_core/cutting/tool.h"
+#include "smartmill_sim/twin/tool_history.h"
 
 namespace smartmill::sim {
-
-/// Position and velocity of the tool.
-struct ToolMotion {
-  double angle = 0.0;                          ///< [rad] immersion angle of tooth 1 at its tip
-  double speed = 0.0;                          ///< [rad/s] of the spindle, >= 0
-  std::array<double, 2> centre{{0, 0}};        ///< [m] x, y of the undeflected tool
-  std::array<double, 2> velocity{{0, 0}};      ///< [m/s] of the undeflected tool
-  std::array<double, 2> displacement{{0, 0}};  ///< [m] deflection of the tip
-  std::array<double, 2> rate{{0, 0}};          ///< [m/s] of the displacement
-};
 
 /// Process damping: sums over the edge length in contact [m] of the edge's velocity into the work over the
 /// cutting speed, times sin(phi), cos(phi), 1.
@@ -35,9 +26,6 @@ struct CutSums {
   EdgeSums edges;
   RubbingSums rubbing;  ///< for laws with damping
 };
-
-/// Feed per angle of the spindle [m/rad]. @throws Error if the spindle is at rest.
-std::array<double, 2> feedOf(const ToolMotion& motion);
 
 /// Milling in constant time steps: every tooth cuts the surface left by earlier teeth (ChipRule), from the
 /// history of position and deflection of the tool. This includes regeneration, loss of contact, runout and
@@ -54,7 +42,6 @@ class MillingProcess {
   /// Changes the contact. At a first contact the earlier motion is the present one without vibration.
   /// @throws Error on an invalid arc, a spindle at rest, a tooth period shorter than two steps.
   void engage(const std::vector<ContactArc>& arcs, const ToolMotion& now);
-  const std::vector<ContactArc>& arcs() const { return arcs_; }
   /// Depth of each arc [m] > 0.
   void setDepths(const std::vector<double>& depths);
   void setLaw(const CuttingLaw& law) { law_ = law; }
@@ -72,22 +59,6 @@ class MillingProcess {
   void endStep(const std::array<double, 2>& displacement);
 
  private:
-  /// Interpolation point of the history.
-  struct HistoryPoint {
-    double ago = 0.0;                 // [steps]
-    std::size_t steps = 0;            // whole steps of ago
-    std::array<double, 4> weights{};  // of the samples steps + 2, steps + 1, steps, steps - 1 ago
-  };
-  /// Delay by an angle of the spindle.
-  struct Delay {
-    double turn = 0.0;  // [rad]
-    HistoryPoint point;
-    long valid_regime = -1;  // regime of point and fed
-    long updated_at = -1;    // step of the other values
-    bool within_history = false;
-    std::array<double, 2> displacement{};  // [m] at that time
-    std::array<double, 2> fed{};           // [m] feed since then
-  };
   /// Surface of an earlier pass as one tooth meets it.
   struct Pass {
     std::size_t delay = 0;
@@ -98,36 +69,23 @@ class MillingProcess {
     double bend = 0.0;       // curvature bound of excess
     double offset = 0.0;     // [rad] angle of its tooth off the ray, solved at the last contact
   };
-  void clear(const ToolMotion& now);
-  void advance(const ToolMotion& now);
-  bool isSteadyOver(double turn) const;
   Pass& passOf(int tooth, int n) {
     std::vector<Pass>& passes = passes_[static_cast<std::size_t>(tooth)];
     if (passes.size() < static_cast<std::size_t>(n)) addPass(tooth);
     Pass& pass = passes[static_cast<std::size_t>(n) - 1];
-    if (pass.valid_regime != regime_ || regime_ != 0) shapePass(tooth, n, pass);
+    if (pass.valid_regime != history_.regime() || history_.regime() != 0) shapePass(tooth, n, pass);
     return pass;
   }
-  const Delay& delayAt(std::size_t delay) {
-    return delays_[delay].updated_at == count_ ? delays_[delay] : updateDelay(delays_[delay]);
-  }
   void addPass(int tooth);
-  Delay& updateDelay(Delay& delay);
-  static HistoryPoint historyPointAt(double steps);
-  static std::array<double, 4> weightSlopes(const HistoryPoint& at);
-  template <class Step>
-  void forEachStep(const HistoryPoint& at, Step&& step) const;
-  void searchHistory(Delay& delay);
   void shapePass(int tooth, int n, Pass& pass);
   double pathMargin(double vibrated, double fed) const;
-  double pathMarginAt(const Delay& delay, const AngleInterval& cell) const;
+  double pathMarginAt(const ToolHistory::Delay& delay, const AngleInterval& cell) const;
   double largestPathMargin(double turn) const;
-  void correctForPath(const Delay& delay, const Delay& first, const AngleInterval& cell, Pass& pass,
-                      ChipShape* shape) const;
+  void correctForPath(const ToolHistory::Delay& delay, const ToolHistory::Delay& first,
+                      const AngleInterval& cell, Pass& pass, ChipShape* shape) const;
   bool collectShapes(int tooth, const AngleInterval& cell, bool& certain);
   void cut(int tooth, const AngleInterval& cell, double height, CutSums& sums);
   void add(const ChipShape& shape, const AngleInterval& over, double height, CutSums& sums);
-  void growHistory();
 
   ToolGeometry tool_;
   ChipRule rule_;
@@ -136,25 +94,9 @@ class MillingProcess {
   double path_share_;  // [1] weight of the path correction
   int only_tooth_ = -1;
   std::vector<ContactArc> arcs_;
-  ToolMotion now_;
-  std::array<double, 2> feed_{{0, 0}}, first_feed_{{0, 0}};  // [m/rad] now, at the first contact
-
-  // Ring buffers of each step since the first contact, newest at count_ - 1.
-  std::vector<std::array<double, 2>> displacement_, centre_;  // [m]
-  std::vector<double> rotation_;                              // [rad] since the first step
-  long count_ = 0;
-  double rotation_now_ = 0.0;
-  std::size_t longest_delay_ = 0;  // longest delay so far [steps]
-  // [m] Largest deflection and largest change per step, in the present and in the previous cycle of the ring.
-  std::array<double, 2> largest_deflection_{{0, 0}}, largest_change_{{0, 0}};
-  double largest_slope_ = 0.0;  // [m/rad] largest slope of the vibration
-  // Speed and feed are constant within a regime.
-  long regime_ = 0;
-  double regime_start_ = 0.0;  // [rad]
-
+  ToolHistory history_;
   std::vector<std::vector<Pass>> passes_;  // of each tooth
-  std::vector<Delay> delays_;
-  std::vector<ChipShape> shapes_;  // candidates for the chip of a cell
+  std::vector<ChipShape> shapes_;          // candidates for the chip of a cell
   // [m] Moments of the rubbing edges over their length in contact at this step.
   struct {
     double sine2 = 0.0, sine_cosine = 0.0, cosine2 = 0.0, sine = 0.0, cosine = 0.0;

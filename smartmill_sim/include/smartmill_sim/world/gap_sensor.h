@@ -63,4 +63,26 @@ class GapSensor {
   double facing_, gain_, gap_, range_, nonlinearity_;
 };
 
+/// Mean voltage of a gap sensor over the integration steps of a sample. The values of the present target are
+/// computed once for equal gaps.
+class GapMean {
+ public:
+  /// @param contact_volt [V] while the tool touches the sensor
+  GapMean(const GapSensor& sensor, double contact_volt) : sensor_(sensor), contact_volt_(contact_volt) {}
+
+  const GapSensor& sensor() const { return sensor_; }
+  /// As GapSensor::setTarget().
+  void setTarget(const ToolSurface& surface, double angle, double above, double lateral);
+  /// Adds a step. @param gap [m] from the sensor's face to the cutting circle @return [m] clearance
+  double add(double gap);
+  double sum() const { return sum_; }  ///< [V] over the steps
+  void clear() { sum_ = 0.0; }
+
+ private:
+  GapSensor sensor_;
+  double contact_volt_;
+  double gap_ = -1.0, clearance_ = 1.0, volt_ = 0.0;  // [m], [m], [V] of the last step
+  double sum_ = 0.0;
+};
+
 }  // namespace smartmill::sim

@@ -3,15 +3,13 @@
 #include <array>
 #include <optional>
 #include <random>
-#include <vector>
 
 #include "smartmill_core/cutting/tool.h"
-#include "smartmill_core/modal/modal_filter.h"
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_sim/world/beam_response.h"
 #include "smartmill_sim/world/gap_sensor.h"
 #include "smartmill_sim/world/solenoid.h"
 #include "smartmill_sim/world/station_traits.h"
-#include "smartmill_sim/world/tool_structure.h"
 
 namespace smartmill::sim {
 
@@ -67,26 +65,37 @@ class HammerStation {
   double struckRetreat(const Pose& pose, std::size_t axis) const;
 
  private:
-  struct ResponsePath {                  // responses to a hit in one axis
-    std::vector<ModalFilter> read, tip;  // by axis
+  /// Positioning error of x and y, drawn when an axis stops.
+  class PositionError {
+   public:
+    /// @param deviation [m]
+    explicit PositionError(double deviation) : deviation_(deviation) {}
+    void update(const Axes3& before, const Axes3& now, std::mt19937_64& random);
+    bool moving() const { return moving_; }
+    double at(std::size_t axis) const { return error_[axis]; }  ///< [m]
+
+   private:
+    double deviation_;
+    bool moving_ = false;
+    std::array<double, 2> error_{{0, 0}};
+    Axes3 stopped_{};
   };
+
   std::array<double, 2> gaps(const std::array<double, 2>& displacement) const;
   double rigidRatio(double height) const;
-  void updateFilters(std::size_t axis);
-  void updatePositionError(const Pose& pose, std::mt19937_64& random);
+  void updateTarget();
+  bool reads(std::size_t axis) const { return axis == *facing_axis_ || traits_.cross_sensor; }
 
   smartmill::HammerStation station_;
   ToolGeometry tool_;
   StationTraits traits_;
   ToolSurface surface_;
-  std::array<GapSensor, 2> sensor_;  // in x, y
+  std::array<GapMean, 2> gap_;  // in x, y
   Solenoid solenoid_;
-  std::optional<ToolStructure> structure_;
-  std::vector<ResponsePath> paths_;            // by struck axis; of a beam, at the height of the last hit
-  std::array<double, 2> path_height_{{0, 0}};  // [m] height of the sensor above the tip for each
-  double step_;                                // [s]
-  bool pivots_ = false;                        // a rigid tool turns about its pivot
-  double height_ = 0.0;                        // [m] height of the sensor's centre above the tip
+  std::optional<BeamResponse> beam_;
+  PositionError error_;
+  bool pivots_ = false;  // a rigid tool turns about its pivot
+  double height_ = 0.0;  // [m] height of the sensor's centre above the tip
 
   bool fired_ = false;
   std::size_t fired_axis_ = 0;
@@ -94,20 +103,10 @@ class HammerStation {
   Pose pose_;
   std::optional<Pose> surface_pose_;
   int samples_since_update_ = 0;
-  bool moving_ = false;
-  std::array<double, 2> position_error_{{0, 0}};  // [m] positioning error of x and y
-  std::array<double, 3> stopped_{};
-  std::array<double, 2> sensor_displacement_{{0, 0}};  // [m] displacement of the structure at the sensor
-  struct GapCache {                                    // sensor values of the present surface at one gap
-    double gap = -1.0, clearance = 1.0, volt = 0.0;
-  };
-  std::array<GapCache, 2> gap_cache_;
-  double vibrates_until_ = -1.0;  // [s]
   bool touched_ = false;
   double closest_ = 1.0;
   int steps_ = 0;
   double force_sum_ = 0.0;
-  std::array<double, 2> volt_sum_{{0, 0}};
 };
 
 }  // namespace smartmill::sim

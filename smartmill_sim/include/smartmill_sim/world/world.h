@@ -3,6 +3,9 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <mutex>
+#include <optional>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -10,10 +13,15 @@
 #include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_sim/controller/controller.h"
+#include "smartmill_sim/controller/servo_recorder.h"
+#include "smartmill_sim/twin/cutting_machine.h"
+#include "smartmill_sim/world/hammer_station.h"
+#include "smartmill_sim/world/manual_forces.h"
 #include "smartmill_sim/world/motor_currents.h"
 #include "smartmill_sim/world/plate.h"
 #include "smartmill_sim/world/spindle_sensor.h"
 #include "smartmill_sim/world/station_traits.h"
+#include "smartmill_sim/world/stock_contact.h"
 
 namespace smartmill::sim {
 
@@ -57,6 +65,17 @@ struct WorldOptions {
   void validate() const;
 };
 
+/// Random numbers that sensors and hits of a world share.
+struct WorldRandom {
+  std::mt19937_64 engine;
+  std::normal_distribution<double> normal;
+
+  double gaussian(double deviation) { return deviation * normal(engine); }
+  double uniform() { return std::uniform_real_distribution<double>(0.0, 1.0)(engine); }
+};
+
+class WorldSensor;
+
 /// A complete machine under its controller: axes, spindle, tool in stock, force sensor under the stock,
 /// hammer station next to it, load meter. It advances in sample blocks; time is the running sample index over
 /// the sample rate.
@@ -88,10 +107,10 @@ class World {
   World& operator=(const World&) = delete;
 
   /// The simulated controller; thread-safe.
-  Controller& controller();
+  Controller& controller() { return controller_; }
 
   /// Drive-point receptances of the tool tip, from the model or from the hammer station's beam.
-  const ToolTip& toolTip() const;
+  const ToolTip& toolTip() const { return tip_; }
 
   /// Fires a hammer once. Thread-safe. @param point tool or force_sensor @param message receives one line of
   /// text
@@ -116,8 +135,32 @@ class World {
   void skipSamples(std::uint64_t samples);
 
  private:
-  class Impl;
-  std::unique_ptr<Impl> impl_;
+  Hit drawHit(double now);
+  void simulateBlock(Block& block, const std::vector<MotionState>& states);
+  void updateContact(const MotionState& state);
+  void simulateSample(double time, const MotionState& now, Block& block);
+  ToolMotion between(const MotionState& now, double share) const;
+  void raiseAlarm(int number, const char* text);
+
+  WorldOptions options_;
+  double full_scale_;  // [V] of the load meter
+  Controller controller_;
+  ServoRecorder servo_;
+  std::optional<HammerStation> station_;
+  ToolTip tip_;
+  CuttingMachine machine_;
+  std::optional<StockContact> stock_;
+  std::optional<SpindleSensor> flange_;
+  ManualForces manual_;
+  WorldRandom random_;
+  std::vector<std::unique_ptr<WorldSensor>> sensors_;
+
+  std::mutex mutex_;
+  std::uint64_t index_ = 0;
+  MotionState last_;  // half a sample after the last sample
+  std::vector<MotionState> states_;
+  double load_meter_ = 0.0;  // [V]
+  double torque_ = 0.0;      // [N m] cutting torque, summed over the samples of a block
 };
 
 }  // namespace smartmill::sim

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_focas/server.h"
+#include "smartmill_sim/controller/motion_watch.h"
+
+namespace smartmill::sim {
+
+struct ControllerOptions {
+  MachineAxes axes;                   ///< travel, rapid, acceleration, home (where it starts)
+  double spindle_max_speed = 0.0;     ///< [rad/s] limits S
+  double spindle_acceleration = 0.0;  ///< [rad/s2] without load
+  double spindle_torque = 0.0;        ///< [N m] limit of the drive; 0: the load does not slow the spindle
+  std::array<double, 3> work_offset{{0, 0, 0}};  ///< [m] machine minus absolute position, of G54
+  focas::SysInfo info = fineInfo();              ///< reported identification
+  int mode = focas::AUT_REMOTE;                  ///< focas::Aut, set at the panel
+  std::size_t buffer_size = 1024;                ///< [byte] of DNC text that has not run
+  double load_step = 0.0;                        ///< [percent] resolution of the polled loads; 0: not rounded
+  std::vector<std::shared_ptr<const MotionWatch>> watches;  ///< called in this order while the machine moves
+  std::function<std::int64_t()>
+      wall_clock;  ///< [s] since 1970, of the controller's calendar; empty: the computer's clock
+
+  /// @throws Error naming key and value.
+  void validate() const;
+
+  /// From a model's sections axes, spindle, hammer, tool and workpiece. Loads are rounded to 0.3 mV of the
+  /// load meter. Defaults: travel x -250..250, y -200..200, z -300..0 mm, home 0 0 0, rapid 30 m/min, 5 m/s2;
+  /// spindle up to 20000 rpm, 10000 rpm/s.
+  static ControllerOptions ofModel(const MachineModel& model);
+  /// Identification with a position increment of 0.1 um.
+  static focas::SysInfo fineInfo();
+};
+
+}  // namespace smartmill::sim

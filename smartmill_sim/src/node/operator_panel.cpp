@@ -1,0 +1,89 @@
+#include "node/operator_panel.h"
+
+#include <array>
+#include <utility>
+
+#include "smartmill_core/error.h"
+
+namespace smartmill::sim {
+
+void OperatorPanel::advertise(const std::string& key, std::size_t values, Press press) {
+  using Response = smartmill_msgs::PanelKey::Response;
+  const boost::function<bool(Request&, Response&)> answer = [key, values, press = std::move(press)](
+                                                                const Request& request, Response& response) {
+    response.message = request.values.size() == values ? press(request)
+                                                       : std::to_string(request.values.size()) +
+                                                             " values, expected " + std::to_string(values);
+    response.code = response.message.empty() ? Response::OK : Response::REFUSED;
+    response.message = key + ": " + (response.message.empty() ? "done" : response.message);
+    return true;
+  };
+  keys_.push_back(nh_.advertiseService("sim/panel/" + key, answer));
+}
+
+void OperatorPanel::advertiseKeys(Controller& controller) {
+  advertise("mode", 1, [&controller](const Request& request) -> std::string {
+    const int mode = static_cast<int>(request.values[0]);
+    if (mode != request.values[0] || mode < focas::AUT_MDI || mode > focas::AUT_REMOTE) {
+      return "expected one of MODE_* of CncState";
+    }
+    controller.setMode(mode);
+    return {};
+  });
+  advertise("emergency_stop", 1, [&controller](const Request& request) -> std::string {
+    controller.emergency(request.values[0] != 0.0);
+    return {};
+  });
+  advertise("reset", 0, [&controller](const Request&) -> std::string {
+    controller.reset();
+    return {};
+  });
+  advertise("feed_hold", 0, [&controller](const Request&) -> std::string {
+    controller.feedHold();
+    return {};
+  });
+  advertise("cycle_start", 0, [&controller](const Request&) -> std::string {
+    const focas::EwCode code = controller.cycleStart();
+    return code == focas::EW_OK ? std::string() : focas::ewName(code);
+  });
+  advertise("overrides", 3, [&controller](const Request& request) -> std::string {
+    controller.setOverrides(request.values[0], request.values[1], request.values[2]);
+    return {};
+  });
+  advertise("alarm", 1, [&controller](const Request& request) -> std::string {
+    controller.raiseAlarm(static_cast<int>(request.values[0]), request.text);
+    return {};
+  });
+}
+
+void OperatorPanel::advertiseManualActions(World& world, const WorldOptions& options) {
+  const auto triple = [](const Request& r) {
+    return std::array<double, 3>{r.values[0], r.values[1], r.values[2]};
+  };
+  if (options.spindle_sensor.present) {
+    advertise("hang_weight", 3, [&world, triple](const Request& request) -> std::string {
+      world.pull(triple(request), false);
+      return {};
+    });
+    advertise("press_workpiece", 3, [&world, triple](const Request& request) -> std::string {
+      world.pull(triple(request), true);
+      return {};
+    });
+    advertise("tool_length", 1, [&world](const Request& request) -> std::string {
+      try {
+        world.setToolLength(request.values[0]);
+      } catch (const Error& e) {
+        return e.what();
+      }
+      return {};
+    });
+  }
+  if (options.plate.present) {
+    advertise("tap_point", 3, [&world, triple](const Request& request) -> std::string {
+      world.setTapPoint(triple(request));
+      return {};
+    });
+  }
+}
+
+}  // namespace smartmill::sim

@@ -1,0 +1,69 @@
+#include "smartmill_sim/twin/tool_contact.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "smartmill_core/units.h"
+
+namespace smartmill::sim {
+namespace {
+
+constexpr double LEAST_DEPTH = 1e-9;  // [m] instead of a depth <= 0
+
+}  // namespace
+
+void ToolContact::engage(const std::vector<ContactArc>& arcs, const ToolMotion& now, double rise) {
+  if (!feed_start_) feed_start_ = now.centre;
+  if (arcs_.empty()) cut_time_ = feed_path_ = 0.0;
+  // A contact that only shifts changes the force gradually.
+  changed_ = arcs_.empty() != arcs.empty();
+  jump_ = 1.0 - rise;
+  arcs_ = arcs;
+}
+
+void ToolContact::setDepth(double depth, double passed_over) {
+  for (ContactArc& a : arcs_) a.depth = depth;
+  feed_path_ += passed_over;
+}
+
+double ToolContact::chip(const ToolMotion& motion, int teeth) {
+  const std::array<double, 2>& feed = motion.velocity;
+  if (feed[0] != chip_motion_[0] || feed[1] != chip_motion_[1] || motion.speed != chip_motion_[2]) {
+    chip_motion_ = {{feed[0], feed[1], motion.speed}};
+    chip_ = std::hypot(feed[0], feed[1]) * units::TWO_PI / (std::abs(motion.speed) * teeth);
+  }
+  return chip_;
+}
+
+bool ToolContact::depthsChange(const TwinState& state) const {
+  return cutting() && (state.depth_slope != 0.0 || state.depth_extra != depth_extra_);
+}
+
+std::vector<ContactArc> ToolContact::actualArcs(const TwinState& state) {
+  const double error = state.depth_extra + state.depth_slope * feed_path_;
+  depth_extra_ = state.depth_extra;
+  std::vector<ContactArc> actual = arcs_;
+  for (ContactArc& a : actual) a.depth = error == 0.0 ? a.depth : std::max(a.depth + error, LEAST_DEPTH);
+  return actual;
+}
+
+ToolMotion ToolContact::actualMotion(const ToolMotion& commanded, const TwinState& state) const {
+  ToolMotion actual = commanded;
+  if (state.feed_ratio == 1.0 || !feed_start_) return actual;
+  for (std::size_t a = 0; a < 2; ++a) {
+    const double start = (*feed_start_)[a];
+    actual.centre[a] = start + state.feed_ratio * (commanded.centre[a] - start);
+    actual.velocity[a] *= state.feed_ratio;
+  }
+  return actual;
+}
+
+void ToolContact::advance(double time, const ToolMotion& motion, const TwinState& state) {
+  if (!cutting()) return;
+  cut_time_ += time;
+  if (state.depth_slope == 0.0) return;
+  const std::array<double, 2>& v = motion.velocity;
+  feed_path_ += time * state.feed_ratio * std::hypot(v[0], v[1]);
+}
+
+}  // namespace smartmill::sim

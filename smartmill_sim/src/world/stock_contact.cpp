@@ -1,0 +1,44 @@
+#include "smartmill_sim/world/stock_contact.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace smartmill::sim {
+namespace {
+
+constexpr double TURNING = 1.0;      // [rad/s] a slower spindle cannot cut
+constexpr double SAME_ANGLE = 1e-7;  // [rad]
+constexpr int TOUCHED = 3001, PLUNGED = 3002;
+
+bool isSameContact(const std::vector<ContactArc>& a, const std::vector<ContactArc>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const ContactArc& p, const ContactArc& q) {
+    return std::abs(p.entry - q.entry) < SAME_ANGLE && std::abs(p.exit - q.exit) < SAME_ANGLE &&
+           p.depth == q.depth;
+  });
+}
+
+}  // namespace
+
+StockContact::Fault StockContact::update(const MotionState& state, const ToolMotion& now,
+                                         CuttingMachine& machine) {
+  Fault fault;
+  std::vector<ContactArc> arcs = stock_.contact(state.position, state.velocity);
+  if (!arcs.empty() && state.spindle_speed < TURNING) {
+    fault = {TOUCHED, "TOOL MET STOCK WITH SPINDLE AT REST"};
+  } else if (state.velocity[2] < 0.0 && stock_.hasMaterialAbove(state.position)) {
+    fault = {PLUNGED, "TOOL PLUNGED INTO STOCK"};
+  }
+  if (fault.alarm != 0) arcs.clear();
+  if (!arcs.empty() || machine.cutting()) {
+    stock_.cutTo(state.position);
+  } else {
+    stock_.endSlot();
+  }
+  if (!isSameContact(arcs, arcs_)) {
+    arcs_ = arcs;
+    machine.engage(arcs, now);
+  }
+  return fault;
+}
+
+}  // namespace smartmill::sim
