@@ -35,10 +35,10 @@ void write(const StabilityChart& chart, const std::string& file) {
   }
   csv.save(file);
   drawPicture(file,
-             "set xlabel 'Spindle speed [rpm]'\nset ylabel 'Axial depth [mm]'\nset yrange [0:]\n"
-             "plot %FILE skip 1 using 1:2 with lines lw 2 title 'stability limit', "
-             "%FILE skip 1 using 1:4 with lines title 'torque limit', "
-             "%FILE skip 1 using 1:5 with lines title 'power limit'");
+              "set xlabel 'Spindle speed [rpm]'\nset ylabel 'Axial depth [mm]'\nset yrange [0:]\n"
+              "plot %FILE skip 1 using 1:2 with lines lw 2 title 'stability limit', "
+              "%FILE skip 1 using 1:4 with lines title 'torque limit', "
+              "%FILE skip 1 using 1:5 with lines title 'power limit'");
 }
 
 void write(const std::vector<ChatterState>& states, const std::string& file) {
@@ -56,10 +56,10 @@ void write(const BistableChart& chart, const std::string& file) {
             b.secant.depth / units::MM);
   csv.save(file);
   drawPicture(file,
-             "set xlabel 'Spindle speed [rpm]'\nset ylabel 'Axial depth [mm]'\nset yrange [0:]\n"
-             "plot %FILE skip 1 using 1:3:2 with filledcurves lc 'gold' title 'bistable', "
-             "%FILE skip 1 using 1:2 with lines lw 2 lc 'black' title 'limit of small vibrations', "
-             "%FILE skip 1 using 1:3 with lines lw 2 lc 'red' title 'limit of large vibrations'");
+              "set xlabel 'Spindle speed [rpm]'\nset ylabel 'Axial depth [mm]'\nset yrange [0:]\n"
+              "plot %FILE skip 1 using 1:3:2 with filledcurves lc 'gold' title 'bistable', "
+              "%FILE skip 1 using 1:2 with lines lw 2 lc 'black' title 'limit of small vibrations', "
+              "%FILE skip 1 using 1:3 with lines lw 2 lc 'red' title 'limit of large vibrations'");
 }
 
 void print(const char* title, const std::vector<StabilityPoint>& points) {

@@ -80,10 +80,10 @@ void traceAll(const Request& request, const stability::FloquetSolver& solver,
   }
   csv.save(request.boundary);
   stability::drawPicture(request.boundary,
-                        axes(request.max_depth_mm) +
-                            "plot %FILE skip 1 using 2:3 with lines lw 2 title 'boundary', "
-                            "%FILE skip 1 using 2:(strcol(5) eq 'flip' ? $3 : NaN) with points "
-                            "pt 7 ps 0.4 title 'flip'");
+                         axes(request.max_depth_mm) +
+                             "plot %FILE skip 1 using 2:3 with lines lw 2 title 'boundary', "
+                             "%FILE skip 1 using 2:(strcol(5) eq 'flip' ? $3 : NaN) with points "
+                             "pt 7 ps 0.4 title 'flip'");
   std::size_t islands = 0;
   for (const auto& curve : curves) islands += curve.closed;
   std::printf("%zu boundary curves, %zu of them islands\n", curves.size(), islands);
