@@ -8,7 +8,8 @@ import sys
 import xml.etree.ElementTree as ElementTree
 
 # What needs packages that are optional (./setup --with-linuxcnc, --with-fleet, --with-docs) may be skipped everywhere.
-OPTIONAL = ("LinuxCncMachine", "FleetDatabase", "FleetMessage", "StudiesEngine", "site_test.SiteTest")
+OPTIONAL = ("LinuxCncMachine", "FleetDatabase", "FleetMessage", "StudiesEngine", "site_test.SiteTest",
+            "graph_tutorials_test.LinuxCncTutorialTest")
 
 
 def verdict(case):

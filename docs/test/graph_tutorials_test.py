@@ -1,0 +1,74 @@
+"""The commands of the tutorials that start nodes, on a ROS master of their own.
+
+Background commands are stopped before the first command that follows the last use of the ROS master ($ROS_COMMANDS).
+"""
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+import unittest
+
+import console
+from tutorials_test import TUTORIALS, free_port
+
+ROS_COMMANDS = ("roslaunch", "rosrun", "rostopic", "python3")
+TIME_LIMIT = 120.0  # [s] of one command; only a fault reaches it
+
+
+def run_graph_tutorial(test, name):
+    folder = tempfile.TemporaryDirectory()
+    test.addCleanup(folder.cleanup)
+    program = pathlib.Path(os.environ["SMARTMILL"])
+    environment = {**os.environ, "PATH": f"{program.parent}:/usr/bin:/bin", "TUTORIALS": str(TUTORIALS), "LC_ALL": "C",
+                   "ROS_MASTER_URI": f"http://localhost:{free_port()}", "ROS_HOSTNAME": "localhost", "ROS_HOME": folder.name}
+    running = []
+
+    def stop():
+        for process in reversed(running):
+            process.send_signal(signal.SIGINT)
+            process.wait(TIME_LIMIT)
+        running.clear()
+
+    test.addCleanup(stop)
+    commands = [step for step in console.steps(TUTORIALS / f"{name}.md") if isinstance(step, console.Command)]
+    test.assertGreaterEqual(len(commands), 2)
+    for command in commands:
+        where = f"{name}.md:{command.line}: {command.text}"
+        if command.text.endswith("&"):
+            running.append(subprocess.Popen(["bash", "-c", "exec " + command.text.rstrip("& ")], cwd=folder.name, env=environment))
+            continue
+        if not command.text.startswith(ROS_COMMANDS):
+            stop()
+        done = run(command.text, folder.name, environment)
+        for process in running:
+            test.assertIsNone(process.poll(), f"{where}: '{process.args[-1]}' has ended with exit code {process.returncode}")
+        test.assertEqual(done.returncode, 0, f"{where}: {done.stderr}")
+        test.assertEqual(console.difference(command.output, done.stdout.splitlines()), "", where)
+
+
+def run(text, folder, environment):
+    """Runs a command; one that finds no ROS master yet is run again."""
+    deadline = time.monotonic() + TIME_LIMIT
+    while True:
+        done = subprocess.run(["timeout", str(TIME_LIMIT), "bash", "-c", text], cwd=folder, env=environment, capture_output=True, text=True)
+        if "communicate with master" not in done.stdout + done.stderr or time.monotonic() > deadline:
+            return done
+        time.sleep(0.5)
+
+
+class GraphTutorialsTest(unittest.TestCase):
+    def test_add_sensor(self):
+        run_graph_tutorial(self, "add_sensor")
+
+
+@unittest.skipUnless(shutil.which("linuxcnc"), "linuxcnc is not installed (./setup --with-linuxcnc)")
+class LinuxCncTutorialTest(unittest.TestCase):
+    def test_linuxcnc(self):
+        run_graph_tutorial(self, "linuxcnc")
+
+
+if __name__ == "__main__":
+    unittest.main()
