@@ -34,6 +34,12 @@ class ConsoleTest(unittest.TestCase):
         self.assertFalse(console.agrees("1 of 5", "2 of 5"))
         self.assertTrue(console.agrees("phase 0.0", "phase -0.0"))
 
+    def test_words_left_out(self):
+        self.assertTrue(console.agrees("[ ... s] ok Ktc 800", "[  125.2 s] ok  Ktc 801"))
+        self.assertFalse(console.agrees("[ ... s] ok Ktc 800", "[ 125.2 s] ok Ktc 900"))
+        self.assertFalse(console.agrees("[ ... s] ok Ktc 800", "( 125.2 s) ok Ktc 800"))
+        self.assertFalse(console.agrees("[ ... s] ok Ktc 800", ""))
+
     def test_lines_left_out(self):
         self.assertEqual(console.difference(["a", "...", "c"], ["a", "b", "b", "c"]), "")
         self.assertEqual(console.difference(["a", "..."], ["a", "b"]), "")
