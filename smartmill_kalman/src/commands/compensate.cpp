@@ -9,7 +9,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <future>
-#include <memory>
 #include <optional>
 #include <set>
 #include <string>
@@ -208,9 +207,7 @@ void run(const Request& request) {
 namespace smartmill::kalman {
 
 Command compensateCommand() {
-  Command command;
-  command.name = command.tool = "compensate";
-  command.summary = "recovers the force at the tool from the records of a force sensor";
+  Command command("compensate", "recovers the force at the tool from the records of a force sensor");
   command.description = "Recovers the force at the tool from the records of a force sensor: one CSV per cut.";
   command.examples = {
       {"campaigns/none --identify -o forces", "sensor modes from the campaign's own taps"},
@@ -218,39 +215,32 @@ Command compensateCommand() {
       {"campaigns/none --method smoother -o forces", "smoother in place of the causal filter"}};
   command.files = {{"OUT/*.csv", "force of a cut: t[s],fx[N],fy[N],fz[N]"},
                    {"launch/config/kalman.yaml", "the node's parameters, for --params"}};
-  command.declare = [](CommandLine& line) -> std::function<int()> {
-    const auto o = std::make_shared<Request>();
-    o->program = line.program();
-    line.option("SOURCE", o->source, "campaign folder, or a bag").required();
-    line.option("-o,--out", o->out, "folder for one CSV per cut").required();
-    line.option("--model", o->model, "model file with the force sensor (default: the campaign's)");
-    line.flag("--identify", o->identify, "campaign: identify the sensor's modes from its own taps");
-    line.flag("--blind", o->blind, "campaign: report the sensor's modes that the cuts show without a tap");
-    line.option("--blind-low-hz", o->blind_low, "lower end of the band of --blind").showDefault();
-    line.option("--blind-high-hz", o->blind_high, "upper end of the band of --blind").showDefault();
+  command.setBody(run, [](CommandLine& line, Request& o) {
+    o.program = line.program();
+    line.option("SOURCE", o.source, "campaign folder, or a bag").required();
+    line.option("-o,--out", o.out, "folder for one CSV per cut").required();
+    line.option("--model", o.model, "model file with the force sensor (default: the campaign's)");
+    line.flag("--identify", o.identify, "campaign: identify the sensor's modes from its own taps");
+    line.flag("--blind", o.blind, "campaign: report the sensor's modes that the cuts show without a tap");
+    line.option("--blind-low-hz", o.blind_low, "lower end of the band of --blind").showDefault();
+    line.option("--blind-high-hz", o.blind_high, "upper end of the band of --blind").showDefault();
     line.flag(
-        "--coupled", o->coupled,
+        "--coupled", o.coupled,
         "campaign: sensor with its cross-talk from the campaign's own taps along x, y and z; method kalman");
-    line.option("--matrix-out", o->matrix_out,
+    line.option("--matrix-out", o.matrix_out,
                 "with --coupled: file of the matrix, for the node's parameter sensor_matrix");
     line.option(
-            "--method", o->method,
+            "--method", o.method,
             "kalman (causal, as the node), delay (as the node with `delay_form`), smoother, fixed-lag (as "
             "the node with `lag`) or inverse")
         .oneOf(kalman::methodNames())
         .showDefault();
-    line.option("--lag-s", o->lag, "lag of fixed-lag [s]").within(0.0, 10.0).showDefault();
-    const auto table = std::make_shared<ParameterTable>(tableOf(o->parameters));
-    const auto parameters = std::make_shared<ParameterOptions>(line, *table, "launch/config/kalman.yaml");
-    parameters->add("--bandwidth-hz", "bandwidth");
-    parameters->add("--noise-rms-n", "noise_rms");
-    parameters->add("--settling-revolutions", "settling_revolutions");
-    return [o, table, parameters] {
-      parameters->apply();
-      run(*o);
-      return 0;
-    };
-  };
+    line.option("--lag-s", o.lag, "lag of fixed-lag [s]").within(0.0, 10.0).showDefault();
+    ParameterOptions parameters(line, tableOf(o.parameters), "launch/config/kalman.yaml");
+    parameters.add("--bandwidth-hz", "bandwidth");
+    parameters.add("--noise-rms-n", "noise_rms");
+    parameters.add("--settling-revolutions", "settling_revolutions");
+  });
   return command;
 }
 

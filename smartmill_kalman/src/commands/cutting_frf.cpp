@@ -3,7 +3,6 @@
 #include <array>
 #include <cstdio>
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -99,6 +98,7 @@ std::vector<kalman::CuttingFrfAxis> axesOf(const kalman::CuttingFrfRequest& requ
 
 void run(const kalman::CuttingFrfRequest& request) {
   kalman::CuttingFrfOptions options = request.options;
+  options.speed_width = 0.01 * request.speed_width;
   options.validate();
   const bool tool = request.of == "tool";
   const std::string unit = tool ? "m/N" : "1";
@@ -137,10 +137,7 @@ void run(const kalman::CuttingFrfRequest& request) {
 namespace smartmill::kalman {
 
 Command cuttingFrfCommand() {
-  Command command;
-  command.name = "cutting-frf";
-  command.tool = "cutting_frf";
-  command.summary = "identifies FRFs of the tool or the force sensor from cuts";
+  Command command("cutting-frf", "identifies FRFs of the tool or the force sensor from cuts");
   command.description =
       "FRF and modes from cuts, as a function of spindle speed: of the tool (displacement against the force "
       "sensor's force) or of the force sensor (against the force predicted from the model's coefficients).";
@@ -150,47 +147,39 @@ Command cuttingFrfCommand() {
                    {"OUT/modes_*.yaml", "its modes"},
                    {"OUT/modes.csv", "all modes"},
                    {"OUT/frf_*.png", "pictures, one per axis"}};
-  command.declare = [](CommandLine& line) -> std::function<int()> {
-    const auto request = std::make_shared<CuttingFrfRequest>();
-    const auto width_percent = std::make_shared<double>(100.0 * request->options.speed_width);
+  command.setBody(run, [](CommandLine& line, CuttingFrfRequest& request) {
     line.option(
-            "SOURCE", request->campaign,
+            "SOURCE", request.campaign,
             "campaign folder, or a bag: its steady cuts with force/compensated and spindle/angle, the taps "
             "at rest from its tool/modes")
         .required();
-    line.option("-o,--out", request->out, "folder for frf_*.csv, modes_*.yaml, modes.csv and pictures")
+    line.option("-o,--out", request.out, "folder for frf_*.csv, modes_*.yaml, modes.csv and pictures")
         .required();
-    line.option("--of", request->of, "what is identified").oneOf({"tool", "sensor"}).showDefault();
-    line.option("--model", request->model, "model file (default: the campaign's)");
-    line.option("--response", request->response,
+    line.option("--of", request.of, "what is identified").oneOf({"tool", "sensor"}).showDefault();
+    line.option("--model", request.model, "model file (default: the campaign's)");
+    line.option("--response", request.response,
                 "bag: topic of the response (default: tool daq/displacement, channels x, y; sensor "
                 "daq/spindle_force)");
-    line.option("--spindle-sensor", request->spindle_sensor,
+    line.option("--spindle-sensor", request.spindle_sensor,
                 "bag: calibration of the six sensors in the spindle, where they are the response");
-    line.option("--spindle-sensor-length-m", request->length, "length of tool and holder [m], for it")
+    line.option("--spindle-sensor-length-m", request.length, "length of tool and holder [m], for it")
         .showDefault();
-    line.option("--force-error-percent", request->force_error, "bag: standard deviation of force/compensated")
+    line.option("--force-error-percent", request.force_error, "bag: standard deviation of force/compensated")
         .within(0.0, 50.0)
         .showDefault();
-    line.flag("--identify", request->identify,
-              "use the force sensor identified from the campaign's own taps");
-    line.option("--low-hz", request->options.low, "lower end of the band of lines and fit").showDefault();
-    line.option("--high-hz", request->options.high, "upper end of the band").showDefault();
-    line.option("--speed-width-percent", *width_percent, "cuts within this range of speed make one FRF")
+    line.flag("--identify", request.identify, "use the force sensor identified from the campaign's own taps");
+    line.option("--low-hz", request.options.low, "lower end of the band of lines and fit").showDefault();
+    line.option("--high-hz", request.options.high, "upper end of the band").showDefault();
+    line.option("--speed-width-percent", request.speed_width, "cuts within this range of speed make one FRF")
         .within(0.0, 100.0)
         .showDefault();
-    line.option("--part-s", request->options.part, "length of the parts into which a record is split [s]")
+    line.option("--part-s", request.options.part, "length of the parts into which a record is split [s]")
         .showDefault();
-    line.option("--least-lines", request->options.least_lines, "least number of lines for a fit of modes")
+    line.option("--least-lines", request.options.least_lines, "least number of lines for a fit of modes")
         .showDefault();
-    line.option("--max-modes", request->options.max_modes, "largest number of modes").showDefault();
-    line.flag("--no-picture", request->no_picture, "no PNG");
-    return [request, width_percent] {
-      request->options.speed_width = 0.01 * *width_percent;
-      run(*request);
-      return 0;
-    };
-  };
+    line.option("--max-modes", request.options.max_modes, "largest number of modes").showDefault();
+    line.flag("--no-picture", request.no_picture, "no PNG");
+  });
   return command;
 }
 

@@ -32,6 +32,11 @@ std::size_t distance(const std::string& a, const std::string& b) {
 
 }  // namespace
 
+Command::Command(const std::string& name, const std::string& summary)
+    : name(name), tool(name), summary(summary) {
+  std::replace(tool.begin(), tool.end(), '-', '_');
+}
+
 std::vector<ExitCode> exitCodes(const Command& command) {
   std::vector<ExitCode> codes{{0, "done"},
                               {1, "error, reported in one line on standard error"},
