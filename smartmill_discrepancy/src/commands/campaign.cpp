@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "recordings/bag_campaign.h"
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_discrepancy/commands.h"
 #include "smartmill_recording/import/import_campaign.h"
@@ -117,7 +118,8 @@ Command campaignCommand() {
     line.option("--kind", a.kind, "kind of the tests: cut, air or tap").oneOf({"cut", "air", "tap"});
     for (std::size_t i = 0; i < settingKeys().size(); ++i)
       line.option(settingKeys()[i].option, a.numbers[i], settingKeys()[i].help);
-    line.option("--direction", a.direction, "axis of the hammer in a tap: x, y or z").oneOf({"x", "y", "z"});
+    line.option("--direction", a.direction, "axis of the hammer in a tap: x, y or z")
+        .oneOf({AXIS_NAMES.begin(), AXIS_NAMES.end()});
     line.option("--channels", a.channels,
                 "COLUMN=NAME[UNIT]*SCALE,...: channels of the file and their units");
     line.option("--teeth", a.teeth, "teeth of the tool, if no model is given").within(1, 20);

@@ -5,6 +5,7 @@
 #include <complex>
 #include <string>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/modal/modal_fit.h"

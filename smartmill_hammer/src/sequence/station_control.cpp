@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "controller_state.h"
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
 #include "smartmill_hammer/analysis/solenoid_crosstalk.h"

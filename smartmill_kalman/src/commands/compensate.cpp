@@ -17,10 +17,12 @@
 
 #include "commands/compensate_results.h"
 #include "recordings/bag_compensation.h"
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/parameters/parameter_options.h"
+#include "smartmill_core/signal/force_channels.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/compensation/campaign_compensation.h"
 #include "smartmill_kalman/compensation/record_compensation.h"
@@ -30,8 +32,6 @@
 namespace {
 
 using namespace smartmill;
-
-constexpr std::array<const char*, 3> AXES{{"x", "y", "z"}};
 
 struct Request {
   std::string program, source, out, model, method = "kalman", matrix_out;
@@ -50,7 +50,7 @@ const char* latency(const Request& request) {
 /// Reports modes that a cut shows without a tap.
 void printBlind(const std::string& name, const Record& record, const CampaignTest& test,
                 const Request& request) {
-  for (const char* channel : {"fx", "fy", "fz"}) {
+  for (const char* channel : FORCE_CHANNELS) {
     const kalman::BlindMode found = kalman::findBlindMode(
         record.column(channel), test.sample_rate, test.spindle_speed, request.blind_low, request.blind_high);
     if (found.likelihood < 10.0) {
@@ -104,7 +104,7 @@ void fromCampaign(const Request& request) {
     sensor = model.force_sensor.axis;
     workpiece = model.force_sensor.measures_workpiece;
   }
-  for (std::size_t axis = 0; axis < 3; ++axis) kalman::printSensor(AXES[axis], sensor[axis]);
+  for (std::size_t axis = 0; axis < 3; ++axis) kalman::printSensor(AXIS_NAMES[axis], sensor[axis]);
   std::size_t cuts = 0;
   for (const CampaignTest& test : campaign.tests) {
     if (test.kind != TestKind::cut) continue;

@@ -8,6 +8,7 @@
 
 #include "commands/cutting_frf_results.h"
 #include "recordings/bag_cuts.h"
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/error.h"
@@ -38,7 +39,7 @@ kalman::CuttingFrfAxis linesOf(const Campaign& campaign, const MachineModel& mod
   found.rest = !tool ? sensors[axis] : axis == 0 ? model.tool_tip.x : model.tool_tip.y;
   for (const CampaignTest& test : campaign.tests) {
     if (test.kind != TestKind::cut) continue;
-    std::fprintf(stderr, "%s: %s\n", kalman::AXIS_NAMES[axis], test.name.c_str());
+    std::fprintf(stderr, "%s: %s\n", AXIS_NAMES[axis], test.name.c_str());
     const Record record = readRecord(campaign, test, model);
     const kalman::CutSegment cut =
         tool ? kalman::toolSegment(record, test, axis, sensors[axis])
@@ -46,7 +47,7 @@ kalman::CuttingFrfAxis linesOf(const Campaign& campaign, const MachineModel& mod
     const auto lines = kalman::frfLines(cut, request.options);
     if (lines.empty())
       std::fprintf(stderr, "%s: no line of %s exceeds the noise (a part needs eleven revolutions)\n",
-                   test.name.c_str(), kalman::AXIS_NAMES[axis]);
+                   test.name.c_str(), AXIS_NAMES[axis]);
     found.lines.insert(found.lines.end(), lines.begin(), lines.end());
   }
   return found;
@@ -75,7 +76,7 @@ std::vector<kalman::CuttingFrfAxis> fromBag(const kalman::CuttingFrfRequest& req
       const auto lines = kalman::frfLines(cut, request.options);
       if (lines.empty())
         std::fprintf(stderr, "%s: no line of %s exceeds the noise (a part needs eleven revolutions)\n",
-                     cut.name.c_str(), kalman::AXIS_NAMES[a]);
+                     cut.name.c_str(), AXIS_NAMES[a]);
       axis.lines.insert(axis.lines.end(), lines.begin(), lines.end());
     }
     axes.push_back(std::move(axis));

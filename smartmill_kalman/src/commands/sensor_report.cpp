@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/error.h"
@@ -39,7 +40,7 @@ Taps fromCampaign(const std::string& path) {
     if (test.kind != TestKind::tap) continue;
     const Record record = readRecord(campaign, test);
     MatrixTap tap;
-    tap.direction[test.direction == "x" ? 0 : test.direction == "y" ? 1 : 2] = 1.0;
+    tap.direction[*axisIndex(test.direction)] = 1.0;
     tap.hammer = record.column("hammer");
     for (std::size_t c = 0; c < 3; ++c) tap.channels.push_back(record.column(CHANNELS[c]));
     if (found.rate != 0.0 && found.rate != test.sample_rate)

@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 #include <Eigen/LU>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/model/strict_yaml.h"
@@ -145,7 +146,7 @@ namespace {
 constexpr const char* FORMAT = "smartmill-sensor-matrix/1";
 
 std::string keyOf(std::size_t row, std::size_t column) {
-  return {"xyz"[row], "xyz"[column]};
+  return std::string(AXIS_NAMES[row]) + AXIS_NAMES[column];
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <deque>
 #include <optional>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/modal/results.h"
@@ -96,8 +97,7 @@ class CutCollector {
   }
   void push(const MeasuredModes& modes) {
     if (modes.point != (request_.tool ? POINT_TOOL_TIP : POINT_FORCE_SENSOR)) return;
-    const std::size_t axis = std::string("xyz").find(modes.direction);
-    if (modes.direction.size() == 1 && axis < 3) found_.rest[axis] = modes.model;
+    if (const auto axis = axisIndex(modes.direction)) found_.rest[*axis] = modes.model;
   }
   void close() {
     if (cutting() && from_ && !force_.value[0].empty() && !response_.value[0].empty() && angles_.size() > 1)

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/modal/hit_check.h"
@@ -69,7 +70,7 @@ bool SensorMeasurement::handle(const MeasureFrfGoal& goal) {
   active_ = true;
   if (goal.point != POINT_FORCE_SENSOR) {
     finish(FrfCode::bad_goal, "point '" + goal.point + "': this node measures " + POINT_FORCE_SENSOR);
-  } else if (goal.direction != "x" && goal.direction != "y" && goal.direction != "z") {
+  } else if (!axisIndex(goal.direction)) {
     finish(FrfCode::bad_goal, "direction '" + goal.direction + "': expected x, y or z");
   } else if (goal.hits < 1 || goal.hits > 1000) {
     finish(FrfCode::bad_goal, "hits " + std::to_string(goal.hits) + ": expected 1..1000");

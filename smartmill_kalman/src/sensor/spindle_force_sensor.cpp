@@ -7,6 +7,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/sensor/block_channels.h"
@@ -41,7 +42,7 @@ SpindleForceSensor::SpindleForceSensor(const SpindleSensorCalibration& calibrati
   constant_ = {calibration.x.at(length), calibration.y.at(length), calibration.z.at(length)};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (!(constant_[axis] > 0.0)) {
-      throw Error(std::string("spindle sensor: constant ") + "xyz"[axis] + " is " +
+      throw Error(std::string("spindle sensor: constant ") + AXIS_NAMES[axis] + " is " +
                   std::to_string(constant_[axis]) + " at a length of " + std::to_string(length / units::MM) +
                   " mm, expected above 0");
     }

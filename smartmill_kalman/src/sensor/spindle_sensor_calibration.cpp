@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/io/csv.h"
@@ -20,7 +21,6 @@
 namespace smartmill::kalman {
 namespace {
 
-constexpr const char* AXES = "xyz";
 constexpr double MIN_CHI2_GAIN = 9.0;   // [1] decrease of chi squared that proves a linear reciprocal
 constexpr double LENGTH_MARGIN = 2e-3;  // [m] validity of the constants beyond the measured lengths
 constexpr const char* FORMAT = "smartmill-spindle-sensor/1";
@@ -74,7 +74,7 @@ ConstantsAtLength constantsOf(const StaticMeasurements& measurements, double len
     for (Eigen::Index k = 0; k < 3; ++k) b(r, k) = means[static_cast<std::size_t>(k)];
   }
   for (Eigen::Index j = 0; j < 3; ++j) {
-    if (a.col(j).isZero()) throw Error(what + ": no load along " + AXES[j]);
+    if (a.col(j).isZero()) throw Error(what + ": no load along " + AXIS_NAMES[static_cast<std::size_t>(j)]);
   }
   ConstantsAtLength found;
   found.length = length;
@@ -376,7 +376,7 @@ StaticCalibration calibrateStatic(const StaticMeasurements& measurements,
     for (int axis = 0; axis < 3; ++axis) {
       if (!(std::abs(l.share[axis][axis]) > 2.0 * l.std_dev[axis][axis])) {
         throw Error(measurements.file + ": length " + std::to_string(l.length / units::MM) + " mm: pair " +
-                    AXES[axis] + " does not respond to its load");
+                    AXIS_NAMES[static_cast<std::size_t>(axis)] + " does not respond to its load");
       }
     }
   }

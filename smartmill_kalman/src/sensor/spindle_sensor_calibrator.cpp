@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
@@ -130,12 +131,12 @@ void SpindleSensorCalibrator::beginTaps(const std::string& direction, double len
 }
 
 void SpindleSensorCalibrator::endTaps(const SensorResult& result) {
-  const std::size_t along = direction_ == "x" ? 0 : direction_ == "y" ? 1 : 2;
-  if (!direction_.empty() && result.code == FrfCode::ok) {
-    taps_[along].clear();
+  const std::optional<std::size_t> along = axisIndex(direction_);
+  if (along && result.code == FrfCode::ok) {
+    taps_[*along].clear();
     tap_rate_ = collector_.rate();
     for (const std::vector<Hit>& hit : collector_.acceptedHits(result))
-      taps_[along].push_back({hit[0].response, hit[1].response, hit[2].response});
+      taps_[*along].push_back({hit[0].response, hit[1].response, hit[2].response});
   }
   beginTaps("");
 }

@@ -5,6 +5,7 @@
 #include <numeric>
 #include <sstream>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/cutting/coefficient_set.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/io/text_file.h"
@@ -20,7 +21,6 @@ constexpr double NOT_KNOWN = std::numeric_limits<double>::quiet_NaN();
 constexpr const char* FORMAT = "smartmill-model/1";
 // Pitch lists have few digits.
 constexpr double PITCH_SUM_TOLERANCE_DEG = 1e-3;
-constexpr const char* AXES[3] = {"x", "y", "z"};
 
 const Range ANY{};
 const Range POSITIVE = Range::positive();
@@ -103,11 +103,12 @@ void readCutting(const StrictYaml& map, MachineModel& model) {
 
 void readForceSensor(const StrictYaml& map, ForceSensor& sensor) {
   for (std::size_t a = 0; a < 3; ++a) {
-    sensor.axis[a].modes = readModes(map, AXES[a], ModeKind::gain);
+    sensor.axis[a].modes = readModes(map, AXIS_NAMES[a], ModeKind::gain);
     double sum = 0.0;
     for (const Mode& mode : sensor.axis[a].modes) sum += mode.gain;
     // 0.9 + 0.1 in binary may exceed 1 by rounding.
-    if (sum > 1.0 + 1e-9) map.fail(AXES[a], "the gains sum to " + yamlNumber(sum) + ", out of range (<= 1)");
+    if (sum > 1.0 + 1e-9)
+      map.fail(AXIS_NAMES[a], "the gains sum to " + yamlNumber(sum) + ", out of range (<= 1)");
     sensor.axis[a].direct = 1.0 - sum;
   }
   if (map.has("noise_rms_n")) {
@@ -151,7 +152,7 @@ Axes3 readPoint(const StrictYaml& map, const std::string& key) {
 MachineAxes readAxes(const StrictYaml& map) {
   MachineAxes axes;
   for (std::size_t a = 0; a < 3; ++a) {
-    const std::string key = std::string(AXES[a]) + "_travel_mm";
+    const std::string key = std::string(AXIS_NAMES[a]) + "_travel_mm";
     const std::vector<double> travel = map.numbers(key, 2);
     if (!(travel[1] > travel[0])) {
       map.fail(key, yamlNumber(travel[0]) + ".." + yamlNumber(travel[1]) + " is out of range (min < max)");
@@ -192,7 +193,7 @@ Workpiece readWorkpiece(const StrictYaml& map) {
   w.high = readPoint(map, "high_mm");
   for (std::size_t a = 0; a < 3; ++a) {
     if (!(w.high[a] > w.low[a]))
-      map.fail("high_mm", "expected a value above low_mm in " + std::string(AXES[a]));
+      map.fail("high_mm", "expected a value above low_mm in " + std::string(AXIS_NAMES[a]));
   }
   map.finish();
   return w;
@@ -373,7 +374,8 @@ void writeToolTip(std::ostream& out, const MachineModel& model) {
 
 void writeForceSensor(std::ostream& out, const ForceSensor& sensor) {
   out << "force_sensor:\n";
-  for (std::size_t a = 0; a < 3; ++a) writeModes(out, "  ", AXES[a], sensor.axis[a].modes, ModeKind::gain);
+  for (std::size_t a = 0; a < 3; ++a)
+    writeModes(out, "  ", AXIS_NAMES[a], sensor.axis[a].modes, ModeKind::gain);
   if (sensor.noise_rms) out << "  noise_rms_n: " << point(*sensor.noise_rms, 1.0) << "\n";
   if (sensor.measures_workpiece) out << "  measures: force_on_workpiece\n";
   if (sensor.mean_samples) out << "  samples: mean\n";
@@ -399,7 +401,7 @@ void writeSpindle(std::ostream& out, const Spindle& s) {
 void writeAxes(std::ostream& out, const MachineAxes& axes) {
   out << "axes:\n";
   for (std::size_t a = 0; a < 3; ++a) {
-    out << "  " << AXES[a] << "_travel_mm: " << list({axes.travel[a][0], axes.travel[a][1]}, units::MM)
+    out << "  " << AXIS_NAMES[a] << "_travel_mm: " << list({axes.travel[a][0], axes.travel[a][1]}, units::MM)
         << "\n";
   }
   writeKey(out, "  ", "rapid_mm_per_min", axes.rapid * 60.0 / units::MM);
