@@ -171,9 +171,10 @@ DelayFilter::DelayFilter(const ModalModel& sensor, double spindle_speed, double 
       memory_(1, units::TWO_PI / spindle_speed * sample_rate) {
   parameters.validate();
   const double r = parameters.noise_rms * parameters.noise_rms;
-  const double quick = QUICK_FACTOR * parameters.settling_revolutions;
-  const double slow = std::max(quick, parameters.memory_revolutions);
-  for (const double memory : {quick, std::sqrt(quick * slow), slow}) {
+  HarmonicFilterParameters slower = parameters;
+  slower.settling_revolutions *= QUICK_FACTOR;
+  for (std::size_t level = 0; level < HarmonicFilter::LEVELS; ++level) {
+    const double memory = slower.memory(level);
     gain_.push_back(delayGain(model_, r / (memory * memory), r));
     innovation_std_.push_back(std::sqrt(gain_.back().back()));
     gain_.back().pop_back();

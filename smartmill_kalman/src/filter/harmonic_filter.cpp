@@ -52,8 +52,7 @@ std::vector<HarmonicGain> designGains(const ModalModel& sensor, double spindle_s
   const double revolution = units::TWO_PI / spindle_speed;
   const double top = std::min(parameters.bandwidth, 0.45 * sample_rate);
   int harmonics = 0;
-  if (parameters.max_harmonics > 0)
-    harmonics = std::clamp(static_cast<int>(top * revolution), 1, parameters.max_harmonics);
+  if (parameters.max_harmonics > 0) harmonics = harmonicCount(top, revolution, parameters.max_harmonics);
   const double quick = parameters.settling_revolutions;
   std::vector<double> memories{quick};
   if (parameters.memory_revolutions > quick)
