@@ -15,10 +15,6 @@
 namespace smartmill {
 namespace {
 
-/// Lines on each side over which the variance is averaged. The variance from a few hits is itself uncertain,
-/// and lines that agree by chance would get far too much weight in a fit.
-constexpr std::size_t SMOOTH_LINES = 8;
-
 std::vector<double> part(const std::vector<double>& values, std::size_t from, std::size_t to) {
   return {values.begin() + static_cast<std::ptrdiff_t>(from),
           values.begin() + static_cast<std::ptrdiff_t>(to)};
@@ -157,8 +153,8 @@ FrequencyResponse ImpactAnalysis::frf(FrfAverage average) const {
       floor *= (of_response + of_force) / c;
     }
     double variance = 0.0;
-    const std::size_t first = k > SMOOTH_LINES ? k - SMOOTH_LINES : 0;
-    const std::size_t last = std::min(lines - 1, k + SMOOTH_LINES);
+    const std::size_t first = k > options_.smooth_lines ? k - options_.smooth_lines : 0;
+    const std::size_t last = std::min(lines - 1, k + options_.smooth_lines);
     for (std::size_t j = first; j <= last; ++j)
       variance += scatter[j] / static_cast<double>(last - first + 1);
     variance = std::max(variance, floor);

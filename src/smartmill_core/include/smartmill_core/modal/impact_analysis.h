@@ -36,6 +36,9 @@ struct ImpactOptions {
   /// motion within this time raises the mean. 0: instantaneous samples.
   double averaged_share = 0.0;
   std::string unit = "m/N";  ///< of the FRF
+  /// Lines on each side over which the variance is averaged. The variance from a few hits is itself
+  /// uncertain, and lines that agree by chance would get far too much weight in a fit.
+  std::size_t smooth_lines = 8;
 };
 
 /// Windows, transforms and averages hits of one point (Dunwoody eq. 4.15..4.27). The baseline before the
