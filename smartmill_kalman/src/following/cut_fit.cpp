@@ -50,7 +50,7 @@ CutResiduals::CutResiduals(const WeightedHarmonics& measured, const Sensor& now,
     }
   }
   prior_.segment(at, modal_ - at).setConstant(1.0 / parameters.gain_std);
-  prior_.tail(tool.teeth - 1).setConstant(RADIUS_UNIT / parameters.radius_std);
+  prior_.tail(tool.teeth - 1).setConstant(1.0 / parameters.radius_std);
 }
 
 Sensor CutResiduals::sensor(const Eigen::VectorXd& at) const {

@@ -16,10 +16,10 @@ struct ModeFollowerParameters {
   double frequency_std = 0.02;  ///< [1] standard deviation of a mode's shift between two updates
   double damping_std = 0.1;     ///< [1] relative, of its damping ratio
   double evidence = 30.0;       ///< [1] decrease of the sum of squares that proves a shift
-  double radius_std = 20e-6;    ///< [m] prior of a tooth's radius: the runout of a usual holder
+  double radius_std = 20.0;     ///< [um] prior of a tooth's radius: the runout of a usual holder
 
   // Search of a mode that is missing in the taps.
-  double hidden_low = 300.0;     ///< [Hz] lowest frequency; sensors have their modes above
+  double hidden_low = 300.0;     ///< [Hz] lowest frequency; force sensors have their modes above
   double hidden_step = 1.02;     ///< [1] from frequency to frequency, within the width of a mode
   double hidden_damping = 0.03;  ///< [1] initial damping ratio
   double gain_std = 0.05;        ///< [1] prior of its gain; a larger one would be seen in the taps
