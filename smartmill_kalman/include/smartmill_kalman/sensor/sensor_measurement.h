@@ -102,8 +102,6 @@ class SensorMeasurement {
   void requestHit(double now);
   void handleRecord(double now, HitCollector::Record record);
   void rejectHit(double now, const std::string& why, bool bad_data);
-  void estimateStaticGain(const FrequencyResponse& frf);
-  void evaluate();
   void finish(FrfCode code, const std::string& message);
   void reportStage(const std::string& stage);
 
