@@ -11,7 +11,6 @@
 #include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
-#include "stamp_tolerance.h"
 #include "station_control.h"
 
 namespace smartmill::hammer {

@@ -9,7 +9,6 @@
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
 #include "smartmill_hammer/analysis/solenoid_crosstalk.h"
-#include "stamp_tolerance.h"
 #include "station_paths.h"
 
 namespace smartmill::hammer {

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "smartmill_core/signal/statistics.h"
-#include "stamp_tolerance.h"
 
 namespace smartmill::hammer {
 namespace {

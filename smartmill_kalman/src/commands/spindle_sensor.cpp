@@ -20,8 +20,6 @@ using namespace smartmill;
 using kalman::LengthDependence;
 using kalman::SpindleSensorCalibration;
 
-constexpr double LARGEST_ERROR = 0.05;  // Burzoni 3.2.1
-
 struct Request {
   std::string table, base, out, calibration;
   double low_pass = 0.0;
@@ -82,7 +80,7 @@ void verify(const Request& request) {
   std::printf(
       "largest difference from the reference over its largest force: x %.2f y %.2f z %.2f %% (limit 5)\n",
       100.0 * error[0], 100.0 * error[1], 100.0 * error[2]);
-  if (*std::max_element(error.begin(), error.end()) > LARGEST_ERROR)
+  if (*std::max_element(error.begin(), error.end()) > kalman::LARGEST_STATIC_ERROR)
     throw Error(request.table + ": the calibration is off by more than 5 %");
 }
 

@@ -287,7 +287,7 @@ double CompensationPipeline::ageOfModes() const {
 
 void CompensationPipeline::hammerStopped(const std::string& reason) {
   if (measurement_.active()) {
-    measurement_.abort(reason);
+    measurement_.end(FrfCode::bad_data, reason);
     publishResults();
   }
   sorter_.setRegular(hammers_, false);

@@ -1,7 +1,6 @@
 #include "smartmill_kalman/sensor/sensor_measurement.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "smartmill_core/axis_names.h"
@@ -11,13 +10,6 @@
 #include "tap_evaluation.h"
 
 namespace smartmill::kalman {
-namespace {
-
-/// Stamps are rounded to nanoseconds; equal times must compare equal however a stream is cut into blocks.
-constexpr double SAME_TIME = 1e-6;  // [s]
-
-}  // namespace
-
 void TapParameters::validate() const {
   checkBounds(*this);
   validateHitTest();
@@ -166,16 +158,8 @@ void SensorMeasurement::rejectHit(double now, const std::string& why, bool bad_d
   rest_until_ = now + parameters_.rest_time;
 }
 
-void SensorMeasurement::cancel() {
-  if (active_) finish(FrfCode::cancelled, "cancelled");
-}
-
-void SensorMeasurement::commandFailed(const std::string& text) {
-  if (active_) finish(FrfCode::no_hit, text);
-}
-
-void SensorMeasurement::abort(const std::string& text) {
-  if (active_) finish(FrfCode::bad_data, text);
+void SensorMeasurement::end(FrfCode code, const std::string& message) {
+  if (active_) finish(code, message);
 }
 
 void SensorMeasurement::finish(FrfCode code, const std::string& message) {

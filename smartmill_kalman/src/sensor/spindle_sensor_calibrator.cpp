@@ -15,9 +15,6 @@ namespace {
 
 using Code = CalibrationResult::Code;
 
-constexpr double SAME_TIME = 1e-6;  // [s] stamps are rounded to nanoseconds
-constexpr double MAX_ERROR = 0.05;  // [1] of verify, Burzoni 3.2.1
-
 }  // namespace
 
 SpindleSensorCalibrator::SpindleSensorCalibrator(const TapParameters& taps,
@@ -207,10 +204,10 @@ void SpindleSensorCalibrator::fit() {
 void SpindleSensorCalibrator::verify() {
   try {
     const auto error = verifyStatic(reference_, base_);
-    const bool good = *std::max_element(error.begin(), error.end()) <= MAX_ERROR;
+    const bool good = *std::max_element(error.begin(), error.end()) <= LARGEST_STATIC_ERROR;
     finish(good ? Code::ok : Code::fit_failed,
            formatted("largest difference from the reference x %.2f, y %.2f, z %.2f %% (limit %.0f)",
-                     100.0 * error[0], 100.0 * error[1], 100.0 * error[2], 100.0 * MAX_ERROR));
+                     100.0 * error[0], 100.0 * error[1], 100.0 * error[2], 100.0 * LARGEST_STATIC_ERROR));
     result_->readings = reference_.size();
     result_->error = error;
   } catch (const Error& e) {

@@ -64,7 +64,7 @@ TEST(FixedLagSmoother, OverTheWholeRecordIsTheFixedIntervalOne) {
   for (int i = 0; i < 3000; ++i) measured.push_back(noise(random) + 20.0 * std::cos(4.0 * speed * i / RATE));
   FixedLagSmoother smoother;
   for (const double sample : measured) smoother.step(filter, sample);
-  ASSERT_EQ(filter.restarts(), 0u);
+  ASSERT_EQ(filter.memory().restarts(), 0u);
   const std::vector<double> force = smoother.takeSmoothed(measured.size()), whole = other.smooth(measured);
   ASSERT_EQ(force.size(), whole.size());
   for (std::size_t i = 0; i < force.size(); ++i) ASSERT_NEAR(force[i], whole[i], 1e-8) << i;

@@ -117,6 +117,9 @@ StaticCalibration calibrateStatic(const StaticMeasurements& measurements,
 /// @throws Error naming the table and a length in it outside the valid range.
 void checkLengths(const StaticMeasurements& measurements, const SpindleSensorCalibration& calibration);
 
+/// [1] of the largest force, up to which a calibration is valid (Burzoni 3.2.1).
+constexpr double LARGEST_STATIC_ERROR = 0.05;
+
 /// Verification (Burzoni 3.2.1): largest difference between estimated and applied force over the largest
 /// applied force, each axis [1]. Zero and drift come from the measurements without load. An axis that is
 /// never loaded: over the largest load of all axes.
