@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "smartmill_core/signal/statistics.h"
+#include "smartmill_core/signal/streams.h"
 
 namespace smartmill::hammer {
 namespace {
