@@ -6,6 +6,7 @@
 
 #include "cut_fit.h"
 #include "cut_harmonics.h"
+#include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
 
 namespace smartmill::kalman {

@@ -32,8 +32,8 @@ std::size_t distance(const std::string& a, const std::string& b) {
 
 }  // namespace
 
-Command::Command(const std::string& name, const std::string& summary)
-    : name(name), tool(name), summary(summary) {
+Command::Command(const std::string& command, const std::string& what)
+    : name(command), tool(command), summary(what) {
   std::replace(tool.begin(), tool.end(), '-', '_');
 }
 

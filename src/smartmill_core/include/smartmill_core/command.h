@@ -30,8 +30,8 @@ struct CommandFile {
 /// A tool: a program of its own (runCommand) and a command of the program `smartmill`.
 struct Command {
   Command() = default;
-  /// @param name e.g. "cutting-frf"; the tool is then "cutting_frf"
-  Command(const std::string& name, const std::string& summary);
+  /// @param command name, e.g. "cutting-frf"; the tool is then "cutting_frf" @param what summary
+  Command(const std::string& command, const std::string& what);
 
   /// Sets declare().
   /// @param run body with the parsed options; returns the exit code, or nothing for 0
