@@ -11,6 +11,7 @@
 #include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
+#include "smartmill_core/signal/same_time.h"
 #include "station_control.h"
 
 namespace smartmill::hammer {

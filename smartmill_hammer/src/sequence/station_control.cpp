@@ -7,6 +7,7 @@
 #include "controller_state.h"
 #include "smartmill_core/axis_names.h"
 #include "smartmill_core/formatted.h"
+#include "smartmill_core/signal/same_time.h"
 #include "smartmill_core/units.h"
 #include "smartmill_hammer/analysis/solenoid_crosstalk.h"
 #include "station_paths.h"

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "smartmill_core/signal/same_time.h"
 #include "smartmill_core/signal/statistics.h"
-#include "smartmill_core/signal/streams.h"
 
 namespace smartmill::hammer {
 namespace {

@@ -6,6 +6,7 @@
 #include "smartmill_core/axis_names.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/modal/hit_check.h"
+#include "smartmill_core/signal/same_time.h"
 #include "smartmill_kalman/sensor/block_channels.h"
 #include "tap_evaluation.h"
 

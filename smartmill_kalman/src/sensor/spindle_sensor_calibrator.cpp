@@ -7,6 +7,7 @@
 #include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
+#include "smartmill_core/signal/same_time.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/sensor/spindle_force_sensor.h"
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "smartmill_core/signal/same_time.h"
+
 namespace smartmill::kalman {
 namespace {
 

@@ -11,9 +11,6 @@
 
 namespace smartmill {
 
-/// [s] Stamps of samples and states are rounded to nanoseconds; equal times must compare equal however a
-/// stream is cut into blocks.
-constexpr double SAME_TIME = 1e-6;
 constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
 
 /// Evenly sampled channels from a data acquisition, 5..20 ms per block.
