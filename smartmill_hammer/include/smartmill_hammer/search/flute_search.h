@@ -47,7 +47,6 @@ class FluteSearch {
 
   double angle() const { return angle_; }     ///< [rad] of the flute, unwrapped; when found
   double volt() const { return best_volt_; }  ///< [V] highest measurement
-  int measurementCount() const { return static_cast<int>(measurements_.size()); }
   struct Measurement {
     double angle, volt;  ///< [rad] unwrapped, [V]
   };

@@ -7,7 +7,6 @@
 
 #include "modal/modal_window.h"
 #include "smartmill_core/error.h"
-#include "smartmill_core/fit/derivative_check.h"
 #include "smartmill_core/testing/coverage.h"
 #include "smartmill_core/units.h"
 
