@@ -18,7 +18,7 @@ struct ClippingLimits {
   double flat_noise = 5.0;    ///< [1] width of the top in deviations of the noise, which hardly exceeds it
   double flat_share = 0.002;  ///< [1] least width, of the largest value, where there is no noise
   double flat = 3.0;          ///< [samples] least length of the top
-  /// [1] Fall beside the top, over that of a parabola as wide as the top. A parabola falls by 1, and each
+  /// [1] Fall next to the top, over that of a parabola as wide as the top. A parabola falls by 1, and each
   /// step is larger than the one before. A corner falls by more than `sharp`, and its next step is at most
   /// `round` times as large, unless it falls by more than `very_sharp`.
   double round = 1.35, sharp = 2.5, very_sharp = 6.0;
