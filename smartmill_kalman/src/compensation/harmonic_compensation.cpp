@@ -89,17 +89,6 @@ double HarmonicCompensation::step(std::size_t, HarmonicFilter& filter, double me
   return std::isfinite(measured) ? filter.step(measured) : filter.predict();
 }
 
-void HarmonicCompensation::filterSample(std::array<double, 3>& force, InnovationStatistics& innovations) {
-  if (speed_tracker_) speed_tracker_->prepare(filters_, spindle_.speed);
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    force[axis] = step(axis, filters_[axis], force[axis]);
-    innovations.add(axis, filters_[axis]);
-  }
-  couple(filters_, force);
-  if (!speed_tracker_) return;
-  speed_tracker_->update(filters_, {sensor_[0].noise_rms, sensor_[1].noise_rms, sensor_[2].noise_rms});
-}
-
 void HarmonicCompensation::filterAxes(ForceBlock& block, InnovationStatistics& innovations) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     for (double& sample : block.force[axis]) {
@@ -112,9 +101,16 @@ void HarmonicCompensation::filterAxes(ForceBlock& block, InnovationStatistics& i
 void HarmonicCompensation::filterSamples(ForceBlock& block, InnovationStatistics& innovations) {
   for (std::size_t i = 0; i < block.force[0].size(); ++i) {
     std::array<double, 3> force{{block.force[0][i], block.force[1][i], block.force[2][i]}};
-    filterSample(force, innovations);
+    if (speed_tracker_) speed_tracker_->prepare(filters_, spindle_.speed);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      force[axis] = step(axis, filters_[axis], force[axis]);
+      innovations.add(axis, filters_[axis]);
+    }
+    couple(filters_, force);
     for (std::size_t axis = 0; axis < 3; ++axis) block.force[axis][i] = force[axis];
-    if (speed_tracker_ && (i + 1) % parameters_.retune_interval == 0 &&
+    if (!speed_tracker_) continue;
+    speed_tracker_->update(filters_, {sensor_[0].noise_rms, sensor_[1].noise_rms, sensor_[2].noise_rms});
+    if ((i + 1) % parameters_.retune_interval == 0 &&
         std::abs(speed_tracker_->speed() / spindle_.speed - 1.0) > parameters_.retune_tolerance) {
       spindle_.speed = speed_tracker_->speed();
       retune();
