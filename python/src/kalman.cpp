@@ -5,6 +5,7 @@
 
 #include "convert.h"
 #include "module.h"
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/signal/force_channels.h"
 #include "smartmill_kalman/compensation/campaign_compensation.h"
@@ -95,8 +96,7 @@ py::tuple compensateCampaign(const std::string& path, const std::optional<Machin
     return result;
   });
   py::dict sensor;
-  for (std::size_t axis = 0; axis < 3; ++axis)
-    sensor[std::string(1, static_cast<char>('x' + axis)).c_str()] = toPython(found.sensor[axis].modes);
+  for (std::size_t axis = 0; axis < 3; ++axis) sensor[AXIS_NAMES[axis]] = toPython(found.sensor[axis].modes);
   return py::make_tuple(sensor,
                         tupleOf(found.cuts, [](const auto& cut) { return toPython(cut.first, cut.second); }));
 }

@@ -11,6 +11,7 @@
 
 #include "convert.h"
 #include "module.h"
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/campaign/record.h"
 #include "work.h"
@@ -56,9 +57,8 @@ py::dict toolTip(const MachineModel& model) {
 
 py::dict forceSensor(const MachineModel& model) {
   py::dict axes;
-  axes["x"] = toPython(model.force_sensor.axis[0].modes);
-  axes["y"] = toPython(model.force_sensor.axis[1].modes);
-  axes["z"] = toPython(model.force_sensor.axis[2].modes);
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    axes[AXIS_NAMES[axis]] = toPython(model.force_sensor.axis[axis].modes);
   return axes;
 }
 

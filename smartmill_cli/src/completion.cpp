@@ -128,9 +128,7 @@ std::string bashCompletion(const CommandProgram& program) {
 }
 
 Command completionCommand(const CommandProgram& program) {
-  Command command;
-  command.name = command.tool = "completion";
-  command.summary = "prints a shell script that completes command lines";
+  Command command("completion", "prints a shell script that completes command lines");
   command.description = "Prints a shell script that completes commands, options, words and files.";
   command.examples = {{"bash > ~/.local/share/bash-completion/completions/" + program.name,
                        "installs it for the user; `source <(" + program.name +

@@ -189,9 +189,7 @@ std::string commandTables(const CommandProgram& program) {
 }
 
 Command manualCommand(const CommandProgram& program) {
-  Command command;
-  command.name = command.tool = "manual";
-  command.summary = "writes the manual pages";
+  Command command("manual", "writes the manual pages");
   command.description = "Writes the manual pages of the program and its commands, in man(7) macros.";
   command.examples = {{"-o share/man/man1", "one page per command"},
                       {"--tables", "prints the tables of docs/program.md"}};

@@ -10,6 +10,7 @@
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/modal/results.h"
 #include "smartmill_core/names.h"
+#include "smartmill_core/signal/force_channels.h"
 #include "smartmill_core/units.h"
 #include "smartmill_sim/twin/twin.h"
 
@@ -20,8 +21,6 @@ constexpr double DURATION = 1.0;         // [s] of a test
 constexpr std::uint64_t PAUSE = 50;      // [steps] between tests
 constexpr std::size_t BLOCK = 100;       // [samples] in a step
 constexpr std::uint64_t LOAD_EVERY = 2;  // [steps]
-constexpr std::array<const char*, 3> FORCES{{"fx", "fy", "fz"}};
-
 double sixDigits(double value) {
   return std::strtod(formatted("%.6g", value).c_str(), nullptr);
 }
@@ -61,7 +60,7 @@ void SimulatedSession::run(const CampaignTest& test) {
   sim::SimulationOptions options;
   options.seed = 7 + records_.size();
   Record record = sim::simulateTest(truth_, test, DURATION, options);
-  for (const char* channel : FORCES) {
+  for (const char* channel : FORCE_CHANNELS) {
     const auto at = static_cast<std::size_t>(std::find(record.names.begin(), record.names.end(), channel) -
                                              record.names.begin());
     for (double& value : record.columns.at(at)) value = sixDigits(value);
@@ -121,13 +120,13 @@ void SimulatedSession::force(const Record& record, std::size_t first) {
   measured.sample_rate = compensated.sample_rate = RATE;
   measured.first_index = compensated.first_index = samples_;
   compensated.status = ForceBlock::Status::compensated;
-  for (const char* channel : FORCES) {
+  for (const char* channel : FORCE_CHANNELS) {
     measured.channels.emplace_back(channel);
     measured.units.emplace_back("N");
   }
   for (std::size_t i = first; i < first + BLOCK; ++i) {
-    for (std::size_t axis = 0; axis < FORCES.size(); ++axis) {
-      const double value = record.column(FORCES[axis])[i];
+    for (std::size_t axis = 0; axis < FORCE_CHANNELS.size(); ++axis) {
+      const double value = record.column(FORCE_CHANNELS[axis])[i];
       measured.samples.push_back(value);
       compensated.force[axis].push_back(value);
     }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "gallery/gallery.h"
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/io/gnuplot.h"
@@ -28,7 +29,6 @@ using Rows = std::vector<std::vector<double>>;
 
 constexpr double RATE = 25600.0;
 constexpr std::size_t OVERSAMPLED = 4;
-constexpr const char* AXES[] = {"x", "y"};
 
 /// One dominant mode per axis, x at 930 Hz as in section 5.3, and a higher one; the rest is not printed.
 ModalModel dynamometer(std::size_t axis) {
@@ -119,7 +119,7 @@ Drawn transferFunctions(const std::string& folder, unsigned) {
           {lines[i], std::abs(spectrum[i]), std::abs(spectrum[i] * dynamometer(axis).response(lines[i]))});
       if (std::abs(lines[i] - 930.0) < 0.5 * lines[1]) at_tooth = gains.back()[2];
     }
-    const std::string png = folder + "/dunwoody_5_2_" + AXES[axis] + ".png";
+    const std::string png = folder + "/dunwoody_5_2_" + AXIS_NAMES[axis] + ".png";
     Gnuplot plot(png, 900, 800, 12);
     plot.block("frf", rows);
     plot.block("gains", gains);
@@ -128,7 +128,7 @@ Drawn transferFunctions(const std::string& folder, unsigned) {
             "set ylabel '|measured / applied|'\nplot $frf using 1:2 with lines lw 3 lc rgb '#b0b0b0' title "
             "'nine "
             "taps, "
-         << AXES[axis]
+         << AXIS_NAMES[axis]
          << "', $frf using 1:3 with lines lw 1.5 lc rgb '#2060c0' title 'model'\nset ylabel '|gain|'\nset "
             "yrange "
             "[0.01:20]\nplot $gains using 1:2 with lines lw 1 lc rgb '#2060c0' title 'filter at 930 Hz tooth "
@@ -137,7 +137,7 @@ Drawn transferFunctions(const std::string& folder, unsigned) {
     plot.draw();
     drawn.pictures.push_back(png);
     drawn.rows.push_back(
-        {formatted("sensor and filter together at 930 Hz, axis %s, figures 5.4, 5.5", AXES[axis]),
+        {formatted("sensor and filter together at 930 Hz, axis %s, figures 5.4, 5.5", AXIS_NAMES[axis]),
          "1 (drawn)", formatted("%.3f", at_tooth),
          std::abs(at_tooth - 1.0) < 0.05 ? Verdict::agrees : Verdict::differs,
          "sensor model from taps with noise"});
@@ -166,13 +166,13 @@ Drawn atResonance(const std::string& folder, unsigned seed) {
         rows.push_back({units::degFromRad(cut.angle[i]), cut.measured[i], cut.compensated[i]});
       return rows;
     };
-    const std::string png = folder + "/dunwoody_5_6_" + AXES[axis] + ".png";
+    const std::string png = folder + "/dunwoody_5_6_" + AXIS_NAMES[axis] + ".png";
     Gnuplot plot(png, 900, 500, 12);
     plot.block("fast", rowsOf(fast));
     plot.block("slow", rowsOf(slow));
     plot << "set grid\nset key above horizontal samplen 2\nset xlabel 'spindle angle [deg]'\nset xrange "
             "[0:360]\nset xtics 45\nset ylabel 'force "
-         << AXES[axis] << " [N]'\nplot ";
+         << AXIS_NAMES[axis] << " [N]'\nplot ";
     const auto points = [&](const char* block, int column, const char* colour, const char* title) {
       plot << "$" << block << " using 1:" << column << " with points pt 7 ps 0.4 lc rgb '" << colour
            << "' notitle, NaN with points pt 7 ps 1.2 lc rgb '" << colour << "' title '" << title << "'";
@@ -186,7 +186,7 @@ Drawn atResonance(const std::string& folder, unsigned seed) {
     plot.draw();
     drawn.pictures.push_back(png);
     const double error = waveformError(fast, fast.compensated);
-    drawn.rows.push_back({formatted("waveform at 13,950 rpm, axis %s, figures 5.6, 5.7", AXES[axis]),
+    drawn.rows.push_back({formatted("waveform at 13,950 rpm, axis %s, figures 5.6, 5.7", AXIS_NAMES[axis]),
                           "right amplitude, waveform \"less well\"",
                           formatted("rms error %.1f %% (measured %.0f %%)", 100.0 * error,
                                     100.0 * waveformError(fast, fast.measured)),
@@ -214,12 +214,12 @@ Drawn ranges(const std::string& folder, unsigned seed) {
       worst = std::max(worst, std::abs(span(cut.compensated) / span(cut.truth) - 1.0));
       worst_raw = std::max(worst_raw, std::abs(span(cut.measured) / span(cut.truth) - 1.0));
     }
-    const std::string png = folder + "/dunwoody_5_8_" + AXES[axis] + ".png";
+    const std::string png = folder + "/dunwoody_5_8_" + AXIS_NAMES[axis] + ".png";
     Gnuplot plot(png, 900, 500, 12);
     plot.block("rows", rows);
     plot << "set grid\nset key above horizontal samplen 2\nset xlabel 'tooth-passing frequency [Hz]'\nset "
             "ylabel 'force "
-         << AXES[axis]
+         << AXIS_NAMES[axis]
          << ", 10 to 90 % [N]'\nplot for [k=6:7] $rows using 1:k with lines lw 4 lc rgb '#b0b0b0' title (k "
             "== 6 ? "
             "'applied' : ''), for [k=2:3] $rows using 1:k with linespoints dt 2 pt 6 lc rgb '#c08040' title "
@@ -231,7 +231,7 @@ Drawn ranges(const std::string& folder, unsigned seed) {
     plot.draw();
     drawn.pictures.push_back(png);
     drawn.rows.push_back(
-        {formatted("range of the force over 50 .. 1200 Hz, axis %s, figures 5.8, 5.9", AXES[axis]),
+        {formatted("range of the force over 50 .. 1200 Hz, axis %s, figures 5.8, 5.9", AXIS_NAMES[axis]),
          "\"approximately constant\"",
          formatted("within %.1f %% (measured %.0f %%)", 100.0 * worst, 100.0 * worst_raw),
          worst < 0.05 ? Verdict::agrees : Verdict::differs, "six speeds of section 5.3"});

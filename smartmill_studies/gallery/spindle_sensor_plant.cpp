@@ -9,6 +9,7 @@
 
 #include "gallery/spindle_sensor.h"
 #include "kalman/expanded_disturbance.h"
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/io/gnuplot.h"
 #include "smartmill_core/signal/fourier.h"
@@ -23,8 +24,6 @@ using Rows = std::vector<std::vector<double>>;
 using kalman::BurzoniData;
 using kalman::BurzoniTable;
 using kalman::TuningMap;
-
-constexpr const char* AXES[] = {"x", "y"};
 
 FrequencyResponse tapped(const BurzoniData& data, std::size_t axis) {
   return kalman::averagedFrf(data.taps[axis].hammer, data.taps[axis].response, BURZONI_RATE)
@@ -53,13 +52,13 @@ Drawn plant(const std::string& folder, unsigned seed) {
       inside_2 += std::abs(size - std::abs(fit)) < 2.0 * s;
       inside_3 += std::abs(size - std::abs(fit)) < 3.0 * s;
     }
-    const std::string png = folder + "/burzoni_21_" + AXES[axis] + ".png";
+    const std::string png = folder + "/burzoni_21_" + AXIS_NAMES[axis] + ".png";
     Gnuplot plot(png, 900, 800, 12);
     plot.block("frf", rows);
     plot
         << "set multiplot layout 2,1\nset grid\nset key above horizontal\nset lmargin 10\nset xlabel "
            "'frequency [Hz]'\nset xrange [0:2500]\nset logscale y\nset ylabel '|shown / applied|, "
-        << AXES[axis]
+        << AXIS_NAMES[axis]
         << "'\nplot $frf using 1:4:5 with filledcurves lc rgb '#f0d8c0' title '3 standard deviations', $frf "
            "using 1:6:7 with filledcurves lc rgb '#e0b890' title '2', $frf using 1:2 with lines lw 2 lc rgb "
            "'#808080' title 'nine taps', $frf using 1:3 with lines lw 1.5 lc rgb '#2060c0' title 'fitted'\n"
@@ -69,13 +68,13 @@ Drawn plant(const std::string& folder, unsigned seed) {
     plot.draw();
     drawn.pictures.push_back(png);
     const double off = std::sqrt(squares / whole);
-    drawn.rows.push_back({formatted("fitted and measured FRF to 2.5 kHz, %s, figure 21", AXES[axis]),
+    drawn.rows.push_back({formatted("fitted and measured FRF to 2.5 kHz, %s, figure 21", AXIS_NAMES[axis]),
                           "plotted, no number", formatted("%.1f %% rms", 100.0 * off),
                           off < 0.05 ? Verdict::agrees : Verdict::differs,
                           "three modes per axis, nine taps"});
     const double n = static_cast<double>(frf.size());
     drawn.rows.push_back(
-        {formatted("lines within 2, 3 standard deviations of the fit, %s, figures 31, 32", AXES[axis]),
+        {formatted("lines within 2, 3 standard deviations of the fit, %s, figures 31, 32", AXIS_NAMES[axis]),
          "95.5, 99.7 %", formatted("%.1f, %.1f %%", 100.0 * inside_2 / n, 100.0 * inside_3 / n),
          inside_2 / n > 0.90 && inside_3 / n > 0.97 ? Verdict::agrees : Verdict::differs,
          "eq. 6-3 on nine taps: their standard deviation is uncertain by a quarter"});
@@ -190,14 +189,15 @@ Drawn maps(const std::string& folder, unsigned seed) {
                        &high = burzoniTableOf(seed, first + 2);
     const TuningMap quiet = mapOf(data, data.taps[axis], axis, low.r_tap, 500.0),
                     noisy = mapOf(data, data.taps[axis], axis, high.r_tap, 500.0);
-    const std::string png = folder + "/burzoni_27_" + AXES[axis] + ".png";
-    kalman::drawMaps({{formatted("%s: R of taps %.2g, of cuts %.2g N2", AXES[axis], mixed.r_tap, mixed.r_cut),
-                       quiet, dots(mixed)},
-                      {formatted("%s: R of taps %.2g, of cuts %.2g N2", AXES[axis], low.r_tap, low.r_cut),
-                       quiet, dots(low)},
-                      {formatted("%s: R of taps %.2g, of cuts %.2g N2", AXES[axis], high.r_tap, high.r_cut),
-                       noisy, dots(high)}},
-                     png);
+    const std::string png = folder + "/burzoni_27_" + AXIS_NAMES[axis] + ".png";
+    kalman::drawMaps(
+        {{formatted("%s: R of taps %.2g, of cuts %.2g N2", AXIS_NAMES[axis], mixed.r_tap, mixed.r_cut), quiet,
+          dots(mixed)},
+         {formatted("%s: R of taps %.2g, of cuts %.2g N2", AXIS_NAMES[axis], low.r_tap, low.r_cut), quiet,
+          dots(low)},
+         {formatted("%s: R of taps %.2g, of cuts %.2g N2", AXIS_NAMES[axis], high.r_tap, high.r_cut), noisy,
+          dots(high)}},
+        png);
     drawn.pictures.push_back(png);
     std::vector<double> found;
     for (const double speed : quiet.speed)
@@ -207,7 +207,7 @@ Drawn maps(const std::string& folder, unsigned seed) {
                  expected = std::log2(high.r_tap / low.r_tap);
     drawn.rows.push_back(
         {formatted("best Q of the taps as R rises from before taps to cutting air, %s, tables 8 and 10",
-                   AXES[axis]),
+                   AXIS_NAMES[axis]),
          "x 64 (512 to 32,770)",
          formatted("x 2^%.1f, R x 2^%.1f (%zu of %zu speeds)", shift, expected, found.size(),
                    quiet.speed.size()),
@@ -285,8 +285,8 @@ Drawn variedPlants(const std::string& folder, unsigned seed) {
       const TuningMap map =
           mapOf(data, k == 0.0 ? data.taps[axis] : kalman::plantAt(data.taps[axis], frf, BURZONI_RATE, k),
                 axis, table.r_tap, 1000.0);
-      all.push_back({k == 0.0 ? formatted("%s: as measured", AXES[axis])
-                              : formatted("%s: %+.0f standard deviations", AXES[axis], k),
+      all.push_back({k == 0.0 ? formatted("%s: as measured", AXIS_NAMES[axis])
+                              : formatted("%s: %+.0f standard deviations", AXIS_NAMES[axis], k),
                      map, dots(table)});
       if (k == 0.0) as_measured = map;
       for (const double by : shifts(map, as_measured)) (k < 0.0 ? smaller : larger).push_back(by);
@@ -303,7 +303,7 @@ Drawn variedPlants(const std::string& folder, unsigned seed) {
     };
     const bool right = !larger.empty() && median(smaller) >= 0.0 && median(larger) >= 0.0;
     drawn.rows.push_back(
-        {formatted("best Q of a plant 2, 3 deviations off, %s, table %zu", AXES[axis], 6 + axis),
+        {formatted("best Q of a plant 2, 3 deviations off, %s, table %zu", AXIS_NAMES[axis], 6 + axis),
          "a slight shift to higher Q",
          formatted("%s with a smaller gain than the model, %s with a larger one", told(smaller).c_str(),
                    told(larger).c_str()),
@@ -312,7 +312,7 @@ Drawn variedPlants(const std::string& folder, unsigned seed) {
          "gain, and vice versa"});
     const double most = larger.empty() ? 0.0 : std::max(median(smaller), median(larger));
     drawn.rows.push_back(
-        {formatted("best Q of the cuts over that of the taps, %s, tables 6 and 7", AXES[axis]),
+        {formatted("best Q of the cuts over that of the taps, %s, tables 6 and 7", AXIS_NAMES[axis]),
          "higher, by more than the plants explain", told(cuts),
          !cuts.empty() && median(cuts) > most ? Verdict::agrees : Verdict::differs,
          "with R of the air cut in the cut and of rest in the taps, as his; at the other speeds the taps "

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "gallery/spindle_sensor.h"
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/io/gnuplot.h"
 #include "smartmill_core/model/machine_model.h"
@@ -25,7 +26,6 @@ using kalman::LengthDependence;
 using kalman::SpindleSensorCalibration;
 
 constexpr double LENGTH = 0.139;  // [m] 138 mm in section 6.3
-constexpr const char* AXES[] = {"x", "y", "z"};
 
 const BurzoniStatics& statics(unsigned seed) {
   static std::map<unsigned, BurzoniStatics> gathered;
@@ -114,10 +114,10 @@ Drawn verification(const std::string& folder, unsigned seed) {
           "'by the sensor [N]'\nplot x with lines lw 4 lc rgb '#b0b0b0' title 'equal'";
   for (std::size_t axis = 0; axis < 3; ++axis)
     plot << ", $hung" << axis << " using 1:2 with points pt " << 5 + 2 * axis << " ps 1.2 lc rgb '"
-         << BURZONI_COLOURS[axis] << "' title '" << AXES[axis] << "'";
+         << BURZONI_COLOURS[axis] << "' title '" << AXIS_NAMES[axis] << "'";
   plot << "\nset xlabel 'time under load [s]'\n";
   for (std::size_t axis = 0; axis < 2; ++axis)
-    plot << "set ylabel 'tool on workpiece, " << AXES[axis] << " [N]'\nplot $pressed" << axis
+    plot << "set ylabel 'tool on workpiece, " << AXIS_NAMES[axis] << " [N]'\nplot $pressed" << axis
          << " using 1:2 with lines lw 4 lc rgb '#b0b0b0' title 'table dynamometer', $pressed" << axis
          << " using 1:3 with lines lw 1 lc rgb '#2060c0' title 'sensor in the spindle'\n";
   plot << "unset multiplot\n";

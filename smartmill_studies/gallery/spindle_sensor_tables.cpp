@@ -8,6 +8,7 @@
 
 #include "gallery/spindle_sensor.h"
 #include "kalman/expanded_disturbance.h"
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/io/gnuplot.h"
 #include "smartmill_core/signal/statistics.h"
@@ -19,7 +20,6 @@ using Rows = std::vector<std::vector<double>>;
 using kalman::BurzoniRow;
 using kalman::BurzoniTable;
 
-constexpr const char* AXES[] = {"x", "y"};
 const std::string OTHER_CUT =
     "another machine, cut and force than his: the same filter has smaller errors here, too";
 
@@ -46,7 +46,7 @@ void drawTable(const BurzoniTable& table, const std::string& png) {
   plot << "set multiplot layout 2,1\nset grid\nset lmargin 10\nset key above horizontal samplen 2\nset "
           "logscale "
           "xy\nset format x '10^%T'\nset xlabel 'Q [N2/s]'\nset ylabel 'RMSE of the harmonics, "
-       << AXES[table.axis] << " [N]'\n";
+       << AXIS_NAMES[table.axis] << " [N]'\n";
   for (std::size_t k = 0; k < table.rows.size(); ++k)
     plot << (k ? ", " : "plot ") << "$curve" << k << " using 1:2 with lines lw 2 lc rgb '"
          << BURZONI_COLOURS[k] << "' title '" << table.rows[k].rpm << " rpm'";
@@ -156,7 +156,7 @@ Drawn byNoise(const std::string& folder, unsigned seed, std::size_t axis) {
           "xy\nset format x '10^%T'\nset xlabel 'Q [N2/s]; dashed: R of the taps, full: R of air'\nset "
           "ylabel "
           "'RMSE of the cut, "
-       << AXES[axis] << " [N]'\n";
+       << AXIS_NAMES[axis] << " [N]'\n";
   for (std::size_t k = 0; k < high.rows.size(); ++k)
     plot << (k ? ", " : "plot ") << "$high" << k << " using 1:2 with lines lw 2 lc rgb '"
          << BURZONI_COLOURS[k] << "' title '" << high.rows[k].rpm << " rpm', $low" << k
@@ -172,11 +172,11 @@ Drawn byNoise(const std::string& folder, unsigned seed, std::size_t axis) {
   const double most = *std::max_element(minima.begin(), minima.end());
   return {
       {png},
-      {{formatted("best Q of a cut as R falls from that of air to that of taps, %s, figure %zu", AXES[axis],
-                  figure),
+      {{formatted("best Q of a cut as R falls from that of air to that of taps, %s, figure %zu",
+                  AXIS_NAMES[axis], figure),
         "\"lower Q\"", formatted("/ 2^%.1f (R / 2^%.1f)", median(shift), std::log2(high.r_cut / low.r_cut)),
         median(shift) > 0.0 ? Verdict::agrees : Verdict::differs, "median of seven speeds"},
-       {formatted("RMSE at the best Q of each R, %s, figure %zu", AXES[axis], figure + 1),
+       {formatted("RMSE at the best Q of each R, %s, figure %zu", AXIS_NAMES[axis], figure + 1),
         "\"almost unchanged\"", formatted("within %.0f %%", 100.0 * most),
         most < 0.1 ? Verdict::agrees : Verdict::differs, "a filter depends only on Q over R"}}};
 }
@@ -211,7 +211,7 @@ Drawn overview(const std::string& folder, unsigned seed, std::size_t axis) {
       << "set multiplot layout 2,1\nset grid\nset lmargin 10\nset key above horizontal samplen 2\nset xlabel "
          "'spindle speed [rpm]'\nset xrange [0:18000]\nset yrange [0:*]\n";
   for (const auto& [label, first] : {std::pair("printed", 2), std::pair("his filter here", 3)}) {
-    plot << "set ylabel 'RMSE " << AXES[axis] << ", " << label << " [N]'\n";
+    plot << "set ylabel 'RMSE " << AXIS_NAMES[axis] << ", " << label << " [N]'\n";
     for (std::size_t h = 0; h < HYPOTHESES; ++h)
       plot << (h ? ", " : "plot ") << "$rows using 1:" << static_cast<std::size_t>(first) + 2 * h
            << " with linespoints pt 7 lw 1.5 lc rgb '" << BURZONI_COLOURS[h] << "' title '" << names[h]
@@ -229,7 +229,7 @@ Drawn overview(const std::string& folder, unsigned seed, std::size_t axis) {
       {png},
       {{formatted(
             "largest RMSE by R of taps and cuts (0.15, 10; 0.15, 0.15; 10, 10; 2, 10), %s, figure %zu [N]",
-            AXES[axis], figure),
+            AXIS_NAMES[axis], figure),
         told(printed) + ": the first is best", told(here), first ? Verdict::agrees : Verdict::differs,
         "his advice is based on noise in the cut that is absent in taps; if Q over R of the taps suits the "
         "cut, equal R suit as well"}}};
@@ -244,7 +244,7 @@ std::vector<Figure> sensorTableFigures() {
     all.push_back(
         {formatted("burzoni_table_%zu", 8 + number),
          formatted("Burzoni table %zu and figure %zu: Q of the taps in seven cuts, %s", 8 + number,
-                   DRAWN_AS[number], AXES[number / HYPOTHESES]),
+                   DRAWN_AS[number], AXIS_NAMES[number / HYPOTHESES]),
          [number](const std::string& folder, unsigned seed) { return tableOf(folder, seed, number); }});
   for (std::size_t axis = 0; axis < 2; ++axis) {
     all.push_back({axis == 0 ? "burzoni_43" : "burzoni_51",

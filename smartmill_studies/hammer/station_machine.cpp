@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
 #include "smartmill_hammer/search/flute_search.h"
@@ -44,7 +45,7 @@ void StationMachine::obey(const Command& c) {
       break;
     case Command::Kind::jog: {
       Axes3 to = path_.empty() ? position_ : path_.back().position;
-      to[static_cast<std::size_t>(c.axis[0] - 'x')] += c.distance;
+      to[*axisIndex(c.axis)] += c.distance;
       path_.push_back({to, c.feed});
       path_from_ = begin;
       break;

@@ -50,8 +50,7 @@ ExpandedDisturbanceFilter::ExpandedDisturbanceFilter(const ModalModel& sensor, d
   shown_.head(n) += modes.c;
   const auto [phi, discrete] = discretiseNoise(a, noise, 1.0 / sample_rate);
   phi_ = phi;
-  const Eigen::MatrixXd p = stationaryCovariance(phi_, discrete, shown_, r);
-  gain_ = p * shown_.transpose() / (shown_ * p * shown_.transpose() + r);
+  gain_ = stationaryGain(phi_, discrete, shown_, r).gain;
   state_ = Eigen::VectorXd::Zero(all);
 }
 

@@ -8,7 +8,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/signal/fourier.h"
-#include "smartmill_core/units.h"
+#include "smartmill_kalman/filter/matrix_inverse.h"
 
 namespace smartmill::kalman {
 namespace {
@@ -25,8 +25,7 @@ std::vector<Complex> onLines(const std::vector<Complex>& element, double spacing
   std::vector<Complex> faded = element;
   for (std::size_t l = 0; l < faded.size(); ++l) {
     const double f = spacing * static_cast<double>(l);
-    const double beyond = std::clamp((f / bandwidth - 1.2) / 0.3, 0.0, 1.0);
-    faded[l] *= 0.5 * (1.0 + std::cos(units::PI * beyond));
+    faded[l] *= fadeOut((f / bandwidth - 1.2) / 0.3);
   }
   faded.back() = faded.back().real();
   const std::vector<double> impulse = inverseFourier(faded, samples);
@@ -36,12 +35,6 @@ std::vector<Complex> onLines(const std::vector<Complex>& element, double spacing
   std::copy(impulse.end() - static_cast<std::ptrdiff_t>(early), impulse.end(),
             longer.end() - static_cast<std::ptrdiff_t>(early));
   return fourier(longer);
-}
-
-/// 1 up to the bandwidth, 0 from 1.15 times it on.
-double passed(double frequency, double bandwidth) {
-  const double beyond = std::clamp((frequency / bandwidth - 1.0) / 0.15, 0.0, 1.0);
-  return 0.5 * (1.0 + std::cos(units::PI * beyond));
 }
 
 /// Misfit of the rigid-body model of the sensor.
@@ -188,7 +181,7 @@ std::vector<std::vector<double>> invertRecord(const TransferMatrix& matrix,
   };
   for (std::size_t i = 0; i < spectra.front().size(); ++i) {
     const double f = sample_rate * static_cast<double>(i) / static_cast<double>(length);
-    const double weight = passed(f, bandwidth);
+    const double weight = fadeOut((f / bandwidth - 1.0) / MatrixInverseParameters().roll_off);
     Eigen::VectorXcd m = Eigen::VectorXcd::Zero(size);
     if (weight > 0.0) {
       for (Index c = 0; c < size; ++c) m(c) = spectra[static_cast<std::size_t>(c)][i] / scale(c);

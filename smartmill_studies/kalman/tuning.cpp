@@ -152,13 +152,11 @@ std::vector<double> bandForce(const std::vector<double>& measured, const ModalMo
                               const std::vector<double>& edges, const std::vector<double>& memory,
                               int max_harmonics, double* log_likelihood) {
   const double revolution = units::TWO_PI / spindle_speed;
-  const int harmonics =
-      std::clamp(static_cast<int>(std::min(5000.0, 0.45 * sample_rate) * revolution), 1, max_harmonics);
+  const int harmonics = harmonicCount(std::min(5000.0, 0.45 * sample_rate), revolution, max_harmonics);
   std::vector<double> settling;
   for (int n = 0; n <= harmonics; ++n) {
-    // Harmonics that the sensor attenuates strongly are slow already.
-    const double passed = std::min(1.0, 2.0 * std::abs(sensor.response(n / revolution)));
-    settling.push_back(std::max(passed * memory.at(bandOf(n / revolution, edges)), QUICKEST) * revolution);
+    const double f = n / revolution;
+    settling.push_back(harmonicSettling(sensor, f, memory.at(bandOf(f, edges)), QUICKEST) * revolution);
   }
   const HarmonicGain gain = designHarmonicGain({sensor, spindle_speed, sample_rate, noise_rms, settling});
   HarmonicFilter filter({gain}, sensor, spindle_speed, sample_rate);

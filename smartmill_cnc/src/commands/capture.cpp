@@ -5,7 +5,6 @@
 #include <csignal>
 #include <cstdio>
 #include <fstream>
-#include <memory>
 #include <string>
 #include <thread>
 
@@ -73,9 +72,7 @@ void run(const Arguments& a) {
 namespace smartmill::cnc {
 
 Command captureCommand() {
-  Command command;
-  command.name = command.tool = "capture";
-  command.summary = "records a session with a Fanuc controller and prints it decoded";
+  Command command("capture", "records a session with a Fanuc controller and prints it decoded");
   command.description =
       "Records a session with a Fanuc controller (FOCAS2 Ethernet) and prints it decoded, one line per "
       "request "
@@ -87,20 +84,18 @@ Command captureCommand() {
       {"192.168.1.10 --listen 8194", "relays the session of a client that connects to port 8194"}};
   command.files = {{"OUT", "the session, frame by frame (smartmill-focas-session/1)"}};
   command.exits = {{0, "done; with --listen: stopped by Ctrl-C or SIGTERM"}};
-  command.declare = [](CommandLine& line) -> std::function<int()> {
-    const auto a = std::make_shared<Arguments>();
-    line.option("HOST", a->host, "name or address of the controller").required();
-    line.option("--port", a->port, "FOCAS port of the controller").within(1, 65535).showDefault();
-    line.option("--listen", a->listen_port,
+  command.setBody(run, [](CommandLine& line, Arguments& a) {
+    line.option("HOST", a.host, "name or address of the controller").required();
+    line.option("--port", a.port, "FOCAS port of the controller").within(1, 65535).showDefault();
+    line.option("--listen", a.listen_port,
                 "port on loopback for another client; 0: requests all values itself")
         .within(0, 65535)
         .showDefault();
-    line.option("--timeout", a->timeout, "[s] timeout of connecting and of every reply")
+    line.option("--timeout", a.timeout, "[s] timeout of connecting and of every reply")
         .positive()
         .showDefault();
-    line.option("-o,--out", a->file, "file to write (smartmill-focas-session/1)").showDefault();
-    return commandBody(a, run);
-  };
+    line.option("-o,--out", a.file, "file to write (smartmill-focas-session/1)").showDefault();
+  });
   return command;
 }
 

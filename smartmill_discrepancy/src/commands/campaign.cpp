@@ -1,11 +1,11 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
-#include <memory>
 #include <string>
 #include <vector>
 
 #include "recordings/bag_campaign.h"
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_discrepancy/commands.h"
 #include "smartmill_recording/import/import_campaign.h"
@@ -92,9 +92,7 @@ int run(const Arguments& arguments) {
 namespace smartmill::discrepancy {
 
 Command campaignCommand() {
-  Command command;
-  command.name = command.tool = "campaign";
-  command.summary = "converts measurement files and recordings into a campaign";
+  Command command("campaign", "converts measurement files and recordings into a campaign");
   command.description =
       "Converts measurement files (MATLAB, HDF5, CSV and other text, DynoWare, WAV, FLAC, UFF58), recordings "
       "(bag, MCAP) and campaigns into one campaign: campaign.yaml, model.yaml and one CSV per test. Missing "
@@ -111,26 +109,25 @@ Command campaignCommand() {
   command.files = {{"OUT/campaign.yaml", "the tests"},
                    {"OUT/model.yaml", "the given model, or one with the tool only"},
                    {"import.yaml", "smartmill-import/1: statements about the files (docs/formats.md)"}};
-  command.declare = [](CommandLine& line) -> std::function<int()> {
-    const auto a = std::make_shared<Arguments>();
-    a->program = line.program();
-    line.option("FILES", a->files, "measurement files, recordings, campaigns (default: those of --import)");
-    line.option("-o,--out", a->out, "folder of the campaign; must not exist or be empty").required();
-    line.option("--import", a->plan, "import.yaml: statements about the files");
-    line.option("--model", a->model, "machine model of the campaign");
-    line.option("--kind", a->kind, "kind of the tests: cut, air or tap").oneOf({"cut", "air", "tap"});
+  command.setBody(run, [](CommandLine& line, Arguments& a) {
+    a.program = line.program();
+    line.option("FILES", a.files, "measurement files, recordings, campaigns (default: those of --import)");
+    line.option("-o,--out", a.out, "folder of the campaign; must not exist or be empty").required();
+    line.option("--import", a.plan, "import.yaml: statements about the files");
+    line.option("--model", a.model, "machine model of the campaign");
+    line.option("--kind", a.kind, "kind of the tests: cut, air or tap").oneOf({"cut", "air", "tap"});
     for (std::size_t i = 0; i < settingKeys().size(); ++i)
-      line.option(settingKeys()[i].option, a->numbers[i], settingKeys()[i].help);
-    line.option("--direction", a->direction, "axis of the hammer in a tap: x, y or z").oneOf({"x", "y", "z"});
-    line.option("--channels", a->channels,
+      line.option(settingKeys()[i].option, a.numbers[i], settingKeys()[i].help);
+    line.option("--direction", a.direction, "axis of the hammer in a tap: x, y or z")
+        .oneOf({AXIS_NAMES.begin(), AXIS_NAMES.end()});
+    line.option("--channels", a.channels,
                 "COLUMN=NAME[UNIT]*SCALE,...: channels of the file and their units");
-    line.option("--teeth", a->teeth, "teeth of the tool, if no model is given").within(1, 20);
-    line.option("--diameter-mm", a->diameter, "diameter of the tool").positive();
-    line.option("--helix-deg", a->helix, "helix angle of the tool").within(0.0, 79.999);
-    line.option("--force-on", a->measures, "object on which the measured force acts: tool or workpiece")
+    line.option("--teeth", a.teeth, "teeth of the tool, if no model is given").within(1, 20);
+    line.option("--diameter-mm", a.diameter, "diameter of the tool").positive();
+    line.option("--helix-deg", a.helix, "helix angle of the tool").within(0.0, 79.999);
+    line.option("--force-on", a.measures, "object on which the measured force acts: tool or workpiece")
         .oneOf({"tool", "workpiece"});
-    return [a] { return run(*a); };
-  };
+  });
   return command;
 }
 

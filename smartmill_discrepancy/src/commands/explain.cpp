@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <functional>
 #include <iostream>
-#include <memory>
 #include <string>
 
 #include <unistd.h>
@@ -91,9 +90,7 @@ int run(const Arguments& arguments) {
 namespace smartmill::discrepancy {
 
 Command explainCommand() {
-  Command command;
-  command.name = command.tool = "explain";
-  command.summary = "finds which effects a machine model lacks, from a campaign or a bag";
+  Command command("explain", "finds which effects a machine model lacks, from a campaign or a bag");
   command.description =
       "Finds where the twin and the records of a campaign disagree and which effects the model lacks.";
   command.examples = {{"campaigns/runout -o report", "searches a campaign; report/report.html is the result"},
@@ -102,16 +99,14 @@ Command explainCommand() {
                    {"OUT/report.json", "the report for programs"},
                    {"OUT/model.yaml", "the model with the effects found"}};
   command.exits = {{INTERRUPTED, "interrupted by Ctrl-C; the report contains the effects found until then"}};
-  command.declare = [](CommandLine& line) -> std::function<int()> {
-    const auto arguments = std::make_shared<Arguments>();
-    line.option("CAMPAIGN", arguments->campaign, "campaign folder, or a bag").required();
-    line.option("--model", arguments->model, "machine model file (default: the campaign's)");
-    line.option("--prior", arguments->prior,
+  command.setBody(run, [](CommandLine& line, Arguments& arguments) {
+    line.option("CAMPAIGN", arguments.campaign, "campaign folder, or a bag").required();
+    line.option("--model", arguments.model, "machine model file (default: the campaign's)");
+    line.option("--prior", arguments.prior,
                 "odds of each effect from other machines (`database proposals --prior` writes them)");
-    line.option("-o,--out", arguments->out, "folder of the report").required();
-    line.option("--threads", arguments->threads, "threads").within(1, 64).showDefault();
-    return [arguments] { return run(*arguments); };
-  };
+    line.option("-o,--out", arguments.out, "folder of the report").required();
+    line.option("--threads", arguments.threads, "threads").within(1, 64).showDefault();
+  });
   return command;
 }
 

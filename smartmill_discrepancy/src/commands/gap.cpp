@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <map>
-#include <memory>
 #include <string>
 
 #include "smartmill_discrepancy/data/alignment.h"
@@ -44,9 +43,7 @@ void run(const Arguments& arguments) {
 namespace smartmill::discrepancy {
 
 Command gapCommand() {
-  Command command;
-  command.name = command.tool = "gap";
-  command.summary = "prints the gap between a campaign's records and the twin, test by test";
+  Command command("gap", "prints the gap between a campaign's records and the twin, test by test");
   command.description =
       "Gap between a campaign's records and the twin: RMS of the difference over the noise; 1 is the noise "
       "floor.";
@@ -54,13 +51,11 @@ Command gapCommand() {
       {"campaigns/runout", "with the campaign's own model"},
       {"campaigns/runout --model found/model.yaml", "with another model, over the same noise"}};
   command.files = {{"CAMPAIGN/campaign.yaml", "the tests, their records and the model"}};
-  command.declare = [](CommandLine& line) -> std::function<int()> {
-    const auto arguments = std::make_shared<Arguments>();
-    line.option("CAMPAIGN", arguments->campaign, "campaign folder").required();
-    line.option("--model", arguments->model, "machine model file (default: the campaign's)");
-    line.option("--threads", arguments->threads, "threads").within(1, 64).showDefault();
-    return commandBody(arguments, run);
-  };
+  command.setBody(run, [](CommandLine& line, Arguments& arguments) {
+    line.option("CAMPAIGN", arguments.campaign, "campaign folder").required();
+    line.option("--model", arguments.model, "machine model file (default: the campaign's)");
+    line.option("--threads", arguments.threads, "threads").within(1, 64).showDefault();
+  });
   return command;
 }
 

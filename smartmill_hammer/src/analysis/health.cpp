@@ -8,14 +8,6 @@
 namespace smartmill::hammer {
 namespace {
 
-/// Standard deviations of a drift: by chance alone some dozens of quantities exceed it once in a thousand
-/// comparisons.
-constexpr double DRIFT = 4.0;
-/// Relative difference of frequency below which two modes are the same.
-constexpr double SAME_MODE = 0.05;
-/// Share of the largest gain from which a new or missing mode counts.
-constexpr double LEAST_GAIN = 0.05;
-
 double finiteOrZero(double std) {
   return std::isfinite(std) ? std : 0.0;
 }
@@ -32,11 +24,12 @@ HealthChange change(const std::string& quantity, double before, double before_st
   return c;
 }
 
-const Mode* nearestMode(const std::vector<Mode>& modes, const Mode& mode) {
+const Mode* nearestMode(const std::vector<Mode>& modes, const Mode& mode, const HealthAllowance& allowance) {
   const Mode* found = nullptr;
   for (const Mode& m : modes) {
     const double off = std::abs(m.frequency - mode.frequency);
-    if (off < SAME_MODE * mode.frequency && (!found || off < std::abs(found->frequency - mode.frequency)))
+    if (off < allowance.same_mode * mode.frequency &&
+        (!found || off < std::abs(found->frequency - mode.frequency)))
       found = &m;
   }
   return found;
@@ -44,11 +37,11 @@ const Mode* nearestMode(const std::vector<Mode>& modes, const Mode& mode) {
 
 /// Changes for the modes of one list that the other one does not contain.
 void addMissing(const std::vector<Mode>& present, const std::vector<Mode>& other, const char* word,
-                std::vector<HealthChange>& changes) {
+                const HealthAllowance& allowance, std::vector<HealthChange>& changes) {
   double largest = 0.0;
   for (const Mode& m : present) largest = std::max(largest, std::abs(m.gain));
   for (const Mode& m : present) {
-    if (nearestMode(other, m) || std::abs(m.gain) < LEAST_GAIN * largest) continue;
+    if (nearestMode(other, m, allowance) || std::abs(m.gain) < allowance.least_gain * largest) continue;
     const bool gone = word[0] == 'g';
     changes.push_back({quantityName("gain", m) + ", " + word, gone ? m.gain : 0.0, gone ? 0.0 : m.gain,
                        gone ? -1.0 : INFINITY, gone ? -INFINITY : INFINITY});
@@ -58,7 +51,7 @@ void addMissing(const std::vector<Mode>& present, const std::vector<Mode>& other
 }  // namespace
 
 bool HealthChange::drifted() const {
-  return std::abs(sigmas) > DRIFT;
+  return std::abs(sigmas) > DRIFT_DEVIATIONS;
 }
 
 std::vector<HealthChange> modeChanges(const MeasuredModes& before, const MeasuredModes& now,
@@ -66,7 +59,7 @@ std::vector<HealthChange> modeChanges(const MeasuredModes& before, const Measure
   std::vector<HealthChange> changes;
   const std::vector<Mode>&old = before.model.modes, &fresh = now.model.modes;
   for (const Mode& m : old) {
-    const Mode* n = nearestMode(fresh, m);
+    const Mode* n = nearestMode(fresh, m, allowance);
     if (!n) continue;
     changes.push_back(change(quantityName("frequency", m), m.frequency, m.frequency_std, n->frequency,
                              n->frequency_std, allowance.frequency));
@@ -75,8 +68,8 @@ std::vector<HealthChange> modeChanges(const MeasuredModes& before, const Measure
     changes.push_back(
         change(quantityName("gain", m), m.gain, m.gain_std, n->gain, n->gain_std, allowance.gain));
   }
-  addMissing(old, fresh, "gone", changes);
-  addMissing(fresh, old, "new", changes);
+  addMissing(old, fresh, "gone", allowance, changes);
+  addMissing(fresh, old, "new", allowance, changes);
   return changes;
 }
 

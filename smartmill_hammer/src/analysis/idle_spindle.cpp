@@ -19,20 +19,6 @@ namespace {
 using Complex = std::complex<double>;
 using Eigen::Index;
 
-constexpr double STEADY_SPEED = 0.005;     // [1] change of speed that ends a segment
-constexpr double LEAST_SPEED = 10.0;       // [rad/s] below it the spindle counts as stopped
-constexpr double LONGEST_SEGMENT = 10.0;   // [s]
-constexpr std::size_t SECTIONS = 8;        // of a segment; their scatter gives the standard deviation
-constexpr double LEAST_REVOLUTIONS = 3.0;  // of a section
-constexpr double LOAD_SETTLE = 0.3;        // [s] of a load meter
-constexpr std::size_t LEAST_LOADS = 4;     // samples
-constexpr double LEAST_LOAD_STD = 1e-5;    // [1] of full scale: resolution of a meter
-constexpr double SAME_SPEED = 0.01;
-/// Closer speeds do not separate Coulomb and viscous friction.
-constexpr double LEAST_SPEED_RATIO = 1.2;
-/// [1] of a force, not contained in its scatter: error of the sensor's gain.
-constexpr double GAIN_ERROR = 0.002;
-
 /// Fit of mean, slope, cosine and sine of the angle over a section. @return [N] F = Re(this exp(i angle))
 Complex synchronousForce(const std::vector<double>& angle, const std::vector<double>& force,
                          std::size_t first, std::size_t last) {
@@ -61,7 +47,7 @@ std::vector<T> atSpeedsOf(const std::vector<T>& others, const std::vector<T>& se
   std::vector<T> chosen;
   for (const T& s : segments) {
     const bool known = std::any_of(others.begin(), others.end(), [&s](const T& o) {
-      return std::abs(o.speed - s.speed) < SAME_SPEED * s.speed;
+      return std::abs(o.speed - s.speed) < IdleSpindleOptions().same_speed * s.speed;
     });
     if (known == shared) chosen.push_back(s);
   }
@@ -95,14 +81,15 @@ void IdleSpindle::handle(const CuttingCondition& condition) {
 
 void IdleSpindle::handle(const SpindleAngle& angle) {
   angle_ = angle;
-  if (force_segment_ && std::abs(angle.speed - force_segment_->speed) > STEADY_SPEED * force_segment_->speed)
+  if (force_segment_ &&
+      std::abs(angle.speed - force_segment_->speed) > options_.steady_speed * force_segment_->speed)
     closeForceSegment();
 }
 
 void IdleSpindle::handle(const SampleBlock& force) {
-  if (!inAir() || !angle_ || angle_->speed < LEAST_SPEED) return;
-  if (force_segment_ &&
-      (force_segment_->channels != force.channels || force.stamp - force_segment_->from > LONGEST_SEGMENT))
+  if (!inAir() || !angle_ || angle_->speed < options_.least_speed) return;
+  if (force_segment_ && (force_segment_->channels != force.channels ||
+                         force.stamp - force_segment_->from > options_.longest_segment))
     closeForceSegment();
   if (!force_segment_) {
     force_segment_ = ForceSegment{force.stamp, force.stamp, angle_->speed, {}, force.channels, {}};
@@ -120,17 +107,18 @@ void IdleSpindle::handle(const SampleBlock& force) {
 }
 
 void IdleSpindle::handle(const LoadSample& load) {
-  if (!inAir() || load.spindle_speed < LEAST_SPEED || !std::isfinite(load.spindle_load)) {
+  if (!inAir() || load.spindle_speed < options_.least_speed || !std::isfinite(load.spindle_load)) {
     closeLoadSegment();
     return;
   }
   if (load_segment_ &&
-      (std::abs(load.spindle_speed - load_segment_->speed) > STEADY_SPEED * load_segment_->speed ||
-       load.stamp - load_segment_->from > LONGEST_SEGMENT))
+      (std::abs(load.spindle_speed - load_segment_->speed) > options_.steady_speed * load_segment_->speed ||
+       load.stamp - load_segment_->from > options_.longest_segment))
     closeLoadSegment();
   if (!load_segment_) load_segment_ = LoadSegment{load.stamp, load.stamp, load.spindle_speed, {}};
   load_segment_->to = load.stamp;
-  if (load.stamp - load_segment_->from >= LOAD_SETTLE) load_segment_->load.push_back(load.spindle_load);
+  if (load.stamp - load_segment_->from >= options_.load_settle)
+    load_segment_->load.push_back(load.spindle_load);
 }
 
 void IdleSpindle::closeForceSegment() {
@@ -138,21 +126,21 @@ void IdleSpindle::closeForceSegment() {
   const ForceSegment t = std::move(*force_segment_);
   force_segment_.reset();
   const double revolutions = t.speed * (t.to - t.from) / units::TWO_PI;
-  if (revolutions < LEAST_REVOLUTIONS * static_cast<double>(SECTIONS)) return;
+  if (revolutions < options_.least_revolutions * static_cast<double>(options_.sections)) return;
   for (std::size_t c = 0; c < t.channels.size(); ++c) {
     const std::vector<double>& force = t.force[c];
     // No unbalance along the spindle.
     if (force.size() != t.angle.size() || t.channels[c] == "fz" || firstNotFinite(force) < force.size())
       continue;
-    std::vector<Complex> sections;
-    for (std::size_t p = 0; p < SECTIONS; ++p)
-      sections.push_back(
-          synchronousForce(t.angle, force, p * force.size() / SECTIONS, (p + 1) * force.size() / SECTIONS));
+    std::vector<Complex> amplitudes;
+    for (std::size_t p = 0; p < options_.sections; ++p)
+      amplitudes.push_back(synchronousForce(t.angle, force, p * force.size() / options_.sections,
+                                            (p + 1) * force.size() / options_.sections));
     Complex middle;
-    for (const Complex& p : sections) middle += p / static_cast<double>(SECTIONS);
+    for (const Complex& p : amplitudes) middle += p / static_cast<double>(options_.sections);
     double squares = 0.0;
-    for (const Complex& p : sections) squares += std::norm(p - middle);
-    const double n = static_cast<double>(SECTIONS);
+    for (const Complex& p : amplitudes) squares += std::norm(p - middle);
+    const double n = static_cast<double>(options_.sections);
     current_.forces[t.channels[c]].push_back(
         {t.to, t.speed, middle, std::sqrt(squares / (2.0 * (n - 1.0) * n))});
   }
@@ -162,10 +150,10 @@ void IdleSpindle::closeLoadSegment() {
   if (!load_segment_) return;
   const LoadSegment r = std::move(*load_segment_);
   load_segment_.reset();
-  if (r.load.size() < LEAST_LOADS) return;
+  if (r.load.size() < options_.least_loads) return;
   const double lag_one = lagOneCorrelation(r.load), n = static_cast<double>(r.load.size());
   const double std_dev = standardDeviation(r.load) * std::sqrt((1.0 + lag_one) / (1.0 - lag_one) / n);
-  current_.loads.push_back({r.to, r.speed, mean(r.load), std::max(std_dev, LEAST_LOAD_STD)});
+  current_.loads.push_back({r.to, r.speed, mean(r.load), std::max(std_dev, options_.least_load_std)});
 }
 
 void IdleSpindle::interrupt() {
@@ -205,7 +193,8 @@ Unbalance unbalanceOf(const std::vector<SynchronousForce>& forces, const std::op
     const Complex gain =
         force.speed * force.speed * (sensor ? sensor->response(force.speed / units::TWO_PI) : Complex(1.0));
     const double std_dev =
-        std::max(std::hypot(force.std, GAIN_ERROR * std::abs(force.force)), 1e-12) / std::abs(gain);
+        std::max(std::hypot(force.std, IdleSpindleOptions().gain_error * std::abs(force.force)), 1e-12) /
+        std::abs(gain);
     single.push_back(force.force / gain);
     weight.push_back(1.0 / (std_dev * std_dev));
     weights += weight.back();
@@ -233,7 +222,7 @@ std::optional<IdleFriction> frictionOf(const std::vector<AirCutLoad>& loads) {
     p += weight * w * l.load;
     q += weight * w * w * l.load;
   }
-  if (!(fastest > LEAST_SPEED_RATIO * slowest)) return {};
+  if (!(fastest > IdleSpindleOptions().least_speed_ratio * slowest)) return {};
   const double determinant = a * c - b * b;
   IdleFriction f;
   f.coulomb = (c * p - b * q) / determinant;

@@ -4,22 +4,12 @@
 #include <cmath>
 #include <vector>
 
+#include "smartmill_core/modal/impact_analysis.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/signal/window.h"
 
 namespace smartmill::hammer {
 namespace {
-
-/// Least samples of a level; standard deviations of a significant difference; share of the ringing amplitude
-/// that may be mistaken for a level.
-constexpr std::size_t LEAST_SAMPLES = 48;
-constexpr double SIGNIFICANT = 4.0, RINGING_SHARE = 0.1;
-/// Share of its size below which a step has decayed.
-constexpr double DECAYED_SHARE = 0.1;
-/// [s] bounds of the current's time constant, and the value used where the force does not determine it; steps
-/// of the search.
-constexpr double SHORTEST = 0.3e-3, LONGEST = 10e-3, USUAL = 3e-3;
-constexpr int STEPS = 36;
 
 using Values = std::vector<double>;
 
@@ -48,7 +38,7 @@ double levelOf(const Values& values) {
 
 /// Levels before the contact and in the last fifth. By a third of the record a current has decayed: a level
 /// that still changes there is a drift.
-Step levelStep(const Values& values, std::size_t quiet) {
+Step levelStep(const Values& values, std::size_t quiet, const SolenoidCrosstalkOptions& options) {
   Step step;
   const Values before = slice(values, 0, quiet),
                after = slice(values, values.size() - values.size() / 5, values.size());
@@ -61,20 +51,23 @@ Step levelStep(const Values& values, std::size_t quiet) {
   const double end_ringing = std::max(0.0, standardDeviation(after) - 1.5 * noise);
   const Values middle = slice(values, values.size() / 3, values.size() / 2);
   const double middle_ringing = std::max(0.0, standardDeviation(middle) - 1.5 * noise);
-  const double remaining =
-      std::abs(levelOf(middle) - step.end) - SIGNIFICANT * of_levels - RINGING_SHARE * middle_ringing;
-  step.significant = std::abs(step.size()) > SIGNIFICANT * of_levels + RINGING_SHARE * end_ringing &&
-                     remaining < DECAYED_SHARE * std::abs(step.size());
+  const double remaining = std::abs(levelOf(middle) - step.end) - options.significant * of_levels -
+                           options.ringing_share * middle_ringing;
+  step.significant =
+      std::abs(step.size()) > options.significant * of_levels + options.ringing_share * end_ringing &&
+      remaining < options.decayed_share * std::abs(step.size());
   return step;
 }
 
 /// [s] time constant that fits the force best after its contact.
 double decayTime(const Values& force, const Step& step, std::size_t contact_start, std::size_t from,
-                 double rate) {
-  const auto to = std::min(force.size(), contact_start + static_cast<std::size_t>(4.0 * LONGEST * rate));
-  double best = USUAL, least = INFINITY;
-  for (int k = 0; k <= STEPS; ++k) {
-    const double time = SHORTEST * std::pow(LONGEST / SHORTEST, static_cast<double>(k) / STEPS);
+                 double rate, const SolenoidCrosstalkOptions& options) {
+  const auto to =
+      std::min(force.size(), contact_start + static_cast<std::size_t>(4.0 * options.longest * rate));
+  double best = options.usual, least = INFINITY;
+  for (int k = 0; k <= options.steps; ++k) {
+    const double time = options.shortest *
+                        std::pow(options.longest / options.shortest, static_cast<double>(k) / options.steps);
     double squares = 0.0;
     for (std::size_t i = from; i < to; ++i) {
       const double expected =
@@ -96,25 +89,27 @@ void subtractDecay(Values& values, const Step& step, double largest_share, std::
 
 }  // namespace
 
-void removeSolenoidCrosstalk(Hit& hit, double largest_share) {
+void removeSolenoidCrosstalk(Hit& hit, double largest_share, const SolenoidCrosstalkOptions& options) {
   const std::size_t quiet = hit.pre_trigger - hit.pre_trigger / 4;
-  if (!(largest_share > 0.0) || quiet < LEAST_SAMPLES || hit.force.size() < 10 * LEAST_SAMPLES) return;
+  if (!(largest_share > 0.0) || quiet < LEAST_QUIET_SAMPLES || hit.force.size() < 10 * LEAST_QUIET_SAMPLES)
+    return;
   for (const Values* values : {&hit.force, &hit.response}) {
     for (const double v : *values) {
       if (!std::isfinite(v)) return;
     }
   }
-  const Step force = levelStep(hit.force, quiet), response = levelStep(hit.response, quiet);
+  const Step force = levelStep(hit.force, quiet, options), response = levelStep(hit.response, quiet, options);
   const auto top =
       static_cast<std::size_t>(std::max_element(hit.force.begin(), hit.force.end()) - hit.force.begin());
   const double contact = std::max(0.02 * (hit.force[top] - force.before),
-                                  SIGNIFICANT * standardDeviation(slice(hit.force, 0, quiet)));
+                                  options.significant * standardDeviation(slice(hit.force, 0, quiet)));
   std::size_t contact_start = top, end = top;
   while (contact_start > quiet && hit.force[contact_start] - force.before > contact) --contact_start;
   const double after_contact = std::max(contact, 1.5 * std::abs(force.size()));
   while (end + 1 < hit.force.size() && hit.force[end] - force.end > after_contact) ++end;
-  const double time =
-      force.significant ? decayTime(hit.force, force, contact_start, end + 2, hit.sample_rate) : USUAL;
+  const double time = force.significant
+                          ? decayTime(hit.force, force, contact_start, end + 2, hit.sample_rate, options)
+                          : options.usual;
   subtractDecay(hit.force, force, largest_share, contact_start, time * hit.sample_rate);
   subtractDecay(hit.response, response, largest_share, contact_start, time * hit.sample_rate);
 }

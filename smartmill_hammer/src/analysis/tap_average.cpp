@@ -6,6 +6,7 @@
 #include "response_kind.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
+#include "smartmill_core/modal/impact_analysis.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
 #include "smartmill_hammer/analysis/tap_records.h"
@@ -13,27 +14,24 @@
 namespace smartmill::hammer {
 namespace {
 
-/// A record is truncated when its end exceeds this share of its beginning, and this multiple of the noise.
-constexpr double RINGING_SHARE = 0.02, CLEAR_OF_NOISE = 2.0;
-constexpr std::size_t LEAST_SCATTER_SAMPLES = 48;  // for a standard deviation
-constexpr std::size_t LEAD_SAMPLES = 8;            // kept before the beginning of a hit
+constexpr std::size_t LEAD_SAMPLES = 8;  // kept before the beginning of a hit
 
 /// By ResponseKind.
 constexpr const char* RESPONSE_NAMES[] = {"acceleration", "velocity", "displacement", "force"};
 constexpr const char* FRF_UNITS[] = {"m/s2/N", "m/s/N", "m/N", "1"};
 
 /// Whether the response has not decayed at the end: its last tenth compared with the first after the hit.
-bool isTruncated(const Hit& hit) {
+bool isTruncated(const Hit& hit, const TapFrfOptions& options) {
   const std::size_t quiet = hit.pre_trigger - hit.pre_trigger / 4,
                     tenth = (hit.response.size() - hit.pre_trigger) / 10;
-  if (tenth < LEAST_SCATTER_SAMPLES) return false;
+  if (tenth < LEAST_QUIET_SAMPLES) return false;
   const auto scatter = [&](std::size_t from, std::size_t count) {
     const auto begin = hit.response.begin() + static_cast<std::ptrdiff_t>(from);
     return standardDeviation({begin, begin + static_cast<std::ptrdiff_t>(count)});
   };
-  const double noise = quiet < LEAST_SCATTER_SAMPLES ? 0.0 : scatter(0, quiet);
+  const double noise = quiet < LEAST_QUIET_SAMPLES ? 0.0 : scatter(0, quiet);
   const double first = scatter(hit.pre_trigger, tenth), last = scatter(hit.response.size() - tenth, tenth);
-  return last > std::hypot(CLEAR_OF_NOISE * noise, RINGING_SHARE * first);
+  return last > std::hypot(options.clear_of_noise * noise, options.ringing_share * first);
 }
 
 /// The record from just before the hit on, baselines subtracted.
@@ -46,7 +44,7 @@ Hit fromHit(const Hit& hit) {
   for (std::vector<double>* channel : {&cut.force, &cut.response}) {
     const auto begin = channel->begin();
     const double base =
-        quiet < LEAST_SCATTER_SAMPLES ? 0.0 : mean({begin, begin + static_cast<std::ptrdiff_t>(quiet)});
+        quiet < LEAST_QUIET_SAMPLES ? 0.0 : mean({begin, begin + static_cast<std::ptrdiff_t>(quiet)});
     channel->erase(begin, begin + static_cast<std::ptrdiff_t>(hit.pre_trigger - lead));
     for (double& value : *channel) value -= base;
   }
@@ -118,7 +116,9 @@ TapFrf averageTaps(const std::vector<TapRecord>& taps, const TapFrfOptions& opti
     accepted.push_back(hits[i]);
   }
   if (accepted.empty()) return result;
-  if (options.exponential_time == 0.0 && std::any_of(accepted.begin(), accepted.end(), isTruncated))
+  if (options.exponential_time == 0.0 &&
+      std::any_of(accepted.begin(), accepted.end(),
+                  [&options](const Hit& hit) { return isTruncated(hit, options); }))
     result.truncated_length = cutToHits(accepted);
   ImpactAnalysis analysis(impact);
   for (const Hit& hit : accepted) analysis.add(hit);

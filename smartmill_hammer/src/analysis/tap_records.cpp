@@ -18,6 +18,7 @@
 #include "smartmill_core/io/csv.h"
 #include "smartmill_core/io/text_file.h"
 #include "smartmill_core/io/uff.h"
+#include "smartmill_core/signal/force_channels.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
 
@@ -106,7 +107,7 @@ std::string responseColumn(const Record& record) {
     if (record.has(name)) return name;
   }
   std::string found;
-  for (const char* name : {"fx", "fy", "fz"}) {
+  for (const char* name : FORCE_CHANNELS) {
     if (record.has(name) && (found.empty() || range(record.column(name)) > range(record.column(found))))
       found = name;
   }

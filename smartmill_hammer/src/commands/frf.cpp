@@ -2,7 +2,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -122,6 +121,7 @@ void runBag(const FrfOptions& options) {
 }
 
 void run(const FrfOptions& options) {
+  options.parameters.validate();
   const std::vector<TapFormat> formats = formatsOf(options);
   if (options.high > 0.0 && !(options.high > options.low))
     throw Error("--high: " + std::to_string(options.high) + " is not above --low");
@@ -161,52 +161,42 @@ void addTip(const CommandOptions& line, TipOptions& tip) {
   line.option("--read-mm", tip.read, "height of the response above the tip").notNegative().showDefault();
 }
 
-std::function<int()> declare(CommandLine& line) {
-  const auto o = std::make_shared<FrfOptions>();
-  line.option("INPUT", o->inputs,
+void addOptions(CommandLine& line, FrfOptions& o) {
+  line.option("INPUT", o.inputs,
               "files; hammer records are averaged as hits of one point, FRFs are fitted with common poles")
       .required();
-  line.option("-o,--out", o->out, "folder for frf.csv, frf.frf, frf.uff, modes.yaml, hits.csv and pictures")
+  line.option("-o,--out", o.out, "folder for frf.csv, frf.frf, frf.uff, modes.yaml, hits.csv and pictures")
       .showDefault();
-  line.option("--format", o->format, "auto (by content), bag, csv, dynoware, frf, sound, text or uff")
+  line.option("--format", o.format, "auto (by content), bag, csv, dynoware, frf, sound, text or uff")
       .oneOf({"auto", "bag", "csv", "dynoware", "frf", "sound", "text", "uff"})
       .showDefault();
-  line.option("--low", o->low, "lower end of the band of modes [Hz] (bags: fit_low of --params)")
+  line.option("--low", o.low, "lower end of the band of modes [Hz] (bags: fit_low of --params)")
       .notNegative();
-  line.option("--high", o->high,
+  line.option("--high", o.high,
               "upper end [Hz], up to which the force of a hit must have power; 0: the whole record")
       .notNegative();
-  line.option("--modes", o->modes, "number of modes, those with the most evidence; 0: all proven ones")
+  line.option("--modes", o.modes, "number of modes, those with the most evidence; 0: all proven ones")
       .within(0, 200);
-  line.option("--max-modes", o->max_modes, "largest number of proven modes").within(1, 200).showDefault();
-  line.flag("--real-modes", o->real_modes, "proportional damping: gains without phase");
-  line.option("--average", o->average, "average of hits").oneOf({"h1", "h2", "hv"}).showDefault();
-  line.option("--weak-force", o->weak_force, "[N] hits with a lower peak are rejected; 0: from the noise")
+  line.option("--max-modes", o.max_modes, "largest number of proven modes").within(1, 200).showDefault();
+  line.flag("--real-modes", o.real_modes, "proportional damping: gains without phase");
+  line.option("--average", o.average, "average of hits").oneOf({"h1", "h2", "hv"}).showDefault();
+  line.option("--weak-force", o.weak_force, "[N] hits with a lower peak are rejected; 0: from the noise")
       .notNegative();
-  addChannels(line, o->channels);
-  addTip(line, o->tip);
-  line.flag("--binary", o->binary, "frf.uff with binary values (58b)");
-  line.option("--model", o->model, "machine model (bags)");
-  const auto table = std::make_shared<ParameterTable>(tableOf(o->parameters));
-  const auto parameters = std::make_shared<ParameterOptions>(line, *table, "launch/config/hammer.yaml");
-  parameters->add("--second-hit-share", "second_hit_share");
-  parameters->add("--exponential-time", "exponential_time");
-  parameters->add("--asked-std", "asked_std");
-  line.flag("--no-picture", o->no_picture, "no PNG files");
-  return [o, table, parameters] {
-    parameters->apply();
-    o->parameters.validate();
-    run(*o);
-    return 0;
-  };
+  addChannels(line, o.channels);
+  addTip(line, o.tip);
+  line.flag("--binary", o.binary, "frf.uff with binary values (58b)");
+  line.option("--model", o.model, "machine model (bags)");
+  ParameterOptions parameters(line, tableOf(o.parameters), "launch/config/hammer.yaml");
+  parameters.add("--second-hit-share", "second_hit_share");
+  parameters.add("--exponential-time", "exponential_time");
+  parameters.add("--asked-std", "asked_std");
+  line.flag("--no-picture", o.no_picture, "no PNG files");
 }
 
 }  // namespace
 
 smartmill::Command frfCommand() {
-  smartmill::Command command;
-  command.name = command.tool = "frf";
-  command.summary = "estimates FRF and modes from hammer tests";
+  smartmill::Command command("frf", "estimates FRF and modes from hammer tests");
   command.description =
       "Frequency response and modes from hammer tests: hits of one point (CSV with time[s],hammer[N] and "
       "acceleration[m/s2], displacement[m] or a force; DynoWare; universal file 58; three columns without "
@@ -219,7 +209,7 @@ smartmill::Command frfCommand() {
                    {"OUT/modes.yaml", "modes with standard deviations"},
                    {"OUT/hits.csv", "the verdict on every hit"},
                    {"launch/config/hammer.yaml", "the node's parameters, for --params"}};
-  command.declare = declare;
+  command.setBody(run, addOptions);
   return command;
 }
 

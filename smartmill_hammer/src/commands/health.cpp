@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdio>
 #include <map>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -136,9 +135,8 @@ int run(const Options& options) {
 }  // namespace
 
 smartmill::Command healthCommand() {
-  smartmill::Command command;
-  command.name = command.tool = "health";
-  command.summary = "reports drift of modes, friction and unbalance over recorded sessions";
+  smartmill::Command command("health",
+                             "reports drift of modes, friction and unbalance over recorded sessions");
   command.description =
       "Health of a spindle over recorded sessions: modes of each tool, point and direction, friction, and "
       "from "
@@ -147,29 +145,25 @@ smartmill::Command healthCommand() {
       {"monday.bag friday.bag", "changes in standard deviations, DRIFT where significant"},
       {"*.bag -o health.csv", "every comparison as a table; `database DB keep health.csv` stores it"}};
   command.files = {{"OUT", "CSV measured,bag,days,quantity,first,now,deviations,drifted,stamp"}};
-  command.declare = [](CommandLine& line) -> std::function<int()> {
-    const auto o = std::make_shared<Options>();
-    line.option("BAGS", o->bags, "recorded sessions").required();
-    line.option("-o,--out", o->out, "CSV of every comparison");
-    line.option("--frequency", o->allowance.frequency,
+  command.setBody(run, [](CommandLine& line, Options& o) {
+    line.option("BAGS", o.bags, "recorded sessions").required();
+    line.option("-o,--out", o.out, "CSV of every comparison");
+    line.option("--frequency", o.allowance.frequency,
                 "allowed change of a frequency from day to day, relative")
         .notNegative()
         .showDefault();
-    line.option("--damping", o->allowance.damping, "allowed change of a damping ratio, relative")
+    line.option("--damping", o.allowance.damping, "allowed change of a damping ratio, relative")
         .notNegative()
         .showDefault();
-    line.option("--gain", o->allowance.gain, "allowed change of a gain, relative")
+    line.option("--gain", o.allowance.gain, "allowed change of a gain, relative").notNegative().showDefault();
+    line.option("--friction", o.allowance.friction, "allowed change of the friction, relative")
         .notNegative()
         .showDefault();
-    line.option("--friction", o->allowance.friction, "allowed change of the friction, relative")
-        .notNegative()
-        .showDefault();
-    line.option("--unbalance", o->allowance.unbalance,
+    line.option("--unbalance", o.allowance.unbalance,
                 "allowed change of the unbalance, relative; a tool clamped anew turns it")
         .notNegative()
         .showDefault();
-    return [o] { return run(*o); };
-  };
+  });
   return command;
 }
 

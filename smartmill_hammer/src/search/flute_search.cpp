@@ -15,12 +15,6 @@ namespace {
 const double GOLDEN_RATIO = 0.5 * (1.0 + std::sqrt(5.0));
 // Share of the wider side, from the centre: 1 - 1 / golden ratio.
 const double SECTION = 2.0 - GOLDEN_RATIO;
-/// Share of the tolerance: distance from the top at which a measurement closes the bracket.
-constexpr double CLOSE_SHARE = 0.45;
-/// Standard deviations of a measurement by which it must be below the top to differ from it.
-constexpr double NOISE_SIGMAS = 3.0;
-/// Share of the range from which a voltage counts as out of range.
-constexpr double RANGE_SHARE = 0.97;
 
 }  // namespace
 
@@ -93,7 +87,8 @@ void FluteSearch::extendBracket(const Point& p) {
         right_ = walk_[i];
       if (direction_ < 0.0) std::swap(left_, right_);
       bracketed_ = true;
-      if (centre_.volt < -RANGE_SHARE * options_.range_volt) return fail("no flute in the sensor's range");
+      if (centre_.volt < -options_.range_share * options_.range_volt)
+        return fail("no flute in the sensor's range");
       return chooseNextAngle();
     }
     // The search began on the flute: its other flank is behind the start, so continue from there.
@@ -141,7 +136,7 @@ FluteSearch::Parabola FluteSearch::parabola() const {
   if (!(p.curvature < 0.0)) return p;
   p.vertex = std::clamp(-(fa / a * b - fb / b * a) / (b - a) / (2.0 * p.curvature), a, b);
   const double noise = std::max({left_.volt_std, centre_.volt_std, right_.volt_std});
-  p.resolvable = std::min(std::sqrt(NOISE_SIGMAS * noise / -p.curvature), options_.tolerance);
+  p.resolvable = std::min(std::sqrt(options_.below_top_sigmas * noise / -p.curvature), options_.tolerance);
   return p;
 }
 
@@ -149,7 +144,7 @@ FluteSearch::Parabola FluteSearch::parabola() const {
 /// side of the bracket.
 double FluteSearch::stepTowardsTop(const Parabola& p) const {
   const double a = left_.angle - centre_.angle, b = right_.angle - centre_.angle;
-  const double top = p.vertex, close = std::max(CLOSE_SHARE * options_.tolerance, p.resolvable);
+  const double top = p.vertex, close = std::max(options_.close_share * options_.tolerance, p.resolvable);
   if (!(p.curvature < 0.0)) return b > -a ? SECTION * b : SECTION * a;
   if (std::abs(top) > close && top > 0.9 * a && top < 0.9 * b) return top;
   const double near = std::clamp(top, -close, close);

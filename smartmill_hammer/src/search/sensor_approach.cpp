@@ -9,15 +9,11 @@
 namespace smartmill::hammer {
 namespace {
 
-/// Points checked over the face's radius; [rad] between two angles checked of the tool; equal angles.
-constexpr int FACE_STEPS = 12;
-constexpr double TURN_STEP = 0.03, SAME_TURN = 1e-6;
+constexpr double SAME_TURN = 1e-6;  // [rad] equal angles
 /// [1] of the gain above the voltage far from the sensor: smallest value from which a gap is computed.
 constexpr double LEAST_OVER = 0.02;
 /// [1] mean distance from a disc's diameter over its radius, 4 / (3 pi).
 constexpr double MEAN_DISC_DISTANCE = 0.4244;
-/// [1] error of the measured curve: nonlinearity of the amplifier.
-constexpr double MEASURED_CURVE_ERROR = 0.01;
 
 }  // namespace
 
@@ -96,7 +92,7 @@ void SensorApproach::setCurve(const SensorCurve& curve) {
   };
   if (!near(gain, station_.gain_volt) || !near(zero, station_.gap_at_zero_volt)) return;
   curve_ = curve;
-  curve_error_ = std::min(options_.curve_error, MEASURED_CURVE_ERROR);
+  curve_error_ = std::min(options_.curve_error, options_.measured_curve_error);
   updateProfile();
 }
 
@@ -154,7 +150,7 @@ double SensorApproach::leastRetreat(double off) const {
 }
 
 double SensorApproach::leastRetreatBetween(double first, double last) const {
-  const int steps = 1 + static_cast<int>(std::abs(last - first) / TURN_STEP);
+  const int steps = 1 + static_cast<int>(std::abs(last - first) / options_.turn_step);
   double least = station_.flute_depth;
   for (int k = 0; k <= steps; ++k) least = std::min(least, leastRetreat(first + (last - first) * k / steps));
   return least;
@@ -163,8 +159,8 @@ double SensorApproach::leastRetreatBetween(double first, double last) const {
 double SensorApproach::safeTravel(const Pose& pose) const {
   const double radius = tool_.radius(), face = 0.5 * options_.face;
   double behind = 2.0 * radius;
-  for (int i = -FACE_STEPS; i <= FACE_STEPS; ++i) {
-    const double aside = face * i / FACE_STEPS;
+  for (int i = -options_.face_steps; i <= options_.face_steps; ++i) {
+    const double aside = face * i / options_.face_steps;
     if (std::abs(aside) > 0.9 * radius) continue;
     const double a = std::asin(aside / radius);
     const double up = std::sqrt(std::max(0.0, face * face - aside * aside));

@@ -2,40 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
-
-#include <Eigen/Core>
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
-#include "smartmill_core/math/linear_algebra.h"
 
 namespace smartmill::hammer {
-namespace {
-
-/// Share of the range from which a voltage does not depend on the distance.
-constexpr double RANGE_SHARE = 0.95;
-/// Least span of the samples over the required one; iterations of that span by the gap found.
-constexpr double LEAST_REACH = 0.2;
-constexpr int CURVE_ROUNDS = 4;
-/// Range of samples over `curve_jog` that determine the curvature.
-constexpr double CURVE_REACH = 1.2;
-constexpr std::size_t LEAST_READINGS = 5;
-/// [1] standard deviation of the far voltage over the gain, above which the curve is undetermined.
-constexpr double KNOWN_FAR = 0.01;
-/// [m] shortest jog whose slope gives the gap; ratio of the slopes of two such jogs, at least.
-constexpr double LEAST_SLOPE = 10e-6;
-constexpr double CLEAR_RISE = 1.05;
-/// [1] local over nominal gap, below which an edge sharper than the electrode faces the sensor.
-constexpr double SHARP = 0.8;
-/// [1] valid gaps of the curve over the nominal gap.
-constexpr double LEAST_BEND = 0.08, MOST_BEND = 4.0;
-
-}  // namespace
 
 SensorCalibration::SensorCalibration(const SensorCalibrationOptions& options)
-    : options_(options), curve_gap_(std::numeric_limits<double>::quiet_NaN()), curve_gap_std_(curve_gap_) {
+    : options_(options), samples_(options) {
   const auto& o = options_;
   if (!(o.least_jog > 0.0 && o.first_jog >= o.least_jog && o.max_jog >= o.first_jog)) {
     throw Error("sensor calibration: expected 0 < least_jog <= first_jog <= max_jog, got " +
@@ -44,25 +19,17 @@ SensorCalibration::SensorCalibration(const SensorCalibrationOptions& options)
   }
 }
 
-bool SensorCalibration::isClipped(double volt) const {
-  return std::abs(volt) >= RANGE_SHARE * options_.range_volt;
-}
-
-double SensorCalibration::nominalGap(double volt) const {
-  return options_.gap_at_zero_volt / std::max(1e-3, 1.0 + volt / options_.gain_volt);
-}
-
 void SensorCalibration::start(double volt, double volt_std) {
   volt_ = volt;
   volt_std_ = volt_std;
-  samples_.push_back({0.0, volt});
+  samples_.add(0.0, volt);
   // A short safe travel may result from the uncertain curve alone: determine it by samples further away.
-  if (!isClipped(volt) && volt < -options_.zero_volt && options_.curve_jog > 0.0 &&
-      options_.safe_travel < static_cast<double>(LEAST_READINGS) * options_.max_jog) {
-    samples_away_ = LEAST_READINGS - 1;
+  if (!samples_.isClipped(volt) && volt < -options_.zero_volt && options_.curve_jog > 0.0 &&
+      options_.safe_travel < static_cast<double>(options_.least_readings) * options_.max_jog) {
+    samples_away_ = options_.least_readings - 1;
     return moveAway();
   }
-  if (isClipped(volt)) {
+  if (samples_.isClipped(volt)) {
     requestJog(volt < 0.0 ? options_.max_jog : -options_.max_jog);
   } else {
     // At zero already: the sensitivity requires a jog, away from the sensor.
@@ -76,7 +43,7 @@ void SensorCalibration::requestJog(double distance) {
     return fail("the sensor's voltage is not zero after " + std::to_string(jogs_) + " jogs");
   }
   const double safe =
-      std::min(options_.safe_travel, travelled_ + localGap() - options_.min_gap - options_.swing);
+      std::min(options_.safe_travel, travelled_ + samples_.localGap() - options_.min_gap - options_.swing);
   if (phase_ == Phase::approach && rounded > 0.0 && travelled_ + rounded > safe - options_.check_jog) {
     const double left = safe - options_.check_jog - travelled_;
     const double step = std::floor(left / options_.resolution) * options_.resolution;
@@ -84,10 +51,10 @@ void SensorCalibration::requestJog(double distance) {
       next_jog_ = step;
       return;
     }
-    limited_by_edges_ = true;
-    if (sensitivity_ > 0.0) return startCheck();
+    result_.limited_by_edges = true;
+    if (result_.sensitivity > 0.0) return startCheck();
     // No approach possible: the sensitivity requires a jog, away from the sensor.
-    if (samples_.size() == 1 && !isClipped(volt_)) {
+    if (samples_.size() == 1 && !samples_.isClipped(volt_)) {
       next_jog_ = -options_.first_jog;
       return;
     }
@@ -100,29 +67,11 @@ void SensorCalibration::requestJog(double distance) {
                           1e3 * travelled_, volt_));
   }
   // By the nominal curve; out of range the gap is at least that at the end of the range.
-  if (rounded > 0.0 && nominalGap(volt_) - rounded < options_.min_gap) {
+  if (rounded > 0.0 && samples_.nominalGap(volt_) - rounded < options_.min_gap) {
     return fail(formatted("a jog of %.0f um at %.2f V would bring the tool nearer than %.0f um",
                           1e6 * rounded, volt_, 1e6 * options_.min_gap));
   }
   next_jog_ = rounded;
-}
-
-/// [m] gap of the hyperbola through the last three samples of the approach, whose slope is proportional to
-/// 1 / gap^2. In front of a sharp edge it falls long before the nominal gap does. Infinite: undetermined.
-double SensorCalibration::localGap() const {
-  const double far = std::numeric_limits<double>::infinity();
-  const std::size_t n = samples_.size();
-  if (n < 3) return far;
-  const Sample &a = samples_[n - 3], &b = samples_[n - 2], &c = samples_[n - 1];
-  if (isClipped(a.volt) ||
-      !(b.position - a.position >= LEAST_SLOPE && c.position - b.position >= LEAST_SLOPE))
-    return far;
-  const double before = (b.volt - a.volt) / (b.position - a.position),
-               now = (c.volt - b.volt) / (c.position - b.position);
-  if (!(before > 0.0 && now > CLEAR_RISE * before)) return far;
-  const double between = 0.5 * (c.position - a.position), middle = between / (std::sqrt(now / before) - 1.0);
-  const double gap = middle - 0.5 * (c.position - b.position);
-  return gap < SHARP * nominalGap(c.volt) ? gap : far;
 }
 
 void SensorCalibration::addVoltage(double volt, double volt_std) {
@@ -132,10 +81,10 @@ void SensorCalibration::addVoltage(double volt, double volt_std) {
   const double before = volt_, change = volt - volt_;
   const double noise = std::hypot(volt_std, volt_std_);
   const double moved = next_jog_;
-  const bool usable = !isClipped(volt) && !isClipped(volt_);
+  const bool usable = !samples_.isClipped(volt) && !samples_.isClipped(volt_);
   volt_ = volt;
   volt_std_ = volt_std;
-  samples_.push_back({travelled_, volt});
+  samples_.add(travelled_, volt);
   switch (phase_) {
     case Phase::check_near:
       near_volt_ = volt;
@@ -146,9 +95,10 @@ void SensorCalibration::addVoltage(double volt, double volt_std) {
       // Symmetric about the rest position: the sensor's curvature cancels (eq. 4.8).
       const double slope = (near_volt_ - volt) / std::abs(moved);
       if (!(slope > 0.0)) return fail("the sensor's voltage does not rise towards the tool");
-      sensitivity_ = 1.0 / slope;
-      sensitivity_std_ = sensitivity_ * std::hypot(std::hypot(near_std_, volt_std) / (near_volt_ - volt),
-                                                   options_.position_std / std::abs(moved));
+      result_.sensitivity = 1.0 / slope;
+      result_.sensitivity_std =
+          result_.sensitivity * std::hypot(std::hypot(near_std_, volt_std) / (near_volt_ - volt),
+                                           options_.position_std / std::abs(moved));
       if (options_.curve_jog <= 2.0 * options_.check_jog) return requestReturn();
       phase_ = Phase::bend_near;
       return requestJog(options_.check_jog - 0.5 * options_.curve_jog);
@@ -166,15 +116,15 @@ void SensorCalibration::addVoltage(double volt, double volt_std) {
   if (usable) return updateSensitivity(change, moved, noise);
   // The curve leaves distance, yet the range ends: some point of the tool is in contact or close to it. No
   // further jog.
-  if (isClipped(volt) && volt > 0.0 && moved > 0.0 && !isClipped(before) &&
-      nominalGap(before) - moved > options_.min_gap) {
+  if (samples_.isClipped(volt) && volt > 0.0 && moved > 0.0 && !samples_.isClipped(before) &&
+      samples_.nominalGap(before) - moved > options_.min_gap) {
     return fail(formatted(
         "a jog of %.0f um took the sensor from %.2f V to the end of its range: a point of the tool is "
         "nearer than the surface in front of the sensor",
         1e6 * moved, before));
   }
   // No sensitivity yet: the longest jog, as in the thesis's program.
-  if (!isClipped(volt)) return requestJog(volt < 0.0 ? options_.first_jog : -options_.first_jog);
+  if (!samples_.isClipped(volt)) return requestJog(volt < 0.0 ? options_.first_jog : -options_.first_jog);
   requestJog(volt < 0.0 ? options_.max_jog : -options_.max_jog);
 }
 
@@ -199,14 +149,14 @@ void SensorCalibration::updateSensitivity(double change, double moved, double no
     return fail(
         formatted("a jog of %.0f um changed the voltage by %.4f V: no sensitivity", 1e6 * moved, change));
   }
-  sensitivity_ = 1.0 / slope;
-  sensitivity_std_ =
-      sensitivity_ * std::hypot(noise / std::abs(change), options_.position_std / std::abs(moved));
+  result_.sensitivity = 1.0 / slope;
+  result_.sensitivity_std =
+      result_.sensitivity * std::hypot(noise / std::abs(change), options_.position_std / std::abs(moved));
   samples_away_ > 0 ? moveAway() : planJog();
 }
 
 void SensorCalibration::planJog() {
-  const double remaining = -volt_ * sensitivity_;  // eq. 4.9
+  const double remaining = -volt_ * result_.sensitivity;  // eq. 4.9
   if (std::abs(volt_) < options_.zero_volt || std::abs(remaining) < options_.resolution) return startCheck();
   const double size = std::abs(remaining) <= options_.least_jog
                           ? std::abs(remaining)
@@ -222,105 +172,30 @@ void SensorCalibration::startCheck() {
 }
 
 void SensorCalibration::finish() {
-  const Hyperbola curve = hyperbola();
-  curve_gap_ = curve.gap;
-  curve_gap_std_ = curve.gap_std;
-  if (std::isfinite(curve_gap_) && options_.check_jog > 0.0) {
+  const ApproachCurve::Hyperbola curve = samples_.hyperbola(curveVoltStd());
+  result_.curve_gap = curve.gap;
+  result_.curve_gap_std = curve.gap_std;
+  if (std::isfinite(result_.curve_gap) && options_.check_jog > 0.0) {
     // Jogs of +-d measure K / (g^2 - d^2) instead of K / g^2.
-    const double share = options_.check_jog / curve_gap_;
-    sensitivity_ /= 1.0 - share * share;
+    const double share = options_.check_jog / result_.curve_gap;
+    result_.sensitivity /= 1.0 - share * share;
   }
-  if (limited_by_edges_ && sensitivity_std_ > options_.largest_std * sensitivity_) {
+  if (result_.limited_by_edges && result_.sensitivity_std > options_.largest_std * result_.sensitivity) {
     return fail(
         formatted("the tool's edges limit the approach to %.2f V, where the standard deviation of the "
                   "sensitivity is %.1f %%",
-                  volt_, 100.0 * sensitivity_std_ / sensitivity_));
+                  volt_, 100.0 * result_.sensitivity_std / result_.sensitivity));
   }
   state_ = State::done;
 }
 
-/// V = a + K / (g - (x - x_now)) through the nearby samples: within `curve_jog` where those exist, otherwise
-/// within that gap itself. Further away other regions of the tool contribute.
-SensorCalibration::Hyperbola SensorCalibration::hyperbola() const {
-  if (options_.curve_jog > 2.0 * options_.check_jog) return hyperbola(CURVE_REACH * options_.curve_jog);
-  Hyperbola found = hyperbola(options_.gap_at_zero_volt);
-  for (int k = 0; k < CURVE_ROUNDS && std::isfinite(found.gap); ++k) {
-    const Hyperbola nearer = hyperbola(std::max(found.gap, 2.0 * options_.check_jog));
-    if (!std::isfinite(nearer.gap)) break;
-    found = nearer;
-  }
-  return found;
-}
-
-/// Over the samples within `reach` [m]; NaN: undetermined.
-SensorCalibration::Hyperbola SensorCalibration::hyperbola(double reach) const {
-  std::vector<Sample> near;
-  double furthest = 0.0;
-  for (const Sample& r : samples_) {
-    const double away = std::abs(r.position - travelled_);
-    if (isClipped(r.volt) || away > reach) continue;
-    near.push_back(r);
-    furthest = std::max(furthest, away);
-  }
-  Hyperbola found = fitHyperbola(near);
-  const double share = found.gap / options_.gap_at_zero_volt;
-  if (furthest < LEAST_REACH * reach || !(share > LEAST_BEND && share < MOST_BEND))
-    found.gap = found.gap_std = std::numeric_limits<double>::quiet_NaN();
-  return found;
+/// Of a sample of the curve.
+double SensorCalibration::curveVoltStd() const {
+  return std::hypot(volt_std_, near_std_);
 }
 
 std::optional<SensorCurve> SensorCalibration::curve() const {
-  std::vector<Sample> all;
-  double nearest = -std::numeric_limits<double>::infinity(), furthest = -nearest;
-  for (const Sample& r : samples_) {
-    if (isClipped(r.volt)) continue;
-    all.push_back(r);
-    nearest = std::max(nearest, r.position);
-    furthest = std::min(furthest, r.position);
-  }
-  if (phase_ != Phase::approach || all.size() < LEAST_READINGS ||
-      nearest - furthest < options_.gap_at_zero_volt) {
-    return std::nullopt;
-  }
-  const Hyperbola h = fitHyperbola(all);
-  if (!(h.gap > 0.0 && h.constant > 0.0 && h.far_volt_std < KNOWN_FAR * options_.gain_volt))
-    return std::nullopt;
-  return SensorCurve{h.far_volt, h.constant};
-}
-
-/// Least squares of V x = g V + a x + c, so that V = a + K / (g - x) with K = -c - a g; NaN: undetermined.
-SensorCalibration::Hyperbola SensorCalibration::fitHyperbola(const std::vector<Sample>& near) const {
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  const Hyperbola none{nan, nan, nan, nan, nan};
-  if (near.size() < LEAST_READINGS) return none;
-  const auto rows = static_cast<Eigen::Index>(near.size());
-  Eigen::MatrixXd a(rows, 3), b(rows, 1);
-  for (Eigen::Index i = 0; i < rows; ++i) {
-    const Sample& r = near[static_cast<std::size_t>(i)];
-    const double x = (r.position - travelled_) / options_.gap_at_zero_volt, v = r.volt / options_.range_volt;
-    a.row(i) << v, x, 1.0;
-    b(i, 0) = v * x;
-  }
-  const linear::LeastSquares fit = linear::leastSquares(a, b);
-  if (fit.rank < 3) return none;
-  const double gap = fit.x(0, 0), far = fit.x(1, 0);
-  // Errors of each row: of position (a distance has two ends), of voltage, and of the law.
-  const Eigen::MatrixXd influence =
-      linear::inverseSymmetric(Eigen::MatrixXd(a.transpose() * a)) * a.transpose();
-  const double position_error = options_.position_std / std::sqrt(2.0) / options_.gap_at_zero_volt;
-  const double volt_error = std::hypot(volt_std_, near_std_) / options_.range_volt;
-  double variance[2] = {0.0, 0.0}, squares = 0.0, expected = 0.0;
-  for (Eigen::Index i = 0; i < rows; ++i) {
-    const double error = std::hypot((a(i, 0) - far) * position_error, (a(i, 1) - gap) * volt_error);
-    const double residual = b(i, 0) - a.row(i).dot(fit.x.col(0));
-    for (Eigen::Index k = 0; k < 2; ++k) variance[k] += std::pow(influence(k, i) * error, 2);
-    squares += residual * residual;
-    expected += error * error * static_cast<double>(rows - 3) / static_cast<double>(rows);
-  }
-  const double misfit = expected > 0.0 ? std::max(1.0, squares / expected) : 1.0;
-  return {gap * options_.gap_at_zero_volt, std::sqrt(variance[0] * misfit) * options_.gap_at_zero_volt,
-          far * options_.range_volt, std::sqrt(variance[1] * misfit) * options_.range_volt,
-          -(fit.x(2, 0) + far * gap) * options_.range_volt * options_.gap_at_zero_volt};
+  return phase_ == Phase::approach ? samples_.curve(curveVoltStd()) : std::nullopt;
 }
 
 void SensorCalibration::fail(std::string reason) {

@@ -1,9 +1,10 @@
 #include "controller_state.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 
-#include "station_paths.h"
+#include "smartmill_core/axis_names.h"
 
 namespace smartmill::hammer {
 
@@ -11,10 +12,12 @@ std::optional<AxesPosition> axesPosition(const CncState& state) {
   AxesPosition result;
   bool found[3] = {false, false, false};
   for (std::size_t i = 0; i < state.axes.size() && i < state.position.size(); ++i) {
-    const int axis = axisIndex(state.axes[i]);
-    if (axis < 0) continue;
-    result.position[static_cast<std::size_t>(axis)] = state.position[i];
-    found[axis] = true;
+    std::string name = state.axes[i];
+    for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    const std::optional<std::size_t> axis = axisIndex(name);
+    if (!axis) continue;
+    result.position[*axis] = state.position[i];
+    found[*axis] = true;
     if (i < state.distance_to_go.size())
       result.to_go = std::max(result.to_go, std::abs(state.distance_to_go[i]));
   }

@@ -5,6 +5,7 @@
 #include <complex>
 #include <string>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/modal/modal_fit.h"
@@ -16,18 +17,8 @@
 namespace smartmill::hammer {
 namespace {
 
-/// Of fewer hits no outlier can be identified; nor, for the jackknife, their scatter.
-constexpr std::size_t LEAST_HITS = 3, LEAST_JACKKNIFE = 4;
 constexpr const char* UNKNOWN = "unknown";
 constexpr double FIRST_LINE = 1e-3;  // [Hz] the line at zero is the drift of the sensor
-/// [1] fluted length in diameters where it is not given, and its standard deviation.
-constexpr UncertainValue USUAL_FLUTES{2.0, 0.6};
-constexpr double LONGEST_FLUTES = 0.9;                         // of the stick-out
-constexpr double FLUTED_STD = 1.0e-3, DIAMETER_STD = 0.02e-3;  // [m] of stated values
-/// [1] standard deviation of the curve's gap where the approach does not determine it: of the nominal one.
-constexpr double NOMINAL_GAP_STD = 0.2;
-/// [1/m] wider than HolderPrior's, which is meant for one height: the second one determines the tilt.
-constexpr double TILT_STD = 7.0;
 
 /// @param relative [1] standard deviation that all lines have in common
 void addCommonError(FrequencyResponse& frf, double relative) {
@@ -80,7 +71,7 @@ FrequencyResponse FrfEvaluation::averageOf(const std::vector<Hit>& hits, const S
 
 bool FrfEvaluation::isPreciseEnough() const {
   const HeightHits& height = measurement_.height();
-  if (!(parameters_.asked_std > 0.0) || height.hits.size() < LEAST_HITS) return false;
+  if (!(parameters_.asked_std > 0.0) || height.hits.size() < parameters_.least_hits) return false;
   return hitsNeeded(averageOf(height.hits, height.sensor), parameters_.fit_low, parameters_.fit_high,
                     parameters_.asked_std)
       .isReached();
@@ -92,7 +83,7 @@ bool FrfEvaluation::isPreciseEnough() const {
 void FrfEvaluation::addScatter(const FrequencyResponse& frf, ModalModel& model) const {
   const HeightHits& first = measurement_.first;
   const auto n = static_cast<double>(first.hits.size());
-  if (first.hits.size() < LEAST_JACKKNIFE) return;
+  if (first.hits.size() < parameters_.least_jackknife) return;
   std::vector<ModalModel> shifts;
   for (std::size_t h = 0; h < first.hits.size(); ++h) {
     std::vector<Hit> others = first.hits;
@@ -135,7 +126,7 @@ void FrfEvaluation::addCurveError(FrequencyResponse& frf, ModalModel& model) con
   SensorState other = first.sensor;
   const bool calibrated = std::isfinite(other.curve_gap);
   if (!calibrated) other.curve_gap = (measurement_.station.gain_volt + other.volt) * other.sensitivity;
-  other.curve_gap += calibrated ? other.curve_gap_std : NOMINAL_GAP_STD * other.curve_gap;
+  other.curve_gap += calibrated ? other.curve_gap_std : parameters_.nominal_gap_std * other.curve_gap;
   std::vector<std::complex<double>> change = averageOf(first.hits, other).value;
   for (std::size_t k = 0; k < frf.size(); ++k) change[k] -= frf.value[k];
   const ModalModel shift = modeShifts(frf, change, model, parameters_.fit_low, parameters_.fit_high);
@@ -151,14 +142,15 @@ void FrfEvaluation::addCurveError(FrequencyResponse& frf, ModalModel& model) con
 }
 
 ToolBeam FrfEvaluation::toolBeam() const {
-  const double diameter = measurement_.tool.diameter, longest = LONGEST_FLUTES * goal_.stickout;
+  const double diameter = measurement_.tool.diameter, longest = parameters_.longest_flutes * goal_.stickout;
   ToolBeam tool;
   tool.stickout = {goal_.stickout, parameters_.stickout_std};
-  tool.diameter = {diameter, DIAMETER_STD};
+  tool.diameter = {diameter, parameters_.diameter_std};
   tool.fluted_length =
       parameters_.tool_fluted_length > 0.0
-          ? UncertainValue{std::min(parameters_.tool_fluted_length, longest), FLUTED_STD}
-          : UncertainValue{std::min(USUAL_FLUTES.value * diameter, longest), USUAL_FLUTES.std * diameter};
+          ? UncertainValue{std::min(parameters_.tool_fluted_length, longest), parameters_.fluted_std}
+          : UncertainValue{std::min(parameters_.usual_flutes * diameter, longest),
+                           parameters_.usual_flutes_std * diameter};
   if (parameters_.tool_material != UNKNOWN) setMaterial(tool, parameters_.tool_material);
   return tool;
 }
@@ -179,7 +171,7 @@ std::vector<OffsetMeasurement> FrfEvaluation::offsetMeasurements(const ModalMode
 TipCorrection FrfEvaluation::tipCorrection(const ModalModel& modes) const {
   HolderPrior prior;
   prior.height = parameters_.height_std;
-  prior.tilt.std = TILT_STD;
+  prior.tilt.std = parameters_.tilt_std;
   const TipCorrection tip =
       hammer::correctToTip(offsetMeasurements(modes), toolBeam(), prior, parameters_.fit_high);
   return parameters_.tool_material == UNKNOWN ? withoutBeyond(tip) : tip;

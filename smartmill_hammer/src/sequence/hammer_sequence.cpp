@@ -8,9 +8,10 @@
 #include "frf_evaluation.h"
 #include "measurement.h"
 #include "sequence_step.h"
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
-#include "stamp_tolerance.h"
+#include "smartmill_core/signal/same_time.h"
 #include "station_control.h"
 
 namespace smartmill::hammer {
@@ -19,10 +20,11 @@ namespace {
 std::string goalFault(const MeasureFrfGoal& goal, const HammerParameters& parameters,
                       const MachineModel& model) {
   const HammerStation& station = *model.hammer;
-  const int axis = axisIndex(goal.direction), teeth = goal.teeth > 0 ? goal.teeth : model.tool->teeth;
+  const std::optional<std::size_t> axis = axisIndex(goal.direction);
+  const int teeth = goal.teeth > 0 ? goal.teeth : model.tool->teeth;
   const double struck = station.offset + parameters.read_height;
   if (goal.point != POINT_TOOL_TIP) return "point '" + goal.point + "': expected " + POINT_TOOL_TIP;
-  if (station.position.count(goal.direction) == 0 || axis < 0 || axis > 1)
+  if (station.position.count(goal.direction) == 0 || !axis || *axis > 1)
     return "direction '" + goal.direction + "': the model's hammer station has no such position";
   if (goal.hits < 1 || goal.hits > 1000) return "hits " + std::to_string(goal.hits) + ": expected 1..1000";
   if (goal.modes < 0 || goal.modes > 20) return "modes " + std::to_string(goal.modes) + ": expected 0..20";

@@ -5,14 +5,6 @@
 #include "smartmill_core/units.h"
 
 namespace smartmill::hammer {
-namespace {
-
-constexpr int SECOND_HEIGHT_HITS = 3;         // at least
-constexpr double LEAST_SHANK = 4e-3;          // [m] of tool above the hammer at the second height
-constexpr double LEAST_LOWERED_SHARE = 0.15;  // of the hammer's offset; less does not resolve the tilt
-
-}  // namespace
-
 Measurement::Measurement(const HammerParameters& p, const MachineModel& model, const MeasureFrfGoal& g)
     : parameters(p),
       station(*model.hammer),
@@ -38,16 +30,16 @@ bool Measurement::correctsPerMode() const {
 
 bool Measurement::needsSecondHeight() const {
   return correctsPerMode() && parameters.second_height != 0 &&
-         lowered() > LEAST_LOWERED_SHARE * station.offset;
+         lowered() > parameters.least_lowered_share * station.offset;
 }
 
 double Measurement::lowered() const {
-  const double margin = goal.stickout - station.offset - parameters.read_height - LEAST_SHANK;
+  const double margin = goal.stickout - station.offset - parameters.read_height - parameters.least_shank;
   return roundTo(std::min(0.5 * station.offset, margin), parameters.resolution);
 }
 
 int Measurement::hitsRequired() const {
-  return at_second_height ? std::min(goal.hits, std::max(SECOND_HEIGHT_HITS, (goal.hits + 1) / 2))
+  return at_second_height ? std::min(goal.hits, std::max(parameters.second_height_hits, (goal.hits + 1) / 2))
                           : goal.hits;
 }
 

@@ -14,9 +14,6 @@
 
 namespace smartmill::hammer {
 
-/// Share of the sensor's range from which a voltage counts as its end.
-constexpr double RANGE_SHARE = 0.98;
-
 /// What the calibration of a sensor found.
 struct SensorState {
   double sensitivity = NOT_A_NUMBER, sensitivity_std = NOT_A_NUMBER;  ///< [m/V]

@@ -5,10 +5,11 @@
 #include <utility>
 
 #include "controller_state.h"
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/formatted.h"
+#include "smartmill_core/signal/same_time.h"
 #include "smartmill_core/units.h"
 #include "smartmill_hammer/analysis/solenoid_crosstalk.h"
-#include "stamp_tolerance.h"
 #include "station_paths.h"
 
 namespace smartmill::hammer {
@@ -18,9 +19,6 @@ namespace {
 constexpr double COUNTS = 4096.0;
 constexpr double STOP_TIMEOUT = 10.0;    // [s] for the axes to come to rest after a stop
 constexpr double AVERAGE_TIMEOUT = 1.0;  // [s]
-/// Share of the sensor's range, and consecutive samples above it, that mean the tool is too near.
-constexpr double NEAR_SHARE = 0.98;
-constexpr int NEAR_SAMPLES = 8;
 
 Command commandOf(Command::Kind kind, double now) {
   Command command;
@@ -165,8 +163,8 @@ bool StationControl::canComplete(double stamp) const {
 }
 
 bool StationControl::isTooNear(double volt) {
-  near_samples_ = range_watched_ && volt >= NEAR_SHARE * range_volt_ ? near_samples_ + 1 : 0;
-  return near_samples_ >= NEAR_SAMPLES;
+  near_samples_ = range_watched_ && volt >= parameters_.range_share * range_volt_ ? near_samples_ + 1 : 0;
+  return near_samples_ >= parameters_.near_samples;
 }
 
 ControlEvent StationControl::handle(const StationSample& s) {

@@ -1,16 +1,11 @@
 #include "station_paths.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 
-namespace smartmill::hammer {
+#include "smartmill_core/axis_names.h"
 
-int axisIndex(const std::string& name) {
-  if (name.size() != 1) return -1;
-  const char c = static_cast<char>(std::tolower(static_cast<unsigned char>(name[0])));
-  return c >= 'x' && c <= 'z' ? c - 'x' : -1;
-}
+namespace smartmill::hammer {
 
 double roundTo(double value, double step) {
   return std::round(value / step) * step;
@@ -18,9 +13,7 @@ double roundTo(double value, double step) {
 
 StationPaths::StationPaths(const HammerParameters& parameters, const MachineModel& model,
                            const std::string& direction)
-    : parameters_(parameters),
-      station_(model.hammer->position.at(direction)),
-      along_(static_cast<std::size_t>(axisIndex(direction))) {
+    : parameters_(parameters), station_(model.hammer->position.at(direction)), along_(*axisIndex(direction)) {
   for (double& v : station_) v = roundTo(v, parameters.resolution);
   double height = station_[2] + parameters.retract_height;
   if (model.axes && model.axes->travel[2][1] > model.axes->travel[2][0])

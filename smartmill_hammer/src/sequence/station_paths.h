@@ -9,10 +9,6 @@
 
 namespace smartmill::hammer {
 
-constexpr const char* AXIS_NAMES[] = {"x", "y", "z"};
-
-/// 0, 1, 2 of x, y, z in either case; -1: none of them.
-int axisIndex(const std::string& name);
 /// @param value rounded to a multiple of this step
 double roundTo(double value, double step);
 

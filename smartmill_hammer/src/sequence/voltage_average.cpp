@@ -4,8 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "smartmill_core/signal/same_time.h"
 #include "smartmill_core/signal/statistics.h"
-#include "stamp_tolerance.h"
 
 namespace smartmill::hammer {
 namespace {

@@ -43,11 +43,11 @@ TEST(FluteSearch, FindsAFluteOfRandomToolsWithinOneAndAHalfDegrees) {
       const double angle = units::TWO_PI * std::fmod(counts, 4096.0) / 4096.0;
       const double volt = curve(500e-6 + p.retreat(angle + mounting, 0.0, 0.0)) + noise * normal(random);
       search.addMeasurement(angle, volt, noise);
-      ASSERT_LT(search.measurementCount(), 120);
+      ASSERT_LT(static_cast<int>(search.measurements().size()), 120);
     }
     ASSERT_EQ(search.state(), FluteSearch::State::found) << search.reason() << " trial " << trial;
     worst = std::max(worst, missed(p, mounting, search.angle()));
-    most = std::max(most, search.measurementCount());
+    most = std::max(most, static_cast<int>(search.measurements().size()));
   }
   EXPECT_LT(units::degFromRad(worst), 1.5);
   RecordProperty("worst_deg", std::to_string(units::degFromRad(worst)));
@@ -96,7 +96,7 @@ Moves movesOver(bool insert, bool golden_only) {
     double off = 10.0;
     for (const double a : at) off = std::min(off, std::abs(nearAngle(search.angle() + a, 0.0)));
     moves.worst = std::max(moves.worst, off);
-    moves.mean += search.measurementCount() / static_cast<double>(TRIALS);
+    moves.mean += static_cast<int>(search.measurements().size()) / static_cast<double>(TRIALS);
     moves.confidence += search.confidence() / TRIALS;
   }
   return moves;
@@ -152,7 +152,7 @@ TEST(FluteSearch, StatesThatThereIsNoFlute) {
     FluteSearch search(0.4, FluteSearchOptions::forPitch(units::PI / 2));
     while (search.state() == FluteSearch::State::searching) {
       search.addMeasurement(search.nextAngle(), std::max(-10.0, level + 1e-3 * normal(random)), 1e-3);
-      ASSERT_LT(search.measurementCount(), 60);
+      ASSERT_LT(static_cast<int>(search.measurements().size()), 60);
     }
     EXPECT_EQ(search.state(), FluteSearch::State::no_flute);
     EXPECT_NE(search.reason().find("no flute"), std::string::npos) << search.reason();

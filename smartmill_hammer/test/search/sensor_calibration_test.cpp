@@ -50,7 +50,8 @@ TEST(SensorCalibration, ZeroesTheNonlinearSensorAndFindsItsSensitivity) {
     const Outcome o = run(exact, gap, 0.0, 1);
     ASSERT_EQ(o.calibration.state(), SensorCalibration::State::done) << gap << ": " << o.calibration.reason();
     EXPECT_NEAR(o.gap, 250e-6, 4e-6) << gap;
-    EXPECT_NEAR(o.calibration.sensitivity(), Sensor().sensitivity(o.gap), 0.003 * Sensor().sensitivity(o.gap))
+    EXPECT_NEAR(o.calibration.result().sensitivity, Sensor().sensitivity(o.gap),
+                0.003 * Sensor().sensitivity(o.gap))
         << gap;
     EXPECT_GE(o.closest, std::min(gap, 235e-6)) << gap;
   }
@@ -90,7 +91,7 @@ TEST(SensorCalibration, StandardDeviationIsHonest) {
     const Outcome o = run(options, 700e-6, 1e-3, 100u + static_cast<std::uint32_t>(i));
     ASSERT_EQ(o.calibration.state(), SensorCalibration::State::done) << o.calibration.reason();
     const double truth = Sensor().sensitivity(o.gap + 0.0);
-    sensitivity.add(o.calibration.sensitivity() - truth, o.calibration.sensitivityStd());
+    sensitivity.add(o.calibration.result().sensitivity - truth, o.calibration.result().sensitivity_std);
   }
   EXPECT_TRUE(sensitivity.isCalibrated());
 }
@@ -128,10 +129,10 @@ TEST(SensorCalibration, MeasuresTheCurveItself) {
   }
   ASSERT_EQ(c.state(), SensorCalibration::State::done) << c.reason();
   EXPECT_LT(std::abs(c.volt()), 0.1);
-  EXPECT_FALSE(c.isLimitedByEdges());
-  EXPECT_NEAR(c.curveGap() / gap, 1.0, 1e-6);
+  EXPECT_FALSE(c.result().limited_by_edges);
+  EXPECT_NEAR(c.result().curve_gap / gap, 1.0, 1e-6);
   const double slope = 0.8 * 10.0 * 180e-6 / (gap * gap);
-  EXPECT_NEAR(c.sensitivity() * slope, 1.0, 1e-6);
+  EXPECT_NEAR(c.result().sensitivity * slope, 1.0, 1e-6);
 }
 
 // Edges next to the sensor extend further than the surface in front of it.
@@ -149,9 +150,9 @@ TEST(SensorCalibration, EndsWhereTheToolWouldTouch) {
     c.addVoltage(sensor.volt(gap), 1e-4);
   }
   ASSERT_EQ(c.state(), SensorCalibration::State::done) << c.reason();
-  EXPECT_TRUE(c.isLimitedByEdges());
-  EXPECT_NEAR(c.sensitivity() / sensor.sensitivity(gap), 1.0, 0.01);
-  EXPECT_GT(c.sensitivityStd(), 0.0);
+  EXPECT_TRUE(c.result().limited_by_edges);
+  EXPECT_NEAR(c.result().sensitivity / sensor.sensitivity(gap), 1.0, 0.01);
+  EXPECT_GT(c.result().sensitivity_std, 0.0);
 }
 
 // An edge of a tenth of the electrode's width: the voltage is zero only just before contact.

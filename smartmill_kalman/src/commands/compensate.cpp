@@ -9,7 +9,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <future>
-#include <memory>
 #include <optional>
 #include <set>
 #include <string>
@@ -18,10 +17,12 @@
 
 #include "commands/compensate_results.h"
 #include "recordings/bag_compensation.h"
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/parameters/parameter_options.h"
+#include "smartmill_core/signal/force_channels.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/compensation/campaign_compensation.h"
 #include "smartmill_kalman/compensation/record_compensation.h"
@@ -31,8 +32,6 @@
 namespace {
 
 using namespace smartmill;
-
-constexpr std::array<const char*, 3> AXES{{"x", "y", "z"}};
 
 struct Request {
   std::string program, source, out, model, method = "kalman", matrix_out;
@@ -51,7 +50,7 @@ const char* latency(const Request& request) {
 /// Reports modes that a cut shows without a tap.
 void printBlind(const std::string& name, const Record& record, const CampaignTest& test,
                 const Request& request) {
-  for (const char* channel : {"fx", "fy", "fz"}) {
+  for (const char* channel : FORCE_CHANNELS) {
     const kalman::BlindMode found = kalman::findBlindMode(
         record.column(channel), test.sample_rate, test.spindle_speed, request.blind_low, request.blind_high);
     if (found.likelihood < 10.0) {
@@ -105,7 +104,7 @@ void fromCampaign(const Request& request) {
     sensor = model.force_sensor.axis;
     workpiece = model.force_sensor.measures_workpiece;
   }
-  for (std::size_t axis = 0; axis < 3; ++axis) kalman::printSensor(AXES[axis], sensor[axis]);
+  for (std::size_t axis = 0; axis < 3; ++axis) kalman::printSensor(AXIS_NAMES[axis], sensor[axis]);
   std::size_t cuts = 0;
   for (const CampaignTest& test : campaign.tests) {
     if (test.kind != TestKind::cut) continue;
@@ -208,9 +207,7 @@ void run(const Request& request) {
 namespace smartmill::kalman {
 
 Command compensateCommand() {
-  Command command;
-  command.name = command.tool = "compensate";
-  command.summary = "recovers the force at the tool from the records of a force sensor";
+  Command command("compensate", "recovers the force at the tool from the records of a force sensor");
   command.description = "Recovers the force at the tool from the records of a force sensor: one CSV per cut.";
   command.examples = {
       {"campaigns/none --identify -o forces", "sensor modes from the campaign's own taps"},
@@ -218,39 +215,32 @@ Command compensateCommand() {
       {"campaigns/none --method smoother -o forces", "smoother in place of the causal filter"}};
   command.files = {{"OUT/*.csv", "force of a cut: t[s],fx[N],fy[N],fz[N]"},
                    {"launch/config/kalman.yaml", "the node's parameters, for --params"}};
-  command.declare = [](CommandLine& line) -> std::function<int()> {
-    const auto o = std::make_shared<Request>();
-    o->program = line.program();
-    line.option("SOURCE", o->source, "campaign folder, or a bag").required();
-    line.option("-o,--out", o->out, "folder for one CSV per cut").required();
-    line.option("--model", o->model, "model file with the force sensor (default: the campaign's)");
-    line.flag("--identify", o->identify, "campaign: identify the sensor's modes from its own taps");
-    line.flag("--blind", o->blind, "campaign: report the sensor's modes that the cuts show without a tap");
-    line.option("--blind-low-hz", o->blind_low, "lower end of the band of --blind").showDefault();
-    line.option("--blind-high-hz", o->blind_high, "upper end of the band of --blind").showDefault();
+  command.setBody(run, [](CommandLine& line, Request& o) {
+    o.program = line.program();
+    line.option("SOURCE", o.source, "campaign folder, or a bag").required();
+    line.option("-o,--out", o.out, "folder for one CSV per cut").required();
+    line.option("--model", o.model, "model file with the force sensor (default: the campaign's)");
+    line.flag("--identify", o.identify, "campaign: identify the sensor's modes from its own taps");
+    line.flag("--blind", o.blind, "campaign: report the sensor's modes that the cuts show without a tap");
+    line.option("--blind-low-hz", o.blind_low, "lower end of the band of --blind").showDefault();
+    line.option("--blind-high-hz", o.blind_high, "upper end of the band of --blind").showDefault();
     line.flag(
-        "--coupled", o->coupled,
+        "--coupled", o.coupled,
         "campaign: sensor with its cross-talk from the campaign's own taps along x, y and z; method kalman");
-    line.option("--matrix-out", o->matrix_out,
+    line.option("--matrix-out", o.matrix_out,
                 "with --coupled: file of the matrix, for the node's parameter sensor_matrix");
     line.option(
-            "--method", o->method,
+            "--method", o.method,
             "kalman (causal, as the node), delay (as the node with `delay_form`), smoother, fixed-lag (as "
             "the node with `lag`) or inverse")
         .oneOf(kalman::methodNames())
         .showDefault();
-    line.option("--lag-s", o->lag, "lag of fixed-lag [s]").within(0.0, 10.0).showDefault();
-    const auto table = std::make_shared<ParameterTable>(tableOf(o->parameters));
-    const auto parameters = std::make_shared<ParameterOptions>(line, *table, "launch/config/kalman.yaml");
-    parameters->add("--bandwidth-hz", "bandwidth");
-    parameters->add("--noise-rms-n", "noise_rms");
-    parameters->add("--settling-revolutions", "settling_revolutions");
-    return [o, table, parameters] {
-      parameters->apply();
-      run(*o);
-      return 0;
-    };
-  };
+    line.option("--lag-s", o.lag, "lag of fixed-lag [s]").within(0.0, 10.0).showDefault();
+    ParameterOptions parameters(line, tableOf(o.parameters), "launch/config/kalman.yaml");
+    parameters.add("--bandwidth-hz", "bandwidth");
+    parameters.add("--noise-rms-n", "noise_rms");
+    parameters.add("--settling-revolutions", "settling_revolutions");
+  });
   return command;
 }
 

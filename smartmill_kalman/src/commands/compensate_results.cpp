@@ -6,12 +6,11 @@
 
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/formatted.h"
+#include "smartmill_core/signal/force_channels.h"
 #include "smartmill_core/signal/statistics.h"
 
 namespace smartmill::kalman {
 namespace {
-
-constexpr std::array<const char*, 3> FORCES{{"fx", "fy", "fz"}};
 
 /// [N] from the tenth to the ninetieth percentile
 double range(std::vector<double> values) {
@@ -40,7 +39,7 @@ void writeForce(const std::string& folder, const std::string& name, std::vector<
                 std::array<std::vector<double>, 3> force) {
   Record record;
   record.time = std::move(time);
-  for (std::size_t axis = 0; axis < 3; ++axis) record.add(FORCES[axis]) = std::move(force[axis]);
+  for (std::size_t axis = 0; axis < 3; ++axis) record.add(FORCE_CHANNELS[axis]) = std::move(force[axis]);
   writeCsv(record, (std::filesystem::path(folder) / (name + ".csv")).string());
 }
 

@@ -3,12 +3,12 @@
 #include <array>
 #include <cstdio>
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <vector>
 
 #include "commands/cutting_frf_results.h"
 #include "recordings/bag_cuts.h"
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/error.h"
@@ -39,7 +39,7 @@ kalman::CuttingFrfAxis linesOf(const Campaign& campaign, const MachineModel& mod
   found.rest = !tool ? sensors[axis] : axis == 0 ? model.tool_tip.x : model.tool_tip.y;
   for (const CampaignTest& test : campaign.tests) {
     if (test.kind != TestKind::cut) continue;
-    std::fprintf(stderr, "%s: %s\n", kalman::AXIS_NAMES[axis], test.name.c_str());
+    std::fprintf(stderr, "%s: %s\n", AXIS_NAMES[axis], test.name.c_str());
     const Record record = readRecord(campaign, test, model);
     const kalman::CutSegment cut =
         tool ? kalman::toolSegment(record, test, axis, sensors[axis])
@@ -47,7 +47,7 @@ kalman::CuttingFrfAxis linesOf(const Campaign& campaign, const MachineModel& mod
     const auto lines = kalman::frfLines(cut, request.options);
     if (lines.empty())
       std::fprintf(stderr, "%s: no line of %s exceeds the noise (a part needs eleven revolutions)\n",
-                   test.name.c_str(), kalman::AXIS_NAMES[axis]);
+                   test.name.c_str(), AXIS_NAMES[axis]);
     found.lines.insert(found.lines.end(), lines.begin(), lines.end());
   }
   return found;
@@ -76,7 +76,7 @@ std::vector<kalman::CuttingFrfAxis> fromBag(const kalman::CuttingFrfRequest& req
       const auto lines = kalman::frfLines(cut, request.options);
       if (lines.empty())
         std::fprintf(stderr, "%s: no line of %s exceeds the noise (a part needs eleven revolutions)\n",
-                     cut.name.c_str(), kalman::AXIS_NAMES[a]);
+                     cut.name.c_str(), AXIS_NAMES[a]);
       axis.lines.insert(axis.lines.end(), lines.begin(), lines.end());
     }
     axes.push_back(std::move(axis));
@@ -99,6 +99,7 @@ std::vector<kalman::CuttingFrfAxis> axesOf(const kalman::CuttingFrfRequest& requ
 
 void run(const kalman::CuttingFrfRequest& request) {
   kalman::CuttingFrfOptions options = request.options;
+  options.speed_width = 0.01 * request.speed_width;
   options.validate();
   const bool tool = request.of == "tool";
   const std::string unit = tool ? "m/N" : "1";
@@ -137,10 +138,7 @@ void run(const kalman::CuttingFrfRequest& request) {
 namespace smartmill::kalman {
 
 Command cuttingFrfCommand() {
-  Command command;
-  command.name = "cutting-frf";
-  command.tool = "cutting_frf";
-  command.summary = "identifies FRFs of the tool or the force sensor from cuts";
+  Command command("cutting-frf", "identifies FRFs of the tool or the force sensor from cuts");
   command.description =
       "FRF and modes from cuts, as a function of spindle speed: of the tool (displacement against the force "
       "sensor's force) or of the force sensor (against the force predicted from the model's coefficients).";
@@ -150,47 +148,39 @@ Command cuttingFrfCommand() {
                    {"OUT/modes_*.yaml", "its modes"},
                    {"OUT/modes.csv", "all modes"},
                    {"OUT/frf_*.png", "pictures, one per axis"}};
-  command.declare = [](CommandLine& line) -> std::function<int()> {
-    const auto request = std::make_shared<CuttingFrfRequest>();
-    const auto width_percent = std::make_shared<double>(100.0 * request->options.speed_width);
+  command.setBody(run, [](CommandLine& line, CuttingFrfRequest& request) {
     line.option(
-            "SOURCE", request->campaign,
+            "SOURCE", request.campaign,
             "campaign folder, or a bag: its steady cuts with force/compensated and spindle/angle, the taps "
             "at rest from its tool/modes")
         .required();
-    line.option("-o,--out", request->out, "folder for frf_*.csv, modes_*.yaml, modes.csv and pictures")
+    line.option("-o,--out", request.out, "folder for frf_*.csv, modes_*.yaml, modes.csv and pictures")
         .required();
-    line.option("--of", request->of, "what is identified").oneOf({"tool", "sensor"}).showDefault();
-    line.option("--model", request->model, "model file (default: the campaign's)");
-    line.option("--response", request->response,
+    line.option("--of", request.of, "what is identified").oneOf({"tool", "sensor"}).showDefault();
+    line.option("--model", request.model, "model file (default: the campaign's)");
+    line.option("--response", request.response,
                 "bag: topic of the response (default: tool daq/displacement, channels x, y; sensor "
                 "daq/spindle_force)");
-    line.option("--spindle-sensor", request->spindle_sensor,
+    line.option("--spindle-sensor", request.spindle_sensor,
                 "bag: calibration of the six sensors in the spindle, where they are the response");
-    line.option("--spindle-sensor-length-m", request->length, "length of tool and holder [m], for it")
+    line.option("--spindle-sensor-length-m", request.length, "length of tool and holder [m], for it")
         .showDefault();
-    line.option("--force-error-percent", request->force_error, "bag: standard deviation of force/compensated")
+    line.option("--force-error-percent", request.force_error, "bag: standard deviation of force/compensated")
         .within(0.0, 50.0)
         .showDefault();
-    line.flag("--identify", request->identify,
-              "use the force sensor identified from the campaign's own taps");
-    line.option("--low-hz", request->options.low, "lower end of the band of lines and fit").showDefault();
-    line.option("--high-hz", request->options.high, "upper end of the band").showDefault();
-    line.option("--speed-width-percent", *width_percent, "cuts within this range of speed make one FRF")
+    line.flag("--identify", request.identify, "use the force sensor identified from the campaign's own taps");
+    line.option("--low-hz", request.options.low, "lower end of the band of lines and fit").showDefault();
+    line.option("--high-hz", request.options.high, "upper end of the band").showDefault();
+    line.option("--speed-width-percent", request.speed_width, "cuts within this range of speed make one FRF")
         .within(0.0, 100.0)
         .showDefault();
-    line.option("--part-s", request->options.part, "length of the parts into which a record is split [s]")
+    line.option("--part-s", request.options.part, "length of the parts into which a record is split [s]")
         .showDefault();
-    line.option("--least-lines", request->options.least_lines, "least number of lines for a fit of modes")
+    line.option("--least-lines", request.options.least_lines, "least number of lines for a fit of modes")
         .showDefault();
-    line.option("--max-modes", request->options.max_modes, "largest number of modes").showDefault();
-    line.flag("--no-picture", request->no_picture, "no PNG");
-    return [request, width_percent] {
-      request->options.speed_width = 0.01 * *width_percent;
-      run(*request);
-      return 0;
-    };
-  };
+    line.option("--max-modes", request.options.max_modes, "largest number of modes").showDefault();
+    line.flag("--no-picture", request.no_picture, "no PNG");
+  });
   return command;
 }
 

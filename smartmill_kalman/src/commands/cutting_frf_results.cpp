@@ -2,6 +2,7 @@
 
 #include <cstdio>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/io/gnuplot.h"
 #include "smartmill_core/units.h"

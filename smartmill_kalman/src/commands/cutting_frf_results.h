@@ -9,12 +9,11 @@
 
 namespace smartmill::kalman {
 
-constexpr std::array<const char*, 3> AXIS_NAMES{{"x", "y", "z"}};
-
 struct CuttingFrfRequest {
   std::string campaign, out, model, of = "tool", response, spindle_sensor;
-  double length = 0.139;     // [m]
-  double force_error = 1.0;  // [%]
+  double length = 0.139;                                         // [m]
+  double force_error = 1.0;                                      // [%]
+  double speed_width = 100.0 * CuttingFrfOptions().speed_width;  // [%]
   bool identify = false, no_picture = false;
   CuttingFrfOptions options;
 };

@@ -6,10 +6,10 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
-#include <memory>
 #include <string>
 #include <vector>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/error.h"
@@ -40,7 +40,7 @@ Taps fromCampaign(const std::string& path) {
     if (test.kind != TestKind::tap) continue;
     const Record record = readRecord(campaign, test);
     MatrixTap tap;
-    tap.direction[test.direction == "x" ? 0 : test.direction == "y" ? 1 : 2] = 1.0;
+    tap.direction[*axisIndex(test.direction)] = 1.0;
     tap.hammer = record.column("hammer");
     for (std::size_t c = 0; c < 3; ++c) tap.channels.push_back(record.column(CHANNELS[c]));
     if (found.rate != 0.0 && found.rate != test.sample_rate)
@@ -176,10 +176,8 @@ void run(const Request& request) {
 namespace smartmill::kalman {
 
 Command sensorReportCommand() {
-  Command command;
-  command.name = "sensor-report";
-  command.tool = "sensor_report";
-  command.summary = "identifies the transfer matrix of a force sensor from taps and checks it";
+  Command command("sensor-report",
+                  "identifies the transfer matrix of a force sensor from taps and checks it");
   command.description =
       "Transfer matrix of a force sensor from all taps (3x3, or 6x6 with moments), with standard deviations, "
       "condition number, stability and observability.";
@@ -189,21 +187,19 @@ Command sensorReportCommand() {
   command.files = {{"SOURCE/campaign.yaml", "campaign with taps"},
                    {"TAPS.yaml", "taps in files of their own (smartmill-taps/1)"},
                    {"OUT", "CSV of both matrices with standard deviations"}};
-  command.declare = [](CommandLine& line) -> std::function<int()> {
-    const auto r = std::make_shared<Request>();
+  command.setBody(run, [](CommandLine& line, Request& r) {
     line.option(
-            "SOURCE", r->source,
+            "SOURCE", r.source,
             "campaign folder with taps, or a smartmill-taps/1 file (sample_rate_hz, channels 3 or 6, taps: "
             "file, direction, point_mm; columns hammer[N], fx[N] .. mz[Nm])")
         .required();
-    line.option("-o,--out", r->out, "CSV of every line: both matrices with standard deviations");
-    line.option("--low-hz", r->low, "lower end of the report's band").showDefault();
-    line.option("--high-hz", r->high,
+    line.option("-o,--out", r.out, "CSV of every line: both matrices with standard deviations");
+    line.option("--low-hz", r.low, "lower end of the report's band").showDefault();
+    line.option("--high-hz", r.high,
                 "upper end of the band; 0: as far as the taps determine the matrix to 0.1")
         .showDefault();
-    line.option("--max-modes", r->max_modes, "largest number of modes of an axis").showDefault();
-    return commandBody(r, run);
-  };
+    line.option("--max-modes", r.max_modes, "largest number of modes of an axis").showDefault();
+  });
   return command;
 }
 

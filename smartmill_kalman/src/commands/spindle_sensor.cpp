@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -20,8 +19,6 @@ namespace {
 using namespace smartmill;
 using kalman::LengthDependence;
 using kalman::SpindleSensorCalibration;
-
-constexpr double LARGEST_ERROR = 0.05;  // Burzoni 3.2.1
 
 struct Request {
   std::string table, base, out, calibration;
@@ -83,7 +80,7 @@ void verify(const Request& request) {
   std::printf(
       "largest difference from the reference over its largest force: x %.2f y %.2f z %.2f %% (limit 5)\n",
       100.0 * error[0], 100.0 * error[1], 100.0 * error[2]);
-  if (*std::max_element(error.begin(), error.end()) > LARGEST_ERROR)
+  if (*std::max_element(error.begin(), error.end()) > kalman::LARGEST_STATIC_ERROR)
     throw Error(request.table + ": the calibration is off by more than 5 %");
 }
 
@@ -125,10 +122,7 @@ void apply(const Request& request) {
 namespace smartmill::kalman {
 
 Command spindleSensorCommand() {
-  Command command;
-  command.name = "spindle-sensor";
-  command.tool = "spindle_sensor";
-  command.summary = "calibrates, verifies and applies a spindle-integrated force sensor";
+  Command command("spindle-sensor", "calibrates, verifies and applies a spindle-integrated force sensor");
   command.description =
       "Spindle-integrated force sensor of six preloaded quartz rings.\nTables: test, time[s], length[mm], "
       "load_x[N], load_y[N], load_z[N], x1[N], x2[N], y1[N], y2[N], z1[N], z2[N]; one row per measurement.";
@@ -139,27 +133,24 @@ Command spindleSensorCommand() {
   command.files = {{"CALIBRATION", "YAML file that `calibrate` writes"}};
   command.exits = {{1, "error, or `verify` found more than 5 %; reported in one line on standard error"}};
   command.declare = [](CommandLine& line) -> std::function<int()> {
-    const auto request = std::make_shared<Request>();
+    Subcommands<Request> commands(line);
+    Request& request = commands.options();
     const CommandOptions c =
-        line.command("calibrate", "constants over tool length from weights hung on a tool");
-    c.option("TABLE", request->table, "measurements; those of one test drift together").required();
-    c.option("-o,--out", request->out, "calibration file").required();
-    c.option("--base", request->base,
+        commands.add("calibrate", "constants over tool length from weights hung on a tool", calibrate);
+    c.option("TABLE", request.table, "measurements; those of one test drift together").required();
+    c.option("-o,--out", request.out, "calibration file").required();
+    c.option("--base", request.base,
              "calibration file with preload, limits and low-pass (default: Burzoni's sensor)");
-    const CommandOptions v = line.command("verify", "compares with reference forces; fails beyond 5 %");
-    v.option("CALIBRATION", request->calibration, "calibration file").required();
-    v.option("TABLE", request->table, "measurements with reference forces as loads").required();
-    const CommandOptions a = line.command("apply", "forces of a record");
-    a.option("CALIBRATION", request->calibration, "calibration file").required();
-    a.option("TABLE", request->table, "record, evenly sampled").required();
-    a.option("-o,--out", request->out, "CSV of the forces").required();
-    a.option("--low-pass-hz", request->low_pass, "zero-phase low-pass; 0: none").showDefault();
-    return [request, c, v, a] {
-      if (c.parsed()) calibrate(*request);
-      if (v.parsed()) verify(*request);
-      if (a.parsed()) apply(*request);
-      return 0;
-    };
+    const CommandOptions v =
+        commands.add("verify", "compares with reference forces; fails beyond 5 %", verify);
+    v.option("CALIBRATION", request.calibration, "calibration file").required();
+    v.option("TABLE", request.table, "measurements with reference forces as loads").required();
+    const CommandOptions a = commands.add("apply", "forces of a record", apply);
+    a.option("CALIBRATION", request.calibration, "calibration file").required();
+    a.option("TABLE", request.table, "record, evenly sampled").required();
+    a.option("-o,--out", request.out, "CSV of the forces").required();
+    a.option("--low-pass-hz", request.low_pass, "zero-phase low-pass; 0: none").showDefault();
+    return commands.body();
   };
   return command;
 }

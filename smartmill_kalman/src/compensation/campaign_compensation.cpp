@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/signal/force_channels.h"
@@ -12,11 +13,7 @@
 #include "smartmill_core/signal/window.h"
 
 namespace smartmill::kalman {
-namespace {
-
-const std::array<const char*, 3> DIRECTIONS{{"x", "y", "z"}};
-
-}  // namespace
+namespace {}  // namespace
 
 void SensorFitParameters::validate() const {
   if (!(low >= 0.0) || !(high > low)) {
@@ -74,7 +71,7 @@ struct Taps {
 Taps tapsAlong(const Campaign& campaign, std::size_t axis) {
   Taps taps;
   for (const CampaignTest& test : campaign.tests) {
-    if (test.kind != TestKind::tap || test.direction != DIRECTIONS[axis]) continue;
+    if (test.kind != TestKind::tap || test.direction != AXIS_NAMES[axis]) continue;
     const Record record = readRecord(campaign, test);
     if (taps.rate != 0.0 && (taps.rate != test.sample_rate || record.size() != taps.hammer.front().size())) {
       throw Error(record.file + ": sample rate or length differs from the other taps of this direction");
@@ -154,7 +151,7 @@ SensorMatrix identifySensorMatrix(const Campaign& campaign, const SensorFitParam
   for (std::size_t j = 0; j < 3; ++j) {
     taps[j] = tapsAlong(campaign, j);
     if (taps[j].hammer.empty())
-      throw Error(campaign.folder + ": no taps for the cross-talk along " + DIRECTIONS[j]);
+      throw Error(campaign.folder + ": no taps for the cross-talk along " + AXIS_NAMES[j]);
     sensor.h[j][j] = identifySensor(taps[j].hammer, taps[j].response[j], taps[j].rate, parameters).model;
   }
   for (std::size_t j = 0; j < 3; ++j) {

@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/names.h"
 #include "smartmill_kalman/sensor/block_channels.h"
@@ -18,10 +19,6 @@ constexpr double NEVER = -std::numeric_limits<double>::infinity();
 TapParameters withRange(TapParameters taps, double saturation) {
   taps.response_range = saturation;
   return taps;
-}
-
-int axisOf(const std::string& direction) {
-  return direction == "x" ? 0 : direction == "y" ? 1 : direction == "z" ? 2 : -1;
 }
 
 }  // namespace
@@ -256,9 +253,9 @@ void CompensationPipeline::event(std::function<void(SensorMeasurement&)> action)
 }
 
 void CompensationPipeline::push(const MeasuredModes& modes) {
-  const int found = axisOf(modes.direction);
-  if (modes.point != POINT_FORCE_SENSOR || found < 0) return;
-  sorter_.push(goals_, modes.stamp, [this, modes, axis = static_cast<std::size_t>(found)] {
+  const std::optional<std::size_t> found = axisIndex(modes.direction);
+  if (modes.point != POINT_FORCE_SENSOR || !found) return;
+  sorter_.push(goals_, modes.stamp, [this, modes, axis = *found] {
     if (modes.stamp <= modes_stamp_[axis]) return;
     modes_stamp_[axis] = modes.stamp;
     compensation_.setSensor(axis, modes.model);
@@ -290,7 +287,7 @@ double CompensationPipeline::ageOfModes() const {
 
 void CompensationPipeline::hammerStopped(const std::string& reason) {
   if (measurement_.active()) {
-    measurement_.abort(reason);
+    measurement_.end(FrfCode::bad_data, reason);
     publishResults();
   }
   sorter_.setRegular(hammers_, false);
@@ -304,7 +301,7 @@ void CompensationPipeline::publishResults() {
     calibrator_.endTaps(*result);
     plate_.endTaps(*result);
     if (result->code == FrfCode::ok) {
-      const auto axis = static_cast<std::size_t>(axisOf(result->modes.direction));
+      const std::size_t axis = *axisIndex(result->modes.direction);
       modes_stamp_[axis] = result->modes.stamp;
       // A record without noise gives no estimate of the sensor's noise.
       if (result->noise_rms > 0.0) {

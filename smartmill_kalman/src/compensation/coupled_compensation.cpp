@@ -19,12 +19,12 @@ void CoupledCompensation::couple(const std::vector<HarmonicFilter>& filters, std
 }
 
 void CoupledCompensation::onFiltersChanged(const std::vector<HarmonicFilter>& filters, double sample_rate) {
-  int harmonics = filters[0].harmonics();
+  int harmonics = filters[0].pairs().harmonics();
   for (std::size_t axis = 0; axis < 3; ++axis) {
     matrix_.h[axis][axis] = sensor(axis);
-    harmonics = std::min(harmonics, filters[axis].harmonics());
+    harmonics = std::min(harmonics, filters[axis].pairs().harmonics());
   }
-  inverse_.emplace(matrix_, filters[0].spindleSpeed(), sample_rate, harmonics);
+  inverse_.emplace(matrix_, filters[0].pairs().spindleSpeed(), sample_rate, harmonics);
 }
 
 }  // namespace smartmill::kalman

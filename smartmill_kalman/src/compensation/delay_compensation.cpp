@@ -7,17 +7,8 @@
 #include "smartmill_kalman/compensation/innovation_statistics.h"
 
 namespace smartmill::kalman {
-namespace {
-
-/// Half samples of the period that gains may be off before they are replaced; 3 diverge.
-constexpr double HYSTERESIS = 0.7;
-/// Relative change of speed at which the filters are retuned.
-constexpr double RETUNE_TOLERANCE = 1e-6;
-
-}  // namespace
-
 DelayCompensation::DelayCompensation(const CompensationParameters& parameters, ForceOutputs outputs)
-    : parameters_(parameters.filter), outputs_(std::move(outputs)) {
+    : parameters_(parameters), outputs_(std::move(outputs)) {
 }
 
 void DelayCompensation::setSensor(std::size_t axis, const SensorAxis& sensor) {
@@ -30,9 +21,10 @@ bool DelayCompensation::prepare(const SpindleAngle& spindle, double sample_rate)
   const bool at_rest = filters_.empty();
   speed_ = spindle.speed;
   const double half_samples = 2.0 * units::TWO_PI / speed_ * sample_rate;
-  if (at_rest || sample_rate_ != sample_rate || std::abs(half_samples - half_samples_) > HYSTERESIS) {
+  if (at_rest || sample_rate_ != sample_rate ||
+      std::abs(half_samples - half_samples_) > parameters_.delay_hysteresis) {
     design(static_cast<int>(std::lround(half_samples)), sample_rate);
-  } else if (std::abs(speed_ / filters_.front().spindleSpeed() - 1.0) > RETUNE_TOLERANCE) {
+  } else if (std::abs(speed_ / filters_.front().spindleSpeed() - 1.0) > parameters_.retune_tolerance) {
     for (DelayFilter& filter : filters_) filter.retune(speed_);
   }
   return at_rest;
@@ -46,7 +38,7 @@ void DelayCompensation::design(int half_samples, double sample_rate) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     auto found = designs_.find({axis, half_samples});
     if (found == designs_.end()) {
-      HarmonicFilterParameters parameters = parameters_;
+      HarmonicFilterParameters parameters = parameters_.filter;
       parameters.noise_rms = sensor_[axis].noise_rms;
       const DelayFilter designed(sensor_[axis].model, 2.0 * units::TWO_PI * sample_rate / half_samples,
                                  sample_rate, parameters);

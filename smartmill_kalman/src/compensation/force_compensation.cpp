@@ -12,8 +12,6 @@
 namespace smartmill::kalman {
 namespace {
 
-constexpr double ZERO_TIME = 2.0;  // [s] time constant of the zero's average
-
 std::array<std::size_t, 3> forceColumns(const SampleBlock& block) {
   std::array<std::size_t, 3> column{};
   for (std::size_t axis = 0; axis < 3; ++axis) column[axis] = columnOf(block, FORCE_CHANNELS[axis], "N");
@@ -69,7 +67,7 @@ void ForceCompensation::reset() {
 void ForceCompensation::updateZero(const ForceBlock& measured) {
   if (!condition_ || condition_->kind == CuttingCondition::Kind::cut || measured.force[0].empty()) return;
   const double length = static_cast<double>(measured.force[0].size());
-  const double weight = std::min(1.0, length / measured.sample_rate / ZERO_TIME);
+  const double weight = std::min(1.0, length / measured.sample_rate / parameters_.zero_time);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     double mean = 0.0;
     for (const double force : measured.force[axis]) mean += std::isfinite(force) ? force / length : 0.0;

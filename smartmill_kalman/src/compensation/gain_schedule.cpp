@@ -6,22 +6,12 @@
 #include "smartmill_kalman/filter/harmonic_filter.h"
 
 namespace smartmill::kalman {
-namespace {
-
-/// Relative spacing of the grid. The gains serve up to HYSTERESIS spacings from their own speed, so that a
-/// speed halfway between two points does not switch gains at every block.
-constexpr double SPACING = 0.01, HYSTERESIS = 0.7;
-/// Relative shift of a mode's frequency that the gains tolerate.
-constexpr double FREQUENCY_TOLERANCE = 0.01;
-
-}  // namespace
-
-int GainSchedule::gridPointOf(double speed) {
-  return static_cast<int>(std::lround(std::log(speed) / SPACING));
+int GainSchedule::gridPointOf(double speed) const {
+  return static_cast<int>(std::lround(std::log(speed) / options_.spacing));
 }
 
-bool GainSchedule::covers(int grid_point, double speed) {
-  return !(std::abs(std::log(speed) / SPACING - grid_point) > HYSTERESIS);
+bool GainSchedule::covers(int grid_point, double speed) const {
+  return !(std::abs(std::log(speed) / options_.spacing - grid_point) > options_.hysteresis);
 }
 
 const std::vector<HarmonicGain>& GainSchedule::gains(std::size_t axis, const SensorAxis& sensor,
@@ -34,7 +24,7 @@ const std::vector<HarmonicGain>& GainSchedule::gains(std::size_t axis, const Sen
     parameters.noise_rms = sensor.noise_rms;
     design_frequencies_[axis].clear();
     for (const Mode& mode : sensor.model.modes) design_frequencies_[axis].push_back(mode.frequency);
-    gains = designGains(sensor.model, std::exp(grid_point * SPACING), sample_rate, parameters);
+    gains = designGains(sensor.model, std::exp(grid_point * options_.spacing), sample_rate, parameters);
   }
   return gains;
 }
@@ -43,7 +33,7 @@ bool GainSchedule::suits(std::size_t axis, const ModalModel& sensor) const {
   const std::vector<double>& designed = design_frequencies_[axis];
   if (designed.size() != sensor.modes.size()) return false;
   for (std::size_t k = 0; k < designed.size(); ++k) {
-    if (std::abs(sensor.modes[k].frequency / designed[k] - 1.0) > FREQUENCY_TOLERANCE) return false;
+    if (std::abs(sensor.modes[k].frequency / designed[k] - 1.0) > options_.frequency_tolerance) return false;
   }
   return true;
 }

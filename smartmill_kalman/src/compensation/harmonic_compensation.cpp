@@ -7,17 +7,6 @@
 #include "smartmill_kalman/compensation/innovation_statistics.h"
 
 namespace smartmill::kalman {
-namespace {
-
-/// Relative change of speed at which the filters are retuned.
-constexpr double RETUNE_TOLERANCE = 1e-6;
-/// A tracked speed is checked for retuning once in so many samples of a block.
-constexpr std::size_t RETUNE_INTERVAL = 32;
-/// Relative standard deviation of a tracked speed above which a block is marked as settling.
-constexpr double SPEED_CONVERGED = 1e-4;
-
-}  // namespace
-
 HarmonicCompensation::HarmonicCompensation(const CompensationParameters& parameters, ForceOutputs outputs)
     : parameters_(parameters), outputs_(std::move(outputs)), schedule_(parameters.filter) {
 }
@@ -58,10 +47,11 @@ void HarmonicCompensation::reset() {
 bool HarmonicCompensation::prepare(const SpindleAngle& spindle, double sample_rate) {
   const bool at_rest = filters_.empty();
   spindle_ = spindle;
-  if (at_rest || sample_rate_ != sample_rate || !GainSchedule::covers(grid_point_, spindle.speed)) {
+  if (at_rest || sample_rate_ != sample_rate || !schedule_.covers(grid_point_, spindle.speed)) {
     sample_rate_ = sample_rate;
     design();
-  } else if (std::abs(spindle.speed / filters_.front().spindleSpeed() - 1.0) > RETUNE_TOLERANCE) {
+  } else if (std::abs(spindle.speed / filters_.front().pairs().spindleSpeed() - 1.0) >
+             parameters_.retune_tolerance) {
     retune();
   }
   if (parameters_.track_speed && !speed_tracker_)
@@ -71,7 +61,7 @@ bool HarmonicCompensation::prepare(const SpindleAngle& spindle, double sample_ra
 
 // New filters take over the force of those before them.
 void HarmonicCompensation::design() {
-  grid_point_ = GainSchedule::gridPointOf(spindle_.speed);
+  grid_point_ = schedule_.gridPointOf(spindle_.speed);
   std::vector<HarmonicFilter> before;
   before.swap(filters_);
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -82,7 +72,7 @@ void HarmonicCompensation::design() {
   onFiltersChanged(filters_, sample_rate_);
   mode_follower_.reset();
   if (parameters_.follow && condition_ && condition_->kind == CuttingCondition::Kind::cut) {
-    const int harmonics = std::min(filters_[0].harmonics(), filters_[1].harmonics());
+    const int harmonics = std::min(filters_[0].pairs().harmonics(), filters_[1].pairs().harmonics());
     if (harmonics > 0) {
       mode_follower_.emplace(*condition_, harmonics, parameters_.follower, parameters_.follow_revolutions,
                              parameters_.filter.memory_revolutions);
@@ -99,17 +89,6 @@ double HarmonicCompensation::step(std::size_t, HarmonicFilter& filter, double me
   return std::isfinite(measured) ? filter.step(measured) : filter.predict();
 }
 
-void HarmonicCompensation::filterSample(std::array<double, 3>& force, InnovationStatistics& innovations) {
-  if (speed_tracker_) speed_tracker_->prepare(filters_, spindle_.speed);
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    force[axis] = step(axis, filters_[axis], force[axis]);
-    innovations.add(axis, filters_[axis]);
-  }
-  couple(filters_, force);
-  if (!speed_tracker_) return;
-  speed_tracker_->update(filters_, {sensor_[0].noise_rms, sensor_[1].noise_rms, sensor_[2].noise_rms});
-}
-
 void HarmonicCompensation::filterAxes(ForceBlock& block, InnovationStatistics& innovations) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     for (double& sample : block.force[axis]) {
@@ -122,10 +101,17 @@ void HarmonicCompensation::filterAxes(ForceBlock& block, InnovationStatistics& i
 void HarmonicCompensation::filterSamples(ForceBlock& block, InnovationStatistics& innovations) {
   for (std::size_t i = 0; i < block.force[0].size(); ++i) {
     std::array<double, 3> force{{block.force[0][i], block.force[1][i], block.force[2][i]}};
-    filterSample(force, innovations);
+    if (speed_tracker_) speed_tracker_->prepare(filters_, spindle_.speed);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      force[axis] = step(axis, filters_[axis], force[axis]);
+      innovations.add(axis, filters_[axis]);
+    }
+    couple(filters_, force);
     for (std::size_t axis = 0; axis < 3; ++axis) block.force[axis][i] = force[axis];
-    if (speed_tracker_ && (i + 1) % RETUNE_INTERVAL == 0 &&
-        std::abs(speed_tracker_->speed() / spindle_.speed - 1.0) > RETUNE_TOLERANCE) {
+    if (!speed_tracker_) continue;
+    speed_tracker_->update(filters_, {sensor_[0].noise_rms, sensor_[1].noise_rms, sensor_[2].noise_rms});
+    if ((i + 1) % parameters_.retune_interval == 0 &&
+        std::abs(speed_tracker_->speed() / spindle_.speed - 1.0) > parameters_.retune_tolerance) {
       spindle_.speed = speed_tracker_->speed();
       retune();
     }
@@ -135,7 +121,7 @@ void HarmonicCompensation::filterSamples(ForceBlock& block, InnovationStatistics
 void HarmonicCompensation::process(const ForceBlock& measured, ForceBlock compensated,
                                    CompensationHealth& health) {
   InnovationStatistics innovations;
-  health.speed = filters_.front().spindleSpeed();
+  health.speed = filters_.front().pairs().spindleSpeed();
   const std::size_t count = compensated.force[0].size();
   if (speed_tracker_ || isCoupled()) {
     filterSamples(compensated, innovations);
@@ -146,7 +132,8 @@ void HarmonicCompensation::process(const ForceBlock& measured, ForceBlock compen
   if (speed_tracker_) {
     health.speed = spindle_.speed;
     health.speed_std = speed_tracker_->speedStd();
-    if (health.speed_std > SPEED_CONVERGED * health.speed) compensated.status = ForceBlock::Status::settling;
+    if (health.speed_std > parameters_.speed_converged * health.speed)
+      compensated.status = ForceBlock::Status::settling;
   }
   const double end = measured.stamp + static_cast<double>(count) / measured.sample_rate;
   publish(measured, std::move(compensated));

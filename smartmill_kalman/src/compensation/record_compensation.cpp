@@ -16,9 +16,6 @@ namespace {
 
 /// Revolutions after an abrupt change from which the amplitudes at the change are estimated.
 constexpr double LEAD = 4.0;
-/// Samples between a change of the force and its detection: the window of the innovations, and the delay of
-/// the sensor.
-constexpr std::size_t DETECTION_DELAY = AdaptiveMemory::WINDOW + 8;
 /// Samples per block of the fixed-lag smoother, as from a DAQ.
 constexpr std::size_t BLOCK = 256;
 
@@ -39,14 +36,14 @@ std::vector<double> stateAtStart(HarmonicFilter quick, const std::vector<double>
     quick.setLevel(0);
     quick.step(segment[i]);
   }
-  std::vector<double> state = quick.state();
-  const std::size_t m = state.size() - 1 - 2 * static_cast<std::size_t>(quick.harmonics());
+  std::vector<double> state = quick.pairs().state();
+  const std::size_t m = state.size() - 1 - 2 * static_cast<std::size_t>(quick.pairs().harmonics());
   // The modes keep their states; the harmonics rotate back to the start.
   std::copy(at_rest.begin(), at_rest.begin() + static_cast<std::ptrdiff_t>(m), state.begin());
-  for (int n = 1; n <= quick.harmonics(); ++n) {
+  for (int n = 1; n <= quick.pairs().harmonics(); ++n) {
     double& in_phase = state[m + 2 * n - 1];
     double& quadrature = state[m + 2 * n];
-    const double angle = -n * quick.spindleSpeed() * static_cast<double>(lead) / sample_rate;
+    const double angle = -n * quick.pairs().spindleSpeed() * static_cast<double>(lead) / sample_rate;
     const double c = std::cos(angle), s = std::sin(angle), f = in_phase, g = quadrature;
     in_phase = c * f + s * g;
     quadrature = c * g - s * f;
@@ -148,11 +145,12 @@ std::vector<double> smoothRecord(const std::vector<double>& measured, const Moda
   std::size_t restarts = 0;
   for (std::size_t i = 0; i < measured.size(); ++i) {
     causal.step(measured[i]);
-    if (causal.restarts() == restarts) continue;
-    restarts = causal.restarts();
-    const std::size_t start = i > DETECTION_DELAY ? i - DETECTION_DELAY : 0;
+    if (causal.memory().restarts() == restarts) continue;
+    restarts = causal.memory().restarts();
+    const std::size_t start = i > AdaptiveMemory::DETECTION_DELAY ? i - AdaptiveMemory::DETECTION_DELAY : 0;
     // A detection soon after a change belongs to it.
-    if (start > starts.back() + (starts.size() > 1 ? lead : DETECTION_DELAY)) starts.push_back(start);
+    if (start > starts.back() + (starts.size() > 1 ? lead : AdaptiveMemory::DETECTION_DELAY))
+      starts.push_back(start);
   }
   std::vector<double> force;
   force.reserve(measured.size());
@@ -161,7 +159,7 @@ std::vector<double> smoothRecord(const std::vector<double>& measured, const Moda
     const std::vector<double> segment(measured.begin() + static_cast<std::ptrdiff_t>(starts[k]),
                                       measured.begin() + static_cast<std::ptrdiff_t>(end));
     if (segment.size() > lead)
-      filter.setState(stateAtStart(filter, filter.state(), segment, lead, sample_rate));
+      filter.setState(stateAtStart(filter, filter.pairs().state(), segment, lead, sample_rate));
     const std::vector<double> smoothed = filter.smooth(segment);
     force.insert(force.end(), smoothed.begin(), smoothed.end());
   }

@@ -4,22 +4,8 @@
 #include <cmath>
 
 namespace smartmill::kalman {
-namespace {
-
-/// A window whose mean square exceeds the largest of the revolution before by this is a change of the force.
-constexpr double OUT_OF_LINE = 5.0;
-/// Windows after a start that give the reference power.
-constexpr std::size_t LEAST_WINDOWS = 12;
-/// Revolutions at a level before the next is tried.
-constexpr std::size_t DWELL = 2;
-/// A revolution with a mean square below this share of the previous one has not settled.
-constexpr double STILL_FALLING = 0.8;
-/// Largest mean square at a longer memory, relative to that at the shortest.
-constexpr double MEMORY_TOO_LONG = 1.5;
-
-}  // namespace
-
-AdaptiveMemory::AdaptiveMemory(std::size_t levels, double revolution) : levels_(levels) {
+AdaptiveMemory::AdaptiveMemory(std::size_t levels, double revolution, const AdaptiveMemoryOptions& options)
+    : options_(options), levels_(levels) {
   setRevolution(revolution);
 }
 
@@ -38,8 +24,8 @@ void AdaptiveMemory::checkWindow() {
   const double mean = window_sum_ / static_cast<double>(WINDOW);
   window_count_ = 0;
   window_sum_ = 0.0;
-  const bool known = level_ > 0 || windows_ >= LEAST_WINDOWS || last_peak_ > 0.0;
-  if (known && mean > OUT_OF_LINE * (level_ > 0 ? last_peak_ : std::max(last_peak_, peak_))) {
+  const bool known = level_ > 0 || windows_ >= options_.least_windows || last_peak_ > 0.0;
+  if (known && mean > options_.out_of_line * (level_ > 0 ? last_peak_ : std::max(last_peak_, peak_))) {
     level_ = 0;
     ++restarts_;
     windows_ = dwell_ = 0;
@@ -54,11 +40,11 @@ void AdaptiveMemory::checkWindow() {
 
 void AdaptiveMemory::checkRevolution() {
   const double mean = revolution_sum_ / static_cast<double>(windows_);
-  const bool settled = mean > STILL_FALLING * last_mean_;
-  if (level_ > 0 && mean > MEMORY_TOO_LONG * accepted_mean_) {
+  const bool settled = mean > options_.still_falling * last_mean_;
+  if (level_ > 0 && mean > options_.memory_too_long * accepted_mean_) {
     --level_;
     dwell_ = 0;
-  } else if (++dwell_ > DWELL && settled && level_ + 1 < levels_) {
+  } else if (++dwell_ > options_.dwell && settled && level_ + 1 < levels_) {
     if (level_ == 0) accepted_mean_ = mean;
     ++level_;
     dwell_ = 0;

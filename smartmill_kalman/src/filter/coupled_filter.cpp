@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 #include <Eigen/LU>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/model/strict_yaml.h"
@@ -117,7 +118,7 @@ CrossTalkInverse::CrossTalkInverse(const SensorMatrix& sensor, double spindle_sp
 void CrossTalkInverse::add(const std::vector<HarmonicFilter>& axes, std::array<double, 3>& force) const {
   for (std::size_t n = 0; n < correction_.size(); ++n) {
     for (std::size_t j = 0; j < 3; ++j) {
-      const Complex own = axes[j].forceHarmonic(n);
+      const Complex own = axes[j].pairs().forceHarmonic(n);
       for (std::size_t i = 0; i < 3; ++i) {
         const Complex& share = correction_[n][i][j];
         force[i] += share.real() * own.real() - share.imag() * own.imag();
@@ -130,7 +131,7 @@ CoupledFilter::CoupledFilter(const SensorMatrix& sensor, double spindle_speed, d
                              const HarmonicFilterParameters& parameters) {
   for (std::size_t i = 0; i < 3; ++i)
     axis_.emplace_back(sensor.h[i][i], spindle_speed, sample_rate, parameters);
-  inverse_.emplace_back(sensor, spindle_speed, sample_rate, axis_[0].harmonics());
+  inverse_.emplace_back(sensor, spindle_speed, sample_rate, axis_[0].pairs().harmonics());
 }
 
 std::array<double, 3> CoupledFilter::step(const std::array<double, 3>& measured) {
@@ -145,7 +146,7 @@ namespace {
 constexpr const char* FORMAT = "smartmill-sensor-matrix/1";
 
 std::string keyOf(std::size_t row, std::size_t column) {
-  return {"xyz"[row], "xyz"[column]};
+  return std::string(AXIS_NAMES[row]) + AXIS_NAMES[column];
 }
 
 }  // namespace

@@ -14,14 +14,8 @@
 namespace smartmill::kalman {
 namespace {
 
-/// Shortest memory over settling_revolutions: the line has more states than the harmonics.
-constexpr double QUICK_FACTOR = 1.5;
 /// Length of the buffer in which the line moves, in lines.
 constexpr std::size_t BUFFER_LINES = 8;
-/// Longest recursion of the gain in revolutions, and relative rise of P per revolution at convergence.
-/// Frequencies that the sensor hardly transmits converge much later; the recursion then ends at its longest,
-/// if the variance of the innovation rises by less than SETTLED.
-constexpr double MAX_REVOLUTIONS = 1000.0, CONVERGED = 1e-7, SETTLED = 1e-4;
 
 /// Coefficients of u^i, lowest first, of the polynomial that is 1 at node j and 0 at the others.
 std::vector<double> lagrangePolynomial(const std::vector<double>& nodes, std::size_t j) {
@@ -130,13 +124,13 @@ double DelayModel::measured(const std::vector<double>& x) const {
   return sum;
 }
 
-std::vector<double> delayGain(const DelayModel& model, double q, double r) {
+std::vector<double> delayGain(const DelayModel& model, double q, double r, const DelayGainOptions& options) {
   if (!(q > 0.0) || !(r > 0.0)) throw Error("delay form: expected variances above 0");
   // Morf, Sidhu and Kailath: P(k + 1) - P(k) = m l l', n = P c'.
   std::vector<double> l(model.states(), 0.0), n = l, through(model.states());
   l.back() = 1.0;
   double m = q, variance = r;
-  const auto most = static_cast<std::size_t>(MAX_REVOLUTIONS * static_cast<double>(model.line));
+  const auto most = static_cast<std::size_t>(options.max_revolutions * static_cast<double>(model.line));
   double rise = 0.0;  // of the innovation's variance over a revolution
   for (std::size_t step = 1; step <= most; ++step) {
     const double output = model.measured(l), before = variance;
@@ -151,9 +145,9 @@ std::vector<double> delayGain(const DelayModel& model, double q, double r) {
     if (step % model.line == 0) {
       double left = 0.0;
       for (const double x : l) left += x * x;
-      const bool last = step + model.line > most && rise < SETTLED * variance;
-      if (last ||
-          (rise < CONVERGED * variance && m * left < CONVERGED * q * static_cast<double>(model.line))) {
+      const bool last = step + model.line > most && rise < options.settled * variance;
+      if (last || (rise < options.converged * variance &&
+                   m * left < options.converged * q * static_cast<double>(model.line))) {
         for (double& gain : n) gain /= variance;
         n.push_back(variance);
         return n;
@@ -171,9 +165,10 @@ DelayFilter::DelayFilter(const ModalModel& sensor, double spindle_speed, double 
       memory_(1, units::TWO_PI / spindle_speed * sample_rate) {
   parameters.validate();
   const double r = parameters.noise_rms * parameters.noise_rms;
-  const double quick = QUICK_FACTOR * parameters.settling_revolutions;
-  const double slow = std::max(quick, parameters.memory_revolutions);
-  for (const double memory : {quick, std::sqrt(quick * slow), slow}) {
+  HarmonicFilterParameters slower = parameters;
+  slower.settling_revolutions *= DelayGainOptions().quick;
+  for (std::size_t level = 0; level < HarmonicFilter::LEVELS; ++level) {
+    const double memory = slower.memory(level);
     gain_.push_back(delayGain(model_, r / (memory * memory), r));
     innovation_std_.push_back(std::sqrt(gain_.back().back()));
     gain_.back().pop_back();

@@ -17,12 +17,20 @@ HarmonicGain designHarmonicGain(const HarmonicDesign& design) {
   return gain ? *gain : riccatiGain(design);
 }
 
+int harmonicCount(double top, double revolution, int most) {
+  return std::clamp(static_cast<int>(top * revolution), 1, most);
+}
+
+double harmonicSettling(const ModalModel& sensor, double f, double settling, double quickest) {
+  return std::max(std::min(1.0, 2.0 * std::abs(sensor.response(f))) * settling, quickest);
+}
+
 HarmonicGain designHarmonicGain(const ModalModel& sensor, double spindle_speed, double sample_rate,
                                 int harmonics, double noise_rms, double settling, double quickest) {
   HarmonicDesign design{sensor, spindle_speed, sample_rate, noise_rms, {}};
   for (int n = 0; n <= harmonics; ++n) {
-    const double passed = std::abs(sensor.response(n * spindle_speed / units::TWO_PI));
-    design.settling.push_back(std::max(std::min(1.0, 2.0 * passed) * settling, quickest));
+    design.settling.push_back(
+        harmonicSettling(sensor, n * spindle_speed / units::TWO_PI, settling, quickest));
   }
   return designHarmonicGain(design);
 }
@@ -65,11 +73,11 @@ HarmonicGain riccatiGain(const HarmonicDesign& design) {
   c << modes.c, design.sensor.direct * force;
   d << Eigen::RowVectorXd::Zero(m), force;
 
-  const Eigen::MatrixXd p = stationaryCovariance(phi, noise, c, r);
+  const StationaryGain found = stationaryGain(phi, noise, c, r);
+  const Eigen::VectorXd smoothing = found.covariance * d.transpose();
   HarmonicGain gain;
-  gain.variance = (c * p * c.transpose())(0) + r;
-  const Eigen::VectorXd filter = p * c.transpose() / gain.variance, smoothing = p * d.transpose();
-  gain.filter.assign(filter.data(), filter.data() + filter.size());
+  gain.variance = found.variance;
+  gain.filter.assign(found.gain.data(), found.gain.data() + found.gain.size());
   gain.smoothing.assign(smoothing.data(), smoothing.data() + smoothing.size());
   return gain;
 }

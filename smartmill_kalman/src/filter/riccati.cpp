@@ -33,4 +33,13 @@ Eigen::MatrixXd stationaryCovariance(const Eigen::MatrixXd& phi, const Eigen::Ma
               " states has no stationary solution");
 }
 
+StationaryGain stationaryGain(const Eigen::MatrixXd& phi, const Eigen::MatrixXd& q,
+                              const Eigen::RowVectorXd& c, double r) {
+  StationaryGain found;
+  found.covariance = stationaryCovariance(phi, q, c, r);
+  found.variance = (c * found.covariance * c.transpose())(0) + r;
+  found.gain = found.covariance * c.transpose() / found.variance;
+  return found;
+}
+
 }  // namespace smartmill::kalman

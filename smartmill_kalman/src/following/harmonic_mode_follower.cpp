@@ -21,12 +21,13 @@ std::optional<ModeFollower::Update> HarmonicModeFollower::update(double now, con
                                                                  double noise_rms, double sample_rate) {
   const double revolution = units::TWO_PI / spindle.speed;
   if (next_update_ == 0.0) next_update_ = now + revolutions_ * revolution;
-  if (now < next_update_ || !filters[0].settled() || !filters[1].settled()) return std::nullopt;
+  if (now < next_update_ || !filters[0].memory().settled() || !filters[1].memory().settled())
+    return std::nullopt;
   next_update_ = now + revolutions_ * revolution;
   const double angle = spindle.angle + spindle.speed * (now - spindle.stamp);
   ModeFollower::Harmonics harmonics;
   for (std::size_t axis = 0; axis < 2; ++axis) {
-    harmonics[axis] = filters[axis].measuredHarmonics();
+    harmonics[axis] = filters[axis].pairs().measuredHarmonics();
     for (std::size_t n = 0; n < harmonics[axis].size(); ++n)
       harmonics[axis][n] *= std::polar(1.0, -static_cast<double>(n) * angle);
   }

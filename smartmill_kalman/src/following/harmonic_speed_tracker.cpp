@@ -6,29 +6,26 @@
 #include "smartmill_core/units.h"
 
 namespace smartmill::kalman {
-namespace {
-
-/// A harmonic is used while one standard deviation of the speed shifts it by less than this share of the
-/// harmonics' spacing; the lowest ones are always used.
-constexpr double MAX_SHIFT = 0.15, MIN_HARMONICS = 8.0;
-
-}  // namespace
-
 HarmonicSpeedTracker::HarmonicSpeedTracker(const SpeedTrackerParameters& tracker,
                                            const HarmonicFilterParameters& filter, double speed,
                                            double sample_rate)
-    : tracker_(tracker, speed, sample_rate), filter_(filter), sample_rate_(sample_rate), speed_used_(speed) {
+    : limits_(tracker),
+      tracker_(tracker, speed, sample_rate),
+      filter_(filter),
+      sample_rate_(sample_rate),
+      speed_used_(speed) {
 }
 
 void HarmonicSpeedTracker::prepare(const std::vector<HarmonicFilter>& filters, double speed) {
   speed_used_ = speed;
-  const std::size_t level = std::min({filters[0].level(), filters[1].level(), filters[2].level()});
+  const std::size_t level =
+      std::min({filters[0].memory().level(), filters[1].memory().level(), filters[2].memory().level()});
   memory_ = filter_.memory(level) * units::TWO_PI / speed;
-  const double highest = std::max(MIN_HARMONICS, MAX_SHIFT * speed / tracker_.speedStd());
+  const double highest = std::max(limits_.min_harmonics, limits_.max_shift * speed / tracker_.speedStd());
   // Root of the sum of n^2: noise of equal harmonics in the slope.
-  const double n = std::min(highest, static_cast<double>(filters.front().harmonics()));
+  const double n = std::min(highest, static_cast<double>(filters.front().pairs().harmonics()));
   slope_gain_ = std::sqrt(n * (n + 1.0) * (2.0 * n + 1.0) / 6.0);
-  for (std::size_t axis = 0; axis < 3; ++axis) slope_[axis] = filters[axis].slope(highest);
+  for (std::size_t axis = 0; axis < 3; ++axis) slope_[axis] = filters[axis].pairs().slope(highest);
 }
 
 void HarmonicSpeedTracker::update(const std::vector<HarmonicFilter>& filters,
@@ -37,7 +34,7 @@ void HarmonicSpeedTracker::update(const std::vector<HarmonicFilter>& filters,
   for (std::size_t axis = 0; axis < 3; ++axis) {
     tracker_.update(axis, filters[axis].innovation(), slope_[axis], noise_rms[axis],
                     noise_rms[axis] * slope_gain_ / std::sqrt(memory_ * sample_rate_));
-    restarts += filters[axis].restarts();
+    restarts += filters[axis].memory().restarts();
   }
   tracker_.predict(speed_used_, memory_);
   if (restarts != restarts_) tracker_.resetCovariance();

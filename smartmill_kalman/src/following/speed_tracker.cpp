@@ -8,29 +8,12 @@
 #include "smartmill_core/units.h"
 
 namespace smartmill::kalman {
-namespace {
-
-/// Mean square of the innovations over that of the noise, up to which they are noise.
-constexpr double NOISE_LIMIT = 2.0;
-/// Mean square of a slope over that by noise alone, from which it is used.
-constexpr double MIN_SLOPE_RATIO = 10.0;
-/// Revolutions after a change of the force in which the amplitudes settle.
-constexpr double RISE_REVOLUTIONS = 1.5;
-/// A change of the load changes the speed; the standard deviation of the acceleration then decays within
-/// LOAD_DECAY to LOAD_FLOOR of its initial value.
-constexpr double LOAD_DECAY = 0.2, LOAD_FLOOR = 0.1;  // [s], [1]
-/// Standard deviations of the nominal speed that limit the estimate, and revolutions at the limit before the
-/// tracker restarts.
-constexpr double MAX_DEVIATIONS = 3.0, MAX_LIMIT_REVOLUTIONS = 3.0;
-
-}  // namespace
-
 void SpeedTrackerParameters::validate() const {
   checkBounds(*this);
 }
 
 SpeedTracker::SpeedTracker(const SpeedTrackerParameters& parameters, double speed, double sample_rate)
-    : dt_(1.0 / sample_rate), nominal_(speed), speed_(speed) {
+    : parameters_(parameters), dt_(1.0 / sample_rate), nominal_(speed), speed_(speed) {
   parameters.validate();
   require("spindle speed [rad/s]", speed, Range::positive());
   max_variance_ = std::pow(parameters.speed_std * speed, 2);
@@ -38,7 +21,7 @@ SpeedTracker::SpeedTracker(const SpeedTrackerParameters& parameters, double spee
   decay_ = std::exp(-dt_ / parameters.acceleration_memory);
   drive_ = acceleration * (1.0 - decay_ * decay_);
   p_[1][1] = max_variance_;
-  rise_left_ = RISE_REVOLUTIONS * units::TWO_PI / speed;
+  rise_left_ = parameters_.rise_revolutions * units::TWO_PI / speed;
   p_[2][2] = acceleration;
 }
 
@@ -48,13 +31,13 @@ void SpeedTracker::predict(double speed_used, double memory) {
   phase_ = keep * phase_ + (speed_ - speed_used) * dt_;
   speed_ += acceleration_ * dt_;
   // The estimate is limited around the nominal speed; at the limit for long, it restarts.
-  const double limit = MAX_DEVIATIONS * std::sqrt(max_variance_);
+  const double limit = parameters_.max_deviations * std::sqrt(max_variance_);
   if (std::abs(speed_ - nominal_) < limit) {
     at_limit_ = 0.0;
   } else {
     speed_ = std::clamp(speed_, nominal_ - limit, nominal_ + limit);
     at_limit_ += dt_;
-    if (at_limit_ > MAX_LIMIT_REVOLUTIONS * units::TWO_PI / nominal_) {
+    if (at_limit_ > parameters_.max_limit_revolutions * units::TWO_PI / nominal_) {
       speed_ = nominal_;
       acceleration_ = at_limit_ = 0.0;
       resetCovariance();
@@ -73,7 +56,8 @@ void SpeedTracker::predict(double speed_used, double memory) {
     p_[i][1] = fp[i][1] + dt_ * fp[i][2];
     p_[i][2] = decay_ * fp[i][2];
   }
-  const double share = std::max(LOAD_FLOOR, std::exp(std::min(0.0, rise_left_) / LOAD_DECAY));
+  const double share =
+      std::max(parameters_.load_floor, std::exp(std::min(0.0, rise_left_) / parameters_.load_decay));
   p_[2][2] += share * share * drive_;
   // Without cutting there is no information; the variance of the speed does not exceed its prior.
   if (p_[1][1] > max_variance_) {
@@ -92,9 +76,11 @@ void SpeedTracker::update(std::size_t axis, double innovation, double slope, dou
   innovation_power_[axis] += share * (left * left - innovation_power_[axis]);
   slope_power_[axis] += share * (slope * slope - slope_power_[axis]);
   // Slopes that are noise, and amplitudes that have not settled, would bias the speed.
-  if (rise_left_ > 0.0 || slope_power_[axis] < MIN_SLOPE_RATIO * slope_noise * slope_noise) return;
+  if (rise_left_ > 0.0 || slope_power_[axis] < parameters_.min_slope_ratio * slope_noise * slope_noise)
+    return;
   const double white = noise_rms * noise_rms;
-  const double noise = white + std::max(0.0, innovation_power_[axis] - NOISE_LIMIT * white) / share;
+  const double noise =
+      white + std::max(0.0, innovation_power_[axis] - parameters_.noise_limit * white) / share;
   const double variance = slope * slope * p_[0][0] + noise;
   double gain[3];
   for (int i = 0; i < 3; ++i) gain[i] = p_[i][0] * slope / variance;
@@ -115,7 +101,7 @@ void SpeedTracker::resetCovariance() {
   p_[0][1] = p_[0][2] = p_[1][2] = 0.0;
   p_[1][1] = max_variance_;
   phase_ = 0.0;
-  rise_left_ = RISE_REVOLUTIONS * units::TWO_PI / nominal_;
+  rise_left_ = parameters_.rise_revolutions * units::TWO_PI / nominal_;
 }
 
 double SpeedTracker::speedStd() const {

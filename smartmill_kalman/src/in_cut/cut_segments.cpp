@@ -9,16 +9,15 @@
 namespace smartmill::kalman {
 namespace {
 
-constexpr double SETTLING = 0.03;  // [s] after the entry: tool, sensor and the first marks on the surface
 constexpr const char* TOOL[] = {"tool_x", "tool_y"};
 
 /// Start of the steady part of a record; force and response are not set.
-CutSegment steady(const Record& record, const CampaignTest& test, std::size_t* from) {
+CutSegment steady(const Record& record, const CampaignTest& test, double settling, std::size_t* from) {
   CutSegment cut;
   cut.name = test.name;
   cut.sample_rate = test.sample_rate;
   cut.speed = test.spindle_speed;
-  const double begin = test.running_before ? 0.0 : test.engage_time.value_or(0.0) + SETTLING;
+  const double begin = test.running_before ? 0.0 : test.engage_time.value_or(0.0) + settling;
   *from = static_cast<std::size_t>(std::ceil(begin * test.sample_rate));
   if (*from >= record.size())
     throw Error(record.file + ": ends before the cut is steady (" + test.name + ")");
@@ -32,9 +31,9 @@ std::vector<double> behind(const std::vector<double>& values, std::size_t from) 
 }  // namespace
 
 CutSegment toolSegment(const Record& record, const CampaignTest& test, std::size_t axis,
-                       const ModalModel& sensor) {
+                       const ModalModel& sensor, double settling) {
   std::size_t from = 0;
-  CutSegment cut = steady(record, test, &from);
+  CutSegment cut = steady(record, test, settling, &from);
   if (record.has("spindle_angle")) cut.angle = behind(record.column("spindle_angle"), from);
   cut.force = behind(record.column(FORCE_CHANNELS[axis]), from);
   cut.response = behind(record.column(TOOL[axis]), from);
@@ -43,9 +42,9 @@ CutSegment toolSegment(const Record& record, const CampaignTest& test, std::size
 }
 
 CutSegment sensorSegment(const Record& record, const CampaignTest& test, std::size_t axis,
-                         const MachineModel& model, double relative_std) {
+                         const MachineModel& model, double relative_std, double settling) {
   std::size_t from = 0;
-  CutSegment cut = steady(record, test, &from);
+  CutSegment cut = steady(record, test, settling, &from);
   cut.angle = behind(record.column("spindle_angle"), from);
   cut.response = behind(record.column(FORCE_CHANNELS[axis]), from);
   if (!model.tool_tip.x.modes.empty() || !model.tool_tip.y.modes.empty())

@@ -10,155 +10,11 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/signal/statistics.h"
-#include "smartmill_core/signal/window.h"
-#include "smartmill_core/units.h"
 
 namespace smartmill::kalman {
 namespace {
 
 using Complex = std::complex<double>;
-
-constexpr double MIN_REVOLUTIONS = 11.0;       // the window's main lobe is +-4 of their inverse
-constexpr int NEIGHBOURS = 8;                  // half orders around a harmonic that estimate its noise
-constexpr double SAME_LINE = 5e-4;             // [1] of frequency
-constexpr double SAME_MODE = 0.1;              // [1] of frequency, at neighbouring speeds
-constexpr double MIN_GAIN_DEVIATIONS = 3.0;    // [1] gain over its standard deviation, for a significant mode
-constexpr double SPEED_TOLERANCE = 3e-3;       // [1] of speed
-constexpr std::size_t MIN_JACKKNIFE_CUTS = 5;  // for the jackknife
-constexpr int PASSES = 4;                      // of the iteration between slopes and fits
-
-std::vector<double> taper(std::size_t size) {
-  std::vector<double> window(size);
-  for (std::size_t i = 0; i < size; ++i)
-    window[i] = blackmanHarris(units::TWO_PI * (static_cast<double>(i) + 0.5) / static_cast<double>(size));
-  return window;
-}
-
-/// Spindle angle over a part [rad]: a parabola fitted to the measured angle, which removes its noise.
-class RotationFit {
- public:
-  RotationFit(const CutSegment& cut, std::size_t from, std::size_t size)
-      : middle_(0.5 * static_cast<double>(size - 1)), rate_(cut.sample_rate) {
-    if (cut.angle.empty()) {
-      speed_ = cut.speed;
-      return;
-    }
-    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d right = Eigen::Vector3d::Zero();
-    double unwrapped = 0.0;
-    for (std::size_t i = 0; i < size; ++i) {
-      if (i > 0) unwrapped += std::remainder(cut.angle[from + i] - cut.angle[from + i - 1], units::TWO_PI);
-      const double t = (static_cast<double>(i) - middle_) / middle_;
-      const Eigen::Vector3d row(1.0, t, t * t);
-      normal += row * row.transpose();
-      right += row * unwrapped;
-    }
-    const Eigen::Vector3d found = normal.ldlt().solve(right);
-    speed_ = found[1] / middle_ * rate_;
-    bend_ = found[2] / (middle_ * middle_) * rate_ * rate_;
-  }
-  double speed() const { return speed_; }  // [rad/s] in the middle
-  double at(std::size_t i) const {
-    const double t = (static_cast<double>(i) - middle_) / rate_;
-    return (speed_ + bend_ * t) * t;
-  }
-
- private:
-  double middle_, rate_, speed_ = 0.0, bend_ = 0.0;
-};
-
-/// Amplitudes at every half order of the spindle, 0, 1/2, 1, ...
-struct HalfOrders {
-  std::vector<Complex> force, response;
-
-  /// Power of the non-synchronous part at a line, from the half orders around it; divided by their number
-  /// less one, since a ratio to so few is distributed as Student's.
-  static double noise(const std::vector<Complex>& values, std::size_t order) {
-    double sum = 0.0;
-    int count = 0;
-    const auto last = static_cast<long>(values.size());
-    for (int n = 0; n < NEIGHBOURS; ++n) {
-      const long place = 2 * static_cast<long>(order) + 1 - NEIGHBOURS + 2 * n;
-      if (place < 1 || place >= last) continue;
-      sum += std::norm(values[static_cast<std::size_t>(place)]);
-      ++count;
-    }
-    return sum / (count - 1);
-  }
-};
-
-HalfOrders halfOrders(const CutSegment& cut, std::size_t from, std::size_t size, const RotationFit& rotation,
-                      std::size_t orders) {
-  HalfOrders found;
-  found.force.resize(2 * orders + NEIGHBOURS);
-  found.response.resize(found.force.size());
-  const std::vector<double> window = taper(size);
-  double sum = 0.0, force_mean = 0.0, response_mean = 0.0;
-  for (std::size_t i = 0; i < size; ++i) {
-    const double w = window[i];
-    sum += w;
-    force_mean += w * cut.force[from + i];
-    response_mean += w * cut.response[from + i];
-  }
-  force_mean /= sum;
-  response_mean /= sum;
-  for (std::size_t i = 0; i < size; ++i) {
-    const double w = 2.0 * window[i] / sum;
-    const double force = w * (cut.force[from + i] - force_mean);
-    const double response = w * (cut.response[from + i] - response_mean);
-    const Complex turn = std::polar(1.0, -0.5 * rotation.at(i));
-    Complex phase = 1.0;
-    for (std::size_t k = 0; k < found.force.size(); ++k, phase *= turn) {
-      found.force[k] += force * phase;
-      found.response[k] += response * phase;
-    }
-  }
-  return found;
-}
-
-/// Relative variance of a sensor's response by the standard deviations of its modes.
-double relativeVariance(const ModalModel& chain, double f) {
-  const Complex nominal = chain.response(f);
-  double sum = 0.0;
-  for (std::size_t m = 0; m < chain.modes.size(); ++m) {
-    const auto moved = [&](double Mode::*what, double by) {
-      if (!std::isfinite(by) || by == 0.0) return;
-      ModalModel other = chain;
-      other.modes[m].*what += by;
-      if (what == &Mode::gain) other.direct -= by;  // the static gain stays 1
-      sum += std::norm(other.response(f) / nominal - 1.0);
-    };
-    moved(&Mode::frequency, chain.modes[m].frequency_std);
-    moved(&Mode::damping_ratio, chain.modes[m].damping_ratio_std);
-    moved(&Mode::gain, chain.modes[m].gain_std);
-  }
-  return sum;
-}
-
-void addSegmentLines(const CutSegment& cut, std::size_t from, std::size_t size,
-                     const CuttingFrfOptions& options, std::vector<FrfLine>& lines) {
-  const RotationFit rotation(cut, from, size);
-  const double step = rotation.speed() / units::TWO_PI;  // [Hz]
-  if (!(step > 0.0) || static_cast<double>(size) / cut.sample_rate * step < MIN_REVOLUTIONS) return;
-  const auto orders = static_cast<std::size_t>(options.high / step);
-  const HalfOrders found = halfOrders(cut, from, size, rotation, orders);
-  for (auto k = static_cast<std::size_t>(cut.every); k <= orders; k += static_cast<std::size_t>(cut.every)) {
-    FrfLine line;
-    line.frequency = static_cast<double>(k) * step;
-    if (line.frequency < options.low) continue;
-    line.speed = rotation.speed();
-    const Complex measured = found.force[2 * k], chain = cut.chain.response(line.frequency);
-    const double force_noise = HalfOrders::noise(found.force, k),
-                 response_noise = HalfOrders::noise(found.response, k);
-    if (std::norm(measured) < options.least_signal * options.least_signal * force_noise) continue;
-    line.value = found.response[2 * k] / measured * chain;
-    line.force = std::abs(measured / chain);
-    const double relative = force_noise / std::norm(measured) + relativeVariance(cut.chain, line.frequency) +
-                            cut.relative_force_std * cut.relative_force_std;
-    line.std_dev = std::sqrt(response_noise / (line.force * line.force) + std::norm(line.value) * relative);
-    if (line.std_dev > 0.0) lines.push_back(line);
-  }
-}
 
 /// Weighted mean of lines at one frequency; its standard deviation includes their scatter.
 FrfLine merged(const std::vector<FrfLine>& lines) {
@@ -179,7 +35,7 @@ FrfLine merged(const std::vector<FrfLine>& lines) {
   return sum;
 }
 
-FrequencyResponse frfOf(std::vector<FrfLine> lines, const std::string& unit) {
+FrequencyResponse frfOf(std::vector<FrfLine> lines, const std::string& unit, double same_line) {
   std::sort(lines.begin(), lines.end(),
             [](const FrfLine& a, const FrfLine& b) { return a.frequency < b.frequency; });
   FrequencyResponse frf;
@@ -187,7 +43,7 @@ FrequencyResponse frfOf(std::vector<FrfLine> lines, const std::string& unit) {
   frf.averages = 1;
   for (std::size_t i = 0; i < lines.size();) {
     std::vector<FrfLine> same{lines[i]};
-    for (++i; i < lines.size() && lines[i].frequency < same.front().frequency * (1.0 + SAME_LINE); ++i)
+    for (++i; i < lines.size() && lines[i].frequency < same.front().frequency * (1.0 + same_line); ++i)
       same.push_back(lines[i]);
     const FrfLine line = merged(same);
     frf.frequency.push_back(line.frequency);
@@ -224,12 +80,14 @@ double meanSpeed(const std::vector<FrfLine>& lines) {
 }
 
 /// Removes modes with a gain that is not significant; differences between speeds can produce such modes.
-void dropUncertainModes(ModalFit& fit, bool unit_static_gain) {
+void dropUncertainModes(ModalFit& fit, const CuttingFrfOptions& options) {
   std::vector<Mode>& modes = fit.model.modes;
-  const auto unseen = [](const Mode& m) { return !(std::abs(m.gain) > MIN_GAIN_DEVIATIONS * m.gain_std); };
+  const auto unseen = [&](const Mode& m) {
+    return !(std::abs(m.gain) > options.least_gain_deviations * m.gain_std);
+  };
   if (std::none_of(modes.begin(), modes.end(), unseen)) return;
   for (const Mode& mode : modes)
-    if (unit_static_gain && unseen(mode)) fit.model.direct += mode.gain;
+    if (options.unit_static_gain && unseen(mode)) fit.model.direct += mode.gain;
   modes.erase(std::remove_if(modes.begin(), modes.end(), unseen), modes.end());
   fit.covariance.resize(0, 0);  // of other modes than these
 }
@@ -244,7 +102,7 @@ SpeedFrf fitted(std::vector<FrfLine> lines, const std::vector<SpeedDependentMode
   for (FrfLine& line : lines)
     for (const SpeedDependentMode& mode : moving)
       line.value += mode.correction(line.frequency, line.speed / found.speed);
-  found.frf = frfOf(std::move(lines), unit);
+  found.frf = frfOf(std::move(lines), unit, options.same_line);
   const auto count = static_cast<int>(found.frf.size());
   if (count < options.least_lines) {
     found.reason = formatted("%d lines, expected at least %d", count, options.least_lines);
@@ -258,7 +116,7 @@ SpeedFrf fitted(std::vector<FrfLine> lines, const std::vector<SpeedDependentMode
   fit.positive_gains = true;
   try {
     found.fit = fitModes(found.frf, fit);
-    dropUncertainModes(*found.fit, options.unit_static_gain);
+    dropUncertainModes(*found.fit, options);
     if (!found.fit->model.modes.empty()) return found;
     found.fit.reset();
     found.reason = "no significant mode";
@@ -268,13 +126,13 @@ SpeedFrf fitted(std::vector<FrfLine> lines, const std::vector<SpeedDependentMode
   return found;
 }
 
-/// Mode closest to a frequency, within SAME_MODE; null: none.
-const Mode* nearest(const SpeedFrf& frf, double frequency) {
+/// Mode closest to a frequency, within `same_mode`; null: none.
+const Mode* nearest(const SpeedFrf& frf, double frequency, double same_mode) {
   const Mode* best = nullptr;
   if (!frf.fit) return best;
   for (const Mode& mode : frf.fit->model.modes) {
     const double apart = std::abs(std::log(mode.frequency / frequency));
-    if (apart < SAME_MODE && (!best || apart < std::abs(std::log(best->frequency / frequency)))) best = &mode;
+    if (apart < same_mode && (!best || apart < std::abs(std::log(best->frequency / frequency)))) best = &mode;
   }
   return best;
 }
@@ -282,12 +140,12 @@ const Mode* nearest(const SpeedFrf& frf, double frequency) {
 /// Slopes of one mode at a group: of the parabola through the values at the nearest three speeds, or of the
 /// line through two; zero for a single group.
 SpeedDependentMode speedDependentMode(const std::vector<SpeedFrf>& all, std::size_t group, const Mode& mode,
-                                      bool receptance) {
+                                      bool receptance, double same_mode) {
   SpeedDependentMode moving;
   moving.mode = mode;
   std::vector<std::pair<double, const Mode*>> neighbours;  // speed over this one, less 1
   for (const SpeedFrf& other : all) {
-    if (const Mode* same = nearest(other, mode.frequency))
+    if (const Mode* same = nearest(other, mode.frequency, same_mode))
       neighbours.emplace_back(other.speed / all[group].speed - 1.0, same);
   }
   std::sort(neighbours.begin(), neighbours.end(),
@@ -340,7 +198,7 @@ void widenBySlopes(const std::vector<FrfLine>& lines, const std::vector<SpeedDep
     changed.slope[n % KINDS] += changed.std_dev[n % KINDS];
     const SpeedFrf moved = fitted(lines, other, unit, options);
     for (std::size_t m = 0; m < modes.size(); ++m) {
-      const Mode* there = nearest(moved, before[m].frequency);
+      const Mode* there = nearest(moved, before[m].frequency, options.same_mode);
       for (std::size_t k = 0; there && k < KINDS; ++k)
         modes[m].*DEVIATIONS[k] =
             std::hypot(modes[m].*DEVIATIONS[k], there->*VALUES[k] - before[m].*VALUES[k]);
@@ -349,10 +207,11 @@ void widenBySlopes(const std::vector<FrfLine>& lines, const std::vector<SpeedDep
 }
 
 /// Cuts of a group, by their speeds: ranges of lines.
-std::vector<std::pair<std::size_t, std::size_t>> cutsOf(const std::vector<FrfLine>& lines) {
+std::vector<std::pair<std::size_t, std::size_t>> cutsOf(const std::vector<FrfLine>& lines,
+                                                        double same_speed) {
   std::vector<std::pair<std::size_t, std::size_t>> cuts;
   for (std::size_t i = 0; i < lines.size(); ++i) {
-    if (i == 0 || lines[i].speed > lines[i - 1].speed * (1.0 + SPEED_TOLERANCE)) cuts.emplace_back(i, i);
+    if (i == 0 || lines[i].speed > lines[i - 1].speed * (1.0 + same_speed)) cuts.emplace_back(i, i);
     cuts.back().second = i + 1;
   }
   return cuts;
@@ -363,9 +222,9 @@ std::vector<std::pair<std::size_t, std::size_t>> cutsOf(const std::vector<FrfLin
 void widenByCuts(const std::vector<FrfLine>& lines, const std::vector<SpeedDependentMode>& moving,
                  const std::string& unit, const CuttingFrfOptions& options, SpeedFrf& found) {
   if (!found.fit) return;
-  const auto cuts = cutsOf(lines);
+  const auto cuts = cutsOf(lines, options.same_speed);
   std::vector<Mode>& modes = found.fit->model.modes;
-  if (cuts.size() < MIN_JACKKNIFE_CUTS) return;
+  if (cuts.size() < options.least_cuts) return;
   std::vector<std::array<std::vector<double>, KINDS>> neighbours(modes.size());
   for (const auto& [from, to] : cuts) {
     std::vector<FrfLine> others;
@@ -374,14 +233,14 @@ void widenByCuts(const std::vector<FrfLine>& lines, const std::vector<SpeedDepen
     // At the mean speed of the whole group.
     const SpeedFrf left = fitted(std::move(others), moving, unit, options, found.speed);
     for (std::size_t m = 0; m < modes.size(); ++m) {
-      const Mode* there = nearest(left, modes[m].frequency);
+      const Mode* there = nearest(left, modes[m].frequency, options.same_mode);
       for (std::size_t k = 0; there && k < KINDS; ++k) neighbours[m][k].push_back(there->*VALUES[k]);
     }
   }
   for (std::size_t m = 0; m < modes.size(); ++m) {
     for (std::size_t k = 0; k < KINDS; ++k) {
       const std::vector<double>& values = neighbours[m][k];
-      if (values.size() < MIN_JACKKNIFE_CUTS) continue;
+      if (values.size() < options.least_cuts) continue;
       const auto n = static_cast<double>(values.size());
       const double deviation = (n - 1.0) / std::sqrt(n) * standardDeviation(values);
       modes[m].*DEVIATIONS[k] = std::max(modes[m].*DEVIATIONS[k], deviation);
@@ -404,24 +263,6 @@ void CuttingFrfOptions::validate() const {
   check(max_modes >= 1 && max_modes <= 20, "max_modes", max_modes);
 }
 
-std::vector<FrfLine> frfLines(const CutSegment& cut, const CuttingFrfOptions& options) {
-  options.validate();
-  const std::size_t size = cut.force.size();
-  if (cut.response.size() != size || (!cut.angle.empty() && cut.angle.size() != size))
-    throw Error(cut.name + ": force, response and angle differ in length");
-  for (const std::vector<double>* values : {&cut.force, &cut.response, &cut.angle})
-    if (firstNotFinite(*values) < values->size()) throw Error(cut.name + ": a value is not finite");
-  if (!(cut.sample_rate > 0.0) || !(cut.speed > 0.0)) throw Error(cut.name + ": no sample rate or no speed");
-  // Each part has MIN_REVOLUTIONS at least.
-  const double least = 1.02 * MIN_REVOLUTIONS * units::TWO_PI / cut.speed;
-  const auto part_size = static_cast<std::size_t>(std::max(options.part, least) * cut.sample_rate);
-  const std::size_t parts = std::max<std::size_t>(1, size / std::max<std::size_t>(1, part_size));
-  std::vector<FrfLine> lines;
-  for (std::size_t p = 0; p < parts; ++p)
-    addSegmentLines(cut, p * (size / parts), size / parts, options, lines);
-  return lines;
-}
-
 std::vector<SpeedFrf> cuttingFrfs(std::vector<FrfLine> lines, const std::string& unit,
                                   const CuttingFrfOptions& options) {
   options.validate();
@@ -438,12 +279,12 @@ std::vector<SpeedFrf> cuttingFrfs(std::vector<FrfLine> lines, const std::string&
   for (const auto& group : groups) found.push_back(fitted(group, {}, unit, options));
   // Modes also shift within a group; the neighbouring groups give the slopes.
   std::vector<std::vector<SpeedDependentMode>> moving(groups.size());
-  for (int pass = 0; pass < PASSES && groups.size() > 1; ++pass) {
+  for (int pass = 0; pass < options.passes && groups.size() > 1; ++pass) {
     for (std::size_t g = 0; g < groups.size(); ++g) {
       if (!found[g].fit) continue;
       moving[g].clear();
       for (const Mode& mode : found[g].fit->model.modes)
-        moving[g].push_back(speedDependentMode(found, g, mode, unit == "m/N"));
+        moving[g].push_back(speedDependentMode(found, g, mode, unit == "m/N", options.same_mode));
     }
     for (std::size_t g = 0; g < groups.size(); ++g)
       if (!found[g].fit) moving[g] = borrowed(found, moving, g);

@@ -92,7 +92,7 @@ FrfServer::Handlers KalmanNode::measurementHandlers() {
           },
           [this](std::function<bool()> is_active) {
             pipeline_.event([is_active](SensorMeasurement& measurement) {
-              if (is_active()) measurement.cancel();
+              if (is_active()) measurement.end(FrfCode::cancelled, "cancelled");
             });
           }};
 }
@@ -176,7 +176,7 @@ void KalmanNode::checkMeasurement() {
   if (const auto fault = strike_.takeFault()) {
     using Kind = StrikeClient::Answer::Kind;
     pipeline_.event([fault](SensorMeasurement& measurement) {
-      if (fault->kind == Kind::failed) return measurement.commandFailed(fault->message);
+      if (fault->kind == Kind::failed) return measurement.end(FrfCode::no_hit, fault->message);
       measurement.hitByHand();  // no automatic hammer
     });
   }
@@ -186,7 +186,7 @@ void KalmanNode::checkMeasurement() {
   if (shell_.inputs().watchdog(names::HAMMER).ended()) {
     pipeline_.hammerStopped(reason);
   } else if (parameters_.command_machine && pipeline_.isMeasuring()) {
-    pipeline_.event([reason](SensorMeasurement& measurement) { measurement.abort(reason); });
+    pipeline_.event([reason](SensorMeasurement& measurement) { measurement.end(FrfCode::bad_data, reason); });
     pipeline_.flush();
   }
   if (parameters_.command_machine) measurement_server_.refuseWaiting(reason, GOAL_TIMEOUT);

@@ -5,6 +5,7 @@
 #include <deque>
 #include <optional>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/modal/results.h"
@@ -18,11 +19,6 @@
 
 namespace smartmill::kalman {
 namespace {
-
-constexpr double SETTLING = 0.1;         // [s]
-constexpr double PATH_TOLERANCE = 1e-3;  // [m]
-constexpr double MAXIMUM_GAP = 0.2;      // [s] of states: not steady
-constexpr double TOGETHER = 0.02;        // [1] of a sample's time
 
 /// Consecutive samples of three channels.
 struct Stream {
@@ -55,10 +51,10 @@ class CutCollector {
     condition_ = condition;
   }
   void push(const CncState& state) {
-    const bool gap = state.stamp - last_state_ > MAXIMUM_GAP;
+    const bool gap = state.stamp - last_state_ > request_.maximum_gap;
     last_state_ = state.stamp;
-    const bool on_line =
-        cutting() && state.connected && state.feed > 0.0 && onSteadyPath(*condition_, state, PATH_TOLERANCE);
+    const bool on_line = cutting() && state.connected && state.feed > 0.0 &&
+                         onSteadyPath(*condition_, state, request_.path_tolerance);
     if (!on_line || (gap && from_)) {
       if (from_ && !to_closed_) to_closed_ = true;  // the first steady run counts
       return;
@@ -96,8 +92,7 @@ class CutCollector {
   }
   void push(const MeasuredModes& modes) {
     if (modes.point != (request_.tool ? POINT_TOOL_TIP : POINT_FORCE_SENSOR)) return;
-    const std::size_t axis = std::string("xyz").find(modes.direction);
-    if (modes.direction.size() == 1 && axis < 3) found_.rest[axis] = modes.model;
+    if (const auto axis = axisIndex(modes.direction)) found_.rest[*axis] = modes.model;
   }
   void close() {
     if (cutting() && from_ && !force_.value[0].empty() && !response_.value[0].empty() && angles_.size() > 1)
@@ -118,11 +113,13 @@ class CutCollector {
       throw Error(where + formatted("%s at %.0f Hz, force/compensated at %.0f Hz", request_.response.c_str(),
                                     response_.rate, force_.rate));
     const double apart = (response_.stamp - force_.stamp) * force_.rate, whole = std::round(apart);
-    if (std::abs(apart - whole) > TOGETHER)
+    if (std::abs(apart - whole) > request_.together)
       throw Error(where + formatted("force/compensated and %s are %.2f samples apart, not sampled together",
                                     request_.response.c_str(), apart - whole));
-    const double begin = std::max({*from_ + SETTLING, force_.stamp, response_.stamp, angles_.front().time});
-    const double end = std::min({to_ - SETTLING, force_.end(), response_.end(), angles_.back().time});
+    const double begin =
+        std::max({*from_ + request_.settling, force_.stamp, response_.stamp, angles_.front().time});
+    const double end =
+        std::min({to_ - request_.settling, force_.end(), response_.end(), angles_.back().time});
     if (!(end > begin)) return;
     CutSegment one;
     one.name = condition_->name;

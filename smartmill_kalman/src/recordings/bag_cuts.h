@@ -18,6 +18,10 @@ struct BagCutsRequest {
   std::string spindle_sensor;  ///< smartmill-spindle-sensor/1 file, where the response is its six channels
   double length = 0.139;       ///< [m] of tool and holder, for it
   double force_error = 0.01;   ///< [1] relative standard deviation of force/compensated
+  double settling = 0.1;       ///< [s] less at each end of full engagement: stamps of the controller are late
+  double path_tolerance = 1e-3;  ///< [m] off the line of full engagement
+  double maximum_gap = 0.2;  ///< [s] between states of the controller; after a longer one it may have moved
+  double together = 0.02;    ///< [1] of the sample's time, by which force and response may be sampled apart
 };
 
 /// Steady cuts of a bag, one segment each, and the taps at rest in the same bag.
@@ -26,8 +30,8 @@ struct BagCuts {
   std::array<ModalModel, 3> rest;               ///< tool/modes of the tool or of the sensor; empty: none
 };
 
-/// A segment contains the samples between controller states on the line of full engagement, less 0.1 s at
-/// each end.
+/// A segment contains the samples between controller states on the line of full engagement, less the settling
+/// time at each end.
 /// @throws Error when a topic is missing or the streams are not sampled together.
 BagCuts cutsOfBag(const BagCutsRequest& request, const std::function<void(double)>& progress = {});
 

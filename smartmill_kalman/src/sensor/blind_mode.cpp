@@ -16,12 +16,9 @@
 namespace smartmill::kalman {
 namespace {
 
-/// Lines on each side of a harmonic that are omitted: main lobe of the Hann window, and error of the speed.
-constexpr double SKIRT = 4.0;
 /// Number of lines per independent line: powers of neighbours in a Hann window are correlated by (2/3)^2 and
 /// (1/6)^2.
 constexpr double CORRELATED = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0);
-constexpr std::size_t MIN_LINES = 50;
 
 struct Fit {
   double f0 = 0.0, zeta = 0.0, share = 0.0, floor = 0.0;
@@ -114,7 +111,7 @@ fit::Covariance covarianceOf(const PowerLines& lines, const Fit& best, double un
 }  // namespace
 
 BlindMode findBlindMode(const std::vector<double>& samples, double sample_rate, double spindle_speed,
-                        double low, double high) {
+                        double low, double high, const BlindModeOptions& options) {
   const std::vector<double> window = hannWindow(samples.size());
   std::vector<double> windowed;
   for (std::size_t i = 0; i < samples.size(); ++i) windowed.push_back(window[i] * samples[i]);
@@ -125,11 +122,12 @@ BlindMode findBlindMode(const std::vector<double>& samples, double sample_rate, 
   PowerLines lines;
   for (std::size_t k = 0; k < spectrum.size(); ++k) {
     if (frequency[k] < low || frequency[k] > high) continue;
-    if (std::abs(frequency[k] - spindle * std::round(frequency[k] / spindle)) <= SKIRT * line) continue;
+    if (std::abs(frequency[k] - spindle * std::round(frequency[k] / spindle)) <= options.skirt * line)
+      continue;
     lines.frequency.push_back(frequency[k]);
     lines.power.push_back(std::norm(spectrum[k]));
   }
-  if (lines.power.size() < MIN_LINES)
+  if (lines.power.size() < options.min_lines)
     throw Error("blind mode: too few lines between the harmonics of the spindle");
 
   Fit best;

@@ -5,6 +5,7 @@
 #include <set>
 #include <utility>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/signal/force_channels.h"
@@ -77,15 +78,15 @@ void PlateCalibrator::beginTaps(const std::string& direction) {
 
 void PlateCalibrator::endTaps(const SensorResult& result) {
   if (!collector_) return;
-  const auto axis = std::string("xyz").find(direction_);
-  if (result.code == FrfCode::ok && axis < 3) {
+  const std::optional<std::size_t> axis = axisIndex(direction_);
+  if (result.code == FrfCode::ok && axis) {
     if (records_.rate != collector_->rate())
       records_ = {{}, collector_->rate()};  // another sample rate: another device
     for (std::vector<Hit>& hit : collector_->acceptedHits(result)) {
       MatrixTap tap;
       tap.point = *point_;
       // The sensor gives the direction of the hit.
-      tap.direction[axis] = result.static_gain < 0.0 ? -1.0 : 1.0;
+      tap.direction[*axis] = result.static_gain < 0.0 ? -1.0 : 1.0;
       tap.hammer = std::move(hit[0].force);
       for (Hit& channel : hit) tap.channels.push_back(std::move(channel.response));
       records_.taps.push_back(std::move(tap));

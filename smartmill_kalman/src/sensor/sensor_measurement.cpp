@@ -1,29 +1,16 @@
 #include "smartmill_kalman/sensor/sensor_measurement.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
-#include "smartmill_core/error.h"
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/modal/hit_check.h"
-#include "smartmill_core/modal/impact_analysis.h"
-#include "smartmill_core/modal/modal_fit.h"
-#include "smartmill_core/signal/statistics.h"
+#include "smartmill_core/signal/same_time.h"
 #include "smartmill_kalman/sensor/block_channels.h"
+#include "tap_evaluation.h"
 
 namespace smartmill::kalman {
-namespace {
-
-/// Stamps are rounded to nanoseconds; equal times must compare equal however a stream is cut into blocks.
-constexpr double SAME_TIME = 1e-6;  // [s]
-/// Least number of lines for the static gain.
-constexpr std::size_t MIN_STATIC_LINES = 4;
-/// Share of the pre-trigger time before the rise of the hit.
-constexpr double QUIET_SHARE = 0.75;
-
-}  // namespace
-
 void TapParameters::validate() const {
   checkBounds(*this);
   validateHitTest();
@@ -69,7 +56,7 @@ bool SensorMeasurement::handle(const MeasureFrfGoal& goal) {
   active_ = true;
   if (goal.point != POINT_FORCE_SENSOR) {
     finish(FrfCode::bad_goal, "point '" + goal.point + "': this node measures " + POINT_FORCE_SENSOR);
-  } else if (goal.direction != "x" && goal.direction != "y" && goal.direction != "z") {
+  } else if (!axisIndex(goal.direction)) {
     finish(FrfCode::bad_goal, "direction '" + goal.direction + "': expected x, y or z");
   } else if (goal.hits < 1 || goal.hits > 1000) {
     finish(FrfCode::bad_goal, "hits " + std::to_string(goal.hits) + ": expected 1..1000");
@@ -153,7 +140,10 @@ void SensorMeasurement::handleRecord(double now, HitCollector::Record record) {
   }
   if (!fault.text.empty()) return rejectHit(now, fault.text, fault.bad_data);
   hits_.push_back(std::move(record.hit));
-  if (static_cast<int>(hits_.size()) >= goal_.hits) return evaluate();
+  if (static_cast<int>(hits_.size()) >= goal_.hits) {
+    result_ = evaluateTaps(hits_, goal_, parameters_);
+    return finish(result_.code, result_.message);
+  }
   reportStage("hit " + std::to_string(hits_.size()) + " of " + std::to_string(goal_.hits));
   waiting_for_hit_ = false;
   rest_until_ = now + parameters_.rest_time;
@@ -169,80 +159,8 @@ void SensorMeasurement::rejectHit(double now, const std::string& why, bool bad_d
   rest_until_ = now + parameters_.rest_time;
 }
 
-// Mean of the real part over the lines below the fit's band, where the sensor has no dynamics yet.
-void SensorMeasurement::estimateStaticGain(const FrequencyResponse& frf) {
-  double weights = 0.0, sum = 0.0;
-  for (std::size_t k = 0; k < frf.size() && (k < MIN_STATIC_LINES || frf.frequency[k] <= parameters_.fit_low);
-       ++k) {
-    const double weight = std::isfinite(frf.std_dev[k]) ? 2.0 / std::norm(frf.std_dev[k]) : 0.0;
-    weights += weight;
-    sum += weight * frf.value[k].real();
-  }
-  result_.static_gain = sum / weights;
-  result_.static_gain_std = 1.0 / std::sqrt(weights);
-}
-
-void SensorMeasurement::evaluate() {
-  result_.frf.stamp = result_.modes.stamp = hits_.back().stamp;
-  result_.frf.tool = result_.modes.tool = goal_.tool;
-  result_.frf.point = result_.modes.point = goal_.point;
-  result_.frf.direction = result_.modes.direction = goal_.direction;
-  result_.modes.unit = "1";
-  for (const Hit& hit : hits_) result_.hit_stamps.push_back(hit.stamp);
-  try {
-    for (const Hit& hit : hits_) {
-      const auto quiet = static_cast<std::ptrdiff_t>(QUIET_SHARE * static_cast<double>(hit.pre_trigger));
-      result_.noise_rms +=
-          std::pow(standardDeviation({hit.response.begin(), hit.response.begin() + quiet}), 2) /
-          static_cast<double>(hits_.size());
-    }
-    result_.noise_rms = std::sqrt(result_.noise_rms);
-    ImpactOptions options;
-    options.unit = "1";
-    ImpactAnalysis analysis(options);
-    for (const Hit& hit : hits_) analysis.add(hit);
-    // The line at 0 Hz is the drift of the sensor.
-    FrequencyResponse frf = analysis.frf().band(1e-3, parameters_.frf_high);
-    estimateStaticGain(frf);
-    const double off = std::abs(std::abs(result_.static_gain) - 1.0);
-    if (!(off <= parameters_.static_tolerance + 4.0 * result_.static_gain_std)) {
-      return finish(
-          FrfCode::bad_data,
-          formatted("static gain %.3f +- %.3f, expected 1: check the sensitivities of hammer and sensor",
-                    result_.static_gain, result_.static_gain_std));
-    }
-    for (std::size_t k = 0; k < frf.size(); ++k) {
-      if (result_.static_gain < 0.0) frf.value[k] = -frf.value[k];
-      frf.std_dev[k] = std::hypot(frf.std_dev[k], parameters_.systematic * std::abs(frf.value[k]));
-    }
-    result_.frf.frf = frf;
-    ModalFitOptions fit_options;
-    fit_options.low = parameters_.fit_low;
-    fit_options.high = std::min(parameters_.fit_high, frf.frequency.back());
-    fit_options.modes = goal_.modes;
-    fit_options.max_modes = parameters_.max_modes;
-    fit_options.unit_static_gain = true;
-    const ModalFit fit = fitModes(frf, fit_options);
-    result_.modes.model = fit.model;
-    result_.modes.relative_error = fit.relative_error;
-    finish(FrfCode::ok, std::to_string(hits_.size()) + " hits, " + std::to_string(fit.model.modes.size()) +
-                            " modes, static gain measured " +
-                            formatted("%.3f +- %.3f", result_.static_gain, result_.static_gain_std));
-  } catch (const Error& error) {
-    finish(FrfCode::fit_failed, error.what());
-  }
-}
-
-void SensorMeasurement::cancel() {
-  if (active_) finish(FrfCode::cancelled, "cancelled");
-}
-
-void SensorMeasurement::commandFailed(const std::string& text) {
-  if (active_) finish(FrfCode::no_hit, text);
-}
-
-void SensorMeasurement::abort(const std::string& text) {
-  if (active_) finish(FrfCode::bad_data, text);
+void SensorMeasurement::end(FrfCode code, const std::string& message) {
+  if (active_) finish(code, message);
 }
 
 void SensorMeasurement::finish(FrfCode code, const std::string& message) {

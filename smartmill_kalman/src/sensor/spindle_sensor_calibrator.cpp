@@ -4,8 +4,10 @@
 #include <cmath>
 #include <utility>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
+#include "smartmill_core/signal/same_time.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/sensor/spindle_force_sensor.h"
 
@@ -13,9 +15,6 @@ namespace smartmill::kalman {
 namespace {
 
 using Code = CalibrationResult::Code;
-
-constexpr double SAME_TIME = 1e-6;  // [s] stamps are rounded to nanoseconds
-constexpr double MAX_ERROR = 0.05;  // [1] of verify, Burzoni 3.2.1
 
 }  // namespace
 
@@ -130,12 +129,12 @@ void SpindleSensorCalibrator::beginTaps(const std::string& direction, double len
 }
 
 void SpindleSensorCalibrator::endTaps(const SensorResult& result) {
-  const std::size_t along = direction_ == "x" ? 0 : direction_ == "y" ? 1 : 2;
-  if (!direction_.empty() && result.code == FrfCode::ok) {
-    taps_[along].clear();
+  const std::optional<std::size_t> along = axisIndex(direction_);
+  if (along && result.code == FrfCode::ok) {
+    taps_[*along].clear();
     tap_rate_ = collector_.rate();
     for (const std::vector<Hit>& hit : collector_.acceptedHits(result))
-      taps_[along].push_back({hit[0].response, hit[1].response, hit[2].response});
+      taps_[*along].push_back({hit[0].response, hit[1].response, hit[2].response});
   }
   beginTaps("");
 }
@@ -206,10 +205,10 @@ void SpindleSensorCalibrator::fit() {
 void SpindleSensorCalibrator::verify() {
   try {
     const auto error = verifyStatic(reference_, base_);
-    const bool good = *std::max_element(error.begin(), error.end()) <= MAX_ERROR;
+    const bool good = *std::max_element(error.begin(), error.end()) <= LARGEST_STATIC_ERROR;
     finish(good ? Code::ok : Code::fit_failed,
            formatted("largest difference from the reference x %.2f, y %.2f, z %.2f %% (limit %.0f)",
-                     100.0 * error[0], 100.0 * error[1], 100.0 * error[2], 100.0 * MAX_ERROR));
+                     100.0 * error[0], 100.0 * error[1], 100.0 * error[2], 100.0 * LARGEST_STATIC_ERROR));
     result_->readings = reference_.size();
     result_->error = error;
   } catch (const Error& e) {

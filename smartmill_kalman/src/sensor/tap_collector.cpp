@@ -4,10 +4,11 @@
 #include <cmath>
 #include <utility>
 
+#include "smartmill_core/signal/same_time.h"
+
 namespace smartmill::kalman {
 namespace {
 
-constexpr double SAME_TIME = 1e-6;            // [s] stamps are rounded to nanoseconds
 constexpr std::size_t MAX_WAITING = 1000000;  // samples of one stream without the other's index
 
 }  // namespace

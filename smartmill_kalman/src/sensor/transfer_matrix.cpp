@@ -7,6 +7,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/math/linear_algebra.h"
+#include "smartmill_core/modal/impact_analysis.h"
 #include "smartmill_core/signal/fourier.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/signal/window.h"
@@ -20,7 +21,6 @@ using Eigen::Index;
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 
-constexpr std::size_t SMOOTHING_LINES = 8;  // lines on each side averaged for the residual variance
 constexpr double MIN_RANK_RATIO = 1e-6;  // [1] smallest over largest singular value of the directions tapped
 
 /// Force and moment of a unit hit (eq. 2.2, 2.6), moments over the lever.
@@ -225,8 +225,8 @@ Eigen::VectorXd varianceAt(const std::vector<LineFit>& lines, std::size_t at, co
                            Index hits) {
   const Index free = hits - before.size();
   if (free <= 0) return before;
-  const std::size_t from = at < SMOOTHING_LINES ? 0 : at - SMOOTHING_LINES,
-                    to = std::min(lines.size(), at + SMOOTHING_LINES + 1);
+  const std::size_t near = ImpactOptions().smooth_lines;
+  const std::size_t from = at < near ? 0 : at - near, to = std::min(lines.size(), at + near + 1);
   Eigen::VectorXd squares = Eigen::VectorXd::Zero(before.size());
   for (std::size_t l = from; l < to; ++l) squares += lines[l].residual_squares;
   return before.cwiseMax(squares / static_cast<double>(to - from) / static_cast<double>(free));

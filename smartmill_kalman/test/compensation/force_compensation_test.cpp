@@ -9,6 +9,7 @@
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/modal/modal_filter.h"
+#include "smartmill_core/testing/force_block.h"
 #include "smartmill_core/testing/tap_rig.h"
 #include "smartmill_core/units.h"
 
@@ -21,13 +22,8 @@ constexpr double START = 1.75e9;    // [s]
 
 /// Without its samples. @param start [s] of block 0
 SampleBlock blockAt(double start, std::size_t number) {
-  SampleBlock block;
-  block.first_index = number * BLOCK;
-  block.stamp = start + static_cast<double>(block.first_index) / RATE;
-  block.sample_rate = RATE;
-  block.channels = {"fx", "fy", "fz"};
-  block.units = {"N", "N", "N"};
-  return block;
+  const std::uint64_t index = number * BLOCK;
+  return forceBlock(start + static_cast<double>(index) / RATE, RATE, index);
 }
 
 struct Session {

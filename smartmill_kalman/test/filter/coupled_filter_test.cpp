@@ -11,6 +11,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/modal/modal_filter.h"
 #include "smartmill_core/testing/coverage.h"
+#include "smartmill_core/testing/force_block.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/compensation/force_compensation.h"
@@ -130,12 +131,7 @@ TEST(ForceCompensation, CoupledIsTheCoupledFilter) {
   std::mt19937 random(9);
   std::normal_distribution<double> noise(0.0, 1.0);
   for (int b = 0; b < 20; ++b) {
-    SampleBlock block;
-    block.stamp = 0.01 * b;
-    block.sample_rate = RATE;
-    block.first_index = 256 * b;
-    block.channels = {"fx", "fy", "fz"};
-    block.units = {"N", "N", "N"};
+    SampleBlock block = forceBlock(0.01 * b, RATE, static_cast<std::uint64_t>(256 * b));
     for (int i = 0; i < 256; ++i) {
       const double phase = 4.0 * speed * (256 * b + i) / RATE;
       block.samples.insert(block.samples.end(),

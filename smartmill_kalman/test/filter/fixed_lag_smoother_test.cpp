@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/testing/force_block.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/compensation/force_compensation.h"
 #include "smartmill_kalman_testing/reference_case.h"
@@ -64,7 +65,7 @@ TEST(FixedLagSmoother, OverTheWholeRecordIsTheFixedIntervalOne) {
   for (int i = 0; i < 3000; ++i) measured.push_back(noise(random) + 20.0 * std::cos(4.0 * speed * i / RATE));
   FixedLagSmoother smoother;
   for (const double sample : measured) smoother.step(filter, sample);
-  ASSERT_EQ(filter.restarts(), 0u);
+  ASSERT_EQ(filter.memory().restarts(), 0u);
   const std::vector<double> force = smoother.takeSmoothed(measured.size()), whole = other.smooth(measured);
   ASSERT_EQ(force.size(), whole.size());
   for (std::size_t i = 0; i < force.size(); ++i) ASSERT_NEAR(force[i], whole[i], 1e-8) << i;
@@ -99,12 +100,7 @@ Outcome runOf(const ReferenceRecord& record, double lag) {
   for (std::size_t axis = 0; axis < 3; ++axis) compensation.setSensor(axis, ReferenceCase::exactSensor());
   for (std::size_t at = 0; at + BLOCK <= record.time.size(); at += BLOCK) {
     compensation.handle(SpindleAngle{record.time[at], 0.0, units::radPerSecFromRpm(21750.0)});
-    SampleBlock block;
-    block.stamp = record.time[at];
-    block.sample_rate = RATE;
-    block.first_index = 1000 + at;
-    block.channels = {"fx", "fy", "fz"};
-    block.units = {"N", "N", "N"};
+    SampleBlock block = forceBlock(record.time[at], RATE, 1000 + at);
     for (std::size_t i = at; i < at + BLOCK; ++i)
       block.samples.insert(block.samples.end(), {record.measured[0][i], record.measured[1][i], 0.0});
     compensation.handle(block);
@@ -148,12 +144,7 @@ TEST(FixedLag, AGapPublishesPendingBlocks) {
   for (std::size_t axis = 0; axis < 3; ++axis) compensation.setSensor(axis, ReferenceCase::exactSensor());
   const auto feed = [&](std::uint64_t index) {
     compensation.handle(SpindleAngle{static_cast<double>(index) / RATE, 0.0, reference.spindle_speed});
-    SampleBlock block;
-    block.stamp = static_cast<double>(index) / RATE;
-    block.sample_rate = RATE;
-    block.first_index = index;
-    block.channels = {"fx", "fy", "fz"};
-    block.units = {"N", "N", "N"};
+    SampleBlock block = forceBlock(static_cast<double>(index) / RATE, RATE, index);
     block.samples.assign(3 * 256, 1.0);
     compensation.handle(block);
   };

@@ -192,11 +192,11 @@ TEST(HarmonicFilter, stateGoesToAndFroAndALayoutChangesWithoutAJump) {
   std::mt19937 random(3);
   std::normal_distribution<double> noise(0.0, 10.0);
   for (int i = 0; i < 5000; ++i) filter.step(noise(random) + 100.0 * std::cos(speed * i / RATE));
-  const std::vector<double> state = filter.state();
+  const std::vector<double> state = filter.pairs().state();
   HarmonicFilter other = filter;
   other.reset();
   other.setState(state);
-  const std::vector<double> again = other.state();
+  const std::vector<double> again = other.pairs().state();
   for (std::size_t i = 0; i < state.size(); ++i) EXPECT_NEAR(again[i], state[i], 1e-9);
   // The force right after a change of speed, of the gains or of both is what it was to be.
   const double expected = HarmonicFilter(filter).predict();

@@ -8,6 +8,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/testing/coverage.h"
+#include "smartmill_core/testing/force_block.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/compensation/compensation_pipeline.h"
 #include "smartmill_kalman_testing/reference_case.h"
@@ -121,12 +122,7 @@ TEST(TrackedSpeed, NeedsNoAngles) {
   condition.spindle_speed = units::TWO_PI * 150.0;
   pipeline.push(condition);
   for (std::size_t b = 0; b < 100; ++b) {
-    SampleBlock block;
-    block.stamp = 0.01 * static_cast<double>(b);
-    block.sample_rate = 25600.0;
-    block.first_index = 256 * b;
-    block.channels = {"fx", "fy", "fz"};
-    block.units = {"N", "N", "N"};
+    SampleBlock block = forceBlock(0.01 * static_cast<double>(b), 25600.0, 256 * b);
     for (std::size_t i = 0; i < 256; ++i) {
       const double t = block.stamp + static_cast<double>(i) / 25600.0;
       const double force =

@@ -12,9 +12,9 @@
 #include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/error.h"
-#include "smartmill_core/fit/derivative_check.h"
 #include "smartmill_core/modal/modal_filter.h"
 #include "smartmill_core/testing/coverage.h"
+#include "smartmill_core/testing/derivative_check.h"
 #include "smartmill_core/testing/shared_data.h"
 #include "smartmill_core/units.h"
 

@@ -191,7 +191,7 @@ TEST(SensorMeasurement, CancelsAndRefusesASecondGoal) {
   loop.pipeline.event([](SensorMeasurement& m) { m.hitByHand(); });
   loop.run(0.2);
   EXPECT_NE(std::find(loop.said.begin(), loop.said.end(), "hit the workpiece by hand in x"), loop.said.end());
-  loop.pipeline.event([](SensorMeasurement& m) { m.cancel(); });
+  loop.pipeline.event([](SensorMeasurement& m) { m.end(FrfCode::cancelled, "cancelled"); });
   loop.run(0.2);
   ASSERT_EQ(loop.results.size(), 1u);
   EXPECT_EQ(loop.results[0].code, FrfCode::cancelled);

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "smartmill_core/testing/force_block.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::kalman {
@@ -35,12 +36,7 @@ std::array<std::vector<double>, 2> runCompensation(const ReferenceCase& referenc
     compensation.handle(SpindleAngle{record.time[at],
                                      std::fmod(reference.angleAt(record.time[at]), units::TWO_PI),
                                      reference.speedAt(record.time[at])});
-    SampleBlock block;
-    block.stamp = record.time[at];
-    block.sample_rate = reference.sample_rate;
-    block.first_index = at;
-    block.channels = {"fx", "fy", "fz"};
-    block.units = {"N", "N", "N"};
+    SampleBlock block = forceBlock(record.time[at], reference.sample_rate, at);
     for (std::size_t i = at; i < at + BLOCK; ++i)
       block.samples.insert(block.samples.end(), {record.measured[0][i], record.measured[1][i], 0.0});
     compensation.handle(block);

@@ -3,7 +3,6 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -29,7 +28,7 @@ void printNotes(const Arguments& a, const std::vector<std::string>& notes) {
   for (const std::string& note : notes) std::fprintf(stderr, "%s: %s\n", a.program.c_str(), note.c_str());
 }
 
-void run(const Arguments& a) {
+void runCampaign(const Arguments& a) {
   const Campaign campaign = readCampaign(a.campaign);
   const MachineModel model = readMachineModel(a.model.empty() ? campaign.modelPath() : a.model);
   const Spindle& spindle = model.needSpindle("calibrate the load meter");
@@ -102,14 +101,22 @@ void runMotors(const Arguments& arguments) {
   if (!arguments.output.empty()) writeMotorCalibration(c, arguments.output);
 }
 
+void run(const Arguments& a) {
+  if (a.campaign.empty() && a.standard.empty())
+    throw UsageError("CAMPAIGN, or --standard-cuts and --currents, is required");
+  if (!a.standard.empty()) {
+    runMotors(a);
+  } else {
+    runCampaign(a);
+  }
+}
+
 }  // namespace
 
 namespace smartmill::loadmeter {
 
 Command calibrateCommand() {
-  Command command;
-  command.name = command.tool = "calibrate";
-  command.summary = "calibrates friction, load meter and motor currents of a machine";
+  Command command("calibrate", "calibrates friction, load meter and motor currents of a machine");
   command.description =
       "Friction, load-meter constant and bandwidth of a machine from a campaign's air cuts and from cuts "
       "whose "
@@ -118,37 +125,26 @@ Command calibrateCommand() {
                       {"--standard-cuts cuts.csv --currents machine.csv -o motors.yaml",
                        "drives and spindle from motor currents"}};
   command.files = {{"OUT", "motor calibration, for the node's parameter motor_calibration"}};
-  command.declare = [](CommandLine& line) -> std::function<int()> {
-    const auto a = std::make_shared<Arguments>();
-    a->program = line.program();
-    const auto campaign = line.option("CAMPAIGN", a->campaign, "campaign folder");
-    const auto cuts = line.option("--standard-cuts", a->standard,
+  command.setBody(run, [](CommandLine& line, Arguments& a) {
+    a.program = line.program();
+    const auto campaign = line.option("CAMPAIGN", a.campaign, "campaign folder");
+    const auto cuts = line.option("--standard-cuts", a.standard,
                                   "CSV of standard cuts whose forces a remote dynamometer recorded: "
                                   "cut,force_x[N],force_y[N],force_z[N],torque[N m]");
     const auto own =
-        line.option("--currents", a->currents,
+        line.option("--currents", a.currents,
                     "CSV of this machine's current ranges in the same cuts and in air: "
                     "cut,spindle_speed[rpm],current_x[A],air_x[A],..,current_spindle[A],air_spindle[A]");
     cuts.needs(own).excludes(campaign);
     own.needs(cuts);
-    line.option("--base-speed", a->base_speed,
+    line.option("--base-speed", a.base_speed,
                 "base speed of the spindle motor [rpm] (default: all cuts are below it)")
         .positive()
         .needs(cuts);
-    line.option("-o,--output", a->output, "motor calibration for the node (parameter motor_calibration)")
+    line.option("-o,--output", a.output, "motor calibration for the node (parameter motor_calibration)")
         .needs(cuts);
-    line.option("--model", a->model, "model file (default: the campaign's)");
-    return [a] {
-      if (a->campaign.empty() && a->standard.empty())
-        throw UsageError("CAMPAIGN, or --standard-cuts and --currents, is required");
-      if (!a->standard.empty()) {
-        runMotors(*a);
-      } else {
-        run(*a);
-      }
-      return 0;
-    };
-  };
+    line.option("--model", a.model, "model file (default: the campaign's)");
+  });
   return command;
 }
 

@@ -2,7 +2,6 @@
 
 #include <cstdio>
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -115,50 +114,40 @@ void run(const CoefficientOptions& o) {
   }
 }
 
-std::function<int()> declare(CommandLine& line) {
-  const auto o = std::make_shared<CoefficientOptions>();
-  o->program = line.program();
-  line.option("SOURCE", o->source_path, "campaign folder, or a bag").required();
-  line.option("--source", o->source, "what to use (default: force of a campaign, load_meter of a bag)")
+void addOptions(CommandLine& line, CoefficientOptions& o) {
+  o.program = line.program();
+  line.option("SOURCE", o.source_path, "campaign folder, or a bag").required();
+  line.option("--source", o.source, "what to use (default: force of a campaign, load_meter of a bag)")
       .oneOf({"force", "load_meter"});
-  line.option("--model", o->model, "model file (default: the campaign's); its cutting section is not used");
-  line.option("--means", o->means, "force: means of all samples in cut, or over whole revolutions")
+  line.option("--model", o.model, "model file (default: the campaign's); its cutting section is not used");
+  line.option("--means", o.means, "force: means of all samples in cut, or over whole revolutions")
       .showDefault()
       .oneOf({"all", "revolutions"});
-  line.flag("--spindle-uncertainty", o->spindle_uncertainty,
+  line.flag("--spindle-uncertainty", o.spindle_uncertainty,
             "load_meter of a campaign: the model's stated uncertainty of the spindle also applies to "
             "load_meter_v_per_w and the bandwidth (default: both exact)");
-  line.option("--depth-uncertainty", o->depth_percent,
+  line.option("--depth-uncertainty", o.depth_percent,
               "[%] load_meter of a campaign: standard deviation of the axial depth, common to all cuts")
       .within(0.0, 100.0);
-  line.option("--runout-uncertainty", o->runout_um,
+  line.option("--runout-uncertainty", o.runout_um,
               "[um] load_meter of a campaign: standard deviation of the cutter axis' offset")
       .within(0.0, 100.0);
-  line.flag("--forces", o->forces,
+  line.flag("--forces", o.forces,
             "bag: prints the force of each cut from all its measurements (force/estimate)");
-  line.flag("--plain-friction", o->plain_friction,
+  line.flag("--plain-friction", o.plain_friction,
             "load_meter of a campaign: Coulomb and viscous friction only, no terms added by evidence");
-  line.option("--database", o->database, "SQLite file of the machine to which the result is added");
-  line.option("--tool", o->tool, "name of the tool, for the database");
-  line.option("--material", o->material, "workpiece material, for the database");
-  line.option("--rake", o->rake, "[deg] normal rake of the tool, for the database");
-  line.option("-o,--output", o->output, "file for the coefficients, as a model file's cutting section");
-  const auto table = std::make_shared<ParameterTable>(tableOf(o->parameters));
-  const auto parameters =
-      std::make_shared<ParameterOptions>(line, *table, "launch/config/loadmeter.yaml, for a bag");
-  return [o, table, parameters] {
-    parameters->apply();
-    run(*o);
-    return 0;
-  };
+  line.option("--database", o.database, "SQLite file of the machine to which the result is added");
+  line.option("--tool", o.tool, "name of the tool, for the database");
+  line.option("--material", o.material, "workpiece material, for the database");
+  line.option("--rake", o.rake, "[deg] normal rake of the tool, for the database");
+  line.option("-o,--output", o.output, "file for the coefficients, as a model file's cutting section");
+  const ParameterOptions parameters(line, tableOf(o.parameters), "launch/config/loadmeter.yaml, for a bag");
 }
 
 }  // namespace
 
 Command coefficientsCommand() {
-  Command command;
-  command.name = command.tool = "coefficients";
-  command.summary = "identifies cutting coefficients from forces or the load meter";
+  Command command("coefficients", "identifies cutting coefficients from forces or the load meter");
   command.description =
       "Cutting coefficients with standard deviations, from the force records or the load meter of a campaign "
       "(a folder with campaign.yaml) or from the load meter in a recorded bag.";
@@ -170,7 +159,7 @@ Command coefficientsCommand() {
   command.files = {{"OUTPUT", "section cutting of a model file"},
                    {"DATABASE", "SQLite file, see smartmill-database(1)"},
                    {"launch/config/loadmeter.yaml", "the node's parameters, for --params"}};
-  command.declare = declare;
+  command.setBody(run, addOptions);
   return command;
 }
 

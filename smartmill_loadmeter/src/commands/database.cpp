@@ -2,7 +2,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <functional>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -20,20 +19,6 @@ namespace smartmill::loadmeter {
 
 void requireExists(const std::string& file) {
   if (!isServerUrl(file) && !std::filesystem::exists(file)) throw Error(file + ": cannot be read");
-}
-
-CommandOptions DatabaseCommands::add(const std::string& name, const std::string& help, Body run) {
-  commands_.emplace_back(line_.command(name, help), run);
-  return commands_.back().first;
-}
-
-std::function<int()> DatabaseCommands::body() const {
-  options_->program = line_.program();
-  return [options = options_, commands = commands_] {
-    for (const auto& [command, run] : commands)
-      if (command.parsed()) run(*options);
-    return 0;
-  };
 }
 
 namespace {
@@ -152,6 +137,7 @@ void pairOptions(const CommandOptions& command, DatabaseOptions& o) {
 std::function<int()> declare(CommandLine& line) {
   DatabaseCommands commands(line);
   DatabaseOptions& o = commands.options();
+  o.program = line.program();
   line.option("DATABASE", o.file,
               "SQLite file of the machine; or a fleet's server, postgresql://USER@HOST/DATABASE")
       .required();
@@ -192,10 +178,8 @@ std::function<int()> declare(CommandLine& line) {
 }  // namespace
 
 Command databaseCommand() {
-  Command command;
-  command.name = "database";
+  Command command("database", "queries and exchanges a machine's database of cutting coefficients");
   command.tool = "coefficients_db";
-  command.summary = "queries and exchanges a machine's database of cutting coefficients";
   command.description = "The database of cutting coefficients that a machine has identified.";
   command.examples = {
       {"machine.sqlite list", "every identification, oldest first"},

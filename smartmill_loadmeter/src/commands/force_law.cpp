@@ -2,7 +2,6 @@
 
 #include <cstdio>
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -189,10 +188,7 @@ void run(const Options& o) {
 namespace smartmill::loadmeter {
 
 Command forceLawCommand() {
-  Command command;
-  command.name = "force-law";
-  command.tool = "force_law";
-  command.summary = "compares force laws on a campaign's force records";
+  Command command("force-law", "compares force laws on a campaign's force records");
   command.description =
       "Compares force laws on the force records of a campaign: linear, shifted linear or power over chip "
       "thickness, size effect, runout.";
@@ -201,34 +197,26 @@ Command forceLawCommand() {
       {"campaigns/none --curve force.yaml", "a spline for `lobes --force-curve`, with a picture"}};
   command.files = {{"CURVE", "YAML of force over chip thickness; a picture of the same name with .png"},
                    {"launch/config/loadmeter.yaml", "the node's parameters, for --params"}};
-  command.declare = [](CommandLine& line) -> std::function<int()> {
-    const auto o = std::make_shared<Options>();
+  command.setBody(run, [](CommandLine& line, Options& o) {
     line.option(
-            "SOURCE", o->campaign,
+            "SOURCE", o.campaign,
             "campaign folder, or a bag with force/compensated and spindle/angle (--curve: as loadmeter_node "
             "identifies it)")
         .required();
     line.option(
-        "--curve", o->curve,
+        "--curve", o.curve,
         "YAML of force over chip thickness as monotone splines with standard deviations, for any number "
         "of teeth in cut (`lobes --force-curve` reads it); a picture of the same name with .png");
-    line.option("--compensated", o->compensated,
+    line.option("--compensated", o.compensated,
                 "folder that `compensate CAMPAIGN -o` wrote: source of fx and fy (without the sensor's own "
                 "modes)");
-    line.option("--pieces", o->pieces,
+    line.option("--pieces", o.pieces,
                 "segments of a spline (default: 8, of a bag the parameter curve_pieces)")
         .within(2, 30);
-    line.option("--tool", o->tool, "bag with several tools: name of the tool");
-    line.option("--material", o->material, "bag with several materials: name of the material");
-    const auto table = std::make_shared<ParameterTable>(tableOf(o->parameters));
-    const auto parameters =
-        std::make_shared<ParameterOptions>(line, *table, "launch/config/loadmeter.yaml, for a bag");
-    return [o, table, parameters] {
-      parameters->apply();
-      run(*o);
-      return 0;
-    };
-  };
+    line.option("--tool", o.tool, "bag with several tools: name of the tool");
+    line.option("--material", o.material, "bag with several materials: name of the material");
+    const ParameterOptions parameters(line, tableOf(o.parameters), "launch/config/loadmeter.yaml, for a bag");
+  });
   return command;
 }
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -103,10 +102,7 @@ void run(const Options& o) {
 namespace smartmill::loadmeter {
 
 Command planCutsCommand() {
-  Command command;
-  command.name = "plan-cuts";
-  command.tool = "plan_cuts";
-  command.summary = "plans the fewest test cuts for given standard deviations of Ktc and Kte";
+  Command command("plan-cuts", "plans the fewest test cuts for given standard deviations of Ktc and Kte");
   command.description =
       "The fewest test cuts that reach given standard deviations of Ktc and Kte within the limits.";
   command.examples = {
@@ -114,27 +110,24 @@ Command planCutsCommand() {
        "--kte-std 1",
        "chooses among twelve cuts"}};
   command.files = {{"STABLE", "CSV speed_rpm,axial_depth_mm with increasing speeds"}};
-  command.declare = [](CommandLine& line) -> std::function<int()> {
-    const auto o = std::make_shared<Options>();
-    line.option("MODEL", o->model, "model file: tool, spindle, and cutting unless --ktc and --kte")
-        .required();
-    line.option("--speeds", o->speeds, "[rpm] to choose among").required().count(1, 100);
-    line.option("--feeds", o->feeds, "[mm] per tooth to choose among").required().count(3, 100);
-    line.option("--depths", o->depths, "[mm] axial, to choose among").required().count(1, 100);
-    line.option("--entry", o->entry, "[deg] entry angle").showDefault();
-    line.option("--exit", o->exit, "[deg] exit angle").showDefault();
-    line.option("--ktc-std", o->ktc_std, "[N/mm2] standard deviation to reach").required().positive();
-    line.option("--kte-std", o->kte_std, "[N/mm] standard deviation to reach").required().positive();
-    line.option("--ktc", o->ktc, "[N/mm2] expected (default: the model's)");
-    line.option("--kte", o->kte, "[N/mm] expected (default: the model's)");
-    line.option("--voltage-std", o->voltage_std, "[V] standard deviation of a cut's mean reading")
+  command.setBody(run, [](CommandLine& line, Options& o) {
+    line.option("MODEL", o.model, "model file: tool, spindle, and cutting unless --ktc and --kte").required();
+    line.option("--speeds", o.speeds, "[rpm] to choose among").required().count(1, 100);
+    line.option("--feeds", o.feeds, "[mm] per tooth to choose among").required().count(3, 100);
+    line.option("--depths", o.depths, "[mm] axial, to choose among").required().count(1, 100);
+    line.option("--entry", o.entry, "[deg] entry angle").showDefault();
+    line.option("--exit", o.exit, "[deg] exit angle").showDefault();
+    line.option("--ktc-std", o.ktc_std, "[N/mm2] standard deviation to reach").required().positive();
+    line.option("--kte-std", o.kte_std, "[N/mm] standard deviation to reach").required().positive();
+    line.option("--ktc", o.ktc, "[N/mm2] expected (default: the model's)");
+    line.option("--kte", o.kte, "[N/mm] expected (default: the model's)");
+    line.option("--voltage-std", o.voltage_std, "[V] standard deviation of a cut's mean reading")
         .showDefault();
-    line.option("--torque", o->torque, "[Nm] limit of the mean torque (default: the model's rated torque)");
-    line.option("--power", o->power, "[W] limit of the mean power (default: the model's rated power)");
-    line.option("--stable", o->limits, "CSV speed_rpm,axial_depth_mm: largest stable depth");
-    line.option("--most", o->max_cuts, "largest number of cuts").showDefault();
-    return commandBody(o, run);
-  };
+    line.option("--torque", o.torque, "[Nm] limit of the mean torque (default: the model's rated torque)");
+    line.option("--power", o.power, "[W] limit of the mean power (default: the model's rated power)");
+    line.option("--stable", o.limits, "CSV speed_rpm,axial_depth_mm: largest stable depth");
+    line.option("--most", o.max_cuts, "largest number of cuts").showDefault();
+  });
   return command;
 }
 

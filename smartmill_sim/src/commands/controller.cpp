@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <cstdio>
 #include <map>
-#include <memory>
 #include <string>
 #include <thread>
 #include <vector>
@@ -73,9 +72,7 @@ void run(const Arguments& a) {
 namespace smartmill::sim {
 
 Command controllerCommand() {
-  Command command;
-  command.name = command.tool = "controller";
-  command.summary = "runs the simulated Fanuc controller until Ctrl-C";
+  Command command("controller", "runs the simulated Fanuc controller until Ctrl-C");
   command.description =
       "Simulated Fanuc controller of a three-axis mill: FOCAS2 over Ethernet, in wall-clock time, until "
       "Ctrl-C.\n"
@@ -87,21 +84,19 @@ Command controllerCommand() {
                       {"--port 0 --model mill.yaml", "any free port; axes and spindle of a model"}};
   command.files = {{"MODEL", "machine model file: its sections axes and spindle"}};
   command.exits = {{0, "stopped by Ctrl-C or SIGTERM"}};
-  command.declare = [](CommandLine& line) -> std::function<int()> {
-    const auto a = std::make_shared<Arguments>();
+  command.setBody(run, [](CommandLine& line, Arguments& a) {
     std::vector<std::string> modes;
     for (const auto& [name, code] : MODES) modes.push_back(name);
-    line.option("--port", a->server.port, "TCP port, 0: any free one").showDefault();
-    line.option("--bind", a->server.bind_address, "address to listen on").showDefault();
-    line.option("--mode", a->mode,
+    line.option("--port", a.server.port, "TCP port, 0: any free one").showDefault();
+    line.option("--bind", a.server.bind_address, "address to listen on").showDefault();
+    line.option("--mode", a.mode,
                 "mode at the panel: mdi, mem, edit, handle, jog, inc, reference, dnc (the one that runs "
                 "programs)")
         .oneOf(modes)
         .showDefault();
-    line.option("--type", a->type, "control type that it reports").oneOf({"30", "31"}).showDefault();
-    line.option("--model", a->model, "machine model file: its sections axes and spindle");
-    return commandBody(a, run);
-  };
+    line.option("--type", a.type, "control type that it reports").oneOf({"30", "31"}).showDefault();
+    line.option("--model", a.model, "machine model file: its sections axes and spindle");
+  });
   return command;
 }
 

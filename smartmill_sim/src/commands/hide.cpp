@@ -1,7 +1,6 @@
 #include "smartmill_sim/commands.h"
 
 #include <algorithm>
-#include <memory>
 #include <random>
 #include <string>
 #include <vector>
@@ -60,9 +59,7 @@ void run(const Arguments& a) {
 namespace smartmill::sim {
 
 Command hideCommand() {
-  Command command;
-  command.name = command.tool = "hide";
-  command.summary = "draws a machine with an effect that its model lacks";
+  Command command("hide", "draws a machine with an effect that its model lacks");
   command.description =
       "Draws a machine that differs from its model: cutting coefficients within their stated uncertainty, "
       "and "
@@ -70,14 +67,12 @@ Command hideCommand() {
   command.examples = {{"mill.yaml -o hidden.yaml --seed 7", "draws the effect as well"},
                       {"mill.yaml -o hidden.yaml --effect runout", "draws the size of a given effect"}};
   command.files = {{"OUT", "model file of the machine, with the effect in its section effects"}};
-  command.declare = [](CommandLine& line) -> std::function<int()> {
-    const auto a = std::make_shared<Arguments>();
-    line.option("MODEL", a->model, "model file of the machine as assumed").required();
-    line.option("-o,--out", a->out, "model file of the actual machine").required();
-    line.option("--effect", a->effect, "name of the effect (default: drawn)");
-    line.option("--seed", a->seed, "seed of the draw").showDefault();
-    return commandBody(a, run);
-  };
+  command.setBody(run, [](CommandLine& line, Arguments& a) {
+    line.option("MODEL", a.model, "model file of the machine as assumed").required();
+    line.option("-o,--out", a.out, "model file of the actual machine").required();
+    line.option("--effect", a.effect, "name of the effect (default: drawn)");
+    line.option("--seed", a.seed, "seed of the draw").showDefault();
+  });
   return command;
 }
 

@@ -4,7 +4,6 @@
 #include <cstdio>
 #include <ctime>
 #include <filesystem>
-#include <memory>
 #include <string>
 
 #include "smartmill_core/campaign/campaign.h"
@@ -63,27 +62,21 @@ void run(const Arguments& a) {
 namespace smartmill::sim {
 
 Command simulateCommand() {
-  Command command;
-  command.name = command.tool = "simulate";
-  command.summary = "simulates a campaign from a machine model and the campaign's plan";
+  Command command("simulate", "simulates a campaign from a machine model and the campaign's plan");
   command.description = "Simulates a campaign from a machine model and the campaign's plan.";
   command.examples = {{"mill.yaml campaigns/runout -o simulated", "the campaign as recorded on this machine"},
                       {"mill.yaml campaigns/runout -o exact --noise off", "without noise and rounding"}};
   command.files = {{"OUT/campaign.yaml", "the plan of the new campaign"},
                    {"OUT/model.yaml", "the machine model"},
                    {"OUT/*.csv", "the records, at the paths of the original ones"}};
-  command.declare = [](CommandLine& line) -> std::function<int()> {
-    const auto a = std::make_shared<Arguments>();
-    line.option("MODEL", a->model, "machine model file").required();
-    line.option("CAMPAIGN", a->campaign, "campaign folder: plan, sample times, spindle phase, hammer forces")
+  command.setBody(run, [](CommandLine& line, Arguments& a) {
+    line.option("MODEL", a.model, "machine model file").required();
+    line.option("CAMPAIGN", a.campaign, "campaign folder: plan, sample times, spindle phase, hammer forces")
         .required();
-    line.option("-o,--out", a->out, "folder of the new campaign").required();
-    line.option("--noise", a->noise, "on; off: neither noise nor rounding")
-        .oneOf({"on", "off"})
-        .showDefault();
-    line.option("--seed", a->options.seed, "seed of the noise").showDefault();
-    return commandBody(a, run);
-  };
+    line.option("-o,--out", a.out, "folder of the new campaign").required();
+    line.option("--noise", a.noise, "on; off: neither noise nor rounding").oneOf({"on", "off"}).showDefault();
+    line.option("--seed", a.options.seed, "seed of the noise").showDefault();
+  });
   return command;
 }
 

@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <cstdio>
-#include <memory>
 #include <string>
 
 #include "recordings/bag_charts.h"
@@ -119,9 +118,7 @@ void run(const Options& o) {
 namespace smartmill::stability {
 
 Command chartCommand() {
-  Command command;
-  command.name = command.tool = "chart";
-  command.summary = "computes the stability chart of a recorded session";
+  Command command("chart", "computes the stability chart of a recorded session");
   command.description =
       "Stability chart and chatter verdicts of a recorded bag, as computed by stability_node.";
   command.examples = {
@@ -132,25 +129,17 @@ Command chartCommand() {
        "CSV rpm,limit_mm,chatter_hz,torque_limit_mm,power_limit_mm; a picture of the same name with "
        ".png"},
       {"launch/config/stability.yaml", "the node's parameters, for --params"}};
-  command.declare = [](CommandLine& line) -> std::function<int()> {
-    const auto o = std::make_shared<Options>();
-    line.option("BAG", o->bag, "recording with tool/frf, material/coefficients and cuts").required();
-    line.option("--model", o->model,
-                "machine model file: tool and spindle limits (default: parameter model)");
-    line.option("-o,--out", o->output, "CSV of the chart; a picture of the same name with .png");
+  command.setBody(run, [](CommandLine& line, Options& o) {
+    line.option("BAG", o.bag, "recording with tool/frf, material/coefficients and cuts").required();
+    line.option("--model", o.model, "machine model file: tool and spindle limits (default: parameter model)");
+    line.option("-o,--out", o.output, "CSV of the chart; a picture of the same name with .png");
     line.option(
-        "--bistable", o->bistable,
+        "--bistable", o.bistable,
         "CSV of the limits of small and large vibrations for the force curve; a picture of the same name "
         "with .png");
-    line.option("--states", o->states, "CSV of the chatter verdicts");
-    const auto table = std::make_shared<ParameterTable>(tableOf(o->parameters));
-    const auto parameters = std::make_shared<ParameterOptions>(line, *table, "launch/config/stability.yaml");
-    return [o, table, parameters] {
-      parameters->apply();
-      run(*o);
-      return 0;
-    };
-  };
+    line.option("--states", o.states, "CSV of the chatter verdicts");
+    const ParameterOptions parameters(line, tableOf(o.parameters), "launch/config/stability.yaml");
+  });
   return command;
 }
 

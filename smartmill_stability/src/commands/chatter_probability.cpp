@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <cstdio>
-#include <memory>
 #include <string>
 
 #include "smartmill_core/error.h"
@@ -70,10 +69,7 @@ void run(const Request& request) {
 namespace smartmill::stability {
 
 Command chatterProbabilityCommand() {
-  Command command;
-  command.name = "chatter-probability";
-  command.tool = "chatter_probability";
-  command.summary = "computes the probability of chatter over speed and depth";
+  Command command("chatter-probability", "computes the probability of chatter over speed and depth");
   command.description =
       "Probability of chatter over speed and depth, from the standard deviations of a machine model.";
   command.examples = {
@@ -82,19 +78,17 @@ Command chatterProbabilityCommand() {
        "a map, and robust points at a risk of 5 %"}};
   command.files = {
       {"OUT", "CSV rpm,depth_mm,probability,nominal_limit_mm; a picture of the same name with .png"}};
-  command.declare = [](CommandLine& line) -> std::function<int()> {
-    const auto request = std::make_shared<Request>();
-    request->addTo(line, "LO:HI:N");
-    line.option("--depths-mm", request->depths, "LO:HI:N [mm]").required();
-    line.option("--draws", request->draws, "number of drawn machines").showDefault();
-    line.option("--seed", request->seed, "seed of the draws").showDefault();
-    line.option("--risk", request->risk, "largest probability of chatter of robust points").showDefault();
-    line.option("--speed-margin", request->speed_margin, "relative error of the speed on both sides")
+  command.setBody(run, [](CommandLine& line, Request& request) {
+    request.addTo(line, "LO:HI:N");
+    line.option("--depths-mm", request.depths, "LO:HI:N [mm]").required();
+    line.option("--draws", request.draws, "number of drawn machines").showDefault();
+    line.option("--seed", request.seed, "seed of the draws").showDefault();
+    line.option("--risk", request.risk, "largest probability of chatter of robust points").showDefault();
+    line.option("--speed-margin", request.speed_margin, "relative error of the speed on both sides")
         .showDefault();
-    line.option("--points", request->points, "largest number of robust points").showDefault();
-    request->addOutTo(line);
-    return commandBody(request, run);
-  };
+    line.option("--points", request.points, "largest number of robust points").showDefault();
+    request.addOutTo(line);
+  });
   return command;
 }
 

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -90,9 +89,7 @@ void run(const RecordingOptions& given) {
 namespace smartmill::stability {
 
 Command detectCommand() {
-  Command command;
-  command.name = command.tool = "detect";
-  command.summary = "detects chatter in a recorded cut (sound, vibration, force)";
+  Command command("detect", "detects chatter in a recorded cut (sound, vibration, force)");
   command.description =
       "Detects chatter in a recording of a cut (sound, vibration, displacement or force; WAV, FLAC, CSV or "
       "bag), "
@@ -102,25 +99,23 @@ Command detectCommand() {
                        "two columns; chatter must lie near a mode of the model"}};
   command.files = {{"FILE", "the recording: WAV, FLAC, AIFF, CSV with a column time[s], or a bag"},
                    {"NAME_spectrogram.png", "spectrogram, unless -o sets another name"}};
-  command.declare = [](CommandLine& line) -> std::function<int()> {
-    const auto o = std::make_shared<RecordingOptions>();
-    line.option("FILE", o->file, "the recording").required();
-    line.option("--speed", o->rpm, "spindle speed of the cut [rpm]").required().positive();
-    line.option("--teeth", o->teeth, "teeth of the tool").required();
-    line.option("--speed-error", o->speed_error, "largest error of the speed [percent]").showDefault();
-    line.option("--model", o->model, "machine model file; chatter must lie near a mode of its tool_tip");
-    line.option("--channels", o->channels,
+  command.setBody(run, [](CommandLine& line, RecordingOptions& o) {
+    line.option("FILE", o.file, "the recording").required();
+    line.option("--speed", o.rpm, "spindle speed of the cut [rpm]").required().positive();
+    line.option("--teeth", o.teeth, "teeth of the tool").required();
+    line.option("--speed-error", o.speed_error, "largest error of the speed [percent]").showDefault();
+    line.option("--model", o.model, "machine model file; chatter must lie near a mode of its tool_tip");
+    line.option("--channels", o.channels,
                 "channel numbers of a sound file, or columns of a CSV file (default: all)")
         .commas();
     line.option(
-        "--topic", o->topic,
+        "--topic", o.topic,
         "topic of a bag (default: the first available of daq/sound, daq/vibration, force/compensated, "
         "daq/dynamometer)");
-    line.option("--from", o->from, "start of the part to use [s]").notNegative();
-    line.option("--to", o->to, "end of the part to use [s]");
-    line.option("-o,--out", o->picture, "picture of the spectrogram (default: NAME_spectrogram.png)");
-    return commandBody(o, run);
-  };
+    line.option("--from", o.from, "start of the part to use [s]").notNegative();
+    line.option("--to", o.to, "end of the part to use [s]");
+    line.option("-o,--out", o.picture, "picture of the spectrogram (default: NAME_spectrogram.png)");
+  });
   return command;
 }
 

@@ -4,7 +4,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -199,9 +198,7 @@ void run(const Request& request) {
 namespace smartmill::stability {
 
 Command lobesCommand() {
-  Command command;
-  command.name = command.tool = "lobes";
-  command.summary = "computes stability lobes of a machine model";
+  Command command("lobes", "computes stability lobes of a machine model");
   command.description =
       "Stability lobes of a machine model: the first loss of stability with growing depth, over spindle "
       "speed.";
@@ -213,30 +210,28 @@ Command lobesCommand() {
        "down-milling; in addition the whole boundary with its islands"}};
   command.files = {{"OUT", "CSV rpm,limit_mm,chatter_hz,kind; a picture of the same name with .png"},
                    {"BOUNDARY", "CSV curve,rpm,depth_mm,chatter_hz,kind"}};
-  command.declare = [](CommandLine& line) -> std::function<int()> {
-    const auto request = std::make_shared<Request>();
-    request->addTo(line, "LO:HI:N");
-    line.option("--method", request->method,
+  command.setBody(run, [](CommandLine& line, Request& request) {
+    request.addTo(line, "LO:HI:N");
+    line.option("--method", request.method,
                 "solver: collocation, semi_discretization, multi_frequency, zero_order")
         .showDefault();
-    line.option("--max-depth-mm", request->max_depth_mm, "largest depth [mm]").required();
-    request->addOutTo(line);
-    line.option("--boundary", request->boundary,
+    line.option("--max-depth-mm", request.max_depth_mm, "largest depth [mm]").required();
+    request.addOutTo(line);
+    line.option("--boundary", request.boundary,
                 "CSV of the whole boundary with its islands, in addition to the first loss; a picture of the "
                 "same name with .png");
-    line.option("--feed-mm", request->feed_mm,
+    line.option("--feed-mm", request.feed_mm,
                 "feed per tooth [mm]: takes the contact of the teeth in the forced vibration into account "
                 "(uneven pitch, serration); without it every tooth cuts along its whole arc");
-    line.option("--serration-mm", request->serration,
+    line.option("--serration-mm", request.serration,
                 "AMPLITUDE:WAVELENGTH [mm] of a serrated edge, evenly shifted from tooth to tooth; requires "
                 "--feed-mm");
     line.option(
-        "--force-curve", request->force_curve,
+        "--force-curve", request.force_curve,
         "force curve (written by `force-law --curve`) instead of the coefficients of the model: limits of "
         "small and large vibrations; requires --feed-mm");
-    line.flag("--errors", request->errors, "estimate the error of each limit from a refined solution");
-    return commandBody(request, run);
-  };
+    line.flag("--errors", request.errors, "estimate the error of each limit from a refined solution");
+  });
   return command;
 }
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "smartmill_cnc/motion/nc_program.h"
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 #include "smartmill_hammer/sequence/hammer_sequence.h"
@@ -233,10 +234,7 @@ class Driver {
     } else if (command.kind == Kind::orient) {
       start(cnc::orientProgram(command.angle, 1133));
     } else if (command.kind == Kind::jog) {
-      start(cnc::jogProgram(command.axis == "x"   ? 0
-                            : command.axis == "y" ? 1
-                                                  : 2,
-                            command.distance, command.feed, 4));
+      start(cnc::jogProgram(static_cast<int>(*axisIndex(command.axis)), command.distance, command.feed, 4));
     } else {
       start(hammer::moveProgram(command.from, command.path));
     }

@@ -32,6 +32,11 @@ std::size_t distance(const std::string& a, const std::string& b) {
 
 }  // namespace
 
+Command::Command(const std::string& command, const std::string& what)
+    : name(command), tool(command), summary(what) {
+  std::replace(tool.begin(), tool.end(), '-', '_');
+}
+
 std::vector<ExitCode> exitCodes(const Command& command) {
   std::vector<ExitCode> codes{{0, "done"},
                               {1, "error, reported in one line on standard error"},

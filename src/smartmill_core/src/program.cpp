@@ -183,6 +183,10 @@ CommandEntry CommandLine::entry() const {
   return entryOf(*root_, *allowed_);
 }
 
+void CommandLine::runAfterParsing() const {
+  for (const auto& action : after_parsing_) action();
+}
+
 CommandLine::Stop CommandLine::parse(int argc, const char* const* argv) {
   if (program_.empty()) program_ = argc > 0 ? std::filesystem::path(argv[0]).filename().string() : "program";
   root_->name(program_);
@@ -202,6 +206,7 @@ CommandLine::Stop CommandLine::parse(int argc, const char* const* argv) {
 int runProgram(CommandLine& line, int argc, const char* const* argv, const std::function<int()>& run) {
   if (const CommandLine::Stop parsed = line.parse(argc, argv); parsed.stop) return parsed.code;
   try {
+    line.runAfterParsing();
     return run();
   } catch (const std::exception& e) {
     std::fprintf(stderr, "%s: %s\n", line.program().c_str(), e.what());

@@ -11,7 +11,13 @@ namespace smartmill::hammer {
 /// stated standard deviations.
 struct HealthAllowance {
   double frequency = 0.002, damping = 0.05, gain = 0.03, friction = 0.05, unbalance = 0.1;
+  double same_mode = 0.05;   ///< [1] of frequency, within which two modes are the same
+  double least_gain = 0.05;  ///< [1] of the largest gain, from which a new or missing mode counts
 };
+
+/// [1] Standard deviations of a drift: by chance alone some dozens of quantities exceed it once in a thousand
+/// comparisons.
+constexpr double DRIFT_DEVIATIONS = 4.0;
 
 /// A quantity at two times.
 struct HealthChange {

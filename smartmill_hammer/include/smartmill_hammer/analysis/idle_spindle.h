@@ -35,13 +35,30 @@ struct AirCutRecord {
   std::vector<AirCutLoad> loads;
 };
 
+/// How air cuts are evaluated.
+struct IdleSpindleOptions {
+  double steady_speed =
+      0.005;                  ///< [1] change of speed that ends a segment; a controlled spindle keeps within
+  double least_speed = 10.0;  ///< [rad/s] below it the spindle counts as stopped
+  double longest_segment = 10.0;   ///< [s] so that a long air cut shows its scatter
+  std::size_t sections = 8;        ///< of a segment; their scatter gives the standard deviation
+  double least_revolutions = 3.0;  ///< of a section, to separate the synchronous part
+  double load_settle = 0.3;        ///< [s] of a load meter after a change
+  std::size_t least_loads = 4;     ///< samples of a mean with a standard deviation
+  double least_load_std = 1e-5;    ///< [1] of full scale: resolution of a meter
+  double same_speed = 0.01;        ///< [1] of speed: segments that are compared with each other
+  double least_speed_ratio = 1.2;  ///< [1] closer speeds do not separate Coulomb and viscous friction
+  double gain_error = 0.002;  ///< [1] of a force, not contained in its scatter: error of the sensor's gain
+};
+
 /// Evaluates air cuts (condition AIR) from streams in stamp order: force, angle, load meter. A segment ends
 /// when the speed changes by 0.5 %, and after ten seconds.
 class IdleSpindle {
  public:
   /// Called with the tool's name at the end of an air cut with at least one complete segment.
   using RecordCallback = std::function<void(const std::string& tool, const AirCutRecord& record)>;
-  explicit IdleSpindle(RecordCallback on_record = {}) : on_record_(std::move(on_record)) {}
+  explicit IdleSpindle(RecordCallback on_record = {}, const IdleSpindleOptions& options = {})
+      : on_record_(std::move(on_record)), options_(options) {}
 
   void handle(const CuttingCondition& condition);
   void handle(const SpindleAngle& angle);
@@ -72,6 +89,7 @@ class IdleSpindle {
   void closeLoadSegment();
 
   RecordCallback on_record_;
+  IdleSpindleOptions options_;
   std::optional<CuttingCondition> condition_;
   std::optional<SpindleAngle> angle_;
   std::optional<ForceSegment> force_segment_;

@@ -72,6 +72,9 @@ struct TapFrfOptions {
   HitCheckOptions check;
   double exponential_time = 0.0;  ///< [s] window on both channels; 0: none
   FrfAverage average = FrfAverage::h1;
+  /// [1] A record is truncated when its end exceeds this share of its beginning, which changes the gains by
+  /// as much, and this multiple of the noise.
+  double ringing_share = 0.02, clear_of_noise = 2.0;
 };
 
 /// Average of several hits of one point.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -39,6 +40,33 @@ struct HolderPrior {
   double height = 0.0;  ///< [m] standard deviation of an error common to all heights above the tip
 };
 
+/// How the beam is fitted, and how far it is trusted.
+struct TipFitOptions {
+  // Model error of the beam; the study hammer_offset counts the coverage of the standard deviations.
+  double model_ratio = 0.005;     ///< [1] of the ratio of the gains at two heights
+  double model_factor = 0.025;    ///< [1] of (a factor to the tip - 1)
+  double model_frequency = 0.01;  ///< [1]
+  double model_gain = 0.03;       ///< [1] of a gain
+  double model_small = 0.003;     ///< [1] of a gain, over the largest, for the weak modes next to strong ones
+  /// [1] Standard deviation of the measured gain of a mode that is not measured, over the largest gain: a
+  /// mode as strong would have been found.
+  double largest_unmeasured = 0.03;
+
+  /// [1] Range of the frequency of a tool mode, over that of the clamped tool: the holder is softer, a
+  /// spindle mode nearby pushes it up.
+  double tool_low = 0.35, tool_high = 1.5;
+  std::size_t most_tool_modes = 2;  ///< in the band; the third bending mode of a tool is far above
+
+  /// [std] Compliance of the seat that counts as rigid, and at the start of the fit.
+  double rigid_seat = 0.01, seat_start = 0.3;
+  double seat_diameter = 0.012;  ///< [m] of the tool to which the prior of the seat belongs
+  /// [1] Prior of a spindle mode without the tool: its spread about the measured one, logarithmic. Wide,
+  /// since the mass and the modes of the tool shift it.
+  double frequency_spread = 0.4, gain_spread = 2.0;
+  /// [1] Relative, of the damping of a mode that is not measured, about the median of the others.
+  double predicted_damping_std = 0.5;
+};
+
 /// Modes of one FRF, struck and measured at heights above the tip.
 struct OffsetMeasurement {
   double struck = 0.0, read = 0.0;  ///< [m]
@@ -74,7 +102,7 @@ struct TipCorrection {
 /// @param high [Hz] upper end of the band in which all modes are expected to be measured
 /// @throws Error on heights beyond the stick-out, no mode, or invalid values of the beam
 TipCorrection correctToTip(const std::vector<OffsetMeasurement>& measurements, const ToolBeam& tool,
-                           const HolderPrior& prior, double high);
+                           const HolderPrior& prior, double high, const TipFitOptions& options = {});
 
 /// For an unknown tool material: modes above the band, which only the beam predicts, contribute to the
 /// standard deviations alone.

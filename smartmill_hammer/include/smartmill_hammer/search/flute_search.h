@@ -13,7 +13,11 @@ struct FluteSearchOptions {
   double range_volt = 10.0;    ///< [V] the sensor outputs -range_volt when the tool is out of its range
   double noise_sigmas = 5.0;   ///< [1] standard deviations above which a difference is significant
   double least_rise = 0.005;   ///< [V] smallest significant difference
-  bool golden_only = false;    ///< golden section alone from bracket to tolerance, as the thesis
+  /// [1] of the tolerance: distance from the top at which a measurement closes the bracket from both sides.
+  double close_share = 0.45;
+  double below_top_sigmas = 3.0;  ///< [1] deviations by which a measurement must be below the top to differ
+  double range_share = 0.97;      ///< [1] of the range, from which a voltage counts as out of range
+  bool golden_only = false;       ///< golden section alone from bracket to tolerance, as the thesis
 
   /// The steps of the thesis, shortened so that none spans more than a quarter of the smallest pitch [rad].
   static FluteSearchOptions forPitch(double least_pitch);
@@ -47,7 +51,6 @@ class FluteSearch {
 
   double angle() const { return angle_; }     ///< [rad] of the flute, unwrapped; when found
   double volt() const { return best_volt_; }  ///< [V] highest measurement
-  int measurementCount() const { return static_cast<int>(measurements_.size()); }
   struct Measurement {
     double angle, volt;  ///< [rad] unwrapped, [V]
   };

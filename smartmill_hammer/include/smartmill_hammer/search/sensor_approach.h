@@ -18,6 +18,9 @@ struct SensorApproachOptions {
   /// [m] diameter of the electrode: a voltage is the mean over that much of a flank, as if measured further
   /// from the flute by the mean distance from the disc's diameter.
   double electrode = 2e-3;
+  double measured_curve_error = 0.01;  ///< [1] of the measured curve: nonlinearity of the amplifier
+  int face_steps = 12;                 ///< points checked over the face's radius
+  double turn_step = 0.03;             ///< [rad] between two angles checked of the tool
 };
 
 /// How far a fluted tool may move towards the sensor's round face without contact, from the voltages that the

@@ -1,40 +1,21 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <optional>
 #include <string>
-#include <vector>
+
+#include "smartmill_hammer/search/approach_curve.h"
 
 namespace smartmill::hammer {
 
-/// Calibration of the displacement sensor in the machine (Dunwoody section 4.2). All distances [m] are
-/// positive towards the sensor.
-struct SensorCalibrationOptions {
-  double first_jog = 50e-6;   ///< [m] > 0
-  double max_jog = 100e-6;    ///< [m] >= first_jog
-  double least_jog = 5e-6;    ///< [m] > 0; below this the machine's resolution dominates the sensitivity
-  double resolution = 1e-6;   ///< [m] of a commanded distance
-  double zero_volt = 0.1;     ///< [V] magnitude below which the sensor is zeroed
-  double check_jog = 10e-6;   ///< [m] half width of the final, symmetric measurement about zero; 0: the
-                              ///< sensitivity of the last approach jog is used, as in the thesis
-  double curve_jog = 100e-6;  ///< [m] away from the sensor, where the curvature is measured at the end, and
-                              ///< halfway; 0: from the samples of the approach alone
-  double position_std = 0.1e-6;      ///< [m] of a distance moved (thesis: within 100 nm)
-  double range_volt = 10.0;          ///< [V] the sensor saturates at plus and minus this
-  double gain_volt = 10.0;           ///< [V] nominal curve V = gain_volt (gap_at_zero_volt / gap - 1)
-  double gap_at_zero_volt = 250e-6;  ///< [m]
-  double min_gap = 100e-6;           ///< [m] no jog to a nominal gap below this
-  double swing = 0.0;  ///< [m] towards the sensor that a hit may cause; added to min_gap before a sharp edge
-  double max_travel = 3e-3;   ///< [m] longest approach
-  double safe_travel = 1.0;   ///< [m] without contact; the approach ends there
-  double largest_std = 0.02;  ///< [1] relative, of the sensitivity where the approach ended early
-  int max_jogs = 100;         ///< [1]
-};
-
-/// A sensor's curve V = far_volt + constant / gap.
-struct SensorCurve {
-  double far_volt = 0.0;  ///< [V] without a target
-  double constant = 0.0;  ///< [V m]
+struct SensorCalibrationResult {
+  double sensitivity = 0.0, sensitivity_std = 0.0;  ///< [m/V] > 0: displacement towards the sensor per volt
+  /// [m] > 0: gap of the hyperbola at the rest position; NaN: too few samples determine it. Its standard
+  /// deviation comes from voltages, positions and the residual of the hyperbola.
+  double curve_gap = std::numeric_limits<double>::quiet_NaN();
+  double curve_gap_std = std::numeric_limits<double>::quiet_NaN();
+  bool limited_by_edges = false;  ///< the approach ended at safe_travel instead of at zero volt
 };
 
 /// Moves the tool towards the sensor in small jogs until its voltage is about zero, and measures its
@@ -59,43 +40,21 @@ class SensorCalibration {
   int jogs() const { return jogs_; }
   double travelled() const { return travelled_; }  ///< [m] towards the sensor since start()
 
-  /// [m/V] > 0: displacement towards the sensor per volt, and its standard deviation.
-  double sensitivity() const { return sensitivity_; }
-  double sensitivityStd() const { return sensitivity_std_; }
-
-  /// [m] > 0: gap of the hyperbola at the rest position; NaN: too few samples determine it.
-  double curveGap() const { return curve_gap_; }
-  /// [m] its standard deviation, from voltages, positions and the residual of the hyperbola.
-  double curveGapStd() const { return curve_gap_std_; }
+  const SensorCalibrationResult& result() const { return result_; }  ///< after the end
   /// The sensor's curve from the approach so far; empty: not yet determined.
   std::optional<SensorCurve> curve() const;
   /// To be called before the next sample. @param safe_travel [m] since start()
   void setSafeTravel(double safe_travel) { options_.safe_travel = safe_travel; }
-  /// Whether the approach ended at safe_travel instead of at zero volt.
-  bool isLimitedByEdges() const { return limited_by_edges_; }
   double volt() const { return volt_; }  ///< [V] last sample
 
  private:
-  struct Sample {
-    double position, volt;  // [m] since start(), [V]
-  };
   void planJog();
   void requestJog(double distance);
   void fail(std::string reason);
-  bool isClipped(double volt) const;
-  double nominalGap(double volt) const;
   void startCheck();
   void finish();
   void updateSensitivity(double change, double moved, double noise);
-  double localGap() const;
-  struct Hyperbola {
-    double gap, gap_std;            // [m]
-    double far_volt, far_volt_std;  // [V]
-    double constant;                // [V m]
-  };
-  Hyperbola hyperbola() const;
-  Hyperbola hyperbola(double reach) const;
-  Hyperbola fitHyperbola(const std::vector<Sample>& near) const;
+  double curveVoltStd() const;
   void requestReturn();
   void moveAway();
 
@@ -109,10 +68,8 @@ class SensorCalibration {
   double rest_ = 0.0;                   // [m] travelled to the rest position
   double volt_ = 0.0, volt_std_ = 0.0;  // last sample
   double near_volt_ = 0.0, near_std_ = 0.0;
-  double sensitivity_ = 0.0, sensitivity_std_ = 0.0;
-  double curve_gap_, curve_gap_std_;
-  bool limited_by_edges_ = false;
-  std::vector<Sample> samples_;
+  SensorCalibrationResult result_;
+  ApproachCurve samples_;
   int jogs_ = 0;
   std::size_t samples_away_ = 0;  // samples still to be taken away from the sensor
 };

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 
 #include "smartmill_core/modal/hit_test_parameters.h"
@@ -64,6 +65,24 @@ struct HammerParameters : HitTestParameters {
   double stickout_std = 0.5e-3;
   std::string tool_material = "unknown";
   double tool_fluted_length = 0.0;
+
+  // Set by programs only.
+  double range_share = 0.98;   ///< [1] of the sensor's range, from which a voltage counts as its end
+  int near_samples = 8;        ///< consecutive ones above it that mean that the tool is too near, not noise
+  std::size_t least_hits = 3;  ///< of fewer hits no outlier can be identified
+  std::size_t least_jackknife = 4;  ///< hits whose scatter gives a standard deviation
+  double usual_flutes = 2.0,
+         usual_flutes_std = 0.6;  ///< [1] fluted length in diameters where it is not given
+  double longest_flutes = 0.9;    ///< [1] of the stick-out: a shank remains
+  double fluted_std = 1.0e-3;     ///< [m] of a stated fluted length
+  double diameter_std = 0.02e-3;  ///< [m] of a stated diameter
+  /// [1] Standard deviation of the curve's gap where the approach does not determine it, of the nominal one.
+  double nominal_gap_std = 0.2;
+  double tilt_std =
+      7.0;  ///< [1/m] wider than HolderPrior's for one height: the second one determines the tilt
+  int second_height_hits = 3;         ///< least number at the second height
+  double least_shank = 4e-3;          ///< [m] of tool above the hammer at the second height
+  double least_lowered_share = 0.15;  ///< [1] of the hammer's offset; less does not resolve the tilt
 
   HammerParameters() {
     fit_low = 200.0;

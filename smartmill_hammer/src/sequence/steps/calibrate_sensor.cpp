@@ -111,9 +111,10 @@ class CalibrateSensor : public SequenceStep {
   }
 
   void storeSensor() {
-    sensor() = {calibration_->sensitivity(), calibration_->sensitivityStd(), calibration_->curveGap(),
-                calibration_->curveGapStd(), calibration_->volt()};
-    const std::string limit = calibration_->isLimitedByEdges()
+    const SensorCalibrationResult& result = calibration_->result();
+    sensor() = {result.sensitivity, result.sensitivity_std, result.curve_gap, result.curve_gap_std,
+                calibration_->volt()};
+    const std::string limit = result.limited_by_edges
                                   ? formatted(" at %.2f V, limited by the tool's edges", sensor().volt)
                                   : std::string();
     measurement_.report(formatted("sensor calibrated: %.3f +- %.3f um/V", 1e6 * sensor().sensitivity,

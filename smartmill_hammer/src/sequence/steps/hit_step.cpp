@@ -17,7 +17,7 @@ StepOutcome HitStep::hitRecorded(double now, RecordedHit&& hit) {
 
 HitCheckOptions HitStep::checkOptions() const {
   const HammerParameters& p = measurement_.parameters;
-  return {p.weak_force, p.second_hit_share, RANGE_SHARE * measurement_.station.range_volt, p.force_high};
+  return {p.weak_force, p.second_hit_share, p.range_share * measurement_.station.range_volt, p.force_high};
 }
 
 StepOutcome HitStep::reject(double now, const HitFault& fault) {

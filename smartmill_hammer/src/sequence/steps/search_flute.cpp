@@ -27,7 +27,7 @@ class SearchFlute : public SequenceStep {
     if (search_->state() == FluteSearch::State::searching) return orient(now);
     if (search_->state() == FluteSearch::State::no_flute)
       return StepOutcome::failed(FrfCode::no_flute, search_->reason());
-    if (search_->volt() > RANGE_SHARE * measurement_.station.range_volt)
+    if (search_->volt() > measurement_.parameters.range_share * measurement_.station.range_volt)
       return StepOutcome::failed(
           FrfCode::no_flute,
           formatted("the flute is too near to the sensor: %.2f V is the end of its range", search_->volt()));

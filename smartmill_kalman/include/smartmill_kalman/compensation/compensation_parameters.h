@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+
 #include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_kalman/filter/harmonic_filter.h"
 #include "smartmill_kalman/following/mode_follower.h"
@@ -21,6 +23,13 @@ struct CompensationParameters {
   int follow_revolutions = 8;
   ModeFollowerParameters follower;
   double saturation = 0.0;
+  double retune_tolerance = 1e-6;    ///< [1] change of speed at which filters are retuned; a retune is cheap
+  std::size_t retune_interval = 32;  ///< [samples] after which a tracked speed is checked for retuning
+  double speed_converged = 1e-4;  ///< [1] standard deviation of a tracked speed above which a block settles
+  /// Half samples of the period that the gains of the delay form may be off before they are replaced; 3
+  /// diverge.
+  double delay_hysteresis = 0.7;
+  double zero_time = 2.0;  ///< [s] time constant of the zero's average: long against a revolution
 
   void declare(ParameterTable& table) {
     filter.declare(table);

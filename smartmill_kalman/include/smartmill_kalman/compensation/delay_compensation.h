@@ -28,7 +28,7 @@ class DelayCompensation : public CompensationMethod {
  private:
   void design(int half_samples, double sample_rate);
 
-  HarmonicFilterParameters parameters_;
+  CompensationParameters parameters_;
   ForceOutputs outputs_;
   std::array<SensorAxis, 3> sensor_;
   std::map<std::pair<std::size_t, int>, DelayFilter> designs_;  // by axis and half samples of the period

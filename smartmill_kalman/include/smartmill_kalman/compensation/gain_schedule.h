@@ -11,15 +11,23 @@
 
 namespace smartmill::kalman {
 
+struct GainScheduleOptions {
+  double spacing = 0.01;    ///< [1] of the grid of speeds; the gains of neighbours differ little
+  double hysteresis = 0.7;  ///< [spacings] that gains serve from their own speed, so that a speed halfway
+                            ///< between two points does not switch gains at every block
+  double frequency_tolerance = 0.01;  ///< [1] shift of a mode's frequency that the gains tolerate
+};
+
 /// Gains of three axes on a logarithmic grid of spindle speed, designed on demand and kept.
 class GainSchedule {
  public:
-  explicit GainSchedule(const HarmonicFilterParameters& parameters) : parameters_(parameters) {}
+  explicit GainSchedule(const HarmonicFilterParameters& parameters, const GainScheduleOptions& options = {})
+      : parameters_(parameters), options_(options) {}
 
   /// Nearest grid point. @param speed [rad/s]
-  static int gridPointOf(double speed);
+  int gridPointOf(double speed) const;
   /// Whether the gains of a grid point still suit a speed [rad/s].
-  static bool covers(int grid_point, double speed);
+  bool covers(int grid_point, double speed) const;
 
   /// Gains from quick to slow. @param sample_rate [Hz]; gains of another rate are dropped.
   const std::vector<HarmonicGain>& gains(std::size_t axis, const SensorAxis& sensor, int grid_point,
@@ -31,6 +39,7 @@ class GainSchedule {
 
  private:
   HarmonicFilterParameters parameters_;
+  GainScheduleOptions options_;
   std::map<std::pair<std::size_t, int>, std::vector<HarmonicGain>> gains_;  // by axis and grid point
   std::array<std::vector<double>, 3> design_frequencies_;                   // [Hz] of the modes, last design
   double sample_rate_ = 0.0;                                                // [Hz]

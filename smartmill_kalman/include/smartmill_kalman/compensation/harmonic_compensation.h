@@ -49,7 +49,6 @@ class HarmonicCompensation : public CompensationMethod {
   void retune();
   void filterAxes(ForceBlock& block, InnovationStatistics& innovations);
   void filterSamples(ForceBlock& block, InnovationStatistics& innovations);
-  void filterSample(std::array<double, 3>& force, InnovationStatistics& innovations);
   bool followModes(double now);
   void restoreModes();
 

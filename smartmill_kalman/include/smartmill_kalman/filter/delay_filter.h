@@ -37,12 +37,22 @@ struct DelayModel {
   double measured(const std::vector<double>& x) const;
 };
 
+struct DelayGainOptions {
+  double quick = 1.5;  ///< [1] shortest memory over settling_revolutions: the line has more states than the
+                       ///< harmonics
+  /// Longest recursion, and relative rise of P per revolution at convergence. Frequencies that the sensor
+  /// hardly transmits converge much later; the recursion then ends at its longest, if the variance of the
+  /// innovation rises by less than `settled`.
+  double max_revolutions = 1000.0, converged = 1e-7, settled = 1e-4;
+};
+
 /// Stationary gain P c' / (c P c' + r) of the model with white noise of variance q on every new force of the
 /// line, by the Chandrasekhar recursion: P starts at zero and grows by one rank a step, which costs a step
 /// O(states) where a Riccati step costs the cube.
 /// @param q, r [N2] > 0 @return {gain, variance of the innovation as the last element}
 /// @throws Error when it does not converge.
-std::vector<double> delayGain(const DelayModel& model, double q, double r);
+std::vector<double> delayGain(const DelayModel& model, double q, double r,
+                              const DelayGainOptions& options = {});
 
 /// Kalman filter of one axis with the force of Dunwoody eq. 7.1, F(t) = F(t - T), in place of the Fourier
 /// series. Discrete: a line of the forces of one revolution; the force one period before the line's next

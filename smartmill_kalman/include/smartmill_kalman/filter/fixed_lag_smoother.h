@@ -30,7 +30,7 @@ class FixedLagSmoother {
     std::size_t level = 0;
     bool is_measured = false;
     bool is_change = false;  // the backward pass stops here
-    std::shared_ptr<const HarmonicFilter::SmootherDesign> design;
+    std::shared_ptr<const HarmonicSmoother> design;
   };
   std::deque<Sample> samples_;
   std::size_t restarts_ = 0;

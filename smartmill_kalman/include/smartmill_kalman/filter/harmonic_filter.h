@@ -1,7 +1,5 @@
 #pragma once
 
-#include <array>
-#include <complex>
 #include <cstddef>
 #include <memory>
 #include <vector>
@@ -10,6 +8,8 @@
 #include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_kalman/filter/adaptive_memory.h"
 #include "smartmill_kalman/filter/harmonic_gain.h"
+#include "smartmill_kalman/filter/harmonic_pairs.h"
+#include "smartmill_kalman/filter/harmonic_smoother.h"
 
 namespace smartmill::kalman {
 
@@ -72,7 +72,7 @@ class HarmonicFilter {
   /// Filters one measured sample [N]. @return applied force [N] at this sample, from all samples up to it.
   double step(double measured) {
     innovation_ = measured - predicted_output_;
-    const double force = advance(gains_[level()].data(), innovation_, force_gain_[level()]);
+    const double force = advance(gains_[memory_.level()].data(), innovation_, force_gain_[memory_.level()]);
     memory_.add(innovation_);
     return force;
   }
@@ -80,7 +80,7 @@ class HarmonicFilter {
   /// Advances the state without a measurement. @return predicted force [N].
   double predict() {
     innovation_ = 0.0;
-    return advance(gains_[level()].data(), 0.0, 0.0);
+    return advance(gains_[memory_.level()].data(), 0.0, 0.0);
   }
 
   /// At rest, no force.
@@ -94,20 +94,6 @@ class HarmonicFilter {
   /// @param gains of the new sensor; empty: the gains stay (same number of modes only)
   void replaceSensor(const ModalModel& sensor, std::vector<HarmonicGain> gains);
 
-  /// Harmonics of the measured force at the next sample [N]: output = Re sum Y_n, n = 0..N.
-  std::vector<std::complex<double>> measuredHarmonics() const;
-
-  /// Harmonic n of the applied force at the next sample [N], 0 the constant: force = Re sum.
-  std::complex<double> forceHarmonic(std::size_t n) const {
-    const std::size_t i = modes_ + n;
-    return {batches_[i / 4].re[i % 4], batches_[i / 4].im[i % 4]};
-  }
-
-  /// Derivative of the predicted sample with respect to the spindle angle [N/rad], steady-state harmonics
-  /// only.
-  /// @param highest harmonic that is included
-  double slope(double highest = 1e9) const;
-
   /// Takes over the force of another filter (harmonics that it lacks: zero), so that a new design starts
   /// without a jump. @throws Error when the number of modes differs.
   void continueFrom(const HarmonicFilter& other);
@@ -116,62 +102,30 @@ class HarmonicFilter {
   /// Starts from the present state and ends in that after the last sample. @return applied force [N].
   std::vector<double> smooth(const std::vector<double>& measured);
 
-  double innovation() const { return innovation_; }                  ///< [N] of the last step
-  double innovationStd() const { return innovation_std_[level()]; }  ///< [N] by design
-  double spindleSpeed() const { return spindle_speed_; }             ///< [rad/s]
-  int harmonics() const { return harmonics_; }
-  std::size_t states() const { return 2 * modes_ + 1 + 2 * static_cast<std::size_t>(harmonics_); }
-  std::size_t level() const { return memory_.level(); }  ///< 0 quick .. LEVELS - 1 slow
-  bool settled() const { return memory_.settled(); }     ///< longest memory
-  /// Times that an outlying innovation reset the memory.
-  std::size_t restarts() const { return memory_.restarts(); }
+  double innovation() const { return innovation_; }                          ///< [N] of the last step
+  double innovationStd() const { return innovation_std_[memory_.level()]; }  ///< [N] by design
+  const HarmonicPairs& pairs() const { return pairs_; }
+  const AdaptiveMemory& memory() const { return memory_; }  ///< level 0 quick .. LEVELS - 1 slow
   void setLevel(std::size_t level) { memory_.setLevel(level); }
-  /// State in the coordinates of HarmonicGain.
-  std::vector<double> state() const;
+  /// @param state in the coordinates of HarmonicGain
   void setState(const std::vector<double>& state);
-
-  // A pair is a rotation (a, b) of (re, im) that contributes (c1, c2) to the measured and g to the applied
-  // force. A batch holds four pairs.
-  typedef double Vector4 __attribute__((vector_size(32), aligned(8)));
-  struct PairBatch {
-    Vector4 re, im, a, b, c1, c2, g;
-  };
-  struct GainBatch {
-    Vector4 re, im;
-  };
-  /// Data of the backward pass, constant while sensor, speed and gains stay.
-  struct SmootherDesign {
-    std::vector<PairBatch> batches;                        ///< re, im unused
-    std::vector<std::vector<GainBatch>> gains, smoothing;  ///< each level
-    std::vector<double> variance, force_gain;              ///< [N2], [1] each level
-  };
-  std::shared_ptr<const SmootherDesign> smootherDesign() const;
-  /// Backward pass of one sample. @param level, innovation of the sample's step @param is_measured false: it
-  /// was predicted @param lambda adjoint of the next sample, replaced by that of this one @return correction
-  /// of the predicted force [N]
-  static double smoothBackward(const SmootherDesign& design, std::size_t level, double innovation,
-                               bool is_measured, std::vector<GainBatch>& lambda);
+  std::shared_ptr<const HarmonicSmoother> smoother() const;
 
  private:
+  using GainBatch = HarmonicPairs::GainBatch;
+
   double advance(const GainBatch* gain, double innovation, double force_gain);
   void setModel(const ModalModel& sensor, double spindle_speed);
-  std::vector<double> toPairs(const std::vector<double>& state) const;
   void setGains();
   void replaceModes(const ModalModel& sensor, std::vector<HarmonicGain> gains);
-  double predictedOutput() const;
 
-  ModalModel sensor_;
-  double spindle_speed_ = 0.0, sample_rate_;
-  std::size_t modes_;
-  int harmonics_;
+  HarmonicPairs pairs_;
   std::vector<HarmonicGain> design_;
-  std::vector<std::array<double, 4>> modal_;  // transition of each mode's two states, row-major
-  std::vector<PairBatch> batches_;
   std::vector<std::vector<GainBatch>> gains_;
   std::vector<double> force_gain_, innovation_std_;
   double predicted_output_ = 0.0, innovation_ = 0.0;
   AdaptiveMemory memory_;
-  mutable std::shared_ptr<const SmootherDesign> smoother_design_;  // empty: not computed yet
+  mutable std::shared_ptr<const HarmonicSmoother> smoother_;  // empty: not computed yet
 };
 
 }  // namespace smartmill::kalman

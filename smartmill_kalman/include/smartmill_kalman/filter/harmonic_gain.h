@@ -25,14 +25,20 @@ struct HarmonicDesign {
   std::vector<double> settling;  ///< [s] of each harmonic, 0 .. N
 };
 
+/// Number of harmonics of the spindle up to `top` [Hz], at least 1. @param revolution [s]
+int harmonicCount(double top, double revolution, int most);
+
+/// Time constant of a harmonic at f [Hz] for a required `settling`. One with a low transmissibility is slow
+/// already: min(1, 2 |H|) settling, at least `quickest`, so that a long memory does not slow it further.
+double harmonicSettling(const ModalModel& sensor, double f, double settling, double quickest);
+
 /// Stationary gain of the Kalman filter of Dunwoody eq. 5.37, exact in time (Van Loan's integrals for the
 /// noise). Process noise q = (r dt) / tau^2 for every amplitude puts each harmonic's pole near -|H| / tau, H
 /// the sensor's response to it. Uses spectralGain(), or riccatiGain() when that fails; both give the same
 /// numbers.
 HarmonicGain designHarmonicGain(const HarmonicDesign& design);
 
-/// The same with one time constant. A harmonic with a low transmissibility is slow already: its tau is
-/// min(1, 2 |H|) settling, at least quickest, so that a long memory does not slow it further.
+/// The same with one time constant and harmonicSettling() of it.
 /// @param spindle_speed [rad/s] @param sample_rate [Hz] @param settling, quickest [s]
 HarmonicGain designHarmonicGain(const ModalModel& sensor, double spindle_speed, double sample_rate,
                                 int harmonics, double noise_rms, double settling, double quickest);

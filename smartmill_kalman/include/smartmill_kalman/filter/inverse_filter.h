@@ -1,10 +1,10 @@
 #pragma once
 
-#include <complex>
 #include <cstddef>
 #include <vector>
 
 #include "smartmill_core/modal/modal_model.h"
+#include "smartmill_kalman/filter/fir_filters.h"
 
 namespace smartmill::kalman {
 
@@ -29,15 +29,15 @@ class InverseFilter {
 
   /// Takes the next samples [N], in blocks of any length. @return as many of the applied force, latency()
   /// late.
-  std::vector<double> process(const std::vector<double>& samples);
+  std::vector<double> process(const std::vector<double>& samples) {
+    return filter_.process({samples}).front();
+  }
   std::size_t latency() const { return latency_; }  ///< [samples]
-  void reset();                                     ///< at rest
+  void reset() { filter_.reset(); }                 ///< at rest
 
  private:
   std::size_t latency_;
-  std::vector<double> taps_, history_;
-  std::vector<std::complex<double>> spectrum_;  // of the taps, for the block length used last
-  std::size_t length_ = 0;
+  FirFilters filter_;
 };
 
 }  // namespace smartmill::kalman

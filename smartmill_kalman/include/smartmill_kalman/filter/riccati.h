@@ -13,4 +13,14 @@ namespace smartmill::kalman {
 Eigen::MatrixXd stationaryCovariance(const Eigen::MatrixXd& phi, const Eigen::MatrixXd& q,
                                      const Eigen::RowVectorXd& c, double r);
 
+/// Stationary Kalman filter of one output.
+struct StationaryGain {
+  Eigen::MatrixXd covariance;  ///< P, by stationaryCovariance()
+  double variance = 0.0;       ///< c P c' + r, of the innovation
+  Eigen::VectorXd gain;        ///< P c' / variance
+};
+/// Parameters and errors as stationaryCovariance().
+StationaryGain stationaryGain(const Eigen::MatrixXd& phi, const Eigen::MatrixXd& q,
+                              const Eigen::RowVectorXd& c, double r);
+
 }  // namespace smartmill::kalman

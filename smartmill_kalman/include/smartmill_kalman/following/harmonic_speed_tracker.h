@@ -26,6 +26,7 @@ class HarmonicSpeedTracker {
   double speedStd() const { return tracker_.speedStd(); }  ///< [rad/s]
 
  private:
+  SpeedTrackerParameters limits_;
   SpeedTracker tracker_;
   HarmonicFilterParameters filter_;
   double sample_rate_;

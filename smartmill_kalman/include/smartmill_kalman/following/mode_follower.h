@@ -16,6 +16,20 @@ struct ModeFollowerParameters {
   double frequency_std = 0.02;  ///< [1] standard deviation of a mode's shift between two updates
   double damping_std = 0.1;     ///< [1] relative, of its damping ratio
   double evidence = 30.0;       ///< [1] decrease of the sum of squares that proves a shift
+  double radius_std = 20.0;     ///< [um] prior of a tooth's radius: the runout of a usual holder
+
+  // Search of a mode that is missing in the taps.
+  double hidden_low = 300.0;     ///< [Hz] lowest frequency; force sensors have their modes above
+  double hidden_step = 1.02;     ///< [1] from frequency to frequency, within the width of a mode
+  double hidden_damping = 0.03;  ///< [1] initial damping ratio
+  double gain_std = 0.05;        ///< [1] prior of its gain; a larger one would be seen in the taps
+  double wider = 5.0;  ///< [1] factor on the prior of its frequency and damping, which are not tapped
+  double hidden_evidence = 2.0;  ///< [1] required evidence over that of a shift
+  double unexplained = 2.0;      ///< [1] mean square of the innovations above which a mode may be missing
+  /// [1] Largest cost with that mode over the cost without. A wrong force model (helix, depth, exit) leaves a
+  /// third of the cost or more.
+  double max_cost_ratio = 0.25;
+  int min_redundancy = 12;  ///< rows in addition to the unknowns; fewer fit any mode
 
   void declare(ParameterTable& table) {
     table.number("misfit", misfit, "1", Range::positive(),

@@ -12,6 +12,20 @@ struct SpeedTrackerParameters {
   double acceleration_std = 0.02;
   double acceleration_memory = 0.25;  ///< [s] correlation time of the acceleration
 
+  double noise_limit = 2.0;  ///< [1] mean square of innovations over that of the noise: more is no noise
+  double min_slope_ratio =
+      10.0;  ///< [1] mean square of a slope over that by noise, which would bias the speed
+  double rise_revolutions = 1.5;  ///< in which the amplitudes settle after a change of the force
+  /// [s], [1] A change of the load changes the speed; the standard deviation of the acceleration then decays
+  /// within load_decay to load_floor of its initial value, as a spindle's control does.
+  double load_decay = 0.2, load_floor = 0.1;
+  double max_deviations = 3.0;         ///< [std] of the nominal speed, which limit the estimate
+  double max_limit_revolutions = 3.0;  ///< at the limit before the tracker restarts: it is lost
+  /// [1] A harmonic is used while one standard deviation of the speed shifts it by less than this share of
+  /// the harmonics' spacing, beyond which it is mistaken for its neighbour.
+  double max_shift = 0.15;
+  double min_harmonics = 8.0;  ///< the lowest ones are always used: without them there is no slope
+
   void declare(ParameterTable& table) {
     table.number("speed_std", speed_std, "1", Range::positive(),
                  "relative standard deviation of the cutting condition's speed");
@@ -53,6 +67,7 @@ class SpeedTracker {
   double acceleration() const { return acceleration_; }  ///< [rad/s2]
 
  private:
+  SpeedTrackerParameters parameters_;
   double dt_, nominal_;
   double phase_ = 0.0, speed_, acceleration_ = 0.0;
   double p_[3][3] = {};

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <complex>
+#include <cstddef>
 #include <limits>
 #include <optional>
 #include <string>
@@ -43,6 +44,13 @@ struct CuttingFrfOptions {
   double speed_width = 0.2;           ///< [1] cuts within this range of speed are one FRF
   int least_lines = 12;               ///< [1] of a fit
   int max_modes = 4;
+  int noise_orders = 8;     ///< half orders around a harmonic that estimate its noise; more mix other noise
+  double same_line = 5e-4;  ///< [1] of frequency: lines that are averaged, far within a mode's width
+  double same_mode = 0.1;   ///< [1] of frequency: a mode at neighbouring speeds
+  double least_gain_deviations = 3.0;  ///< [1] gain over its standard deviation, for a significant mode
+  double same_speed = 3e-3;            ///< [1] of speed: lines of one cut, whose speed varies by less
+  std::size_t least_cuts = 5;          ///< for a jackknife over the cuts
+  int passes = 4;                 ///< of the iteration between slopes and fits, after which it is settled
   bool unit_static_gain = false;  ///< of a force sensor
   /// @throws Error naming key and value.
   void validate() const;

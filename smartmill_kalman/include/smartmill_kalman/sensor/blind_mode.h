@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "smartmill_core/modal/modal_model.h"
@@ -13,6 +14,12 @@ struct BlindMode {
   double likelihood = 0.0;  ///< [1] gain in log-likelihood over a flat spectrum; below 10: no mode
 };
 
+struct BlindModeOptions {
+  double skirt = 4.0;  ///< lines on each side of a harmonic that are omitted: main lobe of the Hann window,
+                       ///< and error of the speed
+  std::size_t min_lines = 50;  ///< between the harmonics, for four unknowns of a scattered spectrum
+};
+
 /// The part of the cutting force that is not synchronous with the spindle (chip breakage, material) excites
 /// the sensor at all frequencies, so that its modes appear between the harmonics of the spindle. Fits one
 /// resonance on a noise floor in the band by its Whittle likelihood. The resonance may also belong to the
@@ -20,6 +27,6 @@ struct BlindMode {
 /// @param samples [N] steady cut @param sample_rate [Hz] @param spindle_speed [rad/s] @param low, high [Hz]
 /// @throws Error when there are too few lines between the harmonics.
 BlindMode findBlindMode(const std::vector<double>& samples, double sample_rate, double spindle_speed,
-                        double low, double high);
+                        double low, double high, const BlindModeOptions& options = {});
 
 }  // namespace smartmill::kalman

@@ -75,12 +75,10 @@ class SensorMeasurement {
   void handleHammer(const SampleBlock& block);
   /// Block of the force sensor (channels fx, fy, fz [N]). @throws Error when the channel is missing.
   void handleSensor(const SampleBlock& block);
-  void cancel();
+  /// Ends a running measurement: cancelled, a command failed, an input stream has ended.
+  void end(FrfCode code, const std::string& message);
   /// There is no automatic hammer: feedback requests a hit by hand.
   void hitByHand();
-  void commandFailed(const std::string& text);
-  /// Ends the measurement: an input stream has ended.
-  void abort(const std::string& text);
   /// As new: a recording was restarted.
   void reset();
 
@@ -102,8 +100,6 @@ class SensorMeasurement {
   void requestHit(double now);
   void handleRecord(double now, HitCollector::Record record);
   void rejectHit(double now, const std::string& why, bool bad_data);
-  void estimateStaticGain(const FrequencyResponse& frf);
-  void evaluate();
   void finish(FrfCode code, const std::string& message);
   void reportStage(const std::string& stage);
 

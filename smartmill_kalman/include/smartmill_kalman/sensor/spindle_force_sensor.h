@@ -8,10 +8,11 @@
 #include <optional>
 #include <vector>
 
-#include "smartmill_core/modal/modal_filter.h"
 #include "smartmill_core/modal/modal_model.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_kalman/filter/low_pass.h"
+#include "smartmill_kalman/sensor/spindle_air_cuts.h"
+#include "smartmill_kalman/sensor/spindle_constants.h"
 #include "smartmill_kalman/sensor/spindle_sensor_calibration.h"
 
 namespace smartmill::kalman {
@@ -51,9 +52,9 @@ class SpindleForceSensor {
   static std::array<std::size_t, 6> columnsOf(const SampleBlock& block);
 
   /// Dynamics of an axis (measured over applied, static gain 1) that the unbalance force passes.
-  void setSensor(std::size_t axis, const ModalModel& sensor) { sensor_.at(axis) = sensor; }
+  void setSensor(std::size_t axis, const ModalModel& sensor) { air_cuts_.setSensor(axis, sensor); }
 
-  void handle(const SpindleAngle& angle);
+  void handle(const SpindleAngle& angle) { air_cuts_.handle(angle); }
   void handle(const CuttingCondition& condition);
   /// @throws Error when a channel is missing or not in N.
   SampleBlock handle(const SampleBlock& block);
@@ -69,59 +70,16 @@ class SpindleForceSensor {
   const SpindleSensorHealth& health() const { return health_; }
 
  private:
-  /// Normal equations of a segment without cutting: offset, drift, cosine and sine of the spindle angle.
-  struct AirSegment {
-    double from = 0.0, speed = 0.0;  // [s], [rad/s]
-    std::size_t samples = 0;
-    std::array<std::array<double, 4>, 4> normal{};
-    std::array<std::array<double, 4>, 6> right{};
-    std::array<double, 6> squares{};
-    std::array<double, 6> first{};  // [N] subtracted for small sums
-  };
-  struct Zero {
-    double at = 0.0;  // [s] reference time of the offset
-    std::array<double, 6> offset{}, drift{};
-    double oo = 0.0, od = 0.0, dd = 0.0;  // covariance of offset and drift, worst sensor
-  };
-  void addPendingSamples(double before);
-  void addAirSample(double time, double angle, double speed, const std::array<double, 6>& sensors);
-  void closeAirSegment();
-  void updateZero();
-  void prepareCrossTalkFilters(const SampleBlock& block);
-  bool isRotating() const;
-  /// Unbalance force at a time [s], complex [N]; the real part acts.
-  std::array<std::complex<double>, 3> unbalanceForce(double time) const;
+  void copyAirCuts();
   /// Counts unloaded and overloaded sensors. @return whether there is none.
   bool subtractZero(double time, std::array<double, 6>& sensors);
-  std::array<double, 3> forceOf(const std::array<double, 6>& sensors);
-  /// Advances the cross-talk filters with the last valid forces.
-  void skipSample();
-  std::array<std::complex<double>, 3> calibratedAmplitudes(const std::array<std::complex<double>, 3>& means,
-                                                           double f) const;
 
   SpindleSensorCalibration calibration_;
-  double length_;
-  std::array<double, 3> constant_{};  // of x, y, z
-  double yx_, yz_, xz_;               // pair per load; 0: none
-  std::array<ModalModel, 3> sensor_;
-  std::vector<ModalFilter> cross_talk_filters_;  // of yx, yz, xz
-  double cross_talk_rate_ = 0.0;                 // [Hz]
-  std::array<double, 3> last_{{0, 0, 0}};
+  SpindleCrossTalk cross_talk_;
+  SpindleAirCuts air_cuts_;
   std::vector<LowPass> low_pass_;
   double low_pass_rate_ = 0.0;
   std::uint64_t next_low_pass_ = 0;
-
-  std::optional<CuttingCondition::Kind> kind_;
-  // Samples wait for one block: a condition may arrive that makes them part of a cut.
-  std::vector<std::array<double, 6>> pending_;
-  double pending_from_ = 0.0, pending_rate_ = 0.0;  // [s], [Hz]
-  SpindleAngle pending_angle_;
-  std::optional<AirSegment> air_segment_;
-  std::optional<Zero> zero_;
-  SpindleAngle angle_;
-  bool angle_known_ = false;
-  std::array<double, 3> weight_{{0, 0, 0}};         // [1/(kg m)^2]
-  std::array<std::complex<double>, 3> weighted_{};  // weight x unbalance
   std::vector<bool> invalid_;
   bool any_invalid_ = false;
   std::optional<std::uint64_t> next_index_;

@@ -100,15 +100,25 @@ struct StaticCalibration {
   std::vector<ConstantsAtLength> lengths;
 };
 
+struct StaticCalibrationOptions {
+  double significant = 2.0;        ///< [std] least constant or cross-talk
+  double proven_reciprocal = 9.0;  ///< [1] decrease of chi squared for a linear reciprocal: three deviations
+  double length_margin = 2e-3;     ///< [m] validity of the constants beyond the measured lengths
+};
+
 /// Constants by least squares over all measurements of one length (offset and drift of every test are
 /// unknowns), then their weighted lines over length (eq. 3-4). One length: no slope. A cross-talk within two
 /// of its standard deviations is omitted. The reciprocal is linear where three or more lengths prove it.
 /// @param base preload and limits. @throws Error when a direction was never loaded.
 StaticCalibration calibrateStatic(const StaticMeasurements& measurements,
-                                  const SpindleSensorCalibration& base);
+                                  const SpindleSensorCalibration& base,
+                                  const StaticCalibrationOptions& options = {});
 
 /// @throws Error naming the table and a length in it outside the valid range.
 void checkLengths(const StaticMeasurements& measurements, const SpindleSensorCalibration& calibration);
+
+/// [1] of the largest force, up to which a calibration is valid (Burzoni 3.2.1).
+constexpr double LARGEST_STATIC_ERROR = 0.05;
 
 /// Verification (Burzoni 3.2.1): largest difference between estimated and applied force over the largest
 /// applied force, each axis [1]. Zero and drift come from the measurements without load. An axis that is

@@ -3,6 +3,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -28,6 +29,16 @@ struct CommandFile {
 
 /// A tool: a program of its own (runCommand) and a command of the program `smartmill`.
 struct Command {
+  Command() = default;
+  /// @param command name, e.g. "cutting-frf"; the tool is then "cutting_frf" @param what summary
+  Command(const std::string& command, const std::string& what);
+
+  /// Sets declare().
+  /// @param run body with the parsed options; returns the exit code, or nothing for 0
+  /// @param add declares the options; their defaults are those of the struct
+  template <class Options, class Result>
+  void setBody(Result (*run)(const Options&), void (*add)(CommandLine&, std::enable_if_t<true, Options>&));
+
   std::string name;         ///< of the command, e.g. "cutting-frf"
   std::string tool;         ///< of the program in its package, e.g. "cutting_frf"
   std::string summary;      ///< one line without a full stop
@@ -40,14 +51,47 @@ struct Command {
   std::function<std::function<int()>(CommandLine&)> declare;
 };
 
-/// Body of a command that calls run(options) and returns exit code 0.
-template <class Options>
-std::function<int()> commandBody(std::shared_ptr<Options> options, void (*run)(const Options&)) {
-  return [options = std::move(options), run] {
-    run(*options);
-    return 0;
+template <class Options, class Result>
+void Command::setBody(Result (*run)(const Options&),
+                      void (*add)(CommandLine&, std::enable_if_t<true, Options>&)) {
+  declare = [run, add](CommandLine& line) -> std::function<int()> {
+    const auto options = std::make_shared<Options>();
+    add(line, *options);
+    return [run, options] {
+      if constexpr (std::is_void_v<Result>) {
+        run(*options);
+        return 0;
+      } else {
+        return run(*options);
+      }
+    };
   };
 }
+
+/// Commands within a command, which share their options; the one that was given runs.
+template <class Options>
+class Subcommands {
+ public:
+  explicit Subcommands(CommandLine& line) : line_(line) {}
+  Options& options() { return *options_; }
+  CommandOptions add(const std::string& name, const std::string& help, void (*run)(const Options&)) {
+    commands_.emplace_back(line_.command(name, help), run);
+    return commands_.back().first;
+  }
+  /// Body of the command; outlives the command line's declaration.
+  std::function<int()> body() const {
+    return [options = options_, commands = commands_] {
+      for (const auto& [command, run] : commands)
+        if (command.parsed()) run(*options);
+      return 0;
+    };
+  }
+
+ private:
+  CommandLine& line_;
+  std::shared_ptr<Options> options_ = std::make_shared<Options>();
+  std::vector<std::pair<CommandOptions, void (*)(const Options&)>> commands_;
+};
 
 /// Exit codes of a command in ascending order: 0 done, 1 error, 2 bad command line, 130 interrupted, and
 /// those of the command.

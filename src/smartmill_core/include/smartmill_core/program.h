@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "smartmill_core/error.h"
@@ -110,6 +111,9 @@ class CommandLine : public CommandOptions {
   /// The name in messages; if not given to the constructor, available after parsing.
   const std::string& program() const { return program_; }
   CommandEntry entry() const;
+  /// @param action runs after parsing and before the body; runProgram() reports its errors like the body's
+  void afterParsing(std::function<void()> action) { after_parsing_.push_back(std::move(action)); }
+  void runAfterParsing() const;
 
   struct Stop {
     bool stop = false;  ///< error or help has been printed, and the program must end
@@ -120,6 +124,7 @@ class CommandLine : public CommandOptions {
  private:
   std::unique_ptr<CLI::App> root_;
   std::string program_;
+  std::vector<std::function<void()>> after_parsing_;
 };
 
 /// Body of a command-line program's main: parses the command line, then runs. @return the exit code: what

@@ -7,6 +7,7 @@
 #include <set>
 #include <sstream>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/campaign/slow_channels.h"
 #include "smartmill_core/campaign/stream_offset.h"
 #include "smartmill_core/error.h"
@@ -74,7 +75,8 @@ CampaignTest readTest(const StrictYaml& map) {
   test.spindle_speed =
       units::radPerSecFromRpm(turns ? map.number("spindle_speed_rpm", POSITIVE)
                                     : map.optionalNumber("spindle_speed_rpm", NOT_NEGATIVE).value_or(0.0));
-  if (test.kind == TestKind::tap) test.direction = map.oneOf("direction", {"x", "y", "z"});
+  if (test.kind == TestKind::tap)
+    test.direction = map.oneOf("direction", {AXIS_NAMES.begin(), AXIS_NAMES.end()});
   if (test.kind == TestKind::cut) {
     Engagement e;
     e.feed_per_tooth = map.number("feed_per_tooth_mm", POSITIVE) * units::MM;

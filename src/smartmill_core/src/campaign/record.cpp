@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <string_view>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/campaign/record_columns.h"
 #include "smartmill_core/campaign/sound_record.h"
 #include "smartmill_core/error.h"
@@ -210,8 +211,7 @@ const RecordColumn* recordColumn(std::string_view name) {
 std::optional<std::size_t> motionAxis(std::string_view name) {
   constexpr std::string_view PREFIX = "axis_";
   if (name.substr(0, PREFIX.size()) != PREFIX) return {};
-  const std::size_t axis = std::string_view("xyz").find(name.back());
-  return axis < 3 ? std::optional<std::size_t>(axis) : std::nullopt;
+  return axisIndex(name.substr(name.size() - 1));
 }
 
 std::optional<UnevenStep> unevenStep(const std::vector<double>& t) {

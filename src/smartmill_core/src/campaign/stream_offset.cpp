@@ -5,6 +5,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
+#include "smartmill_core/signal/force_channels.h"
 #include "smartmill_core/signal/interpolate.h"
 
 namespace smartmill {
@@ -32,7 +33,7 @@ double at(const std::vector<double>& samples, std::size_t i, double later) {
 
 const std::map<std::string, std::set<std::string>>& streamGroups() {
   static const std::map<std::string, std::set<std::string>> GROUPS{
-      {"force", {"fx", "fy", "fz"}},
+      {"force", {FORCE_CHANNELS.begin(), FORCE_CHANNELS.end()}},
       {"controller",
        {"axis_x", "axis_y", "axis_z", "axis_vx", "axis_vy", "axis_vz", "current_x", "current_y", "current_z",
         "load_meter"}},

@@ -15,14 +15,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr std::size_t ORDER = 32, ROWS_A_COEFFICIENT = 3;
-/// Samples of a segment.
-constexpr std::size_t SEGMENT = 8;
-/// An unpredicted deviation counts from this multiple of the usual deviation and this share of the
-/// largest value: for a sample, for a segment.
-constexpr double OUTLIER = 12.0, OUTLIER_SHARE = 0.08;
-constexpr double DEVIATION = 6.0, DEVIATION_SHARE = 0.004;
-
 std::vector<double> averaged(const std::vector<double>& values, std::size_t from, std::size_t group) {
   std::vector<double> result((values.size() - from) / group);
   for (std::size_t i = 0; i < result.size(); ++i) {
@@ -67,30 +59,33 @@ double robustDeviation(const std::vector<double>& residual, std::size_t order) {
   return median(sizes) / 0.6745;
 }
 
-FreeDecayBreak breakAt(const std::vector<double>& y, std::size_t group, double largest, double noise) {
-  const std::size_t order = std::min(ORDER, y.size() / (ROWS_A_COEFFICIENT + 1));
+FreeDecayBreak breakAt(const std::vector<double>& y, std::size_t group, double largest, double noise,
+                       const FreeDecayLimits& limits) {
+  const std::size_t order = std::min(limits.order, y.size() / (limits.rows_a_coefficient + 1));
   if (order < 8) return {};
   std::vector<bool> rows(y.size(), true);
   std::vector<double> residual = predictionResidual(y, order, prediction(y, order, rows, noise));
   // Again without outliers, which bias the prediction.
   const double first = robustDeviation(residual, order);
-  for (std::size_t n = order; n < y.size(); ++n) rows[n] = std::abs(residual[n]) < OUTLIER * first;
+  for (std::size_t n = order; n < y.size(); ++n) rows[n] = std::abs(residual[n]) < limits.outlier * first;
   residual = predictionResidual(y, order, prediction(y, order, rows, noise));
   const double noise_level = std::max(robustDeviation(residual, order), noise);
   FreeDecayBreak found;
   for (std::size_t n = order; group == 1 && n < residual.size(); ++n) {
-    if (std::abs(residual[n]) > std::max({OUTLIER * noise_level, OUTLIER_SHARE * largest, found.size}))
+    if (std::abs(residual[n]) >
+        std::max({limits.outlier * noise_level, limits.outlier_share * largest, found.size}))
       found = {n, std::abs(residual[n]), true};
   }
   if (found.sample > 0) return found;
   double least_size = INFINITY;
-  for (std::size_t n = order; n + SEGMENT <= residual.size(); n += SEGMENT / 2) {
+  for (std::size_t n = order; n + limits.segment <= residual.size(); n += limits.segment / 2) {
     double sum = 0.0;
-    for (std::size_t i = n; i < n + SEGMENT; ++i) sum += residual[i] * residual[i];
-    const double size = std::sqrt(sum / static_cast<double>(SEGMENT));
+    for (std::size_t i = n; i < n + limits.segment; ++i) sum += residual[i] * residual[i];
+    const double size = std::sqrt(sum / static_cast<double>(limits.segment));
     // A deviation by sensor nonlinearity decays with the ringing and does not recur.
-    if (size > std::max({DEVIATION * std::max(noise_level, std::isfinite(least_size) ? least_size : size),
-                         DEVIATION_SHARE * largest, found.size}))
+    if (size >
+        std::max({limits.deviation * std::max(noise_level, std::isfinite(least_size) ? least_size : size),
+                  limits.deviation_share * largest, found.size}))
       found = {n, size, false};
     least_size = std::min(least_size, size);
   }
@@ -100,12 +95,12 @@ FreeDecayBreak breakAt(const std::vector<double>& y, std::size_t group, double l
 }  // namespace
 
 double unpredictedRise(const std::vector<double>& response, std::size_t from, std::size_t begin,
-                       std::size_t end, double noise) {
+                       std::size_t end, double noise, const FreeDecayLimits& limits) {
   double most = 0.0;
   for (const std::size_t group : {1, 4, 16}) {
     const std::vector<double> y = averaged(response, from, group);
     const std::size_t first = (begin - from) / group, last = std::min(y.size(), (end - from) / group + 1);
-    const std::size_t order = std::min(ORDER, first / (ROWS_A_COEFFICIENT + 1));
+    const std::size_t order = std::min(limits.order, first / (limits.rows_a_coefficient + 1));
     if (order < 8 || first >= last) continue;
     std::vector<bool> rows(y.size(), false);
     std::fill(rows.begin() + static_cast<std::ptrdiff_t>(order),
@@ -124,13 +119,14 @@ double unpredictedRise(const std::vector<double>& response, std::size_t from, st
   return most;
 }
 
-FreeDecayBreak freeDecayBreak(const std::vector<double>& response, std::size_t from, double noise) {
+FreeDecayBreak freeDecayBreak(const std::vector<double>& response, std::size_t from, double noise,
+                              const FreeDecayLimits& limits) {
   double largest = 0.0;
   for (const double v : response) largest = std::max(largest, std::abs(v));
   for (const std::size_t group : {1, 4, 16}) {
     if (from >= response.size()) break;
     FreeDecayBreak found = breakAt(averaged(response, from, group), group, largest,
-                                   noise / std::sqrt(static_cast<double>(group)));
+                                   noise / std::sqrt(static_cast<double>(group)), limits);
     if (found.sample == 0) continue;
     found.sample = from + found.sample * group;
     return found;

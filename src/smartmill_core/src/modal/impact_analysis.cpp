@@ -15,12 +15,6 @@
 namespace smartmill {
 namespace {
 
-/// Lines on each side over which the variance is averaged. The variance from a few hits is itself uncertain,
-/// and lines that agree by chance would get far too much weight in a fit.
-constexpr std::size_t SMOOTH_LINES = 8;
-/// Fewest samples before the hit for baseline and noise.
-constexpr std::size_t LEAST_QUIET = 48;
-
 std::vector<double> part(const std::vector<double>& values, std::size_t from, std::size_t to) {
   return {values.begin() + static_cast<std::ptrdiff_t>(from),
           values.begin() + static_cast<std::ptrdiff_t>(to)};
@@ -84,7 +78,7 @@ void ImpactAnalysis::add(const Hit& hit) {
   // The last quarter before the trigger may contain the onset of the hit. A record that begins with the hit
   // has its noise at the end, and no baseline.
   const std::size_t quiet_samples = hit.pre_trigger - hit.pre_trigger / 4;
-  if (quiet_samples >= LEAST_QUIET) {
+  if (quiet_samples >= LEAST_QUIET_SAMPLES) {
     const std::vector<double> quiet_force = part(force, 0, quiet_samples);
     const std::vector<double> quiet = part(response, 0, quiet_samples);
     const double force_base = mean(quiet_force), base = mean(quiet);
@@ -94,7 +88,7 @@ void ImpactAnalysis::add(const Hit& hit) {
     for (double& r : response) r -= base;
     if (options_.sensor_gain > 0.0)
       straighten(response, options_.sensor_gain + base, options_.averaged_share);
-  } else if (samples_ >= 10 * LEAST_QUIET) {
+  } else if (samples_ >= 10 * LEAST_QUIET_SAMPLES) {
     force_noise = noiseUnderRinging(part(force, samples_ - samples_ / 10, samples_));
     response_noise = std::abs(options_.response_scale) *
                      noiseUnderRinging(part(response, samples_ - samples_ / 10, samples_));
@@ -159,8 +153,8 @@ FrequencyResponse ImpactAnalysis::frf(FrfAverage average) const {
       floor *= (of_response + of_force) / c;
     }
     double variance = 0.0;
-    const std::size_t first = k > SMOOTH_LINES ? k - SMOOTH_LINES : 0;
-    const std::size_t last = std::min(lines - 1, k + SMOOTH_LINES);
+    const std::size_t first = k > options_.smooth_lines ? k - options_.smooth_lines : 0;
+    const std::size_t last = std::min(lines - 1, k + options_.smooth_lines);
     for (std::size_t j = first; j <= last; ++j)
       variance += scatter[j] / static_cast<double>(last - first + 1);
     variance = std::max(variance, floor);

@@ -7,6 +7,7 @@
 
 #include "modal_residuals.h"
 #include "modal_search.h"
+#include "modes_by_magnitude.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
@@ -19,22 +20,8 @@ using Complex = std::complex<double>;
 /// Lines on each side over which noise counts as uniform.
 constexpr std::size_t SIDE = 25;
 constexpr std::size_t LEAST_LINES = 12;
-/// Lines of the smallest segment of the band that is searched separately, and the order there.
-constexpr std::size_t LEAST_PART = 160;
-constexpr int PART_ORDER = 16, PART_ORDER_STEP = 2, PART_WORTH = 3;
-/// A pole that persists over 1 / this of the orders is a start value at once.
-constexpr int STEADY_SHARE = 5;
-/// Start values are fitted to at most this accuracy, as share of the FRF: real FRFs have repeatable misfit.
-constexpr double START_MISFIT = 0.01;
-/// The first lines begin near zero when the last of them has at least this multiple of the first frequency; a
-/// mass line has constant acceleration to within this share.
-constexpr double FROM_ZERO = 2.0, MASS_LINE = 0.3;
 /// Significance of the sense of rotation, in standard deviations.
 constexpr double CLEARLY = 3.0;
-/// The response at a resonance exceeds the noise. Where the median coherence within its width is lower in
-/// every FRF, the force had no power there (between the lobes of a pulse), and the curvature is a bias of the
-/// average.
-constexpr double COHERENT = 0.3;
 /// Least noise of a line, as share of the tallest: rounding in files and in the solver.
 constexpr double DIGITS = 1e-7;
 
@@ -75,12 +62,12 @@ WeightedLines weighted(const std::vector<FrequencyResponse>& frfs, const ModalEs
   return lines;
 }
 
-/// Weights for start values, limited by START_MISFIT.
-WeightedLines tempered(const WeightedLines& lines) {
+/// Weights for start values, limited by the misfit.
+WeightedLines tempered(const WeightedLines& lines, double start_misfit) {
   WeightedLines result = lines;
   for (std::size_t o = 0; o < lines.frfs(); ++o) {
     for (std::size_t i = 0; i < lines.size(); ++i) {
-      const double noise = 1.0 / lines.weight[o][i], misfit = START_MISFIT * std::abs(lines.value[o][i]);
+      const double noise = 1.0 / lines.weight[o][i], misfit = start_misfit * std::abs(lines.value[o][i]);
       result.weight[o][i] = 1.0 / std::hypot(noise, misfit);
     }
   }
@@ -89,16 +76,16 @@ WeightedLines tempered(const WeightedLines& lines) {
 
 /// Subtracts the mass line of a free structure, whose curvature over the lowest narrow modes exceeds that of
 /// the background parabola. It is recognised by a constant acceleration of the first lines, from near zero.
-WeightedLines withoutMassLine(const WeightedLines& lines) {
+WeightedLines withoutMassLine(const WeightedLines& lines, const ModalSearchOptions& options) {
   WeightedLines result = lines;
-  if (lines.frequency[LEAST_LINES - 1] < FROM_ZERO * lines.frequency[0]) return result;
+  if (lines.frequency[LEAST_LINES - 1] < options.from_zero * lines.frequency[0]) return result;
   for (std::size_t o = 0; o < lines.frfs(); ++o) {
     std::vector<double> accelerance, off;
     for (std::size_t i = 0; i < LEAST_LINES; ++i)
       accelerance.push_back(lines.value[o][i].real() * std::pow(units::TWO_PI * lines.frequency[i], 2));
     const double level = median(accelerance);
     for (const double a : accelerance) off.push_back(std::abs(a - level));
-    if (median(off) > MASS_LINE * std::abs(level)) continue;
+    if (median(off) > options.mass_line * std::abs(level)) continue;
     for (std::size_t i = 0; i < lines.size(); ++i)
       result.value[o][i] -= level / std::pow(units::TWO_PI * lines.frequency[i], 2);
   }
@@ -120,10 +107,11 @@ void merge(std::vector<Pole>& all, const std::vector<Pole>& more, double line) {
 bool addParts(const WeightedLines& lines, const ModalEstimateOptions& options,
               std::vector<Pole>& candidates) {
   const std::size_t n = lines.size();
-  for (std::size_t part = n / 4; part >= LEAST_PART; part /= 4) {
+  for (std::size_t part = n / 4; part >= options.search.least_part; part /= 4) {
     for (std::size_t first = 0; first + part <= n; first += part / 2) {
       if (options.progress && !options.progress(0.05)) return false;
-      const PoleSearch search{first, std::min(n, first + part), PART_ORDER, PART_ORDER_STEP};
+      const PoleSearch search{first, std::min(n, first + part), options.search.part_order,
+                              options.search.part_order_step};
       const std::size_t quarter = part / 4;
       const double low = first == 0 ? 0.0 : lines.frequency[first + quarter];
       const double high =
@@ -133,7 +121,8 @@ bool addParts(const WeightedLines& lines, const ModalEstimateOptions& options,
         if (p.frequency < low || p.frequency > high) continue;
         inside.push_back(p);
         // Converts the persistence over few orders to the scale of the whole band.
-        inside.back().order = p.order * options.largest_order * PART_ORDER_STEP / PART_ORDER / PART_WORTH;
+        inside.back().order = p.order * options.largest_order * options.search.part_order_step /
+                              options.search.part_order / options.search.part_worth;
       }
       merge(candidates, inside, lines.step());
     }
@@ -144,10 +133,10 @@ bool addParts(const WeightedLines& lines, const ModalEstimateOptions& options,
 /// Starts a search with the poles that persist over the orders. Where some of them remain without a mode, a
 /// second search starts with all candidates: in dense bands weak poles are the missing neighbours of the
 /// persistent ones. The search that matches more of the persistent poles is kept.
-bool begin(ModalSearch& search, const std::vector<Pole>& candidates, int largest_order) {
+bool begin(ModalSearch& search, const std::vector<Pole>& candidates, int largest_order, int steady_share) {
   std::vector<Pole> steady;
   for (const Pole& p : candidates) {
-    if (p.order * STEADY_SHARE >= largest_order) steady.push_back(p);
+    if (p.order * steady_share >= largest_order) steady.push_back(p);
   }
   ModalSearch dense = search;
   if (!search.startWith(steady) || !search.refitAll(1, false)) return false;
@@ -157,7 +146,7 @@ bool begin(ModalSearch& search, const std::vector<Pole>& candidates, int largest
   return true;
 }
 
-bool isCoherent(const std::vector<FrequencyResponse>& bands, const EstimatedMode& mode) {
+bool isCoherent(const std::vector<FrequencyResponse>& bands, const EstimatedMode& mode, double coherent) {
   bool incoherent = false;
   for (const FrequencyResponse& band : bands) {
     if (band.coherence.size() != band.size() || band.size() < 2) continue;
@@ -169,17 +158,17 @@ bool isCoherent(const std::vector<FrequencyResponse>& bands, const EstimatedMode
         about.push_back(band.coherence[i]);
     }
     if (about.empty()) continue;
-    if (median(about) >= COHERENT) return true;
+    if (median(about) >= coherent) return true;
     incoherent = true;
   }
   return !incoherent;
 }
 
 /// Significant modes on lines without coherence become doubts.
-void doubtIncoherent(const std::vector<FrequencyResponse>& bands, ModalEstimate& estimate) {
+void doubtIncoherent(const std::vector<FrequencyResponse>& bands, double coherent, ModalEstimate& estimate) {
   std::vector<EstimatedMode> proven;
   for (const EstimatedMode& m : estimate.modes)
-    (isCoherent(bands, m) ? proven : estimate.doubts).push_back(m);
+    (isCoherent(bands, m, coherent) ? proven : estimate.doubts).push_back(m);
   estimate.modes = std::move(proven);
   std::sort(estimate.doubts.begin(), estimate.doubts.end(),
             [](const EstimatedMode& a, const EstimatedMode& b) { return a.frequency < b.frequency; });
@@ -273,20 +262,21 @@ ModalEstimate estimateModes(const std::vector<FrequencyResponse>& frfs, const Mo
     bands.push_back(frf.band(options.low, options.high > 0.0 ? options.high : INFINITY));
   result.conjugated = hasReversedPhase(bands);
   const WeightedLines lines = weighted(frfs, options, result.conjugated);
-  const WeightedLines start = tempered(lines);
+  const WeightedLines start = tempered(lines, options.search.start_misfit);
   const int most = static_cast<int>(lines.size() / 4);
   const PoleSearch whole{0, lines.size(), std::max(2, std::min(options.largest_order, most)), 1};
   result.diagram = polesByOrder(start, whole);
   std::vector<Pole> candidates = persistentPoles(result.diagram, whole);
-  const WeightedLines searched = withoutMassLine(lines);
+  const WeightedLines searched = withoutMassLine(lines, options.search);
   ModalSearch search(searched, options);
   result.cancelled =
-      !(addParts(start, options, candidates) && begin(search, candidates, whole.largest_order) &&
+      !(addParts(start, options, candidates) &&
+        begin(search, candidates, whole.largest_order, options.search.steady_share) &&
         search.addCandidates(candidates) && search.addAtLargestResidual(10) && search.refitAll(2, true));
-  search.addByMagnitude();
+  addByMagnitude(search.found(), options);
   result.modes = search.results(true);
   result.doubts = search.results(false);
-  doubtIncoherent(bands, result);
+  doubtIncoherent(bands, options.search.coherent, result);
   for (std::size_t o = 0; o < lines.frfs(); ++o)
     result.residual_terms.push_back(residualTermsOf(start, result, o));
   return result;

@@ -17,8 +17,6 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr double MIN_DAMPING = 1e-6;
-constexpr double MAX_DAMPING = 0.5;
 // A gain below this share of the tallest line counts as zero.
 constexpr double LEAST_GAIN = 1e-6;
 // The equivalent mode above the band is at least a few percent above the last line.

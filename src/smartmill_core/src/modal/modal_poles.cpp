@@ -19,13 +19,6 @@ using Eigen::VectorXcd;
 
 /// Angle of z over the lines; the remaining angle is left for computational poles.
 constexpr double TURN = 0.95 * units::PI;
-/// Largest relative change of a pole between orders within a track.
-constexpr double SAME_FREQUENCY = 0.003;
-/// Largest relative change of frequency and damping of a stable pole in the diagram.
-constexpr double STABLE_FREQUENCY = 0.01, STABLE_DAMPING = 0.2;
-/// Least number of orders of a persistent pole.
-constexpr std::size_t LEAST_ORDERS = 3;
-
 /// Sums over the lines of one FRF, from which the normal equations of every order are built.
 struct LineSums {
   VectorXcd plain, mixed, mixed_back, power;  // sum w z^m, -w h z^m, -w h z^-m, w |h|^2 z^m
@@ -89,18 +82,18 @@ VectorXcd denominator(const std::vector<LineSums>& sums, int order) {
   return a;
 }
 
-bool isSamePole(const Pole& a, const Pole& b) {
-  return std::abs(a.frequency - b.frequency) < STABLE_FREQUENCY * b.frequency &&
-         std::abs(a.damping_ratio - b.damping_ratio) < STABLE_DAMPING * b.damping_ratio + 2e-5;
+bool isSamePole(const Pole& a, const Pole& b, const PoleSearch& search) {
+  return std::abs(a.frequency - b.frequency) < search.stable_frequency * b.frequency &&
+         std::abs(a.damping_ratio - b.damping_ratio) < search.stable_damping * b.damping_ratio + 2e-5;
 }
 
 /// One pole through the orders.
 struct Track {
   std::vector<Pole> poles;
 
-  double distance(const Pole& p) const {
+  double distance(const Pole& p, double same_frequency) const {
     const Pole& last = poles.back();
-    const double width = std::max(SAME_FREQUENCY * last.frequency, 0.5 * last.halfWidth());
+    const double width = std::max(same_frequency * last.frequency, 0.5 * last.halfWidth());
     return std::hypot((p.frequency - last.frequency) / width,
                       (p.damping_ratio - last.damping_ratio) / (0.4 * last.damping_ratio + 3e-5));
   }
@@ -115,13 +108,13 @@ struct Track {
   }
 };
 
-void follow(std::vector<Track>& tracks, const std::vector<Pole>& now) {
+void follow(std::vector<Track>& tracks, const std::vector<Pole>& now, double same_frequency) {
   std::vector<bool> used(now.size(), false);
   for (Track& track : tracks) {
     double nearest = 1.0;
     std::size_t at = now.size();
     for (std::size_t k = 0; k < now.size(); ++k) {
-      const double far = track.distance(now[k]);
+      const double far = track.distance(now[k], same_frequency);
       if (!used[k] && far < nearest) nearest = far, at = k;
     }
     if (at == now.size()) continue;
@@ -153,7 +146,8 @@ std::vector<Pole> polesByOrder(const WeightedLines& lines, const PoleSearch& sea
       if (!(pole.real() < 0.0) || !(pole.imag() > low && pole.imag() < high)) continue;
       const double frequency = std::abs(pole);
       Pole p{order, frequency, -pole.real() / frequency, false};
-      p.stable = std::any_of(before.begin(), before.end(), [&](const Pole& b) { return isSamePole(p, b); });
+      p.stable =
+          std::any_of(before.begin(), before.end(), [&](const Pole& b) { return isSamePole(p, b, search); });
       now.push_back(p);
     }
     poles.insert(poles.end(), now.begin(), now.end());
@@ -168,13 +162,13 @@ std::vector<Pole> persistentPoles(const std::vector<Pole>& poles, const PoleSear
   for (int order = 2; order <= search.largest_order; order += search.order_step) {
     std::vector<Pole> now;
     for (; i < poles.size() && poles[i].order == order; ++i) now.push_back(poles[i]);
-    follow(tracks, now);
+    follow(tracks, now, search.same_frequency);
   }
   std::stable_sort(tracks.begin(), tracks.end(),
                    [](const Track& a, const Track& b) { return a.poles.size() > b.poles.size(); });
   std::vector<Pole> found;
   for (const Track& track : tracks) {
-    if (track.poles.size() < LEAST_ORDERS) break;
+    if (track.poles.size() < search.least_orders) break;
     const Pole p = track.middle();
     const bool known = std::any_of(found.begin(), found.end(), [&](const Pole& q) {
       return std::abs(q.frequency - p.frequency) < 0.3 * q.halfWidth() + 1e-5 * q.frequency;

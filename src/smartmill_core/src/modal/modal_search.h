@@ -1,12 +1,8 @@
 #pragma once
 
-#include <functional>
-#include <set>
-#include <utility>
 #include <vector>
 
-#include "modal_window.h"
-#include "smartmill_core/modal/modal_estimate.h"
+#include "residual_modes.h"
 
 namespace smartmill {
 
@@ -32,42 +28,23 @@ class ModalSearch {
   /// last with all lines and to full convergence
   bool refitAll(int sweeps, bool last);
 
-  /// Adds modes of clear peaks whose phase does not identify a mode (few lines on a peak, random excitation),
-  /// fitted to the logarithm of the magnitude.
-  void addByMagnitude();
-
-  std::size_t modes() const { return modes_.size(); }
+  ResidualModes& found() { return found_; }
   /// The significant modes, or the others; lowest frequency first.
   std::vector<EstimatedMode> results(bool proven) const;
 
  private:
-  struct Span {
-    std::size_t first = 0, last = 0;
-  };
-
-  double reach(double frequency, double damping) const;
-  Span spanOf(const std::vector<EstimatedMode>& members) const;
-  std::vector<std::size_t> neighbours(double frequency, double damping) const;
-  WeightedLines window(const Span& span, const std::vector<std::size_t>& members) const;
-  WeightedLines cut(const std::vector<EstimatedMode>& all, const std::vector<std::size_t>& members,
-                    double lines_a_half_width) const;
   double score(const Pole& candidate) const;
   bool tryPole(double frequency, double damping);
   bool refit(const std::vector<std::size_t>& members, const EstimatedMode* more, bool last);
   Eigen::Index worst(const WindowFit& fit, double least) const;
   bool hasModeAt(const Pole& p) const;
   void fitCluster(const std::vector<Pole>& cluster);
-  void replaceModes(const std::vector<std::size_t>& members, const ModalWindow& window, const WindowFit& fit);
-  void subtract(const EstimatedMode& mode, double sign);
-  bool fitMagnitude(const std::vector<double>& magnitude, std::size_t peak);
-  bool inBand(double frequency, double damping) const;
   double frequencyOfLargestResidual() const;
   bool reportProgress(double share) const;
 
-  const WeightedLines& lines_;
   const ModalEstimateOptions& options_;
-  std::vector<std::vector<std::complex<double>>> residual_;  // measured minus all modes
-  std::vector<EstimatedMode> modes_;
+  const ModalSearchOptions& search_;
+  ResidualModes found_;
   std::vector<double> tried_frequencies_;  // [Hz] frequencies that addAtLargestResidual() has tried
 };
 

@@ -14,12 +14,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double MIN_DAMPING = 1e-6, MAX_DAMPING = 0.5;
 constexpr Index POWERS = 3, BACKGROUND = 2 * POWERS;  // of the parabola: real and imaginary part
-/// Probability of a false mode in a record; the bound used is five times as strict.
-constexpr double CHANCE = 0.05;
-/// Ratio of the powers of misfit and noise above which the misfit is more than noise.
-constexpr double MORE_THAN_NOISE = 2.0;
 
 Eigen::Index at(std::size_t i) {
   return static_cast<Eigen::Index>(i);
@@ -53,14 +48,11 @@ Complex unitMode(double f, double f0, double zeta) {
   return {real * size, -imag * size};
 }
 
-Index WindowFit::weakest() const {
-  return std::min_element(evidence.begin(), evidence.end()) - evidence.begin();
-}
-
-ModalWindow::ModalWindow(WeightedLines lines, bool real_modes, std::size_t lines_searched)
+ModalWindow::ModalWindow(WeightedLines lines, const ModalEstimateOptions& options, std::size_t lines_searched)
     : lines_(std::move(lines)),
-      real_modes_(real_modes),
-      chance_(std::log(static_cast<double>(lines_searched) / CHANCE)) {
+      real_modes_(options.real_modes),
+      more_than_noise_(options.search.more_than_noise),
+      chance_(std::log(static_cast<double>(lines_searched) / options.search.chance)) {
   background_ = MatrixXd::Zero(at(2 * lines_.size()), BACKGROUND);
   const double middle = 0.5 * (lines_.frequency.front() + lines_.frequency.back());
   const double half = 0.5 * (lines_.frequency.back() - lines_.frequency.front());
@@ -313,8 +305,8 @@ bool ModalWindow::addMisfit(const WindowFit& fit) {
       misfit += fit.frfs[o].residual.segment<2>(at(2 * i)).squaredNorm() / square;
       noise += 2.0 / square;
     }
-    if (!(misfit > MORE_THAN_NOISE * noise) &&
-        !(fit.frfs[o].residual.squaredNorm() > MORE_THAN_NOISE * static_cast<double>(2 * lines_.size())))
+    if (!(misfit > more_than_noise_ * noise) &&
+        !(fit.frfs[o].residual.squaredNorm() > more_than_noise_ * static_cast<double>(2 * lines_.size())))
       continue;
     const double even = std::max(0.0, misfit - noise) / static_cast<double>(2 * lines_.size());
     for (double& w : lines_.weight[o]) w = 1.0 / std::sqrt(1.0 / (w * w) + even);

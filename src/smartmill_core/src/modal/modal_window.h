@@ -6,9 +6,13 @@
 #include <Eigen/Core>
 
 #include "smartmill_core/fit/least_squares.h"
+#include "smartmill_core/modal/modal_estimate.h"
 #include "smartmill_core/modal/modal_poles.h"
 
 namespace smartmill {
+
+/// Bounds of damping ratios in fits: a perfect spring and a hardly oscillating mode.
+constexpr double MIN_DAMPING = 1e-6, MAX_DAMPING = 0.5;
 
 /// Logarithms of frequency [Hz] and damping ratio of each mode.
 struct PoleList {
@@ -44,15 +48,13 @@ struct WindowFit {
   std::vector<Eigen::MatrixXd> covariance;  // of each FRF's shares, including the contribution of the poles
   std::vector<double> variance;  // [1] of the misfit around each mode, times the number of correlated lines
   std::vector<double> evidence;  // of each mode: Wald statistic over its largest value by chance
-
-  Eigen::Index weakest() const;
 };
 
 /// Modes in an interval of lines, by variable projection: the search is over the poles only.
 class ModalWindow : public fit::Residuals {
  public:
   /// @param lines_searched number of lines that could show a mode by chance
-  ModalWindow(WeightedLines lines, bool real_modes, std::size_t lines_searched);
+  ModalWindow(WeightedLines lines, const ModalEstimateOptions& options, std::size_t lines_searched);
 
   Eigen::Index count() const override;
   bool evaluate(const Eigen::VectorXd& at, Eigen::VectorXd* residual,
@@ -85,7 +87,7 @@ class ModalWindow : public fit::Residuals {
 
   WeightedLines lines_;
   bool real_modes_;
-  double chance_;
+  double more_than_noise_, chance_;
   Eigen::MatrixXd background_;  // 2 lines x BACKGROUND, not weighted
 };
 

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/signal/force_channels.h"
 
@@ -86,7 +87,7 @@ EffectParameter modes(const char* key) {
 }
 
 const std::vector<std::string>& axisNames() {
-  static const std::vector<std::string> NAMES{"x", "y", "z"};
+  static const std::vector<std::string> NAMES(AXIS_NAMES.begin(), AXIS_NAMES.end());
   return NAMES;
 }
 

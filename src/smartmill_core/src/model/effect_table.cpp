@@ -1,6 +1,7 @@
 #include <array>
 #include <cmath>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/model/effect_catalogue.h"
@@ -77,7 +78,7 @@ std::string needText(const EffectKind& kind) {
 
 std::string effectTable() {
   const MachineModel mill = exampleMill();
-  EffectScope scope{mill, {"fx", "fy", "fz", "load_meter"}, {"x", "y", "z"}};
+  EffectScope scope{mill, {"fx", "fy", "fz", "load_meter"}, {AXIS_NAMES.begin(), AXIS_NAMES.end()}};
   scope.largest_force = 500.0;
   std::string table =
       "| name | what it does | keys (unit; range) | stage | coordinates of a fit (bounds; prior deviation) "

@@ -29,32 +29,33 @@ void set(const Parameter& parameter, const std::string& option, const std::strin
 }  // namespace
 
 ParameterOptions::ParameterOptions(CommandLine& line, const ParameterTable& table, const std::string& shipped)
-    : line_(line), table_(table) {
-  line.option("--params", file_, "parameter file in the format of " + shipped + " (keys below)");
+    : line_(line), values_(std::make_shared<Values>(Values{table, "", {}})) {
+  line.option("--params", values_->file, "parameter file in the format of " + shipped + " (keys below)");
   line.footer("\n" + table.yaml());
+  line.afterParsing([values = values_] { values->apply(); });
 }
 
 void ParameterOptions::add(const std::string& option, const std::string& key) {
-  const Parameter* parameter = table_.find(key);
+  const Parameter* parameter = values_->table.find(key);
   if (!parameter) throw std::logic_error("no parameter " + key);
-  given_.push_back({option, key});
-  line_.option(option, *given_.back().text, parameter->description() + " (" + parameter->value() + ")");
+  const Given& given = values_->given.emplace_back(Given{option, key});
+  line_.option(option, *given.text, parameter->description() + " (" + parameter->value() + ")");
 }
 
-void ParameterOptions::apply() {
-  if (!file_.empty()) {
-    ParameterReader reader = ParameterReader::fromFile(file_);
-    reader.read(table_);
+void ParameterOptions::Values::apply() const {
+  if (!file.empty()) {
+    ParameterReader reader = ParameterReader::fromFile(file);
+    reader.read(table);
     reader.finish();
   }
-  for (const Given& given : given_) {
-    if (given.text->empty()) continue;
-    const Parameter& parameter = *table_.find(given.key);
-    set(parameter, given.option, *given.text);
+  for (const Given& one : given) {
+    if (one.text->empty()) continue;
+    const Parameter& parameter = *table.find(one.key);
+    set(parameter, one.option, *one.text);
     try {
       parameter.check();
     } catch (const Error& error) {
-      throw Error(given.option + ": " + error.what());
+      throw Error(one.option + ": " + error.what());
     }
   }
 }

@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "smartmill_core/error.h"
-#include "smartmill_core/fit/derivative_check.h"
+#include "smartmill_core/testing/derivative_check.h"
 #include "smartmill_core/testing/temporary_folder.h"
 
 namespace smartmill::fit {

@@ -7,7 +7,6 @@
 
 #include "modal/modal_window.h"
 #include "smartmill_core/error.h"
-#include "smartmill_core/fit/derivative_check.h"
 #include "smartmill_core/testing/coverage.h"
 #include "smartmill_core/units.h"
 
@@ -266,7 +265,7 @@ TEST(ModalWindow, SlopeOfTheSquaresAgreesWithDifferences) {
   const FrequencyResponse frf =
       measured({{{1000.0, 0.02, 1e-8}, {1080.0, 0.03, 5e-9}}, 4.0, 2000.0, 0.01}, 1);
   WeightedLines lines{frf.frequency, {frf.value}, {std::vector<double>(frf.size(), 1e9)}};
-  const ModalWindow window(lines, false, frf.size());
+  const ModalWindow window(lines, {}, frf.size());
   const PoleList at = PoleList().with(990.0, 0.025).with(1090.0, 0.02);
   Eigen::VectorXd residual(window.count());
   Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(window.count(), 4);

@@ -7,7 +7,7 @@
 
 #include "modal/modal_residuals.h"
 #include "smartmill_core/error.h"
-#include "smartmill_core/fit/derivative_check.h"
+#include "smartmill_core/testing/derivative_check.h"
 
 namespace smartmill {
 namespace {

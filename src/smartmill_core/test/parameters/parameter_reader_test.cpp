@@ -117,7 +117,7 @@ TEST_F(ParameterFiles, EveryErrorIsOneLineWithKeyAndValue) {
 class Options : public ParameterFiles {
  protected:
   struct Tool {
-    Tool() : table(tableOf(parameters)), options(line, table, "launch/config/x.yaml") {
+    Tool() : options(line, tableOf(parameters), "launch/config/x.yaml") {
       options.add("--bandwidth-hz", "bandwidth");
       options.add("--hits", "hits");
     }
@@ -128,14 +128,13 @@ class Options : public ParameterFiles {
       for (const std::string& word : words) argv.push_back(word.c_str());
       if (line.parse(static_cast<int>(argv.size()), argv.data()).stop) return "not parsed";
       try {
-        options.apply();
+        line.runAfterParsing();
       } catch (const Error& error) {
         return error.what();
       }
       return {};
     }
     Parameters parameters;
-    ParameterTable table;
     CommandLine line;
     ParameterOptions options;
   };

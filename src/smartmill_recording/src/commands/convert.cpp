@@ -2,7 +2,6 @@
 
 #include <cstdio>
 #include <map>
-#include <memory>
 #include <string>
 
 #include "smartmill_recording/commands.h"
@@ -34,26 +33,22 @@ void run(const Arguments& arguments) {
 }  // namespace
 
 Command convertCommand() {
-  Command command;
-  command.name = command.tool = "convert";
-  command.summary = "copies a recording to the other format, bag or MCAP";
+  Command command("convert", "copies a recording to the other format, bag or MCAP");
   command.description =
       "Copies a recording (bag of format 2.0, MCAP file) to a bag or an MCAP file. Messages, times of "
       "reception, definitions and publishers stay.";
   command.examples = {{"session.bag -o session.mcap --compression zstd", "for programs that read MCAP files"},
                       {"session.mcap -o session.bag", "for the tools of ROS 1"}};
   command.files = {{"OUT", "the copy; PATH.active until it is complete"}};
-  command.declare = [](CommandLine& line) -> std::function<int()> {
-    const auto arguments = std::make_shared<Arguments>();
+  command.setBody(run, [](CommandLine& line, Arguments& arguments) {
     std::vector<std::string> names;
     for (const auto& [name, compression] : compressions()) names.push_back(name);
-    line.option("RECORDING", arguments->from, "bag or MCAP file").required();
-    line.option("-o,--out", arguments->to, "file to write, *.bag or *.mcap").required();
-    line.option("--compression", arguments->compression, "of the chunks; zstd in MCAP files only")
+    line.option("RECORDING", arguments.from, "bag or MCAP file").required();
+    line.option("-o,--out", arguments.to, "file to write, *.bag or *.mcap").required();
+    line.option("--compression", arguments.compression, "of the chunks; zstd in MCAP files only")
         .oneOf(names)
         .showDefault();
-    return commandBody(arguments, run);
-  };
+  });
   return command;
 }
 

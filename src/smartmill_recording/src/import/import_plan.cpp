@@ -4,6 +4,7 @@
 #include <set>
 #include <system_error>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/model/strict_yaml.h"
 
 namespace smartmill::recording {
@@ -43,7 +44,8 @@ ChannelChoice readChoice(const StrictYaml& map, const std::string& column) {
 TestSettings readSettings(const StrictYaml& map) {
   TestSettings settings;
   if (map.has("kind")) settings.kind = map.oneOf("kind", {"cut", "air", "tap"});
-  if (map.has("direction")) settings.direction = map.oneOf("direction", {"x", "y", "z"});
+  if (map.has("direction"))
+    settings.direction = map.oneOf("direction", {AXIS_NAMES.begin(), AXIS_NAMES.end()});
   for (const SettingKey& key : settingKeys()) settings.*key.value = map.optionalNumber(key.key, key.range);
   if (const auto channels = map.optionalMap("channels")) {
     for (const std::string& column : channels->keys())

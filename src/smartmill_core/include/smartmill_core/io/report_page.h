@@ -19,8 +19,9 @@ class ReportPage {
   std::ostream& html() { return body_; }
   /// Embeds a picture. @throws Error when it cannot be read
   void picture(const std::string& file, const std::string& caption);
-  /// The subset of Markdown that the project's reports use: headings, paragraphs, tables, lists, pictures
-  /// (from a folder), **bold** and `code`. A first-level title replaces the title of the page.
+  /// By hand, since libcmark has no tables and pictures in the file need a walk through its tree. The subset
+  /// of Markdown that the project's reports use: headings, paragraphs, tables, lists, pictures (from a
+  /// folder), **bold** and `code`. A first-level title replaces the title of the page.
   void markdown(const std::string& text, const std::string& folder);
 
   std::string text() const;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,6 +14,9 @@ namespace smartmill {
 /// FRF estimator: H1 = S_fx / S_ff (Dunwoody eq. 4.26, biased low by noise of the force), H2 = S_xx / S_fx*
 /// (eq. 4.27, biased high by noise of the response), Hv between them: sqrt(|H1 H2|) with their phase.
 enum class FrfAverage { h1, h2, hv };
+
+/// Fewest samples before a hit for its baseline and noise: a standard deviation to 10 %.
+constexpr std::size_t LEAST_QUIET_SAMPLES = 48;
 
 /// Noise of a sample where a structure may still ring: the smaller of its scatter and the noise from sixth
 /// differences, which suppress slow ringing.
@@ -32,6 +36,9 @@ struct ImpactOptions {
   /// motion within this time raises the mean. 0: instantaneous samples.
   double averaged_share = 0.0;
   std::string unit = "m/N";  ///< of the FRF
+  /// Lines on each side over which the variance is averaged. The variance from a few hits is itself
+  /// uncertain, and lines that agree by chance would get far too much weight in a fit.
+  std::size_t smooth_lines = 8;
 };
 
 /// Windows, transforms and averages hits of one point (Dunwoody eq. 4.15..4.27). The baseline before the

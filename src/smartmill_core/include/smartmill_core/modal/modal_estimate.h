@@ -6,6 +6,7 @@
 
 #include "smartmill_core/modal/modal_model.h"
 #include "smartmill_core/modal/modal_poles.h"
+#include "smartmill_core/modal/modal_search_options.h"
 #include "smartmill_core/signal/frequency_response.h"
 
 namespace smartmill {
@@ -17,6 +18,7 @@ struct ModalEstimateOptions {
   bool real_modes = false;  ///< proportional damping: gains without phase
   /// Called with the completed share, 0..1. @return false to stop with the modes found so far
   std::function<bool(double)> progress = {};
+  ModalSearchOptions search = {};
 };
 
 /// One mode in all FRFs: (gain + i phase_part f / f_n) f_n^2 / (f_n^2 - f^2 + 2 i zeta f_n f). With

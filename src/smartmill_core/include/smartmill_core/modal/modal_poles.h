@@ -27,11 +27,15 @@ struct Pole {
   double halfWidth() const { return frequency * damping_ratio; }  ///< [Hz] of its peak
 };
 
-/// Lines and orders that polesByOrder() uses.
+/// Lines and orders that polesByOrder() uses, and how poles are compared from order to order.
 struct PoleSearch {
   std::size_t first = 0, last = 0;  ///< lines first .. last - 1
   int largest_order = 60;
   int order_step = 1;
+  double same_frequency = 0.003;   ///< [1] largest change of a pole from order to order within a track
+  double stable_frequency = 0.01;  ///< [1] and of a stable pole in the diagram, as is usual
+  double stable_damping = 0.2;     ///< [1] the same for its damping ratio, which scatters more
+  std::size_t least_orders = 3;    ///< of a persistent pole; computational ones persist over two by chance
 };
 
 /// Poles by the poly-reference least-squares complex frequency method (Peeters, Van der Auweraer, Guillaume

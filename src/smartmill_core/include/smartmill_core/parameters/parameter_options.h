@@ -2,7 +2,6 @@
 
 #include <memory>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "smartmill_core/parameters/parameter_table.h"
@@ -14,7 +13,9 @@ namespace smartmill {
 /// that override single parameters, and the list of all with their defaults at the end of --help.
 class ParameterOptions {
  public:
-  /// @param table of the struct that the command line changes; both outlive this
+  /// After parsing, the file and then the options are read into the struct. An unknown key, a wrong type or a
+  /// value out of its bounds is an Error.
+  /// @param table of the struct that the command line changes and that outlives the line
   /// @param shipped path of the node's own file, for --help
   ParameterOptions(CommandLine& line, const ParameterTable& table, const std::string& shipped);
 
@@ -22,19 +23,20 @@ class ParameterOptions {
   /// default in --help come from the table.
   void add(const std::string& option, const std::string& key);
 
-  /// Reads the file, then the options; call it after the command line is parsed.
-  /// @throws Error on an unknown key, a wrong type or a value out of its bounds.
-  void apply();
-
  private:
   struct Given {
     std::string option, key;
     std::shared_ptr<std::string> text = std::make_shared<std::string>();
   };
+  struct Values {
+    ParameterTable table;
+    std::string file;
+    std::vector<Given> given;
+
+    void apply() const;
+  };
   CommandLine& line_;
-  const ParameterTable& table_;
-  std::string file_;
-  std::vector<Given> given_;
+  std::shared_ptr<Values> values_;  // shared with the command line
 };
 
 }  // namespace smartmill

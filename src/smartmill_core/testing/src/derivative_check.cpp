@@ -1,9 +1,9 @@
-#include "smartmill_core/fit/derivative_check.h"
+#include "smartmill_core/testing/derivative_check.h"
 
 #include <cmath>
 #include <memory>
 
-#include "cost_function.h"
+#include "fit/cost_function.h"
 #include "smartmill_core/error.h"
 
 namespace smartmill::fit {
