@@ -159,7 +159,7 @@ TEST_F(BridgeTest, RefusalsSendNothing) {
   const std::optional<Outcome> limit = bridge_->runProgram("far", "G0 X100\nX250\n", {});
   ASSERT_TRUE(limit);
   EXPECT_EQ(limit->code, MotionCode::limit);
-  EXPECT_EQ(limit->message, "program far: line 2: X would go to 250 mm, limits -200 to 200 mm (machine)");
+  EXPECT_EQ(limit->message, "program far: line 2, column 1: X would go to 250 mm, limits -200 to 200 mm (machine)");
   EXPECT_EQ(bridge_->runProgram("bad", "G2 X1 Y1\n", {})->code, MotionCode::bad_goal);
   EXPECT_EQ(machine_.get(machine_.all_text), "");
   ASSERT_FALSE(bridge_->jog("x", 0.01, 0.001));
