@@ -39,7 +39,6 @@ void Bridge::step(double now) {
     state_.connected = true;
     load_ = reading->load;
     alarms_ = reading->alarms;
-    increment_ = reading->increment;
     noteLoss(motion_.step(*reading, now));
   }
   if (!controller_->connected()) {

@@ -14,7 +14,6 @@
 namespace smartmill::report {
 namespace {
 
-constexpr double SETTLE_REVOLUTIONS = 10.0;
 constexpr double DRAWN_REVOLUTIONS = 3.0;
 
 /// A table for gnuplot; infinite values are not drawn.

@@ -22,7 +22,6 @@ constexpr double LEAST_RANGE = 0.2;      // [1] of the largest axis; axes below 
 constexpr double POCKET_FACTOR = 1.3;    // [1] over the adjacent minima
 constexpr double POCKET_CEILING = 20.0;  // [1] of the absolute limit
 constexpr int MOST_POCKETS = 4;
-constexpr double SETTLE_REVOLUTIONS = 10.0;
 constexpr int WINDOW_REVOLUTIONS = 16;
 constexpr const char* AXES = "xyz";
 constexpr const char* RESONANCE = "resonance";

@@ -6,6 +6,8 @@
 
 namespace smartmill::session {
 
+// By hand: Boost.Process would save 12 lines, but needs the library boost_filesystem.
+
 /// Runs a program on PATH to its end. @param log file for all its output
 /// @param stopped polled; once it returns true, the program gets SIGINT, and SIGKILL if it does not end
 /// @return exit code, 128 + signal if a signal ended it. @throws Error if it cannot be started.

@@ -11,10 +11,7 @@
 namespace smartmill::session {
 namespace {
 
-constexpr int DECIMALS = 3;                                   // of lengths in mm: the controller's increment
-constexpr double EXIT_MARGIN = 1e-3;                          // [m] from the far side of the stock
-constexpr double RUN_OUT_TIME = 0.1;                          // [s] of feed beyond the steady segment
-constexpr double SPIN_UP_RESERVE = 1.2, SPIN_UP_EXTRA = 0.3;  // [1], [s]
+constexpr int DECIMALS = 3;  // of lengths in mm: the controller's increment
 
 /// The controller accepts integer revolutions per minute.
 double wholeRpm(double speed) {
@@ -78,7 +75,7 @@ double CutPlanner::laneY(std::size_t lane) const {
 
 double CutPlanner::spinUp(double speed) const {
   const double time = spindle_.acceleration ? speed / *spindle_.acceleration : parameters_.spin_up_time;
-  return SPIN_UP_RESERVE * time + SPIN_UP_EXTRA;
+  return parameters_.reserves.spin_up_factor * time + parameters_.reserves.spin_up_extra;
 }
 
 void CutPlanner::checkSpeed(const std::string& name, double speed) const {
@@ -123,8 +120,8 @@ PlannedCut CutPlanner::slot(const SlotRequest& request) const {
   const double y = laneY(request.lane), z = stock_.high[2] - request.depth;
   planned.from = {stock_.low[0] - tool_.radius() - parameters_.clearance, y, z};
   const double steady_from = stock_.low[0] + tool_.radius() + feed_per_revolution;
-  const double far_end = stock_.high[0] - tool_.radius() - EXIT_MARGIN;
-  const double run_out = planned.feed * RUN_OUT_TIME;
+  const double far_end = stock_.high[0] - tool_.radius() - parameters_.reserves.exit;
+  const double run_out = planned.feed * parameters_.reserves.run_out_time;
   const double steady_to = std::min(far_end, steady_from + planned.feed * request.time);
   const double time = (steady_to - steady_from) / planned.feed;
   if (!(time >= std::min(request.least_time, request.time))) {
@@ -169,7 +166,8 @@ PlannedCut CutPlanner::airMove(double speed, double feed, double time, double di
                 numberText(axes_.rapid / units::MM * 60.0) + " mm/min");
   }
   planned.feed = feed;
-  const double run_in = feed * RUN_OUT_TIME, y = laneY(0), z = stock_.high[2] + parameters_.safe_height;
+  const double run_in = feed * parameters_.reserves.run_out_time, y = laneY(0),
+               z = stock_.high[2] + parameters_.safe_height;
   condition.steady_from = {stock_.low[0] + run_in, y, z};
   condition.steady_to = {condition.steady_from[0] + std::max(distance, feed * time), y, z};
   planned.from = {stock_.low[0], y, z};

@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include <smartmill_msgs/SampleBlock.h>
-#include <smartmill_msgs/SessionState.h>
 #include <smartmill_msgs/SpindleAngle.h>
 #include <boost/function.hpp>
 
@@ -55,14 +53,11 @@ Session::Session(ros::NodeHandle nh, const ros::NodeHandle& private_nh, const st
       parameters_(parametersFromServer(private_nh).readAll<SessionParameters>()),
       model_(readMachineModel(parameters_.model)),
       plan_(model_, parameters_.plan),
-      begin_(ros::WallTime::now()),
+      log_(nh_, parameters_.plan.tool, plan_.material()),
       tool_frf_(nh_, names::MEASURE_TOOL_FRF, false),
       sensor_frf_(nh_, names::MEASURE_SENSOR_FRF, false),
       identify_(nh_, names::IDENTIFY_COEFFICIENTS, false),
-      driver_(nh_, [this] { return stop_.load(); }),
-      state_(nh_.advertise<smartmill_msgs::SessionState>(names::SESSION_STATE, 100, true)) {
-  summary_.tool = parameters_.plan.tool;
-  summary_.material = plan_.material();
+      driver_(nh_, [this] { return stop_.load(); }) {
   const auto subscribe = [this](const char* topic, auto example, auto use) {
     using Message = decltype(example);
     const boost::function<void(const Message&)> callback = [this, topic, use](const Message& message) {
@@ -105,21 +100,21 @@ int Session::run() {
   int code = 1;
   try {
     runSteps();
-    summary_.completed = true;
+    log_.summary.completed = true;
     code = 0;
   } catch (const Interrupted&) {
-    recordStep("stop", "interrupted",
-               armed_ ? "goals cancelled, motion is being disarmed" : "goals cancelled");
+    log_.record("stop", "interrupted",
+                armed_ ? "goals cancelled, motion is being disarmed" : "goals cancelled");
   } catch (const std::exception& error) {
-    recordStep("FAIL", "session", error.what());
+    log_.record("FAIL", "session", error.what());
   }
   if (code != 0) makeSafe();
-  publishState("", true);
+  log_.publish("", true);
   if (!parameters_.summary.empty()) {
     try {
-      summary_.write(parameters_.summary);
+      log_.summary.write(parameters_.summary);
     } catch (const Error& error) {
-      recordStep("FAIL", "summary", error.what());
+      log_.record("FAIL", "summary", error.what());
       code = 1;
     }
   }
@@ -173,49 +168,13 @@ void Session::runSteps() {
 
 void Session::step(const std::string& name, const std::function<std::string()>& work) {
   driver_.checkStop();
-  publishState(name);
+  log_.publish(name);
   try {
     const std::string detail = work();
-    recordStep("ok", name, detail);
+    log_.record("ok", name, detail);
   } catch (const Error& error) {
     throw Error(name + ": " + error.what());
   }
-}
-
-void Session::recordStep(const char* mark, const std::string& name, const std::string& detail) {
-  const double elapsed = (ros::WallTime::now() - begin_).toSec();
-  std::printf("session [%6.1f s] %-4s %s%s%s\n", elapsed, mark, name.c_str(), detail.empty() ? "" : ": ",
-              detail.c_str());
-  std::fflush(stdout);
-  summary_.steps.push_back({name, detail, elapsed, std::string(mark) == "ok"});
-  using Step = smartmill_msgs::SessionStep;
-  outcomes_.push_back(summary_.steps.back().done ? Step::DONE : *mark == 's' ? Step::STOPPED : Step::FAILED);
-}
-
-void Session::publishState(const std::string& running, bool ended) {
-  constexpr double SENDING = 0.2;  // [s] for the transmission of the last message before the program ends
-  smartmill_msgs::SessionState message;
-  message.header.stamp = ros::Time::now();
-  message.tool = summary_.tool;
-  message.material = summary_.material;
-  message.running = !ended;
-  message.completed = summary_.completed;
-  for (std::size_t k = 0; k < summary_.steps.size(); ++k) {
-    smartmill_msgs::SessionStep step;
-    step.name = summary_.steps[k].name;
-    step.detail = summary_.steps[k].detail;
-    step.elapsed = summary_.steps[k].elapsed;
-    step.state = outcomes_[k];
-    message.steps.push_back(step);
-  }
-  if (!running.empty()) {
-    smartmill_msgs::SessionStep step;
-    step.name = running;
-    step.elapsed = (ros::WallTime::now() - begin_).toSec();
-    message.steps.push_back(step);
-  }
-  state_.publish(message);
-  if (ended) ros::WallDuration(SENDING).sleep();
 }
 
 // ---------------------------------------------------------------------------------------------- waiting
@@ -289,7 +248,7 @@ std::string Session::measure(Client<smartmill_msgs::MeasureFrfAction>& client, c
   goal.stickout = tool ? model_.stickout.value_or(0.0) : 0.0;
   goal.teeth = tool ? static_cast<std::uint32_t>(model_.tool->teeth) : 0;
   const auto result = driver_.call(client, name, goal, parameters_.frf_timeout);
-  summary_.modes.push_back(fromMsg(result.modes));
+  log_.summary.modes.push_back(fromMsg(result.modes));
   return modesText(result.modes);
 }
 
@@ -319,7 +278,7 @@ std::string Session::identify(bool reset) {
       driver_.call(identify_, names::IDENTIFY_COEFFICIENTS, goal, parameters_.identify_timeout);
   if (!reset) {
     coefficients_stamp_ = result.coefficients.header.stamp;
-    summary_.coefficients = {fromMsg(result.coefficients)};
+    log_.summary.coefficients = {fromMsg(result.coefficients)};
   }
   return result.message;
 }
@@ -369,7 +328,7 @@ std::string Session::verify(const char* role, const PlannedCut& cut, CutVerdict:
   verified.axial_depth = point.axial_depth;
   verified.depth_limit = point.depth_limit;
   verified.as_predicted = verified.verdict.kind == predicted;
-  summary_.verified.push_back(verified);
+  log_.summary.verified.push_back(verified);
   return detail + "; " + verified.verdict.text() +
          (verified.as_predicted ? ", as predicted by the chart"
                                 : ", the chart predicts " + std::string(role));
@@ -380,10 +339,10 @@ std::string Session::verify(const char* role, const PlannedCut& cut, CutVerdict:
 void Session::makeSafe() {
   if (!armed_ || !ros::ok()) return;
   try {
-    recordStep("stop", "disarm motion", driver_.makeSafe(stop_));
+    log_.record("stop", "disarm motion", driver_.makeSafe(stop_));
     armed_ = false;
   } catch (const Error& error) {
-    recordStep("FAIL", "disarm motion", error.what());
+    log_.record("FAIL", "disarm motion", error.what());
   }
 }
 

@@ -17,8 +17,8 @@
 #include <smartmill_msgs/StabilityChart.h>
 
 #include "session/machine_driver.h"
+#include "session_log.h"
 #include "session_parameters.h"
-#include "session_summary.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_launch/session/session_plan.h"
 
@@ -38,9 +38,6 @@ class Session {
  private:
   void runSteps();
   void step(const std::string& name, const std::function<std::string()>& work);
-  void recordStep(const char* mark, const std::string& name, const std::string& detail);
-  /// Publishes the steps so far. @param running name of the step in progress; empty: none
-  void publishState(const std::string& running, bool ended = false);
   void pause(double seconds) const;
   bool waitUntil(const std::function<bool()>& ready, double seconds) const;
 
@@ -63,16 +60,13 @@ class Session {
   SessionParameters parameters_;
   MachineModel model_;
   SessionPlan plan_;
-  SessionSummary summary_;
-  ros::WallTime begin_;
+  SessionLog log_;
   bool armed_ = false;
 
   Client<smartmill_msgs::MeasureFrfAction> tool_frf_, sensor_frf_;
   Client<smartmill_msgs::IdentifyCoefficientsAction> identify_;
   MachineDriver driver_;
   std::vector<ros::Subscriber> subscribers_;
-  ros::Publisher state_;
-  std::vector<std::uint8_t> outcomes_;  // SessionStep.DONE, ... of the summary's steps
   std::unique_ptr<ros::AsyncSpinner> spinner_;
 
   mutable std::mutex mutex_;                            // guards the members that subscribers write

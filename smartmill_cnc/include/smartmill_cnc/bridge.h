@@ -42,8 +42,6 @@ class Bridge {
   const std::vector<ControllerAlarm>& alarms() const { return alarms_; }
   /// Connections made and lost since the start.
   Poller::Counts connections() const { return poller_.counts(); }
-  /// [m] Increment of the controller's positions.
-  double positionIncrement() const { return increment_; }
 
   Answer<ArmCode> arm(bool on);
   /// Sets the overrides of the running program while motion is armed. @param reason for the log
@@ -88,7 +86,6 @@ class Bridge {
   CncState state_;
   std::optional<LoadSample> load_;
   std::vector<ControllerAlarm> alarms_;
-  double increment_ = 1e-6;  // [m]
 };
 
 }  // namespace smartmill::cnc

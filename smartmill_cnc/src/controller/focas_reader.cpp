@@ -227,7 +227,6 @@ void FocasReader::readPositions(const std::vector<SubReply>& replies, std::size_
     }
   }
   decimals_ = decimalsOf(replies[q.machine]);
-  reading.increment = units::MM * std::pow(10.0, -decimals_);
 }
 
 void FocasReader::readAlarms(std::uint32_t bits, CncState& state) {

@@ -2,55 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 #include <utility>
 
 #include "smartmill_cnc/linuxcnc/gateway_client.h"
 #include "smartmill_cnc/linuxcnc/silence_timer.h"
 #include "smartmill_core/error.h"
-#include "smartmill_core/formatted.h"
+#include "smartmill_core/nc/orientation.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::cnc::linuxcnc {
 namespace {
 
 constexpr int DECIMALS = 4;             // of lengths in mm; LinuxCNC computes in doubles
-constexpr double INCREMENT = 1e-7;      // [m]
 constexpr double ZERO_DISTANCE = 1e-9;  // [m] a smaller distance to go counts as zero
 constexpr double STREAM_TIMEOUT = 0.4;  // [s]
-constexpr int ORIENT_MACRO = 1133;      // angle of M119, 0 .. 4095, as on a Fanuc
-constexpr const char* UNMARK = "M68 E0 Q0\n";
-constexpr const char* STOP = "M5\nM66 P0 L3 Q30\n";  // waits for the input of standstill
-
-std::string number(double value) {
-  return formatted("%.4f", value);
-}
-
-/// Translates one block; checkProgram() separates its words by blanks.
-std::string blockText(const std::string& line, std::size_t count) {
-  std::istringstream words(line);
-  std::string word, out, tail;
-  bool dwell = false, moves = false;
-  while (words >> word) {
-    const char letter = word.front();
-    dwell = dwell || word == "G4";
-    if (dwell && (letter == 'P' || letter == 'X')) {
-      const double value = std::stod(word.substr(1));
-      word = "P" + number(letter == 'P' ? 1e-3 * value : value);
-    } else if (word == "M5") {
-      tail = std::string(UNMARK) + STOP;
-      continue;
-    } else if (word == "M119") {
-      tail = std::string(UNMARK) + STOP + "M19 R[#" + std::to_string(ORIENT_MACRO) + "*360/4096] Q20\n";
-      continue;
-    } else {
-      moves = moves || (letter >= 'X' && letter <= 'Z');
-    }
-    out += (out.empty() ? "" : " ") + word;
-  }
-  const std::string mark = moves ? "M67 E0 Q" + std::to_string(count) + "\n" : "";
-  return mark + (out.empty() ? "" : out + "\n") + tail;
-}
 
 Failure::Kind kindOf(Reply::Code code) {
   switch (code) {
@@ -67,6 +32,54 @@ Failure::Kind kindOf(Reply::Code code) {
       break;
   }
   return Failure::Kind::refused;
+}
+
+/// Mode for arming and running: DNC while programs are accepted.
+CncMode modeOf(const MachineStatus& status, bool open) {
+  switch (status.mode) {
+    case MachineStatus::Mode::mdi:
+      return CncMode::dnc;
+    case MachineStatus::Mode::manual:
+      return open || status.busy ? CncMode::jog : CncMode::dnc;
+    case MachineStatus::Mode::automatic:
+      break;
+  }
+  return CncMode::mem;
+}
+
+/// @param open programs are accepted @param done every block of the last program has been executed
+Reading readingOf(const MachineStatus& status, const ServoSample& servo, bool open, bool done) {
+  Reading reading;
+  CncState& state = reading.state;
+  const bool on = status.state == MachineStatus::State::on;
+  state.mode = modeOf(status, open);
+  state.run = status.held ? CncRun::hold : status.busy ? CncRun::start : open ? CncRun::stop : CncRun::reset;
+  state.motion = !status.in_position || std::abs(status.velocity) > 0.0;
+  state.emergency = status.state == MachineStatus::State::emergency;
+  state.alarm = !status.errors.empty() || (!on && !state.emergency);
+  state.alarm_text = status.errors.empty() && state.alarm ? "the machine is off" : status.errors;
+  if (!status.errors.empty()) {
+    reading.alarms.push_back({0, 0, 0, status.errors});
+  }
+  state.sequence = status.line;
+  state.axes = {"X", "Y", "Z"};
+  state.position.assign(status.position.begin(), status.position.end());
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double to_go = status.distance_to_go[axis];
+    state.distance_to_go.push_back(std::abs(to_go) < ZERO_DISTANCE ? 0.0 : to_go);
+    reading.absolute.push_back(status.position[axis] - status.offset[axis]);
+  }
+  state.spindle_speed = std::abs(servo.spindle_speed);
+  state.feed = status.velocity;
+  reading.at_rest = !state.motion && status.dwell_left <= 0.0;
+  reading.program_done = done;
+  LoadSample load;
+  load.spindle_load = servo.spindle_load;
+  load.spindle_speed = state.spindle_speed;
+  load.axes = state.axes;
+  load.axis_load.assign(3, NOT_A_NUMBER);
+  reading.load = std::move(load);
+  return reading;
 }
 
 class LinuxCncController : public Controller {
@@ -115,7 +128,7 @@ class LinuxCncController : public Controller {
     if (!servo || silence > STREAM_TIMEOUT) {
       return lost("connection to the " + name() + " lost: its servo stream is silent");
     }
-    return readingOf(*servo);
+    return readingOf(status_, *servo, open_, complete_ && status_.done == number_);
   }
 
   Status setVariable(int number, double value) override {
@@ -128,7 +141,9 @@ class LinuxCncController : public Controller {
     options.decimals = DECIMALS;
     return options;
   }
-  std::string orientProgram(double angle) const override { return cnc::orientProgram(angle, ORIENT_MACRO); }
+  std::string orientProgram(double angle) const override {
+    return cnc::orientProgram(angle, nc::ORIENT_VARIABLE);
+  }
 
   Status openPrograms() override {
     const Status opened = execute({CommandCode::open, 0, 0.0, {}});
@@ -211,57 +226,6 @@ class LinuxCncController : public Controller {
     }
   }
 
-  /// Mode for arming and running: DNC while programs are accepted.
-  CncMode mode() const {
-    switch (status_.mode) {
-      case MachineStatus::Mode::mdi:
-        return CncMode::dnc;
-      case MachineStatus::Mode::manual:
-        return open_ || status_.busy ? CncMode::jog : CncMode::dnc;
-      case MachineStatus::Mode::automatic:
-        break;
-    }
-    return CncMode::mem;
-  }
-
-  Reading readingOf(const ServoSample& servo) const {
-    Reading reading;
-    CncState& state = reading.state;
-    const bool on = status_.state == MachineStatus::State::on;
-    state.mode = mode();
-    state.run = status_.held   ? CncRun::hold
-                : status_.busy ? CncRun::start
-                : open_        ? CncRun::stop
-                               : CncRun::reset;
-    state.motion = !status_.in_position || std::abs(status_.velocity) > 0.0;
-    state.emergency = status_.state == MachineStatus::State::emergency;
-    state.alarm = !status_.errors.empty() || (!on && !state.emergency);
-    state.alarm_text = status_.errors.empty() && state.alarm ? "the machine is off" : status_.errors;
-    if (!status_.errors.empty()) {
-      reading.alarms.push_back({0, 0, 0, status_.errors});
-    }
-    state.sequence = status_.line;
-    state.axes = {"X", "Y", "Z"};
-    state.position.assign(status_.position.begin(), status_.position.end());
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double to_go = status_.distance_to_go[axis];
-      state.distance_to_go.push_back(std::abs(to_go) < ZERO_DISTANCE ? 0.0 : to_go);
-      reading.absolute.push_back(status_.position[axis] - status_.offset[axis]);
-    }
-    state.spindle_speed = std::abs(servo.spindle_speed);
-    state.feed = status_.velocity;
-    reading.increment = INCREMENT;
-    reading.at_rest = !state.motion && status_.dwell_left <= 0.0;
-    reading.program_done = complete_ && status_.done == number_;
-    LoadSample load;
-    load.spindle_load = servo.spindle_load;
-    load.spindle_speed = state.spindle_speed;
-    load.axes = state.axes;
-    load.axis_load.assign(3, NOT_A_NUMBER);
-    reading.load = std::move(load);
-    return reading;
-  }
-
   const std::string folder_;
   const double timeout_;  // [s]
   GatewayClient client_;
@@ -276,15 +240,6 @@ class LinuxCncController : public Controller {
 };
 
 }  // namespace
-
-std::string linuxCncText(const std::string& program) {
-  std::string text = "G21 G94 G61.1 M52 P1\n", line;
-  std::istringstream lines(program);
-  for (std::size_t count = 1; std::getline(lines, line); ++count) {
-    text += line.empty() ? "" : line.front() == '#' ? line + "\n" : blockText(line, count);
-  }
-  return text + UNMARK;
-}
 
 std::unique_ptr<Controller> makeLinuxCncController(const LinuxCncParameters& parameters,
                                                    std::shared_ptr<const ServoStream> stream,

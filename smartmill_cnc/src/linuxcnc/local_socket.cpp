@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <cstring>
 #include <system_error>
+#include <utility>
 
 #include "smartmill_core/error.h"
 
@@ -42,20 +43,6 @@ LocalDescriptor makeSocket() {
 }
 
 }  // namespace
-
-LocalDescriptor& LocalDescriptor::operator=(LocalDescriptor&& other) noexcept {
-  if (this != &other) {
-    reset();
-    fd_ = std::exchange(other.fd_, -1);
-  }
-  return *this;
-}
-
-void LocalDescriptor::reset() {
-  if (fd_ >= 0) {
-    ::close(std::exchange(fd_, -1));
-  }
-}
 
 LocalConnection::LocalConnection(LocalDescriptor descriptor) : descriptor_(std::move(descriptor)) {
 }

@@ -8,9 +8,6 @@
 namespace smartmill::cnc::linuxcnc {
 namespace {
 
-constexpr double SETTLING = 0.5;           // [s] of arrivals before times are defined
-constexpr double WINDOW = 10.0;            // [s] that contains a sample without delay
-constexpr double SLEW = 1e-4;              // [1] largest correction of the time of sample 0, per time
 constexpr double LATE_BIN = 1e-4;          // [s]
 constexpr double TRY_EVERY = 0.2;          // [s]
 constexpr std::uint64_t RESTART = 60'000;  // [samples] a larger gap is a restart of the controller
@@ -26,14 +23,14 @@ void ServoClock::addArrival(std::uint64_t number, double arrival) {
   window_ = std::min(window_, zero);
   const double earliest = std::min(window_, previous_window_);
   if (settled_) {
-    const double most = SLEW * std::max(0.0, arrival - last_);
+    const double most = options_.slew * std::max(0.0, arrival - last_);
     zero_ += std::clamp(earliest - zero_, -most, most);
   } else {
     zero_ = earliest;
-    settled_ = arrival - begun_ > SETTLING;
+    settled_ = arrival - begun_ > options_.settling;
   }
   last_ = arrival;
-  if (arrival - window_begun_ > WINDOW) {
+  if (arrival - window_begun_ > options_.window) {
     window_begun_ = arrival;
     previous_window_ = std::exchange(window_, std::numeric_limits<double>::infinity());
   }

@@ -1,31 +1,25 @@
 #include "smartmill_cnc/motion/nc_program.h"
 
-#include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <optional>
 #include <sstream>
 #include <utility>
 #include <vector>
 
-#include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
-#include "smartmill_core/require.h"
+#include "smartmill_core/nc/block_reader.h"
+#include "smartmill_core/nc/orientation.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::cnc {
 namespace {
 
+using nc::Word;
+
 constexpr const char* AXES = "XYZ";
-constexpr int ORIENT_STEPS = 4096;  // [1] per revolution
 constexpr std::size_t MAX_BLOCK = 200;
 constexpr double POSITION_TOLERANCE = 1e-9;  // [m] rounding of decimal input
-
-struct Word {
-  char letter;
-  double value;
-  std::string digits;
-};
+constexpr int MAX_SEQUENCE = 99999, MAX_CODE = 999;
 
 /// Exception for a block that must not be sent; converted to an NcCheck in this file.
 struct Refusal {
@@ -33,70 +27,18 @@ struct Refusal {
   std::string message;
 };
 
-[[noreturn]] void notUnderstood(const std::string& message) {
-  throw Refusal{NcVerdict::not_understood, message};
+[[noreturn]] void refuse(NcVerdict verdict, std::size_t column, const std::string& message) {
+  throw Refusal{verdict, "column " + std::to_string(column) + ": " + message};
 }
-[[noreturn]] void outside(const std::string& message) {
-  throw Refusal{NcVerdict::outside_limits, message};
+[[noreturn]] void notUnderstood(const Word& word, const std::string& message) {
+  refuse(NcVerdict::not_understood, word.column, message);
+}
+[[noreturn]] void outside(const Word& word, const std::string& message) {
+  refuse(NcVerdict::outside_limits, word.column, message);
 }
 
 std::string numberText(double value) {
   return formatted("%.6g", value);
-}
-
-std::string withoutComments(const std::string& line) {
-  std::string text;
-  bool comment = false;
-  for (char c : line) {
-    if (c == '(') {
-      if (comment) {
-        notUnderstood("comment within a comment");
-      }
-      comment = true;
-    } else if (c == ')') {
-      if (!comment) {
-        notUnderstood("')' without '('");
-      }
-      comment = false;
-    } else if (!comment && c != ' ' && c != '\t' && c != '\r') {
-      text += static_cast<char>(c >= 'a' && c <= 'z' ? c - 'a' + 'A' : c);
-    }
-  }
-  if (comment) {
-    notUnderstood("comment is not closed");
-  }
-  return text;
-}
-
-/// A number as a control reads it: digits with at most one point and a sign, no exponent.
-std::string number(const std::string& text, std::size_t& at) {
-  const std::size_t start = at;
-  if (at < text.size() && (text[at] == '+' || text[at] == '-')) {
-    ++at;
-  }
-  int digits = 0, points = 0;
-  while (at < text.size() && ((text[at] >= '0' && text[at] <= '9') || text[at] == '.')) {
-    (text[at] == '.' ? points : digits) += 1;
-    ++at;
-  }
-  if (digits == 0 || points > 1 || digits > 12) {
-    notUnderstood("'" + text.substr(start, std::max<std::size_t>(at - start, 1)) + "' is not a number");
-  }
-  return text.substr(start, at - start);
-}
-
-std::vector<Word> wordsOf(const std::string& text) {
-  std::vector<Word> words;
-  std::size_t at = 0;
-  while (at < text.size()) {
-    const char letter = text[at++];
-    if (letter < 'A' || letter > 'Z') {
-      notUnderstood("'" + text.substr(at - 1) + "' is not understood");
-    }
-    std::string digits = number(text, at);
-    words.push_back({letter, std::strtod(digits.c_str(), nullptr), std::move(digits)});
-  }
-  return words;
 }
 
 /// Interprets a program block by block and tracks its position.
@@ -111,20 +53,22 @@ class ProgramInterpreter {
   }
 
   void block(const std::string& line) {
-    const std::string content = withoutComments(line);
-    if (content.empty()) {
+    nc::BlockReader reader(line, BRIDGE_DIALECT);
+    if (reader.text().empty()) {
       return;
     }
     if (ended_) {
-      notUnderstood("a block after the end of the program");
+      refuse(NcVerdict::not_understood, 1, "a block after the end of the program");
     }
-    if (content.size() > MAX_BLOCK) {
-      notUnderstood("block is longer than " + std::to_string(MAX_BLOCK) + " characters");
+    if (reader.text().size() > MAX_BLOCK) {
+      refuse(NcVerdict::not_understood, 1,
+             "block of " + std::to_string(reader.text().size()) + " characters, at most " +
+                 std::to_string(MAX_BLOCK));
     }
-    if (content[0] == '#') {
-      assignment(content);
+    if (reader.assigns()) {
+      assign(reader.assignment());
     } else {
-      processWords(wordsOf(content));
+      write(read(reader));
     }
   }
 
@@ -132,90 +76,71 @@ class ProgramInterpreter {
   const std::array<double, 3>& position() const { return position_; }
 
  private:
-  void assignment(const std::string& content) {
-    const std::size_t equals = content.find('=');
-    std::size_t at = 1;
-    const std::string name = number(content, at);
-    if (equals == std::string::npos || at != equals ||
-        name.find_first_not_of("0123456789") != std::string::npos) {
-      notUnderstood("'" + content + "' is not understood: expected #n=value");
-    }
-    ++at;
-    const std::string value = number(content, at);
-    if (at != content.size()) {
-      notUnderstood("'" + content + "' is not understood: expected #n=value");
-    }
-    if (std::atoi(name.c_str()) == options_.marker_macro) {
-      notUnderstood("#" + name + " is the bridge's own variable");
-    }
-    text_ += "#" + name + "=" + value + "\n";
-  }
-
   struct Block {
-    std::array<std::optional<double>, 3> axis;
-    std::optional<double> dwell_p, feed, speed;
-    std::optional<int> m_code;
-    bool dwell = false;
+    std::array<std::optional<Word>, 3> axis;
+    std::optional<Word> sequence, dwell, dwell_p, feed, speed, m_code;
     std::string head;
   };
 
-  void processWords(const std::vector<Word>& words) {
+  void assign(const nc::Assignment& assignment) {
+    if (assignment.variable == options_.marker_macro) {
+      refuse(NcVerdict::not_understood, assignment.column,
+             "#" + assignment.written_variable + " is the bridge's own variable");
+    }
+    text_ += "#" + assignment.written_variable + "=" + assignment.written_value + "\n";
+  }
+
+  Block read(nc::BlockReader& reader) {
     Block block;
-    std::string letters;
-    for (const Word& word : words) {
-      if (word.letter != 'G') {
-        if (letters.find(word.letter) != std::string::npos) {
-          notUnderstood(std::string("two words ") + word.letter + " in one block");
-        }
-        letters += word.letter;
+    while (const std::optional<Word> word = reader.next()) {
+      if (word->address == 'G') {
+        gCode(*word, block);
+        continue;
       }
-      readWord(word, block);
+      std::optional<Word>& place = placeOf(*word, block);
+      if (place) {
+        notUnderstood(*word, std::string("two words ") + word->address + " in one block");
+      }
+      place = word;
+      if (word->address == 'N') {
+        block.head = "N" + std::to_string(nc::integer(*word, MAX_SEQUENCE)) + " " + block.head;
+      } else if (word->address == 'P' || word->address == 'M') {
+        nc::integer(*word, word->address == 'M' ? MAX_CODE : nc::LARGEST_INTEGER);
+      }
     }
-    write(block, words);
+    return block;
   }
 
-  void readWord(const Word& word, Block& block) {
-    switch (word.letter) {
+  /// Of an address of BRIDGE_DIALECT other than G.
+  static std::optional<Word>& placeOf(const Word& word, Block& block) {
+    switch (word.address) {
       case 'N':
-        block.head = "N" + std::to_string(wholeNumber(word, 99999)) + " " + block.head;
-        break;
-      case 'G':
-        gCode(word, block.dwell, block.head);
-        break;
-      case 'X':
-      case 'Y':
-      case 'Z':
-        block.axis[static_cast<std::size_t>(word.letter - 'X')] = word.value;
-        break;
+        return block.sequence;
       case 'P':
-        block.dwell_p = wholeNumber(word, 99999999);
-        break;
+        return block.dwell_p;
       case 'F':
-        block.feed = word.value;
-        break;
+        return block.feed;
       case 'S':
-        block.speed = word.value;
-        break;
+        return block.speed;
       case 'M':
-        block.m_code = wholeNumber(word, 999);
-        break;
+        return block.m_code;
       default:
-        notUnderstood(std::string("word ") + word.letter + word.digits + " is not understood");
+        return block.axis[static_cast<std::size_t>(word.address - 'X')];
     }
   }
 
-  void write(const Block& block, const std::vector<Word>& words) {
+  void write(const Block& block) {
     std::string out = block.head;
     if (block.dwell) {
-      out += dwellWords(block.axis, block.dwell_p);
+      out += dwellWords(block);
     } else if (block.dwell_p) {
-      notUnderstood("P without G4");
+      notUnderstood(*block.dwell_p, "P without G4");
     }
     if (block.feed) {
       out += feedWord(*block.feed);
     }
     if (block.speed) {
-      out += speedWord(*block.speed, words);
+      out += speedWord(*block.speed);
     }
     if (!block.dwell) {
       out += move(block.axis);
@@ -231,104 +156,102 @@ class ProgramInterpreter {
     }
   }
 
-  static int wholeNumber(const Word& word, int most) {
-    if (word.value < 0.0 || word.value > most || word.value != std::floor(word.value)) {
-      notUnderstood(std::string("word ") + word.letter + word.digits + ": expected an integer from 0 to " +
-                    std::to_string(most));
-    }
-    return static_cast<int>(word.value);
-  }
-
-  void gCode(const Word& word, bool& dwell, std::string& head) {
-    const int code = wholeNumber(word, 999);
+  void gCode(const Word& word, Block& block) {
+    const int code = nc::integer(word, MAX_CODE);
     switch (code) {
       case 0:
       case 1:
         motion_ = code;
         break;
       case 4:
-        dwell = true;
+        block.dwell = word;
         break;
       case 90:
       case 91:
         relative_ = code == 91;
         break;
       default:
-        notUnderstood("G" + std::to_string(code) + " is not understood");
+        notUnderstood(word, "unknown word " + word.text() + ", expected G0, G1, G4, G90 or G91");
     }
-    head += "G" + std::to_string(code) + " ";
+    block.head += "G" + std::to_string(code) + " ";
   }
 
-  std::string dwellWords(const std::array<std::optional<double>, 3>& axis, std::optional<double> p) const {
-    if (axis[1] || axis[2] || (axis[0].has_value() == p.has_value())) {
-      notUnderstood("G4 needs P in ms or X in s, alone");
+  std::string dwellWords(const Block& block) const {
+    const auto& [x, y, z] = block.axis;
+    if (y || z || x.has_value() == block.dwell_p.has_value()) {
+      notUnderstood(*block.dwell, "G4 needs P in ms or X in s, alone");
     }
-    const double seconds = p ? *p * 1e-3 : *axis[0];
+    const Word& word = x ? *x : *block.dwell_p;
+    const double seconds = x ? *x->value : 1e-3 * nc::integer(word);
     if (seconds < 0.0) {
-      notUnderstood("G4 with a negative time");
+      notUnderstood(word, "G4 with a negative time");
     }
     if (seconds > limits_.max_dwell) {
-      outside("dwell of " + numberText(seconds) + " s, at most " + numberText(limits_.max_dwell) + " s");
+      outside(word,
+              "dwell of " + numberText(seconds) + " s, at most " + numberText(limits_.max_dwell) + " s");
     }
-    return p ? "P" + std::to_string(static_cast<long>(*p)) + " " : "X" + fixedDecimals(*axis[0], 3) + " ";
+    return x ? "X" + fixedDecimals(seconds, 3) + " " : "P" + std::to_string(nc::integer(word)) + " ";
   }
 
-  std::string feedWord(double feed) {
+  std::string feedWord(const Word& word) {
+    const double feed = *word.value;
     if (feed <= 0.0) {
-      notUnderstood("F" + numberText(feed) + ": expected a feed above 0");
+      notUnderstood(word, "F" + numberText(feed) + ": expected a feed above 0");
     }
     const double most = limits_.max_feed / units::MM * 60.0;
     if (feed > most * (1.0 + 1e-9)) {
-      outside("F" + numberText(feed) + " mm/min, at most " + numberText(most) + " mm/min");
+      outside(word, "F" + numberText(feed) + " mm/min, at most " + numberText(most) + " mm/min");
     }
     feed_known_ = true;
     return "F" + fixedDecimals(feed, options_.decimals) + " ";
   }
 
-  std::string speedWord(double speed, const std::vector<Word>& words) const {
+  std::string speedWord(const Word& word) const {
+    const double speed = *word.value;
     if (speed < 0.0) {
-      notUnderstood("S" + numberText(speed) + ": expected a speed of 0 or more");
+      notUnderstood(word, "S" + numberText(speed) + ": expected a speed of 0 or more");
     }
     const double most = units::rpmFromRadPerSec(limits_.max_spindle_speed);
     if (speed > most * (1.0 + 1e-9)) {
-      outside("S" + numberText(speed) + " rpm, at most " + numberText(most) + " rpm");
+      outside(word, "S" + numberText(speed) + " rpm, at most " + numberText(most) + " rpm");
     }
-    const auto word = std::find_if(words.begin(), words.end(), [](const Word& w) { return w.letter == 'S'; });
-    return "S" + word->digits + " ";
+    return word.text() + " ";
   }
 
-  std::string move(const std::array<std::optional<double>, 3>& axis) {
-    if (!axis[0] && !axis[1] && !axis[2]) {
-      return {};
-    }
-    if (motion_ < 0) {
-      notUnderstood("an axis word before G0 or G1");
-    }
-    if (motion_ == 1 && !feed_known_) {
-      notUnderstood("G1 before F");
-    }
+  std::string move(const std::array<std::optional<Word>, 3>& axis) {
     std::string out;
     for (std::size_t i = 0; i < 3; ++i) {
-      if (!axis[i]) {
-        continue;
+      if (axis[i]) {
+        out += axisWord(i, *axis[i]);
       }
-      const double length = *axis[i] * units::MM;
-      position_[i] = relative_ ? position_[i] + length : length + offset_[i];
-      if (!std::isfinite(position_[i])) {
-        outside(std::string("the controller reports no position of ") + AXES[i]);
-      }
-      const std::array<double, 2>& travel = limits_.travel[i];
-      if (position_[i] < travel[0] - POSITION_TOLERANCE || position_[i] > travel[1] + POSITION_TOLERANCE) {
-        outside(std::string(1, AXES[i]) + " would go to " + numberText(position_[i] / units::MM) +
-                " mm, limits " + numberText(travel[0] / units::MM) + " to " +
-                numberText(travel[1] / units::MM) + " mm (machine)");
-      }
-      out += AXES[i] + fixedDecimals(*axis[i], options_.decimals) + " ";
     }
     return out;
   }
 
-  std::string mCode(int code) {
+  std::string axisWord(std::size_t axis, const Word& word) {
+    if (motion_ < 0) {
+      notUnderstood(word, "an axis word before G0 or G1");
+    }
+    if (motion_ == 1 && !feed_known_) {
+      notUnderstood(word, "G1 before F");
+    }
+    const double length = *word.value * units::MM;
+    double& position = position_[axis];
+    position = relative_ ? position + length : length + offset_[axis];
+    if (!std::isfinite(position)) {
+      outside(word, std::string("the controller reports no position of ") + AXES[axis]);
+    }
+    const auto [low, high] = limits_.travel[axis];
+    if (position < low - POSITION_TOLERANCE || position > high + POSITION_TOLERANCE) {
+      outside(word, std::string(1, AXES[axis]) + " would go to " + numberText(position / units::MM) +
+                        " mm, limits " + numberText(low / units::MM) + " to " + numberText(high / units::MM) +
+                        " mm (machine)");
+    }
+    return AXES[axis] + fixedDecimals(*word.value, options_.decimals) + " ";
+  }
+
+  std::string mCode(const Word& word) {
+    const int code = nc::integer(word, MAX_CODE);
     switch (code) {
       case 2:
       case 30:
@@ -339,7 +262,7 @@ class ProgramInterpreter {
       case 119:
         return "M" + std::to_string(code);
       default:
-        notUnderstood("M" + std::to_string(code) + " is not understood");
+        notUnderstood(word, "unknown word " + word.text() + ", expected M2, M3, M5, M30 or M119");
     }
   }
 
@@ -356,33 +279,29 @@ class ProgramInterpreter {
 
 }  // namespace
 
-void MotionLimits::validate() const {
-  for (std::size_t i = 0; i < 3; ++i) {
-    if (!(travel[i][0] < travel[i][1])) {
-      throw Error(std::string("travel_") + "xyz"[i] + ": [" + numberText(travel[i][0]) + ", " +
-                  numberText(travel[i][1]) + "] m: expected the lower limit first");
-    }
-  }
-  require("max_feed", max_feed, Range::positive(), "m/s");
-  require("max_spindle_speed", max_spindle_speed, Range::positive(), "rad/s");
-  checkBounds(*this);
-}
-
 NcCheck checkProgram(const std::string& program, const StartPosition& start, const MotionLimits& limits,
                      const DialectOptions& options) {
   NcCheck check;
+  check.end = start.machine;
   ProgramInterpreter interpreter(start, limits, options);
   std::istringstream lines(program);
   std::string line;
-  for (int count = 1; std::getline(lines, line); ++count) {
-    try {
+  int count = 0;
+  try {
+    while (std::getline(lines, line)) {
+      ++count;
       interpreter.block(line);
-    } catch (const Refusal& refusal) {
-      check.verdict = refusal.verdict;
-      check.message = "line " + std::to_string(count) + ": " + refusal.message;
-      check.end = start.machine;
-      return check;
     }
+  } catch (const nc::SyntaxError& error) {
+    check.verdict = NcVerdict::not_understood;
+    check.message = error.what();
+  } catch (const Refusal& refusal) {
+    check.verdict = refusal.verdict;
+    check.message = refusal.message;
+  }
+  if (check.verdict != NcVerdict::good) {
+    check.message = "line " + std::to_string(count) + ", " + check.message;
+    return check;
   }
   check.text = interpreter.text();
   check.end = interpreter.position();
@@ -398,9 +317,9 @@ std::string jogProgram(int axis, double distance, double feed, int decimals) {
 }
 
 std::string orientProgram(double angle, int macro) {
-  const long steps = std::lround(std::fmod(angle, units::TWO_PI) / units::TWO_PI * ORIENT_STEPS);
+  const long steps = std::lround(std::fmod(angle, units::TWO_PI) / units::TWO_PI * nc::ORIENT_STEPS);
   return "#" + std::to_string(macro) + "=" +
-         std::to_string((steps % ORIENT_STEPS + ORIENT_STEPS) % ORIENT_STEPS) + "\nM119\n";
+         std::to_string((steps % nc::ORIENT_STEPS + nc::ORIENT_STEPS) % nc::ORIENT_STEPS) + "\nM119\n";
 }
 
 std::string fixedDecimals(double value, int decimals) {

@@ -55,7 +55,8 @@ TEST(NcProgram, NothingMovesFromAnUnknownPosition) {
   for (const char* program : {"G0 X1 Y1", "G91 G0 Y0.1"}) {
     const NcCheck c = check(program, start);
     EXPECT_EQ(c.verdict, NcVerdict::outside_limits) << program;
-    EXPECT_EQ(c.message, "line 1: the controller reports no position of Y");
+    EXPECT_EQ(c.message, std::string("line 1, column ") + (program[1] == '0' ? "7" : "8") +
+                             ": the controller reports no position of Y");
   }
   EXPECT_EQ(check("G91 G0 X1\nS3000 M3\n", start).verdict, NcVerdict::good);
 }
@@ -66,19 +67,33 @@ TEST(NcProgram, NotUnderstoodNamesTheLine) {
     const char* message;
   };
   for (const Case& c :
-       {Case{"G90\nG2 X1 Y1\n", "line 2: G2 is not understood"},
-        Case{"T1 M6", "line 1: word T1 is not understood"}, Case{"M6", "line 1: M6 is not understood"},
-        Case{"X1", "line 1: an axis word before G0 or G1"}, Case{"G1 X1", "line 1: G1 before F"},
-        Case{"G0 X1 X2", "line 1: two words X in one block"},
-        Case{"G0 X1..2", "line 1: '1..2' is not a number"}, Case{"G0 X", "line 1: '' is not a number"},
-        Case{"G0 X1e3", "line 1: word E3 is not understood"},
-        Case{"G4", "line 1: G4 needs P in ms or X in s, alone"},
-        Case{"G0 X1 (open", "line 1: comment is not closed"},
-        Case{"#100=5", "line 1: #100 is the bridge's own variable"},
-        Case{"#5=#6", "line 1: '#' is not a number"}, Case{"\n\n%\n", "line 3: '%' is not understood"},
-        Case{"M30\nG0 X1", "line 2: a block after the end of the program"},
-        Case{"G1 F0 X1", "line 1: F0: expected a feed above 0"}, Case{"P5", "line 1: P without G4"},
-        Case{"N1.5 G0 X1", "line 1: word N1.5: expected an integer from 0 to 99999"}}) {
+       {Case{"G90\nG2 X1 Y1\n", "line 2, column 1: unknown word G2, expected G0, G1, G4, G90 or G91"},
+        Case{"G0 (above) X1 q3 Y2",
+             "line 1, column 15: unknown word Q3, expected N, G, X, Y, Z, P, F, S or M"},
+        Case{"T1 M6", "line 1, column 1: unknown word T1, expected N, G, X, Y, Z, P, F, S or M"},
+        Case{"M6", "line 1, column 1: unknown word M6, expected M2, M3, M5, M30 or M119"},
+        Case{"X1", "line 1, column 1: an axis word before G0 or G1"},
+        Case{"G1 X1", "line 1, column 4: G1 before F"},
+        Case{"G0 X1 X2", "line 1, column 7: two words X in one block"},
+        Case{"G0 X1..2", "line 1, column 4: X1..2, expected a number"},
+        Case{"G0 X", "line 1, column 4: X, expected a number"},
+        Case{"G0 X1e3", "line 1, column 6: unknown word E3, expected N, G, X, Y, Z, P, F, S or M"},
+        Case{"G0 X1234567890123", "line 1, column 4: X1234567890123, expected at most 12 digits"},
+        Case{"G4", "line 1, column 1: G4 needs P in ms or X in s, alone"},
+        Case{"G0 X1 (open", "line 1, column 7: comment is not closed, expected ')'"},
+        Case{"G0 (a (b)", "line 1, column 7: '(' in a comment, expected ')' first"},
+        Case{"G0 X1)", "line 1, column 6: ')' without '('"},
+        Case{"#100=5", "line 1, column 1: #100 is the bridge's own variable"},
+        Case{"#5=#6", "line 1, column 1: #5=, expected a number"},
+        Case{"#5", "line 1, column 3: malformed block, expected #n=value"},
+        Case{"#5=6 X1", "line 1, column 6: malformed block, expected #n=value"},
+        Case{"IF[#1EQ1]GOTO10", "line 1, column 1: IF is not supported"},
+        Case{"\n\n%\n", "line 3, column 1: unknown word %, expected N, G, X, Y, Z, P, F, S or M"},
+        Case{"M30\nG0 X1", "line 2, column 1: a block after the end of the program"},
+        Case{"G1 F0 X1", "line 1, column 4: F0: expected a feed above 0"},
+        Case{"P5", "line 1, column 1: P without G4"},
+        Case{"G4 P20000 M5.5", "line 1, column 11: M5.5, expected an integer from 0 to 999"},
+        Case{"N1.5 G0 X1", "line 1, column 1: N1.5, expected an integer from 0 to 99999"}}) {
     const NcCheck result = check(c.program);
     EXPECT_EQ(result.verdict, NcVerdict::not_understood) << c.program;
     EXPECT_EQ(result.message, c.message);
@@ -96,7 +111,7 @@ TEST(NcProgram, LimitsOfEveryAxisFeedAndSpeed) {
     EXPECT_EQ(check(beyond).verdict, NcVerdict::outside_limits) << beyond;
   }
   EXPECT_EQ(check("G0 X0\nG91\nX200\nX101\n").message,
-            "line 4: X would go to 301 mm, limits -200 to 300 mm (machine)");
+            "line 4, column 1: X would go to 301 mm, limits -200 to 300 mm (machine)");
 }
 
 TEST(NcProgram, RelativeMovesStartAtTheCurrentPosition) {

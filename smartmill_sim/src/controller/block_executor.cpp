@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "smartmill_core/nc/orientation.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::sim {
@@ -15,7 +16,7 @@ constexpr double MINUTE = 60.0;  // [s]
 
 BlockExecutor::BlockExecutor(const ControllerOptions& options, const Overrides& overrides,
                              Variables& variables, AxesMotion& axes, SpindleControl& spindle)
-    : limits_(options.axes), overrides_(overrides), variables_(variables), axes_(axes), spindle_(spindle) {
+    : options_(options), overrides_(overrides), variables_(variables), axes_(axes), spindle_(spindle) {
 }
 
 void BlockExecutor::reset() {
@@ -46,7 +47,7 @@ int BlockExecutor::proceed(double now, double time) {
   if (m_code == 5 || m_code == 30 || m_code == 2) {
     spindle_.stop(time);
   } else if (m_code == 19 || m_code == 119) {
-    spindle_.orient(time, m_code == 19 ? 0.0 : readVariable(Variables::ORIENT, now).value_or(-1.0));
+    spindle_.orient(time, m_code == 19 ? 0.0 : readVariable(nc::ORIENT_VARIABLE, now).value_or(-1.0));
   } else {
     running_ = false;
   }
@@ -103,7 +104,7 @@ void BlockExecutor::startSpindle(double time, const NcBlock& block) {
 }
 
 void BlockExecutor::planPath(const NcBlock& block) {
-  AxesMotion::Path path = pathOf(block, modal_, axes_.target(), variables_.offsets[modal_.work], limits_);
+  AxesMotion::Path path = pathOf(block, modal_, axes_.target(), variables_.offsets[modal_.work], options_);
   if (!path.front().rapid && modal_.feed <= 0.0) throw NcAlarm(PS_FEED_ZERO, "FEED ZERO (COMMAND)");
   if (!path.front().rapid && modal_.per_turn && spindle_.commanded() == 0.0)
     throw NcAlarm(PS_FEED_ZERO, "FEED PER TURN WITHOUT SPINDLE");
@@ -112,12 +113,12 @@ void BlockExecutor::planPath(const NcBlock& block) {
 
 /// Feed [m/s], limited by rapid traverse and the centripetal acceleration of a curve.
 double BlockExecutor::feedOf(const AxesMotion::Segment& segment) const {
-  if (segment.rapid) return overrides_.rapid(limits_.rapid);
+  if (segment.rapid) return overrides_.rapid(options_.axes.rapid);
   const double feed = modal_.feed * modal_.unit();
   const double programmed =
       modal_.per_turn ? feed * std::abs(spindle_.commanded()) / units::TWO_PI : feed / MINUTE;
-  return std::min({overrides_.feed(programmed), limits_.rapid,
-                   segment.move.curveFeed(limits_.acceleration).value_or(limits_.rapid)});
+  return std::min({overrides_.feed(programmed), options_.axes.rapid,
+                   segment.move.curveFeed(options_.axes.acceleration).value_or(options_.axes.rapid)});
 }
 
 void BlockExecutor::beginNextSegment(double time) {

@@ -51,7 +51,7 @@ class BlockExecutor {
   double feedOf(const AxesMotion::Segment& segment) const;
   void beginNextSegment(double time);
 
-  const MachineAxes& limits_;
+  const ControllerOptions& options_;
   const Overrides& overrides_;
   Variables& variables_;
   AxesMotion& axes_;

@@ -5,6 +5,7 @@
 #include <mutex>
 #include <utility>
 
+#include "controller/indicated_state.h"
 #include "controller/machine.h"
 #include "controller/machine_numbers.h"
 #include "smartmill_core/units.h"
@@ -14,7 +15,6 @@ namespace {
 
 using focas::EwCode;
 
-constexpr double MM_PER_MIN = units::MM / 60.0;
 constexpr double SCREW_LEAD = 10.0 * units::MM;  // [m] per revolution of an axis motor
 
 std::vector<double> inMm(const std::array<double, 3>& v) {
@@ -33,6 +33,7 @@ class Controller::Impl {
    public:
     explicit Access(Impl& impl) : lock_(impl.mutex_), machine_(impl.machine_) {}
     ControlledMachine* operator->() const { return &machine_; }
+    const ControlledMachine& operator*() const { return machine_; }
 
    private:
     std::lock_guard<std::mutex> lock_;
@@ -110,7 +111,7 @@ focas::SysInfo Controller::sysInfo() const {
 }
 
 focas::Status Controller::status() const {
-  return impl_->locked()->status();
+  return statusOf(*impl_->locked());
 }
 
 std::vector<double> Controller::machinePosition() const {
@@ -142,7 +143,7 @@ std::vector<double> Controller::spindleSpeed() const {
 }
 
 std::vector<double> Controller::spindleLoad() const {
-  return {impl_->locked()->spindleLoad()};
+  return {spindleLoadOf(*impl_->locked())};
 }
 
 std::vector<double> Controller::spindleMaxSpeed() const {
@@ -221,7 +222,7 @@ std::string Controller::executingBlock() const {
 }
 
 std::string Controller::programText() const {
-  return impl_->locked()->programText();
+  return programTextOf(*impl_->locked());
 }
 
 std::vector<focas::NumberedValue> Controller::parameters(int first, int last) const {
@@ -230,14 +231,14 @@ std::vector<focas::NumberedValue> Controller::parameters(int first, int last) co
 
 std::vector<focas::NumberedValue> Controller::diagnoses(int first, int last) const {
   const Impl::Access machine = impl_->locked();
-  const focas::Status status = machine->status();
+  const focas::Status status = statusOf(*machine);
   DiagnosisState state;
   state.waits_for_m = status.mstb != 0;
   state.moves = status.motion == focas::MOTION_MOVES;
   state.dwells = machine->executor.dwells(machine->now());
   state.at_zero_feed = status.run == focas::RUN_START && !state.moves &&
                        machine->axes.distanceToGo(machine->now()) != Variables::Point{};
-  state.spindle_load = machine->spindleLoad();
+  state.spindle_load = spindleLoadOf(*machine);
   state.spindle_angle = machine->motion().spindle_angle;
   return within(machineDiagnoses(state), first, last);
 }
@@ -253,7 +254,7 @@ EwCode Controller::setDateTime(const focas::DateTime& date_time) {
 
 EwCode Controller::readPmc(focas::PmcArea area, int first, int last, focas::Bytes* bytes) const {
   const Impl::Access machine = impl_->locked();
-  machine->pmc.update(machine->signals());
+  machine->pmc.update(signalsOf(*machine));
   return machine->pmc.read(area, first, last, bytes);
 }
 
@@ -280,7 +281,7 @@ EwCode Controller::deleteProgram(int number) {
 
 EwCode Controller::rewindProgram() {
   // Every start begins at the first block of the program.
-  return impl_->locked()->status().run == focas::RUN_START ? focas::EW_BUSY : focas::EW_OK;
+  return statusOf(*impl_->locked()).run == focas::RUN_START ? focas::EW_BUSY : focas::EW_OK;
 }
 
 EwCode Controller::storePrograms(const std::string& text) {

@@ -1,15 +1,9 @@
 #include "controller/machine.h"
 
-#include <cmath>
-
-#include "smartmill_core/units.h"
-
 namespace smartmill::sim {
 namespace {
 
 using focas::EwCode;
-
-constexpr double CHECK_PERIOD = 2e-3;  // [s] between two checks of the motion
 
 constexpr const char* RESIDENT_PROGRAM = "O0001(PARK)\nG21 G90 G94\nG53 G0 Z0\nM5\nG53 G0 X0 Y0\nM30\n";
 
@@ -45,7 +39,7 @@ void ControlledMachine::step(double dt) {
             {e.number(), e.type(), e.axis(), std::string(e.what()) + ": " + program.indicated().block});
   }
   now_ = end;
-  if (now_ - checked_ >= CHECK_PERIOD) checkMotion();
+  if (now_ - checked_ >= options.check_period) checkMotion();
 }
 
 void ControlledMachine::checkMotion() {
@@ -61,53 +55,6 @@ void ControlledMachine::checkMotion() {
 MotionState ControlledMachine::motion() const {
   return {axes.position(now_), axes.velocity(now_), spindle.angle(now_), spindle.speed(now_),
           program.indicated().sequence};
-}
-
-focas::Status ControlledMachine::status() const {
-  focas::Status status;
-  status.aut = static_cast<std::int16_t>(mode_);
-  const bool moving = axes.moving(now_);
-  status.run = program.held()                          ? focas::RUN_HOLD
-               : program.busy() && !program.stopped()  ? focas::RUN_START
-               : session.isOpen() || program.stopped() ? focas::RUN_STOP
-                                                       : focas::RUN_RESET;
-  status.motion = moving                  ? focas::MOTION_MOVES
-                  : executor.dwells(now_) ? focas::MOTION_DWELL
-                                          : focas::MOTION_NONE;
-  status.mstb = executor.waitsForM() && !moving ? 1 : 0;
-  status.emergency = emergency_ ? 1 : 0;
-  status.alarm = alarms.empty() ? 0 : 1;
-  return status;
-}
-
-std::string ControlledMachine::programText() const {
-  if (executor.running() || session.isOpen() || program.fromMemory()) return program.text();
-  return memory.text(memory.selected()).value_or("");
-}
-
-PmcSignals ControlledMachine::signals() const {
-  PmcSignals s;
-  const double speed = spindle.speed(now_);
-  s.mode = mode_;
-  s.operating = program.busy() || session.isOpen();
-  s.started = program.busy() && !program.held() && !program.stopped();
-  s.held = program.held();
-  s.alarm = !alarms.empty();
-  s.emergency = emergency_;
-  s.at_rest = speed == 0.0;
-  s.at_speed = spindle.atSpeed(now_);
-  s.oriented = spindle.oriented(now_);
-  s.m_code = executor.lastMCode();
-  s.s_code = static_cast<int>(std::lround(units::rpmFromRadPerSec(spindle.programmed())));
-  s.spindle_speed = units::rpmFromRadPerSec(speed);
-  s.feed_override = overrides.feed(1.0);
-  s.spindle_override = overrides.spindle(1.0);
-  return s;
-}
-
-double ControlledMachine::spindleLoad() const {
-  const double step = options.load_step;
-  return step > 0.0 ? step * std::round(spindle_load / step) : spindle_load;
 }
 
 // --- the operator

@@ -25,13 +25,10 @@ class ControlledMachine {
   void step(double dt);
   double now() const { return now_; }  ///< [s]
 
-  // Indicated state.
   MotionState motion() const;
-  focas::Status status() const;
-  std::string programText() const;
-  PmcSignals signals() const;
+  int mode() const { return mode_; }  ///< focas::Aut
+  bool isEmergency() const { return emergency_; }
   std::optional<double> variable(int number) const { return executor.readVariable(number, now_); }
-  double spindleLoad() const;  ///< [percent] rounded to the resolution of the controller
 
   // The operator.
   void setMode(int aut);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "smartmill_core/nc/orientation.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::sim {
@@ -10,9 +11,7 @@ namespace {
 using focas::NumberedType;
 using focas::NumberedValue;
 
-constexpr double MM_PER_MIN = units::MM / 60.0;
 constexpr double AMBIENT = 25.0;  // [deg C] motors without a thermal model
-constexpr double POSITION_STEPS = 4096.0;
 
 NumberedValue ofAxes(int number, NumberedType type, std::vector<double> values, int decimals = 0) {
   return {number, type, std::move(values), true, decimals};
@@ -61,7 +60,7 @@ std::vector<NumberedValue> machineParameters(const ControllerOptions& o) {
 }
 
 std::vector<NumberedValue> machineDiagnoses(const DiagnosisState& state) {
-  const double steps = state.spindle_angle / units::TWO_PI * POSITION_STEPS;
+  const double steps = state.spindle_angle / units::TWO_PI * nc::ORIENT_STEPS;
   return {
       single(0, NumberedType::byte, state.waits_for_m ? 1 : 0),   // waits for FIN
       single(1, NumberedType::byte, state.moves ? 1 : 0),         // motion
@@ -73,7 +72,7 @@ std::vector<NumberedValue> machineDiagnoses(const DiagnosisState& state) {
       single(403, NumberedType::byte, AMBIENT),                   // spindle motor temperature [deg C]
       single(410, NumberedType::real, state.spindle_load, 2),     // spindle load meter [percent]
       single(445, NumberedType::double_word,
-             static_cast<int>(steps)),  // spindle position, 4096 per revolution
+             static_cast<int>(steps)),  // spindle position in steps
   };
 }
 

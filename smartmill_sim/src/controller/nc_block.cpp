@@ -1,27 +1,39 @@
 #include "smartmill_sim/controller/nc_block.h"
 
-#include <cctype>
-
-#include "controller/nc_reader.h"
+#include "smartmill_core/nc/block_reader.h"
 
 namespace smartmill::sim {
 namespace {
 
-/// The line without blanks and comments, in upper case.
-std::string significantText(const std::string& line) {
-  std::string text;
-  bool comment = false;
-  for (const char c : line) {
-    if (comment) {
-      comment = c != ')';
-    } else if (c == '(') {
-      comment = true;
-    } else if (!std::isspace(static_cast<unsigned char>(c)) && c != '\0') {
-      text += static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
-    }
+using nc::SyntaxError;
+
+constexpr nc::Dialect DIALECT{"O:NGXYZIJRPFSM", std::string_view(" \t\n\v\f\r\0", 7), false, true};
+
+[[noreturn]] void illegalAddress(const std::string& what) {
+  throw NcAlarm(PS_ILLEGAL_ADDRESS, "IMPROPER NC ADDRESS " + what);
+}
+
+/// Number and text of the alarm with which a 30i refuses a block.
+[[noreturn]] void throwAlarm(const SyntaxError& error) {
+  switch (error.kind()) {
+    case SyntaxError::Kind::comment:
+    case SyntaxError::Kind::address:
+    case SyntaxError::Kind::integer:
+      illegalAddress(error.address());
+    case SyntaxError::Kind::number:
+      illegalAddress(error.address() + error.written());
+    case SyntaxError::Kind::digits:
+      throw NcAlarm(PS_TOO_MANY_DIGITS, "TOO MANY DIGITS " + error.address());
+    case SyntaxError::Kind::control_flow:
+      throw NcAlarm(PS_MACRO_FORMAT, error.address() + " IS NOT KNOWN");
+    case SyntaxError::Kind::division:
+      throw NcAlarm(PS_DIVIDED_BY_ZERO, "DIVIDED BY ZERO");
+    case SyntaxError::Kind::argument:
+      throw NcAlarm(PS_ILLEGAL_ARGUMENT, "ILLEGAL ARGUMENT");
+    case SyntaxError::Kind::expression:
+      break;
   }
-  if (comment) illegalAddress("(");
-  return text;
+  throw NcAlarm(PS_MACRO_FORMAT, "ILLEGAL EXPRESSION FORMAT");
 }
 
 void refuseRepeated(bool already, char address) {
@@ -98,75 +110,65 @@ void readDwell(NcBlock& block, const std::optional<double>& milliseconds) {
   if (*block.dwell < 0.0) illegalAddress("IN G4");
 }
 
-NcBlock parseAssignment(NcReader& reader) {
+NcBlock blockOf(const nc::Assignment& assignment) {
   NcBlock block;
-  if (reader.accept("N")) block.sequence = reader.integer("N");
-  reader.next();
-  block.macro = reader.number("#");
-  if (reader.next() != '=') throw NcAlarm(PS_MACRO_FORMAT, "ILLEGAL EXPRESSION FORMAT");
-  block.macro_value = reader.expression();
-  if (!reader.done()) throw NcAlarm(PS_MACRO_FORMAT, "ILLEGAL EXPRESSION FORMAT");
+  block.sequence = assignment.sequence;
+  block.macro = assignment.variable;
+  block.macro_value = assignment.value;
   return block;
 }
 
-/// Refuses control flow of macro programs, which this control does not support.
-void refuseFlow(NcReader& reader) {
-  for (const char* word : {"IF", "WHILE", "GOTO", "DO", "END", "THEN"}) {
-    if (reader.accept(word)) throw NcAlarm(PS_MACRO_FORMAT, std::string(word) + " IS NOT KNOWN");
-  }
+/// Program and sequence numbers; one with a vacant variable is ignored.
+std::optional<int> optionalInteger(const nc::Word& word) {
+  return word.value ? std::optional<int>(nc::integer(word)) : std::nullopt;
 }
 
-void readWord(char address, NcReader& reader, NcBlock& block, bool& dwell,
-              std::optional<double>& milliseconds) {
-  const std::string name(1, address);
-  switch (address) {
+void readWord(const nc::Word& word, NcBlock& block, bool& dwell, std::optional<double>& milliseconds) {
+  switch (word.address) {
     case 'O':
     case ':':
-      setWord(block.program, reader.integer(name), address);
+      setWord(block.program, optionalInteger(word), word.address);
       break;
     case 'N':
-      setWord(block.sequence, reader.integer(name), address);
+      setWord(block.sequence, optionalInteger(word), word.address);
       break;
     case 'G':
-      readGCode(reader.number(name), block, dwell);
+      readGCode(nc::integer(word), block, dwell);
       break;
     case 'X':
     case 'Y':
     case 'Z':
-      setWord(block.axis[static_cast<std::size_t>(address - 'X')], reader.value(name), address);
+      setWord(block.axis[static_cast<std::size_t>(word.address - 'X')], word.value, word.address);
       break;
     case 'I':
     case 'J':
-      setWord(block.centre[static_cast<std::size_t>(address - 'I')], reader.value(name), address);
+      setWord(block.centre[static_cast<std::size_t>(word.address - 'I')], word.value, word.address);
       break;
     case 'R':
-      setWord(block.radius, reader.value(name), address);
+      setWord(block.radius, word.value, word.address);
       break;
     case 'P':
-      setWord(milliseconds, reader.value(name), address);
+      setWord(milliseconds, word.value, word.address);
       break;
     case 'F':
-      setWord(block.feed, reader.value(name), address);
+      setWord(block.feed, word.value, word.address);
       break;
     case 'S':
-      setWord(block.speed, reader.value(name), address);
+      setWord(block.speed, word.value, word.address);
       break;
     case 'M':
-      readMCode(reader.number(name), block);
+      readMCode(nc::integer(word), block);
       break;
     default:
-      illegalAddress(name);
+      break;  // not in DIALECT
   }
 }
 
-NcBlock parseWords(NcReader& reader) {
+NcBlock readWords(nc::BlockReader& reader) {
   NcBlock block;
   bool dwell = false;
   std::optional<double> milliseconds;
-  while (!reader.done()) {
-    refuseFlow(reader);
-    readWord(reader.next(), reader, block, dwell, milliseconds);
-  }
+  while (const std::optional<nc::Word> word = reader.next()) readWord(*word, block, dwell, milliseconds);
   if (dwell) {
     readDwell(block, milliseconds);
   } else if (milliseconds) {
@@ -180,13 +182,13 @@ NcBlock parseWords(NcReader& reader) {
 }  // namespace
 
 NcBlock parseBlock(const std::string& line, const NcVariables& variables) {
-  const std::string text = significantText(line);
-  if (text.empty() || text[0] == '%') return {};
-  // A sequence number may precede an assignment.
-  const std::size_t first = text[0] == 'N' ? text.find_first_not_of("0123456789", 1) : 0;
-  NcReader reader(text, variables);
-  return first != std::string::npos && text[first] == '#' && first != 1 ? parseAssignment(reader)
-                                                                        : parseWords(reader);
+  try {
+    nc::BlockReader reader(line, DIALECT, variables);
+    if (reader.text().empty() || reader.text()[0] == '%') return {};
+    return reader.assigns() ? blockOf(reader.assignment()) : readWords(reader);
+  } catch (const SyntaxError& error) {
+    throwAlarm(error);
+  }
 }
 
 }  // namespace smartmill::sim

@@ -13,17 +13,15 @@ using Point = AxesMotion::Point;
 
 constexpr double INCH = 25.4 * units::MM;
 constexpr double TRAVEL_TOLERANCE = 1e-9;  // [m] rounding of decimal input
-constexpr double ARC_TOLERANCE = 20e-6;    // [m] difference of the start and end radius
 
-std::array<double, 2> centreOf(const NcBlock& block, const NcModal& modal, const Point& from,
-                               const Point& to) {
+std::array<double, 2> centreOf(const NcBlock& block, const NcModal& modal, const Point& from, const Point& to,
+                               double tolerance) {
   if (block.radius) {
     // Two circles pass through start and end; a positive R selects the shorter arc.
     const double r = *block.radius * modal.unit();
     const double dx = to[0] - from[0], dy = to[1] - from[1], chord = std::hypot(dx, dy);
     const double square = r * r - 0.25 * chord * chord;
-    if (chord == 0.0 || square < -ARC_TOLERANCE * std::abs(r))
-      throw NcAlarm(PS_ARC, "OVER TOLERANCE OF RADIUS");
+    if (chord == 0.0 || square < -tolerance * std::abs(r)) throw NcAlarm(PS_ARC, "OVER TOLERANCE OF RADIUS");
     const double side = (modal.motion == 2) == (r > 0.0) ? 1.0 : -1.0;
     const double height = side * std::sqrt(std::max(0.0, square)) / chord;
     return {from[0] + 0.5 * dx + height * dy, from[1] + 0.5 * dy - height * dx};
@@ -33,8 +31,7 @@ std::array<double, 2> centreOf(const NcBlock& block, const NcModal& modal, const
                                      from[1] + block.centre[1].value_or(0.0) * modal.unit()};
   const double begin = std::hypot(from[0] - centre[0], from[1] - centre[1]);
   const double end = std::hypot(to[0] - centre[0], to[1] - centre[1]);
-  if (begin == 0.0 || std::abs(begin - end) > ARC_TOLERANCE)
-    throw NcAlarm(PS_ARC, "OVER TOLERANCE OF RADIUS");
+  if (begin == 0.0 || std::abs(begin - end) > tolerance) throw NcAlarm(PS_ARC, "OVER TOLERANCE OF RADIUS");
   return centre;
 }
 
@@ -66,26 +63,28 @@ double NcModal::unit() const {
 }
 
 AxesMotion::Path pathOf(const NcBlock& block, const NcModal& modal, const Point& from, const Point& offset,
-                        const MachineAxes& axes) {
+                        const ControllerOptions& options) {
   Point to = from, home = from;
   for (std::size_t i = 0; i < 3; ++i) {
     if (!block.axis[i]) continue;
     const double zero = block.machine ? 0.0 : modal.relative ? from[i] : offset[i];
     to[i] = *block.axis[i] * modal.unit() + zero;
-    home[i] = axes.home[i];
+    home[i] = options.axes.home[i];
   }
   AxesMotion::Path path;
   if (block.reference) {
     // Through the programmed point to the reference position of the named axes.
     path = {{PathMove::line(from, to), true}, {PathMove::line(to, home), true}};
   } else if (modal.motion >= 2 && !block.machine && !(block.radius && from == to)) {
-    path = {{PathMove::arc(from, to, centreOf(block, modal, from, to), modal.motion == 2), false}};
+    path = {
+        {PathMove::arc(from, to, centreOf(block, modal, from, to, options.arc_tolerance), modal.motion == 2),
+         false}};
   } else {
     // Machine coordinates are approached in rapid traverse in any motion mode; a radius arc that ends at its
     // start is no motion.
     path = {{PathMove::line(from, to), modal.motion == 0 || block.machine}};
   }
-  for (const AxesMotion::Segment& segment : path) checkTravel(segment.move, axes);
+  for (const AxesMotion::Segment& segment : path) checkTravel(segment.move, options.axes);
   return path;
 }
 

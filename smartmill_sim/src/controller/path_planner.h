@@ -3,6 +3,7 @@
 #include <cstddef>
 
 #include "controller/axes_motion.h"
+#include "smartmill_sim/controller/controller_options.h"
 #include "smartmill_sim/controller/nc_block.h"
 
 namespace smartmill::sim {
@@ -21,6 +22,6 @@ struct NcModal {
 /// Path of a block that moves, from a point [m]. @param offset [m] machine minus workpiece position
 /// @throws NcAlarm if a segment leaves the travel of the axes or an arc is inconsistent
 AxesMotion::Path pathOf(const NcBlock& block, const NcModal& modal, const AxesMotion::Point& from,
-                        const AxesMotion::Point& offset, const MachineAxes& axes);
+                        const AxesMotion::Point& offset, const ControllerOptions& options);
 
 }  // namespace smartmill::sim

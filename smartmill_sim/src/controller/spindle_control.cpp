@@ -3,24 +3,19 @@
 #include <algorithm>
 #include <cmath>
 
+#include "smartmill_core/nc/orientation.h"
 #include "smartmill_core/units.h"
 #include "smartmill_sim/controller/nc_alarm.h"
 
 namespace smartmill::sim {
-namespace {
-
-constexpr double ORIENT_STEPS = 4096;  // per revolution
-constexpr double ORIENT_SPEED = 20.0;  // [rad/s] about 190 rpm, typical of spindles
-constexpr double AT_SPEED = 0.05;      // [1] tolerance, relative to the commanded speed
-
-}  // namespace
-
 SpindleControl::SpindleControl(const ControllerOptions& options, const Overrides& overrides)
     : overrides_(overrides),
       motion_(options.spindle_acceleration),
       max_speed_(options.spindle_max_speed),
       drive_acceleration_(options.spindle_acceleration),
-      drive_torque_(options.spindle_torque) {
+      drive_torque_(options.spindle_torque),
+      orient_speed_(options.orient_speed),
+      speed_tolerance_(options.speed_tolerance) {
 }
 
 double SpindleControl::commanded() const {
@@ -30,7 +25,7 @@ double SpindleControl::commanded() const {
 
 bool SpindleControl::atSpeed(double time) const {
   return rotation_ != Rotation::off &&
-         std::abs(speed(time) - commanded()) <= AT_SPEED * std::abs(commanded());
+         std::abs(speed(time) - commanded()) <= speed_tolerance_ * std::abs(commanded());
 }
 
 bool SpindleControl::oriented(double time) const {
@@ -56,10 +51,11 @@ void SpindleControl::stop(double time) {
 }
 
 void SpindleControl::orient(double time, double steps) {
-  if (!(steps >= 0.0 && steps <= ORIENT_STEPS - 1)) throw NcAlarm(PS_MACRO_FORMAT, "#1133 IS NOT 0 TO 4095");
+  if (!(steps >= 0.0 && steps <= nc::ORIENT_STEPS - 1))
+    throw NcAlarm(PS_MACRO_FORMAT, "#1133 IS NOT 0 TO 4095");
   rotation_ = Rotation::off;
   oriented_ = true;
-  motion_.orient(time, units::TWO_PI * steps / ORIENT_STEPS, ORIENT_SPEED);
+  motion_.orient(time, units::TWO_PI * steps / nc::ORIENT_STEPS, orient_speed_);
 }
 
 void SpindleControl::setTorque(double time, double torque) {

@@ -38,6 +38,7 @@ class SpindleControl {
   const Overrides& overrides_;
   SpindleMotion motion_;
   double max_speed_, drive_acceleration_, drive_torque_;  // [rad/s], [rad/s2], [N m]
+  double orient_speed_, speed_tolerance_;                 // [rad/s], [1]
   double speed_ = 0.0;
   Rotation rotation_ = Rotation::off;
   bool oriented_ = false;

@@ -1,5 +1,6 @@
 #include "controller/variables.h"
 
+#include "smartmill_core/nc/orientation.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::sim {
@@ -27,7 +28,7 @@ bool Variables::exists(int number) {
 
 bool Variables::writable(int number) {
   return (number >= 1 && number <= LAST_LOCAL) || (number >= 100 && number <= 199) ||
-         (number >= 500 && number <= 999) || number == ORIENT || isOffset(number);
+         (number >= 500 && number <= 999) || number == nc::ORIENT_VARIABLE || isOffset(number);
 }
 
 std::optional<double> Variables::read(int number, const Positions& positions) const {

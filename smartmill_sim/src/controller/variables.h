@@ -12,8 +12,7 @@ namespace smartmill::sim {
 class Variables {
  public:
   using Point = std::array<double, 3>;
-  static constexpr int ORIENT = 1133;  // Dunwoody 6.2
-  static constexpr int VACANT = 0;     // readable, without a value
+  static constexpr int VACANT = 0;  // readable, without a value
   static constexpr std::size_t SYSTEMS = 6;
 
   /// Present positions [m].

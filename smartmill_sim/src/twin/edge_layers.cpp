@@ -3,14 +3,15 @@
 #include <algorithm>
 #include <utility>
 
+#include "smartmill_sim/twin/tool_contact.h"
+
 namespace smartmill::sim {
 namespace {
 
-constexpr double LEAST_DEPTH = 1e-9;  // [m] instead of a depth <= 0
-constexpr double GONE = 1e-3;         // [m] radius reduction of a missing edge, more than any feed
+constexpr double GONE = 1e-3;  // [m] radius reduction of a missing edge, more than any feed
 
 double depthOf(const EdgeLayer& layer, double depth) {
-  return std::max(layer.from_surface ? depth - layer.height : std::min(layer.height, depth), LEAST_DEPTH);
+  return std::max(layer.from_surface ? depth - layer.height : std::min(layer.height, depth), SMALLEST_DEPTH);
 }
 
 CuttingLaw lawOf(const EdgeLayer& layer, CuttingLaw law) {

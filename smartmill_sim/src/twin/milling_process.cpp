@@ -96,8 +96,8 @@ void MillingProcess::correctForPath(const ToolHistory::Delay& delay, const ToolH
   const double radius = tool_.radius(), steps = history_.stepsPerRadian();  // [m], [1/rad]
   const double share = path_share_ / radius;
   const auto across = [&](double x, double y) { return x * cell.at.cosine - y * cell.at.sine; };
-  const ToolHistory::Point at = ToolHistory::pointAt(delay.point.ago - pass.offset * steps);
-  const std::array<double, 4> slopes = ToolHistory::weightSlopes(at);
+  const ToolHistory::Point at = ToolHistory::Point::at(delay.point.ago - pass.offset * steps);
+  const std::array<double, 4> slopes = at.weightSlopes();
   std::array<double, 2> then{}, rate{};  // [m], [m] per step farther back
   history_.forEachStep(at, [&](std::size_t k, const std::array<double, 2>& u) {
     for (std::size_t i = 0; i < 2; ++i) {

@@ -5,14 +5,6 @@
 namespace smartmill::sim {
 namespace {
 
-// Lead-in before a record of a running cut. The depth of cut grows over its first part: a sudden full cut
-// would excite a long transient.
-constexpr double LEAD_IN = 0.4;        // [s]
-constexpr double LEAST_STEADY = 0.1;   // [s] shorter times before the record are simulated as they are
-constexpr double GROWING_SHARE = 0.6;  // [1] of the lead-in
-constexpr double LEAST_GROWTH = 0.01;  // [1] of the depth at the beginning
-constexpr long GROWTH_STEPS = 32;      // between two depths
-
 // Smooth step from 0 at 0 to 1 at 1.
 double growth(double x) {
   return x >= 1.0 ? 1.0 : x * x * (3.0 - 2.0 * x);
@@ -26,6 +18,7 @@ SteadyTest::SteadyTest(const MachineModel& model, const CampaignTest& test, doub
       phase_(phase),
       begin_(begin),
       substeps_(options.substeps),
+      lead_in_(options.lead_in),
       // A linear rise is on average half a step before the end of the step.
       rise_(engagementRise(machine.vibrates()) + 2.0 * options.early_entry),
       machine_(machine),
@@ -51,17 +44,18 @@ void SteadyTest::next(double t, CuttingMachine::Input& input) {
 
 void SteadyTest::leadIn() {
   // Independent of the model, so that differences between models are smooth.
-  const double time = *test_.running_before < LEAST_STEADY ? *test_.running_before : LEAD_IN;
+  const double time = *test_.running_before < lead_in_.least_steady ? *test_.running_before : lead_in_.time;
   const auto steps = static_cast<long>(time * test_.sample_rate * substeps_);
   const double step = 1.0 / test_.sample_rate / substeps_;
   CuttingMachine::Input input;
   CuttingMachine::Output out;
   for (long k = steps; k > 0; --k) {
     inputAt(begin_ - static_cast<double>(k) * step, input);
-    if (cut() && (k % GROWTH_STEPS == 0 || !engaged_)) {
+    if (cut() && (k % lead_in_.steps == 0 || !engaged_)) {
       const double share =
-          LEAST_GROWTH + (1.0 - LEAST_GROWTH) * growth(static_cast<double>(steps - k) /
-                                                       (GROWING_SHARE * static_cast<double>(steps)));
+          lead_in_.first_depth +
+          (1.0 - lead_in_.first_depth) *
+              growth(static_cast<double>(steps - k) / (lead_in_.growing_share * static_cast<double>(steps)));
       if (!engaged_) engage(input.motion, share * test_.engagement->axial_depth);
       machine_.setDepth(share * test_.engagement->axial_depth);
     }

@@ -27,6 +27,7 @@ class SteadyTest {
   const CampaignTest& test_;
   double phase_, begin_;
   int substeps_;
+  LeadIn lead_in_;
   double rise_;  // [samples]
   CuttingMachine& machine_;
   double start_;       // [s] begin of the cut

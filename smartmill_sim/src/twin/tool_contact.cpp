@@ -6,12 +6,6 @@
 #include "smartmill_core/units.h"
 
 namespace smartmill::sim {
-namespace {
-
-constexpr double LEAST_DEPTH = 1e-9;  // [m] instead of a depth <= 0
-
-}  // namespace
-
 void ToolContact::engage(const std::vector<ContactArc>& arcs, const ToolMotion& now, double rise) {
   if (!feed_start_) feed_start_ = now.centre;
   if (arcs_.empty()) cut_time_ = feed_path_ = 0.0;
@@ -43,7 +37,7 @@ std::vector<ContactArc> ToolContact::actualArcs(const TwinState& state) {
   const double error = state.depth_extra + state.depth_slope * feed_path_;
   depth_extra_ = state.depth_extra;
   std::vector<ContactArc> actual = arcs_;
-  for (ContactArc& a : actual) a.depth = error == 0.0 ? a.depth : std::max(a.depth + error, LEAST_DEPTH);
+  for (ContactArc& a : actual) a.depth = error == 0.0 ? a.depth : std::max(a.depth + error, SMALLEST_DEPTH);
   return actual;
 }
 

@@ -50,8 +50,7 @@ bool ToolHistory::isSteadyOver(double turn) const {
   return regime_ == 0 || rotation_now_ - regime_start_ > turn + SETTLED_STEPS * now_.speed * time_step_;
 }
 
-/// Interpolation point so many steps ago: cubic through the four steps around it.
-ToolHistory::Point ToolHistory::pointAt(double steps) {
+ToolHistory::Point ToolHistory::Point::at(double steps) {
   steps = std::max(2.0, steps);
   const auto whole_steps = static_cast<std::size_t>(steps);
   const double f = steps - static_cast<double>(whole_steps), g = f - 1.0, h = f - 2.0, across = (f + 1.0) * f;
@@ -59,8 +58,8 @@ ToolHistory::Point ToolHistory::pointAt(double steps) {
       steps, whole_steps, {{across * g / 6.0, -across * h / 2.0, (f + 1.0) * g * h / 2.0, -f * g * h / 6.0}}};
 }
 
-std::array<double, 4> ToolHistory::weightSlopes(const Point& at) {
-  const double f = at.ago - static_cast<double>(at.steps), square = 3.0 * f * f;
+std::array<double, 4> ToolHistory::Point::weightSlopes() const {
+  const double f = ago - static_cast<double>(steps), square = 3.0 * f * f;
   return {{(square - 1.0) / 6.0, (2.0 + 2.0 * f - square) / 2.0, (square - 4.0 * f - 1.0) / 2.0,
            (6.0 * f - square - 2.0) / 6.0}};
 }
@@ -78,7 +77,8 @@ void ToolHistory::search(Delay& delay) {
         available == 0 ? now_.centre : centre_[ring(count_ - available, centre_.size())];
     const double before = (available == 0 ? rotation_now_ : rotationAt(available)) - target;
     for (std::size_t i = 0; i < 2; ++i) delay.fed[i] = now_.centre[i] - oldest[i] + first_feed_[i] * before;
-    delay.point = pointAt(static_cast<double>(available) + std::max(3.0, before / (now_.speed * time_step_)));
+    delay.point =
+        Point::at(static_cast<double>(available) + std::max(3.0, before / (now_.speed * time_step_)));
     return;
   }
   auto ago = static_cast<long>(delay.turn / (now_.speed * time_step_));
@@ -87,7 +87,7 @@ void ToolHistory::search(Delay& delay) {
   while (rotationAt(ago) > target) ++ago;
   while (ago > 1 && rotationAt(ago - 1) <= target) --ago;
   const double at = rotationAt(ago), next = rotationAt(ago - 1);
-  delay.point = pointAt(static_cast<double>(ago) - (next > at ? (target - at) / (next - at) : 0.0));
+  delay.point = Point::at(static_cast<double>(ago) - (next > at ? (target - at) / (next - at) : 0.0));
   delay.fed = now_.centre;
   for (std::size_t k = 0; k < 4; ++k) {
     const long step = count_ - static_cast<long>(delay.point.steps) - 2 + static_cast<long>(k);
@@ -103,7 +103,7 @@ const ToolHistory::Delay& ToolHistory::update(Delay& delay) {
     search(delay);
     delay.valid_regime = -1;
   } else if (delay.valid_regime != regime_) {
-    delay.point = pointAt(delay.turn / (now_.speed * time_step_));
+    delay.point = Point::at(delay.turn / (now_.speed * time_step_));
     delay.fed = {{feed_[0] * delay.turn, feed_[1] * delay.turn}};
     delay.valid_regime = regime_;
   }

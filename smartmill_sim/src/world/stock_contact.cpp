@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "smartmill_sim/controller/nc_alarm.h"
+
 namespace smartmill::sim {
 namespace {
 
 constexpr double TURNING = 1.0;      // [rad/s] a slower spindle cannot cut
 constexpr double SAME_ANGLE = 1e-7;  // [rad]
-constexpr int TOUCHED = 3001, PLUNGED = 3002;
 
 bool isSameContact(const std::vector<ContactArc>& a, const std::vector<ContactArc>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const ContactArc& p, const ContactArc& q) {
@@ -24,9 +25,9 @@ StockContact::Fault StockContact::update(const MotionState& state, const ToolMot
   Fault fault;
   std::vector<ContactArc> arcs = stock_.contact(state.position, state.velocity);
   if (!arcs.empty() && state.spindle_speed < TURNING) {
-    fault = {TOUCHED, "TOOL MET STOCK WITH SPINDLE AT REST"};
+    fault = {EX_TOUCHED, "TOOL MET STOCK WITH SPINDLE AT REST"};
   } else if (state.velocity[2] < 0.0 && stock_.hasMaterialAbove(state.position)) {
-    fault = {PLUNGED, "TOOL PLUNGED INTO STOCK"};
+    fault = {EX_PLUNGED, "TOOL PLUNGED INTO STOCK"};
   }
   if (fault.alarm != 0) arcs.clear();
   if (!arcs.empty() || machine.cutting()) {

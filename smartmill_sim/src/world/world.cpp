@@ -5,6 +5,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
+#include "smartmill_sim/controller/nc_alarm.h"
 #include "world/world_sensor.h"
 
 namespace smartmill::sim {
@@ -15,7 +16,6 @@ using Lock = std::lock_guard<std::mutex>;
 constexpr std::size_t CONTACT_UPDATE = 64;     // samples between two updates of the contact with the stock
 constexpr double HAMMER_DELAY = 0.03;          // [s] of the solenoid
 constexpr std::uint64_t FLANGE_SEED = 0x1000;  // offset from the seed of the world
-constexpr int SENSOR = 3003;                   // external alarm
 
 double stepOf(const WorldOptions& options) {
   return 1.0 / (World::SAMPLE_RATE * options.substeps);
@@ -210,7 +210,7 @@ void World::simulateSample(double time, const MotionState& now, Block& block) {
   const WorldSensor::Sample sample{
       time, now, share, {share * sum.fx, share * sum.fy, share * sum.fz}, share * sum.torque, load_meter_};
   for (const auto& sensor : sensors_) sensor->read(sample, block);
-  if (station_ && station_->touched()) raiseAlarm(SENSOR, "TOOL MET THE DISPLACEMENT SENSOR");
+  if (station_ && station_->touched()) raiseAlarm(EX_COLLISION, "TOOL MET THE DISPLACEMENT SENSOR");
 }
 
 ToolMotion World::between(const MotionState& now, double share) const {

@@ -13,9 +13,11 @@
 
 #include "smartmill_cnc/motion/nc_program.h"
 #include "smartmill_core/axis_names.h"
+#include "smartmill_core/nc/orientation.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 #include "smartmill_hammer/sequence/hammer_sequence.h"
+#include "smartmill_sim/controller/nc_alarm.h"
 #include "smartmill_sim/world/world.h"
 #include "study_case.h"
 
@@ -26,7 +28,6 @@ using namespace smartmill;
 constexpr double BLOCK_TIME = sim::World::BLOCK / sim::World::SAMPLE_RATE;  // [s]
 constexpr double MOST_TIME = 240.0;                                         // [s] of a run
 constexpr double STATE_PERIOD = 0.02;                                       // [s]
-constexpr int COLLISION = 3003;                                             // alarm of the simulated machine
 constexpr double NARROW_SHARE = 0.1;
 constexpr double MM = units::MM;
 
@@ -232,7 +233,7 @@ class Driver {
         sequence_.commandFailed(time_, message);
       }
     } else if (command.kind == Kind::orient) {
-      start(cnc::orientProgram(command.angle, 1133));
+      start(cnc::orientProgram(command.angle, nc::ORIENT_VARIABLE));
     } else if (command.kind == Kind::jog) {
       start(cnc::jogProgram(static_cast<int>(*axisIndex(command.axis)), command.distance, command.feed, 4));
     } else {
@@ -278,9 +279,9 @@ class Driver {
   void judge() {
     bool collision = false, overtravel = beyond_;
     for (const focas::AlarmMessage& alarm : controller().alarmMessages()) {
-      collision = collision || alarm.number == COLLISION;
-      overtravel = overtravel || alarm.type == 4;
-      if (alarm.number == COLLISION || alarm.type == 4) {
+      collision = collision || alarm.number == sim::EX_COLLISION;
+      overtravel = overtravel || alarm.type == sim::ALARM_OT;
+      if (alarm.number == sim::EX_COLLISION || alarm.type == sim::ALARM_OT) {
         std::fprintf(stderr, "run %d: %s at %.1f s\n", counts_.runs, alarm.text.c_str(), time_);
       }
     }

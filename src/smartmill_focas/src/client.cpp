@@ -138,12 +138,6 @@ std::size_t Client::dncFlush() {
 void Client::dncEnd(double timeout) {
   impl_->dnc.end(timeout);
 }
-void Client::dncEndBegin() {
-  impl_->dnc.endBegin();
-}
-bool Client::dncEndDone() {
-  return impl_->dnc.endDone();
-}
 void Client::dncCancel(DncResult result) {
   impl_->dnc.cancel(result);
 }

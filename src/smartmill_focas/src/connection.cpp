@@ -1,11 +1,9 @@
 #include "connection.h"
 
-#include <netdb.h>
 #include <poll.h>
 #include <sys/socket.h>
 
-#include <algorithm>
-#include <cerrno>
+#include <stdexcept>
 
 #include "smartmill_focas/client.h"
 
@@ -20,24 +18,6 @@ constexpr std::size_t READ_STEP = 1 << 17;
 
 std::string failureLine(const std::string& call, int code, int detail) {
   return call + ": " + ewName(code) + " (" + std::to_string(code) + "), detail " + std::to_string(detail);
-}
-
-int millisecondsUntil(Clock::time_point deadline) {
-  const auto remaining =
-      std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now()).count();
-  return static_cast<int>(std::clamp<long long>(remaining + 1, 0, 3600000));
-}
-
-namespace {
-
-Clock::duration secondsAsDuration(double seconds) {
-  return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
-}
-
-}  // namespace
-
-Clock::time_point deadlineIn(double seconds) {
-  return Clock::now() + secondsAsDuration(seconds);
 }
 
 void Connection::setTarget(const std::string& host, std::uint16_t port, double timeout) {
@@ -109,55 +89,19 @@ OpenReply Connection::open(Circuit& circuit) {
   }
 }
 
-void Connection::failToConnect(const std::string& reason) {
-  drop();
-  throw ConnectionError("cannot connect to the controller at " + where() + ": " + reason);
-}
-
 void Connection::connectSocket(Circuit& circuit, Clock::time_point deadline) {
-  addrinfo hints{};
-  hints.ai_family = AF_INET;
-  hints.ai_socktype = SOCK_STREAM;
-  addrinfo* found = nullptr;
-  const int resolved = ::getaddrinfo(host_.c_str(), std::to_string(port_).c_str(), &hints, &found);
-  if (resolved != 0) {
-    failToConnect(::gai_strerror(resolved));
+  const bool is_stream = &circuit == &stream;
+  try {
+    circuit.socket = connectTo(host_, port_, deadline, [&](int fd) {
+      keepAlive(fd, is_stream ? UNRESPONSIVE_PROBES : KEEP_ALIVE_PROBES);
+      if (is_stream) {
+        ::setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &STREAM_SEND_BUFFER, sizeof STREAM_SEND_BUFFER);
+      }
+    });
+  } catch (const std::runtime_error& error) {
+    drop();
+    throw ConnectionError("cannot connect to the controller at " + where() + ": " + error.what());
   }
-  circuit.socket = Descriptor(::socket(AF_INET, SOCK_STREAM, 0));
-  int error = circuit.socket.valid() ? 0 : errno;
-  if (error == 0) {
-    prepareSocket(circuit.socket.get());
-    keepAlive(circuit.socket.get(), &circuit == &stream ? UNRESPONSIVE_PROBES : KEEP_ALIVE_PROBES);
-    if (&circuit == &stream) {
-      ::setsockopt(circuit.socket.get(), SOL_SOCKET, SO_SNDBUF, &STREAM_SEND_BUFFER,
-                   sizeof STREAM_SEND_BUFFER);
-    }
-    if (::connect(circuit.socket.get(), found->ai_addr, found->ai_addrlen) != 0) {
-      error = errno;
-    }
-  }
-  ::freeaddrinfo(found);
-  if (error == EINPROGRESS) {
-    error = waitForConnect(circuit.socket.get(), deadline);
-  }
-  if (error != 0) {
-    failToConnect(errorText(error));
-  }
-}
-
-int Connection::waitForConnect(int socket, Clock::time_point deadline) {
-  pollfd wait{socket, POLLOUT, 0};
-  int ready = 0;
-  do {
-    ready = ::poll(&wait, 1, millisecondsUntil(deadline));
-  } while (ready < 0 && errno == EINTR);
-  if (ready == 0) {
-    failToConnect("no answer in time");
-  }
-  int error = 0;
-  socklen_t size = sizeof error;
-  ::getsockopt(socket, SOL_SOCKET, SO_ERROR, &error, &size);
-  return error;
 }
 
 void Connection::queue(Circuit& circuit, std::uint8_t type, std::uint8_t direction, const Bytes& body) {
@@ -205,10 +149,11 @@ std::optional<Frame> Connection::pollOrDrop(Circuit& circuit) {
 }
 
 Frame Connection::receive(Circuit& circuit, Clock::time_point deadline) {
+  const auto timeout = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(timeout_));
   for (;;) {
     if (std::optional<Frame> frame = poll(circuit)) {
       // Endless other frames are no answer either.
-      if (Clock::now() >= deadline + secondsAsDuration(timeout_)) {
+      if (Clock::now() >= deadline + timeout) {
         fail("no answer in time");
       }
       if (frame->version < 1) {

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -10,12 +9,6 @@
 #include "socket.h"
 
 namespace smartmill::focas {
-
-using Clock = std::chrono::steady_clock;
-
-/// [ms] for poll().
-int millisecondsUntil(Clock::time_point deadline);
-Clock::time_point deadlineIn(double seconds);
 
 /// One TCP connection, opened with a code.
 struct Circuit {
@@ -67,8 +60,6 @@ class Connection {
 
  private:
   void connectSocket(Circuit& circuit, Clock::time_point deadline);
-  [[noreturn]] void failToConnect(const std::string& reason);
-  int waitForConnect(int socket, Clock::time_point deadline);
 
   std::string host_;
   std::uint16_t port_ = 0;

@@ -1,14 +1,11 @@
 #include "data_calls.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
-#include <limits>
 
 namespace smartmill::focas {
 namespace {
 
-constexpr int MAX_MACROS = 1000;           // in one request
 constexpr std::size_t NAME_WIDTH = 4;      // [byte]
 constexpr std::size_t PATH_WIDTH = 256;    // [byte]
 constexpr std::size_t PROGRAM_WIDTH = 36;  // [byte]
@@ -49,6 +46,8 @@ SubReply DataCalls::answer(const SubRequest& request) {
       code = EW_PATH;
     } else if (const std::optional<int> memory_code = memory_.call(request, out)) {
       code = *memory_code;
+    } else if (const std::optional<int> macro_code = macros_.call(request, out)) {
+      code = *macro_code;
     } else {
       code = call(request, out);
     }
@@ -78,14 +77,6 @@ int DataCalls::call(const SubRequest& request, Writer& out) {
       return position(request, out);
     case OP_SPINDLE_NAMES:
       return spindleNames(request, out);
-    case OP_READ_MACRO:
-      return readMacros(request, out);
-    case OP_WRITE_MACRO:
-      return writeMacro(request);
-    case OP_READ_MACRO_DOUBLE:
-      return readMacroDoubles(request, out);
-    case OP_WRITE_MACRO_DOUBLE:
-      return writeMacroDoubles(request);
     case OP_ALARM_MESSAGES:
       return alarmMessages(request, out);
     default:
@@ -324,80 +315,6 @@ void DataCalls::units(const SubRequest& request, Writer& out) const {
   for (std::size_t i = 0; i < info_.axes.size(); ++i) {
     out.i16(0).i16(0);  // mm
   }
-}
-
-int DataCalls::readMacros(const SubRequest& request, Writer& out) const {
-  const int first = request.v[0];
-  const std::int64_t count = static_cast<std::int64_t>(request.v[1]) - first + 1;
-  if (count < 1 || count > MAX_MACROS) {
-    return EW_NUMBER;
-  }
-  for (int i = 0; i < static_cast<int>(count); ++i) {
-    std::optional<double> value;
-    const int code = controller_.readMacro(first + i, &value);
-    if (code != EW_OK) {
-      return code;
-    }
-    out.value8(Value8::fromMacro(value));
-  }
-  return EW_OK;
-}
-
-int DataCalls::writeMacro(const SubRequest& request) {
-  Reader reader(request.extra);
-  const Value8 value = reader.value8();
-  if (value.vacant()) {
-    return controller_.writeMacro(request.v[0], std::nullopt);
-  }
-  const double number = value.toDouble();
-  return std::isfinite(number) ? controller_.writeMacro(request.v[0], number) : EW_DATA;
-}
-
-int DataCalls::readMacroDoubles(const SubRequest& request, Writer& out) const {
-  const int count = request.v[1];
-  if (count < 1 || count > MAX_MACROS || request.v[0] > std::numeric_limits<std::int32_t>::max() - count) {
-    return EW_NUMBER;
-  }
-  for (int i = 0; i < count; ++i) {
-    std::optional<double> value;
-    const int code = controller_.readMacro(request.v[0] + i, &value);
-    if (code != EW_OK) {
-      return code;
-    }
-    out.f64(value.value_or(std::numeric_limits<double>::quiet_NaN()));
-  }
-  return EW_OK;
-}
-
-int DataCalls::writeMacroDoubles(const SubRequest& request) {
-  constexpr std::size_t DOUBLE = 8;  // [byte]
-  const int count = static_cast<int>(request.extra.size() / DOUBLE);
-  if (request.extra.size() % DOUBLE != 0 || count < 1 || count > MAX_MACROS ||
-      request.v[0] > std::numeric_limits<std::int32_t>::max() - count) {
-    return EW_LENGTH;
-  }
-  // All of them or none.
-  Reader reader(request.extra);
-  std::vector<std::optional<double>> contents;
-  for (int i = 0; i < count; ++i) {
-    const double value = reader.f64();
-    if (std::isinf(value)) {
-      return EW_DATA;
-    }
-    contents.push_back(std::isnan(value) ? std::nullopt : std::optional<double>(value));
-    std::optional<double> former;
-    const int code = controller_.readMacro(request.v[0] + i, &former);
-    if (code != EW_OK) {
-      return code;
-    }
-  }
-  for (int i = 0; i < count; ++i) {
-    const int code = controller_.writeMacro(request.v[0] + i, contents[static_cast<std::size_t>(i)]);
-    if (code != EW_OK) {
-      return code;
-    }
-  }
-  return EW_OK;
 }
 
 int DataCalls::alarmMessages(const SubRequest& request, Writer& out) const {

@@ -1,7 +1,8 @@
 #pragma once
 
+#include "macro_calls.h"
 #include "memory_calls.h"
-#include "smartmill_focas/server.h"
+#include "smartmill_focas/controller_interface.h"
 
 namespace smartmill::focas {
 
@@ -9,7 +10,10 @@ namespace smartmill::focas {
 class DataCalls {
  public:
   explicit DataCalls(ControllerInterface& controller)
-      : controller_(controller), info_(controller.sysInfo()), memory_(controller, info_) {}
+      : controller_(controller),
+        info_(controller.sysInfo()),
+        memory_(controller, info_),
+        macros_(controller) {}
   DataCalls(const DataCalls&) = delete;
   DataCalls& operator=(const DataCalls&) = delete;
 
@@ -26,10 +30,6 @@ class DataCalls {
   int position(const SubRequest& request, Writer& out) const;
   int spindle(const SubRequest& request, Writer& out) const;
   int servo(const SubRequest& request, Writer& out) const;
-  int readMacros(const SubRequest& request, Writer& out) const;
-  int writeMacro(const SubRequest& request);
-  int readMacroDoubles(const SubRequest& request, Writer& out) const;
-  int writeMacroDoubles(const SubRequest& request);
   int alarmMessages(const SubRequest& request, Writer& out) const;
   void status(const Status& status, Writer& out) const;
   void axisNames(const SubRequest& request, Writer& out) const;
@@ -38,6 +38,7 @@ class DataCalls {
   ControllerInterface& controller_;
   SysInfo info_;
   MemoryCalls memory_;
+  MacroCalls macros_;
 };
 
 }  // namespace smartmill::focas

@@ -15,8 +15,6 @@ class DncStream {
   void start();
   std::size_t send(const char* text, std::size_t size);
   std::size_t flush();
-  void endBegin();
-  bool endDone();
   void end(double timeout);
   void cancel(DncResult result);
   void check();
@@ -25,6 +23,8 @@ class DncStream {
 
  private:
   void requireSession(const std::string& call);
+  void endBegin();
+  bool endDone();
   void throwIfAbort(const Frame& frame, const std::string& call);
 
   Connection& connection_;

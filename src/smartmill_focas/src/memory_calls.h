@@ -3,7 +3,7 @@
 #include <optional>
 #include <string>
 
-#include "smartmill_focas/server.h"
+#include "smartmill_focas/controller_interface.h"
 
 namespace smartmill::focas {
 

@@ -29,7 +29,7 @@ std::string nameIn(const Bytes& body) {
 
 }  // namespace
 
-bool ProgramTransfer::handle(const Frame& frame, ControllerInterface& controller, const Send& send) {
+bool ProgramTransfer::handle(const Frame& frame, ProgramsInterface& controller, const Send& send) {
   if (frame.is(FRAME_DOWNLOAD_START, DIR_REQUEST)) {
     if (receiving_) {
       refuse(send, FRAME_DOWNLOAD_START, EW_BUSY);
@@ -57,7 +57,7 @@ bool ProgramTransfer::handle(const Frame& frame, ControllerInterface& controller
   return true;
 }
 
-void ProgramTransfer::endDownload(ControllerInterface& controller, const Send& send) {
+void ProgramTransfer::endDownload(ProgramsInterface& controller, const Send& send) {
   int code = EW_FUNC;
   if (receiving_) {
     code = too_long_ ? int{EW_OVRFLOW} : int{controller.storePrograms(text_)};
@@ -71,7 +71,7 @@ void ProgramTransfer::endDownload(ControllerInterface& controller, const Send& s
   }
 }
 
-void ProgramTransfer::upload(const Frame& frame, const ControllerInterface& controller, const Send& send) {
+void ProgramTransfer::upload(const Frame& frame, const ProgramsInterface& controller, const Send& send) {
   const std::string name = nameIn(frame.body);
   const std::size_t slash = name.find_last_of('/');
   const std::size_t dash = name.find('-', slash == std::string::npos ? 0 : slash);

@@ -5,7 +5,7 @@
 #include <functional>
 #include <string>
 
-#include "smartmill_focas/server.h"
+#include "smartmill_focas/controller_interface.h"
 
 namespace smartmill::focas {
 
@@ -16,7 +16,7 @@ class ProgramTransfer {
   using Send = std::function<void(std::uint8_t type, Direction direction, const Bytes& body)>;
 
   /// @param send receives the replies @return whether the frame belongs to a transfer
-  bool handle(const Frame& frame, ControllerInterface& controller, const Send& send);
+  bool handle(const Frame& frame, ProgramsInterface& controller, const Send& send);
 
   /// An upload is sent one frame at a time, as a control does, so that clients that expect one frame per
   /// recv() work.
@@ -29,8 +29,8 @@ class ProgramTransfer {
     Direction direction;
     Bytes body;
   };
-  void endDownload(ControllerInterface& controller, const Send& send);
-  void upload(const Frame& frame, const ControllerInterface& controller, const Send& send);
+  void endDownload(ProgramsInterface& controller, const Send& send);
+  void upload(const Frame& frame, const ProgramsInterface& controller, const Send& send);
 
   bool receiving_ = false, too_long_ = false;
   std::string text_;

@@ -1,8 +1,11 @@
 #include "socket.h"
 
+#include <arpa/inet.h>
 #include <fcntl.h>
+#include <netdb.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
+#include <poll.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -10,9 +13,20 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <stdexcept>
 #include <system_error>
 
 namespace smartmill::focas {
+
+int millisecondsUntil(Clock::time_point deadline) {
+  const auto remaining =
+      std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now()).count();
+  return static_cast<int>(std::clamp<long long>(remaining + 1, 0, 3600000));
+}
+
+Clock::time_point deadlineIn(double seconds) {
+  return Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+}
 
 void Descriptor::reset() {
   if (fd_ >= 0) {
@@ -26,6 +40,75 @@ void prepareSocket(int fd) {
   ::fcntl(fd, F_SETFD, FD_CLOEXEC);
   const int on = 1;
   ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+}
+
+Descriptor listenOn(const std::string& address, std::uint16_t& port, const Configure& configure) {
+  constexpr int BACKLOG = 64;
+  const auto fail = [&](const std::string& reason) {
+    throw std::runtime_error("cannot listen on " + address + ":" + std::to_string(port) + ": " + reason);
+  };
+  sockaddr_in where{};
+  where.sin_family = AF_INET;
+  where.sin_port = htons(port);
+  if (::inet_pton(AF_INET, address.c_str(), &where.sin_addr) != 1) {
+    fail("not an IPv4 address");
+  }
+  Descriptor socket(::socket(AF_INET, SOCK_STREAM, 0));
+  if (!socket.valid()) {
+    fail(errorText(errno));
+  }
+  const int on = 1;
+  ::setsockopt(socket.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+  if (configure) {
+    configure(socket.get());
+  }
+  prepareSocket(socket.get());
+  if (::bind(socket.get(), reinterpret_cast<const sockaddr*>(&where), sizeof where) != 0 ||
+      ::listen(socket.get(), BACKLOG) != 0) {
+    fail(errorText(errno));
+  }
+  socklen_t size = sizeof where;
+  ::getsockname(socket.get(), reinterpret_cast<sockaddr*>(&where), &size);
+  port = ntohs(where.sin_port);
+  return socket;
+}
+
+Descriptor connectTo(const std::string& host, std::uint16_t port, Clock::time_point deadline,
+                     const Configure& configure) {
+  addrinfo hints{};
+  hints.ai_family = AF_INET;
+  hints.ai_socktype = SOCK_STREAM;
+  addrinfo* found = nullptr;
+  const int resolved = ::getaddrinfo(host.c_str(), std::to_string(port).c_str(), &hints, &found);
+  if (resolved != 0) {
+    throw std::runtime_error(::gai_strerror(resolved));
+  }
+  Descriptor socket(::socket(AF_INET, SOCK_STREAM, 0));
+  int error = socket.valid() ? 0 : errno;
+  if (error == 0) {
+    prepareSocket(socket.get());
+    if (configure) {
+      configure(socket.get());
+    }
+    error = ::connect(socket.get(), found->ai_addr, found->ai_addrlen) == 0 ? 0 : errno;
+  }
+  ::freeaddrinfo(found);
+  if (error == EINPROGRESS) {
+    pollfd wait{socket.get(), POLLOUT, 0};
+    int ready = 0;
+    do {
+      ready = ::poll(&wait, 1, millisecondsUntil(deadline));
+    } while (ready < 0 && errno == EINTR);
+    if (ready == 0) {
+      throw std::runtime_error("no answer in time");
+    }
+    socklen_t size = sizeof error;
+    ::getsockopt(socket.get(), SOL_SOCKET, SO_ERROR, &error, &size);
+  }
+  if (error != 0) {
+    throw std::runtime_error(errorText(error));
+  }
+  return socket;
 }
 
 namespace {

@@ -1,41 +1,40 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string>
-#include <utility>
 
 #include "smartmill_focas/codec.h"
+#include "smartmill_focas/descriptor.h"
+
+// By hand: Boost.Asio does not report the disconnect of a client that is not read (POLLRDHUP), its
+// synchronous calls have no deadline, TCP_KEEPIDLE and TCP_INFO need the descriptor, and the tap has as many
+// lines with it.
 
 namespace smartmill::focas {
 
-/// Owns a file descriptor.
-class Descriptor {
- public:
-  Descriptor() = default;
-  explicit Descriptor(int fd) : fd_(fd) {}
-  Descriptor(Descriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
-  Descriptor& operator=(Descriptor&& other) noexcept {
-    if (this != &other) {
-      reset();
-      fd_ = std::exchange(other.fd_, -1);
-    }
-    return *this;
-  }
-  ~Descriptor() { reset(); }
-  void reset();
-  int get() const { return fd_; }
-  bool valid() const { return fd_ >= 0; }
+using Clock = std::chrono::steady_clock;
 
- private:
-  int fd_ = -1;
-};
+/// [ms] for poll().
+int millisecondsUntil(Clock::time_point deadline);
+Clock::time_point deadlineIn(double seconds);
 
 /// Result of a read or write on a non-blocking socket.
 enum class Transfer { done, would_block, closed };
 
 /// Non-blocking, without Nagle's algorithm, not inherited by child processes.
 void prepareSocket(int fd);
+
+/// Sets options of a socket before it connects or listens.
+using Configure = std::function<void(int fd)>;
+/// @return a socket that listens. @param port 0: any free one; receives that of the socket.
+/// @throws std::runtime_error "cannot listen on ADDRESS:PORT: REASON".
+Descriptor listenOn(const std::string& address, std::uint16_t& port, const Configure& configure = {});
+/// @return a connected socket. @throws std::runtime_error with the reason.
+Descriptor connectTo(const std::string& host, std::uint16_t port, Clock::time_point deadline,
+                     const Configure& configure = {});
 
 constexpr int KEEP_ALIVE_PROBES = 2;
 /// TCP keep-alive: an idle socket fails if the peer does not answer this many probes at intervals of 1 s,

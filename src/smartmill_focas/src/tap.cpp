@@ -1,6 +1,3 @@
-#include <arpa/inet.h>
-#include <netdb.h>
-#include <netinet/in.h>
 #include <poll.h>
 #include <sys/socket.h>
 
@@ -8,10 +5,11 @@
 #include <atomic>
 #include <cerrno>
 #include <list>
+#include <stdexcept>
 #include <thread>
 
-#include "connection.h"
 #include "smartmill_focas/recording.h"
+#include "socket.h"
 
 namespace smartmill::focas {
 namespace {
@@ -40,23 +38,12 @@ struct Pair {
 class Tap::Impl {
  public:
   Impl(std::uint16_t port, std::string host, std::uint16_t host_port, double timeout, Listener listener)
-      : host_(std::move(host)), host_port_(host_port), timeout_(timeout), listener_(std::move(listener)) {
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_port = htons(port);
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    socket_ = Descriptor(::socket(AF_INET, SOCK_STREAM, 0));
-    const int on = 1;
-    ::setsockopt(socket_.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-    prepareSocket(socket_.get());
-    socklen_t size = sizeof address;
-    if (::bind(socket_.get(), reinterpret_cast<const sockaddr*>(&address), size) != 0 ||
-        ::listen(socket_.get(), 16) != 0) {
-      throw std::runtime_error("cannot listen on 127.0.0.1:" + std::to_string(port) + ": " +
-                               errorText(errno));
-    }
-    ::getsockname(socket_.get(), reinterpret_cast<sockaddr*>(&address), &size);
-    port_ = ntohs(address.sin_port);
+      : host_(std::move(host)),
+        host_port_(host_port),
+        port_(port),
+        timeout_(timeout),
+        listener_(std::move(listener)) {
+    socket_ = listenOn("127.0.0.1", port_);
     start_ = Clock::now();
     thread_ = std::thread([this] { run(); });
   }
@@ -96,37 +83,15 @@ class Tap::Impl {
       return;
     }
     prepareSocket(client.get());
-    Descriptor controller = connect();
-    if (!controller.valid()) {
-      return;  // closes the connection of the client, as without the tap
+    try {
+      Descriptor controller = connectTo(host_, host_port_, deadlineIn(timeout_));
+      pairs_.emplace_back();
+      pairs_.back().number = ++connections_made_;
+      pairs_.back().client = std::move(client);
+      pairs_.back().controller = std::move(controller);
+    } catch (const std::runtime_error&) {
+      // The connection of the client is closed, as without the tap.
     }
-    pairs_.emplace_back();
-    pairs_.back().number = ++connections_made_;
-    pairs_.back().client = std::move(client);
-    pairs_.back().controller = std::move(controller);
-  }
-
-  Descriptor connect() const {
-    addrinfo hints{};
-    hints.ai_family = AF_INET;
-    hints.ai_socktype = SOCK_STREAM;
-    addrinfo* found = nullptr;
-    if (::getaddrinfo(host_.c_str(), std::to_string(host_port_).c_str(), &hints, &found) != 0) {
-      return {};
-    }
-    Descriptor socket(::socket(AF_INET, SOCK_STREAM, 0));
-    prepareSocket(socket.get());
-    int error = ::connect(socket.get(), found->ai_addr, found->ai_addrlen) == 0 ? 0 : errno;
-    ::freeaddrinfo(found);
-    if (error == EINPROGRESS) {
-      pollfd wait{socket.get(), POLLOUT, 0};
-      socklen_t size = sizeof error;
-      error = ETIMEDOUT;
-      if (::poll(&wait, 1, millisecondsUntil(deadlineIn(timeout_))) > 0) {
-        ::getsockopt(socket.get(), SOL_SOCKET, SO_ERROR, &error, &size);
-      }
-    }
-    return error == 0 ? std::move(socket) : Descriptor();
   }
 
   void forward(Pair& pair, const Descriptor& from, const Descriptor& to, Channel& channel, bool from_client) {

@@ -71,6 +71,8 @@ struct Report {
   std::size_t met() const;             ///< of these
 };
 
+constexpr double SETTLE_REVOLUTIONS = 10.0;  ///< after which the compensation has settled
+
 /// Samples on which a cut is evaluated: during steady cutting, in all recorded forces, compensation settled.
 /// Empty (first == second) if there are none.
 std::pair<std::uint64_t, std::uint64_t> evaluatedSamples(const RecordedCut& cut, double settle_revolutions);

@@ -10,6 +10,14 @@
 
 namespace smartmill::session {
 
+/// Reserves in time and length of every cut.
+struct CutReserves {
+  double exit = 1.0e-3;         ///< [m] from the far side of the stock, so that the tool does not leave it
+  double run_out_time = 0.1;    ///< [s] of feed beyond the steady segment, for the ramps of the axes
+  double spin_up_factor = 1.2;  ///< [1] of the time of the nominal acceleration: the real one differs
+  double spin_up_extra = 0.3;   ///< [s] for M3 itself
+};
+
 /// Parameters of the paths through the stock.
 struct PathParameters {
   std::string tool = "end_mill";
@@ -21,6 +29,7 @@ struct PathParameters {
   double plunge_feed = 20.0e-3;
   double spin_up_time = 3.0;
   int feed_block = 0;
+  CutReserves reserves;  ///< no parameters of the node
 
   void declareNames(ParameterTable& table);
   void declarePaths(ParameterTable& table);

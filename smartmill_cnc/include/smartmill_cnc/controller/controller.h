@@ -71,7 +71,6 @@ struct Reading {
   std::optional<LoadSample> load;  ///< without stamp; empty if the controller reports no load
   std::vector<ControllerAlarm> alarms;
   std::vector<double> absolute;  ///< [m] positions in workpiece coordinates, order of state.axes
-  double increment = 1e-6;       ///< [m] of its positions
   bool at_rest = true;           ///< neither axes move nor a dwell runs
   bool program_done = false;     ///< every block of the last program has been executed
 };
@@ -109,7 +108,7 @@ class Controller {
   /// Writes a variable of the controller's programs.
   virtual Status setVariable(int number, double value) = 0;
 
-  /// Requirements of the controller's dialect; the decimals follow the increment of the last reading.
+  /// Requirements of the controller's dialect; the decimals are those of the last reading.
   virtual DialectOptions dialect() const = 0;
   /// @return a program that orients the spindle. @param angle [rad] of tooth 1
   virtual std::string orientProgram(double angle) const = 0;

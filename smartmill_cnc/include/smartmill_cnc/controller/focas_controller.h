@@ -4,6 +4,7 @@
 #include <string>
 
 #include "smartmill_cnc/controller/controller.h"
+#include "smartmill_core/nc/orientation.h"
 #include "smartmill_core/parameters/parameter_table.h"
 
 namespace smartmill::cnc {
@@ -14,7 +15,7 @@ struct FocasParameters {
   double reply_timeout = 0.5;
   int spindle = 1;
   int marker_macro = 100;
-  int orient_macro = 1133;
+  int orient_macro = nc::ORIENT_VARIABLE;
   int override_data = -1;
 
   void declare(ParameterTable& table) {

@@ -3,30 +3,16 @@
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <utility>
 
 #include "smartmill_cnc/linuxcnc/protocol.h"
+#include "smartmill_focas/descriptor.h"
 
 namespace smartmill::cnc::linuxcnc {
 
 constexpr const char* GATEWAY_SOCKET = "gateway.socket";  ///< in the machine's folder
 constexpr const char* STREAM_SOCKET = "stream.socket";    ///< in the machine's folder
 
-/// Owns a file descriptor.
-class LocalDescriptor {
- public:
-  LocalDescriptor() = default;
-  explicit LocalDescriptor(int fd) : fd_(fd) {}
-  LocalDescriptor(LocalDescriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
-  LocalDescriptor& operator=(LocalDescriptor&& other) noexcept;
-  ~LocalDescriptor() { reset(); }
-  void reset();
-  int get() const { return fd_; }
-  bool valid() const { return fd_ >= 0; }
-
- private:
-  int fd_ = -1;
-};
+using LocalDescriptor = focas::Descriptor;
 
 /// One end of a connection over a Unix socket that carries frames. Only wait() blocks.
 class LocalConnection {

@@ -12,13 +12,21 @@
 
 namespace smartmill::cnc::linuxcnc {
 
+struct ServoClockOptions {
+  double settling = 0.5;  ///< [s] of arrivals before times are defined; one of them has no delay
+  double window = 10.0;   ///< [s] that contains a sample without delay, even on a busy computer
+  double slew =
+      1e-4;  ///< [1] largest correction of the time of sample 0, per time; ten times the clocks' difference
+};
+
 /// Assigns times to evenly sampled, numbered samples. No sample arrives before it is taken, and the earliest
 /// arrivals have no delay; they define the time of sample 0. It is tracked slowly (the two clocks differ by
 /// about 1e-5), so that neighbouring samples stay one period apart.
 class ServoClock {
  public:
   /// @param period [s] of the samples
-  explicit ServoClock(double period) : period_(period) {}
+  explicit ServoClock(double period, const ServoClockOptions& options = {})
+      : options_(options), period_(period) {}
 
   /// @param number of a received sample @param arrival [s]
   void addArrival(std::uint64_t number, double arrival);
@@ -29,6 +37,7 @@ class ServoClock {
   }  ///< [s]
 
  private:
+  ServoClockOptions options_;
   double period_, zero_ = 0.0, begun_ = 0.0, window_begun_ = 0.0, last_ = 0.0;
   double window_ = std::numeric_limits<double>::infinity(), previous_window_ = window_;
   bool started_ = false, settled_ = false;

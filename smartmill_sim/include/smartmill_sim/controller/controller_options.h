@@ -18,6 +18,11 @@ struct ControllerOptions {
   double spindle_max_speed = 0.0;     ///< [rad/s] limits S
   double spindle_acceleration = 0.0;  ///< [rad/s2] without load
   double spindle_torque = 0.0;        ///< [N m] limit of the drive; 0: the load does not slow the spindle
+  double orient_speed = 20.0;         ///< [rad/s] of M19 and M119: about 190 rpm, typical of spindles
+  double speed_tolerance = 0.05;      ///< [1] of the signal "at speed", relative to the commanded speed
+  double arc_tolerance =
+      20e-6;                   ///< [m] difference of the start and end radius of an arc: rounded centres pass
+  double check_period = 2e-3;  ///< [s] between two calls of the watches: 1 mm of rapid traverse
   std::array<double, 3> work_offset{{0, 0, 0}};  ///< [m] machine minus absolute position, of G54
   focas::SysInfo info = fineInfo();              ///< reported identification
   int mode = focas::AUT_REMOTE;                  ///< focas::Aut, set at the panel

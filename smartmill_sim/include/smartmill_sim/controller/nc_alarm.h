@@ -22,6 +22,8 @@ constexpr int PS_VARIABLE_READ_ONLY = 116;
 constexpr int PS_ILLEGAL_ARGUMENT = 119;
 constexpr int OT_PLUS = 500;
 constexpr int OT_MINUS = 501;
+constexpr int EX_TOUCHED = 3001;  ///< stock, with the spindle at rest
+constexpr int EX_PLUNGED = 3002;  ///< into the stock
 constexpr int EX_COLLISION = 3003;
 
 /// A block that the control refuses; what() is the text of the alarm.

@@ -1,10 +1,10 @@
 #pragma once
 
 #include <array>
-#include <functional>
 #include <optional>
 #include <string>
 
+#include "smartmill_core/nc/dialect.h"
 #include "smartmill_sim/controller/nc_alarm.h"
 
 namespace smartmill::sim {
@@ -34,7 +34,7 @@ struct NcBlock {
 };
 
 /// Value of a variable #n; nullopt: vacant. @throws NcAlarm if the variable does not exist.
-using NcVariables = std::function<std::optional<double>(int)>;
+using NcVariables = nc::Variables;
 
 /// Parses one line. Dialect: O and N; G0 G1 G2 G3 (I J or R, plane G17) G4 (P in ms or X in s) G20 G21 G28
 /// G53 G54..G59 G90 G91 G94 G95; X Y Z F S; M0 M2 M3 M4 M5 M19 M30 M119; or #n=value. A value is a number,

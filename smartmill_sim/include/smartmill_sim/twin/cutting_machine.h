@@ -6,9 +6,7 @@
 #include <vector>
 
 #include "smartmill_core/model/machine_model.h"
-#include "smartmill_sim/effects/effect_set.h"
-#include "smartmill_sim/twin/flexible_cut.h"
-#include "smartmill_sim/twin/measuring_chain.h"
+#include "smartmill_sim/twin/cutting_parts.h"
 
 namespace smartmill::sim {
 
@@ -16,11 +14,8 @@ namespace smartmill::sim {
 /// effects of its model, in constant time steps.
 class CuttingMachine {
  public:
-  /// Input over one step.
-  struct Input : FlexibleCut::Input {
-    std::array<double, 3> sensor_force{{0, 0, 0}};  ///< [N] force on the sensor in addition to cutting
-    Axes3 axis_acceleration{{0, 0, 0}};             ///< [m/s2] of the machine axes
-  };
+  using Input = CuttingInput;
+  using Clock = EffectTimeline::Clock;
   /// Output at the end of a step.
   struct Output {
     CuttingForce force;                          ///< cutting force on the tool
@@ -30,52 +25,45 @@ class CuttingMachine {
     double load_meter = 0.0;                     ///< [V] before rounding; 0 without a spindle section
     ChannelValues raw{};  ///< channels before the signal stage (drift, hum, saturation)
   };
-  /// Times for effects in time. Live: both times advance from here, edge_time only during cutting.
-  struct Clock {
-    double start_time = 0.0;  ///< [s] since the machine was cold
-    double edge_time = 0.0;   ///< [s] cutting time of the edge
-    bool record = false;      ///< a record of a campaign: start_time is constant, edge_time always advances
-  };
-
   /// Without tool and cutting sections engage() throws.
   /// @param time_step [s] > 0 @throws Error naming what this twin does not support in the model.
   CuttingMachine(const MachineModel& model, double time_step, Feed feed = Feed::any,
                  int corner_slices = CORNER_SLICES);
 
   /// The model as changed by its effects.
-  const MachineModel& model() const { return model_; }
+  const MachineModel& model() const { return parts_.model; }
   /// Whether the tip has modes, so that the chip regenerates.
-  bool vibrates() const { return cut_.vibrates(); }
+  bool vibrates() const { return parts_.cut.vibrates(); }
 
   /// Changes the contact of tool and material, see MillingProcess.
   /// @param rise [1] share of the change in force that is linear over the step that ends now; the rest is a
   /// jump at its end.
   void engage(const std::vector<ContactArc>& arcs, const ToolMotion& now, double rise = 1.0);
-  bool cutting() const { return cut_.contact.cutting(); }
+  bool cutting() const { return parts_.cut.contact.cutting(); }
   /// Sets the axial depth [m] > 0 of every arc; the surface is unchanged. @param passed_over [m] feed path
   /// that is skipped
   void setDepth(double depth, double passed_over = 0.0);
 
   /// Starts a record: drift and hum restart. A new edge has edge_time 0.
-  void setClock(const Clock& clock);
+  void setClock(const Clock& clock) { parts_.timeline.setClock(clock); }
 
   /// The signal stage at the present instant.
-  SignalStage signalStage() { return {effects_, now_}; }
+  SignalStage signalStage() { return parts_.timeline.signalStage(); }
 
   /// Displacement and acceleration sensors are at the tip, in x (0) or y (1).
-  void setProbe(std::size_t axis) { cut_.setProbe(axis); }
+  void setProbe(std::size_t axis) { parts_.cut.setProbe(axis); }
 
   /// The input of every step will prescribe the motion of the tip.
-  void prescribeTip() { cut_.prescribeTip(); }
+  void prescribeTip() { parts_.cut.prescribeTip(); }
 
   /// From here on the trace of cut and tool is recorded, or replayed from a machine that recorded it over the
   /// same steps and differs only in later stages (without modes or with a prescribed motion of the tip: also
   /// in coefficients and factors of the law and in the tool's modes). @param trace must outlive the steps
-  void recordTrace(CutTrace* trace) { cut_.recordTrace(trace); }
-  void replayTrace(const CutTrace* trace) { cut_.replayTrace(trace); }
+  void recordTrace(CutTrace* trace) { parts_.cut.recordTrace(trace); }
+  void replayTrace(const CutTrace* trace) { parts_.cut.replayTrace(trace); }
 
   /// Of forces and load meter only these channels are simulated; the others are invalid from here on.
-  void selectChannels(const std::vector<std::size_t>& channels) { chain_.select(channels); }
+  void selectChannels(const std::vector<std::size_t>& channels) { parts_.chain.select(channels); }
 
   /// Sets the load meter to its steady value in an air cut.
   void resetLoadMeter(double spindle_speed);
@@ -90,33 +78,10 @@ class CuttingMachine {
   void run(std::size_t steps, const std::function<void(std::size_t, Input&)>& next, const ChannelRows& raw);
 
   /// Voltage rounded to the load meter's resolution [V].
-  double rounded(double voltage) const { return chain_.rounded(voltage); }
+  double rounded(double voltage) const { return parts_.chain.rounded(voltage); }
 
  private:
-  CuttingMachine(const MachineModel& model, const TwinSetup& setup, double time_step, Feed feed,
-                 int corner_slices);
-
-  void update(const ToolMotion& motion);
-  void applyEffects(const Input& input);
-  void advanceTime(const ToolMotion& motion, std::size_t steps = 1);
-  // step() for many steps.
-  struct History : ForceHistory {
-    std::vector<Instant> instants;  // where effects need them
-  };
-  void simulateCut(std::size_t steps, const std::function<void(std::size_t, Input&)>& next,
-                   const ChannelRows& raw, History& history);
-  bool replaysWithoutUpdates() const;
-  void applyOutputEffects(const std::vector<Instant>& instants, const ChannelRows& raw) const;
-
-  EffectSet effects_;
-  MachineModel model_;  // as changed by the effects
-  double time_step_;
-  TwinState nominal_, state_;
-  Instant now_;
-  Clock clock_;
-  int steps_to_update_ = 0;
-  FlexibleCut cut_;
-  MeasuringChain chain_;
+  CuttingParts parts_;
 };
 
 }  // namespace smartmill::sim

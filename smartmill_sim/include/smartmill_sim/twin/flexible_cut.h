@@ -47,7 +47,6 @@ class FlexibleCut {
   FlexibleCut(const TwinSetup& setup, const CuttingLaw& law, double time_step, Feed feed, int corner_slices);
 
   bool vibrates() const { return tip_.vibrates(); }
-  bool canEngage() const { return cutter_.has_value(); }
   /// Changes of the law by the effects.
   void update(const TwinState& state);
 

@@ -10,6 +10,8 @@
 
 namespace smartmill::sim {
 
+constexpr double SMALLEST_DEPTH = 1e-9;  ///< [m] of a cut, instead of a depth <= 0
+
 /// Contact of tool and material as commanded, and as the effects of the model change it.
 class ToolContact {
  public:

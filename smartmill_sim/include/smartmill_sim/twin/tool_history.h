@@ -27,6 +27,11 @@ class ToolHistory {
   using Vector = std::array<double, 2>;
   /// Interpolation point of the history.
   struct Point {
+    /// Cubic through the four steps around a point so many steps ago.
+    static Point at(double steps);
+    /// Derivatives of the weights per step farther back.
+    std::array<double, 4> weightSlopes() const;
+
     double ago = 0.0;                 // [steps]
     std::size_t steps = 0;            // whole steps of ago
     std::array<double, 4> weights{};  // of the samples steps + 2, steps + 1, steps, steps - 1 ago
@@ -72,9 +77,6 @@ class ToolHistory {
     return delays_[delay].updated_at == count_ ? delays_[delay] : update(delays_[delay]);
   }
 
-  static Point pointAt(double steps);
-  /// Derivatives of the weights of a point per step farther back.
-  static std::array<double, 4> weightSlopes(const Point& at);
   /// step(k, displacement): displacements around a point; none before the history.
   template <class Step>
   void forEachStep(const Point& at, Step&& step) const {

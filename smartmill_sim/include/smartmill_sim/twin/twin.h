@@ -14,6 +14,16 @@ namespace smartmill::sim {
 
 class CutTraces;
 
+/// Simulated cut before a record of a running cut. Its depth grows at first, since a sudden full cut would
+/// excite a long transient.
+struct LeadIn {
+  double time = 0.4;           ///< [s] in which the transient of the tool decays
+  double least_steady = 0.1;   ///< [s] a shorter time before the record is simulated as it is
+  double growing_share = 0.6;  ///< [1] of the time, in which the depth grows; then the cut settles
+  double first_depth = 0.01;   ///< [1] of the depth: contact from the beginning
+  long steps = 32;             ///< between two depths: far more often than a tool vibrates
+};
+
 struct SimulationOptions {
   bool noise = true;       ///< sensor noise and rounding of the load meter
   std::uint64_t seed = 1;  ///< of the noise and, without a recorded angle, of the phase
@@ -39,6 +49,7 @@ struct SimulationOptions {
   /// Cache of cut and tool in the same test (record, phase, substeps, slices) under other models, read and
   /// extended. nullptr: no cache.
   CutTraces* traces = nullptr;
+  LeadIn lead_in;
 };
 
 /// [1] Part of a sample before the engagement over which the cutting force rises: one step of the programs

@@ -114,10 +114,6 @@ class Client {
   /// Ends the session after all data are sent and waits for the reply. @param timeout [s]; negative: that of
   /// connect(). @throws FocasError.
   void dncEnd(double timeout = -1.0);
-  /// dncEnd() in two steps, without waiting.
-  void dncEndBegin();
-  /// @return true once the reply is received
-  bool dncEndDone();
   /// Cancels the session (result DNC_CANCEL, DNC_READERR ...) without waiting for a reply. If the stream is
   /// full, the stream circuit is closed and opened again.
   void dncCancel(DncResult result = DNC_CANCEL);

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <type_traits>
+#include <utility>
+
 #include <ros/time.h>
 
 #include <smartmill_msgs/CncState.h>
@@ -55,54 +58,19 @@ smartmill_msgs::StabilityChart toMsg(const StabilityChart& chart);
 IdentifiedForceCurves fromMsg(const smartmill_msgs::ForceCurve& message);
 smartmill_msgs::ForceCurve toMsg(const IdentifiedForceCurves& curves);
 
-/// Message type of a core type, MessageOf<SampleBlock>::Type; of a message the message itself.
-template <class Data>
+/// Message type of a core type, which toMsg() returns: MessageOf<SampleBlock>::Type; of a message the message
+/// itself.
+template <class Data, class = void>
 struct MessageOf {
   using Type = Data;
 };
-template <>
-struct MessageOf<SampleBlock> {
-  using Type = smartmill_msgs::SampleBlock;
+template <class Data>
+struct MessageOf<Data, std::void_t<decltype(toMsg(std::declval<const Data&>()))>> {
+  using Type = decltype(toMsg(std::declval<const Data&>()));
 };
 template <>
-struct MessageOf<SpindleAngle> {
-  using Type = smartmill_msgs::SpindleAngle;
-};
-template <>
-struct MessageOf<CncState> {
-  using Type = smartmill_msgs::CncState;
-};
-template <>
-struct MessageOf<LoadSample> {
-  using Type = smartmill_msgs::LoadSample;
-};
-template <>
-struct MessageOf<CuttingCondition> {
-  using Type = smartmill_msgs::CuttingCondition;
-};
-template <>
-struct MessageOf<ForceBlock> {
+struct MessageOf<ForceBlock> {  // whose message requires a frame
   using Type = smartmill_msgs::ForceBlock;
-};
-template <>
-struct MessageOf<MeasuredFrf> {
-  using Type = smartmill_msgs::Frf;
-};
-template <>
-struct MessageOf<MeasuredModes> {
-  using Type = smartmill_msgs::ModalModel;
-};
-template <>
-struct MessageOf<CoefficientSet> {
-  using Type = smartmill_msgs::CuttingCoefficients;
-};
-template <>
-struct MessageOf<StabilityChart> {
-  using Type = smartmill_msgs::StabilityChart;
-};
-template <>
-struct MessageOf<IdentifiedForceCurves> {
-  using Type = smartmill_msgs::ForceCurve;
 };
 
 }  // namespace smartmill

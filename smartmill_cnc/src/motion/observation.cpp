@@ -1,0 +1,44 @@
+#include "smartmill_cnc/motion/observation.h"
+
+#include <algorithm>
+#include <vector>
+
+namespace smartmill::cnc {
+namespace {
+
+constexpr double CLOCK_JUMP = 5.0;  // [s] between two steps; a longer time is no delay
+
+}  // namespace
+
+double Observation::clockJump(double next) const {
+  const double jump = next - now;
+  return jump >= 0.0 && (jump <= CLOCK_JUMP || !reading) ? 0.0 : jump;
+}
+
+std::optional<std::size_t> Observation::axisIndex(int axis) const {
+  if (!reading) {
+    return std::nullopt;
+  }
+  const std::vector<std::string>& axes = state().axes;
+  const auto found = std::find(axes.begin(), axes.end(), std::string(1, static_cast<char>('X' + axis)));
+  if (found == axes.end()) {
+    return std::nullopt;
+  }
+  return static_cast<std::size_t>(found - axes.begin());
+}
+
+std::string Observation::alarmText() const {
+  return (state().emergency ? "emergency stop" : "alarm") +
+         (state().alarm_text.empty() ? std::string() : ": " + state().alarm_text);
+}
+
+std::string Observation::modeText() const {
+  return "the controller is not in DNC mode at its panel (mode " +
+         std::to_string(static_cast<int>(state().mode)) + ")";
+}
+
+std::string Observation::textOf(const Failure& failure) const {
+  return failure.kind == Failure::Kind::wrong_mode ? modeText() : failure.message;
+}
+
+}  // namespace smartmill::cnc
