@@ -18,12 +18,7 @@ std::string FrictionTerms::name() const {
   return std::string("Coulomb and viscous") + (stribeck ? ", Stribeck" : "") + (warmup ? ", warm-up" : "");
 }
 
-double FrictionLaw::torque(double speed, double start_time) const {
-  return at(speed, stribeckFriction(breakaway, stribeck_speed, speed),
-            1.0 + cold_ratio * std::exp(-start_time / warmup_time));
-}
-
-std::vector<FitParameter> FrictionLaw::parameters(const FrictionTerms& terms, double slowest, double fastest,
+std::vector<FitParameter> frictionParameters(const FrictionTerms& terms, double slowest, double fastest,
                                                   const FrictionLaw& start) {
   const double typical = std::max({std::abs(start.coulomb), std::abs(start.viscous) * fastest, 1e-3});
   const double far = 1e3 * typical;
@@ -41,7 +36,7 @@ std::vector<FitParameter> FrictionLaw::parameters(const FrictionTerms& terms, do
   return list;
 }
 
-FrictionLaw FrictionLaw::fromValues(const FrictionTerms& terms, const double* values, double zero_below) {
+FrictionLaw frictionLaw(const FrictionTerms& terms, const double* values, double zero_below) {
   FrictionLaw law;
   law.zero_below = zero_below;
   law.viscous = *values++;
@@ -96,7 +91,7 @@ struct FrictionFitter {
   FitResult solve(const FrictionTerms& terms) const {
     const double slowest = *speeds.begin(), fastest = *speeds.rbegin();
     const auto residuals = [&](const std::vector<double>& value, double* out) {
-      const FrictionLaw law = FrictionLaw::fromValues(terms, value.data(), zero_below);
+      const FrictionLaw law = frictionLaw(terms, value.data(), zero_below);
       for (const TimedAirCut& a : cuts) {
         // Without weights all torques have the same weight, as in the thesis.
         *out++ = residualOf(a, law) / (weighted ? a.cut.voltage_std / (gain * a.cut.speed) : 1.0);
@@ -111,7 +106,7 @@ struct FrictionFitter {
         start.stribeck_speed = std::clamp(share * fastest, 0.3 * slowest, fastest);
         start.warmup_time = constant;
         const FitResult candidate =
-            fitLeastSquares(residuals, cuts.size(), FrictionLaw::parameters(terms, slowest, fastest, start));
+            fitLeastSquares(residuals, cuts.size(), frictionParameters(terms, slowest, fastest, start));
         if (best.value.empty() || candidate.squares < best.squares) best = candidate;
         if (!terms.warmup) break;
       }
@@ -125,7 +120,7 @@ struct FrictionFitter {
     const std::size_t unknowns = terms.unknowns();
     FittedFriction f;
     f.terms = terms;
-    f.law = FrictionLaw::fromValues(terms, best.value.data(), zero_below);
+    f.law = frictionLaw(terms, best.value.data(), zero_below);
     const double count = static_cast<double>(cuts.size()), freedom = count - static_cast<double>(unknowns);
     const double scatter = freedom > 0.0 ? best.squares / freedom : 0.0;
     const double variance = weighted ? std::max(1.0, scatter) : scatter;

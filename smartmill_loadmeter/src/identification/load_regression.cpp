@@ -83,8 +83,7 @@ LoadState LoadRegression::initialState(std::vector<LoadRecord> records, double n
   LoadState state;
   state.records = std::move(records);
   state.noise = noise;
-  state.friction.viscous = spindle_.viscous;
-  state.friction.coulomb = spindle_.coulomb;
+  state.friction = {spindle_.friction()};
   state.friction.stribeck_speed = 0.15 * plan_.fastest;
   return state;
 }
@@ -104,7 +103,7 @@ std::size_t LoadRegression::residualCount(const LoadState& state) const {
 
 void LoadRegression::residuals(const LoadState& state, const LoadTerms& terms, const std::vector<double>& v,
                                double* out) const {
-  const FrictionLaw law = FrictionLaw::fromValues(terms.friction, v.data(), spindle_.friction_zero_below);
+  const FrictionLaw law = frictionLaw(terms.friction, v.data(), spindle_.friction_zero_below);
   std::size_t at = terms.ktcIndex();
   const double ktc = v[at++], kte = v[at++];
   const double growth = terms.growth ? v[at++] : 0.0;
@@ -134,7 +133,7 @@ void LoadRegression::residuals(const LoadState& state, const LoadTerms& terms, c
 }
 
 FrictionLaw LoadRegression::frictionOf(const LoadSolution& s) const {
-  return FrictionLaw::fromValues(s.terms.friction, s.fit.value.data(), spindle_.friction_zero_below);
+  return frictionLaw(s.terms.friction, s.fit.value.data(), spindle_.friction_zero_below);
 }
 
 double LoadRegression::timeConstantOf(const LoadState& state) const {
@@ -144,7 +143,7 @@ double LoadRegression::timeConstantOf(const LoadState& state) const {
 LoadSolution LoadRegression::solve(const LoadState& state, const LoadTerms& terms,
                                    const FrictionLaw& start) const {
   std::vector<FitParameter> unknowns =
-      FrictionLaw::parameters(terms.friction, plan_.slowest, plan_.fastest, start);
+      frictionParameters(terms.friction, plan_.slowest, plan_.fastest, start);
   unknowns.push_back({state.point.ktc, -1e12, 1e12, 1e9});
   unknowns.push_back({state.point.kte, -1e8, 1e8, 1e4});
   if (terms.growth) unknowns.push_back({0.0, -0.1, 1.0, 0.01});

@@ -146,7 +146,7 @@ IdleTorque idleTorque(const std::vector<LoadTest>& air_cuts, const Spindle& spin
             const double step = 1e-5 * (std::abs(v[i]) + 1e-6);
             const auto at = [&](double value) {
               v[i] = value;
-              return FrictionLaw::fromValues(best.terms, v.data(), best.law.zero_below)
+              return frictionLaw(best.terms, v.data(), best.law.zero_below)
                   .torque(t.speed, t.stamp - first);
             };
             slope.push_back((at(best.value[i] + step) - at(best.value[i] - step)) / (2.0 * step));

@@ -18,23 +18,10 @@ struct FrictionTerms {
   std::string name() const;  ///< for example "Coulomb and viscous, Stribeck, warm-up"
 };
 
-/// Spindle friction with Stribeck and warm-up terms (effects.md: stribeck_friction, friction_warmup):
-///   T_f = [viscous w + coulomb + breakaway exp(-(w / stribeck_speed)^2)] (1 + cold_ratio exp(-t /
-///   warmup_time)),
-/// zero below `zero_below`; t is the time since the start of the campaign.
-struct FrictionLaw : LinearFriction {
-  double breakaway = 0.0;       ///< [N m]
-  double stribeck_speed = 1.0;  ///< [rad/s] > 0
-  double cold_ratio = 0.0;      ///< [1]
-  double warmup_time = 1.0;     ///< [s] > 0
-
-  double torque(double speed, double start_time) const;  ///< [N m]
-
-  /// Unknowns of a fit in the order viscous, coulomb, [breakaway, stribeck_speed], [cold_ratio, warmup_time].
-  static std::vector<FitParameter> parameters(const FrictionTerms& terms, double slowest, double fastest,
-                                              const FrictionLaw& start);
-  static FrictionLaw fromValues(const FrictionTerms& terms, const double* values, double zero_below);
-};
+/// Unknowns of a fit in the order viscous, coulomb, [breakaway, stribeck_speed], [cold_ratio, warmup_time].
+std::vector<FitParameter> frictionParameters(const FrictionTerms& terms, double slowest, double fastest,
+                                             const FrictionLaw& start);
+FrictionLaw frictionLaw(const FrictionTerms& terms, const double* values, double zero_below);
 
 /// Steady voltage of one air cut and its start time.
 struct TimedAirCut {
