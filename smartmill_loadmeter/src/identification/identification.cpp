@@ -96,8 +96,9 @@ void LoadMeterIdentification::closeTest() {
   steady_.end();
   if (steady_.readings() >= static_cast<std::size_t>(parameters_.minimum_readings))
     return storeTest(steady_.test());
-  session_.rejected.push_back("'" + steady_.condition()->name + "': " + countOf(steady_.readings(), "steady reading") +
-                              ", expected " + std::to_string(parameters_.minimum_readings) + " or more");
+  session_.rejected.push_back("'" + steady_.condition()->name +
+                              "': " + countOf(steady_.readings(), "steady reading") + ", expected " +
+                              std::to_string(parameters_.minimum_readings) + " or more");
 }
 
 void LoadMeterIdentification::storeTest(LoadTest test) {
