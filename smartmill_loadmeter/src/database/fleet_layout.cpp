@@ -32,9 +32,9 @@ std::optional<std::size_t> FleetLayout::materialAt(const std::string& name) cons
   return static_cast<std::size_t>(at - materials.begin());
 }
 
-const FleetMachine* FleetLayout::machineAt(const std::string& name) const {
+const MachineCells* FleetLayout::machineAt(const std::string& name) const {
   const auto at =
-      std::find_if(machines.begin(), machines.end(), [&](const FleetMachine& m) { return m.name == name; });
+      std::find_if(machines.begin(), machines.end(), [&](const MachineCells& m) { return m.name == name; });
   return at == machines.end() ? nullptr : &*at;
 }
 
@@ -90,7 +90,7 @@ void FleetLayout::estimateNoise() {
 }
 
 void FleetLayout::fillCells() {
-  for (FleetMachine& machine : machines) {
+  for (MachineCells& machine : machines) {
     for (const std::size_t i : machine.observations) {
       auto cell = std::find_if(machine.cells.begin(), machine.cells.end(),
                                [&](const FleetCell& c) { return c.group == group_of[i]; });

@@ -16,7 +16,7 @@ struct FleetCell {
   double mean = 0.0, variance = 0.0;  // of the logarithm, weighted
 };
 
-struct FleetMachine {
+struct MachineCells {
   std::string name;
   std::vector<FleetCell> cells;
   std::vector<std::size_t> observations;
@@ -33,7 +33,7 @@ struct FleetLayout {
   std::vector<FleetObservation> observations;
   std::vector<std::string> materials;
   std::vector<FleetGroup> groups;
-  std::vector<FleetMachine> machines;
+  std::vector<MachineCells> machines;
   std::vector<std::size_t> group_of, machine_of;  // of each observation
   double unstated_std;                            // [1], FleetModelOptions
   double noise = 0.0;                             // [1] of the logarithm, beyond the stated deviations
@@ -42,7 +42,7 @@ struct FleetLayout {
   FleetLayout(const std::vector<FleetObservation>& all, const FleetModelOptions& options);
 
   std::optional<std::size_t> materialAt(const std::string& name) const;
-  const FleetMachine* machineAt(const std::string& name) const;
+  const MachineCells* machineAt(const std::string& name) const;
   double statedVariance(const FleetObservation& o) const;  ///< [1] of the logarithm
   double varianceOf(const FleetObservation& o) const;      ///< [1] with the noise
 

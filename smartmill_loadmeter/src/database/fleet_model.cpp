@@ -32,7 +32,7 @@ std::optional<FleetPrediction> FleetModel::predict(const std::string& machine, c
   const FleetLayout& layout = impl_->solver.layout();
   const auto material_at = layout.materialAt(material);
   if (!material_at) return std::nullopt;
-  const FleetMachine* own = layout.machineAt(machine);
+  const MachineCells* own = layout.machineAt(machine);
   const auto count = static_cast<Eigen::Index>(layout.groups.size());
   EffectQuery query;
   query.group = Eigen::VectorXd::Zero(count);
@@ -43,7 +43,6 @@ std::optional<FleetPrediction> FleetModel::predict(const std::string& machine, c
     ++same_material;
     if (layout.groups[g].tool == tool) query.batch_of = g;
   }
-  found.known_group = query.batch_of.has_value();
   for (std::size_t g = 0; g < layout.groups.size(); ++g) {
     if (layout.groups[g].material != *material_at) continue;
     if (!query.batch_of || *query.batch_of == g)
@@ -72,7 +71,7 @@ std::optional<FleetPrediction> FleetModel::predict(const std::string& machine, c
 namespace {
 
 // Slope of a machine's residuals over time, weighted least squares about each group's mean.
-void fitDrift(const FleetLayout& layout, const FleetMachine& machine, MachineEffect* effect) {
+void fitDrift(const FleetLayout& layout, const MachineCells& machine, MachineEffect* effect) {
   std::map<std::size_t, std::array<double, 3>> sums;  // weight, time, value
   const auto weightOf = [&](std::size_t i) { return 1.0 / layout.varianceOf(layout.observations[i]); };
   for (const std::size_t i : machine.observations) {
@@ -100,7 +99,7 @@ std::vector<MachineEffect> FleetModel::machines() const {
   EffectQuery query;
   query.group = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(layout.groups.size()));
   for (std::size_t m = 0; m < layout.machines.size(); ++m) {
-    const FleetMachine& machine = layout.machines[m];
+    const MachineCells& machine = layout.machines[m];
     MachineEffect effect;
     effect.machine = machine.name;
     effect.observations = static_cast<int>(machine.observations.size());

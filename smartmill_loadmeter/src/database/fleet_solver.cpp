@@ -17,7 +17,7 @@ struct CellCovariance {
   double shrink = 0.0;     // V^-1 = W - shrink w w'
   double log_determinant = 0.0;
 
-  CellCovariance(const FleetMachine& machine, double effect_variance, double batch_variance)
+  CellCovariance(const MachineCells& machine, double effect_variance, double batch_variance)
       : weight(machine.cells.size()) {
     for (std::size_t i = 0; i < machine.cells.size(); ++i) {
       const double variance = batch_variance + machine.cells[i].variance;
@@ -47,7 +47,7 @@ double FleetSolver::outlierVariance(double usual) const {
   return usual + options_.outlier_std * options_.outlier_std;
 }
 
-Eigen::VectorXd FleetSolver::residualOf(const FleetMachine& machine, const Eigen::VectorXd& effects) const {
+Eigen::VectorXd FleetSolver::residualOf(const MachineCells& machine, const Eigen::VectorXd& effects) const {
   Eigen::VectorXd r(machine.cells.size());
   for (std::size_t i = 0; i < machine.cells.size(); ++i)
     r[static_cast<Eigen::Index>(i)] =
@@ -145,7 +145,7 @@ FleetPoint FleetSolver::solve(const FleetDeviations& s) const {
 }
 
 // Best linear unbiased prediction for one component of the machine's effect.
-void FleetSolver::addComponent(const FleetMachine* machine, const FleetPoint& point, const EffectQuery& query,
+void FleetSolver::addComponent(const MachineCells* machine, const FleetPoint& point, const EffectQuery& query,
                                double effect_variance, double share, Mixture* sum) const {
   const double batch = point.s.batch * point.s.batch;
   double mean = query.group.dot(point.groups);
@@ -167,7 +167,7 @@ void FleetSolver::addComponent(const FleetMachine* machine, const FleetPoint& po
   sum->add(share, mean, variance + group.dot(point.covariance * group));
 }
 
-void FleetSolver::predict(const FleetMachine* machine, const FleetPoint& point, const EffectQuery& query,
+void FleetSolver::predict(const MachineCells* machine, const FleetPoint& point, const EffectQuery& query,
                           Mixture* sum) const {
   const double usual = point.s.machine * point.s.machine;
   const double outlier = machine ? point.outlier[static_cast<std::size_t>(machine - layout_.machines.data())]

@@ -49,15 +49,15 @@ class FleetSolver {
   FleetPoint solve(const FleetDeviations& s) const;
   /// Adds the best linear unbiased prediction at a point to a mixture, for a usual machine and an outlier.
   /// @param machine nullptr: a new one
-  void predict(const FleetMachine* machine, const FleetPoint& point, const EffectQuery& query,
+  void predict(const MachineCells* machine, const FleetPoint& point, const EffectQuery& query,
                Mixture* sum) const;
 
  private:
   double outlierVariance(double usual) const;
-  Eigen::VectorXd residualOf(const FleetMachine& machine, const Eigen::VectorXd& effects) const;
+  Eigen::VectorXd residualOf(const MachineCells& machine, const Eigen::VectorXd& effects) const;
   Eigen::MatrixXd toolPrior(double tool) const;
   void solveGroups(FleetPoint* point) const;
-  void addComponent(const FleetMachine* machine, const FleetPoint& point, const EffectQuery& query,
+  void addComponent(const MachineCells* machine, const FleetPoint& point, const EffectQuery& query,
                     double effect_variance, double share, Mixture* sum) const;
 
   FleetModelOptions options_;

@@ -49,9 +49,8 @@ struct FleetModelOptions {
 /// Value and standard deviation (not logarithms).
 struct FleetPrediction {
   double value = 0.0, std_dev = 0.0;
-  double log_std = 0.0;      ///< [1] of the logarithm
-  int own = 0;               ///< observations by this machine of this group
-  bool known_group = false;  ///< some machine has used this tool in this material
+  double log_std = 0.0;  ///< [1] of the logarithm
+  int own = 0;           ///< observations by this machine of this group
 };
 
 /// Deviation of a machine from its fleet.
