@@ -56,16 +56,13 @@ bool SteadyRecord::isPresent(const CuttingCondition& condition) const {
   return condition_ && condition_->stamp == condition.stamp && condition_->name == condition.name;
 }
 
-bool SteadyRecord::isOnPath(const CncState& state) const {
-  return state.connected && state.motion && onSteadyPath(*condition_, state, parameters_.path_tolerance);
-}
-
 void SteadyRecord::handle(const CncState& state) {
   const bool gap = state.stamp - last_state_ > parameters_.maximum_gap;
   last_state_ = state.stamp;
   if (!isTest()) return;
   // In air the tool may be at rest; if it moves, the feed drives show their friction.
-  const bool on_path = isOnPath(state);
+  const bool on_path =
+      state.connected && state.motion && onSteadyPath(*condition_, state, parameters_.path_tolerance);
   if (on_path_since_ && (!on_path || gap)) {
     dropAfter(state.stamp - parameters_.guard_time, isCut());
     on_path_since_.reset();

@@ -9,8 +9,8 @@ namespace smartmill::loadmeter {
 LoadSolution TermSearch::solveFromSeveralStarts(const LoadState& state, const LoadTerms& terms) const {
   const LoadTerms& now = state.solution.terms;
   std::optional<LoadSolution> best;
-  for (const double share : options_.stribeck_shares) {
-    for (const double constant : options_.warmup_times) {
+  for (const double share : options_.starts.stribeck_shares) {
+    for (const double constant : options_.starts.warmup_times) {
       FrictionLaw start = state.friction;
       if (!now.stribeck) start.stribeck_speed = std::max(share * plan_.fastest, plan_.slowest);
       if (!now.warmup) start.warmup_time = constant;

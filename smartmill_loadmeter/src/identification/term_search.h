@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <optional>
 
 #include "load_regression.h"
@@ -14,11 +13,7 @@ struct TermSearchOptions {
   double strong_evidence = 10.0;
   /// [1] share of the residual's squares that a further term must remove: a wrong term always removes some.
   double required_reduction = 0.5;
-  /// @{ Starting points of the nonlinear friction terms, which have local minima: Stribeck speed over the
-  /// fastest [1]; time constant of the warm-up [s], 2.5 to 40 minutes in steps of a factor of four.
-  std::array<double, 2> stribeck_shares{{0.1, 0.25}};
-  std::array<double, 3> warmup_times{{150.0, 600.0, 2400.0}};
-  /// @}
+  FrictionStarts starts{{{0.1, 0.25}}, FrictionStarts().warmup_times};
 };
 
 /// Selects further terms of a regression by evidence.

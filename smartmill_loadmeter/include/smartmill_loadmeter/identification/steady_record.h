@@ -54,7 +54,6 @@ class SteadyRecord {
     double stamp;
     std::array<double, 3> position;
   };
-  bool isOnPath(const CncState& state) const;
   bool isSteadyAt(double stamp) const;
   void dropAfter(double stamp, bool with_readings = true);
 
