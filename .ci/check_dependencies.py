@@ -10,7 +10,7 @@ HEADERS = {
     "Eigen": "eigen", "ceres": "libceres-dev", "fftw3.h": "fftw3", "sndfile.h": "libsndfile1-dev", "hdf5.h": "libhdf5-dev",
     "matio.h": "libmatio-dev", "lz4frame.h": "lz4", "xxhash.h": "libxxhash-dev", "bzlib.h": "bzip2", "zstd.h": "libzstd-dev", "zlib.h": "zlib",
     "yaml-cpp": "yaml-cpp",
-    "nlohmann": "nlohmann-json-dev", "CLI": "cli11", "sqlite3.h": "sqlite3", "benchmark": "benchmark",
+    "nlohmann": "nlohmann-json-dev", "CLI": "cli11", "sqlite3.h": "sqlite3", "SQLiteCpp": "libsqlitecpp-dev", "benchmark": "benchmark",
     "rapidcheck": "rapidcheck", "rapidcheck.h": "rapidcheck", "ros": "roscpp", "boost": "boost",
     "glog": "libgoogle-glog-dev", "unsupported": "eigen", "gtest": None, "gmock": None,
     "pybind11": "pybind11-dev",
@@ -18,7 +18,7 @@ HEADERS = {
     "arpa": None, "netinet": None, "sys": None, "linux": None,
 }
 FOUND = {
-    "Eigen3": "eigen", "Ceres": "libceres-dev", "SQLite3": "sqlite3", "CLI11": "cli11", "liblz4": "lz4",
+    "Eigen3": "eigen", "Ceres": "libceres-dev", "SQLite3": "sqlite3", "SQLiteCpp": "libsqlitecpp-dev", "CLI11": "cli11", "liblz4": "lz4",
     "libxxhash": "libxxhash-dev", "libzstd": "libzstd-dev", "BZip2": "bzip2", "ZLIB": "zlib", "hdf5-serial": "libhdf5-dev", "matio": "libmatio-dev",
     "pybind11": "pybind11-dev", "Python": "python3-dev", "Interpreter": None, "Development.Module": None,
     "nlohmann_json": "nlohmann-json-dev", "PkgConfig": None, "Threads": None, "GTest": None, "catkin": None,

@@ -45,8 +45,7 @@ class Meter {
   explicit Meter(unsigned seed) : drive_(moriSeiki(), 0.02), random_(seed) {}
 
   double mean(double torque, double speed) {
-    const double stribeck = BREAKAWAY * std::exp(-std::pow(units::rpmFromRadPerSec(speed) / STRIBECK_RPM, 2));
-    drive_.setFriction(stribeck, 1.0);
+    drive_.setFriction(stribeck(speed), 1.0);
     drive_.reset(speed);
     for (int i = 0; i < 100; ++i) drive_.step(torque, speed);
     double sum = 0.0;
@@ -56,12 +55,13 @@ class Meter {
   }
 
   /// [N m] true friction torque of the machine.
-  double friction(double speed) {
-    const double stribeck = BREAKAWAY * std::exp(-std::pow(units::rpmFromRadPerSec(speed) / STRIBECK_RPM, 2));
-    return moriSeiki().viscous * speed + moriSeiki().coulomb + stribeck;
-  }
+  double friction(double speed) const { return moriSeiki().friction().at(speed, stribeck(speed)); }
 
  private:
+  static double stribeck(double speed) {
+    return BREAKAWAY * std::exp(-std::pow(units::rpmFromRadPerSec(speed) / STRIBECK_RPM, 2));
+  }
+
   sim::SpindleDrive drive_;
   std::mt19937 random_;
   std::normal_distribution<double> normal_;

@@ -266,10 +266,10 @@ std::vector<MotorCut> runDay(const MotorDay& day, const std::optional<MotorCalib
   for (int i = 0; i < day.cuts; ++i) {
     if (i % GROUP == 0) {
       estimator.emplace(model, estimatorParameters());
-      day.learn ? estimator->enableSelfCalibration()
-                : estimator->setMotors(calibration.value_or(MotorCalibration()));
-      estimator->onForce([&](const ForceEstimate& e) { newest = e; });
-      estimator->onForceWindow([&](const ForceEstimate& e) { windows.push_back(e); });
+      day.learn ? estimator->forces().enableSelfCalibration()
+                : estimator->forces().setMotors(calibration.value_or(MotorCalibration()));
+      estimator->outputs().force = [&](const ForceEstimate& e) { newest = e; };
+      estimator->outputs().force_window = [&](const ForceEstimate& e) { windows.push_back(e); };
       shop.emplace(day, model, *estimator);
       for (std::size_t a = 0; a < 2 && day.rapid_moves; ++a)
         shop->rapid(a, day.seed + static_cast<unsigned>(2 * i + static_cast<int>(a)));
@@ -302,8 +302,8 @@ std::vector<MotorCut> runDay(const MotorDay& day, const std::optional<MotorCalib
     cut.torque = MechanisticForce(*model.tool, metal, {0.0, units::PI, pass.depth, pass.feed}).mean().torque;
     cut.estimate = newest;
     cut.windows = windows;
-    for (std::size_t a = 0; a < 3; ++a) cut.bandwidth[a] = estimator->driveBandwidth(a);
-    cut.learnt = estimator->selfCalibration();
+    for (std::size_t a = 0; a < 3; ++a) cut.bandwidth[a] = estimator->forces().driveBandwidth(a);
+    cut.learnt = estimator->forces().selfCalibration();
     all.push_back(cut);
     if (progress) progress(static_cast<double>(i + 1) / day.cuts);
   }

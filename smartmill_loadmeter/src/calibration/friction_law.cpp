@@ -8,23 +8,12 @@
 
 namespace smartmill::loadmeter {
 
-namespace {
-
-constexpr double STRONG_EVIDENCE = 6.0;  // of the Bayesian information criterion
-
-}  // namespace
-
 std::string FrictionTerms::name() const {
   return std::string("Coulomb and viscous") + (stribeck ? ", Stribeck" : "") + (warmup ? ", warm-up" : "");
 }
 
-double FrictionLaw::torque(double speed, double start_time) const {
-  return at(speed, stribeckFriction(breakaway, stribeck_speed, speed),
-            1.0 + cold_ratio * std::exp(-start_time / warmup_time));
-}
-
-std::vector<FitParameter> FrictionLaw::parameters(const FrictionTerms& terms, double slowest, double fastest,
-                                                  const FrictionLaw& start) {
+std::vector<FitParameter> frictionParameters(const FrictionTerms& terms, double slowest, double fastest,
+                                             const FrictionLaw& start) {
   const double typical = std::max({std::abs(start.coulomb), std::abs(start.viscous) * fastest, 1e-3});
   const double far = 1e3 * typical;
   std::vector<FitParameter> list{{start.viscous, -far / fastest, far / fastest, typical / fastest},
@@ -41,7 +30,7 @@ std::vector<FitParameter> FrictionLaw::parameters(const FrictionTerms& terms, do
   return list;
 }
 
-FrictionLaw FrictionLaw::fromValues(const FrictionTerms& terms, const double* values, double zero_below) {
+FrictionLaw frictionLaw(const FrictionTerms& terms, const double* values, double zero_below) {
   FrictionLaw law;
   law.zero_below = zero_below;
   law.viscous = *values++;
@@ -63,12 +52,14 @@ namespace {
 struct FrictionFitter {
   std::vector<TimedAirCut> cuts;
   double gain, zero_below;
+  FrictionFitOptions options;
   bool weighted;
   Friction linear;
   std::set<double> speeds, times;
 
-  FrictionFitter(const std::vector<TimedAirCut>& air_cuts, double load_meter_gain, double below)
-      : gain(load_meter_gain), zero_below(below) {
+  FrictionFitter(const std::vector<TimedAirCut>& air_cuts, double load_meter_gain, double below,
+                 const FrictionFitOptions& fit)
+      : gain(load_meter_gain), zero_below(below), options(fit) {
     std::vector<AirCut> plain;
     for (const TimedAirCut& a : air_cuts) {
       plain.push_back(a.cut);
@@ -96,22 +87,20 @@ struct FrictionFitter {
   FitResult solve(const FrictionTerms& terms) const {
     const double slowest = *speeds.begin(), fastest = *speeds.rbegin();
     const auto residuals = [&](const std::vector<double>& value, double* out) {
-      const FrictionLaw law = FrictionLaw::fromValues(terms, value.data(), zero_below);
+      const FrictionLaw law = frictionLaw(terms, value.data(), zero_below);
       for (const TimedAirCut& a : cuts) {
         // Without weights all torques have the same weight, as in the thesis.
         *out++ = residualOf(a, law) / (weighted ? a.cut.voltage_std / (gain * a.cut.speed) : 1.0);
       }
     };
     FitResult best;
-    for (const double share : {0.15, 0.4}) {
-      for (const double constant : {150.0, 600.0, 2400.0}) {
-        FrictionLaw start;
-        start.viscous = linear.viscous;
-        start.coulomb = linear.coulomb;
+    for (const double share : options.starts.stribeck_shares) {
+      for (const double constant : options.starts.warmup_times) {
+        FrictionLaw start{linear};
         start.stribeck_speed = std::clamp(share * fastest, 0.3 * slowest, fastest);
         start.warmup_time = constant;
         const FitResult candidate =
-            fitLeastSquares(residuals, cuts.size(), FrictionLaw::parameters(terms, slowest, fastest, start));
+            fitLeastSquares(residuals, cuts.size(), frictionParameters(terms, slowest, fastest, start));
         if (best.value.empty() || candidate.squares < best.squares) best = candidate;
         if (!terms.warmup) break;
       }
@@ -125,7 +114,7 @@ struct FrictionFitter {
     const std::size_t unknowns = terms.unknowns();
     FittedFriction f;
     f.terms = terms;
-    f.law = FrictionLaw::fromValues(terms, best.value.data(), zero_below);
+    f.law = frictionLaw(terms, best.value.data(), zero_below);
     const double count = static_cast<double>(cuts.size()), freedom = count - static_cast<double>(unknowns);
     const double scatter = freedom > 0.0 ? best.squares / freedom : 0.0;
     const double variance = weighted ? std::max(1.0, scatter) : scatter;
@@ -144,16 +133,15 @@ struct FrictionFitter {
 }  // namespace
 
 std::vector<FittedFriction> fitFrictionLaws(const std::vector<TimedAirCut>& air_cuts, double load_meter_gain,
-                                            double zero_below) {
-  const FrictionFitter data(air_cuts, load_meter_gain, zero_below);
+                                            double zero_below, const FrictionFitOptions& options) {
+  const FrictionFitter data(air_cuts, load_meter_gain, zero_below, options);
   std::vector<FittedFriction> found;
   for (const FrictionTerms terms :
        {FrictionTerms{}, FrictionTerms{true, false}, FrictionTerms{false, true}, FrictionTerms{true, true}}) {
     if (data.canFit(terms)) found.push_back(data.fitTerms(terms));
   }
-  // A nonlinear term lowers the criterion by chance more often than the criterion allows for.
-  const auto key = [](const FittedFriction& f) {
-    return f.bic + STRONG_EVIDENCE * ((f.terms.stribeck ? 1 : 0) + (f.terms.warmup ? 1 : 0));
+  const auto key = [&](const FittedFriction& f) {
+    return f.bic + options.strong_evidence * ((f.terms.stribeck ? 1 : 0) + (f.terms.warmup ? 1 : 0));
   };
   std::stable_sort(found.begin(), found.end(),
                    [&](const FittedFriction& a, const FittedFriction& b) { return key(a) < key(b); });

@@ -9,11 +9,6 @@
 
 namespace smartmill::loadmeter {
 
-std::array<double, 2> Friction::gradient(double speed) const {
-  if (speed < zero_below) return {0.0, 0.0};
-  return {speed, 1.0};
-}
-
 Friction fitFriction(const std::vector<AirCut>& air_cuts, double load_meter_gain, double zero_below) {
   bool weighted = true;
   for (const AirCut& cut : air_cuts) weighted = weighted && cut.voltage_std > 0.0;
@@ -68,14 +63,9 @@ Friction fitFriction(const std::vector<AirCut>& air_cuts, double load_meter_gain
 }
 
 Friction modelFriction(const Spindle& spindle, double uncertainty_percent) {
-  Friction friction;
-  friction.viscous = spindle.viscous;
-  friction.coulomb = spindle.coulomb;
-  friction.zero_below = spindle.friction_zero_below;
   const double share = uncertainty_percent / 100.0;
-  friction.covariance = {std::pow(share * spindle.viscous, 2), 0.0, 0.0,
-                         std::pow(share * spindle.coulomb, 2)};
-  return friction;
+  return {spindle.friction(),
+          {std::pow(share * spindle.viscous, 2), 0.0, 0.0, std::pow(share * spindle.coulomb, 2)}};
 }
 
 double timeConstant(double bandwidth) {

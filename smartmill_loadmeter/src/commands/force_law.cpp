@@ -14,6 +14,7 @@
 #include "smartmill_loadmeter/identification/force_curve.h"
 #include "smartmill_loadmeter/identification/force_curve_identification.h"
 #include "smartmill_loadmeter/identification/force_law.h"
+#include "smartmill_loadmeter/identification/slot_fit.h"
 #include "smartmill_recording/recording_file.h"
 
 namespace {

@@ -6,31 +6,17 @@
 #include <sstream>
 
 namespace smartmill::loadmeter {
-namespace {
-
-constexpr int SIZE_STEPS = 8;                // size steps on each side of the size of an explanation
-constexpr double LARGEST_SIZE_RATIO = 20.0;  // [1] largest ratio of two sizes of one cause
-constexpr double PROFILE_STD = 0.5;     // standard deviation of the logarithm of squares between two machines
-constexpr double CHANNEL_ERROR = 0.02;  // [1] probability of a random error in a channel
-constexpr double FALSE_ALARM = 0.0125;  // [1] probability that a channel shows something without a cause
-constexpr double CHANGED_SHARES[] = {
-    0.1, 0.33};  // [1] shares of channels in which an unknown cause differs from a known one
-constexpr double WEIGHT_LIKE_KNOWN = 0.5, WEIGHT_SAME_IN_ALL_TESTS = 0.25,
-                 WEIGHT_ANY_CHANNELS = 0.25;  // weights of the components of an unknown cause
-constexpr double SHOWS_PROBABILITY =
-    0.9;  // probability in the channels of a cause that shows alike in every test
-
 // Probability that a channel shows a cause whose size is larger by a factor. @param squares squared-gap
 // reduction over the threshold
-double showProbability(double squares, double factor) {
-  if (squares <= 0.0) return CHANNEL_ERROR;
-  const double distance = std::log(squares * factor * factor) / PROFILE_STD;
-  return CHANNEL_ERROR + (1.0 - 2.0 * CHANNEL_ERROR) * 0.5 * std::erfc(-distance / std::sqrt(2.0));
+double CauseTable::showProbability(double squares, double factor) const {
+  if (squares <= 0.0) return options_.channel_error;
+  const double distance = std::log(squares * factor * factor) / options_.profile_std;
+  return options_.channel_error +
+         (1.0 - 2.0 * options_.channel_error) * 0.5 * std::erfc(-distance / std::sqrt(2.0));
 }
 
-}  // namespace
-
-CauseTable::CauseTable(const FleetCauses& fleet) : count_(fleet.tests.size()) {
+CauseTable::CauseTable(const FleetCauses& fleet, const CauseTableOptions& options)
+    : options_(options), count_(fleet.tests.size()) {
   std::set<std::string> all;
   for (const FleetCause& c : fleet.causes) {
     for (const EvidenceProfile& s : c.profiles) {
@@ -49,9 +35,11 @@ CauseTable::CauseTable(const FleetCauses& fleet) : count_(fleet.tests.size()) {
 void CauseTable::addCause(const FleetCause& cause, std::size_t hypothesis) {
   // The ratio of two sizes that are uniform in the logarithm has a triangular distribution.
   for (const EvidenceProfile& profile : cause.profiles) {
-    for (int k = 1 - SIZE_STEPS; k < SIZE_STEPS; ++k) {
-      const double factor = std::pow(LARGEST_SIZE_RATIO, static_cast<double>(k) / SIZE_STEPS);
-      const double triangle = (1.0 - std::abs(static_cast<double>(k)) / SIZE_STEPS) / SIZE_STEPS;
+    for (int k = 1 - options_.size_steps; k < options_.size_steps; ++k) {
+      const double factor =
+          std::pow(options_.largest_size_ratio, static_cast<double>(k) / options_.size_steps);
+      const double triangle =
+          (1.0 - std::abs(static_cast<double>(k)) / options_.size_steps) / options_.size_steps;
       Component component{hypothesis, triangle / static_cast<double>(cause.profiles.size()), {}};
       for (std::size_t t = 0; t < count_; ++t) {
         component.shows.emplace_back(channels.size(), 0.5);  // unknown for channels that were not measured
@@ -66,7 +54,8 @@ void CauseTable::addCause(const FleetCause& cause, std::size_t hypothesis) {
 }
 
 void CauseTable::addNoCause(std::size_t hypothesis) {
-  components.push_back({hypothesis, 1.0, {count_, std::vector<double>(channels.size(), FALSE_ALARM)}});
+  components.push_back(
+      {hypothesis, 1.0, {count_, std::vector<double>(channels.size(), options_.false_alarm)}});
 }
 
 void CauseTable::addUnknownCause(std::size_t hypothesis) {
@@ -74,10 +63,11 @@ void CauseTable::addUnknownCause(std::size_t hypothesis) {
   std::set<std::vector<bool>> patterns;
   const double causes = static_cast<double>(std::max<std::size_t>(1, hypothesis - 1));
   for (const Component& like : known) {
-    for (const double share : CHANGED_SHARES) {
+    for (const double share : options_.changed_shares) {
       Component component = like;
       component.hypothesis = hypothesis;
-      component.weight *= WEIGHT_LIKE_KNOWN / (causes * static_cast<double>(std::size(CHANGED_SHARES)));
+      component.weight *=
+          options_.like_known / (causes * static_cast<double>(options_.changed_shares.size()));
       for (auto& test : component.shows) {
         std::vector<bool> pattern;
         for (double& p : test) {
@@ -91,11 +81,11 @@ void CauseTable::addUnknownCause(std::size_t hypothesis) {
   }
   for (const std::vector<bool>& pattern : patterns) {
     std::vector<double> shows;
-    for (const bool here : pattern) shows.push_back(here ? SHOWS_PROBABILITY : 1.0 - SHOWS_PROBABILITY);
+    for (const bool here : pattern) shows.push_back(here ? options_.shows : 1.0 - options_.shows);
     components.push_back(
-        {hypothesis, WEIGHT_SAME_IN_ALL_TESTS / static_cast<double>(patterns.size()), {count_, shows}});
+        {hypothesis, options_.same_in_all_tests / static_cast<double>(patterns.size()), {count_, shows}});
   }
-  const double rest = known.empty() ? 1.0 : WEIGHT_ANY_CHANNELS;
+  const double rest = known.empty() ? 1.0 : options_.any_channels;
   components.push_back({hypothesis, rest, {count_, std::vector<double>(channels.size(), 0.5)}});
 }
 

@@ -17,9 +17,9 @@ namespace {
 // Squared-gap reduction that identifies a cause in a single record: `explain` names a cause from a gain of
 // 100 on. A force record has thousands of samples, a load-meter record one or two independent means.
 constexpr double FORCE_SQUARES = 0.05, LOAD_SQUARES = 100.0;
-const double ACCEPTANCE = std::log(100.0);  // evidence against each other hypothesis
-constexpr double LEAST_INFORMATION = 1e-9;  // [nat] rounding error
-constexpr std::size_t NEWEST = 8;           // explanations of a cause that are used
+const double ACCEPTANCE = std::log(100.0);      // evidence against each other hypothesis
+constexpr double LEAST_INFORMATION = 1e-9;      // [nat] rounding error
+constexpr std::size_t NEWEST_EXPLANATIONS = 8;  // explanations of a cause that are used
 
 double thresholdOf(const std::string& channel) {
   return channel == "load_meter" ? LOAD_SQUARES : FORCE_SQUARES;
@@ -38,7 +38,7 @@ struct Explanations {
     if (single_cause && !is_alone) return;
     if (is_alone && !single_cause) *this = {{}, true};
     by.push_back(&improvement);
-    if (by.size() > NEWEST) by.erase(by.begin());
+    if (by.size() > NEWEST_EXPLANATIONS) by.erase(by.begin());
   }
 };
 

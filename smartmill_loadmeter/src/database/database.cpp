@@ -46,7 +46,7 @@ struct CoefficientDatabase::Impl {
     if (isServerUrl(path)) {
       store = connectFleet(path);
     } else {
-      auto opened = std::make_unique<SqliteStore>(path);
+      auto opened = naming(name, [&] { return std::make_unique<SqliteStore>(name); });
       file = opened.get();
       store = std::move(opened);
     }
@@ -80,11 +80,11 @@ std::size_t CoefficientDatabase::add(const std::vector<HealthRecord>& health) {
 }
 
 std::size_t CoefficientDatabase::add(const RecordKind& kind, const std::vector<Row>& rows) {
-  return impl_->store->add(kind, rows);
+  return naming(impl_->name, [&] { return impl_->store->add(kind, rows); });
 }
 
 std::vector<Row> CoefficientDatabase::rows(const RecordKind& kind) const {
-  return impl_->store->rows(kind);
+  return naming(impl_->name, [&] { return impl_->store->rows(kind); });
 }
 
 std::vector<ModelImprovement> CoefficientDatabase::improvements() const {
@@ -97,22 +97,22 @@ std::vector<HealthRecord> CoefficientDatabase::health() const {
 
 std::optional<CoefficientSet> CoefficientDatabase::find(const std::string& tool,
                                                         const std::string& material) const {
-  const auto newest = impl_->store->newest(tool, material);
+  const auto newest = naming(impl_->name, [&] { return impl_->store->newest(tool, material); });
   return newest ? std::optional(newest->set) : std::nullopt;
 }
 
 std::vector<CoefficientRecord> CoefficientDatabase::records(const std::string& tool,
                                                             const std::string& material) const {
-  return impl_->store->records(tool, material);
+  return naming(impl_->name, [&] { return impl_->store->records(tool, material); });
 }
 
 std::vector<CoefficientRecord> CoefficientDatabase::near(const std::string& tool,
                                                          const CoefficientQuery& query) const {
-  return impl_->store->near(tool, query);
+  return naming(impl_->name, [&] { return impl_->store->near(tool, query); });
 }
 
 std::size_t CoefficientDatabase::size() const {
-  return impl_->store->size();
+  return naming(impl_->name, [&] { return impl_->store->size(); });
 }
 
 std::size_t CoefficientDatabase::merge(const std::string& file) {
@@ -127,7 +127,7 @@ std::size_t CoefficientDatabase::merge(const std::string& file) {
 
 std::string CoefficientDatabase::contents() const {
   std::string text;
-  for (const auto& [tool, material] : impl_->store->pairs())
+  for (const auto& [tool, material] : naming(impl_->name, [&] { return impl_->store->pairs(); }))
     text += (text.empty() ? "" : ", ") + tool + " / " + material;
   return text.empty() ? "no records" : text;
 }
@@ -136,32 +136,38 @@ const std::string& CoefficientDatabase::file() const {
   return impl_->name;
 }
 
-CoefficientDatabase::Batch CoefficientDatabase::unsent(const std::string& fleet, const RecordKind& kind,
-                                                       std::size_t limit) const {
-  return impl_->file->unsent(fleet, kind, limit);
+FleetSynchronisation CoefficientDatabase::synchronisation() const {
+  return {*impl_->file, impl_->name};
 }
 
-std::size_t CoefficientDatabase::unsentCount(const std::string& fleet) const {
+FleetSynchronisation::Batch FleetSynchronisation::unsent(const std::string& fleet, const RecordKind& kind,
+                                                         std::size_t limit) const {
+  return naming(file_, [&] { return store_.unsent(fleet, kind, limit); });
+}
+
+std::size_t FleetSynchronisation::unsentCount(const std::string& fleet) const {
   std::size_t count = 0;
-  for (const RecordKind& kind : recordKinds()) count += impl_->file->unsentCount(fleet, kind);
+  for (const RecordKind& kind : recordKinds())
+    count += naming(file_, [&] { return store_.unsentCount(fleet, kind); });
   return count;
 }
 
-void CoefficientDatabase::markSent(const std::string& fleet, const RecordKind& kind, std::int64_t last) {
-  impl_->file->markSent(fleet, kind, last);
+void FleetSynchronisation::markSent(const std::string& fleet, const RecordKind& kind,
+                                    std::int64_t last) const {
+  naming(file_, [&] { store_.markSent(fleet, kind, last); });
 }
 
-std::string CoefficientDatabase::lastFleet() const {
-  return impl_->file->lastFleet();
+std::string FleetSynchronisation::lastFleet() const {
+  return naming(file_, [&] { return store_.lastFleet(); });
 }
 
-std::size_t CoefficientDatabase::addFrom(const std::string& fleet, const RecordKind& kind,
-                                         const std::vector<Row>& rows) {
-  return impl_->file->addFrom(fleet, kind, rows);
+std::size_t FleetSynchronisation::addFrom(const std::string& fleet, const RecordKind& kind,
+                                          const std::vector<Row>& rows) const {
+  return naming(file_, [&] { return store_.addFrom(fleet, kind, rows); });
 }
 
-std::vector<std::string> CoefficientDatabase::identities(const RecordKind& kind) const {
-  return impl_->file->identities(kind);
+std::vector<std::string> FleetSynchronisation::identities(const RecordKind& kind) const {
+  return naming(file_, [&] { return store_.identities(kind); });
 }
 
 }  // namespace smartmill::loadmeter

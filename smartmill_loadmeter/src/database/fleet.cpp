@@ -8,15 +8,15 @@ namespace smartmill::loadmeter {
 
 namespace {
 
-constexpr std::size_t BATCH = 2000;  // records of a transaction: about 50 ms, 2 MB
-
 void requireServerUrl(const std::string& url) {
   if (!isServerUrl(url)) throw Error("'" + url + "': expected a server, postgresql://USER@HOST/DATABASE");
 }
 
-void requireFile(const CoefficientDatabase& local) {
+std::unique_ptr<FleetServer> connect(const CoefficientDatabase& local, const std::string& url) {
+  requireServerUrl(url);
   if (isServerUrl(local.file()))
     throw Error(withoutPassword(local.file()) + ": expected the machine's file, not a server");
+  return connectFleet(url);
 }
 
 }  // namespace
@@ -38,36 +38,34 @@ std::string withoutPassword(const std::string& url) {
 
 FleetTransfer push(CoefficientDatabase& local, const std::string& url, const FleetProgress& progress,
                    bool all) {
-  requireServerUrl(url);
-  requireFile(local);
-  const auto server = connectFleet(url);
+  const auto server = connect(local, url);
   const std::string fleet = server->identity();
+  const FleetSynchronisation file = local.synchronisation();
   FleetTransfer transfer;
   for (const RecordKind& kind : recordKinds()) {
-    if (all) local.markSent(fleet, kind, 0);
+    if (all) file.markSent(fleet, kind, 0);
     while (true) {
-      const CoefficientDatabase::Batch batch = local.unsent(fleet, kind, BATCH);
+      const FleetSynchronisation::Batch batch = file.unsent(fleet, kind, FLEET_BATCH);
       if (batch.rows.empty()) break;
       transfer.fresh += server->add(kind, batch.rows);
       // An interruption between the two sends the batch again, which adds nothing.
-      local.markSent(fleet, kind, batch.last);
+      file.markSent(fleet, kind, batch.last);
       transfer.offered += batch.rows.size();
       if (progress) progress(transfer);
     }
   }
-  server->storePush(transfer, local.unsentCount(fleet));
+  server->storePush(transfer, file.unsentCount(fleet));
   return transfer;
 }
 
 FleetTransfer pull(CoefficientDatabase& local, const std::string& url, const FleetProgress& progress) {
-  requireServerUrl(url);
-  requireFile(local);
-  const auto server = connectFleet(url);
+  const auto server = connect(local, url);
   const std::string fleet = server->identity();
+  const FleetSynchronisation file = local.synchronisation();
   FleetTransfer transfer;
   for (const RecordKind& kind : recordKinds()) {
-    server->missing(kind, local.identities(kind), [&](const std::vector<Row>& batch) {
-      transfer.fresh += local.addFrom(fleet, kind, batch);
+    server->missing(kind, file.identities(kind), [&](const std::vector<Row>& batch) {
+      transfer.fresh += file.addFrom(fleet, kind, batch);
       transfer.offered += batch.size();
       if (progress) progress(transfer);
     });

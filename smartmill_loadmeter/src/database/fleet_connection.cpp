@@ -102,15 +102,14 @@ void FleetConnection::copyIn(const std::string& sql, const std::string& lines) {
 }
 
 std::string FleetConnection::literal(const std::string& word) const {
-  char* text = PQescapeLiteral(connection_.get(), word.c_str(), word.size());
-  if (!text) fail(PQerrorMessage(connection_.get()));
-  std::string result(text);
-  PQfreemem(text);
-  return result;
+  return escaped(PQescapeLiteral(connection_.get(), word.c_str(), word.size()));
 }
 
 std::string FleetConnection::name(const std::string& word) const {
-  char* text = PQescapeIdentifier(connection_.get(), word.c_str(), word.size());
+  return escaped(PQescapeIdentifier(connection_.get(), word.c_str(), word.size()));
+}
+
+std::string FleetConnection::escaped(char* text) const {
   if (!text) fail(PQerrorMessage(connection_.get()));
   std::string result(text);
   PQfreemem(text);

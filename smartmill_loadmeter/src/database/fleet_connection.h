@@ -21,9 +21,8 @@ class QueryResult {
   std::unique_ptr<PGresult, decltype(&PQclear)> result_;
 };
 
-/// Connection of libpq that reports failures as Error "URL: reason" in one line. libpqxx would not shorten
-/// it: its interface differs between the supported releases (6.4 and 7.10), and errors, COPY and time-outs
-/// need the same code.
+/// Connection of libpq that reports failures as Error "URL: reason" in one line. By hand, because libpqxx has
+/// no common interface for parameters and COPY in Debian 12 (6.4) and 13 (7.10).
 class FleetConnection {
  public:
   explicit FleetConnection(const std::string& url);
@@ -54,6 +53,7 @@ class FleetConnection {
 
  private:
   QueryResult requireSuccess(PGresult* result) const;
+  std::string escaped(char* text) const;
 
   std::string displayed_url_;
   std::unique_ptr<PGconn, decltype(&PQfinish)> connection_;

@@ -12,8 +12,6 @@ namespace smartmill::loadmeter {
 
 namespace {
 
-constexpr int BATCH = 2000;  // records per fetch
-
 void appendWord(const std::string& word, std::string* line) {
   constexpr std::string_view SPECIAL = "\\\t\n\r", LETTER = "\\tnr";
   for (const char c : word) {
@@ -195,7 +193,7 @@ class PostgresqlServer : public FleetServer {
                           "c.id");
       while (true) {
         const std::vector<Row> some =
-            rowsOf(kind, connection_.execute("FETCH " + std::to_string(BATCH) + " FROM lacking"));
+            rowsOf(kind, connection_.execute("FETCH " + std::to_string(FLEET_BATCH) + " FROM lacking"));
         if (some.empty()) break;
         batch(some);
       }

@@ -10,7 +10,7 @@
 
 namespace smartmill::loadmeter {
 
-/// Storage of records: a file or a fleet's server. Every function throws Error "NAME: reason" in one line.
+/// Storage of records: a file (errors are SQLite::Exception) or a fleet's server (Error "URL: reason").
 class RecordStore {
  public:
   virtual ~RecordStore() = default;

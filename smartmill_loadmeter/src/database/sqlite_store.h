@@ -6,22 +6,29 @@
 #include <utility>
 #include <vector>
 
-#include "record_store.h"
+#include <SQLiteCpp/Database.h>
+#include <SQLiteCpp/Exception.h>
 
-struct sqlite3;
+#include "record_store.h"
+#include "smartmill_core/error.h"
 
 namespace smartmill::loadmeter {
 
-/// Records in an SQLite file or in memory, and the state of their synchronisation with fleets. The C
-/// interface is used directly: NULL as NaN and errors as "FILE: reason" need a wrapper of the same size with
-/// SQLiteCpp, which copies a shared pointer for each of the 50 columns of a record.
+/// @throws Error "FILE: reason" in place of the exceptions of SQLiteCpp.
+template <typename Work>
+auto naming(const std::string& file, const Work& work) {
+  try {
+    return work();
+  } catch (const SQLite::Exception& error) {
+    throw Error(file + ": " + error.what());
+  }
+}
+
+/// Records in an SQLite file or in memory, and the state of their synchronisation with fleets.
 class SqliteStore : public RecordStore {
  public:
-  /// @param file empty: in memory. @throws Error when the file is not such a database or cannot be opened.
+  /// @throws SQLite::Exception when the file is not such a database or cannot be opened.
   explicit SqliteStore(const std::string& file);
-  ~SqliteStore() override;
-  SqliteStore(const SqliteStore&) = delete;
-  SqliteStore& operator=(const SqliteStore&) = delete;
 
   std::size_t add(const RecordKind& kind, const std::vector<Row>& rows) override;
   std::vector<Row> rows(const RecordKind& kind) override;
@@ -31,9 +38,9 @@ class SqliteStore : public RecordStore {
   std::vector<std::pair<std::string, std::string>> pairs() override;
   std::size_t size() override;
 
-  /// @{ As in CoefficientDatabase.
-  CoefficientDatabase::Batch unsent(const std::string& fleet, const RecordKind& kind,
-                                    std::size_t limit) const;
+  /// @{ As in FleetSynchronisation.
+  FleetSynchronisation::Batch unsent(const std::string& fleet, const RecordKind& kind,
+                                     std::size_t limit) const;
   std::size_t unsentCount(const std::string& fleet, const RecordKind& kind) const;
   void markSent(const std::string& fleet, const RecordKind& kind, std::int64_t last);
   std::string lastFleet() const;
@@ -42,19 +49,10 @@ class SqliteStore : public RecordStore {
   /// @}
 
  private:
-  void execute(const std::string& sql) const;
-  int version() const;
-  void prepare() const;
-  void switchToWriteAheadLog() const;
-  void makeFirst() const;
-  void makeSecond() const;
-  template <typename Work>
-  void transaction(const Work& work) const;
   std::size_t insert(const RecordKind& kind, const std::vector<Row>& rows) const;
   std::int64_t sentUpTo(const std::string& fleet, const RecordKind& kind) const;
 
-  std::string file_;
-  sqlite3* db_ = nullptr;
+  SQLite::Database db_;
 };
 
 }  // namespace smartmill::loadmeter

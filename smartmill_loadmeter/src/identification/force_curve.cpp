@@ -13,13 +13,9 @@
 namespace smartmill::loadmeter {
 namespace {
 
-constexpr int EDGE_SLICES = 12;               // of the edge over its height
-constexpr int MAX_SWEEPS = 4000;              // of the coordinate descent
-constexpr int ITERATIONS = 4;                 // Gauss-Newton iterations for chip and angle offsets
-constexpr double ANGLE_STEP = 2e-3;           // [rad] step of the numerical derivative
-constexpr double LARGEST_ANGLE_OFFSET = 0.1;  // [rad]
-constexpr double LARGEST_CHIP_OFFSET = 0.5;   // [1] largest chip offset of a tooth over the thickest chip
-constexpr double CONVERGED = 1e-10;           // [1] relative change of a sweep at convergence
+constexpr int MAX_SWEEPS = 4000;     // of the coordinate descent
+constexpr double ANGLE_STEP = 2e-3;  // [rad] step of the numerical derivative
+constexpr double CONVERGED = 1e-10;  // [1] relative change of a sweep at convergence
 
 /// Normal equations. Unknowns: increments of the spline coefficients (the first from 0), tangential then
 /// radial; chip-thickness offset of each tooth (runout, uneven radii) times the mean slope; angle offset
@@ -35,6 +31,7 @@ struct NormalEquations {
 struct CurveModel {
   const std::vector<AngleRecord>& records;
   const ToolGeometry& tool;
+  const CurveFitOptions& options;
   double top = 0.0;  // [m]
   int pieces = 0;
   std::vector<double> chip_offset{};  // [m] chip-thickness offset of each tooth
@@ -53,7 +50,7 @@ struct CurveModel {
 /// height [m]
 template <class Visit>
 void eachEdge(double angle, const CurveModel& model, const Engagement& e, Visit visit) {
-  const int slices = model.tool.lag() == 0.0 ? 1 : EDGE_SLICES;
+  const int slices = model.tool.lag() == 0.0 ? 1 : model.options.edge_slices;
   const double dz = e.axial_depth / slices;
   for (int tooth = 0; tooth < model.tool.teeth; ++tooth) {
     for (int slice = 0; slice < slices; ++slice) {
@@ -314,11 +311,11 @@ ForceCurves curvesOf(const CurveModel& model, const Eigen::VectorXd& found) {
 void relinearise(CurveModel& model, const Eigen::VectorXd& found) {
   model.curves = curvesOf(model, found);
   for (int t = 0; t < model.tool.teeth; ++t)
-    model.chip_offset[static_cast<std::size_t>(t)] =
-        std::clamp(found(model.offsetsBegin() + t) / model.slope, -LARGEST_CHIP_OFFSET * model.top,
-                   LARGEST_CHIP_OFFSET * model.top);
-  model.angle_offset =
-      std::clamp(found(model.angleIndex()) / model.force(), -LARGEST_ANGLE_OFFSET, LARGEST_ANGLE_OFFSET);
+    model.chip_offset[static_cast<std::size_t>(t)] = std::clamp(
+        found(model.offsetsBegin() + t) / model.slope, -model.options.largest_chip_offset * model.top,
+        model.options.largest_chip_offset * model.top);
+  model.angle_offset = std::clamp(found(model.angleIndex()) / model.force(),
+                                  -model.options.largest_angle_offset, model.options.largest_angle_offset);
   model.slope = std::max(model.curves.tangential.value.back() / model.top, 1.0);
 }
 
@@ -360,20 +357,21 @@ void addDeviations(const CurveModel& model, const Eigen::MatrixXd& covariance, F
 
 }  // namespace
 
-ForceCurves fitForceCurves(const std::vector<AngleRecord>& records, const ToolGeometry& tool, int pieces) {
+ForceCurves fitForceCurves(const std::vector<AngleRecord>& records, const ToolGeometry& tool, int pieces,
+                           const CurveFitOptions& options) {
   if (pieces < 2 || pieces > 30)
     throw Error("force curve: " + std::to_string(pieces) + " segments of a spline, expected 2..30");
-  CurveModel model{records, tool, thickest(records), pieces};
+  CurveModel model{records, tool, options, thickest(records), pieces};
   model.chip_offset.assign(static_cast<std::size_t>(tool.teeth), 0.0);
   if (!(model.top > 0.0)) throw Error("force curve: no chip thickness > 0 in the records");
   NormalEquations equations;
   Eigen::VectorXd found;
-  for (int step = 0; step <= ITERATIONS; ++step) {
+  for (int step = 0; step <= options.iterations; ++step) {
     equations = systemOf(model);
     if (equations.rows < 20 * static_cast<std::size_t>(model.curveSize()))
       throw Error("force curve: too few samples in cut");
     found = solveNonNegative(equations.normal, equations.right, model.offsetsBegin());
-    if (step < ITERATIONS) relinearise(model, found);
+    if (step < options.iterations) relinearise(model, found);
   }
   const Eigen::MatrixXd inverse = inverseOf(equations, found, model.offsetsBegin());
   const Eigen::VectorXd increments = found - offsetsOf(model);

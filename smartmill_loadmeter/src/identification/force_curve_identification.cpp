@@ -10,12 +10,6 @@
 #include "smartmill_core/units.h"
 
 namespace smartmill::loadmeter {
-namespace {
-
-constexpr double MAXIMUM_GAP = 0.2;      // [s] longest time without state or angle in a steady cut
-constexpr double PATH_TOLERANCE = 1e-3;  // [m]
-
-}  // namespace
 
 void MeanRevolution::add(double angle, double fx, double fy) {
   double turn = std::fmod(angle / units::TWO_PI, 1.0);
@@ -80,14 +74,15 @@ void ForceCurveIdentification::handle(const CuttingCondition& condition) {
 }
 
 void ForceCurveIdentification::handle(const CncState& state) {
-  const bool gap = state.stamp - last_state_ > MAXIMUM_GAP;
+  const bool gap = state.stamp - last_state_ > parameters_.maximum_gap;
   last_state_ = state.stamp;
   const bool steady = condition_ && condition_->kind == CuttingCondition::Kind::cut && state.connected &&
-                      state.feed > 0.0 && onSteadyPath(*condition_, state, PATH_TOLERANCE);
+                      state.feed > 0.0 && onSteadyPath(*condition_, state, parameters_.path_tolerance);
   if (!steady || gap) steady_since_.reset();
   if (!steady) {
     // No later state can mark these samples as steady.
-    while (!samples_.empty() && samples_.front().time < state.stamp - MAXIMUM_GAP) samples_.pop_front();
+    while (!samples_.empty() && samples_.front().time < state.stamp - parameters_.maximum_gap)
+      samples_.pop_front();
     return;
   }
   if (!steady_since_) steady_since_ = state.stamp;
@@ -97,14 +92,15 @@ void ForceCurveIdentification::handle(const CncState& state) {
 
 void ForceCurveIdentification::handle(const SpindleAngle& angle) {
   if (!std::isfinite(angle.angle) || !std::isfinite(angle.speed)) return;
-  if (!angles_.empty() && angle.stamp - angles_.back().time > MAXIMUM_GAP) angles_.clear();
+  if (!angles_.empty() && angle.stamp - angles_.back().time > parameters_.maximum_gap) angles_.clear();
   if (angles_.empty()) {
     angles_.push_back({angle.stamp, angle.angle, angle.angle});
     return;
   }
   if (!(angle.stamp > angles_.back().time)) return;
   angles_.push_back(angles_.back().next(angle));
-  while (angles_.size() > 2 && angles_[1].time < angle.stamp - 2.0 * MAXIMUM_GAP - parameters_.settle_time)
+  while (angles_.size() > 2 &&
+         angles_[1].time < angle.stamp - 2.0 * parameters_.maximum_gap - parameters_.settle_time)
     angles_.pop_front();
 }
 
@@ -208,19 +204,6 @@ ForceCurvePipeline::ForceCurvePipeline(const CurveParameters& parameters, double
       angles_(sorter_.addOptional(names::SPINDLE_ANGLE)),
       blocks_(sorter_.addOptional(names::FORCE_COMPENSATED)) {
   sorter_.onRestart([this] { identification_.reset(); });
-}
-
-void ForceCurvePipeline::push(const CuttingCondition& condition) {
-  sorter_.push(conditions_, condition.stamp, [this, condition] { identification_.handle(condition); });
-}
-void ForceCurvePipeline::push(const CncState& state) {
-  sorter_.push(states_, state.stamp, [this, state] { identification_.handle(state); });
-}
-void ForceCurvePipeline::push(const SpindleAngle& angle) {
-  sorter_.push(angles_, angle.stamp, [this, angle] { identification_.handle(angle); });
-}
-void ForceCurvePipeline::push(const ForceBlock& block) {
-  sorter_.push(blocks_, block.stamp, [this, block] { identification_.handle(block); });
 }
 
 }  // namespace smartmill::loadmeter

@@ -7,27 +7,18 @@
 
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
+#include "term_search.h"
 
 namespace smartmill::loadmeter {
-
-namespace {
-
-constexpr double STRONG_EVIDENCE = 10.0;  // BIC gain that a further term requires
-// Share of the residual's squares that a further term must remove: a wrong term always removes some.
-constexpr double REQUIRED_REDUCTION = 0.5;
-
-}  // namespace
 
 LoadEstimator::LoadEstimator(std::vector<LoadRecord> records, const Spindle& spindle,
                              double spindle_uncertainty, const LoadRecordOptions& options, double noise,
                              bool timed, const std::string& where)
     : options_(options),
       spindle_uncertainty_(spindle_uncertainty / 100.0),
-      known_noise_(noise > 0.0),
-      timed_(timed),
       where_(where.empty() ? "" : where + ": "),
-      plan_(records, spindle.friction_zero_below, where_),
-      regression_(plan_, spindle, spindle_uncertainty_, options, known_noise_),
+      plan_(records, spindle.friction_zero_below, timed, !(noise > 0.0), where_),
+      regression_(plan_, spindle, spindle_uncertainty_, options),
       state_(regression_.initialState(std::move(records), noise)) {
 }
 
@@ -40,7 +31,13 @@ LoadRecordResult LoadEstimator::estimate() {
     averageOverRunout(*averaging);
   }
   bool added = false;
-  while (options_.choose_terms && state_.solution.recordsDisagree() && addTerm()) added = true;
+  const TermSearch search(regression_, plan_);
+  while (options_.choose_terms && regression_.recordsDisagree(state_.solution)) {
+    std::optional<LoadState> further = search.add(state_);
+    if (!further) break;
+    state_ = std::move(*further);
+    added = true;
+  }
   if (averaging && added) averageOverRunout(*averaging);
   return result();
 }
@@ -50,68 +47,6 @@ void LoadEstimator::averageOverRunout(const RunoutAveraging& averaging) {
   averaging.applyOffset(average_->offset, &state_);
   const LoadTerms terms = state_.solution.terms;
   state_ = regression_.converge(std::move(state_), terms);
-}
-
-std::vector<LoadTerms> LoadEstimator::furtherTerms() const {
-  std::vector<LoadTerms> candidates;
-  const std::size_t residuals = regression_.residualCount(state_);
-  const LoadTerms& now = state_.solution.terms;
-  const auto addIf = [&](bool possible, auto change) {
-    LoadTerms terms = now;
-    change(terms);
-    if (possible && terms.count() + 2 <= residuals) candidates.push_back(terms);
-  };
-  addIf(!now.friction.stribeck && plan_.air_speeds >= 4, [](LoadTerms& t) { t.friction.stribeck = true; });
-  addIf(!now.friction.warmup && timed_, [](LoadTerms& t) { t.friction.warmup = true; });
-  addIf(!now.growth && plan_.edge_ages >= 3, [](LoadTerms& t) { t.growth = true; });
-  addIf(!now.lag && !known_noise_, [](LoadTerms& t) { t.lag = true; });  // means have no transient
-  return candidates;
-}
-
-// A further friction term is fitted from several starting points.
-LoadSolution LoadEstimator::solveFromSeveralStarts(const LoadTerms& terms) const {
-  const FrictionTerms& now = state_.solution.terms.friction;
-  const bool stribeck = terms.friction.stribeck && !now.stribeck;
-  const bool warmup = terms.friction.warmup && !now.warmup;
-  std::optional<LoadSolution> best;
-  for (const double share : {0.1, 0.25}) {
-    for (const double constant : {150.0, 600.0, 2400.0}) {
-      FrictionLaw start = state_.friction;
-      if (!now.stribeck) start.stribeck_speed = std::max(share * plan_.fastest, plan_.slowest);
-      if (!now.warmup) start.warmup_time = constant;
-      const LoadSolution s = regression_.solve(state_, terms, start);
-      if (!best || s.bic < best->bic) best = s;
-      if (!warmup) break;
-    }
-    if (!stribeck) break;
-  }
-  return *best;
-}
-
-// Adds the term with the largest evidence. @return whether there was one with strong evidence.
-bool LoadEstimator::addTerm() {
-  std::optional<LoadState> best;
-  const auto propose = [&](LoadState candidate) {
-    if (!best || candidate.solution.bic < best->solution.bic) best = std::move(candidate);
-  };
-  for (const LoadTerms& terms : furtherTerms()) {
-    LoadState candidate = state_;
-    candidate.solution = solveFromSeveralStarts(terms);
-    propose(std::move(candidate));
-  }
-  if (!state_.solution.terms.runout && plan_.has_angle) {
-    // Runout changes the responses, which are condensed again about its estimate.
-    LoadTerms terms = state_.solution.terms;
-    terms.runout = true;
-    propose(regression_.converge(state_, terms));
-  }
-  if (!best || best->solution.bic > state_.solution.bic - STRONG_EVIDENCE) return false;
-  const auto squares = [](const LoadState& s) { return s.solution.fit.squares * s.noise * s.noise; };
-  if (squares(*best) > REQUIRED_REDUCTION * squares(state_)) return false;
-  best->friction = regression_.frictionOf(best->solution);
-  const LoadTerms terms = best->solution.terms;
-  state_ = regression_.converge(std::move(*best), terms);
-  return true;
 }
 
 LoadRecordResult LoadEstimator::result() const {
@@ -166,12 +101,11 @@ void LoadEstimator::addDetails(LoadRecordResult* result) const {
   result->noise = state_.noise;
   result->misfit = solution.misfit;
   result->disagreement = solution.disagreement;
-  if (terms.friction.stribeck) result->terms.push_back("Stribeck friction");
-  if (terms.friction.warmup) result->terms.push_back("friction warm-up");
-  if (terms.growth) result->terms.push_back("edge growth");
-  if (terms.runout && !(options_.runout_uncertainty > 0.0)) result->terms.push_back("runout");
-  if (terms.lag && !options_.spindle_uncertainty) result->terms.push_back("load-meter lag");
-  if (solution.recordsDisagree()) {
+  const LoadTerms initial = regression_.initialTerms();
+  for (const FurtherTerm& term : furtherTerms()) {
+    if (terms.*term.flag && !(initial.*term.flag)) result->terms.push_back(term.name);
+  }
+  if (regression_.recordsDisagree(solution)) {
     result->notes.push_back(
         where_ +
         formatted("the records disagree by %.3f %% (chi2 %.1f per degree of freedom): the model lacks "

@@ -12,8 +12,8 @@
 
 namespace smartmill::loadmeter {
 
-/// Ktc and Kte from records of air cuts and cuts of a campaign or the running machine: selects friction,
-/// wear, runout and lag terms by evidence.
+/// Ktc and Kte from records of air cuts and cuts of a campaign or the running machine: a fit, averaged over
+/// an unknown runout, with the further terms that TermSearch selects.
 class LoadEstimator {
  public:
   /// @param spindle_uncertainty [%] stated by the model. @param noise [V] of means; 0: estimated from the
@@ -25,16 +25,12 @@ class LoadEstimator {
   LoadRecordResult estimate();
 
  private:
-  bool addTerm();
-  std::vector<LoadTerms> furtherTerms() const;
-  LoadSolution solveFromSeveralStarts(const LoadTerms& terms) const;
   void averageOverRunout(const RunoutAveraging& averaging);
   LoadRecordResult result() const;
   void addDetails(LoadRecordResult* result) const;
 
   LoadRecordOptions options_;
   double spindle_uncertainty_;  // [1]
-  bool known_noise_, timed_;
   std::string where_;
   LoadPlan plan_;
   LoadRegression regression_;

@@ -12,7 +12,7 @@
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/cutting/tool.h"
 #include "smartmill_core/model/machine_model.h"
-#include "smartmill_loadmeter/identification/identification.h"
+#include "smartmill_loadmeter/identification/load_test.h"
 
 namespace smartmill::loadmeter {
 

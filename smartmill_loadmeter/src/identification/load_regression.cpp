@@ -2,72 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <set>
 #include <utility>
 
-#include "smartmill_core/cutting/mechanistic.h"
-#include "smartmill_core/error.h"
 #include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_loadmeter/calibration/load_meter.h"
 
 namespace smartmill::loadmeter {
 
-namespace {
-
-// Accuracy of the model [1]: a smaller disagreement over the voltage increases the standard deviations, but
-// no term is added for it.
-constexpr double MODEL_ACCURACY = 2e-4;
-// chi2 of n degrees of freedom has mean n and variance 2 n: exceeds the mean by so many standard deviations
-// with a probability of 1 %.
-constexpr double SIGNIFICANT = 2.7;
-
-}  // namespace
-
-std::size_t LoadTerms::count() const {
-  return friction.unknowns() + 2 + (growth ? 1 : 0) + (runout ? 2 : 0) + (lag ? 1 : 0);
-}
-
-bool LoadSolution::recordsDisagree() const {
-  return misfit > 1.0 + SIGNIFICANT * std::sqrt(2.0 / freedom) && disagreement > MODEL_ACCURACY;
-}
-
-LoadPlan::LoadPlan(const std::vector<LoadRecord>& records, double friction_zero_below,
-                   const std::string& where) {
-  std::set<double> speeds, ages;
-  std::set<long> chips;
-  slowest = fastest = records.empty() ? 0.0 : records.front().speed;
-  for (const LoadRecord& r : records) {
-    slowest = std::min(slowest, r.speed);
-    fastest = std::max(fastest, r.speed);
-    if (r.cut) {
-      ++cuts;
-      ages.insert(r.edge_age);
-      has_teeth = has_teeth || r.tool.teeth > 1;
-      has_angle = has_angle || (r.has_angle && r.tool.teeth > 1);
-      const auto map = meanForceMatrix(r.tool, r.engagement);
-      chips.insert(std::lround(1e9 * map[3][0] / map[3][3]));
-    } else {
-      ++air_cuts;
-      if (r.speed >= friction_zero_below) speeds.insert(r.speed);
-    }
-  }
-  air_speeds = speeds.size();
-  edge_ages = ages.size();
-  // Readings of one commanded speed differ slightly.
-  if (air_cuts > 0 && (speeds.empty() || !(*speeds.rbegin() > 1.05 * *speeds.begin()))) {
-    throw Error(where + "friction: expected air cuts at two or more speeds, " + std::to_string(air_speeds) +
-                " usable");
-  }
-  if (chips.size() < 3) {
-    throw Error(where + "coefficients from torque: " + std::to_string(cuts) + " cuts at " +
-                std::to_string(chips.size()) + " different feeds, expected three or more feeds");
-  }
-}
-
 LoadRegression::LoadRegression(const LoadPlan& plan, const Spindle& spindle, double spindle_uncertainty,
-                               const LoadRecordOptions& options, bool known_noise)
-    : plan_(plan), spindle_(spindle), known_noise_(known_noise) {
+                               const LoadRecordOptions& options, const LoadRegressionOptions& regression)
+    : plan_(plan), spindle_(spindle), options_(regression) {
   if (plan.air_cuts == 0) {
     // The model's friction is one observation of each term.
     const Friction known = modelFriction(spindle, 100.0 * spindle_uncertainty);
@@ -83,8 +27,7 @@ LoadState LoadRegression::initialState(std::vector<LoadRecord> records, double n
   LoadState state;
   state.records = std::move(records);
   state.noise = noise;
-  state.friction.viscous = spindle_.viscous;
-  state.friction.coulomb = spindle_.coulomb;
+  state.friction = {spindle_.friction()};
   state.friction.stribeck_speed = 0.15 * plan_.fastest;
   return state;
 }
@@ -102,24 +45,35 @@ std::size_t LoadRegression::residualCount(const LoadState& state) const {
   return n;
 }
 
+LoadRegression::Unknowns LoadRegression::unknownsOf(const LoadState& state, const LoadTerms& terms,
+                                                    const std::vector<double>& v) const {
+  Unknowns u{frictionLaw(terms.friction(), v.data(), spindle_.friction_zero_below),
+             0.0,
+             0.0,
+             0.0,
+             state.log_lag,
+             {}};
+  std::size_t at = terms.ktcIndex();
+  u.ktc = v[at++];
+  u.kte = v[at++];
+  if (terms.growth) u.growth = v[at++];
+  if (terms.runout) u.runout = {v[at], v[at + 1]}, at += 2;
+  if (terms.lag) u.log_lag = v[at];
+  return u;
+}
+
 void LoadRegression::residuals(const LoadState& state, const LoadTerms& terms, const std::vector<double>& v,
                                double* out) const {
-  const FrictionLaw law = FrictionLaw::fromValues(terms.friction, v.data(), spindle_.friction_zero_below);
-  std::size_t at = terms.ktcIndex();
-  const double ktc = v[at++], kte = v[at++];
-  const double growth = terms.growth ? v[at++] : 0.0;
-  const Runout runout = terms.runout ? Runout{v[at], v[at + 1]} : Runout();
-  if (terms.runout) at += 2;
-  const double log_lag = terms.lag ? v[at++] : state.log_lag;
+  const Unknowns u = unknownsOf(state, terms, v);
   for (const LoadRecord& r : state.records) {
     LoadRow quantity = LoadRow::Zero();
-    quantity[IDLE] = law.torque(r.speed, r.start_time);
+    quantity[IDLE] = u.friction.torque(r.speed, r.start_time);
     if (r.cut) {
-      quantity[KTC] = ktc * r.mean_ratio[0];
-      quantity[KTE] = kte * (1.0 + growth * r.edge_age) * r.mean_ratio[1];
-      quantity[LAG] = log_lag - state.log_lag;
-      quantity[RUNOUT_X] = runout.x - state.point.runout.x;
-      quantity[RUNOUT_Y] = runout.y - state.point.runout.y;
+      quantity[KTC] = u.ktc * r.mean_ratio[0];
+      quantity[KTE] = u.kte * (1.0 + u.growth * r.edge_age) * r.mean_ratio[1];
+      quantity[LAG] = u.log_lag - state.log_lag;
+      quantity[RUNOUT_X] = u.runout.x - state.point.runout.x;
+      quantity[RUNOUT_Y] = u.runout.y - state.point.runout.y;
     }
     const Eigen::VectorXd residual =
         (r.rows * quantity.cwiseQuotient(loadUnits()) - r.target) / (state.noise * r.spread);
@@ -127,14 +81,20 @@ void LoadRegression::residuals(const LoadState& state, const LoadTerms& terms, c
   }
   for (const Prior& p : friction_priors_) *out++ = (v[p.unknown] - p.value) / p.std_dev;
   if (runout_prior_ > 0.0) {
-    *out++ = runout.x / runout_prior_;
-    *out++ = runout.y / runout_prior_;
+    *out++ = u.runout.x / runout_prior_;
+    *out++ = u.runout.y / runout_prior_;
   }
-  if (lag_prior_ > 0.0) *out++ = log_lag / lag_prior_;
+  if (lag_prior_ > 0.0) *out++ = u.log_lag / lag_prior_;
+}
+
+// chi2 of n degrees of freedom has mean n and variance 2 n.
+bool LoadRegression::recordsDisagree(const LoadSolution& s) const {
+  return s.misfit > 1.0 + options_.significant * std::sqrt(2.0 / s.freedom) &&
+         s.disagreement > options_.model_accuracy;
 }
 
 FrictionLaw LoadRegression::frictionOf(const LoadSolution& s) const {
-  return FrictionLaw::fromValues(s.terms.friction, s.fit.value.data(), spindle_.friction_zero_below);
+  return frictionLaw(s.terms.friction(), s.fit.value.data(), spindle_.friction_zero_below);
 }
 
 double LoadRegression::timeConstantOf(const LoadState& state) const {
@@ -144,7 +104,7 @@ double LoadRegression::timeConstantOf(const LoadState& state) const {
 LoadSolution LoadRegression::solve(const LoadState& state, const LoadTerms& terms,
                                    const FrictionLaw& start) const {
   std::vector<FitParameter> unknowns =
-      FrictionLaw::parameters(terms.friction, plan_.slowest, plan_.fastest, start);
+      frictionParameters(terms.friction(), plan_.slowest, plan_.fastest, start);
   unknowns.push_back({state.point.ktc, -1e12, 1e12, 1e9});
   unknowns.push_back({state.point.kte, -1e8, 1e8, 1e4});
   if (terms.growth) unknowns.push_back({0.0, -0.1, 1.0, 0.01});
@@ -163,9 +123,9 @@ LoadSolution LoadRegression::solve(const LoadState& state, const LoadTerms& term
   double size2 = 0.0;
   for (const LoadRecord& r : state.records) size2 += r.target.squaredNorm() / (r.spread * r.spread);
   s.disagreement = state.noise * std::sqrt(s.fit.squares / size2);
-  s.bic = known_noise_ ? bayesianInformationCriterion(s.fit.squares, count, terms.count(), true)
-                       : bayesianInformationCriterion(s.fit.squares * state.noise * state.noise, count,
-                                                      terms.count(), false);
+  s.bic = plan_.has_transients ? bayesianInformationCriterion(s.fit.squares * state.noise * state.noise,
+                                                              count, terms.count(), false)
+                               : bayesianInformationCriterion(s.fit.squares, count, terms.count(), true);
   return s;
 }
 
@@ -179,24 +139,26 @@ void LoadRegression::condense(LoadState* state) const {
     squares += r.residual_squares;
     freedom += static_cast<double>(r.voltage.size()) - static_cast<double>(r.target.size());
   }
-  if (known_noise_) return;
+  if (!plan_.has_transients) return;
   // At least a tenth of the rounding noise: a record without noise is not exact.
   state->noise =
       std::max(std::sqrt(squares / freedom), 0.1 * spindle_.load_meter_resolution / std::sqrt(12.0));
 }
 
 LoadState LoadRegression::converge(LoadState state, const LoadTerms& terms) const {
-  for (int pass = 0; pass < (terms.runout ? 6 : terms.lag ? 4 : 2); ++pass) {
+  const int passes = terms.runout ? options_.passes_with_runout
+                     : terms.lag  ? options_.passes_with_lag
+                                  : options_.passes;
+  for (int pass = 0; pass < passes; ++pass) {
     condense(&state);
     state.solution = solve(state, terms, state.friction);
-    const std::vector<double>& value = state.solution.fit.value;
-    std::size_t at = terms.ktcIndex();
-    state.point.ktc = value[at++];
-    state.point.kte = value[at++];
-    state.growth = terms.growth ? value[at++] : 0.0;
-    if (terms.runout) state.point.runout = {value[at], value[at + 1]};
-    if (terms.lag) state.log_lag = value.back();
-    state.friction = frictionOf(state.solution);
+    const Unknowns u = unknownsOf(state, terms, state.solution.fit.value);
+    state.point.ktc = u.ktc;
+    state.point.kte = u.kte;
+    state.growth = u.growth;
+    if (terms.runout) state.point.runout = u.runout;
+    state.log_lag = u.log_lag;
+    state.friction = u.friction;
   }
   return state;
 }

@@ -7,21 +7,13 @@
 #include <Eigen/Core>
 
 #include "load_record.h"
+#include "load_terms.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_loadmeter/calibration/fit.h"
 #include "smartmill_loadmeter/calibration/friction_law.h"
 #include "smartmill_loadmeter/identification/campaign_identification.h"
 
 namespace smartmill::loadmeter {
-
-/// Unknowns of a fit in addition to viscous and Coulomb friction, Ktc and Kte.
-struct LoadTerms {
-  FrictionTerms friction;
-  bool growth = false, runout = false, lag = false;
-
-  std::size_t count() const;
-  std::size_t ktcIndex() const { return friction.unknowns(); }
-};
 
 /// Fit of condensed records.
 struct LoadSolution {
@@ -34,8 +26,6 @@ struct LoadSolution {
 
   double ktc() const { return fit.value[terms.ktcIndex()]; }
   double kte() const { return fit.value[terms.ktcIndex() + 1]; }
-  /// Whether the records disagree significantly, beyond the accuracy of the model.
-  bool recordsDisagree() const;
 };
 
 /// Records condensed about a point of linearisation, and the solution there. A value: alternatives are fitted
@@ -50,24 +40,25 @@ struct LoadState {
   LoadSolution solution;
 };
 
-/// Contents of the tests, which decide the observable terms.
-struct LoadPlan {
-  std::size_t cuts = 0, air_cuts = 0, air_speeds = 0, edge_ages = 0;
-  double slowest = 0.0, fastest = 0.0;  ///< [rad/s]
-  bool has_angle = false;               ///< of the spindle, in a cut with several teeth
-  bool has_teeth = false;               ///< a cut with several teeth
-
-  /// @throws Error with fewer than two speeds of air cuts or three feeds. @param where prefix of the message
-  LoadPlan(const std::vector<LoadRecord>& records, double friction_zero_below, const std::string& where);
+struct LoadRegressionOptions {
+  /// [1] accuracy of the model: a smaller disagreement over the voltage increases the standard deviations,
+  /// but no term is added for it.
+  double model_accuracy = 2e-4;
+  /// [1] standard deviations by which chi2 exceeds its mean when records disagree: 1 % by chance.
+  double significant = 2.7;
+  /// @{ [1] passes of condensing and fitting. More where the columns depend on the solution: those of the lag
+  /// on its time constant, those of the runout on its offset.
+  int passes = 2, passes_with_lag = 4, passes_with_runout = 6;
+  /// @}
 };
 
 /// Least squares of friction, coefficients and further terms over condensed records.
 class LoadRegression {
  public:
-  /// @param spindle_uncertainty [1] of the model's spindle section. @param known_noise the noise is not
-  /// estimated from the samples.
+  /// @param spindle_uncertainty [1] of the model's spindle section. Without transients in the plan
+  /// the noise is not estimated from the samples.
   LoadRegression(const LoadPlan& plan, const Spindle& spindle, double spindle_uncertainty,
-                 const LoadRecordOptions& options, bool known_noise);
+                 const LoadRecordOptions& options, const LoadRegressionOptions& regression = {});
 
   LoadState initialState(std::vector<LoadRecord> records, double noise) const;
   LoadTerms initialTerms() const;
@@ -76,6 +67,8 @@ class LoadRegression {
   LoadSolution solve(const LoadState& state, const LoadTerms& terms, const FrictionLaw& start) const;
   /// Condenses the records and fits them, repeatedly: the columns of lag and runout depend on the solution.
   LoadState converge(LoadState state, const LoadTerms& terms) const;
+  /// Whether the records disagree significantly, beyond the accuracy of the model.
+  bool recordsDisagree(const LoadSolution& solution) const;
   FrictionLaw frictionOf(const LoadSolution& solution) const;
   /// Covariance of all unknowns: the larger of noise and scatter between the records, and the rounding error
   /// of each record.
@@ -89,6 +82,13 @@ class LoadRegression {
     std::size_t unknown;
     double value, std_dev;
   };
+  /// Unknowns of a fit as quantities.
+  struct Unknowns {
+    FrictionLaw friction;
+    double ktc, kte, growth, log_lag;
+    Runout runout;
+  };
+  Unknowns unknownsOf(const LoadState& state, const LoadTerms& terms, const std::vector<double>& value) const;
 
   void residuals(const LoadState& state, const LoadTerms& terms, const std::vector<double>& value,
                  double* out) const;
@@ -97,7 +97,7 @@ class LoadRegression {
 
   LoadPlan plan_;
   Spindle spindle_;
-  bool known_noise_;
+  LoadRegressionOptions options_;
   std::vector<Prior> friction_priors_;
   double runout_prior_ = 0.0;  // [m] standard deviation of each component; 0: none
   double lag_prior_ = 0.0;     // standard deviation of the log time constant; 0: none

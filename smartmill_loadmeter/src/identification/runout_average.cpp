@@ -6,14 +6,6 @@
 
 namespace smartmill::loadmeter {
 
-namespace {
-
-// [1] relative standard deviation of the model's ripple variance: samples at many phases, at a few.
-constexpr double RIPPLE_ERROR = 0.1, SPARSE_RIPPLE_ERROR = 0.3;
-constexpr double FEW_PHASES = 3.0;
-
-}  // namespace
-
 /// Fit at one offset and angle of the cutter axis.
 struct RunoutAveraging::Point {
   double offset;
@@ -22,8 +14,9 @@ struct RunoutAveraging::Point {
   double evidence = 0.0;  // log likelihood up to a constant
 };
 
-RunoutAveraging::RunoutAveraging(const LoadRegression& regression, const LoadState& state, double largest)
-    : regression_(regression), largest_(largest) {
+RunoutAveraging::RunoutAveraging(const LoadRegression& regression, const LoadState& state, double largest,
+                                 const RunoutAveragingOptions& options)
+    : regression_(regression), options_(options), largest_(largest) {
   const Spindle& spindle = regression.spindle();
   const double time_constant = regression.timeConstantOf(state);
   double sum = 0.0, samples = 0.0;
@@ -43,8 +36,8 @@ RunoutAveraging::RunoutAveraging(const LoadRegression& regression, const LoadSta
 // Log likelihood of the readings' scatter given the ripple of a runout. With equal probability the scatter
 // beyond that in air is ripple only, or a cut adds noise of unknown size.
 double RunoutAveraging::scatterEvidence(const LoadState& state, const Point& point) const {
-  constexpr int SIZES = 16;
-  std::vector<double> evidence(SIZES + 1, 0.0);
+  const int sizes = options_.noises;
+  std::vector<double> evidence(static_cast<std::size_t>(sizes) + 1, 0.0);
   double largest = 0.0;
   for (const LoadRecord& r : state.records) {
     if (r.cut && r.samples > 0.0) largest = std::max(largest, 2.0 * std::sqrt(r.variance));
@@ -58,11 +51,11 @@ double RunoutAveraging::scatterEvidence(const LoadState& state, const Point& poi
     RunoutEffect::Variance v =
         effect.variance(point.offset, point.angle, point.solution.ktc(), point.solution.kte());
     v.ripple *= r.in_cut;
-    const double error = r.sparse ? SPARSE_RIPPLE_ERROR : RIPPLE_ERROR;
-    for (int i = 0; i <= SIZES; ++i) {
-      const double noise = air_variance_ + std::pow(largest * i / SIZES, 2);
+    const double error = r.sparse ? options_.sparse_ripple_error : options_.ripple_error;
+    for (int i = 0; i <= sizes; ++i) {
+      const double noise = air_variance_ + std::pow(largest * i / sizes, 2);
       const double variance = 2.0 * noise * noise / r.samples +
-                              4.0 * noise * v.ripple / (r.sparse ? FEW_PHASES : r.samples) +
+                              4.0 * noise * v.ripple / (r.sparse ? options_.few_phases : r.samples) +
                               std::pow(error * v.ripple, 2) + (r.sparse ? std::pow(v.interference, 2) : 0.0);
       const double residual = r.variance - noise - v.ripple;
       evidence[static_cast<std::size_t>(i)] -= 0.5 * (residual * residual / variance + std::log(variance));
@@ -70,20 +63,19 @@ double RunoutAveraging::scatterEvidence(const LoadState& state, const Point& poi
   }
   const double best = *std::max_element(evidence.begin(), evidence.end());
   double with_noise = 0.0;
-  for (int i = 1; i <= SIZES; ++i)
-    with_noise += std::exp(evidence[static_cast<std::size_t>(i)] - best) / SIZES;
+  for (int i = 1; i <= sizes; ++i)
+    with_noise += std::exp(evidence[static_cast<std::size_t>(i)] - best) / sizes;
   const double ripple_only = air_variance_known_ ? std::exp(evidence[0] - best) : with_noise;
   return best + std::log(0.5 * (ripple_only + with_noise));
 }
 
 std::vector<RunoutAveraging::Point> RunoutAveraging::evaluate(const LoadState& state, double low,
                                                               double high) const {
-  constexpr int OFFSETS = 25;
   std::vector<Point> points;
   LoadState shifted = state;
-  for (int o = 0; o < OFFSETS; ++o) {
+  for (int o = 0; o < options_.offsets; ++o) {
     for (std::size_t a = 0; a < RunoutEffect::ANGLES; ++a) {
-      Point p{low + (high - low) * o / (OFFSETS - 1), a, {}};
+      Point p{low + (high - low) * o / (options_.offsets - 1), a, {}};
       std::size_t cut = 0;
       for (LoadRecord& r : shifted.records) {
         if (r.cut) r.mean_ratio = effects_[cut++].meanRatio(p.offset, a);
@@ -101,26 +93,24 @@ std::vector<RunoutAveraging::Point> RunoutAveraging::evaluate(const LoadState& s
 }
 
 RunoutAverage RunoutAveraging::average(const LoadState& state) const {
-  constexpr double NEGLIGIBLE = -12.0;  // log of a weight
-  constexpr double SIGNIFICANT = 5.0;   // log of the evidence against a zero offset
   const auto largestOf = [](const std::vector<Point>& points) {
     return std::max_element(points.begin(), points.end(),
                             [](const Point& a, const Point& b) { return a.evidence < b.evidence; })
         ->evidence;
   };
   std::vector<Point> points = evaluate(state, 0.0, largest_);
-  const double coarse = largestOf(points), step = largest_ / 24.0;
+  const double coarse = largestOf(points), step = largest_ / (options_.offsets - 1);
   double zero = -std::numeric_limits<double>::infinity(), low = largest_, high = 0.0;
   for (const Point& p : points) {
     if (p.offset == 0.0) zero = std::max(zero, p.evidence);
-    if (p.evidence < coarse + NEGLIGIBLE) continue;
+    if (p.evidence < coarse - options_.negligible) continue;
     low = std::min(low, p.offset);
     high = std::max(high, p.offset);
   }
   points = evaluate(state, std::max(0.0, low - step), std::min(largest_, high + step));
   const double best = largestOf(points);
   RunoutAverage average;
-  average.is_significant = zero < best - SIGNIFICANT;
+  average.is_significant = zero < best - options_.significant;
   double sum = 0.0;
   const auto weight = [&](const Point& p) { return std::exp(p.evidence - best); };
   for (const Point& p : points) {

@@ -5,19 +5,9 @@
 
 namespace smartmill::loadmeter {
 
-namespace {
-
-constexpr double REST_TOLERANCE = 2e-6;       // [m] largest change between states at rest
-constexpr double BEFORE = 0.08, AFTER = 0.1;  // [s] of current before and after a move
-constexpr double STORED = 6.0;                // [s] of current
-constexpr double LARGEST_GAP = 0.1;           // [s] between states
-constexpr double DURATION_TOLERANCE = 0.06;  // [s] largest difference of a duration from that of a rapid move
-constexpr std::size_t MAX_MOVES = 12;        // moves of an axis that are evaluated
-
-}  // namespace
-
-DriveMoves::DriveMoves(const MotorParameters& parameters, const std::optional<MachineAxes>& axes)
-    : parameters_(parameters), limits_(axes) {
+DriveMoves::DriveMoves(const MotorParameters& parameters, const std::optional<MachineAxes>& axes,
+                       const DriveMoveOptions& options)
+    : parameters_(parameters), options_(options), limits_(axes) {
 }
 
 void DriveMoves::clear() {
@@ -30,7 +20,7 @@ void DriveMoves::clear() {
 
 void DriveMoves::handle(const CncState& state) {
   if (!limits_ || rate_ == 0.0) return;
-  const bool gap = state.stamp - last_state_ > LARGEST_GAP;
+  const bool gap = state.stamp - last_state_ > options_.largest_gap;
   const std::array<const char*, 3> names{"X", "Y", "Z"};
   for (std::size_t a = 0; a < 3; ++a) {
     const auto found = std::find(state.axes.begin(), state.axes.end(), names[a]);
@@ -39,17 +29,18 @@ void DriveMoves::handle(const CncState& state) {
     Axis& axis = axes_[a];
     const double moved = std::abs(state.position[at] - axis.position);
     if (gap) {
-      axis.moving = moved > REST_TOLERANCE && last_state_ > 0.0;
+      axis.moving = moved > options_.rest_tolerance && last_state_ > 0.0;
       axis.begin = -1.0;  // start not observed
-    } else if (moved > REST_TOLERANCE && !axis.moving) {
+    } else if (moved > options_.rest_tolerance && !axis.moving) {
       axis.moving = true;
       axis.begin = last_state_;
       axis.from = axis.position;
-    } else if (moved <= REST_TOLERANCE && axis.moving) {
+    } else if (moved <= options_.rest_tolerance && axis.moving) {
       axis.moving = false;
       if (axis.begin >= 0.0) {
         last_[a] = {axis.begin, last_state_, std::abs(axis.position - axis.from)};
-        if (axis.bandwidths.size() + axis.waiting.size() < MAX_MOVES) axis.waiting.push_back(last_[a]);
+        if (axis.bandwidths.size() + axis.waiting.size() < options_.most_moves)
+          axis.waiting.push_back(last_[a]);
       }
     }
     axis.position = state.position[at];
@@ -72,7 +63,7 @@ void DriveMoves::handle(const SampleBlock& block) {
     if (found == block.channels.end()) continue;
     const auto channel = static_cast<std::size_t>(found - block.channels.begin());
     for (std::size_t i = 0; i < block.size(); ++i) samples_[a].push_back(block.at(i, channel));
-    const auto most = static_cast<std::size_t>(STORED * rate_);
+    const auto most = static_cast<std::size_t>(options_.stored * rate_);
     while (samples_[a].size() > most) samples_[a].pop_front();
   }
   const std::size_t kept = std::max({samples_[0].size(), samples_[1].size(), samples_[2].size()});
@@ -85,7 +76,7 @@ void DriveMoves::evaluateWaiting() {
     const double until = start_ + static_cast<double>(samples_[a].size()) / rate_;
     // Axes of one line stop together, so that all their moves are known by then.
     auto& waiting = axes_[a].waiting;
-    while (!waiting.empty() && waiting.front().end + AFTER < until) {
+    while (!waiting.empty() && waiting.front().end + options_.after < until) {
       const Move move = waiting.front();
       waiting.erase(waiting.begin());
       identifyMove(a, move);
@@ -95,12 +86,12 @@ void DriveMoves::evaluateWaiting() {
 
 void DriveMoves::identifyMove(std::size_t axis, const Move& move) {
   const double per_metre = parameters_.phase_per_metre[axis];
-  if (!(per_metre > 0.0) || move.begin - BEFORE < start_) return;
+  if (!(per_metre > 0.0) || move.begin - options_.before < start_) return;
   // In rapid traverse all axes follow one line.
   double length = 0.0;
   for (const Move& other : last_) {
-    const bool same =
-        std::abs(other.begin - move.begin) < LARGEST_GAP && std::abs(other.end - move.end) < LARGEST_GAP;
+    const bool same = std::abs(other.begin - move.begin) < options_.largest_gap &&
+                      std::abs(other.end - move.end) < options_.largest_gap;
     if (same) length += other.distance * other.distance;
   }
   length = std::sqrt(length);
@@ -108,12 +99,12 @@ void DriveMoves::identifyMove(std::size_t axis, const Move& move) {
   const double share = move.distance / length,
                fastest = std::min(limits_->rapid, std::sqrt(length * limits_->acceleration));
   const double duration = length / fastest + fastest / limits_->acceleration;
-  if (std::abs(move.end - move.begin - duration) > DURATION_TOLERANCE) return;
+  if (std::abs(move.end - move.begin - duration) > options_.duration_tolerance) return;
   DriveMove one;
   one.sample_rate = rate_;
-  const double from = move.begin - BEFORE;
+  const double from = move.begin - options_.before;
   const auto first = static_cast<std::ptrdiff_t>((from - start_) * rate_),
-             last = static_cast<std::ptrdiff_t>((move.end + AFTER - start_) * rate_);
+             last = static_cast<std::ptrdiff_t>((move.end + options_.after - start_) * rate_);
   one.current.assign(samples_[axis].begin() + first, samples_[axis].begin() + last);
   // The start lies between two states.
   one.begin =

@@ -68,7 +68,7 @@ void FleetPusher::pushOnce() {
       next.failing = true;
       next.message = error.what();
     }
-    next.behind = local.unsentCount(local.lastFleet());
+    next.behind = local.synchronisation().behind();
   } catch (const Error& error) {
     next.failing = true;
     next.message = error.what();

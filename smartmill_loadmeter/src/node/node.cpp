@@ -36,24 +36,22 @@ LoadMeterNode::LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
       server_(
           nh, names::IDENTIFY_COEFFICIENTS, [this](Server::GoalHandle handle) { goal(handle); },
           [this](Server::GoalHandle handle) { cancel(handle); }, false) {
-  identification_.identification().onResult([this](const IdentifyResult& result) { finish(result); });
-  identification_.identification().onTest([this](const LoadTest& test) {
+  IdentificationOutputs& outputs = identification_.identification().outputs();
+  outputs.result = [this](const IdentifyResult& result) { finish(result); };
+  outputs.test = [this](const LoadTest& test) {
     ROS_INFO("test '%s': %.4f +- %.4f V at %.1f rad/s from %d readings", test.condition.name.c_str(),
              test.voltage.mean, test.voltage.std_dev, test.speed, test.readings);
     feedback();
-  });
-  if (parameters_.keep_cuts)
-    identification_.identification().onCut([this](const CoefficientRecord& cut) { store(cut); });
+  };
+  if (parameters_.keep_cuts) outputs.cut = [this](const CoefficientRecord& cut) { store(cut); };
   publisher_ = nh.advertise<smartmill_msgs::CuttingCoefficients>(names::COEFFICIENTS, 1, true);
-  if (parameters_.motor_learn) identification_.identification().enableSelfCalibration();
-  if (!parameters_.motor_calibration.empty())
-    identification_.identification().setMotors(readMotorCalibration(parameters_.motor_calibration));
+  useMotors(parameters_, identification_.identification().forces());
   if (parameters_.usesMotors()) {
-    identification_.identification().onMotorForce([this](const MotorForce& force) { publish(force); });
+    outputs.motor_force = [this](const MotorForce& force) { publish(force); };
     force_publisher_ = nh.advertise<geometry_msgs::WrenchStamped>(names::FORCE_OF_MOTORS, 10, true);
   }
-  identification_.identification().onForce([this](const ForceEstimate& force) { report(force); });
-  identification_.identification().onForceWindow([this](const ForceEstimate& force) { publish(force); });
+  outputs.force = [this](const ForceEstimate& force) { report(force); };
+  outputs.force_window = [this](const ForceEstimate& force) { publish(force); };
   estimate_publisher_ = nh.advertise<smartmill_msgs::ForceEstimate>(names::FORCE_ESTIMATE, 10, true);
   if (parameters_.force_curve) {
     curve_publisher_ = nh.advertise<smartmill_msgs::ForceCurve>(names::FORCE_CURVE, 1, true);

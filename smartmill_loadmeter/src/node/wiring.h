@@ -34,6 +34,13 @@ struct CutStreams {
   }
 };
 
+/// Motor currents as the parameters require. @throws Error when the calibration cannot be read.
+inline void useMotors(const NodeParameters& parameters, CutForces& forces) {
+  if (parameters.motor_learn) forces.enableSelfCalibration();
+  if (!parameters.motor_calibration.empty())
+    forces.setMotors(readMotorCalibration(parameters.motor_calibration));
+}
+
 /// Connects the streams of the identification to a node's inputs or a bag.
 /// @param pipeline an IdentificationPipeline, or CutStreams
 template <class Source, class Pipeline>

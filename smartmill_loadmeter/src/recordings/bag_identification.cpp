@@ -13,18 +13,15 @@ namespace smartmill::loadmeter {
 std::vector<IdentifyResult> identifyFromBag(const std::string& path, const MachineModel& model,
                                             const NodeParameters& parameters, const BagListeners& listeners) {
   IdentificationPipeline identification(model, parameters.identification, parameters.hold_back);
-  if (parameters.motor_learn) identification.identification().enableSelfCalibration();
-  if (!parameters.motor_calibration.empty())
-    identification.identification().setMotors(readMotorCalibration(parameters.motor_calibration));
-  if (parameters.usesMotors()) {
-    if (listeners.motors) identification.identification().onMotorForce(listeners.motors);
-  }
-  if (listeners.force) identification.identification().onForce(listeners.force);
-  if (listeners.cut) identification.identification().onCut(listeners.cut);
+  useMotors(parameters, identification.identification().forces());
   std::vector<IdentifyResult> results;
-  identification.identification().onResult([&](const IdentifyResult& result) {
+  IdentificationOutputs& outputs = identification.identification().outputs();
+  if (parameters.usesMotors()) outputs.motor_force = listeners.motors;
+  outputs.force = listeners.force;
+  outputs.cut = listeners.cut;
+  outputs.result = [&](const IdentifyResult& result) {
     if (!result.reset) results.push_back(result);
-  });
+  };
   RecordingReader bag(path);
   if (!bag.has(names::CNC_LOAD)) throw Error(path + ": expected topic " + names::CNC_LOAD);
   connect(bag, parameters, identification);

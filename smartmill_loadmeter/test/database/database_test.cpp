@@ -272,12 +272,12 @@ TEST(Database, anOlderFileIsUpdatedWithoutLoss) {
   sqlite3_close(db);
   CoefficientDatabase database(file);
   EXPECT_EQ(database.size(), 2u);
-  EXPECT_EQ(database.lastFleet(), "f");
-  EXPECT_EQ(database.unsentCount("f"), 1u);
+  EXPECT_EQ(database.synchronisation().lastFleet(), "f");
+  EXPECT_EQ(database.synchronisation().unsentCount("f"), 1u);
   HealthRecord health;
   health.stamp = 5.0;
   EXPECT_EQ(database.add(std::vector<HealthRecord>{health}), 1u);
-  EXPECT_EQ(database.unsentCount("f"), 2u);
+  EXPECT_EQ(database.synchronisation().unsentCount("f"), 2u);
   health.stamp = NAN;
   EXPECT_THAT(errorOf([&] { database.add(std::vector<HealthRecord>{health}); }),
               HasSubstr("old.sqlite: stamp of a record: expected a finite number"));

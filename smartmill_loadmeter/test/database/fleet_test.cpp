@@ -118,7 +118,7 @@ TEST_F(FleetDatabase, pushesNewRecordsAndPullsThemExactly) {
   EXPECT_EQ(push(a, url("a")).offered, 0u) << "acknowledged records are noted";
   EXPECT_EQ(push(a, url("a"), {}, true).fresh, 0u) << "a record is stored once";
   fill(a, "a", 5000, 1);
-  EXPECT_EQ(a.unsentCount(a.lastFleet()), 1u);
+  EXPECT_EQ(a.synchronisation().behind(), 1u);
   EXPECT_EQ(push(a, url("a")).fresh, 1u);
 
   EXPECT_EQ(push(b, url("b")).fresh, 10u);
@@ -270,7 +270,7 @@ TEST_F(FleetDatabase, everyKindOfRecordIsTransferred) {
   EXPECT_EQ(pull(b, url("b")).fresh, 6u);
   EXPECT_EQ(pull(b, url("b")).offered, 0u);
   EXPECT_EQ(push(b, url("b")).fresh, 1u) << "its own record was not sent yet";
-  EXPECT_EQ(b.unsentCount(b.lastFleet()), 0u);
+  EXPECT_EQ(b.synchronisation().behind(), 0u);
   EXPECT_EQ(b.records("", "").at(0).set.source, SOURCE_PRODUCTION);
   const ModelImprovement received = b.improvements().at(1), expected = improvementOf("a", 2);
   EXPECT_EQ(received.effects, expected.effects);
@@ -358,7 +358,7 @@ TEST_F(FleetDatabase, aServerKilledDuringAPushLosesNothing) {
     });
   });
   EXPECT_THAT(message, Not(HasSubstr("\n")));
-  EXPECT_EQ(a.unsentCount(a.lastFleet()), message.empty() ? 0u : 6000u - acknowledged);
+  EXPECT_EQ(a.synchronisation().behind(), message.empty() ? 0u : 6000u - acknowledged);
   server_->start();
   push(a, url("a"));
   EXPECT_EQ(CoefficientDatabase(url("a")).size(), 6000u);

@@ -1,4 +1,5 @@
 #include "smartmill_loadmeter/identification/force_law.h"
+#include "smartmill_loadmeter/identification/slot_fit.h"
 
 #include <cmath>
 #include <random>

@@ -26,7 +26,7 @@ void connect(Session& session, LoadMeterIdentification& identification) {
 
 IdentifyResult identify(LoadMeterIdentification& identification, const IdentifyGoal& goal) {
   IdentifyResult result;
-  identification.onResult([&](const IdentifyResult& r) { result = r; });
+  identification.outputs().result = [&](const IdentifyResult& r) { result = r; };
   identification.handle(goal);
   return result;
 }

@@ -66,9 +66,9 @@ struct MotorSession {
   }
   template <typename Identification>
   void feed(Identification& to, LoadMeterIdentification& from) {
-    from.setMotors(calibration);
-    from.onMotorForce([this](const MotorForce& f) { forces.push_back(f); });
-    from.onResult([this](const IdentifyResult& r) { results.push_back(r); });
+    from.forces().setMotors(calibration);
+    from.outputs().motor_force = [this](const MotorForce& f) { forces.push_back(f); };
+    from.outputs().result = [this](const IdentifyResult& r) { results.push_back(r); };
     const auto put = [&to](const auto& input) {
       if constexpr (std::is_same_v<Identification, IdentificationPipeline>) {
         to.push(input);

@@ -25,9 +25,9 @@ using ::testing::HasSubstr;
 class Recorder {
  public:
   explicit Recorder(const std::string& file) : bag_(file, rosbag::bagmode::Write), direct(model(), {}) {
-    direct.onResult([this](const IdentifyResult& result) {
+    direct.outputs().result = [this](const IdentifyResult& result) {
       if (!result.reset) results.push_back(result);
-    });
+    };
     session.state = [this](const CncState& s) { write("/smartmill/cnc/state", s); };
     session.load = [this](const LoadSample& l) { write("/smartmill/cnc/load", l); };
     session.condition = [this](const CuttingCondition& c) { write("/smartmill/cut/condition", c); };
@@ -67,7 +67,7 @@ TEST(Bag, givesTheResultsOfTheLiveRunToTheLastDigit) {
   std::vector<ForceEstimate> forces, played;
   {
     Recorder recorder(file);
-    recorder.direct.onForce([&](const ForceEstimate& f) { forces.push_back(f); });
+    recorder.direct.outputs().force = [&](const ForceEstimate& f) { forces.push_back(f); };
     recorder.session.air(9000.0, 2.0);
     recorder.goal(true);
     runStandardTests(recorder.session);

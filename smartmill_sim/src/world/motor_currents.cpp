@@ -4,7 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "smartmill_core/cutting/friction.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::sim {
@@ -163,8 +162,7 @@ void MotorCurrents::sample(const DriveState& at) {
         phase(load_[a] / (traits_.newton_per_ampere[a] * gain), traits_.phase_per_metre[a] * at.position[a]));
   }
   const double speed = std::abs(at.speed);
-  const double friction = LinearFriction{spindle_.viscous, spindle_.coulomb, spindle_.friction_zero_below}.at(
-      speed, 0.0, friction_factor);
+  const double friction = spindle_.friction().at(speed, 0.0, friction_factor);
   torque_load_ += follow * (torque_ / count_ + friction - torque_load_);
   power += friction * speed;
   slip_revolutions_ += traits_.spindle_slip * torque_load_ * std::abs(at.turns - sampled_.turns);

@@ -241,7 +241,7 @@ bool away(Shop& shop, const Options& o) {
       }
     }
   });
-  const std::size_t behind = local.unsentCount(local.lastFleet());
+  const std::size_t behind = local.synchronisation().behind();
   shop.server().start();
   const FleetTransfer done = push(local, shop.url(6));
   std::printf(
@@ -316,7 +316,7 @@ bool fullDisk(const Options& o) {
       error_text = error.what();
     }
     std::size_t there = 0;
-    const std::size_t behind = local.unsentCount(local.lastFleet());
+    const std::size_t behind = local.synchronisation().behind();
     if (std::system(("mount -o remount,size=400m " + mount).c_str()) != 0) throw Error("no remount");
     // The server may have ended by itself or still run.
     server.stop();

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <functional>
+#include <array>
 #include <string>
 #include <vector>
 
@@ -18,23 +18,10 @@ struct FrictionTerms {
   std::string name() const;  ///< for example "Coulomb and viscous, Stribeck, warm-up"
 };
 
-/// Spindle friction with Stribeck and warm-up terms (effects.md: stribeck_friction, friction_warmup):
-///   T_f = [viscous w + coulomb + breakaway exp(-(w / stribeck_speed)^2)] (1 + cold_ratio exp(-t /
-///   warmup_time)),
-/// zero below `zero_below`; t is the time since the start of the campaign.
-struct FrictionLaw : LinearFriction {
-  double breakaway = 0.0;       ///< [N m]
-  double stribeck_speed = 1.0;  ///< [rad/s] > 0
-  double cold_ratio = 0.0;      ///< [1]
-  double warmup_time = 1.0;     ///< [s] > 0
-
-  double torque(double speed, double start_time) const;  ///< [N m]
-
-  /// Unknowns of a fit in the order viscous, coulomb, [breakaway, stribeck_speed], [cold_ratio, warmup_time].
-  static std::vector<FitParameter> parameters(const FrictionTerms& terms, double slowest, double fastest,
-                                              const FrictionLaw& start);
-  static FrictionLaw fromValues(const FrictionTerms& terms, const double* values, double zero_below);
-};
+/// Unknowns of a fit in the order viscous, coulomb, [breakaway, stribeck_speed], [cold_ratio, warmup_time].
+std::vector<FitParameter> frictionParameters(const FrictionTerms& terms, double slowest, double fastest,
+                                             const FrictionLaw& start);
+FrictionLaw frictionLaw(const FrictionTerms& terms, const double* values, double zero_below);
 
 /// Steady voltage of one air cut and its start time.
 struct TimedAirCut {
@@ -53,11 +40,23 @@ struct FittedFriction {
   double rms = 0.0;                ///< [N m] RMS of the residual
 };
 
+/// Starting points of the nonlinear terms, which have local minima.
+struct FrictionStarts {
+  std::array<double, 2> stribeck_shares{{0.15, 0.4}};          ///< [1] Stribeck speed over the fastest
+  std::array<double, 3> warmup_times{{150.0, 600.0, 2400.0}};  ///< [s] a factor of four apart
+};
+
+struct FrictionFitOptions {
+  /// [1] by which each further term must lower the Bayesian information criterion: strong evidence (Kass and
+  /// Raftery 1995), because a nonlinear term lowers it by chance more often than the criterion allows for.
+  double strong_evidence = 6.0;
+  FrictionStarts starts;
+};
+
 /// Friction laws with every combination of terms for which there are at least one cut more than unknowns,
-/// best first by the Bayesian information criterion. Each additional term must lower the criterion by 6
-/// (strong evidence).
+/// best first by the Bayesian information criterion.
 /// @throws Error with fewer than two speeds.
 std::vector<FittedFriction> fitFrictionLaws(const std::vector<TimedAirCut>& air_cuts, double load_meter_gain,
-                                            double zero_below);
+                                            double zero_below, const FrictionFitOptions& options = {});
 
 }  // namespace smartmill::loadmeter

@@ -3,7 +3,6 @@
 #include <array>
 #include <vector>
 
-#include "smartmill_core/cutting/friction.h"
 #include "smartmill_core/model/machine_model.h"
 
 namespace smartmill::loadmeter {
@@ -12,8 +11,6 @@ namespace smartmill::loadmeter {
 struct Friction : LinearFriction {
   /// covariance of (viscous, coulomb), row by row
   std::array<double, 4> covariance{{0.0, 0.0, 0.0, 0.0}};
-
-  std::array<double, 2> gradient(double speed) const;  ///< of at() with respect to (viscous, coulomb)
 };
 
 /// Steady load-meter voltage of one air cut.

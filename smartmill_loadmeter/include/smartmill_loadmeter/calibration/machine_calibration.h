@@ -18,7 +18,8 @@ struct IdleVoltage {
   Estimate ktcf;            ///< [V s/rad]
   double covariance = 0.0;  ///< of the two
 
-  double at(double speed) const { return (kb.value * speed + ktcf.value) * speed; }  ///< [V]
+  /// [V]
+  double at(double speed) const { return LinearFriction{kb.value, ktcf.value}.at(speed) * speed; }
 };
 
 /// Unweighted least squares of the voltage, as in the thesis. The standard deviations are the larger of the

@@ -80,6 +80,34 @@ struct CoefficientEstimate {
 
 struct RecordKind;
 struct Row;
+class SqliteStore;
+
+/// Synchronisation of a machine's file with fleets, each of which is named by its identity. Records of each
+/// kind are numbered in the order of insertion. A view of the database.
+class FleetSynchronisation {
+ public:
+  struct Batch {
+    std::vector<Row> rows;
+    std::int64_t last = 0;  ///< number of the last row
+  };
+  FleetSynchronisation(SqliteStore& store, const std::string& file) : store_(store), file_(file) {}
+
+  Batch unsent(const std::string& fleet, const RecordKind& kind, std::size_t limit) const;  ///< oldest first
+  std::size_t unsentCount(const std::string& fleet) const;                                  ///< of all kinds
+  /// Records not sent to the fleet that was pushed to last.
+  std::size_t behind() const { return unsentCount(lastFleet()); }
+  /// Marks all rows up to this number.
+  void markSent(const std::string& fleet, const RecordKind& kind, std::int64_t last) const;
+  /// Identity of the fleet that was pushed to last; empty: none.
+  std::string lastFleet() const;
+  /// Adds records of the fleet, which are not sent back. @return number of new records.
+  std::size_t addFrom(const std::string& fleet, const RecordKind& kind, const std::vector<Row>& rows) const;
+  std::vector<std::string> identities(const RecordKind& kind) const;
+
+ private:
+  SqliteStore& store_;
+  const std::string& file_;  // for messages
+};
 
 /// Coefficients, model improvements and spindle health of a machine in one SQLite file or in memory. Each
 /// add() is one durable transaction (write-ahead log, synchronous): it survives a crash after it has
@@ -125,22 +153,8 @@ class CoefficientDatabase {
 
   const std::string& file() const;
 
-  /// @{ Synchronisation of a file with a fleet, which is named by its identity. Records of each kind are
-  /// numbered in the order of insertion.
-  struct Batch {
-    std::vector<Row> rows;
-    std::int64_t last = 0;  ///< number of the last row
-  };
-  Batch unsent(const std::string& fleet, const RecordKind& kind, std::size_t limit) const;  ///< oldest first
-  std::size_t unsentCount(const std::string& fleet) const;                                  ///< of all kinds
-  /// Marks all rows up to this number.
-  void markSent(const std::string& fleet, const RecordKind& kind, std::int64_t last);
-  /// Identity of the fleet that was pushed to last; empty: none.
-  std::string lastFleet() const;
-  /// Adds records of the fleet, which are not sent back. @return number of new records.
-  std::size_t addFrom(const std::string& fleet, const RecordKind& kind, const std::vector<Row>& rows);
-  std::vector<std::string> identities(const RecordKind& kind) const;
-  /// @}
+  /// Of a file; not of a server.
+  FleetSynchronisation synchronisation() const;
 
  private:
   std::size_t add(const RecordKind& kind, const std::vector<Row>& rows);

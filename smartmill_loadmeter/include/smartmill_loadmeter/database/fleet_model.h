@@ -1,6 +1,5 @@
 #pragma once
 
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -33,14 +32,25 @@ struct FleetModelOptions {
   double outlier_probability = 0.02;     ///< [1] 0..0.5, prior probability that a machine is an outlier
   double outlier_std = 0.15;             ///< [1] > 0, additional standard deviation of an outlier's effect
   std::optional<FleetDeviations> known;  ///< deviations; empty: averaged over their posterior
+  double unstated_std = 0.05;            ///< [1] relative standard deviation of an observation without one
+  /// Scales of the half-normal priors of the deviations [1], wide; they matter with two or three machines.
+  FleetDeviations prior{0.15, 0.1, 0.3, 0.0};
+
+  /// Grid over machine, batch and tool that integrates the posterior.
+  struct Grid {
+    /// [1] ranges, logarithmic: from negligible deviations to more than three scales of the priors.
+    FleetDeviations low{2e-3, 5e-4, 3e-3, 0.0}, high{0.5, 0.3, 1.0, 0.0};
+    int coarse = 8, fine = 7;       ///< points of each axis of the first and the second grid
+    double spread = 2.0;            ///< [1] standard deviations that the second grid extends on each side
+    double smallest_weight = 1e-4;  ///< [1] points with a smaller weight are removed
+  } grid;
 };
 
 /// Value and standard deviation (not logarithms).
 struct FleetPrediction {
   double value = 0.0, std_dev = 0.0;
-  double log_std = 0.0;      ///< [1] of the logarithm
-  int own = 0;               ///< observations by this machine of this group
-  bool known_group = false;  ///< some machine has used this tool in this material
+  double log_std = 0.0;  ///< [1] of the logarithm
+  int own = 0;           ///< observations by this machine of this group
 };
 
 /// Deviation of a machine from its fleet.

@@ -27,6 +27,9 @@ struct CurveParameters {
   int least_revolutions = 8;
   double restless = 0.2;
   double gain_error = 0.005;
+  // No parameters of a node:
+  double maximum_gap = 0.2;        ///< [s] longest time without state or angle in a steady cut
+  double path_tolerance = 1.0e-3;  ///< [m] largest distance from the line between steady_from and steady_to
 
   void declare(ParameterTable& table) {
     table.number("pieces", pieces, "1", Range::closed(2, 30), "segments of each spline");
@@ -118,13 +121,18 @@ class ForceCurvePipeline {
   ForceCurvePipeline(const CurveParameters& parameters, double hold_back);
   ForceCurveIdentification& identification() { return identification_; }
 
-  void push(const CuttingCondition& condition);
-  void push(const CncState& state);
-  void push(const SpindleAngle& angle);
-  void push(const ForceBlock& block);
+  void push(const CuttingCondition& condition) { sort(conditions_, condition); }
+  void push(const CncState& state) { sort(states_, state); }
+  void push(const SpindleAngle& angle) { sort(angles_, angle); }
+  void push(const ForceBlock& block) { sort(blocks_, block); }
   void flush() { sorter_.flush(); }  ///< end of data
 
  private:
+  template <typename Input>
+  void sort(StreamSorter::Stream stream, const Input& input) {
+    sorter_.push(stream, input.stamp, [this, input] { identification_.handle(input); });
+  }
+
   ForceCurveIdentification identification_;
   StreamSorter sorter_;
   StreamSorter::Stream conditions_, states_, angles_, blocks_;

@@ -4,10 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "smartmill_core/campaign/record.h"
-#include "smartmill_core/model/machine_model.h"
-#include "smartmill_loadmeter/calibration/machine_calibration.h"
-#include "smartmill_loadmeter/identification/campaign_identification.h"
+#include "smartmill_core/cutting/tool.h"
 
 namespace smartmill::loadmeter {
 
@@ -35,8 +32,11 @@ enum class ForceLawKind {
 const char* nameOf(ForceLawKind kind);
 
 struct ForceLaw {
+  static constexpr double REFERENCE_CHIP = 1e-4;  ///< [m] of the power law, a usual feed per tooth
+
   ForceLawKind kind = ForceLawKind::linear;
-  std::array<double, 3> value{};  ///< Kc [N/m2], Ke [N/m], knee [m]; power: force at 0.1 mm [N/m], q [1]
+  std::array<double, 3>
+      value{};  ///< Kc [N/m2], Ke [N/m], knee [m]; power: force at REFERENCE_CHIP [N/m], q [1]
   std::array<double, 3> std_dev{};
   double bic = 0.0;              ///< lower is better
   double rms = 0.0;              ///< [N/m] of the residual
@@ -46,30 +46,5 @@ struct ForceLaw {
 /// The three laws fitted to force against chip thickness, best first by the Bayesian information criterion.
 /// @throws Error with fewer than 10 points.
 std::vector<ForceLaw> fitForceLaws(const std::vector<double>& chip, const std::vector<double>& force);
-
-/// Fit of whole revolutions of force by a rigid tool with runout and size effect, Kc (h / 0.1 mm)^-p.
-struct SlotFitResult {
-  std::string name;
-  CuttingCoefficients value, std_dev;
-  double size_exponent = 0.0, size_exponent_std = 0.0;  ///< [1]
-  double offset = 0.0, offset_std = 0.0;                ///< [m] of the cutter axis
-  double offset_angle = 0.0;                            ///< [rad] relative to tooth 1
-  std::vector<double> phase;  ///< [rad] of each cut: spindle angle at its revolution's start
-  double unbalance = 0.0;     ///< [N] force rotating with the tool
-  double bic = 0.0;           ///< lower is better
-  double rms = 0.0;           ///< [N] of the residual in the mean and the first orders
-};
-
-/// Fits the mean revolution of each cut of a campaign (fx, fy, fz at even angles, phases aligned by the fit)
-/// with and without size effect, runout and unbalance, best first. Only the mean and the first teeth + 1
-/// orders are compared, below the resonances of a force sensor. Without a tachometer the phase of each cut is
-/// an unknown.
-/// @throws Error with the file and what is missing.
-std::vector<SlotFitResult> fitSlots(const Campaign& campaign, const MachineModel& model);
-
-/// Force over chip thickness of all cuts in one list, from their mean revolutions at the phases of a fit.
-/// @throws Error as forcePoints().
-std::vector<ForcePoint> revolutionPoints(const Campaign& campaign, const MachineModel& model,
-                                         const SlotFitResult& fit);
 
 }  // namespace smartmill::loadmeter

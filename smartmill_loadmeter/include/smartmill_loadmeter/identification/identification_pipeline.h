@@ -1,7 +1,7 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
-#include <limits>
 #include <string>
 #include <vector>
 
@@ -21,14 +21,14 @@ class IdentificationPipeline {
   /// Callbacks run inside push() and flush().
   LoadMeterIdentification& identification() { return identification_; }
 
-  void push(const CncState& state);
-  void push(const LoadSample& sample);
+  void push(const CncState& state) { sort(states_, state); }
+  void push(const LoadSample& sample) { sort(loads_, sample); }
   /// daq/motor_current: optional; waited for like the others after its first block.
-  void push(const SampleBlock& block);
+  void push(const SampleBlock& block) { sort(motors_, block); }
   /// force/compensated: optional, likewise.
-  void push(const ForceBlock& block);
-  void push(const CuttingCondition& condition);
-  void push(const IdentifyGoal& goal);
+  void push(const ForceBlock& block) { sort(forces_, block); }
+  void push(const CuttingCondition& condition) { sort(conditions_, condition); }
+  void push(const IdentifyGoal& goal) { sort(goals_, goal); }
 
   /// End of data: passes on everything that waits.
   void flush() { sorter_.flush(); }
@@ -39,7 +39,10 @@ class IdentificationPipeline {
 
  private:
   template <typename Input>
-  void sort(StreamSorter::Stream stream, const Input& input);
+  void sort(StreamSorter::Stream stream, const Input& input) {
+    sorter_.push(stream, input.stamp, [this, input] { identification_.handle(input); });
+    newest_ = std::max(newest_, input.stamp);
+  }
 
   LoadMeterIdentification identification_;
   StreamSorter sorter_;

@@ -12,12 +12,22 @@
 
 namespace smartmill::loadmeter {
 
+struct DriveMoveOptions {
+  double rest_tolerance = 2e-6;       ///< [m] largest change between states at rest
+  double before = 0.08, after = 0.1;  ///< [s] of current before and after a move
+  double stored = 6.0;                ///< [s] of current
+  double largest_gap = 0.1;           ///< [s] between states
+  double duration_tolerance = 0.06;   ///< [s] largest difference of a duration from that of a rapid move
+  std::size_t most_moves = 12;        ///< of an axis that are evaluated
+};
+
 /// Finds rapid moves in the controller states and identifies each drive's lag from them. Inputs in stamp
 /// order.
 class DriveMoves {
  public:
   /// @param axes acceleration and rapid traverse of the model; empty: moves are not evaluated
-  DriveMoves(const MotorParameters& parameters, const std::optional<MachineAxes>& axes);
+  DriveMoves(const MotorParameters& parameters, const std::optional<MachineAxes>& axes,
+             const DriveMoveOptions& options = {});
 
   void handle(const CncState& state);
   /// Channels x, y, z of daq/motor_current.
@@ -43,6 +53,7 @@ class DriveMoves {
   void identifyMove(std::size_t axis, const Move& move);
 
   MotorParameters parameters_;
+  DriveMoveOptions options_;
   std::optional<MachineAxes> limits_;
   std::array<Axis, 3> axes_;
   std::array<Move, 3> last_;  // last finished move of each axis, rapid or not

@@ -24,6 +24,9 @@ struct ForceEstimateParameters {
   double sensor_zero = 2.0;
   double period = 0.1;
   double window = 0.5;
+  /// [N/m2], [N/m] prior of the tangential coefficients of metals, wide on purpose; no parameters of a node.
+  double ktc = 1.5e9, ktc_std = 1.5e9;
+  double kte = 2.5e4, kte_std = 2.5e4;
 
   void declare(ParameterTable& table);
 };

@@ -1,6 +1,5 @@
 #pragma once
 
-#include "smartmill_core/cutting/friction.h"
 #include "smartmill_core/model/machine_model.h"
 
 namespace smartmill::sim {
@@ -13,10 +12,7 @@ class SpindleDrive {
   SpindleDrive(const Spindle& spindle, double time_step);
 
   /// Friction torque [N m] at a speed [rad/s]; zero below friction_zero_below.
-  double friction(double speed) const {
-    return LinearFriction{spindle_.viscous, spindle_.coulomb, spindle_.friction_zero_below}.at(speed, extra_,
-                                                                                               factor_);
-  }
+  double friction(double speed) const { return spindle_.friction().at(speed, extra_, factor_); }
 
   /// Friction torque in addition to the model's [N m], and a factor on the total.
   void setFriction(double extra, double factor);

@@ -1,4 +1,5 @@
 #include "model/effect_declaration.h"
+#include "smartmill_core/cutting/friction.h"
 
 namespace smartmill::effects {
 namespace {
@@ -26,7 +27,7 @@ class FrictionWarmup : public Effect {
       : cold_(valueOf(entry, "cold_ratio")), constant_(valueOf(entry, "time_constant_s")) {}
 
   void update(const Instant& now, TwinState& state) const override {
-    state.friction_factor *= 1.0 + cold_ * std::exp(-now.start_time / constant_);
+    state.friction_factor *= warmupFactor(cold_, constant_, now.start_time);
   }
 
  private:

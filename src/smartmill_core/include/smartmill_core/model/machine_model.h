@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "smartmill_core/cutting/friction.h"
 #include "smartmill_core/cutting/tool.h"
 #include "smartmill_core/modal/modal_model.h"
 
@@ -44,6 +45,8 @@ struct Spindle {
   std::optional<double> rated_torque;           ///< [N m]
   std::optional<double> rated_power;            ///< [W]
   std::optional<double> acceleration;           ///< [rad/s2]
+
+  LinearFriction friction() const { return {viscous, coulomb, friction_zero_below}; }
 };
 
 /// Linear axes of the machine.

@@ -1,17 +1,16 @@
-// Identification from the tests of a session: identification.h.
+#include "smartmill_loadmeter/identification/session_identification.h"
+
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
 #include <map>
 
 #include "load_estimator.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
-#include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
-#include "smartmill_loadmeter/calibration/friction_law.h"
-#include "smartmill_loadmeter/identification/identification.h"
+#include "smartmill_loadmeter/identification/cut_forces.h"
+#include "smartmill_loadmeter/identification/idle_torque.h"
+#include "smartmill_loadmeter/motor/joint.h"
 
 namespace smartmill::loadmeter {
 
@@ -85,86 +84,54 @@ std::string descriptionOf(const LoadRecordResult& found) {
   return text;
 }
 
-}  // namespace
-
-double resolutionOf(const std::vector<double>& readings, double resolution) {
-  std::vector<double> sorted = readings;
-  std::sort(sorted.begin(), sorted.end());
-  double smallest = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 1; i < sorted.size(); ++i) {
-    const double difference = sorted[i] - sorted[i - 1];
-    if (difference > 1e-9 * std::abs(sorted[i])) smallest = std::min(smallest, difference);
+// Adds radial and axial coefficients; Ktc and Kte remain those of the torque, which account for the common
+// friction. @return text for the message.
+std::string addMotorCoefficients(const std::vector<LoadTest>& cuts, const IdleTorque& idle,
+                                 const Spindle& spindle, CoefficientRecord* record) {
+  std::vector<JointMeasurement> readings;
+  bool any = false;
+  for (const LoadTest& cut : cuts) {
+    JointMeasurement r;
+    r.tool = cut.condition.tool;
+    r.engagement = cut.condition.engagement;
+    r.heading = headingOf(cut.condition);
+    const double watt = spindle.load_meter_gain * cut.speed;
+    const Estimate torque{cut.voltage.mean / watt - idle.torque(cut), cut.torqueStdAsVoltage() / watt};
+    if (torque.std_dev > 0.0) r.torque = torque;
+    if (cut.force) r.axis_force = cut.force->force;
+    for (const auto& force : r.axis_force) any = any || force;
+    readings.push_back(r);
   }
-  return std::isfinite(smallest) ? std::max(smallest, resolution) : resolution;
-}
-
-void LoadTest::computeMean(const Spindle& spindle, double step) {
-  const double interval = duration / static_cast<double>(voltages.size() - 1);
-  voltage = meanVoltage(voltages, interval, timeConstant(spindle.load_meter_bandwidth), step);
-}
-
-double LoadTest::variance() const {
-  return voltages.size() < 2 ? 0.0 : std::pow(standardDeviation(voltages), 2);
-}
-
-// T = V / (K omega): relative errors add up.
-double LoadTest::torqueStdAsVoltage() const {
-  return std::hypot(voltage.std_dev, voltage.mean * speed_std / speed);
-}
-
-IdleTorque idleTorque(const std::vector<LoadTest>& air_cuts, const Spindle& spindle,
-                      double spindle_uncertainty_percent) {
-  IdleTorque idle;
-  Friction friction = modelFriction(spindle, spindle_uncertainty_percent);
-  if (!air_cuts.empty()) {
-    std::vector<AirCut> air;
-    std::vector<TimedAirCut> timed;
-    double first = air_cuts.front().stamp;
-    for (const LoadTest& test : air_cuts) first = std::min(first, test.stamp);
-    bool weighted = true;
-    for (const LoadTest& test : air_cuts) {
-      air.push_back({test.speed, test.voltage.mean, test.torqueStdAsVoltage()});
-      timed.push_back({air.back(), test.stamp - first});
-      weighted = weighted && air.back().voltage_std > 0.0;
-    }
-    friction = fitFriction(air, spindle.load_meter_gain, spindle.friction_zero_below);
-    idle.viscous = friction.viscous;
-    idle.coulomb = friction.coulomb;
-    if (weighted && air.size() > FrictionTerms{true, false}.unknowns()) {
-      const FittedFriction best =
-          fitFrictionLaws(timed, spindle.load_meter_gain, spindle.friction_zero_below).front();
-      if (best.terms.unknowns() > 2) {
-        idle.viscous = best.law.viscous;
-        idle.coulomb = best.law.coulomb;
-        idle.unknowns = best.terms.unknowns();
-        idle.covariance = best.covariance;
-        idle.torque = [best, first](const LoadTest& t) { return best.law.torque(t.speed, t.stamp - first); };
-        idle.gradient = [best, first](const LoadTest& t) {
-          std::vector<double> slope;
-          for (std::size_t i = 0; i < best.value.size(); ++i) {
-            std::vector<double> v = best.value;
-            const double step = 1e-5 * (std::abs(v[i]) + 1e-6);
-            const auto at = [&](double value) {
-              v[i] = value;
-              return FrictionLaw::fromValues(best.terms, v.data(), best.law.zero_below)
-                  .torque(t.speed, t.stamp - first);
-            };
-            slope.push_back((at(best.value[i] + step) - at(best.value[i] - step)) / (2.0 * step));
-          }
-          return slope;
-        };
-        return idle;
+  if (!any) return "";
+  JointResult joint;
+  try {
+    joint = identifyJointly(readings);
+  } catch (const Error& error) {
+    return std::string("; motor currents: ") + error.what();
+  }
+  std::string text;
+  for (std::size_t i = 0; i < cuttingKeys().size(); ++i) {
+    if (i == 0 || i == 3) continue;
+    const auto coefficient = cuttingKeys()[i].coefficient;
+    record->set.value.*coefficient = joint.value.*coefficient;
+    record->set.std_dev.*coefficient = joint.std_dev.*coefficient;
+    for (std::size_t j = 0; j < cuttingKeys().size(); ++j) {
+      const double c = joint.covariance[6 * i + j];
+      if (std::isfinite(c)) {
+        record->covariance[CoefficientRecord::covarianceIndex(std::min(i, j), std::max(i, j))] = c;
       }
     }
   }
-  idle.unknowns = 2;
-  idle.covariance.assign(friction.covariance.begin(), friction.covariance.end());
-  idle.torque = [friction](const LoadTest& t) { return friction.at(t.speed); };
-  idle.gradient = [friction](const LoadTest& t) {
-    const std::array<double, 2> g = friction.gradient(t.speed);
-    return std::vector<double>{g[0], g[1]};
-  };
-  return idle;
+  for (const std::string& name : joint.not_observable) text += (text.empty() ? "" : ", ") + name;
+  record->set.source = "load_meter and motor_current";
+  return text.empty() ? "; all six coefficients observable with motor currents"
+                      : "; not observable from the axes that moved: " + text;
+}
+
+}  // namespace
+
+std::string countOf(std::size_t n, const char* what) {
+  return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
 }
 
 SessionResult identifyFromTests(std::vector<LoadTest> air_cuts, std::vector<LoadTest> cuts,
@@ -189,6 +156,53 @@ SessionResult identifyFromTests(std::vector<LoadTest> air_cuts, std::vector<Load
   result.record.covariance[index(0, 3)] = found.covariance_tc_te;
   result.record.covariance[index(3, 3)] = found.set.std_dev.kte * found.set.std_dev.kte;
   result.found = descriptionOf(found);
+  return result;
+}
+
+IdentifyResult identifySession(const SessionTests& session, const IdentifyGoal& goal, const Spindle& spindle,
+                               double spindle_uncertainty_percent, double largest_runout) {
+  IdentifyResult result;
+  result.id = goal.id;
+  result.coefficients.value = result.coefficients.std_dev = NOT_IDENTIFIED;
+  result.coefficients.stamp = goal.stamp;
+  if (!session.bad_data.empty()) {
+    result.code = IdentifyResult::Code::bad_data;
+    result.message = session.bad_data;
+    return result;
+  }
+  std::vector<LoadTest> cuts;
+  for (const LoadTest& test : session.cuts) {
+    if ((goal.tool.empty() || test.condition.tool_name == goal.tool) &&
+        (goal.material.empty() || test.condition.material == goal.material)) {
+      cuts.push_back(test);
+    }
+  }
+  SessionResult found;
+  std::string aside;
+  if (cuts.size() < session.cuts.size()) {
+    aside +=
+        "; " + countOf(session.cuts.size() - cuts.size(), "cut") + " with another tool or material ignored";
+  }
+  for (const std::string& reason : session.rejected) aside += "; " + reason;
+  try {
+    found = identifyFromTests(session.air_cuts, cuts, spindle, spindle_uncertainty_percent, largest_runout);
+  } catch (const Error& error) {
+    result.code = IdentifyResult::Code::too_few_tests;
+    result.message = error.what() + aside;
+    return result;
+  }
+  result.record = found.record;
+  const IdleTorque idle = idleTorque(session.air_cuts, spindle, spindle_uncertainty_percent);
+  aside = found.found + addMotorCoefficients(cuts, idle, spindle, &result.record) + aside;
+  CoefficientSet& k = result.record.set;
+  if (!goal.tool.empty()) k.tool = goal.tool;
+  if (!goal.material.empty()) k.material = goal.material;
+  result.coefficients = k;
+  result.message = formatted("Ktc %.1f +- %.1f N/mm2, Kte %.2f +- %.2f N/mm from %zu air cuts and %zu cuts",
+                             k.value.ktc / units::N_PER_MM2, k.std_dev.ktc / units::N_PER_MM2,
+                             k.value.kte / units::N_PER_MM, k.std_dev.kte / units::N_PER_MM,
+                             session.air_cuts.size(), cuts.size()) +
+                   aside;
   return result;
 }
 

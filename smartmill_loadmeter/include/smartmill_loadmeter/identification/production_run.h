@@ -1,0 +1,36 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+
+#include "smartmill_loadmeter/calibration/machine_calibration.h"
+#include "smartmill_loadmeter/database/database.h"
+#include "smartmill_loadmeter/identification/load_test.h"
+#include "smartmill_loadmeter/identification/production.h"
+
+namespace smartmill::loadmeter {
+
+/// Running estimate over the cuts of one tool and material, and the record of each cut for the database.
+class ProductionRun {
+ public:
+  /// @param memory [s], see RecursiveCoefficients.
+  explicit ProductionRun(double memory) : memory_(memory) {}
+
+  /// @param torque [N m] of the cut. @return condition, age of the edge and the running estimate; empty
+  /// without a torque. The standard deviations are those of one of the n cuts in the estimate, so that the
+  /// combined records of a sequence of cuts are as certain as the estimate.
+  std::optional<CoefficientRecord> add(const LoadTest& cut, const std::optional<Estimate>& torque);
+
+  /// Since the last change of tool or material; empty before a cut with known friction.
+  const std::optional<RecursiveCoefficients>& estimate() const { return estimate_; }
+  void clear() { estimate_.reset(); }  ///< the ages of the edges remain
+
+ private:
+  double memory_;
+  std::optional<RecursiveCoefficients> estimate_;
+  std::string of_;                          // tool and material
+  std::map<std::string, double> edge_age_;  // [s] cutting time by tool
+};
+
+}  // namespace smartmill::loadmeter

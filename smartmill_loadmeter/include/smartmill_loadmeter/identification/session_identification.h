@@ -1,0 +1,61 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_loadmeter/database/database.h"
+#include "smartmill_loadmeter/identification/load_test.h"
+
+namespace smartmill::loadmeter {
+
+/// Goal of the action IdentifyCoefficients.
+struct IdentifyGoal {
+  double stamp = 0.0;    ///< [s]
+  std::string tool;      ///< empty: any
+  std::string material;  ///< empty: any
+  bool reset = false;    ///< discard earlier tests
+  std::uint64_t id = 0;  ///< returned with the result
+};
+
+struct IdentifyResult {
+  enum class Code : std::uint8_t { ok = 0, cancelled = 1, too_few_tests = 2, bad_data = 3 };
+  Code code = Code::ok;
+  std::string message;  ///< one line
+  CoefficientSet coefficients;
+  CoefficientRecord record;  ///< the same with tool, engagement and covariance, for the database
+  bool reset = false;        ///< reply to a goal with reset, without coefficients
+  std::uint64_t id = 0;      ///< of the goal
+};
+
+/// Coefficients from the tests of a session.
+struct SessionResult {
+  CoefficientRecord record;  ///< with covariance, and means of tool and engagement
+  std::string found;         ///< terms added by evidence, runout and notes, for messages; may be empty
+};
+/// Coefficients by the estimator of campaign_identification.h, each test a mean of steady readings
+/// (eq. 3.5, 3.19 for any engagement), with the runout from the cuts' means and the ripple of their readings.
+/// @param largest_runout [m]; 0: none.
+/// @throws Error with what is missing.
+SessionResult identifyFromTests(std::vector<LoadTest> air_cuts, std::vector<LoadTest> cuts,
+                                const Spindle& spindle, double spindle_uncertainty_percent,
+                                double largest_runout = 0.0);
+
+/// For example "1 cut", "2 cuts".
+std::string countOf(std::size_t n, const char* what);
+
+/// Tests of a session.
+struct SessionTests {
+  std::vector<LoadTest> air_cuts, cuts;
+  std::vector<std::string> rejected;  ///< tests that are not used, each with the reason
+  std::string bad_data;               ///< why the data are unusable; empty: they are not
+
+  void clear() { *this = {}; }
+};
+
+/// Coefficients of a goal's tool and material: identifyFromTests(), with radial and axial coefficients where
+/// the cuts' motors show them. Never throws: the result has code and message.
+IdentifyResult identifySession(const SessionTests& session, const IdentifyGoal& goal, const Spindle& spindle,
+                               double spindle_uncertainty_percent, double largest_runout);
+
+}  // namespace smartmill::loadmeter
