@@ -28,9 +28,8 @@ void throwIfAny(const Dataset& data, const std::vector<std::string>& reasons) {
 
 void requireFiniteResidual(const TwinRunner& runner, const std::vector<double>& residual) {
   for (const ChannelSpan& b : runner.spans()) {
-    const auto from = residual.begin() + static_cast<std::ptrdiff_t>(b.offset);
-    if (!std::all_of(from, from + static_cast<std::ptrdiff_t>(b.size),
-                     [](double r) { return std::isfinite(r); }))
+    const std::vector<double> values = valuesOf(residual, b);
+    if (!std::all_of(values.begin(), values.end(), [](double r) { return std::isfinite(r); }))
       throw Error(runner.data().campaign.folder + ": test " + runner.data().tests[b.test].test.name +
                   ": the twin gives no finite values of " + b.channel);
   }
@@ -51,12 +50,13 @@ Finding chatterFinding(const std::string& test, double frequency, double amplitu
 // Reports chattering cuts: guided ones whose prediction error exceeds the chatter threshold, and others in
 // which the model does not chatter.
 void addChatter(const Dataset& data, Explanation* result) {
+  const ChatterOptions chatter;
   sim::SimulationOptions options;
   options.noise = false;
   for (const ChatteringCut& c : result->chattering) {
     const Finding f = chatterFinding(c.test, c.frequency, c.amplitude);
-    if (c.before > CHATTER_SHARE) result->where.push_back(f);
-    if (c.after > CHATTER_SHARE) result->unexplained.push_back(f);
+    if (c.before > chatter.min_share) result->where.push_back(f);
+    if (c.after > chatter.min_share) result->unexplained.push_back(f);
   }
   for (const ChatteringTest& c : data.chattering) {
     const auto chatters = [&](const MachineModel& model) {
@@ -160,8 +160,8 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   const Eigen::MatrixXd of_fit = found.best.covariance;
   found.best.covariance = robustCovariance(bench, found.best);
   dropInsignificantPathShare(data.nominal, bench.freedom(), of_fit, &found.best);
-  bench.setGuided(false);
-  bench.alignTo(found.best.state);
+  bench.guidance().set(false);
+  bench.alignment().alignTo(found.best.state);
 
   MachineModel improved = describeModel(bench, search_options, found, &result);
   const GapPair after = residualOf(bench, improved).gap;

@@ -9,6 +9,7 @@
 #include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_discrepancy/hypotheses/hypothesis.h"
+#include "smartmill_discrepancy/search/start_values.h"
 
 namespace smartmill::discrepancy {
 namespace {
