@@ -16,9 +16,9 @@ using units::TWO_PI;
 
 // Estimate of the phase of a record without spindle angle.
 struct PhaseEstimateOptions {
-  double speed_share = 0.01;  ///< [1] search range of the speed: slip of a spindle motor
+  double speed_share = 0.01;  ///< [1] search range of the stated speed
   int phases = 240;           ///< tried per tooth; the best is refined by the fits
-  int tooth_lines = 4;        ///< of the forces: higher ones depend on the sensor's modes
+  int tooth_lines = 4;        ///< of the forces that are compared
 };
 
 // Rotation of the model that aligns a record.

@@ -12,6 +12,9 @@
 namespace smartmill::discrepancy {
 namespace {
 
+constexpr double LEAST_FREQUENCY = 80.0;  // [Hz] drift, hum and slow trends are below
+constexpr std::size_t LEAST_SAMPLES = 128;
+
 // Interpolated value between samples.
 double at(const std::vector<double>& x, double position) {
   const auto i = static_cast<std::size_t>(position);
@@ -20,12 +23,11 @@ double at(const std::vector<double>& x, double position) {
 
 }  // namespace
 
-std::optional<Chatter> findChatter(const Record& record, const CampaignTest& test, std::size_t first_cut,
-                                   const ChatterOptions& options) {
+std::optional<Chatter> findChatter(const Record& record, const CampaignTest& test, std::size_t first_cut) {
   if (test.kind != TestKind::cut || !(test.spindle_speed > 0.0)) return {};
   const double revolution = units::TWO_PI / test.spindle_speed * test.sample_rate;  // [samples]
   const std::size_t from = first_cut + (record.size() - std::min(first_cut, record.size())) / 2;
-  if (static_cast<double>(from - first_cut) < revolution + 2.0 || from + options.min_samples > record.size())
+  if (static_cast<double>(from - first_cut) < revolution + 2.0 || from + LEAST_SAMPLES > record.size())
     return {};
   Chatter chatter;
   chatter.share = 1e300;
@@ -45,7 +47,7 @@ std::optional<Chatter> findChatter(const Record& record, const CampaignTest& tes
     double squares = 0.0, largest = 0.0;
     std::size_t top = 0;
     for (std::size_t k = 1; k + 1 < spectrum.size(); ++k) {
-      if (static_cast<double>(k) * bin < options.lowest) continue;
+      if (static_cast<double>(k) * bin < LEAST_FREQUENCY) continue;
       const double power = std::norm(spectrum[k]);
       squares += power;
       if (power > largest) {
@@ -68,7 +70,7 @@ std::optional<Chatter> findChatter(const Record& record, const CampaignTest& tes
       chatter.frequency = frequency;
     }
   }
-  if (chatter.share < options.min_share) return {};
+  if (chatter.share < CHATTER_SHARE) return {};
   return chatter;
 }
 

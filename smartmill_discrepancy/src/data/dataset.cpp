@@ -22,12 +22,12 @@ const std::vector<std::string> COMPARED{"fx", "fy", "fz", "load_meter", "tool_x"
 struct RecordOptions {
   std::size_t min_samples = 64;  ///< of a record, for a periodogram
   std::size_t min_quiet = 50;    ///< samples without force for a noise estimate to 10 %
-  std::size_t clipped_run = 5;   ///< equal extreme samples in a row of a noisy channel: chance of 1e-6
+  std::size_t clipped_run = 5;   ///< equal extreme samples in a row of a noisy channel
   double contact = 0.05;         ///< [1] of the peak of a hit: contact has begun
   double contact_lead = 1e-3;    ///< [s] that the contact starts earlier at most
   /// [1] RMS over that between lines, from which lines without cutting (hum, unbalance) are not noise.
   double max_line_ratio = 1.5;
-  double slow_piece = 0.25;  ///< [s] of a mean of a slow channel: a few readings
+  double slow_piece = 0.25;  ///< [s] of a mean of a slow channel
 };
 
 const RecordOptions LIMITS;

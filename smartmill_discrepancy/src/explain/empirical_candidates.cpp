@@ -4,25 +4,10 @@
 #include <utility>
 
 #include "smartmill_core/formatted.h"
-#include "smartmill_discrepancy/search/evidence.h"
 #include "smartmill_discrepancy/search/refinement.h"
 #include "smartmill_discrepancy/search/start_values.h"
 
 namespace smartmill::discrepancy {
-
-// Removes catalogue effects that the empirical one has made unnecessary.
-FitResult EmpiricalCandidates::withoutUnneeded(FitResult fit, const NominalTangents& tangents) const {
-  for (std::size_t m = 0; m + 1 < fit.state.members.size();) {
-    FitResult less = bench_.quick().fit(without(fit.state, m), &tangents, FitOptions::toCompare());
-    if (isSignificant(bench_.quick().runner(), less, fit, options_)) {
-      ++m;
-      continue;
-    }
-    options_.log("  no longer needed: " + fit.state.members[m].hypothesis->title());
-    fit = std::move(less);
-  }
-  return fit;
-}
 
 std::vector<FitResult> EmpiricalCandidates::fitsInAddition(const FitResult& now,
                                                            const NominalTangents& tangents,
@@ -55,7 +40,7 @@ bool EmpiricalCandidates::accept(const FitResult& start, const FitState& before,
   const NominalTangents here = bench_.linearise(start.state);
   FitResult fit = bench_.quick().fit(start.state, &here, FitOptions::closely());
   if (!fit.converged || !reproduction_.isReproduced(before, fit)) return false;
-  fit = withoutUnneeded(std::move(fit), here);
+  fit = withoutUnneeded(bench_.quick(), std::move(fit), here, options_, true);
   SearchResult more = *found;
   for (Candidate& r : more.candidates)
     r.result.accepted = r.result.accepted || r.hypothesis == fit.state.members.back().hypothesis;

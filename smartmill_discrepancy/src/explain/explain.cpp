@@ -50,13 +50,12 @@ Finding chatterFinding(const std::string& test, double frequency, double amplitu
 // Reports chattering cuts: guided ones whose prediction error exceeds the chatter threshold, and others in
 // which the model does not chatter.
 void addChatter(const Dataset& data, Explanation* result) {
-  const ChatterOptions chatter;
   sim::SimulationOptions options;
   options.noise = false;
   for (const ChatteringCut& c : result->chattering) {
     const Finding f = chatterFinding(c.test, c.frequency, c.amplitude);
-    if (c.before > chatter.min_share) result->where.push_back(f);
-    if (c.after > chatter.min_share) result->unexplained.push_back(f);
+    if (c.before > CHATTER_SHARE) result->where.push_back(f);
+    if (c.after > CHATTER_SHARE) result->unexplained.push_back(f);
   }
   for (const ChatteringTest& c : data.chattering) {
     const auto chatters = [&](const MachineModel& model) {

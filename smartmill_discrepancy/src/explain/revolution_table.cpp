@@ -15,8 +15,8 @@ namespace smartmill::discrepancy {
 namespace {
 
 struct RevolutionTableOptions {
-  std::size_t min_feeds = 3;  ///< two determine the linear table, the third contradicts it
-  double alike = 0.01;        ///< [1] tolerance of speed, depth and feed: of a controller's override
+  std::size_t min_feeds = 3;  ///< two determine a linear table; the third tests it
+  double alike = 0.01;        ///< [1] tolerance of speed, depth and feed
 };
 
 const RevolutionTableOptions LIMITS;

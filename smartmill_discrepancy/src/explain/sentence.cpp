@@ -125,8 +125,7 @@ std::string ofLife(const FoundEffect& effect) {
       "during run-in of the edge its %s becomes %.0f %% %s, exponentially with a time constant of %.2g min "
       "of "
       "cutting",
-      effect.words.at("of") == "chip" ? "cutting force" : "edge force", 100.0 * std::abs(amplitude),
-      moreOrLess(amplitude), constant / 60.0);
+      shareOf(effect), 100.0 * std::abs(amplitude), moreOrLess(amplitude), constant / 60.0);
 }
 
 std::string ofTime(const FoundEffect& effect) {

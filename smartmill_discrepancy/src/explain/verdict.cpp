@@ -9,7 +9,6 @@
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/model/effect_catalogue.h"
-#include "smartmill_discrepancy/fit/member_tangents.h"
 #include "smartmill_discrepancy/search/unidentifiable_pair.h"
 #include "smartmill_discrepancy/search/validation.h"
 

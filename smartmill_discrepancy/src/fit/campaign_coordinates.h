@@ -11,7 +11,7 @@ namespace smartmill::discrepancy {
 
 struct AlignmentReachOptions {
   double rotation = 0.05;  ///< [rad] in which the derivatives of phase and drift are valid
-  double entry = 1.0;      ///< [samples] that the stated time of an entry may be wrong
+  double entry = 1.0;      ///< [samples] in which the derivative of an entry is valid
 };
 
 /// Coordinates of a fit: nominal values, values of the members, alignment. Those with frozen derivatives act

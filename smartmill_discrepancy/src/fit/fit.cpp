@@ -23,9 +23,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 
 struct StoppingOptions {
-  int max_without_gain = 4;  ///< steps: a fit that circles in a narrow valley ends
-  int patience = 3;          ///< steps before a competing fit ends this one: the first ones are damped
-  /// [1] of the last gain: gain of all later steps, generously, since damped steps grow.
+  int max_without_gain = 4;  ///< steps in a row
+  int patience = 3;          ///< steps before a competing fit ends this one
+  /// [1] of the last gain: largest expected gain of all later steps.
   double expected_gain = 10.0;
   double min_excess = 20.0;  ///< squares above the noise of which the tolerance is a share at least
 };
@@ -223,6 +223,28 @@ NominalTangents Fitter::nominalTangents(const FitState& state) const {
   tangents.alignment.resize(alignments_.size(), 0.0);
   tangents.information = tangents.columns.gram();
   return tangents;
+}
+
+SparseColumns memberTangents(const Fitter& fitter, const FitState& state,
+                             const std::vector<std::size_t>& members, SimulatedChannels* base) {
+  std::vector<MachineModel> models{fitter.model(state)};
+  std::vector<double> steps;
+  for (const std::size_t m : members) {
+    const std::vector<Coordinate>& coordinates = state.members[m].hypothesis->coordinates;
+    for (std::size_t c = 0; c < coordinates.size(); ++c) {
+      FitState moved = state;
+      double& value = moved.members[m].values[c];
+      const double step =
+          value + coordinates[c].step > coordinates[c].high ? -coordinates[c].step : coordinates[c].step;
+      value += step;
+      steps.push_back(step);
+      models.push_back(fitter.model(moved));
+    }
+  }
+  auto simulated = fitter.runner().simulateChannels(models);
+  *base = std::move(simulated.front());
+  simulated.erase(simulated.begin());
+  return {fitter.runner(), *base, simulated, steps};
 }
 
 FitResult Fitter::fit(const FitState& start, const NominalTangents* frozen, const FitOptions& options) const {

@@ -1,13 +1,69 @@
 #include "search/adoption.h"
 
 #include <algorithm>
+#include <map>
 #include <optional>
+#include <string>
 #include <utility>
 
-#include "search/merged_pieces.h"
-#include "smartmill_discrepancy/search/evidence.h"
+#include "smartmill_discrepancy/search/refinement.h"
 
 namespace smartmill::discrepancy {
+namespace {
+
+using PieceValues = std::map<std::string, std::vector<double>>;  // values by the name of a piece
+
+// The form of an effect with exactly these pieces.
+std::optional<Member> formOf(const std::string& effect, const PieceValues& pieces,
+                             const std::vector<Hypothesis>& hypotheses) {
+  for (const Hypothesis& h : hypotheses) {
+    if (h.effect != effect || h.pieces.size() != pieces.size()) continue;
+    if (!std::all_of(h.pieces.begin(), h.pieces.end(),
+                     [&](const std::string& name) { return pieces.count(name) > 0; }))
+      continue;
+    Member one{&h, {}};
+    for (const std::string& name : h.pieces) {
+      const std::vector<double>& values = pieces.at(name);
+      one.values.insert(one.values.end(), values.begin(), values.end());
+    }
+    return one;
+  }
+  return {};
+}
+
+// The state with all members of one effect merged.
+std::optional<FitState> mergedState(const FitState& state, const std::string& effect,
+                                    const std::vector<Hypothesis>& hypotheses) {
+  PieceValues pieces;
+  FitState merged_state{state.nominal, {}, state.alignment};
+  std::size_t members = 0;
+  for (const Member& m : state.members) {
+    if (m.hypothesis->effect != effect) {
+      merged_state.members.push_back(m);
+      continue;
+    }
+    ++members;
+    for (std::size_t k = 0; k < m.hypothesis->pieces.size(); ++k)
+      pieces[m.hypothesis->pieces[k]] = m.hypothesis->pieceOf(m.values, k);
+  }
+  if (members < 2) return {};
+  const std::optional<Member> one = formOf(effect, pieces, hypotheses);
+  if (!one) return {};
+  merged_state.members.push_back(*one);
+  return merged_state;
+}
+
+// Merges separately found pieces of one effect (modes of the tool, axis by axis) into one member, with the
+// newest values of each piece.
+std::optional<FitState> withPiecesMerged(const FitState& state, const std::vector<Hypothesis>& hypotheses) {
+  for (const Member& m : state.members) {
+    if (m.hypothesis->pieces.empty()) continue;
+    if (const auto one = mergedState(state, m.hypothesis->effect, hypotheses)) return one;
+  }
+  return {};
+}
+
+}  // namespace
 
 void Adoption::adopt(SearchState& s, FitResult best) const {
   s.linearise(best.state);
@@ -54,15 +110,7 @@ void Adoption::refitFromStated(SearchState& s) const {
 }
 
 void Adoption::dropUnneeded(SearchState& s) const {
-  for (std::size_t m = 0; m < s.now.state.members.size() && s.now.state.members.size() > 1;) {
-    FitResult less = s.quick.fit(without(s.now.state, m), &s.tangents, FitOptions::toCompare());
-    if (!isSignificant(s.quick.runner(), less, s.now, s.options)) {
-      s.options.log("  no longer needed: " + s.now.state.members[m].hypothesis->title());
-      s.now = std::move(less);
-    } else {
-      ++m;
-    }
-  }
+  s.now = withoutUnneeded(s.quick, std::move(s.now), s.tangents, s.options, false);
 }
 
 }  // namespace smartmill::discrepancy

@@ -10,12 +10,12 @@ namespace smartmill::discrepancy {
 /// Which hypotheses a round fits, and when a fit improves the model.
 struct CandidateRoundOptions {
   /// [1] of the required gain: a weak hypothesis, whose predicted gain is below the required one, may gain
-  /// several times more than predicted.
+  /// more than the linear prediction.
   double weak = 0.25;
   double min_independent_share = 0.02;  ///< [1] of a weak hypothesis: nominal values can replace the rest
   /// [1] of the excess that the best fit leaves: weak hypotheses are fitted if no strong one removes much.
   double unremoved = 0.9;
-  std::size_t max_weak = 2;  ///< weak hypotheses fitted per round: they rarely improve the model
+  std::size_t max_weak = 2;  ///< weak hypotheses fitted per round; limits its time
   /// [1] of the largest predicted gain: smaller ones are fitted only among the first two.
   double min_of_largest = 0.02;
   /// [1] of the excess: a fit that leaves less can be surpassed only by a similar predicted gain.

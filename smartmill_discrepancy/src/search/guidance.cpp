@@ -89,6 +89,11 @@ void Guidance::guideNearLimit(const FitState& state) {
   if (any) twins_.readGuidance();
 }
 
+double Guidance::freeSquares(const FitState& state) {
+  alignment_.alignFitted(state);
+  return residualSquares(twins_.exact, twins_.exact.simulate(fitter_.model(state)));
+}
+
 // @return whether a cut is guided from now on
 bool Guidance::markNearLimit(const TwinRunner& free, const std::vector<double>& freely,
                              const TwinRunner& guided_runner, const std::vector<double>& guided) {

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "smartmill_core/math/linear_algebra.h"
-#include "smartmill_discrepancy/fit/member_tangents.h"
 
 namespace smartmill::discrepancy {
 namespace {

@@ -134,6 +134,22 @@ Candidate fitCandidate(const Fitter& fitter, const PredictedGain& predicted, std
           tried->state.members.back().values};
 }
 
+FitResult withoutUnneeded(const Fitter& fitter, FitResult fit, const NominalTangents& tangents,
+                          const SearchOptions& options, bool keep_newest) {
+  const std::vector<Member>& members = fit.state.members;
+  const std::size_t kept = keep_newest ? 1 : 0;
+  for (std::size_t m = 0; m + kept < members.size() && members.size() > 1;) {
+    FitResult less = fitter.fit(without(fit.state, m), &tangents, FitOptions::toCompare());
+    if (isSignificant(fitter.runner(), less, fit, options)) {
+      ++m;
+      continue;
+    }
+    options.log("  no longer needed: " + members[m].hypothesis->title());
+    fit = std::move(less);
+  }
+  return fit;
+}
+
 void refitSimplerAlternatives(const Fitter& fitter, const FitResult& now, const NominalTangents& tangents,
                               std::vector<Candidate>* candidates) {
   for (std::size_t m = 0; m < now.state.members.size(); ++m) {
@@ -155,10 +171,7 @@ bool refine(Workbench& bench, const FitState& state, const SearchOptions& option
   bench.alignment().alignTo(result->best.state);
   const FitOptions compared = weighted(FitOptions::toCompare(), refined.weight);
   const FitState& at = result->best.state;
-  result->contribution.clear();
-  result->is_needed.clear();
-  result->without_member.clear();
-  result->alternatives.clear();
+  result->clearComparisons();
   for (std::size_t m = 0; m < at.members.size(); ++m) {
     const FitState less = without(at, m);
     FitOptions without_it = compared;

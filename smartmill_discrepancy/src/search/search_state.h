@@ -14,7 +14,7 @@ struct SearchStateOptions {
   /// [1] standard deviations from the stated values within which derivatives are taken: missing effects pull
   /// nominal values further away than they are wrong.
   double near_stated = 2.5;
-  int alignment_passes = 4;     ///< of rotation and refit: the tooth is right after one or two
+  int alignment_passes = 4;     ///< of rotation and refit, which affect each other
   double large_rotation = 0.1;  ///< [rad] that invalidates remembered derivatives
   /// [1] of the excess: a smaller gain ends the alignment. Its last part is left to the fits.
   double negligible_gain = 0.01;

@@ -11,8 +11,7 @@
 namespace smartmill::discrepancy {
 
 struct ThinningOptions {
-  std::size_t every =
-      4;  ///< samples of which one is used: the gain of a scan is then known to a few per cent
+  std::size_t every = 4;  ///< samples of which one is used: a scan only compares gains
   std::size_t few = 256;  ///< samples of a span below which all are used
 };
 

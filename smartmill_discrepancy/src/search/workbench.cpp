@@ -63,11 +63,6 @@ double Workbench::exactSquares(const FitState& state) {
   return residualSquares(fitted(), fitted().simulate(quick_.model(state)));
 }
 
-double Workbench::freeSquares(const FitState& state) {
-  alignment_.alignFitted(state);
-  return residualSquares(twins_.exact, twins_.exact.simulate(quick_.model(state)));
-}
-
 bool Workbench::whitenAt(const FitState& state) {
   clearWhitening();
   if (twins_.isGuided()) return false;

@@ -16,19 +16,13 @@ struct Chatter {
   double share = 0.0;      ///< [1] RMS of the asynchronous part over the standard deviation of the force
 };
 
-struct ChatterOptions {
-  /// [1] of the standard deviation of a cut's force: an asynchronous part above it is chatter. Noise and
-  /// missing effects of stable cuts are at most half of it.
-  double min_share = 0.25;
-  double lowest = 80.0;           ///< [Hz] drift, hum and slow trends are below
-  std::size_t min_samples = 128;  ///< that resolve a line
-};
+/// [1] of the standard deviation of a cut's force: an asynchronous part above it is chatter.
+constexpr double CHATTER_SHARE = 0.25;
 
 /// Uses the second half of the cut, after the transients of the entry. The phase of chatter depends only on
 /// its own past, so no free simulation follows a chattering cut sample by sample.
 /// @param first_cut first sample in cut
 /// @return empty: fx and fy are synchronous with the spindle, or too short to decide
-std::optional<Chatter> findChatter(const Record& record, const CampaignTest& test, std::size_t first_cut,
-                                   const ChatterOptions& options = {});
+std::optional<Chatter> findChatter(const Record& record, const CampaignTest& test, std::size_t first_cut);
 
 }  // namespace smartmill::discrepancy

@@ -18,12 +18,12 @@ namespace smartmill::discrepancy {
 /// Force channels in the order of the axes x, y, z.
 inline const std::vector<std::string> FORCES(FORCE_CHANNELS.begin(), FORCE_CHANNELS.end());
 
-/// [1] of the sample rate: highest frequency at which modes and lines are searched. Above, the anti-aliasing
-/// filters of measuring amplifiers damp the signal and twin and filters are inaccurate.
+/// [1] of the sample rate: highest frequency at which modes and lines are searched, with a margin to the
+/// Nyquist frequency.
 constexpr double USABLE_BAND = 0.42;
 /// [Hz] Lowest frequency at which modes and bursts are searched: below, the residual is drift and hum.
 constexpr double LOWEST_MODE = 60.0;
-/// [1] Damping ratio of a bolted sensor or structure, at which an unknown mode is detected.
+/// [1] Damping ratio at which an unknown mode of sensor or structure is searched.
 constexpr double TYPICAL_DAMPING = 0.04;
 
 /// Of the twin per sample where phases and labels are compared, which need no accurate forces.

@@ -42,7 +42,6 @@ class EmpiricalCandidates {
 
  private:
   bool accept(const FitResult& start, const FitState& before, SearchResult* found) const;
-  FitResult withoutUnneeded(FitResult fit, const NominalTangents& tangents) const;
 
   Workbench& bench_;
   const SearchOptions& options_;

@@ -11,8 +11,8 @@
 namespace smartmill::discrepancy {
 
 struct EmpiricalResidualOptions {
-  std::size_t max_effects = 6;  ///< more than the independent causes of any measured residual so far
-  std::size_t fits_in_addition = 4, fits_as_replacement = 3;  ///< per round, each a few seconds
+  std::size_t max_effects = 6;                                ///< limits the time of an explanation
+  std::size_t fits_in_addition = 4, fits_as_replacement = 3;  ///< per round; limit its time
   /// [1] of the required gain: predicted gain from which a form is fitted instead of the names. It starts far
   /// from its fit, where derivatives are inaccurate.
   double min_predicted_as_replacement = 0.1;

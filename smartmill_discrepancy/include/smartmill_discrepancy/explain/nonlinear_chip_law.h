@@ -47,12 +47,12 @@ struct NonlinearChipLaw {
 /// Grid of laws. An edge force with an onset far below the least feed is constant, one far above the largest
 /// feed is a chip force.
 struct ChipLawOptions {
-  /// [1] of the size effect, up to that of grinding; the first is that of the linear law.
+  /// [1] of the size effect; the first is that of the linear law.
   std::vector<double> exponents{0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6};
   std::vector<double> onsets{0.0, 0.04, 0.08, 0.12, 0.16, 0.24, 0.32};  ///< [1] of the largest feed
-  /// [1] of the model's edge force: handbook values are wrong by up to half and more.
+  /// [1] of the model's edge force
   std::vector<double> edge_shares{0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5};
-  int sweeps = 5;          ///< alternations between axial and in-plane law; two usually suffice
+  int sweeps = 5;          ///< alternations between axial and in-plane law at most
   std::size_t feeds = 11;  ///< of the curvature table, which is linear between them
 };
 

@@ -137,4 +137,9 @@ class Fitter {
   std::vector<FreeAlignment> alignments_;
 };
 
+/// Derivatives with respect to the values of these members, one member after the other.
+/// @param base receives the simulation of the state
+SparseColumns memberTangents(const Fitter& fitter, const FitState& state,
+                             const std::vector<std::size_t>& members, SimulatedChannels* base);
+
 }  // namespace smartmill::discrepancy

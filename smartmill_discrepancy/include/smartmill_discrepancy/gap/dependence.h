@@ -16,7 +16,7 @@ struct TestAmplitude {
 
 struct DependenceOptions {
   std::size_t min_tests = 4;  ///< fewer have no significant correlation
-  /// [1] amplitude outside cuts over that in cuts: limit for "cutting"; noise remains below a third.
+  /// [1] amplitude outside cuts over that in cuts: limit for "cutting".
   double air_share = 0.3;
   double chance = 0.05;  ///< [1] probability of a correlation by chance, over all conditions
 };

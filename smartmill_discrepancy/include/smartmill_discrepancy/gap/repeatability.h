@@ -20,7 +20,7 @@ struct Repeatability {
 
 struct RepeatabilityOptions {
   double min_revolutions = 5.0;  ///< fewer leave too few degrees of freedom for the floor
-  /// [1] of the Nyquist frequency: highest order. The columns are nearly orthogonal below.
+  /// [1] of the Nyquist frequency: highest order that is removed
   double highest = 0.9;
 };
 

@@ -5,8 +5,8 @@
 
 namespace smartmill::discrepancy {
 
-/// [1] Probability of a deviation by chance below which it is significant: among the hundreds of tests and
-/// channels of a campaign one false alarm in some ten campaigns.
+/// [1] Probability of a deviation by chance below which it is significant: a thousand tests and channels give
+/// one false alarm in ten campaigns.
 constexpr double SIGNIFICANT = 1e-4;
 
 /// Upper tail of the chi-square distribution with an even number of degrees of freedom, not below 1e-300.

@@ -10,9 +10,9 @@ namespace smartmill::discrepancy {
 
 /// Components that are tried on a residual.
 struct ComponentOptions {
-  std::size_t orders = 36;      ///< of the spindle: three times the teeth of any common tool
-  std::size_t half_orders = 4;  ///< 0.5, 1.5, ...: of belts and rolling bearings
-  /// [s] time constants of a decay from the start of a record: from a charge amplifier's drift to its reset
+  std::size_t orders = 36;      ///< of the spindle: several tooth passing orders
+  std::size_t half_orders = 4;  ///< 0.5, 1.5, ...: patterns over two revolutions
+  /// [s] time constants of a decay from the start of a record
   std::vector<double> decays{0.02, 0.035, 0.06, 0.1};
   double highest_order = 0.45;       ///< [1] of the sample rate
   std::size_t spectrum = 1u << 16u;  ///< [samples] to which records are padded for a common frequency grid

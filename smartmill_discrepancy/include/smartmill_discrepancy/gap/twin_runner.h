@@ -16,7 +16,7 @@ namespace smartmill::discrepancy {
 
 /// [1] of the signal: difference between two accurate simulations.
 constexpr double TWIN_ACCURACY = 2e-4;
-/// Of the exact twin per sample: more change no force by TWIN_ACCURACY.
+/// Of the exact twin per sample.
 constexpr int EXACT_SUBSTEPS = 8;
 
 /// Simulates tests of a campaign for many models at once. Vectors over the campaign have the layout of

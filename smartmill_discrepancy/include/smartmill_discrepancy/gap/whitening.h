@@ -6,7 +6,7 @@
 namespace smartmill::discrepancy {
 
 struct WhiteningOptions {
-  std::size_t max_order = 32;          ///< covers the decay of sensor modes at usual sample rates
+  std::size_t max_order = 32;          ///< limits the time; the BIC chooses the order
   std::size_t samples_per_order = 16;  ///< minimum, so that a few values get at most a variance
 };
 

@@ -14,7 +14,7 @@ struct NominalFreedomOptions {
   /// [1] standard deviations to the bounds: too narrow to hide an effect that the value could replace.
   double reach = 4.5;
   double step = 2e-3;  ///< [1] standard deviations: of numerical derivatives
-  /// [1] Path share: bounds beyond both surfaces, step, and prior, which prefers neither.
+  /// [1] Path share: bounds beyond both surfaces (0 and 1), step, prior.
   double path_low = -0.5, path_high = 1.5, path_step = 0.02, path_std = 0.5;
   double min_path_deviations = 3.0;  ///< standard deviations from which a path share is written
 };

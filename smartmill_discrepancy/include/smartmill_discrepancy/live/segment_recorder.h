@@ -46,8 +46,8 @@ struct SegmentParameters {
 
 /// When a motion is steady; the same on every machine.
 struct SteadinessOptions {
-  double speed = 0.02;  ///< [1] of the stated spindle speed: a drive under load holds it within one per cent
-  double angle = 0.02;  ///< [rad] from constant speed: a fraction of a sample of any force sensor
+  double speed = 0.02;         ///< [1] of the stated spindle speed
+  double angle = 0.02;         ///< [rad] from constant speed
   double confirmation = 0.05;  ///< [s] of steady motion after a segment: the controller's state may be late
   double history = 1.0;        ///< [s] of angles and loads in addition to the length of a segment
 };

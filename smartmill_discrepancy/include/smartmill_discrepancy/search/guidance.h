@@ -32,6 +32,9 @@ class Guidance {
   /// guided one from now on (near its limit a tool keeps vibrating from any small error). Reset by set().
   void guideNearLimit(const FitState& state);
 
+  /// Squares of the exact twin without guidance on the fitted tests at a state.
+  double freeSquares(const FitState& state);
+
  private:
   bool markNearLimit(const TwinRunner& free, const std::vector<double>& freely,
                      const TwinRunner& guided_runner, const std::vector<double>& guided);

@@ -10,7 +10,7 @@ namespace smartmill::discrepancy {
 
 /// Convergence of a refinement, and which alternatives it compares.
 struct RefinementOptions {
-  int passes = 6;  ///< corrections of the quick twin; most states converge in two
+  int passes = 6;  ///< corrections of the quick twin at most
   FitOptions step{6, 1e-5};
   double tolerance = 0.1;      ///< [1] standard deviations: change of a value in the last pass
   double same_tangents = 2.0;  ///< [1] standard deviations in which derivatives remain valid
@@ -26,6 +26,11 @@ struct RefinementOptions {
 /// @param tried receives the fit
 Candidate fitCandidate(const Fitter& fitter, const PredictedGain& predicted, std::size_t round,
                        const FitResult& now, const std::function<FitResult()>& fit, FitResult* tried);
+
+/// A fit without the members that it no longer needs, since others explain the same; one member remains.
+/// @param tangents near the fit @param keep_newest whether the last member stays
+FitResult withoutUnneeded(const Fitter& fitter, FitResult fit, const NominalTangents& tangents,
+                          const SearchOptions& options, bool keep_newest);
 
 /// Refits alternatives with fewer values than the member that they compete with, so that the later comparison
 /// starts from their best values. Guided simulations have a smooth cost; free ones near a tool's stability

@@ -16,7 +16,7 @@ struct SeparatingTest {
   double difference = 0.0;  ///< [1] RMS difference of the predictions over the noise
 };
 
-/// Variations of a campaign's tests, within what a machinist would set.
+/// Variations of a campaign's tests.
 struct SeparatingTestOptions {
   std::vector<double> speeds{0.4, 1.0, 1.8}, feeds{0.4, 1.0, 2.0}, depths{0.5, 1.0, 2.0};  ///< [1] factors
   double engage_time = 0.02, duration = 0.15;  ///< [s] of a cut: a few revolutions after the entry

@@ -13,8 +13,7 @@ std::optional<std::vector<double>> equivalentValues(const Fitter& fitter, const 
                                                     const Hypothesis& hypothesis);
 
 struct StartOptions {
-  /// [1] of the predicted values: shorter steps from the null point, since effects that are not proportional
-  /// to their values are predicted too large.
+  /// [1] of the predicted values: shorter steps from the null point.
   std::vector<double> shorter{0.5, 0.2, 0.05};
 };
 

@@ -10,7 +10,7 @@ namespace smartmill::discrepancy {
 
 /// Fineness of the quick twin.
 struct QuickTwinOptions {
-  int slices = 4;  ///< of a tool's corner: more change the forces less than the correction to the exact twin
+  int slices = 4;  ///< of a tool's corner: the correction to the exact twin covers the rest
   /// Steps per period of a tool mode for the unguided twin: with fewer its stability limit is wrong and
   /// misleads the fit.
   double steps_per_period = 12.0;

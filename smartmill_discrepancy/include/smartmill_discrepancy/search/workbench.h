@@ -16,8 +16,6 @@ namespace smartmill::discrepancy {
 class Workbench {
  public:
   Workbench(const Dataset& data, const WorkbenchOptions& options);
-  Workbench(const Workbench&) = delete;
-  Workbench& operator=(const Workbench&) = delete;
 
   const Dataset& data() const { return twins_.data; }
   const NominalFreedom& freedom() const { return freedom_; }
@@ -52,8 +50,6 @@ class Workbench {
 
   /// Squares of the exact twin on the fitted tests at a state.
   double exactSquares(const FitState& state);
-  /// Squares of the exact twin without guidance.
-  double freeSquares(const FitState& state);
 
   /// Smaller steps for the quick twin. @return false: they are those of the exact twin already
   bool refineQuick() { return twins_.refineQuick(); }

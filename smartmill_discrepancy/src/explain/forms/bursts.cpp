@@ -13,9 +13,9 @@ namespace smartmill::discrepancy {
 namespace {
 
 struct BurstOptions {
-  double decay = 2e-3;            ///< [s] assumed for detection: of a chip, a bearing defect, a loose part
+  double decay = 2e-3;            ///< [s] assumed for detection; the fit starts from several
   double lowest = LOWEST_MODE;    ///< [Hz] of a band
-  double prominence = 1.3;        ///< [1] power of a band over the median: noise of a record scatters by less
+  double prominence = 1.3;        ///< [1] power of a band over the median of all
   double min_count = 3.0;         ///< periods in a record: fewer do not distinguish a period
   double min_period = 3.0;        ///< [1] of the decay: shorter periods overlap
   double min_correlation = 0.15;  ///< [1] of the envelope with itself at the period
@@ -159,8 +159,6 @@ std::optional<BurstTrain> findBursts(std::vector<ChannelResidual> tests, const B
 /// Bursts at the period of the envelope in the strongest band of each channel.
 class Bursts : public FormFamily {
  public:
-  explicit Bursts(const BurstOptions& options = {}) : options_(options) {}
-
   void locate(const FormContext& context, std::vector<Hypothesis>* located) const override {
     for (const auto& [channel, tests] : context.channels) {
       for (const Hypothesis& h : context.forms) {

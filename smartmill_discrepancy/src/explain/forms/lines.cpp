@@ -55,8 +55,6 @@ bool isTone(const Dataset& data, const FitState& state, const Finding& f, const 
 /// Tones and orders at the findings.
 class Lines : public FormFamily {
  public:
-  explicit Lines(const LineOptions& options = {}) : options_(options) {}
-
   void locate(const FormContext& context, std::vector<Hypothesis>* located) const override {
     for (const Finding& f : context.unexplained) {
       if (located->size() >= options_.most) break;

@@ -12,9 +12,9 @@ struct ResonanceOptions {
   double lowest = LOWEST_MODE;   ///< [Hz]
   double highest = USABLE_BAND;  ///< [1] of the largest sample rate
   double resolved = 0.45;        ///< [1] of the sample rate of a record that takes part
-  double ratio = 1.05;           ///< [1] of neighbouring frequencies: about the half-power width
+  double ratio = 1.05;           ///< [1] of neighbouring frequencies, within the half-power width
   double damping_ratio = TYPICAL_DAMPING;
-  double min_gain = 100.0;  ///< [squares] minimum BIC gain of an effect
+  double min_gain = 100.0;  ///< [squares] with less the fit could not reach SearchOptions::min_gain
 };
 
 // Model and residual of a force channel of one test, over the noise.
@@ -85,8 +85,6 @@ Resonance bestResonance(const TwinRunner& runner, double rate, const std::map<st
 /// Resonances between two force channels at their best frequency.
 class Resonances : public FormFamily {
  public:
-  explicit Resonances(const ResonanceOptions& options = {}) : options_(options) {}
-
   void locate(const FormContext& context, std::vector<Hypothesis>* located) const override {
     const TwinRunner& runner = context.runner;
     const auto forces = forceResiduals(runner, context.now.residual);

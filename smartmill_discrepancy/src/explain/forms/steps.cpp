@@ -7,7 +7,7 @@ namespace smartmill::discrepancy {
 namespace {
 
 struct StepOptions {
-  double min_gain = 50.0;  ///< [squares] twice the chance maximum over all positions of a record
+  double min_gain = 50.0;  ///< [squares] chance maximum over all positions of a record
 };
 
 struct Step {
@@ -71,8 +71,6 @@ Step stepBetweenTests(std::vector<ChannelResidual> tests) {
 /// The best step of each channel, at a time of every record and between two tests.
 class Steps : public FormFamily {
  public:
-  explicit Steps(const StepOptions& options = {}) : options_(options) {}
-
   void locate(const FormContext& context, std::vector<Hypothesis>* located) const override {
     for (const auto& [channel, tests] : context.channels) {
       for (const Hypothesis& h : context.forms) {

@@ -18,8 +18,7 @@ struct SensorModeOptions {
 /// One more mode of the force sensor along an axis.
 class SensorModes : public ProbeFamily {
  public:
-  SensorModes(const ProbeContext& context, const SensorModeOptions& options = {})
-      : context_(context), options_(options) {}
+  explicit SensorModes(const ProbeContext& context) : context_(context) {}
 
   Probes probesOf(const Hypothesis& h) override {
     const auto axis = static_cast<std::size_t>(h.variant.front() - 'x');

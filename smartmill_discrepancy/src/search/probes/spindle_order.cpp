@@ -11,10 +11,10 @@ namespace smartmill::discrepancy {
 namespace {
 
 struct SpindleOrderOptions {
-  double lowest = 0.2, highest = 60.0;  ///< [1] orders: from a slow belt to the teeth of bearings
+  double lowest = 0.2, highest = 60.0;  ///< [1] orders searched
   double band = USABLE_BAND;            ///< [1] of the sample rate
   double spacing = 0.25;                ///< [1] of the resolution of the longest record
-  double min_revolutions = 3.0;         ///< of a record: fewer do not distinguish an order from a trend
+  double min_revolutions = 3.0;         ///< of a record for an order
   double separation = 2.0;              ///< [1] of that resolution between two orders
   std::size_t found = 2;                ///< best orders, of which the fit tries each
 };
@@ -92,8 +92,7 @@ double gainAt(double order, const std::vector<Spectrum>& spectra, const MachineM
 /// by the model's force sensor, explains most of the residual.
 class SpindleOrders : public ProbeFamily {
  public:
-  SpindleOrders(const ProbeContext& context, const SpindleOrderOptions& options = {})
-      : context_(context), options_(options) {}
+  explicit SpindleOrders(const ProbeContext& context) : context_(context) {}
 
   // The order, then amplitudes.
   Probes probesOf(const Hypothesis& h) override {

@@ -7,17 +7,16 @@ namespace smartmill::discrepancy {
 namespace {
 
 struct TipModeOptions {
-  double lowest = 200.0, highest = 6000.0;  ///< [Hz] modes of tools and spindles
+  double lowest = 200.0, highest = 6000.0;  ///< [Hz] searched
   double ratio = 1.08;                      ///< [1] of neighbouring frequencies
-  double damping_ratio = 0.05;              ///< [1] of a typical tool in its holder
+  double damping_ratio = 0.05;              ///< [1] assumed; the fit finds the true one
   double otherwise = 1200.0;                ///< [Hz] if no frequency reduces the residual
 };
 
 /// Modes of the tool tip along the axes that the variant names.
 class TipModes : public ProbeFamily {
  public:
-  TipModes(const ProbeContext& context, const TipModeOptions& options = {})
-      : context_(context), options_(options) {}
+  explicit TipModes(const ProbeContext& context) : context_(context) {}
 
   Probes probesOf(const Hypothesis& h) override {
     Hypothesis::Probe probe;

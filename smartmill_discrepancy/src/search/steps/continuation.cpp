@@ -1,9 +1,35 @@
-#include "search/steps/continuation.h"
-
 #include <algorithm>
 #include <cmath>
 
+#include "search/adoption.h"
+#include "search/steps/nominal_fit.h"
+#include "search/steps/search_step.h"
+
 namespace smartmill::discrepancy {
+namespace {
+
+struct ContinuationOptions {
+  /// [1] of the required gain: smaller gains of shortened records, in proportion to the samples, are not
+  /// screened again.
+  double worth_screening = 0.25;
+};
+
+/// Continues a search on shortened records with the whole records: nominal values and effects start from its
+/// result.
+class Continuation : public SearchStep {
+ public:
+  explicit Continuation(const SearchState& shortened) : shortened_(shortened) {}
+
+  void run(SearchState& state) override;
+
+ private:
+  void limitGains(SearchState& state) const;
+
+  const SearchState& shortened_;
+  ContinuationOptions options_;
+  NominalFit nominal_fit_;
+  Adoption adoption_;
+};
 
 void Continuation::run(SearchState& s) {
   s.options.log("search on whole records");
@@ -40,6 +66,12 @@ void Continuation::limitGains(SearchState& s) const {
   for (const PredictedGain& p : shortened_.screened)
     s.memory.gain_limits[p.hypothesis] =
         p.gain * std::max(std::pow(longer, 3), longer / options_.worth_screening);
+}
+
+}  // namespace
+
+std::unique_ptr<SearchStep> makeContinuation(const SearchState& shortened) {
+  return std::make_unique<Continuation>(shortened);
 }
 
 }  // namespace smartmill::discrepancy

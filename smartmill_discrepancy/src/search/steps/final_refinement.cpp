@@ -1,10 +1,26 @@
-#include "search/steps/final_refinement.h"
-
 #include <algorithm>
 
+#include "search/steps/search_step.h"
 #include "smartmill_discrepancy/search/refinement.h"
 
 namespace smartmill::discrepancy {
+namespace {
+
+struct FinalRefinementOptions {
+  int max_swaps = 3;  ///< of effects by alternatives; limits the time
+};
+
+/// Refines the fit with the exact twin, drops effects that have become unnecessary and swaps effects whose
+/// refined alternatives are better.
+class FinalRefinement : public SearchStep {
+ public:
+  void run(SearchState& state) override;
+
+ private:
+  bool swapBetterAlternatives(SearchState& state) const;
+
+  FinalRefinementOptions options_;
+};
 
 void FinalRefinement::run(SearchState& s) {
   s.bench.guidance().guideNearLimit(s.now.state);
@@ -43,6 +59,12 @@ bool FinalRefinement::swapBetterAlternatives(SearchState& s) const {
     if (!refine(s.bench, state, s.options, &result)) return false;
   }
   return true;
+}
+
+}  // namespace
+
+std::unique_ptr<SearchStep> makeFinalRefinement() {
+  return std::make_unique<FinalRefinement>();
 }
 
 }  // namespace smartmill::discrepancy

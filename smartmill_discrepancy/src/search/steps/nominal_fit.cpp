@@ -72,4 +72,8 @@ void NominalFit::useStatedIfBetter(SearchState& s) const {
   s.now = s.quick.fit(stated, &s.tangents, FitOptions::toEvaluate());
 }
 
+std::unique_ptr<SearchStep> makeNominalFit() {
+  return std::make_unique<NominalFit>();
+}
+
 }  // namespace smartmill::discrepancy

@@ -16,8 +16,7 @@ struct NominalFitOptions {
   int passes_without_angle = 8;
   double settled_without_angle = 1e-6;
   FitOptions last{3, 1e-5};  ///< with the derivatives of the last pass, near its end
-  /// [1] Squares of the guided first pass over those of the free fit above which guidance is given up: later
-  /// passes rarely gain more than a factor of two.
+  /// [1] Squares of the guided first pass over those of the free fit above which guidance is given up.
   double give_up_ratio = 4.0;
 };
 
@@ -25,8 +24,6 @@ struct NominalFitOptions {
 /// is recorded, guided.
 class NominalFit : public SearchStep {
  public:
-  explicit NominalFit(const NominalFitOptions& options = {}) : options_(options) {}
-
   /// @throws Error if the twin gives no finite values for the nominal model
   void run(SearchState& state) override;
 

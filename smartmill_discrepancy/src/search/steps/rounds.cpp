@@ -1,8 +1,10 @@
-#include "search/steps/rounds.h"
-
 #include <algorithm>
+#include <cstddef>
 #include <utility>
 
+#include "search/adoption.h"
+#include "search/candidate_round.h"
+#include "search/steps/search_step.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_discrepancy/search/validation.h"
 
@@ -14,7 +16,37 @@ bool isMember(const FitState& state, const std::string& effect) {
                      [&](const Member& m) { return m.hypothesis->effect == effect; });
 }
 
-}  // namespace
+struct RoundsOptions {
+  /// Consecutive rejections by held-out tests that end the search; limits its time.
+  std::size_t max_rejections = 3;
+  /// Work in units of a nominal fit, from typical campaigns: a round, the last round, the nominal fit of
+  /// whole records, and refinement with validation. Steers the progress only.
+  double round_work = 2.0, last_round_work = 1.0, whole_records_work = 2.0, later_work = 4.0;
+};
+
+/// Rounds of the search, each of which adds one effect: the best fit of a round is adopted and kept if the
+/// exact twin and the held-out tests support it.
+class Rounds : public SearchStep {
+ public:
+  void run(SearchState& state) override;
+
+ private:
+  // Fit and derivatives at the start of a round.
+  struct RoundStart {
+    FitResult fit;
+    NominalTangents tangents;
+  };
+  bool addEffect(SearchState& state);
+  bool isSupportedByHeldout(SearchState& state, const FitResult& before, const Hypothesis& newest) const;
+  void reject(SearchState& state, RoundStart start, const Hypothesis* newest);
+  void revertTo(SearchState& state, RoundStart start) const;
+  void reportProgress(const SearchState& state) const;
+
+  RoundsOptions options_;
+  Adoption adoption_;
+  bool reverted_ = false;  // to the start of the last round, whose predictions remain valid
+  std::size_t rejections_in_a_row_ = 0;
+};
 
 void Rounds::run(SearchState& s) {
   reportProgress(s);
@@ -106,6 +138,12 @@ void Rounds::reportProgress(const SearchState& s) const {
       1.0 + options_.round_work * static_cast<double>(s.rounds) + (s.whole_records ? whole : 0.0);
   const double left = options_.later_work + options_.last_round_work + (s.whole_records ? 0.0 : whole);
   s.options.reportProgress(done / (done + left));
+}
+
+}  // namespace
+
+std::unique_ptr<SearchStep> makeRounds() {
+  return std::make_unique<Rounds>();
 }
 
 }  // namespace smartmill::discrepancy

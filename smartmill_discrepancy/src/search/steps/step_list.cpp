@@ -1,29 +1,20 @@
-#include "search/steps/continuation.h"
-#include "search/steps/final_refinement.h"
-#include "search/steps/guidance_release.h"
-#include "search/steps/nominal_fit.h"
-#include "search/steps/rounds.h"
 #include "search/steps/search_step.h"
 
 namespace smartmill::discrepancy {
 
 SearchSteps stepsOnShortenedRecords() {
   SearchSteps steps;
-  steps.push_back(std::make_unique<NominalFit>());
-  steps.push_back(std::make_unique<Rounds>());
+  steps.push_back(makeNominalFit());
+  steps.push_back(makeRounds());
   return steps;
 }
 
 SearchSteps stepsOnWholeRecords(const SearchState* shortened) {
   SearchSteps steps;
-  if (shortened) {
-    steps.push_back(std::make_unique<Continuation>(*shortened));
-  } else {
-    steps.push_back(std::make_unique<NominalFit>());
-  }
-  steps.push_back(std::make_unique<Rounds>());
-  steps.push_back(std::make_unique<GuidanceRelease>());
-  steps.push_back(std::make_unique<FinalRefinement>());
+  steps.push_back(shortened ? makeContinuation(*shortened) : makeNominalFit());
+  steps.push_back(makeRounds());
+  steps.push_back(makeGuidanceRelease());
+  steps.push_back(makeFinalRefinement());
   return steps;
 }
 
