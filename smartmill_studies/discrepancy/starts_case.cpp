@@ -129,8 +129,8 @@ void fit(const Dataset& data, const std::vector<double>& off, json* line) {
   std::vector<Resemblance> resembles;
   validateEffects(bench, searched, &found, &resembles);
   found.best.covariance = robustCovariance(bench, found.best);
-  bench.setGuided(false);
-  bench.alignTo(found.best.state);
+  bench.guidance().set(false);
+  bench.alignment().alignTo(found.best.state);
   for (const Member& m : found.best.state.members) out["named"].push_back(m.hypothesis->title());
   compare(bench, found.best, off, line);
   const GapPair after = residualOf(bench, bench.exact().model(found.best.state)).gap;

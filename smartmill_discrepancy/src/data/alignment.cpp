@@ -14,6 +14,24 @@ namespace {
 
 using units::TWO_PI;
 
+// Estimate of the phase of a record without spindle angle.
+struct PhaseEstimateOptions {
+  double speed_share = 0.01;  ///< [1] search range of the stated speed
+  int phases = 240;           ///< tried per tooth; the best is refined by the fits
+  int tooth_lines = 4;        ///< of the forces that are compared
+};
+
+// Rotation of the model that aligns a record.
+struct RotationOptions {
+  double min_gain = 25.0;        ///< squares over noise for a significant phase: five standard deviations
+  double min_simulated = 0.05;   ///< [1] of the squares of the lines between the tooth passing lines
+  int all_phases = 1440;         ///< tried in a revolution: 0.25 deg
+  int nearby_phases = 40;        ///< tried in the halves of a record
+  double nearby = 0.25;          ///< [1] of a period of the highest order: range in the halves
+  double min_revolutions = 4.0;  ///< of a record with a speed error
+  int max_orders = 60;           ///< more lines hardly change the phase
+};
+
 std::complex<double> lineAt(const std::vector<double>& values, std::size_t from, std::size_t to,
                             double step) {
   std::complex<double> sum = 0.0, rotation = std::polar(1.0, -step),
@@ -111,6 +129,12 @@ double residualSquares(const Dataset& data, const TestData& t, const Record& sim
 
 }  // namespace
 
+double rotationOf(const std::vector<double>& angle) {
+  double rotated = 0.0;
+  for (std::size_t i = 1; i < angle.size(); ++i) rotated += std::remainder(angle[i] - angle[i - 1], TWO_PI);
+  return rotated;
+}
+
 double refinedSpeed(const TestData& test, int teeth, double share) {
   const double nominal = test.test.spindle_speed / test.test.sample_rate;  // [rad/sample]
   const auto power = [&](double speed) {
@@ -146,20 +170,19 @@ using ForceLine = std::array<std::complex<double>, 3>;
 
 // Estimates speed and, within one tooth period, phase of a cut. @return a note
 std::string estimatePhase(const Dataset& data, TestData& t) {
-  constexpr double SPEED_SHARE = 0.01;
-  constexpr int PHASES = 240, TOOTH_LINES = 4;
+  const PhaseEstimateOptions limits;
   const int teeth = data.nominal.tool->teeth;
-  t.test.spindle_speed = refinedSpeed(t, teeth, SPEED_SHARE);
+  t.test.spindle_speed = refinedSpeed(t, teeth, limits.speed_share);
   sim::SimulationOptions options;
   options.noise = false;
-  options.substeps = 2;
+  options.substeps = COARSE_SUBSTEPS;
   // Rotating the model changes only the phase of its tooth passing lines.
   setAngle(t, 0.0);
   const Record model = sim::simulateTest(data.nominal, t.test, t.record, options);
-  const OrderLines lines = linesOf(data, t, model, t.first_cut, t.record.size(), teeth, TOOTH_LINES);
+  const OrderLines lines = linesOf(data, t, model, t.first_cut, t.record.size(), teeth, limits.tooth_lines);
   double best = 0.0, largest = -1e300;
-  for (int p = 0; p < PHASES; ++p) {
-    const double phase = TWO_PI / teeth * p / PHASES, match = lines.match(phase);
+  for (int p = 0; p < limits.phases; ++p) {
+    const double phase = TWO_PI / teeth * p / limits.phases, match = lines.match(phase);
     if (match > largest) {
       largest = match;
       best = phase;
@@ -236,17 +259,15 @@ std::vector<std::string> estimatePhases(Dataset& data) {
   return notes;
 }
 
-std::vector<AlignmentFreedom> alignmentFreedoms(const TestData& test) {
-  // Force may start at once or over a fraction of a sample.
-  constexpr double ENTRY_STD = 0.1, ENTRY_STEP = 0.02;  // [samples]
-  constexpr double ANGLE_STD = 1.0, ANGLE_STEP = 1e-4;  // [rad]
+std::vector<AlignmentFreedom> alignmentFreedoms(const TestData& test,
+                                                const AlignmentFreedomOptions& options) {
   std::vector<AlignmentFreedom> free;
   if (test.phase_estimated) {
-    free.push_back({&RecordAlignment::phase, ANGLE_STD, ANGLE_STEP});
-    free.push_back({&RecordAlignment::drift, ANGLE_STD, ANGLE_STEP});
+    free.push_back({&RecordAlignment::phase, options.angle_std, options.angle_step});
+    free.push_back({&RecordAlignment::drift, options.angle_std, options.angle_step});
   }
   if (test.test.kind == TestKind::cut && test.test.engage_time && !test.test.running_before)
-    free.push_back({&RecordAlignment::entry, ENTRY_STD, ENTRY_STEP});
+    free.push_back({&RecordAlignment::entry, options.entry_std, options.entry_step});
   return free;
 }
 
@@ -272,20 +293,18 @@ void alignRecord(TestData& t, const RecordAlignment& by) {
 }
 
 double alignPhases(Dataset& data, const MachineModel& model, double least) {
-  constexpr double LEAST_GAIN = 25.0;     // of squares over noise, for a significant phase
-  constexpr double MIN_SIMULATED = 0.05;  // of the squares of the lines between the tooth passing lines
-  constexpr int ALL_PHASES = 1440, NEARBY_PHASES = 40, MOST_ORDERS = 60;
+  const RotationOptions limits;
   double largest = 0.0;
   for (TestData& t : data.tests) {
     if (!t.phase_estimated) continue;
     sim::SimulationOptions options;
     options.noise = false;
-    options.substeps = 2;
+    options.substeps = COARSE_SUBSTEPS;
     options.early_entry = t.early_entry;
     const Record simulated = sim::simulateTest(model, t.test, t.record, options);
     const std::size_t from = beginOf(t), end = t.record.size();
     const auto linesBetween = [&](std::size_t first, std::size_t last) {
-      return linesOf(data, t, simulated, first, last, 1, MOST_ORDERS);
+      return linesOf(data, t, simulated, first, last, 1, limits.max_orders);
     };
     const OrderLines all = linesBetween(from, end);
     // A model without the lines that distinguish the teeth must not select another tooth.
@@ -297,20 +316,20 @@ double alignPhases(Dataset& data, const MachineModel& model, double least) {
       measured_squares += std::norm(all.measured[i]);
     }
     const double range_limit =
-        simulated_squares > MIN_SIMULATED * measured_squares ? units::PI : units::PI / teeth;
-    double rotation = all.best(0.0, range_limit, ALL_PHASES);
+        simulated_squares > limits.min_simulated * measured_squares ? units::PI : units::PI / teeth;
+    double rotation = all.best(0.0, range_limit, limits.all_phases);
     const auto samples = static_cast<double>(end - from);
     double size = 0.0;
     for (const auto& line : all.simulated) size += 4.0 * samples * std::norm(line);
-    if (size < LEAST_GAIN) continue;
+    if (size < limits.min_gain) continue;
     // The phase difference between the halves of a record is the speed error.
     const double span = samples / t.test.sample_rate;
     double early = rotation, late = rotation;
-    if (t.test.kind == TestKind::cut && span * t.test.spindle_speed > 4.0 * TWO_PI) {
+    if (t.test.kind == TestKind::cut && span * t.test.spindle_speed > limits.min_revolutions * TWO_PI) {
       const std::size_t middle = from + (end - from) / 2;
-      const double range = 0.25 * TWO_PI / all.orders;
-      early = linesBetween(from, middle).best(rotation, range, NEARBY_PHASES);
-      late = linesBetween(middle, end).best(rotation, range, NEARBY_PHASES);
+      const double range = limits.nearby * TWO_PI / all.orders;
+      early = linesBetween(from, middle).best(rotation, range, limits.nearby_phases);
+      late = linesBetween(middle, end).best(rotation, range, limits.nearby_phases);
     }
     const double by =
         std::max(std::abs(std::remainder(early, TWO_PI)), std::abs(std::remainder(late, TWO_PI)));

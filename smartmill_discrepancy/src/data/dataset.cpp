@@ -19,9 +19,18 @@ namespace smartmill::discrepancy {
 namespace {
 
 const std::vector<std::string> COMPARED{"fx", "fy", "fz", "load_meter", "tool_x", "tool_y"};
-constexpr std::size_t LEAST_SAMPLES = 64;
-constexpr std::size_t MIN_QUIET = 50;   // samples without force for a noise estimate
-constexpr std::size_t CLIPPED_RUN = 5;  // equal extreme samples in a row of a noisy channel
+struct RecordOptions {
+  std::size_t min_samples = 64;  ///< of a record, for a periodogram
+  std::size_t min_quiet = 50;    ///< samples without force for a noise estimate to 10 %
+  std::size_t clipped_run = 5;   ///< equal extreme samples in a row of a noisy channel
+  double contact = 0.05;         ///< [1] of the peak of a hit: contact has begun
+  double contact_lead = 1e-3;    ///< [s] that the contact starts earlier at most
+  /// [1] RMS over that between lines, from which lines without cutting (hum, unbalance) are not noise.
+  double max_line_ratio = 1.5;
+  double slow_piece = 0.25;  ///< [s] of a mean of a slow channel
+};
+
+const RecordOptions LIMITS;
 
 bool cutsOrTaps(const CampaignTest& test) {
   return test.kind == TestKind::cut || test.kind == TestKind::tap;
@@ -34,9 +43,8 @@ std::size_t quietSamples(const CampaignTest& test, const Record& record) {
     double peak = 0.0;
     for (const double f : hammer) peak = std::max(peak, std::abs(f));
     std::size_t i = 0;
-    while (i < hammer.size() && std::abs(hammer[i]) < 0.05 * peak) ++i;
-    // The contact starts before the force exceeds a twentieth of its peak.
-    const auto lead = static_cast<std::size_t>(std::lround(1e-3 * test.sample_rate));
+    while (i < hammer.size() && std::abs(hammer[i]) < LIMITS.contact * peak) ++i;
+    const auto lead = static_cast<std::size_t>(std::lround(LIMITS.contact_lead * test.sample_rate));
     return i > lead ? i - lead : 0;
   }
   if (!test.engage_time) return 0;
@@ -56,7 +64,7 @@ void checkChannel(const TestData& data, const std::string& channel) {
   if (*low == *high)
     throw Error(data.record.file + ": " + channel + " is dead: every sample is " + number(*low));
   if (channel == "load_meter") return;  // rounded and slow: values repeat
-  if (const std::size_t run = longestRunAtExtreme(values); run >= CLIPPED_RUN) {
+  if (const std::size_t run = longestRunAtExtreme(values); run >= LIMITS.clipped_run) {
     throw Error(data.record.file + ": " + channel + " is clipped: " + std::to_string(run) +
                 " equal samples in a row at its extreme (range " + number(*low) + " to " + number(*high) +
                 ")");
@@ -74,12 +82,12 @@ std::map<std::string, double> noiseOf(const Dataset& data) {
   for (const TestData& t : data.tests) {
     for (const std::string& channel : t.channels) {
       const std::vector<double>& values = t.record.column(channel);
-      if (t.quiet >= MIN_QUIET && cutsOrTaps(t.test)) {
+      if (t.quiet >= LIMITS.min_quiet && cutsOrTaps(t.test)) {
         const std::vector<double> part(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(t.quiet));
-        // Lines that exist without cutting (hum, unbalance) are not noise.
-        const double deviation = part.size() >= LEAST_SAMPLES && channel != "load_meter"
-                                     ? std::min(standardDeviation(part), 1.5 * noiseBetweenLines(part))
-                                     : standardDeviation(part);
+        const double deviation =
+            part.size() >= LIMITS.min_samples && channel != "load_meter"
+                ? std::min(standardDeviation(part), LIMITS.max_line_ratio * noiseBetweenLines(part))
+                : standardDeviation(part);
         quiet[channel].squares += deviation * deviation * static_cast<double>(t.quiet - 1);
         quiet[channel].freedom += t.quiet - 1;
       } else {
@@ -96,7 +104,7 @@ std::map<std::string, double> noiseOf(const Dataset& data) {
         if (channel == COMPARED[axis]) value = (*data.nominal.force_sensor.noise_rms)[axis];
       }
     }
-    if (value == 0.0 && pool.freedom >= MIN_QUIET)
+    if (value == 0.0 && pool.freedom >= LIMITS.min_quiet)
       value = std::sqrt(pool.squares / static_cast<double>(pool.freedom));
     if (value == 0.0 && !between_lines[channel].empty()) value = median(between_lines[channel]);
     if (!(value > 0.0)) {
@@ -109,9 +117,8 @@ std::map<std::string, double> noiseOf(const Dataset& data) {
 
 // @param measurements on the record's clock @param begin, lasts [s] start and length of the record
 SlowMeans meansOf(const std::string& channel, const Record& measurements, double begin, double lasts) {
-  constexpr double PIECE = 0.25;  // [s]
   const std::vector<double>& values = measurements.column(channel);
-  const auto pieces = std::max<std::size_t>(1, static_cast<std::size_t>(lasts / PIECE));
+  const auto pieces = std::max<std::size_t>(1, static_cast<std::size_t>(lasts / LIMITS.slow_piece));
   SlowMeans slow;
   slow.channel = channel;
   std::vector<std::vector<double>> of_piece(pieces), times(pieces);
@@ -228,9 +235,9 @@ std::size_t Dataset::samples() const {
 }
 
 double noiseBetweenLines(const std::vector<double>& values) {
-  if (values.size() < LEAST_SAMPLES) {
+  if (values.size() < LIMITS.min_samples) {
     throw Error("noise estimate: " + std::to_string(values.size()) + " samples, expected at least " +
-                std::to_string(LEAST_SAMPLES));
+                std::to_string(LIMITS.min_samples));
   }
   // Second differences remove slow trends before the leakage of the window spreads them.
   const std::size_t n = values.size() - 2;
@@ -252,16 +259,14 @@ double noiseBetweenLines(const std::vector<double>& values) {
   return std::sqrt(median(power) / std::log(2.0) / window_power);
 }
 
-std::optional<Dataset> shortenedDataset(const Dataset& data) {
-  constexpr double REVOLUTIONS = 6.0;
-  constexpr double MAX_SHARE = 0.75;  // [1] of the samples of fitted cuts: no benefit above
+std::optional<Dataset> shortenedDataset(const Dataset& data, const ShorteningOptions& options) {
   Dataset shortened = data;
   double all = 0.0, kept = 0.0;
   for (TestData& t : shortened.tests) {
     if (t.test.kind != TestKind::cut || t.heldout) continue;
     const double revolution = units::TWO_PI / t.test.spindle_speed * t.test.sample_rate;  // [samples]
-    const std::size_t first =
-        std::max(LEAST_SAMPLES, t.first_cut + static_cast<std::size_t>(REVOLUTIONS * revolution));
+    const std::size_t first = std::max(
+        LIMITS.min_samples, t.first_cut + static_cast<std::size_t>(options.revolutions * revolution));
     const std::size_t size = t.phase_estimated ? t.record.size() : first;
     all += static_cast<double>(t.record.size());
     kept += static_cast<double>(std::min(size, t.record.size()));
@@ -269,7 +274,7 @@ std::optional<Dataset> shortenedDataset(const Dataset& data) {
     t.record.time.resize(size);
     for (std::vector<double>& column : t.record.columns) column.resize(size);
   }
-  if (kept >= MAX_SHARE * all) return {};
+  if (kept >= options.max_share * all) return {};
   return shortened;
 }
 
@@ -326,9 +331,9 @@ Dataset loadDataset(const Campaign& campaign, const MachineModel& nominal) {
     TestData t;
     t.test = test;
     t.record = aligned(readRecord(campaign, test), test);
-    if (t.record.size() < LEAST_SAMPLES) {
+    if (t.record.size() < LIMITS.min_samples) {
       throw Error(t.record.file + ": " + std::to_string(t.record.size()) + " samples, expected at least " +
-                  std::to_string(LEAST_SAMPLES));
+                  std::to_string(LIMITS.min_samples));
     }
     for (const std::string& name : t.record.names) {
       if (std::find(COMPARED.begin(), COMPARED.end(), name) != COMPARED.end()) {

@@ -7,20 +7,12 @@
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
+#include "smartmill_discrepancy/data/alignment.h"
 #include "smartmill_discrepancy/gap/twin_runner.h"
 #include "smartmill_sim/twin/twin.h"
 
 namespace smartmill::discrepancy {
 namespace {
-
-constexpr double DOUBTFUL_GAP = 5.0;  // gap above which a label is doubtful
-constexpr double SWAPPED = 0.1;       // maximum share of the squares after a swap
-constexpr double RELABELLED =
-    0.35;  // the same with another test's label, if the gap is comparable to that test's own
-constexpr double COMPARABLE = 1.5;
-constexpr double SPEED_TOLERANCE = 0.02;
-constexpr double UNIT_FACTOR = 30.0;  // factor beyond any gain error
-constexpr double CORRELATED = 0.5;    // minimum squared correlation with the negative model
 
 double squaresBetween(const std::vector<double>& a, const std::vector<double>& b) {
   double s = 0.0;
@@ -37,17 +29,14 @@ std::string joined(const std::vector<std::string>& names) {
 sim::SimulationOptions coarseSimulation() {
   sim::SimulationOptions options;
   options.noise = false;
-  options.substeps = 2;
+  options.substeps = COARSE_SUBSTEPS;
   return options;
 }
 
 // Speed of the recorded spindle angle [rad/s].
 double rotationSpeed(const TestData& t) {
   const std::vector<double>& angle = t.record.column("spindle_angle");
-  double rotated = 0.0;
-  for (std::size_t i = 1; i < angle.size(); ++i)
-    rotated += std::remainder(angle[i] - angle[i - 1], units::TWO_PI);
-  return rotated / (static_cast<double>(angle.size() - 1) / t.test.sample_rate);
+  return rotationOf(angle) / (static_cast<double>(angle.size() - 1) / t.test.sample_rate);
 }
 
 double forceSquares(const TestData& t, const Record& simulated) {
@@ -58,12 +47,12 @@ double forceSquares(const TestData& t, const Record& simulated) {
   return s;
 }
 
-std::vector<std::string> wrongSpeeds(const Dataset& data) {
+std::vector<std::string> wrongSpeeds(const Dataset& data, const LabelOptions& limits) {
   std::vector<std::string> wrong;
   for (const TestData& t : data.tests) {
     if (t.test.kind == TestKind::tap || t.phase_estimated || !t.record.has("spindle_angle")) continue;
     const double speed = rotationSpeed(t);
-    if (std::abs(speed / t.test.spindle_speed - 1.0) <= SPEED_TOLERANCE) continue;
+    if (std::abs(speed / t.test.spindle_speed - 1.0) <= limits.speed) continue;
     wrong.push_back(formatted(
         "test %s looks mislabelled: its spindle angle advances at %.0f rpm, spindle_speed_rpm is %.0f",
         t.test.name.c_str(), units::rpmFromRadPerSec(speed), units::rpmFromRadPerSec(t.test.spindle_speed)));
@@ -92,16 +81,18 @@ Comparison compare(const Dataset& data, const std::vector<Record>& own, const st
 }
 
 // Units and signs: one factor over all records of a channel.
-std::vector<std::string> wrongScales(const Dataset& data, const std::vector<Record>& own) {
+std::vector<std::string> wrongScales(const Dataset& data, const std::vector<Record>& own,
+                                     const LabelOptions& limits) {
   std::vector<std::string> wrong, inverted;
   for (const auto& [channel, noise] : data.noise) {
     const Comparison c = compare(data, own, channel);
-    if (c.product < 0.0 && c.product * c.product > CORRELATED * c.simulated * c.measured)
+    if (c.product < 0.0 && c.product * c.product > limits.inverted * c.simulated * c.measured)
       inverted.push_back(channel);
     if (c.simulated <= noise * noise) continue;
     const double factor = std::abs(c.product / c.simulated);
-    if (factor > UNIT_FACTOR ||
-        (factor < 1.0 / UNIT_FACTOR && c.product * c.product / c.simulated > 100.0 * noise * noise)) {
+    if (factor > limits.unit_factor ||
+        (factor < 1.0 / limits.unit_factor &&
+         c.product * c.product / c.simulated > limits.min_signal * noise * noise)) {
       wrong.push_back(formatted("%s is %.3g times the simulated value in every cut: its unit looks wrong",
                                 channel.c_str(), factor));
     }
@@ -114,7 +105,7 @@ std::vector<std::string> wrongScales(const Dataset& data, const std::vector<Reco
 
 // Whether swapping two force channels of a test fits the model far better.
 bool looksSwapped(const Dataset& data, const TestData& t, const Record& own, const std::string& x,
-                  const std::string& y) {
+                  const std::string& y, const LabelOptions& limits) {
   if (!t.record.has(x) || !t.record.has(y)) return false;
   const double as_is =
       squaresBetween(t.record.column(x), own.column(x)) + squaresBetween(t.record.column(y), own.column(y));
@@ -122,17 +113,18 @@ bool looksSwapped(const Dataset& data, const TestData& t, const Record& own, con
       squaresBetween(t.record.column(x), own.column(y)) + squaresBetween(t.record.column(y), own.column(x));
   const double floor =
       static_cast<double>(t.record.size()) * (std::pow(data.noise.at(x), 2) + std::pow(data.noise.at(y), 2));
-  return as_is > DOUBTFUL_GAP * floor && swap - floor < SWAPPED * (as_is - floor);
+  return as_is > limits.doubtful_gap * floor && swap - floor < limits.swapped * (as_is - floor);
 }
 
-std::vector<std::string> swappedChannels(const Dataset& data, const std::vector<Record>& own) {
+std::vector<std::string> swappedChannels(const Dataset& data, const std::vector<Record>& own,
+                                         const LabelOptions& limits) {
   std::vector<std::string> wrong;
   for (std::size_t a = 0; a < 3; ++a) {
     for (std::size_t b = a + 1; b < 3; ++b) {
       std::vector<std::string> tests;
       for (std::size_t i = 0; i < own.size(); ++i) {
         const TestData& t = data.tests[i];
-        if (t.test.kind != TestKind::air && looksSwapped(data, t, own[i], FORCES[a], FORCES[b]))
+        if (t.test.kind != TestKind::air && looksSwapped(data, t, own[i], FORCES[a], FORCES[b], limits))
           tests.push_back(t.test.name);
       }
       if (!tests.empty())
@@ -166,21 +158,23 @@ Foreign bestForeignLabel(const Dataset& data, const MachineModel& model, const s
 
 // Cuts that the label of another cut fits far better, while other cuts fit their own.
 std::vector<std::string> foreignLabels(const Dataset& data, const MachineModel& model,
-                                       const std::vector<Record>& own) {
+                                       const std::vector<Record>& own, const LabelOptions& limits) {
   std::vector<double> gaps(own.size(), 0.0), all;
   for (std::size_t i = 0; i < own.size(); ++i) {
     if (data.tests[i].test.kind != TestKind::cut) continue;
     gaps[i] = forceSquares(data.tests[i], own[i]) / static_cast<double>(data.tests[i].record.size());
     all.push_back(gaps[i]);
   }
-  if (all.size() < 4) return {};
+  if (all.size() < limits.min_cuts) return {};
   const double usual = median(all);
   std::vector<std::string> doubtful;
   for (std::size_t i = 0; i < own.size(); ++i) {
     const TestData& t = data.tests[i];
-    if (t.test.kind != TestKind::cut || gaps[i] < 3.0 * usual || gaps[i] < DOUBTFUL_GAP) continue;
+    if (t.test.kind != TestKind::cut || gaps[i] < limits.unusual * usual || gaps[i] < limits.doubtful_gap)
+      continue;
     const Foreign best = bestForeignLabel(data, model, gaps, i);
-    if (best.gap < RELABELLED * gaps[i] && best.gap < COMPARABLE * std::max(best.theirs, 6.0))
+    if (best.gap < limits.relabelled * gaps[i] &&
+        best.gap < limits.comparable * std::max(best.theirs, limits.small_gap))
       doubtful.push_back("test " + t.test.name + " looks mislabelled: feed, depth or immersion of " +
                          best.name + " fit its record");
   }
@@ -212,21 +206,22 @@ Dataset withoutChatter(const Dataset& data) {
 
 }  // namespace
 
-Labels checkLabels(const Dataset& data, int threads) {
+Labels checkLabels(const Dataset& data, int threads, const LabelOptions& limits) {
   Labels labels;
-  labels.wrong = wrongSpeeds(data);
+  labels.wrong = wrongSpeeds(data, limits);
   if (!labels.wrong.empty()) return labels;
-  if (anyChatters(data)) return checkLabels(withoutChatter(data), threads);
+  if (anyChatters(data)) return checkLabels(withoutChatter(data), threads, limits);
   const std::vector<Record> own = simulated(data, data.nominal, threads);
-  labels.wrong = wrongScales(data, own);
-  if (labels.wrong.empty()) labels.wrong = swappedChannels(data, own);
-  if (labels.wrong.empty()) labels.doubtful = foreignLabels(data, data.nominal, own);
+  labels.wrong = wrongScales(data, own, limits);
+  if (labels.wrong.empty()) labels.wrong = swappedChannels(data, own, limits);
+  if (labels.wrong.empty()) labels.doubtful = foreignLabels(data, data.nominal, own, limits);
   return labels;
 }
 
-std::vector<std::string> doubtfulLabels(const MachineModel& model, const Dataset& data, int threads) {
-  if (anyChatters(data)) return doubtfulLabels(model, withoutChatter(data), threads);
-  return foreignLabels(data, model, simulated(data, model, threads));
+std::vector<std::string> doubtfulLabels(const MachineModel& model, const Dataset& data, int threads,
+                                        const LabelOptions& limits) {
+  if (anyChatters(data)) return doubtfulLabels(model, withoutChatter(data), threads, limits);
+  return foreignLabels(data, model, simulated(data, model, threads), limits);
 }
 
 }  // namespace smartmill::discrepancy

@@ -21,10 +21,6 @@ struct Sums {
 void add(const TwinRunner& runner, const std::vector<double>& before, const std::vector<double>& after,
          std::map<std::string, Sums>* sums) {
   const std::vector<ChannelSpan>& spans = runner.spans();
-  const auto valuesOf = [&](const ChannelSpan& b) {
-    const auto at = runner.measured().begin() + static_cast<std::ptrdiff_t>(b.offset);
-    return std::vector<double>(at, at + static_cast<std::ptrdiff_t>(b.size));
-  };
   const auto isCut = [&](const ChannelSpan& b) {
     return b.in_gap && runner.data().tests[b.test].test.kind == TestKind::cut;
   };
@@ -32,12 +28,13 @@ void add(const TwinRunner& runner, const std::vector<double>& before, const std:
   runParallel(spans.size(), runner.threads(), [&](std::size_t k) {
     // The load meter settles more slowly than a record lasts.
     if (isCut(spans[k]) && spans[k].channel != "load_meter")
-      repeat[k] = steadyRepeatability(runner.data().tests[spans[k].test], valuesOf(spans[k]));
+      repeat[k] =
+          steadyRepeatability(runner.data().tests[spans[k].test], valuesOf(runner.measured(), spans[k]));
   });
   for (std::size_t k = 0; k < spans.size(); ++k) {
     const ChannelSpan& b = spans[k];
     if (!isCut(b)) continue;
-    const std::vector<double> values = valuesOf(b);
+    const std::vector<double> values = valuesOf(runner.measured(), b);
     const double level = mean(values);
     Sums& s = (*sums)[b.channel];
     s.noise = b.noise;

@@ -16,7 +16,7 @@ double squaresOf(const std::vector<double>& v, const ChannelSpan& b) {
 
 RevolutionCurve overRevolution(const TwinRunner& runner, const ChannelSpan& span,
                                const std::vector<double>& before, const std::vector<double>& after) {
-  constexpr std::size_t BINS = 180;
+  constexpr std::size_t BINS = 180;  // of a picture: two degrees each
   const TestData& test = runner.data().tests[span.test];
   RevolutionCurve curve{test.test.name, span.channel, {}, {}, {}, {}};
   std::vector<double> count(BINS, 0.0), measured(BINS, 0.0), nominal(BINS, 0.0), improved(BINS, 0.0);
@@ -62,13 +62,10 @@ void addCurves(const TwinRunner& runner, const std::vector<double>& before, cons
     s.test = test.test.name;
     s.channel = channel;
     s.order_hz = test.test.spindle_speed / units::TWO_PI;
-    const auto from = static_cast<std::ptrdiff_t>(worst->offset),
-               to = from + static_cast<std::ptrdiff_t>(worst->size);
-    const auto b = fourier({before.begin() + from, before.begin() + to});
-    const auto a = fourier({after.begin() + from, after.begin() + to});
+    const auto b = fourier(valuesOf(before, *worst)), a = fourier(valuesOf(after, *worst));
     const double scale = 2.0 * worst->noise / static_cast<double>(worst->size);
     const std::vector<double> f = fourierFrequencies(worst->size, test.test.sample_rate);
-    for (std::size_t k = 1; k < b.size() && f[k] < 4000.0; ++k) {
+    for (std::size_t k = 1; k < b.size() && f[k] < HIGHEST_PICTURED; ++k) {
       s.frequency_hz.push_back(f[k]);
       s.before.push_back(scale * std::abs(b[k]));
       s.after.push_back(scale * std::abs(a[k]));

@@ -28,9 +28,8 @@ void throwIfAny(const Dataset& data, const std::vector<std::string>& reasons) {
 
 void requireFiniteResidual(const TwinRunner& runner, const std::vector<double>& residual) {
   for (const ChannelSpan& b : runner.spans()) {
-    const auto from = residual.begin() + static_cast<std::ptrdiff_t>(b.offset);
-    if (!std::all_of(from, from + static_cast<std::ptrdiff_t>(b.size),
-                     [](double r) { return std::isfinite(r); }))
+    const std::vector<double> values = valuesOf(residual, b);
+    if (!std::all_of(values.begin(), values.end(), [](double r) { return std::isfinite(r); }))
       throw Error(runner.data().campaign.folder + ": test " + runner.data().tests[b.test].test.name +
                   ": the twin gives no finite values of " + b.channel);
   }
@@ -160,8 +159,8 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   const Eigen::MatrixXd of_fit = found.best.covariance;
   found.best.covariance = robustCovariance(bench, found.best);
   dropInsignificantPathShare(data.nominal, bench.freedom(), of_fit, &found.best);
-  bench.setGuided(false);
-  bench.alignTo(found.best.state);
+  bench.guidance().set(false);
+  bench.alignment().alignTo(found.best.state);
 
   MachineModel improved = describeModel(bench, search_options, found, &result);
   const GapPair after = residualOf(bench, improved).gap;

@@ -15,15 +15,6 @@ namespace {
 using Complex = std::complex<double>;
 using OrderLines = std::array<std::vector<Complex>, 3>;  // of each force: mean, then orders at equal steps
 
-// Grid of laws. Onsets as shares of the largest feed: an edge force with an onset far below the least feed is
-// constant, one far above the largest feed is a chip force. The first exponent is that of the linear law.
-constexpr std::array<double, 7> EXPONENTS{{0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6}};
-constexpr std::array<double, 7> ONSETS{{0.0, 0.04, 0.08, 0.12, 0.16, 0.24, 0.32}};
-constexpr std::array<double, 15> EDGES{
-    {0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5}};
-constexpr int PASSES = 300;        // maximum alternations of gains and phases
-constexpr std::size_t NODES = 11;  // feeds of the curvature table
-
 // One measured cut.
 struct Cut {
   std::size_t chosen = 0;  // index in the runner's tests
@@ -64,7 +55,8 @@ std::vector<Cut> cutsOf(const TwinRunner& runner, const std::vector<std::size_t>
 
 // Lines of a model in a steady cut at another feed.
 OrderLines simulated(const MachineModel& model, CampaignTest test, double chip, std::size_t count) {
-  constexpr std::size_t SAMPLES = 360, REVOLUTIONS = 12;  // per revolution; until the last one is steady
+  constexpr std::size_t SAMPLES = 360;     // per revolution: more than twice the highest order of a line
+  constexpr std::size_t REVOLUTIONS = 12;  // until the last one is steady
   test.engagement->feed_per_tooth = chip;
   test.sample_rate = SAMPLES * test.spindle_speed / units::TWO_PI;
   sim::SimulationOptions options;
@@ -201,7 +193,8 @@ double stepPhases(const std::vector<Cut>& cuts, std::size_t step, SensorFit* fit
 
 SensorFit fitSensor(const std::vector<Cut>& cuts, const std::vector<OrderLines>& law, std::size_t step,
                     const std::vector<double>& phase) {
-  constexpr double TOLERANCE = 1e-6;  // [rad]
+  constexpr double TOLERANCE = 1e-6;  // [rad] of the last step
+  constexpr int PASSES = 300;         // maximum alternations of gains and phases
   SensorFit fit = initialFit(cuts, phase, law.front()[0].size());
   for (int pass = 0; pass < PASSES; ++pass) {
     fitGains(cuts, law, step, &fit);
@@ -214,7 +207,9 @@ SensorFit fitSensor(const std::vector<Cut>& cuts, const std::vector<OrderLines>&
 struct GridPoint {
   std::size_t exponent = 0, onset = 0, edge = 0;
 
-  ChipLaw law(double max_chip) const { return {EXPONENTS[exponent], ONSETS[onset] * max_chip, EDGES[edge]}; }
+  ChipLaw law(const ChipLawOptions& grid, double max_chip) const {
+    return {grid.exponents[exponent], grid.onsets[onset] * max_chip, grid.edge_shares[edge]};
+  }
 };
 
 // Laws of in-plane and axial forces.
@@ -225,18 +220,20 @@ struct LawPair {
 // All laws of the grid at the feeds of the cuts.
 class LawGrid {
  public:
-  LawGrid(const std::vector<Cut>& cuts, const Law& law, double max_chip, std::size_t teeth)
-      : cuts_(cuts), teeth_(teeth), phase_(cuts.size(), 0.0) {
-    for (const double exponent : EXPONENTS) {
+  LawGrid(const std::vector<Cut>& cuts, const Law& law, double max_chip, std::size_t teeth,
+          const ChipLawOptions& options)
+      : cuts_(cuts), teeth_(teeth), options_(options), phase_(cuts.size(), 0.0) {
+    for (const double exponent : options.exponents) {
       chips_.emplace_back();
       for (const Cut& c : cuts) chips_.back().push_back(law.chips(exponent, c.chip()));
     }
-    for (const double onset : ONSETS) {
+    for (const double onset : options.onsets) {
       edges_.emplace_back();
       for (std::size_t i = 0; i < cuts.size(); ++i)
         edges_.back().push_back(law.edges(onset * max_chip, cuts[i].chip(), chips_.front()[i]));
     }
   }
+  const ChipLawOptions& options() const { return options_; }
   // Phases start from the previous fit.
   SensorFit fit(const LawPair& pair) {
     std::vector<OrderLines> lines;
@@ -249,11 +246,12 @@ class LawGrid {
 
  private:
   OrderLines linesOf(const GridPoint& p, std::size_t cut) const {
-    return sum(chips_[p.exponent][cut], EDGES[p.edge], edges_[p.onset][cut]);
+    return sum(chips_[p.exponent][cut], options_.edge_shares[p.edge], edges_[p.onset][cut]);
   }
 
   const std::vector<Cut>& cuts_;
   std::size_t teeth_;
+  const ChipLawOptions& options_;
   std::vector<double> phase_;
   std::vector<std::vector<OrderLines>> chips_, edges_;  // by exponent or onset, then by cut
 };
@@ -262,11 +260,12 @@ enum class FittedForces { all, in_plane, axial };
 
 // @param of forces whose law is varied
 void searchGrid(FittedForces of, LawGrid* grid, LawPair* pair, SensorFit* best) {
+  const ChipLawOptions& options = grid->options();
   LawPair trial = *pair;
   GridPoint p;
-  for (p.exponent = 0; p.exponent < EXPONENTS.size(); ++p.exponent) {
-    for (p.onset = 0; p.onset < ONSETS.size(); ++p.onset) {
-      for (p.edge = 0; p.edge < EDGES.size(); ++p.edge) {
+  for (p.exponent = 0; p.exponent < options.exponents.size(); ++p.exponent) {
+    for (p.onset = 0; p.onset < options.onsets.size(); ++p.onset) {
+      for (p.edge = 0; p.edge < options.edge_shares.size(); ++p.edge) {
         if (of != FittedForces::axial) trial.in_plane = p;
         if (of != FittedForces::in_plane) trial.axial = p;
         SensorFit fit = grid->fit(trial);
@@ -280,8 +279,8 @@ void searchGrid(FittedForces of, LawGrid* grid, LawPair* pair, SensorFit* best) 
 
 // Best law of the grid and best linear law. The axial force gets a separate law if the lines justify it.
 SensorFit selectLaw(LawGrid* grid, double max_chip, NonlinearChipLaw* found) {
-  constexpr int SWEEPS = 5;
-  for (std::size_t edge = 0; edge < EDGES.size(); ++edge) {
+  const ChipLawOptions& options = grid->options();
+  for (std::size_t edge = 0; edge < options.edge_shares.size(); ++edge) {
     const double squares = grid->fit({{0, 0, edge}, {0, 0, edge}}).squares;
     if (edge == 0 || squares < found->linear_squares) found->linear_squares = squares;
   }
@@ -290,7 +289,7 @@ SensorFit selectLaw(LawGrid* grid, double max_chip, NonlinearChipLaw* found) {
   searchGrid(FittedForces::all, grid, &common, &best);
   LawPair split = common;
   SensorFit own = best;
-  for (int sweep = 0; sweep < SWEEPS; ++sweep) {
+  for (int sweep = 0; sweep < options.sweeps; ++sweep) {
     const double before = own.squares;
     searchGrid(FittedForces::axial, grid, &split, &own);
     searchGrid(FittedForces::in_plane, grid, &split, &own);
@@ -301,18 +300,20 @@ SensorFit selectLaw(LawGrid* grid, double max_chip, NonlinearChipLaw* found) {
   const LawPair& selected = separate ? split : common;
   if (separate) best = std::move(own);
   found->squares = best.squares;
-  found->in_plane = selected.in_plane.law(max_chip);
-  found->axial = selected.axial.law(max_chip);
+  found->in_plane = selected.in_plane.law(options, max_chip);
+  found->axial = selected.axial.law(options, max_chip);
   return best;
 }
 
 // Curvature of the law behind the sensor, in addition to that of the model.
 FeedCurvature curvatureOf(const Law& law, const MachineModel& model, const NonlinearChipLaw& found,
-                          const OrderLines& gains, double min_chip, double max_chip, std::size_t teeth) {
+                          const OrderLines& gains, double min_chip, double max_chip, std::size_t teeth,
+                          std::size_t nodes) {
+  const auto intervals = static_cast<double>(nodes - 1);
   FeedCurvature curvature;
   std::vector<OrderLines> difference;
-  for (std::size_t n = 0; n < NODES; ++n) {
-    const double chip = min_chip + (max_chip - min_chip) * static_cast<double>(n) / (NODES - 1);
+  for (std::size_t n = 0; n < nodes; ++n) {
+    const double chip = min_chip + (max_chip - min_chip) * static_cast<double>(n) / intervals;
     curvature.chips.push_back(chip);
     const OrderLines linear = law.chips(0.0, chip);
     OrderLines lines = withAxial(law.of(found.in_plane, chip, linear), law.of(found.axial, chip, linear));
@@ -324,8 +325,8 @@ FeedCurvature curvatureOf(const Law& law, const MachineModel& model, const Nonli
   for (std::size_t axis = 0; axis < 3; ++axis) {
     for (std::size_t k = 0; k < gains[axis].size(); ++k) {
       std::vector<double>& table = curvature.orders[static_cast<double>(k * teeth)][FORCES[axis]];
-      for (std::size_t n = 0; n < NODES; ++n) {
-        const double fraction = static_cast<double>(n) / (NODES - 1);
+      for (std::size_t n = 0; n < nodes; ++n) {
+        const double fraction = static_cast<double>(n) / intervals;
         const Complex b = difference[n][axis][k] - (1.0 - fraction) * difference.front()[axis][k] -
                           fraction * difference.back()[axis][k];
         table.push_back(b.real());
@@ -352,13 +353,14 @@ std::array<double, 2> FeedCurvature::at(double order, const std::string& channel
 }
 
 double NonlinearChipLaw::requiredReduction() const {
-  constexpr double NUMBERS = 3.0;
-  return NUMBERS * std::log(line_count) * squares / line_count;
+  constexpr double VALUES = 3.0;  // of a ChipLaw
+  return VALUES * std::log(line_count) * squares / line_count;
 }
 
 std::optional<NonlinearChipLaw> identifyChipLaw(const TwinRunner& runner,
                                                 const std::vector<std::size_t>& tests,
-                                                const MachineModel& nominal, const MachineModel& model) {
+                                                const MachineModel& nominal, const MachineModel& model,
+                                                const ChipLawOptions& options) {
   const auto isNonlinear = [](const EffectEntry& e) {
     return e.name == "size_effect" || e.name == "edge_buildup" ||
            e.name == std::string(EMPIRICAL) + ":chip_thickness";
@@ -381,12 +383,12 @@ std::optional<NonlinearChipLaw> identifyChipLaw(const TwinRunner& runner,
   const Law law(even, cuts.front().test->test, 0.5 * (min_chip + max_chip), count);
   NonlinearChipLaw found;
   found.line_count = static_cast<double>(cuts.size() * 3 * (2 * count - 1));
-  LawGrid grid(cuts, law, max_chip, teeth);
+  LawGrid grid(cuts, law, max_chip, teeth, options);
   const SensorFit fit = selectLaw(&grid, max_chip, &found);
   found.phase_shift.assign(runner.tests().size(), 0.0);
   for (std::size_t i = 0; i < cuts.size(); ++i) found.phase_shift[cuts[i].chosen] = fit.phase[i];
   if (found.isNonlinear())
-    found.curvature = curvatureOf(law, model, found, fit.gains, min_chip, max_chip, teeth);
+    found.curvature = curvatureOf(law, model, found, fit.gains, min_chip, max_chip, teeth, options.feeds);
   return found;
 }
 

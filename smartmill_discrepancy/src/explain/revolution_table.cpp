@@ -14,8 +14,12 @@
 namespace smartmill::discrepancy {
 namespace {
 
-constexpr std::size_t LEAST_FEEDS = 3;
-constexpr double ALIKE = 0.01;  // tolerance of speed, depth and feed
+struct RevolutionTableOptions {
+  std::size_t min_feeds = 3;  ///< two determine a linear table; the third tests it
+  double alike = 0.01;        ///< [1] tolerance of speed, depth and feed
+};
+
+const RevolutionTableOptions LIMITS;
 
 // Residual lines of one force of one cut.
 struct CutResidual {
@@ -29,17 +33,13 @@ struct FeedTrend {
 };
 
 bool alike(double a, double b) {
-  return std::abs(a - b) <= ALIKE * std::abs(b);
+  return std::abs(a - b) <= LIMITS.alike * std::abs(b);
 }
 
 bool sameButFeed(const CampaignTest& a, const CampaignTest& b) {
   return alike(a.spindle_speed, b.spindle_speed) &&
          alike(a.engagement->axial_depth, b.engagement->axial_depth) &&
          a.engagement->entry == b.engagement->entry && a.engagement->exit == b.engagement->exit;
-}
-
-std::vector<double> part(const std::vector<double>& all, std::size_t from, std::size_t to) {
-  return {all.begin() + static_cast<std::ptrdiff_t>(from), all.begin() + static_cast<std::ptrdiff_t>(to)};
 }
 
 // By force channel, without the curvature. Entry and the initial transient of the sensor are omitted.
@@ -53,7 +53,7 @@ std::map<std::string, std::vector<CutResidual>> residualsOf(const TwinRunner& ru
         std::find(cuts.begin(), cuts.end(), b.test) == cuts.end())
       continue;
     const TestData& test = runner.data().tests[b.test];
-    std::vector<double> residual = part(now.residual, b.offset, b.offset + b.size);
+    std::vector<double> residual = valuesOf(now.residual, b);
     for (double& v : residual) v *= b.noise;
     auto lines = steadyRepeatability(test, residual);
     if (!lines) continue;
@@ -154,7 +154,8 @@ FeedCurvature curvatureOf(const Member& member) {
     for (const std::string& channel : FORCES) {
       std::vector<double>& table = curvature.orders[orders[k]][channel];
       const std::vector<double>& all = entry.lists.at(channel + "_bend_n");
-      table = part(all, each * k, each * (k + 1));
+      const auto from = all.begin() + static_cast<std::ptrdiff_t>(each * k);
+      table.assign(from, from + static_cast<std::ptrdiff_t>(each));
       for (double& v : table) v *= member.values[0];
     }
   }
@@ -193,7 +194,7 @@ std::vector<std::size_t> cutsOfVaryingFeed(const TwinRunner& runner) {
     if (std::none_of(feeds.begin(), feeds.end(), [&](double f) { return alike(f, feed); }))
       feeds.push_back(feed);
   }
-  return feeds.size() >= LEAST_FEEDS ? cuts : std::vector<std::size_t>{};
+  return feeds.size() >= LIMITS.min_feeds ? cuts : std::vector<std::size_t>{};
 }
 
 std::optional<Hypothesis> revolutionTable(const TwinRunner& runner, const std::vector<Hypothesis>& all,
@@ -207,7 +208,7 @@ std::optional<Hypothesis> revolutionTable(const TwinRunner& runner, const std::v
   const std::map<std::string, std::vector<CutResidual>> residuals =
       residualsOf(runner, now, cuts, chip, curvature);
   if (std::any_of(residuals.begin(), residuals.end(),
-                  [](const auto& r) { return r.second.size() < LEAST_FEEDS; }))
+                  [](const auto& r) { return r.second.size() < LIMITS.min_feeds; }))
     return {};
   const double cost = std::log(static_cast<double>(runner.size()));
   OrderTable lines = orderTableOf(residuals, cost);

@@ -37,6 +37,17 @@ const char* moreOrLess(double value) {
   return value >= 0.0 ? "more" : "less";
 }
 
+// Which words describe a form.
+struct SentenceOptions {
+  double follows = 0.97;     ///< [1] of the variance that a power law must explain to be named
+  double alike = 0.2;        ///< [1] spread of teeth over their distance to the one that differs
+  double out = 0.1;          ///< [1] force of a tooth that hardly cuts
+  double straight = 1500.0;  ///< [s] time constant beyond which wear is linear over any campaign
+  double nothing = 0.15;     ///< [1] gain of an attenuated band
+};
+
+const SentenceOptions LIMITS;
+
 // Power law (h / reference)^-exponent: slope of the logarithms and explained share of their variance.
 struct PowerLawFit {
   double exponent = 0.0, explained = 0.0;
@@ -57,7 +68,6 @@ PowerLawFit fitPowerLaw(const std::vector<double>& h, const std::vector<double>&
 }
 
 std::string ofChip(const FoundEffect& effect) {
-  constexpr double FOLLOWS = 0.97;
   const std::vector<double> h = seriesOf(effect, "h_um"), factor = seriesOf(effect, "factor");
   if (h.size() == 2) {
     const double slope = (h[1] * factor[1] - h[0] * factor[0]) / (h[1] - h[0]) / factor[0];
@@ -69,7 +79,7 @@ std::string ofChip(const FoundEffect& effect) {
   for (std::size_t k = 0; k < h.size(); ++k)
     text += formatted("%s %.2f at %.0f um", k ? "," : "", factor[k], h[k]);
   const PowerLawFit fit = fitPowerLaw(h, factor);
-  if (fit.explained > FOLLOWS)
+  if (fit.explained > LIMITS.follows)
     text += formatted(", a power law like size_effect with exponent %.2f", fit.exponent);
   return text;
 }
@@ -81,22 +91,21 @@ const char* shareOf(const FoundEffect& effect) {
 
 // The tooth that differs while the others agree; nothing if several differ.
 std::optional<std::size_t> oddTooth(const std::vector<double>& factor) {
-  constexpr double ALIKE = 0.2;  // of the tooth's distance to the others
   for (std::size_t k = 0; k < factor.size(); ++k) {
     std::vector<double> others = factor;
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
     const auto [low, high] = std::minmax_element(others.begin(), others.end());
-    if (*high - *low < ALIKE * std::min(std::abs(factor[k] - *low), std::abs(factor[k] - *high))) return k;
+    if (*high - *low < LIMITS.alike * std::min(std::abs(factor[k] - *low), std::abs(factor[k] - *high)))
+      return k;
   }
   return {};
 }
 
 std::string ofTeeth(const FoundEffect& effect) {
-  constexpr double OUT = 0.1;
   const std::vector<double> factor = seriesOf(effect, "factor");
   if (const std::optional<std::size_t> odd = oddTooth(factor)) {
     const double ratio = factor[*odd] / factor[*odd == 0 ? 1 : 0];
-    if (ratio < OUT) return formatted("tooth %zu hardly cuts", *odd + 1);
+    if (ratio < LIMITS.out) return formatted("tooth %zu hardly cuts", *odd + 1);
     return formatted(
         "one tooth differs from the others: the %s of tooth %zu is %.0f %% %s; check whether it is %s",
         shareOf(effect), *odd + 1, 100.0 * std::abs(ratio - 1.0), moreOrLess(ratio - 1.0),
@@ -108,17 +117,15 @@ std::string ofTeeth(const FoundEffect& effect) {
 }
 
 std::string ofLife(const FoundEffect& effect) {
-  constexpr double STRAIGHT = 1500.0;  // [s]
   const double amplitude = valueOf(effect, "amplitude"), constant = valueOf(effect, "time_constant_s");
-  if (constant > STRAIGHT)
+  if (constant > LIMITS.straight)
     return formatted("the %s becomes %.2g %% %s per minute of cutting, linear like tool_wear",
                      shareOf(effect), 100.0 * std::abs(amplitude) * 60.0 / constant, moreOrLess(amplitude));
   return formatted(
       "during run-in of the edge its %s becomes %.0f %% %s, exponentially with a time constant of %.2g min "
       "of "
       "cutting",
-      effect.words.at("of") == "chip" ? "cutting force" : "edge force", 100.0 * std::abs(amplitude),
-      moreOrLess(amplitude), constant / 60.0);
+      shareOf(effect), 100.0 * std::abs(amplitude), moreOrLess(amplitude), constant / 60.0);
 }
 
 std::string ofTime(const FoundEffect& effect) {
@@ -214,15 +221,14 @@ std::string ofBursts(const FoundEffect& effect) {
 }
 
 std::string ofTransfer(const FoundEffect& effect) {
-  constexpr double NOTHING = 0.15;
   const std::string& channel = effect.words.at("channel");
   const double below = valueOf(effect, "below"), above = valueOf(effect, "above");
   const double corner = valueOf(effect, "corner_hz");
-  if (std::abs(above) < NOTHING)
+  if (std::abs(above) < LIMITS.nothing)
     return formatted(
         "%s is attenuated above %.3g Hz like behind a first-order low pass: check for an active filter",
         channel.c_str(), corner);
-  if (std::abs(below) < NOTHING)
+  if (std::abs(below) < LIMITS.nothing)
     return formatted(
         "%s is attenuated below %.3g Hz like behind a first-order high pass: check the time constant of its "
         "charge amplifier, %.2g s",

@@ -58,10 +58,7 @@ void validateEffects(Workbench& bench, const SearchOptions& options, SearchResul
     ValidationResult weakest_validation;
     for (std::size_t m = 0; m < best.members.size(); ++m) {
       const ValidationResult validation = validate(bench, best, found->without_member[m]);
-      options.log(
-          formatted("  %s: effect scale of the fitted tests %.3g +- %.2g, of the held-out tests %.3g +- %.2g",
-                    best.members[m].hypothesis->title().c_str(), validation.fitted.scale,
-                    validation.fitted.std_dev, validation.heldout.scale, validation.heldout.std_dev));
+      options.log("  " + best.members[m].hypothesis->title() + ": " + validation.text());
       if (validation.isAccepted() ||
           (weakest < best.members.size() &&
            validation.weakerGroup().margin() >= weakest_validation.weakerGroup().margin()))

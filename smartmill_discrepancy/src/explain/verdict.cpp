@@ -9,14 +9,18 @@
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/model/effect_catalogue.h"
-#include "smartmill_discrepancy/search/screening.h"
 #include "smartmill_discrepancy/search/unidentifiable_pair.h"
 #include "smartmill_discrepancy/search/validation.h"
 
 namespace smartmill::discrepancy {
 namespace {
 
-constexpr double TWIN_ACCURACY = 2e-4;  // share of a value by which two accurate simulations differ
+struct NamingOptions {
+  /// Squares over the noise at one standard deviation of the prior from which a value is identifiable.
+  double identifiable = 1.0;
+  double min_difference = 0.3;    ///< [1] of the noise by which predictions separate two effects
+  double separating_share = 0.5;  ///< [1] of an effect's gain that separates it from an alternative at most
+};
 
 // Parameters of a member with its values moved along a direction, within their bounds.
 std::vector<std::pair<std::string, double>> numbersAt(const Member& member, const Eigen::VectorXd& shift) {
@@ -77,7 +81,6 @@ void writeStdDevs(EffectEntry& entry, const std::vector<FoundParameter>& paramet
 
 // Number of identifiable directions of a member's values, e.g. one for the runout of a two-tooth tool.
 std::size_t identifiableValues(const Fitter& fitter, const FitState& state, std::size_t member) {
-  constexpr double IDENTIFIABLE = 1.0;  // squares over the noise at one standard deviation of the prior
   const std::vector<Coordinate>& coordinates = state.members[member].hypothesis->coordinates;
   Eigen::VectorXd prior(static_cast<Eigen::Index>(coordinates.size()));
   for (std::size_t c = 0; c < coordinates.size(); ++c)
@@ -85,7 +88,8 @@ std::size_t identifiableValues(const Fitter& fitter, const FitState& state, std:
   SimulatedChannels base;
   const Eigen::MatrixXd gram =
       prior.asDiagonal() * memberTangents(fitter, state, {member}, &base).gram() * prior.asDiagonal();
-  return static_cast<std::size_t>((linear::symmetricEigensystem(gram).values.array() > IDENTIFIABLE).count());
+  return static_cast<std::size_t>(
+      (linear::symmetricEigensystem(gram).values.array() > NamingOptions().identifiable).count());
 }
 
 // Manual test that separates two effects equal in every cut; empty if unknown.
@@ -101,8 +105,7 @@ std::string manualSeparation(const std::string& one, const std::string& other) {
 void addAlternatives(const Workbench& bench, const SearchOptions& options, const SearchResult& found,
                      std::size_t member, FoundEffect* effect,
                      std::vector<UnidentifiablePair>* unidentifiable) {
-  constexpr double MIN_DIFFERENCE =
-      0.3;  // [1] of the noise: smaller differences of predictions do not separate two effects
+  const NamingOptions limits;
   const Fitter& exact = bench.exact();
   const FitState& best = found.best.state;
   for (const Alternative& alternative : found.alternatives) {
@@ -110,11 +113,11 @@ void addAlternatives(const Workbench& bench, const SearchOptions& options, const
     effect->confidence = std::min(effect->confidence, validate(bench, best, alternative.state).confidence());
     effect->alternatives.emplace_back(alternative.effect, alternative.delta_bic);
     // A gain too small for naming an effect does not separate it from another.
-    const double threshold = std::min(options.min_gain, 0.5 * effect->delta_bic);
+    const double threshold = std::min(options.min_gain, limits.separating_share * effect->delta_bic);
     const double gain = effect->delta_bic - alternative.delta_bic;
     if (gain >= threshold) continue;
     const auto test = separatingTest(bench.data(), exact.model(best), exact.model(alternative.state));
-    const bool is_distinct = test && test->difference > MIN_DIFFERENCE;
+    const bool is_distinct = test && test->difference > limits.min_difference;
     // With more identifiable values and no other prediction it is only a more general effect.
     if (!is_distinct &&
         identifiableValues(bench.quick(), alternative.state, alternative.state.members.size() - 1) >

@@ -49,7 +49,7 @@ SearchResult validateWhitened(Workbench& bench, const std::vector<Hypothesis>& h
   if (!sameMembers(whitened.best.state, found->best.state) &&
       !refine(bench, whitened.best.state, options, found))
     found->clearMembers();
-  bench.alignTo(found->best.state);
+  bench.alignment().alignTo(found->best.state);
   return whitened;
 }
 

@@ -22,35 +22,51 @@ using Values = std::vector<double>;
 using Eigen::Index;
 using Eigen::MatrixXd;
 
+struct StoppingOptions {
+  int max_without_gain = 4;  ///< steps in a row
+  int patience = 3;          ///< steps before a competing fit ends this one
+  /// [1] of the last gain: largest expected gain of all later steps.
+  double expected_gain = 10.0;
+  double min_excess = 20.0;  ///< squares above the noise of which the tolerance is a share at least
+};
+
 // Ends a fit when a step gains a negligible share of the squares above the noise, when several steps gain
 // nothing, or when it cannot reach the competing fit.
 class StoppingRule {
  public:
-  StoppingRule(const FitOptions& options, double samples) : options_(options), samples_(samples) {}
+  StoppingRule(const FitOptions& options, double samples, const StoppingOptions& limits = {})
+      : options_(options), limits_(limits), samples_(samples) {}
 
   bool mayContinue(const fit::Progress& now) {
-    constexpr int MAX_WITHOUT_GAIN = 4, PATIENCE = 3;
     const double gain = before_ - now.squares;
     before_ = now.squares;
     steps_without_gain_ = gain > 0.0 ? 0 : steps_without_gain_ + 1;
     if (now.iteration == 0) return true;
     const bool negligible = gain > 0.0 && gain < minGain(now.squares);
     const bool cannot_improve =
-        now.iteration >= PATIENCE && now.squares - options_.to_beat > EXPECTED_GAIN_FACTOR * gain;
-    return !negligible && !cannot_improve && steps_without_gain_ < MAX_WITHOUT_GAIN;
+        now.iteration >= limits_.patience && now.squares - options_.to_beat > limits_.expected_gain * gain;
+    return !negligible && !cannot_improve && steps_without_gain_ < limits_.max_without_gain;
   }
   bool mayImprove(double squares, double predicted) const {
-    return predicted >= minGain(squares) && squares - EXPECTED_GAIN_FACTOR * predicted <= options_.to_beat;
+    return predicted >= minGain(squares) && squares - limits_.expected_gain * predicted <= options_.to_beat;
   }
 
  private:
-  static constexpr double EXPECTED_GAIN_FACTOR = 10.0;  // gain of later steps over that of the last one
   double minGain(double squares) const {
-    return options_.tolerance * std::min(std::max(squares - samples_, 20.0), squares);
+    return options_.tolerance * std::min(std::max(squares - samples_, limits_.min_excess), squares);
   }
   const FitOptions& options_;
+  StoppingOptions limits_;
   double samples_, before_ = std::numeric_limits<double>::infinity();
   int steps_without_gain_ = 0;
+};
+
+struct SolverOptions {
+  int cheap_step_factor = 2;  ///< more steps if each simulates few coordinates
+  /// [1] Trust radii of successive runs if nominal values are simulated, and of the only run if they are
+  /// frozen: damped for curved costs, then undamped.
+  std::vector<double> radii_simulated{1e4, 1e10}, radii_frozen{1e5};
+  double parameter_tolerance = 1e-7;  ///< [1] relative step: far below any standard deviation
 };
 
 // Damped steps for curved costs. If nominal values are simulated, undamped steps follow: an effect and a
@@ -58,19 +74,18 @@ class StoppingRule {
 // @return no value if the twin gives no finite values at the start
 std::optional<Eigen::VectorXd> solve(const CampaignCost& cost, const FitOptions& options, double samples,
                                      const std::function<bool()>& cancelled) {
-  constexpr int CHEAP_STEP_FACTOR = 2;  // more steps if each simulates few coordinates
-  if (options.iterations == 0) return cost.start();
+  const SolverOptions steps;
+  if (options.iterations == 0) return cost.coordinates().start();
   fit::Options solver;
   solver.name = "fit of a campaign";
-  solver.iterations = cost.simulatesAll() ? options.iterations : CHEAP_STEP_FACTOR * options.iterations;
+  solver.iterations = cost.simulatesAll() ? options.iterations : steps.cheap_step_factor * options.iterations;
   solver.function_tolerance = 1e-15;  // StoppingRule decides
-  solver.parameter_tolerance = 1e-7;
+  solver.parameter_tolerance = steps.parameter_tolerance;
   solver.costly_derivatives = true;
   solver.finish_at_bounds = false;  // simulations are expensive and later rounds refit
   std::vector<fit::Parameter> parameters = cost.parameters();
   Eigen::VectorXd own(static_cast<Index>(parameters.size()));
-  const std::vector<double> radii =
-      cost.simulatesAll() ? std::vector<double>{1e4, 1e10} : std::vector<double>{1e5};
+  const std::vector<double>& radii = cost.simulatesAll() ? steps.radii_simulated : steps.radii_frozen;
   for (const double radius : radii) {
     StoppingRule rule(options, samples);
     solver.progress = [&](const fit::Progress& now) {
@@ -93,8 +108,7 @@ std::optional<Eigen::VectorXd> solve(const CampaignCost& cost, const FitOptions&
 
 // Inverse of the information with priors.
 MatrixXd covarianceOf(const CampaignCost& cost, MatrixXd information) {
-  for (Index c = 0; c < information.cols(); ++c)
-    information(c, c) += cost.precision(static_cast<std::size_t>(c));
+  for (Index c = 0; c < information.cols(); ++c) information(c, c) += cost.coordinates().precision()[c];
   return linear::inverseSymmetric(information);
 }
 
@@ -133,14 +147,14 @@ double influenceVariance(const TwinRunner& runner, const Eigen::VectorXd& influe
 // Cost, residual and covariance at a point. @return false if there are no finite values
 bool describe(const CampaignCost& cost, const Eigen::VectorXd& at, double samples, std::size_t records,
               FitResult& fit) {
-  const CampaignCost::Linear* point = cost.linearise(at);
+  const CampaignLinearisation::Linear* point = cost.linearisation().linearise(at);
   if (!point) return false;
-  fit.state = cost.stateAt(at);
-  const Eigen::VectorXd residual = cost.residual(at);
+  fit.state = cost.coordinates().stateAt(at);
+  const Eigen::VectorXd residual = cost.linearisation().residual(at);
   fit.chi2 = residual.squaredNorm();
   fit.residual.resize(static_cast<std::size_t>(residual.size()));
   Eigen::Map<Eigen::VectorXd>(fit.residual.data(), residual.size()) = -residual;
-  fit.penalty = cost.penaltyAt(at);
+  fit.penalty = cost.coordinates().penaltyAt(at);
   fit.bic = fit.chi2 + fit.penalty;
   const auto of_records = static_cast<double>(records);
   for (const Member& m : fit.state.members) {
@@ -211,9 +225,31 @@ NominalTangents Fitter::nominalTangents(const FitState& state) const {
   return tangents;
 }
 
+SparseColumns memberTangents(const Fitter& fitter, const FitState& state,
+                             const std::vector<std::size_t>& members, SimulatedChannels* base) {
+  std::vector<MachineModel> models{fitter.model(state)};
+  std::vector<double> steps;
+  for (const std::size_t m : members) {
+    const std::vector<Coordinate>& coordinates = state.members[m].hypothesis->coordinates;
+    for (std::size_t c = 0; c < coordinates.size(); ++c) {
+      FitState moved = state;
+      double& value = moved.members[m].values[c];
+      const double step =
+          value + coordinates[c].step > coordinates[c].high ? -coordinates[c].step : coordinates[c].step;
+      value += step;
+      steps.push_back(step);
+      models.push_back(fitter.model(moved));
+    }
+  }
+  auto simulated = fitter.runner().simulateChannels(models);
+  *base = std::move(simulated.front());
+  simulated.erase(simulated.begin());
+  return {fitter.runner(), *base, simulated, steps};
+}
+
 FitResult Fitter::fit(const FitState& start, const NominalTangents* frozen, const FitOptions& options) const {
   const CampaignCost cost(*this, start, frozen, options);
-  const double samples = runner_.effectiveSamples();
+  const double samples = runner_.channels().effectiveSamples();
   FitResult fit;
   const std::optional<Eigen::VectorXd> at = solve(cost, options, samples, cancelled_);
   fit.converged = at && describe(cost, *at, samples, runner_.tests().size(), fit);
@@ -229,15 +265,15 @@ std::optional<FitState> Fitter::linearOptimum(const FitState& state, const Nomin
   FitOptions options;
   options.prior_weight = prior_weight;
   const CampaignCost cost(*this, state, &tangents, options);
-  const std::optional<Eigen::VectorXd> at = cost.linearOptimumFrom(cost.start());
-  return at ? std::optional<FitState>(cost.stateAt(*at)) : std::nullopt;
+  const std::optional<Eigen::VectorXd> at = cost.linearOptimumFrom(cost.coordinates().start());
+  return at ? std::optional<FitState>(cost.coordinates().stateAt(*at)) : std::nullopt;
 }
 
 double Fitter::penalty(const FitState& state, double prior_weight) const {
   FitOptions options;
   options.prior_weight = prior_weight;
-  const CampaignCost cost(*this, state, nullptr, options);
-  return cost.penaltyAt(cost.start());
+  const CampaignCoordinates coordinates(*this, state, nullptr, options);
+  return coordinates.penaltyAt(coordinates.start());
 }
 
 MatrixXd Fitter::sandwichCovariance(const FitState& state, const NominalTangents& tangents,
@@ -245,12 +281,13 @@ MatrixXd Fitter::sandwichCovariance(const FitState& state, const NominalTangents
   FitOptions options;
   options.prior_weight = prior_weight;
   const CampaignCost cost(*this, state, &tangents, options);
-  const Eigen::VectorXd& at = cost.start();
+  const Eigen::VectorXd& at = cost.coordinates().start();
   Eigen::VectorXd std_dev(at.size());
-  const CampaignCost::Linear* point = cost.linearise(at);
+  CampaignLinearisation& linearisation = cost.linearisation();
+  const CampaignLinearisation::Linear* point = linearisation.linearise(at);
   if (!point) return {};
   const MatrixXd inverse = covarianceOf(cost, point->information);
-  const Eigen::VectorXd residual = cost.residual(at);
+  const Eigen::VectorXd residual = linearisation.residual(at);
   const std::vector<ChannelSpan>& blocks = runner_.spans();
   std::vector<Values> power(blocks.size());
   runParallel(blocks.size(), runner_.threads(), [&](std::size_t b) {
@@ -258,10 +295,10 @@ MatrixXd Fitter::sandwichCovariance(const FitState& state, const NominalTangents
   });
   runParallel(cost.coordinates().size(), runner_.threads(), [&](std::size_t coordinate) {
     const auto c = static_cast<Index>(coordinate);
-    double variance = influenceVariance(runner_, cost.influence(inverse.col(c)), residual, power);
+    double variance = influenceVariance(runner_, linearisation.influence(inverse.col(c)), residual, power);
     // Stated values have an error of their own.
     for (Index k = 0; k < at.size(); ++k) {
-      const double precision = cost.precision(static_cast<std::size_t>(k));
+      const double precision = cost.coordinates().precision()[k];
       variance += std::pow(inverse(k, c), 2) * prior_weight * precision;
     }
     std_dev[c] = std::sqrt(variance / inverse(c, c));

@@ -11,8 +11,6 @@
 namespace smartmill::discrepancy {
 namespace {
 
-constexpr std::size_t LEAST_TESTS = 4;
-
 struct Condition {
   const char* name;
   std::function<double(const CampaignTest&)> of;
@@ -51,7 +49,7 @@ bool differ(const std::vector<TestAmplitude>& amplitudes) {
     spread += z * z;
   }
   const std::size_t freedom = amplitudes.size() - 1;
-  return chiSquareTail(spread, freedom + freedom % 2) <= 1e-4;
+  return chiSquareTail(spread, freedom + freedom % 2) <= SIGNIFICANT;
 }
 
 // Correlation of the amplitudes with a condition; 0 if one of them is constant.
@@ -76,19 +74,19 @@ double correlation(const std::vector<TestAmplitude>& amplitudes, const Condition
 
 }  // namespace
 
-std::vector<std::string> dependentConditions(const std::vector<TestAmplitude>& amplitudes) {
-  constexpr double AIR_SHARE = 0.3;  // amplitude outside cuts over that in cuts: limit for "cutting"
+std::vector<std::string> dependentConditions(const std::vector<TestAmplitude>& amplitudes,
+                                             const DependenceOptions& options) {
   std::vector<TestAmplitude> cuts, rest, with_spindle;
   for (const TestAmplitude& s : amplitudes) {
     (s.test->test.kind == TestKind::cut ? cuts : rest).push_back(s);
     if (s.test->test.kind != TestKind::tap) with_spindle.push_back(s);
   }
   std::vector<std::string> names;
-  if (!cuts.empty() && !rest.empty() && rmsAmplitude(rest) < AIR_SHARE * rmsAmplitude(cuts))
+  if (!cuts.empty() && !rest.empty() && rmsAmplitude(rest) < options.air_share * rmsAmplitude(cuts))
     names.push_back("cutting");
-  const bool among_cuts = cuts.size() >= LEAST_TESTS;
+  const bool among_cuts = cuts.size() >= options.min_tests;
   const std::vector<TestAmplitude>& chosen = among_cuts ? cuts : with_spindle;
-  if (chosen.size() < LEAST_TESTS || !differ(chosen)) return names;
+  if (chosen.size() < options.min_tests || !differ(chosen)) return names;
   const std::vector<Condition> conditions = conditionsOf(among_cuts);
   std::vector<std::pair<double, std::string>> strengths;
   for (const Condition& c : conditions) {
@@ -96,7 +94,7 @@ std::vector<std::string> dependentConditions(const std::vector<TestAmplitude>& a
     const double r = correlation(chosen, c);
     const double z = std::atanh(std::min(r, 0.999999)) *
                      std::sqrt(std::max(static_cast<double>(chosen.size()) - 3.0, 1.0));
-    if (std::erfc(z / std::sqrt(2.0)) * static_cast<double>(conditions.size()) < 0.05)
+    if (std::erfc(z / std::sqrt(2.0)) * static_cast<double>(conditions.size()) < options.chance)
       strengths.emplace_back(-r, c.name);
   }
   std::sort(strengths.begin(), strengths.end());

@@ -7,12 +7,11 @@
 namespace smartmill::discrepancy {
 
 CampaignGap campaignGap(const Dataset& data, const MachineModel& model, int threads) {
-  constexpr int SUBSTEPS = 8;
   std::vector<std::size_t> all;
   for (std::size_t t = 0; t < data.tests.size(); ++t) {
     if (!data.tests[t].chatter) all.push_back(t);
   }
-  const TwinRunner runner(data, all, threads, SUBSTEPS);
+  const TwinRunner runner(data, all, threads, EXACT_SUBSTEPS);
   const std::vector<double> simulated = runner.simulate(model);
   CampaignGap result;
   double sum = 0.0;

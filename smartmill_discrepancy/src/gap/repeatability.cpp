@@ -6,20 +6,13 @@
 #include "gap/orders.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
+#include "smartmill_discrepancy/data/alignment.h"
 
 namespace smartmill::discrepancy {
 namespace {
 
 constexpr int MAX_STEPS = 30;        // of conjugate gradients: the columns are nearly orthogonal
 constexpr double TOLERANCE = 1e-10;  // of the squares of the first gradient
-constexpr double HIGHEST = 0.9;      // of the Nyquist frequency
-
-double revolutionsIn(const std::vector<double>& angle) {
-  double rotated = 0.0;
-  for (std::size_t i = 1; i < angle.size(); ++i)
-    rotated += std::remainder(angle[i] - angle[i - 1], units::TWO_PI);
-  return std::abs(rotated) / units::TWO_PI;
-}
 
 double dot(const std::vector<double>& a, const std::vector<double>& b) {
   double sum = 0.0;
@@ -52,11 +45,13 @@ double residualSquares(const OrderBasis& orders, std::size_t count, std::vector<
 }  // namespace
 
 std::optional<Repeatability> repeatability(const std::vector<double>& values,
-                                           const std::vector<double>& angle) {
-  const double revolutions = revolutionsIn(angle), samples = static_cast<double>(values.size());
-  if (values.size() != angle.size() || revolutions < LEAST_REVOLUTIONS) return {};
+                                           const std::vector<double>& angle,
+                                           const RepeatabilityOptions& options) {
+  const double revolutions = std::abs(rotationOf(angle)) / units::TWO_PI,
+               samples = static_cast<double>(values.size());
+  if (values.size() != angle.size() || revolutions < options.min_revolutions) return {};
   const auto orders =
-      static_cast<std::size_t>(std::max(1.0, std::floor(HIGHEST * 0.5 * samples / revolutions)));
+      static_cast<std::size_t>(std::max(1.0, std::floor(options.highest * 0.5 * samples / revolutions)));
   const double level = mean(values);
   std::vector<double> about = values;
   for (double& v : about) v -= level;

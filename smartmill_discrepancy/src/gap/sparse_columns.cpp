@@ -31,28 +31,6 @@ SparseColumns::SparseColumns(const TwinRunner& runner, const SimulatedChannels& 
   spans_ = std::make_shared<const AllSpanColumns>(std::move(spans));
 }
 
-SparseColumns::SparseColumns(const TwinRunner& runner, const std::vector<std::vector<double>>& columns)
-    : cols_(static_cast<Index>(columns.size())) {
-  AllSpanColumns spans;
-  for (const ChannelSpan& span : runner.spans()) {
-    SpanColumns span_columns{static_cast<Index>(span.offset), static_cast<Index>(span.size), {}, {}};
-    for (std::size_t k = 0; k < columns.size(); ++k) {
-      const auto begin = columns[k].begin() + static_cast<std::ptrdiff_t>(span.offset);
-      if (std::any_of(begin, begin + static_cast<std::ptrdiff_t>(span.size),
-                      [](double v) { return v != 0.0; }))
-        span_columns.columns.push_back(static_cast<Index>(k));
-    }
-    span_columns.values.resize(span_columns.size, static_cast<Index>(span_columns.columns.size()));
-    for (Index c = 0; c < span_columns.values.cols(); ++c) {
-      const std::vector<double>& column =
-          columns[static_cast<std::size_t>(span_columns.columns[static_cast<std::size_t>(c)])];
-      span_columns.values.col(c) = Eigen::Map<const VectorXd>(column.data() + span.offset, span_columns.size);
-    }
-    spans.push_back(std::move(span_columns));
-  }
-  spans_ = std::make_shared<const AllSpanColumns>(std::move(spans));
-}
-
 bool SparseColumns::allFinite() const {
   return std::all_of(spans_->begin(), spans_->end(),
                      [](const SpanColumns& p) { return p.values.allFinite(); });

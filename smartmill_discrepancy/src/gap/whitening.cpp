@@ -32,9 +32,8 @@ std::vector<double> nextPredictor(const std::vector<double>& weights, const std:
 
 }  // namespace
 
-Whitening::Whitening(const double* residual, std::size_t size) {
-  constexpr std::size_t SAMPLES_OF_ORDER = 16;  // minimum, so that a few values get at most a variance
-  const std::size_t max_order = std::min(MAX_ORDER, size / SAMPLES_OF_ORDER);
+Whitening::Whitening(const double* residual, std::size_t size, const WhiteningOptions& options) {
+  const std::size_t max_order = std::min(options.max_order, size / options.samples_per_order);
   const std::vector<double> lags = autocovariance(residual, size, max_order);
   const auto n = static_cast<double>(size);
   if (size == 0 || !std::isfinite(lags[0]) || lags[0] <= 0.0) return;

@@ -22,7 +22,8 @@ bool isToothPath(const EffectEntry& entry) {
 
 }  // namespace
 
-NominalFreedom::NominalFreedom(const MachineModel& nominal) {
+NominalFreedom::NominalFreedom(const MachineModel& nominal, const NominalFreedomOptions& options)
+    : options_(options) {
   if (nominal.cutting) addCutting(nominal);
   addModes(nominal);
   if (nominal.spindle) addSpindle(nominal);
@@ -31,8 +32,8 @@ NominalFreedom::NominalFreedom(const MachineModel& nominal) {
 
 // From the surface rule of formats.md to the true tooth path.
 void NominalFreedom::addToothPath() {
-  constexpr double STD = 0.5, LEAST = -0.5, MOST = 1.5, STEP = 0.02;
-  coordinates_.push_back({PATH_SHARE, 0.0, LEAST, MOST, STEP, STD});
+  const NominalFreedomOptions& o = options_;
+  coordinates_.push_back({PATH_SHARE, 0.0, o.path_low, o.path_high, o.path_step, o.path_std});
   scale_.push_back([](MachineModel& m, double factor) {
     auto path = std::find_if(m.effects.begin(), m.effects.end(), isToothPath);
     if (path == m.effects.end()) {
@@ -44,12 +45,9 @@ void NominalFreedom::addToothPath() {
 }
 
 void NominalFreedom::add(std::string name, double value, double percent, Scale scale) {
-  // Too narrow to hide an effect that the value could replace.
-  constexpr double REACH = 4.5;
-  constexpr double STEP = 2e-3;  // of numerical derivatives, in standard deviations
   if (value == 0.0 || !std::isfinite(value) || percent <= 0.0) return;
-  const double std_dev = 0.01 * percent;
-  coordinates_.push_back({std::move(name), 0.0, -REACH * std_dev, REACH * std_dev, STEP * std_dev, std_dev});
+  const double std_dev = 0.01 * percent, reach = options_.reach * std_dev;
+  coordinates_.push_back({std::move(name), 0.0, -reach, reach, options_.step * std_dev, std_dev});
   scale_.push_back(std::move(scale));
 }
 
@@ -122,9 +120,8 @@ std::optional<std::size_t> NominalFreedom::pathShare() const {
   return {};
 }
 
-bool NominalFreedom::isPathShareSignificant(double share, double std_dev) {
-  constexpr double MIN_DEVIATIONS = 3.0;
-  return std::abs(share) >= MIN_DEVIATIONS * std_dev;
+bool NominalFreedom::isPathShareSignificant(double share, double std_dev) const {
+  return std::abs(share) >= options_.min_path_deviations * std_dev;
 }
 
 void NominalFreedom::writeStdDevs(MachineModel& model, const std::vector<double>& std_devs) const {

@@ -18,9 +18,13 @@
 namespace smartmill::discrepancy {
 namespace {
 
-constexpr double MIN_RUNNING = 0.1;     // [s] before a segment, in which the twin reaches the steady state
-constexpr double LIMIT_SETTLING = 0.6;  // [s] decay time of vibrations near the stability limit
-constexpr std::size_t MIN_MEASUREMENTS = 5;  // of the load meter
+struct SettlingOptions {
+  double twin = 0.1;                 ///< [s] before a segment, in which the twin reaches the steady state
+  double near_limit = 0.6;           ///< [s] decay time of vibrations near the stability limit
+  std::size_t min_measurements = 5;  ///< of the load meter: fewer have no meaningful RMS
+};
+
+const SettlingOptions LIMITS;
 
 // RMS difference between consecutive revolutions [N], the larger of fx and fy.
 double revolutionDifference(const Record& record, const CampaignTest& test) {
@@ -71,7 +75,7 @@ LiveGap liveGap(const MachineModel& model, const RecordSegment& segment, const L
     return result;
   }
   const bool with_load =
-      model.spindle && model.spindle->load_meter_full_scale && segment.load.size() >= MIN_MEASUREMENTS;
+      model.spindle && model.spindle->load_meter_full_scale && segment.load.size() >= LIMITS.min_measurements;
   Record with_channels = segment.record;
   if (with_load) with_channels.add("load_meter").assign(with_channels.size(), 0.0);
   sim::SimulationOptions twin;
@@ -81,13 +85,13 @@ LiveGap liveGap(const MachineModel& model, const RecordSegment& segment, const L
   if (segment.test.kind == TestKind::cut && hasToolModes(model) &&
       revolutionDifference(simulated, segment.test) > std::min(noise[0], noise[1])) {
     result.near_limit = true;
-    if (segment.test.running_before.value_or(0.0) < LIMIT_SETTLING) {
+    if (segment.test.running_before.value_or(0.0) < LIMITS.near_limit) {
       result.exclusion = "is near its stability limit and not yet steady";
       return result;
     }
   }
   const std::size_t from =
-      segment.test.running_before.value_or(0.0) >= MIN_RUNNING ? 0 : segment.record.size() / 2;
+      segment.test.running_before.value_or(0.0) >= LIMITS.twin ? 0 : segment.record.size() / 2;
   std::size_t axis = 0;
   for (const char* channel : {"fx", "fy", "fz"}) {
     const auto &m = segment.record.column(channel), &s = simulated.column(channel);
@@ -127,7 +131,7 @@ Record resampledLoad(const RecordSegment& segment, double full_scale) {
 void recordLoad(const MachineModel& model, const RecordSegment& segment, const std::string& name,
                 const std::string& folder, std::vector<SlowChannel>* slow) {
   const bool has_full_scale = model.spindle && model.spindle->load_meter_full_scale;
-  if (!has_full_scale || segment.load.size() < MIN_MEASUREMENTS) return;
+  if (!has_full_scale || segment.load.size() < LIMITS.min_measurements) return;
   const Record load_record = resampledLoad(segment, *model.spindle->load_meter_full_scale);
   const double lasts = load_record.time.back() - load_record.time.front();
   if (!(lasts > 0.0)) return;

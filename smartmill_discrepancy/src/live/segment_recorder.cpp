@@ -10,19 +10,10 @@
 #include "smartmill_core/units.h"
 
 namespace smartmill::discrepancy {
-namespace {
-
-constexpr double SPEED_TOLERANCE = 0.02;  // of the stated speed
-constexpr double ANGLE_TOLERANCE = 0.02;  // [rad] from constant speed
-constexpr double CONFIRMATION_TIME =
-    0.05;  // [s] of steady motion after a segment, since the controller's state may be late
-constexpr double HISTORY = 1.0;  // [s] of angles and loads in addition to the length of a segment
-
-}  // namespace
-
 SegmentRecorder::SegmentRecorder(const SegmentParameters& parameters,
-                                 std::function<void(const RecordSegment&)> deliver)
-    : parameters_(parameters), deliver_(std::move(deliver)) {
+                                 std::function<void(const RecordSegment&)> deliver,
+                                 const SteadinessOptions& limits)
+    : parameters_(parameters), limits_(limits), deliver_(std::move(deliver)) {
 }
 
 void SegmentRecorder::reset() {
@@ -53,14 +44,13 @@ void SegmentRecorder::handle(const CncState& state) {
   if (!condition_ || condition_->kind == CuttingCondition::Kind::none) return;
   const bool cut = condition_->kind == CuttingCondition::Kind::cut;
   const bool path = !cut || onSteadyPath(*condition_, state, parameters_.path_tolerance);
-  const bool steady =
-      path && std::abs(state.spindle_speed / condition_->spindle_speed - 1.0) < SPEED_TOLERANCE;
+  const bool steady = path && std::abs(state.spindle_speed / condition_->spindle_speed - 1.0) < limits_.speed;
   if (steady && !steady_since_) steady_since_ = state.stamp;
   if (!steady && steady_since_) {
     if (cut) cut_time_ += state.stamp - *steady_since_;
     restartSegment();
   }
-  while (!unconfirmed_.empty() && state.stamp >= unconfirmed_.front().stamp + CONFIRMATION_TIME) {
+  while (!unconfirmed_.empty() && state.stamp >= unconfirmed_.front().stamp + limits_.confirmation) {
     const RecordSegment segment = std::move(unconfirmed_.front());
     unconfirmed_.pop_front();
     deliver_(segment);
@@ -69,12 +59,12 @@ void SegmentRecorder::handle(const CncState& state) {
 
 void SegmentRecorder::handle(const SpindleAngle& angle) {
   angles_.push_back(angle);
-  while (angles_.front().stamp < angle.stamp - parameters_.length - HISTORY) angles_.pop_front();
+  while (angles_.front().stamp < angle.stamp - parameters_.length - limits_.history) angles_.pop_front();
 }
 
 void SegmentRecorder::handle(const LoadSample& load) {
   loads_.push_back(load);
-  while (loads_.front().stamp < load.stamp - parameters_.length - HISTORY) loads_.pop_front();
+  while (loads_.front().stamp < load.stamp - parameters_.length - limits_.history) loads_.pop_front();
 }
 
 void SegmentRecorder::handle(const SampleBlock& dynamometer) {
@@ -119,7 +109,7 @@ std::optional<SegmentRecorder::SpindleRotation> SegmentRecorder::steadyRotation(
   const bool is_steady = std::all_of(angles_.begin(), angles_.end(), [&](const SpindleAngle& a) {
     const double expected = rotation.phase + rotation.speed * (a.stamp - begin);
     return a.stamp < begin || a.stamp > end ||
-           std::abs(std::remainder(a.angle - expected, units::TWO_PI)) < ANGLE_TOLERANCE;
+           std::abs(std::remainder(a.angle - expected, units::TWO_PI)) < limits_.angle;
   });
   if (!is_steady) return {};
   return rotation;

@@ -90,7 +90,7 @@ std::string spectra(const Explanation& e) {
         double at = 0.0;
         if (f.domain == "frequency") at = f.location.at("frequency_hz");
         if (f.domain == "order") at = f.location.at("order") * s.order_hz;
-        if (at > 0.0 && at < 4000.0) {
+        if (at > 0.0 && at < HIGHEST_PICTURED) {
           out << "set arrow from " << at << ", graph 0.9 to " << at << ", graph 0.82 lc '"
               << (list == &e.where ? "#d95f02" : "#7570b3") << "'\n";
         }

@@ -21,13 +21,12 @@ std::map<std::string, double> squaresOf(const TwinRunner& runner, const std::vec
 
 double requiredGain(const TwinRunner& runner, const FitResult& less, const FitResult& more,
                     const SearchOptions& options) {
-  constexpr double SHARE = 0.05;  // of the gain, for a channel to count
   if (!less.converged || !more.converged) return options.min_gain;
   const auto before = squaresOf(runner, less.residual), after = squaresOf(runner, more.residual),
              signal = squaresOf(runner, runner.measured());
   double floor = 0.0;
   for (const auto& [channel, squares] : signal) {
-    if (before.at(channel) - after.at(channel) > SHARE * (less.chi2 - more.chi2))
+    if (before.at(channel) - after.at(channel) > options.min_channel_share * (less.chi2 - more.chi2))
       floor += squares * options.twin_accuracy * options.twin_accuracy;
   }
   return std::max(options.min_gain, floor);
@@ -35,7 +34,7 @@ double requiredGain(const TwinRunner& runner, const FitResult& less, const FitRe
 
 bool reducesPriorTension(const FitResult& less, const FitResult& more, const SearchOptions& options) {
   return less.bic - more.bic > options.min_prior_gain &&
-         less.penalty - more.penalty > 4.0 * options.min_prior_gain;
+         less.penalty - more.penalty > options.requiredPenaltyReduction();
 }
 
 bool isSignificant(const TwinRunner& runner, const FitResult& less, const FitResult& more,

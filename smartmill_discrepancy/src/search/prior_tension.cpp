@@ -8,6 +8,7 @@
 #include "smartmill_discrepancy/search/evidence.h"
 #include "smartmill_discrepancy/search/refinement.h"
 #include "smartmill_discrepancy/search/screening.h"
+#include "smartmill_discrepancy/search/start_values.h"
 #include "smartmill_discrepancy/search/validation.h"
 
 namespace smartmill::discrepancy {
@@ -20,13 +21,12 @@ double tensionReduction(const PredictedGain& predicted) {
 
 bool mayReduceTension(const Fitter& fitter, const PredictedGain& predicted, const SearchOptions& options) {
   return !predicted.start.empty() && predicted.gain > ValidationResult::requiredSquares() &&
-         tensionReduction(predicted) > 4.0 * options.min_prior_gain &&
+         tensionReduction(predicted) > options.requiredPenaltyReduction() &&
          ValidationResult::isAcceptedByFitted(fittedScale(fitter, predicted));
 }
 
 // Whether nominal values deviate from their stated values by more than chance.
 bool hasPriorTension(const Workbench& bench, const FitResult& fit) {
-  constexpr double CHANCE = 1e-4;
   const std::vector<Coordinate>& free = bench.freedom().coordinates();
   double squares = 0.0;
   for (std::size_t c = 0; c < free.size(); ++c) {
@@ -35,20 +35,19 @@ bool hasPriorTension(const Workbench& bench, const FitResult& fit) {
   }
   // Missing effects displace them too.
   const double variance = std::max(1.0, fit.chi2 / bench.samples());
-  return chiSquareTail(squares / variance, free.size() + free.size() % 2) < CHANCE;
+  return chiSquareTail(squares / variance, free.size() + free.size() % 2) < SIGNIFICANT;
 }
 
 }  // namespace
 
 std::optional<FitState> resolvePriorTension(Workbench& bench, const std::vector<Hypothesis>& hypotheses,
                                             const SearchOptions& options, SearchResult* found) {
-  constexpr std::size_t MAX_FITS = 3;
   if (!hasPriorTension(bench, found->best)) return {};
   const Fitter& quick = bench.quick();
   const NominalTangents tangents = bench.linearise(found->best.state);
   const NominalTangents alignment_tangents =
       tangents.ofAlignments();  // nominal values must be simulated to follow the valley
-  const FitResult now = quick.fit(found->best.state, &tangents, {0, 1e-8, true});
+  const FitResult now = quick.fit(found->best.state, &tangents, FitOptions::toEvaluate());
   if (!now.converged) return {};
   ScreeningMemory memory;
   std::vector<PredictedGain> predictions =
@@ -63,17 +62,14 @@ std::optional<FitState> resolvePriorTension(Workbench& bench, const std::vector<
   const std::size_t first = found->candidates.size();
   std::optional<FitResult> best;
   for (const PredictedGain& predicted : predictions) {
-    if (found->candidates.size() - first >= MAX_FITS || bench.cancelled()) break;
+    if (found->candidates.size() - first >= options.max_tension_fits || bench.cancelled()) break;
     if (!mayReduceTension(quick, predicted, options)) continue;
     FitState with = now.state;
     with.members.push_back({predicted.hypothesis, bestStart(quick, now, predicted)});
     FitResult tried;
     found->candidates.push_back(fitCandidate(
         quick, predicted, round, now,
-        [&] {
-          return quick.fit(with, &alignment_tangents, {6, 1e-3, true});
-        },
-        &tried));
+        [&] { return quick.fit(with, &alignment_tangents, FitOptions::toCompare()); }, &tried));
     options.log(formatted("  prior tension, predicted gain %.4g, gain %.4g, reduction of the penalty %.4g  ",
                           predicted.gain, now.bic - tried.bic, now.penalty - tried.penalty) +
                 predicted.hypothesis->title());

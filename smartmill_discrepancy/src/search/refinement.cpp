@@ -7,11 +7,10 @@
 #include <utility>
 
 #include "smartmill_discrepancy/search/evidence.h"
+#include "smartmill_discrepancy/search/start_values.h"
 
 namespace smartmill::discrepancy {
 namespace {
-
-constexpr FitOptions COMPARED{6, 1e-3, true};
 
 // Derivatives and prior weight at the refined state.
 struct RefinedState {
@@ -41,42 +40,40 @@ FitOptions weighted(FitOptions options, double weight) {
 
 // Converges to the exact solution by correcting the quick twin at each iterate. Convergence is measured in
 // standard deviations, since the cost hardly changes along a narrow valley.
-RefinedState iterate(Workbench& bench, FitState from, FitResult* best) {
-  constexpr int PASSES = 6;
-  constexpr double TOLERANCE = 0.1, SAME_TANGENTS = 2.0, MIN_DISTANCE = 0.5;  // standard deviations
+RefinedState iterate(Workbench& bench, FitState from, FitResult* best, const RefinementOptions& options) {
   RefinedState refined;
   bool reuse_tangents = false;
-  for (int pass = 0; pass <= PASSES; ++pass) {
-    const bool realigned = bench.alignPhases(from) > 0.0;
+  for (int pass = 0; pass <= options.passes; ++pass) {
+    const bool realigned = bench.alignment().alignPhases(from) > 0.0;
     double squares = 0.0;
     refined.tangents = reuse_tangents ? bench.lineariseBy(std::move(refined.tangents), from, &squares)
                                       : bench.linearise(from, &squares);
     // With an unexplained residual the stated uncertainties count in proportion to its variance.
     refined.weight = std::max(1.0, squares / bench.samples());
     // The covariance along a valley requires all derivatives at one point.
-    FitResult here = bench.quick().fit(from, &refined.tangents, weighted({0, 1e-8, true}, refined.weight));
+    FitResult here =
+        bench.quick().fit(from, &refined.tangents, weighted(FitOptions::toEvaluate(), refined.weight));
     if (!here.converged) break;
     const Eigen::MatrixXd covariance = refined.weight * here.covariance;
     *best = std::move(here);
     refined.converged = true;
-    if (pass == PASSES || bench.cancelled()) break;
-    const FitResult next =
-        bench.quick().fit(from, &refined.tangents, weighted({6, 1e-5, true}, refined.weight));
+    if (pass == options.passes || bench.cancelled()) break;
+    const FitResult next = bench.quick().fit(from, &refined.tangents, weighted(options.step, refined.weight));
     if (!next.converged) break;
     FitState next_state = next.state;
     // If values can replace each other, frozen derivatives slow the others down: the linear optimum may be
     // better.
     const std::optional<FitState> linear =
         bench.quick().linearOptimum(from, refined.tangents, refined.weight);
-    if (linear && largestChange(next.state, *linear, covariance) > MIN_DISTANCE) {
+    if (linear && largestChange(next.state, *linear, covariance) > options.min_distance) {
       const auto cost = [&](const FitState& state) {
         return bench.exactSquares(state) + bench.quick().penalty(state, refined.weight);
       };
       if (cost(*linear) < cost(next.state)) next_state = *linear;
     }
     const double by = largestChange(from, next_state, covariance);
-    if (by < TOLERANCE && !realigned) break;
-    reuse_tangents = by < SAME_TANGENTS && !realigned;
+    if (by < options.tolerance && !realigned) break;
+    reuse_tangents = by < options.same_tangents && !realigned;
     from = next_state;
   }
   return refined;
@@ -84,8 +81,8 @@ RefinedState iterate(Workbench& bench, FitState from, FitResult* best) {
 
 // Alternatives of a member among the candidates of the round that accepted it.
 std::vector<const Candidate*> alternativesOf(const FitState& state, std::size_t member,
-                                             const std::vector<Candidate>& candidates) {
-  constexpr double NEAR = 0.3;  // of the round's largest gain
+                                             const std::vector<Candidate>& candidates,
+                                             const RefinementOptions& options) {
   const Hypothesis& own = *state.members[member].hypothesis;
   std::size_t round = 0;
   for (const Candidate& r : candidates) {
@@ -98,8 +95,8 @@ std::vector<const Candidate*> alternativesOf(const FitState& state, std::size_t 
   }
   std::vector<const Candidate*> alternatives;
   for (const Candidate& r : candidates) {
-    if (r.result.round == round && r.result.effect != own.effect && r.result.delta_bic >= NEAR * largest &&
-        !hasMember(state, r.result.effect, r.result.variant))
+    if (r.result.round == round && r.result.effect != own.effect &&
+        r.result.delta_bic >= options.near * largest && !hasMember(state, r.result.effect, r.result.variant))
       alternatives.push_back(&r);
   }
   return alternatives;
@@ -110,15 +107,16 @@ std::vector<double> startOf(const Fitter& fitter, const Candidate& alternative, 
   return equivalentValues(fitter, member, *alternative.hypothesis).value_or(alternative.values);
 }
 
-// Whether an alternative has at least half of the member's effect; otherwise both may act independently.
-bool replaces(const FitResult& alternative, const FitResult& member, const FitResult& without_member) {
+// Whether an alternative has enough of the member's effect; otherwise both may act independently.
+bool replaces(const FitResult& alternative, const FitResult& member, const FitResult& without_member,
+              double min_overlap) {
   double product = 0.0, own = 0.0;
   for (std::size_t i = 0; i < without_member.residual.size(); ++i) {
     const double d = without_member.residual[i] - member.residual[i];
     product += d * (without_member.residual[i] - alternative.residual[i]);
     own += d * d;
   }
-  return product > 0.5 * own;
+  return product > min_overlap * own;
 }
 
 }  // namespace
@@ -136,30 +134,44 @@ Candidate fitCandidate(const Fitter& fitter, const PredictedGain& predicted, std
           tried->state.members.back().values};
 }
 
+FitResult withoutUnneeded(const Fitter& fitter, FitResult fit, const NominalTangents& tangents,
+                          const SearchOptions& options, bool keep_newest) {
+  const std::vector<Member>& members = fit.state.members;
+  const std::size_t kept = keep_newest ? 1 : 0;
+  for (std::size_t m = 0; m + kept < members.size() && members.size() > 1;) {
+    FitResult less = fitter.fit(without(fit.state, m), &tangents, FitOptions::toCompare());
+    if (isSignificant(fitter.runner(), less, fit, options)) {
+      ++m;
+      continue;
+    }
+    options.log("  no longer needed: " + members[m].hypothesis->title());
+    fit = std::move(less);
+  }
+  return fit;
+}
+
 void refitSimplerAlternatives(const Fitter& fitter, const FitResult& now, const NominalTangents& tangents,
                               std::vector<Candidate>* candidates) {
   for (std::size_t m = 0; m < now.state.members.size(); ++m) {
-    for (const Candidate* alternative : alternativesOf(now.state, m, *candidates)) {
+    for (const Candidate* alternative : alternativesOf(now.state, m, *candidates, {})) {
       Candidate& simpler = (*candidates)[static_cast<std::size_t>(alternative - candidates->data())];
       if (simpler.values.size() >= now.state.members[m].values.size()) continue;
       FitState with = without(now.state, m);
       with.members.push_back({simpler.hypothesis, startOf(fitter, simpler, now.state.members[m])});
-      const FitResult fit = fitter.fit(with, &tangents, {8, 1e-5, true});
+      const FitResult fit = fitter.fit(with, &tangents, FitOptions::tightly());
       if (fit.converged) simpler.values = fit.state.members.back().values;
     }
   }
 }
 
-bool refine(Workbench& bench, const FitState& state, const SearchOptions& options, SearchResult* result) {
-  const RefinedState refined = iterate(bench, state, &result->best);
+bool refine(Workbench& bench, const FitState& state, const SearchOptions& options, SearchResult* result,
+            const RefinementOptions& limits) {
+  const RefinedState refined = iterate(bench, state, &result->best, limits);
   if (!refined.converged) return false;
-  bench.alignTo(result->best.state);
-  const FitOptions compared = weighted(COMPARED, refined.weight);
+  bench.alignment().alignTo(result->best.state);
+  const FitOptions compared = weighted(FitOptions::toCompare(), refined.weight);
   const FitState& at = result->best.state;
-  result->contribution.clear();
-  result->is_needed.clear();
-  result->without_member.clear();
-  result->alternatives.clear();
+  result->clearComparisons();
   for (std::size_t m = 0; m < at.members.size(); ++m) {
     const FitState less = without(at, m);
     FitOptions without_it = compared;
@@ -168,11 +180,11 @@ bool refine(Workbench& bench, const FitState& state, const SearchOptions& option
     result->contribution.push_back(rest.bic - result->best.bic);
     result->without_member.push_back(rest.state);
     result->is_needed.push_back(isSignificant(bench.quick().runner(), rest, result->best, options));
-    for (const Candidate* alternative : alternativesOf(at, m, result->candidates)) {
+    for (const Candidate* alternative : alternativesOf(at, m, result->candidates, limits)) {
       FitState with = less;
       with.members.push_back({alternative->hypothesis, startOf(bench.quick(), *alternative, at.members[m])});
       const FitResult fit = bench.quick().fit(with, &refined.tangents, without_it);
-      if (fit.converged && rest.converged && replaces(fit, result->best, rest))
+      if (fit.converged && rest.converged && replaces(fit, result->best, rest, limits.min_overlap))
         result->alternatives.push_back({m, alternative->result.effect, rest.bic - fit.bic, fit.state});
     }
   }
@@ -195,8 +207,7 @@ void dropInsignificantPathShare(const MachineModel& nominal, const NominalFreedo
   FitState& state = best->state;
   const auto k = static_cast<Eigen::Index>(*path_share);
   const double share = before + state.nominal[*path_share];
-  if (share == 0.0 || NominalFreedom::isPathShareSignificant(share, std::sqrt(best->covariance(k, k))))
-    return;
+  if (share == 0.0 || freedom.isPathShareSignificant(share, std::sqrt(best->covariance(k, k)))) return;
   const Eigen::VectorXd by = -share / of_fit(k, k) * of_fit.col(k);
   const double* next = by.data();
   const auto move = [&](const std::vector<Coordinate>& coordinates, std::vector<double>* values) {

@@ -11,13 +11,13 @@ namespace smartmill::discrepancy {
 namespace {
 
 // RMS difference of two models over the noise in one test.
-double separation(const Dataset& data, const CampaignTest& test, const MachineModel& a,
-                  const MachineModel& b) {
+double separation(const Dataset& data, const CampaignTest& test, const MachineModel& a, const MachineModel& b,
+                  double duration) {
   sim::SimulationOptions options;
   options.noise = false;
-  options.substeps = 2;
-  const Record first = sim::simulateTest(a, test, 0.15, options);
-  const Record second = sim::simulateTest(b, test, 0.15, options);
+  options.substeps = COARSE_SUBSTEPS;
+  const Record first = sim::simulateTest(a, test, duration, options);
+  const Record second = sim::simulateTest(b, test, duration, options);
   double squares = 0.0;
   std::size_t count = 0;
   for (const auto& [channel, noise] : data.noise) {
@@ -32,24 +32,24 @@ double separation(const Dataset& data, const CampaignTest& test, const MachineMo
 }  // namespace
 
 std::optional<SeparatingTest> separatingTest(const Dataset& data, const MachineModel& a,
-                                             const MachineModel& b) {
+                                             const MachineModel& b, const SeparatingTestOptions& options) {
   std::optional<SeparatingTest> best;
   for (const TestData& t : data.tests) {
     if (t.test.kind == TestKind::tap || t.chatter) continue;
-    for (const double speed : {0.4, 1.0, 1.8}) {
-      for (const double feed : {0.4, 1.0, 2.0}) {
-        for (const double depth : {0.5, 1.0, 2.0}) {
+    for (const double speed : options.speeds) {
+      for (const double feed : options.feeds) {
+        for (const double depth : options.depths) {
           if (t.test.kind == TestKind::air && (feed != 1.0 || depth != 1.0)) continue;
           CampaignTest test = t.test;
           test.spindle_speed *= speed;
           if (test.engagement) {
             test.engagement->feed_per_tooth *= feed;
             test.engagement->axial_depth *= depth;
-            test.engage_time = 0.02;
+            test.engage_time = options.engage_time;
           }
           double value = 0.0;
           try {
-            value = separation(data, test, a, b);
+            value = separation(data, test, a, b, options.duration);
           } catch (const Error&) {
             continue;  // the twin cannot simulate this test
           }

@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "smartmill_core/formatted.h"
+
 namespace smartmill::discrepancy {
 namespace {
 
@@ -109,9 +111,14 @@ bool ValidationResult::isAccepted() const {
   return isAcceptedByFitted(fitted) && (!known || heldout.margin() > HELDOUT_MARGIN);
 }
 
-ValidationResult validate(const Workbench& bench, const FitState& better, const FitState& other) {
-  constexpr double MIN_SQUARES = 25.0;  // squares over the noise
-  const auto held = bench.heldout().simulate({bench.exact().model(better), bench.exact().model(other)});
+std::string ValidationResult::text() const {
+  return formatted("effect scale of the fitted tests %.3g +- %.2g, of the held-out tests %.3g +- %.2g",
+                   fitted.scale, fitted.std_dev, heldout.scale, heldout.std_dev);
+}
+
+ValidationResult validate(const Workbench& bench, const FitState& better, const FitState& other,
+                          const ValidationOptions& options) {
+  const auto held = simulateAll(bench.heldout(), {bench.exact().model(better), bench.exact().model(other)});
   const std::vector<ScaleEvidence> heldout = scaleEvidenceBetween(bench.heldout(), held[0], held[1]);
   const std::vector<double> simulated = bench.fitted().simulate(bench.exact().model(better));
   std::vector<ScaleEvidence> fitted =
@@ -120,7 +127,7 @@ ValidationResult validate(const Workbench& bench, const FitState& better, const 
   fitted.push_back(priorEvidence(bench.freedom(), better, other, variance));
   const double squares = std::accumulate(heldout.begin(), heldout.end(), 0.0,
                                          [](double sum, const ScaleEvidence& t) { return sum + t.squares; });
-  return {effectScaleOf(squares < MIN_SQUARES ? std::vector<ScaleEvidence>{} : heldout),
+  return {effectScaleOf(squares < options.min_squares ? std::vector<ScaleEvidence>{} : heldout),
           effectScaleOf(fitted)};
 }
 

@@ -80,7 +80,7 @@ FittedValues fitted(const Dataset& data) {
   for (int pass = 0; pass < 2; ++pass) {
     EXPECT_TRUE(refine(bench, start, {}, &found));
     start = found.best.state;
-    bench.updateWeights(start);
+    bench.guidance().updateWeights(start);
   }
   const ModelResidual after = residualOf(bench, bench.exact().model(start));
   fitted_values.gap = after.gap.fit;
@@ -169,8 +169,8 @@ NearLimit fittedNearLimit(const std::string& folder, bool guided) {
   for (int pass = 0; pass < 2; ++pass) {
     EXPECT_TRUE(refine(bench, state, {}, &found));
     state = found.best.state;
-    if (guided) bench.guideNearLimit(state);
-    bench.updateWeights(state);
+    if (guided) bench.guidance().guideNearLimit(state);
+    bench.guidance().updateWeights(state);
   }
   const Eigen::MatrixXd covariance = robustCovariance(bench, found.best);
   NearLimit result;

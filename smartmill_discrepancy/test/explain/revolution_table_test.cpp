@@ -38,18 +38,12 @@ double addedForce(const CampaignTest& test, double angle) {
 
 Dataset slotsAt(const std::vector<CampaignTest>& tests, const std::string& folder, const Forces& forces = {},
                 double added_share = 1.0) {
-  Campaign campaign;
-  campaign.folder = folder;
-  campaign.model_file = "model.yaml";
-  campaign.tests = tests;
-  writeMachineModel(believed(), folder + "/model.yaml");
-  writeCampaign(campaign, folder);
   std::mt19937_64 random(11);
   std::normal_distribution<double> normal;
   sim::SimulationOptions options;
   options.substeps = 8;
   options.noise = false;
-  for (const CampaignTest& test : campaign.tests) {
+  const auto recordOf = [&](const CampaignTest& test, std::uint64_t) {
     Record record = sim::simulateTest(forces.machine, test, 0.15, options);
     record.add("fz") = sim::simulateTest(forces.axial, test, 0.15, options).column("fz");
     std::vector<double>& fy = record.add("fy");
@@ -60,9 +54,9 @@ Dataset slotsAt(const std::vector<CampaignTest>& tests, const std::string& folde
     for (const char* c : {"fx", "fy", "fz"}) {
       for (double& f : record.add(c)) f += normal(random);
     }
-    writeCsv(record, folder + "/" + test.file);
-  }
-  return loadDataset(campaign, readMachineModel(campaign.modelPath()));
+    return record;
+  };
+  return datasetOf(recordOf, folder, tests);
 }
 
 std::optional<Hypothesis> tableOf(const Dataset& data) {

@@ -47,7 +47,7 @@ TEST(Repeatability, FloorOfNoiseIsTheNoise) {
       EXPECT_NEAR(r->floor, noise, 4.0 * noise / std::sqrt(2.0 * free)) << samples_per_revolution;
       const double whole = varianceOfOrders() + noise * noise;
       EXPECT_NEAR(r->variance, whole, 0.02 * whole);  // the record ends within a revolution
-      EXPECT_NEAR(r->synchronousShare(), varianceOfOrders() / whole, 2e-4);
+      EXPECT_NEAR(1.0 - r->floor * r->floor / r->variance, varianceOfOrders() / whole, 2e-4);
     }
   }
 }

@@ -9,6 +9,7 @@
 #include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_discrepancy/hypotheses/hypothesis.h"
+#include "smartmill_discrepancy/search/start_values.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -18,18 +19,13 @@ namespace {
 Dataset axialGain(const std::string& folder) {
   MachineModel machine = believed();
   machine.effects = {effectEntry("gain_error", {{"gain", 1.2}}, {{"channel", "fz"}})};
-  Campaign campaign;
-  campaign.folder = folder;
-  campaign.model_file = "model.yaml";
-  campaign.tests = slotsOfManyKinds();
-  writeMachineModel(believed(), folder + "/model.yaml");
-  writeCampaign(campaign, folder);
-  sim::SimulationOptions options;
-  for (const CampaignTest& test : campaign.tests) {
-    ++options.seed;
-    writeCsv(sim::simulateTest(machine, test, 0.1, options), folder + "/" + test.file);
-  }
-  return loadDataset(campaign, readMachineModel(campaign.modelPath()));
+  return datasetOf(
+      [&](const CampaignTest& test, std::uint64_t seed) {
+        sim::SimulationOptions options;
+        options.seed = seed;
+        return sim::simulateTest(machine, test, 0.1, options);
+      },
+      folder);
 }
 
 // A value at its bound moves back when the effect that pushed it there is added: the predicted gain is that

@@ -153,10 +153,10 @@ TEST(Workbench, LeavesSmallRotationsToTheFits) {
   FitState right = records.stated();
   const FitState near = realigned(bench, right, 0.02);
   FitState same = near;
-  EXPECT_EQ(bench.alignPhases(same), 0.0);
+  EXPECT_EQ(bench.alignment().alignPhases(same), 0.0);
   EXPECT_EQ(same, near);
   FitState far = realigned(bench, right, 0.2);
-  EXPECT_GT(bench.alignPhases(far), 0.15);
+  EXPECT_GT(bench.alignment().alignPhases(far), 0.15);
   // The teeth of this tool are interchangeable.
   const double tooth = units::TWO_PI / believed().tool->teeth;
   for (std::size_t k = 0; k < far.alignment.size(); ++k) {
@@ -170,8 +170,8 @@ TEST(ValidationResult, UsesTheAlignmentOfEachModel) {
   WithoutAngle records;
   Workbench& bench = records.bench;
   FitState right = records.stated();
-  bench.alignPhases(right);
-  bench.alignTo(right);
+  bench.alignment().alignPhases(right);
+  bench.alignment().alignTo(right);
   const FitState off = realigned(bench, right, 0.1);
   const EffectScale evidence = validate(bench, right, off).fitted;
   EXPECT_NEAR(evidence.scale, 1.0, 0.1);

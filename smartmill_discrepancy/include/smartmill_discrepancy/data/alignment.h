@@ -15,6 +15,9 @@ double refinedSpeed(const TestData& test, int teeth, double share);
 /// @return one note per record
 std::vector<std::string> estimatePhases(Dataset& data);
 
+/// [rad] Rotation over the samples of a spindle angle, which may omit whole revolutions.
+double rotationOf(const std::vector<double>& angle);
+
 /// Alignment of a record relative to its state when loaded: phase and speed about the record's middle, where
 /// they are least correlated, and the start of the cut.
 struct RecordAlignment {
@@ -31,9 +34,17 @@ struct AlignmentFreedom {
   double step;       ///< of the numerical derivative
 };
 
+struct AlignmentFreedomOptions {
+  /// [samples] The force may start at once or over a fraction of a sample.
+  double entry_std = 0.1, entry_step = 0.02;
+  /// [rad] The prior only limits a step; the step is far below a sample.
+  double angle_std = 1.0, angle_step = 1e-4;
+};
+
 /// Phase and speed of a record without spindle angle; entry of a cut that starts within its record, whose
 /// stated time is accurate to a fraction of a sample only.
-std::vector<AlignmentFreedom> alignmentFreedoms(const TestData& test);
+std::vector<AlignmentFreedom> alignmentFreedoms(const TestData& test,
+                                                const AlignmentFreedomOptions& options = {});
 
 /// Alignment that moves `before` to `now`, two versions of one record.
 RecordAlignment alignmentBetween(const TestData& before, const TestData& now);

@@ -18,6 +18,17 @@ namespace smartmill::discrepancy {
 /// Force channels in the order of the axes x, y, z.
 inline const std::vector<std::string> FORCES(FORCE_CHANNELS.begin(), FORCE_CHANNELS.end());
 
+/// [1] of the sample rate: highest frequency at which modes and lines are searched, with a margin to the
+/// Nyquist frequency.
+constexpr double USABLE_BAND = 0.42;
+/// [Hz] Lowest frequency at which modes and bursts are searched: below, the residual is drift and hum.
+constexpr double LOWEST_MODE = 60.0;
+/// [1] Damping ratio at which an unknown mode of sensor or structure is searched.
+constexpr double TYPICAL_DAMPING = 0.04;
+
+/// Of the twin per sample where phases and labels are compared, which need no accurate forces.
+constexpr int COARSE_SUBSTEPS = 2;
+
 /// Channel sampled a few times per second, as means over intervals longer than its lag. Consecutive samples
 /// share their rounding error, so each interval counts as one value.
 struct SlowMeans {
@@ -85,9 +96,14 @@ struct Dataset {
 /// estimate possible.
 Dataset loadDataset(const Campaign& campaign, const MachineModel& nominal);
 
+struct ShorteningOptions {
+  double revolutions = 6.0;  ///< kept: the entry and some of the steady cut
+  double max_share = 0.75;   ///< [1] of the samples of fitted cuts that are kept: no benefit above
+};
+
 /// The same data with only the first revolutions of each fitted cut that has a spindle angle.
 /// @return nothing if most of the samples would remain
-std::optional<Dataset> shortenedDataset(const Dataset& data);
+std::optional<Dataset> shortenedDataset(const Dataset& data, const ShorteningOptions& options = {});
 
 /// Marks the held-out tests: about a quarter of the cuts and one air cut, at conditions inside the range of
 /// the others. Chattering cuts are never held out.

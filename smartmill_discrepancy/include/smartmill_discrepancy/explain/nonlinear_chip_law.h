@@ -44,6 +44,18 @@ struct NonlinearChipLaw {
   double requiredReduction() const;
 };
 
+/// Grid of laws. An edge force with an onset far below the least feed is constant, one far above the largest
+/// feed is a chip force.
+struct ChipLawOptions {
+  /// [1] of the size effect; the first is that of the linear law.
+  std::vector<double> exponents{0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6};
+  std::vector<double> onsets{0.0, 0.04, 0.08, 0.12, 0.16, 0.24, 0.32};  ///< [1] of the largest feed
+  /// [1] of the model's edge force
+  std::vector<double> edge_shares{0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5};
+  int sweeps = 5;          ///< alternations between axial and in-plane law at most
+  std::size_t feeds = 11;  ///< of the curvature table, which is linear between them
+};
+
 /// Identifies force law and sensor together from cuts that differ in feed only. Behind a linear sensor each
 /// tooth passing line is the line of the law times one gain that does not depend on the feed. The law is
 /// chosen from a grid by the fitted cuts with the best gains; each record is weighted by its asynchronous
@@ -54,6 +66,7 @@ struct NonlinearChipLaw {
 /// @return nothing if the lines cannot be estimated or the model has a nonlinear law already
 std::optional<NonlinearChipLaw> identifyChipLaw(const TwinRunner& runner,
                                                 const std::vector<std::size_t>& cuts,
-                                                const MachineModel& nominal, const MachineModel& model);
+                                                const MachineModel& nominal, const MachineModel& model,
+                                                const ChipLawOptions& options = {});
 
 }  // namespace smartmill::discrepancy

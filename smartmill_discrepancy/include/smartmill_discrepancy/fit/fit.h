@@ -68,13 +68,22 @@ struct NominalTangents {
 };
 
 struct FitOptions {
-  int iterations = 8;
-  double tolerance = 1e-4;  ///< relative change of the cost that ends a fit
+  int iterations = 8;       ///< of the solver; 0: the start
+  double tolerance = 1e-4;  ///< [1] of the squares above the noise: a smaller gain of a step ends the fit
   bool nominal_free = true;
   double prior_weight =
       1.0;  ///< [1] factor on the priors' squares: the residual's variance if it exceeds the noise
   /// [1] Squares of a competing fit: a fit that cannot reach them ends early.
   double to_beat = std::numeric_limits<double>::infinity();
+
+  /// Close to the minimum, as far as derivatives at one point are valid.
+  static FitOptions closely() { return {}; }
+  /// To the last digits that the twin distinguishes, for a state that others are compared with.
+  static FitOptions tightly() { return {8, 1e-5}; }
+  /// To rank candidates, whose gains differ by far more.
+  static FitOptions toCompare() { return {6, 1e-3}; }
+  /// Cost, residual and covariance at the start.
+  static FitOptions toEvaluate() { return {0}; }
 };
 
 /// Fits models to a campaign with Ceres: nominal values with Gaussian priors, effects within bounds and weak
@@ -127,5 +136,10 @@ class Fitter {
   std::function<bool()> cancelled_;
   std::vector<FreeAlignment> alignments_;
 };
+
+/// Derivatives with respect to the values of these members, one member after the other.
+/// @param base receives the simulation of the state
+SparseColumns memberTangents(const Fitter& fitter, const FitState& state,
+                             const std::vector<std::size_t>& members, SimulatedChannels* base);
 
 }  // namespace smartmill::discrepancy

@@ -16,22 +16,23 @@ struct Repeatability {
   std::size_t samples = 0;  ///< number of samples
   /// [unit] mean, then cosine and sine of each order of the spindle
   std::vector<double> lines;
-
-  double synchronousShare() const {
-    return variance > 0.0 ? 1.0 - floor * floor / variance : 0.0;
-  }  ///< [1] share of the variance
 };
 
-/// Least-squares estimate from the record itself: mean and all orders of the spindle below 0.9 of the Nyquist
-/// frequency; the floor is the RMS of their residual over its degrees of freedom. White noise of RMS s has a
-/// floor of s.
+struct RepeatabilityOptions {
+  double min_revolutions = 5.0;  ///< fewer leave too few degrees of freedom for the floor
+  /// [1] of the Nyquist frequency: highest order that is removed
+  double highest = 0.9;
+};
+
+/// Least-squares estimate from the record itself: mean and all orders of the spindle up to a share of the
+/// Nyquist frequency; the floor is the RMS of their residual over its degrees of freedom. White noise of RMS
+/// s has a floor of s.
 /// @param values of a steady cut @param angle [rad] of the spindle at each sample, whole revolutions may be
 /// omitted
-/// @return nothing below LEAST_REVOLUTIONS revolutions
+/// @return nothing below the minimum of revolutions
 std::optional<Repeatability> repeatability(const std::vector<double>& values,
-                                           const std::vector<double>& angle);
-
-constexpr double LEAST_REVOLUTIONS = 5.0;
+                                           const std::vector<double>& angle,
+                                           const RepeatabilityOptions& options = {});
 
 /// Of the steady part of a cut. @param values one per sample of the record
 /// @return nothing without spindle angle or enough revolutions

@@ -18,8 +18,6 @@ class SparseColumns {
   /// Columns (moved - base) / step.
   SparseColumns(const TwinRunner& runner, const SimulatedChannels& base,
                 const std::vector<SimulatedChannels>& moved, const std::vector<double>& step);
-  /// Copies the columns.
-  SparseColumns(const TwinRunner& runner, const std::vector<std::vector<double>>& columns);
 
   Eigen::Index cols() const { return cols_; }
   bool allFinite() const;

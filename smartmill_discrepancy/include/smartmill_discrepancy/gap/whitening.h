@@ -5,22 +5,25 @@
 
 namespace smartmill::discrepancy {
 
+struct WhiteningOptions {
+  std::size_t max_order = 32;          ///< limits the time; the BIC chooses the order
+  std::size_t samples_per_order = 16;  ///< minimum, so that a few values get at most a variance
+};
+
 /// Autoregression of a channel's residual: x_i = a_1 x_{i-1} + .. + a_p x_{i-p} + e_i. The prediction errors
 /// over their RMS are white. The filter is the inverse root of the residual's covariance, the weight of
 /// generalised least squares (Aitken 1935): applied to residuals and derivatives it gives ordinary least
 /// squares.
 /// Coefficients by the Levinson-Durbin recursion (Durbin 1960, The fitting of time-series models) from the
 /// autocovariance; the first p samples use the shorter predictors of the same recursion, so that the filter
-/// is exact from the first sample on. Among white noise as stated and the orders up to MAX_ORDER the least
+/// is exact from the first sample on. Among white noise as stated and the orders up to a maximum the least
 /// BIC of the Gaussian likelihood is chosen; the variance of e is at least that of the noise.
 class Whitening {
  public:
-  static constexpr std::size_t MAX_ORDER = 32;
-
   /// Identity.
   Whitening() = default;
   /// @param residual of a channel, over its noise
-  Whitening(const double* residual, std::size_t size);
+  Whitening(const double* residual, std::size_t size, const WhiteningOptions& options = {});
 
   bool isActive() const { return !predictors_.empty(); }
   std::size_t order() const { return predictors_.empty() ? 0 : predictors_.size() - 1; }

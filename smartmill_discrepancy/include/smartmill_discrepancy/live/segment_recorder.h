@@ -44,11 +44,20 @@ struct SegmentParameters {
   }
 };
 
+/// When a motion is steady; the same on every machine.
+struct SteadinessOptions {
+  double speed = 0.02;         ///< [1] of the stated spindle speed
+  double angle = 0.02;         ///< [rad] from constant speed
+  double confirmation = 0.05;  ///< [s] of steady motion after a segment: the controller's state may be late
+  double history = 1.0;        ///< [s] of angles and loads in addition to the length of a segment
+};
+
 /// Cuts the streams of a running machine into segments of equal length: condition, controller state, spindle
 /// angle, force sensor and load meter in stamp order.
 class SegmentRecorder {
  public:
-  SegmentRecorder(const SegmentParameters& parameters, std::function<void(const RecordSegment&)> deliver);
+  SegmentRecorder(const SegmentParameters& parameters, std::function<void(const RecordSegment&)> deliver,
+                  const SteadinessOptions& limits = {});
 
   void handle(const CuttingCondition& condition);
   void handle(const CncState& state);
@@ -70,6 +79,7 @@ class SegmentRecorder {
   void dropCondition();
 
   SegmentParameters parameters_;
+  SteadinessOptions limits_;
   std::function<void(const RecordSegment&)> deliver_;
   std::optional<CuttingCondition> condition_;
   std::optional<double> steady_since_;  // [s]

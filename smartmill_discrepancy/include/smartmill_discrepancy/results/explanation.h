@@ -69,6 +69,9 @@ struct RevolutionCurve {
   std::vector<double> angle_deg, measured, nominal, improved;  ///< [deg], [unit of the channel]
 };
 
+/// [Hz] Highest frequency of spectra in pictures: forces of milling are below.
+constexpr double HIGHEST_PICTURED = 4000.0;
+
 /// Amplitude spectrum of the residual before and after.
 struct SpectrumCurve {
   std::string test, channel;

@@ -2,7 +2,6 @@
 
 #include <map>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -42,6 +41,12 @@ struct ScreeningMemory {
   }
 };
 
+struct ScreeningOptions {
+  /// [1] of the required gain: a smaller remembered gain is not simulated again. Between two states of a
+  /// search gains rarely grow tenfold.
+  double min_remembered = 0.1;
+};
+
 /// Score test of each hypothesis at a fitted state, best first; hypotheses without any response come last.
 /// When cancelled, it returns the predictions so far.
 /// @param tangents of the nominal values at the state @param hypotheses existing members are skipped
@@ -49,28 +54,13 @@ struct ScreeningMemory {
 /// with a far smaller remembered gain are approximate and have no start
 std::vector<PredictedGain> screen(const Fitter& fitter, const FitResult& now, const NominalTangents& tangents,
                                   const std::vector<Hypothesis>& hypotheses, double required_gain,
-                                  ScreeningMemory* memory);
+                                  ScreeningMemory* memory, const ScreeningOptions& options = {});
 
 /// Simulates the approximate predictions whose gain exceeds a minimum.
 void screenRemembered(const Fitter& fitter, const FitResult& now, const NominalTangents& tangents,
                       double least, ScreeningMemory* memory, std::vector<PredictedGain>* predictions);
 
-/// Derivatives with respect to the values of these members, one member after the other.
-/// @param base receives the simulation of the state
-SparseColumns memberTangents(const Fitter& fitter, const FitState& state,
-                             const std::vector<std::size_t>& members, SimulatedChannels* base);
-
 /// Predicted effect scale of the fitted tests, as of a fit.
 EffectScale fittedScale(const Fitter& fitter, const PredictedGain& predicted);
-
-/// Values at which a hypothesis reproduces the tooth radii of a member as closely as possible, e.g. runout
-/// instead of individually fitted radii. No value if one of both does not change radii.
-std::optional<std::vector<double>> equivalentValues(const Fitter& fitter, const Member& member,
-                                                    const Hypothesis& hypothesis);
-
-/// Best of several starts, since the prediction is linear: full and shorter steps from the null point, and an
-/// optional other one.
-std::vector<double> bestStart(const Fitter& fitter, const FitResult& now, const PredictedGain& predicted,
-                              const std::optional<std::vector<double>>& other = {});
 
 }  // namespace smartmill::discrepancy

@@ -16,15 +16,23 @@ namespace smartmill::discrepancy {
 struct SearchOptions {
   std::size_t fitted_per_round = 5;  ///< hypotheses fitted per round after screening
   std::size_t max_effects = 8;
-  double min_gain = 100.0;         ///< [1] minimum BIC gain of a named effect
-  double min_prior_gain = 3.0;     ///< [1] the same if it reduces prior tension
-  double twin_accuracy = 2e-4;     ///< [1] of the signal: difference between two accurate simulations
-  double min_share = 0.05;         ///< [1] of the squares above the noise: minimum of an effect
+  double min_gain = 100.0;           ///< [1] minimum BIC gain of a named effect
+  std::size_t max_tension_fits = 3;  ///< of effects hidden in nominal values, which must be simulated
+  double min_prior_gain = 3.0;       ///< [1] the same if it reduces prior tension
+  /// [1] of the gain that a channel must have for its twin accuracy to count: where the fits agree, so do its
+  /// errors.
+  double min_channel_share = 0.05;
+  double twin_accuracy = TWIN_ACCURACY;
+  double min_share = 0.05;  ///< [1] of the squares above the noise: minimum of an effect
+  /// [1] of the squares of the noise: excess below which records count as explained.
+  double negligible_excess = 0.02;
   std::optional<CauseOdds> prior;  ///< of the effects, used for unidentifiable pairs only
   std::function<void(const std::string&)> on_log;
   /// Called after each stage with the share of the work done if nothing more is found.
   std::function<void(double share)> on_progress;
 
+  /// Reduction of the priors' squares from which prior tension is reduced.
+  double requiredPenaltyReduction() const { return 4.0 * min_prior_gain; }
   void log(const std::string& line) const {
     if (on_log) on_log(line);
   }
@@ -64,6 +72,10 @@ struct SearchResult {
   /// Back to the nominal values alone.
   void clearMembers() {
     best = null;
+    clearComparisons();
+  }
+  /// Forgets what was measured of the members.
+  void clearComparisons() {
     contribution.clear();
     is_needed.clear();
     without_member.clear();

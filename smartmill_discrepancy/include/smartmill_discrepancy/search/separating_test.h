@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_discrepancy/data/dataset.h"
@@ -15,8 +16,15 @@ struct SeparatingTest {
   double difference = 0.0;  ///< [1] RMS difference of the predictions over the noise
 };
 
+/// Variations of a campaign's tests.
+struct SeparatingTestOptions {
+  std::vector<double> speeds{0.4, 1.0, 1.8}, feeds{0.4, 1.0, 2.0}, depths{0.5, 1.0, 2.0};  ///< [1] factors
+  double engage_time = 0.02, duration = 0.15;  ///< [s] of a cut: a few revolutions after the entry
+};
+
 /// The cut or air cut with the largest difference of two models among variations of the campaign's tests.
 std::optional<SeparatingTest> separatingTest(const Dataset& data, const MachineModel& a,
-                                             const MachineModel& b);
+                                             const MachineModel& b,
+                                             const SeparatingTestOptions& options = {});
 
 }  // namespace smartmill::discrepancy

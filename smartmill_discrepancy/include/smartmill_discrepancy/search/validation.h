@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <string>
 #include <vector>
 
 #include "smartmill_discrepancy/gap/scale_evidence.h"
@@ -47,6 +48,7 @@ struct ValidationResult {
   /// Probability that the scale of the less certain group is between 1/2 and 3/2.
   double confidence() const;
   bool isAccepted() const;
+  std::string text() const;  ///< both scales, for the log
 
   static bool isAcceptedByFitted(const EffectScale& fitted) { return fitted.margin() > FITTED_MARGIN; }
   /// Whether held-out tests prefer less than half of the change, by the margin required for acceptance.
@@ -61,8 +63,14 @@ struct ValidationResult {
 /// Effect scale of the fitted tests for the change from `other` to `better`.
 EffectScale fittedScale(const Fitter& fitter, const FitResult& better, const FitResult& other);
 
+struct ValidationOptions {
+  /// Squares over the noise by which held-out tests distinguish two models: five standard deviations.
+  double min_squares = 25.0;
+};
+
 /// @param better, other states of the same campaign, both simulated exactly
-ValidationResult validate(const Workbench& bench, const FitState& better, const FitState& other);
+ValidationResult validate(const Workbench& bench, const FitState& better, const FitState& other,
+                          const ValidationOptions& options = {});
 
 /// [1] Share of the held-out squares above the noise that one model removes from another's.
 double heldoutReduction(const Workbench& bench, const FitState& better, const FitState& other);

@@ -1,4 +1,4 @@
-#include "smartmill_discrepancy/search/mode_probes.h"
+#include "search/probes/mode_probes.h"
 
 #include <algorithm>
 #include <array>
@@ -14,8 +14,6 @@ namespace smartmill::discrepancy {
 namespace {
 
 const std::array<std::string, 2> TIP{{"tool_x", "tool_y"}};
-
-constexpr std::size_t POINTS = 360;  // per revolution
 
 bool actsBehindSensor(const std::string& effect) {
   const EffectKind* kind = findEffect(effect);
@@ -65,8 +63,9 @@ struct ModeProbes::TipDisplacement {
   const double* row(std::size_t i) const { return at.data() + i * count; }
 };
 
-ModeProbes::ModeProbes(const TwinRunner& runner, const MachineModel& model, std::vector<Eigen::Index> samples)
-    : runner_(runner), model_(model), samples_(std::move(samples)) {
+ModeProbes::ModeProbes(const TwinRunner& runner, const MachineModel& model, std::vector<Eigen::Index> samples,
+                       const ModeProbeOptions& options)
+    : runner_(runner), model_(model), samples_(std::move(samples)), options_(options) {
   MachineModel ideal = model;
   for (ModalModel& axis : ideal.force_sensor.axis) {
     axis = ModalModel{};
@@ -79,22 +78,21 @@ ModeProbes::ModeProbes(const TwinRunner& runner, const MachineModel& model, std:
   applied_ = runner.simulate(ideal);
   for (const std::size_t t : runner.tests()) {
     const CampaignTest& test = runner.data().tests[t].test;
-    if (test.kind == TestKind::cut) stiffness_[t] = cuttingStiffness(model, *test.engagement);
+    if (test.kind == TestKind::cut) stiffness_[t] = cuttingStiffness(*test.engagement);
   }
 }
 
-std::vector<ModeProbes::Stiffness> ModeProbes::cuttingStiffness(const MachineModel& model,
-                                                                const Engagement& engagement) {
-  const ToolGeometry& tool = *model.tool;
-  const CuttingCoefficients& k = *model.cutting;
-  constexpr int SLICES = 24;
-  const double dz = engagement.axial_depth / SLICES;
-  std::vector<Stiffness> table(POINTS, Stiffness{});
-  for (std::size_t p = 0; p < POINTS; ++p) {
+std::vector<ModeProbes::Stiffness> ModeProbes::cuttingStiffness(const Engagement& engagement) const {
+  const ToolGeometry& tool = *model_.tool;
+  const CuttingCoefficients& k = *model_.cutting;
+  const double dz = engagement.axial_depth / options_.slices;
+  const std::size_t points = options_.angles;
+  std::vector<Stiffness> table(points, Stiffness{});
+  for (std::size_t p = 0; p < points; ++p) {
     for (int j = 0; j < tool.teeth; ++j) {
-      for (int s = 0; s < SLICES; ++s) {
+      for (int s = 0; s < options_.slices; ++s) {
         const double tip =
-            units::TWO_PI * static_cast<double>(p) / static_cast<double>(POINTS) + tool.toothAngle(j);
+            units::TWO_PI * static_cast<double>(p) / static_cast<double>(points) + tool.toothAngle(j);
         double phi = std::fmod(tip - tool.lag() * (s + 0.5) * dz, units::TWO_PI);
         if (phi < 0.0) phi += units::TWO_PI;
         if (phi < engagement.entry || phi >= engagement.exit) continue;
@@ -168,6 +166,7 @@ void ModeProbes::addRegeneration(std::size_t first, std::size_t end, std::size_t
   const std::vector<Stiffness>& table = stiffness_.at(blocks[first].test);
   const double period = units::TWO_PI / model_.tool->teeth / data.test.spindle_speed * rate;  // [samples]
   const std::vector<double>& angle = data.record.column("spindle_angle");
+  const auto points = static_cast<double>(table.size());
   Eigen::RowVectorXd force(columns->cols());
   for (std::size_t b = first; b < end; ++b) {
     const auto a =
@@ -179,7 +178,7 @@ void ModeProbes::addRegeneration(std::size_t first, std::size_t end, std::size_t
       const double before = static_cast<double>(i) - period;
       const auto n = static_cast<std::size_t>(std::max(before, 0.0));
       const double share = before - static_cast<double>(n);
-      const auto p = static_cast<std::size_t>(angle[i] / units::TWO_PI * POINTS) % POINTS;
+      const auto p = static_cast<std::size_t>(angle[i] / units::TWO_PI * points) % table.size();
       for (std::size_t k = 0; k < tip.count && i >= data.first_cut; ++k) {
         const double past = before > 0.0 ? (1.0 - share) * tip.row(n)[k] + share * tip.row(n + 1)[k] : 0.0;
         force[static_cast<Eigen::Index>(k)] = table[p][a][axis] * (tip.row(i)[k] - past);
@@ -214,12 +213,6 @@ Eigen::MatrixXd ModeProbes::tipModes(std::size_t axis, const std::vector<double>
       addRegeneration(first, end, axis, tip, &columns);
   }
   return columns;
-}
-
-std::vector<double> ModeProbes::grid(double low, double high, double ratio) {
-  std::vector<double> frequencies;
-  for (double f = low; f < high; f *= ratio) frequencies.push_back(f);
-  return frequencies;
 }
 
 }  // namespace smartmill::discrepancy

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "smartmill_discrepancy/search/screening.h"
+
+namespace smartmill::discrepancy {
+
+/// Values at which a hypothesis reproduces the tooth radii of a member as closely as possible, e.g. runout
+/// instead of individually fitted radii. No value if one of both does not change radii.
+std::optional<std::vector<double>> equivalentValues(const Fitter& fitter, const Member& member,
+                                                    const Hypothesis& hypothesis);
+
+struct StartOptions {
+  /// [1] of the predicted values: shorter steps from the null point.
+  std::vector<double> shorter{0.5, 0.2, 0.05};
+};
+
+/// Best of several starts, since the prediction is linear: full and shorter steps from the null point, and an
+/// optional other one.
+std::vector<double> bestStart(const Fitter& fitter, const FitResult& now, const PredictedGain& predicted,
+                              const std::optional<std::vector<double>>& other = {},
+                              const StartOptions& options = {});
+
+}  // namespace smartmill::discrepancy

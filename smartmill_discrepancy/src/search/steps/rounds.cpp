@@ -1,0 +1,149 @@
+#include <algorithm>
+#include <cstddef>
+#include <utility>
+
+#include "search/adoption.h"
+#include "search/candidate_round.h"
+#include "search/steps/search_step.h"
+#include "smartmill_core/formatted.h"
+#include "smartmill_discrepancy/search/validation.h"
+
+namespace smartmill::discrepancy {
+namespace {
+
+bool isMember(const FitState& state, const std::string& effect) {
+  return std::any_of(state.members.begin(), state.members.end(),
+                     [&](const Member& m) { return m.hypothesis->effect == effect; });
+}
+
+struct RoundsOptions {
+  /// Consecutive rejections by held-out tests that end the search; limits its time.
+  std::size_t max_rejections = 3;
+  /// Work in units of a nominal fit, from typical campaigns: a round, the last round, the nominal fit of
+  /// whole records, and refinement with validation. Steers the progress only.
+  double round_work = 2.0, last_round_work = 1.0, whole_records_work = 2.0, later_work = 4.0;
+};
+
+/// Rounds of the search, each of which adds one effect: the best fit of a round is adopted and kept if the
+/// exact twin and the held-out tests support it.
+class Rounds : public SearchStep {
+ public:
+  void run(SearchState& state) override;
+
+ private:
+  // Fit and derivatives at the start of a round.
+  struct RoundStart {
+    FitResult fit;
+    NominalTangents tangents;
+  };
+  bool addEffect(SearchState& state);
+  bool isSupportedByHeldout(SearchState& state, const FitResult& before, const Hypothesis& newest) const;
+  void reject(SearchState& state, RoundStart start, const Hypothesis* newest);
+  void revertTo(SearchState& state, RoundStart start) const;
+  void reportProgress(const SearchState& state) const;
+
+  RoundsOptions options_;
+  Adoption adoption_;
+  bool reverted_ = false;  // to the start of the last round, whose predictions remain valid
+  std::size_t rejections_in_a_row_ = 0;
+};
+
+void Rounds::run(SearchState& s) {
+  reportProgress(s);
+  while (s.rounds < s.options.max_effects + s.uncounted_rounds && !s.bench.cancelled()) {
+    const bool continues = addEffect(s);
+    ++s.rounds;
+    if (!continues) break;
+    reportProgress(s);
+  }
+}
+
+// @return false: the search ends
+bool Rounds::addEffect(SearchState& s) {
+  CandidateRound round(s);
+  round.run(!reverted_);
+  reverted_ = false;
+  const std::size_t first = s.result.candidates.size();
+  s.result.candidates.insert(s.result.candidates.end(), round.candidates().begin(), round.candidates().end());
+  if (!round.improved() || s.bench.cancelled()) return false;
+  const Hypothesis* const newest = round.best().state.members.back().hypothesis;
+  RoundStart before{s.now, std::move(s.tangents)};
+  adoption_.adopt(s, std::move(round.best()));
+  adoption_.dropUnneeded(s);
+  const double exact_squares = s.bench.exactSquares(s.now.state);
+  if (!(exact_squares < s.exact_now)) {
+    s.options.log(s.gapText(exact_squares) + " when simulated exactly, rejected: " + newest->title());
+    // An effect already dropped as unnecessary needs no smaller steps.
+    if (isMember(s.now.state, newest->effect) && s.bench.refineQuick()) {
+      s.options.log("  repeated with smaller steps");
+      s.memory.clear();
+      revertTo(s, std::move(before));
+    } else {
+      reject(s, std::move(before), newest);
+    }
+    return true;
+  }
+  auto& rejected_by_heldout = s.result.rejected;
+  if (!isSupportedByHeldout(s, before.fit, *newest)) {
+    if (std::find(rejected_by_heldout.begin(), rejected_by_heldout.end(), newest) ==
+        rejected_by_heldout.end())
+      rejected_by_heldout.push_back(newest);
+    reject(s, std::move(before), newest);
+    return rejections_in_a_row_ < options_.max_rejections;
+  }
+  rejections_in_a_row_ = 0;
+  s.rejected.clear();  // they were rejected without the new effect
+  rejected_by_heldout.erase(std::remove(rejected_by_heldout.begin(), rejected_by_heldout.end(), newest),
+                            rejected_by_heldout.end());
+  for (std::size_t k = first; k < s.result.candidates.size(); ++k)
+    s.result.candidates[k].result.accepted = s.result.candidates[k].hypothesis == newest;
+  s.exact_now = exact_squares;
+  s.options.log(s.gapText(s.now.chi2) + " with " + describe(s.now.state.members.back()));
+  return true;
+}
+
+// An effect that does not reduce the gap of held-out tests imitates another one.
+bool Rounds::isSupportedByHeldout(SearchState& s, const FitResult& before, const Hypothesis& newest) const {
+  s.bench.alignment().alignTo(s.now.state);
+  const EffectScale scale = validate(s.bench, s.now.state, before.state).heldout;
+  if (!ValidationResult::isRejected(scale)) return true;
+  s.options.log(
+      formatted("effect scale of the held-out tests %.2g +- %.2g, rejected: ", scale.scale, scale.std_dev) +
+      newest.title());
+  return false;
+}
+
+void Rounds::revertTo(SearchState& s, RoundStart start) const {
+  ++s.uncounted_rounds;
+  s.now = std::move(start.fit);
+  if (s.bench.alignment().alignPhases(s.now.state) > 0.0) {
+    s.linearise(s.now.state);
+  } else {
+    s.lineariseBy(std::move(start.tangents), s.now.state);
+  }
+  s.now = s.refit(s.now, FitOptions::closely());
+  s.exact_now = s.bench.exactSquares(s.now.state);
+}
+
+void Rounds::reject(SearchState& s, RoundStart start, const Hypothesis* newest) {
+  ++rejections_in_a_row_;
+  s.rejected.push_back(newest);
+  revertTo(s, std::move(start));
+  reverted_ = true;
+}
+
+void Rounds::reportProgress(const SearchState& s) const {
+  const double whole = options_.whole_records_work;
+  const double done =
+      1.0 + options_.round_work * static_cast<double>(s.rounds) + (s.whole_records ? whole : 0.0);
+  const double left = options_.later_work + options_.last_round_work + (s.whole_records ? 0.0 : whole);
+  s.options.reportProgress(done / (done + left));
+}
+
+}  // namespace
+
+std::unique_ptr<SearchStep> makeRounds() {
+  return std::make_unique<Rounds>();
+}
+
+}  // namespace smartmill::discrepancy
