@@ -28,7 +28,7 @@ class EffectTimeline {
 
   /// Starts a record: drift and hum restart.
   void setClock(const Clock& clock);
-  /// Begins a step. @param speed [rad/s] @return whether update() is due: from time to time, since effects
+  /// Begins a step. @param speed [rad/s] @return whether update() is required: from time to time, since effects
   /// change slowly, and at another speed
   bool beginStep(double speed);
   /// Computes the state at a motion. @param cut_time [s] of the contact
