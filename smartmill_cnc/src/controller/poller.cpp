@@ -70,6 +70,8 @@ std::optional<Reading> Poller::takeReading() {
 
 void Poller::reportDisconnected() {
   const bool was_connected = std::exchange(connected_, false);
+  // The controller may start together with this program: one failed attempt is not logged.
+  if (counts_.attempts <= 1 && !was_connected && !refused_) return;
   counts_.lost += was_connected ? 1 : 0;
   // Failing to reach the controller after a loss is expected and not logged; a refused connection is.
   const bool expected = loss_logged_ && !was_connected && !refused_;
