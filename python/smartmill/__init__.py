@@ -13,12 +13,14 @@ import atexit as _atexit
 from . import _smartmill
 from ._smartmill import Model
 from .discrepancy import explain, gap
+from .explanation import (ChannelGap, ChannelShare, Effect, Explanation, Finding, Gap, GapResult, Resemblance,
+                          RevolutionCurve, TestGap)
 from .force import coefficients, coefficients_of_means, compensate
 from .machine import machine_model, read_campaign, simulate
 from .modal import frf, modes
-from .results import (ChannelGap, ChannelShare, Chatter, ChatterRisk, CoefficientResult, Coefficients, Compensated,
-                      CompensatedCampaign, Cut, Effect, Error, Estimate, Explanation, Finding, Frf, Gap, GapResult, Hit,
-                      Lobes, Mode, Record, Resemblance, RevolutionCurve, RobustPoint, TestGap, Tool, UsageError)
+from .quantities import Error, Estimate, UsageError
+from .results import (Chatter, ChatterRisk, CoefficientResult, Coefficients, Compensated, CompensatedCampaign, Cut, Frf,
+                      Hit, Lobes, Mode, Record, RobustPoint, Tool)
 from .stability import chatter_risk, detect, lobes
 
 __all__ = [

@@ -9,7 +9,8 @@ from typing import Dict, List, Mapping, Optional, Sequence, Tuple, Union
 import numpy as np
 
 from ._smartmill import Model
-from .results import ComplexArray, FloatArray, Mode, UsageError
+from .quantities import ComplexArray, FloatArray, UsageError
+from .results import Mode
 
 Path = Union[str, "os.PathLike[str]"]
 

@@ -2,8 +2,9 @@
 import os
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
-from .results import (Chatter, ChatterRisk, CoefficientResult, Coefficients, ComplexArray, Cut, Explanation, FloatArray,
-                      Frf, GapResult, Lobes, Mode, Progress, Record, Tool)
+from .explanation import Explanation, GapResult
+from .quantities import ComplexArray, FloatArray, Progress
+from .results import Chatter, ChatterRisk, CoefficientResult, Coefficients, Cut, Frf, Lobes, Mode, Record, Tool
 
 class Model:
     """A machine model: tool, cutting coefficients, dynamics, spindle and effects.

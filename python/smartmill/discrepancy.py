@@ -8,7 +8,8 @@ from . import _arguments as check
 from . import _smartmill
 from ._arguments import Path
 from ._smartmill import Model
-from .results import Explanation, GapResult, Progress
+from .explanation import Explanation, GapResult
+from .quantities import Progress
 
 
 def gap(campaign: Path, model: Union[None, Path, Model] = None, *, threads: int = 2) -> GapResult:

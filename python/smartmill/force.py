@@ -10,8 +10,8 @@ from . import _arguments as check
 from . import _smartmill
 from ._arguments import Path
 from ._smartmill import Model
-from .results import (RPM, CoefficientResult, Compensated, CompensatedCampaign, Cut, FloatArray, Mode, Progress, Tool,
-                      UsageError)
+from .quantities import RPM, FloatArray, Progress, UsageError
+from .results import CoefficientResult, Compensated, CompensatedCampaign, Cut, Mode, Tool
 
 COMPENSATIONS = ("kalman", "delay", "smoother", "fixed-lag", "inverse")
 

@@ -7,7 +7,8 @@ from . import _arguments as check
 from . import _smartmill
 from ._arguments import Path
 from ._smartmill import Model
-from .results import Coefficients, Cut, Mode, Progress, Record, Tool, UsageError
+from .quantities import Progress, UsageError
+from .results import Coefficients, Cut, Mode, Record, Tool
 
 
 def machine_model(tool: Optional[Tool] = None, cutting: Optional[Coefficients] = None, *,

@@ -10,7 +10,8 @@ import numpy.typing as npt
 from . import _arguments as check
 from . import _smartmill
 from ._arguments import Path
-from .results import Frf, Progress, UsageError
+from .quantities import Progress, UsageError
+from .results import Frf
 
 RESPONSES = ("acceleration", "velocity", "displacement", "force")
 AVERAGES = ("h1", "h2", "hv")

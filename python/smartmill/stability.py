@@ -10,7 +10,8 @@ from . import _arguments as check
 from . import _smartmill
 from ._arguments import Path
 from ._smartmill import Model
-from .results import RPM, Chatter, ChatterRisk, Lobes, Progress, UsageError
+from .quantities import RPM, Progress, UsageError
+from .results import Chatter, ChatterRisk, Lobes
 
 METHODS = ("collocation", "semi_discretization", "multi_frequency", "zero_order")
 

@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/signal/revolution_window.h"
 #include "smartmill_core/signal/statistics.h"
 
 namespace smartmill::report {
@@ -123,31 +124,15 @@ double middleRange(const std::vector<double>& values) {
 }
 
 double nonperiodicShare(const std::vector<double>& values, double samples_per_revolution, int revolutions) {
-  constexpr int ANGLES = 360;
   const double window = samples_per_revolution * revolutions;
-  if (values.size() < 2 || !(window > 0.0)) return NOT_A_NUMBER;
-  const auto at = [&](double position) {
-    const auto index = static_cast<std::size_t>(position);
-    const double share = position - static_cast<double>(index);
-    return values[index] + share * (values[index + 1] - values[index]);
-  };
+  if (!(window > 0.0)) return NOT_A_NUMBER;
   double all = 0.0, nonperiodic = 0.0;
-  for (double start = 0.0; start + window < static_cast<double>(values.size() - 1); start += window) {
-    double sum = 0.0, squares = 0.0, repeating = 0.0;
-    for (int angle = 0; angle < ANGLES; ++angle) {
-      double angle_sum = 0.0;
-      for (int revolution = 0; revolution < revolutions; ++revolution) {
-        const double value =
-            at(start + (revolution + static_cast<double>(angle) / ANGLES) * samples_per_revolution);
-        angle_sum += value;
-        squares += value * value;
-      }
-      sum += angle_sum;
-      repeating += angle_sum * angle_sum / revolutions;
-    }
-    const double energy = squares - sum * sum / (ANGLES * revolutions);
-    nonperiodic += squares - repeating;
-    all += energy;
+  for (double start = 1.0; start + window + 2.0 < static_cast<double>(values.size()); start += window) {
+    RevolutionWindow content(static_cast<std::size_t>(std::ceil(samples_per_revolution)),
+                             static_cast<std::size_t>(revolutions), 0);
+    content.add(values, start, samples_per_revolution);
+    nonperiodic += content.remainder();
+    all += content.total();
   }
   return all > 0.0 ? nonperiodic / all : NOT_A_NUMBER;
 }

@@ -1,5 +1,6 @@
+#include "smartmill_stability/chart/chart_parameters.h"
+
 #include "smartmill_core/require.h"
-#include "smartmill_stability/chart/chart.h"
 
 namespace smartmill::stability {
 namespace {

@@ -11,20 +11,21 @@
 namespace smartmill::stability {
 namespace {
 
-constexpr double UNKNOWN = 0.1;  // [1] relative standard deviation of a value without one
-constexpr double MOST = 0.5;     // [1] largest relative standard deviation
+struct DrawOptions {
+  double unknown = 0.1;  ///< [1] relative standard deviation of a value without one: typical of a catalogue
+  double most = 0.5;     ///< [1] largest relative standard deviation; above, drawn values mean nothing
+  std::size_t lines = 600;    ///< of the receptances; their error cancels in the ratio of draw to mean
+  double speed_step = 0.004;  ///< [1] relative, between the speeds of a search; below any speed margin
+};
+constexpr DrawOptions DRAW;
 
 double shareOf(double deviation, double value, double least) {
-  const double share = std::isfinite(deviation) && value != 0.0 ? std::abs(deviation / value) : UNKNOWN;
-  return std::min(MOST, std::hypot(share, least));
+  const double share = std::isfinite(deviation) && value != 0.0 ? std::abs(deviation / value) : DRAW.unknown;
+  return std::min(DRAW.most, std::hypot(share, least));
 }
 
 std::unique_ptr<FloquetSolver> solverOf(const RegenerativeSystem& system) {
-  SolverOptions options;
-  options.nodes = 8;
-  options.tolerance = 1e-3;
-  options.many = true;
-  return makeFloquetSolver(Method::collocation, system, options);
+  return makeFloquetSolver(Method::collocation, system, SolverOptions::ofManyPoints());
 }
 
 bool isStable(const FloquetSolver& solver, double speed, double depth, double margin) {
@@ -69,25 +70,24 @@ UncertainSystem measuredSystem(const RegenerativeSystem& system, const ModalMode
                        shareOf(mode.gain_std, mode.gain, least.gain)});
     }
     // The residual compliance is one more mode.
-    modes.resize(before + count, {UNKNOWN, UNKNOWN, UNKNOWN});
+    modes.resize(before + count, {DRAW.unknown, DRAW.unknown, DRAW.unknown});
   }
   const CuttingCoefficients &value = coefficients.value, &deviation = coefficients.std_dev;
   const double kt = shareOf(deviation.ktc, value.ktc, least.cutting);
   const bool radial = std::isfinite(deviation.krc) && value.krc > 0.0;
   const double kr = radial ? shareOf(deviation.krc, value.krc, least.cutting) : std::hypot(kt, least.radial);
-  return UncertainSystem(system, modes, kt, std::min(MOST, kr));
+  return UncertainSystem(system, modes, kt, std::min(DRAW.most, kr));
 }
 
 DrawnLimits drawnLimits(const UncertainSystem& system, const std::vector<double>& speeds, int draws,
                         unsigned seed) {
-  constexpr std::size_t LINES = 600;  // the error of this resolution cancels in the ratio of draw to mean
   if (draws < 1) throw Error("draws: " + std::to_string(draws) + ": expected at least 1");
   double highest = 0.0;
   for (const SystemMode& mode : system.mean().modes) highest = std::max(highest, mode.frequency);
   const auto zeroOrder = [&](const RegenerativeSystem& machine) {
     const RegenerativeProcess process{machine.teeth, machine.entry, machine.exit, machine.kt,
                                       machine.kr / machine.kt};
-    return zeroOrderLimit(process, responseOf(machine.modes, 1.0, 2.0 * highest, LINES), speeds).depth;
+    return zeroOrderLimit(process, responseOf(machine.modes, 1.0, 2.0 * highest, DRAW.lines), speeds).depth;
   };
   DrawnLimits limits;
   limits.mean = zeroOrder(system.mean());
@@ -123,14 +123,13 @@ std::vector<double> depthsAtRisk(const DrawnLimits& limits, const std::vector<do
 
 std::optional<StableSpeed> stableSpeed(const UncertainSystem& system, double depth, double low, double high,
                                        const RiskOptions& options) {
-  constexpr double STEP = 0.004;  // [1] relative, between speeds
   if (!(depth > 0.0) || !(low > 0.0) || !(high >= low))
     throw Error("stable speed: expected a depth above 0 and speeds 0 < low <= high");
   DrawnMachines drawn(system, options);
   const auto mean = solverOf(system.mean());
   std::vector<double> speeds;
   std::vector<bool> stable;
-  for (double s = low; s <= high * (1.0 + 1e-9); s *= 1.0 + STEP) {
+  for (double s = low; s <= high * (1.0 + 1e-9); s *= 1.0 + DRAW.speed_step) {
     speeds.push_back(s);
     stable.push_back(mean->multiplier(s, depth).radius() < 1.0);
   }

@@ -8,6 +8,17 @@
 namespace smartmill::stability {
 namespace {
 
+struct AdviceOptions {
+  std::size_t conditions = 8;  ///< most recent ones, among which the cut of a verdict is
+  std::size_t speeds = 12;     ///< proposed by the chatter frequency; limits of more take seconds
+  double same_speed = 0.01;    ///< [1] relative difference of speeds that are one proposal
+  double load = 0.01;          ///< [1] smaller differences of the speed are the effect of load
+  double override = 0.5;       ///< [1] larger ones a spindle run-up or stop
+  double deepest = 5.0;        ///< [1] largest depth over that of the cut, which identifies pockets
+  int correction_steps = 40;   ///< of the factor of a frequency, finer than two motions are apart
+};
+constexpr AdviceOptions ADVICE;
+
 struct Probe {
   /// [Hz] Predicted minus observed frequency, modulo the tooth passing frequency.
   double gap = 0.0;
@@ -94,11 +105,10 @@ std::optional<ModeCorrection> correctFromChatter(const RegenerativeSystem& prior
   const double passing = speed * prior.teeth / units::TWO_PI;
   for (std::size_t mode = 0; mode < prior.modes.size(); ++mode) {
     // Roots of the gap over the factor. A jump to another motion and a wrap-around are no roots.
-    constexpr int STEPS = 40;
     double before_factor = 1.0 - most;
     Probe before = probe(scaled(prior, mode, before_factor), speed, depth, observed);
-    for (int i = 1; i <= STEPS; ++i) {
-      const double factor = 1.0 - most + 2.0 * most * i / STEPS;
+    for (int i = 1; i <= ADVICE.correction_steps; ++i) {
+      const double factor = 1.0 - most + 2.0 * most * i / ADVICE.correction_steps;
       const Probe here = probe(scaled(prior, mode, factor), speed, depth, observed);
       if ((before.gap > 0.0) != (here.gap > 0.0) && std::abs(here.gap - before.gap) < 0.25 * passing) {
         double a = before_factor, b = factor;
@@ -131,9 +141,8 @@ ChatterAdvisor::ChatterAdvisor(double low, double high, int teeth, PriorSystem p
 }
 
 void ChatterAdvisor::handle(const CuttingCondition& condition) {
-  constexpr std::size_t MOST = 8;
   conditions_.push_back(condition);
-  if (conditions_.size() > MOST) conditions_.pop_front();
+  if (conditions_.size() > ADVICE.conditions) conditions_.pop_front();
 }
 
 void ChatterAdvisor::handle(const CncState& state) {
@@ -151,9 +160,8 @@ void ChatterAdvisor::handle(const ChatterState& state) {
   if (!state.valid || !state.chatter) return;
   running_.push_back(state);
   if (advised_ || running_.size() < 2) return;
-  constexpr double AGREE = 0.01;
   const double before = running_[running_.size() - 2].frequency;
-  if (std::abs(state.frequency - before) > AGREE * before) return;
+  if (std::abs(state.frequency - before) > SAME_CHATTER * before) return;
   advised_ = true;
   advise(state);
 }
@@ -164,17 +172,16 @@ namespace {
 /// the modal frequencies, where the pockets are if the chatter is a flip. The limits are still unknown.
 std::vector<ChatterAdvice::Speed> inStep(double frequency, int teeth, const std::vector<SystemMode>& modes,
                                          double low, double high) {
-  constexpr std::size_t MOST_SPEEDS = 12;
-  constexpr double SAME_SPEED = 0.01, UNKNOWN = std::numeric_limits<double>::quiet_NaN();
+  constexpr double UNKNOWN = std::numeric_limits<double>::quiet_NaN();
   std::vector<double> proposed = speedsFromChatter(frequency, teeth, low, high);
-  if (proposed.size() > MOST_SPEEDS) proposed.resize(MOST_SPEEDS);
+  if (proposed.size() > ADVICE.speeds) proposed.resize(ADVICE.speeds);
   for (const SystemMode& mode : modes)
     for (const double s : speedsFromChatter(mode.frequency, teeth, low, high))
-      if (proposed.size() < 4 * MOST_SPEEDS) proposed.push_back(s);
+      if (proposed.size() < 4 * ADVICE.speeds) proposed.push_back(s);
   std::vector<ChatterAdvice::Speed> speeds;
   for (const double s : proposed) {
     if (std::none_of(speeds.begin(), speeds.end(), [&](const ChatterAdvice::Speed& other) {
-          return std::abs(other.speed / s - 1.0) < SAME_SPEED;
+          return std::abs(other.speed / s - 1.0) < ADVICE.same_speed;
         }))
       speeds.push_back({s, UNKNOWN, UNKNOWN});
   }
@@ -195,15 +202,12 @@ void ChatterAdvisor::advise(const ChatterState& state) {
   advice.depth = condition.engagement.axial_depth;
   const int teeth = condition.tool.teeth > 0 ? condition.tool.teeth : teeth_;
   std::optional<RegenerativeSystem> system = prior_system_(condition);
-  // A smaller difference is the effect of load on the commanded speed, a larger one a spindle run-up or stop.
-  constexpr double LOAD = 0.01, OVERRIDE = 0.5;
   const double off = std::abs(actual_speed_ - condition.spindle_speed) / condition.spindle_speed;
-  const double speed = off > LOAD && off < OVERRIDE ? actual_speed_ : condition.spindle_speed;
+  const double speed = off > ADVICE.load && off < ADVICE.override ? actual_speed_ : condition.spindle_speed;
   advice.speed = speed;
   advice.engagement = condition.engagement;
   advice.teeth = teeth;
-  // Deep enough to identify pockets.
-  const double most = 5.0 * advice.depth;
+  const double most = ADVICE.deepest * advice.depth;
   if (system && speed > 0.0 && advice.depth > 0.0) {
     const auto limitOf = [&](const RegenerativeSystem& s) {
       return makeSolver(Method::collocation, s)->limit(speed, most).depth;

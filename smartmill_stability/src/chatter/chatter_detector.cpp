@@ -6,97 +6,12 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/require.h"
-#include "smartmill_core/signal/fourier.h"
 #include "smartmill_core/signal/interpolate.h"
+#include "smartmill_core/signal/revolution_window.h"
 #include "smartmill_core/signal/steady_path.h"
-#include "smartmill_core/signal/window.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::stability {
-namespace {
-
-/// Energies of a window of whole revolutions, summed over the axes.
-class WindowContent {
- public:
-  /// @param bins samples in a revolution @param teeth of the tool
-  WindowContent(std::size_t bins, std::size_t turns, int teeth)
-      : outside_of_turn(turns, 0.0),
-        bins_(bins),
-        turns_(turns),
-        half_(teeth > 0 && teeth % 2 == 0 ? static_cast<std::size_t>(teeth) / 2 : 0),
-        taper_(hannWindow(bins * turns)),
-        of_order_(bins / 2 + 1, 0.0),
-        power_(bins * turns / 2 + 1, 0.0) {}
-
-  double all = 0.0;                     // variance
-  double outside = 0.0;                 // mean square of the remainder without the synchronous part
-  double alternating = 0.0;             // mean square of the synchronous part at the orders of a flip
-  std::vector<double> outside_of_turn;  // mean square of the remainder in each revolution
-
-  void add(std::vector<double> force) {
-    const auto n = static_cast<double>(force.size());
-    double mean = 0.0;
-    std::vector<double> repeated(bins_, 0.0);
-    for (std::size_t i = 0; i < force.size(); ++i) {
-      mean += force[i] / n;
-      repeated[i % bins_] += force[i] / static_cast<double>(turns_);
-    }
-    // The mean over the revolutions removes 1 / turns of the energy of the remainder.
-    const double share = static_cast<double>(turns_) / static_cast<double>(turns_ - 1);
-    for (std::size_t i = 0; i < force.size(); ++i) {
-      all += (force[i] - mean) * (force[i] - mean) / n;
-      force[i] -= repeated[i % bins_];
-      outside += share * force[i] * force[i] / n;
-      outside_of_turn[i / bins_] += share * force[i] * force[i] / static_cast<double>(bins_);
-      force[i] *= taper_[i];
-    }
-    addAlternation(repeated);
-    const auto spectrum = fourier(force);
-    for (std::size_t k = 0; k < power_.size(); ++k) power_[k] += std::norm(spectrum[k]);
-  }
-
-  /// [1 / window] Frequency of the strongest line of the remainder.
-  double strongest() const {
-    const auto peak =
-        static_cast<std::size_t>(std::max_element(power_.begin() + 1, power_.end() - 1) - power_.begin());
-    // Vertex of the parabola through the logarithms: exact to a few percent of a line for a Hann window.
-    const double a = std::log(power_[peak - 1] + 1e-300), b = std::log(power_[peak] + 1e-300),
-                 c = std::log(power_[peak + 1] + 1e-300);
-    const double curve = a - 2.0 * b + c;
-    const double shift = curve < 0.0 ? std::clamp(0.5 * (a - c) / curve, -0.5, 0.5) : 0.0;
-    return static_cast<double>(peak) + shift;
-  }
-
-  /// [1 / revolution] Strongest order of a flip.
-  double strongestOrder() const {
-    return static_cast<double>(std::max_element(of_order_.begin(), of_order_.end()) - of_order_.begin());
-  }
-
-  /// Whether the remainder decays within the window: a transient of the entry, not chatter.
-  bool decays() const {
-    constexpr double DECAY = 0.7;
-    double early = 0.0, late = 0.0;
-    for (std::size_t k = 0; k < turns_; ++k) (2 * k < turns_ ? early : late) += outside_of_turn[k];
-    return late < DECAY * early;
-  }
-
- private:
-  /// Spindle orders of a flip for an even number of teeth: odd multiples of half the number of teeth.
-  void addAlternation(const std::vector<double>& repeated) {
-    if (half_ == 0) return;
-    const auto orders = fourier(repeated);
-    for (std::size_t k = half_; 2 * k < bins_; k += 2 * half_) {
-      const double square = 2.0 * std::norm(orders[k]) / std::pow(static_cast<double>(bins_), 2);
-      of_order_[k] += square;
-      alternating += square;
-    }
-  }
-
-  std::size_t bins_, turns_, half_;
-  std::vector<double> taper_, of_order_, power_;
-};
-
-}  // namespace
 
 void ChatterParameters::validate() const {
   checkBounds(*this);
@@ -104,8 +19,16 @@ void ChatterParameters::validate() const {
           "at most chatter_revolutions");
 }
 
+ChatterCriterionOptions ChatterParameters::criterion() const {
+  ChatterCriterionOptions options;
+  options.energy_ratio = energy_ratio;
+  options.least_severity = least_severity;
+  options.alternation_ratio = alternation_ratio;
+  return options;
+}
+
 ChatterDetector::ChatterDetector(const ChatterParameters& parameters, Output output)
-    : parameters_(parameters), output_(std::move(output)) {
+    : parameters_(parameters), criterion_(parameters.criterion()), output_(std::move(output)) {
   parameters_.validate();
 }
 
@@ -259,29 +182,20 @@ void ChatterDetector::judge(double from, double to) {
   std::vector<double> times;
   for (std::size_t i = 0; i < bins * turns; ++i)
     times.push_back(timeAt(from + units::TWO_PI * static_cast<double>(i) / static_cast<double>(bins)));
-  WindowContent content(bins, turns, condition_->tool.teeth);
-  for (std::size_t axis = 0; axis < 3; ++axis) content.add(forceAt(times, axis, rate));
+  RevolutionWindow window(bins, turns, condition_->tool.teeth);
+  for (std::size_t axis = 0; axis < 3; ++axis) window.add(forceAt(times, axis, rate));
+  const ChatterEvidence evidence = criterion_.judge(window, period);
 
   ChatterState state;
   state.stamp = stop;
   state.condition = condition_->name;
   state.valid = true;
-  const double all = content.all;
-  state.alternation = all > 0.0 ? std::min(1.0, content.alternating / all) : 0.0;
-  const bool flip =
-      state.alternation > parameters_.alternation_ratio && content.alternating > content.outside;
-  const double chatter_energy = flip ? content.outside + content.alternating : content.outside;
-  state.energy_ratio = all > 0.0 ? std::min(1.0, chatter_energy / all) : 0.0;
-  state.severity = std::sqrt(chatter_energy);
-  state.frequency = flip ? content.strongestOrder() / period : content.strongest() / (stop - start);
-  state.chatter = (flip || !content.decays()) && state.energy_ratio > parameters_.energy_ratio &&
-                  state.severity > parameters_.least_severity;
-  if (state.chatter) {
-    // A flip is synchronous: within this window it is present from the start.
-    std::size_t turn = flip ? 0 : turns - 1;
-    while (turn > 0 && content.outside_of_turn[turn - 1] > parameters_.energy_ratio * all) --turn;
-    state.onset = times[turn * bins];
-  }
+  state.chatter = evidence.chatter;
+  state.frequency = evidence.order / period;
+  state.energy_ratio = evidence.energy_ratio;
+  state.severity = evidence.severity;
+  state.alternation = evidence.alternation;
+  if (state.chatter) state.onset = times[evidence.onset * bins];
   reported_invalid_ = false;
   output_(state);
 }

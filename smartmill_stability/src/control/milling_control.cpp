@@ -11,10 +11,16 @@
 namespace smartmill::stability {
 namespace {
 
-constexpr double FALL_OVER_RISE = 5.0;  // [1] rate of decrease of the feed over its rate of increase
-constexpr double LOAD_STEP = 0.02;      // [1] smallest change of the feed override by the load
-constexpr double REACHED = 0.01;        // [1] relative tolerance of the spindle speed
-constexpr double LONGEST_STEP = 1.0;    // [s] longest interval between two loads
+struct MillingControlOptions {
+  double fall_over_rise =
+      5.0;                  ///< [1] rate of decrease of the feed over its rate of increase: overload is worse
+  double load_step = 0.02;  ///< [1] smallest change of the feed override by the load; spares the controller
+  double reached = 0.01;    ///< [1] relative tolerance of the spindle speed, the effect of load
+  double longest_step = 1.0;  ///< [s] longest interval between two loads over which the feed changes
+  /// [1] Steps of the depth of the proposed next cut, and the least one over the depth of this.
+  double depth_step = 0.05, least_depth = 0.1;
+};
+constexpr MillingControlOptions CONTROL;
 
 double rpm(double speed) {
   return units::rpmFromRadPerSec(speed);
@@ -48,7 +54,7 @@ void MillingControl::handle(const CncState& state) {
   if (next_ && state.stamp >= next_->stamp) begin(*std::exchange(next_, std::nullopt));
   if (phase_ == Phase::watching || !cut_) return;
   const double requested = cut_->spindle_speed * spindle_;
-  const bool reached = std::abs(state.spindle_speed - requested) <= REACHED * requested;
+  const bool reached = std::abs(state.spindle_speed - requested) <= CONTROL.reached * requested;
   if (phase_ == Phase::moving && reached) {
     phase_ = Phase::settling;
     since_ = state.stamp;
@@ -83,18 +89,19 @@ void MillingControl::handle(const LoadSample& load) {
   if (!mayAct() || parameters_.load_target == 0.0 || at_floor_) return;
   // An unknown load and the first one after a gap are ignored.
   if (!std::isfinite(load.spindle_load) || !(step > 0.0) ||
-      step > std::min(parameters_.load_timeout, LONGEST_STEP))
+      step > std::min(parameters_.load_timeout, CONTROL.longest_step))
     return;
   const double target = load.spindle_load > 0.0
                             ? std::min(1.0, load_factor_ * parameters_.load_target / load.spindle_load)
                             : 1.0;
   const double rise = parameters_.feed_rise * step;
-  load_factor_ = std::clamp(target, std::max(parameters_.feed_floor, load_factor_ - FALL_OVER_RISE * rise),
-                            load_factor_ + rise);
+  load_factor_ =
+      std::clamp(target, std::max(parameters_.feed_floor, load_factor_ - CONTROL.fall_over_rise * rise),
+                 load_factor_ + rise);
   load_factor_ = std::min(1.0, load_factor_);
   const double feed = feedFor(spindle_);
   const bool at_end = feed == parameters_.feed_floor || load_factor_ == 1.0;
-  if (std::abs(feed - feed_) < LOAD_STEP && !(at_end && feed != feed_)) return;
+  if (std::abs(feed - feed_) < CONTROL.load_step && !(at_end && feed != feed_)) return;
   if (request_) return;
   request(feed, spindle_,
           formatted("spindle load %.0f %%: feed to %.0f %%", 100.0 * load.spindle_load, 100.0 * feed), false);
@@ -163,7 +170,7 @@ void MillingControl::moveWithoutModel(const ChatterAdvice& advice) {
     const bool nearer = std::abs(s.speed - advice.speed) < std::abs(best - advice.speed);
     if (within && nearer) best = s.speed;
   }
-  if (best == 0.0 || std::abs(best / advice.speed - 1.0) < REACHED) {
+  if (best == 0.0 || std::abs(best / advice.speed - 1.0) < CONTROL.reached) {
     reduceFeed(advice, nullptr);
     return;
   }
@@ -181,10 +188,9 @@ void MillingControl::moveWithoutModel(const ChatterAdvice& advice) {
 }
 
 void MillingControl::reduceFeed(const ChatterAdvice& advice, const UncertainSystem* system) {
-  constexpr double DEPTH_STEP = 0.05, LEAST = 0.1;  // [1] of the depth
   at_floor_ = true;
   double speed = 0.0, depth = 0.0;
-  for (double share = 1.0; system && share > LEAST; share -= DEPTH_STEP) {
+  for (double share = 1.0; system && share > CONTROL.least_depth; share -= CONTROL.depth_step) {
     // Upper bound of the removal rate of all shallower cuts.
     if (share * advice.depth * highest() <= speed * depth) break;
     const auto found = stableSpeed(*system, share * advice.depth, lowest(), highest(), riskOptions());

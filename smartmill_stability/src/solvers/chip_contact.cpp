@@ -5,9 +5,9 @@
 
 #include "smartmill_core/cutting/chip_rule.h"
 #include "smartmill_core/error.h"
-#include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_stability/solvers/delayed_system.h"
 #include "solvers/floquet.h"
+#include "solvers/forced_vibration.h"
 
 // Contact of the teeth in the forced vibration. The tool is divided into axial slices, a revolution into
 // cells. The chip thickness of a tooth is the smallest of those against the surfaces of the 1 .. teeth
@@ -18,19 +18,9 @@
 namespace smartmill::stability {
 namespace {
 
-using Complex = std::complex<double>;
-using Eigen::Index;
-using Eigen::MatrixXcd;
-using Eigen::VectorXcd;
-using units::PI;
 using units::TWO_PI;
 
-constexpr int CELLS = 384;          // of a revolution
-constexpr double SLICE_LAG = 0.03;  // [rad] lag of the edge over a slice
-constexpr int WAVE_SLICES = 20;     // of a serration wave
-constexpr int MOST_SLICES = 60;
-constexpr int MOST_ITERATIONS = 30;
-constexpr std::size_t MOST_BREAKS = 80;  // above, the feedback is treated as smooth
+constexpr int CELLS = CONTACT.cells;
 
 double wrap(double angle) {
   angle = std::fmod(angle, TWO_PI);
@@ -46,13 +36,18 @@ struct ContactSegment {
 class Contact {
  public:
   Contact(const RegenerativeSystem& system, double speed, double depth)
-      : system_(system), chip_(*system.chip), speed_(speed), period_(TWO_PI / speed), teeth_(system.teeth) {
+      : system_(system),
+        chip_(*system.chip),
+        speed_(speed),
+        period_(TWO_PI / speed),
+        teeth_(system.teeth),
+        vibration_(system.modes, period_) {
     const ToolGeometry tool{system.teeth, system.diameter, system.helix, system.pitch};
     const double lag = system.helix > 0.0 ? tool.lag() : 0.0;
-    double required = std::max(1.0, lag * depth / SLICE_LAG);
+    double required = std::max(1.0, lag * depth / CONTACT.slice_lag);
     if (chip_.serration_amplitude > 0.0)
-      required = std::max(required, WAVE_SLICES * depth / chip_.serration_wavelength);
-    slices_ = std::min(MOST_SLICES, static_cast<int>(std::ceil(required)));
+      required = std::max(required, CONTACT.wave_slices * depth / chip_.serration_wavelength);
+    slices_ = std::min(CONTACT.most_slices, static_cast<int>(std::ceil(required)));
     height_ = depth / slices_;
     bool alike = true;
     for (int s = 0; s < slices_; ++s) {
@@ -71,7 +66,7 @@ class Contact {
 
   double period() const { return period_; }
   const std::vector<double>& delays() const { return delays_; }
-  bool tooManyBreaks() const { return breaks().size() > MOST_BREAKS; }
+  bool tooManyBreaks() const { return breaks().size() > CONTACT.most_breaks; }
 
   std::vector<double> breaks() const {
     std::vector<double> times;
@@ -152,10 +147,10 @@ class Contact {
     const double angle = angle_[e] + TWO_PI * (cell + 0.5) / CELLS;
     const double sine = std::sin(angle), cosine = std::cos(angle);
     double h = rigidChip(e, m).at(sine, cosine);
-    if (!motion_.empty()) {
+    if (!vibration_.empty()) {
       const auto i = static_cast<std::size_t>(cell);
-      const auto& before = delayed_motion_[delay_[p]];
-      h += (motion_[0][i] - before[0][i]) * sine + (motion_[1][i] - before[1][i]) * cosine;
+      const auto &now = vibration_.motion(), &before = vibration_.delayed(delay_[p]);
+      h += (now[0][i] - before[0][i]) * sine + (now[1][i] - before[1][i]) * cosine;
     }
     return h;
   }
@@ -201,8 +196,8 @@ class Contact {
 
   void solve(bool with_motion) {
     Pattern pattern = patternOf();
-    for (int i = 0; with_motion && i < MOST_ITERATIONS; ++i) {
-      updateMotion(pattern, i < MOST_ITERATIONS / 2 ? 1.0 : 0.5);
+    for (int i = 0; with_motion && i < CONTACT.most_iterations; ++i) {
+      vibration_.update(forcesOf(pattern), delays_, i < CONTACT.most_iterations / 2 ? 1.0 : 0.5);
       const Pattern next = patternOf();
       std::size_t changed = 0;
       for (std::size_t c = 0; c < next.size(); ++c) changed += next[c] != pattern[c];
@@ -211,13 +206,6 @@ class Contact {
     }
     setSegments(pattern);
   }
-
-  /// Forces of a contact: feedback [kind][cell] (kind 0: present motion, 1 + d: motion delayed by d) and
-  /// force of the rigid tool [cell].
-  struct ContactForces {
-    std::vector<std::vector<Eigen::Matrix2d>> gain;
-    std::vector<Eigen::Vector2d> force;
-  };
 
   ContactForces forcesOf(const Pattern& pattern) const {
     ContactForces forces{
@@ -242,84 +230,6 @@ class Contact {
       }
     }
     return forces;
-  }
-
-  /// exp(-2 pi i j / CELLS).
-  static Complex rootOfUnity(long j) {
-    static const std::vector<Complex> ROOTS = [] {
-      std::vector<Complex> roots;
-      for (int k = 0; k < CELLS; ++k) roots.push_back(std::polar(1.0, -TWO_PI * k / CELLS));
-      return roots;
-    }();
-    return ROOTS[static_cast<std::size_t>(((j % CELLS) + CELLS) % CELLS)];
-  }
-
-  /// Fourier coefficient j of values in the middles of the cells.
-  template <class Result, class Value>
-  static Result coefficient(const std::vector<Value>& values, int j) {
-    Result sum = Result::Zero();
-    for (int i = 0; i < CELLS; ++i)
-      sum += rootOfUnity(static_cast<long>(j) * i) * values[static_cast<std::size_t>(i)];
-    return sum * std::polar(1.0 / CELLS, -PI * j / CELLS);
-  }
-
-  /// Harmonic balance: harmonics -most .. most of the forced vibration.
-  VectorXcd balance(const ContactForces& forces, int most) const {
-    const Index n = 2 * most + 1;
-    std::vector<std::vector<Eigen::Matrix2cd>> c;  // Fourier coefficients of the gains, -2 most .. 2 most
-    for (const auto& gain : forces.gain) {
-      c.emplace_back(static_cast<std::size_t>(4 * most + 1));
-      for (int j = 0; j <= 2 * most; ++j) {
-        const auto sum = coefficient<Eigen::Matrix2cd>(gain, j);
-        c.back()[static_cast<std::size_t>(2 * most + j)] = sum;
-        c.back()[static_cast<std::size_t>(2 * most - j)] = sum.conjugate();
-      }
-    }
-    MatrixXcd matrix = MatrixXcd::Identity(2 * n, 2 * n);
-    VectorXcd right(2 * n);
-    for (int r = -most; r <= most; ++r) {
-      const auto g = receptance(system_.modes, r / period_);
-      Eigen::Matrix2cd compliance;
-      compliance << g[0], g[1], g[2], g[3];
-      right.segment<2>(2 * (r + most)) = compliance * coefficient<Eigen::Vector2cd>(forces.force, r);
-      for (int l = -most; l <= most; ++l) {
-        const auto k = static_cast<std::size_t>(2 * most + r - l);
-        Eigen::Matrix2cd sum = c[0][k];
-        for (std::size_t d = 0; d < delays_.size(); ++d)
-          sum += std::polar(1.0, -TWO_PI * l * delays_[d] / period_) * c[1 + d][k];
-        matrix.block<2, 2>(2 * (r + most), 2 * (l + most)) -= compliance * sum;
-      }
-    }
-    return linear::solve(matrix, right);
-  }
-
-  /// [m] The delayed forced vibration in the cells: [axis][cell].
-  std::vector<std::vector<double>> seriesAt(double delay, int most) const {
-    std::vector<std::vector<double>> u(2, std::vector<double>(CELLS, 0.0));
-    for (int r = 0; r <= most; ++r) {
-      const Complex shift = std::polar(r == 0 ? 1.0 : 2.0, TWO_PI * r * (0.5 / CELLS - delay / period_));
-      const Complex x = shift * spectrum_[2 * (r + most)], y = shift * spectrum_[2 * (r + most) + 1];
-      for (int i = 0; i < CELLS; ++i) {
-        const Complex wave = std::conj(rootOfUnity(static_cast<long>(r) * i));
-        u[0][static_cast<std::size_t>(i)] += (x * wave).real();
-        u[1][static_cast<std::size_t>(i)] += (y * wave).real();
-      }
-    }
-    return u;
-  }
-
-  /// Updates the forced vibration to that of a contact. @param share [1] damping of the step, 1: full step
-  void updateMotion(const Pattern& pattern, double share) {
-    double highest = 0.0;
-    for (const SystemMode& mode : system_.modes) highest = std::max(highest, mode.frequency);
-    const int most = std::min(90, static_cast<int>(std::ceil(2.0 * highest * period_)) + 8);
-    VectorXcd found = balance(forcesOf(pattern), most);
-    if (!found.allFinite()) return;
-    if (spectrum_.size() == found.size() && share < 1.0) found = share * found + (1.0 - share) * spectrum_;
-    spectrum_ = found;
-    motion_ = seriesAt(0.0, most);
-    delayed_motion_.clear();
-    for (const double delay : delays_) delayed_motion_.push_back(seriesAt(delay, most));
   }
 
   /// Joins cells to contact segments, whose ends are where the chip thickness is zero or where the surface of
@@ -379,10 +289,8 @@ class Contact {
   std::vector<double> delays_;          // [s]
   std::vector<ChipShape> rigid_chips_;  // of each edge against each pass
   std::vector<std::size_t> delay_;      // of each pass
-  VectorXcd spectrum_;
-  std::vector<std::vector<double>> motion_;                       // [axis][cell] [m]
-  std::vector<std::vector<std::vector<double>>> delayed_motion_;  // [delay][axis][cell]
-  std::vector<std::vector<ContactSegment>> segments_;             // of each edge
+  ForcedVibration vibration_;
+  std::vector<std::vector<ContactSegment>> segments_;  // of each edge
 };
 
 }  // namespace

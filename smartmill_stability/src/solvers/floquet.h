@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <memory>
 #include <vector>
 
@@ -17,6 +18,13 @@ std::unique_ptr<StabilitySolver> makeMultiFrequency(const RegenerativeSystem& sy
                                                     const SolverOptions& options);
 
 std::unique_ptr<StabilitySolver> makeZeroOrder(const RegenerativeSystem& system);
+
+/// @throws Error on an invalid system or one without dynamics.
+void needDynamics(const RegenerativeSystem& system);
+
+/// Nodes and weights of the three-point Gauss quadrature on [-1, 1].
+inline constexpr std::array<std::array<double, 2>, 3> GAUSS{
+    {{{-0.7745966692414834, 5.0 / 9.0}}, {{0.0, 8.0 / 9.0}}, {{0.7745966692414834, 5.0 / 9.0}}}};
 
 /// Axes along which a mode is excited or moves; along the others the tool is rigid.
 struct Axes {

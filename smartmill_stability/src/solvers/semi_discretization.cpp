@@ -18,8 +18,11 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int DEFAULT_STEPS = 200;
-constexpr double EIGENVALUE_TOLERANCE = 1e-9;
+struct SemiDiscretizationOptions {
+  int steps = 200;                     ///< in a principal period; second order: 0.1 % of the depth
+  double eigenvalue_tolerance = 1e-9;  ///< [1] far below the error of the steps
+};
+constexpr SemiDiscretizationOptions DEFAULT;
 
 /// phi_0 .. phi_count of X with phi_k = sum_j X^j / (j + k)!: Taylor series of the last, then phi_k = X
 /// phi_{k+1} + 1 / k!.
@@ -55,8 +58,7 @@ Feedback meanOf(const DelayedSystem& system, const std::vector<double>& breaks, 
     double to = end;
     if (next != breaks.end() && *next < end) to = *next++;
     const double half = 0.5 * (to - from), middle = 0.5 * (to + from);
-    constexpr double NODE = 0.7745966692414834;
-    for (const auto& [x, w] : {std::pair{-NODE, 5.0 / 9.0}, {0.0, 8.0 / 9.0}, {NODE, 5.0 / 9.0}}) {
+    for (const auto& [x, w] : GAUSS) {
       system.feedback(middle + x * half, middle, f);
       const double weight = w * half / (end - begin);
       mean.now += weight * f.now;
@@ -132,7 +134,7 @@ class StepMap {
   Dominant dominant(bool with_vector) {
     Index expected = 0;
     return dominantEigenvalue([this](const VectorXd& in, VectorXd& out) { march(in, out, nullptr); },
-                              m2_ + d_ * ring_, EIGENVALUE_TOLERANCE, with_vector, expected);
+                              m2_ + d_ * ring_, DEFAULT.eigenvalue_tolerance, with_vector, expected);
   }
 
   double strongest(const Dominant& mode, double highest) {
@@ -230,7 +232,7 @@ class SemiDiscretization : public FloquetSolver {
  public:
   SemiDiscretization(const RegenerativeSystem& system, const SolverOptions& options)
       : FloquetSolver(system, options) {
-    if (options_.steps == 0) options_.steps = DEFAULT_STEPS;
+    if (options_.steps == 0) options_.steps = DEFAULT.steps;
   }
 
   class Speed : public AtSpeed {

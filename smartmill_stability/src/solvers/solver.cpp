@@ -9,10 +9,18 @@
 namespace smartmill::stability {
 namespace {
 
-/// [1] Largest and smallest relative step of the depth in a search from zero.
-constexpr double STEP = 0.15, LEAST_STEP = 0.02;
-/// [1] Step over the distance to the crossing that is extrapolated from the last two samples.
-constexpr double OVERSHOOT = 1.3;
+/// Search for the first loss of stability with growing depth.
+struct DepthSearchOptions {
+  double step = 0.15, least_step = 0.02;  ///< [1] of the depth: islands of instability are thicker
+  /// [1] Step over the distance to the crossing that is extrapolated from the last two samples, so that the
+  /// next sample lies beyond it.
+  double overshoot = 1.3;
+  int most_iterations = 60;      ///< of a root; false position needs about ten
+  std::size_t mean_lines = 200;  ///< of the receptance for the first depth, which is a guess
+  double first_share = 0.4;      ///< [1] first depth over the least zero-order limit, which misses flips
+  double jump = 1.15;            ///< [1] over a neighbouring limit, above which the search is repeated
+};
+constexpr DepthSearchOptions SEARCH;
 
 /// Logarithm of the spectral radius at a depth.
 struct Sample {
@@ -43,18 +51,17 @@ class Search {
       if (depth >= most) return std::numeric_limits<double>::infinity();
       const Sample &a = samples[samples.size() - 2], &b = samples.back();
       const double slope = (b.log_radius - a.log_radius) / (b.depth - a.depth);
-      const double step = slope > 0.0 ? -OVERSHOOT * b.log_radius / slope : STEP * depth;
-      depth = std::min(depth + std::clamp(step, LEAST_STEP * depth, STEP * depth), most);
+      const double step = slope > 0.0 ? -SEARCH.overshoot * b.log_radius / slope : SEARCH.step * depth;
+      depth = std::min(depth + std::clamp(step, SEARCH.least_step * depth, SEARCH.step * depth), most);
     }
   }
 
   /// [m] Limit between a stable sample a and an unstable sample b.
   double root(Sample a, Sample b) {
-    constexpr int MOST = 60;
     // Illinois method: false position, halving the value of an end that is retained twice.
     int replaced = 0;  // end replaced last: 1 b, -1 a
     double fa = a.log_radius, fb = b.log_radius;
-    for (int i = 0; i < MOST && b.depth - a.depth > tolerance_ * b.depth; ++i) {
+    for (int i = 0; i < SEARCH.most_iterations && b.depth - a.depth > tolerance_ * b.depth; ++i) {
       double middle = (a.depth * fb - b.depth * fa) / (fb - fa);
       const double margin = 0.3 * tolerance_ * b.depth;
       middle = std::clamp(middle, a.depth + margin, b.depth - margin);
@@ -189,14 +196,13 @@ FloquetSolver::FloquetSolver(const RegenerativeSystem& system, const SolverOptio
   }
   depth_scale_ = 0.5 / (std::hypot(system_.kt, system_.kr) * compliance);
   if (system_.cut == Cut::milling && system_.kt > 0.0) {
-    constexpr std::size_t LINES = 200;
     const RegenerativeProcess mean{system_.teeth, system_.entry, std::min(system_.exit, units::TWO_PI),
                                    system_.kt, system_.kr / system_.kt};
-    const double least = system_.exit <= units::TWO_PI
-                             ? absoluteDepthLimit(mean, responseOf(system_.modes, 1.0, 2.0 * highest, LINES))
-                             : depth_scale_;
-    constexpr double SHARE = 0.4;
-    if (std::isfinite(least)) depth_scale_ = std::max(depth_scale_, SHARE * least);
+    const double least =
+        system_.exit <= units::TWO_PI
+            ? absoluteDepthLimit(mean, responseOf(system_.modes, 1.0, 2.0 * highest, SEARCH.mean_lines))
+            : depth_scale_;
+    if (std::isfinite(least)) depth_scale_ = std::max(depth_scale_, SEARCH.first_share * least);
   }
 }
 
@@ -230,8 +236,7 @@ std::vector<Limit> FloquetSolver::limits(const std::vector<double>& speeds, doub
   const std::vector<Limit> before = found;
   for (std::size_t i = 0; i < found.size(); ++i) {
     for (const std::size_t j : {i - 1, i + 1}) {
-      constexpr double JUMP = 1.15;
-      if (j >= found.size() || !(before[i].depth > JUMP * before[j].depth)) continue;
+      if (j >= found.size() || !(before[i].depth > SEARCH.jump * before[j].depth)) continue;
       const std::unique_ptr<AtSpeed> here = at(speeds[i]);
       double stable = 0.9 * before[j].depth;
       if (here->multiplier(stable).radius() > 1.0) continue;

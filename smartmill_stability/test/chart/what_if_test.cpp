@@ -6,6 +6,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_stability/chart/chart.h"
+#include "smartmill_stability/chart/limit_continuation.h"
 #include "smartmill_stability_testing/benchmark.h"
 
 namespace smartmill::stability {

@@ -72,9 +72,9 @@ class ForceTrack {
 /// Range from the 10th to the 90th percentile.
 double middleRange(const std::vector<double>& values);
 
-/// Share of the energy (without the mean) that is not synchronous with the spindle. In each window of whole
-/// revolutions the synchronous part is the mean over the revolutions at every angle. 0 for a forced
-/// vibration, towards 1 for chatter; NaN if the series is shorter than a window.
+/// Share of the energy (without the mean) that is not synchronous with the spindle, as the chatter detector
+/// computes it (RevolutionWindow). 0 for a forced vibration, towards 1 for chatter; NaN if the series is
+/// shorter than a window.
 /// @param samples_per_revolution may be fractional @param revolutions of a window, 2 or more
 double nonperiodicShare(const std::vector<double>& values, double samples_per_revolution, int revolutions);
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "smartmill_core/cutting/stability_chart.h"
+#include "smartmill_stability/chart/measured_machine.h"
 #include "smartmill_stability/solvers/solver.h"
 
 namespace smartmill::stability {
@@ -42,14 +43,11 @@ struct WhatIfChart {
 /// Modes of the tool at another overhang. @param overhang [1] as WhatIf::overhang
 std::vector<SystemMode> withOverhang(std::vector<SystemMode> modes, double overhang);
 
-/// Limits at two or more ascending speeds by continuation, fast enough for interactive use: every tenth speed
-/// is searched from depth zero by collocation; the speeds between start from a prediction by their neighbours
-/// and the zero-order solution, and are interpolated where the prediction is right to 1 %. Where the lobe
-/// changes, every speed is solved.
-StabilityLimit limitsByContinuation(const RegenerativeSystem& system, const std::vector<double>& speeds,
-                                    double max_depth);
-
 /// Index of the mode with the largest receptance at a frequency [Hz]; -1 for NaN or without modes.
 int dominantMode(const std::vector<SystemMode>& modes, double frequency);
+
+/// The chart of a modified cut, by collocation from the modes, fast enough for interactive use.
+/// @throws Error while modes of x and y or the tangential coefficient are missing, and on an invalid request.
+WhatIfChart whatIfChart(const ChartCut& cut, const MeasuredMachine& machine, const WhatIf& request);
 
 }  // namespace smartmill::stability

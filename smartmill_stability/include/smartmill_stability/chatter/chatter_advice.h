@@ -12,6 +12,10 @@
 
 namespace smartmill::stability {
 
+/// [1] Largest relative difference of the frequencies of two windows with the same chatter: while chatter
+/// grows, the first window may contain another dominant line.
+inline constexpr double SAME_CHATTER = 0.01;
+
 /// Uninterrupted chatter in one cut, from the verdicts of consecutive windows.
 struct ChatterEpisode {
   std::string condition;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "smartmill_core/parameters/parameter_table.h"
+#include "smartmill_core/signal/chatter_criterion.h"
 #include "smartmill_core/signal/stream_sorter.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_core/signal/unwrapped_angle.h"
@@ -47,6 +48,7 @@ struct ChatterParameters {
   }
   /// @throws Error naming key and value.
   void validate() const;
+  ChatterCriterionOptions criterion() const;
 };
 
 /// Verdict on one window (topic chatter/state).
@@ -65,11 +67,8 @@ struct ChatterState {
   double onset = std::numeric_limits<double>::quiet_NaN();
 };
 
-/// Distinguishes chatter from forced vibration in the compensated force. The synchronous part (teeth, runout)
-/// is the mean over the revolutions of the window at each angle; the remainder is chatter or noise. A flip
-/// (period doubling) of a tool with an even number of teeth repeats every revolution, as runout does, and is
-/// distinguished by its amplitude alone: every other tooth leaves the cut, so most of the energy alternates
-/// from tooth to tooth. Inputs in stamp order; the results depend on the inputs only.
+/// Distinguishes chatter from forced vibration in the compensated force: applies ChatterCriterion to windows
+/// of whole revolutions within a steady cut. Inputs in stamp order; the results depend on the inputs only.
 class ChatterDetector {
  public:
   using Output = std::function<void(const ChatterState&)>;
@@ -99,6 +98,7 @@ class ChatterDetector {
   void judge(double from, double to);
 
   ChatterParameters parameters_;
+  ChatterCriterion criterion_;
   Output output_;
   std::optional<CuttingCondition> condition_;
   std::deque<Sample> samples_;

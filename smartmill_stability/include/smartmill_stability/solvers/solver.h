@@ -91,6 +91,8 @@ std::array<std::complex<double>, 4> receptance(const std::vector<SystemMode>& mo
 
 /// Receptances with cross terms at frequencies from low to high [Hz], dense around each mode.
 ToolTipResponse responseOf(const std::vector<SystemMode>& modes, double low, double high, std::size_t lines);
+/// The same at ascending frequencies [Hz].
+ToolTipResponse responseOf(const std::vector<SystemMode>& modes, std::vector<double> frequencies);
 
 /// Type of the loss of stability: Hopf (quasi-periodic), flip (period doubling: the vibration repeats every
 /// two principal periods), fold (multiplier +1: static loss of stability).
@@ -131,6 +133,15 @@ struct SolverOptions {
   /// collocation: optimises for thousands of multipliers. Matrices that depend only on the length of an
   /// element are taken from a table (relative error 1e-9) that costs as much as a few multipliers.
   bool many = false;
+
+  /// For thousands of multipliers, in charts that are shown or drawn at random: 0.1 % of the depth.
+  static SolverOptions ofManyPoints() {
+    SolverOptions options;
+    options.nodes = 8;
+    options.tolerance = 1e-3;
+    options.many = true;
+    return options;
+  }
 };
 
 /// A stability solver of one system.

@@ -1,0 +1,210 @@
+#include "smartmill_stability/chart/measured_machine.h"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+#include "smartmill_stability/chart/risk.h"
+#include "smartmill_stability/solvers/cross_modes.h"
+
+namespace smartmill::stability {
+namespace {
+
+/// Removes lines with too little excitation and lines below a multiple of their own standard deviation, where
+/// noise would appear as a resonance. Interpolation between the neighbours replaces them.
+/// @param error [1] largest standard deviation over the peak @param factor [1] least value over standard
+/// deviation
+FrequencyResponse certainLines(const FrequencyResponse& frf, double error, double factor) {
+  if (frf.std_dev.size() != frf.size()) return frf;
+  double peak = 0.0;
+  for (std::size_t i = 0; i < frf.size(); ++i) {
+    if (frf.std_dev[i] < std::abs(frf.value[i])) peak = std::max(peak, std::abs(frf.value[i]));
+  }
+  FrequencyResponse result;
+  result.unit = frf.unit;
+  result.averages = frf.averages;
+  for (std::size_t i = 0; i < frf.size(); ++i) {
+    if (frf.std_dev[i] > error * peak || std::abs(frf.value[i]) < factor * frf.std_dev[i]) continue;
+    result.frequency.push_back(frf.frequency[i]);
+    result.value.push_back(frf.value[i]);
+  }
+  return result;
+}
+
+/// Adds cross receptances that were measured over the whole band. "xy": excitation along x, response along y.
+/// A single one is used for both (reciprocity).
+void addCross(const std::map<std::string, MeasuredFrf>& frfs, ToolTipResponse& response) {
+  const auto lines = [&](const char* direction) {
+    std::vector<std::complex<double>> values;
+    const auto found = frfs.find(direction);
+    if (found == frfs.end() || found->second.frf.size() < 2 || found->second.frf.unit != "m/N") return values;
+    const FrequencyResponse& frf = found->second.frf;
+    if (frf.frequency.front() > response.frequency.front() ||
+        frf.frequency.back() < response.frequency.back())
+      return values;
+    // Lines within the noise are set to 0; they would lower the limit at random.
+    FrequencyResponse significant = frf;
+    for (std::size_t i = 0; i < significant.size() && significant.std_dev.size() == significant.size(); ++i) {
+      if (std::abs(significant.value[i]) < 2.0 * significant.std_dev[i]) significant.value[i] = 0.0;
+    }
+    for (const double f : response.frequency) values.push_back(significant.at(f));
+    return values;
+  };
+  response.yx = lines("xy");
+  response.xy = lines("yx");
+  if (response.xy.empty()) response.xy = response.yx;
+  if (response.yx.empty()) response.yx = response.xy;
+}
+
+bool needsModes(const ChartParameters& parameters) {
+  return parameters.method == "collocation" || (parameters.method == "zero_order" && parameters.use_modes);
+}
+
+}  // namespace
+
+void MeasuredMachine::use(const std::string& tool, double stamp) {
+  if (tool != tool_) {
+    frfs_.clear();
+    modes_.clear();
+    tool_ = tool;
+  }
+  stamp_ = std::max(stamp_, stamp);
+}
+
+void MeasuredMachine::handle(const MeasuredFrf& frf) {
+  if (frf.point != POINT_TOOL_TIP) return;
+  use(frf.tool, frf.stamp);
+  frfs_[frf.direction] = frf;
+}
+
+void MeasuredMachine::handle(const MeasuredModes& modes) {
+  if (modes.point != POINT_TOOL_TIP) return;
+  use(modes.tool, modes.stamp);
+  modes_[modes.direction] = modes;
+}
+
+void MeasuredMachine::handle(const CoefficientSet& coefficients) {
+  stamp_ = std::max(stamp_, coefficients.stamp);
+  coefficients_ = coefficients;
+}
+
+std::string MeasuredMachine::missing(const ChartParameters& parameters) const {
+  std::string list;
+  const auto need = [&](bool present, const std::string& what) {
+    if (!present) list += (list.empty() ? "" : ", ") + what;
+  };
+  for (const std::string direction : {"x", "y"}) {
+    if (needsModes(parameters)) {
+      need(modes_.count(direction) > 0, "modes in " + direction);
+    } else if (!byCollocation(parameters)) {
+      need(frfs_.count(direction) > 0, "FRF in " + direction);
+    }
+  }
+  need(coefficients_ && coefficients_->value.ktc > 0.0, "tangential coefficient");
+  return list;
+}
+
+bool MeasuredMachine::byCollocation(const ChartParameters& parameters) const {
+  if (parameters.method != "auto") return parameters.method == "collocation";
+  const auto good = [&](const char* direction) {
+    const auto found = modes_.find(direction);
+    return found != modes_.end() && !found->second.model.modes.empty() &&
+           found->second.relative_error <= parameters.modes_error;
+  };
+  return good("x") && good("y");
+}
+
+std::optional<RegenerativeSystem> MeasuredMachine::system(const ChartCut& cut,
+                                                          const Engagement& engagement) const {
+  if (!modes_.count("x") || !modes_.count("y") || !coefficients_ || !(coefficients_->value.ktc > 0.0))
+    return {};
+  const CuttingCoefficients& cutting = coefficients_->value;
+  const bool given = engagement.exit > engagement.entry;
+  RegenerativeSystem system;
+  system.modes = crossModes(modes_.at("x").model, modes_.at("y").model, crossFrf(cut.parameters));
+  system.teeth = cut.tool.teeth;
+  system.pitch = cut.tool.pitch;
+  system.helix = cut.tool.helix;
+  system.diameter = cut.tool.diameter;
+  system.entry = given ? engagement.entry : cut.parameters.entry;
+  system.exit = given ? engagement.exit : cut.parameters.exit;
+  system.kt = cutting.ktc;
+  system.kr = std::isfinite(cutting.krc) ? cutting.krc : cut.parameters.radial_ratio * cutting.ktc;
+  return system;
+}
+
+std::optional<UncertainSystem> MeasuredMachine::uncertainSystem(const ChartCut& cut,
+                                                                const Engagement& engagement) const {
+  const std::optional<RegenerativeSystem> mean = system(cut, engagement);
+  if (!mean) return {};
+  LeastDeviations least;
+  least.frequency = cut.parameters.frequency_std;
+  least.damping = least.gain = least.cutting = cut.parameters.gain_std;
+  least.radial = cut.parameters.radial_std;
+  return measuredSystem(*mean, modes_.at("x").model, modes_.at("y").model, *coefficients_, least);
+}
+
+/// The measured cross receptance, in either direction; empty without one.
+FrequencyResponse MeasuredMachine::crossFrf(const ChartParameters& parameters) const {
+  for (const char* direction : {"xy", "yx"}) {
+    const auto found = frfs_.find(direction);
+    if (found != frfs_.end() && found->second.frf.unit == "m/N")
+      return certainLines(found->second.frf.band(parameters.frequency_low, parameters.frequency_high),
+                          parameters.line_error, 0.0);
+  }
+  return {};
+}
+
+std::size_t MeasuredMachine::modesInX() const {
+  return modes_.count("x") ? systemModes(modes_.at("x").model, 0).size() : 0;
+}
+
+ChartSolver MeasuredMachine::solver(const ChartCut& cut) const {
+  const ChartParameters& parameters = cut.parameters;
+  const std::string lacking = missing(parameters);
+  if (!lacking.empty()) throw Error("no chart yet, missing: " + lacking);
+  ChartSolver result;
+  const CuttingCoefficients& cutting = coefficients_->value;
+  result.process.teeth = cut.tool.teeth;
+  result.process.entry = parameters.entry;
+  result.process.exit = parameters.exit;
+  result.process.kt = cutting.ktc;
+  result.process.radial_ratio =
+      std::isfinite(cutting.krc) ? cutting.krc / cutting.ktc : parameters.radial_ratio;
+  if (byCollocation(parameters)) {
+    const RegenerativeSystem system = *this->system(cut);
+    SolverOptions options;
+    options.tolerance = 1e-4;
+    options.nodes = 10;  // 1e-6 of the depth, enough for a chart
+    result.solver = makeSolver(Method::collocation, system, options);
+    // A limit beyond this depth does not restrict a recommended cut.
+    result.max_depth = parameters.max_depth / (1.0 - parameters.depth_margin);
+  } else {
+    result.response = measuredResponse(parameters);
+  }
+  return result;
+}
+
+/// Receptances of the tool tip for the zero-order solution.
+ToolTipResponse MeasuredMachine::measuredResponse(const ChartParameters& parameters) const {
+  constexpr std::size_t LINES = 20000;  // of the receptances of modes
+  constexpr double STD_DEVS = 3.0;      // least value of a measured line
+  if (parameters.use_modes)
+    return responseOf(modes_.at("x").model, modes_.at("y").model, std::max(1.0, parameters.frequency_low),
+                      parameters.frequency_high, LINES);
+  const auto lines = [&](const char* direction) {
+    return certainLines(frfs_.at(direction).frf.band(parameters.frequency_low, parameters.frequency_high),
+                        parameters.line_error, STD_DEVS);
+  };
+  ToolTipResponse response = responseOf(lines("x"), lines("y"));
+  addCross(frfs_, response);
+  return response;
+}
+
+UncertainSystem MeasuredMachine::measuredSpread(const RegenerativeSystem& system) const {
+  return measuredSystem(system, modes_.at("x").model, modes_.at("y").model, *coefficients_);
+}
+
+}  // namespace smartmill::stability

@@ -1,0 +1,74 @@
+#include "smartmill_core/signal/revolution_window.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "smartmill_core/signal/fourier.h"
+#include "smartmill_core/signal/interpolate.h"
+#include "smartmill_core/signal/window.h"
+
+namespace smartmill {
+
+RevolutionWindow::RevolutionWindow(std::size_t bins, std::size_t turns, int teeth)
+    : bins_(bins),
+      turns_(turns),
+      half_(teeth > 0 && teeth % 2 == 0 ? static_cast<std::size_t>(teeth) / 2 : 0),
+      teeth_(teeth),
+      remainder_of_turn_(turns, 0.0),
+      taper_(hannWindow(bins * turns)),
+      of_order_(bins / 2 + 1, 0.0),
+      power_(bins * turns / 2 + 1, 0.0) {
+}
+
+void RevolutionWindow::add(std::vector<double> channel) {
+  const auto n = static_cast<double>(channel.size());
+  double mean = 0.0;
+  std::vector<double> repeated(bins_, 0.0);
+  for (std::size_t i = 0; i < channel.size(); ++i) {
+    mean += channel[i] / n;
+    repeated[i % bins_] += channel[i] / static_cast<double>(turns_);
+  }
+  // The mean over the revolutions removes 1 / turns of the energy of the remainder.
+  const double share = static_cast<double>(turns_) / static_cast<double>(turns_ - 1);
+  for (std::size_t i = 0; i < channel.size(); ++i) {
+    total_ += (channel[i] - mean) * (channel[i] - mean) / n;
+    channel[i] -= repeated[i % bins_];
+    remainder_ += share * channel[i] * channel[i] / n;
+    remainder_of_turn_[i / bins_] += share * channel[i] * channel[i] / static_cast<double>(bins_);
+    channel[i] *= taper_[i];
+  }
+  addAlternation(repeated);
+  const auto spectrum = fourier(channel);
+  constexpr double MEAN_SQUARE = 0.375;  // of the Hann window
+  const double scale = 2.0 * share / (MEAN_SQUARE * n * n);
+  for (std::size_t k = 0; k < power_.size(); ++k) power_[k] += scale * std::norm(spectrum[k]);
+}
+
+void RevolutionWindow::add(const std::vector<double>& series, double start, double revolution) {
+  std::vector<double> channel;
+  channel.reserve(bins_ * turns_);
+  for (std::size_t i = 0; i < bins_ * turns_; ++i) {
+    const double position = start + revolution * static_cast<double>(i) / static_cast<double>(bins_);
+    const auto at = static_cast<std::size_t>(position);
+    channel.push_back(catmullRom(series[at - 1], series[at], series[at + 1], series[at + 2],
+                                 position - static_cast<double>(at)));
+  }
+  add(std::move(channel));
+}
+
+double RevolutionWindow::strongestFlipOrder() const {
+  return static_cast<double>(std::max_element(of_order_.begin(), of_order_.end()) - of_order_.begin());
+}
+
+void RevolutionWindow::addAlternation(const std::vector<double>& repeated) {
+  if (half_ == 0) return;
+  const auto orders = fourier(repeated);
+  for (std::size_t k = half_; 2 * k < bins_; k += 2 * half_) {
+    const double square = 2.0 * std::norm(orders[k]) / std::pow(static_cast<double>(bins_), 2);
+    of_order_[k] += square;
+    alternating_ += square;
+  }
+}
+
+}  // namespace smartmill
