@@ -28,8 +28,8 @@ class EffectTimeline {
 
   /// Starts a record: drift and hum restart.
   void setClock(const Clock& clock);
-  /// Begins a step. @param speed [rad/s] @return whether update() is required: from time to time, since effects
-  /// change slowly, and at another speed
+  /// Begins a step. @param speed [rad/s] @return whether update() is required: from time to time, since
+  /// effects change slowly, and at another speed
   bool beginStep(double speed);
   /// Computes the state at a motion. @param cut_time [s] of the contact
   void update(const ToolMotion& motion, double cut_time);

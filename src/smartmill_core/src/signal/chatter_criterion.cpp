@@ -23,8 +23,8 @@ std::vector<ChatterCriterion::Line> ChatterCriterion::lines(const RevolutionWind
   const std::vector<double>& power = window.power();
   const std::vector<double> floor = noiseFloor(power, options_.floor_reach);
   const auto turns = static_cast<double>(window.turns());
-  const std::size_t edge = options_.beside + 2;
-  const auto beside = [&](std::size_t k) { return (power[k - 1] + power[k] + power[k + 1]) / 3.0; };
+  const std::size_t edge = options_.skirt_distance + 2;
+  const auto skirt_distance = [&](std::size_t k) { return (power[k - 1] + power[k] + power[k + 1]) / 3.0; };
   std::vector<Line> found;
   for (std::size_t k = edge; k + edge < power.size(); ++k) {
     const double p = power[k];
@@ -32,7 +32,8 @@ std::vector<ChatterCriterion::Line> ChatterCriterion::lines(const RevolutionWind
     if (frequency < options_.lowest_frequency || frequency > options_.highest_frequency) continue;
     if (!(p > options_.over_floor * floor[k]) || p < power[k - 1] || p < power[k + 1]) continue;
     // Another line may be present on one side.
-    if (std::min(beside(k - options_.beside), beside(k + options_.beside)) > options_.narrowness * p)
+    if (std::min(skirt_distance(k - options_.skirt_distance), skirt_distance(k + options_.skirt_distance)) >
+        options_.narrowness * p)
       continue;
     Line line;
     line.position = peakPosition(power, k);
@@ -51,7 +52,7 @@ std::vector<ChatterCriterion::Line> ChatterCriterion::lines(const RevolutionWind
     // A growing vibration widens its line: down to the next minimum.
     line.power = p - floor[k];
     for (const int side : {-1, 1}) {
-      for (std::size_t d = 1, before = k; d <= options_.beside; ++d) {
+      for (std::size_t d = 1, before = k; d <= options_.skirt_distance; ++d) {
         const std::size_t at = side < 0 ? k - d : k + d;
         if (power[at] > power[before] || power[at] < floor[at]) break;
         line.power += power[at] - floor[at];

@@ -36,7 +36,8 @@ struct ModalSearchOptions {
   double roughly = 1e-4, closely = 1e-8;        ///< [1] change of the squares that ends them
 
   // Decisions.
-  double chance = 0.05;  ///< [1] probability of a false mode in a record; the bound used is five times as strict
+  double chance =
+      0.05;  ///< [1] probability of a false mode in a record; the bound used is five times as strict
   /// [1] Power of misfit over noise above which the misfit is more than noise: noise alone varies by less.
   double more_than_noise = 2.0;
   /// [1] Evidence of a significant mode; above 1 because the misfit of real records is not uniform noise.

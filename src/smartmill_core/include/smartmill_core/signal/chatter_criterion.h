@@ -28,10 +28,10 @@ struct ChatterCriterionOptions {
   /// one of 16,000 lines.
   double over_floor = 14.0;
   std::size_t floor_reach = 40;  ///< [lines] of the median to each side, wider than a main lobe by far
-  /// [1] Largest power at a distance of `beside` lines over that of a line. Noise through a resonance is
-  /// wider.
+  /// [1] Largest power at a distance of `skirt_distance` lines over that of a line. Noise through a resonance
+  /// is wider.
   double narrowness = 0.06;
-  std::size_t beside = 6;  ///< [lines] beyond the main lobe of the window, five lines wide
+  std::size_t skirt_distance = 6;  ///< [lines] beyond the main lobe of the window, five lines wide
   /// [1] Least power of a companion over that of its line; the teeth modulate by more, noise by less.
   double least_companion = 1e-2;
   double companion_error = 0.5;  ///< [lines] largest error of a distance, the resolution of a line
