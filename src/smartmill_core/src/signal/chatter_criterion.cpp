@@ -24,7 +24,7 @@ std::vector<ChatterCriterion::Line> ChatterCriterion::lines(const RevolutionWind
   const std::vector<double> floor = noiseFloor(power, options_.floor_reach);
   const auto turns = static_cast<double>(window.turns());
   const std::size_t edge = options_.skirt_distance + 2;
-  const auto skirt_distance = [&](std::size_t k) { return (power[k - 1] + power[k] + power[k + 1]) / 3.0; };
+  const auto levelAt = [&](std::size_t k) { return (power[k - 1] + power[k] + power[k + 1]) / 3.0; };
   std::vector<Line> found;
   for (std::size_t k = edge; k + edge < power.size(); ++k) {
     const double p = power[k];
@@ -32,7 +32,7 @@ std::vector<ChatterCriterion::Line> ChatterCriterion::lines(const RevolutionWind
     if (frequency < options_.lowest_frequency || frequency > options_.highest_frequency) continue;
     if (!(p > options_.over_floor * floor[k]) || p < power[k - 1] || p < power[k + 1]) continue;
     // Another line may be present on one side.
-    if (std::min(skirt_distance(k - options_.skirt_distance), skirt_distance(k + options_.skirt_distance)) >
+    if (std::min(levelAt(k - options_.skirt_distance), levelAt(k + options_.skirt_distance)) >
         options_.narrowness * p)
       continue;
     Line line;
