@@ -135,6 +135,13 @@ void run(const std::vector<double>& speeds, double duration) {
   }
 }
 
+std::size_t statesOf(const HarmonicFilter& filter) {
+  return filter.pairs().states();
+}
+std::size_t statesOf(const DelayFilter& filter) {
+  return filter.states();
+}
+
 /// Comparison of Fourier series and F(t) = F(t - T): error, states, time per sample and of the design.
 void runForceModels(const std::vector<double>& speeds, double duration) {
   const auto seconds = [](std::clock_t since) {
@@ -160,7 +167,7 @@ void runForceModels(const std::vector<double>& speeds, double duration) {
       });
       std::printf("%6.0f  %11.3f  %-18s %9.2f %8.2f %10.2f %10.2f %7zu %10.0f %12.3f\n", rpm,
                   60.0 / rpm * reference.sample_rate, name, 100.0 * e.to_3k, 100.0 * e.to_5k,
-                  100.0 * e.entry_3k, 100.0 * e.entry_5k, filter.pairs().states(), cost, layout);
+                  100.0 * e.entry_3k, 100.0 * e.entry_5k, statesOf(filter), cost, layout);
     };
     HarmonicFilterParameters parameters;
     parameters.max_harmonics = 200;
