@@ -28,7 +28,7 @@ struct ChatterCriterionOptions {
   /// one of 16,000 lines.
   double over_floor = 14.0;
   std::size_t floor_reach = 40;  ///< [lines] of the median to each side, wider than a main lobe by far
-  /// [1] Largest power at a distance of `beside` lines over that of a line. Noise through a resonance is
+  /// [1] Largest power at a distance of six lines over that of a line. Noise through a resonance is
   /// wider.
   double narrowness = 0.06;
   std::size_t beside = 6;  ///< [lines] beyond the main lobe of the window, five lines wide
