@@ -122,7 +122,8 @@ ChatterCriterion::Family ChatterCriterion::strongestFamily(const RevolutionWindo
   }
   if (!(best.power > 0.0)) return {};
   best = familyOf(best.strongest, all, window, period);
-  if (best.power <= options_.energy_ratio * energies.total) {
+  if (best.power <= options_.energy_ratio * energies.total &&
+      best.power < options_.whole * energies.remainder) {
     reason = std::max(reason, Reason::weak);
     return {};
   }

@@ -39,6 +39,9 @@ struct ChatterCriterionOptions {
   /// [1] Least share of a family of lines in the remainder without a companion next to it: one tone outweighs
   /// everything else. Several tones of another machine or noise leave less to one of them.
   double dominance = 0.7;
+  /// [1] Share of a family in the remainder above which it is the remainder: the noise in it is not
+  /// subtracted before the comparison with energy_ratio.
+  double whole = 0.85;
   /// [1] Relative error of the spindle angle of a window: lines that near to a spindle harmonic belong to it;
   /// 0: the spindle angle is measured.
   double speed_error = 0.0;
