@@ -10,6 +10,8 @@ Command coefficientsCommand();
 Command databaseCommand();
 /// The fewest test cuts for given standard deviations.
 Command planCutsCommand();
+/// Inertia and friction of a feed drive from moves in air.
+Command axisDriveCommand();
 /// Friction and load-meter constants of a machine.
 Command calibrateCommand();
 /// Force law with the strongest evidence in force records.

@@ -1,0 +1,79 @@
+#include "smartmill_loadmeter/motor/axis_drive.h"
+
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "smartmill_core/campaign/campaign.h"
+#include "smartmill_core/error.h"
+#include "smartmill_loadmeter/commands.h"
+
+namespace {
+
+using namespace smartmill;             // NOLINT
+using namespace smartmill::loadmeter;  // NOLINT
+
+struct Arguments {
+  std::string campaign, axis;
+  AxisDriveOptions options;
+};
+
+/// Moves of the axis whose records have its current.
+std::vector<AxisMotion> movesOf(const Campaign& campaign, char axis) {
+  std::vector<AxisMotion> moves;
+  for (const CampaignTest& test : campaign.tests) {
+    if (test.kind != TestKind::move) continue;
+    const Record record = readRecord(campaign, test);
+    if (record.has(std::string("current_") + axis))
+      moves.push_back(axisMotion(record, test.sample_rate, axis));
+  }
+  return moves;
+}
+
+void print(char axis, std::size_t moves, const AxisDrive& d) {
+  std::printf("axis %c: %zu moves, at most %.4g m/s and %.4g m/s2\n", axis, moves, d.largest_velocity,
+              d.largest_acceleration);
+  std::printf("  inertia  %9.4f +- %.4f A s2/m\n", d.inertia.value, d.inertia.std_dev);
+  std::printf("  Coulomb  %9.4f +- %.4f A\n", d.coulomb.value, d.coulomb.std_dev);
+  std::printf("  viscous  %9.4f +- %.4f A s/m\n", d.viscous.value, d.viscous.std_dev);
+  std::printf("  offset   %9.4f +- %.4f A\n", d.offset.value, d.offset.std_dev);
+  std::printf("  residual %9.4f A RMS, %.2f %% of the variance explained\n", d.residual, 100.0 * d.explained);
+}
+
+void run(const Arguments& a) {
+  const Campaign campaign = readCampaign(a.campaign);
+  bool found = false;
+  for (const char axis : a.axis.empty() ? std::string("xyz") : a.axis) {
+    const std::vector<AxisMotion> moves = movesOf(campaign, axis);
+    if (moves.empty() && a.axis.empty()) continue;
+    if (moves.empty())
+      throw Error(a.campaign + ": no test of kind move has the column current_" + axis + "[A]");
+    print(axis, moves.size(), identifyAxisDrive(moves, a.options));
+    found = true;
+  }
+  if (!found)
+    throw Error(a.campaign +
+                ": no test of kind move has a column current_x[A], current_y[A] or current_z[A]");
+}
+
+}  // namespace
+
+namespace smartmill::loadmeter {
+
+Command axisDriveCommand() {
+  Command command("axis-drive", "identifies inertia and friction of feed drives from moves in air");
+  command.description =
+      "Current of each feed drive over acceleration and velocity, from the moves of a campaign: inertia, "
+      "Coulomb and viscous friction, offset.";
+  command.examples = {{"measured/axis_motion", "all axes whose motor current was recorded"}};
+  command.setBody(run, [](CommandLine& line, Arguments& a) {
+    line.option("CAMPAIGN", a.campaign, "campaign folder with tests of kind move").required();
+    line.option("--axis", a.axis, "x, y or z (default: all with a current)").oneOf({"x", "y", "z"});
+    line.option("--smoothing", a.options.smoothing, "[s] window over velocity and current")
+        .showDefault()
+        .positive();
+  });
+  return command;
+}
+
+}  // namespace smartmill::loadmeter
