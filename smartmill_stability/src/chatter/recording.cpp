@@ -231,7 +231,11 @@ RecordingVerdict judgeRecording(const Recording& recording, const RecordingReque
     throw Error(formatted(
         "recording: sample rate %.0f Hz: expected at least 5 times the tooth passing frequency, %.0f Hz",
         recording.sample_rate, request.teeth * request.speed / units::TWO_PI));
-  return RecordingAnalysis(recording, request).run();
+  RecordingVerdict verdict = RecordingAnalysis(recording, request).run();
+  verdict.from += recording.start;
+  verdict.to += recording.start;
+  for (double& time : verdict.spectrogram.time) time += recording.start;
+  return verdict;
 }
 
 }  // namespace smartmill::stability

@@ -96,6 +96,7 @@ class LongestSegment {
   void restart(const SampleBlock& block) {
     finishSegment();
     current_ = Recording();
+    current_.start = block.stamp - *start_;
     current_.sample_rate = block.sample_rate;
     current_.channels.resize(block.channels.size());
   }
@@ -146,6 +147,7 @@ Recording loadRecording(const RecordingOptions& o) {
   if (from >= to)
     throw Error(o.file + formatted(": no samples from %.2f to %.2f s (--from, --to): expected at least one",
                                    o.from, o.to));
+  recording.start = static_cast<double>(from) / recording.sample_rate;
   for (std::vector<double>& channel : recording.channels)
     channel = {channel.begin() + static_cast<std::ptrdiff_t>(from),
                channel.begin() + static_cast<std::ptrdiff_t>(to)};

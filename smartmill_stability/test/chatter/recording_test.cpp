@@ -62,6 +62,16 @@ TEST(Recording, linesOneToothPassingApartDuringTheCutAreChatter) {
   EXPECT_NEAR(v.to, 3.0, 0.3);
 }
 
+TEST(Recording, timesIncludeTheStartOfTheRecording) {
+  Recording r = recording(with({{873.0, 3.0}, {673.0, 1.0}, {1073.0, 1.0}}), {});
+  const RecordingVerdict at_zero = judgeRecording(r, request());
+  r.start = 7.5;
+  const RecordingVerdict later = judgeRecording(r, request());
+  EXPECT_DOUBLE_EQ(later.from, at_zero.from + 7.5);
+  EXPECT_DOUBLE_EQ(later.to, at_zero.to + 7.5);
+  EXPECT_DOUBLE_EQ(later.spectrogram.time.front(), at_zero.spectrogram.time.front() + 7.5);
+}
+
 TEST(Recording, harmonicsAreNoChatter) {
   const RecordingVerdict v =
       judgeRecording(recording(with({{100.0, 1.0}, {300.0, 1.0}, {900.0, 2.0}}), {}), request());

@@ -10,6 +10,7 @@ namespace smartmill::stability {
 struct Recording {
   double sample_rate = 0.0;                   ///< [Hz]
   std::vector<std::vector<double>> channels;  ///< each in its own unit
+  double start = 0.0;                         ///< [s] of the first sample; times of the verdict include it
 };
 
 struct RecordingRequest {
