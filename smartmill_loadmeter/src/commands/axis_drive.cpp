@@ -66,6 +66,9 @@ Command axisDriveCommand() {
       "Current of each feed drive over acceleration and velocity, from the moves of a campaign: inertia, "
       "Coulomb and viscous friction, offset.";
   command.examples = {{"measured/axis_motion", "all axes whose motor current was recorded"}};
+  command.files = {{"CAMPAIGN",
+                    "folder with campaign.yaml; records of kind move with axis_vx[mm/min] or axis_x[mm], and "
+                    "current_x[A]"}};
   command.setBody(run, [](CommandLine& line, Arguments& a) {
     line.option("CAMPAIGN", a.campaign, "campaign folder with tests of kind move").required();
     line.option("--axis", a.axis, "x, y or z (default: all with a current)").oneOf({"x", "y", "z"});

@@ -17,8 +17,6 @@ namespace {
 
 constexpr Eigen::Index TERMS = 4;
 const std::array<const char*, TERMS> NAMES{"inertia", "Coulomb friction", "viscous friction", "offset"};
-const std::array<const char*, TERMS> NEEDED{"accelerations of different sizes", "moves in both directions",
-                                            "moves at different velocities", "moves in both directions"};
 
 /// Rows of the regression, in order, and where each record begins.
 struct Rows {
@@ -147,6 +145,10 @@ AxisDrive identifyAxisDrive(const std::vector<AxisMotion>& moves, const AxisDriv
   drive.largest_acceleration = terms.col(0).cwiseAbs().maxCoeff();
   drive.largest_velocity = terms.col(2).cwiseAbs().maxCoeff();
   if (drive.largest_velocity == 0.0) throw Error("axis drive: the axis does not move");
+  // Friction at rest has no direction, so that rest does not separate it from the offset.
+  if (terms.col(1).maxCoeff() < 0.5 || terms.col(1).minCoeff() > -0.5)
+    throw Error(
+        "axis drive: moves in both directions expected, to separate Coulomb friction from the offset");
   // Of size one, so that the inverse is comparable.
   const Eigen::RowVector4d scale = terms.colwise().norm().cwiseMax(1e-300);
   const Eigen::MatrixX4d scaled = terms.array().rowwise() / scale.array();
@@ -157,7 +159,8 @@ AxisDrive identifyAxisDrive(const std::vector<AxisMotion>& moves, const AxisDriv
   for (Eigen::Index k = 0; k < TERMS; ++k) {
     if (!(inverse(k, k) > 0.0 && inverse(k, k) < options.inflation * options.inflation))
       throw Error(std::string("axis drive: the moves do not determine the ") +
-                  NAMES[static_cast<std::size_t>(k)] + "; expected " + NEEDED[static_cast<std::size_t>(k)]);
+                  NAMES[static_cast<std::size_t>(k)] + "; expected " +
+                  (k == 0 ? "accelerations" : "moves at different velocities"));
   }
   const Eigen::Vector4d solution = solver.solve(scaled.transpose() * current);
   const Eigen::VectorXd residual = current - scaled * solution;
