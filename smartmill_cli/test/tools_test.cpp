@@ -96,6 +96,8 @@ TEST(Tools, DoWhatTheirCommandsDoToMeasuredRecords) {
   SMARTMILL_SHARED_DATA(hits, "measured/five_hits");
   SMARTMILL_SHARED_DATA(sound, "measured/sound_mill/chatter.wav");
   SMARTMILL_SHARED_DATA(taps, "campaigns/cross_talk");
+  SMARTMILL_SHARED_DATA(moves, "measured/axis_motion");
+  expectSame("axis-drive", moves);
   expectSame("frf", hits + "/*.csv -o out --no-picture");
   expectSame("detect", sound + " --speed 8018 --teeth 4 -o picture.png");
   expectSame("sensor-report", taps + " -o matrix.csv");
