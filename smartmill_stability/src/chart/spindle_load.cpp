@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "smartmill_core/cutting/friction.h"
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/units.h"
 
@@ -24,9 +25,10 @@ double SpindleLoad::torquePerDepth() const {
 double SpindleLoad::friction(double speed) const {
   const bool found =
       std::isfinite(coefficients_.friction_viscous) && std::isfinite(coefficients_.friction_coulomb);
-  const double torque = found ? coefficients_.friction_viscous * speed + coefficients_.friction_coulomb
-                              : cut_.spindle.viscous * speed + cut_.spindle.coulomb;
-  return std::max(0.0, torque);
+  const LinearFriction law =
+      found ? LinearFriction{coefficients_.friction_viscous, coefficients_.friction_coulomb}
+            : LinearFriction{cut_.spindle.viscous, cut_.spindle.coulomb};
+  return std::max(0.0, law.at(speed));
 }
 
 std::array<double, 2> SpindleLoad::limits(double speed) const {
