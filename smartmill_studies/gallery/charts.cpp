@@ -80,13 +80,14 @@ Drawn radialRatio(const std::string& folder, unsigned) {
   draw(png, limits, {"Kr 0.25", "Kr 0.5"});
   const double ratio = least(limits[1]) / least(limits[0]);
   const double first = pocket(limits[0], 6000.0, 14000.0), second = pocket(limits[1], 6000.0, 14000.0);
-  return {{png},
-          {{"least limit with Kr 0.5 over that with Kr 0.25, figure 6.2", "1.00 (6 mm both)",
-            formatted("%.2f", ratio), std::abs(ratio - 1.0) < 0.1 ? Verdict::agrees : Verdict::differs,
-            "x and y are equal here; the thesis prints no FRFs"},
-           {"speed of the deepest pocket, 6,000 .. 14,000 rpm, with Kr 0.5 over Kr 0.25", "\"very similar\"",
-            formatted("%.3f", second / first),
-            std::abs(second / first - 1.0) < 0.05 ? Verdict::agrees : Verdict::differs, ""}}};
+  return {
+      {png},
+      {{Kind::reproduced, "least limit with Kr 0.5 over that with Kr 0.25, figure 6.2", "1.00 (6 mm both)",
+        formatted("%.2f", ratio), std::abs(ratio - 1.0) < 0.1 ? Verdict::agrees : Verdict::differs,
+        "x and y are equal here; the thesis prints no FRFs"},
+       {Kind::reproduced, "speed of the deepest pocket, 6,000 .. 14,000 rpm, with Kr 0.5 over Kr 0.25",
+        "\"very similar\"", formatted("%.3f", second / first),
+        std::abs(second / first - 1.0) < 0.05 ? Verdict::agrees : Verdict::differs, ""}}};
 }
 
 /// The chart of a machine by three methods.
@@ -148,7 +149,8 @@ Drawn automaticChain(const std::string& folder, unsigned seed) {
   };
   return {
       {png},
-      {{formatted("least limit, error of the automatic chain relative to tap test and dynamometer, %zu "
+      {{Kind::reproduced,
+        formatted("least limit, error of the automatic chain relative to tap test and dynamometer, %zu "
                   "random machines, figures 4.8, 6.3",
                   chains.size()),
         "\"gross features\"; their procedure here: " + say(theirs), say(mine),
