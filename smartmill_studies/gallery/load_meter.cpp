@@ -320,7 +320,7 @@ std::vector<Figure> loadMeterFigures() {
           {"dunwoody_3_5", "Dunwoody figure 3.5: torque over feed per tooth", coefficients},
           {"dunwoody_3_5_machines", "Supplement to figure 3.5: machines with imperfections",
            [](const std::string& folder, unsigned seed) { return manyMachines(folder, seed, 40); },
-           [](const std::string& folder, unsigned seed) { return manyMachines(folder, seed, 8); }}};
+           [](const std::string& folder, unsigned seed) { return manyMachines(folder, seed, 16); }}};
 }
 
 }  // namespace smartmill::studies
