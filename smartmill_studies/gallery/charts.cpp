@@ -134,7 +134,7 @@ Shop drawShop(std::mt19937_64& random) {
 
 /// [N/m2] by the load meter of the machine, from its air cuts and slots. The user knows the spindle up to its
 /// V/W: the meter, not the procedure, is 11 % off. All powers of a cut are then too high by the same share,
-/// the friction with them, so that nothing in the records tells.
+/// the friction with them, so that nothing in the records shows it.
 double ktcByLoadMeter(const Shop& shop, std::mt19937_64& random) {
   MachineModel stated;
   stated.file = "figure 6.3";
@@ -194,7 +194,7 @@ CuttingCoefficients fromDatabase(const Shop& shop, std::mt19937_64& random) {
   return loadmeter::predict(loadmeter::semiInverse(sets), RAKE, shop.tool.helix).value;
 }
 
-/// Charts of one machine; both sides measure, neither is told the truth.
+/// Charts of one machine; both sides measure, neither is given the truth.
 struct Chain {
   StabilityLimit art;     ///< tap at the tip, coefficients of the database
   StabilityLimit thesis;  ///< hammer station with eq. 4.44, load meter, Kr by the product's rule
@@ -290,7 +290,7 @@ Drawn automaticChain(const std::string& folder, unsigned seed, std::size_t machi
             machines),
         "\"comparable\"", formatted("within 5 %% on %zu of %zu", same, machines),
         10 * same >= 9 * machines ? Verdict::agrees : Verdict::differs,
-        "all machines that were drawn; the chain is told neither FRF nor coefficients. The median "
+        "all machines that were drawn; the chain is given neither FRF nor coefficients. The median "
         "machine is drawn"},
        compareNumber(
            Kind::reproduced,

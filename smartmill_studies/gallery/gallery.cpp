@@ -18,7 +18,7 @@ const char* nameOf(Verdict verdict) {
     case Verdict::differs:
       return "differs";
     default:
-      return "beside";
+      return "shown";
   }
 }
 
@@ -41,8 +41,8 @@ Compared::Compared(Kind of, std::string name, std::string printed, std::string c
       ours(std::move(computed)),
       verdict(result),
       why(std::move(reason)) {
-  if ((kind == Kind::another_machine) != (verdict == Verdict::beside))
-    throw std::logic_error(what + ": a number is beside ours if, and only if, it is of another machine");
+  if ((kind == Kind::another_machine) != (verdict == Verdict::shown))
+    throw std::logic_error(what + ": a number is only shown if, and only if, it is of another machine");
   if (kind == Kind::restated && verdict == Verdict::better)
     throw std::logic_error(what + ": a restated number cannot be better");
 }
@@ -70,14 +70,14 @@ KindCount countOf(const std::vector<Compared>& rows, Kind kind) {
     count.agree += row.verdict == Verdict::agrees;
     count.better += row.verdict == Verdict::better;
     count.differ += row.verdict == Verdict::differs;
-    count.beside += row.verdict == Verdict::beside;
+    count.shown += row.verdict == Verdict::shown;
   }
   return count;
 }
 
 std::string summaryOf(const std::vector<Compared>& rows, Kind kind) {
   const KindCount n = countOf(rows, kind);
-  if (kind == Kind::another_machine) return formatted("%s: %zu, shown next to ours", nameOf(kind), n.beside);
+  if (kind == Kind::another_machine) return formatted("%s: %zu, shown next to ours", nameOf(kind), n.shown);
   const std::string better = kind == Kind::reproduced ? formatted(", %zu better here", n.better) : "";
   return formatted("%s: %zu agree%s, %zu differ", nameOf(kind), n.agree, better.c_str(), n.differ);
 }

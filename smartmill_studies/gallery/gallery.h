@@ -18,7 +18,7 @@ constexpr Kind KINDS[] = {Kind::reproduced, Kind::restated, Kind::another_machin
 const char* nameOf(Kind kind);
 
 /// Whether a result confirms the printed value of a document.
-enum class Verdict { agrees, better, differs, beside };
+enum class Verdict { agrees, better, differs, shown };
 const char* nameOf(Verdict verdict);
 
 /// A printed value of a document and the one computed here, as texts, since "about 30 %" is no number.
@@ -30,7 +30,7 @@ struct Compared {
   std::string what;  ///< with its unit
   std::string seed;  ///< as printed
   std::string ours;  ///< computed in this run
-  Verdict verdict;   ///< by the rule of the figure, never by hand; beside: of another machine
+  Verdict verdict;   ///< by the rule of the figure, never by hand; shown: of another machine
   std::string why;   ///< reason of a difference, or limits of the comparison
 };
 
@@ -67,7 +67,7 @@ Compared compareNumber(Kind kind, const std::string& what, double seed, double o
 
 /// Numbers of one kind by verdict.
 struct KindCount {
-  std::size_t agree = 0, better = 0, differ = 0, beside = 0;
+  std::size_t agree = 0, better = 0, differ = 0, shown = 0;
 };
 KindCount countOf(const std::vector<Compared>& rows, Kind kind);
 /// One line: "reproduced: 5 agree, 2 are better, 1 differs".

@@ -262,9 +262,9 @@ Drawn coefficients(const std::string& folder, unsigned seed) {
       "the imperfections of real machines";
   return {{png},
           {{Kind::another_machine, "Ktc by load meter over dynamometer, eq. 3.20, 3.22",
-            "11 % off (1040, 936 N/mm2)", off(here), Verdict::beside, why},
+            "11 % off (1040, 936 N/mm2)", off(here), Verdict::shown, why},
            {Kind::another_machine, "Kte by load meter over dynamometer, eq. 3.21, 3.23",
-            "-29 % off (9.81, 13.9 N/mm)", off(here_edge), Verdict::beside, why}}};
+            "-29 % off (9.81, 13.9 N/mm)", off(here_edge), Verdict::shown, why}}};
 }
 
 Drawn manyMachines(const std::string& folder, unsigned seed, unsigned machines) {

@@ -29,7 +29,7 @@ std::string cell(const std::string& text, const std::string& name = "") {
 }
 
 const char* styleOf(Verdict verdict) {
-  if (verdict == Verdict::beside) return "";
+  if (verdict == Verdict::shown) return "";
   return verdict == Verdict::differs ? "bad" : "good";
 }
 
@@ -55,7 +55,7 @@ void table(ReportPage& page, const std::vector<FigureRow>& rows, bool linked) {
 /// Of one kind, by verdict.
 std::vector<FigureRow> rowsOf(const std::vector<DrawnFigure>& drawn_figures, Kind kind) {
   std::vector<FigureRow> rows;
-  for (const Verdict verdict : {Verdict::agrees, Verdict::better, Verdict::differs, Verdict::beside})
+  for (const Verdict verdict : {Verdict::agrees, Verdict::better, Verdict::differs, Verdict::shown})
     for (const DrawnFigure& one : drawn_figures)
       for (const Compared& row : one.drawn.rows)
         if (row.kind == kind && row.verdict == verdict) rows.emplace_back(&one.figure, &row);

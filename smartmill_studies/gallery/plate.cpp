@@ -196,7 +196,7 @@ Drawn twoSpeeds(const std::string& folder, unsigned seed) {
          rpm < 1e4 ? "\"a better function\"" : "\"an acceptable result\"",
          formatted("error %.1f %% (measured %.0f %%)", worst,
                    std::max(error(m.measured[0], 0), error(m.measured[1], 1))),
-         Verdict::beside, "no error is printed, only a visual judgement; the material is not stated"});
+         Verdict::shown, "no error is printed, only a visual judgement; the material is not stated"});
   }
   return drawn;
 }

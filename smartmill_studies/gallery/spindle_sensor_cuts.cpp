@@ -122,10 +122,10 @@ Drawn inTime(const std::string& folder, unsigned seed) {
         {Kind::another_machine, formatted("amplitude by his filter, %.0f rpm, x, figures 39 to 42", c.rpm),
          s.printed,
          formatted("%+.0f %%; with the cut's best Q %+.0f %%", his, rangeError(best, best.filtered)),
-         Verdict::beside, "Q over R as printed; range of the mean revolution; another sensor and cut"});
+         Verdict::shown, "Q over R as printed; range of the mean revolution; another sensor and cut"});
     drawn.rows.push_back(
         {Kind::another_machine, formatted("the same by this package, %.0f rpm", c.rpm), s.printed,
-         formatted("%+.1f %%", ours), Verdict::beside,
+         formatted("%+.1f %%", ours), Verdict::shown,
          formatted("waveform error %.1f %%, his %.0f, with the best Q of the cut %.0f %%",
                    waveError(c, c.harmonics), waveError(c, c.filtered), waveError(best, best.filtered))});
   }
@@ -166,7 +166,7 @@ Drawn lowNoise(const std::string& folder, unsigned seed) {
   return {{png},
           {{Kind::another_machine, "RMSE at 9000 rpm, R of the taps in both, x, table 9, figure 46 [N]",
             formatted("%.3f, the worst", r.rmse_printed),
-            formatted("%.3f; his filter %.3f", r.harmonics, r.rmse), Verdict::beside,
+            formatted("%.3f; his filter %.3f", r.harmonics, r.rmse), Verdict::shown,
             "his sensor has almost no response at 500 .. 700 Hz; the simulated one has no such gap"}}};
 }
 
@@ -191,7 +191,7 @@ Drawn fastest(const std::string& folder, unsigned seed) {
     drawn.rows.push_back(
         {Kind::another_machine, formatted("RMSE at 17,600 rpm, y, %s, figure 57 [N]", table->name.c_str()),
          formatted("%.3f", r.rmse_printed), formatted("%.3f; his filter %.3f", r.harmonics, r.rmse),
-         Verdict::beside, "another machine, cut and force than his"});
+         Verdict::shown, "another machine, cut and force than his"});
   }
   const int best = cut_high.rows[SPEED].cut_exponent;
   const Compensated above = compensated(seed, HIGH, SPEED, std::pow(2.0, best + 6));

@@ -143,7 +143,7 @@ Drawn spectra(const std::string& folder, unsigned seed) {
                        BURZONI_BAND, BURZONI_BAND);
   return {{png},
           {{Kind::another_machine, "RMSE of the harmonics at 9000 rpm, x, eq. 6-1, figure 24, table 8 [N]",
-            formatted("%.3f", table.rows[SPEED].rmse_printed), formatted("%.3f", score.rmse), Verdict::beside,
+            formatted("%.3f", table.rows[SPEED].rmse_printed), formatted("%.3f", score.rmse), Verdict::shown,
             "his filter, Q of the taps; another machine, cut and force than his"}}};
 }
 
@@ -267,7 +267,7 @@ Drawn overSpeed(const std::string& folder, unsigned seed) {
       {{Kind::another_machine, "best Q of the taps over seven speeds, x, figure 29, table 8",
         formatted("2^%.0f .. 2^%.0f", std::log2(low->q_printed), std::log2(high->q_printed)),
         ends(most) ? formatted("2^%d .. 2^%d", least, most) : formatted("2^%d and more", least),
-        Verdict::beside,
+        Verdict::shown,
         "the dependence on speed is reproduced; taps with little noise and a sensor accurate to half a per "
         "cent permit a large Q: at the higher speeds the optimum is above 2^30"}}};
 }

@@ -189,7 +189,7 @@ Drawn unbalance(const std::string& folder, unsigned seed) {
   drawn.rows.push_back({Kind::another_machine, "noise and unbalance at 4500 rpm, figure 16",
                         "\"noise is dominating\"",
                         formatted("noise %.2f N, unbalance %.2f N rms", noise, raw[1] / std::sqrt(2.0)),
-                        Verdict::beside, "the simulated spindle's unbalance is 20 g mm"});
+                        Verdict::shown, "the simulated spindle's unbalance is 20 g mm"});
   return drawn;
 }
 

@@ -75,7 +75,7 @@ Drawn tableOf(const std::string& folder, unsigned seed, std::size_t number) {
         {Kind::another_machine,
          formatted("%s, %.0f rpm: RMSE with the taps' Q [N]", table.name.c_str(), r.rpm),
          formatted("%.3f (Q %.0f, %s)", r.rmse_printed, r.q_printed, powerOfTwo(r.q_printed).c_str()),
-         formatted("%.3f; his filter %.3f (Q 2^%d)", r.harmonics, r.rmse, r.exponent), Verdict::beside,
+         formatted("%.3f; his filter %.3f (Q 2^%d)", r.harmonics, r.rmse, r.exponent), Verdict::shown,
          OTHER_CUT});
     worst_printed = std::max(worst_printed, r.rmse_printed);
     worst = std::max(worst, r.rmse);
@@ -84,7 +84,7 @@ Drawn tableOf(const std::string& folder, unsigned seed, std::size_t number) {
   drawn.rows.push_back(
       {Kind::another_machine, formatted("largest RMSE of seven speeds, %s [N]", table.name.c_str()),
        formatted("%.2f", worst_printed), formatted("%.2f (his filter here %.2f)", worst_harmonics, worst),
-       Verdict::beside, OTHER_CUT});
+       Verdict::shown, OTHER_CUT});
   return drawn;
 }
 

@@ -41,8 +41,8 @@ TEST(Gallery, onlyAReproducedNumberCanBeBetter) {
   EXPECT_THROW(Compared(Kind::restated, "a", "1", "2", Verdict::better, ""), std::logic_error);
   for (const Verdict verdict : {Verdict::agrees, Verdict::better, Verdict::differs})
     EXPECT_THROW(Compared(Kind::another_machine, "a", "1", "2", verdict, ""), std::logic_error);
-  EXPECT_NO_THROW(Compared(Kind::another_machine, "a", "1", "2", Verdict::beside, ""));
-  EXPECT_THROW(Compared(Kind::reproduced, "a", "1", "2", Verdict::beside, ""), std::logic_error);
+  EXPECT_NO_THROW(Compared(Kind::another_machine, "a", "1", "2", Verdict::shown, ""));
+  EXPECT_THROW(Compared(Kind::reproduced, "a", "1", "2", Verdict::shown, ""), std::logic_error);
 }
 
 /// Numbers that do not agree, by the beginning of their text; each states its reason in the figure.
@@ -54,9 +54,6 @@ const std::set<std::string>& disagreements() {
       "best Q of a plant 2, 3 deviations off, x", "best Q of a plant 2, 3 deviations off, y",
       "best Q of the cuts over that of the taps, x", "best Q of the cuts over that of the taps, y",
       "largest RMSE by R of taps and cuts",
-      // The force model of the simulated centre; the paper states neither its material nor its tool.
-      "mean by the current, table 2 [N], Fy", "mean by the dynamometer, table 2 [N], Fz",
-      "mean by the current, table 2 [N], Fz",
       // His update.
       "the machine by his update after period 2"};
   return all;
@@ -92,7 +89,7 @@ TEST(Gallery, thePageOpensWithTheCounts) {
   const Drawn drawn{{},
                     {{Kind::reproduced, "a", "1", "1", Verdict::agrees, ""},
                      {Kind::restated, "b", "1", "2", Verdict::differs, "<why>"},
-                     {Kind::another_machine, "c", "3", "4", Verdict::beside, ""}}};
+                     {Kind::another_machine, "c", "3", "4", Verdict::shown, ""}}};
   const std::string file = folder.file("page.html");
   writePage({{figure, drawn}}, 7, file);
   const std::string text = readText(file);
