@@ -132,9 +132,9 @@ Shop drawShop(std::mt19937_64& random) {
   return shop;
 }
 
-/// [N/m2] by the load meter of the machine, from its air cuts and slots. The user knows the spindle up to its
-/// V/W: the meter, not the procedure, is 11 % off. All powers of a cut are then too high by the same share,
-/// the friction with them, so that nothing in the records shows it.
+/// [N/m2] by the load meter of the machine, from its air cuts and slots. The spindle is stated but for its
+/// V/W. The thesis gives no cause of its 11 %: a slope wrong by a share is one of V/W, since friction shifts
+/// the intercept only. All powers are then too high by the same share, so that no record shows it.
 double ktcByLoadMeter(const Shop& shop, std::mt19937_64& random) {
   MachineModel stated;
   stated.file = "figure 6.3";
