@@ -48,7 +48,7 @@ Drawn forceWindow(const std::string& folder, unsigned seed) {
   plot.draw();
   return {
       {png},
-      {{"error of the windowed spectrum over that of the raw one, section 4.3.1", "6 %",
+      {{Kind::reproduced, "error of the windowed spectrum over that of the raw one, section 4.3.1", "6 %",
         formatted("%.1f %%", 100.0 * left), std::abs(left - 0.06) < 0.01 ? Verdict::agrees : Verdict::differs,
         "eq. 4.16 with this window; the thesis does not state the pulse shape, a half sine here"}}};
 }
@@ -110,32 +110,34 @@ Drawn automaticHammer(const std::string& folder, unsigned seed) {
   const auto limits = drawSlotLimits({direct, measured, thesis, tip}, drawn.pictures[3]);
   const double across = apart(f.measured, f.across), raw = apart(f.measured, f.direct),
                corrected = apart(f.thesis, f.direct), ours = apart(f.tip, f.direct);
-  drawn.rows.push_back({"automatic hammer and true FRF of the same two heights, figure 4.5",
+  drawn.rows.push_back({Kind::reproduced, "automatic hammer and true FRF of the same two heights, figure 4.5",
                         "\"very similar\"", formatted("%.1f %% rms", 100.0 * across),
                         across < 0.1 ? Verdict::agrees : Verdict::differs,
                         "250 to 4900 Hz; the thesis compares with a manual hammer"});
   const double stiffer = peak(f.measured) / peak(f.direct);
-  drawn.rows.push_back({"largest peak, hit above the tip over hit at the tip, figure 4.6", "stiffer: below 1",
-                        formatted("%.2f", stiffer), stiffer < 1.0 ? Verdict::agrees : Verdict::differs,
+  drawn.rows.push_back({Kind::reproduced, "largest peak, hit above the tip over hit at the tip, figure 4.6",
+                        "stiffer: below 1", formatted("%.2f", stiffer),
+                        stiffer < 1.0 ? Verdict::agrees : Verdict::differs,
                         "theirs at 2400 Hz; neither tool nor spindle is printed"});
   drawn.rows.push_back(
-      {"corrected FRF and true FRF of the tip, figure 4.7", "\"matches more closely\"",
+      {Kind::reproduced, "corrected FRF and true FRF of the tip, figure 4.7", "\"matches more closely\"",
        formatted("eq. 4.44 %.0f %%, uncorrected %.0f %% rms", 100.0 * corrected, 100.0 * raw),
        corrected < raw ? Verdict::agrees : Verdict::differs,
        "eq. 4.44 scales all modes equally, including that of the spindle"});
-  drawn.rows.push_back(
-      {"the same by receptance coupling", "\"matches more closely\"", formatted("%.1f %% rms", 100.0 * ours),
-       ours < corrected ? Verdict::better : Verdict::differs, "by the mode shapes of the beam"});
+  drawn.rows.push_back({Kind::reproduced, "the same by receptance coupling", "\"matches more closely\"",
+                        formatted("%.1f %% rms", 100.0 * ours),
+                        ours < corrected ? Verdict::better : Verdict::differs,
+                        "by the mode shapes of the beam"});
   const double high = least(limits[1]) / least(limits[0]), right = least(limits[3]) / least(limits[0]);
   drawn.rows.push_back(
-      {"least limit of a slot, uncorrected over the tip's, figure 4.8", "much higher",
+      {Kind::reproduced, "least limit of a slot, uncorrected over the tip's, figure 4.8", "much higher",
        formatted("%.2f (eq. 4.44 %.2f, here %.2f)", high, least(limits[2]) / least(limits[0]), right),
        high > 1.05 ? Verdict::agrees : Verdict::differs, "aluminium, four teeth"});
   const double shift = pocket(limits[1]) / pocket(limits[0]);
-  drawn.rows.push_back({"speed of the deepest pocket, uncorrected over the tip's, figure 4.8", "the same",
-                        formatted("%.3f", shift),
-                        std::abs(shift - 1.0) < 0.02 ? Verdict::agrees : Verdict::differs,
-                        "above 10,000 rpm"});
+  drawn.rows.push_back(
+      {Kind::reproduced, "speed of the deepest pocket, uncorrected over the tip's, figure 4.8", "the same",
+       formatted("%.3f", shift), std::abs(shift - 1.0) < 0.02 ? Verdict::agrees : Verdict::differs,
+       "above 10,000 rpm"});
   return drawn;
 }
 

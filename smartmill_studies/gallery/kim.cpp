@@ -22,27 +22,29 @@ Drawn turning(const std::string& folder, unsigned) {
       return std::hypot(frequency / f.truth.frequency - 1.0, damping / f.truth.damping_ratio - 1.0);
     };
     drawn.rows.push_back(
-        {formatted("machine as learnt after period %zu, section 4 (true 350 rad/s, 0.02)", s + 1),
+        {Kind::restated,
+         formatted("machine as learnt after period %zu, section 4 (true 350 rad/s, 0.02)", s + 1),
          formatted("%.0f rad/s, %.2f", printed[s][0], printed[s][1]),
          formatted("%.1f rad/s, %.4f", ours.frequency, ours.damping_ratio),
-         off(ours.frequency, ours.damping_ratio) < off(printed[s][0], printed[s][1]) ? Verdict::better
+         off(ours.frequency, ours.damping_ratio) < off(printed[s][0], printed[s][1]) ? Verdict::agrees
                                                                                      : Verdict::differs,
          "spectra are compared with those of the model output, so that both contain the leakage of the "
          "window"});
   }
   drawn.rows.push_back(
-      {"K / K_m as learnt after period 1, section 4 (true 0.1)", "0.15",
+      {Kind::restated, "K / K_m as learnt after period 1, section 4 (true 0.1)", "0.15",
        formatted("%.4f", f.ours.learnt.front().machine.gain),
-       std::abs(f.ours.learnt.front().machine.gain - 0.1) < 0.05 ? Verdict::better : Verdict::differs, ""});
+       std::abs(f.ours.learnt.front().machine.gain - 0.1) < 0.05 ? Verdict::agrees : Verdict::differs, ""});
   const stability::SecondOrder& read = f.kim.segments.at(1).read;
-  drawn.rows.push_back({"the machine by his update after period 2 (he estimates 332, 0.11 before it)",
+  drawn.rows.push_back({Kind::reproduced,
+                        "the machine by his update after period 2 (he estimates 332, 0.11 before it)",
                         "335 rad/s, 0.06", formatted("%.0f rad/s, %.2f", read.frequency, read.damping_ratio),
                         std::abs(read.frequency / 335.0 - 1.0) < 0.05 ? Verdict::agrees : Verdict::differs,
                         "eq. 16 as printed, computed here, from its peak and half-power width"});
   const double free = stability::lastVibration(f.free), ours = stability::lastVibration(f.ours),
                kim = stability::lastVibration(f.kim.trace);
   drawn.rows.push_back(
-      {"vibration after 6.144 s, figures 4 and 5", "\"virtually\" ended",
+      {Kind::reproduced, "vibration after 6.144 s, figures 4 and 5", "\"virtually\" ended",
        formatted("%.2g of the uncontrolled one (eq. 16 as printed here: %.2g)", ours / free, kim / free),
        ours < 0.01 * free ? Verdict::agrees : Verdict::differs,
        "eq. 16 divides by a difference of two spectra that may vanish line by line"});

@@ -12,7 +12,7 @@ struct DrawnFigure {
   Drawn drawn;
 };
 
-/// One HTML file: agreement, better results and disagreement, then all figures.
+/// One HTML file: the counts and the numbers of each kind apart, then all figures.
 /// @throws Error
 void writePage(const std::vector<DrawnFigure>& drawn_figures, unsigned seed, const std::string& file);
 

@@ -77,11 +77,11 @@ Drawn constants(const std::string& folder, unsigned seed) {
   Drawn drawn{{png}, {}};
   for (const Constant& c : all) {
     drawn.rows.push_back(compareNumber(
-        formatted("%s by the line of table 3 at 139 mm, tables 2 and 3", c.name), c.printed,
+        Kind::restated, formatted("%s by the line of table 3 at 139 mm, tables 2 and 3", c.name), c.printed,
         c.table_3->at(LENGTH), 0.0, 0.02, "a disagreement here is one between the tables of the document"));
     if (!c.found) continue;
     drawn.rows.push_back(
-        compareNumber(formatted("%s calibrated with his weights, table 3 at 139 mm", c.name),
+        compareNumber(Kind::restated, formatted("%s calibrated with his weights, table 3 at 139 mm", c.name),
                       c.table_3->at(LENGTH), c.found->at(LENGTH), 0.0, 0.03,
                       "the simulated ring has his constants at 139 mm; over length it bends as a beam"));
   }
@@ -123,15 +123,21 @@ Drawn verification(const std::string& folder, unsigned seed) {
   plot << "unset multiplot\n";
   plot.draw();
   const double verified = *std::max_element(s.verified.begin(), s.verified.end());
-  const auto row = [](const char* what, const char* printed, double ours, const char* why) {
-    return Compared{what, printed, formatted("at most %.1f %%", 100.0 * ours),
-                    ours < 0.05 ? Verdict::agrees : Verdict::differs, why};
+  const auto row = [](Kind kind, const char* what, const char* printed, double ours, const char* why) {
+    return Compared{kind,
+                    what,
+                    printed,
+                    formatted("at most %.1f %%", 100.0 * ours),
+                    ours < 0.05 ? Verdict::agrees : Verdict::differs,
+                    why};
   };
   return {{png},
-          {row("measured and applied weights, x, y, z, figure 13", "on the line", worst,
+          {row(Kind::restated, "measured and applied weights, x, y, z, figure 13", "on the line", worst,
                "of the largest weight; drift removed between first and last measurement"),
-           row("tool pressed against the workpiece, sensor and dynamometer, figure 15", "less than 5 %",
-               verified, "the verification of the product at 120 mm, a length without weights")}};
+           row(Kind::restated, "tool pressed against the workpiece, sensor and dynamometer, figure 15",
+               "less than 5 %", verified,
+               "at 120 mm, a length without weights; the simulated ring is linear in the length as its "
+               "calibration is")}};
 }
 
 /// [N] amplitude of spindle order 1.
@@ -172,18 +178,18 @@ Drawn unbalance(const std::string& folder, unsigned seed) {
   }
   Drawn drawn{{png}, {}};
   const double deviation = standardDeviation(s.unbalanced[0]) / std::sqrt(0.5 * BURZONI_RATE);  // white noise
-  drawn.rows.push_back(compareNumber("unbalance at 10,000 over that at 1000 rpm, eq. 3-6", 100.0,
-                                     raw[2] / raw[0], raw[2] / raw[0] * deviation / raw[0], 0.15,
+  drawn.rows.push_back(compareNumber(Kind::restated, "unbalance at 10,000 over that at 1000 rpm, eq. 3-6",
+                                     100.0, raw[2] / raw[0], raw[2] / raw[0] * deviation / raw[0], 0.15,
                                      "order 1; at 1000 rpm a fifth of a newton in the noise"));
-  drawn.rows.push_back({"residual unbalance at 17,600 rpm, figure 16", "subtracted",
+  drawn.rows.push_back({Kind::restated, "residual unbalance at 17,600 rpm, figure 16", "subtracted",
                         formatted("%.2f of %.2f N", left[3], raw[3]),
                         left[3] < 0.05 * raw[3] ? Verdict::agrees : Verdict::differs,
                         "identified in air cuts at other speeds, as mass times radius"});
   const double noise = standardDeviation(s.balanced[1]);
-  drawn.rows.push_back({"noise and unbalance at 4500 rpm, figure 16", "\"noise is dominating\"",
+  drawn.rows.push_back({Kind::another_machine, "noise and unbalance at 4500 rpm, figure 16",
+                        "\"noise is dominating\"",
                         formatted("noise %.2f N, unbalance %.2f N rms", noise, raw[1] / std::sqrt(2.0)),
-                        noise > raw[1] / std::sqrt(2.0) ? Verdict::agrees : Verdict::differs,
-                        "the simulated spindle's unbalance is 20 g mm"});
+                        Verdict::shown, "the simulated spindle's unbalance is 20 g mm"});
   return drawn;
 }
 

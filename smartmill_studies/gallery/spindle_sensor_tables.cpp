@@ -72,18 +72,19 @@ Drawn tableOf(const std::string& folder, unsigned seed, std::size_t number) {
   double worst_printed = 0.0, worst = 0.0, worst_harmonics = 0.0;
   for (const BurzoniRow& r : table.rows) {
     drawn.rows.push_back(
-        {formatted("%s, %.0f rpm: RMSE with the taps' Q [N]", table.name.c_str(), r.rpm),
+        {Kind::another_machine,
+         formatted("%s, %.0f rpm: RMSE with the taps' Q [N]", table.name.c_str(), r.rpm),
          formatted("%.3f (Q %.0f, %s)", r.rmse_printed, r.q_printed, powerOfTwo(r.q_printed).c_str()),
-         formatted("%.3f; his filter %.3f (Q 2^%d)", r.harmonics, r.rmse, r.exponent),
-         r.harmonics < r.rmse_printed ? Verdict::better : Verdict::differs, OTHER_CUT});
+         formatted("%.3f; his filter %.3f (Q 2^%d)", r.harmonics, r.rmse, r.exponent), Verdict::shown,
+         OTHER_CUT});
     worst_printed = std::max(worst_printed, r.rmse_printed);
     worst = std::max(worst, r.rmse);
     worst_harmonics = std::max(worst_harmonics, r.harmonics);
   }
-  drawn.rows.push_back({formatted("largest RMSE of seven speeds, %s [N]", table.name.c_str()),
-                        formatted("%.2f", worst_printed),
-                        formatted("%.2f (his filter here %.2f)", worst_harmonics, worst),
-                        worst_harmonics < worst_printed ? Verdict::better : Verdict::differs, OTHER_CUT});
+  drawn.rows.push_back(
+      {Kind::another_machine, formatted("largest RMSE of seven speeds, %s [N]", table.name.c_str()),
+       formatted("%.2f", worst_printed), formatted("%.2f (his filter here %.2f)", worst_harmonics, worst),
+       Verdict::shown, OTHER_CUT});
   return drawn;
 }
 
@@ -120,14 +121,16 @@ Drawn noise(const std::string& folder, unsigned seed) {
   plot.draw();
   const auto row = [&](const char* what, double printed, const std::array<double, 2>& ours) {
     const double worst = std::max(std::abs(ours[0] / printed - 1.0), std::abs(ours[1] / printed - 1.0));
-    drawn.rows.push_back({what, formatted("%g", printed), formatted("x %.2f, y %.2f", ours[0], ours[1]),
+    drawn.rows.push_back({Kind::restated, what, formatted("%g", printed),
+                          formatted("x %.2f, y %.2f", ours[0], ours[1]),
                           worst < 0.5 ? Verdict::agrees : Verdict::differs,
                           "the noise of the simulated sensor is designed for these two values"});
   };
   row("R before taps, section 6.2 [N2]", 0.15, data.r_tap);
   row("R cutting air, section 6.2 [N2]", 10.0, data.r_air);
   const auto kurtosis = [&](const char* what, const std::vector<double>& values) {
-    drawn.rows.push_back(compareNumber(what, 3.0, kalman::kurtosis(values), 0.0, 0.1, "of a Gaussian"));
+    drawn.rows.push_back(compareNumber(Kind::restated, what, 3.0, kalman::kurtosis(values), 0.0, 0.1,
+                                       "of a Gaussian, from which the simulated noise is drawn"));
   };
   kurtosis("kurtosis at rest, eq. 5-17", data.still[0]);
   kurtosis("kurtosis in an air cut, without unbalance, eq. 5-17", data.air[0]);
@@ -172,11 +175,14 @@ Drawn byNoise(const std::string& folder, unsigned seed, std::size_t axis) {
   const double most = *std::max_element(minima.begin(), minima.end());
   return {
       {png},
-      {{formatted("best Q of a cut as R falls from that of air to that of taps, %s, figure %zu",
+      {{Kind::restated,
+        formatted("best Q of a cut as R falls from that of air to that of taps, %s, figure %zu",
                   AXIS_NAMES[axis], figure),
         "\"lower Q\"", formatted("/ 2^%.1f (R / 2^%.1f)", median(shift), std::log2(high.r_cut / low.r_cut)),
-        median(shift) > 0.0 ? Verdict::agrees : Verdict::differs, "median of seven speeds"},
-       {formatted("RMSE at the best Q of each R, %s, figure %zu", AXIS_NAMES[axis], figure + 1),
+        median(shift) > 0.0 ? Verdict::agrees : Verdict::differs,
+        "median of seven speeds; a filter depends only on Q over R"},
+       {Kind::restated,
+        formatted("RMSE at the best Q of each R, %s, figure %zu", AXIS_NAMES[axis], figure + 1),
         "\"almost unchanged\"", formatted("within %.0f %%", 100.0 * most),
         most < 0.1 ? Verdict::agrees : Verdict::differs, "a filter depends only on Q over R"}}};
 }
@@ -227,7 +233,8 @@ Drawn overview(const std::string& folder, unsigned seed, std::size_t axis) {
   const bool first = here[0] < 0.95 * std::min(here[1], here[2]);
   return {
       {png},
-      {{formatted(
+      {{Kind::reproduced,
+        formatted(
             "largest RMSE by R of taps and cuts (0.15, 10; 0.15, 0.15; 10, 10; 2, 10), %s, figure %zu [N]",
             AXIS_NAMES[axis], figure),
         told(printed) + ": the first is best", told(here), first ? Verdict::agrees : Verdict::differs,

@@ -36,6 +36,7 @@ void list() {
 void run(const std::vector<Figure>& figures, const std::string& folder, unsigned seed) {
   std::filesystem::create_directories(folder);
   std::vector<DrawnFigure> drawn_figures;
+  std::vector<Compared> rows;
   for (const Figure& figure : figures) {
     std::fprintf(stderr, "%zu of %zu: %s\n", drawn_figures.size() + 1, figures.size(), figure.name.c_str());
     try {
@@ -43,12 +44,15 @@ void run(const std::vector<Figure>& figures, const std::string& folder, unsigned
     } catch (const Error& error) {
       throw Error(figure.name + ": " + error.what());
     }
-    for (const Compared& row : drawn_figures.back().drawn.rows)
-      std::printf("%-8s %s: seed %s, here %s\n", nameOf(row.verdict), row.what.c_str(), row.seed.c_str(),
-                  row.ours.c_str());
+    for (const Compared& row : drawn_figures.back().drawn.rows) {
+      std::printf("%-15s %-8s %s: seed %s, here %s\n", nameOf(row.kind), nameOf(row.verdict),
+                  row.what.c_str(), row.seed.c_str(), row.ours.c_str());
+      rows.push_back(row);
+    }
   }
   const std::string page = folder + "/gallery.html";
   writePage(drawn_figures, seed, page);
+  for (const Kind kind : KINDS) std::printf("%s\n", summaryOf(rows, kind).c_str());
   std::printf("%s\n", page.c_str());
 }
 

@@ -1,7 +1,10 @@
 #include "gallery/gallery.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <set>
+#include <stdexcept>
+#include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -24,71 +27,80 @@ TEST(Gallery, everyFigureHasItsOwnName) {
 }
 
 TEST(Gallery, aNumberAgreesWithinItsShareAlone) {
-  EXPECT_EQ(compareNumber("a", 10.0, 10.4, 0.0, 0.05, "").verdict, Verdict::agrees);
-  EXPECT_EQ(compareNumber("a", 10.0, 10.6, 0.0, 0.05, "").verdict, Verdict::differs);
-  EXPECT_EQ(compareNumber("a", -10.0, -10.4, 0.0, 0.05, "").verdict, Verdict::agrees);
-  EXPECT_EQ(compareNumber("a", -10.0, 10.0, 0.0, 0.05, "").verdict, Verdict::differs);
+  const auto compareNumber = [](double seed, double ours) {
+    return studies::compareNumber(Kind::restated, "a", seed, ours, 0.0, 0.05, "");
+  };
+  EXPECT_EQ(compareNumber(10.0, 10.4).verdict, Verdict::agrees);
+  EXPECT_EQ(compareNumber(10.0, 10.6).verdict, Verdict::differs);
+  EXPECT_EQ(compareNumber(-10.0, -10.4).verdict, Verdict::agrees);
+  EXPECT_EQ(compareNumber(-10.0, 10.0).verdict, Verdict::differs);
 }
 
-// Constants of the thesis's load meter (eq. 3.11, section 3.2.1), recovered with a resolution of 3e-4 V.
-TEST(Gallery, theLoadMetersNumbersComeBack) {
+TEST(Gallery, onlyAReproducedNumberCanBeBetter) {
+  EXPECT_NO_THROW(Compared(Kind::reproduced, "a", "1", "2", Verdict::better, ""));
+  EXPECT_THROW(Compared(Kind::restated, "a", "1", "2", Verdict::better, ""), std::logic_error);
+  for (const Verdict verdict : {Verdict::agrees, Verdict::better, Verdict::differs})
+    EXPECT_THROW(Compared(Kind::another_machine, "a", "1", "2", verdict, ""), std::logic_error);
+  EXPECT_NO_THROW(Compared(Kind::another_machine, "a", "1", "2", Verdict::shown, ""));
+  EXPECT_THROW(Compared(Kind::reproduced, "a", "1", "2", Verdict::shown, ""), std::logic_error);
+}
+
+/// Numbers that do not agree, by the beginning of their text; each states its reason in the figure.
+const std::set<std::string>& disagreements() {
+  static const std::set<std::string> all{
+      // The tables of the document contradict each other.
+      "cYx by the line of table 3", "cYz by the line of table 3",
+      // The taps of the simulated sensor bound no Q at most speeds; his conclusions from them do not arise.
+      "best Q of a plant 2, 3 deviations off, x", "best Q of a plant 2, 3 deviations off, y",
+      "best Q of the cuts over that of the taps, x", "best Q of the cuts over that of the taps, y",
+      "largest RMSE by R of taps and cuts",
+      // His update.
+      "the machine by his update after period 2"};
+  return all;
+}
+
+bool isKnown(const std::string& what) {
+  const auto& all = disagreements();
+  return std::any_of(all.begin(), all.end(),
+                     [&](const std::string& known) { return what.compare(0, known.size(), known) == 0; });
+}
+
+class EveryFigure : public ::testing::TestWithParam<std::size_t> {};
+
+// A reproduced or restated number leaves its band: fails. So does a known disagreement that has ended.
+TEST_P(EveryFigure, isDrawnAndItsNumbersAreInTheirBands) {
   const TemporaryFolder folder;
-  for (const Figure& figure : loadMeterFigures()) {
-    if (figure.name == "dunwoody_3_5_machines") continue;  // half a minute
-    const Drawn drawn = figure.draw(folder.file(""), 3);
-    for (const std::string& picture : drawn.pictures) EXPECT_GT(std::filesystem::file_size(picture), 5000u);
-    for (const Compared& row : drawn.rows)
-      EXPECT_NE(row.verdict, Verdict::differs) << row.what << ": " << row.ours;
-  }
+  const Figure figure = allFigures()[GetParam()];
+  const Drawn drawn = (figure.draw_small ? figure.draw_small : figure.draw)(folder.file(""), 1);
+  for (const std::string& picture : drawn.pictures)
+    EXPECT_GT(std::filesystem::file_size(picture), 5000u) << picture;
+  ASSERT_FALSE(drawn.rows.empty());
+  for (const Compared& row : drawn.rows)
+    EXPECT_EQ(row.verdict == Verdict::differs, isKnown(row.what))
+        << nameOf(row.kind) << ", " << row.what << ": document " << row.seed << ", here " << row.ours;
 }
 
-Drawn drawn(const std::string& name, const std::string& folder, unsigned seed) {
-  for (const Figure& figure : allFigures())
-    if (figure.name == name) return figure.draw(folder, seed);
-  ADD_FAILURE() << "no figure has the name " << name;
-  return {};
-}
-
-// References: weights, the table dynamometer and the square of the speed (Burzoni eq. 3-6).
-TEST(Gallery, theSpindleSensorTellsWeightsAndUnbalance) {
-  const TemporaryFolder folder;
-  for (const char* name : {"burzoni_13", "burzoni_16"}) {
-    const Drawn found = drawn(name, folder.file(""), 2);
-    ASSERT_EQ(found.pictures.size(), 1u) << name;
-    EXPECT_GT(std::filesystem::file_size(found.pictures[0]), 20000u);
-    ASSERT_GE(found.rows.size(), 2u);
-    for (std::size_t i = 0; i < 2; ++i)
-      EXPECT_EQ(found.rows[i].verdict, Verdict::agrees) << found.rows[i].what << ": " << found.rows[i].ours;
-  }
-}
-
-// The true force is an input of the simulation.
-TEST(Gallery, theCurrentTellsTheForce) {
-  const TemporaryFolder folder;
-  for (const Compared& row : drawn("cheng_5", folder.file(""), 2).rows)
-    EXPECT_EQ(row.verdict, Verdict::agrees) << row.what << ": " << row.ours;
-}
-
-// A tool hit above its tip appears stiffer; the factor of each mode follows from its beam shape.
-TEST(Gallery, theHammersOffsetStiffens) {
-  const TemporaryFolder folder;
-  const Drawn found = drawn("dunwoody_4_5", folder.file(""), 2);
-  ASSERT_EQ(found.rows.size(), 6u);
-  EXPECT_EQ(found.rows[1].verdict, Verdict::agrees) << found.rows[1].ours;
-  EXPECT_EQ(found.rows[3].verdict, Verdict::better) << found.rows[3].ours;
-}
+INSTANTIATE_TEST_SUITE_P(Gallery, EveryFigure, ::testing::Range<std::size_t>(0, allFigures().size()),
+                         [](const auto& at) { return allFigures()[at.param].name; });
 
 TEST(Gallery, thePageOpensWithTheCounts) {
   const TemporaryFolder folder;
   const Figure figure{"one", "A <figure>", nullptr};
-  const Drawn drawn{{}, {{"a", "1", "1", Verdict::agrees, ""}, {"b", "1", "2", Verdict::differs, "<why>"}}};
+  const Drawn drawn{{},
+                    {{Kind::reproduced, "a", "1", "1", Verdict::agrees, ""},
+                     {Kind::restated, "b", "1", "2", Verdict::differs, "<why>"},
+                     {Kind::another_machine, "c", "3", "4", Verdict::shown, ""}}};
   const std::string file = folder.file("page.html");
   writePage({{figure, drawn}}, 7, file);
   const std::string text = readText(file);
-  EXPECT_THAT(text, HasSubstr("1 numbers agree, 0 are better here, 1 do not agree; 1 figures, seed 7."));
+  EXPECT_THAT(text, HasSubstr("reproduced: 1 agree, 0 better here, 0 differ"));
+  EXPECT_THAT(text, HasSubstr("restated: 0 agree, 1 differ"));
+  EXPECT_THAT(text, HasSubstr("another machine: 1, shown next to ours"));
+  EXPECT_THAT(text, HasSubstr("1 figures, seed 7."));
   EXPECT_THAT(text, HasSubstr("&lt;why&gt;"));
   EXPECT_THAT(text, HasSubstr("A &lt;figure&gt;"));
-  EXPECT_LT(text.find("Agreement"), text.find("Disagreement"));
+  EXPECT_LT(text.find("id=\"reproduced\""), text.find("id=\"restated\""));
+  EXPECT_LT(text.find("id=\"restated\""), text.find("id=\"another_machine\""));
 }
 
 }  // namespace
