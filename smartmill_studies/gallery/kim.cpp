@@ -48,7 +48,7 @@ Drawn turning(const std::string& folder, unsigned) {
   const double free = stability::lastVibration(f.free), ours = stability::lastVibration(f.ours);
   // His updates; printed[1] and printed[2] are the results of his first and second application.
   for (const auto& [update, kim] :
-       {std::pair(KimUpdate::printed, &f.printed), std::pair(KimUpdate::mended, &f.mended)}) {
+       {std::pair(KimUpdate::printed, &f.printed), std::pair(KimUpdate::corrected, &f.corrected)}) {
     for (std::size_t s = 1; s < 3; ++s) {
       const stability::SecondOrder& read = kim->segments.at(s).read;
       const bool near = std::abs(read.frequency / printed[s][0] - 1.0) < 0.05 &&

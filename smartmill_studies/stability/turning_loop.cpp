@@ -154,14 +154,14 @@ SecondOrder readOff(const std::vector<double>& frequency, const std::vector<Comp
 }
 
 const char* nameOf(KimUpdate update) {
-  return update == KimUpdate::printed ? "eq. 16 as printed" : "eq. 16 mended";
+  return update == KimUpdate::printed ? "eq. 16 as printed" : "eq. 16 corrected";
 }
 
 Complex updateLine(KimUpdate update, const KimLine& last, const KimLine& before) {
   const Complex moved = last.tool - before.tool;
   if (std::abs(moved) <= 1e-9 * std::abs(last.work)) return last.g;
-  return last.g +
-         (last.work - (update == KimUpdate::mended ? last.tool : before.tool)) / moved * (last.g - before.g);
+  return last.g + (last.work - (update == KimUpdate::corrected ? last.tool : before.tool)) / moved *
+                      (last.g - before.g);
 }
 
 namespace {
@@ -173,7 +173,7 @@ struct KimSignals {
 
 /// Terms of eq. 16 of a segment that the next one needs.
 struct KimTerms {
-  std::vector<Complex> tool;      ///< Y_t; over the chip if mended
+  std::vector<Complex> tool;      ///< Y_t; over the chip if corrected
   std::vector<Complex> in_force;  ///< G of the controller in this segment
 };
 
@@ -182,23 +182,23 @@ KimSegment kimSegment(const KimSignals& signals, KimUpdate update, const std::ve
                       KimTerms* terms) {
   KimSegment segment;
   const auto power = cross(signals.chip, signals.chip), deflection = cross(signals.chip, signals.deflection);
-  const bool mended = update == KimUpdate::mended;
+  const bool corrected = update == KimUpdate::corrected;
   KimTerms now;
-  now.tool = mended ? cross(signals.chip, signals.tool) : meanSpectrum(signals.tool);
+  now.tool = corrected ? cross(signals.chip, signals.tool) : meanSpectrum(signals.tool);
   for (std::size_t l = 0; l < power.size(); ++l) {
     segment.frequency.push_back(LINE * static_cast<double>(l + 1));
     segment.ratio.push_back(deflection[l] / power[l]);
-    if (mended) now.tool[l] /= power[l];
+    if (corrected) now.tool[l] /= power[l];
     now.in_force.push_back(earlier.empty() ? 0.0 : earlier.back().read.response(segment.frequency.back()));
   }
   segment.used = segment.ratio;
   if (!earlier.empty()) {
-    const std::vector<Complex> work = mended ? segment.ratio : meanSpectrum(signals.deflection);
+    const std::vector<Complex> work = corrected ? segment.ratio : meanSpectrum(signals.deflection);
     // As printed, the first application takes the plain estimates of the first two segments.
     const std::vector<Complex>& g =
-        mended ? now.in_force : (earlier.size() == 1 ? segment.ratio : earlier.back().used);
+        corrected ? now.in_force : (earlier.size() == 1 ? segment.ratio : earlier.back().used);
     const std::vector<Complex>& older =
-        mended ? terms->in_force : earlier[earlier.size() - std::min<std::size_t>(earlier.size(), 2)].used;
+        corrected ? terms->in_force : earlier[earlier.size() - std::min<std::size_t>(earlier.size(), 2)].used;
     for (std::size_t l = 0; l < g.size(); ++l)
       segment.used[l] = updateLine(update, {work[l], now.tool[l], g[l]}, {0.0, terms->tool[l], older[l]});
   }

@@ -45,7 +45,7 @@ enum class KimUpdate {
   printed,
   /// The secant of Y_w - Y_t that he derives it from (eq. 11): numerator Y_w,j-1 - Y_t,j-1, motions over the
   /// chip of their segment, each with the G in force in that segment (0 in the first).
-  mended
+  corrected
 };
 const char* nameOf(KimUpdate update);
 

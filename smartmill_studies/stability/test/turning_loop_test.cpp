@@ -65,7 +65,7 @@ TEST(KimUpdate, theSecantFindsTheMachineAndThePrintedFormInvertsTheFirstError) {
   using Complex = std::complex<double>;
   const Complex g(0.3, -1.2), force(2.0, 0.7);
   for (const Complex first : {Complex(0.2, -1.0), Complex(0.5, -1.5), Complex(0.3, -0.6)}) {
-    EXPECT_LT(std::abs(updateLine(KimUpdate::mended, {g, first, first}, {0.0, 0.0, 0.0}) - g), 1e-12);
+    EXPECT_LT(std::abs(updateLine(KimUpdate::corrected, {g, first, first}, {0.0, 0.0, 0.0}) - g), 1e-12);
     const Complex printed = updateLine(KimUpdate::printed, {g * force, first * force, g}, {0.0, 0.0, first});
     EXPECT_LT(std::abs(printed - g * g / first), 1e-12);
     EXPECT_GT(std::abs(printed - g), 0.5 * std::abs(first - g));
@@ -78,12 +78,12 @@ TEST(KimUpdate, bothFormsBeginAlike) {
   TurningLoop loop = kimLoop(1.0);
   loop.lathe.servo_frequency = 0.45 * loop.lathe.rate;
   loop.duration = 4.2;
-  const KimRun printed = runKim(loop, KimUpdate::printed), mended = runKim(loop, KimUpdate::mended);
+  const KimRun printed = runKim(loop, KimUpdate::printed), corrected = runKim(loop, KimUpdate::corrected);
   ASSERT_EQ(printed.segments.size(), 2u);
-  ASSERT_EQ(mended.segments.size(), 2u);
-  EXPECT_EQ(printed.segments[0].read.frequency, mended.segments[0].read.frequency);
-  EXPECT_EQ(printed.trace.vibration(3.0, 4.0), mended.trace.vibration(3.0, 4.0));
-  EXPECT_NE(printed.segments[1].read.damping_ratio, mended.segments[1].read.damping_ratio);
+  ASSERT_EQ(corrected.segments.size(), 2u);
+  EXPECT_EQ(printed.segments[0].read.frequency, corrected.segments[0].read.frequency);
+  EXPECT_EQ(printed.trace.vibration(3.0, 4.0), corrected.trace.vibration(3.0, 4.0));
+  EXPECT_NE(printed.segments[1].read.damping_ratio, corrected.segments[1].read.damping_ratio);
 }
 
 TEST(Lathe, refusesWhatIsWrong) {
