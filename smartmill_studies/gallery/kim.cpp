@@ -7,6 +7,7 @@
 
 #include "gallery/gallery.h"
 #include "smartmill_core/formatted.h"
+#include "smartmill_core/units.h"
 #include "stability/kim_figures.h"
 
 namespace smartmill::studies {
@@ -14,9 +15,16 @@ namespace {
 
 using stability::KimUpdate;
 
+// Resolution of his spectra, 512 points of 1 ms: lines [rad/s], width of a Hamming window [lines].
+constexpr double LINE = units::TWO_PI * 1000.0 / 512.0, HAMMING = 1.36;
+
 const std::string AS_PRINTED =
-    "numerator Y_w of the last segment minus Y_t of the one before it, spectra of the motions (eq. 12)";
-const std::string MENDED = "secant of Y_w - Y_t: both of the last segment, over the chip of their segment";
+    "numerator Y_w of the last segment minus Y_t of the one before it, spectra of the motions (eq. 12); to "
+    "the "
+    "resolution of his spectra";
+const std::string CORRECTED =
+    "secant of Y_w - Y_t: both of the last segment, over the chip of their segment; to the resolution of his "
+    "spectra";
 const std::string BEFORE_IT =
     "eq. 16 acts from 4.096 s on; before, the controller read off the first estimate acts alone";
 const std::string NO_STATED_SPEED =
@@ -51,13 +59,13 @@ Drawn turning(const std::string& folder, unsigned) {
        {std::pair(KimUpdate::printed, &f.printed), std::pair(KimUpdate::corrected, &f.corrected)}) {
     for (std::size_t s = 1; s < 3; ++s) {
       const stability::SecondOrder& read = kim->segments.at(s).read;
-      const bool near = std::abs(read.frequency / printed[s][0] - 1.0) < 0.05 &&
-                        std::abs(read.damping_ratio / printed[s][1] - 1.0) < 0.5;
+      const bool near = std::abs(read.frequency - printed[s][0]) < LINE &&
+                        std::abs(read.damping_ratio - printed[s][1]) < HAMMING * LINE / (2.0 * printed[s][0]);
       drawn.rows.push_back({formatted("%s, machine after period %zu, section 4", nameOf(update), s + 1),
                             formatted("%.0f rad/s, %.2f", printed[s][0], printed[s][1]),
                             formatted("%.0f rad/s, %.3f", read.frequency, read.damping_ratio),
                             near ? Verdict::agrees : Verdict::differs,
-                            update == KimUpdate::printed ? AS_PRINTED : MENDED});
+                            update == KimUpdate::printed ? AS_PRINTED : CORRECTED});
     }
     const double left = stability::lastVibration(kim->trace), early = kim->trace.vibration(3.596, 4.096);
     drawn.rows.push_back({formatted("%s, vibration after 6.144 s, figures 4 and 5", nameOf(update)),
