@@ -39,7 +39,7 @@ void drawTable(const BurzoniTable& table, const std::string& png) {
     const BurzoniRow& r = table.rows[k];
     plot.block(formatted("curve%zu", k), curveOf(r));
     dots.push_back({std::pow(2.0, r.exponent), r.rmse});
-    speeds.push_back({r.rpm, r.rmse_printed, r.rmse, r.harmonics});
+    speeds.push_back({r.rpm, r.rmse_printed, r.rmse, r.noisy_rmse, r.harmonics});
   }
   plot.block("dots", dots);
   plot.block("speeds", speeds);
@@ -50,13 +50,15 @@ void drawTable(const BurzoniTable& table, const std::string& png) {
   for (std::size_t k = 0; k < table.rows.size(); ++k)
     plot << (k ? ", " : "plot ") << "$curve" << k << " using 1:2 with lines lw 2 lc rgb '"
          << BURZONI_COLOURS[k] << "' title '" << table.rows[k].rpm << " rpm'";
-  plot << ", $dots using 1:2 with points pt 7 ps 1.2 lc rgb '#e00000' title 'Q of the taps'\n"
-          "unset logscale x\nset format x '%g'\nset xlabel 'spindle speed [rpm]'\nset xrange [0:18000]\nplot "
-          "$speeds using 1:2 with linespoints pt 7 lw 3 lc rgb '#b0b0b0' title 'printed, "
-       << table.name
-       << "', $speeds using 1:3 with linespoints pt 7 lc rgb '#c08040' title 'his filter here, Q of the "
-          "taps', "
-          "$speeds using 1:4 with linespoints pt 7 lc rgb '#2060c0' title 'this package'\nunset multiplot\n";
+  plot
+      << ", $dots using 1:2 with points pt 7 ps 1.2 lc rgb '#e00000' title 'Q of the taps'\n"
+         "unset logscale x\nset format x '%g'\nset xlabel 'spindle speed [rpm]'\nset xrange [0:18000]\nplot "
+         "$speeds using 1:2 with linespoints pt 7 lw 3 lc rgb '#b0b0b0' title 'printed, "
+      << table.name
+      << "', $speeds using 1:3 with linespoints pt 7 lc rgb '#c08040' title 'his filter here, Q of the "
+         "taps', "
+         "$speeds using 1:4 with linespoints pt 7 lc rgb '#c02020' title 'his filter here, Q of noisy taps', "
+         "$speeds using 1:5 with linespoints pt 7 lc rgb '#2060c0' title 'this package'\nunset multiplot\n";
   plot.draw();
 }
 
