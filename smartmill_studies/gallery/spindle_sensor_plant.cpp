@@ -268,8 +268,9 @@ Drawn overSpeed(const std::string& folder, unsigned seed) {
         formatted("2^%.0f .. 2^%.0f", std::log2(low->q_printed), std::log2(high->q_printed)),
         ends(most) ? formatted("2^%d .. 2^%d", least, most) : formatted("2^%d and more", least),
         Verdict::shown,
-        "the dependence on speed is reproduced; taps with little noise and a sensor accurate to half a per "
-        "cent permit a large Q: at the higher speeds the optimum is above 2^30"}}};
+        "the noise of the taps bounds Q (kalman_burzoni): little noise and a sensor accurate to half a per "
+        "cent "
+        "permit a large Q, at the higher speeds above 2^30; table 8 shows his Q with noisy taps"}}};
 }
 
 /// Tables 6 and 7.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
+#include <random>
 
 #include "kalman/expanded_disturbance.h"
 #include "smartmill_core/signal/statistics.h"
@@ -233,6 +234,16 @@ BurzoniStatics gatherStatics(const MachineModel& model, std::uint64_t seed) {
   return found;
 }
 
+ReferenceTaps withNoise(const ReferenceTaps& taps, double rms, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> draw(0.0, rms);
+  ReferenceTaps noisy = taps;
+  for (std::vector<double>& response : noisy.response) {
+    for (double& sample : response) sample += draw(random);
+  }
+  return noisy;
+}
+
 BurzoniData gatherBurzoni(const MachineModel& model, std::uint64_t seed, double band) {
   const auto made = rigOf(model, seed, band);
   SpindleRig& rig = *made;
@@ -249,6 +260,8 @@ BurzoniData gatherBurzoni(const MachineModel& model, std::uint64_t seed, double 
     rig.run(0.3);
     data.taps[axis] = blowsOf(rig.take(), axis);
     data.r_tap[axis] = noiseBefore(data.taps[axis], RATE, 0.005);
+    data.noisy_taps[axis] =
+        withNoise(data.taps[axis], BURZONI_TAP_NOISE * std::sqrt(data.r_tap[axis]), seed + axis);
   }
   rig.ask(step(CalibrationGoal::Step::fit));
   for (std::size_t axis = 0; axis < 2; ++axis) data.sensor[axis] = rig.sorted().sensor(axis);
@@ -290,8 +303,10 @@ BurzoniTable burzoniTable(const BurzoniData& data, std::size_t number, double ba
                      {}};
   std::vector<double> speeds;
   for (const double rpm : RPM) speeds.push_back(units::radPerSecFromRpm(rpm));
-  const TuningMap map =
-      expandedTapMap(data.taps[axis], data.sensor[axis], RATE, table.r_tap, speeds, data.flutes, band);
+  const auto map_of = [&](const ReferenceTaps& taps) {
+    return expandedTapMap(taps, data.sensor[axis], RATE, table.r_tap, speeds, data.flutes, band);
+  };
+  const TuningMap map = map_of(data.taps[axis]), noisy = map_of(data.noisy_taps[axis]);
   for (std::size_t k = 0; k < RPM.size(); ++k) {
     const SpindleRig::Record& cut = data.cuts[k];
     const std::vector<double>&measured = cut.measured[axis], &truth = cut.truth[axis];
@@ -310,6 +325,8 @@ BurzoniTable burzoniTable(const BurzoniData& data, std::size_t number, double ba
     row.rmse_printed = printed.rmse[k];
     row.exponent = map.best(speeds[k]);
     row.rmse = best.all[static_cast<std::size_t>(row.exponent - LEAST_EXPONENT)];
+    row.noisy_exponent = noisy.best(speeds[k]);
+    row.noisy_rmse = best.all[static_cast<std::size_t>(row.noisy_exponent - LEAST_EXPONENT)];
     row.cut_exponent = best.exponent;
     row.cut_rmse = best.rmse;
     row.cut_wave =

@@ -14,19 +14,24 @@ namespace smartmill::kalman {
 
 /// Spindle speeds of his tables [rpm].
 constexpr std::array<double, 7> BURZONI_RPM{{1000, 4500, 6000, 8400, 9000, 11600, 17600}};
+/// [1] Noise of taps over the square root of the R stated for them at which his Q arises: his calibration
+/// constant (table 2), as if his R were that of the signal before it.
+constexpr double BURZONI_TAP_NOISE = 18.0;
 
 /// Data of the sensor in the simulated spindle, calibrated and tapped by the steps of the product, in air and
 /// in seven slots.
 struct BurzoniData {
   std::array<ModalModel, 2> sensor;
-  std::array<ReferenceTaps, 2> taps;
-  std::array<double, 2> r_tap{}, r_air{};      ///< [N2] before the hits; air cut at 9000 rpm
-  std::array<std::vector<double>, 2> air;      ///< [N] at 9000 rpm, unbalance off
-  std::array<std::vector<double>, 2> air_raw;  ///< [N] with it
-  std::array<std::vector<double>, 2> still;    ///< [N] at rest
-  std::vector<SpindleRig::Record> cuts;        ///< one per speed
+  std::array<ReferenceTaps, 2> taps, noisy_taps;  ///< as measured; with BURZONI_TAP_NOISE times the noise
+  std::array<double, 2> r_tap{}, r_air{};         ///< [N2] before the hits; air cut at 9000 rpm
+  std::array<std::vector<double>, 2> air;         ///< [N] at 9000 rpm, unbalance off
+  std::array<std::vector<double>, 2> air_raw;     ///< [N] with it
+  std::array<std::vector<double>, 2> still;       ///< [N] at rest
+  std::vector<SpindleRig::Record> cuts;           ///< one per speed
   int flutes = 0;
 };
+/// Taps with white noise added to the response. @param rms [N]
+ReferenceTaps withNoise(const ReferenceTaps& taps, double rms, std::uint64_t seed);
 /// @param band [Hz] highest harmonic @throws Error
 BurzoniData gatherBurzoni(const MachineModel& model, std::uint64_t seed, double band);
 
@@ -38,6 +43,8 @@ struct BurzoniRow {
   double rmse = 0.0;                             ///< [N] of the cut with that Q
   int cut_exponent = 0;                          ///< of the best Q of the cut
   double cut_rmse = 0.0, cut_wave = 0.0;         ///< [N], [%] with it
+  int noisy_exponent = 0;                        ///< of the Q from the noisy taps
+  double noisy_rmse = 0.0;                       ///< [N] of the cut with that Q
   double walk = 0.0;                             ///< [N] force as a random walk, same Q
   double harmonics = 0.0, harmonics_wave = 0.0;  ///< [N], [%] of this package's filter
   std::vector<double> curve;                     ///< [N] of the cut over the exponents of Q

@@ -10,10 +10,12 @@
 
 namespace smartmill::kalman {
 
-/// Burzoni's expanded disturbance model (eq. 4-43..4-50): the force is a constant and an undamped oscillator
-/// at the tooth passing frequency, both driven by one noise w (theta_dc = theta_ac = 1), in addition to the
-/// modes of the sensor; discretised exactly (5-9), stationary gain (5-46), force after the measurement update
-/// (5-47).
+/// Burzoni's expanded disturbance (eq. 4-43..4-50): the force is f_a = f_c + f_ha, a constant with f_c' =
+/// w_dc and a harmonic f_ha = cos(w_t t) * w_ac, the output of s / (s^2 + w_t^2) with states x1' = -w_t^2 x2
+/// + w_ac, x2' = x1, f_ha = x1 and w_t the tooth passing frequency; it enters the modes, x_n' = A_n x_n + B_n
+/// (f_c + C_f x_f). One noise w drives both, w_dc = theta_dc w and w_ac = theta_ac w; he states neither
+/// theta, here both are 1. No harmonic of w_t is modelled. Discretised exactly (5-9), stationary gain (5-46),
+/// force after the measurement update (5-47).
 class ExpandedDisturbanceFilter {
  public:
   /// @param tooth_passing [Hz] @param q [N2/s] intensity of w @param r [N2] of a sample. @throws Error.

@@ -10,8 +10,9 @@
 
 namespace smartmill::kalman {
 
-/// Burzoni's tuning: the force is a random walk of intensity q = 2^n [N2/s], n = 1..30 (eq. 6-2), scored by
-/// the RMSE of amplitude spectra at the harmonics of a spindle speed (eq. 6-1).
+/// Burzoni's criterion on a simpler model than his: the force is a random walk of intensity q = 2^n [N2/s], n
+/// = 1..30 (eq. 6-2), scored by the RMSE of amplitude spectra at the harmonics of a spindle speed (eq. 6-1).
+/// His own model is the ExpandedDisturbanceFilter.
 constexpr int LEAST_EXPONENT = 1, MOST_EXPONENT = 30;
 
 /// RMSE [N s] of every exponent (rows) at every spindle speed (columns).

@@ -34,12 +34,13 @@ void drawHistory(const std::string& png,
 }
 
 /// Figures 6 and 7: estimates at the end of a segment.
-void drawTransfer(const std::string& png, const std::string& title, const KimRun& kim, std::size_t segment,
-                  const SecondOrder& learnt, const SecondOrder& truth, const SecondOrder& printed) {
+void drawTransfer(const std::string& png, const std::string& title, const KimFigures& f, std::size_t segment,
+                  const SecondOrder& printed) {
   std::vector<std::vector<double>> lines, curves;
-  const auto& s = kim.segments.at(segment);
+  const KimSegment &s = f.printed.segments.at(segment), &corrected = f.corrected.segments.at(segment);
+  const SecondOrder &learnt = f.ours.learnt.at(segment).machine, &truth = f.truth;
   for (std::size_t i = 0; i < s.frequency.size(); ++i)
-    lines.push_back({s.frequency[i], std::abs(s.ratio[i]), std::abs(s.used[i])});
+    lines.push_back({s.frequency[i], std::abs(s.ratio[i]), std::abs(s.used[i]), std::abs(corrected.used[i])});
   for (double w = 200.0; w <= 500.0; w += 0.5)
     curves.push_back(
         {w, std::abs(learnt.response(w)), std::abs(truth.response(w)), std::abs(printed.response(w))});
@@ -49,8 +50,9 @@ void drawTransfer(const std::string& png, const std::string& title, const KimRun
   plot << "set grid\nset key above horizontal samplen 2\nset logscale y\nset title " << Gnuplot::quoted(title)
        << "\nset xlabel 'frequency [rad/s]'\nset ylabel 'deflection over chip [1]'\nset xrange [200:500]\n"
           "plot $lines using 1:2 with linespoints pt 6 lc 'gray' title 'ratio of spectra', "
-          "$lines using 1:3 with linespoints pt 7 lc rgb '#dd8800' title 'eq. 16, line by line', "
-          "$curves using 1:4 with lines dt 3 lw 2 lc rgb '#aa0000' title 'as Kim prints it', "
+          "$lines using 1:3 with linespoints pt 7 lc rgb '#dd8800' title 'eq. 16 as printed', "
+          "$lines using 1:4 with linespoints pt 5 lc rgb '#209060' title 'eq. 16 corrected', "
+          "$curves using 1:4 with lines dt 3 lw 2 lc rgb '#aa0000' title 'his values', "
           "$curves using 1:3 with lines lw 3 lc 'black' title 'true', "
           "$curves using 1:2 with lines dt 2 lw 2 lc rgb '#0060ad' title 'this package'\n";
   plot.draw();
@@ -68,16 +70,16 @@ KimFigures kimFigures(double growth, const std::string& folder) {
   KimFigures f;
   f.free = runTurning(free);
   f.ours = runTurning(loop);
-  f.kim = runKim(ideal);
+  f.printed = runKim(ideal, KimUpdate::printed);
+  f.corrected = runKim(ideal, KimUpdate::corrected);
   for (const char* number : {"4", "5", "6", "7"})
     f.pictures.push_back(folder + "/kim_figure_" + number + ".png");
   drawHistory(f.pictures[0], {{"Kim figure 4: uncontrolled", &f.free}});
   drawHistory(f.pictures[1], {{"Kim figure 5: controlled, this package", &f.ours},
-                              {"his own update, line by line", &f.kim.trace}});
-  drawTransfer(f.pictures[2], "Kim figure 6: second period, 2.049 to 4.096 s", f.kim, 1,
-               f.ours.learnt.at(1).machine, f.truth, {0.15, 335.0, 0.06});
-  drawTransfer(f.pictures[3], "Kim figure 7: third period, 4.097 to 6.144 s", f.kim, 2,
-               f.ours.learnt.at(2).machine, f.truth, {0.15, 346.0, 0.07});
+                              {"eq. 16 as printed", &f.printed.trace},
+                              {"eq. 16 corrected", &f.corrected.trace}});
+  drawTransfer(f.pictures[2], "Kim figure 6: second period, 2.049 to 4.096 s", f, 1, {0.15, 335.0, 0.06});
+  drawTransfer(f.pictures[3], "Kim figure 7: third period, 4.097 to 6.144 s", f, 2, {0.15, 346.0, 0.07});
   return f;
 }
 

@@ -58,6 +58,16 @@ std::vector<std::vector<Complex>> spectraOf(const std::vector<double>& signal) {
   return all;
 }
 
+/// Spectrum of a signal (eq. 12), line by line, averaged over the blocks.
+std::vector<Complex> meanSpectrum(const std::vector<double>& signal) {
+  const auto blocks = spectraOf(signal);
+  std::vector<Complex> sum(blocks.front().size());
+  for (const auto& block : blocks) {
+    for (std::size_t l = 0; l < sum.size(); ++l) sum[l] += block[l] / static_cast<double>(blocks.size());
+  }
+  return sum;
+}
+
 /// Cross spectrum of two signals, line by line, averaged over the blocks.
 std::vector<Complex> cross(const std::vector<double>& a, const std::vector<double>& b) {
   const auto first = spectraOf(a), second = spectraOf(b);
@@ -143,49 +153,72 @@ SecondOrder readOff(const std::vector<double>& frequency, const std::vector<Comp
   return found;
 }
 
+const char* nameOf(KimUpdate update) {
+  return update == KimUpdate::printed ? "eq. 16 as printed" : "eq. 16 corrected";
+}
+
+Complex updateLine(KimUpdate update, const KimLine& last, const KimLine& before) {
+  const Complex moved = last.tool - before.tool;
+  if (std::abs(moved) <= 1e-9 * std::abs(last.work)) return last.g;
+  return last.g + (last.work - (update == KimUpdate::corrected ? last.tool : before.tool)) / moved *
+                      (last.g - before.g);
+}
+
 namespace {
 
-/// Estimates of a segment from those before it. @param tool_before spectra of tool over chip of the last
-/// segment, then of this one
-KimSegment kimSegment(const std::vector<double>& chips, const std::vector<double>& deflections,
-                      const std::vector<double>& tools, const std::vector<KimSegment>& earlier,
-                      std::vector<Complex>* tool_before) {
+/// Signals of a segment at 1 ms.
+struct KimSignals {
+  std::vector<double> chip, deflection, tool;  ///< [m]
+};
+
+/// Terms of eq. 16 of a segment that the next one needs.
+struct KimTerms {
+  std::vector<Complex> tool;      ///< Y_t; over the chip if corrected
+  std::vector<Complex> in_force;  ///< G of the controller in this segment
+};
+
+/// Estimates of a segment from those before it. @param terms of the last segment, then of this one
+KimSegment kimSegment(const KimSignals& signals, KimUpdate update, const std::vector<KimSegment>& earlier,
+                      KimTerms* terms) {
   KimSegment segment;
-  const auto power = cross(chips, chips), work = cross(chips, deflections);
-  std::vector<Complex> tool_now = cross(chips, tools);
+  const auto power = cross(signals.chip, signals.chip), deflection = cross(signals.chip, signals.deflection);
+  const bool corrected = update == KimUpdate::corrected;
+  KimTerms now;
+  now.tool = corrected ? cross(signals.chip, signals.tool) : meanSpectrum(signals.tool);
   for (std::size_t l = 0; l < power.size(); ++l) {
     segment.frequency.push_back(LINE * static_cast<double>(l + 1));
-    segment.ratio.push_back(work[l] / power[l]);
-    tool_now[l] /= power[l];
+    segment.ratio.push_back(deflection[l] / power[l]);
+    if (corrected) now.tool[l] /= power[l];
+    now.in_force.push_back(earlier.empty() ? 0.0 : earlier.back().read.response(segment.frequency.back()));
   }
   segment.used = segment.ratio;
-  if (earlier.size() >= 2) {
-    const std::vector<Complex>& g = earlier.back().used;
-    const std::vector<Complex>& older = earlier[earlier.size() - 2].used;
-    for (std::size_t l = 0; l < g.size(); ++l) {
-      const Complex moved = tool_now[l] - (*tool_before)[l];
-      segment.used[l] = g[l];
-      if (std::abs(moved) > 1e-9)
-        segment.used[l] += (segment.ratio[l] - tool_now[l]) / moved * (g[l] - older[l]);
-    }
+  if (!earlier.empty()) {
+    const std::vector<Complex> work = corrected ? segment.ratio : meanSpectrum(signals.deflection);
+    // As printed, the first application takes the plain estimates of the first two segments.
+    const std::vector<Complex>& g =
+        corrected ? now.in_force : (earlier.size() == 1 ? segment.ratio : earlier.back().used);
+    const std::vector<Complex>& older =
+        corrected ? terms->in_force : earlier[earlier.size() - std::min<std::size_t>(earlier.size(), 2)].used;
+    for (std::size_t l = 0; l < g.size(); ++l)
+      segment.used[l] = updateLine(update, {work[l], now.tool[l], g[l]}, {0.0, terms->tool[l], older[l]});
   }
   segment.read = readOff(segment.frequency, segment.used, LOW, HIGH);
   // K / K_m remains that of the first estimate (section 4).
   if (!earlier.empty()) segment.read.gain = earlier.front().read.gain;
-  *tool_before = tool_now;
+  *terms = now;
   return segment;
 }
 
 }  // namespace
 
-KimRun runKim(const TurningLoop& loop) {
+KimRun runKim(const TurningLoop& loop, KimUpdate update) {
   KimRun run;
   sim::Lathe lathe(loop.lathe);
   const auto every = static_cast<std::size_t>(std::lround(loop.lathe.rate / 1000.0));
   const double back = TWO_PI / loop.lathe.spindle_speed * loop.lathe.rate;
   std::unique_ptr<ModalFilter> filter;
-  std::vector<double> chips, deflections, tools;
-  std::vector<Complex> tool_before;
+  KimSignals signals;
+  KimTerms terms;
   double chip_before = loop.lathe.chip;
   const auto samples = static_cast<std::size_t>(loop.duration * loop.lathe.rate);
   for (std::size_t i = 0; i < samples; ++i) {
@@ -207,12 +240,16 @@ KimRun runKim(const TurningLoop& loop) {
     }
     chip_before = chip;
     lathe.command(commandBlock(i, loop.lathe.rate, command));
-    if (i % every == 0) chips.push_back(chip), deflections.push_back(deflection), tools.push_back(tool);
-    if (chips.size() < SEGMENT_SAMPLES) continue;
-    const KimSegment segment = kimSegment(chips, deflections, tools, run.segments, &tool_before);
+    if (i % every == 0) {
+      signals.chip.push_back(chip);
+      signals.deflection.push_back(deflection);
+      signals.tool.push_back(tool);
+    }
+    if (signals.chip.size() < SEGMENT_SAMPLES) continue;
+    const KimSegment segment = kimSegment(signals, update, run.segments, &terms);
     filter = std::make_unique<ModalFilter>(segment.read.modal(), loop.lathe.rate, Hold::first_order);
     run.segments.push_back(segment);
-    chips.clear(), deflections.clear(), tools.clear();
+    signals = {};
   }
   run.trace.late = lathe.late();
   return run;

@@ -35,9 +35,28 @@ TurningTrace runTurning(const TurningLoop& loop);
 /// exp(logarithm) per segment of 2.048 s, with the lead that compensates the delay of the blocks.
 TurningLoop kimLoop(double logarithm);
 
-/// Kim's own update (eq. 11 to 16), line by line: G_j = G_j-1 + (Y_w - Y_t)_j-1 / (Y_t,j-1 - Y_t,j-2) (G_j-1
-/// - G_j-2), and the second-order system from its peak and half-power width, as he states.
-/// The first two estimates are the plain ratio of the spectra of deflection and chip.
+/// Kim's update, eq. 16, from the end of the second segment on, line by line:
+/// G_j = G_j-1 + numerator / (Y_t,j-1 - Y_t,j-2) (G_j-1 - G_j-2), and the second-order system from its peak
+/// and half-power width, as he states.
+enum class KimUpdate {
+  /// As printed: numerator Y_w,j-1 - Y_t,j-2, the spectra of the motions themselves (eq. 12), the estimates
+  /// one
+  /// after the other.
+  printed,
+  /// The secant of Y_w - Y_t that he derives it from (eq. 11): numerator Y_w,j-1 - Y_t,j-1, motions over the
+  /// chip of their segment, each with the G in force in that segment (0 in the first).
+  corrected
+};
+const char* nameOf(KimUpdate update);
+
+/// One line of the spectra of a segment: Y_w, Y_t and the G that eq. 16 pairs with them.
+struct KimLine {
+  std::complex<double> work, tool, g;
+};
+/// Eq. 16 of one line; g of the last segment if the tool has moved alike in both.
+std::complex<double> updateLine(KimUpdate update, const KimLine& last, const KimLine& before);
+
+/// The estimates of the first two segments are the plain ratio of the spectra of deflection and chip.
 struct KimSegment {
   std::vector<double> frequency;                  ///< [rad/s]
   std::vector<std::complex<double>> ratio, used;  ///< measured Y_w / chip; G after the update
@@ -48,7 +67,7 @@ struct KimRun {
   TurningTrace trace;
 };
 /// The same lathe with Kim's controller, which gets every sample without delay (block and way are not used).
-KimRun runKim(const TurningLoop& loop);
+KimRun runKim(const TurningLoop& loop, KimUpdate update);
 
 /// Peak and half-power width of a receptance about its largest line between two frequencies [rad/s].
 SecondOrder readOff(const std::vector<double>& frequency, const std::vector<std::complex<double>>& response,

@@ -29,17 +29,20 @@ std::array<double, 6> sensorsUnder(double length_mm, double fx, double fy, doubl
 }
 
 TEST(SpindleSensorCalibration, Table3GivesTable2AtItsLength) {
-  // Table 2: 18, 18.2, 62 and cross-talk 26.5, 139.3, -341. Printed digits; the cross-talks of the two tables
-  // part by up to 6.1 % (their own lengths would be 149 and 118 mm).
-  EXPECT_NEAR(TABLE.x.at(LENGTH), 18.0, 0.05);
-  EXPECT_NEAR(TABLE.y.at(LENGTH), 18.2, 0.3);
-  EXPECT_NEAR(TABLE.z.at(LENGTH), 62.0, 0.5);
-  EXPECT_NEAR(TABLE.xz->at(LENGTH), -341.0, 2.0);
-  EXPECT_NEAR(TABLE.yx->at(LENGTH), 26.5, 0.065 * 26.5);
-  EXPECT_NEAR(TABLE.yz->at(LENGTH), 139.3, 0.065 * 139.3);
-  // Eq. 3-3 with the sensor's 3.8 pC/N (Table 1): 0.209, 0.217, 0.061 pC/N.
-  EXPECT_NEAR(3.8 / TABLE.x.at(LENGTH), 0.209, 0.004);
-  EXPECT_NEAR(3.8 / TABLE.y.at(LENGTH), 0.217, 0.006);
+  // Table 2, within the 5 % to which he calibrates (section 3.2.1). His tables disagree by more in one
+  // constant: the line of c_Yz gives 130.8 where Table 2 has 139.3.
+  constexpr double SHARE = 0.05;
+  EXPECT_NEAR(TABLE.x.at(LENGTH), 18.0, 0.05);  // printed digits
+  EXPECT_NEAR(TABLE.z.at(LENGTH), 62.0, 0.5);   // printed digits
+  EXPECT_NEAR(TABLE.y.at(LENGTH), 18.2, SHARE * 18.2);
+  EXPECT_NEAR(TABLE.xz->at(LENGTH), -341.0, SHARE * 341.0);
+  EXPECT_NEAR(TABLE.yx->at(LENGTH), 26.5, SHARE * 26.5);
+  EXPECT_NEAR(TABLE.yz->at(LENGTH), 130.84, 0.005);
+  EXPECT_GT(std::abs(TABLE.yz->at(LENGTH) - 139.3), SHARE * 139.3);
+  // Eq. 3-3 with the sensor's 3.8 pC/N (Table 1): 0.209, 0.217, 0.061 pC/N. With the constants of Table 2
+  // itself the first two are 0.211 and 0.209.
+  EXPECT_NEAR(3.8 / TABLE.x.at(LENGTH), 0.209, SHARE * 0.209);
+  EXPECT_NEAR(3.8 / TABLE.y.at(LENGTH), 0.217, SHARE * 0.217);
   EXPECT_NEAR(3.8 / TABLE.z.at(LENGTH), 0.061, 0.0005);
 }
 

@@ -32,13 +32,14 @@ TEST(Uncertainty, drawsHaveTheStatedScatter) {
     const double c = drawn.modes[0].input[0] * drawn.modes[0].output[0] / (w * w) * 0.03993 * w0 * w0 - 1.0;
     f += a, ff += a * a, z += b, zz += b * b, k += c, kk += c * c;
   }
-  // Four standard errors of 4000 draws: 6.3 % of the standard deviation for the mean, 4.5 % for its estimate.
-  EXPECT_NEAR(f / N, 0.0, 0.065 * 0.005);
-  EXPECT_NEAR(z / N, 0.0, 0.065 * 0.1);
-  EXPECT_NEAR(k / N, 0.0, 0.065 * 0.05);
-  EXPECT_NEAR(std::sqrt(ff / N), 0.005, 0.06 * 0.005);
-  EXPECT_NEAR(std::sqrt(zz / N), 0.1, 0.06 * 0.1);
-  EXPECT_NEAR(std::sqrt(kk / N), 0.05, 0.06 * 0.05);
+  // Four standard errors, as shares of the standard deviation: of the mean and of the estimated deviation.
+  const double of_mean = 4.0 / std::sqrt(N), of_deviation = 4.0 / std::sqrt(2.0 * N);
+  EXPECT_NEAR(f / N, 0.0, of_mean * 0.005);
+  EXPECT_NEAR(z / N, 0.0, of_mean * 0.1);
+  EXPECT_NEAR(k / N, 0.0, of_mean * 0.05);
+  EXPECT_NEAR(std::sqrt(ff / N), 0.005, of_deviation * 0.005);
+  EXPECT_NEAR(std::sqrt(zz / N), 0.1, of_deviation * 0.1);
+  EXPECT_NEAR(std::sqrt(kk / N), 0.05, of_deviation * 0.05);
 }
 
 TEST(Uncertainty, probabilityWithoutUncertaintyIsAStep) {

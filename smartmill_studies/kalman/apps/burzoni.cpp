@@ -9,6 +9,8 @@
 
 #include "kalman/burzoni_tables.h"
 #include "kalman/expanded_disturbance.h"
+#include "smartmill_core/formatted.h"
+#include "smartmill_core/modal/modal_filter.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/sensor/state_space_checks.h"
@@ -30,14 +32,15 @@ void hypotheses(const BurzoniData& data, double band) {
     const kalman::BurzoniTable table = kalman::burzoniTable(data, number, band);
     std::printf("%s, %c: R of taps %.2f, of cuts %.2f (printed %.2f, %.2f)\n", table.name.c_str(),
                 "xy"[table.axis], table.r_tap, table.r_cut, table.r_tap_printed, table.r_cut_printed);
-    std::printf("%6s %14s %10s | %10s %10s | %14s %10s | %10s %10s | %s\n", "rpm", "Q printed", "ours",
-                "RMSE pr.", "ours", "Q of the cut", "RMSE", "walk, same", "harmonics",
-                "wave, %: cut's Q, harmonics");
+    std::printf("%6s %14s %10s %10s | %10s %10s %10s | %14s %10s | %10s %10s | %s\n", "rpm", "Q printed",
+                "ours", "noisy", "RMSE pr.", "ours", "noisy", "Q of the cut", "RMSE", "walk, same",
+                "harmonics", "wave, %: cut's Q, harmonics");
     for (const kalman::BurzoniRow& r : table.rows)
       std::printf(
-          "%6.0f %14.0f %7s2^%-2d | %10.3f %10.3f | %11s2^%-2d %10.3f | %10.3f %10.3f | %8.1f %8.1f\n", r.rpm,
-          r.q_printed, "", r.exponent, r.rmse_printed, r.rmse, "", r.cut_exponent, r.cut_rmse, r.walk,
-          r.harmonics, r.cut_wave, r.harmonics_wave);
+          "%6.0f %14.0f %7s2^%-2d %7s2^%-2d | %10.3f %10.3f %10.3f | %11s2^%-2d %10.3f | %10.3f %10.3f | "
+          "%8.1f %8.1f\n",
+          r.rpm, r.q_printed, "", r.exponent, "", r.noisy_exponent, r.rmse_printed, r.rmse, r.noisy_rmse, "",
+          r.cut_exponent, r.cut_rmse, r.walk, r.harmonics, r.cut_wave, r.harmonics_wave);
     std::printf("\n");
   }
 }
@@ -93,6 +96,64 @@ void gaussian(const BurzoniData& data) {
   }
 }
 
+/// A hammer's hits on a sensor, without noise.
+ReferenceTaps tapsOn(const ModalModel& sensor, const ReferenceTaps& hits) {
+  ReferenceTaps taps{hits.hammer, {}};
+  for (const std::vector<double>& hammer : taps.hammer) {
+    ModalFilter plant(sensor, RATE, Hold::first_order);
+    taps.response.emplace_back();
+    for (const double force : hammer) taps.response.back().push_back(plant.step(force));
+  }
+  return taps;
+}
+
+/// @param frequency, gain [1] factors of every mode
+ModalModel detuned(ModalModel sensor, double frequency, double gain) {
+  for (Mode& mode : sensor.modes) {
+    mode.frequency *= frequency;
+    mode.gain *= gain;
+  }
+  sensor.direct *= gain;
+  return sensor;
+}
+
+/// What bounds Q of the taps: their noise, a wrong model, a gap of the sensor. The filter depends on Q over R
+/// alone, so that one R shows all; his Q over R is the same in all of tables 8 to 15.
+void boundsOfQ(const BurzoniData& data, double band, std::uint64_t seed) {
+  constexpr double R = 0.15;  // [N2]
+  const ModalModel& smooth = data.sensor[0];
+  ModalModel gap;  // two modes with no response between them near 600 Hz, as his sensor
+  gap.modes.push_back({420.0, 0.03, 0.5});
+  gap.modes.push_back({930.0, 0.03, 0.5});
+  std::vector<double> speeds;
+  for (const double rpm : kalman::BURZONI_RPM) speeds.push_back(units::radPerSecFromRpm(rpm));
+  std::printf(
+      "What bounds Q of the taps, x, R 0.15 N2: n of the best 2^n (Burzoni: 9, at two speeds 10)\n%-52s", "");
+  for (const double rpm : kalman::BURZONI_RPM) std::printf(" %6.0f", rpm);
+  std::printf("\n");
+  const auto line = [&](const std::string& what, const ModalModel& truth, const ModalModel& model,
+                        double noise) {
+    const ReferenceTaps taps = kalman::withNoise(tapsOn(truth, data.taps[0]), noise * std::sqrt(R), seed);
+    const kalman::TuningMap map = kalman::expandedTapMap(taps, model, RATE, R, speeds, data.flutes, band);
+    std::printf("%-52s", what.c_str());
+    for (const double speed : speeds) std::printf(" %6d", map.best(speed));
+    std::printf("\n");
+  };
+  for (const double noise : {1.0, 5.0, 10.0, kalman::BURZONI_TAP_NOISE, 30.0, 100.0})
+    line(formatted("exact model, noise %g times the root of R", noise), smooth, smooth, noise);
+  line("noise of R, model 2 % high in frequency", smooth, detuned(smooth, 1.02, 1.0), 1.0);
+  line("noise of R, model 2 % low in frequency", smooth, detuned(smooth, 0.98, 1.0), 1.0);
+  line("noise of R, model 10 % low in gain", smooth, detuned(smooth, 1.0, 0.9), 1.0);
+  line("noise of R, model 10 % high in gain", smooth, detuned(smooth, 1.0, 1.1), 1.0);
+  line("sensor with a gap, exact model, noise of R", gap, gap, 1.0);
+  line("gap, noise of R, model 2 % high in frequency", gap, detuned(gap, 1.02, 1.0), 1.0);
+  line("gap, noise of R, model 2 % low in frequency", gap, detuned(gap, 0.98, 1.0), 1.0);
+  line("gap, noise of R, model 5 % high in frequency", gap, detuned(gap, 1.05, 1.0), 1.0);
+  line(formatted("gap, exact model, noise %g times the root of R", kalman::BURZONI_TAP_NOISE), gap, gap,
+       kalman::BURZONI_TAP_NOISE);
+  std::printf("\n");
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -107,6 +168,7 @@ int main(int argc, char** argv) {
     const MachineModel model = readMachineModel(file);
     const BurzoniData data = kalman::gatherBurzoni(model, seed, band);
     hypotheses(data, band);
+    boundsOfQ(data, band, seed);
     samplingTime(data.sensor[0]);
     gaussian(data);
   });

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "kalman/bistable.h"
+#include "kalman/burzoni_tables.h"
 #include "kalman/expanded_disturbance.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/testing/reference_case.h"
@@ -85,6 +86,36 @@ TEST(ExpandedDisturbance, TellsWhatItIsMadeFor) {
   };
   EXPECT_LT(error(400.0), 1.0);
   EXPECT_GT(error(1600.0), 3.0);
+}
+
+// The filter depends on Q over R alone: R times 64 multiplies the best Q by 64. That Q falls as the noise of
+// the taps rises.
+TEST(ExpandedDisturbance, TheBestQFollowsRAndTheNoiseOfTheTaps) {
+  constexpr double RATE = 25600.0, R = 0.15, BAND = 2500.0;
+  ModalModel sensor;
+  sensor.modes.push_back({930.0, 0.04, 0.8});
+  sensor.direct = 0.2;
+  ReferenceTaps taps;
+  for (int tap = 0; tap < 5; ++tap) {
+    ModalFilter plant(sensor, RATE, Hold::first_order);
+    taps.hammer.emplace_back();
+    taps.response.emplace_back();
+    for (int i = 0; i < 5120; ++i) {
+      taps.hammer.back().push_back(i >= 256 && i < 270 ? 300.0 * std::sin(units::PI * (i - 256) / 14.0)
+                                                       : 0.0);
+      taps.response.back().push_back(plant.step(taps.hammer.back().back()));
+    }
+  }
+  const std::vector<double> speeds{units::radPerSecFromRpm(1000.0)};
+  const auto best = [&](double noise, double r) {
+    return expandedTapMap(withNoise(taps, noise * std::sqrt(R), 3), sensor, RATE, r, speeds, 4, BAND)
+        .best(speeds.front());
+  };
+  const int tenfold = best(10.0, R), hundredfold = best(100.0, R);
+  EXPECT_GT(best(1.0, R), tenfold);
+  EXPECT_GT(tenfold, hundredfold);
+  EXPECT_GT(hundredfold, LEAST_EXPONENT);
+  EXPECT_EQ(best(10.0, 64.0 * R), tenfold + 6);
 }
 
 /// A law of given coefficients over 0 .. 1 mm.

@@ -2,6 +2,7 @@
 
 #include <cstdio>
 #include <string>
+#include <utility>
 
 #include "smartmill_core/program.h"
 #include "stability/kim_figures.h"
@@ -27,20 +28,26 @@ void run(double growth, const std::string& folder) {
   for (std::size_t s = 0; s < 3 && s < f.ours.learnt.size(); ++s) {
     std::printf("segment %zu\n", s + 1);
     row("this package", f.ours.learnt[s].machine, "");
-    row("Kim's update, peak and width", f.kim.segments[s].read, printed[s]);
+    row("eq. 16 as printed, peak and width", f.printed.segments[s].read, printed[s]);
+    row("eq. 16 corrected, peak and width", f.corrected.segments[s].read, "");
   }
   std::printf(
-      "vibration, rms of the last half second [um]: free %.4g, this package %.4g, Kim's update %.4g; "
-      "commands late %llu\n",
-      1e6 * lastVibration(f.free), 1e6 * lastVibration(f.ours), 1e6 * lastVibration(f.kim.trace),
-      static_cast<unsigned long long>(f.ours.late));
+      "vibration, rms of the half second before 2.048, 4.096, 6.144 s [um]; eq. 16 acts from 4.096 s\n");
+  for (const auto& [name, trace] :
+       {std::pair("free", &f.free), std::pair("this package", &f.ours),
+        std::pair("eq. 16 as printed", &f.printed.trace), std::pair("eq. 16 corrected", &f.corrected.trace)})
+    std::printf("  %-34s %10.4g %10.4g %10.4g\n", name, 1e6 * trace->vibration(1.548, 2.048),
+                1e6 * trace->vibration(3.596, 4.096), 1e6 * lastVibration(*trace));
+  std::printf("commands late %llu\n", static_cast<unsigned long long>(f.ours.late));
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   CommandLine line(
-      "Figures 4 to 7 of Kim's paper on the simulated lathe: his update compared with the control of this "
+      "Figures 4 to 7 of Kim's paper on the simulated lathe: his update, as printed and corrected, next to "
+      "the "
+      "control of this "
       "package.");
   double growth = 1.0;
   std::string folder;

@@ -1,6 +1,7 @@
 #include "stability/turning_loop.h"
 
 #include <cmath>
+#include <complex>
 #include <limits>
 
 #include <gtest/gtest.h>
@@ -55,6 +56,34 @@ TEST(TurningLoop, aCommandThatIsLateIsCounted) {
   loop.control.controller.lead = 0.0;
   loop.duration = 2.2;
   EXPECT_GT(runTurning(loop).late, 0u);
+}
+
+// Eq. 16 on exact spectra: machine G, no control in the first segment, G_1 in force in the second. The secant
+// of Y_w - Y_t ends at G in one step from any G_1. As printed, with both estimates, G itself being the
+// second, the result is G^2 / G_1: the error of the first estimate returns inverted.
+TEST(KimUpdate, theSecantFindsTheMachineAndThePrintedFormInvertsTheFirstError) {
+  using Complex = std::complex<double>;
+  const Complex g(0.3, -1.2), force(2.0, 0.7);
+  for (const Complex first : {Complex(0.2, -1.0), Complex(0.5, -1.5), Complex(0.3, -0.6)}) {
+    EXPECT_LT(std::abs(updateLine(KimUpdate::corrected, {g, first, first}, {0.0, 0.0, 0.0}) - g), 1e-12);
+    const Complex printed = updateLine(KimUpdate::printed, {g * force, first * force, g}, {0.0, 0.0, first});
+    EXPECT_LT(std::abs(printed - g * g / first), 1e-12);
+    EXPECT_GT(std::abs(printed - g), 0.5 * std::abs(first - g));
+  }
+  EXPECT_EQ(updateLine(KimUpdate::printed, {1.0, 0.5, g}, {0.0, 0.5, 2.0 * g}), g);
+}
+
+// The first estimate precedes eq. 16, so that it and the second segment are the same by both forms.
+TEST(KimUpdate, bothFormsBeginAlike) {
+  TurningLoop loop = kimLoop(1.0);
+  loop.lathe.servo_frequency = 0.45 * loop.lathe.rate;
+  loop.duration = 4.2;
+  const KimRun printed = runKim(loop, KimUpdate::printed), corrected = runKim(loop, KimUpdate::corrected);
+  ASSERT_EQ(printed.segments.size(), 2u);
+  ASSERT_EQ(corrected.segments.size(), 2u);
+  EXPECT_EQ(printed.segments[0].read.frequency, corrected.segments[0].read.frequency);
+  EXPECT_EQ(printed.trace.vibration(3.0, 4.0), corrected.trace.vibration(3.0, 4.0));
+  EXPECT_NE(printed.segments[1].read.damping_ratio, corrected.segments[1].read.damping_ratio);
 }
 
 TEST(Lathe, refusesWhatIsWrong) {
