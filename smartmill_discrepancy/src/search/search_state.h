@@ -22,13 +22,13 @@ struct SearchStateOptions {
 
 /// What the steps of a search work on: the current fit with its derivatives, what was tried, and the result.
 struct SearchState {
-  SearchState(Workbench& bench_, const std::vector<Hypothesis>& hypotheses_, const SearchOptions& options_,
-              bool whole_records_)
-      : bench(bench_),
-        quick(bench_.quick()),
-        hypotheses(hypotheses_),
-        options(options_),
-        whole_records(whole_records_) {}
+  SearchState(Workbench& workbench, const std::vector<Hypothesis>& candidates,
+              const SearchOptions& search_options, bool all_samples)
+      : bench(workbench),
+        quick(workbench.quick()),
+        hypotheses(candidates),
+        options(search_options),
+        whole_records(all_samples) {}
 
   Workbench& bench;
   const Fitter& quick;

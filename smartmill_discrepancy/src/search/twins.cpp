@@ -16,8 +16,8 @@ std::vector<std::size_t> testsOf(const Dataset& data, bool heldout) {
 
 }  // namespace
 
-Twins::Twins(const Dataset& data_, const WorkbenchOptions& options)
-    : data(data_),
+Twins::Twins(const Dataset& dataset, const WorkbenchOptions& options)
+    : data(dataset),
       quick(data, testsOf(data, false), options.threads, options.screening_substeps),
       exact(data, testsOf(data, false), options.threads, options.final_substeps),
       guided(data, testsOf(data, false), options.threads, options.final_substeps),

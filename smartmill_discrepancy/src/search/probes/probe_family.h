@@ -12,13 +12,13 @@ namespace smartmill::discrepancy {
 
 /// Current fit of a screening, from whose residual probes are located. Outlives the families.
 struct ProbeContext {
-  ProbeContext(const Projection& projection_, const TwinRunner& runner_, const MachineModel& model_,
-               const FitResult& now_)
-      : projection(projection_),
-        runner(runner_),
-        model(model_),
-        now(now_),
-        modes(runner_, model_, projection_.thinned().rows()) {}
+  ProbeContext(const Projection& at_fit, const TwinRunner& twin, const MachineModel& machine,
+               const FitResult& fit)
+      : projection(at_fit),
+        runner(twin),
+        model(machine),
+        now(fit),
+        modes(twin, machine, at_fit.thinned().rows()) {}
 
   const Projection& projection;
   const TwinRunner& runner;
