@@ -96,7 +96,10 @@ struct FrictionFitter {
     FitResult best;
     for (const double share : options.starts.stribeck_shares) {
       for (const double constant : options.starts.warmup_times) {
-        FrictionLaw start{linear};
+        FrictionLaw start;
+        start.viscous = linear.viscous;
+        start.coulomb = linear.coulomb;
+        start.zero_below = linear.zero_below;
         start.stribeck_speed = std::clamp(share * fastest, 0.3 * slowest, fastest);
         start.warmup_time = constant;
         const FitResult candidate =

@@ -85,7 +85,7 @@ class LoadRegression {
   /// Unknowns of a fit as quantities.
   struct Unknowns {
     FrictionLaw friction;
-    double ktc, kte, growth, log_lag;
+    double ktc = 0.0, kte = 0.0, growth = 0.0, log_lag = 0.0;
     Runout runout;
   };
   Unknowns unknownsOf(const LoadState& state, const LoadTerms& terms, const std::vector<double>& value) const;

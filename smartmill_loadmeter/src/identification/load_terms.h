@@ -35,9 +35,9 @@ struct LoadPlan {
 
 /// A term that evidence may add.
 struct FurtherTerm {
-  const char* name;  ///< for messages
-  bool LoadTerms::*flag;
-  bool (*isObservable)(const LoadPlan& plan);
+  const char* name = "";  ///< for messages
+  bool LoadTerms::*flag = nullptr;
+  bool (*isObservable)(const LoadPlan& plan) = nullptr;
   bool linearised = false;  ///< the records are condensed again about its estimate
 };
 const std::vector<FurtherTerm>& furtherTerms();

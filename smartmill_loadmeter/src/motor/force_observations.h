@@ -14,8 +14,8 @@ namespace smartmill::loadmeter {
 
 /// Measurement: quantity of CutMechanics, value and total standard deviation.
 struct ForceObservation {
-  int quantity;
-  double value, std_dev;
+  int quantity = 0;
+  double value = 0.0, std_dev = 0.0;
   int drive = -1;  // axis of the drive whose motor constant and lag are unknowns; -1: none
   LagResponse lagResponse{};
 
