@@ -1,6 +1,6 @@
 """The commands of the tutorials that start nodes, on a ROS master of their own.
 
-Background commands are stopped before the first command that follows the last use of the ROS master ($ROS_COMMANDS).
+Background commands run until the first command in the foreground that is none of ROS_COMMANDS.
 """
 import os
 import pathlib
@@ -14,7 +14,7 @@ import unittest
 import console
 from tutorials_test import TUTORIALS, free_port
 
-ROS_COMMANDS = ("roslaunch", "rosrun", "rostopic", "python3")
+ROS_COMMANDS = ("roslaunch", "rosrun", "rostopic")
 TIME_LIMIT = 120.0  # [s] of one command; only a fault reaches it
 
 
