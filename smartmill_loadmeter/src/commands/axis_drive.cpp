@@ -1,9 +1,11 @@
 #include "smartmill_loadmeter/motor/axis_drive.h"
 
 #include <cstdio>
+#include <map>
 #include <string>
 #include <vector>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/error.h"
 #include "smartmill_loadmeter/commands.h"
@@ -18,20 +20,8 @@ struct Arguments {
   AxisDriveOptions options;
 };
 
-/// Moves of the axis whose records have its current.
-std::vector<AxisMotion> movesOf(const Campaign& campaign, char axis) {
-  std::vector<AxisMotion> moves;
-  for (const CampaignTest& test : campaign.tests) {
-    if (test.kind != TestKind::move) continue;
-    const Record record = readRecord(campaign, test);
-    if (record.has(std::string("current_") + axis))
-      moves.push_back(axisMotion(record, test.sample_rate, axis));
-  }
-  return moves;
-}
-
-void print(char axis, std::size_t moves, const AxisDrive& d) {
-  std::printf("axis %c: %zu moves, at most %.4g m/s and %.4g m/s2\n", axis, moves, d.largest_velocity,
+void print(const std::string& axis, std::size_t moves, const AxisDrive& d) {
+  std::printf("axis %s: %zu moves, at most %.4g m/s and %.4g m/s2\n", axis.c_str(), moves, d.largest_velocity,
               d.largest_acceleration);
   std::printf("  inertia  %9.4f +- %.4f A s2/m\n", d.inertia.value, d.inertia.std_dev);
   std::printf("  Coulomb  %9.4f +- %.4f A\n", d.coulomb.value, d.coulomb.std_dev);
@@ -42,18 +32,21 @@ void print(char axis, std::size_t moves, const AxisDrive& d) {
 
 void run(const Arguments& a) {
   const Campaign campaign = readCampaign(a.campaign);
-  bool found = false;
-  for (const char axis : a.axis.empty() ? std::string("xyz") : a.axis) {
-    const std::vector<AxisMotion> moves = movesOf(campaign, axis);
-    if (moves.empty() && a.axis.empty()) continue;
-    if (moves.empty())
-      throw Error(a.campaign + ": no test of kind move has the column current_" + axis + "[A]");
-    print(axis, moves.size(), identifyAxisDrive(moves, a.options));
-    found = true;
+  std::map<std::string, std::vector<AxisMotion>> moves;  // of each axis whose current was recorded
+  for (const CampaignTest& test : campaign.tests) {
+    if (test.kind != TestKind::move) continue;
+    const Record record = readRecord(campaign, test);
+    for (const std::string axis : AXIS_NAMES) {
+      if ((a.axis.empty() || a.axis == axis) && record.has("current_" + axis))
+        moves[axis].push_back(axisMotion(record, test.sample_rate, axis[0]));
+    }
   }
-  if (!found)
-    throw Error(a.campaign +
-                ": no test of kind move has a column current_x[A], current_y[A] or current_z[A]");
+  if (moves.empty())
+    throw Error(a.campaign + ": no test of kind move has " +
+                (a.axis.empty() ? "a column current_x[A], current_y[A] or current_z[A]"
+                                : "the column current_" + a.axis + "[A]"));
+  for (const auto& [axis, records] : moves)
+    print(axis, records.size(), identifyAxisDrive(records, a.options));
 }
 
 }  // namespace
@@ -71,7 +64,8 @@ Command axisDriveCommand() {
                     "current_x[A]"}};
   command.setBody(run, [](CommandLine& line, Arguments& a) {
     line.option("CAMPAIGN", a.campaign, "campaign folder with tests of kind move").required();
-    line.option("--axis", a.axis, "x, y or z (default: all with a current)").oneOf({"x", "y", "z"});
+    line.option("--axis", a.axis, "x, y or z (default: all with a current)")
+        .oneOf({AXIS_NAMES.begin(), AXIS_NAMES.end()});
     line.option("--smoothing", a.options.smoothing, "[s] window over velocity and current")
         .showDefault()
         .positive();

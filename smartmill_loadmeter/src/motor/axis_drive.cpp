@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/signal/window.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::loadmeter {
@@ -18,53 +19,39 @@ namespace {
 constexpr Eigen::Index TERMS = 4;
 const std::array<const char*, TERMS> NAMES{"inertia", "Coulomb friction", "viscous friction", "offset"};
 
-/// Rows of the regression, in order, and where each record begins.
-struct Rows {
-  std::vector<std::array<double, TERMS>> terms;
-  std::vector<double> current;     // [A]
-  std::vector<std::size_t> begin;  // row of each record
-};
-
-/// Hann window of unit sum, and its derivative [1/s] for the smoothed acceleration.
-struct Window {
-  Window(double length, double rate) {
-    const auto size = static_cast<std::size_t>(std::max(3.0, std::round(length * rate)));
-    double sum = 0.0;
-    for (std::size_t i = 0; i < size; ++i) {
-      const double angle = 2.0 * units::PI * static_cast<double>(i + 1) / static_cast<double>(size + 1);
-      weight.push_back(0.5 - 0.5 * std::cos(angle));
-      slope.push_back(-0.5 * std::sin(angle) * 2.0 * units::PI / static_cast<double>(size + 1) * rate);
-      sum += weight.back();
-    }
-    for (std::size_t i = 0; i < size; ++i) {
-      weight[i] /= sum;
-      slope[i] /= sum;
-    }
-  }
-  std::vector<double> weight, slope;
-};
-
 double signOf(double v) {
   return v > 0.0 ? 1.0 : v < 0.0 ? -1.0 : 0.0;
 }
 
+/// Regression of all records, one after the other.
+struct Rows {
+  std::vector<double> terms;        // TERMS in a row
+  std::vector<double> current;      // [A]
+  std::vector<Eigen::Index> begin;  // row of each record, and the number of rows
+};
+
 void addRows(const AxisMotion& move, const AxisDriveOptions& options, Rows& rows) {
-  const Window window(options.smoothing, move.sample_rate);
-  const std::size_t size = window.weight.size();
-  rows.begin.push_back(rows.current.size());
+  const auto size = static_cast<std::size_t>(std::max(3.0, std::round(options.smoothing * move.sample_rate)));
+  // Symmetric: the periodic window without its zero. The smoothed acceleration is minus its derivative times
+  // the velocity.
+  std::vector<double> window = hannWindow(size + 1), slope(size + 1);
+  const double sum = 0.5 * static_cast<double>(size + 1), angle = units::PI / sum;
+  for (std::size_t i = 0; i <= size; ++i) {
+    window[i] /= sum;
+    slope[i] = -0.5 * std::sin(angle * static_cast<double>(i)) * angle * move.sample_rate / sum;
+  }
   const auto step =
       std::max<std::size_t>(1, static_cast<std::size_t>(options.step * static_cast<double>(size)));
   for (std::size_t at = 0; at + size <= move.velocity.size(); at += step) {
-    std::array<double, TERMS> terms{0.0, 0.0, 0.0, 1.0};
-    double current = 0.0;
+    double acceleration = 0.0, sign = 0.0, velocity = 0.0, current = 0.0;
     for (std::size_t i = 0; i < size; ++i) {
       const double v = move.velocity[at + i];
-      terms[0] += window.slope[i] * v;
-      terms[1] += window.weight[i] * signOf(v);
-      terms[2] += window.weight[i] * v;
-      current += window.weight[i] * move.current[at + i];
+      acceleration += slope[i + 1] * v;
+      sign += window[i + 1] * signOf(v);
+      velocity += window[i + 1] * v;
+      current += window[i + 1] * move.current[at + i];
     }
-    rows.terms.push_back(terms);
+    rows.terms.insert(rows.terms.end(), {acceleration, sign, velocity, 1.0});
     rows.current.push_back(current);
   }
 }
@@ -88,17 +75,14 @@ void check(const std::vector<AxisMotion>& moves, const AxisDriveOptions& options
 }
 
 /// Sum over rows and lags of score times score, with Bartlett's weights, within each record.
-Eigen::Matrix4d scoreCovariance(const Eigen::MatrixX4d& scores, const std::vector<std::size_t>& begin,
-                                std::size_t lags) {
+Eigen::Matrix4d scoreCovariance(const Eigen::MatrixX4d& scores, const std::vector<Eigen::Index>& begin,
+                                Eigen::Index lags) {
   Eigen::Matrix4d sum = scores.transpose() * scores;
-  for (std::size_t r = 0; r < begin.size(); ++r) {
-    const auto first = static_cast<Eigen::Index>(begin[r]);
-    const auto count = static_cast<Eigen::Index>(
-                           r + 1 < begin.size() ? begin[r + 1] : static_cast<std::size_t>(scores.rows())) -
-                       first;
-    for (Eigen::Index lag = 1; lag <= static_cast<Eigen::Index>(lags) && lag < count; ++lag) {
+  for (std::size_t r = 0; r + 1 < begin.size(); ++r) {
+    const Eigen::MatrixX4d record = scores.middleRows(begin[r], begin[r + 1] - begin[r]);
+    for (Eigen::Index lag = 1; lag <= std::min(lags, record.rows() - 1); ++lag) {
       const Eigen::Matrix4d product =
-          scores.middleRows(first + lag, count - lag).transpose() * scores.middleRows(first, count - lag);
+          record.bottomRows(record.rows() - lag).transpose() * record.topRows(record.rows() - lag);
       sum +=
           (1.0 - static_cast<double>(lag) / static_cast<double>(lags + 1)) * (product + product.transpose());
     }
@@ -132,15 +116,16 @@ AxisMotion axisMotion(const Record& record, double sample_rate, char axis) {
 AxisDrive identifyAxisDrive(const std::vector<AxisMotion>& moves, const AxisDriveOptions& options) {
   check(moves, options);
   Rows rows;
-  for (const AxisMotion& move : moves) addRows(move, options, rows);
-  const auto count = static_cast<Eigen::Index>(rows.current.size());
-  Eigen::MatrixX4d terms(count, TERMS);
-  Eigen::VectorXd current(count);
-  for (Eigen::Index i = 0; i < count; ++i) {
-    for (Eigen::Index k = 0; k < TERMS; ++k)
-      terms(i, k) = rows.terms[static_cast<std::size_t>(i)][static_cast<std::size_t>(k)];
-    current[i] = rows.current[static_cast<std::size_t>(i)];
+  for (const AxisMotion& move : moves) {
+    rows.begin.push_back(static_cast<Eigen::Index>(rows.current.size()));
+    addRows(move, options, rows);
   }
+  const auto count = static_cast<Eigen::Index>(rows.current.size());
+  rows.begin.push_back(count);
+  const Eigen::MatrixX4d terms =
+      Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, TERMS, Eigen::RowMajor>>(rows.terms.data(),
+                                                                                      count, TERMS);
+  const Eigen::Map<const Eigen::VectorXd> current(rows.current.data(), count);
   AxisDrive drive;
   drive.largest_acceleration = terms.col(0).cwiseAbs().maxCoeff();
   drive.largest_velocity = terms.col(2).cwiseAbs().maxCoeff();
@@ -165,7 +150,7 @@ AxisDrive identifyAxisDrive(const std::vector<AxisMotion>& moves, const AxisDriv
   const Eigen::Vector4d solution = solver.solve(scaled.transpose() * current);
   const Eigen::VectorXd residual = current - scaled * solution;
   const Eigen::MatrixX4d scores = scaled.array().colwise() * residual.array();
-  const auto lags = static_cast<std::size_t>(std::ceil(options.correlated / options.step));
+  const auto lags = static_cast<Eigen::Index>(std::ceil(options.correlated / options.step));
   const Eigen::Matrix4d covariance = inverse * scoreCovariance(scores, rows.begin, lags) * inverse;
   const auto estimate = [&](Eigen::Index k) {
     return Estimate{solution[k] / scale[k], std::sqrt(std::max(0.0, covariance(k, k))) / scale[k]};
