@@ -7,6 +7,7 @@
 #include <smartmill_msgs/ArmMotion.h>
 #include <boost/function.hpp>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/units.h"
 #include "smartmill_ros/conversions.h"
@@ -65,10 +66,9 @@ std::array<double, 3> MachineDriver::restPosition() const {
     const smartmill_msgs::CncState current = state();
     if (current.header.stamp < now || !current.connected || current.motion) return false;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto name = std::find(current.axes.begin(), current.axes.end(), std::string(1, "XYZ"[axis]));
-      const auto index = static_cast<std::size_t>(name - current.axes.begin());
-      if (index >= current.position.size()) return false;
-      position[axis] = current.position[index];
+      const std::optional<std::size_t> index = controllerAxis(current.axes, axis);
+      if (!index || *index >= current.position.size()) return false;
+      position[axis] = current.position[*index];
     }
     return true;
   };

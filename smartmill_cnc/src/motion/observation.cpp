@@ -1,7 +1,6 @@
 #include "smartmill_cnc/motion/observation.h"
 
-#include <algorithm>
-#include <vector>
+#include "smartmill_core/axis_names.h"
 
 namespace smartmill::cnc {
 namespace {
@@ -19,12 +18,7 @@ std::optional<std::size_t> Observation::axisIndex(int axis) const {
   if (!reading) {
     return std::nullopt;
   }
-  const std::vector<std::string>& axes = state().axes;
-  const auto found = std::find(axes.begin(), axes.end(), std::string(1, static_cast<char>('X' + axis)));
-  if (found == axes.end()) {
-    return std::nullopt;
-  }
-  return static_cast<std::size_t>(found - axes.begin());
+  return controllerAxis(state().axes, static_cast<std::size_t>(axis));
 }
 
 std::string Observation::alarmText() const {

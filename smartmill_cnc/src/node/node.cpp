@@ -8,6 +8,7 @@
 #include <future>
 #include <utility>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/frames.h"
 #include "smartmill_core/names.h"
@@ -248,12 +249,9 @@ void CncNode::publish(const ros::Time& stamp) {
     transform.transform.rotation.w = 1.0;
     double* const components[] = {&transform.transform.translation.x, &transform.transform.translation.y,
                                   &transform.transform.translation.z};
-    for (std::size_t i = 0; i < state.axes.size() && i < state.position.size(); ++i) {
-      for (std::size_t k = 0; k < 3; ++k) {
-        if (state.axes[i] == std::string(1, "XYZ"[k])) {
-          *components[k] = state.position[i];
-        }
-      }
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::optional<std::size_t> axis = controllerAxis(state.axes, k);
+      if (axis && *axis < state.position.size()) *components[k] = state.position[*axis];
     }
     broadcaster_.sendTransform(transform);
   }

@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/model/effect_catalogue.h"
 
 namespace smartmill::discrepancy {
@@ -81,10 +82,9 @@ void NominalFreedom::addModes(const MachineModel& nominal) {
           [of, k](MachineModel& m, double factor) { of(m)[k].gain /= factor; });
     }
   };
-  const char* const AXES[] = {"x", "y", "z"};
   for (std::size_t a = 0; a < 3; ++a) {
     addAxis(
-        std::string("force_sensor.") + AXES[a],
+        std::string("force_sensor.") + AXIS_NAMES[a],
         [a](MachineModel& m) -> std::vector<Mode>& { return m.force_sensor.axis[a].modes; }, false);
   }
   addAxis(

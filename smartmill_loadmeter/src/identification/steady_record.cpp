@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/signal/steady_path.h"
 
 namespace smartmill::loadmeter {
@@ -69,11 +70,8 @@ void SteadyRecord::handle(const CncState& state) {
   }
   if (!on_path) return;
   PathPoint point{state.stamp, {}};
-  const std::array<const char*, 3> names{"X", "Y", "Z"};
-  for (std::size_t a = 0; a < 3; ++a) {
-    const auto axis = std::find(state.axes.begin(), state.axes.end(), names[a]);
-    point.position[a] = state.position[static_cast<std::size_t>(axis - state.axes.begin())];
-  }
+  // onSteadyPath() has found all three.
+  for (std::size_t a = 0; a < 3; ++a) point.position[a] = state.position[*controllerAxis(state.axes, a)];
   // The return to the start may run along the path, and the tool is at rest before the path.
   const bool entered = !on_path_since_;
   if (path_first_ && (progressAlong(*condition_, path_last_->position, point.position) < 0.0 ||

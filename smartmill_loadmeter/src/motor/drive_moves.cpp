@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "smartmill_core/axis_names.h"
+
 namespace smartmill::loadmeter {
 
 DriveMoves::DriveMoves(const MotorParameters& parameters, const std::optional<MachineAxes>& axes,
@@ -21,13 +23,11 @@ void DriveMoves::clear() {
 void DriveMoves::handle(const CncState& state) {
   if (!limits_ || rate_ == 0.0) return;
   const bool gap = state.stamp - last_state_ > options_.largest_gap;
-  const std::array<const char*, 3> names{"X", "Y", "Z"};
   for (std::size_t a = 0; a < 3; ++a) {
-    const auto found = std::find(state.axes.begin(), state.axes.end(), names[a]);
-    const auto at = static_cast<std::size_t>(found - state.axes.begin());
-    if (at >= state.position.size()) return;
+    const std::optional<std::size_t> at = controllerAxis(state.axes, a);
+    if (!at || *at >= state.position.size()) return;
     Axis& axis = axes_[a];
-    const double moved = std::abs(state.position[at] - axis.position);
+    const double moved = std::abs(state.position[*at] - axis.position);
     if (gap) {
       axis.moving = moved > options_.rest_tolerance && last_state_ > 0.0;
       axis.begin = -1.0;  // start not observed
@@ -43,13 +43,12 @@ void DriveMoves::handle(const CncState& state) {
           axis.waiting.push_back(last_[a]);
       }
     }
-    axis.position = state.position[at];
+    axis.position = state.position[*at];
   }
   last_state_ = state.stamp;
 }
 
 void DriveMoves::handle(const SampleBlock& block) {
-  const std::array<const char*, 3> names{"x", "y", "z"};
   if (!limits_ || block.size() == 0) return;
   if (block.first_index != next_ || block.sample_rate != rate_) {
     for (auto& samples : samples_) samples.clear();
@@ -59,7 +58,7 @@ void DriveMoves::handle(const SampleBlock& block) {
   }
   next_ = block.first_index + block.size();
   for (std::size_t a = 0; a < 3; ++a) {
-    const auto found = std::find(block.channels.begin(), block.channels.end(), names[a]);
+    const auto found = std::find(block.channels.begin(), block.channels.end(), AXIS_NAMES[a]);
     if (found == block.channels.end()) continue;
     const auto channel = static_cast<std::size_t>(found - block.channels.begin());
     for (std::size_t i = 0; i < block.size(); ++i) samples_[a].push_back(block.at(i, channel));

@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/io/csv.h"
@@ -17,7 +18,6 @@ namespace smartmill::loadmeter {
 namespace {
 
 constexpr const char* FORMAT = "smartmill-motor-calibration/1";
-const std::array<const char*, 3> AXES{"x", "y", "z"};
 
 /// Table with a text column `cut` and otherwise numbers or empty cells.
 class Table {
@@ -98,7 +98,7 @@ std::vector<StandardCut> readStandardCuts(const std::string& file) {
   for (const Table::Row& row : table.rows()) {
     StandardCut cut;
     cut.name = row.cut;
-    for (std::size_t a = 0; a < 3; ++a) cut.force[a] = row.at(std::string("force_") + AXES[a] + "[N]");
+    for (std::size_t a = 0; a < 3; ++a) cut.force[a] = row.at(std::string("force_") + AXIS_NAMES[a] + "[N]");
     cut.torque = row.at("torque[N m]");
     cuts.push_back(cut);
   }
@@ -127,7 +127,7 @@ std::vector<MachineCurrents> readMachineCurrents(const std::string& file) {
     MachineCurrents c;
     c.name = row.cut;
     c.spindle_speed = units::radPerSecFromRpm(row.at("spindle_speed[rpm]").value_or(0.0));
-    for (std::size_t a = 0; a < 3; ++a) pair(AXES[a], &c.current[a], &c.air[a]);
+    for (std::size_t a = 0; a < 3; ++a) pair(AXIS_NAMES[a], &c.current[a], &c.air[a]);
     pair("spindle", &c.spindle_current, &c.spindle_air);
     if (c.spindle_current && !(c.spindle_speed > 0.0)) {
       throw Error(where + "spindle_speed[rpm]: expected > 0 with a current of the spindle");
@@ -212,7 +212,7 @@ MotorCalibration calibrateMotors(const std::vector<StandardCut>& cuts,
   MotorCalibration result;
   const MatchedCuts matched = match(cuts, currents, &result.notes);
   for (std::size_t a = 0; a < 3; ++a) {
-    result.drive[a] = calibrateDrive(AXES[a], matched.rises[a], matched.forces[a], &result.notes);
+    result.drive[a] = calibrateDrive(AXIS_NAMES[a], matched.rises[a], matched.forces[a], &result.notes);
   }
   if (!matched.spindle.empty()) {
     result.spindle = TorquePowerLaw(matched.spindle, units::rpmFromRadPerSec(base_speed));
@@ -232,7 +232,7 @@ void writeMotorCalibration(const MotorCalibration& calibration, const std::strin
     if (!calibration.drive[a]) continue;
     const DriveCalibration& d = *calibration.drive[a];
     any = true;
-    out << "  " << AXES[a] << ": {newton_per_ampere: " << yamlNumber(d.newton_per_ampere.value, 17)
+    out << "  " << AXIS_NAMES[a] << ": {newton_per_ampere: " << yamlNumber(d.newton_per_ampere.value, 17)
         << ", newton_per_ampere_std: " << yamlNumber(d.newton_per_ampere.std_dev, 17)
         << ", scatter_n: " << yamlNumber(d.scatter, 17) << ", cuts: " << d.cuts << "}\n";
   }
@@ -259,7 +259,7 @@ MotorCalibration readMotorCalibration(const std::string& file) {
   MotorCalibration calibration;
   const StrictYaml drives = yaml.map("drives");
   for (std::size_t a = 0; a < 3; ++a) {
-    const auto map = drives.optionalMap(AXES[a]);
+    const auto map = drives.optionalMap(AXIS_NAMES[a]);
     if (!map) continue;
     DriveCalibration d;
     d.newton_per_ampere.value = map->number("newton_per_ampere");
