@@ -16,6 +16,7 @@ from tutorials_test import TUTORIALS, free_port
 
 ROS_COMMANDS = ("roslaunch", "rosrun", "rostopic")
 TIME_LIMIT = 120.0  # [s] of one command; only a fault reaches it
+INTERRUPT_LIMIT = 15.0  # [s] from the interrupt to the kill, as in roslaunch: rospy can hang when interrupted while it publishes
 
 
 def run_graph_tutorial(test, name):
@@ -29,7 +30,11 @@ def run_graph_tutorial(test, name):
     def stop():
         for process in reversed(running):
             process.send_signal(signal.SIGINT)
-            process.wait(TIME_LIMIT)
+            try:
+                process.wait(INTERRUPT_LIMIT)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
         running.clear()
 
     test.addCleanup(stop)
