@@ -28,9 +28,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int POLL_PERIOD = 2;  // [ms]
-constexpr std::size_t MAX_CLIENTS = 8, MAX_QUEUED = 8;
-
 /// Observation of the process that permits motion (linuxcnc_stream).
 struct Guard {
   ProcessWatch process;
@@ -48,7 +45,7 @@ struct Client {
 class Gateway {
  public:
   explicit Gateway(const std::string& folder)
-      : link_(folder + "/mill.nml", folder + "/sub/piece.ngc", [this] { receiveAll(); }),
+      : link_(folder + "/mill.nml", folder + "/sub/piece.ngc", options_, [this] { receiveAll(); }),
         listener_(listenAt(folder + "/" + GATEWAY_SOCKET)) {}
 
   void step() {
@@ -56,10 +53,10 @@ class Gateway {
     for (const Client& client : clients_) {
       entries.push_back({client.connection.descriptor(), POLLIN, 0});
     }
-    ::poll(entries.data(), entries.size(), POLL_PERIOD);
+    ::poll(entries.data(), entries.size(), options_.poll_period);
     link_.poll();
     if (std::optional<LocalConnection> connection = acceptFrom(listener_)) {
-      if (clients_.size() < MAX_CLIENTS) {
+      if (clients_.size() < options_.max_clients) {
         clients_.push_back({std::move(*connection), false, nullptr, {}});
       }
     }
@@ -95,7 +92,8 @@ class Gateway {
         }
         if (std::holds_alternative<StatusRequest>(received->message)) {
           client.connection.send(link_.status(), received->sequence);
-        } else if (std::holds_alternative<Command>(received->message) && client.waiting.size() < MAX_QUEUED) {
+        } else if (std::holds_alternative<Command>(received->message) &&
+                   client.waiting.size() < options_.max_commands) {
           client.waiting.push_back(std::move(*received));
         }
       }
@@ -148,6 +146,7 @@ class Gateway {
     }
   }
 
+  const GatewayOptions options_;
   ControllerLink link_;
   LocalDescriptor listener_;
   std::list<Client> clients_;
