@@ -29,7 +29,7 @@ class BridgeTest : public ::testing::Test {
   void startServer(std::uint16_t port) {
     focas::ServerOptions options;
     options.port = port;
-    server_ = std::make_unique<focas::Server>(options, machine_);
+    server_ = std::make_unique<focas::Server>(options, machine_.calls());
     port_ = server_->port();
   }
 

@@ -15,7 +15,12 @@
 namespace smartmill::cnc {
 
 /// A minimal simulated machine: runs the dialect at constant speeds in time steps of the test.
-class TestMachine : public focas::ControllerInterface {
+class TestMachine : public focas::StateInterface,
+                    public focas::AxesInterface,
+                    public focas::MacroInterface,
+                    public focas::DataInterface,
+                    public focas::ProgramsInterface,
+                    public focas::DncInterface {
  public:
   focas::SysInfo info;
   focas::Status state;
@@ -32,6 +37,7 @@ class TestMachine : public focas::ControllerInterface {
   std::map<int, int> data_table;  ///< of the PMC
 
   TestMachine() { state.aut = focas::AUT_REMOTE; }
+  focas::ControllerInterface calls() { return {*this, *this, *this, *this, *this, *this}; }
 
   template <class F>
   void change(F&& f) {

@@ -105,7 +105,7 @@ TEST(Program, ControlFlowAndUnknownWordsAreRefusedByName) {
     Machine m;
     m.start(block + "\n");
     m.run(DT);
-    EXPECT_EQ(m.controller.alarmBits(), 1u << ALARM_PS) << block << ": " << m.alarmText();
+    EXPECT_EQ(m.calls.state.alarmBits(), 1u << ALARM_PS) << block << ": " << m.alarmText();
   }
 }
 
@@ -114,21 +114,21 @@ TEST(Panel, FeedHoldStopsOnThePathAndCycleStartResumes) {
   m.start("G3 X0 Y40 I0 J20 F3000\nG4 X1.\n#100=1\n");
   m.run(0.5);
   m.controller.feedHold();
-  EXPECT_EQ(m.controller.status().run, focas::RUN_HOLD);
+  EXPECT_EQ(m.calls.state.status().run, focas::RUN_HOLD);
   m.run(2.0);
   const std::array<double, 3> held = m.controller.motion().position;
-  EXPECT_EQ(m.controller.actualFeed(), 0.0);
+  EXPECT_EQ(m.calls.axes.actualFeed(), 0.0);
   EXPECT_NEAR(std::hypot(held[0], held[1] - 0.02), 0.02, 1e-12);
-  EXPECT_GT(std::abs(m.controller.distanceToGo()[1]), 1.0);
+  EXPECT_GT(std::abs(m.calls.axes.distanceToGo()[1]), 1.0);
   m.run(1.0);
   EXPECT_EQ(m.controller.motion().position, held);
-  EXPECT_EQ(m.controller.cycleStart(), focas::EW_OK);
+  EXPECT_EQ(m.calls.programs.cycleStart(), focas::EW_OK);
   m.run(1.3);  // 62.8 mm at 50 mm/s
-  EXPECT_EQ(m.controller.status().motion, focas::MOTION_DWELL);
+  EXPECT_EQ(m.calls.state.status().motion, focas::MOTION_DWELL);
   m.controller.feedHold();
   m.run(5.0);
   EXPECT_FALSE(m.macro(100)) << "the dwell waits too";
-  EXPECT_EQ(m.controller.cycleStart(), focas::EW_OK);
+  EXPECT_EQ(m.calls.programs.cycleStart(), focas::EW_OK);
   m.runToEnd();
   EXPECT_EQ(m.macro(100), 1.0);
   expectAt(m, mm(0, 40, 0), "end");
@@ -138,38 +138,38 @@ TEST(Panel, FeedHoldStopsOnThePathAndCycleStartResumes) {
   m.controller.feedHold();
   m.run(0.5);
   const double x = m.controller.motion().position[0];
-  m.controller.reset();
+  m.calls.programs.reset();
   m.run(1.0);
   EXPECT_EQ(m.controller.motion().position[0], x);
-  EXPECT_EQ(m.controller.status().run, focas::RUN_RESET);
+  EXPECT_EQ(m.calls.state.status().run, focas::RUN_RESET);
 }
 
 TEST(Panel, OverridesActAtOnce) {
   Machine m;
   m.start("S1000 M3\nG1 X200 F3000\n");
   m.run(1.0);
-  EXPECT_NEAR(m.controller.actualFeed(), 3000.0, 1e-6);
+  EXPECT_NEAR(m.calls.axes.actualFeed(), 3000.0, 1e-6);
   m.controller.setOverrides(0.5, 1.0, 0.8);
   m.run(1.0);
-  EXPECT_NEAR(m.controller.actualFeed(), 1500.0, 1e-6);
-  EXPECT_NEAR(m.controller.spindleSpeed()[0], 800.0, 1e-6);
+  EXPECT_NEAR(m.calls.axes.actualFeed(), 1500.0, 1e-6);
+  EXPECT_NEAR(m.calls.axes.spindleSpeed()[0], 800.0, 1e-6);
   m.controller.setOverrides(0.0, 1.0, 1.0);
   m.run(1.0);
-  EXPECT_EQ(m.controller.actualFeed(), 0.0);
-  EXPECT_EQ(m.controller.status().run, focas::RUN_START);
+  EXPECT_EQ(m.calls.axes.actualFeed(), 0.0);
+  EXPECT_EQ(m.calls.state.status().run, focas::RUN_START);
   m.controller.setOverrides(1.0, 1.0, 1.0);
   // External override in the data table: multiplies the panel's; 0: no effect.
-  EXPECT_EQ(m.controller.writePmc(focas::PmcArea::d, 500, {40, 90}), focas::EW_OK);
+  EXPECT_EQ(m.calls.data.writePmc(focas::PmcArea::d, 500, {40, 90}), focas::EW_OK);
   m.run(0.5);
-  EXPECT_NEAR(m.controller.actualFeed(), 1200.0, 1e-6);
-  EXPECT_NEAR(m.controller.spindleSpeed()[0], 900.0, 1e-6);
+  EXPECT_NEAR(m.calls.axes.actualFeed(), 1200.0, 1e-6);
+  EXPECT_NEAR(m.calls.axes.spindleSpeed()[0], 900.0, 1e-6);
   m.controller.setOverrides(0.5, 1.0, 1.0);
   m.run(0.5);
-  EXPECT_NEAR(m.controller.actualFeed(), 600.0, 1e-6);
+  EXPECT_NEAR(m.calls.axes.actualFeed(), 600.0, 1e-6);
   m.controller.setOverrides(1.0, 1.0, 1.0);
-  EXPECT_EQ(m.controller.writePmc(focas::PmcArea::d, 500, {0, 0}), focas::EW_OK);
+  EXPECT_EQ(m.calls.data.writePmc(focas::PmcArea::d, 500, {0, 0}), focas::EW_OK);
   m.run(0.5);
-  EXPECT_NEAR(m.controller.spindleSpeed()[0], 1000.0, 1e-6);
+  EXPECT_NEAR(m.calls.axes.spindleSpeed()[0], 1000.0, 1e-6);
   m.runToEnd();
   expectAt(m, mm(200, 0, 0), "end");
 }
@@ -179,8 +179,8 @@ TEST(Panel, M0WaitsForCycleStart) {
   m.start("G91 G0 X1\nM0\nX1\n");
   m.run(1.0);
   expectAt(m, mm(1, 0, 0), "before M0");
-  EXPECT_EQ(m.controller.status().run, focas::RUN_STOP);
-  EXPECT_EQ(m.controller.cycleStart(), focas::EW_OK);
+  EXPECT_EQ(m.calls.state.status().run, focas::RUN_STOP);
+  EXPECT_EQ(m.calls.programs.cycleStart(), focas::EW_OK);
   m.run(1.0);
   expectAt(m, mm(2, 0, 0), "after M0");
 }
@@ -190,7 +190,7 @@ TEST(Panel, BackwardsAndOrientationByM19) {
   m.start("S600 M4\nG4 X1.\n");
   m.run(0.9);
   EXPECT_NEAR(m.controller.motion().spindle_speed, -600.0 * RPM, 1e-9);
-  EXPECT_NEAR(m.controller.spindleSpeed()[0], 600.0, 1e-9);
+  EXPECT_NEAR(m.calls.axes.spindleSpeed()[0], 600.0, 1e-9);
   m.send("M19\n#100=1\n");
   m.run(3.0);
   EXPECT_EQ(m.macro(100), 1.0);
@@ -219,36 +219,36 @@ TEST(Spindle, LoadSlowsTheRampAndStallsBeyondTheDrivesTorque) {
 TEST(Memory, ProgramsAreStoredRunAndFetched) {
   Machine m;
   m.controller.setMode(focas::AUT_MEM);
-  EXPECT_EQ(m.controller.storePrograms("\nO1234(SLOT 1)\nG91 G0 X1\nM30\n%"), focas::EW_OK);
-  EXPECT_EQ(m.controller.storePrograms("G0 X1\n%"), focas::EW_DATA);
-  EXPECT_EQ(m.controller.storePrograms("O7\n" + std::string(600000, ' ') + "\n%"), focas::EW_OVRFLOW);
+  EXPECT_EQ(m.calls.programs.storePrograms("\nO1234(SLOT 1)\nG91 G0 X1\nM30\n%"), focas::EW_OK);
+  EXPECT_EQ(m.calls.programs.storePrograms("G0 X1\n%"), focas::EW_DATA);
+  EXPECT_EQ(m.calls.programs.storePrograms("O7\n" + std::string(600000, ' ') + "\n%"), focas::EW_OVRFLOW);
   std::string text;
-  EXPECT_EQ(m.controller.fetchPrograms(1234, 1234, &text), focas::EW_OK);
+  EXPECT_EQ(m.calls.programs.fetchPrograms(1234, 1234, &text), focas::EW_OK);
   EXPECT_EQ(text, "%\nO1234(SLOT 1)\nG91 G0 X1\nM30\n%\n");
-  EXPECT_EQ(m.controller.fetchPrograms(9, 9, &text), focas::EW_DATA);
-  EXPECT_EQ(m.controller.selectProgram(9), focas::EW_DATA);
-  EXPECT_EQ(m.controller.selectProgram(1234), focas::EW_OK);
-  EXPECT_EQ(m.controller.programPath(), "//CNC_MEM/USER/PATH1/O1234");
-  EXPECT_EQ(m.controller.cycleStart(), focas::EW_OK);
+  EXPECT_EQ(m.calls.programs.fetchPrograms(9, 9, &text), focas::EW_DATA);
+  EXPECT_EQ(m.calls.programs.selectProgram(9), focas::EW_DATA);
+  EXPECT_EQ(m.calls.programs.selectProgram(1234), focas::EW_OK);
+  EXPECT_EQ(m.calls.state.programPath(), "//CNC_MEM/USER/PATH1/O1234");
+  EXPECT_EQ(m.calls.programs.cycleStart(), focas::EW_OK);
   m.run(DT);
-  EXPECT_EQ(m.controller.runningProgram(), 1234);
-  EXPECT_EQ(m.controller.deleteProgram(1234), focas::EW_BUSY);
-  EXPECT_EQ(m.controller.storePrograms("O1234\nM30\n%"), focas::EW_BUSY);
+  EXPECT_EQ(m.calls.state.runningProgram(), 1234);
+  EXPECT_EQ(m.calls.programs.deleteProgram(1234), focas::EW_BUSY);
+  EXPECT_EQ(m.calls.programs.storePrograms("O1234\nM30\n%"), focas::EW_BUSY);
   m.runToEnd();
   expectAt(m, mm(1, 0, 0), "run from memory");
-  EXPECT_EQ(m.controller.cycleStart(), focas::EW_OK);
+  EXPECT_EQ(m.calls.programs.cycleStart(), focas::EW_OK);
   m.runToEnd();
   expectAt(m, mm(2, 0, 0), "run again from its first block");
-  EXPECT_EQ(m.controller.deleteProgram(1234), focas::EW_OK);
-  EXPECT_EQ(m.controller.programs().size(), 1u);  // the resident one
-  EXPECT_EQ(m.controller.cycleStart(), focas::EW_DATA);
+  EXPECT_EQ(m.calls.programs.deleteProgram(1234), focas::EW_OK);
+  EXPECT_EQ(m.calls.programs.programs().size(), 1u);  // the resident one
+  EXPECT_EQ(m.calls.programs.cycleStart(), focas::EW_DATA);
 }
 
 TEST(Memory, PmcShowsTheSignalsOfTheConnectionManual) {
   Machine m;
   const auto byte = [&](focas::PmcArea area, int address) {
     focas::Bytes bytes;
-    EXPECT_EQ(m.controller.readPmc(area, address, address, &bytes), focas::EW_OK);
+    EXPECT_EQ(m.calls.data.readPmc(area, address, address, &bytes), focas::EW_OK);
     return static_cast<int>(bytes.at(0));
   };
   EXPECT_EQ(byte(focas::PmcArea::f, 3), 0x10);  // MRMT
@@ -258,14 +258,14 @@ TEST(Memory, PmcShowsTheSignalsOfTheConnectionManual) {
   EXPECT_EQ(byte(focas::PmcArea::f, 40) + 256 * byte(focas::PmcArea::f, 41), 1500);
   EXPECT_EQ(byte(focas::PmcArea::f, 45), 0x08);         // SAR
   EXPECT_EQ(byte(focas::PmcArea::g, 12), 0xff & ~100);  // *FV
-  EXPECT_EQ(m.controller.writePmc(focas::PmcArea::g, 12, {0}), focas::EW_OK);
+  EXPECT_EQ(m.calls.data.writePmc(focas::PmcArea::g, 12, {0}), focas::EW_OK);
   EXPECT_EQ(byte(focas::PmcArea::g, 12), 0xff & ~100) << "overwritten by the PMC program";
-  EXPECT_EQ(m.controller.writePmc(focas::PmcArea::d, 100, {1, 2}), focas::EW_OK);
+  EXPECT_EQ(m.calls.data.writePmc(focas::PmcArea::d, 100, {1, 2}), focas::EW_OK);
   EXPECT_EQ(byte(focas::PmcArea::d, 101), 2);
   m.controller.emergency(true);
   EXPECT_EQ(byte(focas::PmcArea::x, 8) & 0x10, 0);
   focas::Bytes bytes;
-  EXPECT_EQ(m.controller.readPmc(focas::PmcArea::d, 9999, 10000, &bytes), focas::EW_NUMBER);
+  EXPECT_EQ(m.calls.data.readPmc(focas::PmcArea::d, 9999, 10000, &bytes), focas::EW_NUMBER);
 }
 
 TEST(Memory, ClockIsSetAndRuns) {
@@ -273,25 +273,25 @@ TEST(Memory, ClockIsSetAndRuns) {
   std::int64_t now = 1000000000;  // 2001-09-09 01:46:40
   options.wall_clock = [&] { return now; };
   Machine m(options);
-  EXPECT_EQ(m.controller.dateTime()->year, 2001);
-  EXPECT_EQ(m.controller.dateTime()->second, 40);
-  focas::DateTime at = *m.controller.dateTime();
+  EXPECT_EQ(m.calls.data.dateTime()->year, 2001);
+  EXPECT_EQ(m.calls.data.dateTime()->second, 40);
+  focas::DateTime at = *m.calls.data.dateTime();
   at.hour = 23;
-  EXPECT_EQ(m.controller.setDateTime(at), focas::EW_OK);
+  EXPECT_EQ(m.calls.data.setDateTime(at), focas::EW_OK);
   now += 3600;
-  EXPECT_EQ(m.controller.dateTime()->day, 10);
-  EXPECT_EQ(m.controller.dateTime()->hour, 0);
+  EXPECT_EQ(m.calls.data.dateTime()->day, 10);
+  EXPECT_EQ(m.calls.data.dateTime()->hour, 0);
 }
 
 TEST(Memory, ParametersFollowTheMachine) {
   Machine m;
-  EXPECT_EQ(m.controller.servoLoopGain(), m.controller.parameters(1825, 1825).at(0).values);
-  const std::vector<focas::NumberedValue> limits = m.controller.parameters(1320, 1321);
+  EXPECT_EQ(m.calls.axes.servoLoopGain(), m.calls.data.parameters(1825, 1825).at(0).values);
+  const std::vector<focas::NumberedValue> limits = m.calls.data.parameters(1320, 1321);
   ASSERT_EQ(limits.size(), 2u);
   EXPECT_EQ(limits[0].values, (std::vector<double>{250.0, 200.0, 0.0}));
   EXPECT_EQ(limits[1].values, (std::vector<double>{-250.0, -200.0, -300.0}));
-  EXPECT_TRUE(m.controller.parameters(9999, 9999).empty());
-  EXPECT_EQ(m.controller.diagnoses(445, 445).size(), 1u);
+  EXPECT_TRUE(m.calls.data.parameters(9999, 9999).empty());
+  EXPECT_EQ(m.calls.data.diagnoses(445, 445).size(), 1u);
 }
 
 TEST(Load, PolledLoadsAreRoundedToTheControllersStep) {
@@ -300,7 +300,7 @@ TEST(Load, PolledLoadsAreRoundedToTheControllersStep) {
   Machine m(options);
   for (const double volt : {0.0, 1e-4, 2e-4, 0.12345, 3.1}) {
     m.controller.setSpindleLoad(100.0 * volt / 8.0);
-    const double read = m.controller.spindleLoad()[0] * 8.0 / 100.0;
+    const double read = m.calls.axes.spindleLoad()[0] * 8.0 / 100.0;
     EXPECT_NEAR(read, 3.0e-4 * std::round(volt / 3.0e-4), 1e-12);
   }
 }
@@ -331,7 +331,7 @@ TEST(Collision, CollisionWithAnObstacleStopsWithAnAlarm) {
     m.runToEnd();
     EXPECT_EQ(m.alarmText(), c.met != nullptr ? std::string("TOOL MET ") + c.met : "") << c.text;
     if (c.met != nullptr) {
-      EXPECT_EQ(m.controller.dncAbort(), focas::EW_ALARM);
+      EXPECT_EQ(m.calls.dnc.dncAbort(), focas::EW_ALARM);
       m.run(1.0);
       EXPECT_EQ(m.controller.motion().velocity, (std::array<double, 3>{0, 0, 0}));
     }
@@ -369,7 +369,7 @@ TEST(MotionWatch, FaultOfAnAxisStopsTheMachine) {
   m.start("G91 G1 X10 F6000\nZ-100\n");
   m.run(5.0);
   EXPECT_EQ(m.alarmText(), "SERVO ALARM: Z AXIS");
-  EXPECT_EQ(m.controller.alarmBits(), 1U << 6);
+  EXPECT_EQ(m.calls.state.alarmBits(), 1U << 6);
   // 0.1 m/s: at most one period of the check beyond the limit, and 2.5 mm of braking at 2 m/s2.
   EXPECT_NEAR(m.controller.motion().position[2], -0.0525, 0.1 * 3.0 * DT);
   EXPECT_EQ(m.controller.motion().velocity, (std::array<double, 3>{0, 0, 0}));

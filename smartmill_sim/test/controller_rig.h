@@ -30,9 +30,9 @@ inline ControllerOptions testOptions() {
 struct Machine {
   explicit Machine(const ControllerOptions& options = testOptions()) : controller(options) {}
 
-  void send(const std::string& text) { ASSERT_EQ(controller.dncData(text.data(), text.size()), text.size()); }
+  void send(const std::string& text) { ASSERT_EQ(calls.dnc.dncData(text.data(), text.size()), text.size()); }
   void start(const std::string& text) {
-    ASSERT_EQ(controller.dncStart(), focas::EW_OK);
+    ASSERT_EQ(calls.dnc.dncStart(), focas::EW_OK);
     send(text);
   }
   const std::vector<MotionState>& run(double seconds, double dt = DT) {
@@ -41,7 +41,7 @@ struct Machine {
   }
   std::optional<double> macro(int number) const {
     std::optional<double> value;
-    EXPECT_EQ(controller.readMacro(number, &value), focas::EW_OK);
+    EXPECT_EQ(calls.macros.readMacro(number, &value), focas::EW_OK);
     return value;
   }
   /// Runs until the program ends. @return [s] time, to one step
@@ -49,7 +49,7 @@ struct Machine {
     for (double time = 0.0; time < most;) {
       run(dt, dt);
       time += dt;
-      if (controller.status().run != focas::RUN_START) {
+      if (calls.state.status().run != focas::RUN_START) {
         return time;
       }
     }
@@ -57,11 +57,12 @@ struct Machine {
     return most;
   }
   std::string alarmText() const {
-    const auto alarms = controller.alarmMessages();
+    const auto alarms = calls.state.alarmMessages();
     return alarms.empty() ? "" : alarms.front().text;
   }
 
   Controller controller;
+  const focas::ControllerInterface calls = controller.calls();
   std::vector<MotionState> states;
 };
 

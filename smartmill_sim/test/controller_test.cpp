@@ -28,14 +28,14 @@ TEST(Axes, LongMoveTakesDistanceOverFeedPlusFeedOverAcceleration) {
   EXPECT_NEAR(m.states.back().position[0], 0.6 * distance, ROUND);
   EXPECT_NEAR(m.states.back().position[1], 0.8 * distance, ROUND);
   EXPECT_NEAR(m.states.back().velocity[0], 0.06, ROUND);
-  EXPECT_NEAR(m.controller.actualFeed(), 6000.0, 1e-8);
-  EXPECT_NEAR(m.controller.distanceToGo()[0], 60.0 - 600.0 * distance, 1e-9);
-  EXPECT_EQ(m.controller.distanceToGo()[2], 0.0);
-  EXPECT_EQ(m.controller.status().motion, focas::MOTION_MOVES);
+  EXPECT_NEAR(m.calls.axes.actualFeed(), 6000.0, 1e-8);
+  EXPECT_NEAR(m.calls.axes.distanceToGo()[0], 60.0 - 600.0 * distance, 1e-9);
+  EXPECT_EQ(m.calls.axes.distanceToGo()[2], 0.0);
+  EXPECT_EQ(m.calls.state.status().motion, focas::MOTION_MOVES);
   EXPECT_NEAR(0.5 + m.runToEnd(1e-5), 1.05, 1.1e-5);
   EXPECT_EQ(m.controller.motion().position, (std::array<double, 3>{60.0 * 1e-3, 80.0 * 1e-3, 0.0}));
   EXPECT_EQ(m.controller.motion().velocity, (std::array<double, 3>{0.0, 0.0, 0.0}));
-  EXPECT_EQ(m.controller.status().motion, focas::MOTION_NONE);
+  EXPECT_EQ(m.calls.state.status().motion, focas::MOTION_NONE);
 }
 
 TEST(Axes, ShortMoveHasATriangularProfile) {
@@ -69,8 +69,8 @@ TEST(Axes, RapidRelativeAndWorkOffset) {
   options.work_offset = {0.01, -0.02, -0.1};
   options.axes.home = {0.05, 0.0, -0.03};
   Machine m(options);
-  EXPECT_EQ(m.controller.machinePosition(), (std::vector<double>{50.0, 0.0, -30.0}));
-  EXPECT_NEAR(m.controller.absolutePosition()[2], 70.0, 1e-9);
+  EXPECT_EQ(m.calls.axes.machinePosition(), (std::vector<double>{50.0, 0.0, -30.0}));
+  EXPECT_NEAR(m.calls.axes.absolutePosition()[2], 70.0, 1e-9);
   m.start("N10 G0 X0\n");
   const double distance = 0.04;  // from 50 to 10 mm, triangle below 0.5^2 / 2 = 0.125 m
   EXPECT_NEAR(m.runToEnd(1e-5), 2.0 * std::sqrt(distance / 2.0), 1.1e-5);
@@ -79,8 +79,8 @@ TEST(Axes, RapidRelativeAndWorkOffset) {
   EXPECT_NEAR(m.controller.motion().position[0], 0.01, ROUND);
   EXPECT_NEAR(m.controller.motion().position[1], -0.01, ROUND);
   EXPECT_NEAR(m.controller.motion().position[2], -0.029, ROUND);
-  EXPECT_EQ(m.controller.sequenceNumber(), 10);
-  EXPECT_EQ(m.controller.blockCount(), 4);
+  EXPECT_EQ(m.calls.state.sequenceNumber(), 10);
+  EXPECT_EQ(m.calls.state.blockCount(), 4);
 }
 
 TEST(SpindleDrive, RampAndAngleInClosedForm) {
@@ -94,8 +94,8 @@ TEST(SpindleDrive, RampAndAngleInClosedForm) {
   EXPECT_EQ(m.states.back().spindle_speed, speed);
   const double angle = speed * (1.5 - 0.5 * ramp);
   EXPECT_NEAR(m.states.back().spindle_angle, std::fmod(angle, units::TWO_PI), 1e-9);
-  EXPECT_NEAR(m.controller.spindleSpeed()[0], 3000.0, 1e-9);
-  EXPECT_EQ(m.controller.status().motion, focas::MOTION_DWELL);
+  EXPECT_NEAR(m.calls.axes.spindleSpeed()[0], 3000.0, 1e-9);
+  EXPECT_EQ(m.calls.state.status().motion, focas::MOTION_DWELL);
 }
 
 TEST(SpindleDrive, AngleDoesNotDriftInAMillionSteps) {
@@ -155,7 +155,7 @@ TEST(SpindleDrive, SpeedIsLimitedAndProgramEndStops) {
   Machine m;
   m.start("S30000 M3\nG4 X5\nM30\n#100=1\n");
   m.run(4.9);
-  EXPECT_NEAR(m.controller.spindleSpeed()[0], 20000.0, 1e-9);
+  EXPECT_NEAR(m.calls.axes.spindleSpeed()[0], 20000.0, 1e-9);
   m.runToEnd();
   EXPECT_EQ(m.states.back().spindle_speed, 0.0);
   EXPECT_EQ(m.macro(100), 1.0);
@@ -168,27 +168,27 @@ TEST(Session, BufferIsBoundedAndEmptiesAsBlocksRun) {
   ControllerOptions options = testOptions();
   options.buffer_size = 32;
   Machine m(options);
-  ASSERT_EQ(m.controller.dncStart(), focas::EW_OK);
+  ASSERT_EQ(m.calls.dnc.dncStart(), focas::EW_OK);
   const std::string text = "G1 F600 X1\nX2\nX3\nX4\nX5\nX6\nX7\nX8\n\n\nX9\n#100=9\n";
-  std::size_t sent = m.controller.dncData(text.data(), text.size());
+  std::size_t sent = m.calls.dnc.dncData(text.data(), text.size());
   EXPECT_EQ(sent, 32u);
-  EXPECT_EQ(m.controller.dncData(text.data() + sent, text.size() - sent), 0u);
+  EXPECT_EQ(m.calls.dnc.dncData(text.data() + sent, text.size() - sent), 0u);
   m.run(0.01);  // the first block runs and is no longer in the buffer
-  const std::size_t more = m.controller.dncData(text.data() + sent, text.size() - sent);
+  const std::size_t more = m.calls.dnc.dncData(text.data() + sent, text.size() - sent);
   EXPECT_EQ(more, 11u);
   for (sent += more; sent < text.size(); m.run(0.01)) {
-    sent += m.controller.dncData(text.data() + sent, text.size() - sent);
+    sent += m.calls.dnc.dncData(text.data() + sent, text.size() - sent);
   }
-  EXPECT_EQ(m.controller.dncEnd(), focas::EW_OK);
+  EXPECT_EQ(m.calls.dnc.dncEnd(), focas::EW_OK);
   m.runToEnd();
   EXPECT_EQ(m.macro(100), 9.0);
   EXPECT_EQ(m.controller.motion().position[0], 9.0 * 1e-3);
 
-  ASSERT_EQ(m.controller.dncStart(), focas::EW_OK);
+  ASSERT_EQ(m.calls.dnc.dncStart(), focas::EW_OK);
   const std::string endless(40, '1');
-  EXPECT_EQ(m.controller.dncData(endless.data(), endless.size()), 32u);
+  EXPECT_EQ(m.calls.dnc.dncData(endless.data(), endless.size()), 32u);
   m.run(DT);
-  EXPECT_EQ(m.controller.dncAbort(), focas::EW_ALARM) << "a block longer than the buffer";
+  EXPECT_EQ(m.calls.dnc.dncAbort(), focas::EW_ALARM) << "a block longer than the buffer";
 }
 
 TEST(Session, MarkerIsSetAfterEveryBlockBeforeIt) {
@@ -204,23 +204,23 @@ TEST(Session, MarkerIsSetAfterEveryBlockBeforeIt) {
   }
   EXPECT_TRUE(marker_set);
   EXPECT_EQ(m.controller.motion().position[0], 0.01);
-  EXPECT_EQ(m.controller.executingBlock(), "");
-  EXPECT_EQ(m.controller.status().run, focas::RUN_STOP);
+  EXPECT_EQ(m.calls.state.executingBlock(), "");
+  EXPECT_EQ(m.calls.state.status().run, focas::RUN_STOP);
 }
 
 TEST(Session, LastBlockNeedsNoLineEndAndEndRunsTheRest) {
   Machine m;
   m.start("(first) g1 x2 f60\n#100=3");
   m.run(0.1);
-  EXPECT_EQ(m.controller.executingBlock(), "(first) g1 x2 f60");
-  EXPECT_EQ(m.controller.dncEnd(), focas::EW_OK);
-  EXPECT_EQ(m.controller.dncEnd(), focas::EW_FUNC);
-  EXPECT_EQ(m.controller.dncStart(), focas::EW_BUSY) << "blocks still run";
+  EXPECT_EQ(m.calls.state.executingBlock(), "(first) g1 x2 f60");
+  EXPECT_EQ(m.calls.dnc.dncEnd(), focas::EW_OK);
+  EXPECT_EQ(m.calls.dnc.dncEnd(), focas::EW_FUNC);
+  EXPECT_EQ(m.calls.dnc.dncStart(), focas::EW_BUSY) << "blocks still run";
   m.runToEnd();
   EXPECT_EQ(m.macro(100), 3.0);
-  EXPECT_EQ(m.controller.status().run, focas::RUN_RESET);
-  EXPECT_EQ(m.controller.dncStart(), focas::EW_OK);
-  EXPECT_EQ(m.controller.dncStart(), focas::EW_BUSY);
+  EXPECT_EQ(m.calls.state.status().run, focas::RUN_RESET);
+  EXPECT_EQ(m.calls.dnc.dncStart(), focas::EW_OK);
+  EXPECT_EQ(m.calls.dnc.dncStart(), focas::EW_BUSY);
 }
 
 TEST(Session, ResetBrakesDropsTheProgramAndIsReportedOnce) {
@@ -228,15 +228,15 @@ TEST(Session, ResetBrakesDropsTheProgramAndIsReportedOnce) {
   m.start("S600 M3\nG1 X100 F6000\n#100=1\n");
   m.run(0.5);
   const double x = m.states.back().position[0];
-  EXPECT_EQ(m.controller.reset(), focas::EW_OK);
-  EXPECT_EQ(m.controller.dncAbort(), focas::EW_RESET);
-  EXPECT_EQ(m.controller.dncAbort(), focas::EW_OK);
-  EXPECT_EQ(m.controller.dncStart(), focas::EW_BUSY) << "the axes still brake";
+  EXPECT_EQ(m.calls.programs.reset(), focas::EW_OK);
+  EXPECT_EQ(m.calls.dnc.dncAbort(), focas::EW_RESET);
+  EXPECT_EQ(m.calls.dnc.dncAbort(), focas::EW_OK);
+  EXPECT_EQ(m.calls.dnc.dncStart(), focas::EW_BUSY) << "the axes still brake";
   m.run(1.0);
   EXPECT_NEAR(m.states.back().position[0], x + 0.1 * 0.1 / (2.0 * 2.0), ROUND);
   EXPECT_EQ(m.states.back().spindle_speed, 0.0);
   EXPECT_FALSE(m.macro(100));
-  EXPECT_EQ(m.controller.distanceToGo(), (std::vector<double>{0.0, 0.0, 0.0}));
+  EXPECT_EQ(m.calls.axes.distanceToGo(), (std::vector<double>{0.0, 0.0, 0.0}));
   m.start("G91 G1 X1 F600\n");
   m.runToEnd();
   EXPECT_NEAR(m.controller.motion().position[0], x + 0.0025 + 0.001, ROUND);
@@ -246,24 +246,24 @@ TEST(Session, CancelStopsWithoutAnError) {
   Machine m;
   m.start("G1 X100 F6000\n");
   m.run(0.5);
-  m.controller.dncCancel(focas::DNC_CANCEL);
-  EXPECT_EQ(m.controller.dncAbort(), focas::EW_OK);
+  m.calls.dnc.dncCancel(focas::DNC_CANCEL);
+  EXPECT_EQ(m.calls.dnc.dncAbort(), focas::EW_OK);
   m.run(0.1);
   EXPECT_EQ(m.controller.motion().velocity[0], 0.0);
   EXPECT_LT(m.controller.motion().position[0], 0.06);
-  EXPECT_EQ(m.controller.status().run, focas::RUN_RESET);
+  EXPECT_EQ(m.calls.state.status().run, focas::RUN_RESET);
 }
 
 TEST(Panel, OnlyDncModeRunsAndLeavingItStops) {
   Machine m;
   m.controller.setMode(focas::AUT_MDI);
-  EXPECT_EQ(m.controller.status().aut, focas::AUT_MDI);
-  EXPECT_EQ(m.controller.dncStart(), focas::EW_MODE);
+  EXPECT_EQ(m.calls.state.status().aut, focas::AUT_MDI);
+  EXPECT_EQ(m.calls.dnc.dncStart(), focas::EW_MODE);
   m.controller.setMode(focas::AUT_REMOTE);
   m.start("G1 X100 F600\n");
   m.run(0.5);
   m.controller.setMode(focas::AUT_JOG);
-  EXPECT_EQ(m.controller.dncAbort(), focas::EW_MODE);
+  EXPECT_EQ(m.calls.dnc.dncAbort(), focas::EW_MODE);
   m.run(0.1);
   EXPECT_EQ(m.states.back().velocity[0], 0.0);
 }
@@ -273,24 +273,24 @@ TEST(Panel, AlarmAndEmergencyStopAndBlockTheStart) {
   m.start("G1 X100 F600\n");
   m.run(0.5);
   m.controller.raiseAlarm(1001, "COOLANT EMPTY");
-  EXPECT_EQ(m.controller.dncAbort(), focas::EW_ALARM);
-  EXPECT_EQ(m.controller.status().alarm, 1);
-  EXPECT_EQ(m.controller.alarmBits(), 1u << ALARM_EX);
-  EXPECT_EQ(m.controller.dncStart(), focas::EW_ALARM);
-  m.controller.reset();
-  EXPECT_EQ(m.controller.alarmBits(), 0u);
+  EXPECT_EQ(m.calls.dnc.dncAbort(), focas::EW_ALARM);
+  EXPECT_EQ(m.calls.state.status().alarm, 1);
+  EXPECT_EQ(m.calls.state.alarmBits(), 1u << ALARM_EX);
+  EXPECT_EQ(m.calls.dnc.dncStart(), focas::EW_ALARM);
+  m.calls.programs.reset();
+  EXPECT_EQ(m.calls.state.alarmBits(), 0u);
   m.run(0.5);
   m.start("S6000 M3\nG4 X10\n");
   m.run(1.0);
   m.controller.emergency(true);
-  EXPECT_EQ(m.controller.status().emergency, 1);
-  EXPECT_EQ(m.controller.dncAbort(), focas::EW_ALARM);
-  m.controller.reset();
-  EXPECT_EQ(m.controller.dncStart(), focas::EW_ALARM);
+  EXPECT_EQ(m.calls.state.status().emergency, 1);
+  EXPECT_EQ(m.calls.dnc.dncAbort(), focas::EW_ALARM);
+  m.calls.programs.reset();
+  EXPECT_EQ(m.calls.dnc.dncStart(), focas::EW_ALARM);
   m.run(2.0);
   EXPECT_EQ(m.states.back().spindle_speed, 0.0);
   m.controller.emergency(false);
-  EXPECT_EQ(m.controller.dncStart(), focas::EW_OK);
+  EXPECT_EQ(m.calls.dnc.dncStart(), focas::EW_OK);
 }
 
 TEST(Panel, OvertravelIsRefusedBeforeAnythingMoves) {
@@ -299,17 +299,17 @@ TEST(Panel, OvertravelIsRefusedBeforeAnythingMoves) {
   m.runToEnd();
   EXPECT_EQ(m.macro(100), 1.0) << "the limit itself is inside";
   EXPECT_EQ(m.controller.motion().position[0], 0.25);
-  ASSERT_EQ(m.controller.alarmMessages().size(), 1u);
-  const focas::AlarmMessage alarm = m.controller.alarmMessages()[0];
+  ASSERT_EQ(m.calls.state.alarmMessages().size(), 1u);
+  const focas::AlarmMessage alarm = m.calls.state.alarmMessages()[0];
   EXPECT_EQ(alarm.type, ALARM_OT);
   EXPECT_EQ(alarm.number, 500);
   EXPECT_EQ(alarm.axis, 1);
   EXPECT_NE(alarm.text.find("X250.001"), std::string::npos);
-  EXPECT_EQ(m.controller.dncAbort(), focas::EW_ALARM);
-  m.controller.reset();
+  EXPECT_EQ(m.calls.dnc.dncAbort(), focas::EW_ALARM);
+  m.calls.programs.reset();
   m.start("G0 Z-301\n");
   m.run(DT);
-  EXPECT_EQ(m.controller.alarmMessages()[0].number, 501);
+  EXPECT_EQ(m.calls.state.alarmMessages()[0].number, 501);
 }
 
 TEST(Panel, UnknownWordsRaiseAProgramAlarmWithTheBlock) {
@@ -320,8 +320,8 @@ TEST(Panel, UnknownWordsRaiseAProgramAlarmWithTheBlock) {
     Machine m;
     m.start("#100=1\n" + block + "\n#100=2\n");
     m.run(0.01);
-    EXPECT_EQ(m.controller.dncAbort(), focas::EW_ALARM) << block;
-    EXPECT_EQ(m.controller.alarmBits(), 1u << ALARM_PS) << block;
+    EXPECT_EQ(m.calls.dnc.dncAbort(), focas::EW_ALARM) << block;
+    EXPECT_EQ(m.calls.state.alarmBits(), 1u << ALARM_PS) << block;
     EXPECT_NE(m.alarmText().find(block), std::string::npos) << m.alarmText();
     EXPECT_EQ(m.macro(100), 1.0) << block;
     EXPECT_EQ(m.controller.motion().position, (std::array<double, 3>{0.0, 0.0, 0.0})) << block;
@@ -332,15 +332,15 @@ TEST(Macros, NumbersAndVacancy) {
   Machine m;
   for (const int number : {100, 199, 500, 999, 1133}) {
     EXPECT_FALSE(m.macro(number));
-    EXPECT_EQ(m.controller.writeMacro(number, 2.5), focas::EW_OK);
+    EXPECT_EQ(m.calls.macros.writeMacro(number, 2.5), focas::EW_OK);
     EXPECT_EQ(m.macro(number), 2.5);
-    EXPECT_EQ(m.controller.writeMacro(number, std::nullopt), focas::EW_OK);
+    EXPECT_EQ(m.calls.macros.writeMacro(number, std::nullopt), focas::EW_OK);
     EXPECT_FALSE(m.macro(number));
   }
   for (const int number : {0, 99, 200, 499, 1000, 1132, 1134}) {
     std::optional<double> value;
-    EXPECT_EQ(m.controller.readMacro(number, &value), focas::EW_NUMBER);
-    EXPECT_EQ(m.controller.writeMacro(number, 1.0), focas::EW_NUMBER);
+    EXPECT_EQ(m.calls.macros.readMacro(number, &value), focas::EW_NUMBER);
+    EXPECT_EQ(m.calls.macros.writeMacro(number, 1.0), focas::EW_NUMBER);
   }
 }
 
@@ -356,7 +356,7 @@ TEST(Wire, ProgramIsStreamedAndMarkerIsRead) {
   Machine m;
   focas::ServerOptions options;
   options.port = 0;
-  focas::Server server(options, m.controller);
+  focas::Server server(options, m.calls);
   focas::Client client;
   client.connect("127.0.0.1", server.port(), 20.0);
   client.writeMacro(1133, 1024.0);

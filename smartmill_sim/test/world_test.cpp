@@ -174,9 +174,9 @@ class Machine {
  public:
   explicit Machine(const MachineModel& model, const WorldOptions& options = {}) : world(model, options) {}
   void program(const std::string& text) {
-    ASSERT_EQ(world.controller().dncStart(), focas::EW_OK);
-    ASSERT_EQ(world.controller().dncData(text.data(), text.size()), text.size());
-    ASSERT_EQ(world.controller().dncEnd(), focas::EW_OK);
+    ASSERT_EQ(world.controller().calls().dnc.dncStart(), focas::EW_OK);
+    ASSERT_EQ(world.controller().calls().dnc.dncData(text.data(), text.size()), text.size());
+    ASSERT_EQ(world.controller().calls().dnc.dncEnd(), focas::EW_OK);
   }
   void run(double time) {
     const auto blocks = static_cast<int>(time * World::SAMPLE_RATE / World::BLOCK);
@@ -193,7 +193,7 @@ class Machine {
         gap.push_back(b.hammer.at(i, 1));
       }
       angle.insert(angle.end(), b.angle.begin(), b.angle.end());
-      load.push_back(world.controller().spindleLoad().at(0));
+      load.push_back(world.controller().calls().axes.spindleLoad().at(0));
       position.push_back(world.controller().motion().position);
     }
   }
@@ -249,9 +249,9 @@ TEST(World, TheServoRecordIsTriggeredByItsBlock) {
   options.motor.currents = true;
   World world(millThatCuts(), options);
   const std::string program = "N10 G90 G0 X-60\nN20 S6000 M3\nN25 G4 P500\nN30 G1 F6000 X-50\nN40 X-80\n";
-  ASSERT_EQ(world.controller().dncStart(), focas::EW_OK);
-  ASSERT_EQ(world.controller().dncData(program.data(), program.size()), program.size());
-  ASSERT_EQ(world.controller().dncEnd(), focas::EW_OK);
+  ASSERT_EQ(world.controller().calls().dnc.dncStart(), focas::EW_OK);
+  ASSERT_EQ(world.controller().calls().dnc.dncData(program.data(), program.size()), program.size());
+  ASSERT_EQ(world.controller().calls().dnc.dncEnd(), focas::EW_OK);
   double risen = -1.0;
   std::vector<double> before, after;  // currents of X in the dwell, and while it runs at constant speed after
   for (int k = 0; k < 150; ++k) {
@@ -307,8 +307,9 @@ TEST(World, CuttingWithTheSpindleAtRestIsRefused) {
   Machine machine(millThatCuts());
   machine.program("G90\nG0 X-60\nG1 F6000 Z-1\nG1 F2400 X40\n");
   machine.run(2.0);
-  ASSERT_EQ(machine.world.controller().status().alarm, 1);
-  EXPECT_NE(machine.world.controller().alarmMessages().at(0).text.find("SPINDLE AT REST"), std::string::npos);
+  ASSERT_EQ(machine.world.controller().calls().state.status().alarm, 1);
+  EXPECT_NE(machine.world.controller().calls().state.alarmMessages().at(0).text.find("SPINDLE AT REST"),
+            std::string::npos);
   // It stopped at the contact with the stock, not 90 mm farther.
   EXPECT_LT(machine.position.back()[0], -50e-3 - RADIUS + 5e-3);
 }
@@ -317,8 +318,9 @@ TEST(World, PlungingIsRefused) {
   Machine machine(millThatCuts());
   machine.program("G90\nG0 X0\nS6000 M3\nG4 P500\nG1 F600 Z-5\n");
   machine.run(7.0);
-  ASSERT_EQ(machine.world.controller().status().alarm, 1);
-  EXPECT_NE(machine.world.controller().alarmMessages().at(0).text.find("PLUNGED"), std::string::npos);
+  ASSERT_EQ(machine.world.controller().calls().state.status().alarm, 1);
+  EXPECT_NE(machine.world.controller().calls().state.alarmMessages().at(0).text.find("PLUNGED"),
+            std::string::npos);
 }
 
 // ---- hammer station

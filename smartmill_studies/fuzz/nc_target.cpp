@@ -34,11 +34,11 @@ const sim::ControllerOptions& options() {
 /// Runs a program; the axes must not leave their travel.
 void run(sim::Controller& controller, const std::string& text) {
   static std::vector<sim::MotionState> states;
-  if (controller.dncStart() != focas::EW_OK) {
+  if (controller.calls().dnc.dncStart() != focas::EW_OK) {
     std::abort();
   }
-  controller.dncData(text.data(), text.size());
-  controller.dncEnd();
+  controller.calls().dnc.dncData(text.data(), text.size());
+  controller.calls().dnc.dncEnd();
   for (int i = 0; i < MOST_STEPS; ++i) {
     controller.advance(STEP, 1, states);
     for (std::size_t k = 0; k < 3; ++k) {
@@ -47,7 +47,7 @@ void run(sim::Controller& controller, const std::string& text) {
         std::abort();
       }
     }
-    if (controller.status().run != focas::RUN_START) {
+    if (controller.calls().state.status().run != focas::RUN_START) {
       break;
     }
   }
@@ -80,7 +80,7 @@ void nc(const std::uint8_t* data, std::size_t size) {
   }
   sim::Controller controller(options());
   run(controller, check.text);
-  for (const focas::AlarmMessage& alarm : controller.alarmMessages()) {
+  for (const focas::AlarmMessage& alarm : controller.calls().state.alarmMessages()) {
     if (alarm.type == sim::ALARM_OT) {
       std::fprintf(stderr, "passed the check: %s\nalarm %s\n", check.text.c_str(), alarm.text.c_str());
       std::abort();

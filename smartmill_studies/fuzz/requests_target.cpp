@@ -1,6 +1,6 @@
 #include <cstdlib>
 
-#include "data_calls.h"
+#include "calls/calls.h"
 #include "fuzz/frames.h"
 #include "fuzz/targets.h"
 #include "program_transfer.h"
@@ -18,12 +18,14 @@ const sim::ControllerOptions& options() {
 }  // namespace
 
 void requests(const std::uint8_t* data, std::size_t size) {
-  sim::Controller machine(options());
-  focas::DataCalls calls(machine);
+  const sim::Controller machine(options());
+  const focas::ControllerInterface controller = machine.calls();
+  const focas::SysInfo info = controller.state.sysInfo();
+  const focas::CallTable calls = focas::callsOf(controller, info);
   focas::ProgramTransfer transfer;
   eachFrame(data, size, [&](const focas::Frame& frame) {
     focas::describe(frame);
-    transfer.handle(frame, machine,
+    transfer.handle(frame, controller.programs,
                     [](std::uint8_t type, focas::Direction direction, const focas::Bytes& body) {
                       focas::encodeFrame(type, direction, body, focas::REPLY_VERSION);
                     });

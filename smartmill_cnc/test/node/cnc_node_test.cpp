@@ -57,7 +57,7 @@ class CncNodeTest : public ::testing::Test {
   void listen() {
     focas::ServerOptions options;
     options.port = port_;
-    server_ = std::make_unique<focas::Server>(options, machine_);
+    server_ = std::make_unique<focas::Server>(options, machine_.calls());
   }
   void onState(const CncState& state) {
     state_ = state;

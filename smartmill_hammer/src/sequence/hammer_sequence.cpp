@@ -7,12 +7,12 @@
 #include "controller_state.h"
 #include "frf_evaluation.h"
 #include "measurement.h"
-#include "sequence_step.h"
 #include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/signal/same_time.h"
 #include "station_control.h"
+#include "step_runner.h"
 
 namespace smartmill::hammer {
 namespace {
@@ -50,7 +50,7 @@ HammerSequence::~HammerSequence() = default;
 void HammerSequence::reset() {
   phase_ = Phase::idle;
   control_ = std::make_unique<StationControl>(parameters_, model_.hammer->range_volt);
-  steps_.clear();
+  steps_.reset();
   measurement_.reset();
   result_.reset();
 }
@@ -69,7 +69,7 @@ std::optional<MeasureFrfResult> HammerSequence::takeResult() {
 
 bool HammerSequence::handle(const MeasureFrfGoal& goal) {
   if (isActive()) return false;
-  steps_.clear();
+  steps_.reset();
   if (const std::string fault = goalFault(goal, parameters_, model_); !fault.empty()) {
     result_.emplace();
     result_->code = FrfCode::bad_goal;
@@ -77,10 +77,9 @@ bool HammerSequence::handle(const MeasureFrfGoal& goal) {
     return true;
   }
   measurement_ = std::make_unique<Measurement>(parameters_, model_, goal);
-  steps_ = sequenceSteps(*measurement_, *control_);
+  steps_ = std::make_unique<StepRunner>(*measurement_, *control_);
   phase_ = Phase::steps;
-  step_ = 0;
-  steps_[step_]->begin(goal.stamp);
+  apply(goal.stamp, steps_->begin(goal.stamp));
   return true;
 }
 
@@ -126,34 +125,14 @@ void HammerSequence::dispatch(double now, ControlEvent event) {
   if (const auto* fault = std::get_if<ControlFault>(&event)) return abort(now, fault->code, fault->text);
   if (phase_ == Phase::stopping && std::holds_alternative<MotionDone>(event)) return retract(now);
   if (phase_ == Phase::retracting && std::holds_alternative<MotionDone>(event)) return finish();
-  if (phase_ != Phase::steps) return;
-  SequenceStep& step = *steps_[step_];
-  if (std::holds_alternative<MotionDone>(event)) apply(now, step.motionDone(now));
-  if (const auto* voltage = std::get_if<MeanVoltage>(&event)) apply(now, step.voltageMeasured(now, *voltage));
-  if (auto* hit = std::get_if<RecordedHit>(&event)) apply(now, step.hitRecorded(now, std::move(*hit)));
+  if (phase_ == Phase::steps) apply(now, steps_->handle(now, std::move(event)));
 }
 
 // --------------------------------------------------------------------------------------------- steps
 
 void HammerSequence::apply(double now, const StepOutcome& outcome) {
-  switch (outcome.kind) {
-    case StepOutcome::Kind::running:
-      return;
-    case StepOutcome::Kind::done:
-      return beginNextStep(now);
-    case StepOutcome::Kind::hits_completed:
-      return completeHits(now);
-    case StepOutcome::Kind::failed:
-      return abort(now, outcome.code, outcome.reason);
-  }
-}
-
-void HammerSequence::beginNextStep(double now) {
-  do {
-    if (++step_ == steps_.size()) return completeHits(now);
-  } while (!steps_[step_]->isNeeded());
-  control_->watchRange(steps_[step_]->watchesRange());
-  apply(now, steps_[step_]->begin(now));
+  if (outcome.kind == StepOutcome::Kind::hits_completed) completeHits(now);
+  if (outcome.kind == StepOutcome::Kind::failed) abort(now, outcome.code, outcome.reason);
 }
 
 /// Without a second height the hits of the first are evaluated alone.

@@ -60,7 +60,7 @@ void run(const Arguments& a) {
   options.mode = MODES.at(a.mode);
   options.info.cnc_type = a.type;
   sim::Controller controller(options);
-  const focas::Server server(a.server, controller);
+  const focas::Server server(a.server, controller.calls());
   std::printf("controller: listens on %s:%d, mode %s\n", a.server.bind_address.c_str(), server.port(),
               a.mode.c_str());
   std::fflush(stdout);

@@ -10,7 +10,8 @@
 #include "controller/dnc_session.h"
 #include "controller/pmc_memory.h"
 #include "controller/program_memory.h"
-#include "smartmill_sim/controller/controller.h"
+#include "smartmill_sim/controller/controller_options.h"
+#include "smartmill_sim/controller/motion_state.h"
 
 namespace smartmill::sim {
 

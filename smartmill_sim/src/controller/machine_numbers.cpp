@@ -52,7 +52,7 @@ std::vector<NumberedValue> machineParameters(const ControllerOptions& o) {
       ofAxes(1420, NumberedType::real, all(rapid), 1),           // rapid traverse [mm/min]
       ofAxes(1430, NumberedType::real, all(rapid), 1),           // highest cutting feed [mm/min]
       ofAxes(1620, NumberedType::double_word, all(rapid_ramp)),  // ramp of rapid traverse [ms]
-      ofAxes(1825, NumberedType::word, all(LOOP_GAIN)),
+      ofAxes(1825, NumberedType::word, all(o.loop_gain)),
       single(3741, NumberedType::double_word, max_speed),  // spindle at gear 1 [rpm]
       single(3772, NumberedType::double_word, max_speed),  // highest spindle speed [rpm]
       single(4020, NumberedType::double_word, max_speed),  // highest motor speed [rpm]

@@ -3,12 +3,11 @@
 #include <vector>
 
 #include "smartmill_core/units.h"
-#include "smartmill_sim/controller/controller.h"
+#include "smartmill_sim/controller/controller_options.h"
 
 namespace smartmill::sim {
 
 constexpr double MM_PER_MIN = units::MM / 60.0;  ///< [m/s]
-constexpr double LOOP_GAIN = 3000.0;             ///< [0.01/s] of the axes' position loops, a typical value
 
 /// State behind the diagnosis numbers.
 struct DiagnosisState {

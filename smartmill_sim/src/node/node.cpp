@@ -73,7 +73,7 @@ void Node::serve() {
   focas::ServerOptions options;
   options.port = static_cast<std::uint16_t>(parameters_.port);
   options.bind_address = parameters_.bind;
-  server_ = std::make_unique<focas::Server>(options, world_->controller());
+  server_ = std::make_unique<focas::Server>(options, world_->controller().calls());
   panel_.advertiseKeys(world_->controller());
   angle_ = nh_.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, STREAM_QUEUE);
   ROS_INFO("sim: controller listens on %s:%d", parameters_.bind.c_str(), server_->port());
@@ -209,7 +209,8 @@ bool Node::updateStates(double now, double done) {
 /// Under an external controller collisions raise alarms in the machine's own controller, which is idle then.
 void Node::logAlarms() {
   std::string text;
-  for (const focas::AlarmMessage& alarm : world_->controller().alarmMessages()) text += " " + alarm.text;
+  for (const focas::AlarmMessage& alarm : world_->controller().calls().state.alarmMessages())
+    text += " " + alarm.text;
   if (text != logged_alarm_ && !text.empty()) ROS_ERROR_STREAM("sim:" << text);
   logged_alarm_ = text;
 }

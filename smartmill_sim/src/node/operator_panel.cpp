@@ -35,7 +35,7 @@ void OperatorPanel::advertiseKeys(Controller& controller) {
     return {};
   });
   advertise("reset", 0, [&controller](const Request&) -> std::string {
-    controller.reset();
+    controller.calls().programs.reset();
     return {};
   });
   advertise("feed_hold", 0, [&controller](const Request&) -> std::string {
@@ -43,7 +43,7 @@ void OperatorPanel::advertiseKeys(Controller& controller) {
     return {};
   });
   advertise("cycle_start", 0, [&controller](const Request&) -> std::string {
-    const focas::EwCode code = controller.cycleStart();
+    const focas::EwCode code = controller.calls().programs.cycleStart();
     return code == focas::EW_OK ? std::string() : focas::ewName(code);
   });
   advertise("overrides", 3, [&controller](const Request& request) -> std::string {

@@ -226,7 +226,7 @@ ToolMotion World::between(const MotionState& now, double share) const {
 }
 
 void World::raiseAlarm(int number, const char* text) {
-  if (controller_.status().alarm == 0) controller_.raiseAlarm(number, text);
+  if (controller_.calls().state.status().alarm == 0) controller_.raiseAlarm(number, text);
 }
 
 }  // namespace smartmill::sim

@@ -131,10 +131,11 @@ class Driver {
     return options;
   }
   sim::Controller& controller() { return world_.controller(); }
+  focas::ControllerInterface calls() { return controller().calls(); }
 
   void meddle() {
     if (draw_.trouble == Trouble::hold && held_ && time_ > draw_.trouble_time + 2.0) {
-      controller().cycleStart();
+      calls().programs.cycleStart();
       held_ = false;
     }
     if (troubled_ || draw_.trouble == Trouble::none || time_ < draw_.trouble_time) return;
@@ -150,7 +151,7 @@ class Driver {
         controller().emergency(true);
         break;
       case Trouble::reset:
-        controller().reset();
+        calls().programs.reset();
         break;
       case Trouble::hold:
         controller().feedHold();
@@ -182,13 +183,13 @@ class Driver {
   /// Program text that the controller has not accepted yet.
   void feed() {
     if (!session_ || text_.empty()) return;
-    text_.erase(0, controller().dncData(text_.data(), text_.size()));
+    text_.erase(0, calls().dnc.dncData(text_.data(), text_.size()));
   }
 
   /// State that the bridge reads when the machine ends a motion by itself.
   void watch() {
-    const focas::Status status = controller().status();
-    const focas::EwCode code = controller().dncAbort();
+    const focas::Status status = calls().state.status();
+    const focas::EwCode code = calls().dnc.dncAbort();
     const bool taken =
         code != focas::EW_OK || status.alarm != 0 || status.emergency != 0 || status.aut != focas::AUT_REMOTE;
     if (taken && armed_) {
@@ -204,7 +205,7 @@ class Driver {
   }
 
   CncState state() {
-    const focas::Status status = controller().status();
+    const focas::Status status = calls().state.status();
     CncState s;
     s.stamp = time_;
     s.connected = true;
@@ -215,8 +216,8 @@ class Driver {
     s.emergency = status.emergency != 0;
     s.alarm = status.alarm != 0;
     s.axes = {"X", "Y", "Z"};
-    for (const double mm : controller().machinePosition()) s.position.push_back(mm * MM);
-    for (const double mm : controller().distanceToGo()) s.distance_to_go.push_back(mm * MM);
+    for (const double mm : calls().axes.machinePosition()) s.position.push_back(mm * MM);
+    for (const double mm : calls().axes.distanceToGo()) s.distance_to_go.push_back(mm * MM);
     s.spindle_speed = controller().motion().spindle_speed;
     return s;
   }
@@ -225,7 +226,7 @@ class Driver {
     using Kind = hammer::Command::Kind;
     std::string message;
     if (command.kind == Kind::stop) {
-      controller().dncCancel(focas::DNC_CANCEL);
+      calls().dnc.dncCancel(focas::DNC_CANCEL);
       session_ = false;
       text_.clear();
     } else if (command.kind == Kind::strike) {
@@ -258,7 +259,7 @@ class Driver {
       sequence_.commandFailed(time_, check.message);
       return;
     }
-    if (!session_ && controller().dncStart() != focas::EW_OK) {
+    if (!session_ && calls().dnc.dncStart() != focas::EW_OK) {
       ++counts_.refused_by_state;
       sequence_.commandFailed(time_, "the controller accepts no program");
       return;
@@ -278,7 +279,7 @@ class Driver {
 
   void judge() {
     bool collision = false, overtravel = beyond_;
-    for (const focas::AlarmMessage& alarm : controller().alarmMessages()) {
+    for (const focas::AlarmMessage& alarm : calls().state.alarmMessages()) {
       collision = collision || alarm.number == sim::EX_COLLISION;
       overtravel = overtravel || alarm.type == sim::ALARM_OT;
       if (alarm.number == sim::EX_COLLISION || alarm.type == sim::ALARM_OT) {

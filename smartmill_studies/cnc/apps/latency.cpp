@@ -109,7 +109,7 @@ void measureFanuc(int count, double seconds) {
   sim::Controller machine(sim::ControllerOptions::ofModel(MachineModel{}));
   focas::ServerOptions options;
   options.port = 0;
-  focas::Server server(options, machine);
+  focas::Server server(options, machine.calls());
   focas::Client client;
   client.connect("127.0.0.1", server.port(), 2.0);
   timed("cnc_acts", count, [&] { client.actualSpeed(); });

@@ -46,7 +46,7 @@ class Rig {
   void startServer(std::uint16_t port) {
     focas::ServerOptions options;
     options.port = port;
-    server_ = std::make_unique<focas::Server>(options, world_.controller());
+    server_ = std::make_unique<focas::Server>(options, world_.controller().calls());
     port_ = server_->port();
   }
   void startServer() { startServer(port_); }
@@ -121,8 +121,8 @@ class Rig {
   std::string ended() const { return result_ ? result_->message : "no result"; }
   cnc::Bridge& bridge() { return *bridge_; }
   sim::MotionState motion() { return world_.controller().motion(); }
-  std::vector<focas::AlarmMessage> alarms() { return world_.controller().alarmMessages(); }
-  int blocks() { return world_.controller().blockCount(); }
+  std::vector<focas::AlarmMessage> alarms() { return world_.controller().calls().state.alarmMessages(); }
+  int blocks() { return world_.controller().calls().state.blockCount(); }
 
  private:
   static sim::WorldOptions worldOptions() {

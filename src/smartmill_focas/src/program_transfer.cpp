@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <optional>
 
-#include "memory_calls.h"
+#include "calls/calls.h"
 
 namespace smartmill::focas {
 namespace {

@@ -11,7 +11,7 @@
 #include <stdexcept>
 #include <thread>
 
-#include "data_calls.h"
+#include "calls/calls.h"
 #include "listener.h"
 #include "session.h"
 #include "socket.h"
@@ -25,11 +25,12 @@ constexpr int IDLE_POLL_MS = 200;
 
 class Server::Impl {
  public:
-  Impl(const ServerOptions& options, ControllerInterface& controller)
+  Impl(const ServerOptions& options, const ControllerInterface& controller)
       : options_(options),
-        calls_(controller),
+        info_(controller.state.sysInfo()),
+        calls_(callsOf(controller, info_)),
         listener_(options),
-        shared_{options_, controller, calls_, sessions_} {
+        shared_{options_, controller, info_, calls_, sessions_} {
     int ends[2];
     if (::pipe(ends) != 0) {
       throw std::runtime_error("FOCAS server: no pipe: " + errorText(errno));
@@ -109,7 +110,8 @@ class Server::Impl {
   }
 
   ServerOptions options_;
-  DataCalls calls_;
+  const SysInfo info_;
+  const CallTable calls_;
   Listener listener_;
   Session::Shared shared_;
   Descriptor wake_read_, wake_write_;
@@ -119,7 +121,7 @@ class Server::Impl {
   std::thread thread_;
 };
 
-Server::Server(const ServerOptions& options, ControllerInterface& controller)
+Server::Server(const ServerOptions& options, const ControllerInterface& controller)
     : impl_(std::make_unique<Impl>(options, controller)) {
 }
 Server::~Server() = default;

@@ -49,7 +49,7 @@ int Session::pollPeriod(int longest) const {
 
 void Session::drop() {
   if (std::exchange(dnc_, Dnc::none) == Dnc::open) {
-    shared_.controller.dncDisconnected();
+    shared_.controller.dnc.dncDisconnected();
   }
   dead_ = true;
 }
@@ -89,7 +89,7 @@ void Session::checkDnc() {
   if (dnc_ != Dnc::open) {
     return;
   }
-  const int code = shared_.controller.dncAbort();
+  const int code = shared_.controller.dnc.dncAbort();
   if (code != EW_OK) {
     dnc_ = Dnc::aborted;
     abort_code_ = code;
@@ -124,7 +124,7 @@ bool Session::serveFrame(const Frame& frame) {
     open(frame);
   } else if (frame.is(FRAME_CLOSE, DIR_REQUEST)) {
     if (std::exchange(dnc_, Dnc::none) == Dnc::open) {
-      shared_.controller.dncDisconnected();
+      shared_.controller.dnc.dncDisconnected();
     }
     circuit_ = 0;
     reply(FRAME_CLOSE, EW_OK);
@@ -134,7 +134,7 @@ bool Session::serveFrame(const Frame& frame) {
     }
   } else if (frame.is(FRAME_DATA, DIR_REQUEST)) {
     answerData(frame);
-  } else if (circuit_ != STREAM_CIRCUIT || !transfer_.handle(frame, shared_.controller, sender())) {
+  } else if (circuit_ != STREAM_CIRCUIT || !transfer_.handle(frame, shared_.controller.programs, sender())) {
     return serveDnc(frame);
   }
   return true;
@@ -152,9 +152,8 @@ void Session::open(const Frame& frame) {
   }
   circuit_ = circuit;
   OpenReply opened;
-  const SysInfo& info = shared_.calls.sysInfo();
-  opened.axes = static_cast<int>(info.axes.size());
-  opened.spindles = static_cast<int>(info.spindles.size());
+  opened.axes = static_cast<int>(shared_.info.axes.size());
+  opened.spindles = static_cast<int>(shared_.info.spindles.size());
   send(FRAME_OPEN, DIR_REPLY, encodeOpenReply(opened));
 }
 
@@ -183,7 +182,7 @@ bool Session::serveDnc(const Frame& frame) {
     if (dnc_ == Dnc::open) {
       const char* text = reinterpret_cast<const char*>(frame.body.data()) + text_taken_;
       const std::size_t size = frame.body.size() - text_taken_;
-      text_taken_ += std::min(size, shared_.controller.dncData(text, size));
+      text_taken_ += std::min(size, shared_.controller.dnc.dncData(text, size));
       return text_taken_ == frame.body.size();
     }
   } else if (frame.is(FRAME_DNC_END, DIR_REQUEST)) {
@@ -191,7 +190,7 @@ bool Session::serveDnc(const Frame& frame) {
   } else if (frame.is(FRAME_DNC_CANCEL, DIR_STREAM)) {
     if (dnc_ == Dnc::open) {
       const bool has_result = frame.body.size() >= 4;
-      shared_.controller.dncCancel(has_result ? Reader(frame.body).skip(2).i16() : int{DNC_CANCEL});
+      shared_.controller.dnc.dncCancel(has_result ? Reader(frame.body).skip(2).i16() : int{DNC_CANCEL});
     }
     dnc_ = Dnc::none;
   } else if (frame.direction == DIR_REQUEST) {
@@ -206,7 +205,7 @@ int Session::startDnc() {
   }
   const bool taken = std::any_of(shared_.all.begin(), shared_.all.end(),
                                  [](const Session& other) { return other.dnc_ == Dnc::open; });
-  const int code = taken ? int{EW_BUSY} : int{shared_.controller.dncStart()};
+  const int code = taken ? int{EW_BUSY} : int{shared_.controller.dnc.dncStart()};
   dnc_ = code == EW_OK ? Dnc::open : dnc_;
   return code;
 }
@@ -214,7 +213,7 @@ int Session::startDnc() {
 int Session::endDnc() {
   int code = EW_FUNC;
   if (dnc_ == Dnc::open) {
-    code = shared_.controller.dncEnd();
+    code = shared_.controller.dnc.dncEnd();
   } else if (dnc_ == Dnc::aborted) {
     code = abort_code_;
   }

@@ -5,7 +5,7 @@
 #include <deque>
 #include <list>
 
-#include "data_calls.h"
+#include "calls/call_table.h"
 #include "program_transfer.h"
 #include "smartmill_focas/server.h"
 #include "socket.h"
@@ -18,8 +18,9 @@ class Session {
   /// What all sessions share.
   struct Shared {
     const ServerOptions& options;
-    ControllerInterface& controller;
-    DataCalls& calls;
+    const ControllerInterface controller;
+    const SysInfo& info;
+    const CallTable& calls;
     const std::list<Session>& all;
   };
   Session(Descriptor socket, const Shared& shared) : shared_(shared), socket_(std::move(socket)) {}

@@ -279,7 +279,7 @@ class ClientServerTest : public ::testing::Test {
     controller_.state.aut = AUT_REMOTE;
     ServerOptions options;
     options.port = 0;
-    server_ = std::make_unique<Server>(options, controller_);
+    server_ = std::make_unique<Server>(options, controller_.calls());
     client_.connect("127.0.0.1", server_->port(), TIMEOUT);
   }
   TestController controller_;

@@ -66,7 +66,7 @@ TEST(Conformance31i, RefusesTheLegacyParameterOpcode) {
   controller.info.cnc_type = "31";
   ServerOptions options;
   options.port = 0;
-  Server server(options, controller);
+  Server server(options, controller.calls());
   RawSocket socket(RawSocket::connectTo(server.port()));
   socket.send(hex("a0a0a0a0 0001 0101 0002 0002"));
   socket.receive(82);

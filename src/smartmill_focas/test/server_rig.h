@@ -14,7 +14,7 @@ namespace smartmill::focas {
 /// A server with a TestController in DNC mode, and plain sockets to it.
 class ServerTest : public ::testing::Test {
  protected:
-  ServerTest() : server_(options(), controller_) {
+  ServerTest() : server_(options(), controller_.calls()) {
     controller_.change([](TestController& c) { c.state.aut = AUT_REMOTE; });
   }
   static ServerOptions options() {

@@ -314,10 +314,10 @@ TEST(Server, TakenPortIsOneLine) {
   TestController controller;
   ServerOptions options;
   options.port = 0;
-  Server first(options, controller);
+  Server first(options, controller.calls());
   options.port = first.port();
   try {
-    Server second(options, controller);
+    Server second(options, controller.calls());
     FAIL();
   } catch (const std::runtime_error& e) {
     EXPECT_NE(std::string(e.what()).find("cannot listen on 127.0.0.1:" + std::to_string(first.port())),

@@ -11,8 +11,15 @@
 namespace smartmill::focas {
 
 /// A controller with settable values and a DNC buffer that is emptied by the test only.
-class TestController : public ControllerInterface {
+class TestController : public StateInterface,
+                       public AxesInterface,
+                       public MacroInterface,
+                       public DataInterface,
+                       public ProgramsInterface,
+                       public DncInterface {
  public:
+  ControllerInterface calls() { return {*this, *this, *this, *this, *this, *this}; }
+
   mutable std::mutex mutex;
   SysInfo info;
   Status state;

@@ -14,8 +14,8 @@
 namespace smartmill::hammer {
 
 class Measurement;
-class SequenceStep;
 class StationControl;
+class StepRunner;
 struct ControlEvent;
 struct StepOutcome;
 
@@ -57,10 +57,9 @@ class HammerSequence {
   enum class Phase { idle, steps, stopping, retracting };
 
   void apply(double now, const StepOutcome& outcome);
-  void beginNextStep(double now);
   void completeHits(double now);
   void checkDeadline(double now);
-  /// Passes an event to the step that waits for it, or ends the measurement.
+  /// Passes an event to the steps, or ends the measurement.
   void dispatch(double now, ControlEvent event);
   void abort(double now, FrfCode code, const std::string& reason);
   void retract(double now);
@@ -71,8 +70,7 @@ class HammerSequence {
   Phase phase_ = Phase::idle;
   std::unique_ptr<StationControl> control_;
   std::unique_ptr<Measurement> measurement_;
-  std::vector<std::unique_ptr<SequenceStep>> steps_;
-  std::size_t step_ = 0;
+  std::unique_ptr<StepRunner> steps_;
   std::optional<MeasureFrfResult> result_;
 };
 

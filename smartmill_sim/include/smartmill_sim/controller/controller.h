@@ -2,13 +2,11 @@
 
 #include <array>
 #include <cstddef>
-#include <cstdint>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "smartmill_focas/server.h"
+#include "smartmill_focas/controller_interface.h"
 #include "smartmill_sim/controller/controller_options.h"
 #include "smartmill_sim/controller/motion_state.h"
 
@@ -25,11 +23,11 @@ namespace smartmill::sim {
 /// with an obstacle.
 ///
 /// Programs run by DNC or from the memory (mode MEM, cycle start).
-class Controller : public focas::ControllerInterface {
+class Controller {
  public:
   /// @throws Error of ControllerOptions::validate().
   explicit Controller(const ControllerOptions& options);
-  ~Controller() override;
+  ~Controller();
   Controller(const Controller&) = delete;
   Controller& operator=(const Controller&) = delete;
 
@@ -49,7 +47,7 @@ class Controller : public focas::ControllerInterface {
   /// Mode at the panel. Leaving DNC (focas::AUT_REMOTE) while blocks run or a session is open stops the
   /// machine and ends the session (EW_MODE). @param aut focas::Aut
   void setMode(int aut);
-  /// External alarm (type EX); reset() clears it.
+  /// External alarm (type EX); a reset clears it.
   void raiseAlarm(int number, const std::string& text);
   void emergency(bool on);
   /// The axes brake to rest on their path; cycle start resumes the motion.
@@ -57,57 +55,11 @@ class Controller : public focas::ControllerInterface {
   /// Factors on feed (0..2), rapid (0..1) and spindle speed (0.5..1.2).
   void setOverrides(double feed, double rapid, double spindle);
 
-  focas::SysInfo sysInfo() const override;
-  focas::Status status() const override;
-  std::vector<double> machinePosition() const override;
-  std::vector<double> absolutePosition() const override;
-  std::vector<double> relativePosition() const override;
-  std::vector<double> distanceToGo() const override;
-  double actualFeed() const override;
-  std::vector<double> spindleSpeed() const override;
-  std::vector<double> spindleLoad() const override;
-  std::vector<double> spindleMaxSpeed() const override;
-  std::vector<double> servoLoad() const override;
-  std::vector<double> servoCurrent() const override;
-  std::vector<double> servoSpeed() const override;
-  std::vector<double> servoLoopGain() const override;
-  /// Variables 1..33, 100..199, 500..999 and 1133, initially vacant; work offsets 5221..5323; read-only
-  /// positions 5001.., 5021.., 5041.. .
-  focas::EwCode readMacro(int number, std::optional<double>* value) const override;
-  focas::EwCode writeMacro(int number, std::optional<double> value) override;
-  std::uint32_t alarmBits() const override;
-  std::vector<focas::AlarmMessage> alarmMessages() const override;
-  int runningProgram() const override;
-  int mainProgram() const override;
-  int sequenceNumber() const override;
-  int blockCount() const override;
-  std::string programPath() const override;
-  std::string executingBlock() const override;
-  std::string programText() const override;
-  std::vector<focas::NumberedValue> parameters(int first, int last) const override;
-  std::vector<focas::NumberedValue> diagnoses(int first, int last) const override;
-  std::optional<focas::DateTime> dateTime() const override;
-  focas::EwCode setDateTime(const focas::DateTime& date_time) override;
-  focas::EwCode readPmc(focas::PmcArea area, int first, int last, focas::Bytes* bytes) const override;
-  focas::EwCode writePmc(focas::PmcArea area, int first, const focas::Bytes& bytes) override;
-  std::vector<focas::StoredProgram> programs() const override;
-  focas::EwCode selectProgram(int number) override;
-  focas::EwCode deleteProgram(int number) override;
-  focas::EwCode rewindProgram() override;
-  focas::EwCode storePrograms(const std::string& text) override;
-  focas::EwCode fetchPrograms(int first, int last, std::string* text) const override;
-  /// Runs the main program in MEM; resumes after M0 and feed hold.
-  focas::EwCode cycleStart() override;
-  /// Stops axes and spindle, drops the program, ends the session (EW_RESET), clears alarms.
-  focas::EwCode reset() override;
-  focas::EwCode dncStart() override;
-  std::size_t dncData(const char* data, std::size_t size) override;
-  focas::EwCode dncEnd() override;
-  void dncCancel(int result) override;
-  focas::EwCode dncAbort() override;
+  /// What a FOCAS client reads and commands (src/controller/calls/); valid as long as this object.
+  focas::ControllerInterface calls() const;
 
  private:
-  class Impl;
+  struct Impl;
   std::unique_ptr<Impl> impl_;
 };
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "smartmill_core/model/machine_model.h"
-#include "smartmill_focas/server.h"
+#include "smartmill_focas/controller_interface.h"
 #include "smartmill_sim/controller/motion_watch.h"
 
 namespace smartmill::sim {
@@ -23,6 +23,8 @@ struct ControllerOptions {
   double arc_tolerance =
       20e-6;                   ///< [m] difference of the start and end radius of an arc: rounded centres pass
   double check_period = 2e-3;  ///< [s] between two calls of the watches: 1 mm of rapid traverse
+  double loop_gain = 3000.0;   ///< [0.01/s] reported, of the axes' position loops: a typical value
+  double screw_lead = 10e-3;   ///< [m] of travel per reported revolution of an axis motor
   std::array<double, 3> work_offset{{0, 0, 0}};  ///< [m] machine minus absolute position, of G54
   focas::SysInfo info = fineInfo();              ///< reported identification
   int mode = focas::AUT_REMOTE;                  ///< focas::Aut, set at the panel

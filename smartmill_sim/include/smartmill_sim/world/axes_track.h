@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "smartmill_core/signal/streams.h"
-#include "smartmill_sim/controller/controller.h"
+#include "smartmill_sim/controller/motion_state.h"
 
 namespace smartmill::sim {
 

@@ -50,6 +50,9 @@ struct StoredProgram {
   DateTime changed;
 };
 
+/// Folder of all programs, with a slash at the end.
+constexpr const char* PROGRAM_FOLDER = "//CNC_MEM/USER/PATH1/";
+
 /// Kinds of PMC addresses, numbered as in pmc_rdpmcrng.
 enum class PmcArea : std::uint8_t { g = 0, f = 1, y = 2, x = 3, a = 4, r = 5, t = 6, k = 7, c = 8, d = 9 };
 
@@ -74,9 +77,9 @@ struct AlarmMessage {
   std::string text;
 };
 
-// The machine of a Server, by topic. All methods are called in the thread of the server, while other threads
-// may run the machine: implementations must lock. Calls must be short, since all connections wait. Values
-// have the units of the controller's screen (mm, mm/min, rpm, percent), as on the wire.
+// The machine of a Server, one interface per topic. All methods are called in the thread of the server, while
+// other threads may run the machine: implementations must lock. Calls must be short, since all connections
+// wait. Values have the units of the controller's screen (mm, mm/min, rpm, percent), as on the wire.
 
 /// Axes and spindles.
 class AxesInterface {
@@ -110,11 +113,12 @@ class MacroInterface {
   virtual EwCode writeMacro(int number, std::optional<double> value) = 0;
 };
 
-/// State of the controller, its alarms and its running program.
+/// Identification and state of the controller, its alarms and its running program.
 class StateInterface {
  public:
   virtual ~StateInterface() = default;
 
+  virtual SysInfo sysInfo() const = 0;
   virtual Status status() const = 0;
   virtual std::uint32_t alarmBits() const = 0;
   virtual std::vector<AlarmMessage> alarmMessages() const = 0;
@@ -147,15 +151,13 @@ class DataInterface {
   virtual EwCode writePmc(PmcArea /*area*/, int /*first*/, const Bytes& /*bytes*/) { return EW_FUNC; }
 };
 
-/// Programs in memory.
+/// Programs in memory, their start and the reset.
 class ProgramsInterface {
  public:
   virtual ~ProgramsInterface() = default;
 
   /// Programs in memory, sorted by number.
   virtual std::vector<StoredProgram> programs() const { return {}; }
-  /// Folder of the programs, with a slash at the end.
-  virtual std::string programFolder() const { return "//CNC_MEM/USER/PATH1/"; }
   /// Makes it the main program: EW_OK, EW_DATA (no such program), EW_BUSY, EW_MODE.
   virtual EwCode selectProgram(int /*number*/) { return EW_FUNC; }
   virtual EwCode deleteProgram(int /*number*/) { return EW_FUNC; }
@@ -165,6 +167,10 @@ class ProgramsInterface {
   virtual EwCode storePrograms(const std::string& /*text*/) { return EW_FUNC; }
   /// Text of programs first..last for an upload. EW_OK, EW_DATA (no such program).
   virtual EwCode fetchPrograms(int /*first*/, int /*last*/, std::string* /*text*/) const { return EW_FUNC; }
+  virtual EwCode cycleStart() { return EW_FUNC; }  ///< opcode 01
+  /// Opcode 02, as the RESET key of the operator: stops motion, ends a DNC session (dncAbort() then returns
+  /// EW_RESET).
+  virtual EwCode reset() { return EW_FUNC; }
 };
 
 /// Programs that a client sends while they run.
@@ -189,19 +195,14 @@ class DncInterface {
   virtual EwCode dncAbort() = 0;
 };
 
-/// The machine of a Server.
-class ControllerInterface : public AxesInterface,
-                            public MacroInterface,
-                            public StateInterface,
-                            public DataInterface,
-                            public ProgramsInterface,
-                            public DncInterface {
- public:
-  virtual SysInfo sysInfo() const = 0;
-  virtual EwCode cycleStart() { return EW_FUNC; }  ///< opcode 01
-  /// Opcode 02, as the RESET key of the operator: stops motion, ends a DNC session (dncAbort() then returns
-  /// EW_RESET).
-  virtual EwCode reset() { return EW_FUNC; }
+/// The machine of a Server, which must outlive it.
+struct ControllerInterface {
+  StateInterface& state;
+  AxesInterface& axes;
+  MacroInterface& macros;
+  DataInterface& data;
+  ProgramsInterface& programs;
+  DncInterface& dnc;
 };
 
 }  // namespace smartmill::focas

@@ -21,7 +21,7 @@ struct ServerOptions {
 class Server {
  public:
   /// Starts listening. @throws std::runtime_error "FOCAS server: cannot listen on HOST:PORT: REASON".
-  Server(const ServerOptions& options, ControllerInterface& controller);
+  Server(const ServerOptions& options, const ControllerInterface& controller);
   ~Server();  ///< stop()
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
