@@ -17,8 +17,6 @@ namespace {
 using namespace smartmill;
 using namespace smartmill::cnc::linuxcnc;
 
-constexpr double REPLY_TIMEOUT = 8.0;  // [s] including homing
-
 void show(const MachineStatus& s) {
   const char* states[] = {"", "emergency stop", "reset", "off", "on"};
   const char* modes[] = {"", "manual", "automatic", "mdi"};
@@ -64,6 +62,7 @@ int main(int argc, char** argv) {
                                                  {"abort", CommandCode::abort}};
   std::string folder, command;
   double timeout = 0.0;
+  const double reply_timeout = 8.0;  // [s] of the gateway, including homing
   CommandLine line{"The operator's panel of a LinuxCNC with linuxcnc_gateway."};
   line.option("folder", folder, "folder of the machine").required();
   line.option(
@@ -80,7 +79,7 @@ int main(int argc, char** argv) {
     arguments.push_back(argument.c_str());
   }
   return runProgram(line, static_cast<int>(arguments.size()), arguments.data(), [&] {
-    GatewayClient client(folder, REPLY_TIMEOUT);
+    GatewayClient client(folder, reply_timeout);
     const auto code = codes.find(command);
     show(carryOut(client, code == codes.end() ? nullptr : &code->second, timeout));
   });

@@ -30,10 +30,16 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr int HAL_SEGMENT = 0x48414c32, SAMPLER_FIFO = 0x48534130;  // keys fixed in LinuxCNC's sources
-constexpr int READ_PERIOD = 3;                                      // [ms]
-constexpr std::chrono::milliseconds REQUEST_PERIOD{30}, RETRY_PERIOD{100}, LOADING{10000};
-constexpr double SILENCE_TIMEOUT = 0.5;  // [s]
-constexpr int CONTROLLER_ENDED = 3;      // exit code
+constexpr int CONTROLLER_ENDED = 3;                                 // exit code
+
+struct StreamOptions {
+  int read_period = 3;  ///< [ms] a block has a few samples, the delay stays small
+  std::chrono::milliseconds request_period{
+      30};                                      ///< of the gateway's status: far below LivenessOptions::hangs
+  std::chrono::milliseconds retry_period{100};  ///< between two attempts to connect
+  std::chrono::milliseconds loading_time{10000};  ///< in which a controller loads its configuration
+  double silence_timeout = 0.5;  ///< [s] without samples after which the controller has ended
+};
 
 double seconds() {
   return std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
@@ -165,7 +171,7 @@ class GatewayWatch {
 
   bool alive() {
     const Clock::time_point now = Clock::now();
-    if (!gateway_.open() && now - last_attempt_ > RETRY_PERIOD) {
+    if (!gateway_.open() && now - last_attempt_ > options_.retry_period) {
       last_attempt_ = now;
       try {
         gateway_ = LocalConnection::to(path_);
@@ -184,7 +190,7 @@ class GatewayWatch {
       }
     }
     const Liveness::Verdict verdict = liveness_.update(updated, process_, seconds());
-    if (now - last_request_ > REQUEST_PERIOD) {
+    if (now - last_request_ > options_.request_period) {
       last_request_ = now;
       gateway_.send(StatusRequest{});
     }
@@ -196,6 +202,7 @@ class GatewayWatch {
 
  private:
   const std::string path_;
+  const StreamOptions options_;
   LocalConnection gateway_;
   Clock::time_point last_attempt_, last_request_;
   bool alive_ = false, starved_ = false;
@@ -219,10 +226,10 @@ class Server {
         try {
           return std::make_unique<Component>();
         } catch (const Error&) {
-          if (Clock::now() - found > LOADING) throw;
+          if (Clock::now() - found > options_.loading_time) throw;
         }
       }
-      std::this_thread::sleep_for(RETRY_PERIOD);
+      std::this_thread::sleep_for(options_.retry_period);
     }
     return nullptr;
   }
@@ -232,7 +239,7 @@ class Server {
     SilenceTimer silence;
     while (!stopRequested()) {
       pollfd entry{listener_.get(), POLLIN, 0};
-      ::poll(&entry, 1, READ_PERIOD);
+      ::poll(&entry, 1, options_.read_period);
       if (std::optional<LocalConnection> connection = acceptFrom(listener_)) {
         clients_.push_back(std::move(*connection));
       }
@@ -248,7 +255,7 @@ class Server {
         listen(client, component);
       }
       clients_.remove_if([](const LocalConnection& client) { return !client.open(); });
-      if (silence.update(heard || watch_.starved(), seconds()) > SILENCE_TIMEOUT) {
+      if (silence.update(heard || watch_.starved(), seconds()) > options_.silence_timeout) {
         std::cerr << "linuxcnc_stream: the controller is silent\n";
         return CONTROLLER_ENDED;
       }
@@ -269,6 +276,7 @@ class Server {
     }
   }
 
+  const StreamOptions options_;
   LocalDescriptor listener_;
   GatewayWatch watch_;
   std::list<LocalConnection> clients_;

@@ -20,7 +20,7 @@ double checkedPeriod(double period) {
 Bridge::Bridge(std::unique_ptr<Controller> controller, double reconnect_period,
                const MotionParameters& motion)
     : controller_(std::move(controller)),
-      poller_(*controller_, checkedPeriod(reconnect_period), log_),
+      poller_(*controller_, {checkedPeriod(reconnect_period)}, log_),
       motion_(*controller_, motion, log_) {
 }
 

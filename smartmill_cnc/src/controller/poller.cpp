@@ -7,13 +7,12 @@
 namespace smartmill::cnc {
 namespace {
 
-constexpr double LONGEST_WAIT = 8.0;  // [1] of the first wait
-constexpr int MANY_FAILURES = 10;
+constexpr int MANY_FAILURES = 10;  // more are not counted
 
 }  // namespace
 
-Poller::Poller(Controller& controller, double reconnect_period, Log& log)
-    : controller_(controller), reconnect_period_(reconnect_period), wait_(reconnect_period), log_(log) {
+Poller::Poller(Controller& controller, const PollerOptions& options, Log& log)
+    : controller_(controller), options_(options), wait_(options.reconnect_period), log_(log) {
 }
 
 void Poller::fetch(double now) {
@@ -24,9 +23,10 @@ void Poller::fetch(double now) {
       return;
     }
     connect();
-    const double times = controller_.connected() ? 1.0 : std::min(std::ldexp(1.0, failures_), LONGEST_WAIT);
+    const double times =
+        controller_.connected() ? 1.0 : std::min(std::ldexp(1.0, failures_), options_.longest_wait);
     failures_ = controller_.connected() ? 0 : std::min(failures_ + 1, MANY_FAILURES);
-    wait_ = times * reconnect_period_;
+    wait_ = times * options_.reconnect_period;
     next_connect_ = now + wait_;
   }
   if (!controller_.connected()) {
@@ -76,8 +76,8 @@ void Poller::reportDisconnected() {
   // Failing to reach the controller after a loss is expected and not logged; a refused connection is.
   const bool expected = loss_logged_ && !was_connected && !refused_;
   if (was_connected || (last_error_ != logged_error_ && !expected)) {
-    log_.error(last_error_ + "; trying again every " + fixedDecimals(reconnect_period_, 1) + " to " +
-               fixedDecimals(LONGEST_WAIT * reconnect_period_, 1) + " s");
+    log_.error(last_error_ + "; trying again every " + fixedDecimals(options_.reconnect_period, 1) + " to " +
+               fixedDecimals(options_.longest_wait * options_.reconnect_period, 1) + " s");
   }
   loss_logged_ = was_connected || (loss_logged_ && last_error_ == logged_error_);
   logged_error_ = last_error_;

@@ -3,7 +3,6 @@
 #include <cstdio>
 #include <sstream>
 
-#include "smartmill_cnc/linuxcnc/liveness.h"
 #include "smartmill_cnc/linuxcnc/protocol.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
@@ -12,34 +11,24 @@
 namespace smartmill::cnc::linuxcnc {
 namespace {
 
-constexpr double SPEED_TOLERANCE = 10.0;  // [rpm] of spindle at speed, in addition to 1 %
-constexpr double LIMIT_MARGIN =
-    1e-3;  // [mm] of the limits: a home at the end of travel may round to either side
-constexpr double STANDSTILL = 0.5;         // [rpm]
-constexpr double ORIENT_GAIN = 20.0;       // [1/s]
-constexpr double ORIENT_MAX_SPEED = 5.0;   // [rev/s]
-constexpr double ORIENT_TOLERANCE = 0.02;  // [deg]
-// [s] of servo cycles. A servo thread that has waited for a processor catches up without a beat in between,
-// which must not count as the end of linuxcnc_stream; the gateway detects that end at once.
-constexpr double BEAT_LASTS = Liveness::STARVES + 0.2;
-
 std::string number(double value) {
   return formatted("%.9g", value);
 }
 
-std::string jointSection(const MachineAxes& axes, std::size_t axis) {
+std::string jointSection(const MachineAxes& axes, std::size_t axis, const ConfigurationOptions& options) {
   const double mm = 1.0 / units::MM;
   std::string common = "MAX_VELOCITY = " + number(axes.rapid * mm) +
                        "\nMAX_ACCELERATION = " + number(axes.acceleration * mm) +
-                       "\nMIN_LIMIT = " + number(axes.travel[axis][0] * mm - LIMIT_MARGIN) +
-                       "\nMAX_LIMIT = " + number(axes.travel[axis][1] * mm + LIMIT_MARGIN) + "\n";
+                       "\nMIN_LIMIT = " + number(axes.travel[axis][0] * mm - options.limit_margin) +
+                       "\nMAX_LIMIT = " + number(axes.travel[axis][1] * mm + options.limit_margin) + "\n";
   const std::string home = number(axes.home[axis] * mm);
   return std::string("[AXIS_") + "XYZ"[axis] + "]\n" + common + "[JOINT_" + std::to_string(axis) + "]\n" +
          common + "TYPE = LINEAR\nFERROR = 1\nMIN_FERROR = 0.2\nHOME = " + home + "\nHOME_OFFSET = " + home +
          "\nHOME_SEQUENCE = 0\nHOME_ABSOLUTE_ENCODER = 2\n";
 }
 
-std::string iniOf(const MachineAxes& axes, double max_rpm, const std::string& folder) {
+std::string iniOf(const MachineAxes& axes, double max_rpm, const std::string& folder,
+                  const ConfigurationOptions& options) {
   std::ostringstream ini;
   ini << "[EMC]\nVERSION = 1.1\nMACHINE = smartmill\nNML_FILE = " << folder << "/mill.nml\n"
       << "[DISPLAY]\nDISPLAY = wait_for_end\nMAX_FEED_OVERRIDE = 1.0\n"
@@ -54,7 +43,7 @@ std::string iniOf(const MachineAxes& axes, double max_rpm, const std::string& fo
       << "\n[KINS]\nKINEMATICS = trivkins coordinates=xyz\nJOINTS = 3\n"
       << "[SPINDLE_0]\nMAX_FORWARD_VELOCITY = " << number(max_rpm) << "\nMIN_FORWARD_VELOCITY = 0\n";
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    ini << jointSection(axes, axis);
+    ini << jointSection(axes, axis, options);
   }
   return ini.str();
 }
@@ -86,7 +75,7 @@ void spindleOf(std::ostringstream& hal) {
          "net o-ok orient.is-oriented => spindle.0.is-oriented\n";
 }
 
-std::string halOf(double spindle_acceleration) {
+std::string halOf(double spindle_acceleration, const ConfigurationOptions& options) {
   std::ostringstream hal;
   hal << "loadrt [KINS]KINEMATICS\n"
          "loadrt [EMCMOT]EMCMOT servo_period_nsec=[EMCMOT]SERVO_PERIOD num_joints=[KINS]JOINTS "
@@ -107,13 +96,13 @@ std::string halOf(double spindle_acceleration) {
   setp(hal, "rps.gain", 1.0 / 60.0);
   setp(hal, "rpm.gain", 60.0);
   setp(hal, "atspeed.scale", 1.01);
-  setp(hal, "atspeed.difference", SPEED_TOLERANCE);
-  setp(hal, "standstill.difference", STANDSTILL);
-  setp(hal, "orient.tolerance", ORIENT_TOLERANCE);
-  setp(hal, "opid.Pgain", ORIENT_GAIN);
-  setp(hal, "opid.maxoutput", ORIENT_MAX_SPEED);
+  setp(hal, "atspeed.difference", options.speed_tolerance);
+  setp(hal, "standstill.difference", options.standstill);
+  setp(hal, "orient.tolerance", options.orient_tolerance);
+  setp(hal, "opid.Pgain", options.orient_gain);
+  setp(hal, "opid.maxoutput", options.orient_max_speed);
   hal << "setp opid.error-previous-target 0\nsetp lives.falling 1\n";
-  setp(hal, "lives.width", BEAT_LASTS);
+  setp(hal, "lives.width", options.beat_lasts);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::string joint = "joint." + std::to_string(axis), name(1, "xyz"[axis]);
     hal << "net " << name << "-motor " << joint << ".motor-pos-cmd => " << joint << ".motor-pos-fb\nnet "
@@ -138,15 +127,16 @@ std::string halOf(double spindle_acceleration) {
 
 }  // namespace
 
-std::map<std::string, std::string> configurationOf(const MachineModel& model, const std::string& folder) {
+std::map<std::string, std::string> configurationOf(const MachineModel& model, const std::string& folder,
+                                                   const ConfigurationOptions& options) {
   const MachineAxes& axes = model.needAxes("configure LinuxCNC");
   const Spindle& spindle = model.needSpindle("configure LinuxCNC");
   if (!spindle.max_speed || !spindle.acceleration) {
     throw Error(model.file +
                 ": spindle.max_speed_rpm and acceleration_rpm_per_s are required to configure LinuxCNC");
   }
-  return {{"mill.ini", iniOf(axes, units::rpmFromRadPerSec(*spindle.max_speed), folder)},
-          {"mill.hal", halOf(units::rpmFromRadPerSec(*spindle.acceleration))},
+  return {{"mill.ini", iniOf(axes, units::rpmFromRadPerSec(*spindle.max_speed), folder, options)},
+          {"mill.hal", halOf(units::rpmFromRadPerSec(*spindle.acceleration), options)},
           {"mill.tbl", "T1 P1 D10 Z0 ;end mill\n"}};
 }
 

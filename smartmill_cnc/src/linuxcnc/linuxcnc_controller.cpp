@@ -15,7 +15,6 @@ namespace {
 
 constexpr int DECIMALS = 4;             // of lengths in mm; LinuxCNC computes in doubles
 constexpr double ZERO_DISTANCE = 1e-9;  // [m] a smaller distance to go counts as zero
-constexpr double STREAM_TIMEOUT = 0.4;  // [s]
 
 Failure::Kind kindOf(Reply::Code code) {
   switch (code) {
@@ -88,6 +87,7 @@ class LinuxCncController : public Controller {
                      double (*now)())
       : folder_(parameters.folder),
         timeout_(parameters.timeout),
+        stream_timeout_(parameters.stream_timeout),
         client_(parameters.folder, parameters.timeout),
         stream_(std::move(stream)),
         now_(now) {}
@@ -125,7 +125,7 @@ class LinuxCncController : public Controller {
     // Silence while the controller waits for a processor does not count.
     const bool heard = std::exchange(servo_count_, count) != count || status_.starved > 0.0;
     const double silence = silence_.update(heard, now_());
-    if (!servo || silence > STREAM_TIMEOUT) {
+    if (!servo || silence > stream_timeout_) {
       return lost("connection to the " + name() + " lost: its servo stream is silent");
     }
     return readingOf(status_, *servo, open_, complete_ && status_.done == number_);
@@ -227,7 +227,7 @@ class LinuxCncController : public Controller {
   }
 
   const std::string folder_;
-  const double timeout_;  // [s]
+  const double timeout_, stream_timeout_;  // [s]
   GatewayClient client_;
   std::shared_ptr<const ServoStream> stream_;
   double (*now_)();

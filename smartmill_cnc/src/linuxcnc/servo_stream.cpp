@@ -8,9 +8,7 @@
 namespace smartmill::cnc::linuxcnc {
 namespace {
 
-constexpr double LATE_BIN = 1e-4;          // [s]
-constexpr double TRY_EVERY = 0.2;          // [s]
-constexpr std::uint64_t RESTART = 60'000;  // [samples] a larger gap is a restart of the controller
+constexpr double LATE_BIN = 1e-4;  // [s] resolution of the statistics
 
 }  // namespace
 
@@ -36,11 +34,12 @@ void ServoClock::addArrival(std::uint64_t number, double arrival) {
   }
 }
 
-ServoStream::ServoStream(const std::string& folder) : path_(folder + "/" + STREAM_SOCKET) {
+ServoStream::ServoStream(const std::string& folder, const ServoStreamOptions& options)
+    : path_(folder + "/" + STREAM_SOCKET), options_(options) {
 }
 
 std::vector<ServoSegment> ServoStream::step(double wait, double (*now)()) {
-  if (!connection_.open() && (now() - last_attempt_ > TRY_EVERY || now() < last_attempt_)) {
+  if (!connection_.open() && (now() - last_attempt_ > options_.retry_period || now() < last_attempt_)) {
     last_attempt_ = now();
     try {
       connection_ = LocalConnection::to(path_);
@@ -83,7 +82,7 @@ std::vector<ServoSegment> ServoStream::addBlock(const ServoBlock& block, double 
   const std::lock_guard<std::mutex> lock(mutex_);
   const std::uint32_t gap =
       block.first - static_cast<std::uint32_t>(next_);  // modulo 2^32, as the controller counts
-  if (!begun_ || gap > RESTART) {
+  if (!begun_ || gap > options_.restart_gap) {
     statistics_.restarts += statistics_.samples > 0 ? 1 : 0;
     restart(block);
   } else if (gap > 0) {
@@ -106,7 +105,7 @@ std::vector<ServoSegment> ServoStream::addBlock(const ServoBlock& block, double 
       segment_.stamp = clock_.timeOf(number);
     }
     segment_.samples.push_back(sample);
-    if (segment_.samples.size() == SEGMENT_LENGTH) {
+    if (segment_.samples.size() == options_.segment_length) {
       segments.push_back(std::exchange(segment_, {}));
     }
   }

@@ -35,7 +35,7 @@ MotionMachine::MotionMachine(Controller& controller, const MotionParameters& par
 }
 
 Status MotionMachine::step(const Reading& reading, double now) {
-  if (const double jump = observation_.clockJump(now); jump != 0.0) {
+  if (const double jump = observation_.clockJump(now, parameters_.longest_step); jump != 0.0) {
     if (busy()) {
       log_.warning("the clock jumped by " + fixedDecimals(jump, 3) + " s during a motion");
     }

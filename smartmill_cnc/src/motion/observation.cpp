@@ -3,15 +3,10 @@
 #include "smartmill_core/axis_names.h"
 
 namespace smartmill::cnc {
-namespace {
 
-constexpr double CLOCK_JUMP = 5.0;  // [s] between two steps; a longer time is no delay
-
-}  // namespace
-
-double Observation::clockJump(double next) const {
+double Observation::clockJump(double next, double longest_step) const {
   const double jump = next - now;
-  return jump >= 0.0 && (jump <= CLOCK_JUMP || !reading) ? 0.0 : jump;
+  return jump >= 0.0 && (jump <= longest_step || !reading) ? 0.0 : jump;
 }
 
 std::optional<std::size_t> Observation::axisIndex(int axis) const {

@@ -27,8 +27,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr const char* ALARMS = "cnc/alarms";
-constexpr int FEEDBACK_EVERY = 5;  // periods
-constexpr std::chrono::seconds LONGEST_WAIT{4};
 
 double steadySeconds() {
   return std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
@@ -160,7 +158,7 @@ void CncNode::run() {
     publishConditions();
     publishAlarms(stamp);
     log();
-    if (active_ && count % FEEDBACK_EVERY == 0) {
+    if (active_ && count % parameters_.feedback_every == 0) {
       active_->feedback();
     }
     if (const std::optional<Outcome> outcome = bridge_.takeOutcome()) {
@@ -186,7 +184,7 @@ std::optional<Result> CncNode::callInThread(std::function<Result()> call) {
   const auto answer = std::make_shared<std::promise<Result>>();
   std::future<Result> future = answer->get_future();
   post([answer, call] { answer->set_value(call()); });
-  if (future.wait_for(LONGEST_WAIT) != std::future_status::ready) {
+  if (future.wait_for(std::chrono::duration<double>(parameters_.longest_call)) != std::future_status::ready) {
     return std::nullopt;
   }
   return future.get();

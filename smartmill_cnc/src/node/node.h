@@ -49,7 +49,7 @@ class CncNode {
   void serveActions(ros::NodeHandle& nh);
   void run();
   void post(Job job);
-  /// Calls a function in the bridge's thread. @return empty after LONGEST_WAIT
+  /// Calls a function in the bridge's thread. @return empty after `longest_call`
   template <class Result>
   std::optional<Result> callInThread(std::function<Result()> call);
 

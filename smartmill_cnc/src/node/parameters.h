@@ -22,6 +22,10 @@ struct NodeParameters {
   std::string model;
   std::array<std::vector<double>, 3> travel;
 
+  // Set by programs only.
+  int feedback_every = 5;     ///< [polls] between two messages of feedback: ten a second
+  double longest_call = 4.0;  ///< [s] of a service in the bridge's thread, which waits for the controller
+
   void declare(ParameterTable& table);
   /// Checks the file alone. @throws Error naming key and value.
   void validate() const;

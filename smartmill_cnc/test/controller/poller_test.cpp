@@ -31,7 +31,7 @@ class PollerTest : public ::testing::Test {
 
   ScriptedController controller_;
   Log log_;
-  Poller poller_{controller_, 1.0, log_};
+  Poller poller_{controller_, {}, log_};
   std::vector<std::string> log_lines_;
 };
 

@@ -442,7 +442,7 @@ TEST_F(LinuxCncMachine, AControllerThatWaitsForAProcessorIsNotLost) {
   for (const pid_t thread : threads) {
     ::sched_setaffinity(thread, sizeof first, &first);
   }
-  // Longer than Liveness::HANGS.
+  // Longer than LivenessOptions::hangs.
   std::atomic<bool> over{false};
   bool permitted = false;
   std::thread rival([&] {

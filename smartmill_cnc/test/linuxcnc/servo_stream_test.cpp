@@ -86,7 +86,7 @@ TEST(ServoStream, ReturnsSegmentsAndCountsLostSamples) {
   ASSERT_GT(all.size(), 100u);
   std::uint64_t lost = 0;
   for (std::size_t i = 1; i < all.size(); ++i) {
-    EXPECT_LE(all[i].samples.size(), ServoStream::SEGMENT_LENGTH);
+    EXPECT_LE(all[i].samples.size(), ServoStreamOptions().segment_length);
     const std::uint64_t expected = all[i - 1].first + all[i - 1].samples.size();
     lost += all[i].first - expected;
     EXPECT_NEAR(all[i].stamp - all[i - 1].stamp,
@@ -118,8 +118,8 @@ TEST(SilenceTimer, PausesOfTheObserverDoNotCount) {
     timer.update(false, now += 0.01);
   }
   EXPECT_NEAR(timer.silent(), 0.2, 1e-12);
-  EXPECT_NEAR(timer.update(false, now += 30.0), 0.2 + SilenceTimer::LONGEST_STEP, 1e-12);
-  EXPECT_NEAR(timer.update(false, now -= 5.0), 0.2 + SilenceTimer::LONGEST_STEP, 1e-12);
+  EXPECT_NEAR(timer.update(false, now += 30.0), 0.2 + LivenessOptions().longest_step, 1e-12);
+  EXPECT_NEAR(timer.update(false, now -= 5.0), 0.2 + LivenessOptions().longest_step, 1e-12);
   EXPECT_EQ(timer.update(true, now + 0.01), 0.0);
 }
 

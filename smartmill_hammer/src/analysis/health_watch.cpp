@@ -4,13 +4,6 @@
 
 namespace smartmill::hammer {
 
-namespace {
-
-constexpr double DAY = 86400.0;           // [s]
-constexpr double REPORT_PERIOD = 3600.0;  // [s] of air cuts without a change
-
-}  // namespace
-
 std::optional<HealthReport> HealthWatch::addModes(const MeasuredModes& modes) {
   const std::string key = modes.tool + " " + modes.point + " " + modes.direction;
   const auto [at, fresh] = modes_.try_emplace(key, Modes{modes, modes, ""});
@@ -31,7 +24,7 @@ std::optional<HealthReport> HealthWatch::addAirCut(const std::string& tool, cons
   const std::vector<HealthChange> changes = airCutChanges(known.first, record, {});
   const std::string drift = driftText(changes);
   const bool report = drift.empty() != known.drift.empty() || !known.last_report ||
-                      stamp - *known.last_report > REPORT_PERIOD;
+                      stamp - *known.last_report > report_period_;
   known.drift = drift;
   if (!report || changes.empty()) return {};
   known.last_report = stamp;

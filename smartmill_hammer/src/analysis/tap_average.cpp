@@ -14,8 +14,6 @@
 namespace smartmill::hammer {
 namespace {
 
-constexpr std::size_t LEAD_SAMPLES = 8;  // kept before the beginning of a hit
-
 /// By ResponseKind.
 constexpr const char* RESPONSE_NAMES[] = {"acceleration", "velocity", "displacement", "force"};
 constexpr const char* FRF_UNITS[] = {"m/s2/N", "m/s/N", "m/N", "1"};
@@ -35,11 +33,11 @@ bool isTruncated(const Hit& hit, const TapFrfOptions& options) {
 }
 
 /// The record from just before the hit on, baselines subtracted.
-Hit fromHit(const Hit& hit) {
+Hit fromHit(const Hit& hit, std::size_t lead_samples) {
   Hit cut = hit;
   const auto peak =
       static_cast<std::size_t>(std::max_element(hit.force.begin(), hit.force.end()) - hit.force.begin());
-  const std::size_t lead = std::min(hit.pre_trigger, peak - hit.pre_trigger + LEAD_SAMPLES);
+  const std::size_t lead = std::min(hit.pre_trigger, peak - hit.pre_trigger + lead_samples);
   const std::size_t quiet = hit.pre_trigger - hit.pre_trigger / 4;
   for (std::vector<double>* channel : {&cut.force, &cut.response}) {
     const auto begin = channel->begin();
@@ -53,10 +51,10 @@ Hit fromHit(const Hit& hit) {
 }
 
 /// Truncated records begin with the hit and get the length of the shortest. @return [s] that length
-double cutToHits(std::vector<Hit>& hits) {
+double cutToHits(std::vector<Hit>& hits, std::size_t lead_samples) {
   std::size_t shortest = std::numeric_limits<std::size_t>::max();
   for (Hit& hit : hits) {
-    hit = fromHit(hit);
+    hit = fromHit(hit, lead_samples);
     shortest = std::min(shortest, hit.force.size());
   }
   for (Hit& hit : hits) {
@@ -119,7 +117,7 @@ TapFrf averageTaps(const std::vector<TapRecord>& taps, const TapFrfOptions& opti
   if (options.exponential_time == 0.0 &&
       std::any_of(accepted.begin(), accepted.end(),
                   [&options](const Hit& hit) { return isTruncated(hit, options); }))
-    result.truncated_length = cutToHits(accepted);
+    result.truncated_length = cutToHits(accepted, options.lead_samples);
   ImpactAnalysis analysis(impact);
   for (const Hit& hit : accepted) analysis.add(hit);
   result.measured = analysis.frf(options.average).band(1e-9, INFINITY);

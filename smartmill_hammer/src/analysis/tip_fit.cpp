@@ -13,9 +13,6 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// Bound of an unknown, in standard deviations of its prior.
-constexpr double UNKNOWN_BOUND = 6.0;
-constexpr int ROUNDS = 3, ITERATIONS = 40;
 /// Step of an unknown for derivatives, with modes to first order.
 constexpr double STEP = 1e-5;
 
@@ -173,8 +170,9 @@ TipFit fitTip(const TipProblem& problem) {
   TipFit best;
   best.z = VectorXd::Zero(problem.unknowns());
   best.z[LATERAL] = best.z[ROTATIONAL] = problem.options.seat_start;
-  std::vector<fit::Parameter> unknowns(static_cast<std::size_t>(problem.unknowns()),
-                                       {0.0, -UNKNOWN_BOUND, UNKNOWN_BOUND, 1.0});
+  std::vector<fit::Parameter> unknowns(
+      static_cast<std::size_t>(problem.unknowns()),
+      {0.0, -problem.options.unknown_bound, problem.options.unknown_bound, 1.0});
   unknowns[LATERAL].low = unknowns[ROTATIONAL].low = problem.options.rigid_seat;
   for (std::size_t i = 0; i < problem.spindleModes(); ++i) {
     unknowns[SHARED + 3 * i] = {0.0, -0.7, 0.7, 0.05};
@@ -182,9 +180,9 @@ TipFit fitTip(const TipProblem& problem) {
   }
   fit::Options options;
   options.name = "tip correction";
-  options.iterations = ITERATIONS;
+  options.iterations = problem.options.iterations;
   options.function_tolerance = 1e-8;
-  for (int round = 0; round < ROUNDS; ++round) {
+  for (int round = 0; round < problem.options.rounds; ++round) {
     const std::vector<HeldMode> held = HeldTool(toolInHolder(problem, best.z)).modes();
     const std::vector<std::size_t> match = matchModes(problem, held);
     if (std::count(match.begin(), match.end(), held.size()) > 0) return {};

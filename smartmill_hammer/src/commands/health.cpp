@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "node/parameters.h"
 #include "node/wiring.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/io/csv.h"
@@ -46,9 +47,6 @@ struct History {
   std::map<std::string, ModalModel> sensors;        // latest, by channel of the dynamometer
 };
 
-constexpr double DAY = 86400.0;     // [s]
-constexpr double HOLD_BACK = 0.05;  // [s] see StreamSorter
-
 History read(const std::vector<std::string>& bags) {
   History history;
   for (const std::string& bag : bags) {
@@ -64,7 +62,7 @@ History read(const std::vector<std::string>& bags) {
       if (std::isfinite(set.friction_viscous) && std::isfinite(set.friction_coulomb))
         history.friction.push_back({bag, set.stamp, set.friction_viscous, set.friction_coulomb});
     });
-    IdleSpindlePipeline idle(HOLD_BACK);
+    IdleSpindlePipeline idle(NodeParameters().hold_back);
     connectIdle(reader, idle);
     feed<SpindleAngle>(reader, names::SPINDLE_ANGLE, idle);
     reader.run();

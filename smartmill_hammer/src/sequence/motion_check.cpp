@@ -5,12 +5,6 @@
 #include "smartmill_hammer/search/flute_search.h"
 
 namespace smartmill::hammer {
-namespace {
-
-/// The distance to go is zero between two blocks too: two states in a row.
-constexpr int REST_STATES = 2;
-
-}  // namespace
 
 void MotionCheck::expectAngle(double angle) {
   angle_ = angle;
@@ -36,7 +30,7 @@ bool MotionCheck::isComplete(const CncState& state, const AxesPosition& axes) {
   for (std::size_t i = 0; i < 3 && checks_position_; ++i)
     resting = resting && std::abs(axes.position[i] - position_[i]) <= tolerance_;
   rest_count_ = resting ? rest_count_ + 1 : 0;
-  return rest_count_ >= REST_STATES;
+  return rest_count_ >= parameters_.rest_states;
 }
 
 bool MotionCheck::isComplete(const SpindleAngle& angle) {

@@ -17,8 +17,6 @@ namespace {
 
 /// Angles of M119: 0..4095 (thesis eq. 6.1).
 constexpr double COUNTS = 4096.0;
-constexpr double STOP_TIMEOUT = 10.0;    // [s] for the axes to come to rest after a stop
-constexpr double AVERAGE_TIMEOUT = 1.0;  // [s]
 
 Command commandOf(Command::Kind kind, double now) {
   Command command;
@@ -33,7 +31,7 @@ StationControl::StationControl(const HammerParameters& parameters, double range_
     : parameters_(parameters),
       range_volt_(range_volt),
       motion_(parameters),
-      average_(parameters.averaging_time),
+      average_(parameters),
       collector_({parameters.trigger_force, parameters.pre_trigger, parameters.record_length}),
       cross_collector_({parameters.trigger_force, parameters.pre_trigger, parameters.record_length}) {
 }
@@ -112,12 +110,12 @@ void StationControl::strikeAfterRest(double now) {
 void StationControl::measureVoltage(double from) {
   average_.start(from);
   wait_ = Wait::voltage;
-  deadline_ = from + AVERAGE_TIMEOUT;
+  deadline_ = from + parameters_.average_timeout;
 }
 
 void StationControl::stop(double now) {
   motion_.expectStandstill();
-  send(commandOf(Command::Kind::stop, now), Wait::standstill, STOP_TIMEOUT);
+  send(commandOf(Command::Kind::stop, now), Wait::standstill, parameters_.stop_timeout);
 }
 
 void StationControl::release() {

@@ -8,11 +8,6 @@
 #include "smartmill_core/signal/statistics.h"
 
 namespace smartmill::hammer {
-namespace {
-
-constexpr int MAX_RESTARTS = 3;
-
-}  // namespace
 
 void VoltageAverage::start(double from) {
   from_ = from;
@@ -30,13 +25,13 @@ std::optional<MeanVoltage> VoltageAverage::add(double time, std::uint64_t index,
   index_ = index;
   if (lost || !std::isfinite(volt)) {
     volts_.clear();
-    if (++restarts_ > MAX_RESTARTS)
+    if (++restarts_ > parameters_.average_restarts)
       fault_ = lost ? "daq/hammer loses samples"
                     : "daq/hammer: sample " + std::to_string(index) + " of gap is not a number";
     return std::nullopt;
   }
   volts_.push_back(volt);
-  if (volts_.size() < static_cast<std::size_t>(std::max(2L, std::lround(averaging_time_ * rate))))
+  if (volts_.size() < static_cast<std::size_t>(std::max(2L, std::lround(parameters_.averaging_time * rate))))
     return std::nullopt;
   const std::vector<double> all = std::exchange(volts_, {});
   return MeanVoltage{mean(all), standardDeviation(all) / std::sqrt(static_cast<double>(all.size()))};

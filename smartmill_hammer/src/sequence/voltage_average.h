@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "smartmill_hammer/sequence/hammer_parameters.h"
+
 namespace smartmill::hammer {
 
 /// Mean of the displacement sensor's voltage.
@@ -16,8 +18,7 @@ struct MeanVoltage {
 /// Averages consecutive finite samples; a lost or NaN sample starts the average again.
 class VoltageAverage {
  public:
-  /// @param averaging_time [s]
-  explicit VoltageAverage(double averaging_time) : averaging_time_(averaging_time) {}
+  explicit VoltageAverage(const HammerParameters& parameters) : parameters_(parameters) {}
 
   /// @param from [s] first sample averaged
   void start(double from);
@@ -28,7 +29,7 @@ class VoltageAverage {
   void reset();
 
  private:
-  double averaging_time_;
+  const HammerParameters& parameters_;
   double from_ = 0.0;
   std::vector<double> volts_;
   std::uint64_t index_ = 0;

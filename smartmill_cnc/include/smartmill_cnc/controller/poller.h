@@ -9,6 +9,11 @@
 
 namespace smartmill::cnc {
 
+struct PollerOptions {
+  double reconnect_period = 1.0;  ///< [s] between the first two attempts; the interval doubles
+  double longest_wait = 8.0;  ///< [1] limit of the interval, of reconnect_period: a new start is soon found
+};
+
 /// Maintains the connection to a controller and reads it once per period. A loss or a failure to connect is
 /// logged once, not in every period.
 class Poller {
@@ -17,8 +22,7 @@ class Poller {
     int made = 0, lost = 0, attempts = 0;
   };
 
-  /// @param reconnect_period [s] between the first two attempts; the interval doubles up to eight times this
-  Poller(Controller& controller, double reconnect_period, Log& log);
+  Poller(Controller& controller, const PollerOptions& options, Log& log);
 
   /// Connects if an attempt is scheduled, then reads. @param now [s] any steady time.
   void fetch(double now);
@@ -36,7 +40,7 @@ class Poller {
   void connect();
 
   Controller& controller_;
-  double reconnect_period_;
+  PollerOptions options_;
   double wait_;       // [s] between the last attempt and the next
   int failures_ = 0;  // consecutive
   Counts counts_;

@@ -13,6 +13,9 @@ struct LinuxCncParameters {
   std::string folder;
   double timeout = 1.5;
 
+  // Set by programs only.
+  double stream_timeout = 0.4;  ///< [s] of silence of the servo stream: a loss is reported within 0.5 s
+
   void declare(ParameterTable& table) {
     table.text("linuxcnc_folder", folder, "folder of the machine, with the sockets of linuxcnc_machine");
     table.number("linuxcnc_timeout", timeout, "s", Range::positive(),

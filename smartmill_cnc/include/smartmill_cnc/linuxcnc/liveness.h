@@ -7,16 +7,17 @@
 
 namespace smartmill::cnc::linuxcnc {
 
+struct LivenessOptions {
+  double hangs = 0.4;       ///< [s] without a cycle although a processor is available: reported within 0.5 s
+  double starves = 2.0;     ///< [s] without a cycle for any reason: too slow to run a controller
+  double suspicious = 0.1;  ///< [s] without a cycle before its processes are checked, which costs time
+  double longest_step = 0.05;  ///< [s] between two updates; beyond it the observer itself waited
+};
+
 /// Whether a controller that counts cycles is alive. If the count stops, the controller has ended, hangs, or
 /// waits for a processor on an overloaded computer; the evidence distinguishes these cases.
 class Liveness {
  public:
-  static constexpr double HANGS = 0.4;       ///< [s] without a cycle although a processor is available
-  static constexpr double STARVES = 2.0;     ///< [s] without a cycle for any reason
-  static constexpr double SUSPICIOUS = 0.1;  ///< [s] without a cycle before its processes are checked
-  static constexpr double LONGEST_STEP =
-      0.05;  ///< [s] between two updates; beyond it the observer itself waited
-
   enum class Verdict { lives, ended, hangs, starves };
 
   struct Evidence {
@@ -25,24 +26,27 @@ class Liveness {
     bool waits = false;  ///< one of its threads waits for a processor
   };
 
+  explicit Liveness(const LivenessOptions& options = {}) : options_(options) {}
+
   /// @param now [s] any steady time
   Verdict update(const Evidence& evidence, double now) {
-    const double step = std::max(0.0, now - last_), own = std::max(0.0, step - LONGEST_STEP);
+    const double step = std::max(0.0, now - last_), own = std::max(0.0, step - options_.longest_step);
     last_ = now;
     if (evidence.beats) {
       silent_ = starved_ = 0.0;
     } else {
-      silent_ += evidence.waits ? 0.0 : std::min(step, LONGEST_STEP);
+      silent_ += evidence.waits ? 0.0 : std::min(step, options_.longest_step);
       starved_ += evidence.waits ? step : own;
     }
-    return evidence.ended                 ? Verdict::ended
-           : silent_ > HANGS              ? Verdict::hangs
-           : silent_ + starved_ > STARVES ? Verdict::starves
-                                          : Verdict::lives;
+    return evidence.ended                          ? Verdict::ended
+           : silent_ > options_.hangs              ? Verdict::hangs
+           : silent_ + starved_ > options_.starves ? Verdict::starves
+                                                   : Verdict::lives;
   }
-  /// The same with evidence from its processes, checked only after SUSPICIOUS.
+  /// The same with evidence from its processes, checked only after `suspicious`.
   Verdict update(bool beats, ProcessWatch& processes, double now) {
-    return update({beats, processes.ended(), silent() > SUSPICIOUS && processes.waitsForProcessor(now)}, now);
+    return update(
+        {beats, processes.ended(), silent() > options_.suspicious && processes.waitsForProcessor(now)}, now);
   }
   /// [s] since the last cycle
   double silent() const { return silent_ + starved_; }
@@ -50,6 +54,7 @@ class Liveness {
   double starved() const { return starved_; }
 
  private:
+  LivenessOptions options_;
   double silent_ = 0.0, starved_ = 0.0, last_ = std::numeric_limits<double>::infinity();
 };
 

@@ -56,14 +56,18 @@ struct ServoSegment {
   std::vector<ServoSample> samples;
 };
 
+struct ServoStreamOptions {
+  std::size_t segment_length = 10;     ///< [samples] of 1 ms: 100 messages a second
+  double retry_period = 0.2;           ///< [s] between two attempts to connect
+  std::uint64_t restart_gap = 60'000;  ///< [samples] a larger gap is a restart of the controller: a minute
+};
+
 /// Every servo cycle of the controller, from linuxcnc_stream. One thread calls step(); the const functions
 /// and setLoad() may be called from any thread.
 class ServoStream {
  public:
-  static constexpr std::size_t SEGMENT_LENGTH = 10;  ///< [1] samples
-
   /// @param folder of the machine
-  explicit ServoStream(const std::string& folder);
+  explicit ServoStream(const std::string& folder, const ServoStreamOptions& options = {});
 
   /// Connects if an attempt is scheduled, then waits for data and reads. @param wait [s] at most @param now
   /// clock [s]
@@ -83,6 +87,7 @@ class ServoStream {
   void countLate(double late);
 
   const std::string path_;
+  const ServoStreamOptions options_;
   LocalConnection connection_;
   double last_attempt_ = -std::numeric_limits<double>::infinity();
   ServoClock clock_{1e-3};

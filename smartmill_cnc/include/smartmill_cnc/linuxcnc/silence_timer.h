@@ -3,17 +3,17 @@
 #include <algorithm>
 #include <limits>
 
+#include "smartmill_cnc/linuxcnc/liveness.h"
+
 namespace smartmill::cnc::linuxcnc {
 
 /// Time since an event last happened, excluding pauses of the observer (a starved process, a suspended
-/// computer): every update adds at most LONGEST_STEP.
+/// computer): every update adds at most LivenessOptions::longest_step.
 class SilenceTimer {
  public:
-  static constexpr double LONGEST_STEP = 0.05;  ///< [s] most that one update adds
-
   /// @param happened since the last update @param now [s] any steady time @return [s] since the last event
   double update(bool happened, double now) {
-    silent_ = happened ? 0.0 : silent_ + std::clamp(now - last_, 0.0, LONGEST_STEP);
+    silent_ = happened ? 0.0 : silent_ + std::clamp(now - last_, 0.0, LivenessOptions().longest_step);
     last_ = now;
     return silent_;
   }

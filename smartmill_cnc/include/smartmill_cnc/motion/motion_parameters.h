@@ -15,6 +15,9 @@ struct MotionParameters {
   double open_timeout = 3.0;
   MotionLimits limits;
 
+  // Set by programs only.
+  double longest_step = 5.0;  ///< [s] between two polls; a longer time is no delay but a set clock
+
   /// Without the limits, which have their own declare().
   void declare(ParameterTable& table) {
     table.flag("read_only", read_only, "true: motion cannot be armed, nothing is written to the controller");

@@ -15,7 +15,8 @@ struct Observation {
 
   const CncState& state() const { return reading->state; }
   /// [s] Jump of the clock to the next stamp: it was set, or the computer was suspended; 0: none.
-  double clockJump(double next) const;
+  /// @param longest_step [s] between two stamps
+  double clockJump(double next, double longest_step) const;
   /// Index of x (0), y (1), z (2) among the controller's axes.
   std::optional<std::size_t> axisIndex(int axis) const;
 

@@ -7,6 +7,8 @@
 
 namespace smartmill::hammer {
 
+constexpr double DAY = 86400.0;  ///< [s]
+
 /// Normal relative changes from day to day (tool seat, temperature), one standard deviation, added to the
 /// stated standard deviations.
 struct HealthAllowance {

@@ -25,6 +25,9 @@ struct HealthReport {
 /// kind; air cuts where a drift begins or ends, and otherwise once an hour.
 class HealthWatch {
  public:
+  /// @param report_period [s] between two reports of air cuts without a change: a warm-up takes hours
+  explicit HealthWatch(double report_period = 3600.0) : report_period_(report_period) {}
+
   /// @return empty: the first of its kind, or already reported
   std::optional<HealthReport> addModes(const MeasuredModes& modes);
   std::optional<HealthReport> addAirCut(const std::string& tool, const AirCutRecord& record);
@@ -43,6 +46,7 @@ class HealthWatch {
     std::string drift;
     std::optional<double> last_report;  // [s]
   };
+  double report_period_;
   std::map<std::string, Modes> modes_;      // by tool, point and direction
   std::map<std::string, AirCut> air_cuts_;  // by tool
 };

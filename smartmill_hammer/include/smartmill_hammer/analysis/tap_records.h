@@ -75,6 +75,8 @@ struct TapFrfOptions {
   /// [1] A record is truncated when its end exceeds this share of its beginning, which changes the gains by
   /// as much, and this multiple of the noise.
   double ringing_share = 0.02, clear_of_noise = 2.0;
+  std::size_t lead_samples =
+      8;  ///< kept before a hit begins, since the force rises before its onset is detected
 };
 
 /// Average of several hits of one point.

@@ -67,9 +67,18 @@ struct HammerParameters : HitTestParameters {
   double tool_fluted_length = 0.0;
 
   // Set by programs only.
-  double range_share = 0.98;   ///< [1] of the sensor's range, from which a voltage counts as its end
-  int near_samples = 8;        ///< consecutive ones above it that mean that the tool is too near, not noise
-  std::size_t least_hits = 3;  ///< of fewer hits no outlier can be identified
+  double range_share = 0.98;     ///< [1] of the sensor's range, from which a voltage counts as its end
+  int near_samples = 8;          ///< consecutive ones above it that mean that the tool is too near, not noise
+  double stop_timeout = 10.0;    ///< [s] for the axes to rest after a stop: braking takes less than 1 s
+  double average_timeout = 1.0;  ///< [s] for a mean voltage: a hundred times averaging_time
+  int average_restarts = 3;      ///< lost or NaN samples accepted in one measurement: single losses occur
+  int rest_states = 2;           ///< in a row without distance to go: it is zero between two blocks, too
+  double second_search_step = 0.5;  ///< [1] of the first search's: the helix predicts where the flute is
+  /// [1] of the gap at zero volt by which a flank measured at the same angle may be nearer at the second
+  /// height.
+  double same_flank = 0.1;
+  double largest_swing = 1.5;       ///< [1] of a later hit over that of the trial hit: peaks scatter
+  std::size_t least_hits = 3;       ///< of fewer hits no outlier can be identified
   std::size_t least_jackknife = 4;  ///< hits whose scatter gives a standard deviation
   double usual_flutes = 2.0,
          usual_flutes_std = 0.6;  ///< [1] fluted length in diameters where it is not given

@@ -7,10 +7,6 @@
 namespace smartmill::hammer {
 namespace {
 
-/// [1] of the gap at zero volt by which a flank measured at the same angle may be nearer at the second
-/// height.
-constexpr double SAME_FLANK = 0.1;
-
 /// Jogs the tool towards a sensor until its voltage is about zero and measures its sensitivity there. The
 /// measured voltages also extend what is known of the flanks, by which the approach is limited.
 class CalibrateSensor : public SequenceStep {
@@ -184,7 +180,8 @@ class CalibrateAtSecondHeight : public CalibrateSensor {
     // of the flanks, and the tool counts as round.
     const SensorApproach& approach = measurement_.approach;
     if (approach.nominalGap(volt) <
-        approach.nominalGap(measurement_.flank_volt) - SAME_FLANK * measurement_.station.gap_at_zero_volt)
+        approach.nominalGap(measurement_.flank_volt) -
+            measurement_.parameters.same_flank * measurement_.station.gap_at_zero_volt)
       measurement_.approach.clearFlanks();
   }
   SensorState& sensor() override { return measurement_.second.sensor; }

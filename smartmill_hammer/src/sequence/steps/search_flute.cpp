@@ -8,9 +8,6 @@
 namespace smartmill::hammer {
 namespace {
 
-/// First step of the second search over that of the first: the helix predicts where the flute is.
-constexpr double SECOND_STEP = 0.5;
-
 /// Turns the spindle and measures the voltage until a flute is found.
 class SearchFlute : public SequenceStep {
  public:
@@ -95,7 +92,7 @@ class SearchFluteHalfway : public SearchFlute {
     // A right-hand helix lags with height: the spindle must turn on by the lag.
     expected_angle_ =
         measurement_.result.flute_low + measurement_.tool.lag() * 0.5 * measurement_.station.offset;
-    return start(now, expected_angle_, SECOND_STEP);
+    return start(now, expected_angle_, measurement_.parameters.second_search_step);
   }
 
  private:

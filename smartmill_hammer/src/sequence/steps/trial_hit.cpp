@@ -8,9 +8,6 @@
 namespace smartmill::hammer {
 namespace {
 
-/// Largest swing of a later hit over that of the trial hit.
-constexpr double LARGEST_SWING = 1.5;
-
 class TrialHit : public HitStep {
  public:
   using HitStep::HitStep;
@@ -38,8 +35,9 @@ class TrialHit : public HitStep {
     const double rest = mean(before), noise = 3.0 * standardDeviation(before);
     const double top = *std::max_element(hit.response.begin(), hit.response.end());
     const SensorApproach& approach = measurement_.approach;
-    const double swing = LARGEST_SWING * std::max(0.0, approach.nominalGap(rest) -
-                                                           approach.nominalGap(std::max(rest, top - noise)));
+    const double swing =
+        measurement_.parameters.largest_swing *
+        std::max(0.0, approach.nominalGap(rest) - approach.nominalGap(std::max(rest, top - noise)));
     measurement_.swing = std::min(swing, measurement_.station.gap_at_zero_volt);
     measurement_.report(
         formatted("a hit swings the tool by %.0f um at most towards the sensor", 1e6 * *measurement_.swing),
