@@ -43,7 +43,7 @@ double massPerLength(const RoundBeam& b) {
 
 /// Natural frequencies [Hz] of the beam with `held` fixed degrees of freedom at the first node.
 std::vector<double> frequencies(const RoundBeam& beam, Eigen::Index held) {
-  const RoundBeam::Matrices m = beam.matrices(24);
+  const RoundBeam::Matrices m = beam.matrices();
   const Eigen::Index n = m.mass.rows() - held;
   const auto of_mass = linear::symmetricEigensystem(m.mass.bottomRightCorner(n, n));
   const Eigen::MatrixXd root =
@@ -80,7 +80,7 @@ TEST(RoundBeam, HasTheClosedFormCompliance) {
     beam.shear = shear;
     beam.fluted = 25e-3;
     beam.diameter = 9e-3;
-    const RoundBeam::Matrices m = beam.matrices(24);
+    const RoundBeam::Matrices m = beam.matrices();
     const Eigen::Index n = m.mass.rows() - 2;
     Eigen::VectorXd force = Eigen::VectorXd::Zero(n);
     force[n - 2] = 100.0;

@@ -18,9 +18,6 @@ namespace {
 using namespace smartmill;
 using Clock = std::chrono::steady_clock;
 
-constexpr double STEP = 1e-3;        // [s]
-constexpr double MOST_BEHIND = 0.5;  // [s] after a longer pause of the computer the elapsed time is skipped
-
 const std::map<std::string, int> MODES{{"mdi", focas::AUT_MDI},       {"mem", focas::AUT_MEM},
                                        {"edit", focas::AUT_EDIT},     {"handle", focas::AUT_HANDLE},
                                        {"jog", focas::AUT_JOG},       {"inc", focas::AUT_INC},
@@ -29,6 +26,8 @@ const std::map<std::string, int> MODES{{"mdi", focas::AUT_MDI},       {"mem", fo
 struct Arguments {
   std::string mode = "dnc", model, type = "30";
   focas::ServerOptions server;
+  const std::chrono::milliseconds step{1};  // of the machine
+  const double most_behind = 0.5;  // [s] after a longer pause of the computer the elapsed time is skipped
 };
 
 volatile std::sig_atomic_t stop_requested = 0;
@@ -37,18 +36,18 @@ void requestStop(int) {
   stop_requested = 1;
 }
 
-void run(sim::Controller& controller) {
+void run(const Arguments& a, sim::Controller& controller) {
   std::vector<sim::MotionState> states;
   Clock::time_point done = Clock::now();
   while (stop_requested == 0) {
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
     const Clock::time_point now = Clock::now();
-    if (std::chrono::duration<double>(now - done).count() > MOST_BEHIND) {
+    if (std::chrono::duration<double>(now - done).count() > a.most_behind) {
       done = now;
     }
-    const auto count = static_cast<std::size_t>(std::chrono::duration<double>(now - done).count() / STEP);
-    controller.advance(STEP, count, states);
-    done += std::chrono::milliseconds(1) * count;
+    const auto count = static_cast<std::size_t>((now - done) / a.step);
+    controller.advance(std::chrono::duration<double>(a.step).count(), count, states);
+    done += a.step * count;
   }
 }
 
@@ -64,7 +63,7 @@ void run(const Arguments& a) {
   std::printf("controller: listens on %s:%d, mode %s\n", a.server.bind_address.c_str(), server.port(),
               a.mode.c_str());
   std::fflush(stdout);
-  run(controller);
+  run(a, controller);
 }
 
 }  // namespace

@@ -7,17 +7,11 @@
 namespace smartmill::sim {
 namespace {
 
-// Size of sensor and hammer as in Dunwoody fig. 4.1: a probe of 10 mm and a solenoid of 20 mm, 60 mm long;
-// the hammer at rest is behind the sensor's face by the stroke of its plunger.
-constexpr double SENSOR_HALF_WIDTH = 5e-3, SENSOR_ABOVE_TIP = 5e-3;  // [m]
-constexpr double HAMMER_HALF_WIDTH = 10e-3, PLUNGER = 3e-3;          // [m]
-constexpr double BODY_LENGTH = 60e-3;                                // [m]
-constexpr double FACE_GAPS = 2.0;  // the sensor faces the tool at about twice its gap at zero volt
-constexpr double FAR = 10.0;       // [m]
+constexpr double FAR = 10.0;  // [m]
 
 }  // namespace
 
-CollisionWatch CollisionWatch::ofModel(const MachineModel& model) {
+CollisionWatch CollisionWatch::ofModel(const MachineModel& model, const CollisionOptions& options) {
   CollisionWatch watch;
   if (!model.tool) return watch;
   watch.tool_radius = model.tool->radius();
@@ -34,18 +28,19 @@ CollisionWatch CollisionWatch::ofModel(const MachineModel& model) {
                             double high) {
         Body b{name + " " + direction, station_position, station_position};
         b.low[along] = station_position[along] + watch.tool_radius + behind;
-        b.high[along] = b.low[along] + BODY_LENGTH;
+        b.high[along] = b.low[along] + options.body_length;
         b.low[across] = station_position[across] - half_width;
         b.high[across] = station_position[across] + half_width;
         b.low[2] = low;
         b.high[2] = high;
         watch.add(b);
       };
-      const double face = FACE_GAPS * station.gap_at_zero_volt;
+      const double face = options.face_gaps * station.gap_at_zero_volt;
       // No body in front of the face: the tool turns there.
-      body("SENSOR", face, SENSOR_HALF_WIDTH, -FAR, station_position[2] + SENSOR_ABOVE_TIP);
-      body("HAMMER", face + PLUNGER, HAMMER_HALF_WIDTH, station_position[2] + SENSOR_ABOVE_TIP,
-           station_position[2] + station.offset + HAMMER_HALF_WIDTH);
+      body("SENSOR", face, options.sensor_half_width, -FAR, station_position[2] + options.sensor_above_tip);
+      body("HAMMER", face + options.plunger, options.hammer_half_width,
+           station_position[2] + options.sensor_above_tip,
+           station_position[2] + station.offset + options.hammer_half_width);
     }
   }
   if (model.workpiece) watch.add({"TABLE", {-FAR, -FAR, -FAR}, {FAR, FAR, model.workpiece->low[2]}});

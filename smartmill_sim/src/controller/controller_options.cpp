@@ -8,11 +8,6 @@
 #include "smartmill_sim/controller/collision_watch.h"
 
 namespace smartmill::sim {
-namespace {
-
-constexpr double LOAD_METER_STEP_VOLT = 3.0e-4;  // [V] resolution of the load meter (Dunwoody 3.2.1)
-
-}  // namespace
 
 ControllerOptions ControllerOptions::ofModel(const MachineModel& model) {
   ControllerOptions options;
@@ -25,7 +20,7 @@ ControllerOptions ControllerOptions::ofModel(const MachineModel& model) {
   options.spindle_acceleration = spindle.acceleration.value_or(units::radPerSecFromRpm(10000.0));
   options.spindle_torque = spindle.rated_torque.value_or(0.0);
   if (spindle.load_meter_full_scale)
-    options.load_step = 100.0 * LOAD_METER_STEP_VOLT / *spindle.load_meter_full_scale;
+    options.load_step = 100.0 * LOAD_METER_STEP / *spindle.load_meter_full_scale;
   options.watches.push_back(std::make_shared<CollisionWatch>(CollisionWatch::ofModel(model)));
   return options;
 }

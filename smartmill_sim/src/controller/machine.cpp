@@ -11,6 +11,7 @@ constexpr const char* RESIDENT_PROGRAM = "O0001(PARK)\nG21 G90 G94\nG53 G0 Z0\nM
 
 ControlledMachine::ControlledMachine(const ControllerOptions& o)
     : options(o),
+      memory(o.memory_size),
       calendar(o.wall_clock),
       axes(options.axes),
       spindle(options, overrides),

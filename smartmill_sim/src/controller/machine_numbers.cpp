@@ -11,8 +11,6 @@ namespace {
 using focas::NumberedType;
 using focas::NumberedValue;
 
-constexpr double AMBIENT = 25.0;  // [deg C] motors without a thermal model
-
 NumberedValue ofAxes(int number, NumberedType type, std::vector<double> values, int decimals = 0) {
   return {number, type, std::move(values), true, decimals};
 }
@@ -59,7 +57,7 @@ std::vector<NumberedValue> machineParameters(const ControllerOptions& o) {
   };
 }
 
-std::vector<NumberedValue> machineDiagnoses(const DiagnosisState& state) {
+std::vector<NumberedValue> machineDiagnoses(const ControllerOptions& o, const DiagnosisState& state) {
   const double steps = state.spindle_angle / units::TWO_PI * nc::ORIENT_STEPS;
   return {
       single(0, NumberedType::byte, state.waits_for_m ? 1 : 0),   // waits for FIN
@@ -67,9 +65,9 @@ std::vector<NumberedValue> machineDiagnoses(const DiagnosisState& state) {
       single(2, NumberedType::byte, state.dwells ? 1 : 0),        // dwell
       single(5, NumberedType::byte, state.at_zero_feed ? 1 : 0),  // feed override 0 %
       ofAxes(300, NumberedType::double_word, all(0.0)),           // servo error: ideal axes
-      ofAxes(308, NumberedType::byte, all(AMBIENT)),              // servo motor temperature [deg C]
-      ofAxes(309, NumberedType::byte, all(AMBIENT)),              // encoder temperature [deg C]
-      single(403, NumberedType::byte, AMBIENT),                   // spindle motor temperature [deg C]
+      ofAxes(308, NumberedType::byte, all(o.motor_temperature)),  // servo motor temperature [deg C]
+      ofAxes(309, NumberedType::byte, all(o.motor_temperature)),  // encoder temperature [deg C]
+      single(403, NumberedType::byte, o.motor_temperature),       // spindle motor temperature [deg C]
       single(410, NumberedType::real, state.spindle_load, 2),     // spindle load meter [percent]
       single(445, NumberedType::double_word,
              static_cast<int>(steps)),  // spindle position in steps

@@ -19,7 +19,8 @@ struct DiagnosisState {
 /// Parameters of a 30i that follow from the machine's options.
 std::vector<focas::NumberedValue> machineParameters(const ControllerOptions& options);
 /// Diagnosis numbers of a 30i for a state.
-std::vector<focas::NumberedValue> machineDiagnoses(const DiagnosisState& state);
+std::vector<focas::NumberedValue> machineDiagnoses(const ControllerOptions& options,
+                                                   const DiagnosisState& state);
 
 /// Those with numbers from first to last.
 std::vector<focas::NumberedValue> within(std::vector<focas::NumberedValue> numbers, int first, int last);

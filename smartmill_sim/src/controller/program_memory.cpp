@@ -55,7 +55,7 @@ focas::EwCode ProgramMemory::store(const std::string& text, bool runs, const foc
     if (runs && number == selected_) return focas::EW_BUSY;
     size += program.text.size();
   }
-  if (size > CAPACITY) return focas::EW_OVRFLOW;
+  if (size > capacity_) return focas::EW_OVRFLOW;
   for (auto& [number, program] : loaded) programs_[number] = std::move(program);
   return focas::EW_OK;
 }

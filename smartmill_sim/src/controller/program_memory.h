@@ -13,7 +13,8 @@ namespace smartmill::sim {
 /// it must not change.
 class ProgramMemory {
  public:
-  static constexpr std::size_t CAPACITY = 512 * 1024;  ///< [byte]
+  /// @param capacity [byte]
+  explicit ProgramMemory(std::size_t capacity) : capacity_(capacity) {}
 
   /// Stores one or several programs "O1234 ... %" of a download; existing ones are replaced.
   /// @return EW_OK, EW_DATA (text without O number), EW_OVRFLOW, EW_BUSY (contains the running program:
@@ -34,6 +35,7 @@ class ProgramMemory {
     std::string text;  // from the O word on, ends with a newline
     focas::DateTime changed;
   };
+  std::size_t capacity_;
   std::map<int, Program> programs_;
   int selected_ = 0;
 };

@@ -20,8 +20,6 @@
 
 namespace smartmill::sim {
 
-constexpr double POLL_PERIOD = 1e-3;  // [s]
-
 /// The simulated lathe on ROS: probes on daq/displacement, an accelerometer on daq/vibration, the spindle on
 /// spindle/angle; the fast tool servo follows control/command. Runs in wall-clock time.
 class LatheNode {
@@ -67,7 +65,7 @@ class LatheNode {
         std::unique_lock<std::mutex> lock(mutex_);
         if (parameters_.await_commands && !lathe_.hasCommands(size)) {
           lock.unlock();
-          std::this_thread::sleep_for(std::chrono::duration<double>(POLL_PERIOD));
+          std::this_thread::sleep_for(std::chrono::duration<double>(parameters_.poll_period));
           continue;
         }
         block = lathe_.advance(size);

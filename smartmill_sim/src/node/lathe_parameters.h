@@ -11,6 +11,9 @@ struct LatheParameters {
   double block = 5.0e-3;
   bool await_commands = false;
 
+  // Set by programs only.
+  double poll_period = 1e-3;  ///< [s] of waiting for commands: a fifth of a block
+
   void declare(ParameterTable& table) {
     table.title(
         "Parameters of lathe_node (package smartmill_sim): the simulated lathe with a fast tool servo. SI "

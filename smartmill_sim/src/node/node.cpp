@@ -22,10 +22,7 @@
 namespace smartmill::sim {
 namespace {
 
-constexpr double TRUTH_STEP = 2.0, TRUTH_END = 6000.0;  // [Hz] lines of the true FRFs
 constexpr double BLOCK_TIME = World::BLOCK / World::SAMPLE_RATE;
-constexpr double POLL_PERIOD = 2e-3;  // [s]
-constexpr double WAIT_SHARE = 0.8;    // [1] of most_behind: wait for an external controller
 
 NodeParameters read(const ros::NodeHandle& private_nh) {
   NodeParameters parameters = parametersFromServer(private_nh).readAll<NodeParameters>();
@@ -107,7 +104,7 @@ void Node::addTruth(const std::string& point, const std::string& direction, cons
   f.point = point;
   f.direction = direction;
   f.frf.unit = m.unit;
-  for (double line = TRUTH_STEP; line <= TRUTH_END; line += TRUTH_STEP) {
+  for (double line = parameters_.truth_step; line <= parameters_.truth_end; line += parameters_.truth_step) {
     f.frf.frequency.push_back(line);
     f.frf.value.push_back(modes.response(line));
   }
@@ -173,7 +170,7 @@ void Node::run() {
       continue;
     }
     if (!server_ && !updateStates(now, done)) {
-      std::this_thread::sleep_for(std::chrono::duration<double>(POLL_PERIOD));
+      std::this_thread::sleep_for(std::chrono::duration<double>(parameters_.poll_period));
       continue;
     }
     const auto before = std::chrono::steady_clock::now();
@@ -196,7 +193,7 @@ bool Node::updateStates(double now, double done) {
   const double end = start_ + done + BLOCK_TIME;
   if (!(axes_.newest() >= end)) {
     // No samples: without commands the axes are at rest.
-    if (now - done < WAIT_SHARE * parameters_.most_behind) return false;
+    if (now - done < parameters_.wait_share * parameters_.most_behind) return false;
     axes_.holdUntil(end);
   }
   states_.resize(World::BLOCK);

@@ -16,6 +16,11 @@ struct NodeParameters {
   WorldOptions world;
   double most_behind = 0.25;
 
+  // Set by programs only.
+  double truth_step = 2.0, truth_end = 6000.0;  ///< [Hz] lines of the true FRFs, which cover measured bands
+  double poll_period = 2e-3;  ///< [s] of waiting for an external controller: two of its cycles
+  double wait_share = 0.8;  ///< [1] of most_behind, for which samples of the external controller are awaited
+
   void declare(ParameterTable& table) {
     table.title(
         "Parameters of sim_node (package smartmill_sim): the simulated machine. SI units throughout.");

@@ -8,10 +8,6 @@
 namespace smartmill::sim {
 namespace {
 
-constexpr double BINS_A_CYCLE = 24.0;  // per period of the oscillation
-constexpr double MOST_BINS = 8192.0;
-constexpr double DECAYS = 5.0;  // length of the burst template, in decay times
-
 // Residual of a record, folded at a period.
 struct Folded {
   std::vector<double> sum, count;
@@ -30,13 +26,14 @@ Folded fold(const std::vector<double>& residual, double rate, double period, std
 }
 
 // Begin [s] of the bursts that reduce the sum of squares of the residual most.
-double bestBegin(const std::vector<double>& residual, double rate, const BurstTrain& train) {
+double bestBegin(const std::vector<double>& residual, double rate, const BurstTrain& train,
+                 const BurstSearch& search) {
   const auto bins = static_cast<std::size_t>(
-      std::clamp(std::ceil(BINS_A_CYCLE * train.frequency * train.period), 16.0, MOST_BINS));
+      std::clamp(std::ceil(search.bins_per_cycle * train.frequency * train.period), 16.0, search.most_bins));
   const double width = train.period / static_cast<double>(bins);
   const Folded folded = fold(residual, rate, train.period, bins);
   std::vector<double> shape;
-  for (double t = 0.5 * width; t < std::min(DECAYS * train.decay, train.period); t += width)
+  for (double t = 0.5 * width; t < std::min(search.decays * train.decay, train.period); t += width)
     shape.push_back(train.shape(t));
   std::vector<double> gain(bins, 0.0);
   for (std::size_t first = 0; first < bins; ++first) {
@@ -59,7 +56,7 @@ double bestBegin(const std::vector<double>& residual, double rate, const BurstTr
 }  // namespace
 
 void findBursts(const Record* recorded, const ChannelRows& raw, double rate, const SignalStage& signals,
-                std::mt19937_64& random) {
+                std::mt19937_64& random, const BurstSearch& search) {
   for (BurstTrain* train : signals.bursts()) {
     const std::size_t c = train->channel;
     if (!recorded) {
@@ -76,7 +73,7 @@ void findBursts(const Record* recorded, const ChannelRows& raw, double rate, con
       }
       const double level = mean(residual);
       for (double& v : residual) v -= level;
-      train->first = bestBegin(residual, rate, *train);
+      train->first = bestBegin(residual, rate, *train, search);
       train->amplitude = amplitude;
     }
   }

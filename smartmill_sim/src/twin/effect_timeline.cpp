@@ -3,8 +3,6 @@
 namespace smartmill::sim {
 namespace {
 
-constexpr int UPDATE_STEPS = 16;  // between updates of slow changes
-
 /// The state without effects.
 TwinState nominalStateOf(const MachineModel& model) {
   TwinState state;
@@ -15,8 +13,8 @@ TwinState nominalStateOf(const MachineModel& model) {
 
 }  // namespace
 
-EffectTimeline::EffectTimeline(const MachineModel& model, const MachineModel& changed)
-    : effects_(model), nominal_(nominalStateOf(changed)), state_(nominal_) {
+EffectTimeline::EffectTimeline(const MachineModel& model, const MachineModel& changed, int update_steps)
+    : effects_(model), nominal_(nominalStateOf(changed)), state_(nominal_), update_steps_(update_steps) {
 }
 
 void EffectTimeline::setClock(const Clock& clock) {
@@ -27,7 +25,7 @@ void EffectTimeline::setClock(const Clock& clock) {
 
 bool EffectTimeline::beginStep(double speed) {
   const bool due = !effects_.empty() && (steps_to_update_ <= 0 || speed != now_.speed);
-  if (due) steps_to_update_ = UPDATE_STEPS;
+  if (due) steps_to_update_ = update_steps_;
   --steps_to_update_;
   return due;
 }

@@ -6,7 +6,6 @@
 namespace smartmill::sim {
 namespace {
 
-constexpr double SENSOR_TOLERANCE = 1e-5;  // relative change of a sensor mode that updates its filter
 constexpr std::array<double CuttingForce::*, 3> OF_AXIS{
     {&CuttingForce::fx, &CuttingForce::fy, &CuttingForce::fz}};
 
@@ -23,8 +22,9 @@ double resonated(const Resonance& resonance, ModalFilter& filter, double from) {
 
 }  // namespace
 
-MeasuringChain::MeasuringChain(const TwinSetup& setup, double time_step)
-    : model_(setup.model.force_sensor.axis),
+MeasuringChain::MeasuringChain(const TwinSetup& setup, double time_step, double sensor_tolerance)
+    : sensor_tolerance_(sensor_tolerance),
+      model_(setup.model.force_sensor.axis),
       rate_(1.0 / time_step),
       force_sign_(setup.model.force_sensor.measures_workpiece ? -1.0 : 1.0) {
   for (const ModalModel& axis : model_) sensor_.emplace_back(axis, rate_, Hold::first_order);
@@ -45,7 +45,7 @@ void MeasuringChain::update(const TwinState& state) {
   if (drive_) drive_->setFriction(state.friction_extra, state.friction_factor);
   // The first update is exact, later ones follow the tolerance.
   const double moved = std::abs(state.sensor_frequency / sensor_frequency_ - 1.0);
-  if (!(moved > SENSOR_TOLERANCE || (sensor_frequency_ == 1.0 && moved > 0.0))) return;
+  if (!(moved > sensor_tolerance_ || (sensor_frequency_ == 1.0 && moved > 0.0))) return;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     ModalFilter next(firstModeAt(model_[axis], state.sensor_frequency), rate_, Hold::first_order);
     next.continueFrom(sensor_[axis]);

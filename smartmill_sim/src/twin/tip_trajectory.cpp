@@ -15,16 +15,15 @@ const std::array<const char*, 2> TIP{{"tool_x", "tool_y"}}, FORCE{{"fx", "fy"}};
 // Displacement [m] of the tip under the measured force [N]. The inverse of the sensor's FRF is regularised
 // where its gain is small.
 std::vector<double> displacementUnder(const std::vector<double>& measured, const ModalModel& sensor,
-                                      const ModalModel& tip, double sign, double sample_rate) {
-  constexpr double LEAST_GAIN = 0.05;  // [1] relative to the static gain
-  constexpr double RINGING = 0.2;      // [s] zero padding against the circular convolution
+                                      const ModalModel& tip, double sign, double sample_rate,
+                                      const SimulationOptions& options) {
   std::vector<double> padded = measured;
-  padded.resize(measured.size() + static_cast<std::size_t>(RINGING * sample_rate), 0.0);
+  padded.resize(measured.size() + static_cast<std::size_t>(options.ringing * sample_rate), 0.0);
   std::vector<std::complex<double>> spectrum = fourier(padded);
   const std::vector<double> frequency = fourierFrequencies(padded.size(), sample_rate);
   for (std::size_t k = 0; k < spectrum.size(); ++k) {
     const std::complex<double> gain = sensor.modes.empty() ? 1.0 : sensor.response(frequency[k]);
-    const double square = std::max(std::norm(gain), LEAST_GAIN * LEAST_GAIN);
+    const double square = std::max(std::norm(gain), options.least_sensor_gain * options.least_sensor_gain);
     spectrum[k] *= sign * std::conj(gain) / square * tip.response(frequency[k]);
   }
   std::vector<double> motion = inverseFourier(spectrum, padded.size());
@@ -57,14 +56,15 @@ bool TipTrajectory::isFromForce(const Record& recorded) {
   return !(recorded.has(TIP[0]) && recorded.has(TIP[1])) && recorded.has(FORCE[0]) && recorded.has(FORCE[1]);
 }
 
-TipTrajectory::TipTrajectory(const MachineModel& model, const Record& recorded, double sample_rate)
+TipTrajectory::TipTrajectory(const MachineModel& model, const Record& recorded, double sample_rate,
+                             const SimulationOptions& options)
     : sample_rate_(sample_rate) {
   const double sign = model.force_sensor.measures_workpiece ? -1.0 : 1.0;
   for (std::size_t a = 0; a < 2; ++a) {
-    tip_[a] = isFromForce(recorded)
-                  ? displacementUnder(recorded.column(FORCE[a]), model.force_sensor.axis[a],
-                                      a == 0 ? model.tool_tip.x : model.tool_tip.y, sign, sample_rate)
-                  : recorded.column(TIP[a]);
+    tip_[a] = isFromForce(recorded) ? displacementUnder(recorded.column(FORCE[a]), model.force_sensor.axis[a],
+                                                        a == 0 ? model.tool_tip.x : model.tool_tip.y, sign,
+                                                        sample_rate, options)
+                                    : recorded.column(TIP[a]);
   }
 }
 

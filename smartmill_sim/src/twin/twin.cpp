@@ -188,7 +188,7 @@ std::optional<TipTrajectory> tipTrajectoryOf(const CampaignTest& test, const Rec
   if (!options.guided || test.kind != TestKind::cut || test.running_before || !machine.vibrates() ||
       !recorded || !TipTrajectory::isAvailable(*recorded))
     return {};
-  return TipTrajectory(machine.model(), *recorded, test.sample_rate);
+  return TipTrajectory(machine.model(), *recorded, test.sample_rate, options);
 }
 
 std::optional<AxisMotion> motionOf(const MachineModel& model, const CampaignTest& test,

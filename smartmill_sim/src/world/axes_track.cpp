@@ -6,11 +6,6 @@
 #include "smartmill_core/units.h"
 
 namespace smartmill::sim {
-namespace {
-
-constexpr double GAP = 0.02;  // [s] between samples; longer intervals are gaps
-
-}  // namespace
 
 void AxesTrack::push(const SampleBlock& block) {
   const std::array<std::size_t, 3> axis{block.channel("x"), block.channel("y"), block.channel("z")};
@@ -21,7 +16,8 @@ void AxesTrack::push(const SampleBlock& block) {
     if (!points_.empty() && !(point.time > points_.back().time)) continue;
     for (std::size_t k = 0; k < 3; ++k) point.position[k] = block.at(i, axis[k]);
     point.revolutions = block.at(i, revolutions);
-    point.jump = !points_.empty() && (points_.back().held || point.time - points_.back().time > GAP);
+    point.jump =
+        !points_.empty() && (points_.back().held || point.time - points_.back().time > longest_step_);
     points_.push_back(point);
   }
 }

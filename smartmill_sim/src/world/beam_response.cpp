@@ -5,14 +5,13 @@
 namespace smartmill::sim {
 namespace {
 
-constexpr double DECAY_TIME = 2.0;    // [s] decay time of the vibration after a hit
 constexpr double SAME_HEIGHT = 1e-7;  // [m]
 
 }  // namespace
 
 BeamResponse::BeamResponse(const StationTraits& traits, const ToolGeometry& tool, double stickout,
                            double offset, double step)
-    : structure_(traits, tool, stickout), offset_(offset), step_(step) {
+    : structure_(traits, tool, stickout), offset_(offset), step_(step), decay_time_(traits.decay_time) {
   for (std::size_t axis = 0; axis < 2; ++axis) setHeight(axis, traits.read_height);
 }
 
@@ -36,7 +35,7 @@ void BeamResponse::reset() {
 }
 
 bool BeamResponse::vibrates(double time, double force) {
-  if (force != 0.0) vibrates_until_ = time + DECAY_TIME;
+  if (force != 0.0) vibrates_until_ = time + decay_time_;
   return time < vibrates_until_;
 }
 

@@ -9,9 +9,7 @@
 namespace smartmill::sim {
 namespace {
 
-constexpr int ACROSS = 9, ALONG = 5;  // spots over the electrode, across and along the tool
-constexpr int HOUSING = 10;           // spots on the housing's radius
-constexpr double TOUCHING = 0.5e-6;   // [m] least gap for which a voltage is computed
+constexpr double TOUCHING = 0.5e-6;  // [m] least gap for which a voltage is computed
 
 }  // namespace
 
@@ -63,20 +61,22 @@ GapSensor::GapSensor(const StationTraits& traits, const smartmill::HammerStation
   } else {
     double sum = 0.0;
     // Uniform in the angle about the disc's centre: accurate at the ends of the chord.
-    for (int i = 0; i < ACROSS; ++i) {
-      const double turn = units::PI * (i + 0.5) / ACROSS, chord = radius * std::sin(turn);
+    for (int i = 0; i < traits.electrode_across; ++i) {
+      const double turn = units::PI * (i + 0.5) / traits.electrode_across, chord = radius * std::sin(turn);
       const double share = chord * chord;
-      for (int k = 0; k < ALONG; ++k) {
-        spots_.push_back({-radius * std::cos(turn), chord * ((k + 0.5) / ALONG * 2.0 - 1.0), share});
+      for (int k = 0; k < traits.electrode_along; ++k) {
+        spots_.push_back(
+            {-radius * std::cos(turn), chord * ((k + 0.5) / traits.electrode_along * 2.0 - 1.0), share});
         sum += share;
       }
     }
     for (Spot& s : spots_) s.share /= sum;
   }
-  const double step = 0.5 * traits.housing / HOUSING;
-  for (int i = -HOUSING; i <= HOUSING && step > 0.0; ++i) {
-    for (int k = -HOUSING; k <= HOUSING; ++k)
-      if (i * i + k * k <= HOUSING * HOUSING) spots_.push_back({step * i, step * k, 0.0});
+  const double step = 0.5 * traits.housing / traits.housing_spots;
+  for (int i = -traits.housing_spots; i <= traits.housing_spots && step > 0.0; ++i) {
+    for (int k = -traits.housing_spots; k <= traits.housing_spots; ++k)
+      if (i * i + k * k <= traits.housing_spots * traits.housing_spots)
+        spots_.push_back({step * i, step * k, 0.0});
   }
   surface_distance_.assign(spots_.size(), 0.0);
 }

@@ -9,12 +9,6 @@
 namespace smartmill::sim {
 namespace {
 
-// Limits of a position in front of a sensor: lateral, vertical and axial distance.
-constexpr double LATERAL = 2e-3;    // [m]
-constexpr double VERTICAL = 30e-3;  // [m]
-constexpr double AXIAL = 4e-3;      // [m]
-constexpr double AT_REST = 0.02;    // [rad/s] a hammer hits only a tool at rest
-constexpr int SURFACE_UPDATE = 32;  // samples between two updates of a moving surface
 constexpr std::array<const char*, 2> AXIS{{"x", "y"}};
 
 /// Angle [rad] of a tooth that points along the axis.
@@ -73,8 +67,9 @@ std::optional<std::size_t> HammerStation::facing(const std::array<double, 3>& po
     const auto found = station_.position.find(AXIS[axis]);
     if (found == station_.position.end()) continue;
     const Axes3& p = found->second;
-    if (std::abs(position[1 - axis] - p[1 - axis]) < LATERAL && std::abs(position[2] - p[2]) < VERTICAL &&
-        std::abs(p[axis] - position[axis]) < AXIAL) {
+    if (std::abs(position[1 - axis] - p[1 - axis]) < traits_.lateral_reach &&
+        std::abs(position[2] - p[2]) < traits_.vertical_reach &&
+        std::abs(p[axis] - position[axis]) < traits_.axial_reach) {
       return axis;
     }
   }
@@ -129,7 +124,7 @@ void HammerStation::updateTarget() {
   height_ = p[2] - pose_.position[2] + traits_.read_height;
   const bool at_rest = !error_.moving() && pose_.speed == 0.0;
   if (surface_pose_ &&
-      (isSamePose(*surface_pose_, pose_) || !(at_rest || ++samples_since_update_ >= SURFACE_UPDATE)))
+      (isSamePose(*surface_pose_, pose_) || !(at_rest || ++samples_since_update_ >= traits_.surface_update)))
     return;
   samples_since_update_ = 0;
   surface_pose_ = pose_;
@@ -142,7 +137,7 @@ void HammerStation::updateTarget() {
 
 HammerStation::Push HammerStation::push(double time) {
   Push push;
-  const bool meets = fired_ && facing_axis_ == fired_axis_ && pose_.speed <= AT_REST;
+  const bool meets = fired_ && facing_axis_ == fired_axis_ && pose_.speed <= traits_.rest_speed;
   if (meets) push.force = solenoid_.force(time);
   if (beam_ && beam_->vibrates(time, push.force) && facing_axis_) {
     push.tip = beam_->step(fired_axis_, -push.force);  // the hit comes from the sensor's side

@@ -10,7 +10,6 @@
 namespace smartmill::sim {
 namespace {
 
-constexpr int ELEMENTS = 24;
 constexpr double NO_GAIN = 1e-9;  // relative to the largest gain: a negligible mode
 
 using Element = Eigen::Matrix4d;
@@ -58,7 +57,7 @@ Eigen::Vector4d cubic(double u, double l) {
 
 }  // namespace
 
-RoundBeam::Matrices RoundBeam::matrices(int elements) const {
+RoundBeam::Matrices RoundBeam::matrices() const {
   const double shank = length - fluted;
   // Element lengths as equal as the section boundary allows.
   int first = fluted <= 0.0 ? elements : static_cast<int>(std::lround(elements * shank / length));
@@ -81,7 +80,7 @@ RoundBeam::Matrices RoundBeam::matrices(int elements) const {
 CoupledTool::CoupledTool(const RoundBeam& beam, const std::vector<FaceMode>& spindle, const Joint& joint,
                          double tool_loss)
     : length_(beam.length) {
-  const RoundBeam::Matrices tool = beam.matrices(ELEMENTS);
+  const RoundBeam::Matrices tool = beam.matrices();
   x_ = tool.x;
   const Eigen::Index own = tool.mass.rows(), all = own + static_cast<Eigen::Index>(spindle.size());
   Eigen::MatrixXd bending = Eigen::MatrixXd::Zero(all, all), mass = bending, spring = bending;
@@ -179,7 +178,8 @@ CoupledTool planeOf(const StationTraits& t, const ToolGeometry& tool, double sti
 
 ToolStructure::ToolStructure(const StationTraits& traits, const ToolGeometry& tool, double stickout)
     : plane_{{planeOf(traits, tool, stickout, 1.0), planeOf(traits, tool, stickout, traits.plane_ratio)}},
-      turn_(traits.plane_turn) {
+      turn_(traits.plane_turn),
+      highest_(traits.highest) {
 }
 
 ModalModel ToolStructure::between(std::size_t read_axis, double read, std::size_t struck_axis,
@@ -191,7 +191,7 @@ ModalModel ToolStructure::between(std::size_t read_axis, double read, std::size_
     const std::array<double, 2> along{{std::cos(angle), std::sin(angle)}};
     const double share = along[read_axis] * along[struck_axis];
     if (std::abs(share) < NO_GAIN) continue;
-    const ModalModel plane = plane_[p].between(read, struck, HIGHEST);
+    const ModalModel plane = plane_[p].between(read, struck, highest_);
     sum.direct += share * plane.direct;
     for (Mode mode : plane.modes) {
       mode.gain *= share;

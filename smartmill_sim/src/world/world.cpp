@@ -13,8 +13,6 @@ namespace {
 
 using Lock = std::lock_guard<std::mutex>;
 
-constexpr std::size_t CONTACT_UPDATE = 64;     // samples between two updates of the contact with the stock
-constexpr double HAMMER_DELAY = 0.03;          // [s] of the solenoid
 constexpr std::uint64_t FLANGE_SEED = 0x1000;  // offset from the seed of the world
 
 double stepOf(const WorldOptions& options) {
@@ -94,7 +92,7 @@ World::StrikeAnswer World::strike(const std::string& point, const std::string& d
   const bool before_hammer = station_ && axis < 2 && (!flange_ || station_->facing(last_.position) == axis);
   if (tool && before_hammer) {
     // At a random time between two samples.
-    station_->fire(axis, now, now + HAMMER_DELAY + random_.uniform() / SAMPLE_RATE, random_.engine);
+    station_->fire(axis, now, now + options_.hammer_delay + random_.uniform() / SAMPLE_RATE, random_.engine);
     message = "hammer fired in " + direction;
   } else if (tool && flange_ && axis < 3) {
     manual_.hit(true, axis, drawHit(now));
@@ -112,7 +110,7 @@ World::StrikeAnswer World::strike(const std::string& point, const std::string& d
 
 /// Hit by an automatic hammer or by hand.
 Hit World::drawHit(double now) {
-  const double delay = options_.operator_delay > 0.0 ? options_.operator_delay : HAMMER_DELAY;
+  const double delay = options_.operator_delay > 0.0 ? options_.operator_delay : options_.hammer_delay;
   const double begin = now + delay + random_.uniform() / SAMPLE_RATE;
   const double scatter = std::clamp(1.0 + random_.gaussian(options_.force_scatter), 0.5, 1.5);
   return {begin, options_.tap_peak * scatter, options_.tap_contact, 0.0};
@@ -164,7 +162,7 @@ void World::simulateBlock(Block& block, const std::vector<MotionState>& states) 
   for (const auto& sensor : sensors_) sensor->begin(static_cast<double>(index_) / SAMPLE_RATE, index_, block);
   torque_ = 0.0;
   for (std::size_t i = 0; i < BLOCK; ++i) {
-    if ((index_ + i) % CONTACT_UPDATE == 0) updateContact(states[i]);
+    if ((index_ + i) % options_.contact_update == 0) updateContact(states[i]);
     simulateSample(static_cast<double>(index_ + i) / SAMPLE_RATE, states[i], block);
     last_ = states[i];
   }

@@ -13,6 +13,8 @@
 
 namespace smartmill::sim {
 
+constexpr double LOAD_METER_STEP = 3.0e-4;  ///< [V] resolution of the load meter (Dunwoody 3.2.1)
+
 struct ControllerOptions {
   MachineAxes axes;                   ///< travel, rapid, acceleration, home (where it starts)
   double spindle_max_speed = 0.0;     ///< [rad/s] limits S
@@ -25,6 +27,8 @@ struct ControllerOptions {
   double check_period = 2e-3;  ///< [s] between two calls of the watches: 1 mm of rapid traverse
   double loop_gain = 3000.0;   ///< [0.01/s] reported, of the axes' position loops: a typical value
   double screw_lead = 10e-3;   ///< [m] of travel per reported revolution of an axis motor
+  double motor_temperature = 25.0;               ///< [deg C] reported: the motors have no thermal model
+  std::size_t memory_size = 512 * 1024;          ///< [byte] of programs, as ordered for a 30i
   std::array<double, 3> work_offset{{0, 0, 0}};  ///< [m] machine minus absolute position, of G54
   focas::SysInfo info = fineInfo();              ///< reported identification
   int mode = focas::AUT_REMOTE;                  ///< focas::Aut, set at the panel
@@ -37,9 +41,9 @@ struct ControllerOptions {
   /// @throws Error naming key and value.
   void validate() const;
 
-  /// From a model's sections axes, spindle, hammer, tool and workpiece. Loads are rounded to 0.3 mV of the
-  /// load meter. Defaults: travel x -250..250, y -200..200, z -300..0 mm, home 0 0 0, rapid 30 m/min, 5 m/s2;
-  /// spindle up to 20000 rpm, 10000 rpm/s.
+  /// From a model's sections axes, spindle, hammer, tool and workpiece. Loads are rounded to
+  /// LOAD_METER_STEP. Defaults: travel x -250..250, y -200..200, z -300..0 mm, home 0 0 0, rapid 30 m/min, 5
+  /// m/s2; spindle up to 20000 rpm, 10000 rpm/s.
   static ControllerOptions ofModel(const MachineModel& model);
   /// Identification with a position increment of 0.1 um.
   static focas::SysInfo fineInfo();

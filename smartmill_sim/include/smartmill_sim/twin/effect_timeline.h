@@ -18,7 +18,8 @@ class EffectTimeline {
   };
 
   /// @param model with its effects @param changed by them
-  EffectTimeline(const MachineModel& model, const MachineModel& changed);
+  /// @param update_steps between two updates of slow changes, whose times are far above that of a step
+  EffectTimeline(const MachineModel& model, const MachineModel& changed, int update_steps = 16);
 
   const EffectSet& effects() const { return effects_; }
   const Instant& now() const { return now_; }
@@ -43,7 +44,7 @@ class EffectTimeline {
   TwinState nominal_, state_;
   Instant now_;
   Clock clock_;
-  int steps_to_update_ = 0;
+  int update_steps_, steps_to_update_ = 0;
 };
 
 }  // namespace smartmill::sim

@@ -29,7 +29,9 @@ struct ForceHistory {
 /// Force sensor, load meter and the filters of the channels, in constant time steps.
 class MeasuringChain {
  public:
-  MeasuringChain(const TwinSetup& setup, double time_step);
+  /// @param sensor_tolerance [1] relative change of a sensor mode that updates its filter: far below the
+  /// uncertainty of a mode
+  MeasuringChain(const TwinSetup& setup, double time_step, double sensor_tolerance = 1e-5);
 
   /// Changes of sensor and drive by the effects.
   void update(const TwinState& state);
@@ -56,6 +58,7 @@ class MeasuringChain {
   double rounded(double voltage) const { return drive_ ? drive_->rounded(voltage) : voltage; }
 
  private:
+  double sensor_tolerance_;
   std::array<ModalModel, 3> model_;  // of the force sensor
   double rate_, force_sign_;
   std::vector<ModalFilter> sensor_;  // x, y, z

@@ -6,6 +6,7 @@
 
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_sim/twin/twin.h"
 
 namespace smartmill::sim {
 
@@ -25,7 +26,8 @@ class TipTrajectory {
   static bool isFromForce(const Record& recorded);
 
   /// @param model as changed by its effects @param sample_rate [Hz]
-  TipTrajectory(const MachineModel& model, const Record& recorded, double sample_rate);
+  TipTrajectory(const MachineModel& model, const Record& recorded, double sample_rate,
+                const SimulationOptions& options = {});
 
   /// Interpolated between sample i (share 0) and the next one (share 1).
   TipMotion at(std::size_t i, double share) const;

@@ -38,6 +38,9 @@ struct SimulationOptions {
   /// forces. The simulation cannot become unstable, follows a chattering cut, and its residual is a
   /// prediction error.
   bool guided = false;
+  /// Of a displacement under the measured forces: [1] least gain of the sensor, over its static one, above
+  /// which its FRF is inverted; [s] zero padding, in which its ringing decays.
+  double least_sensor_gain = 0.05, ringing = 0.2;
   /// Phases of tones (mains hum) are drawn from the seed instead of estimated from the record.
   bool random_phases = false;
   /// Channels of the record to simulate; nullptr: all. Requires channelsAreIndependent().

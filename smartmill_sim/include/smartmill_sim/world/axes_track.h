@@ -13,6 +13,9 @@ namespace smartmill::sim {
 /// linear between the samples. Over a gap axes and spindle are at rest.
 class AxesTrack {
  public:
+  /// @param longest_step [s] between samples; longer intervals are gaps: two blocks of a servo stream
+  explicit AxesTrack(double longest_step = 0.02) : longest_step_(longest_step) {}
+
   /// @throws Error naming a missing channel. Samples that are not newer than all earlier ones are ignored.
   void push(const SampleBlock& block);
   /// No samples until a time [s]: the axes are at rest from the last sample on and resume at the position of
@@ -31,6 +34,7 @@ class AxesTrack {
     bool jump = false;  // no motion from the previous point to here
     bool held = false;  // added by holdUntil()
   };
+  double longest_step_;
   std::deque<Point> points_;
 };
 

@@ -35,7 +35,7 @@ class BeamResponse {
   };
 
   ToolStructure structure_;
-  double offset_, step_;
+  double offset_, step_, decay_time_;
   std::array<Path, 2> paths_;     // by struck axis
   double vibrates_until_ = -1.0;  // [s]
   std::array<double, 2> at_sensor_{{0, 0}};

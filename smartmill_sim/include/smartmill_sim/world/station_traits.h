@@ -59,6 +59,18 @@ struct StationTraits {
   double coil_volt = 0.0;
   double axis_scatter = 0.0;
 
+  // Set by programs only.
+  // Distances of a position within which the tool counts as in front of a sensor.
+  double lateral_reach = 2e-3;    ///< [m]
+  double vertical_reach = 30e-3;  ///< [m] includes the second height and the flute search
+  double axial_reach = 4e-3;      ///< [m] includes the tool's path from the standoff on
+  double rest_speed = 0.02;       ///< [rad/s] a hammer hits only a tool that is at rest
+  int surface_update = 32;        ///< [samples] between two updates of a moving surface: 1.25 ms
+  double decay_time = 2.0;        ///< [s] after a hit, in which the least damped mode decays
+  double highest = 16000.0;       ///< [Hz] limit of the retained modes, above half the sample rate
+  int electrode_across = 9, electrode_along = 5;  ///< spots of the mean over the electrode
+  int housing_spots = 10;  ///< on the radius of the housing, for the least distance of the tool
+
   void declare(ParameterTable& table);
   /// Bounds and consistency of the lists. @throws Error naming key and value.
   void validate() const;

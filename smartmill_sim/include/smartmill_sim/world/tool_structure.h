@@ -19,6 +19,7 @@ struct RoundBeam {
   double shank_diameter = 0.0, diameter = 0.0;  ///< [m] of the shank; of the fluted part
   double young = 0.0, density = 0.0;            ///< [Pa], [kg/m3]
   double poisson = 0.22;                        ///< [1] Poisson's ratio; carbide
+  int elements = 24;                            ///< finite elements, far shorter than the bending waves
   bool shear = true;                            ///< false: Euler-Bernoulli beam
 
   /// Stiffness and mass matrices over (displacement, slope) of the nodes, the holder's face first; slope is d
@@ -27,7 +28,7 @@ struct RoundBeam {
     Eigen::MatrixXd stiffness, mass;
     std::vector<double> x;  ///< [m] of the nodes
   };
-  Matrices matrices(int elements) const;
+  Matrices matrices() const;
 };
 
 /// A mode of spindle and holder at the holder's face.
@@ -83,11 +84,9 @@ class ToolStructure {
   /// Drive-point receptances of the tip.
   ToolTip tip() const;
 
-  static constexpr double HIGHEST = 16000.0;  ///< [Hz] limit of the retained modes
-
  private:
   std::array<CoupledTool, 2> plane_;
-  double turn_;
+  double turn_, highest_;
 };
 
 }  // namespace smartmill::sim

@@ -32,12 +32,17 @@ struct WorldOptions {
   double tap_contact = 4.0e-4;
   double operator_delay = 0.0;
   double force_scatter = 0.05;
-  double load_step = 3.0e-4;
+  double load_step = LOAD_METER_STEP;
   int servo_trigger = 0;
   StationTraits hammer;
   MotorTraits motor;
   SpindleSensorTraits spindle_sensor;
   PlateTraits plate;
+
+  // Set by programs only.
+  std::size_t contact_update = 64;  ///< [samples] between two updates of the contact with the stock: 2.5 ms,
+                                    ///< in which the feed moves far less than a tooth's arc
+  double hammer_delay = 0.03;       ///< [s] of a solenoid from its command to the contact
 
   void declare(ParameterTable& table) {
     table.number("seed", seed, "1", Range::notNegative(), "seed of noise and scatter");
