@@ -11,9 +11,9 @@ std::vector<double> inMm(const std::array<double, 3>& v) {
   return {v[0] / units::MM, v[1] / units::MM, v[2] / units::MM};
 }
 
-class AxesCalls : public focas::AxesInterface {
+class AxesCalls : public CallsOf<focas::AxesInterface> {
  public:
-  explicit AxesCalls(LockedMachine& machine) : machine_(machine) {}
+  using CallsOf::CallsOf;
 
   std::vector<double> machinePosition() const override {
     const LockedMachine::Access machine = machine_.lock();
@@ -57,9 +57,6 @@ class AxesCalls : public focas::AxesInterface {
     for (const double v : velocity) speeds.push_back(60.0 * v / machine_.options().screw_lead);
     return speeds;
   }
-
- private:
-  LockedMachine& machine_;
 };
 
 }  // namespace

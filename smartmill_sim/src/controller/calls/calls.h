@@ -32,7 +32,17 @@ class LockedMachine {
   ControlledMachine machine_;
 };
 
-// What the machine answers to the FOCAS calls of each topic.
+/// Base of the classes that answer the FOCAS calls of a topic from a machine.
+template <class Interface>
+class CallsOf : public Interface {
+ public:
+  explicit CallsOf(LockedMachine& machine) : machine_(machine) {}
+
+ protected:
+  LockedMachine& machine_;
+};
+
+// What the machine answers to the calls of each topic.
 
 std::unique_ptr<focas::StateInterface> stateCalls(LockedMachine& machine);
 std::unique_ptr<focas::AxesInterface> axesCalls(LockedMachine& machine);

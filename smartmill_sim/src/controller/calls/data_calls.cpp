@@ -7,9 +7,9 @@ namespace {
 
 using focas::EwCode;
 
-class DataCalls : public focas::DataInterface {
+class DataCalls : public CallsOf<focas::DataInterface> {
  public:
-  explicit DataCalls(LockedMachine& machine) : machine_(machine) {}
+  using CallsOf::CallsOf;
 
   std::vector<focas::NumberedValue> parameters(int first, int last) const override {
     return within(machineParameters(machine_.options()), first, last);
@@ -43,9 +43,6 @@ class DataCalls : public focas::DataInterface {
     if (area == focas::PmcArea::d) machine->updateDataTableOverrides();
     return code;
   }
-
- private:
-  LockedMachine& machine_;
 };
 
 }  // namespace

@@ -5,9 +5,9 @@ namespace {
 
 using focas::EwCode;
 
-class DncCalls : public focas::DncInterface {
+class DncCalls : public CallsOf<focas::DncInterface> {
  public:
-  explicit DncCalls(LockedMachine& machine) : machine_(machine) {}
+  using CallsOf::CallsOf;
 
   EwCode dncStart() override { return machine_.lock()->openSession(); }
   std::size_t dncData(const char* data, std::size_t size) override {
@@ -16,9 +16,6 @@ class DncCalls : public focas::DncInterface {
   EwCode dncEnd() override { return machine_.lock()->session.close(); }
   void dncCancel(int /*result*/) override { machine_.lock()->cancelSession(); }
   EwCode dncAbort() override { return machine_.lock()->session.takeAbortCode(); }
-
- private:
-  LockedMachine& machine_;
 };
 
 }  // namespace

@@ -5,9 +5,9 @@ namespace {
 
 /// Variables 1..33, 100..199, 500..999 and 1133, initially vacant; work offsets 5221..5323; read-only
 /// positions 5001.., 5021.., 5041.. .
-class MacroCalls : public focas::MacroInterface {
+class MacroCalls : public CallsOf<focas::MacroInterface> {
  public:
-  explicit MacroCalls(LockedMachine& machine) : machine_(machine) {}
+  using CallsOf::CallsOf;
 
   focas::EwCode readMacro(int number, std::optional<double>* value) const override {
     if (!Variables::exists(number)) return focas::EW_NUMBER;
@@ -20,9 +20,6 @@ class MacroCalls : public focas::MacroInterface {
     machine_.lock()->variables.write(number, value);
     return focas::EW_OK;
   }
-
- private:
-  LockedMachine& machine_;
 };
 
 }  // namespace

@@ -8,9 +8,9 @@ namespace {
 
 using focas::EwCode;
 
-class ProgramCalls : public focas::ProgramsInterface {
+class ProgramCalls : public CallsOf<focas::ProgramsInterface> {
  public:
-  explicit ProgramCalls(LockedMachine& machine) : machine_(machine) {}
+  using CallsOf::CallsOf;
 
   std::vector<focas::StoredProgram> programs() const override { return machine_.lock()->memory.list(); }
   EwCode selectProgram(int number) override {
@@ -42,9 +42,6 @@ class ProgramCalls : public focas::ProgramsInterface {
     machine_.lock()->reset();
     return focas::EW_OK;
   }
-
- private:
-  LockedMachine& machine_;
 };
 
 }  // namespace

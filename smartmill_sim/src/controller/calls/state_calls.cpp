@@ -4,9 +4,9 @@
 namespace smartmill::sim {
 namespace {
 
-class StateCalls : public focas::StateInterface {
+class StateCalls : public CallsOf<focas::StateInterface> {
  public:
-  explicit StateCalls(LockedMachine& machine) : machine_(machine) {}
+  using CallsOf::CallsOf;
 
   focas::SysInfo sysInfo() const override { return machine_.options().info; }
   focas::Status status() const override { return statusOf(*machine_.lock()); }
@@ -29,9 +29,6 @@ class StateCalls : public focas::StateInterface {
   }
   std::string executingBlock() const override { return machine_.lock()->program.indicated().block; }
   std::string programText() const override { return programTextOf(*machine_.lock()); }
-
- private:
-  LockedMachine& machine_;
 };
 
 }  // namespace

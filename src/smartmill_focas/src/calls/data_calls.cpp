@@ -111,51 +111,52 @@ int setClock(DataInterface& data, const SubRequest& request) {
   return good ? int{data.setDateTime(*now)} : int{EW_DATA};
 }
 
-/// Words and double words are big-endian on the wire and little-endian in the PMC.
-int readPmc(const DataInterface& data, const SubRequest& request, Writer& out) {
+/// Bytes of an element: byte, word or double word.
+int elementOf(const SubRequest& request) {
+  return 1 << request.v[3];
+}
+
+int pmcFault(const SubRequest& request) {
   const int first = request.v[0], last = request.v[1], area = request.v[2], type = request.v[3];
   if (area < 0 || area > static_cast<int>(PmcArea::d) || type < 0 || type > 2) {
     return EW_ATTRIB;
   }
-  const int element = 1 << type;
   if (first < 0 || last < first || last - first >= MAX_PMC_BYTES) {
     return EW_NUMBER;
   }
-  if ((last - first + 1) % element != 0) {
-    return EW_LENGTH;
+  return (last - first + 1) % elementOf(request) == 0 ? EW_OK : EW_LENGTH;
+}
+
+/// Words and double words are big-endian on the wire and little-endian in the PMC.
+Bytes withSwappedElements(Bytes bytes, int element) {
+  for (auto at = bytes.begin(); at != bytes.end(); at += element) {
+    std::reverse(at, at + element);
+  }
+  return bytes;
+}
+
+int readPmc(const DataInterface& data, const SubRequest& request, Writer& out) {
+  if (const int fault = pmcFault(request); fault != EW_OK) {
+    return fault;
   }
   Bytes bytes;
-  const int code = data.readPmc(static_cast<PmcArea>(area), first, last, &bytes);
-  if (code != EW_OK) {
-    return code;
+  const int code = data.readPmc(static_cast<PmcArea>(request.v[2]), request.v[0], request.v[1], &bytes);
+  if (code == EW_OK) {
+    out.bytes(withSwappedElements(bytes, elementOf(request)));
   }
-  for (std::size_t i = 0; i < bytes.size(); i += static_cast<std::size_t>(element)) {
-    for (int k = element - 1; k >= 0; --k) {
-      out.u8(bytes[i + static_cast<std::size_t>(k)]);
-    }
-  }
-  return EW_OK;
+  return code;
 }
 
 int writePmc(DataInterface& data, const SubRequest& request) {
-  const int first = request.v[0], last = request.v[1], area = request.v[2], type = request.v[3];
-  if (area < 0 || area > static_cast<int>(PmcArea::d) || type < 0 || type > 2) {
-    return EW_ATTRIB;
+  if (const int fault = pmcFault(request); fault != EW_OK) {
+    return fault;
   }
-  if (first < 0 || last < first || last - first >= MAX_PMC_BYTES) {
-    return EW_NUMBER;
-  }
-  const std::size_t element = std::size_t{1} << type;
-  const std::size_t size = static_cast<std::size_t>(last - first + 1);
-  if (size % element != 0 || request.extra.size() != size) {
+  const int first = request.v[0], last = request.v[1];
+  if (request.extra.size() != static_cast<std::size_t>(last - first + 1)) {
     return EW_LENGTH;
   }
-  Bytes bytes = request.extra;
-  for (std::size_t i = 0; i < size; i += element) {
-    std::reverse(bytes.begin() + static_cast<std::ptrdiff_t>(i),
-                 bytes.begin() + static_cast<std::ptrdiff_t>(i + element));
-  }
-  return data.writePmc(static_cast<PmcArea>(area), first, bytes);
+  return data.writePmc(static_cast<PmcArea>(request.v[2]), first,
+                       withSwappedElements(request.extra, elementOf(request)));
 }
 
 }  // namespace
