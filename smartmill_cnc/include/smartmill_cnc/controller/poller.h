@@ -11,7 +11,8 @@ namespace smartmill::cnc {
 
 struct PollerOptions {
   double reconnect_period = 1.0;  ///< [s] between the first two attempts; the interval doubles
-  double longest_wait = 8.0;  ///< [1] limit of the interval, of reconnect_period: a new start is soon found
+  double longest_wait =
+      8.0;  ///< [1] limit of the interval, of reconnect_period: a restart is found within 8 s
 };
 
 /// Maintains the connection to a controller and reads it once per period. A loss or a failure to connect is

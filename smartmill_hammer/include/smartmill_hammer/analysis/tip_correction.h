@@ -65,7 +65,7 @@ struct TipFitOptions {
   double frequency_spread = 0.4, gain_spread = 2.0;
   double unknown_bound = 6.0;  ///< [std] of an unknown: beyond it the prior is wrong
   int rounds = 3;       ///< in which the modes are matched anew; the fit ends earlier once the match stays
-  int iterations = 40;  ///< of least squares in a round; more do not change the match
+  int iterations = 40;  ///< of least squares in a round, bounds its time
   /// [1] Relative, of the damping of a mode that is not measured, about the median of the others.
   double predicted_damping_std = 0.5;
 };

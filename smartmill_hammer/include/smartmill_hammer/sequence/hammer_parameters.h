@@ -69,7 +69,7 @@ struct HammerParameters : HitTestParameters {
   // Set by programs only.
   double range_share = 0.98;     ///< [1] of the sensor's range, from which a voltage counts as its end
   int near_samples = 8;          ///< consecutive ones above it that mean that the tool is too near, not noise
-  double stop_timeout = 10.0;    ///< [s] for the axes to rest after a stop: braking takes less than 1 s
+  double stop_timeout = 10.0;    ///< [s] for the axes to rest after a stop: far longer than braking
   double average_timeout = 1.0;  ///< [s] for a mean voltage: a hundred times averaging_time
   int average_restarts = 3;      ///< lost or NaN samples accepted in one measurement: single losses occur
   int rest_states = 2;           ///< in a row without distance to go: it is zero between two blocks, too

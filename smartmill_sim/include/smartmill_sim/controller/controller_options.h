@@ -28,7 +28,7 @@ struct ControllerOptions {
   double loop_gain = 3000.0;   ///< [0.01/s] reported, of the axes' position loops: a typical value
   double screw_lead = 10e-3;   ///< [m] of travel per reported revolution of an axis motor
   double motor_temperature = 25.0;               ///< [deg C] reported: the motors have no thermal model
-  std::size_t memory_size = 512 * 1024;          ///< [byte] of programs, as ordered for a 30i
+  std::size_t memory_size = 512 * 1024;          ///< [byte] of programs: 1280 m of tape, an option of a 30i
   std::array<double, 3> work_offset{{0, 0, 0}};  ///< [m] machine minus absolute position, of G54
   focas::SysInfo info = fineInfo();              ///< reported identification
   int mode = focas::AUT_REMOTE;                  ///< focas::Aut, set at the panel

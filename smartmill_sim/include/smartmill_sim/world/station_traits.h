@@ -63,7 +63,7 @@ struct StationTraits {
   // Distances of a position within which the tool counts as in front of a sensor.
   double lateral_reach = 2e-3;    ///< [m]
   double vertical_reach = 30e-3;  ///< [m] includes the second height and the flute search
-  double axial_reach = 4e-3;      ///< [m] includes the tool's path from the standoff on
+  double axial_reach = 4e-3;      ///< [m] far beyond the range of the sensor
   double rest_speed = 0.02;       ///< [rad/s] a hammer hits only a tool that is at rest
   int surface_update = 32;        ///< [samples] between two updates of a moving surface: 1.25 ms
   double decay_time = 2.0;        ///< [s] after a hit, in which the least damped mode decays

@@ -41,7 +41,7 @@ struct WorldOptions {
 
   // Set by programs only.
   std::size_t contact_update = 64;  ///< [samples] between two updates of the contact with the stock: 2.5 ms,
-                                    ///< in which the feed moves far less than a tooth's arc
+                                    ///< in which a tool moves 0.1 mm at 2.4 m/min
   double hammer_delay = 0.03;       ///< [s] of a solenoid from its command to the contact
 
   void declare(ParameterTable& table) {
