@@ -16,6 +16,7 @@
 #include "../src/session/child.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/io/csv.h"
+#include "smartmill_core/model/force_sensor_kind.h"
 #include "smartmill_core/model/strict_yaml.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
@@ -33,7 +34,7 @@ constexpr double TEN_DIGITS = 6e-10, SIX_DIGITS = 6e-6;
 constexpr double MOST_LOST = 0.05;  // [1]
 
 struct Request {
-  std::string bag, out = "offline", model, config;
+  std::string bag, out = "offline", model, config, sensor = "table";
   double least_ratio = 20.0;
 };
 
@@ -185,7 +186,7 @@ int run(const Request& request) {
                                              0.0,
                                              compareCoefficients},
                                             {{"compensate", "the compensated forces"},
-                                             {},
+                                             {"--sensor", request.sensor},
                                              "kalman.yaml",
                                              out / "compensated",
                                              SIX_DIGITS,
@@ -227,6 +228,9 @@ int main(int argc, char** argv) {
   line.option("-o,--out", request.out, "folder for the output of the tools").showDefault();
   line.option("--model", request.model, "machine model of the session").showDefault();
   line.option("--config", request.config, "folder with the parameter files of the nodes").showDefault();
+  line.option("--sensor", request.sensor, "force sensor of the session")
+      .oneOf(forceSensorWords())
+      .showDefault();
   line.option("--least-ratio", request.least_ratio, "minimum speed of each tool, in multiples of real time")
       .showDefault();
   return runProgram(line, argc, argv, [&] { return run(request); });

@@ -9,7 +9,7 @@ import { Revolution, Spectrum, SpectrumCourse, Strips } from './views/forces.js'
 import { Dynamics } from './views/dynamics.js';
 import { Session, Progress, Notes, Replay } from './views/session.js';
 import { Commands } from './views/commands.js';
-import { Discrepancy, Report, Database, Diagnostics } from './views/model.js';
+import { Discrepancy, Report, Database, Diagnostics, ForceSensor } from './views/model.js';
 import { Fleet } from './views/fleet.js';
 
 const REFRESH = 100;  // [ms]
@@ -129,7 +129,7 @@ class Page {
     place('model', 'Model fit', 'tools-free', e => [new Discrepancy(e, link), new Report(e, link)]);
     const more = make('div', { style: 'display: grid; gap: 12px' });
     this.views.model.append(more);
-    for (const [title, build] of [['Cutting coefficients', e => new Database(e, link)], ['Nodes', e => new Diagnostics(e, link)]]) {
+    for (const [title, build] of [['Cutting coefficients', e => new Database(e, link)], ['Force sensor', e => new ForceSensor(e, link)], ['Nodes', e => new Diagnostics(e, link)]]) {
       const element = card(title, 'tools-free');
       more.append(element);
       this.add('model', element, build(element));

@@ -57,7 +57,9 @@ Session::Session(ros::NodeHandle nh, const ros::NodeHandle& private_nh, const st
       tool_frf_(nh_, names::MEASURE_TOOL_FRF, false),
       sensor_frf_(nh_, names::MEASURE_SENSOR_FRF, false),
       identify_(nh_, names::IDENTIFY_COEFFICIENTS, false),
-      driver_(nh_, [this] { return stop_.load(); }) {
+      driver_(nh_, [this] { return stop_.load(); }),
+      sensor_(nh_, parameters_.calibration, driver_, sensor_frf_,
+              [this](const std::string& request) { log_.request(request); }) {
   const auto subscribe = [this](const char* topic, auto example, auto use) {
     using Message = decltype(example);
     const boost::function<void(const Message&)> callback = [this, topic, use](const Message& message) {
@@ -70,7 +72,9 @@ Session::Session(ros::NodeHandle nh, const ros::NodeHandle& private_nh, const st
   };
   subscribe(names::CNC_STATE, smartmill_msgs::CncState(), [](const auto&) {});
   subscribe(names::HAMMER, smartmill_msgs::SampleBlock(), [](const auto&) {});
-  subscribe(names::DYNAMOMETER, smartmill_msgs::SampleBlock(), [](const auto&) {});
+  subscribe(
+      parameters_.calibration.kind() == ForceSensorKind::spindle ? names::SPINDLE_FORCE : names::DYNAMOMETER,
+      smartmill_msgs::SampleBlock(), [](const auto&) {});
   subscribe(names::SPINDLE_ANGLE, smartmill_msgs::SpindleAngle(), [](const auto&) {});
   subscribers_.push_back(nh_.subscribe<smartmill_msgs::StabilityChart>(
       names::STABILITY_CHART, 10,
@@ -110,6 +114,7 @@ int Session::run() {
   }
   if (code != 0) makeSafe();
   log_.publish("", true);
+  log_.summary.sensor = sensor_.state();
   if (!parameters_.summary.empty()) {
     try {
       log_.summary.write(parameters_.summary);
@@ -131,12 +136,7 @@ void Session::runSteps() {
                      parameters_.modes);
     });
   }
-  for (char direction : parameters_.sensor_directions) {
-    step(std::string("taps on the force sensor in ") + direction, [&] {
-      return measure(sensor_frf_, names::MEASURE_SENSOR_FRF, POINT_FORCE_SENSOR, {direction},
-                     parameters_.sensor_hits, parameters_.sensor_modes);
-    });
-  }
+  calibrateSensor();
   step("discard earlier tests", [&] { return identify(true); });
   for (const PlannedCut& air : plan_.airCuts()) {
     step("air cut " + air.condition.name, [&] { return runCut(air); });
@@ -166,6 +166,29 @@ void Session::runSteps() {
   });
 }
 
+void Session::calibrateSensor() {
+  const double began = log_.elapsed();
+  const ForceSensorKind kind = parameters_.calibration.kind();
+  for (const CalibrationStage& stage : calibrationPlan(parameters_.calibration))
+    step(stage.name, [&] { return sensor_.run(stage, parameters_.frf_timeout); });
+  // The taps on a plate are those of its calibration.
+  if (kind != ForceSensorKind::plate) {
+    for (char direction : parameters_.sensor_directions) {
+      step(std::string("taps on the force sensor in ") + direction, [&] {
+        return measure(sensor_frf_, names::MEASURE_SENSOR_FRF, POINT_FORCE_SENSOR, {direction},
+                       parameters_.sensor_hits, parameters_.sensor_modes);
+      });
+    }
+  }
+  if (kind == ForceSensorKind::spindle) {
+    CalibrationStage dynamics{"cross-talk of the spindle sensor", {CalibrationStep()}};
+    dynamics.steps.front().kind = CalibrationStep::Kind::fit;
+    step(dynamics.name, [&] { return sensor_.run(dynamics, parameters_.frf_timeout); });
+  }
+  sensor_.requireCalibrated();
+  log_.summary.calibration_time = log_.elapsed() - began;
+}
+
 void Session::step(const std::string& name, const std::function<std::string()>& work) {
   driver_.checkStop();
   log_.publish(name);
@@ -187,7 +210,7 @@ bool Session::waitUntil(const std::function<bool()>& ready, double seconds) cons
   return driver_.waitUntil(ready, seconds);
 }
 
-std::string Session::missing() const {
+std::string Session::missing() {
   std::string text;
   const auto add = [&](const std::string& what) { text += (text.empty() ? "" : ", ") + what; };
   const auto server = [&](bool there, const char* name) {
@@ -197,6 +220,7 @@ std::string Session::missing() const {
   server(tool_frf_.isServerConnected(), names::MEASURE_TOOL_FRF);
   server(sensor_frf_.isServerConnected(), names::MEASURE_SENSOR_FRF);
   server(identify_.isServerConnected(), names::IDENTIFY_COEFFICIENTS);
+  if (const std::string what = sensor_.missing(); !what.empty()) add(what);
   const std::lock_guard<std::mutex> lock(mutex_);
   for (const auto& [topic, time] : last_received_) {
     if ((ros::WallTime::now() - time).toSec() > FRESH) add("data on " + topic);

@@ -17,6 +17,7 @@
 #include <smartmill_msgs/StabilityChart.h>
 
 #include "session/machine_driver.h"
+#include "session/sensor_calibration.h"
 #include "session_log.h"
 #include "session_parameters.h"
 #include "smartmill_core/model/machine_model.h"
@@ -45,6 +46,7 @@ class Session {
   std::string arm(bool on);
   std::string measure(Client<smartmill_msgs::MeasureFrfAction>& client, const std::string& name,
                       const std::string& point, const std::string& direction, int hits, int modes);
+  void calibrateSensor();
   std::string runCut(const PlannedCut& cut);
   void waitVerdict();
   std::string identify(bool reset);
@@ -52,7 +54,7 @@ class Session {
   std::string choosePoints();
   std::string verify(const char* role, const PlannedCut& cut, CutVerdict::Kind predicted);
   void makeSafe();
-  std::string missing() const;
+  std::string missing();
   std::string recorderMissing() const;
 
   ros::NodeHandle nh_;
@@ -66,6 +68,7 @@ class Session {
   Client<smartmill_msgs::MeasureFrfAction> tool_frf_, sensor_frf_;
   Client<smartmill_msgs::IdentifyCoefficientsAction> identify_;
   MachineDriver driver_;
+  SensorCalibration sensor_;
   std::vector<ros::Subscriber> subscribers_;
   std::unique_ptr<ros::AsyncSpinner> spinner_;
 

@@ -24,6 +24,12 @@ void SessionLog::record(const char* mark, const std::string& name, const std::st
   outcomes_.push_back(summary.steps.back().done ? Step::DONE : *mark == 's' ? Step::STOPPED : Step::FAILED);
 }
 
+void SessionLog::request(const std::string& text) {
+  std::printf("session [%6.1f s] ask  %s\n", elapsed(), text.c_str());
+  std::fflush(stdout);
+  publish(text);
+}
+
 void SessionLog::publish(const std::string& running, bool ended) {
   constexpr double SENDING = 0.2;  // [s] for the transmission of the last message before the program ends
   smartmill_msgs::SessionState message;

@@ -20,11 +20,13 @@ class SessionLog {
   /// Publishes the steps so far. @param running name of the step in progress; empty: none
   void publish(const std::string& running, bool ended = false);
 
+  /// Asks the operator, as the step in progress.
+  void request(const std::string& text);
+  double elapsed() const { return (ros::WallTime::now() - begin_).toSec(); }  ///< [s]
+
   SessionSummary summary;
 
  private:
-  double elapsed() const { return (ros::WallTime::now() - begin_).toSec(); }  // [s]
-
   ros::WallTime begin_ = ros::WallTime::now();
   ros::Publisher state_;
   std::vector<std::uint8_t> outcomes_;  // SessionStep.DONE, ... of the summary's steps

@@ -37,6 +37,7 @@ void SessionParameters::declare(ParameterTable& table) {
                "hits on the force sensor per direction");
   table.number("sensor_modes", sensor_modes, "1", Range::closed(0, 20),
                "modes to fit to the FRF of the force sensor; 0: chosen by evidence");
+  calibration.declare(table);
   table.section("Start and time limits.");
   table.text("recorder", recorder,
              "recorder node; the session starts after the node has subscribed; empty: none");
@@ -54,6 +55,7 @@ void SessionParameters::declare(ParameterTable& table) {
 void SessionParameters::validate() const {
   checkBounds(*this);
   plan.validate();
+  calibration.validate();
   if (model.empty()) throw Error("model: empty, expected the path of a smartmill-model/1 file");
   if (verify && tool_directions.size() < 2) {
     throw Error("verify: a stability chart requires the tool's FRF in x and y, tool_directions is '" +

@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "smartmill_launch/session/calibration_plan.h"
 #include "smartmill_launch/session/session_plan.h"
 
 namespace smartmill::session {
@@ -23,6 +24,7 @@ struct SessionParameters {
   double identify_timeout = 20.0;
   double chart_timeout = 60.0;
   PlanParameters plan;
+  CalibrationParameters calibration;
 
   void declare(ParameterTable& table);
   /// @throws Error naming key and value.

@@ -70,6 +70,20 @@ void SessionSummary::write(const std::string& file) const {
                                      {"chatter_frequency_hz", number(cut.verdict.frequency)},
                                      {"as_predicted", cut.as_predicted}});
   }
+  if (sensor) {
+    const auto vector = [](const geometry_msgs::Vector3& v) {
+      return Json{number(v.x), number(v.y), number(v.z)};
+    };
+    json["force_sensor"] = {{"sensor", sensor->sensor},
+                            {"calibrated", sensor->calibrated != 0},
+                            {"message", sensor->message},
+                            {"readings", sensor->readings},
+                            {"constant", vector(sensor->constant)},
+                            {"constant_std", vector(sensor->constant_std)},
+                            {"expected_error", vector(sensor->error)},
+                            {"verified", sensor->verified != 0},
+                            {"calibration_s", calibration_time}};
+  }
   std::ofstream out(file);
   out << json.dump(2) << "\n";
   out.close();

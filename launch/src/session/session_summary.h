@@ -1,7 +1,10 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
+
+#include <smartmill_msgs/ForceSensorState.h>
 
 #include "smartmill_core/cutting/coefficient_set.h"
 #include "smartmill_core/modal/results.h"
@@ -28,6 +31,8 @@ struct SessionSummary {
   std::vector<MeasuredModes> modes;
   std::vector<CoefficientSet> coefficients;  ///< none or one
   std::vector<Verified> verified;
+  std::optional<smartmill_msgs::ForceSensorState> sensor;
+  double calibration_time = 0.0;  ///< [s] of the force sensor, taps included
 
   /// @throws Error when the file cannot be written.
   void write(const std::string& file) const;

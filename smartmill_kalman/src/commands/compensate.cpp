@@ -237,6 +237,7 @@ Command compensateCommand() {
         .showDefault();
     line.option("--lag-s", o.lag, "lag of fixed-lag [s]").within(0.0, 10.0).showDefault();
     ParameterOptions parameters(line, tableOf(o.parameters), "launch/config/kalman.yaml");
+    parameters.add("--sensor", "sensor");
     parameters.add("--bandwidth-hz", "bandwidth");
     parameters.add("--noise-rms-n", "noise_rms");
     parameters.add("--settling-revolutions", "settling_revolutions");

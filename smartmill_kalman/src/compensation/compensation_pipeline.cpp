@@ -40,7 +40,7 @@ CompensationPipeline::CompensationPipeline(const CompensationParameters& paramet
       blocks_(sorter_.addRegular(names::DYNAMOMETER)),
       taps_(withRange(taps, parameters.saturation)),
       calibrator_(taps_, SpindleSensorCalibration::table3()),
-      plate_(taps_),
+      plate_(taps_, parameters.filter.bandwidth),
       bandwidth_(parameters.filter.bandwidth) {
   useModelSensors();
   sorter_.onRestart([this] { restart(); });
@@ -53,20 +53,50 @@ void CompensationPipeline::restart() {
   if (inverse_) inverse_->reset();
   calibrator_.reset();
   plate_.reset();
+  if (std::exchange(calibrated_here_, false)) {
+    spindle_.reset();
+    inverse_.reset();
+    startUncalibrated();
+  }
   condition_.reset();
   invalid_.clear();
   useModelSensors();
   if (on_restart_) on_restart_();
 }
 
+void CompensationPipeline::useKind(ForceSensorKind kind) {
+  kind_ = kind;
+  startUncalibrated();
+}
+
+void CompensationPipeline::startUncalibrated() {
+  calibration_ = {};
+  calibration_.calibrated = !isUncalibrated();
+  calibration_.message =
+      calibration_.calibrated
+          ? "modes of the machine model, until taps have measured them"
+          : "not calibrated: no force is published until kalman/calibrate has ended step FIT";
+}
+
+bool CompensationPipeline::isUncalibrated() const {
+  return (kind_ == ForceSensorKind::spindle && !spindle_) || (kind_ == ForceSensorKind::plate && !inverse_);
+}
+
 void CompensationPipeline::useSpindleSensor(const SpindleSensorCalibration& calibration, double length) {
   spindle_length_ = length;
   spindle_.emplace(calibration, length);
   calibrator_ = SpindleSensorCalibrator(taps_, calibration);
+  setCalibration(SpindleSensorCalibrator::describe(calibration, length));
 }
 
 void CompensationPipeline::useTransferMatrix(const TransferMatrix& matrix, double bandwidth) {
+  installMatrix(matrix, bandwidth);
+  setCalibration(plate_.describe());
+}
+
+void CompensationPipeline::installMatrix(const TransferMatrix& matrix, double bandwidth) {
   inverse_.emplace(MatrixInverse(matrix, bandwidth), model_sensor_.measures_workpiece, blockOutputs());
+  plate_.use(matrix, bandwidth);
 }
 
 void CompensationPipeline::useModelSensors() {
@@ -87,9 +117,9 @@ void CompensationPipeline::useModelSensors() {
 // Checked before it waits in the sorter: an error belongs to the topic of the block, not to that of the input
 // that releases it.
 void CompensationPipeline::check(const SampleBlock& block) const {
-  if (SpindleForceSensor::isSixChannels(block)) {
+  if (kind_ == ForceSensorKind::spindle || SpindleForceSensor::isSixChannels(block)) {
     SpindleForceSensor::columnsOf(block);
-    if (!spindle_ && !uncalibrated_allowed_)
+    if (!spindle_ && kind_ != ForceSensorKind::spindle)
       throw Error("spindle_sensor: not set, expected a calibration for a sensor of six channels");
   } else if (inverse_) {
     inverse_->check(block);
@@ -113,6 +143,7 @@ void CompensationPipeline::push(SampleBlock block) {
 }
 
 void CompensationPipeline::handle(const SampleBlock& block) {
+  stuck_.handle(block);
   if (SpindleForceSensor::isSixChannels(block)) {
     calibrator_.handle(block);
     publishCalibration();
@@ -124,7 +155,7 @@ void CompensationPipeline::handle(const SampleBlock& block) {
   }
   if (inverse_) {
     inverse_->handle(block);
-  } else {
+  } else if (kind_ != ForceSensorKind::plate) {
     compensation_.handle(block);
   }
   plate_.handle(block);
@@ -203,7 +234,9 @@ void CompensationPipeline::push(const CalibrationGoal& goal, std::function<bool(
     const bool free = !calibrator_.active();
     const bool start = !begin || begin(free);
     using Step = CalibrationGoal::Step;
-    const bool plate = goal.step == Step::point || (goal.step == Step::fit && !plate_.taps().taps.empty());
+    const bool plate =
+        goal.step == Step::point || (goal.step != Step::measurement && goal.step != Step::forget &&
+                                     (kind_ == ForceSensorKind::plate || !plate_.taps().taps.empty()));
     if (goal.step == Step::forget) plate_.reset();
     if (free && start && plate) {
       applyCalibration(plate_.handle(goal));
@@ -226,9 +259,11 @@ void CompensationPipeline::publishCalibration() {
 }
 
 void CompensationPipeline::applyCalibration(CalibrationResult result) {
+  bool changed = result.verified;
   if (result.matrix) {
     try {
-      useTransferMatrix(*result.matrix, bandwidth_);
+      installMatrix(*result.matrix, bandwidth_);
+      changed = calibrated_here_ = true;
     } catch (const Error& e) {
       result.message += std::string("; not in use: ") + e.what();
     }
@@ -238,11 +273,26 @@ void CompensationPipeline::applyCalibration(CalibrationResult result) {
     try {
       spindle_.emplace(*result.calibration, spindle_length_);
       if (condition_) spindle_->handle(*condition_);
+      changed = calibrated_here_ = true;
     } catch (const Error& e) {
       result.message += std::string("; not in use: ") + e.what();
     }
   }
+  if (changed) setCalibration(result);
   if (outputs_.calibration) outputs_.calibration(result);
+}
+
+void CompensationPipeline::setCalibration(const CalibrationResult& result) {
+  SensorCalibrationState& state = calibration_;
+  state.calibrated = !isUncalibrated();
+  state.message = result.message;
+  state.stamp = std::max(0.0, sorter_.newest());  // 0 before any input
+  state.readings = result.readings;
+  state.verified = result.verified;
+  state.error = result.error;
+  if (result.verified) return;  // the constants stay
+  state.constant = result.constant;
+  state.constant_std = result.constant_std;
 }
 
 void CompensationPipeline::event(std::function<void(SensorMeasurement&)> action) {

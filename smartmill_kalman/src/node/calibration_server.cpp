@@ -1,15 +1,18 @@
 #include "node/calibration_server.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <fstream>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include <actionlib/server/action_server.h>
 #include <smartmill_msgs/CalibrateForceSensorAction.h>
 #include <boost/function.hpp>
 
+#include "node/calibration_goal.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/names.h"
 #include "smartmill_kalman/sensor/tap_file.h"
@@ -22,24 +25,6 @@ using Server = actionlib::ActionServer<smartmill_msgs::CalibrateForceSensorActio
 using Handle = Server::GoalHandle;
 using Code = CalibrationResult::Code;
 
-constexpr double DEFAULT_DURATION = 0.5;  // [s] where the goal has 0
-
-CalibrationGoal fromMsg(const smartmill_msgs::CalibrateForceSensorGoal& message, double received) {
-  CalibrationGoal goal;
-  const double stamp = toSec(message.header.stamp);
-  goal.stamp = stamp > 0.0 ? stamp : received;
-  goal.step = static_cast<CalibrationGoal::Step>(message.step);
-  goal.test = static_cast<int>(message.test);
-  goal.length = message.length;
-  goal.load = {message.load.x, message.load.y, message.load.z};
-  if (goal.step == CalibrationGoal::Step::point)
-    goal.load = {message.point.x, message.point.y, message.point.z};
-  goal.reference = message.reference;
-  goal.duration = message.duration == 0.0 ? DEFAULT_DURATION : message.duration;
-  goal.file = message.file;
-  return goal;
-}
-
 smartmill_msgs::CalibrateForceSensorResult resultOf(Code code, const std::string& text) {
   smartmill_msgs::CalibrateForceSensorResult result;
   result.code = static_cast<std::uint8_t>(code);
@@ -50,12 +35,16 @@ smartmill_msgs::CalibrateForceSensorResult resultOf(Code code, const std::string
 }  // namespace
 
 struct CalibrationServer::Impl {
-  Impl(ros::NodeHandle nh, CompensationPipeline& target)
+  Impl(ros::NodeHandle nh, CompensationPipeline& target, bool is_live)
       : pipeline(target),
+        live(is_live),
         server(nh, names::CALIBRATE_SENSOR,
                boost::function<void(Handle)>([this](Handle handle) { onGoal(handle); }),
                boost::function<void(Handle)>([this](Handle handle) {
-                 if (active && *active == handle) pipeline.cancelCalibration();
+                 if (active && *active == handle) return pipeline.cancelCalibration();
+                 if (isWaiting(handle))
+                   handle.setCanceled(resultOf(Code::cancelled, "cancelled before its start"));
+                 remove(handle);
                }),
                false) {
     server.start();
@@ -69,24 +58,47 @@ struct CalibrationServer::Impl {
     if (message.step > smartmill_msgs::CalibrateForceSensorGoal::POINT)
       return reject("step " + std::to_string(message.step) +
                     ": expected READING, FIT, VERIFY, FORGET or POINT");
-    if (active) return reject("another step is running");
+    waiting.push_back(handle);
+    pipeline.push(calibrationGoal(message, toSec(message.header.stamp), toSec(ros::Time::now())),
+                  [this, handle](bool free) { return begin(handle, free); });
+  }
+
+  /// At the stamp of a goal. @return whether it starts; it may have been cancelled before.
+  bool begin(Handle handle, bool free) {
+    if (!isWaiting(handle)) return false;
+    remove(handle);
+    if (!free) {
+      const std::string reason = "another step is running";
+      handle.setRejected(resultOf(Code::bad_goal, reason), reason);
+      return false;
+    }
     handle.setAccepted();
     active = handle;
-    file = message.file;
-    pipeline.push(fromMsg(message, toSec(ros::Time::now())), [this, handle](bool free) {
-      // It may have been cancelled before its stamp was reached.
-      return free && active && *active == handle;
-    });
+    return true;
   }
+
+  bool isWaiting(const Handle& handle) const {
+    return std::find(waiting.begin(), waiting.end(), handle) != waiting.end();
+  }
+  void remove(const Handle& handle) {
+    waiting.erase(std::remove(waiting.begin(), waiting.end(), handle), waiting.end());
+  }
+  void refuseWaiting(Code code, const std::string& reason) {
+    for (Handle& handle : waiting) handle.setRejected(resultOf(code, reason), reason);
+    waiting.clear();
+  }
+
+  std::string file() const { return active && live ? active->getGoal()->file : ""; }
 
   /// Writes the calibration and the measurements that it was fitted to. @throws Error.
   void write(const SpindleSensorCalibration& calibration) const {
-    if (file.empty()) return;
-    writeSpindleSensor(calibration, file);
-    std::ofstream table(file + ".csv");
+    const std::string to = file();
+    if (to.empty()) return;
+    writeSpindleSensor(calibration, to);
+    std::ofstream table(to + ".csv");
     table << pipeline.calibrator().measurementTable();
     table.close();
-    if (!table) throw Error(file + ".csv: cannot write");
+    if (!table) throw Error(to + ".csv: cannot write");
   }
 
   void end(const smartmill_msgs::CalibrateForceSensorResult& result) {
@@ -108,13 +120,15 @@ struct CalibrationServer::Impl {
   }
 
   CompensationPipeline& pipeline;
-  std::string file, last_message = "no calibration yet";
+  bool live;
+  std::string last_message = "no calibration yet";
+  std::vector<Handle> waiting;  // for their stamps
   std::optional<Handle> active;
   Server server;
 };
 
-CalibrationServer::CalibrationServer(ros::NodeHandle nh, CompensationPipeline& pipeline)
-    : impl_(std::make_unique<Impl>(std::move(nh), pipeline)) {
+CalibrationServer::CalibrationServer(ros::NodeHandle nh, CompensationPipeline& pipeline, bool live)
+    : impl_(std::make_unique<Impl>(std::move(nh), pipeline, live)) {
 }
 
 CalibrationServer::~CalibrationServer() = default;
@@ -126,12 +140,14 @@ const std::string& CalibrationServer::lastMessage() const {
 void CalibrationServer::finish(const CalibrationResult& result) {
   smartmill_msgs::CalibrateForceSensorResult message = resultOf(result.code, result.message);
   message.readings = static_cast<std::uint32_t>(result.readings);
-  message.error.x = result.error[0];
-  message.error.y = result.error[1];
-  message.error.z = result.error[2];
+  if (result.verified) {
+    message.error.x = result.error[0];
+    message.error.y = result.error[1];
+    message.error.z = result.error[2];
+  }
   try {
     if (result.calibration) impl_->write(*result.calibration);
-    if (result.matrix && !impl_->file.empty()) writeTapFile(impl_->pipeline.plate().taps(), impl_->file);
+    if (result.matrix && !impl_->file().empty()) writeTapFile(impl_->pipeline.plate().taps(), impl_->file());
   } catch (const Error& e) {
     message.code = message.FIT_FAILED;
     message.message = e.what();
@@ -140,6 +156,7 @@ void CalibrationServer::finish(const CalibrationResult& result) {
 }
 
 void CalibrationServer::abort(const std::string& reason) {
+  if (impl_->live) impl_->refuseWaiting(Code::bad_data, reason);
   if (!impl_->active) return;
   const bool running = impl_->pipeline.calibrator().active();
   impl_->end(resultOf(Code::bad_data, reason));
@@ -147,7 +164,9 @@ void CalibrationServer::abort(const std::string& reason) {
 }
 
 void CalibrationServer::restart() {
-  if (impl_->active) impl_->end(resultOf(Code::cancelled, "time jumped back: the recording was restarted"));
+  const std::string reason = "time jumped back: the recording was restarted";
+  impl_->refuseWaiting(Code::cancelled, reason);
+  if (impl_->active) impl_->end(resultOf(Code::cancelled, reason));
 }
 
 }  // namespace smartmill::kalman

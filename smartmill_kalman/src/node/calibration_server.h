@@ -13,7 +13,8 @@ namespace smartmill::kalman {
 /// The result of a fit is written to the goal's file. Runs in the thread of the callbacks.
 class CalibrationServer {
  public:
-  CalibrationServer(ros::NodeHandle nh, CompensationPipeline& pipeline);
+  /// @param live false: replay; no file is written, goals wait for their stamps
+  CalibrationServer(ros::NodeHandle nh, CompensationPipeline& pipeline, bool live);
   ~CalibrationServer();
 
   void finish(const CalibrationResult& result);

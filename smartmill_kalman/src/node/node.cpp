@@ -2,14 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <functional>
 
 #include <geometry_msgs/WrenchStamped.h>
 #include <smartmill_msgs/ForceBlock.h>
+#include <smartmill_msgs/ForceSensorState.h>
 
 #include "node/rotation.h"
 #include "node/wiring.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/frames.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_ros/node_main.h"
@@ -39,20 +42,19 @@ KalmanNode::KalmanNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
       measured_(nh.advertise<smartmill_msgs::ForceBlock>(names::FORCE_MEASURED, STREAM_QUEUE)),
       compensated_(nh.advertise<smartmill_msgs::ForceBlock>(names::FORCE_COMPENSATED, STREAM_QUEUE)),
       wrench_(nh.advertise<geometry_msgs::WrenchStamped>(names::FORCE_WRENCH, STREAM_QUEUE)),
-      strike_(nh, parameters_.inSpindle() ? "tool" : POINT_FORCE_SENSOR),
+      sensor_state_(nh.advertise<smartmill_msgs::ForceSensorState>(names::FORCE_SENSOR, 10, true)),
+      strike_(nh, parameters_.kind() == ForceSensorKind::spindle ? "tool" : POINT_FORCE_SENSOR),
       pipeline_(parameters_.compensation, parameters_.taps, sensorOf(parameters_), parameters_.hold_back,
                 pipelineOutputs()),
       measurement_server_(nh, names::MEASURE_SENSOR_FRF, "kalman", measurementHandlers()),
-      calibration_server_(nh, pipeline_) {
+      calibration_server_(nh, pipeline_, parameters_.command_machine) {
   loadSensorFiles(pipeline_, parameters_);
-  if (parameters_.inSpindle() && parameters_.spindle_sensor.empty()) {
-    pipeline_.allowUncalibrated();
-    ROS_WARN(
-        "spindle_sensor: not set; no force is published until kalman/calibrate has calibrated the sensors");
-  }
+  if (pipeline_.isUncalibrated()) ROS_WARN("%s", pipeline_.calibration().message.c_str());
+  publishSensor();
   pipeline_.onRestart([this] {
     measurement_server_.restart();
     calibration_server_.restart();
+    publishSensor();
   });
   subscribe();
   shell_.diagnose("force compensation", [this](auto& status) { diagnose(status); });
@@ -77,10 +79,13 @@ CompensationPipeline::Outputs KalmanNode::pipelineOutputs() {
     result.modes = sensor.modes;
     measurement_server_.finish(result);
   };
-  outputs.calibration = [this](const CalibrationResult& result) { calibration_server_.finish(result); };
+  outputs.calibration = [this](const CalibrationResult& result) {
+    publishSensor();
+    calibration_server_.finish(result);
+  };
   outputs.block_error = [this](const std::string& reason) {
     ++failed_blocks_;
-    last_failure_ = parameters_.force_input + ": block not compensated: " + reason;
+    last_failure_ = force_input_ + ": block not compensated: " + reason;
     ROS_ERROR_STREAM_THROTTLE(5.0, last_failure_);
   };
   return outputs;
@@ -99,16 +104,15 @@ FrfServer::Handlers KalmanNode::measurementHandlers() {
 
 void KalmanNode::subscribe() {
   Inputs& inputs = shell_.inputs();
-  inputs.on<smartmill_msgs::SampleBlock>(
-      parameters_.force_input, [this](const smartmill_msgs::SampleBlock& message, double) {
-        const std::string frame =
-            message.header.frame_id.empty() ? frames::DYNAMOMETER : message.header.frame_id;
-        if (frame != sensor_frame_) rotation_known_ = false;
-        sensor_frame_ = frame;
-        pipeline_.push(fromMsg(message));
-      });
+  inputs.on<smartmill_msgs::SampleBlock>(force_input_, [this](const smartmill_msgs::SampleBlock& message,
+                                                              double) {
+    const std::string frame = message.header.frame_id.empty() ? frames::DYNAMOMETER : message.header.frame_id;
+    if (frame != sensor_frame_) rotation_known_ = false;
+    sensor_frame_ = frame;
+    pipeline_.push(fromMsg(message));
+  });
   // One input block becomes two output blocks.
-  inputs.setWaiting(parameters_.force_input, [this] { return (waiting_.size() + 1) / 2; });
+  inputs.setWaiting(force_input_, [this] { return (waiting_.size() + 1) / 2; });
   connect(inputs, pipeline_);
   feed<CuttingCondition>(inputs, names::CUTTING_CONDITION, pipeline_);
   // A recording that starts after the taps contains the modes that were used in it.
@@ -165,11 +169,33 @@ void KalmanNode::publishWrench(const ForceBlock& block) {
   }
 }
 
+void KalmanNode::publishSensor() {
+  const SensorCalibrationState& state = pipeline_.calibration();
+  const auto vector = [](const std::array<double, 3>& from) {
+    geometry_msgs::Vector3 to;
+    to.x = from[0];
+    to.y = from[1];
+    to.z = from[2];
+    return to;
+  };
+  smartmill_msgs::ForceSensorState message;
+  message.header.stamp = fromSec(state.stamp);
+  message.sensor = forceSensorWords()[static_cast<std::size_t>(parameters_.kind())];
+  message.calibrated = state.calibrated;
+  message.message = state.message;
+  message.readings = static_cast<std::uint32_t>(state.readings);
+  message.constant = vector(state.constant);
+  message.constant_std = vector(state.constant_std);
+  message.error = vector(state.error);
+  message.verified = state.verified;
+  sensor_state_.publish(message);
+}
+
 void KalmanNode::checkInputs() {
   checkMeasurement();
   publishWaiting();
   // End of data: no later input releases the blocks that wait.
-  if (shell_.inputs().watchdog(parameters_.force_input).ended()) pipeline_.flush();
+  if (shell_.inputs().watchdog(force_input_).ended()) pipeline_.flush();
 }
 
 void KalmanNode::checkMeasurement() {
@@ -180,7 +206,7 @@ void KalmanNode::checkMeasurement() {
       measurement.hitByHand();  // no automatic hammer
     });
   }
-  const InputHealth* dead = shell_.inputs().dead({names::HAMMER, parameters_.force_input.c_str()});
+  const InputHealth* dead = shell_.inputs().dead({names::HAMMER, force_input_.c_str()});
   if (!dead) return;
   const std::string reason = "no data on " + dead->topic();
   if (shell_.inputs().watchdog(names::HAMMER).ended()) {
@@ -204,9 +230,15 @@ std::pair<int, std::string> KalmanNode::summary(const SpindleSensorHealth* spind
     return {Level::ERROR, last_failure_};
   if (std::exchange(reported_drops_, dropped_blocks_) != dropped_blocks_)
     return {Level::ERROR, "force blocks were dropped: no transform of the force sensor for 20 s"};
-  if (shell_.inputs().watchdog(parameters_.force_input).dead())
+  if (shell_.inputs().watchdog(force_input_).dead())
     return {Level::STALE, "no samples from the force sensor"};
-  if (pipeline_.isUncalibrated()) return {Level::ERROR, "the sensors in the spindle are not calibrated"};
+  if (const StuckChannel& stuck = pipeline_.stuck(); stuck.duration() > parameters_.input_timeout) {
+    const std::string text = force_input_ + formatted(": channel %s has not changed for %.1f s: stuck",
+                                                      stuck.channel().c_str(), stuck.duration());
+    ROS_ERROR_STREAM_THROTTLE(5.0, text);
+    return {Level::ERROR, text};
+  }
+  if (pipeline_.isUncalibrated()) return {Level::ERROR, pipeline_.calibration().message};
   if (!rotation_known_) return {Level::ERROR, "no transform of the force sensor"};
   if (health.gaps + health.not_finite + health.clipped > 0)
     return {Level::WARN, "samples were lost, clipped or not finite"};
@@ -221,6 +253,7 @@ std::pair<int, std::string> KalmanNode::summary(const SpindleSensorHealth* spind
   if (parameters_.model_max_age > 0.0 && pipeline_.ageOfModes() > parameters_.model_max_age)
     return {Level::WARN, "the measured modes are older than model_max_age: repeat the taps"};
   if (pipeline_.isMeasuring()) return {Level::OK, "measuring the sensor"};
+  if (pipeline_.invertsMatrix()) return {Level::OK, "inverting the matrix of the plate"};
   return {Level::OK, health.speed > 0.0 ? "compensating" : "passing through"};
 }
 

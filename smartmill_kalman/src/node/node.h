@@ -35,12 +35,14 @@ class KalmanNode {
   void publishWaiting();
   void publishWrench(const ForceBlock& block);
   bool lookUpRotation();
+  void publishSensor();
   void checkInputs();
   void checkMeasurement();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
   std::pair<int, std::string> summary(const SpindleSensorHealth* spindle);
 
   NodeParameters parameters_;
+  std::string force_input_ = parameters_.input();
   tf2_ros::Buffer transforms_;
   tf2_ros::TransformListener listener_;
   NodeShell shell_;
@@ -55,7 +57,7 @@ class KalmanNode {
   std::size_t reported_failures_ = 0, reported_drops_ = 0;
   double next_wrench_ = 0.0;  // [s]
 
-  ros::Publisher measured_, compensated_, wrench_;
+  ros::Publisher measured_, compensated_, wrench_, sensor_state_;
   StrikeClient strike_;
   CompensationPipeline pipeline_;
   FrfServer measurement_server_;

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/model/force_sensor_kind.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_kalman/compensation/compensation_pipeline.h"
@@ -12,6 +13,7 @@ namespace smartmill::kalman {
 /// Parameters of kalman_node and of `compensate` on a bag.
 struct NodeParameters {
   std::string model;  ///< may be empty in tools with an option --model
+  std::string sensor = "table";
   std::string force_input = names::DYNAMOMETER;
   std::string sensor_matrix, spindle_sensor, plate_taps;
   double spindle_sensor_length = 0.139;
@@ -30,14 +32,18 @@ struct NodeParameters {
     table.atLaunch("model", model,
                    "path of a smartmill-model/1 file; its force_sensor section gives the sensor's modes");
     table.section();
-    table.text("force_input", force_input,
-               "topic of the force sensor; daq/spindle_force: sensor in the spindle, taps are on the tool");
+    table.choice(
+        "sensor", sensor, forceSensorWords(),
+        "table: dynamometer; spindle: six sensors in the spindle on daq/spindle_force, taps are on the "
+        "tool; plate: 3 or 6 channels on force_input; spindle and plate publish no force until they "
+        "are calibrated (action kalman/calibrate, spindle_sensor, plate_taps)");
+    table.text("force_input", force_input, "topic of the force sensor; daq/spindle_force: as sensor spindle");
     table.text("sensor_matrix", sensor_matrix,
                "smartmill-sensor-matrix/1 file (compensate --coupled --matrix-out): corrects cross-talk");
-    table.text(
-        "spindle_sensor", spindle_sensor,
-        "smartmill-spindle-sensor/1 file: calibration of six sensors x1 x2 y1 y2 z1 z2 on force_input; "
-        "empty: calibrate them first (action kalman/calibrate)");
+    table.text("spindle_sensor", spindle_sensor,
+               "smartmill-spindle-sensor/1 file: calibration of six sensors x1 x2 y1 y2 z1 z2; empty: "
+               "calibrate them "
+               "first (action kalman/calibrate)");
     table.number("spindle_sensor_length", spindle_sensor_length, "m", Range::positive(),
                  "length of tool and holder, for spindle_sensor");
     table.text("plate_taps", plate_taps,
@@ -58,14 +64,24 @@ struct NodeParameters {
                "false: replay; daq/strike is not called, the recorded hits are used");
     taps.declare(table);
   }
-  /// Whether the sensor is in the spindle; taps are on the tool then.
-  bool inSpindle() const { return force_input == names::SPINDLE_FORCE; }
+  ForceSensorKind kind() const {
+    if (force_input == names::SPINDLE_FORCE) return ForceSensorKind::spindle;
+    return plate_taps.empty() ? forceSensorKind(sensor) : ForceSensorKind::plate;
+  }
+  /// Topic of the force sensor.
+  std::string input() const {
+    return kind() == ForceSensorKind::spindle ? names::SPINDLE_FORCE : force_input;
+  }
   /// @throws Error naming key and value.
   void validate() const {
     checkBounds(*this);
     if (force_input.empty()) throw Error("force_input: empty, expected a topic");
     if (!plate_taps.empty() && !(spindle_sensor.empty() && sensor_matrix.empty()))
       throw Error("plate_taps: set together with sensor_matrix or spindle_sensor, expected only one of them");
+    if (sensor == "spindle" && !plate_taps.empty())
+      throw Error("plate_taps: set together with sensor spindle, expected sensor plate");
+    if (sensor == "plate" && force_input == names::SPINDLE_FORCE)
+      throw Error("force_input: daq/spindle_force, expected the topic of the plate with sensor plate");
     compensation.validate();
     taps.validate();
   }

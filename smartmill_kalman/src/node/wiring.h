@@ -25,6 +25,7 @@ inline void loadSensorFiles(CompensationPipeline& pipeline, const NodeParameters
     pipeline.useTransferMatrix(identifyTransferMatrix(records.taps, records.rate),
                                parameters.compensation.filter.bandwidth);
   }
+  pipeline.useKind(parameters.kind());
   pipeline.setSpindleSensorLength(parameters.spindle_sensor_length);
   if (!parameters.spindle_sensor.empty()) {
     pipeline.useSpindleSensor(readSpindleSensor(parameters.spindle_sensor), parameters.spindle_sensor_length);

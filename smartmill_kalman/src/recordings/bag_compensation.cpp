@@ -4,6 +4,7 @@
 #include <optional>
 #include <utility>
 
+#include "node/calibration_goal.h"
 #include "node/rotation.h"
 #include "node/wiring.h"
 #include "recordings/frame_tree.h"
@@ -135,7 +136,7 @@ BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, con
                    std::move(outputs));
   loadSensorFiles(*pipeline, parameters);
   std::size_t blocks = 0;
-  bag.on<plain::SampleBlock>(parameters.force_input, [&](const plain::SampleBlock& m, double) {
+  bag.on<plain::SampleBlock>(parameters.input(), [&](const plain::SampleBlock& m, double) {
     if (blocks++ == 0 && !m.header.frame_id.empty()) transformer.setFrame(m.header.frame_id);
     pipeline->push(fromMsg(m));
   });
@@ -149,9 +150,18 @@ BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, con
                                       [&](const plain::MeasureFrfActionGoal& m, double received) {
                                         pipeline->push(goalFromMsg(m.goal, received));
                                       });
+  bag.on<plain::CalibrateForceSensorActionGoal>(
+      names::goals(names::CALIBRATE_SENSOR),
+      [&](const plain::CalibrateForceSensorActionGoal& m, double received) {
+        pipeline->push(calibrationGoal(m.goal, toSec(m.goal.header.stamp), received));
+      });
   bag.run(progress);
   summary.duration = bag.duration();
-  if (blocks == 0) throw Error(path + ": topic " + parameters.force_input + " not found");
+  if (blocks == 0) throw Error(path + ": topic " + parameters.input() + " not found");
+  if (pipeline->isUncalibrated()) {
+    throw Error(path + ": the force sensor (" + parameters.sensor +
+                ") is not calibrated: no goal of kalman/calibrate with step FIT, no calibration file");
+  }
   pipeline->flush();
   splitter.close();
   transformer.flush();

@@ -66,6 +66,13 @@ void SpindleSensorCalibration::checkLength(double length) const {
                         length / units::MM, lengths[0] / units::MM, lengths[1] / units::MM));
 }
 
+double LengthDependence::stdAt(double length) const {
+  const double variance =
+      slope_std * slope_std * length * length + 2.0 * covariance * length + offset_std * offset_std;
+  const double value = at(length);
+  return (variance < 0.0 ? 0.0 : std::sqrt(variance)) * (reciprocal ? value * value : 1.0);
+}
+
 std::array<double, 3> pairMeans(const std::array<double, 6>& s) {
   return {0.5 * (s[0] - s[1]), -0.5 * (s[2] - s[3]), 0.5 * (s[4] + s[5])};
 }

@@ -191,15 +191,35 @@ void SpindleSensorCalibrator::fit() {
     StaticCalibration found = calibrateStatic(measurements_, base_);
     const std::string dynamics = fitDynamicCrossTalks(found.calibration);
     const SpindleSensorCalibration& c = found.calibration;
-    finish(Code::ok, formatted("%zu measurements at %zu lengths: constants x %.3f, y %.3f, z %.3f at %.0f mm",
-                               measurements_.size(), found.lengths.size(), c.x.at(tap_length_),
-                               c.y.at(tap_length_), c.z.at(tap_length_), tap_length_ / units::MM) +
-                         dynamics);
+    const CalibrationResult described = describe(c, tap_length_);
+    finish(Code::ok,
+           formatted("%zu measurements at %zu lengths: ", measurements_.size(), found.lengths.size()) +
+               described.message + dynamics);
+    result_->constant = described.constant;
+    result_->constant_std = described.constant_std;
+    result_->error = described.error;
     result_->calibration = c;
     base_ = c;
   } catch (const Error& e) {
     finish(Code::fit_failed, e.what());
   }
+}
+
+CalibrationResult SpindleSensorCalibrator::describe(const SpindleSensorCalibration& calibration,
+                                                    double length) {
+  CalibrationResult result;
+  const std::array<const LengthDependence*, 3> lines{{&calibration.x, &calibration.y, &calibration.z}};
+  result.message = "constants";
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    result.constant[axis] = lines[axis]->at(length);
+    result.constant_std[axis] = lines[axis]->stdAt(length);
+    result.error[axis] = result.constant_std[axis] / std::abs(result.constant[axis]);
+    result.message += formatted("%s %s %.3f", axis > 0 ? "," : "", AXIS_NAMES[axis], result.constant[axis]);
+    if (std::isfinite(result.constant_std[axis]))
+      result.message += formatted(" +- %.3f", result.constant_std[axis]);
+  }
+  result.message += formatted(" at %.0f mm", length / units::MM);
+  return result;
 }
 
 void SpindleSensorCalibrator::verify() {
@@ -211,6 +231,7 @@ void SpindleSensorCalibrator::verify() {
                      100.0 * error[0], 100.0 * error[1], 100.0 * error[2], 100.0 * LARGEST_STATIC_ERROR));
     result_->readings = reference_.size();
     result_->error = error;
+    result_->verified = true;
   } catch (const Error& e) {
     finish(Code::fit_failed, e.what());
   }

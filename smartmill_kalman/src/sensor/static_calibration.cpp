@@ -99,7 +99,7 @@ std::pair<LengthDependence, double> fitLine(const std::vector<ConstantsAtLength>
   line.reciprocal = reciprocal;
   if (points.size() == 1) {
     line.offset = points[0][1];
-    line.slope_std = 0.0;
+    line.slope_std = line.covariance = 0.0;
     line.offset_std = 1.0 / std::sqrt(points[0][2]);
     return {line, 0.0};
   }
@@ -114,6 +114,7 @@ std::pair<LengthDependence, double> fitLine(const std::vector<ConstantsAtLength>
   line.offset = x(1) - x(0) * middle;
   line.slope_std = std::sqrt(covariance(0, 0));
   line.offset_std = std::sqrt(covariance(1, 1) + middle * middle * covariance(0, 0));
+  line.covariance = -middle * covariance(0, 0);
   double chi2 = 0.0;
   for (const auto& [length, value, weight] : points)
     chi2 += weight * std::pow(value - line.slope * length - line.offset, 2);

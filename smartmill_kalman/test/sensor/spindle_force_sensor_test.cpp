@@ -134,17 +134,20 @@ TEST(CalibrateStatic, ALengthThatNoWeightWasHungAtIsRefused) {
 }
 
 TEST(CalibrateStatic, StandardDeviationsAreHonest) {
-  Coverage x, y, z;
+  Coverage x, y, z, constant;
   for (std::uint32_t run = 0; run < Coverage::RUNS; ++run) {
     const SpindleSensorCalibration c =
         calibrateStatic(weights({100.0, 180.0}, 0.01, 100 + run), TABLE).calibration;
     x.add(c.x.slope - TABLE.x.slope, c.x.slope_std);
     y.add(c.y.slope - TABLE.y.slope, c.y.slope_std);
     z.add(c.z.offset - TABLE.z.offset, c.z.offset_std);
+    constant.add(c.y.at(LENGTH) - TABLE.y.at(LENGTH), c.y.stdAt(LENGTH));
   }
   EXPECT_TRUE(x.isCalibrated());
   EXPECT_TRUE(y.isCalibrated());
   EXPECT_TRUE(z.isCalibrated());
+  EXPECT_TRUE(constant.isCalibrated());
+  EXPECT_TRUE(std::isnan(TABLE.y.stdAt(LENGTH)));  // Table 3 has none
 }
 
 TEST(SpindleSensorCalibration, FileKeepsEverything) {
@@ -347,6 +350,35 @@ TEST(SpindleForceSensor, DynamicCrossTalkGoesWhereTheStaticOneFails) {
   }
   EXPECT_GT(was, 40.0);         // 100 N in y give 18/27.7 |h - 1| 100 N
   EXPECT_LT(left, 0.01 * was);  // a force linear between samples: 1 - (w dt)^2 / 12 = 0.2 %
+}
+
+// Six sensors that wait for their calibration give no force; blocks of another sensor are refused.
+TEST(CompensationPipeline, GivesNoForceBeforeTheCalibration) {
+  std::size_t forces = 0;
+  const auto count = [&](const ForceBlock&) { ++forces; };
+  CompensationPipeline pipeline({}, {}, {}, 0.05, {{count, count}});
+  pipeline.useKind(ForceSensorKind::spindle);
+  EXPECT_TRUE(pipeline.isUncalibrated());
+  EXPECT_FALSE(pipeline.calibration().calibrated);
+  EXPECT_NE(pipeline.calibration().message.find("not calibrated"), std::string::npos);
+  SampleBlock block;
+  block.sample_rate = RATE;
+  block.channels = {"x1", "x2", "y1", "y2", "z1", "z2"};
+  block.units.assign(6, "N");
+  for (int b = 0; b < 100; ++b) {
+    block.stamp = 0.01 * b;
+    block.first_index = 256 * b;
+    block.samples.assign(6 * 256, 1.0);
+    pipeline.push(block);
+  }
+  pipeline.flush();
+  EXPECT_EQ(forces, 0u);
+  block.channels = {"fx", "fy", "fz", "mx", "my", "mz"};
+  EXPECT_EQ(errorOf([&] { pipeline.push(block); }),
+            "sample block: channel 'x1' is missing (present: fx fy fz mx my mz)");
+  pipeline.useSpindleSensor(TABLE, LENGTH);
+  EXPECT_TRUE(pipeline.calibration().calibrated);
+  EXPECT_NEAR(pipeline.calibration().constant[1], TABLE.y.at(LENGTH), 1e-12);
 }
 
 // What the node is made of: six channels in, force at the tool out, with the sensor's own sample index.

@@ -88,6 +88,25 @@ export class Database {
   }
 }
 
+// The force sensor in use and its calibration.
+export class ForceSensor {
+  constructor(card, link) {
+    this.place = make('div', { class: 'dim' }, 'Unknown');
+    card.append(this.place);
+    link.on('force/sensor', m => this.show(m));
+  }
+  show(m) {
+    const SENSORS = { table: 'Dynamometer on the table', spindle: 'Six sensors in the spindle', plate: 'Plate under the workpiece' };
+    const rows = ['x', 'y', 'z'].filter(k => Number.isFinite(m.constant[k]) || Number.isFinite(m.error[k])).map(k => [
+      k, withDeviation(m.constant[k], m.constant_std[k]), Number.isFinite(m.error[k]) ? `${fixed(100 * m.error[k], 2)} %` : '–']);
+    this.place.className = '';
+    this.place.replaceChildren(
+      make('p', { class: `sentence ${m.calibrated ? 'good' : 'bad'}`, id: 'force-sensor' }, `${SENSORS[m.sensor] ?? m.sensor}: ` + (m.calibrated ? 'in use.' : 'not calibrated, no force is published.')),
+      make('p', { class: 'dim' }, m.message),
+      rows.length ? table(['Axis', 'Constant', m.verified ? 'Error, compared with the reference' : 'Expected error'], rows) : '');
+  }
+}
+
 export class Diagnostics {
   constructor(card, link) {
     this.found = new Map();

@@ -8,7 +8,7 @@ export const STALE_AGE = 1.0;  // [s] of a state that is published several times
 export class StatusLine {
   constructor(element, link, name, short = false) {
     Object.assign(this, { element, link, name, short });
-    for (const topic of ['cnc/state', 'chatter/state', 'cut/condition']) link.on(topic, () => {});
+    for (const topic of ['cnc/state', 'chatter/state', 'cut/condition', 'force/sensor']) link.on(topic, () => {});
   }
 
   words() {
@@ -23,10 +23,13 @@ export class StatusLine {
     else if (old > STALE_AGE) words.push(['bad', 'Controller silent']);
     if (state.emergency) words.push(['bad', 'EMERGENCY STOP']);
     if (state.alarm) words.push(['bad', `Alarm ${state.alarm_text}`]);
+    const sensor = link.message('force/sensor');
+    if (sensor && !sensor.calibrated) words.push(['bad', `Sensor ${sensor.sensor} not calibrated`]);
     if (!this.short) {
       if (old <= STALE_AGE) words.push(['good', 'Connected']);
       words.push(state.armed ? ['warn', 'Armed'] : ['plain', 'Disarmed']);
       words.push(['plain', MODES[state.mode] ?? `mode ${state.mode}`], ['plain', RUNS[state.run] ?? '']);
+      if (sensor?.calibrated && sensor.sensor !== 'table') words.push(['plain', `Sensor ${sensor.sensor}, calibrated`]);
       if (!state.alarm && !state.emergency && old <= STALE_AGE) words.push(['plain', 'no alarm']);
     } else if (!words.length) {
       words.push(['good', RUNS[state.run]]);

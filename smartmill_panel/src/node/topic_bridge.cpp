@@ -15,6 +15,7 @@
 #include <smartmill_msgs/FleetState.h>
 #include <smartmill_msgs/ForceBlock.h>
 #include <smartmill_msgs/ForceRevolution.h>
+#include <smartmill_msgs/ForceSensorState.h>
 #include <smartmill_msgs/ForceSpectrum.h>
 #include <smartmill_msgs/ForceStrip.h>
 #include <smartmill_msgs/Frf.h>
@@ -48,9 +49,9 @@ const std::map<std::string, std::string>& knownDefinitions() {
   using namespace smartmill_msgs;
   static const auto definitions =
       definitionsOf<ChatterAdvice, ChatterState, CncState, CuttingCoefficients, CuttingCondition,
-                    DiscrepancyState, FleetState, ForceBlock, ForceRevolution, ForceSpectrum, ForceStrip, Frf,
-                    LoadSample, ModalModel, SampleBlock, SessionState, SpindleAngle, StabilityChart,
-                    diagnostic_msgs::DiagnosticArray>();
+                    DiscrepancyState, FleetState, ForceBlock, ForceRevolution, ForceSensorState,
+                    ForceSpectrum, ForceStrip, Frf, LoadSample, ModalModel, SampleBlock, SessionState,
+                    SpindleAngle, StabilityChart, diagnostic_msgs::DiagnosticArray>();
   return definitions;
 }
 

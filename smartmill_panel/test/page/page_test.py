@@ -52,6 +52,7 @@ class Machine:
         self.publish("cut/condition", m.CuttingCondition(
             kind=2, name="slot_7", material="al7050", tool="end_mill", teeth=4, diameter=0.01905, helix=0.5236, spindle_speed=418.9,
             feed_per_tooth=1e-4, axial_depth=1.234e-3, entry_angle=0.0, exit_angle=math.pi), latch=True)
+        self.sensor(calibrated=True)
         speeds = [200.0 + 6.0 * k for k in range(300)]
         limits = [math.inf if k == 150 else 1e-3 * (2.0 + math.sin(0.1 * k)) for k in range(300)]
         best = m.StabilityPoint(spindle_speed=1200.0, axial_depth=2.2e-3, depth_limit=2.9e-3, chatter_frequency=1234.5, torque=3.21, power=3852.0,
@@ -90,6 +91,12 @@ class Machine:
         self.publish("loadmeter/fleet", m.FleetState(
             server="postgresql://mill_07@shop/fleet", reached=reached, message=message, behind=0 if reached else 3, between_machines=0.021,
             between_batches=0.008, between_tools=0.09, between_cuts=0.015, pairs=pairs, machines=machines), latch=True)
+
+    def sensor(self, calibrated):
+        from geometry_msgs.msg import Vector3
+        self.publish("force/sensor", self.msg.ForceSensorState(
+            sensor="spindle", calibrated=calibrated, message="36 measurements at 3 lengths" if calibrated else "not calibrated: weights are missing",
+            constant=Vector3(18.0, 18.2, 62.0), constant_std=Vector3(0.04, 0.05, 0.3), error=Vector3(0.002, 0.003, math.nan)), latch=True)
 
     def run(self):
         while not self.rospy.is_shutdown():
@@ -182,7 +189,7 @@ def tile(browser, what):
                       ".querySelector('.value').textContent", what)
 
 
-def values_are_the_topics(browser):
+def values_are_the_topics(browser, machine):
     browser.wait("document.querySelector('.tile.bad')")
     becomes(lambda: tile(browser, "Spindle [rpm]"), "4000")
     becomes(lambda: tile(browser, "Spindle load"), "45.7")
@@ -200,6 +207,14 @@ def values_are_the_topics(browser):
     browser.js("(location.hash = 'model', 1)")
     browser.wait("document.querySelector('#gap td')")
     becomes(lambda: browser.js("[...document.querySelectorAll('#gap td:nth-child(2)')].map(e => e.textContent)"), ["1.04", "3.21"])
+    becomes(lambda: browser.text("#force-sensor"), "Six sensors in the spindle: in use.")
+    becomes(lambda: browser.js("[...document.querySelectorAll('#force-sensor ~ div td, #force-sensor ~ table td')].map(e => e.textContent)"),
+          ["x", "18.00 ± 0.04", "0.20 %", "y", "18.20 ± 0.05", "0.30 %", "z", "62.0 ± 0.3", "–"])
+    machine.sensor(calibrated=False)
+    becomes(lambda: "Sensor spindle not calibrated" in browser.text("#status"), True)
+    becomes(lambda: browser.text("#force-sensor"), "Six sensors in the spindle: not calibrated, no force is published.")
+    machine.sensor(calibrated=True)
+    becomes(lambda: "Sensor spindle, calibrated" in browser.text("#status"), True)
     browser.js("(location.hash = 'session', 1)")
     browser.wait("document.querySelector('#steps td')")
     becomes(lambda: browser.js("[...document.querySelectorAll('#steps tbody tr')].map(e => e.children[0].textContent + ' ' + e.children[1].textContent)"),
@@ -208,7 +223,7 @@ def values_are_the_topics(browser):
 
 def messages_are_decoded_as_by_ros(browser, machine):
     import io
-    for topic in ("stability/chart", "tool/frf", "tool/modes", "material/coefficients", "cut/condition", "session/state", "loadmeter/fleet"):
+    for topic in ("stability/chart", "tool/frf", "tool/modes", "material/coefficients", "cut/condition", "session/state", "loadmeter/fleet", "force/sensor"):
         browser.wait("window.smartmill.link.message(arguments[0]) !== undefined", topic)
         sent = machine.last[topic]
         wire = io.BytesIO()
@@ -483,7 +498,7 @@ def main():
         with Browser() as browser:
             browser.resize(*SIZES["1280x800"])
             browser.open(bench.address)
-            bench.case(values_are_the_topics, browser)
+            bench.case(values_are_the_topics, browser, machine)
             bench.case(messages_are_decoded_as_by_ros, browser, machine)
             bench.case(force_and_spectrum_are_those_of_the_machine, browser)
             bench.case(every_view_is_drawn, browser)

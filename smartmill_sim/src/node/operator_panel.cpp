@@ -3,7 +3,10 @@
 #include <array>
 #include <utility>
 
+#include <boost/function.hpp>
+
 #include "smartmill_core/error.h"
+#include "smartmill_core/names.h"
 
 namespace smartmill::sim {
 
@@ -60,7 +63,14 @@ void OperatorPanel::advertiseManualActions(World& world, const WorldOptions& opt
   const auto triple = [](const Request& r) {
     return std::array<double, 3>{r.values[0], r.values[1], r.values[2]};
   };
+  using Action = smartmill_msgs::OperatorAction::Request;
+  const auto vector = [](const geometry_msgs::Vector3& v) { return std::array<double, 3>{v.x, v.y, v.z}; };
   if (options.spindle_sensor.present) {
+    actions_[Action::HANG_WEIGHT] = [&world, vector](const Action& a) { world.pull(vector(a.load), false); };
+    actions_[Action::PRESS_WORKPIECE] = [&world, vector](const Action& a) {
+      world.pull(vector(a.load), true);
+    };
+    actions_[Action::CHANGE_TOOL] = [&world](const Action& a) { world.setToolLength(a.length); };
     advertise("hang_weight", 3, [&world, triple](const Request& request) -> std::string {
       world.pull(triple(request), false);
       return {};
@@ -79,11 +89,31 @@ void OperatorPanel::advertiseManualActions(World& world, const WorldOptions& opt
     });
   }
   if (options.plate.present) {
+    actions_[Action::TAP_POINT] = [&world, vector](const Action& a) { world.setTapPoint(vector(a.point)); };
     advertise("tap_point", 3, [&world, triple](const Request& request) -> std::string {
       world.setTapPoint(triple(request));
       return {};
     });
   }
+  if (actions_.empty()) return;
+  keys_.push_back(nh_.advertiseService(
+      names::OPERATOR_ACTION,
+      boost::function<bool(Action&, smartmill_msgs::OperatorAction::Response&)>(
+          [this](const Action& request, auto& response) { return act(request, response); })));
+}
+
+bool OperatorPanel::act(const smartmill_msgs::OperatorAction::Request& request,
+                        smartmill_msgs::OperatorAction::Response& response) {
+  const auto action = actions_.find(request.action);
+  try {
+    if (action == actions_.end()) throw Error("nothing to do this with on this machine");
+    action->second(request);
+    response.message = "done: " + request.text;
+  } catch (const Error& e) {
+    response.code = smartmill_msgs::OperatorAction::Response::REFUSED;
+    response.message = request.text + ": " + e.what();
+  }
+  return true;
 }
 
 }  // namespace smartmill::sim

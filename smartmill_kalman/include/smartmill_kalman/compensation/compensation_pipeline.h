@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "smartmill_core/model/force_sensor_kind.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/signal/stream_sorter.h"
 #include "smartmill_kalman/compensation/force_compensation.h"
@@ -16,6 +17,7 @@
 #include "smartmill_kalman/sensor/sensor_measurement.h"
 #include "smartmill_kalman/sensor/spindle_force_sensor.h"
 #include "smartmill_kalman/sensor/spindle_sensor_calibrator.h"
+#include "smartmill_kalman/sensor/stuck_channel.h"
 
 namespace smartmill::kalman {
 
@@ -47,9 +49,11 @@ class CompensationPipeline {
   void useSpindleSensor(const SpindleSensorCalibration& calibration, double length);
   /// Length [m] of tool and holder for a calibration on the machine.
   void setSpindleSensorLength(double length) { spindle_length_ = length; }
-  /// Six sensors without a calibration are accepted and give no force until they are calibrated.
-  void allowUncalibrated() { uncalibrated_allowed_ = true; }
-  bool isUncalibrated() const { return uncalibrated_allowed_ && !spindle_; }
+  /// Kind of the sensor. Six sensors in the spindle and a plate give no force until they are calibrated.
+  void useKind(ForceSensorKind kind);
+  bool isUncalibrated() const;
+  bool invertsMatrix() const { return inverse_.has_value(); }
+  const SensorCalibrationState& calibration() const { return calibration_; }
   /// Inverts the transfer matrix of a sensor of 3 or 6 channels instead of filtering. @throws Error.
   void useTransferMatrix(const TransferMatrix& matrix, double bandwidth);
   /// Sensor with cross-talk; its diagonal replaces the machine model's sensor.
@@ -86,6 +90,8 @@ class CompensationPipeline {
   void flush();
 
   CompensationHealth health() const;
+  /// Channel of the force sensor whose samples have not changed for longest.
+  const StuckChannel& stuck() const { return stuck_; }
   /// Model in use of an axis.
   const ModalModel& sensor(std::size_t axis) const { return compensation_.sensor(axis); }
   /// Age of the oldest measured modes in use, at the newest input [s]; 0 without measured modes.
@@ -100,9 +106,12 @@ class CompensationPipeline {
   void check(const SampleBlock& block) const;
   void handle(const SampleBlock& block);
   void restart();
+  void startUncalibrated();
   void publishResults();
   void publishCalibration();
   void applyCalibration(CalibrationResult result);
+  void installMatrix(const TransferMatrix& matrix, double bandwidth);
+  void setCalibration(const CalibrationResult& result);
   SampleBlock forcesOf(const SampleBlock& block);
   ForceOutputs blockOutputs();
   void useModelSensors();
@@ -116,8 +125,10 @@ class CompensationPipeline {
   StreamSorter::Stream conditions_, goals_, hammers_, angles_, blocks_;
   std::optional<MatrixCompensation> inverse_;
   std::optional<SpindleForceSensor> spindle_;
-  bool uncalibrated_allowed_ = false;
-  double spindle_length_ = 0.0;  // [m] 0: unknown
+  std::optional<ForceSensorKind> kind_;
+  SensorCalibrationState calibration_;
+  bool calibrated_here_ = false;  // by goals: ends with a restart of the recording
+  double spindle_length_ = 0.0;   // [m] 0: unknown
   std::optional<CuttingCondition> condition_;
   TapParameters taps_;
   SpindleSensorCalibrator calibrator_;
@@ -125,6 +136,7 @@ class CompensationPipeline {
   double bandwidth_;  // [Hz] of a transfer matrix that is measured here
   std::optional<SensorMatrix> matrix_;
   InvalidSamples invalid_;
+  StuckChannel stuck_;
   std::function<void()> on_restart_;
 };
 

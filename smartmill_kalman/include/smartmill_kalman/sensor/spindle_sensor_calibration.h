@@ -21,10 +21,13 @@ struct LengthDependence {
   double offset = 0.0;                                          ///< [1]
   double slope_std = std::numeric_limits<double>::quiet_NaN();  ///< [1/m]
   double offset_std = std::numeric_limits<double>::quiet_NaN();
-  double at(double length) const {  ///< [1] at length [m]
+  double covariance = std::numeric_limits<double>::quiet_NaN();  ///< [1/m] of slope and offset
+  double at(double length) const {                               ///< [1] at length [m]
     const double line = slope * length + offset;
     return reciprocal ? 1.0 / line : line;
   }
+  /// Standard deviation [1] of at(); NaN where that of slope or offset is unknown.
+  double stdAt(double length) const;
 };
 
 /// Calibration from six sensors to three forces (Burzoni ch. 3).

@@ -22,7 +22,7 @@ struct CalibrationGoal {
   int test = 0;                           ///< measurements of one test have a common drift
   double length = 0.0;                    ///< [m] of tool and holder
   std::array<double, 3> load{{0, 0, 0}};  ///< [N] on the tool; with step point: position of the taps [m]
-  bool reference = false;                 ///< the measurement is used by verify, not by fit
+  bool reference = false;                 ///< measurement or taps are used by verify, not by fit
   double duration = 0.5;                  ///< [s] averaging time of a measurement
   std::string file;                       ///< of fit: calibration file; its measurements go to `file`.csv
 };
@@ -30,12 +30,27 @@ struct CalibrationGoal {
 struct CalibrationResult {
   enum class Code : std::uint8_t { ok = 0, cancelled = 1, bad_goal = 2, bad_data = 3, fit_failed = 4 };
   Code code = Code::ok;
-  std::string message;                     ///< one line
-  std::size_t readings = 0;                ///< number of measurements, of the goal's kind
-  std::array<double, 3> error{{0, 0, 0}};  ///< [1] of verify, x, y, z
+  std::string message;       ///< one line
+  std::size_t readings = 0;  ///< number of measurements, of the goal's kind
+  /// [1] relative to the force along x, y, z: of verify the largest difference from the reference, of fit
+  /// that expected from the standard deviations; NaN: unknown
+  std::array<double, 3> error{{NOT_A_NUMBER, NOT_A_NUMBER, NOT_A_NUMBER}};
+  bool verified = false;  ///< error is that of verify
+  /// [1] of fit: force over the reading of x, y, z and its standard deviation; NaN: unknown
+  std::array<double, 3> constant = error, constant_std = error;
   /// Of fit: in use from now on.
   std::optional<SpindleSensorCalibration> calibration;
   std::optional<TransferMatrix> matrix;  ///< of a plate, likewise
+};
+
+/// Calibration of the sensor in use.
+struct SensorCalibrationState {
+  bool calibrated = true;    ///< false: no force is published
+  std::string message;       ///< one line: result, or why it is not calibrated
+  double stamp = 0.0;        ///< [s]
+  std::size_t readings = 0;  ///< 0: from a file or the machine model
+  std::array<double, 3> constant = CalibrationResult().constant, constant_std = constant, error = constant;
+  bool verified = false;  ///< error is the difference from a reference
 };
 
 /// Calibrates a spindle-integrated sensor on the machine (Burzoni 3.2, 3.4): measurements under known loads
@@ -56,6 +71,8 @@ class SpindleSensorCalibrator {
   void endTaps(const SensorResult& result);
   void cancel();
   void reset();
+  /// Constants at a length [m] of tool and holder with their standard deviations.
+  static CalibrationResult describe(const SpindleSensorCalibration& calibration, double length);
 
   bool active() const { return goal_.has_value(); }
   std::optional<CalibrationResult> takeResult();

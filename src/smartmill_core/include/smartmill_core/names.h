@@ -24,6 +24,7 @@ constexpr const char* FORCE_CURVE = "material/force_curve";
 constexpr const char* FORCE_MEASURED = "force/measured";
 constexpr const char* FORCE_COMPENSATED = "force/compensated";
 constexpr const char* FORCE_WRENCH = "force/wrench";
+constexpr const char* FORCE_SENSOR = "force/sensor";
 constexpr const char* FORCE_OF_MOTORS = "force/motor_current";
 constexpr const char* FORCE_ESTIMATE = "force/estimate";
 constexpr const char* STABILITY_CHART = "stability/chart";
@@ -60,6 +61,8 @@ constexpr const char* ORIENT_SPINDLE = "cnc/orient_spindle";
 
 // Services.
 constexpr const char* STRIKE = "daq/strike";
+constexpr const char* OPERATOR_ACTION = "operator/act";
+constexpr const char* OPERATOR_DONE = "session/done";
 constexpr const char* ARM_MOTION = "cnc/arm_motion";
 constexpr const char* INSTALL_MODEL = "discrepancy/install_model";
 constexpr const char* FEED_HOLD = "cnc/feed_hold";

@@ -9,6 +9,10 @@ namespace smartmill {
 namespace {
 
 void set(const Parameter& parameter, const std::string& option, const std::string& text) {
+  if (auto* const* word = std::get_if<std::string*>(&parameter.address)) {
+    **word = text;
+    return;
+  }
   std::size_t used = 0;
   double number = 0.0;
   try {

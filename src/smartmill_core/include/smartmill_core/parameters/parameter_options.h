@@ -19,7 +19,8 @@ class ParameterOptions {
   /// @param shipped path of the node's own file, for --help
   ParameterOptions(CommandLine& line, const ParameterTable& table, const std::string& shipped);
 
-  /// An option, e.g. "--bandwidth-hz", for the parameter of that key (a number); unit, bounds, meaning and
+  /// An option, e.g. "--bandwidth-hz", for the parameter of that key (a number or a
+  /// word); unit, bounds, meaning and
   /// default in --help come from the table.
   void add(const std::string& option, const std::string& key);
 
