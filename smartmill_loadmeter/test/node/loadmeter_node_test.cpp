@@ -222,10 +222,10 @@ TEST(LoadMeterNode, storesSpindleHealth) {
   std::vector<HealthRecord> kept;
   for (int i = 0; i < 2400 && kept.size() < 2; ++i) {
     ros::WallDuration(0.05).sleep();
-    kept = CoefficientDatabase(file).health();
+    kept = CoefficientDatabase(file).evidence().health();
   }
   ros::WallDuration(0.2).sleep();
-  kept = CoefficientDatabase(file).health();
+  kept = CoefficientDatabase(file).evidence().health();
   ASSERT_EQ(kept.size(), 2u);
   EXPECT_EQ(kept[0].machine, "mill 07");
   EXPECT_EQ(kept[0].measured, "T1 tool_tip x");
