@@ -6,6 +6,7 @@
 
 #include "smartmill_core/formatted.h"
 #include "smartmill_loadmeter/database/recommend.h"
+#include "smartmill_loadmeter/identification/session_identification.h"
 
 namespace smartmill::loadmeter {
 
@@ -78,9 +79,10 @@ FoundCoefficients findCoefficients(const CoefficientDatabase& database, const st
   if (found.known) {
     const CoefficientKnowledge& k = *found.known;
     found.message = k.identifications > 0
-                        ? formatted("source %s, %d tests in %d identifications",
-                                    k.combined.set.source.c_str(), k.combined.set.tests, k.identifications)
-                        : std::to_string(k.production_cuts) + " cuts combined";
+                        ? "source " + k.combined.set.source + ", " +
+                              countOf(static_cast<std::size_t>(k.combined.set.tests), "test") + " in " +
+                              countOf(static_cast<std::size_t>(k.identifications), "identification")
+                        : countOf(static_cast<std::size_t>(k.production_cuts), "cut") + " combined";
     if (k.superseded > 0)
       found.message += formatted("; %d older ones disagree and are not used", k.superseded);
     suggestNext(k, model, &found);

@@ -34,14 +34,14 @@ std::vector<IdentifyResult> identifyFromBag(const std::string& path, const Machi
       [&](const plain::IdentifyCoefficientsActionGoal& m, double) {
         const double stamped = toSec(m.goal.header.stamp);
         const double stamp = stamped == 0.0 ? toSec(m.goal_id.stamp) : stamped;
-        IdentifyGoal goal{stamp, m.goal.tool, m.goal.material, m.goal.reset != 0, {}, 0};
+        IdentifyGoal goal{stamp, m.goal.tool, m.goal.material, m.goal.reset != 0, 0};
         prior.use(&goal);
         identification.push(goal);
       });
   bag.run(listeners.progress);
   identification.flush();
   if (results.empty()) {
-    identification.push(IdentifyGoal{identification.newest(), "", "", false, {}, 0});
+    identification.push(IdentifyGoal{identification.newest(), "", "", false, 0});
     identification.flush();
   }
   return results;

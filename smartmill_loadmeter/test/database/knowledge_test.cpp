@@ -133,7 +133,7 @@ TEST(FindCoefficients, saysWhatIsKnownAndProposesATestWithinTheCoveredDepth) {
   EXPECT_THAT(findCoefficients(database, "t", "m", {}, model).message, HasSubstr("known: no records"));
   database.add(recordOf(2000, KTC, KTE));
   const FoundCoefficients found = findCoefficients(database, "t", "m", {}, model);
-  EXPECT_EQ(found.message, "source load_meter, 4 tests in 1 identifications");
+  EXPECT_EQ(found.message, "source load_meter, 4 tests in 1 identification");
   ASSERT_TRUE(found.next);
   EXPECT_LT(found.next->ktc_std, KTC_STD);
   EXPECT_EQ(found.next->engagement.axial_depth, 1e-3);

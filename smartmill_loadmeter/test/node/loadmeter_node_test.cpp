@@ -119,6 +119,13 @@ TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
   ASSERT_TRUE(find.call(call));
   EXPECT_EQ(call.response.code, smartmill_msgs::FindCoefficients::Response::OK);
   EXPECT_EQ(call.response.coefficients.ktc, result->coefficients.ktc);
+  EXPECT_TRUE(call.response.of_pair);
+  EXPECT_EQ(call.response.identifications, 1u);
+  EXPECT_EQ(call.response.next_test.kind, smartmill_msgs::CuttingCondition::CUT);
+  EXPECT_LT(call.response.next_std[0], result->coefficients.ktc_std);
+  std::string database;
+  ASSERT_TRUE(ros::param::get("/smartmill/loadmeter/database", database));
+  EXPECT_EQ(call.response.database, database);
   call.request.material = "steel";
   ASSERT_TRUE(find.call(call));
   EXPECT_EQ(call.response.code, smartmill_msgs::FindCoefficients::Response::NOT_FOUND);

@@ -16,9 +16,9 @@ struct IdentifyGoal {
   std::string tool;      ///< empty: any
   std::string material;  ///< empty: any
   bool reset = false;    ///< discard earlier tests
-  /// Independent earlier knowledge of this pair with covariance, combined with the tests if it agrees.
-  std::optional<CoefficientRecord> prior;
   std::uint64_t id = 0;  ///< returned with the result
+  /// Independent earlier knowledge of this pair with covariance, combined with the tests if it agrees.
+  std::optional<CoefficientRecord> prior = std::nullopt;
 };
 
 /// Latest message material/prior for the goals that follow. Its stamp decides, not the order of arrival.
