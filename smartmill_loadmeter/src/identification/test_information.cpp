@@ -70,6 +70,21 @@ bool isComplete(const std::vector<CuttingCondition>& tests) {
   return speeds.size() >= 2 && feeds.size() >= 2;
 }
 
+// Whether air cuts at most as fast, and at least as fast, exist for every cut for which the plan has them:
+// friction is not extrapolated.
+bool enclosesCuts(const std::vector<CuttingCondition>& tests, const std::vector<CuttingCondition>& plan) {
+  const auto hasAir = [](const std::vector<CuttingCondition>& of, double speed, bool above) {
+    return std::any_of(of.begin(), of.end(), [&](const CuttingCondition& t) {
+      return !isCut(t) && (above ? t.spindle_speed >= speed : t.spindle_speed <= speed);
+    });
+  };
+  return std::all_of(tests.begin(), tests.end(), [&](const CuttingCondition& t) {
+    const double speed = t.spindle_speed;
+    return !isCut(t) || ((hasAir(tests, speed, false) || !hasAir(plan, speed, false)) &&
+                         (hasAir(tests, speed, true) || !hasAir(plan, speed, true)));
+  });
+}
+
 std::array<double, 3> between(double low, double high) {
   return {low, 0.5 * (low + high), high};
 }
@@ -104,7 +119,7 @@ std::vector<std::size_t> neededTests(const std::vector<CuttingCondition>& tests,
       std::vector<std::size_t> rest = needed;
       rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(drop));
       const std::vector<CuttingCondition> left = select(tests, rest);
-      if (!isComplete(left)) continue;
+      if (!isComplete(left) || !enclosesCuts(left, tests)) continue;
       const TorqueCovariance with = expectedCovariance(left, spindle, &knowledge, voltage_std);
       const double cost = std::max(with.tc / target.tc, with.te / target.te);
       if (cost < best) best = cost, fewer = rest;

@@ -107,7 +107,7 @@ TEST(DatabaseLocation, anUnusableFileIsNamedAndUntouched) {
   refuses("damaged", "damaged: ");
 }
 
-// A path below a file cannot be a folder, whoever runs the test (root may write into read-only folders).
+// A path below a file cannot be a folder; root may write into read-only folders.
 TEST(DatabaseLocation, withoutAWritableFolderTheRunGoesOn) {
   const TemporaryFolder folder;
   const std::string blocked = folder.write("blocked", "");

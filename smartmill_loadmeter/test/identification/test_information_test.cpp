@@ -89,7 +89,8 @@ TEST(NeededTests, areAllWithoutKnowledgeAndFewerTheMoreIsKnown) {
   EXPECT_EQ(neededTests(tests, spindle(), scaled(1e6)).size(), 8u);
   // A session as certain as the planned one.
   const auto after_one = neededTests(tests, spindle(), scaled(1.0));
-  EXPECT_EQ(after_one.size(), 4u) << "two air cuts and two cuts check the knowledge";
+  ASSERT_EQ(after_one.size(), 4u) << "two air cuts and two cuts check the knowledge";
+  EXPECT_EQ(after_one[0], 0u) << "the only air cut slower than the slots: friction is not extrapolated";
   EXPECT_LE(after_one.size(), neededTests(tests, spindle(), scaled(4.0)).size());
   for (const double s : {0.01, 1.0, 4.0}) {
     std::vector<CuttingCondition> chosen;

@@ -1,4 +1,4 @@
-// What the machine's database knows of a tool in a material, and the next test (loadmeter/find_coefficients).
+// The stored coefficients of a tool in a material, and the next test (loadmeter/find_coefficients).
 import { deg, fixed, make, rpm, table, withDeviation } from '../format.js';
 
 const COEFFICIENTS = [['ktc', 'Ktc', 1e-6, 'N/mm²'], ['krc', 'Krc', 1e-6, 'N/mm²'], ['kac', 'Kac', 1e-6, 'N/mm²'],

@@ -25,8 +25,9 @@ TorqueCovariance expectedCovariance(const std::vector<CuttingCondition>& tests, 
                                     const TorqueCovariance* prior, double voltage_std = TYPICAL_VOLTAGE_STD);
 
 /// Indices, in order, of the fewest of the planned tests that, with the knowledge, make Ktc and Kte as
-/// certain as all tests would without it. Two air cuts of different speeds and two cuts of different feeds
-/// remain, which check the knowledge. Everything is needed if the tests have fewer.
+/// certain as all tests would without it. Two air cuts of different speeds, which enclose those of the cuts,
+/// and two cuts of different feeds remain and check the knowledge. Everything is needed if the tests have
+/// fewer.
 std::vector<std::size_t> neededTests(const std::vector<CuttingCondition>& tests, const Spindle& spindle,
                                      const TorqueCovariance& knowledge,
                                      double voltage_std = TYPICAL_VOLTAGE_STD);
