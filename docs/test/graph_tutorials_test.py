@@ -24,7 +24,8 @@ def run_graph_tutorial(test, name):
     test.addCleanup(folder.cleanup)
     program = pathlib.Path(os.environ["SMARTMILL"])
     environment = {**os.environ, "PATH": f"{program.parent}:/usr/bin:/bin", "TUTORIALS": str(TUTORIALS), "LC_ALL": "C",
-                   "ROS_MASTER_URI": f"http://localhost:{free_port()}", "ROS_HOSTNAME": "localhost", "ROS_HOME": folder.name}
+                   "ROS_MASTER_URI": f"http://localhost:{free_port()}", "ROS_HOSTNAME": "localhost", "ROS_HOME": folder.name,
+                   "XDG_DATA_HOME": folder.name}
     running = []
 
     def stop():

@@ -162,6 +162,7 @@ int run(const Request& request) {
   if (!model.empty()) truth = trueStability(recording, TrueLimit(model, data, *recording.chart));
   Report report = makeReport(recording, truth);
   report.unchecked = notMeasured(recording, session);
+  for (const std::string& note : testPlanNotes(session)) report.notes.push_back(note);
   if (report.sections.empty() && report.cuts.empty() && report.unchecked.empty())
     throw Error(request.bag + ": contains no results");
   const std::string text = markdown(report);

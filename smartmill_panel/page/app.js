@@ -9,6 +9,7 @@ import { Revolution, Spectrum, SpectrumCourse, Strips } from './views/forces.js'
 import { Dynamics } from './views/dynamics.js';
 import { Session, Progress, Notes, Replay } from './views/session.js';
 import { Commands } from './views/commands.js';
+import { Knowledge } from './views/knowledge.js';
 import { Discrepancy, Report, Database, Diagnostics, ForceSensor } from './views/model.js';
 import { Fleet } from './views/fleet.js';
 
@@ -109,9 +110,9 @@ class Page {
     place('forces', 'Force over one revolution', '', e => new Revolution(e, link, store, false));
     place('forces', 'Spectrum of the last minute', '', e => new SpectrumCourse(e, link, store));
 
-    let chart = null;
+    let chart = null, what_if = null;
     place('stability', 'Stability', '', e => chart = new ChartView(e, link, 'stability'));
-    place('stability', 'What if', 'side what-if tools-free', e => new WhatIf(e, link, chart));
+    place('stability', 'What if', 'side what-if tools-free', e => what_if = new WhatIf(e, link, chart));
     place('stability', 'Recommended points', 'wide tools-free', e => new PointsTable(e, link));
 
     const dynamics = new Dynamics(this.views.dynamics, link, card, store);
@@ -129,7 +130,8 @@ class Page {
     place('model', 'Model fit', 'tools-free', e => [new Discrepancy(e, link), new Report(e, link)]);
     const more = make('div', { style: 'display: grid; gap: 12px' });
     this.views.model.append(more);
-    for (const [title, build] of [['Cutting coefficients', e => new Database(e, link)], ['Force sensor', e => new ForceSensor(e, link)], ['Nodes', e => new Diagnostics(e, link)]]) {
+    const known = e => new Knowledge(e, link, what_if);
+    for (const [title, build] of [['Cutting coefficients', e => new Database(e, link)], ['Tool and material', known], ['Force sensor', e => new ForceSensor(e, link)], ['Nodes', e => new Diagnostics(e, link)]]) {
       const element = card(title, 'tools-free');
       more.append(element);
       this.add('model', element, build(element));

@@ -17,7 +17,7 @@ sed -e 's/^air_speeds:.*/air_speeds: [62.83, 125.66, 251.33, 418.88, 628.32, 942
     -e 's/^verify:.*/verify: false/' -e 's/^resonance_speed:.*/resonance_speed: 0.0/' \
     -e 's/^hits:.*/hits: 3/' -e 's/^sensor_hits:.*/sensor_hits: 3/' \
   "$(rospack find smartmill_launch)/config/session.yaml" > "$out/session.yaml"
-roslaunch --port "${ROS_PORT:-11311}" smartmill_launch pipeline.launch port:="${FOCAS_PORT:-8193}" session:=true \
+roslaunch --port "${ROS_PORT:-11311}" smartmill_launch pipeline.launch database:=none port:="${FOCAS_PORT:-8193}" session:=true \
   session_params:="$out/session.yaml" model:="$out/hidden.yaml" monitor:=true record_folder:="$out/kept" \
   summary:="$out/summary.json" > "$out/session.log" 2>&1
 rosrun smartmill_discrepancy explain "$out/kept" -o "$out/report"

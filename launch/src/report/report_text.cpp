@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <sstream>
+#include <tuple>
 
 #include <nlohmann/json.hpp>
 
@@ -18,6 +19,12 @@ using Row = std::vector<std::string>;
 std::string cell(const char* format, double value) {
   if (std::isnan(value)) return "-";
   return formatted(format, value);
+}
+
+/// NaN: absent or null.
+double numberAt(const Json& object, const std::string& key) {
+  const auto found = object.find(key);
+  return found != object.end() && found->is_number() ? found->get<double>() : NOT_A_NUMBER;
 }
 
 std::string aligned(const std::vector<Row>& rows) {
@@ -120,6 +127,44 @@ std::vector<std::string> notMeasured(const SessionRecording& recording, const st
   for (const char* cut : {"verify_stable", "verify_unstable", "resonance"})
     require(recording.cut(cut), std::string("cut ") + cut);
   return missing;
+}
+
+std::vector<std::string> testPlanNotes(const std::string& session) {
+  if (session.empty()) return {};
+  const Json summary = parsed(session);
+  const Json plan = summary.value("test_plan", Json::object());
+  if (plan.value("planned_tests", 0) == 0) return {};
+  const int tests = plan.value("made_tests", 0), planned = plan.value("planned_tests", 0);
+  const int cuts = plan.value("made_cuts", 0), planned_cuts = plan.value("planned_cuts", 0);
+  const double saved = plan.value("planned_time_s", 0.0) - plan.value("made_time_s", 0.0);
+  std::vector<std::string> notes{
+      formatted(
+          "test plan: %d of %d cuts and %d of %d air cuts, %.2f of %.2f min (%d tests and %.2f min fewer); "
+          "database: ",
+          cuts, planned_cuts, tests - cuts, planned - planned_cuts, plan.value("made_time_s", 0.0) / 60.0,
+          plan.value("planned_time_s", 0.0) / 60.0, planned - tests, saved / 60.0) +
+      plan.value("stored", "")};
+  const Json known = plan.value("stored_coefficients", Json::array());
+  const Json found = summary.value("coefficients", Json::array());
+  if (known.empty() || found.empty()) return notes;
+  for (const auto& [key, name, unit, text] : {std::tuple{"ktc_n_per_m2", "Ktc", units::N_PER_MM2, "N/mm2"},
+                                              std::tuple{"kte_n_per_m", "Kte", units::N_PER_MM, "N/mm"}}) {
+    const std::string std_key = std::string(key) + "_std";
+    const double before = numberAt(known[0], key), before_std = numberAt(known[0], std_key);
+    const double now = numberAt(found[0], key), now_std = numberAt(found[0], std_key);
+    // The new value contains the stored one, so that the variance of their difference is that of the
+    // variances; without it they are independent.
+    const double variance =
+        before_std * before_std + (plan.value("stored_used", false) ? -1.0 : 1.0) * now_std * now_std;
+    notes.push_back(
+        formatted("%s: stored %.2f +- %.2f %s, now %.2f +- %.2f %s, difference %.1f standard deviations%s",
+                  name, before / unit, before_std / unit, text, now / unit, now_std / unit, text,
+                  std::abs(now - before) / std::sqrt(variance),
+                  plan.value("stored_used", false)
+                      ? ""
+                      : "; the tests disagree with the stored values, which are not used"));
+  }
+  return notes;
 }
 
 std::string json(const Report& report, const std::string& session) {

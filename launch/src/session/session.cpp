@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <smartmill_msgs/CoefficientPrior.h>
+#include <smartmill_msgs/FindCoefficients.h>
 #include <smartmill_msgs/SampleBlock.h>
 #include <smartmill_msgs/SpindleAngle.h>
 #include <boost/function.hpp>
@@ -60,6 +62,9 @@ Session::Session(ros::NodeHandle nh, const ros::NodeHandle& private_nh, const st
       driver_(nh_, [this] { return stop_.load(); }),
       sensor_(nh_, parameters_.calibration, driver_, sensor_frf_,
               [this](const std::string& request) { log_.request(request); }) {
+  tests_ = plan_.airCuts();
+  tests_.insert(tests_.end(), plan_.slots().begin(), plan_.slots().end());
+  prior_ = nh_.advertise<smartmill_msgs::CoefficientPrior>(names::COEFFICIENT_PRIOR, 1, true);
   const auto subscribe = [this](const char* topic, auto example, auto use) {
     using Message = decltype(example);
     const boost::function<void(const Message&)> callback = [this, topic, use](const Message& message) {
@@ -138,16 +143,11 @@ void Session::runSteps() {
   }
   calibrateSensor();
   step("discard earlier tests", [&] { return identify(true); });
-  for (const PlannedCut& air : plan_.airCuts()) {
-    step("air cut " + air.condition.name, [&] { return runCut(air); });
-  }
+  step("stored coefficients", [&] { return useStored(); });
   for (const PlannedCut& air : plan_.airMoves()) {
     step("move in air " + air.condition.name, [&] { return runCut(air); });
   }
-  for (const PlannedCut& slot : plan_.slots()) {
-    step("slot test " + slot.condition.name, [&] { return runCut(slot); });
-  }
-  step("cutting coefficients", [&] { return identify(false); });
+  identifyFromTests();
   if (parameters_.verify) {
     step("stability chart", [&] { return waitChart(); });
     step("points to verify", [&] { return choosePoints(); });
@@ -279,6 +279,75 @@ std::string Session::measure(Client<smartmill_msgs::MeasureFrfAction>& client, c
 std::string Session::runCut(const PlannedCut& cut) {
   cut_from_ = ros::Time::now();
   return driver_.run(plan_.planner(), cut, parameters_.program_timeout);
+}
+
+// The coefficients of the database become the prior of the identification, which makes tests unnecessary.
+std::string Session::useStored() {
+  SessionSummary::TestPlan& plan = log_.summary.test_plan;
+  smartmill_msgs::FindCoefficients service;
+  service.request.tool = parameters_.plan.tool;
+  service.request.material = plan_.material();
+  for (const PlannedCut& test : tests_) service.request.tests.push_back(toMsg(test.condition));
+  for (std::size_t i = 0; i < tests_.size(); ++i) needed_.insert(i);
+  if (!parameters_.use_stored) {
+    plan.stored = "not used (use_stored)";
+  } else if (!driver_.callService(names::FIND_COEFFICIENTS, service, MachineDriver::SERVICE_WAIT)) {
+    plan.stored = std::string(names::FIND_COEFFICIENTS) + ": no answer";
+  } else {
+    plan.stored = service.response.message;
+    has_prior_ = service.response.of_pair && service.response.identifications > 0;
+  }
+  if (!has_prior_) return plan.stored + "; all tests are made";
+  smartmill_msgs::CoefficientPrior prior;
+  prior.header.stamp = ros::Time::now();
+  prior.coefficients = service.response.coefficients;
+  prior.ktc_kte_covariance = service.response.ktc_kte_covariance;
+  prior_.publish(prior);
+  plan.known = {fromMsg(prior.coefficients)};
+  needed_ = {service.response.needed.begin(), service.response.needed.end()};
+  const CoefficientSet& k = plan.known.front();
+  return formatted("%s: Ktc %.1f +- %.1f N/mm2, Kte %.2f +- %.2f N/mm; %zu of %zu tests are needed",
+                   plan.stored.c_str(), k.value.ktc / units::N_PER_MM2, k.std_dev.ktc / units::N_PER_MM2,
+                   k.value.kte / units::N_PER_MM, k.std_dev.kte / units::N_PER_MM, needed_.size(),
+                   tests_.size());
+}
+
+void Session::runTests(const std::set<std::size_t>& selected) {
+  SessionSummary::TestPlan& plan = log_.summary.test_plan;
+  for (const std::size_t i : selected) {
+    const PlannedCut& test = tests_.at(i);
+    const bool is_cut = test.condition.kind == CuttingCondition::Kind::cut;
+    step((is_cut ? "slot test " : "air cut ") + test.condition.name, [&] { return runCut(test); });
+    ++plan.made;
+    plan.made_cuts += is_cut ? 1 : 0;
+    plan.made_time += test.duration();
+  }
+}
+
+void Session::identifyFromTests() {
+  SessionSummary::TestPlan& plan = log_.summary.test_plan;
+  for (const PlannedCut& test : tests_) {
+    ++plan.planned;
+    plan.planned_cuts += test.condition.kind == CuttingCondition::Kind::cut ? 1 : 0;
+    plan.planned_time += test.duration();
+  }
+  runTests(needed_);
+  const auto isUsed = [&] {
+    const std::string& source = log_.summary.coefficients.front().source;
+    return source.find(names::WITH_STORED) != std::string::npos;
+  };
+  step("cutting coefficients", [&] { return identify(false); });
+  plan.used = isUsed();
+  if (has_prior_ && !plan.used && needed_.size() < tests_.size()) {
+    std::set<std::size_t> others;
+    for (std::size_t i = 0; i < tests_.size(); ++i) {
+      if (needed_.count(i) == 0) others.insert(i);
+    }
+    step("stored coefficients disagree", [&] { return std::string("the other tests are made"); });
+    runTests(others);
+    step("cutting coefficients from all tests", [&] { return identify(false); });
+  }
+  step("test plan", [&] { return plan.text(); });
 }
 
 // The detector reports the end of a condition after it has processed all data before it.

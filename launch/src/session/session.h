@@ -6,6 +6,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -48,6 +49,9 @@ class Session {
                       const std::string& point, const std::string& direction, int hits, int modes);
   void calibrateSensor();
   std::string runCut(const PlannedCut& cut);
+  std::string useStored();
+  void runTests(const std::set<std::size_t>& selected);
+  void identifyFromTests();
   void waitVerdict();
   std::string identify(bool reset);
   std::string waitChart();
@@ -77,6 +81,11 @@ class Session {
   std::optional<smartmill_msgs::StabilityChart> chart_;
   std::map<std::string, std::vector<ChatterWindow>> windows_;  // by condition
   std::optional<smartmill_msgs::ChatterState> verdict_;        // the latest
+
+  std::vector<PlannedCut> tests_;  // air cuts, then slots
+  std::set<std::size_t> needed_;   // of these, with the stored coefficients
+  bool has_prior_ = false;         // the coefficients of the database are used
+  ros::Publisher prior_;
 
   ros::Time cut_from_;
   ros::Time coefficients_stamp_;

@@ -26,6 +26,9 @@ void SessionParameters::declare(ParameterTable& table) {
   table.section();
   table.text("summary", summary, "JSON file for the summary, written at the end; empty: none");
   table.flag("verify", verify, "wait for the stability chart and verify it with two cuts");
+  table.flag("use_stored", use_stored,
+             "begin with the coefficients of the database: tests that they make unnecessary are not made, "
+             "unless the others disagree with them");
   plan.declare(table);
   table.section("Hammer tests.");
   table.text("tool_directions", tool_directions, "directions of the tool's FRF");

@@ -16,6 +16,7 @@ struct SessionParameters {
   int hits = 20, modes = 0;
   int sensor_hits = 10, sensor_modes = 0;
   bool verify = true;
+  bool use_stored = true;
   std::string recorder;
   double start_delay = 2.0;
   double ready_timeout = 30.0;

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 
 namespace smartmill::session {
 namespace {
@@ -33,7 +34,37 @@ Json modesOf(const MeasuredModes& measured) {
           {"modes", modes}};
 }
 
+Json coefficientsOf(const CoefficientSet& set) {
+  return {{"ktc_n_per_m2", number(set.value.ktc)},
+          {"ktc_n_per_m2_std", number(set.std_dev.ktc)},
+          {"kte_n_per_m", number(set.value.kte)},
+          {"kte_n_per_m_std", number(set.std_dev.kte)},
+          {"friction_viscous_nm_s_per_rad", number(set.friction_viscous)},
+          {"friction_coulomb_nm", number(set.friction_coulomb)},
+          {"source", set.source},
+          {"tests", set.tests}};
+}
+
+Json planOf(const SessionSummary::TestPlan& plan) {
+  Json known = Json::array();
+  for (const CoefficientSet& set : plan.known) known.push_back(coefficientsOf(set));
+  return {{"planned_tests", plan.planned},
+          {"made_tests", plan.made},
+          {"planned_cuts", plan.planned_cuts},
+          {"made_cuts", plan.made_cuts},
+          {"planned_time_s", plan.planned_time},
+          {"made_time_s", plan.made_time},
+          {"stored", plan.stored},
+          {"stored_coefficients", known},
+          {"stored_used", plan.used}};
+}
+
 }  // namespace
+
+std::string SessionSummary::TestPlan::text() const {
+  return formatted("%zu of %zu cuts, %zu of %zu air cuts, %.2f of %.2f min", made_cuts, planned_cuts,
+                   made - made_cuts, planned - planned_cuts, made_time / 60.0, planned_time / 60.0);
+}
 
 void SessionSummary::write(const std::string& file) const {
   Json json;
@@ -48,16 +79,8 @@ void SessionSummary::write(const std::string& file) const {
   json["modes"] = Json::array();
   for (const MeasuredModes& measured : modes) json["modes"].push_back(modesOf(measured));
   json["coefficients"] = Json::array();
-  for (const CoefficientSet& set : coefficients) {
-    json["coefficients"].push_back({{"ktc_n_per_m2", number(set.value.ktc)},
-                                    {"ktc_n_per_m2_std", number(set.std_dev.ktc)},
-                                    {"kte_n_per_m", number(set.value.kte)},
-                                    {"kte_n_per_m_std", number(set.std_dev.kte)},
-                                    {"friction_viscous_nm_s_per_rad", number(set.friction_viscous)},
-                                    {"friction_coulomb_nm", number(set.friction_coulomb)},
-                                    {"source", set.source},
-                                    {"tests", set.tests}});
-  }
+  for (const CoefficientSet& set : coefficients) json["coefficients"].push_back(coefficientsOf(set));
+  json["test_plan"] = planOf(test_plan);
   json["verified_cuts"] = Json::array();
   for (const Verified& cut : verified) {
     json["verified_cuts"].push_back({{"chart_says", cut.role},

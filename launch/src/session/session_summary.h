@@ -25,6 +25,17 @@ struct SessionSummary {
     CutVerdict verdict;
     bool as_predicted = false;
   };
+  /// Test plan with the knowledge of the database.
+  struct TestPlan {
+    std::size_t planned = 0, made = 0;            ///< air cuts and cuts: in the full plan, made
+    std::size_t planned_cuts = 0, made_cuts = 0;  ///< of these cuts in the stock
+    double planned_time = 0.0, made_time = 0.0;   ///< [s] without rapid motion
+    std::string stored;                           ///< what the database knew, in one line
+    std::vector<CoefficientSet> known;            ///< none or one
+    bool used = false;                            ///< the tests agree with it
+
+    std::string text() const;
+  };
   bool completed = false;  ///< all steps are done
   std::string tool, material;
   std::vector<Step> steps;
@@ -33,6 +44,7 @@ struct SessionSummary {
   std::vector<Verified> verified;
   std::optional<smartmill_msgs::ForceSensorState> sensor;
   double calibration_time = 0.0;  ///< [s] of the force sensor, taps included
+  TestPlan test_plan;
 
   /// @throws Error when the file cannot be written.
   void write(const std::string& file) const;

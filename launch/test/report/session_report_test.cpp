@@ -232,5 +232,24 @@ TEST(SessionReport, WritesAJsonSummary) {
   EXPECT_THROW(json(report, "{broken"), Error);
 }
 
+// Combined values contain the stored ones: Var(now - before) = Var(before) - Var(now); 5 - 3 is a std of 4.
+TEST(SessionReport, statesHowMuchShorterTheTestPlanBecame) {
+  EXPECT_TRUE(testPlanNotes("").empty());
+  EXPECT_TRUE(testPlanNotes(R"({"completed": true})").empty()) << "a summary without a test plan";
+  const std::string summary =
+      R"({"coefficients": [{"ktc_n_per_m2": 802e6, "ktc_n_per_m2_std": 3e6, "kte_n_per_m": 2e4,
+    "kte_n_per_m_std": 300.0}], "test_plan": {"planned_tests": 8, "made_tests": 4, "planned_cuts": 4, "made_cuts": 2,
+    "planned_time_s": 30.0, "made_time_s": 12.0, "stored": "4 tests in 1 identification", "stored_used": true,
+    "stored_coefficients": [{"ktc_n_per_m2": 800e6, "ktc_n_per_m2_std": 5e6, "kte_n_per_m": null, "kte_n_per_m_std": 500.0}]}})";
+  const auto notes = testPlanNotes(summary);
+  ASSERT_EQ(notes.size(), 3u);
+  EXPECT_EQ(notes[0],
+            "test plan: 2 of 4 cuts and 2 of 4 air cuts, 0.20 of 0.50 min (4 tests and 0.30 min fewer); "
+            "database: 4 "
+            "tests in 1 identification");
+  EXPECT_EQ(notes[1],
+            "Ktc: stored 800.00 +- 5.00 N/mm2, now 802.00 +- 3.00 N/mm2, difference 0.5 standard deviations");
+}
+
 }  // namespace
 }  // namespace smartmill::report

@@ -13,7 +13,7 @@ namespace {
 template <typename Record>
 void addAs(const DatabaseOptions& o, std::vector<Record> records) {
   for (Record& r : records) r.machine = o.machine;
-  std::printf("%zu new of %zu\n", CoefficientDatabase(o.file).add(records), records.size());
+  std::printf("%zu new of %zu\n", CoefficientDatabase(o.file).evidence().add(records), records.size());
 }
 
 void keep(const DatabaseOptions& o) {
@@ -26,7 +26,7 @@ void keep(const DatabaseOptions& o) {
 
 void health(const DatabaseOptions& o) {
   requireExists(o.file);
-  for (const HealthRecord& r : CoefficientDatabase(o.file).health()) {
+  for (const HealthRecord& r : CoefficientDatabase(o.file).evidence().health()) {
     if (!o.machine.empty() && r.machine != o.machine) continue;
     std::printf("%s: %s, %s: %.5g -> %.5g in %.2f days, %.1f deviations%s\n",
                 r.machine.empty() ? "-" : r.machine.c_str(), r.measured.c_str(), r.quantity.c_str(), r.first,
@@ -36,7 +36,7 @@ void health(const DatabaseOptions& o) {
 
 void improvements(const DatabaseOptions& o) {
   requireExists(o.file);
-  for (const ModelImprovement& i : CoefficientDatabase(o.file).improvements()) {
+  for (const ModelImprovement& i : CoefficientDatabase(o.file).evidence().improvements()) {
     if (!o.machine.empty() && i.machine != o.machine) continue;
     std::printf("%s: %s, gap %.4g -> %.4g, held out %.4g -> %.4g, stamp %.0f s\n",
                 i.machine.empty() ? "-" : i.machine.c_str(), i.verdict.c_str(), i.fit_before, i.fit_after,
@@ -48,7 +48,7 @@ void improvements(const DatabaseOptions& o) {
 
 void proposals(const DatabaseOptions& o) {
   requireExists(o.file);
-  const auto improvements = CoefficientDatabase(o.file).improvements();
+  const auto improvements = CoefficientDatabase(o.file).evidence().improvements();
   const FleetCauses fleet = fleetCauses(improvements, o.machine);
   if (fleet.explained == 0) throw Error(withoutPassword(o.file) + ": no explanation of another machine");
   std::printf("# %zu machines explained; prior odds of any cause that none of them has: %.3g\n",

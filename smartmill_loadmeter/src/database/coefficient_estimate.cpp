@@ -92,30 +92,4 @@ std::optional<CoefficientEstimate> CoefficientDatabase::estimate(const Coefficie
   return result;
 }
 
-FoundCoefficients findCoefficients(const CoefficientDatabase& database, const std::string& tool,
-                                   const std::string& material) {
-  FoundCoefficients found;
-  found.set = database.find(tool, material);
-  // Production cuts are combined, which is more certain than the newest.
-  if (found.set && found.set->source != SOURCE_PRODUCTION) {
-    found.message = "source " + found.set->source + ", " + std::to_string(found.set->tests) + " tests";
-    return found;
-  }
-  CoefficientQuery query;
-  query.tool = tool;
-  query.material = material;
-  if (const auto estimate = database.estimate(query)) {
-    found.set = estimate->set;
-    if (!estimate->other_tool) {
-      found.message = std::to_string(estimate->records) + " identifications and cuts combined";
-      return found;
-    }
-    found.message = "no records with '" + tool + "': from " + std::to_string(estimate->records) + " of '" +
-                    estimate->set.tool + "' and other tools, uncertainty widened";
-    return found;
-  }
-  found.message = "no records for '" + tool + "' in '" + material + "'; known: " + database.contents();
-  return found;
-}
-
 }  // namespace smartmill::loadmeter

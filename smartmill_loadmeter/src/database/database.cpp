@@ -35,6 +35,15 @@ std::vector<Record> recordsOf(const std::vector<Row>& rows) {
   return records;
 }
 
+std::size_t addRows(RecordStore& store, const std::string& file, const RecordKind& kind,
+                    const std::vector<Row>& rows) {
+  return naming(file, [&] { return store.add(kind, rows); });
+}
+
+std::vector<Row> allRows(RecordStore& store, const std::string& file, const RecordKind& kind) {
+  return naming(file, [&] { return store.rows(kind); });
+}
+
 }  // namespace
 
 struct CoefficientDatabase::Impl {
@@ -68,31 +77,7 @@ bool CoefficientDatabase::add(const CoefficientSet& set) {
 }
 
 std::size_t CoefficientDatabase::add(const std::vector<CoefficientRecord>& records) {
-  return add(coefficientKind(), rowsOf(impl_->name, records));
-}
-
-std::size_t CoefficientDatabase::add(const std::vector<ModelImprovement>& improvements) {
-  return add(improvementKind(), rowsOf(impl_->name, improvements));
-}
-
-std::size_t CoefficientDatabase::add(const std::vector<HealthRecord>& health) {
-  return add(healthKind(), rowsOf(impl_->name, health));
-}
-
-std::size_t CoefficientDatabase::add(const RecordKind& kind, const std::vector<Row>& rows) {
-  return naming(impl_->name, [&] { return impl_->store->add(kind, rows); });
-}
-
-std::vector<Row> CoefficientDatabase::rows(const RecordKind& kind) const {
-  return naming(impl_->name, [&] { return impl_->store->rows(kind); });
-}
-
-std::vector<ModelImprovement> CoefficientDatabase::improvements() const {
-  return recordsOf<ModelImprovement>(rows(improvementKind()));
-}
-
-std::vector<HealthRecord> CoefficientDatabase::health() const {
-  return recordsOf<HealthRecord>(rows(healthKind()));
+  return addRows(*impl_->store, impl_->name, coefficientKind(), rowsOf(impl_->name, records));
 }
 
 std::optional<CoefficientSet> CoefficientDatabase::find(const std::string& tool,
@@ -121,7 +106,8 @@ std::size_t CoefficientDatabase::merge(const std::string& file) {
   std::fclose(there);
   const CoefficientDatabase other(file);
   std::size_t added = 0;
-  for (const RecordKind& kind : recordKinds()) added += add(kind, other.rows(kind));
+  for (const RecordKind& kind : recordKinds())
+    added += addRows(*impl_->store, impl_->name, kind, allRows(*other.impl_->store, file, kind));
   return added;
 }
 
@@ -134,6 +120,30 @@ std::string CoefficientDatabase::contents() const {
 
 const std::string& CoefficientDatabase::file() const {
   return impl_->name;
+}
+
+void CoefficientDatabase::check() const {
+  if (impl_->file) naming(impl_->name, [&] { impl_->file->check(); });
+}
+
+EvidenceRecords CoefficientDatabase::evidence() const {
+  return {*impl_->store, impl_->name};
+}
+
+std::size_t EvidenceRecords::add(const std::vector<ModelImprovement>& improvements) const {
+  return addRows(store_, file_, improvementKind(), rowsOf(file_, improvements));
+}
+
+std::size_t EvidenceRecords::add(const std::vector<HealthRecord>& health) const {
+  return addRows(store_, file_, healthKind(), rowsOf(file_, health));
+}
+
+std::vector<ModelImprovement> EvidenceRecords::improvements() const {
+  return recordsOf<ModelImprovement>(allRows(store_, file_, improvementKind()));
+}
+
+std::vector<HealthRecord> EvidenceRecords::health() const {
+  return recordsOf<HealthRecord>(allRows(store_, file_, healthKind()));
 }
 
 FleetSynchronisation CoefficientDatabase::synchronisation() const {

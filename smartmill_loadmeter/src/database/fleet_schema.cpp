@@ -113,6 +113,16 @@ std::string third() {
          "GRANT USAGE ON ALL SEQUENCES IN SCHEMA public TO fleet_machine;UPDATE fleet SET schema = 3;";
 }
 
+// Version 4: time of the first test, wear and temperature of coefficients.
+std::string fourth() {
+  std::string sql;
+  for (const NumberField& f : numberFields()) {
+    if (f.since_schema_3)
+      sql += "ALTER TABLE coefficients ADD COLUMN IF NOT EXISTS " + f.name + " double precision;";
+  }
+  return sql + "UPDATE fleet SET schema = 4;";
+}
+
 }  // namespace
 
 std::string checkFleet(FleetConnection& connection) {
@@ -136,7 +146,7 @@ int migrateFleet(const std::string& url, int schema) {
     found = versionOf(connection);
     if (found > schema)
       connection.fail("tables of version " + std::to_string(found) + " are newer than this program");
-    const std::string steps[] = {first(), second(), third()};
+    const std::string steps[] = {first(), second(), third(), fourth()};
     for (int version = found; version < schema; ++version) connection.execute(steps[version]);
   });
   return found;

@@ -15,13 +15,21 @@ using Record = CoefficientRecord;
 
 template <double Record::*member>
 NumberField own(const char* name, const char* unit) {
-  return {name, unit, [](const Record& r, std::size_t) { return r.*member; },
-          [](Record& r, std::size_t, double v) { r.*member = v; }, 0};
+  return {name,
+          unit,
+          [](const Record& r, std::size_t) { return r.*member; },
+          [](Record& r, std::size_t, double v) { r.*member = v; },
+          0,
+          false};
 }
 template <double CoefficientSet::*member>
 NumberField ofSet(const char* name, const char* unit) {
-  return {name, unit, [](const Record& r, std::size_t) { return r.set.*member; },
-          [](Record& r, std::size_t, double v) { r.set.*member = v; }, 0};
+  return {name,
+          unit,
+          [](const Record& r, std::size_t) { return r.set.*member; },
+          [](Record& r, std::size_t, double v) { r.set.*member = v; },
+          0,
+          false};
 }
 
 // Integers have no NaN; 0 is unknown.
@@ -87,6 +95,12 @@ const std::vector<NumberField>& numberFields() {
                      Record::covarianceIndex(i, j)});
       }
     }
+    for (NumberField field :
+         {own<&Record::first_stamp>("first_stamp", "s"), own<&Record::flank_wear>("flank_wear", "m"),
+          own<&Record::temperature>("temperature", "K")}) {
+      field.since_schema_3 = true;
+      f.push_back(field);
+    }
     return f;
   }();
   return fields;
@@ -109,7 +123,14 @@ std::string identityOf(CoefficientRecord record) {
   for (const TextField& f : textFields()) {
     if (f.name != "version") text += f.at(record) + '\x1f';
   }
-  for (const NumberField& f : numberFields()) text += exactNumber(f.get(record, f.index)) + '\x1f';
+  for (const NumberField& f : numberFields()) {
+    const double value = f.get(record, f.index);
+    if (!f.since_schema_3) {
+      text += exactNumber(value) + '\x1f';
+    } else if (std::isfinite(value)) {
+      text += f.name + exactNumber(value) + '\x1f';
+    }
+  }
   return identityOf(text);
 }
 

@@ -16,6 +16,7 @@ struct NumberField {
   double (*get)(const CoefficientRecord&, std::size_t);
   void (*set)(CoefficientRecord&, std::size_t, double);
   std::size_t index;
+  bool since_schema_3 = false;  ///< absent from older files; unknown, it is not part of a record's identity
 };
 struct TextField {
   std::string name;

@@ -4,6 +4,7 @@
 #include <SQLiteCpp/Statement.h>
 #include <SQLiteCpp/Transaction.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "sqlite_tables.h"
@@ -66,6 +67,12 @@ void bindPair(Statement& s, const std::string& tool, const std::string& material
 SqliteStore::SqliteStore(const std::string& file)
     : db_(file, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE | SQLite::OPEN_FULLMUTEX, BUSY_TIMEOUT) {
   prepareTables(db_);
+}
+
+void SqliteStore::check() {
+  std::string found = db_.execAndGet("PRAGMA quick_check(1)").getString();
+  std::replace(found.begin(), found.end(), '\n', ' ');
+  if (found != "ok") throw SQLite::Exception("damaged: " + found);
 }
 
 std::size_t SqliteStore::add(const RecordKind& kind, const std::vector<Row>& rows) {

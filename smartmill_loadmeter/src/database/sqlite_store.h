@@ -38,6 +38,9 @@ class SqliteStore : public RecordStore {
   std::vector<std::pair<std::string, std::string>> pairs() override;
   std::size_t size() override;
 
+  /// @throws SQLite::Exception when the content is damaged.
+  void check();
+
   /// @{ As in FleetSynchronisation.
   FleetSynchronisation::Batch unsent(const std::string& fleet, const RecordKind& kind,
                                      std::size_t limit) const;

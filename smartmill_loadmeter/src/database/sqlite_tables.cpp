@@ -15,8 +15,9 @@ namespace smartmill::loadmeter {
 
 namespace {
 
-// 1: coefficients. 2: adds improvements and health, and the state of synchronisation of each kind.
-constexpr int SCHEMA = 2;
+// 1: coefficients. 2: adds improvements and health, and the state of synchronisation of each kind. 3: adds
+// the time of the first test, wear and temperature to coefficients.
+constexpr int SCHEMA = 3;
 
 std::string createOf(const RecordKind& kind) {
   std::string sql = "CREATE TABLE " + kind.table + " (id INTEGER PRIMARY KEY, identity TEXT NOT NULL UNIQUE";
@@ -45,9 +46,18 @@ void switchToWriteAheadLog(SQLite::Database& db) {
   }
 }
 
+void requireOurs(SQLite::Database& db) {
+  const int tables = db.execAndGet("SELECT count(*) FROM sqlite_master").getInt();
+  const bool ours =
+      db.execAndGet("SELECT count(*) FROM sqlite_master WHERE name = 'coefficients'").getInt() > 0;
+  if (tables > 0 && !ours) throw SQLite::Exception("not a database of cutting coefficients");
+  if (version(db) > SCHEMA) {
+    throw SQLite::Exception("schema " + std::to_string(version(db)) +
+                            " of a newer version, expected at most " + std::to_string(SCHEMA));
+  }
+}
+
 void makeFirst(SQLite::Database& db) {
-  if (db.execAndGet("SELECT count(*) FROM sqlite_master").getInt() > 0)
-    throw SQLite::Exception("not a database of cutting coefficients");
   db.exec(createOf(coefficientKind()));
   db.exec("CREATE INDEX pair ON coefficients (material, tool, speed_bucket, stamp)");
   db.exec("CREATE INDEX material_speed ON coefficients (material, speed_bucket, stamp)");
@@ -70,9 +80,21 @@ void makeSecond(SQLite::Database& db) {
   db.exec("PRAGMA user_version=2");
 }
 
+void makeThird(SQLite::Database& db) {
+  for (const NumberField& f : numberFields()) {
+    if (!f.since_schema_3) continue;
+    const int present =
+        db.execAndGet("SELECT count(*) FROM pragma_table_info('coefficients') WHERE name = '" + f.name + "'")
+            .getInt();
+    if (present == 0) db.exec("ALTER TABLE coefficients ADD COLUMN " + f.name + " REAL");
+  }
+  db.exec("PRAGMA user_version=3");
+}
+
 }  // namespace
 
 void prepareTables(SQLite::Database& db) {
+  requireOurs(db);  // before anything is written
   switchToWriteAheadLog(db);
   db.exec("PRAGMA synchronous=FULL");
   if (version(db) < SCHEMA) {
@@ -80,11 +102,8 @@ void prepareTables(SQLite::Database& db) {
     // Another process may have done it meanwhile.
     if (version(db) == 0) makeFirst(db);
     if (version(db) == 1) makeSecond(db);
+    if (version(db) == 2) makeThird(db);
     transaction.commit();
-  }
-  if (version(db) != SCHEMA) {
-    throw SQLite::Exception("schema " + std::to_string(version(db)) + ", expected at most " +
-                            std::to_string(SCHEMA));
   }
 }
 

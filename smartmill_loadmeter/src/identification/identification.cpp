@@ -86,6 +86,7 @@ void LoadMeterIdentification::handle(const IdentifyGoal& goal) {
     closeTest();
     steady_.begin(std::nullopt);
     result = identifySession(session_, goal, spindle_, spindle_uncertainty_, parameters_.largest_runout);
+    result.record.edge_age = production_.edgeAge(result.record.set.tool);
     if (result.code == IdentifyResult::Code::ok) result.message += forces_.calibrationText();
   }
   if (outputs_.result) outputs_.result(result);

@@ -17,7 +17,7 @@ LoadEstimator::LoadEstimator(std::vector<LoadRecord> records, const Spindle& spi
     : options_(options),
       spindle_uncertainty_(spindle_uncertainty / 100.0),
       where_(where.empty() ? "" : where + ": "),
-      plan_(records, spindle.friction_zero_below, timed, !(noise > 0.0), where_),
+      plan_(records, spindle.friction_zero_below, timed, !(noise > 0.0), options.least_feeds, where_),
       regression_(plan_, spindle, spindle_uncertainty_, options),
       state_(regression_.initialState(std::move(records), noise)) {
 }

@@ -14,7 +14,7 @@ std::size_t LoadTerms::count() const {
 }
 
 LoadPlan::LoadPlan(const std::vector<LoadRecord>& records, double friction_zero_below, bool timed,
-                   bool transients, const std::string& where)
+                   bool transients, std::size_t least_feeds, const std::string& where)
     : is_timed(timed), has_transients(transients) {
   std::set<double> speeds, ages;
   std::set<long> chips;
@@ -41,9 +41,10 @@ LoadPlan::LoadPlan(const std::vector<LoadRecord>& records, double friction_zero_
     throw Error(where + "friction: expected air cuts at two or more speeds, " + std::to_string(air_speeds) +
                 " usable");
   }
-  if (chips.size() < 3) {
+  if (chips.size() < least_feeds) {
     throw Error(where + "coefficients from torque: " + std::to_string(cuts) + " cuts at " +
-                std::to_string(chips.size()) + " different feeds, expected three or more feeds");
+                std::to_string(chips.size()) + " different feeds, expected " +
+                std::string(least_feeds == 3 ? "three" : std::to_string(least_feeds)) + " or more feeds");
   }
 }
 

@@ -28,9 +28,10 @@ struct LoadPlan {
   bool is_timed = false;                ///< every record has its start time
   bool has_transients = false;          ///< the records are samples, not means
 
-  /// @throws Error with fewer than two speeds of air cuts or three feeds. @param where prefix of the message
+  /// @throws Error with fewer than two speeds of air cuts or `least_feeds` feeds. @param where prefix of the
+  /// message
   LoadPlan(const std::vector<LoadRecord>& records, double friction_zero_below, bool timed, bool transients,
-           const std::string& where);
+           std::size_t least_feeds, const std::string& where);
 };
 
 /// A term that evidence may add.

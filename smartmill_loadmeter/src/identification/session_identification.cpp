@@ -7,7 +7,9 @@
 #include "load_estimator.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
+#include "smartmill_core/names.h"
 #include "smartmill_core/units.h"
+#include "smartmill_loadmeter/database/knowledge.h"
 #include "smartmill_loadmeter/identification/cut_forces.h"
 #include "smartmill_loadmeter/identification/idle_torque.h"
 #include "smartmill_loadmeter/motor/joint.h"
@@ -128,7 +130,43 @@ std::string addMotorCoefficients(const std::vector<LoadTest>& cuts, const IdleTo
                       : "; not observable from the axes that moved: " + text;
 }
 
+void addPrior(const CoefficientRecord& prior, IdentifyResult* result) {
+  const CombinedRecord both = combine(result->record, prior);
+  const double deviation = both.deviation;
+  if (!both.agree) {
+    result->message += formatted(
+        "; stored coefficients (Ktc %.1f +- %.1f N/mm2) not used: the tests deviate by %.1f standard "
+        "deviations",
+        prior.set.value.ktc / units::N_PER_MM2, prior.set.std_dev.ktc / units::N_PER_MM2, deviation);
+    return;
+  }
+  const double stamp = result->coefficients.stamp;
+  result->coefficients = both.record.set;
+  result->coefficients.stamp = stamp;
+  result->coefficients.source += names::WITH_STORED;
+  const CoefficientSet& k = result->coefficients;
+  result->message += formatted(
+      "; with the stored coefficients, which deviate by %.1f standard deviations: Ktc %.1f +- %.1f N/mm2, "
+      "Kte %.2f +- %.2f N/mm",
+      deviation, k.value.ktc / units::N_PER_MM2, k.std_dev.ktc / units::N_PER_MM2,
+      k.value.kte / units::N_PER_MM, k.std_dev.kte / units::N_PER_MM);
+}
+
 }  // namespace
+
+void PriorKnowledge::set(double stamp, const CoefficientSet& set, double ktc_kte_covariance) {
+  stamp_ = stamp;
+  prior_ = CoefficientRecord();
+  prior_.set = set;
+  prior_.covariance[CoefficientRecord::covarianceIndex(0, 3)] = ktc_kte_covariance;
+}
+
+void PriorKnowledge::use(IdentifyGoal* goal) {
+  if (goal->reset) reset_ = goal->stamp;
+  const bool same_pair =
+      !goal->tool.empty() && prior_.set.tool == goal->tool && prior_.set.material == goal->material;
+  if (same_pair && stamp_ > reset_) goal->prior = prior_;
+}
 
 std::string countOf(std::size_t n, const char* what) {
   return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
@@ -136,7 +174,7 @@ std::string countOf(std::size_t n, const char* what) {
 
 SessionResult identifyFromTests(std::vector<LoadTest> air_cuts, std::vector<LoadTest> cuts,
                                 const Spindle& spindle, double spindle_uncertainty_percent,
-                                double largest_runout) {
+                                double largest_runout, std::size_t least_feeds) {
   computeMeans(&air_cuts, &cuts, spindle);
   double noise2 = 0.0;
   for (const auto* tests : {&air_cuts, &cuts}) {
@@ -145,12 +183,17 @@ SessionResult identifyFromTests(std::vector<LoadTest> air_cuts, std::vector<Load
   const double noise = std::sqrt(noise2 / std::max(1.0, static_cast<double>(air_cuts.size() + cuts.size())));
   LoadRecordOptions options;
   options.runout_uncertainty = largest_runout / std::sqrt(3.0);
+  options.least_feeds = least_feeds;
   LoadEstimator estimator(recordsOf(air_cuts, cuts, spindle, noise), spindle, spindle_uncertainty_percent,
                           options, noise, true, "");
   const LoadRecordResult found = estimator.estimate();
   SessionResult result;
   result.record.set = found.set;
   addConditions(cuts, &result.record);
+  for (const auto* tests : {&air_cuts, &cuts}) {
+    for (const LoadTest& t : *tests)
+      result.record.first_stamp = std::fmin(result.record.first_stamp, t.stamp - t.duration);
+  }
   const auto index = CoefficientRecord::covarianceIndex;
   result.record.covariance[index(0, 0)] = found.set.std_dev.ktc * found.set.std_dev.ktc;
   result.record.covariance[index(0, 3)] = found.covariance_tc_te;
@@ -185,7 +228,8 @@ IdentifyResult identifySession(const SessionTests& session, const IdentifyGoal& 
   }
   for (const std::string& reason : session.rejected) aside += "; " + reason;
   try {
-    found = identifyFromTests(session.air_cuts, cuts, spindle, spindle_uncertainty_percent, largest_runout);
+    found = identifyFromTests(session.air_cuts, cuts, spindle, spindle_uncertainty_percent, largest_runout,
+                              goal.prior ? 2 : 3);
   } catch (const Error& error) {
     result.code = IdentifyResult::Code::too_few_tests;
     result.message = error.what() + aside;
@@ -203,6 +247,7 @@ IdentifyResult identifySession(const SessionTests& session, const IdentifyGoal& 
                              k.value.kte / units::N_PER_MM, k.std_dev.kte / units::N_PER_MM,
                              session.air_cuts.size(), cuts.size()) +
                    aside;
+  if (goal.prior) addPrior(*goal.prior, &result);
   return result;
 }
 

@@ -3,6 +3,7 @@
 #include <geometry_msgs/WrenchStamped.h>
 #include <smartmill_msgs/ForceEstimate.h>
 
+#include "node/find_message.h"
 #include "node/fleet_message.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
@@ -30,12 +31,16 @@ MachineModel modelOf(const NodeParameters& parameters) {
 LoadMeterNode::LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
     : parameters_(parametersFromServer(private_nh).readAll<NodeParameters>()),
       shell_(nh, private_nh, "spindle load meter", parameters_.input_timeout),
-      identification_(modelOf(parameters_), parameters_.identification, parameters_.hold_back),
+      model_(modelOf(parameters_)),
+      identification_(model_, parameters_.identification, parameters_.hold_back),
       curves_(parameters_.curve, parameters_.hold_back),
-      database_(parameters_.database),
+      opened_(openDatabase(parameters_.database, parameters_.machine, parameters_.model,
+                           DataFolders::ofEnvironment())),
+      database_(*opened_.database),
       server_(
           nh, names::IDENTIFY_COEFFICIENTS, [this](Server::GoalHandle handle) { goal(handle); },
           [this](Server::GoalHandle handle) { cancel(handle); }, false) {
+  reportDatabase(private_nh);
   IdentificationOutputs& outputs = identification_.identification().outputs();
   outputs.result = [this](const IdentifyResult& result) { finish(result); };
   outputs.test = [this](const LoadTest& test) {
@@ -63,6 +68,10 @@ LoadMeterNode::LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   connectCurves(shell_.inputs(), parameters_, streams_);
   find_service_ = nh.advertiseService(names::FIND_COEFFICIENTS, &LoadMeterNode::find, this);
   recommend_service_ = nh.advertiseService(names::RECOMMEND_CUT, &LoadMeterNode::recommend, this);
+  prior_subscriber_ = nh.subscribe<smartmill_msgs::CoefficientPrior>(
+      names::COEFFICIENT_PRIOR, 1, [this](const smartmill_msgs::CoefficientPrior::ConstPtr& prior) {
+        prior_.set(toSec(prior->header.stamp), fromMsg(prior->coefficients), prior->ktc_kte_covariance);
+      });
   discovered_ = nh.subscribe<smartmill_msgs::DiscoverActionResult>(
       std::string(names::DISCOVER) + "/result", 10,
       [this](const smartmill_msgs::DiscoverActionResult::ConstPtr& result) { store(*result); });
@@ -72,11 +81,24 @@ LoadMeterNode::LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   shell_.diagnose("load meter", [this](auto& status) { diagnose(status); });
   shell_.every(WATCH_PERIOD, [this] { watch(); });
   if (!parameters_.fleet.empty()) {
+    if (!opened_.problem.empty()) throw Error("fleet: requires a database to push; " + opened_.problem);
     fleet_publisher_ = nh.advertise<smartmill_msgs::FleetState>(names::FLEET_STATE, 1, true);
-    pusher_ =
-        std::make_unique<FleetPusher>(parameters_.database, parameters_.fleet, parameters_.fleet_period);
+    pusher_ = std::make_unique<FleetPusher>(opened_.file, parameters_.fleet, parameters_.fleet_period);
   }
   server_.start();
+}
+
+// The parameter `database` becomes the file in use, so that `rosparam get` says where the records are.
+void LoadMeterNode::reportDatabase(const ros::NodeHandle& private_nh) const {
+  if (opened_.problem.empty())
+    private_nh.setParam("database", opened_.file.empty() ? DATABASE_NONE : opened_.file);
+  if (!opened_.problem.empty()) {
+    ROS_WARN("database: %s", opened_.problem.c_str());
+  } else if (opened_.file.empty()) {
+    ROS_INFO("database: none, records of this run only");
+  } else {
+    ROS_INFO("database: %s (%zu records)", opened_.file.c_str(), database_.size());
+  }
 }
 
 // Mean force of a cut on the tool; NaN: not observable.
@@ -144,6 +166,7 @@ void LoadMeterNode::goal(Server::GoalHandle handle) {
   goal.material = request->material;
   goal.reset = request->reset;
   goal.id = next_id_++;
+  prior_.use(&goal);
   handle.setAccepted();
   waiting_[goal.id] = handle;
   feedback();
@@ -205,19 +228,15 @@ void LoadMeterNode::feedback() {
 
 bool LoadMeterNode::find(smartmill_msgs::FindCoefficients::Request& request,
                          smartmill_msgs::FindCoefficients::Response& response) {
-  CoefficientSet unknown;
-  unknown.value = unknown.std_dev = NOT_IDENTIFIED;
-  response.coefficients = toMsg(unknown);
-  response.code = smartmill_msgs::FindCoefficients::Response::NOT_FOUND;
+  std::vector<CuttingCondition> tests;
+  for (const smartmill_msgs::CuttingCondition& test : request.tests) tests.push_back(fromMsg(test));
   try {
-    const FoundCoefficients found = findCoefficients(database_, request.tool, request.material);
-    response.message = found.message;
-    if (!found.set) return true;
-    response.code = smartmill_msgs::FindCoefficients::Response::OK;
-    response.coefficients = toMsg(*found.set);
+    response = toMsg(findCoefficients(database_, request.tool, request.material, tests, model_));
   } catch (const Error& error) {
+    response = toMsg(FoundCoefficients());
     response.message = error.what();
   }
+  response.database = opened_.file;
   return true;
 }
 
@@ -272,7 +291,7 @@ void LoadMeterNode::store(const smartmill_msgs::DiscoverActionResult& discovered
     ModelImprovement improvement = readImprovement(discovered.result.report);
     improvement.machine = parameters_.machine;
     improvement.stamp = discovered.header.stamp.toSec();
-    stored_explanations_ += database_.add(std::vector<ModelImprovement>{improvement});
+    stored_explanations_ += database_.evidence().add(std::vector<ModelImprovement>{improvement});
   } catch (const Error& error) {
     ROS_ERROR("database: explanation not stored: %s", error.what());
   }
@@ -294,7 +313,7 @@ void LoadMeterNode::store(const smartmill_msgs::SpindleHealth& health) {
     records.push_back(r);
   }
   try {
-    stored_health_ += database_.add(records);
+    stored_health_ += database_.evidence().add(records);
   } catch (const Error& error) {
     ROS_ERROR("database: spindle health not stored: %s", error.what());
   }
@@ -343,6 +362,8 @@ void LoadMeterNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status
   }
   if (!last_force_.empty()) status.add("force by motor currents", last_force_);
   if (!last_curve_.empty()) status.add("force curve", last_curve_);
+  status.add("database", opened_.file.empty() ? "records of this run only" : opened_.file);
+  if (!opened_.problem.empty()) status.mergeSummary(Level::WARN, "database: " + opened_.problem);
   status.add("cuts stored", stored_cuts_);
   status.add("explanations stored", stored_explanations_);
   status.add("spindle-health quantities stored", stored_health_);

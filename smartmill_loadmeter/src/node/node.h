@@ -11,8 +11,9 @@
 #include "node/parameters.h"
 #include "node/wiring.h"
 #include "smartmill_core/model/machine_model.h"
-#include "smartmill_loadmeter/database/database.h"
+#include "smartmill_loadmeter/database/database_location.h"
 #include "smartmill_loadmeter/identification/identification_pipeline.h"
+#include "smartmill_msgs/CoefficientPrior.h"
 #include "smartmill_msgs/DiscoverActionResult.h"
 #include "smartmill_msgs/FindCoefficients.h"
 #include "smartmill_msgs/IdentifyCoefficientsAction.h"
@@ -49,23 +50,27 @@ class LoadMeterNode {
   void publish(const IdentifiedForceCurves& found);
   void watch();
   void publishFleetState();
+  void reportDatabase(const ros::NodeHandle& private_nh) const;
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   NodeParameters parameters_;
   NodeShell shell_;
+  MachineModel model_;
   IdentificationPipeline identification_;
   ForceCurvePipeline curves_;
   CutStreams streams_{identification_, curves_, parameters_};
-  CoefficientDatabase database_;
+  OpenedDatabase opened_;
+  CoefficientDatabase& database_;
   std::unique_ptr<FleetPusher> pusher_;
   std::map<std::uint64_t, Server::GoalHandle> waiting_;
   std::uint64_t next_id_ = 1;
+  PriorKnowledge prior_;  // of the next goals
   std::string last_message_, last_force_, last_curve_;
   std::size_t stored_cuts_ = 0, stored_explanations_ = 0, stored_health_ = 0;
   std::uint64_t published_fleet_state_ = 0;
 
   ros::Publisher publisher_, force_publisher_, estimate_publisher_, curve_publisher_, fleet_publisher_;
-  ros::Subscriber discovered_, health_;
+  ros::Subscriber discovered_, health_, prior_subscriber_;
   ros::ServiceServer find_service_, recommend_service_;
   Server server_;
 };

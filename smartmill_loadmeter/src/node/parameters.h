@@ -4,6 +4,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/parameters/parameter_table.h"
+#include "smartmill_loadmeter/database/database_location.h"
 #include "smartmill_loadmeter/database/fleet.h"
 #include "smartmill_loadmeter/identification/force_curve_identification.h"
 #include "smartmill_loadmeter/identification/identification.h"
@@ -13,7 +14,7 @@ namespace smartmill::loadmeter {
 /// Parameters of loadmeter_node and of `coefficients` on a bag.
 struct NodeParameters {
   std::string model;
-  std::string database, machine;
+  std::string database = DATABASE_AUTO, machine;
   bool keep_cuts = true;
   std::string fleet;
   double fleet_period = 60.0;
@@ -35,8 +36,12 @@ struct NodeParameters {
         "meter.");
     table.atLaunch("model", model, "path of a smartmill-model/1 file with a spindle section");
     table.section();
-    table.text("database", database, "path of the SQLite file for this machine's records; empty: not stored");
-    table.text("machine", machine, "name of this machine in its records");
+    table.text(
+        "database", database,
+        "path of the SQLite file for this machine's records; auto: NAME.sqlite in $STATE_DIRECTORY, "
+        "$XDG_DATA_HOME/smartmill or ~/.local/share/smartmill, where NAME is that of the machine or of "
+        "its model file; none or empty: records of this run only");
+    table.text("machine", machine, "name of this machine in its records; empty: unnamed");
     table.flag("keep_cuts", keep_cuts,
                "true: every cut is stored with its condition and the running estimate");
     table.text("fleet", fleet,
@@ -79,7 +84,7 @@ struct NodeParameters {
           "database: expected a file, because a machine does not wait for a server (parameter fleet)");
     if (!fleet.empty() && !isServerUrl(fleet))
       throw Error("fleet: '" + fleet + "': expected postgresql://USER@HOST/DATABASE");
-    if (!fleet.empty() && database.empty()) throw Error("fleet: requires a database to push");
+    if (!fleet.empty() && isWithoutFile(database)) throw Error("fleet: requires a database to push");
     if (motor_learn && !motor_calibration.empty()) throw Error("motor_learn: excludes motor_calibration");
     if (motor_servo && !usesMotors()) throw Error("motor_servo: requires motor_learn or motor_calibration");
     if (usesMotors() && !motor_servo && !identification.motor.any())

@@ -25,12 +25,18 @@ std::vector<IdentifyResult> identifyFromBag(const std::string& path, const Machi
   RecordingReader bag(path);
   if (!bag.has(names::CNC_LOAD)) throw Error(path + ": expected topic " + names::CNC_LOAD);
   connect(bag, parameters, identification);
+  PriorKnowledge prior;
+  bag.on<plain::CoefficientPrior>(names::COEFFICIENT_PRIOR, [&](const plain::CoefficientPrior& m, double) {
+    prior.set(toSec(m.header.stamp), fromMsg(m.coefficients), m.ktc_kte_covariance);
+  });
   bag.on<plain::IdentifyCoefficientsActionGoal>(
       names::goals(names::IDENTIFY_COEFFICIENTS),
       [&](const plain::IdentifyCoefficientsActionGoal& m, double) {
         const double stamped = toSec(m.goal.header.stamp);
         const double stamp = stamped == 0.0 ? toSec(m.goal_id.stamp) : stamped;
-        identification.push(IdentifyGoal{stamp, m.goal.tool, m.goal.material, m.goal.reset != 0, 0});
+        IdentifyGoal goal{stamp, m.goal.tool, m.goal.material, m.goal.reset != 0, 0};
+        prior.use(&goal);
+        identification.push(goal);
       });
   bag.run(listeners.progress);
   identification.flush();

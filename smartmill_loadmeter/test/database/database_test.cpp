@@ -17,6 +17,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/testing/temporary_folder.h"
+#include "smartmill_loadmeter/database/find_coefficients.h"
 
 namespace smartmill::loadmeter {
 namespace {
@@ -185,8 +186,8 @@ TEST(Estimate, uncertaintyGrowsWithDistance) {
   EXPECT_GT(other->set.std_dev.ktc, 0.1e9);
   query.material = "titanium";
   EXPECT_FALSE(database.estimate(query));
-  const FoundCoefficients found = findCoefficients(database, "new", "1018");
-  ASSERT_TRUE(found.set);
+  const FoundCoefficients found = findCoefficients(database, "new", "1018", {}, MachineModel());
+  ASSERT_TRUE(found.predicted);
   EXPECT_THAT(found.message, HasSubstr("no records with 'new'"));
 }
 
@@ -264,6 +265,8 @@ TEST(Database, anOlderFileIsUpdatedWithoutLoss) {
   sqlite3* db = nullptr;
   ASSERT_EQ(sqlite3_open(file.c_str(), &db), SQLITE_OK);
   ASSERT_EQ(sqlite3_exec(db,
+                         "ALTER TABLE coefficients DROP COLUMN first_stamp; ALTER TABLE coefficients DROP "
+                         "COLUMN flank_wear; ALTER TABLE coefficients DROP COLUMN temperature;"
                          "DROP TABLE improvements; DROP TABLE health; DROP TABLE handed; CREATE TABLE sent "
                          "(fleet TEXT PRIMARY KEY, last INTEGER, at REAL); INSERT INTO sent VALUES ('f', 1, "
                          "1); PRAGMA user_version=1",
@@ -272,15 +275,33 @@ TEST(Database, anOlderFileIsUpdatedWithoutLoss) {
   sqlite3_close(db);
   CoefficientDatabase database(file);
   EXPECT_EQ(database.size(), 2u);
+  EXPECT_TRUE(std::isnan(database.records("t", "")[0].temperature));
+  EXPECT_FALSE(database.add(recordOf("t", 1, 1e9, 2.0))) << "a record keeps its identity";
   EXPECT_EQ(database.synchronisation().lastFleet(), "f");
   EXPECT_EQ(database.synchronisation().unsentCount("f"), 1u);
   HealthRecord health;
   health.stamp = 5.0;
-  EXPECT_EQ(database.add(std::vector<HealthRecord>{health}), 1u);
+  EXPECT_EQ(database.evidence().add(std::vector<HealthRecord>{health}), 1u);
   EXPECT_EQ(database.synchronisation().unsentCount("f"), 2u);
   health.stamp = NAN;
-  EXPECT_THAT(errorOf([&] { database.add(std::vector<HealthRecord>{health}); }),
+  EXPECT_THAT(errorOf([&] { database.evidence().add(std::vector<HealthRecord>{health}); }),
               HasSubstr("old.sqlite: stamp of a record: expected a finite number"));
+}
+
+// Without a value the fields of schema 3 do not change a record; with one it is another record.
+TEST(Database, wearAndTemperatureAreStored) {
+  const TemporaryFolder folder;
+  CoefficientRecord warm = recordOf("t", 1, 1e9, 2.0);
+  warm.first_stamp = 0.5, warm.flank_wear = 1.2e-4, warm.temperature = 313.15, warm.edge_age = 240.0;
+  CoefficientDatabase database(folder.file("m.sqlite"));
+  database.add(recordOf("t", 1, 1e9, 2.0));
+  EXPECT_TRUE(database.add(warm));
+  const CoefficientRecord read = database.records("t", "")[1];
+  EXPECT_EQ(read.first_stamp, 0.5);
+  EXPECT_EQ(read.flank_wear, 1.2e-4);
+  EXPECT_EQ(read.temperature, 313.15);
+  exportCsv({read}, folder.file("a.csv"));
+  EXPECT_FALSE(database.add(importCsv(folder.file("a.csv"))[0]));
 }
 
 // Keys and numbers of docs/formats.md.
@@ -306,10 +327,10 @@ TEST(Database, aReportIsStoredOnceWithItsEvidence) {
   EXPECT_EQ(evidenceOf(kept).at(1).gaps.at(1).before, 90.0);
   EXPECT_EQ(kept.heldout_after, 1.009);
   CoefficientDatabase database("");
-  EXPECT_EQ(database.add(std::vector<ModelImprovement>{kept}), 1u);
+  EXPECT_EQ(database.evidence().add(std::vector<ModelImprovement>{kept}), 1u);
   kept.stamp += 60.0;
   kept.report = "a copy";
-  EXPECT_EQ(database.add(std::vector<ModelImprovement>{kept}), 0u);
+  EXPECT_EQ(database.evidence().add(std::vector<ModelImprovement>{kept}), 0u);
   EXPECT_THAT(errorOf([&] { readImprovement(folder.write("bad.json", "{}")); }), HasSubstr("bad.json: "));
   EXPECT_THAT(errorOf([&] { readImprovement(folder.file("none")); }), HasSubstr("none: cannot be read"));
 }

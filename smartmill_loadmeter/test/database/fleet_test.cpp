@@ -217,7 +217,7 @@ TEST_F(FleetDatabase, olderTablesAreNamedAndMigratedWithoutLoss) {
   EXPECT_THAT(errorOf([&] { CoefficientDatabase database(old); }), HasSubstr("no tables"));
   EXPECT_EQ(migrateFleet(old, 1), 0);
   EXPECT_THAT(errorOf([&] { CoefficientDatabase database(old); }),
-              HasSubstr("tables of version 1, expected 3: update them with `coefficients_db URL migrate`"));
+              HasSubstr("tables of version 1, expected 4: update them with `coefficients_db URL migrate`"));
   ASSERT_TRUE(server_->run("owner", "old",
                            "INSERT INTO machine (name, login, shop) VALUES ('a', 'owner', 'milling')"));
   ASSERT_TRUE(server_->run("owner", "old",
@@ -225,10 +225,10 @@ TEST_F(FleetDatabase, olderTablesAreNamedAndMigratedWithoutLoss) {
                            "material, source, machine, bag, version, "
                            "stamp, ktc) VALUES ('1', 'milling', 1, 0, 't', 'm', '', '', '', '', 5, 7e8)"));
   EXPECT_EQ(migrateFleet(old), 1);
-  EXPECT_EQ(migrateFleet(old), 3) << "a repeated migration changes nothing";
+  EXPECT_EQ(migrateFleet(old), 4) << "a repeated migration changes nothing";
   EXPECT_EQ(CoefficientDatabase(old).find("t", "m")->value.ktc, 7e8);
-  ASSERT_TRUE(server_->run("owner", "old", "UPDATE fleet SET schema = 4"));
-  EXPECT_THAT(errorOf([&] { CoefficientDatabase database(old); }), HasSubstr("newer than this program's 3"));
+  ASSERT_TRUE(server_->run("owner", "old", "UPDATE fleet SET schema = 5"));
+  EXPECT_THAT(errorOf([&] { CoefficientDatabase database(old); }), HasSubstr("newer than this program's 4"));
 }
 
 // A server of version 2, without improvements and health: a machine that pushed then continues.
@@ -246,12 +246,12 @@ TEST_F(FleetDatabase, tablesOfVersionTwoTakeTheNewKindsAfterMigration) {
                            "INSERT INTO push (shop, machine_id, offered, fresh, behind) VALUES ('milling', "
                            "1, 1, 1, 0)"));
   CoefficientDatabase a(file("a"));
-  a.add(std::vector<HealthRecord>{healthOf("a", 1)});
-  EXPECT_THAT(errorOf([&] { push(a, there("a")); }), HasSubstr("tables of version 2, expected 3"));
+  a.evidence().add(std::vector<HealthRecord>{healthOf("a", 1)});
+  EXPECT_THAT(errorOf([&] { push(a, there("a")); }), HasSubstr("tables of version 2, expected 4"));
   EXPECT_EQ(migrateFleet(there("owner")), 2);
   EXPECT_EQ(push(a, there("a")).fresh, 1u);
   EXPECT_EQ(CoefficientDatabase(there("a")).find("t", "m")->value.ktc, 7e8);
-  EXPECT_EQ(CoefficientDatabase(there("a")).health().size(), 1u);
+  EXPECT_EQ(CoefficientDatabase(there("a")).evidence().health().size(), 1u);
   EXPECT_EQ(fleetMembers(there("a")).at(0).records, 2u);
 }
 
@@ -260,35 +260,36 @@ TEST_F(FleetDatabase, everyKindOfRecordIsTransferred) {
   CoefficientRecord cut = recordOf("a", 7);
   cut.set.source = SOURCE_PRODUCTION;
   a.add(cut);
-  a.add(std::vector<ModelImprovement>{improvementOf("a", 1), improvementOf("a", 2)});
-  a.add(std::vector<HealthRecord>{healthOf("a", 1), healthOf("a", 2), healthOf("a", 3)});
-  EXPECT_EQ(a.add(std::vector<HealthRecord>{healthOf("a", 3)}), 0u) << "an existing record is not added";
+  a.evidence().add(std::vector<ModelImprovement>{improvementOf("a", 1), improvementOf("a", 2)});
+  a.evidence().add(std::vector<HealthRecord>{healthOf("a", 1), healthOf("a", 2), healthOf("a", 3)});
+  EXPECT_EQ(a.evidence().add(std::vector<HealthRecord>{healthOf("a", 3)}), 0u)
+      << "an existing record is not added";
   EXPECT_EQ(push(a, url("a")).fresh, 6u);
   EXPECT_EQ(push(a, url("a")).offered, 0u);
   EXPECT_EQ(push(a, url("a"), {}, true).fresh, 0u);
-  b.add(std::vector<HealthRecord>{healthOf("b", 1)});
+  b.evidence().add(std::vector<HealthRecord>{healthOf("b", 1)});
   EXPECT_EQ(pull(b, url("b")).fresh, 6u);
   EXPECT_EQ(pull(b, url("b")).offered, 0u);
   EXPECT_EQ(push(b, url("b")).fresh, 1u) << "its own record was not sent yet";
   EXPECT_EQ(b.synchronisation().behind(), 0u);
   EXPECT_EQ(b.records("", "").at(0).set.source, SOURCE_PRODUCTION);
-  const ModelImprovement received = b.improvements().at(1), expected = improvementOf("a", 2);
+  const ModelImprovement received = b.evidence().improvements().at(1), expected = improvementOf("a", 2);
   EXPECT_EQ(received.effects, expected.effects);
   EXPECT_EQ(received.fit_before, expected.fit_before);
   EXPECT_TRUE(std::isnan(received.heldout_before));
   EXPECT_EQ(received.report, expected.report);
-  const HealthRecord health = b.health().at(3), sent = healthOf("a", 3);
+  const HealthRecord health = b.evidence().health().at(3), sent = healthOf("a", 3);
   EXPECT_EQ(health.quantity, sent.quantity);
   EXPECT_EQ(health.now, sent.now);
-  EXPECT_EQ(CoefficientDatabase(url("b")).health().size(), 4u);
-  EXPECT_EQ(CoefficientDatabase(url("c")).health().size(), 0u) << "another shop";
-  EXPECT_EQ(CoefficientDatabase(url("c")).improvements().size(), 0u);
+  EXPECT_EQ(CoefficientDatabase(url("b")).evidence().health().size(), 4u);
+  EXPECT_EQ(CoefficientDatabase(url("c")).evidence().health().size(), 0u) << "another shop";
+  EXPECT_EQ(CoefficientDatabase(url("c")).evidence().improvements().size(), 0u);
 }
 
 TEST_F(FleetDatabase, recordsOfEveryKindAreBoundToTheirSender) {
   CoefficientDatabase a(file("a"));
-  a.add(std::vector<ModelImprovement>{improvementOf("a", 1)});
-  a.add(std::vector<HealthRecord>{healthOf("a", 1)});
+  a.evidence().add(std::vector<ModelImprovement>{improvementOf("a", 1)});
+  a.evidence().add(std::vector<HealthRecord>{healthOf("a", 1)});
   push(a, url("a"));
   const std::pair<std::string, std::string> kinds[] = {
       {"improvements", "machine, verdict, effects, rivals, resembles, tests, asked, report, version"},

@@ -109,6 +109,77 @@ TEST(LoadMeterIdentification, runoutIsEstimatedFromMeansAndRippleOfTheReadings) 
   EXPECT_GT(worst_bias, 0.015);  // bias without the estimate of runout
 }
 
+// A second, short session begins with the record of the first: the combination is calibrated and more certain
+// than either, and tests that contradict the record are used alone.
+TEST(LoadMeterIdentification, knowledgeOfAnEarlierSessionReplacesTests) {
+  Coverage ktc, kte;
+  for (int run = 0; run < Coverage::RUNS; ++run) {
+    const auto identifyWith = [&](unsigned seed, bool full, const std::optional<CoefficientRecord>& prior) {
+      Session session(seed, 2e-4);
+      session.ripple = session.any_angle = true;
+      LoadMeterIdentification identification(model(), {});
+      connect(session, identification);
+      if (full) {
+        runStandardTests(session, 6100.0);
+      } else {
+        for (const double rpm : {2000.0, 8000.0}) session.air(rpm, 2.0);
+        for (const double feed : {4e-5, 8e-5}) session.slot(6100.0, feed, 4.0);
+      }
+      IdentifyGoal goal{session.now(), "endmill", "aluminium", false, 0};
+      goal.prior = prior;
+      return identify(identification, goal);
+    };
+    const unsigned seed = 2 * static_cast<unsigned>(run) + 1;
+    const IdentifyResult first = identifyWith(seed, true, {});
+    ASSERT_EQ(first.code, IdentifyResult::Code::ok) << first.message;
+    const IdentifyResult both = identifyWith(seed + 1, false, first.record);
+    ASSERT_EQ(both.code, IdentifyResult::Code::ok) << both.message;
+    if (both.coefficients.source == "load_meter") continue;  // one pair in a hundred disagrees by chance
+    EXPECT_EQ(both.coefficients.source, "load_meter and database");
+    EXPECT_EQ(both.coefficients.tests, 5);
+    EXPECT_EQ(both.record.set.tests, 2) << "the database receives the new tests alone";
+    EXPECT_LT(both.coefficients.std_dev.ktc, first.coefficients.std_dev.ktc);
+    EXPECT_LT(both.coefficients.std_dev.ktc, both.record.set.std_dev.ktc);
+    ktc.add(both.coefficients.value.ktc - TRUTH.ktc, both.coefficients.std_dev.ktc);
+    kte.add(both.coefficients.value.kte - TRUTH.kte, both.coefficients.std_dev.kte);
+    if (run > 0) continue;
+    EXPECT_EQ(identifyWith(seed + 1, false, {}).code, IdentifyResult::Code::too_few_tests);
+    CoefficientRecord worn = first.record;
+    worn.set.value.kte *= 1.5;
+    const IdentifyResult alone = identifyWith(seed + 1, false, worn);
+    EXPECT_EQ(alone.coefficients.source, "load_meter");
+    EXPECT_EQ(alone.coefficients.value.ktc, alone.record.set.value.ktc);
+    EXPECT_THAT(alone.message, HasSubstr("not used: the tests deviate by"));
+  }
+  EXPECT_TRUE(ktc.isCalibrated());
+  EXPECT_TRUE(kte.isCalibrated());
+}
+
+TEST(PriorKnowledge, isOfThePairAndYoungerThanTheReset) {
+  CoefficientSet set;
+  set.tool = "endmill", set.material = "aluminium";
+  PriorKnowledge prior;
+  const auto isUsed = [&](const char* tool) {
+    IdentifyGoal goal{50.0, tool, "aluminium", false, 0};
+    prior.use(&goal);
+    return goal.prior.has_value();
+  };
+  EXPECT_FALSE(isUsed(""));
+  prior.set(10.0, set, -1.0);
+  EXPECT_TRUE(isUsed("endmill"));
+  EXPECT_FALSE(isUsed("other"));
+  IdentifyGoal reset{5.0, "endmill", "aluminium", true, 0};
+  prior.use(&reset);  // arrives late
+  EXPECT_TRUE(isUsed("endmill"));
+  reset.stamp = 20.0;
+  prior.use(&reset);
+  EXPECT_FALSE(isUsed("endmill"));
+  prior.set(30.0, set, -1.0);
+  EXPECT_TRUE(isUsed("endmill"));
+  prior.set(40.0, CoefficientSet(), -1.0);
+  EXPECT_FALSE(isUsed("endmill"));
+}
+
 TEST(LoadMeterIdentification, resetDiscardsTestsAndWrongPlansAreNamed) {
   Session session(1, 2e-4);
   LoadMeterIdentification identification(model(), {});

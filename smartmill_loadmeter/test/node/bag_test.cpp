@@ -13,6 +13,7 @@
 #include "smartmill_core/names.h"
 #include "smartmill_core/testing/shipped_parameters.h"
 #include "smartmill_core/testing/temporary_folder.h"
+#include "smartmill_msgs/CoefficientPrior.h"
 #include "smartmill_msgs/IdentifyCoefficientsActionGoal.h"
 #include "smartmill_ros/conversions.h"
 
@@ -40,7 +41,18 @@ class Recorder {
     m.goal.material = "aluminium";
     m.goal.reset = reset;
     bag_.write("/smartmill/loadmeter/identify_coefficients/goal", m.goal.header.stamp, m);
-    direct.handle(IdentifyGoal{toSec(m.goal.header.stamp), m.goal.tool, m.goal.material, reset, 0});
+    IdentifyGoal goal{toSec(m.goal.header.stamp), m.goal.tool, m.goal.material, reset, 0};
+    knowledge_.use(&goal);
+    direct.handle(goal);
+  }
+
+  void prior(const CoefficientSet& set, double covariance) {
+    smartmill_msgs::CoefficientPrior m;
+    m.header.stamp = fromSec(session.now());
+    m.coefficients = toMsg(set);
+    m.ktc_kte_covariance = covariance;
+    bag_.write("/smartmill/material/prior", m.header.stamp, m);
+    knowledge_.set(toSec(m.header.stamp), fromMsg(m.coefficients), covariance);
   }
 
   Session session{21, 2e-4};
@@ -55,6 +67,7 @@ class Recorder {
   }
 
   rosbag::Bag bag_;
+  PriorKnowledge knowledge_;
 
  public:
   LoadMeterIdentification direct;
@@ -92,6 +105,31 @@ TEST(Bag, givesTheResultsOfTheLiveRunToTheLastDigit) {
   const std::string message = errorOf([&] { identifyFromBag(file, model(), {}); });
   EXPECT_THAT(message, HasSubstr("run.bag"));
   EXPECT_EQ(message.find('\n'), std::string::npos);
+}
+
+TEST(Bag, containsTheKnowledgeThatTheLiveRunBeganWith) {
+  const TemporaryFolder folder;
+  std::vector<IdentifyResult> live;
+  {
+    Recorder recorder(folder.file("run.bag"));
+    recorder.goal(true);
+    for (const double rpm : {2000.0, 8000.0}) recorder.session.air(rpm, 2.0);
+    CoefficientSet stored;
+    stored.tool = "endmill", stored.material = "aluminium", stored.tests = 3;
+    stored.value = stored.std_dev = NOT_IDENTIFIED;
+    stored.value.ktc = TRUTH.ktc, stored.std_dev.ktc = 0.01 * TRUTH.ktc;
+    stored.value.kte = TRUTH.kte, stored.std_dev.kte = 0.03 * TRUTH.kte;
+    recorder.prior(stored, -0.8 * stored.std_dev.ktc * stored.std_dev.kte);
+    for (const double feed : {4e-5, 8e-5}) recorder.session.slot(6100.0, feed, 4.0);
+    recorder.goal(false);
+    live = recorder.results;
+  }
+  const auto found = identifyFromBag(folder.file("run.bag"), model(), {});
+  ASSERT_EQ(live.size(), 1u);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(live[0].coefficients.source, "load_meter and database") << live[0].message;
+  EXPECT_EQ(found[0].message, live[0].message);
+  EXPECT_EQ(found[0].coefficients.value.ktc, live[0].coefficients.value.ktc);
 }
 
 TEST(Bag, withoutAGoalIsIdentifiedAtItsEnd) {

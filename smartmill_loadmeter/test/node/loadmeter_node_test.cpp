@@ -119,6 +119,13 @@ TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
   ASSERT_TRUE(find.call(call));
   EXPECT_EQ(call.response.code, smartmill_msgs::FindCoefficients::Response::OK);
   EXPECT_EQ(call.response.coefficients.ktc, result->coefficients.ktc);
+  EXPECT_TRUE(call.response.of_pair);
+  EXPECT_EQ(call.response.identifications, 1u);
+  EXPECT_EQ(call.response.next_test.kind, smartmill_msgs::CuttingCondition::CUT);
+  EXPECT_LT(call.response.next_std[0], result->coefficients.ktc_std);
+  std::string database;
+  ASSERT_TRUE(ros::param::get("/smartmill/loadmeter/database", database));
+  EXPECT_EQ(call.response.database, database);
   call.request.material = "steel";
   ASSERT_TRUE(find.call(call));
   EXPECT_EQ(call.response.code, smartmill_msgs::FindCoefficients::Response::NOT_FOUND);
@@ -222,10 +229,10 @@ TEST(LoadMeterNode, storesSpindleHealth) {
   std::vector<HealthRecord> kept;
   for (int i = 0; i < 2400 && kept.size() < 2; ++i) {
     ros::WallDuration(0.05).sleep();
-    kept = CoefficientDatabase(file).health();
+    kept = CoefficientDatabase(file).evidence().health();
   }
   ros::WallDuration(0.2).sleep();
-  kept = CoefficientDatabase(file).health();
+  kept = CoefficientDatabase(file).evidence().health();
   ASSERT_EQ(kept.size(), 2u);
   EXPECT_EQ(kept[0].machine, "mill 07");
   EXPECT_EQ(kept[0].measured, "T1 tool_tip x");

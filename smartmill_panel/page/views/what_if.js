@@ -60,6 +60,17 @@ export class WhatIf {
     this.answer.textContent = 'Move a slider to change the chart.';
   }
 
+  // The sliders take the conditions of a test in SI units.
+  fill(test) {
+    const width = 50 * (Math.cos(test.entry_angle) - Math.cos(test.exit_angle));
+    Object.assign(this.value, { depth: 1e3 * test.axial_depth, feed: 1e3 * test.feed_per_tooth, teeth: test.teeth, helix: deg(test.helix), width });
+    for (const key of ['depth', 'feed', 'teeth', 'helix', 'width']) this.changed.add(key);
+    this.down = test.entry_angle > 0.1;
+    this.side.textContent = this.down ? 'Down-milling' : 'Up-milling';
+    for (const s of SLIDERS) this.label(s);
+    this.fetchChart();
+  }
+
   query() {
     const v = this.value, query = new URLSearchParams({ axial_depth: 1e-3 * v.depth });
     if (this.changed.has('feed')) query.set('feed_per_tooth', 1e-3 * v.feed);

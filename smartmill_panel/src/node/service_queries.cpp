@@ -112,9 +112,37 @@ ApiResponse queryCoefficients(ros::NodeHandle& nh, const ApiRequest& request) {
   if (!nh.serviceClient<smartmill_msgs::FindCoefficients>(names::FIND_COEFFICIENTS).call(service))
     return messageResponse(UNAVAILABLE, "the load meter node does not answer");
   const auto& found = service.response;
-  if (found.code != found.OK) return messageResponse(UNAVAILABLE, found.message);
+  if (found.code != found.OK) {
+    const json answer = {{"message", found.message}, {"database", found.database}};
+    return {UNAVAILABLE, answer.dump(-1, ' ', false, json::error_handler_t::replace)};
+  }
   const auto& c = found.coefficients;
-  const json answer = {{"tool", c.tool},
+  const auto range = [](const auto& values) { return json{number(values[0]), number(values[1])}; };
+  const auto& next = found.next_test;
+  json next_test;
+  if (next.kind == next.CUT) {
+    next_test = {{"spindle_speed", number(next.spindle_speed)},
+                 {"feed_per_tooth", number(next.feed_per_tooth)},
+                 {"axial_depth", number(next.axial_depth)},
+                 {"entry_angle", number(next.entry_angle)},
+                 {"exit_angle", number(next.exit_angle)},
+                 {"teeth", next.teeth},
+                 {"helix", number(next.helix)},
+                 {"diameter", number(next.diameter)},
+                 {"ktc_std", number(found.next_std[0])},
+                 {"kte_std", number(found.next_std[1])}};
+  }
+  const json answer = {{"of_pair", found.of_pair != 0},
+                       {"database", found.database},
+                       {"identifications", found.identifications},
+                       {"production_cuts", found.production_cuts},
+                       {"superseded", found.superseded},
+                       {"cutting_speed", range(found.cutting_speed)},
+                       {"feed_per_tooth", range(found.feed_per_tooth)},
+                       {"axial_depth", range(found.axial_depth)},
+                       {"edge_age", range(found.edge_age)},
+                       {"next_test", next_test},
+                       {"tool", c.tool},
                        {"material", c.material},
                        {"ktc", number(c.ktc)},
                        {"ktc_std", number(c.ktc_std)},

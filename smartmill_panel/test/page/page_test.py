@@ -37,8 +37,26 @@ class Machine:
         for topic, kind in (("goal", msg.MeasureFrfActionGoal), ("feedback", msg.MeasureFrfActionFeedback)):  # as an action's client and server
             name = "hammer/measure_frf/" + topic
             self.publishers[name] = rospy.Publisher("/smartmill/" + name, kind, queue_size=10)
+        self.requests = []
+        from smartmill_msgs.srv import FindCoefficients
+        self.service = rospy.Service("/smartmill/loadmeter/find_coefficients", FindCoefficients, self.find)
         self.thread = threading.Thread(target=self.run, daemon=True)
         self.thread.start()
+
+    def find(self, request):
+        from smartmill_msgs.srv import FindCoefficientsResponse
+        m, nan = self.msg, math.nan
+        self.requests.append((request.tool, request.material))
+        if request.material != "al7050":
+            return FindCoefficientsResponse(code=1, message=f"no records for '{request.tool}' in '{request.material}'; known: end_mill / al7050",
+                                            database="/data/mill.sqlite")
+        found = m.CuttingCoefficients(tool="end_mill", material="al7050", ktc=796.4e6, krc=nan, kac=nan, kte=27.7e3, kre=nan, kae=nan, ktc_std=4.2e6,
+                                      krc_std=nan, kac_std=nan, kte_std=800.0, kre_std=nan, kae_std=nan, source="load_meter", test_count=8)
+        test = m.CuttingCondition(kind=2, spindle_speed=2 * math.pi * 100, feed_per_tooth=2e-4, axial_depth=1.5e-3, entry_angle=math.pi / 2,
+                                  exit_angle=math.pi, teeth=3, helix=math.radians(40))
+        return FindCoefficientsResponse(message="8 tests in 2 identifications", coefficients=found, of_pair=True, database="/data/mill.sqlite",
+                                        identifications=2, production_cuts=5, cutting_speed=[1.0, 2.5], feed_per_tooth=[5e-5, 2e-4],
+                                        axial_depth=[1e-3, 1e-3], edge_age=[nan, nan], next_test=test, next_std=[2.1e6, 400.0])
 
     def publish(self, topic, message, latch=False):
         if topic not in self.publishers:
@@ -219,6 +237,24 @@ def values_are_the_topics(browser, machine):
     browser.wait("document.querySelector('#steps td')")
     becomes(lambda: browser.js("[...document.querySelectorAll('#steps tbody tr')].map(e => e.children[0].textContent + ' ' + e.children[1].textContent)"),
           ["done connect", "running slot test"])
+
+
+def database_answers_and_fills_the_chart(browser, machine):
+    browser.js("(location.hash = 'model', 1)")
+    cells = "[...document.querySelectorAll(arguments[0])].map(e => e.textContent)"
+    becomes(lambda: browser.js(cells, "#knowledge-coefficients td"), ["Ktc", "796 ± 4", "N/mm²", "Kte", "27.7 ± 0.8", "N/mm"])
+    assert machine.requests[0] == ("end_mill", "al7050"), machine.requests
+    becomes(lambda: browser.js(cells, "#knowledge-covered td"),
+          ["Cutting speed", "60 … 150", "m/min", "Feed per tooth", "0.050 … 0.200", "mm", "Axial depth", "1.00 … 1.00", "mm"])
+    becomes(lambda: browser.text("#knowledge-file"), "Database: /data/mill.sqlite")
+    becomes(lambda: "half immersion, down milling, 6000 rpm, 0.200 mm per tooth, 1.50 mm deep; then Ktc ± 2.1 N/mm², Kte ± 0.40 N/mm"
+            in browser.text("#knowledge-next"), True)
+    browser.js("(document.querySelector('#knowledge-use').click(), 1)")
+    for key, value in (("depth", "1.5"), ("feed", "0.2"), ("teeth", "3"), ("helix", "40"), ("width", "50")):
+        becomes(lambda: browser.js("document.querySelector('#what-if-' + arguments[0]).value", key), value)
+    browser.js("(location.hash = 'model', document.querySelector('#knowledge-material').value = 'steel',"
+               " document.querySelector('#knowledge-show').click(), 1)")
+    becomes(lambda: browser.text("#knowledge p"), "no records for 'end_mill' in 'steel'; known: end_mill / al7050")
 
 
 def messages_are_decoded_as_by_ros(browser, machine):
@@ -499,6 +535,7 @@ def main():
             browser.resize(*SIZES["1280x800"])
             browser.open(bench.address)
             bench.case(values_are_the_topics, browser, machine)
+            bench.case(database_answers_and_fills_the_chart, browser, machine)
             bench.case(messages_are_decoded_as_by_ros, browser, machine)
             bench.case(force_and_spectrum_are_those_of_the_machine, browser)
             bench.case(every_view_is_drawn, browser)

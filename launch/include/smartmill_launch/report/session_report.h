@@ -88,4 +88,8 @@ std::string markdown(const Report& report);
 /// The report as JSON. @param session JSON text of the session, included; empty: none
 std::string json(const Report& report, const std::string& session);
 
+/// Length of the test plan with the knowledge of the database, and the stored coefficients next to those with
+/// the new tests. @param session JSON summary; empty: no notes
+std::vector<std::string> testPlanNotes(const std::string& session);
+
 }  // namespace smartmill::report

@@ -33,6 +33,9 @@ struct CoefficientRecord {
   double axial_depth = UNKNOWN;            ///< [m] mean of the cuts
   double entry = UNKNOWN, exit = UNKNOWN;  ///< [rad]
   double edge_age = UNKNOWN;               ///< [s] cutting time of the edge
+  double first_stamp = UNKNOWN;            ///< [s] of the first test used; independent records do not overlap
+  double flank_wear = UNKNOWN;             ///< [m] width of flank wear land
+  double temperature = UNKNOWN;            ///< [K] of the spindle during the tests
   std::string bag;                         ///< source bag or campaign
   std::string version;                     ///< of the software; set by add()
   /// Upper triangle of the covariance, row by row, in the order ktc, krc, kac, kte, kre, kae [SI]; NaN:
@@ -80,7 +83,25 @@ struct CoefficientEstimate {
 
 struct RecordKind;
 struct Row;
+class RecordStore;
 class SqliteStore;
+
+/// Model improvements and spindle health next to the coefficients. A view of the database.
+class EvidenceRecords {
+ public:
+  EvidenceRecords(RecordStore& store, const std::string& file) : store_(store), file_(file) {}
+
+  /// @{ One transaction. @return number of new records. @throws Error when they cannot be written.
+  std::size_t add(const std::vector<ModelImprovement>& improvements) const;
+  std::size_t add(const std::vector<HealthRecord>& health) const;
+  /// @}
+  std::vector<ModelImprovement> improvements() const;  ///< oldest first
+  std::vector<HealthRecord> health() const;            ///< oldest first
+
+ private:
+  RecordStore& store_;
+  const std::string& file_;  // for messages
+};
 
 /// Synchronisation of a machine's file with fleets, each of which is named by its identity. Records of each
 /// kind are numbered in the order of insertion. A view of the database.
@@ -125,11 +146,8 @@ class CoefficientDatabase {
   /// @return false when the record exists already. @throws Error when it cannot be written.
   bool add(const CoefficientRecord& record);
   bool add(const CoefficientSet& set);
-  /// @{ One transaction. @return number of new records.
+  /// One transaction. @return number of new records.
   std::size_t add(const std::vector<CoefficientRecord>& records);
-  std::size_t add(const std::vector<ModelImprovement>& improvements);
-  std::size_t add(const std::vector<HealthRecord>& health);
-  /// @}
 
   /// Newest set of this tool and material; empty text matches any.
   std::optional<CoefficientSet> find(const std::string& tool, const std::string& material) const;
@@ -142,8 +160,6 @@ class CoefficientDatabase {
   /// Oldest first. Empty text matches any.
   std::vector<CoefficientRecord> records(const std::string& tool, const std::string& material) const;
   std::size_t size() const;
-  std::vector<ModelImprovement> improvements() const;  ///< oldest first
-  std::vector<HealthRecord> health() const;            ///< oldest first
 
   /// Copies the records of another machine's file. @return number of new records.
   std::size_t merge(const std::string& file);
@@ -152,28 +168,19 @@ class CoefficientDatabase {
   std::string contents() const;
 
   const std::string& file() const;
+  /// @throws Error when the content of the file is damaged.
+  void check() const;
 
+  EvidenceRecords evidence() const;
   /// Of a file; not of a server.
   FleetSynchronisation synchronisation() const;
 
  private:
-  std::size_t add(const RecordKind& kind, const std::vector<Row>& rows);
-  std::vector<Row> rows(const RecordKind& kind) const;
   std::vector<CoefficientRecord> near(const std::string& tool, const CoefficientQuery& query) const;
 
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
-
-struct FoundCoefficients {
-  std::optional<CoefficientSet> set;
-  std::string message;  ///< one line: their origin, or the known pairs
-};
-
-/// Answer of the service: the newest set of the pair, or the estimate from other tools in the material with a
-/// larger uncertainty. @throws Error when the database cannot be read.
-FoundCoefficients findCoefficients(const CoefficientDatabase& database, const std::string& tool,
-                                   const std::string& material);
 
 /// @{ Records as CSV (one header row, name[unit]) or YAML (smartmill-coefficients/1) with 17 digits, so that
 /// export and import are lossless. @throws Error with file, line or key, and value.

@@ -36,6 +36,8 @@ struct LoadRecordOptions {
   /// Adds Stribeck friction, warm-up, edge growth, runout or another load-meter lag when the records
   /// disagree.
   bool choose_terms = true;
+  /// [1] >= 2, least number of different feeds; the third is a check of the regression.
+  std::size_t least_feeds = 3;
 };
 
 struct LoadRecordResult {

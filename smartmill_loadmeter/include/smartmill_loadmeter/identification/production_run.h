@@ -24,6 +24,11 @@ class ProductionRun {
 
   /// Since the last change of tool or material; empty before a cut with known friction.
   const std::optional<RecursiveCoefficients>& estimate() const { return estimate_; }
+  /// [s] cutting time of a tool's edge since the start of the node; NaN: no cut with it.
+  double edgeAge(const std::string& tool) const {
+    const auto found = edge_age_.find(tool);
+    return found == edge_age_.end() ? CoefficientRecord::UNKNOWN : found->second;
+  }
   void clear() { estimate_.reset(); }  ///< the ages of the edges remain
 
  private:

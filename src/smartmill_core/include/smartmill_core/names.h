@@ -20,6 +20,7 @@ constexpr const char* TOOL_FRF = "tool/frf";
 constexpr const char* TOOL_MODES = "tool/modes";
 constexpr const char* SPINDLE_HEALTH = "hammer/health";
 constexpr const char* COEFFICIENTS = "material/coefficients";
+constexpr const char* COEFFICIENT_PRIOR = "material/prior";
 constexpr const char* FORCE_CURVE = "material/force_curve";
 constexpr const char* FORCE_MEASURED = "force/measured";
 constexpr const char* FORCE_COMPENSATED = "force/compensated";
@@ -73,6 +74,9 @@ constexpr const char* FIND_COEFFICIENTS = "loadmeter/find_coefficients";
 constexpr const char* PREDICT_STABILITY = "stability/predict";
 constexpr const char* WHAT_IF = "stability/what_if";
 constexpr const char* REPLAY_CONTROL = "replay/control";
+
+/// Ends the source of coefficients that were combined with those of the database.
+constexpr const char* WITH_STORED = " and database";
 
 /// Topic of a signal of the data acquisition, e.g. daq/vibration.
 inline std::string daq(const std::string& signal) {

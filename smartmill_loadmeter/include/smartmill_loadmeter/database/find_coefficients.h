@@ -1,0 +1,36 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_loadmeter/database/knowledge.h"
+#include "smartmill_loadmeter/identification/test_information.h"
+
+namespace smartmill::loadmeter {
+
+/// Answer of the service loadmeter/find_coefficients.
+struct FoundCoefficients {
+  std::optional<CoefficientKnowledge> known;  ///< of the pair
+  /// Without records of the pair: from other tools and materials, by the methods of recommendCut().
+  std::optional<CoefficientSet> predicted;
+  std::vector<std::size_t> needed;  ///< indices of the planned tests; all without knowledge of the pair
+  std::array<double, 2> planned_std{{CoefficientRecord::UNKNOWN, CoefficientRecord::UNKNOWN}};
+  std::optional<SuggestedCut> next;  ///< cut that would reduce the uncertainty most
+  CuttingCondition next_condition;   ///< the same with tool and material
+  std::string message;               ///< one line: origin of the coefficients, or the known pairs
+};
+
+/// Knowledge of a tool in a material; the planned tests that it makes unnecessary; the next test. The next
+/// test has speed and feed within a factor of two of those covered, their depth, so that it is as stable as
+/// they were, and stays within speed, torque and power of the model's spindle.
+/// @param tests planned air cuts and cuts; may be empty
+/// @throws Error when the database cannot be read.
+FoundCoefficients findCoefficients(const CoefficientDatabase& database, const std::string& tool,
+                                   const std::string& material, const std::vector<CuttingCondition>& tests,
+                                   const MachineModel& model);
+
+}  // namespace smartmill::loadmeter
