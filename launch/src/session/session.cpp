@@ -346,6 +346,7 @@ void Session::identifyFromTests() {
     step("stored coefficients disagree", [&] { return std::string("the other tests are made"); });
     runTests(others);
     step("cutting coefficients from all tests", [&] { return identify(false); });
+    plan.used = isUsed();
   }
   step("test plan", [&] { return plan.text(); });
 }
