@@ -186,6 +186,12 @@ void Session::calibrateSensor() {
     step(dynamics.name, [&] { return sensor_.run(dynamics, parameters_.frf_timeout); });
   }
   sensor_.requireCalibrated();
+  const auto verdict = [this] {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return verdict_.has_value();
+  };
+  if (!waitUntil(verdict, parameters_.ready_timeout))
+    throw Error(std::string("force sensor: calibrated, but no verdict on ") + names::CHATTER_STATE);
   log_.summary.calibration_time = log_.elapsed() - began;
 }
 
@@ -226,7 +232,9 @@ std::string Session::missing() {
     if ((ros::WallTime::now() - time).toSec() > FRESH) add("data on " + topic);
   }
   if (!driver_.state().connected) add("the controller's connection");
-  if (!verdict_) add(std::string("a verdict on ") + names::CHATTER_STATE);
+  // The detector needs forces, which a sensor that is not calibrated yet does not give.
+  if (!verdict_ && parameters_.calibration.kind() == ForceSensorKind::table)
+    add(std::string("a verdict on ") + names::CHATTER_STATE);
   return text;
 }
 
