@@ -1,21 +1,18 @@
-// Dunwoody chapter 5: the dynamometer beyond its first mode.
+// Dunwoody chapter 5 on a dynamometer that is not of the filter's class.
 
 #include <array>
 #include <cmath>
 #include <complex>
-#include <random>
 #include <string>
 #include <vector>
 
+#include "gallery/dynamometer_rig.h"
 #include "gallery/gallery.h"
 #include "smartmill_core/axis_names.h"
-#include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/io/gnuplot.h"
-#include "smartmill_core/modal/modal_filter.h"
 #include "smartmill_core/signal/fourier.h"
 #include "smartmill_core/signal/statistics.h"
-#include "smartmill_core/testing/reference_case.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/compensation/campaign_compensation.h"
 #include "smartmill_kalman/filter/harmonic_filter.h"
@@ -27,77 +24,48 @@ using kalman::HarmonicFilter;
 using kalman::HarmonicFilterParameters;
 using Rows = std::vector<std::vector<double>>;
 
-constexpr double RATE = 25600.0;
-constexpr std::size_t OVERSAMPLED = 4;
-
-/// One dominant mode per axis, x at 930 Hz as in section 5.3, and a higher one; the rest is not printed.
-ModalModel dynamometer(std::size_t axis) {
-  ModalModel sensor;
-  sensor.modes = axis == 0 ? std::vector<Mode>{{930.0, 0.03, 0.85}, {2450.0, 0.04, 0.10}}
-                           : std::vector<Mode>{{1080.0, 0.03, 0.85}, {2700.0, 0.04, 0.10}};
-  sensor.direct = 0.05;
-  return sensor;
-}
-
-/// The slot of section 5.3: four flutes; tool, depth and material are not printed.
-MechanisticForce slot() {
-  return {{4, 19.05e-3, units::radFromDeg(30.0), {}},
-          {796e6, 168e6, 222e6, 27.7e3, 30.8e3, 1.4e3},
-          {0.0, units::PI, 2e-3, 6e-5}};
-}
-
-double along(const CuttingForce& force, std::size_t axis) {
-  return axis == 0 ? force.fx : force.fy;
-}
+constexpr double RATE = DynamometerRig::RATE;
 
 /// True, measured and compensated force of a steady slot over the spindle angle [rad].
 struct Cut {
   std::vector<double> angle, truth, measured, compensated;
 };
 
-Cut cutAt(double rpm, std::size_t axis, const ModalModel& believed, unsigned seed) {
-  const double speed = units::radPerSecFromRpm(rpm);
-  ModalFilter sensor(dynamometer(axis), OVERSAMPLED * RATE, Hold::first_order);
-  HarmonicFilter filter(believed, speed, RATE, {});
-  std::mt19937 random(seed);
-  std::normal_distribution<double> noise(0.0, 1.0);
-  const MechanisticForce process = slot();
+/// The last eight revolutions of a cut, after the filter has settled.
+Cut cutAt(double rpm, std::size_t axis, const ModalModel& sensor, unsigned seed) {
   const auto revolution = static_cast<std::size_t>(60.0 / rpm * RATE);
   const std::size_t settled = static_cast<std::size_t>(0.5 * RATE) + 8 * revolution;
+  const DynamometerRig::Cut record = DynamometerRig::slot(rpm, settled + 8 * revolution, seed);
+  HarmonicFilter filter(sensor, units::radPerSecFromRpm(rpm), RATE, {});
   Cut cut;
-  for (std::size_t i = 0; i < settled + 8 * revolution; ++i) {
-    double measured = 0.0, truth = 0.0;
-    for (std::size_t fine = 1; fine <= OVERSAMPLED; ++fine) {
-      const double t = (static_cast<double>(i) + static_cast<double>(fine) / OVERSAMPLED) / RATE;
-      truth = along(process.at(speed * t), axis);
-      measured = sensor.step(truth);
-    }
-    measured += noise(random);
-    const double compensated = filter.step(measured);
+  for (std::size_t i = 0; i < record.angle.size(); ++i) {
+    const double compensated = filter.step(record.measured[axis][i]);
     if (i < settled) continue;
-    cut.angle.push_back(std::fmod(speed * static_cast<double>(i + 1) / RATE, units::TWO_PI));
-    cut.truth.push_back(truth);
-    cut.measured.push_back(measured);
+    cut.angle.push_back(record.angle[i]);
+    cut.truth.push_back(record.applied[axis][i]);
+    cut.measured.push_back(record.measured[axis][i]);
     cut.compensated.push_back(compensated);
   }
   return cut;
 }
 
-/// Sensor models from nine taps per axis, identified by the product.
-ModalModel identified(std::size_t axis, FrequencyResponse* measured = nullptr) {
-  ReferenceCase reference;
-  reference.sensor = dynamometer(axis);
-  const ReferenceTaps taps = simulateTaps(reference, 9);
-  if (measured != nullptr) *measured = kalman::averagedFrf(taps.hammer, taps.response, reference.sample_rate);
-  return kalman::identifySensor(taps.hammer, taps.response, reference.sample_rate, {100.0, 5000.0, 4}).model;
+/// Sensor model of an axis from nine taps, identified by the product as shipped.
+ModalModel identified(std::size_t axis, unsigned seed, FrequencyResponse* measured = nullptr) {
+  const DynamometerRig::Taps taps = DynamometerRig::taps(axis, 9, seed);
+  if (measured != nullptr) *measured = kalman::averagedFrf(taps.hammer, taps.response, RATE);
+  return kalman::identifySensor(taps.hammer, taps.response, RATE, {}).model;
+}
+
+double rangeOf(const std::vector<double>& force) {
+  return percentile(force, 0.9) - percentile(force, 0.1);
 }
 
 /// Figures 5.2 and 5.3 with 5.4 and 5.5.
-Drawn transferFunctions(const std::string& folder, unsigned) {
+Drawn transferFunctions(const std::string& folder, unsigned seed) {
   Drawn drawn;
   for (std::size_t axis = 0; axis < 2; ++axis) {
     FrequencyResponse frf;
-    const ModalModel sensor = identified(axis, &frf);
+    const ModalModel sensor = identified(axis, seed, &frf);
     // Linear and time-invariant: an impulse response gives the complete FRF.
     HarmonicFilterParameters parameters;
     parameters.memory_revolutions = parameters.settling_revolutions;
@@ -115,8 +83,8 @@ Drawn transferFunctions(const std::string& folder, unsigned) {
     double at_tooth = 0.0;
     for (std::size_t i = 0; i < lines.size() && lines[i] < 5000.0; ++i) {
       if (lines[i] < 50.0) continue;
-      gains.push_back(
-          {lines[i], std::abs(spectrum[i]), std::abs(spectrum[i] * dynamometer(axis).response(lines[i]))});
+      gains.push_back({lines[i], std::abs(spectrum[i]),
+                       std::abs(spectrum[i] * DynamometerRig::response(axis, lines[i]))});
       if (std::abs(lines[i] - 930.0) < 0.5 * lines[1]) at_tooth = gains.back()[2];
     }
     const std::string png = folder + "/dunwoody_5_2_" + AXIS_NAMES[axis] + ".png";
@@ -137,11 +105,11 @@ Drawn transferFunctions(const std::string& folder, unsigned) {
     plot.draw();
     drawn.pictures.push_back(png);
     drawn.rows.push_back(
-        {Kind::restated,
+        {Kind::reproduced,
          formatted("sensor and filter together at 930 Hz, axis %s, figures 5.4, 5.5", AXIS_NAMES[axis]),
          "1 (drawn)", formatted("%.3f", at_tooth),
          std::abs(at_tooth - 1.0) < 0.05 ? Verdict::agrees : Verdict::differs,
-         "the product's own modes make the taps and the cut, and its filter inverts them"});
+         "a dynamometer of 51 modes, tapped 5 mm below the cut, against the filter's four"});
   }
   return drawn;
 }
@@ -159,7 +127,7 @@ double waveformError(const Cut& cut, const std::vector<double>& estimated) {
 Drawn atResonance(const std::string& folder, unsigned seed) {
   Drawn drawn;
   for (std::size_t axis = 0; axis < 2; ++axis) {
-    const ModalModel sensor = identified(axis);
+    const ModalModel sensor = identified(axis, seed);
     const Cut fast = cutAt(13950.0, axis, sensor, seed), slow = cutAt(750.0, axis, sensor, seed);
     const auto rowsOf = [](const Cut& cut) {
       Rows rows;
@@ -186,35 +154,42 @@ Drawn atResonance(const std::string& folder, unsigned seed) {
     plot << "\n";
     plot.draw();
     drawn.pictures.push_back(png);
-    const double error = waveformError(fast, fast.compensated);
-    drawn.rows.push_back({Kind::another_machine,
-                          formatted("waveform at 13,950 rpm, axis %s, figures 5.6, 5.7", AXIS_NAMES[axis]),
-                          "right amplitude, waveform \"less well\"",
-                          formatted("rms error %.1f %% (measured %.0f %%)", 100.0 * error,
-                                    100.0 * waveformError(fast, fast.measured)),
-                          Verdict::shown,
-                          "the filter contains harmonics to 5 kHz and both modes; the sensor of the thesis "
-                          "could not be modelled above its first mode"});
+    const double amplitude = rangeOf(fast.compensated) / rangeOf(slow.measured);
+    drawn.rows.push_back(
+        {Kind::reproduced,
+         formatted("range at 13,950 rpm over that of the test at 750 rpm, axis %s, figures "
+                   "5.6, 5.7",
+                   AXIS_NAMES[axis]),
+         "\"correct overall amplitude\"",
+         formatted("%.3f (measured %.2f)", amplitude, rangeOf(fast.measured) / rangeOf(slow.measured)),
+         std::abs(amplitude - 1.0) < 0.05 ? Verdict::agrees : Verdict::differs,
+         "as in section 5.3, the reference is the measured force at 750 rpm"});
+    drawn.rows.push_back(
+        {Kind::another_machine,
+         formatted("waveform at 13,950 rpm, axis %s, figures 5.6, 5.7", AXIS_NAMES[axis]), "\"less well\"",
+         formatted("rms error %.1f %% (measured %.0f %%)", 100.0 * waveformError(fast, fast.compensated),
+                   100.0 * waveformError(fast, fast.measured)),
+         Verdict::shown,
+         "against the applied force; the filter contains harmonics to 5 kHz and four modes, "
+         "the sensor of the thesis could not be modelled above its first one"});
   }
   return drawn;
 }
 
 /// Figures 5.8 and 5.9: six speeds from 50 to 1200 Hz of tooth passing.
 Drawn ranges(const std::string& folder, unsigned seed) {
-  const auto range = [](const std::vector<double>& v, double share) { return percentile(v, share); };
   Drawn drawn;
   for (std::size_t axis = 0; axis < 2; ++axis) {
-    const ModalModel sensor = identified(axis);
+    const ModalModel sensor = identified(axis, seed);
     Rows rows;
     double worst = 0.0, worst_raw = 0.0;
     for (const double rpm : {750.0, 4500.0, 9000.0, 13950.0, 16200.0, 18000.0}) {
       const Cut cut = cutAt(rpm, axis, sensor, seed);
-      const auto span = [&](const std::vector<double>& v) { return range(v, 0.9) - range(v, 0.1); };
-      rows.push_back({rpm / 15.0, range(cut.measured, 0.1), range(cut.measured, 0.9),
-                      range(cut.compensated, 0.1), range(cut.compensated, 0.9), range(cut.truth, 0.1),
-                      range(cut.truth, 0.9)});
-      worst = std::max(worst, std::abs(span(cut.compensated) / span(cut.truth) - 1.0));
-      worst_raw = std::max(worst_raw, std::abs(span(cut.measured) / span(cut.truth) - 1.0));
+      rows.push_back({rpm / 15.0, percentile(cut.measured, 0.1), percentile(cut.measured, 0.9),
+                      percentile(cut.compensated, 0.1), percentile(cut.compensated, 0.9),
+                      percentile(cut.truth, 0.1), percentile(cut.truth, 0.9)});
+      worst = std::max(worst, std::abs(rangeOf(cut.compensated) / rangeOf(cut.truth) - 1.0));
+      worst_raw = std::max(worst_raw, std::abs(rangeOf(cut.measured) / rangeOf(cut.truth) - 1.0));
     }
     const std::string png = folder + "/dunwoody_5_8_" + AXIS_NAMES[axis] + ".png";
     Gnuplot plot(png, 900, 500, 12);
@@ -233,12 +208,14 @@ Drawn ranges(const std::string& folder, unsigned seed) {
     plot.draw();
     drawn.pictures.push_back(png);
     drawn.rows.push_back(
-        {Kind::restated,
+        {Kind::reproduced,
          formatted("range of the force over 50 .. 1200 Hz, axis %s, figures 5.8, 5.9", AXIS_NAMES[axis]),
          "\"approximately constant\"",
          formatted("within %.1f %% (measured %.0f %%)", 100.0 * worst, 100.0 * worst_raw),
          worst < 0.05 ? Verdict::agrees : Verdict::differs,
-         "six speeds of section 5.3; the simulated sensor is of the filter's class"});
+         "six speeds of section 5.3; beyond 5 % where the tooth passes the resonance of the other axis, of "
+         "which 1 % "
+         "is in this channel and not in its sensor model"});
   }
   return drawn;
 }

@@ -50,6 +50,9 @@ const std::set<std::string>& disagreements() {
   static const std::set<std::string> all{
       // The tables of the document contradict each other.
       "cYx by the line of table 3", "cYz by the line of table 3",
+      // 1 % of the other axis, whose resonance at 930 or 1080 Hz is 14 times as large, is not in a model by
+      // axis.
+      "range of the force over 50 .. 1200 Hz, axis x", "range of the force over 50 .. 1200 Hz, axis y",
       // The taps of the simulated sensor bound no Q at most speeds; his conclusions from them do not arise.
       "best Q of a plant 2, 3 deviations off, x", "best Q of a plant 2, 3 deviations off, y",
       "best Q of the cuts over that of the taps, x", "best Q of the cuts over that of the taps, y",

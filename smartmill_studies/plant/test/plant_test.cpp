@@ -6,6 +6,7 @@
 
 #include "plant/beam.h"
 #include "plant/draw.h"
+#include "plant/elastic_dynamometer.h"
 #include "plant/front.h"
 #include "plant/machine.h"
 #include "plant/oscillator.h"
@@ -120,6 +121,46 @@ TEST(PlateSensor, ShowsAForceAtRestAsItIs) {
       EXPECT_NEAR(sum, c == a ? 1.0 : 0.0, 1e-9);
     }
   }
+}
+
+// At rest the sensor shows the force. A short stiff body on a heavy table: sqrt(k / m) / 2 pi; a beam on a
+// heavy plate: a clamped bar.
+TEST(ElasticDynamometer, ShowsAForceAtRestAsItIsAndHasTheModesOfItsLimits) {
+  ElasticDynamometer d;
+  d.beams = {{0.1, 0.05, 0.02, 210e9, 7850.0}, {0.06, 0.1, 0.03, 70e9, 2700.0}};
+  d.plate_mass = 14.0;
+  d.plate_inertia = 0.05;
+  d.stiffness = 8e8;
+  d.stiffness_tilting = 1e7;
+  d.table_mass = 600.0;
+  d.table_stiffness = 1e8;
+  const auto staticSum = [](const ElasticDynamometer& on, double height) {
+    double sum = 0.0;
+    for (const SensorMode& m : modesOf(on, 0, height)) sum += m.output[0] * m.input[0];
+    return sum;
+  };
+  for (const double height : {0.1, 0.05, 0.0}) EXPECT_NEAR(staticSum(d, height), 1.0, 1e-6) << height;
+
+  ElasticDynamometer rigid = d;
+  rigid.beams = {{0.001, 0.01, 0.01, 210e9, 7850.0}};
+  rigid.table_mass = 1e6;
+  rigid.stiffness_tilting = 1e10;
+  const auto modes = modesOf(rigid, 1, 0.001);
+  const auto main =
+      std::max_element(modes.begin(), modes.end(), [](const SensorMode& a, const SensorMode& b) {
+        return a.output[1] * a.input[1] < b.output[1] * b.input[1];
+      });
+  EXPECT_NEAR(main->frequency / (std::sqrt(d.stiffness / d.plate_mass) / units::TWO_PI), 1.0, 1e-4);
+
+  ElasticDynamometer clamped = d;
+  clamped.beams.resize(1);
+  clamped.plate_mass = clamped.plate_inertia = 1e6;
+  const double section = std::sqrt(210e9 / 7850.0 / 12.0) * 0.02;  // sqrt(E I / (rho A)) [m2/s]
+  const double bar = 1.87510 * 1.87510 / units::TWO_PI * section / 0.01;
+  const auto bars = modesOf(clamped, 0, 0.1);
+  EXPECT_TRUE(std::any_of(bars.begin(), bars.end(), [bar](const SensorMode& m) {
+    return std::abs(m.frequency / bar - 1.0) < 1e-4;
+  })) << bar;
 }
 
 TEST(OscillatorTest, AnswersAStepAndAResonantForceAsTheClosedFormsSay) {
