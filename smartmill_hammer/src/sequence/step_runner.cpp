@@ -17,7 +17,8 @@ StepOutcome StepRunner::handle(double now, ControlEvent event) {
   if (std::holds_alternative<MotionDone>(event)) return proceed(now, step.motionDone(now));
   if (const auto* voltage = std::get_if<MeanVoltage>(&event))
     return proceed(now, step.voltageMeasured(now, *voltage));
-  if (auto* hit = std::get_if<RecordedHit>(&event)) return proceed(now, step.hitRecorded(now, std::move(*hit)));
+  if (auto* hit = std::get_if<RecordedHit>(&event))
+    return proceed(now, step.hitRecorded(now, std::move(*hit)));
   return StepOutcome::running();
 }
 

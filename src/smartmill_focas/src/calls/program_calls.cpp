@@ -129,8 +129,7 @@ void addProgramCalls(ProgramsInterface& memory, CallTable& table) {
   table.add(OP_PROGRAM_LIST, [&](const SubRequest& r, Writer& out) { return programList(memory, r, out); });
   table.add(OP_FOLDER_COUNT, [&](const SubRequest& r, Writer& out) { return folderCount(memory, r, out); });
   table.add(OP_FOLDER_LIST, [&](const SubRequest& r, Writer& out) { return folderList(memory, r, out); });
-  table.addReply(OP_FOLDER,
-                 [&](const SubRequest&, Writer& out) { out.text(PROGRAM_FOLDER, PATH_WIDTH); });
+  table.addReply(OP_FOLDER, [&](const SubRequest&, Writer& out) { out.text(PROGRAM_FOLDER, PATH_WIDTH); });
 }
 
 }  // namespace smartmill::focas
