@@ -181,8 +181,9 @@ void Session::calibrateSensor() {
     }
   }
   if (kind == ForceSensorKind::spindle) {
-    CalibrationStage dynamics{"cross-talk of the spindle sensor", {CalibrationStep()}};
+    CalibrationStage dynamics{"cross-talk of the spindle sensor", {CalibrationStep(), CalibrationStep()}};
     dynamics.steps.front().kind = CalibrationStep::Kind::fit;
+    dynamics.steps.back().kind = CalibrationStep::Kind::verify;  // of what is in use from now on
     step(dynamics.name, [&] { return sensor_.run(dynamics, parameters_.frf_timeout); });
   }
   sensor_.requireCalibrated();

@@ -25,7 +25,7 @@ void SessionLog::record(const char* mark, const std::string& name, const std::st
 }
 
 void SessionLog::request(const std::string& text) {
-  std::printf("session [%6.1f s] ask  %s\n", elapsed(), text.c_str());
+  std::printf("session [%6.1f s] todo %s\n", elapsed(), text.c_str());
   std::fflush(stdout);
   publish(text);
 }

@@ -20,7 +20,7 @@ class SessionLog {
   /// Publishes the steps so far. @param running name of the step in progress; empty: none
   void publish(const std::string& running, bool ended = false);
 
-  /// Asks the operator, as the step in progress.
+  /// Requests an action of the operator, as the step in progress.
   void request(const std::string& text);
   double elapsed() const { return (ros::WallTime::now() - begin_).toSec(); }  ///< [s]
 

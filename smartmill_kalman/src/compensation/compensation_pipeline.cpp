@@ -273,6 +273,10 @@ void CompensationPipeline::applyCalibration(CalibrationResult result) {
     try {
       spindle_.emplace(*result.calibration, spindle_length_);
       if (condition_) spindle_->handle(*condition_);
+      const CalibrationResult here = SpindleSensorCalibrator::describe(*result.calibration, spindle_length_);
+      result.constant = here.constant;
+      result.constant_std = here.constant_std;
+      result.error = here.error;
       changed = calibrated_here_ = true;
     } catch (const Error& e) {
       result.message += std::string("; not in use: ") + e.what();
