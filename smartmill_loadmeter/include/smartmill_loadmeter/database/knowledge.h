@@ -23,7 +23,8 @@ struct CoveredRange {
   void add(double value);
 };
 
-/// Content of the database about a tool in a material (database that compiles itself, document 004, section 4).
+/// Content of the database about a tool in a material (database that compiles itself, document 004, section
+/// 4).
 struct CoefficientKnowledge {
   CoefficientRecord combined;   ///< values, standard deviations, covariance; tests of all combined records
   int identifications = 0;      ///< combined; 0: production cuts only
