@@ -84,7 +84,7 @@ struct CalibrationServer::Impl {
     if (file.empty()) return;
     writeSpindleSensor(calibration, file);
     std::ofstream table(file + ".csv");
-    table << pipeline.calibrator().measurementTable();
+    table << pipeline.identification().calibrator().measurementTable();
     table.close();
     if (!table) throw Error(file + ".csv: cannot write");
   }
@@ -131,7 +131,8 @@ void CalibrationServer::finish(const CalibrationResult& result) {
   message.error.z = result.error[2];
   try {
     if (result.calibration) impl_->write(*result.calibration);
-    if (result.matrix && !impl_->file.empty()) writeTapFile(impl_->pipeline.plate().taps(), impl_->file);
+    if (result.matrix && !impl_->file.empty())
+      writeTapFile(impl_->pipeline.identification().plate().taps(), impl_->file);
   } catch (const Error& e) {
     message.code = message.FIT_FAILED;
     message.message = e.what();
@@ -141,7 +142,7 @@ void CalibrationServer::finish(const CalibrationResult& result) {
 
 void CalibrationServer::abort(const std::string& reason) {
   if (!impl_->active) return;
-  const bool running = impl_->pipeline.calibrator().active();
+  const bool running = impl_->pipeline.identification().calibrator().active();
   impl_->end(resultOf(Code::bad_data, reason));
   if (running) impl_->pipeline.cancelCalibration();
 }

@@ -46,14 +46,10 @@ KalmanNode::KalmanNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
       calibration_server_(nh, pipeline_) {
   loadSensorFiles(pipeline_, parameters_);
   if (parameters_.inSpindle() && parameters_.spindle_sensor.empty()) {
-    pipeline_.allowUncalibrated();
+    pipeline_.forces().spindle().allowUncalibrated();
     ROS_WARN(
         "spindle_sensor: not set; no force is published until kalman/calibrate has calibrated the sensors");
   }
-  pipeline_.onRestart([this] {
-    measurement_server_.restart();
-    calibration_server_.restart();
-  });
   subscribe();
   shell_.diagnose("force compensation", [this](auto& status) { diagnose(status); });
   shell_.every(CHECK_PERIOD, [this] { checkInputs(); });
@@ -78,6 +74,10 @@ CompensationPipeline::Outputs KalmanNode::pipelineOutputs() {
     measurement_server_.finish(result);
   };
   outputs.calibration = [this](const CalibrationResult& result) { calibration_server_.finish(result); };
+  outputs.restart = [this] {
+    measurement_server_.restart();
+    calibration_server_.restart();
+  };
   outputs.block_error = [this](const std::string& reason) {
     ++failed_blocks_;
     last_failure_ = parameters_.force_input + ": block not compensated: " + reason;
@@ -185,7 +185,7 @@ void KalmanNode::checkMeasurement() {
   const std::string reason = "no data on " + dead->topic();
   if (shell_.inputs().watchdog(names::HAMMER).ended()) {
     pipeline_.hammerStopped(reason);
-  } else if (parameters_.command_machine && pipeline_.isMeasuring()) {
+  } else if (parameters_.command_machine && pipeline_.identification().isMeasuring()) {
     pipeline_.event([reason](SensorMeasurement& measurement) { measurement.end(FrfCode::bad_data, reason); });
     pipeline_.flush();
   }
@@ -195,7 +195,7 @@ void KalmanNode::checkMeasurement() {
 
 std::pair<int, std::string> KalmanNode::summary(const SpindleSensorHealth* spindle) {
   using Level = diagnostic_msgs::DiagnosticStatus;
-  const CompensationHealth health = pipeline_.health();
+  const CompensationHealth health = pipeline_.forces().health();
   // Events between two publications of the diagnostics are reported once, whatever the present state.
   const std::size_t invalid = spindle ? spindle->unloaded + spindle->overloaded : 0;
   if (std::exchange(reported_invalid_, invalid) != invalid)
@@ -206,7 +206,8 @@ std::pair<int, std::string> KalmanNode::summary(const SpindleSensorHealth* spind
     return {Level::ERROR, "force blocks were dropped: no transform of the force sensor for 20 s"};
   if (shell_.inputs().watchdog(parameters_.force_input).dead())
     return {Level::STALE, "no samples from the force sensor"};
-  if (pipeline_.isUncalibrated()) return {Level::ERROR, "the sensors in the spindle are not calibrated"};
+  if (pipeline_.forces().spindle().isUncalibrated())
+    return {Level::ERROR, "the sensors in the spindle are not calibrated"};
   if (!rotation_known_) return {Level::ERROR, "no transform of the force sensor"};
   if (health.gaps + health.not_finite + health.clipped > 0)
     return {Level::WARN, "samples were lost, clipped or not finite"};
@@ -220,13 +221,13 @@ std::pair<int, std::string> KalmanNode::summary(const SpindleSensorHealth* spind
     return {Level::WARN, "the zero of the sensor has drifted beyond drift_limit"};
   if (parameters_.model_max_age > 0.0 && pipeline_.ageOfModes() > parameters_.model_max_age)
     return {Level::WARN, "the measured modes are older than model_max_age: repeat the taps"};
-  if (pipeline_.isMeasuring()) return {Level::OK, "measuring the sensor"};
+  if (pipeline_.identification().isMeasuring()) return {Level::OK, "measuring the sensor"};
   return {Level::OK, health.speed > 0.0 ? "compensating" : "passing through"};
 }
 
 void KalmanNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
-  const CompensationHealth health = pipeline_.health();
-  const SpindleSensorHealth* spindle = pipeline_.spindleHealth();
+  const CompensationHealth health = pipeline_.forces().health();
+  const SpindleSensorHealth* spindle = pipeline_.forces().spindle().health();
   const auto [level, text] = summary(spindle);
   status.summary(static_cast<unsigned char>(level), text);
   status.add("spindle speed of the filters [rad/s]", health.speed);
@@ -250,8 +251,8 @@ void KalmanNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
                 1e6 * std::abs(spindle->unbalance[1]), 1e6 * std::abs(spindle->unbalance[2]));
     status.add("segments without cutting evaluated", spindle->air_segments);
   }
-  status.add("inputs out of order", pipeline_.late());
-  status.add("waiting for", pipeline_.waitingFor());
+  status.add("inputs out of order", pipeline_.sorter().late());
+  status.add("waiting for", pipeline_.sorter().waitingFor());
   status.add("last measurement of the sensor", measurement_server_.lastMessage());
   status.add("last calibration step", calibration_server_.lastMessage());
 }

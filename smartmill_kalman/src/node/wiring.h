@@ -19,13 +19,14 @@ void connect(Source& source, CompensationPipeline& pipeline) {
 
 /// Reads the sensor files that the parameters name. @throws Error on an invalid file.
 inline void loadSensorFiles(CompensationPipeline& pipeline, const NodeParameters& parameters) {
-  if (!parameters.sensor_matrix.empty()) pipeline.useMatrix(readSensorMatrix(parameters.sensor_matrix));
+  if (!parameters.sensor_matrix.empty())
+    pipeline.forces().useMatrix(readSensorMatrix(parameters.sensor_matrix));
   if (!parameters.plate_taps.empty()) {
     const TapRecords records = readTapFile(parameters.plate_taps);
-    pipeline.useTransferMatrix(identifyTransferMatrix(records.taps, records.rate),
-                               parameters.compensation.filter.bandwidth);
+    pipeline.forces().useTransferMatrix(identifyTransferMatrix(records.taps, records.rate),
+                                        parameters.compensation.filter.bandwidth);
   }
-  pipeline.setSpindleSensorLength(parameters.spindle_sensor_length);
+  pipeline.forces().spindle().setLength(parameters.spindle_sensor_length);
   if (!parameters.spindle_sensor.empty()) {
     pipeline.useSpindleSensor(readSpindleSensor(parameters.spindle_sensor), parameters.spindle_sensor_length);
   }

@@ -106,8 +106,8 @@ void compensateWholeCut(BagCut& cut, Method method, const CompensationPipeline& 
                         const HarmonicFilterParameters& parameters) {
   if (!needsWholeRecord(method) || !(cut.speed > 0.0)) return;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    cut.compensated[axis] = compensateRecord(method, cut.measured[axis], pipeline.sensor(axis), cut.speed,
-                                             cut.sample_rate, parameters);
+    cut.compensated[axis] = compensateRecord(method, cut.measured[axis], pipeline.forces().sensor(axis),
+                                             cut.speed, cut.sample_rate, parameters);
   }
 }
 
@@ -128,7 +128,7 @@ BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, con
   CompensationPipeline::Outputs outputs;
   outputs.force.measured = [&](const ForceBlock& block) { splitter.addMeasured(block); };
   outputs.force.compensated = [&](const ForceBlock& block) {
-    splitter.addCompensated(block, pipeline->health().speed);
+    splitter.addCompensated(block, pipeline->forces().health().speed);
   };
   outputs.result = [&](const SensorResult& result) { summary.identified.push_back(result); };
   pipeline.emplace(parameters.compensation, parameters.taps, sensor, parameters.hold_back,
@@ -156,9 +156,9 @@ BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, con
   splitter.close();
   transformer.flush();
   summary.rotation_known = transformer.isKnown();
-  summary.gaps = pipeline->health().gaps;
-  summary.not_finite = pipeline->health().not_finite;
-  summary.late = pipeline->late();
+  summary.gaps = pipeline->forces().health().gaps;
+  summary.not_finite = pipeline->forces().health().not_finite;
+  summary.late = pipeline->sorter().late();
   return summary;
 }
 

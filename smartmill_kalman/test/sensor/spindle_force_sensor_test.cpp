@@ -404,8 +404,8 @@ TEST(CompensationPipeline, TakesSixChannels) {
   }
   EXPECT_NEAR(largest_measured, 20.0 * std::abs(passed), 2.0);
   EXPECT_NEAR(largest, 20.0, 0.2);
-  ASSERT_NE(pipeline.spindleHealth(), nullptr);
-  EXPECT_EQ(pipeline.spindleHealth()->unloaded, 256u);
+  ASSERT_NE(pipeline.forces().spindle().health(), nullptr);
+  EXPECT_EQ(pipeline.forces().spindle().health()->unloaded, 256u);
 }
 
 TEST(FitDynamicCrossTalk, FindsTheCourse) {

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "smartmill_kalman/compensation/compensation_outputs.h"
+#include "smartmill_kalman/compensation/sensor_forces.h"
+#include "smartmill_kalman/sensor/plate_calibrator.h"
+#include "smartmill_kalman/sensor/sensor_measurement.h"
+#include "smartmill_kalman/sensor/spindle_sensor_calibrator.h"
+
+namespace smartmill::kalman {
+
+/// Identifies the force sensor on request: taps (SensorMeasurement) and steps of a calibration
+/// (SpindleSensorCalibrator, PlateCalibrator). The identified sensor replaces the one in use. Inputs in stamp
+/// order.
+class SensorIdentification {
+ public:
+  /// @param bandwidth [Hz] of a transfer matrix that is measured here @param forces with the sensor in use
+  SensorIdentification(const TapParameters& taps, double bandwidth, SensorForces& forces,
+                       const CompensationOutputs& outputs);
+
+  /// Calibration of the spindle sensor in use: the base of the next.
+  void setBase(const SpindleSensorCalibration& calibration);
+  /// Block of the force sensor, all channels. @throws Error when a channel is missing.
+  void handleChannels(const SampleBlock& block);
+  /// Forces of the same block, fx, fy, fz.
+  void handleForces(const SampleBlock& forces) { measurement_.handleSensor(forces); }
+  void handleHammer(const SampleBlock& block);
+  /// @param begin called with whether no other measurement runs; returns whether to start; may be empty
+  void start(const MeasureFrfGoal& goal, const std::function<bool(bool)>& begin);
+  void start(const CalibrationGoal& goal, const std::function<bool(bool)>& begin);
+  void cancelCalibration();
+  void event(const std::function<void(SensorMeasurement&)>& action);
+  void publishResults();
+  void reset();
+
+  bool isMeasuring() const { return measurement_.active(); }
+  const SpindleSensorCalibrator& calibrator() const { return calibrator_; }
+  const PlateCalibrator& plate() const { return plate_; }
+
+ private:
+  void publishCalibration();
+  void apply(CalibrationResult result);
+
+  TapParameters taps_;
+  double bandwidth_;
+  SensorForces& forces_;
+  const CompensationOutputs& outputs_;
+  SensorMeasurement measurement_;
+  SpindleSensorCalibrator calibrator_;
+  PlateCalibrator plate_;
+};
+
+}  // namespace smartmill::kalman

@@ -1,0 +1,111 @@
+#include "smartmill_kalman/compensation/sensor_identification.h"
+
+#include <utility>
+
+#include "smartmill_core/axis_names.h"
+#include "smartmill_core/error.h"
+
+namespace smartmill::kalman {
+
+SensorIdentification::SensorIdentification(const TapParameters& taps, double bandwidth, SensorForces& forces,
+                                           const CompensationOutputs& outputs)
+    : taps_(taps),
+      bandwidth_(bandwidth),
+      forces_(forces),
+      outputs_(outputs),
+      measurement_(taps),
+      calibrator_(taps, SpindleSensorCalibration::table3()),
+      plate_(taps) {
+}
+
+void SensorIdentification::setBase(const SpindleSensorCalibration& calibration) {
+  calibrator_ = SpindleSensorCalibrator(taps_, calibration);
+}
+
+void SensorIdentification::handleChannels(const SampleBlock& block) {
+  if (!SpindleForceSensor::isSixChannels(block)) return plate_.handle(block);
+  calibrator_.handle(block);
+  publishCalibration();
+}
+
+void SensorIdentification::handleHammer(const SampleBlock& block) {
+  calibrator_.handleHammer(block);
+  plate_.handleHammer(block);
+  measurement_.handleHammer(block);
+  publishResults();
+}
+
+void SensorIdentification::start(const MeasureFrfGoal& goal, const std::function<bool(bool)>& begin) {
+  const bool free = !measurement_.active();
+  const bool start = !begin || begin(free);  // before any result of the goal
+  if (free && start) {
+    if (forces_.spindle().isInUse()) {
+      calibrator_.beginTaps(goal.direction, forces_.spindle().length());
+    } else {
+      plate_.beginTaps(goal.direction);
+    }
+    measurement_.handle(goal);
+  }
+  publishResults();
+}
+
+void SensorIdentification::start(const CalibrationGoal& goal, const std::function<bool(bool)>& begin) {
+  const bool free = !calibrator_.active();
+  const bool start = !begin || begin(free);
+  using Step = CalibrationGoal::Step;
+  const bool plate = goal.step == Step::point || (goal.step == Step::fit && !plate_.taps().taps.empty());
+  if (goal.step == Step::forget) plate_.reset();
+  if (free && start && plate) {
+    apply(plate_.handle(goal));
+  } else if (free && start) {
+    calibrator_.handle(goal);
+  }
+  publishCalibration();
+}
+
+void SensorIdentification::cancelCalibration() {
+  calibrator_.cancel();
+  publishCalibration();
+}
+
+void SensorIdentification::event(const std::function<void(SensorMeasurement&)>& action) {
+  action(measurement_);
+  publishResults();
+}
+
+void SensorIdentification::publishCalibration() {
+  if (auto result = calibrator_.takeResult()) apply(std::move(*result));
+}
+
+void SensorIdentification::apply(CalibrationResult result) {
+  try {
+    if (result.matrix) forces_.useTransferMatrix(*result.matrix, bandwidth_);
+    if (result.calibration) forces_.spindle().recalibrate(*result.calibration);
+  } catch (const Error& e) {
+    result.message += std::string("; not in use: ") + e.what();
+  }
+  if (outputs_.calibration) outputs_.calibration(result);
+}
+
+void SensorIdentification::publishResults() {
+  if (const auto command = measurement_.takeCommand(); command && outputs_.strike) outputs_.strike(*command);
+  if (const auto feedback = measurement_.takeFeedback(); feedback && outputs_.feedback)
+    outputs_.feedback(*feedback);
+  const auto result = measurement_.takeResult();
+  if (!result) return;
+  calibrator_.endTaps(*result);
+  plate_.endTaps(*result);
+  if (result->code == FrfCode::ok) {
+    forces_.setModes(*axisIndex(result->modes.direction), result->modes.stamp, result->modes.model,
+                     result->noise_rms);
+  }
+  if (outputs_.result) outputs_.result(*result);
+}
+
+void SensorIdentification::reset() {
+  measurement_.reset();
+  calibrator_.reset();
+  plate_.reset();
+}
+
+}  // namespace smartmill::kalman
