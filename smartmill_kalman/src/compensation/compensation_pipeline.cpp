@@ -26,7 +26,7 @@ CompensationPipeline::CompensationPipeline(const CompensationParameters& paramet
                                            double hold_back, Outputs outputs)
     : outputs_(std::move(outputs)),
       forces_(parameters, sensor, outputs_.force),
-      identification_(withRange(taps, parameters.saturation), parameters.filter.bandwidth, forces_, outputs_),
+      identification_(withRange(taps, parameters.saturation), parameters.filter, forces_, outputs_),
       sorter_(hold_back),
       conditions_(sorter_.addLatched(names::CUTTING_CONDITION)),
       goals_(sorter_.addEvents(names::MEASURE_SENSOR_FRF)),
@@ -44,6 +44,7 @@ CompensationPipeline::CompensationPipeline(const CompensationParameters& paramet
 
 void CompensationPipeline::useSpindleSensor(const SpindleSensorCalibration& calibration, double length) {
   forces_.spindle().use(calibration, length);
+  forces_.useMemory(calibration.memory);
   identification_.setBase(calibration);
 }
 
@@ -84,11 +85,17 @@ void CompensationPipeline::pushHammer(SampleBlock block) {
 }
 
 void CompensationPipeline::push(const SpindleAngle& angle) {
-  sorter_.push(angles_, angle.stamp, [this, angle] { forces_.handle(angle); });
+  sorter_.push(angles_, angle.stamp, [this, angle] {
+    forces_.handle(angle);
+    identification_.handle(angle);
+  });
 }
 
 void CompensationPipeline::push(const CuttingCondition& condition) {
-  sorter_.push(conditions_, condition.stamp, [this, condition] { forces_.handle(condition); });
+  sorter_.push(conditions_, condition.stamp, [this, condition] {
+    forces_.handle(condition);
+    identification_.handle(condition);
+  });
 }
 
 void CompensationPipeline::push(const MeasureFrfGoal& goal, std::function<bool(bool)> begin) {

@@ -27,6 +27,11 @@ void SensorForces::useMatrix(const SensorMatrix& matrix) {
   useModelSensors();
 }
 
+void SensorForces::useMemory(const MemorySchedule& memory) {
+  file_memory_ = memory;
+  setMemory(memory);
+}
+
 void SensorForces::useModelSensors() {
   modes_stamp_.fill(NEVER);
   if (matrix_) {
@@ -97,6 +102,7 @@ void SensorForces::reset() {
   spindle_.reset();
   if (inverse_) inverse_->reset();
   useModelSensors();
+  setMemory(file_memory_);
 }
 
 ForceOutputs SensorForces::blockOutputs() {

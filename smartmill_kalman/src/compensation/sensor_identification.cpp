@@ -7,10 +7,10 @@
 
 namespace smartmill::kalman {
 
-SensorIdentification::SensorIdentification(const TapParameters& taps, double bandwidth, SensorForces& forces,
-                                           const CompensationOutputs& outputs)
+SensorIdentification::SensorIdentification(const TapParameters& taps, const HarmonicFilterParameters& filter,
+                                           SensorForces& forces, const CompensationOutputs& outputs)
     : taps_(taps),
-      bandwidth_(bandwidth),
+      filter_(filter),
       forces_(forces),
       outputs_(outputs),
       measurement_(taps),
@@ -26,6 +26,11 @@ void SensorIdentification::handleChannels(const SampleBlock& block) {
   if (!SpindleForceSensor::isSixChannels(block)) return plate_.handle(block);
   calibrator_.handle(block);
   publishCalibration();
+}
+
+void SensorIdentification::handleForces(const SampleBlock& forces) {
+  measurement_.handleSensor(forces);
+  tuning_.handle(forces);
 }
 
 void SensorIdentification::handleHammer(const SampleBlock& block) {
@@ -54,13 +59,47 @@ void SensorIdentification::start(const CalibrationGoal& goal, const std::functio
   const bool start = !begin || begin(free);
   using Step = CalibrationGoal::Step;
   const bool plate = goal.step == Step::point || (goal.step == Step::fit && !plate_.taps().taps.empty());
-  if (goal.step == Step::forget) plate_.reset();
+  if (goal.step == Step::forget) {
+    plate_.reset();
+    tuning_.reset();
+  }
   if (free && start && plate) {
     apply(plate_.handle(goal));
   } else if (free && start) {
     calibrator_.handle(goal);
   }
-  publishCalibration();
+  auto result = calibrator_.takeResult();
+  if (!result) return;
+  if (goal.step == Step::fit) tune(*result);
+  apply(std::move(*result));
+}
+
+// A sensor without readings (a table sensor, or one calibrated earlier) is only tuned.
+void SensorIdentification::tune(CalibrationResult& result) {
+  const std::vector<TuningRecord> records = tuning_.records();
+  if (records.empty() || forces_.invertsMatrix()) return;
+  std::array<SensorAxis, 3> sensor;
+  for (std::size_t axis = 0; axis < 3; ++axis) sensor[axis] = {forces_.sensor(axis), filter_.noise_rms};
+  MemorySchedule memory;
+  try {
+    for (const TuningRecord& record : records) {
+      const std::array<TunedMemory, 3> tuned = tuneMemory(record, sensor, filter_);
+      for (std::size_t axis = 0; axis < 3; ++axis) memory.axis[axis].push_back(tuned[axis]);
+    }
+  } catch (const Error& e) {
+    result.message += std::string("; not tuned: ") + e.what();
+    return;
+  }
+  if (!calibrator_.hasMeasurements()) {
+    result.code = CalibrationResult::Code::ok;
+    result.message = describe(memory);
+  } else {
+    result.message += "; " + describe(memory);
+  }
+  forces_.setMemory(memory);
+  calibrator_.setMemory(memory);
+  if (result.calibration) result.calibration->memory = memory;
+  result.memory = std::move(memory);
 }
 
 void SensorIdentification::cancelCalibration() {
@@ -79,7 +118,7 @@ void SensorIdentification::publishCalibration() {
 
 void SensorIdentification::apply(CalibrationResult result) {
   try {
-    if (result.matrix) forces_.useTransferMatrix(*result.matrix, bandwidth_);
+    if (result.matrix) forces_.useTransferMatrix(*result.matrix, filter_.bandwidth);
     if (result.calibration) forces_.spindle().recalibrate(*result.calibration);
   } catch (const Error& e) {
     result.message += std::string("; not in use: ") + e.what();
@@ -106,6 +145,7 @@ void SensorIdentification::reset() {
   measurement_.reset();
   calibrator_.reset();
   plate_.reset();
+  tuning_.reset();
 }
 
 }  // namespace smartmill::kalman

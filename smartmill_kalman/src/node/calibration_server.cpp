@@ -130,7 +130,16 @@ void CalibrationServer::finish(const CalibrationResult& result) {
   message.error.y = result.error[1];
   message.error.z = result.error[2];
   try {
-    if (result.calibration) impl_->write(*result.calibration);
+    const bool in_spindle = impl_->pipeline.forces().spindle().isInUse();
+    if (result.calibration) {
+      impl_->write(*result.calibration);
+    } else if (result.memory && !impl_->file.empty()) {
+      if (in_spindle) {
+        writeSpindleSensor(impl_->pipeline.identification().calibrator().base(), impl_->file);
+      } else {
+        writeMemorySchedule(*result.memory, impl_->file);
+      }
+    }
     if (result.matrix && !impl_->file.empty())
       writeTapFile(impl_->pipeline.identification().plate().taps(), impl_->file);
   } catch (const Error& e) {

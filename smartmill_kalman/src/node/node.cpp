@@ -234,6 +234,12 @@ void KalmanNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   status.add("innovation ratio [1]", health.innovation_ratio);
   status.add("correlation of the innovations [1]", health.innovation_correlation);
   status.addf("zero of the sensor [N]", "%.2f %.2f %.2f", health.zero[0], health.zero[1], health.zero[2]);
+  const MemorySchedule& memory = pipeline_.forces().memory();
+  status.add("spindle speeds with tuned process noise", memory.axis[0].size());
+  if (memory.error(0, health.speed)) {
+    status.addf("expected RMS force error [N]", "%.2f %.2f %.2f", *memory.error(0, health.speed),
+                *memory.error(1, health.speed), *memory.error(2, health.speed));
+  }
   status.add("age of the measured modes [s]", pipeline_.ageOfModes());
   status.add("updates of the sensor's modes", health.mode_updates);
   status.add("gaps", health.gaps);

@@ -26,6 +26,8 @@ inline void loadSensorFiles(CompensationPipeline& pipeline, const NodeParameters
     pipeline.forces().useTransferMatrix(identifyTransferMatrix(records.taps, records.rate),
                                         parameters.compensation.filter.bandwidth);
   }
+  if (!parameters.memory_over_speed.empty())
+    pipeline.forces().useMemory(readMemorySchedule(parameters.memory_over_speed));
   pipeline.forces().spindle().setLength(parameters.spindle_sensor_length);
   if (!parameters.spindle_sensor.empty()) {
     pipeline.useSpindleSensor(readSpindleSensor(parameters.spindle_sensor), parameters.spindle_sensor_length);

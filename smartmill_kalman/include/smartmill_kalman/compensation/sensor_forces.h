@@ -31,6 +31,11 @@ class SensorForces {
   /// Measured modes of an axis are in use from now on. @param stamp [s] of the modes @param noise_rms [N];
   /// 0: unknown
   void setModes(std::size_t axis, double stamp, const ModalModel& model, double noise_rms = 0.0);
+  /// Process noise over the spindle speed of a calibration file.
+  void useMemory(const MemorySchedule& memory);
+  /// The same, tuned here: from now on, until a restart.
+  void setMemory(const MemorySchedule& memory) { compensation_.setMemory(memory); }
+  const MemorySchedule& memory() const { return compensation_.memory(); }
   /// [s] of the measured modes in use; -infinity: those of the machine model
   double modesStamp(std::size_t axis) const { return modes_stamp_[axis]; }
 
@@ -49,6 +54,7 @@ class SensorForces {
   CompensationHealth health() const;
   /// Model in use of an axis.
   const ModalModel& sensor(std::size_t axis) const { return compensation_.sensor(axis); }
+  bool invertsMatrix() const { return inverse_.has_value(); }
 
  private:
   ForceOutputs blockOutputs();
@@ -60,6 +66,7 @@ class SensorForces {
   SpindleSensorInput spindle_;
   std::optional<MatrixCompensation> inverse_;
   std::optional<SensorMatrix> matrix_;
+  MemorySchedule file_memory_;
   std::array<double, 3> modes_stamp_{};  // [s]
   SampleBlock spindle_forces_;           // of the last block
 };

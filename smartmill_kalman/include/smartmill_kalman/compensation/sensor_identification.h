@@ -8,25 +8,28 @@
 #include "smartmill_kalman/sensor/plate_calibrator.h"
 #include "smartmill_kalman/sensor/sensor_measurement.h"
 #include "smartmill_kalman/sensor/spindle_sensor_calibrator.h"
+#include "smartmill_kalman/tuning/tuning_records.h"
 
 namespace smartmill::kalman {
 
 /// Identifies the force sensor on request: taps (SensorMeasurement) and steps of a calibration
-/// (SpindleSensorCalibrator, PlateCalibrator). The identified sensor replaces the one in use. Inputs in stamp
-/// order.
+/// (SpindleSensorCalibrator, PlateCalibrator). The identified sensor replaces the one in use. The step FIT
+/// also tunes the filters' process noise from the cuts so far (tuneMemory). Inputs in stamp order.
 class SensorIdentification {
  public:
-  /// @param bandwidth [Hz] of a transfer matrix that is measured here @param forces with the sensor in use
-  SensorIdentification(const TapParameters& taps, double bandwidth, SensorForces& forces,
-                       const CompensationOutputs& outputs);
+  /// @param filter its bandwidth is that of a transfer matrix @param forces with the sensor in use
+  SensorIdentification(const TapParameters& taps, const HarmonicFilterParameters& filter,
+                       SensorForces& forces, const CompensationOutputs& outputs);
 
   /// Calibration of the spindle sensor in use: the base of the next.
   void setBase(const SpindleSensorCalibration& calibration);
   /// Block of the force sensor, all channels. @throws Error when a channel is missing.
   void handleChannels(const SampleBlock& block);
   /// Forces of the same block, fx, fy, fz.
-  void handleForces(const SampleBlock& forces) { measurement_.handleSensor(forces); }
+  void handleForces(const SampleBlock& forces);
   void handleHammer(const SampleBlock& block);
+  void handle(const SpindleAngle& angle) { tuning_.handle(angle); }
+  void handle(const CuttingCondition& condition) { tuning_.handle(condition); }
   /// @param begin called with whether no other measurement runs; returns whether to start; may be empty
   void start(const MeasureFrfGoal& goal, const std::function<bool(bool)>& begin);
   void start(const CalibrationGoal& goal, const std::function<bool(bool)>& begin);
@@ -42,14 +45,16 @@ class SensorIdentification {
  private:
   void publishCalibration();
   void apply(CalibrationResult result);
+  void tune(CalibrationResult& result);
 
   TapParameters taps_;
-  double bandwidth_;
+  HarmonicFilterParameters filter_;
   SensorForces& forces_;
   const CompensationOutputs& outputs_;
   SensorMeasurement measurement_;
   SpindleSensorCalibrator calibrator_;
   PlateCalibrator plate_;
+  TuningRecords tuning_;
 };
 
 }  // namespace smartmill::kalman

@@ -36,6 +36,7 @@ struct CalibrationResult {
   /// Of fit: in use from now on.
   std::optional<SpindleSensorCalibration> calibration;
   std::optional<TransferMatrix> matrix;  ///< of a plate, likewise
+  std::optional<MemorySchedule> memory;  ///< process noise over the spindle speed, likewise
 };
 
 /// Calibrates a spindle-integrated sensor on the machine (Burzoni 3.2, 3.4): measurements under known loads
@@ -58,6 +59,10 @@ class SpindleSensorCalibrator {
   void reset();
 
   bool active() const { return goal_.has_value(); }
+  /// Calibration in use, of the last fit or as constructed.
+  const SpindleSensorCalibration& base() const { return base_; }
+  void setMemory(const MemorySchedule& memory) { base_.memory = memory; }
+  bool hasMeasurements() const { return measurements_.size() > 0; }
   std::optional<CalibrationResult> takeResult();
   /// Measurements of fit as a table for `spindle_sensor calibrate`.
   std::string measurementTable() const;
