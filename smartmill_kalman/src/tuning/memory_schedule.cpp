@@ -14,7 +14,8 @@ namespace smartmill::kalman {
 namespace {
 
 constexpr const char* FORMAT = "smartmill-memory/1";
-constexpr double ROUNDING = 1e-3;  // [1] of a measured speed: a cut at the last tuned speed is inside
+constexpr double ROUNDING =
+    0.01;  // [1] gains are designed on a grid of 1 % of speed: the last tuned speed is inside
 
 /// Neighbours of a speed, and the share of the second.
 struct Neighbours {
