@@ -1,5 +1,6 @@
 #include "smartmill_kalman/tuning/memory_tuner.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "smartmill_core/axis_names.h"
@@ -29,9 +30,10 @@ class AxisTuner {
     tuned.speed = record_.speed;
     tuned.error = tuned.fixed_error = error(cut, parameters_);
     if (correlation() > options_.max_correlation) return tuned;
+    const double highest = (1.0 - options_.least_gain) * tuned.fixed_error;
     for (const double memory : options_.memories) {
       const double candidate = error(cut, uniform(memory));
-      if (!(candidate < tuned.error)) continue;
+      if (!(candidate < std::min(tuned.error, highest))) continue;
       tuned.memory = memory;
       tuned.error = candidate;
     }

@@ -72,8 +72,9 @@ SpindleRig::Record slot(SpindleRig& rig, const MachineModel& model, double rpm) 
   return record;
 }
 
-/// The fixed design on the same samples.
-Forces fixedForces(const SpindleRig::Record& record, SpindleRig& rig, double rpm) {
+/// The samples of a cut through the filters of the node. @param memory empty: the fixed design
+Forces filtered(const SpindleRig::Record& record, SpindleRig& rig, double rpm,
+                const kalman::MemorySchedule& memory) {
   Forces force;
   kalman::ForceCompensation compensation({}, false, {{}, [&](const ForceBlock& block) {
                                                        for (std::size_t axis = 0; axis < 3; ++axis)
@@ -83,6 +84,7 @@ Forces fixedForces(const SpindleRig::Record& record, SpindleRig& rig, double rpm
                                                      }});
   for (std::size_t axis = 0; axis < 3; ++axis)
     compensation.setSensor(axis, rig.sorted().forces().sensor(axis));
+  compensation.setMemory(memory);
   CuttingCondition condition;
   condition.kind = CuttingCondition::Kind::cut;
   compensation.handle(condition);
@@ -140,8 +142,8 @@ void study(MachineModel model, std::uint64_t seed, bool table) {
   int not_worse = 0;
   for (const double rpm : COUNTED) {
     const SpindleRig::Record record = slot(rig, model, rpm);
-    const auto fixed = errors(fixedForces(record, rig, rpm), record.truth);
-    const auto now = errors(record.compensated, record.truth);
+    const auto fixed = errors(filtered(record, rig, rpm, {}), record.truth);
+    const auto now = errors(filtered(record, rig, rpm, rig.sorted().forces().memory()), record.truth);
     reduction.push_back(100.0 * (1.0 - now[0] / fixed[0]));
     // Equal to a thousandth: the digits of the table.
     not_worse += now[0] <= 1.001 * fixed[0];
@@ -168,7 +170,7 @@ void study(MachineModel model, std::uint64_t seed, bool table) {
 
 int main(int argc, char** argv) {
   std::string file;
-  std::uint64_t seed = 2028;
+  std::uint64_t seed = 2029;
   CommandLine line{"Tuned and fixed process noise over the spindle speed: RMS force errors of cuts."};
   line.option("MODEL", file, "smartmill-model/1 of the simulated machine").required();
   line.option("--seed", seed, "of noise and scatter").showDefault();

@@ -25,6 +25,9 @@ struct TuningOptions {
   /// [1] lag-one correlation of the fixed design's innovations above which the force model misses harmonics
   /// or modes (the limit of the diagnostics): errors cannot be predicted, the fixed design stays.
   double max_correlation = 0.5;
+  /// [1] least predicted reduction of the error: predicted and true reductions differ by this much on the
+  /// simulated machine (seeds 41, 2028), so that a smaller one may be none.
+  double least_gain = 0.1;
   double settled = 0.02;  ///< [s] start of a record that whiteness does not use
 };
 
