@@ -17,7 +17,7 @@ struct TuningRecord {
 };
 
 struct TuningOptions {
-  /// [revolutions] powers of two, as Burzoni's q = 2^n; beyond 32 a cut of a second is too short to tell.
+  /// [revolutions] powers of two, as Burzoni's q = 2^n; beyond 32 a cut of a second is too short.
   std::vector<double> memories{0.2, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0};
   /// [revolutions] memory of the smoother that gives the force of the reproduced cut. 0.2 to 2 select the
   /// same memory within one step; shorter ones take noise for force.
