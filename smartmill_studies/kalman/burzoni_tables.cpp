@@ -124,7 +124,7 @@ std::unique_ptr<SpindleRig> rigOf(const MachineModel& model, std::uint64_t seed,
   TapParameters taps;
   taps.fit_high = band;
   auto rig = std::make_unique<SpindleRig>(model, world, filter, taps, false);
-  rig->sorted().setSpindleSensorLength(LENGTH);
+  rig->sorted().forces().spindle().setLength(LENGTH);
   rig->publishCondition(CuttingCondition::Kind::none);
   return rig;
 }
@@ -264,7 +264,7 @@ BurzoniData gatherBurzoni(const MachineModel& model, std::uint64_t seed, double 
         withNoise(data.taps[axis], BURZONI_TAP_NOISE * std::sqrt(data.r_tap[axis]), seed + axis);
   }
   rig.ask(step(CalibrationGoal::Step::fit));
-  for (std::size_t axis = 0; axis < 2; ++axis) data.sensor[axis] = rig.sorted().sensor(axis);
+  for (std::size_t axis = 0; axis < 2; ++axis) data.sensor[axis] = rig.sorted().forces().sensor(axis);
   rig.run(0.5);
   rig.start();
   rig.run(1.0);

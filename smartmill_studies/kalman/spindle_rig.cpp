@@ -37,7 +37,7 @@ SpindleRig::SpindleRig(const MachineModel& model, const sim::WorldOptions& optio
   outputs.calibration = [this](const CalibrationResult& result) { calibration_ = result; };
   // Without hold-back every block is output at once.
   sorted_ = std::make_unique<CompensationPipeline>(filter, taps, ideal, 0.0, outputs);
-  sorted_->allowUncalibrated();
+  sorted_->forces().spindle().allowUncalibrated();
 }
 
 void SpindleRig::run(double seconds, const std::array<double, 3>& velocity) {

@@ -38,8 +38,14 @@ void ForceCompensation::setMatrix(const SensorMatrix& matrix) {
   auto coupled = std::make_unique<CoupledCompensation>(parameters_, matrix, outputs_);
   method_->stop();
   method_ = std::move(coupled);
+  method_->setMemory(memory_);
   for (std::size_t axis = 0; axis < 3; ++axis) setSensor(axis, matrix.h[axis][axis]);
   if (condition_) method_->beginCondition(*condition_);
+}
+
+void ForceCompensation::setMemory(const MemorySchedule& memory) {
+  memory_ = memory;
+  method_->setMemory(memory);
 }
 
 void ForceCompensation::handle(const SpindleAngle& angle) {

@@ -24,9 +24,19 @@ const std::vector<HarmonicGain>& GainSchedule::gains(std::size_t axis, const Sen
     parameters.noise_rms = sensor.noise_rms;
     design_frequencies_[axis].clear();
     for (const Mode& mode : sensor.model.modes) design_frequencies_[axis].push_back(mode.frequency);
-    gains = designGains(sensor.model, std::exp(grid_point * options_.spacing), sample_rate, parameters);
+    const double speed = std::exp(grid_point * options_.spacing);
+    if (const auto memory = memory_.memory(axis, speed)) {
+      parameters.uniform_noise = true;
+      parameters.memory_revolutions = *memory;
+    }
+    gains = designGains(sensor.model, speed, sample_rate, parameters);
   }
   return gains;
+}
+
+void GainSchedule::setMemory(const MemorySchedule& memory) {
+  memory_ = memory;
+  clear();
 }
 
 bool GainSchedule::suits(std::size_t axis, const ModalModel& sensor) const {

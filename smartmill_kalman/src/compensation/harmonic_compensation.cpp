@@ -17,6 +17,11 @@ void HarmonicCompensation::setSensor(std::size_t axis, const SensorAxis& sensor)
   schedule_.clear();
 }
 
+void HarmonicCompensation::setMemory(const MemorySchedule& memory) {
+  stop();
+  schedule_.setMemory(memory);
+}
+
 void HarmonicCompensation::beginCondition(const CuttingCondition& condition) {
   stop();
   condition_ = condition;

@@ -45,8 +45,10 @@ std::vector<HarmonicGain> designGains(const ModalModel& sensor, double spindle_s
     memories.insert(memories.end(), {parameters.memory(1), parameters.memory(2)});
   std::vector<HarmonicGain> gains;
   for (const double memory : memories) {
+    // A time constant for the quickest that all share makes the process noise uniform.
+    const double quickest = parameters.uniform_noise ? memory : quick;
     gains.push_back(designHarmonicGain(sensor, spindle_speed, sample_rate, harmonics, parameters.noise_rms,
-                                       memory * revolution, quick * revolution));
+                                       memory * revolution, quickest * revolution));
   }
   return gains;
 }

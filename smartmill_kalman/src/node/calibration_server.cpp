@@ -96,7 +96,7 @@ struct CalibrationServer::Impl {
     if (to.empty()) return;
     writeSpindleSensor(calibration, to);
     std::ofstream table(to + ".csv");
-    table << pipeline.calibrator().measurementTable();
+    table << pipeline.identification().calibrator().measurementTable();
     table.close();
     if (!table) throw Error(to + ".csv: cannot write");
   }
@@ -146,8 +146,18 @@ void CalibrationServer::finish(const CalibrationResult& result) {
     message.error.z = result.error[2];
   }
   try {
-    if (result.calibration) impl_->write(*result.calibration);
-    if (result.matrix && !impl_->file().empty()) writeTapFile(impl_->pipeline.plate().taps(), impl_->file());
+    const bool in_spindle = impl_->pipeline.forces().spindle().isInUse();
+    if (result.calibration) {
+      impl_->write(*result.calibration);
+    } else if (result.memory && !impl_->file().empty()) {
+      if (in_spindle) {
+        writeSpindleSensor(impl_->pipeline.identification().calibrator().base(), impl_->file());
+      } else {
+        writeMemorySchedule(*result.memory, impl_->file());
+      }
+    }
+    if (result.matrix && !impl_->file().empty())
+      writeTapFile(impl_->pipeline.identification().plate().taps(), impl_->file());
   } catch (const Error& e) {
     message.code = message.FIT_FAILED;
     message.message = e.what();
@@ -158,7 +168,7 @@ void CalibrationServer::finish(const CalibrationResult& result) {
 void CalibrationServer::abort(const std::string& reason) {
   if (impl_->live) impl_->refuseWaiting(Code::bad_data, reason);
   if (!impl_->active) return;
-  const bool running = impl_->pipeline.calibrator().active();
+  const bool running = impl_->pipeline.identification().calibrator().active();
   impl_->end(resultOf(Code::bad_data, reason));
   if (running) impl_->pipeline.cancelCalibration();
 }

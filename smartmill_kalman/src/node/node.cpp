@@ -49,13 +49,9 @@ KalmanNode::KalmanNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
       measurement_server_(nh, names::MEASURE_SENSOR_FRF, "kalman", measurementHandlers()),
       calibration_server_(nh, pipeline_, parameters_.command_machine) {
   loadSensorFiles(pipeline_, parameters_);
-  if (pipeline_.isUncalibrated()) ROS_WARN("%s", pipeline_.calibration().message.c_str());
+  if (pipeline_.forces().isUncalibrated())
+    ROS_WARN("%s", pipeline_.identification().calibration().message.c_str());
   publishSensor();
-  pipeline_.onRestart([this] {
-    measurement_server_.restart();
-    calibration_server_.restart();
-    publishSensor();
-  });
   subscribe();
   shell_.diagnose("force compensation", [this](auto& status) { diagnose(status); });
   shell_.every(CHECK_PERIOD, [this] { checkInputs(); });
@@ -82,6 +78,11 @@ CompensationPipeline::Outputs KalmanNode::pipelineOutputs() {
   outputs.calibration = [this](const CalibrationResult& result) {
     publishSensor();
     calibration_server_.finish(result);
+  };
+  outputs.restart = [this] {
+    measurement_server_.restart();
+    calibration_server_.restart();
+    publishSensor();
   };
   outputs.block_error = [this](const std::string& reason) {
     ++failed_blocks_;
@@ -170,7 +171,7 @@ void KalmanNode::publishWrench(const ForceBlock& block) {
 }
 
 void KalmanNode::publishSensor() {
-  const SensorCalibrationState& state = pipeline_.calibration();
+  const SensorCalibrationState& state = pipeline_.identification().calibration();
   const auto vector = [](const std::array<double, 3>& from) {
     geometry_msgs::Vector3 to;
     to.x = from[0];
@@ -211,7 +212,7 @@ void KalmanNode::checkMeasurement() {
   const std::string reason = "no data on " + dead->topic();
   if (shell_.inputs().watchdog(names::HAMMER).ended()) {
     pipeline_.hammerStopped(reason);
-  } else if (parameters_.command_machine && pipeline_.isMeasuring()) {
+  } else if (parameters_.command_machine && pipeline_.identification().isMeasuring()) {
     pipeline_.event([reason](SensorMeasurement& measurement) { measurement.end(FrfCode::bad_data, reason); });
     pipeline_.flush();
   }
@@ -221,7 +222,7 @@ void KalmanNode::checkMeasurement() {
 
 std::pair<int, std::string> KalmanNode::summary(const SpindleSensorHealth* spindle) {
   using Level = diagnostic_msgs::DiagnosticStatus;
-  const CompensationHealth health = pipeline_.health();
+  const CompensationHealth health = pipeline_.forces().health();
   // Events between two publications of the diagnostics are reported once, whatever the present state.
   const std::size_t invalid = spindle ? spindle->unloaded + spindle->overloaded : 0;
   if (std::exchange(reported_invalid_, invalid) != invalid)
@@ -238,7 +239,8 @@ std::pair<int, std::string> KalmanNode::summary(const SpindleSensorHealth* spind
     ROS_ERROR_STREAM_THROTTLE(5.0, text);
     return {Level::ERROR, text};
   }
-  if (pipeline_.isUncalibrated()) return {Level::ERROR, pipeline_.calibration().message};
+  if (pipeline_.forces().isUncalibrated())
+    return {Level::ERROR, pipeline_.identification().calibration().message};
   if (!rotation_known_) return {Level::ERROR, "no transform of the force sensor"};
   if (health.gaps + health.not_finite + health.clipped > 0)
     return {Level::WARN, "samples were lost, clipped or not finite"};
@@ -252,20 +254,26 @@ std::pair<int, std::string> KalmanNode::summary(const SpindleSensorHealth* spind
     return {Level::WARN, "the zero of the sensor has drifted beyond drift_limit"};
   if (parameters_.model_max_age > 0.0 && pipeline_.ageOfModes() > parameters_.model_max_age)
     return {Level::WARN, "the measured modes are older than model_max_age: repeat the taps"};
-  if (pipeline_.isMeasuring()) return {Level::OK, "measuring the sensor"};
-  if (pipeline_.invertsMatrix()) return {Level::OK, "inverting the matrix of the plate"};
+  if (pipeline_.identification().isMeasuring()) return {Level::OK, "measuring the sensor"};
+  if (pipeline_.forces().invertsMatrix()) return {Level::OK, "inverting the matrix of the plate"};
   return {Level::OK, health.speed > 0.0 ? "compensating" : "passing through"};
 }
 
 void KalmanNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
-  const CompensationHealth health = pipeline_.health();
-  const SpindleSensorHealth* spindle = pipeline_.spindleHealth();
+  const CompensationHealth health = pipeline_.forces().health();
+  const SpindleSensorHealth* spindle = pipeline_.forces().spindle().health();
   const auto [level, text] = summary(spindle);
   status.summary(static_cast<unsigned char>(level), text);
   status.add("spindle speed of the filters [rad/s]", health.speed);
   status.add("innovation ratio [1]", health.innovation_ratio);
   status.add("correlation of the innovations [1]", health.innovation_correlation);
   status.addf("zero of the sensor [N]", "%.2f %.2f %.2f", health.zero[0], health.zero[1], health.zero[2]);
+  const MemorySchedule& memory = pipeline_.forces().memory();
+  status.add("spindle speeds with tuned process noise", memory.axis[0].size());
+  if (memory.error(0, health.speed)) {
+    status.addf("expected RMS force error [N]", "%.2f %.2f %.2f", *memory.error(0, health.speed),
+                *memory.error(1, health.speed), *memory.error(2, health.speed));
+  }
   status.add("age of the measured modes [s]", pipeline_.ageOfModes());
   status.add("updates of the sensor's modes", health.mode_updates);
   status.add("gaps", health.gaps);
@@ -283,8 +291,8 @@ void KalmanNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
                 1e6 * std::abs(spindle->unbalance[1]), 1e6 * std::abs(spindle->unbalance[2]));
     status.add("segments without cutting evaluated", spindle->air_segments);
   }
-  status.add("inputs out of order", pipeline_.late());
-  status.add("waiting for", pipeline_.waitingFor());
+  status.add("inputs out of order", pipeline_.sorter().late());
+  status.add("waiting for", pipeline_.sorter().waitingFor());
   status.add("last measurement of the sensor", measurement_server_.lastMessage());
   status.add("last calibration step", calibration_server_.lastMessage());
 }

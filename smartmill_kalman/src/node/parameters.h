@@ -15,7 +15,7 @@ struct NodeParameters {
   std::string model;  ///< may be empty in tools with an option --model
   std::string sensor = "table";
   std::string force_input = names::DYNAMOMETER;
-  std::string sensor_matrix, spindle_sensor, plate_taps;
+  std::string sensor_matrix, spindle_sensor, plate_taps, memory_over_speed;
   double spindle_sensor_length = 0.139;
   CompensationParameters compensation;
   double hold_back = 0.05;
@@ -49,6 +49,10 @@ struct NodeParameters {
     table.text("plate_taps", plate_taps,
                "smartmill-taps/1 file: the sensor's 3x3 or 6x6 matrix is inverted up to bandwidth instead of "
                "filtering; 10 ms latency");
+    table.text(
+        "memory_over_speed", memory_over_speed,
+        "smartmill-memory/1 file (kalman/calibrate, step FIT after cuts): process noise of the filters "
+        "over the spindle speed; a spindle_sensor file has its own");
     compensation.declare(table);
     table.number("hold_back", hold_back, "s", Range::notNegative(),
                  "time after its stamp that an event may arrive and still be in order");

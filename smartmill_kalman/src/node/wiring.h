@@ -19,14 +19,17 @@ void connect(Source& source, CompensationPipeline& pipeline) {
 
 /// Reads the sensor files that the parameters name. @throws Error on an invalid file.
 inline void loadSensorFiles(CompensationPipeline& pipeline, const NodeParameters& parameters) {
-  if (!parameters.sensor_matrix.empty()) pipeline.useMatrix(readSensorMatrix(parameters.sensor_matrix));
+  pipeline.useKind(parameters.kind());
+  if (!parameters.sensor_matrix.empty())
+    pipeline.forces().useMatrix(readSensorMatrix(parameters.sensor_matrix));
   if (!parameters.plate_taps.empty()) {
     const TapRecords records = readTapFile(parameters.plate_taps);
     pipeline.useTransferMatrix(identifyTransferMatrix(records.taps, records.rate),
                                parameters.compensation.filter.bandwidth);
   }
-  pipeline.useKind(parameters.kind());
-  pipeline.setSpindleSensorLength(parameters.spindle_sensor_length);
+  if (!parameters.memory_over_speed.empty())
+    pipeline.forces().useMemory(readMemorySchedule(parameters.memory_over_speed));
+  pipeline.forces().spindle().setLength(parameters.spindle_sensor_length);
   if (!parameters.spindle_sensor.empty()) {
     pipeline.useSpindleSensor(readSpindleSensor(parameters.spindle_sensor), parameters.spindle_sensor_length);
   }

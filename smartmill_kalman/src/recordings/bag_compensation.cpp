@@ -107,8 +107,8 @@ void compensateWholeCut(BagCut& cut, Method method, const CompensationPipeline& 
                         const HarmonicFilterParameters& parameters) {
   if (!needsWholeRecord(method) || !(cut.speed > 0.0)) return;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    cut.compensated[axis] = compensateRecord(method, cut.measured[axis], pipeline.sensor(axis), cut.speed,
-                                             cut.sample_rate, parameters);
+    cut.compensated[axis] = compensateRecord(method, cut.measured[axis], pipeline.forces().sensor(axis),
+                                             cut.speed, cut.sample_rate, parameters);
   }
 }
 
@@ -129,7 +129,7 @@ BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, con
   CompensationPipeline::Outputs outputs;
   outputs.force.measured = [&](const ForceBlock& block) { splitter.addMeasured(block); };
   outputs.force.compensated = [&](const ForceBlock& block) {
-    splitter.addCompensated(block, pipeline->health().speed);
+    splitter.addCompensated(block, pipeline->forces().health().speed);
   };
   outputs.result = [&](const SensorResult& result) { summary.identified.push_back(result); };
   pipeline.emplace(parameters.compensation, parameters.taps, sensor, parameters.hold_back,
@@ -158,7 +158,7 @@ BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, con
   bag.run(progress);
   summary.duration = bag.duration();
   if (blocks == 0) throw Error(path + ": topic " + parameters.input() + " not found");
-  if (pipeline->isUncalibrated()) {
+  if (pipeline->forces().isUncalibrated()) {
     throw Error(path + ": the force sensor (" + parameters.sensor +
                 ") is not calibrated: no goal of kalman/calibrate with step FIT, no calibration file");
   }
@@ -166,9 +166,9 @@ BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, con
   splitter.close();
   transformer.flush();
   summary.rotation_known = transformer.isKnown();
-  summary.gaps = pipeline->health().gaps;
-  summary.not_finite = pipeline->health().not_finite;
-  summary.late = pipeline->late();
+  summary.gaps = pipeline->forces().health().gaps;
+  summary.not_finite = pipeline->forces().health().not_finite;
+  summary.late = pipeline->sorter().late();
   return summary;
 }
 

@@ -99,6 +99,7 @@ SpindleSensorCalibration readSpindleSensor(const std::string& file) {
     }
     map->finish();
   }
+  if (const auto section = yaml.optionalMap("memory_over_speed")) c.memory = readMemorySection(*section);
   yaml.finish();
   try {
     c.validate();
@@ -139,6 +140,7 @@ void writeSpindleSensor(const SpindleSensorCalibration& c, const std::string& fi
     out += "  " + list("sin_kg_m", u.begin(), u.end(), [](auto v) { return -v.imag(); }) + "\n";
     out += "  " + list("std_kg_m", c.unbalance_std.begin(), c.unbalance_std.end(), same) + "\n";
   }
+  out += memorySection(c.memory);
   std::ofstream stream(file);
   stream << out;
   stream.close();

@@ -59,7 +59,7 @@ long aBlock(bool coupled, bool spindle, std::size_t samples) {
       matrix.h[i][i] = model_sensor.axis[i];
       matrix.h[i][(i + 1) % 3].direct = 0.05;
     }
-    pipeline.useMatrix(matrix);
+    pipeline.forces().useMatrix(matrix);
   }
   if (spindle) pipeline.useSpindleSensor(SpindleSensorCalibration::table3(), 0.139);
   SampleBlock block;

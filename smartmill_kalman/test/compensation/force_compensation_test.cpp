@@ -139,7 +139,7 @@ TEST(ForceCompensation, restartsAtAGapAndMarksIt) {
   gapped.blocks.erase(gapped.blocks.begin() + 50);
   gapped.angles.erase(gapped.angles.begin() + 50);
   runner.feed(gapped);
-  EXPECT_EQ(runner.pipeline.health().gaps, 1u);
+  EXPECT_EQ(runner.pipeline.forces().health().gaps, 1u);
   EXPECT_EQ(runner.result.compensated[49].status, ForceBlock::Status::compensated);
   EXPECT_EQ(runner.result.compensated[50].status, ForceBlock::Status::settling);
 }
@@ -213,7 +213,7 @@ TEST(ForceCompensation, bridgesSamplesThatAreNotNumbers) {
   for (std::size_t i = 0; i < 5; ++i) s.blocks[50].samples[3 * (100 + i)] = NAN;
   Runner runner;
   runner.feed(s);
-  EXPECT_EQ(runner.pipeline.health().not_finite, 5u);
+  EXPECT_EQ(runner.pipeline.forces().health().not_finite, 5u);
   for (const ForceBlock& block : runner.result.compensated) {
     for (const double force : block.force[0]) ASSERT_TRUE(std::isfinite(force));
   }
@@ -261,7 +261,7 @@ TEST(CompensationPipeline, RefusesABadBlockAtItsOwnPush) {
   }
   runner.pipeline.flush();
   EXPECT_EQ(runner.result.compensated.size(), 19u);
-  EXPECT_EQ(runner.pipeline.health().gaps, 1u);
+  EXPECT_EQ(runner.pipeline.forces().health().gaps, 1u);
 }
 
 // The delay form needs 18 samples a revolution; 90,000 rpm give 17.07 at 25.6 kHz. The input that releases

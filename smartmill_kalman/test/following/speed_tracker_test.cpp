@@ -133,7 +133,7 @@ TEST(TrackedSpeed, NeedsNoAngles) {
   }
   EXPECT_GT(out, 90u);  // the last 50 ms wait for events
   EXPECT_EQ(last, ForceBlock::Status::compensated);
-  EXPECT_NEAR(pipeline.health().speed, units::TWO_PI * 150.7, 0.01);
+  EXPECT_NEAR(pipeline.forces().health().speed, units::TWO_PI * 150.7, 0.01);
 }
 
 }  // namespace

@@ -165,7 +165,7 @@ TEST(CompensationPipeline, APlateGivesNoForceBeforeItsMatrix) {
   for (int b = 0; b < 100; ++b) pipeline.push(plateBlock(b, 0.0));
   pipeline.flush();
   EXPECT_EQ(forces, 0u);
-  EXPECT_FALSE(pipeline.calibration().calibrated);
+  EXPECT_FALSE(pipeline.identification().calibration().calibrated);
 }
 
 TEST(StuckChannel, IsTheOneThatHasNotChangedForLongest) {

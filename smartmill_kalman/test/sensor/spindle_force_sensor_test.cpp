@@ -358,9 +358,9 @@ TEST(CompensationPipeline, GivesNoForceBeforeTheCalibration) {
   const auto count = [&](const ForceBlock&) { ++forces; };
   CompensationPipeline pipeline({}, {}, {}, 0.05, {{count, count}});
   pipeline.useKind(ForceSensorKind::spindle);
-  EXPECT_TRUE(pipeline.isUncalibrated());
-  EXPECT_FALSE(pipeline.calibration().calibrated);
-  EXPECT_NE(pipeline.calibration().message.find("not calibrated"), std::string::npos);
+  EXPECT_TRUE(pipeline.forces().isUncalibrated());
+  EXPECT_FALSE(pipeline.identification().calibration().calibrated);
+  EXPECT_NE(pipeline.identification().calibration().message.find("not calibrated"), std::string::npos);
   SampleBlock block;
   block.sample_rate = RATE;
   block.channels = {"x1", "x2", "y1", "y2", "z1", "z2"};
@@ -377,8 +377,8 @@ TEST(CompensationPipeline, GivesNoForceBeforeTheCalibration) {
   EXPECT_EQ(errorOf([&] { pipeline.push(block); }),
             "sample block: channel 'x1' is missing (present: fx fy fz mx my mz)");
   pipeline.useSpindleSensor(TABLE, LENGTH);
-  EXPECT_TRUE(pipeline.calibration().calibrated);
-  EXPECT_NEAR(pipeline.calibration().constant[1], TABLE.y.at(LENGTH), 1e-12);
+  EXPECT_TRUE(pipeline.identification().calibration().calibrated);
+  EXPECT_NEAR(pipeline.identification().calibration().constant[1], TABLE.y.at(LENGTH), 1e-12);
 }
 
 // What the node is made of: six channels in, force at the tool out, with the sensor's own sample index.
@@ -436,8 +436,8 @@ TEST(CompensationPipeline, TakesSixChannels) {
   }
   EXPECT_NEAR(largest_measured, 20.0 * std::abs(passed), 2.0);
   EXPECT_NEAR(largest, 20.0, 0.2);
-  ASSERT_NE(pipeline.spindleHealth(), nullptr);
-  EXPECT_EQ(pipeline.spindleHealth()->unloaded, 256u);
+  ASSERT_NE(pipeline.forces().spindle().health(), nullptr);
+  EXPECT_EQ(pipeline.forces().spindle().health()->unloaded, 256u);
 }
 
 TEST(FitDynamicCrossTalk, FindsTheCourse) {

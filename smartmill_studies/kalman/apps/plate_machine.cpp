@@ -193,7 +193,7 @@ int main(int argc, char** argv) {
     const auto three = kalman::identifyTransferMatrix(tapAll(rig, 3), RATE);
     for (const double rpm : {5000.0, 20000.0}) {
       SpindleRig machine(model, world, {}, {}, true);
-      machine.sorted().useTransferMatrix(six, BANDWIDTH);
+      machine.sorted().forces().useTransferMatrix(six, BANDWIDTH);
       std::vector<SpindleRig::Record> passes;
       for (const double feed : FEEDS) {
         std::fprintf(stderr, "%.0f rpm, %.3f mm per tooth\n", rpm, 1e3 * feed);

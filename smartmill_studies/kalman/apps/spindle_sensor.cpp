@@ -101,7 +101,7 @@ int main(int argc, char** argv) {
     kalman::TapParameters taps;
     taps.fit_high = request.bandwidth;
     SpindleRig rig(model, world, filter, taps, false);
-    rig.sorted().setSpindleSensorLength(LENGTH);
+    rig.sorted().forces().spindle().setLength(LENGTH);
     calibrate(rig, request);
     cuts(rig, model, request.bandwidth);
   });

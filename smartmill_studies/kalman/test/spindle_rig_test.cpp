@@ -28,7 +28,7 @@ TEST(SpindleRig, ShowsTheForceOfACutAfterItsCalibration) {
   TapParameters taps;
   taps.fit_high = 2500.0;
   SpindleRig rig(model, world, filter, taps, false);
-  rig.sorted().setSpindleSensorLength(LENGTH);
+  rig.sorted().forces().spindle().setLength(LENGTH);
   rig.publishCondition(CuttingCondition::Kind::none);
   rig.readStatic({0.110, LENGTH, 0.170}, {0.0, 150.0, 300.0, 0.0}, false);
   CalibrationGoal fit;

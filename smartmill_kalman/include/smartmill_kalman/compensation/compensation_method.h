@@ -8,6 +8,7 @@
 #include "smartmill_core/modal/modal_model.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_kalman/compensation/compensation_parameters.h"
+#include "smartmill_kalman/tuning/memory_schedule.h"
 
 namespace smartmill::kalman {
 
@@ -53,6 +54,9 @@ class CompensationMethod {
   virtual void setSensor(std::size_t axis, const SensorAxis& sensor) = 0;
   /// Model in use.
   virtual const ModalModel& sensor(std::size_t axis) const = 0;
+
+  /// Process noise over the speed from now on; the filters restart. Methods without harmonics ignore it.
+  virtual void setMemory(const MemorySchedule&) {}
 
   /// A cutting condition begins: the filters restart, and no result depends on data before it.
   virtual void beginCondition(const CuttingCondition& condition) = 0;

@@ -33,6 +33,9 @@ class ForceCompensation {
   /// setSensor() replaces them, the cross-talk stays. @throws Error.
   void setMatrix(const SensorMatrix& matrix);
   bool hasSensor() const { return has_sensor_[0] && has_sensor_[1] && has_sensor_[2]; }
+  /// Process noise over the spindle speed from now on; the filters restart.
+  void setMemory(const MemorySchedule& memory);
+  const MemorySchedule& memory() const { return memory_; }
   /// Model in use.
   const ModalModel& sensor(std::size_t axis) const { return method_->sensor(axis); }
 
@@ -58,6 +61,7 @@ class ForceCompensation {
   double sign_;
   ForceOutputs outputs_;
   std::unique_ptr<CompensationMethod> method_;
+  MemorySchedule memory_;
   std::array<bool, 3> has_sensor_{};
   SteadySpeed steady_speed_;
   SpindleAngle spindle_;  // newest

@@ -8,6 +8,7 @@
 
 #include "smartmill_kalman/compensation/compensation_method.h"
 #include "smartmill_kalman/filter/harmonic_gain.h"
+#include "smartmill_kalman/tuning/memory_schedule.h"
 
 namespace smartmill::kalman {
 
@@ -34,12 +35,15 @@ class GainSchedule {
                                          double sample_rate);
   /// Whether the modes are close enough to those of the last design for its gains.
   bool suits(std::size_t axis, const ModalModel& sensor) const;
+  /// Process noise over the speed from now on. Speeds without one have the fixed design.
+  void setMemory(const MemorySchedule& memory);
   void clear() { gains_.clear(); }
   void clear(std::size_t axis);
 
  private:
   HarmonicFilterParameters parameters_;
   GainScheduleOptions options_;
+  MemorySchedule memory_;
   std::map<std::pair<std::size_t, int>, std::vector<HarmonicGain>> gains_;  // by axis and grid point
   std::array<std::vector<double>, 3> design_frequencies_;                   // [Hz] of the modes, last design
   double sample_rate_ = 0.0;                                                // [Hz]

@@ -24,6 +24,7 @@ class HarmonicCompensation : public CompensationMethod {
 
   void setSensor(std::size_t axis, const SensorAxis& sensor) override;
   const ModalModel& sensor(std::size_t axis) const override { return sensor_.at(axis).model; }
+  void setMemory(const MemorySchedule& memory) override;
   void beginCondition(const CuttingCondition& condition) override;
   bool prepare(const SpindleAngle& spindle, double sample_rate) override;
   void process(const ForceBlock& measured, ForceBlock compensated, CompensationHealth& health) override;

@@ -20,6 +20,9 @@ struct HarmonicFilterParameters {
   double noise_rms = 1.0;
   double settling_revolutions = 0.2;
   double memory_revolutions = 8.0;
+  /// The same process noise for every harmonic (Burzoni's Q): one with a low transmissibility has a longer
+  /// memory than memory_revolutions, by its reciprocal. False: all have the same memory.
+  bool uniform_noise = false;
 
   void declare(ParameterTable& table) {
     table.number(

@@ -10,6 +10,7 @@
 
 #include "smartmill_core/modal/modal_model.h"
 #include "smartmill_core/signal/force_channels.h"
+#include "smartmill_kalman/tuning/memory_schedule.h"
 
 namespace smartmill::kalman {
 
@@ -47,6 +48,7 @@ struct SpindleSensorCalibration {
   double drift_std = 5.0 / 60.0;  ///< [N/s] > 0 prior of a sensor's drift (Burzoni: to 5 N/min)
   std::array<std::complex<double>, 3> unbalance{};  ///< [kg m] F = Re(unbalance w^2 exp(i spindle angle))
   std::array<double, 3> unbalance_std{{0, 0, 0}};   ///< [kg m] prior; 0: unknown
+  MemorySchedule memory;  ///< process noise of the filter over the spindle speed; empty: fixed design
 
   SpindleSensorCalibration();
   /// Burzoni Table 1, Table 3 and the preloads of section 3.1.

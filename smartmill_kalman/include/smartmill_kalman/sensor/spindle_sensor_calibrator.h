@@ -41,6 +41,7 @@ struct CalibrationResult {
   /// Of fit: in use from now on.
   std::optional<SpindleSensorCalibration> calibration;
   std::optional<TransferMatrix> matrix;  ///< of a plate, likewise
+  std::optional<MemorySchedule> memory;  ///< process noise over the spindle speed, likewise
 };
 
 /// Calibration of the sensor in use.
@@ -75,6 +76,10 @@ class SpindleSensorCalibrator {
   static CalibrationResult describe(const SpindleSensorCalibration& calibration, double length);
 
   bool active() const { return goal_.has_value(); }
+  /// Calibration in use, of the last fit or as constructed.
+  const SpindleSensorCalibration& base() const { return base_; }
+  void setMemory(const MemorySchedule& memory) { base_.memory = memory; }
+  bool hasMeasurements() const { return measurements_.size() > 0; }
   std::optional<CalibrationResult> takeResult();
   /// Measurements of fit as a table for `spindle_sensor calibrate`.
   std::string measurementTable() const;
