@@ -20,6 +20,7 @@ namespace {
 constexpr double RATE = 25600.0;       // [Hz]
 constexpr double BANDWIDTH = 5000.0;   // [Hz]
 constexpr std::size_t LENGTH = 10240;  // samples of a tap: 0.4 s
+constexpr std::size_t BLOCK = 256;     // samples
 
 /// Taps of the closed-form plate, through the streams: the goal sets the point, hammer and plate are blocks.
 class Taps {
@@ -48,22 +49,24 @@ class Taps {
     const auto measured = PlateSensor().measure(force, point, RATE, 6, random_);
     static const char* const DIRECTIONS[] = {"x", "y", "z"};
     calibrator_.beginTaps(DIRECTIONS[axis]);
-    SampleBlock hammer_block, plate_block;
-    for (SampleBlock* block : {&hammer_block, &plate_block}) {
-      block->stamp = static_cast<double>(index_) / RATE;
-      block->sample_rate = RATE;
-      block->first_index = index_;
+    for (std::size_t from = 0; from < LENGTH; from += BLOCK) {
+      SampleBlock hammer_block, plate_block;
+      for (SampleBlock* block : {&hammer_block, &plate_block}) {
+        block->stamp = static_cast<double>(index_ + from) / RATE;
+        block->sample_rate = RATE;
+        block->first_index = index_ + from;
+      }
+      hammer_block.channels = {"hammer"};
+      hammer_block.units = {"N"};
+      plate_block.channels.assign(PLATE_CHANNELS.begin(), PLATE_CHANNELS.end());
+      plate_block.units = {"N", "N", "N", "N m", "N m", "N m"};
+      for (std::size_t i = from; i < from + BLOCK; ++i) {
+        hammer_block.samples.push_back(hammer[i]);
+        for (const auto& channel : measured) plate_block.samples.push_back(channel[i]);
+      }
+      calibrator_.handle(plate_block);
+      calibrator_.handleHammer(hammer_block);
     }
-    hammer_block.channels = {"hammer"};
-    hammer_block.units = {"N"};
-    hammer_block.samples = hammer;
-    plate_block.channels.assign(PLATE_CHANNELS.begin(), PLATE_CHANNELS.end());
-    plate_block.units = {"N", "N", "N", "N m", "N m", "N m"};
-    for (std::size_t i = 0; i < LENGTH; ++i) {
-      for (const auto& channel : measured) plate_block.samples.push_back(channel[i]);
-    }
-    calibrator_.handleHammer(hammer_block);
-    calibrator_.handle(plate_block);
     SensorResult result;
     result.static_gain = 1.0;
     result.hit_stamps = {static_cast<double>(index_ + trigger) / RATE};
