@@ -8,6 +8,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/modal/results.h"
 #include "smartmill_core/names.h"
+#include "smartmill_recording/conversion/fields.h"
 
 namespace smartmill::session {
 namespace {
@@ -15,14 +16,6 @@ namespace {
 using Kind = CalibrationStep::Kind;
 using smartmill_msgs::CalibrateForceSensorGoal;
 using smartmill_msgs::OperatorDone;
-
-geometry_msgs::Vector3 vectorOf(const std::array<double, 3>& from) {
-  geometry_msgs::Vector3 to;
-  to.x = from[0];
-  to.y = from[1];
-  to.z = from[2];
-  return to;
-}
 
 std::uint8_t actionOf(Kind kind) {
   using Request = smartmill_msgs::OperatorAction::Request;
@@ -99,8 +92,8 @@ std::string SensorCalibration::run(const CalibrationStage& stage, double timeout
 void SensorCalibration::askOperator(const CalibrationStep& step) {
   smartmill_msgs::OperatorAction service;
   service.request.action = actionOf(step.kind);
-  service.request.load = vectorOf(step.load);
-  service.request.point = vectorOf(step.point);
+  conversion::setPoint(step.load, service.request.load);
+  conversion::setPoint(step.point, service.request.point);
   service.request.length = step.length;
   service.request.text = step.request();
   if (ros::service::exists(nh_.resolveName(names::OPERATOR_ACTION), false)) {
@@ -131,8 +124,8 @@ std::string SensorCalibration::calibrate(const CalibrationStep& step) {
                                           : CalibrateForceSensorGoal::READING;
   goal.test = step.test;
   goal.length = step.length;
-  goal.load = vectorOf(step.load);
-  goal.point = vectorOf(step.point);
+  conversion::setPoint(step.load, goal.load);
+  conversion::setPoint(step.point, goal.point);
   goal.reference = step.reference;
   goal.duration = parameters_.reading_time;
   goal.file = parameters_.file;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "smartmill_kalman/sensor/spindle_sensor_calibrator.h"
+#include "smartmill_recording/conversion/fields.h"
 
 namespace smartmill::kalman {
 
@@ -14,9 +15,7 @@ CalibrationGoal calibrationGoal(const Goal& message, double stamp, double receiv
   goal.step = static_cast<CalibrationGoal::Step>(message.step);
   goal.test = static_cast<int>(message.test);
   goal.length = message.length;
-  goal.load = {message.load.x, message.load.y, message.load.z};
-  if (goal.step == CalibrationGoal::Step::point)
-    goal.load = {message.point.x, message.point.y, message.point.z};
+  goal.load = conversion::fromPoint(goal.step == CalibrationGoal::Step::point ? message.point : message.load);
   goal.reference = message.reference;
   goal.duration = message.duration == 0.0 ? DEFAULT_DURATION : message.duration;
   goal.file = message.file;

@@ -140,11 +140,7 @@ const std::string& CalibrationServer::lastMessage() const {
 void CalibrationServer::finish(const CalibrationResult& result) {
   smartmill_msgs::CalibrateForceSensorResult message = resultOf(result.code, result.message);
   message.readings = static_cast<std::uint32_t>(result.readings);
-  if (result.verified) {
-    message.error.x = result.error[0];
-    message.error.y = result.error[1];
-    message.error.z = result.error[2];
-  }
+  if (result.verified) conversion::setPoint(result.error, message.error);
   try {
     const bool in_spindle = impl_->pipeline.forces().spindle().isInUse();
     if (result.calibration) {

@@ -15,6 +15,7 @@
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/frames.h"
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_recording/conversion/fields.h"
 #include "smartmill_ros/node_main.h"
 #include "smartmill_ros/parameter_server.h"
 #include "smartmill_ros/run_node.h"
@@ -172,22 +173,15 @@ void KalmanNode::publishWrench(const ForceBlock& block) {
 
 void KalmanNode::publishSensor() {
   const SensorCalibrationState& state = pipeline_.identification().calibration();
-  const auto vector = [](const std::array<double, 3>& from) {
-    geometry_msgs::Vector3 to;
-    to.x = from[0];
-    to.y = from[1];
-    to.z = from[2];
-    return to;
-  };
   smartmill_msgs::ForceSensorState message;
   message.header.stamp = fromSec(state.stamp);
   message.sensor = forceSensorWords()[static_cast<std::size_t>(parameters_.kind())];
   message.calibrated = state.calibrated;
   message.message = state.message;
   message.readings = static_cast<std::uint32_t>(state.readings);
-  message.constant = vector(state.constant);
-  message.constant_std = vector(state.constant_std);
-  message.error = vector(state.error);
+  conversion::setPoint(state.constant, message.constant);
+  conversion::setPoint(state.constant_std, message.constant_std);
+  conversion::setPoint(state.error, message.error);
   message.verified = state.verified;
   sensor_state_.publish(message);
 }

@@ -9,13 +9,14 @@
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/model/strict_yaml.h"
 #include "smartmill_core/units.h"
+#include "smartmill_kalman/compensation/gain_schedule.h"
 
 namespace smartmill::kalman {
 namespace {
 
 constexpr const char* FORMAT = "smartmill-memory/1";
-constexpr double ROUNDING =
-    0.01;  // [1] gains are designed on a grid of 1 % of speed: the last tuned speed is inside
+/// [1] Gains are designed on this grid of speeds: the last tuned speed is inside.
+constexpr double ROUNDING = GainScheduleOptions().spacing;
 
 /// Neighbours of a speed, and the share of the second.
 struct Neighbours {

@@ -62,8 +62,6 @@ void findNeeded(const std::vector<CuttingCondition>& tests, const MachineModel& 
   found->needed.resize(tests.size());
   std::iota(found->needed.begin(), found->needed.end(), 0);
   if (tests.empty() || !model.spindle) return;
-  const TorqueCovariance planned = expectedCovariance(tests, *model.spindle, nullptr);
-  found->planned_std = {std::sqrt(planned.tc), std::sqrt(planned.te)};
   if (found->known && found->known->identifications > 0 && isComplete(found->known->combined))
     found->needed = neededTests(tests, *model.spindle, torqueCovarianceOf(found->known->combined));
 }

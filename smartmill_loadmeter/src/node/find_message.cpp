@@ -29,7 +29,6 @@ smartmill_msgs::FindCoefficients::Response toMsg(const FoundCoefficients& found)
   fill(known.axial_depth, response.axial_depth);
   fill(known.edge_age, response.edge_age);
   response.needed.assign(found.needed.begin(), found.needed.end());
-  for (std::size_t i = 0; i < 2; ++i) response.planned_std[i] = found.planned_std[i];
   response.next_test = toMsg(found.next_condition);
   response.next_std[0] = found.next ? found.next->ktc_std : NOT_A_NUMBER;
   response.next_std[1] = found.next ? found.next->kte_std : NOT_A_NUMBER;

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -17,8 +16,7 @@ struct FoundCoefficients {
   std::optional<CoefficientKnowledge> known;  ///< of the pair
   /// Without records of the pair: from other tools and materials, by the methods of recommendCut().
   std::optional<CoefficientSet> predicted;
-  std::vector<std::size_t> needed;  ///< indices of the planned tests; all without knowledge of the pair
-  std::array<double, 2> planned_std{{CoefficientRecord::UNKNOWN, CoefficientRecord::UNKNOWN}};
+  std::vector<std::size_t> needed;   ///< indices of the planned tests; all without knowledge of the pair
   std::optional<SuggestedCut> next;  ///< cut that would reduce the uncertainty most
   CuttingCondition next_condition;   ///< the same with tool and material
   std::string message;               ///< one line: origin of the coefficients, or the known pairs
