@@ -11,6 +11,7 @@
 
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/signal/pulse_tachometer.h"
 #include "smartmill_core/testing/mill.h"
 #include "smartmill_core/units.h"
 #include "smartmill_sim/world/hammer_station.h"
@@ -301,6 +302,40 @@ TEST(World, ForceMatchesTheAngle) {
     ++compared;
   }
   EXPECT_GT(compared, 10);
+}
+
+// The pulses of the tachometer give the encoder's angle and speed.
+TEST(World, PulsesMatchTheAngle) {
+  WorldOptions options;
+  options.pulse_train = true;
+  World world(millThatCuts(), options);
+  PulseTachometer tachometer({});
+  std::vector<MotionState> states(World::BLOCK);
+  const double speed = units::radPerSecFromRpm(7321.0);
+  double angle = 1.0;
+  World::Block block;
+  int compared = 0;
+  for (int k = 0; k < 60; ++k) {
+    for (MotionState& state : states) {
+      angle += speed / World::SAMPLE_RATE;
+      state.spindle_angle = std::fmod(angle, units::TWO_PI);
+      state.spindle_speed = speed;
+      state.position = {0.0, 0.0, 0.1};
+    }
+    world.advance(block, states);
+    ASSERT_EQ(block.tachometer.channels, std::vector<std::string>{"tachometer"});
+    ASSERT_EQ(block.tachometer.size(), World::BLOCK);
+    for (const PulseReading& reading : tachometer.push(block.tachometer)) {
+      const SpindleAngle& encoder = block.angle[0];
+      const double there = encoder.angle + speed * (reading.angle.stamp - encoder.stamp);
+      // Half a sample.
+      EXPECT_NEAR(std::remainder(reading.angle.angle - there, units::TWO_PI), 0.0,
+                  0.55 * speed / World::SAMPLE_RATE);
+      EXPECT_LT(std::abs(reading.angle.speed - speed), 4.0 * reading.speed_std);
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 65);
 }
 
 TEST(World, CuttingWithTheSpindleAtRestIsRefused) {

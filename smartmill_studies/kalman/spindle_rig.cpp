@@ -38,6 +38,7 @@ SpindleRig::SpindleRig(const MachineModel& model, const sim::WorldOptions& optio
   // Without hold-back every block is output at once.
   sorted_ = std::make_unique<CompensationPipeline>(filter, taps, ideal, 0.0, outputs);
   sorted_->forces().spindle().allowUncalibrated();
+  if (options.pulse_train) tachometer_.emplace(PulseTachometerParameters());
 }
 
 void SpindleRig::run(double seconds, const std::array<double, 3>& velocity) {
@@ -79,7 +80,11 @@ void SpindleRig::hear(const sim::World::Block& block) {
                               angle.speed * static_cast<double>(i) / sim::World::SAMPLE_RATE);
     }
   }
-  for (const SpindleAngle& angle : block.angle) sorted_->push(angle);
+  if (tachometer_) {
+    for (const PulseReading& reading : tachometer_->push(block.tachometer)) sorted_->push(reading.angle);
+  } else {
+    for (const SpindleAngle& angle : block.angle) sorted_->push(angle);
+  }
   sorted_->pushHammer(block.hammer);
   sorted_->push(use_plate_ ? block.dynamometer : block.spindle_force);
 }

@@ -2,10 +2,12 @@
 
 #include <array>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/signal/pulse_tachometer.h"
 #include "smartmill_kalman/compensation/compensation_pipeline.h"
 #include "smartmill_sim/world/world.h"
 
@@ -15,7 +17,8 @@ namespace smartmill::kalman {
 /// nodes in one thread, without ROS.
 class SpindleRig {
  public:
-  /// @param use_plate the dynamometer's blocks are compensated; false: those of the sensor in the spindle
+  /// @param options with pulse_train the spindle angle is that of its pulses @param use_plate the
+  /// dynamometer's blocks are compensated; false: those of the sensor in the spindle
   SpindleRig(const MachineModel& model, const sim::WorldOptions& options,
              const CompensationParameters& filter, const TapParameters& taps, bool use_plate);
 
@@ -55,6 +58,7 @@ class SpindleRig {
   sim::World world_;
   bool use_plate_;
   std::unique_ptr<CompensationPipeline> sorted_;
+  std::optional<PulseTachometer> tachometer_;  // with pulse_train
   std::array<double, 3> position_{{0, 0, 0}};
   double speed_ = 0.0, angle_ = 0.0, now_ = 0.0;
   int tests_ = 0, slots_ = 0;

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "node/parameters.h"
+#include "node/tachometer_parameters.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/testing/shipped_parameters.h"
 
@@ -60,6 +61,14 @@ TEST(Parameters, InvalidOnesAreNamed) {
     EXPECT_EQ(message.find('\n'), std::string::npos);
   }
   EXPECT_NE(refusal("travel_x: [0.2, -0.2]\n" + good().substr(22)).find("travel_x"), std::string::npos);
+}
+
+TEST(TachometerParameters, ShippedFileMatchesTheTable) {
+  expectShipped<TachometerNodeParameters>("../launch/config/tachometer.yaml",
+                                          "smartmill_cnc tachometer_node");
+  TachometerNodeParameters parameters;
+  parameters.input.clear();
+  EXPECT_THROW(parameters.validate(), Error);
 }
 
 }  // namespace

@@ -39,6 +39,7 @@ struct Request {
   bool identify = false, coupled = false, blind = false;
   double blind_low = 600.0, blind_high = 1500.0;  // [Hz]
   double lag = 0.05;                              // [s]
+  PulseTachometerParameters tachometer;
 };
 
 /// Latency of the result, for the report.
@@ -111,12 +112,18 @@ void fromCampaign(const Request& request) {
     std::fprintf(stderr, "compensating %s\n", test.name.c_str());
     Record record = readRecord(campaign, test);
     if (workpiece) kalman::negateForces(record);
+    for (const std::string& note : record.notes) std::fprintf(stderr, "%s\n", note.c_str());
+    const double speed = kalman::spindleSpeedOf(record, test);
+    if (test.tachometer) {
+      std::printf("%s: %.2f rpm by the tachometer, commanded %.2f rpm\n", test.name.c_str(),
+                  units::rpmFromRadPerSec(speed), units::rpmFromRadPerSec(test.spindle_speed));
+    }
     if (request.blind) printBlind(test.name, record, test, request);
-    const auto force = matrix ? kalman::compensate(record, *matrix, test.spindle_speed, test.sample_rate,
-                                                   parameters.compensation.filter)
-                              : kalman::compensate(record, sensor, false, test.spindle_speed,
-                                                   test.sample_rate, parameters.compensation.filter,
-                                                   kalman::methodOf(request.method), request.lag);
+    const auto force =
+        matrix ? kalman::compensate(record, *matrix, speed, test.sample_rate, parameters.compensation.filter)
+               : kalman::compensate(record, sensor, false, speed, test.sample_rate,
+                                    parameters.compensation.filter, kalman::methodOf(request.method),
+                                    request.lag);
     kalman::writeForce(request.out, test.name, record.time, force);
     std::fputs(kalman::rangeLine(test.name, forces(record), force).c_str(), stdout);
     ++cuts;
@@ -165,7 +172,7 @@ void fromBag(const Request& request) {
   std::vector<std::future<std::string>> written;  // while the bag is read on
   const auto began = std::chrono::steady_clock::now();
   const kalman::BagSummary summary = kalman::compensateBag(
-      request.source, model.force_sensor, parameters, kalman::methodOf(request.method),
+      request.source, model.force_sensor, parameters, kalman::methodOf(request.method), request.tachometer,
       [&](kalman::BagCut&& cut) {
         const std::string name = fileName(cut.name, used);
         written.push_back(std::async(std::launch::async, writeCut, request.out, name, std::move(cut)));
@@ -186,6 +193,13 @@ void fromBag(const Request& request) {
   if (summary.gaps + summary.not_finite + summary.late > 0) {
     std::fprintf(stderr, "%s: %zu gaps, %zu samples not finite, %zu inputs out of order\n",
                  request.program.c_str(), summary.gaps, summary.not_finite, summary.late);
+  }
+  if (summary.pulses) {
+    const PulseTachometer::Counts& pulses = *summary.pulses;
+    std::printf(
+        "no spindle/angle: speed by %zu pulses of daq/tachometer, %zu missing, %zu double, %zu irregular%s\n",
+        pulses.pulses, pulses.missing, pulses.doubled, pulses.irregular,
+        summary.tachometer_fault.empty() ? "" : ("; last: " + summary.tachometer_fault).c_str());
   }
   const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   std::printf("%zu cuts written to %s (no latency); %.1f s of data in %.2f s, %.0f x real time\n",
@@ -236,6 +250,12 @@ Command compensateCommand() {
         .oneOf(kalman::methodNames())
         .showDefault();
     line.option("--lag-s", o.lag, "lag of fixed-lag [s]").within(0.0, 10.0).showDefault();
+    line.option("--pulses-per-revolution", o.tachometer.pulses_per_revolution,
+                "bag without spindle/angle: pulses of daq/tachometer per revolution")
+        .showDefault();
+    line.option("--pulse-threshold-v", o.tachometer.threshold,
+                "bag without spindle/angle: voltage of daq/tachometer at which a pulse begins")
+        .showDefault();
     ParameterOptions parameters(line, tableOf(o.parameters), "launch/config/kalman.yaml");
     parameters.add("--sensor", "sensor");
     parameters.add("--bandwidth-hz", "bandwidth");

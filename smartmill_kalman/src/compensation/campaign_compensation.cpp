@@ -11,6 +11,7 @@
 #include "smartmill_core/signal/frequency_response.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/signal/window.h"
+#include "smartmill_core/units.h"
 
 namespace smartmill::kalman {
 namespace {}  // namespace
@@ -119,6 +120,15 @@ bool measuresWorkpiece(const Campaign& campaign, const std::string& model_file) 
   const std::string file = model_file.empty() ? campaign.modelPath() : model_file;
   if (model_file.empty() && (file.empty() || !std::filesystem::is_regular_file(file))) return false;
   return readMachineModel(file).force_sensor.measures_workpiece;
+}
+
+double spindleSpeedOf(const Record& record, const CampaignTest& test) {
+  if (!test.tachometer || !record.has("spindle_angle")) return test.spindle_speed;
+  const std::vector<double>& angle = record.column("spindle_angle");
+  double turned = 0.0;
+  for (std::size_t i = 1; i < angle.size(); ++i)
+    turned += std::remainder(angle[i] - angle[i - 1], units::TWO_PI);
+  return turned / (record.time.back() - record.time.front());
 }
 
 void negateForces(Record& record) {

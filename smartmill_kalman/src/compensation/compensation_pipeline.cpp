@@ -94,7 +94,10 @@ void CompensationPipeline::pushHammer(SampleBlock block) {
   sorter_.push(hammers_, stamp, [this, block = std::move(block)] { identification_.handleHammer(block); });
 }
 
-void CompensationPipeline::push(const SpindleAngle& angle) {
+void CompensationPipeline::push(const SpindleAngle& reading) {
+  SpindleAngle angle = reading;
+  // At rest a pulse tachometer gives no angle, and no force depends on it.
+  if (std::isnan(angle.angle)) angle.angle = 0.0;
   sorter_.push(angles_, angle.stamp, [this, angle] {
     forces_.handle(angle);
     identification_.handle(angle);

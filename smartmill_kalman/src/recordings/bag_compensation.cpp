@@ -115,7 +115,8 @@ void compensateWholeCut(BagCut& cut, Method method, const CompensationPipeline& 
 }  // namespace
 
 BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, const NodeParameters& parameters,
-                         Method method, const std::function<void(BagCut&&)>& done,
+                         Method method, const PulseTachometerParameters& tachometer_parameters,
+                         const std::function<void(BagCut&&)>& done,
                          const std::function<void(double)>& progress) {
   BagSummary summary;
   RecordingReader bag(path);
@@ -141,6 +142,15 @@ BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, con
     pipeline->push(fromMsg(m));
   });
   connect(bag, *pipeline);
+  // A recording of the pulses alone.
+  PulseTachometer tachometer(tachometer_parameters);
+  if (!bag.has(names::SPINDLE_ANGLE) && bag.has(names::TACHOMETER)) {
+    bag.on<SampleBlock>(names::TACHOMETER, [&](const SampleBlock& block, double) {
+      for (const PulseReading& reading : tachometer.push(block)) pipeline->push(reading.angle);
+      if (const std::string fault = tachometer.takeFault(); !fault.empty()) summary.tachometer_fault = fault;
+    });
+    summary.pulses = tachometer.counts();
+  }
   bag.on<CuttingCondition>(names::CUTTING_CONDITION, [&](const CuttingCondition& condition, double) {
     splitter.addCondition(condition);
     pipeline->push(condition);
@@ -169,6 +179,7 @@ BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, con
   summary.gaps = pipeline->forces().health().gaps;
   summary.not_finite = pipeline->forces().health().not_finite;
   summary.late = pipeline->sorter().late();
+  if (summary.pulses) summary.pulses = tachometer.counts();
   return summary;
 }
 

@@ -2,10 +2,12 @@
 
 #include <array>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "node/parameters.h"
+#include "smartmill_core/signal/pulse_tachometer.h"
 #include "smartmill_kalman/compensation/record_compensation.h"
 
 namespace smartmill::kalman {
@@ -27,13 +29,18 @@ struct BagSummary {
   bool rotation_known = false;           ///< false: no transform, forces are in the sensor's frame
   double duration = 0.0;                 ///< [s]
   std::vector<SensorResult> identified;  ///< tap tests in the bag
+  /// Pulses of daq/tachometer, where the bag has no spindle/angle; nothing: it has.
+  std::optional<PulseTachometer::Counts> pulses;
+  std::string tachometer_fault;  ///< the last one; empty: none
 };
 
 /// Feeds a bag's sensors, conditions and goals to CompensationPipeline, as the node does. Methods that need
 /// the whole record then run on each cut, with the sensor and the speed of the pipeline.
-/// @param done called at the end of each cut, in order @throws Error.
+/// @param tachometer of daq/tachometer, for a bag without spindle/angle @param done called at the end of each
+/// cut, in order @throws Error.
 BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, const NodeParameters& parameters,
-                         Method method, const std::function<void(BagCut&&)>& done,
+                         Method method, const PulseTachometerParameters& tachometer,
+                         const std::function<void(BagCut&&)>& done,
                          const std::function<void(double)>& progress = {});
 
 }  // namespace smartmill::kalman

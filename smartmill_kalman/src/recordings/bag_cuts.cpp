@@ -64,6 +64,7 @@ class CutCollector {
     to_ = state.stamp;
   }
   void push(const SpindleAngle& angle) {
+    if (std::isnan(angle.angle)) return;  // at rest
     if (spindle_) spindle_->handle(angle);
     if (!cutting()) return;
     if (angles_.empty()) angles_.push_back({angle.stamp, angle.angle, angle.angle});

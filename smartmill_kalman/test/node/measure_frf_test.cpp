@@ -201,7 +201,7 @@ TEST_F(MeasureFrf, TapsThenCutsAndReplaysToTheLastDigit) {
   const auto parameters =
       parametersFromServer(ros::NodeHandle("/smartmill/kalman")).readAll<NodeParameters>();
   std::vector<BagCut> cuts;
-  const BagSummary summary = compensateBag(file, ForceSensor(), parameters, Method::kalman,
+  const BagSummary summary = compensateBag(file, ForceSensor(), parameters, Method::kalman, {},
                                            [&](BagCut&& c) { cuts.push_back(std::move(c)); });
   ASSERT_EQ(cuts.size(), 1u);
   EXPECT_TRUE(summary.rotation_known);
@@ -233,7 +233,7 @@ TEST_F(MeasureFrf, TapsThenCutsAndReplaysToTheLastDigit) {
   EXPECT_GT(same, 30000u);
 
   // The smoother, from the same bag, agrees but for the noise.
-  compensateBag(file, ForceSensor(), parameters, Method::smoother,
+  compensateBag(file, ForceSensor(), parameters, Method::smoother, {},
                 [&](BagCut&& c) { cuts.push_back(std::move(c)); });
   ASSERT_EQ(cuts.size(), 2u);
   double difference = 0.0, norm = 0.0;

@@ -28,10 +28,12 @@ std::optional<double> AngleTrack::at(double time) const {
   const auto after = std::lower_bound(readings_.begin(), readings_.end(), time,
                                       [](const SpindleAngle& r, double t) { return r.stamp < t; });
   const SpindleAngle& near = after == readings_.begin() ? *after : *(after - 1);
+  if (std::isnan(near.angle)) return {};  // at rest
   const double since = time - near.stamp;
   if (std::abs(since) > REACH) return {};
   double turned = near.speed * since;
-  if (after != readings_.end() && after != readings_.begin() && after->stamp - near.stamp <= REACH) {
+  if (after != readings_.end() && after != readings_.begin() && after->stamp - near.stamp <= REACH &&
+      !std::isnan(after->angle)) {
     // The number of revolutions between two readings follows from the speed.
     const double between = after->stamp - near.stamp;
     const double predicted = 0.5 * (near.speed + after->speed) * between;

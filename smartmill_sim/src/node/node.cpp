@@ -72,7 +72,11 @@ void Node::serve() {
   options.bind_address = parameters_.bind;
   server_ = std::make_unique<focas::Server>(options, world_->controller().calls());
   panel_.advertiseKeys(world_->controller());
-  angle_ = nh_.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, STREAM_QUEUE);
+  if (parameters_.world.pulse_train) {
+    tachometer_ = nh_.advertise<smartmill_msgs::SampleBlock>(names::TACHOMETER, STREAM_QUEUE);
+  } else {
+    angle_ = nh_.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, STREAM_QUEUE);
+  }
   ROS_INFO("sim: controller listens on %s:%d", parameters_.bind.c_str(), server_->port());
 }
 
@@ -137,7 +141,9 @@ void Node::publish(const World::Block& block) {
   // The ring in the flange is fixed to the spindle housing.
   if (!block.spindle_force.channels.empty())
     spindle_force_.publish(toMsg(shifted(block.spindle_force), frames::MACHINE));
-  if (server_) {
+  if (server_ && parameters_.world.pulse_train) {
+    tachometer_.publish(toMsg(shifted(block.tachometer)));
+  } else if (server_) {
     for (const SpindleAngle& angle : block.angle) angle_.publish(toMsg(shifted(angle)));
   } else {
     LoadSample load;

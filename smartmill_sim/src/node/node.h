@@ -24,9 +24,9 @@
 
 namespace smartmill::sim {
 
-/// The simulated machine on ROS: the controller on its port, sensors on daq/* and spindle/angle, hammers by
-/// the service daq/strike, true values on sim/truth/*, the operator's panel by services sim/panel/*. Runs in
-/// wall-clock time.
+/// The simulated machine on ROS: the controller on its port, sensors on daq/* and spindle/angle (or
+/// daq/tachometer), hammers by the service daq/strike, true values on sim/truth/*, the operator's panel by
+/// services sim/panel/*. Runs in wall-clock time.
 class Node {
  public:
   using Parameters = NodeParameters;
@@ -55,8 +55,8 @@ class Node {
   std::unique_ptr<focas::Server> server_;
 
   double start_ = 0.0;  // [s] stamp of sample 0
-  ros::Publisher hammer_, dynamometer_, spindle_force_, angle_, force_, vibration_, servo_, motor_current_,
-      coefficients_, load_meter_;
+  ros::Publisher hammer_, dynamometer_, spindle_force_, angle_, tachometer_, force_, vibration_, servo_,
+      motor_current_, coefficients_, load_meter_;
   LatchedTopic<smartmill_msgs::Frf> frf_;
   LatchedTopic<smartmill_msgs::ModalModel> modes_;
   ros::ServiceServer strike_server_;

@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "smartmill_core/error.h"
 #include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_sim/world/world.h"
 
@@ -36,7 +37,11 @@ struct NodeParameters {
                  "largest lag behind the clock; beyond it samples are lost, as with a real device");
   }
   /// @throws Error naming key and value.
-  void validate() const { checkBounds(*this); }
+  void validate() const {
+    checkBounds(*this);
+    if (world.pulse_train && !axes_input.empty())
+      throw Error("pulse_train: true, expected false with axes_input, whose source publishes spindle/angle");
+  }
 };
 
 }  // namespace smartmill::sim

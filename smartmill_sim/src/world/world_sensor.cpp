@@ -3,7 +3,10 @@
 #include <string>
 #include <utility>
 
+#include "smartmill_core/math/angle.h"
 #include "smartmill_core/signal/force_channels.h"
+#include "smartmill_core/signal/pulse_tachometer.h"
+#include "smartmill_core/units.h"
 #include "smartmill_sim/world/plate.h"
 #include "smartmill_sim/world/spindle_sensor.h"
 
@@ -13,6 +16,7 @@ namespace {
 using Names = std::vector<std::string>;
 
 constexpr std::uint64_t PLATE_SEED = 0x2000;  // offset from the seed of the world
+constexpr std::uint64_t TACHOMETER_SEED = 0x3000;
 
 template <class T>
 void beginBlock(T& block, double stamp, std::uint64_t first_index) {
@@ -141,6 +145,25 @@ class FlangeSensor : public BlockSensor {
   SpindleSensor& flange_;
 };
 
+/// Optical sensor at a mark on the spindle, with a digital output.
+class TachometerSensor : public BlockSensor {
+ public:
+  explicit TachometerSensor(std::uint64_t seed)
+      : BlockSensor(&World::Block::tachometer, {TACHOMETER_CHANNEL}, {"V"}),
+        random_{std::mt19937_64(seed), {}} {}
+
+  void read(const Sample& sample, World::Block& block) override {
+    constexpr double HIGH = 5.0, NOISE = 0.02;    // [V]
+    constexpr double MARK = 0.1 * units::TWO_PI;  // [rad] a sample at 150,000 rpm
+    const double angle =
+        wrapped(sample.motion.spindle_angle - 0.5 * sample.motion.spindle_speed / World::SAMPLE_RATE);
+    append(std::array<double, 1>{{(angle < MARK ? HIGH : 0.0) + random_.gaussian(NOISE)}}, block);
+  }
+
+ private:
+  WorldRandom random_;
+};
+
 class TrueValues : public BlockSensor {
  public:
   TrueValues() : BlockSensor(&World::Block::vibration, {"x", "y"}, {"m", "m"}) {}
@@ -209,6 +232,7 @@ std::vector<std::unique_ptr<WorldSensor>> makeSensors(const SensorContext& c) {
     add(ForceSensor(c.model.force_sensor.noise_rms.value_or(Axes3{{0, 0, 0}}), c.random));
   }
   if (c.flange) add(FlangeSensor(*c.flange));
+  if (c.options.pulse_train) add(TachometerSensor(c.options.seed + TACHOMETER_SEED));
   add(TrueValues());
   return sensors;
 }

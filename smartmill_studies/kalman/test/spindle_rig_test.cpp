@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include <gtest/gtest.h>
 
@@ -161,6 +162,39 @@ TEST(ExpandedDisturbance, KurtosisOfKnownDistributions) {
   }
   EXPECT_NEAR(kurtosis(uniform), 1.8, 1e-6);
   EXPECT_NEAR(kurtosis(sine), 1.5, 1e-6);
+}
+
+// A slot compensated with the angle of the encoder and with one pulse per revolution.
+TEST(SpindleRig, PulsesGiveTheForcesOfTheAngle) {
+  const MachineModel model = readMachineModel("../../launch/models/mill_twin.yaml");
+  for (const double rpm : {3000.0, 6000.0, 12000.0}) {
+    std::array<std::array<double, 3>, 2> error{};
+    std::array<std::vector<double>, 3> by_angle;
+    for (const bool pulses : {false, true}) {
+      sim::WorldOptions world;
+      world.pulse_train = pulses;
+      SpindleRig rig(model, world, {}, {}, true);
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        rig.sorted().forces().setModes(axis, 0.0, model.force_sensor.axis[axis], 1.0);
+      const auto cut = cutSlot(rig, model, units::radPerSecFromRpm(rpm), 0.8e-3, 0.1e-3, 0.6, 0.4);
+      const std::size_t n = cut.compensated[2].size();
+      ASSERT_GT(n, 8000u);
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        error[pulses ? 1 : 0][axis] = bandError(cut.compensated[axis], cut.truth[axis],
+                                                sim::World::SAMPLE_RATE, n / 10, n - n / 10, 5000.0);
+        if (pulses) {
+          const double difference = bandError(cut.compensated[axis], by_angle[axis], sim::World::SAMPLE_RATE,
+                                              n / 10, n - n / 10, 5000.0);
+          std::printf(
+              "%5.0f rpm, axis %zu: error %.2f %% by the angle, %.2f %% by pulses, difference %.2f %%\n", rpm,
+              axis, 100.0 * error[0][axis], 100.0 * error[1][axis], 100.0 * difference);
+          EXPECT_LT(difference, 0.01);
+          EXPECT_LT(error[1][axis], error[0][axis] + 0.005);
+        }
+      }
+      if (!pulses) by_angle = cut.compensated;
+    }
+  }
 }
 
 }  // namespace

@@ -63,6 +63,22 @@ TEST(Conversions, SpindleAngleAndLoad) {
   EXPECT_EQ(load.axis_load, (std::vector<double>{0.5, -0.125}));
 }
 
+// A pulse tachometer gives no angle at rest; a turning spindle without an angle is refused.
+TEST(Conversions, SpindleAngleIsUnknownOnlyAtRest) {
+  const double none = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_TRUE(std::isnan(recorded(SpindleAngle{STAMP, none, 0.0}).angle));
+  EXPECT_THAT(
+      [&] {
+        recorded(SpindleAngle{STAMP, none, 1.0});
+      },
+      ThrowsMessage<Error>(HasSubstr("spindle angle: not a finite number")));
+  EXPECT_THAT(
+      [&] {
+        recorded(SpindleAngle{STAMP, 0.0, none});
+      },
+      ThrowsMessage<Error>(HasSubstr("spindle angle: not a finite number")));
+}
+
 TEST(Conversions, CncState) {
   CncState state;
   state.stamp = STAMP;

@@ -56,6 +56,9 @@ std::array<std::vector<double>, 3> compensate(const Record& record, const std::a
 /// model; false without a model. @throws Error when a model cannot be read.
 bool measuresWorkpiece(const Campaign& campaign, const std::string& model_file);
 
+/// [rad/s] mean spindle speed of a record: of its tachometer, else the commanded one.
+double spindleSpeedOf(const Record& record, const CampaignTest& test);
+
 /// Negates fx, fy, fz: the reaction becomes the force on the tool.
 void negateForces(Record& record);
 

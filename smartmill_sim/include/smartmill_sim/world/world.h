@@ -34,6 +34,7 @@ struct WorldOptions {
   double force_scatter = 0.05;
   double load_step = LOAD_METER_STEP;
   int servo_trigger = 0;
+  bool pulse_train = false;
   StationTraits hammer;
   MotorTraits motor;
   SpindleSensorTraits spindle_sensor;
@@ -60,6 +61,9 @@ struct WorldOptions {
         "resolution of the loads that the controller reports, on the load meter's scale; 0: not rounded");
     table.number("servo_trigger", servo_trigger, "1", Range::notNegative(),
                  "N word of the block that sets the trigger in daq/servo; 0: none");
+    table.flag(
+        "pulse_train", pulse_train,
+        "true: daq/tachometer (one pulse of 5 V per revolution, at angle 0) in place of spindle/angle");
     table.part("hammer_", hammer);
     table.part("motor_", motor);
     table.part("spindle_sensor_", spindle_sensor);
@@ -96,6 +100,7 @@ class World {
     SampleBlock dynamometer;    ///< fx, fy, fz [N]; with a plate also mx, my, mz [N m]
     SampleBlock spindle_force;  ///< x1 .. z2 [N]; no channels without these sensors
     std::array<SpindleAngle, ANGLES> angle;
+    SampleBlock tachometer;     ///< one pulse per revolution [V]; no channels without pulse_train
     ForceBlock force;           ///< true cutting force on the tool
     SampleBlock vibration;      ///< true displacement of the tip, x, y [m]
     SampleBlock servo;          ///< ServoRecorder's: spindle load and axis currents at 1 kHz

@@ -12,6 +12,7 @@ constexpr const char* DYNAMOMETER = "daq/dynamometer";
 constexpr const char* SPINDLE_FORCE = "daq/spindle_force";
 constexpr const char* MOTOR_CURRENT = "daq/motor_current";
 constexpr const char* DISPLACEMENT = "daq/displacement";
+constexpr const char* TACHOMETER = "daq/tachometer";
 constexpr const char* SPINDLE_ANGLE = "spindle/angle";
 constexpr const char* CNC_STATE = "cnc/state";
 constexpr const char* CNC_LOAD = "cnc/load";

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <set>
@@ -54,6 +55,21 @@ std::map<std::string, double> readStreamOffsets(const StrictYaml& map) {
   return offsets;
 }
 
+PulseTachometerParameters readTachometer(const StrictYaml& map) {
+  PulseTachometerParameters tachometer;
+  const double pulses =
+      map.optionalNumber("pulses_per_revolution", Range::closed(1.0, 10000.0)).value_or(1.0);
+  if (pulses != std::floor(pulses))
+    map.fail("pulses_per_revolution", yamlNumber(pulses) + " is not an integer");
+  tachometer.pulses_per_revolution = static_cast<int>(pulses);
+  tachometer.threshold = map.optionalNumber("threshold_v", Range{}).value_or(tachometer.threshold);
+  tachometer.hysteresis = map.optionalNumber("hysteresis_v", NOT_NEGATIVE).value_or(tachometer.hysteresis);
+  if (map.has("edge")) tachometer.falling = map.oneOf("edge", {"rising", "falling"}) == "falling";
+  tachometer.angle = units::radFromDeg(map.optionalNumber("angle_deg", Range{}).value_or(0.0));
+  map.finish();
+  return tachometer;
+}
+
 CampaignTest readTest(const StrictYaml& map) {
   CampaignTest test;
   test.name = map.word("name");
@@ -65,7 +81,8 @@ CampaignTest readTest(const StrictYaml& map) {
     const StrictYaml channels = map.map("channels");
     for (const std::string& key : channels.keys()) {
       // A sound file may contain any column of a record; its reader rejects others.
-      if (test.file_format == "sound" || key == "fx" || key == "fy" || key == "fz")
+      if (test.file_format == "sound" || key == "fx" || key == "fy" || key == "fz" ||
+          key == TACHOMETER_CHANNEL)
         test.channels[key] = channels.word(key);
     }
     channels.finish();
@@ -99,6 +116,7 @@ CampaignTest readTest(const StrictYaml& map) {
   test.cut_time_before = map.optionalNumber("cut_time_before_s", NOT_NEGATIVE);
   if (const auto offsets = map.optionalMap("stream_offset_s"))
     test.stream_offset = readStreamOffsets(*offsets);
+  if (const auto tachometer = map.optionalMap("tachometer")) test.tachometer = readTachometer(*tachometer);
   map.finish();
   return test;
 }
@@ -183,6 +201,13 @@ void writeCampaign(const Campaign& campaign, const std::string& folder) {
     if (!test.stream_offset.empty()) out << "  stream_offset_s:\n";
     for (const auto& [group, offset] : test.stream_offset)
       out << "    " << group << ": " << yamlNumber(offset) << "\n";
+    if (test.tachometer) {
+      const PulseTachometerParameters& t = *test.tachometer;
+      out << "  tachometer: {pulses_per_revolution: " << t.pulses_per_revolution
+          << ", threshold_v: " << yamlNumber(t.threshold) << ", hysteresis_v: " << yamlNumber(t.hysteresis)
+          << ", edge: " << (t.falling ? "falling" : "rising")
+          << ", angle_deg: " << yamlNumber(units::degFromRad(t.angle)) << "}\n";
+    }
   }
   std::error_code ignored;
   fs::create_directories(folder, ignored);

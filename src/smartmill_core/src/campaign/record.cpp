@@ -256,7 +256,33 @@ std::vector<double>& Record::add(const std::string& name) {
   return columns.emplace_back();
 }
 
-Record readRecord(const Campaign& campaign, const CampaignTest& test) {
+namespace {
+
+/// Makes spindle_angle of the pulses of a tachometer, whose column is removed.
+void replaceTachometer(const CampaignTest& test, Record* record) {
+  const auto at = std::find(record->names.begin(), record->names.end(), TACHOMETER_CHANNEL);
+  if (at == record->names.end()) {
+    if (test.tachometer)
+      throw Error(record->file + ": column tachometer is missing (test " + test.name +
+                  " has key tachometer)");
+    return;
+  }
+  const auto column = record->columns.begin() + (at - record->names.begin());
+  const std::vector<double> volts = std::move(*column);
+  record->columns.erase(column);
+  record->names.erase(at);
+  const std::string where = record->file + ": column tachometer";
+  if (!test.tachometer) {
+    record->notes.push_back(where + " is not used: its test has no key tachometer");
+  } else if (record->has("spindle_angle")) {
+    record->notes.push_back(where + " is not used: the record has spindle_angle");
+  } else {
+    record->add("spindle_angle") =
+        angleOfPulses(record->time, volts, *test.tachometer, where, &record->notes);
+  }
+}
+
+Record readColumns(const Campaign& campaign, const CampaignTest& test) {
   const std::string path = campaign.pathOf(test);
   if (test.file_format == "dynoware") return readDynowareAt(path, test.channels, test.sample_rate);
   if (test.file_format != "sound") {
@@ -272,6 +298,14 @@ Record readRecord(const Campaign& campaign, const CampaignTest& test) {
   }
   const Record record = readSoundRecord(path, soundChannels(channels));
   checkTime(record, 1, test.sample_rate);
+  return record;
+}
+
+}  // namespace
+
+Record readRecord(const Campaign& campaign, const CampaignTest& test) {
+  Record record = readColumns(campaign, test);
+  replaceTachometer(test, &record);
   return record;
 }
 

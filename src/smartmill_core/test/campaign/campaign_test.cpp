@@ -107,6 +107,57 @@ TEST(Campaign, rejectsSlowChannelsWithoutATest) {
   refuses("test: air, channel: load_meter, file: a.csv, sample_rate_hz: 50, unit: V", "unit");
 }
 
+// One pulse per revolution at 1000 rpm: 10 V below the threshold of 5 V once in 60 ms.
+TEST(Campaign, makesTheSpindleAngleOfATachometer) {
+  const TemporaryFolder folder;
+  const std::string header =
+      "format: smartmill-campaign/1\nmodel: model.yaml\ntests:\n"
+      "- {name: air, kind: air, file: air.csv, sample_rate_hz: 1000, spindle_speed_rpm: 1000";
+  std::string csv = "time[s],fx[N],tachometer[V]\n";
+  for (int i = 0; i < 500; ++i) csv += formatted("%.3f,0,%d\n", 1e-3 * i, i % 60 < 10 ? 0 : 10);
+  folder.write("air.csv", csv);
+  folder.write("campaign.yaml",
+               header + ", tachometer: {threshold_v: 5, hysteresis_v: 2, edge: falling, angle_deg: 90}}\n");
+  const Campaign campaign = readCampaign(folder.file("."));
+  const Record record = readRecord(campaign, campaign.tests[0]);
+  EXPECT_FALSE(record.has("tachometer"));
+  const std::vector<double>& angle = record.column("spindle_angle");
+  for (std::size_t i = 0; i < angle.size(); ++i) {
+    // The pulse is half a sample before the first low sample.
+    const double turned = units::TWO_PI * (static_cast<double>(i) + 0.5) / 60.0 + 0.5 * units::PI;
+    EXPECT_NEAR(std::remainder(angle[i] - turned, units::TWO_PI), 0.0, 1e-6) << i;
+  }
+  writeCampaign(campaign, folder.file("copy"));
+  const CampaignTest again = readCampaign(folder.file("copy")).tests[0];
+  ASSERT_TRUE(again.tachometer);
+  EXPECT_DOUBLE_EQ(again.tachometer->threshold, 5.0);
+  EXPECT_TRUE(again.tachometer->falling);
+  EXPECT_NEAR(again.tachometer->angle, 0.5 * units::PI, 1e-9);
+
+  const auto refusal = [&](const std::string& key) {
+    folder.write("campaign.yaml", header + ", tachometer: " + key + "}\n");
+    try {
+      const Campaign bad = readCampaign(folder.file("."));
+      readRecord(bad, bad.tests[0]);
+      return std::string();
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+  };
+  EXPECT_THAT(refusal("{threshold_v: 50}"), HasSubstr("air.csv: column tachometer: 0 pulses through 50 V"));
+  EXPECT_THAT(refusal("{pulses_per_revolution: 1.5}"), HasSubstr("pulses_per_revolution"));
+  EXPECT_THAT(refusal("{volt: 1}"), HasSubstr("volt"));
+  // Without the key the column is not used; with the key and without the column the record is refused.
+  folder.write("campaign.yaml", header + "}\n");
+  const Campaign without = readCampaign(folder.file("."));
+  const Record unused = readRecord(without, without.tests[0]);
+  EXPECT_FALSE(unused.has("spindle_angle"));
+  EXPECT_EQ(unused.notes.size(), 1u);
+  folder.write("air.csv", "time[s],fx[N]\n0,0\n0.001,0\n");
+  EXPECT_THAT(refusal("{}"),
+              HasSubstr("air.csv: column tachometer is missing (test air has key tachometer)"));
+}
+
 TEST(Campaign, readsAndWritesEveryKey) {
   const TemporaryFolder folder;
   folder.write("campaign.yaml", CAMPAIGN);

@@ -7,6 +7,7 @@
 
 #include "smartmill_core/cutting/tool.h"
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/signal/pulse_tachometer.h"
 
 namespace smartmill {
 
@@ -33,6 +34,8 @@ struct CampaignTest {
   std::string direction;                  ///< of a tap: x, y or z
   /// [s] by which a group of columns (streamGroups()) is recorded later than the rest, where it is known.
   std::map<std::string, double> stream_offset;
+  /// Column tachometer: readRecord() makes spindle_angle of its pulses.
+  std::optional<PulseTachometerParameters> tachometer;
 };
 
 /// smartmill-campaign/1: a folder with campaign.yaml and one CSV a test.

@@ -17,7 +17,7 @@ struct RecordColumn {
   double si;         ///< SI value of one in the CSV
 };
 
-inline constexpr std::array<RecordColumn, 20> RECORD_COLUMNS{{{"time", "s", 1.0},
+inline constexpr std::array<RecordColumn, 21> RECORD_COLUMNS{{{"time", "s", 1.0},
                                                               {"spindle_angle", "rad", 1.0},
                                                               {"fx", "N", 1.0},
                                                               {"fy", "N", 1.0},
@@ -36,7 +36,8 @@ inline constexpr std::array<RecordColumn, 20> RECORD_COLUMNS{{{"time", "s", 1.0}
                                                               {"axis_vz", "mm/min", units::MM / 60.0},
                                                               {"current_x", "A", 1.0},
                                                               {"current_y", "A", 1.0},
-                                                              {"current_z", "A", 1.0}}};
+                                                              {"current_z", "A", 1.0},
+                                                              {"tachometer", "V", 1.0}}};
 
 /// @return nullptr for a name that is not a column
 const RecordColumn* recordColumn(std::string_view name);

@@ -40,7 +40,10 @@ void write(const SampleBlock& block, const std::string& frame_id, M& m) {
 
 template <class M>
 void read(const M& m, SpindleAngle& out) {
-  if (!std::isfinite(m.angle) || !std::isfinite(m.speed)) throw Error("spindle angle: not a finite number");
+  // A pulse tachometer does not determine the angle at rest.
+  const bool at_rest = m.speed == 0.0 && std::isnan(m.angle);
+  if (!std::isfinite(m.speed) || !(std::isfinite(m.angle) || at_rest))
+    throw Error("spindle angle: not a finite number");
   out = {secondsOf(m.header.stamp), m.angle, m.speed};
 }
 
