@@ -167,6 +167,16 @@ void fromBag(const Request& request) {
   const std::string model_file = request.model.empty() ? parameters.model : request.model;
   if (model_file.empty()) throw Error(request.source + ": bag without a machine model (--model)");
   const MachineModel model = readMachineModel(model_file);
+  if (model.force_sensor.channels) {
+    const kalman::ChannelForces channels(*model.force_sensor.channels);
+    std::printf("%zu channels to %zu components, condition number %.2f", channels.channels(),
+                channels.components(), channels.condition());
+    for (std::size_t c = 0; c < channels.deviations().size(); ++c) {
+      std::printf("%s %s %.3g %s", c == 0 ? "; standard deviation" : ",", PLATE_CHANNELS[c],
+                  channels.deviations()[c], c < 3 ? "N" : "N m");
+    }
+    std::printf("\n");
+  }
   const bool terminal = isatty(STDERR_FILENO);
   std::set<std::string> used;
   std::vector<std::future<std::string>> written;  // while the bag is read on

@@ -35,6 +35,7 @@ CompensationPipeline::CompensationPipeline(const CompensationParameters& paramet
       angles_(parameters.track_speed ? sorter_.addUnawaited(names::SPINDLE_ANGLE)
                                      : sorter_.addRegular(names::SPINDLE_ANGLE)),
       blocks_(sorter_.addRegular(names::DYNAMOMETER)) {
+  if (sensor.channels) channels_.emplace(*sensor.channels);
   sorter_.onRestart([this] {
     identification_.reset();
     forces_.reset();
@@ -68,12 +69,14 @@ double CompensationPipeline::ageOfModes() const {
 
 // Checked before it waits in the sorter: an error belongs to the topic of the block, not to that of the input
 // that releases it.
-void CompensationPipeline::push(SampleBlock block) {
+void CompensationPipeline::push(SampleBlock channels) {
+  const bool combines = channels_ && channels_->isOf(channels);
+  SampleBlock block = combines ? channels_->forces(channels) : channels;
   forces_.check(block);
   const double stamp = block.stamp;
-  sorter_.push(blocks_, stamp, [this, block = std::move(block)] {
+  sorter_.push(blocks_, stamp, [this, channels = std::move(channels), block = std::move(block)] {
     try {
-      handle(block);
+      handle(channels, block);
     } catch (const Error& error) {
       if (!outputs_.block_error) throw;
       outputs_.block_error(error.what());
@@ -82,8 +85,8 @@ void CompensationPipeline::push(SampleBlock block) {
   });
 }
 
-void CompensationPipeline::handle(const SampleBlock& block) {
-  stuck_.handle(block);
+void CompensationPipeline::handle(const SampleBlock& channels, const SampleBlock& block) {
+  stuck_.handle(channels);
   identification_.handleChannels(block);
   if (const SampleBlock* forces = forces_.handle(block)) identification_.handleForces(*forces);
 }

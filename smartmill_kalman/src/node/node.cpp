@@ -15,6 +15,7 @@
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/frames.h"
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/signal/force_channels.h"
 #include "smartmill_recording/conversion/fields.h"
 #include "smartmill_ros/node_main.h"
 #include "smartmill_ros/parameter_server.h"
@@ -276,6 +277,15 @@ void KalmanNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   status.add("blocks not compensated", failed_blocks_);
   status.add("blocks waiting for a transform", waiting_.size());
   status.add("blocks dropped for want of a transform", dropped_blocks_);
+  if (const ChannelForces* channels = pipeline_.channels()) {
+    status.add("channels of the sensor", channels->channels());
+    status.add("condition number of the channels [1]", channels->condition());
+    static constexpr const char* UNITS[] = {"N", "N m"};
+    for (std::size_t c = 0; c < channels->deviations().size(); ++c) {
+      status.add(formatted("standard deviation of %s [%s]", PLATE_CHANNELS[c], UNITS[c / 3]),
+                 channels->deviations()[c]);
+    }
+  }
   if (spindle) {
     status.add("samples with a sensor unloaded", spindle->unloaded);
     status.add("samples with a sensor overloaded", spindle->overloaded);

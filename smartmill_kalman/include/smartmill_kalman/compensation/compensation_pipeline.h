@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "smartmill_core/model/force_sensor_kind.h"
@@ -9,6 +10,7 @@
 #include "smartmill_kalman/compensation/compensation_outputs.h"
 #include "smartmill_kalman/compensation/sensor_forces.h"
 #include "smartmill_kalman/compensation/sensor_identification.h"
+#include "smartmill_kalman/sensor/channel_forces.h"
 #include "smartmill_kalman/sensor/stuck_channel.h"
 
 namespace smartmill::kalman {
@@ -31,6 +33,8 @@ class CompensationPipeline {
   const SensorForces& forces() const { return forces_; }
   const SensorIdentification& identification() const { return identification_; }
   const StreamSorter& sorter() const { return sorter_; }
+  /// Channels of the machine model's sensor; nullptr: its forces are measured.
+  const ChannelForces* channels() const { return channels_ ? &*channels_ : nullptr; }
   /// Channel of the force sensor whose samples have not changed for longest.
   const StuckChannel& stuck() const { return stuck_; }
   /// Kind of the sensor. Six sensors in the spindle and a plate give no force until they are calibrated.
@@ -67,12 +71,13 @@ class CompensationPipeline {
   void flush();
 
  private:
-  void handle(const SampleBlock& block);
+  void handle(const SampleBlock& channels, const SampleBlock& block);
 
   Outputs outputs_;
   StreamSorter sorter_;
   SensorForces forces_;
   SensorIdentification identification_;
+  std::optional<ChannelForces> channels_;
   StuckChannel stuck_;
   StreamSorter::Stream conditions_, goals_, hammers_, angles_, blocks_;
 };

@@ -93,6 +93,83 @@ void readCutting(const StrictYaml& map, MachineModel& model) {
   if (any_std) model.cutting_std = std_dev;
 }
 
+Axes3 axes3(const std::vector<double>& v, double unit) {
+  return {v[0] * unit, v[1] * unit, v[2] * unit};
+}
+
+double forcePerUnit(const StrictYaml& map, const std::string& key, double value) {
+  if (value == 0.0) map.fail(key, "0, expected a number other than 0");
+  return value;
+}
+
+/// The channels of a piezoelectric dynamometer with four three-component sensors at x = +-a, y = +-b,
+/// numbered from (a, b) counter-clockwise; lateral channels are summed in pairs.
+std::vector<SensorChannel> kistlerChannels(const StrictYaml& map) {
+  const double a = map.number("distance_x_mm", POSITIVE) * units::MM;
+  const double b = map.number("distance_y_mm", POSITIVE) * units::MM;
+  const double z = map.optionalNumber("height_mm", ANY).value_or(0.0) * units::MM;
+  Axes3 scale{{1.0, 1.0, 1.0}};
+  if (map.has("n_per_unit")) scale = axes3(map.numbers("n_per_unit", 3), 1.0);
+  for (const double s : scale) forcePerUnit(map, "n_per_unit", s);
+  const Axes3 x{{1, 0, 0}}, y{{0, 1, 0}}, up{{0, 0, 1}};
+  return {{"fx12", scale[0], x, {{0, b, z}}, {}},   {"fx34", scale[0], x, {{0, -b, z}}, {}},
+          {"fy14", scale[1], y, {{a, 0, z}}, {}},   {"fy23", scale[1], y, {{-a, 0, z}}, {}},
+          {"fz1", scale[2], up, {{a, b, z}}, {}},   {"fz2", scale[2], up, {{-a, b, z}}, {}},
+          {"fz3", scale[2], up, {{-a, -b, z}}, {}}, {"fz4", scale[2], up, {{a, -b, z}}, {}}};
+}
+
+SensorChannel readChannel(const StrictYaml& map, std::size_t components) {
+  SensorChannel channel;
+  channel.name = map.word("name");
+  if (map.has("response")) {
+    channel.response = map.numbers("response", components);
+  } else {
+    channel.direction = axes3(map.numbers("direction", 3), 1.0);
+    const double length = std::hypot(channel.direction[0], channel.direction[1], channel.direction[2]);
+    if (!(length > 0.0)) map.fail("direction", "has length 0");
+    for (double& d : channel.direction) d /= length;
+    if (components == 6 || map.has("position_mm"))
+      channel.position = axes3(map.numbers("position_mm", 3), units::MM);
+    channel.force_per_unit =
+        forcePerUnit(map, "n_per_unit", map.optionalNumber("n_per_unit", ANY).value_or(1.0));
+  }
+  map.finish();
+  return channel;
+}
+
+SensorChannels readSensorChannels(const StrictYaml& map) {
+  SensorChannels sensor;
+  if (map.has("unit")) sensor.unit = map.word("unit");
+  sensor.noise_rms = map.optionalNumber("noise_rms", POSITIVE);
+  if (map.has("components")) {
+    sensor.components = static_cast<std::size_t>(map.integer("components", 3, 6));
+    if (sensor.components != 3 && sensor.components != 6)
+      map.fail("components", std::to_string(sensor.components) + ", expected 3 (forces) or 6 (and moments)");
+  }
+  if (map.has("arrangement")) {
+    map.oneOf("arrangement", {"kistler_8"});
+    sensor.channels = kistlerChannels(map);
+  } else {
+    bool measured = false;
+    for (const StrictYaml& entry : map.maps("list")) {
+      const SensorChannel channel = readChannel(entry, sensor.components);
+      if (!sensor.channels.empty() && measured != !channel.response.empty())
+        map.fail("list", "channel " + channel.name + ": expected response for all channels or for none");
+      measured = !channel.response.empty();
+      for (const SensorChannel& other : sensor.channels) {
+        if (other.name == channel.name) map.fail("list", "channel " + channel.name + " occurs twice");
+      }
+      sensor.channels.push_back(channel);
+    }
+  }
+  if (sensor.channels.size() < sensor.components) {
+    map.fail("list", std::to_string(sensor.channels.size()) + " channels, expected at least " +
+                         std::to_string(sensor.components) + " for as many components");
+  }
+  map.finish();
+  return sensor;
+}
+
 void readForceSensor(const StrictYaml& map, ForceSensor& sensor) {
   for (std::size_t a = 0; a < 3; ++a) {
     sensor.axis[a].modes = readModes(map, AXIS_NAMES[a], ModeKind::gain);
@@ -111,6 +188,7 @@ void readForceSensor(const StrictYaml& map, ForceSensor& sensor) {
     sensor.measures_workpiece =
         map.oneOf("measures", {"force_on_tool", "force_on_workpiece"}) == "force_on_workpiece";
   }
+  if (const auto channels = map.optionalMap("channels")) sensor.channels = readSensorChannels(*channels);
   if (map.has("samples")) sensor.mean_samples = map.oneOf("samples", {"instant", "mean"}) == "mean";
   map.finish();
 }

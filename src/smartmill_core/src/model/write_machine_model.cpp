@@ -111,12 +111,30 @@ void writeToolTip(std::ostream& out, const MachineModel& model) {
   writeModes(out, "  ", "y", model.tool_tip.y.modes, ModeKind::stiffness);
 }
 
+void writeChannels(std::ostream& out, const SensorChannels& sensor) {
+  out << "  channels:\n    unit: " << yamlWord(sensor.unit) << "\n    components: " << sensor.components
+      << "\n";
+  if (sensor.noise_rms) writeKey(out, "    ", "noise_rms", *sensor.noise_rms);
+  out << "    list:\n";
+  for (const SensorChannel& c : sensor.channels) {
+    out << "    - {name: " << yamlWord(c.name);
+    if (!c.response.empty()) {
+      out << ", response: " << list(c.response, 1.0);
+    } else {
+      out << ", direction: " << point(c.direction, 1.0) << ", position_mm: " << point(c.position, units::MM)
+          << ", n_per_unit: " << yamlNumber(c.force_per_unit);
+    }
+    out << "}\n";
+  }
+}
+
 void writeForceSensor(std::ostream& out, const ForceSensor& sensor) {
   out << "force_sensor:\n";
   for (std::size_t a = 0; a < 3; ++a)
     writeModes(out, "  ", AXIS_NAMES[a], sensor.axis[a].modes, ModeKind::gain);
   if (sensor.noise_rms) out << "  noise_rms_n: " << point(*sensor.noise_rms, 1.0) << "\n";
   if (sensor.measures_workpiece) out << "  measures: force_on_workpiece\n";
+  if (sensor.channels) writeChannels(out, *sensor.channels);
   if (sensor.mean_samples) out << "  samples: mean\n";
 }
 

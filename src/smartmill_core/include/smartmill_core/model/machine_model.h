@@ -9,6 +9,7 @@
 #include "smartmill_core/cutting/friction.h"
 #include "smartmill_core/cutting/tool.h"
 #include "smartmill_core/modal/modal_model.h"
+#include "smartmill_core/model/sensor_channels.h"
 
 namespace smartmill {
 
@@ -28,7 +29,8 @@ struct ForceSensor {
   std::array<ModalModel, 3> axis;
   std::optional<Axes3> noise_rms;   ///< [N]
   bool measures_workpiece = false;  ///< measures the reaction on the workpiece; the sign is reversed on input
-  bool mean_samples = false;        ///< a sample is the mean over its interval, not instantaneous
+  std::optional<SensorChannels> channels;  ///< from which fx, fy, fz follow; nothing: these are measured
+  bool mean_samples = false;               ///< a sample is the mean over its interval, not instantaneous
 };
 
 /// Spindle friction, load meter and limits.
