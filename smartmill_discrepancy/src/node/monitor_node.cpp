@@ -22,11 +22,19 @@ MonitorParameters read(const ros::NodeHandle& private_nh) {
   return parameters;
 }
 
+/// The monitor compares daq/dynamometer, whose axes must be those of the machine. @throws Error.
+MachineModel readAligned(const std::string& file) {
+  MachineModel model = readMachineModel(file);
+  if (placedFrame(model.frames, frames::DYNAMOMETER, frames::MACHINE).isTurned())
+    throw Error(file + ": frames.dynamometer is turned, expected an aligned one for the monitor");
+  return model;
+}
+
 }  // namespace
 
 MonitorNode::MonitorNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
     : parameters_(read(private_nh)),
-      model_(readMachineModel(parameters_.model)),
+      model_(readAligned(parameters_.model)),
       shell_(nh, private_nh, "none", INPUT_TIMEOUT),
       segments_(parameters_.segment, parameters_.hold_back,
                 [this](const RecordSegment& segment) { evaluate(segment); }),
@@ -86,7 +94,7 @@ void MonitorNode::record(const RecordSegment& segment) {
 bool MonitorNode::install(smartmill_msgs::InstallModel::Request& request,
                           smartmill_msgs::InstallModel::Response& response) {
   try {
-    MachineModel model = readMachineModel(request.file);
+    MachineModel model = readAligned(request.file);
     if (!model.force_sensor.noise_rms)
       throw Error(request.file + ": force_sensor.noise_rms_n: not found, expected for the gap");
     model_ = std::move(model);

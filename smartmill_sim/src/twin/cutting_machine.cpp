@@ -1,9 +1,21 @@
 #include "smartmill_sim/twin/cutting_machine.h"
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/frames.h"
 #include "twin/stage_run.h"
 
 namespace smartmill::sim {
+namespace {
+
+CuttingForce turned(CuttingForce force, const std::array<double, 9>& rotation) {
+  const std::array<double, 3> f = frames::rotate(rotation, {force.fx, force.fy, force.fz});
+  force.fx = f[0];
+  force.fy = f[1];
+  force.fz = f[2];
+  return force;
+}
+
+}  // namespace
 
 CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed feed, int corner_slices)
     : parts_(model, setUpOf(model, EffectSet(model)), time_step, feed, corner_slices) {
@@ -50,7 +62,12 @@ void CuttingMachine::step(const Input& input, Output& out) {
                   out.force.fz + input.sensor_force[2]}};
   if (effects.has(Stage::sensor_force)) effects.addForce(timeline.now(), out.applied);
   cut.moveTip(input, out.force, out.raw);
-  chain.measure(cut.last(), out.force, cut.contact.jump(), out.applied, input.motion.speed, out.raw);
+  if (to_sensor_) {
+    chain.measure(turned(cut.last(), *to_sensor_), turned(out.force, *to_sensor_), cut.contact.jump(),
+                  frames::rotate(*to_sensor_, out.applied), input.motion.speed, out.raw);
+  } else {
+    chain.measure(cut.last(), out.force, cut.contact.jump(), out.applied, input.motion.speed, out.raw);
+  }
   cut.endStep(out.force);
   if (effects.has(Stage::sensor_output)) effects.measure(Stage::sensor_output, timeline.now(), out.raw);
   chain.filter(out.raw);

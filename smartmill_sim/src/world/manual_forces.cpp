@@ -1,5 +1,7 @@
 #include "smartmill_sim/world/manual_forces.h"
 
+#include "smartmill_core/frames.h"
+
 namespace smartmill::sim {
 
 void ManualForces::hit(bool on_tool, std::size_t axis, const Hit& hit) {
@@ -18,7 +20,10 @@ void ManualForces::pull(const Vector& force, bool on_table) {
 ManualForces::Forces ManualForces::at(double time) const {
   Forces forces;
   forces.tip = pull_;
-  if (workpiece_.hit) forces.hammer = forces.workpiece[workpiece_.axis] = workpiece_.hit->force(time);
+  if (workpiece_.hit) {
+    forces.hammer = forces.workpiece[workpiece_.axis] = workpiece_.hit->force(time);
+    forces.workpiece = frames::rotate(from_sensor, forces.workpiece);
+  }
   if (tool_.hit) {
     const double hit = tool_.hit->force(time);
     forces.tip[tool_.axis] += hit;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/frames.h"
 #include "smartmill_core/units.h"
 #include "smartmill_sim/controller/nc_alarm.h"
 #include "world/world_sensor.h"
@@ -71,6 +72,14 @@ World::World(const MachineModel& model, const WorldOptions& options)
   if (model.workpiece) stock_.emplace(*model.workpiece, tool.radius());
   last_ = controller_.motion();
   machine_.resetLoadMeter(0.0);
+  const PlacedFrame dynamometer = placedFrame(model.frames, frames::DYNAMOMETER, frames::MACHINE);
+  if (dynamometer.isTurned()) {
+    if (options.plate.present)
+      throw Error(model.file + ": frames.dynamometer is turned, expected an aligned one with plate_present");
+    const std::array<double, 9>& r = dynamometer.rotation;
+    machine_.turnSensor({r[0], r[3], r[6], r[1], r[4], r[7], r[2], r[5], r[8]});
+    manual_.from_sensor = r;
+  }
   if (options.spindle_sensor.present)
     flange_.emplace(options.spindle_sensor, stepOf(options), SAMPLE_RATE, options.seed + FLANGE_SEED);
   sensors_ = makeSensors({model, options, stepOf(options), station_ ? &*station_ : nullptr,

@@ -164,6 +164,44 @@ TEST(ExpandedDisturbance, KurtosisOfKnownDistributions) {
   EXPECT_NEAR(kurtosis(sine), 1.5, 1e-6);
 }
 
+// The same slot with the dynamometer turned by 30 degrees about z: forces carried into the machine's axes.
+TEST(SpindleRig, ATurnedDynamometerGivesTheSameForces) {
+  std::array<std::array<double, 3>, 2> error{};
+  for (const bool turned : {false, true}) {
+    MachineModel model = readMachineModel("../../launch/models/mill_twin.yaml");
+    if (turned)
+      model.frames["dynamometer"] = {
+          "table", {{0.05, 0.02, 0.0}}, {{0.0, 0.0, std::sin(units::PI / 12.0), std::cos(units::PI / 12.0)}}};
+    const PlacedFrame placed = placedFrame(model.frames, "dynamometer", "machine");
+    SpindleRig rig(model, {}, {}, {}, true);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      rig.sorted().forces().setModes(axis, 0.0, model.force_sensor.axis[axis], 1.0);
+    auto cut = cutSlot(rig, model, units::radPerSecFromRpm(6000.0), 0.8e-3, 0.1e-3, 0.6, 0.4);
+    const std::size_t n = cut.compensated[2].size();
+    if (turned) {
+      // Without the rotation x differs.
+      EXPECT_GT(
+          bandError(cut.compensated[0], cut.truth[0], sim::World::SAMPLE_RATE, n / 10, n - n / 10, 5000.0),
+          0.2);
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+      std::array<double, 3> force{{cut.compensated[0][i], cut.compensated[1][i], cut.compensated[2][i]}},
+          moment{};
+      placed.carry(force, moment);
+      for (std::size_t axis = 0; axis < 3; ++axis) cut.compensated[axis][i] = force[axis];
+    }
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      error[turned ? 1 : 0][axis] = bandError(cut.compensated[axis], cut.truth[axis], sim::World::SAMPLE_RATE,
+                                              n / 10, n - n / 10, 5000.0);
+    }
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::printf("axis %zu: error %.2f %% aligned, %.2f %% turned by 30 degrees\n", axis,
+                100.0 * error[0][axis], 100.0 * error[1][axis]);
+    EXPECT_LT(error[1][axis], error[0][axis] + 0.005);
+  }
+}
+
 // A slot compensated with the angle of the encoder and with one pulse per revolution.
 TEST(SpindleRig, PulsesGiveTheForcesOfTheAngle) {
   const MachineModel model = readMachineModel("../../launch/models/mill_twin.yaml");

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "smartmill_core/model/machine_model.h"
@@ -68,6 +69,10 @@ class CuttingMachine {
   /// Sets the load meter to its steady value in an air cut.
   void resetLoadMeter(double spindle_speed);
 
+  /// The force sensor is turned: step() measures along its own axes. @param to_sensor row-major rotation from
+  /// the machine's axes to those of the sensor
+  void turnSensor(const std::array<double, 9>& to_sensor) { to_sensor_ = to_sensor; }
+
   Output step(const Input& input);
   /// As step() above, into an existing Output.
   void step(const Input& input, Output& output);
@@ -82,6 +87,7 @@ class CuttingMachine {
 
  private:
   CuttingParts parts_;
+  std::optional<std::array<double, 9>> to_sensor_;
 };
 
 }  // namespace smartmill::sim

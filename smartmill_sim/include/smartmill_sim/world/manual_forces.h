@@ -14,7 +14,8 @@ class ManualForces {
  public:
   using Vector = std::array<double, 3>;
 
-  /// Begins a hit along an axis. @param on_tool at the tool's tip; otherwise on the workpiece at tap_point
+  /// Begins a hit along an axis. @param on_tool at the tool's tip; otherwise on the workpiece at tap_point,
+  /// along an axis of the force sensor
   void hit(bool on_tool, std::size_t axis, const Hit& hit);
   bool hitting(double time) const;
   /// Constant force [N] on the tool's tip from now on. @param on_table whether it acts between tool and
@@ -33,6 +34,8 @@ class ManualForces {
   void skipTime(double time);
 
   Vector tap_point{{0, 0, 0}};  ///< [m] point of hits on the workpiece, from the plate's origin
+  /// Row-major rotation from the axes of the force sensor to those of the machine.
+  std::array<double, 9> from_sensor{{1, 0, 0, 0, 1, 0, 0, 0, 1}};
 
  private:
   struct AxisHit {

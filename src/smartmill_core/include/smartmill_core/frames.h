@@ -4,10 +4,12 @@
 
 namespace smartmill::frames {
 
-// tf2 frames: machine -> spindle -> tool_tip; machine -> table -> dynamometer; machine -> hammer.
+// tf2 frames: machine -> spindle -> tool_tip, spindle_sensor; machine -> table -> dynamometer; machine ->
+// hammer.
 constexpr const char* MACHINE = "machine";
 constexpr const char* SPINDLE = "spindle";
 constexpr const char* TOOL_TIP = "tool_tip";
+constexpr const char* SPINDLE_SENSOR = "spindle_sensor";
 constexpr const char* TABLE = "table";
 constexpr const char* DYNAMOMETER = "dynamometer";
 constexpr const char* HAMMER = "hammer";

@@ -5,6 +5,7 @@
 #include "machine_model_format.h"
 #include "smartmill_core/axis_names.h"
 #include "smartmill_core/cutting/coefficient_set.h"
+#include "smartmill_core/frames.h"
 #include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/model/strict_yaml.h"
@@ -193,6 +194,53 @@ void readForceSensor(const StrictYaml& map, ForceSensor& sensor) {
   map.finish();
 }
 
+FramePose readFrame(const StrictYaml& map, const std::string& parent) {
+  FramePose pose;
+  pose.parent = map.has("parent") ? map.word("parent") : parent;
+  if (map.has("position_mm")) pose.position = axes3(map.numbers("position_mm", 3), units::MM);
+  if (map.has("rotation_xyzw") && map.has("about_z_deg"))
+    map.fail("about_z_deg", "is stated together with rotation_xyzw, expected one of them");
+  if (const auto turn = map.optionalNumber("about_z_deg", ANY)) {
+    const double half = 0.5 * units::radFromDeg(*turn);
+    pose.rotation = {{0.0, 0.0, std::sin(half), std::cos(half)}};
+  } else if (map.has("rotation_xyzw")) {
+    const std::vector<double> q = map.numbers("rotation_xyzw", 4);
+    const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    // As the printed digits of a pose.
+    if (std::abs(length - 1.0) > 1e-3)
+      map.fail("rotation_xyzw", "has length " + yamlNumber(length, 4) + ", expected a unit quaternion");
+    for (std::size_t i = 0; i < 4; ++i) pose.rotation[i] = q[i] / length;
+  }
+  map.finish();
+  return pose;
+}
+
+FramePoses readFrames(const StrictYaml& map) {
+  FramePoses poses;
+  for (const std::string& name : map.keys()) {
+    const auto usual = usualFrames().find(name);
+    if (usual == usualFrames().end())
+      map.fail(name, "is not a frame (expected dynamometer, hammer, spindle_sensor, table or tool_tip)");
+    const FramePose pose = readFrame(map.map(name), usual->second.parent);
+    if (pose.parent != frames::MACHINE && pose.parent != frames::SPINDLE &&
+        usualFrames().count(pose.parent) == 0)
+      map.fail(name,
+               "parent '" + pose.parent + "' is not a frame (expected machine, spindle or a fixed one)");
+    poses[name] = pose;
+  }
+  map.finish();
+  for (const auto& [name, pose] : poses) {
+    // A chain that does not end at the machine or its spindle is a loop.
+    std::string at = name;
+    for (std::size_t i = 0; at != frames::MACHINE && at != frames::SPINDLE; ++i) {
+      if (i > usualFrames().size()) map.fail(name, "parent '" + pose.parent + "' is below it: a loop");
+      const auto stated = poses.find(at);
+      at = stated != poses.end() ? stated->second.parent : usualFrames().at(at).parent;
+    }
+  }
+  return poses;
+}
+
 Spindle readSpindle(const StrictYaml& map) {
   Spindle s;
   s.viscous = map.number("viscous_nm_s_per_rad", NOT_NEGATIVE);
@@ -356,6 +404,7 @@ MachineModel readMachineModel(const std::string& file) {
   if (const auto map = root.optionalMap("spindle")) model.spindle = readSpindle(*map);
   if (const auto map = root.optionalMap("axes")) model.axes = readAxes(*map);
   if (const auto map = root.optionalMap("hammer")) model.hammer = readHammer(*map);
+  if (const auto map = root.optionalMap("frames")) model.frames = readFrames(*map);
   if (const auto map = root.optionalMap("workpiece")) model.workpiece = readWorkpiece(*map);
   if (root.has("effects")) {
     for (const StrictYaml& map : root.maps("effects")) model.effects.push_back(readEffect(map, model));

@@ -128,6 +128,16 @@ void writeChannels(std::ostream& out, const SensorChannels& sensor) {
   }
 }
 
+void writeFrames(std::ostream& out, const FramePoses& poses) {
+  if (poses.empty()) return;
+  out << "frames:\n";
+  for (const auto& [name, pose] : poses) {
+    out << "  " << name << ": {parent: " << pose.parent
+        << ", position_mm: " << point(pose.position, units::MM)
+        << ", rotation_xyzw: " << list({pose.rotation.begin(), pose.rotation.end()}, 1.0) << "}\n";
+  }
+}
+
 void writeForceSensor(std::ostream& out, const ForceSensor& sensor) {
   out << "force_sensor:\n";
   for (std::size_t a = 0; a < 3; ++a)
@@ -214,6 +224,7 @@ void writeMachineModel(const MachineModel& model, const std::string& file) {
   if (model.cutting) out << cuttingSection(*model.cutting, model.cutting_std.value_or(NOT_IDENTIFIED));
   writeToolTip(out, model);
   writeForceSensor(out, model.force_sensor);
+  writeFrames(out, model.frames);
   if (model.spindle) writeSpindle(out, *model.spindle);
   if (model.axes) writeAxes(out, *model.axes);
   if (model.hammer) writeHammer(out, *model.hammer);

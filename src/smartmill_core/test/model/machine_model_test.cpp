@@ -148,6 +148,52 @@ TEST(MachineModel, anEmptyModelIsValidAndErrorsNameTheMissingSection) {
             folder.file("p.yaml") + ": cutting.Krc_n_per_mm2 is missing (needed to simulate a cut)");
 }
 
+// A dynamometer turned by 30 degrees on a shifted table: its axes and the lever arm by hand.
+TEST(MachineModel, framesCarryForcesAndMoments) {
+  const TemporaryFolder folder;
+  const std::string head = "format: smartmill-model/1\nframes:\n";
+  folder.write("model.yaml", head +
+                                 "  table: {position_mm: [100, 0, 0]}\n"
+                                 "  dynamometer: {position_mm: [0, 20, 50], about_z_deg: 30}\n");
+  const MachineModel model = readMachineModel(folder.file("model.yaml"));
+  const PlacedFrame placed = placedFrame(model.frames, "dynamometer", "machine");
+  EXPECT_TRUE(placed.isTurned());
+  EXPECT_FALSE(placedFrame(model.frames, "hammer", "machine").isTurned());
+  Axes3 force{{10.0, 0.0, -3.0}}, moment{{0.0, 0.0, 2.0}};
+  placed.carry(force, moment);
+  const double fx = 10.0 * std::cos(units::PI / 6.0), fy = 5.0;
+  EXPECT_NEAR(force[0], fx, 1e-12);
+  EXPECT_NEAR(force[1], fy, 1e-12);
+  EXPECT_NEAR(force[2], -3.0, 1e-12);
+  // r = (0.1, 0.02, 0.05)
+  EXPECT_NEAR(moment[0], 0.02 * -3.0 - 0.05 * fy, 1e-12);
+  EXPECT_NEAR(moment[1], 0.05 * fx - 0.1 * -3.0, 1e-12);
+  EXPECT_NEAR(moment[2], 2.0 + 0.1 * fy - 0.02 * fx, 1e-12);
+  writeMachineModel(model, folder.file("again.yaml"));
+  const FramePose again = readMachineModel(folder.file("again.yaml")).frames.at("dynamometer");
+  EXPECT_EQ(again.parent, "table");
+  EXPECT_NEAR(again.position[2], 0.05, 1e-12);
+  EXPECT_NEAR(again.rotation[2], std::sin(units::PI / 12.0), 1e-9);
+
+  const auto refusal = [&](const std::string& entry) {
+    folder.write("bad.yaml", head + "  " + entry + "\n");
+    return errorOf([&] { readMachineModel(folder.file("bad.yaml")); });
+  };
+  EXPECT_NE(refusal("dynamometer: {rotation_xyzw: [0, 0, 0.5, 1]}")
+                .find("frames.dynamometer.rotation_xyzw: has length 1.118, expected a unit quaternion"),
+            std::string::npos);
+  EXPECT_NE(
+      refusal("dynamometer: {parent: pallet}").find("frames.dynamometer: parent 'pallet' is not a frame"),
+      std::string::npos);
+  EXPECT_NE(refusal("dynamometer: {parent: hammer}\n  hammer: {parent: dynamometer}").find("a loop"),
+            std::string::npos);
+  EXPECT_NE(refusal("vice: {about_z_deg: 1}").find("frames.vice: is not a frame"), std::string::npos);
+  EXPECT_NE(refusal("table: {about_z_deg: 1, rotation_xyzw: [0, 0, 0, 1]}").find("expected one of them"),
+            std::string::npos);
+  EXPECT_EQ(errorOf([&] { placedFrame(model.frames, "tool_tip", "machine"); }),
+            "frames: no transform from tool_tip to machine: the chain ends at spindle");
+}
+
 TEST(MachineModel, errorsNameFileKeyAndValue) {
   const TemporaryFolder folder;
   const std::vector<Refusal> refusals{

@@ -9,6 +9,7 @@
 #include "smartmill_core/cutting/friction.h"
 #include "smartmill_core/cutting/tool.h"
 #include "smartmill_core/modal/modal_model.h"
+#include "smartmill_core/model/frame_poses.h"
 #include "smartmill_core/model/sensor_channels.h"
 
 namespace smartmill {
@@ -114,6 +115,7 @@ struct MachineModel {
   std::optional<Workpiece> workpiece;
   std::vector<EffectEntry> effects;
   Uncertainty uncertainty;
+  FramePoses frames;  ///< fixed frames that the file states
 
   /// A section that a program needs. @throws Error "FILE: NAME is missing (needed to WHY)".
   const ToolGeometry& needTool(const std::string& why) const;
