@@ -10,6 +10,7 @@
 #include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
+#include "smartmill_core/frames.h"
 #include "smartmill_core/signal/same_time.h"
 #include "station_control.h"
 #include "step_runner.h"
@@ -42,6 +43,11 @@ HammerSequence::HammerSequence(const HammerParameters& parameters, const Machine
   control_ =
       std::make_unique<StationControl>(parameters_, model.needHammer("measure the tool tip").range_volt);
   model.needTool("find a flute");
+  if (placedFrame(model.frames, frames::HAMMER, frames::MACHINE).isTurned()) {
+    throw Error(
+        model.file +
+        ": frames.hammer is turned, expected an aligned station: hits are along x and y of the machine");
+  }
   parameters_.validate();
 }
 

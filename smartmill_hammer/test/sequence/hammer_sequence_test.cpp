@@ -300,6 +300,20 @@ TEST(HammerSequence, ToleratesOneNaNAndEndsOnMany) {
   EXPECT_TRUE(retracted(machine));
 }
 
+// Hits are along x and y of the machine: a station along 45 degrees is refused.
+TEST(HammerSequence, RefusesATurnedStation) {
+  MachineModel model = ClosedFormMachine(1).model;
+  const double half = 0.125 * units::PI;
+  model.frames["hammer"] = {"machine", {{0, 0, 0}}, {{0.0, 0.0, std::sin(half), std::cos(half)}}};
+  try {
+    const HammerSequence sequence(HammerParameters(), model);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("frames.hammer is turned, expected an aligned station"),
+              std::string::npos);
+  }
+}
+
 TEST(HammerSequence, StatesThatThereIsNoToolOrNoHammer) {
   {
     ClosedFormMachine machine(8);

@@ -198,8 +198,10 @@ TEST(SpindleRig, ATurnedDynamometerGivesTheSameForces) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     std::printf("axis %zu: error %.2f %% aligned, %.2f %% turned by 30 degrees\n", axis,
                 100.0 * error[0][axis], 100.0 * error[1][axis]);
-    EXPECT_LT(error[1][axis], error[0][axis] + 0.005);
   }
+  // The rotation mixes the errors of x and y, whose size stays.
+  EXPECT_LT(std::hypot(error[1][0], error[1][1]), 1.1 * std::hypot(error[0][0], error[0][1]));
+  EXPECT_LT(error[1][2], error[0][2] + 0.002);
 }
 
 // A slot compensated with the angle of the encoder and with one pulse per revolution.
@@ -226,6 +228,10 @@ TEST(SpindleRig, PulsesGiveTheForcesOfTheAngle) {
           std::printf(
               "%5.0f rpm, axis %zu: error %.2f %% by the angle, %.2f %% by pulses, difference %.2f %%\n", rpm,
               axis, 100.0 * error[0][axis], 100.0 * error[1][axis], 100.0 * difference);
+          // Not passed through: the output of the sensor differs.
+          EXPECT_GT(bandError(cut.measured[axis], cut.compensated[axis], sim::World::SAMPLE_RATE, n / 10,
+                              n - n / 10, 5000.0),
+                    axis == 2 ? 0.002 : 0.1);
           EXPECT_LT(difference, 0.01);
           EXPECT_LT(error[1][axis], error[0][axis] + 0.005);
         }
