@@ -226,7 +226,7 @@ TEST(SpindleRig, PulsesGiveTheForcesOfTheAngle) {
           const double difference = bandError(cut.compensated[axis], by_angle[axis], sim::World::SAMPLE_RATE,
                                               n / 10, n - n / 10, 5000.0);
           std::printf(
-              "%5.0f rpm, axis %zu: error %.2f %% by the angle, %.2f %% by pulses, difference %.2f %%\n", rpm,
+              "%5.0f rpm, axis %zu: error %.2f %% by the angle, %.2f %% by pulses, difference %.4f %%\n", rpm,
               axis, 100.0 * error[0][axis], 100.0 * error[1][axis], 100.0 * difference);
           // Not passed through: the output of the sensor differs.
           EXPECT_GT(bandError(cut.measured[axis], cut.compensated[axis], sim::World::SAMPLE_RATE, n / 10,
