@@ -13,8 +13,8 @@ import atexit as _atexit
 from . import _smartmill
 from ._smartmill import Model
 from .discrepancy import explain, gap
-from .explanation import (ChannelGap, ChannelShare, Effect, Explanation, Finding, Gap, GapResult, Resemblance,
-                          RevolutionCurve, TestGap)
+from .explanation import (ChannelGap, ChannelShare, Effect, Explanation, Finding, Gap, GapResult, RecalibratedValue,
+                          Resemblance, RevolutionCurve, TestGap)
 from .force import coefficients, coefficients_of_means, compensate
 from .machine import machine_model, read_campaign, simulate
 from .modal import frf, modes
@@ -28,6 +28,7 @@ __all__ = [
     "compensate", "detect", "read_campaign", "machine_model", "Model",
     "ChannelGap", "ChannelShare", "Chatter", "ChatterRisk", "CoefficientResult", "Coefficients", "Compensated",
     "CompensatedCampaign", "Cut", "Effect", "Error", "Estimate", "Explanation", "Finding", "Frf", "Gap", "GapResult",
-    "Hit", "Lobes", "Mode", "Record", "Resemblance", "RevolutionCurve", "RobustPoint", "TestGap", "Tool", "UsageError"]
+    "Hit", "Lobes", "Mode", "Record", "RecalibratedValue", "Resemblance", "RevolutionCurve", "RobustPoint", "TestGap", "Tool",
+    "UsageError"]
 
 _atexit.register(_smartmill.wait_for_abandoned)

@@ -100,6 +100,17 @@ class TestGap:
 
 
 @dataclass(frozen=True)
+class RecalibratedValue:
+    """A nominal value that the records determine differently than the model states."""
+
+    name: str  #: key in the model file
+    before: float  #: unit of the key: stated
+    after: float  #: unit of the key
+    std: float  #: unit of the key, of the value after
+    deviations: float  #: [1] change over the stated uncertainty
+
+
+@dataclass(frozen=True)
 class ChannelShare:
     """One channel over all cuts: how much of its variance the models explain."""
 
@@ -128,9 +139,10 @@ class RevolutionCurve:
 class Explanation:
     """Why measurement and model differ."""
 
-    verdict: str  #: no_disagreement, explained, partly_explained or unknown_effect
+    verdict: str  #: no_disagreement, recalibrated, explained, partly_explained or unknown_effect
     sentence: str  #: for the machinist; may be empty
     effects: Tuple[Effect, ...]
+    recalibrated: Tuple[RecalibratedValue, ...]  #: of this verdict; most deviations first
     gap_before: Gap
     gap_after: Gap
     gap_named_only: Optional[Gap]  #: without the effects that have no name, where there are any

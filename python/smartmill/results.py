@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 # The compiled part finds all classes here.
-from .explanation import (ChannelGap, ChannelShare, Effect, Explanation, Finding, Gap, GapResult, Resemblance,
-                          RevolutionCurve, TestGap)
+from .explanation import (ChannelGap, ChannelShare, Effect, Explanation, Finding, Gap, GapResult, RecalibratedValue,
+                          Resemblance, RevolutionCurve, TestGap)
 from .quantities import RPM, ComplexArray, Error, Estimate, FloatArray, Progress, UsageError, _set
 
 

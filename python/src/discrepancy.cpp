@@ -72,8 +72,13 @@ py::object toPython(const Explanation& e, const std::string& summary) {
   const auto converted = [](const auto& item) { return toPython(item); };
   return make(
       "Explanation", arg("verdict") = nameOf(e.verdict), arg("sentence") = e.sentence,
-      arg("effects") = tupleOf(e.effects, converted), arg("gap_before") = toPython(e.before),
-      arg("gap_after") = toPython(e.after),
+      arg("effects") = tupleOf(e.effects, converted),
+      arg("recalibrated") = tupleOf(e.recalibrated,
+                                    [](const RecalibratedValue& v) {
+                                      return make("RecalibratedValue", v.name, v.before, v.after, v.std_dev,
+                                                  v.deviations);
+                                    }),
+      arg("gap_before") = toPython(e.before), arg("gap_after") = toPython(e.after),
       arg("gap_named_only") = e.named_only ? toPython(*e.named_only) : py::object(py::none()),
       arg("where") = tupleOf(e.where, converted), arg("unexplained") = tupleOf(e.unexplained, converted),
       arg("resembles") = tupleOf(e.resembles,

@@ -9,6 +9,7 @@
 #include "smartmill_discrepancy/data/labels.h"
 #include "smartmill_discrepancy/explain/empirical_residual_model.h"
 #include "smartmill_discrepancy/explain/outcome.h"
+#include "smartmill_discrepancy/explain/recalibration.h"
 #include "smartmill_discrepancy/explain/sentence.h"
 #include "smartmill_discrepancy/explain/verdict.h"
 #include "smartmill_discrepancy/explain/whitened_refit.h"
@@ -175,8 +176,10 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   noteToothPath(improved, &result);
   writeOutcome(bench, before, improved, folder, &result);
   addChatter(bench.data(), &result);
-  result.verdict = verdictOf(result);
+  result.verdict = verdictOf(result, search_options.negligible_excess);
   if (result.verdict == Verdict::no_disagreement) result.where.clear();
+  if (result.verdict == Verdict::recalibrated)
+    describeRecalibration(bench, hypotheses, search_options, found, &result);
   // A missing effect that acts in one test may look like a wrong label; the improved model decides.
   if (!labels.doubtful.empty() && !result.unexplained.empty())
     throwIfAny(data, doubtfulLabels(improved, bench.data(), options.bench.threads));

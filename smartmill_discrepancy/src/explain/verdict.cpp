@@ -185,13 +185,18 @@ MachineModel nameEffects(const Workbench& bench, const SearchOptions& options, c
   return model;
 }
 
-Verdict verdictOf(const Explanation& result) {
+Verdict verdictOf(const Explanation& result, double negligible_excess) {
   const auto empirical = static_cast<std::size_t>(
       std::count_if(result.effects.begin(), result.effects.end(),
                     [](const FoundEffect& f) { return findEffect(f.name)->empirical(); }));
   const bool all_known = result.unexplained.empty() && empirical == 0;
-  if (result.effects.size() == empirical)
-    return all_known ? Verdict::no_disagreement : Verdict::unknown_effect;
+  if (result.effects.size() == empirical) {
+    if (!all_known) return Verdict::unknown_effect;
+    const auto squares = [](double gap) { return gap * gap; };
+    return squares(result.before.fit) - squares(result.after.fit) < negligible_excess
+               ? Verdict::no_disagreement
+               : Verdict::recalibrated;
+  }
   return all_known ? Verdict::explained : Verdict::partly_explained;
 }
 

@@ -8,6 +8,7 @@
 
 #include "smartmill_core/axis_names.h"
 #include "smartmill_core/model/effect_catalogue.h"
+#include "smartmill_core/units.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -35,6 +36,7 @@ NominalFreedom::NominalFreedom(const MachineModel& nominal, const NominalFreedom
 void NominalFreedom::addToothPath() {
   const NominalFreedomOptions& o = options_;
   coordinates_.push_back({PATH_SHARE, 0.0, o.path_low, o.path_high, o.path_step, o.path_std});
+  stated_.emplace_back();
   scale_.push_back([](MachineModel& m, double factor) {
     auto path = std::find_if(m.effects.begin(), m.effects.end(), isToothPath);
     if (path == m.effects.end()) {
@@ -49,7 +51,12 @@ void NominalFreedom::add(std::string name, double value, double percent, Scale s
   if (value == 0.0 || !std::isfinite(value) || percent <= 0.0) return;
   const double std_dev = 0.01 * percent, reach = options_.reach * std_dev;
   coordinates_.push_back({std::move(name), 0.0, -reach, reach, options_.step * std_dev, std_dev});
+  stated_.emplace_back(value);
   scale_.push_back(std::move(scale));
+}
+
+std::optional<double> NominalFreedom::stated(std::size_t coordinate) const {
+  return stated_.at(coordinate);
 }
 
 void NominalFreedom::addCutting(const MachineModel& nominal) {
@@ -59,7 +66,7 @@ void NominalFreedom::addCutting(const MachineModel& nominal) {
     double percent = nominal.uncertainty.cutting;
     if (nominal.cutting_std && std::isfinite((*nominal.cutting_std).*c))
       percent = 100.0 * (*nominal.cutting_std).*c / value;
-    add(std::string("cutting.") + key.key, value, percent,
+    add(std::string("cutting.") + key.key, value / key.unit, percent,
         [c](MachineModel& m, double factor) { (*m.cutting).*c *= factor; });
   }
 }
@@ -78,7 +85,7 @@ void NominalFreedom::addModes(const MachineModel& nominal) {
         damping = std::min(damping * factor, 0.99);
       });
       if (!stiffness) continue;
-      add(mode + "stiffness_n_per_um", modes[k].gain, u.stiffness,
+      add(mode + "stiffness_n_per_um", units::UM / modes[k].gain, u.stiffness,
           [of, k](MachineModel& m, double factor) { of(m)[k].gain /= factor; });
     }
   };

@@ -37,6 +37,8 @@ void findings(std::ostream& out, const char* title, const std::vector<Finding>& 
 const char* sentenceOf(Verdict verdict) {
   static const std::map<Verdict, const char*> SENTENCES{
       {Verdict::no_disagreement, "Model and records agree within the noise."},
+      {Verdict::recalibrated,
+       "No effect is missing: with the values below in place of the stated ones, model and records agree."},
       {Verdict::explained, "The effects below explain the difference between model and records."},
       {Verdict::partly_explained,
        "The effects below explain a part of the difference; the rest is not in the catalogue."},
@@ -62,6 +64,19 @@ void verdict(std::ostream& out, const Explanation& e) {
       << number(e.after.heldout)
       << "</tr></table>\n<p>The gap is the RMS of (measured - simulated) over the noise; 1 is the noise "
          "floor.</p>\n";
+}
+
+void recalibrated(std::ostream& out, const std::vector<RecalibratedValue>& values) {
+  if (values.empty()) return;
+  out << "<h2>Values of the model</h2>\n<table><tr><th>value<th>stated<th>from the "
+         "records<th>change<th>stated "
+         "deviations</tr>\n";
+  for (const RecalibratedValue& v : values)
+    out << "<tr><td>" << v.name << "<td>" << number(v.before, "%.5g") << "<td>" << number(v.after, "%.5g")
+        << " &plusmn; " << number(v.std_dev, "%.2g") << "<td>"
+        << number(100.0 * (v.after / v.before - 1.0), "%+.2f %%") << "<td>" << number(v.deviations, "%+.1f")
+        << "</tr>\n";
+  out << "</table>\n";
 }
 
 void effects(std::ostream& out, const Explanation& e) {
@@ -156,6 +171,7 @@ void writeHtml(const Explanation& e, const std::string& campaign, const std::vec
   ReportPage page("Where simulation and measurement disagree: " + campaign);
   std::ostream& out = page.html();
   verdict(out, e);
+  recalibrated(out, e.recalibrated);
   effects(out, e);
   shares(out, e.channels);
   chattering(out, e.chattering);

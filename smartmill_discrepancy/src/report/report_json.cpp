@@ -93,10 +93,19 @@ Json effectsOf(const std::vector<FoundEffect>& effects) {
 
 void writeReport(const Explanation& e, const std::string& folder) {
   Json report;
-  report["format"] = "smartmill-report/1";
+  report["format"] = "smartmill-report/2";
   report["verdict"] = nameOf(e.verdict);
   report["where"] = findingsOf(e.where);
   report["effects"] = effectsOf(e.effects);
+  if (e.verdict == Verdict::recalibrated) {
+    report["recalibrated"] = Json::array();
+    for (const RecalibratedValue& v : e.recalibrated)
+      report["recalibrated"].push_back({{"name", v.name},
+                                        {"before", rounded(v.before)},
+                                        {"after", rounded(v.after)},
+                                        {"std", rounded(v.std_dev)},
+                                        {"deviations", rounded(v.deviations)}});
+  }
   report["resembles"] = Json::array();
   for (const Resemblance& r : e.resembles) {
     report["resembles"].push_back({{"name", r.name}, {"variant", r.variant}, {"reason", r.reason}});

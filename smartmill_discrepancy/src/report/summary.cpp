@@ -6,6 +6,9 @@ namespace smartmill::discrepancy {
 std::string summaryOf(const Explanation& e) {
   std::string lines = std::string("verdict: ") + nameOf(e.verdict) + "\n";
   if (!e.sentence.empty()) lines += e.sentence + "\n";
+  for (const RecalibratedValue& v : e.recalibrated)
+    lines += v.name + formatted(": %.5g -> %.5g +- %.2g, %+.1f stated deviations\n", v.before, v.after,
+                                v.std_dev, v.deviations);
   for (const FoundEffect& effect : e.effects) {
     lines += effect.name + ":";
     for (const auto& [key, word] : effect.words) lines += " " + key + " " + word;

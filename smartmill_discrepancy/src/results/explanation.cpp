@@ -6,8 +6,8 @@
 namespace smartmill::discrepancy {
 
 const char* nameOf(Verdict verdict) {
-  static const std::array<const char*, 4> NAMES{
-      {"no_disagreement", "explained", "partly_explained", "unknown_effect"}};
+  static const std::array<const char*, 5> NAMES{
+      {"no_disagreement", "explained", "partly_explained", "unknown_effect", "recalibrated"}};
   return NAMES.at(static_cast<std::size_t>(verdict));
 }
 

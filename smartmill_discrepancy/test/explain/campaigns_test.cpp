@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <map>
 #include <ostream>
 #include <string>
@@ -154,10 +155,66 @@ TEST(RecordsWithoutAngle, DeviatingNominalValuesAreNoEffect) {
   writeLess(full, less.file("."));
   writeMachineModel(believed, less.file("model.yaml"));
   const Explanation e = explained(less.file("."));
-  EXPECT_STREQ(nameOf(e.verdict), nameOf(Verdict::no_disagreement));
+  EXPECT_STREQ(nameOf(e.verdict), nameOf(Verdict::recalibrated));
   EXPECT_TRUE(e.effects.empty());
   EXPECT_LE(e.after.fit, 1.01);
   EXPECT_LE(e.after.heldout, 1.02);
+}
+
+// The records of a campaign under other statements about them.
+void writeStated(const Campaign& stated, const MachineModel& believed, const std::string& folder) {
+  for (const CampaignTest& test : stated.tests)
+    std::filesystem::create_symlink(stated.folder + "/" + test.file, folder + "/" + test.file);
+  writeMachineModel(believed, folder + "/model.yaml");
+  writeCampaign(stated, folder);
+}
+
+bool isNotSeparable(const Explanation& e, const std::string& effect) {
+  const std::vector<std::string> pair{"nominal values", effect};
+  return std::count(e.not_separable.begin(), e.not_separable.end(), pair) > 0;
+}
+
+TEST(NominalValues, ACommonFactorOfTheCoefficientsIsReportedAsARecalibration) {
+  SMARTMILL_SHARED_DATA(folder, "campaigns/none");
+  const TemporaryFolder stated;
+  const Campaign campaign = readCampaign(folder);
+  const MachineModel truth = readMachineModel(campaign.modelPath());
+  MachineModel believed = truth;
+  for (const CuttingKey& key : cuttingKeys()) (*believed.cutting).*key.coefficient /= 1.2;
+  writeStated(campaign, believed, stated.file("."));
+  const Explanation e = explained(stated.file("."));
+  EXPECT_STREQ(nameOf(e.verdict), nameOf(Verdict::recalibrated));
+  EXPECT_TRUE(e.effects.empty());
+  EXPECT_GT(e.before.fit, 1.5);
+  EXPECT_LE(e.after.heldout, 1.02);
+  std::size_t coefficients = 0;
+  for (const RecalibratedValue& v : e.recalibrated) {
+    for (const CuttingKey& key : cuttingKeys()) {
+      if (v.name != std::string("cutting.") + key.key) continue;
+      ++coefficients;
+      const double right = (*truth.cutting).*key.coefficient / key.unit;
+      EXPECT_NEAR(v.after, right, 3.0 * v.std_dev + 0.002 * right) << v.name;
+      EXPECT_NEAR(v.before, right / 1.2, 1e-6 * right) << v.name;
+      EXPECT_GT(v.deviations, 1.0) << v.name;
+    }
+  }
+  EXPECT_GE(coefficients, 3u);
+  EXPECT_NE(e.sentence.find("by the common factor 1.2"), std::string::npos) << e.sentence;
+}
+
+TEST(NominalValues, AFeedErrorIsNamedOrNotSeparableFromTheRecalibration) {
+  SMARTMILL_SHARED_DATA(folder, "campaigns/none");
+  const TemporaryFolder stated;
+  Campaign campaign = readCampaign(folder);
+  for (CampaignTest& test : campaign.tests) {
+    if (test.engagement) test.engagement->feed_per_tooth /= 1.1;
+  }
+  writeStated(campaign, readMachineModel(campaign.modelPath()), stated.file("."));
+  const Explanation e = explained(stated.file("."));
+  EXPECT_STRNE(nameOf(e.verdict), nameOf(Verdict::no_disagreement));
+  EXPECT_TRUE(namesOf(e) == std::vector<std::string>{"feed_error"} || isNotSeparable(e, "feed_error"))
+      << nameOf(e.verdict) << ": " << e.sentence;
+  EXPECT_LE(e.after.heldout, 1.05);
 }
 
 INSTANTIATE_TEST_SUITE_P(Shared, ExampleCampaign,

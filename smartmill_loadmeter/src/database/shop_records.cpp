@@ -122,8 +122,9 @@ std::string testsOf(const Json& gaps, const std::string& campaign) {
 }
 
 ModelImprovement improvementOf(const Json& report, const std::string& campaign) {
-  if (report.at("format") != "smartmill-report/1")
-    throw Error("format " + report.at("format").dump() + ", expected \"smartmill-report/1\"");
+  const Json& format = report.at("format");
+  if (format != "smartmill-report/2" && format != "smartmill-report/1")
+    throw Error("format " + format.dump() + ", expected \"smartmill-report/2\" or \"smartmill-report/1\"");
   ModelImprovement i;
   i.verdict = report.at("verdict");
   i.effects = report.at("effects").dump();

@@ -10,7 +10,7 @@
 
 namespace smartmill::discovery {
 
-/// The part of the report.json of `explain` (formats.md, smartmill-report/1) that a discovery uses.
+/// The part of the report.json of `explain` (formats.md, smartmill-report/2) that a discovery uses.
 struct Explained {
   struct Effect {
     std::string name;

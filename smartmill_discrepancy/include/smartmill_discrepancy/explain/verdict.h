@@ -12,7 +12,9 @@ namespace smartmill::discrepancy {
 MachineModel nameEffects(const Workbench& bench, const SearchOptions& options, const SearchResult& found,
                          Explanation* result);
 
-/// From effects and unexplained findings.
-Verdict verdictOf(const Explanation& result);
+/// From effects, unexplained findings and the gap.
+/// @param negligible_excess [1] of the squares of the noise: what nominal values remove below is no
+/// disagreement
+Verdict verdictOf(const Explanation& result, double negligible_excess);
 
 }  // namespace smartmill::discrepancy

@@ -27,6 +27,9 @@ class NominalFreedom {
  public:
   explicit NominalFreedom(const MachineModel& nominal, const NominalFreedomOptions& options = {});
   const std::vector<Coordinate>& coordinates() const { return coordinates_; }
+  /// [unit of the key in the model file] Stated value of a coordinate; none of the path share, which no model
+  /// states.
+  std::optional<double> stated(std::size_t coordinate) const;
   /// The model with these values. values.size() == coordinates().size()
   MachineModel apply(const MachineModel& nominal, const std::vector<double>& values) const;
   /// Index of the path share; none without a tool.
@@ -39,6 +42,7 @@ class NominalFreedom {
 
  private:
   using Scale = std::function<void(MachineModel&, double factor)>;
+  /// @param value [unit of the key]
   void add(std::string name, double value, double percent, Scale scale);
   void addCutting(const MachineModel& nominal);
   void addModes(const MachineModel& nominal);
@@ -47,6 +51,7 @@ class NominalFreedom {
 
   NominalFreedomOptions options_;
   std::vector<Coordinate> coordinates_;
+  std::vector<std::optional<double>> stated_;
   std::vector<Scale> scale_;
 };
 

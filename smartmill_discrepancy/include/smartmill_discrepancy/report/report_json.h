@@ -6,7 +6,7 @@
 
 namespace smartmill::discrepancy {
 
-/// Writes FOLDER/report.json (smartmill-report/1). @throws Error.
+/// Writes FOLDER/report.json (smartmill-report/2). @throws Error.
 void writeReport(const Explanation& explanation, const std::string& folder);
 
 }  // namespace smartmill::discrepancy

@@ -13,7 +13,13 @@
 
 namespace smartmill::discrepancy {
 
-enum class Verdict { no_disagreement, explained, partly_explained, unknown_effect };
+enum class Verdict {
+  no_disagreement,  ///< the gap before is at the noise
+  explained,
+  partly_explained,
+  unknown_effect,
+  recalibrated,  ///< nothing is missing, but nominal values differ from the stated ones
+};
 
 /// As in report.json.
 const char* nameOf(Verdict verdict);
@@ -23,6 +29,15 @@ struct FoundParameter {
   std::string key;  ///< as in the model file
   double value = 0.0;
   double std_dev = 0.0;
+};
+
+/// A nominal value that the records determine differently than the model states.
+struct RecalibratedValue {
+  std::string name;         ///< key in the model file, "cutting.ktc_n_per_mm2"
+  double before = 0.0;      ///< [unit of the key] stated
+  double after = 0.0;       ///< [unit of the key]
+  double std_dev = 0.0;     ///< [unit of the key] of the value after
+  double deviations = 0.0;  ///< [1] change of its logarithm over the stated relative uncertainty
 };
 
 struct FoundEffect {
@@ -97,6 +112,7 @@ struct Explanation {
   Verdict verdict = Verdict::no_disagreement;
   std::vector<Finding> where, unexplained;
   std::vector<FoundEffect> effects;
+  std::vector<RecalibratedValue> recalibrated;  ///< of this verdict; most deviations first
   std::vector<Resemblance> resembles;
   std::vector<std::vector<std::string>> not_separable;
   std::optional<std::string> suggested_test;

@@ -11,7 +11,7 @@ namespace smartmill::loadmeter {
 /// Records of a machine's database in addition to coefficients (database.h). NaN and empty text: unknown.
 
 /// Effects that an explanation found missing in a machine's model, with their evidence. Lists are JSON with
-/// the keys of the report (docs/formats.md, smartmill-report/1).
+/// the keys of the report (docs/formats.md, smartmill-report/2).
 struct ModelImprovement {
   static constexpr double UNKNOWN = std::numeric_limits<double>::quiet_NaN();
 

@@ -7,7 +7,7 @@
 
 namespace smartmill {
 
-/// A parameter of an effect as in a report of `explain` (docs/formats.md, smartmill-report/1), in the unit of
+/// A parameter of an effect as in a report of `explain` (docs/formats.md, smartmill-report/2), in the unit of
 /// its key.
 struct ReportedParameter {
   std::string key;

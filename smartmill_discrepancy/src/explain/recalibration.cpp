@@ -1,0 +1,99 @@
+#include "smartmill_discrepancy/explain/recalibration.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "smartmill_core/formatted.h"
+#include "smartmill_discrepancy/search/prior_tension.h"
+#include "smartmill_discrepancy/search/separating_test.h"
+
+namespace smartmill::discrepancy {
+namespace {
+
+struct RecalibrationOptions {
+  double determined = 2.0;       ///< standard deviations of the fit from which a change is listed
+  double stated = 2.0;           ///< stated deviations up to which a change is within the uncertainty
+  std::size_t in_sentence = 3;   ///< values that the sentence lists
+  std::size_t least_common = 2;  ///< values that have a common factor
+  double min_difference = 0.3;   ///< [1] of the noise by which predictions separate two models
+};
+
+const RecalibrationOptions LIMITS;
+
+// Factor that all values have in common, weighted by their deviations; 0: none.
+double commonFactor(const std::vector<RecalibratedValue>& values) {
+  if (values.size() < LIMITS.least_common) return 0.0;
+  double weights = 0.0, mean = 0.0;
+  const auto weight = [](const RecalibratedValue& v) { return std::pow(v.after / v.std_dev, 2); };
+  for (const RecalibratedValue& v : values) {
+    mean += weight(v) * std::log(v.after / v.before);
+    weights += weight(v);
+  }
+  mean /= weights;
+  const bool common = std::all_of(values.begin(), values.end(), [&](const RecalibratedValue& v) {
+    return std::abs(std::log(v.after / v.before) - mean) < LIMITS.determined / std::sqrt(weight(v));
+  });
+  return common ? std::exp(mean) : 0.0;
+}
+
+}  // namespace
+
+std::vector<RecalibratedValue> recalibratedValues(const NominalFreedom& freedom, const FitResult& fit) {
+  std::vector<RecalibratedValue> values;
+  const auto isDetermined = [](const RecalibratedValue& v) {
+    return std::abs(std::log(v.after / v.before)) >= LIMITS.determined * v.std_dev / v.after;
+  };
+  for (std::size_t c = 0; c < fit.state.nominal.size(); ++c) {
+    const std::optional<double> stated = freedom.stated(c);
+    if (!stated) continue;
+    const auto i = static_cast<Eigen::Index>(c);
+    const Coordinate& coordinate = freedom.coordinates()[c];
+    const double after = *stated * std::exp(fit.state.nominal[c]);
+    values.push_back({coordinate.name, *stated, after, after * std::sqrt(fit.covariance(i, i)),
+                      fit.state.nominal[c] / coordinate.prior_std});
+  }
+  std::stable_sort(values.begin(), values.end(), [](const RecalibratedValue& a, const RecalibratedValue& b) {
+    return std::abs(a.deviations) > std::abs(b.deviations);
+  });
+  if (values.empty()) return values;
+  values.erase(std::remove_if(values.begin() + 1, values.end(),
+                              [&](const RecalibratedValue& v) { return !isDetermined(v); }),
+               values.end());
+  return values;
+}
+
+std::string sentenceOf(const std::vector<RecalibratedValue>& values) {
+  if (values.empty()) return "";
+  std::string text = "No effect is missing, but the model's values are off: ";
+  for (std::size_t k = 0; k < std::min(values.size(), LIMITS.in_sentence); ++k) {
+    const RecalibratedValue& v = values[k];
+    text += (k ? ", " : "") + v.name +
+            formatted(" %.4g instead of %.4g (%+.1f %%, %.1f stated deviations)", v.after, v.before,
+                      100.0 * (v.after / v.before - 1.0), std::abs(v.deviations));
+  }
+  if (values.size() > LIMITS.in_sentence)
+    text += formatted(" and %zu more", values.size() - LIMITS.in_sentence);
+  if (const double factor = commonFactor(values); factor > 0.0)
+    text += formatted("; all by the common factor %.3f", factor);
+  if (std::abs(values.front().deviations) <= LIMITS.stated) text += "; within their stated uncertainty";
+  return text + ".";
+}
+
+void describeRecalibration(Workbench& bench, const std::vector<Hypothesis>& hypotheses,
+                           const SearchOptions& options, const SearchResult& found, Explanation* result) {
+  const FitState& state = found.best.state;
+  result->recalibrated = recalibratedValues(bench.freedom(), found.best);
+  result->sentence = sentenceOf(result->recalibrated);
+  for (const FitState& other : equivalentsOfRecalibration(bench, hypotheses, options, state)) {
+    const std::string& effect = other.members.front().hypothesis->effect;
+    result->not_separable.push_back({"nominal values", effect});
+    if (result->suggested_test) continue;
+    const auto test = separatingTest(bench.data(), bench.exact().model(state), bench.exact().model(other));
+    if (!test || test->difference <= LIMITS.min_difference) continue;
+    result->suggested_test = test->text;
+    result->suggested_cut = test->test;
+  }
+}
+
+}  // namespace smartmill::discrepancy
