@@ -30,7 +30,13 @@ class Recorder {
       if (!result.reset) results.push_back(result);
     };
     session.state = [this](const CncState& s) { write("/smartmill/cnc/state", s); };
-    session.load = [this](const LoadSample& l) { write("/smartmill/cnc/load", l); };
+    session.load = [this](const LoadSample& l) {
+      write("/smartmill/cnc/load", l);
+      if (l.stamp < next_temperature_) return;
+      next_temperature_ = l.stamp + 5.0;
+      write("/smartmill/machine/temperature",
+            MachineTemperature{l.stamp, {"X"}, {300.0}, {300.0}, 300.0 + 0.1 * (l.stamp - 1000.0)});
+    };
     session.condition = [this](const CuttingCondition& c) { write("/smartmill/cut/condition", c); };
   }
 
@@ -68,6 +74,7 @@ class Recorder {
 
   rosbag::Bag bag_;
   PriorKnowledge knowledge_;
+  double next_temperature_ = 0.0;  // [s]
 
  public:
   LoadMeterIdentification direct;
@@ -96,6 +103,8 @@ TEST(Bag, givesTheResultsOfTheLiveRunToTheLastDigit) {
   EXPECT_EQ(found[0].coefficients.value.ktc, live[0].coefficients.value.ktc);
   EXPECT_EQ(found[0].coefficients.std_dev.kte, live[0].coefficients.std_dev.kte);
   EXPECT_EQ(found[0].coefficients.stamp, live[0].coefficients.stamp);
+  EXPECT_GT(found[0].record.temperature, 300.0);
+  EXPECT_EQ(found[0].record.temperature, live[0].record.temperature);
   ASSERT_EQ(played.size(), 3u);
   ASSERT_EQ(forces.size(), 3u);
   for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(played[i].text(), forces[i].text());
