@@ -49,17 +49,18 @@ MachineModel simulatedMill() {
   return m;
 }
 
-/// Air cuts at three speeds, then the slots, each from outside the stock; every feed has the same block.
+/// Air cuts at three speeds, then the slots, each from outside the stock; every feed has the same block. A
+/// block without N word keeps the number of the one before: the block after a test has one.
 std::string program() {
   std::string text = "G90 G0 Z5\n";
   int block = 90;
   for (const double rpm : {2000.0, 6000.0, 12000.0})
-    text += formatted("S%.0f M3\nN%d G4 P2000\n", rpm, block++);
-  text += formatted("S%.0f M3\n", SPEED_RPM);
+    text += formatted("N1 S%.0f M3\nN%d G4 P2000\n", rpm, block++);
+  text += formatted("N1 S%.0f M3\n", SPEED_RPM);
   double y = -25.0;
   for (const double feed : FEEDS) {
     const double mm_per_min = 1e3 * feed * 4.0 * SPEED_RPM;
-    text += formatted("G0 X-60 Y%.0f\nG0 Z-2\nG4 P500\nN%d G1 X%.3f F%.0f\nG0 Z5\n", y, FEED_BLOCK,
+    text += formatted("G0 X-60 Y%.0f\nG0 Z-2\nG4 P500\nN%d G1 X%.3f F%.0f\nN1 G0 Z5\n", y, FEED_BLOCK,
                       -60.0 + mm_per_min / 60.0 * 2.5, mm_per_min);
     y += 25.0;
   }
