@@ -30,6 +30,38 @@ Bridge::~Bridge() {
 
 void Bridge::fetch(double now) {
   poller_.fetch(now);
+  fetchTemperature(now);
+}
+
+void Bridge::fetchTemperature(double now) {
+  temperature_.reset();
+  const double period = controller_->temperaturePeriod();
+  if (!controller_->connected()) {
+    temperature_offered_ = true;  // the next connection may be to another controller
+    next_temperature_ = now;
+    return;
+  }
+  // A clock that jumps back must not delay the next reading.
+  const bool due = now >= next_temperature_ || now < next_temperature_ - period;
+  if (period == 0.0 || !temperature_offered_ || !due) {
+    return;
+  }
+  next_temperature_ = now + period;
+  std::string refused;
+  const Result<MachineTemperature> read = controller_->readTemperature(refused);
+  if (read) {
+    temperature_ = *read;
+  } else if (read.failure().kind == Failure::Kind::lost) {
+    return poller_.setError(read.failure().message);
+  } else {
+    temperature_offered_ = false;
+    refused = read.failure().message;
+  }
+  if (!refused.empty() && refused != temperature_refused_) {
+    log_.warning((temperature_offered_ ? "machine/temperature is incomplete: " : "no machine/temperature: ") +
+                 refused);
+    temperature_refused_ = refused;
+  }
 }
 
 void Bridge::step(double now) {
@@ -48,6 +80,9 @@ void Bridge::step(double now) {
   state_.armed = motion_.armed();
   if (load_) {
     load_->stamp = now;
+  }
+  if (temperature_) {
+    temperature_->stamp = now;
   }
 }
 

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 
@@ -36,6 +37,59 @@ TEST_F(BridgeTest, StateAndLoadInSi) {
   EXPECT_DOUBLE_EQ(bridge_->load()->spindle_speed, 200.0 * units::PI);
   EXPECT_EQ(bridge_->load()->axis_load, (std::vector<double>{0.015, 0.025, 0.035}));
   EXPECT_TRUE(logged("connected to the controller 127.0.0.1:"));
+}
+
+// Numbers of the diagnosis screen of a 30i [deg C]: 308 servo motors, 309 their encoders, 403 spindle motor.
+TEST_F(BridgeTest, TemperaturesInKelvinAtASlowRate) {
+  machine_.temperatures = {{308, focas::NumberedType::byte, {28.0, 31.0, 44.0}, true, 0},
+                           {309, focas::NumberedType::byte, {27.0, 30.0, 43.0}, true, 0},
+                           {403, focas::NumberedType::byte, {52.0}, false, 0}};
+  cycle();
+  ASSERT_TRUE(bridge_->temperature());
+  EXPECT_EQ(bridge_->temperature()->stamp, 100.0);
+  EXPECT_EQ(bridge_->temperature()->axes, (std::vector<std::string>{"X", "Y", "Z"}));
+  EXPECT_DOUBLE_EQ(bridge_->temperature()->axis_motor[2], 317.15);
+  EXPECT_DOUBLE_EQ(bridge_->temperature()->axis_encoder[0], 300.15);
+  EXPECT_DOUBLE_EQ(bridge_->temperature()->spindle_motor, 325.15);
+  int readings = 0;
+  for (int i = 0; i < 600; ++i) {  // 12 s, with a period of 5 s
+    cycle();
+    readings += bridge_->temperature() ? 1 : 0;
+  }
+  EXPECT_EQ(readings, 2);
+  EXPECT_FALSE(logged("machine/temperature"));
+}
+
+TEST_F(BridgeTest, TemperaturesThatTheControllerLacksAreAnnouncedOnce) {
+  machine_.temperatures = {{308, focas::NumberedType::byte, {28.0, 31.0, 44.0}, true, 0}};
+  for (int i = 0; i < 600; ++i) {
+    cycle();
+    if (!bridge_->temperature()) continue;
+    EXPECT_DOUBLE_EQ(bridge_->temperature()->axis_motor[0], 301.15);
+    EXPECT_TRUE(std::isnan(bridge_->temperature()->axis_encoder[0]));
+    EXPECT_TRUE(std::isnan(bridge_->temperature()->spindle_motor));
+  }
+  const auto lines = [&] {
+    return std::count_if(log_lines_.begin(), log_lines_.end(), [](const std::string& l) {
+      return l.find("machine/temperature") != std::string::npos;
+    });
+  };
+  EXPECT_EQ(lines(), 1);
+  EXPECT_TRUE(logged("machine/temperature is incomplete: cnc_diagnoss 309"));
+  EXPECT_TRUE(logged("cnc_diagnoss 403"));
+}
+
+TEST_F(BridgeTest, AControllerWithoutTemperaturesIsAskedOnce) {
+  int readings = 0;
+  for (int i = 0; i < 600; ++i) {
+    cycle();
+    readings += bridge_->temperature() ? 1 : 0;
+  }
+  EXPECT_EQ(readings, 0);
+  EXPECT_TRUE(bridge_->state().connected);
+  EXPECT_EQ(std::count_if(log_lines_.begin(), log_lines_.end(),
+                          [](const std::string& l) { return l.find("no machine/temperature") == 0; }),
+            1);
 }
 
 TEST_F(BridgeTest, ProgramRunsToItsEnd) {

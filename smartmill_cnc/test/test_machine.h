@@ -34,7 +34,8 @@ class TestMachine : public focas::StateInterface,
   int starts = 0, ends = 0, cancels = 0, disconnects = 0, resets = 0;
   focas::EwCode refuse_start = focas::EW_OK;
   std::map<int, double> macros;
-  std::map<int, int> data_table;  ///< of the PMC
+  std::map<int, int> data_table;                   ///< of the PMC
+  std::vector<focas::NumberedValue> temperatures;  ///< diagnosis numbers
 
   TestMachine() { state.aut = focas::AUT_REMOTE; }
   focas::ControllerInterface calls() { return {*this, *this, *this, *this, *this, *this}; }
@@ -132,6 +133,16 @@ class TestMachine : public focas::StateInterface,
     }
     macros[number] = value.value_or(0.0);
     return focas::EW_OK;
+  }
+  std::vector<focas::NumberedValue> diagnoses(int first, int last) const override {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    std::vector<focas::NumberedValue> found;
+    for (const focas::NumberedValue& value : temperatures) {
+      if (value.number >= first && value.number <= last) {
+        found.push_back(value);
+      }
+    }
+    return found;
   }
   std::uint32_t alarmBits() const override { return get(alarm_bits); }
   std::vector<focas::AlarmMessage> alarmMessages() const override { return get(alarms); }

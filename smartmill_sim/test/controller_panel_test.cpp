@@ -294,6 +294,27 @@ TEST(Memory, ParametersFollowTheMachine) {
   EXPECT_EQ(m.calls.data.diagnoses(445, 445).size(), 1u);
 }
 
+// First-order heating: after one time constant 1 - 1/e of the steady rise (closed form).
+TEST(Load, MotorsHeatWithTheirLoad) {
+  ControllerOptions options = testOptions();
+  options.motor_temperature = 20.0;
+  options.motor_load_rise = 40.0;
+  options.motor_time_constant = 10.0;
+  Machine m(options);
+  const auto reported = [&](int number) { return m.calls.data.diagnoses(number, number).at(0).values; };
+  m.controller.setServoLoad({100.0, 50.0, 0.0});
+  m.controller.setSpindleLoad(200.0);
+  m.run(10.0);
+  const double grown = 1.0 - std::exp(-1.0);
+  EXPECT_NEAR(reported(308)[0], 20.0 + 40.0 * grown, 0.6);  // reported as integers
+  EXPECT_NEAR(reported(309)[1], 20.0 + 10.0 * grown, 0.6);
+  EXPECT_EQ(reported(308)[2], 20.0);
+  EXPECT_NEAR(reported(403)[0], 20.0 + 160.0 * grown, 0.6);
+  m.controller.setServoLoad({0.0, 0.0, 0.0});
+  m.run(100.0);
+  EXPECT_EQ(reported(308)[0], 20.0);
+}
+
 TEST(Load, PolledLoadsAreRoundedToTheControllersStep) {
   ControllerOptions options = testOptions();
   options.load_step = 100.0 * 3.0e-4 / 8.0;  // 0.3 mV of 8 V

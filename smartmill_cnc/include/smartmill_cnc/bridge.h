@@ -38,6 +38,8 @@ class Bridge {
   const CncState& state() const { return state_; }
   /// Load of the last step; empty without a connection.
   const std::optional<LoadSample>& load() const { return load_; }
+  /// Temperatures read in the last step; empty in most steps, and when the controller offers none.
+  const std::optional<MachineTemperature>& temperature() const { return temperature_; }
   /// Active alarms, as of the last reading.
   const std::vector<ControllerAlarm>& alarms() const { return alarms_; }
   /// Connections made and lost since the start.
@@ -78,6 +80,7 @@ class Bridge {
   /// Stores the reason of a lost connection.
   void noteLoss(const Status& status);
   void endWithoutConnection(double now);
+  void fetchTemperature(double now);
 
   Log log_;
   std::unique_ptr<Controller> controller_;
@@ -85,6 +88,10 @@ class Bridge {
   MotionMachine motion_;
   CncState state_;
   std::optional<LoadSample> load_;
+  std::optional<MachineTemperature> temperature_;
+  bool temperature_offered_ = true;  ///< of the present connection
+  std::string temperature_refused_;  ///< logged
+  double next_temperature_ = 0.0;    ///< [s]
   std::vector<ControllerAlarm> alarms_;
 };
 

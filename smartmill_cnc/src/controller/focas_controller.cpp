@@ -96,6 +96,17 @@ class FocasController : public Controller {
     return reading;
   }
 
+  double temperaturePeriod() const override { return parameters_.temperature_period; }
+
+  Result<MachineTemperature> readTemperature(std::string& refused) override {
+    MachineTemperature temperature;
+    const Status status = attempt(plainLine, [&] { temperature = reader_.readTemperature(refused); });
+    if (!status) {
+      return status.failure();
+    }
+    return temperature;
+  }
+
   Status setVariable(int number, double value) override {
     if (number == parameters_.marker_macro) {
       return Failure{Failure::Kind::refused, "#" + std::to_string(number) + " is the bridge's own variable"};

@@ -17,6 +17,7 @@ using focas::SubRequest;
 
 constexpr int DEFAULT_DECIMALS = 3;
 constexpr int MAX_DECIMALS = 6;
+constexpr int AXIS_MOTOR = 308, AXIS_ENCODER = 309, SPINDLE_MOTOR = 403;  // diagnosis numbers [deg C]
 
 std::int32_t firstInteger(const SubReply& reply) {
   return reply.code == focas::EW_OK && reply.data.size() >= 4 ? focas::Reader(reply.data).i32() : 0;
@@ -186,9 +187,41 @@ Reading FocasReader::read() {
   readAlarms(static_cast<std::uint32_t>(firstInteger(replies[q.alarm])), reading.state);
   reading.alarms = alarms_;
   readLoad(replies, axes, reading);
+  axes_ = reading.state.axes;
   const std::vector<double> marker = focas::decodeValues(replies[q.marker], 1);
   marker_ = marker.empty() ? std::numeric_limits<double>::quiet_NaN() : marker.front();
   return reading;
+}
+
+MachineTemperature FocasReader::readTemperature(std::string& refused) {
+  constexpr double NOT_REPORTED = std::numeric_limits<double>::quiet_NaN();
+  bool any = false;
+  const auto kelvin = [&](int number, int axis, std::size_t count) {
+    std::vector<double> values;
+    try {
+      values = client_.diagnosis(number, axis);
+      any = true;
+    } catch (const FocasError& e) {
+      if (!client_.connected()) {
+        throw;
+      }
+      refused += (refused.empty() ? "" : "; ") + std::string(e.what());
+    }
+    values.resize(count, NOT_REPORTED);
+    for (double& value : values) {
+      value += ZERO_CELSIUS;
+    }
+    return values;
+  };
+  MachineTemperature temperature;
+  temperature.axes = axes_;
+  temperature.axis_motor = kelvin(AXIS_MOTOR, -1, axes_.size());
+  temperature.axis_encoder = kelvin(AXIS_ENCODER, -1, axes_.size());
+  temperature.spindle_motor = kelvin(SPINDLE_MOTOR, parameters_.spindle, 1).front();
+  if (!any) {
+    throw FocasError(refused, focas::EW_NUMBER);
+  }
+  return temperature;
 }
 
 void FocasReader::readState(const std::vector<SubReply>& replies, std::size_t axes, Reading& reading) {

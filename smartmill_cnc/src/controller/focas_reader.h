@@ -23,6 +23,10 @@ class FocasReader {
 
   /// @throws FocasError, ConnectionError, WireError: the connection is unusable.
   Reading read();
+  /// Temperatures of the axes of the last reading and of the spindle. @param refused one line, of the
+  /// diagnosis numbers that the controller does not offer; empty: none. @throws FocasError when it offers
+  /// none; ConnectionError, WireError as read().
+  MachineTemperature readTemperature(std::string& refused);
   /// Value of the marker variable in the last reading; NaN: vacant.
   double marker() const { return marker_; }
   /// Decimals of lengths in mm.
@@ -44,6 +48,7 @@ class FocasReader {
   bool requested_ = false, answered_ = false;
   std::uint32_t alarm_bits_ = 0;
   std::string alarm_text_;
+  std::vector<std::string> axes_;
   std::vector<ControllerAlarm> alarms_;
   double marker_;
   int decimals_;

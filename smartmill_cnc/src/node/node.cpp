@@ -16,6 +16,7 @@
 #include "smartmill_msgs/CncState.h"
 #include "smartmill_msgs/CuttingCondition.h"
 #include "smartmill_msgs/LoadSample.h"
+#include "smartmill_msgs/MachineTemperature.h"
 #include "smartmill_ros/conversions.h"
 #include "smartmill_ros/node_main.h"
 #include "smartmill_ros/parameter_server.h"
@@ -75,6 +76,8 @@ CncNode::CncNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   state_publisher_ = nh.advertise<smartmill_msgs::CncState>(names::CNC_STATE, STREAM_QUEUE);
   alarms_publisher_ = nh.advertise<smartmill_msgs::CncAlarms>(ALARMS, 1, true);
   load_publisher_ = nh.advertise<smartmill_msgs::LoadSample>(names::CNC_LOAD, STREAM_QUEUE);
+  if (parameters_.kind == "fanuc" && parameters_.controller.temperature_period > 0.0)
+    temperature_publisher_ = nh.advertise<smartmill_msgs::MachineTemperature>(names::MACHINE_TEMPERATURE, 1);
   condition_publisher_ =
       nh.advertise<smartmill_msgs::CuttingCondition>(names::CUTTING_CONDITION, STREAM_QUEUE, true);
   CuttingCondition none;
@@ -238,6 +241,9 @@ void CncNode::publish(const ros::Time& stamp) {
   state_publisher_.publish(toMsg(state));
   if (const std::optional<LoadSample>& load = bridge_.load()) {
     load_publisher_.publish(toMsg(*load));
+  }
+  if (const std::optional<MachineTemperature>& temperature = bridge_.temperature()) {
+    temperature_publisher_.publish(toMsg(*temperature));
   }
   if (state.connected) {
     geometry_msgs::TransformStamped transform;

@@ -74,7 +74,8 @@ class CncNode {
   std::optional<Active> active_;                                  // the bridge's thread only
   std::optional<std::vector<ControllerAlarm>> published_alarms_;  // the bridge's thread only
 
-  ros::Publisher state_publisher_, load_publisher_, condition_publisher_, alarms_publisher_;
+  ros::Publisher state_publisher_, load_publisher_, temperature_publisher_, condition_publisher_,
+      alarms_publisher_;
   tf2_ros::TransformBroadcaster broadcaster_;
   ros::ServiceServer arm_service_, hold_service_, macro_service_, override_service_;
   std::unique_ptr<Server<smartmill_msgs::RunProgramAction>> run_program_;

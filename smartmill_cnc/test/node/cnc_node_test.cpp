@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <thread>
 
@@ -19,6 +20,7 @@
 #include "smartmill_msgs/CuttingCondition.h"
 #include "smartmill_msgs/JogAction.h"
 #include "smartmill_msgs/LoadSample.h"
+#include "smartmill_msgs/MachineTemperature.h"
 #include "smartmill_msgs/OrientSpindleAction.h"
 #include "smartmill_msgs/RunProgramAction.h"
 #include "smartmill_msgs/SetMacro.h"
@@ -38,6 +40,7 @@ class CncNodeTest : public ::testing::Test {
     port_ = static_cast<std::uint16_t>(ros::NodeHandle("~").param("port", 18193));
     subscribers_.push_back(nh_.subscribe(names::CNC_STATE, 100, &CncNodeTest::onState, this));
     subscribers_.push_back(nh_.subscribe(names::CNC_LOAD, 100, &CncNodeTest::onLoad, this));
+    subscribers_.push_back(nh_.subscribe(names::MACHINE_TEMPERATURE, 100, &CncNodeTest::onTemperature, this));
     subscribers_.push_back(nh_.subscribe(names::CUTTING_CONDITION, 100, &CncNodeTest::onCondition, this));
     subscribers_.push_back(nh_.subscribe("/diagnostics", 100, &CncNodeTest::onDiagnostics, this));
     clock_ = std::thread([this] {
@@ -64,6 +67,7 @@ class CncNodeTest : public ::testing::Test {
     stamps_.push_back(state.header.stamp);
   }
   void onLoad(const smartmill_msgs::LoadSample& load) { load_ = load; }
+  void onTemperature(const smartmill_msgs::MachineTemperature& temperature) { temperature_ = temperature; }
   void onCondition(const smartmill_msgs::CuttingCondition& condition) { conditions_.push_back(condition); }
   void onDiagnostics(const diagnostic_msgs::DiagnosticArray& array) {
     for (const diagnostic_msgs::DiagnosticStatus& status : array.status) {
@@ -122,6 +126,7 @@ class CncNodeTest : public ::testing::Test {
   CncState state_;
   std::vector<ros::Time> stamps_;  // of the states
   smartmill_msgs::LoadSample load_;
+  smartmill_msgs::MachineTemperature temperature_;
   std::vector<smartmill_msgs::CuttingCondition> conditions_;
   diagnostic_msgs::DiagnosticStatus diagnostic_;
 };
@@ -143,6 +148,7 @@ TEST_F(CncNodeTest, StateLoadMacroAndTransform) {
   machine_.change([](TestMachine& m) {
     m.position = {{10.0, -20.0, 30.0}};
     m.speed = 3000.0;
+    m.temperatures = {{403, focas::NumberedType::byte, {52.0}, false, 0}};
   });
   listen();
   ASSERT_TRUE(
@@ -152,6 +158,9 @@ TEST_F(CncNodeTest, StateLoadMacroAndTransform) {
   EXPECT_DOUBLE_EQ(state_.position[1], -0.020);
   EXPECT_NEAR(load_.spindle_load, 0.1234, 1e-12);
   EXPECT_NEAR(load_.spindle_speed, 314.159, 1e-3);
+  ASSERT_TRUE(spinUntil([&] { return temperature_.axes.size() == 3; }));
+  EXPECT_NEAR(temperature_.spindle_motor, 325.15, 1e-9);
+  EXPECT_TRUE(std::isnan(temperature_.axis_motor[0]));  // number 308 is absent
   smartmill_msgs::SetMacro macro;
   macro.request.number = 500;
   macro.request.value = 2.5;

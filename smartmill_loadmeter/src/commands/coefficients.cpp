@@ -46,19 +46,21 @@ void fromForce(const CoefficientOptions& o, const Campaign& campaign, const Mach
   }
 }
 
+/// Progress on a terminal.
+void showProgress(double share) {
+  static const bool terminal = isatty(STDERR_FILENO);
+  if (terminal) std::fprintf(stderr, "\rreading %3.0f %%%s", 100.0 * share, share >= 1.0 ? "\n" : "");
+}
+
 void fromBag(const CoefficientOptions& o) {
   if (o.source == "force") throw Error(o.source_path + ": --source force requires a campaign, not a bag");
   const NodeParameters& parameters = o.parameters;
   parameters.validate();
   const std::string model_file = o.model.empty() ? parameters.model : o.model;
   if (model_file.empty()) throw Error(o.source_path + ": a bag requires the machine's model (--model)");
-  const bool terminal = isatty(STDERR_FILENO);
-  const auto progress = [terminal](double share) {
-    if (terminal) std::fprintf(stderr, "\rreading %3.0f %%%s", 100.0 * share, share >= 1.0 ? "\n" : "");
-  };
   std::vector<CoefficientRecord> cuts;
   BagListeners listeners;
-  listeners.progress = progress;
+  listeners.progress = showProgress;
   listeners.cut = [&](const CoefficientRecord& cut) { cuts.push_back(cut); };
   if (o.forces) {
     listeners.force = [](const ForceEstimate& f) {
@@ -76,19 +78,18 @@ void fromBag(const CoefficientOptions& o) {
   }
 }
 
-void fromCampaign(const CoefficientOptions& o) {
-  const Campaign campaign = readCampaign(o.source_path);
-  const MachineModel model = readMachineModel(o.model.empty() ? campaign.modelPath() : o.model);
-  if (o.source != "load_meter") {
-    fromForce(o, campaign, model);
-    return;
-  }
+LoadRecordOptions loadOptions(const CoefficientOptions& o) {
   LoadRecordOptions options;
   options.spindle_uncertainty = o.spindle_uncertainty;
   options.choose_terms = !o.plain_friction;
   options.runout_uncertainty = o.runout_um * units::UM;
   options.depth_uncertainty = o.depth_percent / 100.0;
-  const LoadRecordResult found = identifyFromLoadRecords(campaign, model, options);
+  return options;
+}
+
+/// Prints, writes and stores what the load meter gives.
+void reportLoad(const CoefficientOptions& o, const Campaign& campaign, const MachineModel& model,
+                const LoadRecordResult& found) {
   for (const std::string& note : found.notes)
     std::fprintf(stderr, "%s: %s\n", o.program.c_str(), note.c_str());
   printLoad(found.set);
@@ -105,9 +106,41 @@ void fromCampaign(const CoefficientOptions& o) {
   storeRecord(o, record);
 }
 
+void fromCampaign(const CoefficientOptions& o) {
+  const Campaign campaign = readCampaign(o.source_path);
+  const MachineModel model = readMachineModel(o.model.empty() ? campaign.modelPath() : o.model);
+  if (o.source == "load_meter") {
+    reportLoad(o, campaign, model, identifyFromLoadRecords(campaign, model, loadOptions(o)));
+  } else {
+    fromForce(o, campaign, model);
+  }
+}
+
+/// Dunwoody, section 6.1.
+void fromServoRecord(const CoefficientOptions& o) {
+  if (o.source == "force")
+    throw Error(o.source_path + ": --source force requires a campaign, not --servo-cuts");
+  if (o.model.empty())
+    throw Error(o.source_path + ": a record of Servo Guide requires the machine's model (--model)");
+  if (!isRecording(o.source_path))
+    throw Error(o.source_path + ": expected a bag or MCAP file with daq/servo, as --servo-cuts is given");
+  const MachineModel model = readMachineModel(o.model);
+  const std::vector<ServoTest> tests = readServoTests(o.servo_cuts);
+  const Spindle& spindle = model.needSpindle("read the load meter");
+  if (!spindle.load_meter_full_scale)
+    throw Error(o.model + ": spindle.load_meter_full_scale_v is missing (required for the load meter)");
+  const std::vector<TestRecord> records = servoLoadFromBag(o.source_path, showProgress)
+                                              .records(tests, *spindle.load_meter_full_scale, o.source_path);
+  Campaign campaign;
+  for (const TestRecord& record : records) campaign.tests.push_back(record.test);
+  reportLoad(o, campaign, model, identifyFromLoadRecords(records, model, loadOptions(o), o.source_path));
+}
+
 void run(const CoefficientOptions& o) {
   if (!std::filesystem::exists(o.source_path)) throw Error(o.source_path + ": cannot be read");
-  if (isRecording(o.source_path)) {
+  if (!o.servo_cuts.empty()) {
+    fromServoRecord(o);
+  } else if (isRecording(o.source_path)) {
     fromBag(o);
   } else {
     fromCampaign(o);
@@ -119,6 +152,10 @@ void addOptions(CommandLine& line, CoefficientOptions& o) {
   line.option("SOURCE", o.source_path, "campaign folder, or a bag").required();
   line.option("--source", o.source, "what to use (default: force of a campaign, load_meter of a bag)")
       .oneOf({"force", "load_meter"});
+  line.option(
+      "--servo-cuts", o.servo_cuts,
+      "bag with a record of Servo Guide (daq/servo): conditions of its cuts, smartmill-servo-cuts/1; the "
+      "coefficients are from its spindle load");
   line.option("--model", o.model, "model file (default: the campaign's); its cutting section is not used");
   line.option("--means", o.means, "force: means of all samples in cut, or over whole revolutions")
       .showDefault()
@@ -150,13 +187,16 @@ Command coefficientsCommand() {
   Command command("coefficients", "identifies cutting coefficients from forces or the load meter");
   command.description =
       "Cutting coefficients with standard deviations, from the force records or the load meter of a campaign "
-      "(a folder with campaign.yaml) or from the load meter in a recorded bag.";
+      "(a folder with campaign.yaml), or from the load meter or a record of Servo Guide in a recorded bag.";
   command.examples = {{"campaigns/none --source force -o cutting.yaml",
                        "from the force records, as a section of a model file"},
                       {"campaigns/none --source load_meter", "from the spindle's load meter"},
+                      {"servo.bag --servo-cuts cuts.yaml --model mill.yaml",
+                       "from the spindle load in a record of Servo Guide"},
                       {"session.bag --model mill.yaml --database machine.sqlite",
                        "from a recorded session, into the database"}};
-  command.files = {{"OUTPUT", "section cutting of a model file"},
+  command.files = {{"SERVO_CUTS", "smartmill-servo-cuts/1, see docs/formats.md"},
+                   {"OUTPUT", "section cutting of a model file"},
                    {"DATABASE", "SQLite file, see smartmill-database(1)"},
                    {"launch/config/loadmeter.yaml", "the node's parameters, for --params"}};
   command.setBody(run, addOptions);

@@ -13,7 +13,7 @@ namespace smartmill::loadmeter {
 
 /// Options of the command `coefficients`.
 struct CoefficientOptions {
-  std::string program, source_path, source, model, means = "all", output, database;
+  std::string program, source_path, source, servo_cuts, model, means = "all", output, database;
   NodeParameters parameters;
   std::string tool, material;
   double rake = NAN, depth_percent = 0.0, runout_um = 0.0;

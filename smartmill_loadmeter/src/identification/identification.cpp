@@ -18,6 +18,7 @@ void IdentificationParameters::validate() const {
   checkBounds(*this);
   motor.validate();
   checkBounds(force);
+  checkBounds(temperature);
 }
 
 LoadMeterIdentification::LoadMeterIdentification(const MachineModel& model,
@@ -27,6 +28,7 @@ LoadMeterIdentification::LoadMeterIdentification(const MachineModel& model,
       parameters_(parameters),
       steady_(spindle_, parameters),
       forces_(parameters.motor, parameters.force, model.axes),
+      temperature_(parameters.temperature),
       production_(parameters.production_memory) {
   parameters.validate();
   if (!spindle_.load_meter_full_scale) {
@@ -37,6 +39,7 @@ LoadMeterIdentification::LoadMeterIdentification(const MachineModel& model,
 void LoadMeterIdentification::reset() {
   steady_.reset();
   forces_.clear();
+  temperature_.clear();
   production_.clear();
   session_.clear();
   next_window_ = 0.0;
@@ -54,6 +57,7 @@ void LoadMeterIdentification::handle(const SampleBlock& block) {
 }
 
 void LoadMeterIdentification::handle(const LoadSample& sample) {
+  temperature_.handle(sample);
   const SteadyRecord::Reading reading = steady_.handle(sample);
   if (reading == SteadyRecord::Reading::not_finite && session_.bad_data.empty()) {
     session_.bad_data = formatted("test '%s': the load sample at %.3f s is not a finite number",
@@ -103,7 +107,11 @@ void LoadMeterIdentification::closeTest() {
 }
 
 void LoadMeterIdentification::storeTest(LoadTest test) {
+  const double began = test.stamp - test.duration;
+  test.temperature = temperature_.spindle(began, test.stamp);
   forces_.addMotors(steady_.motor(), steady_.velocity(), false, session_.air_cuts, &test);
+  for (std::size_t a = 0; test.motor && a < 3; ++a)
+    test.motor->temperature[a] = temperature_.axis(a, began, test.stamp).value;
   const bool cut = test.isCut();
   (cut ? session_.cuts : session_.air_cuts).push_back(test);
   std::optional<Estimate> torque;

@@ -9,6 +9,7 @@ IdentificationPipeline::IdentificationPipeline(const MachineModel& model,
     : identification_(model, parameters), sorter_(hold_back) {
   states_ = sorter_.addRegular(names::CNC_STATE);
   loads_ = sorter_.addRegular(names::CNC_LOAD);
+  temperatures_ = sorter_.addEvents(names::MACHINE_TEMPERATURE);
   motors_ = sorter_.addOptional(names::MOTOR_CURRENT);
   forces_ = sorter_.addOptional(names::FORCE_COMPENSATED);
   conditions_ = sorter_.addLatched(names::CUTTING_CONDITION);

@@ -39,6 +39,7 @@ std::optional<CoefficientRecord> ProductionRun::add(const LoadTest& cut,
   record.entry = c.engagement.entry;
   record.exit = c.engagement.exit;
   record.edge_age = age;
+  record.temperature = cut.temperature.value;
   return record;
 }
 

@@ -130,6 +130,33 @@ std::string addMotorCoefficients(const std::vector<LoadTest>& cuts, const IdleTo
                       : "; not observable from the axes that moved: " + text;
 }
 
+/// Mean temperature of the spindle motor in tests; the first fault, if any.
+TemperatureReading meanTemperature(const std::vector<LoadTest>& tests) {
+  TemperatureReading mean;
+  double sum = 0.0;
+  for (const LoadTest& test : tests) {
+    sum += test.temperature.value;  // NaN: unknown
+    if (mean.fault.empty() && !test.temperature.fault.empty())
+      mean.fault = "test '" + test.condition.name + "': " + test.temperature.fault;
+  }
+  if (!tests.empty()) mean.value = sum / static_cast<double>(tests.size());
+  return mean;
+}
+
+/// Temperature of the cuts, to which the coefficients and the friction of the air cuts belong.
+/// @return for the message; empty when the controller reports none.
+std::string addTemperature(const std::vector<LoadTest>& air_cuts, const std::vector<LoadTest>& cuts,
+                           CoefficientRecord* record) {
+  const TemperatureReading cut = meanTemperature(cuts), air = meanTemperature(air_cuts);
+  record->temperature = cut.value;
+  std::string text;
+  if (cut.known()) text += formatted("; spindle motor at %.1f K", cut.value);
+  if (cut.known() && air.known()) text += formatted(", at %.1f K in the air cuts (friction)", air.value);
+  const std::string& fault = cut.fault.empty() ? air.fault : cut.fault;
+  if (!fault.empty()) text += "; temperature not recorded: " + fault;
+  return text;
+}
+
 void addPrior(const CoefficientRecord& prior, IdentifyResult* result) {
   const CombinedRecord both = combine(result->record, prior);
   const double deviation = both.deviation;
@@ -238,6 +265,7 @@ IdentifyResult identifySession(const SessionTests& session, const IdentifyGoal& 
   result.record = found.record;
   const IdleTorque idle = idleTorque(session.air_cuts, spindle, spindle_uncertainty_percent);
   aside = found.found + addMotorCoefficients(cuts, idle, spindle, &result.record) + aside;
+  aside += addTemperature(session.air_cuts, cuts, &result.record);
   CoefficientSet& k = result.record.set;
   if (!goal.tool.empty()) k.tool = goal.tool;
   if (!goal.material.empty()) k.material = goal.material;

@@ -39,13 +39,16 @@ void SelfCalibration::air(const MotorMeasurement& measurement, double stamp) {
 void SelfCalibration::updateFriction(std::size_t axis) {
   std::vector<TimedAirCut> all;
   std::set<double> speeds;
+  double temperatures = 0.0;  // [K] sum
   for (const Air& one : air_) {
     if (!one.measurement.range[axis]) continue;
+    temperatures += one.measurement.temperature[axis];
     const double speed = std::abs(one.measurement.velocity[axis]);
     all.push_back({{speed, *one.measurement.range[axis] * speed, 0.0}, one.stamp - air_.front().stamp});
     speeds.insert(speed);
   }
   if (speeds.size() < 2 || *speeds.rbegin() < SAME_FEED_RATIO * *speeds.begin()) return;
+  temperature_[axis] = temperatures / static_cast<double>(all.size());
   slowest_[axis] = *speeds.begin(), fastest_[axis] = *speeds.rbegin();
   try {
     friction_[axis] = fitFrictionLaws(all, 1.0, 0.0).front();
@@ -158,7 +161,8 @@ std::string SelfCalibration::text(const std::array<std::optional<Estimate>, 3>& 
     if (friction_[a]) {
       const FittedFriction& f = *friction_[a];
       add(formatted("air current %.3f A + %.2f A s/m (%s)", f.law.coulomb, f.law.viscous,
-                    f.terms.name().c_str()));
+                    f.terms.name().c_str()) +
+          (std::isfinite(temperature_[a]) ? formatted(" at %.1f K", temperature_[a]) : ""));
     }
     if (bandwidth[a]) add(formatted("bandwidth %.1f +- %.1f Hz", bandwidth[a]->value, bandwidth[a]->std_dev));
     if (!one.empty()) all += std::string(all.empty() ? "" : "; ") + "XYZ"[a] + " " + one;

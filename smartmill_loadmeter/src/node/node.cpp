@@ -3,6 +3,8 @@
 #include <geometry_msgs/WrenchStamped.h>
 #include <smartmill_msgs/ForceEstimate.h>
 
+#include <cmath>
+
 #include "node/find_message.h"
 #include "node/fleet_message.h"
 #include "smartmill_core/error.h"
@@ -359,6 +361,16 @@ void LoadMeterNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status
     status.addf("production Kte [N/mm]", "%.2f +- %.2f", production->kte() / units::N_PER_MM,
                 production->kteStd() / units::N_PER_MM);
     status.addf("last cut's normalised innovation", "%.1f sigma", production->normalisedInnovation());
+  }
+  const TemperatureWatch& temperature = identification.temperature();
+  const std::string temperature_fault = temperature.fault(identification_.newest());
+  if (!temperature_fault.empty()) {
+    status.add("spindle motor temperature [K]", temperature_fault);
+    status.mergeSummary(Level::WARN, temperature_fault);
+  } else if (temperature.ever() && std::isfinite(temperature.newest())) {
+    status.addf("spindle motor temperature [K]", "%.1f", temperature.newest());
+  } else {
+    status.add("spindle motor temperature [K]", "not reported");
   }
   if (!last_force_.empty()) status.add("force by motor currents", last_force_);
   if (!last_curve_.empty()) status.add("force curve", last_curve_);

@@ -50,6 +50,8 @@ struct NodeParameters {
     table.number("fleet_period", fleet_period, "s", Range::openLow(0.0, 86400.0),
                  "between pushes, also after a failed one");
     identification.declare(table);
+    table.section("Temperature of the motors (machine/temperature).");
+    table.part("temperature_", identification.temperature);
     table.section("Motor currents.");
     table.text(
         "motor_calibration", motor_calibration,

@@ -47,6 +47,7 @@ template <class Source, class Pipeline>
 void connect(Source& source, const NodeParameters& parameters, Pipeline& pipeline) {
   feed<CncState>(source, names::CNC_STATE, pipeline);
   feed<LoadSample>(source, names::CNC_LOAD, pipeline);
+  feed<MachineTemperature>(source, names::MACHINE_TEMPERATURE, pipeline);
   feed<CuttingCondition>(source, names::CUTTING_CONDITION, pipeline);
   if (parameters.usesMotors())
     feed<SampleBlock>(source, parameters.motor_servo ? names::daq("servo") : names::MOTOR_CURRENT, pipeline);

@@ -47,6 +47,16 @@ std::vector<IdentifyResult> identifyFromBag(const std::string& path, const Machi
   return results;
 }
 
+ServoLoad servoLoadFromBag(const std::string& path, const std::function<void(double)>& progress) {
+  RecordingReader bag(path);
+  const std::string topic = names::daq("servo");
+  if (!bag.has(topic)) throw Error(path + ": expected topic " + topic);
+  ServoLoad load;
+  bag.on<SampleBlock>(topic, [&](const SampleBlock& block, double) { load.add(block); });
+  bag.run(progress);
+  return load;
+}
+
 std::vector<IdentifiedForceCurves> curvesFromBag(const std::string& path, const NodeParameters& parameters,
                                                  const std::function<void(double)>& progress) {
   ForceCurvePipeline curves(parameters.curve, parameters.hold_back);

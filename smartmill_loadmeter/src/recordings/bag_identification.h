@@ -7,6 +7,7 @@
 #include "node/parameters.h"
 #include "smartmill_core/cutting/force_curve.h"
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_loadmeter/identification/servo_load.h"
 
 namespace smartmill::loadmeter {
 
@@ -26,6 +27,9 @@ struct BagListeners {
 std::vector<IdentifyResult> identifyFromBag(const std::string& path, const MachineModel& model,
                                             const NodeParameters& parameters,
                                             const BagListeners& listeners = {});
+
+/// Spindle load of a record of Servo Guide in a bag, topic daq/servo. @throws Error without the topic.
+ServoLoad servoLoadFromBag(const std::string& path, const std::function<void(double)>& progress = {});
 
 /// Newest force curve of each tool and material in a bag, by the class of the node.
 /// @throws Error when it has no force/compensated or spindle/angle, or no cut gives a curve (with the

@@ -30,7 +30,13 @@ class Recorder {
       if (!result.reset) results.push_back(result);
     };
     session.state = [this](const CncState& s) { write("/smartmill/cnc/state", s); };
-    session.load = [this](const LoadSample& l) { write("/smartmill/cnc/load", l); };
+    session.load = [this](const LoadSample& l) {
+      write("/smartmill/cnc/load", l);
+      if (l.stamp < next_temperature_) return;
+      next_temperature_ = l.stamp + 5.0;
+      write("/smartmill/machine/temperature",
+            MachineTemperature{l.stamp, {"X"}, {300.0}, {300.0}, 300.0 + 0.1 * (l.stamp - 1000.0)});
+    };
     session.condition = [this](const CuttingCondition& c) { write("/smartmill/cut/condition", c); };
   }
 
@@ -68,6 +74,7 @@ class Recorder {
 
   rosbag::Bag bag_;
   PriorKnowledge knowledge_;
+  double next_temperature_ = 0.0;  // [s]
 
  public:
   LoadMeterIdentification direct;
@@ -96,6 +103,8 @@ TEST(Bag, givesTheResultsOfTheLiveRunToTheLastDigit) {
   EXPECT_EQ(found[0].coefficients.value.ktc, live[0].coefficients.value.ktc);
   EXPECT_EQ(found[0].coefficients.std_dev.kte, live[0].coefficients.std_dev.kte);
   EXPECT_EQ(found[0].coefficients.stamp, live[0].coefficients.stamp);
+  EXPECT_GT(found[0].record.temperature, 300.0);
+  EXPECT_EQ(found[0].record.temperature, live[0].record.temperature);
   ASSERT_EQ(played.size(), 3u);
   ASSERT_EQ(forces.size(), 3u);
   for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(played[i].text(), forces[i].text());
@@ -130,6 +139,38 @@ TEST(Bag, containsTheKnowledgeThatTheLiveRunBeganWith) {
   EXPECT_EQ(live[0].coefficients.source, "load_meter and database") << live[0].message;
   EXPECT_EQ(found[0].message, live[0].message);
   EXPECT_EQ(found[0].coefficients.value.ktc, live[0].coefficients.value.ktc);
+}
+
+TEST(Bag, containsTheSpindleLoadOfAServoRecord) {
+  const TemporaryFolder folder;
+  const std::string file = folder.file("servo.bag");
+  {
+    rosbag::Bag bag(file, rosbag::bagmode::Write);
+    for (int k = 0; k < 200; ++k) {
+      SampleBlock block;
+      block.stamp = 100.0 + 0.01 * k;
+      block.sample_rate = 1000.0;
+      block.first_index = static_cast<std::uint64_t>(10 * k);
+      block.channels = {"spindle_load", "sequence"};
+      block.units = {"1", "1"};
+      for (int i = 0; i < 10; ++i) block.samples.insert(block.samples.end(), {0.25, k < 50 ? 1.0 : 100.0});
+      const auto message = toMsg(block);
+      bag.write("/smartmill/daq/servo", message.header.stamp, message);
+    }
+  }
+  ServoTest test;
+  test.block = 100;
+  test.test.name = "slot";
+  const auto records = servoLoadFromBag(file).records({test}, 8.0, file);
+  ASSERT_EQ(records.size(), 1u);
+  EXPECT_EQ(records[0].record.column("load_meter"), std::vector<double>(1500, 2.0));  // [V]
+  EXPECT_NEAR(*records[0].test.start_time, 0.5, 1e-6);
+  const std::string other = folder.file("other.bag");
+  {
+    Recorder recorder(other);
+    recorder.session.air(9000.0, 1.0);
+  }
+  EXPECT_THAT(errorOf([&] { servoLoadFromBag(other); }), HasSubstr("other.bag: expected topic daq/servo"));
 }
 
 TEST(Bag, withoutAGoalIsIdentifiedAtItsEnd) {

@@ -21,6 +21,7 @@
 #include "smartmill_msgs/ForceEstimate.h"
 #include "smartmill_msgs/IdentifyCoefficientsAction.h"
 #include "smartmill_msgs/LoadSample.h"
+#include "smartmill_msgs/MachineTemperature.h"
 #include "smartmill_msgs/SampleBlock.h"
 #include "smartmill_msgs/SpindleHealth.h"
 #include "smartmill_ros/conversions.h"
@@ -48,6 +49,7 @@ TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
   spinner.start();
   const auto states = nh.advertise<smartmill_msgs::CncState>("cnc/state", 0);
   const auto loads = nh.advertise<smartmill_msgs::LoadSample>("cnc/load", 0);
+  const auto temperatures = nh.advertise<smartmill_msgs::MachineTemperature>("machine/temperature", 0);
   const auto currents = nh.advertise<smartmill_msgs::SampleBlock>("daq/motor_current", 0);
   geometry_msgs::WrenchStamped force;
   std::mutex force_lock;
@@ -61,7 +63,8 @@ TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
   ASSERT_TRUE(client.waitForServer(PATIENCE));
   Followers node({names::absolute("loadmeter")});
   node.begin();
-  for (const ros::Publisher& publisher : {states, loads, currents, conditions}) node.expect(publisher);
+  for (const ros::Publisher& publisher : {states, loads, temperatures, currents, conditions})
+    node.expect(publisher);
   node.expect(forces);
   // A goal is not ordered with the streams: it must arrive before they continue.
   const auto send = [&](double stamp, bool reset) {
@@ -71,7 +74,13 @@ TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
 
   Session session(4, 2e-4);
   session.state = [&](const CncState& s) { node.publish(states, toMsg(s)); };
-  session.load = [&](const LoadSample& l) { node.publish(loads, toMsg(l)); };
+  double next_temperature = 0.0;
+  session.load = [&](const LoadSample& l) {
+    node.publish(loads, toMsg(l));
+    if (l.stamp < next_temperature) return;
+    next_temperature = l.stamp + 5.0;
+    node.publish(temperatures, toMsg(MachineTemperature{l.stamp, {"X"}, {300.0}, {300.0}, 310.0}));
+  };
   session.cutting = {TRUTH.ktc, 420e6, 0.0, TRUTH.kte, 21e3, 0.0};
   session.currents = [&](const SampleBlock& b) { node.publish(currents, toMsg(b)); };
   session.condition = [&](const CuttingCondition& c) {
@@ -104,6 +113,7 @@ TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
   EXPECT_GT(result->coefficients.ktc_std, 0.0);
   EXPECT_TRUE(std::isnan(result->coefficients.krc));
   EXPECT_EQ(result->coefficients.test_count, 3u);
+  EXPECT_NE(result->message.find("spindle motor at 310.0 K"), std::string::npos) << result->message;
   EXPECT_EQ(result->coefficients.source, "load_meter");
 
   // Latched: a late subscriber receives it.

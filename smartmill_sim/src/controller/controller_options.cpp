@@ -57,6 +57,10 @@ void ControllerOptions::validate() const {
   positive("spindle_acceleration", spindle_acceleration);
   if (!(spindle_torque >= 0.0) || !(load_step >= 0.0))
     throw Error("controller: spindle_torque and load_step must not be below 0");
+  positive("motor_time_constant", motor_time_constant);
+  if (!(motor_load_rise >= 0.0) || !(motor_idle_rise >= 0.0) || !std::isfinite(motor_temperature))
+    throw Error(
+        "controller: motor_load_rise and motor_idle_rise must not be below 0, and motor_temperature finite");
   if (buffer_size == 0) throw Error("controller: buffer_size is 0 bytes");
 }
 

@@ -13,6 +13,7 @@ ControlledMachine::ControlledMachine(const ControllerOptions& o)
     : options(o),
       memory(o.memory_size),
       calendar(o.wall_clock),
+      heating(options),
       axes(options.axes),
       spindle(options, overrides),
       executor(options, overrides, variables, axes, spindle),
@@ -44,8 +45,9 @@ void ControlledMachine::step(double dt) {
 }
 
 void ControlledMachine::checkMotion() {
-  checked_ = now_;
   const MotionState state = motion();
+  if (checked_ >= 0.0) heating.advance(now_ - checked_, servo_load, spindle_load, state.spindle_speed);
+  checked_ = now_;
   if (!axes.moving(now_) && state.spindle_speed == 0.0) return;
   for (const std::shared_ptr<const MotionWatch>& watch : options.watches) {
     if (!alarms.empty()) return;

@@ -8,6 +8,7 @@
 
 #include "controller/calendar_clock.h"
 #include "controller/dnc_session.h"
+#include "controller/motor_heating.h"
 #include "controller/pmc_memory.h"
 #include "controller/program_memory.h"
 #include "smartmill_sim/controller/controller_options.h"
@@ -53,6 +54,7 @@ class ControlledMachine {
   std::vector<focas::AlarmMessage> alarms;
   double spindle_load = 0.0;                                              // [percent]
   std::array<double, 3> servo_load{{0, 0, 0}}, servo_current{{0, 0, 0}};  // [percent], [A]
+  MotorHeating heating;
   Overrides overrides;
   AxesMotion axes;
   SpindleControl spindle;

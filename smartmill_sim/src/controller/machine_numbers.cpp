@@ -1,6 +1,7 @@
 #include "controller/machine_numbers.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "smartmill_core/nc/orientation.h"
 #include "smartmill_core/units.h"
@@ -57,7 +58,9 @@ std::vector<NumberedValue> machineParameters(const ControllerOptions& o) {
   };
 }
 
-std::vector<NumberedValue> machineDiagnoses(const ControllerOptions& o, const DiagnosisState& state) {
+std::vector<NumberedValue> machineDiagnoses(const DiagnosisState& state) {
+  std::vector<double> axis_temperature;
+  for (const double temperature : state.axis_temperature) axis_temperature.push_back(std::round(temperature));
   const double steps = state.spindle_angle / units::TWO_PI * nc::ORIENT_STEPS;
   return {
       single(0, NumberedType::byte, state.waits_for_m ? 1 : 0),   // waits for FIN
@@ -65,10 +68,10 @@ std::vector<NumberedValue> machineDiagnoses(const ControllerOptions& o, const Di
       single(2, NumberedType::byte, state.dwells ? 1 : 0),        // dwell
       single(5, NumberedType::byte, state.at_zero_feed ? 1 : 0),  // feed override 0 %
       ofAxes(300, NumberedType::double_word, all(0.0)),           // servo error: ideal axes
-      ofAxes(308, NumberedType::byte, all(o.motor_temperature)),  // servo motor temperature [deg C]
-      ofAxes(309, NumberedType::byte, all(o.motor_temperature)),  // encoder temperature [deg C]
-      single(403, NumberedType::byte, o.motor_temperature),       // spindle motor temperature [deg C]
-      single(410, NumberedType::real, state.spindle_load, 2),     // spindle load meter [percent]
+      ofAxes(308, NumberedType::byte, axis_temperature),          // servo motor temperature [deg C]
+      ofAxes(309, NumberedType::byte, axis_temperature),          // encoder temperature [deg C]
+      single(403, NumberedType::byte, std::round(state.spindle_temperature)),  // spindle motor [deg C]
+      single(410, NumberedType::real, state.spindle_load, 2),                  // spindle load meter [percent]
       single(445, NumberedType::double_word,
              static_cast<int>(steps)),  // spindle position in steps
   };

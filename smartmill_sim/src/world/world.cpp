@@ -41,6 +41,7 @@ double fullScaleOf(const MachineModel& model) {
 ControllerOptions controllerOptions(const MachineModel& model, const WorldOptions& options) {
   ControllerOptions controller_options = ControllerOptions::ofModel(model);
   controller_options.load_step = 100.0 * options.load_step / fullScaleOf(model);
+  controller_options.motor_temperature = options.motor.temperature;
   return controller_options;
 }
 

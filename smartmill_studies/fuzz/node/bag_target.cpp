@@ -26,6 +26,7 @@ void recordingOf(const std::uint8_t* data, std::size_t size) {
     hear<SpindleAngle>(reader, names::SPINDLE_ANGLE);
     hear<CncState>(reader, names::CNC_STATE);
     hear<LoadSample>(reader, names::CNC_LOAD);
+    hear<MachineTemperature>(reader, names::MACHINE_TEMPERATURE);
     hear<CuttingCondition>(reader, names::CUTTING_CONDITION);
     hear<ForceBlock>(reader, names::FORCE_COMPENSATED);
     hear<MeasuredFrf>(reader, names::TOOL_FRF);

@@ -93,6 +93,17 @@ LoadMeter Client::servoMeter() {
   return meter;
 }
 
+std::vector<double> Client::diagnosis(int number, int axis) {
+  constexpr std::ptrdiff_t HEADER = 8;  // [byte] i32 number, i16 axis, u16 type
+  const std::string call = "cnc_diagnoss " + std::to_string(number);
+  Bytes data = impl_->request(call, SubRequest(OP_DIAGNOSIS, number, number, axis));
+  if (static_cast<std::ptrdiff_t>(data.size()) < HEADER || Reader(data).i32() != number) {
+    throw FocasError(call + ": expected this number in the reply", EW_LENGTH);
+  }
+  data.erase(data.begin(), data.begin() + HEADER);
+  return impl_->values(call, data, axis == -1 ? impl_->axes() : 1);
+}
+
 std::vector<std::string> Client::axisNames() {
   const SubReply reply = exchange({SubRequest(OP_AXIS_NAMES, 0)}).front();
   Impl::dataOf("axis names", reply);

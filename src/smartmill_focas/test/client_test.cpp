@@ -316,6 +316,9 @@ TEST_F(ClientServerTest, EveryTypedCall) {
   const LoadMeter servo = client_.servoMeter();
   EXPECT_EQ(servo.names, (std::vector<std::string>{"X", "Y", "Z"}));
   EXPECT_EQ(servo.load, (std::vector<double>{5.5, 6.25, 7.75}));
+  EXPECT_EQ(client_.diagnosis(308, -1), (std::vector<double>{28.0, 28.0, 44.0}));
+  EXPECT_EQ(client_.diagnosis(308, 3), std::vector<double>{44.0});
+  EXPECT_THROW(client_.diagnosis(403, 1), FocasError);  // this controller has no such number
   EXPECT_EQ(client_.axisNames(), servo.names);
   EXPECT_EQ(client_.readMacro(500), 2.5);
   EXPECT_EQ(client_.readMacro(501), std::nullopt);

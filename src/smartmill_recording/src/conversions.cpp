@@ -32,6 +32,12 @@ LoadSample fromMsg(const plain::LoadSample& message) {
 plain::LoadSample toPlain(const LoadSample& data) {
   return conversion::to<plain::LoadSample>(data);
 }
+MachineTemperature fromMsg(const plain::MachineTemperature& message) {
+  return conversion::from<MachineTemperature>(message);
+}
+plain::MachineTemperature toPlain(const MachineTemperature& data) {
+  return conversion::to<plain::MachineTemperature>(data);
+}
 CuttingCondition fromMsg(const plain::CuttingCondition& message) {
   return conversion::from<CuttingCondition>(message);
 }

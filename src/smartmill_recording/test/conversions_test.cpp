@@ -79,6 +79,20 @@ TEST(Conversions, SpindleAngleIsUnknownOnlyAtRest) {
       ThrowsMessage<Error>(HasSubstr("spindle angle: not a finite number")));
 }
 
+TEST(Conversions, MachineTemperature) {
+  const MachineTemperature warm =
+      recorded(MachineTemperature{STAMP, {"X", "Z"}, {300.15, NOT_A_NUMBER}, {301.15, 302.15}, 318.15});
+  EXPECT_EQ(warm.stamp, STAMP);
+  EXPECT_EQ(warm.axes, (std::vector<std::string>{"X", "Z"}));
+  EXPECT_EQ(warm.axis_motor[0], 300.15);
+  EXPECT_TRUE(std::isnan(warm.axis_motor[1]));
+  EXPECT_EQ(warm.axis_encoder, (std::vector<double>{301.15, 302.15}));
+  EXPECT_EQ(warm.spindle_motor, 318.15);
+  plain::MachineTemperature short_one = toPlain(warm);
+  short_one.axis_motor.pop_back();
+  EXPECT_THAT([&] { fromMsg(short_one); }, ThrowsMessage<Error>(HasSubstr("axis_motor")));
+}
+
 TEST(Conversions, CncState) {
   CncState state;
   state.stamp = STAMP;

@@ -36,6 +36,12 @@ LoadSample fromMsg(const smartmill_msgs::LoadSample& message) {
 smartmill_msgs::LoadSample toMsg(const LoadSample& data) {
   return conversion::to<smartmill_msgs::LoadSample>(data);
 }
+MachineTemperature fromMsg(const smartmill_msgs::MachineTemperature& message) {
+  return conversion::from<MachineTemperature>(message);
+}
+smartmill_msgs::MachineTemperature toMsg(const MachineTemperature& data) {
+  return conversion::to<smartmill_msgs::MachineTemperature>(data);
+}
 CuttingCondition fromMsg(const smartmill_msgs::CuttingCondition& message) {
   return conversion::from<CuttingCondition>(message);
 }

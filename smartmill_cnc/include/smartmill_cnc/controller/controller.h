@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "smartmill_cnc/motion/nc_program.h"
+#include "smartmill_core/signal/machine_temperature.h"
 #include "smartmill_core/signal/streams.h"
 
 namespace smartmill::cnc {
@@ -104,6 +105,14 @@ class Controller {
 
   /// Every failure is Failure::Kind::lost: a machine without known state is not moved.
   virtual Result<Reading> read() = 0;
+
+  /// [s] Period of readTemperature(); 0: it is not called.
+  virtual double temperaturePeriod() const { return 0.0; }
+  /// Temperatures of the motors, without stamp. What the controller does not offer is NaN and stated in
+  /// `refused`, in one line. Not lost: a failure of the call means that it offers none.
+  virtual Result<MachineTemperature> readTemperature(std::string& /*refused*/) {
+    return Failure{Failure::Kind::refused, name() + " reports no temperatures"};
+  }
 
   /// Writes a variable of the controller's programs.
   virtual Status setVariable(int number, double value) = 0;

@@ -17,6 +17,7 @@ struct FocasParameters {
   int marker_macro = 100;
   int orient_macro = nc::ORIENT_VARIABLE;
   int override_data = -1;
+  double temperature_period = 5.0;
 
   void declare(ParameterTable& table) {
     table.text("host", host, "name or address of the controller, real or simulated");
@@ -34,6 +35,10 @@ struct FocasParameters {
         "override; the next byte is for the spindle; 0 means 100; -1: the ladder has no such rungs, "
         "overrides "
         "are refused");
+    table.number(
+        "temperature_period", temperature_period, "s", Range::closed(0.0, 3600.0),
+        "period of machine/temperature, from the diagnosis numbers 308, 309 and 403; motors warm up in "
+        "minutes; 0: not read");
   }
 
   /// @throws Error naming key and value.

@@ -39,9 +39,12 @@ class LoadMeterIdentification {
   IdentificationOutputs& outputs() { return outputs_; }
   CutForces& forces() { return forces_; }
   const CutForces& forces() const { return forces_; }
+  const TemperatureWatch& temperature() const { return temperature_; }
 
   void handle(const CncState& state);
   void handle(const LoadSample& sample);
+  /// Topic machine/temperature.
+  void handle(const MachineTemperature& temperature) { temperature_.handle(temperature); }
   /// Topic daq/motor_current: phase currents [A] in channels x, y, z, spindle; or daq/servo, a record of
   /// Servo Guide, used from its trigger on.
   void handle(const SampleBlock& block);
@@ -72,6 +75,7 @@ class LoadMeterIdentification {
   IdentificationOutputs outputs_;
   SteadyRecord steady_;
   CutForces forces_;
+  TemperatureWatch temperature_;
   ProductionRun production_;
   SessionTests session_;
   double next_window_ = 0.0;  // [s]

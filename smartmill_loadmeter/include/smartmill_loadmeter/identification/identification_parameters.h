@@ -1,6 +1,7 @@
 #pragma once
 
 #include "smartmill_core/parameters/parameter_table.h"
+#include "smartmill_loadmeter/identification/temperature_watch.h"
 #include "smartmill_loadmeter/motor/force_estimate.h"
 #include "smartmill_loadmeter/motor/motor_chain.h"
 
@@ -17,8 +18,9 @@ struct IdentificationParameters {
   double largest_runout = 3.0e-5;
   MotorParameters motor;          ///< for daq/motor_current
   ForceEstimateParameters force;  ///< for the force of each cut
+  TemperatureParameters temperature;
 
-  /// Without those of `motor` and `force`, whose keys have a prefix.
+  /// Without those of `motor`, `force` and `temperature`, whose keys have a prefix.
   void declare(ParameterTable& table) {
     table.number("speed_tolerance", speed_tolerance, "1", Range::open(0.0, 0.5),
                  "share of the commanded spindle speed within which the speed is reached");

@@ -23,6 +23,8 @@ class IdentificationPipeline {
 
   void push(const CncState& state) { sort(states_, state); }
   void push(const LoadSample& sample) { sort(loads_, sample); }
+  /// machine/temperature: readings in seconds, not waited for longer than the hold-back.
+  void push(const MachineTemperature& temperature) { sort(temperatures_, temperature); }
   /// daq/motor_current: optional; waited for like the others after its first block.
   void push(const SampleBlock& block) { sort(motors_, block); }
   /// force/compensated: optional, likewise.
@@ -46,7 +48,7 @@ class IdentificationPipeline {
 
   LoadMeterIdentification identification_;
   StreamSorter sorter_;
-  StreamSorter::Stream states_, loads_, motors_, forces_, conditions_, goals_;
+  StreamSorter::Stream states_, loads_, temperatures_, motors_, forces_, conditions_, goals_;
   double newest_ = 0.0;
 };
 

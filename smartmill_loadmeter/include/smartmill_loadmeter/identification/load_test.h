@@ -6,6 +6,7 @@
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_loadmeter/calibration/load_meter.h"
+#include "smartmill_loadmeter/identification/temperature_watch.h"
 #include "smartmill_loadmeter/motor/force_record.h"
 #include "smartmill_loadmeter/motor/motor_chain.h"
 
@@ -20,8 +21,9 @@ struct LoadTest {
   std::vector<double> voltages;  ///< [V] steady readings
   std::vector<double> times;     ///< [s] of `voltages`, since the first
   int readings = 0;
-  double stamp = 0.0;     ///< [s] of its last reading
-  double duration = 0.0;  ///< [s] steady
+  double stamp = 0.0;              ///< [s] of its last reading
+  double duration = 0.0;           ///< [s] steady
+  TemperatureReading temperature;  ///< [K] of the spindle motor, mean
   std::optional<MotorMeasurement> motor;
   std::optional<MotorForce> force;         ///< of a cut, with calibrated motors
   std::optional<ForceMeasurement> sensor;  ///< by a force sensor, if used

@@ -75,6 +75,8 @@ struct MotorMeasurement {
   std::array<std::string, 4> reason;  ///< why a range is empty
   bool is_signed = false;             ///< ranges are mean currents, positive in the direction of motion
   std::array<std::vector<SpectralLine>, 3> lines;  ///< [A2] of the ranges' variation
+  /// [K] of the servo motors X, Y, Z; NaN: unknown
+  std::array<double, 3> temperature{{NOT_A_NUMBER, NOT_A_NUMBER, NOT_A_NUMBER}};
 };
 /// @param is_short the record is a window of a cut, whose noise is added to the calibration's scatter
 /// @param teeth of the tool in a cut; 0: no spectral lines

@@ -51,6 +51,7 @@ class SelfCalibration {
   std::vector<Cut> cuts_;
   std::array<std::optional<FittedFriction>, 3> friction_;  // [A] over [m/s]
   std::array<double, 3> slowest_{}, fastest_{};            // [m/s] of the air moves
+  std::array<double, 3> temperature_{};                    // [K] mean in the air moves; NaN: unknown
   std::optional<MotorCalibration> calibration_;
 };
 

@@ -27,7 +27,11 @@ struct ControllerOptions {
   double check_period = 2e-3;  ///< [s] between two calls of the watches: 1 mm of rapid traverse
   double loop_gain = 3000.0;   ///< [0.01/s] reported, of the axes' position loops: a typical value
   double screw_lead = 10e-3;   ///< [m] of travel per reported revolution of an axis motor
-  double motor_temperature = 25.0;               ///< [deg C] reported: the motors have no thermal model
+  double motor_temperature = 25.0;  ///< [deg C] of the shop and of the motors at the start
+  double motor_load_rise = 40.0;  ///< [K] steady rise at 100 % load; with the idle rise below the 105 K that
+                                  ///< insulation of class F permits
+  double motor_idle_rise = 20.0;  ///< [K] steady rise of the spindle motor at its highest speed without load
+  double motor_time_constant = 1500.0;           ///< [s] of the motors' heating: typical of servo motors
   std::size_t memory_size = 512 * 1024;          ///< [byte] of programs: 1280 m of tape, an option of a 30i
   std::array<double, 3> work_offset{{0, 0, 0}};  ///< [m] machine minus absolute position, of G54
   focas::SysInfo info = fineInfo();              ///< reported identification

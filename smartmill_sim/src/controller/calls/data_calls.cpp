@@ -25,7 +25,9 @@ class DataCalls : public CallsOf<focas::DataInterface> {
                          machine->axes.distanceToGo(machine->now()) != Variables::Point{};
     state.spindle_load = spindleLoadOf(*machine);
     state.spindle_angle = machine->motion().spindle_angle;
-    return within(machineDiagnoses(machine_.options(), state), first, last);
+    state.axis_temperature = machine->heating.axes();
+    state.spindle_temperature = machine->heating.spindle();
+    return within(machineDiagnoses(state), first, last);
   }
   std::optional<focas::DateTime> dateTime() const override { return machine_.lock()->calendar.now(); }
   EwCode setDateTime(const focas::DateTime& date_time) override {

@@ -90,6 +90,9 @@ class Client {
   std::vector<double> spindleLoad(int spindle = -1);  ///< [percent] cnc_rdspload
   LoadMeter spindleMeter();                           ///< cnc_rdspmeter
   LoadMeter servoMeter();                             ///< cnc_rdsvmeter
+  /// Diagnosis number. @param axis 1-based, of an axis or a spindle; -1 all axes; 0 without axis. @return one
+  /// value per axis; NaN: vacant.
+  std::vector<double> diagnosis(int number, int axis);  ///< cnc_diagnoss
   std::vector<std::string> axisNames();
   std::optional<double> readMacro(int number);  ///< nothing: vacant
   void writeMacro(int number, std::optional<double> value);

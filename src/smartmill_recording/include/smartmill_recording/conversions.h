@@ -7,6 +7,7 @@
 #include "smartmill_core/cutting/stability_chart.h"
 #include "smartmill_core/frames.h"
 #include "smartmill_core/modal/results.h"
+#include "smartmill_core/signal/machine_temperature.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_recording/messages.h"
 
@@ -27,6 +28,8 @@ CncState fromMsg(const plain::CncState& message);
 plain::CncState toPlain(const CncState& state);
 LoadSample fromMsg(const plain::LoadSample& message);
 plain::LoadSample toPlain(const LoadSample& load);
+MachineTemperature fromMsg(const plain::MachineTemperature& message);
+plain::MachineTemperature toPlain(const MachineTemperature& temperature);
 CuttingCondition fromMsg(const plain::CuttingCondition& message);
 plain::CuttingCondition toPlain(const CuttingCondition& condition);
 ForceBlock fromMsg(const plain::ForceBlock& message);
@@ -64,6 +67,10 @@ struct PlainOf<CncState> {
 template <>
 struct PlainOf<LoadSample> {
   using Type = plain::LoadSample;
+};
+template <>
+struct PlainOf<MachineTemperature> {
+  using Type = plain::MachineTemperature;
 };
 template <>
 struct PlainOf<CuttingCondition> {

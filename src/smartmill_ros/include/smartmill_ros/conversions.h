@@ -12,6 +12,7 @@
 #include <smartmill_msgs/ForceCurve.h>
 #include <smartmill_msgs/Frf.h>
 #include <smartmill_msgs/LoadSample.h>
+#include <smartmill_msgs/MachineTemperature.h>
 #include <smartmill_msgs/ModalModel.h>
 #include <smartmill_msgs/SampleBlock.h>
 #include <smartmill_msgs/SpindleAngle.h>
@@ -21,6 +22,7 @@
 #include "smartmill_core/cutting/force_curve.h"
 #include "smartmill_core/cutting/stability_chart.h"
 #include "smartmill_core/modal/results.h"
+#include "smartmill_core/signal/machine_temperature.h"
 #include "smartmill_core/signal/streams.h"
 
 namespace smartmill {
@@ -41,6 +43,8 @@ CncState fromMsg(const smartmill_msgs::CncState& message);
 smartmill_msgs::CncState toMsg(const CncState& state);
 LoadSample fromMsg(const smartmill_msgs::LoadSample& message);
 smartmill_msgs::LoadSample toMsg(const LoadSample& load);
+MachineTemperature fromMsg(const smartmill_msgs::MachineTemperature& message);
+smartmill_msgs::MachineTemperature toMsg(const MachineTemperature& temperature);
 CuttingCondition fromMsg(const smartmill_msgs::CuttingCondition& message);
 smartmill_msgs::CuttingCondition toMsg(const CuttingCondition& condition);
 ForceBlock fromMsg(const smartmill_msgs::ForceBlock& message);

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/signal/machine_temperature.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_recording/conversion/fields.h"
 
@@ -109,6 +110,22 @@ void write(const LoadSample& load, M& m) {
   m.spindle_speed = load.spindle_speed;
   m.axes = load.axes;
   m.axis_load = load.axis_load;
+}
+
+template <class M>
+void read(const M& m, MachineTemperature& out) {
+  requireLength("axis_motor", m.axis_motor.size(), m.axes.size());
+  requireLength("axis_encoder", m.axis_encoder.size(), m.axes.size());
+  out = {secondsOf(m.header.stamp), m.axes, m.axis_motor, m.axis_encoder, m.spindle_motor};
+}
+
+template <class M>
+void write(const MachineTemperature& temperature, M& m) {
+  setStamp(temperature.stamp, m);
+  m.axes = temperature.axes;
+  m.axis_motor = temperature.axis_motor;
+  m.axis_encoder = temperature.axis_encoder;
+  m.spindle_motor = temperature.spindle_motor;
 }
 
 template <class M>
