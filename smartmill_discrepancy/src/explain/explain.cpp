@@ -178,8 +178,10 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   addChatter(bench.data(), &result);
   result.verdict = verdictOf(result, search_options.negligible_excess);
   if (result.verdict == Verdict::no_disagreement) result.where.clear();
-  if (result.verdict == Verdict::recalibrated)
-    describeRecalibration(bench, hypotheses, search_options, found, &result);
+  if (result.verdict == Verdict::recalibrated) {
+    result.recalibrated = recalibratedValues(bench.freedom(), found.best);
+    result.sentence = sentenceOf(result.recalibrated);
+  }
   // A missing effect that acts in one test may look like a wrong label; the improved model decides.
   if (!labels.doubtful.empty() && !result.unexplained.empty())
     throwIfAny(data, doubtfulLabels(improved, bench.data(), options.bench.threads));

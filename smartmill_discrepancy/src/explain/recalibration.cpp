@@ -5,8 +5,6 @@
 #include <cstddef>
 
 #include "smartmill_core/formatted.h"
-#include "smartmill_discrepancy/search/prior_tension.h"
-#include "smartmill_discrepancy/search/separating_test.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -16,7 +14,6 @@ struct RecalibrationOptions {
   double stated = 2.0;           ///< stated deviations up to which a change is within the uncertainty
   std::size_t in_sentence = 3;   ///< values that the sentence lists
   std::size_t least_common = 2;  ///< values that have a common factor
-  double min_difference = 0.3;   ///< [1] of the noise by which predictions separate two models
 };
 
 const RecalibrationOptions LIMITS;
@@ -78,22 +75,6 @@ std::string sentenceOf(const std::vector<RecalibratedValue>& values) {
     text += formatted("; all by the common factor %.3f", factor);
   if (std::abs(values.front().deviations) <= LIMITS.stated) text += "; within their stated uncertainty";
   return text + ".";
-}
-
-void describeRecalibration(Workbench& bench, const std::vector<Hypothesis>& hypotheses,
-                           const SearchOptions& options, const SearchResult& found, Explanation* result) {
-  const FitState& state = found.best.state;
-  result->recalibrated = recalibratedValues(bench.freedom(), found.best);
-  result->sentence = sentenceOf(result->recalibrated);
-  for (const FitState& other : equivalentsOfRecalibration(bench, hypotheses, options, state)) {
-    const std::string& effect = other.members.front().hypothesis->effect;
-    result->not_separable.push_back({"nominal values", effect});
-    if (result->suggested_test) continue;
-    const auto test = separatingTest(bench.data(), bench.exact().model(state), bench.exact().model(other));
-    if (!test || test->difference <= LIMITS.min_difference) continue;
-    result->suggested_test = test->text;
-    result->suggested_cut = test->test;
-  }
 }
 
 }  // namespace smartmill::discrepancy

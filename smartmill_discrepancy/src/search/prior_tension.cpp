@@ -38,21 +38,6 @@ bool hasPriorTension(const Workbench& bench, const FitResult& fit) {
   return chiSquareTail(squares / variance, free.size() + free.size() % 2) < SIGNIFICANT;
 }
 
-// Predictions of all hypotheses; many can follow the valley to some extent, so those with few values come
-// first.
-std::vector<PredictedGain> predictionsAlongValley(const Fitter& quick, const FitResult& now,
-                                                  const NominalTangents& tangents,
-                                                  const std::vector<Hypothesis>& hypotheses,
-                                                  double required_gain) {
-  ScreeningMemory memory;
-  std::vector<PredictedGain> predictions = screen(quick, now, tangents, hypotheses, required_gain, &memory);
-  std::stable_sort(predictions.begin(), predictions.end(),
-                   [](const PredictedGain& a, const PredictedGain& b) {
-                     return a.hypothesis->coordinates.size() < b.hypothesis->coordinates.size();
-                   });
-  return predictions;
-}
-
 }  // namespace
 
 std::optional<FitState> resolvePriorTension(Workbench& bench, const std::vector<Hypothesis>& hypotheses,
@@ -64,8 +49,14 @@ std::optional<FitState> resolvePriorTension(Workbench& bench, const std::vector<
       tangents.ofAlignments();  // nominal values must be simulated to follow the valley
   const FitResult now = quick.fit(found->best.state, &tangents, FitOptions::toEvaluate());
   if (!now.converged) return {};
-  const std::vector<PredictedGain> predictions =
-      predictionsAlongValley(quick, now, tangents, hypotheses, ValidationResult::requiredSquares());
+  ScreeningMemory memory;
+  std::vector<PredictedGain> predictions =
+      screen(quick, now, tangents, hypotheses, ValidationResult::requiredSquares(), &memory);
+  // Many effects can follow the valley to some extent; those with few values are preferred.
+  std::stable_sort(predictions.begin(), predictions.end(),
+                   [](const PredictedGain& a, const PredictedGain& b) {
+                     return a.hypothesis->coordinates.size() < b.hypothesis->coordinates.size();
+                   });
   std::size_t round = 0;
   for (const Candidate& r : found->candidates) round = std::max(round, r.result.round + 1);
   const std::size_t first = found->candidates.size();
@@ -90,34 +81,6 @@ std::optional<FitState> resolvePriorTension(Workbench& bench, const std::vector<
     found->candidates[k].result.accepted =
         found->candidates[k].hypothesis == best->state.members.back().hypothesis;
   return best->state;
-}
-
-std::vector<FitState> equivalentsOfRecalibration(Workbench& bench, const std::vector<Hypothesis>& hypotheses,
-                                                 const SearchOptions& options, const FitState& recalibrated) {
-  const Fitter& quick = bench.quick();
-  const NominalTangents tangents = bench.linearise(recalibrated);
-  const NominalTangents alignment_tangents = tangents.ofAlignments();
-  const FitResult now = quick.fit(recalibrated, &tangents, FitOptions::toEvaluate());
-  std::vector<FitState> equivalents;
-  if (!now.converged) return equivalents;
-  const double required = options.replaced_share * now.penalty;
-  std::size_t fitted = 0;
-  for (const PredictedGain& predicted : predictionsAlongValley(quick, now, tangents, hypotheses, required)) {
-    if (fitted >= options.max_tension_fits || bench.cancelled()) break;
-    if (predicted.start.empty() || tensionReduction(predicted) < required) continue;
-    FitState with = now.state;
-    with.members.push_back({predicted.hypothesis, bestStart(quick, now, predicted)});
-    const FitResult tried = quick.fit(with, &alignment_tangents, FitOptions::toCompare());
-    ++fitted;
-    options.log(
-        formatted("  instead of the recalibration: squares %.5g -> %.5g, of the priors %.4g -> %.4g  ",
-                  now.chi2, tried.chi2, now.penalty, tried.penalty) +
-        predicted.hypothesis->title());
-    if (tried.converged && now.penalty - tried.penalty >= required &&
-        tried.chi2 + tried.penalty <= now.chi2 + now.penalty)
-      equivalents.push_back(tried.state);
-  }
-  return equivalents;
 }
 
 }  // namespace smartmill::discrepancy

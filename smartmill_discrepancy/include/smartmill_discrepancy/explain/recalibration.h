@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "smartmill_discrepancy/fit/fit.h"
 #include "smartmill_discrepancy/results/explanation.h"
-#include "smartmill_discrepancy/search/search.h"
 
 namespace smartmill::discrepancy {
 
@@ -16,9 +16,5 @@ std::vector<RecalibratedValue> recalibratedValues(const NominalFreedom& freedom,
 /// One line for the machinist: which values, how far, by a common factor or not, and whether within their
 /// stated uncertainty.
 std::string sentenceOf(const std::vector<RecalibratedValue>& values);
-
-/// Fills recalibrated, sentence, not_separable and the suggested test of a result with that verdict.
-void describeRecalibration(Workbench& bench, const std::vector<Hypothesis>& hypotheses,
-                           const SearchOptions& options, const SearchResult& found, Explanation* result);
 
 }  // namespace smartmill::discrepancy

@@ -15,11 +15,4 @@ namespace smartmill::discrepancy {
 std::optional<FitState> resolvePriorTension(Workbench& bench, const std::vector<Hypothesis>& hypotheses,
                                             const SearchOptions& options, SearchResult* found);
 
-/// Effects that reproduce the records as well as recalibrated nominal values do, with values nearer to the
-/// stated ones.
-/// @param recalibrated a refined state without effects
-/// @return states with one effect each, those with few values first
-std::vector<FitState> equivalentsOfRecalibration(Workbench& bench, const std::vector<Hypothesis>& hypotheses,
-                                                 const SearchOptions& options, const FitState& recalibrated);
-
 }  // namespace smartmill::discrepancy

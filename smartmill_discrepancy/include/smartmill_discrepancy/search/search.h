@@ -22,9 +22,6 @@ struct SearchOptions {
   /// [1] of the gain that a channel must have for its twin accuracy to count: where the fits agree, so do its
   /// errors.
   double min_channel_share = 0.05;
-  /// [1] of the squared deviations from the stated values: an effect that removes them is an alternative to
-  /// the recalibration.
-  double replaced_share = 0.5;
   double twin_accuracy = TWIN_ACCURACY;
   double min_share = 0.05;  ///< [1] of the squares above the noise: minimum of an effect
   /// [1] of the squares of the noise: excess below which records count as explained.
