@@ -74,7 +74,7 @@ TEST_P(SensorSession, IsCalibratedAndItsBagGivesTheSameForces) {
   std::size_t evaluated = 0;
   for (const RecordedCut& cut : recording.cuts) {
     const auto [from, to] = evaluatedSamples(cut, SETTLE);
-    if (from == to) continue;  // samples were lost on a busy computer
+    if (from == to) continue;  // no steady samples, for example lost on a busy computer
     ++evaluated;
     const double compensated = forceError(cut, cut.compensated), raw = forceError(cut, cut.raw);
     std::printf("%s, %s: RMS error compensated %.2f %%, as measured %.2f %%\n", sensor.c_str(),
