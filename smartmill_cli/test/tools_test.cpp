@@ -134,7 +134,7 @@ TEST(Tools, DoWhatTheirCommandsDoWithASpindleSensor) {
                    "y2[N],z1[N],z2[N]\n"
                    "1,0,130,0,0,0,1,-1,2,-2,3,3\n"
                    "1,0.001,130,0,0,0,2,-2,1,-1,2,2\n");
-  expectSame("spindle-sensor", "apply " SPINDLE_SENSOR " " + table + " -o forces.csv");
+  expectSame("spindle-sensor", "apply " SENSOR_FILE " " + table + " -o forces.csv");
   expectSame("spindle-sensor", "apply nowhere.yaml nowhere.csv -o forces.csv", 1);
 }
 
