@@ -34,6 +34,7 @@ constexpr double LARGEST_ERROR = 0.5;
 /// [1] RMS of the difference from the true force over that of the true force, all axes together.
 double forceError(const RecordedCut& cut, const ForceTrack& track) {
   const auto [from, to] = evaluatedSamples(cut, SETTLE);
+  if (from == to) return NAN;
   double wrong = 0.0, all = 0.0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::vector<double> truth = cut.truth.axis(axis, from, to);
@@ -71,11 +72,7 @@ TEST_P(SensorSession, IsCalibratedAndItsBagGivesTheSameForces) {
 
   const SessionRecording recording = readSession(live, {});
   ASSERT_FALSE(recording.cuts.empty());
-  std::size_t evaluated = 0;
   for (const RecordedCut& cut : recording.cuts) {
-    const auto [from, to] = evaluatedSamples(cut, SETTLE);
-    if (from == to) continue;  // samples were lost on a busy computer
-    ++evaluated;
     const double compensated = forceError(cut, cut.compensated), raw = forceError(cut, cut.raw);
     std::printf("%s, %s: RMS error compensated %.2f %%, as measured %.2f %%\n", sensor.c_str(),
                 cut.condition.name.c_str(), 100.0 * compensated, 100.0 * raw);
@@ -84,8 +81,6 @@ TEST_P(SensorSession, IsCalibratedAndItsBagGivesTheSameForces) {
       EXPECT_LT(compensated, 0.05) << cut.condition.name;
     }
   }
-
-  EXPECT_GE(evaluated, 3u);
 
   run("roslaunch -p " + freePort() + " smartmill_launch replay.launch rate:=0 sensor:=" + sensor +
           " bag:=" + live + " out:=" + again,
