@@ -24,6 +24,7 @@ BagRecorder::BagRecorder(const ros::NodeHandle& nh, const std::string& path,
 }
 
 void BagRecorder::subscribe() {
+  if (!ros::Time::isValid()) return;  // before the first /clock there is no time of reception
   ros::master::V_TopicInfo topics;
   ros::master::getTopics(topics);
   for (const ros::master::TopicInfo& topic : topics) {
@@ -66,8 +67,7 @@ std::uint32_t BagRecorder::connectionOf(const std::string& topic, Event event) {
 }
 
 void BagRecorder::write(const std::string& topic, Event event) {
-  // Simulated time may still be zero.
-  const ros::Time time = std::max(event.getReceiptTime(), ros::TIME_MIN);
+  const ros::Time time = event.getReceiptTime();
   const topic_tools::ShapeShifter& message = *event.getMessage();
   bytes_.resize(message.size());
   ros::serialization::OStream stream(bytes_.data(), message.size());

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include <rosgraph_msgs/Clock.h>
 #include <smartmill_msgs/CuttingCoefficients.h>
 #include <smartmill_msgs/ForceBlock.h>
 #include <smartmill_msgs/LoadSample.h>
@@ -27,8 +28,8 @@ constexpr double BLOCK_TIME = World::BLOCK / World::SAMPLE_RATE;
 NodeParameters read(const ros::NodeHandle& private_nh) {
   NodeParameters parameters = parametersFromServer(private_nh).readAll<NodeParameters>();
   if (parameters.model.empty()) throw Error("model: empty, expected the path of a smartmill-model/1 file");
-  if (ros::Time::isSimTime())
-    throw Error("/use_sim_time is set: the simulated machine runs in wall-clock time");
+  if (ros::Time::isSimTime() && !parameters.axes_input.empty())
+    throw Error("/use_sim_time: true, expected false with axes_input: an external controller runs in wall time");
   return parameters;
 }
 
@@ -58,7 +59,9 @@ Node::Node(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
     listen();
   }
 
-  start_ = toSec(ros::Time::now());
+  if (ros::Time::isSimTime()) clock_ = nh_.advertise<rosgraph_msgs::Clock>("/clock", STREAM_QUEUE);
+  wall_start_ = ros::WallTime::now();
+  start_ = clock_ ? wall_start_.toSec() : toSec(ros::Time::now());
   publishTruth();
   panel_.advertiseManualActions(*world_, parameters_.world);
   strike_server_ = nh_.advertiseService(names::STRIKE, &Node::strike, this);
@@ -158,11 +161,21 @@ void Node::publish(const World::Block& block) {
   if (!block.motor_current.channels.empty()) motor_current_.publish(toMsg(shifted(block.motor_current)));
 }
 
+/// [s] of the clock that the simulation follows.
+double Node::clockTime() const {
+  if (!clock_) return toSec(ros::Time::now());
+  return start_ + parameters_.pace * (ros::WallTime::now() - wall_start_).toSec() - held_back_;
+}
+
 void Node::run() {
   World::Block block;
   double done = 0.0;  // [s] since start
   while (!stopping_) {
-    const double now = toSec(ros::Time::now()) - start_;
+    const double now = clockTime() - start_;
+    if (clock_ && now - done > parameters_.most_behind) {
+      held_back_ = held_back_ + (now - done);
+      continue;
+    }
     if (now - done > parameters_.most_behind) {
       const auto blocks = static_cast<std::uint64_t>((now - done) / BLOCK_TIME);
       world_->skipSamples(blocks * World::BLOCK);
@@ -172,7 +185,8 @@ void Node::run() {
                static_cast<double>(blocks) * BLOCK_TIME);
     }
     if (now < done + BLOCK_TIME) {
-      std::this_thread::sleep_for(std::chrono::duration<double>(done + BLOCK_TIME - now));
+      const double pace = clock_ ? parameters_.pace : 1.0;
+      std::this_thread::sleep_for(std::chrono::duration<double>((done + BLOCK_TIME - now) / pace));
       continue;
     }
     if (!server_ && !updateStates(now, done)) {
@@ -190,6 +204,11 @@ void Node::run() {
     load_ = 0.98 * load_ + 0.02 * duration.count() / BLOCK_TIME;
     publish(block);
     done += BLOCK_TIME;
+    if (clock_) {
+      rosgraph_msgs::Clock clock;
+      clock.clock.fromSec(start_ + done);
+      clock_.publish(clock);
+    }
   }
 }
 
@@ -240,6 +259,7 @@ void Node::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
     status.summary(diagnostic_msgs::DiagnosticStatus::OK, "running");
   }
   status.addf("processor time per real time [1]", "%.3f", load_.load());
+  status.addf("clock held back [s]", "%.3f", held_back_.load());
   status.addf("samples lost [1]", "%llu", static_cast<unsigned long long>(lost_.load()));
 }
 

@@ -37,6 +37,7 @@ class Node {
   Node& operator=(const Node&) = delete;
 
  private:
+  double clockTime() const;
   void run();
   void publish(const World::Block& block);
   void serve();
@@ -54,9 +55,10 @@ class Node {
   std::unique_ptr<World> world_;
   std::unique_ptr<focas::Server> server_;
 
-  double start_ = 0.0;  // [s] stamp of sample 0
+  double start_ = 0.0;         // [s] stamp of sample 0
+  ros::WallTime wall_start_;  // wall time of sample 0
   ros::Publisher hammer_, dynamometer_, spindle_force_, angle_, tachometer_, force_, vibration_, servo_,
-      motor_current_, coefficients_, load_meter_;
+      motor_current_, coefficients_, load_meter_, clock_;
   LatchedTopic<smartmill_msgs::Frf> frf_;
   LatchedTopic<smartmill_msgs::ModalModel> modes_;
   ros::ServiceServer strike_server_;
@@ -64,6 +66,7 @@ class Node {
   NodeShell shell_;
   std::atomic<double> load_{0.0};  // [1] processor time per real time
   std::atomic<std::uint64_t> lost_{0};
+  std::atomic<double> held_back_{0.0};  // [s] by which /clock is behind the wall clock
 
   // Axes and spindle under an external controller.
   std::mutex axes_mutex_;  // of the track

@@ -16,6 +16,7 @@ struct NodeParameters {
   std::string axes_input;
   WorldOptions world;
   double most_behind = 0.25;
+  double pace = 1.0;
 
   // Set by programs only.
   double truth_step = 2.0, truth_end = 6000.0;  ///< [Hz] lines of the true FRFs, which cover measured bands
@@ -34,7 +35,10 @@ struct NodeParameters {
                "empty: the simulated controller");
     world.declare(table);
     table.number("most_behind", most_behind, "s", Range::atLeast(0.05),
-                 "largest lag behind the clock; beyond it samples are lost, as with a real device");
+                 "largest lag behind the clock; beyond it samples are lost, as with a real device; with "
+                 "/use_sim_time the clock is held back in place of it");
+    table.number("pace", pace, "1", Range::closed(0.01, 100.0),
+                 "simulated time per wall time with /use_sim_time, at most: a slow computer takes longer");
   }
   /// @throws Error naming key and value.
   void validate() const {
