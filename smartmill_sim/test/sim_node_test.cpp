@@ -11,6 +11,7 @@
 
 #include <gtest/gtest.h>
 #include <ros/ros.h>
+#include <rosgraph_msgs/Clock.h>
 #include <smartmill_msgs/ForceBlock.h>
 #include <smartmill_msgs/Frf.h>
 #include <smartmill_msgs/ModalModel.h>
@@ -106,6 +107,24 @@ TEST_F(SimNode, blocksHaveNoGapsAndShareOneClock) {
   EXPECT_EQ(truth.back().first_index % 256, dynamometer.back().first_index % 256);
   for (std::size_t i = 1; i < angle.size(); ++i)
     ASSERT_NEAR((angle[i].header.stamp - angle[i - 1].header.stamp).toSec(), 0.005, 2e-6);
+}
+
+// A state of the controller that is stamped on reception then belongs to the samples of the same stamp, however
+// late the simulation is.
+TEST_F(SimNode, itsClockIsTheEndOfTheLastBlock) {
+  ASSERT_TRUE(ros::Time::isSimTime());
+  const auto clock_ = collect<rosgraph_msgs::Clock>("/clock");
+  auto& clock = *clock_;
+  const auto dynamometer_ = collect<smartmill_msgs::SampleBlock>(names::DYNAMOMETER);
+  auto& dynamometer = *dynamometer_;
+  ASSERT_TRUE(until([&] { return clock.size() > 100 && dynamometer.size() > 100; }));
+  const std::lock_guard<std::mutex> lock(mutex);
+  for (const auto& c : clock) {
+    const double blocks = (c.clock - dynamometer[0].header.stamp).toSec() * 25600.0 / 256.0;
+    ASSERT_NEAR(blocks, std::round(blocks), 1e-3);
+  }
+  for (std::size_t i = 1; i < clock.size(); ++i)
+    ASSERT_NEAR((clock[i].clock - clock[i - 1].clock).toSec(), 0.01, 2e-6);
 }
 
 TEST_F(SimNode, aHitOnTheSensorActsOnBothChannels) {

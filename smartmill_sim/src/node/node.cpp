@@ -29,7 +29,8 @@ NodeParameters read(const ros::NodeHandle& private_nh) {
   NodeParameters parameters = parametersFromServer(private_nh).readAll<NodeParameters>();
   if (parameters.model.empty()) throw Error("model: empty, expected the path of a smartmill-model/1 file");
   if (ros::Time::isSimTime() && !parameters.axes_input.empty())
-    throw Error("/use_sim_time: true, expected false with axes_input: an external controller runs in wall time");
+    throw Error(
+        "/use_sim_time: true, expected false with axes_input: an external controller runs in wall time");
   return parameters;
 }
 

@@ -55,7 +55,7 @@ class Node {
   std::unique_ptr<World> world_;
   std::unique_ptr<focas::Server> server_;
 
-  double start_ = 0.0;         // [s] stamp of sample 0
+  double start_ = 0.0;        // [s] stamp of sample 0
   ros::WallTime wall_start_;  // wall time of sample 0
   ros::Publisher hammer_, dynamometer_, spindle_force_, angle_, tachometer_, force_, vibration_, servo_,
       motor_current_, coefficients_, load_meter_, clock_;
