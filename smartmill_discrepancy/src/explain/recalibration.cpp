@@ -11,6 +11,7 @@ namespace {
 
 struct RecalibrationOptions {
   double determined = 2.0;       ///< standard deviations of the fit from which a change is listed
+  double share = 0.1;            ///< of the largest change, in stated deviations, from which one is listed
   double stated = 2.0;           ///< stated deviations up to which a change is within the uncertainty
   std::size_t in_sentence = 3;   ///< values that the sentence lists
   std::size_t least_common = 2;  ///< values that have a common factor
@@ -38,9 +39,6 @@ double commonFactor(const std::vector<RecalibratedValue>& values) {
 
 std::vector<RecalibratedValue> recalibratedValues(const NominalFreedom& freedom, const FitResult& fit) {
   std::vector<RecalibratedValue> values;
-  const auto isDetermined = [](const RecalibratedValue& v) {
-    return std::abs(std::log(v.after / v.before)) >= LIMITS.determined * v.std_dev / v.after;
-  };
   for (std::size_t c = 0; c < fit.state.nominal.size(); ++c) {
     const std::optional<double> stated = freedom.stated(c);
     if (!stated) continue;
@@ -54,8 +52,13 @@ std::vector<RecalibratedValue> recalibratedValues(const NominalFreedom& freedom,
     return std::abs(a.deviations) > std::abs(b.deviations);
   });
   if (values.empty()) return values;
+  const double least = LIMITS.share * std::abs(values.front().deviations);
+  const auto isListed = [least](const RecalibratedValue& v) {
+    return std::abs(v.deviations) >= least &&
+           std::abs(std::log(v.after / v.before)) >= LIMITS.determined * v.std_dev / v.after;
+  };
   values.erase(std::remove_if(values.begin() + 1, values.end(),
-                              [&](const RecalibratedValue& v) { return !isDetermined(v); }),
+                              [&](const RecalibratedValue& v) { return !isListed(v); }),
                values.end());
   return values;
 }
