@@ -137,7 +137,7 @@ class Graph:
         kind = "topic"
         for line in (root / "src/smartmill_core/include/smartmill_core/names.h").read_text(encoding="utf-8").splitlines():
             kind = {"// Actions.": "action", "// Services.": "service"}.get(line.strip(), kind)
-            match = re.match(r'constexpr const char\* (\w+) = "([^"]+)";', line)
+            match = re.match(r'constexpr const char\* (\w+) = "([\w/]+)";', line)
             if match and match[1] != "NAMESPACE":
                 self.constants[match[1]] = match[2]
                 self.kind[match[2]] = kind
@@ -191,6 +191,9 @@ class Graph:
         for word, handler in re.findall(rf"advertiseService\(\s*{NAME}\)?,\s*&\w+::(\w+)", text):
             kind = re.search(rf"bool {handler}\(smartmill_msgs::(\w+)::Request", folder)
             self.add(self.services, self.name(word, folder), kind[1] if kind else "", publishers=users)
+        for word, request in re.findall(rf"advertiseService\(\s*{NAME},\s*boost::function<bool\((\w+)(?:::Request)?&", text):
+            alias = re.search(rf"using {request} = smartmill_msgs::(\w+)::Request;", text)
+            self.add(self.services, self.name(word, folder), alias[1] if alias else request, publishers=users)
         for word in re.findall(rf"serviceClient<[^>]*>\({NAME}", text):
             self.add(self.services, self.name(word, folder), "", readers=users)
         for kind, word in re.findall(rf"serve<smartmill_msgs::(\w+)Action>\(\s*nh, {NAME}", text):
