@@ -44,13 +44,17 @@ def run_graph_tutorial(test, name):
     for command in commands:
         where = f"{name}.md:{command.line}: {command.text}"
         if command.text.endswith("&"):
-            running.append(subprocess.Popen(["bash", "-c", "exec " + command.text.rstrip("& ")], cwd=folder.name, env=environment))
+            # Not the pipe of the test: a master that outlives its roslaunch would keep it open.
+            with open(pathlib.Path(folder.name) / "background.log", "ab") as log:
+                running.append(subprocess.Popen(["bash", "-c", "exec " + command.text.rstrip("& ")], cwd=folder.name,
+                                                env=environment, stdout=log, stderr=log))
             continue
         if not command.text.startswith(ROS_COMMANDS):
             stop()
         done = run(command.text, folder.name, environment)
         for process in running:
-            test.assertIsNone(process.poll(), f"{where}: '{process.args[-1]}' has ended with exit code {process.returncode}")
+            test.assertIsNone(process.poll(), f"{where}: '{process.args[-1]}' has ended with exit code {process.returncode}: "
+                              + (pathlib.Path(folder.name) / "background.log").read_text(errors="replace")[-2000:])
         test.assertEqual(done.returncode, 0, f"{where}: {done.stderr}")
         test.assertEqual(console.difference(command.output, done.stdout.splitlines()), "", where)
 
