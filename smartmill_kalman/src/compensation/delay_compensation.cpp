@@ -38,8 +38,10 @@ void DelayCompensation::design(int half_samples, double sample_rate) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     auto found = designs_.find({axis, half_samples});
     if (found == designs_.end()) {
+      HarmonicFilterParameters parameters = parameters_.filter;
+      parameters.noise_rms = sensor_[axis].noise_rms;
       const DelayFilter designed(sensor_[axis].model, 2.0 * units::TWO_PI * sample_rate / half_samples,
-                                 sample_rate, sensor_[axis].filter(parameters_.filter));
+                                 sample_rate, parameters);
       found = designs_.emplace(std::pair(axis, half_samples), designed).first;
     }
     filters_.push_back(found->second);

@@ -29,9 +29,9 @@ ForceCompensation::ForceCompensation(const CompensationParameters& parameters, b
       steady_speed_(parameters.speed_tolerance) {
 }
 
-void ForceCompensation::setSensor(std::size_t axis, const SensorAxis& sensor) {
+void ForceCompensation::setSensor(std::size_t axis, const ModalModel& sensor, double noise_rms) {
   has_sensor_.at(axis) = true;
-  method_->setSensor(axis, sensor);
+  method_->setSensor(axis, {sensor, noise_rms});
 }
 
 void ForceCompensation::setMatrix(const SensorMatrix& matrix) {

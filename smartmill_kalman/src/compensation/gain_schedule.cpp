@@ -20,7 +20,8 @@ const std::vector<HarmonicGain>& GainSchedule::gains(std::size_t axis, const Sen
   sample_rate_ = sample_rate;
   std::vector<HarmonicGain>& gains = gains_[{axis, grid_point}];
   if (gains.empty()) {
-    HarmonicFilterParameters parameters = sensor.filter(parameters_);
+    HarmonicFilterParameters parameters = parameters_;
+    parameters.noise_rms = sensor.noise_rms;
     design_frequencies_[axis].clear();
     for (const Mode& mode : sensor.model.modes) design_frequencies_[axis].push_back(mode.frequency);
     const double speed = std::exp(grid_point * options_.spacing);

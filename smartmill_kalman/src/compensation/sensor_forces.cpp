@@ -14,8 +14,7 @@ SensorForces::SensorForces(const CompensationParameters& parameters, const Force
                            ForceOutputs outputs)
     : model_sensor_(sensor),
       outputs_(std::move(outputs)),
-      compensation_(parameters, sensor.measures_workpiece, blockOutputs()),
-      noise_rms_(parameters.filter.noise_rms) {
+      compensation_(parameters, sensor.measures_workpiece, blockOutputs()) {
   useModelSensors();
 }
 
@@ -49,24 +48,26 @@ void SensorForces::useMemory(const MemorySchedule& memory) {
 
 void SensorForces::useModelSensors() {
   modes_stamp_.fill(NEVER);
-  bandwidth_.fill(std::numeric_limits<double>::infinity());
   if (matrix_) {
     compensation_.setMatrix(*matrix_);
     for (std::size_t axis = 0; axis < 3; ++axis) model_sensor_.axis[axis] = matrix_->h[axis][axis];
   }
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (model_sensor_.noise_rms) {
-      compensation_.setSensor(axis, SensorAxis{model_sensor_.axis[axis], (*model_sensor_.noise_rms)[axis]});
+      compensation_.setSensor(axis, model_sensor_.axis[axis], (*model_sensor_.noise_rms)[axis]);
     } else {
       compensation_.setSensor(axis, model_sensor_.axis[axis]);
     }
   }
 }
 
-void SensorForces::setModes(std::size_t axis, double stamp, const SensorAxis& sensor) {
+void SensorForces::setModes(std::size_t axis, double stamp, const ModalModel& model, double noise_rms) {
   modes_stamp_[axis] = stamp;
-  bandwidth_[axis] = sensor.bandwidth;
-  compensation_.setSensor(axis, sensor);
+  if (noise_rms > 0.0) {
+    compensation_.setSensor(axis, model, noise_rms);
+  } else {
+    compensation_.setSensor(axis, model);
+  }
 }
 
 void SensorForces::check(const SampleBlock& block) const {

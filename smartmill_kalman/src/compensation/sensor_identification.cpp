@@ -117,8 +117,7 @@ void SensorIdentification::tune(CalibrationResult& result) {
   const std::vector<TuningRecord> records = tuning_.records();
   if (records.empty() || forces_.invertsMatrix()) return;
   std::array<SensorAxis, 3> sensor;
-  for (std::size_t axis = 0; axis < 3; ++axis)
-    sensor[axis] = {forces_.sensor(axis), filter_.noise_rms, forces_.bandwidth(axis)};
+  for (std::size_t axis = 0; axis < 3; ++axis) sensor[axis] = {forces_.sensor(axis), filter_.noise_rms};
   MemorySchedule memory;
   try {
     for (const TuningRecord& record : records) {
@@ -186,10 +185,8 @@ void SensorIdentification::publishResults() {
   calibrator_.endTaps(*result);
   plate_.endTaps(*result);
   if (result->code == FrfCode::ok) {
-    forces_.setModes(
-        *axisIndex(result->modes.direction), result->modes.stamp,
-        SensorAxis{result->modes.model, result->noise_rms > 0.0 ? result->noise_rms : filter_.noise_rms,
-                   result->bandwidth});
+    forces_.setModes(*axisIndex(result->modes.direction), result->modes.stamp, result->modes.model,
+                     result->noise_rms);
   }
   if (outputs_.result) outputs_.result(*result);
 }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
@@ -29,17 +28,6 @@ void estimateStaticGain(const FrequencyResponse& frf, const TapParameters& param
   }
   result.static_gain = sum / weights;
   result.static_gain_std = 1.0 / std::sqrt(weights);
-}
-
-/// [Hz] of the known lines, counted from 0 Hz: single lines, as at a zero of the FRF, do not end the band.
-/// Infinite for a single hit without noise, whose deviations are unknown.
-double knownBand(const FrequencyResponse& frf, const ModalModel& model, double known_error) {
-  if (std::none_of(frf.std_dev.begin(), frf.std_dev.end(), [](double s) { return std::isfinite(s); }))
-    return std::numeric_limits<double>::infinity();
-  std::size_t known = 0;
-  for (std::size_t k = 0; k < frf.size(); ++k)
-    known += frf.std_dev[k] <= known_error * std::abs(model.response(frf.frequency[k])) ? 1 : 0;
-  return static_cast<double>(known) * frf.frequency.back() / static_cast<double>(frf.size());
 }
 
 }  // namespace
@@ -90,10 +78,8 @@ SensorResult evaluateTaps(const std::vector<Hit>& hits, const MeasureFrfGoal& go
     const ModalFit fit = fitModes(frf, fit_options);
     result.modes.model = fit.model;
     result.modes.relative_error = fit.relative_error;
-    result.bandwidth = knownBand(frf, fit.model, parameters.known_error);
     result.message = std::to_string(hits.size()) + " hits, " + std::to_string(fit.model.modes.size()) +
-                     " modes, known up to " + formatted("%.0f Hz", result.bandwidth) +
-                     ", static gain measured " +
+                     " modes, static gain measured " +
                      formatted("%.3f +- %.3f", result.static_gain, result.static_gain_std);
   } catch (const Error& error) {
     result.code = FrfCode::fit_failed;

@@ -20,11 +20,9 @@ class AxisTuner {
  public:
   AxisTuner(const TuningRecord& record, std::size_t axis, const SensorAxis& sensor,
             const HarmonicFilterParameters& parameters, const TuningOptions& options)
-      : record_(record),
-        axis_(axis),
-        sensor_(sensor),
-        parameters_(sensor.filter(parameters)),
-        options_(options) {}
+      : record_(record), axis_(axis), sensor_(sensor), parameters_(parameters), options_(options) {
+    parameters_.noise_rms = sensor.noise_rms;
+  }
 
   TunedMemory tune() const {
     const ReproducedCut cut = reproduce();

@@ -90,28 +90,6 @@ TEST(SensorMeasurement, findsTheModeFromThreeTaps) {
   }
 }
 
-// Closed form: the spectrum of a sin^2 hit falls to zero at 2 / contact; a line is known where noise of the
-// record over spectrum and sqrt(hits) is at most half the response.
-TEST(SensorMeasurement, theModesAreKnownWhereTheHitsExceedTheNoise) {
-  constexpr int HITS = 8;
-  for (const double noise : {0.3, 1.0, 3.0}) {
-    Loop loop;
-    loop.rig.noise = noise;
-    const SensorResult r = loop.measure(goal("x", HITS, 1));
-    ASSERT_EQ(r.code, FrfCode::ok) << r.message;
-    const double contact = loop.rig.contact, samples = TapParameters().record_length * TapRig::RATE;
-    double known = 0.0;  // [Hz]
-    for (double f = 5.0; f <= 5000.0; f += 5.0) {
-      const double x = f * contact;
-      const double hit = TapRig::RATE * loop.rig.peak * 0.5 * contact * std::sin(units::PI * x) /
-                         (units::PI * x) / (1.0 - x * x + 1e-12);
-      const double error = noise * std::sqrt(samples / HITS) / std::abs(hit);
-      if (error <= 0.5 * std::abs(dynamometer().response(f))) known += 5.0;
-    }
-    EXPECT_NEAR(r.bandwidth, known, 0.1 * known) << noise << " N";
-  }
-}
-
 TEST(SensorMeasurement, ABlowFromTheOtherSideIsTurned) {
   Loop loop;
   loop.rig.peak = -300.0;

@@ -1,10 +1,8 @@
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <functional>
-#include <limits>
 #include <memory>
 
 #include "smartmill_core/modal/modal_model.h"
@@ -29,15 +27,6 @@ struct ForceOutputs {
 struct SensorAxis {
   ModalModel model;        ///< measured over applied force [1]
   double noise_rms = 0.0;  ///< [N] of one sample, > 0
-  /// [Hz] up to which the model is known; the fit of taps extrapolates above
-  double bandwidth = std::numeric_limits<double>::infinity();
-
-  /// Parameters of a filter of this axis.
-  HarmonicFilterParameters filter(HarmonicFilterParameters parameters) const {
-    parameters.noise_rms = noise_rms;
-    parameters.bandwidth = std::min(parameters.bandwidth, bandwidth);
-    return parameters;
-  }
 };
 
 /// Counts since the start, and state at the last block, for diagnostics.

@@ -25,9 +25,10 @@ class ForceCompensation {
 
   /// Model of an axis (0 x, 1 y, 2 z) from now on; the filters restart.
   void setSensor(std::size_t axis, const ModalModel& sensor) {
-    setSensor(axis, SensorAxis{sensor, parameters_.filter.noise_rms});
+    setSensor(axis, sensor, parameters_.filter.noise_rms);
   }
-  void setSensor(std::size_t axis, const SensorAxis& sensor);
+  /// @param noise_rms [N] of one sample, > 0
+  void setSensor(std::size_t axis, const ModalModel& sensor, double noise_rms);
   /// Sensor with cross-talk from now on (CoupledCompensation). Its diagonal elements are the sensor models;
   /// setSensor() replaces them, the cross-talk stays. @throws Error.
   void setMatrix(const SensorMatrix& matrix);

@@ -35,11 +35,9 @@ class SensorForces {
   void useTransferMatrix(const TransferMatrix& matrix, double bandwidth);
   /// Sensor with cross-talk; its diagonal replaces the machine model's sensor.
   void useMatrix(const SensorMatrix& matrix);
-  /// Measured modes of an axis are in use from now on. @param stamp [s] of the modes
-  void setModes(std::size_t axis, double stamp, const ModalModel& model) {
-    setModes(axis, stamp, SensorAxis{model, noise_rms_});
-  }
-  void setModes(std::size_t axis, double stamp, const SensorAxis& sensor);
+  /// Measured modes of an axis are in use from now on. @param stamp [s] of the modes @param noise_rms [N];
+  /// 0: unknown
+  void setModes(std::size_t axis, double stamp, const ModalModel& model, double noise_rms = 0.0);
   /// Process noise over the spindle speed of a calibration file.
   void useMemory(const MemorySchedule& memory);
   /// The same, tuned here: from now on, until a restart.
@@ -63,8 +61,6 @@ class SensorForces {
   CompensationHealth health() const;
   /// Model in use of an axis.
   const ModalModel& sensor(std::size_t axis) const { return compensation_.sensor(axis); }
-  /// [Hz] up to which it is known; infinite for the modes of the machine model.
-  double bandwidth(std::size_t axis) const { return bandwidth_[axis]; }
   bool invertsMatrix() const { return inverse_.has_value(); }
 
  private:
@@ -79,9 +75,7 @@ class SensorForces {
   std::optional<MatrixCompensation> inverse_;
   std::optional<SensorMatrix> matrix_;
   MemorySchedule file_memory_;
-  double noise_rms_;                     // [N] where it was not measured
   std::array<double, 3> modes_stamp_{};  // [s]
-  std::array<double, 3> bandwidth_{};    // [Hz]
   SampleBlock spindle_forces_;           // of the last block
 };
 

@@ -18,7 +18,6 @@ namespace smartmill::kalman {
 struct TapParameters : HitTestParameters {
   double response_range = 0.0;  ///< [N] a sample of the sensor at or beyond it is clipped; 0: unknown
   double static_tolerance = 0.25;
-  double known_error = 0.5;
   double systematic = 0.002;
 
   TapParameters() {
@@ -30,10 +29,6 @@ struct TapParameters : HitTestParameters {
     table.internal("response_range", response_range, "N", Range::notNegative());
     table.number("static_tolerance", static_tolerance, "1", Range::positive(),
                  "accepted difference of the measured static gain from 1");
-    table.number(
-        "known_error", known_error, "1", Range::positive(),
-        "relative standard deviation up to which a line of the FRF is known; harmonics above the known "
-        "lines are not estimated, since the fit extrapolates there");
     table.number("systematic", systematic, "1", Range::openHigh(0.0, 1.0),
                  "systematic relative error of |H| (linearity, aliasing), part of each standard deviation");
     declareFit(table);
@@ -48,7 +43,6 @@ struct SensorResult {
   MeasuredFrf frf;                 ///< [1] measured over applied force, static gain positive
   MeasuredModes modes;             ///< [1] static gain 1
   double noise_rms = 0.0;          ///< [N] of one sample of the sensor, from the samples before the hits
-  double bandwidth = 0.0;          ///< [Hz] up to which the modes are known
   double static_gain = 0.0;        ///< [1] measured; the fit assumes 1; negative: hit against the axis
   double static_gain_std = 0.0;    ///< [1]
   std::vector<double> hit_stamps;  ///< [s] triggers of the accepted hits
