@@ -39,8 +39,6 @@ std::vector<HarmonicGain> designGains(const ModalModel& sensor, double spindle_s
   const double top = std::min(parameters.bandwidth, 0.45 * sample_rate);
   int harmonics = 0;
   if (parameters.max_harmonics > 0) harmonics = harmonicCount(top, revolution, parameters.max_harmonics);
-  while (harmonics > 1 && std::abs(sensor.response(harmonics / revolution)) < parameters.least_response)
-    --harmonics;
   const double quick = parameters.settling_revolutions;
   std::vector<double> memories{quick};
   if (parameters.memory_revolutions > quick)

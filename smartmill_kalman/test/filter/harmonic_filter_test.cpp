@@ -267,21 +267,6 @@ TEST(HarmonicFilter, coastsThroughAGap) {
   EXPECT_LT(worst, 1e-6);
 }
 
-// Closed form: above one mode |H| is 1 / ((f / f0)^2 - 1), which is the least response at f0 sqrt(1 + 1 /
-// least).
-TEST(HarmonicFilter, endsWhereTheSensorHasNoResponse) {
-  ModalModel sensor;
-  sensor.modes = {{500.0, 0.01, 1.0}};
-  HarmonicFilterParameters parameters;
-  for (const double least : {0.03, 0.1}) {
-    parameters.least_response = least;
-    const double last = 500.0 * std::sqrt(1.0 + 1.0 / least);  // [Hz]
-    const std::size_t states =
-        designGains(sensor, units::TWO_PI * 100.0, 25600.0, parameters)[0].filter.size();
-    EXPECT_EQ((states - 2 * sensor.modes.size() - 1) / 2, static_cast<std::size_t>(last / 100.0)) << least;
-  }
-}
-
 TEST(HarmonicFilter, refusesImpossibleParameters) {
   HarmonicFilterParameters parameters;
   parameters.noise_rms = -1.0;

@@ -102,15 +102,8 @@ Cut cutWithNoise(double noise, double unmodelled) {
   return cut;
 }
 
-/// All harmonics, those with little response too, whose noise the memory has to limit.
-HarmonicFilterParameters allHarmonics() {
-  HarmonicFilterParameters parameters;
-  parameters.least_response = 0.0;
-  return parameters;
-}
-
 double trueError(const Cut& cut, std::optional<double> memory) {
-  HarmonicFilterParameters parameters = allHarmonics();
+  HarmonicFilterParameters parameters;
   if (memory) {
     parameters.uniform_noise = true;
     parameters.memory_revolutions = *memory;
@@ -125,7 +118,7 @@ double trueError(const Cut& cut, std::optional<double> memory) {
 // The truth is not given to the tuner: its choice and its expected error are compared with it.
 TEST(MemoryTuner, FindsTheLeastErrorAndStatesIt) {
   const Cut cut = cutWithNoise(5.0, 0.0);
-  const TunedMemory tuned = tuneMemory(cut.record, cut.sensor, allHarmonics())[0];
+  const TunedMemory tuned = tuneMemory(cut.record, cut.sensor, {})[0];
   ASSERT_TRUE(tuned.memory);
   const double fixed = trueError(cut, std::nullopt), is = trueError(cut, tuned.memory);
   EXPECT_LT(is, 0.9 * fixed);

@@ -17,7 +17,6 @@ namespace smartmill::kalman {
 struct HarmonicFilterParameters {
   double bandwidth = 5000.0;
   int max_harmonics = 50;
-  double least_response = 0.03;
   double noise_rms = 1.0;
   double settling_revolutions = 0.2;
   double memory_revolutions = 8.0;
@@ -32,10 +31,6 @@ struct HarmonicFilterParameters {
     table.number("max_harmonics", max_harmonics, "1", Range::closed(0, 200),
                  "largest number of harmonics, reached at low speeds; the design time grows with its square; "
                  "0: random walk");
-    table.number(
-        "least_response", least_response, "1", Range::openHigh(0.0, 1.0),
-        "response of the sensor below which the highest harmonics are not estimated: they would mostly be "
-        "noise, amplified by its reciprocal");
     table.number("noise_rms", noise_rms, "N", Range::positive(),
                  "standard deviation of one sample of the sensor");
     table.number(
