@@ -11,6 +11,7 @@ import sys
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 DOCUMENT = ROOT / "docs" / "licences.md"
 COMPILER = re.compile(r"lib(c|m|stdc\+\+|gcc_s|pthread|dl|rt)\.so|ld-linux")
+OPTIONAL = {"linuxcnc_gateway", "linuxcnc_stream"}  # built only where LinuxCNC is installed, in no package
 ROS = {"librosconsole", "libroscpp", "librostime"}  # what links these is in smartmill-ros
 
 
@@ -31,6 +32,8 @@ def needed(path):
 
 def package_of(path, libraries):
     """Debian package (debian/*.install) of a file of the devel space; none: it is in no package."""
+    if path.name in OPTIONAL:
+        return None
     if "studies" in str(path) or "testing" in path.name or path.stem.endswith("_test"):
         return None
     if "smartmill_panel" in str(path):

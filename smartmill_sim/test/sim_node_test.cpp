@@ -109,8 +109,8 @@ TEST_F(SimNode, blocksHaveNoGapsAndShareOneClock) {
     ASSERT_NEAR((angle[i].header.stamp - angle[i - 1].header.stamp).toSec(), 0.005, 2e-6);
 }
 
-// A state of the controller that is stamped on reception then belongs to the samples of the same stamp, however
-// late the simulation is.
+// A state of the controller that is stamped on reception then belongs to the samples of the same stamp,
+// however late the simulation is.
 TEST_F(SimNode, itsClockIsTheEndOfTheLastBlock) {
   ASSERT_TRUE(ros::Time::isSimTime());
   const auto clock_ = collect<rosgraph_msgs::Clock>("/clock");
