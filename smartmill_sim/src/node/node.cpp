@@ -173,8 +173,10 @@ void Node::run() {
   double done = 0.0;  // [s] since start
   while (!stopping_) {
     const double now = clockTime() - start_;
-    if (clock_ && now - done > parameters_.most_behind) {
-      held_back_ = held_back_ + (now - done);
+    // The clock is held back rather than made up for: in a burst of blocks what reads the controller would
+    // stamp its states too late.
+    if (clock_ && now - done > 2.0 * BLOCK_TIME) {
+      held_back_ = held_back_ + (now - done - BLOCK_TIME);
       continue;
     }
     if (now - done > parameters_.most_behind) {

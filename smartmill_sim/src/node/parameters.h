@@ -35,8 +35,8 @@ struct NodeParameters {
                "empty: the simulated controller");
     world.declare(table);
     table.number("most_behind", most_behind, "s", Range::atLeast(0.05),
-                 "largest lag behind the clock; beyond it samples are lost, as with a real device; with "
-                 "/use_sim_time the clock is held back in place of it");
+                 "largest lag behind the clock; beyond it samples are lost, as with a real device; not used "
+                 "with /use_sim_time, where the clock is held back");
     table.number("pace", pace, "1", Range::closed(0.01, 100.0),
                  "simulated time per wall time with /use_sim_time, at most: a slow computer takes longer");
   }
