@@ -32,8 +32,7 @@ void SteadyRecord::begin(const std::optional<CuttingCondition>& condition) {
   condition_ = condition;
   at_speed_since_.reset();
   on_path_since_.reset();
-  path_first_.reset();
-  path_last_.reset();
+  path_.clear();
 }
 
 void SteadyRecord::clear() {
@@ -74,16 +73,12 @@ void SteadyRecord::handle(const CncState& state) {
   for (std::size_t a = 0; a < 3; ++a) point.position[a] = state.position[*controllerAxis(state.axes, a)];
   // The return to the start may run along the path, and the tool is at rest before the path.
   const bool entered = !on_path_since_;
-  if (path_first_ && (progressAlong(*condition_, path_last_->position, point.position) < 0.0 ||
-                      (entered && path_first_->stamp == path_last_->stamp)))
-    path_first_.reset();
-  if (!path_first_) {
-    if (isCut()) clear();
-    path_first_ = point;
-    on_path_since_ = state.stamp;
-  }
-  if (entered) on_path_since_ = state.stamp;
-  path_last_ = point;
+  if (!path_.empty() && (progressAlong(*condition_, path_.back().position, point.position) < 0.0 ||
+                         (entered && path_.size() == 1)))
+    path_.clear();
+  if (path_.empty() && isCut()) clear();
+  if (path_.empty() || entered) on_path_since_ = state.stamp;
+  path_.push_back(point);
 }
 
 // Whether a block of another sensor belongs to the steady part of a test.
@@ -92,7 +87,7 @@ bool SteadyRecord::isSteadyAt(double stamp) const {
   if (!at_speed_since_ || stamp - last_load_ > parameters_.maximum_gap) return false;
   double since = *at_speed_since_;
   // In air without motion only the spindle is measured.
-  if (!on_path_since_ && (path_first_ || isCut())) return false;
+  if (!on_path_since_ && (!path_.empty() || isCut())) return false;
   if (on_path_since_) since = std::max(since, *on_path_since_);
   return stamp >= since + settle_time_;
 }
@@ -155,11 +150,19 @@ LoadTest SteadyRecord::test(double since) const {
 
 std::array<double, 3> SteadyRecord::velocity() const {
   std::array<double, 3> velocity{{0.0, 0.0, 0.0}};
-  if (!path_first_ || !path_last_ || !(path_last_->stamp > path_first_->stamp)) return velocity;
-  for (std::size_t a = 0; a < 3; ++a) {
-    velocity[a] =
-        (path_last_->position[a] - path_first_->position[a]) / (path_last_->stamp - path_first_->stamp);
+  if (path_.empty()) return velocity;
+  // Line of all points: on a busy computer the first or the last state may be stamped late.
+  double middle = 0.0;  // [s] after the first
+  for (const PathPoint& point : path_)
+    middle += (point.stamp - path_.front().stamp) / static_cast<double>(path_.size());
+  double squares = 0.0;  // [s2]
+  for (const PathPoint& point : path_) {
+    const double time = point.stamp - path_.front().stamp - middle;
+    squares += time * time;
+    for (std::size_t a = 0; a < 3; ++a) velocity[a] += time * (point.position[a] - path_.front().position[a]);
   }
+  if (!(squares > 0.0)) return {{0.0, 0.0, 0.0}};
+  for (double& v : velocity) v /= squares;
   return velocity;
 }
 

@@ -64,7 +64,7 @@ class SteadyRecord {
   std::optional<CuttingCondition> condition_;
   std::optional<double> at_speed_since_, on_path_since_;  // [s] start of the steady state
   double last_load_ = 0.0, last_state_ = 0.0;             // [s]
-  std::optional<PathPoint> path_first_, path_last_;       // of the path in a cut, or along its line in air
+  std::vector<PathPoint> path_;                           // in a cut, or along its line in air
   std::vector<Sample> readings_;                          // of the load meter
   MotorRecord motor_;
   ForceRecord force_;
