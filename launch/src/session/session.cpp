@@ -5,6 +5,7 @@
 
 #include <smartmill_msgs/CoefficientPrior.h>
 #include <smartmill_msgs/FindCoefficients.h>
+#include <smartmill_msgs/ForceCurve.h>
 #include <smartmill_msgs/SampleBlock.h>
 #include <smartmill_msgs/SpindleAngle.h>
 #include <boost/function.hpp>
@@ -20,7 +21,8 @@
 namespace smartmill::session {
 namespace {
 
-constexpr double FRESH = 0.5;  // [s] since the last message of a sensor
+constexpr double FRESH = 0.5;       // [s] since the last message of a sensor
+constexpr double CURVE_WAIT = 5.0;  // [s] after the last cut, for the force curve that contains it
 
 std::string modesText(const smartmill_msgs::ModalModel& model) {
   std::string text;
@@ -86,6 +88,11 @@ Session::Session(ros::NodeHandle nh, const ros::NodeHandle& private_nh, const st
       boost::function<void(const smartmill_msgs::StabilityChart&)>([this](const auto& m) {
         const std::lock_guard<std::mutex> lock(mutex_);
         chart_ = m;
+      })));
+  subscribers_.push_back(nh_.subscribe<smartmill_msgs::ForceCurve>(
+      names::FORCE_CURVE, 10, boost::function<void(const smartmill_msgs::ForceCurve&)>([this](const auto& m) {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        curve_stamp_ = m.header.stamp;
       })));
   subscribers_.push_back(nh_.subscribe<smartmill_msgs::ChatterState>(
       names::CHATTER_STATE, 1000,
@@ -164,6 +171,7 @@ void Session::runSteps() {
     waitVerdict();
     return arm(false);
   });
+  waitCurve();
 }
 
 void Session::calibrateSensor() {
@@ -370,6 +378,17 @@ void Session::waitVerdict() {
     throw Error(formatted("chatter/state: no verdict on the end of the cut within %.0f s",
                           parameters_.program_timeout));
   }
+}
+
+// The end of the session ends the recording, which must contain the last result. A cut that the curve does
+// not use, for example one with chatter, is not waited for beyond the limit.
+void Session::waitCurve() const {
+  const ros::Time limit = ros::Time::now() + ros::Duration(CURVE_WAIT);
+  const auto passed = [&] {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return curve_stamp_.isZero() || curve_stamp_ > cut_from_ || ros::Time::now() > limit;
+  };
+  waitUntil(passed, parameters_.program_timeout);
 }
 
 std::string Session::identify(bool reset) {

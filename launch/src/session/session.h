@@ -53,6 +53,7 @@ class Session {
   void runTests(const std::set<std::size_t>& selected);
   void identifyFromTests();
   void waitVerdict();
+  void waitCurve() const;
   std::string identify(bool reset);
   std::string waitChart();
   std::string choosePoints();
@@ -81,6 +82,7 @@ class Session {
   std::optional<smartmill_msgs::StabilityChart> chart_;
   std::map<std::string, std::vector<ChatterWindow>> windows_;  // by condition
   std::optional<smartmill_msgs::ChatterState> verdict_;        // the latest
+  ros::Time curve_stamp_;  // end of the last cut that the force curve contains
 
   std::vector<PlannedCut> tests_;  // air cuts, then slots
   std::set<std::size_t> needed_;   // of these, with the stored coefficients
