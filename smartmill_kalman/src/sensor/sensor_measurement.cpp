@@ -139,6 +139,7 @@ void SensorMeasurement::handleRecord(double now, HitCollector::Record record) {
                      {parameters_.weak_force, parameters_.second_hit_share, parameters_.response_range, 0.0});
   }
   if (!fault.text.empty()) return rejectHit(now, fault.text, fault.bad_data);
+  bad_hits_ = 0;
   hits_.push_back(std::move(record.hit));
   if (static_cast<int>(hits_.size()) >= goal_.hits) {
     result_ = evaluateTaps(hits_, goal_, parameters_);
@@ -152,7 +153,7 @@ void SensorMeasurement::handleRecord(double now, HitCollector::Record record) {
 void SensorMeasurement::rejectHit(double now, const std::string& why, bool bad_data) {
   if (++bad_hits_ > parameters_.max_bad_hits) {
     return finish(bad_data ? FrfCode::bad_data : FrfCode::no_hit,
-                  std::to_string(bad_hits_) + " rejected hits, the last: " + why);
+                  std::to_string(bad_hits_) + " rejected hits in a row, the last: " + why);
   }
   reportStage("rejected hit: " + why);
   waiting_for_hit_ = false;

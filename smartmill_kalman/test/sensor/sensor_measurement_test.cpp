@@ -123,6 +123,17 @@ TEST(SensorMeasurement, StandardDeviationsAreHonest) {
   EXPECT_TRUE(gain.isCalibrated());
 }
 
+// More rejected hits than max_bad_hits in all, but not in a row.
+TEST(SensorMeasurement, GoesOnWhenEverySecondHitIsRejected) {
+  TapParameters taps;
+  taps.max_bad_hits = 1;
+  Loop loop(dynamometer(), 1, taps);
+  loop.spoil = [&loop](TapRig::Blocks&) { loop.rig.peak = loop.strikes % 2 == 1 ? 14.0 : 300.0; };
+  const SensorResult r = loop.measure(goal("x", 4, 1));
+  EXPECT_EQ(r.code, FrfCode::ok) << r.message;
+  EXPECT_EQ(loop.strikes, 8);
+}
+
 TEST(SensorMeasurement, NamesWhatIsWrong) {
   TapParameters taps;
   taps.max_bad_hits = 1;

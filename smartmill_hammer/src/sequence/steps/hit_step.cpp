@@ -12,6 +12,7 @@ StepOutcome HitStep::begin(double now) {
 StepOutcome HitStep::hitRecorded(double now, RecordedHit&& hit) {
   if (hit.fault.text.empty()) hit.fault = faultOf(hit.hit);
   if (!hit.fault.text.empty()) return reject(now, hit.fault);
+  measurement_.bad_hits = 0;
   return hitAccepted(now, std::move(hit));
 }
 
@@ -22,8 +23,9 @@ HitCheckOptions HitStep::checkOptions() const {
 
 StepOutcome HitStep::reject(double now, const HitFault& fault) {
   if (++measurement_.bad_hits > measurement_.parameters.max_bad_hits)
-    return tooManyRejected(fault.bad_data ? FrfCode::bad_data : FrfCode::no_hit,
-                           std::to_string(measurement_.bad_hits) + " rejected hits, the last: " + fault.text);
+    return tooManyRejected(
+        fault.bad_data ? FrfCode::bad_data : FrfCode::no_hit,
+        std::to_string(measurement_.bad_hits) + " rejected hits in a row, the last: " + fault.text);
   // The panel recognises a rejected hit by this prefix.
   measurement_.report("hit thrown away: " + fault.text, measurement_.hitProgress());
   control_.strikeAfterRest(now);

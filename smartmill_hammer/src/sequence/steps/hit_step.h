@@ -7,7 +7,7 @@
 
 namespace smartmill::hammer {
 
-/// A step that strikes: a rejected hit is repeated after the rest time, up to `max_bad_hits` of them.
+/// A step that strikes: a rejected hit is repeated after the rest time, up to `max_bad_hits` in a row.
 class HitStep : public SequenceStep {
  public:
   using SequenceStep::SequenceStep;

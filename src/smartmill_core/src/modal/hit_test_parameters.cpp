@@ -20,7 +20,7 @@ void HitTestParameters::declareHits(ParameterTable& table) {
   table.number("strike_timeout", strike_timeout, "s", Range::positive(),
                "from the request of a hit to the hit");
   table.number("max_bad_hits", max_bad_hits, "1", Range::notNegative(),
-               "more rejected hits end the measurement");
+               "more rejected hits in a row end the measurement");
 }
 
 void HitTestParameters::declareFit(ParameterTable& table) {
