@@ -4,7 +4,6 @@
 #include <cmath>
 #include <random>
 
-#include "loadmeter/anfis.h"
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
@@ -245,10 +244,6 @@ IdentificationParameters estimatorParameters() {
   return p;
 }
 
-double rise(const MotorCut& cut, std::size_t axis) {
-  return *cut.cut.range[axis] - *cut.air.range[axis];
-}
-
 }  // namespace
 
 std::vector<MotorCut> runDay(const MotorDay& day, const std::optional<MotorCalibration>& calibration,
@@ -340,25 +335,17 @@ bool alone(const MotorCut& cut, std::size_t axis) {
   return cut.cut.range[axis] && cut.air.range[axis] && std::abs(cut.cut.velocity[1 - axis]) < 1e-9;
 }
 
-/// Inputs and outputs of an ANFIS for an axis (0, 1) or the spindle (2); the inputs that were best in the
-/// paper.
-struct Samples {
-  std::vector<std::vector<double>> inputs;
-  std::vector<double> outputs;
-};
-Samples samplesOf(const std::vector<MotorCut>& cuts, std::size_t which) {
-  Samples s;
-  for (const MotorCut& cut : cuts) {
-    if (which == 2) {
-      if (!cut.cut.spindle_range || !cut.air.spindle_range) continue;
-      s.inputs.push_back({*cut.cut.spindle_range - *cut.air.spindle_range, cut.speed_rpm});
-      s.outputs.push_back(cut.torque / cut.radius);
-    } else if (alone(cut, which)) {
-      s.inputs.push_back({rise(cut, which), std::abs(cut.cut.velocity[which])});
-      s.outputs.push_back(cut.cut.velocity[which] > 0.0 ? -cut.force[which] : cut.force[which]);
-    }
-  }
-  return s;
+/// Error [N] of the product's method for a cut: force along an axis (0, 1) or tangential force (2). Empty:
+/// refused, or not measured alone.
+std::optional<double> errorBy(MotorMethod method, const MotorCut& cut, std::size_t which,
+                              const MotorCalibration& calibration) {
+  MotorParameters parameters = estimatorParameters().motor;
+  parameters.method = method == MotorMethod::anfis ? "anfis" : "regression";
+  if (which < 2 && !alone(cut, which)) return std::nullopt;
+  const MotorForce found = forceFromMotors(cut.cut, {cut.air}, calibration, parameters);
+  if (which == 2)
+    return found.torque ? std::optional((found.torque->value - cut.torque) / cut.radius) : std::nullopt;
+  return found.force[which] ? std::optional(found.force[which]->value - cut.force[which]) : std::nullopt;
 }
 
 void judgeEstimates(const std::vector<MotorCut>& cuts, DayErrors* errors) {
@@ -421,35 +408,33 @@ DayErrors judgeDay(const std::vector<MotorCut>& learnt, const MotorCalibration& 
                    const std::vector<MotorCut>& cuts) {
   DayErrors errors;
   for (std::size_t which = 0; which < 3; ++which) {
-    const Samples train = samplesOf(learnt, which), test = samplesOf(cuts, which);
-    const Anfis anfis(train.inputs, train.outputs, {});
     // Air currents of the first day replace those of the second.
     double old_air = 0.0, old_count = 0.0;
     for (const MotorCut& cut : learnt) {
       if (which < 2 && cut.air.range[which]) old_air += *cut.air.range[which], old_count += 1.0;
     }
     old_air /= std::max(1.0, old_count);
-    std::size_t k = 0;
     for (const MotorCut& cut : cuts) {
-      double by_law = 0.0, by_old = 0.0;
-      if (which == 2) {
-        if (!cut.cut.spindle_range || !cut.air.spindle_range) continue;
-        by_law = calibration.spindle->torque(cut.speed_rpm, test.inputs[k][0]) / cut.radius;
-        by_old = by_law;
-      } else {
-        if (!alone(cut, which)) continue;
-        const double m = calibration.drive[which]->newton_per_ampere.value;
-        by_law = m * rise(cut, which);
-        by_old = m * (*cut.cut.range[which] - old_air);
+      const std::optional<double> by_law = errorBy(MotorMethod::regression, cut, which, calibration);
+      if (!by_law) continue;
+      ++errors.count[which];
+      errors.regression[which] += *by_law * *by_law;
+      double by_old = *by_law;
+      if (which < 2) {
+        const double against = cut.cut.velocity[which] > 0.0 ? -cut.force[which] : cut.force[which];
+        by_old =
+            calibration.drive[which]->newton_per_ampere.value * (*cut.cut.range[which] - old_air) - against;
       }
-      errors.regression[which] += std::pow(by_law - test.outputs[k], 2);
-      errors.old_air[which] += std::pow(by_old - test.outputs[k], 2);
-      errors.anfis[which] += std::pow(anfis(test.inputs[k]) - test.outputs[k], 2);
-      ++k;
+      errors.old_air[which] += by_old * by_old;
+      const std::optional<double> by_anfis = errorBy(MotorMethod::anfis, cut, which, calibration);
+      if (!by_anfis) continue;
+      ++errors.anfis_count[which];
+      errors.anfis[which] += *by_anfis * *by_anfis;
     }
-    errors.count[which] = static_cast<int>(k);
-    for (auto* e : {&errors.regression, &errors.old_air, &errors.anfis})
-      (*e)[which] = std::sqrt((*e)[which] / std::max<double>(1.0, static_cast<double>(k)));
+    const double n = std::max(1, errors.count[which]);
+    errors.regression[which] = std::sqrt(errors.regression[which] / n);
+    errors.old_air[which] = std::sqrt(errors.old_air[which] / n);
+    errors.anfis[which] = std::sqrt(errors.anfis[which] / std::max(1, errors.anfis_count[which]));
   }
   judgeEstimates(cuts, &errors);
   judgeVariations(cuts, &errors);

@@ -49,8 +49,8 @@ MotorCalibration calibrationOf(const std::vector<MotorCut>& cuts);
 /// Root mean square errors [N] of force along X and Y and of the tangential force T / r.
 struct DayErrors {
   std::array<double, 3> regression{}, anfis{},
-      old_air{};  ///< old_air: regression with the first day's air cuts
-  std::array<int, 3> count{};
+      old_air{};                              ///< old_air: regression with the first day's air cuts
+  std::array<int, 3> count{}, anfis_count{};  ///< ANFIS refuses cuts outside its calibration
   /// For the estimated forces X, Y, Z: error and share within 1.96 standard deviations, of means and
   /// variations.
   std::array<double, 3> estimate{}, inside{}, inside_rms{};
@@ -64,7 +64,7 @@ struct DayErrors {
   };
   Variation variation, variation_window;
 };
-/// @param learnt the cuts of the first day, from which regression and ANFIS were trained.
+/// @param learnt the cuts of the first day, whose air currents old_air uses.
 DayErrors judgeDay(const std::vector<MotorCut>& learnt, const MotorCalibration& calibration,
                    const std::vector<MotorCut>& cuts);
 

@@ -8,10 +8,10 @@
 
 #include <boost/math/distributions/fisher_f.hpp>
 
-#include "loadmeter/anfis.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
+#include "smartmill_loadmeter/motor/anfis.h"
 
 namespace smartmill::loadmeter {
 

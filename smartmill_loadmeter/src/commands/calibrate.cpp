@@ -93,10 +93,12 @@ void runMotors(const Arguments& arguments) {
     const DriveCalibration& d = *c.drive[a];
     std::printf("drive %s: %.2f +- %.2f N/A, scatter of a cut %.1f N, from %d cuts\n", names[a],
                 d.newton_per_ampere.value, d.newton_per_ampere.std_dev, d.scatter, d.cuts);
+    if (d.anfis) std::printf("  ANFIS: RMS of the cuts %.1f N\n", d.anfis->trainingRms());
   }
   if (c.spindle) {
     std::printf("spindle: T = a(N) dI^b(N), base speed %.0f rpm, scatter of a cut %.3f Nm, R2 %.4f\n",
                 c.spindle->baseSpeed(), c.spindle->scatter(), c.spindle->rSquared());
+    if (c.spindle_anfis) std::printf("  ANFIS: RMS of the cuts %.3f Nm\n", c.spindle_anfis->trainingRms());
   }
   if (!arguments.output.empty()) writeMotorCalibration(c, arguments.output);
 }

@@ -178,7 +178,8 @@ void addOptions(CommandLine& line, CoefficientOptions& o) {
   line.option("--material", o.material, "workpiece material, for the database");
   line.option("--rake", o.rake, "[deg] normal rake of the tool, for the database");
   line.option("-o,--output", o.output, "file for the coefficients, as a model file's cutting section");
-  const ParameterOptions parameters(line, tableOf(o.parameters), "launch/config/loadmeter.yaml, for a bag");
+  ParameterOptions parameters(line, tableOf(o.parameters), "launch/config/loadmeter.yaml, for a bag");
+  parameters.add("--motor-method", "motor_method");
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <limits>
 #include <map>
+#include <utility>
 
 #include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
@@ -79,6 +80,28 @@ class Table {
   std::vector<Row> rows_;
 };
 
+std::vector<double> column(const CalibrationSamples& samples, std::size_t i) {
+  std::vector<double> values;
+  for (const std::vector<double>& input : samples.inputs) values.push_back(input[i]);
+  return values;
+}
+
+/// Samples of a stored calibration; none in a file of an earlier version.
+CalibrationSamples readSamples(const StrictYaml& map, const std::vector<std::string>& inputs,
+                               const std::string& output) {
+  CalibrationSamples samples;
+  if (!map.has(output)) return samples;
+  const std::vector<double> outputs = map.numbers(output, 0);
+  std::vector<std::vector<double>> columns;
+  for (const std::string& key : inputs) columns.push_back(map.numbers(key, outputs.size()));
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    std::vector<double> input;
+    for (const std::vector<double>& one : columns) input.push_back(one[i]);
+    samples.add(std::move(input), outputs[i]);
+  }
+  return samples;
+}
+
 std::string numbersOf(const std::vector<double>& values) {
   std::string text = "[";
   for (std::size_t i = 0; i < values.size(); ++i) text += (i ? ", " : "") + yamlNumber(values[i], 17);
@@ -86,6 +109,22 @@ std::string numbersOf(const std::vector<double>& values) {
 }
 
 }  // namespace
+
+void CalibrationSamples::add(std::vector<double> input, double output) {
+  inputs.push_back(std::move(input));
+  outputs.push_back(output);
+}
+
+std::size_t CalibrationSamples::required() const {
+  const std::size_t width = inputs.empty() ? 1 : inputs.front().size();
+  const auto rules = std::size_t{1} << width;  // two memberships per input
+  return 2 * rules * (width + 1);
+}
+
+std::optional<Anfis> CalibrationSamples::learn() const {
+  if (inputs.empty() || inputs.size() < required()) return std::nullopt;
+  return Anfis(inputs, outputs, {});
+}
 
 Estimate DriveCalibration::opposing(double current, double air) const {
   const double rise = current - air;
@@ -193,6 +232,8 @@ std::optional<DriveCalibration> calibrateDrive(const char* axis, const std::vect
     left += std::pow(forces[i] - drive.newton_per_ampere.value * rises[i], 2);
   drive.scatter = std::sqrt(left / static_cast<double>(n - 1));
   drive.newton_per_ampere.std_dev = drive.scatter / std::sqrt(rr);
+  for (std::size_t i = 0; i < n; ++i) drive.samples.add({rises[i]}, forces[i]);
+  drive.anfis = drive.samples.learn();
   // Without a rise of the current there is no force: an intercept indicates other air cuts.
   const Line line = fitLine(rises, forces);
   if (std::abs(line.level.value) > 4.0 * line.level.std_dev + 1e-9 * std::sqrt(rf)) {
@@ -216,6 +257,9 @@ MotorCalibration calibrateMotors(const std::vector<StandardCut>& cuts,
   }
   if (!matched.spindle.empty()) {
     result.spindle = TorquePowerLaw(matched.spindle, units::rpmFromRadPerSec(base_speed));
+    for (const SpindleCut& cut : matched.spindle)
+      result.spindle_samples.add({cut.rise, cut.speed_rpm}, cut.torque);
+    result.spindle_anfis = result.spindle_samples.learn();
   }
   if (!result.drive[0] && !result.drive[1] && !result.drive[2] && !result.spindle) {
     throw Error(
@@ -234,13 +278,22 @@ void writeMotorCalibration(const MotorCalibration& calibration, const std::strin
     any = true;
     out << "  " << AXIS_NAMES[a] << ": {newton_per_ampere: " << yamlNumber(d.newton_per_ampere.value, 17)
         << ", newton_per_ampere_std: " << yamlNumber(d.newton_per_ampere.std_dev, 17)
-        << ", scatter_n: " << yamlNumber(d.scatter, 17) << ", cuts: " << d.cuts << "}\n";
+        << ", scatter_n: " << yamlNumber(d.scatter, 17) << ", cuts: " << d.cuts;
+    if (!d.samples.inputs.empty()) {
+      out << ", rise_a: " << numbersOf(column(d.samples, 0)) << ", force_n: " << numbersOf(d.samples.outputs);
+    }
+    out << "}\n";
   }
   if (!any) out << "  {}\n";
   if (calibration.spindle) {
     const TorquePowerLaw& law = *calibration.spindle;
     out << "spindle:\n  base_speed_rpm: " << yamlNumber(law.baseSpeed(), 17)
         << "\n  scatter_nm: " << yamlNumber(law.scatter(), 17) << "\n";
+    if (!calibration.spindle_samples.inputs.empty()) {
+      out << "  rise_a: " << numbersOf(column(calibration.spindle_samples, 0))
+          << "\n  speed_rpm: " << numbersOf(column(calibration.spindle_samples, 1))
+          << "\n  torque_nm: " << numbersOf(calibration.spindle_samples.outputs) << "\n";
+    }
     for (const bool above : {false, true}) {
       const auto& side = law.side(above);
       if (!side) continue;
@@ -266,6 +319,8 @@ MotorCalibration readMotorCalibration(const std::string& file) {
     d.newton_per_ampere.std_dev = map->number("newton_per_ampere_std", Range::notNegative());
     d.scatter = map->number("scatter_n", Range::notNegative());
     d.cuts = map->integer("cuts", 3, std::numeric_limits<int>::max());
+    d.samples = readSamples(*map, {"rise_a"}, "force_n");
+    d.anfis = d.samples.learn();
     map->finish();
     calibration.drive[a] = d;
   }
@@ -285,6 +340,8 @@ MotorCalibration readMotorCalibration(const std::string& file) {
     }
     calibration.spindle = TorquePowerLaw(sides[0], sides[1], map->number("base_speed_rpm", Range::positive()),
                                          map->number("scatter_nm", Range::notNegative()));
+    calibration.spindle_samples = readSamples(*map, {"rise_a", "speed_rpm"}, "torque_nm");
+    calibration.spindle_anfis = calibration.spindle_samples.learn();
     map->finish();
   }
   yaml.finish();

@@ -177,9 +177,27 @@ std::string MotorForce::text() const {
 
 namespace {
 
+/// Output of an ANFIS; empty outside its calibration, with the reason. @param names inputs, for the reason
+std::optional<Estimate> byAnfis(const std::optional<Anfis>& anfis, const CalibrationSamples& samples,
+                                const std::vector<double>& input, const std::vector<std::string>& names,
+                                std::string* reason) {
+  if (!anfis) {
+    *reason = formatted("ANFIS requires %zu cuts of the calibration, found %zu", samples.required(),
+                        samples.inputs.size());
+    return std::nullopt;
+  }
+  for (std::size_t i = 0; i < input.size(); ++i) {
+    if (input[i] >= anfis->low(i) && input[i] <= anfis->high(i)) continue;
+    *reason = formatted("%s %.4g outside the calibration of its ANFIS, %.4g to %.4g", names[i].c_str(),
+                        input[i], anfis->low(i), anfis->high(i));
+    return std::nullopt;
+  }
+  return Estimate{(*anfis)(input), anfis->stdAt(input)};
+}
+
 /// Adds the torque of the spindle motor, or the reason why it is unknown.
 void addTorque(const MotorMeasurement& cut, const std::vector<MotorMeasurement>& air,
-               const MotorCalibration& calibration, MotorForce* result) {
+               const MotorCalibration& calibration, MotorMethod method, MotorForce* result) {
   const MotorMeasurement* nearest = nullptr;
   double least = 0.1;
   for (const MotorMeasurement& one : air) {
@@ -197,7 +215,12 @@ void addTorque(const MotorMeasurement& cut, const std::vector<MotorMeasurement>&
                    rise = *cut.spindle_range - *nearest->spindle_range;
       const double torque = calibration.spindle->torque(rpm, rise);
       const double noise = calibration.spindle->torque(rpm, rise + cut.short_std[3]) - torque;
-      result->torque = Estimate{torque, std::hypot(calibration.spindle->scatter(), noise)};
+      result->torque = Estimate{torque, calibration.spindle->scatter()};
+      if (method == MotorMethod::anfis) {
+        result->torque = byAnfis(calibration.spindle_anfis, calibration.spindle_samples, {rise, rpm},
+                                 {"rise of the current [A]", "spindle speed [rpm]"}, &result->reason[3]);
+      }
+      if (result->torque) result->torque->std_dev = std::hypot(result->torque->std_dev, noise);
     } catch (const Error& error) {
       result->reason[3] = error.what();
     }
@@ -228,23 +251,28 @@ MotorForce forceFromMotors(const MotorMeasurement& cut, const std::vector<MotorM
       result.reason[a] = "no air cut of this axis in this direction near this feed";
       continue;
     }
-    Estimate force = calibration.drive[a]->opposing(*cut.range[a], *nearest->range[a]);
-    Estimate other = calibration.drive[a]->opposing(-*cut.range[a], *nearest->range[a]);
-    const double noise = calibration.drive[a]->newton_per_ampere.value * cut.short_std[a];
-    force.std_dev = std::hypot(force.std_dev, noise);
-    other.std_dev = std::hypot(other.std_dev, noise);
-    if (cut.velocity[a] > 0.0) {
-      force.value = -force.value;
-      other.value = -other.value;
-    }
     if (std::abs(cut.velocity[a]) < parameters.smallest_velocity) continue;
-    result.force[a] = force;
-    if (!cut.is_signed) result.other[a] = other;
+    const DriveCalibration& drive = *calibration.drive[a];
+    // Force on the tool for a current of either sign.
+    const auto forceOf = [&](double current, std::string* reason) {
+      const double air_current = *nearest->range[a];
+      std::optional<Estimate> force = parameters.motorMethod() == MotorMethod::anfis
+                                          ? byAnfis(drive.anfis, drive.samples, {current - air_current},
+                                                    {"rise of the current [A]"}, reason)
+                                          : drive.opposing(current, air_current);
+      if (!force) return force;
+      force->std_dev = std::hypot(force->std_dev, drive.newton_per_ampere.value * cut.short_std[a]);
+      if (cut.velocity[a] > 0.0) force->value = -force->value;
+      return force;
+    };
+    result.force[a] = forceOf(*cut.range[a], &result.reason[a]);
+    std::string of_other;
+    if (!cut.is_signed && result.force[a]) result.other[a] = forceOf(-*cut.range[a], &of_other);
     const double squared = std::pow(calibration.drive[a]->newton_per_ampere.value, 2);
     result.lines[a] = cut.lines[a];
     for (SpectralLine& line : result.lines[a]) line.power *= squared, line.power_std *= squared;
   }
-  if (cut.spindle_range) addTorque(cut, air, calibration, &result);
+  if (cut.spindle_range) addTorque(cut, air, calibration, parameters.motorMethod(), &result);
   return result;
 }
 

@@ -84,7 +84,7 @@ std::vector<MotorMeasurement> SelfCalibration::airFor(const MotorMeasurement& cu
 // F = m (I - Ia) from cuts whose force another sensor measured; its systematic error is common to all cuts.
 std::optional<DriveCalibration> SelfCalibration::drive(std::size_t axis) const {
   MotorCalibration unit;
-  unit.drive[axis] = DriveCalibration{{1.0, 0.0}, 0.0, static_cast<int>(MIN_CUTS)};
+  unit.drive[axis] = DriveCalibration{{1.0, 0.0}, 0.0, static_cast<int>(MIN_CUTS), {}, {}};
   double rr = 0.0, rf = 0.0, share = 0.0;
   std::vector<std::pair<double, double>> points;  // [A], [N] against the motion
   for (const Cut& cut : cuts_) {
@@ -106,14 +106,15 @@ std::optional<DriveCalibration> SelfCalibration::drive(std::size_t axis) const {
   double left = 0.0;
   for (const auto& [r, f] : points) left += std::pow(f - found.newton_per_ampere.value * r, 2);
   found.scatter = std::sqrt(left / (count - 1.0));
+  for (const auto& [r, f] : points) found.samples.add({r}, f);
+  found.anfis = found.samples.learn();
   found.newton_per_ampere.std_dev =
       std::hypot(found.scatter / std::sqrt(rr), share / count * found.newton_per_ampere.value);
   return found;
 }
 
-std::optional<TorquePowerLaw> SelfCalibration::spindle() const {
+std::vector<SpindleCut> SelfCalibration::spindleCuts() const {
   std::vector<SpindleCut> cuts;
-  double fastest = 0.0;
   for (const Cut& cut : cuts_) {
     if (!cut.measurement.spindle_range) continue;
     const MotorMeasurement* air = nullptr;
@@ -127,9 +128,14 @@ std::optional<TorquePowerLaw> SelfCalibration::spindle() const {
         !(cut.reference.torque.value > 0.0))
       continue;
     cuts.push_back({rpm, *cut.measurement.spindle_range - *air->spindle_range, cut.reference.torque.value});
-    fastest = std::max(fastest, rpm);
   }
+  return cuts;
+}
+
+std::optional<TorquePowerLaw> SelfCalibration::spindle(const std::vector<SpindleCut>& cuts) const {
   if (cuts.size() < MIN_CUTS) return std::nullopt;
+  double fastest = 0.0;
+  for (const SpindleCut& cut : cuts) fastest = std::max(fastest, cut.speed_rpm);
   try {
     return TorquePowerLaw(cuts, fastest);  // one law over all speeds of the cuts
   } catch (const Error&) {
@@ -144,7 +150,10 @@ void SelfCalibration::calibrate() {
     found.drive[a] = drive(a);
     any = any || found.drive[a];
   }
-  found.spindle = spindle();
+  const std::vector<SpindleCut> spindle_cuts = spindleCuts();
+  found.spindle = spindle(spindle_cuts);
+  for (const SpindleCut& cut : spindle_cuts) found.spindle_samples.add({cut.rise, cut.speed_rpm}, cut.torque);
+  found.spindle_anfis = found.spindle_samples.learn();
   if (any || found.spindle) calibration_ = found;
 }
 

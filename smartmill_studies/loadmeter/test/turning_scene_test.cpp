@@ -7,7 +7,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "loadmeter/anfis.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/motor/motor_calibration.h"
@@ -27,28 +26,6 @@ TEST(FeedDrive, weightAndFrictionOfTheSlideAreThoseOfThePaper) {
   EXPECT_NEAR(-load.weight.value + load.friction.value, 377.0, 0.1);
   EXPECT_NEAR(load.weight.value, -317.5, 0.1);
   EXPECT_NEAR(load.friction.value, 59.5, 0.1);  // positive: always opposes
-}
-
-TEST(AnfisLearning, hybridRuleLearnsWhatALineCannot) {
-  std::mt19937 random(5);
-  std::uniform_real_distribution<double> uniform;
-  std::vector<std::vector<double>> inputs, unseen;
-  std::vector<double> outputs, truth;
-  const auto function = [](double a, double b) { return 10.0 * std::sin(2.5 * a) + 20.0 * b * b; };
-  for (int i = 0; i < 400; ++i) {
-    const double a = uniform(random), b = uniform(random);
-    (i % 2 ? unseen : inputs).push_back({a, 500.0 * b});
-    (i % 2 ? truth : outputs).push_back(function(a, b));
-  }
-  Anfis::Parameters once;
-  once.epochs = 1;
-  const Anfis first(inputs, outputs, once);
-  const Anfis trained(inputs, outputs, Anfis::Parameters());
-  EXPECT_LT(trained.trainingRms(), first.trainingRms());
-  double squares = 0.0;
-  for (std::size_t i = 0; i < unseen.size(); ++i) squares += std::pow(trained(unseen[i]) - truth[i], 2);
-  EXPECT_LT(std::sqrt(squares / 200.0), 0.25);  // of a range of 30
-  EXPECT_THAT(errorOf([&] { trained({1.0}); }), HasSubstr("expected 2 inputs"));
 }
 
 TEST(Variances, splitAndFTestAreThoseOfTheFormulas) {

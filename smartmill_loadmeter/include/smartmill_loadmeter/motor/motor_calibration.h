@@ -1,11 +1,13 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "smartmill_loadmeter/calibration/machine_calibration.h"
+#include "smartmill_loadmeter/motor/anfis.h"
 #include "smartmill_loadmeter/motor/motor_current.h"
 
 namespace smartmill::loadmeter {
@@ -27,21 +29,44 @@ struct MachineCurrents {
   std::optional<double> spindle_current, spindle_air;  ///< [A]
 };
 
+/// Methods that turn the rise of a motor's current into force or torque.
+enum class MotorMethod : std::uint8_t {
+  regression,  ///< F = m (I - Ia), T = a(N) dI^b(N) (Cheng & Venuvinod, section 9)
+  anfis        ///< adaptive neuro-fuzzy inference (section 11)
+};
+
+/// Cuts of a calibration as inputs and output of an ANFIS: rise [A] and force [N] of a drive; rise [A], speed
+/// [rpm] and torque [N m] of the spindle.
+struct CalibrationSamples {
+  std::vector<std::vector<double>> inputs;
+  std::vector<double> outputs;
+
+  void add(std::vector<double> input, double output);
+  /// Two cuts for each unknown of its rules' lines.
+  std::size_t required() const;
+  /// Empty with fewer samples than required.
+  std::optional<Anfis> learn() const;
+};
+
 /// F = m (I - Ia) of one feed drive.
 struct DriveCalibration {
   Estimate
       newton_per_ampere;  ///< [N/A] m; negative when the weight aids the motion more than friction opposes it
   double scatter = 0.0;   ///< [N] standard deviation of one cut about the law
   int cuts = 0;
+  CalibrationSamples samples;
+  std::optional<Anfis> anfis;  ///< of the samples; empty: too few
 
-  /// Force of a new cut against the motion [N].
+  /// Force of a new cut against the motion [N], by regression.
   Estimate opposing(double current, double air) const;
 };
 
 struct MotorCalibration {
   std::array<std::optional<DriveCalibration>, 3> drive;  ///< X, Y, Z; empty: did not move in a standard cut
   std::optional<TorquePowerLaw> spindle;
-  std::vector<std::string> notes;  ///< rejected cuts and inconsistencies; one line each
+  CalibrationSamples spindle_samples;
+  std::optional<Anfis> spindle_anfis;  ///< of the samples; empty: too few
+  std::vector<std::string> notes;      ///< rejected cuts and inconsistencies; one line each
 };
 
 /// Tables "cut,force_x[N],force_y[N],force_z[N],torque[N m]" and "cut,spindle_speed[rpm],current_x[A],

@@ -20,6 +20,7 @@ struct MotorParameters {
   double phase_per_revolution = 0.0;
   double smallest_velocity = 1.0e-4;
   double largest_slip = 0.02;
+  std::string method = "regression";
 
   void declare(ParameterTable& table) {
     table.list("phase_per_metre", phase_per_metre, "1/m", Range::openHigh(0.0, 1e7),
@@ -30,7 +31,11 @@ struct MotorParameters {
                  "velocity below which an axis is at rest and its force not observable");
     table.number("largest_slip", largest_slip, "1", Range::closed(0.0, 0.1),
                  "largest slip of the spindle motor's phase frequency; 0: a synchronous motor");
+    table.choice("method", method, {"regression", "anfis"},
+                 "force from the rise of a current: by regression or by ANFIS, both from the cuts of the "
+                 "calibration; ANFIS needs 8 cuts of an axis, 24 of the spindle, and does not extrapolate");
   }
+  MotorMethod motorMethod() const { return method == "anfis" ? MotorMethod::anfis : MotorMethod::regression; }
   bool any() const;
   /// @throws Error naming key and value.
   void validate() const;

@@ -43,7 +43,8 @@ class SelfCalibration {
   };
   void calibrate();
   std::optional<DriveCalibration> drive(std::size_t axis) const;
-  std::optional<TorquePowerLaw> spindle() const;
+  std::vector<SpindleCut> spindleCuts() const;
+  std::optional<TorquePowerLaw> spindle(const std::vector<SpindleCut>& cuts) const;
   void updateFriction(std::size_t axis);
 
   MotorParameters parameters_;

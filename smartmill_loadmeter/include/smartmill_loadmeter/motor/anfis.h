@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <vector>
 
+#include <Eigen/Core>
+
 namespace smartmill::loadmeter {
 
 /// Adaptive neuro-fuzzy inference (Jang 1993): first-order Sugeno rules over a grid of bell-shaped membership
@@ -25,6 +27,12 @@ class Anfis {
 
   double operator()(const std::vector<double>& input) const;
   double trainingRms() const { return rms_; }
+  /// Standard deviation of one new output: scatter about the trained outputs and uncertainty of the rules'
+  /// lines, with the trained memberships (linearised).
+  double stdAt(const std::vector<double>& input) const;
+  /// Range of an input of the training data, outside which no rule is supported.
+  double low(std::size_t i) const { return low_[i]; }
+  double high(std::size_t i) const { return high_[i]; }
 
  private:
   struct Bell {
@@ -48,14 +56,24 @@ class Anfis {
   void fire(const std::vector<double>& x, std::vector<double>* normalised) const;
   void solveLines(const std::vector<std::vector<double>>& x, const std::vector<double>& y, double ridge);
   double squares(const std::vector<std::vector<double>>& x, const std::vector<double>& y) const;
+  std::size_t lines() const { return rules() * (inputs_ + 1); }
+  void requireWidth(const std::vector<double>& input) const;
+  /// Firing of the rules times inputs, the row of the linear problem.
+  Eigen::VectorXd rowOf(const std::vector<double>& x) const;
+  Eigen::MatrixXd normalOf(const std::vector<std::vector<double>>& x, double ridge) const;
+  /// Covariance of the lines and scatter from the residual.
+  void computeUncertainty(const std::vector<std::vector<double>>& x, const std::vector<double>& y,
+                          double ridge);
 
   std::size_t inputs_;
   std::size_t memberships_;
-  std::vector<double> low_, span_;
+  std::vector<double> low_, high_, span_;
   double out_middle_ = 0.0, out_span_ = 1.0;
   std::vector<Bell> bells_;  // input by input
   std::vector<double> lines_;
   double rms_ = 0.0;
+  Eigen::MatrixXd inverse_;  // of the normal equations
+  double scatter_ = 0.0;     // of a scaled output
 };
 
 }  // namespace smartmill::loadmeter

@@ -1,12 +1,11 @@
-#include "loadmeter/anfis.h"
+#include "smartmill_loadmeter/motor/anfis.h"
 
 #include <algorithm>
 #include <cmath>
 #include <string>
 
-#include <Eigen/Cholesky>
-
 #include "smartmill_core/error.h"
+#include "smartmill_core/math/linear_algebra.h"
 
 namespace smartmill::loadmeter {
 
@@ -45,6 +44,7 @@ Anfis::Anfis(const std::vector<std::vector<double>>& inputs, const std::vector<d
     y.push_back((outputs[i] - out_middle_) / out_span_);
   }
   learn(x, y, parameters);
+  computeUncertainty(x, y, parameters.ridge);
 }
 
 void Anfis::spread(const std::vector<std::vector<double>>& inputs) {
@@ -55,6 +55,7 @@ void Anfis::spread(const std::vector<std::vector<double>>& inputs) {
       high = std::max(high, input[i]);
     }
     low_.push_back(low);
+    high_.push_back(high);
     span_.push_back(high > low ? high - low : 1.0);
     for (std::size_t m = 0; m < memberships_; ++m) {
       const double gap = 1.0 / static_cast<double>(memberships_ - 1);
@@ -171,24 +172,56 @@ void Anfis::fire(const std::vector<double>& x, std::vector<double>* normalised) 
 
 void Anfis::solveLines(const std::vector<std::vector<double>>& x, const std::vector<double>& y,
                        double ridge) {
-  const std::size_t width = inputs_ + 1, size = rules() * width;
-  const Eigen::Index n = static_cast<Eigen::Index>(size);
-  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(n, n);
-  Eigen::VectorXd right = Eigen::VectorXd::Zero(n), row(n);
+  const Eigen::Index n = static_cast<Eigen::Index>(lines());
+  Eigen::VectorXd right = Eigen::VectorXd::Zero(n);
+  for (std::size_t s = 0; s < x.size(); ++s) right += rowOf(x[s]) * y[s];
+  const Eigen::VectorXd found = linear::solveSymmetric(normalOf(x, ridge), right);
+  lines_.assign(found.data(), found.data() + n);
+}
+
+Eigen::VectorXd Anfis::rowOf(const std::vector<double>& x) const {
+  const std::size_t width = inputs_ + 1;
   std::vector<double> normalised;
-  for (std::size_t s = 0; s < x.size(); ++s) {
-    fire(x[s], &normalised);
-    for (std::size_t r = 0; r < normalised.size(); ++r) {
-      for (std::size_t i = 0; i <= inputs_; ++i) {
-        row[static_cast<Eigen::Index>(r * width + i)] = normalised[r] * (i < inputs_ ? x[s][i] : 1.0);
-      }
-    }
-    normal.selfadjointView<Eigen::Lower>().rankUpdate(row);
-    right += row * y[s];
+  fire(x, &normalised);
+  Eigen::VectorXd row(static_cast<Eigen::Index>(lines()));
+  for (std::size_t r = 0; r < normalised.size(); ++r) {
+    for (std::size_t i = 0; i <= inputs_; ++i)
+      row[static_cast<Eigen::Index>(r * width + i)] = normalised[r] * (i < inputs_ ? x[i] : 1.0);
+  }
+  return row;
+}
+
+Eigen::MatrixXd Anfis::normalOf(const std::vector<std::vector<double>>& x, double ridge) const {
+  const Eigen::Index n = static_cast<Eigen::Index>(lines());
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(n, n);
+  for (const std::vector<double>& input : x) {
+    const Eigen::VectorXd row = rowOf(input);
+    normal += row * row.transpose();
   }
   normal.diagonal().array() += ridge * static_cast<double>(x.size()) / static_cast<double>(rules()) + 1e-12;
-  const Eigen::VectorXd found = normal.selfadjointView<Eigen::Lower>().ldlt().solve(right);
-  lines_.assign(found.data(), found.data() + n);
+  return normal;
+}
+
+void Anfis::computeUncertainty(const std::vector<std::vector<double>>& x, const std::vector<double>& y,
+                               double ridge) {
+  inverse_ = linear::inverseSymmetric(normalOf(x, ridge));
+  double used = 0.0;  // degrees of freedom of the lines: trace of the hat matrix
+  for (const std::vector<double>& input : x) {
+    const Eigen::VectorXd row = rowOf(input);
+    used += row.dot(inverse_ * row);
+  }
+  const double left = std::max(1.0, static_cast<double>(x.size()) - used);
+  scatter_ = std::sqrt(squares(x, y) / left);
+}
+
+double Anfis::stdAt(const std::vector<double>& input) const {
+  requireWidth(input);
+  const Eigen::VectorXd row = rowOf(scaled(input));
+  return out_span_ * scatter_ * std::sqrt(1.0 + row.dot(inverse_ * row));
+}
+
+void Anfis::requireWidth(const std::vector<double>& input) const {
+  if (input.size() != inputs_) throw Error("anfis: expected " + std::to_string(inputs_) + " inputs");
 }
 
 double Anfis::squares(const std::vector<std::vector<double>>& x, const std::vector<double>& y) const {
@@ -201,7 +234,7 @@ double Anfis::squares(const std::vector<std::vector<double>>& x, const std::vect
 }
 
 double Anfis::operator()(const std::vector<double>& input) const {
-  if (input.size() != inputs_) throw Error("anfis: expected " + std::to_string(inputs_) + " inputs");
+  requireWidth(input);
   return out_middle_ + out_span_ * answerTo(scaled(input)).out;
 }
 
