@@ -36,11 +36,14 @@ CompensationPipeline::CompensationPipeline(const CompensationParameters& paramet
                                      : sorter_.addRegular(names::SPINDLE_ANGLE)),
       blocks_(sorter_.addRegular(names::DYNAMOMETER)) {
   if (sensor.channels) channels_.emplace(*sensor.channels);
-  sorter_.onRestart([this] {
-    identification_.reset();
-    forces_.reset();
-    if (outputs_.restart) outputs_.restart();
-  });
+  sorter_.onRestart([this] { restart(); });
+}
+
+void CompensationPipeline::restart() {
+  identification_.reset();
+  forces_.reset();
+  if (use_file_) use_file_();
+  if (outputs_.restart) outputs_.restart();
 }
 
 void CompensationPipeline::useKind(ForceSensorKind kind) {
@@ -49,13 +52,17 @@ void CompensationPipeline::useKind(ForceSensorKind kind) {
 }
 
 void CompensationPipeline::useSpindleSensor(const SpindleSensorCalibration& calibration, double length) {
-  forces_.spindle().use(calibration, length);
-  forces_.useMemory(calibration.memory);
-  identification_.use(calibration, length);
+  use_file_ = [this, calibration, length] {
+    forces_.spindle().use(calibration, length);
+    forces_.useMemory(calibration.memory);
+    identification_.use(calibration, length);
+  };
+  use_file_();
 }
 
 void CompensationPipeline::useTransferMatrix(const TransferMatrix& matrix, double bandwidth) {
-  identification_.use(matrix, bandwidth);
+  use_file_ = [this, matrix, bandwidth] { identification_.use(matrix, bandwidth); };
+  use_file_();
 }
 
 double CompensationPipeline::ageOfModes() const {

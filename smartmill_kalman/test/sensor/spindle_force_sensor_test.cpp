@@ -381,6 +381,54 @@ TEST(CompensationPipeline, GivesNoForceBeforeTheCalibration) {
   EXPECT_NEAR(pipeline.identification().calibration().constant[1], TABLE.y.at(LENGTH), 1e-12);
 }
 
+// A recording that starts again ends what was calibrated in it, not what a file gave.
+TEST(CompensationPipeline, AfterARestartTheCalibrationIsThatOfTheFile) {
+  CompensationPipeline pipeline({}, {}, {}, 0.05, {{[](const ForceBlock&) {}, [](const ForceBlock&) {}}});
+  pipeline.useSpindleSensor(TABLE, LENGTH);
+  const double of_file = pipeline.identification().calibration().constant[0];
+  int number = 0;
+  const auto push = [&](const std::array<double, 3>& load, int blocks) {
+    for (; blocks > 0; --blocks, ++number) {
+      SampleBlock block;
+      block.stamp = 50.0 + number * 0.01;
+      block.sample_rate = RATE;
+      block.first_index = 256 * static_cast<std::uint64_t>(number);
+      block.channels = {"x1", "x2", "y1", "y2", "z1", "z2"};
+      block.units.assign(6, "N");
+      for (int i = 0; i < 256; ++i) {
+        // A sensor whose constants are 1.1 times those of the file.
+        for (const double value : sensorsUnder(139.0, load[0], load[1], load[2]))
+          block.samples.push_back(value / 1.1);
+      }
+      pipeline.push(SpindleAngle{block.stamp, 0.0, 0.0});
+      pipeline.push(block);
+    }
+  };
+  CalibrationGoal goal;
+  goal.length = LENGTH;
+  goal.duration = 0.1;
+  for (std::size_t axis = 0; axis < 3; ++axis, ++goal.test) {
+    for (const double load : {0.0, 200.0, 400.0, 600.0, 0.0}) {
+      goal.load = {0.0, 0.0, 0.0};
+      goal.load[axis] = load;
+      push(goal.load, 10);
+      goal.stamp = 50.0 + number * 0.01;
+      pipeline.push(goal);
+      push(goal.load, 30);
+    }
+  }
+  goal.step = CalibrationGoal::Step::fit;
+  goal.stamp = 50.0 + number * 0.01;
+  pipeline.push(goal);
+  push({0.0, 0.0, 0.0}, 30);
+  ASSERT_NEAR(pipeline.identification().calibration().constant[0], 1.1 * of_file, 1e-3 * of_file)
+      << pipeline.identification().calibration().message;
+  number = -4000;  // 40 s earlier
+  push({0.0, 0.0, 0.0}, 30);
+  EXPECT_TRUE(pipeline.identification().calibration().calibrated);
+  EXPECT_DOUBLE_EQ(pipeline.identification().calibration().constant[0], of_file);
+}
+
 // What the node is made of: six channels in, force at the tool out, with the sensor's own sample index.
 TEST(CompensationPipeline, TakesSixChannels) {
   ForceSensor model_sensor;

@@ -72,11 +72,13 @@ class CompensationPipeline {
 
  private:
   void handle(const SampleBlock& channels, const SampleBlock& block);
+  void restart();
 
   Outputs outputs_;
   StreamSorter sorter_;
   SensorForces forces_;
   SensorIdentification identification_;
+  std::function<void()> use_file_;  // the calibration of a file; empty: none
   std::optional<ChannelForces> channels_;
   StuckChannel stuck_;
   StreamSorter::Stream conditions_, goals_, hammers_, angles_, blocks_;
