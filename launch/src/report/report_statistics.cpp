@@ -144,20 +144,25 @@ std::vector<Pocket> pockets(const std::vector<double>& speeds, const std::vector
   if (speeds.size() != depths.size())
     throw Error("stability chart: " + std::to_string(speeds.size()) + " speeds and " +
                 std::to_string(depths.size()) + " depths, expected equal numbers");
-  constexpr double TOP = 0.9;  // [1] of the maximum depth, from which on a point belongs to the plateau
+  constexpr double TOP = 0.9;  // [1] of the maximum depth, the level above which a point has weight
   const auto depth = [&](std::size_t i) { return std::min(depths[i], ceiling); };
   std::vector<Pocket> found;
   bool rising = false;  // the start of the chart is no pocket
-  std::size_t extreme = 0;
+  std::size_t extreme = 0, valley = 0;
   for (std::size_t i = 1; i < depths.size(); ++i) {
     if (rising ? depth(i) > depth(extreme) : depth(i) < depth(extreme)) extreme = i;
     const bool reversed = rising ? depth(i) * factor < depth(extreme) : depth(i) > depth(extreme) * factor;
     if (!reversed) continue;
     if (rising) {
-      std::size_t low = extreme, high = extreme;
-      while (low > 0 && depth(low - 1) >= TOP * depth(extreme)) --low;
-      while (depth(high + 1) >= TOP * depth(extreme)) ++high;
-      found.push_back({0.5 * (speeds[low] + speeds[high]), depth(extreme)});
+      double weights = 0.0, sum = 0.0;
+      for (std::size_t k = valley; k <= i; ++k) {
+        const double weight = std::max(0.0, depth(k) - TOP * depth(extreme));
+        weights += weight;
+        sum += weight * speeds[k];
+      }
+      found.push_back({sum / weights, depth(extreme)});
+    } else {
+      valley = extreme;
     }
     rising = !rising;
     extreme = i;
