@@ -144,7 +144,9 @@ std::vector<Pocket> pockets(const std::vector<double>& speeds, const std::vector
   if (speeds.size() != depths.size())
     throw Error("stability chart: " + std::to_string(speeds.size()) + " speeds and " +
                 std::to_string(depths.size()) + " depths, expected equal numbers");
-  constexpr double TOP = 0.9;  // [1] of the maximum depth, the level above which a point has weight
+  // [1] of the maximum depth: a point has no weight below LOW, all of it above HIGH, a share between them, so
+  // that the speed does not jump where a second peak is nearly as high.
+  constexpr double LOW = 0.85, HIGH = 0.95;
   const auto depth = [&](std::size_t i) { return std::min(depths[i], ceiling); };
   std::vector<Pocket> found;
   bool rising = false;  // the start of the chart is no pocket
@@ -156,7 +158,7 @@ std::vector<Pocket> pockets(const std::vector<double>& speeds, const std::vector
     if (rising) {
       double weights = 0.0, sum = 0.0;
       for (std::size_t k = valley; k <= i; ++k) {
-        const double weight = std::max(0.0, depth(k) - TOP * depth(extreme));
+        const double weight = std::clamp((depth(k) / depth(extreme) - LOW) / (HIGH - LOW), 0.0, 1.0);
         weights += weight;
         sum += weight * speeds[k];
       }

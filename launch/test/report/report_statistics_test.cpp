@@ -186,6 +186,22 @@ TEST(Pockets, OnAPlateauTheHighestPointDoesNotDecide) {
   EXPECT_DOUBLE_EQ(pockets(speeds, right, 1.5, 10.0).at(0).spindle_speed, 4.5);
 }
 
+// Two peaks, the second about 90 % of the first: as its height passes that level, the speed moves by little.
+TEST(Pockets, ASecondPeakChangesTheSpeedContinuously) {
+  const std::vector<double> speeds{1, 2, 3, 4, 5, 6, 7, 8};
+  constexpr double STEP = 0.01;
+  // The change of a weight times the distance of the peaks.
+  constexpr double LARGEST = STEP / 3.0 / (0.95 - 0.85) * 2.0;
+  double last = NAN;
+  for (double second = 2.4; second < 3.0; second += STEP) {
+    const double speed = pockets(speeds, {1, 1, 3.0, 2.6, second, 1, 1, 1}, 1.5, 10.0).at(0).spindle_speed;
+    if (std::isfinite(last)) {
+      EXPECT_NEAR(speed, last, LARGEST) << second;
+    }
+    last = speed;
+  }
+}
+
 TEST(Interpolate, LinearInsideNaNOutside) {
   EXPECT_DOUBLE_EQ(interpolate({1.0, 3.0}, {10.0, 20.0}, 2.5), 17.5);
   EXPECT_DOUBLE_EQ(interpolate({1.0, 3.0}, {10.0, 20.0}, 1.0), 10.0);

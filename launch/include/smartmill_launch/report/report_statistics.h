@@ -85,8 +85,8 @@ struct Pocket {
 };
 
 /// Local maxima of a limit that exceed the minima on both sides by a factor (> 1); the ends of the chart are
-/// no pockets. Infinite depths count as `ceiling` [m]. The speed is the centroid of the pocket above 90 % of its
-/// depth: of a plateau the middle, and continuous where a second peak is nearly as high.
+/// no pockets. Infinite depths count as `ceiling` [m]. The speed is the centroid of the pocket's top: of a
+/// plateau the middle.
 std::vector<Pocket> pockets(const std::vector<double>& speeds, const std::vector<double>& depths,
                             double factor, double ceiling);
 
