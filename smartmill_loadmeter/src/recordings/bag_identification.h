@@ -17,6 +17,7 @@ struct BagListeners {
   std::function<void(const MotorForce&)> motors;      ///< force of each cut by calibrated motors
   std::function<void(const ForceEstimate&)> force;    ///< force of each cut by all its measurements
   std::function<void(const CoefficientRecord&)> cut;  ///< record of every cut for the database
+  std::function<void(const InspectionResult&)> inspected;  ///< every measured dimension of a part
 };
 
 /// Processes a bag with the class of the node: cnc/state, cnc/load, daq/motor_current, cut/condition and the
