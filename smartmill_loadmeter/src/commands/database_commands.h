@@ -12,8 +12,7 @@ struct DatabaseOptions {
   std::string program, file, tool, material, other, shop, login, password_file, machine, campaign, prior,
       model;
   bool all = false;
-  double cutting_speed = NAN, feed = NAN, diameter = NAN, helix = NAN, rake = NAN, age = NAN,
-         since = NAN;
+  double cutting_speed = NAN, feed = NAN, diameter = NAN, helix = NAN, rake = NAN, age = NAN, since = NAN;
 };
 
 using DatabaseCommands = Subcommands<DatabaseOptions>;

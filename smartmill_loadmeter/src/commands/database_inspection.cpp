@@ -35,7 +35,8 @@ void inspect(const DatabaseOptions& o) {
     feature.record.machine = o.machine;
     feature.record.bag = o.other;
     tools.insert(feature.record.tool);
-    if (const std::string why = setDeflection(feature.condition, model, database, &feature.record); !why.empty())
+    if (const std::string why = setDeflection(feature.condition, model, database, &feature.record);
+        !why.empty())
       std::fprintf(stderr, "%s: '%s': not corrected for deflection: %s\n", o.program.c_str(),
                    feature.record.condition.c_str(), why.c_str());
     records.push_back(feature.record);
@@ -53,9 +54,9 @@ void inspections(const DatabaseOptions& o) {
   const CoefficientDatabase database(o.file);
   const std::vector<InspectionRecord> records = inspectionsOf(database, o);
   for (const InspectionRecord& r : records) {
-    std::printf("%s / %s  %s: %s along %s, %.4f mm, %+.1f +- %.1f um from nominal", r.tool.c_str(), r.material.c_str(),
-                r.condition.c_str(), r.kind.c_str(), r.direction.c_str(), r.measured / units::MM,
-                r.deviation() / units::UM, r.std_dev / units::UM);
+    std::printf("%s / %s  %s: %s along %s, %.4f mm, %+.1f +- %.1f um from nominal", r.tool.c_str(),
+                r.material.c_str(), r.condition.c_str(), r.kind.c_str(), r.direction.c_str(),
+                r.measured / units::MM, r.deviation() / units::UM, r.std_dev / units::UM);
     if (std::isfinite(r.deflection)) std::printf(", of it deflection %+.1f um", r.deflection / units::UM);
     if (std::isfinite(r.machine_temperature))
       std::printf(", machine at %.1f degC", r.machine_temperature - ZERO_CELSIUS);
@@ -75,9 +76,9 @@ void addInspectionCommands(DatabaseCommands& commands) {
   add.option("--machine", o.machine, "name of the machine");
   add.option("--model", o.model,
              "model file of the machine: slot widths are corrected for the deflection of its tool tip");
-  const CommandOptions show =
-      commands.add("inspections", "prints measured dimensions of parts, with radius of the tools and thermal growth",
-                   inspections);
+  const CommandOptions show = commands.add(
+      "inspections", "prints measured dimensions of parts, with radius of the tools and thermal growth",
+      inspections);
   show.option("--tool", o.tool, "name of the tool (default: any)");
   show.option("--machine", o.machine, "of this machine only");
   show.option("--since", o.since, "[s] stamp of the first inspection used, for example of a new edge");

@@ -154,8 +154,9 @@ std::vector<HealthRecord> EvidenceRecords::health() const {
 std::vector<InspectionRecord> EvidenceRecords::inspections(const std::string& tool) const {
   std::vector<InspectionRecord> found = recordsOf<InspectionRecord>(allRows(store_, file_, inspectionKind()));
   if (!tool.empty())
-    found.erase(std::remove_if(found.begin(), found.end(), [&](const InspectionRecord& r) { return r.tool != tool; }),
-                found.end());
+    found.erase(
+        std::remove_if(found.begin(), found.end(), [&](const InspectionRecord& r) { return r.tool != tool; }),
+        found.end());
   return found;
 }
 

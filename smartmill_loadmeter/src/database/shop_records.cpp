@@ -59,9 +59,10 @@ const std::vector<NumberColumn<H>> HEALTH_NUMBERS{{"stamp", &H::stamp},         
 using P = InspectionRecord;
 // What follows from other records or the machine's state is not part of the identity.
 const std::vector<TextColumn<P>> INSPECTION_WORDS{
-    {"machine", &P::machine},     {"tool", &P::tool}, {"material", &P::material},
-    {"condition", &P::condition}, {"kind", &P::kind}, {"direction", &P::direction},
-    {"bag", &P::bag, false},      {"version", &P::version, false}};
+    {"machine", &P::machine},   {"tool", &P::tool},
+    {"material", &P::material}, {"condition", &P::condition},
+    {"kind", &P::kind},         {"direction", &P::direction},
+    {"bag", &P::bag, false},    {"version", &P::version, false}};
 const std::vector<NumberColumn<P>> INSPECTION_NUMBERS{{"stamp", &P::stamp, false},
                                                       {"diameter", &P::diameter},
                                                       {"nominal", &P::nominal},
@@ -235,7 +236,8 @@ FoundCause causeOf(const Json& effect) {
 double InspectionRecord::deviation() const {
   constexpr double REFERENCE = 293.15;  // [K] of dimensions, ISO 1
   const bool is_corrected = std::isfinite(part_temperature) && std::isfinite(part_expansion);
-  return (is_corrected ? measured / (1.0 + part_expansion * (part_temperature - REFERENCE)) : measured) - nominal;
+  return (is_corrected ? measured / (1.0 + part_expansion * (part_temperature - REFERENCE)) : measured) -
+         nominal;
 }
 
 std::string FoundCause::text() const {

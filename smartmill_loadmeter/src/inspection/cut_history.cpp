@@ -54,8 +54,8 @@ const InspectedCut& CutHistory::find(const std::string& name, double time) const
   if (!last)
     throw Error("no cut of this name since the start; newest cuts: " + (known.empty() ? "none" : known));
   if (!found)
-    throw Error(formatted("cut_stamp %.3f s is in no cut of this name, the last one is from %.3f to %.3f s", time,
-                          last->condition.stamp, last->end));
+    throw Error(formatted("cut_stamp %.3f s is in no cut of this name, the last one is from %.3f to %.3f s",
+                          time, last->condition.stamp, last->end));
   if (std::isnan(time) && count > 1)
     throw Error(formatted("%zu cuts have this name, expected cut_stamp, the time of the cut", count));
   return *found;

@@ -32,7 +32,8 @@ std::vector<std::string> notesOf(const WeightedFit& fit, const Records& records)
     notes.push_back(formatted("'%s' refused: %.1f um from the others, %.1f standard deviations",
                               records[r.row].condition.c_str(), r.deviation / units::UM, r.sigmas));
   if (fit.found() && fit.widened > 1.0)
-    notes.push_back(formatted("they scatter %.1f times as much as stated: standard deviation widened", fit.widened));
+    notes.push_back(
+        formatted("they scatter %.1f times as much as stated: standard deviation widened", fit.widened));
   return notes;
 }
 
@@ -79,7 +80,8 @@ GrowthEvidence growthOf(const Records& all, const InspectionParameters& paramete
   if (steps.size() < all.size())
     found.notes.push_back(plural(all.size() - steps.size(), "position") + " without temperature not used");
   if (steps.size() < FEWEST_POSITIONS) {
-    found.problem = plural(steps.size(), "position") + formatted(" with temperature, expected %zu or more", FEWEST_POSITIONS);
+    found.problem = plural(steps.size(), "position") +
+                    formatted(" with temperature, expected %zu or more", FEWEST_POSITIONS);
     return found;
   }
   const auto count = static_cast<Eigen::Index>(steps.size());
@@ -96,8 +98,8 @@ GrowthEvidence growthOf(const Records& all, const InspectionParameters& paramete
     found.lowest = lowest;
     found.highest = highest;
     if (highest - lowest >= parameters.least_temperature_spread) return true;
-    found.problem = formatted("temperatures from %.1f to %.1f K differ by %.1f K, expected %.1f K or more", lowest, highest,
-                              highest - lowest, parameters.least_temperature_spread);
+    found.problem = formatted("temperatures from %.1f to %.1f K differ by %.1f K, expected %.1f K or more",
+                              lowest, highest, highest - lowest, parameters.least_temperature_spread);
     return false;
   };
   if (!isSpread(temperature.minCoeff(), temperature.maxCoeff())) return found;
@@ -134,10 +136,13 @@ std::string headOf(const std::string& machine, const std::string& tool) {
 std::string RadiusEvidence::text() const {
   const std::string head = headOf(machine, tool) + "effective radius: ";
   if (!problem.empty()) return head + problem;
-  return head + formatted("%.4f +- %.4f mm, %+.1f um from the stated one, from %s, corrected for deflection: %s",
-                          (0.5 * diameter + deviation.value) / units::MM, deviation.std_dev / units::MM,
-                          deviation.value / units::UM, plural(used, "slot width").c_str(),
-                          corrected == used ? "all" : corrected == 0 ? "none" : std::to_string(corrected).c_str());
+  return head +
+         formatted("%.4f +- %.4f mm, %+.1f um from the stated one, from %s, corrected for deflection: %s",
+                   (0.5 * diameter + deviation.value) / units::MM, deviation.std_dev / units::MM,
+                   deviation.value / units::UM, plural(used, "slot width").c_str(),
+                   corrected == used ? "all"
+                   : corrected == 0  ? "none"
+                                     : std::to_string(corrected).c_str());
 }
 
 std::string GrowthEvidence::text() const {

@@ -21,7 +21,8 @@ InspectedCut readCut(const StrictYaml& map) {
   c.tool_name = map.word("tool");
   c.material = map.word("material");
   c.tool.diameter = map.number("diameter_mm", Range::positive()) * units::MM;
-  if (const auto before = map.optionalNumber("cut_time_before_s", Range::notNegative())) cut.edge_age = *before;
+  if (const auto before = map.optionalNumber("cut_time_before_s", Range::notNegative()))
+    cut.edge_age = *before;
   // A full slot, whose deflection can be corrected.
   if (map.has("axial_depth_mm")) {
     c.tool.teeth = map.integer("teeth", 1, 20);
@@ -56,7 +57,8 @@ InspectionFeature readFeature(const StrictYaml& map, double stamp) {
 
 }  // namespace
 
-std::vector<InspectedFeature> readInspection(const std::string& file, const InspectionParameters& parameters) {
+std::vector<InspectedFeature> readInspection(const std::string& file,
+                                             const InspectionParameters& parameters) {
   const StrictYaml root = StrictYaml::fromFile(file);
   root.oneOf("format", {FORMAT});
   const double stamp = root.number("stamp_s", Range::positive());

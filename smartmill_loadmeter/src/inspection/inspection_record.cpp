@@ -14,10 +14,10 @@ namespace smartmill::loadmeter {
 
 namespace {
 
-constexpr double SAME_DIAMETER = 1e-6;                             // [m]
-const Range PART_TEMPERATURE = Range::closed(253.15, 353.15);      // [K] -20..80 deg C
-const Range EXPANSION = Range::openLow(0.0, 1e-4);                 // [1/K] of solids; aluminium 23e-6
-const Range MACHINE_TEMPERATURE = Range::closed(253.15, 453.15);   // [K] up to insulation of class H
+constexpr double SAME_DIAMETER = 1e-6;                            // [m]
+const Range PART_TEMPERATURE = Range::closed(253.15, 353.15);     // [K] -20..80 deg C
+const Range EXPANSION = Range::openLow(0.0, 1e-4);                // [1/K] of solids; aluminium 23e-6
+const Range MACHINE_TEMPERATURE = Range::closed(253.15, 453.15);  // [K] up to insulation of class H
 
 void requireIfStated(const char* key, double value, const Range& range, const char* unit) {
   if (!std::isnan(value)) require(key, value, range, unit);
@@ -77,7 +77,8 @@ std::optional<Coefficients> coefficientsOf(const CuttingCondition& cut, const Ma
     return with(stored->value, std::max(relative(stored->std_dev.ktc, stored->value.ktc),
                                         relative(stored->std_dev.krc, stored->value.krc)));
   }
-  if (model.cutting && isComplete(*model.cutting)) return with(*model.cutting, 0.01 * model.uncertainty.cutting);
+  if (model.cutting && isComplete(*model.cutting))
+    return with(*model.cutting, 0.01 * model.uncertainty.cutting);
   return std::nullopt;
 }
 
@@ -136,7 +137,8 @@ std::string setDeflection(const CuttingCondition& cut, const MachineModel& model
                           const CoefficientDatabase& database, InspectionRecord* record) {
   if (record->kind != SLOT_WIDTH) return {};
   if (!isFullSlot(cut, *record)) return "no slot as wide as the tool";
-  if (!(cut.engagement.axial_depth > 0.0) || !(cut.engagement.feed_per_tooth > 0.0) || !(cut.spindle_speed > 0.0))
+  if (!(cut.engagement.axial_depth > 0.0) || !(cut.engagement.feed_per_tooth > 0.0) ||
+      !(cut.spindle_speed > 0.0))
     return "speed, feed and depth of the cut are not stated";
   const ModalModel& across = record->direction == "x" ? model.tool_tip.x : model.tool_tip.y;
   if (across.modes.empty()) return "the model states no modes of the tool tip along " + record->direction;

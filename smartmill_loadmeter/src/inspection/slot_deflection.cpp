@@ -19,7 +19,8 @@ constexpr int HEIGHTS = 16;           // over the depth
 
 // Steady vibration across the feed over a revolution [m].
 std::vector<double> vibration(Spectrum force, const ModalModel& across, double rotation) {
-  for (std::size_t k = 0; k < force.size(); ++k) force[k] *= across.response(static_cast<double>(k) * rotation);
+  for (std::size_t k = 0; k < force.size(); ++k)
+    force[k] *= across.response(static_cast<double>(k) * rotation);
   return inverseFourier(force, ANGLES);
 }
 
@@ -33,8 +34,8 @@ double at(const std::vector<double>& series, double angle) {
 
 }  // namespace
 
-Estimate slotWidening(const CuttingCondition& cut, const CuttingCoefficients& coefficients, double force_uncertainty,
-                      const ModalModel& across, const Uncertainty& uncertainty) {
+Estimate slotWidening(const CuttingCondition& cut, const CuttingCoefficients& coefficients,
+                      double force_uncertainty, const ModalModel& across, const Uncertainty& uncertainty) {
   const MechanisticForce model(cut.tool, coefficients, cut.engagement);
   std::vector<double> force;
   for (std::size_t i = 0; i < ANGLES; ++i)
@@ -46,7 +47,8 @@ Estimate slotWidening(const CuttingCondition& cut, const CuttingCoefficients& co
     const std::vector<double> y = vibration(spectrum, modes, rotation);
     double sum = 0.0;
     for (int h = 0; h < HEIGHTS; ++h) {
-      const double angle = lag * depth * (h + 0.5) / HEIGHTS;  // of the tip when the edge at this height is at 0
+      const double angle =
+          lag * depth * (h + 0.5) / HEIGHTS;  // of the tip when the edge at this height is at 0
       sum += at(y, angle) - at(y, angle + units::PI);
     }
     return sum / HEIGHTS;

@@ -11,8 +11,8 @@ namespace smartmill::loadmeter {
 
 namespace {
 
-constexpr double SCATTER = 0.99;    // [1] probability of the chi square that stated deviations explain
-constexpr std::size_t SHARE = 4;    // at most one of so many rows is refused
+constexpr double SCATTER = 0.99;     // [1] probability of the chi square that stated deviations explain
+constexpr std::size_t SHARE = 4;     // at most one of so many rows is refused
 constexpr double UNTESTABLE = 1e-9;  // [1] 1 - leverage of a row that alone determines an unknown
 
 }  // namespace
@@ -42,11 +42,11 @@ WeightedFit fitWeighted(const Eigen::MatrixXd& design, const Eigen::VectorXd& va
     }
     if (worst.sigmas > limit) {
       if (fit.refused.size() == most || used == unknowns + 1) {
-        fit.problem =
-            formatted("%zu of %zu %s deviate from the others by more than %.1f standard deviations, the largest by "
-                      "%.1f um; expected at most a quarter: state larger standard deviations or inspect again",
-                      beyond + fit.refused.size(), static_cast<std::size_t>(rows), what.c_str(), limit,
-                      1e6 * worst.deviation);
+        fit.problem = formatted(
+            "%zu of %zu %s deviate from the others by more than %.1f standard deviations, the largest by "
+            "%.1f um; expected at most a quarter: state larger standard deviations or inspect again",
+            beyond + fit.refused.size(), static_cast<std::size_t>(rows), what.c_str(), limit,
+            1e6 * worst.deviation);
         return fit;
       }
       // The deviation is that from the others.

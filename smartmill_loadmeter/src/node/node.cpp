@@ -333,12 +333,14 @@ void LoadMeterNode::store(InspectionResult inspected) {
     const std::string why = setDeflection(inspected.condition, model_, database_, &record);
     if (!why.empty())
       ROS_INFO("inspection, '%s': not corrected for deflection: %s", record.condition.c_str(), why.c_str());
-    if (!inspected.note.empty()) ROS_WARN("inspection, '%s': %s", record.condition.c_str(), inspected.note.c_str());
+    if (!inspected.note.empty())
+      ROS_WARN("inspection, '%s': %s", record.condition.c_str(), inspected.note.c_str());
     const EvidenceRecords evidence = database_.evidence();
     stored_inspections_ += evidence.add(std::vector<InspectionRecord>{record});
     last_inspection_.clear();
     for (const std::string& line :
-         inspectionEvidence(evidence.inspections(record.tool), parameters_.identification.inspection).lines()) {
+         inspectionEvidence(evidence.inspections(record.tool), parameters_.identification.inspection)
+             .lines()) {
       ROS_INFO("inspection, %s", line.c_str());
       last_inspection_ += (last_inspection_.empty() ? "" : "; ") + line;
     }

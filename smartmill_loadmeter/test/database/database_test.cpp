@@ -265,15 +265,16 @@ TEST(Database, anOlderFileIsUpdatedWithoutLoss) {
   }
   sqlite3* db = nullptr;
   ASSERT_EQ(sqlite3_open(file.c_str(), &db), SQLITE_OK);
-  ASSERT_EQ(sqlite3_exec(db,
-                         "ALTER TABLE coefficients DROP COLUMN first_stamp; ALTER TABLE coefficients DROP "
-                         "COLUMN flank_wear; ALTER TABLE coefficients DROP COLUMN temperature;"
-                         "DROP TABLE improvements; DROP TABLE health; DROP TABLE inspections; DROP TABLE handed; "
-                         "CREATE TABLE sent "
-                         "(fleet TEXT PRIMARY KEY, last INTEGER, at REAL); INSERT INTO sent VALUES ('f', 1, "
-                         "1); PRAGMA user_version=1",
-                         nullptr, nullptr, nullptr),
-            SQLITE_OK);
+  ASSERT_EQ(
+      sqlite3_exec(db,
+                   "ALTER TABLE coefficients DROP COLUMN first_stamp; ALTER TABLE coefficients DROP "
+                   "COLUMN flank_wear; ALTER TABLE coefficients DROP COLUMN temperature;"
+                   "DROP TABLE improvements; DROP TABLE health; DROP TABLE inspections; DROP TABLE handed; "
+                   "CREATE TABLE sent "
+                   "(fleet TEXT PRIMARY KEY, last INTEGER, at REAL); INSERT INTO sent VALUES ('f', 1, "
+                   "1); PRAGMA user_version=1",
+                   nullptr, nullptr, nullptr),
+      SQLITE_OK);
   sqlite3_close(db);
   CoefficientDatabase database(file);
   EXPECT_EQ(database.size(), 2u);
@@ -297,7 +298,8 @@ TEST(Database, aFileOfVersionThreeTakesInspections) {
   CoefficientDatabase(file).add(recordOf("t", 1, 1e9, 2.0));
   sqlite3* db = nullptr;
   ASSERT_EQ(sqlite3_open(file.c_str(), &db), SQLITE_OK);
-  ASSERT_EQ(sqlite3_exec(db, "DROP TABLE inspections; PRAGMA user_version=3", nullptr, nullptr, nullptr), SQLITE_OK);
+  ASSERT_EQ(sqlite3_exec(db, "DROP TABLE inspections; PRAGMA user_version=3", nullptr, nullptr, nullptr),
+            SQLITE_OK);
   sqlite3_close(db);
   CoefficientDatabase database(file);
   EXPECT_EQ(database.size(), 1u);

@@ -34,7 +34,8 @@ InspectionRecord slotOf(double measured, double std_dev, const std::string& name
   return r;
 }
 
-InspectionRecord stepOf(double deviation, double std_dev, double temperature, const std::string& name = "step") {
+InspectionRecord stepOf(double deviation, double std_dev, double temperature,
+                        const std::string& name = "step") {
   InspectionRecord r = slotOf(-5e-3 + deviation, std_dev, name);
   r.kind = STEP_POSITION;
   r.direction = "z";
@@ -87,14 +88,16 @@ GrowthEvidence growthOf(const std::vector<InspectionRecord>& records) {
 
 TEST(RadiusEvidence, weightedMeanOfTwoSlotsInClosedForm) {
   // Radii off by -8 and -2 um with 1 and 2 um: weights 1 and 1/4.
-  const RadiusEvidence r = radiusOf({slotOf(DIAMETER - 16.0 * UM, 2.0 * UM), slotOf(DIAMETER - 4.0 * UM, 4.0 * UM)});
+  const RadiusEvidence r =
+      radiusOf({slotOf(DIAMETER - 16.0 * UM, 2.0 * UM), slotOf(DIAMETER - 4.0 * UM, 4.0 * UM)});
   EXPECT_NEAR(r.deviation.value, (-8.0 - 0.25 * 2.0) / 1.25 * UM, 1e-12);
   // chi square 7.2 of one degree of freedom is beyond 6.63 (99 %).
   EXPECT_NEAR(r.deviation.std_dev, std::sqrt(7.2 / 1.25) * UM, 1e-12);
   EXPECT_THAT(r.notes, ElementsAre("they scatter 2.7 times as much as stated: standard deviation widened"));
-  EXPECT_EQ(radiusOf({slotOf(DIAMETER - 16.0 * UM, 2.0 * UM)}).text(),
-            "endmill 12: effective radius: 5.9920 +- 0.0010 mm, -8.0 um from the stated one, from 1 slot width, "
-            "corrected for deflection: none");
+  EXPECT_EQ(
+      radiusOf({slotOf(DIAMETER - 16.0 * UM, 2.0 * UM)}).text(),
+      "endmill 12: effective radius: 5.9920 +- 0.0010 mm, -8.0 um from the stated one, from 1 slot width, "
+      "corrected for deflection: none");
 }
 
 TEST(RadiusEvidence, isCalibrated) {
@@ -115,7 +118,8 @@ TEST(RadiusEvidence, isCalibrated) {
   // 95 % of 200, three standard deviations of the binomial distribution on both sides.
   EXPECT_GE(within, 181);
   EXPECT_LE(within, 199);
-  std::printf("radius: error over standard deviation RMS %.3f, %d of 200 within 1.96\n", coverage.rms(), within);
+  std::printf("radius: error over standard deviation RMS %.3f, %d of 200 within 1.96\n", coverage.rms(),
+              within);
 }
 
 TEST(RadiusEvidence, anOutlierIsRefusedAndAnnounced) {
@@ -134,11 +138,13 @@ TEST(RadiusEvidence, anOutlierIsRefusedAndAnnounced) {
 
 TEST(RadiusEvidence, widthsThatDisagreeGiveNoEstimate) {
   const RadiusEvidence two = radiusOf({slotOf(DIAMETER, 1.0 * UM), slotOf(DIAMETER - 30.0 * UM, 1.0 * UM)});
-  EXPECT_THAT(two.problem, HasSubstr("2 of 2 slot widths deviate from the others by more than 4.0 standard deviations"));
+  EXPECT_THAT(two.problem,
+              HasSubstr("2 of 2 slot widths deviate from the others by more than 4.0 standard deviations"));
   EXPECT_TRUE(two.used == 0 && two.deviation.std_dev == 0.0);
   std::vector<InspectionRecord> worn;  // the tool wore from slot to slot
   for (int i = 0; i < 8; ++i) worn.push_back(slotOf(DIAMETER - 10.0 * UM * i, 1.0 * UM));
-  EXPECT_THAT(radiusOf(worn).text(), HasSubstr("expected at most a quarter: state larger standard deviations"));
+  EXPECT_THAT(radiusOf(worn).text(),
+              HasSubstr("expected at most a quarter: state larger standard deviations"));
 }
 
 // The uncertainty of the deflections does not fall with their number.
@@ -170,7 +176,8 @@ TEST(GrowthEvidence, isTheSlopeInClosedForm) {
   EXPECT_NEAR(g.coefficient.value, 3.0 * UM, 1e-13);
   // 1 um, with 0.29 K at 3 um/K; the variance of the temperatures is 50 K2.
   EXPECT_NEAR(g.coefficient.std_dev, std::hypot(1.0, 0.87) / std::sqrt(50.0) * UM, 1e-10);
-  EXPECT_EQ(g.text(), "endmill 12: thermal growth along z: 3.00 +- 0.19 um/K from 3 positions at 300.0 to 310.0 K");
+  EXPECT_EQ(g.text(),
+            "endmill 12: thermal growth along z: 3.00 +- 0.19 um/K from 3 positions at 300.0 to 310.0 K");
 }
 
 TEST(GrowthEvidence, isCalibrated) {
@@ -188,7 +195,8 @@ TEST(GrowthEvidence, isCalibrated) {
   EXPECT_TRUE(coverage.isCalibrated());
   EXPECT_GE(within, 181);
   EXPECT_LE(within, 199);
-  std::printf("growth: error over standard deviation RMS %.3f, %d of 200 within 1.96\n", coverage.rms(), within);
+  std::printf("growth: error over standard deviation RMS %.3f, %d of 200 within 1.96\n", coverage.rms(),
+              within);
 }
 
 TEST(GrowthEvidence, anOutlierIsRefusedAndAnnounced) {
@@ -208,7 +216,7 @@ TEST(GrowthEvidence, needsTemperaturesThatDiffer) {
   const GrowthEvidence g = growthOf({stepOf(0.0, UM, 300.0), stepOf(0.0, UM, 310.0), stepOf(0.0, UM, NAN)});
   EXPECT_EQ(g.problem, "2 positions with temperature, expected 3 or more");
   EXPECT_THAT(g.notes, ElementsAre("1 position without temperature not used"));
-  // The only warm one is refused: what remains does not tell.
+  // The only warm positions contradict each other: there is no estimate.
   std::vector<InspectionRecord> steps;
   for (int i = 0; i < 8; ++i) steps.push_back(stepOf((i % 2) * UM, UM, 300.0 + 0.2 * i));
   InspectionRecord loose = stepOf(500.0 * UM, UM, 320.0);
@@ -219,12 +227,13 @@ TEST(GrowthEvidence, needsTemperaturesThatDiffer) {
 }
 
 TEST(InspectionEvidence, machinesToolsAndAxesAreSeparate) {
-  InspectionRecord other_tool = slotOf(DIAMETER, UM), other_machine = other_tool, along_x = stepOf(0.0, UM, 300.0);
+  InspectionRecord other_tool = slotOf(DIAMETER, UM), other_machine = other_tool,
+                   along_x = stepOf(0.0, UM, 300.0);
   other_tool.tool = "endmill 10";
   other_machine.machine = "mill 07";
   along_x.direction = "x";
-  const InspectionEvidence found = inspectionEvidence(
-      {slotOf(DIAMETER, UM), other_tool, other_machine, stepOf(0.0, UM, 300.0), along_x});
+  const InspectionEvidence found =
+      inspectionEvidence({slotOf(DIAMETER, UM), other_tool, other_machine, stepOf(0.0, UM, 300.0), along_x});
   EXPECT_EQ(found.radii.size(), 3u);
   EXPECT_EQ(found.growths.size(), 2u);
   EXPECT_EQ(found.lines().size(), 5u);

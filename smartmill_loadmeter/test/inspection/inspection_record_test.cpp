@@ -1,4 +1,5 @@
-// Which measured dimensions are accepted, of which cut they are, and how they come from a file into the database.
+// Which measured dimensions are accepted, of which cut they are, and how they come from a file into the
+// database.
 #include "smartmill_loadmeter/inspection/inspection_record.h"
 
 #include <gmock/gmock.h>
@@ -60,8 +61,8 @@ InspectionFeature stepOf(const std::string& name) {
   return f;
 }
 
-/// Cuts slot_1 at 1000 s, slot_2 twice, at 1100 and 1200 s, and an air cut; the spindle motor warms up by 0.1 K/s from
-/// 300 K at 1000 s.
+/// Cuts slot_1 at 1000 s, slot_2 twice, at 1100 and 1200 s, and an air cut; the spindle motor warms up by 0.1
+/// K/s from 300 K at 1000 s.
 class Inspection : public ::testing::Test {
  protected:
   Inspection() {
@@ -107,8 +108,10 @@ TEST_F(Inspection, takesToolAndTemperatureFromTheCut) {
 }
 
 TEST_F(Inspection, findsTheCutByNameAndTime) {
-  EXPECT_EQ(refusal(slotOf("slot_3")), "'slot_3': no cut of this name since the start; newest cuts: slot_2, slot_2, slot_1");
-  EXPECT_EQ(refusal(slotOf("air")), "'air': no cut of this name since the start; newest cuts: slot_2, slot_2, slot_1");
+  EXPECT_EQ(refusal(slotOf("slot_3")),
+            "'slot_3': no cut of this name since the start; newest cuts: slot_2, slot_2, slot_1");
+  EXPECT_EQ(refusal(slotOf("air")),
+            "'air': no cut of this name since the start; newest cuts: slot_2, slot_2, slot_1");
   EXPECT_EQ(refusal(slotOf("")), "'': condition: empty, expected the name of a cut");
   InspectionFeature twice = slotOf("slot_2");
   EXPECT_EQ(refusal(twice), "'slot_2': 2 cuts have this name, expected cut_stamp, the time of the cut");
@@ -118,7 +121,8 @@ TEST_F(Inspection, findsTheCutByNameAndTime) {
   EXPECT_EQ(inspect(twice, cuts_, {}).record.cut_time, 1200.0);
   twice.cut_time = 1350.0;
   EXPECT_EQ(refusal(twice),
-            "'slot_2': cut_stamp 1350.000 s is in no cut of this name, the last one is from 1200.000 to 1300.000 s");
+            "'slot_2': cut_stamp 1350.000 s is in no cut of this name, the last one is from 1200.000 to "
+            "1300.000 s");
   // A latched condition that is received again is no other cut.
   cuts_.handle(cutOf("slot_9", 1390.0), watch_, production_);
   cuts_.handle(cutOf("slot_9", 1390.0), watch_, production_);
@@ -136,25 +140,26 @@ TEST_F(Inspection, refusesWhatCannotBe) {
       {[](auto& f) { f.kind = ""; }, "kind: '', expected slot_width or step_position"},
       {[](auto& f) { f.direction = "w"; }, "direction: 'w', expected x, y or z"},
       {[](auto& f) { f.direction = "z"; }, "direction: 'z', expected x or y of a slot's width"},
-      {[](auto& f) { f.stamp = NAN; }, "stamp: nan s is out of range (> 0)"},
+      {[](auto& f) { f.stamp = NAN; }, "stamp: nan is out of range (> 0 s)"},
       {[](auto& f) { f.stamp = 900.0; }, "stamp: inspected at 900.000 s, before its cut at 1000.000 s"},
-      {[](auto& f) { f.nominal = NAN; }, "nominal: nan m is out of range (> 0)"},
-      {[](auto& f) { f.measured = NAN; }, "measured: nan m is out of range (> 0)"},
-      {[=](auto& f) { f.measured = infinite; }, "measured: inf m is out of range (> 0)"},
-      {[](auto& f) { f.measured = 0.0; }, "measured: 0 m is out of range (> 0)"},
-      {[](auto& f) { f.std_dev = NAN; }, "std_dev: nan m is out of range (0 < value <= 0.001)"},
-      {[](auto& f) { f.std_dev = 0.0; }, "std_dev: 0 m is out of range (0 < value <= 0.001)"},
-      {[](auto& f) { f.std_dev = 0.0015; }, "std_dev: 0.0015 m is out of range (0 < value <= 0.001)"},
+      {[](auto& f) { f.nominal = NAN; }, "nominal: nan is out of range (> 0 m)"},
+      {[](auto& f) { f.measured = NAN; }, "measured: nan is out of range (> 0 m)"},
+      {[=](auto& f) { f.measured = infinite; }, "measured: inf is out of range (> 0 m)"},
+      {[](auto& f) { f.measured = 0.0; }, "measured: 0 is out of range (> 0 m)"},
+      {[](auto& f) { f.std_dev = NAN; }, "std_dev: nan is out of range (0 < value <= 0.001 m)"},
+      {[](auto& f) { f.std_dev = 0.0; }, "std_dev: 0 is out of range (0 < value <= 0.001 m)"},
+      {[](auto& f) { f.std_dev = 0.0015; }, "std_dev: 0.0015 is out of range (0 < value <= 0.001 m)"},
       {[](auto& f) { f.measured = 11.984; },
        "measured: 11972.0000 mm from nominal, expected at most 1.0000 mm (wrong feature or unit?)"},
       {[](auto& f) { f.nominal = 11.9e-3; }, "nominal: 11.9000 mm, narrower than the tool of 12.0000 mm"},
-      {[](auto& f) { f.cut_time = 6000.0; }, "cut_stamp: 6000 s is out of range (0 < value <= 5000)"},
-      {[](auto& f) { f.machine_temperature = 31.0; }, "machine_temperature: 31 K is out of range (253.15..453.15)"},
-      {[](auto& f) { f.part_temperature = 22.0; }, "part_temperature: 22 K is out of range (253.15..353.15)"},
+      {[](auto& f) { f.cut_time = 6000.0; }, "cut_stamp: 6000 is out of range (0 < value <= 5000 s)"},
+      {[](auto& f) { f.machine_temperature = 31.0; },
+       "machine_temperature: 31 is out of range (253.15 <= value <= 453.15 K)"},
+      {[](auto& f) { f.part_temperature = 22.0; }, "part_temperature: 22 is out of range (253.15 <= value <= 353.15 K)"},
       {[](auto& f) { f.part_temperature = 295.0; },
        "part_temperature and part_expansion: one without the other, expected both or none"},
       {[](auto& f) { f.part_temperature = 295.0, f.part_expansion = 23.1; },
-       "part_expansion: 23.1 1/K is out of range (0 < value <= 0.0001)"}};
+       "part_expansion: 23.1 is out of range (0 < value <= 0.0001 1/K)"}};
   for (const Case& one : cases) {
     InspectionFeature f = slotOf("slot_1");
     one.edit(f);
@@ -237,12 +242,19 @@ TEST(InspectionFile, isReadIntoTheDatabase) {
     return ::testing::internal::GetCapturedStdout();
   };
   const std::string first = run({database.c_str(), "inspect", file.c_str(), "--machine", "mill 07"});
-  EXPECT_THAT(first, StartsWith("3 new of 3\nmill 07: endmill_12: effective radius: 5.9925 +- 0.0005 mm, -7.5 um"));
-  EXPECT_THAT(first, HasSubstr("mill 07: endmill_12: thermal growth along z: 1 position with temperature, expected 3 or more"));
-  EXPECT_THAT(run({database.c_str(), "inspect", file.c_str(), "--machine", "mill 07"}), StartsWith("0 new of 3\n"));
+  EXPECT_THAT(first,
+              StartsWith("3 new of 3\nmill 07: endmill_12: effective radius: 5.9925 +- 0.0005 mm, -7.5 um"));
+  EXPECT_THAT(
+      first,
+      HasSubstr(
+          "mill 07: endmill_12: thermal growth along z: 1 position with temperature, expected 3 or more"));
+  EXPECT_THAT(run({database.c_str(), "inspect", file.c_str(), "--machine", "mill 07"}),
+              StartsWith("0 new of 3\n"));
   const std::string shown = run({database.c_str(), "inspections", "--tool", "endmill_12"});
-  EXPECT_THAT(shown, StartsWith("endmill_12 / 6061  slot_1: slot_width along y, 11.9840 mm, -16.0 +- 1.5 um from nominal, "
-                                "edge age 4.0 min, stamp 1763700000.000 s, mill 07\n"));
+  EXPECT_THAT(
+      shown,
+      StartsWith("endmill_12 / 6061  slot_1: slot_width along y, 11.9840 mm, -16.0 +- 1.5 um from nominal, "
+                 "edge age 4.0 min, stamp 1763700000.000 s, mill 07\n"));
   EXPECT_THAT(shown, HasSubstr("machine at 31.0 degC"));
   EXPECT_THAT(shown, HasSubstr("effective radius: 5.9925"));
   EXPECT_EQ(run({database.c_str(), "inspections", "--since", "1763700001"}), "");
@@ -259,15 +271,18 @@ TEST(InspectionFile, nameWhatIsWrong) {
        {"helix_deg: 35.0,", "", "cuts[1].helix_deg: is missing"},
        {"axial_depth_mm: 2.0", "axial_depth: 2.0", "cuts[1].teeth: the key is unknown"},
        {"cut: slot_1", "cut: slot_7", "features[0].cut: 'slot_7' is not among the cuts"},
-       {"kind: slot_width", "kind: hole", "features[0].kind: 'hole' is not one of slot_width | step_position"},
+       {"kind: slot_width", "kind: hole",
+        "features[0].kind: 'hole' is not one of slot_width | step_position"},
        {"direction: y", "direction: up", "features[0].direction: 'up' is not one of x | y | z"},
        {"measured_mm: 11.984", "measured_mm: .nan", "features[0].measured_mm: '.nan' is not a finite number"},
        {"measured_mm: 11.984", "measured_mm: wide", "features[0].measured_mm: 'wide' is not a number"},
-       {"measured_mm: 11.984", "measured_mm: 11.984, measured_mm: 12.0", "features[0].measured_mm: the key occurs twice"},
+       {"measured_mm: 11.984", "measured_mm: 11.984, measured_mm: 12.0",
+        "features[0].measured_mm: the key occurs twice"},
        {"std_um: 1.5}", "std_um: 0.0}", "features[0].std_um: 0 is out of range (> 0)"},
        {"std_um: 1.5}", "std: 1.5}", "features[0].std_um: is missing"},
        {"measured_mm: 11.984", "measured_mm: 1.1984",
-        "features[0]: measured: 10.8016 mm from nominal, expected at most 1.0000 mm (wrong feature or unit?)"},
+        "features[0]: measured: 10.8016 mm from nominal, expected at most 1.0000 mm (wrong feature or "
+        "unit?)"},
        {"nominal_mm: 12.0, measured_mm: 11.984", "nominal_mm: 11.5, measured_mm: 11.49",
         "features[0]: nominal: 11.5000 mm, narrower than the tool of 12.0000 mm"},
        {", part_expansion_um_per_m_k: 23.1", "",

@@ -33,8 +33,9 @@ ModalModel modeOf(double frequency, double stiffness) {
   return tip;
 }
 
-// Three straight teeth: with one at 0 another cuts at 120 deg, with one at 180 deg another at 60 deg. Their radial forces
-// differ by the chip there, c sin 60 deg; edge forces of the tooth at the wall begin and end there and are left out.
+// Three straight teeth: with one at 0 another cuts at 120 deg, with one at 180 deg another at 60 deg. Their
+// radial forces differ by the chip there, c sin 60 deg; edge forces of the tooth at the wall begin and end
+// there and are left out.
 TEST(SlotDeflection, ofAStiffToolInClosedForm) {
   CuttingCoefficients k = K;
   k.kre = 0.0;
@@ -50,7 +51,8 @@ TEST(SlotDeflection, ofAStiffToolInClosedForm) {
 }
 
 TEST(SlotDeflection, anEvenNumberOfStraightTeethShiftsBothWalls) {
-  for (const int teeth : {2, 4}) EXPECT_NEAR(slotWidening(slot(teeth, 0.0), K, 0.0, modeOf(1200.0, 10e6), EXACT).value, 0.0, 1e-12);
+  for (const int teeth : {2, 4})
+    EXPECT_NEAR(slotWidening(slot(teeth, 0.0), K, 0.0, modeOf(1200.0, 10e6), EXACT).value, 0.0, 1e-12);
 }
 
 // y'' + 2 zeta w y' + w^2 y = w^2 F(t) / k by Runge-Kutta over 60 revolutions.
@@ -93,7 +95,8 @@ TEST(SlotDeflection, agreesWithTheIntegratedVibration) {
       const double truth = integrated(cut, frequency, 10e6);
       const double found = slotWidening(cut, K, 0.0, modeOf(frequency, 10e6), EXACT).value;
       EXPECT_NEAR(found, truth, 0.02 * std::abs(truth) + 5e-9) << frequency << " Hz, " << teeth << " teeth";
-      std::printf("%.0f Hz, %d teeth: widening %.3f um, integrated %.3f um\n", frequency, teeth, 1e6 * found, 1e6 * truth);
+      std::printf("%.0f Hz, %d teeth: widening %.3f um, integrated %.3f um\n", frequency, teeth, 1e6 * found,
+                  1e6 * truth);
     }
   }
 }

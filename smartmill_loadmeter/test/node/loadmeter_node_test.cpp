@@ -214,7 +214,8 @@ TEST(LoadMeterNode, storesExplanations) {
   EXPECT_EQ(kept, "1");
 }
 
-// A measured dimension of a part is stored with the tool of its cut; what is refused is named in the diagnostics.
+// A measured dimension of a part is stored with the tool of its cut; what is refused is named in the
+// diagnostics.
 TEST(LoadMeterNode, storesInspectedDimensions) {
   ros::NodeHandle nh, node("loadmeter");
   ros::AsyncSpinner spinner(1);
@@ -271,7 +272,8 @@ TEST(LoadMeterNode, storesInspectedDimensions) {
   feature.std_dev = 1.5e-6;
   features.publish(feature);
   ASSERT_TRUE(waitFor("inspected dimensions stored", "1"));
-  EXPECT_TRUE(waitFor("inspection", "worn endmill: effective radius: 5.9920 +- 0.0008 mm, -8.0 um from the stated one"));
+  EXPECT_TRUE(waitFor("inspection",
+                      "worn endmill: effective radius: 5.9920 +- 0.0008 mm, -8.0 um from the stated one"));
   std::string file;
   ASSERT_TRUE(node.getParam("database", file));
   const auto kept = CoefficientDatabase(file).evidence().inspections("worn endmill");
@@ -293,13 +295,13 @@ TEST(LoadMeterNode, storesInspectedDimensions) {
   refuses(bad, "'unheard of': no cut of this name since the start");
   bad = feature;
   bad.measured = std::nan("");
-  refuses(bad, "'inspected slot': measured: nan m");
+  refuses(bad, "'inspected slot': measured: nan is out of range");
   bad = feature;
   bad.measured = 11.984;  // in mm
   refuses(bad, "'inspected slot': measured: 11972.0000 mm from nominal, expected at most 1.0000 mm");
   bad = feature;
   bad.measured = 0.0;  // not stated
-  refuses(bad, "'inspected slot': measured: 0 m is out of range");
+  refuses(bad, "'inspected slot': measured: 0 is out of range");
   EXPECT_EQ(CoefficientDatabase(file).evidence().inspections().size(), 1u);
   // A good one ends the warning.
   feature.measured = 11.986e-3;

@@ -50,13 +50,13 @@ struct HealthRecord {
 struct InspectionRecord {
   static constexpr double UNKNOWN = std::numeric_limits<double>::quiet_NaN();
 
-  std::string machine;         ///< name of the machine
-  std::string tool, material;  ///< of the cut
-  std::string condition;       ///< name of the cut
+  std::string machine;          ///< name of the machine
+  std::string tool, material;   ///< of the cut
+  std::string condition;        ///< name of the cut
   std::string kind, direction;  ///< as InspectionFeature
   std::string bag, version;
-  double stamp = UNKNOWN;     ///< [s] of the inspection
-  double diameter = UNKNOWN;  ///< [m] stated, of the tool
+  double stamp = UNKNOWN;                                           ///< [s] of the inspection
+  double diameter = UNKNOWN;                                        ///< [m] stated, of the tool
   double nominal = UNKNOWN, measured = UNKNOWN, std_dev = UNKNOWN;  ///< [m]
   /// @{ [m] by which forced vibration of the tool widens the slot, and its standard deviation.
   double deflection = UNKNOWN, deflection_std = UNKNOWN;

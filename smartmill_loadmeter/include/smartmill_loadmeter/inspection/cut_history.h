@@ -14,8 +14,8 @@ namespace smartmill::loadmeter {
 /// A cut whose part may be inspected.
 struct InspectedCut {
   CuttingCondition condition;
-  double end = std::numeric_limits<double>::infinity();       ///< [s]
-  std::array<TemperatureReading, 3> temperature;              ///< for faces along x, y, z
+  double end = std::numeric_limits<double>::infinity();        ///< [s]
+  std::array<TemperatureReading, 3> temperature;               ///< for faces along x, y, z
   double edge_age = std::numeric_limits<double>::quiet_NaN();  ///< [s] cutting time of the edge; NaN: unknown
 };
 

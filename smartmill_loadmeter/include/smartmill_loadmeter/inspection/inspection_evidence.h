@@ -14,10 +14,10 @@ namespace smartmill::loadmeter {
 /// tooth, so that runout is part of it.
 struct RadiusEvidence {
   std::string machine, tool;
-  double diameter = 0.0;       ///< [m] stated
-  Estimate deviation;          ///< [m] of the effective radius from the stated one; negative: worn
-  std::size_t used = 0;        ///< widths
-  std::size_t corrected = 0;   ///< of these with a known deflection of the tool
+  double diameter = 0.0;           ///< [m] stated
+  Estimate deviation;              ///< [m] of the effective radius from the stated one; negative: worn
+  std::size_t used = 0;            ///< widths
+  std::size_t corrected = 0;       ///< of these with a known deflection of the tool
   std::vector<std::string> notes;  ///< one line each: refused widths, scatter
   std::string problem;             ///< why there is no estimate; empty: there is one
 
@@ -25,11 +25,11 @@ struct RadiusEvidence {
 };
 
 /// Thermal growth of a machine along an axis, from the positions of faces that one tool cut at several
-/// temperatures: position - nominal = offset + coefficient (T - mean T). The temperature is that of the spindle
-/// motor for z and of the axis' servo motor for x and y; the offset contains datum and tool length.
+/// temperatures: position - nominal = offset + coefficient (T - mean T). The temperature is that of the
+/// spindle motor for z and of the axis' servo motor for x and y; the offset contains datum and tool length.
 struct GrowthEvidence {
   std::string machine, tool, axis;
-  Estimate coefficient;               ///< [m/K] positive: faces move in the positive direction as it warms up
+  Estimate coefficient;  ///< [m/K] positive: faces move in the positive direction as it warms up
   double lowest = 0.0, highest = 0.0;  ///< [K] of the positions used
   std::size_t used = 0;
   std::vector<std::string> notes;
@@ -45,8 +45,8 @@ struct InspectionEvidence {
   std::vector<std::string> lines() const;  ///< each estimate, followed by its notes
 };
 
-/// Evidence of each tool. Weights are the inverse variances; of a radius the uncertainty of the corrections for
-/// deflection is common to all widths, of a growth the uncertainty of the temperature adds growth x
+/// Evidence of each tool. Weights are the inverse variances; of a radius the uncertainty of the corrections
+/// for deflection is common to all widths, of a growth the uncertainty of the temperature adds growth x
 /// temperature_std to each position. Outliers and sets that disagree: weighted_fit.h.
 InspectionEvidence inspectionEvidence(const std::vector<InspectionRecord>& records,
                                       const InspectionParameters& parameters = {});

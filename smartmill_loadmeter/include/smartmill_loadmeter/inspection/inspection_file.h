@@ -15,6 +15,7 @@ struct InspectedFeature {
 
 /// Measured dimensions of parts and the cuts that made them, smartmill-inspection/1 (docs/formats.md).
 /// @throws Error with file, key and value, as recordOf() for a feature that is refused.
-std::vector<InspectedFeature> readInspection(const std::string& file, const InspectionParameters& parameters = {});
+std::vector<InspectedFeature> readInspection(const std::string& file,
+                                             const InspectionParameters& parameters = {});
 
 }  // namespace smartmill::loadmeter

@@ -12,9 +12,10 @@ struct InspectionParameters {
   double least_temperature_spread = 5.0;
 
   void declare(ParameterTable& table) {
-    table.number("largest_difference", largest_difference, "m", Range::openLow(0.0, 0.1),
-                 "largest plausible difference between measured and nominal dimension; a larger one is a wrong "
-                 "feature or unit");
+    table.number(
+        "largest_difference", largest_difference, "m", Range::openLow(0.0, 0.1),
+        "largest plausible difference between measured and nominal dimension; a larger one is a wrong "
+        "feature or unit");
     table.number("outlier", outlier, "1", Range::closed(2.0, 20.0),
                  "standard deviations from the others at which a dimension is refused; noise alone exceeds 4 "
                  "once in 16,000");

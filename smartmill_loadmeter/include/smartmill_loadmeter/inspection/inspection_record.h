@@ -10,9 +10,9 @@
 
 namespace smartmill::loadmeter {
 
-/// Record of a measured dimension, without deflection. @throws Error of one line: a missing value or one that is
-/// not finite, a difference from nominal above InspectionParameters::largest_difference, a slot narrower than
-/// its tool, an unknown kind or direction, times or temperatures that cannot be.
+/// Record of a measured dimension, without deflection. @throws Error of one line: a missing value or one that
+/// is not finite, a difference from nominal above InspectionParameters::largest_difference, a slot narrower
+/// than its tool, an unknown kind or direction, times or temperatures that cannot be.
 InspectionRecord recordOf(const InspectionFeature& feature, const InspectedCut& cut,
                           const InspectionParameters& parameters);
 

@@ -18,10 +18,11 @@ struct InspectionFeature {
   std::string condition;  ///< name of the cut that made it
   std::string kind;       ///< SLOT_WIDTH or STEP_POSITION
   std::string direction;  ///< x, y, z: axis of the machine along which it was measured
-  double nominal = UNKNOWN;   ///< [m] expected of a tool of its stated diameter on a machine that does not grow
-  double measured = UNKNOWN;  ///< [m]
-  double std_dev = UNKNOWN;   ///< [m] of measured
-  double cut_time = UNKNOWN;  ///< [s] time of the cut
+  double nominal =
+      UNKNOWN;  ///< [m] expected of a tool of its stated diameter on a machine that does not grow
+  double measured = UNKNOWN;             ///< [m]
+  double std_dev = UNKNOWN;              ///< [m] of measured
+  double cut_time = UNKNOWN;             ///< [s] time of the cut
   double machine_temperature = UNKNOWN;  ///< [K] of the motor during the cut
   double part_temperature = UNKNOWN;     ///< [K] during the inspection; NaN: 20 deg C
   double part_expansion = UNKNOWN;       ///< [1/K] of the part's material
