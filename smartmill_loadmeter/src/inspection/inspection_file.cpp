@@ -1,5 +1,7 @@
 #include "smartmill_loadmeter/inspection/inspection_file.h"
 
+#include <algorithm>
+#include <iterator>
 #include <map>
 
 #include "smartmill_core/error.h"
@@ -12,6 +14,8 @@ namespace smartmill::loadmeter {
 namespace {
 
 constexpr const char* FORMAT = "smartmill-inspection/1";
+constexpr const char* SLOT_KEYS[] = {"teeth", "helix_deg", "spindle_speed_rpm", "axial_depth_mm",
+                                     "feed_per_tooth_mm"};
 
 InspectedCut readCut(const StrictYaml& map) {
   InspectedCut cut;
@@ -23,8 +27,9 @@ InspectedCut readCut(const StrictYaml& map) {
   c.tool.diameter = map.number("diameter_mm", Range::positive()) * units::MM;
   if (const auto before = map.optionalNumber("cut_time_before_s", Range::notNegative()))
     cut.edge_age = *before;
-  // A full slot, whose deflection can be corrected.
-  if (map.has("axial_depth_mm")) {
+  // A full slot, whose deflection can be corrected; all keys or none.
+  const auto isStated = [&map](const char* key) { return map.has(key); };
+  if (std::any_of(std::begin(SLOT_KEYS), std::end(SLOT_KEYS), isStated)) {
     c.tool.teeth = map.integer("teeth", 1, 20);
     c.tool.helix = units::radFromDeg(map.number("helix_deg", Range::openHigh(0.0, 80.0)));
     c.spindle_speed = units::radPerSecFromRpm(map.number("spindle_speed_rpm", Range::positive()));

@@ -269,11 +269,11 @@ TEST(LoadMeterNode, storesInspectedDimensions) {
   feature.direction = "y";
   feature.nominal = 12e-3;
   feature.measured = 11.984e-3;
-  feature.std_dev = 1.5e-6;
+  feature.std_dev = 2e-6;
   features.publish(feature);
   ASSERT_TRUE(waitFor("inspected dimensions stored", "1"));
   EXPECT_TRUE(waitFor("inspection",
-                      "worn endmill: effective radius: 5.9920 +- 0.0008 mm, -8.0 um from the stated one"));
+                      "worn endmill: effective radius: 5.9920 +- 0.0010 mm, -8.0 um from the stated one"));
   std::string file;
   ASSERT_TRUE(node.getParam("database", file));
   const auto kept = CoefficientDatabase(file).evidence().inspections("worn endmill");

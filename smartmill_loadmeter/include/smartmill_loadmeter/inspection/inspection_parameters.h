@@ -23,7 +23,7 @@ struct InspectionParameters {
                  "standard deviation of a temperature of the machine: 0.29 K by a resolution of 1 K");
     table.number("least_temperature_spread", least_temperature_spread, "K", Range::openLow(0.0, 100.0),
                  "between the lowest and the highest temperature, from which a thermal growth is estimated; "
-                 "the resolution of the temperature then biases it by less than 5 %");
+                 "the resolution of the temperature then biases it by a few percent");
   }
 };
 
