@@ -69,14 +69,62 @@ RadiusEvidence radiusOf(const Records& slots, const InspectionParameters& parame
   return found;
 }
 
+// Positions over temperature.
+struct Positions {
+  explicit Positions(const Records& steps)
+      : position(size(steps)), std_dev(size(steps)), temperature(size(steps)) {
+    for (Eigen::Index i = 0; i < position.size(); ++i) {
+      const InspectionRecord& step = steps[static_cast<std::size_t>(i)];
+      position[i] = step.deviation();
+      std_dev[i] = step.std_dev;
+      temperature[i] = step.machine_temperature;
+    }
+  }
+
+  // Offset at the mean temperature, and growth.
+  WeightedFit fit(const InspectionParameters& parameters) const {
+    Eigen::MatrixXd design = Eigen::MatrixXd::Ones(position.size(), 2);
+    design.col(1) = temperature.array() - temperature.mean();
+    WeightedFit found;
+    double growth = 0.0;
+    for (int pass = 0; pass < WEIGHT_PASSES; ++pass) {
+      const double by_temperature = growth * parameters.temperature_std;
+      const Eigen::VectorXd total = (std_dev.array().square() + by_temperature * by_temperature).sqrt();
+      found = fitWeighted(design, position, total, parameters.outlier, "positions");
+      if (!found.found()) break;
+      growth = found.value[1];
+    }
+    return found;
+  }
+
+  static Eigen::Index size(const Records& steps) { return static_cast<Eigen::Index>(steps.size()); }
+
+  Eigen::VectorXd position, std_dev, temperature;  // [m], [m], [K]
+};
+
+// Sets the range of the temperatures. @return whether a growth can be estimated; else the problem is set
+bool isSpread(const std::vector<double>& temperatures, double least, GrowthEvidence* found) {
+  const auto [lowest, highest] = std::minmax_element(temperatures.begin(), temperatures.end());
+  found->lowest = *lowest;
+  found->highest = *highest;
+  if (*highest - *lowest >= least) return true;
+  found->problem = formatted("temperatures from %.1f to %.1f K differ by %.1f K, expected %.1f K or more",
+                             *lowest, *highest, *highest - *lowest, least);
+  return false;
+}
+
 GrowthEvidence growthOf(const Records& all, const InspectionParameters& parameters) {
   GrowthEvidence found;
   found.machine = all.front().machine;
   found.tool = all.front().tool;
   found.axis = all.front().direction;
   Records steps;
-  std::copy_if(all.begin(), all.end(), std::back_inserter(steps),
-               [](const InspectionRecord& r) { return std::isfinite(r.machine_temperature); });
+  std::vector<double> temperatures;
+  for (const InspectionRecord& r : all) {
+    if (!std::isfinite(r.machine_temperature)) continue;
+    steps.push_back(r);
+    temperatures.push_back(r.machine_temperature);
+  }
   if (steps.size() < all.size())
     found.notes.push_back(plural(all.size() - steps.size(), "position") + " without temperature not used");
   if (steps.size() < FEWEST_POSITIONS) {
@@ -84,45 +132,16 @@ GrowthEvidence growthOf(const Records& all, const InspectionParameters& paramete
                     formatted(" with temperature, expected %zu or more", FEWEST_POSITIONS);
     return found;
   }
-  const auto count = static_cast<Eigen::Index>(steps.size());
-  Eigen::VectorXd value(count), temperature(count), std_dev(count);
-  for (Eigen::Index i = 0; i < count; ++i) {
-    const InspectionRecord& step = steps[static_cast<std::size_t>(i)];
-    value[i] = step.deviation();
-    temperature[i] = step.machine_temperature;
-    std_dev[i] = step.std_dev;
-  }
-  Eigen::MatrixXd design = Eigen::MatrixXd::Ones(count, 2);
-  design.col(1) = temperature.array() - temperature.mean();
-  const auto isSpread = [&](double lowest, double highest) {
-    found.lowest = lowest;
-    found.highest = highest;
-    if (highest - lowest >= parameters.least_temperature_spread) return true;
-    found.problem = formatted("temperatures from %.1f to %.1f K differ by %.1f K, expected %.1f K or more",
-                              lowest, highest, highest - lowest, parameters.least_temperature_spread);
-    return false;
-  };
-  if (!isSpread(temperature.minCoeff(), temperature.maxCoeff())) return found;
-  WeightedFit fit;
-  double growth = 0.0;
-  for (int pass = 0; pass < WEIGHT_PASSES; ++pass) {
-    const double by_temperature = growth * parameters.temperature_std;
-    const Eigen::VectorXd total = (std_dev.array().square() + by_temperature * by_temperature).sqrt();
-    fit = fitWeighted(design, value, total, parameters.outlier, "positions");
-    if (!fit.found()) break;
-    growth = fit.value[1];
-  }
+  if (!isSpread(temperatures, parameters.least_temperature_spread, &found)) return found;
+  const WeightedFit fit = Positions(steps).fit(parameters);
   for (std::string& note : notesOf(fit, steps)) found.notes.push_back(std::move(note));
   found.problem = fit.problem;
   if (!fit.found()) return found;
-  double lowest = temperature.maxCoeff(), highest = temperature.minCoeff();
-  for (Eigen::Index i = 0; i < count; ++i) {
-    if (fit.weight[static_cast<std::size_t>(i)] == 0.0) continue;
-    ++found.used;
-    lowest = std::min(lowest, temperature[i]);
-    highest = std::max(highest, temperature[i]);
-  }
-  if (!isSpread(lowest, highest)) return found;
+  temperatures.clear();
+  for (std::size_t i = 0; i < steps.size(); ++i)
+    if (fit.weight[i] != 0.0) temperatures.push_back(steps[i].machine_temperature);
+  found.used = temperatures.size();
+  if (!isSpread(temperatures, parameters.least_temperature_spread, &found)) return found;
   found.coefficient = {fit.value[1], std::sqrt(fit.covariance(1, 1))};
   return found;
 }
