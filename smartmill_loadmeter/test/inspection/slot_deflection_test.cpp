@@ -50,9 +50,11 @@ TEST(SlotDeflection, ofAStiffToolInClosedForm) {
               w.value * std::hypot(0.03, 0.05), 1e-12);
 }
 
-TEST(SlotDeflection, anEvenNumberOfStraightTeethShiftsBothWalls) {
-  for (const int teeth : {2, 4})
-    EXPECT_NEAR(slotWidening(slot(teeth, 0.0), K, 0.0, modeOf(1200.0, 10e6), EXACT).value, 0.0, 1e-12);
+TEST(SlotDeflection, anEvenNumberOfTeethShiftsBothWalls) {
+  for (const int teeth : {2, 4}) {
+    for (const double helix : {0.0, 0.6})
+      EXPECT_NEAR(slotWidening(slot(teeth, helix), K, 0.0, modeOf(1200.0, 10e6), EXACT).value, 0.0, 1e-12);
+  }
 }
 
 // y'' + 2 zeta w y' + w^2 y = w^2 F(t) / k by Runge-Kutta over 30 revolutions.

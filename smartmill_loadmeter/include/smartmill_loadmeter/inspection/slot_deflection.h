@@ -13,8 +13,8 @@ namespace smartmill::loadmeter {
 ///     widening = y(tooth at 0) - y(tooth at pi)
 ///
 /// (surface location error, Schmitz & Ziegert 1999). Teeth are evenly spaced, so that forced vibration does
-/// not change the chip; runout, chatter and feed marks are not included. With an even number of teeth and no
-/// helix both walls shift equally and the widening is zero.
+/// not change the chip; runout, chatter and feed marks are not included. With an even number of teeth both
+/// walls shift equally and the widening is zero.
 /// @param force_uncertainty [1] of the coefficients; the standard deviation contains those of the modes too.
 /// @throws Error on an invalid tool, engagement or coefficient.
 Estimate slotWidening(const CuttingCondition& cut, const CuttingCoefficients& coefficients,
