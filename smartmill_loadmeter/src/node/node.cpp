@@ -326,7 +326,10 @@ void LoadMeterNode::store(const smartmill_msgs::SpindleHealth& health) {
 
 void LoadMeterNode::store(InspectionResult inspected) {
   refused_inspection_ = inspected.refusal;
-  if (!refused_inspection_.empty()) return ROS_WARN("inspection refused: %s", refused_inspection_.c_str());
+  if (!refused_inspection_.empty()) {
+    ROS_WARN("inspection refused: %s", refused_inspection_.c_str());
+    return;
+  }
   InspectionRecord& record = inspected.record;
   record.machine = parameters_.machine;
   try {
