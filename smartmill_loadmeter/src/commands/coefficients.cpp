@@ -67,8 +67,12 @@ void fromBag(const CoefficientOptions& o) {
       std::printf("%s: %s\n", f.name.c_str(), f.text().c_str());
     };
   }
-  const auto results = identifyFromBag(o.source_path, readMachineModel(model_file), parameters, listeners);
+  std::vector<InspectionResult> inspected;
+  listeners.inspected = [&](const InspectionResult& one) { inspected.push_back(one); };
+  const MachineModel model = readMachineModel(model_file);
+  const auto results = identifyFromBag(o.source_path, model, parameters, listeners);
   storeCuts(o, std::move(cuts));
+  storeInspections(o, model, inspected);
   for (const IdentifyResult& result : results) {
     if (result.code != IdentifyResult::Code::ok) throw Error(o.source_path + ": " + result.message);
     std::printf("%s\n", result.message.c_str());

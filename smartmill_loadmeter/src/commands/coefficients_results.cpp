@@ -63,6 +63,26 @@ void printLoad(const CoefficientSet& found) {
   }
 }
 
+void storeInspections(const CoefficientOptions& o, const MachineModel& model,
+                      const std::vector<InspectionResult>& inspected) {
+  if (inspected.empty()) return;
+  const CoefficientDatabase database(o.database);
+  std::vector<InspectionRecord> records;
+  for (const InspectionResult& one : inspected) {
+    if (!one.refusal.empty()) {
+      std::fprintf(stderr, "%s: inspection refused: %s\n", o.program.c_str(), one.refusal.c_str());
+      continue;
+    }
+    InspectionRecord& record = records.emplace_back(one.record);
+    record.machine = o.parameters.machine;
+    record.bag = o.source_path;
+    setDeflection(one.condition, model, database, &record);
+  }
+  const std::size_t added = database.evidence().add(records);
+  if (!o.database.empty())
+    std::printf("  %s: %zu of %zu inspected dimensions new\n", o.database.c_str(), added, records.size());
+}
+
 void printTerms(const CoefficientOptions& o, const LoadRecordResult& found) {
   if (o.spindle_uncertainty) {
     std::printf("  with the stated uncertainty of the spindle; load-meter bandwidth %.4f Hz\n",

@@ -8,6 +8,7 @@
 #include "smartmill_core/campaign/campaign.h"
 #include "smartmill_loadmeter/database/database.h"
 #include "smartmill_loadmeter/identification/campaign_identification.h"
+#include "smartmill_loadmeter/inspection/inspection_record.h"
 
 namespace smartmill::loadmeter {
 
@@ -32,6 +33,10 @@ void writeSection(const std::string& file, const CuttingCoefficients& value,
 void storeRecord(const CoefficientOptions& options, CoefficientRecord record);
 /// Adds every cut of a bag.
 void storeCuts(const CoefficientOptions& options, std::vector<CoefficientRecord> cuts);
+
+/// Adds the accepted dimensions of parts in a bag; prints the reasons of the others.
+void storeInspections(const CoefficientOptions& options, const MachineModel& model,
+                      const std::vector<InspectionResult>& inspected);
 
 /// Record with the mean conditions of a campaign's cuts.
 CoefficientRecord recordOf(const Campaign& campaign, const MachineModel& model);

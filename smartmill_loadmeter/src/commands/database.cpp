@@ -171,6 +171,7 @@ std::function<int()> declare(CommandLine& line) {
       .option("FILE", o.other, "file to read")
       .required();
   addEvidenceCommands(commands);
+  addInspectionCommands(commands);
   addFleetCommands(commands);
   return commands.body();
 }
@@ -184,8 +185,11 @@ Command databaseCommand() {
   command.examples = {
       {"machine.sqlite list", "every identification, oldest first"},
       {"machine.sqlite find --tool endmill --material steel --feed-per-tooth 0.1", "coefficients for a cut"},
+      {"machine.sqlite inspect parts.yaml --model mill.yaml",
+       "measured dimensions of parts, as evidence of tool and machine"},
       {"machine.sqlite export records.csv --material steel", "records as a table"}};
-  command.files = {{"DATABASE", "SQLite file, or a fleet's server (postgresql://USER@HOST/DATABASE)"}};
+  command.files = {{"DATABASE", "SQLite file, or a fleet's server (postgresql://USER@HOST/DATABASE)"},
+                   {"FILE", "of `inspect`: smartmill-inspection/1, see docs/formats.md"}};
   command.declare = declare;
   return command;
 }

@@ -9,9 +9,10 @@ namespace smartmill::loadmeter {
 
 /// What the commands of the database are given; each uses some of them.
 struct DatabaseOptions {
-  std::string program, file, tool, material, other, shop, login, password_file, machine, campaign, prior;
+  std::string program, file, tool, material, other, shop, login, password_file, machine, campaign, prior,
+      model;
   bool all = false;
-  double cutting_speed = NAN, feed = NAN, diameter = NAN, helix = NAN, rake = NAN, age = NAN;
+  double cutting_speed = NAN, feed = NAN, diameter = NAN, helix = NAN, rake = NAN, age = NAN, since = NAN;
 };
 
 using DatabaseCommands = Subcommands<DatabaseOptions>;
@@ -21,6 +22,8 @@ void requireExists(const std::string& file);
 
 /// Health records and explanations, which the database holds in addition to coefficients.
 void addEvidenceCommands(DatabaseCommands& commands);
+/// Measured dimensions of parts.
+void addInspectionCommands(DatabaseCommands& commands);
 /// Exchange with a fleet's server.
 void addFleetCommands(DatabaseCommands& commands);
 

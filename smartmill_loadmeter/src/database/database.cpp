@@ -1,5 +1,6 @@
 #include "smartmill_loadmeter/database/database.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <utility>
 
@@ -138,12 +139,25 @@ std::size_t EvidenceRecords::add(const std::vector<HealthRecord>& health) const 
   return addRows(store_, file_, healthKind(), rowsOf(file_, health));
 }
 
+std::size_t EvidenceRecords::add(const std::vector<InspectionRecord>& inspections) const {
+  return addRows(store_, file_, inspectionKind(), rowsOf(file_, inspections));
+}
+
 std::vector<ModelImprovement> EvidenceRecords::improvements() const {
   return recordsOf<ModelImprovement>(allRows(store_, file_, improvementKind()));
 }
 
 std::vector<HealthRecord> EvidenceRecords::health() const {
   return recordsOf<HealthRecord>(allRows(store_, file_, healthKind()));
+}
+
+std::vector<InspectionRecord> EvidenceRecords::inspections(const std::string& tool) const {
+  std::vector<InspectionRecord> found = recordsOf<InspectionRecord>(allRows(store_, file_, inspectionKind()));
+  if (!tool.empty())
+    found.erase(
+        std::remove_if(found.begin(), found.end(), [&](const InspectionRecord& r) { return r.tool != tool; }),
+        found.end());
+  return found;
 }
 
 FleetSynchronisation CoefficientDatabase::synchronisation() const {

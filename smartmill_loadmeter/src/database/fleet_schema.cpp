@@ -123,6 +123,12 @@ std::string fourth() {
   return sql + "UPDATE fleet SET schema = 4;";
 }
 
+// Version 5: measured dimensions of parts.
+std::string fifth() {
+  return tableOf(inspectionKind()) +
+         "GRANT USAGE ON ALL SEQUENCES IN SCHEMA public TO fleet_machine;UPDATE fleet SET schema = 5;";
+}
+
 }  // namespace
 
 std::string checkFleet(FleetConnection& connection) {
@@ -146,7 +152,7 @@ int migrateFleet(const std::string& url, int schema) {
     found = versionOf(connection);
     if (found > schema)
       connection.fail("tables of version " + std::to_string(found) + " are newer than this program");
-    const std::string steps[] = {first(), second(), third(), fourth()};
+    const std::string steps[] = {first(), second(), third(), fourth(), fifth()};
     for (int version = found; version < schema; ++version) connection.execute(steps[version]);
   });
   return found;

@@ -164,7 +164,8 @@ const RecordKind& coefficientKind() {
 }
 
 const std::vector<RecordKind>& recordKinds() {
-  static const std::vector<RecordKind> kinds{coefficientKind(), improvementKind(), healthKind()};
+  static const std::vector<RecordKind> kinds{coefficientKind(), improvementKind(), healthKind(),
+                                             inspectionKind()};
   return kinds;
 }
 

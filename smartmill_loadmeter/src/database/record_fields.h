@@ -49,15 +49,18 @@ const std::vector<RecordKind>& recordKinds();
 const RecordKind& coefficientKind();
 const RecordKind& improvementKind();
 const RecordKind& healthKind();
+const RecordKind& inspectionKind();
 /// @}
 
 /// @{ Conversion between a record and its row. @throws Error when its stamp is not a number.
 Row rowOf(CoefficientRecord record);
 Row rowOf(const ModelImprovement& improvement);
 Row rowOf(const HealthRecord& health);
+Row rowOf(const InspectionRecord& inspection);
 void readRow(const Row& row, CoefficientRecord* record);
 void readRow(const Row& row, ModelImprovement* improvement);
 void readRow(const Row& row, HealthRecord* health);
+void readRow(const Row& row, InspectionRecord* inspection);
 /// @}
 
 /// 17 significant digits; empty for NaN.

@@ -56,6 +56,26 @@ const std::vector<NumberColumn<H>> HEALTH_NUMBERS{{"stamp", &H::stamp},         
                                                   {"first", &H::first},           {"now", &H::now},
                                                   {"deviations", &H::deviations}, {"drifted", &H::drifted}};
 
+using P = InspectionRecord;
+// What follows from other records or the machine's state is not part of the identity.
+const std::vector<TextColumn<P>> INSPECTION_WORDS{
+    {"machine", &P::machine},   {"tool", &P::tool},
+    {"material", &P::material}, {"condition", &P::condition},
+    {"kind", &P::kind},         {"direction", &P::direction},
+    {"bag", &P::bag, false},    {"version", &P::version, false}};
+const std::vector<NumberColumn<P>> INSPECTION_NUMBERS{{"stamp", &P::stamp, false},
+                                                      {"diameter", &P::diameter},
+                                                      {"nominal", &P::nominal},
+                                                      {"measured", &P::measured},
+                                                      {"std_dev", &P::std_dev},
+                                                      {"deflection", &P::deflection, false},
+                                                      {"deflection_std", &P::deflection_std, false},
+                                                      {"cut_time", &P::cut_time},
+                                                      {"machine_temperature", &P::machine_temperature, false},
+                                                      {"part_temperature", &P::part_temperature},
+                                                      {"part_expansion", &P::part_expansion},
+                                                      {"edge_age", &P::edge_age, false}};
+
 template <typename R>
 RecordKind kindOf(const char* table, const std::vector<TextColumn<R>>& words,
                   const std::vector<NumberColumn<R>>& numbers) {
@@ -152,17 +172,28 @@ const RecordKind& healthKind() {
   return kind;
 }
 
+const RecordKind& inspectionKind() {
+  static const RecordKind kind = kindOf("inspections", INSPECTION_WORDS, INSPECTION_NUMBERS);
+  return kind;
+}
+
 Row rowOf(const ModelImprovement& improvement) {
   return rowFrom(improvement, IMPROVEMENT_WORDS, IMPROVEMENT_NUMBERS);
 }
 Row rowOf(const HealthRecord& health) {
   return rowFrom(health, HEALTH_WORDS, HEALTH_NUMBERS);
 }
+Row rowOf(const InspectionRecord& inspection) {
+  return rowFrom(inspection, INSPECTION_WORDS, INSPECTION_NUMBERS);
+}
 void readRow(const Row& row, ModelImprovement* improvement) {
   readColumns(row, IMPROVEMENT_WORDS, IMPROVEMENT_NUMBERS, improvement);
 }
 void readRow(const Row& row, HealthRecord* health) {
   readColumns(row, HEALTH_WORDS, HEALTH_NUMBERS, health);
+}
+void readRow(const Row& row, InspectionRecord* inspection) {
+  readColumns(row, INSPECTION_WORDS, INSPECTION_NUMBERS, inspection);
 }
 
 namespace {
@@ -201,6 +232,13 @@ FoundCause causeOf(const Json& effect) {
 }
 
 }  // namespace
+
+double InspectionRecord::deviation() const {
+  constexpr double REFERENCE = 293.15;  // [K] of dimensions, ISO 1
+  const bool is_corrected = std::isfinite(part_temperature) && std::isfinite(part_expansion);
+  return (is_corrected ? measured / (1.0 + part_expansion * (part_temperature - REFERENCE)) : measured) -
+         nominal;
+}
 
 std::string FoundCause::text() const {
   return name + (parameters.empty() ? "" : ": " + textOf(parameters));

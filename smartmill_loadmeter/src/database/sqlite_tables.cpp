@@ -16,8 +16,8 @@ namespace smartmill::loadmeter {
 namespace {
 
 // 1: coefficients. 2: adds improvements and health, and the state of synchronisation of each kind. 3: adds
-// the time of the first test, wear and temperature to coefficients.
-constexpr int SCHEMA = 3;
+// the time of the first test, wear and temperature to coefficients. 4: adds inspections.
+constexpr int SCHEMA = 4;
 
 std::string createOf(const RecordKind& kind) {
   std::string sql = "CREATE TABLE " + kind.table + " (id INTEGER PRIMARY KEY, identity TEXT NOT NULL UNIQUE";
@@ -91,6 +91,11 @@ void makeThird(SQLite::Database& db) {
   db.exec("PRAGMA user_version=3");
 }
 
+void makeFourth(SQLite::Database& db) {
+  db.exec(createOf(inspectionKind()));
+  db.exec("PRAGMA user_version=4");
+}
+
 }  // namespace
 
 void prepareTables(SQLite::Database& db) {
@@ -103,6 +108,7 @@ void prepareTables(SQLite::Database& db) {
     if (version(db) == 0) makeFirst(db);
     if (version(db) == 1) makeSecond(db);
     if (version(db) == 2) makeThird(db);
+    if (version(db) == 3) makeFourth(db);
     transaction.commit();
   }
 }

@@ -19,6 +19,7 @@ void IdentificationParameters::validate() const {
   motor.validate();
   checkBounds(force);
   checkBounds(temperature);
+  checkBounds(inspection);
 }
 
 LoadMeterIdentification::LoadMeterIdentification(const MachineModel& model,
@@ -42,6 +43,7 @@ void LoadMeterIdentification::reset() {
   temperature_.clear();
   production_.clear();
   session_.clear();
+  made_.clear();
   next_window_ = 0.0;
 }
 
@@ -72,6 +74,11 @@ void LoadMeterIdentification::handle(const CuttingCondition& condition) {
   if (steady_.isPresent(condition)) return;
   closeTest();
   steady_.begin(condition);
+  made_.handle(condition, temperature_, production_);
+}
+
+void LoadMeterIdentification::handle(const InspectionFeature& feature) {
+  if (outputs_.inspected) outputs_.inspected(inspect(feature, made_, parameters_.inspection));
 }
 
 void LoadMeterIdentification::handle(const IdentifyGoal& goal) {

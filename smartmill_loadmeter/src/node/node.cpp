@@ -13,6 +13,7 @@
 #include "smartmill_core/names.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/database/recommend.h"
+#include "smartmill_loadmeter/inspection/inspection_evidence.h"
 #include "smartmill_ros/node_main.h"
 #include "smartmill_ros/parameter_server.h"
 #include "smartmill_ros/run_node.h"
@@ -66,7 +67,9 @@ LoadMeterNode::LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
     curves_.identification().onRejected(
         [](const std::string& why) { ROS_WARN("force curve: %s", why.c_str()); });
   }
+  outputs.inspected = [this](const InspectionResult& inspected) { store(inspected); };
   connect(shell_.inputs(), parameters_, streams_);
+  connectInspection(shell_.inputs(), identification_);
   connectCurves(shell_.inputs(), parameters_, streams_);
   find_service_ = nh.advertiseService(names::FIND_COEFFICIENTS, &LoadMeterNode::find, this);
   recommend_service_ = nh.advertiseService(names::RECOMMEND_CUT, &LoadMeterNode::recommend, this);
@@ -321,6 +324,35 @@ void LoadMeterNode::store(const smartmill_msgs::SpindleHealth& health) {
   }
 }
 
+void LoadMeterNode::store(InspectionResult inspected) {
+  refused_inspection_ = inspected.refusal;
+  if (!refused_inspection_.empty()) {
+    ROS_WARN("inspection refused: %s", refused_inspection_.c_str());
+    return;
+  }
+  InspectionRecord& record = inspected.record;
+  record.machine = parameters_.machine;
+  try {
+    const std::string why = setDeflection(inspected.condition, model_, database_, &record);
+    if (!why.empty())
+      ROS_INFO("inspection, '%s': not corrected for deflection: %s", record.condition.c_str(), why.c_str());
+    if (!inspected.note.empty())
+      ROS_WARN("inspection, '%s': %s", record.condition.c_str(), inspected.note.c_str());
+    const EvidenceRecords evidence = database_.evidence();
+    stored_inspections_ += evidence.add(std::vector<InspectionRecord>{record});
+    last_inspection_.clear();
+    for (const std::string& line :
+         inspectionEvidence(evidence.inspections(record.tool), parameters_.identification.inspection)
+             .lines()) {
+      ROS_INFO("inspection, %s", line.c_str());
+      last_inspection_ += (last_inspection_.empty() ? "" : "; ") + line;
+    }
+  } catch (const Error& error) {
+    refused_inspection_ = "'" + record.condition + "': not stored: " + error.what();
+    ROS_ERROR("inspection: %s", refused_inspection_.c_str());
+  }
+}
+
 // Publishes the state after every push.
 void LoadMeterNode::publishFleetState() {
   if (!pusher_) return;
@@ -379,6 +411,12 @@ void LoadMeterNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status
   status.add("cuts stored", stored_cuts_);
   status.add("explanations stored", stored_explanations_);
   status.add("spindle-health quantities stored", stored_health_);
+  status.add("inspected dimensions stored", stored_inspections_);
+  if (!last_inspection_.empty()) status.add("inspection", last_inspection_);
+  if (!refused_inspection_.empty()) {
+    status.add("inspection refused", refused_inspection_);
+    status.mergeSummary(Level::WARN, "inspection refused: " + refused_inspection_);
+  }
   if (pusher_) {
     const FleetPusher::State fleet = pusher_->state();
     status.add("not sent to the fleet [records]", fleet.behind);

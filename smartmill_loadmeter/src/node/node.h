@@ -44,6 +44,7 @@ class LoadMeterNode {
   void store(CoefficientRecord cut);
   void store(const smartmill_msgs::DiscoverActionResult& discovered);
   void store(const smartmill_msgs::SpindleHealth& health);
+  void store(InspectionResult inspected);
   void publish(const MotorForce& force);
   void publish(const ForceEstimate& force);
   void report(const ForceEstimate& force);
@@ -65,8 +66,8 @@ class LoadMeterNode {
   std::map<std::uint64_t, Server::GoalHandle> waiting_;
   std::uint64_t next_id_ = 1;
   PriorKnowledge prior_;  // of the next goals
-  std::string last_message_, last_force_, last_curve_;
-  std::size_t stored_cuts_ = 0, stored_explanations_ = 0, stored_health_ = 0;
+  std::string last_message_, last_force_, last_curve_, last_inspection_, refused_inspection_;
+  std::size_t stored_cuts_ = 0, stored_explanations_ = 0, stored_health_ = 0, stored_inspections_ = 0;
   std::uint64_t published_fleet_state_ = 0;
 
   ros::Publisher publisher_, force_publisher_, estimate_publisher_, curve_publisher_, fleet_publisher_;

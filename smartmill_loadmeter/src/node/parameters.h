@@ -52,6 +52,8 @@ struct NodeParameters {
     identification.declare(table);
     table.section("Temperature of the motors (machine/temperature).");
     table.part("temperature_", identification.temperature);
+    table.section("Measured dimensions of parts (inspection/feature).");
+    table.part("inspection_", identification.inspection);
     table.section("Motor currents.");
     table.text(
         "motor_calibration", motor_calibration,

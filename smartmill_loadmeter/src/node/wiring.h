@@ -54,6 +54,16 @@ void connect(Source& source, const NodeParameters& parameters, Pipeline& pipelin
   if (parameters.force_sensor) feed<ForceBlock>(source, names::FORCE_COMPENSATED, pipeline);
 }
 
+/// Connects the measured dimensions of parts. One without a stamp has the time of its reception.
+template <class Source, class Pipeline>
+void connectInspection(Source& source, Pipeline& pipeline) {
+  source.template on<InspectionFeature>(names::INSPECTION_FEATURE,
+                                        [&pipeline](InspectionFeature feature, double received) {
+                                          if (feature.stamp == 0.0) feature.stamp = received;
+                                          pipeline.push(feature);
+                                        });
+}
+
 /// Connects the additional streams of force curves.
 template <class Source>
 void connectCurves(Source& source, const NodeParameters& parameters, CutStreams& streams) {

@@ -19,12 +19,14 @@ std::vector<IdentifyResult> identifyFromBag(const std::string& path, const Machi
   if (parameters.usesMotors()) outputs.motor_force = listeners.motors;
   outputs.force = listeners.force;
   outputs.cut = listeners.cut;
+  outputs.inspected = listeners.inspected;
   outputs.result = [&](const IdentifyResult& result) {
     if (!result.reset) results.push_back(result);
   };
   RecordingReader bag(path);
   if (!bag.has(names::CNC_LOAD)) throw Error(path + ": expected topic " + names::CNC_LOAD);
   connect(bag, parameters, identification);
+  connectInspection(bag, identification);
   PriorKnowledge prior;
   bag.on<plain::CoefficientPrior>(names::COEFFICIENT_PRIOR, [&](const plain::CoefficientPrior& m, double) {
     prior.set(toSec(m.header.stamp), fromMsg(m.coefficients), m.ktc_kte_covariance);

@@ -13,10 +13,11 @@ namespace smartmill::loadmeter {
 
 /// Callbacks; may be empty.
 struct BagListeners {
-  std::function<void(double)> progress;               ///< share read, 0..1
-  std::function<void(const MotorForce&)> motors;      ///< force of each cut by calibrated motors
-  std::function<void(const ForceEstimate&)> force;    ///< force of each cut by all its measurements
-  std::function<void(const CoefficientRecord&)> cut;  ///< record of every cut for the database
+  std::function<void(double)> progress;                    ///< share read, 0..1
+  std::function<void(const MotorForce&)> motors;           ///< force of each cut by calibrated motors
+  std::function<void(const ForceEstimate&)> force;         ///< force of each cut by all its measurements
+  std::function<void(const CoefficientRecord&)> cut;       ///< record of every cut for the database
+  std::function<void(const InspectionResult&)> inspected;  ///< every measured dimension of a part
 };
 
 /// Processes a bag with the class of the node: cnc/state, cnc/load, daq/motor_current, cut/condition and the

@@ -16,6 +16,7 @@
 #include <gtest/gtest.h>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/signal/inspection_feature.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_loadmeter/database/find_coefficients.h"
 
@@ -264,14 +265,16 @@ TEST(Database, anOlderFileIsUpdatedWithoutLoss) {
   }
   sqlite3* db = nullptr;
   ASSERT_EQ(sqlite3_open(file.c_str(), &db), SQLITE_OK);
-  ASSERT_EQ(sqlite3_exec(db,
-                         "ALTER TABLE coefficients DROP COLUMN first_stamp; ALTER TABLE coefficients DROP "
-                         "COLUMN flank_wear; ALTER TABLE coefficients DROP COLUMN temperature;"
-                         "DROP TABLE improvements; DROP TABLE health; DROP TABLE handed; CREATE TABLE sent "
-                         "(fleet TEXT PRIMARY KEY, last INTEGER, at REAL); INSERT INTO sent VALUES ('f', 1, "
-                         "1); PRAGMA user_version=1",
-                         nullptr, nullptr, nullptr),
-            SQLITE_OK);
+  ASSERT_EQ(
+      sqlite3_exec(db,
+                   "ALTER TABLE coefficients DROP COLUMN first_stamp; ALTER TABLE coefficients DROP "
+                   "COLUMN flank_wear; ALTER TABLE coefficients DROP COLUMN temperature;"
+                   "DROP TABLE improvements; DROP TABLE health; DROP TABLE inspections; DROP TABLE handed; "
+                   "CREATE TABLE sent "
+                   "(fleet TEXT PRIMARY KEY, last INTEGER, at REAL); INSERT INTO sent VALUES ('f', 1, "
+                   "1); PRAGMA user_version=1",
+                   nullptr, nullptr, nullptr),
+      SQLITE_OK);
   sqlite3_close(db);
   CoefficientDatabase database(file);
   EXPECT_EQ(database.size(), 2u);
@@ -286,6 +289,80 @@ TEST(Database, anOlderFileIsUpdatedWithoutLoss) {
   health.stamp = NAN;
   EXPECT_THAT(errorOf([&] { database.evidence().add(std::vector<HealthRecord>{health}); }),
               HasSubstr("old.sqlite: stamp of a record: expected a finite number"));
+}
+
+// A file of version 3 has no inspections; its other records stay.
+TEST(Database, aFileOfVersionThreeTakesInspections) {
+  const TemporaryFolder folder;
+  const std::string file = folder.file("third.sqlite");
+  CoefficientDatabase(file).add(recordOf("t", 1, 1e9, 2.0));
+  sqlite3* db = nullptr;
+  ASSERT_EQ(sqlite3_open(file.c_str(), &db), SQLITE_OK);
+  ASSERT_EQ(sqlite3_exec(db, "DROP TABLE inspections; PRAGMA user_version=3", nullptr, nullptr, nullptr),
+            SQLITE_OK);
+  sqlite3_close(db);
+  CoefficientDatabase database(file);
+  EXPECT_EQ(database.size(), 1u);
+  EXPECT_TRUE(database.evidence().inspections().empty());
+  InspectionRecord slot;
+  slot.stamp = 5.0;
+  EXPECT_EQ(database.evidence().add(std::vector<InspectionRecord>{slot}), 1u);
+}
+
+// The same value of a cut is one record, whenever it was entered and whatever is known of the cut by then.
+TEST(Database, inspectionsAreStoredOnce) {
+  const TemporaryFolder folder;
+  InspectionRecord slot;
+  slot.machine = "mill 07";
+  slot.tool = "endmill 12";
+  slot.material = "6061";
+  slot.condition = "slot_1";
+  slot.kind = SLOT_WIDTH;
+  slot.direction = "y";
+  slot.stamp = 1700000100.5;
+  slot.cut_time = 1700000000.25;
+  slot.diameter = slot.nominal = 0.012;
+  slot.measured = 0.011984;
+  slot.std_dev = 1.5e-6;
+  slot.deflection = -2.5e-6;
+  slot.deflection_std = 3e-7;
+  slot.machine_temperature = 313.15;
+  slot.part_temperature = 295.15;
+  slot.part_expansion = 23.1e-6;
+  slot.edge_age = 240.0;
+  InspectionRecord again = slot, other = slot;
+  again.stamp += 60.0;
+  again.deflection = NAN;
+  other.measured = 0.011986;
+  other.tool = "endmill 10";
+  {
+    const CoefficientDatabase database(folder.file("m.sqlite"));
+    EXPECT_EQ(database.evidence().add(std::vector<InspectionRecord>{slot, again, other}), 2u);
+  }
+  const CoefficientDatabase database(folder.file("m.sqlite"));
+  EXPECT_EQ(database.evidence().inspections().size(), 2u);
+  const auto read = database.evidence().inspections("endmill 12");
+  ASSERT_EQ(read.size(), 1u);
+  EXPECT_EQ(read[0].machine, "mill 07");
+  EXPECT_EQ(read[0].material, "6061");
+  EXPECT_EQ(read[0].condition, "slot_1");
+  EXPECT_EQ(read[0].kind, SLOT_WIDTH);
+  EXPECT_EQ(read[0].direction, "y");
+  EXPECT_EQ(read[0].stamp, 1700000100.5);
+  EXPECT_EQ(read[0].cut_time, 1700000000.25);
+  EXPECT_EQ(read[0].diameter, 0.012);
+  EXPECT_EQ(read[0].measured, 0.011984);
+  EXPECT_EQ(read[0].std_dev, 1.5e-6);
+  EXPECT_EQ(read[0].deflection, -2.5e-6);
+  EXPECT_EQ(read[0].deflection_std, 3e-7);
+  EXPECT_EQ(read[0].machine_temperature, 313.15);
+  EXPECT_EQ(read[0].edge_age, 240.0);
+  EXPECT_FALSE(read[0].version.empty());
+  // At 22 deg C 12 mm of aluminium are 0.55 um longer than at 20 deg C.
+  EXPECT_NEAR(read[0].deviation(), -16e-6 - 0.55e-6, 5e-9);
+  CoefficientDatabase copy("");
+  copy.merge(folder.file("m.sqlite"));
+  EXPECT_EQ(copy.evidence().inspections().size(), 2u);
 }
 
 // Without a value the fields of schema 3 do not change a record; with one it is another record.

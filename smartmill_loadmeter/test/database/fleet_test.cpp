@@ -14,6 +14,7 @@
 
 #include "node/fleet_pusher.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/signal/inspection_feature.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_loadmeter_testing/private_server.h"
 
@@ -51,6 +52,20 @@ ModelImprovement improvementOf(const std::string& machine, int number) {
   i.fit_before = 10.0 + number / 3.0;
   i.fit_after = 1.0;
   return i;
+}
+
+InspectionRecord inspectionOf(const std::string& machine) {
+  InspectionRecord r;
+  r.machine = machine;
+  r.tool = "endmill";
+  r.condition = "slot_1";
+  r.kind = SLOT_WIDTH;
+  r.direction = "y";
+  r.stamp = 5.0;
+  r.diameter = r.nominal = 0.012;
+  r.measured = 0.011984;
+  r.std_dev = 1.5e-6;
+  return r;
 }
 
 HealthRecord healthOf(const std::string& machine, int number) {
@@ -217,7 +232,7 @@ TEST_F(FleetDatabase, olderTablesAreNamedAndMigratedWithoutLoss) {
   EXPECT_THAT(errorOf([&] { CoefficientDatabase database(old); }), HasSubstr("no tables"));
   EXPECT_EQ(migrateFleet(old, 1), 0);
   EXPECT_THAT(errorOf([&] { CoefficientDatabase database(old); }),
-              HasSubstr("tables of version 1, expected 4: update them with `coefficients_db URL migrate`"));
+              HasSubstr("tables of version 1, expected 5: update them with `coefficients_db URL migrate`"));
   ASSERT_TRUE(server_->run("owner", "old",
                            "INSERT INTO machine (name, login, shop) VALUES ('a', 'owner', 'milling')"));
   ASSERT_TRUE(server_->run("owner", "old",
@@ -225,10 +240,10 @@ TEST_F(FleetDatabase, olderTablesAreNamedAndMigratedWithoutLoss) {
                            "material, source, machine, bag, version, "
                            "stamp, ktc) VALUES ('1', 'milling', 1, 0, 't', 'm', '', '', '', '', 5, 7e8)"));
   EXPECT_EQ(migrateFleet(old), 1);
-  EXPECT_EQ(migrateFleet(old), 4) << "a repeated migration changes nothing";
+  EXPECT_EQ(migrateFleet(old), 5) << "a repeated migration changes nothing";
   EXPECT_EQ(CoefficientDatabase(old).find("t", "m")->value.ktc, 7e8);
-  ASSERT_TRUE(server_->run("owner", "old", "UPDATE fleet SET schema = 5"));
-  EXPECT_THAT(errorOf([&] { CoefficientDatabase database(old); }), HasSubstr("newer than this program's 4"));
+  ASSERT_TRUE(server_->run("owner", "old", "UPDATE fleet SET schema = 6"));
+  EXPECT_THAT(errorOf([&] { CoefficientDatabase database(old); }), HasSubstr("newer than this program's 5"));
 }
 
 // A server of version 2, without improvements and health: a machine that pushed then continues.
@@ -247,7 +262,7 @@ TEST_F(FleetDatabase, tablesOfVersionTwoTakeTheNewKindsAfterMigration) {
                            "1, 1, 1, 0)"));
   CoefficientDatabase a(file("a"));
   a.evidence().add(std::vector<HealthRecord>{healthOf("a", 1)});
-  EXPECT_THAT(errorOf([&] { push(a, there("a")); }), HasSubstr("tables of version 2, expected 4"));
+  EXPECT_THAT(errorOf([&] { push(a, there("a")); }), HasSubstr("tables of version 2, expected 5"));
   EXPECT_EQ(migrateFleet(there("owner")), 2);
   EXPECT_EQ(push(a, there("a")).fresh, 1u);
   EXPECT_EQ(CoefficientDatabase(there("a")).find("t", "m")->value.ktc, 7e8);
@@ -264,12 +279,14 @@ TEST_F(FleetDatabase, everyKindOfRecordIsTransferred) {
   a.evidence().add(std::vector<HealthRecord>{healthOf("a", 1), healthOf("a", 2), healthOf("a", 3)});
   EXPECT_EQ(a.evidence().add(std::vector<HealthRecord>{healthOf("a", 3)}), 0u)
       << "an existing record is not added";
-  EXPECT_EQ(push(a, url("a")).fresh, 6u);
+  a.evidence().add(std::vector<InspectionRecord>{inspectionOf("a")});
+  EXPECT_EQ(push(a, url("a")).fresh, 7u);
   EXPECT_EQ(push(a, url("a")).offered, 0u);
   EXPECT_EQ(push(a, url("a"), {}, true).fresh, 0u);
   b.evidence().add(std::vector<HealthRecord>{healthOf("b", 1)});
-  EXPECT_EQ(pull(b, url("b")).fresh, 6u);
+  EXPECT_EQ(pull(b, url("b")).fresh, 7u);
   EXPECT_EQ(pull(b, url("b")).offered, 0u);
+  EXPECT_EQ(b.evidence().inspections("endmill").at(0).measured, 0.011984);
   EXPECT_EQ(push(b, url("b")).fresh, 1u) << "its own record was not sent yet";
   EXPECT_EQ(b.synchronisation().behind(), 0u);
   EXPECT_EQ(b.records("", "").at(0).set.source, SOURCE_PRODUCTION);
@@ -290,10 +307,12 @@ TEST_F(FleetDatabase, recordsOfEveryKindAreBoundToTheirSender) {
   CoefficientDatabase a(file("a"));
   a.evidence().add(std::vector<ModelImprovement>{improvementOf("a", 1)});
   a.evidence().add(std::vector<HealthRecord>{healthOf("a", 1)});
+  a.evidence().add(std::vector<InspectionRecord>{inspectionOf("a")});
   push(a, url("a"));
   const std::pair<std::string, std::string> kinds[] = {
       {"improvements", "machine, verdict, effects, rivals, resembles, tests, asked, report, version"},
-      {"health", "machine, measured, quantity, bag, version"}};
+      {"health", "machine, measured, quantity, bag, version"},
+      {"inspections", "machine, tool, material, condition, kind, direction, bag, version"}};
   for (const auto& [table, words] : kinds) {
     const auto forge = [&](const std::string& machine, const std::string& shop) {
       std::string values = "'x" + machine + "', '" + shop + "', " + machine;

@@ -61,6 +61,8 @@ class Recorder {
     knowledge_.set(toSec(m.header.stamp), fromMsg(m.coefficients), covariance);
   }
 
+  void inspect(const InspectionFeature& feature) { write("/smartmill/inspection/feature", feature); }
+
   Session session{21, 2e-4};
   std::vector<IdentifyResult> results;
 
@@ -114,6 +116,50 @@ TEST(Bag, givesTheResultsOfTheLiveRunToTheLastDigit) {
   const std::string message = errorOf([&] { identifyFromBag(file, model(), {}); });
   EXPECT_THAT(message, HasSubstr("run.bag"));
   EXPECT_EQ(message.find('\n'), std::string::npos);
+}
+
+TEST(Bag, inspectedDimensionsAreThoseOfTheLiveRun) {
+  const TemporaryFolder folder;
+  std::vector<InspectionResult> live, found;
+  CuttingCondition cut;
+  {
+    Recorder recorder(folder.file("run.bag"));
+    recorder.direct.outputs().inspected = [&](const InspectionResult& one) { live.push_back(one); };
+    const auto write = recorder.session.condition;
+    recorder.session.condition = [&](const CuttingCondition& c) {
+      if (c.kind == CuttingCondition::Kind::cut) cut = c;
+      write(c);
+    };
+    recorder.goal(true);
+    runStandardTests(recorder.session);
+    InspectionFeature step;
+    step.stamp = recorder.session.now() + 600.0;
+    step.condition = cut.name;
+    step.kind = STEP_POSITION;
+    step.direction = "z";
+    step.nominal = 0.0;
+    step.measured = -12e-6;
+    step.std_dev = 2e-6;
+    recorder.inspect(step);
+    step.condition = "unheard of";
+    recorder.inspect(step);
+    recorder.goal(false);
+  }
+  BagListeners listeners;
+  listeners.inspected = [&](const InspectionResult& one) { found.push_back(one); };
+  identifyFromBag(folder.file("run.bag"), model(), {}, listeners);
+  ASSERT_EQ(live.size(), 2u);
+  ASSERT_EQ(found.size(), 2u);
+  EXPECT_EQ(found[0].refusal, "");
+  EXPECT_EQ(found[0].record.tool, cut.tool_name);
+  EXPECT_EQ(found[0].record.cut_time, live[0].record.cut_time);
+  EXPECT_NEAR(found[0].record.cut_time, cut.stamp, 1e-6);  // a stamp has nanoseconds
+  // The spindle motor warms up by 0.1 K/s from 300 K at 1000 s.
+  EXPECT_NEAR(found[0].record.machine_temperature, 300.0 + 0.1 * (cut.stamp - 1000.0), 1.0);
+  EXPECT_EQ(found[0].record.machine_temperature, live[0].record.machine_temperature);
+  EXPECT_EQ(found[0].record.measured, live[0].record.measured);
+  EXPECT_THAT(found[1].refusal, HasSubstr("'unheard of': no cut of this name"));
+  EXPECT_EQ(found[1].refusal, live[1].refusal);
 }
 
 TEST(Bag, containsTheKnowledgeThatTheLiveRunBeganWith) {

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <mutex>
 
 #include <gtest/gtest.h>
@@ -20,6 +21,7 @@
 #include "smartmill_msgs/FindCoefficients.h"
 #include "smartmill_msgs/ForceEstimate.h"
 #include "smartmill_msgs/IdentifyCoefficientsAction.h"
+#include "smartmill_msgs/InspectionFeature.h"
 #include "smartmill_msgs/LoadSample.h"
 #include "smartmill_msgs/MachineTemperature.h"
 #include "smartmill_msgs/SampleBlock.h"
@@ -210,6 +212,102 @@ TEST(LoadMeterNode, storesExplanations) {
   }
   const std::lock_guard<std::mutex> guard(lock);
   EXPECT_EQ(kept, "1");
+}
+
+// A measured dimension of a part is stored with the tool of its cut; what is refused is named in the
+// diagnostics.
+TEST(LoadMeterNode, storesInspectedDimensions) {
+  ros::NodeHandle nh, node("loadmeter");
+  ros::AsyncSpinner spinner(1);
+  spinner.start();
+  const auto conditions = nh.advertise<smartmill_msgs::CuttingCondition>(names::CUTTING_CONDITION, 0, true);
+  const auto features = nh.advertise<smartmill_msgs::InspectionFeature>(names::INSPECTION_FEATURE, 10);
+  std::mutex lock;
+  std::map<std::string, std::string> shown;
+  const boost::function<void(const diagnostic_msgs::DiagnosticArray&)> take = [&](const auto& m) {
+    const std::lock_guard<std::mutex> guard(lock);
+    for (const auto& status : m.status) {
+      if (status.name.find(": load meter") == std::string::npos) continue;
+      shown["summary"] = status.message;
+      for (const auto& value : status.values) shown[value.key] = value.value;
+    }
+  };
+  const auto diagnostics = nh.subscribe<diagnostic_msgs::DiagnosticArray>("/diagnostics", 10, take);
+  const auto waitFor = [&](const std::string& key, const std::string& part) {
+    for (int i = 0; i < 2400; ++i) {
+      ros::WallDuration(0.05).sleep();
+      const std::lock_guard<std::mutex> guard(lock);
+      if (shown[key].find(part) != std::string::npos) return true;
+    }
+    const std::lock_guard<std::mutex> guard(lock);
+    ADD_FAILURE() << key << ": '" << shown[key] << "', expected '" << part << "'";
+    return false;
+  };
+  Followers player({names::absolute("loadmeter")});
+  player.begin();
+  for (const ros::Publisher& publisher : {conditions, features}) player.expect(publisher);
+  CuttingCondition cut;
+  cut.stamp = 900000.0;  // after the other tests' cuts
+  cut.kind = CuttingCondition::Kind::cut;
+  cut.name = "inspected slot";
+  cut.material = "aluminium";
+  cut.tool_name = "worn endmill";
+  cut.tool = {3, 12e-3, 0.0, {}};
+  cut.engagement = {0.0, units::PI, 2e-3, 6e-5};
+  cut.spindle_speed = 600.0;
+  player.publish(conditions, toMsg(cut));
+  cut.kind = CuttingCondition::Kind::none;
+  cut.name = "";
+  cut.stamp += 10.0;
+  player.publish(conditions, toMsg(cut));
+  player.settle();
+  player.end();  // the conditions wait for no stream
+  smartmill_msgs::InspectionFeature feature;
+  feature.header.stamp = ros::Time(950000.0);
+  feature.condition = "inspected slot";
+  feature.kind = smartmill_msgs::InspectionFeature::SLOT_WIDTH;
+  feature.direction = "y";
+  feature.nominal = 12e-3;
+  feature.measured = 11.984e-3;
+  feature.std_dev = 2e-6;
+  features.publish(feature);
+  ASSERT_TRUE(waitFor("inspected dimensions stored", "1"));
+  EXPECT_TRUE(waitFor("inspection",
+                      "worn endmill: effective radius: 5.9920 +- 0.0010 mm, -8.0 um from the stated one"));
+  std::string file;
+  ASSERT_TRUE(node.getParam("database", file));
+  const auto kept = CoefficientDatabase(file).evidence().inspections("worn endmill");
+  ASSERT_EQ(kept.size(), 1u);
+  EXPECT_EQ(kept[0].machine, "mill 07");
+  EXPECT_EQ(kept[0].condition, "inspected slot");
+  EXPECT_EQ(kept[0].diameter, 12e-3);
+  EXPECT_EQ(kept[0].measured, 11.984e-3);
+  EXPECT_EQ(kept[0].cut_time, 900000.0);
+  EXPECT_EQ(kept[0].stamp, 950000.0);
+
+  const auto refuses = [&](smartmill_msgs::InspectionFeature bad, const std::string& reason) {
+    features.publish(bad);
+    EXPECT_TRUE(waitFor("inspection refused", reason));
+    EXPECT_TRUE(waitFor("summary", reason));
+  };
+  smartmill_msgs::InspectionFeature bad = feature;
+  bad.condition = "unheard of";
+  refuses(bad, "'unheard of': no cut of this name since the start");
+  bad = feature;
+  bad.measured = std::nan("");
+  refuses(bad, "'inspected slot': measured: nan is out of range");
+  bad = feature;
+  bad.measured = 11.984;  // in mm
+  refuses(bad, "'inspected slot': measured: 11972.0000 mm from nominal, expected at most 1.0000 mm");
+  bad = feature;
+  bad.measured = 0.0;  // not stated
+  refuses(bad, "'inspected slot': measured: 0 is out of range");
+  EXPECT_EQ(CoefficientDatabase(file).evidence().inspections().size(), 1u);
+  // A good one ends the warning.
+  feature.measured = 11.986e-3;
+  features.publish(feature);
+  ASSERT_TRUE(waitFor("inspected dimensions stored", "2"));
+  EXPECT_TRUE(waitFor("inspection", "from 2 slot widths"));
 }
 
 // Spindle health of the hammer's node is stored with the other records, each quantity once.

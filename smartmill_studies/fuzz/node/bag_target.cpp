@@ -27,6 +27,7 @@ void recordingOf(const std::uint8_t* data, std::size_t size) {
     hear<CncState>(reader, names::CNC_STATE);
     hear<LoadSample>(reader, names::CNC_LOAD);
     hear<MachineTemperature>(reader, names::MACHINE_TEMPERATURE);
+    hear<InspectionFeature>(reader, names::INSPECTION_FEATURE);
     hear<CuttingCondition>(reader, names::CUTTING_CONDITION);
     hear<ForceBlock>(reader, names::FORCE_COMPENSATED);
     hear<MeasuredFrf>(reader, names::TOOL_FRF);

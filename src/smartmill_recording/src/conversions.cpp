@@ -38,6 +38,12 @@ MachineTemperature fromMsg(const plain::MachineTemperature& message) {
 plain::MachineTemperature toPlain(const MachineTemperature& data) {
   return conversion::to<plain::MachineTemperature>(data);
 }
+InspectionFeature fromMsg(const plain::InspectionFeature& message) {
+  return conversion::from<InspectionFeature>(message);
+}
+plain::InspectionFeature toPlain(const InspectionFeature& data) {
+  return conversion::to<plain::InspectionFeature>(data);
+}
 CuttingCondition fromMsg(const plain::CuttingCondition& message) {
   return conversion::from<CuttingCondition>(message);
 }

@@ -93,6 +93,42 @@ TEST(Conversions, MachineTemperature) {
   EXPECT_THAT([&] { fromMsg(short_one); }, ThrowsMessage<Error>(HasSubstr("axis_motor")));
 }
 
+TEST(Conversions, InspectionFeature) {
+  InspectionFeature slot;
+  slot.stamp = STAMP;
+  slot.condition = "slot_1";
+  slot.kind = SLOT_WIDTH;
+  slot.direction = "y";
+  slot.nominal = 0.012;
+  slot.measured = 0.011984;
+  slot.std_dev = 1.5e-6;
+  const InspectionFeature bare = recorded(slot);
+  EXPECT_EQ(bare.stamp, STAMP);
+  EXPECT_EQ(bare.condition, "slot_1");
+  EXPECT_EQ(bare.kind, SLOT_WIDTH);
+  EXPECT_EQ(bare.direction, "y");
+  EXPECT_EQ(bare.nominal, 0.012);
+  EXPECT_EQ(bare.measured, 0.011984);
+  EXPECT_EQ(bare.std_dev, 1.5e-6);
+  EXPECT_TRUE(std::isnan(bare.cut_time));
+  EXPECT_TRUE(std::isnan(bare.part_temperature));
+  slot.cut_time = STAMP - 60.0;
+  slot.machine_temperature = 310.15;
+  slot.part_temperature = 295.15;
+  slot.part_expansion = 23.1e-6;
+  const InspectionFeature full = recorded(slot);
+  EXPECT_EQ(full.cut_time, STAMP - 60.0);
+  EXPECT_EQ(full.machine_temperature, 310.15);
+  EXPECT_EQ(full.part_temperature, 295.15);
+  EXPECT_EQ(full.part_expansion, 23.1e-6);
+  // rostopic pub leaves what is not stated at zero.
+  plain::InspectionFeature typed = toPlain(bare);
+  typed.machine_temperature = typed.part_temperature = typed.part_expansion = 0.0;
+  EXPECT_TRUE(std::isnan(fromMsg(typed).machine_temperature));
+  EXPECT_TRUE(std::isnan(fromMsg(typed).part_temperature));
+  EXPECT_TRUE(std::isnan(fromMsg(typed).part_expansion));
+}
+
 TEST(Conversions, CncState) {
   CncState state;
   state.stamp = STAMP;

@@ -42,6 +42,12 @@ MachineTemperature fromMsg(const smartmill_msgs::MachineTemperature& message) {
 smartmill_msgs::MachineTemperature toMsg(const MachineTemperature& data) {
   return conversion::to<smartmill_msgs::MachineTemperature>(data);
 }
+InspectionFeature fromMsg(const smartmill_msgs::InspectionFeature& message) {
+  return conversion::from<InspectionFeature>(message);
+}
+smartmill_msgs::InspectionFeature toMsg(const InspectionFeature& data) {
+  return conversion::to<smartmill_msgs::InspectionFeature>(data);
+}
 CuttingCondition fromMsg(const smartmill_msgs::CuttingCondition& message) {
   return conversion::from<CuttingCondition>(message);
 }

@@ -86,7 +86,8 @@ struct Row;
 class RecordStore;
 class SqliteStore;
 
-/// Model improvements and spindle health next to the coefficients. A view of the database.
+/// Model improvements, spindle health and measured dimensions of parts next to the coefficients. A view of
+/// the database.
 class EvidenceRecords {
  public:
   EvidenceRecords(RecordStore& store, const std::string& file) : store_(store), file_(file) {}
@@ -94,9 +95,12 @@ class EvidenceRecords {
   /// @{ One transaction. @return number of new records. @throws Error when they cannot be written.
   std::size_t add(const std::vector<ModelImprovement>& improvements) const;
   std::size_t add(const std::vector<HealthRecord>& health) const;
+  std::size_t add(const std::vector<InspectionRecord>& inspections) const;
   /// @}
   std::vector<ModelImprovement> improvements() const;  ///< oldest first
   std::vector<HealthRecord> health() const;            ///< oldest first
+  /// Oldest first. @param tool empty: any
+  std::vector<InspectionRecord> inspections(const std::string& tool = "") const;
 
  private:
   RecordStore& store_;
@@ -130,10 +134,11 @@ class FleetSynchronisation {
   const std::string& file_;  // for messages
 };
 
-/// Coefficients, model improvements and spindle health of a machine in one SQLite file or in memory. Each
-/// add() is one durable transaction (write-ahead log, synchronous): it survives a crash after it has
-/// returned, and several processes may write concurrently. A record with the content of an existing one is
-/// ignored. With the address of a fleet's server (fleet.h) instead of a file, the queries go to the server.
+/// Coefficients, model improvements, spindle health and measured dimensions of a machine's parts in one
+/// SQLite file or in memory. Each add() is one durable transaction (write-ahead log, synchronous): it
+/// survives a crash after it has returned, and several processes may write concurrently. A record with the
+/// content of an existing one is ignored. With the address of a fleet's server (fleet.h) instead of a file,
+/// the queries go to the server.
 class CoefficientDatabase {
  public:
   /// @param file empty: in memory; postgresql://..: a fleet's server. @throws Error when the file is not such

@@ -23,7 +23,7 @@ bool fleetSupported();
 std::string withoutPassword(const std::string& url);
 
 /// Version of the server's tables that this program reads and writes; migrateFleet() updates older ones.
-constexpr int FLEET_SCHEMA = 4;
+constexpr int FLEET_SCHEMA = 5;
 
 /// Result of a transfer.
 struct FleetTransfer {

@@ -45,6 +45,31 @@ struct HealthRecord {
   double drifted = 0.0;                   ///< 1: significant change
 };
 
+/// Measured dimension of a part with what is known of the cut that made it (topic inspection/feature,
+/// smartmill-inspection/1). The same value of a cut is one record, whenever it was entered.
+struct InspectionRecord {
+  static constexpr double UNKNOWN = std::numeric_limits<double>::quiet_NaN();
+
+  std::string machine;          ///< name of the machine
+  std::string tool, material;   ///< of the cut
+  std::string condition;        ///< name of the cut
+  std::string kind, direction;  ///< as InspectionFeature
+  std::string bag, version;
+  double stamp = UNKNOWN;                                           ///< [s] of the inspection
+  double diameter = UNKNOWN;                                        ///< [m] stated, of the tool
+  double nominal = UNKNOWN, measured = UNKNOWN, std_dev = UNKNOWN;  ///< [m]
+  /// @{ [m] by which forced vibration of the tool widens the slot, and its standard deviation.
+  double deflection = UNKNOWN, deflection_std = UNKNOWN;
+  /// @}
+  double cut_time = UNKNOWN;             ///< [s]
+  double machine_temperature = UNKNOWN;  ///< [K] of the motor during the cut
+  double part_temperature = UNKNOWN;     ///< [K] during the inspection; NaN: 20 deg C
+  double part_expansion = UNKNOWN;       ///< [1/K]
+  double edge_age = UNKNOWN;             ///< [s] cutting time of the edge
+
+  double deviation() const;  ///< [m] measured at 20 deg C, minus nominal
+};
+
 /// Cause named by an explanation.
 struct FoundCause {
   std::string name;  ///< as in the catalogue of effects

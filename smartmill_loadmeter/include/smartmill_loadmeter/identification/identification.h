@@ -12,6 +12,8 @@
 #include "smartmill_loadmeter/identification/production_run.h"
 #include "smartmill_loadmeter/identification/session_identification.h"
 #include "smartmill_loadmeter/identification/steady_record.h"
+#include "smartmill_loadmeter/inspection/cut_history.h"
+#include "smartmill_loadmeter/inspection/inspection_record.h"
 
 namespace smartmill::loadmeter {
 
@@ -24,6 +26,7 @@ struct IdentificationOutputs {
   std::function<void(const ForceEstimate&)> force;     ///< of each cut by all its measurements
   /// The same each period of a steady cut, for its last ForceEstimateParameters::window.
   std::function<void(const ForceEstimate&)> force_window;
+  std::function<void(const InspectionResult&)> inspected;  ///< of each measured dimension of a part
 };
 
 /// Identifies cutting coefficients from controller state and load (Dunwoody, chapter 3). Inputs are in stamp
@@ -52,6 +55,8 @@ class LoadMeterIdentification {
   void handle(const ForceBlock& block) { steady_.handle(block); }
   void handle(const CuttingCondition& condition);
   void handle(const IdentifyGoal& goal);
+  /// Topic inspection/feature, of a cut of this run.
+  void handle(const InspectionFeature& feature);
 
   /// Returns to the initial state (a bag was restarted).
   void reset();
@@ -78,6 +83,7 @@ class LoadMeterIdentification {
   TemperatureWatch temperature_;
   ProductionRun production_;
   SessionTests session_;
+  CutHistory made_;
   double next_window_ = 0.0;  // [s]
 };
 

@@ -2,6 +2,7 @@
 
 #include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_loadmeter/identification/temperature_watch.h"
+#include "smartmill_loadmeter/inspection/inspection_parameters.h"
 #include "smartmill_loadmeter/motor/force_estimate.h"
 #include "smartmill_loadmeter/motor/motor_chain.h"
 
@@ -19,8 +20,9 @@ struct IdentificationParameters {
   MotorParameters motor;          ///< for daq/motor_current
   ForceEstimateParameters force;  ///< for the force of each cut
   TemperatureParameters temperature;
+  InspectionParameters inspection;  ///< for measured dimensions of parts
 
-  /// Without those of `motor`, `force` and `temperature`, whose keys have a prefix.
+  /// Without those of `motor`, `force`, `temperature` and `inspection`, whose keys have a prefix.
   void declare(ParameterTable& table) {
     table.number("speed_tolerance", speed_tolerance, "1", Range::open(0.0, 0.5),
                  "share of the commanded spindle speed within which the speed is reached");

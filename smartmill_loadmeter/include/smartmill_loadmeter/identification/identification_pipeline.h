@@ -31,6 +31,8 @@ class IdentificationPipeline {
   void push(const ForceBlock& block) { sort(forces_, block); }
   void push(const CuttingCondition& condition) { sort(conditions_, condition); }
   void push(const IdentifyGoal& goal) { sort(goals_, goal); }
+  /// inspection/feature: of a cut long past, with the time of its inspection: not ordered with the streams.
+  void push(const InspectionFeature& feature) { identification_.handle(feature); }
 
   /// End of data: passes on everything that waits.
   void flush() { sorter_.flush(); }

@@ -17,6 +17,7 @@ constexpr const char* SPINDLE_ANGLE = "spindle/angle";
 constexpr const char* CNC_STATE = "cnc/state";
 constexpr const char* CNC_LOAD = "cnc/load";
 constexpr const char* MACHINE_TEMPERATURE = "machine/temperature";
+constexpr const char* INSPECTION_FEATURE = "inspection/feature";
 constexpr const char* CUTTING_CONDITION = "cut/condition";
 constexpr const char* TOOL_FRF = "tool/frf";
 constexpr const char* TOOL_MODES = "tool/modes";

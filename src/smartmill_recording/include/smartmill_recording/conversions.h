@@ -7,6 +7,7 @@
 #include "smartmill_core/cutting/stability_chart.h"
 #include "smartmill_core/frames.h"
 #include "smartmill_core/modal/results.h"
+#include "smartmill_core/signal/inspection_feature.h"
 #include "smartmill_core/signal/machine_temperature.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_recording/messages.h"
@@ -30,6 +31,8 @@ LoadSample fromMsg(const plain::LoadSample& message);
 plain::LoadSample toPlain(const LoadSample& load);
 MachineTemperature fromMsg(const plain::MachineTemperature& message);
 plain::MachineTemperature toPlain(const MachineTemperature& temperature);
+InspectionFeature fromMsg(const plain::InspectionFeature& message);
+plain::InspectionFeature toPlain(const InspectionFeature& feature);
 CuttingCondition fromMsg(const plain::CuttingCondition& message);
 plain::CuttingCondition toPlain(const CuttingCondition& condition);
 ForceBlock fromMsg(const plain::ForceBlock& message);
@@ -71,6 +74,10 @@ struct PlainOf<LoadSample> {
 template <>
 struct PlainOf<MachineTemperature> {
   using Type = plain::MachineTemperature;
+};
+template <>
+struct PlainOf<InspectionFeature> {
+  using Type = plain::InspectionFeature;
 };
 template <>
 struct PlainOf<CuttingCondition> {

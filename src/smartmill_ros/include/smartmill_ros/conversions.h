@@ -11,6 +11,7 @@
 #include <smartmill_msgs/ForceBlock.h>
 #include <smartmill_msgs/ForceCurve.h>
 #include <smartmill_msgs/Frf.h>
+#include <smartmill_msgs/InspectionFeature.h>
 #include <smartmill_msgs/LoadSample.h>
 #include <smartmill_msgs/MachineTemperature.h>
 #include <smartmill_msgs/ModalModel.h>
@@ -22,6 +23,7 @@
 #include "smartmill_core/cutting/force_curve.h"
 #include "smartmill_core/cutting/stability_chart.h"
 #include "smartmill_core/modal/results.h"
+#include "smartmill_core/signal/inspection_feature.h"
 #include "smartmill_core/signal/machine_temperature.h"
 #include "smartmill_core/signal/streams.h"
 
@@ -45,6 +47,8 @@ LoadSample fromMsg(const smartmill_msgs::LoadSample& message);
 smartmill_msgs::LoadSample toMsg(const LoadSample& load);
 MachineTemperature fromMsg(const smartmill_msgs::MachineTemperature& message);
 smartmill_msgs::MachineTemperature toMsg(const MachineTemperature& temperature);
+InspectionFeature fromMsg(const smartmill_msgs::InspectionFeature& message);
+smartmill_msgs::InspectionFeature toMsg(const InspectionFeature& feature);
 CuttingCondition fromMsg(const smartmill_msgs::CuttingCondition& message);
 smartmill_msgs::CuttingCondition toMsg(const CuttingCondition& condition);
 ForceBlock fromMsg(const smartmill_msgs::ForceBlock& message);

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/signal/inspection_feature.h"
 #include "smartmill_core/signal/machine_temperature.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_recording/conversion/fields.h"
@@ -126,6 +127,38 @@ void write(const MachineTemperature& temperature, M& m) {
   m.axis_motor = temperature.axis_motor;
   m.axis_encoder = temperature.axis_encoder;
   m.spindle_motor = temperature.spindle_motor;
+}
+
+// A message that is entered by hand leaves what is not stated at zero.
+template <class M>
+void read(const M& m, InspectionFeature& f) {
+  const auto stated = [](double value) { return value == 0.0 ? NOT_A_NUMBER : value; };
+  f.stamp = secondsOf(m.header.stamp);
+  f.condition = m.condition;
+  f.kind = m.kind;
+  f.direction = m.direction;
+  f.nominal = m.nominal;
+  f.measured = m.measured;
+  f.std_dev = m.std_dev;
+  f.cut_time = stated(secondsOf(m.cut_stamp));
+  f.machine_temperature = stated(m.machine_temperature);
+  f.part_temperature = stated(m.part_temperature);
+  f.part_expansion = stated(m.part_expansion);
+}
+
+template <class M>
+void write(const InspectionFeature& f, M& m) {
+  setStamp(f.stamp, m);
+  m.condition = f.condition;
+  m.kind = f.kind;
+  m.direction = f.direction;
+  m.nominal = f.nominal;
+  m.measured = f.measured;
+  m.std_dev = f.std_dev;
+  if (std::isfinite(f.cut_time)) m.cut_stamp = timeOf<decltype(m.cut_stamp)>(f.cut_time);
+  m.machine_temperature = f.machine_temperature;
+  m.part_temperature = f.part_temperature;
+  m.part_expansion = f.part_expansion;
 }
 
 template <class M>
