@@ -107,14 +107,17 @@ TEST(TurningForces, motorCurrentsGiveTheForcesOfTheCut) {
     std::array<double, 3> truth{};
     ASSERT_TRUE(cuts.meanForce(toSec(e.header.stamp) - e.duration, toSec(e.header.stamp), &truth)) << e.cut;
     const std::array<double, 3> mean{e.mean.x, e.mean.y, e.mean.z},
-        std_dev{e.mean_std.x, e.mean_std.y, e.mean_std.z}, motor{w.wrench.force.x, w.wrench.force.y, w.wrench.force.z};
+        std_dev{e.mean_std.x, e.mean_std.y, e.mean_std.z},
+        motor{w.wrench.force.x, w.wrench.force.y, w.wrench.force.z};
     for (std::size_t a = 0; a < 3; ++a) {
-      std::printf("%s F%c: estimate %.1f +- %.1f N, by its motor %.1f N, true %.1f N\n", e.cut.c_str(), "xyz"[a],
-                  mean[a], std_dev[a], motor[a], truth[a]);
+      std::printf("%s F%c: estimate %.1f +- %.1f N, by its motor %.1f N, true %.1f N\n", e.cut.c_str(),
+                  "xyz"[a], mean[a], std_dev[a], motor[a], truth[a]);
       EXPECT_GT(std_dev[a], 0.0) << e.cut;
-      EXPECT_NEAR(mean[a], truth[a], 3.0 * std_dev[a]) << e.cut << " F" << "xyz"[a];
+      EXPECT_NEAR(mean[a], truth[a], 3.0 * std_dev[a]) << e.cut << " F"
+                                                       << "xyz"[a];
       const bool moves = std::abs(condition.steady_to[a] - condition.steady_from[a]) > 1e-6;
-      EXPECT_EQ(std::isfinite(motor[a]), moves) << e.cut << " F" << "xyz"[a];
+      EXPECT_EQ(std::isfinite(motor[a]), moves) << e.cut << " F"
+                                                << "xyz"[a];
       const std::string source = std::string("motor_") + "xyz"[a];
       EXPECT_EQ(std::count(e.sources.begin(), e.sources.end(), source), moves ? 1 : 0) << e.cut;
     }

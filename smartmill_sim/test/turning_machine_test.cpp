@@ -115,9 +115,9 @@ TEST(TurningForces, pointAgainstFeedAndAwayFromTheWorkpiece) {
   EXPECT_NEAR(taper[2], 60.0 / std::sqrt(2.0), 1e-9);
 }
 
-// A screw of lead l turns a force F into a torque F l / (2 pi), a motor with K N m/A into a current F l / (2 pi K):
-// the Z drive with a lead of 5 mm and 0.1718 N m/A. X at rest carries the passive force by its dry friction and the
-// motor the excess of the weight over it.
+// A screw of lead l turns a force F into a torque F l / (2 pi), a motor with K N m/A into a current F l / (2
+// pi K): the Z drive with a lead of 5 mm and 0.1718 N m/A. X at rest carries the passive force by its dry
+// friction and the motor the excess of the weight over it.
 TEST(TurningMachine, feedForceLoadsTheMotorOfZ) {
   const double feed = 2e-4, width = 0.8, v = feed * SPEED / units::TWO_PI, force = feedForce(feed, width);
   const auto [air, cut] = run(quietPass(0.0, feed, width * 1e-3));
@@ -126,7 +126,7 @@ TEST(TurningMachine, feedForceLoadsTheMotorOfZ) {
   EXPECT_NEAR(cut.force[0], 0.5 * force, 0.005 * 0.5 * force);
   EXPECT_EQ(air.force[2], 0.0);
   const double friction = 150.0 + 60.0 * std::exp(-std::pow(v / 2e-3, 2)) + 600.0 * v;
-  constexpr double LEAD = 0.005, TORQUE_PER_AMPERE = 0.17181;  // [m], [N m/A]
+  constexpr double LEAD = 0.005, TORQUE_PER_AMPERE = 0.17181;         // [m], [N m/A]
   const double amperes = LEAD / (units::TWO_PI * TORQUE_PER_AMPERE);  // per newton
   // Towards -Z the motor pushes in the negative direction.
   EXPECT_NEAR(air.range[2].value(), -friction * amperes, 0.01);
@@ -143,9 +143,11 @@ TEST(TurningMachine, infeedForceUnloadsTheMotorOfX) {
   EXPECT_NEAR(cut.range[0].value(), (without - force) / 198.45, 0.01);
 }
 
-// Torque T = Ft (r + ap / 2), friction viscous and dry; magnetising current in quadrature; power on the load meter.
+// Torque T = Ft (r + ap / 2), friction viscous and dry; magnetising current in quadrature; power on the load
+// meter.
 TEST(TurningMachine, tangentialForceLoadsTheSpindle) {
-  const double feed = 2e-4, width = 0.8, torque = 1.491 * feedForce(feed, width) * (0.03 - 0.5 * width * 1e-3);
+  const double feed = 2e-4, width = 0.8,
+               torque = 1.491 * feedForce(feed, width) * (0.03 - 0.5 * width * 1e-3);
   const double friction = COULOMB + VISCOUS * SPEED;
   const auto [air, cut] = run(quietPass(0.0, feed, width * 1e-3));
   EXPECT_NEAR(cut.radius, 0.03 - 0.5 * width * 1e-3, 1e-9);
@@ -195,8 +197,9 @@ TEST(TurningPasses, eachPassIsDoneInAirAndInTheCut) {
   }
   EXPECT_NEAR(cutting, 4 * 2.0, 0.1);
   for (std::size_t i = 0; i + 1 < 16; ++i) {
-    const std::array<CuttingCondition::Kind, 4> order{CuttingCondition::Kind::none, CuttingCondition::Kind::air,
-                                                      CuttingCondition::Kind::none, CuttingCondition::Kind::cut};
+    const std::array<CuttingCondition::Kind, 4> order{
+        CuttingCondition::Kind::none, CuttingCondition::Kind::air, CuttingCondition::Kind::none,
+        CuttingCondition::Kind::cut};
     EXPECT_EQ(conditions[i].kind, order[i % 4]) << i;
   }
   // Air pass and cut have the same way; the cut is 2 mm nearer to the axis or to the face.
@@ -204,7 +207,8 @@ TEST(TurningPasses, eachPassIsDoneInAirAndInTheCut) {
     const CuttingCondition &air = conditions[4 * pass + 1], &cut = conditions[4 * pass + 3];
     for (std::size_t a = 0; a < 3; ++a) {
       EXPECT_NEAR(air.steady_to[a] - air.steady_from[a], cut.steady_to[a] - cut.steady_from[a], 1e-9);
-      EXPECT_NEAR(air.steady_from[a] - cut.steady_from[a], 2e-3 * clearDirection(traits.angle[pass])[a], 1e-9);
+      EXPECT_NEAR(air.steady_from[a] - cut.steady_from[a], 2e-3 * clearDirection(traits.angle[pass])[a],
+                  1e-9);
     }
     EXPECT_EQ(cut.tool.teeth, 0);
     EXPECT_EQ(cut.engagement.feed_per_tooth, traits.feed[pass]);

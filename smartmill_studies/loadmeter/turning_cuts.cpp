@@ -132,7 +132,8 @@ std::vector<LatheCut> runLathe(const sim::LatheTraits& lathe_traits, const sim::
   return cuts;
 }
 
-void writeTables(const std::vector<LatheCut>& cuts, const std::string& cuts_file, const std::string& currents_file) {
+void writeTables(const std::vector<LatheCut>& cuts, const std::string& cuts_file,
+                 const std::string& currents_file) {
   std::ofstream forces(cuts_file), currents(currents_file);
   forces << "cut,force_x[N],force_y[N],force_z[N],torque[N m]\n";
   currents << "cut,spindle_speed[rpm]";

@@ -18,11 +18,11 @@ namespace smartmill::loadmeter {
 /// Cut of the simulated lathe (smartmill_sim/turning/turning_machine.h): truth, measurement and estimates.
 struct LatheCut {
   std::string name;
-  double radius = 0.0;                ///< [m] at half depth and half way
-  std::array<double, 3> force{};      ///< [N] true mean on the tool, of the steady part
-  double torque = 0.0;                ///< [N m] true mean
-  MotorMeasurement cut, air;          ///< out of the signal chain
-  std::optional<MotorForce> motors;   ///< if a calibration is given
+  double radius = 0.0;               ///< [m] at half depth and half way
+  std::array<double, 3> force{};     ///< [N] true mean on the tool, of the steady part
+  double torque = 0.0;               ///< [N m] true mean
+  MotorMeasurement cut, air;         ///< out of the signal chain
+  std::optional<MotorForce> motors;  ///< if a calibration is given
   std::optional<ForceEstimate> estimate;
 };
 
@@ -40,6 +40,7 @@ std::vector<LatheCut> runLathe(const sim::LatheTraits& lathe, const sim::Turning
                                const std::optional<MotorCalibration>& calibration);
 
 /// Tables for `calibrate --standard-cuts CUTS --currents CURRENTS`. @throws Error.
-void writeTables(const std::vector<LatheCut>& cuts, const std::string& cuts_file, const std::string& currents_file);
+void writeTables(const std::vector<LatheCut>& cuts, const std::string& cuts_file,
+                 const std::string& currents_file);
 
 }  // namespace smartmill::loadmeter

@@ -12,7 +12,7 @@ namespace smartmill::loadmeter {
 namespace {
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
-constexpr int ANGLES = 64;  // per tooth period
+constexpr int ANGLES = 64;            // per tooth period
 constexpr double FACING_SINE = 1e-3;  // of a feed along X, up to the noise of positions
 
 }  // namespace
@@ -27,7 +27,8 @@ Eigen::Matrix3d feedFrame(const ToolGeometry& tool, double heading) {
   // Turning: the edge points away from the workpiece, to +X, in facing to +Z.
   const bool facing = std::abs(s) < FACING_SINE;
   turn.col(0) = Eigen::Vector3d(c, 0.0, s);
-  turn.col(2) = facing ? Eigen::Vector3d(0.0, 0.0, 1.0) : Eigen::Vector3d(std::abs(s), 0.0, -c * std::copysign(1.0, s));
+  turn.col(2) =
+      facing ? Eigen::Vector3d(0.0, 0.0, 1.0) : Eigen::Vector3d(std::abs(s), 0.0, -c * std::copysign(1.0, s));
   return turn;
 }
 

@@ -93,7 +93,8 @@ std::string ForceEstimate::text() const {
   std::string all;
   for (std::size_t a = 0; a < 3; ++a) {
     all += formatted("F%c %.1f +- %.1f N", "xyz"[a], mean[a].value, mean[a].std_dev);
-    if (std::isfinite(rms[a].value)) all += formatted(" (varies by %.1f +- %.1f)", rms[a].value, rms[a].std_dev);
+    if (std::isfinite(rms[a].value))
+      all += formatted(" (varies by %.1f +- %.1f)", rms[a].value, rms[a].std_dev);
     all += ", ";
   }
   all += formatted("torque %.3f +- %.3f N m, by", torque.value, torque.std_dev);

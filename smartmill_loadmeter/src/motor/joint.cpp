@@ -44,7 +44,8 @@ struct Observations {
     if (r.torque) add(row[3], *r.torque);
     for (std::size_t a = 0; a < 3; ++a) {
       const auto i = static_cast<Eigen::Index>(a);
-      if (r.axis_force[a]) add(turn(i, 0) * row[0] + turn(i, 1) * row[1] + turn(i, 2) * row[2], *r.axis_force[a]);
+      if (r.axis_force[a])
+        add(turn(i, 0) * row[0] + turn(i, 1) * row[1] + turn(i, 2) * row[2], *r.axis_force[a]);
     }
   }
 };

@@ -30,16 +30,18 @@
 namespace smartmill::sim {
 
 /// The simulated lathe on ROS: probes on daq/displacement, an accelerometer on daq/vibration, the spindle on
-/// spindle/angle; the fast tool servo follows control/command. With motor_currents it is a turning centre that does
-/// passes: motor currents on daq/motor_current, the controller on cnc/state, cnc/load and cut/condition, the true force
-/// on sim/truth/force. Runs in wall-clock time, or as the clock of the graph with /use_sim_time.
+/// spindle/angle; the fast tool servo follows control/command. With motor_currents it is a turning centre
+/// that does passes: motor currents on daq/motor_current, the controller on cnc/state, cnc/load and
+/// cut/condition, the true force on sim/truth/force. Runs in wall-clock time, or as the clock of the graph
+/// with /use_sim_time.
 class LatheNode {
  public:
   using Parameters = LatheParameters;
   /// @throws Error on bad parameters or a bad model file.
   LatheNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
       : parameters_(parametersFromServer(private_nh).readAll<LatheParameters>()),
-        size_(static_cast<std::size_t>(std::max(1.0, std::round(parameters_.block * parameters_.lathe.rate)))),
+        size_(
+            static_cast<std::size_t>(std::max(1.0, std::round(parameters_.block * parameters_.lathe.rate)))),
         lathe_(parameters_.lathe),
         displacement_(nh.advertise<smartmill_msgs::SampleBlock>(names::DISPLACEMENT, STREAM_QUEUE)),
         vibration_(nh.advertise<smartmill_msgs::SampleBlock>(names::daq("vibration"), STREAM_QUEUE)),

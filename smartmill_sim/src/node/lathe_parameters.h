@@ -19,14 +19,15 @@ struct LatheParameters {
   double pace = 1.0;
 
   // Set by programs only.
-  double poll_period = 1e-3;  ///< [s] of waiting for commands: a fifth of a block
+  double poll_period = 1e-3;   ///< [s] of waiting for commands: a fifth of a block
   double state_period = 2e-2;  ///< [s] of cnc/state and cnc/load: the rate of the bridge to a controller
 
   void declare(ParameterTable& table) {
     table.title(
         "Parameters of lathe_node (package smartmill_sim): the simulated lathe with a fast tool servo. SI "
         "units throughout.");
-    table.atLaunch("model", model, "path of a smartmill-model/1 file with a spindle; required with motor_currents");
+    table.atLaunch("model", model,
+                   "path of a smartmill-model/1 file with a spindle; required with motor_currents");
     table.section();
     lathe.declare(table);
     turning.declare(table);

@@ -15,9 +15,9 @@ class Pacer {
   Pacer(double wall, double block, bool own_clock, double pace = 1.0)
       : start_(wall), block_(block), own_clock_(own_clock), pace_(own_clock ? pace : 1.0) {}
 
-  double start() const { return start_; }        ///< [s] stamp of sample 0
-  double done() const { return done_; }          ///< [s] simulated since the start
-  double now() const { return start_ + done_; }  ///< [s] stamp of the end of the simulated samples
+  double start() const { return start_; }         ///< [s] stamp of sample 0
+  double done() const { return done_; }           ///< [s] simulated since the start
+  double now() const { return start_ + done_; }   ///< [s] stamp of the end of the simulated samples
   double heldBack() const { return held_back_; }  ///< [s] by which the clock is behind the wall clock
 
   /// [s] by which the simulation is behind the clock at a wall time; holds its own clock back to one block.

@@ -16,8 +16,9 @@ double fullScaleOf(const Spindle& spindle) {
 }  // namespace
 
 void TurningForces::declare(ParameterTable& table) {
-  table.number("tangential_ratio", tangential_ratio, "1", Range::closed(0.0, 10.0),
-               "tangential force over the force along the feed (Cheng & Venuvinod, table 2: 485.8 N / 325.8 N)");
+  table.number(
+      "tangential_ratio", tangential_ratio, "1", Range::closed(0.0, 10.0),
+      "tangential force over the force along the feed (Cheng & Venuvinod, table 2: 485.8 N / 325.8 N)");
   table.number("radial_ratio", radial_ratio, "1", Range::closed(0.0, 10.0),
                "force normal to the feed, away from the workpiece, over the force along the feed");
 }

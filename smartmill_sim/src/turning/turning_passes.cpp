@@ -10,8 +10,8 @@ namespace smartmill::sim {
 namespace {
 
 constexpr double RAPID = 0.05, ACCELERATION = 1.0;  // [m/s], [m/s2]
-constexpr double CLEARANCE = 2.0e-3;                // [m] from the workpiece in air: above the steady path's tolerance
-constexpr double LEAD = 0.5;                        // [s] of feed before the tool enters the workpiece
+constexpr double CLEARANCE = 2.0e-3;  // [m] from the workpiece in air: above the steady path's tolerance
+constexpr double LEAD = 0.5;          // [s] of feed before the tool enters the workpiece
 
 }  // namespace
 
@@ -47,7 +47,8 @@ std::array<double, 3> clearDirection(double angle) {
 TurningPasses::TurningPasses(const PassTraits& traits, double spindle_speed)
     : traits_((traits.validate(), traits)), spindle_speed_(spindle_speed), move_(Point{}) {
   for (std::size_t i = 0; i < traits.angle.size(); ++i) {
-    const double way = traits.feed[i] * spindle_speed / units::TWO_PI * traits.duration * std::sin(traits.angle[i]);
+    const double way =
+        traits.feed[i] * spindle_speed / units::TWO_PI * traits.duration * std::sin(traits.angle[i]);
     if (way + traits.depth[i] >= traits.radius)
       throw Error("pass_duration: pass " + std::to_string(i + 1) + " goes " + std::to_string(way) +
                   " m towards the axis, expected less than pass_radius");
@@ -86,9 +87,11 @@ void TurningPasses::begin(double time) {
     announce(time, air_ ? CuttingCondition::Kind::air : CuttingCondition::Kind::cut);
     return;
   }
-  move_ = PathMove::line(now, step_ == Step::retract ? along(now, clearDirection(angle()), CLEARANCE) : start(air_));
+  move_ = PathMove::line(
+      now, step_ == Step::retract ? along(now, clearDirection(angle()), CLEARANCE) : start(air_));
   move_.plan(time, RAPID, ACCELERATION);
-  if (condition_.kind != CuttingCondition::Kind::none || passes_ == 0) announce(time, CuttingCondition::Kind::none);
+  if (condition_.kind != CuttingCondition::Kind::none || passes_ == 0)
+    announce(time, CuttingCondition::Kind::none);
 }
 
 void TurningPasses::announce(double time, CuttingCondition::Kind kind) {

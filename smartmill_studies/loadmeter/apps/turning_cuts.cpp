@@ -1,4 +1,5 @@
-// rosrun smartmill_studies loadmeter_turning_cuts --model launch/models/lathe.yaml --cuts cuts.csv --currents currents.csv
+// rosrun smartmill_studies loadmeter_turning_cuts --model launch/models/lathe.yaml --cuts cuts.csv --currents
+// currents.csv
 
 #include <algorithm>
 #include <array>
@@ -32,8 +33,9 @@ void report(const char* name, const std::vector<LatheCut>& cuts) {
         squares += error * error, stated += e->std_dev * e->std_dev, n += 1.0;
         largest = std::max(largest, std::abs(error) / e->std_dev);
       }
-      std::printf("  %-16s %-14s %3.0f cuts %12.3f %11.3f %11.2f\n", joint ? "force/estimate" : "motor currents",
-                  quantities[q], n, std::sqrt(squares / n), std::sqrt(stated / n), largest);
+      std::printf("  %-16s %-14s %3.0f cuts %12.3f %11.3f %11.2f\n",
+                  joint ? "force/estimate" : "motor currents", quantities[q], n, std::sqrt(squares / n),
+                  std::sqrt(stated / n), largest);
     }
   }
 }
@@ -51,7 +53,8 @@ void run(const Arguments& a) {
   for (const char* method : {"regression", "anfis"}) {
     std::vector<LatheCut> cuts;
     for (const double speed : {45.0, 57.5, 75.0}) {
-      const auto some = runLathe(latheTraits(speed, a.seed), standardPasses(), model, latheParameters(method), calibration);
+      const auto some =
+          runLathe(latheTraits(speed, a.seed), standardPasses(), model, latheParameters(method), calibration);
       cuts.insert(cuts.end(), some.begin(), some.end());
     }
     if (calibration) report(method, cuts);
@@ -65,7 +68,8 @@ void run(const Arguments& a) {
 
 int main(int argc, char** argv) {
   CommandLine line(
-      "Standard cuts of the simulated lathe: forces and motor currents as tables for calibrate --standard-cuts, and "
+      "Standard cuts of the simulated lathe: forces and motor currents as tables for calibrate "
+      "--standard-cuts, and "
       "with a calibration the errors of the forces estimated from the currents.");
   Arguments a;
   line.option("--model", a.model, "machine model with a spindle")->required();

@@ -49,9 +49,9 @@ class Lathe {
   /// @throws Error without this channel, or in another unit.
   void command(const SampleBlock& commands);
 
-  /// Cut from the next sample on; without a call, the nominal one. @param feed [m] per revolution; 0: the tool
-  /// is out of the cut, and the next cut meets a surface without waves. @param width [1] width of cut over that
-  /// of cutting_stiffness
+  /// Cut from the next sample on; without a call, the nominal one. @param feed [m] per revolution; 0: the
+  /// tool is out of the cut, and the next cut meets a surface without waves. @param width [1] width of cut
+  /// over that of cutting_stiffness
   void engage(double feed, double width);
 
   /// Sensor signals and true values.

@@ -40,21 +40,23 @@ struct TurningTraits {
   static MotorTraits turningMotors();
 };
 
-/// The lathe in a turning centre: it does passes, its cutting force loads the feed motors and the spindle motor,
-/// and a controller reports axes, spindle load and condition of the cut, as the bridge to a controller does.
+/// The lathe in a turning centre: it does passes, its cutting force loads the feed motors and the spindle
+/// motor, and a controller reports axes, spindle load and condition of the cut, as the bridge to a controller
+/// does.
 class TurningMachine {
  public:
   /// @param lathe must outlive this. @param spindle friction and load meter. @throws Error on bad traits or
   /// without load_meter_full_scale_v.
-  TurningMachine(Lathe& lathe, const TurningTraits& traits, const LatheTraits& lathe_traits, const Spindle& spindle);
+  TurningMachine(Lathe& lathe, const TurningTraits& traits, const LatheTraits& lathe_traits,
+                 const Spindle& spindle);
 
   /// Streams of one block; stamps from the start of the simulation [s].
   struct Block {
     Lathe::Block sensors;
     SampleBlock motor_current;
-    ForceBlock force;  ///< true force on the tool
-    CncState state;    ///< at the end
-    LoadSample load;   ///< at the end
+    ForceBlock force;                           ///< true force on the tool
+    CncState state;                             ///< at the end
+    LoadSample load;                            ///< at the end
     std::optional<CuttingCondition> condition;  ///< if one begins
   };
   /// The next samples. @param count > 0

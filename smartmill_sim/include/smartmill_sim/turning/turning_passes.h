@@ -13,8 +13,8 @@
 
 namespace smartmill::sim {
 
-/// Passes of the turning tool: longitudinal, facing and taper, as Cheng & Venuvinod calibrate and test (sections
-/// 9 and 10). Units and meaning: declare().
+/// Passes of the turning tool: longitudinal, facing and taper, as Cheng & Venuvinod calibrate and test
+/// (sections 9 and 10). Units and meaning: declare().
 struct PassTraits {
   double radius = 0.03;
   double reference_depth = 1.0e-3;
@@ -28,9 +28,10 @@ struct PassTraits {
   void validate() const;
 };
 
-/// Motion of the axes over the passes, from the first to the last and again. Each pass is done twice in the same
-/// direction and with the same feed: in air, the tool clear of the workpiece (kind AIR of the cutting condition), and
-/// in the cut (CUT). In between the tool returns (NONE). X is the radius, Y is at rest, -Z points to the chuck.
+/// Motion of the axes over the passes, from the first to the last and again. Each pass is done twice in the
+/// same direction and with the same feed: in air, the tool clear of the workpiece (kind AIR of the cutting
+/// condition), and in the cut (CUT). In between the tool returns (NONE). X is the radius, Y is at rest, -Z
+/// points to the chuck.
 class TurningPasses {
  public:
   /// @param spindle_speed [rad/s] > 0. @throws Error on bad traits.
@@ -42,12 +43,13 @@ class TurningPasses {
   /// Axes and spindle at a time [s] of the present move.
   MotionState state(double time) const;
   std::array<double, 3> distanceToGo(double time) const;  ///< [m]
-  /// Of the present move; a turning cut has no teeth, and the diameter of the workpiece at half depth and half way.
+  /// Of the present move; a turning cut has no teeth, and the diameter of the workpiece at half depth and
+  /// half way.
   const CuttingCondition& condition() const { return condition_; }
 
   /// Whether the tool is in the cut at a time [s]; then feed and width are those of the present pass.
   bool isCutting(double time) const;
-  double feed() const { return traits_.feed[pass_]; }  ///< [m] per revolution
+  double feed() const { return traits_.feed[pass_]; }                              ///< [m] per revolution
   double width() const { return traits_.depth[pass_] / traits_.reference_depth; }  ///< [1]
   double angle() const { return traits_.angle[pass_]; }  ///< [rad] of the feed, from -Z towards -X
   /// [m] radius at half depth.
