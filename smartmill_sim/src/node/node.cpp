@@ -49,8 +49,10 @@ Node::Node(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
       coefficients_(nh_.advertise<smartmill_msgs::CuttingCoefficients>(names::TRUE_COEFFICIENTS, 1, true)),
       frf_(nh_, names::TRUE_FRF),
       modes_(nh_, names::TRUE_MODES),
+      clock_(nh_),
       panel_(nh_),
-      shell_(nh_, private_nh, "simulated mill", 1.0) {
+      shell_(nh_, private_nh, "simulated mill", 1.0),
+      pacer_(ros::WallTime::now().toSec(), BLOCK_TIME, static_cast<bool>(clock_), parameters_.pace) {
   if (parameters_.world.motor.currents)
     motor_current_ = nh_.advertise<smartmill_msgs::SampleBlock>(names::MOTOR_CURRENT, STREAM_QUEUE);
   if (parameters_.axes_input.empty()) {
