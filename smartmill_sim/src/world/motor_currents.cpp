@@ -17,7 +17,7 @@ constexpr double LEAST_SPEED = 1e-7;  // [m/s]
 void MotorTraits::declare(ParameterTable& table) {
   table.section("Motors: signals of a Hall sensor at one phase of each (daq/motor_current).");
   table.flag("currents", currents,
-             "whether daq/motor_current is published, from the drives below, which daq/servo then uses too");
+             "whether daq/motor_current is published; daq/servo then uses the drives below too");
   table.list("mass", mass, "kg", Range::openLow(0.0, 1e5),
              "moved mass of X, Y, Z, inertia of the motor included");
   table.list("coulomb", coulomb, "N", Range::closed(0.0, 1e4), "dry friction of X, Y, Z");

@@ -72,7 +72,7 @@ int main(int argc, char** argv) {
       "--standard-cuts, and "
       "with a calibration the errors of the forces estimated from the currents.");
   Arguments a;
-  line.option("--model", a.model, "machine model with a spindle")->required();
+  line.option("--model", a.model, "machine model with a spindle").required();
   const auto cuts = line.option("--cuts", a.cuts, "table of forces to write");
   const auto currents = line.option("--currents", a.currents, "table of currents to write");
   cuts.needs(currents);
