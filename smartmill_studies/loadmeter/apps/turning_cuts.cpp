@@ -33,9 +33,10 @@ void report(const char* name, const std::vector<LatheCut>& cuts) {
         squares += error * error, stated += e->std_dev * e->std_dev, n += 1.0;
         largest = std::max(largest, std::abs(error) / e->std_dev);
       }
-      std::printf("  %-16s %-14s %3.0f cuts %12.3f %11.3f %11.2f\n",
-                  joint ? "force/estimate" : "motor currents", quantities[q], n, std::sqrt(squares / n),
-                  std::sqrt(stated / n), largest);
+      if (n > 0.0)
+        std::printf("  %-16s %-14s %3.0f cuts %12.3f %11.3f %11.2f\n",
+                    joint ? "force/estimate" : "motor currents", quantities[q], n, std::sqrt(squares / n),
+                    std::sqrt(stated / n), largest);
     }
   }
 }
