@@ -53,6 +53,7 @@ TEST(Turning, theMachineIsIdentifiedAndChatterSuppressed) {
           [&](const auto& m) { vibration.add(fromMsg(*m)); }));
   ros::AsyncSpinner spinner(1);
   spinner.start();
+  ASSERT_TRUE(ros::Time::waitForValid(ros::WallDuration(120.0)));  // the lathe is the clock
   const auto identified = ros::topic::waitForMessage<smartmill_msgs::ModalModel>(names::CONTROL_MACHINE, nh,
                                                                                  ros::Duration(300.0));
   ASSERT_TRUE(identified);

@@ -10,7 +10,8 @@ namespace smartmill::loadmeter {
 double headingOf(const CuttingCondition& condition) {
   const auto& from = condition.steady_from;
   const auto& to = condition.steady_to;
-  return std::atan2(to[1] - from[1], to[0] - from[0]);
+  const std::size_t across = condition.tool.teeth == 0 ? 2 : 1;
+  return std::atan2(to[across] - from[across], to[0] - from[0]);
 }
 
 CutForces::CutForces(const MotorParameters& motor, const ForceEstimateParameters& force,

@@ -12,9 +12,25 @@ namespace smartmill::loadmeter {
 namespace {
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
-constexpr int ANGLES = 64;  // per tooth period
+constexpr int ANGLES = 64;            // per tooth period
+constexpr double FACING_SINE = 1e-3;  // of a feed along X, up to the noise of positions
 
 }  // namespace
+
+Eigen::Matrix3d feedFrame(const ToolGeometry& tool, double heading) {
+  const double c = std::cos(heading), s = std::sin(heading);
+  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
+  if (tool.teeth > 0) {
+    turn.topLeftCorner<2, 2>() << c, -s, s, c;
+    return turn;
+  }
+  // Turning: the edge points away from the workpiece, to +X, in facing to +Z.
+  const bool facing = std::abs(s) < FACING_SINE;
+  turn.col(0) = Eigen::Vector3d(c, 0.0, s);
+  turn.col(2) =
+      facing ? Eigen::Vector3d(0.0, 0.0, 1.0) : Eigen::Vector3d(std::abs(s), 0.0, -c * std::copysign(1.0, s));
+  return turn;
+}
 
 CutMechanics::CutMechanics(const CutMeasurements& r, const ForceEstimateParameters& p)
     : ktc_(p.ktc), kte_(p.kte) {
@@ -23,12 +39,11 @@ CutMechanics::CutMechanics(const CutMeasurements& r, const ForceEstimateParamete
   for (int f = 0; f < 4; ++f) {
     for (int c = 0; c < 6; ++c) own(f, c) = map[static_cast<std::size_t>(f)][static_cast<std::size_t>(c)];
   }
-  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
-  turn.topLeftCorner<2, 2>() << std::cos(r.heading), -std::sin(r.heading), std::sin(r.heading),
-      std::cos(r.heading);
+  const Eigen::Matrix3d turn = feedFrame(r.tool, r.heading);
   mean_.topRows<3>() = turn * own.topRows<3>();
   mean_.row(3) = own.row(3);
   for (Matrix6& q : squares_) q.setZero();
+  if (r.tool.teeth == 0) return;  // the force of a turning cut does not vary
   std::vector<MechanisticForce> units;
   for (const CuttingKey& key : cuttingKeys()) {
     CuttingCoefficients one{0, 0, 0, 0, 0, 0};

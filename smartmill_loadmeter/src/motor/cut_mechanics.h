@@ -9,6 +9,10 @@
 
 namespace smartmill::loadmeter {
 
+/// Rotation from the frame of the feed (x along the feed, z along spindle or edge) to the machine's. @param
+/// heading [rad] as CutMeasurements::heading
+Eigen::Matrix3d feedFrame(const ToolGeometry& tool, double heading);
+
 /// Forces as functions of the coefficients: linear in the mean, quadratic in the variance over a tooth
 /// period.
 class CutMechanics {

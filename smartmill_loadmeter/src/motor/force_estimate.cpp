@@ -92,8 +92,10 @@ void ForceEstimateParameters::declare(ParameterTable& table) {
 std::string ForceEstimate::text() const {
   std::string all;
   for (std::size_t a = 0; a < 3; ++a) {
-    all += formatted("F%c %.1f +- %.1f N (varies by %.1f +- %.1f), ", "xyz"[a], mean[a].value,
-                     mean[a].std_dev, rms[a].value, rms[a].std_dev);
+    all += formatted("F%c %.1f +- %.1f N", "xyz"[a], mean[a].value, mean[a].std_dev);
+    if (std::isfinite(rms[a].value))
+      all += formatted(" (varies by %.1f +- %.1f)", rms[a].value, rms[a].std_dev);
+    all += ", ";
   }
   all += formatted("torque %.3f +- %.3f N m, by", torque.value, torque.std_dev);
   for (const std::string& source : sources) all += " " + source;
@@ -129,7 +131,7 @@ std::optional<ForceLine> revolutionOf(const CutMeasurements& r, const ForceEstim
 
 void addLines(const CutMeasurements& r, const ForceEstimateParameters& p, const Eigen::VectorXd& best,
               const Eigen::MatrixXd& spread, ForceEstimate* found) {
-  if (!(r.spindle_speed > 0.0)) return;
+  if (!(r.spindle_speed > 0.0) || r.tool.teeth == 0) return;
   if (const auto revolution = revolutionOf(r, p)) found->lines.push_back(*revolution);
   for (const SpectralLine& known : cutLines(r.spindle_speed, r.tool.teeth)) {
     if (known.tooth == 0) continue;
@@ -187,7 +189,8 @@ ForceEstimate estimateOne(const CutMeasurements& measurements, const ForceEstima
   };
   for (Eigen::Index a = 0; a < 3; ++a) {
     found.mean[static_cast<std::size_t>(a)] = estimate(a);
-    found.rms[static_cast<std::size_t>(a)] = estimate(CutMechanics::RMS + a);
+    found.rms[static_cast<std::size_t>(a)] =
+        measurements.tool.teeth > 0 ? estimate(CutMechanics::RMS + a) : NOT_MEASURED;
   }
   found.torque = estimate(CutMechanics::TORQUE);
   addLines(measurements, p, best, spread, &found);

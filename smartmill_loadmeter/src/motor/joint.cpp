@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 
+#include "cut_mechanics.h"
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/math/linear_algebra.h"
@@ -39,11 +40,13 @@ struct Observations {
     for (std::size_t f = 0; f < 4; ++f) {
       for (std::size_t c = 0; c < 6; ++c) row[f][static_cast<Eigen::Index>(c)] = map[f][c] * UNIT[c];
     }
-    const double cosine = std::cos(r.heading), sine = std::sin(r.heading);
+    const Eigen::Matrix3d turn = feedFrame(r.tool, r.heading);
     if (r.torque) add(row[3], *r.torque);
-    if (r.axis_force[0]) add(cosine * row[0] - sine * row[1], *r.axis_force[0]);
-    if (r.axis_force[1]) add(sine * row[0] + cosine * row[1], *r.axis_force[1]);
-    if (r.axis_force[2]) add(row[2], *r.axis_force[2]);
+    for (std::size_t a = 0; a < 3; ++a) {
+      const auto i = static_cast<Eigen::Index>(a);
+      if (r.axis_force[a])
+        add(turn(i, 0) * row[0] + turn(i, 1) * row[1] + turn(i, 2) * row[2], *r.axis_force[a]);
+    }
   }
 };
 

@@ -227,5 +227,57 @@ TEST(ForceRecord, meanAndVariationWithoutZeroAndNoise) {
   }
 }
 
+/// Turning: workpiece of 30 mm radius, 300 N tangential by the torque.
+CutMeasurements turning(double heading) {
+  CutMeasurements r;
+  r.tool.diameter = 0.06;
+  r.engagement.axial_depth = 1e-3;
+  r.engagement.feed_per_tooth = 2e-4;
+  r.heading = heading;
+  r.spindle_speed = 60.0;
+  r.motor_torque = Estimate{9.0, 0.1};
+  return r;
+}
+
+// Ft = T / r acts along the cutting speed (+Y), the feed force against the feed. The passive force has no
+// motor that moves: its value and its larger deviation are those of the prior, and it points away from the
+// workpiece.
+TEST(ForceEstimate, turningCutsHaveTangentialFeedAndPassiveForce) {
+  CutMeasurements longitudinal = turning(-0.5 * units::PI);
+  longitudinal.motor_force[2] = Estimate{150.0, 3.0};
+  const ForceEstimateParameters p;
+  const ForceEstimate along = estimateForce(longitudinal, p);
+  const auto deviation = [&](double value, double own) {
+    return std::hypot(own, std::hypot(p.model_error, p.motor_error) * value);
+  };
+  EXPECT_NEAR(along.mean[1].value, 300.0, deviation(300.0, 0.1 / 0.03));
+  EXPECT_NEAR(along.mean[2].value, 150.0, deviation(150.0, 3.0));
+  EXPECT_LE(along.mean[2].std_dev, deviation(150.0, 3.0));
+  // About 0.2 +- 0.11 of the tangential force, as Kac of Ktc.
+  EXPECT_NEAR(along.mean[0].value, 60.0, 30.0);
+  EXPECT_GT(along.mean[0].std_dev, 0.09 * 300.0);
+  for (const Estimate& rms : along.rms) EXPECT_TRUE(std::isnan(rms.value));
+  EXPECT_TRUE(along.lines.empty());
+  EXPECT_EQ(along.text().find("nan"), std::string::npos) << along.text();
+
+  CutMeasurements facing = turning(units::PI);
+  facing.motor_force[0] = Estimate{150.0, 3.0};
+  const ForceEstimate inwards = estimateForce(facing, p);
+  EXPECT_NEAR(inwards.mean[0].value, along.mean[2].value, 1e-3);
+  EXPECT_NEAR(inwards.mean[2].value, along.mean[0].value, 1e-3);
+  EXPECT_NEAR(inwards.mean[1].value, along.mean[1].value, 1e-3);
+
+  // Taper of 30 degrees: both axes move, and the two forces determine feed and passive force, here 200 N and
+  // 80 N.
+  const double c = std::cos(units::PI / 6.0), s = std::sin(units::PI / 6.0);
+  CutMeasurements taper = turning(std::atan2(-c, -s));
+  taper.motor_force[0] = Estimate{200.0 * s + 80.0 * c, 3.0};
+  taper.motor_force[2] = Estimate{200.0 * c - 80.0 * s, 3.0};
+  const ForceEstimate both = estimateForce(taper, p);
+  EXPECT_NEAR(both.mean[0].value, 200.0 * s + 80.0 * c, 2.0 * both.mean[0].std_dev);
+  EXPECT_NEAR(both.mean[2].value, 200.0 * c - 80.0 * s, 2.0 * both.mean[2].std_dev);
+  EXPECT_LT(both.mean[0].std_dev, 8.0);
+}
+
 }  // namespace
 }  // namespace smartmill::loadmeter

@@ -127,6 +127,35 @@ TEST(Joint, rampsShowTheAxialCoefficientsToo) {
   EXPECT_NEAR(k.value.kae, m.truth.kae, 3.0 * k.std_dev.kae);
 }
 
+// Turning: a taper moves both axes, so that torque, feed force and passive force determine all six.
+TEST(Joint, taperTurningShowsAllCoefficients) {
+  const CuttingCoefficients truth{1500e6, 700e6, 300e6, 40e3, 50e3, 20e3};
+  const double c = std::cos(units::PI / 6.0), s = std::sin(units::PI / 6.0), depth = 1e-3, radius = 0.025;
+  std::vector<JointMeasurement> cuts;
+  for (const double feed : {0.1e-3, 0.2e-3, 0.3e-3}) {
+    const double tangential = depth * (truth.ktc * feed + truth.kte),
+                 normal = depth * (truth.krc * feed + truth.kre),
+                 passive = depth * (truth.kac * feed + truth.kae);
+    JointMeasurement cut;
+    cut.tool.diameter = 2.0 * radius;
+    cut.engagement.axial_depth = depth;
+    cut.engagement.feed_per_tooth = feed;
+    cut.heading = std::atan2(-c, -s);  // towards -Z and the axis
+    cut.torque = Estimate{tangential * radius, 0.01};
+    cut.axis_force[0] = Estimate{normal * s + passive * c, 1.0};
+    cut.axis_force[2] = Estimate{normal * c - passive * s, 1.0};
+    cuts.push_back(cut);
+  }
+  const JointResult found = identifyJointly(cuts);
+  EXPECT_THAT(found.not_observable, IsEmpty());
+  EXPECT_NEAR(found.value.ktc, truth.ktc, 1e-6 * truth.ktc);
+  EXPECT_NEAR(found.value.krc, truth.krc, 1e-6 * truth.krc);
+  EXPECT_NEAR(found.value.kac, truth.kac, 1e-6 * truth.kac);
+  EXPECT_NEAR(found.value.kte, truth.kte, 1e-6 * truth.kte);
+  EXPECT_NEAR(found.value.kre, truth.kre, 1e-6 * truth.kre);
+  EXPECT_NEAR(found.value.kae, truth.kae, 1e-6 * truth.kae);
+}
+
 TEST(Joint, oneFeedIsNamedAsNotObservable) {
   Machine m(4);
   std::vector<JointMeasurement> readings;

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include <rosgraph_msgs/Clock.h>
 #include <smartmill_msgs/CuttingCoefficients.h>
 #include <smartmill_msgs/ForceBlock.h>
 #include <smartmill_msgs/LoadSample.h>
@@ -50,8 +49,10 @@ Node::Node(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
       coefficients_(nh_.advertise<smartmill_msgs::CuttingCoefficients>(names::TRUE_COEFFICIENTS, 1, true)),
       frf_(nh_, names::TRUE_FRF),
       modes_(nh_, names::TRUE_MODES),
+      clock_(nh_),
       panel_(nh_),
-      shell_(nh_, private_nh, "simulated mill", 1.0) {
+      shell_(nh_, private_nh, "simulated mill", 1.0),
+      pacer_(ros::WallTime::now().toSec(), BLOCK_TIME, static_cast<bool>(clock_), parameters_.pace) {
   if (parameters_.world.motor.currents)
     motor_current_ = nh_.advertise<smartmill_msgs::SampleBlock>(names::MOTOR_CURRENT, STREAM_QUEUE);
   if (parameters_.axes_input.empty()) {
@@ -60,9 +61,6 @@ Node::Node(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
     listen();
   }
 
-  if (ros::Time::isSimTime()) clock_ = nh_.advertise<rosgraph_msgs::Clock>("/clock", STREAM_QUEUE);
-  wall_start_ = ros::WallTime::now();
-  start_ = clock_ ? wall_start_.toSec() : toSec(ros::Time::now());
   publishTruth();
   panel_.advertiseManualActions(*world_, parameters_.world);
   strike_server_ = nh_.advertiseService(names::STRIKE, &Node::strike, this);
@@ -101,14 +99,14 @@ Node::~Node() {
 
 void Node::addTruth(const std::string& point, const std::string& direction, const ModalModel& modes) {
   MeasuredModes m;
-  m.stamp = start_;
+  m.stamp = pacer_.start();
   m.point = point;
   m.direction = direction;
   m.unit = point == POINT_TOOL_TIP ? "m/N" : "1";
   m.model = modes;
   modes_.publish(point + direction, toMsg(m));
   MeasuredFrf f;
-  f.stamp = start_;
+  f.stamp = pacer_.start();
   f.point = point;
   f.direction = direction;
   f.frf.unit = m.unit;
@@ -125,7 +123,7 @@ void Node::publishTruth() {
   for (std::size_t axis = 0; axis < 3; ++axis)
     addTruth(POINT_FORCE_SENSOR, std::string(1, "xyz"[axis]), model_.force_sensor.axis[axis]);
   CoefficientSet set;
-  set.stamp = start_;
+  set.stamp = pacer_.start();
   set.material = model_.workpiece ? model_.workpiece->material : "";
   set.source = "model";
   set.value = *model_.cutting;
@@ -137,7 +135,7 @@ void Node::publishTruth() {
 
 void Node::publish(const World::Block& block) {
   const auto shifted = [this](auto part) {
-    part.stamp += start_;
+    part.stamp += pacer_.start();
     return part;
   };
   hammer_.publish(toMsg(shifted(block.hammer)));
@@ -151,7 +149,7 @@ void Node::publish(const World::Block& block) {
     for (const SpindleAngle& angle : block.angle) angle_.publish(toMsg(shifted(angle)));
   } else {
     LoadSample load;
-    load.stamp = start_ + block.dynamometer.timeOf(World::BLOCK);
+    load.stamp = pacer_.start() + block.dynamometer.timeOf(World::BLOCK);
     load.spindle_load = block.spindle_load;
     load.spindle_speed = std::abs(states_.back().spindle_speed);
     load_meter_.publish(toMsg(load));
@@ -162,37 +160,24 @@ void Node::publish(const World::Block& block) {
   if (!block.motor_current.channels.empty()) motor_current_.publish(toMsg(shifted(block.motor_current)));
 }
 
-/// [s] of the clock that the simulation follows.
-double Node::clockTime() const {
-  if (!clock_) return toSec(ros::Time::now());
-  return start_ + parameters_.pace * (ros::WallTime::now() - wall_start_).toSec() - held_back_;
-}
-
 void Node::run() {
   World::Block block;
-  double done = 0.0;  // [s] since start
   while (!stopping_) {
-    const double now = clockTime() - start_;
-    // The clock is held back rather than made up for: in a burst of blocks what reads the controller would
-    // stamp its states too late.
-    if (clock_ && now - done > 2.0 * BLOCK_TIME) {
-      held_back_ = held_back_ + (now - done - BLOCK_TIME);
-      continue;
-    }
-    if (now - done > parameters_.most_behind) {
-      const auto blocks = static_cast<std::uint64_t>((now - done) / BLOCK_TIME);
+    const double wall = ros::WallTime::now().toSec(), behind = pacer_.behind(wall);
+    if (!clock_ && behind > parameters_.most_behind) {
+      const auto blocks = static_cast<std::uint64_t>(behind / BLOCK_TIME);
       world_->skipSamples(blocks * World::BLOCK);
-      done += static_cast<double>(blocks) * BLOCK_TIME;
+      pacer_.proceed(static_cast<double>(blocks));
       lost_ += blocks * World::BLOCK;
       ROS_WARN("sim: the simulation fell behind the clock, %.2f s of samples lost",
                static_cast<double>(blocks) * BLOCK_TIME);
     }
-    if (now < done + BLOCK_TIME) {
-      const double pace = clock_ ? parameters_.pace : 1.0;
-      std::this_thread::sleep_for(std::chrono::duration<double>((done + BLOCK_TIME - now) / pace));
+    const double wait = pacer_.wait(wall);
+    if (wait > 0.0) {
+      std::this_thread::sleep_for(std::chrono::duration<double>(wait));
       continue;
     }
-    if (!server_ && !updateStates(now, done)) {
+    if (!server_ && !updateStates(pacer_.behind(wall))) {
       std::this_thread::sleep_for(std::chrono::duration<double>(parameters_.poll_period));
       continue;
     }
@@ -206,27 +191,23 @@ void Node::run() {
     const std::chrono::duration<double> duration = std::chrono::steady_clock::now() - before;
     load_ = 0.98 * load_ + 0.02 * duration.count() / BLOCK_TIME;
     publish(block);
-    done += BLOCK_TIME;
-    if (clock_) {
-      rosgraph_msgs::Clock clock;
-      clock.clock.fromSec(start_ + done);
-      clock_.publish(clock);
-    }
+    pacer_.proceed();
+    clock_.publish(pacer_.now());
   }
 }
 
 /// States of the next block under the external controller. @return whether they are available
-bool Node::updateStates(double now, double done) {
+bool Node::updateStates(double behind) {
   const std::lock_guard<std::mutex> lock(axes_mutex_);
-  const double end = start_ + done + BLOCK_TIME;
+  const double end = pacer_.now() + BLOCK_TIME;
   if (!(axes_.newest() >= end)) {
     // No samples: without commands the axes are at rest.
-    if (now - done < parameters_.wait_share * parameters_.most_behind) return false;
+    if (behind < parameters_.wait_share * parameters_.most_behind) return false;
     axes_.holdUntil(end);
   }
   states_.resize(World::BLOCK);
   for (std::size_t i = 0; i < World::BLOCK; ++i) {
-    states_[i] = axes_.at(start_ + done + (static_cast<double>(i) + 0.5) / World::SAMPLE_RATE);
+    states_[i] = axes_.at(pacer_.now() + (static_cast<double>(i) + 0.5) / World::SAMPLE_RATE);
   }
   return true;
 }
@@ -262,7 +243,7 @@ void Node::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
     status.summary(diagnostic_msgs::DiagnosticStatus::OK, "running");
   }
   status.addf("processor time per real time [1]", "%.3f", load_.load());
-  status.addf("clock held back [s]", "%.3f", held_back_.load());
+  status.addf("clock held back [s]", "%.3f", pacer_.heldBack());
   status.addf("samples lost [1]", "%llu", static_cast<unsigned long long>(lost_.load()));
 }
 

@@ -12,7 +12,9 @@
 #include <smartmill_msgs/ModalModel.h>
 #include <smartmill_msgs/Strike.h>
 
+#include "node/clock.h"
 #include "node/operator_panel.h"
+#include "node/pacer.h"
 #include "node/parameters.h"
 #include "smartmill_core/modal/modal_model.h"
 #include "smartmill_core/model/machine_model.h"
@@ -26,7 +28,7 @@ namespace smartmill::sim {
 
 /// The simulated machine on ROS: the controller on its port, sensors on daq/* and spindle/angle (or
 /// daq/tachometer), hammers by the service daq/strike, true values on sim/truth/*, the operator's panel by
-/// services sim/panel/*. Runs in wall-clock time.
+/// services sim/panel/*. Runs in wall-clock time, or as the clock of the graph with /use_sim_time.
 class Node {
  public:
   using Parameters = NodeParameters;
@@ -37,12 +39,11 @@ class Node {
   Node& operator=(const Node&) = delete;
 
  private:
-  double clockTime() const;
   void run();
   void publish(const World::Block& block);
   void serve();
   void listen();
-  bool updateStates(double now, double done);
+  bool updateStates(double behind);
   void logAlarms();
   void publishTruth();
   bool strike(smartmill_msgs::Strike::Request& request, smartmill_msgs::Strike::Response& response);
@@ -55,18 +56,17 @@ class Node {
   std::unique_ptr<World> world_;
   std::unique_ptr<focas::Server> server_;
 
-  double start_ = 0.0;        // [s] stamp of sample 0
-  ros::WallTime wall_start_;  // wall time of sample 0
   ros::Publisher hammer_, dynamometer_, spindle_force_, angle_, tachometer_, force_, vibration_, servo_,
-      motor_current_, coefficients_, load_meter_, clock_;
+      motor_current_, coefficients_, load_meter_;
   LatchedTopic<smartmill_msgs::Frf> frf_;
   LatchedTopic<smartmill_msgs::ModalModel> modes_;
   ros::ServiceServer strike_server_;
+  Clock clock_;
   OperatorPanel panel_;
   NodeShell shell_;
+  Pacer pacer_;
   std::atomic<double> load_{0.0};  // [1] processor time per real time
   std::atomic<std::uint64_t> lost_{0};
-  std::atomic<double> held_back_{0.0};  // [s] by which /clock is behind the wall clock
 
   // Axes and spindle under an external controller.
   std::mutex axes_mutex_;  // of the track

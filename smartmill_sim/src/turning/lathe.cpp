@@ -60,7 +60,13 @@ Lathe::Lathe(const LatheTraits& traits)
       machine_(machineOf(traits), traits.rate, Hold::first_order),
       servo_filter_(ModalModel{{{traits.servo_frequency, traits.servo_damping, 1.0}}, 0.0}, traits.rate,
                     Hold::zero_order),
-      random_(traits.seed) {
+      random_(traits.seed),
+      feed_(traits.chip) {
+}
+
+void Lathe::engage(double feed, double width) {
+  feed_ = feed;
+  width_ = width;
 }
 
 void Lathe::command(const SampleBlock& commands) {
@@ -94,7 +100,7 @@ double Lathe::force(double chip) const {
   if (chip <= 0.0) return 0.0;
   // Slope K at the nominal chip: K h0 / m (h / h0)^m.
   const double m = traits_.chip_exponent;
-  return traits_.cutting_stiffness * traits_.chip / m * std::pow(chip / traits_.chip, m);
+  return width_ * traits_.cutting_stiffness * traits_.chip / m * std::pow(chip / traits_.chip, m);
 }
 
 double Lathe::pastSurface() const {
@@ -125,13 +131,14 @@ Lathe::Block Lathe::advance(std::size_t count) {
     const double past = traits_.overlap * pastSurface();
     // Fixed-point iteration: the force depends on the deflection in the same sample; each pass reduces the
     // error to about 1 %.
-    double acting = last_force_;
-    for (int turn = 0; turn < 4; ++turn)
-      acting = force(traits_.chip - (machine_.peek(acting) - tool_) + past);
+    double acting = feed_ > 0.0 ? last_force_ : 0.0;
+    for (int turn = 0; turn < 4 && feed_ > 0.0; ++turn)
+      acting = force(feed_ - (machine_.peek(acting) - tool_) + past);
     const double deflection = machine_.step(acting);
     const double motion = deflection - tool_;
     // Out of the cut the old surface remains, one feed farther away.
-    surface_.push_front(acting > 0.0 ? motion : traits_.chip + past);
+    const double missed = feed_ > 0.0 ? feed_ + past : 0.0;
+    surface_.push_front(acting > 0.0 ? motion : missed);
     if (surface_.size() > longest) surface_.pop_back();
     last_force_ = acting;
     block.displacement.samples.push_back(deflection + traits_.probe_noise * normal_(random_));

@@ -37,7 +37,7 @@ struct CutMeasurements {
   std::string name;
   ToolGeometry tool;
   Engagement engagement;
-  double heading = 0.0;                  ///< [rad] of the feed in the X-Y plane, from +X towards +Y
+  double heading = 0.0;                  ///< [rad] of the feed, from +X towards +Y, in turning towards +Z
   std::optional<Estimate> load_torque;   ///< [N m] cutting torque by the load meter
   std::optional<Estimate> motor_torque;  ///< [N m] by the spindle's current
   std::array<std::optional<Estimate>, 3> motor_force;  ///< [N] mean, of moving axes

@@ -16,7 +16,7 @@ namespace smartmill::loadmeter {
 struct JointMeasurement {
   ToolGeometry tool;
   Engagement engagement;
-  double heading = 0.0;            ///< [rad] of the feed in the X-Y plane, from +X towards +Y
+  double heading = 0.0;            ///< [rad] of the feed, from +X towards +Y, in turning towards +Z
   std::optional<Estimate> torque;  ///< [N m] mean cutting torque
   std::array<std::optional<Estimate>, 3> axis_force;  ///< [N] mean, X, Y, Z
 };

@@ -49,6 +49,11 @@ class Lathe {
   /// @throws Error without this channel, or in another unit.
   void command(const SampleBlock& commands);
 
+  /// Cut from the next sample on; without a call, the nominal one. @param feed [m] per revolution; 0: the
+  /// tool is out of the cut, and the next cut meets a surface without waves. @param width [1] width of cut
+  /// over that of cutting_stiffness
+  void engage(double feed, double width);
+
   /// Sensor signals and true values.
   struct Block {
     SampleBlock displacement;  ///< deflection, tool [m]: probes at workpiece and tool; headstock [m/s2]
@@ -77,6 +82,7 @@ class Lathe {
   std::deque<double> delayed_;  // [m] delayed commands of the servo
   std::map<std::uint64_t, double> commands_;
   double commanded_ = 0.0, tool_ = 0.0, last_force_ = 0.0;
+  double feed_, width_ = 1.0;  // [m], [1] of the present cut
   std::uint64_t index_ = 0, late_ = 0, newest_ = 0;
 };
 

@@ -147,7 +147,27 @@ CuttingForce MechanisticForce::mean() const {
   return {mean[0], mean[1], mean[2], mean[3]};
 }
 
+namespace {
+
+// The edge at an immersion of pi/2: x along the feed, y along the cutting speed, z along the edge.
+std::array<std::array<double, 6>, 4> turningForceMatrix(const ToolGeometry& tool,
+                                                        const Engagement& engagement) {
+  const double edge = engagement.axial_depth, feed = engagement.feed_per_tooth, r = tool.radius();
+  if (!(tool.diameter > 0.0) || !std::isfinite(tool.diameter))
+    refuse("tool diameter", tool.diameter, "m", "> 0");
+  if (!(edge > 0.0) || !std::isfinite(edge)) refuse("axial depth", edge, "m", "> 0");
+  if (!(feed > 0.0) || !std::isfinite(feed)) refuse("feed per tooth", feed, "m", "> 0 in turning");
+  const double chip = edge * feed;
+  return {{{0.0, -chip, 0.0, 0.0, -edge, 0.0},
+           {chip, 0.0, 0.0, edge, 0.0, 0.0},
+           {0.0, 0.0, chip, 0.0, 0.0, edge},
+           {r * chip, 0.0, 0.0, r * edge, 0.0, 0.0}}};
+}
+
+}  // namespace
+
 std::array<std::array<double, 6>, 4> meanForceMatrix(const ToolGeometry& tool, const Engagement& engagement) {
+  if (tool.teeth == 0) return turningForceMatrix(tool, engagement);
   validate(tool);
   validate(engagement);
   const double entry = firstCut(engagement), exit = lastCut(engagement);

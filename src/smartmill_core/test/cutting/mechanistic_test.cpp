@@ -191,5 +191,23 @@ TEST(MechanisticForce, errorsNameTheInvalidQuantity) {
   EXPECT_NE(messageOf(tool(2, 0.02, 30.0), slot, k).find("Kre"), std::string::npos);
 }
 
+// Turning is the limit of milling with one edge always in the cut about an immersion of pi/2: 20 teeth over
+// an arc of one pitch, whose mean square of the sine differs from 1 by pitch^2 / 12 = 0.8 %.
+TEST(MechanisticForce, turningIsAnEdgeThatStaysAcrossTheFeed) {
+  const double pitch = units::TWO_PI / 20.0;
+  const auto milling = meanForceMatrix({20, 0.06, 0.0, {}},
+                                       {0.5 * (units::PI - pitch), 0.5 * (units::PI + pitch), 1e-3, 2e-4});
+  const auto turning = meanForceMatrix({0, 0.06, 0.0, {}}, {0.0, 0.0, 1e-3, 2e-4});
+  for (std::size_t r = 0; r < 4; ++r) {
+    for (std::size_t c = 0; c < 6; ++c) {
+      const double unit = (c < 3 ? 2e-7 : 1e-3) * (r == 3 ? 0.03 : 1.0);
+      EXPECT_NEAR(turning[r][c], milling[r][c], 0.01 * unit) << r << ", " << c;
+    }
+  }
+  EXPECT_NEAR(turning[3][0], 0.03 * 2e-7, 1e-15);
+  EXPECT_THROW(meanForceMatrix({0, 0.0, 0.0, {}}, {0.0, 0.0, 1e-3, 2e-4}), Error);
+  EXPECT_THROW(meanForceMatrix({0, 0.06, 0.0, {}}, {0.0, 0.0, 0.0, 2e-4}), Error);
+}
+
 }  // namespace
 }  // namespace smartmill
