@@ -201,21 +201,23 @@ LoadMeterReadings readingsOf(const std::vector<LoadTest>& air_cuts, const Spindl
   readings.settling = settling;
   readings.noise = readings.rounding = spindle.load_meter_resolution / std::sqrt(12.0);
   double variance = 0.0, duration = 0.0, intervals = 0.0, tests = 0.0;
-  std::vector<double> voltages;
+  double shown = std::numeric_limits<double>::infinity();  // [V] smallest step within an air cut
   for (const LoadTest& test : air_cuts) {
     if (test.voltages.size() < 2) continue;
     variance += test.variance();
     duration += test.duration;
     intervals += static_cast<double>(test.voltages.size() - 1);
     tests += 1.0;
-    voltages.insert(voltages.end(), test.voltages.begin(), test.voltages.end());
+    const double step = resolutionOf(test.voltages, 0.0);
+    if (step > 0.0) shown = std::min(shown, step);  // 0: all readings are the same
   }
   if (!(duration > 0.0)) return readings;
   readings.period = duration / intervals;
   readings.air_time = duration / tests;
   variance /= tests;
   // As in meanVoltage(): noise of some 0.4 steps spreads the readings over the steps of the meter.
-  const double resolution = resolutionOf(voltages, spindle.load_meter_resolution);
+  const double resolution =
+      std::isfinite(shown) ? std::max(shown, spindle.load_meter_resolution) : spindle.load_meter_resolution;
   const double step = resolution / std::sqrt(12.0), noise2 = std::max(0.0, variance - step * step);
   readings.rounding = resolution > 0.0
                           ? step * std::exp(-2.0 * units::PI * units::PI * noise2 / (resolution * resolution))

@@ -392,6 +392,10 @@ TEST(LoadMeterReadings, areThoseOfTheAirCuts) {
   EXPECT_NEAR(readings.period, 0.02, 1e-9);
   EXPECT_NEAR(readings.voltageStd(4.0), readings.noise / std::sqrt(200.0), 1e-6);
   EXPECT_NEAR(readings.rounding, 0.0, 1e-9) << "noise of several steps";
+  // Without noise each air cut is on one step: the differences between air cuts are no resolution.
+  m.noise = 1e-9;
+  for (LoadTest& test : air) test = measure(m, test.condition, 2.0, test.stamp, random);
+  EXPECT_NEAR(readingsOf(air, spindle(), 0.2).voltageStd(4.0), 3e-4 / std::sqrt(12.0), 1e-9);
   const LoadMeterReadings none = readingsOf({}, spindle(), 0.2);
   EXPECT_NEAR(none.voltageStd(100.0), 3e-4 / std::sqrt(12.0), 1e-6) << "one step, whatever the time";
 }
