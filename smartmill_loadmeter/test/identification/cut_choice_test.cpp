@@ -176,7 +176,7 @@ TEST(ChooseCuts, staysWithinStabilityTorquePowerAndStock) {
   goal.power = goal.torque * SPEED, goal.torque = 0.0;
   EXPECT_THAT(chooseCuts(afterAir(quiet()), all, quiet(), spindle(), goal).excluded.front(),
               HasSubstr("W, limit"));
-  // A stock as wide as one slot and two half immersions still has room for three feeds.
+  // A stock as wide as one slot and two half immersions still has space for three feeds.
   goal = goalOf(afterSlots(quiet()));
   goal.stock = TOOL.diameter + MARGIN + 2.0 * TOOL.radius();
   const CutChoice narrow = chooseCuts(afterAir(quiet()), all, quiet(), spindle(), goal);
