@@ -48,7 +48,8 @@ class Chooser {
     const CuttingCondition& c = cut.condition;
     const double depth = c.engagement.axial_depth, limit = (1.0 - goal_.depth_margin) * cut.depth_limit;
     if (cut.depth_limit > 0.0 && depth > limit)
-      return formatted("%.2f mm deep, %.2f mm is stable", depth / units::MM, limit / units::MM);
+      return formatted("%.2f mm deep, expected at most %.2f mm, %.0f %% of the stability limit",
+                       depth / units::MM, limit / units::MM, 100.0 * (1.0 - goal_.depth_margin));
     const auto map = meanForceMatrix(c.tool, c.engagement);
     const double torque = map[3][0] * goal_.highest.ktc + map[3][3] * goal_.highest.kte;
     if (goal_.torque > 0.0 && torque > goal_.torque)

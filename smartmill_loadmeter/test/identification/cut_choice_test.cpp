@@ -163,7 +163,8 @@ TEST(ChooseCuts, staysWithinStabilityTorquePowerAndStock) {
   ChoiceGoal goal = goalOf(afterSlots(quiet()));
   const CutChoice stable = chooseCuts(afterAir(quiet()), all, quiet(), spindle(), goal);
   ASSERT_EQ(stable.excluded.size(), FEEDS.size()) << "2 mm is above 80 % of 2.4 mm";
-  EXPECT_EQ(stable.excluded.front(), "down: 2.00 mm deep, 1.92 mm is stable");
+  EXPECT_EQ(stable.excluded.front(),
+            "down: 2.00 mm deep, expected at most 1.92 mm, 80 % of the stability limit");
   EXPECT_EQ(namesOf(stable, all).count("down"), 0u);
   // N a R / (2 pi) (2 f Ktc + pi Kte) at 0.2 mm: 1.46 N m, at 0.15 mm: 1.21 N m.
   goal.highest.ktc = 1e9, goal.highest.kte = 1.3e4;

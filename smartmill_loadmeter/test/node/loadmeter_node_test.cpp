@@ -164,7 +164,8 @@ TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
   EXPECT_TRUE(call.response.target_reached) << call.response.message;
   EXPECT_EQ(call.response.chosen.size(), 2u) << "two feeds check the stored coefficients";
   ASSERT_EQ(call.response.excluded.size(), 1u);
-  EXPECT_EQ(call.response.excluded[0], "half_2: 2.00 mm deep, 0.80 mm is stable");
+  EXPECT_EQ(call.response.excluded[0],
+            "half_2: 2.00 mm deep, expected at most 0.80 mm, 80 % of the stability limit");
   call.request.stock.pop_back();
   ASSERT_TRUE(find.call(call));
   EXPECT_NE(call.response.message.find("3 cuts, 3 cutting_time, 2 stock"), std::string::npos);
