@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <set>
 
+#include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_loadmeter/database/recommend.h"
 #include "smartmill_loadmeter/identification/production.h"
@@ -114,10 +116,20 @@ CutChoice chooseCuts(const FoundCoefficients& found, const CutChoiceRequest& req
   ChoiceGoal goal;
   CutInformation known;
   known.addKnowledge(start);
+  std::set<double> air_speeds;
   for (const CuttingCondition& test : request.made) {
     const bool cut = test.kind == CuttingCondition::Kind::cut;
     known.addTest(test, spindle, readings.voltageStd(cut ? steadyTime(test) - settling : readings.air_time));
-    if (cut) goal.feeds_made.push_back(test.engagement.feed_per_tooth);
+    if (cut) {
+      goal.feeds_made.push_back(test.engagement.feed_per_tooth);
+    } else {
+      air_speeds.insert(test.spindle_speed);
+    }
+  }
+  if (air_speeds.size() < 2) {
+    throw Error(
+        formatted("tests: air cuts at %zu speeds, expected two or more for the friction of the spindle",
+                  air_speeds.size()));
   }
   const RecursiveCoefficients::Start metal;
   goal.highest.ktc = (stored ? found.known->combined.set.value.ktc : metal.ktc) + std::sqrt(start.tc);

@@ -161,6 +161,14 @@ TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
   call.request.target_std[0] = 2.0 * result->coefficients.ktc_std;
   call.request.target_std[1] = 2.0 * result->coefficients.kte_std;
   ASSERT_TRUE(find.call(call));
+  EXPECT_NE(call.response.message.find("air cuts at 0 speeds"), std::string::npos) << call.response.message;
+  for (const double speed : {300.0, 900.0}) {
+    CuttingCondition air;
+    air.kind = CuttingCondition::Kind::air;
+    air.spindle_speed = speed;
+    call.request.tests.push_back(toMsg(air));
+  }
+  ASSERT_TRUE(find.call(call));
   EXPECT_TRUE(call.response.target_reached) << call.response.message;
   EXPECT_EQ(call.response.chosen.size(), 2u) << "two feeds check the stored coefficients";
   ASSERT_EQ(call.response.excluded.size(), 1u);

@@ -46,7 +46,7 @@ struct CutChoiceRequest {
 /// with earlier knowledge, as for the identification.
 /// @param air_cuts measured in the session, whose readings show the noise of the load meter. @param settling
 /// [s] of a steady part without readings
-/// @throws Error if the model has no spindle.
+/// @throws Error if the model has no spindle or the air cuts have fewer than two speeds.
 CutChoice chooseCuts(const FoundCoefficients& found, const CutChoiceRequest& request,
                      const std::vector<LoadTest>& air_cuts, double settling, const MachineModel& model);
 
