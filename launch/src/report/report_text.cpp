@@ -144,6 +144,12 @@ std::vector<std::string> testPlanNotes(const std::string& session) {
           cuts, planned_cuts, tests - cuts, planned - planned_cuts, plan.value("made_time_s", 0.0) / 60.0,
           plan.value("planned_time_s", 0.0) / 60.0, planned - tests, saved / 60.0) +
       plan.value("stored", "")};
+  std::string chosen;
+  for (const Json& cut : plan.value("chosen_cuts", Json::array())) {
+    chosen += (chosen.empty() ? "cuts by their information per second of cutting: " : ", ") +
+              cut.value("name", "") + formatted(" (%.2f)", numberAt(cut, "information_per_s"));
+  }
+  if (!chosen.empty()) notes.push_back(chosen);
   const Json known = plan.value("stored_coefficients", Json::array());
   const Json found = summary.value("coefficients", Json::array());
   if (known.empty() || found.empty()) return notes;

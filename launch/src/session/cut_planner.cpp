@@ -20,8 +20,25 @@ double wholeRpm(double speed) {
 
 }  // namespace
 
+double PlannedCut::cuttingTime() const {
+  return (feed > 0.0 ? (to[0] - from[0]) / feed : 0.0) +
+         (leave_y ? std::abs(*leave_y - to[1]) / leave_feed : 0.0);
+}
+
 double PlannedCut::duration() const {
-  return spin_up + dwell + (feed > 0.0 ? (to[0] - from[0]) / feed : 0.0);
+  return spin_up + dwell + cuttingTime();
+}
+
+const char* wordOf(Immersion immersion) {
+  switch (immersion) {
+    case Immersion::half_up:
+      return "half_up";
+    case Immersion::half_down:
+      return "half_down";
+    case Immersion::slot:
+      break;
+  }
+  return "slot";
 }
 
 void PathParameters::declareNames(ParameterTable& table) {
@@ -53,8 +70,7 @@ CutPlanner::CutPlanner(const MachineModel& model, const PathParameters& paramete
       stock_(model.needWorkpiece("plan the cuts")) {
   material_ = parameters_.material.empty() ? stock_.material : parameters_.material;
   const double width = stock_.high[1] - stock_.low[1] - 2.0 * parameters_.lane_margin - tool_.diameter;
-  const double pitch = tool_.diameter + parameters_.lane_margin;
-  lanes_ = width < 0.0 ? 0 : static_cast<std::size_t>(std::floor(width / pitch + 1e-9)) + 1;
+  lanes_ = width < 0.0 ? 0 : static_cast<std::size_t>(std::floor(width / laneWidth() + 1e-9)) + 1;
   if (stock_.high[2] + parameters_.safe_height > axes_.travel[2][1]) {
     throw Error(file_ + ": safe_height " + mm(parameters_.safe_height) +
                 " above the stock is beyond the travel of z");
@@ -68,9 +84,29 @@ void CutPlanner::requireLanes(std::size_t needed, const std::string& purpose) co
               ", expected " + std::to_string(needed) + " (" + purpose + ")");
 }
 
-double CutPlanner::laneY(std::size_t lane) const {
-  return stock_.low[1] + parameters_.lane_margin + tool_.radius() +
-         static_cast<double>(lane) * (tool_.diameter + parameters_.lane_margin);
+double CutPlanner::laneWidth() const {
+  return tool_.diameter + parameters_.lane_margin;
+}
+
+double CutPlanner::stripWidth() const {
+  return tool_.radius();
+}
+
+double CutPlanner::width() const {
+  return stock_.high[1] - stock_.low[1] - parameters_.lane_margin;
+}
+
+double CutPlanner::laneY(const SlotRequest& request) const {
+  const double before = static_cast<double>(request.lane);
+  switch (request.immersion) {
+    case Immersion::half_up:
+      return stock_.low[1] + before * stripWidth();
+    case Immersion::half_down:
+      return stock_.high[1] - before * stripWidth();
+    case Immersion::slot:
+      break;
+  }
+  return stock_.low[1] + request.shift + parameters_.lane_margin + tool_.radius() + before * laneWidth();
 }
 
 double CutPlanner::spinUp(double speed) const {
@@ -117,7 +153,7 @@ PlannedCut CutPlanner::slot(const SlotRequest& request) const {
                 numberText(axes_.rapid / units::MM * 60.0) + " mm/min");
   }
   planned.spin_up = spinUp(request.speed);
-  const double y = laneY(request.lane), z = stock_.high[2] - request.depth;
+  const double y = laneY(request), z = stock_.high[2] - request.depth;
   planned.from = {stock_.low[0] - tool_.radius() - parameters_.clearance, y, z};
   const double steady_from = stock_.low[0] + tool_.radius() + feed_per_revolution;
   const double far_end = stock_.high[0] - tool_.radius() - parameters_.reserves.exit;
@@ -129,7 +165,13 @@ PlannedCut CutPlanner::slot(const SlotRequest& request) const {
                 mm(stock_.high[0] - stock_.low[0]) + " of stock, expected at least " +
                 numberText(request.least_time, 2) + " s (reduce the feed or use a longer stock)");
   }
-  planned.to = {steady_to + run_out, y, z};
+  planned.to = {std::max(steady_to + run_out, std::min(request.least_end, stock_.high[0])), y, z};
+  const bool half = request.immersion != Immersion::slot, down = request.immersion == Immersion::half_down;
+  if (half) {
+    const double away = tool_.radius() + parameters_.clearance;
+    planned.leave_y = down ? y + away : y - away;
+    planned.leave_feed = parameters_.plunge_feed;
+  }
   CuttingCondition& condition = planned.condition;
   condition.kind = CuttingCondition::Kind::cut;
   condition.name = request.name;
@@ -137,7 +179,8 @@ PlannedCut CutPlanner::slot(const SlotRequest& request) const {
   condition.tool_name = parameters_.tool;
   condition.tool = tool_;
   condition.tool.pitch.clear();
-  condition.engagement = {0.0, units::PI, request.depth, request.feed_per_tooth};
+  condition.engagement = {down ? 0.5 * units::PI : 0.0, half && !down ? 0.5 * units::PI : units::PI,
+                          request.depth, request.feed_per_tooth};
   condition.spindle_speed = units::radPerSecFromRpm(rpm);
   condition.steady_from = {steady_from, y, z};
   condition.steady_to = {steady_to, y, z};
@@ -146,7 +189,8 @@ PlannedCut CutPlanner::slot(const SlotRequest& request) const {
 }
 
 void CutPlanner::checkTravel(const PlannedCut& cut) const {
-  for (const std::array<double, 3>& point : {cut.from, cut.to}) {
+  const std::array<double, 3> left{cut.to[0], cut.leave_y.value_or(cut.to[1]), cut.to[2]};
+  for (const std::array<double, 3>& point : {cut.from, cut.to, left}) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (point[axis] < axes_.travel[axis][0] || point[axis] > axes_.travel[axis][1]) {
         throw Error(cut.condition.name + ": " + "xyz"[axis] + " = " + mm(point[axis]) +
@@ -166,7 +210,7 @@ PlannedCut CutPlanner::airMove(double speed, double feed, double time, double di
                 numberText(axes_.rapid / units::MM * 60.0) + " mm/min");
   }
   planned.feed = feed;
-  const double run_in = feed * parameters_.reserves.run_out_time, y = laneY(0),
+  const double run_in = feed * parameters_.reserves.run_out_time, y = laneY({}),
                z = stock_.high[2] + parameters_.safe_height;
   condition.steady_from = {stock_.low[0] + run_in, y, z};
   condition.steady_to = {condition.steady_from[0] + std::max(distance, feed * time), y, z};
@@ -212,6 +256,7 @@ std::string CutPlanner::program(const PlannedCut& cut, const std::array<double, 
   go({std::nullopt, std::nullopt, cut.from[2]}, parameters_.plunge_feed);
   if (parameters_.feed_block > 0) text += "N" + std::to_string(parameters_.feed_block) + " ";
   go({cut.to[0], std::nullopt, std::nullopt}, cut.feed);
+  if (cut.leave_y) go({std::nullopt, *cut.leave_y, std::nullopt}, cut.leave_feed);
   go({std::nullopt, std::nullopt, safe}, 0.0);
   return text + "M5\n";
 }

@@ -22,6 +22,17 @@ void declareTests(PlanParameters& p, ParameterTable& table) {
   table.number("slot_time", p.slot_time, "s", Range::positive(), "maximum time of steady cutting");
   table.number("least_slot_time", p.least_slot_time, "s", Range::positive(),
                "minimum time of steady cutting; the load meter settles in about 0.2 s");
+  table.choice(
+      "test_cuts", p.test_cuts, {"slots", "informative"},
+      "slots: one at each feed; informative: of slots and cuts of half immersion at these feeds, those "
+      "with the most information per second of cutting until the targets are reached");
+  table.number("half_up_depth", p.half_up_depth, "m", Range::positive(),
+               "axial depth of up-milling cuts of half immersion; more informative than slots from twice "
+               "their depth on");
+  table.number("half_down_depth", p.half_down_depth, "m", Range::positive(), "the same of down-milling cuts");
+  table.number("target_ktc_std", p.target_ktc_std, "N/m2", Range::positive(),
+               "informative: standard deviation of Ktc at which no further cut is made");
+  table.number("target_kte_std", p.target_kte_std, "N/m", Range::positive(), "the same of Kte");
 }
 
 void declareChecks(PlanParameters& p, ParameterTable& table) {

@@ -8,6 +8,7 @@
 #include <smartmill_msgs/ForceCurve.h>
 #include <smartmill_msgs/SampleBlock.h>
 #include <smartmill_msgs/SpindleAngle.h>
+#include <smartmill_msgs/WhatIf.h>
 #include <boost/function.hpp>
 
 #include "smartmill_core/error.h"
@@ -21,8 +22,9 @@
 namespace smartmill::session {
 namespace {
 
-constexpr double FRESH = 0.5;       // [s] since the last message of a sensor
-constexpr double CURVE_WAIT = 5.0;  // [s] after the last cut, for the force curve that contains it
+constexpr double FRESH = 0.5;        // [s] since the last message of a sensor
+constexpr double CURVE_WAIT = 5.0;   // [s] after the last cut, for the force curve that contains it
+constexpr double CHART_WAIT = 20.0;  // [s] for the stability limit of another immersion
 
 std::string modesText(const smartmill_msgs::ModalModel& model) {
   std::string text;
@@ -65,7 +67,8 @@ Session::Session(ros::NodeHandle nh, const ros::NodeHandle& private_nh, const st
       sensor_(nh_, parameters_.calibration, driver_, sensor_frf_,
               [this](const std::string& request) { log_.request(request); }) {
   tests_ = plan_.airCuts();
-  tests_.insert(tests_.end(), plan_.slots().begin(), plan_.slots().end());
+  if (!parameters_.plan.isInformative())
+    tests_.insert(tests_.end(), plan_.slots().begin(), plan_.slots().end());
   prior_ = nh_.advertise<smartmill_msgs::CoefficientPrior>(names::COEFFICIENT_PRIOR, 1, true);
   const auto subscribe = [this](const char* topic, auto example, auto use) {
     using Message = decltype(example);
@@ -314,56 +317,160 @@ std::string Session::useStored() {
     plan.stored = service.response.message;
     has_prior_ = service.response.of_pair && service.response.identifications > 0;
   }
-  if (!has_prior_) return plan.stored + "; all tests are made";
+  if (!has_prior_) return plan.stored + (parameters_.plan.isInformative() ? "" : "; all tests are made");
   smartmill_msgs::CoefficientPrior prior;
   prior.header.stamp = ros::Time::now();
   prior.coefficients = service.response.coefficients;
   prior.ktc_kte_covariance = service.response.ktc_kte_covariance;
   prior_.publish(prior);
   plan.known = {fromMsg(prior.coefficients)};
-  needed_ = {service.response.needed.begin(), service.response.needed.end()};
   const CoefficientSet& k = plan.known.front();
-  return formatted("%s: Ktc %.1f +- %.1f N/mm2, Kte %.2f +- %.2f N/mm; %zu of %zu tests are needed",
-                   plan.stored.c_str(), k.value.ktc / units::N_PER_MM2, k.std_dev.ktc / units::N_PER_MM2,
-                   k.value.kte / units::N_PER_MM, k.std_dev.kte / units::N_PER_MM, needed_.size(),
-                   tests_.size());
+  const std::string text = formatted("%s: Ktc %.1f +- %.1f N/mm2, Kte %.2f +- %.2f N/mm", plan.stored.c_str(),
+                                     k.value.ktc / units::N_PER_MM2, k.std_dev.ktc / units::N_PER_MM2,
+                                     k.value.kte / units::N_PER_MM, k.std_dev.kte / units::N_PER_MM);
+  if (parameters_.plan.isInformative()) return text;  // the cuts are chosen after the air cuts
+  needed_ = {service.response.needed.begin(), service.response.needed.end()};
+  return text + formatted("; %zu of %zu tests are needed", needed_.size(), tests_.size());
+}
+
+// Stability limits of the candidates by the chart of this tool and material, at their immersion; 0: unknown.
+std::vector<double> Session::depthLimits(const std::vector<std::size_t>& candidates) const {
+  std::vector<double> limits(candidates.size(), 0.0);
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!chart_ || chart_->tool != parameters_.plan.tool || chart_->material != plan_.material())
+      return limits;
+  }
+  std::map<double, smartmill_msgs::WhatIf> charts;  // by the middle of the immersion
+  for (std::size_t k = 0; k < candidates.size(); ++k) {
+    const CuttingCondition& cut = plan_.candidates()[candidates[k]].condition;
+    const double middle = 0.5 * (cut.engagement.entry + cut.engagement.exit);
+    if (charts.count(middle) == 0) {
+      smartmill_msgs::WhatIf service;
+      service.request.helix = service.request.overhang = service.request.axial_depth = NOT_A_NUMBER;
+      service.request.entry_angle = cut.engagement.entry;
+      service.request.exit_angle = cut.engagement.exit;
+      service.request.feed_per_tooth = cut.engagement.feed_per_tooth;
+      if (!driver_.callService(names::WHAT_IF, service, CHART_WAIT) ||
+          service.response.code != smartmill_msgs::WhatIf::Response::OK)
+        return std::vector<double>(candidates.size(), 0.0);
+      charts[middle] = service;
+    }
+    // The smaller of the two neighbours.
+    const auto& speed = charts[middle].response.spindle_speed;
+    const auto& depth = charts[middle].response.depth_limit;
+    const auto above = std::lower_bound(speed.begin(), speed.end(), cut.spindle_speed) - speed.begin();
+    if (above == 0 || above == static_cast<std::ptrdiff_t>(speed.size())) continue;
+    const auto at = static_cast<std::size_t>(above);
+    limits[k] = std::min(depth[at - 1], depth[at]);
+  }
+  return limits;
+}
+
+// Queries the load meter node which of the candidates to make, and lays them into the stock.
+std::string Session::chooseCuts(bool without_stored) {
+  const std::vector<std::size_t> available = plan_.available();
+  smartmill_msgs::FindCoefficients service;
+  service.request.tool = parameters_.plan.tool;
+  service.request.material = plan_.material();
+  for (const std::size_t i : made_) service.request.tests.push_back(toMsg(tests_[i].condition));
+  for (const std::size_t i : available) {
+    const PlannedCut& cut = plan_.candidates()[i];
+    service.request.candidates.push_back(toMsg(cut.condition));
+    service.request.cutting_time.push_back(cut.cuttingTime());
+    service.request.stock.push_back(plan_.stockOf(i));
+  }
+  service.request.depth_limit = depthLimits(available);
+  service.request.stock_available = plan_.freeStock();
+  service.request.target_std[0] = parameters_.plan.target_ktc_std;
+  service.request.target_std[1] = parameters_.plan.target_kte_std;
+  service.request.without_stored = without_stored;
+  if (!driver_.callService(names::FIND_COEFFICIENTS, service, MachineDriver::SERVICE_WAIT))
+    throw Error(std::string(names::FIND_COEFFICIENTS) + ": no answer");
+  const auto& answer = service.response;
+  std::vector<std::size_t> chosen;
+  for (const std::uint32_t k : answer.chosen) chosen.push_back(available.at(k));
+  if (chosen.empty() && !answer.target_reached) {
+    std::string reasons;
+    for (const std::string& one : answer.excluded) reasons += "; " + one;
+    throw Error("no cut within the limits: " + answer.message + reasons);
+  }
+  SessionSummary::TestPlan& plan = log_.summary.test_plan;
+  const std::vector<PlannedCut> cuts = plan_.place(chosen);
+  std::string text;
+  needed_.clear();
+  for (std::size_t k = 0; k < cuts.size(); ++k) {
+    needed_.insert(tests_.size());
+    tests_.push_back(cuts[k]);
+    plan.chosen.push_back(
+        {cuts[k].condition.name, answer.chosen_gain[k], answer.chosen_ktc_std[k], answer.chosen_kte_std[k]});
+    text += formatted("%s %s (%.2f /s)", text.empty() ? "" : ",", cuts[k].condition.name.c_str(),
+                      answer.chosen_gain[k]);
+  }
+  for (const std::string& one : answer.excluded) plan.excluded.push_back(one);
+  plan.target_reached = answer.target_reached;
+  if (cuts.empty()) return "none is needed";
+  return formatted("information per second of cutting:%s; expected Ktc +- %.1f N/mm2, Kte +- %.2f N/mm",
+                   text.c_str(), answer.chosen_ktc_std.back() / units::N_PER_MM2,
+                   answer.chosen_kte_std.back() / units::N_PER_MM) +
+         (answer.target_reached ? "" : ", which is above the target") +
+         (answer.excluded.empty() ? ""
+                                  : formatted("; %zu candidates beyond a limit", answer.excluded.size()));
 }
 
 void Session::runTests(const std::set<std::size_t>& selected) {
   SessionSummary::TestPlan& plan = log_.summary.test_plan;
   for (const std::size_t i : selected) {
     const PlannedCut& test = tests_.at(i);
+    const Engagement& engagement = test.condition.engagement;
     const bool is_cut = test.condition.kind == CuttingCondition::Kind::cut;
-    step((is_cut ? "slot test " : "air cut ") + test.condition.name, [&] { return runCut(test); });
+    const bool is_slot = engagement.exit - engagement.entry > 0.75 * units::PI;
+    step((!is_cut   ? "air cut "
+          : is_slot ? "slot test "
+                    : "half immersion test ") +
+             test.condition.name,
+         [&] { return runCut(test); });
+    made_.insert(i);
     ++plan.made;
     plan.made_cuts += is_cut ? 1 : 0;
     plan.made_time += test.duration();
   }
 }
 
+std::string Session::identifyAndCompare() {
+  const std::string detail = identify(false);
+  const std::string& source = log_.summary.coefficients.front().source;
+  log_.summary.test_plan.used = source.find(names::WITH_STORED) != std::string::npos;
+  return detail;
+}
+
 void Session::identifyFromTests() {
+  const bool informative = parameters_.plan.isInformative();
   SessionSummary::TestPlan& plan = log_.summary.test_plan;
-  for (const PlannedCut& test : tests_) {
-    ++plan.planned;
-    plan.planned_cuts += test.condition.kind == CuttingCondition::Kind::cut ? 1 : 0;
-    plan.planned_time += test.duration();
+  for (const std::vector<PlannedCut>* tests : {&plan_.airCuts(), &plan_.slots()}) {
+    for (const PlannedCut& test : *tests) {
+      ++plan.planned;
+      plan.planned_cuts += test.condition.kind == CuttingCondition::Kind::cut ? 1 : 0;
+      plan.planned_time += test.duration();
+    }
   }
   runTests(needed_);
-  const auto isUsed = [&] {
-    const std::string& source = log_.summary.coefficients.front().source;
-    return source.find(names::WITH_STORED) != std::string::npos;
-  };
-  step("cutting coefficients", [&] { return identify(false); });
-  plan.used = isUsed();
-  if (has_prior_ && !plan.used && needed_.size() < tests_.size()) {
-    std::set<std::size_t> others;
-    for (std::size_t i = 0; i < tests_.size(); ++i) {
-      if (needed_.count(i) == 0) others.insert(i);
-    }
-    step("stored coefficients disagree", [&] { return std::string("the other tests are made"); });
-    runTests(others);
-    step("cutting coefficients from all tests", [&] { return identify(false); });
-    plan.used = isUsed();
+  if (informative) {
+    step("choice of cuts", [&] { return chooseCuts(!has_prior_); });
+    runTests(needed_);
+  }
+  step("cutting coefficients", [&] { return identifyAndCompare(); });
+  if (has_prior_ && !plan.used && (informative || made_.size() < tests_.size())) {
+    step("stored coefficients disagree", [&] {
+      if (informative) return chooseCuts(true);
+      needed_.clear();
+      for (std::size_t i = 0; i < tests_.size(); ++i) {
+        if (made_.count(i) == 0) needed_.insert(i);
+      }
+      return std::string("the other tests are made");
+    });
+    runTests(needed_);
+    step("cutting coefficients from all tests", [&] { return identifyAndCompare(); });
   }
   step("test plan", [&] { return plan.text(); });
 }

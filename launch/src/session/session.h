@@ -52,6 +52,9 @@ class Session {
   std::string useStored();
   void runTests(const std::set<std::size_t>& selected);
   void identifyFromTests();
+  std::string identifyAndCompare();
+  std::string chooseCuts(bool without_stored);
+  std::vector<double> depthLimits(const std::vector<std::size_t>& candidates) const;
   void waitVerdict();
   void waitCurve() const;
   std::string identify(bool reset);
@@ -84,8 +87,9 @@ class Session {
   std::optional<smartmill_msgs::ChatterState> verdict_;        // the latest
   ros::Time curve_stamp_;  // end of the last cut that the force curve contains
 
-  std::vector<PlannedCut> tests_;  // air cuts, then slots
+  std::vector<PlannedCut> tests_;  // air cuts, then slots or the chosen cuts
   std::set<std::size_t> needed_;   // of these, with the stored coefficients
+  std::set<std::size_t> made_;     // of these
   bool has_prior_ = false;         // the coefficients of the database are used
   ros::Publisher prior_;
 

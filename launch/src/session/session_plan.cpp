@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "session/number_text.h"
 #include "smartmill_core/error.h"
@@ -11,6 +12,7 @@ namespace smartmill::session {
 namespace {
 
 constexpr std::size_t VERIFYING_CUTS = 2;
+constexpr std::size_t FEWEST_CUTS = 3;  // for the coefficients, as slots
 
 const PlanParameters& checked(const PlanParameters& parameters) {
   parameters.validate();
@@ -21,38 +23,143 @@ const PlanParameters& checked(const PlanParameters& parameters) {
 
 SessionPlan::SessionPlan(const MachineModel& model, const PlanParameters& parameters)
     : parameters_(checked(parameters)), planner_(model, parameters) {
-  const std::size_t slots = parameters_.slot_feeds.size();
-  const bool with_resonance = parameters_.resonance_speed > 0.0;
-  const std::size_t needed = slots + VERIFYING_CUTS + (with_resonance ? 1 : 0);
+  const bool informative = parameters_.isInformative();
+  const std::size_t tests = informative ? FEWEST_CUTS : parameters_.slot_feeds.size();
+  const std::size_t needed = tests + verifyingCuts();
   planner_.requireLanes(
-      needed, std::to_string(slots) + " slot tests, " + std::to_string(needed - slots) + " verifying cuts");
+      needed, std::to_string(tests) + " slot tests, " + std::to_string(needed - tests) + " verifying cuts");
   for (double speed : parameters_.air_speeds) air_cuts_.push_back(planner_.air(speed, parameters_.air_time));
   for (double feed : parameters_.air_feeds)
     air_moves_.push_back(
         planner_.airMove(parameters_.slot_speed, feed, parameters_.air_move_time, parameters_.air_way));
-  for (std::size_t i = 0; i < slots; ++i) {
-    slots_.push_back(
-        planner_.slot({"slot_" + std::to_string(i + 1), i, parameters_.slot_speed, parameters_.slot_depth,
-                       parameters_.slot_feeds[i], parameters_.slot_time, parameters_.least_slot_time}));
+  for (std::size_t i = 0; i < parameters_.slot_feeds.size(); ++i)
+    slots_.push_back(planner_.slot(slotRequest(i)));
+  if (informative) {
+    addCandidates();
+  } else {
+    verifying_lane_ = slots_.size();
   }
-  if (with_resonance) {
-    const double least = parameters_.least_revolutions * units::TWO_PI / parameters_.resonance_speed;
-    resonance_ = planner_.slot({"resonance", slots + VERIFYING_CUTS, parameters_.resonance_speed,
-                                parameters_.resonance_depth, parameters_.resonance_feed,
-                                parameters_.resonance_time, least});
+  planResonance();
+}
+
+std::size_t SessionPlan::verifyingCuts() const {
+  return VERIFYING_CUTS + (parameters_.resonance_speed > 0.0 ? 1 : 0);
+}
+
+SlotRequest SessionPlan::slotRequest(std::size_t feed) const {
+  SlotRequest request;
+  request.name = "slot_" + std::to_string(feed + 1);
+  request.lane = feed;
+  request.speed = parameters_.slot_speed;
+  request.depth = parameters_.slot_depth;
+  request.feed_per_tooth = parameters_.slot_feeds[feed];
+  request.time = parameters_.slot_time;
+  request.least_time = parameters_.least_slot_time;
+  return request;
+}
+
+void SessionPlan::addCandidates() {
+  for (const Immersion immersion : {Immersion::slot, Immersion::half_up, Immersion::half_down}) {
+    for (std::size_t i = 0; i < parameters_.slot_feeds.size(); ++i) {
+      SlotRequest request = slotRequest(i);
+      request.immersion = immersion;
+      request.lane = 0;
+      if (immersion != Immersion::slot) {
+        request.name = wordOf(immersion) + ("_" + std::to_string(i + 1));
+        request.depth =
+            immersion == Immersion::half_up ? parameters_.half_up_depth : parameters_.half_down_depth;
+      }
+      requests_.push_back(request);
+      candidates_.push_back(planner_.slot(request));
+    }
   }
+  placed_.assign(candidates_.size(), false);
+}
+
+void SessionPlan::planResonance() {
+  if (!(parameters_.resonance_speed > 0.0)) return;
+  SlotRequest request;
+  request.name = "resonance";
+  request.lane = verifying_lane_ + VERIFYING_CUTS;
+  request.speed = parameters_.resonance_speed;
+  request.depth = parameters_.resonance_depth;
+  request.feed_per_tooth = parameters_.resonance_feed;
+  request.time = parameters_.resonance_time;
+  request.least_time = parameters_.least_revolutions * units::TWO_PI / parameters_.resonance_speed;
+  request.shift = shift_;
+  resonance_ = planner_.slot(request);
+}
+
+std::vector<std::size_t> SessionPlan::available() const {
+  const bool first = std::find(placed_.begin(), placed_.end(), true) == placed_.end();
+  std::vector<std::size_t> indices;
+  for (std::size_t i = 0; i < requests_.size(); ++i) {
+    if (!placed_[i] && (first || requests_[i].immersion == Immersion::slot)) indices.push_back(i);
+  }
+  return indices;
+}
+
+double SessionPlan::stockOf(std::size_t candidate) const {
+  return requests_.at(candidate).immersion == Immersion::slot ? planner_.laneWidth() : planner_.stripWidth();
+}
+
+double SessionPlan::freeStock() const {
+  double width = planner_.width() - static_cast<double>(verifyingCuts()) * planner_.laneWidth();
+  for (std::size_t i = 0; i < requests_.size(); ++i) width -= placed_[i] ? stockOf(i) : 0.0;
+  return width;
+}
+
+std::vector<PlannedCut> SessionPlan::place(const std::vector<std::size_t>& chosen) {
+  // Lanes: the verifying cuts, then the slots. Strips begin at the sides of the stock.
+  std::map<Immersion, std::size_t> next{{Immersion::slot, verifyingCuts()}};
+  double width = 0.0;
+  for (std::size_t i = 0; i < requests_.size(); ++i) next[requests_[i].immersion] += placed_[i] ? 1 : 0;
+  for (const std::size_t i : chosen) {
+    requests_.at(i).lane = next[requests_[i].immersion]++;
+    width += stockOf(i);
+  }
+  if (width > freeStock() * (1.0 + 1e-9)) {
+    throw Error("test cuts: " + mm(width) + " of stock in y, " + mm(std::max(0.0, freeStock())) + " is free");
+  }
+  for (const std::size_t i : chosen) placed_[i] = true;
+  shift_ = static_cast<double>(next[Immersion::half_up]) * planner_.stripWidth();
+  // The side of a strip is free as far as the strip before it was cut, beyond the front of the tool.
+  std::map<Immersion, double> free_until;
+  std::vector<PlannedCut> cuts(chosen.size());
+  for (std::size_t k = chosen.size(); k-- > 0;) {
+    SlotRequest request = requests_[chosen[k]];
+    if (request.immersion == Immersion::slot) {
+      request.shift = shift_;
+    } else if (free_until.count(request.immersion)) {
+      request.least_end = free_until[request.immersion];
+    }
+    cuts[k] = planner_.slot(request);
+    free_until[request.immersion] = cuts[k].to[0] + planner_.stripWidth();
+  }
+  planResonance();
+  return cuts;
+}
+
+PlannedCut SessionPlan::verifying(const char* name, std::size_t lane, const Point& point,
+                                  double feed_per_tooth, double time) const {
+  SlotRequest request;
+  request.name = name;
+  request.lane = verifying_lane_ + lane;
+  request.speed = point.spindle_speed;
+  request.depth = point.axial_depth;
+  request.feed_per_tooth = feed_per_tooth;
+  request.time = time;
+  request.least_time = parameters_.least_revolutions * units::TWO_PI / point.spindle_speed;
+  request.shift = shift_;
+  return planner_.slot(request);
 }
 
 PlannedCut SessionPlan::stable(const Point& point, double feed_per_tooth) const {
-  return planner_.slot({"verify_stable", slots_.size(), point.spindle_speed, point.axial_depth,
-                        feed_per_tooth, parameters_.stable_time,
-                        parameters_.least_revolutions * units::TWO_PI / point.spindle_speed});
+  return verifying("verify_stable", 0, point, feed_per_tooth, parameters_.stable_time);
 }
 
 PlannedCut SessionPlan::unstable(const Point& point, double feed_per_tooth) const {
-  return planner_.slot({"verify_unstable", slots_.size() + 1, point.spindle_speed, point.axial_depth,
-                        feed_per_tooth, parameters_.unstable_time,
-                        parameters_.least_revolutions * units::TWO_PI / point.spindle_speed});
+  return verifying("verify_unstable", 1, point, feed_per_tooth, parameters_.unstable_time);
 }
 
 std::optional<Point> SessionPlan::firstStable(const std::vector<Point>& points, double feed_per_tooth,

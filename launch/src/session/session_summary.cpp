@@ -48,20 +48,37 @@ Json coefficientsOf(const CoefficientSet& set) {
 Json planOf(const SessionSummary::TestPlan& plan) {
   Json known = Json::array();
   for (const CoefficientSet& set : plan.known) known.push_back(coefficientsOf(set));
-  return {{"planned_tests", plan.planned},
-          {"made_tests", plan.made},
-          {"planned_cuts", plan.planned_cuts},
-          {"made_cuts", plan.made_cuts},
-          {"planned_time_s", plan.planned_time},
-          {"made_time_s", plan.made_time},
-          {"stored", plan.stored},
-          {"stored_coefficients", known},
-          {"stored_used", plan.used}};
+  Json chosen = Json::array();
+  for (const SessionSummary::TestPlan::Chosen& cut : plan.chosen) {
+    chosen.push_back({{"name", cut.name},
+                      {"information_per_s", number(cut.gain)},
+                      {"expected_ktc_n_per_m2_std", number(cut.ktc_std)},
+                      {"expected_kte_n_per_m_std", number(cut.kte_std)}});
+  }
+  Json json{{"planned_tests", plan.planned},
+            {"made_tests", plan.made},
+            {"planned_cuts", plan.planned_cuts},
+            {"made_cuts", plan.made_cuts},
+            {"planned_time_s", plan.planned_time},
+            {"made_time_s", plan.made_time},
+            {"stored", plan.stored},
+            {"stored_coefficients", known},
+            {"stored_used", plan.used}};
+  if (plan.chosen.empty()) return json;
+  json["chosen_cuts"] = chosen;
+  json["target_reached"] = plan.target_reached;
+  json["excluded_cuts"] = plan.excluded;
+  return json;
 }
 
 }  // namespace
 
 std::string SessionSummary::TestPlan::text() const {
+  if (!chosen.empty()) {
+    return formatted("%zu cuts in place of %zu slots, %zu of %zu air cuts, %.2f min in place of %.2f min",
+                     made_cuts, planned_cuts, made - made_cuts, planned - planned_cuts, made_time / 60.0,
+                     planned_time / 60.0);
+  }
   return formatted("%zu of %zu cuts, %zu of %zu air cuts, %.2f of %.2f min", made_cuts, planned_cuts,
                    made - made_cuts, planned - planned_cuts, made_time / 60.0, planned_time / 60.0);
 }

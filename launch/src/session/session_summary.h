@@ -33,6 +33,15 @@ struct SessionSummary {
     std::string stored;                           ///< what the database knew, in one line
     std::vector<CoefficientSet> known;            ///< none or one
     bool used = false;                            ///< the tests agree with it
+    /// A cut that was chosen for its information (test_cuts `informative`).
+    struct Chosen {
+      std::string name;
+      double gain = 0.0;                    ///< [1/s] of cutting
+      double ktc_std = 0.0, kte_std = 0.0;  ///< [N/m2], [N/m] expected after it
+    };
+    std::vector<Chosen> chosen;         ///< in order
+    std::vector<std::string> excluded;  ///< candidates beyond a limit, each with the reason
+    bool target_reached = false;        ///< expected standard deviations of the chosen cuts
 
     std::string text() const;
   };

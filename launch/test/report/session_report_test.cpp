@@ -251,5 +251,13 @@ TEST(SessionReport, statesHowMuchShorterTheTestPlanBecame) {
             "Ktc: stored 800.00 +- 5.00 N/mm2, now 802.00 +- 3.00 N/mm2, difference 0.5 standard deviations");
 }
 
+TEST(SessionReport, namesTheCutsThatWereChosenForTheirInformation) {
+  const auto notes = testPlanNotes(
+      R"({"test_plan": {"planned_tests": 8, "made_tests": 7, "planned_cuts": 4, "made_cuts": 3, "chosen_cuts":
+    [{"name": "half_up_4", "information_per_s": 1.256}, {"name": "slot_1", "information_per_s": 0.5}]}})");
+  ASSERT_EQ(notes.size(), 2u);
+  EXPECT_EQ(notes[1], "cuts by their information per second of cutting: half_up_4 (1.26), slot_1 (0.50)");
+}
+
 }  // namespace
 }  // namespace smartmill::report

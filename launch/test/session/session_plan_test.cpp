@@ -5,6 +5,7 @@
 #include <map>
 #include <sstream>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "smartmill_core/error.h"
@@ -215,6 +216,158 @@ TEST(SessionPlan, RefusesCutsThatDoNotFitInOneLine) {
   model = mill();
   model.workpiece.reset();
   EXPECT_NE(refusal(model, parameters).find("workpiece is missing"), std::string::npos);
+}
+
+// ----------------------------------------------------------------- cuts of half immersion
+
+PlanParameters informative() {
+  PlanParameters parameters;
+  parameters.test_cuts = "informative";
+  parameters.half_up_depth = 3.0 * MM;
+  return parameters;
+}
+
+/// The stock after the motions of NC programs below its top; independent of the planner.
+class CutStock {
+ public:
+  explicit CutStock(const MachineModel& model) : box_(*model.workpiece), radius_(model.tool->radius()) {}
+
+  /// Height of the material above the tip at a point of its circumference.
+  double heightAt(const std::array<double, 3>& tip, double angle, double share = 1.0) const {
+    const double x = tip[0] + share * radius_ * std::sin(angle),
+                 y = tip[1] + share * radius_ * std::cos(angle);
+    if (x <= box_.low[0] || x >= box_.high[0] || y <= box_.low[1] || y >= box_.high[1]) return 0.0;
+    double top = box_.high[2];
+    for (const auto& [from, to] : motions_) {
+      const double dx = to[0] - from[0], dy = to[1] - from[1], length2 = dx * dx + dy * dy;
+      const double along = length2 > 0.0 ? ((x - from[0]) * dx + (y - from[1]) * dy) / length2 : 0.0;
+      const double t = std::min(1.0, std::max(0.0, along));
+      if (std::hypot(x - from[0] - t * dx, y - from[1] - t * dy) < radius_) top = std::min(top, to[2]);
+    }
+    return std::max(0.0, top - tip[2]);
+  }
+
+  bool isInAir(const std::array<double, 3>& tip) const {
+    for (int i = 0; i < 360; ++i) {
+      // 0.01 mm inside: the circle touches the side of the strip.
+      if (heightAt(tip, units::TWO_PI * i / 360, 1.0 - 1e-3) > 0.0) return false;
+    }
+    return true;
+  }
+
+  /// Entry, exit and depth of the front half of a tool that moves along +x.
+  Engagement contact(const std::array<double, 3>& tip) const {
+    constexpr int STEPS = 18000;
+    Engagement found{NOT_A_NUMBER, NOT_A_NUMBER, 0.0, 0.0};
+    for (int i = 0; i < STEPS; ++i) {
+      const double angle = units::PI * (i + 0.5) / STEPS, height = heightAt(tip, angle);
+      if (height <= 0.0) continue;
+      if (std::isnan(found.entry)) found.entry = angle;
+      EXPECT_TRUE(found.axial_depth == 0.0 || std::abs(height - found.axial_depth) < 1e-9) << "one depth";
+      found.exit = angle;
+      found.axial_depth = height;
+    }
+    return found;
+  }
+
+  void remove(const std::array<double, 3>& from, const std::array<double, 3>& to) {
+    if (to[2] < box_.high[2]) motions_.push_back({from, to});
+  }
+
+ private:
+  Workpiece box_;
+  double radius_;
+  std::vector<std::pair<std::array<double, 3>, std::array<double, 3>>> motions_;
+};
+
+/// Runs the program of a cut and compares its contact with its condition, at the increments of the
+/// controller.
+void runAndCompare(const SessionPlan& plan, const PlannedCut& cut, CutStock& stock) {
+  const CuttingCondition& condition = cut.condition;
+  const std::array<double, 3> start{0.1234567, -0.0123456, -0.0501234};
+  const ToolPath path = toolPathOf(plan.planner().program(cut, start), start);
+  std::array<double, 3> last = start;
+  bool has_cut = false;
+  for (std::size_t i = 0; i < path.points.size(); ++i) {
+    const std::array<double, 3>& point = path.points[i];
+    const bool feeds_x = path.feeds[i] > 0.0 && point[0] - last[0] > 1e-6;
+    if (feeds_x) {
+      has_cut = true;
+      EXPECT_TRUE(stock.isInAir(last)) << condition.name << " enters from the air";
+      for (const double share : {0.0, 0.25, 0.5, 0.75, 1.0}) {
+        std::array<double, 3> tip = point;
+        tip[0] = condition.steady_from[0] + share * (condition.steady_to[0] - condition.steady_from[0]);
+        const Engagement found = stock.contact(tip);
+        // 1 um of the controller over a radius of 10 mm, and a step of the scan.
+        EXPECT_NEAR(found.entry, condition.engagement.entry, 3e-4) << condition.name << " " << share;
+        EXPECT_NEAR(found.exit, condition.engagement.exit, 3e-4) << condition.name << " " << share;
+        EXPECT_NEAR(found.axial_depth, condition.engagement.axial_depth, 1e-6) << condition.name;
+      }
+    } else if (path.feeds[i] > 0.0 && std::abs(point[1] - last[1]) > 1e-6) {
+      for (const double share : {0.3, 0.6, 1.0}) {
+        const std::array<double, 3> tip{point[0], last[1] + share * (point[1] - last[1]), point[2]};
+        EXPECT_TRUE(stock.isInAir(tip)) << condition.name << " leaves into the air";
+      }
+    }
+    stock.remove(last, point);
+    last = point;
+  }
+  EXPECT_TRUE(has_cut);
+}
+
+std::size_t indexOf(const SessionPlan& plan, const std::string& name) {
+  for (std::size_t i = 0; i < plan.candidates().size(); ++i) {
+    if (plan.candidates()[i].condition.name == name) return i;
+  }
+  ADD_FAILURE() << name;
+  return 0;
+}
+
+TEST(HalfImmersion, ContactAlongTheProgramsIsThatOfTheConditions) {
+  const MachineModel model = mill();
+  SessionPlan plan(model, informative());
+  ASSERT_EQ(plan.candidates().size(), 12u);
+  std::vector<std::size_t> chosen;
+  // Shorter and longer paths follow each other on each side.
+  for (const char* name : {"half_up_1", "half_up_4", "slot_2", "half_down_3", "half_up_2", "half_down_4"})
+    chosen.push_back(indexOf(plan, name));
+  std::vector<PlannedCut> cuts = plan.place(chosen);
+  EXPECT_DOUBLE_EQ(cuts[0].condition.engagement.exit, 0.5 * units::PI);
+  EXPECT_DOUBLE_EQ(cuts[3].condition.engagement.entry, 0.5 * units::PI);
+  EXPECT_DOUBLE_EQ(cuts[0].condition.engagement.axial_depth, 3.0 * MM);
+  cuts.push_back(plan.stable({radPerSecFromRpm(18000.0), 3e-3, 4e-3, 1000.0}, 1e-4));
+  cuts.push_back(plan.unstable({radPerSecFromRpm(16000.0), 4e-3, 2e-3, 1000.0}, 1e-4));
+  cuts.push_back(*plan.resonance());
+  CutStock stock(model);
+  for (const PlannedCut& cut : cuts) runAndCompare(plan, cut, stock);
+}
+
+TEST(HalfImmersion, CandidatesAreOfferedUntilTheStockIsUsed) {
+  const MachineModel model = mill();
+  SessionPlan plan(model, informative());
+  EXPECT_EQ(plan.available().size(), 12u);
+  // 200 mm less a margin of 2 mm and three lanes of 22 mm for the verifying cuts.
+  EXPECT_NEAR(plan.freeStock(), (200.0 - 2.0 - 3 * 22.0) * MM, 1e-9);
+  EXPECT_NEAR(plan.stockOf(indexOf(plan, "slot_1")), 22.0 * MM, 1e-9);
+  EXPECT_NEAR(plan.stockOf(indexOf(plan, "half_down_1")), 10.0 * MM, 1e-9);
+  const double time = plan.candidates()[indexOf(plan, "slot_4")].cuttingTime();
+  const PlannedCut& half = plan.candidates()[indexOf(plan, "half_up_4")];
+  // Sideways by the radius and the clearance, at the plunge feed of 20 mm/s.
+  EXPECT_NEAR(half.cuttingTime() - time, (10.0 + 2.0) / 20.0, 1e-9);
+  EXPECT_NEAR(half.duration() - half.spin_up, half.cuttingTime(), 1e-12);
+  plan.place({indexOf(plan, "half_up_1"), indexOf(plan, "slot_3"), indexOf(plan, "half_down_1")});
+  EXPECT_EQ(plan.available().size(), 3u) << "the slots that are left";
+  EXPECT_NEAR(plan.freeStock(), (200.0 - 2.0 - 3 * 22.0 - 22.0 - 2 * 10.0) * MM, 1e-9);
+  // Slots chosen later have their own lanes.
+  const auto later = plan.place({indexOf(plan, "slot_1")});
+  EXPECT_NEAR(later.front().from[1], (-100.0 + 10.0 + 2.0 + 10.0 + 4 * 22.0) * MM, 1e-9);
+  EXPECT_THAT(errorOf([&] {
+                SessionPlan full(model, informative());
+                std::vector<std::size_t> all(12);
+                for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;
+                full.place(all);
+              }),
+              ::testing::HasSubstr("is free"));
 }
 
 TEST(PlanParameters, RefusesTooFewSpeedsAndFeedsAndValuesNotAboveZero) {

@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <set>
 
+#include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_loadmeter/database/recommend.h"
+#include "smartmill_loadmeter/identification/production.h"
 #include "smartmill_loadmeter/identification/session_identification.h"
 
 namespace smartmill::loadmeter {
@@ -101,6 +104,43 @@ FoundCoefficients findCoefficients(const CoefficientDatabase& database, const st
   }
   found.message = "no records for '" + tool + "' in '" + material + "'; known: " + database.contents();
   return found;
+}
+
+CutChoice chooseCuts(const FoundCoefficients& found, const CutChoiceRequest& request,
+                     const std::vector<LoadTest>& air_cuts, double settling, const MachineModel& model) {
+  const Spindle& spindle = model.needSpindle("choose cuts");
+  const LoadMeterReadings readings = readingsOf(air_cuts, spindle, settling);
+  const bool stored = !request.without_stored && found.known && found.known->identifications > 0 &&
+                      isComplete(found.known->combined);
+  const TorqueCovariance start = stored ? torqueCovarianceOf(found.known->combined) : withoutKnowledge();
+  ChoiceGoal goal;
+  CutInformation known;
+  known.addKnowledge(start);
+  std::set<double> air_speeds;
+  for (const CuttingCondition& test : request.made) {
+    const bool cut = test.kind == CuttingCondition::Kind::cut;
+    known.addTest(test, spindle, readings.voltageStd(cut ? steadyTime(test) - settling : readings.air_time));
+    if (cut) {
+      goal.feeds_made.push_back(test.engagement.feed_per_tooth);
+    } else {
+      air_speeds.insert(test.spindle_speed);
+    }
+  }
+  if (air_speeds.size() < 2) {
+    throw Error(
+        formatted("tests: air cuts at %zu speeds, expected two or more for the friction of the spindle",
+                  air_speeds.size()));
+  }
+  const RecursiveCoefficients::Start metal;
+  goal.highest.ktc = (stored ? found.known->combined.set.value.ktc : metal.ktc) + std::sqrt(start.tc);
+  goal.highest.kte = (stored ? found.known->combined.set.value.kte : metal.kte) + std::sqrt(start.te);
+  goal.ktc_std = request.ktc_std;
+  goal.kte_std = request.kte_std;
+  goal.stock = request.stock;
+  goal.torque = spindle.rated_torque.value_or(0.0);
+  goal.power = spindle.rated_power.value_or(0.0);
+  goal.least_feeds = stored ? 2 : 3;
+  return chooseCuts(known, request.candidates, readings, spindle, goal);
 }
 
 }  // namespace smartmill::loadmeter

@@ -22,6 +22,10 @@ void IdentificationParameters::validate() const {
   checkBounds(inspection);
 }
 
+double IdentificationParameters::timeWithoutReadings(const Spindle& spindle) const {
+  return settle_time_constants * timeConstant(spindle.load_meter_bandwidth) + guard_time;
+}
+
 LoadMeterIdentification::LoadMeterIdentification(const MachineModel& model,
                                                  const IdentificationParameters& parameters)
     : spindle_(model.needSpindle("read the load meter")),

@@ -1,7 +1,5 @@
 #include "smartmill_loadmeter/identification/test_information.h"
 
-#include <Eigen/Dense>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -16,45 +14,8 @@ namespace smartmill::loadmeter {
 
 namespace {
 
-// Unknowns Ktc, Kte, Coulomb [N m] and viscous [N m s/rad] friction, scaled to similar magnitudes.
-using Information = Eigen::Matrix4d;
-const Eigen::Vector4d SCALE{1e9, 1e4, 0.1, 1e-3};
-
 bool isCut(const CuttingCondition& test) {
   return test.kind == CuttingCondition::Kind::cut;
-}
-
-// Variance of a mean torque [N2 m2] (eq. 3.12).
-double varianceOf(double speed, const Spindle& spindle, double voltage_std) {
-  return std::pow(voltage_std / (spindle.load_meter_gain * speed), 2);
-}
-
-void add(const CuttingCondition& test, const Spindle& spindle, double voltage_std, Information* information) {
-  Eigen::Vector4d row{0.0, 0.0, 1.0, test.spindle_speed};
-  if (isCut(test)) {
-    const auto map = meanForceMatrix(test.tool, test.engagement);
-    row[0] = map[3][0];
-    row[1] = map[3][3];
-  }
-  row = row.cwiseProduct(SCALE);
-  *information += row * row.transpose() / varianceOf(test.spindle_speed, spindle, voltage_std);
-}
-
-void add(const TorqueCovariance& prior, Information* information) {
-  if (!std::isfinite(prior.tc) || !std::isfinite(prior.te)) return;
-  Eigen::Matrix2d covariance;
-  covariance << prior.tc, prior.tc_te, prior.tc_te, prior.te;
-  const Eigen::Vector2d unscale = SCALE.head<2>().cwiseInverse();
-  covariance = unscale.asDiagonal() * covariance * unscale.asDiagonal();
-  information->topLeftCorner<2, 2>() += covariance.inverse();
-}
-
-TorqueCovariance covarianceOf(const Information& information) {
-  const double unknown = std::numeric_limits<double>::infinity();
-  const Eigen::SelfAdjointEigenSolver<Information> eigen(information);
-  if (!(eigen.eigenvalues()[0] > 1e-12 * eigen.eigenvalues()[3])) return {unknown, 0.0, unknown};
-  const Information c = information.inverse();
-  return {c(0, 0) * SCALE[0] * SCALE[0], c(0, 1) * SCALE[0] * SCALE[1], c(1, 1) * SCALE[1] * SCALE[1]};
 }
 
 // Whether these tests determine friction and both coefficients by themselves.
@@ -100,10 +61,10 @@ std::vector<CuttingCondition> select(const std::vector<CuttingCondition>& tests,
 
 TorqueCovariance expectedCovariance(const std::vector<CuttingCondition>& tests, const Spindle& spindle,
                                     const TorqueCovariance* prior, double voltage_std) {
-  Information information = Information::Zero();
-  if (prior) add(*prior, &information);
-  for (const CuttingCondition& test : tests) add(test, spindle, voltage_std, &information);
-  return covarianceOf(information);
+  CutInformation information;
+  if (prior) information.addKnowledge(*prior);
+  for (const CuttingCondition& test : tests) information.addTest(test, spindle, voltage_std);
+  return information.covariance().torque();
 }
 
 std::vector<std::size_t> neededTests(const std::vector<CuttingCondition>& tests, const Spindle& spindle,
@@ -148,14 +109,14 @@ std::optional<SuggestedCut> mostInformativeCut(const ToolGeometry& tool, const S
           cut.torque = map[3][0] * value.ktc + map[3][3] * value.kte;
           if (limits.torque > 0.0 && cut.torque > limits.torque) continue;
           if (limits.power > 0.0 && cut.torque * speed > limits.power) continue;
-          // Friction is measured in air at the same speed, which doubles the variance.
-          Information information = Information::Identity();  // friction is not estimated
-          information.topLeftCorner<2, 2>().setZero();
-          add(knowledge, &information);
-          const Eigen::Vector2d row = Eigen::Vector2d{map[3][0], map[3][3]}.cwiseProduct(SCALE.head<2>());
-          information.topLeftCorner<2, 2>() +=
-              row * row.transpose() / (2.0 * varianceOf(speed, spindle, voltage_std));
-          const TorqueCovariance after = covarianceOf(information);
+          CuttingCondition condition;
+          condition.tool = tool;
+          condition.engagement = cut.engagement;
+          condition.spindle_speed = speed;
+          CutInformation information;
+          information.addKnowledge(knowledge);
+          information.addAboveAir(condition, spindle, voltage_std);
+          const TorqueCovariance after = information.covariance().torque();
           const double sum = after.tc / (value.ktc * value.ktc) + after.te / (value.kte * value.kte);
           if (!(sum < smallest)) continue;
           smallest = sum;

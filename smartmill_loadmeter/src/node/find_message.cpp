@@ -1,5 +1,7 @@
 #include "node/find_message.h"
 
+#include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_ros/conversions.h"
 
 namespace smartmill::loadmeter {
@@ -33,6 +35,39 @@ smartmill_msgs::FindCoefficients::Response toMsg(const FoundCoefficients& found)
   response.next_std[0] = found.next ? found.next->ktc_std : NOT_A_NUMBER;
   response.next_std[1] = found.next ? found.next->kte_std : NOT_A_NUMBER;
   return response;
+}
+
+CutChoiceRequest choiceOf(const smartmill_msgs::FindCoefficients::Request& request) {
+  CutChoiceRequest choice;
+  for (const smartmill_msgs::CuttingCondition& test : request.tests) choice.made.push_back(fromMsg(test));
+  const std::size_t n = request.candidates.size();
+  if (request.cutting_time.size() != n || request.stock.size() != n || request.depth_limit.size() != n)
+    throw Error(
+        formatted("candidates: %zu cuts, %zu cutting_time, %zu stock, %zu depth_limit, expected equal "
+                  "numbers",
+                  n, request.cutting_time.size(), request.stock.size(), request.depth_limit.size()));
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!(request.cutting_time[i] > 0.0))
+      throw Error(formatted("cutting_time: %g s of candidate %zu, expected > 0", request.cutting_time[i], i));
+    choice.candidates.push_back(
+        {fromMsg(request.candidates[i]), request.cutting_time[i], request.stock[i], request.depth_limit[i]});
+  }
+  choice.ktc_std = request.target_std[0];
+  choice.kte_std = request.target_std[1];
+  choice.stock = request.stock_available;
+  choice.without_stored = request.without_stored != 0;
+  return choice;
+}
+
+void fill(const CutChoice& choice, smartmill_msgs::FindCoefficients::Response* response) {
+  for (const ChosenCut& cut : choice.cuts) {
+    response->chosen.push_back(static_cast<std::uint32_t>(cut.candidate));
+    response->chosen_gain.push_back(cut.gain_per_second);
+    response->chosen_ktc_std.push_back(cut.ktc_std);
+    response->chosen_kte_std.push_back(cut.kte_std);
+  }
+  response->target_reached = choice.reached;
+  response->excluded = choice.excluded;
 }
 
 }  // namespace smartmill::loadmeter

@@ -236,7 +236,14 @@ bool LoadMeterNode::find(smartmill_msgs::FindCoefficients::Request& request,
   std::vector<CuttingCondition> tests;
   for (const smartmill_msgs::CuttingCondition& test : request.tests) tests.push_back(fromMsg(test));
   try {
-    response = toMsg(findCoefficients(database_, request.tool, request.material, tests, model_));
+    const FoundCoefficients found =
+        findCoefficients(database_, request.tool, request.material, tests, model_);
+    response = toMsg(found);
+    if (!request.candidates.empty()) {
+      fill(chooseCuts(found, choiceOf(request), identification_.identification().airCuts(),
+                      parameters_.identification.timeWithoutReadings(*model_.spindle), model_),
+           &response);
+    }
   } catch (const Error& error) {
     response = toMsg(FoundCoefficients());
     response.message = error.what();

@@ -144,6 +144,43 @@ TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
   EXPECT_TRUE(std::isnan(call.response.coefficients.ktc));
   EXPECT_NE(call.response.message.find("endmill / aluminium"), std::string::npos);
 
+  // Cuts of half immersion at two feeds next to the stored identification; one of them is too deep.
+  call.request.material = "aluminium";
+  for (const double feed : {4e-5, 8e-5, 1.2e-4}) {
+    CuttingCondition cut;
+    cut.kind = CuttingCondition::Kind::cut;
+    cut.name = "half_" + std::to_string(call.request.candidates.size());
+    cut.tool = {3, 0.012, 0.6, {}};
+    cut.spindle_speed = 600.0;
+    cut.engagement = {0.0, 0.5 * units::PI, 2e-3, feed};
+    cut.steady_to = {feed * 3 * 600.0 / units::TWO_PI * 2.0, 0.0, 0.0};
+    call.request.candidates.push_back(toMsg(cut));
+    call.request.cutting_time.push_back(3.0);
+    call.request.stock.push_back(6e-3);
+    call.request.depth_limit.push_back(feed > 1e-4 ? 1e-3 : 0.0);
+  }
+  call.request.stock_available = 0.1;
+  call.request.target_std[0] = 2.0 * result->coefficients.ktc_std;
+  call.request.target_std[1] = 2.0 * result->coefficients.kte_std;
+  ASSERT_TRUE(find.call(call));
+  EXPECT_NE(call.response.message.find("air cuts at 0 speeds"), std::string::npos) << call.response.message;
+  for (const double speed : {300.0, 900.0}) {
+    CuttingCondition air;
+    air.kind = CuttingCondition::Kind::air;
+    air.spindle_speed = speed;
+    call.request.tests.push_back(toMsg(air));
+  }
+  ASSERT_TRUE(find.call(call));
+  EXPECT_TRUE(call.response.target_reached) << call.response.message;
+  EXPECT_EQ(call.response.chosen.size(), 2u) << "two feeds check the stored coefficients";
+  ASSERT_EQ(call.response.excluded.size(), 1u);
+  EXPECT_EQ(call.response.excluded[0],
+            "half_2: 2.00 mm deep, expected at most 0.80 mm, 80 % of the stability limit");
+  call.request.stock.pop_back();
+  ASSERT_TRUE(find.call(call));
+  EXPECT_NE(call.response.message.find("3 cuts, 3 cutting_time, 2 stock"), std::string::npos);
+  EXPECT_TRUE(call.response.chosen.empty());
+
   node.begin();
   // After a pass in air the X drive gives the force of a cut; Y and Z are at rest and not observable.
   session.airPass(6000.0, 6e-5, 4.0);

@@ -23,6 +23,9 @@ struct PlanParameters : PathParameters {
   double slot_depth = 1.0e-3;
   std::vector<double> slot_feeds{5.0e-5, 1.0e-4, 1.5e-4, 2.0e-4};
   double slot_time = 2.0, least_slot_time = 0.8;
+  std::string test_cuts = "slots";
+  double half_up_depth = 2.0e-3, half_down_depth = 2.0e-3;  // the torque of a slot of half the depth
+  double target_ktc_std = 4.0e6, target_kte_std = 300.0;    // 0.5 % and 1 % of aluminium
 
   double stable_time = 1.0, unstable_time = 0.5;
   double least_revolutions = 50.0;
@@ -32,6 +35,7 @@ struct PlanParameters : PathParameters {
   double resonance_feed = 1.0e-4;
   double resonance_time = 0.8;
 
+  bool isInformative() const { return test_cuts == "informative"; }
   void declare(ParameterTable& table);
   /// @throws Error naming key and value.
   void validate() const;
@@ -45,8 +49,9 @@ struct Point {
   double chatter_frequency = NOT_A_NUMBER;  ///< [Hz] at the limit
 };
 
-/// Paths of all cuts of a session in the stock of the nominal model: full slots along +x, each in its own
-/// lane, lanes spaced in y. All positions are of the centre of the tool tip in the machine frame.
+/// Paths of all cuts of a session in the stock of the nominal model, by CutPlanner. With test_cuts
+/// `informative` the cuts for the coefficients are candidates, which take their place in the stock once they
+/// are chosen.
 class SessionPlan {
  public:
   /// @throws Error of one line if the model is incomplete or a cut does not fit machine or stock.
@@ -58,6 +63,15 @@ class SessionPlan {
   const std::vector<PlannedCut>& airMoves() const { return air_moves_; }
   const std::vector<PlannedCut>& slots() const { return slots_; }
   const std::optional<PlannedCut>& resonance() const { return resonance_; }
+
+  /// Slots and cuts of half immersion, up and down, at each feed; without test_cuts `informative` none.
+  const std::vector<PlannedCut>& candidates() const { return candidates_; }
+  /// Indices of the candidates that may be placed next: all at first, then the slots that are left.
+  std::vector<std::size_t> available() const;
+  double stockOf(std::size_t candidate) const;  ///< [m] width
+  double freeStock() const;                     ///< [m] width for further candidates
+  /// Paths of chosen candidates, in their order. @throws Error if they do not fit the stock.
+  std::vector<PlannedCut> place(const std::vector<std::size_t>& chosen);
 
   /// Cuts that verify the chart, each in its own lane. @throws Error if a cut does not fit machine or stock.
   PlannedCut stable(const Point& point, double feed_per_tooth) const;
@@ -73,9 +87,20 @@ class SessionPlan {
   const CutPlanner& planner() const { return planner_; }
 
  private:
+  void addCandidates();
+  void planResonance();
+  std::size_t verifyingCuts() const;
+  PlannedCut verifying(const char* name, std::size_t lane, const Point& point, double feed_per_tooth,
+                       double time) const;
+  SlotRequest slotRequest(std::size_t feed) const;
+
   PlanParameters parameters_;
   CutPlanner planner_;
-  std::vector<PlannedCut> air_cuts_, air_moves_, slots_;
+  std::vector<PlannedCut> air_cuts_, air_moves_, slots_, candidates_;
+  std::vector<SlotRequest> requests_;  // of the candidates
+  std::vector<bool> placed_;           // of the candidates
+  std::size_t verifying_lane_ = 0;     // the first
+  double shift_ = 0.0;                 // [m] of all lanes
   std::optional<PlannedCut> resonance_;
 };
 

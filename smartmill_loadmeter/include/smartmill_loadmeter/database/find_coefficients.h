@@ -7,6 +7,7 @@
 
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_loadmeter/database/knowledge.h"
+#include "smartmill_loadmeter/identification/cut_choice.h"
 #include "smartmill_loadmeter/identification/test_information.h"
 
 namespace smartmill::loadmeter {
@@ -30,5 +31,23 @@ struct FoundCoefficients {
 FoundCoefficients findCoefficients(const CoefficientDatabase& database, const std::string& tool,
                                    const std::string& material, const std::vector<CuttingCondition>& tests,
                                    const MachineModel& model);
+
+/// Candidate cuts of a session, of which those to make are chosen.
+struct CutChoiceRequest {
+  std::vector<CuttingCondition> made;  ///< air cuts and cuts
+  std::vector<CandidateCut> candidates;
+  double ktc_std = 0.0, kte_std = 0.0;  ///< [N/m2], [N/m] to reach
+  double stock = 0.0;                   ///< [m] width available
+  bool without_stored = false;          ///< without the coefficients of the database
+};
+
+/// Chooses cuts (chooseCuts()) that together with the tests that are made and, if the pair is known, with the
+/// database reach the standard deviations, within torque and power of the model's spindle. Two feeds suffice
+/// with earlier knowledge, as for the identification.
+/// @param air_cuts measured in the session, whose readings show the noise of the load meter. @param settling
+/// [s] of a steady part without readings
+/// @throws Error if the model has no spindle or the air cuts have fewer than two speeds.
+CutChoice chooseCuts(const FoundCoefficients& found, const CutChoiceRequest& request,
+                     const std::vector<LoadTest>& air_cuts, double settling, const MachineModel& model);
 
 }  // namespace smartmill::loadmeter

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_loadmeter/identification/temperature_watch.h"
 #include "smartmill_loadmeter/inspection/inspection_parameters.h"
@@ -44,6 +45,9 @@ struct IdentificationParameters {
   }
   /// @throws Error with key and value.
   void validate() const;
+
+  /// Time [s] of a steady part without readings: settling of the load meter and guard time at the end.
+  double timeWithoutReadings(const Spindle& spindle) const;
 };
 
 }  // namespace smartmill::loadmeter

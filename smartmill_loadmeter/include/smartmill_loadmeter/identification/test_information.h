@@ -7,16 +7,12 @@
 #include "smartmill_core/cutting/tool.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/signal/streams.h"
+#include "smartmill_loadmeter/identification/cut_information.h"
 
 namespace smartmill::loadmeter {
 
 /// [V] standard deviation of a test's mean voltage: the resolution of the thesis' load meter (eq. 3.12).
 constexpr double TYPICAL_VOLTAGE_STD = 3e-4;
-
-/// Covariance of Ktc [N/m2] and Kte [N/m]. Infinite standard deviations: unknown.
-struct TorqueCovariance {
-  double tc = 0.0, tc_te = 0.0, te = 0.0;
-};
 
 /// Covariance of Ktc and Kte that air cuts and cuts will have together with earlier knowledge: eq. 3.19 and
 /// 3.12, with Coulomb and viscous friction of the spindle determined by the same tests.
