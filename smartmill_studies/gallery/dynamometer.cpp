@@ -66,11 +66,10 @@ Drawn transferFunctions(const std::string& folder, unsigned seed) {
   for (std::size_t axis = 0; axis < 2; ++axis) {
     FrequencyResponse frf;
     const ModalModel sensor = identified(axis, seed, &frf);
-    // Linear and time-invariant without the weights of harmonics: an impulse response gives the complete FRF.
+    // Linear and time-invariant: an impulse response gives the complete FRF.
     HarmonicFilterParameters parameters;
     parameters.memory_revolutions = parameters.settling_revolutions;
     HarmonicFilter filter(sensor, units::TWO_PI * 930.0 / 4.0, RATE, parameters);
-    filter.setWeighting(false);
     std::vector<double> answer(1 << 16);
     for (std::size_t i = 0; i < answer.size(); ++i) answer[i] = filter.step(i == 0 ? 1.0 : 0.0);
     const auto spectrum = fourier(answer);

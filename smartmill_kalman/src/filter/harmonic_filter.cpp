@@ -64,16 +64,13 @@ HarmonicFilter::HarmonicFilter(std::vector<HarmonicGain> gains, const ModalModel
     : pairs_(sensor, spindle_speed, sample_rate,
              static_cast<int>(gains.at(0).filter.size() - 2 * sensor.modes.size() - 1) / 2),
       design_(std::move(gains)),
-      revolution_(static_cast<std::size_t>(std::ceil(units::TWO_PI / spindle_speed * sample_rate))),
       memory_(design_.size(), units::TWO_PI / spindle_speed * sample_rate) {
   setGains();
 }
 
 void HarmonicFilter::setModel(const ModalModel& sensor, double spindle_speed) {
   pairs_.setModel(sensor, spindle_speed);
-  const double revolution = units::TWO_PI / spindle_speed * pairs_.sampleRate();
-  memory_.setRevolution(revolution);
-  revolution_ = static_cast<std::size_t>(std::ceil(revolution));
+  memory_.setRevolution(units::TWO_PI / spindle_speed * pairs_.sampleRate());
 }
 
 void HarmonicFilter::setState(const std::vector<double>& state) {
@@ -84,49 +81,17 @@ void HarmonicFilter::setState(const std::vector<double>& state) {
 void HarmonicFilter::setGains() {
   smoother_.reset();
   gains_.clear();
+  force_gain_.clear();
   innovation_std_.clear();
   for (const HarmonicGain& design : design_) {
-    gains_.push_back(pairs_.toPairs(design.filter));
+    std::vector<GainBatch> gain = pairs_.toPairs(design.filter);
+    double force = 0.0;
+    for (std::size_t i = 0; i < 4 * gain.size(); ++i)
+      force += pairs_.batches()[i / 4].g[i % 4] * gain[i / 4].re[i % 4];
+    gains_.push_back(std::move(gain));
+    force_gain_.push_back(force);
     innovation_std_.push_back(std::sqrt(design.variance));
   }
-  force_gain_.resize(gains_.size());
-  if (weights_.size() != pairs_.batches().size()) resetWeights();
-  updateForceGains();
-}
-
-void HarmonicFilter::resetWeights() {
-  weights_.resize(pairs_.batches().size());
-  for (std::size_t b = 0; b < weights_.size(); ++b) weights_[b] = pairs_.batches()[b].g;
-  weighted_ = false;
-  updateForceGains();
-}
-
-void HarmonicFilter::updateForceGains() {
-  for (std::size_t level = 0; level < gains_.size(); ++level) {
-    force_gain_[level] = 0.0;
-    for (std::size_t i = 0; i < 4 * weights_.size(); ++i)
-      force_gain_[level] += weights_[i / 4][i % 4] * gains_[level][i / 4].re[i % 4];
-  }
-}
-
-// The stationary covariance p of both parts of a harmonic, noise and wander as designed, follows from its
-// gain K = p H / S, with the variance S of the innovations as measured: in a cut a sensor is noisier than at
-// the taps. The mean square of its error in the force is p, that of the estimate |a|^2 / 2.
-void HarmonicFilter::endRevolution() {
-  const double variance = innovation_sum_ / static_cast<double>(innovation_count_);  // [N2]
-  innovation_sum_ = 0.0;
-  innovation_count_ = 0;
-  if (!weighting_ || !memory_.settled()) return;
-  for (std::size_t n = 1; n <= static_cast<std::size_t>(pairs_.harmonics()); ++n) {
-    const std::size_t i = pairs_.modes() + n;
-    const HarmonicPairs::PairBatch& batch = pairs_.batches()[i / 4];
-    const GainBatch& gain = gains_[memory_.level()][i / 4];
-    const double response = std::hypot(batch.c1[i % 4], batch.c2[i % 4]);
-    const double covariance = std::hypot(gain.re[i % 4], gain.im[i % 4]) * variance / response;
-    weights_[i / 4][i % 4] = std::max(0.0, 1.0 - 2.0 * covariance / std::norm(pairs_.forceHarmonic(n)));
-  }
-  weighted_ = true;
-  updateForceGains();
 }
 
 void HarmonicFilter::retune(const ModalModel& sensor, double spindle_speed) {
@@ -182,18 +147,12 @@ void HarmonicFilter::continueFrom(const HarmonicFilter& other) {
   memory_.setLevel(other.memory_.level());
   state.resize(pairs_.states(), 0.0);
   setState(state);
-  resetWeights();
-  weighted_ = other.weighted_;
-  std::copy_n(other.weights_.begin(), std::min(weights_.size(), other.weights_.size()), weights_.begin());
-  updateForceGains();
 }
 
 void HarmonicFilter::reset() {
   pairs_.reset();
-  predicted_output_ = innovation_ = innovation_sum_ = 0.0;
-  innovation_count_ = 0;
+  predicted_output_ = innovation_ = 0.0;
   memory_.reset();
-  resetWeights();
 }
 
 // Without fused multiply-adds all clones give the same numbers.
@@ -202,10 +161,8 @@ AVX2_AND_DEFAULT double HarmonicFilter::advance(const GainBatch* gain, double in
   const Vector4 nu = {innovation, innovation, innovation, innovation};
   Vector4 force = {}, expected = {};
   HarmonicPairs::PairBatch* batch = pairs_.batches().data();
-  const Vector4* weight = weights_.data();
-  for (const HarmonicPairs::PairBatch* end = batch + pairs_.batches().size(); batch != end;
-       ++batch, ++gain, ++weight) {
-    force += *weight * batch->re;
+  for (const HarmonicPairs::PairBatch* end = batch + pairs_.batches().size(); batch != end; ++batch, ++gain) {
+    force += batch->g * batch->re;
     const Vector4 re = batch->re + gain->re * nu, im = batch->im + gain->im * nu;
     const Vector4 next_re = batch->a * re - batch->b * im, next_im = batch->b * re + batch->a * im;
     expected += batch->c1 * next_re + batch->c2 * next_im;
@@ -217,7 +174,6 @@ AVX2_AND_DEFAULT double HarmonicFilter::advance(const GainBatch* gain, double in
 }
 
 std::vector<double> HarmonicFilter::smooth(const std::vector<double>& measured) {
-  resetWeights();
   const std::size_t slow = gains_.size() - 1;
   std::vector<double> force, innovation;
   force.reserve(measured.size());
@@ -238,12 +194,7 @@ std::shared_ptr<const HarmonicSmoother> HarmonicFilter::smoother() const {
     auto made = std::make_shared<HarmonicSmoother>();
     made->batches = pairs_.batches();
     made->gains = gains_;
-    for (const std::vector<GainBatch>& gain : gains_) {
-      double force = 0.0;
-      for (std::size_t i = 0; i < 4 * gain.size(); ++i)
-        force += pairs_.batches()[i / 4].g[i % 4] * gain[i / 4].re[i % 4];
-      made->force_gain.push_back(force);
-    }
+    made->force_gain = force_gain_;
     for (const HarmonicGain& design : design_) {
       made->smoothing.push_back(pairs_.toPairs(design.smoothing));
       made->variance.push_back(design.variance);

@@ -61,9 +61,6 @@ std::vector<HarmonicGain> designGains(const ModalModel& sensor, double spindle_s
 /// After a change (start, tool entry) the filter follows within settling_revolutions. In a steady cut its
 /// memory grows to memory_revolutions and the noise falls; an outlying innovation resets it (AdaptiveMemory).
 /// Only the gain changes, the state continues.
-///
-/// In a steady cut each harmonic enters the force with the weight that minimises its mean square error
-/// (Wiener): where the sensor hardly responds, a harmonic is mostly noise, amplified by 1 / |H|.
 class HarmonicFilter {
  public:
   static constexpr std::size_t LEVELS = 3;
@@ -80,9 +77,6 @@ class HarmonicFilter {
     innovation_ = measured - predicted_output_;
     const double force = advance(gains_[memory_.level()].data(), innovation_, force_gain_[memory_.level()]);
     memory_.add(innovation_);
-    innovation_sum_ += innovation_ * innovation_;
-    if (++innovation_count_ >= revolution_) endRevolution();
-    if (weighted_ && !memory_.settled()) resetWeights();
     return force;
   }
 
@@ -116,16 +110,6 @@ class HarmonicFilter {
   const HarmonicPairs& pairs() const { return pairs_; }
   const AdaptiveMemory& memory() const { return memory_; }  ///< level 0 quick .. LEVELS - 1 slow
   void setLevel(std::size_t level) { memory_.setLevel(level); }
-  /// Weight of harmonic n in the force, 1 unless the cut is steady.
-  double weight(std::size_t n) const {
-    const std::size_t i = pairs_.modes() + n;
-    return weights_[i / 4][i % 4];
-  }
-  /// False: all weights of the harmonics are 1, as a smoother requires, which corrects the filter's force.
-  void setWeighting(bool on) {
-    weighting_ = on;
-    if (!on && weighted_) resetWeights();
-  }
   /// @param state in the coordinates of HarmonicGain
   void setState(const std::vector<double>& state);
   std::shared_ptr<const HarmonicSmoother> smoother() const;
@@ -137,20 +121,12 @@ class HarmonicFilter {
   void setModel(const ModalModel& sensor, double spindle_speed);
   void setGains();
   void replaceModes(const ModalModel& sensor, std::vector<HarmonicGain> gains);
-  /// Weights of the next revolution by the innovations of this one.
-  void endRevolution();
-  void resetWeights();
-  void updateForceGains();
 
   HarmonicPairs pairs_;
   std::vector<HarmonicGain> design_;
   std::vector<std::vector<GainBatch>> gains_;
   std::vector<double> force_gain_, innovation_std_;
-  std::vector<HarmonicPairs::Vector4> weights_;  // [1] of the pairs in the force; 0: of a mode
-  bool weighting_ = true, weighted_ = false;     // whether weights are used; whether one is not 1
   double predicted_output_ = 0.0, innovation_ = 0.0;
-  double innovation_sum_ = 0.0;                        // [N2] of the running revolution
-  std::size_t innovation_count_ = 0, revolution_ = 1;  // [samples]
   AdaptiveMemory memory_;
   mutable std::shared_ptr<const HarmonicSmoother> smoother_;  // empty: not computed yet
 };
