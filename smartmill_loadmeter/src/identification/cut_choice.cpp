@@ -6,10 +6,10 @@
 #include <optional>
 #include <set>
 
-#include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/identification/production.h"
+#include "smartmill_loadmeter/identification/torque_sensitivity.h"
 
 namespace smartmill::loadmeter {
 
@@ -50,8 +50,8 @@ class Chooser {
     if (cut.depth_limit > 0.0 && depth > limit)
       return formatted("%.2f mm deep, expected at most %.2f mm, %.0f %% of the stability limit",
                        depth / units::MM, limit / units::MM, 100.0 * (1.0 - goal_.depth_margin));
-    const auto map = meanForceMatrix(c.tool, c.engagement);
-    const double torque = map[3][0] * goal_.highest.ktc + map[3][3] * goal_.highest.kte;
+    const double torque =
+        torqueSensitivity(c.tool, c.engagement).torque(goal_.highest.ktc, goal_.highest.kte);
     if (goal_.torque > 0.0 && torque > goal_.torque)
       return formatted("torque up to %.2f N m, limit %.2f N m", torque, goal_.torque);
     const double power = torque * c.spindle_speed;
@@ -104,20 +104,31 @@ class Chooser {
     return now.entropy() - with(now, i).entropy();
   }
 
+  bool isChosen(std::size_t i) const { return std::find(chosen_.begin(), chosen_.end(), i) != chosen_.end(); }
+
+  // Of these cuts the one with the largest gain per second [1/s] above a least one.
+  std::optional<std::size_t> mostInformative(const CutInformation& now, const Indices& cuts,
+                                             double least) const {
+    std::optional<std::size_t> pick;
+    for (const std::size_t i : cuts) {
+      const double rate = gainOf(now, i) / candidates_[i].cutting_time;
+      if (rate > least) least = rate, pick = i;
+    }
+    return pick;
+  }
+
   // The most informative cut per second; with the precision reached, of those with another feed.
   bool addBest() {
     const CutInformation now = informationOf(chosen_);
     const bool for_feeds = isPrecise(chosen_);
-    double best = 0.0;
-    std::optional<std::size_t> pick;
+    Indices open;
     for (const std::size_t i : allowed_) {
-      if (std::find(chosen_.begin(), chosen_.end(), i) != chosen_.end()) continue;
+      if (isChosen(i)) continue;
       Indices more = chosen_;
       more.push_back(i);
-      if (!fits(more) || (for_feeds && missingFeeds(more) == missingFeeds(chosen_))) continue;
-      const double rate = gainOf(now, i) / candidates_[i].cutting_time;
-      if (rate > best) best = rate, pick = i;
+      if (fits(more) && !(for_feeds && missingFeeds(more) == missingFeeds(chosen_))) open.push_back(i);
     }
+    const std::optional<std::size_t> pick = mostInformative(now, open, 0.0);
     if (pick) chosen_.push_back(*pick);
     return pick.has_value();
   }
@@ -139,7 +150,7 @@ class Chooser {
           }
           keepShorter(rest, &shortest);
           for (const std::size_t other : allowed_) {
-            if (std::find(chosen_.begin(), chosen_.end(), other) != chosen_.end()) continue;
+            if (isChosen(other)) continue;
             Indices exchanged = rest;
             exchanged.push_back(other);
             keepShorter(exchanged, &shortest);
@@ -159,15 +170,12 @@ class Chooser {
     const Indices cuts = chosen_;
     chosen_.clear();
     while (chosen_.size() < cuts.size()) {
-      const CutInformation now = informationOf(chosen_);
-      std::size_t pick = 0;
-      double best = -std::numeric_limits<double>::infinity();
+      Indices open;
       for (const std::size_t i : cuts) {
-        if (std::find(chosen_.begin(), chosen_.end(), i) != chosen_.end()) continue;
-        const double rate = gainOf(now, i) / candidates_[i].cutting_time;
-        if (rate > best) best = rate, pick = i;
+        if (!isChosen(i)) open.push_back(i);
       }
-      chosen_.push_back(pick);
+      const double any = -std::numeric_limits<double>::infinity();
+      chosen_.push_back(mostInformative(informationOf(chosen_), open, any).value_or(open.front()));
     }
   }
 

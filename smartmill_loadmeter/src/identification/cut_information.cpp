@@ -8,6 +8,7 @@
 
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/units.h"
+#include "smartmill_loadmeter/identification/torque_sensitivity.h"
 
 namespace smartmill::loadmeter {
 
@@ -48,24 +49,26 @@ void CutInformation::addKnowledge(const TorqueCovariance& known) {
   information_.topLeftCorner<2, 2>() += covariance.inverse();
 }
 
+void CutInformation::setTorque(const CuttingCondition& cut, Vector* row) {
+  const TorqueSensitivity torque = torqueSensitivity(cut.tool, cut.engagement);
+  (*row)[PLANE_KTC] = torque.tc;
+  (*row)[PLANE_KTE] = torque.te;
+}
+
 // Eq. 3.12: the torque per volt falls with the speed.
 void CutInformation::addTest(const CuttingCondition& test, const Spindle& spindle, double voltage_std) {
   Vector row = Vector::Zero();
   row[COULOMB] = 1.0;
   row[VISCOUS] = test.spindle_speed;
   if (test.kind == CuttingCondition::Kind::cut) {
-    const auto map = meanForceMatrix(test.tool, test.engagement);
-    row[PLANE_KTC] = map[3][0];
-    row[PLANE_KTE] = map[3][3];
+    setTorque(test, &row);
   }
   add(row, voltage_std / (spindle.load_meter_gain * test.spindle_speed));
 }
 
 void CutInformation::addAboveAir(const CuttingCondition& cut, const Spindle& spindle, double voltage_std) {
   Vector row = Vector::Zero();
-  const auto map = meanForceMatrix(cut.tool, cut.engagement);
-  row[PLANE_KTC] = map[3][0];
-  row[PLANE_KTE] = map[3][3];
+  setTorque(cut, &row);
   add(row, std::sqrt(2.0) * voltage_std / (spindle.load_meter_gain * cut.spindle_speed));
 }
 

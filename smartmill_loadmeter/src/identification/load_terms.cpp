@@ -4,8 +4,8 @@
 #include <cmath>
 #include <set>
 
-#include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
+#include "smartmill_loadmeter/identification/torque_sensitivity.h"
 
 namespace smartmill::loadmeter {
 
@@ -27,8 +27,8 @@ LoadPlan::LoadPlan(const std::vector<LoadRecord>& records, double friction_zero_
       ages.insert(r.edge_age);
       has_teeth = has_teeth || r.tool.teeth > 1;
       has_angle = has_angle || (r.has_angle && r.tool.teeth > 1);
-      const auto map = meanForceMatrix(r.tool, r.engagement);
-      chips.insert(std::lround(1e9 * map[3][0] / map[3][3]));
+      const TorqueSensitivity torque = torqueSensitivity(r.tool, r.engagement);
+      chips.insert(std::lround(1e9 * torque.tc / torque.te));
     } else {
       ++air_cuts;
       if (r.speed >= friction_zero_below) speeds.insert(r.speed);

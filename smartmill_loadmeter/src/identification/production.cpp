@@ -5,10 +5,10 @@
 #include <limits>
 #include <set>
 
-#include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
+#include "smartmill_loadmeter/identification/torque_sensitivity.h"
 
 namespace smartmill::loadmeter {
 
@@ -20,16 +20,7 @@ double determinant(const Information& i) {
   return i[0] * i[2] - i[1] * i[1];
 }
 
-struct Sensitivity {
-  double tc = 0.0, te = 0.0;  // [N m] per unit of Ktc, Kte
-};
-
-Sensitivity sensitivityOf(const ToolGeometry& tool, const Engagement& engagement) {
-  const auto map = meanForceMatrix(tool, engagement);
-  return {map[3][0], map[3][3]};
-}
-
-void add(Information& i, const Sensitivity& s, double variance) {
+void add(Information& i, const TorqueSensitivity& s, double variance) {
   i[0] += s.tc * s.tc / variance;
   i[1] += s.tc * s.te / variance;
   i[2] += s.te * s.te / variance;
@@ -53,7 +44,7 @@ void RecursiveCoefficients::update(const TorqueMeasurement& reading) {
   // Forgotten information is replaced by the initial one about the present value.
   const double keep = std::exp(-reading.cutting_time / memory_);
   for (std::size_t i = 0; i < 3; ++i) information_[i] = keep * information_[i] + (1.0 - keep) * start_[i];
-  const Sensitivity s = sensitivityOf(reading.tool, reading.engagement);
+  const TorqueSensitivity s = torqueSensitivity(reading.tool, reading.engagement);
   const double variance = reading.torque_std * reading.torque_std;
   const double d0 = determinant(information_);
   const double expected =
@@ -82,7 +73,7 @@ namespace {
 
 struct Candidate {
   PlannedCut cut;
-  Sensitivity s;
+  TorqueSensitivity s;
   double variance = 0.0;  // [N2 m2] of its torque
 };
 
@@ -97,7 +88,7 @@ std::vector<Candidate> allowedCuts(const ToolGeometry& tool, const Spindle& spin
         Candidate c;
         c.cut.speed = speed;
         c.cut.engagement = {candidates.entry, candidates.exit, depth, feed};
-        c.s = sensitivityOf(tool, c.cut.engagement);
+        c.s = torqueSensitivity(tool, c.cut.engagement);
         c.cut.torque = c.s.tc * expected.ktc + c.s.te * expected.kte;
         c.cut.power = c.cut.torque * speed;
         if (c.cut.torque > limits.torque || c.cut.power > limits.power) continue;

@@ -7,8 +7,8 @@
 #include <numeric>
 #include <set>
 
-#include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/units.h"
+#include "smartmill_loadmeter/identification/torque_sensitivity.h"
 
 namespace smartmill::loadmeter {
 
@@ -105,8 +105,7 @@ std::optional<SuggestedCut> mostInformativeCut(const ToolGeometry& tool, const S
           SuggestedCut cut;
           cut.speed = speed;
           cut.engagement = {entry, exit, depth, feed};
-          const auto map = meanForceMatrix(tool, cut.engagement);
-          cut.torque = map[3][0] * value.ktc + map[3][3] * value.kte;
+          cut.torque = torqueSensitivity(tool, cut.engagement).torque(value.ktc, value.kte);
           if (limits.torque > 0.0 && cut.torque > limits.torque) continue;
           if (limits.power > 0.0 && cut.torque * speed > limits.power) continue;
           CuttingCondition condition;

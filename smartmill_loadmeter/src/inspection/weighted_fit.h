@@ -25,10 +25,9 @@ struct WeightedFit {
   bool found() const { return problem.empty(); }
 };
 
-/// Minimises sum ((y - X b) / s)^2. The row with the largest residual in its own standard deviations, s
-/// sqrt(1
-/// - leverage), is refused while that is above `limit`; at most a quarter of the rows, and only if more
-/// rows than unknowns remain. If the scatter of the others is beyond what 99 % of such sets show (chi
+/// Minimises sum ((y - X b) / s)^2. The row with the largest residual in its own standard deviations,
+/// s sqrt(1 - leverage), is refused while that is above `limit`; at most a quarter of the rows, and only if
+/// more rows than unknowns remain. If the scatter of the others is beyond what 99 % of such sets show (chi
 /// square), the standard deviations are multiplied by its root (Birge 1932).
 /// @param design X, full rank. @param what the rows are, plural, for the reason
 WeightedFit fitWeighted(const Eigen::MatrixXd& design, const Eigen::VectorXd& value,

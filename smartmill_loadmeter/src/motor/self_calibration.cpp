@@ -107,7 +107,7 @@ std::optional<DriveCalibration> SelfCalibration::drive(std::size_t axis) const {
   for (const auto& [r, f] : points) left += std::pow(f - found.newton_per_ampere.value * r, 2);
   found.scatter = std::sqrt(left / (count - 1.0));
   for (const auto& [r, f] : points) found.samples.add({r}, f);
-  found.anfis = found.samples.learn();
+  if (parameters_.motorMethod() == MotorMethod::anfis) found.anfis = found.samples.learn();
   found.newton_per_ampere.std_dev =
       std::hypot(found.scatter / std::sqrt(rr), share / count * found.newton_per_ampere.value);
   return found;
@@ -153,7 +153,7 @@ void SelfCalibration::calibrate() {
   const std::vector<SpindleCut> spindle_cuts = spindleCuts();
   found.spindle = spindle(spindle_cuts);
   for (const SpindleCut& cut : spindle_cuts) found.spindle_samples.add({cut.rise, cut.speed_rpm}, cut.torque);
-  found.spindle_anfis = found.spindle_samples.learn();
+  if (parameters_.motorMethod() == MotorMethod::anfis) found.spindle_anfis = found.spindle_samples.learn();
   if (any || found.spindle) calibration_ = found;
 }
 

@@ -1,5 +1,7 @@
 #include "node/find_message.h"
 
+#include <utility>
+
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_ros/conversions.h"
@@ -37,9 +39,10 @@ smartmill_msgs::FindCoefficients::Response toMsg(const FoundCoefficients& found)
   return response;
 }
 
-CutChoiceRequest choiceOf(const smartmill_msgs::FindCoefficients::Request& request) {
+CutChoiceRequest choiceOf(const smartmill_msgs::FindCoefficients::Request& request,
+                          std::vector<CuttingCondition> tests) {
   CutChoiceRequest choice;
-  for (const smartmill_msgs::CuttingCondition& test : request.tests) choice.made.push_back(fromMsg(test));
+  choice.made = std::move(tests);
   const std::size_t n = request.candidates.size();
   if (request.cutting_time.size() != n || request.stock.size() != n || request.depth_limit.size() != n)
     throw Error(

@@ -7,8 +7,9 @@ namespace smartmill::loadmeter {
 
 smartmill_msgs::FindCoefficients::Response toMsg(const FoundCoefficients& found);
 
-/// Candidates of a request; without candidates none. @throws Error if their lists differ in length.
-CutChoiceRequest choiceOf(const smartmill_msgs::FindCoefficients::Request& request);
+/// Candidates of a request. @param tests of the request. @throws Error if their lists differ in length.
+CutChoiceRequest choiceOf(const smartmill_msgs::FindCoefficients::Request& request,
+                          std::vector<CuttingCondition> tests);
 void fill(const CutChoice& choice, smartmill_msgs::FindCoefficients::Response* response);
 
 }  // namespace smartmill::loadmeter

@@ -4,6 +4,7 @@
 #include <smartmill_msgs/ForceEstimate.h>
 
 #include <cmath>
+#include <utility>
 
 #include "node/find_message.h"
 #include "node/fleet_message.h"
@@ -240,7 +241,7 @@ bool LoadMeterNode::find(smartmill_msgs::FindCoefficients::Request& request,
         findCoefficients(database_, request.tool, request.material, tests, model_);
     response = toMsg(found);
     if (!request.candidates.empty()) {
-      fill(chooseCuts(found, choiceOf(request), identification_.identification().airCuts(),
+      fill(chooseCuts(found, choiceOf(request, std::move(tests)), identification_.identification().airCuts(),
                       parameters_.identification.timeWithoutReadings(*model_.spindle), model_),
            &response);
     }

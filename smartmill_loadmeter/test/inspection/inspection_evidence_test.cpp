@@ -100,27 +100,41 @@ TEST(RadiusEvidence, weightedMeanOfTwoSlotsInClosedForm) {
       "corrected for deflection: none");
 }
 
+/// Errors of Coverage::RUNS estimates.
+class DrawnErrors {
+ public:
+  void add(double error, double std_dev) {
+    coverage_.add(error, std_dev);
+    within_ += std::abs(error) < 1.96 * std_dev;
+    beyond_ += std::abs(error) > 3.0 * std_dev;
+  }
+  void expectCalibrated(const char* what) const {
+    EXPECT_TRUE(coverage_.isCalibrated());
+    // 95 % of 200, three standard deviations of the binomial distribution on both sides.
+    EXPECT_GE(within_, 181);
+    EXPECT_LE(within_, 199);
+    EXPECT_LE(beyond_, 3);  // 0.5 expected; more than 3 with a probability of 0.2 %
+    std::printf("%s: error over standard deviation RMS %.3f, %d of 200 within 1.96, %d beyond 3\n", what,
+                coverage_.rms(), within_, beyond_);
+  }
+
+ private:
+  Coverage coverage_;
+  int within_ = 0, beyond_ = 0;
+};
+
 TEST(RadiusEvidence, isCalibrated) {
   std::mt19937 random(11);
-  Coverage coverage;
-  int within = 0, beyond = 0;
+  DrawnErrors errors;
   for (int run = 0; run < Coverage::RUNS; ++run) {
     const RadiusEvidence r = radiusOf(WornTool::inspected(random));
     ASSERT_EQ(r.problem, "");
     const double error = 0.5 * DIAMETER + r.deviation.value - WornTool::RADIUS;
     // 5 widths of 1.5 um and 3 of 10 um.
     EXPECT_GE(r.deviation.std_dev, 0.5 / std::sqrt(5.0 / 2.25 + 3.0 / 100.0) * UM - 1e-12);
-    coverage.add(error, r.deviation.std_dev);
-    within += std::abs(error) < 1.96 * r.deviation.std_dev;
-    beyond += std::abs(error) > 3.0 * r.deviation.std_dev;
+    errors.add(error, r.deviation.std_dev);
   }
-  EXPECT_TRUE(coverage.isCalibrated());
-  // 95 % of 200, three standard deviations of the binomial distribution on both sides.
-  EXPECT_GE(within, 181);
-  EXPECT_LE(within, 199);
-  EXPECT_LE(beyond, 3);  // 0.5 expected; more than 3 with a probability of 0.2 %
-  std::printf("radius: error over standard deviation RMS %.3f, %d of 200 within 1.96, %d beyond 3\n",
-              coverage.rms(), within, beyond);
+  errors.expectCalibrated("radius");
 }
 
 TEST(RadiusEvidence, anOutlierIsRefusedAndAnnounced) {
@@ -184,22 +198,13 @@ TEST(GrowthEvidence, isTheSlopeInClosedForm) {
 
 TEST(GrowthEvidence, isCalibrated) {
   std::mt19937 random(13);
-  Coverage coverage;
-  int within = 0, beyond = 0;
+  DrawnErrors errors;
   for (int run = 0; run < Coverage::RUNS; ++run) {
     const GrowthEvidence g = growthOf(WarmMachine::inspected(random));
     ASSERT_EQ(g.problem, "");
-    const double error = g.coefficient.value - WarmMachine::GROWTH;
-    coverage.add(error, g.coefficient.std_dev);
-    within += std::abs(error) < 1.96 * g.coefficient.std_dev;
-    beyond += std::abs(error) > 3.0 * g.coefficient.std_dev;
+    errors.add(g.coefficient.value - WarmMachine::GROWTH, g.coefficient.std_dev);
   }
-  EXPECT_TRUE(coverage.isCalibrated());
-  EXPECT_GE(within, 181);
-  EXPECT_LE(within, 199);
-  EXPECT_LE(beyond, 3);  // 0.5 expected; more than 3 with a probability of 0.2 %
-  std::printf("growth: error over standard deviation RMS %.3f, %d of 200 within 1.96, %d beyond 3\n",
-              coverage.rms(), within, beyond);
+  errors.expectCalibrated("growth");
 }
 
 TEST(GrowthEvidence, anOutlierIsRefusedAndAnnounced) {

@@ -54,6 +54,7 @@ class CutInformation {
   // Ktc, Kte, Krc, Kre, Coulomb [N m] and viscous [N m s/rad] friction, scaled to similar magnitudes.
   using Vector = Eigen::Matrix<double, 6, 1>;
   static const Vector& scale();
+  static void setTorque(const CuttingCondition& cut, Vector* row);
   void add(const Vector& row, double std_dev);
 
   Eigen::Matrix<double, 6, 6> information_ = Eigen::Matrix<double, 6, 6>::Zero();
