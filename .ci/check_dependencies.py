@@ -15,12 +15,15 @@ HEADERS = {
     "glog": "libgoogle-glog-dev", "unsupported": "eigen", "gtest": None, "gmock": None,
     "pybind11": "pybind11-dev",
     "libpq-fe.h": None,  # optional: ./setup --with-fleet
+    "mqtt": None,  # optional: a build without it refuses mqtt_broker
+    "pulse": None, "libsigrok": None, "iio.h": None, "comedilib.h": None,  # optional: ./setup --with-instruments
     "arpa": None, "netinet": None, "sys": None, "linux": None,
 }
 FOUND = {
     "Eigen3": "eigen", "Ceres": "libceres-dev", "SQLite3": "sqlite3", "SQLiteCpp": "libsqlitecpp-dev", "CLI11": "cli11", "liblz4": "lz4",
     "libxxhash": "libxxhash-dev", "libzstd": "libzstd-dev", "BZip2": "bzip2", "ZLIB": "zlib", "hdf5-serial": "libhdf5-dev", "matio": "libmatio-dev",
     "pybind11": "pybind11-dev", "Python": "python3-dev", "Interpreter": None, "Development.Module": None,
+    "comedilib": None, "libiio": None, "libpulse": None, "libsigrok": None,  # optional: ./setup --with-instruments
     "nlohmann_json": "nlohmann-json-dev", "PkgConfig": None, "Threads": None, "GTest": None, "catkin": None,
 }
 ROS_PACKAGES = {"actionlib", "tf2", "tf2_ros", "roslib", "rosbag", "rosbag_storage", "diagnostic_updater", "topic_tools",

@@ -97,7 +97,7 @@ def main():
     entries = commands()
     (database / "compile_commands.json").write_text(json.dumps(list(entries.values())))
     for source, entry in sorted(entries.items()):
-        if not is_selected(source, folders, shells):
+        if source.suffix != ".cpp" or not is_selected(source, folders, shells):
             continue
         count += 1
         if source not in reads:

@@ -190,6 +190,9 @@ class Graph:
                     self.add(self.topics, self.name(word, folder), "", readers=users)
         for word, handler in re.findall(rf"advertiseService\(\s*{NAME}\)?,\s*&\w+::(\w+)", text):
             kind = re.search(rf"bool {handler}\(smartmill_msgs::(\w+)::Request", folder)
+            event = re.search(rf"bool {handler}\((\w+)& ", folder)  # with the name of the caller
+            if event and not kind:
+                kind = re.search(rf"using {event[1]} =\s*ros::ServiceEvent<smartmill_msgs::(\w+)::Request", folder)
             self.add(self.services, self.name(word, folder), kind[1] if kind else "", publishers=users)
         for word, request in re.findall(rf"advertiseService\(\s*{NAME},\s*boost::function<bool\((\w+)(?:::Request)?&", text):
             alias = re.search(rf"using {request} = smartmill_msgs::(\w+)::Request;", text)

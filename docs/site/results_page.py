@@ -44,8 +44,8 @@ study is shown with its command, figures, targets and verdicts. Every command ex
 records and independent campaigns; "shipped" means the parameters of `launch/config`. {count} studies; {missed} of {judged} figures with a verdict
 miss their target; where no verdict was recorded, none is shown.
 
-Stability charts of a session come from the zero-order solution and measured FRFs; they are checked by collocation, another solver, on the true
-machine. Compensated forces, tool modes and coefficients of a session are checked against the simulated machine, whose physics is validated
+Stability charts of a session come from fitted modes; they are checked by the full search of collocation on the true machine and by cuts in the
+simulator, which is independent of the solvers. Compensated forces, tool modes and coefficients of a session are checked against the simulated machine, whose physics is validated
 by the campaigns of an independent program.
 """
 

@@ -1,7 +1,9 @@
 // rosrun smartmill_launch compare_bags LIVE.bag REPLAY.bag
 
+#include <cmath>
 #include <cstdio>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -107,6 +109,19 @@ ResultRecord recordOf(const plain::ChatterState& m) {
   return record;
 }
 
+/// Stamp [s] of the first sensor block of the first bag. What a node made of blocks before it, which the
+/// recorder did not get, cannot be repeated.
+struct Beginning {
+  double stamp = -std::numeric_limits<double>::infinity();
+
+  void read(RecordingReader& bag) {
+    for (const char* sensor : {names::DYNAMOMETER, names::SPINDLE_FORCE})
+      bag.on<plain::SampleBlock>(sensor, [this](const plain::SampleBlock& block, double) {
+        if (!std::isfinite(stamp)) stamp = toSec(block.header.stamp);
+      });
+  }
+};
+
 /// One topic of both bags.
 struct Topic {
   std::string name;
@@ -131,6 +146,7 @@ std::unique_ptr<Topic> topic(const char* name, double slack) {
 
 int run(const std::string& first, const std::string& second, double slack, double most_lost) {
   // Single results must be in both recordings; of streams a recorder may miss the ends.
+  Beginning beginning;
   std::vector<std::unique_ptr<Topic>> topics;
   topics.push_back(topic<plain::Frf>(names::TOOL_FRF, 0.0));
   topics.push_back(topic<plain::ModalModel>(names::TOOL_MODES, 0.0));
@@ -142,13 +158,14 @@ int run(const std::string& first, const std::string& second, double slack, doubl
   topics.push_back(topic<plain::ChatterState>(names::CHATTER_STATE, slack));
   for (const bool is_first : {true, false}) {
     RecordingReader bag(is_first ? first : second);
+    if (is_first) beginning.read(bag);
     for (const auto& topic : topics) topic->attach(bag, is_first);
     bag.run();
   }
   bool same = true;
   std::size_t common = 0;
   for (const auto& topic : topics) {
-    const TopicDifference difference = topic->comparison.result();
+    const TopicDifference difference = topic->comparison.result(beginning.stamp);
     std::printf("%s\n", difference.text(topic->name).c_str());
     const bool is_stream = topic->name.rfind("force/", 0) == 0 || topic->name == names::CHATTER_STATE;
     same = same && (is_stream ? difference.sameButFor(most_lost) : difference.same());

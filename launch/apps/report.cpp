@@ -25,9 +25,9 @@ using namespace smartmill;
 using namespace smartmill::report;
 namespace fs = std::filesystem;
 
-/// Stability limit of the true machine, from the tool `lobes` with another solver than the session's chart:
-/// collocation does not average the directional coefficients as the zero-order solution does. The check thus
-/// covers the error of the measured FRF and the error of the method.
+/// Stability limit of the true machine, from the tool `lobes`: collocation with the full search at each
+/// speed. The check thus covers the error of the measured modes and coefficients, and of a chart that is
+/// continued over the speed or by the zero-order solution.
 class TrueLimit {
  public:
   /// @param model file of the true machine @param folder for the output of the tool

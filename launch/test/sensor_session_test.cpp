@@ -26,10 +26,10 @@ using Json = nlohmann::json;
 
 constexpr double SETTLE = 10.0;  // [1] revolutions after which the compensation has settled, as in the report
 
-/// [1] of the error as measured. The target of 5 % of the force is met by the spindle sensor in the slots
-/// (1.1 to 2.2 %), not at the dynamometer's resonance (20 to 35 %), and by the plate (slots 1.0 to 1.3 %,
-/// resonance 3.4 %; with 4 instead of 12 hits at each point 2.8 to 7.4 %).
-constexpr double LARGEST_ERROR = 0.5;
+/// [1] RMS error of the force: the documents' 5 %. The spindle sensor misses it at the dynamometer's
+/// resonance (8 to 10 %), where a quarter of the error as measured is required; it meets it in the slots (1.0
+/// to 2.2 %), the plate in all cuts (1.0 to 4.3 %, by the scatter of its taps).
+constexpr double TARGET = 0.05, LARGEST_SHARE = 0.25;
 
 /// [1] RMS of the difference from the true force over that of the true force, all axes together.
 double forceError(const RecordedCut& cut, const ForceTrack& track) {
@@ -76,10 +76,8 @@ TEST_P(SensorSession, IsCalibratedAndItsBagGivesTheSameForces) {
     const double compensated = forceError(cut, cut.compensated), raw = forceError(cut, cut.raw);
     std::printf("%s, %s: RMS error compensated %.2f %%, as measured %.2f %%\n", sensor.c_str(),
                 cut.condition.name.c_str(), 100.0 * compensated, 100.0 * raw);
-    EXPECT_LT(compensated, LARGEST_ERROR * raw) << cut.condition.name;
-    if (sensor == "spindle" && cut.condition.name != "resonance") {
-      EXPECT_LT(compensated, 0.05) << cut.condition.name;
-    }
+    const bool missed = sensor == "spindle" && cut.condition.name.rfind("slot", 0) != 0;
+    EXPECT_LT(compensated, missed ? LARGEST_SHARE * raw : TARGET) << cut.condition.name;
   }
 
   run("roslaunch -p " + freePort() + " smartmill_launch replay.launch rate:=0 sensor:=" + sensor +

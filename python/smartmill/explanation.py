@@ -56,7 +56,8 @@ class Effect:
     variant: str
     words: Dict[str, str]  #: channel, axis
     parameters: Dict[str, Estimate]  #: by key of the model file, in the unit that the key names
-    confidence: float  #: [1] that it reduces the gap of held-out tests, compared with none and with its rivals
+    modulo: Dict[str, float]  #: deg: angles known up to multiples of it, since no spindle angle was recorded
+    confidence: float  #: [1] that it (or what not_separable lists with it) reduces the gap of held-out tests
     delta_bic: float  #: [1] BIC that is lost without it
     heldout_gap_reduction: float  #: [1] share of the held-out squares above the noise that it removes
     alternatives: Dict[str, float]  #: other effects in its place: delta_bic of each
@@ -83,7 +84,6 @@ class Resemblance:
     name: str
     variant: str
     reason: str
-    confidence: Optional[float]  #: [1]
 
 
 @dataclass(frozen=True)
@@ -157,6 +157,8 @@ class Explanation:
     model: "Model" = field(repr=False)  #: the improved model
     notes: Tuple[str, ...]
     interrupted: bool  #: progress returned False: found until then
+    spent_budget: Optional[float]  #: [s] budget that ended a stage: found until then
+    not_tried: Tuple[str, ...]  #: effects that either has left untried
     seconds: float  #: [s] of computing
     summary: str = field(repr=False)  #: as the program prints it
 

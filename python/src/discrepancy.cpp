@@ -1,5 +1,7 @@
+#include <chrono>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -60,10 +62,14 @@ py::object toPython(const Finding& finding) {
 
 py::object toPython(const FoundEffect& effect) {
   py::dict parameters;
-  for (const FoundParameter& p : effect.parameters) parameters[p.key.c_str()] = estimate(p.value, p.std_dev);
+  py::dict modulo;
+  for (const FoundParameter& p : effect.parameters) {
+    parameters[p.key.c_str()] = estimate(p.known(), p.std_dev);
+    if (p.modulo > 0.0) modulo[p.key.c_str()] = p.modulo;
+  }
   py::dict alternatives;
   for (const auto& [name, delta_bic] : effect.alternatives) alternatives[name.c_str()] = delta_bic;
-  return make("Effect", effect.name, effect.variant, effect.words, parameters, effect.confidence,
+  return make("Effect", effect.name, effect.variant, effect.words, parameters, modulo, effect.confidence,
               effect.delta_bic, effect.heldout_gap_reduction, alternatives);
 }
 
@@ -81,10 +87,8 @@ py::object toPython(const Explanation& e, const std::string& summary) {
       arg("gap_before") = toPython(e.before), arg("gap_after") = toPython(e.after),
       arg("gap_named_only") = e.named_only ? toPython(*e.named_only) : py::object(py::none()),
       arg("where") = tupleOf(e.where, converted), arg("unexplained") = tupleOf(e.unexplained, converted),
-      arg("resembles") = tupleOf(e.resembles,
-                                 [](const Resemblance& r) {
-                                   return make("Resemblance", r.name, r.variant, r.reason, r.confidence);
-                                 }),
+      arg("resembles") = tupleOf(
+          e.resembles, [](const Resemblance& r) { return make("Resemblance", r.name, r.variant, r.reason); }),
       arg("not_separable") =
           tupleOf(e.not_separable, [](const auto& names) { return py::tuple(py::cast(names)); }),
       arg("suggested_test") = e.suggested_test,
@@ -106,18 +110,26 @@ py::object toPython(const Explanation& e, const std::string& summary) {
                                                  arrayOf(r.improved));
                                    }),
       arg("model") = e.model, arg("notes") = py::tuple(py::cast(e.notes)), arg("interrupted") = e.interrupted,
+      arg("spent_budget") = e.spent_budget, arg("not_tried") = py::tuple(py::cast(e.not_tried)),
       arg("seconds") = e.seconds, arg("summary") = summary);
 }
 
 py::object explainCampaign(const std::string& path, const std::optional<MachineModel>& given,
                            const std::string& out, bool report, int threads,
-                           const std::optional<std::string>& prior, const py::object& progress) {
+                           const std::optional<std::string>& prior, std::optional<double> budget,
+                           const py::object& progress) {
   Explanation found = interruptible(progress, [=](Work& work) {
     double done = 0.0;
     ExplainOptions options;
     options.bench.threads = threads;
     if (prior) options.search.prior = readCauseOdds(*prior);
     options.bench.cancelled = [&work] { return work.cancelled(); };
+    if (budget) {
+      options.budget = *budget;
+      options.elapsed = [begin = std::chrono::steady_clock::now()] {
+        return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+      };
+    }
     options.search.on_log = [&](const std::string& line) { work.progress(done, line); };
     options.search.on_progress = [&](double share) { work.progress(done = share); };
     std::error_code failed;
@@ -144,7 +156,7 @@ py::object explainCampaign(const std::string& path, const std::optional<MachineM
 void addDiscrepancy(py::module_& m) {
   m.def("gap", &gap, py::arg("campaign"), py::arg("model"), py::arg("threads"));
   m.def("explain", &explainCampaign, py::arg("campaign"), py::arg("model"), py::arg("out"), py::arg("report"),
-        py::arg("threads"), py::arg("prior"), py::arg("progress"));
+        py::arg("threads"), py::arg("prior"), py::arg("budget"), py::arg("progress"));
 }
 
 }  // namespace smartmill::python

@@ -3,14 +3,10 @@
 #include <cstdio>
 #include <memory>
 
+#include "smartmill_core/formatted.h"
+
 namespace smartmill {
 namespace {
-
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : " ") + word;
-  return text;
-}
 
 /// Lines of the script's tables, of a command and those below it.
 struct Tables {
@@ -25,7 +21,7 @@ struct Tables {
       std::string pattern;
       for (const std::string& one : option.names)
         pattern += (pattern.empty() ? "'" : " | '") + name + " " + one + "'";
-      const std::string words = !option.choice.empty()   ? "words='" + joined(option.choice) + "'"
+      const std::string words = !option.choice.empty()   ? "words='" + joined(option.choice, " ") + "'"
                                 : option.value == "TEXT" ? "files=yes"
                                                          : "words=";
       values += "    " + pattern + ") " + words + " ;;\n";
@@ -34,9 +30,9 @@ struct Tables {
     std::vector<std::string> places;
     for (const OptionEntry& option : entry.options)
       if (option.argument) places.insert(places.end(), option.choice.begin(), option.choice.end());
-    options += "    '" + name + "') options='" + joined(names) + "'";
-    if (!commands.empty()) options += " commands='" + joined(commands) + "'";
-    if (!places.empty()) options += " words='" + joined(places) + "'";
+    options += "    '" + name + "') options='" + joined(names, " ") + "'";
+    if (!commands.empty()) options += " commands='" + joined(commands, " ") + "'";
+    if (!places.empty()) options += " words='" + joined(places, " ") + "'";
     options += " ;;\n";
     for (const CommandEntry& command : entry.commands) add(name + " " + command.name, command);
   }
@@ -121,7 +117,7 @@ std::string bashCompletion(const CommandProgram& program) {
   std::string script = FRAME;
   replaceAll(script, "%OPTIONS", tables.options);
   replaceAll(script, "%VALUES", tables.values);
-  replaceAll(script, "%COMMANDS", joined(names));
+  replaceAll(script, "%COMMANDS", joined(names, " "));
   replaceAll(script, "%NAME", program.name);
   replaceAll(script, "%VERSION", program.version);
   return script;

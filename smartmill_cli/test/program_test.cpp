@@ -51,7 +51,7 @@ TEST(Program, NamesEveryCommandOnce) {
     EXPECT_EQ(command.name.find('_'), std::string::npos) << command.name;
   }
   for (const char* due : {"explain", "gap", "simulate", "hide", "coefficients", "frf", "health", "compensate",
-                          "cutting-frf", "lobes", "detect", "force-law", "database"})
+                          "cutting-frf", "lobes", "detect", "force-law", "database", "program"})
     EXPECT_EQ(names.count(due), 1u) << due;
 }
 
@@ -130,7 +130,8 @@ TEST(Program, NamesAFileThatIsMissingInOneLine) {
         "compensate nowhere -o out", "cutting-frf nowhere -o out",
         "detect nowhere.wav --speed 8000 --teeth 4",
         "lobes nowhere.yaml --entry-deg 0 --exit-deg 180 --speeds 1e3:2e3:3 --max-depth-mm 1 -o out.csv",
-        "force-law nowhere", "database nowhere.sqlite list", "calibrate nowhere", "sensor-report nowhere",
+        "program nowhere.nc --stock-mm 1 1 1 --model nowhere.yaml -o out", "force-law nowhere",
+        "database nowhere.sqlite list", "calibrate nowhere", "sensor-report nowhere",
         "chart nowhere.bag --model nowhere.yaml", "spindle-sensor verify nowhere.yaml nowhere.csv",
         "plan-cuts nowhere.yaml --speeds 3000 --feeds 0.1 0.2 0.3 --depths 1 --ktc-std 9 --kte-std 1"}) {
     const Outcome failed = smartmill(arguments);
@@ -162,7 +163,7 @@ std::vector<std::string> completed(const std::string& words) {
 }
 
 TEST(Completion, KnowsCommandsOptionsWordsAndFiles) {
-  EXPECT_THAT(completed("smartmill ex"), ElementsAre("explain"));
+  EXPECT_THAT(completed("smartmill expl"), ElementsAre("explain"));
   EXPECT_THAT(completed("smartmill c"),
               ::testing::IsSupersetOf({"coefficients", "compensate", "cutting-frf"}));
   EXPECT_THAT(completed("smartmill --v"), ElementsAre("--version"));

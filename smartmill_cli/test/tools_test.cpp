@@ -1,5 +1,6 @@
 // The command of the program and the tool of the same code do the same to the byte: output, exit code, files.
 
+#include <fstream>
 #include <regex>
 #include <set>
 
@@ -98,6 +99,8 @@ TEST(Tools, DoWhatTheirCommandsDoToMeasuredRecords) {
   SMARTMILL_SHARED_DATA(taps, "campaigns/cross_talk");
   SMARTMILL_SHARED_DATA(moves, "measured/axis_motion");
   expectSame("axis-drive", moves);
+  expectSame("daq", "nowhere.yaml", 1);  // its output has times
+  expectSame("sensitivity", "nowhere.yaml daq/vibration x nowhere.bag --exciter 10", 1);
   expectSame("frf", hits + "/*.csv -o out --no-picture");
   expectSame("detect", sound + " --speed 8018 --teeth 4 -o picture.png");
   expectSame("sensor-report", taps + " -o matrix.csv");
@@ -108,6 +111,23 @@ TEST(Tools, DoWhatTheirCommandsDoToAModel) {
   expectSame("lobes", cut + "--speeds 4000:6000:11 --max-depth-mm 2 -o chart.csv");
   expectSame("lobes", cut + "--speeds 4000:6000:11 --max-depth-mm 0 -o chart.csv", 1);
   expectSame("chatter-probability", cut + "--speeds 4000:6000:5 --depths-mm 0.1:1:3 --draws 3 -o grid.csv");
+  expectSame("lobes", " " MODEL
+                      " --entry-deg 150 --exit-deg 180 --speeds 4000:6000:5 --max-depth-mm 2 -o chart.csv "
+                      "--surface-error walls.csv --feed-mm 0.05 --tolerance-um 10");
+  expectSame("tool-frf", "nowhere.yaml --tool em12 -o tip", 1);
+  const TemporaryFolder folder;
+  std::ofstream(folder.file("cuts.csv")) << "rpm,depth_mm,verdict\n3000,0.1,stable\n3000,0.3,chatter\n"
+                                            "900,0.15,stable\n900,0.3,chatter\n";
+  expectSame("process-damping", cut + "--cuts " + folder.file("cuts.csv") + " -o damped.yaml");
+}
+
+TEST(Tools, DoWhatTheirCommandsDoToANcProgram) {
+  const TemporaryFolder folder;
+  const std::string good =
+      folder.write("part.nc", "G21 G90 G0 X-10 Y10 Z-2\nS6000 M3\nG1 X30 F1200\nG0 Z5\nM30\n");
+  const std::string options = " --stock-mm 40 20 10 --model " MODEL " -o part";
+  expectSame("program", good + options);
+  expectSame("program", folder.write("bad.nc", "G41 X1\nM30\n") + options, 1);
 }
 
 TEST(Tools, DoWhatTheirCommandsDoToADatabase) {
@@ -171,6 +191,9 @@ TEST(Tools, DoWhatTheirCommandsDoToARecording) {
   expectSame("campaign", bag + with_model + " -o out");
   expectSame("convert", bag + " -o out.mcap --compression zstd");
   expectSame("convert", later + " -o out.bag");
+  expectSame("export", bag + " -o out.h5 --name force/compensated --to 5");
+  expectSame("account", bag);
+  expectSame("items", bag + " -o out");
   expectSame("compensate", bag + with_model + " -o out");
   expectSame("compensate", later + with_model + " -o out");
   expectSame("coefficients", bag + with_model + " -o cutting.yaml");

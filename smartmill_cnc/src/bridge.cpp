@@ -78,6 +78,9 @@ void Bridge::step(double now) {
   }
   state_.stamp = now;
   state_.armed = motion_.armed();
+  if (!state_.armed) {
+    holder_.reset();
+  }
   if (load_) {
     load_->stamp = now;
   }
@@ -98,17 +101,24 @@ void Bridge::noteLoss(const Status& status) {
   }
 }
 
-Answer<ArmCode> Bridge::arm(bool on) {
+Answer<ArmCode> Bridge::arm(bool on, const std::string& client) {
   if (!on) {
     noteLoss(motion_.disarm());
     state_.armed = false;
+    holder_.reset();
     return {ArmCode::ok, "motion is disarmed"};
   }
   if (!state_.connected || !controller_->connected()) {
     return {ArmCode::not_connected, "no connection to the " + controller_->name()};
   }
+  if (const std::string refusal = armRefusal(holder_, client); !refusal.empty()) {
+    return {ArmCode::held, refusal};
+  }
   const Result<Answer<ArmCode>> answer = motion_.arm();
   state_.armed = motion_.armed();
+  if (state_.armed && !holder_) {
+    holder_ = ArmHolder{client, state_.stamp};
+  }
   if (answer) {
     return *answer;
   }

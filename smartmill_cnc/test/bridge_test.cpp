@@ -221,6 +221,30 @@ TEST_F(BridgeTest, RefusalsSendNothing) {
   EXPECT_EQ(finish().code, MotionCode::ok);
 }
 
+TEST_F(BridgeTest, MotionIsArmedForOneClient) {
+  cycle();
+  EXPECT_FALSE(bridge_->holder());
+  EXPECT_EQ(bridge_->arm(true, "/a").code, ArmCode::ok);
+  ASSERT_TRUE(bridge_->holder());
+  EXPECT_EQ(bridge_->holder()->client, "/a");
+  EXPECT_EQ(bridge_->arm(true, "/a").code, ArmCode::ok);
+  const Answer<ArmCode> second = bridge_->arm(true, "/b");
+  EXPECT_EQ(second.code, ArmCode::held);
+  EXPECT_EQ(second.message.find("motion is armed by /a since "), 0u) << second.message;
+  cycle();
+  EXPECT_EQ(bridge_->holder()->client, "/a");
+  // Every client can disarm.
+  EXPECT_EQ(bridge_->arm(false, "/b").code, ArmCode::ok);
+  EXPECT_FALSE(bridge_->holder());
+  EXPECT_EQ(bridge_->arm(true, "/b").code, ArmCode::ok);
+  EXPECT_EQ(bridge_->holder()->client, "/b");
+  // The controller disarms.
+  machine_.change([](TestMachine& m) { m.state.aut = focas::AUT_MEM; });
+  cycle();
+  EXPECT_FALSE(bridge_->state().armed);
+  EXPECT_FALSE(bridge_->holder());
+}
+
 TEST_F(BridgeTest, WorkpieceZeroIsTakenIntoAccount) {
   machine_.change([](TestMachine& m) { m.offset = {{150.0, 0.0, 0.0}}; });
   arm();

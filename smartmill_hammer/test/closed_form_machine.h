@@ -118,6 +118,7 @@ class ClosedFormMachine {
       case Command::Kind::stop:
         path.clear();
         orienting = false;
+        spindle_speed = 0.0;
         break;
     }
   }

@@ -409,8 +409,8 @@ TEST(ServoGuide, CurrentsLoadAndTriggerAtABlock) {
   }
   const SampleBlock block = recorder.take();
   EXPECT_EQ(block.sample_rate, 1000.0);
-  ASSERT_EQ(block.samples.size(), 6u * 2500u);
-  const auto at = [&](std::size_t k, std::size_t channel) { return block.samples[6 * k + channel]; };
+  ASSERT_EQ(block.samples.size(), 9u * 2500u);
+  const auto at = [&](std::size_t k, std::size_t channel) { return block.samples[9 * k + channel]; };
   const AxisDrive drive;
   // At 0.1 m/s friction alone; during the acceleration of 2 m/s2 the mass as well.
   const double friction = (drive.viscous * 0.1 + drive.coulomb) / drive.force_per_ampere;
@@ -418,13 +418,15 @@ TEST(ServoGuide, CurrentsLoadAndTriggerAtABlock) {
   EXPECT_NEAR(at(25, 1), (drive.mass * 2.0 + drive.viscous * 0.05 + drive.coulomb) / drive.force_per_ampere,
               0.01);
   EXPECT_EQ(at(300, 0), 0.25);
-  EXPECT_EQ(at(300, 4), 10.0);
+  EXPECT_NEAR(at(300, 4), 0.1, 1e-9);  // velocity along x
   EXPECT_EQ(at(300, 5), 0.0);
+  EXPECT_EQ(at(300, 7), 10.0);
+  EXPECT_EQ(at(300, 8), 0.0);
   // The second block begins after 0.6 s + 0.05 s.
-  EXPECT_EQ(at(649, 5), 0.0);
-  EXPECT_EQ(at(651, 5), 1.0);
-  EXPECT_EQ(at(2400, 5), 1.0);
-  EXPECT_EQ(at(900, 4), 20.0);
+  EXPECT_EQ(at(649, 8), 0.0);
+  EXPECT_EQ(at(651, 8), 1.0);
+  EXPECT_EQ(at(2400, 8), 1.0);
+  EXPECT_EQ(at(900, 7), 20.0);
 }
 
 }  // namespace

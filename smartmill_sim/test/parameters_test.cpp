@@ -1,4 +1,5 @@
 #include "../src/node/parameters.h"
+#include "../src/node/fault_parameters.h"
 #include "../src/node/lathe_parameters.h"
 
 #include "smartmill_core/testing/shipped_parameters.h"
@@ -11,6 +12,8 @@ TEST(Parameters, TheShippedFileIsTheTable) {
   EXPECT_NO_THROW(NodeParameters().validate());
   expectShipped<LatheParameters>("../launch/config/lathe.yaml", "smartmill_sim lathe_node");
   EXPECT_NO_THROW(LatheParameters().validate());
+  expectShipped<FaultParameters>("../launch/config/faults.yaml", "smartmill_sim fault_node");
+  EXPECT_NO_THROW(FaultParameters().validate());
 }
 
 }  // namespace

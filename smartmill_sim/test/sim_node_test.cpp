@@ -172,15 +172,16 @@ TEST_F(SimNode, anOperatorHitsByHand) {
 }
 
 TEST_F(SimNode, servoStreamHasNoGapsAtOneKilohertz) {
-  const auto blocks = collect<smartmill_msgs::SampleBlock>(names::daq("servo"));
+  const auto blocks = collect<smartmill_msgs::SampleBlock>(names::SERVO_RECORD);
   ASSERT_TRUE(until([&] { return blocks->size() > 100; }));
   const std::lock_guard<std::mutex> lock(mutex);
-  EXPECT_EQ(blocks->front().channels, (std::vector<std::string>{"spindle_load", "current_x", "current_y",
-                                                                "current_z", "sequence", "trigger"}));
+  EXPECT_EQ(blocks->front().channels,
+            (std::vector<std::string>{"spindle_load", "current_x", "current_y", "current_z", "axis_vx",
+                                      "axis_vy", "axis_vz", "sequence", "trigger"}));
   for (std::size_t i = 1; i < blocks->size(); ++i) {
     const auto& b = (*blocks)[i];
     ASSERT_EQ(b.sample_rate, 1000.0);
-    ASSERT_EQ(b.first_index, (*blocks)[i - 1].first_index + (*blocks)[i - 1].samples.size() / 6);
+    ASSERT_EQ(b.first_index, (*blocks)[i - 1].first_index + (*blocks)[i - 1].samples.size() / 9);
   }
 }
 

@@ -129,11 +129,6 @@ void score(const plant::Case& hidden, const plant::Drawn& drawn, const Explanati
       all.insert(all.end(), some.begin(), some.end());
     }
   }
-  for (const Resemblance& r : e.resembles) {
-    if (!r.confidence) continue;
-    const bool right = hidden.kind != "outside" && isHidden(hidden, e, r.name);
-    out["resembling"].push_back({{"name", r.name}, {"confidence", *r.confidence}, {"right", right}});
-  }
   out["false_effect"] = false_effect;
   out["parameters"] = all.size();
   out["inside"] = std::count_if(all.begin(), all.end(), [](double z) { return z <= 1.96; });
@@ -149,15 +144,10 @@ void score(const plant::Case& hidden, const plant::Drawn& drawn, const Explanati
 
 json runBenchCase(const plant::Case& hidden, int number, const std::string& folder,
                   const std::function<void(const std::string&)>& progress) {
-  json line{{"case", number},
-            {"kind", hidden.kind},
-            {"hidden", hidden.names},
-            {"vibrating", hidden.vibrating},
-            {"named", json::array()},
-            {"resembling", json::array()},
-            {"empirical", json::array()},
-            {"right", false},
-            {"false_effect", false}};
+  json line{{"case", number},         {"kind", hidden.kind},
+            {"hidden", hidden.names}, {"vibrating", hidden.vibrating},
+            {"named", json::array()}, {"empirical", json::array()},
+            {"right", false},         {"false_effect", false}};
   const plant::Drawn drawn = plant::draw(hidden);
   const std::vector<Record> records = plant::runCampaign(drawn, hidden);
   plant::writeCampaignOf(drawn, records, folder);

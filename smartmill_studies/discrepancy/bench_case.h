@@ -13,7 +13,7 @@ namespace smartmill::discrepancy {
 /// is compared with the hidden truth.
 /// @param folder for the campaign and explain's report @param receives progress lines; may be empty
 /// @return one line of the bench: case, kind, hidden, vibrating, verdict (or why the campaign was refused),
-/// named and resembling (name, confidence, right), empirical (forms found without a name), right,
+/// named (name, confidence, right), empirical (forms found without a name), right,
 /// false_effect, largest_z (distance of a parameter from the truth [standard deviations]), parameters, inside
 /// (number of them within 1.96), gap_before, gap_after, heldout_before (with named effects only),
 /// heldout_after, floor, heldout_floor (fitted and held-out tests: gap between two runs of the plant over

@@ -130,49 +130,43 @@ void drawConfusion(const std::vector<json>& lines, const std::string& png) {
 // Effects of one range of stated confidence.
 struct Bin {
   double stated = 0.0;
-  Share named, resembling;
-
-  double all() const { return named.all + resembling.all; }
-  double right() const { return named.right + resembling.right; }
+  Share named;
 };
 
 const std::vector<double> EDGES{0.0, 0.2, 0.5, 0.8, 0.95, 0.99, 0.999, 1.0};
 
 std::vector<Bin> binsOf(const std::vector<json>& lines) {
   std::vector<Bin> bins(EDGES.size() - 1);
-  const auto add = [&](const json& effect, Share Bin::*kind) {
-    const double confidence = effect["confidence"];
-    std::size_t b = 0;
-    while (b + 2 < EDGES.size() && confidence >= EDGES[b + 1]) ++b;
-    bins[b].stated += confidence;
-    (bins[b].*kind).add(effect["right"]);
-  };
   for (const json& line : lines) {
-    for (const json& effect : line["named"]) add(effect, &Bin::named);
-    if (!line.contains("resembling")) continue;  // line of an older bench
-    for (const json& effect : line["resembling"]) add(effect, &Bin::resembling);
+    for (const json& effect : line["named"]) {
+      const double confidence = effect["confidence"];
+      std::size_t b = 0;
+      while (b + 2 < EDGES.size() && confidence >= EDGES[b + 1]) ++b;
+      bins[b].stated += confidence;
+      bins[b].named.add(effect["right"]);
+    }
   }
   return bins;
 }
 
-// Stated confidence of each effect, named or only resembling, compared with the share that was hidden.
+// Stated confidence of each named effect compared with the share that was hidden.
 void drawReliability(const std::vector<json>& lines, const std::string& folder) {
   const std::vector<Bin> bins = binsOf(lines);
   std::string data;
   std::ofstream csv(folder + "/reliability.csv");
-  csv << "from,to,stated,right,low,high,named_right,named,resembling_right,resembling\n";
-  std::printf("stated confidence  mean    hidden (95 %% interval)         named    only resembling\n");
+  csv << "from,to,stated,right,low,high,named_right,named\n";
+  std::printf("stated confidence  mean    hidden (95 %% interval)         named\n");
   for (std::size_t b = 0; b < bins.size(); ++b) {
     const Bin& bin = bins[b];
-    if (bin.all() == 0.0) continue;
-    const double stated = bin.stated / bin.all(), right = bin.right() / bin.all();
-    const auto [low, high] = wilson(right, bin.all());
+    const double all = bin.named.all;
+    if (all == 0.0) continue;
+    const double stated = bin.stated / all, right = bin.named.right / all;
+    const auto [low, high] = wilson(right, all);
     data += formatted("%.5f %.5f %.5f %.5f\n", stated, right, low, high);
-    csv << formatted("%g,%g,%.5f,%.5f,%.5f,%.5f,%d,%d,%d,%d\n", EDGES[b], EDGES[b + 1], stated, right, low,
-                     high, bin.named.right, bin.named.all, bin.resembling.right, bin.resembling.all);
-    std::printf("%5.3f .. %5.3f     %6.4f  %6.4f (%.2f .. %.2f)           %3d of %-3d %3d of %d\n", EDGES[b],
-                EDGES[b + 1], stated, right, low, high, bin.named.right, bin.named.all, bin.resembling.right,
-                bin.resembling.all);
+    csv << formatted("%g,%g,%.5f,%.5f,%.5f,%.5f,%d,%d\n", EDGES[b], EDGES[b + 1], stated, right, low, high,
+                     bin.named.right, bin.named.all);
+    std::printf("%5.3f .. %5.3f     %6.4f  %6.4f (%.2f .. %.2f)           %3d of %d\n", EDGES[b],
+                EDGES[b + 1], stated, right, low, high, bin.named.right, bin.named.all);
   }
   if (data.empty()) return;
   Gnuplot picture(folder + "/reliability.png", 700, 650, 10);
@@ -180,8 +174,7 @@ void drawReliability(const std::vector<json>& lines, const std::string& folder) 
           << data
           << "EOD\nset title 'reliability of the stated confidence'\nset xlabel 'stated'\nset ylabel 'share "
              "right'\nset xrange [-0.02:1.02]\nset yrange [0:1.05]\nset key left\nplot x with lines dt 2 lc "
-             "'gray' title 'ideal', $r using 1:2:3:4 with yerrorbars pt 7 title 'effects named or "
-             "resembling'\n";
+             "'gray' title 'ideal', $r using 1:2:3:4 with yerrorbars pt 7 title 'named effects'\n";
   picture.draw();
 }
 

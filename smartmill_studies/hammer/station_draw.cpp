@@ -146,4 +146,16 @@ DrawnStation drawStation(std::uint64_t seed, int number) {
   return d;
 }
 
+DrawnStation withSensorOpposite(DrawnStation drawn) {
+  for (MachineModel* model : {&drawn.believed, &drawn.true_model}) {
+    ToolGeometry& tool = *model->tool;
+    tool.teeth += tool.teeth % 2;
+    tool.pitch.clear();
+    model->hammer->offset = 0.0;
+    model->hammer->opposite = smartmill::HammerStation::Opposite{tool.diameter + 10e-3, 20e-3};
+    drawn.traits.tooth_low.resize(static_cast<std::size_t>(tool.teeth), 0.0);
+  }
+  return drawn;
+}
+
 }  // namespace smartmill::hammer

@@ -25,4 +25,8 @@ struct DrawnStation {
 /// The machine with a number; the same arguments give the same machine.
 DrawnStation drawStation(std::uint64_t seed, int number);
 
+/// The same with the sensor opposite the hammer, at its height: an odd number of teeth becomes the next even
+/// one, teeth are evenly spaced.
+DrawnStation withSensorOpposite(DrawnStation drawn);
+
 }  // namespace smartmill::hammer

@@ -205,7 +205,8 @@ StationFrfs figuresOf(const Truth& truth, const MeasureFrfResult& result, double
 
 json runStation(const StationStudy& study, int number, StationFrfs* frfs) {
   const auto begun = std::chrono::steady_clock::now();
-  const DrawnStation drawn = drawStation(study.seed, number);
+  const DrawnStation drawn =
+      study.opposite ? withSensorOpposite(drawStation(study.seed, number)) : drawStation(study.seed, number);
   const StationTask task = taskOf(drawn, study.hits);
   const HammerParameters& parameters = task.parameters;
   const MeasureFrfGoal& goal = task.goal;

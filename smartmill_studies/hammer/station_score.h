@@ -15,7 +15,8 @@ constexpr double BAND_LOW = 250.0, BAND_HIGH = 4900.0;  ///< [Hz] of the scored 
 /// Settings of the study's measurements.
 struct StationStudy {
   std::uint64_t seed = 1;
-  int hits = 10;  ///< [1] per measurement
+  int hits = 10;          ///< [1] per measurement
+  bool opposite = false;  ///< the sensor is opposite the hammer
 };
 
 /// Curves of figures 4.5 to 4.8 of the thesis, on the frequency lines of the measurement; empty if it failed.

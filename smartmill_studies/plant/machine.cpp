@@ -142,7 +142,7 @@ class TestRun {
                  plant.unsteadiness, random),
         sensor_(plant, hidden_, units::rpmFromRadPerSec(test.spindle_speed), step_),
         tip_(plant, hidden_, step_),
-        disturbance_(hidden_, test.spindle_speed),
+        disturbance_(hidden_, test.spindle_speed, random),
         chain_(plant, hidden_, test.spindle_speed, step_, random),
         peak_(std::uniform_real_distribution<double>(150.0, 300.0)(random)) {
     if (plant.spindle && turns()) drive_.emplace(plant, hidden_, test, step_);

@@ -103,7 +103,7 @@ class Drive {
 /// Forces on the sensor other than cutting forces.
 class Disturbance {
  public:
-  Disturbance(const Hidden& hidden, double speed)
+  Disturbance(const Hidden& hidden, double speed, std::mt19937_64& random)
       : unbalance_(1e-6 * hidden("unbalance", "mass_eccentricity_g_mm") * speed * speed),
         unbalance_angle_(units::radFromDeg(hidden("unbalance", "angle_deg"))) {
     for (const EffectEntry* e : hidden.all("axis_inertia"))
@@ -117,6 +117,12 @@ class Disturbance {
         order.phase[a] = units::radFromDeg(e->numbers.at(axes[a] + "_deg"));
       }
       orders_.push_back(order);
+    }
+    // A bearing's cage slips: its phase has no relation to the angle of the spindle.
+    for (const EffectEntry* e : hidden.all("bearing_tone")) {
+      const double phase = std::uniform_real_distribution<double>(0, units::TWO_PI)(random);
+      const auto& n = e->numbers;
+      orders_.push_back({n.at("order"), {n.at("x_n"), n.at("y_n"), n.at("z_n")}, {phase, phase, phase}});
     }
   }
   /// [N] @param angle [rad] of the spindle @param axes [m/s2] acceleration of the machine's axes

@@ -89,7 +89,7 @@ void TopicComparison::addSecond(const ResultRecord& record) {
   if (difference_.where.empty()) difference_.where = record.key;
 }
 
-TopicDifference TopicComparison::result() const {
+TopicDifference TopicComparison::result(double from) const {
   TopicDifference difference = difference_;
   double earliest = INFINITE;
   const auto classify = [&](const std::string& key, double stamp, std::size_t& within, std::size_t& ends) {
@@ -101,7 +101,12 @@ TopicDifference TopicComparison::result() const {
     difference.missing = key;
   };
   for (const auto& [key, record] : first_) {
-    if (!matched_.count(key)) classify(key, record.stamp, difference.first_only, difference.first_ends);
+    if (matched_.count(key)) continue;
+    if (record.stamp < from) {
+      ++difference.first_ends;
+    } else {
+      classify(key, record.stamp, difference.first_only, difference.first_ends);
+    }
   }
   for (const auto& [key, stamp] : second_only_) {
     classify(key, stamp, difference.second_only, difference.second_ends);

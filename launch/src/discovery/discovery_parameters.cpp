@@ -37,8 +37,7 @@ void DiscoveryParameters::declare(ParameterTable& table) {
                "until the monitor reports a result of a cut");
   table.number("quiet_time", quiet_time, "s", waiting_time,
                "without a result of the monitor, after which its results are complete");
-  table.number("explain_timeout", explain_timeout, "s", waiting_time,
-               "of one run of explain; then its intermediate result is used");
+  table.number("explain_budget", explain_budget, "s", waiting_time, "of one run of explain");
 }
 
 void DiscoveryParameters::validate() const {

@@ -119,6 +119,10 @@ void CalibrationParameters::declare(ParameterTable& table) {
                "spindle: averaging time of a load");
   table.number("load_settling", load_settling, "s", Range::closed(0.0, 60.0),
                "spindle: from the operator's answer to the reading");
+  table.list(
+      "tuning_speeds", tuning_speeds, "rad/s", Range::positive(),
+      "spindle: spindle speeds (13950 rpm) at which the process noise of the force filter is tuned, each "
+      "from two air cuts and a slot of the resonance's depth and feed; empty: none");
   const Range point_range = Range::closed(-2.0, 2.0);
   table.list("tap_points_x", points_x, "m", point_range, "plate: points of the taps along x" + points);
   table.list("tap_points_y", points_y, "m", point_range, "plate: points of the taps along y" + points);

@@ -11,6 +11,7 @@
 
 #include "session/child.h"
 #include "smartmill_core/cutting/coefficient_set.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/modal/results.h"
 #include "smartmill_core/model/cause_odds.h"
 #include "smartmill_core/names.h"
@@ -22,12 +23,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using discovery::Explained;
-
-std::string joined(const std::vector<std::string>& texts) {
-  std::string text;
-  for (const std::string& item : texts) text += (text.empty() ? "" : "; ") + item;
-  return text;
-}
 
 }  // namespace
 
@@ -156,7 +151,7 @@ void Discovery::discover(const smartmill_msgs::DiscoverGoal& goal, Result& resul
     install(result);
     messages.push_back("installed, the previous model is kept in " + installed_model_.replaced());
   }
-  result.message = joined(messages);
+  result.message = joined(messages, "; ");
 }
 
 void Discovery::waitUntilReady() {
@@ -228,16 +223,21 @@ Explained Discovery::explain(Result& result) {
   std::error_code failed;
   fs::create_directories(out, failed);
   if (failed) throw Failure{Result::EXPLAIN_FAILED, out + ": " + failed.message()};
-  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(parameters_.explain_timeout);
   const std::string log = out + "/explain.log";
   int code = 0;
   try {
-    std::vector<std::string> arguments{
-        parameters_.record_folder,          "--model", installed_model_.inUse(), "-o", out, "--threads",
-        std::to_string(parameters_.threads)};
+    std::vector<std::string> arguments{parameters_.record_folder,
+                                       "--model",
+                                       installed_model_.inUse(),
+                                       "-o",
+                                       out,
+                                       "--threads",
+                                       std::to_string(parameters_.threads),
+                                       "--budget",
+                                       numberText(parameters_.explain_budget, 1)};
     if (!parameters_.prior.empty()) arguments.insert(arguments.end(), {"--prior", parameters_.prior});
-    code = runTool({"explain", "the cause of the disagreement"}, arguments, log,
-                   [&] { return cancel_ || ros::WallTime::now() > end; });
+    code =
+        runTool({"explain", "the cause of the disagreement"}, arguments, log, [&] { return cancel_.load(); });
   } catch (const Error& error) {
     throw Failure{Result::EXPLAIN_FAILED, error.what()};
   }

@@ -37,6 +37,9 @@ smartmill_msgs::CncState MachineDriver::state() const {
 
 void MachineDriver::checkStop() const {
   if (stopped_() || !ros::ok()) throw Interrupted();
+  for (const auto& [node, is_alive] : is_alive_) {
+    if (!is_alive()) throw Error("node " + nh_.resolveName(node) + " has ended");
+  }
 }
 
 bool MachineDriver::waitUntil(const std::function<bool()>& ready, double seconds) const {

@@ -3,6 +3,7 @@
 #include <array>
 #include <functional>
 #include <future>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -36,9 +37,12 @@ class MachineDriver {
   /// @param stopped polled by the waiting thread; true interrupts it
   MachineDriver(ros::NodeHandle nh, std::function<bool()> stopped);
 
-  /// @throws Interrupted if stopped
+  /// From now on every wait ends with an error if a node has ended. @param is_alive of each, by name
+  void require(std::map<std::string, std::function<bool()>> is_alive) { is_alive_ = std::move(is_alive); }
+
+  /// @throws Interrupted if stopped; Error naming a required node that has ended
   void checkStop() const;
-  /// @return false: not ready in time. @throws Interrupted
+  /// @return false: not ready in time. @throws as checkStop()
   bool waitUntil(const std::function<bool()>& ready, double seconds) const;
 
   /// @throws Error naming the action if it fails; Interrupted after cancelling the goal
@@ -63,6 +67,7 @@ class MachineDriver {
 
   ros::NodeHandle nh_;
   std::function<bool()> stopped_;
+  std::map<std::string, std::function<bool()>> is_alive_;  // required nodes
   Client<smartmill_msgs::RunProgramAction> program_;
   mutable std::mutex mutex_;
   smartmill_msgs::CncState state_;

@@ -41,6 +41,10 @@ void declareChecks(PlanParameters& p, ParameterTable& table) {
                "maximum time of steady cutting at the recommended point");
   table.number("unstable_time", p.unstable_time, "s", Range::positive(),
                "maximum time of steady cutting at the unstable point");
+  table.number(
+      "control_time", p.control_time, "s", Range::notNegative(),
+      "maximum time of steady cutting at the unstable point under chatter control (set by the launch "
+      "file where the control acts); 0.0: no such cut");
   table.number("least_revolutions", p.least_revolutions, "1", Range::positive(),
                "minimum spindle revolutions of steady cutting; points with fewer are skipped");
   table.section(

@@ -58,11 +58,12 @@ Session::Session(ros::NodeHandle nh, const ros::NodeHandle& private_nh, const st
       stop_(stop),
       parameters_(parametersFromServer(private_nh).readAll<SessionParameters>()),
       model_(readMachineModel(parameters_.model)),
-      plan_(model_, parameters_.plan),
+      plan_(model_, parameters_.cuts()),
       log_(nh_, parameters_.plan.tool, plan_.material()),
       tool_frf_(nh_, names::MEASURE_TOOL_FRF, false),
       sensor_frf_(nh_, names::MEASURE_SENSOR_FRF, false),
       identify_(nh_, names::IDENTIFY_COEFFICIENTS, false),
+      drive_(nh_, names::IDENTIFY_AXIS_DRIVE, false),
       driver_(nh_, [this] { return stop_.load(); }),
       sensor_(nh_, parameters_.calibration, driver_, sensor_frf_,
               [this](const std::string& request) { log_.request(request); }) {
@@ -80,18 +81,20 @@ Session::Session(ros::NodeHandle nh, const ros::NodeHandle& private_nh, const st
     last_received_[topic] = ros::WallTime(0);
     subscribers_.push_back(nh_.subscribe<Message>(topic, 200, callback));
   };
-  subscribe(names::CNC_STATE, smartmill_msgs::CncState(), [](const auto&) {});
+  subscribe(names::CNC_STATE, smartmill_msgs::CncState(), [this](const smartmill_msgs::CncState& m) {
+    if (under_control_ && m.feed > 0.0) states_.push_back({toSec(m.header.stamp), m.spindle_speed, m.feed});
+  });
   subscribe(names::HAMMER, smartmill_msgs::SampleBlock(), [](const auto&) {});
   subscribe(
       parameters_.calibration.kind() == ForceSensorKind::spindle ? names::SPINDLE_FORCE : names::DYNAMOMETER,
       smartmill_msgs::SampleBlock(), [](const auto&) {});
   subscribe(names::SPINDLE_ANGLE, smartmill_msgs::SpindleAngle(), [](const auto&) {});
-  subscribers_.push_back(nh_.subscribe<smartmill_msgs::StabilityChart>(
+  chart_subscriber_ = nh_.subscribe<smartmill_msgs::StabilityChart>(
       names::STABILITY_CHART, 10,
       boost::function<void(const smartmill_msgs::StabilityChart&)>([this](const auto& m) {
         const std::lock_guard<std::mutex> lock(mutex_);
         chart_ = m;
-      })));
+      }));
   subscribers_.push_back(nh_.subscribe<smartmill_msgs::ForceCurve>(
       names::FORCE_CURVE, 10, boost::function<void(const smartmill_msgs::ForceCurve&)>([this](const auto& m) {
         const std::lock_guard<std::mutex> lock(mutex_);
@@ -103,7 +106,7 @@ Session::Session(ros::NodeHandle nh, const ros::NodeHandle& private_nh, const st
         const std::lock_guard<std::mutex> lock(mutex_);
         verdict_ = m;
         if (!m.valid) return;
-        windows_[m.condition].push_back({m.chatter != 0, m.frequency, m.severity});
+        windows_[m.condition].push_back({m.chatter != 0, m.frequency, m.severity, toSec(m.header.stamp)});
       })));
   spinner_ = std::make_unique<ros::AsyncSpinner>(2);
   spinner_->start();
@@ -154,10 +157,9 @@ void Session::runSteps() {
   calibrateSensor();
   step("discard earlier tests", [&] { return identify(true); });
   step("stored coefficients", [&] { return useStored(); });
-  for (const PlannedCut& air : plan_.airMoves()) {
-    step("move in air " + air.condition.name, [&] { return runCut(air); });
-  }
+  moveInAir();
   identifyFromTests();
+  tuneFilter();  // chosen test cuts have moved the lanes before
   if (parameters_.verify) {
     step("stability chart", [&] { return waitChart(); });
     step("points to verify", [&] { return choosePoints(); });
@@ -166,6 +168,8 @@ void Session::runSteps() {
          [&] { return verify("stable", plan_.stable(stable_, feed), CutVerdict::Kind::stable); });
     step("cut at the unstable point",
          [&] { return verify("unstable", plan_.unstable(unstable_, feed), CutVerdict::Kind::chatter); });
+    if (const auto cut = plan_.controlled(unstable_, feed))
+      step("cut at the unstable point under chatter control", [&] { return cutUnderControl(*cut); });
   }
   if (plan_.resonance()) {
     step("cut at the sensor's resonance", [&] { return runCut(*plan_.resonance()); });
@@ -207,6 +211,32 @@ void Session::calibrateSensor() {
   log_.summary.calibration_time = log_.elapsed() - began;
 }
 
+void Session::tuneFilter() {
+  if (plan_.tuning().empty()) return;
+  for (const PlannedCut& cut : plan_.tuning())
+    step("cut for the tuning " + cut.condition.name, [&] { return runCut(cut); });
+  CalibrationStage tuning{"process noise of the force filter", {CalibrationStep()}};
+  tuning.steps.front().kind = CalibrationStep::Kind::fit;
+  step(tuning.name, [&] { return sensor_.run(tuning, parameters_.frf_timeout); });
+}
+
+// With a record of Servo Guide the moves identify the drive as well.
+void Session::moveInAir() {
+  using smartmill_msgs::IdentifyAxisDriveGoal;
+  const bool has_record = parameters_.plan.feed_block > 0 && !plan_.airMoves().empty();
+  const auto identifyDrive = [this](bool reset) {
+    IdentifyAxisDriveGoal goal;
+    goal.header.stamp = ros::Time::now();
+    goal.axis = "x";
+    goal.reset = reset;
+    return driver_.call(drive_, names::IDENTIFY_AXIS_DRIVE, goal, parameters_.identify_timeout).message;
+  };
+  if (has_record) step("discard earlier moves", [&] { return identifyDrive(true); });
+  for (const PlannedCut& air : plan_.airMoves())
+    step("move in air " + air.condition.name, [&] { return runCut(air); });
+  if (has_record) step("drive of the x axis", [&] { return identifyDrive(false); });
+}
+
 void Session::step(const std::string& name, const std::function<std::string()>& work) {
   driver_.checkStop();
   log_.publish(name);
@@ -238,6 +268,7 @@ std::string Session::missing() {
   server(tool_frf_.isServerConnected(), names::MEASURE_TOOL_FRF);
   server(sensor_frf_.isServerConnected(), names::MEASURE_SENSOR_FRF);
   server(identify_.isServerConnected(), names::IDENTIFY_COEFFICIENTS);
+  if (chart_subscriber_.getNumPublishers() == 0) add(std::string("a publisher of ") + names::STABILITY_CHART);
   if (const std::string what = sensor_.missing(); !what.empty()) add(what);
   const std::lock_guard<std::mutex> lock(mutex_);
   for (const auto& [topic, time] : last_received_) {
@@ -265,6 +296,7 @@ std::string Session::waitReady() {
   if (!waitUntil([&] { return missing().empty(); }, parameters_.ready_timeout)) {
     throw Error(formatted("after %.0f s still missing: ", parameters_.ready_timeout) + missing());
   }
+  requireNodes();
   // An incomplete recording does not prevent the session.
   std::string recorder;
   waitUntil([&] { return (recorder = recorderMissing()).empty(); }, parameters_.ready_timeout);
@@ -272,6 +304,16 @@ std::string Session::waitReady() {
   return formatted("nodes, sensors and controller are available; the stock has space for %.0f lanes",
                    static_cast<double>(plan_.planner().lanes())) +
          (recorder.empty() ? "" : "; missing: " + recorder);
+}
+
+// Steps use what earlier ones have measured, so that a node which is restarted lacks it.
+void Session::requireNodes() {
+  const auto has = [](const auto& client) { return [&client] { return client.isServerConnected(); }; };
+  driver_.require({{"cnc", [this] { return driver_.reachable(); }},
+                   {"hammer", has(tool_frf_)},
+                   {"kalman", has(sensor_frf_)},
+                   {"loadmeter", has(identify_)},
+                   {"stability", [this] { return chart_subscriber_.getNumPublishers() > 0; }}});
 }
 
 std::string Session::arm(bool on) {
@@ -561,6 +603,27 @@ std::string Session::verify(const char* role, const PlannedCut& cut, CutVerdict:
   return detail + "; " + verified.verdict.text() +
          (verified.as_predicted ? ", as predicted by the chart"
                                 : ", the chart predicts " + std::string(role));
+}
+
+std::string Session::cutUnderControl(const PlannedCut& cut) {
+  const auto follow = [this](bool on) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    under_control_ = on;
+  };
+  follow(true);
+  const std::string detail = runCut(cut);
+  follow(false);
+  waitVerdict();
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const std::vector<ChatterWindow>& windows = windows_[cut.condition.name];
+  // Approach and retraction have other feeds; the windows begin and end with the steady cut.
+  std::vector<CutState> states;
+  for (const CutState& state : states_) {
+    if (!windows.empty() && state.stamp >= windows.front().stamp && state.stamp <= windows.back().stamp)
+      states.push_back(state);
+  }
+  log_.summary.control = controlVerdict(windows, states, cut.condition.spindle_speed, cut.feed);
+  return detail + "; " + log_.summary.control->text();
 }
 
 // ---------------------------------------------------------------------------------------------- the end

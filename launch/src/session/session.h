@@ -13,6 +13,7 @@
 #include <ros/ros.h>
 #include <smartmill_msgs/ChatterState.h>
 #include <smartmill_msgs/CncState.h>
+#include <smartmill_msgs/IdentifyAxisDriveAction.h>
 #include <smartmill_msgs/IdentifyCoefficientsAction.h>
 #include <smartmill_msgs/MeasureFrfAction.h>
 #include <smartmill_msgs/StabilityChart.h>
@@ -48,6 +49,8 @@ class Session {
   std::string measure(Client<smartmill_msgs::MeasureFrfAction>& client, const std::string& name,
                       const std::string& point, const std::string& direction, int hits, int modes);
   void calibrateSensor();
+  void tuneFilter();
+  void moveInAir();
   std::string runCut(const PlannedCut& cut);
   std::string useStored();
   void runTests(const std::set<std::size_t>& selected);
@@ -60,9 +63,11 @@ class Session {
   std::string identify(bool reset);
   std::string waitChart();
   std::string choosePoints();
+  std::string cutUnderControl(const PlannedCut& cut);
   std::string verify(const char* role, const PlannedCut& cut, CutVerdict::Kind predicted);
   void makeSafe();
   std::string missing();
+  void requireNodes();
   std::string recorderMissing() const;
 
   ros::NodeHandle nh_;
@@ -75,17 +80,21 @@ class Session {
 
   Client<smartmill_msgs::MeasureFrfAction> tool_frf_, sensor_frf_;
   Client<smartmill_msgs::IdentifyCoefficientsAction> identify_;
+  Client<smartmill_msgs::IdentifyAxisDriveAction> drive_;
   MachineDriver driver_;
   SensorCalibration sensor_;
   std::vector<ros::Subscriber> subscribers_;
+  ros::Subscriber chart_subscriber_;
   std::unique_ptr<ros::AsyncSpinner> spinner_;
 
   mutable std::mutex mutex_;                            // guards the members that subscribers write
   std::map<std::string, ros::WallTime> last_received_;  // by topic
   std::optional<smartmill_msgs::StabilityChart> chart_;
   std::map<std::string, std::vector<ChatterWindow>> windows_;  // by condition
-  std::optional<smartmill_msgs::ChatterState> verdict_;        // the latest
-  ros::Time curve_stamp_;  // end of the last cut that the force curve contains
+  bool under_control_ = false;    // the cut that the chatter control is to stabilise is running
+  std::vector<CutState> states_;  // of the controller in it, in motion
+  std::optional<smartmill_msgs::ChatterState> verdict_;  // the latest
+  ros::Time curve_stamp_;                                // end of the last cut that the force curve contains
 
   std::vector<PlannedCut> tests_;  // air cuts, then slots or the chosen cuts
   std::set<std::size_t> needed_;   // of these, with the stored coefficients

@@ -55,6 +55,12 @@ void SessionParameters::declare(ParameterTable& table) {
   table.number("chart_timeout", chart_timeout, "s", waiting_time, "until the stability chart is available");
 }
 
+PlanParameters SessionParameters::cuts() const {
+  PlanParameters cuts = plan;
+  if (calibration.kind() == ForceSensorKind::spindle) cuts.tuning_speeds = calibration.tuning_speeds;
+  return cuts;
+}
+
 void SessionParameters::validate() const {
   checkBounds(*this);
   plan.validate();

@@ -27,6 +27,9 @@ struct SessionParameters {
   PlanParameters plan;
   CalibrationParameters calibration;
 
+  /// Parameters of the plan with the cuts that the force sensor requires.
+  PlanParameters cuts() const;
+
   void declare(ParameterTable& table);
   /// @throws Error naming key and value.
   void validate() const;

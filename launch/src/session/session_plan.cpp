@@ -12,6 +12,8 @@ namespace smartmill::session {
 namespace {
 
 constexpr std::size_t VERIFYING_CUTS = 2;
+// Of the feed of the chart: the cut lasts longer in its lane, and the limit does not depend on it.
+constexpr double CONTROL_FEED = 0.5;    // [1]
 constexpr std::size_t FEWEST_CUTS = 3;  // for the coefficients, as slots
 
 const PlanParameters& checked(const PlanParameters& parameters) {
@@ -40,10 +42,19 @@ SessionPlan::SessionPlan(const MachineModel& model, const PlanParameters& parame
     verifying_lane_ = slots_.size();
   }
   planResonance();
+  planTuning();
 }
 
 std::size_t SessionPlan::verifyingCuts() const {
+  return tuningLane() + parameters_.tuning_speeds.size();
+}
+
+std::size_t SessionPlan::controlLane() const {
   return VERIFYING_CUTS + (parameters_.resonance_speed > 0.0 ? 1 : 0);
+}
+
+std::size_t SessionPlan::tuningLane() const {
+  return controlLane() + (parameters_.control_time > 0.0 ? 1 : 0);
 }
 
 SlotRequest SessionPlan::slotRequest(std::size_t feed) const {
@@ -76,18 +87,36 @@ void SessionPlan::addCandidates() {
   placed_.assign(candidates_.size(), false);
 }
 
-void SessionPlan::planResonance() {
-  if (!(parameters_.resonance_speed > 0.0)) return;
+// A slot of the resonance's depth and feed in one of the lanes of the verifying cuts.
+SlotRequest SessionPlan::lightSlot(double speed, std::size_t lane) const {
   SlotRequest request;
-  request.name = "resonance";
-  request.lane = verifying_lane_ + VERIFYING_CUTS;
-  request.speed = parameters_.resonance_speed;
+  request.lane = verifying_lane_ + lane;
+  request.speed = speed;
   request.depth = parameters_.resonance_depth;
   request.feed_per_tooth = parameters_.resonance_feed;
-  request.time = parameters_.resonance_time;
-  request.least_time = parameters_.least_revolutions * units::TWO_PI / parameters_.resonance_speed;
+  request.least_time = parameters_.least_revolutions * units::TWO_PI / speed;
   request.shift = shift_;
+  return request;
+}
+
+void SessionPlan::planResonance() {
+  if (!(parameters_.resonance_speed > 0.0)) return;
+  SlotRequest request = lightSlot(parameters_.resonance_speed, VERIFYING_CUTS);
+  request.name = "resonance";
+  request.time = parameters_.resonance_time;
   resonance_ = planner_.slot(request);
+}
+
+void SessionPlan::planTuning() {
+  tuning_.clear();
+  std::size_t lane = tuningLane();
+  for (const double speed : parameters_.tuning_speeds) {
+    SlotRequest request = lightSlot(speed, lane++);
+    request.name = "tuning_" + numberText(units::rpmFromRadPerSec(speed), 0);
+    request.time = parameters_.tuning_time;
+    const PlannedCut air = planner_.air(speed, parameters_.air_time);
+    tuning_.insert(tuning_.end(), {air, air, planner_.slot(request)});
+  }
 }
 
 std::vector<std::size_t> SessionPlan::available() const {
@@ -137,6 +166,7 @@ std::vector<PlannedCut> SessionPlan::place(const std::vector<std::size_t>& chose
     free_until[request.immersion] = cuts[k].to[0] + planner_.stripWidth();
   }
   planResonance();
+  planTuning();
   return cuts;
 }
 
@@ -160,6 +190,12 @@ PlannedCut SessionPlan::stable(const Point& point, double feed_per_tooth) const 
 
 PlannedCut SessionPlan::unstable(const Point& point, double feed_per_tooth) const {
   return verifying("verify_unstable", 1, point, feed_per_tooth, parameters_.unstable_time);
+}
+
+std::optional<PlannedCut> SessionPlan::controlled(const Point& point, double feed_per_tooth) const {
+  if (!(parameters_.control_time > 0.0)) return std::nullopt;
+  return verifying("chatter_control", controlLane(), point, CONTROL_FEED * feed_per_tooth,
+                   parameters_.control_time);
 }
 
 std::optional<Point> SessionPlan::firstStable(const std::vector<Point>& points, double feed_per_tooth,

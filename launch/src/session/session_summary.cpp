@@ -110,6 +110,16 @@ void SessionSummary::write(const std::string& file) const {
                                      {"chatter_frequency_hz", number(cut.verdict.frequency)},
                                      {"as_predicted", cut.as_predicted}});
   }
+  if (control) {
+    json["controlled_cut"] = {{"suppressed", control->suppressed()},
+                              {"chatter_frequency_hz", number(control->frequency)},
+                              {"time_to_last_change_s", number(control->duration)},
+                              {"speed_ratio", number(control->speed_ratio)},
+                              {"feed_ratio", number(control->feed_ratio)},
+                              {"cut_is_then", wordOf(control->after.kind)},
+                              {"windows", control->after.windows},
+                              {"chattering_windows", control->after.chattering}};
+  }
   if (sensor) {
     const auto vector = [](const geometry_msgs::Vector3& v) {
       return Json{number(v.x), number(v.y), number(v.z)};

@@ -8,7 +8,7 @@
 
 #include "smartmill_core/cutting/coefficient_set.h"
 #include "smartmill_core/modal/results.h"
-#include "smartmill_launch/session/session_plan.h"
+#include "smartmill_launch/session/control_verdict.h"
 
 namespace smartmill::session {
 
@@ -51,6 +51,7 @@ struct SessionSummary {
   std::vector<MeasuredModes> modes;
   std::vector<CoefficientSet> coefficients;  ///< none or one
   std::vector<Verified> verified;
+  std::optional<ControlVerdict> control;  ///< of the cut under chatter control; empty: none was made
   std::optional<smartmill_msgs::ForceSensorState> sensor;
   double calibration_time = 0.0;  ///< [s] of the force sensor, taps included
   TestPlan test_plan;

@@ -63,6 +63,17 @@ TEST(TopicComparison, EndsMayBeMissingWithinTheSlackOnly) {
   EXPECT_EQ(far.first_only, 1u);
 }
 
+// Blocks 1 to 3 were processed before the recording of the inputs began with block 4.
+TEST(TopicComparison, ResultsBeforeTheFirstInputCannotBeRepeated) {
+  TopicComparison comparison(0.0);
+  for (const int index : {1, 2, 3, 4, 5}) comparison.addFirst(block(index));
+  for (const int index : {4, 5}) comparison.addSecond(block(index));
+  EXPECT_FALSE(comparison.result().same());
+  EXPECT_TRUE(comparison.result(0.04).same());
+  EXPECT_EQ(comparison.result(0.04).first_ends, 3u);
+  EXPECT_FALSE(comparison.result(0.025).same());  // block 3 had its input
+}
+
 TEST(TopicComparison, AMissingBlockInTheMiddleIsADifference) {
   const TopicDifference hole = compare({block(1), block(2), block(3)}, {block(1), block(3)}, 10.0);
   EXPECT_FALSE(hole.same());

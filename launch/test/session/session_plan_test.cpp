@@ -1,4 +1,5 @@
 #include "smartmill_launch/session/session_plan.h"
+#include "smartmill_launch/session/control_verdict.h"
 
 #include <cmath>
 #include <functional>
@@ -400,6 +401,43 @@ TEST(CutVerdict, StableToATenthChatterFromHalfUnknownForFewWindows) {
   EXPECT_DOUBLE_EQ(chatter.frequency, 802.0);  // median of 800..804
   EXPECT_DOUBLE_EQ(chatter.severity, 9.0);
   EXPECT_NE(chatter.text().find("5 of 10"), std::string::npos);
+}
+
+// Programmed: 1000 rad/s and 0.08 m/s. The control reduces both by a tenth at 0.5 s; a revolution takes
+// 7 ms then, so that windows lie wholly after the change from 0.7 s on.
+TEST(ControlVerdict, SeparatesTheWindowsByTheChangeOfTheOverrides) {
+  const auto windows = [](double until) {
+    std::vector<ChatterWindow> all;
+    for (int k = 1; k <= 20; ++k) {
+      const double stamp = 0.1 * k;
+      const bool chatters = stamp >= 0.25 && stamp < until;
+      all.push_back({chatters, chatters ? 1234.0 : NOT_A_NUMBER, 10.0, stamp});
+    }
+    return all;
+  };
+  const auto states = [](double ratio) {
+    std::vector<CutState> all;
+    for (int k = 0; k < 100; ++k) {
+      const double now = k < 25 ? 1.0 : ratio;
+      all.push_back({0.02 * k, 1000.0 * now, 0.08 * now});
+    }
+    return all;
+  };
+  const ControlVerdict ended = controlVerdict(windows(0.65), states(0.9), 1000.0, 0.08);
+  EXPECT_TRUE(ended.suppressed()) << ended.text();
+  EXPECT_NEAR(ended.duration, 0.48 - 0.3, 1e-9);  // last state before the change, end of the first window
+  EXPECT_NEAR(ended.speed_ratio, 0.9, 1e-12);
+  EXPECT_NEAR(ended.feed_ratio, 0.9, 1e-12);
+  EXPECT_DOUBLE_EQ(ended.frequency, 1234.0);
+  EXPECT_EQ(ended.after.chattering, 0U);
+
+  EXPECT_FALSE(controlVerdict(windows(3.0), states(0.9), 1000.0, 0.08).suppressed());
+  const ControlVerdict ignored = controlVerdict(windows(3.0), states(1.0), 1000.0, 0.08);
+  EXPECT_FALSE(ignored.suppressed());
+  EXPECT_NE(ignored.text().find("no override followed"), std::string::npos);
+  EXPECT_NE(controlVerdict(windows(0.0), states(1.0), 1000.0, 0.08).text().find("no chatter"),
+            std::string::npos);
+  EXPECT_FALSE(controlVerdict({}, {}, 1000.0, 0.08).suppressed());
 }
 
 }  // namespace

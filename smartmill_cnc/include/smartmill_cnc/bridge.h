@@ -9,6 +9,7 @@
 #include "smartmill_cnc/controller/focas_controller.h"
 #include "smartmill_cnc/controller/poller.h"
 #include "smartmill_cnc/log.h"
+#include "smartmill_cnc/motion/arming.h"
 #include "smartmill_cnc/motion/motion_machine.h"
 #include "smartmill_core/signal/streams.h"
 
@@ -45,7 +46,10 @@ class Bridge {
   /// Connections made and lost since the start.
   Poller::Counts connections() const { return poller_.counts(); }
 
-  Answer<ArmCode> arm(bool on);
+  /// @param client that arms motion; every client can disarm
+  Answer<ArmCode> arm(bool on, const std::string& client = {});
+  /// The client for which motion is armed; empty while disarmed.
+  const std::optional<ArmHolder>& holder() const { return holder_; }
   /// Sets the overrides of the running program while motion is armed. @param reason for the log
   OverrideAnswer setOverrides(const Overrides& wanted, const std::string& reason);
   /// Feed hold while motion is armed.
@@ -86,6 +90,7 @@ class Bridge {
   std::unique_ptr<Controller> controller_;
   Poller poller_;
   MotionMachine motion_;
+  std::optional<ArmHolder> holder_;
   CncState state_;
   std::optional<LoadSample> load_;
   std::optional<MachineTemperature> temperature_;

@@ -1,6 +1,12 @@
 #include "node/node.h"
 
 #include <geometry_msgs/TransformStamped.h>
+#include <netdb.h>
+#include <poll.h>
+#include <ros/master.h>
+#include <ros/network.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -10,6 +16,7 @@
 
 #include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/frames.h"
 #include "smartmill_core/names.h"
 #include "smartmill_msgs/CncAlarms.h"
@@ -27,7 +34,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr const char* ALARMS = "cnc/alarms";
+constexpr double HOLDER_PERIOD = 1.0;  // [s] between two checks of the client that armed motion
 
 double steadySeconds() {
   return std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
@@ -42,6 +49,56 @@ std::unique_ptr<Controller> makeController(const NodeParameters& parameters,
                                            const std::shared_ptr<linuxcnc::ServoStream>& stream) {
   return stream ? linuxcnc::makeLinuxCncController(parameters.linuxcnc, stream, rosSeconds)
                 : makeFocasController(parameters.controller);
+}
+
+// Of the shipped file, a missing folder does not stop the node.
+MotionLog openMotionLog(const NodeParameters& parameters) {
+  try {
+    return MotionLog(parameters.motionLogFile());
+  } catch (const Error& error) {
+    if (parameters.motion_log != "auto") throw;
+    ROS_ERROR("no motion log: %s", error.what());
+    return MotionLog("");
+  }
+}
+
+/// Whether a program listens on a port. @return also true when that cannot be found out within half a second
+bool listens(const std::string& host, std::uint32_t port) {
+  constexpr int LONGEST = 500;  // [ms]
+  addrinfo hints{}, *found = nullptr;
+  hints.ai_socktype = SOCK_STREAM;
+  if (getaddrinfo(host.c_str(), std::to_string(port).c_str(), &hints, &found) != 0) return true;
+  const int connection = socket(found->ai_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  int error = connect(connection, found->ai_addr, found->ai_addrlen) == 0 ? 0 : errno;
+  freeaddrinfo(found);
+  pollfd waiting{connection, POLLOUT, 0};
+  if (error == EINPROGRESS && poll(&waiting, 1, LONGEST) == 1) {
+    socklen_t size = sizeof error;
+    getsockopt(connection, SOL_SOCKET, SO_ERROR, &error, &size);
+  }
+  close(connection);
+  return error != ECONNREFUSED;
+}
+
+/// Whether a node of the graph has ended: it is not registered any more, or does not listen.
+bool hasEnded(const std::string& node) {
+  XmlRpc::XmlRpcValue request, response, uri;
+  request[0] = ros::this_node::getName();
+  request[1] = node;
+  if (!ros::master::execute("lookupNode", request, response, uri, false)) return ros::master::check();
+  std::string host;
+  std::uint32_t port = 0;
+  return ros::network::splitURI(static_cast<std::string>(uri), host, port) && !listens(host, port);
+}
+
+std::string textOf(const smartmill_msgs::RunProgramGoal& goal) {
+  return "program " + goal.name + formatted(", %zu bytes", goal.program.size());
+}
+std::string textOf(const smartmill_msgs::JogGoal& goal) {
+  return formatted("jog %s by %.6g m at %.4g m/s", goal.axis.c_str(), goal.distance, goal.feed);
+}
+std::string textOf(const smartmill_msgs::OrientSpindleGoal& goal) {
+  return formatted("orient the spindle to %.4f rad", goal.angle);
 }
 
 /// Why a condition cannot be published; empty: it can.
@@ -68,13 +125,15 @@ std::string conditionFault(const smartmill_msgs::CuttingCondition& c) {
 
 CncNode::CncNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
     : parameters_(parametersFromServer(private_nh).readAll<NodeParameters>().completed()),
+      helpers_(parameters_.helpers()),
+      motion_log_(openMotionLog(parameters_)),
       stream_(makeStream(parameters_)),
       bridge_(makeController(parameters_, stream_), parameters_.reconnect_period, parameters_.motion),
       shell_(nh, private_nh, bridge_.controllerName(), 1.0),
       servo_(stream_ ? std::make_unique<ServoPublisher>(nh, shell_, stream_, parameters_.load_input)
                      : nullptr) {
   state_publisher_ = nh.advertise<smartmill_msgs::CncState>(names::CNC_STATE, STREAM_QUEUE);
-  alarms_publisher_ = nh.advertise<smartmill_msgs::CncAlarms>(ALARMS, 1, true);
+  alarms_publisher_ = nh.advertise<smartmill_msgs::CncAlarms>(names::CNC_ALARMS, 1, true);
   load_publisher_ = nh.advertise<smartmill_msgs::LoadSample>(names::CNC_LOAD, STREAM_QUEUE);
   if (parameters_.kind == "fanuc" && parameters_.controller.temperature_period > 0.0)
     temperature_publisher_ = nh.advertise<smartmill_msgs::MachineTemperature>(names::MACHINE_TEMPERATURE, 1);
@@ -89,6 +148,7 @@ CncNode::CncNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   macro_service_ = nh.advertiseService(names::SET_MACRO, &CncNode::setMacro, this);
   override_service_ = nh.advertiseService(names::SET_OVERRIDES, &CncNode::setOverrides, this);
   shell_.diagnose("controller", [this](auto& status) { diagnose(status); });
+  shell_.every(HOLDER_PERIOD, [this] { watchHolder(); });
   thread_ = std::thread([this] { run(); });
 }
 
@@ -160,6 +220,10 @@ void CncNode::run() {
     publish(stamp);
     publishConditions();
     publishAlarms(stamp);
+    if (!bridge_.holder() && !recorded_holder_.empty()) {
+      record(recorded_holder_, "motion is disarmed by the controller or the connection");
+      recorded_holder_.clear();
+    }
     log();
     if (active_ && count % parameters_.feedback_every == 0) {
       active_->feedback();
@@ -213,7 +277,12 @@ std::unique_ptr<CncNode::Server<Action>> CncNode::serve(ros::NodeHandle& nh, con
           handle.setAborted(result, outcome.message);
         }
       };
-      if (const std::optional<Outcome> refusal = start(*handle.getGoal())) {
+      const std::string client = clientOfGoal(handle.getGoalID().id), what = textOf(*handle.getGoal());
+      const std::string foreign = motionRefusal(bridge_.holder(), client, helpers_);
+      const std::optional<Outcome> refusal =
+          foreign.empty() ? start(*handle.getGoal()) : Outcome{MotionCode::not_armed, what + ": " + foreign};
+      record(client, refusal ? what + " REFUSED: " + refusal->message : what);
+      if (refusal) {
         ROS_WARN_STREAM(refusal->message);
         finish(*refusal);
         return;
@@ -261,6 +330,7 @@ void CncNode::publish(const ros::Time& stamp) {
   }
   const std::lock_guard<std::mutex> lock(mutex_);
   diagnosed_state_ = state;
+  diagnosed_holder_ = bridge_.holder();
   diagnosed_connections_ = bridge_.connections();
 }
 
@@ -306,13 +376,58 @@ void CncNode::log() {
   }
 }
 
-bool CncNode::armMotion(smartmill_msgs::ArmMotion::Request& request,
-                        smartmill_msgs::ArmMotion::Response& response) {
-  const bool on = request.arm != 0;
-  const auto answer = callInThread<Answer<ArmCode>>([this, on] { return bridge_.arm(on); });
-  response.code = static_cast<std::uint8_t>(answer ? answer->code : ArmCode::not_connected);
-  response.message = answer ? answer->message : "the controller does not answer";
+bool CncNode::armMotion(ArmEvent& event) {
+  const bool on = event.getRequest().arm != 0;
+  const std::string stated = event.getRequest().client;
+  const std::string client = stated.empty() ? event.getCallerName() : stated;
+  const std::string caller =
+      client == event.getCallerName() ? "" : " (called by " + event.getCallerName() + ")";
+  struct Given {
+    Answer<ArmCode> answer;
+    std::optional<ArmHolder> holder;
+  };
+  const auto given = callInThread<Given>([this, on, client, caller] {
+    const Answer<ArmCode> answer = bridge_.arm(on, client);
+    record(client, (on ? "arm: " : "disarm: ") + answer.message + caller);
+    recorded_holder_ = bridge_.holder() ? bridge_.holder()->client : "";
+    return Given{answer, bridge_.holder()};
+  });
+  smartmill_msgs::ArmMotion::Response& response = event.getResponse();
+  response.code = static_cast<std::uint8_t>(given ? given->answer.code : ArmCode::not_connected);
+  response.message = given ? given->answer.message : "the controller does not answer";
+  if (given && given->holder) {
+    response.holder = given->holder->client;
+    response.since = fromSec(given->holder->since);
+  }
   return true;
+}
+
+void CncNode::record(const std::string& client, const std::string& what) {
+  std::string problem;
+  try {
+    motion_log_.write(ros::Time::now().toSec(), client, what);
+  } catch (const Error& error) {
+    problem = std::string("motion log: ") + error.what();
+    ROS_ERROR_STREAM_THROTTLE(60.0, problem);
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  log_problem_ = problem;
+}
+
+void CncNode::watchHolder() {
+  std::optional<ArmHolder> holder;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    holder = diagnosed_holder_;
+  }
+  if (!holder || holder->client.empty() || holder->client[0] != '/' || !hasEnded(holder->client)) return;
+  post([this, holder] {
+    if (!bridge_.holder() || bridge_.holder()->client != holder->client) return;
+    ROS_WARN("motion is disarmed: its client %s has ended", holder->client.c_str());
+    bridge_.arm(false);
+    record(holder->client, "motion is disarmed: the client has ended");
+    recorded_holder_.clear();
+  });
 }
 
 bool CncNode::feedHold(smartmill_msgs::FeedHold::Request&, smartmill_msgs::FeedHold::Response& response) {
@@ -333,12 +448,24 @@ bool CncNode::setMacro(smartmill_msgs::SetMacro::Request& request,
   return true;
 }
 
-bool CncNode::setOverrides(smartmill_msgs::SetOverrides::Request& request,
-                           smartmill_msgs::SetOverrides::Response& response) {
+bool CncNode::setOverrides(OverrideEvent& event) {
+  const smartmill_msgs::SetOverrides::Request& request = event.getRequest();
+  smartmill_msgs::SetOverrides::Response& response = event.getResponse();
   const Overrides wanted{request.feed, request.spindle};
-  const std::string reason = request.reason;
-  const auto answer =
-      callInThread<OverrideAnswer>([this, wanted, reason] { return bridge_.setOverrides(wanted, reason); });
+  const std::string reason = request.reason, client = event.getCallerName();
+  const auto answer = callInThread<OverrideAnswer>([this, wanted, reason, client] {
+    const std::string what =
+        formatted("overrides feed %.3g, spindle %.3g: %s", wanted.feed, wanted.spindle, reason.c_str());
+    OverrideAnswer given;
+    if (const std::string foreign = motionRefusal(bridge_.holder(), client, helpers_); !foreign.empty()) {
+      given.code = OverrideCode::not_armed;
+      given.message = "overrides: " + foreign;
+    } else {
+      given = bridge_.setOverrides(wanted, reason);
+    }
+    record(client, given.code == OverrideCode::ok ? what : what + " REFUSED: " + given.message);
+    return given;
+  });
   response.code = static_cast<std::uint8_t>(answer ? answer->code : OverrideCode::not_connected);
   response.message = answer ? answer->message : "the controller does not answer";
   response.feed = answer ? answer->taken.feed : 1.0;
@@ -356,12 +483,17 @@ void CncNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
                    diagnosed_state_.emergency ? "emergency stop" : "alarm " + diagnosed_state_.alarm_text);
   } else if (diagnosed_state_.mode != CncMode::dnc) {
     status.summary(Level::WARN, "connected; not in DNC mode, nothing can be moved");
+  } else if (!log_problem_.empty()) {
+    status.summary(Level::WARN, log_problem_);
   } else {
     status.summary(Level::OK,
                    diagnosed_state_.armed ? "connected, motion armed" : "connected, motion disarmed");
   }
   status.add("mode", static_cast<int>(diagnosed_state_.mode));
   status.add("armed", diagnosed_state_.armed);
+  if (diagnosed_holder_)
+    status.add("armed by", diagnosed_holder_->client + " since " + utcText(diagnosed_holder_->since));
+  status.add("motion log", motion_log_.file());
   status.add("read only", parameters_.motion.read_only);
   status.add("connections made", diagnosed_connections_.made);
   status.add("connections lost", diagnosed_connections_.lost);

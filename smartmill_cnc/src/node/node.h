@@ -61,14 +61,23 @@ class CncNode {
   void publishConditions();
   void publishAlarms(const ros::Time& stamp);
   void log();
-  bool armMotion(smartmill_msgs::ArmMotion::Request& request, smartmill_msgs::ArmMotion::Response& response);
+  using ArmEvent = ros::ServiceEvent<smartmill_msgs::ArmMotion::Request, smartmill_msgs::ArmMotion::Response>;
+  using OverrideEvent =
+      ros::ServiceEvent<smartmill_msgs::SetOverrides::Request, smartmill_msgs::SetOverrides::Response>;
+  bool armMotion(ArmEvent& event);
   bool feedHold(smartmill_msgs::FeedHold::Request& request, smartmill_msgs::FeedHold::Response& response);
   bool setMacro(smartmill_msgs::SetMacro::Request& request, smartmill_msgs::SetMacro::Response& response);
-  bool setOverrides(smartmill_msgs::SetOverrides::Request& request,
-                    smartmill_msgs::SetOverrides::Response& response);
+  bool setOverrides(OverrideEvent& event);
+  /// Adds a line to the motion log.
+  void record(const std::string& client, const std::string& what);
+  /// Disarms when the client that armed motion has ended.
+  void watchHolder();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   const NodeParameters parameters_;
+  const std::vector<std::string> helpers_;
+  MotionLog motion_log_;
+  std::string recorded_holder_;                                   // the bridge's thread only
   const std::shared_ptr<linuxcnc::ServoStream> stream_;           // null without LinuxCNC
   Bridge bridge_;                                                 // the bridge's thread only
   std::optional<Active> active_;                                  // the bridge's thread only
@@ -87,7 +96,8 @@ class CncNode {
   std::mutex mutex_;  // guards the members below
   std::vector<Job> jobs_;
   CncState diagnosed_state_;
-  std::string diagnosed_line_;
+  std::string diagnosed_line_, log_problem_;
+  std::optional<ArmHolder> diagnosed_holder_;
   Poller::Counts diagnosed_connections_;
 
   std::atomic<double> round_trip_{0.0};  // [s] longest recent one

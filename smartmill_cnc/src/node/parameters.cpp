@@ -1,7 +1,11 @@
 #include "node/parameters.h"
 
+#include <sstream>
+
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/data_folder.h"
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/names.h"
 
 namespace smartmill::cnc {
 namespace {
@@ -42,6 +46,14 @@ void NodeParameters::declare(ParameterTable& table) {
   table.number("reconnect_period", reconnect_period, "s", Range::positive(),
                "time between the first two attempts to connect, then up to eight times as long");
   motion.declare(table);
+  table.text(
+      "motion_nodes", motion_nodes,
+      "nodes that move the machine on behalf of the client that has armed motion, separated by blanks; every "
+      "other client is refused");
+  table.text(
+      "motion_log", motion_log,
+      "file to which a line is added whenever motion is armed, disarmed or commanded; auto: motion.log in "
+      "$STATE_DIRECTORY, $XDG_DATA_HOME/smartmill or ~/.local/share/smartmill; empty: none");
   table.section(
       "Limits of every motion, checked before anything is sent. An empty or zero value is taken from the "
       "axes and "
@@ -61,6 +73,17 @@ void NodeParameters::validate() const {
   } else if (linuxcnc.folder.empty()) {
     throw Error("linuxcnc_folder: empty, expected the folder of the machine");
   }
+}
+
+std::vector<std::string> NodeParameters::helpers() const {
+  std::vector<std::string> list;
+  std::stringstream words(motion_nodes);
+  for (std::string word; words >> word;) list.push_back(names::absolute(word));
+  return list;
+}
+
+std::string NodeParameters::motionLogFile() const {
+  return motion_log == "auto" ? dataFile(DataFolders::ofEnvironment(), "motion.log") : motion_log;
 }
 
 NodeParameters NodeParameters::completed() const {

@@ -19,6 +19,8 @@ struct NodeParameters {
   double rate = 50.0;
   double reconnect_period = 1.0;
   MotionParameters motion;
+  std::string motion_nodes = "hammer stability discover";
+  std::string motion_log = "auto";
   std::string model;
   std::array<std::vector<double>, 3> travel;
 
@@ -32,6 +34,10 @@ struct NodeParameters {
   /// @return a copy with missing limits from the machine model. @throws Error naming key and value, also of a
   /// limit that neither states.
   NodeParameters completed() const;
+  /// Full names of motion_nodes.
+  std::vector<std::string> helpers() const;
+  /// File of motion_log; empty: none. @throws Error when no data folder is defined.
+  std::string motionLogFile() const;
 };
 
 }  // namespace smartmill::cnc

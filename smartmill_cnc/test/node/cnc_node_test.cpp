@@ -11,6 +11,8 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <fstream>
+#include <iterator>
 #include <thread>
 
 #include "../test_machine.h"
@@ -247,6 +249,41 @@ TEST_F(CncNodeTest, ArmingInTheWrongModeIsRefused) {
   EXPECT_EQ(arm(true), smartmill_msgs::ArmMotion::Response::WRONG_MODE);
   ASSERT_TRUE(run_.waitForServer(ros::Duration(PATIENCE)));
   EXPECT_EQ(program("G0 X1\n").code, RunProgramResult::WRONG_MODE);
+}
+
+TEST_F(CncNodeTest, MotionIsArmedForOneClientAndRecorded) {
+  connectAndArm();
+  smartmill_msgs::ArmMotion second;
+  second.request.arm = true;
+  second.request.client = "operator";
+  ASSERT_TRUE(ros::service::call(names::ARM_MOTION, second));
+  EXPECT_EQ(second.response.code, smartmill_msgs::ArmMotion::Response::HELD);
+  EXPECT_NE(second.response.message.find(ros::this_node::getName()), std::string::npos)
+      << second.response.message;
+  EXPECT_EQ(second.response.holder, ros::this_node::getName());
+  EXPECT_GT(second.response.since.toSec(), 0.0);
+  EXPECT_EQ(program("G91 G1 X1 F600\n").code, RunProgramResult::OK);
+  EXPECT_EQ(arm(false), smartmill_msgs::ArmMotion::Response::OK);
+  // Armed under another name, this node cannot move the machine.
+  ASSERT_TRUE(ros::service::call(names::ARM_MOTION, second));
+  EXPECT_EQ(second.response.code, smartmill_msgs::ArmMotion::Response::OK);
+  const RunProgramResult refused = program("G91 G1 X1 F600\n");
+  EXPECT_EQ(refused.code, RunProgramResult::NOT_ARMED);
+  EXPECT_NE(refused.message.find("motion is armed by operator since "), std::string::npos) << refused.message;
+  EXPECT_EQ(arm(false), smartmill_msgs::ArmMotion::Response::OK);
+  // A client that has ended holds motion no longer: no node has this name.
+  second.request.client = "/smartmill/absent";
+  ASSERT_TRUE(ros::service::call(names::ARM_MOTION, second));
+  EXPECT_EQ(second.response.code, smartmill_msgs::ArmMotion::Response::OK);
+  ASSERT_TRUE(spinUntil([&] { return state_.armed != 0; }));
+  EXPECT_TRUE(spinUntil([&] { return state_.armed == 0; }));
+
+  std::ifstream log(ros::NodeHandle("~").param<std::string>("motion_log", ""));
+  const std::string text(std::istreambuf_iterator<char>(log), {});
+  for (const char* line : {"arm: motion is armed\n", "arm: motion is armed by ", "program test, 15 bytes\n",
+                           "disarm: motion is disarmed\n", "program test, 15 bytes REFUSED: ",
+                           "/smartmill/absent  motion is disarmed: the client has ended\n"})
+    EXPECT_NE(text.find(line), std::string::npos) << line << " in\n" << text;
 }
 
 TEST_F(CncNodeTest, ControllerLostDuringAProgram) {

@@ -7,12 +7,14 @@
 #include <filesystem>
 #include <functional>
 #include <iostream>
+#include <optional>
 #include <string>
 
 #include <unistd.h>
 
 #include "recordings/bag_campaign.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/inspection_file.h"
 #include "smartmill_discrepancy/explain/explain.h"
 #include "smartmill_discrepancy/report/pictures.h"
 #include "smartmill_discrepancy/report/report_html.h"
@@ -40,8 +42,9 @@ void interrupt(int) {
 }
 
 struct Arguments {
-  std::string campaign, model, prior, out;
+  std::string campaign, model, prior, inspection, out;
   int threads = 2;
+  double budget = 60.0;
 };
 
 Campaign load(const Arguments& arguments, const std::function<void(const std::string&)>& progress) {
@@ -66,18 +69,25 @@ int run(const Arguments& arguments) {
   options.search.on_log = [&](const std::string& line) {
     std::fprintf(stderr, "[%5.1f s] %s\n", elapsed(), line.c_str());
   };
-  options.search.on_progress = [&](double share) {
-    const double t = elapsed();
-    std::fprintf(stderr, "[%5.1f s] about %.0f s left if nothing more is found\n", t, t / share - t);
-  };
+  if (arguments.budget > 0.0) {
+    options.budget = arguments.budget;
+    options.elapsed = elapsed;
+  }
   std::error_code failed;
   std::filesystem::create_directories(arguments.out, failed);
   if (failed) throw Error(arguments.out + ": " + failed.message());
   const Campaign campaign = load(arguments, options.search.on_log);
   const Dataset data = loadDataset(
       campaign, readMachineModel(arguments.model.empty() ? campaign.modelPath() : arguments.model));
+  std::optional<InspectionFile> inspection;
+  if (!arguments.inspection.empty()) inspection = readInspectionFile(arguments.inspection);
   std::signal(SIGINT, interrupt);
-  const Explanation explanation = explain(data, options, arguments.out);
+  Explanation explanation = explain(data, options, arguments.out);
+  if (inspection) {
+    explanation.inspection = checkInspection(*inspection, campaign.tests, data.nominal, explanation.model);
+    const std::vector<std::string>& notes = explanation.inspection.notes;
+    explanation.notes.insert(explanation.notes.end(), notes.begin(), notes.end());
+  }
   writeReport(explanation, arguments.out);
   writeHtml(explanation, std::filesystem::path(arguments.campaign).filename().string(),
             drawPictures(explanation, arguments.out), arguments.out);
@@ -94,7 +104,8 @@ Command explainCommand() {
   command.description =
       "Finds where the twin and the records of a campaign disagree and which effects the model lacks.";
   command.examples = {{"campaigns/runout -o report", "searches a campaign; report/report.html is the result"},
-                      {"session.bag --model mill.yaml -o report", "the same for a recorded session"}};
+                      {"session.bag --model mill.yaml -o report --budget 0",
+                       "the same for a recorded session, without a limit of its time"}};
   command.files = {{"OUT/report.html", "the report with its pictures"},
                    {"OUT/report.json", "the report for programs"},
                    {"OUT/model.yaml", "the model with the effects found"}};
@@ -104,7 +115,14 @@ Command explainCommand() {
     line.option("--model", arguments.model, "machine model file (default: the campaign's)");
     line.option("--prior", arguments.prior,
                 "odds of each effect from other machines (`database proposals --prior` writes them)");
+    line.option(
+        "--inspection", arguments.inspection,
+        "measured dimensions of the cuts (smartmill-inspection/1), compared with the model before and after");
     line.option("-o,--out", arguments.out, "folder of the report").required();
+    line.option("--budget", arguments.budget,
+                "seconds after which the best result so far is judged and written; 0: none")
+        .within(0, 1e6)
+        .showDefault();
     line.option("--threads", arguments.threads, "threads").within(1, 64).showDefault();
   });
   return command;

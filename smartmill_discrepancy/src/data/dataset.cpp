@@ -13,6 +13,8 @@
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
 #include "smartmill_discrepancy/data/alignment.h"
+#include "smartmill_discrepancy/data/stream_shift.h"
+#include "smartmill_sim/twin/axis_motion.h"
 #include "smartmill_sim/twin/tip_trajectory.h"
 
 namespace smartmill::discrepancy {
@@ -214,6 +216,26 @@ void markChatter(Dataset& data) {
     throw Error(data.campaign.folder + ": every test chatters; expected a test without chatter");
 }
 
+// The records of a campaign. Where an axis moves and the force columns are recorded later or earlier than the
+// controller's, the tests state it afterwards.
+std::vector<RecordedTest> recordedTests(const Campaign& campaign, std::set<std::string>* notes) {
+  constexpr double BEYOND_CHANCE = 3.0;  // standard deviations
+  std::vector<RecordedTest> tests;
+  for (const CampaignTest& test : campaign.tests) tests.push_back({test, readRecord(campaign, test)});
+  const std::optional<StreamShift> shift = shiftOfForces(tests);
+  if (!shift || std::abs(shift->delay) < BEYOND_CHANCE * shift->std_dev) return tests;
+  for (RecordedTest& one : tests) {
+    if (one.test.stream_offset.empty() && sim::AxisMotion::isRecorded(one.record))
+      one.test.stream_offset["force"] = shift->delay;
+  }
+  notes->insert(
+      formatted("forces are recorded %.5f +- %.2g s %s than the controller's columns: with that shift the "
+                "acceleration of axis %c explains %.1f %% of f%c",
+                std::abs(shift->delay), shift->std_dev, shift->delay > 0.0 ? "later" : "earlier", shift->axis,
+                100.0 * shift->explained, shift->axis));
+  return tests;
+}
+
 }  // namespace
 
 bool hasToolModes(const MachineModel& model) {
@@ -327,10 +349,11 @@ Dataset loadDataset(const Campaign& campaign, const MachineModel& nominal) {
   data.campaign = campaign;
   data.nominal = nominal;
   std::set<std::string> notes;
-  for (const CampaignTest& test : campaign.tests) {
+  for (RecordedTest& recorded : recordedTests(campaign, &notes)) {
+    const CampaignTest& test = recorded.test;
     TestData t;
     t.test = test;
-    t.record = aligned(readRecord(campaign, test), test);
+    t.record = aligned(recorded.record, test);
     if (t.record.size() < LIMITS.min_samples) {
       throw Error(t.record.file + ": " + std::to_string(t.record.size()) + " samples, expected at least " +
                   std::to_string(LIMITS.min_samples));

@@ -20,12 +20,6 @@ double squaresBetween(const std::vector<double>& a, const std::vector<double>& b
   return s;
 }
 
-std::string joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& n : names) text += (text.empty() ? "" : ", ") + n;
-  return text;
-}
-
 sim::SimulationOptions coarseSimulation() {
   sim::SimulationOptions options;
   options.noise = false;

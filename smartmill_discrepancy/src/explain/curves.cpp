@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "smartmill_core/signal/fourier.h"
 #include "smartmill_core/units.h"
@@ -41,36 +42,53 @@ RevolutionCurve overRevolution(const TwinRunner& runner, const ChannelSpan& span
   return curve;
 }
 
+SpectrumCurve spectrumOf(const TwinRunner& runner, const ChannelSpan& span, const std::vector<double>& before,
+                         const std::vector<double>& after) {
+  const CampaignTest& test = runner.data().tests[span.test].test;
+  SpectrumCurve s;
+  s.test = test.name;
+  s.channel = span.channel;
+  s.order_hz = test.spindle_speed / units::TWO_PI;
+  const auto b = fourier(valuesOf(before, span)), a = fourier(valuesOf(after, span));
+  const double scale = 2.0 * span.noise / static_cast<double>(span.size);
+  const std::vector<double> f = fourierFrequencies(span.size, test.sample_rate);
+  for (std::size_t k = 1; k < b.size() && f[k] < HIGHEST_PICTURED; ++k) {
+    s.frequency_hz.push_back(f[k]);
+    s.before.push_back(scale * std::abs(b[k]));
+    s.after.push_back(scale * std::abs(a[k]));
+  }
+  return s;
+}
+
 }  // namespace
 
 void addCurves(const TwinRunner& runner, const std::vector<double>& before, const std::vector<double>& after,
                Explanation* explanation) {
   for (const char* channel : {"fx", "fy", "fz", "load_meter", "tool_x", "tool_y"}) {
-    const ChannelSpan *worst = nullptr, *worst_cut = nullptr;
+    const ChannelSpan* worst = nullptr;
     for (const ChannelSpan& b : runner.spans()) {
-      if (b.channel != channel || b.slow || !b.in_gap) continue;
-      const TestData& test = runner.data().tests[b.test];
-      if (!worst || squaresOf(before, b) > squaresOf(before, *worst)) worst = &b;
-      if (test.test.kind == TestKind::cut && test.record.has("spindle_angle") &&
-          (!worst_cut || squaresOf(before, b) > squaresOf(before, *worst_cut)))
-        worst_cut = &b;
+      if (b.channel == channel && !b.slow && b.in_gap &&
+          (!worst || squaresOf(before, b) > squaresOf(before, *worst)))
+        worst = &b;
     }
-    if (worst_cut) explanation->revolutions.push_back(overRevolution(runner, *worst_cut, before, after));
-    if (!worst) continue;
-    const TestData& test = runner.data().tests[worst->test];
-    SpectrumCurve s;
-    s.test = test.test.name;
-    s.channel = channel;
-    s.order_hz = test.test.spindle_speed / units::TWO_PI;
-    const auto b = fourier(valuesOf(before, *worst)), a = fourier(valuesOf(after, *worst));
-    const double scale = 2.0 * worst->noise / static_cast<double>(worst->size);
-    const std::vector<double> f = fourierFrequencies(worst->size, test.test.sample_rate);
-    for (std::size_t k = 1; k < b.size() && f[k] < HIGHEST_PICTURED; ++k) {
-      s.frequency_hz.push_back(f[k]);
-      s.before.push_back(scale * std::abs(b[k]));
-      s.after.push_back(scale * std::abs(a[k]));
-    }
-    explanation->spectra.push_back(std::move(s));
+    if (worst) explanation->spectra.push_back(spectrumOf(runner, *worst, before, after));
+  }
+  // The cut with the largest residual of the forces first.
+  std::vector<double> residual(runner.data().tests.size(), 0.0);
+  std::vector<std::vector<const ChannelSpan*>> spans(residual.size());
+  for (const ChannelSpan& b : runner.spans()) {
+    const TestData& test = runner.data().tests[b.test];
+    if (b.slow || !b.in_gap || test.test.kind != TestKind::cut || !test.record.has("spindle_angle")) continue;
+    residual[b.test] = std::max(residual[b.test], squaresOf(before, b));
+    spans[b.test].push_back(&b);
+  }
+  std::vector<std::size_t> order(residual.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t i, std::size_t j) { return residual[i] > residual[j]; });
+  for (const std::size_t test : order) {
+    for (const ChannelSpan* span : spans[test])
+      explanation->revolutions.push_back(overRevolution(runner, *span, before, after));
   }
 }
 

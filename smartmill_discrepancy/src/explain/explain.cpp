@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "explain/time_budget.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_discrepancy/data/labels.h"
@@ -20,6 +21,13 @@
 
 namespace smartmill::discrepancy {
 namespace {
+
+/// Shares of a time budget at which the stages end.
+struct StageEnds {
+  double search = 0.5;     ///< a fit of an effect may last until its next step ends
+  double whitened = 0.75;  ///< refit and validation of the effects
+  double empirical = 0.9;  ///< the rest: deviations, gaps
+};
 
 void throwIfAny(const Dataset& data, const std::vector<std::string>& reasons) {
   std::string all;
@@ -80,6 +88,19 @@ void reportReplaced(const FitState& named, const FitState& now, std::vector<Rese
   }
 }
 
+// Names that the end of the work left without validation are no names.
+void withdrawNotValidated(const SearchResult& found, Explanation* result) {
+  for (std::size_t m = result->effects.size(); m-- > 0;) {
+    const Hypothesis& hypothesis = *found.best.state.members[m].hypothesis;
+    const auto& open = found.not_validated;
+    if (std::find(open.begin(), open.end(), &hypothesis) == open.end()) continue;
+    result->resembles.push_back(
+        {hypothesis.effect, hypothesis.variant,
+         "in the improved model, but the search ended before it was validated next to an empirical effect"});
+    result->effects.erase(result->effects.begin() + static_cast<std::ptrdiff_t>(m));
+  }
+}
+
 // Withdraws all effects if the model with them is worse than the nominal one.
 void withdrawEffects(const SearchResult& found, Explanation* result) {
   for (std::size_t m = 0; m < result->effects.size(); ++m) {
@@ -105,6 +126,30 @@ MachineModel describeModel(Workbench& bench, const SearchOptions& options, const
   return improved;
 }
 
+// Names, each once, in the order of the catalogue.
+std::vector<std::string> effectsOf(const std::vector<const Hypothesis*>& hypotheses) {
+  std::vector<std::string> names;
+  for (const Hypothesis* h : hypotheses) {
+    if (std::find(names.begin(), names.end(), h->effect) == names.end()) names.push_back(h->effect);
+  }
+  return names;
+}
+
+// All of them as one group, and the test that separates one of them best.
+void reportEquivalents(const std::vector<Equivalent>& equivalents, Explanation* result) {
+  std::vector<std::string> group;
+  const SeparatingTest* best = nullptr;
+  for (const Equivalent& one : equivalents) {
+    if (std::find(group.begin(), group.end(), one.effect) == group.end()) group.push_back(one.effect);
+    if (one.test && (!best || one.test->difference > best->difference)) best = &*one.test;
+  }
+  if (!group.empty()) result->not_separable.push_back(std::move(group));
+  if (best && best->difference > MIN_SEPARATION) {
+    result->suggested_test = best->text;
+    result->suggested_cut = best->test;
+  }
+}
+
 void noteToothPath(const MachineModel& model, Explanation* result) {
   const EffectEntry* const path = toothPathOf(model);
   if (path == nullptr) return;
@@ -128,7 +173,12 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   const Labels labels = checkLabels(data, options.bench.threads);
   throwIfAny(data, labels.wrong);
 
-  Workbench bench(data, options.bench);
+  const StageEnds ends;
+  TimeBudget budget(options.elapsed, options.budget);
+  const auto cancelled = [&] { return options.bench.cancelled && options.bench.cancelled(); };
+  WorkbenchOptions bench_options = options.bench;
+  bench_options.cancelled = [&] { return cancelled() || budget.isStageOver(); };
+  Workbench bench(data, bench_options);
   const ModelResidual before = residualOf(bench, data.nominal);
   requireFiniteResidual(bench.fitted(), before.fit);
   requireFiniteResidual(bench.heldout(), before.heldout);
@@ -140,22 +190,27 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   if (!labels.doubtful.empty())
     search_options.max_effects = std::min<std::size_t>(search_options.max_effects, 2);
   const std::vector<Hypothesis> hypotheses = catalogueHypotheses(data, &result.notes);
+  budget.beginStage(ends.search);
   SearchResult found = search(bench, hypotheses, search_options);
+  result.not_tried = effectsOf(found.not_tried);
 
   // The part of the residual that calibrated nominal values remove is not a disagreement.
   StructureOptions structure = options.structure;
   structure.squares_of_gap = std::max(found.null.chi2 - bench.samples(), 1.0);
   result.where = findStructure(bench.fitted(), found.null.residual, structure);
   options.search.reportProgress(0.65);
+  budget.beginStage(ends.whitened);
   SearchResult whitened = validateWhitened(bench, hypotheses, search_options, &found, &result.resembles);
   options.search.reportProgress(0.75);
   result.unexplained = findStructure(bench.fitted(), found.best.residual, structure);
+  budget.beginStage(ends.empirical);
   EmpiricalResidualModel empirical_model(bench, options, structure);
   const FitState named = found.best.state;
   const std::optional<FitState> named_only = empirical_model.extend(&found, &result.unexplained);
   options.search.reportProgress(0.9);
   reportReplaced(named, found.best.state, &result.resembles);
-  result.interrupted = bench.cancelled();
+  result.interrupted = cancelled();
+  budget.beginStage(1.0);
   found = finalResult(bench, std::move(whitened), found);
   const Eigen::MatrixXd of_fit = found.best.covariance;
   found.best.covariance = robustCovariance(bench, found.best);
@@ -168,6 +223,7 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   if (after.fit <= before.gap.fit && after.heldout <= before.gap.heldout) {
     result.sentence = sentenceOf(result);
     if (named_only) result.named_only = residualOf(bench, bench.exact().model(*named_only)).gap;
+    withdrawNotValidated(found, &result);
   } else {
     improved = data.nominal;
     withdrawEffects(found, &result);
@@ -180,11 +236,15 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   if (result.verdict == Verdict::no_disagreement) result.where.clear();
   if (result.verdict == Verdict::recalibrated) {
     result.recalibrated = recalibratedValues(bench.freedom(), found.best);
-    result.sentence = sentenceOf(result.recalibrated);
+    const std::vector<Equivalent> equivalents =
+        equivalentEffects(bench, hypotheses, search_options, found.best);
+    result.sentence = sentenceOf(result.recalibrated, equivalents);
+    reportEquivalents(equivalents, &result);
   }
   // A missing effect that acts in one test may look like a wrong label; the improved model decides.
   if (!labels.doubtful.empty() && !result.unexplained.empty())
     throwIfAny(data, doubtfulLabels(improved, bench.data(), options.bench.threads));
+  if (budget.isSpent()) result.spent_budget = options.budget;
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   logVerdict(options.search, result);
   return result;

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <cstddef>
 
+#include "search/search_state.h"
 #include "smartmill_core/formatted.h"
+#include "smartmill_discrepancy/search/screening.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -15,6 +17,11 @@ struct RecalibrationOptions {
   double stated = 2.0;           ///< stated deviations up to which a change is within the uncertainty
   std::size_t in_sentence = 3;   ///< values that the sentence lists
   std::size_t least_common = 2;  ///< values that have a common factor
+  /// [1] of the squared deviations from the stated values: an equivalent effect removes this share of them.
+  double share_removed = 0.5;
+  /// [1] of that: a smaller predicted share is not fitted, since the prediction is linear.
+  double share_predicted = 0.5;
+  std::size_t max_fits = 6;  ///< limits the time
 };
 
 const RecalibrationOptions LIMITS;
@@ -63,7 +70,47 @@ std::vector<RecalibratedValue> recalibratedValues(const NominalFreedom& freedom,
   return values;
 }
 
-std::string sentenceOf(const std::vector<RecalibratedValue>& values) {
+// The prediction of an effect in place of moved values is that of a score test at the stated values: its
+// gain is what it removes of their squared deviations.
+std::vector<Equivalent> equivalentEffects(Workbench& bench, const std::vector<Hypothesis>& hypotheses,
+                                          const SearchOptions& options, const FitResult& moved) {
+  const Fitter& quick = bench.quick();
+  FitState stated = moved.state;
+  for (std::size_t c = 0; c < stated.nominal.size(); ++c)
+    stated.nominal[c] = bench.freedom().coordinates()[c].null;
+  const NominalTangents tangents = bench.linearise(stated);
+  const FitResult from = quick.fit(stated, &tangents, FitOptions::toEvaluate());
+  if (!from.converged) return {};
+  const double required = LIMITS.share_removed * moved.penalty;
+  const double as_well = moved.chi2 + options.negligible_excess * bench.samples();
+  ScreeningMemory memory;
+  std::vector<Equivalent> equivalents;
+  std::size_t fits = 0;
+  for (const PredictedGain& predicted :
+       screen(quick, from, tangents, hypotheses, LIMITS.share_predicted * required, &memory)) {
+    if (predicted.gain < LIMITS.share_predicted * required || fits >= LIMITS.max_fits || bench.cancelled())
+      break;
+    if (predicted.start.empty()) continue;
+    ++fits;
+    FitState with = stated;
+    with.members.push_back({predicted.hypothesis, predicted.start});
+    const FitResult fit = quick.fit(with, &tangents, FitOptions::closely());
+    options.log(
+        formatted(
+            "  in place of the moved values, squares %.4g instead of %.4g, penalty %.4g instead of %.4g  ",
+            fit.chi2, moved.chi2, fit.penalty, moved.penalty) +
+        predicted.hypothesis->title());
+    if (!fit.converged || fit.chi2 > as_well || fit.penalty > moved.penalty - required) continue;
+    const Member& member = fit.state.members.back();
+    equivalents.push_back(
+        {member.hypothesis->effect, describe(member),
+         separatingTest(bench.data(), bench.exact().model(moved.state), bench.exact().model(fit.state))});
+  }
+  return equivalents;
+}
+
+std::string sentenceOf(const std::vector<RecalibratedValue>& values,
+                       const std::vector<Equivalent>& equivalents) {
   if (values.empty()) return "";
   std::string text = "No effect is missing, but the model's values are off: ";
   for (std::size_t k = 0; k < std::min(values.size(), LIMITS.in_sentence); ++k) {
@@ -77,7 +124,10 @@ std::string sentenceOf(const std::vector<RecalibratedValue>& values) {
   if (const double factor = commonFactor(values); factor > 0.0)
     text += formatted("; all by the common factor %.3f", factor);
   if (std::abs(values.front().deviations) <= LIMITS.stated) text += "; within their stated uncertainty";
-  return text + ".";
+  text += ".";
+  for (std::size_t k = 0; k < equivalents.size(); ++k)
+    text += (k ? " or " : " The same records follow from ") + equivalents[k].text;
+  return text + (equivalents.empty() ? "" : " with the values as stated.");
 }
 
 }  // namespace smartmill::discrepancy

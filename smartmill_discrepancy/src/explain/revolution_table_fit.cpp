@@ -80,8 +80,12 @@ void RevolutionTableFit::replaceTable(FitResult with, SearchResult* found) const
 // @return false: it remains
 bool RevolutionTableFit::dropIfUnneeded(std::size_t member, SearchResult* found) {
   const FitState now = found->best.state;
+  if (bench_.cancelled()) {
+    found->not_validated.push_back(now.members[member].hypothesis);
+    return false;
+  }
   const FitState bare = without(without(now, now.members.size() - 1), member);
-  const std::optional<FitResult> less = bench_.cancelled() ? std::nullopt : withTable(bare, {});
+  const std::optional<FitResult> less = withTable(bare, {});
   if (!less) return false;
   const std::string title = now.members[member].hypothesis->title();
   const ValidationResult validation =

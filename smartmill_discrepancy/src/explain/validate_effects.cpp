@@ -15,8 +15,7 @@ Resemblance resemblanceOf(const Member& member, const ValidationResult& validati
   const double percent = 100.0 * std::max(scale.scale, 0.0);
   return {member.hypothesis->effect, member.hypothesis->variant,
           "closest effect of the catalogue, but " +
-              formatted("the %s prefer %.0f +- %.0f %% of it", tests, percent, 100.0 * scale.std_dev),
-          validation.confidence()};
+              formatted("the %s prefer %.0f +- %.0f %% of it", tests, percent, 100.0 * scale.std_dev)};
 }
 
 // An accepted alternative with fewer values that the tests do not distinguish from the member.

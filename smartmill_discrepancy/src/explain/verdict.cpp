@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include "smartmill_core/formatted.h"
@@ -18,7 +19,6 @@ namespace {
 struct NamingOptions {
   /// Squares over the noise at one standard deviation of the prior from which a value is identifiable.
   double identifiable = 1.0;
-  double min_difference = 0.3;    ///< [1] of the noise by which predictions separate two effects
   double separating_share = 0.5;  ///< [1] of an effect's gain that separates it from an alternative at most
 };
 
@@ -35,7 +35,8 @@ std::vector<std::pair<std::string, double>> numbersAt(const Member& member, cons
 // Standard deviations of the keys of a member's entry: RMS difference at points with the covariance of the
 // coordinates. Linear propagation would give no deviation of the magnitude of a vector of which only one
 // direction is identifiable.
-std::vector<FoundParameter> parametersOf(const Member& member, const Eigen::MatrixXd& covariance) {
+std::vector<FoundParameter> parametersOf(const Member& member, const Eigen::MatrixXd& covariance,
+                                         double angle_modulo) {
   const auto numbers = numbersOf(member.hypothesis->entry(member.values));
   const EffectKind& kind = *findEffect(member.hypothesis->effect);
   const Eigen::Index count = covariance.cols();
@@ -56,10 +57,43 @@ std::vector<FoundParameter> parametersOf(const Member& member, const Eigen::Matr
   std::vector<FoundParameter> parameters;
   for (std::size_t k = 0; k < numbers.size(); ++k) {
     const auto& [key, value] = numbers[k];
-    const double own = TWIN_ACCURACY * parameterOf(kind, key).scale(value);
+    const EffectParameter& parameter = parameterOf(kind, key);
+    const double own = TWIN_ACCURACY * parameter.scale(value);
     parameters.push_back({key, value, std::sqrt(variance[k] + own * own)});
+    if (parameter.on_spindle) parameters.back().modulo = angle_modulo;
   }
   return parameters;
+}
+
+// [deg] Multiples of it are added to all angles on the spindle by another choice of the first tooth, which no
+// record shows without a spindle angle; 0: a record or the model distinguishes the teeth.
+double angleModulo(const Dataset& data) {
+  const MachineModel& nominal = data.nominal;
+  const bool shown = std::any_of(data.tests.begin(), data.tests.end(), [](const TestData& t) {
+    return t.test.kind == TestKind::cut && !t.phase_estimated;
+  });
+  const bool distinguished =
+      std::any_of(nominal.effects.begin(), nominal.effects.end(),
+                  [](const EffectEntry& e) { return findEffect(e.name)->stage == EffectStage::geometry; });
+  if (shown || distinguished || !nominal.tool || !nominal.tool->pitch.empty()) return 0.0;
+  return 360.0 / nominal.tool->teeth;
+}
+
+// Differences of angles that are known up to the same multiples.
+void noteAngleDifferences(const std::vector<FoundEffect>& effects, std::vector<std::string>* notes) {
+  const FoundParameter* first = nullptr;
+  std::string name;
+  for (const FoundEffect& effect : effects) {
+    for (const FoundParameter& p : effect.parameters) {
+      if (p.modulo == 0.0) continue;
+      if (first)
+        notes->push_back(p.key + " of " + effect.name + " minus that of " + name +
+                         formatted(": %.2f +- %.2g deg", std::remainder(p.value - first->value, 360.0),
+                                   std::hypot(p.std_dev, first->std_dev)));
+      else
+        std::tie(first, name) = std::pair(&p, effect.name);
+    }
+  }
 }
 
 void writeStdDevs(EffectEntry& entry, const std::vector<FoundParameter>& parameters) {
@@ -110,19 +144,26 @@ void addAlternatives(const Workbench& bench, const SearchOptions& options, const
   const FitState& best = found.best.state;
   for (const Alternative& alternative : found.alternatives) {
     if (alternative.member != member) continue;
-    effect->confidence = std::min(effect->confidence, validate(bench, best, alternative.state).confidence());
+    const auto compare = [&] {
+      effect->confidence =
+          std::min(effect->confidence, validate(bench, best, alternative.state).confidence());
+    };
     effect->alternatives.emplace_back(alternative.effect, alternative.delta_bic);
     // A gain too small for naming an effect does not separate it from another.
     const double threshold = std::min(options.min_gain, limits.separating_share * effect->delta_bic);
     const double gain = effect->delta_bic - alternative.delta_bic;
-    if (gain >= threshold) continue;
+    if (gain >= threshold) {
+      compare();
+      continue;
+    }
     const auto test = separatingTest(bench.data(), exact.model(best), exact.model(alternative.state));
-    const bool is_distinct = test && test->difference > limits.min_difference;
+    const bool is_distinct = test && test->difference > MIN_SEPARATION;
     // With more identifiable values and no other prediction it is only a more general effect.
     if (!is_distinct &&
         identifiableValues(bench.quick(), alternative.state, alternative.state.members.size() - 1) >
             identifiableValues(bench.quick(), best, member))
       continue;
+    if (is_distinct) compare();  // one that predicts the same shares the confidence, as not separable
     unidentifiable->push_back({effect->name, alternative.effect, gain / threshold, {}});
     if (is_distinct) unidentifiable->back().test = test;
     if (options.prior)
@@ -164,6 +205,7 @@ MachineModel nameEffects(const Workbench& bench, const SearchOptions& options, c
   auto first = static_cast<Eigen::Index>(best.state.nominal.size());
   for (Eigen::Index i = 0; i < first; ++i) nominal_std.push_back(std::sqrt(covariance(i, i)));
   bench.freedom().writeStdDevs(model, nominal_std);
+  const double modulo = angleModulo(bench.data());
   const std::size_t first_entry = model.effects.size() - best.state.members.size();
   for (std::size_t m = 0; m < best.state.members.size(); ++m) {
     const Member& member = best.state.members[m];
@@ -173,14 +215,19 @@ MachineModel nameEffects(const Workbench& bench, const SearchOptions& options, c
     effect.name = member.hypothesis->effect;
     effect.variant = member.hypothesis->variant;
     effect.words = entry.words;
-    effect.parameters = parametersOf(member, covariance.block(first, first, own, own));
+    effect.parameters = parametersOf(member, covariance.block(first, first, own, own), modulo);
     first += own;
+    if (const EffectKind& kind = *findEffect(effect.name); kind.remark) {
+      const std::string remark = kind.remark(entry);
+      if (!remark.empty()) result->notes.push_back(remark);
+    }
     writeStdDevs(entry, effect.parameters);
     effect.delta_bic = found.contribution[m];
     effect.confidence = validate(bench, best.state, found.without_member[m]).confidence();
     addAlternatives(bench, options, found, m, &effect, &unidentifiable);
     result->effects.push_back(std::move(effect));
   }
+  noteAngleDifferences(result->effects, &result->notes);
   reportUnidentifiable(unidentifiable, options.prior, result);
   return model;
 }

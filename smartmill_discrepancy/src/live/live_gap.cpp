@@ -8,6 +8,8 @@
 #include "smartmill_core/campaign/slow_channels.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
+#include "smartmill_core/frames.h"
+#include "smartmill_core/signal/force_channels.h"
 #include "smartmill_core/signal/interpolate.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
@@ -62,7 +64,26 @@ void addLoad(const Spindle& spindle, const RecordSegment& segment, const Record&
                                  (half_step * half_step + ripple * ripple)));
 }
 
+// Error [N] of compensated forces, in proportion to the force, cross-talk included.
+double compensationError(const Record& simulated, std::size_t from, double relative) {
+  double squares = 0.0;
+  for (const char* channel : FORCE_CHANNELS) {
+    const std::vector<double>& force = simulated.column(channel);
+    for (std::size_t i = from; i < force.size(); ++i) squares += force[i] * force[i];
+  }
+  return relative * std::sqrt(squares / (3.0 * static_cast<double>(simulated.size() - from)));
+}
+
 }  // namespace
+
+MachineModel comparedModel(MachineModel model, ComparedForce compared) {
+  if (compared == ComparedForce::measured) return model;
+  const auto noise = model.force_sensor.noise_rms;
+  model.force_sensor = ForceSensor();
+  model.force_sensor.noise_rms = noise;
+  model.frames.erase(frames::DYNAMOMETER);
+  return model;
+}
 
 LiveGap liveGap(const MachineModel& model, const RecordSegment& segment, const LiveGapOptions& options) {
   if (!model.force_sensor.noise_rms)
@@ -92,13 +113,17 @@ LiveGap liveGap(const MachineModel& model, const RecordSegment& segment, const L
   }
   const std::size_t from =
       segment.test.running_before.value_or(0.0) >= LIMITS.twin ? 0 : segment.record.size() / 2;
+  const double error = options.compared == ComparedForce::compensated
+                           ? compensationError(simulated, from, options.force_error)
+                           : 0.0;
   std::size_t axis = 0;
-  for (const char* channel : {"fx", "fy", "fz"}) {
+  for (const char* channel : FORCE_CHANNELS) {
     const auto &m = segment.record.column(channel), &s = simulated.column(channel);
     double squares = 0.0;
     for (std::size_t i = from; i < m.size(); ++i) squares += (m[i] - s[i]) * (m[i] - s[i]);
     result.channels.push_back(channel);
-    result.gap.push_back(std::sqrt(squares / static_cast<double>(m.size() - from)) / noise[axis++]);
+    result.gap.push_back(std::sqrt(squares / static_cast<double>(m.size() - from)) /
+                         std::hypot(noise[axis++], error));
   }
   if (with_load) addLoad(*model.spindle, segment, simulated, options, result);
   result.model_fits =

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "smartmill_core/names.h"
+#include "smartmill_core/signal/force_channels.h"
 #include "smartmill_core/signal/steady_path.h"
 #include "smartmill_core/units.h"
 
@@ -67,17 +68,38 @@ void SegmentRecorder::handle(const LoadSample& load) {
   while (loads_.front().stamp < load.stamp - parameters_.length - limits_.history) loads_.pop_front();
 }
 
-void SegmentRecorder::handle(const SampleBlock& dynamometer) {
-  if (dynamometer.size() == 0) return;
-  if (!first_) first_ = dynamometer.stamp;
-  if (!steady_since_ || dynamometer.stamp < *steady_since_ + parameters_.settle) return;
+void SegmentRecorder::handle(const SampleBlock& forces) {
+  if (forces.size() == 0) return;
+  if (!first_) first_ = forces.stamp;
+  if (!steady_since_ || forces.stamp < *steady_since_ + parameters_.settle) return;
   const bool gap =
-      !blocks_.empty() && dynamometer.first_index != blocks_.back().first_index + blocks_.back().size();
+      !blocks_.empty() && forces.first_index != blocks_.back().first_index + blocks_.back().size();
   if (gap) blocks_.clear();
-  blocks_.push_back(dynamometer);
+  blocks_.push_back(forces);
   // Stamps are rounded: half a sample is enough.
-  const double length = dynamometer.timeOf(dynamometer.size()) - blocks_.front().stamp;
-  if (length >= parameters_.length - 0.5 / dynamometer.sample_rate) finish();
+  const double length = forces.timeOf(forces.size()) - blocks_.front().stamp;
+  if (length >= parameters_.length - 0.5 / forces.sample_rate) finish();
+}
+
+void SegmentRecorder::handle(const ForceBlock& compensated) {
+  SampleBlock block;
+  block.stamp = compensated.stamp;
+  block.sample_rate = compensated.sample_rate;
+  block.first_index = compensated.first_index;
+  block.channels = {FORCE_CHANNELS.begin(), FORCE_CHANNELS.end()};
+  block.units.assign(FORCE_CHANNELS.size(), "N");
+  bool valid = compensated.status == ForceBlock::Status::compensated;
+  for (std::size_t i = 0; i < compensated.force[0].size(); ++i) {
+    for (const std::vector<double>& axis : compensated.force) {
+      valid = valid && std::isfinite(axis[i]);
+      block.samples.push_back(axis[i]);
+    }
+  }
+  if (valid) {
+    handle(block);
+  } else {
+    blocks_.clear();
+  }
 }
 
 // Linear fit of the angles of a segment; nothing if the speed is not constant.
@@ -168,14 +190,16 @@ void SegmentRecorder::finish() {
   blocks_.clear();
 }
 
-SegmentPipeline::SegmentPipeline(const SegmentParameters& parameters, double hold_back,
-                                 std::function<void(const RecordSegment&)> deliver)
-    : recorder_(parameters, std::move(deliver)),
+SegmentPipeline::SegmentPipeline(const SegmentParameters& parameters, ComparedForce compared,
+                                 double hold_back, std::function<void(const RecordSegment&)> deliver)
+    : compared_(compared),
+      recorder_(parameters, std::move(deliver)),
       sorter_(hold_back),
       conditions_(sorter_.addLatched(names::CUTTING_CONDITION)),
       states_(sorter_.addRegular(names::CNC_STATE)),
       angles_(sorter_.addRegular(names::SPINDLE_ANGLE)),
-      blocks_(sorter_.addRegular(names::DYNAMOMETER)),
+      blocks_(sorter_.addRegular(compared == ComparedForce::measured ? names::DYNAMOMETER
+                                                                     : names::FORCE_COMPENSATED)),
       // Absent from some machines: waited for only by the hold-back.
       loads_(sorter_.addUnawaited(names::CNC_LOAD)) {
   sorter_.onRestart([this] { recorder_.reset(); });
@@ -195,6 +219,10 @@ void SegmentPipeline::push(const SpindleAngle& angle) {
 
 void SegmentPipeline::push(const SampleBlock& dynamometer) {
   sorter_.push(blocks_, dynamometer.stamp, [this, dynamometer] { recorder_.handle(dynamometer); });
+}
+
+void SegmentPipeline::push(const ForceBlock& compensated) {
+  sorter_.push(blocks_, compensated.stamp, [this, compensated] { recorder_.handle(compensated); });
 }
 
 void SegmentPipeline::push(const LoadSample& load) {

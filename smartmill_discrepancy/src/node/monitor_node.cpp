@@ -22,11 +22,11 @@ MonitorParameters read(const ros::NodeHandle& private_nh) {
   return parameters;
 }
 
-/// The monitor compares daq/dynamometer, whose axes must be those of the machine. @throws Error.
-MachineModel readAligned(const std::string& file) {
-  MachineModel model = readMachineModel(file);
+/// The compared forces must have the axes of the machine. @throws Error.
+MachineModel readAligned(const std::string& file, ComparedForce compared) {
+  MachineModel model = comparedModel(readMachineModel(file), compared);
   if (placedFrame(model.frames, frames::DYNAMOMETER, frames::MACHINE).isTurned())
-    throw Error(file + ": frames.dynamometer is turned, expected an aligned one for the monitor");
+    throw Error(file + ": frames.dynamometer is turned, expected an aligned one, or forces: compensated");
   return model;
 }
 
@@ -34,9 +34,9 @@ MachineModel readAligned(const std::string& file) {
 
 MonitorNode::MonitorNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
     : parameters_(read(private_nh)),
-      model_(readAligned(parameters_.model)),
+      model_(readAligned(parameters_.model, parameters_.compared())),
       shell_(nh, private_nh, "none", INPUT_TIMEOUT),
-      segments_(parameters_.segment, parameters_.hold_back,
+      segments_(parameters_.segment, parameters_.compared(), parameters_.hold_back,
                 [this](const RecordSegment& segment) { evaluate(segment); }),
       state_(nh.advertise<smartmill_msgs::DiscrepancyState>(names::DISCREPANCY_STATE, 100)),
       force_(nh.advertise<smartmill_msgs::ForceBlock>(names::TWIN_FORCE, 100)),
@@ -47,7 +47,7 @@ MonitorNode::MonitorNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
 
 void MonitorNode::evaluate(const RecordSegment& segment) {
   try {
-    last_ = liveGap(model_, segment, parameters_.gap);
+    last_ = liveGap(model_, segment, parameters_.gapOptions());
     problem_.clear();
   } catch (const Error& error) {
     problem_ = error.what();
@@ -76,7 +76,8 @@ void MonitorNode::publishForce(const RecordSegment& segment) {
   block.first_index = simulated_;
   block.force = {simulated.column("fx"), simulated.column("fy"), simulated.column("fz")};
   simulated_ += simulated.size();
-  force_.publish(toMsg(block, frames::DYNAMOMETER));
+  const bool on_tool = parameters_.compared() == ComparedForce::compensated;
+  force_.publish(toMsg(block, on_tool ? frames::MACHINE : frames::DYNAMOMETER));
 }
 
 void MonitorNode::record(const RecordSegment& segment) {
@@ -94,7 +95,7 @@ void MonitorNode::record(const RecordSegment& segment) {
 bool MonitorNode::install(smartmill_msgs::InstallModel::Request& request,
                           smartmill_msgs::InstallModel::Response& response) {
   try {
-    MachineModel model = readAligned(request.file);
+    MachineModel model = readAligned(request.file, parameters_.compared());
     if (!model.force_sensor.noise_rms)
       throw Error(request.file + ": force_sensor.noise_rms_n: not found, expected for the gap");
     model_ = std::move(model);

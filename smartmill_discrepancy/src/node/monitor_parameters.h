@@ -12,6 +12,7 @@ namespace smartmill::discrepancy {
 /// Parameters of the monitor and of `explain` on a bag.
 struct MonitorParameters {
   std::string model;
+  std::string forces = "measured";
   SegmentParameters segment;
   double hold_back = 0.05;
   LiveGapOptions gap;
@@ -25,6 +26,11 @@ struct MonitorParameters {
     table.title(
         "Parameters of the monitor (package smartmill_discrepancy): the twin of the running machine.");
     table.atLaunch("model", model, "path of a smartmill-model/1 file: the model of the machine");
+    table.choice(
+        "forces", forces, {"measured", "compensated"},
+        "measured: daq/dynamometer, the twin has the modes of the sensor; compensated: "
+        "force/compensated of any force sensor, the twin's force on the tool (set by the launch file for "
+        "sensor spindle and plate)");
     table.section();
     segment.declare(table);
     table.number("hold_back", hold_back, "s", Range::notNegative(),
@@ -41,6 +47,14 @@ struct MonitorParameters {
                  "maximum number of recorded segments");
     table.number("most_per_condition", most_per_condition, "1", Range::notNegative(),
                  "maximum number of recorded segments per cutting condition");
+  }
+  ComparedForce compared() const {
+    return forces == "compensated" ? ComparedForce::compensated : ComparedForce::measured;
+  }
+  LiveGapOptions gapOptions() const {
+    LiveGapOptions options = gap;
+    options.compared = compared();
+    return options;
   }
   void validate() const { checkBounds(*this); }  ///< @throws Error naming key and value
 };

@@ -12,7 +12,11 @@ void connect(Source& source, SegmentPipeline& segments) {
   feed<CuttingCondition>(source, names::CUTTING_CONDITION, segments);
   feed<CncState>(source, names::CNC_STATE, segments);
   feed<SpindleAngle>(source, names::SPINDLE_ANGLE, segments);
-  feed<SampleBlock>(source, names::DYNAMOMETER, segments);
+  if (segments.compared() == ComparedForce::measured) {
+    feed<SampleBlock>(source, names::DYNAMOMETER, segments);
+  } else {
+    feed<ForceBlock>(source, names::FORCE_COMPENSATED, segments);
+  }
   feed<LoadSample>(source, names::CNC_LOAD, segments);
 }
 

@@ -45,9 +45,15 @@ std::string gapMap(const Explanation& e, bool after) {
   return out.str();
 }
 
-std::string revolutions(const Explanation& e) {
+// Curves of the first test, which has the largest residual.
+std::size_t picturedRevolutions(const Explanation& e) {
+  return static_cast<std::size_t>(
+      std::count_if(e.revolutions.begin(), e.revolutions.end(),
+                    [&](const RevolutionCurve& c) { return c.test == e.revolutions.front().test; }));
+}
+
+std::string revolutions(const Explanation& e, std::size_t n) {
   std::ostringstream out;
-  const std::size_t n = e.revolutions.size();
   for (std::size_t k = 0; k < n; ++k) {
     const RevolutionCurve& c = e.revolutions[k];
     out << "$c" << k << " << EOD\n";
@@ -149,8 +155,8 @@ std::vector<std::string> drawPictures(const Explanation& e, const std::string& f
   };
   add("gaps.png", 1200, 900,
       "set multiplot layout 2,1\n" + gapMap(e, false) + gapMap(e, true) + "unset multiplot\n");
-  if (!e.revolutions.empty())
-    add("revolution.png", 1200, 350 * static_cast<int>((e.revolutions.size() + 1) / 2), revolutions(e));
+  if (const std::size_t n = picturedRevolutions(e))
+    add("revolution.png", 1200, 350 * static_cast<int>((n + 1) / 2), revolutions(e, n));
   if (!e.spectra.empty())
     add("spectra.png", 1200, 350 * static_cast<int>((e.spectra.size() + 1) / 2), spectra(e));
   if (!e.candidates.empty())

@@ -1,22 +1,19 @@
 #include "smartmill_discrepancy/report/report_html.h"
 
+#include <algorithm>
 #include <map>
 #include <ostream>
 
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/io/report_page.h"
+#include "smartmill_core/model/effect_catalogue.h"
+#include "smartmill_core/units.h"
 
 namespace smartmill::discrepancy {
 namespace {
 
 std::string number(double value, const char* format = "%.4g") {
   return formatted(format, value);
-}
-
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& w : words) text += (text.empty() ? "" : ", ") + w;
-  return text;
 }
 
 void findings(std::ostream& out, const char* title, const std::vector<Finding>& list) {
@@ -49,9 +46,6 @@ const char* sentenceOf(Verdict verdict) {
 
 const std::map<std::string, std::string> CAPTIONS{
     {"gaps.png", "Gap of every test and channel before and after"},
-    {"revolution.png", "One revolution of the cut with the largest residual: measured, nominal, improved"},
-    {"spectra.png",
-     "Spectra of the residual before and after; arrows: lines found (orange) and unexplained (violet)"},
     {"candidates.png", "BIC gain of the candidates"},
     {"residual.png", "Gap after, test by test"}};
 
@@ -59,11 +53,17 @@ void verdict(std::ostream& out, const Explanation& e) {
   out << "<p class=\"verdict\"><b>" << nameOf(e.verdict) << "</b>. " << sentenceOf(e.verdict) << "</p>\n";
   if (!e.sentence.empty()) out << "<p><b>" << escapedHtml(e.sentence) << "</b></p>\n";
   if (e.interrupted) out << "<p>The search was interrupted: effects found until then.</p>\n";
-  out << "<table><tr><th>gap<th>before<th>after</tr><tr><td>fit tests<td>" << number(e.before.fit) << "<td>"
-      << number(e.after.fit) << "</tr><tr><td>held-out tests<td>" << number(e.before.heldout) << "<td>"
-      << number(e.after.heldout)
-      << "</tr></table>\n<p>The gap is the RMS of (measured - simulated) over the noise; 1 is the noise "
-         "floor.</p>\n";
+  if (e.spent_budget)
+    out << "<p>The search was ended by its budget of " << number(*e.spent_budget)
+        << " s: effects found until then.</p>\n";
+  if (!e.not_tried.empty()) out << "<p>Not tried: " << joined(e.not_tried) << ".</p>\n";
+  out << "<table><tr><th>difference, as a multiple of the noise<th>before<th>after</tr><tr><td>tests used to "
+         "find the cause<td>"
+      << number(e.before.fit) << "<td>" << number(e.after.fit) << "</tr><tr><td>held-out tests<td>"
+      << number(e.before.heldout) << "<td>" << number(e.after.heldout)
+      << "</tr></table>\n<p>This gap is the RMS of measured minus simulated values over the noise; at 1 only "
+         "noise is "
+         "left.</p>\n";
 }
 
 void recalibrated(std::ostream& out, const std::vector<RecalibratedValue>& values) {
@@ -79,31 +79,92 @@ void recalibrated(std::ostream& out, const std::vector<RecalibratedValue>& value
   out << "</table>\n";
 }
 
+// A key of an effect as a machinist reads it, with its unit.
+std::string sizeOf(const FoundEffect& effect, const FoundParameter& p) {
+  const EffectParameter& parameter = parameterOf(*findEffect(effect.name), p.key);
+  const bool is_item = p.key.find('[') != std::string::npos;  // of a list: the key says which
+  return (is_item ? p.key : parameter.quantity()) + " " + number(p.known(), "%.5g") + " &plusmn; " +
+         number(p.std_dev, "%.2g") +
+         (is_item || parameter.unit == "1" ? "" : " " + escapedHtml(parameter.unit)) +
+         (p.modulo > 0.0 ? " (plus multiples of " + number(p.modulo) + ")" : "") + "<br>";
+}
+
+std::string titleOf(const std::string& effect) {
+  std::string title = effect;
+  std::replace(title.begin(), title.end(), '_', ' ');
+  return title;
+}
+
+std::string certaintyOf(double confidence) {
+  constexpr double NEARLY = 0.999;
+  return confidence > NEARLY ? "above 99.9 %" : number(100.0 * confidence, "%.3g %%");
+}
+
 void effects(std::ostream& out, const Explanation& e) {
   if (!e.effects.empty()) {
-    out << "<h2>Effects found</h2>\n<table><tr><th>effect<th>parameters<th>BIC gain<th>share "
-           "of the held-out gap<th>alternatives (BIC gain)</tr>\n";
+    out << "<h2>What the machine has and the model lacks</h2>\n<table><tr><th>effect<th>what it does<th>how "
+           "large<th>how "
+           "sure<th>what else it may be</tr>\n";
     for (const FoundEffect& f : e.effects) {
-      out << "<tr><td><b>" << f.name << "</b><td>";
-      for (const auto& [key, word] : f.words) out << key << " " << escapedHtml(word) << "<br>";
-      for (const FoundParameter& p : f.parameters)
-        out << p.key << " = " << number(p.value, "%.5g") << " &plusmn; " << number(p.std_dev, "%.2g")
-            << "<br>";
-      out << "<td>" << number(f.delta_bic) << "<td>" << number(f.heldout_gap_reduction) << "<td>";
-      for (const auto& [name, delta] : f.alternatives) out << name << " (" << number(delta) << ")<br>";
-      out << "</tr>\n";
+      out << "<tr><td><b>" << titleOf(f.name) << "</b>";
+      for (const auto& [key, word] : f.words) out << "<br>" << key << " " << escapedHtml(word);
+      out << "<td>" << escapedHtml(findEffect(f.name)->description) << "<td>";
+      for (const FoundParameter& p : f.parameters) out << sizeOf(f, p);
+      std::string others;
+      for (const auto& group : e.not_separable) {
+        if (std::find(group.begin(), group.end(), f.name) == group.end()) continue;
+        for (const std::string& other : group) {
+          if (other != f.name) others += (others.empty() ? "" : ", ") + titleOf(other);
+        }
+      }
+      out << "<td>" << certaintyOf(f.confidence)
+          << (others.empty() ? "; removes " : ", this or what else it may be; removes ")
+          << number(100.0 * f.heldout_gap_reduction, "%.0f %%")
+          << " of the difference in cuts that were not used to find it<td>"
+          << (others.empty() ? "nothing in the catalogue fits as well" : others + ": these records fit both")
+          << "</tr>\n";
     }
     out << "</table>\n";
   }
   for (const Resemblance& r : e.resembles) {
-    out << "<p>Not named: <b>" << r.name << "</b>"
+    out << "<p>Not named: <b>" << titleOf(r.name) << "</b>"
         << (r.variant.empty() ? "" : " (" + escapedHtml(r.variant) + ")") << ", " << escapedHtml(r.reason)
         << ".</p>\n";
   }
-  for (const auto& group : e.not_separable)
-    out << "<p>Unidentifiable with this campaign: " << joined(group) << ".</p>\n";
+}
+
+// What to do now, the most useful first.
+void nextSteps(std::ostream& out, const Explanation& e) {
+  std::vector<std::string> steps;
+  const auto add = [&steps](const std::string& step) {
+    if (std::find(steps.begin(), steps.end(), step) == steps.end()) steps.push_back(step);
+  };
+  for (const FoundEffect& f : e.effects) {
+    const std::string& advice = findEffect(f.name)->advice;
+    if (!advice.empty()) add("<b>" + titleOf(f.name) + "</b>: " + escapedHtml(advice) + ".");
+  }
+  if (e.verdict == Verdict::recalibrated) {
+    for (const auto& group : e.not_separable) {
+      for (const std::string& name : group)
+        add("Exclude <b>" + titleOf(name) +
+            "</b>, which would do the same: " + escapedHtml(findEffect(name)->advice) + ".");
+    }
+    add("Check whether tool and material are those of the model. If they are, its values were off.");
+  }
   if (e.suggested_test)
-    out << "<p>A test that separates them: " << escapedHtml(*e.suggested_test) << ".</p>\n";
+    add("Make this test, which decides what these records leave open: " + escapedHtml(*e.suggested_test) +
+        ".");
+  if (e.verdict != Verdict::no_disagreement)
+    add("Use the improved model: <code>pipeline.launch model:=</code> or <code>machine.launch model:=</code> "
+        "with "
+        "<code>model.yaml</code> of this folder.");
+  if (!e.unexplained.empty())
+    add("The rest has no name. Where it is and what it depends on is listed under <i>Unexplained "
+        "residual</i>.");
+  if (steps.empty()) return;
+  out << "<h2>What to do</h2>\n<ol>";
+  for (const std::string& step : steps) out << "<li>" << step << "</li>";
+  out << "</ol>\n";
 }
 
 void shares(std::ostream& out, const std::vector<ChannelShare>& channels) {
@@ -139,9 +200,52 @@ void chattering(std::ostream& out, const std::vector<ChatteringCut>& cuts) {
 
 void images(ReportPage& page, const std::vector<std::string>& pictures, const std::string& folder) {
   for (const std::string& name : pictures) {
-    const auto caption = CAPTIONS.find(name);
-    page.picture(folder + "/" + name, caption != CAPTIONS.end() ? caption->second : name);
+    // Revolutions and spectra are drawn from their data.
+    if (const auto caption = CAPTIONS.find(name); caption != CAPTIONS.end())
+      page.picture(folder + "/" + name, caption->second);
   }
+}
+
+std::string unitOf(const std::string& channel) {
+  return channel == "load_meter"         ? "load meter [V]"
+         : channel.rfind("tool", 0) == 0 ? "displacement [m]"
+                                         : "force [N]";
+}
+
+void curves(ReportPage& page, const Explanation& e) {
+  if (!e.revolutions.empty())
+    page.html()
+        << "<h2>Force over one revolution</h2>\n<p>The wheel zooms, dragging moves, a double click shows "
+           "everything.</p>\n";
+  std::string test;
+  for (const RevolutionCurve& c : e.revolutions) {
+    if (c.test != test) {
+      if (!test.empty()) page.html() << "</div>\n", page.endChoice();
+      page.beginChoice(c.test);
+      page.html() << "<div class=\"plots\">\n";
+      test = c.test;
+    }
+    page.plot({c.channel + ", " + c.test,
+               "spindle angle [deg]",
+               unitOf(c.channel),
+               false,
+               {{"measured", "#8d99a6", true, c.angle_deg, c.measured},
+                {"model as stated", "#d95f02", false, c.angle_deg, c.nominal},
+                {"improved model", "#1b9e77", false, c.angle_deg, c.improved}}});
+  }
+  if (!test.empty()) page.html() << "</div>\n", page.endChoice();
+  if (e.spectra.empty()) return;
+  page.html() << "<h2>Spectra of measured minus simulated</h2>\n<div class=\"plots\">\n";
+  for (const SpectrumCurve& s : e.spectra) {
+    const std::string order = s.order_hz > 0.0 ? formatted(", one order is %.4g Hz", s.order_hz) : "";
+    page.plot({s.channel + ", " + s.test + order,
+               "frequency [Hz]",
+               unitOf(s.channel),
+               true,
+               {{"before", "#d95f02", false, s.frequency_hz, s.before},
+                {"after", "#1b9e77", false, s.frequency_hz, s.after}}});
+  }
+  page.html() << "</div>\n";
 }
 
 void candidates(std::ostream& out, const std::vector<CandidateResult>& tried) {
@@ -154,6 +258,21 @@ void candidates(std::ostream& out, const std::vector<CandidateResult>& tried) {
         << number(t.predicted_gain) << "<td>" << number(t.delta_bic) << "<td>" << t.simulations << "<td>"
         << number(t.seconds, "%.1f") << "</tr>\n";
   }
+  out << "</table>\n";
+}
+
+void inspection(std::ostream& out, const InspectionCheck& check) {
+  if (check.dimensions.empty()) return;
+  out << "<h2>Measured dimensions of the parts</h2>\n<p>" << check.text()
+      << ". The search did not use them.</p>\n<table><tr><th>cut<th>dimension<th>measured minus nominal<th>"
+         "stated model<th>improved model</tr>\n";
+  const auto microns = [](double value) { return number(value / units::UM, "%.1f") + " &micro;m"; };
+  for (const InspectedDimension& d : check.dimensions)
+    out << "<tr><td>" << escapedHtml(d.test) << "<td>"
+        << (d.kind == SLOT_WIDTH ? "width of the slot along " : "position of the face along ") << d.direction
+        << "<td>" << microns(d.measured) << " &plusmn; " << microns(d.std_dev) << "<td>" << microns(d.before)
+        << (d.agreesBefore() ? "" : ", differs") << "<td>" << microns(d.after)
+        << (d.agreesAfter() ? "" : ", differs") << "</tr>\n";
   out << "</table>\n";
 }
 
@@ -173,8 +292,11 @@ void writeHtml(const Explanation& e, const std::string& campaign, const std::vec
   verdict(out, e);
   recalibrated(out, e.recalibrated);
   effects(out, e);
+  inspection(out, e.inspection);
+  nextSteps(out, e);
   shares(out, e.channels);
   chattering(out, e.chattering);
+  curves(page, e);
   images(page, pictures, folder);
   findings(out, "Unexplained residual", e.unexplained);
   findings(out, "Disagreement of the nominal model", e.where);

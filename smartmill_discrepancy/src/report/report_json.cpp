@@ -70,8 +70,10 @@ Json effectsOf(const std::vector<FoundEffect>& effects) {
   Json list = Json::array();
   for (const FoundEffect& effect : effects) {
     Json parameters = Json::object();
-    for (const FoundParameter& p : effect.parameters)
-      parameters[p.key] = {{"value", rounded(p.value)}, {"std", rounded(p.std_dev)}};
+    for (const FoundParameter& p : effect.parameters) {
+      parameters[p.key] = {{"value", rounded(p.known())}, {"std", rounded(p.std_dev)}};
+      if (p.modulo > 0.0) parameters[p.key]["modulo"] = rounded(p.modulo);
+    }
     for (const auto& [key, word] : effect.words) parameters[key] = {{"value", word}};
     Json alternatives = Json::array();
     for (const auto& [name, delta] : effect.alternatives)
@@ -97,6 +99,15 @@ void writeReport(const Explanation& e, const std::string& folder) {
   report["verdict"] = nameOf(e.verdict);
   report["where"] = findingsOf(e.where);
   report["effects"] = effectsOf(e.effects);
+  for (const InspectedDimension& d : e.inspection.dimensions) {
+    report["inspection"].push_back({{"test", d.test},
+                                    {"kind", d.kind},
+                                    {"direction", d.direction},
+                                    {"measured_um", rounded(d.measured / units::UM)},
+                                    {"std_um", rounded(d.std_dev / units::UM)},
+                                    {"before_um", rounded(d.before / units::UM)},
+                                    {"after_um", rounded(d.after / units::UM)}});
+  }
   if (e.verdict == Verdict::recalibrated) {
     report["recalibrated"] = Json::array();
     for (const RecalibratedValue& v : e.recalibrated)
@@ -107,10 +118,8 @@ void writeReport(const Explanation& e, const std::string& folder) {
                                         {"deviations", rounded(v.deviations)}});
   }
   report["resembles"] = Json::array();
-  for (const Resemblance& r : e.resembles) {
+  for (const Resemblance& r : e.resembles)
     report["resembles"].push_back({{"name", r.name}, {"variant", r.variant}, {"reason", r.reason}});
-    if (r.confidence) report["resembles"].back()["confidence"] = *r.confidence;
-  }
   report["not_separable"] = e.not_separable;
   report["suggested_test"] = e.suggested_test ? Json(*e.suggested_test) : Json(nullptr);
   if (e.suggested_cut) report["suggested_cut"] = cutOf(*e.suggested_cut);
@@ -156,6 +165,8 @@ void writeReport(const Explanation& e, const std::string& folder) {
   }
   report["notes"] = e.notes;
   if (e.interrupted) report["interrupted"] = true;
+  if (e.spent_budget) report["spent_budget_s"] = rounded(*e.spent_budget);
+  if (!e.not_tried.empty()) report["not_tried"] = e.not_tried;
   report["seconds"] = rounded(e.seconds);
   const std::string file = folder + "/report.json";
   std::ofstream out(file);

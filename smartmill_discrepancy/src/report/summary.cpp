@@ -13,7 +13,8 @@ std::string summaryOf(const Explanation& e) {
     lines += effect.name + ":";
     for (const auto& [key, word] : effect.words) lines += " " + key + " " + word;
     for (const FoundParameter& p : effect.parameters)
-      lines += " " + p.key + formatted(" %.5g +- %.2g", p.value, p.std_dev);
+      lines += " " + p.key + formatted(" %.5g +- %.2g", p.known(), p.std_dev) +
+               (p.modulo > 0.0 ? formatted(" modulo %.4g", p.modulo) : "");
     lines += "\n";
   }
   for (const Resemblance& r : e.resembles)
@@ -33,6 +34,10 @@ std::string summaryOf(const Explanation& e) {
                                              100.0 * *c.synchronous_share, c.floor_gap)
                                  : std::string("\n");
   }
+  if (const std::string text = e.inspection.text(); !text.empty()) lines += text + "\n";
+  if (e.spent_budget)
+    lines += formatted("budget of %.3g s spent: effects found until then\n", *e.spent_budget);
+  if (!e.not_tried.empty()) lines += "not tried: " + joined(e.not_tried) + "\n";
   if (e.interrupted) lines += "interrupted: effects found until then\n";
   return lines;
 }

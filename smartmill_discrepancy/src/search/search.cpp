@@ -1,5 +1,6 @@
 #include "smartmill_discrepancy/search/search.h"
 
+#include <algorithm>
 #include <optional>
 #include <utility>
 
@@ -10,6 +11,20 @@ namespace {
 
 void run(const SearchSteps& steps, SearchState& state) {
   for (const std::unique_ptr<SearchStep>& step : steps) step->run(state);
+}
+
+// Neither fitted nor screened with too small a gain.
+std::vector<const Hypothesis*> notTried(const SearchState& state,
+                                        const std::vector<PredictedGain>& screened) {
+  std::vector<const Hypothesis*> not_tried;
+  for (const Hypothesis& h : state.hypotheses) {
+    const auto is = [&h](const auto& one) { return one.hypothesis == &h; };
+    const auto& fitted = state.result.candidates;
+    const auto predicted = std::find_if(screened.begin(), screened.end(), is);
+    const bool too_small = predicted != screened.end() && predicted->gain < state.options.min_gain;
+    if (!too_small && std::none_of(fitted.begin(), fitted.end(), is)) not_tried.push_back(&h);
+  }
+  return not_tried;
 }
 
 }  // namespace
@@ -28,12 +43,15 @@ SearchResult search(Workbench& bench, const std::vector<Hypothesis>& hypotheses,
       hasToolModes(bench.data().nominal) ? shortenedDataset(bench.data()) : std::nullopt;
   if (!short_data) {
     run(stepsOnWholeRecords(nullptr), state);
+    if (bench.cancelled()) state.result.not_tried = notTried(state, state.screened);
     return std::move(state.result);
   }
   Workbench shortened_bench(*short_data, bench.options());
   SearchState shortened(shortened_bench, hypotheses, options, false);
   run(stepsOnShortenedRecords(), shortened);
   run(stepsOnWholeRecords(&shortened), state);
+  if (bench.cancelled())
+    state.result.not_tried = notTried(state, state.screened.empty() ? shortened.screened : state.screened);
   return std::move(state.result);
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <yaml-cpp/yaml.h>
 
@@ -161,6 +162,32 @@ TEST(RecordsWithoutAngle, DeviatingNominalValuesAreNoEffect) {
   EXPECT_LE(e.after.heldout, 1.02);
 }
 
+// Without a spindle angle any tooth may be the first one: the angle of the runout is known up to the pitch.
+TEST(RecordsWithoutAngle, AnAngleIsKnownUpToTheToothPitch) {
+  SMARTMILL_SHARED_DATA(folder, "campaigns/runout");
+  TemporaryFolder less;
+  const Campaign full = readCampaign(folder);
+  const MachineModel believed = readMachineModel(full.modelPath());
+  writeLess(full, less.file("."));
+  writeMachineModel(believed, less.file("model.yaml"));
+  const std::map<std::string, Printed> truth = truthOf(folder).at("runout");
+  const Explanation e = explained(less.file("."));
+  ASSERT_EQ(namesOf(e), std::vector<std::string>{"runout"});
+  const double pitch = 360.0 / believed.tool->teeth;
+  for (const FoundParameter& p : e.effects.front().parameters) {
+    const Printed expected = truth.at(p.key);
+    if (p.key != "angle_deg") {
+      EXPECT_EQ(p.modulo, 0.0) << p.key;
+      continue;
+    }
+    EXPECT_NEAR(p.modulo, pitch, 1e-9);
+    EXPECT_GE(p.known(), 0.0);
+    EXPECT_LT(p.known(), pitch);
+    EXPECT_LE(std::abs(std::remainder(p.known() - expected.value, pitch)),
+              3.0 * p.std_dev + expected.rounding);
+  }
+}
+
 // The records of a campaign under other statements about them.
 void writeStated(const Campaign& stated, const MachineModel& believed, const std::string& folder) {
   for (const CampaignTest& test : stated.tests)
@@ -210,6 +237,11 @@ TEST(NominalValues, AFeedErrorIsNamedOrARecalibration) {
   EXPECT_TRUE(namesOf(e) == std::vector<std::string>{"feed_error"} || e.verdict == Verdict::recalibrated)
       << nameOf(e.verdict) << ": " << e.sentence;
   EXPECT_LE(e.after.heldout, 1.05);
+  if (e.verdict != Verdict::recalibrated) return;
+  // Either changes the records alike, which the report must say.
+  ASSERT_EQ(e.not_separable.size(), 1u) << e.sentence;
+  EXPECT_THAT(e.not_separable.front(), testing::Contains("feed_error"));
+  EXPECT_THAT(e.sentence, testing::HasSubstr("The same records follow from"));
 }
 
 INSTANTIATE_TEST_SUITE_P(Shared, ExampleCampaign,

@@ -58,5 +58,10 @@ TEST(HiddenEffects, FindsThermalGrowth) {
   expectFound(effectEntry("thermal_growth", {{"growth_um", 58.0}, {"time_constant_s", 190.0}}));
 }
 
+// A line at no whole order, with another phase in each record.
+TEST(HiddenEffects, FindsABearingTone) {
+  expectFound(effectEntry("bearing_tone", {{"order", 5.4}, {"x_n", 4.0}, {"y_n", -2.5}, {"z_n", 1.5}}));
+}
+
 }  // namespace
 }  // namespace smartmill::discrepancy

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/frames.h"
 #include "smartmill_core/testing/mill.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
@@ -198,6 +199,28 @@ TEST(RecordSegmentFiles, ReadBackEqual) {
   }
   segment.record = record;
   EXPECT_TRUE(liveGap(read, segment, {}).model_fits);
+}
+
+// Compensated forces are those on the tool: the twin has no modes of the sensor, and an error of the sensor
+// in proportion to the force is part of the noise.
+TEST(LiveGap, ComparesCompensatedForcesWithTheForceOnTheTool) {
+  MachineModel model = mill();
+  model.frames[frames::DYNAMOMETER] = {frames::TABLE, {{0, 0, 0}}, {{0, 0, 0.5, std::sqrt(0.75)}}};
+  const MachineModel ideal = comparedModel(model, ComparedForce::compensated);
+  EXPECT_FALSE(placedFrame(ideal.frames, frames::DYNAMOMETER, frames::MACHINE).isTurned());
+  EXPECT_TRUE(ideal.force_sensor.axis[0].modes.empty());
+  ASSERT_TRUE(ideal.force_sensor.noise_rms);
+  RecordSegment segment = slot(ideal, 3);
+  for (std::vector<double>& column : segment.record.columns) {
+    if (&column == &segment.record.column("spindle_angle")) continue;
+    for (double& force : column) force *= 1.03;
+  }
+  LiveGapOptions options;
+  EXPECT_FALSE(liveGap(ideal, segment, options).model_fits);
+  options.compared = ComparedForce::compensated;
+  const LiveGap gap = liveGap(ideal, segment, options);
+  EXPECT_TRUE(gap.model_fits);
+  EXPECT_FALSE(liveGap(model, segment, options).model_fits);  // the sensor's mode at 930 Hz
 }
 
 }  // namespace

@@ -20,8 +20,10 @@ struct Machine {
   double actual_speed = SPEED;   // [rad/s]
   double begin = 100.0;          // [s] stamp of the start
   double settle = 0.0;           // [s]
-  double stops = 1e300;          // [s] the controller's position leaves the path from here on
-  double acceleration = 0.0;     // [rad/s2] of the spindle
+  ComparedForce compared = ComparedForce::measured;
+  double settling_at = -1.0;  // [s] time of a block in which the compensation settles
+  double stops = 1e300;       // [s] the controller's position leaves the path from here on
+  double acceleration = 0.0;  // [rad/s2] of the spindle
 };
 
 /// A second of straight cutting through the recorder; fx counts samples.
@@ -30,7 +32,8 @@ std::vector<RecordSegment> run(const Machine& machine, double length = 0.3) {
   SegmentParameters parameters;
   parameters.length = length;
   parameters.settle = machine.settle;
-  SegmentPipeline recorder(parameters, 0.05, [&](const RecordSegment& s) { segments.push_back(s); });
+  SegmentPipeline recorder(parameters, machine.compared, 0.05,
+                           [&](const RecordSegment& s) { segments.push_back(s); });
   CuttingCondition condition;
   condition.stamp = machine.begin;
   condition.kind = CuttingCondition::Kind::cut;
@@ -72,7 +75,20 @@ std::vector<RecordSegment> run(const Machine& machine, double length = 0.3) {
       const double index = static_cast<double>(static_cast<std::size_t>(k) * BLOCK + i);
       block.samples.insert(block.samples.end(), {index, -index, 0.5});
     }
-    recorder.push(block);
+    if (machine.compared == ComparedForce::measured) {
+      recorder.push(block);
+      continue;
+    }
+    ForceBlock compensated;
+    compensated.stamp = block.stamp;
+    compensated.sample_rate = RATE;
+    compensated.first_index = block.first_index;
+    for (std::size_t i = 0; i < BLOCK; ++i) {
+      for (std::size_t axis = 0; axis < 3; ++axis) compensated.force[axis].push_back(block.at(i, axis));
+    }
+    compensated.status = std::abs(t - machine.settling_at) < 1e-6 ? ForceBlock::Status::settling
+                                                                  : ForceBlock::Status::compensated;
+    recorder.push(compensated);
   }
   recorder.flush();
   return segments;
@@ -154,6 +170,16 @@ TEST(SegmentRecorder, NeverSpansLostSamples) {
     const auto& fx = s.record.column("fx");
     EXPECT_EQ(fx.back() - fx.front(), static_cast<double>(fx.size() - 1));
   }
+}
+
+TEST(SegmentRecorder, TakesCompensatedForcesWhileTheyAreCompensated) {
+  Machine machine;
+  machine.compared = ComparedForce::compensated;
+  machine.settling_at = 0.2;
+  const std::vector<RecordSegment> segments = run(machine);
+  ASSERT_EQ(segments.size(), 2U);  // as with a lost block
+  EXPECT_EQ(segments[0].record.column("fx").front(), 21.0 * 256.0);
+  EXPECT_EQ(segments[0].record.column("fy").front(), -21.0 * 256.0);
 }
 
 }  // namespace

@@ -40,6 +40,7 @@ void printModes(const std::vector<EstimatedMode>& modes, bool receptance) {
                 formatted("%.4f +- %.4f", 100.0 * m.damping_ratio, 100.0 * m.damping_ratio_std).c_str(),
                 formatted("%.4g +- %.2g", printed, std::abs(printed * gain.std / gain.value)).c_str(),
                 units::degFromRad(gain.phase), m.evidence);
+    if (!m.doubt.empty()) std::printf("    %s\n", m.doubt.c_str());
   }
 }
 

@@ -53,9 +53,8 @@ double FrfEvaluation::offsetCorrection() const {
 ImpactOptions FrfEvaluation::impactOptions(const SensorState& sensor) const {
   ImpactOptions options;
   options.exponential_time = parameters_.exponential_time;
-  // The hit drives the tool away from the sensor: the voltage falls. For the cross FRF this turns the sense
-  // of the hit.
-  options.response_scale = -sensor.sensitivity * offsetCorrection();
+  // A hit away from the sensor lowers the voltage. For the cross FRF this turns the sense of the hit.
+  options.response_scale = measurement_.hitSense() * sensor.sensitivity * offsetCorrection();
   if (parameters_.straighten_sensor == 0) return options;
   options.sensor_gain = std::isfinite(sensor.curve_gap) ? sensor.curve_gap / sensor.sensitivity - sensor.volt
                                                         : measurement_.station.gain_volt;

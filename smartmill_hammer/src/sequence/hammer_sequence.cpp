@@ -12,11 +12,34 @@
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/frames.h"
 #include "smartmill_core/signal/same_time.h"
+#include "smartmill_core/units.h"
 #include "station_control.h"
 #include "step_runner.h"
 
 namespace smartmill::hammer {
 namespace {
+
+/// Fault of a tool that a hammer opposite the sensor cannot strike on a flute while another faces the sensor.
+std::string oppositeFault(const HammerStation& station, const ToolGeometry& tool, int teeth,
+                          double tolerance) {
+  if (teeth % 2 != 0)
+    return formatted(
+        "teeth %d: expected an even number, the sensor is opposite the hammer and both face a flute", teeth);
+  for (int k = 0; teeth == tool.teeth && k < teeth / 2; ++k) {
+    const double between = tool.toothAngle(k + teeth / 2) - tool.toothAngle(k);
+    if (std::abs(between - units::PI) > tolerance) {
+      return formatted(
+          "teeth %d and %d are %.1f deg apart: expected 180 +- %.1f deg, the sensor is opposite the hammer "
+          "and both "
+          "face a flute",
+          k + 1, k + 1 + teeth / 2, units::degFromRad(between), units::degFromRad(tolerance));
+    }
+  }
+  const double stroke = station.opposite->distance - station.gap_at_zero_volt - tool.diameter;
+  if (stroke > 0.0 && stroke <= station.opposite->stroke) return {};
+  return formatted("tool of %.1f mm: expected %.1f to %.1f mm between sensor and hammer", 1e3 * tool.diameter,
+                   1e3 * (stroke + tool.diameter - station.opposite->stroke), 1e3 * (stroke + tool.diameter));
+}
 
 std::string goalFault(const MeasureFrfGoal& goal, const HammerParameters& parameters,
                       const MachineModel& model) {
@@ -33,6 +56,7 @@ std::string goalFault(const MeasureFrfGoal& goal, const HammerParameters& parame
   if (!(goal.stickout == 0.0 || (goal.stickout > struck && std::isfinite(goal.stickout))))
     return formatted("stickout %.2f mm: expected 0 or more than the height of the hammer, %.2f mm",
                      1e3 * goal.stickout, 1e3 * struck);
+  if (station.opposite) return oppositeFault(station, *model.tool, teeth, parameters.flute_tolerance);
   return {};
 }
 

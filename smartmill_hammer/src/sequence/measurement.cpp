@@ -25,7 +25,8 @@ double Measurement::leastPitch() const {
 }
 
 bool Measurement::correctsPerMode() const {
-  return parameters.tip_correction == "apart" && goal.stickout > 0.0 && station.offset > 0.0;
+  return parameters.tip_correction == "apart" && goal.stickout > 0.0 &&
+         station.offset + parameters.read_height > 0.0;
 }
 
 bool Measurement::needsSecondHeight() const {
@@ -56,7 +57,8 @@ double Measurement::rotationFromFlute(std::size_t axis) const {
 }
 
 double Measurement::safeTravel(std::size_t axis, double moved) const {
-  const double found = (result.flute_hammer - result.flute_low) / station.offset, nominal = tool.lag();
+  const double nominal = tool.lag();
+  const double found = hasOffset() ? (result.flute_hammer - result.flute_low) / station.offset : nominal;
   const SensorApproach::Pose pose{rotationFromFlute(axis),
                                   parameters.read_height + (at_second_height ? lowered() : 0.0),
                                   std::min(found, nominal), std::max(found, nominal)};

@@ -34,6 +34,11 @@ class Measurement {
 
   int teeth() const { return goal.teeth > 0 ? goal.teeth : tool.teeth; }
   double leastPitch() const;  ///< [rad]
+  /// [1] sense of a hit along the direction, in which the tool nears the sensor: 1 with the sensor opposite
+  /// the hammer, else -1.
+  double hitSense() const { return station.opposite ? 1.0 : -1.0; }
+  /// Whether the sensor is below the hammer, which needs the flute's angle at the hammer.
+  bool hasOffset() const { return station.offset > 0.0; }
 
   /// Whether spindle and tool modes are corrected to the tip apart from one another.
   bool correctsPerMode() const;

@@ -1,7 +1,5 @@
 #include "smartmill_kalman/commands.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -27,6 +25,7 @@
 #include "smartmill_kalman/compensation/campaign_compensation.h"
 #include "smartmill_kalman/compensation/record_compensation.h"
 #include "smartmill_kalman/sensor/blind_mode.h"
+#include "smartmill_recording/reading_progress.h"
 #include "smartmill_recording/recording_file.h"
 
 namespace {
@@ -151,10 +150,11 @@ std::string fileName(std::string name, std::set<std::string>& used) {
 
 /// Writes a cut of a bag. @return its report
 std::string writeCut(const std::string& folder, const std::string& name, kalman::BagCut cut) {
-  const std::string range = kalman::rangeLine(name, cut.measured, cut.compensated);
+  std::string report = kalman::rangeLine(name, cut.measured, cut.compensated);
+  if (!cut.force_model.empty()) report += name + ": force model: " + cut.force_model + "\n";
   kalman::writeForce(folder, name, std::move(cut.offset), std::move(cut.compensated));
-  return range + formatted("%s: time 0 is %.9f s, the first %.3f s are settling\n", name.c_str(), cut.stamp,
-                           cut.settling);
+  return report + formatted("%s: time 0 is %.9f s, the first %.3f s are settling\n", name.c_str(), cut.stamp,
+                            cut.settling);
 }
 
 void fromBag(const Request& request) {
@@ -177,7 +177,6 @@ void fromBag(const Request& request) {
     }
     std::printf("\n");
   }
-  const bool terminal = isatty(STDERR_FILENO);
   std::set<std::string> used;
   std::vector<std::future<std::string>> written;  // while the bag is read on
   const auto began = std::chrono::steady_clock::now();
@@ -187,9 +186,7 @@ void fromBag(const Request& request) {
         const std::string name = fileName(cut.name, used);
         written.push_back(std::async(std::launch::async, writeCut, request.out, name, std::move(cut)));
       },
-      [&](double share) {
-        if (terminal) std::fprintf(stderr, "\rreading %3.0f %%%s", 100.0 * share, share >= 1.0 ? "\n" : "");
-      });
+      printReadingProgress);
   for (std::future<std::string>& cut : written) std::fputs(cut.get().c_str(), stdout);
   for (const kalman::SensorResult& result : summary.identified) {
     std::printf("taps in %s: %s\n", result.modes.direction.c_str(), result.message.c_str());

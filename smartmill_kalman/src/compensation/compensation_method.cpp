@@ -1,5 +1,6 @@
 #include "smartmill_kalman/compensation/compensation_method.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "smartmill_core/error.h"
@@ -12,10 +13,20 @@ namespace smartmill::kalman {
 void CompensationParameters::validate() const {
   checkBounds(*this);
   // Mode tracking needs the angle of the teeth, which cannot be estimated from the force alone.
-  if (track_speed && follow)
-    throw Error("track_speed: true, expected false with follow (needs spindle/angle)");
-  if (delay_form && (track_speed || follow || lag > 0.0))
-    throw Error("delay_form: true, expected false with track_speed, follow or lag > 0 (they need harmonics)");
+  if (track_speed.isAlways() && follow)
+    throw Error("track_speed: always, expected auto or never with follow (needs spindle/angle)");
+  if (delay_form && (track_speed.isAlways() || follow || lag > 0.0)) {
+    throw Error(
+        "delay_form: true, expected false with track_speed always, follow or lag > 0 (they need harmonics)");
+  }
+}
+
+CompensationParameters CompensationParameters::withSpeed(bool estimated) const {
+  CompensationParameters result = *this;
+  result.track_speed = estimated;
+  if (estimated)
+    result.filter.memory_revolutions = std::min(filter.memory_revolutions, estimated_speed_memory);
+  return result;
 }
 
 std::unique_ptr<CompensationMethod> makeCompensationMethod(const CompensationParameters& parameters,

@@ -19,6 +19,14 @@ TapParameters withRange(TapParameters taps, double saturation) {
   return taps;
 }
 
+// Where the speed can be estimated, blocks do not wait for angles that are missing.
+StreamSorter::Stream addAngles(StreamSorter& sorter, const CompensationParameters& parameters) {
+  if (parameters.track_speed.isAlways()) return sorter.addUnawaited(names::SPINDLE_ANGLE);
+  if (parameters.track_speed.isAuto())
+    return sorter.addRegular(names::SPINDLE_ANGLE, parameters.angle_patience);
+  return sorter.addRegular(names::SPINDLE_ANGLE);
+}
+
 }  // namespace
 
 CompensationPipeline::CompensationPipeline(const CompensationParameters& parameters,
@@ -28,13 +36,13 @@ CompensationPipeline::CompensationPipeline(const CompensationParameters& paramet
       sorter_(hold_back),
       forces_(parameters, sensor, outputs_.force),
       identification_(withRange(taps, parameters.saturation), parameters.filter, forces_, sorter_, outputs_),
+      may_estimate_(parameters.track_speed.isAuto()),
       conditions_(sorter_.addLatched(names::CUTTING_CONDITION)),
       goals_(sorter_.addEvents(names::MEASURE_SENSOR_FRF)),
       hammers_(sorter_.addOptional(names::HAMMER)),
-      // Without a tachometer there are no angles to wait for.
-      angles_(parameters.track_speed ? sorter_.addUnawaited(names::SPINDLE_ANGLE)
-                                     : sorter_.addRegular(names::SPINDLE_ANGLE)),
-      blocks_(sorter_.addRegular(names::DYNAMOMETER)) {
+      angles_(addAngles(sorter_, parameters)),
+      blocks_(sorter_.addRegular(names::DYNAMOMETER)),
+      states_(sorter_.addEvents(names::CNC_STATE)) {
   if (sensor.channels) channels_.emplace(*sensor.channels);
   sorter_.onRestart([this] { restart(); });
 }
@@ -121,6 +129,10 @@ void CompensationPipeline::push(const CuttingCondition& condition) {
   });
 }
 
+void CompensationPipeline::push(const CncState& state) {
+  sorter_.push(states_, state.stamp, [this, state] { forces_.handle(state); });
+}
+
 void CompensationPipeline::push(const MeasureFrfGoal& goal, std::function<bool(bool)> begin) {
   sorter_.push(goals_, goal.stamp,
                [this, goal, begin = std::move(begin)] { identification_.start(goal, begin); });
@@ -153,6 +165,10 @@ void CompensationPipeline::hammerStopped(const std::string& reason) {
         [&reason](SensorMeasurement& measurement) { measurement.end(FrfCode::bad_data, reason); });
   }
   sorter_.setRegular(hammers_, false);
+}
+
+void CompensationPipeline::anglesStopped() {
+  if (may_estimate_) sorter_.setRegular(angles_, false);
 }
 
 void CompensationPipeline::flush() {

@@ -12,6 +12,15 @@
 namespace smartmill::kalman {
 namespace {
 
+// The filters bridge single samples that are not measured by their prediction, but not a block of them.
+bool isMeasured(const ForceBlock& block) {
+  for (const std::vector<double>& force : block.force) {
+    const auto finite = std::count_if(force.begin(), force.end(), [](double f) { return std::isfinite(f); });
+    if (2 * static_cast<std::size_t>(finite) < force.size()) return false;
+  }
+  return true;
+}
+
 std::array<std::size_t, 3> forceColumns(const SampleBlock& block) {
   std::array<std::size_t, 3> column{};
   for (std::size_t axis = 0; axis < 3; ++axis) column[axis] = columnOf(block, FORCE_CHANNELS[axis], "N");
@@ -25,21 +34,38 @@ ForceCompensation::ForceCompensation(const CompensationParameters& parameters, b
     : parameters_((parameters.validate(), parameters)),
       sign_(measures_workpiece ? -1.0 : 1.0),
       outputs_(std::move(outputs)),
-      method_(makeCompensationMethod(parameters, outputs_)),
+      chooser_(parameters),
+      estimates_speed_(parameters.track_speed.isAlways()),
+      method_(makeCompensationMethod(parameters.withSpeed(estimates_speed_), outputs_)),
       steady_speed_(parameters.speed_tolerance) {
 }
 
 void ForceCompensation::setSensor(std::size_t axis, const ModalModel& sensor, double noise_rms) {
-  has_sensor_.at(axis) = true;
-  method_->setSensor(axis, {sensor, noise_rms});
+  sensor_.at(axis) = SensorAxis{sensor, noise_rms};
+  method_->setSensor(axis, *sensor_[axis]);
 }
 
 void ForceCompensation::setMatrix(const SensorMatrix& matrix) {
-  auto coupled = std::make_unique<CoupledCompensation>(parameters_, matrix, outputs_);
+  matrix_ = matrix;
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    sensor_[axis] = SensorAxis{matrix.h[axis][axis], parameters_.filter.noise_rms};
+  makeMethod();
+}
+
+void ForceCompensation::makeMethod() {
+  const CompensationParameters parameters = parameters_.withSpeed(estimates_speed_);
+  std::unique_ptr<CompensationMethod> method;
+  if (matrix_) {
+    method = std::make_unique<CoupledCompensation>(parameters, *matrix_, outputs_);
+  } else {
+    method = makeCompensationMethod(parameters, outputs_);
+  }
   method_->stop();
-  method_ = std::move(coupled);
+  method_ = std::move(method);
   method_->setMemory(memory_);
-  for (std::size_t axis = 0; axis < 3; ++axis) setSensor(axis, matrix.h[axis][axis]);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (sensor_[axis]) method_->setSensor(axis, *sensor_[axis]);
+  }
   if (condition_) method_->beginCondition(*condition_);
 }
 
@@ -49,22 +75,53 @@ void ForceCompensation::setMemory(const MemorySchedule& memory) {
 }
 
 void ForceCompensation::handle(const SpindleAngle& angle) {
-  if (parameters_.track_speed) return;
+  chooser_.handle(angle);
   steady_speed_.add(angle);
-  spindle_ = angle;
+  angle_ = angle;
+}
+
+void ForceCompensation::handle(const CncState& state) {
+  chooser_.handle(state);
 }
 
 void ForceCompensation::handle(const CuttingCondition& condition) {
   method_->beginCondition(condition);
   condition_ = condition;
-  if (parameters_.track_speed) spindle_.speed = condition.spindle_speed;
+  chooser_.handle(condition);
+  if (estimates_speed_) spindle_.speed = 0.0;  // the estimate starts again
+}
+
+bool ForceCompensation::takeSpeed(double stamp) {
+  const ForceModelChoice& choice = chooser_.choose(stamp);
+  const bool estimated = choice.speed == ForceModelChoice::Speed::estimated;
+  const bool unknown = choice.speed == ForceModelChoice::Speed::unknown;
+  // The estimate is limited around its start: where readings or controller have another speed, it starts
+  // again.
+  const double known =
+      choice.reason == ForceModelChoice::Reason::ripple ? chooser_.startSpeed() : chooser_.controllerSpeed();
+  const double limit = parameters_.tracker.max_deviations * parameters_.tracker.speed_std;
+  const bool ends =
+      estimates_speed_ && spindle_.speed > 0.0 && (unknown || std::abs(known / spindle_.speed - 1.0) > limit);
+  if (ends || (!unknown && estimated != estimates_speed_)) {
+    if (!unknown) estimates_speed_ = estimated;
+    spindle_.speed = 0.0;
+    makeMethod();
+  }
+  if (unknown) return false;
+  if (!estimated) {
+    spindle_ = angle_;
+    return spindle_.speed >= parameters_.least_speed && steady_speed_.isSteadyAt(stamp);
+  }
+  if (spindle_.speed == 0.0) spindle_.speed = chooser_.startSpeed();
+  return spindle_.speed >= parameters_.least_speed;
 }
 
 void ForceCompensation::reset() {
   method_->reset();
   steady_speed_.reset();
+  chooser_.reset();
   next_index_.reset();
-  spindle_.speed = 0.0;
+  spindle_.speed = angle_.speed = 0.0;
   condition_.reset();
   health_ = {};
 }
@@ -113,7 +170,8 @@ void ForceCompensation::handle(const SampleBlock& block) {
   next_index_ = block.first_index + block.size();
   updateZero(measured);
   ForceBlock compensated = measured;
-  if (!hasSensor() || spindle_.speed < parameters_.least_speed || !steady_speed_.isSteadyAt(block.stamp)) {
+  health_.speed_std = 0.0;
+  if (!takeSpeed(block.stamp) || !hasSensor() || !isMeasured(measured)) {
     method_->stop();
     health_.speed = 0.0;
     compensated.status = ForceBlock::Status::passed_through;
@@ -128,6 +186,7 @@ void ForceCompensation::handle(const SampleBlock& block) {
   settling_left_ -= static_cast<double>(block.size()) / block.sample_rate;
   method_->process(measured, std::move(compensated), health_);
   spindle_.speed = method_->speed();
+  if (estimates_speed_) ++health_.estimated_blocks;
 }
 
 }  // namespace smartmill::kalman

@@ -59,7 +59,7 @@ bool HarmonicCompensation::prepare(const SpindleAngle& spindle, double sample_ra
              parameters_.retune_tolerance) {
     retune();
   }
-  if (parameters_.track_speed && !speed_tracker_)
+  if (parameters_.track_speed.isAlways() && !speed_tracker_)
     speed_tracker_.emplace(parameters_.tracker, parameters_.filter, spindle.speed, sample_rate);
   return at_rest;
 }
@@ -72,6 +72,7 @@ void HarmonicCompensation::design() {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     filters_.emplace_back(schedule_.gains(axis, sensor_[axis], grid_point_, sample_rate_),
                           sensor_[axis].model, spindle_.speed, sample_rate_);
+    filters_[axis].setWeighting(parameters_.filter.weighted);
     if (!before.empty()) filters_[axis].continueFrom(before[axis]);
   }
   onFiltersChanged(filters_, sample_rate_);

@@ -136,6 +136,10 @@ ForceOutputs SensorForces::blockOutputs() {
           }};
 }
 
+std::string SensorForces::forceModel() const {
+  return inverse_ ? "inverse of the transfer matrix" : compensation_.forceModel();
+}
+
 CompensationHealth SensorForces::health() const {
   CompensationHealth health = compensation_.health();
   if (inverse_) {

@@ -5,6 +5,7 @@
 
 namespace smartmill::kalman {
 double FixedLagSmoother::step(HarmonicFilter& filter, double measured) {
+  filter.setWeighting(false);
   Sample sample;
   sample.level = filter.memory().level();
   sample.is_measured = std::isfinite(measured);

@@ -57,6 +57,7 @@ HarmonicFilter::HarmonicFilter(const ModalModel& sensor, double spindle_speed, d
                                const HarmonicFilterParameters& parameters)
     : HarmonicFilter(designGains(sensor, spindle_speed, sample_rate, parameters), sensor, spindle_speed,
                      sample_rate) {
+  setWeighting(parameters.weighted);
 }
 
 HarmonicFilter::HarmonicFilter(std::vector<HarmonicGain> gains, const ModalModel& sensor,
@@ -64,13 +65,16 @@ HarmonicFilter::HarmonicFilter(std::vector<HarmonicGain> gains, const ModalModel
     : pairs_(sensor, spindle_speed, sample_rate,
              static_cast<int>(gains.at(0).filter.size() - 2 * sensor.modes.size() - 1) / 2),
       design_(std::move(gains)),
+      revolution_(static_cast<std::size_t>(std::ceil(units::TWO_PI / spindle_speed * sample_rate))),
       memory_(design_.size(), units::TWO_PI / spindle_speed * sample_rate) {
   setGains();
 }
 
 void HarmonicFilter::setModel(const ModalModel& sensor, double spindle_speed) {
   pairs_.setModel(sensor, spindle_speed);
-  memory_.setRevolution(units::TWO_PI / spindle_speed * pairs_.sampleRate());
+  const double revolution = units::TWO_PI / spindle_speed * pairs_.sampleRate();
+  memory_.setRevolution(revolution);
+  revolution_ = static_cast<std::size_t>(std::ceil(revolution));
 }
 
 void HarmonicFilter::setState(const std::vector<double>& state) {
@@ -81,17 +85,59 @@ void HarmonicFilter::setState(const std::vector<double>& state) {
 void HarmonicFilter::setGains() {
   smoother_.reset();
   gains_.clear();
-  force_gain_.clear();
   innovation_std_.clear();
   for (const HarmonicGain& design : design_) {
-    std::vector<GainBatch> gain = pairs_.toPairs(design.filter);
-    double force = 0.0;
-    for (std::size_t i = 0; i < 4 * gain.size(); ++i)
-      force += pairs_.batches()[i / 4].g[i % 4] * gain[i / 4].re[i % 4];
-    gains_.push_back(std::move(gain));
-    force_gain_.push_back(force);
+    gains_.push_back(pairs_.toPairs(design.filter));
     innovation_std_.push_back(std::sqrt(design.variance));
   }
+  if (weights_.size() != pairs_.batches().size()) {
+    resetWeights();
+  } else {
+    force_gain_ = forceGains(weights_);
+  }
+}
+
+std::vector<HarmonicFilter::Vector4> HarmonicFilter::unitWeights() const {
+  std::vector<Vector4> weights;
+  for (const HarmonicPairs::PairBatch& batch : pairs_.batches()) weights.push_back(batch.g);
+  return weights;
+}
+
+void HarmonicFilter::resetWeights() {
+  weights_ = unitWeights();
+  weighted_ = false;
+  force_gain_ = forceGains(weights_);
+}
+
+std::vector<double> HarmonicFilter::forceGains(const std::vector<Vector4>& weights) const {
+  std::vector<double> gains;
+  for (const std::vector<GainBatch>& gain : gains_) {
+    double force = 0.0;
+    for (std::size_t i = 0; i < 4 * weights.size(); ++i)
+      force += weights[i / 4][i % 4] * gain[i / 4].re[i % 4];
+    gains.push_back(force);
+  }
+  return gains;
+}
+
+// The stationary covariance p of both parts of a harmonic, noise and wander as designed, follows from its
+// gain K = p H / S, with the variance S of the innovations as measured: in a cut a sensor is noisier than at
+// the taps. The mean square of its error in the force is p, that of the estimate |a|^2 / 2.
+void HarmonicFilter::endRevolution() {
+  const double variance = innovation_sum_ / static_cast<double>(innovation_count_);  // [N2]
+  innovation_sum_ = 0.0;
+  innovation_count_ = 0;
+  if (!weighting_ || !memory_.settled()) return;
+  for (std::size_t n = 1; n <= static_cast<std::size_t>(pairs_.harmonics()); ++n) {
+    const std::size_t i = pairs_.modes() + n;
+    const HarmonicPairs::PairBatch& batch = pairs_.batches()[i / 4];
+    const GainBatch& gain = gains_[memory_.level()][i / 4];
+    const double response = std::hypot(batch.c1[i % 4], batch.c2[i % 4]);
+    const double covariance = std::hypot(gain.re[i % 4], gain.im[i % 4]) * variance / response;
+    weights_[i / 4][i % 4] = std::max(0.0, 1.0 - 2.0 * covariance / std::norm(pairs_.forceHarmonic(n)));
+  }
+  weighted_ = true;
+  force_gain_ = forceGains(weights_);
 }
 
 void HarmonicFilter::retune(const ModalModel& sensor, double spindle_speed) {
@@ -147,12 +193,18 @@ void HarmonicFilter::continueFrom(const HarmonicFilter& other) {
   memory_.setLevel(other.memory_.level());
   state.resize(pairs_.states(), 0.0);
   setState(state);
+  resetWeights();
+  weighted_ = other.weighted_;
+  std::copy_n(other.weights_.begin(), std::min(weights_.size(), other.weights_.size()), weights_.begin());
+  force_gain_ = forceGains(weights_);
 }
 
 void HarmonicFilter::reset() {
   pairs_.reset();
-  predicted_output_ = innovation_ = 0.0;
+  predicted_output_ = innovation_ = innovation_sum_ = 0.0;
+  innovation_count_ = 0;
   memory_.reset();
+  resetWeights();
 }
 
 // Without fused multiply-adds all clones give the same numbers.
@@ -161,8 +213,10 @@ AVX2_AND_DEFAULT double HarmonicFilter::advance(const GainBatch* gain, double in
   const Vector4 nu = {innovation, innovation, innovation, innovation};
   Vector4 force = {}, expected = {};
   HarmonicPairs::PairBatch* batch = pairs_.batches().data();
-  for (const HarmonicPairs::PairBatch* end = batch + pairs_.batches().size(); batch != end; ++batch, ++gain) {
-    force += batch->g * batch->re;
+  const Vector4* weight = weights_.data();
+  for (const HarmonicPairs::PairBatch* end = batch + pairs_.batches().size(); batch != end;
+       ++batch, ++gain, ++weight) {
+    force += *weight * batch->re;
     const Vector4 re = batch->re + gain->re * nu, im = batch->im + gain->im * nu;
     const Vector4 next_re = batch->a * re - batch->b * im, next_im = batch->b * re + batch->a * im;
     expected += batch->c1 * next_re + batch->c2 * next_im;
@@ -174,6 +228,7 @@ AVX2_AND_DEFAULT double HarmonicFilter::advance(const GainBatch* gain, double in
 }
 
 std::vector<double> HarmonicFilter::smooth(const std::vector<double>& measured) {
+  resetWeights();
   const std::size_t slow = gains_.size() - 1;
   std::vector<double> force, innovation;
   force.reserve(measured.size());
@@ -194,7 +249,7 @@ std::shared_ptr<const HarmonicSmoother> HarmonicFilter::smoother() const {
     auto made = std::make_shared<HarmonicSmoother>();
     made->batches = pairs_.batches();
     made->gains = gains_;
-    made->force_gain = force_gain_;
+    made->force_gain = forceGains(unitWeights());
     for (const HarmonicGain& design : design_) {
       made->smoothing.push_back(pairs_.toPairs(design.smoothing));
       made->variance.push_back(design.variance);

@@ -46,14 +46,18 @@ KalmanNode::KalmanNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
       wrench_(nh.advertise<geometry_msgs::WrenchStamped>(names::FORCE_WRENCH, STREAM_QUEUE)),
       sensor_state_(nh.advertise<smartmill_msgs::ForceSensorState>(names::FORCE_SENSOR, 10, true)),
       strike_(nh, parameters_.kind() == ForceSensorKind::spindle ? "tool" : POINT_FORCE_SENSOR),
-      pipeline_(parameters_.compensation, parameters_.taps, sensorOf(parameters_), parameters_.hold_back,
-                pipelineOutputs()),
+      pipeline_(parameters_.compensationOfSensor(), parameters_.taps, sensorOf(parameters_),
+                parameters_.hold_back, pipelineOutputs()),
       measurement_server_(nh, names::MEASURE_SENSOR_FRF, "kalman", measurementHandlers()),
       calibration_server_(nh, pipeline_, parameters_.command_machine) {
   loadSensorFiles(pipeline_, parameters_);
   if (pipeline_.forces().isUncalibrated())
     ROS_WARN("%s", pipeline_.identification().calibration().message.c_str());
   publishSensor();
+  for (const MeasuredModes& modes : measurement_server_.modes()) {
+    ROS_INFO("modes in %s from before the restart", modes.direction.c_str());
+    pipeline_.push(modes);
+  }
   subscribe();
   shell_.diagnose("force compensation", [this](auto& status) { diagnose(status); });
   shell_.every(CHECK_PERIOD, [this] { checkInputs(); });
@@ -107,12 +111,11 @@ FrfServer::Handlers KalmanNode::measurementHandlers() {
 
 void KalmanNode::subscribe() {
   Inputs& inputs = shell_.inputs();
-  inputs.on<smartmill_msgs::SampleBlock>(force_input_, [this](const smartmill_msgs::SampleBlock& message,
-                                                              double) {
-    const std::string frame = message.header.frame_id.empty() ? frames::DYNAMOMETER : message.header.frame_id;
+  inputs.on<FramedBlock>(force_input_, [this](const FramedBlock& framed, double) {
+    const std::string frame = framed.frame.empty() ? frames::DYNAMOMETER : framed.frame;
     if (frame != sensor_frame_) rotation_known_ = false;
     sensor_frame_ = frame;
-    pipeline_.push(fromMsg(message));
+    pipeline_.push(framed.block);
   });
   // One input block becomes two output blocks.
   inputs.setWaiting(force_input_, [this] { return (waiting_.size() + 1) / 2; });
@@ -141,6 +144,8 @@ void KalmanNode::enqueue(ros::Publisher& publisher, const ForceBlock& block) {
   if (waiting_.size() > MAX_WAITING) {
     waiting_.pop_front();
     ++dropped_blocks_;
+    ROS_ERROR_THROTTLE(5.0, "%s: %zu force blocks dropped: no transform from %s to %s", force_input_.c_str(),
+                       dropped_blocks_, sensor_frame_.c_str(), frames::MACHINE);
   }
   publishWaiting();
 }
@@ -189,9 +194,22 @@ void KalmanNode::publishSensor() {
 
 void KalmanNode::checkInputs() {
   checkMeasurement();
+  checkAngles();
   publishWaiting();
   // End of data: no later input releases the blocks that wait.
   if (shell_.inputs().watchdog(force_input_).ended()) pipeline_.flush();
+}
+
+// Blocks wait for angles until these have been silent while blocks came.
+void KalmanNode::checkAngles() {
+  const Watchdog& blocks = shell_.inputs().watchdog(force_input_);
+  const double silent = shell_.inputs().watchdog(names::SPINDLE_ANGLE).silent();
+  if (!blocks.ever() || blocks.dead()) {
+    blocks_from_ = silent;
+  } else if (silent < blocks_from_) {
+    blocks_from_ = 0.0;
+  }
+  if (silent - blocks_from_ > parameters_.input_timeout) pipeline_.anglesStopped();
 }
 
 void KalmanNode::checkMeasurement() {
@@ -259,7 +277,10 @@ void KalmanNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   const SpindleSensorHealth* spindle = pipeline_.forces().spindle().health();
   const auto [level, text] = summary(spindle);
   status.summary(static_cast<unsigned char>(level), text);
+  status.add("force model", pipeline_.forces().forceModel());
   status.add("spindle speed of the filters [rad/s]", health.speed);
+  status.add("standard deviation of the estimated speed [rad/s]", health.speed_std);
+  status.add("blocks with an estimated speed", health.estimated_blocks);
   status.add("innovation ratio [1]", health.innovation_ratio);
   status.add("correlation of the innovations [1]", health.innovation_correlation);
   status.addf("zero of the sensor [N]", "%.2f %.2f %.2f", health.zero[0], health.zero[1], health.zero[2]);

@@ -37,6 +37,7 @@ class KalmanNode {
   bool lookUpRotation();
   void publishSensor();
   void checkInputs();
+  void checkAngles();
   void checkMeasurement();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
   std::pair<int, std::string> summary(const SpindleSensorHealth* spindle);
@@ -56,6 +57,7 @@ class KalmanNode {
   std::size_t reported_invalid_ = 0;  // samples
   std::size_t reported_failures_ = 0, reported_drops_ = 0;
   double next_wrench_ = 0.0;  // [s]
+  double blocks_from_ = 0.0;  // [s] silence of spindle/angle when blocks began to come
 
   ros::Publisher measured_, compensated_, wrench_, sensor_state_;
   StrikeClient strike_;

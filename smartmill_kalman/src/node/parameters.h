@@ -18,6 +18,7 @@ struct NodeParameters {
   std::string sensor_matrix, spindle_sensor, plate_taps, memory_over_speed;
   double spindle_sensor_length = 0.139;
   CompensationParameters compensation;
+  AutoSetting harmonic_weights;
   double hold_back = 0.05;
   double wrench_rate = 100.0;
   double drift_limit = 0.0;
@@ -54,6 +55,10 @@ struct NodeParameters {
         "smartmill-memory/1 file (kalman/calibrate, step FIT after cuts): process noise of the filters "
         "over the spindle speed; a spindle_sensor file has its own");
     compensation.declare(table);
+    table.choice(
+        "harmonic_weights", harmonic_weights.word, {"auto", "always", "never"},
+        "each harmonic enters the force of a steady cut by its signal-to-noise ratio (Wiener); auto: with "
+        "the sensor in the spindle, whose noise is not small compared with the force");
     table.number("hold_back", hold_back, "s", Range::notNegative(),
                  "time after its stamp that an event may arrive and still be in order");
     table.number("wrench_rate", wrench_rate, "Hz", Range::positive(), "rate of force/wrench");
@@ -71,6 +76,13 @@ struct NodeParameters {
   ForceSensorKind kind() const {
     if (force_input == names::SPINDLE_FORCE) return ForceSensorKind::spindle;
     return plate_taps.empty() ? forceSensorKind(sensor) : ForceSensorKind::plate;
+  }
+  /// Those of the sensor in use.
+  CompensationParameters compensationOfSensor() const {
+    CompensationParameters own = compensation;
+    own.filter.weighted =
+        harmonic_weights.isAlways() || (harmonic_weights.isAuto() && kind() == ForceSensorKind::spindle);
+    return own;
   }
   /// Topic of the force sensor.
   std::string input() const {

@@ -9,12 +9,13 @@
 
 namespace smartmill::kalman {
 
-/// Connects hammer and tachometer, from the inputs of a node or from a recording.
+/// Connects hammer, tachometer and controller, from the inputs of a node or from a recording.
 template <class Source>
 void connect(Source& source, CompensationPipeline& pipeline) {
   source.template on<SampleBlock>(
       names::HAMMER, [&pipeline](const SampleBlock& block, double) { pipeline.pushHammer(block); });
   feed<SpindleAngle>(source, names::SPINDLE_ANGLE, pipeline);
+  feed<CncState>(source, names::CNC_STATE, pipeline);
 }
 
 /// Reads the sensor files that the parameters name. @throws Error on an invalid file.

@@ -23,14 +23,16 @@ class CutSplitter {
   void addCondition(const CuttingCondition& condition) { conditions_[condition.stamp] = condition; }
 
   void addMeasured(const ForceBlock& block) { measured_ = block; }
-  /// Compensated block of the same samples. @param speed [rad/s] of the filters; 0: unknown
-  void addCompensated(const ForceBlock& block, double speed) {
+  /// Compensated block of the same samples.
+  void addCompensated(const ForceBlock& block, const SensorForces& forces) {
+    const double speed = forces.health().speed;
     for (std::size_t i = 0; i < block.force[0].size(); ++i) {
       const double time = block.stamp + static_cast<double>(i) / block.sample_rate;
       startCutAt(time);
       if (!cut_) continue;
       cut_->sample_rate = block.sample_rate;
       if (speed > 0.0) cut_->speed = speed;
+      if (i == 0 && !forces.hasDefaultForceModel()) cut_->force_model = forces.forceModel();
       cut_->offset.push_back(time - cut_->stamp);
       if (block.status != ForceBlock::Status::compensated) cut_->settling += 1.0 / block.sample_rate;
       for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -124,16 +126,16 @@ BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, con
   std::optional<CompensationPipeline> pipeline;
   CutSplitter splitter([&](BagCut&& cut) {
     ++summary.cuts;
-    compensateWholeCut(cut, method, *pipeline, parameters.compensation.filter);
+    compensateWholeCut(cut, method, *pipeline, parameters.compensationOfSensor().filter);
     transformer.add(std::move(cut));
   });
   CompensationPipeline::Outputs outputs;
   outputs.force.measured = [&](const ForceBlock& block) { splitter.addMeasured(block); };
   outputs.force.compensated = [&](const ForceBlock& block) {
-    splitter.addCompensated(block, pipeline->forces().health().speed);
+    splitter.addCompensated(block, pipeline->forces());
   };
   outputs.result = [&](const SensorResult& result) { summary.identified.push_back(result); };
-  pipeline.emplace(parameters.compensation, parameters.taps, sensor, parameters.hold_back,
+  pipeline.emplace(parameters.compensationOfSensor(), parameters.taps, sensor, parameters.hold_back,
                    std::move(outputs));
   loadSensorFiles(*pipeline, parameters);
   std::size_t blocks = 0;

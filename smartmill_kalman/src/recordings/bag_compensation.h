@@ -14,12 +14,13 @@ namespace smartmill::kalman {
 
 /// Force on the tool in one cut of a bag, machine frame.
 struct BagCut {
-  std::string name;                                          ///< of the cutting condition
-  double stamp = 0.0;                                        ///< [s] of the cutting condition
-  double sample_rate = 0.0;                                  ///< [Hz]
-  double speed = 0.0;                                        ///< [rad/s] of the spindle, last
-  double settling = 0.0;                                     ///< [s] marked as settling or passed through
-  std::vector<double> offset;                                ///< [s] of each sample since stamp
+  std::string name;            ///< of the cutting condition
+  double stamp = 0.0;          ///< [s] of the cutting condition
+  double sample_rate = 0.0;    ///< [Hz]
+  double speed = 0.0;          ///< [rad/s] of the spindle, last
+  std::string force_model;     ///< last one, where it is not the default; empty: the default
+  double settling = 0.0;       ///< [s] marked as settling or passed through
+  std::vector<double> offset;  ///< [s] of each sample since stamp
   std::array<std::vector<double>, 3> measured, compensated;  ///< [N]
 };
 

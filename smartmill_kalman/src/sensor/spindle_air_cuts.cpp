@@ -76,6 +76,13 @@ void SpindleAirCuts::reset() {
   }
 }
 
+void SpindleAirCuts::keepUnbalance(const SpindleAirCuts& before) {
+  weight_ = before.weight_;
+  weighted_ = before.weighted_;
+  unbalance_ = before.unbalance_;
+  unbalance_std_ = before.unbalance_std_;
+}
+
 void SpindleAirCuts::handle(const SpindleAngle& angle) {
   angle_ = angle;
   angle_known_ = true;

@@ -37,6 +37,11 @@ void SpindleForceSensor::reset() {
   copyAirCuts();
 }
 
+void SpindleForceSensor::keepUnbalance(const SpindleForceSensor& before) {
+  air_cuts_.keepUnbalance(before.air_cuts_);
+  copyAirCuts();
+}
+
 void SpindleForceSensor::copyAirCuts() {
   health_.air_segments = air_cuts_.segments();
   health_.unbalance = air_cuts_.unbalance();

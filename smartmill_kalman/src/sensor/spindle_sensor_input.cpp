@@ -1,5 +1,7 @@
 #include "smartmill_kalman/sensor/spindle_sensor_input.h"
 
+#include <utility>
+
 #include "smartmill_core/error.h"
 
 namespace smartmill::kalman {
@@ -11,8 +13,10 @@ void SpindleSensorInput::use(const SpindleSensorCalibration& calibration, double
 
 void SpindleSensorInput::recalibrate(const SpindleSensorCalibration& calibration) {
   if (!(length_ > 0.0)) return;
-  sensor_.emplace(calibration, length_);
-  if (condition_) sensor_->handle(*condition_);
+  SpindleForceSensor recalibrated(calibration, length_);
+  if (sensor_) recalibrated.keepUnbalance(*sensor_);
+  if (condition_) recalibrated.handle(*condition_);
+  sensor_ = std::move(recalibrated);
 }
 
 void SpindleSensorInput::check(const SampleBlock& block) const {

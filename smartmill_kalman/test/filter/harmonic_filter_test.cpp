@@ -267,6 +267,61 @@ TEST(HarmonicFilter, coastsThroughAGap) {
   EXPECT_LT(worst, 1e-6);
 }
 
+// Noise alone: the amplitude of a harmonic is complex normal, u = |a|^2 over its mean is exponential, and a
+// weight max(0, 1 - c/u) leaves the share E[(1 - c/u)^2 u; u > c] = (1 - c) exp(-c) + c^2 E1(c) of its power.
+// The covariance of the design is at least that of the noise (c = 1: E1(1) = 0.2194), and twice as much where
+// an exponential average forgets slowly (c = 2: 0.0603; E1 by Abramowitz and Stegun table 5.1).
+TEST(HarmonicFilter, weightsLeaveTheShareOfNoiseThatTheoryGives) {
+  constexpr double NOISE = 2.0;  // [N]
+  ModalModel model;
+  model.modes.push_back({800.0, 0.03, 0.9});
+  model.direct = 0.1;
+  HarmonicFilterParameters parameters;
+  double weighted = 0.0, all = 0.0;
+  for (unsigned seed = 0; seed < 40; ++seed) {
+    HarmonicFilter filter(model, units::TWO_PI * 150.0, RATE, parameters), plain = filter;
+    filter.setWeighting(true);
+    std::mt19937 random(seed);
+    std::normal_distribution<double> noise(0.0, NOISE);  // not that of the design, 1 N
+    for (int i = 0; i < 40000; ++i) {
+      const double measured = noise(random), force = filter.step(measured), without = plain.step(measured);
+      if (i < 15000 || !filter.memory().settled()) continue;
+      weighted += force * force;
+      all += without * without;
+    }
+  }
+  EXPECT_LT(weighted / all, 0.2194);
+  EXPECT_GT(weighted / all, 0.0603);
+}
+
+// A harmonic of ten times its standard deviation or more is not changed by more than its noise.
+TEST(HarmonicFilter, weightsKeepWhatIsNoNoise) {
+  ModalModel model;
+  model.modes.push_back({800.0, 0.03, 0.9});
+  model.direct = 0.1;
+  const double speed = units::TWO_PI * 150.0;
+  HarmonicFilter filter(model, speed, RATE, {}), plain = filter;
+  filter.setWeighting(true);
+  const auto force = [&](int i) {
+    const double angle = speed * i / RATE;
+    return 60.0 + 50.0 * std::cos(4.0 * angle) + 20.0 * std::cos(20.0 * angle + 1.0);
+  };
+  ModalFilter plant(model, RATE, Hold::first_order);
+  std::mt19937 random(7);
+  std::normal_distribution<double> noise(0.0, 1.0);
+  double weighted = 0.0, unweighted = 0.0;
+  for (int i = 0; i < 60000; ++i) {
+    const double measured = plant.step(force(i)) + noise(random), one = filter.step(measured),
+                 other = plain.step(measured);
+    if (i < 20000) continue;
+    weighted += std::pow(one - force(i), 2);
+    unweighted += std::pow(other - force(i), 2);
+  }
+  EXPECT_GT(filter.weight(4), 0.99);
+  EXPECT_GT(filter.weight(20), 0.9);
+  EXPECT_LT(weighted, 0.6 * unweighted);
+}
+
 TEST(HarmonicFilter, refusesImpossibleParameters) {
   HarmonicFilterParameters parameters;
   parameters.noise_rms = -1.0;

@@ -102,7 +102,14 @@ Cut cutWithNoise(double noise, double unmodelled) {
   return cut;
 }
 
-double trueError(const Cut& cut, std::optional<double> memory) {
+/// RMS over the three axes, whose noise is drawn independently.
+double rmsOf(const std::array<double, 3>& errors) {
+  double squares = 0.0;
+  for (const double error : errors) squares += error * error / 3.0;
+  return std::sqrt(squares);
+}
+
+double trueError(const Cut& cut, std::size_t axis, std::optional<double> memory) {
   HarmonicFilterParameters parameters;
   if (memory) {
     parameters.uniform_noise = true;
@@ -111,23 +118,28 @@ double trueError(const Cut& cut, std::optional<double> memory) {
   HarmonicFilter filter(cut.sensor[0].model, cut.record.speed, RATE, parameters);
   double squares = 0.0;
   for (std::size_t i = 0; i < cut.truth.size(); ++i)
-    squares += std::pow(filter.step(cut.record.cut[0][i]) - cut.truth[i], 2);
+    squares += std::pow(filter.step(cut.record.cut[axis][i]) - cut.truth[i], 2);
   return std::sqrt(squares / static_cast<double>(cut.truth.size()));
 }
 
 // The truth is not given to the tuner: its choice and its expected error are compared with it.
 TEST(MemoryTuner, FindsTheLeastErrorAndStatesIt) {
   const Cut cut = cutWithNoise(5.0, 0.0);
-  const TunedMemory tuned = tuneMemory(cut.record, cut.sensor, {})[0];
-  ASSERT_TRUE(tuned.memory);
-  const double fixed = trueError(cut, std::nullopt), is = trueError(cut, tuned.memory);
-  EXPECT_LT(is, 0.9 * fixed);
-  double best = fixed;
-  for (const double memory : TuningOptions().memories) best = std::min(best, trueError(cut, memory));
-  EXPECT_LT(is, 1.15 * best);  // the neighbours of the optimum are as close
-  // The noise in the smoothed force counts as force: up to a third more.
-  EXPECT_GT(tuned.error / is, 0.7);
-  EXPECT_LT(tuned.error / is, 1.4);
+  const std::array<TunedMemory, 3> tuned = tuneMemory(cut.record, cut.sensor, {});
+  std::array<double, 3> expected{}, actual{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    ASSERT_TRUE(tuned[axis].memory);
+    const double fixed = trueError(cut, axis, std::nullopt), is = trueError(cut, axis, tuned[axis].memory);
+    EXPECT_LT(is, 0.9 * fixed);
+    double best = fixed;
+    for (const double memory : TuningOptions().memories) best = std::min(best, trueError(cut, axis, memory));
+    EXPECT_LT(is, 1.15 * best);  // the neighbours of the optimum are as close
+    expected[axis] = tuned[axis].error;
+    actual[axis] = is;
+  }
+  // The noise of the smoothed force counts as force at tool entry: up to a third more.
+  EXPECT_GT(rmsOf(expected) / rmsOf(actual), 0.7);
+  EXPECT_LT(rmsOf(expected) / rmsOf(actual), 1.4);
 }
 
 // A strong line between two harmonics, as chatter: no harmonic explains it, and no error can be predicted.
@@ -142,23 +154,26 @@ TEST(MemoryTuner, RefusesARecordWithoutAir) {
   EXPECT_THROW(tuneMemory(cut.record, cut.sensor, {}), Error);
 }
 
+/// Blocks of 10 ms, 256 samples: the spindle runs up in the first five and stops in the last five; the tool
+/// enters after 20 blocks at speed. @param gap block after which samples are missing; -1: none
 void feed(TuningRecords& records, CuttingCondition::Kind kind, double speed, int blocks, std::uint64_t& index,
-          bool gap = false) {
+          int gap = -1) {
   CuttingCondition condition;
   condition.kind = kind;
   records.handle(condition);
-  for (int b = 0; b < blocks; ++b) {
+  for (int b = -5; b < blocks + 5; ++b) {
     SpindleAngle angle;
-    angle.speed = speed;
+    angle.speed = b < 0 ? speed * (b + 6) / 6.0 : b < blocks ? speed : speed * (blocks + 5 - b) / 6.0;
     records.handle(angle);
     SampleBlock block;
     block.sample_rate = RATE;
     block.first_index = index;
     block.channels = {"fx", "fy", "fz"};
     block.units.assign(3, "N");
-    block.samples.assign(std::size_t{3 * 256}, 1.0);
+    const double size = kind == CuttingCondition::Kind::cut && b >= 20 ? 50.0 : 1.0;
+    for (int i = 0; i < 3 * 256; ++i) block.samples.push_back(i / 3 % 2 == 0 ? size : -size);
     records.handle(block);
-    index += 256 + (gap && b == 3 ? 10 : 0);
+    index += 256 + (b == gap ? 10 : 0);
   }
 }
 
@@ -167,20 +182,25 @@ TEST(TuningRecords, PairsAirWithTheCutAtTheSameSpeed) {
   TuningRecords records;
   std::uint64_t index = 0;
   feed(records, Kind::air, 300.0, 50, index);
-  feed(records, Kind::cut, 300.0, 150, index);
+  feed(records, Kind::none, 300.0, 1, index);  // between two programs
+  feed(records, Kind::cut, 300.0, 300, index);
   feed(records, Kind::air, 200.0, 50, index);
   feed(records, Kind::cut, 200.0, 50, index);
   feed(records, Kind::air, 400.0, 50, index);
   feed(records, Kind::cut, 500.0, 50, index);  // no air at this speed
   feed(records, Kind::air, 600.0, 50, index);
-  feed(records, Kind::cut, 600.0, 50, index, true);  // lost samples
+  feed(records, Kind::cut, 600.0, 50, index, 22);  // the entry is not in one record
+  feed(records, Kind::air, 700.0, 50, index);
+  feed(records, Kind::cut, 700.0, 60, index, 55);  // samples are missing after the record is long enough
   feed(records, Kind::none, 0.0, 1, index);
   const std::vector<TuningRecord> found = records.records();
-  ASSERT_EQ(found.size(), 2u);
+  ASSERT_EQ(found.size(), 3u);
   EXPECT_EQ(found[0].speed, 200.0);
   EXPECT_EQ(found[0].cut[0].size(), 50u * 256u);
-  EXPECT_EQ(found[1].cut[2].size(), 25600u);  // a second
+  EXPECT_EQ(found[1].speed, 300.0);
+  EXPECT_EQ(found[1].cut[2].size(), 51200u);  // two seconds
   EXPECT_EQ(found[1].air[2].size(), 50u * 256u);
+  EXPECT_EQ(found[2].cut[0].size(), 56u * 256u);
 }
 
 }  // namespace

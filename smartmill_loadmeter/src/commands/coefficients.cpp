@@ -1,5 +1,3 @@
-#include <unistd.h>
-
 #include <cstdio>
 #include <filesystem>
 #include <string>
@@ -11,6 +9,7 @@
 #include "smartmill_core/parameters/parameter_options.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/commands.h"
+#include "smartmill_recording/reading_progress.h"
 #include "smartmill_recording/recording_file.h"
 
 namespace smartmill::loadmeter {
@@ -46,12 +45,6 @@ void fromForce(const CoefficientOptions& o, const Campaign& campaign, const Mach
   }
 }
 
-/// Progress on a terminal.
-void showProgress(double share) {
-  static const bool terminal = isatty(STDERR_FILENO);
-  if (terminal) std::fprintf(stderr, "\rreading %3.0f %%%s", 100.0 * share, share >= 1.0 ? "\n" : "");
-}
-
 void fromBag(const CoefficientOptions& o) {
   if (o.source == "force") throw Error(o.source_path + ": --source force requires a campaign, not a bag");
   const NodeParameters& parameters = o.parameters;
@@ -60,7 +53,7 @@ void fromBag(const CoefficientOptions& o) {
   if (model_file.empty()) throw Error(o.source_path + ": a bag requires the machine's model (--model)");
   std::vector<CoefficientRecord> cuts;
   BagListeners listeners;
-  listeners.progress = showProgress;
+  listeners.progress = printReadingProgress;
   listeners.cut = [&](const CoefficientRecord& cut) { cuts.push_back(cut); };
   if (o.forces) {
     listeners.force = [](const ForceEstimate& f) {
@@ -133,7 +126,7 @@ void fromServoRecord(const CoefficientOptions& o) {
   const Spindle& spindle = model.needSpindle("read the load meter");
   if (!spindle.load_meter_full_scale)
     throw Error(o.model + ": spindle.load_meter_full_scale_v is missing (required for the load meter)");
-  const std::vector<TestRecord> records = servoLoadFromBag(o.source_path, showProgress)
+  const std::vector<TestRecord> records = servoLoadFromBag(o.source_path, printReadingProgress)
                                               .records(tests, *spindle.load_meter_full_scale, o.source_path);
   Campaign campaign;
   for (const TestRecord& record : records) campaign.tests.push_back(record.test);

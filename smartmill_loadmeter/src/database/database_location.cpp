@@ -1,7 +1,6 @@
 #include "smartmill_loadmeter/database/database_location.h"
 
 #include <algorithm>
-#include <cstdlib>
 #include <filesystem>
 
 #include "smartmill_core/error.h"
@@ -11,19 +10,6 @@ namespace smartmill::loadmeter {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string variable(const char* name) {
-  const char* value = std::getenv(name);
-  return value ? value : "";
-}
-
-fs::path folderOf(const DataFolders& folders) {
-  const fs::path state = folders.state.substr(0, folders.state.find(':'));
-  if (state.is_absolute()) return state;
-  if (fs::path(folders.data).is_absolute()) return fs::path(folders.data) / "smartmill";
-  if (fs::path(folders.home).is_absolute()) return fs::path(folders.home) / ".local" / "share" / "smartmill";
-  throw Error("no data folder: expected an absolute path in XDG_DATA_HOME or HOME");
-}
 
 std::unique_ptr<CoefficientDatabase> openChecked(const std::string& file) {
   auto database = std::make_unique<CoefficientDatabase>(file);
@@ -37,15 +23,11 @@ bool isWithoutFile(const std::string& database) {
   return database.empty() || database == DATABASE_NONE;
 }
 
-DataFolders DataFolders::ofEnvironment() {
-  return {variable("STATE_DIRECTORY"), variable("XDG_DATA_HOME"), variable("HOME")};
-}
-
 std::string databaseFile(const DataFolders& folders, const std::string& machine, const std::string& model) {
   std::string name = machine.empty() ? fs::path(model).stem().string() : machine;
   std::replace(name.begin(), name.end(), '/', '_');
   if (name.empty() || name[0] == '.') name = "machine" + name;
-  return (folderOf(folders) / (name + ".sqlite")).string();
+  return dataFile(folders, name + ".sqlite");
 }
 
 OpenedDatabase openDatabase(const std::string& database, const std::string& machine, const std::string& model,

@@ -14,6 +14,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/io/csv.h"
+#include "smartmill_core/signal/inspection_feature.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::loadmeter {
@@ -234,10 +235,7 @@ FoundCause causeOf(const Json& effect) {
 }  // namespace
 
 double InspectionRecord::deviation() const {
-  constexpr double REFERENCE = 293.15;  // [K] of dimensions, ISO 1
-  const bool is_corrected = std::isfinite(part_temperature) && std::isfinite(part_expansion);
-  return (is_corrected ? measured / (1.0 + part_expansion * (part_temperature - REFERENCE)) : measured) -
-         nominal;
+  return dimensionAtReference(measured, part_temperature, part_expansion) - nominal;
 }
 
 std::string FoundCause::text() const {

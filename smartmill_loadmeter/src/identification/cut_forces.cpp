@@ -37,6 +37,11 @@ void CutForces::addMotors(const MotorRecord& record, const std::array<double, 3>
   const auto& calibration = motors_ ? motors_ : self_calibration_->calibration();
   if (!calibration) return;  // too few cuts so far
   test->force = forceFromMotors(*test->motor, air, *calibration, motor_parameters_);
+  if (calibration->hasAnfis()) {
+    const MotorParameters other = motor_parameters_.withOtherMethod();
+    test->force->by_other_method =
+        "by " + other.method + " " + forceFromMotors(*test->motor, air, *calibration, other).text();
+  }
   test->force->stamp = test->stamp;
   test->force->name = test->condition.name;
 }

@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/signal/window.h"
 #include "smartmill_core/units.h"
 
@@ -91,6 +92,15 @@ Eigen::Matrix4d scoreCovariance(const Eigen::MatrixX4d& scores, const std::vecto
 }
 
 }  // namespace
+
+std::string AxisDrive::text() const {
+  return formatted(
+      "inertia %.4f +- %.4f A s2/m, Coulomb %.4f +- %.4f A, viscous %.4f +- %.4f A s/m, offset %.4f +- %.4f "
+      "A; "
+      "residual %.4f A RMS",
+      inertia.value, inertia.std_dev, coulomb.value, coulomb.std_dev, viscous.value, viscous.std_dev,
+      offset.value, offset.std_dev, residual);
+}
 
 AxisMotion axisMotion(const Record& record, double sample_rate, char axis) {
   AxisMotion motion;

@@ -126,6 +126,72 @@ std::optional<Anfis> CalibrationSamples::learn() const {
   return Anfis(inputs, outputs, {});
 }
 
+namespace {
+
+/// @param predict output of the regression of all samples but one, at that one
+template <class Predict>
+std::optional<MethodErrors> leaveOneOut(const CalibrationSamples& samples, Predict predict) {
+  if (samples.inputs.size() <= samples.required()) return std::nullopt;
+  MethodErrors errors;
+  for (std::size_t i = 0; i < samples.inputs.size(); ++i) {
+    CalibrationSamples others = samples;
+    others.inputs.erase(others.inputs.begin() + static_cast<std::ptrdiff_t>(i));
+    others.outputs.erase(others.outputs.begin() + static_cast<std::ptrdiff_t>(i));
+    const std::vector<double>& input = samples.inputs[i];
+    bool inside = true;
+    for (std::size_t k = 0; k < input.size(); ++k) {
+      const std::vector<double> values = column(others, k);
+      const auto [low, high] = std::minmax_element(values.begin(), values.end());
+      inside = inside && input[k] >= *low && input[k] <= *high;
+    }
+    if (!inside) continue;
+    errors.regression += std::pow(predict(others, input) - samples.outputs[i], 2);
+    errors.anfis += std::pow((*others.learn())(input)-samples.outputs[i], 2);
+    ++errors.cuts;
+  }
+  if (errors.cuts == 0) return std::nullopt;
+  const auto count = static_cast<double>(errors.cuts);
+  errors.regression = std::sqrt(errors.regression / count);
+  errors.anfis = std::sqrt(errors.anfis / count);
+  return errors;
+}
+
+}  // namespace
+
+std::optional<MethodErrors> driveErrors(const CalibrationSamples& samples) {
+  return leaveOneOut(samples, [](const CalibrationSamples& others, const std::vector<double>& input) {
+    double rr = 0.0, rf = 0.0;
+    for (std::size_t i = 0; i < others.outputs.size(); ++i) {
+      rr += std::pow(others.inputs[i][0], 2);
+      rf += others.inputs[i][0] * others.outputs[i];
+    }
+    return rf / rr * input[0];
+  });
+}
+
+std::optional<MethodErrors> spindleErrors(const CalibrationSamples& samples) {
+  return leaveOneOut(samples, [](const CalibrationSamples& others, const std::vector<double>& input) {
+    std::vector<SpindleCut> cuts;
+    double fastest = 0.0;
+    for (std::size_t i = 0; i < others.outputs.size(); ++i) {
+      cuts.push_back({others.inputs[i][1], others.inputs[i][0], others.outputs[i]});
+      fastest = std::max(fastest, others.inputs[i][1]);
+    }
+    return TorquePowerLaw(cuts, fastest).torque(input[1], input[0]);
+  });
+}
+
+std::string textOf(const MethodErrors& errors, const char* unit) {
+  return formatted(
+      "error of a cut predicted from the others %.3g %s by regression, %.3g %s by ANFIS (%zu cuts)",
+      errors.regression, unit, errors.anfis, unit, errors.cuts);
+}
+
+bool MotorCalibration::hasAnfis() const {
+  return spindle_anfis ||
+         std::any_of(drive.begin(), drive.end(), [](const auto& d) { return d && d->anfis; });
+}
+
 Estimate DriveCalibration::opposing(double current, double air) const {
   const double rise = current - air;
   return {newton_per_ampere.value * rise, std::hypot(newton_per_ampere.std_dev * rise, scatter)};

@@ -166,6 +166,7 @@ std::string SelfCalibration::text(const std::array<std::optional<Estimate>, 3>& 
       const DriveCalibration& d = *calibration_->drive[a];
       add(formatted("%.1f +- %.1f N/A from %d cuts", d.newton_per_ampere.value, d.newton_per_ampere.std_dev,
                     d.cuts));
+      if (const auto errors = driveErrors(d.samples)) add(textOf(*errors, "N"));
     }
     if (friction_[a]) {
       const FittedFriction& f = *friction_[a];
@@ -176,9 +177,12 @@ std::string SelfCalibration::text(const std::array<std::optional<Estimate>, 3>& 
     if (bandwidth[a]) add(formatted("bandwidth %.1f +- %.1f Hz", bandwidth[a]->value, bandwidth[a]->std_dev));
     if (!one.empty()) all += std::string(all.empty() ? "" : "; ") + "XYZ"[a] + " " + one;
   }
-  if (calibration_ && calibration_->spindle)
+  if (calibration_ && calibration_->spindle) {
     all += std::string(all.empty() ? "" : "; ") +
            formatted("spindle torque +- %.3f N m", calibration_->spindle->scatter());
+    if (const auto errors = spindleErrors(calibration_->spindle_samples))
+      all += ", " + textOf(*errors, "N m");
+  }
   return all;
 }
 

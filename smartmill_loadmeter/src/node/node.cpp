@@ -43,7 +43,8 @@ LoadMeterNode::LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
       database_(*opened_.database),
       server_(
           nh, names::IDENTIFY_COEFFICIENTS, [this](Server::GoalHandle handle) { goal(handle); },
-          [this](Server::GoalHandle handle) { cancel(handle); }, false) {
+          [this](Server::GoalHandle handle) { cancel(handle); }, false),
+      axis_drives_(nh, parameters_.input_timeout) {
   reportDatabase(private_nh);
   IdentificationOutputs& outputs = identification_.identification().outputs();
   outputs.result = [this](const IdentifyResult& result) { finish(result); };
@@ -53,7 +54,8 @@ LoadMeterNode::LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
     feedback();
   };
   if (parameters_.keep_cuts) outputs.cut = [this](const CoefficientRecord& cut) { store(cut); };
-  publisher_ = nh.advertise<smartmill_msgs::CuttingCoefficients>(names::COEFFICIENTS, 1, true);
+  coefficients_ =
+      std::make_unique<LatchedTopic<smartmill_msgs::CuttingCoefficients>>(nh, names::COEFFICIENTS);
   useMotors(parameters_, identification_.identification().forces());
   if (parameters_.usesMotors()) {
     outputs.motor_force = [this](const MotorForce& force) { publish(force); };
@@ -120,6 +122,7 @@ void LoadMeterNode::publish(const MotorForce& force) {
   message.wrench.torque.z = valueOf(force.torque);
   force_publisher_.publish(message);
   last_force_ = "'" + force.name + "': " + force.text();
+  if (!force.by_other_method.empty()) last_force_ += "; " + force.by_other_method;
   ROS_INFO("motors, test %s", last_force_.c_str());
 }
 
@@ -204,7 +207,7 @@ void LoadMeterNode::finish(const IdentifyResult& result) {
     ROS_WARN("%s", result.message.c_str());
   }
   if (found) {
-    publisher_.publish(message.coefficients);
+    coefficients_->publish("last", message.coefficients);
     try {
       CoefficientRecord record = result.record;
       record.machine = parameters_.machine;
@@ -375,6 +378,7 @@ void LoadMeterNode::publishFleetState() {
 // Liveness: when all inputs have stopped, nothing can precede the waiting ones.
 void LoadMeterNode::watch() {
   publishFleetState();
+  axis_drives_.watch();
   if (!shell_.inputs().any().dead()) return;
   if (!waiting_.empty())
     ROS_WARN_THROTTLE(5.0, "controller state and load have stopped: using the data received");

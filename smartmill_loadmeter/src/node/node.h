@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 
+#include "node/axis_drive_server.h"
 #include "node/fleet_pusher.h"
 #include "node/parameters.h"
 #include "node/wiring.h"
@@ -19,6 +20,7 @@
 #include "smartmill_msgs/IdentifyCoefficientsAction.h"
 #include "smartmill_msgs/RecommendCut.h"
 #include "smartmill_msgs/SpindleHealth.h"
+#include "smartmill_ros/latched_topic.h"
 #include "smartmill_ros/node_shell.h"
 
 namespace smartmill::loadmeter {
@@ -70,10 +72,12 @@ class LoadMeterNode {
   std::size_t stored_cuts_ = 0, stored_explanations_ = 0, stored_health_ = 0, stored_inspections_ = 0;
   std::uint64_t published_fleet_state_ = 0;
 
-  ros::Publisher publisher_, force_publisher_, estimate_publisher_, curve_publisher_, fleet_publisher_;
+  std::unique_ptr<LatchedTopic<smartmill_msgs::CuttingCoefficients>> coefficients_;
+  ros::Publisher force_publisher_, estimate_publisher_, curve_publisher_, fleet_publisher_;
   ros::Subscriber discovered_, health_, prior_subscriber_;
   ros::ServiceServer find_service_, recommend_service_;
   Server server_;
+  AxisDriveServer axis_drives_;
 };
 
 }  // namespace smartmill::loadmeter

@@ -50,7 +50,7 @@ void connect(Source& source, const NodeParameters& parameters, Pipeline& pipelin
   feed<MachineTemperature>(source, names::MACHINE_TEMPERATURE, pipeline);
   feed<CuttingCondition>(source, names::CUTTING_CONDITION, pipeline);
   if (parameters.usesMotors())
-    feed<SampleBlock>(source, parameters.motor_servo ? names::daq("servo") : names::MOTOR_CURRENT, pipeline);
+    feed<SampleBlock>(source, parameters.motor_servo ? names::SERVO_RECORD : names::MOTOR_CURRENT, pipeline);
   if (parameters.force_sensor) feed<ForceBlock>(source, names::FORCE_COMPENSATED, pipeline);
 }
 

@@ -51,7 +51,7 @@ std::vector<IdentifyResult> identifyFromBag(const std::string& path, const Machi
 
 ServoLoad servoLoadFromBag(const std::string& path, const std::function<void(double)>& progress) {
   RecordingReader bag(path);
-  const std::string topic = names::daq("servo");
+  const std::string topic = names::SERVO_RECORD;
   if (!bag.has(topic)) throw Error(path + ": expected topic " + topic);
   ServoLoad load;
   bag.on<SampleBlock>(topic, [&](const SampleBlock& block, double) { load.add(block); });

@@ -109,6 +109,29 @@ TEST(AnfisMethod, deviationsAreCalibrated) {
   EXPECT_TRUE(torque.isCalibrated()) << torque.rms();
 }
 
+// A straight drive with noise of 2 N: both methods predict a cut left out about as well as the noise permits,
+// sqrt(1 + 1/n) of it and more. A drive that saturates (F = 100 sin(r)): ANFIS is several times better.
+TEST(MethodErrors, regressionAndAnfisAtCutsLeftOut) {
+  std::mt19937_64 random(12);
+  std::normal_distribution<double> noise(0.0, 2.0);
+  CalibrationSamples straight, bent;
+  for (int i = 0; i < 30; ++i) {
+    const double rise = 0.05 + 0.05 * i;
+    straight.add({rise}, 90.0 * rise + noise(random));
+    bent.add({rise}, 100.0 * std::sin(rise) + noise(random));
+  }
+  const auto line = driveErrors(straight), curve = driveErrors(bent);
+  ASSERT_TRUE(line && curve);
+  EXPECT_EQ(line->cuts, 28u);  // the first and the last are outside the range of the others
+  EXPECT_NEAR(line->regression, 2.0, 0.6);
+  EXPECT_NEAR(line->anfis, 2.0, 0.8);
+  EXPECT_LT(curve->anfis, 3.0);
+  EXPECT_GT(curve->regression, 3.0 * curve->anfis);
+  straight.inputs.resize(8);
+  straight.outputs.resize(8);
+  EXPECT_FALSE(driveErrors(straight));  // 7 others, ANFIS requires 8
+}
+
 TEST(AnfisMethod, nothingIsExtrapolated) {
   Machine machine(1);
   const MotorCalibration calibration = machine.calibrate(60);

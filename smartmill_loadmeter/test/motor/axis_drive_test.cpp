@@ -1,5 +1,6 @@
 // Inertia and friction of a feed drive from moves in air.
 #include "smartmill_loadmeter/motor/axis_drive.h"
+#include "smartmill_loadmeter/motor/axis_drive_recorder.h"
 
 #include <cmath>
 #include <random>
@@ -144,6 +145,78 @@ TEST(AxisDrive, AgreesWithTheMeasuredTable) {
   // 7.68: the target of 2 % is missed, the records determine it within 15 %.
   EXPECT_NEAR(drive.viscous.value, 7.9, drive.viscous.std_dev);
   EXPECT_GT(drive.explained, 0.97);
+}
+
+/// The blocks of 10 ms of a record of Servo Guide in which only x moves.
+std::vector<SampleBlock> servoRecord(const AxisMotion& motion) {
+  std::vector<SampleBlock> blocks;
+  for (std::size_t i = 0; i < motion.velocity.size(); ++i) {
+    if (i % 10 == 0) {
+      blocks.emplace_back();
+      blocks.back().stamp = static_cast<double>(i) / RATE;
+      blocks.back().sample_rate = RATE;
+      blocks.back().first_index = i;
+      blocks.back().channels = {"current_x", "current_y", "current_z", "axis_vx", "axis_vy", "axis_vz"};
+      blocks.back().units = {"A", "A", "A", "m/s", "m/s", "m/s"};
+    }
+    std::vector<double>& samples = blocks.back().samples;
+    samples.insert(samples.end(), {motion.current[i], 0.1, 5.0, motion.velocity[i], 0.0, 0.0});
+  }
+  return blocks;
+}
+
+TEST(AxisDriveRecorder, UsesMovesInAirOfAServoRecord) {
+  AxisDriveRecorder recorder;
+  EXPECT_THROW(recorder.identify(0), Error);  // nothing received
+  const std::vector<SampleBlock> blocks = servoRecord(trapezoids({0.1, -0.2, 0.3, -0.1, 0.2, -0.3}));
+  CuttingCondition condition;
+  for (std::size_t k = 0; k < blocks.size(); ++k) {
+    // From 3 s to 4 s it cuts: the current has a cutting force, which must not be used.
+    condition.kind = k < 300 ? CuttingCondition::Kind::air : CuttingCondition::Kind::cut;
+    if (k == 0 || k == 300) recorder.handle(condition);
+    if (k == 400) recorder.handle(CuttingCondition());
+    SampleBlock block = blocks[k];
+    for (std::size_t i = 0; k >= 300 && k < 400 && i < block.samples.size(); i += 6) block.samples[i] += 3.0;
+    recorder.handle(block);
+  }
+  const AxisDrive drive = recorder.identify(0);
+  EXPECT_NEAR(drive.inertia.value, INERTIA, 0.02 * INERTIA);
+  EXPECT_NEAR(drive.coulomb.value, COULOMB, 0.02 * COULOMB);
+  EXPECT_NEAR(drive.viscous.value, VISCOUS, 0.02 * VISCOUS);
+  EXPECT_NEAR(drive.offset.value, OFFSET, 0.02 * OFFSET);
+  const auto refused = [&](std::size_t axis) {
+    try {
+      recorder.identify(axis);
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_THAT(refused(1), HasSubstr("axis y has not moved"));
+  SampleBlock without = blocks.front();
+  without.channels[3] = "speed";
+  recorder.handle(without);
+  EXPECT_THAT(refused(0), HasSubstr("axis_vx"));
+}
+
+// An axis that moves to and fro without rest for twice the time that is kept.
+TEST(AxisDriveRecorder, KeepsABoundedTimeOfMotion) {
+  AxisDriveRecorderOptions options;
+  options.longest = 4.0;
+  options.move = 1.0;
+  AxisDriveRecorder recorder(options);
+  AxisMotion motion;
+  motion.sample_rate = RATE;
+  for (int i = 0; i < 8000; ++i) {
+    const double phase = 2.0 * M_PI * i / RATE, v = 0.1 * std::sin(phase) + 1e-6;
+    motion.velocity.push_back(v);
+    motion.current.push_back(INERTIA * 0.1 * 2.0 * M_PI * std::cos(phase) + COULOMB * (v > 0.0 ? 1.0 : -1.0) +
+                             VISCOUS * v + OFFSET);
+  }
+  for (const SampleBlock& block : servoRecord(motion)) recorder.handle(block);
+  EXPECT_LE(recorder.recorded(), 4.0);
+  EXPECT_GT(recorder.recorded(), 2.9);
+  EXPECT_NEAR(recorder.identify(0).inertia.value, INERTIA, 0.02 * INERTIA);
 }
 
 }  // namespace

@@ -1,12 +1,9 @@
 #include "smartmill_panel/server/command_gate.h"
 
-#include <cctype>
-#include <filesystem>
-#include <fstream>
-
 #include <nlohmann/json.hpp>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/secret_file.h"
 
 namespace smartmill::panel {
 namespace {
@@ -23,16 +20,7 @@ bool equalInConstantTime(const std::string& a, const std::string& b) {
 
 }  // namespace
 
-CommandGate::CommandGate(const std::string& token_file) {
-  namespace fs = std::filesystem;
-  std::ifstream in(token_file);
-  if (!in.is_open() || !std::getline(in, token_))
-    throw Error("token_file " + token_file + ": cannot be read");
-  std::error_code failed;
-  const fs::perms others = fs::perms::group_all | fs::perms::others_all;
-  if ((fs::status(token_file, failed).permissions() & others) != fs::perms::none)
-    throw Error("token_file " + token_file + ": readable by others, expected mode 600 (chmod 600)");
-  while (!token_.empty() && std::isspace(static_cast<unsigned char>(token_.back()))) token_.pop_back();
+CommandGate::CommandGate(const std::string& token_file) : token_(readSecret("token_file", token_file)) {
   if (token_.size() < MIN_LENGTH)
     throw Error("token_file " + token_file + ": expected a token of at least " + std::to_string(MIN_LENGTH) +
                 " characters");

@@ -29,6 +29,7 @@ void ServoRecorder::push(const Input& input) {
   started_ = true;
   samples_.push_back(input.spindle_load);
   samples_.insert(samples_.end(), current_.begin(), current_.end());
+  samples_.insert(samples_.end(), last_velocity_.begin(), last_velocity_.end());
   samples_.push_back(sequence_);
   samples_.push_back(triggered_ ? 1.0 : 0.0);
 }
@@ -38,8 +39,9 @@ SampleBlock ServoRecorder::take() {
   block.stamp = static_cast<double>(block_index_) / SAMPLE_RATE;
   block.sample_rate = SAMPLE_RATE;
   block.first_index = block_index_;
-  block.channels = {"spindle_load", "current_x", "current_y", "current_z", "sequence", "trigger"};
-  block.units = {"1", "A", "A", "A", "1", "1"};
+  block.channels = {"spindle_load", "current_x", "current_y", "current_z", "axis_vx",
+                    "axis_vy",      "axis_vz",   "sequence",  "trigger"};
+  block.units = {"1", "A", "A", "A", "m/s", "m/s", "m/s", "1", "1"};
   block.samples = std::exchange(samples_, {});
   return block;
 }

@@ -45,7 +45,7 @@ Node::Node(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
       spindle_force_(nh_.advertise<smartmill_msgs::SampleBlock>(names::SPINDLE_FORCE, STREAM_QUEUE)),
       force_(nh_.advertise<smartmill_msgs::ForceBlock>(names::TRUE_FORCE, STREAM_QUEUE)),
       vibration_(nh_.advertise<smartmill_msgs::SampleBlock>(names::TRUE_VIBRATION, STREAM_QUEUE)),
-      servo_(nh_.advertise<smartmill_msgs::SampleBlock>(names::daq("servo"), STREAM_QUEUE)),
+      servo_(nh_.advertise<smartmill_msgs::SampleBlock>(names::SERVO_RECORD, STREAM_QUEUE)),
       coefficients_(nh_.advertise<smartmill_msgs::CuttingCoefficients>(names::TRUE_COEFFICIENTS, 1, true)),
       frf_(nh_, names::TRUE_FRF),
       modes_(nh_, names::TRUE_MODES),

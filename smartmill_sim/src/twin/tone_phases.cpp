@@ -1,6 +1,7 @@
 #include "twin/tone_phases.h"
 
 #include <cmath>
+#include <complex>
 
 #include <Eigen/Dense>
 
@@ -42,9 +43,11 @@ void findPhases(const Record* recorded, const ChannelRows& raw, double rate, dou
       values[c] = (*raw[c])[i];
       signals.apply(t, values);
       for (Eigen::Index k = 0; k < n / 2; ++k) {
-        const double a = tones[static_cast<std::size_t>(k)]->rate(speed) * t;
-        row(2 * k) = amplitudeOf(k, c) * std::sin(a);
-        row(2 * k + 1) = amplitudeOf(k, c) * std::cos(a);
+        const Tone& tone = *tones[static_cast<std::size_t>(k)];
+        const std::complex<double> wave =
+            amplitudeOf(k, c) * tone.response[c] * std::polar(1.0, tone.rate(speed) * t);
+        row(2 * k) = wave.imag();
+        row(2 * k + 1) = wave.real();
       }
       square += row * row.transpose();
       product += row * (measured[i] - values[c]);

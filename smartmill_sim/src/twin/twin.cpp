@@ -133,6 +133,11 @@ void run(const MachineModel& model, const CampaignTest& test, const SimulationOp
   std::mt19937_64 random(options.seed);
   std::normal_distribution<double> normal;
   const SignalStage signals = machine.signalStage();
+  for (Tone* tone : signals.tones()) {
+    const double frequency = tone->rate(test.spindle_speed) / units::TWO_PI;
+    for (std::size_t a = 0; a < 3 && tone->on_sensor; ++a)
+      tone->response[a] = machine.model().force_sensor.axis[a].response(frequency);
+  }
   const Record* const phases = options.random_phases ? nullptr : recorded;
   findPhases(phases, out, test.sample_rate, test.spindle_speed, signals, random);
   findBursts(phases, out, test.sample_rate, signals, random);

@@ -85,7 +85,8 @@ void HammerStation::fire(std::size_t axis, double now, double touch, std::mt1993
 
 double HammerStation::struckRetreat(const Pose& pose, std::size_t axis) const {
   const double height = station_.position.at(AXIS[axis])[2] - pose.position[2];
-  return surface_.retreat(pose.angle, height + traits_.read_height + station_.offset, angleOf(axis));
+  const double side = station_.opposite ? units::PI : 0.0;
+  return surface_.retreat(pose.angle, height + traits_.read_height + station_.offset, angleOf(axis) + side);
 }
 
 void HammerStation::PositionError::update(const Axes3& before, const Axes3& now, std::mt19937_64& random) {
@@ -139,10 +140,11 @@ HammerStation::Push HammerStation::push(double time) {
   Push push;
   const bool meets = fired_ && facing_axis_ == fired_axis_ && pose_.speed <= traits_.rest_speed;
   if (meets) push.force = solenoid_.force(time);
+  const double along = station_.opposite ? push.force : -push.force;  // the sensor is on the positive side
   if (beam_ && beam_->vibrates(time, push.force) && facing_axis_) {
-    push.tip = beam_->step(fired_axis_, -push.force);  // the hit comes from the sensor's side
+    push.tip = beam_->step(fired_axis_, along);
   } else if (meets) {
-    push.tip_force[fired_axis_] = -rigidRatio(height_ + station_.offset) * push.force;
+    push.tip_force[fired_axis_] = rigidRatio(height_ + station_.offset) * along;
   }
   ++steps_;
   force_sum_ += push.force;

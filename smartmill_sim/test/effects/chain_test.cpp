@@ -258,6 +258,47 @@ TEST(Effects, spindleOrderIsLockedToTheSpindle) {
   }
 }
 
+// A force on the sensor: each channel has the size and lag of the sensor's response at the tone's frequency.
+TEST(Effects, bearingTonePassesTheSensorWithItsOwnPhaseEachRecord) {
+  MachineModel model = mill(4, 30.0);
+  for (ModalModel& axis : model.force_sensor.axis) {
+    axis.modes = {{1000.0, 0.05, 1.0}};
+    axis.direct = 0.0;
+  }
+  model.force_sensor.axis[1].modes = {{700.0, 0.05, 1.0}};
+  const double order = 5.4, rpm = 9000.0, f = order * rpm / 60.0;  // 810 Hz, between the modes
+  model = with(model, {effectEntry("bearing_tone", {{"order", order}, {"x_n", 4.0}, {"y_n", -2.0}})});
+  const auto factor = [&](double mode) {  // of a mode with unit gain, and its lag
+    const std::complex<double> h =
+        1.0 / std::complex<double>(1.0 - f * f / mode / mode, 2.0 * 0.05 * f / mode);
+    return std::pair(std::abs(h), std::arg(h));
+  };
+  SimulationOptions options;
+  options.noise = false;
+  std::set<double> first;
+  for (options.seed = 1; options.seed < 4; ++options.seed) {
+    const Record air = simulateTest(model, airCut(rpm), 0.2, options);
+    first.insert(air.column("fx")[0]);
+    // Complex amplitude over 162 periods of the record of 0.2 s.
+    const auto amplitude = [&](const char* name) {
+      std::complex<double> sum = 0.0;
+      for (std::size_t i = 0; i < air.size(); ++i)
+        sum += air.column(name)[i] * std::polar(1.0, -units::TWO_PI * f * air.time[i]);
+      return 2.0 / static_cast<double>(air.size()) * sum;
+    };
+    const auto [x_factor, x_lag] = factor(1000.0);
+    const auto [y_factor, y_lag] = factor(700.0);
+    EXPECT_NEAR(std::abs(amplitude("fx")), 4.0 * x_factor, 0.01 * 4.0 * x_factor);
+    EXPECT_NEAR(std::abs(amplitude("fy")), 2.0 * y_factor, 0.01 * 2.0 * y_factor);
+    EXPECT_NEAR(std::remainder(std::arg(-amplitude("fy") / amplitude("fx")) - (y_lag - x_lag), units::TWO_PI),
+                0.0, 0.01);
+    EXPECT_EQ(air.column("fz")[64], 0.0);
+    const Record again = simulateTest(model, airCut(rpm), air, options);
+    for (const std::size_t i : {1000u, 3333u}) EXPECT_NEAR(again.column("fx")[i], air.column("fx")[i], 1e-6);
+  }
+  EXPECT_EQ(first.size(), 3u);
+}
+
 TEST(Effects, zeroOffsetIsOnEverySample) {
   const Record record = run(with(mill(4, 30.0), {effectEntry("zero_offset", {{"x_n", 2.5}, {"z_n", -1.0}})}),
                             airCut(3000.0), 0.1);

@@ -10,6 +10,10 @@ Command lobesCommand();
 Command chartCommand();
 /// Probability of chatter over speed and depth.
 Command chatterProbabilityCommand();
+/// Coefficient of process damping from cuts with their verdicts.
+Command processDampingCommand();
+/// Tip FRF of a tool that was not tapped, by receptance coupling.
+Command toolFrfCommand();
 /// Chatter in a recorded cut.
 Command detectCommand();
 

@@ -7,11 +7,13 @@
 #include "chart/recommendation.h"
 #include "chart/spindle_load.h"
 #include "smartmill_core/error.h"
+#include "smartmill_stability/solvers/model_system.h"
 
 namespace smartmill::stability {
 
 ChartMaker::ChartMaker(const ChartParameters& parameters, const MachineModel& model)
-    : cut_{parameters, model.needTool("predict stability"), model.spindle.value_or(Spindle{})} {
+    : cut_{parameters, model.needTool("predict stability"), model.spindle.value_or(Spindle{}),
+           processDamping(model)} {
   ChartParameters& own = cut_.parameters;
   if (own.speed_high == 0.0 && cut_.spindle.max_speed) own.speed_high = *cut_.spindle.max_speed;
   own.validate();
@@ -36,10 +38,8 @@ StabilityChart ChartMaker::chart() const {
     return std::vector<double>(all.begin() + extra, all.end() - extra);
   };
   chart.limit = {inner(wide.spindle_speed), inner(wide.depth), inner(wide.chatter_frequency)};
-  chart.method = given.solver ? nameOf(Method::collocation) : nameOf(Method::zero_order);
-  chart.absolute_depth_limit = given.solver
-                                   ? *std::min_element(chart.limit.depth.begin(), chart.limit.depth.end())
-                                   : absoluteDepthLimit(given.process, given.response);
+  chart.method = nameOf(given.method);
+  chart.absolute_depth_limit = given.absoluteDepthLimit(chart.limit);
   for (const double speed : chart.limit.spindle_speed) {
     const auto [torque, power] = load.limits(speed);
     chart.torque_depth_limit.push_back(torque);
@@ -47,6 +47,13 @@ StabilityChart ChartMaker::chart() const {
   }
   Recommendation(cut_, machine_, wide).addTo(chart);
   return chart;
+}
+
+std::string ChartMaker::solver() const {
+  const bool exact = machine_.byCollocation(cut_.parameters);
+  const std::string reason = machine_.fallbackReason(cut_.parameters);
+  return nameOf(exact ? Method::collocation : Method::zero_order) +
+         (reason.empty() ? "" : " (" + reason + ")");
 }
 
 Prediction ChartMaker::predict(double spindle_speed, double axial_depth) const {

@@ -61,10 +61,10 @@ void ChartParameters::declare(ParameterTable& table) {
       "line_error", line_error, "1", Range::positive(),
       "lines with a standard deviation above this fraction of the peak of the FRF are ignored (zeros of the "
       "hammer's spectrum), as are lines below three of their own standard deviations");
-  table.choice(
-      "method", method, {"zero_order", "collocation", "auto"},
-      "zero_order: immediate, from the measured FRFs; collocation: exact, from the modes (tool/modes), takes "
-      "seconds; auto: collocation where the modes of x and y fit well");
+  table.choice("method", method, {"zero_order", "collocation", "auto"},
+               "zero_order: from the measured FRFs, mean over the arc; collocation: exact, from the modes "
+               "(tool/modes); auto: "
+               "collocation where the modes of x and y fit, else zero_order");
   table.number("modes_error", modes_error, "1", Range::positive(),
                "largest relative error of the modal fit for which auto selects collocation");
   table.flag("use_modes", use_modes,

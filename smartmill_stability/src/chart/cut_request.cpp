@@ -5,10 +5,14 @@
 
 namespace smartmill::stability {
 
-void CutRequest::addTo(CommandLine& line, const std::string& form) {
+void CutRequest::addCutTo(CommandLine& line) {
   line.option("MODEL", model, "machine model file with sections tool, cutting and tool_tip").required();
   line.option("--entry-deg", entry_deg, "immersion angle at which a tooth enters [deg]").required();
   line.option("--exit-deg", exit_deg, "immersion angle at which a tooth leaves [deg]").required();
+}
+
+void CutRequest::addTo(CommandLine& line, const std::string& form) {
+  addCutTo(line);
   line.option("--speeds", speeds, form + " [rpm]").required();
 }
 

@@ -16,23 +16,23 @@ namespace smartmill::stability {
 namespace {
 
 /// Zero-order limits as a first guess; empty where that solution does not apply.
-StabilityLimit firstGuess(const RegenerativeSystem& system, const std::vector<double>& speeds) {
+/// @param near lines on either side of each mode
+StabilityLimit firstGuess(const RegenerativeSystem& system, const std::vector<double>& speeds, int near) {
   if (system.cut != Cut::milling || !system.evenPitch() || !(system.kt > 0.0) ||
       system.exit > units::TWO_PI + 1e-9)
     return {};
-  // Lines are dense around each mode: spacing below a twentieth of its half-power bandwidth.
-  constexpr int NEAR = 60;
+  // Lines are dense around each mode: with 60 the spacing is below a twentieth of its half-power bandwidth.
   constexpr double REACH = 20.0, LEAST = 50.0;
   double highest = 0.0;
   std::vector<double> lines;
   for (const SystemMode& mode : system.modes) {
     highest = std::max(highest, mode.frequency);
-    for (int i = -NEAR; i <= NEAR; ++i) {
-      const double share = static_cast<double>(i) / NEAR;
+    for (int i = -near; i <= near; ++i) {
+      const double share = static_cast<double>(i) / near;
       lines.push_back(mode.frequency * (1.0 + mode.damping_ratio * REACH * share * share * share));
     }
   }
-  for (double f = LEAST; f < 1.5 * highest; f *= 1.02) lines.push_back(f);
+  for (double f = LEAST; f < 1.5 * highest; f *= 1.0 + 1.2 / near) lines.push_back(f);
   std::sort(lines.begin(), lines.end());
   std::vector<double> frequencies;
   for (const double f : lines)
@@ -84,20 +84,23 @@ void inThreads(std::size_t count, const std::function<void(std::size_t)>& work) 
   other.get();
 }
 
-/// Continuation of the first loss of stability over the speeds of a chart: every tenth speed is searched from
-/// depth zero, the speeds between start from a prediction by their neighbours and the first guess.
+/// Continuation of the first loss of stability over the speeds of a chart: evenly spaced speeds are searched
+/// from depth zero, the speeds between start from a prediction by their neighbours and the first guess.
 class LimitContinuation {
  public:
   LimitContinuation(const FloquetSolver& solver, const std::vector<double>& speeds, double max_depth,
-                    const GuessedLobes& guess)
-      : search_(solver, max_depth, CONTINUATION.below * guess.leastDepth()),
+                    const GuessedLobes& guess, const ContinuationAccuracy& accuracy)
+      : search_(solver, max_depth, firstDepth(solver, guess), accuracy.tolerance),
         speeds_(speeds),
         guess_(guess),
+        straight_(accuracy.straight),
+        longest_(accuracy.longest),
+        stride_(std::max(CONTINUATION.stride, speeds.size() / accuracy.searched)),
         knots_(speeds.size()) {}
 
   StabilityLimit run() {
     std::vector<std::size_t> seeds;
-    for (std::size_t i = 0; i < speeds_.size(); i += CONTINUATION.stride) seeds.push_back(i);
+    for (std::size_t i = 0; i < speeds_.size(); i += stride_) seeds.push_back(i);
     if (seeds.back() + 1 != speeds_.size()) seeds.push_back(speeds_.size() - 1);
     inThreads(seeds.size(), [&](std::size_t k) { solve(seeds[k]); });
     inThreads(seeds.size() - 1, [&](std::size_t k) { fill(seeds[k], seeds[k + 1]); });
@@ -105,7 +108,9 @@ class LimitContinuation {
     inThreads(uncertain.size(), [&](std::size_t k) { correct(uncertain[k], knots_[uncertain[k]]); });
     StabilityLimit limit;
     limit.spindle_speed = speeds_;
-    for (const LimitKnot& knot : knots_) {
+    for (LimitKnot& knot : knots_) {
+      // Extrapolated from a smaller depth, or interpolated.
+      if (knot.depth > search_.maxDepth()) knot = LimitKnot();
       limit.depth.push_back(knot.depth);
       limit.chatter_frequency.push_back(knot.frequency);
     }
@@ -113,6 +118,11 @@ class LimitContinuation {
   }
 
  private:
+  static double firstDepth(const FloquetSolver& solver, const GuessedLobes& guess) {
+    const double least = guess.leastDepth();
+    return std::isfinite(least) ? CONTINUATION.below * least : solver.firstDepth();
+  }
+
   void solve(std::size_t i) { knots_[i] = search_.fromZero(speeds_[i]); }
   /// Solves for the limit near a prediction. @return false: there is none near it
   bool correct(std::size_t i, const LimitKnot& guess) {
@@ -205,9 +215,9 @@ class LimitContinuation {
     const LimitKnot predicted = one ? between(a, b, middle) : acrossLobes(a, b, middle);
     if (!correct(middle, predicted)) solve(middle);
     const LimitKnot& found = knots_[middle];
-    if (!one || !similar(a, b) || found.kind != knots_[a].kind ||
-        !isClose(found.depth, predicted.depth, CONTINUATION.straight) ||
-        !isClose(found.frequency, predicted.frequency, CONTINUATION.straight)) {
+    if (middle - a > longest_ || !one || !similar(a, b) || found.kind != knots_[a].kind ||
+        !isClose(found.depth, predicted.depth, straight_) ||
+        !isClose(found.frequency, predicted.frequency, straight_)) {
       fill(a, middle);
       fill(middle, b);
       return;
@@ -219,17 +229,24 @@ class LimitContinuation {
   LimitSearch search_;
   const std::vector<double>& speeds_;
   const GuessedLobes& guess_;
+  double straight_;      // [1]
+  std::size_t longest_;  // from one solved speed to the next
+  std::size_t stride_;   // of the speeds that are searched from depth zero
   std::vector<LimitKnot> knots_;
 };
 
 }  // namespace
 
 StabilityLimit limitsByContinuation(const RegenerativeSystem& system, const std::vector<double>& speeds,
-                                    double max_depth) {
-  if (speeds.size() < 2) throw Error("what if: expected at least two speeds");
-  const GuessedLobes guess(speeds, system.evenPitch() ? system.teeth : 0, firstGuess(system, speeds));
-  return LimitContinuation(*makeFloquetSolver(Method::collocation, system, SolverOptions::ofManyPoints()),
-                           speeds, max_depth, guess)
+                                    double max_depth, const ContinuationAccuracy& accuracy) {
+  if (speeds.size() < 2) throw Error("stability limits: expected at least two speeds");
+  SolverOptions options = SolverOptions::ofManyPoints();
+  options.nodes = accuracy.nodes;
+  options.tolerance = accuracy.tolerance;
+  const GuessedLobes guess(speeds, system.evenPitch() ? system.teeth : 0,
+                           firstGuess(system, speeds, accuracy.lines));
+  return LimitContinuation(*makeFloquetSolver(Method::collocation, system, options), speeds, max_depth, guess,
+                           accuracy)
       .run();
 }
 

@@ -25,7 +25,8 @@ double slopeOf(const Sample& a, const Sample& b) {
 }
 
 /// The limit from a sample close to it.
-LimitKnot knotAt(FloquetSolver::AtSpeed& here, const Sample& sample, double slope, double frequency) {
+LimitKnot knotAt(FloquetSolver::AtSpeed& here, const Sample& sample, double slope, double frequency,
+                 double tolerance) {
   LimitKnot knot;
   knot.solved = true;
   knot.slope = slope;
@@ -40,23 +41,22 @@ LimitKnot knotAt(FloquetSolver::AtSpeed& here, const Sample& sample, double slop
         !(std::abs(knot.frequency - frequency) < std::abs(nearest - frequency)))
       knot.frequency = nearest;
   }
-  if (std::isnan(knot.frequency))
-    knot.frequency = here.chatterFrequency((1.0 + CONTINUATION.tolerance) * knot.depth);
+  if (std::isnan(knot.frequency)) knot.frequency = here.chatterFrequency((1.0 + tolerance) * knot.depth);
   return knot;
 }
 
 /// Limit between a stable and an unstable depth. @param frequency [Hz] expected; not finite: unknown
-LimitKnot refined(FloquetSolver::AtSpeed& here, Sample low, Sample high, double frequency) {
+LimitKnot refined(FloquetSolver::AtSpeed& here, Sample low, Sample high, double frequency, double tolerance) {
   constexpr int MOST = 12;
-  for (int k = 0; k < MOST && high.depth > (1.0 + CONTINUATION.tolerance) * low.depth; ++k) {
+  for (int k = 0; k < MOST && high.depth > (1.0 + tolerance) * low.depth; ++k) {
     const double share = -low.log_radius / (high.log_radius - low.log_radius);
     const Sample middle =
         sampleOf(here, low.depth * std::pow(high.depth / low.depth, std::clamp(share, 0.03, 0.97)));
     const double off = std::abs(middle.log_radius / slopeOf(low, high));
     (middle.log_radius > 0.0 ? high : low) = middle;
-    if (off < CONTINUATION.tolerance) return knotAt(here, middle, slopeOf(low, high), frequency);
+    if (off < tolerance) return knotAt(here, middle, slopeOf(low, high), frequency, tolerance);
   }
-  return knotAt(here, high, slopeOf(low, high), frequency);
+  return knotAt(here, high, slopeOf(low, high), frequency, tolerance);
 }
 
 }  // namespace
@@ -79,23 +79,25 @@ LimitKnot LimitSearch::fromZero(double speed) const {
     slope = slopeOf(low, high);
     if (high.log_radius <= 0.0) low = high;
   }
-  return high.log_radius > 0.0 ? refined(*here, low, high, LimitKnot::NO_LIMIT) : LimitKnot();
+  return high.log_radius > 0.0 ? refined(*here, low, high, LimitKnot::NO_LIMIT, tolerance_) : LimitKnot();
 }
 
 std::optional<LimitKnot> LimitSearch::near(double speed, const LimitKnot& guess) const {
   constexpr int MOST = 5;
-  constexpr double NEAR = 0.003, CLOSE_BY = 0.03, FAR = 0.2, REACH = 1.4;
+  constexpr double NEAR = 0.003, FAR = 0.2, REACH = 1.4;
   if (!(guess.depth > 0.0) || guess.depth > max_depth_) return {};
   const auto here = solver_.at(speed);
   const Sample first = sampleOf(*here, guess.depth);
   double slope = std::max(CONTINUATION.least_slope, guess.slope);
-  if (std::abs(first.log_radius) <= NEAR * slope) return knotAt(*here, first, slope, guess.frequency);
+  if (std::abs(first.log_radius) <= NEAR * slope)
+    return knotAt(*here, first, slope, guess.frequency, tolerance_);
   const double step = std::exp(std::clamp(-first.log_radius / slope, -FAR, FAR));
   const Sample second = sampleOf(*here, std::min(max_depth_, step * guess.depth));
   slope = slopeOf(first, second);
-  if (slope > CONTINUATION.least_slope &&
-      std::abs(second.log_radius) <= CLOSE_BY * slope * std::abs(step - 1.0))
-    return knotAt(*here, second, slope, guess.frequency);
+  // The error of the secant grows with the rest of the way and with the length of the secant.
+  const double rest = std::abs(second.log_radius / slope);
+  if (slope > CONTINUATION.least_slope && rest * std::max(rest, std::abs(step - 1.0)) <= tolerance_)
+    return knotAt(*here, second, slope, guess.frequency, tolerance_);
   Sample low = first.depth < second.depth ? first : second,
          high = first.depth < second.depth ? second : first;
   double reach = 1.05;
@@ -109,7 +111,7 @@ std::optional<LimitKnot> LimitSearch::near(double speed, const LimitKnot& guess)
     high = sampleOf(*here, std::min(max_depth_, reach * high.depth));
   }
   if (low.log_radius > 0.0 || high.log_radius <= 0.0) return {};
-  return refined(*here, low, high, guess.frequency);
+  return refined(*here, low, high, guess.frequency, tolerance_);
 }
 
 bool LimitSearch::isStableTo(double speed, double depth) const {

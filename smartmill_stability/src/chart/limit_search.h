@@ -12,14 +12,12 @@ namespace smartmill::stability {
 
 /// Search and continuation of the first loss of stability over the speeds of a chart.
 struct ContinuationOptions {
-  std::size_t stride = 10;  ///< of the speeds that are searched from depth zero
+  std::size_t stride = 10;  ///< [1] least distance of the speeds that are searched from depth zero
   /// [1] First depth of a search over the least first guess, which misses flips.
   double below = 0.6;
-  double growth = 1.25;     ///< [1] of the depth in a search: islands of instability are thicker
-  double tolerance = 1e-3;  ///< [1] relative, of a depth; less than a pixel of the chart
+  double growth = 1.25;  ///< [1] of the depth in a search: islands of instability are thicker
   /// [1] Relative difference of the chatter frequency within a lobe; it jumps by more between lobes.
   double same_lobe = 0.03;
-  double straight = 0.01;  ///< [1] relative error of a prediction that permits interpolation
   /// [1] Largest relative difference of two limits over their first guesses, or of two limits without a
   /// guess, for interpolation between them.
   double similar_ratio = 0.06, similar_depth = 0.3;
@@ -46,9 +44,9 @@ struct LimitKnot {
 /// Finds the first loss of stability at one speed [rad/s].
 class LimitSearch {
  public:
-  /// @param start [m] first depth of a search from zero
-  LimitSearch(const FloquetSolver& solver, double max_depth, double start)
-      : solver_(solver), max_depth_(max_depth), start_(std::min(start, max_depth)) {}
+  /// @param start [m] first depth of a search from zero @param tolerance [1] relative, of a depth
+  LimitSearch(const FloquetSolver& solver, double max_depth, double start, double tolerance)
+      : solver_(solver), max_depth_(max_depth), start_(std::min(start, max_depth)), tolerance_(tolerance) {}
 
   /// From depth zero, in larger steps than FloquetSolver::limit().
   LimitKnot fromZero(double speed) const;
@@ -61,6 +59,7 @@ class LimitSearch {
  private:
   const FloquetSolver& solver_;
   double max_depth_, start_;  // [m]
+  double tolerance_;          // [1]
 };
 
 }  // namespace smartmill::stability

@@ -5,6 +5,7 @@
 #include <complex>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
 #include "smartmill_stability/chart/risk.h"
 #include "smartmill_stability/solvers/cross_modes.h"
@@ -59,7 +60,7 @@ void addCross(const std::map<std::string, MeasuredFrf>& frfs, ToolTipResponse& r
 }
 
 bool needsModes(const ChartParameters& parameters) {
-  return parameters.method == "collocation" || (parameters.method == "zero_order" && parameters.use_modes);
+  return parameters.method == "collocation" || parameters.use_modes;
 }
 
 }  // namespace
@@ -108,22 +109,28 @@ std::string MeasuredMachine::missing(const ChartParameters& parameters) const {
 
 bool MeasuredMachine::byCollocation(const ChartParameters& parameters) const {
   if (parameters.method != "auto") return parameters.method == "collocation";
-  const auto good = [&](const char* direction) {
-    const auto found = modes_.find(direction);
-    return found != modes_.end() && !found->second.model.modes.empty() &&
-           found->second.relative_error <= parameters.modes_error;
-  };
-  return good("x") && good("y");
+  return fallbackReason(parameters).empty();
 }
 
-std::optional<RegenerativeSystem> MeasuredMachine::system(const ChartCut& cut,
-                                                          const Engagement& engagement) const {
-  if (!modes_.count("x") || !modes_.count("y") || !coefficients_ || !(coefficients_->value.ktc > 0.0))
-    return {};
+std::string MeasuredMachine::fallbackReason(const ChartParameters& parameters) const {
+  if (parameters.method != "auto") return "";
+  for (const char* direction : {"x", "y"}) {
+    const auto found = modes_.find(direction);
+    if (found == modes_.end() || found->second.model.modes.empty())
+      return std::string("no modes in ") + direction;
+    if (!(found->second.relative_error <= parameters.modes_error))
+      return std::string("modes in ") + direction +
+             formatted(": relative error of the fit %.2g, above modes_error %.2g",
+                       found->second.relative_error, parameters.modes_error);
+  }
+  return "";
+}
+
+/// The cut without the dynamics of the tool.
+RegenerativeSystem MeasuredMachine::cutOf(const ChartCut& cut, const Engagement& engagement) const {
   const CuttingCoefficients& cutting = coefficients_->value;
   const bool given = engagement.exit > engagement.entry;
   RegenerativeSystem system;
-  system.modes = crossModes(modes_.at("x").model, modes_.at("y").model, crossFrf(cut.parameters));
   system.teeth = cut.tool.teeth;
   system.pitch = cut.tool.pitch;
   system.helix = cut.tool.helix;
@@ -132,6 +139,16 @@ std::optional<RegenerativeSystem> MeasuredMachine::system(const ChartCut& cut,
   system.exit = given ? engagement.exit : cut.parameters.exit;
   system.kt = cutting.ktc;
   system.kr = std::isfinite(cutting.krc) ? cutting.krc : cut.parameters.radial_ratio * cutting.ktc;
+  system.setProcessDamping(cut.process_damping);
+  return system;
+}
+
+std::optional<RegenerativeSystem> MeasuredMachine::system(const ChartCut& cut,
+                                                          const Engagement& engagement) const {
+  if (!modes_.count("x") || !modes_.count("y") || !coefficients_ || !(coefficients_->value.ktc > 0.0))
+    return {};
+  RegenerativeSystem system = cutOf(cut, engagement);
+  system.modes = crossModes(modes_.at("x").model, modes_.at("y").model, crossFrf(cut.parameters));
   return system;
 }
 
@@ -166,23 +183,14 @@ ChartSolver MeasuredMachine::solver(const ChartCut& cut) const {
   const std::string lacking = missing(parameters);
   if (!lacking.empty()) throw Error("no chart yet, missing: " + lacking);
   ChartSolver result;
-  const CuttingCoefficients& cutting = coefficients_->value;
-  result.process.teeth = cut.tool.teeth;
-  result.process.entry = parameters.entry;
-  result.process.exit = parameters.exit;
-  result.process.kt = cutting.ktc;
-  result.process.radial_ratio =
-      std::isfinite(cutting.krc) ? cutting.krc / cutting.ktc : parameters.radial_ratio;
   if (byCollocation(parameters)) {
-    const RegenerativeSystem system = *this->system(cut);
-    SolverOptions options;
-    options.tolerance = 1e-4;
-    options.nodes = 10;  // 1e-6 of the depth, enough for a chart
-    result.solver = makeSolver(Method::collocation, system, options);
+    result.method = Method::collocation;
+    result.system = *system(cut);
     // A limit beyond this depth does not restrict a recommended cut.
     result.max_depth = parameters.max_depth / (1.0 - parameters.depth_margin);
   } else {
-    result.response = measuredResponse(parameters);
+    result.system = cutOf(cut, {});
+    result.system.response = measuredResponse(parameters);
   }
   return result;
 }

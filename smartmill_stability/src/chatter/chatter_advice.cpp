@@ -26,9 +26,8 @@ struct Probe {
 };
 
 Probe probe(const RegenerativeSystem& system, double speed, double depth, double observed) {
-  const auto at = makeFloquetSolver(Method::collocation, system)->at(speed);
-  const CharacteristicMultiplier m = at->multiplier(depth);
-  const double passing = 1.0 / m.period, predicted = at->chatterFrequency(depth);
+  const auto [m, predicted] = makeFloquetSolver(Method::collocation, system)->at(speed)->motion(depth);
+  const double passing = 1.0 / m.period;
   // A multiplier and its conjugate: frequencies +f and -f, each plus integer multiples of the tooth passing.
   const double same = std::remainder(predicted - observed, passing);
   const double mirrored = -std::remainder(-predicted - observed, passing);

@@ -1,7 +1,5 @@
 #include "smartmill_stability/commands.h"
 
-#include <unistd.h>
-
 #include <cmath>
 #include <cstdio>
 #include <string>
@@ -11,6 +9,7 @@
 #include "smartmill_core/io/csv.h"
 #include "smartmill_core/parameters/parameter_options.h"
 #include "smartmill_core/units.h"
+#include "smartmill_recording/reading_progress.h"
 #include "smartmill_stability/chart/picture.h"
 
 namespace {
@@ -77,11 +76,8 @@ void run(const Options& o) {
   parameters.validate();
   if (parameters.model.empty())
     throw Error(o.bag + ": machine model missing: expected --model or the parameter model");
-  const bool terminal = isatty(STDERR_FILENO);
-  const auto progress = [terminal](double share) {
-    if (terminal) std::fprintf(stderr, "\rreading %3.0f %%%s", 100.0 * share, share >= 1.0 ? "\n" : "");
-  };
-  const BagCharts found = chartsFromBag(o.bag, readMachineModel(parameters.model), parameters, progress);
+  const BagCharts found =
+      chartsFromBag(o.bag, readMachineModel(parameters.model), parameters, printReadingProgress);
   if (!o.states.empty()) write(found.states, o.states);
   if (found.bistable) {
     std::printf(
@@ -108,6 +104,7 @@ void run(const Options& o) {
   }
   std::printf("tool %s, material %s, stable at every speed below %.4f mm\n", found.chart->tool.c_str(),
               found.chart->material.c_str(), found.chart->absolute_depth_limit / units::MM);
+  std::printf("limits by %s\n", found.solver.c_str());
   print("recommended:", found.chart->recommended);
   print("unstable, proposed for a check:", found.chart->unstable);
   if (!o.output.empty()) write(*found.chart, o.output);

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "commands/surface_error.h"
 #include "smartmill_core/cutting/force_curve.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
@@ -16,6 +17,7 @@
 #include "smartmill_stability/chart/bistable.h"
 #include "smartmill_stability/chart/cut_request.h"
 #include "smartmill_stability/chart/picture.h"
+#include "smartmill_stability/chart/pitch_design.h"
 #include "smartmill_stability/solvers/boundary.h"
 #include "smartmill_stability/solvers/model_system.h"
 #include "smartmill_stability/solvers/solver.h"
@@ -25,8 +27,8 @@ namespace {
 using namespace smartmill;
 
 struct Request : stability::CutRequest {
-  std::string method = "collocation", boundary, serration, force_curve;
-  double max_depth_mm = 0.0, feed_mm = 0.0;
+  std::string method = "collocation", boundary, serration, force_curve, surface_error;
+  double max_depth_mm = 0.0, feed_mm = 0.0, tolerance_um = 0.0, best_pitch_rpm = 0.0;
   bool errors = false;
 };
 
@@ -110,8 +112,10 @@ void addChips(const Request& request, stability::RegenerativeSystem& system) {
 /// Limits of small and large vibrations for a nonlinear force law.
 void bistable(const Request& request, stability::Method method) {
   if (!(request.feed_mm > 0.0)) throw Error("--force-curve: requires --feed-mm: expected a value above 0");
-  if (!request.serration.empty() || !request.boundary.empty() || request.errors)
-    throw Error("--force-curve: cannot be combined with --serration-mm, --boundary or --errors");
+  if (!request.serration.empty() || !request.boundary.empty() || request.errors ||
+      !request.surface_error.empty())
+    throw Error(
+        "--force-curve: cannot be combined with --serration-mm, --boundary, --errors or --surface-error");
   const ForceCurves law = readForceCurves(request.force_curve);
   const stability::RegenerativeSystem system = request.system(readMachineModel(request.model));
   const auto found = stability::bistableLimits(system, law, request.feed_mm * units::MM, method, {},
@@ -151,6 +155,27 @@ void bistable(const Request& request, stability::Method method) {
       100.0 * range, 100.0 * widest);
 }
 
+/// The pitch angles with the largest limit at one speed.
+void printBestPitch(const Request& request, const stability::RegenerativeSystem& system) {
+  if (!(request.best_pitch_rpm > 0.0)) throw Error("--best-pitch: expected a speed above 0");
+  const stability::PitchDesignOptions options;
+  const double max_depth = request.max_depth_mm * units::MM;
+  const stability::PitchDesign design =
+      stability::designPitch(system, units::radPerSecFromRpm(request.best_pitch_rpm), max_depth, options);
+  const auto depth = [&](double limit) {
+    return std::isfinite(limit) ? formatted("%.4f mm", limit / units::MM)
+                                : formatted("above %.4f mm", request.max_depth_mm);
+  };
+  std::string angles;
+  for (const double pitch : design.pitch)
+    angles += (angles.empty() ? "" : ", ") + formatted("%.2f", units::degFromRad(pitch));
+  std::printf(
+      "pitch for %.1f rpm: %s deg (variation %.2f deg): limit %s, %s with even pitch, within %.1f %% of the "
+      "speed\n",
+      request.best_pitch_rpm, angles.c_str(), units::degFromRad(design.variation),
+      depth(design.least_limit).c_str(), depth(design.even_limit).c_str(), 100.0 * options.speed_margin);
+}
+
 void run(const Request& request) {
   const stability::Method method = stability::methodOf(request.method);
   if (!(request.max_depth_mm > 0.0)) throw Error("--max-depth-mm: expected a value above 0");
@@ -158,8 +183,14 @@ void run(const Request& request) {
     bistable(request, method);
     return;
   }
+  if (request.tolerance_um != 0.0 && request.surface_error.empty())
+    throw Error("--tolerance-um: requires --surface-error");
+  if (!request.serration.empty() && !request.surface_error.empty())
+    throw Error("--surface-error: cannot be combined with --serration-mm");
   const std::vector<double> speeds = request.speedRange();
-  stability::RegenerativeSystem system = request.system(readMachineModel(request.model));
+  const MachineModel model = readMachineModel(request.model);
+  stability::RegenerativeSystem system = request.system(model);
+  const stability::RegenerativeSystem plain = system;
   addChips(request, system);
   stability::SolverOptions options;
   options.estimate_error = request.errors;
@@ -181,16 +212,24 @@ void run(const Request& request) {
     }
   }
   csv.save(request.out);
-  stability::drawPicture(
-      request.out, axes(request.max_depth_mm) +
-                       "plot %FILE skip 1 using 1:2 with lines lw 2 title 'first loss of stability (" +
-                       std::string(nameOf(method)) +
-                       ")', %FILE skip 1 using 1:(strcol(4) eq 'flip' ? $2 : NaN) with points pt 7 ps 0.4 "
-                       "title 'flip'");
+  std::string plot = "plot %FILE skip 1 using 1:2 with lines lw 2 title 'first loss of stability (" +
+                     std::string(nameOf(method)) +
+                     ")', %FILE skip 1 using 1:(strcol(4) eq 'flip' ? $2 : NaN) with points pt 7 ps 0.4 "
+                     "title 'flip'";
+  // gnuplot refuses a curve without points.
+  if (std::none_of(limits.begin(), limits.end(), [](const auto& l) { return std::isfinite(l.depth); }))
+    plot = "plot %FILE skip 1 using 1:(" + std::to_string(request.max_depth_mm) +
+           ") with lines lw 2 title 'stable to the largest depth'";
+  stability::drawPicture(request.out, axes(request.max_depth_mm) + plot);
   std::printf("stable below %.4f mm at all of these speeds (%s)\n", least / units::MM, nameOf(method));
   if (request.errors) std::printf("largest estimated error of a limit: %.2g %%\n", 100.0 * error);
   if (!request.boundary.empty())
     traceAll(request, *stability::makeFloquetSolver(method, system, options), speeds);
+  if (request.best_pitch_rpm != 0.0) printBestPitch(request, plain);
+  if (!request.surface_error.empty())
+    stability::writeSurfaceMap(
+        {request.surface_error, request.feed_mm, request.max_depth_mm, request.tolerance_um}, model, plain,
+        speeds);
 }
 
 }  // namespace
@@ -207,9 +246,15 @@ Command lobesCommand() {
        "a slot, 201 speeds"},
       {"mill.yaml --entry-deg 90 --exit-deg 180 --speeds 2000:12000:101 --max-depth-mm 8 -o chart.csv "
        "--boundary all.csv",
-       "down-milling; in addition the whole boundary with its islands"}};
+       "down-milling; in addition the whole boundary with its islands"},
+      {"mill.yaml --entry-deg 154 --exit-deg 180 --speeds 8000:16000:161 --max-depth-mm 8 -o chart.csv "
+       "--surface-error walls.csv --feed-mm 0.08 --tolerance-um 10",
+       "finishing by down-milling: the error of the wall, and the cuts that make size"}};
   command.files = {{"OUT", "CSV rpm,limit_mm,chatter_hz,kind; a picture of the same name with .png"},
-                   {"BOUNDARY", "CSV curve,rpm,depth_mm,chatter_hz,kind"}};
+                   {"BOUNDARY", "CSV curve,rpm,depth_mm,chatter_hz,kind"},
+                   {"SURFACE-ERROR",
+                    "CSV rpm,depth_mm,stable,error_um,error_std_um,least_um,most_um,peak_to_valley_um,"
+                    "mean_deviation_um; empty in unstable cuts"}};
   command.setBody(run, [](CommandLine& line, Request& request) {
     request.addTo(line, "LO:HI:N");
     line.option("--method", request.method,
@@ -230,6 +275,16 @@ Command lobesCommand() {
         "--force-curve", request.force_curve,
         "force curve (written by `force-law --curve`) instead of the coefficients of the model: limits of "
         "small and large vibrations; requires --feed-mm");
+    line.option(
+        "--surface-error", request.surface_error,
+        "CSV of surface location error (+ overcut) and roughness along the feed over speeds and depths, "
+        "with runout and edge forces of the model; a picture of the same name with .png; requires "
+        "--feed-mm");
+    line.option("--tolerance-um", request.tolerance_um,
+                "tolerance of the wall on either side [um]: prints stable finishing cuts within it; requires "
+                "--surface-error");
+    line.option("--best-pitch", request.best_pitch_rpm,
+                "speed [rpm]: prints the linear variation of the tooth pitch with the largest limit there");
     line.flag("--errors", request.errors, "estimate the error of each limit from a refined solution");
   });
   return command;

@@ -303,7 +303,7 @@ void StabilityNode::diagnoseChart(diagnostic_updater::DiagnosticStatusWrapper& s
   } else if (!chart_problem_.empty()) {
     status.summary(diagnostic_msgs::DiagnosticStatus::ERROR, chart_problem_);
   } else {
-    status.summary(diagnostic_msgs::DiagnosticStatus::OK, "chart published");
+    status.summary(diagnostic_msgs::DiagnosticStatus::OK, "chart published, by " + maker_.solver());
   }
   if (!bistable_problem_.empty()) status.add("limits for the force curve", bistable_problem_);
 }

@@ -28,7 +28,10 @@ BagCharts chartsFromBag(const std::string& path, const MachineModel& model, cons
   bag.run(progress);
   detection.flush();
   found.missing = maker.missing();
-  if (found.missing.empty()) found.chart = maker.chart();
+  if (found.missing.empty()) {
+    found.chart = maker.chart();
+    found.solver = maker.solver();
+  }
   if (!parameters.force_curve.empty()) {
     curves.emplace();
     curves->curves = readForceCurves(parameters.force_curve);

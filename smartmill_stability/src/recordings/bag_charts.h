@@ -13,6 +13,7 @@ namespace smartmill::stability {
 /// Results that the node publishes for the same data.
 struct BagCharts {
   std::optional<StabilityChart> chart;    ///< from all inputs of the bag
+  std::string solver;                     ///< of the chart, as ChartMaker::solver()
   std::string missing;                    ///< missing inputs, without a chart
   std::optional<BistableChart> bistable;  ///< for the last force curve
   std::vector<ChatterState> states;

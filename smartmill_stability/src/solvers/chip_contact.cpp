@@ -65,6 +65,7 @@ class Contact {
   }
 
   double period() const { return period_; }
+  const ForcedVibration& vibration() const { return vibration_; }
   const std::vector<double>& delays() const { return delays_; }
   bool tooManyBreaks() const { return breaks().size() > CONTACT.most_breaks; }
 
@@ -87,9 +88,7 @@ class Contact {
     feedback.now.setZero();
     feedback.velocity.setZero();
     feedback.delayed.assign(delays_.size(), Eigen::Matrix2d::Zero());
-    const double damp = system_.damping_radial > 0.0 || system_.damping_tangential > 0.0
-                            ? 1.0 / (0.5 * speed_ * system_.diameter)
-                            : 0.0;
+    const double damp = system_.hasProcessDamping() ? 1.0 / (0.5 * speed_ * system_.diameter) : 0.0;
     double at = std::fmod(inside, period_);
     if (at < 0.0) at += period_;
     for (std::size_t e = 0; e < segments_.size(); ++e) {
@@ -225,7 +224,10 @@ class Contact {
           forces.gain[0][i] += d;
           forces.gain[1 + delay_[pass(k, m)]][i] -= d;
           // directional() is force times normal; multiplied by the normal it is the force per chip thickness.
-          forces.force[i] += d * Eigen::Vector2d(sine, cosine) * rigidChip(e, m).at(sine, cosine);
+          // The edge force is that of a chip of one metre with the coefficients kte and kre.
+          const Eigen::Vector2d normal(sine, cosine);
+          forces.force[i] += d * normal * rigidChip(e, m).at(sine, cosine) +
+                             inArc(e, cell) * height_ * directional(chip_.kte, chip_.kre, angle) * normal;
         }
       }
     }
@@ -294,6 +296,12 @@ class Contact {
 };
 
 }  // namespace
+
+ForcedVibration forcedVibration(const RegenerativeSystem& system, double speed, double depth) {
+  if (!system.chip) throw Error("forced vibration: expected a system with a chip geometry");
+  if (!(speed > 0.0) || !(depth > 0.0)) throw Error("forced vibration: expected speed and depth above 0");
+  return Contact(system, speed, depth).vibration();
+}
 
 DelayedSystem contactSystem(const RegenerativeSystem& system, double speed, double depth) {
   if (!system.chip) throw Error("stability: expected a system with a chip geometry");

@@ -25,7 +25,7 @@ class Collocation : public FloquetSolver {
   Collocation(const RegenerativeSystem& system, const SolverOptions& options)
       : FloquetSolver(system, options),
         reference_(std::make_shared<ReferenceElement>(options.nodes > 0 ? options.nodes : COLLOCATION.nodes)),
-        with_velocity_(system.damping_radial > 0.0 || system.damping_tangential > 0.0),
+        with_velocity_(system.hasProcessDamping()),
         table_(options.many && fastestOf(system.modes, 0.0) > 0.0
                    ? std::make_shared<ResponseTable>(system.modes, *reference_, with_velocity_)
                    : nullptr) {}
@@ -44,10 +44,13 @@ class Collocation : public FloquetSolver {
       return {PeriodMap(delayed, responses_).dominant(false).value, delayed.period};
     }
 
-    double chatterFrequency(double depth) override {
+    double chatterFrequency(double depth) override { return motion(depth).second; }
+
+    std::pair<CharacteristicMultiplier, double> motion(double depth) override {
       const DelayedSystem delayed = delayedSystem(system_, speed_, depth);
       PeriodMap map(delayed, responses_);
-      return map.strongest(map.dominant(true), highestOf(system_));
+      const Dominant dominant = map.dominant(true);
+      return {{dominant.value, delayed.period}, map.strongest(dominant, highestOf(system_))};
     }
 
    private:

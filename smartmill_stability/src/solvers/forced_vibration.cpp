@@ -85,6 +85,16 @@ std::vector<std::vector<double>> ForcedVibration::seriesAt(double delay, int mos
   return u;
 }
 
+Eigen::Vector2d ForcedVibration::at(double turned) const {
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  const Index most = (spectrum_.size() / 2 - 1) / 2;
+  for (Index r = 0; !empty() && r <= most; ++r)
+    sum += (std::polar(r == 0 ? 1.0 : 2.0, static_cast<double>(r) * turned) *
+            spectrum_.segment<2>(2 * (r + most)))
+               .real();
+  return sum;
+}
+
 void ForcedVibration::update(const ContactForces& forces, const std::vector<double>& delays, double share) {
   double highest = 0.0;
   for (const SystemMode& mode : modes_) highest = std::max(highest, mode.frequency);

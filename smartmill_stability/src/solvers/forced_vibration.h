@@ -41,6 +41,8 @@ class ForcedVibration {
   void update(const ContactForces& forces, const std::vector<double>& delays, double share);
 
   bool empty() const { return motion_.empty(); }
+  /// [m] x and y with the tool turned by an angle [rad]; zero when empty.
+  Eigen::Vector2d at(double turned) const;
   /// [m] In the cells: [axis][cell].
   const std::vector<std::vector<double>>& motion() const { return motion_; }
   /// [m] The same, delayed.
@@ -56,5 +58,9 @@ class ForcedVibration {
   std::vector<std::vector<double>> motion_;
   std::vector<std::vector<std::vector<double>>> delayed_motion_;  // [delay][axis][cell]
 };
+
+/// Forced vibration of a stable cut with the contact of system.chip, from the modes; empty if the chips of
+/// all teeth are alike. Process damping is neglected.
+ForcedVibration forcedVibration(const RegenerativeSystem& system, double speed, double depth);
 
 }  // namespace smartmill::stability

@@ -1,10 +1,22 @@
 #include "smartmill_stability/solvers/model_system.h"
 
 #include <cstdio>
+#include <string>
 
 #include "smartmill_core/error.h"
 
 namespace smartmill::stability {
+
+double processDamping(const MachineModel& model) {
+  constexpr const char* KEY = "coefficient_n_per_mm";
+  double sum = 0.0;  // [N/mm]
+  for (const EffectEntry& effect : model.effects)
+    if (effect.name == "process_damping") sum += effect.numbers.at(KEY);
+  if (sum < 0.0)
+    throw Error(model.file + ": effects: process_damping: " + KEY + ": " + std::to_string(sum) +
+                ": expected a value of at least 0 to predict stability");
+  return sum * units::N_PER_MM;
+}
 
 RegenerativeSystem systemOf(const MachineModel& model, double entry_deg, double exit_deg) {
   const ToolGeometry& tool = model.needTool("predict stability");
@@ -20,6 +32,7 @@ RegenerativeSystem systemOf(const MachineModel& model, double entry_deg, double 
   system.exit = units::radFromDeg(exit_deg);
   system.kt = cutting.ktc;
   system.kr = cutting.krc;
+  system.setProcessDamping(processDamping(model));
   return system;
 }
 

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "smartmill_core/cutting/cutting_law.h"
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/require.h"
@@ -57,7 +58,7 @@ class Teeth {
     swept_ = system.helix > 0.0 ? tool.lag() * depth : 0.0;
     depth_ = depth;
     const double v = 0.5 * speed * system.diameter;
-    damps_ = (system.damping_tangential > 0.0 || system.damping_radial > 0.0);
+    damps_ = system.hasProcessDamping();
     tangential_damping_ = damps_ ? system.damping_tangential / v : 0.0;
     radial_damping_ = damps_ ? system.damping_radial / v : 0.0;
     for (int k = 0; k < system.teeth; ++k) {
@@ -165,6 +166,11 @@ class Teeth {
 
 }  // namespace
 
+void RegenerativeSystem::setProcessDamping(double coefficient) {
+  damping_radial = coefficient;
+  damping_tangential = TANGENTIAL_DAMPING * coefficient;
+}
+
 void RegenerativeSystem::validate() const {
   for (const SystemMode& mode : modes) {
     require("mode frequency [Hz]", mode.frequency, Range::positive());
@@ -179,7 +185,7 @@ void RegenerativeSystem::validate() const {
   require("tangential process damping [N/m]", damping_tangential, Range::notNegative());
   require("radial process damping [N/m]", damping_radial, Range::notNegative());
   require("overlap", overlap, Range::closed(0.0, 1.0));
-  const bool needs_diameter = helix > 0.0 || damping_radial > 0.0 || damping_tangential > 0.0;
+  const bool needs_diameter = helix > 0.0 || hasProcessDamping();
   require(diameter > 0.0 || !needs_diameter, "diameter [m]", diameter, "above 0");
   if (chip && along_arc)
     throw Error("chip geometry with coefficients along the arc: expected only one of them");
@@ -189,6 +195,8 @@ void RegenerativeSystem::validate() const {
     require(chip->radius_offset.empty() || static_cast<int>(chip->radius_offset.size()) == teeth,
             "number of radius offsets", static_cast<double>(chip->radius_offset.size()),
             "one for each tooth");
+    require("tangential edge force [N/m]", chip->kte, Range::notNegative());
+    require("radial edge force [N/m]", chip->kre, Range::notNegative());
     require("serration amplitude [m]", chip->serration_amplitude, Range::notNegative());
     require(chip->serration_amplitude == 0.0 || chip->serration_wavelength > 0.0, "serration wavelength [m]",
             chip->serration_wavelength, "above 0");

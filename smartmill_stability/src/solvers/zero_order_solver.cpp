@@ -34,9 +34,8 @@ class ZeroOrder : public StabilitySolver {
 
   std::vector<Limit> limits(const std::vector<double>& speeds, double max_depth) const override {
     if (!(max_depth > 0.0)) throw Error("stability: largest depth: expected a value above 0");
-    const bool damped = system_.damping_radial > 0.0 || system_.damping_tangential > 0.0;
-    if (system_.cut == Cut::milling && system_.evenPitch() && system_.overlap == 1.0 && !damped &&
-        !system_.chip && system_.kt > 0.0) {
+    if (system_.cut == Cut::milling && system_.evenPitch() && system_.overlap == 1.0 &&
+        !system_.hasProcessDamping() && !system_.chip && system_.kt > 0.0) {
       const RegenerativeProcess process{system_.teeth, system_.entry, system_.exit, system_.kt,
                                         system_.kr / system_.kt};
       std::vector<double> sorted = speeds;

@@ -180,9 +180,18 @@ TEST(ChartMaker, knownModesGiveTheConvergedLimits) {
 
 TEST(ChartMaker, autoUsesTheFrfWhenTheModesFitBadly) {
   EXPECT_EQ(fromModes(slot(), 0.3).chart().method, "zero_order");
+  EXPECT_EQ(fromModes(slot(), 0.3).solver(),
+            "zero_order (modes in x: relative error of the fit 0.3, above modes_error 0.1)");
+  EXPECT_EQ(filled(slot()).solver(), "zero_order (no modes in x)");
+  EXPECT_EQ(fromModes(slot(), 0.01).solver(), "collocation");
+  EXPECT_EQ(ChartParameters().method, "auto");
   ChartParameters parameters = slot();
   parameters.method = "zero_order";
   EXPECT_EQ(fromModes(parameters, 0.01).chart().method, "zero_order");
+  parameters.method = "auto";
+  parameters.use_modes = true;
+  EXPECT_EQ(fromModes(parameters, 0.3).chart().method, "zero_order");
+  EXPECT_EQ(filled(parameters).missing(), "modes in x, modes in y");
   parameters.method = "guess";
   EXPECT_THROW(fromModes(parameters, 0.01), Error);
 }

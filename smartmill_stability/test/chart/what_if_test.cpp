@@ -1,5 +1,6 @@
 #include "smartmill_stability/chart/what_if.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -53,6 +54,52 @@ TEST(WhatIf, ContinuationGivesTheLimitsOfTheFullSearch) {
     }
     EXPECT_LE(off, 5) << exit_deg << " deg";
   }
+}
+
+/// Relative errors above a bound of limits for a chart, compared with the search from depth zero at each
+/// speed.
+struct ChartErrors {
+  int above = 0;
+  double most = 0.0;
+};
+
+ChartErrors errorsOfChart(const RegenerativeSystem& system, double bound) {
+  std::vector<double> speeds;
+  for (int i = 0; i < 300; ++i) speeds.push_back(units::radPerSecFromRpm(3000.0 + 57.0 * i));
+  constexpr double DEEPEST = 5e-3;
+  const StabilityLimit found = limitsByContinuation(system, speeds, DEEPEST, ContinuationAccuracy::ofChart());
+  const std::vector<Limit> exact = makeFloquetSolver(Method::collocation, system)->limits(speeds, DEEPEST);
+  ChartErrors errors;
+  for (std::size_t k = 0; k < speeds.size(); ++k) {
+    if (std::min(found.depth[k], exact[k].depth) > 0.97 * DEEPEST) continue;
+    const double error = std::abs(found.depth[k] / exact[k].depth - 1.0);
+    errors.above += !(error <= bound);
+    errors.most = std::max(errors.most, error);
+  }
+  return errors;
+}
+
+// Pockets of a published chart are to be right to 1 %; the interpolation is permitted 0.1 %, more only where
+// lobes intersect.
+TEST(WhatIf, ContinuationOfAChartIsRightToAFewTenthsOfAPercent) {
+  for (const double exit_deg : {180.0, 60.0, 30.0}) {
+    const ChartErrors errors =
+        errorsOfChart(*benchmarkMaker().system({0.0, units::radFromDeg(exit_deg), 0.0, 0.0}), 0.003);
+    EXPECT_LE(errors.above, 1) << exit_deg;
+    EXPECT_LT(errors.most, 0.015) << exit_deg;
+  }
+}
+
+// Without a zero-order guess: uneven pitch, helix, process damping. At single speeds where lobes intersect a
+// narrow one is missed, and the limit is that of the next.
+TEST(WhatIf, ContinuationOfAChartNeedsNoGuess) {
+  RegenerativeSystem system = *benchmarkMaker().system({0.0, units::radFromDeg(90.0), 0.0, 0.0});
+  system.pitch = {units::radFromDeg(170.0), units::radFromDeg(190.0)};
+  system.helix = units::radFromDeg(30.0);
+  system.setProcessDamping(20e3);
+  const ChartErrors errors = errorsOfChart(system, 0.003);
+  EXPECT_LE(errors.above, 3);
+  EXPECT_LT(errors.most, 0.06);
 }
 
 // The result does not depend on the distribution of the speeds to threads.

@@ -65,8 +65,8 @@ void run(const Options& o) {
     return;
   }
   std::filesystem::create_directories(o.out);
-  const std::string file =
-      o.out + "/stations_" + std::to_string(o.study.seed) + "_" + std::to_string(o.study.hits) + ".jsonl";
+  const std::string file = o.out + "/stations_" + std::to_string(o.study.seed) + "_" +
+                           std::to_string(o.study.hits) + (o.study.opposite ? "_opposite" : "") + ".jsonl";
   std::map<int, json> lines;
   for (const json& line : readJsonLines(file)) lines[line["machine"]] = line;
   std::ofstream table(file, std::ios::app);
@@ -95,6 +95,8 @@ int main(int argc, char** argv) {
   o.one.addScore(line);
   line.option("--seed", o.study.seed, "seed of all random draws").showDefault();
   line.option("--hits", o.study.hits, "hits per measurement").within(1, 100).showDefault();
+  line.flag("--opposite", o.study.opposite,
+            "sensor opposite the hammer, even numbers of evenly spaced teeth");
   line.option("--figures", o.figures, "with --case: folder for figures 4.5 to 4.8 of the thesis");
   line.option("--repeats", o.repeats,
               "only repeats each machine N times and compares scatter and stated uncertainty: one line per "

@@ -114,8 +114,7 @@ void run(const std::vector<double>& speeds, double duration) {
     ReferenceCase reference = caseAt(rpm, duration);
     std::fprintf(stderr, "%.0f rpm\n", rpm);
     const ReferenceRecord record = simulate(reference);
-    HarmonicFilterParameters parameters;
-    parameters.max_harmonics = 200;
+    const HarmonicFilterParameters parameters;
     const auto with = [&](Method method, const ModalModel& sensor) {
       return errorsOf(reference, record, [&](const std::vector<double>& measured) {
         return compensateRecord(method, measured, sensor, reference.spindle_speed, reference.sample_rate,
@@ -212,6 +211,45 @@ void runSpeeds(const std::vector<double>& speeds, double duration) {
       std::printf("%6.0f %18.1f %% %13.1f %% %9.2f %7.2f %10.2f %7.2f %12.1f %7.1f\n", rpm, 100.0 * off,
                   100.0 * drop, tachometer[0], tachometer[1], tracked[0], tracked[1], commanded[0],
                   commanded[1]);
+    }
+  }
+}
+
+/// Speed ripple at an order of the spindle or at a frequency of its own: the force models that can follow it,
+/// each without passing samples through, and the choice of the node. A reading of the spindle every 10 ms.
+void runRipples(const std::vector<double>& speeds, double duration) {
+  struct Ripple {
+    const char* name;
+    double order, frequency;  // [1/revolution], [Hz]
+  };
+  std::printf("speed ripple: error of the force to 5 kHz [%%] over the last 0.3 s, worst of x and y\n");
+  std::printf(
+      "   rpm  ripple       RMS [%%]  measured  track_speed never  by angle  estimated  delay form    "
+      "auto\n");
+  for (const double rpm : speeds) {
+    for (const Ripple& ripple : {Ripple{"order 1", 1.0, 0.0}, Ripple{"order 4", 4.0, 0.0},
+                                 Ripple{"7 Hz", 0.0, 7.0}, Ripple{"33 Hz", 0.0, 33.0}}) {
+      for (const double rms : {0.0, 0.0005, 0.001, 0.002, 0.005, 0.01, 0.02}) {
+        ReferenceCase reference = caseAt(rpm, duration);
+        reference.speed_ripple = rms;
+        reference.ripple_frequency = ripple.order * rpm / 60.0 + ripple.frequency;
+        const ReferenceRecord record = simulate(reference);
+        const auto error = [&](const std::array<std::vector<double>, 2>& force) {
+          const std::size_t to = record.time.size() / 256 * 256;
+          return worstError(force, reference, record,
+                            to - static_cast<std::size_t>(0.3 * reference.sample_rate), to, 5000.0);
+        };
+        const auto with = [&](AutoSetting track, bool delay_form, bool pass) {
+          CompensationParameters parameters = allHarmonics();
+          parameters.track_speed = std::move(track);
+          parameters.delay_form = delay_form;
+          if (!pass) parameters.speed_tolerance = 0.49;
+          return error(runCompensation(reference, record, reference.sensor, parameters));
+        };
+        std::printf("%6.0f  %-10s %9.2f %9.1f %18.2f %9.2f %10.2f %11.2f %7.2f\n", rpm, ripple.name,
+                    100.0 * rms, error(record.measured), with(false, false, true), with(false, false, false),
+                    with(true, false, false), with(false, true, false), with({}, false, true));
+      }
     }
   }
 }
@@ -444,13 +482,16 @@ int main(int argc, char** argv) {
   std::vector<double> speeds{3000.0, 9000.0, 15000.0, 21750.0};
   double duration = 1.0;
   std::string picture;
-  bool errors = false, tuning = false, force_models = false, track = false, lags = false;
+  bool errors = false, tuning = false, force_models = false, track = false, lags = false, ripples = false;
   CommandLine line{"Errors of the force compensation in the reference cut, next to their targets."};
   line.option("--speed-rpm", speeds, "spindle speeds").within(500.0, 60000.0);
   line.option("--duration-s", duration, "length of a record").within(0.3, 100.0);
   line.flag("--model-errors", errors, "a sensor that differs from its model: frozen and following filter");
   line.flag("--force-models", force_models, "Fourier series and F(t) = F(t - T): error and cost");
   line.flag("--track-speed", track, "no tachometer: the speed as a state, compared with a tachometer");
+  line.flag(
+      "--speed-ripple", ripples,
+      "speed ripple of 0.05 to 2 %: harmonics by angle, estimated speed, delay form and the node's choice");
   line.flag("--lags", lags, "error of the fixed-lag smoother over its lag");
   line.flag("--tuning", tuning, "seven speeds: q from the taps compared with the best q of the cut");
   line.option("--picture", picture, "with --tuning: PNG of the maps q over speed, with confidence plants");
@@ -461,6 +502,10 @@ int main(int argc, char** argv) {
     }
     if (track) {
       runSpeeds(speeds, duration);
+      return 0;
+    }
+    if (ripples) {
+      runRipples(speeds, std::max(duration, 1.2));
       return 0;
     }
     if (lags) {

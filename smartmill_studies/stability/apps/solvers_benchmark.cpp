@@ -2,12 +2,16 @@
 // measured elsewhere): full discretization in Octave 24.1 s and semi-discretization 112.6 s for 101 x 51
 // points, about 1760 s for 401 x 201; numba 652 s for 400 x 200; zero-order from 8001 lines in Octave 620 ms.
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
 #include <benchmark/benchmark.h>
 
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_stability/chart/limit_continuation.h"
 #include "smartmill_stability/solvers/boundary.h"
+#include "smartmill_stability/solvers/model_system.h"
 #include "smartmill_stability/solvers/solver.h"
 #include "smartmill_stability_testing/benchmark.h"
 
@@ -76,6 +80,30 @@ void Grid401x201(benchmark::State& state) {
   benchmark::DoNotOptimize(sum);
 }
 BENCHMARK(Grid401x201)->Arg(1)->Unit(benchmark::kMillisecond)->Iterations(1);
+
+/// The demonstration mill: entry angle [deg] to 180 deg, number of speeds. CPU time of both threads.
+void ChartOfTheMill(benchmark::State& state) {
+  const RegenerativeSystem system =
+      systemOf(readMachineModel(MILL_FILE), static_cast<double>(state.range(0)), 180.0);
+  constexpr double DEEPEST = 25e-3;
+  std::vector<double> at;
+  for (int i = 0; i < state.range(1); ++i)
+    at.push_back(units::radPerSecFromRpm(2000.0 + 18000.0 * i / static_cast<double>(state.range(1) - 1)));
+  StabilityLimit found;
+  for (auto _ : state) found = limitsByContinuation(system, at, DEEPEST, ContinuationAccuracy::ofChart());
+  const std::vector<Limit> exact = makeSolver(Method::collocation, system)->limits(at, DEEPEST);
+  std::vector<double> errors;
+  for (std::size_t i = 0; i < at.size(); ++i)
+    if (std::isfinite(found.depth[i]) && std::isfinite(exact[i].depth))
+      errors.push_back(std::abs(found.depth[i] / exact[i].depth - 1.0));
+  std::sort(errors.begin(), errors.end());
+  state.counters["99 % of the errors %"] = 100.0 * errors[errors.size() * 99 / 100];
+  state.counters["largest error %"] = 100.0 * errors.back();
+}
+BENCHMARK(ChartOfTheMill)
+    ->ArgsProduct({{0, 90, 150}, {300, 1500}})
+    ->MeasureProcessCPUTime()
+    ->Unit(benchmark::kMillisecond);
 
 void WholeBoundary(benchmark::State& state) {
   const auto solver = makeFloquetSolver(Method::collocation, slot(false));

@@ -21,4 +21,10 @@ std::string formatted(const char* format, ...) {
   return text;
 }
 
+std::string joined(const std::vector<std::string>& texts, const char* between) {
+  std::string text;
+  for (const std::string& one : texts) text += (text.empty() ? "" : between) + one;
+  return text;
+}
+
 }  // namespace smartmill

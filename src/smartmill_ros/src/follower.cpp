@@ -171,8 +171,9 @@ void Followers::settle() {
   }
 }
 
+// Messages of other publishers may never stand still.
 void Followers::leave() {
-  settle();
+  keepUp(0);
   for (Node& node : nodes_) call(node, Request::LEAVE);
 }
 

@@ -106,6 +106,12 @@ const std::string& FrfServer::lastMessage() const {
   return impl_->last_message;
 }
 
+std::vector<MeasuredModes> FrfServer::modes() const {
+  std::vector<MeasuredModes> modes;
+  for (const auto& [direction, message] : impl_->modes.messages()) modes.push_back(fromMsg(message));
+  return modes;
+}
+
 void FrfServer::feedback(const std::string& stage, double progress, int hits_done) {
   ROS_INFO("%s: %s", impl_->node.c_str(), stage.c_str());
   if (!impl_->active) return;

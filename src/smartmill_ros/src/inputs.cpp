@@ -1,31 +1,46 @@
 #include "smartmill_ros/inputs.h"
 
+#include <algorithm>
+#include <cmath>
 #include <exception>
+#include <limits>
 #include <stdexcept>
 
 #include <ros/console.h>
+
+#include "smartmill_core/formatted.h"
+#include "smartmill_core/signal/stream_sorter.h"
 
 namespace smartmill {
 namespace {
 
 constexpr double LOG_PERIOD = 5.0;  // [s] between lines in the log about one input
 constexpr double HOLD = 120.0;      // [s] without a call after which a player has ended
+constexpr int LEADING =
+    2;  // other streams that have to be ahead, so that one whose clock is ahead blames none
 
 }  // namespace
 
 std::string InputHealth::take(double now, const std::function<void()>& handle) {
+  const Watchdog before = watchdog_;
   watchdog_.heard();
   ++taken_;
+  dropped_ = false;
   try {
     handle();
     last_refused_ = false;
+    if (dropped_) watchdog_ = before;
     return {};
   } catch (const std::exception& error) {
-    problem_ = error.what();
-    ++refused_;
-    last_refused_ = true;
-    reported_ = false;
+    return refuse(now, error.what());
   }
+}
+
+std::string InputHealth::refuse(double now, const std::string& problem) {
+  problem_ = problem;
+  ++refused_;
+  last_refused_ = true;
+  reported_ = false;
   if (now - logged_ < LOG_PERIOD) return {};
   logged_ = now;
   return topic_ + ": " + problem_;
@@ -38,7 +53,7 @@ std::string InputHealth::takeProblem() {
   return problem_;
 }
 
-Inputs::Inputs(ros::NodeHandle nh, double timeout) : nh_(std::move(nh)), timeout_(timeout), any_(timeout) {
+Inputs::Inputs(const ros::NodeHandle& nh, double timeout) : nh_(nh), timeout_(timeout), any_(timeout) {
 }
 
 void Inputs::tick(double period) {
@@ -57,8 +72,61 @@ InputHealth& Inputs::add(const std::string& topic) {
 
 void Inputs::take(InputHealth& health, const std::function<void()>& handle) {
   any_.heard();
-  const std::string line = health.take(ros::WallTime::now().toSec(), handle);
+  const double now = ros::WallTime::now().toSec();
+  std::string line, line_of_other;
+  line = health.take(now, [&] {
+    try {
+      handle();
+    } catch (const StreamError& error) {
+      // Data of another input, which this one has released.
+      const auto other = std::find_if(inputs_.begin(), inputs_.end(), [&](const InputHealth& input) {
+        return input.topic() == error.stream() && &input != &health;
+      });
+      if (other == inputs_.end()) throw;
+      line_of_other = other->refuse(now, error.what());
+    }
+  });
   if (!line.empty()) ROS_ERROR_STREAM(line);
+  if (!line_of_other.empty()) ROS_ERROR_STREAM(line_of_other);
+}
+
+void Inputs::logLines(InputHealth& health) {
+  for (const std::string& line : health.streamCheck().takeLines())
+    ROS_ERROR_STREAM(health.topic() << ": " << line);
+}
+
+void Inputs::compareSpeed(InputHealth& health, const SpindleAngle& reading) {
+  const std::string line = speeds_.check(reading);
+  if (!line.empty()) ROS_ERROR_STREAM(health.topic() << ": " << line);
+}
+
+void Inputs::noteStamp(InputHealth& health, double stamp, double limit) {
+  InputHealth::Progress& progress = health.progress();
+  if (stamp < progress.newest - StreamSorter::RESTART) {
+    for (InputHealth& input : inputs_) input.progress() = {};
+  }
+  progress.newest = std::max(progress.newest, stamp);
+  progress.limit = limit;
+  for (InputHealth& input : inputs_) {
+    InputHealth::Progress& own = input.progress();
+    if (!std::isfinite(own.newest)) continue;
+    int others = 0, ahead = 0;
+    double least = std::numeric_limits<double>::infinity();  // [s] of those ahead
+    for (const InputHealth& other : inputs_) {
+      if (&other == &input || !std::isfinite(other.progress().newest)) continue;
+      ++others;
+      const double lead = other.progress().newest - own.newest;
+      if (lead <= own.limit) continue;
+      ++ahead;
+      least = std::min(least, lead);
+    }
+    const bool silent = input.watchdog().silent() >= SENSOR_BEHIND;  // not only waiting in a queue
+    const bool behind = silent && others > 0 && ahead >= std::min(LEADING, others);
+    if (behind && own.behind == 0.0)
+      ROS_WARN("%s: no data for %.2f s of the other inputs, since %.3f s", input.topic().c_str(), least,
+               own.newest);
+    own.behind = behind ? least : 0.0;
+  }
 }
 
 InputHealth& Inputs::find(const std::string& topic) {
@@ -99,9 +167,16 @@ void Inputs::follow(const smartmill_msgs::Follow::Request& request,
 void Inputs::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   using Level = diagnostic_msgs::DiagnosticStatus;
   status.summary(Level::OK, "inputs without errors");
+  if (speeds_.disagrees())
+    status.mergeSummary(Level::ERROR, "speeds of spindle/angle and of the controller differ");
   for (InputHealth& input : inputs_) {
     const std::string problem = input.takeProblem();
     if (!problem.empty()) status.mergeSummary(Level::ERROR, input.topic() + ": " + problem);
+    const std::string fault = input.streamCheck().present();
+    if (!fault.empty()) status.mergeSummary(Level::ERROR, input.topic() + ": " + fault);
+    if (input.progress().behind > 0.0)
+      status.mergeSummary(Level::WARN, input.topic() + formatted(": %.2f s behind the other inputs",
+                                                                 input.progress().behind));
     if (input.watchdog().ever()) {
       status.addf(input.topic(), "%.2f s since the last message, %zu refused", input.watchdog().silent(),
                   input.refused());

@@ -1,18 +1,41 @@
 #include "smartmill_ros/node_shell.h"
 
+#include <cstdlib>
 #include <exception>
+#include <map>
+#include <string>
 #include <utility>
 
 #include <ros/console.h>
+#include <ros/network.h>
 
 #include "smartmill_ros/follower.h"
+#include "smartmill_ros/kept_messages.h"
 
 namespace smartmill {
 namespace {
 
 constexpr double TICK = 0.05;  // [s]
 
+// ROS 1 has no authentication: every program that reaches a node can publish and call its services.
+void diagnoseNetwork(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  using Level = diagnostic_msgs::DiagnosticStatus;
+  const std::string& host = ros::network::getHost();
+  status.add("host", host);
+  if (isLoopback(host)) {
+    status.summary(Level::OK, "reachable from this computer only");
+  } else {
+    status.summary(Level::WARN,
+                   "reachable from other computers as " + host +
+                       ", without authentication; ROS_HOSTNAME=localhost closes it (docs/security.md)");
+  }
+}
+
 }  // namespace
+
+bool isLoopback(const std::string& host) {
+  return host == "localhost" || host == "::1" || host.rfind("127.", 0) == 0;
+}
 
 NodeShell::NodeShell(ros::NodeHandle nh, ros::NodeHandle private_nh, const std::string& hardware,
                      double input_timeout)
@@ -22,10 +45,33 @@ NodeShell::NodeShell(ros::NodeHandle nh, ros::NodeHandle private_nh, const std::
       follow_(private_nh.advertiseService(FOLLOW, &NodeShell::follow, this)) {
   diagnostics_.setHardwareID(hardware);
   diagnostics_.add("inputs", &inputs_, &Inputs::diagnose);
+  diagnostics_.add("network", diagnoseNetwork);
+  countStart();
+  diagnostics_.add("restarts", this, &NodeShell::diagnoseRestarts);
   every(TICK, [this] {
     inputs_.tick(TICK);
     diagnostics_.update();  // publishes once a second
   });
+}
+
+void NodeShell::countStart() {
+  constexpr const char* KEY = "count";
+  KeptTexts starts(nh_, "starts");
+  const std::map<std::string, std::string> kept = starts.all();
+  if (const auto before = kept.find(KEY); before != kept.end())
+    starts_ = std::atoi(before->second.c_str()) + 1;
+  starts.keep(KEY, std::to_string(starts_));
+  if (starts_ > 1) ROS_WARN("%s: start %d in this launch", ros::this_node::getName().c_str(), starts_);
+}
+
+void NodeShell::diagnoseRestarts(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  using Level = diagnostic_msgs::DiagnosticStatus;
+  if (starts_ == 1) {
+    status.summary(Level::OK, "not restarted");
+  } else {
+    status.summaryf(Level::WARN, "restarted %d times in this launch", starts_ - 1);
+  }
+  status.add("starts", starts_);
 }
 
 void NodeShell::diagnose(const std::string& name,

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,6 +14,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/names.h"
+#include "smartmill_core/signal/stream_sorter.h"
 #include "smartmill_ros/follower.h"
 #include "smartmill_ros/frf_server.h"
 #include "smartmill_ros/latched_topic.h"
@@ -23,6 +25,7 @@ namespace smartmill {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr double TIMEOUT = 120.0;  // [s] time limit on a busy computer
 
@@ -34,6 +37,13 @@ bool eventually(Condition condition) {
     ros::WallDuration(0.01).sleep();
   }
   return condition();
+}
+
+TEST(NodeShell, ALoopbackHostIsKnownByItsName) {
+  for (const char* host : {"localhost", "127.0.0.1", "127.0.1.1", "::1"})
+    EXPECT_TRUE(isLoopback(host)) << host;
+  for (const char* host : {"", "mill-07", "192.0.2.7", "localhost.example", "1127.0.0.1"})
+    EXPECT_FALSE(isLoopback(host)) << host;
 }
 
 TEST(NodeShell, AnExceptionOfAHandlerIsReportedAndTheNodeContinues) {
@@ -84,6 +94,128 @@ TEST(NodeShell, AnExceptionOfAHandlerIsReportedAndTheNodeContinues) {
   const InputHealth* dead = shell.inputs().dead({names::SPINDLE_ANGLE});
   ASSERT_NE(dead, nullptr);
   EXPECT_EQ(dead->topic(), names::SPINDLE_ANGLE);
+}
+
+TEST(Inputs, FaultsAreReportedUnderTheTopicAtFault) {
+  ros::NodeHandle nh, private_nh("~");
+  NodeShell shell(nh, private_nh, "none", 1.0);
+  std::vector<SampleBlock> blocks;
+  shell.inputs().on<FramedBlock>(names::DYNAMOMETER, [&](const FramedBlock& framed, double) {
+    EXPECT_EQ(framed.frame, "dynamometer");
+    blocks.push_back(framed.block);
+  });
+  // A block that had waited is released by an angle, and found to be wrong.
+  shell.inputs().on<SpindleAngle>(names::SPINDLE_ANGLE, [](const SpindleAngle&, double) {
+    throw StreamError(names::DYNAMOMETER, "channel fz is missing");
+  });
+  std::string reported;
+  const boost::function<void(const diagnostic_msgs::DiagnosticArray&)> listen =
+      [&](const diagnostic_msgs::DiagnosticArray& array) {
+        for (const auto& status : array.status) {
+          if (status.level == diagnostic_msgs::DiagnosticStatus::ERROR) reported = status.message;
+        }
+      };
+  const ros::Subscriber diagnostics =
+      nh.subscribe<diagnostic_msgs::DiagnosticArray>("/diagnostics", 10, listen);
+  ros::Publisher force = nh.advertise<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, 10);
+  ros::Publisher angle = nh.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, 10);
+  ASSERT_TRUE(eventually([&] {
+    return force.getNumSubscribers() == 1 && angle.getNumSubscribers() == 1 &&
+           diagnostics.getNumPublishers() > 0;
+  }));
+  SampleBlock block;
+  block.stamp = 100.0;
+  block.sample_rate = 1000.0;
+  block.channels = {"fx"};
+  block.units = {"N"};
+  block.samples = {1.0, 1e30, 3.0};
+  force.publish(toMsg(block, "dynamometer"));
+  force.publish(toMsg(block, "dynamometer"));
+  ASSERT_TRUE(eventually([&] { return !reported.empty(); }));
+  EXPECT_THAT(reported,
+              HasSubstr("daq/dynamometer: channel fx has values that are not finite or beyond 1e9"));
+  ASSERT_EQ(blocks.size(), 1u);  // the second is the first once more
+  EXPECT_TRUE(std::isnan(blocks[0].samples[1]));
+  EXPECT_EQ(blocks[0].samples[2], 3.0);
+  reported.clear();
+  angle.publish(toMsg(SpindleAngle{100.0, 0.0, 0.0}));
+  EXPECT_TRUE(eventually(
+      [&] { return reported.find("daq/dynamometer: channel fz is missing") != std::string::npos; }));
+  EXPECT_THAT(reported, Not(HasSubstr("spindle/angle")));
+}
+
+TEST(Inputs, AStreamThatStopsIsBehindTheOthers) {
+  ros::NodeHandle nh, private_nh("~");
+  NodeShell shell(nh, private_nh, "none", 1.0);
+  int taken = 0;
+  const std::vector<const char*> topics{"daq/a", "daq/b", "daq/c"};
+  std::vector<ros::Publisher> publishers;
+  for (const char* topic : topics) {
+    shell.inputs().on<SampleBlock>(topic, [&](const SampleBlock&, double) { ++taken; });
+    publishers.push_back(nh.advertise<smartmill_msgs::SampleBlock>(topic, 1000));
+  }
+  std::string reported;
+  const boost::function<void(const diagnostic_msgs::DiagnosticArray&)> listen =
+      [&](const diagnostic_msgs::DiagnosticArray& array) {
+        for (const auto& status : array.status) {
+          if (status.name.find("inputs") != std::string::npos && status.level > 0) reported = status.message;
+        }
+      };
+  const ros::Subscriber diagnostics =
+      nh.subscribe<diagnostic_msgs::DiagnosticArray>("/diagnostics", 10, listen);
+  ASSERT_TRUE(eventually([&] {
+    return std::all_of(publishers.begin(), publishers.end(),
+                       [](const ros::Publisher& p) { return p.getNumSubscribers() == 1; }) &&
+           diagnostics.getNumPublishers() > 0;
+  }));
+  SampleBlock block;
+  block.sample_rate = 100.0;
+  block.channels = {"x"};
+  block.units = {"N"};
+  int sent = 0;
+  for (int k = 0; reported.empty() && k < 100000; ++k) {
+    block.stamp = 100.0 + 0.01 * k;
+    block.first_index = static_cast<std::uint64_t>(k);
+    block.samples = {0.1 * k};
+    for (std::size_t t = 0; t < topics.size(); ++t) {
+      if (t == 1 && k >= 100) continue;
+      publishers[t].publish(toMsg(block));
+      ++sent;
+    }
+    ASSERT_TRUE(eventually([&] { return taken == sent; }));
+  }
+  EXPECT_THAT(reported, HasSubstr("daq/b: "));
+  EXPECT_THAT(reported, HasSubstr("s behind the other inputs"));
+  EXPECT_THAT(reported, Not(HasSubstr("daq/a")));
+}
+
+TEST(KeptMessages, OutliveTheirNodeUntilTheyAreForgotten) {
+  ros::NodeHandle nh;
+  smartmill_msgs::Frf frf;
+  frf.direction = "x";
+  frf.header.stamp = ros::Time(12.5);
+  frf.real = {1.0, std::nan(""), -1e-300};
+  {
+    LatchedTopic<smartmill_msgs::Frf> topic(nh, "kept/frf");
+    EXPECT_TRUE(topic.messages().empty());
+    topic.publish("x", frf);
+  }
+  {
+    LatchedTopic<smartmill_msgs::Frf> topic(nh, "kept/frf");
+    ASSERT_EQ(topic.messages().size(), 1u);
+    const smartmill_msgs::Frf& again = topic.messages().at("x");
+    EXPECT_EQ(again.direction, "x");
+    EXPECT_EQ(again.header.stamp, frf.header.stamp);
+    EXPECT_EQ(again.real[2], -1e-300);
+    EXPECT_TRUE(std::isnan(again.real[1]));
+    topic.forget();
+  }
+  EXPECT_TRUE(LatchedTopic<smartmill_msgs::Frf>(nh, "kept/frf").messages().empty());
+  // Of another message, or damaged.
+  KeptTexts(nh, "kept/frf").keep("x", "*:00");
+  EXPECT_TRUE(LatchedTopic<smartmill_msgs::Frf>(nh, "kept/frf").messages().empty());
+  EXPECT_EQ(bytesOf("0aff"), (std::vector<std::uint8_t>{10, 255}));
+  EXPECT_TRUE(bytesOf("0ag").empty());
 }
 
 TEST(Followers, APlayerLosesNoMessageAndItsPausesAreNoEnd) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <string>
 #include <unordered_map>
 #include <unordered_set>
@@ -44,7 +45,9 @@ class TopicComparison {
   /// To be called after all results of the first recording were added.
   void addSecond(const ResultRecord& record);
 
-  TopicDifference result() const;
+  /// @param from [s] stamp of the first input in the first recording: its earlier results, which cannot be
+  /// repeated, count as ends
+  TopicDifference result(double from = -std::numeric_limits<double>::infinity()) const;
 
  private:
   double slack_;

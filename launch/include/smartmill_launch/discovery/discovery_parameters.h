@@ -26,7 +26,7 @@ struct DiscoveryParameters {
   double program_timeout = 60.0;
   double judged_timeout = 10.0;
   double quiet_time = 1.0;
-  double explain_timeout = 300.0;
+  double explain_budget = 300.0;
 
   session::PathParameters paths;
 

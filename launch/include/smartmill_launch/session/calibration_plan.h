@@ -20,6 +20,7 @@ struct CalibrationParameters {
                             0.0};  // Burzoni 3.2: weights of up to 30 kg, zero before and after
   double reading_time = 0.1;
   double load_settling = 0.2;
+  std::vector<double> tuning_speeds{1460.84};  // resonance_speed of the session
   std::vector<double> points_x{0.045, -0.02, 0.012, 0.045, 0.02, 0.028};
   std::vector<double> points_y{-0.02, -0.04, 0.028, 0.02, -0.04, 0.012};
   std::vector<double> points_z{-0.03, -0.025, 0.03, -0.03, 0.025, 0.03,

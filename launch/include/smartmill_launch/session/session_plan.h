@@ -28,12 +28,16 @@ struct PlanParameters : PathParameters {
   double target_ktc_std = 4.0e6, target_kte_std = 300.0;    // 0.5 % and 1 % of aluminium
 
   double stable_time = 1.0, unstable_time = 0.5;
+  double control_time = 0.0;
   double least_revolutions = 50.0;
 
   double resonance_speed = 1460.84;
   double resonance_depth = 1.0e-3;
   double resonance_feed = 1.0e-4;
   double resonance_time = 0.8;
+
+  std::vector<double> tuning_speeds;  // those of the calibration with sensor spindle, else none
+  double tuning_time = 1.5;
 
   bool isInformative() const { return test_cuts == "informative"; }
   void declare(ParameterTable& table);
@@ -63,6 +67,9 @@ class SessionPlan {
   const std::vector<PlannedCut>& airMoves() const { return air_moves_; }
   const std::vector<PlannedCut>& slots() const { return slots_; }
   const std::optional<PlannedCut>& resonance() const { return resonance_; }
+  /// Cuts from which the process noise of the force filter is tuned, two in air and a light slot at each
+  /// speed of tuning_speeds.
+  const std::vector<PlannedCut>& tuning() const { return tuning_; }
 
   /// Slots and cuts of half immersion, up and down, at each feed; without test_cuts `informative` none.
   const std::vector<PlannedCut>& candidates() const { return candidates_; }
@@ -76,6 +83,9 @@ class SessionPlan {
   /// Cuts that verify the chart, each in its own lane. @throws Error if a cut does not fit machine or stock.
   PlannedCut stable(const Point& point, double feed_per_tooth) const;
   PlannedCut unstable(const Point& point, double feed_per_tooth) const;
+  /// Cut at the unstable point that the chatter control is to stabilise; with control_time 0 none.
+  /// @throws Error if it does not fit machine or stock.
+  std::optional<PlannedCut> controlled(const Point& point, double feed_per_tooth) const;
 
   /// First of the points that stable() or unstable() accepts. @param reasons why the points before it were
   /// refused, in one line.
@@ -89,14 +99,20 @@ class SessionPlan {
  private:
   void addCandidates();
   void planResonance();
+  void planTuning();
+  SlotRequest lightSlot(double speed, std::size_t lane) const;
   std::size_t verifyingCuts() const;
+  /// @{ Lanes after those that verify the chart: resonance, chatter control, tuning.
+  std::size_t controlLane() const;
+  std::size_t tuningLane() const;
+  /// @}
   PlannedCut verifying(const char* name, std::size_t lane, const Point& point, double feed_per_tooth,
                        double time) const;
   SlotRequest slotRequest(std::size_t feed) const;
 
   PlanParameters parameters_;
   CutPlanner planner_;
-  std::vector<PlannedCut> air_cuts_, air_moves_, slots_, candidates_;
+  std::vector<PlannedCut> air_cuts_, air_moves_, slots_, candidates_, tuning_;
   std::vector<SlotRequest> requests_;  // of the candidates
   std::vector<bool> placed_;           // of the candidates
   std::size_t verifying_lane_ = 0;     // the first
@@ -109,6 +125,7 @@ struct ChatterWindow {
   bool chatter = false;
   double frequency = NOT_A_NUMBER;  ///< [Hz]
   double severity = 0.0;            ///< [N]
+  double stamp = NOT_A_NUMBER;      ///< [s] of its end
 };
 
 /// Verdict on a cut from all its windows.

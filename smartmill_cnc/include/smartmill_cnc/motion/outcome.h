@@ -29,7 +29,7 @@ enum class OverrideCode : std::uint8_t { ok = 0, not_connected = 1, not_armed = 
 /// Codes of the service FeedHold.
 enum class HoldCode : std::uint8_t { ok = 0, not_connected = 1, not_armed = 2, refused = 3 };
 /// Codes of the service ArmMotion.
-enum class ArmCode : std::uint8_t { ok = 0, not_connected = 1, wrong_mode = 2, alarm = 3 };
+enum class ArmCode : std::uint8_t { ok = 0, not_connected = 1, wrong_mode = 2, alarm = 3, held = 4 };
 /// Codes of the service SetMacro.
 enum class MacroCode : std::uint8_t { ok = 0, not_connected = 1, refused = 2 };
 

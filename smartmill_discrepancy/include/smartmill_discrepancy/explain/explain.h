@@ -1,5 +1,7 @@
 #pragma once
 
+#include <functional>
+#include <limits>
 #include <string>
 
 #include "smartmill_discrepancy/data/dataset.h"
@@ -13,11 +15,13 @@ struct ExplainOptions {
   WorkbenchOptions bench;
   SearchOptions search;
   StructureOptions structure;
+  double budget = std::numeric_limits<double>::infinity();  ///< [s] of the whole workflow
+  std::function<double()> elapsed;                          ///< [s] since its begin; required by a budget
 };
 
 /// The complete workflow: check labels, search for missing effects, localise the disagreement, validate
-/// effects, write FOLDER/model.yaml and measure the gap with that file. When cancelled, it ends with the
-/// effects found so far.
+/// effects, write FOLDER/model.yaml and measure the gap with that file. When cancelled, or when its budget is
+/// spent, it ends with the effects found so far, judged as usual, and the effects that were not tried.
 /// @throws Error if campaign or model cannot be used.
 Explanation explain(const Dataset& data, const ExplainOptions& options, const std::string& folder);
 

@@ -9,14 +9,20 @@
 namespace smartmill::discrepancy {
 
 struct LiveGapOptions {
+  ComparedForce compared = ComparedForce::measured;
   double limit = 1.5;
   double load_step = 1.0e-4;
+  double force_error = 0.05;
 
   void declare(ParameterTable& table) {
     table.number("limit", limit, "1", Range::above(1.0),
                  "gap (RMS difference over noise; 1 is the noise floor) above which the model does not fit");
     table.number("load_step", load_step, "1", Range::notNegative(),
                  "of full scale: resolution of the spindle load from the controller");
+    table.number(
+        "force_error", force_error, "1", Range::notNegative(),
+        "of the RMS force of all axes: error of compensated forces that is added to the noise; 0.05 is the "
+        "target of the compensation");
   }
 };
 
@@ -31,6 +37,10 @@ struct LiveGap {
   std::string exclusion;    ///< reason why the segment was not compared (chatter); empty if it was
   bool near_limit = false;  ///< too close to the stability limit for the coarse twin of explain
 };
+
+/// Model of the twin whose forces are compared. With compensated ones its force sensor is ideal and shows the
+/// force on the tool in the machine's axes, with the noise of the model's.
+MachineModel comparedModel(MachineModel model, ComparedForce compared);
 
 /// Gap of one segment. fx, fy, fz are compared sample by sample (only the second half if the segment states
 /// no running_before). load_meter is compared if the model has a spindle with its full scale and the segment

@@ -30,6 +30,12 @@ struct RecordSegment {
   std::vector<LoadMeasurement> load;
 };
 
+/// Force that is compared with the twin.
+enum class ComparedForce {
+  measured,     ///< output of the dynamometer; the twin has the modes of the sensor
+  compensated,  ///< force on the tool, of any force sensor; the twin has none
+};
+
 struct SegmentParameters {
   double length = 0.3;
   double settle = 0.15;
@@ -62,7 +68,9 @@ class SegmentRecorder {
   void handle(const CuttingCondition& condition);
   void handle(const CncState& state);
   void handle(const SpindleAngle& angle);
-  void handle(const SampleBlock& dynamometer);
+  void handle(const SampleBlock& forces);
+  /// A block that is not compensated throughout ends the segment as lost samples do.
+  void handle(const ForceBlock& compensated);
   void handle(const LoadSample& load);
   void reset();
 
@@ -94,17 +102,20 @@ class SegmentRecorder {
 /// The recorder behind a stream sorter, for a node and for a bag.
 class SegmentPipeline {
  public:
-  SegmentPipeline(const SegmentParameters& parameters, double hold_back,
+  SegmentPipeline(const SegmentParameters& parameters, ComparedForce compared, double hold_back,
                   std::function<void(const RecordSegment&)> deliver);
 
   void push(const CuttingCondition& condition);
   void push(const CncState& state);
   void push(const SpindleAngle& angle);
   void push(const SampleBlock& dynamometer);
+  void push(const ForceBlock& compensated);
   void push(const LoadSample& load);
+  ComparedForce compared() const { return compared_; }
   void flush() { sorter_.flush(); }
 
  private:
+  ComparedForce compared_;
   SegmentRecorder recorder_;
   StreamSorter sorter_;
   StreamSorter::Stream conditions_, states_, angles_, blocks_, loads_;

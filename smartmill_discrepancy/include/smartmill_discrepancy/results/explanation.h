@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <map>
 #include <optional>
 #include <string>
@@ -8,6 +9,7 @@
 
 #include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_discrepancy/explain/inspection_check.h"
 #include "smartmill_discrepancy/results/candidate_result.h"
 #include "smartmill_discrepancy/results/finding.h"
 
@@ -29,6 +31,10 @@ struct FoundParameter {
   std::string key;  ///< as in the model file
   double value = 0.0;
   double std_dev = 0.0;
+  double modulo = 0.0;  ///< [deg] of an angle that is known up to multiples of it; 0: it is known
+
+  /// The value as far as it is known: an angle from 0 to the modulus.
+  double known() const { return modulo > 0.0 ? value - modulo * std::floor(value / modulo) : value; }
 };
 
 /// A nominal value that the records determine differently than the model states.
@@ -47,15 +53,15 @@ struct FoundEffect {
   double delta_bic = 0.0;  ///< BIC gain against the model without it
   /// [1] share of the held-out squares above the noise that it removes
   double heldout_gap_reduction = 0.0;
-  double confidence = 0.0;  ///< [1] probability that it reduces the gap of tests outside the fit, compared
-                            ///< with no effect and with each alternative (ValidationResult)
+  /// [1] probability that it reduces the gap of tests outside the fit, compared with no effect and with each
+  /// alternative (ValidationResult) except those of not_separable that predict the same in every test
+  double confidence = 0.0;
   std::vector<std::pair<std::string, double>> alternatives;  ///< other effects instead of it: name, delta_bic
 };
 
 /// Rejected effect of the catalogue that is closest to the residual.
 struct Resemblance {
   std::string name, variant, reason;
-  std::optional<double> confidence = {};  ///< as FoundEffect::confidence, if it was validated
 };
 
 /// Gap of one channel of one test before and after.
@@ -124,11 +130,14 @@ struct Explanation {
   std::vector<ChannelShare> channels;
   std::vector<CandidateResult> candidates;
   std::vector<std::string> notes;
+  InspectionCheck inspection;             ///< with --inspection
   std::vector<ChatteringCut> chattering;  ///< used in the fit
   std::vector<RevolutionCurve> revolutions;
   std::vector<SpectrumCurve> spectra;
-  MachineModel model;        ///< the improved model, as written
-  bool interrupted = false;  ///< cancelled: effects found until then
+  MachineModel model;                  ///< the improved model, as written
+  bool interrupted = false;            ///< cancelled: effects found until then
+  std::optional<double> spent_budget;  ///< [s] time budget that ended a stage: effects found until then
+  std::vector<std::string> not_tried;  ///< effects of the catalogue that either has left untried
   double seconds = 0.0;
 };
 

@@ -65,6 +65,10 @@ struct SearchResult {
   std::vector<FitState> without_member;  ///< refitted model without each member
   std::vector<Alternative> alternatives;
   std::vector<const Hypothesis*> rejected;  ///< denied by held-out tests: they imitate another effect
+  /// Of a cancelled search: neither fitted nor screened with too small a gain.
+  std::vector<const Hypothesis*> not_tried;
+  /// Members that were not validated next to an accepted empirical effect, since the work was ended.
+  std::vector<const Hypothesis*> not_validated;
 
   /// Marks one effect as replaced by another among the candidates.
   void markReplaced(const Hypothesis& old, const Hypothesis& better);

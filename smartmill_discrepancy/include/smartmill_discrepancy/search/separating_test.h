@@ -9,6 +9,9 @@
 
 namespace smartmill::discrepancy {
 
+/// [1] of the noise by which the predictions of a test separate two models.
+constexpr double MIN_SEPARATION = 0.3;
+
 /// A test that distinguishes two models.
 struct SeparatingTest {
   std::string text;         ///< description

@@ -117,9 +117,12 @@ double periodOf(const std::vector<double>& correlation, double rate, const Burst
     lag = static_cast<double>(k);
     break;
   }
+  // A peak at a whole lag is within half a sample; multiples that disagree by more are other peaks.
+  const double peak = lag;
   for (double count = 2.0; count * lag < static_cast<double>(correlation.size()) - 2.0; ++count) {
-    const auto at = highestAbout(count * lag, 2.0 + 0.5 * count);
-    if (at > 0) lag = static_cast<double>(at) / count;
+    const double refined = static_cast<double>(highestAbout(count * lag, 2.0 + 0.5 * count)) / count;
+    if (std::abs(refined - peak) > 1.0) break;
+    lag = refined;
   }
   return lag;
 }

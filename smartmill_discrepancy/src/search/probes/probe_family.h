@@ -40,6 +40,7 @@ class ProbeFamily {
 std::unique_ptr<ProbeFamily> makeSensorModes(const ProbeContext& context);
 std::unique_ptr<ProbeFamily> makeTipModes(const ProbeContext& context);
 std::unique_ptr<ProbeFamily> makeSpindleOrders(const ProbeContext& context);
+std::unique_ptr<ProbeFamily> makeFreeOrders(const ProbeContext& context);
 
 /// Probes of any hypothesis: the stated ones, or those of its family.
 class ProbeFinder {

@@ -9,6 +9,7 @@ ProbeFinder::ProbeFinder(const Projection& projection, const TwinRunner& runner,
   families_[Strategy::sensor_mode] = makeSensorModes(context_);
   families_[Strategy::tip_mode] = makeTipModes(context_);
   families_[Strategy::spindle_order] = makeSpindleOrders(context_);
+  families_[Strategy::free_order] = makeFreeOrders(context_);
 }
 
 Probes ProbeFinder::probesOf(const Hypothesis& hypothesis) {

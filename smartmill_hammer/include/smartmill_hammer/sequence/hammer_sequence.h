@@ -25,9 +25,10 @@ struct StepOutcome;
 /// angle and at rest, axes at their target with no distance to go, a hit in the record. An abort retracts the
 /// tool where the controller's state permits it, and states so in the message.
 ///
-/// Signs: the tool nears the sensor in the positive sense of the direction; the hammer above the sensor
-/// strikes away from it. A hit thus lowers the voltage, and displacement along the hit is
-/// -(V - V before) x sensitivity.
+/// Signs: the tool nears the sensor in the positive sense of the direction; a hammer above the sensor strikes
+/// away from it. A hit thus lowers the voltage, and displacement along the hit is -(V - V before) x
+/// sensitivity. A hammer opposite the sensor (HammerStation::Opposite) strikes towards it: +(V - V before) x
+/// sensitivity.
 class HammerSequence {
  public:
   /// @throws Error when the model lacks the hammer or the tool section, or a parameter is out of range.

@@ -77,8 +77,9 @@ class SearchFluteAtTip : public SearchFlute {
 
  private:
   void storeFlute() override {
-    measurement_.result.flute_low = search_->angle();
-    measurement_.result.flute_confidence = search_->confidence();
+    MeasureFrfResult& result = measurement_.result;
+    result.flute_low = result.flute_high = result.flute_hammer = search_->angle();
+    result.flute_confidence = search_->confidence();
     measurement_.approach.startFromFlute(search_->measurements(), search_->angle(), search_->volt());
   }
 };
@@ -87,6 +88,7 @@ class SearchFluteHalfway : public SearchFlute {
  public:
   using SearchFlute::SearchFlute;
 
+  bool isNeeded() const override { return measurement_.hasOffset(); }
   StepOutcome begin(double now) override {
     measurement_.report("searching the flute halfway up to the hammer", 0.3);
     // A right-hand helix lags with height: the spindle must turn on by the lag.
@@ -122,6 +124,7 @@ class ShiftHeight : public SequenceStep {
   ShiftHeight(Measurement& measurement, StationControl& control, bool down)
       : SequenceStep(measurement, control), down_(down) {}
 
+  bool isNeeded() const override { return measurement_.hasOffset(); }
   bool watchesRange() const override { return down_; }
   StepOutcome begin(double now) override {
     if (down_) measurement_.report("lowering the tool to find the flute halfway up to the hammer", 0.28);

@@ -41,7 +41,8 @@ struct CompensationHealth {
   double innovation_correlation = 0;
   std::array<double, 3> zero{{0, 0, 0}};  ///< [N] sensor mean without cutting (condition AIR or NONE)
   double speed = 0;                       ///< [rad/s] of the filters; 0: passing through
-  double speed_std = 0;                   ///< [rad/s] with track_speed
+  double speed_std = 0;                   ///< [rad/s] of an estimated speed; 0: measured
+  std::size_t estimated_blocks = 0;       ///< compensated with an estimated speed
 };
 
 /// A compensation method: estimates the applied force of the three axes while the spindle turns at a known

@@ -53,6 +53,8 @@ class CompensationPipeline {
   void pushHammer(SampleBlock block);
   void push(const SpindleAngle& angle);
   void push(const CuttingCondition& condition);
+  /// State of the controller: its speed, for estimates without spindle/angle.
+  void push(const CncState& state);
   /// @param begin called at the goal's stamp with whether no other measurement runs; returns whether to
   /// start; may be empty
   void push(const MeasureFrfGoal& goal, std::function<bool(bool)> begin = {});
@@ -67,6 +69,9 @@ class CompensationPipeline {
   void cancelCalibration();
   /// The hammer's stream has ended: other streams no longer wait for it.
   void hammerStopped(const std::string& reason);
+  /// Readings of the spindle no longer come while blocks do: with track_speed auto blocks do not wait for
+  /// them until the next one. The choice of the speed does not depend on it.
+  void anglesStopped();
   /// End of data.
   void flush();
 
@@ -81,7 +86,8 @@ class CompensationPipeline {
   std::function<void()> use_file_;  // the calibration of a file; empty: none
   std::optional<ChannelForces> channels_;
   StuckChannel stuck_;
-  StreamSorter::Stream conditions_, goals_, hammers_, angles_, blocks_;
+  bool may_estimate_;  // the speed, where angles are missing
+  StreamSorter::Stream conditions_, goals_, hammers_, angles_, blocks_, states_;
 };
 
 }  // namespace smartmill::kalman

@@ -5,17 +5,20 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "smartmill_core/modal/modal_model.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_kalman/compensation/compensation_method.h"
+#include "smartmill_kalman/compensation/force_model_chooser.h"
 #include "smartmill_kalman/compensation/steady_speed.h"
 #include "smartmill_kalman/filter/coupled_filter.h"
 
 namespace smartmill::kalman {
 
 /// Sensor blocks in, force blocks out with the same sample index. Checks the samples, passes them through
-/// while the spindle is slow or its speed changes, and otherwise hands them to a CompensationMethod. Inputs
+/// while the spindle is slow or its speed changes, and otherwise hands them to a CompensationMethod, with the
+/// measured or an estimated speed (ForceModelChooser). Inputs
 /// come in stamp order (CompensationPipeline), and the result depends only on them: the filters restart at
 /// every cutting condition and at a gap of the sample index.
 class ForceCompensation {
@@ -32,7 +35,7 @@ class ForceCompensation {
   /// Sensor with cross-talk from now on (CoupledCompensation). Its diagonal elements are the sensor models;
   /// setSensor() replaces them, the cross-talk stays. @throws Error.
   void setMatrix(const SensorMatrix& matrix);
-  bool hasSensor() const { return has_sensor_[0] && has_sensor_[1] && has_sensor_[2]; }
+  bool hasSensor() const { return sensor_[0] && sensor_[1] && sensor_[2]; }
   /// Process noise over the spindle speed from now on; the filters restart.
   void setMemory(const MemorySchedule& memory);
   const MemorySchedule& memory() const { return memory_; }
@@ -45,6 +48,7 @@ class ForceCompensation {
   void handle(const SampleBlock& block);
   void handle(const SpindleAngle& angle);
   void handle(const CuttingCondition& condition);
+  void handle(const CncState& state);
 
   /// End of data: pending blocks are published.
   void flush() { method_->flush(); }
@@ -52,19 +56,29 @@ class ForceCompensation {
   void reset();
 
   const CompensationHealth& health() const { return health_; }
+  /// Force model in use and its reason, one line.
+  std::string forceModel() const { return chooser_.text(); }
+  bool hasDefaultForceModel() const { return chooser_.hasDefault(); }
 
  private:
   ForceBlock measuredForce(const SampleBlock& block);
   void updateZero(const ForceBlock& measured);
+  void makeMethod();
+  /// Takes the speed of a block. @return whether it is known and steady
+  bool takeSpeed(double stamp);
 
   CompensationParameters parameters_;
   double sign_;
   ForceOutputs outputs_;
+  ForceModelChooser chooser_;
+  bool estimates_speed_;  // the method
   std::unique_ptr<CompensationMethod> method_;
   MemorySchedule memory_;
-  std::array<bool, 3> has_sensor_{};
+  std::optional<SensorMatrix> matrix_;
+  std::array<std::optional<SensorAxis>, 3> sensor_;
   SteadySpeed steady_speed_;
-  SpindleAngle spindle_;  // newest
+  SpindleAngle angle_;    // newest reading
+  SpindleAngle spindle_;  // that the method uses
   std::optional<CuttingCondition> condition_;
   std::optional<std::uint64_t> next_index_;
   double settling_left_ = 0.0;  // [s]

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <optional>
+#include <string>
 
 #include "smartmill_core/model/force_sensor_kind.h"
 #include "smartmill_core/model/machine_model.h"
@@ -53,12 +54,17 @@ class SensorForces {
   const SampleBlock* handle(const SampleBlock& block);
   void handle(const SpindleAngle& angle);
   void handle(const CuttingCondition& condition);
+  void handle(const CncState& state) { compensation_.handle(state); }
   /// End of data: pending blocks are published.
   void flush();
   /// A recording was restarted: as new, measured modes are dropped.
   void reset();
 
   CompensationHealth health() const;
+  /// Force model in use and its reason, one line.
+  std::string forceModel() const;
+  /// Harmonics (or delay_form) by a spindle angle without ripple.
+  bool hasDefaultForceModel() const { return inverse_ || compensation_.hasDefaultForceModel(); }
   /// Model in use of an axis.
   const ModalModel& sensor(std::size_t axis) const { return compensation_.sensor(axis); }
   bool invertsMatrix() const { return inverse_.has_value(); }

@@ -23,6 +23,10 @@ struct HarmonicFilterParameters {
   /// The same process noise for every harmonic (Burzoni's Q): one with a low transmissibility has a longer
   /// memory than memory_revolutions, by its reciprocal. False: all have the same memory.
   bool uniform_noise = false;
+  /// Each harmonic enters the force with its Wiener weight in a steady cut; for sensors whose noise,
+  /// amplified by 1 / |H|, is not small compared with the force. They narrow the range of a force with little
+  /// noise by 3 to 6 %.
+  bool weighted = false;
 
   void declare(ParameterTable& table) {
     table.number(
@@ -61,6 +65,10 @@ std::vector<HarmonicGain> designGains(const ModalModel& sensor, double spindle_s
 /// After a change (start, tool entry) the filter follows within settling_revolutions. In a steady cut its
 /// memory grows to memory_revolutions and the noise falls; an outlying innovation resets it (AdaptiveMemory).
 /// Only the gain changes, the state continues.
+///
+/// With HarmonicFilterParameters::weighted each harmonic enters the force of a steady cut with the weight
+/// that minimises its mean square error (Wiener): where the sensor hardly responds, a harmonic is mostly
+/// noise, amplified by 1 / |H|.
 class HarmonicFilter {
  public:
   static constexpr std::size_t LEVELS = 3;
@@ -77,6 +85,9 @@ class HarmonicFilter {
     innovation_ = measured - predicted_output_;
     const double force = advance(gains_[memory_.level()].data(), innovation_, force_gain_[memory_.level()]);
     memory_.add(innovation_);
+    innovation_sum_ += innovation_ * innovation_;
+    if (++innovation_count_ >= revolution_) endRevolution();
+    if (weighted_ && !memory_.settled()) resetWeights();
     return force;
   }
 
@@ -110,6 +121,17 @@ class HarmonicFilter {
   const HarmonicPairs& pairs() const { return pairs_; }
   const AdaptiveMemory& memory() const { return memory_; }  ///< level 0 quick .. LEVELS - 1 slow
   void setLevel(std::size_t level) { memory_.setLevel(level); }
+  /// Weight of harmonic n in the force, 1 unless the cut is steady.
+  double weight(std::size_t n) const {
+    const std::size_t i = pairs_.modes() + n;
+    return weights_[i / 4][i % 4];
+  }
+  /// False (the state of a filter made from gains): all weights of the harmonics are 1, as a smoother
+  /// requires, which corrects the filter's force.
+  void setWeighting(bool on) {
+    weighting_ = on;
+    if (!on && weighted_) resetWeights();
+  }
   /// @param state in the coordinates of HarmonicGain
   void setState(const std::vector<double>& state);
   std::shared_ptr<const HarmonicSmoother> smoother() const;
@@ -121,12 +143,23 @@ class HarmonicFilter {
   void setModel(const ModalModel& sensor, double spindle_speed);
   void setGains();
   void replaceModes(const ModalModel& sensor, std::vector<HarmonicGain> gains);
+  /// Weights of the next revolution by the innovations of this one.
+  void endRevolution();
+  void resetWeights();
+  using Vector4 = HarmonicPairs::Vector4;
+  std::vector<Vector4> unitWeights() const;
+  /// Share of an innovation in the force of its step, of each level.
+  std::vector<double> forceGains(const std::vector<Vector4>& weights) const;
 
   HarmonicPairs pairs_;
   std::vector<HarmonicGain> design_;
   std::vector<std::vector<GainBatch>> gains_;
   std::vector<double> force_gain_, innovation_std_;
+  std::vector<Vector4> weights_;               // [1] of the pairs in the force; 0: of a mode
+  bool weighting_ = false, weighted_ = false;  // whether weights are used; whether one is not 1
   double predicted_output_ = 0.0, innovation_ = 0.0;
+  double innovation_sum_ = 0.0;                        // [N2] of the running revolution
+  std::size_t innovation_count_ = 0, revolution_ = 1;  // [samples]
   AdaptiveMemory memory_;
   mutable std::shared_ptr<const HarmonicSmoother> smoother_;  // empty: not computed yet
 };

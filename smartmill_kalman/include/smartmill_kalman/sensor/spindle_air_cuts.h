@@ -36,6 +36,9 @@ class SpindleAirCuts {
                  const AirCutOptions& options = {});
 
   void reset();
+  /// Takes over the unbalance, which was estimated with another calibration of the same sensor. The zero is
+  /// estimated anew: weights may have been on the tool.
+  void keepUnbalance(const SpindleAirCuts& before);
   /// Dynamics of an axis that the unbalance force passes.
   void setSensor(std::size_t axis, const ModalModel& sensor) { sensor_.at(axis) = sensor; }
   void handle(const SpindleAngle& angle);

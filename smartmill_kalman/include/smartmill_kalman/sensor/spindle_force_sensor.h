@@ -67,6 +67,8 @@ class SpindleForceSensor {
   void lowPass(ForceBlock& block);
 
   void reset();
+  /// Takes over the unbalance of the spindle, which a new calibration of the sensor does not change.
+  void keepUnbalance(const SpindleForceSensor& before);
   const SpindleSensorHealth& health() const { return health_; }
 
  private:

@@ -28,11 +28,15 @@ struct TuningOptions {
   /// [1] least predicted reduction of the error: predicted and true reductions differ by this much on the
   /// simulated machine (seeds 41, 2028), so that a smaller one may be none.
   double least_gain = 0.1;
+  /// [1] of the steady force: a larger change between the revolutions before and after one is tool entry,
+  /// where the smoothed force counts, with its noise.
+  double changing = 0.1;
   double settled = 0.02;  ///< [s] start of a record that whiteness does not use
 };
 
 /// Process noise that minimises the force error at one speed. The cut is reproduced: the force that a
-/// smoother finds in it passes the identified sensor, and the samples measured in air are its noise. Each
+/// smoother finds in it, in the steady part without its noise, passes the identified sensor, and the samples
+/// measured in air are its noise. Each
 /// candidate q = r dt / tau^2 (Burzoni eq. 6-2) filters the reproduced cut, whose force is known (his taps
 /// have a known force too; an impact is not periodic, so that it cannot tune a filter of harmonics). The
 /// criterion is the RMS of the force error from before tool entry on: noise of a short memory, delay of a

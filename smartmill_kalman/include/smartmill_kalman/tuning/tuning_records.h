@@ -11,14 +11,19 @@
 namespace smartmill::kalman {
 
 struct TuningRecordOptions {
-  double length = 1.0;  ///< [s] of air and of cut: tool entry and a steady part, few megabytes a speed
-  double speed_tolerance = 0.002;  ///< [1] a segment whose speed changes by more is not used
+  double air_length = 1.0;  ///< [s] few megabytes a speed
+  double cut_length = 2.0;  ///< [s] from steady speed on: approach, tool entry and a steady part
+  double least = 0.3;       ///< [s] a shorter record begins again when the speed changes, a longer one ends
+  double speed_tolerance = 0.002;  ///< [1] of the change of speed at which a record begins again or ends
+  double entry = 0.02;             ///< [s] start of a cut, which must be in air
+  double quiet = 2.0;              ///< [1] RMS of the force there at most, of that in air
   double same_speed = 0.01;  ///< [1] air and cut within it belong together; a later pair replaces an earlier
   std::size_t most_speeds = 32;  ///< 5 MB each; the first of them are kept
 };
 
-/// Keeps the samples that tuning requires: the last in air and the first of a cut that follows at the same
-/// speed, each speed of a run-up. Inputs in stamp order.
+/// Keeps the samples that tuning requires, each speed of a run-up: the last in air at a steady speed, and the
+/// first at this speed of a cut that follows, from before tool entry. The spindle may run up and stop within
+/// a condition. Inputs in stamp order.
 class TuningRecords {
  public:
   explicit TuningRecords(const TuningRecordOptions& options = {}) : options_(options) {}
@@ -34,12 +39,14 @@ class TuningRecords {
 
  private:
   void closeSegment();
+  bool startsInAir() const;
 
   TuningRecordOptions options_;
   double speed_ = 0.0;  // [rad/s] newest
   std::optional<CuttingCondition::Kind> kind_;
   TuningRecord air_, cut_;
-  bool valid_ = false;  // the running segment: steady, no gap, finite
+  bool valid_ = false;     // the running segment is finite
+  bool complete_ = false;  // its record has ended
   std::optional<std::uint64_t> next_index_;
   std::map<double, TuningRecord> records_;  // by speed
 };

@@ -3,6 +3,7 @@
 #include <memory>
 #include <string>
 
+#include "smartmill_core/io/data_folder.h"
 #include "smartmill_loadmeter/database/database.h"
 
 namespace smartmill::loadmeter {
@@ -14,18 +15,8 @@ constexpr const char* DATABASE_NONE = "none";  ///< this run only, as an empty v
 
 bool isWithoutFile(const std::string& database);
 
-/// Variables of the environment that define the data folder. Empty: not set.
-struct DataFolders {
-  std::string state;  ///< $STATE_DIRECTORY, of a systemd service; the first of several separated by ':'
-  std::string data;   ///< $XDG_DATA_HOME
-  std::string home;   ///< $HOME
-
-  static DataFolders ofEnvironment();
-};
-
-/// Path of a machine's file: $STATE_DIRECTORY/NAME.sqlite, else $XDG_DATA_HOME/smartmill/NAME.sqlite, else
-/// ~/.local/share/smartmill/NAME.sqlite, where NAME is the machine's name or, without one, that of its model
-/// file. Relative folders are ignored (XDG Base Directory Specification).
+/// Path of a machine's file NAME.sqlite in the data folder (dataFile), where NAME is the machine's name or,
+/// without one, that of its model file.
 /// @throws Error when no folder is defined.
 std::string databaseFile(const DataFolders& folders, const std::string& machine, const std::string& model);
 

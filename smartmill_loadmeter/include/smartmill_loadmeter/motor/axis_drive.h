@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <string>
 #include <vector>
 
 #include "smartmill_core/campaign/record.h"
@@ -42,6 +43,8 @@ struct AxisDrive {
   double residual = 0.0;   ///< [A] RMS, of the smoothed current
   double explained = 0.0;  ///< [1] share of the variance of the smoothed current
   double largest_velocity = 0.0, largest_acceleration = 0.0;  ///< [m/s], [m/s2] of the smoothed motion
+
+  std::string text() const;  ///< one line
 };
 
 /// Least squares over all records. Velocity, sign of the velocity and current pass through the same window,

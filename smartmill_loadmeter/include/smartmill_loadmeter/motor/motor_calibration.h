@@ -48,6 +48,19 @@ struct CalibrationSamples {
   std::optional<Anfis> learn() const;
 };
 
+/// RMS errors [N or N m] of both methods at the cuts of a calibration, each predicted from the others, where
+/// it lies within their range (ANFIS does not extrapolate). Cheng & Venuvinod, table 1.
+struct MethodErrors {
+  double regression = 0.0, anfis = 0.0;
+  std::size_t cuts = 0;  ///< that were predicted
+};
+/// Of a feed drive, F = m (I - Ia). Empty where the others are too few for ANFIS.
+std::optional<MethodErrors> driveErrors(const CalibrationSamples& samples);
+/// Of the spindle, T = a(N) dI^b(N), one law over all speeds.
+std::optional<MethodErrors> spindleErrors(const CalibrationSamples& samples);
+/// "error of the next cut 3.1 N by regression, 4.0 N by ANFIS (7 cuts)"
+std::string textOf(const MethodErrors& errors, const char* unit);
+
 /// F = m (I - Ia) of one feed drive.
 struct DriveCalibration {
   Estimate
@@ -66,7 +79,9 @@ struct MotorCalibration {
   std::optional<TorquePowerLaw> spindle;
   CalibrationSamples spindle_samples;
   std::optional<Anfis> spindle_anfis;  ///< of the samples; empty: too few
-  std::vector<std::string> notes;      ///< rejected cuts and inconsistencies; one line each
+  /// Whether a drive or the spindle has enough cuts for ANFIS, so that both methods can be compared.
+  bool hasAnfis() const;
+  std::vector<std::string> notes;  ///< rejected cuts and inconsistencies; one line each
 };
 
 /// Tables "cut,force_x[N],force_y[N],force_z[N],torque[N m]" and "cut,spindle_speed[rpm],current_x[A],

@@ -35,6 +35,12 @@ struct MotorParameters {
                  "force from the rise of a current: by regression or by ANFIS, both from the cuts of the "
                  "calibration; ANFIS needs 8 cuts of an axis, 24 of the spindle, and does not extrapolate");
   }
+  /// The same with the other method.
+  MotorParameters withOtherMethod() const {
+    MotorParameters other = *this;
+    other.method = motorMethod() == MotorMethod::anfis ? "regression" : "anfis";
+    return other;
+  }
   MotorMethod motorMethod() const { return method == "anfis" ? MotorMethod::anfis : MotorMethod::regression; }
   bool any() const;
   /// @throws Error naming key and value.
@@ -100,6 +106,8 @@ struct MotorForce {
   std::array<std::vector<SpectralLine>, 3> lines;  ///< [N2] of the force, attenuated by the drives' lag
   std::optional<Estimate> torque;                  ///< [N m] of the spindle
   std::array<std::string, 4> reason;               ///< why X, Y, Z, torque are unknown
+  /// The forces by the method that was not chosen, in one line; empty where its calibration has too few cuts.
+  std::string by_other_method;
   /// For example "Fx -120.1 +- 3.0 N; Fy not observable: the axis is at rest".
   std::string text() const;
 };

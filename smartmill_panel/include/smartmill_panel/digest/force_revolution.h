@@ -1,11 +1,11 @@
 #pragma once
 
 #include <array>
-#include <deque>
 #include <optional>
 #include <vector>
 
 #include "smartmill_core/parameters/parameter_table.h"
+#include "smartmill_core/signal/angle_track.h"
 #include "smartmill_core/signal/streams.h"
 
 namespace smartmill::panel {
@@ -17,24 +17,6 @@ struct RevolutionParameters {
     table.number("revolution_bins", bins, "1", Range::closed(8, 4096),
                  "angle bins per revolution of the spindle");
   }
-};
-
-/// Spindle angle at any time, from readings that may arrive late: interpolated linearly between two readings,
-/// extrapolated with the speed of the nearest one.
-class AngleTrack {
- public:
-  /// A backward jump of time resets the track.
-  void push(const SpindleAngle& reading);
-  /// [rad] 0 .. 2 pi; empty: no reading within REACH
-  std::optional<double> at(double time) const;
-  /// [rad/s] of the newest reading; 0: none
-  double speed() const { return readings_.empty() ? 0.0 : readings_.back().speed; }
-
-  static constexpr double HISTORY = 5.0;  ///< [s] of stored readings
-  static constexpr double REACH = 0.5;    ///< [s] beyond the nearest reading
-
- private:
-  std::deque<SpindleAngle> readings_;
 };
 
 /// Force over the spindle angle: mean, minimum and maximum of the samples in each bin.

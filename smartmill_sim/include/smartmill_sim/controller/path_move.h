@@ -3,17 +3,19 @@
 #include <array>
 #include <optional>
 
+#include "smartmill_core/nc/path_segment.h"
+
 namespace smartmill::sim {
 
-/// Motion of a point along a straight line or an arc in x and y (z proportional to the path), with a
-/// trapezoidal speed profile: from the present speed to the feed, to rest exactly at the target. Closed form
-/// in time. Times [s] are those of the caller's clock and do not decrease.
+/// Motion of a point along a path with a trapezoidal speed profile: from the present speed to the feed, to
+/// rest exactly at the target. Closed form in time. Times [s] are those of the caller's clock and do not
+/// decrease.
 class PathMove {
  public:
-  using Point = std::array<double, 3>;
+  using Point = nc::PathSegment::Point;
 
   /// At rest at a point.
-  explicit PathMove(const Point& point) : start_(point), target_(point) {}
+  explicit PathMove(const Point& point) : path_(point) {}
   static PathMove line(const Point& start, const Point& target);
   /// @param centre [m] x, y @param clockwise seen from +z; a target equal to the start is a full circle
   static PathMove arc(const Point& start, const Point& target, const std::array<double, 2>& centre,
@@ -26,11 +28,11 @@ class PathMove {
   /// Brakes to rest on the path; the point of rest becomes the target.
   void stop(double time, double acceleration);
 
-  double length() const { return length_; }          ///< [m]
+  double length() const { return path_.length(); }   ///< [m]
   double end() const { return begin_ + duration_; }  ///< [s] when it comes to rest
   /// Whether it comes to rest before the target.
-  bool held() const { return end_distance_ < length_; }
-  const Point& target() const { return target_; }  ///< [m]
+  bool held() const { return end_distance_ < path_.length(); }
+  const Point& target() const { return path_.target(); }  ///< [m]
   Point position(double time) const;
   double speed(double time) const;    ///< [m/s] along the path
   Point velocity(double time) const;  ///< [m/s]
@@ -41,14 +43,8 @@ class PathMove {
 
  private:
   double distance(double time) const;
-  Point at(double distance) const;
-  Point direction(double distance) const;
 
-  Point start_{{0, 0, 0}}, target_{{0, 0, 0}};
-  double length_ = 0.0;  // [m]
-  // Arc: angle of the start about the centre, signed sweep; radius 0: a line.
-  std::array<double, 2> centre_{{0, 0}};
-  double radius_ = 0.0, start_angle_ = 0.0, sweep_ = 0.0;
+  nc::PathSegment path_;
 
   // Speed profile: from begin_ a ramp of ramp_ seconds from first_ to peak_, constant for steady_ seconds, a
   // ramp of down_ seconds to rest.

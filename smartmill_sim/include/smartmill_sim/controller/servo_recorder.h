@@ -9,8 +9,8 @@
 
 namespace smartmill::sim {
 
-/// Record of Fanuc's Servo Guide: spindle load and motor currents of the axes at 1 kHz, the running block,
-/// and a trigger at the start of a block (N word).
+/// Record of Fanuc's Servo Guide: spindle load, motor currents and velocities of the axes at 1 kHz, the
+/// running block, and a trigger at the start of a block (N word).
 class ServoRecorder {
  public:
   static constexpr double SAMPLE_RATE = 1000.0;  ///< [Hz]
@@ -28,8 +28,8 @@ class ServoRecorder {
   /// Inputs at a rate of at least SAMPLE_RATE; each sample is the first input at or after its time.
   void push(const Input& input);
 
-  /// Samples since the last call: channels spindle_load [1], current_x, current_y, current_z [A], sequence
-  /// [1], trigger [1].
+  /// Samples since the last call: channels spindle_load [1], current_x, current_y, current_z [A], axis_vx,
+  /// axis_vy, axis_vz [m/s], sequence [1], trigger [1].
   SampleBlock take();
   const std::array<double, 3>& current() const { return current_; }  ///< [A] latest
   std::array<double, 3> load() const;                                ///< [percent] of the axes

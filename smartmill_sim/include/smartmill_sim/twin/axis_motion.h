@@ -21,6 +21,8 @@ class AxisMotion {
   /// [m/s2] of x, y, z, interpolated linearly between sample i (share 0) and the next one (share 1); 0 for
   /// axes without columns.
   Axes3 acceleration(std::size_t i, double share) const;
+  /// [m/s2] at each sample of an axis, 0 to 2; empty: without columns.
+  const std::vector<double>& samples(std::size_t axis) const { return acceleration_[axis]; }
 
  private:
   std::array<std::vector<double>, 3> acceleration_;  // [m/s2] at each sample; empty: not recorded

@@ -19,7 +19,7 @@ struct Prediction {
 /// Computes charts from measurements: FRFs or modes of x and y, and coefficients, in any order.
 class ChartMaker {
  public:
-  /// @param model tool and spindle limits; its sections tool_tip and cutting are not used.
+  /// @param model tool, spindle limits and process damping; its sections tool_tip and cutting are not used.
   /// @throws Error on bad parameters or a model without a tool.
   ChartMaker(const ChartParameters& parameters, const MachineModel& model);
 
@@ -34,6 +34,8 @@ class ChartMaker {
 
   /// @throws Error when an input is missing or inputs contradict each other.
   StabilityChart chart() const;
+  /// Solver of the chart, for people: "collocation" or "zero_order (no modes in x)".
+  std::string solver() const;
 
   /// As MeasuredMachine::system().
   std::optional<RegenerativeSystem> system(const Engagement& engagement) const {

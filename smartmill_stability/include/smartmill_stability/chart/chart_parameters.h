@@ -20,7 +20,7 @@ struct ChartParameters {
   int speeds = 1500;
   double frequency_low = 50.0, frequency_high = 10000.0;
   double line_error = 0.05;
-  std::string method = "zero_order";
+  std::string method = "auto";
   double modes_error = 0.1;
   bool use_modes = false;
   double max_depth = 0.02;
@@ -43,6 +43,7 @@ struct ChartCut {
   ChartParameters parameters;
   ToolGeometry tool;
   Spindle spindle;
+  double process_damping = 0.0;  ///< [N/m] radial, as RegenerativeSystem::setProcessDamping()
 };
 
 }  // namespace smartmill::stability

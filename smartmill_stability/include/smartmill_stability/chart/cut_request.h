@@ -14,7 +14,9 @@ struct CutRequest {
   std::string model, speeds, out;
   double entry_deg = 0.0, exit_deg = 180.0;
 
-  /// @param form of the option --speeds, for example LO:HI:N
+  /// Adds model and engagement.
+  void addCutTo(CommandLine& line);
+  /// Adds speeds too. @param form of the option --speeds, for example LO:HI:N
   void addTo(CommandLine& line, const std::string& form);
   /// Adds the required CSV file, next to which a picture is drawn. @param what is drawn, for the help text
   void addOutTo(CommandLine& line, const std::string& what = "a picture");

@@ -26,6 +26,9 @@ class MeasuredMachine {
   std::string missing(const ChartParameters& parameters) const;
   /// Whether the limits of the chart are computed by collocation.
   bool byCollocation(const ChartParameters& parameters) const;
+  /// Why the parameter `auto` selects the zero-order solution, for example "no modes in x"; empty where it
+  /// does not.
+  std::string fallbackReason(const ChartParameters& parameters) const;
   /// @throws Error when an input is missing or inputs contradict each other.
   ChartSolver solver(const ChartCut& cut) const;
 
@@ -45,6 +48,7 @@ class MeasuredMachine {
 
  private:
   void use(const std::string& tool, double stamp);
+  RegenerativeSystem cutOf(const ChartCut& cut, const Engagement& engagement) const;
   FrequencyResponse crossFrf(const ChartParameters& parameters) const;
   ToolTipResponse measuredResponse(const ChartParameters& parameters) const;
 

@@ -8,7 +8,12 @@
 
 namespace smartmill::stability {
 
-/// The regenerative system of a model and an engagement [deg]. @throws Error naming what the model lacks.
+/// [N/m] Coefficient of the effect process_damping of a model; 0 without this effect.
+/// @throws Error naming file and key when it is negative: it would drive the vibration.
+double processDamping(const MachineModel& model);
+
+/// The regenerative system of a model and an engagement [deg], with its process damping. Other effects of the
+/// model are not included. @throws Error naming what the model lacks.
 RegenerativeSystem systemOf(const MachineModel& model, double entry_deg, double exit_deg);
 
 /// Values of LO:HI:N, evenly spaced; 0 < LO < HI, or N = 1 and LO = HI. @param option named in the error

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "smartmill_core/cutting/tool.h"
@@ -39,6 +40,7 @@ struct ChipGeometry {
   double serration_amplitude = 0.0;
   double serration_wavelength = 0.0;  ///< [m] > 0 with an amplitude
   bool forced_vibration = true;       ///< false: contact of a rigid tool
+  double kte = 0.0, kre = 0.0;  ///< [N/m] tangential and radial edge force, of the forced vibration only
 };
 
 /// A milling or turning system: dynamics of the tool tip and regeneration. Angles are immersion angles,
@@ -73,6 +75,9 @@ struct RegenerativeSystem {
   /// waves.
   std::optional<ChipGeometry> chip;
 
+  /// Process damping as the effect process_damping: radial `coefficient` [N/m], tangential 0.3 of it.
+  void setProcessDamping(double coefficient);
+  bool hasProcessDamping() const { return damping_radial > 0.0 || damping_tangential > 0.0; }
   /// @throws Error naming the quantity and its value.
   void validate() const;
   bool evenPitch() const;
@@ -165,6 +170,10 @@ class FloquetSolver : public StabilitySolver {
     virtual CharacteristicMultiplier multiplier(double depth) = 0;
     /// [Hz] Strongest component of the tool motion that belongs to the dominant multiplier at a depth.
     virtual double chatterFrequency(double depth) = 0;
+    /// Both at the cost of one.
+    virtual std::pair<CharacteristicMultiplier, double> motion(double depth) {
+      return {multiplier(depth), chatterFrequency(depth)};
+    }
   };
   virtual std::unique_ptr<AtSpeed> at(double speed) const = 0;
   /// The same system at a finer resolution, for error estimates.
@@ -172,6 +181,8 @@ class FloquetSolver : public StabilitySolver {
 
   /// @param speed [rad/s], depth [m] >= 0
   CharacteristicMultiplier multiplier(double speed, double depth) const;
+  /// [m] First depth of a search from zero: a guess below the limits of all speeds.
+  double firstDepth() const { return depth_scale_; }
   Limit limit(double speed, double max_depth) const override;
   /// Repeats the search where the limit at a neighbouring speed is much lower.
   std::vector<Limit> limits(const std::vector<double>& speeds, double max_depth) const override;

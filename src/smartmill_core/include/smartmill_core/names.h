@@ -11,11 +11,13 @@ constexpr const char* HAMMER = "daq/hammer";
 constexpr const char* DYNAMOMETER = "daq/dynamometer";
 constexpr const char* SPINDLE_FORCE = "daq/spindle_force";
 constexpr const char* MOTOR_CURRENT = "daq/motor_current";
+constexpr const char* SERVO_RECORD = "daq/servo";
 constexpr const char* DISPLACEMENT = "daq/displacement";
 constexpr const char* TACHOMETER = "daq/tachometer";
 constexpr const char* SPINDLE_ANGLE = "spindle/angle";
 constexpr const char* CNC_STATE = "cnc/state";
 constexpr const char* CNC_LOAD = "cnc/load";
+constexpr const char* CNC_ALARMS = "cnc/alarms";
 constexpr const char* MACHINE_TEMPERATURE = "machine/temperature";
 constexpr const char* INSPECTION_FEATURE = "inspection/feature";
 constexpr const char* CUTTING_CONDITION = "cut/condition";
@@ -58,6 +60,7 @@ constexpr const char* MEASURE_TOOL_FRF = "hammer/measure_frf";
 constexpr const char* MEASURE_SENSOR_FRF = "kalman/measure_frf";
 constexpr const char* CALIBRATE_SENSOR = "kalman/calibrate";
 constexpr const char* IDENTIFY_COEFFICIENTS = "loadmeter/identify_coefficients";
+constexpr const char* IDENTIFY_AXIS_DRIVE = "loadmeter/identify_axis_drive";
 constexpr const char* DISCOVER = "discover";
 constexpr const char* RUN_PROGRAM = "cnc/run_program";
 constexpr const char* JOG = "cnc/jog";
@@ -77,6 +80,7 @@ constexpr const char* FIND_COEFFICIENTS = "loadmeter/find_coefficients";
 constexpr const char* PREDICT_STABILITY = "stability/predict";
 constexpr const char* WHAT_IF = "stability/what_if";
 constexpr const char* REPLAY_CONTROL = "replay/control";
+constexpr const char* SET_FAULT = "sim/set_fault";
 
 /// Ends the source of coefficients that were combined with those of the database.
 constexpr const char* WITH_STORED = " and database";
@@ -84,6 +88,11 @@ constexpr const char* WITH_STORED = " and database";
 /// Topic of a signal of the data acquisition, e.g. daq/vibration.
 inline std::string daq(const std::string& signal) {
   return "daq/" + signal;
+}
+
+/// Topic of a sensor's stream before the fault_node of a simulation, e.g. sim/healthy/daq/dynamometer.
+inline std::string healthy(const std::string& topic) {
+  return "sim/healthy/" + topic;
 }
 
 /// The topic of an action's goals in a recording.

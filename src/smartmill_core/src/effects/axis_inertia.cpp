@@ -11,6 +11,7 @@ class AxisInertia : public Effect {
     kind.description =
         "the sensor moves with an axis: minus mass x acceleration of the axis acts on it along the axis";
     kind.source = "d'Alembert's force of table, sensor and workpiece";
+    kind.advice = "install the model, or use records at constant feed only";
     kind.parameters = {oneOf("axis", axisNames()),
                        number("mass_kg", "kg", Range::notNegative()).drawn(5.0, 60.0)};
     kind.needs = {EffectNeed::forces, EffectNeed::axis_motion};

@@ -10,6 +10,7 @@ class ChannelDelay : public Effect {
     EffectKind kind{"channel_delay", EffectStage::delay, 10};
     kind.description = "one channel is delayed";
     kind.source = "filters and converters of one channel";
+    kind.advice = "check the filters and the converter of this channel";
     kind.parameters = {oneOf("channel", measuredChannels()).drawnFromFirst(3),
                        number("delay_us", "us", Range::notNegative()).drawn(30.0, 200.0)};
     kind.forms = [](const Scope& s) {

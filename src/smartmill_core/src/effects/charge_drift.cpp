@@ -10,6 +10,7 @@ class ChargeDrift : public Effect {
     EffectKind kind{"charge_drift", EffectStage::signal, 20};
     kind.description = "linear drift from the start of each record: rate on fx, y_ratio of it on fy";
     kind.source = "Kistler, charge amplifiers: drift of the insulation";
+    kind.advice = "check the insulation of cables and connectors, and reset the amplifier before each record";
     kind.parameters = {number("rate_n_per_min", "N/min").drawnOnBothSides(800.0, 4000.0),
                        number("y_ratio", "1").drawnOnBothSides(0.3, 1.5)};
     kind.needs = {EffectNeed::forces};

@@ -10,6 +10,7 @@ class ChipCoefficients : public Effect {
     EffectKind kind{"chip_coefficients", EffectStage::cutting_law, 40};
     kind.description = "adds to the chip coefficients";
     kind.source = "Dunwoody eq. 2.1: coefficients of another material, or of a regression biased by runout";
+    kind.advice = "check material and hardness; install the model if they are as they should be";
     kind.parameters = {orZero("Ktc_n_per_mm2", "N/mm2").drawnOnBothSides(120.0, 300.0),
                        orZero("Krc_n_per_mm2", "N/mm2").drawnOnBothSides(50.0, 110.0),
                        orZero("Kac_n_per_mm2", "N/mm2").drawnOnBothSides(30.0, 90.0)};

@@ -13,6 +13,7 @@ class CornerRadius : public Effect {
         "bull-nose or ball end: below this height the edge's normal turns from radial to axial; chip, local "
         "radius and direction of the forces follow";
     kind.source = "Altintas & Lee 1996; Engin & Altintas 2001";
+    kind.advice = "state the corner radius of the tool in the model";
     kind.parameters = {number("corner_radius_mm", "mm", Range::notNegative())};
     kind.needs = {EffectNeed::cuts};
     kind.forms = [](const Scope& s) {

@@ -10,6 +10,7 @@ class CuttingSpeed : public Effect {
     EffectKind kind{"cutting_speed", EffectStage::cutting_law, 30};
     kind.description = "Kc multiplied by (v / reference)^-exponent";
     kind.source = "Altintas, Manufacturing Automation, 2.4";
+    kind.advice = "install the model: the coefficients depend on the cutting speed";
     kind.parameters = {number("exponent", "1").drawn(0.05, 0.25),
                        number("reference_m_per_min", "m/min", Range::positive()).drawn(100.0, 300.0)};
     kind.needs = {EffectNeed::cuts};

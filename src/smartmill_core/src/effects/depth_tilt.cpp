@@ -10,6 +10,7 @@ class DepthTilt : public Effect {
     EffectKind kind{"depth_tilt", EffectStage::motion, 20};
     kind.description = "the axial depth changes along the feed path from engagement";
     kind.source = "stock or table not level along the feed";
+    kind.advice = "check that the surface of the workpiece is parallel to the feed";
     kind.parameters = {number("slope_um_per_mm", "um/mm").drawnOnBothSides(15.0, 60.0)};
     kind.needs = {EffectNeed::cuts};
     kind.forms =

@@ -10,6 +10,7 @@ class EdgeBuildup : public Effect {
     EffectKind kind{"edge_buildup", EffectStage::cutting_law, 50};
     kind.description = "edge coefficients multiplied by 1 - exp(-h / chip)";
     kind.source = "Endres, DeVor & Kapoor 1995: ploughing needs some chip to build up";
+    kind.advice = "install the model: thin chips have smaller edge forces than stated";
     kind.parameters = {number("chip_um", "um", Range::notNegative()).drawn(8.0, 40.0)};
     kind.needs = {EffectNeed::cuts};
     kind.forms = always(

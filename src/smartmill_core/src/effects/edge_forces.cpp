@@ -10,6 +10,7 @@ class EdgeForces : public Effect {
     EffectKind kind{"edge_forces", EffectStage::cutting_law, 10};
     kind.description = "adds to the edge coefficients";
     kind.source = "Dunwoody eq. 2.1; Armarego & Deshpande 1991";
+    kind.advice = "compare the edge with a new one; install the model if it is as it should be";
     kind.parameters = {orZero("Kte_n_per_mm", "N/mm").drawn(4.0, 15.0),
                        orZero("Kre_n_per_mm", "N/mm").drawn(4.0, 15.0),
                        orZero("Kae_n_per_mm", "N/mm").drawn(0.5, 4.0)};

@@ -31,7 +31,7 @@ class OrderTone : public Effect {
 
   void measure(const Instant& now, ChannelValues& c) const override {
     const double rate = tone_.rate(now.speed);
-    if (rate > 0.0) c[channel_] += tone_.amplitude[channel_] * std::sin(rate * now.record_time + tone_.phase);
+    if (rate > 0.0) c[channel_] += tone_.at(channel_, rate * now.record_time + tone_.phase);
   }
   Tone* tone() override { return &tone_; }
 

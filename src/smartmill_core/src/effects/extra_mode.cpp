@@ -34,6 +34,7 @@ class ExtraMode : public Effect {
     EffectKind kind{"extra_mode", EffectStage::sensor, 30};
     kind.description = "one more mode in the force sensor; its gain is taken from the direct share";
     kind.source = "Dunwoody eq. 5.5";
+    kind.advice = "check how sensor and workpiece are clamped, and repeat the taps on the workpiece";
     kind.parameters = {oneOf("axis", axisNames()),
                        number("frequency_hz", "Hz", Range::positive()).drawn(300.0, 3500.0),
                        number("damping_ratio", "1", Range::open(0.0, 1.0)).drawn(0.01, 0.05),

@@ -10,6 +10,7 @@ class FeedError : public Effect {
     EffectKind kind{"feed_error", EffectStage::motion, 10};
     kind.description = "actual feed over commanded feed";
     kind.source = "error of the feed drive or the override";
+    kind.advice = "check feed override, number of teeth and units of the program";
     kind.parameters = {number("ratio", "1", Range::positive()).drawnOnBothSides(0.12, 0.25, 1.0)};
     kind.needs = {EffectNeed::cuts};
     kind.forms =

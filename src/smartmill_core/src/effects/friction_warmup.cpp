@@ -12,6 +12,7 @@ class FrictionWarmup : public Effect {
     kind.description =
         "spindle friction (Stribeck's included) multiplied by 1 + cold x exp(-start_time / constant)";
     kind.source = "Dunwoody 3.2.1: friction falls as the spindle warms up";
+    kind.advice = "warm the spindle up before measuring";
     kind.parameters = {number("cold_ratio", "1").drawn(0.2, 0.8),
                        number("time_constant_s", "s", Range::positive()).drawn(120.0, 500.0)};
     kind.needs = {EffectNeed::load_meter, EffectNeed::start_time};

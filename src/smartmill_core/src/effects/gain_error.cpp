@@ -10,6 +10,7 @@ class GainError : public Effect {
     EffectKind kind{"gain_error", EffectStage::sensor_output, 20};
     kind.description = "one channel's sensitivity is wrong: it indicates gain times the value";
     kind.source = "calibration of one channel";
+    kind.advice = "check the stated sensitivity of this channel with a known weight";
     kind.parameters = {oneOf("channel", measuredChannels()).drawnFromFirst(4),
                        number("gain", "1").drawnOnBothSides(0.06, 0.2, 1.0)};
     kind.forms = [](const Scope& s) {

@@ -10,6 +10,7 @@ class Helix : public Effect {
     EffectKind kind{"helix", EffectStage::geometry, 40};
     kind.description = "helix angle, replaces the nominal one";
     kind.source = "Dunwoody eq. 5.64";
+    kind.advice = "measure the helix angle and state it in the model";
     kind.parameters = {number("helix_deg", "deg", Range::openHigh(0.0, 80.0))};
     kind.needs = {EffectNeed::cuts};
     kind.forms = [](const Scope& s) {

@@ -10,6 +10,7 @@ class LoadMeterLag : public Effect {
     EffectKind kind{"load_meter_lag", EffectStage::drive, 30};
     kind.description = "bandwidth of the load meter, replaces the nominal one";
     kind.source = "Dunwoody 3.2.1: first-order load meter";
+    kind.advice = "state the bandwidth of the load meter in the model";
     kind.parameters = {number("bandwidth_hz", "Hz", Range::positive()).drawn(1.5, 5.0)};
     kind.needs = {EffectNeed::load_meter};
     kind.forms = [](const Scope& s) {

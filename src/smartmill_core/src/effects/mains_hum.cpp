@@ -10,6 +10,7 @@ class MainsHum : public Effect {
     EffectKind kind{"mains_hum", EffectStage::signal, 30};
     kind.description = "sine on fx, y_ratio of it in phase on fy; the phase is estimated from each record";
     kind.source = "coupling of the mains into the charge lines";
+    kind.advice = "check grounding and shield of the sensor cables";
     kind.parameters = {oneOfNumbers("frequency_hz", "Hz", {50.0, 60.0}),
                        number("amplitude_n", "N").drawn(2.0, 12.0),
                        number("y_ratio", "1").drawnOnBothSides(0.3, 1.2)};
@@ -38,9 +39,8 @@ class MainsHum : public Effect {
   }
 
   void measure(const Instant& now, ChannelValues& c) const override {
-    const double wave = std::sin(units::TWO_PI * tone_.frequency * now.record_time + tone_.phase);
-    c[FX] += tone_.amplitude[FX] * wave;
-    c[FY] += tone_.amplitude[FY] * wave;
+    const double angle = tone_.rate(now.speed) * now.record_time + tone_.phase;
+    for (const std::size_t channel : {FX, FY}) c[channel] += tone_.at(channel, angle);
   }
   Tone* tone() override { return &tone_; }
 

@@ -13,6 +13,7 @@ class ProcessDamping : public Effect {
         "radial force C v_r / v_c per mm of engaged edge, v_r the velocity into the work; tangential 0.3 of "
         "it";
     kind.source = "Tunc & Budak 2012; Altintas, Eynian & Onozuka 2008";
+    kind.advice = "install the model: at low speeds deeper cuts are stable than the model predicts";
     kind.parameters = {number("coefficient_n_per_mm", "N/mm").drawn(150.0, 800.0)};
     kind.needs = {EffectNeed::cuts, EffectNeed::flexible_tool};
     kind.forms = always(EffectForm({amplitude("coefficient_n_per_mm", {-1e4, 1e6, 0.125, 2000.0})})

@@ -12,6 +12,7 @@ class Runout : public Effect {
     EffectKind kind{"runout", EffectStage::geometry, 20};
     kind.description = "tooth j cuts at radius R + offset cos(angle - position of tooth j)";
     kind.source = "Kline & DeVor 1983; Dunwoody 6.1";
+    kind.advice = "check the seat of the tool in its holder and the taper with a dial indicator";
     kind.parameters = {number("offset_um", "um", Range::notNegative()).drawn(5.0, 25.0), angle("angle_deg")};
     kind.needs = {EffectNeed::cuts};
     kind.forms =

@@ -10,6 +10,7 @@ class SizeEffect : public Effect {
     EffectKind kind{"size_effect", EffectStage::cutting_law, 20};
     kind.description = "Kc multiplied by (h / reference)^-exponent";
     kind.source = "Kienzle 1952";
+    kind.advice = "install the model: small chips need more force per area than stated";
     kind.parameters = {number("exponent", "1").drawn(0.1, 0.35),
                        number("reference_chip_um", "um", Range::positive()).drawn(40.0, 120.0)};
     kind.needs = {EffectNeed::cuts};

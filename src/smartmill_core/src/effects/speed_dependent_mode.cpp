@@ -12,6 +12,8 @@ class SpeedDependentMode : public Effect {
     EffectKind kind{"speed_dependent_mode", EffectStage::sensor, 20};
     kind.description = "the first sensor mode of each axis falls linearly with spindle speed";
     kind.source = "Cao & Altintas 2007: bearing preload falls with speed";
+    kind.advice =
+        "measure the FRF of the force sensor from cuts at the speeds in use (smartmill cutting-frf)";
     kind.parameters = {number("softening_per_krpm", "1/krpm").drawn(0.004, 0.015)};
     kind.needs = {EffectNeed::forces, EffectNeed::sensor_modes};
     kind.forms = always(EffectForm({amplitude("softening_per_krpm", {-0.04, 0.04, 5e-06, 0.02})})

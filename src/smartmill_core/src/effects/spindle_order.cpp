@@ -12,6 +12,7 @@ class SpindleOrder : public Effect {
     kind.description =
         "x_n sin(order x spindle angle + x_deg), y and z alike, on the sensor while the spindle turns";
     kind.source = "bearings, drive and draw bar: lines locked to the spindle angle";
+    kind.advice = "check bearings, drive and draw bar of the spindle";
     kind.parameters = {number("order", "1", Range::positive()).drawn(0.35, 12.0),
                        orZero("x_n", "N").drawn(2.0, 8.0),
                        orZero("y_n", "N").drawn(2.0, 8.0),

@@ -11,6 +11,7 @@ class StribeckFriction : public Effect {
     EffectKind kind{"stribeck_friction", EffectStage::drive, 10};
     kind.description = "adds breakaway x exp(-(n / speed)^2) to the spindle friction";
     kind.source = "Armstrong-Helouvry, Dupont & Canudas de Wit 1994";
+    kind.advice = "repeat the air cuts at more speeds, low ones included";
     kind.parameters = {number("breakaway_nm", "N m").drawn(0.1, 0.6),
                        number("speed_rpm", "rpm", Range::positive()).drawn(1200.0, 4500.0)};
     kind.needs = {EffectNeed::load_meter};

@@ -20,6 +20,7 @@ class ToolFlexibility : public Effect {
     EffectKind kind{"tool_flexibility", EffectStage::structure, 10};
     kind.description = "modes added to the tool tip's: it vibrates and the chip regenerates";
     kind.source = "Dunwoody 2.2; Altintas & Budak 1995";
+    kind.advice = "measure the FRF of the tool tip with the hammer";
     kind.parameters = {modes("x"), modes("y")};
     kind.needs = {EffectNeed::cuts};
     kind.forms = [](const Scope&) {

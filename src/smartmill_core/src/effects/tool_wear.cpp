@@ -11,6 +11,8 @@ class ToolWear : public Effect {
     kind.description =
         "edge coefficients (added ones included) multiplied by 1 + growth x cutting time of the edge";
     kind.source = "Teitenberg, Bayoumi & Yucesan 1992";
+    kind.advice =
+        "watch the edge, and change it before its force or the surface exceeds the limit of the process";
     kind.parameters = {number("edge_growth_per_min", "1/min").drawn(0.1, 0.8)};
     kind.needs = {EffectNeed::cuts, EffectNeed::cut_time};
     kind.forms =

@@ -23,6 +23,7 @@ class ToothRadius : public Effect {
         "tooth j cuts at radius R + offset[j]: a chipped, re-ground or badly seated insert; only differences "
         "act";
     kind.source = "Kline & DeVor 1983, with a radius for each tooth";
+    kind.advice = "check the inserts: one is chipped, reground or badly seated";
     kind.parameters = {perTooth("offset_um", "um")};
     kind.needs = {EffectNeed::cuts, EffectNeed::several_teeth};
     kind.forms = [](const Scope& s) {

@@ -11,6 +11,7 @@ class Unbalance : public Effect {
     kind.description =
         "m e omega^2 on the sensor: x sin(a), y cos(a), a = spindle angle + angle; the tip does not move";
     kind.source = "ISO 21940-11";
+    kind.advice = "balance the tool in its holder";
     kind.parameters = {number("mass_eccentricity_g_mm", "g mm", Range::notNegative()).drawn(4.0, 20.0),
                        angle("angle_deg")};
     kind.needs = {EffectNeed::forces};

@@ -20,6 +20,7 @@ class UnevenPitch : public Effect {
     EffectKind kind{"uneven_pitch", EffectStage::geometry, 10};
     kind.description = "teeth not evenly spaced; the feed of each tooth is in proportion to its pitch";
     kind.source = "Budak 2003";
+    kind.advice = "state the measured pitch of the teeth in the model";
     kind.parameters = {perTooth("pitch_deg", "deg", Range::positive(), 360.0)};
     kind.needs = {EffectNeed::cuts, EffectNeed::several_teeth};
     kind.forms = [](const Scope& s) {

@@ -12,6 +12,7 @@ class ZeroOffset : public Effect {
     EffectKind kind{"zero_offset", EffectStage::signal, 10};
     kind.description = "a constant on each force channel";
     kind.source = "Kistler, charge amplifiers: zero after the last reset";
+    kind.advice = "zero the amplifier before each record";
     for (const char* key : KEYS) kind.parameters.push_back(orZero(key, "N").drawnOnBothSides(2.0, 15.0));
     kind.needs = {EffectNeed::forces};
     std::vector<EffectCoordinates> offsets;

@@ -1,7 +1,10 @@
 #include "smartmill_core/io/report_page.h"
 
+#include <cmath>
 #include <string_view>
 #include <vector>
+
+#include <nlohmann/json.hpp>
 
 #include "smartmill_core/io/text_file.h"
 
@@ -43,13 +46,25 @@ dialog { border: 0; padding: 0; width: 100vw; height: 100vh; max-width: none; ma
   background: #0f1419ee; overflow: hidden; touch-action: none; cursor: grab; }
 dialog img { position: absolute; left: 0; top: 0; transform-origin: 0 0; background: #fff; user-select: none; }
 dialog p { position: absolute; left: 16px; bottom: 8px; margin: 0; color: #edf2f7; }
-@media print { button { display: none; } .table { overflow: visible; } }
+.plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(440px, 1fr)); gap: 10px; }
+.plot { background: var(--card); border-radius: 12px; padding: 8px 10px; break-inside: avoid; }
+.plot h3 { font-size: 15px; font-weight: 500; margin: 0 0 4px; }
+.plot svg { width: 100%; height: auto; display: block; touch-action: none; cursor: crosshair; }
+.plot text { fill: var(--dim); font-size: 12px; } .plot .axis { stroke: var(--grid); stroke-width: 1; }
+.plot p { margin: 2px 0 0; font-size: 13px; color: var(--dim); min-height: 18px; }
+select { background: var(--raised); color: var(--text); border: 0; border-radius: 8px; padding: 8px 12px; font-size: 15px; }
+@media print {
+  body, .verdict, .table, .plot { background: #fff; }
+  button, select { display: none; } .table { overflow: visible; } body { font-size: 12px; }
+  main { max-width: none; padding: 0; } tr, figure { break-inside: avoid; } h2 { break-after: avoid; }
+}
 )";
 
 constexpr const char* SCRIPT = R"(
 const root = document.documentElement;
 const setTheme = theme => { root.dataset.theme = theme; };
 setTheme(matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark');
+addEventListener('beforeprint', () => setTheme('light'));
 document.querySelector('button').onclick = () => setTheme(root.dataset.theme === 'dark' ? 'light' : 'dark');
 
 const numberIn = text => { const found = text.match(/^[^\d\-+.]*([-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?)/i); return found ? +found[1] : NaN; };
@@ -81,6 +96,107 @@ for (const table of document.querySelectorAll('table')) {
     cell.onclick = sort;
     cell.onkeydown = event => { if (event.key === 'Enter') sort(); };
   });
+}
+
+// Parts of which one is shown at a time.
+const parts = [...document.querySelectorAll('section[data-choice]')];
+if (parts.length > 1) {
+  const choice = document.createElement('select');
+  for (const part of parts) choice.append(new Option(part.dataset.choice));
+  const show = () => parts.forEach((part, k) => { part.hidden = k !== choice.selectedIndex; });
+  choice.onchange = show; parts[0].before(choice); show();
+}
+
+const element = (parent, name, attributes, text) => {
+  const made = document.createElementNS(parent.namespaceURI, name);
+  for (const key in attributes) made.setAttribute(key, attributes[key]);
+  if (text !== undefined) made.textContent = text;
+  parent.append(made);
+  return made;
+};
+const ticks = (low, high) => {
+  const raw = (high - low) / 6, power = 10 ** Math.floor(Math.log10(raw));
+  const step = [1, 2, 5, 10].map(k => k * power).find(s => s >= raw);
+  const all = [];
+  for (let k = Math.ceil(low / step); k * step <= high; ++k) all.push(k * step);
+  return all;
+};
+const short = value => +value.toPrecision(6) === 0 ? '0' : Math.abs(value) >= 1e5 || Math.abs(value) < 1e-3 ? value.toExponential(0) : String(+value.toPrecision(6));
+for (const box of document.querySelectorAll('.plot')) {
+  const data = JSON.parse(box.querySelector('script').textContent);
+  const W = 560, H = 300, L = 62, R = 10, T = 8, B = 40;
+  const scaled = data.log_y ? Math.log10 : v => v;
+  for (const curve of data.curves) curve.v = curve.y.map(v => v === null || (data.log_y && v <= 0) ? NaN : scaled(v));
+  const range = pick => {
+    let low = Infinity, high = -Infinity;
+    for (const curve of data.curves) for (const v of pick(curve)) if (Number.isFinite(v)) { low = Math.min(low, v); high = Math.max(high, v); }
+    if (!(low < high)) { low -= 1; high += 1; }
+    return [low, high];
+  };
+  const full = () => {
+    const [x0, x1] = range(c => c.x), [y0, y1] = range(c => c.v), margin = 0.05 * (y1 - y0);
+    return { x0, x1, y0: y0 - margin, y1: y1 + margin };
+  };
+  let view = full();
+  box.insertAdjacentHTML('beforeend', `<svg viewBox="0 0 ${W} ${H}" role="img"></svg>`);
+  const svg = box.querySelector('svg');
+  const line = document.createElement('p');
+  box.append(line);
+  const px = x => L + (x - view.x0) / (view.x1 - view.x0) * (W - L - R), py = y => H - B - (y - view.y0) / (view.y1 - view.y0) * (H - B - T);
+  const legend = () => { line.innerHTML = ''; for (const c of data.curves) { const s = document.createElement('span'); s.style.color = c.colour; s.textContent = '\u25cf ' + c.name + '   '; line.append(s); } };
+  const draw = () => {
+    svg.replaceChildren();
+    for (const x of ticks(view.x0, view.x1)) {
+      element(svg, 'line', { class: 'axis', x1: px(x), x2: px(x), y1: T, y2: H - B });
+      element(svg, 'text', { x: px(x), y: H - B + 15, 'text-anchor': 'middle' }, short(x));
+    }
+    for (const y of ticks(view.y0, view.y1)) {
+      if (data.log_y && y !== Math.round(y) && view.y1 - view.y0 > 2) continue;
+      element(svg, 'line', { class: 'axis', x1: L, x2: W - R, y1: py(y), y2: py(y) });
+      element(svg, 'text', { x: L - 5, y: py(y) + 4, 'text-anchor': 'end' }, short(data.log_y ? 10 ** y : y));
+    }
+    element(svg, 'text', { x: (L + W - R) / 2, y: H - 6, 'text-anchor': 'middle' }, data.x_label);
+    element(svg, 'text', { transform: `translate(13 ${(H - B + T) / 2}) rotate(-90)`, 'text-anchor': 'middle' }, data.y_label);
+    const inside = element(svg, 'svg', { x: L, y: T, width: W - L - R, height: H - B - T, viewBox: `${L} ${T} ${W - L - R} ${H - B - T}` });
+    for (const curve of data.curves) {
+      let path = '', pen = false;
+      curve.x.forEach((x, i) => {
+        const v = curve.v[i];
+        if (!Number.isFinite(v)) { pen = false; return; }
+        const at = px(x).toFixed(1) + ' ' + py(v).toFixed(1);
+        path += curve.dots ? `M${at}h0` : (pen ? 'L' : 'M') + at;
+        pen = true;
+      });
+      element(inside, 'path', { d: path, fill: 'none', stroke: curve.colour, 'stroke-width': curve.dots ? 4 : 1.5, 'stroke-linecap': 'round' });
+    }
+  };
+  const at = event => {
+    const r = svg.getBoundingClientRect(), sx = (event.clientX - r.left) / r.width * W, sy = (event.clientY - r.top) / r.height * H;
+    return { x: view.x0 + (sx - L) / (W - L - R) * (view.x1 - view.x0), y: view.y0 + (H - B - sy) / (H - B - T) * (view.y1 - view.y0) };
+  };
+  svg.addEventListener('wheel', event => {
+    event.preventDefault();
+    const p = at(event), k = event.deltaY > 0 ? 1.25 : 0.8;
+    view.x0 = p.x + (view.x0 - p.x) * k; view.x1 = p.x + (view.x1 - p.x) * k;
+    if (!event.shiftKey) { view.y0 = p.y + (view.y0 - p.y) * k; view.y1 = p.y + (view.y1 - p.y) * k; }
+    draw();
+  }, { passive: false });
+  let held = null;
+  svg.addEventListener('pointerdown', event => { held = at(event); svg.setPointerCapture(event.pointerId); });
+  svg.addEventListener('pointermove', event => {
+    const p = at(event);
+    if (held) { view.x0 += held.x - p.x; view.x1 += held.x - p.x; view.y0 += held.y - p.y; view.y1 += held.y - p.y; draw(); return; }
+    const values = data.curves.map(c => {
+      let best = -1;
+      c.x.forEach((x, i) => { if (best < 0 || Math.abs(x - p.x) < Math.abs(c.x[best] - p.x)) best = i; });
+      return best < 0 || c.y[best] === null ? '' : `${c.name} ${+c.y[best].toPrecision(4)}`;
+    });
+    line.textContent = `${data.x_label} ${+p.x.toPrecision(5)}: ` + values.filter(Boolean).join(', ');
+  });
+  for (const kind of ['pointerup', 'pointercancel']) svg.addEventListener(kind, () => { held = null; });
+  svg.addEventListener('pointerleave', legend);
+  svg.addEventListener('dblclick', () => { view = full(); draw(); });
+  legend(); draw();
 }
 
 const dialog = document.querySelector('dialog'), large = dialog.querySelector('img');
@@ -202,6 +318,33 @@ void ReportPage::picture(const std::string& file, const std::string& caption) {
   const std::string text = escapedHtml(caption);
   body_ << "<figure><img alt=\"" << text << "\" src=\"data:image/png;base64," << base64(readText(file))
         << "\"><figcaption>" << text << "</figcaption></figure>\n";
+}
+
+void ReportPage::plot(const PagePlot& plot) {
+  using Json = nlohmann::ordered_json;
+  const auto numbers = [](const std::vector<double>& values) {
+    constexpr double DIGITS = 1e6;  // of a picture
+    Json list = Json::array();
+    for (const double v : values) {
+      const double scale = v == 0.0 ? 1.0 : DIGITS / std::pow(10.0, std::floor(std::log10(std::abs(v))));
+      list.push_back(std::isfinite(v) ? Json(std::round(v * scale) / scale) : Json(nullptr));
+    }
+    return list;
+  };
+  Json data = {{"x_label", plot.x_label}, {"y_label", plot.y_label}, {"log_y", plot.log_y}};
+  data["curves"] = Json::array();
+  for (const PagePlot::Curve& curve : plot.curves) {
+    data["curves"].push_back({{"name", curve.name},
+                              {"colour", curve.colour},
+                              {"dots", curve.is_dots},
+                              {"x", numbers(curve.x)},
+                              {"y", numbers(curve.y)}});
+  }
+  // Within a script element only "</" ends it.
+  std::string json = data.dump();
+  for (std::size_t k = 0; (k = json.find("</", k)) != std::string::npos; k += 3) json.replace(k, 2, "<\\/");
+  body_ << "<div class=\"plot\"><h3>" << escapedHtml(plot.title) << "</h3><script type=\"application/json\">"
+        << json << "</script></div>\n";
 }
 
 void ReportPage::markdown(const std::string& text, const std::string& folder) {

@@ -35,6 +35,7 @@ std::string listed(const EstimatedMode& mode, bool receptance) {
   }
   text += row("phase_deg", units::degFromRad(gain.phase), STD_DIGITS) +
           row("evidence", mode.evidence, STD_DIGITS);
+  if (!mode.doubt.empty()) text += "    reason: " + yamlWord(mode.doubt) + "\n";
   if (mode.gain.size() < 2) return text;
   text += "    gains: [";
   for (std::size_t o = 0; o < mode.gain.size(); ++o)

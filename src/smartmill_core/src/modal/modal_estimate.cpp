@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "modal_doubts.h"
 #include "modal_residuals.h"
 #include "modal_search.h"
 #include "modes_by_magnitude.h"
@@ -146,34 +147,6 @@ bool begin(ModalSearch& search, const std::vector<Pole>& candidates, int largest
   return true;
 }
 
-bool isCoherent(const std::vector<FrequencyResponse>& bands, const EstimatedMode& mode, double coherent) {
-  bool incoherent = false;
-  for (const FrequencyResponse& band : bands) {
-    if (band.coherence.size() != band.size() || band.size() < 2) continue;
-    const double step = band.frequency[1] - band.frequency[0];
-    const double reach = std::max(mode.frequency * mode.damping_ratio, 2.0 * step);
-    std::vector<double> about;
-    for (std::size_t i = 0; i < band.size(); ++i) {
-      if (std::abs(band.frequency[i] - mode.frequency) <= reach && std::isfinite(band.coherence[i]))
-        about.push_back(band.coherence[i]);
-    }
-    if (about.empty()) continue;
-    if (median(about) >= coherent) return true;
-    incoherent = true;
-  }
-  return !incoherent;
-}
-
-/// Significant modes on lines without coherence become doubts.
-void doubtIncoherent(const std::vector<FrequencyResponse>& bands, double coherent, ModalEstimate& estimate) {
-  std::vector<EstimatedMode> proven;
-  for (const EstimatedMode& m : estimate.modes)
-    (isCoherent(bands, m, coherent) ? proven : estimate.doubts).push_back(m);
-  estimate.modes = std::move(proven);
-  std::sort(estimate.doubts.begin(), estimate.doubts.end(),
-            [](const EstimatedMode& a, const EstimatedMode& b) { return a.frequency < b.frequency; });
-}
-
 /// Lower and upper residual terms of the residual of modes and doubts, by least squares.
 ResidualTerms residualTermsOf(const WeightedLines& lines, const ModalEstimate& estimate, std::size_t o) {
   const double reference = units::TWO_PI * lines.frequency[lines.size() / 2];
@@ -276,7 +249,7 @@ ModalEstimate estimateModes(const std::vector<FrequencyResponse>& frfs, const Mo
   addByMagnitude(search.found(), options);
   result.modes = search.results(true);
   result.doubts = search.results(false);
-  doubtIncoherent(bands, options.search.coherent, result);
+  judgeModes(bands, options.search, result);
   for (std::size_t o = 0; o < lines.frfs(); ++o)
     result.residual_terms.push_back(residualTermsOf(start, result, o));
   return result;

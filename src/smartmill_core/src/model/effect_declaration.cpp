@@ -32,11 +32,13 @@ EffectParameter orZero(const char* key, const char* unit, const Range& range) {
 EffectParameter angle(const char* key) {
   EffectParameter p = number(key, "deg").drawn(0.0, 360.0);
   p.period = 360.0;
+  p.on_spindle = true;
   return p;
 }
 
 EffectParameter angleOrZero(const char* key) {
   EffectParameter p = angle(key);
+  p.on_spindle = false;
   p.optional = true;
   return p;
 }

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 
 #include "smartmill_core/error.h"
@@ -83,6 +84,19 @@ bool isBehindSensor(EffectStage stage) {
 bool EffectParameter::allows(double number) const {
   return choices.empty() ? range.contains(number)
                          : std::find(choices.begin(), choices.end(), number) != choices.end();
+}
+
+std::string EffectParameter::quantity() const {
+  std::string suffix;  // as keys end in their unit: "_n_per_mm2" of "N/mm2"
+  for (const char c : unit == "N m" ? std::string("nm") : unit)
+    suffix += c == '/' ? "_per_" : c == ' ' ? "_" : std::string(1, static_cast<char>(std::tolower(c)));
+  if (suffix.rfind("1_", 0) == 0) suffix.erase(0, 2);
+  suffix.insert(0, "_");
+  std::string words = key;
+  if (words.size() > suffix.size() && words.compare(words.size() - suffix.size(), suffix.size(), suffix) == 0)
+    words.resize(words.size() - suffix.size());
+  std::replace(words.begin(), words.end(), '_', ' ');
+  return words;
 }
 
 std::string EffectParameter::rangeText() const {

@@ -287,6 +287,11 @@ MachineAxes readAxes(const StrictYaml& map) {
 HammerStation readHammer(const StrictYaml& map) {
   HammerStation h;
   h.offset = map.number("offset_mm", NOT_NEGATIVE) * units::MM;
+  if (const auto opposite = map.optionalMap("opposite")) {
+    h.opposite = HammerStation::Opposite{opposite->number("distance_mm", POSITIVE) * units::MM,
+                                         opposite->number("stroke_mm", POSITIVE) * units::MM};
+    opposite->finish();
+  }
   h.peak_force = map.number("peak_force_n", POSITIVE);
   h.contact_time = map.number("contact_time_us", POSITIVE) * 1e-6;
   h.force_noise_rms = map.number("force_noise_rms_n", NOT_NEGATIVE);

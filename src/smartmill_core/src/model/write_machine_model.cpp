@@ -179,6 +179,11 @@ void writeAxes(std::ostream& out, const MachineAxes& axes) {
 void writeHammer(std::ostream& out, const HammerStation& h) {
   out << "hammer:\n";
   writeKey(out, "  ", "offset_mm", h.offset / units::MM);
+  if (h.opposite) {
+    out << "  opposite:\n";
+    writeKey(out, "    ", "distance_mm", h.opposite->distance / units::MM);
+    writeKey(out, "    ", "stroke_mm", h.opposite->stroke / units::MM);
+  }
   writeKey(out, "  ", "peak_force_n", h.peak_force);
   writeKey(out, "  ", "contact_time_us", h.contact_time / 1e-6);
   writeKey(out, "  ", "force_noise_rms_n", h.force_noise_rms);

@@ -158,9 +158,18 @@ void ParameterReader::read(const std::string& key, std::array<double, 3>& value)
   std::copy(values.begin(), values.end(), value.begin());
 }
 
+// A flag that has become a choice is refused with the new words.
+void ParameterReader::checkIsWord(const Parameter& parameter) {
+  const ParameterValue* found = find(parameter.key);
+  if (!found || std::holds_alternative<std::string>(found->value)) return;
+  throw Error("parameter " + prefix_ + parameter.key + ": " + describe(*found) +
+              ", expected a string: " + parameter.choices());
+}
+
 void ParameterReader::read(const ParameterTable& table) {
   for (const Parameter& parameter : table.parameters()) {
     if (parameter.where == Parameter::Where::internal) continue;
+    if (!parameter.words.empty()) checkIsWord(parameter);
     std::visit([&](auto* address) { read(parameter.key, *address); }, parameter.address);
   }
   try {

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/model/strict_yaml.h"
 
 namespace smartmill {
@@ -14,17 +15,11 @@ namespace {
 constexpr std::size_t WIDTH = 140;       // of a line of the file
 constexpr std::size_t LAST_COLUMN = 36;  // of comments; a longer value moves its comment to the right
 
-std::string joined(const std::vector<std::string>& words, const std::string& between) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : between) + word;
-  return text;
-}
-
 template <class Numbers>
 std::string listed(const Numbers& numbers) {
   std::vector<std::string> words;
   for (const double number : numbers) words.push_back(yamlNumberExact(number));
-  return "[" + joined(words, ", ") + "]";
+  return "[" + joined(words) + "]";
 }
 
 std::string written(double value) {
@@ -105,7 +100,11 @@ void Parameter::check() const {
   }
   const auto* text = std::get_if<std::string*>(&address);
   if (!text || words.empty() || std::find(words.begin(), words.end(), **text) != words.end()) return;
-  throw Error(key + ": '" + **text + "' is not one of " + joined(words, " | "));
+  throw Error(key + ": '" + **text + "' is not one of " + choices());
+}
+
+std::string Parameter::choices() const {
+  return joined(words, " | ");
 }
 
 void ParameterTable::section(const std::string& text) {

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "smartmill_core/error.h"
-
 namespace smartmill {
 
 namespace {
@@ -27,6 +25,12 @@ StreamSorter::Stream StreamSorter::add(std::string name, bool regular, bool opti
   return sources_.size() - 1;
 }
 
+StreamSorter::Stream StreamSorter::addRegular(std::string name, double patience) {
+  const Stream stream = add(std::move(name), true, std::isfinite(patience), true, false);
+  sources_[stream].patience = patience;
+  return stream;
+}
+
 void StreamSorter::setRegular(Stream stream, bool regular) {
   Source& source = sources_.at(stream);
   if (source.regular == regular) return;
@@ -41,6 +45,7 @@ void StreamSorter::push(Stream stream, double stamp, Deliver deliver) {
   if (source.optional) source.regular = true;
   if (source.latched) source.held = Item{stamp, deliver};
   source.newest = std::max(source.newest, stamp);
+  if (source.sampled) first_ = std::min(first_, stamp);
   if (stamp < delivered_) {
     ++late_;
     deliver();
@@ -76,6 +81,7 @@ void StreamSorter::reset() {
   waiting_.clear();
   for (Source& source : sources_) source.newest = NEVER;
   delivered_ = NEVER;
+  first_ = -NEVER;
   late_ = 0;
 }
 
@@ -91,7 +97,7 @@ std::string StreamSorter::waitingFor() const {
   if (waiting_.empty()) return {};
   const Source* slowest = nullptr;
   for (const Source& source : sources_) {
-    if (source.regular && (!slowest || source.newest < slowest->newest)) slowest = &source;
+    if (isAwaited(source) && (!slowest || source.newest < slowest->newest)) slowest = &source;
   }
   return slowest ? slowest->name : std::string();
 }
@@ -101,8 +107,19 @@ void StreamSorter::release(double up_to) {
   while (!waiting_.empty() && waiting_.begin()->first.first.first + hold_back_ < up_to) {
     auto item = waiting_.extract(waiting_.begin());
     delivered_ = item.key().first.first;
-    item.mapped()();
+    try {
+      item.mapped()();
+    } catch (const StreamError&) {
+      throw;
+    } catch (const Error& error) {
+      throw StreamError(sources_[item.key().first.second].name, error.what());
+    }
   }
+}
+
+bool StreamSorter::isAwaited(const Source& source) const {
+  if (!source.regular || std::isinf(source.patience)) return source.regular;
+  return newest() - std::max(source.newest, first_) <= source.patience;
 }
 
 // Strictly past: an item of the same stamp may still arrive on the stream that has reached it. Without
@@ -113,7 +130,7 @@ double StreamSorter::passed() const {
   bool any_regular = false;
   for (const Source& source : sources_) {
     newest = std::max(newest, source.newest);
-    if (!source.regular) continue;
+    if (!isAwaited(source)) continue;
     any_regular = true;
     slowest = std::min(slowest, source.newest);
   }

@@ -1,5 +1,7 @@
 #include "smartmill_core/io/report_page.h"
 
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include "smartmill_core/error.h"
@@ -33,6 +35,19 @@ TEST(ReportPage, EscapesNames) {
   page.markdown("<b>no</b>\n", ".");
   EXPECT_EQ(page.text().find("<script>alert"), std::string::npos);
   EXPECT_EQ(page.text().find("<b>no"), std::string::npos);
+}
+
+TEST(ReportPage, PlotsKeepTheirDataAndEscapeIt) {
+  ReportPage page("t");
+  PagePlot plot;
+  plot.title = "fx < fy";
+  plot.x_label = "angle [deg]";
+  plot.curves = {{"</script>", "#000", false, {0.0, 1.0, 2.0}, {1234.5678, NAN, -2e-7}}};
+  page.plot(plot);
+  const std::string text = page.text();
+  EXPECT_NE(text.find("<h3>fx &lt; fy</h3>"), std::string::npos);
+  EXPECT_NE(text.find("[1234.568,null,-2e-07]"), std::string::npos) << text;
+  EXPECT_NE(text.find("\"name\":\"<\\/script>\""), std::string::npos);
 }
 
 // The page opens without server and network: it has no external references.

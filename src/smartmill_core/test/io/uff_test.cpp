@@ -1,11 +1,14 @@
 #include "smartmill_core/io/uff.h"
 
+#include <cmath>
+#include <cstdlib>
 #include <fstream>
 #include <iterator>
 
 #include <gtest/gtest.h>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/text_file.h"
 #include "smartmill_core/testing/temporary_folder.h"
 
 namespace smartmill {
@@ -49,6 +52,35 @@ TEST(Uff, ReadsBackWhatWasWritten) {
         EXPECT_NEAR(found[1].abscissa[i], expected.abscissa[i], 1e-5);
         EXPECT_NEAR(std::abs(found[1].value[i] - expected.value[i]), 0.0, 1e-18);
       }
+    }
+  }
+}
+
+// An independent reader, written from the definition of the dataset (read_uff.py).
+TEST(Uff, AnIndependentReaderReadsWhatWasWritten) {
+  const TemporaryFolder folder;
+  for (const bool binary : {false, true}) {
+    for (const bool even : {false, true}) {
+      const UffFunction expected = receptance(even);
+      const std::string file = folder.file("frf.uff"), out = folder.file("frf.json");
+      writeUff({expected, expected}, file, binary);
+      ASSERT_EQ(std::system(("/usr/bin/python3 test/io/read_uff.py " + file + " >" + out).c_str()), 0);
+      std::string line =
+          "{\"type\": 4, \"name\": \"point 1\", \"response\": [7, 3], \"reference\": [1, -3], \"numerator\": "
+          "8, ";
+      const auto list = [&line](const char* name, const auto& numberOf) {
+        line += std::string("\"") + name + "\": [";
+        for (std::size_t i = 0; i < 9; ++i)
+          line += (i ? ", " : "") + std::to_string(std::lround(numberOf(i)));
+        line += "]";
+      };
+      list("abscissa_um", [&](std::size_t i) { return 1e6 * expected.abscissa[i]; });
+      line += ", ";
+      list("real_pm", [&](std::size_t i) { return 1e12 * expected.value[i].real(); });
+      line += ", ";
+      list("imag_pm", [&](std::size_t i) { return 1e12 * expected.value[i].imag(); });
+      line += "}";
+      EXPECT_EQ(readText(out), "[" + line + ", " + line + "]\n");
     }
   }
 }

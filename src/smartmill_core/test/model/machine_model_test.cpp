@@ -61,6 +61,7 @@ axes:
   home_mm: [10, 20, 0]
 hammer:
   offset_mm: 12
+  opposite: {distance_mm: 40, stroke_mm: 25}
   peak_force_n: 150
   contact_time_us: 300
   force_noise_rms_n: 0.2
@@ -109,6 +110,9 @@ void expectModel(const MachineModel& m) {
   EXPECT_DOUBLE_EQ(m.axes->travel[2][0], -0.3);
   EXPECT_DOUBLE_EQ(m.axes->rapid, 0.5);
   EXPECT_DOUBLE_EQ(m.axes->home[1], 0.02);
+  ASSERT_TRUE(m.hammer->opposite);
+  EXPECT_DOUBLE_EQ(m.hammer->opposite->distance, 0.04);
+  EXPECT_DOUBLE_EQ(m.hammer->opposite->stroke, 0.025);
   EXPECT_DOUBLE_EQ(m.hammer->contact_time, 3e-4);
   EXPECT_DOUBLE_EQ(m.hammer->gap_at_zero_volt, 250e-6);
   EXPECT_DOUBLE_EQ(m.hammer->position.at("y")[0], 0.12);

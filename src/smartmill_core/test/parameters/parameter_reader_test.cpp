@@ -114,6 +114,14 @@ TEST_F(ParameterFiles, EveryErrorIsOneLineWithKeyAndValue) {
   EXPECT_THAT(errorOf("part_share: 0.9\nhits: 100\n"), HasSubstr("part_share: too many of hits"));
 }
 
+// A flag of an earlier version.
+TEST_F(ParameterFiles, ABooleanForAChoiceIsRefusedWithItsWords) {
+  EXPECT_THAT(errorOf("method: true\n"),
+              HasSubstr("method: 'true' is a boolean, expected a string: auto | exact"));
+  EXPECT_THAT(errorOf("method: off\n"),
+              HasSubstr("method: 'false' is a boolean, expected a string: auto | exact"));
+}
+
 class Options : public ParameterFiles {
  protected:
   struct Tool {

@@ -59,6 +59,29 @@ TEST(StreamSorter, aStreamDelaysTheOthersOnlyWhileItIsRegular) {
   EXPECT_EQ(got, "12b");
 }
 
+TEST(StreamSorter, aStreamIsAwaitedUpToItsPatience) {
+  StreamSorter sorter(0.0);
+  const auto a = sorter.addRegular("a", 0.5), b = sorter.addRegular("b");
+  std::string got;
+  sorter.push(b, 1.0, [&] { got += "1"; });
+  sorter.push(b, 1.4, [&] { got += "2"; });
+  EXPECT_EQ(got, "");
+  EXPECT_EQ(sorter.waitingFor(), "a");
+  sorter.push(b, 1.6, [&] { got += "3"; });  // never one of a
+  EXPECT_EQ(got, "12");
+  EXPECT_EQ(sorter.waitingFor(), "b");
+  sorter.push(a, 1.7, [&] { got += "a"; });  // awaited again
+  sorter.push(b, 2.0, [&] { got += "4"; });
+  EXPECT_EQ(got, "123");
+  sorter.push(b, 2.1, [&] { got += "5"; });
+  EXPECT_EQ(got, "123");
+  sorter.push(b, 2.3, [&] { got += "6"; });  // 0.6 s after the last of a
+  EXPECT_EQ(got, "123a45");
+  sorter.flush();
+  EXPECT_EQ(got, "123a456");
+  EXPECT_EQ(sorter.late(), 0u);
+}
+
 TEST(StreamSorter, anEventWithinTheHoldBackIsInOrderAndALaterOneIsCounted) {
   StreamSorter sorter(0.05);
   const auto a = sorter.addRegular("a"), events = sorter.addEvents("goal");
@@ -241,6 +264,20 @@ TEST(SampleBlock, findsChannelsByName) {
     FAIL();
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("'gap' is missing (present: fx fy)"), std::string::npos);
+  }
+}
+
+TEST(StreamSorter, anErrorNamesTheStreamOfItsItem) {
+  StreamSorter sorter(0.0);
+  const auto a = sorter.addRegular("a"), b = sorter.addRegular("b");
+  sorter.push(b, 1.0, [] { throw Error("channel fx is missing"); });
+  sorter.push(b, 2.0, [] {});
+  try {
+    sorter.push(a, 2.0, [] {});
+    FAIL() << "no error";
+  } catch (const StreamError& error) {
+    EXPECT_EQ(error.stream(), "b");
+    EXPECT_STREQ(error.what(), "channel fx is missing");
   }
 }
 

@@ -91,12 +91,19 @@ ModalModel ReferenceCase::exactSensor() {
 
 double ReferenceCase::speedAt(double time) const {
   const double cutting = std::max(0.0, time - engage_time);
-  return spindle_speed * (1.0 - speed_drop * (1.0 - std::exp(-cutting / drop_time)));
+  const double load = speed_drop * (1.0 - std::exp(-cutting / drop_time));
+  if (speed_ripple == 0.0) return spindle_speed * (1.0 - load);
+  const double ripple = std::sqrt(2.0) * speed_ripple * std::sin(units::TWO_PI * ripple_frequency * time);
+  return spindle_speed * (1.0 - load + ripple);
 }
 
 double ReferenceCase::angleAt(double time) const {
   const double cutting = std::max(0.0, time - engage_time);
-  return spindle_speed * (time - speed_drop * (cutting - drop_time * (1.0 - std::exp(-cutting / drop_time))));
+  const double load = speed_drop * (cutting - drop_time * (1.0 - std::exp(-cutting / drop_time)));
+  if (speed_ripple == 0.0) return spindle_speed * (time - load);
+  const double w = units::TWO_PI * ripple_frequency;  // [rad/s]
+  const double ripple = std::sqrt(2.0) * speed_ripple * (1.0 - std::cos(w * time)) / w;
+  return spindle_speed * (time - load + ripple);
 }
 
 ReferenceRecord simulate(const ReferenceCase& reference) {

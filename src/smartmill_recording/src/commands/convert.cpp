@@ -1,10 +1,9 @@
-#include <unistd.h>
-
 #include <cstdio>
 #include <map>
 #include <string>
 
 #include "smartmill_recording/commands.h"
+#include "smartmill_recording/reading_progress.h"
 #include "smartmill_recording/recording_writer.h"
 
 namespace smartmill::recording {
@@ -22,11 +21,8 @@ struct Arguments {
 };
 
 void run(const Arguments& arguments) {
-  const bool terminal = isatty(STDERR_FILENO) != 0;
   const std::size_t messages = convertRecording(
-      arguments.from, arguments.to, compressions().at(arguments.compression), [&](double share) {
-        if (terminal) std::fprintf(stderr, "\rreading %3.0f %%%s", 100.0 * share, share >= 1.0 ? "\n" : "");
-      });
+      arguments.from, arguments.to, compressions().at(arguments.compression), printReadingProgress);
   std::printf("%s: %zu messages\n", arguments.to.c_str(), messages);
 }
 

@@ -6,7 +6,8 @@
 #include <exception>
 #include <functional>
 
-#include "import/hdf5_errors.h"
+#include "hdf5_errors.h"
+#include "hdf5_handle.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_recording/import/channel_file.h"
@@ -23,31 +24,15 @@ using ObjectInfo = H5O_info_t;
 
 constexpr hsize_t LONGEST_WORD = 1000;  // [byte] of an attribute
 
-/// An identifier of libhdf5 with the call that gives it back.
-class Handle {
- public:
-  Handle(hid_t id, herr_t (*close)(hid_t)) : id_(id), close_(close) {}
-  ~Handle() {
-    if (id_ >= 0) close_(id_);
-  }
-  Handle(const Handle&) = delete;
-  Handle& operator=(const Handle&) = delete;
-  operator hid_t() const { return id_; }
-
- private:
-  hid_t id_;
-  herr_t (*close_)(hid_t);
-};
-
 bool isNumeric(hid_t type) {
   const H5T_class_t kind = H5Tget_class(type);
   return kind == H5T_INTEGER || kind == H5T_FLOAT;
 }
 
 std::string readWord(hid_t attribute, hid_t type) {
-  const Handle space(H5Aget_space(attribute), H5Sclose);
+  const Hdf5Handle space(H5Aget_space(attribute), H5Sclose);
   if (H5Sget_simple_extent_npoints(space) != 1) return {};
-  const Handle memory(H5Tcopy(H5T_C_S1), H5Tclose);
+  const Hdf5Handle memory(H5Tcopy(H5T_C_S1), H5Tclose);
   H5Tset_cset(memory, H5Tget_cset(type));
   if (H5Tis_variable_str(type) > 0) {
     H5Tset_size(memory, H5T_VARIABLE);
@@ -70,12 +55,12 @@ void readAttributes(hid_t object, const std::string& path, ChannelFile* file) {
   ObjectInfo info;
   if (H5Oget_info2(object, &info, H5O_INFO_NUM_ATTRS) < 0) return;
   for (hsize_t i = 0; i < info.num_attrs; ++i) {
-    const Handle attribute(
+    const Hdf5Handle attribute(
         H5Aopen_by_idx(object, ".", H5_INDEX_NAME, H5_ITER_INC, i, H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
     if (attribute < 0) continue;
     std::array<char, 256> name{};
     H5Aget_name(attribute, name.size(), name.data());
-    const Handle type(H5Aget_type(attribute), H5Tclose), space(H5Aget_space(attribute), H5Sclose);
+    const Hdf5Handle type(H5Aget_type(attribute), H5Tclose), space(H5Aget_space(attribute), H5Sclose);
     const std::string key = (path.empty() ? "" : path + "/") + name.data();
     double value = 0.0;
     if (H5Tget_class(type) == H5T_STRING) {
@@ -88,7 +73,7 @@ void readAttributes(hid_t object, const std::string& path, ChannelFile* file) {
 }
 
 void readDataset(hid_t dataset, const std::string& path, ChannelFile* file) {
-  const Handle type(H5Dget_type(dataset), H5Tclose), space(H5Dget_space(dataset), H5Sclose);
+  const Hdf5Handle type(H5Dget_type(dataset), H5Tclose), space(H5Dget_space(dataset), H5Sclose);
   const int rank = H5Sget_simple_extent_ndims(space);
   const hssize_t count = H5Sget_simple_extent_npoints(space);
   if (!isNumeric(type)) {
@@ -140,7 +125,7 @@ herr_t visit(hid_t root, const char* name, const ObjectInfo* info, void* data) {
   auto& to = *static_cast<Visit*>(data);
   try {
     const std::string path = std::string(name) == "." ? "" : name;
-    const Handle object(H5Oopen(root, name, H5P_DEFAULT), H5Oclose);
+    const Hdf5Handle object(H5Oopen(root, name, H5P_DEFAULT), H5Oclose);
     if (object < 0) throw Error(to.file->file + ": " + path + ": cannot be read; the file is damaged");
     readAttributes(object, path, to.file);
     if (info->type == H5O_TYPE_DATASET) readDataset(object, path, to.file);
@@ -190,7 +175,7 @@ ChannelFile readHdf5File(const std::string& file) {
   ChannelFile result;
   result.file = file;
   result.kind = "HDF5";
-  const Handle id(H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
+  const Hdf5Handle id(H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
   if (id < 0) throw Error(file + ": not a readable HDF5 file: truncated or damaged");
   Visit to{&result, nullptr};
   const herr_t code = H5Ovisit2(id, H5_INDEX_NAME, H5_ITER_INC, visit, &to, H5O_INFO_BASIC);

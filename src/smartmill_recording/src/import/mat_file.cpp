@@ -6,7 +6,7 @@
 #include <fstream>
 #include <memory>
 
-#include "import/hdf5_errors.h"
+#include "hdf5_errors.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_recording/import/channel_file.h"

@@ -66,6 +66,12 @@ smartmill_msgs::StabilityChart toMsg(const StabilityChart& chart);
 IdentifiedForceCurves fromMsg(const smartmill_msgs::ForceCurve& message);
 smartmill_msgs::ForceCurve toMsg(const IdentifiedForceCurves& curves);
 
+/// A block with the frame of its sensor.
+struct FramedBlock {
+  std::string frame;  ///< empty: not stated
+  SampleBlock block;
+};
+
 /// Message type of a core type, which toMsg() returns: MessageOf<SampleBlock>::Type; of a message the message
 /// itself.
 template <class Data, class = void>
@@ -80,5 +86,21 @@ template <>
 struct MessageOf<ForceBlock> {  // whose message requires a frame
   using Type = smartmill_msgs::ForceBlock;
 };
+template <>
+struct MessageOf<FramedBlock> {
+  using Type = smartmill_msgs::SampleBlock;
+};
+
+/// @throws Error as fromMsg().
+template <class Data>
+Data dataOf(const typename MessageOf<Data>::Type& message) {
+  if constexpr (std::is_same_v<Data, FramedBlock>) {
+    return {message.header.frame_id, fromMsg(message)};
+  } else if constexpr (std::is_same_v<Data, typename MessageOf<Data>::Type>) {
+    return message;
+  } else {
+    return fromMsg(message);
+  }
+}
 
 }  // namespace smartmill

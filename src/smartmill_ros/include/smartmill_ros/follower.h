@@ -63,7 +63,8 @@ class Followers {
   /// Announces the end of the data: the nodes release delayed results, one node after the other.
   void end();
 
-  /// Ends the flow control without an end of data: the nodes again detect missing messages.
+  /// Ends the flow control without an end of data, once all messages sent are processed: the nodes again
+  /// detect missing messages. @throws Error as keepUp()
   void leave();
 
   static constexpr double TIMEOUT = 120.0;  ///< [s] time limit without progress

@@ -3,6 +3,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <ros/node_handle.h>
 
@@ -48,6 +49,8 @@ class FrfServer {
   void refuseWaiting(const std::string& reason, double timeout);
 
   const std::string& lastMessage() const;  ///< of the last result
+  /// Modes that this node measured, also before its last restart.
+  std::vector<MeasuredModes> modes() const;
 
  private:
   struct Impl;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <limits>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -13,6 +14,7 @@
 #include <smartmill_msgs/Follow.h>
 #include <boost/function.hpp>
 
+#include "smartmill_core/signal/stream_check.h"
 #include "smartmill_core/signal/watchdog.h"
 #include "smartmill_ros/conversions.h"
 
@@ -22,6 +24,10 @@ namespace smartmill {
 /// loses no messages.
 constexpr std::uint32_t STREAM_QUEUE = 100000;
 
+/// [s] of stamps by which a silent stream may be behind the others: a sensor, whose fault is to be announced
+/// within 0.5 s, and results of a node that may compute for a while.
+constexpr double SENSOR_BEHIND = 0.4, RESULT_BEHIND = 2.0;
+
 /// State of one input of a node: time since the last message and last error of its handler.
 class InputHealth {
  public:
@@ -30,6 +36,11 @@ class InputHealth {
   /// Calls the handler of a message and catches its exceptions. @param now [s] wall time
   /// @return error for the log; empty: none, or logged recently
   std::string take(double now, const std::function<void()>& handle);
+  /// Within a handler: the message is dropped as if it had not come, so that an input of which every message
+  /// is dropped is dead.
+  void drop() { dropped_ = true; }
+  /// A message of this input cannot be used. @return as take()
+  std::string refuse(double now, const std::string& problem);
 
   const std::string& topic() const { return topic_; }
   const Watchdog& watchdog() const { return watchdog_; }
@@ -43,24 +54,41 @@ class InputHealth {
   }
   void setWaiting(std::function<std::size_t()> waiting) { waiting_ = std::move(waiting); }
 
+  /// Of sample blocks and spindle angles.
+  StreamCheck& streamCheck() { return check_; }
+  const StreamCheck& streamCheck() const { return check_; }
+
+  /// Stamps of a stream, compared with those of the others.
+  struct Progress {
+    double newest = -std::numeric_limits<double>::infinity();  // [s]
+    double behind = 0.0;                                       // [s] behind the other streams; 0: not behind
+    double limit = 0.0;                                        // [s]
+  };
+  Progress& progress() { return progress_; }
+  const Progress& progress() const { return progress_; }
+
  private:
   std::string topic_, problem_;
   Watchdog watchdog_;
   bool reported_ = false;      // the problem, by takeProblem()
   bool last_refused_ = false;  // the last message
+  bool dropped_ = false;       // the present message
   double logged_ = -1e9;       // [s] time of the last line for the log
   std::size_t refused_ = 0;
   std::uint64_t taken_ = 0;
   std::function<std::size_t()> waiting_;
+  StreamCheck check_;
+  Progress progress_;
 };
 
 /// Subscriptions of a node. on() has the signature of RecordingReader::on(), so that one function can connect
 /// an estimator to either. An exception of a handler is logged and reported in the diagnostics; the node
-/// continues.
+/// continues. Sample blocks and spindle angles pass a StreamCheck, whose findings are logged and reported,
+/// too, as is a stream whose stamps fall behind those of the others.
 class Inputs {
  public:
   /// @param timeout [s] of ticks without a message after which an input is dead
-  Inputs(ros::NodeHandle nh, double timeout);
+  Inputs(const ros::NodeHandle& nh, double timeout);
 
   /// @param Data a core type, converted from its message (an inconsistent message is refused), or a message.
   /// The handler gets the data and the time of their reception [s].
@@ -73,7 +101,12 @@ class Inputs {
         if constexpr (std::is_same_v<Message, Data>) {
           handler(message, toSec(ros::Time::now()));
         } else {
-          handler(fromMsg(message), toSec(ros::Time::now()));
+          Data data = dataOf<Data>(message);
+          if (isUsable(health, data)) {
+            handler(data, toSec(ros::Time::now()));
+          } else {
+            health.drop();
+          }
         }
       });
     };
@@ -110,11 +143,35 @@ class Inputs {
   InputHealth& find(const std::string& topic);
   void take(InputHealth& health, const std::function<void()>& handle);
 
+  template <class Data>
+  bool isUsable(InputHealth& health, Data& data) {
+    if constexpr (std::is_same_v<Data, FramedBlock>) {
+      return isUsable(health, data.block);
+    } else if constexpr (std::is_same_v<Data, SampleBlock> || std::is_same_v<Data, SpindleAngle>) {
+      const bool usable = health.streamCheck().check(data);
+      logLines(health);
+      if constexpr (std::is_same_v<Data, SpindleAngle>) compareSpeed(health, data);
+      noteStamp(health, data.stamp, SENSOR_BEHIND);
+      return usable;
+    } else if constexpr (std::is_same_v<Data, ForceBlock>) {
+      noteStamp(health, data.stamp, RESULT_BEHIND);
+    } else if constexpr (std::is_same_v<Data, CncState>) {
+      speeds_.setController(data.stamp, data.connected ? data.spindle_speed : NOT_A_NUMBER);
+      noteStamp(health, data.stamp, std::numeric_limits<double>::infinity());  // polled, may pause
+    }
+    return true;
+  }
+  void logLines(InputHealth& health);
+  void compareSpeed(InputHealth& health, const SpindleAngle& reading);
+  /// @param limit [s] beyond which the stream is behind the others
+  void noteStamp(InputHealth& health, double stamp, double limit);
+
   ros::NodeHandle nh_;
   double timeout_;
   double hold_ = 0.0;               // [s] remaining ticks without timeouts
   std::deque<InputHealth> inputs_;  // with stable addresses
   Watchdog any_;
+  SpeedAgreement speeds_;
   std::deque<ros::Subscriber> subscribers_;
 };
 

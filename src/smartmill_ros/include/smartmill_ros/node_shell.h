@@ -13,8 +13,12 @@
 
 namespace smartmill {
 
-/// Common parts of a node: inputs that catch exceptions, tasks on wall timers, diagnostics once a second and
-/// the service `follow` for a player of recorded data.
+/// Whether other nodes reach a node under this name through the loopback interface only (roscpp then listens
+/// on it alone): "localhost" or an address 127.x.x.x or ::1. @param host ROS_HOSTNAME or ROS_IP
+bool isLoopback(const std::string& host);
+
+/// Common parts of a node: inputs that catch exceptions, tasks on wall timers, diagnostics once a second, the
+/// count of its restarts and the service `follow` for a player of recorded data.
 class NodeShell {
  public:
   /// @param hardware id in the diagnostics @param input_timeout [s] see Inputs
@@ -36,6 +40,8 @@ class NodeShell {
   void every(double period, std::function<void()> task);
 
  private:
+  void countStart();
+  void diagnoseRestarts(diagnostic_updater::DiagnosticStatusWrapper& status);
   bool follow(smartmill_msgs::Follow::Request& request, smartmill_msgs::Follow::Response& response);
 
   ros::NodeHandle nh_;
@@ -44,6 +50,7 @@ class NodeShell {
   std::vector<std::function<void()>> tasks_;
   std::vector<ros::WallTimer> timers_;
   ros::ServiceServer follow_;
+  int starts_ = 1;  // in this launch
 };
 
 }  // namespace smartmill

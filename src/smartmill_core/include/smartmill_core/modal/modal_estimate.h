@@ -2,6 +2,7 @@
 
 #include <complex>
 #include <functional>
+#include <string>
 #include <vector>
 
 #include "smartmill_core/modal/modal_model.h"
@@ -29,6 +30,7 @@ struct EstimatedMode {
   std::vector<double> gain, gain_std;                   ///< [unit of the FRF] per FRF
   std::vector<double> phase_part, phase_part_std;       ///< [unit of the FRF] per FRF
   double evidence = 0.0;  ///< Wald statistic over its largest value by chance: significant from 2.5
+  std::string doubt;      ///< why the mode is doubtful; empty: it is proven
 
   std::complex<double> response(std::size_t frf, double f) const;  ///< [unit] at f [Hz]
 };

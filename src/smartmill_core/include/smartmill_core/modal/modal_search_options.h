@@ -50,6 +50,13 @@ struct ModalSearchOptions {
   /// [1] Median coherence within a mode's width. Where it is lower in every FRF, the force had no power there
   /// (between the lobes of a pulse), and the curvature is a bias of the average.
   double coherent = 0.3;
+  /// [1] The same below which hits disagree: the average of a drifting resonance is not a mode. Noise alone
+  /// gives this at a signal of three times the noise.
+  double repeatable = 0.9;
+  /// [deg] Phase to a neighbour, modulo 180 deg, above which a mode is a flank where hits disagree. Lightly
+  /// damped modes are within a few degrees; the flanks of an averaged peak have 30 to 60 deg.
+  double flank_phase = 20.0;
+  double dominant = 1.5;  ///< [1] a mode so many times as large as its neighbour is not the neighbour's flank
 
   // Modes by magnitude.
   double clear_peak = 12.0;  ///< [1] of the magnitude around it: such a peak is a mode whatever its phase

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <complex>
 #include <cstddef>
 #include <memory>
 #include <string>
@@ -102,9 +103,23 @@ struct Tone {
   std::array<double, CHANNEL_COUNT> amplitude{};  ///< in each channel
   double phase = 0.0;                             ///< [rad] at the start of the record
   double order = 0.0;                             ///< [1] of the spindle, replaces the frequency; 0: none
+  bool on_sensor = false;  ///< amplitude is that of a force on the sensor, which responds to it
+  /// [1] of the path to each channel at the tone's frequency; the caller sets that of the sensor.
+  std::array<std::complex<double>, CHANNEL_COUNT> response = filled(1.0);
 
   /// [rad/s] @param speed [rad/s] of the spindle
   double rate(double speed) const { return order > 0.0 ? order * speed : units::TWO_PI * frequency; }
+  /// Value in a channel. @param angle [rad] of the sine, including the phase
+  double at(std::size_t channel, double angle) const {
+    return amplitude[channel] * std::imag(response[channel] * std::polar(1.0, angle));
+  }
+
+ private:
+  static std::array<std::complex<double>, CHANNEL_COUNT> filled(double value) {
+    std::array<std::complex<double>, CHANNEL_COUNT> all;
+    all.fill(value);
+    return all;
+  }
 };
 
 /// Decaying oscillations on a channel, one every period, with an unknown start in each record.

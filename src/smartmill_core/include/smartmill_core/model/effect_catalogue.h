@@ -79,9 +79,12 @@ struct EffectParameter {
   std::vector<double> choices = {};     ///< allowed numbers; empty: the range
   std::optional<double> sum = {};       ///< required sum of a list
   double period = 0.0;                  ///< of an angle; 0: not periodic
+  bool on_spindle = false;              ///< angle of something that turns with the spindle, from tooth 1
   EffectDraw draw = {};
   std::size_t words_drawn = 0;  ///< only this many words, from the first, are drawn; 0: all
 
+  /// Its quantity without the unit, as read aloud: "mass eccentricity" of mass_eccentricity_g_mm.
+  std::string quantity() const;
   /// Whether files may contain this number.
   bool allows(double number) const;
   /// The condition of allows(), for example "> 0" or "50 or 60".
@@ -119,6 +122,7 @@ struct EffectKind {
   int rank = 0;                  ///< within the stage: lower acts first
   std::string description = {};  ///< one line
   std::string source = {};       ///< publication or cause of the law
+  std::string advice = {};       ///< for the machinist: what to do about it
   std::vector<EffectParameter> parameters = {};
   std::vector<EffectNeed> needs = {};
   /// Forms in which the effect may be present where its needs are met: coordinates of a fit, bounds, priors,
@@ -126,6 +130,8 @@ struct EffectKind {
   std::function<std::vector<EffectForm>(const EffectScope&)> forms = {};
   /// Draws what the keys' own distributions do not cover: lists, modes, values that depend on the machine.
   std::function<void(const MachineModel&, Random&, EffectEntry&)> draw = {};
+  /// One sentence for the machinist about an entry that was found; empty: none.
+  std::function<std::string(const EffectEntry&)> remark = {};
   /// [BIC] gain required in addition to that of a rival: of two effects that no record distinguishes the more
   /// common one is named.
   double bic_penalty = 0.0;

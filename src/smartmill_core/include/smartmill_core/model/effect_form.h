@@ -89,8 +89,8 @@ struct EffectForm {
   };
 
   /// How the search finds probes that are not known beforehand: from the residual, as a mode of the sensor, a
-  /// mode of the tool tip, a line at a spindle order.
-  enum class SearchStrategy { none, sensor_mode, tip_mode, spindle_order };
+  /// mode of the tool tip, a line at a spindle order, a line at an order without a fixed phase.
+  enum class SearchStrategy { none, sensor_mode, tip_mode, spindle_order, free_order };
 
   EffectForm() = default;
   explicit EffectForm(std::vector<EffectCoordinates> terms);

@@ -62,7 +62,15 @@ struct MachineAxes {
 
 /// Hammer station: solenoid hammer above a capacitive displacement sensor, on the table (Dunwoody fig. 4.1).
 struct HammerStation {
-  double offset = 0.0;           ///< [m] hammer's height above the displacement sensor
+  /// Displacement sensor on the other side of the tool (Dunwoody 7.1): the hammer strikes towards it, at its
+  /// height where the offset is zero. Without it the sensor is on the hammer's side, below it.
+  struct Opposite {
+    double distance = 0.0;  ///< [m] from the sensor's face to the hammer's head at rest
+    double stroke = 0.0;    ///< [m] of the head, up to which it reaches a tool
+  };
+
+  double offset = 0.0;  ///< [m] hammer's height above the displacement sensor
+  std::optional<Opposite> opposite;
   double peak_force = 0.0;       ///< [N]
   double contact_time = 0.0;     ///< [s] of the half-sine hit
   double force_noise_rms = 0.0;  ///< [N]

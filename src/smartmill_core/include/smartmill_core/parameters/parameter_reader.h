@@ -67,6 +67,7 @@ class ParameterReader {
 
  private:
   void need(const std::string& key) const;
+  void checkIsWord(const Parameter& parameter);
   const ParameterValue* find(const std::string& key);
 
   std::string prefix_;

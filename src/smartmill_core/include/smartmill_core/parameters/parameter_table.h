@@ -26,6 +26,7 @@ struct Parameter {
 
   std::string value() const;        ///< as written in a YAML file
   std::string description() const;  ///< "[unit] bounds, comment", one line
+  std::string choices() const;      ///< "WORD | WORD", of the allowed words
   /// @throws Error "KEY: VALUE is out of range (...)" or "KEY: 'WORD' is not one of ...".
   void check() const;
 };

@@ -3,13 +3,26 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "smartmill_core/error.h"
+
 namespace smartmill {
+
+/// Error in the data of a stream, which may be thrown while an item of another stream arrives.
+class StreamError : public Error {
+ public:
+  StreamError(std::string stream, const std::string& what) : Error(what), stream_(std::move(stream)) {}
+  const std::string& stream() const { return stream_; }
+
+ private:
+  std::string stream_;
+};
 
 /// Puts several streams into stamp order. roscpp does not preserve order across topics; with this class a
 /// node and an offline tool process the same sequence, so that live, replay and offline results agree to the
@@ -23,7 +36,8 @@ namespace smartmill {
 ///
 /// When the stamps of a sampled stream jump back, a recording was restarted, and all state is reset. Each
 /// stream is compared with its own stamps only, since under load one topic may arrive seconds after another.
-/// Not thread-safe; deliver functions run inside push() and flush().
+/// Not thread-safe; deliver functions run inside push() and flush(). An Error that one throws becomes a
+/// StreamError with the name of its own stream, which need not be the one that releases it.
 class StreamSorter {
  public:
   using Stream = std::size_t;
@@ -35,7 +49,10 @@ class StreamSorter {
   /// @param hold_back [s] >= 0, time that an event may arrive after its stamp and still be in order
   explicit StreamSorter(double hold_back);
 
-  Stream addRegular(std::string name) { return add(std::move(name), true, false, true, false); }
+  /// @param patience [s] > 0; once the stream is behind the newest sample of all streams by more, it is not
+  /// awaited until it continues, as after setRegular(stream, false). The order is that of the stamps unless
+  /// the stream arrives later than that.
+  Stream addRegular(std::string name, double patience = std::numeric_limits<double>::infinity());
   /// Sampled, but possibly absent: regular from its first item on, until setRegular(stream, false).
   Stream addOptional(std::string name) { return add(std::move(name), false, true, true, false); }
   /// Sampled, but never awaited.
@@ -84,18 +101,21 @@ class StreamSorter {
     std::string name;
     bool regular, optional, sampled, latched;
     double newest;
-    std::optional<Item> held;  // last item of a latched stream
+    std::optional<Item> held;                                   // last item of a latched stream
+    double patience = std::numeric_limits<double>::infinity();  // [s]
   };
   Stream add(std::string name, bool regular, bool optional, bool sampled, bool latched);
   void restart(double stamp);
   void release(double up_to);
   double passed() const;
+  bool isAwaited(const Source& source) const;
 
   double hold_back_;
   std::vector<Source> sources_;
   std::map<Key, Deliver> waiting_;
   std::uint64_t arrivals_ = 0;
   double delivered_;
+  double first_ = std::numeric_limits<double>::infinity();  // [s] oldest stamp of the sampled streams
   std::size_t late_ = 0;
   std::function<void()> forget_;
 };

@@ -21,7 +21,10 @@ struct ReferenceCase {
   double sample_rate = 25600.0;  ///< [Hz]
   double speed_drop = 0.0;       ///< [1] relative drop of the speed under load ...
   double drop_time = 0.3;        ///< [s] ... with this time constant
-  double nominal_off = 0.0;      ///< [1] relative error of the speed of the cutting condition
+  double speed_ripple = 0.0;     ///< [1] RMS of a sine on the speed over the speed ...
+  double ripple_frequency =
+      0.0;                   ///< [Hz] ... > 0 with speed_ripple; a multiple of the spindle's is synchronous
+  double nominal_off = 0.0;  ///< [1] relative error of the speed of the cutting condition
   std::uint32_t seed = 1;
   ModalModel sensor = exactSensor();  ///< at the start
   ModalModel later = exactSensor();   ///< at the end

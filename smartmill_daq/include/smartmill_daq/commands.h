@@ -1,0 +1,12 @@
+#pragma once
+
+#include "smartmill_core/command.h"
+
+namespace smartmill::daq {
+
+/// Opens an instrument without ROS; level, clipping and clock once a second.
+Command daqCommand();
+/// Sensitivity of a channel from a record of a known quantity.
+Command sensitivityCommand();
+
+}  // namespace smartmill::daq

@@ -1,0 +1,9 @@
+#pragma once
+
+#include "smartmill_core/command.h"
+
+namespace smartmill::exchange {
+
+smartmill::Command itemsCommand();
+
+}  // namespace smartmill::exchange

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <string>
+
+#include "smartmill_core/nc/path_segment.h"
+
+namespace smartmill::program {
+
+/// A motion of the tool tip, or a dwell, with the modal state in which it is executed. Coordinates are those
+/// of the workpiece, z along the tool axis.
+struct Move {
+  std::size_t block = 0;  ///< executed block, from 0; the blocks of a subprogram count at each call
+  int line = 0;           ///< in the file, from 1
+  std::string operation;  ///< "G0" ... "G3", "G81" ..., "G4"
+  nc::PathSegment path{nc::PathSegment::Point{{0, 0, 0}}};
+  bool rapid = false;
+  double feed = 0.0;           ///< [m/s] along the path; unused where rapid
+  double dwell = 0.0;          ///< [s] after the motion
+  double spindle_speed = 0.0;  ///< [rad/s] >= 0
+  bool left_hand = false;      ///< M4: the teeth move counterclockwise
+  int tool = 0;                ///< T; 0: the program has not changed the tool
+};
+
+}  // namespace smartmill::program

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <array>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "smartmill_program/nc/move.h"
+
+namespace smartmill::program {
+
+struct ReaderOptions {
+  /// [m] G54..G59 (0..5): position of its zero in the coordinates of the stock. The first work offset of a
+  /// program that is not listed is that of the stock; any other has to be listed.
+  std::map<int, std::array<double, 3>> work_offsets;
+};
+
+/// The moves of a program in the order of execution. Dialect: Fanuc 30i with decimal point input (parameter
+/// 3401#0) and what LinuxCNC shares with it; docs/nc_program.md lists the words. z is the tool tip (G43). The
+/// position is unknown at the start and after G28 and G53, so the rapid move from there is not part of the
+/// result.
+/// @throws Error "FILE: line N, column C: ..." for any word that is not supported, and for programs that end
+/// early.
+std::vector<Move> readProgram(const std::string& file, const ReaderOptions& options = {});
+
+/// The same of a text. @param name for messages
+std::vector<Move> interpretProgram(const std::string& text, const std::string& name,
+                                   const ReaderOptions& options = {});
+
+}  // namespace smartmill::program

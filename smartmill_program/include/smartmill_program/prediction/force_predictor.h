@@ -1,0 +1,37 @@
+#pragma once
+
+#include "smartmill_core/cutting/mechanistic.h"
+#include "smartmill_program/engagement/contact.h"
+
+namespace smartmill::program {
+
+/// Force of the side of the tool in the feed frame.
+struct ForcePrediction {
+  CuttingForce mean;         ///< over a revolution
+  double peak_force = 0.0;   ///< [N] largest force across the tool axis over a revolution
+  double peak_torque = 0.0;  ///< [N m] largest
+};
+
+/// Forces of a contact by the mechanistic model (smartmill_core/cutting/mechanistic.h): the sum over its
+/// arcs, each of which is a cut of its own depth. The end face and process damping are not part of the model.
+class ForcePredictor {
+ public:
+  ForcePredictor(const ToolGeometry& tool, const CuttingCoefficients& coefficients)
+      : tool_(tool), coefficients_(coefficients) {}
+
+  /// @param feed_per_tooth [m] horizontal
+  /// @throws Error as MechanisticForce
+  const ForcePrediction& predict(const Contact& contact, double feed_per_tooth);
+
+ private:
+  bool isLast(const Contact& contact, double feed_per_tooth) const;
+
+  ToolGeometry tool_;
+  CuttingCoefficients coefficients_;
+  // The last prediction; along a straight cut it stays the same.
+  Contact contact_;
+  double feed_per_tooth_ = 0.0;
+  ForcePrediction prediction_;
+};
+
+}  // namespace smartmill::program

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <map>
+#include <memory>
+
+#include "smartmill_program/engagement/cut_simulation.h"
+#include "smartmill_program/prediction/force_predictor.h"
+#include "smartmill_program/prediction/stability_limits.h"
+#include "smartmill_program/prediction/tool_models.h"
+
+namespace smartmill::program {
+
+/// What is predicted of a step; NaN: not predicted.
+struct StepPrediction {
+  double feed_per_tooth = std::numeric_limits<double>::quiet_NaN();  ///< [m] along the path
+  ForcePrediction force;                                             ///< of the side of the tool
+  double power = 0.0;                                                ///< [W] mean, of the cut
+  double limit = std::numeric_limits<double>::quiet_NaN();           ///< [m] stability limit
+};
+
+/// Predicts forces and stability of the steps of a program, each with the model of its tool.
+class StepPredictor {
+ public:
+  /// @param with_stability computes limits for the models that state modes of the tool tip
+  StepPredictor(ToolModels& models, bool with_stability) : models_(models), with_stability_(with_stability) {}
+
+  /// @throws Error naming what a model lacks
+  StepPrediction predict(const Step& step);
+  std::size_t computedLimits() const;
+
+ private:
+  struct OfTool {
+    OfTool(const MachineModel& model, const CuttingCoefficients& cutting)
+        : force(*model.tool, cutting), limits(model) {}
+    ForcePredictor force;
+    StabilityLimits limits;
+  };
+  OfTool& of(int tool);
+
+  ToolModels& models_;
+  bool with_stability_;
+  std::map<int, std::unique_ptr<OfTool>> tools_;
+};
+
+}  // namespace smartmill::program

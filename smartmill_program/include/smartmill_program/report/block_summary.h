@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <string>
+
+#include "smartmill_program/engagement/cut_simulation.h"
+#include "smartmill_program/prediction/step_predictor.h"
+
+namespace smartmill::program {
+
+/// The steps of one executed block together. Angles, depths, feed per tooth and forces are those of its cuts;
+/// NaN: it has none.
+struct BlockSummary {
+  static constexpr double NONE = std::numeric_limits<double>::quiet_NaN();
+
+  BlockSummary() = default;
+  explicit BlockSummary(const Move& move);
+  void add(const Step& step, const StepPrediction& prediction, double radius);
+  void addDwell(double seconds) { time += seconds; }
+
+  std::size_t block = 0;  ///< in the order of execution, from 0
+  int line = 0, tool = 0;
+  std::string operation;
+  double length = 0.0;                             ///< [m]
+  double time = 0.0, cut_time = 0.0;               ///< [s] of all, of the steps that remove material
+  double feed_time = 0.0;                          ///< [s] of feed motion
+  double axial_depth = NONE, radial_depth = NONE;  ///< [m] largest
+  double entry = NONE, exit = NONE;        ///< [rad] of the widest engagement: least and largest angle
+  double feed_per_tooth = NONE;            ///< [m] largest
+  double volume = 0.0, face_volume = 0.0;  ///< [m3]
+  double peak_force = NONE;                ///< [N]
+  double peak_torque = NONE;               ///< [N m]
+  double power = NONE;                     ///< [W] largest mean power of a step
+  double margin = NONE;                    ///< [1] least stability limit over axial depth
+  bool rapid_hit = false;                  ///< a rapid move removes material
+
+  /// [1] Share of the feed motion's time without removal; NaN without feed motion.
+  double airShare() const { return feed_time > 0.0 ? 1.0 - cut_time / feed_time : NONE; }
+};
+
+}  // namespace smartmill::program

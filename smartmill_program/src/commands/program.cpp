@@ -1,0 +1,212 @@
+#include <array>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+#include "smartmill_program/commands.h"
+#include "smartmill_program/nc/program_reader.h"
+#include "smartmill_program/program_analysis.h"
+#include "smartmill_program/report/program_page.h"
+#include "smartmill_program/report/tables.h"
+
+namespace {
+
+using namespace smartmill;
+using namespace smartmill::program;
+using Clock = std::chrono::steady_clock;
+using units::MM;
+
+constexpr int INTERRUPTED = 130;  // exit status
+constexpr double QUIET = 1.0;     // [s] after which progress is displayed, and between its lines
+
+volatile std::sig_atomic_t stop_requested = 0;
+
+// The first Ctrl-C ends the simulation and keeps its result, the second ends the program.
+void requestStop(int) {
+  stop_requested = 1;
+  std::signal(SIGINT, SIG_DFL);
+}
+
+struct Arguments {
+  std::string program, out, colour = "force";
+  std::vector<double> stock_mm, corner_mm;
+  std::vector<std::string> models, work_offsets;
+  double resolution_mm = 0.1, step = SimulationOptions().step_share;
+  bool stability = true;
+};
+
+StockBlock blockOf(const Arguments& arguments) {
+  StockBlock block;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double size = arguments.stock_mm[i] * MM;
+    const double top_is_zero = i == 2 ? -size : 0.0;
+    block.low[i] = arguments.corner_mm.empty() ? top_is_zero : arguments.corner_mm[i] * MM;
+    block.high[i] = block.low[i] + size;
+  }
+  return block;
+}
+
+ReaderOptions readerOptions(const Arguments& arguments) {
+  ReaderOptions options;
+  for (const std::string& text : arguments.work_offsets) {
+    int code = 0;
+    std::array<double, 3> offset{};
+    char rest = 0;
+    if (std::sscanf(text.c_str(), "G%d:%lf:%lf:%lf%c", &code, &offset[0], &offset[1], &offset[2], &rest) !=
+            4 ||
+        code < 54 || code > 59)
+      throw Error("--work-offset " + text + ": expected G54:X:Y:Z to G59:X:Y:Z [mm]");
+    for (double& value : offset) value *= MM;
+    if (!options.work_offsets.emplace(code - 54, offset).second)
+      throw Error("--work-offset " + text + ": stated a second time");
+  }
+  return options;
+}
+
+/// Percentages on standard error, and whether to go on.
+class ProgressLine {
+ public:
+  bool operator()(double share) {
+    if (elapsed() > shown_ + QUIET) {
+      shown_ = elapsed();
+      std::fprintf(stderr, "\r%3.0f %% of the moves", 100.0 * share);
+      open_ = true;
+    }
+    return stop_requested == 0;
+  }
+  void close() {
+    if (open_) std::fprintf(stderr, "\n");
+    open_ = false;
+  }
+  double elapsed() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }  // [s]
+
+ private:
+  Clock::time_point begin_ = Clock::now();
+  double shown_ = 0.0;
+  bool open_ = false;
+};
+
+/// @throws Error naming the first rapid move that meets the stock
+void refuseRapidHits(const std::string& program, const std::vector<BlockSummary>& blocks) {
+  const BlockSummary* first = nullptr;
+  std::size_t others = 0;
+  for (const BlockSummary& block : blocks) {
+    if (block.rapid_hit && first) ++others;
+    if (block.rapid_hit && !first) first = &block;
+  }
+  if (!first) return;
+  throw Error(program + ": line " + std::to_string(first->line) + ": " + first->operation +
+              ": a rapid move hits the stock" +
+              (others > 0 ? " (and in " + std::to_string(others) + " more blocks, see blocks.csv)" : ""));
+}
+
+void noteCornerRadii(const ToolModels& models) {
+  for (const auto& [number, model] : models.models())
+    for (const EffectEntry& effect : model.effects)
+      if (effect.name == "corner_radius")
+        std::fprintf(stderr, "%s: corner_radius is ignored, the tool is taken as a flat end mill\n",
+                     model.file.c_str());
+}
+
+int run(const Arguments& arguments) {
+  const Colour colour = colourOf(arguments.colour);
+  ToolModels models(arguments.models);
+  const std::vector<Move> moves = readProgram(arguments.program, readerOptions(arguments));
+  Stock stock(blockOf(arguments), arguments.resolution_mm * MM);
+  std::error_code failed;
+  std::filesystem::create_directories(arguments.out, failed);
+  if (failed) throw Error(arguments.out + ": " + failed.message());
+
+  AnalysisOptions options;
+  options.simulation.step_share = arguments.step;
+  options.simulation.rapid = models.rapid();
+  options.stability = arguments.stability;
+  ProgramAnalysis analysis(arguments.program, models, stock, options);
+  StepTable steps;
+  PathPicture picture(stock.block(), colour);
+  ProgressLine progress;
+  std::signal(SIGINT, requestStop);
+  const AnalysisResult result = analysis.run(
+      moves,
+      [&](const Step& step, const StepPrediction& prediction) {
+        steps.add(step, prediction, models.radius(step.move->tool));
+        picture.add(step, prediction);
+      },
+      [&](double share) { return progress(share); });
+  progress.close();
+  const double seconds = progress.elapsed();
+
+  noteCornerRadii(models);
+  const std::string summary = summaryOf(result.blocks);
+  blockTable(result.blocks).save(arguments.out + "/blocks.csv");
+  steps.csv().save(arguments.out + "/steps.csv");
+  programPage(std::filesystem::path(arguments.program).filename().string(), summary, picture, result.blocks)
+      .write(arguments.out + "/report.html");
+  std::cout << summary;
+  std::fprintf(stderr, "%zu steps and %zu stability limits in %.2f s, %.0f x real time\n", result.steps,
+               result.limits, seconds, result.time / seconds);
+  if (result.interrupted) {
+    std::fprintf(stderr, "interrupted in line %d; %s has the blocks until then\n",
+                 result.blocks.empty() ? 0 : result.blocks.back().line, arguments.out.c_str());
+    return INTERRUPTED;
+  }
+  refuseRapidHits(arguments.program, result.blocks);
+  return 0;
+}
+
+}  // namespace
+
+namespace smartmill::program {
+
+Command programCommand() {
+  Command command("program", "predicts engagement, forces and stability of every block of an NC program");
+  command.description =
+      "Runs an NC program (Fanuc, LinuxCNC) through a block of stock: engagement of the end mill step by "
+      "step, from "
+      "it forces, torque, power and the stability limit with the coefficients and modes of a machine model.";
+  command.examples = {{"part.nc --stock-mm 100 60 20 --model mill.yaml -o part",
+                       "stock with a corner at X0 Y0 and its top at Z0"},
+                      {"part.nc --stock-mm 100 60 20 --corner-mm -50 -30 0 --model 1=rougher.yaml "
+                       "2=drill.yaml -o part --colour margin",
+                       "another corner, two tools, path coloured by the stability margin"}};
+  command.files = {{"OUT/blocks.csv", "a row for each executed block"},
+                   {"OUT/steps.csv", "a row for each step of a feed motion"},
+                   {"OUT/report.html", "the tool path from above and the table of the blocks"}};
+  command.exits = {{INTERRUPTED, "interrupted by Ctrl-C; the files contain the blocks until then"}};
+  command.setBody(run, [](CommandLine& line, Arguments& arguments) {
+    line.option("PROGRAM", arguments.program, "NC program").required();
+    line.option("--stock-mm", arguments.stock_mm, "size of the stock in X, Y and Z [mm]")
+        .count(3, 3)
+        .required();
+    line.option("--corner-mm", arguments.corner_mm,
+                "its corner of least X, Y and Z [mm] (default: 0 0 and minus the size in Z)")
+        .count(3, 3);
+    line.option("--model", arguments.models,
+                "machine model file with tool, coefficients and modes; N=FILE for tool N of several")
+        .count(1, 99)
+        .required();
+    line.option("-o,--out", arguments.out, "folder of the results").required();
+    line.option("--resolution-mm", arguments.resolution_mm, "width of the columns of the stock [mm]")
+        .positive()
+        .showDefault();
+    line.option("--step", arguments.step, "length of a step per tool radius")
+        .within(0.001, 1.0)
+        .showDefault();
+    line.option("--work-offset", arguments.work_offsets,
+                "G54:X:Y:Z ... G59:X:Y:Z [mm] zero of a work offset in the coordinates of the stock")
+        .count(1, 6);
+    line.option("--colour", arguments.colour, "quantity that colours the path")
+        .oneOf(colourNames())
+        .showDefault();
+    line.flag("!--no-stability", arguments.stability, "leaves out the stability limits");
+  });
+  return command;
+}
+
+}  // namespace smartmill::program

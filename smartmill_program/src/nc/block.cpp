@@ -1,0 +1,123 @@
+#include "block.h"
+
+#include <string_view>
+
+#include "smartmill_core/error.h"
+
+namespace smartmill::program {
+namespace {
+
+using nc::Word;
+
+constexpr nc::Dialect DIALECT{"O:NGXYZIJKRPQLHTFSM", std::string_view(" \t\n\v\f\r\0", 7), false, false};
+constexpr int MAX_CODE = 999;
+
+struct Code {
+  int code;
+  Group group;
+};
+constexpr Code CODES[] = {
+    {0, Group::motion},    {1, Group::motion},    {2, Group::motion},  {3, Group::motion},
+    {80, Group::cycle},    {81, Group::cycle},    {82, Group::cycle},  {83, Group::cycle},
+    {17, Group::plane},    {18, Group::plane},    {19, Group::plane},  {20, Group::units},
+    {21, Group::units},    {40, Group::cutter},   {43, Group::length}, {49, Group::length},
+    {54, Group::work},     {55, Group::work},     {56, Group::work},   {57, Group::work},
+    {58, Group::work},     {59, Group::work},     {61, Group::path},   {64, Group::path},
+    {90, Group::distance}, {91, Group::distance}, {94, Group::feed},   {95, Group::feed},
+    {98, Group::retract},  {99, Group::retract},  {4, Group::none},    {28, Group::none},
+    {53, Group::none}};
+constexpr int FUNCTIONS[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30, 98, 99};
+
+/// Without the comment of LinuxCNC that begins with ';' (on a Fanuc control ';' is the end of the block).
+std::string withoutSemicolon(const std::string& line) {
+  bool comment = false;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    if (line[i] == '(' || line[i] == ')') comment = line[i] == '(';
+    if (line[i] == ';' && !comment) return line.substr(0, i);
+  }
+  return line;
+}
+
+std::optional<Group> groupOf(int code) {
+  for (const Code& known : CODES)
+    if (known.code == code) return known.group;
+  return std::nullopt;
+}
+
+}  // namespace
+
+void refuse(const Word& word, const std::string& message) {
+  throw Error("column " + std::to_string(word.column) + ": " + message);
+}
+
+Block::Block(const std::string& line) {
+  nc::BlockReader reader(withoutSemicolon(line), DIALECT);
+  if (reader.assigns()) throw Error("column 1: macro variables (#) are not supported");
+  while (const std::optional<Word> word = reader.next()) add(*word);
+}
+
+void Block::add(const Word& word) {
+  empty_ = false;
+  if (word.address == 'G') {
+    const std::optional<Group> group = groupOf(nc::integer(word, MAX_CODE));
+    if (!group) refuse(word, "unknown word " + word.text());
+    std::optional<Word>& place = codes_[static_cast<std::size_t>(*group)];
+    if (place) refuse(word, word.text() + " and " + place->text() + " in one block");
+    place = word;
+    // G80 in the block of a motion, as in the first block of most programs; a cycle is itself the motion.
+    const std::optional<Word>&motion = codes_[static_cast<std::size_t>(Group::motion)],
+          &cycle = codes_[static_cast<std::size_t>(Group::cycle)];
+    if (motion && cycle && *cycle->value != 80.0)
+      refuse(word, cycle->text() + " and " + motion->text() + " in one block");
+  } else if (word.address == 'M') {
+    const int code = nc::integer(word, MAX_CODE);
+    bool known = false;
+    for (const int function : FUNCTIONS) known = known || function == code;
+    if (!known) refuse(word, "unknown word " + word.text());
+    if (this->function(code)) refuse(word, "two words " + word.text() + " in one block");
+    functions_.push_back(word);
+  } else {
+    std::optional<Word>& place = words_[index(word.address)];
+    if (place) refuse(word, std::string("two words ") + word.address + " in one block");
+    place = word;
+  }
+}
+
+const Word* Block::function(int code) const {
+  for (const Word& word : functions_)
+    if (*word.value == code) return &word;
+  return nullptr;
+}
+
+const Word* Block::take(char address) {
+  taken_[index(address)] = true;
+  const std::optional<Word>& word = words_[index(address)];
+  return word ? &*word : nullptr;
+}
+
+std::optional<double> Block::takeValue(char address) {
+  const Word* word = take(address);
+  return word ? word->value : std::nullopt;
+}
+
+void Block::finish() const {
+  const Word* first = nullptr;
+  for (std::size_t i = 0; i < words_.size(); ++i)
+    if (words_[i] && !taken_[i] && (!first || words_[i]->column < first->column)) first = &*words_[i];
+  if (first) refuse(*first, first->text() + " without a code that uses it");
+}
+
+std::optional<int> programNumber(const std::string& line) {
+  const std::size_t begin = line.find_first_not_of(" \t\r");
+  if (begin == std::string::npos || std::string_view("Oo:").find(line[begin]) == std::string_view::npos)
+    return std::nullopt;
+  nc::BlockReader reader(withoutSemicolon(line), DIALECT);
+  return nc::integer(*reader.next());
+}
+
+bool isTapeMark(const std::string& line) {
+  const std::size_t begin = line.find_first_not_of(" \t\r");
+  return begin != std::string::npos && line[begin] == '%';
+}
+
+}  // namespace smartmill::program

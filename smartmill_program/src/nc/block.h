@@ -1,0 +1,70 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "smartmill_core/nc/block_reader.h"
+
+namespace smartmill::program {
+
+/// Modal groups of G codes; at most one code of each in a block.
+enum class Group {
+  none,  // G4, G28, G53
+  motion,
+  cycle,
+  plane,
+  distance,
+  feed,
+  units,
+  cutter,
+  length,
+  work,
+  retract,
+  path,
+  count
+};
+
+/// @throws Error "column C: message"
+[[noreturn]] void refuse(const nc::Word& word, const std::string& message);
+
+/// The words of a block. A word that no code of the block uses is an error.
+class Block {
+ public:
+  /// @throws Error on an unknown word, and on two words of one address or codes of one group.
+  explicit Block(const std::string& line);
+
+  bool empty() const { return empty_; }
+  /// The code of a group, as its word.
+  const std::optional<nc::Word>& code(Group group) const { return codes_[static_cast<std::size_t>(group)]; }
+  const std::vector<nc::Word>& functions() const { return functions_; }  ///< M
+  const nc::Word* function(int code) const;
+
+  bool has(char address) const { return words_[index(address)].has_value(); }
+  /// The word of an address, which then counts as used; nullptr: absent.
+  const nc::Word* take(char address);
+  std::optional<double> takeValue(char address);
+  /// @throws Error naming the first word that was not taken
+  void finish() const;
+
+ private:
+  static std::size_t index(char address) {
+    return address == ':' ? 26 : static_cast<std::size_t>(address - 'A');
+  }
+  void add(const nc::Word& word);
+
+  std::array<std::optional<nc::Word>, static_cast<std::size_t>(Group::count)> codes_;
+  std::array<std::optional<nc::Word>, 27> words_;
+  std::array<bool, 27> taken_{};
+  std::vector<nc::Word> functions_;
+  bool empty_ = true;
+};
+
+/// O or : number of a line that begins a program or subprogram. @throws Error
+std::optional<int> programNumber(const std::string& line);
+/// Whether a line is the % before or after the programs.
+bool isTapeMark(const std::string& line);
+
+}  // namespace smartmill::program

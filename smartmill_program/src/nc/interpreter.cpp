@@ -1,0 +1,349 @@
+#include "interpreter.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "arc.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::program {
+namespace {
+
+using nc::PathSegment;
+using nc::Word;
+using units::MM;
+
+constexpr double INCH = 25.4 * MM;
+constexpr double PECK_CLEARANCE =
+    0.25 * MM;  // [m] above the previous depth of G83 (LinuxCNC 0.254 mm, Fanuc 5115)
+constexpr std::size_t MAX_MOVES = 5000000;  // 1.3 GB; a program that cuts for days
+constexpr int MAX_TOOL = 9999;
+constexpr double MAX_PECKS = 9999;
+constexpr int MAX_HOLES = 9999;  // K or L
+
+int codeOf(const Word& word) {
+  return static_cast<int>(*word.value);
+}
+
+}  // namespace
+
+void Interpreter::execute(Block& block, std::size_t number, int line) {
+  number_ = number;
+  line_ = line;
+  block.take('O');
+  block.take(':');
+  block.take('N');
+  setModes(block);
+  const std::optional<Word>& single = block.code(Group::none);
+  if (single && codeOf(*single) == 4) {
+    dwell(block, *single);
+  } else if (single) {
+    reference(block, *single, codeOf(*single) == 28);
+  } else if (hasAxes(block) || block.has('I') || block.has('J') || block.has('K')) {
+    motion(block);
+  }
+  for (const int end : {2, 30}) ended_ = ended_ || block.function(end);
+}
+
+void Interpreter::fail(const std::string& message) const {
+  throw Error("column " + std::to_string(motion_word_ ? motion_word_->column : 1) + ": " + message);
+}
+
+void Interpreter::setModes(Block& block) {
+  if (const auto& word = block.code(Group::feed)) {
+    const bool per_revolution = codeOf(*word) == 95;
+    if (per_revolution != per_revolution_) feed_.reset();
+    per_revolution_ = per_revolution;
+  }
+  if (const auto& word = block.code(Group::units)) setUnits(*word);
+  if (const Word* word = block.take('F')) {
+    if (!(*word->value > 0.0)) refuse(*word, word->text() + ", expected a feed above 0");
+    feed_ = length(*word->value);
+  }
+  if (const Word* word = block.take('S')) {
+    if (*word->value < 0.0) refuse(*word, word->text() + ", expected a speed of 0 or more");
+    speed_ = units::radPerSecFromRpm(*word->value);
+  }
+  setTool(block);
+  for (const int turn : {3, 4, 5})
+    if (block.function(turn)) turns_ = turn == 5 ? 0 : turn;
+  if (const auto& word = block.code(Group::plane)) {
+    const int code = codeOf(*word);
+    plane_ = code == 17 ? nc::Plane::xy : code == 18 ? nc::Plane::zx : nc::Plane::yz;
+  }
+  if (const auto& word = block.code(Group::length); word && codeOf(*word) == 43) block.take('H');
+  if (block.code(Group::path)) {
+    block.take('P');
+    block.take('Q');
+  }
+  if (const auto& word = block.code(Group::work)) setWorkOffset(*word);
+  if (const auto& word = block.code(Group::distance)) relative_ = codeOf(*word) == 91;
+  if (const auto& word = block.code(Group::retract)) to_retract_plane_ = codeOf(*word) == 99;
+  motion_word_.reset();
+  if (const auto& word = block.code(Group::motion)) {
+    motion_ = codeOf(*word);
+    motion_word_ = word;
+    in_cycle_ = false;
+  } else if (const auto& cycle = block.code(Group::cycle)) {
+    motion_ = codeOf(*cycle);
+    motion_word_ = cycle;
+    if (motion_ == 80) in_cycle_ = false;
+  }
+  operation_ = "G" + std::to_string(motion_);
+}
+
+void Interpreter::setUnits(const Word& word) {
+  const double unit = codeOf(word) == 20 ? INCH : MM;
+  if (unit_ && *unit_ != unit)
+    refuse(word, word.text() + " after lengths in " + (unit == MM ? "inches" : "mm") +
+                     ", expected one unit in the whole program");
+  unit_ = unit;
+}
+
+void Interpreter::setWorkOffset(const Word& word) {
+  const int work = codeOf(word) - 54;
+  if (work_ == work) return;
+  const auto stated = options_.work_offsets.find(work);
+  if (stated == options_.work_offsets.end() && work_)
+    refuse(word, word.text() + " after G" + std::to_string(*work_ + 54) +
+                     ": its offset is unknown, expected --work-offset " + word.text() + ":X:Y:Z");
+  const Point offset = stated == options_.work_offsets.end() ? Point{{0, 0, 0}} : stated->second;
+  work_ = work;
+  offset_ = offset;
+}
+
+void Interpreter::setTool(Block& block) {
+  if (const Word* word = block.take('T')) selected_tool_ = nc::integer(*word, MAX_TOOL);
+  if (const Word* change = block.function(6)) {
+    if (selected_tool_ == 0) refuse(*change, "M6 without a tool, expected T");
+    tool_ = selected_tool_;
+    turns_ = 0;
+  }
+}
+
+double Interpreter::length(double value) {
+  if (!unit_) unit_ = MM;
+  return value * *unit_;
+}
+
+// P is in ms without and in s with a decimal point (Fanuc has no point there, LinuxCNC states seconds).
+double Interpreter::secondsOf(const Word& word) {
+  if (*word.value < 0.0) refuse(word, word.text() + ", expected a time of 0 or more");
+  return word.written.find('.') == std::string::npos ? 1e-3 * *word.value : *word.value;
+}
+
+void Interpreter::dwell(Block& block, const Word& code) {
+  const Word* seconds = block.take('X');
+  const Word* word = block.take('P');
+  if ((seconds != nullptr) == (word != nullptr))
+    refuse(code, "G4 without a time, expected P in ms or X in s");
+  if (seconds && *seconds->value < 0.0) refuse(*seconds, seconds->text() + ", expected a time of 0 or more");
+  operation_ = "G4";
+  Point here{{0, 0, 0}};
+  for (std::size_t i = 0; i < 3; ++i) here[i] = position_[i].value_or(0.0);
+  add(PathSegment(here), false, 0.0, word ? secondsOf(*word) : *seconds->value);
+}
+
+// G28 by way of a point to the reference position, G53 in machine coordinates: the place of both in the
+// coordinates of the stock is not part of a program.
+void Interpreter::reference(Block& block, const Word& code, bool by_way) {
+  std::array<bool, 3> moved{block.has('X'), block.has('Y'), block.has('Z')};
+  if (!hasAxes(block)) {
+    if (!by_way) refuse(code, "G53 without X, Y or Z");
+    moved = {true, true, true};
+  }
+  operation_ = code.text();
+  if (by_way) {
+    const Position way = target(block);
+    bool whole = true;
+    for (std::size_t i = 0; i < 3; ++i) whole = whole && way[i] && position_[i];
+    if (whole) rapidTo(known(way, operation_));
+  } else {
+    for (const char axis : {'X', 'Y', 'Z'}) block.take(axis);
+  }
+  for (std::size_t i = 0; i < 3; ++i)
+    if (moved[i]) position_[i].reset();
+}
+
+Interpreter::Position Interpreter::target(Block& block, bool with_z) {
+  Position result = position_;
+  for (std::size_t i = 0; i < (with_z ? 3u : 2u); ++i) {
+    const char axis = static_cast<char>('X' + i);
+    const Word* word = block.take(axis);
+    if (!word) continue;
+    const double value = length(*word->value);
+    if (relative_ && !position_[i]) {
+      // G91 G28 Z0 and similar: the axis stays where it is.
+      if (value == 0.0) continue;
+      refuse(*word, word->text() + " from an unknown position, expected an absolute one (G90) first");
+    }
+    result[i] = relative_ ? *position_[i] + value : value + offset_[i];
+  }
+  return result;
+}
+
+Interpreter::Point Interpreter::known(const Position& position, const std::string& what) const {
+  Point point{{0, 0, 0}};
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (!position[i])
+      fail(what + " from an unknown position of " + static_cast<char>('X' + i) +
+           ", expected G0 to X, Y and Z first");
+    point[i] = *position[i];
+  }
+  return point;
+}
+
+double Interpreter::feed(const std::string& operation) const {
+  if (!feed_)
+    fail(operation + " without a feed, expected F" + (per_revolution_ ? " in G95" : "") +
+         " in or before this block");
+  if (!per_revolution_) return *feed_ / 60.0;
+  if (!(speed_ > 0.0)) fail(operation + " in G95 without a speed, expected S");
+  return *feed_ * speed_ / units::TWO_PI;
+}
+
+void Interpreter::add(const PathSegment& path, bool rapid, double feed, double dwell) {
+  if (moves_.size() >= MAX_MOVES) fail("more than " + std::to_string(MAX_MOVES) + " moves");
+  Move move;
+  move.block = number_;
+  move.line = line_;
+  move.operation = operation_;
+  move.path = path;
+  move.rapid = rapid;
+  move.feed = feed;
+  move.dwell = dwell;
+  move.spindle_speed = turns_ == 0 ? 0.0 : speed_;
+  move.left_hand = turns_ == 4;
+  move.tool = tool_;
+  moves_.push_back(move);
+}
+
+void Interpreter::rapidTo(const Point& point) {
+  const Point start = known(position_, operation_);
+  if (start != point) add(PathSegment::line(start, point), true, 0.0);
+  for (std::size_t i = 0; i < 3; ++i) position_[i] = point[i];
+}
+
+void Interpreter::motion(Block& block) {
+  if (motion_ == -1 || motion_ == 80)
+    fail(std::string("axis words without a motion") + (motion_ == 80 ? " after G80" : "") +
+         ", expected G0, G1, G2 or G3");
+  if (motion_ > 80) {
+    cycle(block);
+    return;
+  }
+  const Position to = target(block);
+  if (motion_ >= 2) {
+    arc(block, to);
+  } else if (motion_ == 1) {
+    const double speed = feed(operation_);
+    const Point start = known(position_, operation_), end = known(to, operation_);
+    if (start != end) add(PathSegment::line(start, end), false, speed);
+  } else {
+    bool whole = true;
+    for (std::size_t i = 0; i < 3; ++i) whole = whole && position_[i] && to[i];
+    if (whole) rapidTo(known(to, operation_));
+  }
+  position_ = to;
+}
+
+void Interpreter::arc(Block& block, const Position& to) {
+  const double speed = feed(operation_);
+  const Point start = known(position_, operation_), end = known(to, operation_);
+  const bool clockwise = motion_ == 2;
+  const Word* radius = block.take('R');
+  const auto [a, b, c] = nc::axesOf(plane_);
+  try {
+    if (radius) {
+      add(arcByRadius(start, end, length(*radius->value), clockwise, plane_), false, speed);
+      return;
+    }
+    const Word* first = block.take(static_cast<char>('I' + a));
+    const Word* second = block.take(static_cast<char>('I' + b));
+    if (!first && !second) throw Error(operation_ + " without a centre, expected R or I, J, K of its plane");
+    CentreOffset offset;
+    if (first) offset.first = length(*first->value);
+    if (second) offset.second = length(*second->value);
+    add(arcByCentre(start, end, offset, clockwise, plane_), false, speed);
+  } catch (const Error& error) {
+    fail(error.what());
+  }
+}
+
+void Interpreter::cycle(Block& block) {
+  if (plane_ != nc::Plane::xy) fail(operation_ + " in G18 or G19, expected G17");
+  const Word* retract = block.take('R');
+  const Word* bottom = block.take('Z');
+  const Word* peck = block.take('Q');
+  const Word* wait = block.take('P');
+  const Word* repeat = block.take('K');
+  if (!repeat) repeat = block.take('L');
+  if (!in_cycle_) {
+    if (!retract || !bottom) fail(operation_ + " without " + (retract ? "Z" : "R") + ", expected R and Z");
+    if (motion_ == 83 && !peck) fail("G83 without Q, expected the depth of a peck");
+    cycle_ = {};
+    cycle_.initial = known({0.0, 0.0, position_[2]}, operation_)[2];
+    in_cycle_ = true;
+  }
+  if (retract)
+    cycle_.retract =
+        relative_ ? cycle_.initial + length(*retract->value) : length(*retract->value) + offset_[2];
+  if (bottom)
+    cycle_.bottom = relative_ ? cycle_.retract + length(*bottom->value) : length(*bottom->value) + offset_[2];
+  if (peck) {
+    cycle_.peck = std::abs(length(*peck->value));
+    if (!(cycle_.peck > 0.0)) refuse(*peck, peck->text() + ", expected a depth above 0");
+  }
+  if (wait) cycle_.dwell = secondsOf(*wait);
+  if (!(cycle_.bottom < cycle_.retract)) fail(operation_ + " with Z at or above R, expected Z below R");
+  const int holes = repeat ? nc::integer(*repeat, MAX_HOLES) : 1;
+  for (int i = 0; i < holes; ++i) {
+    Position to = position_;
+    if (i == 0 || relative_) {
+      Block again = block;  // X and Y of G91 count once for each hole
+      to = target(again, false);
+      block.take('X');
+      block.take('Y');
+    }
+    // Before the first hole the tool may be below the retract plane (LinuxCNC raises it first).
+    if (*position_[2] < cycle_.retract) {
+      Position up = position_;
+      up[2] = cycle_.retract;
+      rapidTo(known(up, operation_));
+      to[2] = cycle_.retract;
+    }
+    if (position_[0] && position_[1]) {
+      rapidTo(known(to, operation_));
+    } else {
+      position_ = to;
+    }
+    drill(known(position_, operation_),
+          to_retract_plane_ ? cycle_.retract : std::max(cycle_.initial, cycle_.retract));
+  }
+}
+
+void Interpreter::drill(const Point& hole, double retract) {
+  const double speed = feed(operation_);
+  const auto at = [&](double z) { return Point{hole[0], hole[1], z}; };
+  rapidTo(at(cycle_.retract));
+  const auto down = [&](double z, double dwell) {
+    add(PathSegment::line(known(position_, operation_), at(z)), false, speed, dwell);
+    position_[2] = z;
+  };
+  if (motion_ == 83 && (cycle_.retract - cycle_.bottom) / cycle_.peck > MAX_PECKS)
+    fail(formatted("G83 with more than %.0f pecks", MAX_PECKS));
+  const double wait = motion_ == 82 ? cycle_.dwell : 0.0;
+  if (motion_ == 83) {
+    for (double depth = cycle_.retract - cycle_.peck; depth > cycle_.bottom + 1e-9; depth -= cycle_.peck) {
+      down(depth, 0.0);
+      rapidTo(at(cycle_.retract));
+      rapidTo(at(std::min(cycle_.retract, depth + PECK_CLEARANCE)));
+    }
+  }
+  down(cycle_.bottom, wait);
+  rapidTo(at(retract));
+}
+
+}  // namespace smartmill::program

@@ -1,0 +1,53 @@
+#include "smartmill_program/prediction/force_predictor.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "smartmill_core/units.h"
+
+namespace smartmill::program {
+namespace {
+
+constexpr double ANGLE_STEP = 1.5;    // [deg] of the spindle: a smooth peak within 0.01 %
+constexpr double SAME_ANGLE = 2e-4;   // [rad] resolution of a contact
+constexpr double SAME_LENGTH = 1e-7;  // [m] a tenth of the last digit of a program
+
+}  // namespace
+
+bool ForcePredictor::isLast(const Contact& contact, double feed_per_tooth) const {
+  if (contact.arcs.size() != contact_.arcs.size() ||
+      std::abs(feed_per_tooth - feed_per_tooth_) > 1e-6 * feed_per_tooth)
+    return false;
+  for (std::size_t i = 0; i < contact.arcs.size(); ++i) {
+    const ContactArc &a = contact.arcs[i], &b = contact_.arcs[i];
+    if (std::abs(a.entry - b.entry) > SAME_ANGLE || std::abs(a.exit - b.exit) > SAME_ANGLE ||
+        std::abs(a.depth - b.depth) > SAME_LENGTH)
+      return false;
+  }
+  return true;
+}
+
+const ForcePrediction& ForcePredictor::predict(const Contact& contact, double feed_per_tooth) {
+  if (isLast(contact, feed_per_tooth)) return prediction_;
+  contact_ = contact;
+  feed_per_tooth_ = feed_per_tooth;
+  prediction_ = {};
+  std::vector<MechanisticForce> cuts;
+  for (const ContactArc& arc : contact.arcs) {
+    cuts.emplace_back(tool_, coefficients_, Engagement{arc.entry, arc.exit, arc.depth, feed_per_tooth});
+    prediction_.mean.add(cuts.back().mean());
+  }
+  // With even pitch the force repeats with every tooth.
+  const double range = tool_.pitch.empty() ? units::TWO_PI / tool_.teeth : units::TWO_PI;
+  const int count = static_cast<int>(std::ceil(units::degFromRad(range) / ANGLE_STEP));
+  for (int k = 0; k < count; ++k) {
+    CuttingForce sum;
+    for (const MechanisticForce& cut : cuts) sum.add(cut.at(range * (k + 0.5) / count));
+    prediction_.peak_force = std::max(prediction_.peak_force, std::hypot(sum.fx, sum.fy));
+    prediction_.peak_torque = std::max(prediction_.peak_torque, sum.torque);
+  }
+  return prediction_;
+}
+
+}  // namespace smartmill::program

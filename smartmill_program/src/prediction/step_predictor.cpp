@@ -1,0 +1,37 @@
+#include "smartmill_program/prediction/step_predictor.h"
+
+#include "smartmill_core/units.h"
+
+namespace smartmill::program {
+
+StepPredictor::OfTool& StepPredictor::of(int tool) {
+  std::unique_ptr<OfTool>& place = tools_[tool];
+  if (!place) {
+    const MachineModel& model = models_.of(tool);
+    place = std::make_unique<OfTool>(model, model.needCutting("predict forces"));
+  }
+  return *place;
+}
+
+StepPrediction StepPredictor::predict(const Step& step) {
+  StepPrediction prediction;
+  const Move& move = *step.move;
+  if (step.air() || move.rapid || !(move.spindle_speed > 0.0)) return prediction;
+  OfTool& tool = of(move.tool);
+  prediction.feed_per_tooth =
+      units::TWO_PI * move.feed / (move.spindle_speed * models_.of(move.tool).tool->teeth);
+  if (step.contact.empty()) return prediction;
+  prediction.force = tool.force.predict(step.contact, prediction.feed_per_tooth * step.feed_share);
+  prediction.power = prediction.force.mean.torque * move.spindle_speed;
+  if (with_stability_ && tool.limits.available())
+    prediction.limit = tool.limits.limit(step.contact, step.feed_angle, move.left_hand, move.spindle_speed);
+  return prediction;
+}
+
+std::size_t StepPredictor::computedLimits() const {
+  std::size_t sum = 0;
+  for (const auto& [number, tool] : tools_) sum += tool->limits.computed();
+  return sum;
+}
+
+}  // namespace smartmill::program

@@ -1,0 +1,126 @@
+// The program as a user runs it: files, exit codes, one line for each fault.
+
+#include <sys/wait.h>
+
+#include <cstdlib>
+#include <filesystem>
+
+#include <gmock/gmock.h>
+
+#include "smartmill_core/formatted.h"
+#include "smartmill_core/io/csv.h"
+#include "smartmill_core/io/text_file.h"
+#include "smartmill_core/testing/temporary_folder.h"
+
+namespace smartmill {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+constexpr const char* MODEL =
+    "format: smartmill-model/1\ntool: {teeth: 4, diameter_mm: 10.0, helix_deg: 30.0}\ncutting:\n  "
+    "Ktc_n_per_mm2: 800.0\n  "
+    "Krc_n_per_mm2: 300.0\n  Kac_n_per_mm2: 200.0\n  Kte_n_per_mm: 20.0\n  Kre_n_per_mm: 25.0\n  "
+    "Kae_n_per_mm: 3.0\n"
+    "tool_tip:\n  x: [{frequency_hz: 1210.0, damping_ratio: 0.031, stiffness_n_per_um: 28.0}]\n"
+    "  y: [{frequency_hz: 1180.0, damping_ratio: 0.029, stiffness_n_per_um: 31.0}]\n";
+
+/// A folder with the model, in which the program runs.
+class Command : public ::testing::Test {
+ protected:
+  Command() { folder_.write("mill.yaml", MODEL); }
+
+  /// @return exit code of a line of bash
+  int shell(const std::string& line) {
+    const int status = std::system(
+        ("cd '" + folder_.file(".") + "' && bash -c '" + line + "' >out 2>err </dev/null").c_str());
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+  int run(const std::string& text, const std::string& options = "--model mill.yaml") {
+    folder_.write("part.nc", text);
+    return shell(std::string(PROGRAM) + " part.nc --stock-mm 60 40 10 -o result " + options);
+  }
+  std::string read(const std::string& file) { return readText(folder_.file(file)); }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(Command, WritesBlocksStepsAndPage) {
+  EXPECT_EQ(run("O1\nT1 M6\nG21 G90 G0 X-10 Y10 Z5\nS6000 M3\nZ-2\nG1 X70 F1200\nG0 Z5\nX-10 Y15\nZ-2\nG1 "
+                "X70\nG0 Z5\nM30\n"),
+            0)
+      << read("err");
+  EXPECT_THAT(read("out"), AllOf(HasSubstr("largest force"), HasSubstr("line 6 (G1)"),
+                                 HasSubstr("least stability margin")));
+  EXPECT_THAT(read("err"), HasSubstr("x real time"));
+  // The second slot overlaps the first by half: 60 x 10 x 2 and 60 x 5 x 2 mm3.
+  CsvReader blocks(folder_.file("result/blocks.csv"));
+  std::vector<std::string_view> cells;
+  std::vector<double> volumes;
+  while (blocks.nextFilled(&cells)) {
+    ASSERT_EQ(cells.size(), 19u);
+    if (cells[2] == "G1") volumes.push_back(blocks.number(cells[11], "volume_mm3"));
+  }
+  ASSERT_EQ(volumes.size(), 2u);
+  EXPECT_NEAR(volumes[0], 1200.0, 1.2);
+  EXPECT_NEAR(volumes[1], 600.0, 0.6);
+  EXPECT_THAT(read("result/steps.csv"), HasSubstr(",0.00-90.00:2\n"));
+  EXPECT_THAT(read("result/report.html"), AllOf(HasSubstr("<svg"), HasSubstr("<td>G1")));
+}
+
+TEST_F(Command, OneLineForEachFault) {
+  struct Case {
+    std::string text, options, fault;
+  };
+  const std::string start = "G21 G90 G0 X-10 Y20 Z-2\nS3000 M3\n", model = "--model mill.yaml";
+  for (const Case& c : std::vector<Case>{
+           {start + "G1 X70 F600\n", model,
+            "part.nc: line 3: the program ends in the middle, expected M30 or M2"},
+           {start + "G2 X10 I9 F600\nM30\n", model,
+            "part.nc: line 3, column 1: arc does not close: radius 9.0000 mm at its "
+            "start, 11.0000 mm at its end, expected equal radii"},
+           {start + "G68 R45\nM30\n", model, "part.nc: line 3, column 1: unknown word G68"},
+           {start + "T2 M6 S100 M3\nG1 X70 F600\nM30\n", "--model 1=mill.yaml",
+            "part.nc: line 4: T2: no model of this tool, expected --model 2=FILE"},
+           {start + "G0 Z20\nG1 X70 F600\nM30\n", model,
+            "part.nc: no block meets the stock (X 0 to 60, Y 0 to 40, Z -10 to 0 mm), the feed motions are "
+            "in X -10 to 70, Y "
+            "20 to 20, Z 20 to 20 mm"},
+           {start + "G20 G1 X7 F6\nM30\n", model,
+            "part.nc: line 3, column 1: G20 after lengths in mm, expected one unit in the whole program"},
+           {start + "G1 X70\nM30\n", model,
+            "part.nc: line 3, column 1: G1 without a feed, expected F in or before this block"},
+           {start + "M5\nG1 X70 F600\nM30\n", model,
+            "part.nc: line 4: G1 cuts with the spindle at rest, expected S and M3 or M4 before it"},
+           {start + "M30\n", "--model mill.yaml --work-offset G60:1:2:3",
+            "--work-offset G60:1:2:3: expected G54:X:Y:Z to G59:X:Y:Z [mm]"}}) {
+    EXPECT_EQ(run(c.text, c.options), 1) << c.text;
+    EXPECT_EQ(read("err"), "program: " + c.fault + "\n");
+    EXPECT_EQ(read("out"), "");
+  }
+}
+
+TEST_F(Command, ARapidMoveThatHitsTheStockIsAnErrorAfterTheFilesAreWritten) {
+  EXPECT_EQ(run("G21 G90 G0 X-10 Y20 Z-2\nS3000 M3\nG1 X20 F600\nG0 X70\nM30\n"), 1);
+  EXPECT_THAT(read("err"), HasSubstr("program: part.nc: line 4: G0: a rapid move hits the stock\n"));
+  EXPECT_TRUE(std::filesystem::exists(folder_.file("result/blocks.csv")));
+}
+
+// The interrupt is sent once the first line of progress is there.
+TEST_F(Command, CtrlCKeepsTheBlocksUntilThen) {
+  std::string text = "O1\nG21 G90 G0 X-10 Y20 Z-2\nS3000 M3\nF600\nM98 P2 L9999\nM30\nO2\n";
+  for (int k = 0; k < 10; ++k) text += formatted("G1 X70 Y%d\nX-10\n", 5 + 3 * k);
+  folder_.write("long.nc", text + "M99\n");
+  EXPECT_EQ(
+      shell(
+          std::string(PROGRAM) +
+          " long.nc --stock-mm 60 40 10 -o result --model mill.yaml 2>progress & pid=$!; until grep -q moves "
+          "progress; do sleep 0.05; done; kill -INT $pid; wait $pid"),
+      130);
+  EXPECT_THAT(read("progress"), HasSubstr("interrupted in line"));
+  EXPECT_TRUE(std::filesystem::exists(folder_.file("result/blocks.csv")));
+}
+
+}  // namespace
+}  // namespace smartmill

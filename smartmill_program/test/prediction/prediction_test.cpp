@@ -1,0 +1,168 @@
+// Forces against closed forms of Altintas (Manufacturing Automation, eq. 2.27..2.29) and symmetries of the
+// limits.
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "smartmill_core/testing/mill.h"
+#include "smartmill_core/testing/temporary_folder.h"
+#include "smartmill_core/units.h"
+#include "smartmill_program/nc/program_reader.h"
+#include "smartmill_program/program_analysis.h"
+
+namespace smartmill::program {
+namespace {
+
+using units::MM;
+using units::PI;
+
+constexpr double SPEED = 2 * PI * 50.0;  // [rad/s] 3000 rpm
+
+Contact contactOf(double entry_deg, double exit_deg, double depth) {
+  return {{{units::radFromDeg(entry_deg), units::radFromDeg(exit_deg), depth}}};
+}
+
+// A slot with N teeth: Fx = -N a (Krc c / 4 + Kre / pi), Fy = N a (Ktc c / 4 + Kte / pi) on the tool, Fz = N
+// a (Kac c / pi + Kae / 2), torque N a R (Ktc c / pi + Kte / 2).
+TEST(ForcePredictor, MeanForceOfASlot) {
+  const MachineModel model = mill(4);
+  const CuttingCoefficients& k = *model.cutting;
+  const double a = 2 * MM, c = 0.05 * MM;
+  ForcePredictor predictor(*model.tool, k);
+  const CuttingForce mean = predictor.predict(contactOf(0, 180, a), c).mean;
+  EXPECT_NEAR(mean.fx, -4 * a * (k.krc * c / 4 + k.kre / PI), 1e-9);
+  EXPECT_NEAR(mean.fy, 4 * a * (k.ktc * c / 4 + k.kte / PI), 1e-9);
+  EXPECT_NEAR(mean.fz, 4 * a * (k.kac * c / PI + k.kae / 2), 1e-9);
+  EXPECT_NEAR(mean.torque, 4 * a * model.tool->radius() * (k.ktc * c / PI + k.kte / 2), 1e-9);
+}
+
+// One tooth without helix: the peak torque is at phi = 90 deg, R a (Ktc c + Kte).
+TEST(ForcePredictor, PeakOfOneStraightTooth) {
+  const MachineModel model = mill(1, 0.0);
+  const CuttingCoefficients& k = *model.cutting;
+  const double a = 2 * MM, c = 0.05 * MM;
+  ForcePredictor predictor(*model.tool, k);
+  const ForcePrediction& slot = predictor.predict(contactOf(0, 180, a), c);
+  EXPECT_NEAR(slot.peak_torque, model.tool->radius() * a * (k.ktc * c + k.kte), 2e-3 * slot.peak_torque);
+  EXPECT_NEAR(slot.peak_force, a * std::hypot(k.ktc * c + k.kte, k.krc * c + k.kre), 2e-3 * slot.peak_force);
+  // A narrow cut ends below that: sin(30 deg).
+  const ForcePrediction& narrow = predictor.predict(contactOf(0, 30, a), c);
+  EXPECT_NEAR(narrow.peak_torque, model.tool->radius() * a * (k.ktc * c * 0.5 + k.kte),
+              0.02 * narrow.peak_torque);
+}
+
+// Two arcs of the same depth that touch are one.
+TEST(ForcePredictor, ArcsAdd) {
+  const MachineModel model = mill(4);
+  ForcePredictor one(*model.tool, *model.cutting), two(*model.tool, *model.cutting);
+  Contact split = contactOf(20, 70, 2 * MM);
+  split.arcs.push_back(contactOf(70, 150, 2 * MM).arcs[0]);
+  const ForcePrediction& whole = one.predict(contactOf(20, 150, 2 * MM), 0.05 * MM);
+  const ForcePrediction& parts = two.predict(split, 0.05 * MM);
+  EXPECT_NEAR(parts.mean.fy, whole.mean.fy, 1e-9);
+  EXPECT_NEAR(parts.peak_force, whole.peak_force, 1e-9);
+}
+
+ModalModel modes(double frequency, double stiffness) {
+  ModalModel model;
+  model.modes.push_back({});
+  model.modes.back().frequency = frequency;
+  model.modes.back().damping_ratio = 0.03;
+  model.modes.back().gain = 1.0 / stiffness;
+  return model;
+}
+
+TEST(StabilityLimits, IsotropicToolHasOneLimitInAllDirections) {
+  MachineModel model = mill(4);
+  model.tool_tip.x = model.tool_tip.y = modes(900.0, 2e7);
+  StabilityLimits limits(model);
+  ASSERT_TRUE(limits.available());
+  const Contact contact = contactOf(90, 180, 2 * MM);
+  const double along_x = limits.limit(contact, 0.0, false, SPEED);
+  EXPECT_GT(along_x, 0.05 * MM);
+  EXPECT_LT(along_x, 50 * MM);
+  for (const double deg : {30.0, 90.0, 135.0})
+    EXPECT_NEAR(limits.limit(contact, units::radFromDeg(deg), false, SPEED), along_x,
+                3e-3 * along_x);  // tolerance of the solver
+  EXPECT_EQ(limits.computed(), 4u);
+  EXPECT_EQ(limits.limit(contact, units::radFromDeg(181.0), false, SPEED), along_x);
+  EXPECT_EQ(limits.computed(), 4u);
+  // A left-hand tool in the mirrored frame sees the same isotropic dynamics.
+  EXPECT_NEAR(limits.limit(contact, 0.0, true, SPEED), along_x, 3e-3 * along_x);
+}
+
+// Feed along y with a flexible x is feed along x with a flexible y.
+TEST(StabilityLimits, DynamicsTurnWithTheFeed) {
+  MachineModel x = mill(4), y = mill(4);
+  x.tool_tip.x = modes(900.0, 2e7);
+  y.tool_tip.y = modes(900.0, 2e7);
+  StabilityLimits of_x(x), of_y(y);
+  const Contact contact = contactOf(90, 180, 2 * MM);
+  const double limit = of_y.limit(contact, 0.0, false, SPEED);
+  EXPECT_NEAR(of_x.limit(contact, PI / 2, false, SPEED), limit, 3e-3 * limit);
+  EXPECT_GT(std::abs(of_x.limit(contact, 0.0, false, SPEED) / limit - 1.0), 0.05);
+}
+
+constexpr const char* MODEL =
+    "format: smartmill-model/1\ntool: {teeth: 4, diameter_mm: 10.0, helix_deg: 30.0}\ncutting:\n  "
+    "Ktc_n_per_mm2: 800.0\n  "
+    "Krc_n_per_mm2: 300.0\n  Kac_n_per_mm2: 200.0\n  Kte_n_per_mm: 20.0\n  Kre_n_per_mm: 25.0\n  "
+    "Kae_n_per_mm: 3.0\n";
+
+// The power of the chip forces is Ktc times the removal rate: for a slot Ktc ae ap vf, plus the edges N a R w
+// Kte / 2.
+TEST(ProgramAnalysis, PowerIsSpecificEnergyTimesRemovalRate) {
+  const TemporaryFolder folder;
+  ToolModels models({folder.write("mill.yaml", MODEL)});
+  Stock stock({{0, 0, -10 * MM}, {60 * MM, 40 * MM, 0}}, 0.1 * MM);
+  ProgramAnalysis analysis("part.nc", models, stock);
+  const auto moves =
+      interpretProgram("G21 G90 G0 X-10 Y20 Z-2\nS3000 M3\nG1 X70 F600\nG0 Z5\nM30\n", "part.nc");
+  const AnalysisResult result = analysis.run(moves);
+  ASSERT_EQ(result.blocks.size(), 2u);
+  const BlockSummary& cut = result.blocks[0];
+  EXPECT_EQ(cut.line, 3);
+  EXPECT_NEAR(cut.time, 8.0, 1e-9);
+  EXPECT_NEAR(cut.feed_per_tooth, 0.05 * MM, 1e-12);
+  const double chip = 800e6 * (10 * MM * 2 * MM * 0.01), edge = 4 * 2 * MM * 5 * MM * SPEED * 20e3 / 2;
+  EXPECT_NEAR(cut.power, chip + edge, 1e-3 * (chip + edge));
+  EXPECT_NEAR(cut.airShare(), 1.0 - 65.0 / 80.0,
+              0.01);                    // from 5 mm before the block to the end of the tool at its end
+  EXPECT_TRUE(std::isnan(cut.margin));  // the tool is rigid
+}
+
+TEST(ProgramAnalysis, ErrorsNameProgramAndLine) {
+  const TemporaryFolder folder;
+  const std::string model = folder.write("mill.yaml", MODEL);
+  const auto faultOf = [&](const std::string& text, const std::vector<std::string>& models) {
+    return errorOf([&] {
+      ToolModels tools(models);
+      Stock stock({{0, 0, -10 * MM}, {60 * MM, 40 * MM, 0}}, 0.2 * MM);
+      ProgramAnalysis("part.nc", tools, stock).run(interpretProgram(text, "part.nc"));
+    });
+  };
+  EXPECT_EQ(faultOf("T1 M6\nG0 X-10 Y20 Z-2\nS3000 M3\nG1 X70 F600\nT2 M6\nS100 M3\nG1 X75\nM30\n", {model}),
+            "part.nc: line 7: T2: no model of this tool, expected --model 2=FILE");
+  EXPECT_EQ(faultOf("T1 M6\nG0 X-10 Y20 Z-2\nS3000 M3\nG1 X70 F600\nM30\n", {"3=" + model}),
+            "part.nc: line 4: T1: no model of this tool, expected --model 1=FILE");
+  EXPECT_EQ(faultOf("G0 X-10 Y20 Z-2\nG1 X70 F600\nM30\n", {model}),
+            "part.nc: line 2: G1 cuts with the spindle at rest, expected S and M3 or M4 before it");
+  EXPECT_EQ(faultOf("G0 X-10 Y20 Z12\nS3000 M3\nG1 X70 F600\nM30\n", {model}),
+            "part.nc: no block meets the stock (X 0 to 60, Y 0 to 40, Z -10 to 0 mm), the feed motions are "
+            "in X -10 to 70, "
+            "Y 20 to 20, Z 12 to 12 mm");
+  EXPECT_EQ(faultOf("G0 X-10 Y20 Z12\nX0\nM30\n", {model}),
+            "part.nc: no block with a feed motion, expected G1, G2, G3 or a cycle");
+  EXPECT_EQ(faultOf("M30\n", {model, model}),
+            "--model " + model + ": expected N=FILE, the number of the tool for each of several models");
+  const std::string no_tool = folder.write("no_tool.yaml", "format: smartmill-model/1\n");
+  EXPECT_EQ(faultOf("M30\n", {no_tool}), no_tool + ": tool is missing (needed to simulate a program)");
+  const std::string no_cutting = folder.write(
+      "no_cutting.yaml", "format: smartmill-model/1\ntool: {teeth: 4, diameter_mm: 10.0, helix_deg: 30.0}\n");
+  EXPECT_EQ(faultOf("G0 X-10 Y20 Z-2\nS3000 M3\nG1 X70 F600\nM30\n", {no_cutting}),
+            "part.nc: line 3: " + no_cutting + ": cutting is missing (needed to predict forces)");
+}
+
+}  // namespace
+}  // namespace smartmill::program

@@ -1,0 +1,81 @@
+#include <algorithm>
+#include <cstdio>
+#include <string>
+
+#include "smartmill_core/formatted.h"
+#include "smartmill_recording/account.h"
+#include "smartmill_recording/commands.h"
+#include "smartmill_recording/reading_progress.h"
+
+namespace smartmill::recording {
+namespace {
+
+constexpr int INCOMPLETE = 3;  // exit code
+constexpr std::size_t GAPS_PRINTED = 20;
+
+using Kind = StreamGap::Kind;
+
+std::string textOf(const StreamGap& gap) {
+  const auto count = static_cast<unsigned long long>(gap.count);
+  switch (gap.kind) {
+    case Kind::messages:
+      return formatted("%.3f s  %s: %llu messages lost between publisher and recorder", gap.stamp,
+                       gap.topic.c_str(), count);
+    case Kind::samples:
+      return formatted("%.3f s  %s: %llu samples lost before they were published", gap.stamp,
+                       gap.topic.c_str(), count);
+    case Kind::repeated:
+      return formatted("%.3f s  %s: %llu samples repeated", gap.stamp, gap.topic.c_str(), count);
+    case Kind::unprocessed:
+      break;
+  }
+  return formatted("%.3f s  %s: lacks %llu samples of the sensor", gap.stamp, gap.topic.c_str(), count);
+}
+
+struct Arguments {
+  std::string recording;
+};
+
+int run(const Arguments& arguments) {
+  const RecordingAccount account = accountOf(arguments.recording, printReadingProgress);
+  std::printf("%-44s %9s %6s %10s %6s %8s %10s %12s\n", "topic", "messages", "lost", "samples", "lost",
+              "not fin.", "rate [Hz]", "by stamps");
+  for (const StreamAccount& s : account.streams) {
+    std::printf("%-44s %9llu %6llu", s.topic.c_str(), static_cast<unsigned long long>(s.messages),
+                static_cast<unsigned long long>(s.lost_messages));
+    if (s.sampled)
+      std::printf(" %10llu %6llu %8llu %10.1f %12.4f", static_cast<unsigned long long>(s.samples),
+                  static_cast<unsigned long long>(s.lost_samples),
+                  static_cast<unsigned long long>(s.not_finite), s.rate_stated, s.rate_seen);
+    std::printf("\n");
+  }
+  for (std::size_t k = 0; k < std::min(GAPS_PRINTED, account.gaps.size()); ++k)
+    std::printf("%s\n", textOf(account.gaps[k]).c_str());
+  if (account.gaps.size() > GAPS_PRINTED)
+    std::printf("and %zu more gaps\n", account.gaps.size() - GAPS_PRINTED);
+  if (!account.isComplete()) {
+    std::printf("incomplete: %zu gaps\n", account.gaps.size());
+    return INCOMPLETE;
+  }
+  std::printf("complete: no message and no sample is missing\n");
+  return 0;
+}
+
+}  // namespace
+
+Command accountCommand() {
+  Command command("account", "accounts for every message and sample of a recording");
+  command.description =
+      "Counts the messages of a recording by the sequence numbers of their headers, the samples of sensors "
+      "and forces "
+      "by their running index, and the samples of the force sensor that have no compensated force.";
+  command.examples = {{"session.bag", "proves that nothing is missing, or lists what is"}};
+  command.files = {{"RECORDING", "bag or MCAP file"}};
+  command.exits = {{INCOMPLETE, "messages or samples are missing or repeated"}};
+  command.setBody(run, [](CommandLine& line, Arguments& arguments) {
+    line.option("RECORDING", arguments.recording, "bag or MCAP file").required();
+  });
+  return command;
+}
+
+}  // namespace smartmill::recording
