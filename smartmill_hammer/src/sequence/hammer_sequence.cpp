@@ -10,11 +10,12 @@
 #include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
-#include "smartmill_core/frames.h"
+#include "smartmill_core/model/station_axes.h"
 #include "smartmill_core/signal/same_time.h"
 #include "smartmill_core/units.h"
 #include "station_control.h"
 #include "step_runner.h"
+#include "turned_station.h"
 
 namespace smartmill::hammer {
 namespace {
@@ -64,13 +65,18 @@ std::string goalFault(const MeasureFrfGoal& goal, const HammerParameters& parame
 
 HammerSequence::HammerSequence(const HammerParameters& parameters, const MachineModel& model)
     : parameters_(parameters), model_(model) {
-  control_ =
-      std::make_unique<StationControl>(parameters_, model.needHammer("measure the tool tip").range_volt);
+  const HammerStation& station = model_.needHammer("measure the tool tip");
+  const StationAxes axes(model_);
+  control_ = std::make_unique<StationControl>(parameters_, axes, station.range_volt);
   model.needTool("find a flute");
-  if (placedFrame(model.frames, frames::HAMMER, frames::MACHINE).isTurned()) {
-    throw Error(
-        model.file +
-        ": frames.hammer is turned, expected an aligned station: hits are along x and y of the machine");
+  if (axes.isTurned() && (station.position.count("x") == 0 || station.position.count("y") == 0)) {
+    throw Error(model.file +
+                ": frames.hammer is turned, expected hammer.position_mm of x and y: the receptance along an "
+                "axis of the machine follows from both");
+  }
+  if (axes.isTurned() && parameters_.cross_frf == 0) {
+    throw Error("cross_frf 0: frames.hammer of " + model.file +
+                " is turned, expected 1: the receptance along an axis of the machine follows from the cross FRF");
   }
   parameters_.validate();
 }
@@ -79,9 +85,10 @@ HammerSequence::~HammerSequence() = default;
 
 void HammerSequence::reset() {
   phase_ = Phase::idle;
-  control_ = std::make_unique<StationControl>(parameters_, model_.hammer->range_volt);
+  control_ = std::make_unique<StationControl>(parameters_, StationAxes(model_), model_.hammer->range_volt);
   steps_.reset();
   measurement_.reset();
+  first_part_.reset();
   result_.reset();
 }
 
@@ -89,7 +96,11 @@ std::vector<Command> HammerSequence::takeCommands() {
   return control_->takeCommands();
 }
 std::optional<Feedback> HammerSequence::takeFeedback() {
-  return measurement_ ? std::exchange(measurement_->feedback, std::nullopt) : std::nullopt;
+  std::optional<Feedback> feedback =
+      measurement_ ? std::exchange(measurement_->feedback, std::nullopt) : std::nullopt;
+  if (feedback && StationAxes(model_).isTurned())
+    feedback->progress = 0.5 * (feedback->progress + (first_part_ ? 1.0 : 0.0));
+  return feedback;
 }
 std::optional<MeasureFrfResult> HammerSequence::takeResult() {
   return std::exchange(result_, std::nullopt);
@@ -106,11 +117,19 @@ bool HammerSequence::handle(const MeasureFrfGoal& goal) {
     result_->message = fault;
     return true;
   }
+  first_part_.reset();
+  asked_modes_ = goal.modes;
+  MeasureFrfGoal part = goal;
+  if (StationAxes(model_).isTurned()) part.modes = 0;  // along its axes other modes are seen
+  begin(part);
+  return true;
+}
+
+void HammerSequence::begin(const MeasureFrfGoal& goal) {
   measurement_ = std::make_unique<Measurement>(parameters_, model_, goal);
   steps_ = std::make_unique<StepRunner>(*measurement_, *control_);
   phase_ = Phase::steps;
   apply(goal.stamp, steps_->begin(goal.stamp));
-  return true;
 }
 
 void HammerSequence::handle(const CncState& state) {
@@ -154,7 +173,7 @@ void HammerSequence::dispatch(double now, ControlEvent event) {
   if (!isActive()) return;
   if (const auto* fault = std::get_if<ControlFault>(&event)) return abort(now, fault->code, fault->text);
   if (phase_ == Phase::stopping && std::holds_alternative<MotionDone>(event)) return retract(now);
-  if (phase_ == Phase::retracting && std::holds_alternative<MotionDone>(event)) return finish();
+  if (phase_ == Phase::retracting && std::holds_alternative<MotionDone>(event)) return endPart(now);
   if (phase_ == Phase::steps) apply(now, steps_->handle(now, std::move(event)));
 }
 
@@ -228,15 +247,32 @@ void HammerSequence::retract(double now) {
   phase_ = Phase::retracting;
   control_->watchRange(false);
   measurement_->report("retracting from the station", 0.97);
-  const auto here = axesPosition(*control_->state());
+  const auto here = control_->position();
   const Axes3 position = here ? here->position : Axes3{};
   control_->move(now, position, measurement_->paths.retract(position));
+}
+
+/// The receptance along an axis of the machine needs the hits along both axes of a turned station.
+void HammerSequence::endPart(double now) {
+  const StationAxes axes(model_);
+  if (!axes.isTurned() || measurement_->result.code != FrfCode::ok) return finish();
+  if (!first_part_) {
+    first_part_ = std::move(measurement_->result);
+    first_part_->spindle_moves = control_->spindleMoves();
+    MeasureFrfGoal other = measurement_->goal;
+    other.stamp = now;
+    other.direction = AXIS_NAMES[measurement_->paths.across()];
+    return begin(other);
+  }
+  const MeasureFrfResult second = std::move(measurement_->result);
+  measurement_->result = alongMachineAxis(*first_part_, second, axes.angle(), asked_modes_, parameters_);
+  finish();
 }
 
 void HammerSequence::finish() {
   phase_ = Phase::idle;
   control_->release();
-  measurement_->result.spindle_moves = control_->spindleMoves();
+  measurement_->result.spindle_moves += control_->spindleMoves();
   result_ = std::move(measurement_->result);
 }
 

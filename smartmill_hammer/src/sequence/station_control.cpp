@@ -4,7 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "controller_state.h"
 #include "smartmill_core/axis_names.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/signal/same_time.h"
@@ -27,8 +26,9 @@ Command commandOf(Command::Kind kind, double now) {
 
 }  // namespace
 
-StationControl::StationControl(const HammerParameters& parameters, double range_volt)
+StationControl::StationControl(const HammerParameters& parameters, const StationAxes& axes, double range_volt)
     : parameters_(parameters),
+      axes_(axes),
       range_volt_(range_volt),
       motion_(parameters),
       average_(parameters),
@@ -68,6 +68,11 @@ void StationControl::orient(double now, double angle) {
 }
 
 void StationControl::jog(double now, std::size_t axis, double distance, double feed) {
+  if (axes_.isTurned()) {
+    Axes3 target = motion_.position();
+    target[axis] += distance;
+    return move(now, motion_.position(), {{target, feed}}, jogTolerance(distance));
+  }
   Command c = commandOf(Command::Kind::jog, now);
   c.axis = AXIS_NAMES[axis];
   c.distance = distance;
@@ -75,21 +80,30 @@ void StationControl::jog(double now, std::size_t axis, double distance, double f
   // From the commanded position, not the displayed one, so that the display's rounding does not accumulate.
   Axes3 target = motion_.position();
   target[axis] += distance;
-  motion_.expectPosition(target, std::min(parameters_.position_tolerance, 0.25 * std::abs(distance)));
+  motion_.expectPosition(target, jogTolerance(distance));
   send(std::move(c), Wait::position, parameters_.motion_timeout);
 }
 
+double StationControl::jogTolerance(double distance) const {
+  return std::min(parameters_.position_tolerance, 0.25 * std::abs(distance));
+}
+
 void StationControl::move(double now, const Axes3& from, std::vector<Waypoint> path) {
+  move(now, from, std::move(path), parameters_.position_tolerance);
+}
+
+void StationControl::move(double now, const Axes3& from, std::vector<Waypoint> path, double tolerance) {
   Command c = commandOf(Command::Kind::move, now);
-  c.from = from;
+  c.from = axes_.toMachine(from);
   // In increments that the controller can command.
-  Axes3 position = from;
+  Axes3 position = c.from;
   for (Waypoint& w : path) {
+    const Axes3 end = axes_.toMachine(w.position);
     for (std::size_t i = 0; i < 3; ++i)
-      position[i] += roundTo(w.position[i] - position[i], parameters_.resolution);
+      position[i] += roundTo(end[i] - position[i], parameters_.resolution);
     w.position = position;
   }
-  motion_.expectPosition(position, parameters_.position_tolerance);
+  motion_.expectPosition(axes_.toStation(position), tolerance);
   c.path = std::move(path);
   send(std::move(c), Wait::position, parameters_.motion_timeout);
 }
@@ -143,11 +157,17 @@ ControlEvent StationControl::handle(const CncState& state) {
     if (state.stamp >= sent_ && !state.motion) return complete();
     return {};
   }
-  const std::optional<AxesPosition> axes = axesPosition(state);
+  const std::optional<AxesPosition> axes = position();
   if (!axes)
     return ControlFault{FrfCode::motion_failed, "cnc/state: expected the axes x, y and z, one is missing"};
   const bool waits = wait_ == Wait::position || wait_ == Wait::standstill;
   return waits && canComplete(state.stamp) && motion_.isComplete(state, *axes) ? complete() : ControlEvent();
+}
+
+std::optional<AxesPosition> StationControl::position() const {
+  std::optional<AxesPosition> axes = state_ ? axesPosition(*state_) : std::nullopt;
+  if (axes) axes->position = axes_.toStation(axes->position);
+  return axes;
 }
 
 ControlEvent StationControl::handle(const SpindleAngle& angle) {

@@ -6,8 +6,10 @@
 #include <variant>
 #include <vector>
 
+#include "controller_state.h"
 #include "motion_check.h"
 #include "smartmill_core/modal/results.h"
+#include "smartmill_core/model/station_axes.h"
 #include "smartmill_core/signal/hit_collector.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_hammer/sequence/hammer_parameters.h"
@@ -47,11 +49,12 @@ struct StationSample {
 };
 
 /// Sends the commands of a measurement one at a time and decides from the streams when each is complete. The
-/// inputs return the event that a step waits for.
+/// inputs return the event that a step waits for. Positions are along the axes of the station; the commands
+/// and the controller's state are in those of the machine.
 class StationControl {
  public:
   /// @param range_volt [V] of the displacement sensor
-  StationControl(const HammerParameters& parameters, double range_volt);
+  StationControl(const HammerParameters& parameters, const StationAxes& axes, double range_volt);
 
   /// Begins a measurement: waits until the axes rest at or after this time [s].
   void start(double stamp, const std::string& direction);
@@ -78,6 +81,8 @@ class StationControl {
   ControlEvent checkDeadline(double now);
 
   const std::optional<CncState>& state() const { return state_; }
+  /// [m] displayed; empty: the controller's state lacks an axis
+  std::optional<AxesPosition> position() const;
   bool hasCrossSensor() const { return has_cross_; }
   bool hasCommanded() const { return commanded_; }
   bool isWaitingForHit() const { return wait_ == Wait::hit; }
@@ -90,12 +95,15 @@ class StationControl {
   enum class Wait { nothing, readiness, position, angle, voltage, hit, rest, standstill };
 
   void send(Command command, Wait wait, double timeout);
+  void move(double now, const Axes3& from, std::vector<Waypoint> path, double tolerance);
+  double jogTolerance(double distance) const;  ///< [m]
   bool isTooNear(double volt);
   bool canComplete(double stamp) const;
   ControlEvent complete();
   ControlEvent hitOf(HitCollector::Record record, std::optional<HitCollector::Record> cross);
 
   const HammerParameters& parameters_;
+  StationAxes axes_;
   double range_volt_;
   std::string direction_;
   std::vector<Command> commands_;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "smartmill_core/axis_names.h"
+#include "smartmill_core/model/station_axes.h"
 
 namespace smartmill::hammer {
 
@@ -13,7 +14,9 @@ double roundTo(double value, double step) {
 
 StationPaths::StationPaths(const HammerParameters& parameters, const MachineModel& model,
                            const std::string& direction)
-    : parameters_(parameters), station_(model.hammer->position.at(direction)), along_(*axisIndex(direction)) {
+    : parameters_(parameters),
+      station_(StationAxes(model).toStation(model.hammer->position.at(direction))),
+      along_(*axisIndex(direction)) {
   for (double& v : station_) v = roundTo(v, parameters.resolution);
   double height = station_[2] + parameters.retract_height;
   if (model.axes && model.axes->travel[2][1] > model.axes->travel[2][0])

@@ -12,8 +12,8 @@ namespace smartmill::hammer {
 /// @param value rounded to a multiple of this step
 double roundTo(double value, double step);
 
-/// Paths to the hammer station of a direction, at its second height, and away from it. All in machine
-/// positions [m].
+/// Paths to the hammer station of a direction, at its second height, and away from it. All in
+/// positions [m] along the axes of the station (StationAxes).
 class StationPaths {
  public:
   /// @param direction "x" or "y", for which the model's hammer station has a position

@@ -19,9 +19,10 @@ CollisionWatch CollisionWatch::ofModel(const MachineModel& model, const Collisio
   if (model.hammer) {
     watch.core_radius = std::max(0.0, watch.tool_radius - model.hammer->flute_depth);
     const HammerStation& station = *model.hammer;
+    watch.axes_ = StationAxes(model);
     for (const auto& entry : station.position) {
       const std::string& direction = entry.first;
-      const Axes3& station_position = entry.second;
+      const Axes3 station_position = watch.axes_.toStation(entry.second);
       const std::size_t along = direction == "y" ? 1 : 0;
       const std::size_t across = 1 - along;
       const auto body = [&](const std::string& name, double behind, double half_width, double low,
@@ -55,14 +56,15 @@ std::optional<focas::AlarmMessage> CollisionWatch::check(const MotionState& stat
 
 const CollisionWatch::Body* CollisionWatch::collidingBody(const Axes3& position, bool turning) const {
   const double radius = turning ? tool_radius : core_radius;
+  const Axes3 centre = axes_.toStation(position);
   for (const Body& body : bodies_) {
     if (position[2] >= body.high[2]) {
       continue;  // the whole tool is above it
     }
     double square = 0.0;
     for (std::size_t i = 0; i < 2; ++i) {
-      const double nearest = std::clamp(position[i], body.low[i], body.high[i]);
-      square += (position[i] - nearest) * (position[i] - nearest);
+      const double nearest = std::clamp(centre[i], body.low[i], body.high[i]);
+      square += (centre[i] - nearest) * (centre[i] - nearest);
     }
     if (square < radius * radius) return &body;
   }

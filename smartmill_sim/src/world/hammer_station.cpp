@@ -11,9 +11,19 @@ namespace {
 
 constexpr std::array<const char*, 2> AXIS{{"x", "y"}};
 
-/// Angle [rad] of a tooth that points along the axis.
-double angleOf(std::size_t axis) {
-  return axis == 0 ? 0.5 * units::PI : 0.0;
+/// Angle [rad] of a tooth that points along an axis of the station. @param turn [rad] of the station
+double angleOf(std::size_t axis, double turn) {
+  return (axis == 0 ? 0.5 * units::PI : 0.0) - turn;
+}
+
+/// The section with its positions along the axes of the station.
+smartmill::HammerStation alongItsAxes(smartmill::HammerStation station, const StationAxes& axes) {
+  for (auto& entry : station.position) entry.second = axes.toStation(entry.second);
+  return station;
+}
+
+std::array<double, 2> inPlane(const Axes3& v) {
+  return {v[0], v[1]};
 }
 
 void checkHeight(double stickout, double struck) {
@@ -30,12 +40,13 @@ bool isSamePose(const HammerStation::Pose& a, const HammerStation::Pose& b) {
 
 HammerStation::HammerStation(const MachineModel& model, const StationTraits& traits, double force_scatter,
                              double step)
-    : station_(model.needHammer("simulate its station")),
+    : axes_(model),
+      station_(alongItsAxes(model.needHammer("simulate its station"), axes_)),
       tool_(model.needTool("simulate the hammer station")),
       traits_(traits),
       surface_(traits, tool_, station_.flute_depth),
-      gap_{{GapMean(GapSensor(traits, station_, angleOf(0)), station_.range_volt),
-            GapMean(GapSensor(traits, station_, angleOf(1)), station_.range_volt)}},
+      gap_{{GapMean(GapSensor(traits, station_, angleOf(0, axes_.angle())), station_.range_volt),
+            GapMean(GapSensor(traits, station_, angleOf(1, axes_.angle())), station_.range_volt)}},
       solenoid_(traits, station_, force_scatter),
       error_(traits.axis_scatter) {
   pivots_ = model.stickout.has_value();
@@ -44,7 +55,10 @@ HammerStation::HammerStation(const MachineModel& model, const StationTraits& tra
   if (traits.structure != "beam") return;
   if (!model.stickout) throw Error("hammer_structure: beam needs the model's tool.stickout_mm");
   checkHeight(*model.stickout, station_.offset + traits.read_height);
-  beam_.emplace(traits, tool_, *model.stickout, station_.offset, step);
+  StationTraits along = traits;
+  along.plane_turn -= axes_.angle();
+  beam_.emplace(along, tool_, *model.stickout, station_.offset, step);
+  tip_ = ToolStructure(traits, tool_, *model.stickout).tip();
 }
 
 /// Displacement at a height [m] of a rigid tool over that of its tip; the same ratio applies to forces.
@@ -53,8 +67,7 @@ double HammerStation::rigidRatio(double height) const {
 }
 
 std::optional<ToolTip> HammerStation::tip() const {
-  if (!beam_) return std::nullopt;
-  return beam_->structure().tip();
+  return tip_;
 }
 
 ModalModel HammerStation::measured(std::size_t read_axis, std::size_t struck_axis) const {
@@ -63,6 +76,10 @@ ModalModel HammerStation::measured(std::size_t read_axis, std::size_t struck_axi
 }
 
 std::optional<std::size_t> HammerStation::facing(const std::array<double, 3>& position) const {
+  return facingAt(axes_.toStation(position));
+}
+
+std::optional<std::size_t> HammerStation::facingAt(const Axes3& position) const {
   for (std::size_t axis = 0; axis < 2; ++axis) {
     const auto found = station_.position.find(AXIS[axis]);
     if (found == station_.position.end()) continue;
@@ -85,8 +102,8 @@ void HammerStation::fire(std::size_t axis, double now, double touch, std::mt1993
 
 double HammerStation::struckRetreat(const Pose& pose, std::size_t axis) const {
   const double height = station_.position.at(AXIS[axis])[2] - pose.position[2];
-  const double side = station_.opposite ? units::PI : 0.0;
-  return surface_.retreat(pose.angle, height + traits_.read_height + station_.offset, angleOf(axis) + side);
+  const double facing = angleOf(axis, axes_.angle()) + (station_.opposite ? units::PI : 0.0);
+  return surface_.retreat(pose.angle, height + traits_.read_height + station_.offset, facing);
 }
 
 void HammerStation::PositionError::update(const Axes3& before, const Axes3& now, std::mt19937_64& random) {
@@ -102,14 +119,15 @@ void HammerStation::PositionError::update(const Axes3& before, const Axes3& now,
   }
 }
 
-void HammerStation::setPose(const Pose& pose, std::mt19937_64& random) {
+void HammerStation::setPose(const Pose& machine_pose, std::mt19937_64& random) {
+  const Pose pose{axes_.toStation(machine_pose.position), machine_pose.angle, machine_pose.speed};
   error_.update(pose_.position, pose.position, random);
   pose_ = pose;
   steps_ = 0;
   force_sum_ = 0.0;
   for (GapMean& gap : gap_) gap.clear();
   touched_ = false;
-  const std::optional<std::size_t> facing_axis = facing(pose.position);
+  const std::optional<std::size_t> facing_axis = facingAt(pose.position);
   if (facing_axis != facing_axis_) {
     facing_axis_ = facing_axis;
     surface_pose_.reset();
@@ -142,9 +160,12 @@ HammerStation::Push HammerStation::push(double time) {
   if (meets) push.force = solenoid_.force(time);
   const double along = station_.opposite ? push.force : -push.force;  // the sensor is on the positive side
   if (beam_ && beam_->vibrates(time, push.force) && facing_axis_) {
-    push.tip = beam_->step(fired_axis_, along);
+    const std::array<double, 2> tip = beam_->step(fired_axis_, along);
+    push.tip = inPlane(axes_.toMachine({tip[0], tip[1], 0.0}));
   } else if (meets) {
-    push.tip_force[fired_axis_] = rigidRatio(height_ + station_.offset) * along;
+    Axes3 force{};
+    force[fired_axis_] = rigidRatio(height_ + station_.offset) * along;
+    push.tip_force = inPlane(axes_.toMachine(force));
   }
   ++steps_;
   force_sum_ += push.force;
@@ -162,8 +183,9 @@ std::array<double, 2> HammerStation::gaps(const std::array<double, 2>& displacem
   return gap;
 }
 
-void HammerStation::addDisplacement(const std::array<double, 2>& displacement) {
+void HammerStation::addDisplacement(const std::array<double, 2>& in_machine) {
   if (!facing_axis_) return;
+  const std::array<double, 2> displacement = inPlane(axes_.toStation({in_machine[0], in_machine[1], 0.0}));
   std::array<double, 2> at = displacement;
   for (std::size_t axis = 0; axis < 2; ++axis)
     at[axis] =

@@ -14,7 +14,9 @@
 #include "hammer/station_machine.h"
 #include "hammer/tap_scatter.h"
 #include "smartmill_core/signal/statistics.h"
+#include "smartmill_core/units.h"
 #include "smartmill_sim/world/hammer_station.h"
+#include "smartmill_sim/world/tool_structure.h"
 
 namespace smartmill::hammer {
 namespace {
@@ -129,6 +131,54 @@ TEST(Station, TheCrossFrfIsThatOfTheStructure) {
   }
   EXPECT_GT(lines, 10);
   EXPECT_LT(std::sqrt(off / all), 0.1);
+}
+
+// A station turned about z: the receptances and modes along the machine's axes are those of the structure, the
+// cross receptance too, which is not zero between its principal planes.
+TEST(Station, ATurnedStationGivesTheReceptancesAlongTheMachine) {
+  for (const double turn : {45.0, -30.0}) {
+    DrawnStation drawn = firstWith([](const DrawnStation& d) {
+      return d.traits.cross_sensor && !d.out_of_range && d.traits.tooth == "flute";
+    });
+    drawn.traits.plane_turn = 0.2;
+    drawn.traits.plane_ratio = 0.85;
+    drawn.traits.bounce_chance = 0.0;
+    const double half = 0.5 * units::radFromDeg(turn);
+    for (MachineModel* model : {&drawn.true_model, &drawn.believed})
+      model->frames["hammer"] = {"machine", {}, {{0.0, 0.0, std::sin(half), std::cos(half)}}};
+    StationMachine machine(drawn, 1);
+    HammerParameters parameters;
+    parameters.sensor_face = drawn.traits.housing;
+    parameters.sensor_electrode = drawn.traits.electrode;
+    double seconds = 0.0;
+    const MeasureFrfResult result = measure(machine, parameters, drawn.believed, goalOf(drawn, 10), seconds);
+    ASSERT_EQ(result.code, FrfCode::ok) << result.message;
+    EXPECT_FALSE(machine.touched());
+    const std::size_t axis = drawn.direction == "x" ? 0 : 1;
+    EXPECT_EQ(result.frf.direction, drawn.direction);
+    const sim::ToolStructure structure(drawn.traits, *drawn.believed.tool, *drawn.believed.stickout);
+    const ModalModel along = structure.between(axis, 0.0, axis, 0.0),
+                     across = structure.between(1 - axis, 0.0, axis, 0.0);
+    const auto error = [](const FrequencyResponse& frf, const ModalModel& truth) {
+      double off = 0.0, all = 0.0;
+      for (std::size_t k = 0; k < frf.size(); ++k) {
+        const double f = frf.frequency[k];
+        if (f < 300.0 || f > 3500.0) continue;
+        off += std::norm(frf.value[k] - truth.response(f));
+        all += std::norm(truth.response(f));
+      }
+      return std::sqrt(off / all);
+    };
+    EXPECT_LT(error(result.frf.frf, along), 0.08) << turn;
+    EXPECT_LT(error(result.cross.frf, across), 0.15) << turn;
+    std::cout << turn << " deg: " << result.message << ", " << error(result.frf.frf, along) << ", "
+              << error(result.cross.frf, across) << "\n";
+    for (const Mode& mode : result.modes.model.modes)
+      std::cout << mode.frequency << " " << mode.damping_ratio << " " << 1e-6 / mode.gain << " +- "
+                << mode.gain_std / mode.gain << "\n";
+    for (const Mode& mode : along.modes)
+      std::cout << "  " << mode.frequency << " " << mode.damping_ratio << " " << 1e-6 / mode.gain << "\n";
+  }
 }
 
 TEST(Station, SaysThatNothingStandsThere) {

@@ -29,9 +29,13 @@ struct StepOutcome;
 /// away from it. A hit thus lowers the voltage, and displacement along the hit is -(V - V before) x
 /// sensitivity. A hammer opposite the sensor (HammerStation::Opposite) strikes towards it: +(V - V before) x
 /// sensitivity.
+///
+/// A station turned about z (StationAxes) is measured along both of its axes for each goal, and the FRFs are
+/// turned into the axes of the machine, in which the goal's direction is.
 class HammerSequence {
  public:
-  /// @throws Error when the model lacks the hammer or the tool section, or a parameter is out of range.
+  /// @throws Error when the model lacks the hammer or the tool section, a parameter is out of range, or the
+  /// station is turned and lacks what that needs.
   HammerSequence(const HammerParameters& parameters, const MachineModel& model);
   ~HammerSequence();
 
@@ -57,6 +61,7 @@ class HammerSequence {
  private:
   enum class Phase { idle, steps, stopping, retracting };
 
+  void begin(const MeasureFrfGoal& goal);
   void apply(double now, const StepOutcome& outcome);
   void completeHits(double now);
   void checkDeadline(double now);
@@ -64,6 +69,7 @@ class HammerSequence {
   void dispatch(double now, ControlEvent event);
   void abort(double now, FrfCode code, const std::string& reason);
   void retract(double now);
+  void endPart(double now);
   void finish();
 
   HammerParameters parameters_;
@@ -72,6 +78,8 @@ class HammerSequence {
   std::unique_ptr<StationControl> control_;
   std::unique_ptr<Measurement> measurement_;
   std::unique_ptr<StepRunner> steps_;
+  int asked_modes_ = 0;
+  std::optional<MeasureFrfResult> first_part_;  // of a turned station: hits along the first of its axes
   std::optional<MeasureFrfResult> result_;
 };
 

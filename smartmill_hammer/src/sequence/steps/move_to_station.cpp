@@ -1,4 +1,3 @@
-#include "sequence/controller_state.h"
 #include "sequence/steps/steps.h"
 
 namespace smartmill::hammer {
@@ -29,7 +28,7 @@ class MoveToStation : public SequenceStep {
   StepOutcome begin(double now) override {
     measurement_.report("moving to the hammer station " + measurement_.goal.direction, 0.05);
     measurement_.at_station = true;
-    const Axes3 here = axesPosition(*control_.state())->position;
+    const Axes3 here = control_.position()->position;
     control_.move(now, here, measurement_.paths.approach(here));
     return StepOutcome::running();
   }

@@ -1,4 +1,3 @@
-#include "sequence/controller_state.h"
 #include "sequence/steps/steps.h"
 
 namespace smartmill::hammer {
@@ -14,7 +13,7 @@ class LowerToSecondHeight : public SequenceStep {
     measurement_.at_second_height = true;
     measurement_.bad_hits = 0;
     measurement_.report("lowering the tool for hits at a second height", 0.83);
-    const Axes3 here = axesPosition(*control_.state())->position;
+    const Axes3 here = control_.position()->position;
     control_.move(now, here, measurement_.paths.toSecondHeight(here, measurement_.lowered()));
     return StepOutcome::running();
   }

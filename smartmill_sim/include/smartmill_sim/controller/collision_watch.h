@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/model/station_axes.h"
 #include "smartmill_sim/controller/motion_watch.h"
 
 namespace smartmill::sim {
@@ -19,13 +20,13 @@ struct CollisionOptions {
   double face_gaps = 2.0;  ///< [1] of the gap at zero volt, at which the sensor faces a tool at the station
 };
 
-/// Obstacles on the table as boxes in machine coordinates of the tool tip. The tool is a cylinder whose tip
+/// Obstacles on the table as boxes along the axes of the hammer station. The tool is a cylinder whose tip
 /// has its centre at the machine position.
 class CollisionWatch : public MotionWatch {
  public:
   struct Body {
     std::string name;                       ///< as named in the alarm
-    Axes3 low{{0, 0, 0}}, high{{0, 0, 0}};  ///< [m]
+    Axes3 low{{0, 0, 0}}, high{{0, 0, 0}};  ///< [m] along the axes of the hammer station
   };
 
   /// No obstacles.
@@ -48,6 +49,7 @@ class CollisionWatch : public MotionWatch {
 
  private:
   std::vector<Body> bodies_;
+  StationAxes axes_;
 };
 
 }  // namespace smartmill::sim
