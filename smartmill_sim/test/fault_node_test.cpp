@@ -14,6 +14,7 @@
 #include <smartmill_msgs/SpindleAngle.h>
 
 #include "smartmill_core/names.h"
+#include "smartmill_core/testing/eventually.h"
 
 namespace smartmill {
 namespace {
@@ -22,16 +23,6 @@ using ::testing::HasSubstr;
 using Response = smartmill_msgs::SetFault::Response;
 
 constexpr double PATIENCE = 120.0;  // [s] for a busy computer
-
-bool eventually(const std::function<bool()>& condition) {
-  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(PATIENCE);
-  while (!condition()) {
-    if (ros::WallTime::now() > end || !ros::ok()) return false;
-    ros::spinOnce();
-    ros::WallDuration(0.002).sleep();
-  }
-  return true;
-}
 
 smartmill_msgs::SampleBlock blockOf(int number) {
   smartmill_msgs::SampleBlock block;
@@ -70,12 +61,14 @@ TEST(FaultNode, PassesStreamsWithTheFaultsOfParametersAndService) {
       nh.advertise<smartmill_msgs::SampleBlock>(names::healthy(names::DYNAMOMETER), 1000);
   const ros::Publisher angle =
       nh.advertise<smartmill_msgs::SpindleAngle>(names::healthy(names::SPINDLE_ANGLE), 1000);
-  ASSERT_TRUE(eventually([&] {
-    return force.getNumSubscribers() == 1 && angle.getNumSubscribers() == 1 &&
-           block_subscriber.getNumPublishers() == 1 && angle_subscriber.getNumPublishers() == 1;
-  }));
+  ASSERT_TRUE(eventually(
+      [&] {
+        return force.getNumSubscribers() == 1 && angle.getNumSubscribers() == 1 &&
+               block_subscriber.getNumPublishers() == 1 && angle_subscriber.getNumPublishers() == 1;
+      },
+      ros::spinOnce));
   for (int k = 0; k < 100; ++k) force.publish(blockOf(k));
-  ASSERT_TRUE(eventually([&] { return blocks.size() == 100; }));
+  ASSERT_TRUE(eventually([&] { return blocks.size() == 100; }, ros::spinOnce));
   // From 0.5 s to 0.7 s twice the value: block k has 1 + k.
   EXPECT_EQ(blocks[49].samples[0], 50.0);
   EXPECT_EQ(blocks[51].samples[0], 104.0);
@@ -88,10 +81,10 @@ TEST(FaultNode, PassesStreamsWithTheFaultsOfParametersAndService) {
   reading.header.stamp.fromSec(100.0);
   for (int k = 100; k < 110; ++k) force.publish(blockOf(k));
   angle.publish(reading);
-  ASSERT_TRUE(eventually([&] { return angles == 1; }));
+  ASSERT_TRUE(eventually([&] { return angles == 1; }, ros::spinOnce));
   EXPECT_EQ(set(names::DYNAMOMETER, "").code, Response::OK);
   force.publish(blockOf(110));
-  ASSERT_TRUE(eventually([&] { return blocks.size() >= 101; }));
+  ASSERT_TRUE(eventually([&] { return blocks.size() >= 101; }, ros::spinOnce));
   EXPECT_EQ(blocks.back().first_index, 110u);
 
   const Response unknown = set("daq/hammer", "off");

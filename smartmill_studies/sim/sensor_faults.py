@@ -195,14 +195,14 @@ class Study:
         name = f"{topic.replace('/', '_')}_{fault}"
         bag, text = self.replay(name, f"{topic} {fault} {begin - first:.4f} {LASTS}")
         healthy, faulty = self.results(self.folder / "healthy.bag", topic), self.results(bag, topic)
-        told = announcements(text, topic, begin, begin + LASTS)
+        announced = announcements(text, topic, begin, begin + LASTS)
         force, chatter = force_verdict(healthy, faulty), chatter_verdict(healthy, faulty)
         coefficients = value_verdict(healthy.coefficients, faulty.coefficients)
         frf = value_verdict(healthy.frf, faulty.frf) if topic == HAMMER else None
-        prompt = bool(told) and told[0][0] <= PROMPT
+        prompt = bool(announced) and announced[0][0] <= PROMPT
         wrong = force["wrong"] > 0.02 or chatter["wrong"] > 0.02 or coefficients.startswith("wrong") or (frf or "").startswith("wrong")
-        row = {"topic": topic, "fault": fault, "visible": (topic, fault) not in NOT_VISIBLE, "announced_after": told[0][0] if told else None,
-               "announced_by": [f"{node} {after:.2f} s" for after, node, _ in told], "line": told[0][2] if told else None, "force": force,
+        row = {"topic": topic, "fault": fault, "visible": (topic, fault) not in NOT_VISIBLE, "announced_after": announced[0][0] if announced else None,
+               "announced_by": [f"{node} {after:.2f} s" for after, node, _ in announced], "line": announced[0][2] if announced else None, "force": force,
                "chatter": chatter, "coefficients": coefficients, "frf": frf, "silently_wrong": wrong and not prompt}
         self.rows.append(row)
         print(f"{topic} | {fault} | {', '.join(row['announced_by']) or 'no node'} | {words(force)} | {words(chatter)} | {coefficients} | "

@@ -12,23 +12,14 @@
 #include <vector>
 
 #include "smartmill_core/names.h"
+#include "smartmill_core/testing/eventually.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::cnc {
 namespace {
 
-constexpr double PATIENCE = 120.0;  // [s] for a busy computer
-constexpr double RATE = 25600.0;    // [Hz]
+constexpr double RATE = 25600.0;  // [Hz]
 constexpr int BLOCK = 256;
-
-bool waitUntil(const std::function<bool()>& done) {
-  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(PATIENCE);
-  while (ros::WallTime::now() < end && !done()) {
-    ros::spinOnce();
-    ros::WallDuration(0.01).sleep();
-  }
-  return done();
-}
 
 /// Block of a spindle at 6000 rpm; silent: the channel is stuck.
 smartmill_msgs::SampleBlock blockOf(int number, bool silent) {
@@ -60,9 +51,12 @@ TEST(TachometerNode, GivesTheAngleAndReportsAStuckChannel) {
       });
   auto blocks = nh.advertise<smartmill_msgs::SampleBlock>(names::TACHOMETER, 1000);
   auto states = nh.advertise<smartmill_msgs::CncState>(names::CNC_STATE, 1000);
-  ASSERT_TRUE(waitUntil([&] {
-    return blocks.getNumSubscribers() > 0 && states.getNumSubscribers() > 0 && angle.getNumPublishers() > 0;
-  }));
+  ASSERT_TRUE(eventually(
+      [&] {
+        return blocks.getNumSubscribers() > 0 && states.getNumSubscribers() > 0 &&
+               angle.getNumPublishers() > 0;
+      },
+      ros::spinOnce));
   smartmill_msgs::CncState state;
   state.connected = true;
   state.spindle_speed = units::TWO_PI * 100.0;
@@ -70,16 +64,20 @@ TEST(TachometerNode, GivesTheAngleAndReportsAStuckChannel) {
   int number = 0;
   for (; number < 50; ++number) blocks.publish(blockOf(number, false));
   // 49 or 50 pulses in 0.5 s; the first reading is at the fourth.
-  ASSERT_TRUE(waitUntil([&] { return angles.size() >= 46; })) << angles.size();
+  ASSERT_TRUE(eventually([&] { return angles.size() >= 46; }, ros::spinOnce)) << angles.size();
   EXPECT_NEAR(angles.back().speed, units::TWO_PI * 100.0, 0.1);
   const double turned = 100.0 * (angles.back().header.stamp.toSec() - 1000.0) + 0.37;
   EXPECT_NEAR(std::remainder(angles.back().angle - units::TWO_PI * turned, units::TWO_PI), 0.0, 0.02);
   const std::size_t before = angles.size();
-  ASSERT_TRUE(waitUntil([&] {
-    states.publish(state);
-    blocks.publish(blockOf(number++, true));
-    return diagnosed.find("no pulses while the controller reports a turning spindle") != std::string::npos;
-  })) << diagnosed;
+  ASSERT_TRUE(eventually(
+      [&] {
+        states.publish(state);
+        blocks.publish(blockOf(number++, true));
+        return diagnosed.find("no pulses while the controller reports a turning spindle") !=
+               std::string::npos;
+      },
+      ros::spinOnce))
+      << diagnosed;
   EXPECT_EQ(angles.size(), before);
 }
 

@@ -18,6 +18,7 @@
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/io/text_file.h"
 #include "smartmill_core/names.h"
+#include "smartmill_core/testing/eventually.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
 #include "smartmill_daq/drivers/frame.h"
@@ -30,14 +31,6 @@ namespace {
 constexpr double RATE = 25600.0;  // [Hz]
 constexpr int BLOCK = 256, COUNT = 300;
 constexpr int GAP_AT = 200, GAP = 100;  // [1] block before which samples are missing, samples
-
-bool waitUntil(const std::function<bool()>& done) {
-  for (int i = 0; i < 2400 && !done() && ros::ok(); ++i) {
-    ros::spinOnce();
-    ros::WallDuration(0.05).sleep();
-  }
-  return done();
-}
 
 /// A device on the loopback interface.
 class Device {
@@ -157,7 +150,8 @@ TEST(DaqNode, theForceCompensationGivesTheSameAsWithoutIt) {
                              "_instrument:=" + folder.write("instrument.yaml", instrument(device.port))},
                             {}, folder.file("log"));
   device.accept();
-  ASSERT_TRUE(waitUntil([&] { return sub3.getNumPublishers() > 0; })) << readText(folder.file("log"));
+  ASSERT_TRUE(eventually([&] { return sub3.getNumPublishers() > 0; }, ros::spinOnce))
+      << readText(folder.file("log"));
   Followers nodes({names::absolute("kalman"), "/direct/kalman"});
   nodes.begin();
   for (const ros::Publisher& publisher : {samples, angle, direct_angle}) nodes.expect(publisher);
@@ -177,10 +171,10 @@ TEST(DaqNode, theForceCompensationGivesTheSameAsWithoutIt) {
   }
   nodes.settle();
   nodes.end();
-  ASSERT_TRUE(waitUntil([&] {
-    return blocks.size() >= COUNT && direct.size() >= COUNT && through.size() >= COUNT;
-  })) << blocks.size()
-      << " blocks, " << direct.size() << " and " << through.size() << " forces";
+  ASSERT_TRUE(
+      eventually([&] { return blocks.size() >= COUNT && direct.size() >= COUNT && through.size() >= COUNT; },
+                 ros::spinOnce))
+      << blocks.size() << " blocks, " << direct.size() << " and " << through.size() << " forces";
   for (int b = 0; b < COUNT; ++b) {
     const smartmill_msgs::SampleBlock sent = blockOf(b, start);
     const smartmill_msgs::SampleBlock& got = blocks[static_cast<std::size_t>(b)];
@@ -196,17 +190,23 @@ TEST(DaqNode, theForceCompensationGivesTheSameAsWithoutIt) {
     ASSERT_EQ(through[index].fy, force.fy);
     ASSERT_EQ(through[index].status, force.status);
   }
-  EXPECT_TRUE(waitUntil([&] {
-    return instrument_state.find("|samples lost=" + std::to_string(GAP) + "|") != std::string::npos &&
-           instrument_state.find("|samples in blocks=" + std::to_string(COUNT * BLOCK) + "|") !=
-               std::string::npos;
-  })) << instrument_state;
+  EXPECT_TRUE(eventually(
+      [&] {
+        return instrument_state.find("|samples lost=" + std::to_string(GAP) + "|") != std::string::npos &&
+               instrument_state.find("|samples in blocks=" + std::to_string(COUNT * BLOCK) + "|") !=
+                   std::string::npos;
+      },
+      ros::spinOnce))
+      << instrument_state;
   device.unplug();
-  EXPECT_TRUE(waitUntil([&] {
-    return instrument_state.find("Connection refused") != std::string::npos &&
-           instrument_state.find("|unplugged events=1|") != std::string::npos &&
-           channel_state.find("Connection refused") != std::string::npos;
-  })) << instrument_state;
+  EXPECT_TRUE(eventually(
+      [&] {
+        return instrument_state.find("Connection refused") != std::string::npos &&
+               instrument_state.find("|unplugged events=1|") != std::string::npos &&
+               channel_state.find("Connection refused") != std::string::npos;
+      },
+      ros::spinOnce))
+      << instrument_state;
 }
 
 TEST(DaqNode, aWrongInstrumentIsRefusedInOneLine) {

@@ -24,6 +24,7 @@
 #include "../closed_form_machine.h"
 #include "recordings/bag_replay.h"
 #include "smartmill_core/names.h"
+#include "smartmill_core/testing/eventually.h"
 
 namespace smartmill::hammer {
 namespace {
@@ -31,13 +32,6 @@ namespace {
 using Client = actionlib::SimpleActionClient<smartmill_msgs::MeasureFrfAction>;
 
 const ros::Duration PATIENCE(200.0);  // of a busy machine
-
-template <class Done>
-bool eventually(Done done) {
-  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(PATIENCE.toSec());
-  while (!done() && ros::WallTime::now() < end) ros::WallDuration(0.05).sleep();
-  return done();
-}
 
 class HammerNode : public testing::Test {
  protected:

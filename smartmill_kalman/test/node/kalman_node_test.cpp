@@ -16,19 +16,12 @@
 
 #include "smartmill_core/modal/modal_model.h"
 #include "smartmill_core/names.h"
+#include "smartmill_core/testing/eventually.h"
 #include "smartmill_core/units.h"
 #include "smartmill_ros/follower.h"
 
 namespace smartmill {
 namespace {
-
-bool waitUntil(const std::function<bool()>& done) {
-  for (int i = 0; i < 2400 && !done() && ros::ok(); ++i) {
-    ros::spinOnce();
-    ros::WallDuration(0.05).sleep();
-  }
-  return done();
-}
 
 using Blocks = std::map<std::uint64_t, smartmill_msgs::ForceBlock>;  // by first index
 
@@ -84,8 +77,9 @@ TEST(KalmanNode, compensatesInTheMachinesFrame) {
     ros::spinOnce();
   }
   node.end();
-  ASSERT_TRUE(waitUntil(
-      [&] { return compensated.count((COUNT - 1) * BLOCK) > 0 && measured.count((COUNT - 1) * BLOCK) > 0; }));
+  ASSERT_TRUE(eventually(
+      [&] { return compensated.count((COUNT - 1) * BLOCK) > 0 && measured.count((COUNT - 1) * BLOCK) > 0; },
+      ros::spinOnce));
   const smartmill_msgs::ForceBlock& last = compensated[(COUNT - 1) * BLOCK];
   EXPECT_EQ(last.header.frame_id, "machine");
   EXPECT_EQ(last.status, smartmill_msgs::ForceBlock::COMPENSATED);
@@ -139,7 +133,8 @@ TEST(KalmanNode, takesSixSensorsInTheSpindle) {
   }
   node.end();
   ASSERT_TRUE(
-      waitUntil([&] { return compensated.count(256 * (COUNT - 1)) && measured.count(256 * (COUNT - 1)); }));
+      eventually([&] { return compensated.count(256 * (COUNT - 1)) && measured.count(256 * (COUNT - 1)); },
+                 ros::spinOnce));
   // x of the sensor is y of the machine.
   const smartmill_msgs::ForceBlock& good = measured[256 * 40];
   EXPECT_NEAR(good.fy[100], 360.0, 0.01);
@@ -150,7 +145,7 @@ TEST(KalmanNode, takesSixSensorsInTheSpindle) {
     EXPECT_TRUE(std::isnan((*stream)[256 * BAD].fz[255]));
     EXPECT_FALSE(std::isnan((*stream)[256 * (BAD + 1)].fx[0]));
   }
-  EXPECT_TRUE(waitUntil([&] { return reported; }));
+  EXPECT_TRUE(eventually([&] { return reported; }, ros::spinOnce));
 }
 
 // 2100 input blocks are 4200 force blocks, 4000 of which may wait. The last 0.05 s wait for their order. A
@@ -171,7 +166,8 @@ TEST(KalmanNode, countsBlocksWithoutATransformAndBadBlocks) {
       });
   auto blocks = nh.advertise<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, 0);
   auto angles = nh.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, 0);
-  ASSERT_TRUE(waitUntil([&] { return blocks.getNumSubscribers() > 0 && angles.getNumSubscribers() > 0; }));
+  ASSERT_TRUE(eventually([&] { return blocks.getNumSubscribers() > 0 && angles.getNumSubscribers() > 0; },
+                         ros::spinOnce));
   constexpr int COUNT = 2100;
   for (int b = 0; b < COUNT; ++b) {
     smartmill_msgs::SampleBlock block;
@@ -188,7 +184,7 @@ TEST(KalmanNode, countsBlocksWithoutATransformAndBadBlocks) {
     if (b == COUNT / 2) block.units[0] = "V";
     blocks.publish(block);
   }
-  EXPECT_TRUE(waitUntil([&] { return dropped >= 180; })) << dropped;
+  EXPECT_TRUE(eventually([&] { return dropped >= 180; }, ros::spinOnce)) << dropped;
   EXPECT_LE(dropped, 200);
   EXPECT_NE(input.find(" 1 refused"), std::string::npos) << input;
 }
@@ -196,11 +192,14 @@ TEST(KalmanNode, countsBlocksWithoutATransformAndBadBlocks) {
 TEST(KalmanNode, refusesAStringForANumber) {
   // The node `wrong` got noise_rms: 1e-2, which YAML makes a string; it ended before it advertised anything.
   std::vector<std::string> nodes;
-  ASSERT_TRUE(waitUntil([&] {
-    nodes.clear();
-    return ros::master::getNodes(nodes) && std::count(nodes.begin(), nodes.end(), "/smartmill/kalman") == 1 &&
-           std::count(nodes.begin(), nodes.end(), "/smartmill/wrong") == 0;
-  }));
+  ASSERT_TRUE(eventually(
+      [&] {
+        nodes.clear();
+        return ros::master::getNodes(nodes) &&
+               std::count(nodes.begin(), nodes.end(), "/smartmill/kalman") == 1 &&
+               std::count(nodes.begin(), nodes.end(), "/smartmill/wrong") == 0;
+      },
+      ros::spinOnce));
 }
 
 }  // namespace

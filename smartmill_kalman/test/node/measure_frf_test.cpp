@@ -31,6 +31,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/names.h"
+#include "smartmill_core/testing/eventually.h"
 #include "smartmill_core/units.h"
 #include "smartmill_ros/follower.h"
 #include "smartmill_ros/parameter_server.h"
@@ -43,12 +44,6 @@ const ros::Duration LEAD(2.0);
 
 using Client = actionlib::SimpleActionClient<smartmill_msgs::MeasureFrfAction>;
 using Blocks = std::map<std::uint64_t, smartmill_msgs::ForceBlock>;
-
-template <typename Done>
-bool waitUntil(Done done, double patience = 120.0) {
-  for (int i = 0; i < patience / 0.05 && !done() && ros::ok(); ++i) ros::WallDuration(0.05).sleep();
-  return done();
-}
 
 class MeasureFrf : public testing::Test {
  protected:
@@ -131,7 +126,7 @@ TEST_F(MeasureFrf, TapsThenCutsAndReplaysToTheLastDigit) {
   record<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE);
   record<smartmill_msgs::CuttingCondition>(names::CUTTING_CONDITION);
   record<smartmill_msgs::MeasureFrfActionGoal>(names::goals(names::MEASURE_SENSOR_FRF));
-  ASSERT_TRUE(waitUntil([&] {
+  ASSERT_TRUE(eventually([&] {
     const std::lock_guard<std::mutex> lock(mutex);
     return messages[names::HAMMER] > 10 && messages[names::DYNAMOMETER] > 10 &&
            messages[names::SPINDLE_ANGLE] > 10 && messages["/tf_static"] > 0 && live.size() > 10;
@@ -160,7 +155,7 @@ TEST_F(MeasureFrf, TapsThenCutsAndReplaysToTheLastDigit) {
         if (m.point == POINT_FORCE_SENSOR) directions.insert(m.direction);
       };
   subscribers.push_back(nh.subscribe<smartmill_msgs::ModalModel>(names::TOOL_MODES, 10, note));
-  EXPECT_TRUE(waitUntil([&] {
+  EXPECT_TRUE(eventually([&] {
     const std::lock_guard<std::mutex> lock(mutex);
     return directions.size() == 2;
   }));
@@ -179,7 +174,7 @@ TEST_F(MeasureFrf, TapsThenCutsAndReplaysToTheLastDigit) {
   condition.publish(cut);
   // By the rig's samples, however late they are.
   const auto milled = [&](const ros::Time& until) {
-    return waitUntil([&] {
+    return eventually([&] {
       const std::lock_guard<std::mutex> lock(mutex);
       return live.rbegin()->second.header.stamp > until;
     });
@@ -275,7 +270,7 @@ TEST_F(MeasureFrf, TapsThenCutsAndReplaysToTheLastDigit) {
       node.settle();
   }
   node.end();
-  ASSERT_TRUE(waitUntil([&] {
+  ASSERT_TRUE(eventually([&] {
     const std::lock_guard<std::mutex> lock(mutex);
     return !again.empty() && again.rbegin()->first + 20 * 256 >= last;
   }));

@@ -15,6 +15,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/signal/stream_sorter.h"
+#include "smartmill_core/testing/eventually.h"
 #include "smartmill_ros/follower.h"
 #include "smartmill_ros/frf_server.h"
 #include "smartmill_ros/latched_topic.h"
@@ -26,18 +27,6 @@ namespace {
 
 using ::testing::HasSubstr;
 using ::testing::Not;
-
-constexpr double TIMEOUT = 120.0;  // [s] time limit on a busy computer
-
-template <class Condition>
-bool eventually(Condition condition) {
-  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(TIMEOUT);
-  while (ros::ok() && !condition() && ros::WallTime::now() < end) {
-    ros::spinOnce();
-    ros::WallDuration(0.01).sleep();
-  }
-  return condition();
-}
 
 TEST(NodeShell, ALoopbackHostIsKnownByItsName) {
   for (const char* host : {"localhost", "127.0.0.1", "127.0.1.1", "::1"})
@@ -71,25 +60,25 @@ TEST(NodeShell, AnExceptionOfAHandlerIsReportedAndTheNodeContinues) {
   const ros::Subscriber diagnostics =
       nh.subscribe<diagnostic_msgs::DiagnosticArray>("/diagnostics", 10, listen);
   ros::Publisher angle = nh.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, 10);
-  ASSERT_TRUE(
-      eventually([&] { return angle.getNumSubscribers() == 1 && diagnostics.getNumPublishers() > 0; }));
+  ASSERT_TRUE(eventually([&] { return angle.getNumSubscribers() == 1 && diagnostics.getNumPublishers() > 0; },
+                         ros::spinOnce));
   EXPECT_FALSE(shell.inputs().any().ever());
   smartmill_msgs::SpindleAngle message;
   message.speed = -1.0;
   angle.publish(message);
-  ASSERT_TRUE(eventually([&] { return !reported.empty(); }));
+  ASSERT_TRUE(eventually([&] { return !reported.empty(); }, ros::spinOnce));
   EXPECT_THAT(reported, HasSubstr("inputs"));
   EXPECT_THAT(reported, HasSubstr("spindle/angle: speed is below 0"));
   EXPECT_EQ(accepted, 0);
   message.speed = 1.0;
   angle.publish(message);
-  EXPECT_TRUE(eventually([&] { return accepted == 1; }));
+  EXPECT_TRUE(eventually([&] { return accepted == 1; }, ros::spinOnce));
   EXPECT_TRUE(shell.inputs().watchdog(names::SPINDLE_ANGLE).ever());
   EXPECT_THROW(shell.inputs().watchdog(names::CNC_STATE), std::out_of_range);
-  EXPECT_TRUE(eventually([&] { return task_calls > 3; }));
+  EXPECT_TRUE(eventually([&] { return task_calls > 3; }, ros::spinOnce));
   // The end of data is reported once.
   int ends = 0;
-  EXPECT_TRUE(eventually([&] { return (ends += shell.inputs().any().ended()) > 0; }));
+  EXPECT_TRUE(eventually([&] { return (ends += shell.inputs().any().ended()) > 0; }, ros::spinOnce));
   EXPECT_EQ(ends, 1);
   const InputHealth* dead = shell.inputs().dead({names::SPINDLE_ANGLE});
   ASSERT_NE(dead, nullptr);
@@ -119,10 +108,12 @@ TEST(Inputs, FaultsAreReportedUnderTheTopicAtFault) {
       nh.subscribe<diagnostic_msgs::DiagnosticArray>("/diagnostics", 10, listen);
   ros::Publisher force = nh.advertise<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, 10);
   ros::Publisher angle = nh.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, 10);
-  ASSERT_TRUE(eventually([&] {
-    return force.getNumSubscribers() == 1 && angle.getNumSubscribers() == 1 &&
-           diagnostics.getNumPublishers() > 0;
-  }));
+  ASSERT_TRUE(eventually(
+      [&] {
+        return force.getNumSubscribers() == 1 && angle.getNumSubscribers() == 1 &&
+               diagnostics.getNumPublishers() > 0;
+      },
+      ros::spinOnce));
   SampleBlock block;
   block.stamp = 100.0;
   block.sample_rate = 1000.0;
@@ -131,7 +122,7 @@ TEST(Inputs, FaultsAreReportedUnderTheTopicAtFault) {
   block.samples = {1.0, 1e30, 3.0};
   force.publish(toMsg(block, "dynamometer"));
   force.publish(toMsg(block, "dynamometer"));
-  ASSERT_TRUE(eventually([&] { return !reported.empty(); }));
+  ASSERT_TRUE(eventually([&] { return !reported.empty(); }, ros::spinOnce));
   EXPECT_THAT(reported,
               HasSubstr("daq/dynamometer: channel fx has values that are not finite or beyond 1e9"));
   ASSERT_EQ(blocks.size(), 1u);  // the second is the first once more
@@ -139,8 +130,9 @@ TEST(Inputs, FaultsAreReportedUnderTheTopicAtFault) {
   EXPECT_EQ(blocks[0].samples[2], 3.0);
   reported.clear();
   angle.publish(toMsg(SpindleAngle{100.0, 0.0, 0.0}));
-  EXPECT_TRUE(eventually(
-      [&] { return reported.find("daq/dynamometer: channel fz is missing") != std::string::npos; }));
+  EXPECT_TRUE(
+      eventually([&] { return reported.find("daq/dynamometer: channel fz is missing") != std::string::npos; },
+                 ros::spinOnce));
   EXPECT_THAT(reported, Not(HasSubstr("spindle/angle")));
 }
 
@@ -163,11 +155,13 @@ TEST(Inputs, AStreamThatStopsIsBehindTheOthers) {
       };
   const ros::Subscriber diagnostics =
       nh.subscribe<diagnostic_msgs::DiagnosticArray>("/diagnostics", 10, listen);
-  ASSERT_TRUE(eventually([&] {
-    return std::all_of(publishers.begin(), publishers.end(),
-                       [](const ros::Publisher& p) { return p.getNumSubscribers() == 1; }) &&
-           diagnostics.getNumPublishers() > 0;
-  }));
+  ASSERT_TRUE(eventually(
+      [&] {
+        return std::all_of(publishers.begin(), publishers.end(),
+                           [](const ros::Publisher& p) { return p.getNumSubscribers() == 1; }) &&
+               diagnostics.getNumPublishers() > 0;
+      },
+      ros::spinOnce));
   SampleBlock block;
   block.sample_rate = 100.0;
   block.channels = {"x"};
@@ -182,7 +176,7 @@ TEST(Inputs, AStreamThatStopsIsBehindTheOthers) {
       publishers[t].publish(toMsg(block));
       ++sent;
     }
-    ASSERT_TRUE(eventually([&] { return taken == sent; }));
+    ASSERT_TRUE(eventually([&] { return taken == sent; }, ros::spinOnce));
   }
   EXPECT_THAT(reported, HasSubstr("daq/b: "));
   EXPECT_THAT(reported, HasSubstr("s behind the other inputs"));
@@ -270,7 +264,7 @@ TEST(LatchedTopic, ALateSubscriberGetsTheLastOfEveryKey) {
     received[m.direction] = m.header.stamp.toSec();
   };
   const ros::Subscriber subscriber = nh.subscribe<smartmill_msgs::Frf>(names::TOOL_FRF, 10, listen);
-  ASSERT_TRUE(eventually([&] { return received.size() == 2; }));
+  ASSERT_TRUE(eventually([&] { return received.size() == 2; }, ros::spinOnce));
   EXPECT_EQ(received["x"], 3.0);
   EXPECT_EQ(received["y"], 2.0);
 }
@@ -319,14 +313,14 @@ TEST(FrfServer, MeasuresOneGoalAtATimeAndAnswersEach) {
       {[&](const MeasureFrfGoal& goal, std::function<bool(bool)> at) { begin[goal.direction] = at; },
        [&](std::function<bool()> query) { still_active = query; }});
   Client client(nh);
-  ASSERT_TRUE(eventually([&] { return client.connected(); }));
+  ASSERT_TRUE(eventually([&] { return client.connected(); }, ros::spinOnce));
   for (const char* id : {"x", "y", "z"}) client.send(id);
-  ASSERT_TRUE(eventually([&] { return begin.size() == 3; }));
+  ASSERT_TRUE(eventually([&] { return begin.size() == 3; }, ros::spinOnce));
   EXPECT_TRUE(begin["x"](true));
   EXPECT_FALSE(begin["y"](false));  // another measurement is running
-  EXPECT_TRUE(eventually([&] { return client.statusOf("y") == Status::REJECTED; }));
+  EXPECT_TRUE(eventually([&] { return client.statusOf("y") == Status::REJECTED; }, ros::spinOnce));
   client.cancel("x");
-  ASSERT_TRUE(eventually([&] { return static_cast<bool>(still_active); }));
+  ASSERT_TRUE(eventually([&] { return static_cast<bool>(still_active); }, ros::spinOnce));
   EXPECT_TRUE(still_active());
   server.feedback("stage", 0.5, 3);
   FrfServer::Result result;
@@ -334,20 +328,20 @@ TEST(FrfServer, MeasuresOneGoalAtATimeAndAnswersEach) {
   result.frf.direction = "x";
   server.finish(result);
   EXPECT_FALSE(still_active());
-  EXPECT_TRUE(eventually([&] { return client.statusOf("x") == Status::SUCCEEDED; }));
+  EXPECT_TRUE(eventually([&] { return client.statusOf("x") == Status::SUCCEEDED; }, ros::spinOnce));
   EXPECT_EQ(server.lastMessage(), "measured");
 
   server.refuseWaiting("daq/hammer is silent", 1e3);  // before the timeout
   server.refuseWaiting("daq/hammer is silent", 0.0);
-  EXPECT_TRUE(eventually([&] { return client.statusOf("z") == Status::REJECTED; }));
+  EXPECT_TRUE(eventually([&] { return client.statusOf("z") == Status::REJECTED; }, ros::spinOnce));
   EXPECT_EQ(client.results["z"].result.message, "daq/hammer is silent");
   EXPECT_FALSE(begin["z"](true));  // already answered
 
   client.send("again");
-  ASSERT_TRUE(eventually([&] { return begin.count("again") > 0; }));
+  ASSERT_TRUE(eventually([&] { return begin.count("again") > 0; }, ros::spinOnce));
   EXPECT_TRUE(begin["again"](true));
   server.restart();
-  EXPECT_TRUE(eventually([&] { return client.statusOf("again") == Status::ABORTED; }));
+  EXPECT_TRUE(eventually([&] { return client.statusOf("again") == Status::ABORTED; }, ros::spinOnce));
 }
 
 TEST(StrikeClient, ReturnsEachFaultOnce) {
@@ -358,7 +352,7 @@ TEST(StrikeClient, ReturnsEachFaultOnce) {
   std::optional<StrikeClient::Answer> fault;
   const auto hasFault = [&] { return (fault = caller.takeFault()).has_value(); };
   caller.strike("x");
-  ASSERT_TRUE(eventually([&] { return fault || hasFault(); }));
+  ASSERT_TRUE(eventually([&] { return fault || hasFault(); }, ros::spinOnce));
   EXPECT_EQ(fault->kind, Kind::no_answer);
 
   std::string struck;
@@ -373,7 +367,7 @@ TEST(StrikeClient, ReturnsEachFaultOnce) {
   const ros::ServiceServer server =
       nh.advertiseService<Strike::Request, Strike::Response>(names::STRIKE, serve);
   caller.strike("y");
-  EXPECT_TRUE(eventually([&] { return struck == "tool y"; }));
+  EXPECT_TRUE(eventually([&] { return struck == "tool y"; }, ros::spinOnce));
   EXPECT_FALSE(caller.takeFault());
   for (const auto& [answer, kind] :
        {std::pair<std::uint8_t, Kind>{Strike::Response::NO_HAMMER, Kind::no_hammer},
@@ -381,7 +375,7 @@ TEST(StrikeClient, ReturnsEachFaultOnce) {
     code = answer;
     fault.reset();
     caller.strike("z");
-    ASSERT_TRUE(eventually([&] { return fault || hasFault(); }));
+    ASSERT_TRUE(eventually([&] { return fault || hasFault(); }, ros::spinOnce));
     EXPECT_EQ(fault->kind, kind);
     EXPECT_EQ(fault->message, "daq/strike: message");
   }

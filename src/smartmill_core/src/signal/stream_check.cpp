@@ -36,7 +36,7 @@ constexpr double PERIOD_SHARE = 0.1;   // [1] weight of a reading in the mean pe
 
 void StreamCheck::reset() {
   newest_ = NEVER;
-  for (Episode& episode : episodes_) episode.seen = episode.told = NEVER;
+  for (Episode& episode : episodes_) episode.seen = episode.announced = NEVER;
   next_index_.reset();
   channels_.clear();
   window_samples_ = 0;
@@ -52,8 +52,8 @@ void StreamCheck::note(Kind kind, double stamp, std::size_t count, const std::st
   const bool begins = stamp - episode.seen > PRESENT;
   episode.seen = stamp;
   episode.count += count;
-  if (!begins && stamp - episode.told < REPEAT) return;
-  episode.told = stamp;
+  if (!begins && stamp - episode.announced < REPEAT) return;
+  episode.announced = stamp;
   episode.line = text + formatted(" at %.3f s", stamp);
   lines_.push_back(episode.line);
 }
@@ -270,8 +270,8 @@ std::string SpeedAgreement::check(const SpindleAngle& reading) {
   }
   if (reading.stamp - since_ < STEADY_TIME) return {};
   disagrees_ = std::abs(reading.speed - controller_) > SPEED_SHARE * controller_;
-  if (!disagrees_ || std::abs(reading.stamp - told_) < REPEAT) return {};
-  told_ = reading.stamp;
+  if (!disagrees_ || std::abs(reading.stamp - announced_) < REPEAT) return {};
+  announced_ = reading.stamp;
   return formatted("speed %.4g rad/s, the controller states %.4g rad/s at %.3f s", reading.speed, controller_,
                    reading.stamp);
 }

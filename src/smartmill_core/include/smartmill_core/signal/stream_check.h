@@ -49,7 +49,7 @@ class StreamCheck {
  private:
   static constexpr double NEVER = -std::numeric_limits<double>::infinity();  // [s]
   struct Episode {
-    double seen = NEVER, told = NEVER;  // [s]
+    double seen = NEVER, announced = NEVER;  // [s]
     std::string line;
     std::size_t count = 0;
   };
@@ -110,9 +110,9 @@ class SpeedAgreement {
   bool disagrees() const { return disagrees_; }
 
  private:
-  double controller_stamp_ = 0.0, controller_ = 0.0;           // [s], [rad/s]
-  double since_ = 0.0, first_ = 0.0, first_controller_ = 0.0;  // [s], [rad/s] since when both are steady
-  double told_ = -std::numeric_limits<double>::infinity();     // [s]
+  double controller_stamp_ = 0.0, controller_ = 0.0;             // [s], [rad/s]
+  double since_ = 0.0, first_ = 0.0, first_controller_ = 0.0;    // [s], [rad/s] since when both are steady
+  double announced_ = -std::numeric_limits<double>::infinity();  // [s]
   bool disagrees_ = false;
 };
 
