@@ -97,9 +97,9 @@ void HarmonicFilter::setGains() {
   }
 }
 
-std::vector<HarmonicFilter::Vector4> HarmonicFilter::unitWeights() const {
-  std::vector<Vector4> weights;
-  for (const HarmonicPairs::PairBatch& batch : pairs_.batches()) weights.push_back(batch.g);
+std::vector<HarmonicFilter::WeightBatch> HarmonicFilter::unitWeights() const {
+  std::vector<WeightBatch> weights;
+  for (const HarmonicPairs::PairBatch& batch : pairs_.batches()) weights.push_back({batch.g});
   return weights;
 }
 
@@ -109,12 +109,12 @@ void HarmonicFilter::resetWeights() {
   force_gain_ = forceGains(weights_);
 }
 
-std::vector<double> HarmonicFilter::forceGains(const std::vector<Vector4>& weights) const {
+std::vector<double> HarmonicFilter::forceGains(const std::vector<WeightBatch>& weights) const {
   std::vector<double> gains;
   for (const std::vector<GainBatch>& gain : gains_) {
     double force = 0.0;
     for (std::size_t i = 0; i < 4 * weights.size(); ++i)
-      force += weights[i / 4][i % 4] * gain[i / 4].re[i % 4];
+      force += weights[i / 4].g[i % 4] * gain[i / 4].re[i % 4];
     gains.push_back(force);
   }
   return gains;
@@ -134,7 +134,7 @@ void HarmonicFilter::endRevolution() {
     const GainBatch& gain = gains_[memory_.level()][i / 4];
     const double response = std::hypot(batch.c1[i % 4], batch.c2[i % 4]);
     const double covariance = std::hypot(gain.re[i % 4], gain.im[i % 4]) * variance / response;
-    weights_[i / 4][i % 4] = std::max(0.0, 1.0 - 2.0 * covariance / std::norm(pairs_.forceHarmonic(n)));
+    weights_[i / 4].g[i % 4] = std::max(0.0, 1.0 - 2.0 * covariance / std::norm(pairs_.forceHarmonic(n)));
   }
   weighted_ = true;
   force_gain_ = forceGains(weights_);
@@ -213,10 +213,10 @@ AVX2_AND_DEFAULT double HarmonicFilter::advance(const GainBatch* gain, double in
   const Vector4 nu = {innovation, innovation, innovation, innovation};
   Vector4 force = {}, expected = {};
   HarmonicPairs::PairBatch* batch = pairs_.batches().data();
-  const Vector4* weight = weights_.data();
+  const WeightBatch* weight = weights_.data();
   for (const HarmonicPairs::PairBatch* end = batch + pairs_.batches().size(); batch != end;
        ++batch, ++gain, ++weight) {
-    force += *weight * batch->re;
+    force += weight->g * batch->re;
     const Vector4 re = batch->re + gain->re * nu, im = batch->im + gain->im * nu;
     const Vector4 next_re = batch->a * re - batch->b * im, next_im = batch->b * re + batch->a * im;
     expected += batch->c1 * next_re + batch->c2 * next_im;

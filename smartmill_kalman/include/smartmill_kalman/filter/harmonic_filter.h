@@ -124,7 +124,7 @@ class HarmonicFilter {
   /// Weight of harmonic n in the force, 1 unless the cut is steady.
   double weight(std::size_t n) const {
     const std::size_t i = pairs_.modes() + n;
-    return weights_[i / 4][i % 4];
+    return weights_[i / 4].g[i % 4];
   }
   /// False (the state of a filter made from gains): all weights of the harmonics are 1, as a smoother
   /// requires, which corrects the filter's force.
@@ -146,16 +146,16 @@ class HarmonicFilter {
   /// Weights of the next revolution by the innovations of this one.
   void endRevolution();
   void resetWeights();
-  using Vector4 = HarmonicPairs::Vector4;
-  std::vector<Vector4> unitWeights() const;
+  using WeightBatch = HarmonicPairs::WeightBatch;
+  std::vector<WeightBatch> unitWeights() const;
   /// Share of an innovation in the force of its step, of each level.
-  std::vector<double> forceGains(const std::vector<Vector4>& weights) const;
+  std::vector<double> forceGains(const std::vector<WeightBatch>& weights) const;
 
   HarmonicPairs pairs_;
   std::vector<HarmonicGain> design_;
   std::vector<std::vector<GainBatch>> gains_;
   std::vector<double> force_gain_, innovation_std_;
-  std::vector<Vector4> weights_;               // [1] of the pairs in the force; 0: of a mode
+  std::vector<WeightBatch> weights_;           // [1] of the pairs in the force; 0: of a mode
   bool weighting_ = false, weighted_ = false;  // whether weights are used; whether one is not 1
   double predicted_output_ = 0.0, innovation_ = 0.0;
   double innovation_sum_ = 0.0;                        // [N2] of the running revolution

@@ -22,6 +22,9 @@ class HarmonicPairs {
   struct GainBatch {
     Vector4 re, im;
   };
+  struct WeightBatch {
+    Vector4 g;
+  };
 
   HarmonicPairs(const ModalModel& sensor, double spindle_speed, double sample_rate, int harmonics);
 

@@ -92,11 +92,11 @@ std::string EffectParameter::quantity() const {
     suffix += c == '/' ? "_per_" : c == ' ' ? "_" : std::string(1, static_cast<char>(std::tolower(c)));
   if (suffix.rfind("1_", 0) == 0) suffix.erase(0, 2);
   suffix.insert(0, "_");
-  std::string words = key;
-  if (words.size() > suffix.size() && words.compare(words.size() - suffix.size(), suffix.size(), suffix) == 0)
-    words.resize(words.size() - suffix.size());
-  std::replace(words.begin(), words.end(), '_', ' ');
-  return words;
+  std::string text = key;
+  if (text.size() > suffix.size() && text.compare(text.size() - suffix.size(), suffix.size(), suffix) == 0)
+    text.resize(text.size() - suffix.size());
+  std::replace(text.begin(), text.end(), '_', ' ');
+  return text;
 }
 
 std::string EffectParameter::rangeText() const {
