@@ -5,8 +5,11 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <iostream>
 #include <regex>
+#include <sstream>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -19,6 +22,20 @@ namespace {
 using smartmill::TemporaryFolder;
 using namespace smartmill::testing;
 
+/// Lines of a file with one of these words: what ended the session, before the whole log.
+std::string linesWith(const std::string& file, const std::vector<std::string>& words) {
+  std::istringstream in(contentOf(file));
+  std::string text;
+  for (std::string line; std::getline(in, line);) {
+    for (const std::string& word : words) {
+      if (line.find(word) == std::string::npos) continue;
+      text += line + "\n";
+      break;
+    }
+  }
+  return text;
+}
+
 TEST(LinuxCncMachine, AShortSessionFindsTheTwinsCoefficients) {
   if (::access("/usr/bin/linuxcnc", X_OK) != 0) GTEST_SKIP() << "LinuxCNC is not installed";
   if (::geteuid() != 0) GTEST_SKIP() << "the namespaces of LinuxCNC require root";
@@ -27,10 +44,20 @@ TEST(LinuxCncMachine, AShortSessionFindsTheTwinsCoefficients) {
   setenv("ROS_HOME", folder.file("ros_home").c_str(), 1);
   const std::string machine = "/dev/shm/smartmill_session_" + std::to_string(::getpid());
   const std::string summary = folder.file("session.json"), log = folder.file("log.txt");
-  run("roslaunch -p " + freePort() + " " SESSION " folder:=" + machine + " summary:=" + summary, log);
-  std::filesystem::remove_all(machine);
-  const std::string summary_text = contentOf(summary);
-  ASSERT_NE(summary_text.find("\"completed\": true"), std::string::npos) << contentOf(log);
+  std::string summary_text;
+  // LinuxCNC may end by itself on a computer that starves its real-time thread. Whatever else ends the
+  // session fails.
+  for (int attempt = 1; attempt <= 2; ++attempt) {
+    run("roslaunch -p " + freePort() + " " SESSION " folder:=" + machine + " summary:=" + summary, log);
+    const std::string ended = contentOf(machine + "/linuxcnc.log");
+    std::filesystem::remove_all(machine);
+    summary_text = contentOf(summary);
+    if (summary_text.find("\"completed\": true") != std::string::npos) break;
+    const bool by_itself = contentOf(log).find("linuxcnc_machine: LinuxCNC has ended") != std::string::npos;
+    ASSERT_TRUE(by_itself && attempt == 1)
+        << linesWith(log, {"died", "ended", "FAIL", "ERROR"}) << contentOf(log);
+    std::cout << "LinuxCNC has ended by itself, the session is repeated:\n" << ended << "\n";
+  }
   std::smatch ktc;
   ASSERT_TRUE(std::regex_search(summary_text, ktc, std::regex("Ktc ([0-9.]+)"))) << summary_text;
   // N/mm2; three percent as for a whole session (docs/pipeline.md).

@@ -49,8 +49,9 @@ class ClosedFormMachine {
  public:
   MachineModel model;
   FluteProfile profile;
-  ModalModel tip[2];      // truth: direct receptance at the tip [m/N]
-  double mounting = 0.3;  // [rad] of the cutter in the spindle, unknown to the sequence
+  ModalModel tip[2];          // truth: direct receptance at the tip [m/N]
+  double mounting = 0.3;      // [rad] of the cutter in the spindle, unknown to the sequence
+  double station_turn = 0.0;  // [rad] of the station about z
   double force_noise = 0.2, volt_noise = 0.002;
   double peak = 200.0, contact = 0.4e-3;
   double pivot = 0.25;  // [m] above the tip, about which the tool rotates
@@ -124,11 +125,11 @@ class ClosedFormMachine {
   }
 
   bool at(const std::string& direction) const {
-    const auto& p = model.hammer->position.at(direction);
+    const Axes3 p = alongStation(model.hammer->position.at(direction)), here = alongStation(position);
     const std::size_t d = direction == "x" ? 0 : 1;
     // In front of the sensor, not next to it or above it.
-    return tool_present && std::abs(position[1 - d] - p[1 - d]) < 2e-3 &&
-           std::abs(position[2] - p[2]) < 0.03 && p[d] - position[d] < 4e-3;
+    return tool_present && std::abs(here[1 - d] - p[1 - d]) < 2e-3 && std::abs(here[2] - p[2]) < 0.03 &&
+           p[d] - here[d] < 4e-3;
   }
 
   bool still() const { return path.empty() && !orienting; }
@@ -165,10 +166,10 @@ class ClosedFormMachine {
       double volt = -h.range_volt;
       if (dir >= 0) {
         const auto d = static_cast<std::size_t>(dir);
-        const Axes3& p = h.position.at(dir == 0 ? "x" : "y");
-        const double facing = dir == 0 ? 0.5 * units::PI : 0.0;
+        const Axes3 p = alongStation(h.position.at(dir == 0 ? "x" : "y"));
+        const double facing = (dir == 0 ? 0.5 * units::PI : 0.0) - station_turn;
         const double gap =
-            p[d] + 2.0 * h.gap_at_zero_volt - position[d] - hidden_offset[d] + away +
+            p[d] + 2.0 * h.gap_at_zero_volt - alongStation(position)[d] - hidden_offset[d] + away +
             profile.retreat(spindle + mounting, model.tool->lag() * (p[2] - position[2]), facing);
         closest = std::min(closest, gap);
         volt = gap > 0.0 ? h.gain_volt * (h.gap_at_zero_volt / gap - 1.0) : h.range_volt;
@@ -211,6 +212,11 @@ class ClosedFormMachine {
 
  private:
   static constexpr int SUB = 8;
+
+  Axes3 alongStation(const Axes3& v) const {
+    const double c = std::cos(station_turn), s = std::sin(station_turn);
+    return {c * v[0] + s * v[1], c * v[1] - s * v[0], v[2]};
+  }
 
   double forceAt(double t) const {
     double f = 0.0;

@@ -75,8 +75,9 @@ HammerSequence::HammerSequence(const HammerParameters& parameters, const Machine
                 "axis of the machine follows from both");
   }
   if (axes.isTurned() && parameters_.cross_frf == 0) {
-    throw Error("cross_frf 0: frames.hammer of " + model.file +
-                " is turned, expected 1: the receptance along an axis of the machine follows from the cross FRF");
+    throw Error(
+        "cross_frf 0: frames.hammer of " + model.file +
+        " is turned, expected 1: the receptance along an axis of the machine follows from the cross FRF");
   }
   parameters_.validate();
 }
@@ -255,17 +256,24 @@ void HammerSequence::retract(double now) {
 /// The receptance along an axis of the machine needs the hits along both axes of a turned station.
 void HammerSequence::endPart(double now) {
   const StationAxes axes(model_);
-  if (!axes.isTurned() || measurement_->result.code != FrfCode::ok) return finish();
+  MeasureFrfResult& result = measurement_->result;
+  if (!axes.isTurned() || result.code != FrfCode::ok) return finish();
+  if (result.cross.frf.size() == 0) {
+    result.code = FrfCode::bad_data;
+    result.message +=
+        "; no cross FRF, from which the receptance along the machine's axis follows, since "
+        "frames.hammer is turned";
+    return finish();
+  }
   if (!first_part_) {
-    first_part_ = std::move(measurement_->result);
+    first_part_ = std::move(result);
     first_part_->spindle_moves = control_->spindleMoves();
     MeasureFrfGoal other = measurement_->goal;
     other.stamp = now;
     other.direction = AXIS_NAMES[measurement_->paths.across()];
     return begin(other);
   }
-  const MeasureFrfResult second = std::move(measurement_->result);
-  measurement_->result = alongMachineAxis(*first_part_, second, axes.angle(), asked_modes_, parameters_);
+  result = alongMachineAxis(*first_part_, result, axes.angle(), asked_modes_, parameters_);
   finish();
 }
 

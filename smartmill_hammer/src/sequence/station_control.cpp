@@ -99,8 +99,7 @@ void StationControl::move(double now, const Axes3& from, std::vector<Waypoint> p
   Axes3 position = c.from;
   for (Waypoint& w : path) {
     const Axes3 end = axes_.toMachine(w.position);
-    for (std::size_t i = 0; i < 3; ++i)
-      position[i] += roundTo(end[i] - position[i], parameters_.resolution);
+    for (std::size_t i = 0; i < 3; ++i) position[i] += roundTo(end[i] - position[i], parameters_.resolution);
     w.position = position;
   }
   motion_.expectPosition(axes_.toStation(position), tolerance);

@@ -7,6 +7,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/modal/modal_fit.h"
+#include "smartmill_core/modal/modal_model.h"
 
 namespace smartmill::hammer {
 namespace {
@@ -30,6 +31,29 @@ FrequencyResponse weightedSum(const std::array<const FrequencyResponse*, 4>& frf
   return sum;
 }
 
+/// Standard deviations of a mode as measured along an axis of the station; zero: not seen along it.
+Mode nearest(const ModalModel& model, const Mode& mode) {
+  Mode found;
+  double least = mode.damping_ratio * mode.frequency;  // half of its width
+  for (const Mode& m : model.modes) {
+    const double off = std::abs(m.frequency - mode.frequency);
+    if (off < least) least = off, found = m;
+  }
+  return found;
+}
+
+/// The errors of sensors, tip correction and scatter along each axis of the station, which the fit to the
+/// sum of their FRFs does not know.
+void addErrors(const ModalModel& first, const ModalModel& second, double c, double s, ModalModel& model) {
+  for (Mode& mode : model.modes) {
+    const Mode a = nearest(first, mode), b = nearest(second, mode);
+    const double cross = 2.0 * c * s * std::sqrt(a.gain_std * b.gain_std);
+    mode.gain_std = std::hypot(mode.gain_std, std::hypot(c * c * a.gain_std, s * s * b.gain_std, cross));
+    mode.frequency_std = std::max({mode.frequency_std, a.frequency_std, b.frequency_std});
+    mode.damping_ratio_std = std::max({mode.damping_ratio_std, a.damping_ratio_std, b.damping_ratio_std});
+  }
+}
+
 }  // namespace
 
 MeasureFrfResult alongMachineAxis(const MeasureFrfResult& first, const MeasureFrfResult& second, double angle,
@@ -38,12 +62,6 @@ MeasureFrfResult alongMachineAxis(const MeasureFrfResult& first, const MeasureFr
   result.frf.stamp = result.modes.stamp = result.cross.stamp = second.frf.stamp;
   result.measured_frf = {};
   result.measured = {};
-  if (first.cross.frf.size() == 0 || second.cross.frf.size() == 0) {
-    result.code = FrfCode::bad_data;
-    result.message = "no cross FRF: frames.hammer is turned, the receptance along " + first.frf.direction +
-                     " follows from the station's direct and cross FRFs";
-    return result;
-  }
   // Along x from the station's x and y, along y from its y and x: the machine's axis is turned by the angle
   // from the station's own, and its other axis is on the other side.
   const double c = std::cos(angle), s = first.frf.direction == "x" ? std::sin(angle) : -std::sin(angle);
@@ -60,6 +78,7 @@ MeasureFrfResult alongMachineAxis(const MeasureFrfResult& first, const MeasureFr
     options.max_modes = parameters.max_modes;
     options.positive_gains = true;
     ModalFit fit = fitModes(result.frf.frf, options);
+    addErrors(first.modes.model, second.modes.model, c, s, fit.model);
     result.modes.model = fit.model;
     result.modes.relative_error = fit.relative_error;
     result.message = first.message + "; " + second.frf.direction + ": " + second.message + "; turned into " +

@@ -11,7 +11,7 @@ namespace smartmill::hammer {
 /// @param first result of the goal's direction; gives what is not an FRF @param second of the other direction
 /// @param angle [rad] from the machine's x to the station's
 /// @param modes to fit; 0: all significant ones
-/// @return code bad_data without a cross FRF, fit_failed where no mode fits
+/// @return code fit_failed where no mode fits
 MeasureFrfResult alongMachineAxis(const MeasureFrfResult& first, const MeasureFrfResult& second, double angle,
                                   int modes, const HammerParameters& parameters);
 

@@ -5,6 +5,7 @@
 #include <iostream>
 #include <random>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "../closed_form_machine.h"
@@ -300,18 +301,39 @@ TEST(HammerSequence, ToleratesOneNaNAndEndsOnMany) {
   EXPECT_TRUE(retracted(machine));
 }
 
-// Hits are along x and y of the machine: a station along 45 degrees is refused.
-TEST(HammerSequence, RefusesATurnedStation) {
+std::string refusalOf(const HammerParameters& parameters, const MachineModel& model) {
+  try {
+    const HammerSequence sequence(parameters, model);
+    return "";
+  } catch (const Error& error) {
+    return error.what();
+  }
+}
+
+// The receptance along an axis of the machine needs both directions of a turned station and the second
+// sensor.
+TEST(HammerSequence, StatesWhatATurnedStationLacks) {
   MachineModel model = ClosedFormMachine(1).model;
   const double half = 0.125 * units::PI;
   model.frames["hammer"] = {"machine", {{0, 0, 0}}, {{0.0, 0.0, std::sin(half), std::cos(half)}}};
-  try {
-    const HammerSequence sequence(HammerParameters(), model);
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("frames.hammer is turned, expected an aligned station"),
-              std::string::npos);
-  }
+  EXPECT_EQ(refusalOf({}, model), "");
+  HammerParameters without_cross;
+  without_cross.cross_frf = 0;
+  EXPECT_THAT(refusalOf(without_cross, model), ::testing::HasSubstr("cross_frf 0: frames.hammer of"));
+  MachineModel one_direction = model;
+  one_direction.hammer->position.erase("y");
+  EXPECT_THAT(refusalOf({}, one_direction), ::testing::HasSubstr("expected hammer.position_mm of x and y"));
+  MachineModel tilted = model;
+  tilted.frames["hammer"].rotation = {{std::sin(0.01), 0.0, 0.0, std::cos(0.01)}};
+  EXPECT_THAT(refusalOf({}, tilted), ::testing::HasSubstr("frames.hammer is tilted by 1.15 deg"));
+
+  ClosedFormMachine machine(7);
+  machine.model.frames["hammer"] = model.frames["hammer"];
+  machine.station_turn = 0.25 * units::PI;
+  HammerSequence sequence(HammerParameters(), machine.model);
+  const auto result = measure(machine, sequence, goalFor("x", machine.time));
+  EXPECT_EQ(result.code, FrfCode::bad_data) << result.message;
+  EXPECT_THAT(result.message, ::testing::HasSubstr("no cross FRF")) << result.message;
 }
 
 TEST(HammerSequence, StatesThatThereIsNoToolOrNoHammer) {

@@ -185,9 +185,9 @@ TEST(CutInformation, entropyIsHalfTheLogarithmOfTheDeterminant) {
 }
 
 }  // namespace
-// Through an inner corner at half immersion the immersion grows from 90 to 180 degrees and returns. The depth is
-// limited by the largest immersion, the information by all: at the same depth, feeds and time a slot, read in
-// the same parts, leaves smaller standard deviations of both coefficients.
+// Through an inner corner at half immersion the immersion grows from 90 to 180 degrees and returns. The depth
+// is limited by the largest immersion, the information by all: at the same depth, feeds and time a slot, read
+// in the same parts, leaves smaller standard deviations of both coefficients.
 TEST(CutInformation, ACornerIsLessInformativeThanASlotOfItsDepth) {
   constexpr int PARTS = 20;
   const auto covarianceOf = [](bool corner, bool up) {
@@ -196,7 +196,8 @@ TEST(CutInformation, ACornerIsLessInformativeThanASlotOfItsDepth) {
     for (const double feed : {5e-5, 1e-4, 2e-4}) {
       for (int k = 0; k < PARTS; ++k) {
         const double immersion = corner ? 180.0 - 90.0 * std::abs((2.0 * k + 1.0) / PARTS - 1.0) : 180.0;
-        const CuttingCondition part = up ? cut(0.0, immersion, 1e-3, feed) : cut(180.0 - immersion, 180.0, 1e-3, feed);
+        const CuttingCondition part =
+            up ? cut(0.0, immersion, 1e-3, feed) : cut(180.0 - immersion, 180.0, 1e-3, feed);
         information.addTest(part, spindle(), VOLT * std::sqrt(PARTS));
       }
     }
