@@ -6,10 +6,12 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <chrono>
+#include <functional>
 #include <stdexcept>
 #include <string>
+#include <thread>
 
-#include "smartmill_core/testing/eventually.h"
 #include "smartmill_focas/codec.h"
 
 namespace smartmill::focas {
@@ -46,6 +48,18 @@ inline std::string show(const Bytes& bytes) {
     text += DIGITS[byte & 15];
   }
   return text;
+}
+
+/// Waits until a condition is true; with a long time limit for slow computers.
+inline bool eventually(const std::function<bool()>& condition, double seconds = 120.0) {
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
+  while (!condition()) {
+    if (std::chrono::steady_clock::now() > deadline) {
+      return false;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return true;
 }
 
 inline sockaddr_in loopback(std::uint16_t port) {
