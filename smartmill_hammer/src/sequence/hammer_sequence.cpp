@@ -260,9 +260,7 @@ void HammerSequence::endPart(double now) {
   if (!axes.isTurned() || result.code != FrfCode::ok) return finish();
   if (result.cross.frf.size() == 0) {
     result.code = FrfCode::bad_data;
-    result.message +=
-        "; no cross FRF, from which the receptance along the machine's axis follows, since "
-        "frames.hammer is turned";
+    result.message += "; a turned station requires the cross FRF";
     return finish();
   }
   if (!first_part_) {

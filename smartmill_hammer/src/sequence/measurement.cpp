@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "smartmill_core/model/station_axes.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::hammer {
@@ -11,6 +12,7 @@ Measurement::Measurement(const HammerParameters& p, const MachineModel& model, c
       tool(*model.tool),
       goal(g),
       paths(p, model, g.direction),
+      turned(StationAxes(model).isTurned()),
       approach(
           station, tool,
           {p.sensor_face, p.curve_error, p.min_gap_share * station.gap_at_zero_volt, p.sensor_electrode}) {

@@ -67,6 +67,7 @@ class Measurement {
   const ToolGeometry& tool;
   const MeasureFrfGoal goal;
   const StationPaths paths;
+  const bool turned;  // the station, about z
 
   MeasureFrfResult result;
   std::optional<Feedback> feedback;

@@ -333,7 +333,7 @@ TEST(HammerSequence, StatesWhatATurnedStationLacks) {
   HammerSequence sequence(HammerParameters(), machine.model);
   const auto result = measure(machine, sequence, goalFor("x", machine.time));
   EXPECT_EQ(result.code, FrfCode::bad_data) << result.message;
-  EXPECT_THAT(result.message, ::testing::HasSubstr("no cross FRF")) << result.message;
+  EXPECT_THAT(result.message, ::testing::HasSubstr("expected the channel gap_cross")) << result.message;
 }
 
 TEST(HammerSequence, StatesThatThereIsNoToolOrNoHammer) {

@@ -26,6 +26,9 @@ class MoveToStation : public SequenceStep {
 
   bool watchesRange() const override { return true; }
   StepOutcome begin(double now) override {
+    if (measurement_.turned && !control_.hasCrossSensor())
+      return StepOutcome::failed(FrfCode::bad_data,
+                                 "daq/hammer: expected the channel gap_cross, since frames.hammer is turned");
     measurement_.report("moving to the hammer station " + measurement_.goal.direction, 0.05);
     measurement_.at_station = true;
     const Axes3 here = control_.position()->position;
