@@ -167,7 +167,7 @@ void StreamCheck::checkValues(SampleBlock& block) {
         continue;
       }
       if (++channel.run == 2) channel.was_noisy = channel.noisy[0] || channel.noisy[1];
-      if (channel.run >= long_run && channel.was_noisy) channel.stuck = true;
+      if (channel.run >= long_run && channel.was_noisy && source_ == Source::sensor) channel.stuck = true;
       if (!channel.stuck) continue;
       value = NOT_A_NUMBER;
       ++stuck;

@@ -116,6 +116,19 @@ TEST(StreamCheck, AChannelWithNoiseThatRepeatsOneValueIsStuck) {
   EXPECT_NE(line.find("channel fx repeats one value: stuck"), std::string::npos) << line;
 }
 
+// The current of a drive in a controller's record: digits that change while the axis moves and repeat at
+// rest.
+TEST(StreamCheck, AValueOfTheControllerRepeatsAtRest) {
+  StreamCheck check(StreamCheck::Source::controller);
+  const double after = announcedAfter(
+      check,
+      [](SampleBlock& block) {
+        for (std::size_t i = 0; i < SIZE; ++i) block.samples[2 * i] = 0.012;
+      },
+      nullptr);
+  EXPECT_TRUE(std::isnan(after));
+}
+
 TEST(StreamCheck, AQuietChannelIsNotStuck) {
   StreamCheck check;
   Blocks blocks;

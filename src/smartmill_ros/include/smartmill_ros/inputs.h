@@ -14,6 +14,7 @@
 #include <smartmill_msgs/Follow.h>
 #include <boost/function.hpp>
 
+#include "smartmill_core/names.h"
 #include "smartmill_core/signal/stream_check.h"
 #include "smartmill_core/signal/watchdog.h"
 #include "smartmill_ros/conversions.h"
@@ -31,7 +32,11 @@ constexpr double SENSOR_BEHIND = 0.4, RESULT_BEHIND = 2.0;
 /// State of one input of a node: time since the last message and last error of its handler.
 class InputHealth {
  public:
-  InputHealth(std::string topic, double timeout) : topic_(std::move(topic)), watchdog_(timeout) {}
+  InputHealth(std::string topic, double timeout)
+      : topic_(std::move(topic)),
+        watchdog_(timeout),
+        check_(topic_ == names::SERVO_RECORD ? StreamCheck::Source::controller
+                                             : StreamCheck::Source::sensor) {}
 
   /// Calls the handler of a message and catches its exceptions. @param now [s] wall time
   /// @return error for the log; empty: none, or logged recently

@@ -18,7 +18,7 @@ namespace smartmill {
 /// | fault | what happens to the data |
 /// |---|---|
 /// | sample not finite, or beyond every sensor (1e9 in SI units) | NaN: not measured |
-/// | channel that had noise and then repeats one value for 0.2 s | NaN until it changes |
+/// | channel of a sensor that had noise and then repeats one value for 0.2 s | NaN until it changes |
 /// | samples lost, index restarted | pass; the estimators see the index |
 /// | block or reading received twice | dropped |
 /// | stated rate differs from that of the stamps by more than 3 % | dropped from the second window of 0.2 s |
@@ -31,6 +31,10 @@ class StreamCheck {
  public:
   enum class Kind : std::uint8_t { value, stuck, gap, duplicate, rate, jump, angle };
   static constexpr std::size_t KINDS = 7;
+
+  /// Where the samples come from: values of a controller are digital and repeat at rest.
+  enum class Source : std::uint8_t { sensor, controller };
+  explicit StreamCheck(Source source = Source::sensor) : source_(source) {}
 
   /// @return whether the block is to be used
   bool check(SampleBlock& block);
@@ -78,6 +82,7 @@ class StreamCheck {
   void checkValues(SampleBlock& block);
   void checkAdvance(const SpindleAngle& reading);
 
+  Source source_;
   std::array<Episode, KINDS> episodes_;
   std::vector<std::string> lines_;
   double newest_ = NEVER;
