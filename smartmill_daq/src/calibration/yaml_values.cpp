@@ -28,10 +28,14 @@ void setValue(std::string& text, const YAML::Node& map, const std::string& key, 
     return;
   }
   const Place neighbour = *placeOf(map, after, text);
-  const bool flow = map.Style() == YAML::EmitterStyle::Flow;
-  // The value of the neighbour begins behind its key, a colon and a blank.
+  const std::size_t end = neighbour.at + neighbour.length;
+  if (map.Style() == YAML::EmitterStyle::Flow) {
+    text.insert(end, ", " + key + ": " + value);
+    return;
+  }
+  // The value of the neighbour begins behind its key, a colon and a blank; its comment stays on its line.
   const std::string indent(static_cast<std::size_t>(map[after].Mark().column) - after.size() - 2, ' ');
-  text.insert(neighbour.at + neighbour.length, (flow ? ", " : "\n" + indent) + key + ": " + value);
+  text.insert(std::min(text.find('\n', end), text.size()), "\n" + indent + key + ": " + value);
 }
 
 }  // namespace smartmill::daq
