@@ -194,7 +194,8 @@ TEST(AngleSelector, TheNextSourceTakesOverWithoutAStepAndTheBetterOneComesBack) 
   bench.run(15.0, 17.0, false, false, true);
   EXPECT_EQ(bench.selector.active(), std::size_t{2});
   EXPECT_TRUE(bench.selector.related());
-  bench.run(17.0, 19.0, true, true, true);
+  bench.run(17.0, 17.5, true, false, true);
+  bench.run(17.5, 19.0, true, true, true);
   EXPECT_EQ(bench.selector.active(), std::size_t{0});
   ASSERT_EQ(bench.changes.size(), 4u);
   EXPECT_EQ(bench.changes[0], "encoder");
