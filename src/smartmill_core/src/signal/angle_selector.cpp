@@ -30,6 +30,7 @@ std::vector<SpindleAngle> AngleSelector::push(std::size_t source, const SpindleA
   std::vector<SpindleAngle> out;
   if (reading.stamp <= entry.newest) return out;
   if (!(reading.stamp - entry.newest <= sources_[source].timeout)) {
+    entry.has_failed = std::isfinite(entry.newest);
     entry.since = reading.stamp;
     entry.recent.clear();
   }
@@ -83,8 +84,9 @@ void AngleSelector::choose(std::vector<SpindleAngle>& out) {
   std::optional<std::size_t> best;
   for (std::size_t s = 0; s < sources_.size(); ++s) {
     if (!works(s)) continue;
-    // A better one that has come back must have worked for a while.
-    const bool held = !active_ || s >= *active_ || !works(*active_) || now_ - entries_[s].since >= HOLD;
+    // A better one that has failed must have worked for a while.
+    const bool held = !active_ || s >= *active_ || !works(*active_) || !entries_[s].has_failed ||
+                      now_ - entries_[s].since >= HOLD;
     if (!held) continue;
     if (!best) best = s;
     if (entries_[s].angle_known) {

@@ -49,7 +49,10 @@ std::optional<OrderTracker::Reading> OrderTracker::push(const SampleBlock& block
       unlock();
     }
   }
-  if (teeth_ == 0 || speed_ <= 0.0) return {};
+  if (teeth_ == 0 || speed_ <= 0.0) {
+    samples_.clear();
+    return {};
+  }
   const double passing = static_cast<double>(teeth_) * speed_ / units::TWO_PI;
   const auto window = static_cast<std::size_t>(rate_ * std::max(parameters_.window, TOOTH_PERIODS / passing));
   if (samples_.size() < window) return {};

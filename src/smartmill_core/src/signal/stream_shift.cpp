@@ -264,7 +264,8 @@ SignalPair onCommonTimes(const SampledSignal& late, const SampledSignal& early, 
   if (late.values.empty() || early.values.empty()) return pair;
   const double begin = std::max(late.begin, early.begin), end = std::min(endOf(late), endOf(early));
   if (end < begin) return pair;
-  const auto samples = static_cast<std::size_t>((end - begin) * rate) + 1;
+  constexpr double ROUNDED = 1e-6;  // [samples] of stamps
+  const auto samples = static_cast<std::size_t>((end - begin) * rate + ROUNDED) + 1;
   for (std::size_t i = 0; i < samples; ++i) {
     const double time = begin + static_cast<double>(i) / rate;
     pair.late.push_back(valueAt(late, time, rate));

@@ -71,7 +71,7 @@ TEST(EncoderReader, ReversedCountersGapsJumpsAndNumbersThatAreNone) {
   reader.push(counts(500, 300, 1000.0, -SPEED));
   EXPECT_EQ(reader.takeFault(), "samples are missing");
   reader.push(counts(800, 300, 1000.0, -SPEED, 0.0, 5e6));
-  EXPECT_EQ(reader.takeFault().rfind("the counter has jumped by 5", 0), 0u);
+  EXPECT_EQ(reader.takeFault().rfind("the counter has jumped by ", 0), 0u);
   SampleBlock none = counts(1100, 300, 1000.0, -SPEED, 0.0, 5e6);
   none.samples[401] = NOT_A_NUMBER;
   EXPECT_FALSE(reader.push(none).empty());

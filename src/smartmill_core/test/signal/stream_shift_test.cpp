@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "smartmill_core/campaign/campaign.h"
+#include "smartmill_core/campaign/record.h"
 #include "smartmill_core/signal/derivative.h"
 #include "smartmill_core/testing/coverage.h"
 #include "smartmill_core/testing/shared_data.h"
@@ -37,7 +38,7 @@ SignalPair pairOf(double delay, double noise, double rate, std::uint64_t seed) {
   std::mt19937_64 random(seed + 1);
   std::normal_distribution<double> normal;
   SignalPair pair;
-  for (int i = 0; i < 2000; ++i) {
+  for (int i = 0; i < static_cast<int>(2.0 * rate); ++i) {
     const double t = i / rate;
     pair.early.push_back(motion.at(t));
     pair.late.push_back(-3.0 * (motion.at(t - delay) + noise * normal(random)));
@@ -60,13 +61,13 @@ TEST(StreamShift, CorrelationFindsTheDelayOfAnyScaleAndSign) {
   EXPECT_FALSE(shiftByCorrelation({unrelated}, RATE));
 }
 
-// Noise of the same strength as the signal, so that the rounding to a sample is the smaller part.
+// Noise six times as strong as the signal, so that the rounding to a sample is the smaller part.
 TEST(StreamShift, CorrelationStatesItsScatter) {
-  constexpr double RATE = 1000.0;
+  constexpr double RATE = 4000.0;
   Coverage coverage;
   for (int draw = 0; draw < Coverage::RUNS; ++draw) {
-    const auto shift = shiftByCorrelation({pairOf(0.0514, 3.0, RATE, 100u + static_cast<unsigned>(draw))},
-                                          RATE, {0.3, 0.05, 0.7, 0.5});
+    const auto shift = shiftByCorrelation({pairOf(0.0514, 6.0, RATE, 100u + static_cast<unsigned>(draw))},
+                                          RATE, {0.3, 0.005, 0.7, 0.5});
     if (shift) coverage.add(shift->delay - 0.0514, shift->std_dev);
   }
   EXPECT_TRUE(coverage.isCalibrated());

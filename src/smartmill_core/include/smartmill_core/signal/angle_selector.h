@@ -16,10 +16,10 @@ namespace smartmill {
 /// The spindle angle of the best source that works.
 ///
 /// Sources are ordered, the best first. One that gives no reading for its time-out fails and the next one
-/// takes over, with the readings that it has given since the last published one; a better source that has
-/// worked again for HOLD takes over in its turn. While another source is used, the difference of the angles
-/// is averaged; a source that takes over is turned by it, so that the angle continues. Time is that of the
-/// stamps; a backward jump begins anew.
+/// takes over, with the readings that it has given since the last published one; a better source takes over
+/// at once, but after a failure only when it has worked for HOLD. While another source is used, the
+/// difference of the angles is averaged; a source that takes over is turned by it, so that the angle
+/// continues. Time is that of the stamps; a backward jump begins anew.
 class AngleSelector {
  public:
   struct Source {
@@ -60,7 +60,7 @@ class AngleSelector {
  private:
   struct Entry {
     double newest = -std::numeric_limits<double>::infinity(), since = 0.0;  // [s]
-    bool angle_known = false;
+    bool angle_known = false, has_failed = false;
     std::deque<SpindleAngle> recent;     // of the last time-out
     std::complex<double> difference;     // weighted sum of unit vectors
     double weight = 0.0, squares = 0.0;  // sums of weights and of their squares
