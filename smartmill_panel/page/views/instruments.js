@@ -8,6 +8,7 @@ const PPM = 1e6;
 const UNITS = ['V', 'N', 'N m', 'm/s2', 'm/s', 'm', 'A', 'rad', 'Pa', '1'];
 const COUPLINGS = ['dc', 'ac', 'iepe'];
 const DAY = 86400e3;        // [ms]
+const DYNAMOMETER = 'daq/dynamometer';  // whose forces are turned into the machine's frame
 
 const dim = text => make('span', { class: 'dim' }, text);
 const word = (kind, text) => make('span', { class: `word ${kind}` }, text);
@@ -45,8 +46,7 @@ export class Instruments {
     const all = [...this.found.values()].sort((a, b) => a.node.localeCompare(b.node));
     const parts = all.filter(one => one.kind === 'instrument').flatMap(one => this.instrument(one, all.filter(other => other.kind === 'channel' && other.node === one.node)));
     const rest = all.filter(one => one.kind === 'alignment' || one.kind === 'spindle angle');
-    if (rest.length) parts.push(table(['', '', ''], rest.map(one => [one.kind === 'alignment' ? `Alignment ${one.name}` : 'Spindle angle', this.state(one),
-      dim([...one.values].filter(([key]) => /\[/.test(key)).map(([key, value]) => `${key} ${digits(+value, 4)}`).join(', '))]), { id: 'alignments' }));
+    if (rest.length) parts.push(table(['', ''], rest.map(one => [one.kind === 'alignment' ? `Alignment ${one.name}` : 'Spindle angle', this.state(one)]), { id: 'alignments' }));
     if (parts.length) this.place.replaceChildren(...parts);
   }
 
@@ -73,7 +73,7 @@ export class Instruments {
     const unit = one.values.get('unit') ?? '', v = key => +(one.values.get(key) ?? NaN);
     const clipped = v('samples clipped');
     return [one.name, this.state(one), bar(v('peak [share of the range]'), one.level > 0), `${digits(v(`mean [${unit}]`), 4)} ${unit}`, `${digits(v(`rms [${unit}]`), 4)} ${unit}`,
-      clipped > 0 ? word('bad', `${clipped}`) : '0', `${withDeviation(v(`sensitivity [V/${unit}]`), v('standard deviation of the sensitivity'))} V/(${unit})`,
+      clipped > 0 ? word('bad', `${clipped}`) : '0', `${withDeviation(v(`sensitivity [V/${unit}]`), v('standard deviation of the sensitivity'))} V/${/[ /]/.test(unit) ? `(${unit})` : unit}`,
       dim(sensitivityDate(one.values.get('date of the sensitivity')))];
   }
 }
@@ -179,7 +179,9 @@ export class FirstConnection {
     if (options.length) lines.push(`options: {${options.join(', ')}}`);
     lines.push(`sample_rate: ${this.rate.value}   # [Hz]`, 'streams:');
     for (const topic of new Set(this.channels.map(c => c.topic.value))) {
-      lines.push(`  - topic: ${yaml(topic)}`, '    channels:');
+      lines.push(`  - topic: ${yaml(topic)}`);
+      if (topic === DYNAMOMETER) lines.push('    frame: dynamometer   # tf2 frame of the sensor');
+      lines.push('    channels:');
       for (const c of this.channels.filter(one => one.topic.value === topic))
         lines.push(`      - {input: ${yaml(c.input.value)}, name: ${yaml(c.name.value)}, unit: ${yaml(c.unit.value)}, sensitivity: ${c.sensitivity.value}, range: ${c.range.value}, coupling: ${c.coupling.value}}`);
     }
