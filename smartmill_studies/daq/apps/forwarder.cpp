@@ -6,10 +6,11 @@
 //   rosrun smartmill_studies daq_forwarder _input:=daq/dynamometer _pipe:=/tmp/forces _full_scale:=1.0e6
 #include <array>
 #include <charconv>
+#include <chrono>
 #include <condition_variable>
 #include <csignal>
 #include <deque>
-#include <memory>
+#include <functional>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -31,19 +32,12 @@ namespace {
 
 using namespace smartmill;
 
-/// Serves one connection at a time on the loopback interface; what comes without one is lost, as in a device.
-class FrameServer {
+/// Writes to one reader at a time; what comes without one is lost, as in a device.
+class StreamWriter {
  public:
-  explicit FrameServer(int port) : listener_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_port = htons(static_cast<std::uint16_t>(port));
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    const int on = 1;
-    ::setsockopt(listener_, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-    if (::bind(listener_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
-        ::listen(listener_, 1) != 0)
-      throw Error("cannot listen on port " + std::to_string(port));
+  /// @param open waits for a reader and returns its descriptor
+  explicit StreamWriter(std::function<int()> open) : open_(std::move(open)) {
+    std::signal(SIGPIPE, SIG_IGN);
     std::thread([this] { run(); }).detach();  // ends with the process
   }
 
@@ -52,33 +46,30 @@ class FrameServer {
     if (connected_) waiting_.push_back(std::move(bytes));
     changed_.notify_one();
   }
-  bool connected() {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    return connected_;
-  }
 
  private:
   void run() {
     while (true) {
-      const int socket = ::accept(listener_, nullptr, nullptr);
-      if (socket < 0) continue;
-      const int on = 1;
-      ::setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+      const int reader = open_();
+      if (reader < 0) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+        continue;
+      }
       setConnected(true);
-      while (sendNext(socket)) {
+      while (sendNext(reader)) {
       }
       setConnected(false);
-      ::close(socket);
+      ::close(reader);
     }
   }
-  bool sendNext(int socket) {
+  bool sendNext(int reader) {
     std::unique_lock<std::mutex> lock(mutex_);
     changed_.wait(lock, [this] { return !waiting_.empty(); });
     const std::string bytes = std::move(waiting_.front());
     waiting_.pop_front();
     lock.unlock();
     for (std::size_t at = 0; at < bytes.size();) {
-      const ssize_t sent = ::send(socket, bytes.data() + at, bytes.size() - at, MSG_NOSIGNAL);
+      const ssize_t sent = ::write(reader, bytes.data() + at, bytes.size() - at);
       if (sent <= 0) return false;
       at += static_cast<std::size_t>(sent);
     }
@@ -90,63 +81,36 @@ class FrameServer {
     waiting_.clear();
   }
 
-  int listener_;
+  std::function<int()> open_;
   std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<std::string> waiting_;
   bool connected_ = false;
 };
 
-/// Writes into a named pipe once a reader has opened it; what comes without one is lost, as in a device.
-class PipeWriter {
- public:
-  explicit PipeWriter(std::string path) : path_(std::move(path)) {
-    ::signal(SIGPIPE, SIG_IGN);
-    std::thread([this] { run(); }).detach();  // ends with the process
-  }
-  void send(std::string bytes) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    if (open_) waiting_.push_back(std::move(bytes));
-    changed_.notify_one();
-  }
+/// A server on the loopback interface.
+std::function<int()> connectionsOf(int port) {
+  const int listener = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(static_cast<std::uint16_t>(port));
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  const int on = 1;
+  ::setsockopt(listener, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+  if (::bind(listener, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
+      ::listen(listener, 1) != 0)
+    throw Error("cannot listen on port " + std::to_string(port));
+  return [listener] {
+    const int socket = ::accept(listener, nullptr, nullptr);
+    const int at_once = 1;
+    ::setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &at_once, sizeof at_once);
+    return socket;
+  };
+}
 
- private:
-  void run() {
-    while (true) {
-      const int pipe = ::open(path_.c_str(), O_WRONLY | O_CLOEXEC);  // waits for a reader
-      if (pipe < 0) throw Error(path_ + ": cannot be opened");
-      setOpen(true);
-      while (writeNext(pipe)) {
-      }
-      setOpen(false);
-      ::close(pipe);
-    }
-  }
-  bool writeNext(int pipe) {
-    std::unique_lock<std::mutex> lock(mutex_);
-    changed_.wait(lock, [this] { return !waiting_.empty(); });
-    const std::string bytes = std::move(waiting_.front());
-    waiting_.pop_front();
-    lock.unlock();
-    for (std::size_t at = 0; at < bytes.size();) {
-      const ssize_t written = ::write(pipe, bytes.data() + at, bytes.size() - at);
-      if (written <= 0) return false;
-      at += static_cast<std::size_t>(written);
-    }
-    return true;
-  }
-  void setOpen(bool open) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    open_ = open;
-    waiting_.clear();
-  }
-
-  std::string path_;
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::deque<std::string> waiting_;
-  bool open_ = false;
-};
+std::function<int()> readersOf(const std::string& pipe) {
+  return [pipe] { return ::open(pipe.c_str(), O_WRONLY | O_CLOEXEC); };
+}
 
 /// @param full_scale [unit] of float32 samples; 0: rows of numbers
 std::string streamOf(const smartmill_msgs::SampleBlock& message, double full_scale) {
@@ -184,21 +148,11 @@ int main(int argc, char** argv) {
   try {
     const auto pipe = private_nh.param<std::string>("pipe", "");
     const double full_scale = private_nh.param("full_scale", 0.0);
-    std::unique_ptr<PipeWriter> writer;
-    std::unique_ptr<FrameServer> server;
-    if (pipe.empty()) {
-      server = std::make_unique<FrameServer>(private_nh.param("port", 5045));
-    } else {
-      writer = std::make_unique<PipeWriter>(pipe);
-    }
+    StreamWriter writer(pipe.empty() ? connectionsOf(private_nh.param("port", 5045)) : readersOf(pipe));
     const auto input = nh.subscribe<smartmill_msgs::SampleBlock>(
         private_nh.param<std::string>("input", "daq/dynamometer"), STREAM_QUEUE,
         [&](const smartmill_msgs::SampleBlock::ConstPtr& message) {
-          if (writer) {
-            writer->send(streamOf(*message, full_scale));
-          } else {
-            server->send(frameOf(*message));
-          }
+          writer.send(pipe.empty() ? frameOf(*message) : streamOf(*message, full_scale));
         });
     ros::spin();
   } catch (const std::exception& error) {
