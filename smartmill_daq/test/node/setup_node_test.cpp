@@ -81,6 +81,7 @@ TEST(SetupNode, WhatItWritesIsWhatDaqNodeReads) {
   attempt.request.file = "bench";
   ASSERT_TRUE(call());
   EXPECT_EQ(attempt.response.code, TryInstrument::Response::OK) << attempt.response.message;
+  const std::string path = attempt.response.path;
   ASSERT_TRUE(call());
   EXPECT_EQ(attempt.response.code, TryInstrument::Response::NOT_WRITTEN);
 
@@ -114,9 +115,8 @@ TEST(SetupNode, WhatItWritesIsWhatDaqNodeReads) {
           for (const auto& value : status.values) channel += "|" + value.key + "=" + value.value;
         }
       });
-  const testing::Child node(
-      {DAQ_NODE, "__ns:=/smartmill", "__name:=daq", "_instrument:=" + attempt.response.path}, {},
-      folder.file("daq_log"));
+  const testing::Child node({DAQ_NODE, "__ns:=/smartmill", "__name:=daq", "_instrument:=" + path}, {},
+                            folder.file("daq_log"));
   const auto value = [&](const std::string& key) {
     const std::size_t at = channel.find("|" + key + "=");
     return at == std::string::npos ? std::string() : channel.substr(at + key.size() + 2, 8);
