@@ -85,21 +85,18 @@ started+=($!)
 record() { # SECONDS FILE
   timeout -s INT "$1" devel/env.sh rosrun smartmill_launch record -o "$2" '/smartmill/(daq|device)/.*' >"$out/record.log" 2>&1 || true
 }
-# The latency, then what is left of it after a restart of daq_node.
-sleep "${SETTLE:-15}"
-for round in 1 2 3; do
-  record 15 "$out/align_$round.bag"
-  for name in dynamometer/fx hammer/hammer; do
-    write=()
-    [ "$round" = 3 ] || write=(--write "$out/${name%/*}.yaml")
-    devel/env.sh rosrun smartmill_daq align "$out/align_$round.bag" "daq/$name" "device/$name" --by correlation "${write[@]}" |
-      sed "s/^/round $round: /" | tee -a "$out/align.txt"
-  done
-  [ "$round" = 3 ] || {
-    devel/env.sh rosnode kill /smartmill/daq_dynamometer /smartmill/daq_hammer >/dev/null   # roslaunch starts them again
-    sleep 10
-  }
-done
+align() { # RECORD NAME/CHANNEL OPTION...
+  devel/env.sh rosrun smartmill_daq align "$1" "daq/$2" "device/$2" --by correlation "${@:3}" 2>&1 | tee -a "$out/align.txt"
+}
+# The line of the arrivals settles for half a minute. The latency, then what is left of it after a restart of daq_node.
+rm -f "$out/align.txt"
+sleep "${SETTLE:-30}"
+record 15 "$out/align_before.bag"
+for name in dynamometer/fx hammer/hammer; do align "$out/align_before.bag" "$name" --write "$out/${name%/*}.yaml"; done
+devel/env.sh rosnode kill /smartmill/daq_dynamometer /smartmill/daq_hammer >/dev/null   # roslaunch starts them again
+sleep "${SETTLE:-30}"
+record 12 "$out/align_after.bag"
+for name in dynamometer/fx hammer/hammer; do align "$out/align_after.bag" "$name" || true; done
 devel/env.sh roslaunch -p "$master" smartmill_studies/daq/launch/session_on_machine.launch port:="$focas" bag:="$out/session.bag" \
   summary:="$out/session.json" >"$out/session.log" 2>&1 || true
 grep -aoE "session \[.*|\[(WARN|ERROR|FATAL)\].*" "$out/session.log" "$out/machine.log" || true

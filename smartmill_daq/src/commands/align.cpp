@@ -44,8 +44,10 @@ int run(const Arguments& arguments) {
   alignment.finish();
   std::printf("%s\n", alignmentText(alignment).c_str());
   if (!alignment.state()) return NO_SHIFT;
-  if (const std::string change = alignment.takeChange(); !change.empty())
-    throw Error(arguments.record + ": " + change);
+  const std::string change = alignment.takeChange();
+  if (!change.empty() && !arguments.config.empty())
+    throw Error(arguments.record + ": " + change + "; a shift that changes is not stored");
+  if (!change.empty()) std::fprintf(stderr, "%s\n", change.c_str());
   if (!arguments.config.empty()) {
     const double latency = storeLatency(arguments.config, alignment.state()->shift);
     std::printf("latency %.6f s stored in %s\n", latency, arguments.config.c_str());
