@@ -9,13 +9,17 @@
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/signal/derivative.h"
+#include "smartmill_daq/clock/sample_clock.h"
 
 namespace smartmill::daq {
 namespace {
 
-constexpr double MOTION_RATE = 10.0;   // [1] common samples per state of the controller
-constexpr double CONTRADICTION = 5.0;  // standard deviations
-constexpr double MILLI = 1e-3;         // [s]
+constexpr double MOTION_RATE = 10.0;  // [1] common samples per state of the controller
+// A record contradicts those before it beyond both: the line of a counted clock wanders by less than what
+// counts as a jump of it.
+constexpr double CONTRADICTION = 5.0;                      // standard deviations
+const double CLOCK_WANDER = SampleClockParameters().jump;  // [s]
+constexpr double MILLI = 1e-3;                             // [s]
 
 std::optional<Alignment> byMotion(const SampledSignal& late, const SampledSignal& position,
                                   const StreamShiftOptions& options) {
@@ -116,7 +120,8 @@ void StreamAlignment::combine(const Alignment& found) {
   ++shown_;
   const double uncertainty =
       state_ ? std::hypot(state_->shift.std_dev, found.shift.std_dev) : found.shift.std_dev;
-  if (state_ && std::abs(found.shift.delay - state_->shift.delay) > CONTRADICTION * uncertainty) {
+  const double apart = state_ ? std::abs(found.shift.delay - state_->shift.delay) : 0.0;
+  if (apart > std::max(CONTRADICTION * uncertainty, CLOCK_WANDER)) {
     change_ = formatted("the shift of %s to %s has changed from %.3f ms to %.3f ms", late_.text().c_str(),
                         early_.text().c_str(), state_->shift.delay / MILLI, found.shift.delay / MILLI);
     state_.reset();
@@ -124,13 +129,21 @@ void StreamAlignment::combine(const Alignment& found) {
   }
   if (!state_ || state_->method != found.method) {
     // Of another method only where it is better.
-    if (!state_ || found.shift.std_dev < state_->shift.std_dev) state_ = found;
-    return;
+    if (state_ && found.shift.std_dev >= state_->shift.std_dev) return;
+    state_ = found;
+    sums_ = {};
   }
+  const double weight = std::pow(found.shift.std_dev, -2), delay = found.shift.delay;
+  sums_[0] += 1.0;
+  sums_[1] += weight;
+  sums_[2] += weight * delay;
+  sums_[3] += weight * delay * delay;
+  if (sums_[0] < 2.0) return;
   StreamShift& shift = state_->shift;
-  const double old_weight = std::pow(shift.std_dev, -2), weight = std::pow(found.shift.std_dev, -2);
-  shift.delay = (old_weight * shift.delay + weight * found.shift.delay) / (old_weight + weight);
-  shift.std_dev = 1.0 / std::sqrt(old_weight + weight);
+  shift.delay = sums_[2] / sums_[1];
+  // Records that scatter by more than they state: Birge ratio.
+  const double ratio = (sums_[3] - sums_[2] * shift.delay) / (sums_[0] - 1.0);
+  shift.std_dev = std::sqrt(std::max(1.0, ratio) / sums_[1]);
   shift.explained = std::max(shift.explained, found.shift.explained);
   shift.events += found.shift.events;
 }

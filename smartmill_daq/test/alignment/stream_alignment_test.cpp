@@ -98,6 +98,22 @@ TEST(StreamAlignment, AShiftThatChangesIsAnnouncedAndBeginsAnew) {
   EXPECT_NEAR(alignment.state()->shift.delay, 0.0143, 30e-6);
 }
 
+// A clock whose line wanders by 0.2 ms from record to record, where each record alone states microseconds.
+TEST(StreamAlignment, TheScatterBetweenRecordsIsInTheStandardDeviation) {
+  Device hammer("daq/hammer", "hammer", 10000.0, 0.0, 1), force("daq/dynamometer", "fz", 10000.0, 0.0, 2);
+  StreamAlignment alignment(SignalName("daq/hammer/hammer"), SignalName("daq/dynamometer/fz"));
+  for (double t = START; t < START + 31.0; t += 0.1) {
+    hammer.setDelay(t < START + 10.2 ? 0.0041 : t < START + 20.4 ? 0.0043 : 0.0045);
+    hammer.run(t, tap, 0.5, alignment);
+    force.run(t + 0.05, tap, 0.5, alignment);
+  }
+  ASSERT_TRUE(alignment.state());
+  EXPECT_EQ(alignment.takeChange(), "");
+  EXPECT_NEAR(alignment.state()->shift.delay, 0.0043, 0.0001);
+  // 0.2 ms between three records: 0.2 ms / sqrt(3).
+  EXPECT_NEAR(alignment.state()->shift.std_dev, 0.2e-3 / std::sqrt(3.0), 0.06e-3);
+}
+
 TEST(StreamAlignment, GapsAndMissingSamplesAreNotBridged) {
   Device hammer("daq/hammer", "hammer", 10000.0, 0.002, 1), force("daq/dynamometer", "fz", 10000.0, 0.0, 2);
   StreamAlignment alignment(SignalName("daq/hammer/hammer"), SignalName("daq/dynamometer/fz"));

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -44,8 +45,9 @@ struct AlignmentOptions {
 std::optional<Alignment> align(const SampledSignal& late, const SampledSignal& early, bool early_is_position,
                                const AlignmentOptions& options);
 
-/// Shift between two streams, estimated record by record and combined by the inverse variances; begins anew
-/// where a record contradicts. Time is that of the stamps.
+/// Shift between two streams, estimated record by record and combined by the inverse variances; its standard
+/// deviation contains the scatter between records (R. T. Birge, Phys. Rev. 40, 1932), to which the clocks of
+/// the devices add. Begins anew where a record contradicts. Time is that of the stamps.
 class StreamAlignment {
  public:
   /// @throws Error when the late signal is one of the controller
@@ -89,6 +91,7 @@ class StreamAlignment {
   AlignmentOptions options_;
   Window late_window_, early_window_;
   std::optional<Alignment> state_;
+  std::array<double, 4> sums_{};  // of the records: number, weights, weighted shifts and their squares
   std::size_t records_ = 0, shown_ = 0;
   std::string change_;
 };
