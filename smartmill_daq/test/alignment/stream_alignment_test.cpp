@@ -109,9 +109,10 @@ TEST(StreamAlignment, TheScatterBetweenRecordsIsInTheStandardDeviation) {
   }
   ASSERT_TRUE(alignment.state());
   EXPECT_EQ(alignment.takeChange(), "");
-  EXPECT_NEAR(alignment.state()->shift.delay, 0.0043, 0.0001);
-  // 0.2 ms between three records: 0.2 ms / sqrt(3).
-  EXPECT_NEAR(alignment.state()->shift.std_dev, 0.2e-3 / std::sqrt(3.0), 0.06e-3);
+  // 0.2 ms between three records: about 0.2 ms / sqrt(3), by the weights that the records have.
+  EXPECT_NEAR(alignment.state()->shift.delay, 0.0043, 2.0 * 0.2e-3 / std::sqrt(3.0));
+  EXPECT_GT(alignment.state()->shift.std_dev, 0.04e-3);
+  EXPECT_LT(alignment.state()->shift.std_dev, 0.25e-3);
 }
 
 TEST(StreamAlignment, GapsAndMissingSamplesAreNotBridged) {
