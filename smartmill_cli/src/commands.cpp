@@ -24,7 +24,7 @@ CommandProgram smartmillProgram() {
       "Measured and simulated milling: dynamics, forces, stability, and what a machine model lacks.";
   program.version = version();
   program.topics = {
-      {"Instruments", {daq::daqCommand(), daq::sensitivityCommand()}},
+      {"Instruments", {daq::daqCommand(), daq::sensitivityCommand(), daq::alignCommand()}},
       {"Records",
        {discrepancy::campaignCommand(), recording::convertCommand(), recording::exportCommand(),
         recording::accountCommand(), exchange::itemsCommand()}},

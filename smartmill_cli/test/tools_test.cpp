@@ -100,6 +100,7 @@ TEST(Tools, DoWhatTheirCommandsDoToMeasuredRecords) {
   SMARTMILL_SHARED_DATA(moves, "measured/axis_motion");
   expectSame("axis-drive", moves);
   expectSame("daq", "nowhere.yaml", 1);  // its output has times
+  expectSame("align", "nowhere.bag daq/hammer/hammer daq/dynamometer/fz", 1);
   expectSame("sensitivity", "nowhere.yaml daq/vibration x nowhere.bag --exciter 10", 1);
   expectSame("frf", hits + "/*.csv -o out --no-picture");
   expectSame("detect", sound + " --speed 8018 --teeth 4 -o picture.png");

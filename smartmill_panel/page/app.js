@@ -12,11 +12,12 @@ import { Commands } from './views/commands.js';
 import { Knowledge } from './views/knowledge.js';
 import { Discrepancy, Report, Database, Diagnostics, ForceSensor } from './views/model.js';
 import { Fleet } from './views/fleet.js';
+import { FirstConnection, Instruments } from './views/instruments.js';
 
 const REFRESH = 100;  // [ms]
 
 const VIEWS = {
-  overview: 'Overview', forces: 'Forces', stability: 'Stability', dynamics: 'Dynamics', session: 'Session', model: 'Model', fleet: 'Fleet',
+  overview: 'Overview', forces: 'Forces', stability: 'Stability', dynamics: 'Dynamics', session: 'Session', model: 'Model', instruments: 'Instruments', fleet: 'Fleet',
 };
 
 // A card with a title.
@@ -137,6 +138,8 @@ class Page {
       this.add('model', element, build(element));
     }
 
+    this.add('instruments', null, new Instruments(this.views.instruments, link, card));
+    this.add('instruments', null, new FirstConnection(this.views.instruments, card, this.config));
     this.add('fleet', null, new Fleet(this.views.fleet, link, card));
   }
 

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <string>
 
+#include "node/angle_parameters.h"
 #include "node/parameters.h"
 #include "node/tachometer_parameters.h"
 #include "smartmill_core/error.h"
@@ -69,6 +70,10 @@ TEST(TachometerParameters, ShippedFileMatchesTheTable) {
   TachometerNodeParameters parameters;
   parameters.input.clear();
   EXPECT_THROW(parameters.validate(), Error);
+}
+
+TEST(AngleParameters, ShippedFileMatchesTheTable) {
+  expectShipped<AngleNodeParameters>("../launch/config/angle.yaml", "smartmill_cnc angle_node");
 }
 
 }  // namespace

@@ -1,8 +1,10 @@
 #include "smartmill_daq/calibration/sensitivity.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <complex>
+#include <ctime>
 #include <utility>
 
 #include "smartmill_core/error.h"
@@ -179,6 +181,28 @@ ReadingRatio ratioByHits(const std::vector<double>& force, const std::vector<dou
   if (ratios.size() < LEAST_PIECES)
     throw Error(formatted("%zu hits: expected %zu or more", ratios.size(), LEAST_PIECES));
   return ratioOf(ratios);
+}
+
+NewSensitivity sensitivityOf(const Channel& channel, const ReadingRatio& ratio, double reference_std) {
+  const double value = channel.sensitivity * ratio.value;
+  return {value, std::abs(value) * std::hypot(ratio.std_dev / ratio.value, reference_std),
+          channel.sensitivity, channel.unit, ratio.parts};
+}
+
+std::string sensitivityText(const std::string& channel, const NewSensitivity& sensitivity) {
+  return formatted("%s: %.6g +- %.2g V/(%s), so far %.6g (%+.2f %%), from %zu parts of the record",
+                   channel.c_str(), sensitivity.value, sensitivity.std_dev, sensitivity.unit.c_str(),
+                   sensitivity.before, 100.0 * (sensitivity.value / sensitivity.before - 1.0),
+                   sensitivity.parts);
+}
+
+std::string today() {
+  const std::time_t now = std::time(nullptr);
+  std::tm local{};
+  ::localtime_r(&now, &local);
+  std::array<char, 11> text{};
+  std::strftime(text.data(), text.size(), "%Y-%m-%d", &local);
+  return text.data();
 }
 
 }  // namespace smartmill::daq

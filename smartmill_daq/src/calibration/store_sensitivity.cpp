@@ -1,9 +1,8 @@
 #include <yaml-cpp/yaml.h>
 
-#include <algorithm>
 #include <cmath>
-#include <optional>
 
+#include "calibration/yaml_values.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/io/text_file.h"
@@ -14,11 +13,6 @@
 namespace smartmill::daq {
 namespace {
 
-/// Position of the text of a value in the file.
-struct Place {
-  std::size_t at = 0, length = 0;
-};
-
 YAML::Node channelNode(const YAML::Node& root, const std::string& topic, const std::string& name) {
   for (const YAML::Node& stream : root["streams"]) {
     if (stream["topic"].as<std::string>() != topic) continue;
@@ -27,14 +21,6 @@ YAML::Node channelNode(const YAML::Node& root, const std::string& topic, const s
     }
   }
   return {};
-}
-
-std::optional<Place> placeOf(const YAML::Node& channel, const char* key, const std::string& text) {
-  const YAML::Node value = channel[key];
-  if (!value) return std::nullopt;
-  const auto at = static_cast<std::size_t>(value.Mark().pos);
-  const std::size_t end = std::min(text.find_first_of(",}# \t\r\n", at), text.size());
-  return Place{at, end - at};
 }
 
 }  // namespace
@@ -49,15 +35,7 @@ void storeSensitivity(const std::string& file, const std::string& topic, const s
                                                                 {"sensitivity_std", yamlNumber(std_dev, 4)},
                                                                 {"sensitivity", yamlNumber(sensitivity, 6)}};
   for (const auto& [key, value] : values) {
-    const YAML::Node node = channelNode(YAML::Load(text), topic, channel);
-    if (const auto place = placeOf(node, key, text)) {
-      text.replace(place->at, place->length, value);
-      continue;
-    }
-    const Place after = *placeOf(node, "sensitivity", text);
-    const bool flow = node.Style() == YAML::EmitterStyle::Flow;
-    const std::string indent(static_cast<std::size_t>(node["sensitivity"].Mark().column) - 13, ' ');
-    text.insert(after.at + after.length, (flow ? ", " : "\n" + indent) + key + ": " + value);
+    setValue(text, channelNode(YAML::Load(text), topic, channel), key, value, "sensitivity");
   }
   writeText(file, text);
   try {

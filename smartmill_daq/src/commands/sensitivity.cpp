@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <ctime>
 #include <string>
 #include <vector>
 
@@ -15,11 +14,10 @@
 namespace smartmill::daq {
 namespace {
 
-constexpr double STANDARD_GRAVITY = 9.80665;  // [m/s2] ISO 80000-3
-
 struct Arguments {
   std::string config, topic, channel, record, empty, accelerometer, date;
-  double exciter = 0.0, frequency = 159.155, mass = 0.0, gravity = STANDARD_GRAVITY, reference_std = 0.0;
+  double exciter = 0.0, frequency = EXCITER_FREQUENCY, mass = 0.0, gravity = STANDARD_GRAVITY,
+         reference_std = 0.0;
   bool write = false, upwards = false;
 };
 
@@ -62,24 +60,14 @@ ReadingRatio ratioBy(const Arguments& arguments) {
   return ratioByHits(samples.values, acceleration.values, samples.rate, arguments.mass);
 }
 
-std::string today() {
-  const std::time_t now = std::time(nullptr);
-  char text[11];
-  std::strftime(text, sizeof text, "%Y-%m-%d", std::localtime(&now));
-  return text;
-}
-
 void run(const Arguments& arguments) {
   const Channel channel = readChannel(arguments.config, arguments.topic, arguments.channel);
   const ReadingRatio ratio = ratioBy(arguments);
-  const double relative = std::hypot(ratio.std_dev / ratio.value, arguments.reference_std);
-  const double sensitivity = channel.sensitivity * ratio.value, std_dev = std::abs(sensitivity) * relative;
-  std::printf("%s: %.6g +- %.2g V/(%s), so far %.6g (%+.2f %%), from %zu parts of the record\n",
-              channel.name.c_str(), sensitivity, std_dev, channel.unit.c_str(), channel.sensitivity,
-              100.0 * (ratio.value - 1.0), ratio.parts);
+  const NewSensitivity sensitivity = sensitivityOf(channel, ratio, arguments.reference_std);
+  std::printf("%s\n", sensitivityText(channel.name, sensitivity).c_str());
   if (!arguments.write) return;
-  storeSensitivity(arguments.config, arguments.topic, arguments.channel, sensitivity, std_dev,
-                   arguments.date.empty() ? today() : arguments.date);
+  storeSensitivity(arguments.config, arguments.topic, arguments.channel, sensitivity.value,
+                   sensitivity.std_dev, arguments.date.empty() ? today() : arguments.date);
   std::printf("stored in %s\n", arguments.config.c_str());
 }
 

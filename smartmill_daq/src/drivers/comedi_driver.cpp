@@ -152,7 +152,10 @@ class ComediDriver : public Driver {
 }  // namespace
 
 DriverKind comediDriver() {
-  return {"comedi", [](const DriverSetup& setup) { return std::make_unique<ComediDriver>(setup); }};
+  return {"comedi",
+          [](const DriverSetup& setup) { return std::make_unique<ComediDriver>(setup); },
+          {{"device", "file of the card, for example /dev/comedi0"},
+           {"reference", "ground (default) or differential"}}};
 }
 
 }  // namespace smartmill::daq

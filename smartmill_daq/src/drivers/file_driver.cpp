@@ -287,7 +287,11 @@ std::unique_ptr<Driver> make(const DriverSetup& setup) {
 }  // namespace
 
 DriverKind fileDriver() {
-  return {"file", make};
+  return {"file",
+          make,
+          {{"path", "measurement file, named pipe, or - for standard input"},
+           {"topic", "of a recording, for example daq/dynamometer"},
+           {"repeat", "true: the file is played again and again"}}};
 }
 
 }  // namespace smartmill::daq

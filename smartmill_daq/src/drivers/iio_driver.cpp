@@ -135,7 +135,9 @@ class IioDriver : public Driver {
 }  // namespace
 
 DriverKind iioDriver() {
-  return {"iio", [](const DriverSetup& setup) { return std::make_unique<IioDriver>(setup); }};
+  return {"iio",
+          [](const DriverSetup& setup) { return std::make_unique<IioDriver>(setup); },
+          {{"uri", "context, for example local: or ip:192.168.2.1"}, {"device", "name of the converter"}}};
 }
 
 }  // namespace smartmill::daq

@@ -176,7 +176,9 @@ class SigrokDriver : public Driver {
 }  // namespace
 
 DriverKind sigrokDriver() {
-  return {"sigrok", [](const DriverSetup& setup) { return std::make_unique<SigrokDriver>(setup); }};
+  return {"sigrok",
+          [](const DriverSetup& setup) { return std::make_unique<SigrokDriver>(setup); },
+          {{"device", "driver of libsigrok, for example demo"}}};
 }
 
 }  // namespace smartmill::daq

@@ -209,7 +209,11 @@ class SoundDriver : public Driver {
 }  // namespace
 
 DriverKind soundDriver() {
-  return {"sound", [](const DriverSetup& setup) { return std::make_unique<SoundDriver>(setup); }};
+  return {"sound",
+          [](const DriverSetup& setup) { return std::make_unique<SoundDriver>(setup); },
+          {{"source", "name of the source, see pactl list short sources"},
+           {"channels", "number of channels of the source"},
+           {"server", "sound server; default: that of the user"}}};
 }
 
 }  // namespace smartmill::daq

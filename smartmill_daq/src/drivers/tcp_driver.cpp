@@ -153,7 +153,11 @@ class TcpDriver : public Driver {
 }  // namespace
 
 DriverKind tcpDriver() {
-  return {"tcp", [](const DriverSetup& setup) { return std::make_unique<TcpDriver>(setup); }};
+  return {"tcp",
+          [](const DriverSetup& setup) { return std::make_unique<TcpDriver>(setup); },
+          {{"host", "name or address of the device"},
+           {"port", "TCP port of the device"},
+           {"samples", "volts (default) or shares of the range"}}};
 }
 
 }  // namespace smartmill::daq

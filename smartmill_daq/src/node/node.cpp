@@ -7,6 +7,7 @@
 #include <ros/ros.h>
 #include <smartmill_msgs/SampleBlock.h>
 
+#include "smartmill_core/formatted.h"
 #include "smartmill_daq/acquisition/state_text.h"
 #include "smartmill_ros/conversions.h"
 #include "smartmill_ros/node_main.h"
@@ -49,9 +50,14 @@ DaqNode::DaqNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
                                                [] { return toSec(ros::Time::now()); });
   shell_.diagnose("instrument " + acquisition_->instrument().name,
                   [this](auto& status) { diagnose(status); });
-  const std::vector<Channel> channels = acquisition_->instrument().channels();
-  for (std::size_t c = 0; c < channels.size(); ++c)
-    shell_.diagnose("channel " + channels[c].name, [this, c](auto& status) { diagnoseChannel(c, status); });
+  std::size_t c = 0;
+  for (const Stream& stream : acquisition_->instrument().streams) {
+    for (const Channel& channel : stream.channels) {
+      shell_.diagnose("channel " + stream.topic + "/" + channel.name,
+                      [this, c](auto& status) { diagnoseChannel(c, status); });
+      ++c;
+    }
+  }
   thread_ = std::thread([this] { run(); });
 }
 
@@ -85,6 +91,10 @@ void DaqNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
     status.summary(Level::OK, summaryOf(state));
   }
   const SampleAccount& account = state.account;
+  status.add("driver", acquisition_->instrument().driver);
+  status.add("sample rate [Hz]", acquisition_->instrument().sample_rate);
+  status.add("latency [s]", acquisition_->instrument().latency);
+  status.add("standard deviation of the latency [s]", acquisition_->instrument().latency_std);
   status.add("samples in blocks", account.delivered);
   status.add("blocks", account.blocks);
   status.add("samples lost", account.lost);
@@ -114,6 +124,7 @@ void DaqNode::diagnoseChannel(std::size_t channel, diagnostic_updater::Diagnosti
   } else {
     status.summary(Level::OK, "alive");
   }
+  status.add("unit", described.unit);
   status.add("mean [" + described.unit + "]", level.mean);
   status.add("rms [" + described.unit + "]", level.rms);
   status.add("peak [share of the range]", level.peak);
@@ -123,7 +134,7 @@ void DaqNode::diagnoseChannel(std::size_t channel, diagnostic_updater::Diagnosti
   status.add("samples not finite", level.not_finite);
   status.add("sensitivity [V/" + described.unit + "]", described.sensitivity);
   status.add("standard deviation of the sensitivity",
-             described.sensitivity_std ? std::to_string(*described.sensitivity_std) : "not stated");
+             described.sensitivity_std ? formatted("%.4g", *described.sensitivity_std) : "not stated");
   status.add("date of the sensitivity", described.sensitivity_date.value_or("not stated"));
 }
 

@@ -137,7 +137,8 @@ TEST(DaqNode, theForceCompensationGivesTheSameAsWithoutIt) {
             instrument_state = status.message;
             for (const auto& value : status.values) instrument_state += "|" + value.key + "=" + value.value;
           }
-          if (status.name.find("channel fx") != std::string::npos) channel_state = status.message;
+          if (status.name.find("channel daq/dynamometer/fx") != std::string::npos)
+            channel_state = status.message;
         }
       });
   auto samples = nh.advertise<smartmill_msgs::SampleBlock>("/direct/daq/dynamometer", 2000);

@@ -222,7 +222,7 @@ std::vector<RecordedTest> recordedTests(const Campaign& campaign, std::set<std::
   constexpr double BEYOND_CHANCE = 3.0;  // standard deviations
   std::vector<RecordedTest> tests;
   for (const CampaignTest& test : campaign.tests) tests.push_back({test, readRecord(campaign, test)});
-  const std::optional<StreamShift> shift = shiftOfForces(tests);
+  const std::optional<ForceShift> shift = shiftOfForces(tests);
   if (!shift || std::abs(shift->delay) < BEYOND_CHANCE * shift->std_dev) return tests;
   for (RecordedTest& one : tests) {
     if (one.test.stream_offset.empty() && sim::AxisMotion::isRecorded(one.record))

@@ -44,7 +44,7 @@ TEST(StreamShift, IsFoundWithinItsStandardDeviation) {
     std::vector<RecordedTest> tests;
     for (std::uint64_t k = 0; k < 4; ++k)
       tests.push_back(step(1.1 + 0.2 * static_cast<double>(k), delay, 10.0, k));
-    const std::optional<StreamShift> shift = shiftOfForces(tests);
+    const std::optional<ForceShift> shift = shiftOfForces(tests);
     ASSERT_TRUE(shift) << delay;
     EXPECT_EQ(shift->axis, 'x');
     // The force has an RMS of 157 N / sqrt(2) for 0.2 s of 3 s, the noise one of 10 N throughout.
@@ -72,7 +72,7 @@ TEST(StreamShift, OfTheMeasuredAxisMotion) {
   const Campaign campaign = readCampaign(folder);
   std::vector<RecordedTest> tests;
   for (const CampaignTest& test : campaign.tests) tests.push_back({test, readRecord(campaign, test)});
-  const std::optional<StreamShift> shift = shiftOfForces(tests);
+  const std::optional<ForceShift> shift = shiftOfForces(tests);
   ASSERT_TRUE(shift);
   EXPECT_EQ(shift->axis, 'x');
   EXPECT_NEAR(shift->delay, 0.1866, 0.0004);

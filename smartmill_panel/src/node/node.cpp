@@ -9,6 +9,7 @@
 #include <smartmill_msgs/ForceStrip.h>
 #include <nlohmann/json.hpp>
 
+#include "node/instrument_queries.h"
 #include "node/service_queries.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/names.h"
@@ -77,6 +78,10 @@ PanelNode::PanelNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
                }}),
       bridge_(nh, server_) {
   if (gate_.open()) commands_ = std::make_unique<Commands>(nh, log_);
+  authorised_ = {
+      {"command", [this](const ApiRequest& request) { return commands_->run(request); }},
+      {"instrument", [this](const ApiRequest& request) { return tryInstrument(nh_, request, log_); }},
+      {"calibrate", [this](const ApiRequest& request) { return calibrateChannel(nh_, request, log_); }}};
   listen();
   shell_.every(DISCOVER_PERIOD, [this] {
     if (!discovery_.busy()) discovery_.post([this] { bridge_.discover(); });
@@ -96,6 +101,7 @@ PanelNode::PanelNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
 PanelNode::~PanelNode() {
   discovery_.stop();
   worker_.stop();
+  instruments_.stop();
 }
 
 void PanelNode::listen() {
@@ -176,7 +182,10 @@ void PanelNode::publish(Digests& digests) {
 // In the server's thread.
 void PanelNode::answer(ApiRequest request, const Server::Respond& respond) {
   constexpr int BUSY = 503, BAD_REQUEST = 400;
-  const bool taken = worker_.post([this, request = std::move(request), respond] {
+  // A record for a calibration takes up to a minute.
+  const bool slow = request.path == "instrument" || request.path == "calibrate";
+  Worker& worker = slow ? instruments_ : worker_;
+  const bool taken = worker.post([this, request = std::move(request), respond] {
     try {
       respond(answerNow(request));
     } catch (const Error& error) {
@@ -194,12 +203,13 @@ ApiResponse PanelNode::answerNow(const ApiRequest& request) {
   if (request.path == "report") return newestReport(parameters_.reports);
   if (request.path == "note") return takeNote(request, log_);
   if (request.path == "replay") return controlReplay(nh_, request);
-  if (request.path == "command") {
+  for (const auto& [path, run] : authorised_) {
+    if (request.path != path) continue;
     if (const auto refusal = gate_.refusal(request)) {
-      ROS_WARN("panel: command from %s refused", request.from.c_str());
+      ROS_WARN("panel: %s from %s refused", path.c_str(), request.from.c_str());
       return *refusal;
     }
-    return commands_->run(request);
+    return run(request);
   }
   return messageResponse(NOT_FOUND, "unknown request");
 }

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <array>
+#include <functional>
+#include <map>
 #include <memory>
 #include <string>
 
@@ -56,7 +58,10 @@ class PanelNode {
   ros::Publisher strip_, revolution_, spectrum_;
   PanelLog log_;
   std::unique_ptr<Commands> commands_;
+  /// Requests below /api/ that need the token.
+  std::map<std::string, std::function<ApiResponse(const ApiRequest&)>> authorised_;
   Worker worker_, discovery_;  // discovery_ blocks while the master is unreachable
+  Worker instruments_;         // blocks while a device is read
   Server server_;
   TopicBridge bridge_;
 };

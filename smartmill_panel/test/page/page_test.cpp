@@ -97,6 +97,12 @@ TEST_F(PageTest, EveryViewIsDrawn) {
 TEST_F(PageTest, TheFleetIsShown) {
   check("TheFleetIsShown");
 }
+TEST_F(PageTest, InstrumentsAreShown) {
+  check("InstrumentsAreShown");
+}
+TEST_F(PageTest, ANewInstrumentIsTriedWrittenAndCalibrated) {
+  check("ANewInstrumentIsTriedWrittenAndCalibrated");
+}
 TEST_F(PageTest, SilenceTurnsValuesGrey) {
   check("SilenceTurnsValuesGrey");
 }

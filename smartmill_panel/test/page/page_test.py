@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Tests the page in a real browser with a panel node and the topics of a simulated machine, so that each value is known.
 usage: page_test.py NODE PAGE OUT: writes OUT/results.json, {case: failure or ""}, and screenshots in each size."""
+import calendar
 import json
 import math
 import os
@@ -18,7 +19,7 @@ from browser import PATIENCE, Browser, free_port
 NODE, PAGE, OUT = sys.argv[1:4]
 TOKEN = "a token that is long enough"
 SIZES = {"1280x800": (1280, 800), "1920x1080": (1920, 1080), "phone": (390, 844)}
-VIEWS = ["overview", "forces", "stability", "dynamics", "session", "model", "fleet"]
+VIEWS = ["overview", "forces", "stability", "dynamics", "session", "model", "instruments", "fleet"]
 LOSS_TIMEOUT = 2.0  # [s] in which the page must report a lost node
 
 
@@ -27,6 +28,7 @@ class Machine:
 
     def __init__(self):
         import rospy
+        from diagnostic_msgs.msg import DiagnosticArray
         from smartmill_msgs import msg
         self.rospy, self.msg, self.publishers, self.silent = rospy, msg, {}, False
         rospy.init_node("machine", anonymous=True, disable_signals=True)
@@ -40,6 +42,12 @@ class Machine:
         self.requests = []
         from smartmill_msgs.srv import FindCoefficients
         self.service = rospy.Service("/smartmill/loadmeter/find_coefficients", FindCoefficients, self.find)
+        self.front_end, self.tried, self.calibrated, self.moved = True, [], [], []
+        self.diagnostics_publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
+        from smartmill_msgs.srv import ArmMotion, CalibrateChannel, TryInstrument
+        self.setup = [rospy.Service("/smartmill/daq/try_instrument", TryInstrument, self.try_instrument),
+                      rospy.Service("/smartmill/daq/calibrate_channel", CalibrateChannel, self.calibrate),
+                      rospy.Service("/smartmill/cnc/arm_motion", ArmMotion, self.moved.append)]
         self.thread = threading.Thread(target=self.run, daemon=True)
         self.thread.start()
 
@@ -57,6 +65,55 @@ class Machine:
         return FindCoefficientsResponse(message="8 tests in 2 identifications", coefficients=found, of_pair=True, database="/data/mill.sqlite",
                                         identifications=2, production_cuts=5, cutting_speed=[1.0, 2.5], feed_per_tooth=[5e-5, 2e-4],
                                         axial_depth=[1e-3, 1e-3], edge_age=[nan, nan], next_test=test, next_std=[2.1e6, 400.0])
+
+    def try_instrument(self, request):
+        """As setup_node: a wrong sensitivity is named, a file is written once."""
+        from smartmill_msgs.srv import TryInstrumentResponse as Response
+        self.tried.append(request)
+        known = {"drivers": ["file", "tcp"], "option_driver": ["file", "tcp", "tcp"], "option_key": ["path", "host", "port"],
+                 "option_meaning": ["measurement file", "name of the device", "TCP port"], "files": ["front_end"]}
+        if "sensitivity: 0," in request.description:
+            return Response(code=1, message="instrument: streams[0].channels[1].sensitivity: 0, expected volts per m/s2", **known)
+        if request.file:
+            return Response(message=f"stored in /instruments/{request.file}.yaml", path=f"/instruments/{request.file}.yaml", **known)
+        if not request.description:
+            return Response(**known)
+        return Response(topic=["daq/vibration"] * 2, channel=["x", "c2"], unit=["m/s2", "V"], mean=[0.12, math.nan], rms=[9.87, math.nan], peak=[0.42, 1.0],
+                        clipped=[0, 173], faulty=[False, True], samples=51200, drift=31e-6, drift_std=4e-6, jitter=210e-6, faults=["clipping: c2: clipped at 10 V"], **known)
+
+    def calibrate(self, request):
+        from smartmill_msgs.srv import CalibrateChannelResponse as Response
+        self.calibrated.append(request)
+        if request.method == Response.OK and request.exciter != 10.0:
+            return Response(code=3, message="x: distortion 34 %")
+        line = "x: 0.0104 +- 0.00016 V/(m/s2), so far 0.01 (+4.00 %), from 9 parts of the record"
+        return Response(message=line + ("; stored, daq_node reads it at its next start" if request.method == 4 else ""), sensitivity=0.0104, parts=9)
+
+    def diagnostics(self):
+        """As daq_node with a clipped channel, and as the nodes that align streams and choose the source of the angle."""
+        from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+        def status(name, level, message, **values):
+            return DiagnosticStatus(name=name, level=level, message=message, values=[KeyValue(key, str(value)) for key, value in values.items()])
+
+        def channel(name, level, message, clipped, peak, date):
+            return status("smartmill/daq: channel daq/dynamometer/" + name, level, message, **{
+                "unit": "N", "mean [N]": 12.3456, "rms [N]": 45.6, "peak [share of the range]": peak, "samples clipped": clipped, "sensitivity [V/N]": 0.0102,
+                "standard deviation of the sensitivity": "5.0e-05", "date of the sensitivity": date})
+        array = DiagnosticArray(status=[status("smartmill/panel: panel", 0, "serving")])
+        array.header.stamp = self.rospy.Time.now()
+        if self.front_end:
+            array.status += [
+                status("smartmill/daq: instrument front end", 0, "measuring", **{
+                    "driver": "tcp", "sample rate [Hz]": 51200.0, "samples in blocks": 123456789, "samples lost": 512, "samples lost by the clock": 0,
+                    "samples withheld": 0, "clock drift [ppm]": 30.02, "standard deviation of the drift [ppm]": 0.05, "clock offset [s]": -0.0012,
+                    "standard deviation of the offset [s]": 2.1e-6, "jitter of the arrivals [s]": 310e-6, "latency [s]": 0.0125,
+                    "standard deviation of the latency [s]": 3e-5, "last fault": "512 samples are missing"}),
+                channel("fx", 0, "alive", 0, 0.42, "2026-09-14"), channel("fy", 2, "no measurement: clipped, stuck or without supply", 173, 1.0, "not stated"),
+                status("smartmill/alignment: alignment daq/hammer/hammer to daq/dynamometer/fx", 0, "12.5 ms later, by taps", **{
+                    "shift [s]": 0.0125, "standard deviation of the shift [s]": 3e-5}),
+                status("smartmill/angle: spindle angle", 1, "pulses in place of encoder: no samples for 0.5 s")]
+        self.diagnostics_publisher.publish(array)
 
     def publish(self, topic, message, latch=False):
         if topic not in self.publishers:
@@ -138,6 +195,7 @@ class Machine:
         fx = [100.0 + 40.0 * math.sin(2 * math.pi * 300.0 * (first + i) / rate) for i in range(n)]
         for topic, status in (("force/measured", 0), ("force/compensated", 1)):
             self.publish(topic, m.ForceBlock(sample_rate=rate, first_index=first, fx=fx, fy=fx, fz=[0.0] * n, status=status))
+        self.diagnostics()
         self.index += 1
 
 
@@ -351,6 +409,103 @@ def the_fleet_is_shown(browser, machine):
     browser.js("(location.hash = 'overview', 1)")
 
 
+def instruments_are_shown(browser, machine):
+    browser.js("(location.hash = 'instruments', 1)")
+    browser.wait("document.querySelectorAll('[data-instrument] tbody tr').length == 2")
+    rows = "[...document.querySelectorAll('[data-instrument] tbody tr')].map(r => [...r.children].map(e => e.textContent))"
+    found = browser.js(rows)
+    days = int((time.time() - calendar.timegm((2026, 9, 14, 0, 0, 0))) // 86400)
+    equal(found[0][:2] + found[0][3:], ["daq/dynamometer/fx", "alive", "12.35 N", "45.60 N", "0", "0.01020 ± 0.00005 V/N", f"2026-09-14, {max(0, days)} days ago"])
+    equal(found[1][1:2] + found[1][5:6] + found[1][7:], ["no measurement: clipped, stuck or without supply", "173", "date not stated"])
+    equal(browser.js("[...document.querySelectorAll('[data-instrument] .bar')].map(e => [e.className.trim(), e.title])"), [["bar", "42.0 % of the range"], ["bar bad", "100.0 % of the range"]])
+    clock = browser.text("#instruments .clock")
+    for part in ("tcp, 51200.0 Hz", "drift 30.02 ± 0.05 ppm", "offset -1.200 ± 0.002 ms", "late by 0.310 ms", "latency 12.50 ± 0.03 ms", "512 lost", "last fault: 512 samples are missing"):
+        assert part in clock, (part, clock)
+    table = browser.text("#alignments")
+    for part in ("Alignment daq/hammer/hammer to daq/dynamometer/fx", "12.5 ms later, by taps", "pulses in place of encoder"):
+        assert part in table, (part, table)
+    for size, (width, height) in SIZES.items():
+        browser.resize(width, height)
+        browser.picture(f"{OUT}/instruments_{size}.png")
+        wide = browser.js("document.documentElement.scrollWidth")
+        assert wide <= width, (size, wide)
+    browser.resize(*SIZES["1280x800"])
+    machine.front_end = False
+    browser.wait("document.querySelector('#instruments .stale')?.textContent.startsWith('no report for')")
+    machine.front_end = True
+    browser.wait("!document.querySelector('#instruments .stale')")
+
+
+def a_new_instrument_is_tried_written_and_calibrated(browser, bench, machine):
+    browser.js("(location.hash = 'instruments', 1)")
+    fill = "(e => { e.value = arguments[1]; e.dispatchEvent(new Event('change')); return 1; })(document.querySelector(arguments[0]))"
+    answer = lambda: browser.text("#instrument-answer")
+    browser.js(fill, "[aria-label=Name]", "tester")
+    browser.js(fill, "[aria-label=Token]", "wrong")
+    browser.click("#instrument-begin")
+    becomes(answer, "the token is missing or wrong")
+    equal(machine.tried, [])
+    browser.js(fill, "[aria-label=Token]", TOKEN)
+    browser.click("#instrument-begin")
+    browser.wait("document.querySelectorAll('#instrument-driver option').length == 2")
+    browser.js(fill, "#instrument-driver", "tcp")
+    browser.js(fill, "#instrument-option-host", "192.168.1.7")
+    browser.js(fill, "#instrument-option-port", "5045")
+    browser.js(fill, "#instrument-count", "2")
+    cell = "#instrument-channels tbody tr:nth-child({}) td:nth-child({}) :is(input, select)"
+    for column, value in ((3, "x"), (4, "m/s2"), (5, "0.0102"), (6, "5.0"), (7, "iepe")):
+        browser.js(fill, cell.format(1, column), value)
+    browser.js(fill, cell.format(2, 5), "0")
+    browser.click("#instrument-read")
+    becomes(answer, "instrument: streams[0].channels[1].sensitivity: 0, expected volts per m/s2")
+    browser.js(fill, cell.format(2, 5), "1.0")
+    browser.click("#instrument-read")
+    becomes(answer, "51200 samples; drift 31 ± 4 ppm after one second, arrivals late by 0.210 ms")
+    becomes(lambda: browser.js("[...document.querySelectorAll('#instrument-levels tbody tr')].map(r => [...r.children].map(e => e.textContent))"),
+            [["daq/vibration/x", "", "0.1200 m/s2", "9.870 m/s2", "0", "alive"], ["daq/vibration/c2", "", "– V", "– V", "173", "no measurement"]])
+    assert "clipping: c2" in browser.text("#instrument-levels")
+    browser.resize(1280, 1500)
+    browser.picture(OUT + "/first_connection.png")
+    browser.resize(*SIZES["1280x800"])
+    browser.click("#instrument-write")
+    becomes(answer, "stored in /instruments/front_end.yaml. Start it: roslaunch smartmill_daq daq.launch instrument:=/instruments/front_end.yaml")
+    written = machine.tried[-1]
+    equal((written.file, written.replace, written.seconds), ("front_end", False, 0.0))
+    equal(written.description, """format: smartmill-instrument/1
+name: "front end"
+driver: tcp
+options: {host: "192.168.1.7", port: 5045}
+sample_rate: 51200.0   # [Hz]
+streams:
+  - topic: "daq/vibration"
+    channels:
+      - {input: 1, name: "x", unit: "m/s2", sensitivity: 0.0102, range: 5.0, coupling: iepe}
+      - {input: 2, name: "c2", unit: "V", sensitivity: 1.0, range: 10.0, coupling: dc}
+""")
+    # Calibration: a record that is refused, a good one, its result stored.
+    result = lambda: browser.text("#calibrate-answer")
+    browser.js(fill, "#calibrate-exciter", "9")
+    browser.click("[data-method=exciter]")
+    becomes(result, "x: distortion 34 %")
+    equal(browser.js("document.querySelector('[data-method=store]').hidden"), True)
+    browser.js(fill, "#calibrate-exciter", "10")
+    browser.click("[data-method=exciter]")
+    becomes(lambda: result().startswith("x: 0.0104 +- 0.00016"), True)
+    asked = machine.calibrated[-1]
+    equal((asked.file, asked.topic, asked.channel, asked.method, asked.seconds, asked.reference_std), ("front_end", "daq/vibration", "x", 0, 5.0, 0.015))
+    browser.click("[data-method=store]")
+    becomes(lambda: result().endswith("stored, daq_node reads it at its next start"), True)
+    equal(machine.calibrated[-1].method, 4)
+    # Without token nothing is opened or written, and nothing of all this has touched the machine.
+    count = len(machine.tried)
+    for path in ("instrument", "calibrate"):
+        equal(status_of(bench.address + "api/" + path, b"{}"), 401)
+        equal(status_of(bench.address + "api/" + path, b"{}", X_SmartMill_Token=TOKEN), 400)  # no name
+        equal(status_of(bench.address + "api/" + path, b"{}", X_SmartMill_Token=TOKEN, Origin="http://evil.example"), 403)
+    equal((len(machine.tried), machine.moved), (count, []))
+    browser.js("(location.hash = 'overview', 1)")
+
+
 def silence_turns_values_grey(browser, machine):
     machine.silent = True
     browser.wait("document.querySelector('#status').textContent.includes('Controller silent')")
@@ -522,7 +677,7 @@ def reports_sort_and_zoom_without_a_server(browser):
 
 
 def no_error_on_the_console(browser):
-    errors = [e for e in browser.errors() if "/api/command" not in e]  # the refusals above are expected
+    errors = [e for e in browser.errors() if "/api/command" not in e and "/api/instrument" not in e]  # the refusals above are expected
     assert not errors, errors
 
 
@@ -540,6 +695,8 @@ def main():
             bench.case(force_and_spectrum_are_those_of_the_machine, browser)
             bench.case(every_view_is_drawn, browser)
             bench.case(the_fleet_is_shown, browser, machine)
+            bench.case(instruments_are_shown, browser, machine)
+            bench.case(a_new_instrument_is_tried_written_and_calibrated, browser, bench, machine)
             bench.case(silence_turns_values_grey, browser, machine)
             bench.case(hostile_origins_and_commands_without_token_are_refused, bench)
             bench.case(the_page_commands_after_an_unlock, browser)

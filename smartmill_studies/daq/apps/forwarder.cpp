@@ -1,13 +1,21 @@
-// A topic of sample blocks as a device that streams them by TCP (docs/daq.md): samples of the simulated
-// machine take the way of a real instrument.
+// A topic of sample blocks as a device (docs/daq.md): samples of the simulated machine take the way of a real
+// instrument. By TCP, or by a named pipe as rows of numbers or as raw float32 for a player of sound.
 //
 //   rosrun smartmill_studies daq_forwarder _input:=daq/dynamometer _port:=5045
+//   rosrun smartmill_studies daq_forwarder _input:=daq/dynamometer _pipe:=/tmp/forces
+//   rosrun smartmill_studies daq_forwarder _input:=daq/dynamometer _pipe:=/tmp/forces _full_scale:=1.0e6
+#include <array>
+#include <charconv>
+#include <chrono>
 #include <condition_variable>
+#include <csignal>
 #include <deque>
+#include <functional>
 #include <mutex>
 #include <string>
 #include <thread>
 
+#include <fcntl.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <ros/ros.h>
@@ -24,19 +32,12 @@ namespace {
 
 using namespace smartmill;
 
-/// Serves one connection at a time on the loopback interface; what comes without one is lost, as in a device.
-class FrameServer {
+/// Writes to one reader at a time; what comes without one is lost, as in a device.
+class StreamWriter {
  public:
-  explicit FrameServer(int port) : listener_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_port = htons(static_cast<std::uint16_t>(port));
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    const int on = 1;
-    ::setsockopt(listener_, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-    if (::bind(listener_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
-        ::listen(listener_, 1) != 0)
-      throw Error("cannot listen on port " + std::to_string(port));
+  /// @param open waits for a reader and returns its descriptor
+  explicit StreamWriter(std::function<int()> open) : open_(std::move(open)) {
+    std::signal(SIGPIPE, SIG_IGN);
     std::thread([this] { run(); }).detach();  // ends with the process
   }
 
@@ -45,33 +46,30 @@ class FrameServer {
     if (connected_) waiting_.push_back(std::move(bytes));
     changed_.notify_one();
   }
-  bool connected() {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    return connected_;
-  }
 
  private:
   void run() {
     while (true) {
-      const int socket = ::accept(listener_, nullptr, nullptr);
-      if (socket < 0) continue;
-      const int on = 1;
-      ::setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+      const int reader = open_();
+      if (reader < 0) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+        continue;
+      }
       setConnected(true);
-      while (sendNext(socket)) {
+      while (sendNext(reader)) {
       }
       setConnected(false);
-      ::close(socket);
+      ::close(reader);
     }
   }
-  bool sendNext(int socket) {
+  bool sendNext(int reader) {
     std::unique_lock<std::mutex> lock(mutex_);
     changed_.wait(lock, [this] { return !waiting_.empty(); });
     const std::string bytes = std::move(waiting_.front());
     waiting_.pop_front();
     lock.unlock();
     for (std::size_t at = 0; at < bytes.size();) {
-      const ssize_t sent = ::send(socket, bytes.data() + at, bytes.size() - at, MSG_NOSIGNAL);
+      const ssize_t sent = ::write(reader, bytes.data() + at, bytes.size() - at);
       if (sent <= 0) return false;
       at += static_cast<std::size_t>(sent);
     }
@@ -83,12 +81,53 @@ class FrameServer {
     waiting_.clear();
   }
 
-  int listener_;
+  std::function<int()> open_;
   std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<std::string> waiting_;
   bool connected_ = false;
 };
+
+/// A server on the loopback interface.
+std::function<int()> connectionsOf(int port) {
+  const int listener = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(static_cast<std::uint16_t>(port));
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  const int on = 1;
+  ::setsockopt(listener, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+  if (::bind(listener, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
+      ::listen(listener, 1) != 0)
+    throw Error("cannot listen on port " + std::to_string(port));
+  return [listener] {
+    const int socket = ::accept(listener, nullptr, nullptr);
+    const int at_once = 1;
+    ::setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &at_once, sizeof at_once);
+    return socket;
+  };
+}
+
+std::function<int()> readersOf(const std::string& pipe) {
+  return [pipe] { return ::open(pipe.c_str(), O_WRONLY | O_CLOEXEC); };
+}
+
+/// @param full_scale [unit] of float32 samples; 0: rows of numbers
+std::string streamOf(const smartmill_msgs::SampleBlock& message, double full_scale) {
+  std::string bytes;
+  const std::size_t channels = message.channels.size();
+  for (std::size_t i = 0; i < message.samples.size(); ++i) {
+    if (full_scale > 0.0) {
+      const auto share = static_cast<float>(message.samples[i] / full_scale);
+      bytes.append(reinterpret_cast<const char*>(&share), sizeof share);
+    } else {
+      std::array<char, 32> text;  // NOLINT(cppcoreguidelines-pro-type-member-init): to_chars fills it
+      const auto end = std::to_chars(text.data(), text.data() + text.size(), message.samples[i]);
+      bytes.append(text.data(), end.ptr).push_back((i + 1) % channels == 0 ? '\n' : ' ');
+    }
+  }
+  return bytes;
+}
 
 std::string frameOf(const smartmill_msgs::SampleBlock& message) {
   daq::Frame frame;
@@ -107,10 +146,14 @@ int main(int argc, char** argv) {
   ros::init(argc, argv, "forwarder");
   ros::NodeHandle nh, private_nh("~");
   try {
-    FrameServer server(private_nh.param("port", 5045));
+    const auto pipe = private_nh.param<std::string>("pipe", "");
+    const double full_scale = private_nh.param("full_scale", 0.0);
+    StreamWriter writer(pipe.empty() ? connectionsOf(private_nh.param("port", 5045)) : readersOf(pipe));
     const auto input = nh.subscribe<smartmill_msgs::SampleBlock>(
         private_nh.param<std::string>("input", "daq/dynamometer"), STREAM_QUEUE,
-        [&server](const smartmill_msgs::SampleBlock::ConstPtr& message) { server.send(frameOf(*message)); });
+        [&](const smartmill_msgs::SampleBlock::ConstPtr& message) {
+          writer.send(pipe.empty() ? frameOf(*message) : streamOf(*message, full_scale));
+        });
     ros::spin();
   } catch (const std::exception& error) {
     ROS_FATAL("forwarder: %s", error.what());

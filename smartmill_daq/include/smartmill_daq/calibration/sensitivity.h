@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "smartmill_daq/instrument/instrument.h"
+
 namespace smartmill::daq {
 
 /// Value read by a channel with its present sensitivity over the true one. The right sensitivity is the
@@ -32,6 +34,26 @@ ReadingRatio ratioByMass(const std::vector<double>& without, const std::vector<d
 /// @throws Error: no three hits, not finite, or force and acceleration are not in proportion (above 5 %)
 ReadingRatio ratioByHits(const std::vector<double>& force, const std::vector<double>& acceleration,
                          double rate, double mass);
+
+/// Right sensitivity of a channel.
+struct NewSensitivity {
+  double value = 1.0, std_dev = 0.0;  ///< [V/unit]
+  double before = 1.0;                ///< [V/unit]
+  std::string unit;                   ///< of the channel
+  std::size_t parts = 0;              ///< pieces or hits that were evaluated
+};
+
+/// @param channel with its present sensitivity @param reference_std [1] relative standard deviation of the
+/// known quantity
+NewSensitivity sensitivityOf(const Channel& channel, const ReadingRatio& ratio, double reference_std);
+/// "fz: 0.01021 +- 3e-05 V/(N), so far 0.01 (+2.10 %), from 8 parts of the record"
+std::string sensitivityText(const std::string& channel, const NewSensitivity& sensitivity);
+
+/// Local date of today, YYYY-MM-DD.
+std::string today();
+
+constexpr double STANDARD_GRAVITY = 9.80665;   // [m/s2] ISO 80000-3
+constexpr double EXCITER_FREQUENCY = 159.155;  // [Hz] of handheld exciters: 1000 rad/s
 
 /// Replaces sensitivity, sensitivity_std and sensitivity_date of a channel in an instrument file; the rest,
 /// comments included, stays.

@@ -66,11 +66,17 @@ struct DriverSetup {
   const std::optional<StrictYaml>& options;  ///< the driver's own; finish() is called by makeDriver()
 };
 
+/// A key of a driver's options, for those who describe an instrument.
+struct DriverOption {
+  std::string key, meaning;
+};
+
 /// A driver is one file, src/drivers/NAME_driver.cpp, which defines `DriverKind NAMEDriver()`.
 struct DriverKind {
   std::string name;
   /// Reads the options. @throws Error "FILE: options.key: what". Empty: not built.
   std::function<std::unique_ptr<Driver>(const DriverSetup&)> make;
+  std::vector<DriverOption> options;
 };
 
 /// All drivers, those that were not built too, by name.
