@@ -90,7 +90,22 @@ ProgramNode::ProgramNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   shell_.diagnose("NC program", [this](auto& status) { diagnose(status); });
 }
 
+/// A node that was killed in a steady stretch has left its condition. The latched ones of other nodes come
+/// first.
+void ProgramNode::endPredecessor(double stamp) {
+  constexpr double LATCHED = 1.0;  // [s] for their delivery
+  if (ended_predecessor_) return;
+  if (!first_state_) first_state_ = stamp;
+  if (stamp - *first_state_ < LATCHED) return;
+  ended_predecessor_ = true;
+  if (!others_.empty() || follower_.states()) return;
+  CuttingCondition none;
+  none.stamp = stamp;
+  publisher_.publish(toMsg(none));
+}
+
 void ProgramNode::handle(const CncState& state) {
+  endPredecessor(state.stamp);
   if (const std::optional<CuttingCondition> condition = follower_.handle(state)) {
     condition_ = condition->name;
     publisher_.publish(toMsg(*condition));

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 
 #include <ros/message_event.h>
@@ -26,6 +27,7 @@ class ProgramNode {
   using ConditionEvent = ros::MessageEvent<const smartmill_msgs::CuttingCondition>;
   void handle(const CncState& state);
   void handle(const ConditionEvent& event);
+  void endPredecessor(double stamp);
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   NodeParameters parameters_;
@@ -36,6 +38,8 @@ class ProgramNode {
   std::map<std::string, std::string> others_;  // names of valid conditions by their node
   std::string condition_;                      // name of the present one; empty: none
   std::size_t losses_ = 0;                     // logged
+  std::optional<double> first_state_;          // [s]
+  bool ended_predecessor_ = false;
 };
 
 }  // namespace smartmill::program
