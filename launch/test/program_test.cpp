@@ -83,7 +83,8 @@ TEST(Program, OnePartGivesTheCoefficients) {
       boost::function<void(const smartmill_msgs::CncState&)>([&](const auto& m) { state = m; }));
   const ros::Subscriber on_coefficients = nh.subscribe<smartmill_msgs::CuttingCoefficients>(
       names::COEFFICIENTS, 10,
-      boost::function<void(const smartmill_msgs::CuttingCoefficients&)>([&](const auto& m) { published = m; }));
+      boost::function<void(const smartmill_msgs::CuttingCoefficients&)>(
+          [&](const auto& m) { published = m; }));
   ASSERT_TRUE(wait([&] { return state.connected && diagnostics.count("parts begun") > 0; }));
 
   smartmill_msgs::ArmMotion arm;

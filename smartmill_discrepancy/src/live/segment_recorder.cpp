@@ -56,8 +56,8 @@ void SegmentRecorder::handle(const CuttingCondition& condition) {
 void SegmentRecorder::handle(const CncState& state) {
   if (!condition_ || condition_->kind == CuttingCondition::Kind::none) return;
   const bool cut = condition_->kind == CuttingCondition::Kind::cut;
-  const bool path = !cut || (feedsAlongX(*condition_) &&
-                             onSteadyPath(*condition_, state, parameters_.path_tolerance));
+  const bool path =
+      !cut || (feedsAlongX(*condition_) && onSteadyPath(*condition_, state, parameters_.path_tolerance));
   const bool steady = path && std::abs(state.spindle_speed / condition_->spindle_speed - 1.0) < limits_.speed;
   if (steady && !steady_since_) steady_since_ = state.stamp;
   if (!steady && steady_since_) {

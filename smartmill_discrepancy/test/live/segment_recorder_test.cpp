@@ -50,7 +50,8 @@ std::vector<RecordSegment> run(const Machine& machine, double length = 0.3) {
       CncState state;
       state.stamp = stamp;
       state.axes = {"X", "Y", "Z"};
-      state.position = {(machine.backwards ? -FEED : FEED) * (t - machine.started_cutting), machine.feed_offset, 0.0};
+      state.position = {(machine.backwards ? -FEED : FEED) * (t - machine.started_cutting),
+                        machine.feed_offset, 0.0};
       if (t > machine.stops) state.position[2] = 0.01;
       state.spindle_speed = machine.actual_speed;
       recorder.push(state);

@@ -166,7 +166,7 @@ class StretchFinder {
   std::size_t move_ = 0;  // of the last step
   bool any_step_ = false, in_contact_ = false;
   std::optional<Run> run_;
-  Engagement sum_;                              // over the steps of a cut, times length
+  Engagement sum_;                             // over the steps of a cut, times length
   std::map<std::pair<bool, int>, int> parts_;  // by kind and line
 };
 
@@ -195,8 +195,8 @@ LiveProgram prepareProgram(const std::string& name, std::vector<Move> moves, Too
   options.simulation = simulation;
   options.prediction = false;
   ProgramAnalysis analysis(name, tools, stock, options);
-  const AnalysisResult result = analysis.run(
-      program.path.moves(), [&](const Step& step, const StepPrediction&) { finder.add(step); });
+  const AnalysisResult result =
+      analysis.run(program.path.moves(), [&](const Step& step, const StepPrediction&) { finder.add(step); });
   finder.finish();
   refuseRapidHits(name, result.blocks);
   return program;

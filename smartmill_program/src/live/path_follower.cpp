@@ -67,7 +67,7 @@ std::optional<CuttingCondition> PathFollower::handle(const CncState& state) {
     if (std::abs(state.spindle_speed - active_->speed) <= parameters_.speed_tolerance * active_->speed &&
         (!cut || std::abs(state.feed - active_->feed) <= parameters_.feed_tolerance * active_->feed))
       return std::nullopt;
-    readings_.clear();
+    readings_.erase(readings_.begin(), readings_.end() - 1);
     return end(state.stamp);
   }
   if (active_) return end(state.stamp);
@@ -143,12 +143,11 @@ void PathFollower::advance(const Point& tip, double most) {
   std::vector<Hypothesis> next;
   for (const Hypothesis& from : hypotheses_) {
     for (const ProgramPath::Place& place :
-         program_->path.near(tip, from.place - slack_, from.place + most,
-                             parameters_.path_tolerance)) {
+         program_->path.near(tip, from.reached - slack_, from.place + most, parameters_.path_tolerance)) {
       if (place.distance - from.place < least) continue;
       const double deviation = place.deviation / parameters_.position_std;
-      next.push_back({place.distance, from.first_place, from.chi_square + deviation * deviation,
-                      place.deviation, place.move});
+      next.push_back({place.distance, std::max(from.reached, place.distance), from.first_place,
+                      from.chi_square + deviation * deviation, place.deviation, place.move});
     }
   }
   hypotheses_ = std::move(next);
@@ -184,7 +183,8 @@ void PathFollower::search(const Point& tip, int sequence) {
                  places.end());
   for (const ProgramPath::Place& place : places) {
     const double deviation = place.deviation / parameters_.position_std;
-    hypotheses_.push_back({place.distance, place.distance, deviation * deviation, place.deviation, place.move});
+    hypotheses_.push_back(
+        {place.distance, place.distance, place.distance, deviation * deviation, place.deviation, place.move});
   }
   keepProbable();
 }
@@ -250,24 +250,24 @@ std::optional<std::size_t> PathFollower::stretchHere(const CncState& state) {
 /// deviation over the radius. The ends 0 and pi are the tool's own.
 double PathFollower::angleStd(const SteadyStretch& stretch, double deviation) const {
   constexpr double OWN_END = 1e-3;  // [rad]
-  const double shift =
-      std::hypot(parameters_.position_std, deviation) / stretch.geometry.radius();
+  const double shift = std::hypot(parameters_.position_std, deviation) / stretch.geometry.radius();
   double largest = 0.0;
   for (const double angle : {stretch.engagement.entry, stretch.engagement.exit}) {
     if (angle < OWN_END || angle > units::PI - OWN_END) continue;
     for (const double sign : {-1.0, 1.0})
-      largest = std::max(
-          largest, std::abs(std::acos(std::clamp(std::cos(angle) + sign * shift, -1.0, 1.0)) - angle));
+      largest = std::max(largest,
+                         std::abs(std::acos(std::clamp(std::cos(angle) + sign * shift, -1.0, 1.0)) - angle));
   }
   return largest;
 }
 
 bool PathFollower::isSteady() const {
-  if (readings_.back().stamp - readings_.front().stamp < parameters_.steady_time) return false;
+  constexpr double ROUNDING = 1e-6;  // [s] of stamps
+  if (readings_.back().stamp - readings_.front().stamp < parameters_.steady_time - ROUNDING) return false;
   const auto steady = [&](double Reading::*value, double tolerance) {
-    const auto [low, high] = std::minmax_element(
-        readings_.begin(), readings_.end(),
-        [value](const Reading& a, const Reading& b) { return a.*value < b.*value; });
+    const auto [low, high] =
+        std::minmax_element(readings_.begin(), readings_.end(),
+                            [value](const Reading& a, const Reading& b) { return a.*value < b.*value; });
     return (*low).*value > 0.0 && (*high).*value - (*low).*value <= tolerance * (*high).*value;
   };
   const bool cut = program_->stretches[*stretch_].cut;
@@ -300,8 +300,7 @@ CuttingCondition PathFollower::begin(std::size_t index, double stamp) {
   condition.spindle_speed = active.speed;
   if (!stretch.cut) return condition;
   condition.engagement = stretch.engagement;
-  condition.engagement.feed_per_tooth =
-      active.feed * units::TWO_PI / (active.speed * stretch.geometry.teeth);
+  condition.engagement.feed_per_tooth = active.feed * units::TWO_PI / (active.speed * stretch.geometry.teeth);
   for (std::size_t a = 0; a < 3; ++a) {
     condition.steady_from[a] = stretch.from[a] + zero_[a];
     condition.steady_to[a] = stretch.to[a] + zero_[a];

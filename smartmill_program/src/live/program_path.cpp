@@ -52,11 +52,11 @@ std::vector<ProgramPath::Place> ProgramPath::near(const Point& point, double fro
                                                   double tolerance) const {
   std::vector<Place> places;
   const auto first = std::lower_bound(begin_.begin() + 1, begin_.end(), from);
-  for (auto m = static_cast<std::size_t>(first - begin_.begin()) - 1;
-       m < moves_.size() && begin_[m] <= to; ++m) {
+  for (auto m = static_cast<std::size_t>(first - begin_.begin()) - 1; m < moves_.size() && begin_[m] <= to;
+       ++m) {
     const PathSegment& path = moves_[m].path;
-    const double along = nearestOn(path, point, std::max(0.0, from - begin_[m]),
-                                   std::min(path.length(), to - begin_[m]));
+    const double along =
+        nearestOn(path, point, std::max(0.0, from - begin_[m]), std::min(path.length(), to - begin_[m]));
     const double deviation = distanceBetween(point, path.at(along));
     if (deviation > tolerance) continue;
     const Place place{begin_[m] + along, deviation, m};

@@ -61,8 +61,8 @@ PathFollower followerOf(const NodeParameters& parameters) {
   SimulationOptions simulation;
   simulation.step_share = parameters.step_share;
   simulation.rapid = models.rapid();
-  const auto program = std::make_shared<const LiveProgram>(prepareProgram(
-      parameters.program, std::move(moves), models, stock, simulation, parameters.stretches));
+  const auto program = std::make_shared<const LiveProgram>(
+      prepareProgram(parameters.program, std::move(moves), models, stock, simulation, parameters.stretches));
   const ConditionNames names{parameters.tool, parameters.material.empty()
                                                   ? workpieceOf(models, "material").material
                                                   : parameters.material};
@@ -82,7 +82,8 @@ ProgramNode::ProgramNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
     : parameters_(parametersFromServer(private_nh).readAll<NodeParameters>()),
       follower_(followerOf(parameters_)),
       shell_(nh, private_nh, "NC program", parameters_.input_timeout),
-      publisher_(nh.advertise<smartmill_msgs::CuttingCondition>(names::CUTTING_CONDITION, STREAM_QUEUE, true)) {
+      publisher_(
+          nh.advertise<smartmill_msgs::CuttingCondition>(names::CUTTING_CONDITION, STREAM_QUEUE, true)) {
   conditions_ = nh.subscribe<smartmill_msgs::CuttingCondition>(
       names::CUTTING_CONDITION, STREAM_QUEUE,
       boost::function<void(const ConditionEvent&)>([this](const ConditionEvent& event) { handle(event); }));
@@ -151,8 +152,8 @@ void ProgramNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) 
   } else if (now.follows == Follows::ambiguous) {
     status.summary(Level::OK, "the tool may be at several places of the path");
   } else {
-    status.summary(Level::OK, now.follows == Follows::idle ? "no program runs"
-                                                           : "the tool has not come to the path");
+    status.summary(Level::OK,
+                   now.follows == Follows::idle ? "no program runs" : "the tool has not come to the path");
   }
   status.add("program", parameters_.program);
   status.add("condition", condition_);

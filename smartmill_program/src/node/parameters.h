@@ -22,14 +22,17 @@ struct NodeParameters {
 
   void declare(ParameterTable& table) {
     table.title(
-        "Parameters of program_node (package smartmill_program): cutting conditions of a running NC program.");
+        "Parameters of program_node (package smartmill_program): cutting conditions of a running NC "
+        "program.");
     table.atLaunch("program", program, "path of the NC program");
-    table.atLaunch("models", models,
-                   "path of a smartmill-model/1 file with the tool; N=FILE for tool N of several, separated by "
-                   "blanks");
+    table.atLaunch(
+        "models", models,
+        "path of a smartmill-model/1 file with the tool; N=FILE for tool N of several, separated by "
+        "blanks");
     table.section("Stock and zero.");
-    table.list("stock_size", stock_size, "m", Range::notNegative(),
-               "size of the stock along X, Y, Z; all 0: the workpiece of the model, and stock_corner is unused");
+    table.list(
+        "stock_size", stock_size, "m", Range::notNegative(),
+        "size of the stock along X, Y, Z; all 0: the workpiece of the model, and stock_corner is unused");
     table.list("stock_corner", stock_corner, "m", Range(),
                "corner of the stock of least X, Y, Z in the coordinates of the program");
     table.list("program_zero", program_zero, "m", Range(),

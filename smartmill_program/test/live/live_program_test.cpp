@@ -21,13 +21,13 @@ constexpr double STEP = 0.3125;  // [mm] of a tool of 10 mm
 /// A slot, one step of 3 mm up and one down, with the way back in air.
 const char* const SHOULDER =
     "G21 G90 G17 S3000 M3 F600\n"
-    "G0 X-10 Y10 Z5\n"   // 2
-    "G1 Z-2\n"           // 3
-    "G1 X70\n"           // 4: slot
-    "G1 Y13 F1200\n"     // 5: beside the stock
-    "G1 X-10 F600\n"     // 6: down-milling
-    "G1 Y16\n"           // 7
-    "G1 X70\n"           // 8: up-milling
+    "G0 X-10 Y10 Z5\n"  // 2
+    "G1 Z-2\n"          // 3
+    "G1 X70\n"          // 4: slot
+    "G1 Y13 F1200\n"    // 5: beside the stock
+    "G1 X-10 F600\n"    // 6: down-milling
+    "G1 Y16\n"          // 7
+    "G1 X70\n"          // 8: up-milling
     "G0 Z5\n"
     "M30\n";
 

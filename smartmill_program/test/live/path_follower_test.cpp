@@ -15,21 +15,21 @@ namespace {
 using units::MM;
 using units::PI;
 
-constexpr double PERIOD = 0.02;  // [s] of the states
-constexpr double RPS = 50.0;     // 3000 rpm
+constexpr double PERIOD = 0.02;                        // [s] of the states
+constexpr double RPS = 50.0;                           // 3000 rpm
 const std::array<double, 3> ZERO{{0.1, -0.05, -0.2}};  // [m] machine position of the program's zero
 constexpr double RAPID = 200.0;                        // [mm/s]
 
 /// Slot, a step of 3 mm down-milling and one up-milling, as straight lines along x.
 const char* const SHOULDER =
     "G21 G90 G17 S3000 M3 F600\n"
-    "N10 G0 X-10 Y10 Z5\n"   // 2
-    "N20 G1 Z-2\n"           // 3
-    "N30 G1 X70\n"           // 4
-    "N40 G1 Y13\n"           // 5
-    "N50 G1 X-10\n"          // 6
-    "N60 G1 Y16\n"           // 7
-    "N70 G1 X70\n"           // 8
+    "N10 G0 X-10 Y10 Z5\n"  // 2
+    "N20 G1 Z-2\n"          // 3
+    "N30 G1 X70\n"          // 4
+    "N40 G1 Y13\n"          // 5
+    "N50 G1 X-10\n"         // 6
+    "N60 G1 Y16\n"          // 7
+    "N70 G1 X70\n"          // 8
     "N80 G0 Z5\n"
     "M30\n";
 
@@ -39,9 +39,9 @@ struct Way {
   std::array<double, 3> to;
   double feed;
 };
-const std::vector<Way> SHOULDER_WAYS{{10, {-10, 10, 5}, RAPID}, {20, {-10, 10, -2}, 10}, {30, {70, 10, -2}, 10},
-                                     {40, {70, 13, -2}, 10},    {50, {-10, 13, -2}, 10}, {60, {-10, 16, -2}, 10},
-                                     {70, {70, 16, -2}, 10},    {80, {70, 16, 5}, RAPID}};
+const std::vector<Way> SHOULDER_WAYS{
+    {10, {-10, 10, 5}, RAPID}, {20, {-10, 10, -2}, 10}, {30, {70, 10, -2}, 10}, {40, {70, 13, -2}, 10},
+    {50, {-10, 13, -2}, 10},   {60, {-10, 16, -2}, 10}, {70, {70, 16, -2}, 10}, {80, {70, 16, 5}, RAPID}};
 
 /// A controller that moves along points, polled every 20 ms with noise of 2 um.
 class Controller {
@@ -164,9 +164,11 @@ TEST(PathFollower, AirIsStatedWithTheSpindleTurning) {
   EXPECT_NEAR(air[0].spindle_speed, RPS * units::TWO_PI, 1e-9);
   for (std::size_t i = 0; i + 1 < controller.conditions.size(); ++i) {
     if (controller.conditions[i].kind != CuttingCondition::Kind::air) continue;
-    // From its statement to its end the tool does not touch the block.
-    for (const auto& place : {controller.places[i], controller.places[i + 1]})
-      EXPECT_TRUE(place[0] < -5.0 || place[0] > 65.0 || place[2] > 0.0) << place[0];
+    // From its statement to its end the front of the tool is outside of the block: on the way in its radius
+    // before the edge, on the way out with its centre on the edge.
+    EXPECT_TRUE(controller.places[i][0] <= 0.0 || controller.places[i][0] >= 60.0);
+    const double end = controller.places[i + 1][0];
+    EXPECT_TRUE(end < -5.0 || end > 64.5) << end;
   }
 }
 
@@ -301,8 +303,8 @@ TEST(PathFollower, TheDeviationFromThePathIsAnUncertaintyOfTheWall) {
 }
 
 TEST(PathFollower, TheWayBackInTheSlotIsNoCut) {
-  PathFollower follower = followerOf(
-      "G21 G90 G17 S3000 M3 F600\nG0 X-10 Y10 Z5\nG1 Z-2\nG1 X40\nG1 X-10\nG0 Z5\nM30\n");
+  PathFollower follower =
+      followerOf("G21 G90 G17 S3000 M3 F600\nG0 X-10 Y10 Z5\nG1 Z-2\nG1 X40\nG1 X-10\nG0 Z5\nM30\n");
   Controller controller(follower);
   controller.with_sequence = false;
   controller.run({{0, {-10, 10, 5}, RAPID}, {0, {-10, 10, -2}, 10}, {0, {40, 10, -2}, 10}});
@@ -314,8 +316,8 @@ TEST(PathFollower, TheWayBackInTheSlotIsNoCut) {
 }
 
 TEST(PathFollower, ADwellInTheCutIsNoCondition) {
-  PathFollower follower = followerOf(
-      "G21 G90 G17 S3000 M3 F600\nG0 X-10 Y10 Z5\nG1 Z-2\nG1 X30\nG4 X3.\nG1 X50\nG0 Z5\nM30\n");
+  PathFollower follower =
+      followerOf("G21 G90 G17 S3000 M3 F600\nG0 X-10 Y10 Z5\nG1 Z-2\nG1 X30\nG4 X3.\nG1 X50\nG0 Z5\nM30\n");
   Controller controller(follower);
   controller.run({{0, {-10, 10, 5}, RAPID}, {0, {-10, 10, -2}, 10}, {0, {30, 10, -2}, 10}});
   for (int i = 0; i < 150; ++i) controller.poll(CncRun::start, 0.0, 0);
@@ -352,8 +354,8 @@ TEST(PathFollower, AProgramOfAnotherNumberOrBesideThePathIsIgnored) {
 
 TEST(PathFollower, OnACircleThePlaceIsFoundAtItsStartAndEnd) {
   // A full circle in the pocket that it widens, then a line.
-  PathFollower follower = followerOf(
-      "G21 G90 G17 S3000 M3 F600\nG0 X20 Y20 Z1\nG1 Z-2\nG3 X20 Y20 I5 J0\nG1 X50\nG0 Z5\nM30\n");
+  PathFollower follower =
+      followerOf("G21 G90 G17 S3000 M3 F600\nG0 X20 Y20 Z1\nG1 Z-2\nG3 X20 Y20 I5 J0\nG1 X50\nG0 Z5\nM30\n");
   Controller controller(follower);
   controller.with_sequence = false;
   controller.at = {20, 20, 1};

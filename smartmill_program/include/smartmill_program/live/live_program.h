@@ -17,17 +17,17 @@ namespace smartmill::program {
 /// contact, or moves and dwells in air while the spindle turns.
 struct SteadyStretch {
   bool cut = false;
-  double begin = 0.0, end = 0.0;                ///< [m] places on the path between which the load is constant
-  double steady_from = 0.0, steady_to = 0.0;    ///< [m] the same without the margins
-  nc::PathSegment::Point from{}, to{};          ///< [m] of a cut: tool tip at steady_from and steady_to
-  std::size_t move = 0;                         ///< first move
-  int part = 1;                                 ///< number among the stretches of the same line
-  int tool = 0;                                 ///< T
-  ToolGeometry geometry;                        ///< of the tool
-  Engagement engagement;                        ///< of a cut, with the programmed feed
-  double feed = 0.0;                            ///< [m/s] of a cut, programmed
-  double spindle_speed = 0.0;                   ///< [rad/s] programmed
-  double time = 0.0;                            ///< [s] between begin and end at the programmed feed
+  double begin = 0.0, end = 0.0;              ///< [m] places on the path between which the load is constant
+  double steady_from = 0.0, steady_to = 0.0;  ///< [m] the same without the margins
+  nc::PathSegment::Point from{}, to{};        ///< [m] of a cut: tool tip at steady_from and steady_to
+  std::size_t move = 0;                       ///< first move
+  int part = 1;                               ///< number among the stretches of the same line
+  int tool = 0;                               ///< T
+  ToolGeometry geometry;                      ///< of the tool
+  Engagement engagement;                      ///< of a cut, with the programmed feed
+  double feed = 0.0;                          ///< [m/s] of a cut, programmed
+  double spindle_speed = 0.0;                 ///< [rad/s] programmed
+  double time = 0.0;                          ///< [s] between begin and end at the programmed feed
 };
 
 struct StretchParameters {

@@ -37,15 +37,15 @@ class PathFollower {
   };
   struct Status {
     Follows follows = Follows::idle;
-    double place = NOT_A_NUMBER;             ///< [m] on the path
-    int line = 0;                            ///< of the program
-    int parts = 0;                           ///< begun since the start
-    double deviation = NOT_A_NUMBER;         ///< [m] of the tool from the path
-    double largest_deviation = 0.0;          ///< [m] while following
-    double angle_std = NOT_A_NUMBER;         ///< [rad] of entry or exit by the position, in a steady cut
-    bool cut_before = false;                 ///< here the part was cut before a restart
-    bool material_unknown = false;           ///< cuts before this place were skipped
-    std::size_t lost = 0, conditions = 0;    ///< losses of the path, conditions stated since the start
+    double place = NOT_A_NUMBER;           ///< [m] on the path
+    int line = 0;                          ///< of the program
+    int parts = 0;                         ///< begun since the start
+    double deviation = NOT_A_NUMBER;       ///< [m] of the tool from the path
+    double largest_deviation = 0.0;        ///< [m] while following
+    double angle_std = NOT_A_NUMBER;       ///< [rad] of entry or exit by the position, in a steady cut
+    bool cut_before = false;               ///< here the part was cut before a restart
+    bool material_unknown = false;         ///< cuts before this place were skipped
+    std::size_t lost = 0, conditions = 0;  ///< losses of the path, conditions stated since the start
   };
 
   /// @param zero [m] machine position at which the tip of the tool is at the program's zero
@@ -64,6 +64,7 @@ class PathFollower {
   using Point = nc::PathSegment::Point;
   struct Hypothesis {
     double place;        // [m]
+    double reached;      // [m] furthest place; the tool does not go back
     double first_place;  // [m] at which it arose
     double chi_square;   // of the deviations
     double deviation;    // [m]
@@ -104,11 +105,11 @@ class PathFollower {
   std::vector<Hypothesis> hypotheses_;
   Point last_tip_{};
   double last_stamp_ = 0.0, last_feed_ = 0.0;  // [s], [m/s]
-  bool followed_ = false;    // at the last state
-  bool stopped_ = true;      // since the place was last known
-  double furthest_ = -1.0;   // [m] place that the present part has reached; < 0: none
-  double cut_until_ = 0.0;   // [m] place until which it was cut before a restart
-  std::deque<Reading> readings_;  // in the present stretch
+  bool followed_ = false;                      // at the last state
+  bool stopped_ = true;                        // since the place was last known
+  double furthest_ = -1.0;                     // [m] place that the present part has reached; < 0: none
+  double cut_until_ = 0.0;                     // [m] place until which it was cut before a restart
+  std::deque<Reading> readings_;               // in the present stretch
   std::optional<std::size_t> stretch_;
   std::optional<Active> active_;
   bool other_source_ = false;
