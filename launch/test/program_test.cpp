@@ -41,19 +41,19 @@ bool wait(const std::function<bool()>& condition) {
   return true;
 }
 
-template <class Action, class Goal>
-auto resultOf(const std::string& name, const Goal& goal) {
+template <class Action, class Result, class Goal>
+Result resultOf(const std::string& name, const Goal& goal) {
   actionlib::SimpleActionClient<Action> client(names::absolute(name), false);
   EXPECT_TRUE(wait([&] { return client.isServerConnected(); })) << name;
   client.sendGoal(goal);
   EXPECT_TRUE(wait([&] { return client.getState().isDone(); })) << name;
   const auto result = client.getResult();
-  return result ? *result : typename decltype(client)::Result();
+  return result ? *result : Result();
 }
 
 /// "796.1 +- 3.2" of a diagnostic.
 struct Stated {
-  double value = NOT_A_NUMBER, std_dev = NOT_A_NUMBER;
+  double value = std::nan(""), std_dev = std::nan("");
   explicit Stated(const std::string& text) { std::sscanf(text.c_str(), "%lf +- %lf", &value, &std_dev); }
 };
 
@@ -96,7 +96,8 @@ TEST(Program, OnePartGivesTheCoefficients) {
   program.header.stamp = ros::Time::now();
   program.name = "shoulder";
   program.program = testing::contentOf(package + "/programs/shoulder.nc");
-  const auto run = resultOf<smartmill_msgs::RunProgramAction>(names::RUN_PROGRAM, program);
+  const auto run = resultOf<smartmill_msgs::RunProgramAction, smartmill_msgs::RunProgramResult>(
+      names::RUN_PROGRAM, program);
   ASSERT_EQ(run.code, smartmill_msgs::RunProgramResult::OK) << run.message;
 
   // The seven passes, with the immersion that their step gives: cos = 1 - step / R.
@@ -133,7 +134,8 @@ TEST(Program, OnePartGivesTheCoefficients) {
   identify.tool = "end_mill";
   identify.material = "al7050";
   const auto identified =
-      resultOf<smartmill_msgs::IdentifyCoefficientsAction>(names::IDENTIFY_COEFFICIENTS, identify);
+      resultOf<smartmill_msgs::IdentifyCoefficientsAction, smartmill_msgs::IdentifyCoefficientsResult>(
+          names::IDENTIFY_COEFFICIENTS, identify);
   ASSERT_EQ(identified.code, smartmill_msgs::IdentifyCoefficientsResult::OK) << identified.message;
   ASSERT_TRUE(wait([&] { return published.test_count == passes.size(); }));
   const double true_ktc = truth.cutting->ktc, true_kte = truth.cutting->kte;
