@@ -11,8 +11,7 @@ namespace {
 
 using units::MM;
 
-constexpr double CLEARANCE = 10 * MM;  // above the stock
-constexpr double RAMP = 0.05;          // [1] depth over length
+constexpr double CLEARANCE = 5 * MM;  // above and beside the stock
 
 }  // namespace
 
@@ -34,9 +33,10 @@ std::string pocketProgram(const PocketTraits& t, const MachineModel& model) {
   const ToolGeometry& tool = model.needTool("mill a pocket");
   if (!model.workpiece) throw Error(model.file + ": workpiece is missing (needed to mill a pocket)");
   const Workpiece& stock = *model.workpiece;
-  const double x = 0.5 * (stock.low[0] + stock.high[0]), y = 0.5 * (stock.low[1] + stock.high[1]);
-  const double step = t.step * tool.diameter, half = 0.5 * t.slot, reach = t.rings * step + tool.radius();
-  if (half + reach > x - stock.low[0] || reach > y - stock.low[1])
+  const double y = 0.5 * (stock.low[1] + stock.high[1]), step = t.step * tool.diameter;
+  const double outside = stock.low[0] - tool.radius() - CLEARANCE, end = stock.low[0] + t.slot;
+  const double reach = t.rings * step + tool.radius();
+  if (end + reach > stock.high[0] || y + reach > stock.high[1])
     throw Error(model.file + ": workpiece is smaller than the pocket");
   std::string text = "G90\n";
   int number = 0;
@@ -47,29 +47,24 @@ std::string pocketProgram(const PocketTraits& t, const MachineModel& model) {
     return formatted(" F%.1f", per_tooth * tool.teeth * t.speed / units::TWO_PI / MM * 60.0);
   };
   block(formatted("G0 Z%.3f", (stock.high[2] + CLEARANCE) / MM));
-  block(formatted("G0 X%.3f Y%.3f", (x - half) / MM, y / MM));
+  block(formatted("G0 X%.3f Y%.3f", outside / MM, y / MM));
   block(formatted("S%.0f M3", units::rpmFromRadPerSec(t.speed)));
   block("G4 X2.5");
   for (int level = 1; level <= t.levels; ++level) {
-    const double z = stock.high[2] - level * t.depth;
-    block(formatted("G0 Z%.3f", (z + t.depth) / MM));
-    block(formatted("G1 X%.3f Z%.3f", (x - half + t.depth / RAMP) / MM, z / MM) + feedOf(t.least_feed));
-    block(formatted("G1 X%.3f", (x - half) / MM));
-    block(formatted("G1 X%.3f", (x + half) / MM) + feedOf(t.largest_feed));
+    block(formatted("G0 X%.3f Y%.3f", outside / MM, y / MM));
+    block(formatted("G0 Z%.3f", (stock.high[2] - level * t.depth) / MM));
+    block(formatted("G1 X%.3f", end / MM) + feedOf(t.largest_feed));
+    block(formatted("G1 X%.3f", outside / MM));
     for (int ring = 1; ring <= t.rings; ++ring) {
-      const double right = x + half + ring * step, left = x - half - ring * step, up = y + ring * step,
-                   down = y - ring * step;
-      const double feed =
-          t.largest_feed + (t.least_feed - t.largest_feed) * (ring - 1) / std::max(1, t.rings - 1);
+      const double share = (ring - 1.0) / std::max(1, t.rings - 1);
       // Counterclockwise: down-milling.
-      block(formatted("G1 X%.3f Y%.3f", right / MM, down / MM) + feedOf(t.least_feed));
-      block(formatted("G1 Y%.3f", up / MM) + feedOf(feed));
-      block(formatted("G1 X%.3f", left / MM));
-      block(formatted("G1 Y%.3f", down / MM));
-      block(formatted("G1 X%.3f", right / MM));
+      block(formatted("G0 Y%.3f", (y - ring * step) / MM));
+      block(formatted("G1 X%.3f", (end + ring * step) / MM) +
+            feedOf(t.largest_feed + share * (t.least_feed - t.largest_feed)));
+      block(formatted("G1 Y%.3f", (y + ring * step) / MM));
+      block(formatted("G1 X%.3f", outside / MM));
     }
     block(formatted("G0 Z%.3f", (stock.high[2] + CLEARANCE) / MM));
-    if (level < t.levels) block(formatted("G0 X%.3f Y%.3f", (x - half) / MM, y / MM));
   }
   block("M30");
   return text;
