@@ -11,21 +11,23 @@
 namespace smartmill::loadmeter {
 namespace {
 
-/// [N m] Friction at the speed of a cut from the air cuts at this speed alone; empty without any.
+/// [N m] Friction at the speed of a cut from the air cuts at this speed alone; empty without any. Their
+/// rounding is the same in all of them, so that the mean is as certain as one.
 std::optional<Estimate> idleTorqueAt(double speed, const std::vector<LoadTest>& air_cuts,
                                      const Spindle& spindle) {
   constexpr double SAME_SPEED = 0.05;  // [1] as two speeds of a fit must differ by more
-  double weights = 0.0, sum = 0.0, difference = 0.0;
+  double weights = 0.0, sum = 0.0, deviation = 0.0, difference = 0.0;
   for (const LoadTest& air : air_cuts) {
     if (std::abs(air.speed - speed) > SAME_SPEED * speed || !(air.torqueStdAsVoltage() > 0.0)) continue;
-    const double watt = spindle.load_meter_gain * air.speed;
-    const double weight = std::pow(watt / air.torqueStdAsVoltage(), 2);
+    const double watt = spindle.load_meter_gain * air.speed, std_dev = air.torqueStdAsVoltage() / watt;
+    const double weight = 1.0 / (std_dev * std_dev);
     weights += weight;
     sum += weight * air.voltage.mean / watt;
+    deviation += weight * std_dev;
     difference = std::max(difference, std::abs(air.speed - speed));
   }
   if (!(weights > 0.0)) return std::nullopt;
-  return Estimate{sum / weights, std::sqrt(1.0 / weights + std::pow(difference * spindle.viscous, 2))};
+  return Estimate{sum / weights, std::hypot(deviation / weights, difference * spindle.viscous)};
 }
 
 }  // namespace

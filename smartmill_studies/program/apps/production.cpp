@@ -22,6 +22,7 @@
 #include "smartmill_loadmeter/identification/identification_pipeline.h"
 #include "smartmill_program/live/path_follower.h"
 #include "smartmill_program/nc/program_reader.h"
+#include "smartmill_program/prediction/stability_limits.h"
 #include "smartmill_sim/world/world.h"
 #include "study_case.h"
 
@@ -32,6 +33,7 @@ using namespace smartmill;
 constexpr double PERIOD = 0.02;                     // [s] of the controller's states
 constexpr double LATE = 0.005;                      // [s] largest delay of a stamp
 constexpr double MOST_TIME = 600.0;                 // [s] of a part
+constexpr double STABLE = 0.7;                      // [1] depth over the stability limit of a slot
 constexpr double HOLD_BACK = 0.05;                  // [s]
 constexpr std::chrono::microseconds TRANSFER(200);  // for the server's thread
 
@@ -151,7 +153,12 @@ nlohmann::json lineOf(const Arguments& a, int number) {
   MachineModel nominal = readMachineModel(a.model);
   const MachineModel machine = drawMachine(nominal, random);
   nominal.cutting.reset();
-  const std::string text = pocketProgram(drawPocket(random), nominal);
+  PocketTraits traits = drawPocket(random);
+  // The shop's depth does not chatter.
+  const program::Contact slot{{{0.0, units::PI, traits.depth}}};
+  traits.depth = std::min(traits.depth,
+                          STABLE * program::StabilityLimits(machine).limit(slot, 0.0, false, traits.speed));
+  const std::string text = pocketProgram(traits, nominal);
   const Part part = machinePart(machine, nominal, text, prepared(text, a.model, nominal), seed);
   nlohmann::json line{
       {"case", number}, {"cuts", part.cuts}, {"air", part.air}, {"lost", part.lost}, {"time", part.time}};
