@@ -14,6 +14,7 @@
 #include <ros/package.h>
 #include <ros/ros.h>
 #include <smartmill_msgs/ArmMotion.h>
+#include <smartmill_msgs/ChatterState.h>
 #include <smartmill_msgs/CncState.h>
 #include <smartmill_msgs/CuttingCoefficients.h>
 #include <smartmill_msgs/CuttingCondition.h>
@@ -85,6 +86,13 @@ TEST(Program, OnePartGivesTheCoefficients) {
       names::COEFFICIENTS, 10,
       boost::function<void(const smartmill_msgs::CuttingCoefficients&)>(
           [&](const auto& m) { published = m; }));
+  std::map<std::string, int> judged, chattered;  // windows of the chatter detection, by cut
+  const ros::Subscriber on_chatter = nh.subscribe<smartmill_msgs::ChatterState>(
+      names::CHATTER_STATE, 1000,
+      boost::function<void(const smartmill_msgs::ChatterState&)>([&](const smartmill_msgs::ChatterState& m) {
+        if (m.valid) ++judged[m.condition];
+        if (m.valid && m.chatter) ++chattered[m.condition];
+      }));
   ASSERT_TRUE(wait([&] { return state.connected && diagnostics.count("parts begun") > 0; }));
 
   smartmill_msgs::ArmMotion arm;
@@ -124,6 +132,12 @@ TEST(Program, OnePartGivesTheCoefficients) {
     EXPECT_NEAR(cuts[k].axial_depth, 1e-3, 1e-8) << cuts[k].name;
     EXPECT_NEAR(cuts[k].feed_per_tooth / units::MM, passes[k].feed, 0.01 * passes[k].feed) << cuts[k].name;
     EXPECT_EQ(cuts[k].material, "al7050");
+  }
+
+  // Each cut is judged under the name of its line.
+  for (const Condition& cut : cuts) {
+    EXPECT_GT(judged[cut.name], 0) << cut.name;
+    EXPECT_EQ(chattered[cut.name], 0) << cut.name;
   }
 
   // The running estimate of production, and an identification from the same cuts.
