@@ -11,7 +11,7 @@ namespace {
 
 using units::MM;
 
-constexpr double CLEARANCE = 5 * MM;  // above and beside the stock
+constexpr double CLEARANCE = 5 * MM;  // above the stock and next to it
 
 }  // namespace
 

@@ -16,7 +16,7 @@ namespace {
 /// [1] Longest way over displacement or over actual feed times time: corners, and stamps that are late.
 constexpr double MOST_WAY = 2.0;
 constexpr double IMPROBABLE = 25.0;       // difference of chi-square: five standard deviations
-constexpr std::size_t MOST_PLACES = 200;  // of hypotheses; more tell nothing about the place
+constexpr std::size_t MOST_PLACES = 200;  // of hypotheses; more do not distinguish places
 constexpr double ENTIRE = std::numeric_limits<double>::infinity();
 
 double distanceBetween(const std::array<double, 3>& a, const std::array<double, 3>& b) {
@@ -246,7 +246,7 @@ std::optional<std::size_t> PathFollower::stretchHere(const CncState& state) {
   return index;
 }
 
-/// Of an angle whose wall is fixed in the part, when the tool is beside its path: cos(angle) changes by the
+/// Of an angle whose wall is fixed in the part, when the tool is off its path: cos(angle) changes by the
 /// deviation over the radius. The ends 0 and pi are the tool's own.
 double PathFollower::angleStd(const SteadyStretch& stretch, double deviation) const {
   constexpr double OWN_END = 1e-3;  // [rad]

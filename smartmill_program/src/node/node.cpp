@@ -138,7 +138,7 @@ void ProgramNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) 
   if (shell_.inputs().watchdog(names::CNC_STATE).dead()) {
     status.summary(Level::STALE, std::string("no states of the controller on ") + names::CNC_STATE);
   } else if (now.follows == Follows::lost) {
-    status.summaryf(Level::WARN, "the tool is more than %.3g mm beside the path, which it left after line %d",
+    status.summaryf(Level::WARN, "the tool is more than %.3g mm off the path, which it left after line %d",
                     parameters_.follower.path_tolerance / MM, now.line);
   } else if (!others_.empty()) {
     status.summary(Level::WARN, "condition '" + others_.begin()->second + "' is stated by " +

@@ -24,7 +24,7 @@ const char* const SHOULDER =
     "G0 X-10 Y10 Z5\n"  // 2
     "G1 Z-2\n"          // 3
     "G1 X70\n"          // 4: slot
-    "G1 Y13 F1200\n"    // 5: beside the stock
+    "G1 Y13 F1200\n"    // 5: outside of the stock
     "G1 X-10 F600\n"    // 6: down-milling
     "G1 Y16\n"          // 7
     "G1 X70\n"          // 8: up-milling

@@ -49,7 +49,7 @@ class Controller {
   explicit Controller(PathFollower& follower, unsigned seed = 1) : follower_(follower), random_(seed) {}
 
   std::function<double(double time)> override_of = [](double) { return 1.0; };
-  std::array<double, 3> error{};  // [mm] of the tool beside its path
+  std::array<double, 3> error{};  // [mm] of the tool off its path
   double speed = RPS * units::TWO_PI;
   bool with_sequence = true;
 

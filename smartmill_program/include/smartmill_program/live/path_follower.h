@@ -14,7 +14,7 @@
 
 namespace smartmill::program {
 
-/// What conditions state beside the engagement.
+/// What conditions state in addition to the engagement.
 struct ConditionNames {
   std::string tool, material;
 };
