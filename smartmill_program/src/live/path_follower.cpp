@@ -118,8 +118,9 @@ void PathFollower::track(const CncState& state, const Point& tip) {
   }
   if (hypotheses_.empty()) {
     followed_ = false;
-    search(tip, state.sequence);
+    search(tip);
   }
+  keepInBlock(state.sequence);
   const Hypothesis* at = unique();
   if (at && !followed_) arrive(*at);
   followed_ = at != nullptr;
@@ -169,24 +170,24 @@ void PathFollower::keepProbable() {
   hypotheses_ = std::move(kept);
 }
 
-void PathFollower::search(const Point& tip, int sequence) {
-  const std::vector<Move>& moves = program_->path.moves();
-  std::vector<ProgramPath::Place> places =
-      program_->path.near(tip, 0.0, program_->path.length(), parameters_.path_tolerance);
-  // The N word helps where the program has it; a state between two blocks may show either.
-  const auto inBlock = [&](const ProgramPath::Place& place) {
-    return sequence > 0 && moves[place.move].sequence == sequence;
-  };
-  if (std::any_of(places.begin(), places.end(), inBlock))
-    places.erase(std::remove_if(places.begin(), places.end(),
-                                [&](const ProgramPath::Place& place) { return !inBlock(place); }),
-                 places.end());
-  for (const ProgramPath::Place& place : places) {
+void PathFollower::search(const Point& tip) {
+  for (const ProgramPath::Place& place :
+       program_->path.near(tip, 0.0, program_->path.length(), parameters_.path_tolerance)) {
     const double deviation = place.deviation / parameters_.position_std;
     hypotheses_.push_back(
         {place.distance, place.distance, place.distance, deviation * deviation, place.deviation, place.move});
   }
   keepProbable();
+}
+
+/// Of several places those in the block that the controller states, if the program has it there; a state
+/// between two blocks may show either.
+void PathFollower::keepInBlock(int sequence) {
+  if (hypotheses_.size() < 2 || sequence == 0) return;
+  std::vector<Hypothesis> in_block;
+  for (const Hypothesis& one : hypotheses_)
+    if (program_->path.hasSequence(sequence, one.place - slack_, one.place + slack_)) in_block.push_back(one);
+  if (!in_block.empty()) hypotheses_ = std::move(in_block);
 }
 
 /// A rapid move need not be straight, and the program may go to a position that it does not state.

@@ -48,12 +48,22 @@ ProgramPath::ProgramPath(std::vector<Move> moves) : moves_(std::move(moves)) {
   for (const Move& move : moves_) begin_.push_back(begin_.back() + move.path.length());
 }
 
+/// The first that ends at or after a place.
+std::size_t ProgramPath::firstMove(double from) const {
+  return static_cast<std::size_t>(std::lower_bound(begin_.begin() + 1, begin_.end(), from) - begin_.begin()) -
+         1;
+}
+
+bool ProgramPath::hasSequence(int sequence, double from, double to) const {
+  for (std::size_t m = firstMove(from); m < moves_.size() && begin_[m] <= to; ++m)
+    if (moves_[m].sequence == sequence) return true;
+  return false;
+}
+
 std::vector<ProgramPath::Place> ProgramPath::near(const Point& point, double from, double to,
                                                   double tolerance) const {
   std::vector<Place> places;
-  const auto first = std::lower_bound(begin_.begin() + 1, begin_.end(), from);
-  for (auto m = static_cast<std::size_t>(first - begin_.begin()) - 1; m < moves_.size() && begin_[m] <= to;
-       ++m) {
+  for (std::size_t m = firstMove(from); m < moves_.size() && begin_[m] <= to; ++m) {
     const PathSegment& path = moves_[m].path;
     const double along =
         nearestOn(path, point, std::max(0.0, from - begin_[m]), std::min(path.length(), to - begin_[m]));

@@ -315,6 +315,20 @@ TEST(PathFollower, TheWayBackInTheSlotIsNoCut) {
   EXPECT_EQ(controller.conditions.back().name, "part.nc air from line 5");
 }
 
+TEST(PathFollower, TheBlockDistinguishesTwoVisitsOfAPoint) {
+  // The start is visited a second time before the second slot.
+  PathFollower follower = followerOf(
+      "G21 G90 G17 S3000 M3 F600\nN10 G0 X-10 Y10 Z5\nN20 G4 X3.\nN30 G1 Z-2\nN40 G1 X40\nN50 G0 Z5\n"
+      "N60 G0 X-10 Y10\nN70 G1 Z-4\nN80 G1 X40\nN90 G0 Z5\nM30\n");
+  Controller controller(follower);
+  controller.run({{10, {-10, 10, 5}, RAPID}});
+  EXPECT_EQ(follower.status().follows, PathFollower::Follows::ambiguous);
+  for (int i = 0; i < 150; ++i) controller.poll(CncRun::start, 0.0, 20);
+  EXPECT_EQ(follower.status().follows, PathFollower::Follows::following);
+  ASSERT_EQ(controller.conditions.size(), 1u);
+  EXPECT_EQ(controller.conditions[0].name, "part.nc air from line 3");
+}
+
 TEST(PathFollower, ADwellInTheCutIsNoCondition) {
   PathFollower follower =
       followerOf("G21 G90 G17 S3000 M3 F600\nG0 X-10 Y10 Z5\nG1 Z-2\nG1 X30\nG4 X3.\nG1 X50\nG0 Z5\nM30\n");

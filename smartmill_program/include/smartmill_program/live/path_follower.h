@@ -83,7 +83,8 @@ class PathFollower {
   void track(const CncState& state, const Point& tip);
   void restart();
   void advance(const Point& tip, double most);
-  void search(const Point& tip, int sequence);
+  void search(const Point& tip);
+  void keepInBlock(int sequence);
   void keepProbable();
   void loseIfInFeed();
   void arrive(const Hypothesis& at);

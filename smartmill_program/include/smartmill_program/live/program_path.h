@@ -29,7 +29,12 @@ class ProgramPath {
   std::vector<Place> near(const nc::PathSegment::Point& point, double from, double to,
                           double tolerance) const;
 
+  /// Whether a move or dwell with an N word reaches into a part of the path [m].
+  bool hasSequence(int sequence, double from, double to) const;
+
  private:
+  std::size_t firstMove(double from) const;
+
   std::vector<Move> moves_;
   std::vector<double> begin_;  // [m] of each move, and the end of the last
 };
