@@ -8,7 +8,7 @@ import sys
 from packages import includes, packages, report, text
 
 ROS = re.compile(r"(ros|rosbag|roslib|actionlib|tf2|tf2_\w+|diagnostic_updater|topic_tools|smartmill_ros|\w+_msgs)/")
-ROS_FREE = {"smartmill_core", "smartmill_focas", "smartmill_recording", "smartmill_program"}
+ROS_FREE = {"smartmill_core", "smartmill_focas", "smartmill_recording"}
 SHELLS = {"smartmill_ros", "smartmill_msgs"}  # ROS everywhere
 COMMON = {"smartmill_core", "smartmill_focas", "smartmill_recording", "smartmill_ros", "smartmill_msgs"}
 MAY_INCLUDE = {
@@ -17,7 +17,7 @@ MAY_INCLUDE = {
     "smartmill_recording": {"smartmill_core"},
     "smartmill_ros": {"smartmill_core", "smartmill_recording", "smartmill_msgs"},
     "smartmill_discrepancy": COMMON | {"smartmill_sim"},  # runs the twin
-    "smartmill_program": {"smartmill_core", "smartmill_stability"},  # limits of a program's engagements
+    "smartmill_program": COMMON | {"smartmill_stability"},  # limits of a program's engagements
     "smartmill_studies": None,  # every library
     "smartmill_cli": None,  # the commands of every library
     "smartmill_python": None,  # every library

@@ -37,7 +37,7 @@ AnalysisResult ProgramAnalysis::run(const std::vector<Move>& moves, const Visit&
       stock_, [&](int tool) { return models_.radius(tool); }, options_.simulation);
   std::size_t done = 0;
   const auto onStep = [&](const Step& step) {
-    const StepPrediction prediction = predictor.predict(step);
+    const StepPrediction prediction = options_.prediction ? predictor.predict(step) : StepPrediction();
     result.blocks.back().add(step, prediction, models_.radius(step.move->tool));
     result.volume += step.volume();
     if (visit) visit(step, prediction);

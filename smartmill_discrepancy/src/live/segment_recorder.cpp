@@ -11,6 +11,18 @@
 #include "smartmill_core/units.h"
 
 namespace smartmill::discrepancy {
+namespace {
+
+/// The forces of a campaign's cut are those of a feed along +x of the machine.
+bool feedsAlongX(const CuttingCondition& condition) {
+  constexpr double STRAIGHT = 1e-3;  // [1]
+  const auto& from = condition.steady_from;
+  const auto& to = condition.steady_to;
+  return std::hypot(to[1] - from[1], to[2] - from[2]) <= STRAIGHT * (to[0] - from[0]);
+}
+
+}  // namespace
+
 SegmentRecorder::SegmentRecorder(const SegmentParameters& parameters,
                                  std::function<void(const RecordSegment&)> deliver,
                                  const SteadinessOptions& limits)
@@ -44,7 +56,8 @@ void SegmentRecorder::handle(const CuttingCondition& condition) {
 void SegmentRecorder::handle(const CncState& state) {
   if (!condition_ || condition_->kind == CuttingCondition::Kind::none) return;
   const bool cut = condition_->kind == CuttingCondition::Kind::cut;
-  const bool path = !cut || onSteadyPath(*condition_, state, parameters_.path_tolerance);
+  const bool path =
+      !cut || (feedsAlongX(*condition_) && onSteadyPath(*condition_, state, parameters_.path_tolerance));
   const bool steady = path && std::abs(state.spindle_speed / condition_->spindle_speed - 1.0) < limits_.speed;
   if (steady && !steady_since_) steady_since_ = state.stamp;
   if (!steady && steady_since_) {

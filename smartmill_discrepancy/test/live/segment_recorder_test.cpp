@@ -24,6 +24,7 @@ struct Machine {
   double settling_at = -1.0;  // [s] time of a block in which the compensation settles
   double stops = 1e300;       // [s] the controller's position leaves the path from here on
   double acceleration = 0.0;  // [rad/s2] of the spindle
+  bool backwards = false;     // the feed is along -x
 };
 
 /// A second of straight cutting through the recorder; fx counts samples.
@@ -41,7 +42,7 @@ std::vector<RecordSegment> run(const Machine& machine, double length = 0.3) {
   condition.spindle_speed = SPEED;
   condition.engagement.feed_per_tooth = 1e-4;
   condition.engagement.axial_depth = 1e-3;
-  condition.steady_to = {{0.1, 0.0, 0.0}};
+  condition.steady_to = {{machine.backwards ? -0.1 : 0.1, 0.0, 0.0}};
   recorder.push(condition);
   for (int k = 0; k < 100; ++k) {  // 10 ms each
     const double t = 0.01 * k, stamp = machine.begin + t;
@@ -49,7 +50,8 @@ std::vector<RecordSegment> run(const Machine& machine, double length = 0.3) {
       CncState state;
       state.stamp = stamp;
       state.axes = {"X", "Y", "Z"};
-      state.position = {FEED * (t - machine.started_cutting), machine.feed_offset, 0.0};
+      state.position = {(machine.backwards ? -FEED : FEED) * (t - machine.started_cutting),
+                        machine.feed_offset, 0.0};
       if (t > machine.stops) state.position[2] = 0.01;
       state.spindle_speed = machine.actual_speed;
       recorder.push(state);
@@ -111,6 +113,12 @@ TEST(SegmentRecorder, CutsSteadyCuttingIntoEqualSegments) {
       ASSERT_NEAR(std::remainder(angle[i] - PHASE - SPEED * fx[i] / RATE, units::TWO_PI), 0.0, 1e-6);
     }
   }
+}
+
+TEST(SegmentRecorder, LeavesOutCutsOfAnotherFeedDirection) {
+  Machine machine;
+  machine.backwards = true;
+  EXPECT_TRUE(run(machine).empty());
 }
 
 // running_before and cut_time_before of the segments, needed by the twin.

@@ -128,7 +128,8 @@ void LoadMeterIdentification::storeTest(LoadTest test) {
   std::optional<Estimate> torque;
   if (cut) {
     torque = torqueOf(test);
-    const auto record = production_.add(test, torque);
+    const double own_std = test.torqueStdAsVoltage() / (spindle_.load_meter_gain * test.speed);
+    const auto record = production_.add(test, torque, own_std);
     if (record && outputs_.cut) outputs_.cut(*record);
   }
   forces_.calibrate(test, torque, session_.air_cuts);

@@ -9,6 +9,28 @@
 #include "smartmill_loadmeter/calibration/load_meter.h"
 
 namespace smartmill::loadmeter {
+namespace {
+
+/// [N m] Friction at the speed of a cut from the air cuts at this speed alone; empty without any. Their
+/// rounding is the same in all of them, so that the mean is as certain as one.
+std::optional<Estimate> idleTorqueAt(double speed, const std::vector<LoadTest>& air_cuts,
+                                     const Spindle& spindle) {
+  constexpr double SAME_SPEED = 0.05;  // [1] as two speeds of a fit must differ by more
+  double weights = 0.0, sum = 0.0, deviation = 0.0, difference = 0.0;
+  for (const LoadTest& air : air_cuts) {
+    if (std::abs(air.speed - speed) > SAME_SPEED * speed || !(air.torqueStdAsVoltage() > 0.0)) continue;
+    const double watt = spindle.load_meter_gain * air.speed, std_dev = air.torqueStdAsVoltage() / watt;
+    const double weight = 1.0 / (std_dev * std_dev);
+    weights += weight;
+    sum += weight * air.voltage.mean / watt;
+    deviation += weight * std_dev;
+    difference = std::max(difference, std::abs(air.speed - speed));
+  }
+  if (!(weights > 0.0)) return std::nullopt;
+  return Estimate{sum / weights, std::hypot(deviation / weights, difference * spindle.viscous)};
+}
+
+}  // namespace
 
 IdleTorque idleTorque(const std::vector<LoadTest>& air_cuts, const Spindle& spindle,
                       double spindle_uncertainty_percent) {
@@ -66,9 +88,9 @@ IdleTorque idleTorque(const std::vector<LoadTest>& air_cuts, const Spindle& spin
 
 std::optional<Estimate> cuttingTorque(const LoadTest& cut, const std::vector<LoadTest>& air_cuts,
                                       const Spindle& spindle, double spindle_uncertainty_percent) {
+  const double watt = spindle.load_meter_gain * cut.speed;
   try {
     const IdleTorque idle = idleTorque(air_cuts, spindle, spindle_uncertainty_percent);
-    const double watt = spindle.load_meter_gain * cut.speed;
     const std::vector<double> gradient = idle.gradient(cut);
     double variance = std::pow(cut.torqueStdAsVoltage() / watt, 2);
     for (std::size_t i = 0; i < idle.unknowns; ++i) {
@@ -78,7 +100,10 @@ std::optional<Estimate> cuttingTorque(const LoadTest& cut, const std::vector<Loa
     }
     return Estimate{cut.voltage.mean / watt - idle.torque(cut), std::sqrt(variance)};
   } catch (const Error&) {
-    return std::nullopt;
+    const std::optional<Estimate> idle = idleTorqueAt(cut.speed, air_cuts, spindle);
+    if (!idle) return std::nullopt;
+    return Estimate{cut.voltage.mean / watt - idle->value,
+                    std::hypot(cut.torqueStdAsVoltage() / watt, idle->std_dev)};
   }
 }
 

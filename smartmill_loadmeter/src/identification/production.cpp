@@ -44,6 +44,7 @@ void RecursiveCoefficients::update(const TorqueMeasurement& reading) {
   // Forgotten information is replaced by the initial one about the present value.
   const double keep = std::exp(-reading.cutting_time / memory_);
   for (std::size_t i = 0; i < 3; ++i) information_[i] = keep * information_[i] + (1.0 - keep) * start_[i];
+  for (double& p : pull_) p *= keep;
   const TorqueSensitivity s = torqueSensitivity(reading.tool, reading.engagement);
   const double variance = reading.torque_std * reading.torque_std;
   const double d0 = determinant(information_);
@@ -51,22 +52,30 @@ void RecursiveCoefficients::update(const TorqueMeasurement& reading) {
       (s.tc * s.tc * information_[2] - 2.0 * s.tc * s.te * information_[1] + s.te * s.te * information_[0]) /
       d0;
   const double error = reading.torque - s.tc * value_[0] - s.te * value_[1];
-  innovation_ = error / std::sqrt(variance + expected);
+  innovation_ = error / std::sqrt(variance + expected + reading.common_std * reading.common_std);
   add(information_, s, variance);
+  pull_[0] += s.tc * reading.common_std / variance;
+  pull_[1] += s.te * reading.common_std / variance;
   const double d = determinant(information_);
   value_[0] += (information_[2] * s.tc - information_[1] * s.te) / d * error / variance;
   value_[1] += (information_[0] * s.te - information_[1] * s.tc) / d * error / variance;
   ++readings_;
 }
 
+/// Shift of the estimate by one standard deviation of the common error.
+std::array<double, 2> RecursiveCoefficients::common() const {
+  const double d = determinant(information_);
+  return {(information_[2] * pull_[0] - information_[1] * pull_[1]) / d,
+          (information_[0] * pull_[1] - information_[1] * pull_[0]) / d};
+}
 double RecursiveCoefficients::ktcStd() const {
-  return std::sqrt(information_[2] / determinant(information_));
+  return std::hypot(std::sqrt(information_[2] / determinant(information_)), common()[0]);
 }
 double RecursiveCoefficients::kteStd() const {
-  return std::sqrt(information_[0] / determinant(information_));
+  return std::hypot(std::sqrt(information_[0] / determinant(information_)), common()[1]);
 }
 double RecursiveCoefficients::covariance() const {
-  return -information_[1] / determinant(information_);
+  return -information_[1] / determinant(information_) + common()[0] * common()[1];
 }
 
 namespace {

@@ -1,19 +1,21 @@
 #include "smartmill_loadmeter/identification/production_run.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace smartmill::loadmeter {
 
 std::optional<CoefficientRecord> ProductionRun::add(const LoadTest& cut,
-                                                    const std::optional<Estimate>& torque) {
-  if (!torque || !(torque->std_dev > 0.0)) return std::nullopt;
+                                                    const std::optional<Estimate>& torque, double own_std) {
+  if (!torque || !(own_std > 0.0)) return std::nullopt;
   const CuttingCondition& c = cut.condition;
   const std::string of = c.tool_name + "\n" + c.material;
   if (!estimate_ || of != of_) {
     estimate_.emplace(RecursiveCoefficients::Start(), memory_);
     of_ = of;
   }
-  estimate_->update({c.tool, c.engagement, torque->value, torque->std_dev, cut.duration});
+  const double friction_std = std::sqrt(std::max(0.0, torque->std_dev * torque->std_dev - own_std * own_std));
+  estimate_->update({c.tool, c.engagement, torque->value, own_std, cut.duration, friction_std});
   double& age = edge_age_[c.tool_name];
   age += cut.duration;
 

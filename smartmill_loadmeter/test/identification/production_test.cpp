@@ -100,6 +100,28 @@ TEST(Recursive, standardDeviationsAreCalibrated) {
   EXPECT_TRUE(kte.isCalibrated());
 }
 
+// All torques are wrong by one draw of the common error: that of the friction, from a few air cuts.
+TEST(Recursive, aCommonErrorOfTheTorquesIsPartOfTheDeviations) {
+  Coverage ktc, kte;
+  constexpr double COMMON = 0.02;
+  for (int run = 0; run < Coverage::RUNS; ++run) {
+    std::mt19937 random(static_cast<unsigned>(run) + 1);
+    std::normal_distribution<double> normal;
+    const double shift = COMMON * normal(random);
+    RecursiveCoefficients recursive({}, 1e12);
+    for (int i = 0; i < 60; ++i) {
+      TorqueMeasurement one = reading(random, 953e6, 17.3e3, 0.01);
+      one.torque += shift;
+      one.common_std = COMMON;
+      recursive.update(one);
+    }
+    ktc.add(recursive.ktc() - 953e6, recursive.ktcStd());
+    kte.add(recursive.kte() - 17.3e3, recursive.kteStd());
+  }
+  EXPECT_TRUE(ktc.isCalibrated());
+  EXPECT_TRUE(kte.isCalibrated());
+}
+
 TEST(Recursive, followsEdgeWear) {
   std::mt19937 random(7);
   RecursiveCoefficients recursive({}, 120.0);

@@ -14,7 +14,8 @@ namespace smartmill::program {
 
 struct AnalysisOptions {
   SimulationOptions simulation;
-  bool stability = true;  ///< computes stability limits for models with modes of the tool tip
+  bool prediction = true;  ///< forces and limits; requires coefficients in the models
+  bool stability = true;   ///< computes stability limits for models with modes of the tool tip
 };
 
 struct AnalysisResult {

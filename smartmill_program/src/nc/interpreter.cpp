@@ -34,7 +34,7 @@ void Interpreter::execute(Block& block, std::size_t number, int line) {
   line_ = line;
   block.take('O');
   block.take(':');
-  block.take('N');
+  if (const Word* word = block.take('N')) sequence_ = nc::integer(*word);
   setModes(block);
   const std::optional<Word>& single = block.code(Group::none);
   if (single && codeOf(*single) == 4) {
@@ -209,6 +209,7 @@ void Interpreter::add(const PathSegment& path, bool rapid, double feed, double d
   Move move;
   move.block = number_;
   move.line = line_;
+  move.sequence = sequence_;
   move.operation = operation_;
   move.path = path;
   move.rapid = rapid;

@@ -64,6 +64,7 @@ class Interpreter {
   std::optional<nc::Word> motion_word_;
 
   // modal
+  int sequence_ = 0;  // last N word
   Position position_;
   int motion_ = -1;  // -1: none; 80: cancelled
   nc::Plane plane_ = nc::Plane::xy;

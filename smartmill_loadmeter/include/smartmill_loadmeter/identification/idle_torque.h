@@ -26,8 +26,9 @@ struct IdleTorque {
 IdleTorque idleTorque(const std::vector<LoadTest>& air_cuts, const Spindle& spindle,
                       double spindle_uncertainty_percent);
 
-/// Mean cutting torque [N m] of a cut by the load meter: eq. 3.5 without the friction of the air cuts. Empty
-/// when the friction is unknown, because a single air cut does not determine it.
+/// Mean cutting torque [N m] of a cut by the load meter: eq. 3.5 without the friction of the air cuts. Air
+/// cuts at one speed determine the friction of cuts at this speed only (within 5 %): of other cuts the torque
+/// is empty.
 std::optional<Estimate> cuttingTorque(const LoadTest& cut, const std::vector<LoadTest>& air_cuts,
                                       const Spindle& spindle, double spindle_uncertainty_percent);
 

@@ -15,14 +15,16 @@ struct TorqueMeasurement {
   ToolGeometry tool;
   Engagement engagement;
   double torque = 0.0;        ///< [N m] mean cutting torque
-  double torque_std = 0.0;    ///< [N m] > 0
+  double torque_std = 0.0;    ///< [N m] > 0, independent of other measurements
   double cutting_time = 0.0;  ///< [s] of the edge since the previous measurement
+  double common_std = 0.0;  ///< [N m] part of the error that all measurements share: friction of the spindle
 };
 
 /// Running estimate of Ktc and Kte over production cuts: recursive least squares of the mean torque (eq. 3.19
 /// for any engagement) with exponential forgetting in cutting time, so that it follows wear. Directions
 /// without excitation (one feed only) return to the initial uncertainty, not beyond. The standard deviations
-/// allow for a drift within the memory; for constant coefficients they are up to sqrt(2) times the errors.
+/// allow for a drift within the memory; for constant coefficients they are up to sqrt(2) times the errors. A
+/// common error of the torques moves the estimate, and is not reduced by more cuts.
 class RecursiveCoefficients {
  public:
   struct Start {
@@ -45,8 +47,11 @@ class RecursiveCoefficients {
   int readings() const { return readings_; }
 
  private:
+  std::array<double, 2> common() const;
+
   std::array<double, 2> value_;
   std::array<double, 3> information_{}, start_{};  // xx, xy, yy
+  std::array<double, 2> pull_{};                   // information times the shift by one common deviation
   double memory_;
   double innovation_ = 0.0;
   int readings_ = 0;

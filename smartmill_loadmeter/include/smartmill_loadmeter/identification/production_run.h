@@ -17,10 +17,12 @@ class ProductionRun {
   /// @param memory [s], see RecursiveCoefficients.
   explicit ProductionRun(double memory) : memory_(memory) {}
 
-  /// @param torque [N m] of the cut. @return condition, age of the edge and the running estimate; empty
-  /// without a torque. The standard deviations are those of one of the n cuts in the estimate, so that the
-  /// combined records of a sequence of cuts are as certain as the estimate.
-  std::optional<CoefficientRecord> add(const LoadTest& cut, const std::optional<Estimate>& torque);
+  /// @param torque [N m] of the cut, with the friction of the air cuts subtracted. @param own_std [N m] part
+  /// of its standard deviation that is not of the friction. @return condition, age of the edge and the
+  /// running estimate; empty without a torque. The standard deviations are those of one of the n cuts in the
+  /// estimate, so that the combined records of a sequence of cuts are as certain as the estimate.
+  std::optional<CoefficientRecord> add(const LoadTest& cut, const std::optional<Estimate>& torque,
+                                       double own_std);
 
   /// Since the last change of tool or material; empty before a cut with known friction.
   const std::optional<RecursiveCoefficients>& estimate() const { return estimate_; }

@@ -11,6 +11,7 @@ namespace smartmill::program {
 struct Move {
   std::size_t block = 0;  ///< executed block, from 0; the blocks of a subprogram count at each call
   int line = 0;           ///< in the file, from 1
+  int sequence = 0;       ///< last N word until the block, which a control displays; 0: none so far
   std::string operation;  ///< "G0" ... "G3", "G81" ..., "G4"
   nc::PathSegment path{nc::PathSegment::Point{{0, 0, 0}}};
   bool rapid = false;

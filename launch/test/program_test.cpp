@@ -1,0 +1,179 @@
+// A program on the simulated mill, sent without a condition: program_node states the cuts, and the load meter
+// identifies the coefficients from them.
+
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <actionlib/client/simple_action_client.h>
+#include <diagnostic_msgs/DiagnosticArray.h>
+#include <gtest/gtest.h>
+#include <ros/package.h>
+#include <ros/ros.h>
+#include <smartmill_msgs/ArmMotion.h>
+#include <smartmill_msgs/ChatterState.h>
+#include <smartmill_msgs/CncState.h>
+#include <smartmill_msgs/CuttingCoefficients.h>
+#include <smartmill_msgs/CuttingCondition.h>
+#include <smartmill_msgs/IdentifyCoefficientsAction.h>
+#include <smartmill_msgs/RunProgramAction.h>
+
+#include "launched.h"
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/names.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill {
+namespace {
+
+constexpr double TIMEOUT = 240.0;  // [s] time limit on a busy computer
+using Condition = smartmill_msgs::CuttingCondition;
+
+bool wait(const std::function<bool()>& condition) {
+  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(TIMEOUT);
+  while (!condition()) {
+    if (ros::WallTime::now() > end || !ros::ok()) return false;
+    ros::spinOnce();
+    ros::WallDuration(0.02).sleep();
+  }
+  return true;
+}
+
+template <class Action, class Result, class Goal>
+Result resultOf(const std::string& name, const Goal& goal) {
+  actionlib::SimpleActionClient<Action> client(names::absolute(name), false);
+  EXPECT_TRUE(wait([&] { return client.isServerConnected(); })) << name;
+  client.sendGoal(goal);
+  EXPECT_TRUE(wait([&] { return client.getState().isDone(); })) << name;
+  const auto result = client.getResult();
+  return result ? *result : Result();
+}
+
+/// "796.1 +- 3.2" of a diagnostic.
+struct Stated {
+  double value = std::nan(""), std_dev = std::nan("");
+  explicit Stated(const std::string& text) { std::sscanf(text.c_str(), "%lf +- %lf", &value, &std_dev); }
+};
+
+TEST(Program, OnePartGivesTheCoefficients) {
+  const std::string package = ros::package::getPath("smartmill_launch");
+  const MachineModel truth = readMachineModel(package + "/models/mill_twin.yaml");
+  ros::NodeHandle nh("smartmill");
+  std::vector<Condition> conditions;
+  std::map<std::string, std::string> diagnostics;  // of the load meter and the program, by key
+  smartmill_msgs::CncState state;
+  smartmill_msgs::CuttingCoefficients published;
+  const ros::Subscriber on_condition = nh.subscribe<Condition>(
+      names::CUTTING_CONDITION, 1000,
+      boost::function<void(const Condition&)>([&](const Condition& c) { conditions.push_back(c); }));
+  const ros::Subscriber on_diagnostics = nh.subscribe<diagnostic_msgs::DiagnosticArray>(
+      "/diagnostics", 1000,
+      boost::function<void(const diagnostic_msgs::DiagnosticArray&)>([&](const auto& array) {
+        for (const auto& status : array.status) {
+          if (status.name.find("load meter") == std::string::npos &&
+              status.name.find("NC program") == std::string::npos)
+            continue;
+          for (const auto& item : status.values) diagnostics[item.key] = item.value;
+        }
+      }));
+  const ros::Subscriber on_state = nh.subscribe<smartmill_msgs::CncState>(
+      names::CNC_STATE, 1000,
+      boost::function<void(const smartmill_msgs::CncState&)>([&](const auto& m) { state = m; }));
+  const ros::Subscriber on_coefficients = nh.subscribe<smartmill_msgs::CuttingCoefficients>(
+      names::COEFFICIENTS, 10,
+      boost::function<void(const smartmill_msgs::CuttingCoefficients&)>(
+          [&](const auto& m) { published = m; }));
+  std::map<std::string, int> judged, chattered;  // windows of the chatter detection, by cut
+  const ros::Subscriber on_chatter = nh.subscribe<smartmill_msgs::ChatterState>(
+      names::CHATTER_STATE, 1000,
+      boost::function<void(const smartmill_msgs::ChatterState&)>([&](const smartmill_msgs::ChatterState& m) {
+        if (m.valid) ++judged[m.condition];
+        if (m.valid && m.chatter) ++chattered[m.condition];
+      }));
+  ASSERT_TRUE(wait([&] { return state.connected && diagnostics.count("parts begun") > 0; }));
+
+  smartmill_msgs::ArmMotion arm;
+  arm.request.arm = 1;
+  ASSERT_TRUE(ros::service::call(names::absolute(names::ARM_MOTION), arm));
+  ASSERT_EQ(arm.response.code, 0) << arm.response.message;
+  ASSERT_TRUE(wait([&] { return state.armed != 0; }));
+  smartmill_msgs::RunProgramGoal program;
+  program.header.stamp = ros::Time::now();
+  program.name = "shoulder";
+  program.program = testing::contentOf(package + "/programs/shoulder.nc");
+  const auto run = resultOf<smartmill_msgs::RunProgramAction, smartmill_msgs::RunProgramResult>(
+      names::RUN_PROGRAM, program);
+  ASSERT_EQ(run.code, smartmill_msgs::RunProgramResult::OK) << run.message;
+
+  // The seven passes, with the immersion that their step gives: cos = 1 - step / R.
+  struct Pass {
+    int line;
+    double entry, exit, feed;  // [deg], [mm] per tooth
+  };
+  const double third = units::degFromRad(std::acos(1.0 - 6.35 / 9.525));
+  const std::vector<Pass> passes{{13, 0, 180, 0.1},    {18, 0, 60, 0.2},    {21, 90, 180, 0.1},
+                                 {24, 0, third, 0.05}, {27, 120, 180, 0.2}, {32, 0, 180, 0.15},
+                                 {35, 90, 180, 0.1}};
+  std::vector<Condition> cuts;
+  std::size_t air = 0;
+  for (const Condition& condition : conditions) {
+    if (condition.kind == Condition::CUT) cuts.push_back(condition);
+    if (condition.kind == Condition::AIR) ++air;
+  }
+  EXPECT_GE(air, 2u);  // two speeds
+  ASSERT_EQ(cuts.size(), passes.size());
+  for (std::size_t k = 0; k < passes.size(); ++k) {
+    EXPECT_EQ(cuts[k].name, "shoulder.nc line " + std::to_string(passes[k].line));
+    EXPECT_NEAR(units::degFromRad(cuts[k].entry_angle), passes[k].entry, 0.1) << cuts[k].name;
+    EXPECT_NEAR(units::degFromRad(cuts[k].exit_angle), passes[k].exit, 0.1) << cuts[k].name;
+    EXPECT_NEAR(cuts[k].axial_depth, 1e-3, 1e-8) << cuts[k].name;
+    EXPECT_NEAR(cuts[k].feed_per_tooth / units::MM, passes[k].feed, 0.01 * passes[k].feed) << cuts[k].name;
+    EXPECT_EQ(cuts[k].material, "al7050");
+  }
+
+  // Each cut is judged under the name of its line.
+  for (const Condition& cut : cuts) {
+    EXPECT_GT(judged[cut.name], 0) << cut.name;
+    EXPECT_EQ(chattered[cut.name], 0) << cut.name;
+  }
+
+  // The running estimate of production, and an identification from the same cuts.
+  ASSERT_TRUE(wait([&] { return diagnostics["cuts"] == std::to_string(passes.size()); }));
+  const Stated ktc(diagnostics["production Ktc [N/mm2]"]), kte(diagnostics["production Kte [N/mm]"]);
+  smartmill_msgs::IdentifyCoefficientsGoal identify;
+  identify.header.stamp = ros::Time::now();
+  identify.tool = "end_mill";
+  identify.material = "al7050";
+  const auto identified =
+      resultOf<smartmill_msgs::IdentifyCoefficientsAction, smartmill_msgs::IdentifyCoefficientsResult>(
+          names::IDENTIFY_COEFFICIENTS, identify);
+  ASSERT_EQ(identified.code, smartmill_msgs::IdentifyCoefficientsResult::OK) << identified.message;
+  ASSERT_TRUE(wait([&] { return published.test_count == passes.size(); }));
+  const double true_ktc = truth.cutting->ktc, true_kte = truth.cutting->kte;
+  std::printf("running estimate: Ktc %.1f +- %.1f N/mm2 (true %.1f), Kte %.2f +- %.2f N/mm (true %.2f)\n",
+              ktc.value, ktc.std_dev, true_ktc / units::N_PER_MM2, kte.value, kte.std_dev,
+              true_kte / units::N_PER_MM);
+  std::printf("identified: %s\n", identified.message.c_str());
+  EXPECT_NEAR(ktc.value * units::N_PER_MM2, true_ktc, 0.03 * true_ktc);
+  EXPECT_NEAR(kte.value * units::N_PER_MM, true_kte, 0.05 * true_kte);
+  EXPECT_NEAR(ktc.value * units::N_PER_MM2, true_ktc, 4.0 * ktc.std_dev * units::N_PER_MM2);
+  EXPECT_NEAR(published.ktc, true_ktc, 0.03 * true_ktc);
+  EXPECT_NEAR(published.kte, true_kte, 0.05 * true_kte);
+  EXPECT_NEAR(published.ktc, true_ktc, 4.0 * published.ktc_std);
+  EXPECT_NEAR(published.kte, true_kte, 4.0 * published.kte_std);
+  EXPECT_EQ(diagnostics["parts begun"], "1");
+  EXPECT_EQ(diagnostics["losses of the path"], "0");
+}
+
+}  // namespace
+}  // namespace smartmill
+
+int main(int argc, char** argv) {
+  ros::init(argc, argv, "program_test");
+  ros::NodeHandle keep_ros_running;
+  ::testing::InitGoogleTest(&argc, argv);
+  return RUN_ALL_TESTS();
+}

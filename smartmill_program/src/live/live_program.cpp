@@ -1,0 +1,205 @@
+#include "smartmill_program/live/live_program.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "smartmill_core/error.h"
+#include "smartmill_program/program_analysis.h"
+
+namespace smartmill::program {
+namespace {
+
+constexpr double LEVEL = 1.0 - 1e-9;  // [1] horizontal share of a feed without ramp, despite rounding
+
+bool isSteadyCut(const Step& step) {
+  const Move& move = *step.move;
+  return !move.rapid && !move.left_hand && !move.path.isArc() && step.feed_share >= LEVEL &&
+         step.contact.arcs.size() == 1;
+}
+
+struct Bounds {
+  double low, high;
+  void add(double value) {
+    low = std::min(low, value);
+    high = std::max(high, value);
+  }
+  double rangeWith(double value) const { return std::max(high, value) - std::min(low, value); }
+};
+
+/// Joins steps and dwells while their load is constant.
+class StretchFinder {
+ public:
+  StretchFinder(LiveProgram& program, ToolModels& tools, const StretchParameters& parameters)
+      : program_(program), tools_(tools), parameters_(parameters) {}
+
+  void add(const Step& step) {
+    const auto move = static_cast<std::size_t>(step.move - moves().data());
+    if (move != move_ || !any_step_) {
+      dwellBefore(move);
+      at_ = program_.path.begin(move);
+      move_ = move;
+      any_step_ = true;
+    }
+    const double begin = at_, end = at_ + step.length;
+    at_ = end;
+    const bool contact = !step.air();
+    if (contact) addContact(begin, end);
+    const bool cut = contact && isSteadyCut(step), air = !contact && step.move->spindle_speed > 0.0;
+    if (run_ && !(cut && continuesCut(step)) && !(air && continuesAir(*step.move))) close(contact);
+    in_contact_ = contact;
+    if (!cut && !air) return;
+    if (!run_) start(move, cut, begin);
+    run_->stretch.end = end;
+    run_->stretch.time += step.time;
+    run_->last_feed = step.move->rapid ? 0.0 : step.move->feed;
+    if (cut) addToCut(step);
+  }
+
+  void finish() {
+    dwellBefore(moves().size());
+    if (run_) close(false);
+  }
+
+ private:
+  struct Run {
+    SteadyStretch stretch;
+    double last_feed = 0.0;    // [m/s] 0: rapid
+    double step_length = 0.0;  // [m]
+    std::optional<Bounds> entry, exit, depth;
+  };
+  const std::vector<Move>& moves() const { return program_.path.moves(); }
+
+  /// The dwells after the moves since the last step. A tool at rest is in air if it was before.
+  void dwellBefore(std::size_t move) {
+    for (std::size_t m = move_; m < move; ++m) {
+      const Move& resting = moves()[m];
+      if (run_ && !continuesAir(resting)) close(false);
+      if (resting.dwell == 0.0 || resting.spindle_speed == 0.0 || in_contact_) continue;
+      const double place = program_.path.begin(m + 1);
+      if (!run_) start(m, false, place);
+      run_->stretch.end = place;
+      run_->stretch.time += resting.dwell;
+    }
+  }
+
+  void addContact(double begin, double end) {
+    constexpr double ROUNDING = 1e-9;  // [m]
+    if (!program_.contact.empty() && program_.contact.back().to >= begin - ROUNDING) {
+      program_.contact.back().to = end;
+    } else {
+      program_.contact.push_back({begin, end});
+    }
+  }
+
+  bool continuesCut(const Step& step) const {
+    if (!run_->stretch.cut || run_->stretch.move != move_) return false;
+    return run_->entry->rangeWith(step.contact.entry()) <= parameters_.angle_tolerance &&
+           run_->exit->rangeWith(step.contact.exit()) <= parameters_.angle_tolerance &&
+           run_->depth->rangeWith(step.contact.axialDepth()) <=
+               parameters_.depth_tolerance * step.contact.axialDepth();
+  }
+  bool continuesAir(const Move& move) const {
+    return !run_->stretch.cut && move.tool == run_->stretch.tool &&
+           move.spindle_speed == run_->stretch.spindle_speed;
+  }
+
+  void start(std::size_t move, bool cut, double begin) {
+    SteadyStretch& stretch = run_.emplace().stretch;
+    stretch.cut = cut;
+    stretch.begin = begin;
+    stretch.move = move;
+    stretch.tool = moves()[move].tool;
+    stretch.geometry = *tools_.of(stretch.tool).tool;
+    stretch.spindle_speed = moves()[move].spindle_speed;
+    stretch.feed = cut ? moves()[move].feed : 0.0;
+    sum_ = {};
+  }
+
+  void addToCut(const Step& step) {
+    const auto extend = [](std::optional<Bounds>& bounds, double value) {
+      if (!bounds) bounds = Bounds{value, value};
+      bounds->add(value);
+    };
+    extend(run_->entry, step.contact.entry());
+    extend(run_->exit, step.contact.exit());
+    extend(run_->depth, step.contact.axialDepth());
+    run_->step_length = step.length;
+    sum_.entry += step.length * step.contact.entry();
+    sum_.exit += step.length * step.contact.exit();
+    sum_.axial_depth += step.length * step.contact.axialDepth();
+  }
+
+  /// @param contact whether the tool cuts after the run
+  void close(bool contact) {
+    const Run run = *std::exchange(run_, std::nullopt);
+    SteadyStretch stretch = run.stretch;
+    if (stretch.time < parameters_.least_time) return;
+    const double revolution = units::TWO_PI / stretch.spindle_speed;
+    const double margin = std::max(parameters_.margin_time, revolution);
+    if (stretch.cut) {
+      const double length = stretch.end - stretch.begin;
+      stretch.engagement = {sum_.entry / length, sum_.exit / length, sum_.axial_depth / length,
+                            stretch.feed * revolution / stretch.geometry.teeth};
+      // The engagement is that of the middle of a step.
+      const double way = std::max(stretch.feed * margin, run.step_length);
+      stretch.steady_from = stretch.begin + way;
+      stretch.steady_to = stretch.end - way;
+      if (!(stretch.steady_to > stretch.steady_from)) return;
+      const double begin = program_.path.begin(stretch.move);
+      stretch.from = moves()[stretch.move].path.at(stretch.steady_from - begin);
+      stretch.to = moves()[stretch.move].path.at(stretch.steady_to - begin);
+    } else {
+      stretch.steady_from = stretch.begin;
+      stretch.steady_to = std::max(stretch.begin, stretch.end - (contact ? run.last_feed * margin : 0.0));
+    }
+    stretch.part = ++parts_[{stretch.cut, moves()[stretch.move].line}];
+    program_.stretches.push_back(stretch);
+  }
+
+  LiveProgram& program_;
+  ToolModels& tools_;
+  const StretchParameters& parameters_;
+  double at_ = 0.0;       // [m] end of the last step
+  std::size_t move_ = 0;  // of the last step
+  bool any_step_ = false, in_contact_ = false;
+  std::optional<Run> run_;
+  Engagement sum_;                             // over the steps of a cut, times length
+  std::map<std::pair<bool, int>, int> parts_;  // by kind and line
+};
+
+void refuseRapidHits(const std::string& name, const std::vector<BlockSummary>& blocks) {
+  const auto hit =
+      std::find_if(blocks.begin(), blocks.end(), [](const BlockSummary& block) { return block.rapid_hit; });
+  if (hit != blocks.end())
+    throw Error(name + ": line " + std::to_string(hit->line) + ": " + hit->operation +
+                ": a rapid move hits the stock, expected the stock's size and corner in the program's "
+                "coordinates");
+}
+
+}  // namespace
+
+bool LiveProgram::cutsBetween(double from, double to) const {
+  const auto next = std::find_if(contact.begin(), contact.end(),
+                                 [from](const Interval& interval) { return interval.to > from; });
+  return next != contact.end() && next->from < to;
+}
+
+LiveProgram prepareProgram(const std::string& name, std::vector<Move> moves, ToolModels& tools, Stock& stock,
+                           const SimulationOptions& simulation, const StretchParameters& parameters) {
+  LiveProgram program{name, ProgramPath(std::move(moves)), {}, {}};
+  StretchFinder finder(program, tools, parameters);
+  AnalysisOptions options;
+  options.simulation = simulation;
+  options.prediction = false;
+  ProgramAnalysis analysis(name, tools, stock, options);
+  const AnalysisResult result =
+      analysis.run(program.path.moves(), [&](const Step& step, const StepPrediction&) { finder.add(step); });
+  finder.finish();
+  refuseRapidHits(name, result.blocks);
+  return program;
+}
+
+}  // namespace smartmill::program

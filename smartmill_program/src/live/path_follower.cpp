@@ -1,0 +1,320 @@
+#include "smartmill_program/live/path_follower.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <set>
+#include <utility>
+
+#include "smartmill_core/axis_names.h"
+#include "smartmill_core/formatted.h"
+
+namespace smartmill::program {
+namespace {
+
+/// [1] Longest way over displacement or over actual feed times time: corners, and stamps that are late.
+constexpr double MOST_WAY = 2.0;
+constexpr double IMPROBABLE = 25.0;       // difference of chi-square: five standard deviations
+constexpr std::size_t MOST_PLACES = 200;  // of hypotheses; more do not distinguish places
+constexpr double ENTIRE = std::numeric_limits<double>::infinity();
+
+double distanceBetween(const std::array<double, 3>& a, const std::array<double, 3>& b) {
+  return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+}
+
+}  // namespace
+
+PathFollower::PathFollower(std::shared_ptr<const LiveProgram> program, const std::array<double, 3>& zero,
+                           const ConditionNames& names, const FollowerParameters& parameters)
+    : program_(std::move(program)),
+      zero_(zero),
+      names_(names),
+      parameters_(parameters),
+      slack_(2.0 * parameters.path_tolerance) {
+  checkBounds(parameters);
+  std::set<int> tools;
+  for (const Move& move : program_->path.moves()) tools.insert(move.tool);
+  several_tools_ = tools.size() > 1;
+}
+
+std::optional<CuttingCondition> PathFollower::handle(const CncState& state) {
+  if (state.stamp < last_stamp_) restart();
+  const std::optional<Point> tip = runs(state) ? tipOf(state) : std::nullopt;
+  if (!tip) {
+    hypotheses_.clear();
+    followed_ = false;
+    stopped_ = true;
+    status_.follows = Follows::idle;
+    status_.deviation = status_.angle_std = NOT_A_NUMBER;
+    last_stamp_ = state.stamp;
+    return end(state.stamp);
+  }
+  track(state, *tip);
+  last_tip_ = *tip;
+  last_feed_ = state.feed;
+  last_stamp_ = state.stamp;
+
+  const std::optional<std::size_t> here = stretchHere(state);
+  if (here != stretch_) readings_.clear();
+  stretch_ = here;
+  if (!here) return end(state.stamp);
+  readings_.push_back({state.stamp, state.feed, state.spindle_speed});
+  while (readings_.size() > 2 && readings_[1].stamp <= state.stamp - parameters_.steady_time)
+    readings_.pop_front();
+  if (active_ && active_->stretch == *here) {
+    const bool cut = program_->stretches[*here].cut;
+    if (std::abs(state.spindle_speed - active_->speed) <= parameters_.speed_tolerance * active_->speed &&
+        (!cut || std::abs(state.feed - active_->feed) <= parameters_.feed_tolerance * active_->feed))
+      return std::nullopt;
+    readings_.erase(readings_.begin(), readings_.end() - 1);
+    return end(state.stamp);
+  }
+  if (active_) return end(state.stamp);
+  if (other_source_ || !isSteady()) return std::nullopt;
+  return begin(*here, state.stamp);
+}
+
+/// Time has jumped back: a recording begins again.
+void PathFollower::restart() {
+  hypotheses_.clear();
+  readings_.clear();
+  stretch_.reset();
+  followed_ = false;
+  stopped_ = true;
+  furthest_ = -1.0;
+  cut_until_ = 0.0;
+  status_ = {};
+}
+
+void PathFollower::setOtherSource(bool other) {
+  other_source_ = other;
+  if (other) active_.reset();
+}
+
+bool PathFollower::runs(const CncState& state) const {
+  return state.connected && (state.run == CncRun::start || state.run == CncRun::hold) &&
+         (parameters_.number == 0 || state.program == parameters_.number);
+}
+
+std::optional<PathFollower::Point> PathFollower::tipOf(const CncState& state) const {
+  Point tip{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    const std::optional<std::size_t> axis = controllerAxis(state.axes, a);
+    if (!axis || *axis >= state.position.size() || !std::isfinite(state.position[*axis])) return std::nullopt;
+    tip[a] = state.position[*axis] - zero_[a];
+  }
+  return tip;
+}
+
+void PathFollower::track(const CncState& state, const Point& tip) {
+  const double time = state.stamp - last_stamp_;
+  if (!hypotheses_.empty() && time <= parameters_.longest_gap) {
+    advance(tip, MOST_WAY * std::max(state.feed, last_feed_) * time);
+    if (hypotheses_.empty()) loseIfInFeed();
+  } else {
+    hypotheses_.clear();
+    readings_.clear();
+  }
+  if (hypotheses_.empty()) {
+    followed_ = false;
+    search(tip);
+  }
+  keepInBlock(state.sequence);
+  const Hypothesis* at = unique();
+  if (at && !followed_) arrive(*at);
+  followed_ = at != nullptr;
+  if (!hypotheses_.empty()) {
+    status_.follows = at ? Follows::following : Follows::ambiguous;
+  } else if (status_.follows != Follows::lost) {
+    status_.follows = Follows::searching;
+  }
+  if (!at) return;
+  furthest_ = std::max(furthest_, at->place);
+  status_.place = at->place;
+  status_.line = program_->path.moves()[at->move].line;
+  status_.deviation = at->deviation;
+  status_.largest_deviation = std::max(status_.largest_deviation, at->deviation);
+}
+
+/// The tool has moved at least its displacement along the path. @param most [m] way by its feed
+void PathFollower::advance(const Point& tip, double most) {
+  const double displacement = distanceBetween(tip, last_tip_), least = displacement - 2.0 * slack_;
+  most = std::max(most, MOST_WAY * displacement) + slack_;
+  std::vector<Hypothesis> next;
+  for (const Hypothesis& from : hypotheses_) {
+    for (const ProgramPath::Place& place :
+         program_->path.near(tip, from.reached - slack_, from.place + most, parameters_.path_tolerance)) {
+      if (place.distance - from.place < least) continue;
+      const double deviation = place.deviation / parameters_.position_std;
+      next.push_back({place.distance, std::max(from.reached, place.distance), from.first_place,
+                      from.chi_square + deviation * deviation, place.deviation, place.move});
+    }
+  }
+  hypotheses_ = std::move(next);
+  keepProbable();
+}
+
+/// Of several hypotheses at one place the most probable, and none that is improbable.
+void PathFollower::keepProbable() {
+  std::sort(hypotheses_.begin(), hypotheses_.end(),
+            [](const Hypothesis& a, const Hypothesis& b) { return a.chi_square < b.chi_square; });
+  std::vector<Hypothesis> kept;
+  for (const Hypothesis& one : hypotheses_) {
+    if (one.chi_square > hypotheses_.front().chi_square + IMPROBABLE || kept.size() >= MOST_PLACES) break;
+    const bool known = std::any_of(kept.begin(), kept.end(), [&](const Hypothesis& other) {
+      return std::abs(other.place - one.place) <= slack_;
+    });
+    if (!known) kept.push_back(one);
+  }
+  hypotheses_ = std::move(kept);
+}
+
+void PathFollower::search(const Point& tip) {
+  for (const ProgramPath::Place& place :
+       program_->path.near(tip, 0.0, program_->path.length(), parameters_.path_tolerance)) {
+    const double deviation = place.deviation / parameters_.position_std;
+    hypotheses_.push_back(
+        {place.distance, place.distance, place.distance, deviation * deviation, place.deviation, place.move});
+  }
+  keepProbable();
+}
+
+/// Of several places those in the block that the controller states, if the program has it there; a state
+/// between two blocks may show either.
+void PathFollower::keepInBlock(int sequence) {
+  if (hypotheses_.size() < 2 || sequence == 0) return;
+  std::vector<Hypothesis> in_block;
+  for (const Hypothesis& one : hypotheses_)
+    if (program_->path.hasSequence(sequence, one.place - slack_, one.place + slack_)) in_block.push_back(one);
+  if (!in_block.empty()) hypotheses_ = std::move(in_block);
+}
+
+/// A rapid move need not be straight, and the program may go to a position that it does not state.
+void PathFollower::loseIfInFeed() {
+  if (!followed_) return;
+  const std::vector<Move>& moves = program_->path.moves();
+  const auto leads = [&](double place) {
+    const auto near = program_->path.near(last_tip_, place - slack_, place + slack_, ENTIRE);
+    const std::size_t move = near.empty() ? moves.size() : near.front().move;
+    if (move >= moves.size() || moves[move].rapid) return true;
+    const bool ends = program_->path.begin(move + 1) - place <= slack_;
+    return ends && (move + 1 == moves.size() || moves[move + 1].rapid ||
+                    moves[move + 1].path.start() != moves[move].path.target());
+  };
+  if (leads(status_.place)) return;
+  status_.follows = Follows::lost;
+  ++status_.lost;
+}
+
+/// The place has become known: a new part, or the present one continued.
+void PathFollower::arrive(const Hypothesis& at) {
+  const double first_cut = program_->contact.empty() ? 0.0 : program_->contact.front().from;
+  if (at.first_place <= first_cut && (furthest_ < 0.0 || furthest_ > first_cut)) {
+    ++status_.parts;
+    furthest_ = cut_until_ = 0.0;
+    status_.material_unknown = false;
+  } else if (furthest_ >= 0.0 && stopped_) {
+    if (at.place < furthest_ - slack_) cut_until_ = furthest_;
+    if (at.first_place > furthest_ + slack_ && program_->cutsBetween(furthest_, at.first_place))
+      status_.material_unknown = true;
+  }
+  if (furthest_ < 0.0) ++status_.parts;
+  stopped_ = false;
+}
+
+std::optional<std::size_t> PathFollower::stretchHere(const CncState& state) {
+  status_.angle_std = NOT_A_NUMBER;
+  status_.cut_before = false;
+  const Hypothesis* at = unique();
+  if (!at || state.run != CncRun::start) return std::nullopt;
+  const std::vector<SteadyStretch>& stretches = program_->stretches;
+  const auto next =
+      std::upper_bound(stretches.begin(), stretches.end(), at->place + slack_,
+                       [](double place, const SteadyStretch& stretch) { return place < stretch.begin; });
+  if (next == stretches.begin()) return std::nullopt;
+  const SteadyStretch& stretch = *(next - 1);
+  const auto index = static_cast<std::size_t>(next - 1 - stretches.begin());
+  if (!stretch.cut) {
+    if (at->place > stretch.steady_to + slack_) return std::nullopt;
+    return index;
+  }
+  status_.cut_before = stretch.begin < cut_until_;
+  if (at->place < stretch.begin || at->place > stretch.steady_to || !(state.feed > 0.0) ||
+      status_.cut_before || status_.material_unknown)
+    return std::nullopt;
+  status_.angle_std = angleStd(stretch, at->deviation);
+  return index;
+}
+
+/// Of an angle whose wall is fixed in the part, when the tool is off its path: cos(angle) changes by the
+/// deviation over the radius. The ends 0 and pi are the tool's own.
+double PathFollower::angleStd(const SteadyStretch& stretch, double deviation) const {
+  constexpr double OWN_END = 1e-3;  // [rad]
+  const double shift = std::hypot(parameters_.position_std, deviation) / stretch.geometry.radius();
+  double largest = 0.0;
+  for (const double angle : {stretch.engagement.entry, stretch.engagement.exit}) {
+    if (angle < OWN_END || angle > units::PI - OWN_END) continue;
+    for (const double sign : {-1.0, 1.0})
+      largest = std::max(largest,
+                         std::abs(std::acos(std::clamp(std::cos(angle) + sign * shift, -1.0, 1.0)) - angle));
+  }
+  return largest;
+}
+
+bool PathFollower::isSteady() const {
+  constexpr double ROUNDING = 1e-6;  // [s] of stamps
+  if (readings_.back().stamp - readings_.front().stamp < parameters_.steady_time - ROUNDING) return false;
+  const auto steady = [&](double Reading::*value, double tolerance) {
+    const auto [low, high] =
+        std::minmax_element(readings_.begin(), readings_.end(),
+                            [value](const Reading& a, const Reading& b) { return a.*value < b.*value; });
+    return (*low).*value > 0.0 && (*high).*value - (*low).*value <= tolerance * (*high).*value;
+  };
+  const bool cut = program_->stretches[*stretch_].cut;
+  return steady(&Reading::speed, parameters_.speed_tolerance) &&
+         (!cut || steady(&Reading::feed, parameters_.feed_tolerance));
+}
+
+CuttingCondition PathFollower::begin(std::size_t index, double stamp) {
+  const SteadyStretch& stretch = program_->stretches[index];
+  Active active{index, 0.0, 0.0};
+  for (const Reading& reading : readings_) {
+    active.feed += reading.feed / static_cast<double>(readings_.size());
+    active.speed += reading.speed / static_cast<double>(readings_.size());
+  }
+  active_ = active;
+  ++status_.conditions;
+  const int count = ++stated_[index];
+
+  CuttingCondition condition;
+  condition.stamp = stamp;
+  condition.kind = stretch.cut ? CuttingCondition::Kind::cut : CuttingCondition::Kind::air;
+  condition.name = std::filesystem::path(program_->name).filename().string() +
+                   (stretch.cut ? "" : " air from") +
+                   formatted(" line %d", program_->path.moves()[stretch.move].line) +
+                   (stretch.part > 1 ? formatted(" stretch %d", stretch.part) : "") +
+                   (count > 1 ? formatted(" (%d)", count) : "");
+  condition.material = names_.material;
+  condition.tool_name = names_.tool + (several_tools_ ? formatted(" T%d", stretch.tool) : "");
+  condition.tool = stretch.geometry;
+  condition.spindle_speed = active.speed;
+  if (!stretch.cut) return condition;
+  condition.engagement = stretch.engagement;
+  condition.engagement.feed_per_tooth = active.feed * units::TWO_PI / (active.speed * stretch.geometry.teeth);
+  for (std::size_t a = 0; a < 3; ++a) {
+    condition.steady_from[a] = stretch.from[a] + zero_[a];
+    condition.steady_to[a] = stretch.to[a] + zero_[a];
+  }
+  return condition;
+}
+
+std::optional<CuttingCondition> PathFollower::end(double stamp) {
+  if (!active_) return std::nullopt;
+  active_.reset();
+  CuttingCondition none;
+  none.stamp = stamp;
+  return none;
+}
+
+}  // namespace smartmill::program

@@ -1,0 +1,173 @@
+#include "node/node.h"
+
+#include <algorithm>
+#include <memory>
+#include <sstream>
+#include <utility>
+#include <vector>
+
+#include <ros/this_node.h>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/names.h"
+#include "smartmill_core/units.h"
+#include "smartmill_program/nc/program_reader.h"
+#include "smartmill_ros/conversions.h"
+#include "smartmill_ros/node_main.h"
+#include "smartmill_ros/parameter_server.h"
+#include "smartmill_ros/run_node.h"
+
+namespace smartmill::program {
+namespace {
+
+using units::MM;
+
+std::vector<std::string> wordsOf(const std::string& text) {
+  std::istringstream words(text);
+  return {std::istream_iterator<std::string>(words), {}};
+}
+
+/// Workpiece of the first model that states one.
+const Workpiece& workpieceOf(const ToolModels& models, const std::string& key) {
+  for (const auto& [number, model] : models.models())
+    if (model.workpiece) return *model.workpiece;
+  throw Error(key + ": not stated, expected a value here or a model with a workpiece");
+}
+
+StockBlock blockOf(const NodeParameters& parameters, const ToolModels& models) {
+  const std::array<double, 3>& size = parameters.stock_size;
+  const bool own = std::any_of(size.begin(), size.end(), [](double s) { return s > 0.0; });
+  StockBlock block;
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (own) {
+      block.low[a] = parameters.stock_corner[a];
+      block.high[a] = block.low[a] + size[a];
+    } else {
+      const Workpiece& workpiece = workpieceOf(models, "stock_size");
+      block.low[a] = workpiece.low[a] - parameters.program_zero[a];
+      block.high[a] = workpiece.high[a] - parameters.program_zero[a];
+    }
+  }
+  return block;
+}
+
+PathFollower followerOf(const NodeParameters& parameters) {
+  if (parameters.program.empty()) throw Error("program: expected the path of an NC program");
+  if (parameters.models.empty()) throw Error("models: expected the path of a smartmill-model/1 file");
+  std::vector<Move> moves = readProgram(parameters.program);
+  ToolModels models(wordsOf(parameters.models));
+  for (const Move& move : moves) models.of(move.tool);
+  Stock stock(blockOf(parameters, models), parameters.resolution);
+  SimulationOptions simulation;
+  simulation.step_share = parameters.step_share;
+  simulation.rapid = models.rapid();
+  const auto program = std::make_shared<const LiveProgram>(
+      prepareProgram(parameters.program, std::move(moves), models, stock, simulation, parameters.stretches));
+  const ConditionNames names{parameters.tool, parameters.material.empty()
+                                                  ? workpieceOf(models, "material").material
+                                                  : parameters.material};
+  const auto cuts = std::count_if(program->stretches.begin(), program->stretches.end(),
+                                  [](const SteadyStretch& stretch) { return stretch.cut; });
+  ROS_INFO("%s: %zu moves, %td steady cuts, %td stretches in air", parameters.program.c_str(),
+           program->path.moves().size(), cuts, static_cast<std::ptrdiff_t>(program->stretches.size()) - cuts);
+  if (cuts == 0)
+    ROS_WARN("%s: no cut is steady for %.3g s (least_time)", parameters.program.c_str(),
+             parameters.stretches.least_time);
+  return {program, parameters.program_zero, names, parameters.follower};
+}
+
+}  // namespace
+
+ProgramNode::ProgramNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
+    : parameters_(parametersFromServer(private_nh).readAll<NodeParameters>()),
+      follower_(followerOf(parameters_)),
+      shell_(nh, private_nh, "NC program", parameters_.input_timeout),
+      publisher_(
+          nh.advertise<smartmill_msgs::CuttingCondition>(names::CUTTING_CONDITION, STREAM_QUEUE, true)) {
+  conditions_ = nh.subscribe<smartmill_msgs::CuttingCondition>(
+      names::CUTTING_CONDITION, STREAM_QUEUE,
+      boost::function<void(const ConditionEvent&)>([this](const ConditionEvent& event) { handle(event); }));
+  shell_.inputs().on<CncState>(names::CNC_STATE, [this](const CncState& state, double) { handle(state); });
+  shell_.diagnose("NC program", [this](auto& status) { diagnose(status); });
+}
+
+/// A node that was killed in a steady stretch has left its condition. The latched ones of other nodes come
+/// first.
+void ProgramNode::endPredecessor(double stamp) {
+  constexpr double LATCHED = 1.0;  // [s] for their delivery
+  if (ended_predecessor_) return;
+  if (!first_state_) first_state_ = stamp;
+  if (stamp - *first_state_ < LATCHED) return;
+  ended_predecessor_ = true;
+  if (!others_.empty() || follower_.states()) return;
+  CuttingCondition none;
+  none.stamp = stamp;
+  publisher_.publish(toMsg(none));
+}
+
+void ProgramNode::handle(const CncState& state) {
+  endPredecessor(state.stamp);
+  if (const std::optional<CuttingCondition> condition = follower_.handle(state)) {
+    condition_ = condition->name;
+    publisher_.publish(toMsg(*condition));
+  }
+  const PathFollower::Status& status = follower_.status();
+  if (status.lost > losses_) ROS_WARN("the tool has left the path of the program after line %d", status.line);
+  losses_ = status.lost;
+}
+
+void ProgramNode::handle(const ConditionEvent& event) {
+  const std::string& from = event.getPublisherName();
+  if (from == ros::this_node::getName()) return;
+  const smartmill_msgs::CuttingCondition& condition = *event.getConstMessage();
+  if (condition.kind == smartmill_msgs::CuttingCondition::NONE) {
+    others_.erase(from);
+  } else {
+    if (follower_.states())
+      ROS_WARN("'%s' of %s replaces '%s'", condition.name.c_str(), from.c_str(), condition_.c_str());
+    others_[from] = condition.name;
+    condition_.clear();
+  }
+  follower_.setOtherSource(!others_.empty());
+}
+
+void ProgramNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  using Level = diagnostic_msgs::DiagnosticStatus;
+  using Follows = PathFollower::Follows;
+  const PathFollower::Status& now = follower_.status();
+  if (shell_.inputs().watchdog(names::CNC_STATE).dead()) {
+    status.summary(Level::STALE, std::string("no states of the controller on ") + names::CNC_STATE);
+  } else if (now.follows == Follows::lost) {
+    status.summaryf(Level::WARN, "the tool is more than %.3g mm off the path, which it left after line %d",
+                    parameters_.follower.path_tolerance / MM, now.line);
+  } else if (!others_.empty()) {
+    status.summary(Level::WARN, "condition '" + others_.begin()->second + "' is stated by " +
+                                    others_.begin()->first + ", none by this node");
+  } else if (now.follows == Follows::following && now.material_unknown) {
+    status.summary(Level::WARN, "cuts before this place were skipped: the material is not known");
+  } else if (now.follows == Follows::following && now.cut_before) {
+    status.summary(Level::WARN, "the program cuts here a second time: the material is not known");
+  } else if (now.follows == Follows::following) {
+    status.summaryf(Level::OK, "line %d", now.line);
+  } else if (now.follows == Follows::ambiguous) {
+    status.summary(Level::OK, "the tool may be at several places of the path");
+  } else {
+    status.summary(Level::OK,
+                   now.follows == Follows::idle ? "no program runs" : "the tool has not come to the path");
+  }
+  status.add("program", parameters_.program);
+  status.add("condition", condition_);
+  status.add("place on the path [m]", now.place);
+  status.add("deviation from the path [m]", now.deviation);
+  status.add("largest deviation [m]", now.largest_deviation);
+  status.add("standard deviation of the engagement by the position [deg]", units::degFromRad(now.angle_std));
+  status.add("parts begun", now.parts);
+  status.add("conditions stated", now.conditions);
+  status.add("losses of the path", now.lost);
+}
+
+}  // namespace smartmill::program
+
+int smartmill::nodeMain(int argc, char** argv) {
+  return runNode<program::ProgramNode>(argc, argv, "program");
+}

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <array>
+#include <string>
+
+#include "smartmill_core/parameters/parameter_table.h"
+#include "smartmill_program/live/follower_parameters.h"
+#include "smartmill_program/live/live_program.h"
+
+namespace smartmill::program {
+
+/// Parameters of program_node.
+struct NodeParameters {
+  std::string program, models;
+  std::array<double, 3> stock_size{{0, 0, 0}}, stock_corner{{0, 0, 0}}, program_zero{{0, 0, 0}};
+  double resolution = 1.0e-4;
+  double step_share = SimulationOptions().step_share;
+  std::string tool = "end_mill", material;
+  StretchParameters stretches;
+  FollowerParameters follower;
+  double input_timeout = 1.0;
+
+  void declare(ParameterTable& table) {
+    table.title(
+        "Parameters of program_node (package smartmill_program): cutting conditions of a running NC "
+        "program.");
+    table.atLaunch("program", program, "path of the NC program");
+    table.atLaunch(
+        "models", models,
+        "path of a smartmill-model/1 file with the tool; N=FILE for tool N of several, separated by "
+        "blanks");
+    table.section("Stock and zero.");
+    table.list(
+        "stock_size", stock_size, "m", Range::notNegative(),
+        "size of the stock along X, Y, Z; all 0: the workpiece of the model, and stock_corner is unused");
+    table.list("stock_corner", stock_corner, "m", Range(),
+               "corner of the stock of least X, Y, Z in the coordinates of the program");
+    table.list("program_zero", program_zero, "m", Range(),
+               "machine position at which the tip of the tool is at the zero of the program");
+    table.number("resolution", resolution, "m", Range::openLow(0.0, 0.01),
+                 "width of the columns of the stock");
+    table.number("step_share", step_share, "1", Range::openLow(0.0, 1.0), "length of a step per tool radius");
+    table.section("Names in conditions and results.");
+    table.text("tool", tool, "name of the tool; of several, T and its number are appended");
+    table.text("material", material, "workpiece material; empty: that of the model's workpiece");
+    table.section("Steady stretches.");
+    stretches.declare(table);
+    table.section("Place of the tool on the path.");
+    follower.declare(table);
+    table.section();
+    table.number("input_timeout", input_timeout, "s", Range::positive(),
+                 "time without a state of the controller after which diagnostics report a dead input");
+  }
+  /// @throws Error naming key and value.
+  void validate() const { checkBounds(*this); }
+};
+
+}  // namespace smartmill::program
