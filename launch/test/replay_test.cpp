@@ -78,8 +78,8 @@ TEST(Replay, OfAShortSessionIsTheSameToTheLastDigit) {
   EXPECT_NE(summary_text.find("bandwidth", motors), std::string::npos) << summary_text;
   if (with_page)
     page_check.emplace(page, "replayed", "tool/frf panel/revolution panel/spectrum panel/strip cnc/load");
-  run("roslaunch -p " + freePort() + " smartmill_launch replay.launch rate:=0 bag:=" +
-          live + " out:=" + again + panel,
+  run("roslaunch -p " + freePort() + " smartmill_launch replay.launch rate:=0 bag:=" + live +
+          " out:=" + again + panel,
       log);
   if (page_check) page_replayed = page_check->fault();
   const std::string replayed = contentOf(log);

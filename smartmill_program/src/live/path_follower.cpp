@@ -170,13 +170,11 @@ void PathFollower::keepProbable() {
   hypotheses_ = std::move(kept);
 }
 
+/// The deviation of a tool that comes to the path from outside rejects no place.
 void PathFollower::search(const Point& tip) {
   for (const ProgramPath::Place& place :
-       program_->path.near(tip, 0.0, program_->path.length(), parameters_.path_tolerance)) {
-    const double deviation = place.deviation / parameters_.position_std;
-    hypotheses_.push_back(
-        {place.distance, place.distance, place.distance, deviation * deviation, place.deviation, place.move});
-  }
+       program_->path.near(tip, 0.0, program_->path.length(), parameters_.path_tolerance))
+    hypotheses_.push_back({place.distance, place.distance, place.distance, 0.0, place.deviation, place.move});
   keepProbable();
 }
 

@@ -321,7 +321,11 @@ TEST(PathFollower, TheBlockDistinguishesTwoVisitsOfAPoint) {
       "G21 G90 G17 S3000 M3 F600\nN10 G0 X-10 Y10 Z5\nN20 G4 X3.\nN30 G1 Z-2\nN40 G1 X40\nN50 G0 Z5\n"
       "N60 G0 X-10 Y10\nN70 G1 Z-4\nN80 G1 X40\nN90 G0 Z5\nM30\n");
   Controller controller(follower);
-  controller.run({{10, {-10, 10, 5}, RAPID}});
+  // The last state of the rapid move is 0.15 mm before the point, nearer to the path of N60 along x.
+  controller.at = {-10.1, 10.11, 5};
+  controller.poll(CncRun::start, 10.0, 10);
+  controller.at = {-10, 10, 5};
+  controller.poll(CncRun::start, 0.0, 10);
   EXPECT_EQ(follower.status().follows, PathFollower::Follows::ambiguous);
   for (int i = 0; i < 150; ++i) controller.poll(CncRun::start, 0.0, 20);
   EXPECT_EQ(follower.status().follows, PathFollower::Follows::following);

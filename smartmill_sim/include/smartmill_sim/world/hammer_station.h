@@ -106,7 +106,7 @@ class HammerStation {
   bool fired_ = false;
   std::size_t fired_axis_ = 0;
   std::optional<std::size_t> facing_axis_;  // axis of the station that the tool faces
-  Pose pose_;  // position along the station's axes
+  Pose pose_;                               // position along the station's axes
   std::optional<Pose> surface_pose_;
   int samples_since_update_ = 0;
   bool touched_ = false;
