@@ -42,8 +42,8 @@ Mode nearest(const ModalModel& model, const Mode& mode) {
   return found;
 }
 
-/// The errors of sensors, tip correction and scatter along each axis of the station, which the fit to the
-/// sum of their FRFs does not know.
+/// The errors of sensors, tip correction and scatter along each axis of the station, which the scatter of
+/// the lines of their sum does not contain.
 void addErrors(const ModalModel& first, const ModalModel& second, double c, double s, ModalModel& model) {
   for (Mode& mode : model.modes) {
     const Mode a = nearest(first, mode), b = nearest(second, mode);
