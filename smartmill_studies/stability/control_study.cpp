@@ -137,7 +137,7 @@ class ControlledCut {
       wanted_ = asked_->spindle * cut_.speed;
       feed_ = asked_->feed;
       asked_.reset();
-      control_.answer(true, "");
+      control_.answer(true, "", time_);
     }
     const double most = options_.spindle_acceleration * step_;
     speed_ += std::clamp(wanted_ - speed_, -most, most);

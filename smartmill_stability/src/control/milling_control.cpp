@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "smartmill_core/error.h"
@@ -55,7 +56,7 @@ void MillingControl::handle(const CncState& state) {
   if (phase_ == Phase::watching || !cut_) return;
   const double requested = cut_->spindle_speed * spindle_;
   const bool reached = std::abs(state.spindle_speed - requested) <= CONTROL.reached * requested;
-  if (phase_ == Phase::moving && reached) {
+  if (phase_ == Phase::moving && reached && std::isfinite(since_)) {
     phase_ = Phase::settling;
     since_ = state.stamp;
   } else if (phase_ == Phase::moving && state.stamp - since_ > parameters_.settle_time) {
@@ -151,7 +152,7 @@ void MillingControl::moveTo(const ChatterAdvice& advice, const StableSpeed& spee
   const double spindle = speed.speed / cut_->spindle_speed;
   ++moves_;
   phase_ = Phase::moving;
-  since_ = moved_at_ = advice.stamp;
+  since_ = std::numeric_limits<double>::infinity();
   request(
       feedFor(spindle), spindle,
       formatted("chatter at %.0f Hz, %.0f rpm: spindle to %.0f rpm (%.1f %%), feed to %.1f %%; depth %.2f mm "
@@ -177,7 +178,7 @@ void MillingControl::moveWithoutModel(const ChatterAdvice& advice) {
   const double spindle = best / cut_->spindle_speed;
   ++moves_;
   phase_ = Phase::moving;
-  since_ = moved_at_ = advice.stamp;
+  since_ = std::numeric_limits<double>::infinity();
   request(
       feedFor(spindle), spindle,
       formatted(
@@ -217,8 +218,11 @@ std::optional<OverrideRequest> MillingControl::takeRequest() {
   return std::exchange(request_, std::nullopt);
 }
 
-void MillingControl::answer(bool accepted, const std::string& message) {
-  if (accepted) return;
+void MillingControl::answer(bool accepted, const std::string& message, double stamp) {
+  if (accepted) {
+    if (phase_ == Phase::moving && std::isinf(since_)) since_ = moved_at_ = stamp;
+    return;
+  }
   feed_ = old_feed_;
   spindle_ = old_spindle_;
   phase_ = Phase::watching;

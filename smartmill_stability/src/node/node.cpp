@@ -140,7 +140,8 @@ void StabilityNode::override() {
   if (answer_.valid()) {
     if (answer_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
     const smartmill_msgs::SetOverrides::Response answer = answer_.get();
-    control_.answer(answer.code == smartmill_msgs::SetOverrides::Response::OK, answer.message);
+    control_.answer(answer.code == smartmill_msgs::SetOverrides::Response::OK, answer.message,
+                    toSec(ros::Time::now()));
   }
   const std::optional<OverrideRequest> request = control_.takeRequest();
   if (!request) return;

@@ -102,7 +102,7 @@ TEST_F(Control, reportsAStableCutAfterTheMove) {
   control_->handle(advice(1.0, 1.5));
   const auto request = control_->takeRequest();
   ASSERT_TRUE(request);
-  control_->answer(true, "");
+  control_->answer(true, "", 1.05);
   EXPECT_TRUE(control_->moving());
   const double speed = request->spindle * cut_.spindle_speed, turn = units::TWO_PI / speed;
   state(1.1, speed);
@@ -138,7 +138,7 @@ TEST_F(Control, withoutAStableSpeedTheFeedGoesToItsFloor) {
   EXPECT_EQ(request->feed, 0.4);
   EXPECT_EQ(request->spindle, 1.0);
   EXPECT_NE(request->reason.find("no speed from 8000 to 12000 rpm"), std::string::npos) << request->reason;
-  control_->answer(true, "");
+  control_->answer(true, "", 1.0);
   control_->handle(advice(2.0, 1.5));
   EXPECT_FALSE(control_->takeRequest());
   // The next cut starts from the programmed values.
@@ -161,7 +161,7 @@ TEST_F(Control, theProposedNextCutIsStable) {
 TEST_F(Control, aRefusalIsReportedOnceAndEndsTheAttemptsInThisCut) {
   control_->handle(advice(1.0, 1.5));
   ASSERT_TRUE(control_->takeRequest());
-  control_->answer(false, "overrides: controlled by the panel");
+  control_->answer(false, "overrides: controlled by the panel", 1.0);
   EXPECT_EQ(control_->spindle(), 1.0);
   const auto notes = control_->takeNotes();
   ASSERT_EQ(notes.size(), 1u);
@@ -174,12 +174,30 @@ TEST_F(Control, aRefusalIsReportedOnceAndEndsTheAttemptsInThisCut) {
 TEST_F(Control, aSpindleThatDoesNotReachItsSpeedEndsTheAttempts) {
   control_->handle(advice(1.0, 1.5));
   ASSERT_TRUE(control_->takeRequest());
-  control_->answer(true, "");
+  control_->answer(true, "", 1.2);
   state(1.5, cut_.spindle_speed);
   EXPECT_TRUE(control_->moving());
   state(3.5, cut_.spindle_speed);
   EXPECT_FALSE(control_->moving());
   EXPECT_EQ(control_->takeNotes().size(), 1u);
+}
+
+// A busy computer needs three seconds for advice and answer while the controller's states go on.
+TEST_F(Control, theTimeOfTheSpindleBeginsWithTheAnswerOfTheController) {
+  control_->handle(advice(1.0, 1.5));
+  const auto request = control_->takeRequest();
+  ASSERT_TRUE(request);
+  state(4.0, cut_.spindle_speed);
+  EXPECT_TRUE(control_->moving());
+  control_->answer(true, "", 4.1);
+  state(4.2, cut_.spindle_speed);
+  state(4.9, request->spindle * cut_.spindle_speed);
+  EXPECT_TRUE(control_->takeNotes().empty());
+  const double turn = units::TWO_PI / (request->spindle * cut_.spindle_speed);
+  verdict(4.9 + 30.0 * turn, false);
+  const auto notes = control_->takeNotes();
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_NE(notes[0].find("slot: cut stable at"), std::string::npos) << notes[0];
 }
 
 TEST_F(Control, withoutModesMovesToTheNearestProposedSpeed) {
@@ -205,7 +223,7 @@ TEST_F(Control, loadDecreasesTheFeedFiveTimesAsFastAsItIncreasesIt) {
   const auto run = [&](double value, double seconds) {
     for (const double end = t + seconds; t < end; t += 0.02) {
       load(t, value);
-      if (control_->takeRequest()) control_->answer(true, "");
+      if (control_->takeRequest()) control_->answer(true, "", t);
     }
   };
   run(1.2, 1.0);

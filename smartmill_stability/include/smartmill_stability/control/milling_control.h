@@ -89,7 +89,8 @@ class MillingControl {
   /// The pending request, once.
   std::optional<OverrideRequest> takeRequest();
   /// Response of the controller to the last request. @param message of the controller, one line
-  void answer(bool accepted, const std::string& message);
+  /// @param stamp [s] of the response, from which the spindle has override_settle_time
+  void answer(bool accepted, const std::string& message, double stamp);
   /// Log lines since the last call.
   std::vector<std::string> takeNotes();
 
@@ -124,8 +125,8 @@ class MillingControl {
   double old_spindle_ = 1.0, old_feed_ = 1.0;  // before the last request
   double load_factor_ = 1.0;                   // [1] of the feed, by the load control
   double last_load_ = 0.0;                     // [s]
-  double since_ = 0.0;                         // [s] start of the phase
-  double moved_at_ = 0.0;                      // [s]
+  double since_ = 0.0;     // [s] start of the phase; infinite: the controller has not answered
+  double moved_at_ = 0.0;  // [s]
   int moves_ = 0;
   bool refused_ = false, at_floor_ = false;
   std::optional<OverrideRequest> request_;
