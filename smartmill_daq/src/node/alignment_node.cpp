@@ -11,7 +11,7 @@
 
 namespace smartmill::daq {
 
-AlignmentNode::AlignmentNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
+AlignmentNode::AlignmentNode(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
     : parameters_(parametersFromServer(private_nh).readAll<AlignmentNodeParameters>()),
       alignment_(SignalName(parameters_.late), SignalName(parameters_.early), parameters_.alignment),
       shell_(nh, private_nh, "alignment", parameters_.input_timeout) {

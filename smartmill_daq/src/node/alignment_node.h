@@ -13,7 +13,7 @@ class AlignmentNode {
  public:
   using Parameters = AlignmentNodeParameters;
   /// @throws Error on an invalid parameter.
-  AlignmentNode(ros::NodeHandle nh, ros::NodeHandle private_nh);
+  AlignmentNode(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh);
 
  private:
   void listen(const SignalName& signal);

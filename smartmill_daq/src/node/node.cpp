@@ -30,7 +30,7 @@ std::uint64_t eventsOf(const FaultLog& faults) {
 
 }  // namespace
 
-DaqNode::DaqNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
+DaqNode::DaqNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
     : parameters_(parametersFromServer(private_nh).readAll<DaqNodeParameters>()),
       shell_(nh, private_nh, "daq", INPUT_TIMEOUT) {
   std::optional<StrictYaml> options;

@@ -20,7 +20,7 @@ class DaqNode {
  public:
   using Parameters = DaqNodeParameters;
   /// @throws Error on an invalid parameter or instrument file.
-  DaqNode(ros::NodeHandle nh, ros::NodeHandle private_nh);
+  DaqNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh);
   ~DaqNode();
 
  private:

@@ -95,7 +95,7 @@ std::string messageOf(const CalibrateRequest& request, const std::optional<NewSe
 
 }  // namespace
 
-SetupNode::SetupNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
+SetupNode::SetupNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
     : setup_(parametersFromServer(private_nh).readAll<SetupNodeParameters>().folder,
              [] { return ros::WallTime::now().toSec(); }),
       try_(nh.advertiseService(names::TRY_INSTRUMENT, &SetupNode::tryInstrument, this)),

@@ -17,7 +17,7 @@ class SetupNode {
  public:
   using Parameters = SetupNodeParameters;
   /// @throws Error on an invalid parameter.
-  SetupNode(ros::NodeHandle nh, ros::NodeHandle private_nh);
+  SetupNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh);
 
  private:
   using TryInstrument = smartmill_msgs::TryInstrument;

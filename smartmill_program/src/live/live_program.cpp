@@ -107,7 +107,8 @@ class StretchFinder {
   }
 
   void start(std::size_t move, bool cut, double begin) {
-    SteadyStretch& stretch = run_.emplace().stretch;
+    run_ = Run();
+    SteadyStretch& stretch = run_->stretch;
     stretch.cut = cut;
     stretch.begin = begin;
     stretch.move = move;

@@ -78,7 +78,7 @@ PathFollower followerOf(const NodeParameters& parameters) {
 
 }  // namespace
 
-ProgramNode::ProgramNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
+ProgramNode::ProgramNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
     : parameters_(parametersFromServer(private_nh).readAll<NodeParameters>()),
       follower_(followerOf(parameters_)),
       shell_(nh, private_nh, "NC program", parameters_.input_timeout),

@@ -21,7 +21,7 @@ class ProgramNode {
  public:
   using Parameters = NodeParameters;
   /// @throws Error on an invalid parameter, program or model.
-  ProgramNode(ros::NodeHandle nh, ros::NodeHandle private_nh);
+  ProgramNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh);
 
  private:
   using ConditionEvent = ros::MessageEvent<const smartmill_msgs::CuttingCondition>;

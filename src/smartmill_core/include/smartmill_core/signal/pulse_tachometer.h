@@ -51,9 +51,9 @@ struct PulseTachometerParameters {
 
 /// Angle and speed of the spindle at a pulse, or at rest.
 struct PulseReading {
-  SpindleAngle angle;  ///< angle NaN at rest: between two pulses it is not determined
-  double angle_std;    ///< [rad] NaN at rest
-  double speed_std;    ///< [rad/s]
+  SpindleAngle angle;      ///< angle NaN at rest: between two pulses it is not determined
+  double angle_std = 0.0;  ///< [rad] NaN at rest
+  double speed_std = 0.0;  ///< [rad/s]
 };
 
 /// Finds the pulses of a sampled channel: crossings of the threshold, interpolated between two samples, with
