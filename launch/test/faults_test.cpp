@@ -1,6 +1,5 @@
 // Faults of sensors in the running graph are announced under the topic at fault, by the stamps of the data.
 
-#include <functional>
 #include <regex>
 #include <string>
 #include <vector>
@@ -12,23 +11,13 @@
 #include <smartmill_msgs/SetFault.h>
 
 #include "smartmill_core/names.h"
+#include "smartmill_core/testing/eventually.h"
 
 namespace {
 
 using namespace smartmill;
 
-constexpr double PATIENCE = 120.0;  // [s] for a busy computer
-constexpr double PROMPT = 0.5;      // [s] of stamps
-
-bool eventually(const std::function<bool()>& condition) {
-  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(PATIENCE);
-  while (!condition()) {
-    if (ros::WallTime::now() > end || !ros::ok()) return false;
-    ros::spinOnce();
-    ros::WallDuration(0.01).sleep();
-  }
-  return true;
-}
+constexpr double PROMPT = 0.5;  // [s] of stamps
 
 struct Case {
   const char *topic, *fault,
@@ -51,7 +40,7 @@ TEST(Faults, AreAnnouncedUnderTheirTopic) {
       };
   const ros::Subscriber forces =
       nh.subscribe<smartmill_msgs::ForceBlock>(names::FORCE_COMPENSATED, 1000, on_block);
-  ASSERT_TRUE(eventually([&] { return blocks > 100; }));
+  ASSERT_TRUE(eventually([&] { return blocks > 100; }, ros::spinOnce));
   EXPECT_TRUE(lines.empty() || lines.back().find("no data") == std::string::npos) << lines.back();
 
   const std::vector<Case> cases{
@@ -71,13 +60,15 @@ TEST(Faults, AreAnnouncedUnderTheirTopic) {
     ASSERT_TRUE(ros::service::call(names::absolute(names::SET_FAULT), service));
     ASSERT_EQ(service.response.code, smartmill_msgs::SetFault::Response::OK) << service.response.message;
     double announced = 0.0;  // [s] stamp, or age of the last data
-    EXPECT_TRUE(eventually([&] {
-      for (const std::string& line : lines) {
-        std::smatch match;
-        if (std::regex_match(line, match, std::regex(c.line))) announced = std::stod(match[1]);
-      }
-      return announced > 0.0;
-    }));
+    EXPECT_TRUE(eventually(
+        [&] {
+          for (const std::string& line : lines) {
+            std::smatch match;
+            if (std::regex_match(line, match, std::regex(c.line))) announced = std::stod(match[1]);
+          }
+          return announced > 0.0;
+        },
+        ros::spinOnce));
     // The service takes effect some blocks later.
     EXPECT_LE(announced > 1e6 ? announced - begin : announced, 2.0 * PROMPT);
     for (const std::string& line : lines) {
@@ -86,7 +77,7 @@ TEST(Faults, AreAnnouncedUnderTheirTopic) {
     service.request.fault = "";
     ASSERT_TRUE(ros::service::call(names::absolute(names::SET_FAULT), service));
     const double resumed = newest;
-    EXPECT_TRUE(eventually([&] { return newest > resumed + 2.0; }));
+    EXPECT_TRUE(eventually([&] { return newest > resumed + 2.0; }, ros::spinOnce));
   }
 }
 

@@ -4,7 +4,6 @@
 #include <signal.h>
 
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <string>
 
@@ -21,22 +20,13 @@
 #include <smartmill_msgs/ModalModel.h>
 
 #include "smartmill_core/names.h"
+#include "smartmill_core/testing/eventually.h"
 
 namespace {
 
 using namespace smartmill;
 
 constexpr double PATIENCE = 120.0;  // [s] for a busy computer
-
-bool eventually(const std::function<bool()>& condition) {
-  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(PATIENCE);
-  while (!condition()) {
-    if (ros::WallTime::now() > end || !ros::ok()) return false;
-    ros::spinOnce();
-    ros::WallDuration(0.02).sleep();
-  }
-  return true;
-}
 
 /// Process of a node, as it states itself. @return 0: no answer
 int processOf(const std::string& node) {
@@ -85,7 +75,7 @@ TEST(Respawn, EachNodeComesBackWithWhatItHadPublished) {
       [&](const smartmill_msgs::ForceBlock&) { ++blocks; };
   const ros::Subscriber forces =
       nh.subscribe<smartmill_msgs::ForceBlock>(names::FORCE_COMPENSATED, 100, on_block);
-  ASSERT_TRUE(eventually([&] { return blocks > 10; }));
+  ASSERT_TRUE(eventually([&] { return blocks > 10; }, ros::spinOnce));
 
   // A result of kalman: modes of the force sensor in y.
   actionlib::SimpleActionClient<smartmill_msgs::MeasureFrfAction> measure(
@@ -98,42 +88,45 @@ TEST(Respawn, EachNodeComesBackWithWhatItHadPublished) {
   goal.hits = 3;
   goal.modes = 1;
   measure.sendGoal(goal);
-  ASSERT_TRUE(eventually([&] { return measure.getState().isDone(); }));
+  ASSERT_TRUE(eventually([&] { return measure.getState().isDone(); }, ros::spinOnce));
   ASSERT_EQ(measure.getResult()->code, smartmill_msgs::MeasureFrfResult::OK) << measure.getResult()->message;
   const ros::Time measured = measure.getResult()->modes.header.stamp;
 
   for (const char* name : {"kalman", "hammer", "loadmeter", "stability", "cnc"}) {
     const std::string node = names::absolute(name);
-    ASSERT_TRUE(eventually([&] { return diagnostics.has(node); })) << node;
+    ASSERT_TRUE(eventually([&] { return diagnostics.has(node); }, ros::spinOnce)) << node;
     EXPECT_FALSE(diagnostics.restarted(node)) << node;
     const int before = processOf(node);
     ASSERT_GT(before, 0) << node;
     ASSERT_EQ(::kill(before, SIGKILL), 0) << node;
-    EXPECT_TRUE(eventually([&] { return diagnostics.restarted(node); })) << node << " did not come back";
+    EXPECT_TRUE(eventually([&] { return diagnostics.restarted(node); }, ros::spinOnce))
+        << node << " did not come back";
     EXPECT_NE(processOf(node), before) << node;
   }
   const int frames = processOf("/frames");  // a node without diagnostics
   ASSERT_GT(frames, 0);
   ASSERT_EQ(::kill(frames, SIGKILL), 0);
-  EXPECT_TRUE(eventually([&] {
-    const int now = processOf("/frames");
-    return now > 0 && now != frames;
-  }));
+  EXPECT_TRUE(eventually(
+      [&] {
+        const int now = processOf("/frames");
+        return now > 0 && now != frames;
+      },
+      ros::spinOnce));
   // Every topic flows again, and who subscribes now gets the latched results.
   const std::size_t before = blocks;
-  EXPECT_TRUE(eventually([&] { return blocks > before + 10; }));
+  EXPECT_TRUE(eventually([&] { return blocks > before + 10; }, ros::spinOnce));
   smartmill_msgs::ModalModel modes;
   const boost::function<void(const smartmill_msgs::ModalModel&)> on_modes =
       [&](const smartmill_msgs::ModalModel& m) { modes = m; };
   const ros::Subscriber latched = nh.subscribe<smartmill_msgs::ModalModel>(names::TOOL_MODES, 10, on_modes);
-  EXPECT_TRUE(eventually([&] { return modes.direction == "y"; }));
+  EXPECT_TRUE(eventually([&] { return modes.direction == "y"; }, ros::spinOnce));
   EXPECT_EQ(modes.header.stamp, measured);
   bool has_condition = false;
   const boost::function<void(const smartmill_msgs::CuttingCondition&)> on_condition =
       [&](const smartmill_msgs::CuttingCondition&) { has_condition = true; };
   const ros::Subscriber conditions =
       nh.subscribe<smartmill_msgs::CuttingCondition>(names::CUTTING_CONDITION, 10, on_condition);
-  EXPECT_TRUE(eventually([&] { return has_condition; }));
+  EXPECT_TRUE(eventually([&] { return has_condition; }, ros::spinOnce));
 }
 
 }  // namespace

@@ -6,28 +6,18 @@
 #include <smartmill_msgs/SpindleAngle.h>
 
 #include <cmath>
-#include <functional>
 #include <string>
 #include <vector>
 
 #include "smartmill_core/names.h"
+#include "smartmill_core/testing/eventually.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::cnc {
 namespace {
 
-constexpr double PATIENCE = 120.0;  // [s] for a busy computer
 constexpr double RATE = 10000.0, SPEED = 420.0;
 constexpr int BLOCK = 100;
-
-bool waitUntil(const std::function<bool()>& done) {
-  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(PATIENCE);
-  while (ros::WallTime::now() < end && !done()) {
-    ros::spinOnce();
-    ros::WallDuration(0.01).sleep();
-  }
-  return done();
-}
 
 double timeOf(int number, int sample) {
   return 1000.0 + (number * BLOCK + sample) / RATE;
@@ -70,21 +60,29 @@ TEST(AngleNode, TheControllerTakesOverAndItIsSaid) {
       });
   auto encoder = nh.advertise<smartmill_msgs::SampleBlock>("daq/encoder", 1000);
   auto controller = nh.advertise<smartmill_msgs::SpindleAngle>("cnc/spindle_angle", 1000);
-  ASSERT_TRUE(waitUntil([&] {
-    return encoder.getNumSubscribers() > 0 && controller.getNumSubscribers() > 0 &&
-           angle.getNumPublishers() > 0;
-  }));
+  ASSERT_TRUE(eventually(
+      [&] {
+        return encoder.getNumSubscribers() > 0 && controller.getNumSubscribers() > 0 &&
+               angle.getNumPublishers() > 0;
+      },
+      ros::spinOnce));
   int number = 0;
-  ASSERT_TRUE(waitUntil([&] {
-    encoder.publish(counts(number));
-    controller.publish(position(number++));
-    return diagnosed == "by encoder";
-  })) << diagnosed;
+  ASSERT_TRUE(eventually(
+      [&] {
+        encoder.publish(counts(number));
+        controller.publish(position(number++));
+        return diagnosed == "by encoder";
+      },
+      ros::spinOnce))
+      << diagnosed;
   const int failed = number;
-  ASSERT_TRUE(waitUntil([&] {
-    controller.publish(position(number++));
-    return diagnosed == "by controller";
-  })) << diagnosed;
+  ASSERT_TRUE(eventually(
+      [&] {
+        controller.publish(position(number++));
+        return diagnosed == "by controller";
+      },
+      ros::spinOnce))
+      << diagnosed;
   EXPECT_EQ(announced.rfind("controller in place of encoder: no reading for 0.1", 0), 0u) << announced;
   for (const auto& reading : angles) {
     const double time = reading.header.stamp.toSec();

@@ -21,17 +21,13 @@ double storeLatency(const std::string& file, const StreamShift& shift) {
                 formatted(": latency would be %.6f s; the other stream is the late one, store the shift in "
                           "its instrument",
                           latency));
-  const std::string original = readText(file);
-  std::string text = original;
+  std::string text = readText(file);
   setValue(text, YAML::Load(text), "latency", yamlNumber(latency, 7), "sample_rate");
   setValue(text, YAML::Load(text), "latency_std", yamlNumber(shift.std_dev, 3), "latency");
-  writeText(file, text);
-  try {
-    if (std::abs(readInstrument(file, &options).latency - latency) < 1e-6) return latency;
-  } catch (const Error&) {  // reported below
-  }
-  writeText(file, original);
-  throw Error(file + formatted(": latency cannot be stored here, expected latency: %.6f", latency));
+  writeChecked(
+      file, text, [&] { return std::abs(readInstrument(file, &options).latency - latency) < 1e-6; },
+      file + formatted(": latency cannot be stored here, expected latency: %.6f", latency));
+  return latency;
 }
 
 }  // namespace smartmill::daq

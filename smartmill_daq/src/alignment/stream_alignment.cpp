@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/names.h"
@@ -80,6 +81,8 @@ StreamAlignment::StreamAlignment(SignalName late, SignalName early, const Alignm
     : late_(std::move(late)), early_(std::move(early)), options_(options) {
   if (late_.ofController())
     throw Error(late_.text() + ": a signal of the controller, expected as the second one");
+  if (early_.ofController() && !axisIndex(early_.channel))
+    throw Error(early_.text() + ": expected the axis x, y or z");
 }
 
 void StreamAlignment::push(const std::string& topic, const SampleBlock& block) {
@@ -90,8 +93,8 @@ void StreamAlignment::push(const std::string& topic, const SampleBlock& block) {
 
 void StreamAlignment::push(const CncState& state) {
   if (!early_.ofController() || !state.connected) return;
-  for (std::size_t axis = 0; axis < state.axes.size() && axis < state.position.size(); ++axis)
-    if (state.axes[axis] == early_.channel) early_window_.push(state.stamp, state.position[axis]);
+  const auto axis = controllerAxis(state.axes, *axisIndex(early_.channel));
+  if (axis && *axis < state.position.size()) early_window_.push(state.stamp, state.position[*axis]);
   evaluateIfFull();
 }
 

@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "calibration/yaml_values.h"
-#include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/io/text_file.h"
 #include "smartmill_core/model/strict_yaml.h"
@@ -28,8 +27,7 @@ YAML::Node channelNode(const YAML::Node& root, const std::string& topic, const s
 void storeSensitivity(const std::string& file, const std::string& topic, const std::string& channel,
                       double sensitivity, double std_dev, const std::string& date) {
   readChannel(file, topic, channel);
-  const std::string original = readText(file);
-  std::string text = original;
+  std::string text = readText(file);
   // The last key first, so that the places of the others stay.
   const std::vector<std::pair<const char*, std::string>> values{{"sensitivity_date", date},
                                                                 {"sensitivity_std", yamlNumber(std_dev, 4)},
@@ -37,15 +35,12 @@ void storeSensitivity(const std::string& file, const std::string& topic, const s
   for (const auto& [key, value] : values) {
     setValue(text, channelNode(YAML::Load(text), topic, channel), key, value, "sensitivity");
   }
-  writeText(file, text);
-  try {
-    if (std::abs(readChannel(file, topic, channel).sensitivity / sensitivity - 1.0) < 1e-4) return;
-  } catch (const Error&) {  // reported below
-  }
-  writeText(file, original);
-  throw Error(file +
-              formatted(": the sensitivity of %s cannot be replaced here, expected sensitivity: %.6g",  //
-                        channel.c_str(), sensitivity));
+  const auto is_stored = [&] {
+    return std::abs(readChannel(file, topic, channel).sensitivity / sensitivity - 1.0) < 1e-4;
+  };
+  writeChecked(file, text, is_stored,
+               file + formatted(": the sensitivity of %s cannot be replaced here, expected sensitivity: %.6g",
+                                channel.c_str(), sensitivity));
 }
 
 }  // namespace smartmill::daq

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <optional>
 
+#include "smartmill_core/error.h"
+#include "smartmill_core/io/text_file.h"
+
 namespace smartmill::daq {
 namespace {
 
@@ -36,6 +39,18 @@ void setValue(std::string& text, const YAML::Node& map, const std::string& key, 
   // The value of the neighbour begins behind its key, a colon and a blank; its comment stays on its line.
   const std::string indent(static_cast<std::size_t>(map[after].Mark().column) - after.size() - 2, ' ');
   text.insert(std::min(text.find('\n', end), text.size()), "\n" + indent + key + ": " + value);
+}
+
+void writeChecked(const std::string& file, const std::string& text, const std::function<bool()>& is_stored,
+                  const std::string& fault) {
+  const std::string original = readText(file);
+  writeText(file, text);
+  try {
+    if (is_stored()) return;
+  } catch (const Error&) {  // reported below
+  }
+  writeText(file, original);
+  throw Error(fault);
 }
 
 }  // namespace smartmill::daq

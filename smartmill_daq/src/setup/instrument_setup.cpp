@@ -9,6 +9,7 @@
 
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/io/text_file.h"
+#include "smartmill_daq/alignment/stream_alignment.h"
 #include "smartmill_daq/instrument/instrument.h"
 
 namespace smartmill::daq {
@@ -67,10 +68,9 @@ ReadingRatio ratioOf(const CalibrationRequest& request, const Trial& trial, doub
     return ratioByExciter(samples, rate, request.frequency, request.exciter);
   if (request.method == Method::mass)
     return ratioByMass(*empty, samples, (request.against ? -1.0 : 1.0) * request.mass * request.gravity);
-  const std::size_t slash = request.accelerometer.rfind('/');
-  const TriedChannel& accelerometer =
-      find(trial, request.accelerometer.substr(0, slash), request.accelerometer.substr(slash + 1));
-  return ratioByHits(samples, accelerometer.samples, rate, request.mass);
+  const SignalName accelerometer(request.accelerometer);
+  return ratioByHits(samples, find(trial, accelerometer.topic, accelerometer.channel).samples, rate,
+                     request.mass);
 }
 
 void checkQuantity(const CalibrationRequest& request) {
@@ -166,8 +166,8 @@ std::optional<NewSensitivity> InstrumentSetup::calibrate(const CalibrationReques
     return {};
   }
   if (request.method == Method::hits) {
-    const std::size_t slash = request.accelerometer.rfind('/');
-    find(trial, request.accelerometer.substr(0, slash), request.accelerometer.substr(slash + 1));
+    const SignalName accelerometer(request.accelerometer);
+    find(trial, accelerometer.topic, accelerometer.channel);
   }
   try {
     const ReadingRatio ratio =

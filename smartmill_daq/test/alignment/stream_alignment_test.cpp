@@ -151,7 +151,7 @@ TEST(StreamAlignment, ControllerByTheStartOfAnAxis) {
       CncState state;
       state.connected = true;
       state.stamp = START + i / 50.0 + jitter(random);
-      state.axes = {"z", "x"};
+      state.axes = {"Z", "X"};
       state.position = {0.3, positionOf(state.stamp)};
       alignment.push(state);
       force.run(state.stamp, inertia, 3.0, alignment);

@@ -1,6 +1,5 @@
 // First connection by the services of setup_node, the written file read by daq_node, and alignment_node.
 #include <cmath>
-#include <functional>
 #include <string>
 
 #include <diagnostic_msgs/DiagnosticArray.h>
@@ -14,6 +13,7 @@
 #include "smartmill_core/instrument_names.h"
 #include "smartmill_core/io/text_file.h"
 #include "smartmill_core/names.h"
+#include "smartmill_core/testing/eventually.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
 #include "smartmill_daq_testing/child.h"
@@ -22,14 +22,6 @@ namespace smartmill::daq {
 namespace {
 
 constexpr double RATE = 4000.0;  // [Hz]
-
-bool waitUntil(const std::function<bool()>& done) {
-  for (int i = 0; i < 2400 && !done() && ros::ok(); ++i) {
-    ros::spinOnce();
-    ros::WallDuration(0.05).sleep();
-  }
-  return done();
-}
 
 std::string description(const std::string& sensitivity) {
   return "format: smartmill-instrument/1\nname: bench\ndriver: file\noptions: {path: device.csv, repeat: "
@@ -51,7 +43,8 @@ TEST(SetupNode, WhatItWritesIsWhatDaqNodeReads) {
   folder.write("device.csv", text);
   const testing::Child setup({SETUP_NODE, "__ns:=/smartmill", "__name:=setup", "_folder:=" + folder.file("")},
                              {}, folder.file("log"));
-  ASSERT_TRUE(waitUntil([] { return ros::service::exists("/smartmill/daq/calibrate_channel", false); }))
+  ASSERT_TRUE(eventually([] { return ros::service::exists("/smartmill/daq/calibrate_channel", false); },
+                         ros::spinOnce))
       << readText(folder.file("log"));
 
   TryInstrument attempt;
@@ -121,10 +114,13 @@ TEST(SetupNode, WhatItWritesIsWhatDaqNodeReads) {
     const std::size_t at = channel.find("|" + key + "=");
     return at == std::string::npos ? std::string() : channel.substr(at + key.size() + 2, 8);
   };
-  EXPECT_TRUE(waitUntil([&] {
-    return channel.rfind("alive", 0) == 0 && !value("rms [m/s2]").empty() &&
-           std::abs(std::stod(value("rms [m/s2]")) - 5.0) < 0.01;
-  })) << channel;
+  EXPECT_TRUE(eventually(
+      [&] {
+        return channel.rfind("alive", 0) == 0 && !value("rms [m/s2]").empty() &&
+               std::abs(std::stod(value("rms [m/s2]")) - 5.0) < 0.01;
+      },
+      ros::spinOnce))
+      << channel;
   EXPECT_EQ(value("date of the sensitivity"), "2026-11-");
 }
 
@@ -146,7 +142,8 @@ TEST(AlignmentNode, ShiftAndStandardDeviationAreInTheDiagnostics) {
       });
   auto hammer = nh.advertise<smartmill_msgs::SampleBlock>(names::HAMMER, 2000);
   auto force = nh.advertise<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, 2000);
-  ASSERT_TRUE(waitUntil([&] { return hammer.getNumSubscribers() > 0 && force.getNumSubscribers() > 0; }));
+  ASSERT_TRUE(eventually([&] { return hammer.getNumSubscribers() > 0 && force.getNumSubscribers() > 0; },
+                         ros::spinOnce));
   const auto block = [](int number, const char* channel, double delay) {
     smartmill_msgs::SampleBlock message;
     message.header.stamp = ros::Time(1000.0 + 0.01 * number + delay);
@@ -167,7 +164,7 @@ TEST(AlignmentNode, ShiftAndStandardDeviationAreInTheDiagnostics) {
     hammer.publish(block(b, "hammer", 0.0231));
     force.publish(block(b, "fz", 0.0));
   }
-  EXPECT_TRUE(waitUntil([&] { return deviation > 0.0; })) << aligned;
+  EXPECT_TRUE(eventually([&] { return deviation > 0.0; }, ros::spinOnce)) << aligned;
   EXPECT_NEAR(shift, 0.0231, 3.0 * deviation);
   EXPECT_LT(deviation, 1e-3 / 4.0);
   EXPECT_NE(aligned.find("later than daq/dynamometer/fz, by taps (4)"), std::string::npos) << aligned;

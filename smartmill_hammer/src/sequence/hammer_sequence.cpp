@@ -10,7 +10,6 @@
 #include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
-#include "smartmill_core/model/station_axes.h"
 #include "smartmill_core/signal/same_time.h"
 #include "smartmill_core/units.h"
 #include "station_control.h"
@@ -64,17 +63,16 @@ std::string goalFault(const MeasureFrfGoal& goal, const HammerParameters& parame
 }  // namespace
 
 HammerSequence::HammerSequence(const HammerParameters& parameters, const MachineModel& model)
-    : parameters_(parameters), model_(model) {
+    : parameters_(parameters), model_(model), axes_(model) {
   const HammerStation& station = model_.needHammer("measure the tool tip");
-  const StationAxes axes(model_);
-  control_ = std::make_unique<StationControl>(parameters_, axes, station.range_volt);
+  control_ = std::make_unique<StationControl>(parameters_, axes_, station.range_volt);
   model.needTool("find a flute");
-  if (axes.isTurned() && (station.position.count("x") == 0 || station.position.count("y") == 0)) {
+  if (axes_.isTurned() && (station.position.count("x") == 0 || station.position.count("y") == 0)) {
     throw Error(model.file +
                 ": frames.hammer is turned, expected hammer.position_mm of x and y: the receptance along an "
                 "axis of the machine follows from both");
   }
-  if (axes.isTurned() && parameters_.cross_frf == 0) {
+  if (axes_.isTurned() && parameters_.cross_frf == 0) {
     throw Error(
         "cross_frf 0: frames.hammer of " + model.file +
         " is turned, expected 1: the receptance along an axis of the machine follows from the cross FRF");
@@ -86,7 +84,7 @@ HammerSequence::~HammerSequence() = default;
 
 void HammerSequence::reset() {
   phase_ = Phase::idle;
-  control_ = std::make_unique<StationControl>(parameters_, StationAxes(model_), model_.hammer->range_volt);
+  control_ = std::make_unique<StationControl>(parameters_, axes_, model_.hammer->range_volt);
   steps_.reset();
   measurement_.reset();
   first_part_.reset();
@@ -99,7 +97,7 @@ std::vector<Command> HammerSequence::takeCommands() {
 std::optional<Feedback> HammerSequence::takeFeedback() {
   std::optional<Feedback> feedback =
       measurement_ ? std::exchange(measurement_->feedback, std::nullopt) : std::nullopt;
-  if (feedback && StationAxes(model_).isTurned())
+  if (feedback && axes_.isTurned())
     feedback->progress = 0.5 * (feedback->progress + (first_part_ ? 1.0 : 0.0));
   return feedback;
 }
@@ -121,7 +119,7 @@ bool HammerSequence::handle(const MeasureFrfGoal& goal) {
   first_part_.reset();
   asked_modes_ = goal.modes;
   MeasureFrfGoal part = goal;
-  if (StationAxes(model_).isTurned()) part.modes = 0;  // along its axes other modes are seen
+  if (axes_.isTurned()) part.modes = 0;  // along its axes other modes are seen
   begin(part);
   return true;
 }
@@ -255,9 +253,8 @@ void HammerSequence::retract(double now) {
 
 /// The receptance along an axis of the machine needs the hits along both axes of a turned station.
 void HammerSequence::endPart(double now) {
-  const StationAxes axes(model_);
   MeasureFrfResult& result = measurement_->result;
-  if (!axes.isTurned() || result.code != FrfCode::ok) return finish();
+  if (!axes_.isTurned() || result.code != FrfCode::ok) return finish();
   if (result.cross.frf.size() == 0) {
     result.code = FrfCode::bad_data;
     result.message += "; a turned station requires the cross FRF";
@@ -271,7 +268,7 @@ void HammerSequence::endPart(double now) {
     other.direction = AXIS_NAMES[measurement_->paths.across()];
     return begin(other);
   }
-  result = alongMachineAxis(*first_part_, result, axes.angle(), asked_modes_, parameters_);
+  result = alongMachineAxis(*first_part_, result, axes_.angle(), asked_modes_, parameters_);
   finish();
 }
 

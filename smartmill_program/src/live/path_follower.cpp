@@ -19,10 +19,6 @@ constexpr double IMPROBABLE = 25.0;       // difference of chi-square: five stan
 constexpr std::size_t MOST_PLACES = 200;  // of hypotheses; more do not distinguish places
 constexpr double ENTIRE = std::numeric_limits<double>::infinity();
 
-double distanceBetween(const std::array<double, 3>& a, const std::array<double, 3>& b) {
-  return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
-}
-
 }  // namespace
 
 PathFollower::PathFollower(std::shared_ptr<const LiveProgram> program, const std::array<double, 3>& zero,

@@ -13,11 +13,11 @@ namespace {
 using nc::PathSegment;
 using Point = PathSegment::Point;
 
+}  // namespace
+
 double distanceBetween(const Point& a, const Point& b) {
   return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 }
-
-}  // namespace
 
 double nearestOn(const PathSegment& path, const Point& point, double from, double to) {
   if (!path.isArc()) {

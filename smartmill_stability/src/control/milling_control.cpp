@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "smartmill_core/error.h"
@@ -56,7 +55,7 @@ void MillingControl::handle(const CncState& state) {
   if (phase_ == Phase::watching || !cut_) return;
   const double requested = cut_->spindle_speed * spindle_;
   const bool reached = std::abs(state.spindle_speed - requested) <= CONTROL.reached * requested;
-  if (phase_ == Phase::moving && reached && std::isfinite(since_)) {
+  if (phase_ == Phase::moving && reached) {
     phase_ = Phase::settling;
     since_ = state.stamp;
   } else if (phase_ == Phase::moving && state.stamp - since_ > parameters_.settle_time) {
@@ -151,8 +150,7 @@ RiskOptions MillingControl::riskOptions() const {
 void MillingControl::moveTo(const ChatterAdvice& advice, const StableSpeed& speed, bool corrected) {
   const double spindle = speed.speed / cut_->spindle_speed;
   ++moves_;
-  phase_ = Phase::moving;
-  since_ = std::numeric_limits<double>::infinity();
+  phase_ = Phase::requested;
   request(
       feedFor(spindle), spindle,
       formatted("chatter at %.0f Hz, %.0f rpm: spindle to %.0f rpm (%.1f %%), feed to %.1f %%; depth %.2f mm "
@@ -177,8 +175,7 @@ void MillingControl::moveWithoutModel(const ChatterAdvice& advice) {
   }
   const double spindle = best / cut_->spindle_speed;
   ++moves_;
-  phase_ = Phase::moving;
-  since_ = std::numeric_limits<double>::infinity();
+  phase_ = Phase::requested;
   request(
       feedFor(spindle), spindle,
       formatted(
@@ -220,7 +217,9 @@ std::optional<OverrideRequest> MillingControl::takeRequest() {
 
 void MillingControl::answer(bool accepted, const std::string& message, double stamp) {
   if (accepted) {
-    if (phase_ == Phase::moving && std::isinf(since_)) since_ = moved_at_ = stamp;
+    if (phase_ != Phase::requested) return;
+    phase_ = Phase::moving;
+    since_ = moved_at_ = stamp;
     return;
   }
   feed_ = old_feed_;

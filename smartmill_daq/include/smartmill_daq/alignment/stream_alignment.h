@@ -50,7 +50,7 @@ std::optional<Alignment> align(const SampledSignal& late, const SampledSignal& e
 /// the devices add. Begins anew where a record contradicts. Time is that of the stamps.
 class StreamAlignment {
  public:
-  /// @throws Error when the late signal is one of the controller
+  /// @throws Error when the late signal is one of the controller, or the early one none of its axes
   StreamAlignment(SignalName late, SignalName early, const AlignmentOptions& options = {});
 
   void push(const std::string& topic, const SampleBlock& block);

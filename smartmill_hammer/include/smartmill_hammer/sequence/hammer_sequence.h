@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/model/station_axes.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_hammer/sequence/hammer_parameters.h"
 #include "smartmill_hammer/sequence/machine_command.h"
@@ -74,6 +75,7 @@ class HammerSequence {
 
   HammerParameters parameters_;
   MachineModel model_;
+  StationAxes axes_;
   Phase phase_ = Phase::idle;
   std::unique_ptr<StationControl> control_;
   std::unique_ptr<Measurement> measurement_;

@@ -39,6 +39,9 @@ class ProgramPath {
   std::vector<double> begin_;  // [m] of each move, and the end of the last
 };
 
+/// [m] between two points
+double distanceBetween(const nc::PathSegment::Point& a, const nc::PathSegment::Point& b);
+
 /// [m] Distance along a path to the place nearest to a point; of several the first.
 /// @param from, to [m] part of the path that is searched
 double nearestOn(const nc::PathSegment& path, const nc::PathSegment::Point& point, double from, double to);

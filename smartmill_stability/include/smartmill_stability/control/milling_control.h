@@ -101,7 +101,7 @@ class MillingControl {
   double spindle() const { return spindle_; }  ///< [1] last requested
 
  private:
-  enum class Phase { watching, moving, settling };
+  enum class Phase { watching, requested, moving, settling };
 
   void begin(const CuttingCondition& condition);
   bool mayAct() const;
@@ -125,8 +125,8 @@ class MillingControl {
   double old_spindle_ = 1.0, old_feed_ = 1.0;  // before the last request
   double load_factor_ = 1.0;                   // [1] of the feed, by the load control
   double last_load_ = 0.0;                     // [s]
-  double since_ = 0.0;     // [s] start of the phase; infinite: the controller has not answered
-  double moved_at_ = 0.0;  // [s]
+  double since_ = 0.0;                         // [s] start of the phase
+  double moved_at_ = 0.0;                      // [s]
   int moves_ = 0;
   bool refused_ = false, at_floor_ = false;
   std::optional<OverrideRequest> request_;

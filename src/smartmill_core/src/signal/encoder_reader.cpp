@@ -51,7 +51,7 @@ std::vector<SpindleAngle> EncoderReader::push(const SampleBlock& block) {
     }
     last_raw_ = raw;
     counts_.push_back(unwrapped_);
-    if (counts_.size() > window + 1) counts_.erase(counts_.begin());
+    if (counts_.size() > window + 1) counts_.pop_front();
     if (++since_reading_ < every || counts_.size() <= window) continue;
     since_reading_ = 0;
     const double speed =

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <optional>
 #include <string>
 #include <vector>
@@ -43,7 +44,7 @@ class EncoderReader {
 
   EncoderParameters parameters_;
   std::optional<std::uint64_t> next_index_;
-  std::vector<double> counts_;  // unwrapped, of the speed window; the last one is the newest
+  std::deque<double> counts_;  // unwrapped, of the speed window; the last one is the newest
   double last_raw_ = 0.0, unwrapped_ = 0.0;
   std::size_t since_reading_ = 0;
   std::size_t faults_ = 0;

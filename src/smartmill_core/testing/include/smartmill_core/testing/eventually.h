@@ -12,7 +12,7 @@ bool eventually(Condition condition, Meanwhile meanwhile) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(200);
   for (meanwhile(); !condition(); meanwhile()) {
     if (std::chrono::steady_clock::now() > end) return condition();
-    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
   return true;
 }
