@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "smartmill_core/math/angle.h"
 #include "smartmill_core/modal/modal_filter.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/signal/streams.h"

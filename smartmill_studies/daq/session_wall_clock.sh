@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# A complete session of the simulated machine in wall-clock time whose dynamometer and hammer take the way of a real instrument: by named pipes
-# (driver file) or by null sinks of a sound server of its own and their monitors (driver sound). Neither stamps nor counts samples: daq_node
-# counts them against the arrivals, and the latency of the way is found by `smartmill align` before the session. The report judges it as it
-# judges the direct way. Needs everything built (./setup --with-instruments); about six minutes.
+# A complete session of the simulated machine in wall-clock time whose dynamometer and hammer take the way of one real instrument of five
+# channels: by a named pipe (driver file) or by a null sink of a sound server of its own and its monitor (driver sound). Neither stamps nor
+# counts samples: daq_node counts them against the arrivals, and the latency of the way is found by `smartmill align` before the session. The
+# report judges it as it judges the direct way. Needs everything built (./setup --with-instruments); about six minutes.
 #
 # usage: session_wall_clock.sh pipe|sound OUT
 set -euo pipefail
@@ -28,34 +28,32 @@ stop() {
 }
 trap stop EXIT
 
-instrument() { # NAME TOPIC FRAME CHANNELS
-  local options="{path: $1.pipe}" driver=file
-  if [ "$way" = sound ]; then
-    driver=sound options="{source: $1.monitor, channels: $5, server: 'unix:$out/native'}"
-  fi
-  cat >"$out/$1.yaml" <<END
+options="{path: front_end.pipe}" driver=file
+if [ "$way" = sound ]; then
+  driver=sound options="{source: front_end.monitor, channels: 5, server: 'unix:$out/native'}"
+fi
+channel() { # INPUT NAME UNIT
+  echo "      - {input: $1, name: $2, unit: $3, sensitivity: 1.0, range: $FULL_SCALE}"
+}
+cat >"$out/front_end.yaml" <<END
 format: smartmill-instrument/1
-name: $1
+name: front_end
 driver: $driver
 options: $options
 sample_rate: $RATE.0
 block: 0.01
 silence: 5.0   # [s] on a busy computer
 streams:
-  - topic: $2
-$3    channels:
-$4
+  - topic: daq/dynamometer
+    frame: dynamometer
+    channels:
+$(channel 1 fx N; channel 2 fy N; channel 3 fz N)
+  - topic: daq/hammer
+    channels:
+$(channel 4 hammer N; channel 5 gap V)
 END
-}
-channel() { # INPUT NAME UNIT
-  echo "      - {input: $1, name: $2, unit: $3, sensitivity: 1.0, range: $FULL_SCALE}"
-}
-instrument dynamometer daq/dynamometer $'    frame: dynamometer\n' "$(channel 1 fx N; channel 2 fy N; channel 3 fz N)" 3
-instrument hammer daq/hammer "" "$(channel 1 hammer N; channel 2 gap V)" 2
-for name in dynamometer hammer; do
-  rm -f "$out/$name.pipe"
-  mkfifo "$out/$name.pipe"
-done
+rm -f "$out/front_end.pipe"
+mkfifo "$out/front_end.pipe"
 
 full_scale=0.0
 if [ "$way" = sound ]; then
@@ -63,18 +61,13 @@ if [ "$way" = sound ]; then
   export HOME=$out XDG_RUNTIME_DIR=$out PULSE_RUNTIME_PATH=$out
   sink="rate=$RATE format=float32le"
   pulseaudio -n --daemonize=no --exit-idle-time=-1 --use-pid-file=no --disable-shm=yes \
-    -L "module-null-sink sink_name=dynamometer channels=3 channel_map=aux0,aux1,aux2 $sink" \
-    -L "module-null-sink sink_name=hammer channels=2 channel_map=aux0,aux1 $sink" \
+    -L "module-null-sink sink_name=front_end channels=5 channel_map=aux0,aux1,aux2,aux3,aux4 $sink" \
     -L "module-native-protocol-unix socket=$out/native auth-anonymous=1" >"$out/pulseaudio.log" 2>&1 &
   started+=($!)
   for _ in $(seq 100); do [ ! -S "$out/native" ] || break; sleep 0.1; done
-  play() { # NAME CHANNELS MAP
-    pacat --playback --server="unix:$out/native" --device="$1" --rate="$RATE" --channels="$2" --channel-map="$3" --format=float32le \
-      --no-remix --no-remap --raw --latency-msec=200 --process-time-msec=10 <"$out/$1.pipe" >"$out/pacat_$1.log" 2>&1 &
-    started+=($!)
-  }
-  play dynamometer 3 aux0,aux1,aux2
-  play hammer 2 aux0,aux1
+  pacat --playback --server="unix:$out/native" --device=front_end --rate="$RATE" --channels=5 --channel-map=aux0,aux1,aux2,aux3,aux4 \
+    --format=float32le --no-remix --no-remap --raw --latency-msec=200 --process-time-msec=10 <"$out/front_end.pipe" >"$out/pacat.log" 2>&1 &
+  started+=($!)
 fi
 
 export ROS_MASTER_URI=http://localhost:$master ROS_HOSTNAME=localhost ROS_HOME=$out ROS_LOG_DIR=$out/log
@@ -92,8 +85,8 @@ align() { # RECORD NAME/CHANNEL OPTION...
 rm -f "$out/align.txt"
 sleep "${SETTLE:-30}"
 record 15 "$out/align_before.bag"
-for name in dynamometer/fx hammer/hammer; do align "$out/align_before.bag" "$name" --write "$out/${name%/*}.yaml" || true; done
-devel/env.sh rosnode kill /smartmill/daq_dynamometer /smartmill/daq_hammer >/dev/null   # roslaunch starts them again
+align "$out/align_before.bag" hammer/hammer --write "$out/front_end.yaml" || true
+devel/env.sh rosnode kill /smartmill/daq_front_end >/dev/null   # roslaunch starts it again
 sleep "${SETTLE:-30}"
 record 12 "$out/align_after.bag"
 for name in dynamometer/fx hammer/hammer; do align "$out/align_after.bag" "$name" || true; done

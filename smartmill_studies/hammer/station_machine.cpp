@@ -5,8 +5,8 @@
 
 #include "smartmill_core/axis_names.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/math/angle.h"
 #include "smartmill_core/units.h"
-#include "smartmill_hammer/search/flute_search.h"
 
 namespace smartmill::hammer {
 namespace {

@@ -91,10 +91,18 @@ AngleSources::Angles AngleSources::pushForces(const SampleBlock& block) {
 }
 
 AngleSources::Angles AngleSources::push(const CncState& state) {
-  speed_ = state.connected ? state.spindle_speed : NOT_A_NUMBER;
+  setControllerSpeed(state.connected ? state.spindle_speed : NOT_A_NUMBER);
+  return selector_.advance(state.stamp);
+}
+
+void AngleSources::forgetControllerSpeed() {
+  setControllerSpeed(NOT_A_NUMBER);
+}
+
+void AngleSources::setControllerSpeed(double speed) {
+  speed_ = speed;
   pulses_.setControllerSpeed(speed_);
   setCut();
-  return selector_.advance(state.stamp);
 }
 
 void AngleSources::push(const CuttingCondition& condition) {

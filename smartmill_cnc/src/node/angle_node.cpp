@@ -11,6 +11,11 @@
 #include "smartmill_ros/run_node.h"
 
 namespace smartmill::cnc {
+namespace {
+
+constexpr double CHECK_PERIOD = 0.2;  // [s]
+
+}  // namespace
 
 AngleNode::AngleNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
     : parameters_(parametersFromServer(private_nh).readAll<AngleNodeParameters>()),
@@ -31,6 +36,9 @@ AngleNode::AngleNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
       names::CUTTING_CONDITION,
       [this](const CuttingCondition& condition, double) { sources_.push(condition); });
   shell_.diagnose("spindle angle", [this](auto& status) { diagnose(status); });
+  shell_.every(CHECK_PERIOD, [this] {
+    if (shell_.inputs().watchdog(names::CNC_STATE).dead()) sources_.forgetControllerSpeed();
+  });
 }
 
 void AngleNode::listen(const std::string& topic,

@@ -5,7 +5,8 @@
 #include <cmath>
 #include <complex>
 #include <ctime>
-#include <utility>
+
+#include <boost/math/tools/minima.hpp>
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
@@ -52,27 +53,12 @@ double amplitudeAt(Iterator begin, Iterator end, double rate, double frequency) 
   return 2.0 * std::abs(sum) / weights;
 }
 
-/// The frequency of the largest amplitude: golden section, since a Hann window has one maximum within two
-/// lines.
+/// The frequency of the largest amplitude: a Hann window has one maximum within two lines.
 double frequencyOf(Iterator begin, Iterator end, double rate, double stated) {
-  constexpr double GOLDEN = 0.6180339887498949;
-  double low = stated * (1.0 - FREQUENCY_RANGE), high = stated * (1.0 + FREQUENCY_RANGE);
-  double a = high - GOLDEN * (high - low), b = low + GOLDEN * (high - low);
-  double at_a = amplitudeAt(begin, end, rate, a), at_b = amplitudeAt(begin, end, rate, b);
-  while (high - low > 1e-6 * stated) {
-    if (at_a > at_b) {
-      high = std::exchange(b, a);
-      at_b = at_a;
-      a = high - GOLDEN * (high - low);
-      at_a = amplitudeAt(begin, end, rate, a);
-    } else {
-      low = std::exchange(a, b);
-      at_a = at_b;
-      b = low + GOLDEN * (high - low);
-      at_b = amplitudeAt(begin, end, rate, b);
-    }
-  }
-  return 0.5 * (low + high);
+  constexpr int BITS = 20;  // relative 1e-6
+  const auto lost = [&](double frequency) { return -amplitudeAt(begin, end, rate, frequency); };
+  const double reach = FREQUENCY_RANGE * stated;
+  return boost::math::tools::brent_find_minima(lost, stated - reach, stated + reach, BITS).first;
 }
 
 std::vector<double> pieceMeans(const std::vector<double>& samples) {

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <utility>
 
+#include "smartmill_core/math/normal.h"
 #include "smartmill_discrepancy/gap/significance.h"
 
 namespace smartmill::discrepancy {
@@ -94,7 +95,7 @@ std::vector<std::string> dependentConditions(const std::vector<TestAmplitude>& a
     const double r = correlation(chosen, c);
     const double z = std::atanh(std::min(r, 0.999999)) *
                      std::sqrt(std::max(static_cast<double>(chosen.size()) - 3.0, 1.0));
-    if (std::erfc(z / std::sqrt(2.0)) * static_cast<double>(conditions.size()) < options.chance)
+    if (2.0 * normalCdf(-z) * static_cast<double>(conditions.size()) < options.chance)
       strengths.emplace_back(-r, c.name);
   }
   std::sort(strengths.begin(), strengths.end());

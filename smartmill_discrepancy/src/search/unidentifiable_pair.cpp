@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "smartmill_core/math/normal.h"
 #include "smartmill_discrepancy/search/validation.h"
 
 namespace smartmill::discrepancy {
@@ -14,7 +15,7 @@ double entropy(double p) {
 }  // namespace
 
 double nameProbability(const UnidentifiablePair& pair, const CauseOdds& prior) {
-  const double tail = 0.5 * std::erfc(ValidationResult::FITTED_MARGIN / std::sqrt(2.0));
+  const double tail = normalCdf(-ValidationResult::FITTED_MARGIN);
   const double odds =
       std::pow((1.0 - tail) / tail, pair.separation) * prior.of(pair.name) / prior.of(pair.alternative);
   return odds / (1.0 + odds);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "smartmill_core/formatted.h"
+#include "smartmill_core/math/normal.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -103,7 +104,7 @@ const EffectScale& ValidationResult::weakerGroup() const {
 double ValidationResult::confidence() const {
   const double beyond =
       std::isfinite(heldout.std_dev) ? std::min(heldout.margin(), fitted.margin()) : fitted.margin();
-  return 0.5 * std::erfc(-beyond / std::sqrt(2.0));
+  return normalCdf(beyond);
 }
 
 bool ValidationResult::isAccepted() const {

@@ -7,6 +7,8 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
+#include "smartmill_core/math/angle.h"
+#include "smartmill_core/math/normal.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::hammer {
@@ -17,10 +19,6 @@ const double GOLDEN_RATIO = 0.5 * (1.0 + std::sqrt(5.0));
 const double SECTION = 2.0 - GOLDEN_RATIO;
 
 }  // namespace
-
-double nearAngle(double angle, double reference) {
-  return angle - units::TWO_PI * std::round((angle - reference) / units::TWO_PI);
-}
 
 FluteSearchOptions FluteSearchOptions::forPitch(double least_pitch) {
   FluteSearchOptions options;
@@ -176,7 +174,7 @@ void FluteSearch::finish() {
   if (fall > 6.0 * noise) angle_ += parabola().vertex;
   const auto below = [&](const Point& end) {
     const double std_dev = std::max(std::hypot(end.volt_std, centre_.volt_std), 1e-12);
-    return 0.5 * std::erfc((end.volt - centre_.volt) / (std_dev * std::sqrt(2.0)));
+    return normalCdf((centre_.volt - end.volt) / std_dev);
   };
   confidence_ = below(left_) * below(right_);
   state_ = State::found;

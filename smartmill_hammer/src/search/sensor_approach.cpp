@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "smartmill_core/math/angle.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::hammer {

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "smartmill_hammer/search/flute_search.h"
+#include "smartmill_core/math/angle.h"
 
 namespace smartmill::hammer {
 

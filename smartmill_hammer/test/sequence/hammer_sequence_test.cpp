@@ -10,6 +10,7 @@
 
 #include "../closed_form_machine.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/math/angle.h"
 #include "smartmill_core/signal/stream_sorter.h"
 #include "smartmill_core/testing/coverage.h"
 #include "smartmill_hammer/sequence/hammer_pipeline.h"

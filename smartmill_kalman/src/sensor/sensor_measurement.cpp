@@ -18,14 +18,14 @@ void TapParameters::validate() const {
 
 SensorMeasurement::SensorMeasurement(const TapParameters& parameters)
     : parameters_((parameters.validate(), parameters)),
-      collector_({parameters.trigger_force, parameters.pre_trigger, parameters.record_length}) {
+      collector_({parameters.trigger_force, parameters.pre_trigger, parameters.record_length}),
+      pairs_(parameters.strike_timeout) {
 }
 
 void SensorMeasurement::reset() {
   active_ = waiting_for_hit_ = false;
   collector_.reset();
-  hammer_.clear();
-  sensor_.clear();
+  pairs_.clear();
   hits_.clear();
   command_.reset();
   feedback_.reset();
@@ -70,41 +70,28 @@ bool SensorMeasurement::handle(const MeasureFrfGoal& goal) {
   return true;
 }
 
-void SensorMeasurement::addBlock(const SampleBlock& block, const std::string& channel,
-                                 std::deque<Sample>& queue) {
-  const std::size_t c = columnOf(block, channel, "N");
-  for (std::size_t i = 0; i < block.size(); ++i) {
-    queue.push_back({block.timeOf(i), block.first_index + i, block.sample_rate, block.at(i, c)});
-  }
-  pairSamples();
-  for (const auto* waiting : {&hammer_, &sensor_}) {
-    if (waiting->empty() || waiting->back().time - waiting->front().time <= parameters_.strike_timeout)
-      continue;
-    return finish(FrfCode::bad_data, std::string("no samples of ") +
-                                         (waiting == &hammer_ ? "the force sensor" : "the hammer") +
-                                         " with the other's running index");
-  }
-}
-
 void SensorMeasurement::handleHammer(const SampleBlock& block) {
-  if (active_) addBlock(block, "hammer", hammer_);
+  if (!active_) return;
+  pairs_.addHammer(block);
+  handlePairs();
 }
 
 void SensorMeasurement::handleSensor(const SampleBlock& block) {
-  if (active_) addBlock(block, "f" + goal_.direction, sensor_);
+  if (!active_) return;
+  const std::size_t c = columnOf(block, "f" + goal_.direction, "N");
+  for (std::size_t i = 0; i < block.size(); ++i)
+    pairs_.addResponse(block.timeOf(i), block.first_index + i, block.sample_rate, {block.at(i, c)});
+  handlePairs();
 }
 
 // A sample lost by one stream is a gap in the index, which the collector detects.
-void SensorMeasurement::pairSamples() {
-  while (!hammer_.empty() && !sensor_.empty()) {
-    const Sample h = hammer_.front(), s = sensor_.front();
-    if (h.index <= s.index) hammer_.pop_front();
-    if (s.index <= h.index) sensor_.pop_front();
-    if (h.index != s.index) continue;
-    if (h.rate != s.rate) return finish(FrfCode::bad_data, "hammer and force sensor differ in sample rate");
-    addSample(h.time, h.index, h.rate, h.value, s.value);
-    if (!active_) return;
+void SensorMeasurement::handlePairs() {
+  while (active_) {
+    const std::optional<TapPairs::Pair> pair = pairs_.next();
+    if (!pair) break;
+    addSample(pair->time, pair->index, pair->rate, pair->force, pair->response[0]);
   }
+  if (active_ && !pairs_.fault().empty()) finish(FrfCode::bad_data, pairs_.fault());
 }
 
 void SensorMeasurement::addSample(double time, std::uint64_t index, double rate, double force,
@@ -165,12 +152,11 @@ void SensorMeasurement::end(FrfCode code, const std::string& message) {
 }
 
 void SensorMeasurement::finish(FrfCode code, const std::string& message) {
+  result_.code = code;
+  result_.message = message;  // may be that of pairs_
   active_ = waiting_for_hit_ = false;
   collector_.disarm();
-  hammer_.clear();
-  sensor_.clear();
-  result_.code = code;
-  result_.message = message;
+  pairs_.clear();
   finished_ = std::move(result_);
   result_ = SensorResult();
 }

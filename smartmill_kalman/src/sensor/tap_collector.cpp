@@ -2,19 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "smartmill_core/signal/same_time.h"
 
 namespace smartmill::kalman {
-namespace {
-
-constexpr std::size_t MAX_WAITING = 1000000;  // samples of one stream without the other's index
-
-}  // namespace
 
 TapCollector::TapCollector(const TapParameters& taps, std::size_t channels)
-    : collectors_(channels, HitCollector({taps.trigger_force, taps.pre_trigger, taps.record_length})) {
+    : pairs_(taps.strike_timeout),
+      collectors_(channels, HitCollector({taps.trigger_force, taps.pre_trigger, taps.record_length})) {
 }
 
 void TapCollector::begin() {
@@ -25,44 +22,35 @@ void TapCollector::begin() {
 
 void TapCollector::end() {
   active_ = false;
-  hammer_.clear();
-  samples_.clear();
+  pairs_.clear();
   for (HitCollector& collector : collectors_) collector.reset();
 }
 
 void TapCollector::handleHammer(const SampleBlock& block) {
   if (!active_) return;
-  const std::size_t c = block.channel("hammer");
-  for (std::size_t i = 0; i < block.size(); ++i) hammer_.push_back({block.first_index + i, block.at(i, c)});
-  pairSamples();
+  pairs_.addHammer(block);
+  handlePairs();
 }
 
 void TapCollector::add(double time, std::uint64_t index, double rate, std::vector<double> values) {
   if (!active_) return;
-  samples_.push_back({time, index, rate, std::move(values)});
-  pairSamples();
+  pairs_.addResponse(time, index, rate, std::move(values));
+  handlePairs();
 }
 
-void TapCollector::pairSamples() {
-  while (!hammer_.empty() && !samples_.empty()) {
-    const Force h = hammer_.front();
-    const std::uint64_t index = samples_.front().index;
-    if (h.index <= index) hammer_.pop_front();
-    if (index > h.index) continue;
-    const Sample s = std::move(samples_.front());
-    samples_.pop_front();
-    if (h.index != index) continue;
-    rate_ = s.rate;
+void TapCollector::handlePairs() {
+  while (const std::optional<TapPairs::Pair> pair = pairs_.next()) {
+    rate_ = pair->rate;
     std::vector<Hit> hit;
     for (std::size_t c = 0; c < collectors_.size(); ++c) {
       HitCollector& collector = collectors_[c];
       if (!collector.armed() && !collector.recording()) collector.arm();
-      auto record = collector.add(s.time, s.index, s.rate, h.force, s.values.at(c));
+      auto record = collector.add(pair->time, pair->index, pair->rate, pair->force, pair->response.at(c));
       if (record && record->fault.empty()) hit.push_back(std::move(record->hit));
     }
     if (hit.size() == collectors_.size()) hits_.push_back(std::move(hit));
   }
-  if (std::max(hammer_.size(), samples_.size()) > MAX_WAITING) end();
+  if (!pairs_.fault().empty()) end();  // SensorMeasurement reports it
 }
 
 std::vector<std::vector<Hit>> TapCollector::acceptedHits(const SensorResult& result) const {

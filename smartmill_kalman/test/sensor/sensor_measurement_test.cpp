@@ -178,6 +178,14 @@ TEST(SensorMeasurement, NamesWhatIsWrong) {
     loop.spoil = [](TapRig::Blocks& b) { b.hammer.first_index += 1000000; };
     EXPECT_EQ(loop.measure(goal("x", 3, 0)).code, FrfCode::bad_data);
   }
+  {
+    Loop loop(dynamometer(), 1, taps);  // an instrument of its own: its count began with the same sample
+    loop.spoil = [](TapRig::Blocks& b) { b.hammer.stamp += 0.1e-3; };
+    const SensorResult r = loop.measure(goal("x", 3, 0));
+    EXPECT_EQ(r.code, FrfCode::bad_data);
+    EXPECT_NE(r.message.find("stamps of the same running index differ by 0.10 ms"), std::string::npos)
+        << r.message;
+  }
   EXPECT_EQ(Loop().measure(goal("u", 3, 0)).code, FrfCode::bad_goal);
   EXPECT_EQ(Loop().measure(goal("x", 0, 0)).code, FrfCode::bad_goal);
   MeasureFrfGoal tip = goal("x", 3, 0);

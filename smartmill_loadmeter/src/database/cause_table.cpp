@@ -5,6 +5,8 @@
 #include <set>
 #include <sstream>
 
+#include "smartmill_core/math/normal.h"
+
 namespace smartmill::loadmeter {
 // Probability that a channel shows a cause whose size is larger by a factor. @param squares squared-gap
 // reduction over the threshold
@@ -12,7 +14,7 @@ double CauseTable::showProbability(double squares, double factor) const {
   if (squares <= 0.0) return options_.channel_error;
   const double distance = std::log(squares * factor * factor) / options_.profile_std;
   return options_.channel_error +
-         (1.0 - 2.0 * options_.channel_error) * 0.5 * std::erfc(-distance / std::sqrt(2.0));
+         (1.0 - 2.0 * options_.channel_error) * normalCdf(distance);
 }
 
 CauseTable::CauseTable(const FleetCauses& fleet, const CauseTableOptions& options)

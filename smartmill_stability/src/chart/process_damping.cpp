@@ -4,8 +4,11 @@
 #include <cmath>
 #include <functional>
 
+#include <boost/math/tools/minima.hpp>
+
 #include "smartmill_core/error.h"
 #include "smartmill_core/io/csv.h"
+#include "smartmill_core/math/normal.h"
 #include "smartmill_core/require.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
@@ -30,31 +33,10 @@ struct GridOptions {
 };
 constexpr GridOptions GRID;
 
-double normalDistribution(double x) {
-  return 0.5 * std::erfc(-x / std::sqrt(2.0));
-}
-
-/// Position of the maximum of a function with one maximum between low and high, by golden section.
-double maximumOf(const std::function<double(double)>& function, double low, double high, double tolerance) {
-  const double golden = 0.5 * (std::sqrt(5.0) - 1.0);
-  double a = high - golden * (high - low), b = low + golden * (high - low), fa = function(a),
-         fb = function(b);
-  while (high - low > tolerance) {
-    if (fa < fb) {
-      low = a;
-      a = b;
-      fa = fb;
-      b = low + golden * (high - low);
-      fb = function(b);
-    } else {
-      high = b;
-      b = a;
-      fb = fa;
-      a = high - golden * (high - low);
-      fa = function(a);
-    }
-  }
-  return 0.5 * (low + high);
+/// Position of the maximum of a function with one maximum between low and high.
+double maximumOf(const std::function<double(double)>& function, double low, double high) {
+  constexpr int BITS = 20;  // relative 1e-6
+  return boost::math::tools::brent_find_minima([&](double x) { return -function(x); }, low, high, BITS).first;
 }
 
 /// Position between an inner one above a level and an outer one below it at which a function crosses it.
@@ -172,7 +154,7 @@ ProcessDampingChart::Marginal ProcessDampingChart::marginal(const std::vector<Ju
     double sum = 0.0;
     for (std::size_t i = 0; i < cuts.size(); ++i) {
       const double distance = (above[i] - log_scale) / options.scatter;
-      sum += std::log(std::max(GRID.probability, normalDistribution(cuts[i].chatter ? distance : -distance)));
+      sum += std::log(std::max(GRID.probability, normalCdf(cuts[i].chatter ? distance : -distance)));
     }
     return sum;
   };
@@ -204,8 +186,7 @@ ProcessDampingEstimate ProcessDampingChart::estimate(const std::vector<JudgedCut
   const auto top = static_cast<int>(std::max_element(scan.begin(), scan.end()) - scan.begin());
   const int last = static_cast<int>(scan.size()) - 1;
   const auto positionOf = [](int i) { return static_cast<double>(i) * GRID.coarse; };
-  double best =
-      maximumOf(likelihood, positionOf(std::max(0, top - 1)), positionOf(std::min(last, top + 1)), 1e-3);
+  double best = maximumOf(likelihood, positionOf(std::max(0, top - 1)), positionOf(std::min(last, top + 1)));
   if (likelihood(0.0) >= likelihood(best)) best = 0.0;
   const Marginal found = marginal(cuts, options, best);
   // Coefficients whose likelihood matters.

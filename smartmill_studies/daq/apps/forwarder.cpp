@@ -1,9 +1,13 @@
 // A topic of sample blocks as a device (docs/daq.md): samples of the simulated machine take the way of a real
-// instrument. By TCP, or by a named pipe as rows of numbers or as raw float32 for a player of sound.
+// instrument. By TCP, or by a named pipe as rows of numbers or as raw float32 for a player of sound. Several
+// topics with the same running index become the channels of one device, in the order of the topics (pipe
+// only).
 //
 //   rosrun smartmill_studies daq_forwarder _input:=daq/dynamometer _port:=5045
 //   rosrun smartmill_studies daq_forwarder _input:=daq/dynamometer _pipe:=/tmp/forces
-//   rosrun smartmill_studies daq_forwarder _input:=daq/dynamometer _pipe:=/tmp/forces _full_scale:=1.0e6
+//   rosrun smartmill_studies daq_forwarder _input:="daq/dynamometer daq/hammer" _pipe:=/tmp/front_end
+//   _full_scale:=1.0e6
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <chrono>
@@ -11,9 +15,12 @@
 #include <csignal>
 #include <deque>
 #include <functional>
+#include <iterator>
 #include <mutex>
+#include <sstream>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include <fcntl.h>
 #include <netinet/in.h>
@@ -112,19 +119,62 @@ std::function<int()> readersOf(const std::string& pipe) {
   return [pipe] { return ::open(pipe.c_str(), O_WRONLY | O_CLOEXEC); };
 }
 
-/// @param full_scale [unit] of float32 samples; 0: rows of numbers
-std::string streamOf(const smartmill_msgs::SampleBlock& message, double full_scale) {
-  std::string bytes;
-  const std::size_t channels = message.channels.size();
-  for (std::size_t i = 0; i < message.samples.size(); ++i) {
-    if (full_scale > 0.0) {
-      const auto share = static_cast<float>(message.samples[i] / full_scale);
-      bytes.append(reinterpret_cast<const char*>(&share), sizeof share);
-    } else {
-      std::array<char, 32> text;  // NOLINT(cppcoreguidelines-pro-type-member-init): to_chars fills it
-      const auto end = std::to_chars(text.data(), text.data() + text.size(), message.samples[i]);
-      bytes.append(text.data(), end.ptr).push_back((i + 1) % channels == 0 ? '\n' : ' ');
+/// Rows of topics whose samples have the same running index. What one of them has lost is left out.
+class RowJoiner {
+ public:
+  explicit RowJoiner(std::size_t topics) : waiting_(topics) {}
+
+  /// @return the rows that are complete with this block
+  std::vector<std::vector<double>> add(std::size_t topic, const smartmill_msgs::SampleBlock& message) {
+    const std::size_t channels = message.channels.size();
+    for (std::size_t i = 0; (i + 1) * channels <= message.samples.size(); ++i) {
+      const auto row = message.samples.begin() + static_cast<std::ptrdiff_t>(i * channels);
+      waiting_[topic].push_back(Row{message.first_index + i,
+                                    std::vector<double>(row, row + static_cast<std::ptrdiff_t>(channels))});
     }
+    std::vector<std::vector<double>> rows;
+    while (std::none_of(waiting_.begin(), waiting_.end(), [](const auto& queue) { return queue.empty(); })) {
+      std::uint64_t newest = 0;
+      for (const auto& queue : waiting_) newest = std::max(newest, queue.front().index);
+      bool same = true;
+      for (auto& queue : waiting_) {
+        if (queue.front().index == newest) continue;
+        queue.pop_front();
+        same = false;
+      }
+      if (!same) continue;
+      rows.emplace_back();
+      for (auto& queue : waiting_) {
+        rows.back().insert(rows.back().end(), queue.front().values.begin(), queue.front().values.end());
+        queue.pop_front();
+      }
+    }
+    return rows;
+  }
+
+ private:
+  struct Row {
+    std::uint64_t index;
+    std::vector<double> values;
+  };
+  std::vector<std::deque<Row>> waiting_;
+};
+
+/// @param full_scale [unit] of float32 samples; 0: rows of numbers
+std::string streamOf(const std::vector<std::vector<double>>& rows, double full_scale) {
+  std::string bytes;
+  for (const std::vector<double>& row : rows) {
+    for (const double value : row) {
+      if (full_scale > 0.0) {
+        const auto share = static_cast<float>(value / full_scale);
+        bytes.append(reinterpret_cast<const char*>(&share), sizeof share);
+      } else {
+        std::array<char, 32> text;  // NOLINT(cppcoreguidelines-pro-type-member-init): to_chars fills it
+        const auto end = std::to_chars(text.data(), text.data() + text.size(), value);
+        bytes.append(text.data(), end.ptr).push_back(' ');
+      }
+    }
+    if (full_scale <= 0.0) bytes.back() = '\n';
   }
   return bytes;
 }
@@ -149,11 +199,19 @@ int main(int argc, char** argv) {
     const auto pipe = private_nh.param<std::string>("pipe", "");
     const double full_scale = private_nh.param("full_scale", 0.0);
     StreamWriter writer(pipe.empty() ? connectionsOf(private_nh.param("port", 5045)) : readersOf(pipe));
-    const auto input = nh.subscribe<smartmill_msgs::SampleBlock>(
-        private_nh.param<std::string>("input", "daq/dynamometer"), STREAM_QUEUE,
-        [&](const smartmill_msgs::SampleBlock::ConstPtr& message) {
-          writer.send(pipe.empty() ? frameOf(*message) : streamOf(*message, full_scale));
-        });
+    std::istringstream names(private_nh.param<std::string>("input", "daq/dynamometer"));
+    const std::vector<std::string> topics(std::istream_iterator<std::string>(names), {});
+    if (topics.empty() || (pipe.empty() && topics.size() > 1))
+      throw Error("input: " + std::to_string(topics.size()) + " topics, expected one (several with a pipe)");
+    RowJoiner joiner(topics.size());
+    std::vector<ros::Subscriber> inputs;
+    for (std::size_t topic = 0; topic < topics.size(); ++topic) {
+      const boost::function<void(const smartmill_msgs::SampleBlock::ConstPtr&)> forward =
+          [&, topic](const smartmill_msgs::SampleBlock::ConstPtr& message) {
+            writer.send(pipe.empty() ? frameOf(*message) : streamOf(joiner.add(topic, *message), full_scale));
+          };
+      inputs.push_back(nh.subscribe<smartmill_msgs::SampleBlock>(topics[topic], STREAM_QUEUE, forward));
+    }
     ros::spin();
   } catch (const std::exception& error) {
     ROS_FATAL("forwarder: %s", error.what());

@@ -64,13 +64,6 @@ ReferenceCase caseAt(double rpm, double duration) {
   return reference;
 }
 
-/// As many harmonics as the sample rate permits.
-CompensationParameters allHarmonics() {
-  CompensationParameters parameters;
-  parameters.filter.max_harmonics = 200;
-  return parameters;
-}
-
 /// Worst error of x and y from a sample on.
 double worstError(const std::array<std::vector<double>, 2>& force, const ReferenceCase& reference,
                   const ReferenceRecord& record, std::size_t from, std::size_t to, double band) {
@@ -168,8 +161,7 @@ void runForceModels(const std::vector<double>& speeds, double duration) {
                   60.0 / rpm * reference.sample_rate, name, 100.0 * e.to_3k, 100.0 * e.to_5k,
                   100.0 * e.entry_3k, 100.0 * e.entry_5k, statesOf(filter), cost, layout);
     };
-    HarmonicFilterParameters parameters;
-    parameters.max_harmonics = 200;
+    const HarmonicFilterParameters parameters;
     show("Fourier series", [&] {
       return HarmonicFilter(reference.sensor, reference.spindle_speed, reference.sample_rate, parameters);
     });
@@ -194,7 +186,7 @@ void runSpeeds(const std::vector<double>& speeds, double duration) {
       reference.speed_drop = drop;
       const ReferenceRecord record = simulate(reference);
       const auto error = [&](const ReferenceCase& told, bool track) {
-        CompensationParameters parameters = allHarmonics();
+        CompensationParameters parameters;
         parameters.track_speed = track;
         parameters.filter.memory_revolutions = 2.0;  // without a tachometer a longer memory has larger errors
         const auto force = runCompensation(told, record, reference.sensor, parameters);
@@ -240,7 +232,7 @@ void runRipples(const std::vector<double>& speeds, double duration) {
                             to - static_cast<std::size_t>(0.3 * reference.sample_rate), to, 5000.0);
         };
         const auto with = [&](AutoSetting track, bool delay_form, bool pass) {
-          CompensationParameters parameters = allHarmonics();
+          CompensationParameters parameters;
           parameters.track_speed = std::move(track);
           parameters.delay_form = delay_form;
           if (!pass) parameters.speed_tolerance = 0.49;
@@ -264,7 +256,7 @@ void runLags(const std::vector<double>& speeds, double duration) {
     const ReferenceRecord record = simulate(reference);
     const auto from = static_cast<std::size_t>((reference.engage_time + 0.1) * reference.sample_rate);
     for (const double lag : {0.0, 0.002, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16}) {
-      CompensationParameters parameters = allHarmonics();
+      CompensationParameters parameters;
       parameters.lag = lag;
       const auto force = runCompensation(reference, record, reference.sensor, parameters);
       const auto error = [&](double band) {
@@ -335,7 +327,7 @@ void runErrors(const std::vector<double>& speeds, double duration) {
         reference.sensor = reference.later;
       }
       const ReferenceRecord record = simulate(reference);
-      CompensationParameters parameters = allHarmonics();
+      CompensationParameters parameters;
       const auto frozen = runCompensation(reference, record, believed, parameters);
       parameters.follow = true;
       std::size_t moves = 0;

@@ -97,7 +97,6 @@ int main(int argc, char** argv) {
     world.spindle_sensor.present = true;
     kalman::CompensationParameters filter;
     filter.filter.bandwidth = request.bandwidth;
-    filter.filter.max_harmonics = 150;
     kalman::TapParameters taps;
     taps.fit_high = request.bandwidth;
     SpindleRig rig(model, world, filter, taps, false);

@@ -41,6 +41,8 @@ class AngleSources {
   Angles pushForces(const SampleBlock& block);
   Angles push(const CncState& state);
   void push(const CuttingCondition& condition);
+  /// The controller has fallen silent: its last speed is none.
+  void forgetControllerSpeed();
 
   const AngleSelector& selector() const { return selector_; }
   /// [rad] standard deviation of the last reading of a source, as it states it; NaN: none, or at rest
@@ -50,6 +52,7 @@ class AngleSources {
 
  private:
   void add(const Angles& more, Angles& to) const { to.insert(to.end(), more.begin(), more.end()); }
+  void setControllerSpeed(double speed);  // [rad/s]; NaN: not known
   void setCut();
 
   AngleSourcesParameters parameters_;

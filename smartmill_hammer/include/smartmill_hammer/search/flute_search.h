@@ -92,7 +92,4 @@ class FluteSearch {
   std::vector<Measurement> measurements_;
 };
 
-/// [rad] the angle shifted by full turns to within half a turn of a reference.
-double nearAngle(double angle, double reference);
-
 }  // namespace smartmill::hammer

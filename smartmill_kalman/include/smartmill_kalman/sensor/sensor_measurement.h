@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cstdint>
-#include <deque>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,6 +10,7 @@
 #include "smartmill_core/modal/results.h"
 #include "smartmill_core/signal/hit_collector.h"
 #include "smartmill_core/signal/streams.h"
+#include "smartmill_kalman/sensor/tap_pairs.h"
 
 namespace smartmill::kalman {
 
@@ -60,7 +60,7 @@ struct StrikeCommand {
 };
 
 /// Sequence of a tap test of the force sensor: requests a hit, detects it in the hammer's samples, pairs them
-/// with the sensor's samples by the running index, averages, and fits modes with static gain 1 (Dunwoody
+/// with the sensor's samples (TapPairs), averages, and fits modes with static gain 1 (Dunwoody
 /// ch. 5). No machine motion.
 ///
 /// Inputs come in stamp order, and time is that of the inputs. Directions are the sensor's axes. A hit may
@@ -89,13 +89,7 @@ class SensorMeasurement {
   std::optional<SensorResult> takeResult();
 
  private:
-  struct Sample {
-    double time;
-    std::uint64_t index;
-    double rate, value;
-  };
-  void addBlock(const SampleBlock& block, const std::string& channel, std::deque<Sample>& queue);
-  void pairSamples();
+  void handlePairs();
   void addSample(double time, std::uint64_t index, double rate, double force, double response);
   void requestHit(double now);
   void handleRecord(double now, HitCollector::Record record);
@@ -107,7 +101,7 @@ class SensorMeasurement {
   bool active_ = false;
   MeasureFrfGoal goal_;
   HitCollector collector_;
-  std::deque<Sample> hammer_, sensor_;
+  TapPairs pairs_;
   bool waiting_for_hit_ = false;
   double deadline_ = 0.0, rest_until_ = 0.0;  // [s]
   std::vector<Hit> hits_;

@@ -2,12 +2,12 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <vector>
 
 #include "smartmill_core/signal/hit_collector.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_kalman/sensor/sensor_measurement.h"
+#include "smartmill_kalman/sensor/tap_pairs.h"
 
 namespace smartmill::kalman {
 
@@ -29,22 +29,11 @@ class TapCollector {
   double rate() const { return rate_; }  ///< [Hz] of the last hit; 0 before
 
  private:
-  struct Force {
-    std::uint64_t index;
-    double force;  // [N]
-  };
-  struct Sample {
-    double time;
-    std::uint64_t index;
-    double rate;
-    std::vector<double> values;
-  };
-  void pairSamples();
+  void handlePairs();
 
   bool active_ = false;
   double rate_ = 0.0;
-  std::deque<Force> hammer_;
-  std::deque<Sample> samples_;
+  TapPairs pairs_;
   std::vector<HitCollector> collectors_;
   std::vector<std::vector<Hit>> hits_;
 };

@@ -75,7 +75,7 @@ std::optional<OrderTracker::Reading> OrderTracker::push(const SampleBlock& block
   const auto teeth = static_cast<double>(teeth_);
   if (locked_) {
     const double expected = turned_ + units::TWO_PI * frequency_ * (stamp - stamp_);
-    turned_ = line.phase + units::TWO_PI * std::round((expected - line.phase) / units::TWO_PI);
+    turned_ = nearAngle(line.phase, expected);
   } else {
     locked_ = true;
     ++locks_;
@@ -130,9 +130,7 @@ OrderTracker::Line OrderTracker::lineAt(double frequency) const {
     times.push_back(
         (static_cast<double>(begin) + 0.5 * static_cast<double>(piece - 1) - static_cast<double>(size - 1)) /
         rate_);
-    double phase = std::arg(own);
-    if (p > 0) phase += units::TWO_PI * std::round((phases.back() - phase) / units::TWO_PI);
-    phases.push_back(phase);
+    phases.push_back(p > 0 ? nearAngle(std::arg(own), phases.back()) : std::arg(own));
   }
   for (const double value : samples_) squares += (value - level) * (value - level);
 

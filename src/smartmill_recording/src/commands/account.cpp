@@ -38,16 +38,19 @@ struct Arguments {
 
 int run(const Arguments& arguments) {
   const RecordingAccount account = accountOf(arguments.recording, printReadingProgress);
-  std::printf("%-44s %9s %6s %10s %6s %8s %10s %12s\n", "topic", "messages", "lost", "samples", "lost",
-              "not fin.", "rate [Hz]", "by stamps");
+  std::printf("%-44s %9s %6s %10s %6s %8s %10s %12s  %s\n", "topic", "messages", "lost", "samples", "lost",
+              "not fin.", "rate [Hz]", "by stamps", "publisher");
   for (const StreamAccount& s : account.streams) {
     std::printf("%-44s %9llu %6llu", s.topic.c_str(), static_cast<unsigned long long>(s.messages),
                 static_cast<unsigned long long>(s.lost_messages));
-    if (s.sampled)
+    if (s.sampled) {
       std::printf(" %10llu %6llu %8llu %10.1f %12.4f", static_cast<unsigned long long>(s.samples),
                   static_cast<unsigned long long>(s.lost_samples),
                   static_cast<unsigned long long>(s.not_finite), s.rate_stated, s.rate_seen);
-    std::printf("\n");
+    } else {
+      std::printf(" %10s %6s %8s %10s %12s", "", "", "", "", "");
+    }
+    std::printf("  %s\n", s.publisher.c_str());
   }
   for (std::size_t k = 0; k < std::min(GAPS_PRINTED, account.gaps.size()); ++k)
     std::printf("%s\n", textOf(account.gaps[k]).c_str());

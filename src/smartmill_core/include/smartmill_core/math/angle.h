@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cmath>
+
 #include "smartmill_core/units.h"
 
 namespace smartmill {
@@ -14,6 +16,11 @@ inline double wrapped(double angle) {
   // Rounding may leave it slightly outside its range.
   if (rest < 0.0) return rest + units::TWO_PI < units::TWO_PI ? rest + units::TWO_PI : 0.0;
   return rest < units::TWO_PI ? rest : rest - units::TWO_PI;
+}
+
+/// [rad] The angle shifted by whole revolutions to within half a revolution of a reference.
+inline double nearAngle(double angle, double reference) {
+  return angle - units::TWO_PI * std::round((angle - reference) / units::TWO_PI);
 }
 
 }  // namespace smartmill
