@@ -1,7 +1,9 @@
 #include "session_bag.h"
 
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <optional>
 
 #include "smartmill_core/names.h"
 #include "smartmill_core/signal/steady_path.h"
@@ -12,6 +14,9 @@ namespace {
 
 constexpr double PATH_TOLERANCE = 1e-3;   // [m]
 constexpr double SPEED_TOLERANCE = 0.01;  // [1]
+/// [s] largest latency of a sensor: stamps of the same running index that differ by more are of instruments
+/// that count from different samples.
+constexpr double LARGEST_LATENCY = 0.1;
 
 /// Fills a SessionRecording from the messages of a bag, in the order of their reception.
 class SessionRecordingBuilder {
@@ -39,13 +44,15 @@ class SessionRecordingBuilder {
     bag.on<plain::ChatterState>(names::CHATTER_STATE, [this](const auto& state, double) { add(state); });
     const auto force = [&](const char* topic, ForceTrack RecordedCut::*track) {
       bag.on<ForceBlock>(topic, [this, track](const auto& block, double) {
-        RecordedCut* cut = cutAt(block.stamp);
-        if (cut) (cut->*track).add(block);
+        if (RecordedCut* cut = cutAt(block.stamp)) (cut->*track).add(withTrueIndex(block, *cut));
       });
     };
     force(names::FORCE_MEASURED, &RecordedCut::raw);
     force(names::FORCE_COMPENSATED, &RecordedCut::compensated);
-    force(names::TRUE_FORCE, &RecordedCut::truth);
+    bag.on<ForceBlock>(names::TRUE_FORCE, [this](const auto& block, double) {
+      truth_ = {block.stamp, block.first_index};
+      if (RecordedCut* cut = cutAt(block.stamp)) cut->truth.add(block);
+    });
   }
 
  private:
@@ -91,6 +98,20 @@ class SessionRecordingBuilder {
     }
   }
 
+  /// The block with the running index of the true force at its stamps: an instrument behind a pipe counts
+  /// from a sample of its own. The shift is that of the first block of the cut.
+  ForceBlock withTrueIndex(ForceBlock block, const RecordedCut& cut) {
+    if (!truth_) return block;
+    if (shift_of_ != cut.condition.stamp) {
+      const double ahead = (block.stamp - truth_->stamp) * block.sample_rate +
+                           static_cast<double>(truth_->index) - static_cast<double>(block.first_index);
+      shift_ = std::abs(ahead) > LARGEST_LATENCY * block.sample_rate ? std::llround(ahead) : 0;
+      shift_of_ = cut.condition.stamp;
+    }
+    block.first_index += static_cast<std::uint64_t>(shift_);
+    return block;
+  }
+
   RecordedCut* cutAt(double stamp) {
     for (auto cut = recording_.cuts.rbegin(); cut != recording_.cuts.rend(); ++cut) {
       if (cut->condition.stamp <= stamp) return stamp < cut->ends || std::isnan(cut->ends) ? &*cut : nullptr;
@@ -98,7 +119,15 @@ class SessionRecordingBuilder {
     return nullptr;
   }
 
+  struct Sample {
+    double stamp;         // [s]
+    std::uint64_t index;  // running index
+  };
+
   SessionRecording& recording_;
+  std::optional<Sample> truth_;     // the last of the true force
+  double shift_of_ = NOT_A_NUMBER;  // [s] start of the cut
+  long long shift_ = 0;             // [samples] from the sensor's running index to the true force's
 };
 
 }  // namespace

@@ -117,6 +117,30 @@ TEST_F(SessionBag, CutsHaveTheirSteadySegmentAndForces) {
   EXPECT_TRUE(cut.raw.empty());
 }
 
+// A pipe transmits no count: its reader counts from the first sample it receives.
+TEST_F(SessionBag, ForcesOfAnInstrumentWithACountOfItsOwnArePairedByStamps) {
+  const std::string file = folder_.file("pipe.bag");
+  const auto writer = createRecording(file, RecordingCompression::lz4);
+  const auto put = [&](const std::string& topic, double time, const auto& data) {
+    writer->write(topic, static_cast<std::uint64_t>(std::llround(1e9 * time)), data);
+  };
+  put(names::CUTTING_CONDITION, 10.0, condition(10.0, CuttingCondition::Kind::cut, "resonance"));
+  constexpr std::uint64_t OWN = 1000000;
+  for (std::uint64_t i = 0; i < 3; ++i) {
+    const double stamp = 10.0 + 0.01 * static_cast<double>(i);
+    put(names::TRUE_FORCE, stamp + 0.001, force(stamp, 256 * i, 2.0));
+    // Stamps of a counted clock wander; the blocks stay adjacent.
+    put(names::FORCE_COMPENSATED, stamp + 0.002,
+        force(stamp + 1e-6 * static_cast<double>(i), OWN + 256 * i, static_cast<double>(i)));
+  }
+  writer->close();
+  const SessionRecording recording = readSession(file, {});
+  ASSERT_EQ(recording.cuts.size(), 1u);
+  EXPECT_EQ(recording.cuts[0].compensated.covered(0, 10000),
+            std::make_pair(std::uint64_t{0}, std::uint64_t{768}));
+  EXPECT_EQ(recording.cuts[0].compensated.axis(0, 256, 257)[0], 1.0);
+}
+
 TEST_F(SessionBag, MeasuredAndTrueValuesAreSeparate) {
   const SessionRecording recording = readSession(file_, {});
   ASSERT_TRUE(recording.coefficients && recording.true_coefficients && recording.chart);
