@@ -29,7 +29,7 @@ void TapPairs::addResponse(double time, std::uint64_t index, double rate, std::v
   checkPatience();
 }
 
-// next() has taken what can be paired: what is left waits for the other stream.
+// next() has taken all pairs: the remainder waits for the other stream.
 void TapPairs::checkPatience() {
   for (const auto* waiting : {&hammer_, &response_}) {
     if (waiting->empty() || waiting->back().time - waiting->front().time <= patience_) continue;
