@@ -17,7 +17,7 @@ constexpr double CHECK_PERIOD = 0.2;  // [s]
 
 }  // namespace
 
-AngleNode::AngleNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
+AngleNode::AngleNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
     : parameters_(parametersFromServer(private_nh).readAll<AngleNodeParameters>()),
       sources_(parameters_.sources),
       shell_(nh, private_nh, "angle", parameters_.input_timeout),

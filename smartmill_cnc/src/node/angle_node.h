@@ -15,7 +15,7 @@ class AngleNode {
  public:
   using Parameters = AngleNodeParameters;
   /// @throws Error on an invalid parameter.
-  AngleNode(ros::NodeHandle nh, ros::NodeHandle private_nh);
+  AngleNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh);
 
  private:
   void listen(const std::string& topic, AngleSources::Angles (AngleSources::*push)(const SampleBlock&));

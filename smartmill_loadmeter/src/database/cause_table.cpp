@@ -13,8 +13,7 @@ namespace smartmill::loadmeter {
 double CauseTable::showProbability(double squares, double factor) const {
   if (squares <= 0.0) return options_.channel_error;
   const double distance = std::log(squares * factor * factor) / options_.profile_std;
-  return options_.channel_error +
-         (1.0 - 2.0 * options_.channel_error) * normalCdf(distance);
+  return options_.channel_error + (1.0 - 2.0 * options_.channel_error) * normalCdf(distance);
 }
 
 CauseTable::CauseTable(const FleetCauses& fleet, const CauseTableOptions& options)

@@ -60,7 +60,7 @@ class AngleSources {
   PulseTachometer pulses_;
   OrderTracker orders_;
   AngleSelector selector_;
-  std::array<double, SOURCES> angle_std_;
+  std::array<double, SOURCES> angle_std_{};
   double speed_ = 0.0;  // [rad/s] by the controller
   std::size_t teeth_ = 0, locks_ = 0;
 };
