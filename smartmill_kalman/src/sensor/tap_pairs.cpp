@@ -40,10 +40,14 @@ void TapPairs::checkPatience() {
 
 std::optional<TapPairs::Pair> TapPairs::next() {
   while (fault_.empty() && !hammer_.empty() && !response_.empty()) {
-    Sample h = hammer_.front(), r = response_.front();
-    if (h.index <= r.index) hammer_.pop_front();
-    if (r.index <= h.index) response_.pop_front();
-    if (h.index != r.index) continue;
+    if (hammer_.front().index != response_.front().index) {
+      (hammer_.front().index < response_.front().index ? hammer_ : response_).pop_front();
+      continue;
+    }
+    const Sample h = std::move(hammer_.front());
+    Sample r = std::move(response_.front());
+    hammer_.pop_front();
+    response_.pop_front();
     if (h.rate != r.rate) {
       fault_ = "hammer and force sensor differ in sample rate";
     } else if (std::abs(h.time - r.time) > 0.5 / h.rate) {
