@@ -3,6 +3,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_exchange/mqtt/publisher.h"
+#include "smartmill_exchange/opcua/server.h"
 
 namespace smartmill::exchange {
 namespace {
@@ -31,10 +32,7 @@ Address addressOf(const std::string& broker) {
 
 bool isLoopback(const std::string& broker) {
   const std::string host = addressOf(broker).host;
-  if (host == "localhost" || host == "[::1]") return true;
-  bool numeric = host.rfind("127.", 0) == 0;
-  for (const char c : host) numeric = numeric && (std::isdigit(static_cast<unsigned char>(c)) || c == '.');
-  return numeric;
+  return host == "localhost" || host == "[::1]" || isLoopbackAddress(host);
 }
 
 void check(const MqttOptions& options) {

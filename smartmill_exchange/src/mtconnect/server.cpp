@@ -10,6 +10,7 @@
 #include <boost/asio.hpp>
 #include <boost/beast.hpp>
 
+#include "listen.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_exchange/mtconnect/shdr.h"
@@ -325,18 +326,9 @@ class ExchangeServer::Impl {
   }
 
  private:
-  static int listen(Tcp::acceptor& acceptor, const std::string& text, int port, const char* key) {
+  static int listen(Tcp::acceptor& acceptor, const std::string& address, int port, const char* key) {
     if (port < 0) return -1;
-    beast::error_code failed;
-    const auto address = asio::ip::make_address(text, failed);
-    if (failed) throw Error(std::string(key) + ": '" + text + "', expected an IP address");
-    const Tcp::endpoint endpoint(address, static_cast<unsigned short>(port));
-    acceptor.open(endpoint.protocol(), failed);
-    if (!failed) acceptor.set_option(asio::socket_base::reuse_address(true), failed);
-    if (!failed) acceptor.bind(endpoint, failed);
-    if (!failed) acceptor.listen(asio::socket_base::max_listen_connections, failed);
-    if (failed) throw Error(text + ":" + std::to_string(port) + ": cannot listen: " + failed.message());
-    return acceptor.local_endpoint().port();
+    return listenAt(acceptor, address, port, key);
   }
 
   void acceptAgent() {

@@ -69,10 +69,12 @@ ExchangeNode::ExchangeNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   if (parameters_.agent || parameters_.adapter)
     server_ = std::make_unique<ExchangeServer>(serverOptions(parameters_), wallTime);
   if (!parameters_.mqtt.broker.empty()) mqtt_ = std::make_unique<MqttPublisher>(parameters_.mqtt);
+  if (parameters_.opcua_port > 0) opcua_ = std::make_unique<OpcUaServer>(parameters_.opcua());
   Translator::forEachTopic(Subscribe{*this});
   shell_.every(TICK, [this] { translator_.tick(ros::Time::now().toSec()); });
   if (server_) shell_.diagnose("MTConnect", [this](auto& status) { diagnoseMtconnect(status); });
   if (mqtt_) shell_.diagnose("MQTT", [this](auto& status) { diagnoseMqtt(status); });
+  if (opcua_) shell_.diagnose("OPC UA", [this](auto& status) { diagnoseOpcUa(status); });
   if (server_ && server_->agentPort() >= 0)
     std::printf("exchange: MTConnect agent at http://%s:%d/probe\n", parameters_.agent_address.c_str(),
                 server_->agentPort());
@@ -82,17 +84,22 @@ ExchangeNode::ExchangeNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   if (mqtt_)
     std::printf("exchange: MQTT to %s, topics %s/...\n", parameters_.mqtt.broker.c_str(),
                 parameters_.mqtt.prefix.c_str());
+  if (opcua_)
+    std::printf("exchange: OPC UA at opc.tcp://%s:%d\n", parameters_.opcua_address.c_str(),
+                parameters_.opcua_port);
   std::fflush(stdout);
 }
 
 void ExchangeNode::observe(const Observation& observation) {
   if (server_) server_->observe(observation);
   if (mqtt_) mqtt_->observe(observation);
+  if (opcua_) opcua_->observe(observation);
 }
 
 void ExchangeNode::store(const Asset& asset) {
   if (server_) server_->store(asset);
   if (mqtt_) mqtt_->store(asset);
+  if (opcua_) opcua_->store(asset);
 }
 
 void ExchangeNode::diagnoseMtconnect(diagnostic_updater::DiagnosticStatusWrapper& status) {
@@ -119,6 +126,14 @@ void ExchangeNode::diagnoseMqtt(diagnostic_updater::DiagnosticStatusWrapper& sta
   status.add("topics waiting", s.waiting);
   status.add("values replaced by newer ones", s.replaced);
   status.add("connections", s.connections);
+}
+
+void ExchangeNode::diagnoseOpcUa(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  const OpcUaStatistics s = opcua_->statistics();
+  status.summary(diagnostic_msgs::DiagnosticStatus::OK, "serving");
+  status.add("sessions", s.sessions);
+  status.add("sessions refused", s.refused);
+  status.add("values written", s.written);
 }
 
 }  // namespace smartmill::exchange

@@ -10,6 +10,7 @@
 #include "smartmill_exchange/items/translator.h"
 #include "smartmill_exchange/mqtt/publisher.h"
 #include "smartmill_exchange/mtconnect/server.h"
+#include "smartmill_exchange/opcua/server.h"
 #include "smartmill_ros/node_shell.h"
 
 namespace smartmill::exchange {
@@ -28,11 +29,13 @@ class ExchangeNode {
   void store(const Asset& asset);
   void diagnoseMtconnect(diagnostic_updater::DiagnosticStatusWrapper& status);
   void diagnoseMqtt(diagnostic_updater::DiagnosticStatusWrapper& status);
+  void diagnoseOpcUa(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   ExchangeParameters parameters_;
   NodeShell shell_;
   std::unique_ptr<ExchangeServer> server_;
   std::unique_ptr<MqttPublisher> mqtt_;
+  std::unique_ptr<OpcUaServer> opcua_;
   Translator translator_;
   std::vector<std::uint8_t> bytes_;  // of a message
 };

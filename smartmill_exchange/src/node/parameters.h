@@ -5,6 +5,7 @@
 #include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_exchange/items/translator.h"
 #include "smartmill_exchange/mqtt/publisher.h"
+#include "smartmill_exchange/opcua/server.h"
 
 namespace smartmill::exchange {
 
@@ -22,10 +23,14 @@ struct ExchangeParameters {
   double queue = 4.0;
   int most_clients = 32;
   MqttOptions mqtt;
+  std::string opcua_address = "127.0.0.1";
+  int opcua_port = 0;
+  std::string opcua_user, opcua_password_file, opcua_certificate_file, opcua_key_file;
 
   void declare(ParameterTable& table) {
     table.title(
-        "Parameters of exchange_node (package smartmill_exchange): data items by MTConnect and MQTT.");
+        "Parameters of exchange_node (package smartmill_exchange): data items by MTConnect, MQTT and OPC "
+        "UA.");
     table.text("device", device, "name of the machine: letters, digits, points, hyphens and underscores");
     table.text("uuid", uuid, "identifier of the machine, unique in the shop");
     table.text("manufacturer", manufacturer, "of the machine, for the description; may be empty");
@@ -46,10 +51,11 @@ struct ExchangeParameters {
     table.number("adapter_port", adapter_port, "1", Range::closed(0, 65535), "as agent_port");
     table.number("heartbeat", heartbeat, "s", Range::closed(0.1, 600.0),
                  "stated in PONG: an agent sends a PING this often");
-    table.section("Limits of agent and adapter.");
+    table.section("Limits.");
     table.number("queue", queue, "MB", Range::closed(0.1, 1000.0),
                  "queued for a client of the adapter before it is disconnected");
-    table.number("most_clients", most_clients, "1", Range::closed(1, 1000), "most clients of each at a time");
+    table.number("most_clients", most_clients, "1", Range::closed(1, 1000),
+                 "most clients of agent, adapter and OPC UA each at a time");
     table.section("MQTT. A broker on another computer requires mqtts, user and password.");
     table.text("mqtt_broker", mqtt.broker, "mqtt://HOST:PORT or mqtts://HOST:PORT; empty: no MQTT");
     table.text("mqtt_prefix", mqtt.prefix, "first levels of the topics, unique for each machine of a broker");
@@ -59,11 +65,37 @@ struct ExchangeParameters {
                "file with the password, readable by its owner only; empty: none");
     table.text("mqtt_ca_file", mqtt.ca_file,
                "certificates that sign the broker's; empty: those of the system");
+    table.section("OPC UA (Debian 13). Another address than loopback requires user and certificate.");
+    table.number("opcua_port", opcua_port, "1", Range::closed(0, 65535),
+                 "port to listen at, 4840 by convention; 0: no OPC UA");
+    table.text("opcua_address", opcua_address, "as agent_address");
+    table.text("opcua_user", opcua_user, "user; empty: everybody on this computer");
+    table.text("opcua_password_file", opcua_password_file,
+               "file with the password, readable by its owner only; empty: none");
+    table.text("opcua_certificate_file", opcua_certificate_file,
+               "certificate of the server (PEM or DER) for urn:smartmill:exchange; empty: no encryption");
+    table.text("opcua_key_file", opcua_key_file, "its private key");
+  }
+  OpcUaOptions opcua() const {
+    OpcUaOptions options;
+    options.address = opcua_address;
+    options.port = opcua_port;
+    options.device = device;
+    options.uuid = uuid;
+    options.manufacturer = manufacturer;
+    options.model = machine;
+    options.user = opcua_user;
+    options.password_file = opcua_password_file;
+    options.certificate_file = opcua_certificate_file;
+    options.key_file = opcua_key_file;
+    options.most_clients = static_cast<std::size_t>(most_clients);
+    return options;
   }
   /// @throws Error naming key and value.
   void validate() const {
     checkBounds(*this);
     if (!mqtt.broker.empty()) check(mqtt);
+    if (opcua_port > 0) check(opcua());
   }
 };
 

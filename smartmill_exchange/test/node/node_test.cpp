@@ -67,6 +67,9 @@ TEST_F(NodeTest, SilentTopicsBecomeUnavailable) {
 TEST_F(NodeTest, NothingFromOutsideReachesTheGraph) {
   check("NothingFromOutsideReachesTheGraph");
 }
+TEST_F(NodeTest, OpcUaHasTheValuesOfTheTopics) {
+  check("OpcUaHasTheValuesOfTheTopics");
+}
 TEST_F(NodeTest, AKilledNodeLeavesItsLastWill) {
   check("AKilledNodeLeavesItsLastWill");
 }

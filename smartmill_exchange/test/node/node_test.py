@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Runs exchange_node with topics of known values and reads what it sends with clients of other hands: urllib and xml.etree for the agent, a
-socket for the adapter, python3-paho-mqtt for a broker (mosquitto).
+socket for the adapter, python3-paho-mqtt for a broker (mosquitto), node-opcua-client (npm) for OPC UA.
 
 usage: node_test.py NODE OUT: writes OUT/results.json, {case: failure, "skipped: REASON" or ""}, and prints the latency from topic to item."""
 import json
@@ -250,6 +250,41 @@ def nothing_from_outside_reaches_the_graph(bench, machine, client, shdr, broker)
         assert client.refused("/current", method) == (405, "UNSUPPORTED")
 
 
+def opc_ua_has_the_values_of_the_topics(bench, machine, client, shdr, broker):
+    """A second node, since not every build has OPC UA."""
+    port = free_port()
+    node = subprocess.Popen([NODE, "__ns:=/smartmill", "__name:=opcua", "_agent:=false", "_adapter:=false", f"_opcua_port:={port}", "_sample_period:=0.0",
+                             "_input_timeout:=60.0"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    bench.processes.append(node)
+    line = ""
+    while "OPC UA" not in line:
+        line = node.stdout.readline()
+        assert line, "the node ended"
+    if "this build has no OPC UA" in line:
+        return "skipped: open62541 is not installed"
+    if subprocess.run(["node", "-e", "require('node-opcua-client')"], capture_output=True).returncode != 0:
+        return "skipped: node-opcua-client is not installed"
+    assert line.strip() == f"exchange: OPC UA at opc.tcp://127.0.0.1:{port}", line
+
+    def read():
+        script = pathlib.Path(__file__).resolve().parent.parent / "clients/opcua.js"
+        return json.loads(subprocess.run(["node", script, str(port)], capture_output=True, text=True, check=True, timeout=PATIENCE).stdout)
+
+    for topic in ("cnc/state", "cnc/load", "cnc/alarms", "cut/condition", "machine/temperature", "chatter/state", "material/coefficients"):
+        end = time.time() + PATIENCE
+        while machine.publishers[topic].get_num_connections() < 2 and time.time() < end:
+            time.sleep(0.01)
+    state = machine.state()
+    expected = {"feed": 1e3 * state.feed, "x_position": 1e3 * state.position[0], "execution": "ACTIVE", "tool": "end_mill", "chatter_frequency": 843.21,
+                "alarms": ["fault 417.2: SERVO <ALARM> & more"], "connection": []}
+    becomes(lambda: {k: v["value"] for k, v in read().items() if k in expected}, expected)
+    found = read()
+    assert found["feed"]["time"] == state.header.stamp.to_nsec() // 1000, (found["feed"], state.header.stamp)
+    assert found["feed"]["units"] == "mm/s" and found["force_peak"]["status"] == "BadNoCommunication", found
+    ktc = "assets/coefficients.end_mill.al7050/ktc"
+    assert (found[ktc]["value"], found[ktc + "/StandardDeviation"]["value"], found[ktc]["units"]) == (796.4e6, 4.2e6, "N/m2"), found
+
+
 def a_killed_node_leaves_its_last_will(bench, machine, client, shdr, broker):
     bench.node.kill()
     bench.node.wait()
@@ -271,7 +306,7 @@ def main():
         client = bench.start()
         parts = (bench, machine, client, Shdr(bench.adapter), None if bench.missing else bench.mqtt())
         for case in (values_are_the_topics, assets_have_their_deviations, a_stream_has_every_value_of_the_topic, silent_topics_become_unavailable,
-                     nothing_from_outside_reaches_the_graph, a_killed_node_leaves_its_last_will):
+                     nothing_from_outside_reaches_the_graph, opc_ua_has_the_values_of_the_topics, a_killed_node_leaves_its_last_will):
             bench.case(case, *parts)
         bench.case(a_remote_broker_without_tls_is_refused, bench)
     finally:
