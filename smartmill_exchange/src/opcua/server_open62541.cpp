@@ -206,7 +206,7 @@ class OpcUaServer::Impl {
       require(UA_ServerConfig_addSecurityPolicyNone(config, &certificate_bytes), "configuration");
       config->securityPolicyNoneDiscoveryOnly = true;
       keepEncrypted(config);
-      // Clients are told apart by user and password; any certificate encrypts.
+      // User and password identify a client; any certificate encrypts.
       acceptAnyCertificate(&config->secureChannelPKI);
       acceptAnyCertificate(&config->sessionPKI);
     } else {
