@@ -21,7 +21,7 @@ using kalman::CalibrationGoal;
 using kalman::SpindleRig;
 using Forces = std::array<std::vector<double>, 3>;
 
-constexpr double LENGTH = 0.139;  // [m] of tool and holder
+constexpr double LENGTH = 0.139;   // [m] of tool and holder
 constexpr double APPROACH = 0.05;  // [s] of feed in air before the stock; the tuner requires 20 ms
 constexpr double RATE = sim::World::SAMPLE_RATE;
 /// [rpm] of the run-up, and of the cuts that count: lowest to highest of the shipped spindle.
