@@ -1,7 +1,9 @@
 #include "smartmill_exchange/mtconnect/agent.h"
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
+#include <map>
 
 #include "smartmill_core/error.h"
 #include "smartmill_exchange/items/catalogue.h"
@@ -107,19 +109,23 @@ std::string observationXml(const Record& record) {
   return "<" + element + common + ">" + content + "</" + element + ">";
 }
 
-/// The part of a ComponentStream with one category; empty without records.
-std::string categoryXml(Category category, const char* element, const std::string& component,
-                        const std::vector<std::vector<const Record*>>& records) {
-  std::vector<const Record*> chosen;
-  for (std::size_t i = 0; i < records.size(); ++i)
-    if (catalogue()[i].component == component && catalogue()[i].category == category)
-      chosen.insert(chosen.end(), records[i].begin(), records[i].end());
-  if (chosen.empty()) return {};
-  std::sort(chosen.begin(), chosen.end(),
-            [](const Record* a, const Record* b) { return a->sequence < b->sequence; });
-  std::string xml = std::string("        <") + element + ">\n";
-  for (const Record* record : chosen) xml += "          " + observationXml(*record) + "\n";
-  return xml + "        </" + element + ">\n";
+/// Records of one component by category, in the order of their sequence numbers.
+using OfComponent = std::array<std::vector<const Record*>, 3>;
+constexpr std::array<const char*, 3> ELEMENTS{
+    {"Samples", "Events", "Condition"}};  // in the order of Category
+
+std::string recordsXml(OfComponent records) {
+  std::string xml;
+  for (std::size_t category = 0; category < records.size(); ++category) {
+    std::vector<const Record*>& list = records[category];
+    if (list.empty()) continue;
+    std::sort(list.begin(), list.end(),
+              [](const Record* a, const Record* b) { return a->sequence < b->sequence; });
+    xml += std::string("        <") + ELEMENTS[category] + ">\n";
+    for (const Record* record : list) xml += "          " + observationXml(*record) + "\n";
+    xml += std::string("        </") + ELEMENTS[category] + ">\n";
+  }
+  return xml;
 }
 
 std::string root(const char* kind, const std::string& content) {
@@ -257,18 +263,23 @@ std::string Agent::probe(double now) const {
 
 std::string Agent::streams(const std::vector<std::vector<const Record*>>& records, std::uint64_t next,
                            double now) const {
-  std::string streams;
-  std::vector<Component> all = components();
-  all.insert(all.begin(), Component{"", "", "Device", options_.device});
-  for (const Component& c : all) {
-    const std::string parts = categoryXml(Category::sample, "Samples", c.id, records) +
-                              categoryXml(Category::event, "Events", c.id, records) +
-                              categoryXml(Category::condition, "Condition", c.id, records);
-    if (parts.empty()) continue;
-    streams += "      <ComponentStream" + attribute("component", c.element) + attribute("name", c.name) +
-               attribute("componentId", c.id.empty() ? "d" : c.id) + ">\n" + parts +
-               "      </ComponentStream>\n";
+  std::map<std::string, OfComponent> of_components;
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    if (records[i].empty()) continue;
+    const DataItem& item = catalogue()[i];
+    std::vector<const Record*>& list = of_components[item.component][static_cast<std::size_t>(item.category)];
+    list.insert(list.end(), records[i].begin(), records[i].end());
   }
+  std::string streams;
+  const auto add = [&](const Component& c) {
+    const auto found = of_components.find(c.id);
+    if (found == of_components.end()) return;
+    streams += "      <ComponentStream" + attribute("component", c.element) + attribute("name", c.name) +
+               attribute("componentId", c.id.empty() ? "d" : c.id) + ">\n" + recordsXml(found->second) +
+               "      </ComponentStream>\n";
+  };
+  add({"", "", "Device", options_.device});
+  for (const Component& c : components()) add(c);
   return header("Streams", now,
                 attribute("deviceModelChangeTime", timeText(started_)) +
                     attribute("bufferSize", buffer_.capacity()) + attribute("nextSequence", next) +

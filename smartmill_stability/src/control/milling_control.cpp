@@ -74,6 +74,7 @@ bool MillingControl::mayAct() const {
 void MillingControl::request(double feed, double spindle, const std::string& reason, bool chatter) {
   old_feed_ = std::exchange(feed_, feed);
   old_spindle_ = std::exchange(spindle_, spindle);
+  if (chatter) requested_at_ = state_->stamp;
   request_ = OverrideRequest{feed_, spindle_, cut_->name + ": " + reason, chatter};
 }
 
@@ -115,8 +116,9 @@ void MillingControl::handle(const ChatterState& state) {
   if (state.stamp - window_ * turn < since_ + parameters_.settle_revolutions * turn) return;
   phase_ = Phase::watching;
   if (state.chatter) return;
-  notes_.push_back(formatted("%s: cut stable at %.0f rpm, %.2f s after the override", cut_->name.c_str(),
-                             rpm(cut_->spindle_speed * spindle_), state.stamp - moved_at_));
+  notes_.push_back(formatted("%s: cut stable at %.0f rpm, %.2f s after the verdict of chatter",
+                             cut_->name.c_str(), rpm(cut_->spindle_speed * spindle_),
+                             state.stamp - requested_at_));
 }
 
 std::optional<UncertainSystem> MillingControl::systemOf(const ChatterAdvice& advice) const {
@@ -219,7 +221,7 @@ void MillingControl::answer(bool accepted, const std::string& message, double st
   if (accepted) {
     if (phase_ != Phase::requested) return;
     phase_ = Phase::moving;
-    since_ = moved_at_ = stamp;
+    since_ = stamp;
     return;
   }
   feed_ = old_feed_;

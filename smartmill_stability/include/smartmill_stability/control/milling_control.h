@@ -126,7 +126,7 @@ class MillingControl {
   double load_factor_ = 1.0;                   // [1] of the feed, by the load control
   double last_load_ = 0.0;                     // [s]
   double since_ = 0.0;                         // [s] start of the phase
-  double moved_at_ = 0.0;                      // [s]
+  double requested_at_ = 0.0;                  // [s] newest state when chatter was answered
   int moves_ = 0;
   bool refused_ = false, at_floor_ = false;
   std::optional<OverrideRequest> request_;
