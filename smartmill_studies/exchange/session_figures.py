@@ -1,13 +1,19 @@
 #!/usr/bin/env python3
-"""Reads a running session with an MTConnect client (urllib, xml.etree) and compares every value with the topics, to the printed digits.
+"""Reads a running session with an MTConnect client (urllib, xml.etree), or with another client's program, and compares every value with the
+topics, to the printed digits.
 
-usage: session_figures.py AGENT_PORT SECONDS    with the ROS master of the session, exchange_node with sample_period 0 next to it
+usage: session_figures.py AGENT_PORT SECONDS [COMMAND...]    with the ROS master of the session, exchange_node with sample_period 0 next to it
+  COMMAND  a client that prints lines [item, value, status, time in microseconds, wall time of its arrival in s]:
+           node smartmill_exchange/test/clients/mqtt.js PORT PREFIX SECONDS
+           node smartmill_exchange/test/clients/opcua.js PORT --follow SECONDS
 
 Prints: observations and their sequence numbers, values compared and different, latency from a message of cnc/state to the item in the client."""
 import calendar
 import collections
 import math
+import json
 import pathlib
+import subprocess
 import sys
 import threading
 import time
@@ -58,7 +64,7 @@ rospy.Subscriber("/smartmill/chatter/state", msg.ChatterState, chatter, queue_si
 rospy.Subscriber("/smartmill/material/coefficients", msg.CuttingCoefficients, lambda m: coefficients.__setitem__(f"{m.tool}.{m.material}", m), queue_size=100)
 client = Client(port)
 start, end = client.current().header["nextSequence"], time.time() + seconds
-observations = []
+observations, lines = [], []
 
 
 def read():
@@ -69,25 +75,36 @@ def read():
             return
 
 
-reader = threading.Thread(target=read)
-reader.start()
-reader.join()
+def microseconds(text):
+    return calendar.timegm(time.strptime(text[:19], "%Y-%m-%dT%H:%M:%S")) * 1000000 + int(text[20:26])
+
+
+if sys.argv[3:]:
+    out = subprocess.run(sys.argv[3:], stdout=subprocess.PIPE, text=True, check=True).stdout
+    for item, value, status, stamp, now in map(json.loads, out.splitlines()):
+        text = f"{value:.9g}" if isinstance(value, (int, float)) else value
+        lines.append((item, text if status == "Good" else "UNAVAILABLE", stamp, now))
+else:
+    reader = threading.Thread(target=read)
+    reader.start()
+    reader.join()
+    lines = [(o["id"], o["value"], microseconds(o["time"]), now) for o, now in observations]
 compared, different, latency = collections.Counter(), [], []
-for o, now in observations:
-    stamp = calendar.timegm(time.strptime(o["time"][:19], "%Y-%m-%dT%H:%M:%S")) * 1000000 + int(o["time"][20:26])
+for item, value, stamp, now in lines:
     for near in (stamp, stamp - 1, stamp + 1):  # a stamp is a double with a resolution of 0.24 us
-        if o["id"] in expected.get(near, {}) and o["value"] != "UNAVAILABLE":
-            compared[o["id"]] += 1
-            if o["value"] not in expected[near][o["id"]]:
-                different.append((o["id"], o["value"], sorted(expected[near][o["id"]])))
+        if item in expected.get(near, {}) and value != "UNAVAILABLE":
+            compared[item] += 1
+            if value not in expected[near][item]:
+                different.append((item, value, sorted(expected[near][item])))
             if near in received:
                 latency.append(now - received[near])
             break
 sequences = [o["sequence"] for o, _ in observations]
-print(f"{len(observations)} observations, sequence numbers consecutive: {sequences == list(range(start, start + len(sequences)))}")
+if observations:
+    print(f"sequence numbers consecutive: {sequences == list(range(start, start + len(sequences)))}")
+print(f"{len(lines)} observations")
 print(f"{sum(compared.values())} values compared, {len(different)} different", different[:5], dict(compared))
-peaks = [float(o["value"]) for o, _ in observations if o["id"] == "force_peak" and o["value"] != "UNAVAILABLE"]
-margins = [float(o["value"]) for o, _ in observations if o["id"] == "stability_margin" and o["value"] != "UNAVAILABLE"]
+peaks, margins = ([float(value) for item, value, *_ in lines if item == name and value != "UNAVAILABLE"] for name in ("force_peak", "stability_margin"))
 print(f"force_peak: {len(peaks)} values, {min(peaks, default=math.nan):.1f} to {max(peaks, default=math.nan):.1f} N; "
       f"stability_margin: {len(margins)} values, {min(margins, default=math.nan):.1f} to {max(margins, default=math.nan):.1f} %")
 found = assets(client.get("/assets"))
