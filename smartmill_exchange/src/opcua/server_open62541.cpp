@@ -156,9 +156,9 @@ class OpcUaServer::Impl {
     } else if (const auto* set = std::get_if<DataSet>(&observation.value)) {
       std::vector<std::string> keys;
       std::vector<double> numbers;
-      for (const auto& [key, number] : *set) {
+      for (const auto& [key, value_of_key] : *set) {
         keys.push_back(key);
-        numbers.push_back(number);
+        numbers.push_back(value_of_key);
       }
       writeTexts(item.id + "/Keys", keys, value);
       UA_Variant_setArray(&value.value, numbers.data(), numbers.size(), &UA_TYPES[UA_TYPES_DOUBLE]);
