@@ -427,7 +427,9 @@ class OpcUaServer::Impl {
     std::vector<UA_String> strings;
     for (const std::string& text : texts) strings.push_back(view(text));
     value.hasValue = true;
-    UA_Variant_setArray(&value.value, strings.data(), strings.size(), &UA_TYPES[UA_TYPES_STRING]);
+    // An array without elements, which is not the same as none.
+    void* const data = strings.empty() ? UA_EMPTY_ARRAY_SENTINEL : strings.data();
+    UA_Variant_setArray(&value.value, data, strings.size(), &UA_TYPES[UA_TYPES_STRING]);
     write(id, value);
   }
 
