@@ -61,7 +61,7 @@ struct ExchangeNode::Subscribe {
   }
 };
 
-ExchangeNode::ExchangeNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
+ExchangeNode::ExchangeNode(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh)
     : parameters_(parametersFromServer(private_nh).readAll<ExchangeParameters>()),
       shell_(nh, private_nh, parameters_.device, parameters_.translator.input_timeout),
       translator_(parameters_.translator, {[this](const Observation& observation) { observe(observation); },

@@ -21,7 +21,7 @@ class ExchangeNode {
  public:
   using Parameters = ExchangeParameters;
   /// @throws Error on an invalid parameter or a port in use.
-  ExchangeNode(ros::NodeHandle nh, ros::NodeHandle private_nh);
+  ExchangeNode(const ros::NodeHandle& nh, const ros::NodeHandle& private_nh);
 
  private:
   struct Subscribe;

@@ -17,6 +17,7 @@
 #include <nlohmann/json.hpp>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/testing/free_port.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_exchange/items/catalogue.h"
 #include "smartmill_exchange/mqtt/retained_state.h"
@@ -31,18 +32,6 @@ bool installed(const std::string& programs) {
   return std::system(
              ("PATH=/usr/sbin:$PATH; for p in " + programs + "; do command -v $p >/dev/null || exit 1; done")
                  .c_str()) == 0;
-}
-
-int freePort() {
-  const int listener = socket(AF_INET, SOCK_STREAM, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof address;
-  EXPECT_EQ(bind(listener, reinterpret_cast<sockaddr*>(&address), size), 0);
-  getsockname(listener, reinterpret_cast<sockaddr*>(&address), &size);
-  close(listener);
-  return ntohs(address.sin_port);
 }
 
 /// Without a timeout: the test runner ends a hanging test.

@@ -1,10 +1,6 @@
 // The server read by the library's own client; by a client of another hand: test/clients/opcua.js.
 #include "smartmill_exchange/opcua/server.h"
 
-#include <arpa/inet.h>
-#include <sys/socket.h>
-#include <unistd.h>
-
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -24,6 +20,7 @@
 #include <nlohmann/json.hpp>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/testing/free_port.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_exchange/items/catalogue.h"
 
@@ -34,18 +31,6 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 constexpr double NOW = 1.7e9 + 0.25;  // [s]
-
-int freePort() {
-  const int listener = socket(AF_INET, SOCK_STREAM, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof address;
-  EXPECT_EQ(bind(listener, reinterpret_cast<sockaddr*>(&address), size), 0);
-  getsockname(listener, reinterpret_cast<sockaddr*>(&address), &size);
-  close(listener);
-  return ntohs(address.sin_port);
-}
 
 OpcUaOptions onLoopback() {
   OpcUaOptions options;
