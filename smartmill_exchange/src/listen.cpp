@@ -1,8 +1,17 @@
 #include "listen.h"
 
+#include <cctype>
+
 #include "smartmill_core/error.h"
 
 namespace smartmill::exchange {
+
+bool isLoopbackAddress(const std::string& address) {
+  if (address == "::1") return true;
+  bool numeric = address.rfind("127.", 0) == 0;
+  for (const char c : address) numeric = numeric && (std::isdigit(static_cast<unsigned char>(c)) || c == '.');
+  return numeric;
+}
 
 int listenAt(boost::asio::ip::tcp::acceptor& acceptor, const std::string& address, int port,
              const char* key) {

@@ -10,12 +10,11 @@ usage: session_figures.py AGENT_PORT SECONDS [COMMAND...]    with the ROS master
 Prints: observations and their sequence numbers, values compared and different, latency from a message of cnc/state to the item in the client."""
 import calendar
 import collections
-import math
 import json
+import math
 import pathlib
 import subprocess
 import sys
-import threading
 import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "smartmill_exchange/test/clients"))
@@ -85,9 +84,7 @@ if sys.argv[3:]:
         text = f"{value:.9g}" if isinstance(value, (int, float)) else value
         lines.append((item, text if status == "Good" else "UNAVAILABLE", stamp, now))
 else:
-    reader = threading.Thread(target=read)
-    reader.start()
-    reader.join()
+    read()
     lines = [(o["id"], o["value"], microseconds(o["time"]), now) for o, now in observations]
 compared, different, latency = collections.Counter(), [], []
 for item, value, stamp, now in lines:

@@ -1,9 +1,9 @@
 // Rules of the connection to a broker, which need no library.
 #include <cctype>
 
+#include "listen.h"
 #include "smartmill_core/error.h"
 #include "smartmill_exchange/mqtt/publisher.h"
-#include "smartmill_exchange/opcua/server.h"
 
 namespace smartmill::exchange {
 namespace {

@@ -1,17 +1,9 @@
 // Rules of the address and of its protection, which need no library.
-#include <cctype>
-
+#include "listen.h"
 #include "smartmill_core/error.h"
 #include "smartmill_exchange/opcua/server.h"
 
 namespace smartmill::exchange {
-
-bool isLoopbackAddress(const std::string& address) {
-  if (address == "::1") return true;
-  bool numeric = address.rfind("127.", 0) == 0;
-  for (const char c : address) numeric = numeric && (std::isdigit(static_cast<unsigned char>(c)) || c == '.');
-  return numeric;
-}
 
 void check(const OpcUaOptions& options) {
   if (options.user.empty() != options.password_file.empty())

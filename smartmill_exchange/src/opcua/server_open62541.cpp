@@ -41,9 +41,13 @@ UA_String view(const std::string& text) {
   return {text.size(), reinterpret_cast<UA_Byte*>(const_cast<char*>(text.data()))};
 }
 
-UA_LocalizedText english(const std::string& text) {
+UA_LocalizedText english(const UA_String& text) {
   static const std::string LOCALE = "en";
-  return {view(LOCALE), view(text)};
+  return {view(LOCALE), text};
+}
+
+UA_LocalizedText english(const std::string& text) {
+  return english(view(text));
 }
 
 UA_DateTime ticks(double time) {
@@ -319,11 +323,11 @@ class OpcUaServer::Impl {
   }
 
   /// @param rank UA_VALUERANK_SCALAR or UA_VALUERANK_ONE_DIMENSION
-  void addVariable(const std::string& parent, const std::string& id, const std::string& name,
+  void addVariable(const std::string& parent, const std::string& id, const UA_QualifiedName& name,
                    const std::string& description, int type, UA_Int32 rank, bool property,
                    const UA_Variant& value) {
     UA_VariableAttributes attributes = UA_VariableAttributes_default;
-    attributes.displayName = english(name);
+    attributes.displayName = english(name.name);
     attributes.description = english(description);
     attributes.dataType = UA_TYPES[type].typeId;
     attributes.valueRank = rank;
@@ -334,19 +338,20 @@ class OpcUaServer::Impl {
     }
     attributes.accessLevel = UA_ACCESSLEVELMASK_READ;
     attributes.value = value;
-    require(UA_Server_addVariableNode(
-                server_, node(id), node(parent),
-                standard(property ? UA_NS0ID_HASPROPERTY : UA_NS0ID_HASCOMPONENT), browseName(name),
-                standard(property ? UA_NS0ID_PROPERTYTYPE : UA_NS0ID_BASEDATAVARIABLETYPE), attributes,
-                nullptr, nullptr),
-            "node " + id);
+    require(
+        UA_Server_addVariableNode(server_, node(id), node(parent),
+                                  standard(property ? UA_NS0ID_HASPROPERTY : UA_NS0ID_HASCOMPONENT), name,
+                                  standard(property ? UA_NS0ID_PROPERTYTYPE : UA_NS0ID_BASEDATAVARIABLETYPE),
+                                  attributes, nullptr, nullptr),
+        "node " + id);
   }
 
   void addText(const std::string& parent, const std::string& name, const std::string& text) {
     UA_String string = view(text);
     UA_Variant value{};
     UA_Variant_setScalar(&value, &string, &UA_TYPES[UA_TYPES_STRING]);
-    addVariable(parent, parent + "/" + name, name, "", UA_TYPES_STRING, UA_VALUERANK_SCALAR, true, value);
+    addVariable(parent, parent + "/" + name, browseName(name), "", UA_TYPES_STRING, UA_VALUERANK_SCALAR, true,
+                value);
   }
 
   void addUnits(const std::string& parent, const std::string& units) {
@@ -359,19 +364,9 @@ class OpcUaServer::Impl {
     information.displayName = information.description = english(unit.symbol);
     UA_Variant value{};
     UA_Variant_setScalar(&value, &information, &UA_TYPES[UA_TYPES_EUINFORMATION]);
-    const std::string id = parent + "/EngineeringUnits";
-    UA_VariableAttributes attributes = UA_VariableAttributes_default;
-    const std::string name = "EngineeringUnits";
-    attributes.displayName = english(name);
-    attributes.dataType = UA_TYPES[UA_TYPES_EUINFORMATION].typeId;
-    attributes.valueRank = UA_VALUERANK_SCALAR;
-    attributes.accessLevel = UA_ACCESSLEVELMASK_READ;
-    attributes.value = value;
-    // A name of the standard, which clients look for.
-    require(UA_Server_addVariableNode(server_, node(id), node(parent), standard(UA_NS0ID_HASPROPERTY),
-                                      {0, view(name)}, standard(UA_NS0ID_PROPERTYTYPE), attributes, nullptr,
-                                      nullptr),
-            "node " + id);
+    const std::string name = "EngineeringUnits";  // of the standard: clients look for it
+    addVariable(parent, parent + "/" + name, {0, view(name)}, "", UA_TYPES_EUINFORMATION, UA_VALUERANK_SCALAR,
+                true, value);
   }
 
   void addQuantities(const std::string& parent, const std::vector<Quantity>& quantities) {
@@ -380,11 +375,12 @@ class OpcUaServer::Impl {
       const std::string id = parent + "/" + quantity.name;
       UA_Variant value{};
       UA_Variant_setScalar(&value, const_cast<double*>(&quantity.value), &UA_TYPES[UA_TYPES_DOUBLE]);
-      addVariable(parent, id, quantity.name, "", UA_TYPES_DOUBLE, UA_VALUERANK_SCALAR, false, value);
+      addVariable(parent, id, browseName(quantity.name), "", UA_TYPES_DOUBLE, UA_VALUERANK_SCALAR, false,
+                  value);
       addUnits(id, quantity.unit);
       if (!std::isfinite(quantity.std_dev)) continue;
       UA_Variant_setScalar(&value, const_cast<double*>(&quantity.std_dev), &UA_TYPES[UA_TYPES_DOUBLE]);
-      addVariable(id, id + "/StandardDeviation", "StandardDeviation", "", UA_TYPES_DOUBLE,
+      addVariable(id, id + "/StandardDeviation", browseName("StandardDeviation"), "", UA_TYPES_DOUBLE,
                   UA_VALUERANK_SCALAR, true, value);
     }
   }
@@ -394,12 +390,12 @@ class OpcUaServer::Impl {
     const bool number = item.category == Category::sample,
                list = item.category == Category::condition || item.set;
     const int type = number ? UA_TYPES_DOUBLE : UA_TYPES_STRING;
-    addVariable(item.component.empty() ? "monitoring" : item.component, item.id, item.id,
+    addVariable(item.component.empty() ? "monitoring" : item.component, item.id, browseName(item.id),
                 item.meaning + "; uncertainty: " + item.uncertainty + "; bandwidth: " + item.bandwidth, type,
                 list ? UA_VALUERANK_ONE_DIMENSION : UA_VALUERANK_SCALAR, false, {});
     addUnits(item.id, item.units);
     if (item.set)
-      addVariable(item.id, item.id + "/Keys", "Keys", "of the values", UA_TYPES_STRING,
+      addVariable(item.id, item.id + "/Keys", browseName("Keys"), "of the values", UA_TYPES_STRING,
                   UA_VALUERANK_ONE_DIMENSION, true, {});
     observe({index, 0.0, Unavailable{}});
   }

@@ -20,9 +20,6 @@ struct OpcUaOptions {
   std::size_t most_clients = 32;           ///< [1] sessions at a time
 };
 
-/// Whether an address to listen at is this computer only: 127.x.x.x, ::1.
-bool isLoopbackAddress(const std::string& address);
-
 /// @throws Error on an address other than loopback without user, password and certificate, and on half of a
 /// pair
 void check(const OpcUaOptions& options);
