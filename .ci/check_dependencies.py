@@ -15,7 +15,7 @@ HEADERS = {
     "glog": "libgoogle-glog-dev", "unsupported": "eigen", "gtest": None, "gmock": None,
     "pybind11": "pybind11-dev",
     "libpq-fe.h": None,  # optional: ./setup --with-fleet
-    "mqtt": None,  # optional: a build without it refuses mqtt_broker
+    "mqtt": None, "open62541": None,  # optional: a build without it refuses mqtt_broker, opcua_port
     "pulse": None, "libsigrok": None, "iio.h": None, "comedilib.h": None,  # optional: ./setup --with-instruments
     "arpa": None, "netinet": None, "sys": None, "linux": None,
 }
