@@ -257,6 +257,8 @@ class Chatter:
     """Verdict on a recorded cut."""
 
     chatter: bool
+    verdict: str  #: "no_cut", "stable", "chatter" or "unsure"
+    probability: float  #: [1] of chatter; NaN without a cut
     cut: bool  #: something is being cut
     frequency: float  #: [Hz] strongest line of the chatter; NaN without
     spindle_speed: float  #: [rad/s] that the harmonics show

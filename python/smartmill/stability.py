@@ -56,15 +56,16 @@ def chatter_risk(model: Union[Path, Model], speeds_rpm: npt.ArrayLike, depths: n
 
 
 def detect(samples: Union[Path, npt.ArrayLike, Sequence[npt.ArrayLike]], rate: Optional[float] = None, *,
-           speed_rpm: float, teeth: int, speed_error: float = 0.02, modes: Sequence[float] = ()) -> Chatter:
+           speed_rpm: Optional[float] = None, teeth: int, speed_error: float = 0.02, modes: Sequence[float] = ()) -> Chatter:
     """Decide whether a recorded cut chatters.
 
     samples: one channel, rows of channels, or a sound file (WAV, FLAC). Sound, vibration, displacement or force.
-    rate: sample rate [Hz] of arrays. speed_rpm: of the spindle, within speed_error [1]. teeth: of the tool.
+    rate: sample rate [Hz] of arrays. speed_rpm: of the spindle, within speed_error [1]; None: found from the harmonics.
+    teeth: of the tool.
     modes: natural frequencies of tool and spindle [Hz], if known.
     Raises Error on a recording that is too short.
     """
-    speed = check.positive("speed_rpm", speed_rpm, "rpm") * RPM
+    speed = 0.0 if speed_rpm is None else check.positive("speed_rpm", speed_rpm, "rpm") * RPM
     count = check.integer("teeth", teeth, 1, 40)
     error = check.number("speed_error", speed_error, low=0.0, high=0.1)
     known = [check.positive("modes", mode, "Hz") for mode in modes]

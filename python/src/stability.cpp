@@ -74,7 +74,8 @@ py::object verdictOf(RecordingVerdict v) {
   using py::arg;
   const std::string text = v.text();
   return make(
-      "Chatter", arg("chatter") = v.chatter, arg("cut") = v.cut, arg("frequency") = v.frequency,
+      "Chatter", arg("chatter") = v.chatter(), arg("verdict") = nameOf(v.kind),
+      arg("probability") = v.probability, arg("cut") = v.cut, arg("frequency") = v.frequency,
       arg("spindle_speed") = v.speed, arg("start") = v.from, arg("end") = v.to,
       arg("over_noise") = v.over_noise, arg("over_air") = v.over_air, arg("companions") = v.companions,
       arg("share") = v.share, arg("mode") = v.mode, arg("reason") = v.reason, arg("text") = text,

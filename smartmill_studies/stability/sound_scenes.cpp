@@ -19,11 +19,14 @@ constexpr double FEED = 0.1e-3;  // [m] per tooth
 
 bool cuts(SoundKind kind) {
   return kind != SoundKind::idle && kind != SoundKind::broadband && kind != SoundKind::other_machine &&
-         kind != SoundKind::run_up;
+         kind != SoundKind::run_up && kind != SoundKind::idle_bearing && kind != SoundKind::idle_hall;
+}
+bool inHall(SoundKind kind) {
+  return kind == SoundKind::idle_hall || kind == SoundKind::stable_hall || kind == SoundKind::chatter_hall;
 }
 bool chatters(SoundKind kind) {
   return kind == SoundKind::chatter || kind == SoundKind::chatter_no_air || kind == SoundKind::chatter_shop ||
-         kind == SoundKind::chatter_interrupted;
+         kind == SoundKind::chatter_interrupted || kind == SoundKind::chatter_hall;
 }
 bool interrupted(SoundKind kind) {
   return kind == SoundKind::interrupted || kind == SoundKind::chatter_interrupted;
@@ -104,6 +107,55 @@ class Shop {
     add(hiss, level, from);
   }
 
+  /// A defect of the inner ring: lines at its order, modulated by the revolution.
+  void defectiveBearing(double speed, double level) {
+    const double order = uniform(4.2, 6.8), depth = uniform(0.4, 0.9);
+    for (std::size_t i = 0; i < sound_.size(); ++i) {
+      const double turned = speed * static_cast<double>(i) / RATE;
+      const double modulation = 1.0 + depth * std::cos(turned);
+      for (int k = 1; k <= 4; ++k) sound_[i] += level / k * modulation * std::sin(k * order * turned + k);
+    }
+  }
+
+  /// Compressor, slamming doors and music.
+  void hallNoise(double level) {
+    const double piston = uniform(18.0, 26.0), loudness = uniform(0.3, 1.0);
+    for (std::size_t i = 0; i < sound_.size(); ++i) {
+      const double t = static_cast<double>(i) / RATE;
+      for (int k = 1; k <= 12; ++k)
+        sound_[i] += loudness * level / k * std::sin(units::TWO_PI * k * piston * t + 0.7 * k * k);
+    }
+    for (double at = uniform(0.2, 1.0); at * RATE < static_cast<double>(sound_.size());
+         at += uniform(0.8, 2.0)) {
+      std::vector<double> bang(static_cast<std::size_t>(0.3 * RATE));
+      for (std::size_t i = 0; i < bang.size(); ++i)
+        bang[i] = normal_(random_) * std::exp(-static_cast<double>(i) / (0.04 * RATE));
+      add(through(bang, uniform(90.0, 400.0), 0.05), 4.0 * level, at);
+    }
+    for (double at = 0.0; at * RATE < static_cast<double>(sound_.size());) {
+      const double lasts = uniform(0.15, 0.6);
+      const double note = 110.0 * std::pow(2.0, std::floor(uniform(0.0, 36.0)) / 12.0);
+      for (std::size_t i = 0; i < static_cast<std::size_t>(lasts * RATE); ++i) {
+        const std::size_t sample = static_cast<std::size_t>(at * RATE) + i;
+        if (sample >= sound_.size()) break;
+        const double t = static_cast<double>(i) / RATE;
+        for (int k = 1; k <= 5; ++k)
+          sound_[sample] += level / k * std::exp(-2.0 * t / lasts) * std::sin(units::TWO_PI * k * note * t);
+      }
+      at += lasts;
+    }
+  }
+
+  /// Echoes of a hall of 0.3 .. 0.8 s reverberation.
+  void echoes() {
+    const double decay = uniform(0.04, 0.12);  // [s] of the amplitude
+    const std::vector<double> direct = sound_;
+    for (int k = 0; k < 60; ++k) {
+      const double delay = uniform(0.005, 4.0 * decay);
+      add(direct, 0.35 * std::exp(-delay / decay) * (uniform(0.0, 1.0) < 0.5 ? -1.0 : 1.0), delay);
+    }
+  }
+
   /// Sound of the cut with unit amplitude, in place.
   std::vector<double> heard(const std::vector<double>& cut) {
     std::vector<double> sum(cut.size(), 0.0);
@@ -176,6 +228,12 @@ std::vector<double> soundOf(const SoundScene& scene, const std::vector<double>& 
       shop.add(heard, 1.0, airless(scene.kind) ? 0.0 : AIR);
     }
   }
+  if (scene.kind == SoundKind::idle_bearing)
+    shop.defectiveBearing(scene.speed, shop.uniform(0.5, 2.0) * level);
+  if (inHall(scene.kind)) {
+    shop.hallNoise(shop.uniform(0.3, 1.0) * level);
+    shop.echoes();
+  }
   return shop.take();
 }
 
@@ -183,7 +241,7 @@ std::vector<double> soundOf(const SoundScene& scene, const std::vector<double>& 
 
 std::vector<SoundKind> soundKinds() {
   std::vector<SoundKind> kinds;
-  for (int k = 0; k <= static_cast<int>(SoundKind::chatter_interrupted); ++k)
+  for (int k = 0; k <= static_cast<int>(SoundKind::chatter_hall); ++k)
     kinds.push_back(static_cast<SoundKind>(k));
   return kinds;
 }
@@ -200,7 +258,11 @@ const char* nameOf(SoundKind kind) {
                                    "chatter",
                                    "chatter, no air",
                                    "chatter, other machine, speed error",
-                                   "chatter, interrupted"};
+                                   "chatter, interrupted",
+                                   "idle spindle, defective bearing",
+                                   "idle spindle, hall",
+                                   "stable cut, hall",
+                                   "chatter, hall"};
   return NAMES[static_cast<int>(kind)];
 }
 
@@ -249,6 +311,47 @@ std::vector<SoundScene> soundScenes(const MachineModel& model, const Regenerativ
         soundOf(scenes[k], sounds[k], range.seed + 17u * static_cast<unsigned>(k))};
   }
   return scenes;
+}
+
+std::vector<Capture> captures() {
+  return {Capture::whole, Capture::no_speed, Capture::brief, Capture::low_rate};
+}
+
+const char* nameOf(Capture capture) {
+  constexpr const char* NAMES[] = {"whole", "speed not stated", "3 .. 30 revolutions",
+                                   "2.2 .. 6 samples a tooth"};
+  return NAMES[static_cast<int>(capture)];
+}
+
+SoundScene captured(const SoundScene& scene, Capture capture, int teeth, unsigned seed) {
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> unit;
+  SoundScene result = scene;
+  std::vector<double>& sound = result.recording.channels[0];
+  if (capture == Capture::no_speed) result.stated_speed = 0.0;
+  if (capture == Capture::brief) {
+    // The middle of the recording is in the cut, where there is one; that of interrupted cuts in the second.
+    const double turns = 3.0 * std::pow(10.0, unit(random));
+    const auto length = static_cast<std::size_t>(turns * units::TWO_PI / scene.speed * RATE) + 8;
+    const double middle = interrupted(scene.kind) ? AIR + PIECE + GAP + 0.5 * PIECE
+                                                  : 0.5 * static_cast<double>(sound.size()) / RATE;
+    const auto from = static_cast<std::ptrdiff_t>(middle * RATE) - static_cast<std::ptrdiff_t>(length / 2);
+    const auto first = sound.begin() + std::max<std::ptrdiff_t>(0, from);
+    sound = std::vector<double>(first, first + static_cast<std::ptrdiff_t>(std::min(length, sound.size())));
+  }
+  if (capture == Capture::low_rate) {
+    const double passing = teeth * scene.speed / units::TWO_PI;
+    const double rate = passing * (2.2 + 3.8 * unit(random));
+    std::vector<double> slow;
+    for (double at = 1.0; at < static_cast<double>(sound.size()) - 3.0; at += RATE / rate) {
+      const auto k = static_cast<std::size_t>(at);
+      slow.push_back(
+          catmullRom(sound[k - 1], sound[k], sound[k + 1], sound[k + 2], at - static_cast<double>(k)));
+    }
+    sound = std::move(slow);
+    result.recording.sample_rate = rate;
+  }
+  return result;
 }
 
 }  // namespace smartmill::stability

@@ -24,10 +24,24 @@ enum class SoundKind {
   chatter,         ///< 1.2 .. 2 times the limit
   chatter_no_air,  ///< the same without air in the recording
   chatter_shop,    ///< chatter with tones of another machine and a wrong stated speed
-  chatter_interrupted
+  chatter_interrupted,
+  idle_bearing,  ///< a bearing louder than the spindle's orders, modulated by the revolution
+  idle_hall,     ///< idle spindle, compressor, doors and music in a hall with echoes
+  stable_hall,   ///< the same with a stable cut
+  chatter_hall   ///< and with chatter
 };
 std::vector<SoundKind> soundKinds();
 const char* nameOf(SoundKind kind);
+
+/// How a scene is recorded.
+enum class Capture {
+  whole,     ///< at 44.1 kHz with a stated speed
+  no_speed,  ///< without a stated speed
+  brief,     ///< 3 .. 30 revolutions of the middle
+  low_rate   ///< 2.2 .. 6 samples in a tooth passing period, without a filter: lines above are aliased
+};
+std::vector<Capture> captures();
+const char* nameOf(Capture capture);
 
 struct SoundScene {
   SoundKind kind{};
@@ -43,5 +57,8 @@ struct SoundScene {
 /// synthesised. @param speeds range of the spindle and largest depth
 std::vector<SoundScene> soundScenes(const MachineModel& model, const RegenerativeSystem& system,
                                     const StudyRange& range, const std::vector<SoundKind>& kinds);
+
+/// Records a scene in another way. @param teeth of the tool
+SoundScene captured(const SoundScene& scene, Capture capture, int teeth, unsigned seed);
 
 }  // namespace smartmill::stability

@@ -5,76 +5,25 @@
 #include <numeric>
 #include <utility>
 
-#include "smartmill_core/error.h"
-#include "smartmill_core/formatted.h"
-#include "smartmill_core/signal/fourier.h"
+#include "chatter/spectrogram.h"
 #include "smartmill_core/signal/spectral_lines.h"
-#include "smartmill_core/signal/window.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::stability {
-namespace {
-
-/// Blackman-Harris window: the side lobes of strong harmonics stay below chatter lines.
-std::vector<double> taper(std::size_t n) {
-  std::vector<double> window(n);
-  for (std::size_t i = 0; i < n; ++i)
-    window[i] = blackmanHarris(units::TWO_PI * static_cast<double>(i) / static_cast<double>(n));
-  return window;
-}
-
-Spectrogram spectrogramOf(const Recording& recording, double window_seconds, double highest) {
-  const auto length = static_cast<std::size_t>(window_seconds * recording.sample_rate);
-  const std::size_t hop = length / 2, samples = recording.channels[0].size();
-  const std::vector<double> window = taper(length);
-  Spectrogram result;
-  const double step = recording.sample_rate / static_cast<double>(length);
-  const auto lines = static_cast<std::size_t>(std::min(highest, 0.45 * recording.sample_rate) / step);
-  for (std::size_t k = 0; k < lines; ++k) result.frequency.push_back(step * static_cast<double>(k));
-  std::vector<double> size;  // mean square of each channel
-  for (const std::vector<double>& channel : recording.channels) {
-    const double n = static_cast<double>(samples);
-    const double mean = std::accumulate(channel.begin(), channel.end(), 0.0) / n;
-    double square = 0.0;
-    for (const double v : channel) square += (v - mean) * (v - mean) / n;
-    size.push_back(square);
-  }
-  std::vector<double> piece(length);
-  for (std::size_t at = 0; at + length <= samples; at += hop) {
-    std::vector<double> power(lines, 0.0);
-    for (std::size_t c = 0; c < recording.channels.size(); ++c) {
-      if (!(size[c] > 0.0)) continue;
-      const double* values = recording.channels[c].data() + at;
-      const double mean = std::accumulate(values, values + length, 0.0) / static_cast<double>(length);
-      for (std::size_t i = 0; i < length; ++i) piece[i] = (values[i] - mean) * window[i];
-      const auto spectrum = fourier(piece);
-      const double scale = 1.0 / (size[c] * static_cast<double>(length * length));
-      for (std::size_t k = 0; k < lines; ++k) power[k] += scale * std::norm(spectrum[k]);
-    }
-    result.time.push_back((static_cast<double>(at) + 0.5 * static_cast<double>(length)) /
-                          recording.sample_rate);
-    result.power.push_back(std::move(power));
-  }
-  return result;
-}
-
-}  // namespace
 
 CutFinder::CutFinder(const Recording& recording, const RecordingRequest& request) : request_(request) {
-  const double seconds = static_cast<double>(recording.channels[0].size()) / recording.sample_rate;
+  constexpr double MARGIN = 6.0;  // [samples] of the interpolation
+  const double seconds = (static_cast<double>(recording.channels[0].size()) - MARGIN) / recording.sample_rate;
   const double turn = units::TWO_PI / request.speed;
-  window_ = std::min(std::clamp(options_.turns * turn, options_.least_window, options_.longest_window),
+  window_ = std::min(std::clamp(options_.turns * turn, options_.least_window,
+                                std::max(options_.longest_window, options_.least_turns * turn)),
                      2.0 * seconds / (options_.least_windows + 1));
-  if (window_ < 8.0 * turn)
-    throw Error(formatted("recording: %.2f s with %.0f revolutions: expected at least %d revolutions",
-                          seconds, seconds / turn, 8 * (options_.least_windows + 1) / 2));
+  if (window_ < options_.least_turns * turn) window_ = seconds;  // no level of cut and air
   spectrogram_ = spectrogramOf(recording, window_, options_.highest);
-  step_ = spectrogram_.frequency[1];
+  step_ = spectrogram_.frequency.size() > 1 ? spectrogram_.frequency[1] : 1.0 / window_;
   findCut();
   in_cut_ = mean(true);
   floor_ = noiseFloor(in_cut_);
-  findSpeed();
-  refineSpeed();
 }
 
 double CutFinder::from() const {
@@ -96,11 +45,16 @@ bool CutFinder::within(bool cut, double from, double to) const {
 }
 
 std::size_t CutFinder::lineAt(double frequency) const {
-  return std::min(in_cut_.size() - 1, static_cast<std::size_t>(std::lround(frequency / step_)));
+  return std::min(spectrogram_.frequency.size() - 1,
+                  static_cast<std::size_t>(std::lround(frequency / step_)));
 }
 
 /// Separates loud from quiet windows, by Otsu's threshold on the logarithm of their power.
 void CutFinder::findCut() {
+  if (static_cast<int>(spectrogram_.power.size()) < options_.least_windows) {
+    cut_.assign(spectrogram_.power.size(), true);
+    return;
+  }
   std::vector<double> level;
   for (const std::vector<double>& power : spectrogram_.power) {
     double sum = 0.0;
@@ -131,8 +85,8 @@ void CutFinder::findCut() {
   }
 }
 
-/// Whether the loud windows are louder at the tooth passing frequency: a cut, not a vibration that grows
-/// within a cut.
+/// Whether the loud windows are louder at the tooth passing frequency, or the quiet ones those of an idle
+/// spindle: a cut, not a vibration that grows within a cut.
 bool CutFinder::loudFromTeeth() const {
   const auto loud = static_cast<double>(std::count(cut_.begin(), cut_.end(), true));
   const double all = static_cast<double>(cut_.size());
@@ -151,7 +105,28 @@ bool CutFinder::loudFromTeeth() const {
       out += air[k];
     }
   }
-  return in > options_.tooth_contrast * out;
+  return in > options_.tooth_contrast * out || (isIdle(air) && longestLoud() > options_.least_cut);
+}
+
+/// [s] Longest part without a quiet window.
+double CutFinder::longestLoud() const {
+  std::size_t longest = 0, run = 0;
+  for (const bool loud : cut_) {
+    run = loud ? run + 1 : 0;
+    longest = std::max(longest, run);
+  }
+  return 0.5 * window_ * static_cast<double>(longest);
+}
+
+/// Whether the other spindle harmonics of a spectrum are stronger than those of the teeth.
+bool CutFinder::isIdle(const std::vector<double>& power) const {
+  double of_teeth = 0.0, of_others = 0.0;
+  for (int order = 1; order <= options_.harmonics * request_.teeth; ++order) {
+    const double frequency = order * request_.speed / units::TWO_PI;
+    if (frequency > options_.lowest)
+      (order % request_.teeth == 0 ? of_teeth : of_others) += power[lineAt(frequency)];
+  }
+  return of_others > of_teeth;
 }
 
 /// Mean spectrum of the windows in the cut or outside, without those at a transition unless there are no
@@ -175,63 +150,11 @@ std::vector<double> CutFinder::mean(bool cut) const {
   return {};
 }
 
-/// Agreement of the lines with the tooth passing harmonics at a speed.
-double CutFinder::combScore(double speed) const {
-  const double tooth = request_.teeth * speed / units::TWO_PI;
-  double score = 0.0;
-  for (double f = tooth; f < spectrogram_.frequency.back(); f += tooth) {
-    const std::size_t k = lineAt(f);
-    if (f > options_.lowest) score += std::log1p(in_cut_[k] / floor_[k]);
-  }
-  return score;
-}
-
-void CutFinder::findSpeed() {
-  speed_ = request_.speed;
-  // A correction larger than the effect of load must improve the score.
-  double best = combScore(request_.speed);
-  const double step = 0.3 * step_ / spectrogram_.frequency.back();
-  for (double off = -request_.speed_error; off <= request_.speed_error; off += step) {
-    const double speed = request_.speed * (1.0 + off);
-    const double score = combScore(speed) / (std::abs(off) > options_.loaded ? options_.beyond : 1.0);
-    if (!(score > best)) continue;
-    best = score;
-    speed_ = speed;
-  }
-}
-
-/// Replaces the speed by the weighted median of the frequencies of the harmonics over their orders, unless
-/// they agree worse then: a strong line near a harmonic may draw it away.
-void CutFinder::refineSpeed() {
-  std::vector<std::pair<double, double>> speeds;  // and weight
-  const double spindle = speed_ / units::TWO_PI;
-  const auto reach = static_cast<std::size_t>(options_.main_lobe);
-  double weights = 0.0;
-  for (int order = 1;; ++order) {
-    const auto center = static_cast<std::size_t>(std::lround(order * spindle / step_));
-    if (center + reach + 1 >= in_cut_.size()) break;
-    if (order * spindle < options_.lowest || center < reach + 1) continue;
-    const auto from = in_cut_.begin() + static_cast<std::ptrdiff_t>(center - reach);
-    const auto to = in_cut_.begin() + static_cast<std::ptrdiff_t>(center + reach);
-    const auto peak = std::max_element(from, to + 1);
-    const auto at = static_cast<std::size_t>(peak - in_cut_.begin());
-    if (peak == from || peak == to || *peak < options_.present * floor_[at]) continue;
-    speeds.emplace_back(peakPosition(in_cut_, at) * step_ / order * units::TWO_PI, order);
-    weights += order;
-  }
-  constexpr std::size_t FEWEST = 3;
-  if (speeds.size() < FEWEST) return;
-  std::sort(speeds.begin(), speeds.end());
-  auto middle = speeds.begin();
-  for (double sum = middle->second; sum < 0.5 * weights; sum += middle->second) ++middle;
-  if (combScore(middle->first) >= options_.retained * combScore(speed_)) speed_ = middle->first;
-}
-
 /// Whether tooth passing harmonics are present.
 bool CutFinder::hasToothPassing() const {
   int found = 0;
   for (int k = 1; k <= 3; ++k) {
-    const std::size_t at = lineAt(k * request_.teeth * speed_ / units::TWO_PI);
+    const std::size_t at = lineAt(k * request_.teeth * request_.speed / units::TWO_PI);
     found += in_cut_[at] > options_.present * floor_[at];
   }
   return found >= 2;

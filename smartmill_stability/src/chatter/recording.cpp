@@ -2,12 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
+#include <numeric>
+#include <optional>
 
 #include "chatter/cut_finder.h"
+#include "chatter/spectrogram.h"
+#include "chatter/speed_finder.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/signal/chatter_criterion.h"
+#include "smartmill_core/signal/revolution_window.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
 #include "smartmill_stability/chatter/chatter_advice.h"
@@ -16,9 +22,24 @@ namespace smartmill::stability {
 namespace {
 
 using Reason = ChatterEvidence::Reason;
+using Kind = RecordingVerdict::Kind;
 
 /// [1] Relative variation of the spindle speed within a window, and error of its correction.
 constexpr double SPEED_ERROR = 6e-4;
+
+/// [1] Verdicts between these probabilities of chatter are unsure.
+constexpr double STABLE_BELOW = 0.2, CHATTER_ABOVE = 0.8;
+constexpr double NOT_KNOWN = 0.5;  ///< [1] probability of what the recording does not distinguish
+/// Probability of chatter from the mean margin m of the windows: 1 / (1 + exp(-SLOPE m)).
+constexpr double SLOPE = 2.0;
+constexpr double ALIASED_TO = 2.0;  ///< [sample rates] harmonics above are weak
+/// Without a sign that teeth cut nothing is cut below this probability of chatter, unless the vibration
+/// between the spindle harmonics has this many times their power, which no bearing of an idle spindle has.
+constexpr double NO_CUT_BELOW = 0.4, LOUD = 50.0;
+constexpr double LEAST_TURNS = 3.0;    ///< [revolutions] of a recording
+constexpr double SPEED_TURNS = 12.0;   ///< [revolutions] for the speed from the harmonics
+constexpr double WINDOW_TURNS = 36.0;  ///< [revolutions] of a recording that is divided into windows
+constexpr double FINE_SAMPLES = 12.0;  ///< [1] in a tooth passing period, for the interpolation of windows
 
 double decibel(double ratio) {
   return 10.0 * std::log10(std::max(1e-30, ratio));
@@ -44,15 +65,78 @@ const char* textOf(Reason reason) {
   return "";
 }
 
+/// [rad/s] Speed of a recording of few revolutions: the least energy does not repeat with the revolution.
+double repeatingSpeed(const Recording& recording, const RecordingRequest& request) {
+  constexpr double MARGIN = 4.0;  // [samples] of the interpolation
+  constexpr int STEPS = 20;       // to each side
+  double best = request.speed, least = std::numeric_limits<double>::infinity();
+  const double slowest = (1.0 - request.speed_error) * request.speed;
+  const auto samples = static_cast<double>(recording.channels[0].size()) - MARGIN;
+  const auto turns = static_cast<std::size_t>(samples / recording.sample_rate * slowest / units::TWO_PI);
+  for (int step = -STEPS; turns > 1 && step <= STEPS; ++step) {
+    const double speed = request.speed * (1.0 + request.speed_error * step / STEPS);
+    const double revolution = units::TWO_PI / speed * recording.sample_rate;
+    RevolutionWindow window(static_cast<std::size_t>(std::ceil(revolution)), turns, request.teeth);
+    for (const std::vector<double>& channel : recording.channels) window.add(channel, 1.0, revolution);
+    if (!(window.remainder() < least)) continue;
+    least = window.remainder();
+    best = speed;
+  }
+  return best;
+}
+
+struct SpindleSpeed {
+  double value;  // [rad/s]; NaN: unknown
+  RecordingVerdict::SpeedSource source;
+  /// SpeedFinder::teethDominate(); unknown for a recording of few revolutions.
+  std::optional<bool> teeth_dominate{};
+};
+
+/// The stated speed, unless none is stated or the harmonics agree much better with another one.
+SpindleSpeed speedOf(const Recording& recording, const RecordingRequest& request) {
+  using Source = RecordingVerdict::SpeedSource;
+  constexpr double LEAST_AGREEMENT = 12.0;  // [1] chance agrees with 8 at most among all speeds
+  constexpr double CORRECTED = 2.0;         // [1] agreement over that, of another speed than the stated one
+  constexpr double WINDOWS = 2.0;
+  const CutFinderOptions band;
+  const double seconds = static_cast<double>(recording.channels[0].size()) / recording.sample_rate;
+  const bool stated = request.speed > 0.0;
+  if (stated && seconds * request.speed < WINDOW_TURNS * units::TWO_PI)
+    return {repeatingSpeed(recording, request), Source::stated};
+  const double window = std::min(band.longest_window, seconds / WINDOWS);
+  const SpeedFinder finder(loudPower(spectrogramOf(recording, window, band.highest)), 1.0 / window,
+                           band.lowest, request.teeth);
+  if (!(finder.lowestSpeed() < finder.highestSpeed())) return {stated ? request.speed : NAN, Source::stated};
+  const double free = finder.anywhere(), agreement = finder.agreement(free);
+  // Load reduces the speed by less than this; a larger correction has to agree better.
+  // Aliased lines agree with other speeds by chance.
+  constexpr double LOADED = 0.005, BEYOND = 1.15, ALIASED = 1.5;
+  const bool aliased = recording.sample_rate * units::TWO_PI < FINE_SAMPLES * request.teeth * request.speed;
+  if (!stated) return {agreement > LEAST_AGREEMENT ? free : NAN, Source::found, finder.teethDominate(free)};
+  const auto within = [&](double error) {
+    return finder.best((1.0 - error) * request.speed, (1.0 + error) * request.speed);
+  };
+  double near = within(std::min(LOADED, request.speed_error));
+  if (const double farther = within(request.speed_error);
+      finder.agreement(farther) > (aliased ? ALIASED : BEYOND) * finder.agreement(near))
+    near = farther;
+  if (finder.agreement(near) < LEAST_AGREEMENT && agreement > CORRECTED * LEAST_AGREEMENT)
+    return {free, Source::corrected, finder.teethDominate(free)};
+  return {near, Source::stated, finder.teethDominate(near)};
+}
+
 /// Applies ChatterCriterion to windows of whole revolutions of the cut.
 class RecordingAnalysis {
  public:
-  RecordingAnalysis(const Recording& recording, const RecordingRequest& request)
+  /// @param aliased [Hz] lines at aliased harmonics
+  RecordingAnalysis(const Recording& recording, const RecordingRequest& request,
+                    std::optional<bool> teeth_dominate, const std::vector<double>& aliased)
       : recording_(recording),
         cut_(recording, request),
-        criterion_(optionsOf(request)),
+        criterion_(optionsOf(request, aliased)),
         teeth_(request.teeth),
-        period_(units::TWO_PI / cut_.speed()),
+        teeth_dominate_(teeth_dominate),
+        period_(units::TWO_PI / request.speed),
         revolution_(period_ * recording.sample_rate),
         turns_(static_cast<std::size_t>(cut_.window() / period_)) {
     for (const std::vector<double>& channel : recording_.channels) {
@@ -65,18 +149,24 @@ class RecordingAnalysis {
 
   RecordingVerdict run() {
     const std::vector<double> background = this->background();
-    for (const double start : startsWithin(true)) add(criterion_.judge(windowAt(start), period_, background));
+    for (const double start : startsWithin(true)) {
+      const RevolutionWindow window = windowAt(start);
+      addOrders(window);
+      add(criterion_.judge(window, period_, background));
+    }
     return verdict();
   }
 
  private:
-  static ChatterCriterionOptions optionsOf(const RecordingRequest& request) {
+  static ChatterCriterionOptions optionsOf(const RecordingRequest& request,
+                                           const std::vector<double>& aliased) {
     const CutFinderOptions band;
     ChatterCriterionOptions options;
     options.lowest_frequency = band.lowest;
     options.highest_frequency = band.highest;
     options.speed_error = SPEED_ERROR;
     options.modes = request.modes;
+    options.ignored = aliased;
     // Without a known cut the orders of an idle spindle cannot be distinguished from a flip.
     options.alternation_ratio = 1.0;
     return options;
@@ -120,10 +210,48 @@ class RecordingAnalysis {
     return sum;
   }
 
+  void addOrders(const RevolutionWindow& window) {
+    of_order_.resize(window.ofOrder().size(), 0.0);
+    for (std::size_t k = 1; k < of_order_.size(); ++k)
+      if (static_cast<double>(k) / period_ > CutFinderOptions().lowest) of_order_[k] += window.ofOrder()[k];
+  }
+
+  bool teethDominate() const {
+    if (teeth_dominate_) return *teeth_dominate_;
+    if (teeth_ == 1) return cut_.hasToothPassing();
+    double of_teeth = 0.0, of_others = 0.0;
+    const auto teeth = static_cast<std::size_t>(teeth_);
+    for (std::size_t k = 1;
+         k <= static_cast<std::size_t>(CutFinderOptions().harmonics) * teeth && k < of_order_.size(); ++k)
+      (k % teeth == 0 ? of_teeth : of_others) += of_order_[k];
+    return of_teeth > of_others;
+  }
+
+  /// Whether most of the synchronous power is at one order above that of the teeth that is not theirs:
+  /// neither teeth nor runout do that, but chatter next to a spindle harmonic does.
+  bool harmonicLikeChatter() const {
+    const auto strongest =
+        static_cast<std::size_t>(std::max_element(of_order_.begin(), of_order_.end()) - of_order_.begin());
+    const double all = std::accumulate(of_order_.begin(), of_order_.end(), 0.0);
+    const auto teeth = static_cast<std::size_t>(teeth_);
+    return strongest > teeth && strongest % teeth != 0 && 2.0 * of_order_[strongest] > all;
+  }
+
+  /// Signs that teeth cut: their harmonics are stronger than the other spindle harmonics, which an idle
+  /// spindle has as well; a part of some length is louder; the vibration is modulated by the teeth.
+  bool cuts() const {
+    constexpr std::size_t LEAST_WINDOWS = 4;  // a slamming door is shorter
+    return teethDominate() || (cut_.hasAir() && windows_ >= LEAST_WINDOWS) || 2 * modulated_ > windows_;
+  }
+
   void add(const ChatterEvidence& evidence) {
     ++windows_;
     ++reasons_[evidence.reason];
     synchronous_ += evidence.synchronous;
+    between_ += std::pow(evidence.severity, 2);
+    margins_ += evidence.margin;
+    modulated_ += evidence.modulated && evidence.companions > 1;
+    like_bearing_ += evidence.like_bearing;
     if (!evidence.chatter) return;
     // Consecutive windows agree on the frequency or on another line of the family, which excludes a run-up of
     // the spindle.
@@ -133,7 +261,7 @@ class RecordingAnalysis {
       steady = std::abs(evidence.order - before) < SAME_CHATTER * before ||
                std::abs(std::remainder(evidence.order - before, 1.0)) < 1.0 / static_cast<double>(turns_);
     }
-    steady_ += steady;
+    if (!steady) margins_ -= evidence.margin + ChatterEvidence::LARGEST_MARGIN;
     chattering_.push_back(evidence);
   }
 
@@ -147,17 +275,50 @@ class RecordingAnalysis {
 
   RecordingVerdict verdict() const {
     RecordingVerdict verdict;
-    verdict.speed = cut_.speed();
+    verdict.speed = units::TWO_PI / period_;
     verdict.from = cut_.from();
     verdict.to = cut_.to();
     verdict.spectrogram = cut_.spectrogram();
-    verdict.chatter = windows_ > 0 && 2 * steady_ >= windows_;
-    verdict.cut = cut_.hasAir() || verdict.chatter || cut_.hasToothPassing();
-    if (!verdict.cut) verdict.reason = "no louder part and no lines at the tooth passing frequency";
-    if (!verdict.chatter) {
-      if (verdict.cut) verdict.reason = textOf(mostFrequentReason());
-      return verdict;
+    if (windows_ == 0) return verdict;
+    verdict.cut = cuts();
+    verdict.margin = margins_ / static_cast<double>(windows_);
+    const double probability = 1.0 / (1.0 + std::exp(-SLOPE * verdict.margin));
+    if (!chattering_.empty()) describe(verdict);
+    const bool bearing = 2 * like_bearing_ > windows_;
+    if (!verdict.cut) {
+      const double loudness = between_ / std::max(1e-30, synchronous_);
+      const bool brief = static_cast<double>(turns_) * static_cast<double>(windows_) < WINDOW_TURNS;
+      const bool quiet = loudness < 1.0 && !harmonicLikeChatter();
+      if (quiet || (loudness < LOUD && !brief && (probability < NO_CUT_BELOW || bearing))) {
+        verdict.kind = Kind::no_cut;
+        verdict.reason = bearing ? "lines modulated by the spindle, not by the teeth, as those of a bearing"
+                                 : "no louder part and no lines at the tooth passing frequency";
+        return verdict;
+      }
+      verdict.cut = loudness > LOUD;
     }
+    verdict.probability = probability;
+    if (!verdict.cut) {
+      verdict.probability = NOT_KNOWN;
+      verdict.reason = "vibration between the spindle harmonics, but no sign that teeth cut";
+    } else if (bearing && probability > CHATTER_ABOVE) {
+      verdict.probability = NOT_KNOWN;
+      verdict.reason = "lines modulated by the spindle, not by the teeth: chatter or a bearing";
+    } else if (probability < STABLE_BELOW && harmonicLikeChatter()) {
+      verdict.probability = NOT_KNOWN;
+      verdict.reason =
+          "the strongest line is a spindle harmonic, but none of the teeth: chatter may coincide with it";
+    } else {
+      verdict.kind = probability < STABLE_BELOW    ? Kind::stable
+                     : probability > CHATTER_ABOVE ? Kind::chatter
+                                                   : Kind::unsure;
+      if (verdict.kind != Kind::chatter) verdict.reason = textOf(mostFrequentReason());
+    }
+    return verdict;
+  }
+
+  /// The family of chatter lines.
+  void describe(RecordingVerdict& verdict) const {
     verdict.frequency = medianOf([&](const ChatterEvidence& e) { return e.order / period_; });
     verdict.over_noise = medianOf([](const ChatterEvidence& e) { return decibel(e.over_floor); });
     if (std::isfinite(chattering_.front().over_background))
@@ -171,7 +332,6 @@ class RecordingAnalysis {
     }
     verdict.share = power / static_cast<double>(chattering_.size()) /
                     std::max(1e-30, synchronous_ / static_cast<double>(windows_));
-    return verdict;
   }
 
   Reason mostFrequentReason() const {
@@ -189,34 +349,52 @@ class RecordingAnalysis {
   CutFinder cut_;
   ChatterCriterion criterion_;
   int teeth_;
+  std::optional<bool> teeth_dominate_;
   double period_, revolution_;  // [s], [samples]
   std::size_t turns_;
   std::vector<std::vector<double>> channels_;  // with unit variance
-  std::size_t windows_ = 0, steady_ = 0;
+  std::vector<double> of_order_;               // sum over the windows
+  std::size_t windows_ = 0, modulated_ = 0, like_bearing_ = 0;
+  double margins_ = 0.0;  // sum over the windows
   std::map<Reason, std::size_t> reasons_;
-  double synchronous_ = 0.0;
+  double synchronous_ = 0.0, between_ = 0.0;  // sum of the mean squares at the spindle harmonics and between
   std::vector<ChatterEvidence> chattering_;
 };
 
 }  // namespace
 
 void RecordingRequest::validate() const {
-  if (!(speed > 0.0) || !std::isfinite(speed))
-    throw Error(formatted("recording: spindle speed %g rad/s: expected a value above 0", speed));
+  if (!(speed >= 0.0) || !std::isfinite(speed))
+    throw Error(formatted(
+        "recording: spindle speed %g rad/s: expected a value above 0, or 0 for an unknown speed", speed));
   if (teeth < 1 || teeth > 40) throw Error(formatted("recording: %d teeth: expected 1 to 40", teeth));
   if (!(speed_error >= 0.0) || speed_error > 0.1)
     throw Error(formatted("recording: speed error %g %%: expected 0 to 10 %%", 100.0 * speed_error));
 }
 
+const char* nameOf(RecordingVerdict::Kind kind) {
+  constexpr const char* NAMES[] = {"no_cut", "stable", "chatter", "unsure"};
+  return NAMES[static_cast<int>(kind)];
+}
+
 std::string RecordingVerdict::text() const {
-  const std::string where =
-      formatted(" (%.0f rpm, %.2f .. %.2f s)", units::rpmFromRadPerSec(speed), from, to);
-  if (!cut) return "no cut: " + reason;
-  if (!chatter) return "stable: " + reason + where;
-  std::string line = formatted("chatter at %.1f Hz, %.0f dB above the noise floor", frequency, over_noise);
-  if (std::isfinite(over_air)) line += formatted(", %.0f dB above the level outside the cut", over_air);
-  line += formatted(", %d companions, %.1f times the power of the harmonics", companions, share);
+  std::string where = formatted(" (%.0f rpm", units::rpmFromRadPerSec(speed));
+  if (speed_source == SpeedSource::found) where += " by the harmonics";
+  if (speed_source == SpeedSource::corrected)
+    where += " by the harmonics, which differs from the stated speed";
+  where += formatted(", %.2f .. %.2f s)", from, to);
+  if (kind == Kind::no_cut) return "no cut: " + reason;
+  if (std::isnan(probability)) return "unsure: " + reason;
+  const std::string probable = formatted(" (probability of chatter %.0f %%)", 100.0 * probability);
+  if (kind == Kind::stable) return "stable" + probable + ": " + reason + where;
+  std::string line = (kind == Kind::chatter ? "chatter" : "unsure") + probable;
+  if (std::isfinite(frequency)) {
+    line += formatted(" at %.1f Hz, %.0f dB above the noise floor", frequency, over_noise);
+    if (std::isfinite(over_air)) line += formatted(", %.0f dB above the level outside the cut", over_air);
+    line += formatted(", %d companions, %.1f times the power of the harmonics", companions, share);
+  }
   if (std::isfinite(mode)) line += formatted(", near the mode at %.0f Hz", mode);
+  if (!reason.empty()) line += ": " + reason;
   return line + where;
 }
 
@@ -227,11 +405,39 @@ RecordingVerdict judgeRecording(const Recording& recording, const RecordingReque
   for (const std::vector<double>& channel : recording.channels)
     if (channel.size() != recording.channels[0].size())
       throw Error("recording: channels of different length: expected equal lengths");
-  if (request.teeth * request.speed / units::TWO_PI > 0.2 * recording.sample_rate)
-    throw Error(formatted(
-        "recording: sample rate %.0f Hz: expected at least 5 times the tooth passing frequency, %.0f Hz",
-        recording.sample_rate, request.teeth * request.speed / units::TWO_PI));
-  RecordingVerdict verdict = RecordingAnalysis(recording, request).run();
+  const double seconds = static_cast<double>(recording.channels[0].size()) / recording.sample_rate;
+  const SpindleSpeed speed = speedOf(recording, request);
+  RecordingVerdict verdict;
+  if (std::isnan(speed.value)) {
+    verdict.kind = RecordingVerdict::Kind::unsure;
+    verdict.speed = NAN;
+    verdict.reason = "no spindle harmonics were found";
+    verdict.spectrogram = spectrogramOf(recording, std::min(CutFinderOptions().longest_window, seconds),
+                                        CutFinderOptions().highest);
+  } else {
+    const double turns = seconds * speed.value / units::TWO_PI;
+    if (turns < LEAST_TURNS)
+      throw Error(formatted("recording: %.3f s with %.1f revolutions: expected at least %.0f", seconds, turns,
+                            LEAST_TURNS));
+    const double passing = request.teeth * speed.value / units::TWO_PI;
+    if (2.0 * passing > recording.sample_rate)
+      throw Error(formatted(
+          "recording: sample rate %.0f Hz: expected at least twice the tooth passing frequency, %.0f Hz",
+          recording.sample_rate, passing));
+    const int factor = static_cast<int>(std::ceil(FINE_SAMPLES * passing / recording.sample_rate));
+    RecordingRequest at_speed = request;
+    at_speed.speed = speed.value;
+    at_speed.speed_error = SPEED_ERROR;
+    std::vector<double> aliased;
+    for (int k = 1; factor > 1 && k * passing < ALIASED_TO * recording.sample_rate; ++k)
+      if (k * passing > 0.5 * recording.sample_rate)
+        aliased.push_back(std::abs(std::remainder(k * passing, recording.sample_rate)));
+    verdict = factor > 1 ? RecordingAnalysis(atHigherRate(recording, factor), at_speed, speed.teeth_dominate,
+                                             aliased)
+                               .run()
+                         : RecordingAnalysis(recording, at_speed, speed.teeth_dominate, aliased).run();
+    verdict.speed_source = speed.source;
+  }
   verdict.from += recording.start;
   verdict.to += recording.start;
   for (double& time : verdict.spectrogram.time) time += recording.start;

@@ -46,10 +46,10 @@ void draw(const RecordingVerdict& verdict, const RecordingOptions& o) {
   Gnuplot plot(o.picture, 1100, 650, 12);
   plot.block("levels", rows);
   const double passing = o.teeth * verdict.speed / units::TWO_PI, end = s.time.back();
-  for (double f = passing; f < s.frequency.back(); f += passing)
+  for (double f = passing; f < s.frequency.back(); f += passing)  // none if the speed is unknown
     plot << formatted("set arrow from %g,%g to %g,%g nohead front lc rgb '#ffffff' dt 3 lw 0.5\n", s.time[0],
                       f, end, f);
-  if (verdict.chatter)
+  if (verdict.chatter())
     plot << formatted("set arrow from %g,%g to %g,%g nohead front lc rgb '#ff2020' lw 1.5\n", s.time[0],
                       verdict.frequency, end, verdict.frequency)
          << formatted("set label 'chatter %.0f Hz' at %g,%g front tc rgb '#ff2020' offset 0,0.6\n",
@@ -93,15 +93,19 @@ Command detectCommand() {
   command.description =
       "Detects chatter in a recording of a cut (sound, vibration, displacement or force; WAV, FLAC, CSV or "
       "bag), "
-      "prints the result in one line and draws the spectrogram.";
+      "prints the result in one line (no cut, stable, chatter or unsure, with the probability of chatter) "
+      "and draws "
+      "the spectrogram. Three revolutions and two samples in a tooth passing period are the least.";
   command.examples = {{"cut.wav --speed 8000 --teeth 4", "all channels of a sound file"},
+                      {"cut.wav --teeth 4", "the spindle speed is found from the harmonics"},
                       {"cut.csv --speed 8000 --teeth 4 --channels fx,fy --model mill.yaml",
                        "two columns; chatter must lie near a mode of the model"}};
   command.files = {{"FILE", "the recording: WAV, FLAC, AIFF, CSV with a column time[s], or a bag"},
                    {"NAME_spectrogram.png", "spectrogram, unless -o sets another name"}};
   command.setBody(run, [](CommandLine& line, RecordingOptions& o) {
     line.option("FILE", o.file, "the recording").required();
-    line.option("--speed", o.rpm, "spindle speed of the cut [rpm]").required().positive();
+    line.option("--speed", o.rpm, "spindle speed of the cut [rpm] (default: found from the harmonics)")
+        .positive();
     line.option("--teeth", o.teeth, "teeth of the tool").required();
     line.option("--speed-error", o.speed_error, "largest error of the speed [percent]").showDefault();
     line.option("--model", o.model, "machine model file; chatter must lie near a mode of its tool_tip");

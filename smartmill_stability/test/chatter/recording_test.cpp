@@ -54,7 +54,7 @@ TEST(Recording, linesOneToothPassingApartDuringTheCutAreChatter) {
   const RecordingVerdict v =
       judgeRecording(recording(with({{873.0, 3.0}, {673.0, 1.0}, {1073.0, 1.0}}), {}), request());
   EXPECT_TRUE(v.cut);
-  EXPECT_TRUE(v.chatter) << v.text();
+  EXPECT_TRUE(v.chatter()) << v.text();
   EXPECT_NEAR(v.frequency, 873.0, 1.0);
   EXPECT_EQ(v.companions, 2);
   EXPECT_GT(v.over_air, 20.0);
@@ -76,14 +76,14 @@ TEST(Recording, harmonicsAreNoChatter) {
   const RecordingVerdict v =
       judgeRecording(recording(with({{100.0, 1.0}, {300.0, 1.0}, {900.0, 2.0}}), {}), request());
   EXPECT_TRUE(v.cut);
-  EXPECT_FALSE(v.chatter) << v.text();
+  EXPECT_FALSE(v.chatter()) << v.text();
 }
 
 TEST(Recording, aToneOutsideTheCutIsNoChatter) {
   const std::vector<Tone> other{{873.0, 2.0}, {1746.0, 1.0}, {1231.0, 2.0}};
-  EXPECT_FALSE(judgeRecording(recording(TOOTH_PASSING, other), request()).chatter);
+  EXPECT_FALSE(judgeRecording(recording(TOOTH_PASSING, other), request()).chatter());
   // Without air it is identified by the lack of companions.
-  EXPECT_FALSE(judgeRecording(recording(TOOTH_PASSING, other, false), request()).chatter);
+  EXPECT_FALSE(judgeRecording(recording(TOOTH_PASSING, other, false), request()).chatter());
 }
 
 TEST(Recording, theHarmonicsCorrectAWrongSpeed) {
@@ -91,17 +91,17 @@ TEST(Recording, theHarmonicsCorrectAWrongSpeed) {
   wrong.speed = 1.012 * SPEED;
   const RecordingVerdict stable = judgeRecording(recording(with({{1200.0, 2.0}, {1800.0, 2.0}}), {}), wrong);
   EXPECT_NEAR(stable.speed / SPEED, 1.0, 1e-3);
-  EXPECT_FALSE(stable.chatter) << stable.text();
+  EXPECT_FALSE(stable.chatter()) << stable.text();
 }
 
 TEST(Recording, withKnownModesChatterLiesNearOne) {
   RecordingRequest known = request();
   known.modes = {840.0};
   const Recording r = recording(with({{873.0, 3.0}, {673.0, 1.0}, {1073.0, 1.0}}), {});
-  EXPECT_TRUE(judgeRecording(r, known).chatter);
+  EXPECT_TRUE(judgeRecording(r, known).chatter());
   EXPECT_EQ(judgeRecording(r, known).mode, 840.0);
   known.modes = {2500.0};
-  EXPECT_FALSE(judgeRecording(r, known).chatter);
+  EXPECT_FALSE(judgeRecording(r, known).chatter());
 }
 
 TEST(Recording, noiseAloneIsNoCut) {

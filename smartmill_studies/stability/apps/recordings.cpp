@@ -1,6 +1,8 @@
 // rosrun smartmill_studies stability_recordings MODEL --entry-deg A --exit-deg B --speeds LO:HI
 // --max-depth-mm D
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -22,32 +24,70 @@ using namespace smartmill;
 
 struct Request : stability::StudyRequest {
   int each = 10, cases = 0;
-  bool modes = false;
+  bool modes = false, all_captures = false;
   StudyCase one;
 };
 
 struct Count {
-  int all = 0, verdicts = 0, right = 0;
-  void add(bool chatter, bool truth) {
-    ++all;
-    verdicts += chatter;
-    right += chatter == truth;
-  }
+  int all = 0, chatter = 0, unsure = 0, right = 0;
 };
-using Counts = std::map<std::string, Count>;  // by kind
+using Counts = std::map<std::string, Count>;  // by kind, by capture
+
+/// One verdict. `unsure` is not right.
+struct Outcome {
+  std::string kind, capture, said;
+  bool chatters = false;
+  double probability = 0.0;  // [1]; NaN: no cut
+  bool right() const { return said != "unsure" && (said == "chatter") == chatters; }
+};
+
+Outcome outcomeOf(const nlohmann::json& line) {
+  const nlohmann::json& p = line.at("probability");
+  return {line.at("kind"), line.at("capture"), line.at("said"), line.at("chatters"),
+          p.is_null() ? NAN : p.get<double>()};
+}
 
 void print(const Counts& counts) {
-  int right = 0, all = 0;
-  std::printf("%-38s %6s %12s %6s\n", "kind", "scenes", "chatter", "right");
-  for (const stability::SoundKind kind : stability::soundKinds()) {
-    const auto found = counts.find(nameOf(kind));
-    if (found == counts.end()) continue;
-    const Count& count = found->second;
-    std::printf("%-38s %6d %12d %6d\n", nameOf(kind), count.all, count.verdicts, count.right);
-    right += count.right;
-    all += count.all;
+  for (const auto& [name, count] : counts)
+    std::printf("%-38s %6d %8d %7d %6d\n", name.c_str(), count.all, count.chatter, count.unsure, count.right);
+}
+
+/// Tables by kind and by capture, and the reliability of the probability.
+void print(const std::vector<Outcome>& outcomes) {
+  Counts kinds, ways;
+  Count sum;
+  constexpr int BINS = 5;
+  std::array<double, BINS> predicted{}, chattering{}, size{};
+  for (const Outcome& o : outcomes) {
+    for (Count* count : {&kinds[o.kind], &ways[o.capture], &sum}) {
+      ++count->all;
+      count->chatter += o.said == "chatter";
+      count->unsure += o.said == "unsure";
+      count->right += o.right();
+    }
+    if (std::isnan(o.probability)) continue;
+    const auto bin = static_cast<std::size_t>(std::min(BINS - 1.0, BINS * o.probability));
+    predicted[bin] += o.probability;
+    chattering[bin] += o.chatters;
+    ++size[bin];
   }
-  std::printf("right in %d of %d\n", right, all);
+  std::printf("%-38s %6s %8s %7s %6s\n", "kind", "scenes", "chatter", "unsure", "right");
+  print(kinds);
+  std::printf("%-38s\n", "recorded");
+  print(ways);
+  std::printf("right in %d of %d, unsure in %d\n", sum.right, sum.all, sum.unsure);
+  std::printf("probability of chatter: stated, observed, recordings\n");
+  for (std::size_t bin = 0; bin < BINS; ++bin)
+    if (size[bin] > 0.0)
+      std::printf("%6.3f %6.3f %5.0f\n", predicted[bin] / size[bin], chattering[bin] / size[bin], size[bin]);
+}
+
+/// Of eight recordings of a kind five are whole.
+stability::Capture captureOf(int number) {
+  constexpr int WHOLE = 5;
+  const auto ways = stability::captures();
+  return number % 8 < WHOLE ? stability::Capture::whole
+                            : ways[static_cast<std::size_t>(number % 8 - WHOLE + 1)];
 }
 
 stability::RecordingVerdict judged(const Request& request, const MachineModel& model,
@@ -61,31 +101,41 @@ stability::RecordingVerdict judged(const Request& request, const MachineModel& m
   return judgeRecording(scene.recording, recording_request);
 }
 
+nlohmann::json lineOf(const Request& request, const MachineModel& model, const stability::SoundScene& whole,
+                      int number, int of_kind) {
+  const stability::Capture capture = request.all_captures ? captureOf(of_kind) : stability::Capture::whole;
+  const stability::SoundScene scene = captured(whole, capture, model.tool->teeth,
+                                               static_cast<unsigned>(seedOfCase(request.seed + 1, number)));
+  const stability::RecordingVerdict verdict = judged(request, model, scene);
+  return {{"case", number},
+          {"kind", nameOf(scene.kind)},
+          {"capture", nameOf(capture)},
+          {"speed_rpm", units::rpmFromRadPerSec(scene.speed)},
+          {"depth_mm", scene.depth / units::MM},
+          {"chatters", scene.chatters},
+          {"said", stability::nameOf(verdict.kind)},
+          {"probability", verdict.probability},
+          {"margin", verdict.margin},
+          {"text", verdict.text()}};
+}
+
 /// One scene; the kinds alternate.
 void runOne(const Request& request, const MachineModel& model, int cases) {
   request.one.check(cases);
   const auto kinds = stability::soundKinds();
   stability::StudyRange range = request.range();
   range.seed = static_cast<unsigned>(seedOfCase(range.seed, request.one.number));
-  const auto scene = soundScenes(model, request.system(model), range,
-                                 {kinds[static_cast<std::size_t>(request.one.number) % kinds.size()]})
-                         .front();
-  const stability::RecordingVerdict verdict = judged(request, model, scene);
-  request.one.print({{"case", request.one.number},
-                     {"kind", nameOf(scene.kind)},
-                     {"speed_rpm", units::rpmFromRadPerSec(scene.speed)},
-                     {"depth_mm", scene.depth / units::MM},
-                     {"chatters", scene.chatters},
-                     {"said", verdict.chatter},
-                     {"right", verdict.chatter == scene.chatters}});
+  const auto number = static_cast<std::size_t>(request.one.number);
+  const auto scene = soundScenes(model, request.system(model), range, {kinds[number % kinds.size()]}).front();
+  request.one.print(
+      lineOf(request, model, scene, request.one.number, static_cast<int>(number / kinds.size())));
 }
 
 void run(const Request& request) {
+  std::vector<Outcome> outcomes;
   if (request.one.scores()) {
-    Counts counts;
-    for (const nlohmann::json& line : readJsonLines(request.one.lines))
-      counts[line.at("kind")].add(line.at("said"), line.at("chatters"));
-    return print(counts);
+    for (const nlohmann::json& line : readJsonLines(request.one.lines)) outcomes.push_back(outcomeOf(line));
+    return print(outcomes);
   }
   const MachineModel model = request.machine();
   std::vector<stability::SoundKind> kinds;
@@ -95,28 +145,23 @@ void run(const Request& request) {
   if (request.one.one()) return runOne(request, model, cases);
   if (request.cases > 0) throw UsageError("--cases: requires --case; --each is the number of each kind");
   const auto scenes = soundScenes(model, request.system(model), request.range(), kinds);
-  Counts counts;
-  std::string list;  // file, stated and true speed [rpm], truth, kind
   for (std::size_t k = 0; k < scenes.size(); ++k) {
     const stability::SoundScene& scene = scenes[k];
-    const stability::RecordingVerdict verdict = judged(request, model, scene);
-    counts[nameOf(scene.kind)].add(verdict.chatter, scene.chatters);
-    if (verdict.chatter != scene.chatters)
-      std::printf("scene %zu, %s, %s, %.0f rpm (stated %.0f), %.2f mm: %s\n", k, nameOf(scene.kind),
-                  scene.chatters ? "chatters" : "does not", units::rpmFromRadPerSec(scene.speed),
-                  units::rpmFromRadPerSec(scene.stated_speed), scene.depth / units::MM,
-                  verdict.text().c_str());
+    const int number = static_cast<int>(k);
+    const nlohmann::json line = lineOf(request, model, scene, number, number % request.each);
+    outcomes.push_back(outcomeOf(line));
+    if (!outcomes.back().right())
+      std::printf("scene %zu, %s, %s, %s, %.0f rpm, %.2f mm: %s\n", k, nameOf(scene.kind),
+                  outcomes.back().capture.c_str(), scene.chatters ? "chatters" : "does not",
+                  units::rpmFromRadPerSec(scene.speed), scene.depth / units::MM,
+                  line.at("text").get<std::string>().c_str());
     if (request.out.empty()) continue;
     SoundFile sound{scene.recording.sample_rate, scene.recording.channels};
     for (double& v : sound.channels[0]) v *= 0.2;
-    const std::string file = request.out + formatted("/scene_%03zu.wav", k);
-    writeWav(sound, file);
-    list +=
-        formatted("%s %.2f %.2f %d %s\n", file.c_str(), units::rpmFromRadPerSec(scene.stated_speed),
-                  units::rpmFromRadPerSec(scene.speed), static_cast<int>(scene.chatters), nameOf(scene.kind));
+    writeWav(sound, request.out + formatted("/scene_%03zu.wav", k));
+    std::ofstream(request.out + "/scenes.jsonl", std::ios::app) << line.dump() << "\n";
   }
-  if (!request.out.empty()) std::ofstream(request.out + "/scenes.txt") << list;
-  print(counts);
+  print(outcomes);
 }
 
 }  // namespace
@@ -126,11 +171,14 @@ int main(int argc, char** argv) {
   CommandLine line{"Chatter verdicts on synthesised sound recordings of many kinds."};
   request.addTo(line);
   line.option("--each", request.each, "scenes of each kind (10)").within(1, 1000000);
-  line.option("--cases", request.cases, "number of scenes, with alternating kinds, for --case (12 x EACH)")
+  line.option("--cases", request.cases, "number of scenes, with alternating kinds, for --case (16 x EACH)")
       .within(1, 1000000);
   line.option("--case", request.one.number, "only this case (0..): prints its line of JSON");
   request.one.addScore(line);
   line.flag("--modes", request.modes, "pass the modes of the machine to the verdict");
+  line.flag(
+      "--captures", request.all_captures,
+      "of eight recordings of a kind one without a stated speed, one of few revolutions, one at a low rate");
   line.option("-o,--out", request.out, "existing folder for the scenes as WAV files");
   return runProgram(line, argc, argv, [&] { run(request); });
 }

@@ -21,7 +21,7 @@ TEST(Recordings, soundsOfTheShopAreToldFromChatter) {
     request.speed = scene.stated_speed;
     request.teeth = model.tool->teeth;
     const RecordingVerdict verdict = judgeRecording(scene.recording, request);
-    EXPECT_EQ(verdict.chatter, scene.chatters) << nameOf(scene.kind) << ": " << verdict.text();
+    EXPECT_EQ(verdict.chatter(), scene.chatters) << nameOf(scene.kind) << ": " << verdict.text();
     EXPECT_EQ(verdict.text().find('\n'), std::string::npos);
   }
 }

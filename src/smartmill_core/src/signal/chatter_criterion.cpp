@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "smartmill_core/signal/spectral_lines.h"
@@ -13,6 +14,19 @@ namespace {
 double strongest(const std::vector<double>& power) {
   return peakPosition(
       power, static_cast<std::size_t>(std::max_element(power.begin() + 1, power.end() - 1) - power.begin()));
+}
+
+/// [1] Natural logarithm of a ratio, limited.
+double marginOf(double ratio) {
+  constexpr double MOST = ChatterEvidence::LARGEST_MARGIN;
+  return ratio > 0.0 ? std::clamp(std::log(ratio), -MOST, MOST) : -MOST;
+}
+
+/// [1] Of a part in a whole over a limit of their ratio, by the part over the rest: as far from the limit at
+/// 0 as at 1.
+double marginOf(double part, double whole, double limit) {
+  const double rest = whole - part;
+  return rest > 0.0 ? marginOf(part / rest * (1.0 - limit) / limit) : ChatterEvidence::LARGEST_MARGIN;
 }
 
 }  // namespace
@@ -39,6 +53,11 @@ std::vector<ChatterCriterion::Line> ChatterCriterion::lines(const RevolutionWind
     line.position = peakPosition(power, k);
     if (options_.speed_error > 0.0 && std::abs(std::remainder(line.position, turns)) <
                                           options_.companion_error + options_.speed_error * line.position)
+      continue;
+    if (std::any_of(options_.ignored.begin(), options_.ignored.end(), [&](double known) {
+          return std::abs(known * period * turns - line.position) <
+                 options_.companion_error + options_.speed_error * line.position + 1.0;
+        }))
       continue;
     line.over_floor = p / floor[k];
     if (!background.empty()) {
@@ -77,7 +96,10 @@ ChatterCriterion::Family ChatterCriterion::familyOf(const Line& line, const std:
   const double teeth = std::max(1, window.teeth()), farthest = options_.companion_passings * teeth;
   const bool measured_angle = !(options_.speed_error > 0.0);
   const auto modeOf = [&](const Line& of) { return modeNear(of.position / turns / period); };
-  Family family{line, line.power, 0, 0, false, modeOf(line)};
+  Family family;
+  family.strongest = line;
+  family.power = line.power;
+  family.mode = modeOf(line);
   for (const Line& other : lines) {
     if (other.position == line.position || other.power < options_.least_companion * line.power) continue;
     bool member = false;
@@ -90,6 +112,7 @@ ChatterCriterion::Family ChatterCriterion::familyOf(const Line& line, const std:
       const bool next = revolutions == 1.0 || revolutions == teeth;
       family.one_passing = family.one_passing || revolutions == teeth;
       family.one_revolution += revolutions == 1.0;
+      if (sign > 0.0 && revolutions == 1.0) (distance > 0.0 ? family.above : family.below) = other.power;
       // Unequal teeth add all multiples of a revolution, which coincide by chance unless the angle is
       // measured.
       const bool near = measured_angle ? std::abs(other.position - line.position) <= farthest * turns
@@ -122,26 +145,30 @@ ChatterCriterion::Family ChatterCriterion::strongestFamily(const RevolutionWindo
   }
   if (!(best.power > 0.0)) return {};
   best = familyOf(best.strongest, all, window, period);
-  if (best.power <= options_.energy_ratio * energies.total &&
-      best.power < options_.whole * energies.remainder) {
+  best.margin = std::max(marginOf(best.power, energies.total, options_.energy_ratio),
+                         marginOf(best.power, energies.remainder, options_.whole));
+  if (best.margin <= 0.0) {
     reason = std::max(reason, Reason::weak);
-    return {};
+    return best;
   }
-  if (background.empty() && !best.isModulated() && best.power <= options_.dominance * energies.remainder) {
-    reason = std::max(reason, Reason::single);
-    return {};
+  if (background.empty() && !best.isModulated()) {
+    best.margin = std::min(best.margin, marginOf(best.power, energies.remainder, options_.dominance));
+    if (best.margin <= 0.0) {
+      reason = std::max(reason, Reason::single);
+      return best;
+    }
   }
   reason = Reason::none;
   return best;
 }
 
-bool ChatterCriterion::decays(const RevolutionWindow& window) const {
+double ChatterCriterion::persistence(const RevolutionWindow& window) const {
   const std::vector<double>& turns = window.remainderOfTurn();
   const auto middle = turns.begin() + static_cast<std::ptrdiff_t>((turns.size() + 1) / 2);
   const double early =
       std::accumulate(turns.begin(), middle, 0.0) / static_cast<double>(middle - turns.begin());
   const double late = std::accumulate(middle, turns.end(), 0.0) / static_cast<double>(turns.end() - middle);
-  return late < options_.decay * early;
+  return late / std::max(options_.decay * early, std::numeric_limits<double>::min());
 }
 
 double ChatterCriterion::powerInBand(const RevolutionWindow& window, double period) const {
@@ -172,18 +199,20 @@ ChatterEvidence ChatterCriterion::judge(const RevolutionWindow& window, double p
   evidence.severity = std::sqrt(energy);
   const auto turns = static_cast<double>(window.turns());
   evidence.order = evidence.flip ? window.strongestFlipOrder() : strongest(window.power()) / turns;
-  if (!(evidence.energy_ratio > options_.energy_ratio) || !(evidence.severity > options_.least_severity)) {
-    evidence.reason = Reason::weak;
-    return evidence;
-  }
-  if (evidence.flip) {
+  evidence.margin = marginOf(evidence.energy_ratio, 1.0, options_.energy_ratio);
+  if (options_.least_severity > 0.0)
+    evidence.margin = std::min(evidence.margin, marginOf(energy / std::pow(options_.least_severity, 2)));
+  const bool weak = evidence.margin <= 0.0;
+  if (evidence.flip && !weak) {
+    evidence.margin = std::min(evidence.margin, marginOf(evidence.alternation / options_.alternation_ratio));
     // It is synchronous: within this window it is present from the start.
     evidence.chatter = true;
     evidence.reason = Reason::none;
     return evidence;
   }
-  if (decays(window)) {
-    evidence.reason = Reason::decays;
+  if (const double persists = persistence(window); persists < 1.0) {
+    evidence.margin = std::min(evidence.margin, marginOf(persists));
+    evidence.reason = weak ? Reason::weak : Reason::decays;
     return evidence;
   }
   // The taper of the spectrum suppresses the ends of the window, where growing chatter and chatter near a
@@ -191,12 +220,16 @@ ChatterEvidence ChatterCriterion::judge(const RevolutionWindow& window, double p
   const double scale = options_.speed_error > 0.0 ? 1.0 : window.remainder() / all;
   const Family family =
       strongestFamily(window, period, background, {total / scale, remainder / scale}, evidence.reason);
-  if (!(family.power > 0.0)) return evidence;
+  evidence.margin = std::min(evidence.margin, family.margin);
+  if (weak) evidence.reason = Reason::weak;
+  evidence.modulated = family.one_passing;
+  evidence.companions = family.companions;
+  evidence.like_bearing = family.isLikeBearing();
+  if (evidence.margin <= 0.0) return evidence;
   evidence.chatter = true;
   evidence.order = family.strongest.position / turns;
   evidence.line_power = scale * family.strongest.power;
   evidence.power = scale * family.power;
-  evidence.companions = family.companions;
   evidence.over_floor = family.strongest.over_floor;
   evidence.over_background = family.strongest.over_background;
   evidence.mode = family.mode;

@@ -38,7 +38,7 @@ void RevolutionWindow::add(std::vector<double> channel) {
     remainder_of_turn_[i / bins_] += share * channel[i] * channel[i] / static_cast<double>(bins_);
     channel[i] *= taper_[i];
   }
-  addAlternation(repeated);
+  addOrders(repeated);
   const auto spectrum = fourier(channel);
   constexpr double MEAN_SQUARE = 0.375;  // of the Hann window
   const double scale = 2.0 * share / (MEAN_SQUARE * n * n);
@@ -58,17 +58,18 @@ void RevolutionWindow::add(const std::vector<double>& series, double start, doub
 }
 
 double RevolutionWindow::strongestFlipOrder() const {
-  return static_cast<double>(std::max_element(of_order_.begin(), of_order_.end()) - of_order_.begin());
+  std::size_t strongest = 0;
+  for (std::size_t k = half_; half_ > 0 && 2 * k < bins_; k += 2 * half_)
+    if (strongest == 0 || of_order_[k] > of_order_[strongest]) strongest = k;
+  return static_cast<double>(strongest);
 }
 
-void RevolutionWindow::addAlternation(const std::vector<double>& repeated) {
-  if (half_ == 0) return;
+void RevolutionWindow::addOrders(const std::vector<double>& repeated) {
   const auto orders = fourier(repeated);
-  for (std::size_t k = half_; 2 * k < bins_; k += 2 * half_) {
-    const double square = 2.0 * std::norm(orders[k]) / std::pow(static_cast<double>(bins_), 2);
-    of_order_[k] += square;
-    alternating_ += square;
-  }
+  for (std::size_t k = 1; 2 * k < bins_; ++k)
+    of_order_[k] += 2.0 * std::norm(orders[k]) / std::pow(static_cast<double>(bins_), 2);
+  alternating_ = 0.0;
+  for (std::size_t k = half_; half_ > 0 && 2 * k < bins_; k += 2 * half_) alternating_ += of_order_[k];
 }
 
 }  // namespace smartmill

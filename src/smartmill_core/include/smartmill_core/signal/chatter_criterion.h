@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <limits>
 #include <vector>
@@ -45,6 +46,8 @@ struct ChatterCriterionOptions {
   /// [1] Relative error of the spindle angle of a window: lines that near to a spindle harmonic belong to it;
   /// 0: the spindle angle is measured.
   double speed_error = 0.0;
+  /// [Hz] Lines that are known to be no chatter, e.g. aliased harmonics, within `companion_error`.
+  std::vector<double> ignored;
   double over_background = 6.0;  ///< [1] least power of a line over the same line of the background
   std::vector<double> modes;     ///< [Hz] natural frequencies of tool and spindle; empty: unknown
   /// [1] Range of chatter frequencies around a mode; chatter is mostly above it.
@@ -54,12 +57,17 @@ struct ChatterCriterionOptions {
 /// Evidence of one window.
 struct ChatterEvidence {
   static constexpr double UNKNOWN = std::numeric_limits<double>::quiet_NaN();
+  static constexpr double LARGEST_MARGIN = 3.0;  ///< [1] factor of 20: further energy says nothing more
   /// Why there is no chatter, the strongest reason last.
   enum class Reason { none, no_lines, decays, in_background, weak, single, far_from_modes };
 
   bool chatter = false;
   bool flip = false;  ///< period doubling of a tool with an even number of teeth
   Reason reason = Reason::no_lines;
+  /// [1] Natural logarithm of the odds of the energy that decides (part over the rest) over those of its
+  /// limit, the least where several have one: positive with chatter; at most 3 on either side, -3 without
+  /// lines.
+  double margin = -LARGEST_MARGIN;
   double energy_ratio = 0.0;  ///< [1] energy outside the spindle harmonics over total energy, without mean
   double severity = 0.0;      ///< [unit of the signal] RMS outside the spindle harmonics
   double alternation = 0.0;   ///< [1] energy that alternates from tooth to tooth over total energy
@@ -67,9 +75,12 @@ struct ChatterEvidence {
   double synchronous = 0.0;   ///< [unit of the signal squared] mean square of the spindle harmonics
   std::size_t onset = 0;      ///< first revolution of the window after which none repeats
   // Of the family of chatter lines
-  double line_power = 0.0;           ///< [unit of the signal squared] mean square of the strongest line
-  double power = 0.0;                ///< [unit of the signal squared] mean square
-  int companions = 0;                ///< lines in addition to the strongest
+  double line_power = 0.0;  ///< [unit of the signal squared] mean square of the strongest line
+  double power = 0.0;       ///< [unit of the signal squared] mean square
+  int companions = 0;       ///< lines in addition to the strongest
+  bool modulated = false;   ///< a companion is one tooth passing frequency away
+  /// Equal companions one revolution to both sides, none one tooth passing frequency away: as of a bearing.
+  bool like_bearing = false;
   double over_floor = UNKNOWN;       ///< [1] power of the strongest line over the noise floor
   double over_background = UNKNOWN;  ///< [1] and over the background, if it is given
   double mode = UNKNOWN;             ///< [Hz] nearby mode
@@ -105,11 +116,20 @@ class ChatterCriterion {
     Line strongest;
     double power = 0.0;  // mean square of all
     int companions = 0;
-    int one_revolution = 0;    // companions one revolution away
-    bool one_passing = false;  // a companion one tooth passing frequency away
+    int one_revolution = 0;           // companions one revolution away
+    bool one_passing = false;         // a companion one tooth passing frequency away
+    double below = 0.0, above = 0.0;  // mean squares of the lines one revolution below and above
     double mode = ChatterEvidence::UNKNOWN;
+    double margin = -ChatterEvidence::LARGEST_MARGIN;  // [1]
     /// By the teeth: two unrelated tones are one revolution apart by chance more often than three.
     bool isModulated() const { return one_passing || one_revolution >= 2; }
+    /// A defect of a bearing is modulated by the revolution, the same on both sides; teeth also add lines one
+    /// tooth passing frequency away.
+    bool isLikeBearing() const {
+      constexpr double SAME = 4.0;  // [1] power, 6 dB
+      return !one_passing && std::min(below, above) > 0.0 &&
+             std::max(below, above) < SAME * std::min(below, above);
+    }
   };
   /// Mean squares within the band, on the scale of the spectrum.
   struct Energies {
@@ -121,7 +141,8 @@ class ChatterCriterion {
                   double period) const;
   Family strongestFamily(const RevolutionWindow& window, double period, const std::vector<double>& background,
                          const Energies& energies, ChatterEvidence::Reason& reason) const;
-  bool decays(const RevolutionWindow& window) const;
+  /// [1] Energy of the second half of the window over the least that of a vibration that persists.
+  double persistence(const RevolutionWindow& window) const;
   /// Of the remainder.
   double powerInBand(const RevolutionWindow& window, double period) const;
   double modeNear(double frequency) const;  // [Hz]

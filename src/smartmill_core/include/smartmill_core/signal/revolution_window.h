@@ -34,9 +34,11 @@ class RevolutionWindow {
   /// 0 for an odd number of teeth.
   double alternating() const { return alternating_; }
   double strongestFlipOrder() const;  ///< [1/revolution]
+  /// Mean square of the synchronous part at each order from 0; that of order 0 is not defined.
+  const std::vector<double>& ofOrder() const { return of_order_; }
 
  private:
-  void addAlternation(const std::vector<double>& repeated);
+  void addOrders(const std::vector<double>& repeated);
 
   std::size_t bins_, turns_, half_;
   int teeth_;
