@@ -75,6 +75,7 @@ double repeatingSpeed(const Recording& recording, const RecordingRequest& reques
   const auto turns = static_cast<std::size_t>(samples / recording.sample_rate * slowest / units::TWO_PI);
   for (int step = -STEPS; turns > 1 && step <= STEPS; ++step) {
     const double speed = request.speed * (1.0 + request.speed_error * step / STEPS);
+    if (samples / recording.sample_rate * speed < LEAST_TURNS * units::TWO_PI) continue;
     const double revolution = units::TWO_PI / speed * recording.sample_rate;
     RevolutionWindow window(static_cast<std::size_t>(std::ceil(revolution)), turns, request.teeth);
     for (const std::vector<double>& channel : recording.channels) window.add(channel, 1.0, revolution);

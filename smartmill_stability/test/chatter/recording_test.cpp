@@ -110,9 +110,90 @@ TEST(Recording, noiseAloneIsNoCut) {
   EXPECT_EQ(v.text(), "no cut: no louder part and no lines at the tooth passing frequency");
 }
 
+// Orders 1, 3 and 5 of the spindle and those of the teeth determine the speed.
+TEST(Recording, theSpeedIsFoundFromTheHarmonics) {
+  RecordingRequest unknown = request();
+  unknown.speed = 0.0;
+  const std::vector<Tone> runout{{100.0, 1.0}, {300.0, 1.0}, {500.0, 0.5}};
+  std::vector<Tone> tones = with(runout);
+  const RecordingVerdict stable = judgeRecording(recording(tones, {}), unknown);
+  EXPECT_EQ(stable.kind, RecordingVerdict::Kind::stable) << stable.text();
+  EXPECT_EQ(stable.speed_source, RecordingVerdict::SpeedSource::found);
+  EXPECT_NEAR(stable.speed / SPEED, 1.0, 1e-3);
+  tones.insert(tones.end(), {{873.0, 3.0}, {673.0, 1.0}, {1073.0, 1.0}});
+  const RecordingVerdict chatter = judgeRecording(recording(tones, {}), unknown);
+  EXPECT_TRUE(chatter.chatter()) << chatter.text();
+  EXPECT_NEAR(chatter.speed / SPEED, 1.0, 1e-3);
+  // A stated speed that the harmonics contradict is replaced.
+  RecordingRequest wrong = request();
+  wrong.speed = 1.37 * SPEED;
+  const RecordingVerdict corrected = judgeRecording(recording(with(runout), {}), wrong);
+  EXPECT_EQ(corrected.speed_source, RecordingVerdict::SpeedSource::corrected) << corrected.text();
+  EXPECT_NEAR(corrected.speed / SPEED, 1.0, 1e-3);
+}
+
+/// Part of a recording, from its middle. @param turns revolutions
+Recording partOf(Recording whole, double turns) {
+  std::vector<double>& channel = whole.channels[0];
+  const auto middle = channel.begin() + static_cast<std::ptrdiff_t>(channel.size() / 2);
+  channel = std::vector<double>(middle, middle + static_cast<std::ptrdiff_t>(turns * RATE / 100.0));
+  return whole;
+}
+
+TEST(Recording, fewRevolutionsAreJudgedWithLessCertainty) {
+  const Recording chatter = recording(with({{873.0, 8.0}, {673.0, 3.0}, {1073.0, 3.0}}), {});
+  const Recording stable = recording(with({{1200.0, 2.0}}), {});
+  for (const double turns : {4.0, 8.0, 16.0, 30.0}) {
+    const RecordingVerdict v = judgeRecording(partOf(chatter, turns), request());
+    EXPECT_TRUE(v.chatter() || v.kind == RecordingVerdict::Kind::unsure) << turns << ' ' << v.text();
+    EXPECT_NE(judgeRecording(partOf(stable, turns), request()).kind, RecordingVerdict::Kind::chatter)
+        << turns;
+  }
+  EXPECT_TRUE(judgeRecording(partOf(chatter, 30.0), request()).chatter());
+}
+
+// 2.7 samples in a tooth passing period: harmonics from 400 Hz on are aliased.
+TEST(Recording, aliasedHarmonicsAreNoChatter) {
+  const auto slow = [](const std::vector<Tone>& tones) {
+    Recording r;
+    r.sample_rate = 540.0;
+    r.channels.resize(1);
+    std::mt19937_64 random(7);
+    std::normal_distribution<double> normal;
+    for (int i = 0; i < 3 * 540; ++i) {
+      double v = 0.3 * normal(random);
+      for (const Tone& tone : tones) v += tone.size * std::sin(units::TWO_PI * tone.frequency * i / 540.0);
+      r.channels[0].push_back(v);
+    }
+    return r;
+  };
+  RecordingRequest exact = request();
+  exact.speed_error = 0.0;
+  const RecordingVerdict stable = judgeRecording(slow(TOOTH_PASSING), exact);
+  EXPECT_EQ(stable.kind, RecordingVerdict::Kind::stable) << stable.text();
+  const RecordingVerdict chatter = judgeRecording(slow(with({{237.0, 6.0}, {37.0, 2.0}})), exact);
+  EXPECT_TRUE(chatter.chatter()) << chatter.text();
+  EXPECT_NEAR(chatter.frequency, 237.0, 1.0);
+}
+
+// The orders of an idle spindle, and a bearing modulated by the revolution.
+TEST(Recording, anIdleSpindleWithABearingIsNoChatter) {
+  const std::vector<Tone> idle{{100.0, 2.0}, {200.0, 0.5}, {300.0, 2.0}, {400.0, 0.5},
+                               {500.0, 1.0}, {531.0, 3.0}, {431.0, 1.0}, {631.0, 1.0}};
+  const RecordingVerdict v = judgeRecording(recording(idle, {}, false), request());
+  EXPECT_NE(v.kind, RecordingVerdict::Kind::chatter) << v.text();
+  EXPECT_NE(v.kind, RecordingVerdict::Kind::stable) << v.text();
+}
+
+// Where chatter coincides with a spindle harmonic the recording does not distinguish it.
+TEST(Recording, chatterAtASpindleHarmonicIsUnsure) {
+  const RecordingVerdict v = judgeRecording(recording(with({{900.0, 20.0}}), {}), request());
+  EXPECT_EQ(v.kind, RecordingVerdict::Kind::unsure) << v.text();
+}
+
 TEST(Recording, refusesInvalidRecordingsAndRequests) {
   Recording brief = recording({}, {});
-  brief.channels[0].resize(500);
+  brief.channels[0].resize(400);  // 2.5 revolutions
   EXPECT_THROW(judgeRecording(brief, request()), Error);
   EXPECT_THROW(judgeRecording(Recording(), request()), Error);
   RecordingRequest wrong = request();
