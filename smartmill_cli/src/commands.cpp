@@ -40,7 +40,7 @@ CommandProgram smartmillProgram() {
         loadmeter::databaseCommand()}},
       {"Stability",
        {stability::lobesCommand(), stability::chartCommand(), stability::chatterProbabilityCommand(),
-        stability::processDampingCommand(), stability::detectCommand()}},
+        stability::processDampingCommand(), stability::detectCommand(), stability::nextSpeedCommand()}},
       {"NC programs", {smartmill::program::programCommand()}},
       {"Controller", {sim::controllerCommand(), cnc::captureCommand()}},
   };

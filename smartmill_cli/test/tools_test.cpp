@@ -104,6 +104,8 @@ TEST(Tools, DoWhatTheirCommandsDoToMeasuredRecords) {
   expectSame("sensitivity", "nowhere.yaml daq/vibration x nowhere.bag --exciter 10", 1);
   expectSame("frf", hits + "/*.csv -o out --no-picture");
   expectSame("detect", sound + " --speed 8018 --teeth 4 -o picture.png");
+  expectSame("next-speed", "--teeth 4 --speeds 6000:18000 9000=1050 14800=stable");
+  expectSame("next-speed", "--teeth 4 --speeds 6000:18000 9000=stable", 1);
   expectSame("sensor-report", taps + " -o matrix.csv");
 }
 

@@ -16,5 +16,7 @@ Command processDampingCommand();
 Command toolFrfCommand();
 /// Chatter in a recorded cut.
 Command detectCommand();
+/// Next spindle speed for a chattering cut, from its sound.
+Command nextSpeedCommand();
 
 }  // namespace smartmill::stability
