@@ -19,6 +19,7 @@ struct MillingControlOptions {
   double longest_step = 1.0;  ///< [s] longest interval between two loads over which the feed changes
   /// [1] Steps of the depth of the proposed next cut, and the least one over the depth of this.
   double depth_step = 0.05, least_depth = 0.1;
+  double least_probability = 0.1;  ///< [1] of a stable cut at a speed that is worth a move
 };
 constexpr MillingControlOptions CONTROL;
 
@@ -46,6 +47,7 @@ void MillingControl::begin(const CuttingCondition& condition) {
   last_load_ = 0.0;
   moves_ = 0;
   refused_ = at_floor_ = false;
+  search_.reset();
   request_.reset();
 }
 
@@ -163,28 +165,28 @@ void MillingControl::moveTo(const ChatterAdvice& advice, const StableSpeed& spee
       true);
 }
 
-/// Moves to the nearest speed whose tooth passing frequency divides the chatter frequency; for unknown modes.
+/// Moves to the speed that SpeedSearch proposes from the chatter heard in this cut; for unknown modes.
 void MillingControl::moveWithoutModel(const ChatterAdvice& advice) {
-  double best = 0.0;
-  for (const ChatterAdvice::Speed& s : advice.speeds) {
-    const bool within = s.speed >= lowest() && s.speed <= highest();
-    const bool nearer = std::abs(s.speed - advice.speed) < std::abs(best - advice.speed);
-    if (within && nearer) best = s.speed;
-  }
-  if (best == 0.0 || std::abs(best / advice.speed - 1.0) < CONTROL.reached) {
+  if (advice.teeth < 1 || !(advice.episode.frequency > 0.0)) {
     reduceFeed(advice, nullptr);
     return;
   }
-  const double spindle = best / cut_->spindle_speed;
+  if (!search_) search_.emplace(advice.teeth, lowest(), highest());
+  search_->heard({std::clamp(advice.speed, lowest(), highest()), advice.episode.frequency});
+  const SpeedProposal next = search_->next();
+  if (next.stable < CONTROL.least_probability) {
+    reduceFeed(advice, nullptr);
+    return;
+  }
+  const double spindle = next.speed / cut_->spindle_speed;
   ++moves_;
   phase_ = Phase::requested;
-  request(
-      feedFor(spindle), spindle,
-      formatted(
-          "chatter at %.0f Hz, %.0f rpm: spindle to %.0f rpm (%.1f %%), where the tooth passing frequency "
-          "divides the chatter frequency; modes unknown",
-          advice.episode.frequency, rpm(advice.speed), rpm(best), 100.0 * spindle),
-      true);
+  request(feedFor(spindle), spindle,
+          formatted("chatter at %.0f Hz, %.0f rpm: spindle to %.0f rpm (%.1f %%), stable there with a "
+                    "probability of %.0f %%; modes unknown",
+                    advice.episode.frequency, rpm(advice.speed), rpm(next.speed), 100.0 * spindle,
+                    100.0 * next.stable),
+          true);
 }
 
 void MillingControl::reduceFeed(const ChatterAdvice& advice, const UncertainSystem* system) {

@@ -200,19 +200,31 @@ TEST_F(Control, theTimeOfTheSpindleBeginsWithTheAnswerOfTheController) {
   EXPECT_NE(notes[0].find("slot: cut stable at"), std::string::npos) << notes[0];
 }
 
-TEST_F(Control, withoutModesMovesToTheNearestProposedSpeed) {
+// Teeth that meet the waves in phase: a little more than a whole number of waves in a tooth passing period.
+TEST_F(Control, withoutModesMovesToTheSpeedThatIsMostProbablyStable) {
   start(false);
   ChatterAdvice a = advice(1.0, 1.5);
-  for (const double rpm : {15000.0, 11200.0, 9500.0, 4000.0}) {
-    ChatterAdvice::Speed s;
-    s.speed = rpm * RPM;
-    s.limit = std::nan("");
-    a.speeds.push_back(s);
-  }
+  a.teeth = 4;
+  a.episode.frequency = 1500.0;  // 2.25 waves at 10,000 rpm
+  a.speed = 10000.0 * RPM;
   control_->handle(a);
   const auto request = control_->takeRequest();
   ASSERT_TRUE(request);
-  EXPECT_NEAR(request->spindle, 0.95, 1e-9);
+  EXPECT_GE(request->spindle, 0.8);
+  EXPECT_LE(request->spindle, 1.2);
+  const double waves = 1500.0 / (4.0 * 10000.0 * request->spindle / 60.0);
+  EXPECT_LT(waves - std::floor(waves), 0.2) << request->reason;
+  EXPECT_EQ(request->feed, request->spindle);
+  // Chatter there: another speed.
+  control_->answer(true, "", 1.0);
+  state(1.5, request->spindle * 10000.0 * RPM);
+  control_->handle(ChatterState{2.5, a.episode.condition, true, true});
+  a.speed = request->spindle * 10000.0 * RPM;
+  a.episode.frequency = 1510.0;
+  control_->handle(a);
+  const auto second = control_->takeRequest();
+  ASSERT_TRUE(second);
+  EXPECT_GT(std::abs(second->spindle - request->spindle), 0.01) << second->reason;
 }
 
 TEST_F(Control, loadDecreasesTheFeedFiveTimesAsFastAsItIncreasesIt) {

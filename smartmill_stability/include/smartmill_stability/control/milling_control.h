@@ -9,6 +9,7 @@
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_stability/chart/risk.h"
 #include "smartmill_stability/chatter/chatter_advice.h"
+#include "smartmill_stability/chatter/speed_search.h"
 
 namespace smartmill::stability {
 
@@ -127,6 +128,7 @@ class MillingControl {
   double last_load_ = 0.0;                     // [s]
   double since_ = 0.0;                         // [s] start of the phase
   double requested_at_ = 0.0;                  // [s] newest state when chatter was answered
+  std::optional<SpeedSearch> search_;          // of this cut, without a model
   int moves_ = 0;
   bool refused_ = false, at_floor_ = false;
   std::optional<OverrideRequest> request_;
