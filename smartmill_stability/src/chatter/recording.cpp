@@ -86,6 +86,14 @@ double repeatingSpeed(const Recording& recording, const RecordingRequest& reques
   return best;
 }
 
+/// Spectrogram of a recording that is not divided into windows, for its picture.
+Spectrogram pictureOf(const Recording& recording) {
+  constexpr double PARTS = 4.0;
+  const CutFinderOptions options;
+  const double seconds = static_cast<double>(recording.channels[0].size()) / recording.sample_rate;
+  return spectrogramOf(recording, std::min(options.longest_window, seconds / PARTS), options.highest);
+}
+
 struct SpindleSpeed {
   double value;  // [rad/s]; NaN: unknown
   RecordingVerdict::SpeedSource source;
@@ -280,6 +288,7 @@ class RecordingAnalysis {
     verdict.from = cut_.from();
     verdict.to = cut_.to();
     verdict.spectrogram = cut_.spectrogram();
+    if (verdict.spectrogram.time.size() < 2) verdict.spectrogram = pictureOf(recording_);
     if (windows_ == 0) return verdict;
     verdict.cut = cuts();
     verdict.margin = margins_ / static_cast<double>(windows_);
@@ -293,7 +302,10 @@ class RecordingAnalysis {
       if (quiet || (loudness < LOUD && !brief && (probability < NO_CUT_BELOW || bearing))) {
         verdict.kind = Kind::no_cut;
         verdict.reason = bearing ? "lines modulated by the spindle, not by the teeth, as those of a bearing"
-                                 : "no louder part and no lines at the tooth passing frequency";
+                         : cut_.hasToothPassing()
+                             ? "other spindle harmonics are stronger than those of the teeth: an idle "
+                               "spindle, or a cut with large runout"
+                             : "no louder part and no lines at the tooth passing frequency";
         return verdict;
       }
       verdict.cut = loudness > LOUD;
@@ -413,8 +425,7 @@ RecordingVerdict judgeRecording(const Recording& recording, const RecordingReque
     verdict.kind = RecordingVerdict::Kind::unsure;
     verdict.speed = NAN;
     verdict.reason = "no spindle harmonics were found";
-    verdict.spectrogram = spectrogramOf(recording, std::min(CutFinderOptions().longest_window, seconds),
-                                        CutFinderOptions().highest);
+    verdict.spectrogram = pictureOf(recording);
   } else {
     const double turns = seconds * speed.value / units::TWO_PI;
     if (turns < LEAST_TURNS)

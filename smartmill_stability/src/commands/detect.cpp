@@ -80,8 +80,8 @@ void run(const RecordingOptions& given) {
       throw Error(o.file + ": " + error.what());
     }
   }();
-  draw(verdict, o);
   std::printf("%s\n", verdict.text().c_str());
+  draw(verdict, o);
 }
 
 }  // namespace

@@ -145,6 +145,7 @@ TEST(Recording, fewRevolutionsAreJudgedWithLessCertainty) {
   const Recording stable = recording(with({{1200.0, 2.0}}), {});
   for (const double turns : {4.0, 8.0, 16.0, 30.0}) {
     const RecordingVerdict v = judgeRecording(partOf(chatter, turns), request());
+    EXPECT_GE(v.spectrogram.time.size(), 2u);  // of a picture
     EXPECT_TRUE(v.chatter() || v.kind == RecordingVerdict::Kind::unsure) << turns << ' ' << v.text();
     EXPECT_NE(judgeRecording(partOf(stable, turns), request()).kind, RecordingVerdict::Kind::chatter)
         << turns;
