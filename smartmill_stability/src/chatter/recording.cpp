@@ -95,8 +95,8 @@ Spectrogram pictureOf(const Recording& recording) {
 }
 
 struct SpindleSpeed {
-  double value;  // [rad/s]; NaN: unknown
-  RecordingVerdict::SpeedSource source;
+  double value = NAN;  // [rad/s]; NaN: unknown
+  RecordingVerdict::SpeedSource source = RecordingVerdict::SpeedSource::stated;
   /// SpeedFinder::teethDominate(); unknown for a recording of few revolutions.
   std::optional<bool> teeth_dominate{};
 };

@@ -87,7 +87,7 @@ void SpeedSearch::draw() {
 /// Limit and phase between the waves of consecutive teeth over the frequency.
 std::vector<SpeedSearch::Point> SpeedSearch::pointsOf(const std::vector<Mode>& modes) {
   std::vector<double> frequencies;
-  const auto lines = static_cast<double>(LINES / modes.size());
+  const auto lines = static_cast<double>(LINES) / static_cast<double>(modes.size());
   for (const Mode& mode : modes)
     for (double k = 0.5; k < lines; k += 1.0) {
       // Quantiles of a Cauchy distribution about the mode, as wide as its resonance and wider.
