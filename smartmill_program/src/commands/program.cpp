@@ -1,16 +1,22 @@
+#include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/text_file.h"
 #include "smartmill_core/units.h"
 #include "smartmill_program/commands.h"
 #include "smartmill_program/nc/program_reader.h"
+#include "smartmill_program/plan/feed_planner.h"
+#include "smartmill_program/plan/plan_report.h"
 #include "smartmill_program/program_analysis.h"
 #include "smartmill_program/report/program_page.h"
 #include "smartmill_program/report/tables.h"
@@ -39,7 +45,37 @@ struct Arguments {
   std::vector<std::string> models, work_offsets;
   double resolution_mm = 0.1, step = SimulationOptions().step_share;
   bool stability = true;
+  std::string plan;  // file; empty: no plan
+  double most_force_n = FeedLimits::UNLIMITED, most_torque_nm = FeedLimits::UNLIMITED,
+         most_power_w = FeedLimits::UNLIMITED, most_chip_mm = FeedLimits::UNLIMITED, least_chip_mm = 0.0,
+         most_feed_per_tooth_mm = FeedLimits::UNLIMITED, most_feed_mm_per_min = FeedLimits::UNLIMITED;
 };
+
+/// @throws UsageError, Error
+FeedLimits limitsOf(const Arguments& arguments, const ToolModels& models) {
+  FeedLimits limits;
+  limits.force = arguments.most_force_n;
+  limits.torque = arguments.most_torque_nm;
+  limits.power = arguments.most_power_w;
+  limits.chip = arguments.most_chip_mm * MM;
+  limits.least_chip = arguments.least_chip_mm * MM;
+  limits.feed_per_tooth = arguments.most_feed_per_tooth_mm * MM;
+  limits.machine = arguments.most_feed_mm_per_min * MM / 60.0;
+  if (std::isinf(limits.chip) && std::isinf(limits.feed_per_tooth))
+    throw UsageError("--plan: expected --most-chip-mm or --most-feed-per-tooth-mm next to it");
+  if (models.rapid() > 0.0) limits.machine = std::min(limits.machine, models.rapid());
+  if (models.acceleration() > 0.0) limits.acceleration = models.acceleration();
+  if (std::isinf(limits.machine))
+    throw Error("--plan: no model states axes, expected --most-feed-mm-per-min or the section axes");
+  return limits;
+}
+
+/// @throws Error when the planned program would replace the program
+void refuseToReplace(const Arguments& arguments) {
+  std::error_code absent;
+  if (std::filesystem::equivalent(arguments.program, arguments.plan, absent))
+    throw Error("--plan " + arguments.plan + ": is the program itself, expected another file");
+}
 
 StockBlock blockOf(const Arguments& arguments) {
   StockBlock block;
@@ -114,10 +150,36 @@ void noteCornerRadii(const ToolModels& models) {
                      model.file.c_str());
 }
 
+/// Plans the feeds, after the analysis of the program. @return exit code
+int writePlan(const Arguments& arguments, const std::string& text, FeedPlanner& planner,
+              const std::vector<Move>& moves, const AnalysisResult& before, const AnalysisOptions& options) {
+  ProgressLine progress;
+  const Stock stock(blockOf(arguments), arguments.resolution_mm * MM);
+  const FeedPlan plan =
+      planner.plan(moves, before, stock, options, [&](double share) { return progress(share); });
+  progress.close();
+  if (plan.interrupted) {
+    std::fprintf(stderr, "interrupted; %s has not been written\n", arguments.plan.c_str());
+    return INTERRUPTED;
+  }
+  writeText(arguments.plan, plan.text);
+  writeText(arguments.out + "/plan.diff", planDiff(text, plan.text, arguments.program, arguments.plan));
+  planTable(plan).save(arguments.out + "/plan.csv");
+  std::cout << planSummary(plan, planner.limits());
+  return 0;
+}
+
 int run(const Arguments& arguments) {
   const Colour colour = colourOf(arguments.colour);
   ToolModels models(arguments.models);
-  const std::vector<Move> moves = readProgram(arguments.program, readerOptions(arguments));
+  const ReaderOptions reader = readerOptions(arguments);
+  const std::string text = readText(arguments.program);
+  std::optional<FeedPlanner> planner;
+  if (!arguments.plan.empty()) {
+    refuseToReplace(arguments);
+    planner.emplace(arguments.program, text, reader, models, limitsOf(arguments, models));
+  }
+  const std::vector<Move> moves = interpretProgram(text, arguments.program, reader);
   Stock stock(blockOf(arguments), arguments.resolution_mm * MM);
   std::error_code failed;
   std::filesystem::create_directories(arguments.out, failed);
@@ -137,6 +199,7 @@ int run(const Arguments& arguments) {
       [&](const Step& step, const StepPrediction& prediction) {
         steps.add(step, prediction, models.radius(step.move->tool));
         picture.add(step, prediction);
+        if (planner) planner->add(step);
       },
       [&](double share) { return progress(share); });
   progress.close();
@@ -157,7 +220,7 @@ int run(const Arguments& arguments) {
     return INTERRUPTED;
   }
   refuseRapidHits(arguments.program, result.blocks);
-  return 0;
+  return planner ? writePlan(arguments, text, *planner, moves, result, options) : 0;
 }
 
 }  // namespace
@@ -174,10 +237,15 @@ Command programCommand() {
                        "stock with a corner at X0 Y0 and its top at Z0"},
                       {"part.nc --stock-mm 100 60 20 --corner-mm -50 -30 0 --model 1=rougher.yaml "
                        "2=drill.yaml -o part --colour margin",
-                       "another corner, two tools, path coloured by the stability margin"}};
+                       "another corner, two tools, path coloured by the stability margin"},
+                      {"part.nc --stock-mm 100 60 20 --model mill.yaml -o part --plan planned.nc "
+                       "--most-force-n 400 --most-chip-mm 0.1",
+                       "feeds that hold 400 N and 0.1 mm, as a new program"}};
   command.files = {{"OUT/blocks.csv", "a row for each executed block"},
                    {"OUT/steps.csv", "a row for each step of a feed motion"},
-                   {"OUT/report.html", "the tool path from above and the table of the blocks"}};
+                   {"OUT/report.html", "the tool path from above and the table of the blocks"},
+                   {"OUT/plan.diff", "with --plan: difference of the two programs"},
+                   {"OUT/plan.csv", "with --plan: a row for each executed block with a feed motion"}};
   command.exits = {{INTERRUPTED, "interrupted by Ctrl-C; the files contain the blocks until then"}};
   command.setBody(run, [](CommandLine& line, Arguments& arguments) {
     line.option("PROGRAM", arguments.program, "NC program").required();
@@ -205,6 +273,21 @@ Command programCommand() {
         .oneOf(colourNames())
         .showDefault();
     line.flag("!--no-stability", arguments.stability, "leaves out the stability limits");
+    const auto plan =
+        line.option("--plan", arguments.plan,
+                    "writes the program with feeds that hold the following limits to this file");
+    const auto limit = [&](const char* name, double& value, const char* help) {
+      line.option(name, value, help).positive().needs(plan);
+    };
+    limit("--most-force-n", arguments.most_force_n, "peak force across the tool axis [N]");
+    limit("--most-torque-nm", arguments.most_torque_nm, "peak torque of the spindle [N m]");
+    limit("--most-power-w", arguments.most_power_w, "mean cutting power [W]");
+    limit("--most-chip-mm", arguments.most_chip_mm, "largest chip thickness [mm]");
+    limit("--least-chip-mm", arguments.least_chip_mm,
+          "largest chip thickness below which a block is reported [mm]");
+    limit("--most-feed-per-tooth-mm", arguments.most_feed_per_tooth_mm, "feed per tooth along the path [mm]");
+    limit("--most-feed-mm-per-min", arguments.most_feed_mm_per_min,
+          "feed of the machine [mm/min] (default: rapid feed of the model)");
   });
   return command;
 }

@@ -61,6 +61,7 @@ void Interpreter::setModes(Block& block) {
   if (const Word* word = block.take('F')) {
     if (!(*word->value > 0.0)) refuse(*word, word->text() + ", expected a feed above 0");
     feed_ = length(*word->value);
+    feed_word_ = {*word->value, 0.0, per_revolution_, line_, number_};
   }
   if (const Word* word = block.take('S')) {
     if (*word->value < 0.0) refuse(*word, word->text() + ", expected a speed of 0 or more");
@@ -214,6 +215,10 @@ void Interpreter::add(const PathSegment& path, bool rapid, double feed, double d
   move.path = path;
   move.rapid = rapid;
   move.feed = feed;
+  if (feed > 0.0) {
+    move.feed_word = feed_word_;
+    move.feed_word.unit = feed / feed_word_.value;
+  }
   move.dwell = dwell;
   move.spindle_speed = turns_ == 0 ? 0.0 : speed_;
   move.left_hand = turns_ == 4;

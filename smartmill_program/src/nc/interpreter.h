@@ -72,7 +72,8 @@ class Interpreter {
   std::optional<double> unit_;  // [m] of one in the program
   std::optional<int> work_;     // 0..5: G54..G59
   Point offset_{{0, 0, 0}};     // [m] of work_
-  std::optional<double> feed_;  // [unit/min] or [unit/rev]
+  std::optional<double> feed_;  // [m/min] or [m/rev]
+  FeedWord feed_word_;          // of feed_; without its unit
   double speed_ = 0.0;          // [rad/s]
   int turns_ = 0;               // 3 M3, 4 M4, 0 at rest
   int selected_tool_ = 0, tool_ = 0;
