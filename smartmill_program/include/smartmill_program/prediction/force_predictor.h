@@ -38,7 +38,7 @@ class ForcePredictor {
 
  private:
   std::vector<MechanisticForce> cutsOf(const Contact& contact, double feed_per_tooth) const;
-  std::vector<double> angles() const;
+  std::vector<double> angles(const Contact& contact) const;
   bool isLast(const Contact& contact, double feed_per_tooth) const;
 
   ToolGeometry tool_;
