@@ -42,7 +42,7 @@ void requestStop(int) {
 struct Arguments {
   std::string program, out, colour = "force";
   std::vector<double> stock_mm, corner_mm;
-  std::vector<std::string> models, work_offsets;
+  std::vector<std::string> models, work_offsets, radius_offsets;
   double resolution_mm = 0.1, step = SimulationOptions().step_share;
   bool stability = true;
   std::string plan;  // file; empty: no plan
@@ -88,7 +88,7 @@ StockBlock blockOf(const Arguments& arguments) {
   return block;
 }
 
-ReaderOptions readerOptions(const Arguments& arguments) {
+ReaderOptions readerOptions(const Arguments& arguments, ToolModels& models) {
   ReaderOptions options;
   for (const std::string& text : arguments.work_offsets) {
     int code = 0;
@@ -102,6 +102,17 @@ ReaderOptions readerOptions(const Arguments& arguments) {
     if (!options.work_offsets.emplace(code - 54, offset).second)
       throw Error("--work-offset " + text + ": stated a second time");
   }
+  for (const std::string& text : arguments.radius_offsets) {
+    int number = 0;
+    double radius = 0.0;
+    char rest = 0;
+    if (std::sscanf(text.c_str(), "D%d=%lf%c", &number, &radius, &rest) != 2 || number < 0 ||
+        !(radius >= 0.0) || std::isinf(radius))
+      throw Error("--radius-offset " + text + ": expected D1=RADIUS [mm] with a radius of 0 or more");
+    if (!options.radius_offsets.emplace(number, radius * MM).second)
+      throw Error("--radius-offset " + text + ": stated a second time");
+  }
+  options.tool_radius = [&models](int tool) { return models.radius(tool); };
   return options;
 }
 
@@ -172,7 +183,7 @@ int writePlan(const Arguments& arguments, const std::string& text, FeedPlanner& 
 int run(const Arguments& arguments) {
   const Colour colour = colourOf(arguments.colour);
   ToolModels models(arguments.models);
-  const ReaderOptions reader = readerOptions(arguments);
+  const ReaderOptions reader = readerOptions(arguments, models);
   const std::string text = readText(arguments.program);
   std::optional<FeedPlanner> planner;
   if (!arguments.plan.empty()) {
@@ -269,6 +280,9 @@ Command programCommand() {
     line.option("--work-offset", arguments.work_offsets,
                 "G54:X:Y:Z ... G59:X:Y:Z [mm] zero of a work offset in the coordinates of the stock")
         .count(1, 6);
+    line.option("--radius-offset", arguments.radius_offsets,
+                "D1=RADIUS [mm] radius offset of G41 and G42 (default: radius of the tool)")
+        .count(1, 999);
     line.option("--colour", arguments.colour, "quantity that colours the path")
         .oneOf(colourNames())
         .showDefault();

@@ -9,7 +9,7 @@ namespace {
 
 using nc::Word;
 
-constexpr nc::Dialect DIALECT{"O:NGXYZIJKRPQLHTFSM", std::string_view(" \t\n\v\f\r\0", 7), false, false};
+constexpr nc::Dialect DIALECT{"O:NGXYZIJKRPQLHDTFSM", std::string_view(" \t\n\v\f\r\0", 7), false, false};
 constexpr int MAX_CODE = 999;
 
 struct Code {
@@ -17,15 +17,15 @@ struct Code {
   Group group;
 };
 constexpr Code CODES[] = {
-    {0, Group::motion},    {1, Group::motion},    {2, Group::motion},  {3, Group::motion},
-    {80, Group::cycle},    {81, Group::cycle},    {82, Group::cycle},  {83, Group::cycle},
-    {17, Group::plane},    {18, Group::plane},    {19, Group::plane},  {20, Group::units},
-    {21, Group::units},    {40, Group::cutter},   {43, Group::length}, {49, Group::length},
-    {54, Group::work},     {55, Group::work},     {56, Group::work},   {57, Group::work},
-    {58, Group::work},     {59, Group::work},     {61, Group::path},   {64, Group::path},
-    {90, Group::distance}, {91, Group::distance}, {94, Group::feed},   {95, Group::feed},
-    {98, Group::retract},  {99, Group::retract},  {4, Group::none},    {28, Group::none},
-    {53, Group::none}};
+    {0, Group::motion},  {1, Group::motion},  {2, Group::motion},    {3, Group::motion},
+    {80, Group::cycle},  {81, Group::cycle},  {82, Group::cycle},    {83, Group::cycle},
+    {17, Group::plane},  {18, Group::plane},  {19, Group::plane},    {20, Group::units},
+    {21, Group::units},  {40, Group::cutter}, {41, Group::cutter},   {42, Group::cutter},
+    {43, Group::length}, {49, Group::length}, {54, Group::work},     {55, Group::work},
+    {56, Group::work},   {57, Group::work},   {58, Group::work},     {59, Group::work},
+    {61, Group::path},   {64, Group::path},   {90, Group::distance}, {91, Group::distance},
+    {94, Group::feed},   {95, Group::feed},   {98, Group::retract},  {99, Group::retract},
+    {4, Group::none},    {28, Group::none},   {53, Group::none}};
 constexpr int FUNCTIONS[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30, 98, 99};
 
 /// Without the comment of LinuxCNC that begins with ';' (on a Fanuc control ';' is the end of the block).

@@ -107,6 +107,24 @@ TEST_F(Command, ARapidMoveThatHitsTheStockIsAnErrorAfterTheFilesAreWritten) {
   EXPECT_TRUE(std::filesystem::exists(folder_.file("result/blocks.csv")));
 }
 
+// A wall at Y38 in a stock of 40 mm: 60 x 2 x 2 mm3 with the radius of the tool, 60 x 3 x 2 mm3 with 4 mm.
+TEST_F(Command, RadiusCompensation) {
+  const std::string text = "G21 G90 G0 X-20 Y60 Z-2\nS3000 M3\nG1 G41 D1 X-10 Y38 F600\nX70\nG40 Y60\nM30\n";
+  for (const auto& [options, volume] :
+       std::vector<std::pair<std::string, double>>{{"", 240.0}, {" --radius-offset D1=4", 360.0}}) {
+    EXPECT_EQ(run(text, "--no-stability --model mill.yaml" + options), 0) << read("err");
+    CsvReader blocks(folder_.file("result/blocks.csv"));
+    std::vector<std::string_view> cells;
+    double removed = 0.0;
+    blocks.nextFilled(&cells);
+    while (blocks.nextFilled(&cells)) removed += blocks.number(cells[11], "volume_mm3");
+    EXPECT_NEAR(removed, volume, 2e-3 * volume) << options;
+  }
+  EXPECT_EQ(run(text, "--model mill.yaml --radius-offset D1=-2"), 1);
+  EXPECT_EQ(read("err"),
+            "program: --radius-offset D1=-2: expected D1=RADIUS [mm] with a radius of 0 or more\n");
+}
+
 TEST_F(Command, PlanWritesProgramDifferenceAndTable) {
   folder_.write("axes.yaml",
                 std::string(MODEL) +
