@@ -9,7 +9,6 @@ namespace {
 
 using nc::Word;
 
-constexpr nc::Dialect DIALECT{"O:NGXYZIJKRPQLHDTFSM", std::string_view(" \t\n\v\f\r\0", 7), false, false};
 constexpr int MAX_CODE = 999;
 
 struct Code {
@@ -28,7 +27,14 @@ constexpr Code CODES[] = {
     {4, Group::none},    {28, Group::none},   {53, Group::none}};
 constexpr int FUNCTIONS[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30, 98, 99};
 
-/// Without the comment of LinuxCNC that begins with ';' (on a Fanuc control ';' is the end of the block).
+std::optional<Group> groupOf(int code) {
+  for (const Code& known : CODES)
+    if (known.code == code) return known.group;
+  return std::nullopt;
+}
+
+}  // namespace
+
 std::string withoutSemicolon(const std::string& line) {
   bool comment = false;
   for (std::size_t i = 0; i < line.size(); ++i) {
@@ -38,26 +44,19 @@ std::string withoutSemicolon(const std::string& line) {
   return line;
 }
 
-std::optional<Group> groupOf(int code) {
-  for (const Code& known : CODES)
-    if (known.code == code) return known.group;
-  return std::nullopt;
-}
-
-}  // namespace
-
 void refuse(const Word& word, const std::string& message) {
   throw Error("column " + std::to_string(word.column) + ": " + message);
 }
 
-Block::Block(const std::string& line) {
-  nc::BlockReader reader(withoutSemicolon(line), DIALECT);
-  if (reader.assigns()) throw Error("column 1: macro variables (#) are not supported");
-  while (const std::optional<Word> word = reader.next()) add(*word);
+Block::Block(const std::string& line, const nc::Variables& variables) {
+  nc::BlockReader reader(withoutSemicolon(line), MACRO_DIALECT, variables);
+  while (const std::optional<Word> word = reader.next()) {
+    empty_ = false;
+    if (word->value) add(*word);
+  }
 }
 
 void Block::add(const Word& word) {
-  empty_ = false;
   if (word.address == 'G') {
     const std::optional<Group> group = groupOf(nc::integer(word, MAX_CODE));
     if (!group) refuse(word, "unknown word " + word.text());
@@ -111,7 +110,7 @@ std::optional<int> programNumber(const std::string& line) {
   const std::size_t begin = line.find_first_not_of(" \t\r");
   if (begin == std::string::npos || std::string_view("Oo:").find(line[begin]) == std::string_view::npos)
     return std::nullopt;
-  nc::BlockReader reader(withoutSemicolon(line), DIALECT);
+  nc::BlockReader reader(withoutSemicolon(line), MACRO_DIALECT);
   return nc::integer(*reader.next());
 }
 

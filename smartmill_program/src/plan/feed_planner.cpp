@@ -101,7 +101,7 @@ std::string FeedPlanner::rewritten() const {
   FeedText text(text_);
   for (const auto& [line, feed] : lines_) {
     const bool has = text.hasFeed(line);
-    const bool same = has && feed.old_low == feed.value && feed.old_high == feed.value;
+    const bool same = has && !feed.stated && feed.old_low == feed.value && feed.old_high == feed.value;
     if ((!has && !feed.stated) || same) continue;
     try {
       text.setFeed(line, feed.number);

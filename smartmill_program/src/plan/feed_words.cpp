@@ -36,6 +36,7 @@ struct WordPlaces {
 WordPlaces placesIn(const std::string& line) {
   WordPlaces places;
   bool comment = false, in_feed = false, comment_in_feed = false, blank = false;
+  int depth = 0;  // of brackets
   for (std::size_t i = 0; i < line.size(); ++i) {
     const char c = line[i];
     if (c == '(' || c == ')') {
@@ -50,9 +51,11 @@ WordPlaces placesIn(const std::string& line) {
       continue;
     }
     places.blanks = places.blanks || blank;
-    const bool number = (c >= '0' && c <= '9') || c == '.' || c == '+' || c == '-';
+    const bool number =
+        depth > 0 || (c >= '0' && c <= '9') || std::string_view(".+-#[").find(c) != std::string_view::npos;
+    depth += (c == '[') - (c == ']');
     in_feed = in_feed && number;
-    if (c == 'F' || c == 'f') {
+    if (depth == 0 && (c == 'F' || c == 'f')) {
       in_feed = true;
       comment_in_feed = false;
       places.feed = i + 1;

@@ -231,6 +231,18 @@ TEST(FeedPlan, OtherModes) {
   EXPECT_THAT(ramp.plan.text, HasSubstr("Z-1 F100\nX10F960\n"));
 }
 
+// An F word of a macro becomes a number that holds for each of its values.
+TEST(FeedPlan, Macros) {
+  FeedLimits limits = generous();
+  limits.chip = 0.08 * MM;
+  const std::string text = START +
+                           "G65 P2 A70 F300\nG0 Z5\nX-10 Z-3\nG65 P2 A60 F900\nM30\nO2\n#3=FIX[#9/2]\nG1 "
+                           "X[#1+0] F[#3*2] (FIX)\nM99\n";
+  const Planned planned = planOf(text, limits);
+  EXPECT_THAT(planned.plan.text, HasSubstr("O2\n#3=FIX[#9/2]\nG1 X[#1+0] F960 (FIX)\nM99"));
+  EXPECT_EQ(planned.plan.changed, 1u);
+}
+
 TEST(FeedPlan, LeastChipIsReported) {
   FeedLimits limits = generous();
   limits.force = 180.0;
