@@ -2,12 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <random>
+#include <sstream>
 
 #include <gmock/gmock.h>
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
+#include "smartmill_core/io/text_file.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
 #include "smartmill_program/nc/program_reader.h"
@@ -193,6 +197,77 @@ TEST(CutterCompensation, ConvexPolygons) {
       }
     }
   }
+}
+
+/// A path of lines and arcs with corners of 5 to 100 degrees (LinuxCNC has no arc at flatter ones), whose
+/// start-up move is in line with the first motion: there LinuxCNC and a Fanuc control agree.
+std::string randomPath(std::mt19937_64& random) {
+  const auto uniform = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  double x = 0.0, y = 0.0, heading = uniform(-PI, PI);
+  std::string text = "G21 G90 G17 G40 G64\nT1 M6\nG0 X0 Y0 Z-1\nS3000 M3 F600\n";
+  const auto line = [&](double length) {
+    x += length * std::cos(heading);
+    y += length * std::sin(heading);
+    text += formatted("G1 X%.6f Y%.6f\n", x, y);
+  };
+  text += uniform(0.0, 1.0) < 0.5 ? "G41 D1\n" : "G42 D1\n";
+  line(20.0);
+  line(20.0);
+  for (int k = 0; k < 8; ++k) {
+    heading += (uniform(0.0, 1.0) < 0.5 ? -1.0 : 1.0) * uniform(5.0, 100.0) * PI / 180.0;
+    if (uniform(0.0, 1.0) < 0.5) {
+      line(uniform(20.0, 40.0));
+      continue;
+    }
+    const double side = uniform(0.0, 1.0) < 0.5 ? 1.0 : -1.0, radius = uniform(15.0, 30.0),
+                 sweep = side * uniform(1.0, 2.5);
+    const double cx = x - side * radius * std::sin(heading), cy = y + side * radius * std::cos(heading);
+    const double i = cx - x, j = cy - y, end = std::atan2(y - cy, x - cx) + sweep;
+    x = cx + radius * std::cos(end);
+    y = cy + radius * std::sin(end);
+    heading += sweep;
+    text += formatted("%s X%.6f Y%.6f I%.6f J%.6f\n", side > 0.0 ? "G3" : "G2", x, y, i, j);
+  }
+  line(20.0);
+  return text + "G40 G1 X0 Y0\nM30\n";
+}
+
+// LinuxCNC's interpreter (rs274) prints the path of the tool axis with four decimals. Where it refuses a
+// path, as one whose arc the corners shorten to nothing, there is nothing to compare.
+TEST(CutterCompensation, PathOfLinuxCnc) {
+  if (std::system("command -v rs274 >/dev/null 2>&1") != 0) GTEST_SKIP() << "rs274 is not installed";
+  const TemporaryFolder folder;
+  folder.write("tool.tbl", formatted("T1 P1 D%.12f\n", 6.0 / 25.4));  // in inches
+  std::mt19937_64 random(42);
+  int compared = 0;
+  for (int n = 0; n < 40; ++n) {
+    const std::string text = randomPath(random);
+    folder.write("part.ngc", text);
+    const std::string run =
+        "cd '" + folder.file(".") + "' && rs274 -t tool.tbl -g part.ngc >out 2>err </dev/null";
+    if (std::system(run.c_str()) != 0) continue;
+    std::istringstream in(readText(folder.file("out")));
+    std::vector<std::array<double, 2>> ends;
+    for (std::string line; std::getline(in, line);) {
+      std::array<double, 2> end{};
+      const std::size_t at = line.find("_FEED(");
+      if (at != std::string::npos && std::sscanf(line.c_str() + at, "_FEED(%lf, %lf", &end[0], &end[1]) == 2)
+        ends.push_back(end);
+    }
+    if (readText(folder.file("out")).find("PROGRAM_END") == std::string::npos) continue;
+    std::vector<std::array<double, 2>> own;
+    for (const Move& move : movesOf(text, 3.0))
+      if (!move.rapid) own.push_back({move.path.target()[0] / MM, move.path.target()[1] / MM});
+    ASSERT_EQ(own.size(), ends.size()) << text;
+    for (std::size_t k = 0; k < own.size(); ++k) {
+      EXPECT_NEAR(own[k][0], ends[k][0], 2e-4) << "end " << k << " of\n" << text;
+      EXPECT_NEAR(own[k][1], ends[k][1], 2e-4) << "end " << k << " of\n" << text;
+    }
+    ++compared;
+  }
+  EXPECT_GT(compared, 20);
 }
 
 TEST(CutterCompensation, NamesTheLineOfAFault) {
