@@ -11,7 +11,8 @@
 namespace smartmill::program {
 namespace {
 
-constexpr double ROUNDING = 1e-9;  // [1] of computed values
+constexpr double ROUNDING = 1e-9;   // [1] of computed values
+constexpr double SAME_FEED = 1e-6;  // [1] an F word has twelve digits at most
 constexpr double LEAST_GAIN =
     1e-3;  // [1] a feed changes by more, and is lowered by this when it does not hold
 
@@ -126,7 +127,7 @@ std::vector<Move> FeedPlanner::completed(std::string* text) {
       LineFeed& line = lines_.at(move.line);
       const bool inherits = last && move.feed_word.block <= last->block;
       const double in_force = inherits ? lines_.at(last->line).value : move.feed_word.value;
-      if (std::abs(in_force / line.value - 1.0) > ROUNDING) {
+      if (std::abs(in_force / line.value - 1.0) > SAME_FEED) {
         line.stated = true;
         added.insert(move.line);
         complete = false;

@@ -10,8 +10,8 @@
 namespace smartmill::program {
 namespace {
 
-constexpr int DIGITS = 4;  // of a planned feed: 0.1 %
-constexpr int MOST_DECIMALS = 8;
+constexpr int DIGITS = 4;        // of a planned feed: 0.1 %
+constexpr int MOST_DIGITS = 12;  // of a number (value_reader.cpp)
 
 std::string withoutTrailingZeros(std::string number) {
   if (number.find('.') == std::string::npos) return number;
@@ -91,7 +91,8 @@ std::string feedNumberUpTo(double value) {
 }
 
 std::string feedNumberOf(double value) {
-  return withoutTrailingZeros(formatted("%.*f", MOST_DECIMALS, value));
+  const int before = std::max(1, static_cast<int>(std::floor(std::log10(value))) + 1);  // the point
+  return withoutTrailingZeros(formatted("%.*f", std::max(0, MOST_DIGITS - before), value));
 }
 
 FeedText::FeedText(const std::string& text) : lines_(linesOf(text)) {

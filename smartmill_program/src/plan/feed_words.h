@@ -12,7 +12,7 @@ std::vector<std::string> linesOf(const std::string& text);
 /// A number of an F word that is at most `value` by less than 0.1 %: four significant digits, without
 /// exponent; "0" below 1e-8.
 std::string feedNumberUpTo(double value);
-/// A number that reads back as the value of an F word.
+/// The value of an F word as a number of at most twelve digits.
 std::string feedNumberOf(double value);
 
 /// Text of a program whose F words change; everything else stays byte for byte.

@@ -243,6 +243,13 @@ TEST(FeedPlan, Macros) {
   EXPECT_EQ(planned.plan.changed, 1u);
 }
 
+// A feed with more digits than a planned one, kept by a plunge that inherited it.
+TEST(FeedPlan, FeedsOfManyDigits) {
+  const Planned planned =
+      planOf("G21 G90 G95 G0 X-10 Y20 Z-2\nS3000 M3\nG1 X20 F.0333333333\nZ-2.5\nG0 Z5\nM30\n", generous());
+  EXPECT_THAT(planned.plan.text, HasSubstr("G1 X20 F4\nZ-2.5F0.0333333333\nG0 Z5"));
+}
+
 TEST(FeedPlan, LeastChipIsReported) {
   FeedLimits limits = generous();
   limits.force = 180.0;
