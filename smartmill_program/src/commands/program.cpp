@@ -239,7 +239,9 @@ int run(const Arguments& arguments) {
 namespace smartmill::program {
 
 Command programCommand() {
-  Command command("program", "predicts engagement, forces and stability of every block of an NC program");
+  Command command(
+      "program",
+      "predicts engagement, forces and stability of every block of an NC program, and plans its feeds");
   command.description =
       "Runs an NC program (Fanuc, LinuxCNC) through a block of stock: engagement of the end mill step by "
       "step, from "
