@@ -173,8 +173,13 @@ FeedPlan FeedPlanner::plan(const std::vector<Move>& moves, const AnalysisResult&
     }
     holds = failed.empty();
   }
-  if (plan.interrupted) return plan;
+  if (!plan.interrupted) describe(moves, planned, {before, after, chips}, options.simulation.rapid, plan);
+  return plan;
+}
 
+void FeedPlanner::describe(const std::vector<Move>& moves, const std::vector<Move>& planned,
+                           const Analyses& analyses, double rapid, FeedPlan& plan) const {
+  const auto& [before, after, chips] = analyses;
   plan.old_steady_time = before.time;
   plan.new_steady_time = after.time;
   plan.lines = lines_.size();
@@ -186,7 +191,7 @@ FeedPlan FeedPlanner::plan(const std::vector<Move>& moves, const AnalysisResult&
   for (std::size_t i = 0; i < moves.size(); ++i) {
     const Move &from = moves[i], &to = planned[i];
     const FeedBound bound = bounds_.of(from);  // the control slows down on arcs by itself
-    const double rapid = options.simulation.rapid, acceleration = limits_.acceleration;
+    const double acceleration = limits_.acceleration;
     const double old_time = timeOf(from, rapid, acceleration, bound),
                  new_time = timeOf(to, rapid, acceleration, bound);
     plan.old_time += old_time;
@@ -218,7 +223,6 @@ FeedPlan FeedPlanner::plan(const std::vector<Move>& moves, const AnalysisResult&
   }
   for (PlannedBlock& block : plan.blocks)
     if (block.reached < block.new_feed * (1.0 - ROUNDING)) block.limit = FeedLimit::acceleration;
-  return plan;
 }
 
 }  // namespace smartmill::program

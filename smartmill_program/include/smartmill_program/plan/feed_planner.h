@@ -73,6 +73,14 @@ class FeedPlanner {
   void choose(int line, LineFeed& feed) const;
   std::string rewritten() const;
   std::vector<Move> completed(std::string* text);
+  /// Of the program and its plan.
+  struct Analyses {
+    const AnalysisResult &before, &after;
+    const std::map<std::size_t, double>& chips;  // [m] of the plan, by executed block
+  };
+  /// Times and blocks of a plan. @param rapid [m/s]
+  void describe(const std::vector<Move>& moves, const std::vector<Move>& planned, const Analyses& analyses,
+                double rapid, FeedPlan& plan) const;
   [[noreturn]] void fail(int line, const std::string& message) const;
 
   std::string name_, text_;
