@@ -1,16 +1,22 @@
+#include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/text_file.h"
 #include "smartmill_core/units.h"
 #include "smartmill_program/commands.h"
 #include "smartmill_program/nc/program_reader.h"
+#include "smartmill_program/plan/feed_planner.h"
+#include "smartmill_program/plan/plan_report.h"
 #include "smartmill_program/program_analysis.h"
 #include "smartmill_program/report/program_page.h"
 #include "smartmill_program/report/tables.h"
@@ -36,10 +42,40 @@ void requestStop(int) {
 struct Arguments {
   std::string program, out, colour = "force";
   std::vector<double> stock_mm, corner_mm;
-  std::vector<std::string> models, work_offsets;
+  std::vector<std::string> models, work_offsets, radius_offsets;
   double resolution_mm = 0.1, step = SimulationOptions().step_share;
   bool stability = true;
+  std::string plan;  // file; empty: no plan
+  double most_force_n = FeedLimits::UNLIMITED, most_torque_nm = FeedLimits::UNLIMITED,
+         most_power_w = FeedLimits::UNLIMITED, most_chip_mm = FeedLimits::UNLIMITED, least_chip_mm = 0.0,
+         most_feed_per_tooth_mm = FeedLimits::UNLIMITED, most_feed_mm_per_min = FeedLimits::UNLIMITED;
 };
+
+/// @throws UsageError, Error
+FeedLimits limitsOf(const Arguments& arguments, const ToolModels& models) {
+  FeedLimits limits;
+  limits.force = arguments.most_force_n;
+  limits.torque = arguments.most_torque_nm;
+  limits.power = arguments.most_power_w;
+  limits.chip = arguments.most_chip_mm * MM;
+  limits.least_chip = arguments.least_chip_mm * MM;
+  limits.feed_per_tooth = arguments.most_feed_per_tooth_mm * MM;
+  limits.machine = arguments.most_feed_mm_per_min * MM / 60.0;
+  if (std::isinf(limits.chip) && std::isinf(limits.feed_per_tooth))
+    throw UsageError("--plan: expected --most-chip-mm or --most-feed-per-tooth-mm next to it");
+  if (models.rapid() > 0.0) limits.machine = std::min(limits.machine, models.rapid());
+  if (models.acceleration() > 0.0) limits.acceleration = models.acceleration();
+  if (std::isinf(limits.machine))
+    throw Error("--plan: no model states axes, expected --most-feed-mm-per-min or the section axes");
+  return limits;
+}
+
+/// @throws Error when the planned program would replace the program
+void refuseToReplace(const Arguments& arguments) {
+  std::error_code absent;
+  if (std::filesystem::equivalent(arguments.program, arguments.plan, absent))
+    throw Error("--plan " + arguments.plan + ": is the program itself, expected another file");
+}
 
 StockBlock blockOf(const Arguments& arguments) {
   StockBlock block;
@@ -52,7 +88,7 @@ StockBlock blockOf(const Arguments& arguments) {
   return block;
 }
 
-ReaderOptions readerOptions(const Arguments& arguments) {
+ReaderOptions readerOptions(const Arguments& arguments, ToolModels& models) {
   ReaderOptions options;
   for (const std::string& text : arguments.work_offsets) {
     int code = 0;
@@ -66,6 +102,17 @@ ReaderOptions readerOptions(const Arguments& arguments) {
     if (!options.work_offsets.emplace(code - 54, offset).second)
       throw Error("--work-offset " + text + ": stated a second time");
   }
+  for (const std::string& text : arguments.radius_offsets) {
+    int number = 0;
+    double radius = 0.0;
+    char rest = 0;
+    if (std::sscanf(text.c_str(), "D%d=%lf%c", &number, &radius, &rest) != 2 || number < 0 ||
+        !(radius >= 0.0) || std::isinf(radius))
+      throw Error("--radius-offset " + text + ": expected D1=RADIUS [mm] with a radius of 0 or more");
+    if (!options.radius_offsets.emplace(number, radius * MM).second)
+      throw Error("--radius-offset " + text + ": stated a second time");
+  }
+  options.tool_radius = [&models](int tool) { return models.radius(tool); };
   return options;
 }
 
@@ -114,10 +161,36 @@ void noteCornerRadii(const ToolModels& models) {
                      model.file.c_str());
 }
 
+/// Plans the feeds, after the analysis of the program. @return exit code
+int writePlan(const Arguments& arguments, const std::string& text, FeedPlanner& planner,
+              const std::vector<Move>& moves, const AnalysisResult& before, const AnalysisOptions& options) {
+  ProgressLine progress;
+  const Stock stock(blockOf(arguments), arguments.resolution_mm * MM);
+  const FeedPlan plan =
+      planner.plan(moves, before, stock, options, [&](double share) { return progress(share); });
+  progress.close();
+  if (plan.interrupted) {
+    std::fprintf(stderr, "interrupted; %s has not been written\n", arguments.plan.c_str());
+    return INTERRUPTED;
+  }
+  writeText(arguments.plan, plan.text);
+  writeText(arguments.out + "/plan.diff", planDiff(text, plan.text, arguments.program, arguments.plan));
+  planTable(plan).save(arguments.out + "/plan.csv");
+  std::cout << planSummary(plan, planner.limits());
+  return 0;
+}
+
 int run(const Arguments& arguments) {
   const Colour colour = colourOf(arguments.colour);
   ToolModels models(arguments.models);
-  const std::vector<Move> moves = readProgram(arguments.program, readerOptions(arguments));
+  const ReaderOptions reader = readerOptions(arguments, models);
+  const std::string text = readText(arguments.program);
+  std::optional<FeedPlanner> planner;
+  if (!arguments.plan.empty()) {
+    refuseToReplace(arguments);
+    planner.emplace(arguments.program, text, reader, models, limitsOf(arguments, models));
+  }
+  const std::vector<Move> moves = interpretProgram(text, arguments.program, reader);
   Stock stock(blockOf(arguments), arguments.resolution_mm * MM);
   std::error_code failed;
   std::filesystem::create_directories(arguments.out, failed);
@@ -137,6 +210,7 @@ int run(const Arguments& arguments) {
       [&](const Step& step, const StepPrediction& prediction) {
         steps.add(step, prediction, models.radius(step.move->tool));
         picture.add(step, prediction);
+        if (planner) planner->add(step);
       },
       [&](double share) { return progress(share); });
   progress.close();
@@ -157,7 +231,7 @@ int run(const Arguments& arguments) {
     return INTERRUPTED;
   }
   refuseRapidHits(arguments.program, result.blocks);
-  return 0;
+  return planner ? writePlan(arguments, text, *planner, moves, result, options) : 0;
 }
 
 }  // namespace
@@ -165,7 +239,9 @@ int run(const Arguments& arguments) {
 namespace smartmill::program {
 
 Command programCommand() {
-  Command command("program", "predicts engagement, forces and stability of every block of an NC program");
+  Command command(
+      "program",
+      "predicts engagement, forces and stability of every block of an NC program, and plans its feeds");
   command.description =
       "Runs an NC program (Fanuc, LinuxCNC) through a block of stock: engagement of the end mill step by "
       "step, from "
@@ -174,10 +250,15 @@ Command programCommand() {
                        "stock with a corner at X0 Y0 and its top at Z0"},
                       {"part.nc --stock-mm 100 60 20 --corner-mm -50 -30 0 --model 1=rougher.yaml "
                        "2=drill.yaml -o part --colour margin",
-                       "another corner, two tools, path coloured by the stability margin"}};
+                       "another corner, two tools, path coloured by the stability margin"},
+                      {"part.nc --stock-mm 100 60 20 --model mill.yaml -o part --plan planned.nc "
+                       "--most-force-n 400 --most-chip-mm 0.1",
+                       "feeds that hold 400 N and 0.1 mm, as a new program"}};
   command.files = {{"OUT/blocks.csv", "a row for each executed block"},
                    {"OUT/steps.csv", "a row for each step of a feed motion"},
-                   {"OUT/report.html", "the tool path from above and the table of the blocks"}};
+                   {"OUT/report.html", "the tool path from above and the table of the blocks"},
+                   {"OUT/plan.diff", "with --plan: difference of the two programs"},
+                   {"OUT/plan.csv", "with --plan: a row for each executed block with a feed motion"}};
   command.exits = {{INTERRUPTED, "interrupted by Ctrl-C; the files contain the blocks until then"}};
   command.setBody(run, [](CommandLine& line, Arguments& arguments) {
     line.option("PROGRAM", arguments.program, "NC program").required();
@@ -201,10 +282,28 @@ Command programCommand() {
     line.option("--work-offset", arguments.work_offsets,
                 "G54:X:Y:Z ... G59:X:Y:Z [mm] zero of a work offset in the coordinates of the stock")
         .count(1, 6);
+    line.option("--radius-offset", arguments.radius_offsets,
+                "D1=RADIUS [mm] radius offset of G41 and G42 (default: radius of the tool)")
+        .count(1, 999);
     line.option("--colour", arguments.colour, "quantity that colours the path")
         .oneOf(colourNames())
         .showDefault();
     line.flag("!--no-stability", arguments.stability, "leaves out the stability limits");
+    const auto plan =
+        line.option("--plan", arguments.plan,
+                    "writes the program with feeds that hold the following limits to this file");
+    const auto limit = [&](const char* name, double& value, const char* help) {
+      line.option(name, value, help).positive().needs(plan);
+    };
+    limit("--most-force-n", arguments.most_force_n, "peak force across the tool axis [N]");
+    limit("--most-torque-nm", arguments.most_torque_nm, "peak torque of the spindle [N m]");
+    limit("--most-power-w", arguments.most_power_w, "mean cutting power [W]");
+    limit("--most-chip-mm", arguments.most_chip_mm, "largest chip thickness [mm]");
+    limit("--least-chip-mm", arguments.least_chip_mm,
+          "largest chip thickness below which a block is reported [mm]");
+    limit("--most-feed-per-tooth-mm", arguments.most_feed_per_tooth_mm, "feed per tooth along the path [mm]");
+    limit("--most-feed-mm-per-min", arguments.most_feed_mm_per_min,
+          "feed of the machine [mm/min] (default: rapid feed of the model)");
   });
   return command;
 }

@@ -9,7 +9,6 @@ namespace {
 
 using nc::Word;
 
-constexpr nc::Dialect DIALECT{"O:NGXYZIJKRPQLHTFSM", std::string_view(" \t\n\v\f\r\0", 7), false, false};
 constexpr int MAX_CODE = 999;
 
 struct Code {
@@ -17,26 +16,16 @@ struct Code {
   Group group;
 };
 constexpr Code CODES[] = {
-    {0, Group::motion},    {1, Group::motion},    {2, Group::motion},  {3, Group::motion},
-    {80, Group::cycle},    {81, Group::cycle},    {82, Group::cycle},  {83, Group::cycle},
-    {17, Group::plane},    {18, Group::plane},    {19, Group::plane},  {20, Group::units},
-    {21, Group::units},    {40, Group::cutter},   {43, Group::length}, {49, Group::length},
-    {54, Group::work},     {55, Group::work},     {56, Group::work},   {57, Group::work},
-    {58, Group::work},     {59, Group::work},     {61, Group::path},   {64, Group::path},
-    {90, Group::distance}, {91, Group::distance}, {94, Group::feed},   {95, Group::feed},
-    {98, Group::retract},  {99, Group::retract},  {4, Group::none},    {28, Group::none},
-    {53, Group::none}};
+    {0, Group::motion},  {1, Group::motion},  {2, Group::motion},    {3, Group::motion},
+    {80, Group::cycle},  {81, Group::cycle},  {82, Group::cycle},    {83, Group::cycle},
+    {17, Group::plane},  {18, Group::plane},  {19, Group::plane},    {20, Group::units},
+    {21, Group::units},  {40, Group::cutter}, {41, Group::cutter},   {42, Group::cutter},
+    {43, Group::length}, {49, Group::length}, {54, Group::work},     {55, Group::work},
+    {56, Group::work},   {57, Group::work},   {58, Group::work},     {59, Group::work},
+    {61, Group::path},   {64, Group::path},   {90, Group::distance}, {91, Group::distance},
+    {94, Group::feed},   {95, Group::feed},   {98, Group::retract},  {99, Group::retract},
+    {4, Group::none},    {28, Group::none},   {53, Group::none}};
 constexpr int FUNCTIONS[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30, 98, 99};
-
-/// Without the comment of LinuxCNC that begins with ';' (on a Fanuc control ';' is the end of the block).
-std::string withoutSemicolon(const std::string& line) {
-  bool comment = false;
-  for (std::size_t i = 0; i < line.size(); ++i) {
-    if (line[i] == '(' || line[i] == ')') comment = line[i] == '(';
-    if (line[i] == ';' && !comment) return line.substr(0, i);
-  }
-  return line;
-}
 
 std::optional<Group> groupOf(int code) {
   for (const Code& known : CODES)
@@ -46,18 +35,28 @@ std::optional<Group> groupOf(int code) {
 
 }  // namespace
 
+std::string withoutSemicolon(const std::string& line) {
+  bool comment = false;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    if (line[i] == '(' || line[i] == ')') comment = line[i] == '(';
+    if (line[i] == ';' && !comment) return line.substr(0, i);
+  }
+  return line;
+}
+
 void refuse(const Word& word, const std::string& message) {
   throw Error("column " + std::to_string(word.column) + ": " + message);
 }
 
-Block::Block(const std::string& line) {
-  nc::BlockReader reader(withoutSemicolon(line), DIALECT);
-  if (reader.assigns()) throw Error("column 1: macro variables (#) are not supported");
-  while (const std::optional<Word> word = reader.next()) add(*word);
+Block::Block(const std::string& line, const nc::Variables& variables) {
+  nc::BlockReader reader(withoutSemicolon(line), MACRO_DIALECT, variables);
+  while (const std::optional<Word> word = reader.next()) {
+    empty_ = false;
+    if (word->value) add(*word);
+  }
 }
 
 void Block::add(const Word& word) {
-  empty_ = false;
   if (word.address == 'G') {
     const std::optional<Group> group = groupOf(nc::integer(word, MAX_CODE));
     if (!group) refuse(word, "unknown word " + word.text());
@@ -111,7 +110,7 @@ std::optional<int> programNumber(const std::string& line) {
   const std::size_t begin = line.find_first_not_of(" \t\r");
   if (begin == std::string::npos || std::string_view("Oo:").find(line[begin]) == std::string_view::npos)
     return std::nullopt;
-  nc::BlockReader reader(withoutSemicolon(line), DIALECT);
+  nc::BlockReader reader(withoutSemicolon(line), MACRO_DIALECT);
   return nc::integer(*reader.next());
 }
 

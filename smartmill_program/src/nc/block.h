@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "smartmill_core/nc/block_reader.h"
@@ -27,14 +28,22 @@ enum class Group {
   count
 };
 
+/// Words with expressions of macro B.
+inline constexpr nc::Dialect MACRO_DIALECT{"O:NGXYZIJKRPQLHDTFSM", std::string_view(" \t\n\v\f\r\0", 7),
+                                           false, true, true};
+
+/// Without the comment of LinuxCNC that begins with ';' (on a Fanuc control ';' is the end of the block).
+std::string withoutSemicolon(const std::string& line);
+
 /// @throws Error "column C: message"
 [[noreturn]] void refuse(const nc::Word& word, const std::string& message);
 
 /// The words of a block. A word that no code of the block uses is an error.
 class Block {
  public:
+  /// A word whose variable is vacant does not count.
   /// @throws Error on an unknown word, and on two words of one address or codes of one group.
-  explicit Block(const std::string& line);
+  explicit Block(const std::string& line, const nc::Variables& variables = {});
 
   bool empty() const { return empty_; }
   /// The code of a group, as its word.

@@ -20,6 +20,7 @@ constexpr double PECK_CLEARANCE =
     0.25 * MM;  // [m] above the previous depth of G83 (LinuxCNC 0.254 mm, Fanuc 5115)
 constexpr std::size_t MAX_MOVES = 5000000;  // 1.3 GB; a program that cuts for days
 constexpr int MAX_TOOL = 9999;
+constexpr int MAX_OFFSET = 999;  // D
 constexpr double MAX_PECKS = 9999;
 constexpr int MAX_HOLES = 9999;  // K or L
 
@@ -45,6 +46,15 @@ void Interpreter::execute(Block& block, std::size_t number, int line) {
     motion(block);
   }
   for (const int end : {2, 30}) ended_ = ended_ || block.function(end);
+  if (ended_) compensated([&] { compensation_.cancel(); });
+}
+
+void Interpreter::compensated(const std::function<void()>& action) const {
+  try {
+    action();
+  } catch (const Error& error) {
+    fail(error.what());
+  }
 }
 
 void Interpreter::fail(const std::string& message) const {
@@ -61,6 +71,7 @@ void Interpreter::setModes(Block& block) {
   if (const Word* word = block.take('F')) {
     if (!(*word->value > 0.0)) refuse(*word, word->text() + ", expected a feed above 0");
     feed_ = length(*word->value);
+    feed_word_ = {*word->value, 0.0, per_revolution_, line_, number_};
   }
   if (const Word* word = block.take('S')) {
     if (*word->value < 0.0) refuse(*word, word->text() + ", expected a speed of 0 or more");
@@ -73,6 +84,7 @@ void Interpreter::setModes(Block& block) {
     const int code = codeOf(*word);
     plane_ = code == 17 ? nc::Plane::xy : code == 18 ? nc::Plane::zx : nc::Plane::yz;
   }
+  setCompensation(block);
   if (const auto& word = block.code(Group::length); word && codeOf(*word) == 43) block.take('H');
   if (block.code(Group::path)) {
     block.take('P');
@@ -118,9 +130,39 @@ void Interpreter::setTool(Block& block) {
   if (const Word* word = block.take('T')) selected_tool_ = nc::integer(*word, MAX_TOOL);
   if (const Word* change = block.function(6)) {
     if (selected_tool_ == 0) refuse(*change, "M6 without a tool, expected T");
+    if (compensation_.active()) refuse(*change, "M6 under radius compensation, expected G40 before it");
     tool_ = selected_tool_;
     turns_ = 0;
   }
+}
+
+void Interpreter::setCompensation(Block& block) {
+  const Word* offset = block.take('D');
+  if (offset) radius_offset_ = nc::integer(*offset, MAX_OFFSET);
+  const auto& code = block.code(Group::cutter);
+  if (offset && !code && compensation_.active())
+    refuse(*offset, offset->text() + " under radius compensation, expected G40 before it");
+  if (!code) return;
+  if (codeOf(*code) == 40) {
+    compensated([&] { compensation_.cancel(); });
+    return;
+  }
+  if (compensation_.active())
+    refuse(*code, code->text() + " under radius compensation, expected G40 before it");
+  if (plane_ != nc::Plane::xy) refuse(*code, code->text() + " in G18 or G19, expected G17");
+  if (!radius_offset_) refuse(*code, code->text() + " without D, expected the number of a radius offset");
+  double radius = 0.0;
+  const auto stated = options_.radius_offsets.find(*radius_offset_);
+  if (stated != options_.radius_offsets.end()) {
+    radius = stated->second;
+  } else if (*radius_offset_ != 0) {
+    if (!options_.tool_radius)
+      refuse(*code, code->text() + ": radius offset D" + std::to_string(*radius_offset_) +
+                        " is unknown, expected it in the options or the model of the tool");
+    radius = options_.tool_radius(tool_);
+  }
+  using Side = CutterCompensation::Side;
+  compensated([&] { compensation_.start(codeOf(*code) == 41 ? Side::left : Side::right, radius); });
 }
 
 double Interpreter::length(double value) {
@@ -165,6 +207,7 @@ void Interpreter::reference(Block& block, const Word& code, bool by_way) {
   }
   for (std::size_t i = 0; i < 3; ++i)
     if (moved[i]) position_[i].reset();
+  if (moved[0] || moved[1]) compensated([&] { compensation_.forget(); });
 }
 
 Interpreter::Position Interpreter::target(Block& block, bool with_z) {
@@ -214,11 +257,15 @@ void Interpreter::add(const PathSegment& path, bool rapid, double feed, double d
   move.path = path;
   move.rapid = rapid;
   move.feed = feed;
+  if (feed > 0.0) {
+    move.feed_word = feed_word_;
+    move.feed_word.unit = feed / feed_word_.value;
+  }
   move.dwell = dwell;
   move.spindle_speed = turns_ == 0 ? 0.0 : speed_;
   move.left_hand = turns_ == 4;
   move.tool = tool_;
-  moves_.push_back(move);
+  compensated([&] { compensation_.add(move); });
 }
 
 void Interpreter::rapidTo(const Point& point) {
@@ -245,7 +292,7 @@ void Interpreter::motion(Block& block) {
   } else {
     bool whole = true;
     for (std::size_t i = 0; i < 3; ++i) whole = whole && position_[i] && to[i];
-    if (whole) rapidTo(known(to, operation_));
+    if (whole || compensation_.active()) rapidTo(known(to, operation_));
   }
   position_ = to;
 }
@@ -256,25 +303,29 @@ void Interpreter::arc(Block& block, const Position& to) {
   const bool clockwise = motion_ == 2;
   const Word* radius = block.take('R');
   const auto [a, b, c] = nc::axesOf(plane_);
+  PathSegment path(start);
   try {
     if (radius) {
-      add(arcByRadius(start, end, length(*radius->value), clockwise, plane_), false, speed);
-      return;
+      path = arcByRadius(start, end, length(*radius->value), clockwise, plane_);
+    } else {
+      const Word* first = block.take(static_cast<char>('I' + a));
+      const Word* second = block.take(static_cast<char>('I' + b));
+      if (!first && !second)
+        throw Error(operation_ + " without a centre, expected R or I, J, K of its plane");
+      CentreOffset offset;
+      if (first) offset.first = length(*first->value);
+      if (second) offset.second = length(*second->value);
+      path = arcByCentre(start, end, offset, clockwise, plane_);
     }
-    const Word* first = block.take(static_cast<char>('I' + a));
-    const Word* second = block.take(static_cast<char>('I' + b));
-    if (!first && !second) throw Error(operation_ + " without a centre, expected R or I, J, K of its plane");
-    CentreOffset offset;
-    if (first) offset.first = length(*first->value);
-    if (second) offset.second = length(*second->value);
-    add(arcByCentre(start, end, offset, clockwise, plane_), false, speed);
   } catch (const Error& error) {
     fail(error.what());
   }
+  add(path, false, speed);
 }
 
 void Interpreter::cycle(Block& block) {
   if (plane_ != nc::Plane::xy) fail(operation_ + " in G18 or G19, expected G17");
+  if (compensation_.active()) fail(operation_ + " under radius compensation, expected G40 before it");
   const Word* retract = block.take('R');
   const Word* bottom = block.take('Z');
   const Word* peck = block.take('Q');

@@ -1,11 +1,13 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "block.h"
+#include "cutter_compensation.h"
 #include "smartmill_program/nc/program_reader.h"
 
 namespace smartmill::program {
@@ -15,7 +17,8 @@ namespace smartmill::program {
 /// spindle, dwell, plane, units, offsets, distance mode, motion.
 class Interpreter {
  public:
-  Interpreter(const ReaderOptions& options, std::vector<Move>& moves) : options_(options), moves_(moves) {}
+  Interpreter(const ReaderOptions& options, std::vector<Move>& moves)
+      : options_(options), moves_(moves), compensation_(moves) {}
 
   /// Executes a block, except M98 and M99. @param number of executed blocks before it
   /// @throws Error "column C: ..."
@@ -34,10 +37,12 @@ class Interpreter {
   };
 
   [[noreturn]] void fail(const std::string& message) const;  // at the word of the motion
+  void compensated(const std::function<void()>& action) const;
   void setModes(Block& block);
   void setUnits(const nc::Word& word);
   void setWorkOffset(const nc::Word& word);
   void setTool(Block& block);
+  void setCompensation(Block& block);
   void dwell(Block& block, const nc::Word& code);
   void reference(Block& block, const nc::Word& code, bool by_way);
   void motion(Block& block);
@@ -72,10 +77,13 @@ class Interpreter {
   std::optional<double> unit_;  // [m] of one in the program
   std::optional<int> work_;     // 0..5: G54..G59
   Point offset_{{0, 0, 0}};     // [m] of work_
-  std::optional<double> feed_;  // [unit/min] or [unit/rev]
+  std::optional<double> feed_;  // [m/min] or [m/rev]
+  FeedWord feed_word_;          // of feed_; without its unit
   double speed_ = 0.0;          // [rad/s]
   int turns_ = 0;               // 3 M3, 4 M4, 0 at rest
   int selected_tool_ = 0, tool_ = 0;
+  CutterCompensation compensation_;
+  std::optional<int> radius_offset_;  // D
   Cycle cycle_;
   bool in_cycle_ = false;
   bool ended_ = false;

@@ -54,8 +54,10 @@ StockBlock blockOf(const NodeParameters& parameters, const ToolModels& models) {
 PathFollower followerOf(const NodeParameters& parameters) {
   if (parameters.program.empty()) throw Error("program: expected the path of an NC program");
   if (parameters.models.empty()) throw Error("models: expected the path of a smartmill-model/1 file");
-  std::vector<Move> moves = readProgram(parameters.program);
   ToolModels models(wordsOf(parameters.models));
+  ReaderOptions reader;
+  reader.tool_radius = [&models](int tool) { return models.radius(tool); };
+  std::vector<Move> moves = readProgram(parameters.program, reader);
   for (const Move& move : moves) models.of(move.tool);
   Stock stock(blockOf(parameters, models), parameters.resolution);
   SimulationOptions simulation;

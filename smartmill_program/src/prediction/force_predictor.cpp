@@ -9,9 +9,11 @@
 namespace smartmill::program {
 namespace {
 
-constexpr double ANGLE_STEP = 1.5;    // [deg] of the spindle: a smooth peak within 0.01 %
-constexpr double SAME_ANGLE = 2e-4;   // [rad] resolution of a contact
-constexpr double SAME_LENGTH = 1e-7;  // [m] a tenth of the last digit of a program
+constexpr double ANGLE_STEP = 1.5;       // [deg] of the spindle: a smooth peak within 0.01 %
+constexpr double SAME_ANGLE = 2e-4;      // [rad] resolution of a contact
+constexpr double SAME_LENGTH = 1e-7;     // [m] a tenth of the last digit of a program
+constexpr double INSIDE = 1e-9;          // [rad] of an arc, despite rounding
+constexpr double REFERENCE_FEED = 1e-4;  // [m] any: the force is affine in the feed per tooth
 
 }  // namespace
 
@@ -28,26 +30,62 @@ bool ForcePredictor::isLast(const Contact& contact, double feed_per_tooth) const
   return true;
 }
 
+std::vector<MechanisticForce> ForcePredictor::cutsOf(const Contact& contact, double feed_per_tooth) const {
+  std::vector<MechanisticForce> cuts;
+  for (const ContactArc& arc : contact.arcs)
+    cuts.emplace_back(tool_, coefficients_, Engagement{arc.entry, arc.exit, arc.depth, feed_per_tooth});
+  return cuts;
+}
+
+// With even pitch the force repeats with every tooth. It is smooth in between, and has its kinks and jumps
+// where the ends of an edge enter and leave an arc.
+std::vector<double> ForcePredictor::angles(const Contact& contact) const {
+  const double range = tool_.pitch.empty() ? units::TWO_PI / tool_.teeth : units::TWO_PI;
+  const int count = static_cast<int>(std::ceil(units::degFromRad(range) / ANGLE_STEP));
+  std::vector<double> angles;
+  for (int k = 0; k < count; ++k) angles.push_back(range * (k + 0.5) / count);
+  for (const ContactArc& arc : contact.arcs) {
+    const double lag = tool_.lag() * arc.depth;
+    for (int tooth = 0; tooth < (tool_.pitch.empty() ? 1 : tool_.teeth); ++tooth)
+      for (const double tip : {arc.entry + INSIDE, arc.exit - INSIDE, arc.entry + lag, arc.exit + lag})
+        angles.push_back(std::fmod(tip - tool_.toothAngle(tooth) + units::TWO_PI, range));
+  }
+  return angles;
+}
+
 const ForcePrediction& ForcePredictor::predict(const Contact& contact, double feed_per_tooth) {
   if (isLast(contact, feed_per_tooth)) return prediction_;
   contact_ = contact;
   feed_per_tooth_ = feed_per_tooth;
   prediction_ = {};
-  std::vector<MechanisticForce> cuts;
-  for (const ContactArc& arc : contact.arcs) {
-    cuts.emplace_back(tool_, coefficients_, Engagement{arc.entry, arc.exit, arc.depth, feed_per_tooth});
-    prediction_.mean.add(cuts.back().mean());
-  }
-  // With even pitch the force repeats with every tooth.
-  const double range = tool_.pitch.empty() ? units::TWO_PI / tool_.teeth : units::TWO_PI;
-  const int count = static_cast<int>(std::ceil(units::degFromRad(range) / ANGLE_STEP));
-  for (int k = 0; k < count; ++k) {
+  const std::vector<MechanisticForce> cuts = cutsOf(contact, feed_per_tooth);
+  for (const MechanisticForce& cut : cuts) prediction_.mean.add(cut.mean());
+  for (const double angle : angles(contact)) {
     CuttingForce sum;
-    for (const MechanisticForce& cut : cuts) sum.add(cut.at(range * (k + 0.5) / count));
+    for (const MechanisticForce& cut : cuts) sum.add(cut.at(angle));
     prediction_.peak_force = std::max(prediction_.peak_force, std::hypot(sum.fx, sum.fy));
     prediction_.peak_torque = std::max(prediction_.peak_torque, sum.torque);
   }
   return prediction_;
+}
+
+std::vector<ForceOverFeed> ForcePredictor::overFeed(const Contact& contact, ForceOverFeed* mean) const {
+  const std::vector<MechanisticForce> once = cutsOf(contact, REFERENCE_FEED),
+                                      twice = cutsOf(contact, 2.0 * REFERENCE_FEED);
+  const auto add = [](const CuttingForce& one, const CuttingForce& two, ForceOverFeed& sum) {
+    sum.edges.add(one, 2.0);
+    sum.edges.add(two, -1.0);
+    sum.chip.add(two, 1.0 / REFERENCE_FEED);
+    sum.chip.add(one, -1.0 / REFERENCE_FEED);
+  };
+  std::vector<ForceOverFeed> forces;
+  for (const double angle : angles(contact)) {
+    forces.emplace_back();
+    for (std::size_t i = 0; i < once.size(); ++i) add(once[i].at(angle), twice[i].at(angle), forces.back());
+  }
+  *mean = {};
+  for (std::size_t i = 0; i < once.size(); ++i) add(once[i].mean(), twice[i].mean(), *mean);
+  return forces;
 }
 
 }  // namespace smartmill::program

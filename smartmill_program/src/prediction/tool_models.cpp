@@ -39,11 +39,19 @@ ToolModels::ToolModels(const std::vector<std::string>& files) {
   }
 }
 
-double ToolModels::rapid() const {
-  if (only_ && only_->axes) return only_->axes->rapid;
+const MachineAxes* ToolModels::axes() const {
+  if (only_ && only_->axes) return &*only_->axes;
   for (const auto& [number, model] : models_)
-    if (model.axes) return model.axes->rapid;
-  return 0.0;
+    if (model.axes) return &*model.axes;
+  return nullptr;
+}
+
+double ToolModels::rapid() const {
+  return axes() ? axes()->rapid : 0.0;
+}
+
+double ToolModels::acceleration() const {
+  return axes() ? axes()->acceleration : 0.0;
 }
 
 const MachineModel& ToolModels::of(int tool) {

@@ -107,6 +107,70 @@ TEST_F(Command, ARapidMoveThatHitsTheStockIsAnErrorAfterTheFilesAreWritten) {
   EXPECT_TRUE(std::filesystem::exists(folder_.file("result/blocks.csv")));
 }
 
+// A wall at Y38 in a stock of 40 mm: 60 x 2 x 2 mm3 with the radius of the tool, 60 x 3 x 2 mm3 with 4 mm.
+TEST_F(Command, RadiusCompensation) {
+  const std::string text = "G21 G90 G0 X-20 Y60 Z-2\nS3000 M3\nG1 G41 D1 X-10 Y38 F600\nX70\nG40 Y60\nM30\n";
+  for (const auto& [options, volume] :
+       std::vector<std::pair<std::string, double>>{{"", 240.0}, {" --radius-offset D1=4", 360.0}}) {
+    EXPECT_EQ(run(text, "--no-stability --model mill.yaml" + options), 0) << read("err");
+    CsvReader blocks(folder_.file("result/blocks.csv"));
+    std::vector<std::string_view> cells;
+    double removed = 0.0;
+    blocks.nextFilled(&cells);
+    while (blocks.nextFilled(&cells)) removed += blocks.number(cells[11], "volume_mm3");
+    EXPECT_NEAR(removed, volume, 2e-3 * volume) << options;
+  }
+  EXPECT_EQ(run(text, "--model mill.yaml --radius-offset D1=-2"), 1);
+  EXPECT_EQ(read("err"),
+            "program: --radius-offset D1=-2: expected D1=RADIUS [mm] with a radius of 0 or more\n");
+}
+
+TEST_F(Command, PlanWritesProgramDifferenceAndTable) {
+  folder_.write("axes.yaml",
+                std::string(MODEL) +
+                    "axes: {x_travel_mm: [-250, 250], y_travel_mm: [-200, 200], z_travel_mm: [-300, 0], "
+                    "rapid_mm_per_min: 24000, acceleration_mm_per_s2: 5000, home_mm: [0, 0, 0]}\n");
+  std::string text = "O1\nT1 M6\nG21 G90 G0 X-10 Y10 Z5\nS6000 M3\nZ-2\nG1 X70 F1200\n";
+  for (int k = 0; k < 9; ++k) text += formatted("G0 Z%d\n", 6 + k);
+  text += "G0 X-10 Y15\nZ-2\nG1 X70 (second)\nG1 Y16\nG0 Z5\nM30";
+  EXPECT_EQ(run(text, "--model axes.yaml --plan new.nc --most-force-n 300 --most-chip-mm 0.1"), 0)
+      << read("err");
+  EXPECT_THAT(read("out"), AllOf(HasSubstr("plan: the feed of 3 of 3 lines"), HasSubstr("limit that binds: "),
+                                 HasSubstr("with a stop after each motion")));
+  EXPECT_EQ(read("part.nc"), text);
+  EXPECT_NE(read("new.nc"), text);
+  EXPECT_EQ(shell("diff -u --label part.nc --label new.nc part.nc new.nc > expected.diff"), 1);
+  EXPECT_EQ(read("result/plan.diff"), read("expected.diff"));
+  CsvReader blocks(folder_.file("result/plan.csv"));
+  std::vector<std::string_view> cells;
+  while (blocks.nextFilled(&cells)) EXPECT_EQ(cells.size(), 16u);
+  EXPECT_EQ(blocks.line(), 4);
+}
+
+TEST_F(Command, PlanRefusesWhatItCannotDo) {
+  const std::string text = "G21 G90 G0 X-10 Y20 Z-2\nS3000 M3\nG1 X70 F600\nG0 Z5\nM30\n";
+  const std::string model = "--model mill.yaml ", chip = "--most-chip-mm 0.1 --most-feed-mm-per-min 9000 ";
+  for (const auto& [options, fault] : std::vector<std::pair<std::string, std::string>>{
+           {"--plan part.nc " + chip, "--plan part.nc: is the program itself, expected another file"},
+           {"--plan ./result/../part.nc " + chip,
+            "--plan ./result/../part.nc: is the program itself, expected another file"},
+           {"--plan new.nc --most-chip-mm 0.1",
+            "--plan: no model states axes, expected --most-feed-mm-per-min or the section axes"}}) {
+    shell("mkdir -p result");
+    EXPECT_EQ(run(text, model + options), 1) << options;
+    EXPECT_EQ(read("err"), "program: " + fault + "\n");
+  }
+  EXPECT_EQ(run(text, model + "--plan new.nc --most-feed-mm-per-min 9000"), 2);
+  EXPECT_THAT(read("err"), HasSubstr("expected --most-chip-mm or --most-feed-per-tooth-mm"));
+  for (const std::string value : {"0", "-3", "nan"})
+    EXPECT_EQ(run(text, model + "--plan new.nc " + chip + "--most-force-n " + value), 2) << value;
+  EXPECT_EQ(run(text, model + chip), 2);  // limits without --plan
+  EXPECT_EQ(run(text, model + "--plan new.nc " + chip + "--most-force-n 20"), 1);
+  EXPECT_THAT(read("err"), HasSubstr("program: part.nc: line 3: G1: the force of the edges alone is "));
+  EXPECT_FALSE(std::filesystem::exists(folder_.file("new.nc")));
+  EXPECT_EQ(read("part.nc"), text);
+}
+
 // The interrupt is sent once the first line of progress is there.
 TEST_F(Command, CtrlCKeepsTheBlocksUntilThen) {
   std::string text = "O1\nG21 G90 G0 X-10 Y20 Z-2\nS3000 M3\nF600\nM98 P2 L9999\nM30\nO2\n";

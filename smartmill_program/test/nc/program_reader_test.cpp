@@ -164,13 +164,17 @@ TEST(ProgramReader, NamesLineAndWordOfAFault) {
            {"O1\n" + START + "O2\nM99\n",
             "part.nc: line 3: the program ends in the middle, expected M30 or M2"},
            {"O1\nM98 P2\nM30\nO2\nG90\n", "part.nc: line 5: the subprogram ends in the middle, expected M99"},
-           {START + "G41 D1 X5\nM30\n", "part.nc: line 3, column 1: unknown word G41"},
+           {START + "G41 D1 X5\nM30\n",
+            "part.nc: line 3, column 1: G41: radius offset D1 is unknown, expected it in the options or the "
+            "model "
+            "of the tool"},
            {START + "G0 X5 A90\nM30\n",
             "part.nc: line 3, column 7: unknown word A90, expected O, :, N, G, X, Y, Z, I, J, K, R, P, Q, L, "
-            "H, T, F, S or M"},
+            "H, D, T, F, S or M"},
            {START + "M88\nM30\n", "part.nc: line 3, column 1: unknown word M88"},
            {START + "G1 X1..2 F100\nM30\n", "part.nc: line 3, column 4: X1..2, expected a number"},
-           {START + "#100=5\nM30\n", "part.nc: line 3, column 1: macro variables (#) are not supported"},
+           {START + "G1 X#5041\nM30\n",
+            "part.nc: line 3, #5041 is not supported, expected #1 to #33, #100 to #199 or #500 to #999"},
            {START + "G1 X10\nM30\n",
             "part.nc: line 3, column 1: G1 without a feed, expected F in or before this block"},
            {START + "G95 G1 X10\nM30\n",

@@ -1,10 +1,20 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 
 #include "smartmill_core/nc/path_segment.h"
 
 namespace smartmill::program {
+
+/// The F word in force.
+struct FeedWord {
+  double value = 0.0;           ///< as written, in units of the program
+  double unit = 0.0;            ///< [m/s] of one
+  bool per_revolution = false;  ///< G95
+  int line = 0;                 ///< that states it, from 1
+  std::size_t block = 0;        ///< executed block that states it
+};
 
 /// A motion of the tool tip, or a dwell, with the modal state in which it is executed. Coordinates are those
 /// of the workpiece, z along the tool axis.
@@ -16,6 +26,7 @@ struct Move {
   nc::PathSegment path{nc::PathSegment::Point{{0, 0, 0}}};
   bool rapid = false;
   double feed = 0.0;           ///< [m/s] along the path; unused where rapid
+  FeedWord feed_word;          ///< of a feed motion
   double dwell = 0.0;          ///< [s] after the motion
   double spindle_speed = 0.0;  ///< [rad/s] >= 0
   bool left_hand = false;      ///< M4: the teeth move counterclockwise

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -13,6 +14,9 @@ struct ReaderOptions {
   /// [m] G54..G59 (0..5): position of its zero in the coordinates of the stock. The first work offset of a
   /// program that is not listed is that of the stock; any other has to be listed.
   std::map<int, std::array<double, 3>> work_offsets;
+  /// [m] >= 0, D of G41 and G42; D0 is 0, any other that is not listed is the radius of the tool.
+  std::map<int, double> radius_offsets;
+  std::function<double(int tool)> tool_radius;  ///< [m] by the tool number. May throw; empty: unknown
 };
 
 /// The moves of a program in the order of execution. Dialect: Fanuc 30i with decimal point input (parameter

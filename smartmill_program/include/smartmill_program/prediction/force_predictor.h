@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_program/engagement/contact.h"
 
@@ -10,6 +12,13 @@ struct ForcePrediction {
   CuttingForce mean;         ///< over a revolution
   double peak_force = 0.0;   ///< [N] largest force across the tool axis over a revolution
   double peak_torque = 0.0;  ///< [N m] largest
+};
+
+/// The force over the feed per tooth c > 0 at one spindle angle: edges + c chip, exact in the linear
+/// edge-force model.
+struct ForceOverFeed {
+  CuttingForce edges;  ///< at c = 0
+  CuttingForce chip;   ///< [1/m] per feed per tooth
 };
 
 /// Forces of a contact by the mechanistic model (smartmill_core/cutting/mechanistic.h): the sum over its
@@ -23,7 +32,13 @@ class ForcePredictor {
   /// @throws Error as MechanisticForce
   const ForcePrediction& predict(const Contact& contact, double feed_per_tooth);
 
+  /// At the spindle angles of predict().
+  /// @param mean of a revolution
+  std::vector<ForceOverFeed> overFeed(const Contact& contact, ForceOverFeed* mean) const;
+
  private:
+  std::vector<MechanisticForce> cutsOf(const Contact& contact, double feed_per_tooth) const;
+  std::vector<double> angles(const Contact& contact) const;
   bool isLast(const Contact& contact, double feed_per_tooth) const;
 
   ToolGeometry tool_;

@@ -21,10 +21,13 @@ class ToolModels {
   double radius(int tool) { return of(tool).tool->radius(); }  ///< [m]
   /// [m/s] Rapid feed of the machine by the first model that states its axes; 0: none does.
   double rapid() const;
+  double acceleration() const;  ///< [m/s2] of the axes, in the same way
   /// The models that have been requested, by tool number.
   const std::map<int, MachineModel>& models() const { return models_; }
 
  private:
+  const MachineAxes* axes() const;
+
   std::map<int, MachineModel> models_;
   std::optional<MachineModel> only_;  // belongs to the first tool that is requested
 };

@@ -15,10 +15,36 @@ using Kind = SyntaxError::Kind;
 constexpr std::size_t MAX_DIGITS = 12;
 constexpr int MAX_DEPTH = 5;  // of brackets, as on a 30i
 
+double degrees(double radians) {
+  return radians * 180.0 / units::PI;
+}
+
+/// Operand of AND, OR and XOR.
+long bits(std::optional<double> value) {
+  return std::lround(value.value_or(0.0));
+}
+
+struct Function {
+  const char* name;
+  double (*of)(double);  // not finite: outside of its domain
+};
+constexpr Function FUNCTIONS[] = {{"TAN", [](double x) { return std::tan(x * units::PI / 180.0); }},
+                                  {"ASIN", [](double x) { return degrees(std::asin(x)); }},
+                                  {"ACOS", [](double x) { return degrees(std::acos(x)); }},
+                                  {"ABS", [](double x) { return std::abs(x); }},
+                                  {"ROUND", [](double x) { return std::round(x); }},
+                                  {"FIX", [](double x) { return std::trunc(x); }},
+                                  {"FUP", [](double x) { return x < 0.0 ? std::floor(x) : std::ceil(x); }},
+                                  {"EXP", [](double x) { return std::exp(x); }},
+                                  {"LN", [](double x) { return std::log(x); }}};
+
 }  // namespace
 
 ValueReader::ValueReader(Cursor& cursor, const Dialect& dialect, Variables variables)
-    : cursor_(cursor), expressions_(dialect.expressions), variables_(std::move(variables)) {
+    : cursor_(cursor),
+      expressions_(dialect.expressions),
+      macros_(dialect.expressions && dialect.macros),
+      variables_(std::move(variables)) {
 }
 
 void ValueReader::refuse() const {
@@ -55,9 +81,17 @@ double ValueReader::number(const std::string& address, std::size_t column) {
 std::optional<double> ValueReader::sum() {
   const std::size_t column = cursor_.column();
   std::optional<double> result = product();
-  while (isSign(cursor_.peek())) {
-    const double sign = cursor_.take() == '-' ? -1.0 : 1.0;
-    result = result.value_or(0.0) + sign * product().value_or(0.0);
+  for (;;) {
+    if (isSign(cursor_.peek())) {
+      const double sign = cursor_.take() == '-' ? -1.0 : 1.0;
+      result = result.value_or(0.0) + sign * product().value_or(0.0);
+    } else if (macros_ && cursor_.accept("XOR")) {
+      result = static_cast<double>(bits(result) ^ bits(product()));
+    } else if (macros_ && cursor_.accept("OR")) {
+      result = static_cast<double>(bits(result) | bits(product()));
+    } else {
+      break;
+    }
   }
   if (result && !std::isfinite(*result))
     throw SyntaxError(Kind::argument, column, "", "", "the value of the expression is not finite");
@@ -66,7 +100,19 @@ std::optional<double> ValueReader::sum() {
 
 std::optional<double> ValueReader::product() {
   std::optional<double> result = term();
-  while (cursor_.peek() == '*' || cursor_.peek() == '/') {
+  for (;;) {
+    if (macros_ && cursor_.accept("AND")) {
+      result = static_cast<double>(bits(result) & bits(term()));
+      continue;
+    }
+    if (macros_ && cursor_.accept("MOD")) {
+      const std::size_t column = cursor_.column();
+      const double divisor = term().value_or(0.0);
+      if (divisor == 0.0) throw SyntaxError(Kind::division, column, "", "", "division by zero");
+      result = std::fmod(result.value_or(0.0), divisor);
+      continue;
+    }
+    if (cursor_.peek() != '*' && cursor_.peek() != '/') break;
     const bool division = cursor_.take() == '/';
     const std::size_t column = cursor_.column();
     const double factor = term().value_or(0.0);
@@ -92,8 +138,48 @@ std::optional<double> ValueReader::term() {
     if (content < 0.0) throw SyntaxError(Kind::argument, column, "", "", "square root of a negative number");
     return std::sqrt(content);
   }
+  if (macros_) {
+    if (const std::optional<double> value = function()) return value;
+  }
   if (!isDigit(cursor_.peek()) && cursor_.peek() != '.') refuse();
   return number("#=", cursor_.column());
+}
+
+std::optional<double> ValueReader::function() {
+  const std::size_t column = cursor_.column();
+  if (cursor_.accept("ATAN")) return arcTangent();
+  for (const Function& function : FUNCTIONS) {
+    if (!cursor_.accept(function.name)) continue;
+    const double value = function.of(bracket());
+    if (!std::isfinite(value))
+      throw SyntaxError(Kind::argument, column, "", "",
+                        std::string(function.name) + " of a value outside of its domain");
+    return value;
+  }
+  return std::nullopt;
+}
+
+// ATAN[y]/[x] is 0 to 360 degrees, ATAN[y] -90 to 90.
+double ValueReader::arcTangent() {
+  const double y = bracket();
+  if (!cursor_.startsWith("/[")) return degrees(std::atan(y));
+  cursor_.take();
+  const double angle = degrees(std::atan2(y, bracket()));
+  return angle < 0.0 ? angle + 360.0 : angle;
+}
+
+// A vacant variable equals another one only, and is 0 for the other comparisons.
+bool ValueReader::compare(std::optional<double> left) {
+  for (const bool equal : {true, false}) {
+    if (!cursor_.accept(equal ? "EQ" : "NE")) continue;
+    return (left == sum()) == equal;
+  }
+  const double a = left.value_or(0.0);
+  if (cursor_.accept("GT")) return a > sum().value_or(0.0);
+  if (cursor_.accept("GE")) return a >= sum().value_or(0.0);
+  if (cursor_.accept("LT")) return a < sum().value_or(0.0);
+  if (cursor_.accept("LE")) return a <= sum().value_or(0.0);
+  refuse();
 }
 
 std::optional<double> ValueReader::variable() {
@@ -113,7 +199,8 @@ std::optional<double> ValueReader::variable() {
 
 double ValueReader::bracket() {
   if (cursor_.take() != '[' || ++depth_ > MAX_DEPTH) refuse();
-  const double content = sum().value_or(0.0);
+  const std::optional<double> first = sum();
+  const double content = macros_ && cursor_.peek() != ']' ? compare(first) : first.value_or(0.0);
   if (cursor_.take() != ']') refuse();
   --depth_;
   return content;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
 #include <vector>
 
 namespace smartmill::nc {
@@ -43,6 +44,35 @@ TEST(BlockReader, WordsHaveTheirTextAndColumn) {
   EXPECT_EQ(words[3].value, 0.5);
   EXPECT_EQ(words[3].column, 25u);
   EXPECT_TRUE(wordsOf("(only a comment)", PLAIN).empty());
+}
+
+TEST(BlockReader, FunctionsAndComparisonsOfMacroB) {
+  constexpr Dialect MACRO_B{"X", " ", false, true, true};
+  const Variables variables = [](int n) { return n == 7 ? std::nullopt : std::optional<double>(10.0 * n); };
+  const std::vector<std::pair<std::string, double>> cases{
+      {"X[TAN[45]]", 1.0},         {"X[ASIN[0.5]]", 30.0},
+      {"X[ACOS[0.5]]", 60.0},      {"X[ATAN[1]]", 45.0},
+      {"X[ATAN[-1]/[-1]]", 225.0}, {"X[ABS[-3]]", 3.0},
+      {"X[ROUND[2.5]]", 3.0},      {"X[FIX[-2.7]]", -2.0},
+      {"X[FUP[2.1]]", 3.0},        {"X[FUP[-2.1]]", -3.0},
+      {"X[LN[EXP[2]]]", 2.0},      {"X[17MOD5*2]", 4.0},
+      {"X[6AND3]", 2.0},           {"X[6OR3]", 7.0},
+      {"X[6XOR3]", 5.0},           {"X[#1EQ10]", 1.0},
+      {"X[#1NE10]", 0.0},          {"X[#1GT9+1]", 0.0},
+      {"X[#1GE9+1]", 1.0},         {"X[#1LT#2]", 1.0},
+      {"X[#2LE#1]", 0.0},          {"X[#7EQ#7]", 1.0},
+      {"X[#7EQ0]", 0.0},           {"X[#7LT1]", 1.0},
+      {"X[[1LT2]AND[3GT2]]", 1.0}, {"X[[1LT2]AND[3LT2]]", 0.0},
+      {"X-[[1LT2]OR[3LT2]]", -1.0}};
+  for (const auto& [line, value] : cases) {
+    const std::vector<Word> words = wordsOf(line, MACRO_B, variables);
+    ASSERT_EQ(words.size(), 1u) << line;
+    EXPECT_NEAR(*words[0].value, value, 1e-12) << line;
+  }
+  EXPECT_EQ(errorOf("X[ASIN[2]]", MACRO_B), "column 3: ASIN of a value outside of its domain");
+  EXPECT_EQ(errorOf("X[5MOD0]", MACRO_B), "column 7: division by zero");
+  EXPECT_NE(errorOf("X[1EQ1]", MACROS), "");  // not of the controller's dialect
+  EXPECT_NE(errorOf("X[TAN[45]]", MACROS), "");
 }
 
 TEST(BlockReader, VariablesAndExpressions) {

@@ -14,6 +14,9 @@ struct Dialect {
   /// A value may be #n or an expression in brackets with + - * / SIN COS SQRT (degrees), and an assignment
   /// may have a sequence number.
   bool expressions = false;
+  /// With expressions: the functions of Fanuc's macro B (TAN ASIN ACOS ATAN ABS ROUND FIX FUP EXP LN), MOD
+  /// AND OR XOR, and comparisons in brackets (EQ NE GT GE LT LE), whose value is 1 or 0.
+  bool macros = false;
 };
 
 /// Value of a variable #n; nullopt: vacant. May throw.

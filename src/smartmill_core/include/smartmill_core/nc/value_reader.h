@@ -30,10 +30,13 @@ class ValueReader {
   std::optional<double> term();
   std::optional<double> variable();
   double bracket();
+  std::optional<double> function();
+  double arcTangent();
+  bool compare(std::optional<double> left);
   double number(const std::string& address, std::size_t column);
 
   Cursor& cursor_;
-  bool expressions_;
+  bool expressions_, macros_;
   Variables variables_;
   int depth_ = 0;  // of brackets
 };

@@ -1,0 +1,35 @@
+#pragma once
+
+#include "smartmill_program/engagement/cut_simulation.h"
+#include "smartmill_program/plan/feed_limits.h"
+#include "smartmill_program/prediction/tool_models.h"
+
+namespace smartmill::program {
+
+/// The largest chip thickness [m] over a revolution: the feed of the tooth with the largest pitch times the
+/// largest sin(phi) in the contact. @param feed_per_tooth [m] horizontal
+double largestChip(const ToolGeometry& tool, const Contact& contact, double feed_per_tooth);
+
+/// The largest feed at which a step holds the limits. The force of the mechanistic model is affine in the
+/// feed per tooth at each spindle angle, so that every limit is the root of a quadratic or linear equation:
+///
+///     |edges + c chip|^2 = force^2,    torque and power: edges + c chip = limit
+class StepBounds {
+ public:
+  StepBounds(ToolModels& models, const FeedLimits& limits) : models_(models), limits_(limits) {}
+
+  /// The feed of a step of the end face, which has no force model, is at most that of the program. In air
+  /// only the machine limits the feed, which is not part of the result.
+  /// @throws Error when the edge forces alone exceed a limit
+  FeedBound of(const Step& step) const;
+  /// Of a whole move, without its forces: machine, acceleration towards the centre of an arc.
+  FeedBound of(const Move& move) const;
+
+ private:
+  void boundForces(const Step& step, const MachineModel& model, double speed_of_chip, FeedBound& bound) const;
+
+  ToolModels& models_;
+  const FeedLimits& limits_;
+};
+
+}  // namespace smartmill::program
