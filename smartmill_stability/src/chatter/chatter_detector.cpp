@@ -8,8 +8,10 @@
 #include "smartmill_core/require.h"
 #include "smartmill_core/signal/interpolate.h"
 #include "smartmill_core/signal/revolution_window.h"
+#include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/signal/steady_path.h"
 #include "smartmill_core/units.h"
+#include "smartmill_stability/chatter/recording.h"
 
 namespace smartmill::stability {
 
@@ -46,6 +48,7 @@ void ChatterDetector::dropWindow() {
   steady_since_.reset();
   steady_until_.reset();
   window_start_.reset();
+  harmonics_from_.reset();
 }
 
 void ChatterDetector::notSteady(double stamp) {
@@ -72,6 +75,7 @@ void ChatterDetector::handle(const CuttingCondition& condition) {
 void ChatterDetector::handle(const CncState& state) {
   const bool gap = state.stamp - last_state_ > parameters_.maximum_gap;
   last_state_ = state.stamp;
+  speed_ = state.spindle_speed;
   const bool steady = condition_ && condition_->kind == CuttingCondition::Kind::cut && state.connected &&
                       state.feed > 0.0 && onSteadyPath(*condition_, state, parameters_.path_tolerance);
   if (!steady || gap) notSteady(state.stamp);
@@ -134,6 +138,10 @@ double ChatterDetector::timeAt(double turned) const {
 }
 
 void ChatterDetector::evaluate() {
+  if (parameters_.angle == "none") {
+    evaluateHarmonics();
+    return;
+  }
   if (!steady_since_) {
     // Retain data that the next controller state may declare steady.
     const double retained = 2.0 * parameters_.maximum_gap;
@@ -154,6 +162,63 @@ void ChatterDetector::evaluate() {
   const double needed = std::min(timeAt(*window_start_), last) - 0.01;
   while (samples_.size() > 4 && samples_[2].time < needed) samples_.pop_front();
   while (angles_.size() > 2 && angles_[1].time < needed) angles_.pop_front();
+}
+
+void ChatterDetector::evaluateHarmonics() {
+  const auto forgetBefore = [&](double time) {
+    while (!samples_.empty() && samples_.front().time < time) samples_.pop_front();
+  };
+  if (samples_.size() < 4) return;
+  if (!steady_since_ || !(speed_ > 0.0)) {
+    forgetBefore(samples_.back().time - 2.0 * parameters_.maximum_gap);
+    return;
+  }
+  if (!harmonics_from_)
+    harmonics_from_ = std::max(*steady_since_, samples_.front().time) +
+                      parameters_.settle_revolutions * units::TWO_PI / speed_;
+  const double last = std::min(*steady_until_, samples_.back().time);
+  forgetBefore(*harmonics_from_);
+  if (last < *harmonics_from_ + parameters_.harmonics_window || samples_.size() < 4) return;
+  judgeHarmonics(*harmonics_from_ + parameters_.harmonics_window,
+                 static_cast<double>(samples_.size() - 1) / (samples_.back().time - samples_.front().time));
+  *harmonics_from_ += 0.5 * parameters_.harmonics_window;
+}
+
+/// Judges the samples up to a time [s]. @param rate [Hz]
+void ChatterDetector::judgeHarmonics(double to, double rate) {
+  Recording recording;
+  recording.sample_rate = rate;
+  recording.same_unit = true;
+  double variance = 0.0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::vector<double> channel;
+    for (const Sample& sample : samples_)
+      if (sample.time <= to) channel.push_back(sample.force[axis]);
+    const double deviation = standardDeviation(channel);
+    if (!(deviation > 0.0)) continue;
+    variance += deviation * deviation;
+    recording.channels.push_back(std::move(channel));
+  }
+  ChatterState state;
+  state.stamp = to;
+  state.condition = condition_->name;
+  RecordingRequest request;
+  request.speed = speed_;
+  request.teeth = std::max(1, static_cast<int>(condition_->tool.teeth));
+  RecordingVerdict verdict;  // unsure
+  try {
+    if (!recording.channels.empty()) verdict = judgeRecording(recording, request);
+  } catch (const Error&) {
+    // Fewer than three revolutions or two samples in a tooth passing period decide nothing.
+  }
+  state.valid = verdict.kind == RecordingVerdict::Kind::stable || verdict.chatter();
+  state.chatter = verdict.chatter();
+  state.frequency = verdict.frequency;
+  state.energy_ratio = verdict.energy_ratio;
+  state.severity = std::sqrt(variance * verdict.energy_ratio);
+  if (state.chatter) state.onset = to - parameters_.harmonics_window;
+  reported_invalid_ = !state.valid;
+  output_(state);
 }
 
 std::vector<double> ChatterDetector::forceAt(const std::vector<double>& times, std::size_t axis,
@@ -222,7 +287,8 @@ DetectionPipeline::DetectionPipeline(const ChatterParameters& parameters, double
       sorter_(hold_back),
       conditions_(sorter_.addLatched(names::CUTTING_CONDITION)),
       states_(sorter_.addRegular(names::CNC_STATE)),
-      angles_(sorter_.addRegular(names::SPINDLE_ANGLE)),
+      angles_(parameters.angle == "measured" ? std::optional(sorter_.addRegular(names::SPINDLE_ANGLE))
+                                             : std::nullopt),
       blocks_(sorter_.addRegular(names::FORCE_COMPENSATED)) {
   sorter_.onRestart([this] { detector_.reset(); });
 }
@@ -236,7 +302,8 @@ void DetectionPipeline::push(const CncState& state) {
 }
 
 void DetectionPipeline::push(const SpindleAngle& angle) {
-  sorter_.push(angles_, angle.stamp, [this, angle] { detector_.handle(angle); });
+  if (!angles_) return;
+  sorter_.push(*angles_, angle.stamp, [this, angle] { detector_.handle(angle); });
 }
 
 void DetectionPipeline::push(const ForceBlock& block) {

@@ -148,11 +148,14 @@ class RecordingAnalysis {
         period_(units::TWO_PI / request.speed),
         revolution_(period_ * recording.sample_rate),
         turns_(static_cast<std::size_t>(cut_.window() / period_)) {
+    double largest = 0.0;
+    for (const std::vector<double>& channel : recording_.channels)
+      largest = std::max(largest, standardDeviation(channel));
     for (const std::vector<double>& channel : recording_.channels) {
       const double deviation = standardDeviation(channel);
       if (!(deviation > 0.0)) continue;
       channels_.push_back(channel);
-      for (double& value : channels_.back()) value /= deviation;
+      for (double& value : channels_.back()) value /= recording_.same_unit ? largest : deviation;
     }
   }
 
@@ -292,6 +295,7 @@ class RecordingAnalysis {
     if (windows_ == 0) return verdict;
     verdict.cut = cuts();
     verdict.margin = margins_ / static_cast<double>(windows_);
+    verdict.energy_ratio = between_ / std::max(1e-30, between_ + synchronous_);
     const double probability = 1.0 / (1.0 + std::exp(-SLOPE * verdict.margin));
     if (!chattering_.empty()) describe(verdict);
     const bool bearing = 2 * like_bearing_ > windows_;

@@ -39,6 +39,7 @@ Spectrogram spectrogramOf(const Recording& recording, double window_seconds, dou
     for (const double v : channel) square += (v - mean) * (v - mean) / n;
     size.push_back(square);
   }
+  if (recording.same_unit) size.assign(size.size(), *std::max_element(size.begin(), size.end()));
   std::vector<double> piece(length);
   for (std::size_t at = 0; at + length <= samples; at += hop) {
     std::vector<double> power(lines, 0.0);

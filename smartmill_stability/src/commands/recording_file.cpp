@@ -80,6 +80,7 @@ class LongestSegment {
   }
   Recording result() {
     finishSegment();
+    longest_.same_unit = true;
     if (longest_.channels.empty()) throw Error(o_.file + ": topic " + o_.topic + ": expected samples");
     for (const std::vector<double>& channel : longest_.channels)
       for (const double v : channel)

@@ -14,7 +14,7 @@ namespace smartmill::stability {
 template <class Source, class Detection>
 void connect(Source& source, const NodeParameters& parameters, Detection& detection) {
   feed<CncState>(source, names::CNC_STATE, detection);
-  feed<SpindleAngle>(source, names::SPINDLE_ANGLE, detection);
+  if (parameters.chatter.angle == "measured") feed<SpindleAngle>(source, names::SPINDLE_ANGLE, detection);
   if (parameters.chatter_signal == "force") {
     feed<ForceBlock>(source, names::FORCE_COMPENSATED, detection);
   } else {

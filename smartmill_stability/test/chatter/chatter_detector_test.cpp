@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -113,6 +114,42 @@ TEST(ChatterDetector, aDecayingTransientIsNoChatter) {
     largest = std::max(largest, state.energy_ratio);
   }
   EXPECT_GT(largest, 0.1);  // above energy_ratio
+}
+
+/// Verdicts without a spindle angle.
+std::vector<ChatterState> runWithoutAngle(const Scene& scene) {
+  ChatterParameters parameters;
+  parameters.angle = "none";
+  parameters.harmonics_window = 0.8;
+  std::vector<ChatterState> states;
+  ChatterDetector detector(parameters, [&](const ChatterState& state) { states.push_back(state); });
+  play(scene, [&](const auto& input) {
+    if constexpr (!std::is_same_v<std::decay_t<decltype(input)>, SpindleAngle>) detector.handle(input);
+  });
+  return states;
+}
+
+TEST(ChatterDetector, withoutAnAngleTheHarmonicsDecide) {
+  Scene scene;
+  scene.teeth = 4;
+  scene.chatter = 120.0;
+  int chattering = 0, stable = 0;
+  for (const ChatterState& state : runWithoutAngle(scene)) {
+    if (!state.valid) continue;
+    ++chattering;
+    EXPECT_TRUE(state.chatter);
+    EXPECT_NEAR(state.frequency, scene.frequency, 1.0) << state.stamp;
+    EXPECT_NEAR(state.severity, 120.0 / std::sqrt(2.0), 12.0) << state.stamp;
+    EXPECT_EQ(state.condition, "cut_1");
+  }
+  scene.chatter = 0.0;
+  for (const ChatterState& state : runWithoutAngle(scene)) {
+    EXPECT_FALSE(state.chatter) << state.stamp;
+    stable += state.valid;
+  }
+  // Two seconds less 4 revolutions of settling, windows of 0.8 s by half.
+  EXPECT_GE(chattering, 2);
+  EXPECT_GE(stable, 2);
 }
 
 TEST(SignalBlock, hasUpToThreeChannels) {

@@ -48,6 +48,7 @@ void play(const Scene& scene, const Handle& handle, double start = 0.0) {
       state.position = {0.020 * next_state, 0.0, -0.001};
       state.distance_to_go = {0.0, 0.0, 0.0};
       state.feed = 0.020;
+      state.spindle_speed = SPEED;
       handle(state);
       next_state += 0.02;
     } else if (next_angle <= next_block) {

@@ -24,6 +24,8 @@ struct ChatterParameters {
   double settle_revolutions = 4.0;
   double path_tolerance = 1.0e-3;
   double maximum_gap = 0.2;
+  std::string angle = "measured";
+  double harmonics_window = 2.0;
 
   void declare(ParameterTable& table) {
     table.number("chatter_revolutions", revolutions, "1", Range::closed(4, 200),
@@ -45,6 +47,13 @@ struct ChatterParameters {
                  "largest distance of the tool from the path of the steady cut");
     table.number("maximum_gap", maximum_gap, "s", Range::openLow(0.0, 60.0),
                  "longest interval without controller state or spindle angle within a window");
+    table.choice(
+        "chatter_angle", angle, {"measured", "none"},
+        "measured: windows of revolutions by spindle/angle; none: the revolutions are found from the "
+        "harmonics of the signal and the speed of cnc/state, for a microphone or a vibration sensor "
+        "alone");
+    table.number("chatter_harmonics_window", harmonics_window, "s", Range::closed(0.2, 30.0),
+                 "with chatter_angle: none, length of the signal of a verdict, twice in each such time");
   }
   /// @throws Error naming key and value.
   void validate() const;
@@ -68,7 +77,9 @@ struct ChatterState {
 };
 
 /// Distinguishes chatter from forced vibration in the compensated force: applies ChatterCriterion to windows
-/// of whole revolutions within a steady cut. Inputs in stamp order; the results depend on the inputs only.
+/// of whole revolutions within a steady cut. With ChatterParameters::angle none it applies judgeRecording()
+/// to the signal of the steady cut; a verdict that is unsure is not valid. Inputs in stamp order; the results
+/// depend on the inputs only.
 class ChatterDetector {
  public:
   using Output = std::function<void(const ChatterState&)>;
@@ -96,6 +107,8 @@ class ChatterDetector {
   /// Force of an axis, interpolated at times [s]. @param rate [Hz] of the samples
   std::vector<double> forceAt(const std::vector<double>& times, std::size_t axis, double rate) const;
   void judge(double from, double to);
+  void evaluateHarmonics();
+  void judgeHarmonics(double to, double rate);
 
   ChatterParameters parameters_;
   ChatterCriterion criterion_;
@@ -106,6 +119,8 @@ class ChatterDetector {
   std::optional<double> steady_since_, steady_until_;  // [s]
   std::optional<double> window_start_;                 // [rad] accumulated angle
   double last_state_ = 0.0;
+  double speed_ = 0.0;                    // [rad/s] of the controller
+  std::optional<double> harmonics_from_;  // [s] start of the next window without an angle
   std::uint64_t next_index_ = 0;
   bool reported_invalid_ = false;
 };
@@ -132,7 +147,9 @@ class DetectionPipeline {
  private:
   ChatterDetector detector_;
   StreamSorter sorter_;
-  StreamSorter::Stream conditions_, states_, angles_, blocks_;
+  StreamSorter::Stream conditions_, states_;
+  std::optional<StreamSorter::Stream> angles_;
+  StreamSorter::Stream blocks_;
 };
 
 }  // namespace smartmill::stability

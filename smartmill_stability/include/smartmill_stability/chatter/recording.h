@@ -11,6 +11,9 @@ struct Recording {
   double sample_rate = 0.0;                   ///< [Hz]
   std::vector<std::vector<double>> channels;  ///< each in its own unit
   double start = 0.0;                         ///< [s] of the first sample; times of the verdict include it
+  /// Whether the channels have one unit, so that their energies are added. Otherwise each is divided by its
+  /// standard deviation.
+  bool same_unit = false;
 };
 
 struct RecordingRequest {
@@ -50,6 +53,7 @@ struct RecordingVerdict {
   double frequency = UNKNOWN;   ///< [Hz] strongest chatter line
   double over_noise = UNKNOWN;  ///< [dB] of that line over the noise floor around it
   double over_air = UNKNOWN;    ///< [dB] of that line over the same line outside the cut; NaN: no such part
+  double energy_ratio = 0.0;    ///< [1] energy outside the spindle harmonics over that of both
   int companions = 0;           ///< lines an integer number of tooth passing frequencies away
   double share = 0.0;           ///< [1] power of the chatter lines over that of the spindle harmonics
   double mode = UNKNOWN;        ///< [Hz] nearby mode; NaN: none is known
