@@ -134,6 +134,27 @@ std::string ofTime(const FoundEffect& effect) {
                    100.0 * std::abs(amplitude), moreOrLess(amplitude), valueOf(effect, "time_constant_s"));
 }
 
+std::string ofCourse(const FoundEffect& effect) {
+  struct Words {
+    const char *course, *unit, *check;
+  };
+  static const std::map<std::string, Words> WORDS{
+      {"path", {"along the feed", "mm", "the work for hard spots and a change of its hardness"}},
+      {"time", {"with the time in cut", "s", "the heating of tool and work"}},
+      {"revolutions",
+       {"with the revolutions in cut", "revolutions", "what repeats with the entry of a cut"}}};
+  const Words& words = WORDS.at(effect.words.at("over"));
+  const std::vector<double> at = seriesOf(effect, "at"), factor = seriesOf(effect, "factor");
+  const auto [low, high] = std::minmax_element(factor.begin(), factor.end());
+  const auto place = [&](std::vector<double>::const_iterator f) {
+    return at[static_cast<std::size_t>(f - factor.begin())];
+  };
+  return formatted(
+      "the cutting force changes %s, by the same factor in every cut: it is largest %.3g %s after the entry, "
+      "%.2f times the one at %.3g %s, where it is smallest; check %s",
+      words.course, place(high), words.unit, *high / *low, place(low), words.unit, words.check);
+}
+
 std::string ofProfile(const FoundEffect& effect) {
   const double extra = valueOf(effect, "factor") - 1.0;
   const bool surface = effect.words.at("from") == "surface";
@@ -259,23 +280,15 @@ std::string ofRevolution(const FoundEffect& effect) {
 
 std::string sentenceOf(const FoundEffect& effect) {
   static const std::map<std::string, std::function<std::string(const FoundEffect&)>> SENTENCES{
-      {"chip_thickness", ofChip},
-      {"cutting_time", ofTime},
-      {"depth_profile", ofProfile},
-      {"lost_edge", ofLostEdge},
-      {"curve", ofCurve},
-      {"tone", ofTone},
-      {"order", ofOrder},
-      {"settling", ofSettling},
-      {"tooth_factor", ofTeeth},
-      {"edge_life", ofLife},
-      {"step", ofStep},
-      {"ramp", ofRamp},
-      {"approach", ofApproach},
-      {"bursts", ofBursts},
-      {"transfer", ofTransfer},
-      {"resonance", ofResonance},
-      {"revolution", ofRevolution}};
+      {"chip_thickness", ofChip}, {"cutting_time", ofTime},
+      {"force_course", ofCourse}, {"depth_profile", ofProfile},
+      {"lost_edge", ofLostEdge},  {"curve", ofCurve},
+      {"tone", ofTone},           {"order", ofOrder},
+      {"settling", ofSettling},   {"tooth_factor", ofTeeth},
+      {"edge_life", ofLife},      {"step", ofStep},
+      {"ramp", ofRamp},           {"approach", ofApproach},
+      {"bursts", ofBursts},       {"transfer", ofTransfer},
+      {"resonance", ofResonance}, {"revolution", ofRevolution}};
   const EffectKind* kind = findEffect(effect.name);
   if (!kind || !kind->empirical()) return "";
   return SENTENCES.at(kind->form)(effect);

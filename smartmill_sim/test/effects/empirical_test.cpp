@@ -1,5 +1,6 @@
 // Empirical effects against their closed forms.
 
+#include <algorithm>
 #include <cmath>
 #include <complex>
 
@@ -65,6 +66,42 @@ TEST(EmpiricalEffects, chipForceSettlesWithTheTimeInCut) {
     const double factor = 1.0 + 0.25 * std::exp(-(record.time[i] - engage) / 0.05);
     EXPECT_NEAR(fz[i], axialForce(model, factor * FEED, DEPTH), 2e-3 * fz[i]) << turn;
   }
+}
+
+// The factor is that of the place that the cut has reached, on chip and edge force; between two nodes linear,
+// beyond them constant.
+TEST(EmpiricalEffects, forceFollowsItsCourseInTheCut) {
+  const double revolutions_per_s = 1.0 / REVOLUTION, engage = 4 * REVOLUTION;
+  const double feed_mm = 2 * FEED / units::MM * revolutions_per_s;  // per second
+  struct Case {
+    const char* over;
+    double per_second;
+  };
+  for (const Case& c : {Case{"path", feed_mm}, Case{"time", 1.0}, Case{"revolutions", revolutions_per_s}}) {
+    const double from = 0.05 * c.per_second, to = 0.15 * c.per_second;
+    const MachineModel model =
+        with(mill(2, 0.0), {effectEntry("empirical:force_course", {}, {{"over", c.over}},
+                                        {{"at", {from, to}}, {"factor", {0.9, 1.5}}})});
+    CampaignTest test = slotCut(EVEN_RPM, DEPTH, FEED);
+    test.engage_time = engage;
+    const Record record = run(model, test, 0.3);
+    const std::vector<double>& fz = record.column("fz");
+    for (const int turn : {5, 8, 10, 13}) {
+      const auto i = static_cast<std::size_t>(std::lround((turn * REVOLUTION + 0.25 * REVOLUTION) * RATE));
+      const double share = std::clamp((record.time[i] - engage - 0.05) / 0.1, 0.0, 1.0);
+      const double expected = (0.9 + 0.6 * share) * axialForce(model, FEED, DEPTH);
+      EXPECT_NEAR(fz[i], expected, 3e-3 * expected) << c.over << " " << turn;
+    }
+  }
+}
+
+TEST(EmpiricalEffects, aCourseNeedsRisingPlacesWithOneFactorEach) {
+  const auto course = [](const std::vector<double>& at, const std::vector<double>& factor) {
+    return effectEntry("empirical:force_course", {}, {{"over", "path"}}, {{"at", at}, {"factor", factor}});
+  };
+  EXPECT_THROW(makeEffect(course({0.0, 0.0}, {1.0, 1.2})), Error);
+  EXPECT_THROW(makeEffect(course({0.0, 1.0, 2.0}, {1.0, 1.2})), Error);
+  EXPECT_THROW(makeEffect(course({0.0}, {1.0})), Error);
 }
 
 TEST(EmpiricalEffects, aHeightOfTheEdgeCutsHarder) {

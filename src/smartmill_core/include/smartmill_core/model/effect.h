@@ -72,14 +72,21 @@ struct TwinSetup {
   std::vector<std::pair<std::size_t, Shelf>> shelves;  ///< by channel, act before the delays
 };
 
+/// How far a cut is since it began.
+struct CutProgress {
+  double time = 0.0;   ///< [s]
+  double path = 0.0;   ///< [m] along the feed
+  double angle = 0.0;  ///< [rad] turned by the spindle
+};
+
 /// The present time step.
 struct Instant {
-  double angle = 0.0;                  ///< [rad] immersion angle of tooth 1
-  double speed = 0.0;                  ///< [rad/s] of the spindle
-  double record_time = 0.0;            ///< [s] since the record began
-  double start_time = 0.0;             ///< [s] of the record, since the machine was started cold
-  double edge_time = 0.0;              ///< [s] that the edge has cut
-  double cut_time = 0.0;               ///< [s] since this cut began
+  double angle = 0.0;        ///< [rad] immersion angle of tooth 1
+  double speed = 0.0;        ///< [rad/s] of the spindle
+  double record_time = 0.0;  ///< [s] since the record began
+  double start_time = 0.0;   ///< [s] of the record, since the machine was started cold
+  double edge_time = 0.0;    ///< [s] that the edge has cut
+  CutProgress cut;
   double chip = 0.0;                   ///< [m] commanded feed per tooth; 0 outside a cut
   double depth = 0.0;                  ///< [m] commanded axial depth; 0 outside a cut
   Axes3 axis_acceleration{{0, 0, 0}};  ///< [m/s2] of the machine axes, where their motion is recorded
