@@ -13,13 +13,12 @@ namespace {
 struct CourseOptions {
   std::size_t bins = 400;   ///< of the longest course: a spot of a hundredth of it still has several
   double min_gain = 100.0;  ///< [squares] with less the fit could not reach SearchOptions::min_gain
-  /// [1] of the gain with the most nodes: a course with fewer nodes suffices from this share on.
-  double sufficient = 0.95;
-  double reach = 0.05;  ///< [1] of a probe: the force is proportional to the factors
+  double reach = 0.05;      ///< [1] of a probe: the force is proportional to the factors
 };
 
 /// Scale of the force that the residual requests, by the place in the course of a cut.
 struct LocalScale {
+  double samples = 0.0;
   double longest = 0.0;                  // [mm], [s] or [1]
   std::vector<double> product, squares;  // of residual and simulated force, and of the latter, in each bin
 
@@ -65,6 +64,7 @@ LocalScale localScale(const FormContext& context, const std::string& over, std::
       const std::size_t bin = std::min(static_cast<std::size_t>(place / scale.width()), bins - 1);
       scale.product[bin] += residual * force;
       scale.squares[bin] += force * force;
+      ++scale.samples;
     }
   }
   return scale;
@@ -124,7 +124,7 @@ std::vector<Course> coursesOf(const LocalScale& scale, std::size_t most) {
   return courses;
 }
 
-/// Courses of the force over path, time and revolutions, with as many nodes as they need.
+/// Courses of the force over path, time and revolutions, with the number of nodes of the best BIC.
 class ForceCourses : public FormFamily {
  public:
   void locate(const FormContext& context, std::vector<Hypothesis>* located) const override {
@@ -136,18 +136,20 @@ class ForceCourses : public FormFamily {
       const LocalScale scale = localScale(context, over, options_.bins);
       if (scale.longest <= 0.0) continue;
       const std::vector<Course> courses = coursesOf(scale, forms.back()->coordinates.size());
-      const double most = courses.back().gain;
-      if (most < options_.min_gain) continue;
-      for (const Hypothesis* h : forms) {
-        const Course& course = courses[h->coordinates.size() - 2];
-        if (course.gain < options_.sufficient * most) continue;
-        Hypothesis at = *h;
-        std::vector<double> places;
-        for (const std::size_t bin : course.nodes) places.push_back(scale.place(bin));
-        at.list("at", places).straight({options_.reach});
-        located->push_back(at.named(over + formatted(", %zu nodes", places.size())));
-        break;
-      }
+      const auto worth = [&](const Hypothesis* h) {
+        const auto nodes = static_cast<double>(h->coordinates.size());
+        return courses[h->coordinates.size() - 2].gain - nodes * std::log(scale.samples);
+      };
+      const Hypothesis* best =
+          *std::max_element(forms.begin(), forms.end(),
+                            [&](const Hypothesis* a, const Hypothesis* b) { return worth(a) < worth(b); });
+      if (worth(best) < options_.min_gain) continue;
+      Hypothesis at = *best;
+      std::vector<double> places;
+      for (const std::size_t bin : courses[at.coordinates.size() - 2].nodes)
+        places.push_back(scale.place(bin));
+      at.list("at", places).straight({options_.reach});
+      located->push_back(at.named(over + formatted(", %zu nodes", places.size())));
     }
   }
 
