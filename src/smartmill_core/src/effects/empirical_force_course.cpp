@@ -34,7 +34,7 @@ EffectCoordinates factorsAt(std::size_t nodes) {
 Forms courses(const Scope&) {
   Forms forms;
   for (const std::string& over : courseNames()) {
-    for (const std::size_t nodes : {2, 5, 10, 20}) {
+    for (const std::size_t nodes : {2, 5, 12}) {
       Values at;
       for (std::size_t k = 0; k < nodes; ++k) at.push_back(static_cast<double>(k));
       EffectForm form({factorsAt(nodes)});
