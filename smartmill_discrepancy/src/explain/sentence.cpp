@@ -42,7 +42,7 @@ struct SentenceOptions {
   double follows = 0.97;     ///< [1] of the variance that a power law must explain to be named
   double alike = 0.2;        ///< [1] spread of teeth over their distance to the one that differs
   double out = 0.1;          ///< [1] force of a tooth that hardly cuts
-  double straight = 1500.0;  ///< [s] time constant beyond which wear is linear over any campaign
+  double straight = 1500.0;  ///< [s] time constant beyond which a change is almost linear
   double nothing = 0.15;     ///< [1] gain of an attenuated band
 };
 
@@ -225,11 +225,23 @@ std::string ofRamp(const FoundEffect& effect) {
 
 std::string ofApproach(const FoundEffect& effect) {
   const std::string& channel = effect.words.at("channel");
+  const double amplitude = valueOf(effect, "amplitude"), constant = valueOf(effect, "time_constant_s");
+  if (constant > LIMITS.straight)
+    return formatted(
+        "%s drifts by %+.3g %s per minute over the whole campaign, almost linearly: check the "
+        "temperature of its mounting and its charge amplifier",
+        channel.c_str(), 60.0 * amplitude / constant, unitOf(channel));
   return formatted(
       "%s reaches an offset of %+.3g %s while the machine warms up, exponentially with a time constant of "
       "%.2g min",
-      channel.c_str(), valueOf(effect, "amplitude"), unitOf(channel),
-      valueOf(effect, "time_constant_s") / 60.0);
+      channel.c_str(), amplitude, unitOf(channel), constant / 60.0);
+}
+
+std::string ofZero(const FoundEffect& effect) {
+  return formatted(
+      "the zero of %s differs from record to record, as the part without cut shows; %.0f %% of it act in the "
+      "cut: reset its amplifier before each test",
+      effect.words.at("channel").c_str(), 100.0 * valueOf(effect, "share"));
 }
 
 std::string ofBursts(const FoundEffect& effect) {
@@ -280,15 +292,25 @@ std::string ofRevolution(const FoundEffect& effect) {
 
 std::string sentenceOf(const FoundEffect& effect) {
   static const std::map<std::string, std::function<std::string(const FoundEffect&)>> SENTENCES{
-      {"chip_thickness", ofChip}, {"cutting_time", ofTime},
-      {"force_course", ofCourse}, {"depth_profile", ofProfile},
-      {"lost_edge", ofLostEdge},  {"curve", ofCurve},
-      {"tone", ofTone},           {"order", ofOrder},
-      {"settling", ofSettling},   {"tooth_factor", ofTeeth},
-      {"edge_life", ofLife},      {"step", ofStep},
-      {"ramp", ofRamp},           {"approach", ofApproach},
-      {"bursts", ofBursts},       {"transfer", ofTransfer},
-      {"resonance", ofResonance}, {"revolution", ofRevolution}};
+      {"chip_thickness", ofChip},
+      {"cutting_time", ofTime},
+      {"force_course", ofCourse},
+      {"depth_profile", ofProfile},
+      {"lost_edge", ofLostEdge},
+      {"curve", ofCurve},
+      {"tone", ofTone},
+      {"order", ofOrder},
+      {"settling", ofSettling},
+      {"tooth_factor", ofTeeth},
+      {"edge_life", ofLife},
+      {"step", ofStep},
+      {"ramp", ofRamp},
+      {"approach", ofApproach},
+      {"bursts", ofBursts},
+      {"transfer", ofTransfer},
+      {"resonance", ofResonance},
+      {"zero", ofZero},
+      {"revolution", ofRevolution}};
   const EffectKind* kind = findEffect(effect.name);
   if (!kind || !kind->empirical()) return "";
   return SENTENCES.at(kind->form)(effect);

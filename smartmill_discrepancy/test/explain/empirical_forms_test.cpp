@@ -161,6 +161,16 @@ TEST(EmpiricalForms, Drift) {
   EXPECT_NEAR(valueOf(e.effects[0], "per_min"), -9600.0, 100.0);
 }
 
+// The zero of each record is another one; only the part before the engagement shows it.
+TEST(EmpiricalForms, ZeroOfEachRecord) {
+  const TemporaryFolder folder;
+  const Explanation e = withExtra(folder, "fz", [](const CampaignTest&, double, std::uint64_t seed) {
+    return 3.0 * static_cast<double>(seed * seed * 7 % 11) - 15.0;
+  });
+  expectBuilt(e, "zero", "the zero of fz differs from record to record");
+  EXPECT_NEAR(valueOf(e.effects[0], "share"), 1.0, 0.02);
+}
+
 TEST(EmpiricalForms, WarmUp) {
   const TemporaryFolder folder;
   const Explanation e = withExtra(folder, "fz", [](const CampaignTest& test, double time, std::uint64_t) {

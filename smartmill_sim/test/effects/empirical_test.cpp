@@ -183,6 +183,40 @@ TEST(EmpiricalEffects, aChannelSettlesFromTheBeginningOfTheRecord) {
   EXPECT_EQ(record.column("fx")[1000], 0.0);
 }
 
+// The zero of a record is estimated before the engagement and acts throughout.
+TEST(EmpiricalEffects, aZeroIsTakenFromTheRecordBeforeItsCut) {
+  CampaignTest test = slotCut(EVEN_RPM);
+  test.engage_time = 4 * REVOLUTION;
+  const Record pure = run(mill(4, 30.0), test, 0.2);
+  Record indicated = pure;
+  for (std::size_t i = 0; i < pure.size(); ++i)
+    indicated.add("fy")[i] = pure.column("fy")[i] + (pure.time[i] < *test.engage_time ? 4.0 : 400.0);
+  SimulationOptions options;
+  options.noise = false;
+  options.phase = 0.0;
+  const MachineModel model =
+      with(mill(4, 30.0), {effectEntry("empirical:zero", {{"share", 0.75}}, {{"channel", "fy"}})});
+  const Record found = simulateTest(model, test, indicated, options);
+  for (std::size_t i = 0; i < pure.size(); i += 53) {
+    EXPECT_NEAR(found.column("fy")[i], pure.column("fy")[i] + 3.0, 1e-6);
+    EXPECT_NEAR(found.column("fx")[i], pure.column("fx")[i], 1e-9);
+  }
+}
+
+TEST(EmpiricalEffects, aZeroIsUnknownWhereARecordBeginsInTheCut) {
+  CampaignTest test = slotCut(EVEN_RPM);
+  test.engage_time.reset();
+  const Record pure = run(mill(4, 30.0), test, 0.2);
+  Record indicated = pure;
+  for (double& f : indicated.add("fy")) f += 4.0;
+  SimulationOptions options;
+  options.noise = false;
+  options.phase = 0.0;
+  const EffectEntry zero = effectEntry("empirical:zero", {{"share", 1.0}}, {{"channel", "fy"}});
+  const Record found = simulateTest(with(mill(4, 30.0), {zero}), test, indicated, options);
+  EXPECT_NEAR(found.column("fy")[777], pure.column("fy")[777], 1e-9);
+}
+
 // The phase of a line is not a value of the model: it is estimated from each record.
 TEST(EmpiricalEffects, linesTakeTheirPhaseFromTheRecord) {
   const CampaignTest test = slotCut(EVEN_RPM);

@@ -143,6 +143,13 @@ struct BurstTrain {
   double shape(double since) const;
 };
 
+/// A constant on a channel that differs from record to record.
+struct RecordZero {
+  std::size_t channel = 0;
+  double share = 1.0;  ///< [1] of the value that acts
+  double value = 0.0;  ///< [unit of the channel] in this record; the caller estimates it
+};
+
 /// The physics of one entry of a model's `effects:`. A class overrides the functions of its stage
 /// (EffectStage).
 class Effect {
@@ -165,6 +172,8 @@ class Effect {
   virtual Tone* tone() { return nullptr; }
   /// The bursts of an effect that consists of them, else nullptr.
   virtual BurstTrain* bursts() { return nullptr; }
+  /// The zero of an effect that is one, else nullptr.
+  virtual RecordZero* zero() { return nullptr; }
 };
 
 /// The physics of an entry. @throws Error on an unknown name, a missing key, values that contradict each
