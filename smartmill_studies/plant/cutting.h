@@ -46,12 +46,15 @@ class Law {
                               -hidden("cutting_speed", "exponent"));
   }
 
-  /// Time-dependent inputs: factor [1] of the chip coefficients, time since engagement [s].
-  void setTime(double unsteadiness, double in_cut) {
+  /// Time-dependent inputs: factor [1] of the chip coefficients, time [s] and path [m] since engagement.
+  void setTime(double unsteadiness, double in_cut, double fed) {
     now_ = chip_factor_ * (1.0 + unsteadiness);
     if (isOutside(plant_, "softer_with_time"))
       now_ *= 1.0 + plant_.outside->size * std::exp(-in_cut / plant_.outside->place);
     edge_ = 1.0 + growth_ * (cut_before_ + in_cut);
+    const double hardness = hardnessAt(fed);
+    now_ *= hardness;
+    edge_ *= hardness;
   }
 
   /// Tangential, radial, axial force [N/m] on an edge. @param chip [m] > 0 @param into [m/s] velocity into
@@ -72,6 +75,18 @@ class Law {
   }
 
  private:
+  // [1] of the work at a path [m] since engagement.
+  double hardnessAt(double fed) const {
+    if (!plant_.outside) return 1.0;
+    const Outside& o = *plant_.outside;
+    if (o.kind == "hard_spot") {
+      const double off = (fed - o.place) / o.width;
+      return 1.0 + o.size * std::exp(-0.5 * off * off);
+    }
+    if (o.kind == "hardness_wave") return 1.0 + o.size * std::sin(units::TWO_PI * (fed - o.place) / o.width);
+    return o.kind == "hardness_slope" ? std::exp(o.size * fed / units::MM) : 1.0;
+  }
+
   const Plant& plant_;
   CuttingCoefficients c_;
   double growth_, cut_before_, exponent_, reference_, buildup_, damping_;
@@ -116,7 +131,7 @@ class Cutting {
               double fed) {
     Result sum;
     const double depth = depth_ + tilt_ * fed, radius = 0.5 * plant_.tool.diameter;
-    law_.setTime(unsteadiness, in_cut);
+    law_.setTime(unsteadiness, in_cut, fed);
     for (std::size_t s = 0; s < slabs_.size(); ++s) {
       const Slab& slab = slabs_[s];
       const double rise = std::min(depth, slab.high) - slab.low;

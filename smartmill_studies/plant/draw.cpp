@@ -290,13 +290,29 @@ Outside drawOutside(const std::string& kind, double depth, Random& random) {
   if (kind == "kink") o.size = between(random, 0.2, 0.5), o.place = between(random, 25e-6, 50e-6);
   if (kind == "softer_with_time") o.size = between(random, 0.1, 0.3), o.place = between(random, 0.03, 0.1);
   if (kind == "hard_skin") o.size = between(random, 0.15, 0.5), o.place = between(random, 0.2, 0.5) * depth;
+  if (kind == "hard_spot")
+    o.size = between(random, 0.15, 0.5), o.place = between(random, 0.3e-3, 1.5e-3),
+    o.width = between(random, 0.1e-3, 0.4e-3);
+  if (kind == "hardness_wave")
+    o.size = between(random, 0.1, 0.3), o.width = between(random, 1e-3, 4e-3),
+    o.place = between(random, 0.0, o.width);
+  if (kind == "hardness_slope") o.size = between(random, 0.03, 0.1) * oneOf<double>(random, {-1.0, 1.0});
+  const auto zero = [&](double low, double high) {
+    on_channel(low, high);
+    o.size *= oneOf<double>(random, {-1.0, 1.0});
+  };
+  if (kind == "zero_drift") zero(0.5, 3.0);
+  if (kind == "zero_approach") zero(6.0, 25.0), o.place = between(random, 100.0, 400.0);
+  if (kind == "zero_step") zero(4.0, 20.0), o.place = between(random, 200.0, 700.0);
+  if (kind == "zero_of_record") zero(4.0, 15.0);
   if (kind == "lost_corner") o.place = between(random, 0.2, 0.5) * depth;
   return o;
 }
 
 }  // namespace
 
-std::vector<Case> drawCases(const Counts& counts, const std::vector<std::string>& names, std::uint64_t seed) {
+std::vector<Case> drawCases(const Counts& counts, const std::vector<std::string>& names, std::uint64_t seed,
+                            const std::vector<std::string>& outside) {
   Random random(seed);
   std::vector<Case> cases;
   const auto add = [&](const std::string& kind, const std::vector<std::string>& hidden) {
@@ -321,7 +337,7 @@ std::vector<Case> drawCases(const Counts& counts, const std::vector<std::string>
   for (int k = 0; k < counts.triples; ++k) several("triple", 3);
   for (int k = 0; k < counts.none; ++k) add("none", {});
   for (int k = 0; k < counts.outside; ++k)
-    add("outside", {outsideKinds()[static_cast<std::size_t>(k) % outsideKinds().size()]});
+    add("outside", {outside[static_cast<std::size_t>(k) % outside.size()]});
   return cases;
 }
 
@@ -380,7 +396,7 @@ void writeTruth(const Drawn& drawn, const std::string& file) {
   if (drawn.plant.outside) {
     const Outside& o = *drawn.plant.outside;
     text << "outside: {kind: " << o.kind << ", channel: '" << o.channel << "', size: " << o.size
-         << ", place: " << o.place << "}\n";
+         << ", place: " << o.place << ", width: " << o.width << "}\n";
   }
   writeText(file, text.str());
 }

@@ -27,8 +27,9 @@ struct Counts {
 };
 
 /// The cases of a bench, rigid and vibrating in turn. The same arguments give the same cases.
-/// @param names effects to draw from
-std::vector<Case> drawCases(const Counts& counts, const std::vector<std::string>& names, std::uint64_t seed);
+/// @param names effects to draw from @param outside kinds of outside causes, drawn in turn
+std::vector<Case> drawCases(const Counts& counts, const std::vector<std::string>& names, std::uint64_t seed,
+                            const std::vector<std::string>& outside = outsideKinds());
 
 /// A machine, its nominal model and its tests.
 struct Drawn {

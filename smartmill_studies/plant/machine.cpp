@@ -143,7 +143,7 @@ class TestRun {
         sensor_(plant, hidden_, units::rpmFromRadPerSec(test.spindle_speed), step_),
         tip_(plant, hidden_, step_),
         disturbance_(hidden_, test.spindle_speed, random),
-        chain_(plant, hidden_, test.spindle_speed, step_, random),
+        chain_(plant, hidden_, test.start_time.value_or(0.0), test.spindle_speed, step_, random),
         peak_(std::uniform_real_distribution<double>(150.0, 300.0)(random)) {
     if (plant.spindle && turns()) drive_.emplace(plant, hidden_, test, step_);
     for (std::size_t a = 0; a < 3; ++a)
@@ -270,6 +270,13 @@ class TestRun {
 const std::vector<std::string>& outsideKinds() {
   static const std::vector<std::string> KINDS{"tone", "settling",         "half_order", "bursts",     "curve",
                                               "kink", "softer_with_time", "hard_skin",  "lost_corner"};
+  return KINDS;
+}
+
+const std::vector<std::string>& requestedOutsideKinds() {
+  static const std::vector<std::string> KINDS{"hard_spot",     "hardness_wave", "hardness_slope",
+                                              "zero_drift",    "zero_approach", "zero_step",
+                                              "zero_of_record"};
   return KINDS;
 }
 

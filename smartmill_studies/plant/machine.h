@@ -20,6 +20,7 @@ struct Outside {
   std::string channel;  ///< fx, fy, fz of those that act on a channel
   double size = 0.0;    ///< [N] on a channel, else [1]
   double place = 0.0;   ///< [Hz], order, [s] or [m], depending on the kind
+  double width = 0.0;   ///< [m] of hard_spot and hardness_wave
 };
 
 /// tone (place [Hz]), settling (place [s]) and half_order on a channel; bursts (place [s] between them);
@@ -28,6 +29,12 @@ struct Outside {
 /// uppermost place [m] of the depth has coefficients 1 + size; lost_corner: the lowest place [m] of one
 /// tooth's edge is missing.
 const std::vector<std::string>& outsideKinds();
+/// Kinds that the bench draws on request only. Factors on all coefficients at a path x along the feed since
+/// engagement: hard_spot, 1 + size exp(-((x - place) / width)^2 / 2); hardness_wave,
+/// 1 + size sin(2 pi (x - place) / width); hardness_slope, exp(size x / 1 mm). Zero of a channel at a time t
+/// since the machine was cold: zero_drift, size t / 1 min; zero_approach, size (1 - exp(-t / place));
+/// zero_step, size from place on; zero_of_record, size times a normal number in each record.
+const std::vector<std::string>& requestedOutsideKinds();
 
 /// Small imperfections of real machines that no model contains.
 struct Unsteadiness {

@@ -149,13 +149,17 @@ class Disturbance {
 /// Amplifiers, cables and the recorder: from the sensor to the file.
 class Chain {
  public:
-  Chain(const Plant& plant, const Hidden& hidden, double speed, double step, std::mt19937_64& random)
+  /// @param start [s] of the record since the machine was cold
+  Chain(const Plant& plant, const Hidden& hidden, double start, double speed, double step,
+        std::mt19937_64& random)
       : plant_(plant),
         hidden_(hidden),
+        start_(start),
         speed_(speed),
         step_(step),
         hum_phase_(std::uniform_real_distribution<double>(0, units::TWO_PI)(random)),
         own_phase_(std::uniform_real_distribution<double>(0, units::TWO_PI)(random)) {
+    if (isOutside(plant, "zero_of_record")) own_zero_ = std::normal_distribution<double>()(random);
     for (const EffectEntry* e : hidden.all("channel_delay")) {
       delay_[channelNumber(e->words.at("channel"))] += 1e-6 * e->numbers.at("delay_us");
       delayed_ = true;
@@ -218,6 +222,10 @@ class Chain {
     if (o.kind == "tone") value += o.size * std::sin(units::TWO_PI * o.place * time + own_phase_);
     if (o.kind == "half_order" && speed_ > 0.0) value += o.size * std::sin(0.5 * angle + own_phase_);
     if (o.kind == "settling") value += o.size * std::exp(-time / o.place);
+    if (o.kind == "zero_drift") value += o.size / 60.0 * (start_ + time);
+    if (o.kind == "zero_approach") value += o.size * (1.0 - std::exp(-(start_ + time) / o.place));
+    if (o.kind == "zero_step" && start_ + time > o.place) value += o.size;
+    if (o.kind == "zero_of_record") value += o.size * own_zero_;
     if (o.kind == "curve") value *= 1.0 + o.size * std::abs(value) / 1000.0;
     if (o.kind == "bursts") {
       const double since = std::fmod(time + o.place * own_phase_ / units::TWO_PI, o.place);
@@ -227,7 +235,7 @@ class Chain {
 
   const Plant& plant_;
   const Hidden& hidden_;
-  double speed_, step_, hum_phase_, own_phase_;
+  double start_, speed_, step_, hum_phase_, own_phase_, own_zero_ = 0.0;
   std::array<double, 4> delay_{};
   bool delayed_ = false;
   std::size_t longest_ = 0;  // delay of the slowest channel [steps]

@@ -30,7 +30,7 @@ std::vector<Hypothesis> localisedForms(const TwinRunner& runner, const std::vect
                                        const FitResult& now, const std::vector<Finding>& unexplained) {
   const FormContext context{runner, all, now, unexplained, residualByChannel(runner, now.residual)};
   std::vector<Hypothesis> located;
-  for (const auto& make : {makeLines, makeSteps, makeBursts, makeResonances})
+  for (const auto& make : {makeLines, makeSteps, makeBursts, makeResonances, makeForceCourses})
     make()->locate(context, &located);
   return located;
 }

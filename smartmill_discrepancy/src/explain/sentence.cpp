@@ -42,7 +42,7 @@ struct SentenceOptions {
   double follows = 0.97;     ///< [1] of the variance that a power law must explain to be named
   double alike = 0.2;        ///< [1] spread of teeth over their distance to the one that differs
   double out = 0.1;          ///< [1] force of a tooth that hardly cuts
-  double straight = 1500.0;  ///< [s] time constant beyond which wear is linear over any campaign
+  double straight = 1500.0;  ///< [s] time constant beyond which a change is almost linear
   double nothing = 0.15;     ///< [1] gain of an attenuated band
 };
 
@@ -134,6 +134,27 @@ std::string ofTime(const FoundEffect& effect) {
                    100.0 * std::abs(amplitude), moreOrLess(amplitude), valueOf(effect, "time_constant_s"));
 }
 
+std::string ofCourse(const FoundEffect& effect) {
+  struct Words {
+    const char *course, *unit, *check;
+  };
+  static const std::map<std::string, Words> WORDS{
+      {"path", {"along the feed", "mm", "the work for hard spots and a change of its hardness"}},
+      {"time", {"with the time in cut", "s", "the heating of tool and work"}},
+      {"revolutions",
+       {"with the revolutions in cut", "revolutions", "what repeats with the entry of a cut"}}};
+  const Words& words = WORDS.at(effect.words.at("over"));
+  const std::vector<double> at = seriesOf(effect, "at"), factor = seriesOf(effect, "factor");
+  const auto [low, high] = std::minmax_element(factor.begin(), factor.end());
+  const auto place = [&](std::vector<double>::const_iterator f) {
+    return at[static_cast<std::size_t>(f - factor.begin())];
+  };
+  return formatted(
+      "the cutting force changes %s, by the same factor in every cut: it is largest %.3g %s after the entry, "
+      "%.2f times the one at %.3g %s, where it is smallest; check %s",
+      words.course, place(high), words.unit, *high / *low, place(low), words.unit, words.check);
+}
+
 std::string ofProfile(const FoundEffect& effect) {
   const double extra = valueOf(effect, "factor") - 1.0;
   const bool surface = effect.words.at("from") == "surface";
@@ -204,11 +225,23 @@ std::string ofRamp(const FoundEffect& effect) {
 
 std::string ofApproach(const FoundEffect& effect) {
   const std::string& channel = effect.words.at("channel");
+  const double amplitude = valueOf(effect, "amplitude"), constant = valueOf(effect, "time_constant_s");
+  if (constant > LIMITS.straight)
+    return formatted(
+        "%s drifts by %+.3g %s per minute over the whole campaign, almost linearly: check the "
+        "temperature of its mounting and its charge amplifier",
+        channel.c_str(), 60.0 * amplitude / constant, unitOf(channel));
   return formatted(
       "%s reaches an offset of %+.3g %s while the machine warms up, exponentially with a time constant of "
       "%.2g min",
-      channel.c_str(), valueOf(effect, "amplitude"), unitOf(channel),
-      valueOf(effect, "time_constant_s") / 60.0);
+      channel.c_str(), amplitude, unitOf(channel), constant / 60.0);
+}
+
+std::string ofZero(const FoundEffect& effect) {
+  return formatted(
+      "the zero of %s differs from record to record, as the part without cut shows; %.0f %% of it act in the "
+      "cut: reset its amplifier before each test",
+      effect.words.at("channel").c_str(), 100.0 * valueOf(effect, "share"));
 }
 
 std::string ofBursts(const FoundEffect& effect) {
@@ -261,6 +294,7 @@ std::string sentenceOf(const FoundEffect& effect) {
   static const std::map<std::string, std::function<std::string(const FoundEffect&)>> SENTENCES{
       {"chip_thickness", ofChip},
       {"cutting_time", ofTime},
+      {"force_course", ofCourse},
       {"depth_profile", ofProfile},
       {"lost_edge", ofLostEdge},
       {"curve", ofCurve},
@@ -275,6 +309,7 @@ std::string sentenceOf(const FoundEffect& effect) {
       {"bursts", ofBursts},
       {"transfer", ofTransfer},
       {"resonance", ofResonance},
+      {"zero", ofZero},
       {"revolution", ofRevolution}};
   const EffectKind* kind = findEffect(effect.name);
   if (!kind || !kind->empirical()) return "";

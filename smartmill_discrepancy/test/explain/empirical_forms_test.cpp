@@ -70,6 +70,66 @@ TEST(EmpiricalForms, ToothFactor) {
   EXPECT_NEAR(valueOf(e.effects[0], "factor[2]"), 1.25, 0.01);
 }
 
+// A spot of the work 0.3 mm wide, at the same place of each cut: force of a rigid tool times 1.3.
+TEST(EmpiricalForms, HardSpot) {
+  const TemporaryFolder folder;
+  const Explanation e = explained(
+      [](const CampaignTest& test, std::uint64_t seed) {
+        Record record = pure(test, 1.0, seed);
+        const double feed =
+            test.engagement->feed_per_tooth * 4.0 * test.spindle_speed / units::TWO_PI / units::MM;
+        for (std::size_t i = 0; i < record.size(); ++i) {
+          const double off = (feed * (record.time[i] - *test.engage_time) - 0.7) / 0.15;
+          for (const char* channel : FORCES_SHOWN)
+            record.add(channel)[i] *= 1.0 + 0.3 * std::exp(-0.5 * off * off);
+        }
+        addNoise(record, seed);
+        return record;
+      },
+      folder.file("."), quickly());
+  expectBuilt(e, "force_course", "the cutting force changes along the feed");
+  EXPECT_EQ(e.effects[0].words.at("over"), "path");
+}
+
+// Heat: the force falls with the time in cut, to 0.8 at 40 ms and back to 1 at 80 ms.
+TEST(EmpiricalForms, ForceOverTimeInCut) {
+  const TemporaryFolder folder;
+  const Explanation e = explained(
+      [](const CampaignTest& test, std::uint64_t seed) {
+        Record record = pure(test, 1.0, seed);
+        for (std::size_t i = 0; i < record.size(); ++i) {
+          const double t = record.time[i] - *test.engage_time;
+          for (const char* channel : FORCES_SHOWN)
+            record.add(channel)[i] *= 1.0 - 0.2 * std::max(0.0, 1.0 - std::abs(t - 0.04) / 0.04);
+        }
+        addNoise(record, seed);
+        return record;
+      },
+      folder.file("."), quickly());
+  expectBuilt(e, "force_course", "the cutting force changes with the time in cut");
+  EXPECT_EQ(e.effects[0].words.at("over"), "time");
+}
+
+// Another place in each cut: not reproducible.
+TEST(EmpiricalForms, RejectsHardSpotsAtRandomPlaces) {
+  const TemporaryFolder folder;
+  const Explanation e = explained(
+      [](const CampaignTest& test, std::uint64_t seed) {
+        Record record = pure(test, 1.0, seed);
+        for (std::size_t i = 0; i < record.size(); ++i) {
+          const double place = 0.025 + 0.012 * static_cast<double>(seed * seed % 5);
+          const double off = (record.time[i] - place) / 0.004;
+          for (const char* channel : FORCES_SHOWN)
+            record.add(channel)[i] *= 1.0 + (seed % 2 ? 0.2 : -0.2) * std::exp(-0.5 * off * off);
+        }
+        addNoise(record, seed);
+        return record;
+      },
+      folder.file("."), quickly());
+  EXPECT_EQ(e.verdict, Verdict::unknown_effect);
+  EXPECT_TRUE(e.effects.empty()) << e.sentence;
+}
+
 TEST(EmpiricalForms, EdgeRunIn) {
   const TemporaryFolder folder;
   const Explanation e = explained(
@@ -99,6 +159,16 @@ TEST(EmpiricalForms, Drift) {
       withExtra(folder, "fz", [](const CampaignTest&, double time, std::uint64_t) { return -160.0 * time; });
   expectBuilt(e, "ramp", "linear like charge_drift");
   EXPECT_NEAR(valueOf(e.effects[0], "per_min"), -9600.0, 100.0);
+}
+
+// The zero of each record is another one; only the part before the engagement shows it.
+TEST(EmpiricalForms, ZeroOfEachRecord) {
+  const TemporaryFolder folder;
+  const Explanation e = withExtra(folder, "fz", [](const CampaignTest&, double, std::uint64_t seed) {
+    return 3.0 * static_cast<double>(seed * seed * 7 % 11) - 15.0;
+  });
+  expectBuilt(e, "zero", "the zero of fz differs from record to record");
+  EXPECT_NEAR(valueOf(e.effects[0], "share"), 1.0, 0.02);
 }
 
 TEST(EmpiricalForms, WarmUp) {

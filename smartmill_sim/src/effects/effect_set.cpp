@@ -92,6 +92,14 @@ std::vector<BurstTrain*> EffectSet::bursts() {
   return all;
 }
 
+std::vector<RecordZero*> EffectSet::zeros() {
+  std::vector<RecordZero*> all;
+  for (const Member& m : effects_) {
+    if (RecordZero* zero = m.effect->zero()) all.push_back(zero);
+  }
+  return all;
+}
+
 void SignalStage::apply(double record_time, ChannelValues& channels) const {
   Instant at = now_;
   at.record_time = record_time;

@@ -12,7 +12,7 @@ CuttingParts::CuttingParts(const MachineModel& original, const TwinSetup& setup,
 }
 
 void CuttingParts::update(const ToolMotion& motion) {
-  timeline.update(motion, cut.contact.cutTime());
+  timeline.update(motion, cut.contact.progress());
   cut.update(timeline.state());
   chain.update(timeline.state());
 }

@@ -30,12 +30,12 @@ bool EffectTimeline::beginStep(double speed) {
   return due;
 }
 
-void EffectTimeline::update(const ToolMotion& motion, double cut_time) {
+void EffectTimeline::update(const ToolMotion& motion, const CutProgress& cut) {
   now_.angle = motion.angle;
   now_.speed = motion.speed;
   now_.start_time = clock_.start_time;
   now_.edge_time = clock_.edge_time;
-  now_.cut_time = cut_time;
+  now_.cut = cut;
   state_ = nominal_;
   effects_.update(now_, state_);
 }

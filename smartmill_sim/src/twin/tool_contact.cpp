@@ -8,7 +8,7 @@
 namespace smartmill::sim {
 void ToolContact::engage(const std::vector<ContactArc>& arcs, const ToolMotion& now, double rise) {
   if (!feed_start_) feed_start_ = now.centre;
-  if (arcs_.empty()) cut_time_ = feed_path_ = 0.0;
+  if (arcs_.empty()) progress_ = {};
   // A contact that only shifts changes the force gradually.
   changed_ = arcs_.empty() != arcs.empty();
   jump_ = 1.0 - rise;
@@ -17,7 +17,7 @@ void ToolContact::engage(const std::vector<ContactArc>& arcs, const ToolMotion& 
 
 void ToolContact::setDepth(double depth, double passed_over) {
   for (ContactArc& a : arcs_) a.depth = depth;
-  feed_path_ += passed_over;
+  progress_.path += passed_over;
 }
 
 double ToolContact::chip(const ToolMotion& motion, int teeth) {
@@ -34,7 +34,7 @@ bool ToolContact::depthsChange(const TwinState& state) const {
 }
 
 std::vector<ContactArc> ToolContact::actualArcs(const TwinState& state) {
-  const double error = state.depth_extra + state.depth_slope * feed_path_;
+  const double error = state.depth_extra + state.depth_slope * progress_.path;
   depth_extra_ = state.depth_extra;
   std::vector<ContactArc> actual = arcs_;
   for (ContactArc& a : actual) a.depth = error == 0.0 ? a.depth : std::max(a.depth + error, SMALLEST_DEPTH);
@@ -54,10 +54,10 @@ ToolMotion ToolContact::actualMotion(const ToolMotion& commanded, const TwinStat
 
 void ToolContact::advance(double time, const ToolMotion& motion, const TwinState& state) {
   if (!cutting()) return;
-  cut_time_ += time;
-  if (state.depth_slope == 0.0) return;
+  progress_.time += time;
+  progress_.angle += time * std::abs(motion.speed);
   const std::array<double, 2>& v = motion.velocity;
-  feed_path_ += time * state.feed_ratio * std::hypot(v[0], v[1]);
+  progress_.path += time * state.feed_ratio * std::hypot(v[0], v[1]);
 }
 
 }  // namespace smartmill::sim

@@ -18,6 +18,7 @@
 #include "smartmill_sim/twin/cut_traces.h"
 #include "smartmill_sim/twin/cutting_machine.h"
 #include "smartmill_sim/twin/tip_trajectory.h"
+#include "twin/record_zeros.h"
 #include "twin/steady_test.h"
 #include "twin/tap_input.h"
 #include "twin/tone_phases.h"
@@ -141,6 +142,7 @@ void run(const MachineModel& model, const CampaignTest& test, const SimulationOp
   const Record* const phases = options.random_phases ? nullptr : recorded;
   findPhases(phases, out, test.sample_rate, test.spindle_speed, signals, random);
   findBursts(phases, out, test.sample_rate, signals, random);
+  findZeros(test, recorded, out, signals);
   for (std::size_t i = 0; i < record.size() && (options.noise || signals.acts()); ++i) {
     ChannelValues values{};
     for (const std::size_t c : simulated_channels) values[c] = (*out[c])[i];

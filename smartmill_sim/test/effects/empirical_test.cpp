@@ -1,5 +1,6 @@
 // Empirical effects against their closed forms.
 
+#include <algorithm>
 #include <cmath>
 #include <complex>
 
@@ -65,6 +66,42 @@ TEST(EmpiricalEffects, chipForceSettlesWithTheTimeInCut) {
     const double factor = 1.0 + 0.25 * std::exp(-(record.time[i] - engage) / 0.05);
     EXPECT_NEAR(fz[i], axialForce(model, factor * FEED, DEPTH), 2e-3 * fz[i]) << turn;
   }
+}
+
+// The factor is that of the place that the cut has reached, on chip and edge force; between two nodes linear,
+// beyond them constant.
+TEST(EmpiricalEffects, forceFollowsItsCourseInTheCut) {
+  const double revolutions_per_s = 1.0 / REVOLUTION, engage = 4 * REVOLUTION;
+  const double feed_mm = 2 * FEED / units::MM * revolutions_per_s;  // per second
+  struct Case {
+    const char* over;
+    double per_second;
+  };
+  for (const Case& c : {Case{"path", feed_mm}, Case{"time", 1.0}, Case{"revolutions", revolutions_per_s}}) {
+    const double from = 0.05 * c.per_second, to = 0.15 * c.per_second;
+    const MachineModel model =
+        with(mill(2, 0.0), {effectEntry("empirical:force_course", {}, {{"over", c.over}},
+                                        {{"at", {from, to}}, {"factor", {0.9, 1.5}}})});
+    CampaignTest test = slotCut(EVEN_RPM, DEPTH, FEED);
+    test.engage_time = engage;
+    const Record record = run(model, test, 0.3);
+    const std::vector<double>& fz = record.column("fz");
+    for (const int turn : {5, 8, 10, 13}) {
+      const auto i = static_cast<std::size_t>(std::lround((turn * REVOLUTION + 0.25 * REVOLUTION) * RATE));
+      const double share = std::clamp((record.time[i] - engage - 0.05) / 0.1, 0.0, 1.0);
+      const double expected = (0.9 + 0.6 * share) * axialForce(model, FEED, DEPTH);
+      EXPECT_NEAR(fz[i], expected, 3e-3 * expected) << c.over << " " << turn;
+    }
+  }
+}
+
+TEST(EmpiricalEffects, aCourseNeedsRisingPlacesWithOneFactorEach) {
+  const auto course = [](const std::vector<double>& at, const std::vector<double>& factor) {
+    return effectEntry("empirical:force_course", {}, {{"over", "path"}}, {{"at", at}, {"factor", factor}});
+  };
+  EXPECT_THROW(makeEffect(course({0.0, 0.0}, {1.0, 1.2})), Error);
+  EXPECT_THROW(makeEffect(course({0.0, 1.0, 2.0}, {1.0, 1.2})), Error);
+  EXPECT_THROW(makeEffect(course({0.0}, {1.0})), Error);
 }
 
 TEST(EmpiricalEffects, aHeightOfTheEdgeCutsHarder) {
@@ -144,6 +181,40 @@ TEST(EmpiricalEffects, aChannelSettlesFromTheBeginningOfTheRecord) {
   for (const std::size_t i : {0u, 1000u, 4000u})
     EXPECT_NEAR(record.column("fy")[i], -7.0 * std::exp(-static_cast<double>(i) / RATE / 0.04), 1e-9);
   EXPECT_EQ(record.column("fx")[1000], 0.0);
+}
+
+// The zero of a record is estimated before the engagement and acts throughout.
+TEST(EmpiricalEffects, aZeroIsTakenFromTheRecordBeforeItsCut) {
+  CampaignTest test = slotCut(EVEN_RPM);
+  test.engage_time = 4 * REVOLUTION;
+  const Record pure = run(mill(4, 30.0), test, 0.2);
+  Record indicated = pure;
+  for (std::size_t i = 0; i < pure.size(); ++i)
+    indicated.add("fy")[i] = pure.column("fy")[i] + (pure.time[i] < *test.engage_time ? 4.0 : 400.0);
+  SimulationOptions options;
+  options.noise = false;
+  options.phase = 0.0;
+  const MachineModel model =
+      with(mill(4, 30.0), {effectEntry("empirical:zero", {{"share", 0.75}}, {{"channel", "fy"}})});
+  const Record found = simulateTest(model, test, indicated, options);
+  for (std::size_t i = 0; i < pure.size(); i += 53) {
+    EXPECT_NEAR(found.column("fy")[i], pure.column("fy")[i] + 3.0, 1e-6);
+    EXPECT_NEAR(found.column("fx")[i], pure.column("fx")[i], 1e-9);
+  }
+}
+
+TEST(EmpiricalEffects, aZeroIsUnknownWhereARecordBeginsInTheCut) {
+  CampaignTest test = slotCut(EVEN_RPM);
+  test.engage_time.reset();
+  const Record pure = run(mill(4, 30.0), test, 0.2);
+  Record indicated = pure;
+  for (double& f : indicated.add("fy")) f += 4.0;
+  SimulationOptions options;
+  options.noise = false;
+  options.phase = 0.0;
+  const EffectEntry zero = effectEntry("empirical:zero", {{"share", 1.0}}, {{"channel", "fy"}});
+  const Record found = simulateTest(with(mill(4, 30.0), {zero}), test, indicated, options);
+  EXPECT_NEAR(found.column("fy")[777], pure.column("fy")[777], 1e-9);
 }
 
 // The phase of a line is not a value of the model: it is estimated from each record.

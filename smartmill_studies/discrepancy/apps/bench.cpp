@@ -1,6 +1,7 @@
 // rosrun smartmill_studies discrepancy_bench: hides causes in a machine that shares no physics with the twin,
 // runs explain and scores its answers against the hidden truth.
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -28,7 +29,7 @@ using nlohmann::json;
 
 struct Options {
   std::string out;
-  std::vector<std::string> only;
+  std::vector<std::string> only, outside_kinds = plant::outsideKinds();
   plant::Counts counts;
   StudyCase one;
   int threads = 2, cases = 0;
@@ -47,6 +48,17 @@ std::vector<std::string> namesOf(const Options& o) {
     if (!kind.has(EffectNeed::axis_motion)) names.push_back(kind.name);
   }
   return names;
+}
+
+void checkOutsideKinds(const std::vector<std::string>& kinds) {
+  const auto contains = [](const std::vector<std::string>& known, const std::string& kind) {
+    return std::find(known.begin(), known.end(), kind) != known.end();
+  };
+  for (const std::string& kind : kinds) {
+    if (!contains(plant::outsideKinds(), kind) && !contains(plant::requestedOutsideKinds(), kind))
+      throw UsageError("--outside-kinds: '" + kind + "' is no kind of outside cause");
+  }
+  if (kinds.empty()) throw UsageError("--outside-kinds: expected at least one kind");
 }
 
 // Results of an earlier run of the same bench, by case.
@@ -69,7 +81,8 @@ void runOne(const Options& o, const plant::Case& hidden) {
 
 void run(const Options& o) {
   if (o.one.scores()) return scoreBench(readJsonLines(o.one.lines), o.out.empty() ? "." : o.out);
-  std::vector<plant::Case> cases = plant::drawCases(o.counts, namesOf(o), o.seed);
+  checkOutsideKinds(o.outside_kinds);
+  std::vector<plant::Case> cases = plant::drawCases(o.counts, namesOf(o), o.seed, o.outside_kinds);
   if (o.cases > static_cast<int>(cases.size()))
     throw UsageError("--cases: " + std::to_string(cases.size()) +
                      " are drawn by --singles, --pairs and so on");
@@ -117,6 +130,9 @@ int main(int argc, char** argv) {
   line.option("--triples", o.counts.triples, "cases of three effects");
   line.option("--none", o.counts.none, "cases with nothing hidden");
   line.option("--outside", o.counts.outside, "cases with a cause outside the catalogue");
+  line.option("--outside-kinds", o.outside_kinds,
+              "kinds of outside causes, comma separated (default: those of the bench)")
+      .commas();
   line.option("--only", o.only, "effects to draw from, comma separated").commas();
   line.option("--cases", o.cases, "number of cases, from the first (default: all)").notNegative();
   line.option("--case", o.one.number, "only this case, with progress on standard error");

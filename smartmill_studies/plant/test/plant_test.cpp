@@ -400,6 +400,63 @@ TEST(Machine, HasEveryEffectOfTheCatalogue) {
   }
 }
 
+// Rigid: the force at each path is that of uniform work times the factor there.
+TEST(Machine, HardnessScalesTheForceAlongTheFeed) {
+  Plant plant = rigidPlant();
+  CampaignTest cut = slot(3000.0, 0.1e-3, 2e-3);
+  cut.engage_time = 0.0;
+  RunOptions options;
+  options.noise = false;
+  options.steps = 2;
+  options.slice = 0.5e-3;
+  options.phase = 0.3;
+  const auto fx = [&] {
+    std::mt19937_64 random(1);
+    return run(plant, cut, options, random).column("fx");
+  };
+  const std::vector<double> uniform = fx();
+  const double feed = 0.1e-3 * plant.tool.teeth * 50.0;  // [m/s]
+  for (const std::string kind : {"hard_spot", "hardness_wave", "hardness_slope"}) {
+    plant.outside = Outside{kind, "", 0.3, 0.8e-3, 0.5e-3};
+    const std::vector<double> hard = fx();
+    for (std::size_t i = 500; i < hard.size(); i += 97) {
+      const double x = feed * static_cast<double>(i) / cut.sample_rate;
+      const double off = (x - 0.8e-3) / 0.5e-3;
+      const double factor = kind == "hard_spot"       ? 1.0 + 0.3 * std::exp(-0.5 * off * off)
+                            : kind == "hardness_wave" ? 1.0 + 0.3 * std::sin(units::TWO_PI * off)
+                                                      : std::exp(300.0 * x);
+      EXPECT_NEAR(hard[i], factor * uniform[i], 1e-6 * std::abs(hard[i]) + 1e-6) << kind << " " << i;
+    }
+  }
+}
+
+// Air cut without noise: the channel shows its zero.
+TEST(Machine, ZeroOfAChannelFollowsTheMachinesTime) {
+  Plant plant = rigidPlant();
+  CampaignTest air = slot(3000.0, 0.1e-3, 2e-3);
+  air.kind = TestKind::air;
+  air.engagement.reset();
+  RunOptions options;
+  options.noise = false;
+  const auto fy = [&](double start, int seed) {
+    air.start_time = start;
+    std::mt19937_64 random(seed);
+    return run(plant, air, options, random).column("fy");
+  };
+  const double end = 99.0 / air.sample_rate;  // [s] of the sample compared
+  plant.outside = Outside{"zero_drift", "fy", 3.0, 0.0, 0.0};
+  EXPECT_NEAR(fy(120.0, 1)[99], 3.0 / 60.0 * (120.0 + end), 1e-9);
+  plant.outside = Outside{"zero_approach", "fy", 8.0, 100.0, 0.0};
+  EXPECT_NEAR(fy(100.0, 1)[99], 8.0 * (1.0 - std::exp(-1.0 - end / 100.0)), 1e-9);
+  plant.outside = Outside{"zero_step", "fy", -5.0, 110.0, 0.0};
+  EXPECT_NEAR(fy(100.0, 1)[99], 0.0, 1e-9);
+  EXPECT_NEAR(fy(120.0, 1)[99], -5.0, 1e-9);
+  plant.outside = Outside{"zero_of_record", "fy", 5.0, 0.0, 0.0};
+  const std::vector<double> one = fy(100.0, 1), other = fy(100.0, 2);
+  EXPECT_NEAR(one[0], one[99], 1e-9);
+  EXPECT_GT(std::abs(one[0] - other[0]), 0.1);
+}
+
 TEST(Draw, TheSameCaseGivesTheSameRecordsAndAnotherRunOthers) {
   const std::vector<Case> cases = drawCases({1, 0, 0, 0, 0}, {"runout"}, 5);
   ASSERT_EQ(cases.size(), 1u);

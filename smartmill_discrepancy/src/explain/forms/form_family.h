@@ -40,6 +40,7 @@ std::unique_ptr<FormFamily> makeLines();
 std::unique_ptr<FormFamily> makeSteps();
 std::unique_ptr<FormFamily> makeBursts();
 std::unique_ptr<FormFamily> makeResonances();
+std::unique_ptr<FormFamily> makeForceCourses();
 
 /// Whether a hypothesis is a form of the empirical catalogue whose variant begins as stated.
 bool isForm(const Hypothesis& hypothesis, const char* form, const std::string& variant);

@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <utility>
+#include <vector>
 
 #include "explain/forms/form_family.h"
 #include "smartmill_core/formatted.h"
@@ -40,8 +42,31 @@ Step stepInRecords(const std::vector<ChannelResidual>& tests) {
   return best;
 }
 
+// [s] since the cold start, of a record.
+double endOf(const TestData& test) {
+  return *test.test.start_time + static_cast<double>(test.record.size()) / test.test.sample_rate;
+}
+
+// The same step at each time between two tests from one time to another: other tests than those of the
+// residual may lie there.
+std::vector<Step> betweenTests(const Dataset& data, const Step& step, double from, double to) {
+  std::vector<std::pair<double, double>> records;
+  for (const TestData& t : data.tests) {
+    if (t.test.start_time && *t.test.start_time > from && *t.test.start_time < to)
+      records.emplace_back(*t.test.start_time, endOf(t));
+  }
+  records.emplace_back(to, to);
+  std::sort(records.begin(), records.end());
+  std::vector<Step> steps;
+  for (const auto& [begin, end] : records) {
+    steps.push_back({0.5 * (from + begin), step.size, step.gain});
+    from = end;
+  }
+  return steps;
+}
+
 // One step between two tests.
-Step stepBetweenTests(std::vector<ChannelResidual> tests) {
+std::vector<Step> stepBetweenTests(const Dataset& data, std::vector<ChannelResidual> tests) {
   tests.erase(std::remove_if(tests.begin(), tests.end(),
                              [](const ChannelResidual& t) { return !t.test->test.start_time; }),
               tests.end());
@@ -54,7 +79,7 @@ Step stepBetweenTests(std::vector<ChannelResidual> tests) {
     sum += t.mean * static_cast<double>(t.values.size());
   }
   Step best;
-  double before = 0.0, product = 0.0;
+  double from = 0.0, to = 0.0, before = 0.0, product = 0.0;
   for (std::size_t k = 0; k + 1 < tests.size(); ++k) {
     const ChannelResidual& t = tests[k];
     const auto n = static_cast<double>(t.values.size());
@@ -62,10 +87,11 @@ Step stepBetweenTests(std::vector<ChannelResidual> tests) {
     product -= n * (t.mean - sum / all);
     const double squares = before * (all - before) / all, gain = product * product / squares;
     if (gain <= best.gain) continue;
-    const double end = *t.test->test.start_time + n / t.test->test.sample_rate;
-    best = {0.5 * (end + *tests[k + 1].test->test.start_time), product / squares, gain};
+    best = {0.0, product / squares, gain};
+    from = endOf(*t.test);
+    to = *tests[k + 1].test->test.start_time;
   }
-  return best;
+  return betweenTests(data, best, from, to);
 }
 
 /// The best step of each channel, at a time of every record and between two tests.
@@ -76,11 +102,14 @@ class Steps : public FormFamily {
       for (const Hypothesis& h : context.forms) {
         if (!isForm(h, "step", channel + ",")) continue;
         const bool record = h.variant == channel + ", record";
-        const Step step = record ? stepInRecords(tests) : stepBetweenTests(tests);
-        if (step.gain < options_.min_gain) continue;
-        Hypothesis at = h;
-        at.number("at_s", step.at).probe({0.0}, {{step.size * tests.front().noise}});
-        located->push_back(at.named(h.variant + formatted(", %.5g s", step.at)));
+        const std::vector<Step> steps =
+            record ? std::vector<Step>{stepInRecords(tests)} : stepBetweenTests(context.runner.data(), tests);
+        for (const Step& step : steps) {
+          if (step.gain < options_.min_gain) continue;
+          Hypothesis at = h;
+          at.number("at_s", step.at).probe({0.0}, {{step.size * tests.front().noise}});
+          located->push_back(at.named(h.variant + formatted(", %.5g s", step.at)));
+        }
       }
     }
   }

@@ -36,6 +36,7 @@ class EffectSet {
   ChannelValues limits() const;
   std::vector<Tone*> tones();
   std::vector<BurstTrain*> bursts();
+  std::vector<RecordZero*> zeros();
 
  private:
   struct Member {
@@ -59,6 +60,8 @@ class SignalStage {
   std::vector<Tone*> tones() const { return effects_.tones(); }
   /// Burst trains; the caller sets their begin.
   std::vector<BurstTrain*> bursts() const { return effects_.bursts(); }
+  /// Zeros of channels; the caller sets their values.
+  std::vector<RecordZero*> zeros() const { return effects_.zeros(); }
   /// Largest magnitude that each channel can indicate; infinity: unlimited.
   ChannelValues limits() const { return effects_.limits(); }
 

@@ -32,8 +32,8 @@ class EffectTimeline {
   /// Begins a step. @param speed [rad/s] @return whether update() is required: from time to time, since
   /// effects change slowly, and at another speed
   bool beginStep(double speed);
-  /// Computes the state at a motion. @param cut_time [s] of the contact
-  void update(const ToolMotion& motion, double cut_time);
+  /// Computes the state at a motion.
+  void update(const ToolMotion& motion, const CutProgress& cut);
   /// The instant of a step. @param chip [m] and depth [m] of the cut, 0 without one
   void setInstant(const ToolMotion& motion, const Axes3& axis_acceleration, double chip, double depth);
   void setAngle(double angle) { now_.angle = angle; }  ///< [rad]

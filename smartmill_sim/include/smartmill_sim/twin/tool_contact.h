@@ -22,7 +22,7 @@ class ToolContact {
   void setDepth(double depth, double passed_over);
 
   double depth() const { return arcs_.front().depth; }  ///< [m] commanded, of the first arc
-  double cutTime() const { return cut_time_; }          ///< [s] since engagement
+  const CutProgress& progress() const { return progress_; }
   /// Commanded feed per tooth [m] of a turning tool.
   double chip(const ToolMotion& motion, int teeth);
 
@@ -39,14 +39,13 @@ class ToolContact {
     jump_ = 0.0;
     changed_ = false;
   }
-  /// Advances the time [s] of the cut.
+  /// Advances the cut by a time [s].
   void advance(double time, const ToolMotion& motion, const TwinState& state);
 
  private:
-  std::vector<ContactArc> arcs_;                     // as commanded
-  double depth_extra_ = 0.0;                         // [m] contained in the present depths
-  double feed_path_ = 0.0;                           // [m] since engagement
-  double cut_time_ = 0.0;                            // [s] since engagement
+  std::vector<ContactArc> arcs_;  // as commanded
+  double depth_extra_ = 0.0;      // [m] contained in the present depths
+  CutProgress progress_;
   std::optional<std::array<double, 2>> feed_start_;  // [m] start of the feed error
   std::array<double, 3> chip_motion_{{0, 0, 0}};     // velocity and speed that give chip_
   double chip_ = 0.0;                                // [m]

@@ -24,7 +24,7 @@ class CuttingTime : public Effect {
       : amplitude_(valueOf(entry, "amplitude")), constant_(valueOf(entry, "time_constant_s")) {}
 
   void update(const Instant& now, TwinState& state) const override {
-    state.law.chip_factor *= 1.0 + amplitude_ * std::exp(-now.cut_time / constant_);
+    state.law.chip_factor *= 1.0 + amplitude_ * std::exp(-now.cut.time / constant_);
   }
 
  private:

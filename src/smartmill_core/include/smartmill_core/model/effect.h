@@ -72,14 +72,21 @@ struct TwinSetup {
   std::vector<std::pair<std::size_t, Shelf>> shelves;  ///< by channel, act before the delays
 };
 
+/// How far a cut is since it began.
+struct CutProgress {
+  double time = 0.0;   ///< [s]
+  double path = 0.0;   ///< [m] along the feed
+  double angle = 0.0;  ///< [rad] turned by the spindle
+};
+
 /// The present time step.
 struct Instant {
-  double angle = 0.0;                  ///< [rad] immersion angle of tooth 1
-  double speed = 0.0;                  ///< [rad/s] of the spindle
-  double record_time = 0.0;            ///< [s] since the record began
-  double start_time = 0.0;             ///< [s] of the record, since the machine was started cold
-  double edge_time = 0.0;              ///< [s] that the edge has cut
-  double cut_time = 0.0;               ///< [s] since this cut began
+  double angle = 0.0;        ///< [rad] immersion angle of tooth 1
+  double speed = 0.0;        ///< [rad/s] of the spindle
+  double record_time = 0.0;  ///< [s] since the record began
+  double start_time = 0.0;   ///< [s] of the record, since the machine was started cold
+  double edge_time = 0.0;    ///< [s] that the edge has cut
+  CutProgress cut;
   double chip = 0.0;                   ///< [m] commanded feed per tooth; 0 outside a cut
   double depth = 0.0;                  ///< [m] commanded axial depth; 0 outside a cut
   Axes3 axis_acceleration{{0, 0, 0}};  ///< [m/s2] of the machine axes, where their motion is recorded
@@ -136,6 +143,13 @@ struct BurstTrain {
   double shape(double since) const;
 };
 
+/// A constant on a channel that differs from record to record.
+struct RecordZero {
+  std::size_t channel = 0;
+  double share = 1.0;  ///< [1] of the value that acts
+  double value = 0.0;  ///< [unit of the channel] in this record; the caller estimates it
+};
+
 /// The physics of one entry of a model's `effects:`. A class overrides the functions of its stage
 /// (EffectStage).
 class Effect {
@@ -158,6 +172,8 @@ class Effect {
   virtual Tone* tone() { return nullptr; }
   /// The bursts of an effect that consists of them, else nullptr.
   virtual BurstTrain* bursts() { return nullptr; }
+  /// The zero of an effect that is one, else nullptr.
+  virtual RecordZero* zero() { return nullptr; }
 };
 
 /// The physics of an entry. @throws Error on an unknown name, a missing key, values that contradict each
