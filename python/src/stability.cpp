@@ -88,13 +88,13 @@ py::object detect(const std::vector<Array>& samples, double rate, double speed, 
   Recording recording{rate, {}};
   for (const Array& channel : samples) recording.channels.push_back(vectorOf(channel));
   return verdictOf(interruptible(py::none(), [=](Work&) {
-    return judgeRecording(recording, {speed, teeth, speed_error, modes});
+    return judgeRecording(recording, {speed, teeth, speed_error, modes, {}});
   }));
 }
 
 py::object detectSound(const std::string& file, double speed, int teeth, double speed_error,
                        const std::vector<double>& modes) {
-  const RecordingRequest request{speed, teeth, speed_error, modes};
+  const RecordingRequest request{speed, teeth, speed_error, modes, {}};
   request.validate();
   return verdictOf(interruptible(py::none(), [=](Work& work) {
     SoundFile sound = readSoundFile(file);

@@ -36,6 +36,9 @@ constexpr double ALIASED_TO = 2.0;  ///< [sample rates] harmonics above are weak
 /// Without a sign that teeth cut nothing is cut below this probability of chatter, unless the vibration
 /// between the spindle harmonics has this many times their power, which no bearing of an idle spindle has.
 constexpr double NO_CUT_BELOW = 0.4, LOUD = 50.0;
+/// The same of a single edge (turning, fly cutting), which has no harmonics that distinguish a cut.
+constexpr double LOUD_SINGLE = 10.0;
+constexpr double SAME_RATE = 1e-3;     ///< [1] difference of the sample rates of recording and idle recording
 constexpr double LEAST_TURNS = 3.0;    ///< [revolutions] of a recording
 constexpr double SPEED_TURNS = 12.0;   ///< [revolutions] for the speed from the harmonics
 constexpr double WINDOW_TURNS = 36.0;  ///< [revolutions] of a recording that is divided into windows
@@ -92,6 +95,16 @@ Spectrogram pictureOf(const Recording& recording) {
   const CutFinderOptions options;
   const double seconds = static_cast<double>(recording.channels[0].size()) / recording.sample_rate;
   return spectrogramOf(recording, std::min(options.longest_window, seconds / PARTS), options.highest);
+}
+
+/// [Hz] @throws Error if the samples do not resolve it
+double toothPassing(const Recording& recording, int teeth, double speed) {
+  const double passing = teeth * speed / units::TWO_PI;
+  if (2.0 * passing > recording.sample_rate)
+    throw Error(formatted(
+        "recording: sample rate %.0f Hz: expected at least twice the tooth passing frequency, %.0f Hz",
+        recording.sample_rate, passing));
+  return passing;
 }
 
 struct SpindleSpeed {
@@ -154,16 +167,20 @@ class RecordingAnalysis {
     for (const std::vector<double>& channel : recording_.channels) {
       const double deviation = standardDeviation(channel);
       if (!(deviation > 0.0)) continue;
-      channels_.push_back(channel);
-      for (double& value : channels_.back()) value /= recording_.same_unit ? largest : deviation;
+      const double unit = recording_.same_unit ? largest : deviation;
+      channels_.push_back(scaled(channel, unit));
+      if (!request.idle.channels.empty())
+        idle_.push_back(scaled(
+            request.idle.channels[static_cast<std::size_t>(&channel - recording_.channels.data())], unit));
     }
   }
 
   RecordingVerdict run() {
-    const std::vector<double> background = this->background();
+    const std::vector<double> background = idle_.empty() ? this->background() : idleBackground();
     for (const double start : startsWithin(true)) {
       const RevolutionWindow window = windowAt(start);
       addOrders(window);
+      level_ += window.total();
       add(criterion_.judge(window, period_, background));
     }
     return verdict();
@@ -222,6 +239,33 @@ class RecordingAnalysis {
     return sum;
   }
 
+  /// Mean power of each line of the idle spindle, and its level.
+  std::vector<double> idleBackground() {
+    const double length = revolution_ * static_cast<double>(turns_);
+    std::vector<double> sum;
+    double windows = 0.0;
+    for (double start = 1.0; start + length + 3.0 < static_cast<double>(idle_[0].size());
+         start += 0.5 * length) {
+      RevolutionWindow window(static_cast<std::size_t>(std::ceil(revolution_)), turns_, teeth_);
+      for (const std::vector<double>& channel : idle_) window.add(channel, start, revolution_);
+      sum.resize(window.power().size(), 0.0);
+      for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += window.power()[k];
+      idle_level_ += window.total();
+      windows += 1.0;
+    }
+    if (windows == 0.0)
+      throw Error(formatted("idle recording: %zu samples: expected at least the %zu revolutions of a window",
+                            idle_[0].size(), turns_));
+    for (double& power : sum) power /= windows;
+    idle_level_ /= windows;
+    return sum;
+  }
+
+  static std::vector<double> scaled(std::vector<double> channel, double unit) {
+    for (double& value : channel) value /= unit;
+    return channel;
+  }
+
   void addOrders(const RevolutionWindow& window) {
     of_order_.resize(window.ofOrder().size(), 0.0);
     for (std::size_t k = 1; k < of_order_.size(); ++k)
@@ -240,19 +284,27 @@ class RecordingAnalysis {
   }
 
   /// Whether most of the synchronous power is at one order above that of the teeth that is not theirs:
-  /// neither teeth nor runout do that, but chatter next to a spindle harmonic does.
+  /// neither teeth nor runout do that, but chatter next to a spindle harmonic does. The speed of few
+  /// revolutions may have been fitted to the chatter, so that a high order of the teeth is no better.
   bool harmonicLikeChatter() const {
     const auto strongest =
         static_cast<std::size_t>(std::max_element(of_order_.begin(), of_order_.end()) - of_order_.begin());
     const double all = std::accumulate(of_order_.begin(), of_order_.end(), 0.0);
     const auto teeth = static_cast<std::size_t>(teeth_);
-    return strongest > teeth && strongest % teeth != 0 && 2.0 * of_order_[strongest] > all;
+    const bool of_teeth =
+        strongest % teeth == 0 &&
+        (!brief() || strongest <= static_cast<std::size_t>(CutFinderOptions().harmonics) * teeth);
+    return strongest > teeth && !of_teeth && 2.0 * of_order_[strongest] > all;
   }
+
+  bool brief() const { return static_cast<double>(turns_) * static_cast<double>(windows_) < WINDOW_TURNS; }
 
   /// Signs that teeth cut: their harmonics are stronger than the other spindle harmonics, which an idle
   /// spindle has as well; a part of some length is louder; the vibration is modulated by the teeth.
   bool cuts() const {
     constexpr std::size_t LEAST_WINDOWS = 4;  // a slamming door is shorter
+    if (!idle_.empty())
+      return level_ > CutFinderOptions().contrast * static_cast<double>(windows_) * idle_level_;
     return teethDominate() || (cut_.hasAir() && windows_ >= LEAST_WINDOWS) || 2 * modulated_ > windows_;
   }
 
@@ -299,20 +351,26 @@ class RecordingAnalysis {
     const double probability = 1.0 / (1.0 + std::exp(-SLOPE * verdict.margin));
     if (!chattering_.empty()) describe(verdict);
     const bool bearing = 2 * like_bearing_ > windows_;
+    if (!verdict.cut && !idle_.empty()) {
+      verdict.kind = Kind::no_cut;
+      verdict.reason = "no louder than the idle spindle";
+      return verdict;
+    }
     if (!verdict.cut) {
       const double loudness = between_ / std::max(1e-30, synchronous_);
-      const bool brief = static_cast<double>(turns_) * static_cast<double>(windows_) < WINDOW_TURNS;
+      const double loud = teeth_ == 1 ? LOUD_SINGLE : LOUD;
       const bool quiet = loudness < 1.0 && !harmonicLikeChatter();
-      if (quiet || (loudness < LOUD && !brief && (probability < NO_CUT_BELOW || bearing))) {
+      if (quiet || (loudness < loud && !brief() && (probability < NO_CUT_BELOW || bearing))) {
         verdict.kind = Kind::no_cut;
         verdict.reason = bearing ? "lines modulated by the spindle, not by the teeth, as those of a bearing"
+                         : teeth_ == 1 ? "no louder part: an idle spindle, or a quiet cut"
                          : cut_.hasToothPassing()
                              ? "other spindle harmonics are stronger than those of the teeth: an idle "
                                "spindle, or a cut with large runout"
                              : "no louder part and no lines at the tooth passing frequency";
         return verdict;
       }
-      verdict.cut = loudness > LOUD;
+      verdict.cut = loudness > loud;
     }
     verdict.probability = probability;
     if (!verdict.cut) {
@@ -370,6 +428,8 @@ class RecordingAnalysis {
   double period_, revolution_;  // [s], [samples]
   std::size_t turns_;
   std::vector<std::vector<double>> channels_;  // with unit variance
+  std::vector<std::vector<double>> idle_;      // on the same scale; empty: not recorded
+  double level_ = 0.0, idle_level_ = 0.0;      // variance: sum over the windows, mean
   std::vector<double> of_order_;               // sum over the windows
   std::size_t windows_ = 0, modulated_ = 0, like_bearing_ = 0;
   double margins_ = 0.0;  // sum over the windows
@@ -422,7 +482,14 @@ RecordingVerdict judgeRecording(const Recording& recording, const RecordingReque
   for (const std::vector<double>& channel : recording.channels)
     if (channel.size() != recording.channels[0].size())
       throw Error("recording: channels of different length: expected equal lengths");
+  const Recording& idle = request.idle;
+  if (!idle.channels.empty() && (idle.channels.size() != recording.channels.size() ||
+                                 std::abs(idle.sample_rate / recording.sample_rate - 1.0) > SAME_RATE))
+    throw Error(
+        formatted("idle recording: %zu channels at %.0f Hz: expected %zu at %.0f Hz as in the recording",
+                  idle.channels.size(), idle.sample_rate, recording.channels.size(), recording.sample_rate));
   const double seconds = static_cast<double>(recording.channels[0].size()) / recording.sample_rate;
+  if (request.speed > 0.0) toothPassing(recording, request.teeth, request.speed);
   const SpindleSpeed speed = speedOf(recording, request);
   RecordingVerdict verdict;
   if (std::isnan(speed.value)) {
@@ -435,11 +502,7 @@ RecordingVerdict judgeRecording(const Recording& recording, const RecordingReque
     if (turns < LEAST_TURNS)
       throw Error(formatted("recording: %.3f s with %.1f revolutions: expected at least %.0f", seconds, turns,
                             LEAST_TURNS));
-    const double passing = request.teeth * speed.value / units::TWO_PI;
-    if (2.0 * passing > recording.sample_rate)
-      throw Error(formatted(
-          "recording: sample rate %.0f Hz: expected at least twice the tooth passing frequency, %.0f Hz",
-          recording.sample_rate, passing));
+    const double passing = toothPassing(recording, request.teeth, speed.value);
     const int factor = static_cast<int>(std::ceil(FINE_SAMPLES * passing / recording.sample_rate));
     RecordingRequest at_speed = request;
     at_speed.speed = speed.value;
@@ -448,6 +511,7 @@ RecordingVerdict judgeRecording(const Recording& recording, const RecordingReque
     for (int k = 1; factor > 1 && k * passing < ALIASED_TO * recording.sample_rate; ++k)
       if (k * passing > 0.5 * recording.sample_rate)
         aliased.push_back(std::abs(std::remainder(k * passing, recording.sample_rate)));
+    if (factor > 1 && !idle.channels.empty()) at_speed.idle = atHigherRate(idle, factor);
     verdict = factor > 1 ? RecordingAnalysis(atHigherRate(recording, factor), at_speed, speed.teeth_dominate,
                                              aliased)
                                .run()

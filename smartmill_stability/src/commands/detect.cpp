@@ -73,6 +73,13 @@ void run(const RecordingOptions& given) {
   if (o.picture.empty()) o.picture = std::filesystem::path(o.file).stem().string() + "_spectrogram.png";
   request.validate();
   const Recording recording = loadRecording(o);
+  if (!o.idle.empty()) {
+    RecordingOptions idle = o;
+    idle.file = o.idle;
+    idle.from = 0.0;
+    idle.to = INFINITY;
+    request.idle = loadRecording(idle);
+  }
   const RecordingVerdict verdict = [&] {
     try {
       return judgeRecording(recording, request);
@@ -108,6 +115,10 @@ Command detectCommand() {
         .positive();
     line.option("--teeth", o.teeth, "teeth of the tool").required();
     line.option("--speed-error", o.speed_error, "largest error of the speed [percent]").showDefault();
+    line.option(
+        "--idle", o.idle,
+        "recording of the idle spindle at the same speed by the same sensor: a cut is louder, and its lines "
+        "are no chatter");
     line.option("--model", o.model, "machine model file; chatter must lie near a mode of its tool_tip");
     line.option("--channels", o.channels,
                 "channel numbers of a sound file, or columns of a CSV file (default: all)")

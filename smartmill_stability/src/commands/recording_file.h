@@ -10,7 +10,7 @@ namespace smartmill::stability {
 
 /// Options of a recorded cut: file, channels, and data of the cut.
 struct RecordingOptions {
-  std::string file, model, topic, picture;
+  std::string file, model, topic, picture, idle;
   std::vector<std::string> channels;
   double rpm = 0.0, speed_error = 2.0, from = 0.0, to = INFINITY;
   int teeth = 0;

@@ -192,6 +192,47 @@ TEST(Recording, chatterAtASpindleHarmonicIsUnsure) {
   EXPECT_EQ(v.kind, RecordingVerdict::Kind::unsure) << v.text();
 }
 
+// What the idle machine does as well is no chatter; without the recording of it the bearing is one.
+TEST(Recording, anIdleRecordingShowsWhatIsNoChatter) {
+  const std::vector<Tone> idle{{100.0, 0.5}, {300.0, 0.5}, {531.0, 2.0}, {431.0, 1.0}, {731.0, 1.0}};
+  std::vector<Tone> tones = with(idle);
+  RecordingRequest known = request();
+  known.idle = recording(idle, {}, false);
+  const RecordingVerdict stable = judgeRecording(recording(tones, {}, false), known);
+  EXPECT_EQ(stable.kind, RecordingVerdict::Kind::stable) << stable.text();
+  EXPECT_EQ(judgeRecording(known.idle, known).kind, RecordingVerdict::Kind::no_cut);
+  tones.push_back({873.0, 6.0});
+  const RecordingVerdict chatter = judgeRecording(recording(tones, {}, false), known);
+  EXPECT_TRUE(chatter.chatter()) << chatter.text();
+  EXPECT_NEAR(chatter.frequency, 873.0, 1.0);
+  EXPECT_GT(chatter.over_air, 10.0);
+  known.idle.sample_rate = 8000.0;
+  EXPECT_THROW(judgeRecording(recording(tones, {}, false), known), Error);
+}
+
+// Turning at 720 rpm: chatter of 152 Hz is 12.7 revolutions, and one of 144.3 Hz next to the twelfth
+// harmonic.
+TEST(Recording, turningHasOneEdge) {
+  RecordingRequest turning;
+  turning.speed = units::TWO_PI * 12.0;
+  turning.teeth = 1;
+  const std::vector<Tone> revolution{{12.0, 1.0}, {24.0, 0.5}, {96.0, 0.5}};
+  const auto cut = [&](double frequency, double size, double turns) {
+    std::vector<Tone> tones = revolution;
+    tones.push_back({frequency, size});
+    Recording whole = recording(tones, {}, false);
+    whole.channels[0].resize(static_cast<std::size_t>(turns * RATE / 12.0));
+    return judgeRecording(whole, turning);
+  };
+  EXPECT_TRUE(cut(152.0, 8.0, 24.0).chatter() ||
+              cut(152.0, 8.0, 24.0).kind == RecordingVerdict::Kind::unsure);
+  // The speed of few revolutions fits itself to the chatter: it is not called stable.
+  for (const double turns : {6.0, 11.0, 18.0})
+    for (const double frequency : {144.3, 152.0})
+      EXPECT_NE(cut(frequency, 8.0, turns).kind, RecordingVerdict::Kind::stable)
+          << turns << ' ' << cut(frequency, 8.0, turns).text();
+}
+
 TEST(Recording, refusesInvalidRecordingsAndRequests) {
   Recording brief = recording({}, {});
   brief.channels[0].resize(400);  // 2.5 revolutions

@@ -21,6 +21,9 @@ struct RecordingRequest {
   int teeth = 0;
   double speed_error = 0.02;  ///< [1] largest relative error of speed
   std::vector<double> modes;  ///< [Hz] natural frequencies of tool and spindle; empty: unknown
+  /// The idle spindle at the same speed, by the same sensor with the same gain: a cut is louder, and lines of
+  /// the idle machine are no chatter. Without channels: not recorded.
+  Recording idle{};
   /// @throws Error naming the quantity.
   void validate() const;
 };
