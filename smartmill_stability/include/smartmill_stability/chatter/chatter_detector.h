@@ -25,7 +25,7 @@ struct ChatterParameters {
   double path_tolerance = 1.0e-3;
   double maximum_gap = 0.2;
   std::string angle = "measured";
-  double harmonics_window = 2.0;
+  double harmonics_window = 1.0;
 
   void declare(ParameterTable& table) {
     table.number("chatter_revolutions", revolutions, "1", Range::closed(4, 200),
