@@ -138,7 +138,7 @@ std::vector<Move> FeedPlanner::completed(std::string* text) {
   }
 }
 
-FeedPlan FeedPlanner::plan(const std::vector<Move>& moves, const AnalysisResult& before, Stock stock,
+FeedPlan FeedPlanner::plan(const std::vector<Move>& moves, const AnalysisResult& before, const Stock& stock,
                            const AnalysisOptions& options, const ProgramAnalysis::Progress& progress) {
   addMoves(moves);
   for (auto& [line, feed] : lines_) choose(line, feed);

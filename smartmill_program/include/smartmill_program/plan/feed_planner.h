@@ -56,7 +56,7 @@ class FeedPlanner {
   /// @param moves of the program, all of whose steps have been added. @param before its analysis
   /// @param stock before the program
   /// @throws Error "NAME: line N: ..." when no feed holds a limit
-  FeedPlan plan(const std::vector<Move>& moves, const AnalysisResult& before, Stock stock,
+  FeedPlan plan(const std::vector<Move>& moves, const AnalysisResult& before, const Stock& stock,
                 const AnalysisOptions& options, const ProgramAnalysis::Progress& progress = {});
 
  private:
