@@ -5,6 +5,7 @@
 #include <numeric>
 #include <utility>
 
+#include "chatter/order_powers.h"
 #include "chatter/spectrogram.h"
 #include "smartmill_core/signal/spectral_lines.h"
 #include "smartmill_core/units.h"
@@ -120,13 +121,11 @@ double CutFinder::longestLoud() const {
 
 /// Whether the other spindle harmonics of a spectrum are stronger than those of the teeth.
 bool CutFinder::isIdle(const std::vector<double>& power) const {
-  double of_teeth = 0.0, of_others = 0.0;
-  for (int order = 1; order <= options_.harmonics * request_.teeth; ++order) {
+  const OrderPowers powers = orderPowers(request_.teeth, [&](int order) {
     const double frequency = order * request_.speed / units::TWO_PI;
-    if (frequency > options_.lowest)
-      (order % request_.teeth == 0 ? of_teeth : of_others) += power[lineAt(frequency)];
-  }
-  return of_others > of_teeth;
+    return frequency > options_.lowest ? power[lineAt(frequency)] : 0.0;
+  });
+  return powers.others > powers.teeth;
 }
 
 /// Mean spectrum of the windows in the cut or outside, without those at a transition unless there are no

@@ -20,7 +20,6 @@ struct CutFinderOptions {
   double least_cut = 0.5;    ///< [s] of the cut without tooth passing harmonics; a slamming door is shorter
   double least_part = 0.12;  ///< [1] least fraction of the windows of either kind
   double main_lobe = 3.5;    ///< [lines] half width of the main lobe, Blackman-Harris
-  int harmonics = 3;         ///< [tooth passing frequencies] that are compared with the other orders
   double present = 30.0;     ///< [1] least power of a tooth passing harmonic over the noise floor
 };
 

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "chatter/cut_finder.h"
+#include "chatter/order_powers.h"
 #include "chatter/spectrogram.h"
 #include "chatter/speed_finder.h"
 #include "smartmill_core/error.h"
@@ -129,12 +130,15 @@ SpindleSpeed speedOf(const Recording& recording, const RecordingRequest& request
   const SpeedFinder finder(loudPower(spectrogramOf(recording, window, band.highest)), 1.0 / window,
                            band.lowest, request.teeth);
   if (!(finder.lowestSpeed() < finder.highestSpeed())) return {stated ? request.speed : NAN, Source::stated};
-  const double free = finder.anywhere(), agreement = finder.agreement(free);
+  if (!stated) {
+    const double found = finder.anywhere();
+    return {finder.agreement(found) > LEAST_AGREEMENT ? found : NAN, Source::found,
+            finder.teethDominate(found)};
+  }
   // Load reduces the speed by less than this; a larger correction has to agree better.
   // Aliased lines agree with other speeds by chance.
   constexpr double LOADED = 0.005, BEYOND = 1.15, ALIASED = 1.5;
   const bool aliased = recording.sample_rate * units::TWO_PI < FINE_SAMPLES * request.teeth * request.speed;
-  if (!stated) return {agreement > LEAST_AGREEMENT ? free : NAN, Source::found, finder.teethDominate(free)};
   const auto within = [&](double error) {
     return finder.best((1.0 - error) * request.speed, (1.0 + error) * request.speed);
   };
@@ -142,8 +146,11 @@ SpindleSpeed speedOf(const Recording& recording, const RecordingRequest& request
   if (const double farther = within(request.speed_error);
       finder.agreement(farther) > (aliased ? ALIASED : BEYOND) * finder.agreement(near))
     near = farther;
-  if (finder.agreement(near) < LEAST_AGREEMENT && agreement > CORRECTED * LEAST_AGREEMENT)
-    return {free, Source::corrected, finder.teethDominate(free)};
+  if (finder.agreement(near) < LEAST_AGREEMENT) {
+    const double other = finder.anywhere();
+    if (finder.agreement(other) > CORRECTED * LEAST_AGREEMENT)
+      return {other, Source::corrected, finder.teethDominate(other)};
+  }
   return {near, Source::stated, finder.teethDominate(near)};
 }
 
@@ -176,12 +183,13 @@ class RecordingAnalysis {
   }
 
   RecordingVerdict run() {
-    const std::vector<double> background = idle_.empty() ? this->background() : idleBackground();
+    const Background background = this->background();
+    idle_level_ = background.level;
     for (const double start : startsWithin(true)) {
-      const RevolutionWindow window = windowAt(start);
+      const RevolutionWindow window = windowAt(channels_, start);
       addOrders(window);
       level_ += window.total();
-      add(criterion_.judge(window, period_, background));
+      add(criterion_.judge(window, period_, background.power));
     }
     return verdict();
   }
@@ -219,46 +227,42 @@ class RecordingAnalysis {
     return starts;
   }
 
-  RevolutionWindow windowAt(double start) const {
+  RevolutionWindow windowAt(const std::vector<std::vector<double>>& channels, double start) const {
     RevolutionWindow window(static_cast<std::size_t>(std::ceil(revolution_)), turns_, teeth_);
-    for (const std::vector<double>& channel : channels_) window.add(channel, start, revolution_);
+    for (const std::vector<double>& channel : channels) window.add(channel, start, revolution_);
     return window;
   }
 
-  /// Mean power of each line outside the cut; empty without such windows.
-  std::vector<double> background() const {
-    std::vector<double> sum;
-    if (!cut_.hasAir()) return sum;
-    const std::vector<double> starts = startsWithin(false);
+  /// Mean over windows.
+  struct Background {
+    std::vector<double> power;  // of each line; empty without windows
+    double level = 0.0;         // variance
+  };
+  Background meanOf(const std::vector<std::vector<double>>& channels,
+                    const std::vector<double>& starts) const {
+    Background mean;
+    const auto windows = static_cast<double>(starts.size());
     for (const double start : starts) {
-      const RevolutionWindow window = windowAt(start);
-      sum.resize(window.power().size(), 0.0);
-      for (std::size_t k = 0; k < sum.size(); ++k)
-        sum[k] += window.power()[k] / static_cast<double>(starts.size());
+      const RevolutionWindow window = windowAt(channels, start);
+      mean.power.resize(window.power().size(), 0.0);
+      for (std::size_t k = 0; k < mean.power.size(); ++k) mean.power[k] += window.power()[k] / windows;
+      mean.level += window.total() / windows;
     }
-    return sum;
+    return mean;
   }
 
-  /// Mean power of each line of the idle spindle, and its level.
-  std::vector<double> idleBackground() {
+  /// Of the idle spindle, where it is recorded, or else of the windows outside the cut.
+  Background background() const {
+    if (idle_.empty()) return meanOf(channels_, cut_.hasAir() ? startsWithin(false) : std::vector<double>());
     const double length = revolution_ * static_cast<double>(turns_);
-    std::vector<double> sum;
-    double windows = 0.0;
+    std::vector<double> starts;
     for (double start = 1.0; start + length + 3.0 < static_cast<double>(idle_[0].size());
-         start += 0.5 * length) {
-      RevolutionWindow window(static_cast<std::size_t>(std::ceil(revolution_)), turns_, teeth_);
-      for (const std::vector<double>& channel : idle_) window.add(channel, start, revolution_);
-      sum.resize(window.power().size(), 0.0);
-      for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += window.power()[k];
-      idle_level_ += window.total();
-      windows += 1.0;
-    }
-    if (windows == 0.0)
+         start += 0.5 * length)
+      starts.push_back(start);
+    if (starts.empty())
       throw Error(formatted("idle recording: %zu samples: expected at least the %zu revolutions of a window",
                             idle_[0].size(), turns_));
-    for (double& power : sum) power /= windows;
-    idle_level_ /= windows;
-    return sum;
+    return meanOf(idle_, starts);
   }
 
   static std::vector<double> scaled(std::vector<double> channel, double unit) {
@@ -275,12 +279,11 @@ class RecordingAnalysis {
   bool teethDominate() const {
     if (teeth_dominate_) return *teeth_dominate_;
     if (teeth_ == 1) return cut_.hasToothPassing();
-    double of_teeth = 0.0, of_others = 0.0;
-    const auto teeth = static_cast<std::size_t>(teeth_);
-    for (std::size_t k = 1;
-         k <= static_cast<std::size_t>(CutFinderOptions().harmonics) * teeth && k < of_order_.size(); ++k)
-      (k % teeth == 0 ? of_teeth : of_others) += of_order_[k];
-    return of_teeth > of_others;
+    const OrderPowers powers = orderPowers(teeth_, [&](int order) {
+      const auto k = static_cast<std::size_t>(order);
+      return k < of_order_.size() ? of_order_[k] : 0.0;
+    });
+    return powers.teeth > powers.others;
   }
 
   /// Whether most of the synchronous power is at one order above that of the teeth that is not theirs:
@@ -291,9 +294,7 @@ class RecordingAnalysis {
         static_cast<std::size_t>(std::max_element(of_order_.begin(), of_order_.end()) - of_order_.begin());
     const double all = std::accumulate(of_order_.begin(), of_order_.end(), 0.0);
     const auto teeth = static_cast<std::size_t>(teeth_);
-    const bool of_teeth =
-        strongest % teeth == 0 &&
-        (!brief() || strongest <= static_cast<std::size_t>(CutFinderOptions().harmonics) * teeth);
+    const bool of_teeth = strongest % teeth == 0 && (!brief() || strongest <= COMPARED_PASSINGS * teeth);
     return strongest > teeth && !of_teeth && 2.0 * of_order_[strongest] > all;
   }
 
@@ -511,11 +512,12 @@ RecordingVerdict judgeRecording(const Recording& recording, const RecordingReque
     for (int k = 1; factor > 1 && k * passing < ALIASED_TO * recording.sample_rate; ++k)
       if (k * passing > 0.5 * recording.sample_rate)
         aliased.push_back(std::abs(std::remainder(k * passing, recording.sample_rate)));
-    if (factor > 1 && !idle.channels.empty()) at_speed.idle = atHigherRate(idle, factor);
-    verdict = factor > 1 ? RecordingAnalysis(atHigherRate(recording, factor), at_speed, speed.teeth_dominate,
-                                             aliased)
-                               .run()
-                         : RecordingAnalysis(recording, at_speed, speed.teeth_dominate, aliased).run();
+    std::optional<Recording> finer;
+    if (factor > 1) {
+      finer = atHigherRate(recording, factor);
+      at_speed.idle = atHigherRate(idle, factor);
+    }
+    verdict = RecordingAnalysis(finer ? *finer : recording, at_speed, speed.teeth_dominate, aliased).run();
     verdict.speed_source = speed.source;
   }
   verdict.from += recording.start;

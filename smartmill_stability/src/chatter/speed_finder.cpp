@@ -6,6 +6,7 @@
 #include <numeric>
 #include <utility>
 
+#include "chatter/order_powers.h"
 #include "smartmill_core/signal/spectral_lines.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
@@ -17,7 +18,6 @@ constexpr double STRONG = 30.0;  // [1] power of a line over the floor; noise ex
 constexpr double HIGHEST_LEVEL =
     3.4;                            // [1] of a line 30 times above the floor: a stronger one proves no more
 constexpr double OF_SPINDLE = 2.0;  // [1] weight of all harmonics
-constexpr int HARMONICS = 3;        // [tooth passing frequencies]
 constexpr double RESOLVED = 6.0;    // [lines] least distance of harmonics: main lobe of the window
 constexpr std::size_t CELLS = 4;    // in a line
 constexpr double TOLERANCE = 0.6;   // [lines] error of the frequency of a line and wander of the speed
@@ -90,7 +90,7 @@ double SpeedFinder::agreement(double speed) const {
   const double spindle = speed / units::TWO_PI, end = step_ * static_cast<double>(power_.size());
   const double between = strongestBetween(spindle);
   Comb of_teeth, of_spindle;
-  for (int k = 1; k * spindle < end && k <= HARMONICS * teeth_; ++k) {
+  for (int k = 1; k * spindle < end && k <= COMPARED_PASSINGS * teeth_; ++k) {
     const double level = levelAt(k * spindle);
     of_spindle.add(level, mean_);
     if (k % teeth_ == 0) of_teeth.add(level, mean_);
@@ -119,21 +119,20 @@ double SpeedFinder::best(double low, double high) const {
 /// [1] Deviation from chance of the multiples of a frequency [Hz] that are no multiples of `factor` times it.
 double SpeedFinder::between(double frequency, int factor) const {
   Comb comb;
-  for (int k = 1; k <= HARMONICS * factor * teeth_; ++k)
+  for (int k = 1; k <= COMPARED_PASSINGS * factor * teeth_; ++k)
     if (k % factor != 0) comb.add(levelAt(k * frequency), mean_);
   return comb.deviations(deviation_);
 }
 
 bool SpeedFinder::teethDominate(double speed) const {
-  double of_teeth = 0.0, of_others = 0.0;
-  for (int order = 1; order <= HARMONICS * teeth_; ++order) {
+  const OrderPowers powers = orderPowers(teeth_, [&](int order) {
     const double frequency = order * speed / units::TWO_PI;
     const auto k = static_cast<std::size_t>(std::lround(frequency / step_));
-    if (frequency < lowest_ || k + 1 >= power_.size()) continue;
+    if (frequency < lowest_ || k + 1 >= power_.size()) return 0.0;
     const double most = std::max({power_[k - 1], power_[k], power_[k + 1]});
-    if (most > STRONG * floor_[k]) (order % teeth_ == 0 ? of_teeth : of_others) += most;
-  }
-  return of_teeth > of_others;
+    return most > STRONG * floor_[k] ? most : 0.0;
+  });
+  return powers.teeth > powers.others;
 }
 
 double SpeedFinder::anywhere() const {
@@ -153,7 +152,7 @@ double SpeedFinder::refined(double speed) const {
   const double spindle = speed / units::TWO_PI;
   const auto reach = static_cast<std::size_t>(SAME_LINE);
   double of_orders = 0.0, squares = 0.0;
-  for (int order = 1; order <= HARMONICS * teeth_; ++order) {
+  for (int order = 1; order <= COMPARED_PASSINGS * teeth_; ++order) {
     const auto center = static_cast<std::size_t>(std::lround(order * spindle / step_));
     if (center <= reach || center + reach + 1 >= power_.size() || order * spindle < lowest_) continue;
     const auto from = power_.begin() + static_cast<std::ptrdiff_t>(center - reach);

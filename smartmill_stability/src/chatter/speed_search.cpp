@@ -187,17 +187,9 @@ std::vector<SpeedProposal> SpeedSearch::proposals() const {
   double all = 0.0;
   for (const Machine& machine : machines_) all += machine.weight;
   for (std::size_t s = 0; s < speeds_; ++s) {
-    SpeedProposal proposal{speedAt(s), 0.0, 0.0};
-    double chattering = 0.0;
-    for (const Machine& machine : machines_) {
-      if (machine.depth > machine.limit[s]) {
-        chattering += machine.weight;
-        proposal.frequency += machine.weight * machine.frequency[s];
-      } else {
-        proposal.stable += machine.weight / all;
-      }
-    }
-    if (chattering > 0.0) proposal.frequency /= chattering;
+    SpeedProposal proposal{speedAt(s), 0.0};
+    for (const Machine& machine : machines_)
+      if (!(machine.depth > machine.limit[s])) proposal.stable += machine.weight / all;
     proposal.stable += RULE * (followsRule(proposal.speed) - proposal.stable);
     for (const HeardCut& cut : cuts_)
       if (cut.frequency && std::abs(cut.speed / proposal.speed - 1.0) < 1.5 * SPEED_STEP)

@@ -72,7 +72,6 @@ void run(const RecordingOptions& given) {
   request.modes = modesOf(o.model);
   if (o.picture.empty()) o.picture = std::filesystem::path(o.file).stem().string() + "_spectrogram.png";
   request.validate();
-  const Recording recording = loadRecording(o);
   if (!o.idle.empty()) {
     RecordingOptions idle = o;
     idle.file = o.idle;
@@ -80,13 +79,7 @@ void run(const RecordingOptions& given) {
     idle.to = INFINITY;
     request.idle = loadRecording(idle);
   }
-  const RecordingVerdict verdict = [&] {
-    try {
-      return judgeRecording(recording, request);
-    } catch (const Error& error) {
-      throw Error(o.file + ": " + error.what());
-    }
-  }();
+  const RecordingVerdict verdict = judgeFile(o, request);
   std::printf("%s\n", verdict.text().c_str());
   draw(verdict, o);
 }

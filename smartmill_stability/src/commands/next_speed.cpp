@@ -47,14 +47,7 @@ std::optional<HeardCut> cutOf(const std::string& text, int teeth) {
   request.speed = cut.speed;
   request.teeth = teeth;
   request.validate();
-  const RecordingVerdict verdict = [&] {
-    try {
-      return judgeRecording(loadRecording(options), request);
-    } catch (const Error& error) {
-      const std::string reason = error.what();
-      throw Error(reason.rfind(what, 0) == 0 ? reason : what + ": " + reason);
-    }
-  }();
+  const RecordingVerdict verdict = judgeFile(options, request);
   std::printf("%s: %s\n", what.c_str(), verdict.text().c_str());
   if (verdict.kind == RecordingVerdict::Kind::stable) return cut;
   if (verdict.kind != RecordingVerdict::Kind::chatter) return std::nullopt;

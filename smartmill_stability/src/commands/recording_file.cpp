@@ -155,4 +155,13 @@ Recording loadRecording(const RecordingOptions& o) {
   return recording;
 }
 
+RecordingVerdict judgeFile(const RecordingOptions& o, const RecordingRequest& request) {
+  const Recording recording = loadRecording(o);
+  try {
+    return judgeRecording(recording, request);
+  } catch (const Error& error) {
+    throw Error(o.file + ": " + error.what());
+  }
+}
+
 }  // namespace smartmill::stability

@@ -20,4 +20,7 @@ struct RecordingOptions {
 /// @throws Error naming the file and the fault.
 Recording loadRecording(const RecordingOptions& options);
 
+/// judgeRecording() of a file. @throws Error naming the file and the fault.
+RecordingVerdict judgeFile(const RecordingOptions& options, const RecordingRequest& request);
+
 }  // namespace smartmill::stability

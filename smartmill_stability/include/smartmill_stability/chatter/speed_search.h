@@ -16,9 +16,8 @@ struct HeardCut {
 
 /// A spindle speed to try.
 struct SpeedProposal {
-  double speed = 0.0;      ///< [rad/s]
-  double stable = 0.0;     ///< [1] probability that the same cut is stable there
-  double frequency = 0.0;  ///< [Hz] mean chatter frequency if it is not
+  double speed = 0.0;   ///< [rad/s]
+  double stable = 0.0;  ///< [1] probability that the same cut is stable there
 };
 
 /// What is known before the first cut.
