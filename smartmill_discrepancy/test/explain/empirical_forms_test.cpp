@@ -70,21 +70,30 @@ TEST(EmpiricalForms, ToothFactor) {
   EXPECT_NEAR(valueOf(e.effects[0], "factor[2]"), 1.25, 0.01);
 }
 
+/// A record with noise whose forces are multiplied by a factor. @param factor_at of the time of the record
+/// [s]
+template <class FactorAt>
+Record multiplied(const CampaignTest& test, std::uint64_t seed, const FactorAt& factor_at) {
+  Record record = pure(test, 1.0, seed);
+  for (std::size_t i = 0; i < record.size(); ++i) {
+    const double factor = factor_at(record.time[i]);
+    for (const char* channel : FORCES_SHOWN) record.add(channel)[i] *= factor;
+  }
+  addNoise(record, seed);
+  return record;
+}
+
 // A spot of the work 0.3 mm wide, at the same place of each cut: force of a rigid tool times 1.3.
 TEST(EmpiricalForms, HardSpot) {
   const TemporaryFolder folder;
   const Explanation e = explained(
       [](const CampaignTest& test, std::uint64_t seed) {
-        Record record = pure(test, 1.0, seed);
         const double feed =
             test.engagement->feed_per_tooth * 4.0 * test.spindle_speed / units::TWO_PI / units::MM;
-        for (std::size_t i = 0; i < record.size(); ++i) {
-          const double off = (feed * (record.time[i] - *test.engage_time) - 0.7) / 0.15;
-          for (const char* channel : FORCES_SHOWN)
-            record.add(channel)[i] *= 1.0 + 0.3 * std::exp(-0.5 * off * off);
-        }
-        addNoise(record, seed);
-        return record;
+        return multiplied(test, seed, [&](double time) {
+          const double off = (feed * (time - *test.engage_time) - 0.7) / 0.15;
+          return 1.0 + 0.3 * std::exp(-0.5 * off * off);
+        });
       },
       folder.file("."), quickly());
   expectBuilt(e, "force_course", "the cutting force changes along the feed");
@@ -96,14 +105,10 @@ TEST(EmpiricalForms, ForceOverTimeInCut) {
   const TemporaryFolder folder;
   const Explanation e = explained(
       [](const CampaignTest& test, std::uint64_t seed) {
-        Record record = pure(test, 1.0, seed);
-        for (std::size_t i = 0; i < record.size(); ++i) {
-          const double t = record.time[i] - *test.engage_time;
-          for (const char* channel : FORCES_SHOWN)
-            record.add(channel)[i] *= 1.0 - 0.2 * std::max(0.0, 1.0 - std::abs(t - 0.04) / 0.04);
-        }
-        addNoise(record, seed);
-        return record;
+        return multiplied(test, seed, [&](double time) {
+          const double t = time - *test.engage_time;
+          return 1.0 - 0.2 * std::max(0.0, 1.0 - std::abs(t - 0.04) / 0.04);
+        });
       },
       folder.file("."), quickly());
   expectBuilt(e, "force_course", "the cutting force changes with the time in cut");
@@ -115,15 +120,11 @@ TEST(EmpiricalForms, RejectsHardSpotsAtRandomPlaces) {
   const TemporaryFolder folder;
   const Explanation e = explained(
       [](const CampaignTest& test, std::uint64_t seed) {
-        Record record = pure(test, 1.0, seed);
-        for (std::size_t i = 0; i < record.size(); ++i) {
-          const double place = 0.025 + 0.012 * static_cast<double>(seed * seed % 5);
-          const double off = (record.time[i] - place) / 0.004;
-          for (const char* channel : FORCES_SHOWN)
-            record.add(channel)[i] *= 1.0 + (seed % 2 ? 0.2 : -0.2) * std::exp(-0.5 * off * off);
-        }
-        addNoise(record, seed);
-        return record;
+        const double place = 0.025 + 0.012 * static_cast<double>(seed * seed % 5);
+        return multiplied(test, seed, [&](double time) {
+          const double off = (time - place) / 0.004;
+          return 1.0 + (seed % 2 ? 0.2 : -0.2) * std::exp(-0.5 * off * off);
+        });
       },
       folder.file("."), quickly());
   EXPECT_EQ(e.verdict, Verdict::unknown_effect);
