@@ -22,6 +22,13 @@ def verdict(case):
     return "passed"
 
 
+def reasons(case):
+    """First lines of each failure of a testcase."""
+    for failure in [*case.findall("failure"), *case.findall("error")]:
+        text = failure.get("message") or failure.text or ""
+        yield from ("  " + line.strip() for line in text.strip().splitlines()[:6])
+
+
 def main():
     count = {"passed": 0, "failed": 0, "skipped": 0}
     refused = 0
@@ -33,6 +40,7 @@ def main():
             refused += verdict(case) == "skipped" and case.get("classname") not in OPTIONAL
             if verdict(case) != "passed":
                 print(f"{verdict(case)}: {case.get('classname')}.{case.get('name')}")
+                print(*reasons(case), sep="\n", end="\n" if verdict(case) == "failed" else "")
     if int(sys.argv[2]) != 0 and count["failed"] == 0:
         print("failed: a test program that ended without a report")
         count["failed"] = 1

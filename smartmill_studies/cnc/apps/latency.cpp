@@ -9,11 +9,8 @@
 #include <chrono>
 #include <cstdio>
 #include <ctime>
-#include <fstream>
 #include <functional>
-#include <iterator>
 #include <memory>
-#include <sstream>
 #include <string>
 #include <thread>
 #include <vector>
@@ -24,6 +21,7 @@
 #include "smartmill_cnc/linuxcnc/local_socket.h"
 #include "smartmill_cnc/linuxcnc/servo_stream.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/process_usage.h"
 #include "smartmill_core/program.h"
 #include "smartmill_focas/client.h"
 #include "smartmill_focas/server.h"
@@ -54,20 +52,6 @@ void timed(const char* name, int count, const Ask& ask) {
   std::printf("%-28s median %.3f ms, 99 %% %.3f ms, longest %.3f ms (%d)\n", name,
               1e3 * durations[durations.size() / 2], 1e3 * durations[durations.size() * 99 / 100],
               1e3 * durations.back(), count);
-}
-
-/// [s] CPU time of another process: user and system time from proc(5).
-double secondsOf(int pid) {
-  std::ifstream file("/proc/" + std::to_string(pid) + "/stat");
-  std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-  std::istringstream words(text.substr(std::min(text.rfind(')') + 1, text.size())));
-  std::string word;
-  for (int i = 0; i < 11; ++i) {
-    words >> word;
-  }
-  double user = 0.0, system = 0.0;
-  words >> user >> system;
-  return (user + system) / static_cast<double>(::sysconf(_SC_CLK_TCK));
 }
 
 /// Complete read cycles of the bridge at its rate: duration, and CPU load of both sides as share of one core.
@@ -177,7 +161,8 @@ void measureLinuxCnc(const std::string& folder, int count, double seconds) {
     timed("read cycle of the bridge", count, [&] {
       if (!controller->read()) throw Error("a read cycle failed");
     });
-    polled(*controller, seconds, [&] { return processSeconds() + secondsOf(gateway) + secondsOf(reader); });
+    polled(*controller, seconds,
+           [&] { return processSeconds() + processUsage(gateway).cpu_time + processUsage(reader).cpu_time; });
   } catch (...) {
     end();
     throw;

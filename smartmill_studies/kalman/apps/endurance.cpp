@@ -1,17 +1,15 @@
 // rosrun smartmill_studies kalman_endurance: memory and allocations of the estimator over an hour of samples.
 
-#include <unistd.h>
-
 #include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <fstream>
 #include <new>
 #include <string>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/process_usage.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/compensation/compensation_pipeline.h"
@@ -51,14 +49,6 @@ void operator delete(void* place, std::size_t) noexcept {
 namespace {
 
 using namespace smartmill;
-
-/// [kB] resident.
-long resident() {
-  std::ifstream status("/proc/self/statm");
-  long size = 0, pages = 0;
-  status >> size >> pages;
-  return pages * sysconf(_SC_PAGESIZE) / 1024;
-}
 
 constexpr std::size_t BLOCK = 256;  // 10 ms
 constexpr long BLOCKS_PER_MINUTE = 6000;
@@ -112,8 +102,9 @@ class Account {
   void at(long number) {
     if (number % every_ != 0) return;
     const double span = static_cast<double>(std::max(1L, number - first_));
-    std::printf("%8.1f %10ld %14lld %18.1f\n", static_cast<double>(number) / BLOCKS_PER_MINUTE, resident(),
-                live.load(), static_cast<double>(made - made_before_) / span);
+    std::printf("%8.1f %10ld %14lld %18.1f\n", static_cast<double>(number) / BLOCKS_PER_MINUTE,
+                static_cast<long>(processUsage().memory / 1024.0), live.load(),
+                static_cast<double>(made - made_before_) / span);
     std::fflush(stdout);
     made_before_ = made;
     first_ = number;

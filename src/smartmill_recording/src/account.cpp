@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <sstream>
+#include <utility>
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/names.h"
@@ -143,6 +144,43 @@ class Stream {
   std::uint64_t first_first_ = 0, last_first_ = 0;  // running indices of these blocks
 };
 
+// Inputs of the nodes. A node counts from its start, so that the last message of each start counts.
+class NodeAccounts {
+ public:
+  static bool isHealth(const RecordedConnection& connection) {
+    return connection.type == Recorded<plain::NodeHealth>::type() &&
+           connection.md5sum == Recorded<plain::NodeHealth>::md5();
+  }
+
+  void add(const std::uint8_t* data, std::size_t size) {
+    const plain::NodeHealth& health = health_.decode(data, size);
+    last_[{health.node, health.started}] = health;
+  }
+
+  std::vector<InputAccount> inputs() const {
+    std::map<std::pair<std::string, std::string>, InputAccount> sums;
+    for (const auto& [start, health] : last_) {
+      for (const plain::StreamHealth& input : health.inputs) {
+        InputAccount& sum = sums[{health.node, input.topic}];
+        sum.node = health.node;
+        sum.topic = input.topic;
+        sum.starts = std::max(sum.starts, health.starts);
+        sum.received += input.received;
+        sum.dropped += input.dropped;
+        sum.refused += input.refused;
+        sum.lost += input.lost;
+      }
+    }
+    std::vector<InputAccount> inputs;
+    for (const auto& [key, sum] : sums) inputs.push_back(sum);
+    return inputs;
+  }
+
+ private:
+  Recorded<plain::NodeHealth> health_;
+  std::map<std::pair<std::string, double>, plain::NodeHealth> last_;  // by node and start
+};
+
 // The sensor whose running index the forces have: of those recorded the one with most samples of them.
 const Stream* sensorOf(const std::map<std::uint32_t, Stream>& streams, const Stream& forces) {
   const Stream* best = nullptr;
@@ -162,6 +200,11 @@ const Stream* sensorOf(const std::map<std::uint32_t, Stream>& streams, const Str
 }
 
 }  // namespace
+
+bool RecordingAccount::isComplete() const {
+  return gaps.empty() &&
+         std::none_of(inputs.begin(), inputs.end(), [](const InputAccount& input) { return input.lost > 0; });
+}
 
 std::vector<IndexRange> missingRanges(const std::vector<IndexRange>& all,
                                       const std::vector<IndexRange>& present) {
@@ -187,6 +230,7 @@ RecordingAccount accountOf(const std::string& path, const std::function<void(dou
   const std::unique_ptr<RecordingFile> file = openRecording(path);
   RecordingAccount result;
   std::map<std::uint32_t, Stream> streams;
+  NodeAccounts nodes;
   RecordingFile::Entry entry;
   for (std::uint64_t count = 0; file->next(&entry); ++count) {
     if (progress && count % REPORTED == 0) progress(file->share());
@@ -194,6 +238,7 @@ RecordingAccount accountOf(const std::string& path, const std::function<void(dou
     Stream& stream = streams.try_emplace(entry.connection, connection, &result.gaps).first->second;
     try {
       stream.add(file->data(entry), entry.size);
+      if (NodeAccounts::isHealth(connection)) nodes.add(file->data(entry), entry.size);
     } catch (const Error& error) {
       throw Error(path + ": topic " + connection.topic + ": " + error.what());
     }
@@ -208,6 +253,7 @@ RecordingAccount accountOf(const std::string& path, const std::function<void(dou
       result.gaps.push_back({StreamGap::Kind::unprocessed, result.streams.back().topic,
                              sensor->stampOf(range.first), range.size()});
   }
+  result.inputs = nodes.inputs();
   std::stable_sort(result.streams.begin(), result.streams.end(),
                    [](const StreamAccount& a, const StreamAccount& b) { return a.topic < b.topic; });
   return result;

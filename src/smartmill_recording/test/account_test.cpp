@@ -148,6 +148,38 @@ TEST_F(Account, RepeatedAndNotFiniteSamples) {
   EXPECT_FALSE(account.isComplete());
 }
 
+// A node that is started again counts from 0; what it received before counts as well.
+TEST(NodeAccount, SumsAllStarts) {
+  const TemporaryFolder folder;
+  const auto writer = createRecording(folder.file("session.bag"), RecordingCompression::none);
+  const auto write = [&](double started, std::uint32_t starts, std::uint64_t received, std::uint64_t lost) {
+    plain::NodeHealth health;
+    health.node = "/smartmill/kalman";
+    health.started = started;
+    health.starts = starts;
+    plain::StreamHealth input;
+    input.topic = "/smartmill/daq/dynamometer";
+    input.received = received;
+    input.lost = lost;
+    input.dropped = 1;
+    health.inputs = {input};
+    writer->write(names::NODE_HEALTH, static_cast<std::uint64_t>(STAMP * 1e9) + received, health);
+  };
+  write(STAMP, 1, 100, 0);
+  write(STAMP, 1, 200, 3);
+  write(STAMP + 50.0, 2, 40, 2);
+  writer->close();
+  const RecordingAccount account = accountOf(folder.file("session.bag"));
+  ASSERT_EQ(account.inputs.size(), 1u);
+  EXPECT_EQ(account.inputs[0].topic, "/smartmill/daq/dynamometer");
+  EXPECT_EQ(account.inputs[0].starts, 2u);
+  EXPECT_EQ(account.inputs[0].received, 240u);
+  EXPECT_EQ(account.inputs[0].lost, 5u);
+  EXPECT_EQ(account.inputs[0].dropped, 2u);
+  EXPECT_TRUE(account.gaps.empty());
+  EXPECT_FALSE(account.isComplete());
+}
+
 TEST(MissingRanges, AreThoseWithinThePresentOnes) {
   const auto missing = [](const std::vector<IndexRange>& all, const std::vector<IndexRange>& present) {
     std::vector<std::pair<std::uint64_t, std::uint64_t>> pairs;

@@ -5,6 +5,7 @@
 #include <exception>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include <ros/console.h>
 
@@ -25,11 +26,14 @@ std::string InputHealth::take(double now, const std::function<void()>& handle) {
   const Watchdog before = watchdog_;
   watchdog_.heard();
   ++taken_;
-  dropped_ = false;
+  is_dropped_ = false;
   try {
     handle();
     last_refused_ = false;
-    if (dropped_) watchdog_ = before;
+    if (is_dropped_) {
+      watchdog_ = before;
+      ++dropped_;
+    }
     return {};
   } catch (const std::exception& error) {
     return refuse(now, error.what());
@@ -44,6 +48,29 @@ std::string InputHealth::refuse(double now, const std::string& problem) {
   if (now - logged_ < LOG_PERIOD) return {};
   logged_ = now;
   return topic_ + ": " + problem_;
+}
+
+void InputHealth::count(const std::string& publisher, std::uint32_t number) {
+  const auto [last, is_first] = numbers_.try_emplace(publisher, number);
+  if (!is_first && number > last->second) lost_ += number - last->second - 1;
+  last->second = number;
+}
+
+smartmill_msgs::StreamHealth InputHealth::account(const std::string& topic) {
+  smartmill_msgs::StreamHealth account;
+  account.topic = topic;
+  account.received = taken_;
+  account.lost = lost_;
+  account.waiting = waiting();
+  account.dropped = dropped_;
+  account.refused = refused_;
+  const std::uint64_t unused = account.waiting + account.dropped + account.refused;
+  account.processed = taken_ - std::min(taken_, unused);
+  account.lost_samples = check_.lostSamples();
+  account.silent = watchdog_.silent();
+  account.latency = std::exchange(progress_.latency, 0.0);
+  account.fault = check_.present();
+  return account;
 }
 
 std::string InputHealth::takeProblem() {
@@ -107,6 +134,7 @@ void Inputs::noteStamp(InputHealth& health, double stamp, double limit) {
   }
   progress.newest = std::max(progress.newest, stamp);
   progress.limit = limit;
+  progress.latency = std::max(progress.latency, toSec(ros::Time::now()) - stamp);
   for (InputHealth& input : inputs_) {
     InputHealth::Progress& own = input.progress();
     if (!std::isfinite(own.newest)) continue;
@@ -162,6 +190,15 @@ void Inputs::follow(const smartmill_msgs::Follow::Request& request,
     response.taken.push_back(inputs_[i].taken());
     response.publishers.push_back(subscribers_[i].getNumPublishers());
   }
+}
+
+std::vector<smartmill_msgs::StreamHealth> Inputs::accounts() {
+  std::vector<smartmill_msgs::StreamHealth> accounts;
+  for (std::size_t i = 0; i < inputs_.size(); ++i) {
+    accounts.push_back(inputs_[i].account(subscribers_[i].getTopic()));
+    accounts.back().publishers = subscribers_[i].getNumPublishers();
+  }
+  return accounts;
 }
 
 void Inputs::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {

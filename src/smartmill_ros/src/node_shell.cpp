@@ -1,5 +1,7 @@
 #include "smartmill_ros/node_shell.h"
 
+#include <algorithm>
+#include <cstdint>
 #include <cstdlib>
 #include <exception>
 #include <map>
@@ -8,14 +10,18 @@
 
 #include <ros/console.h>
 #include <ros/network.h>
+#include <smartmill_msgs/NodeHealth.h>
 
+#include "smartmill_core/io/process_usage.h"
+#include "smartmill_core/names.h"
 #include "smartmill_ros/follower.h"
 #include "smartmill_ros/kept_messages.h"
 
 namespace smartmill {
 namespace {
 
-constexpr double TICK = 0.05;  // [s]
+constexpr double TICK = 0.05;          // [s]
+constexpr double HEALTH_PERIOD = 1.0;  // [s]
 
 // ROS 1 has no authentication: every program that reaches a node can publish and call its services.
 void diagnoseNetwork(diagnostic_updater::DiagnosticStatusWrapper& status) {
@@ -48,6 +54,10 @@ NodeShell::NodeShell(ros::NodeHandle nh, ros::NodeHandle private_nh, const std::
   diagnostics_.add("network", diagnoseNetwork);
   countStart();
   diagnostics_.add("restarts", this, &NodeShell::diagnoseRestarts);
+  health_ = nh.advertise<smartmill_msgs::NodeHealth>(names::NODE_HEALTH, 10);
+  started_ = counted_ = ros::WallTime::now().toSec();
+  cpu_time_ = processUsage().cpu_time;
+  every(HEALTH_PERIOD, [this] { publishHealth(); });
   every(TICK, [this] {
     inputs_.tick(TICK);
     diagnostics_.update();  // publishes once a second
@@ -72,6 +82,24 @@ void NodeShell::diagnoseRestarts(diagnostic_updater::DiagnosticStatusWrapper& st
     status.summaryf(Level::WARN, "restarted %d times in this launch", starts_ - 1);
   }
   status.add("starts", starts_);
+}
+
+void NodeShell::publishHealth() {
+  const ProcessUsage usage = processUsage();
+  const double now = ros::WallTime::now().toSec();
+  smartmill_msgs::NodeHealth health;
+  health.header.stamp = ros::Time::now();
+  health.node = ros::this_node::getName();
+  health.started = started_;
+  health.starts = static_cast<std::uint32_t>(starts_);
+  health.cpu = (usage.cpu_time - cpu_time_) / std::max(now - counted_, TICK);
+  health.memory = usage.memory;
+  health.descriptors = usage.descriptors;
+  health.threads = usage.threads;
+  health.inputs = inputs_.accounts();
+  health_.publish(health);
+  cpu_time_ = usage.cpu_time;
+  counted_ = now;
 }
 
 void NodeShell::diagnose(const std::string& name,

@@ -45,5 +45,28 @@ TEST(InputHealth, ARefusedMessageResetsTheWatchdog) {
   EXPECT_TRUE(input.watchdog().dead());
 }
 
+// Numbers of the headers of one publisher: 1, 2, 5, then those of its successor from 1 on.
+TEST(InputHealth, MessagesAreCountedByTheNumbersOfTheirHeaders) {
+  InputHealth input("daq/dynamometer", 1.0);
+  for (const std::uint32_t number : {7u, 8u, 11u, 1u, 2u, 4u}) input.count("/sim", number);
+  for (const std::uint32_t number : {900u, 901u}) input.count("/faults", number);
+  EXPECT_EQ(input.account("").lost, 3u);
+}
+
+TEST(InputHealth, EveryMessageIsProcessedWaitingDroppedOrRefused) {
+  InputHealth input("daq/dynamometer", 1.0);
+  for (int k = 0; k < 10; ++k) input.take(k, [] {});
+  for (int k = 0; k < 3; ++k) input.take(k, [&] { input.drop(); });
+  for (int k = 0; k < 2; ++k) input.take(k, refuse);
+  input.setWaiting([] { return std::size_t{4}; });
+  const smartmill_msgs::StreamHealth account = input.account("/smartmill/daq/dynamometer");
+  EXPECT_EQ(account.topic, "/smartmill/daq/dynamometer");
+  EXPECT_EQ(account.received, 15u);
+  EXPECT_EQ(account.dropped, 3u);
+  EXPECT_EQ(account.refused, 2u);
+  EXPECT_EQ(account.waiting, 4u);
+  EXPECT_EQ(account.processed, 6u);
+}
+
 }  // namespace
 }  // namespace smartmill

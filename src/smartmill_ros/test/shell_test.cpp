@@ -10,6 +10,7 @@
 #include <ros/ros.h>
 #include <smartmill_msgs/MeasureFrfActionGoal.h>
 #include <smartmill_msgs/MeasureFrfActionResult.h>
+#include <smartmill_msgs/NodeHealth.h>
 #include <smartmill_msgs/Strike.h>
 
 #include "smartmill_core/error.h"
@@ -181,6 +182,47 @@ TEST(Inputs, AStreamThatStopsIsBehindTheOthers) {
   EXPECT_THAT(reported, HasSubstr("daq/b: "));
   EXPECT_THAT(reported, HasSubstr("s behind the other inputs"));
   EXPECT_THAT(reported, Not(HasSubstr("daq/a")));
+}
+
+// By the running index of the samples one block comes twice, and 40 samples are missing.
+TEST(NodeShell, AccountsForEveryMessage) {
+  ros::NodeHandle nh, private_nh("~");
+  NodeShell shell(nh, private_nh, "none", 1.0);
+  std::uint64_t handled = 0;
+  shell.inputs().on<FramedBlock>(names::DYNAMOMETER, [&](const FramedBlock&, double) { ++handled; });
+  smartmill_msgs::NodeHealth health;
+  const boost::function<void(const smartmill_msgs::NodeHealth&)> listen =
+      [&](const smartmill_msgs::NodeHealth& m) { health = m; };
+  const ros::Subscriber subscriber = nh.subscribe<smartmill_msgs::NodeHealth>(names::NODE_HEALTH, 10, listen);
+  ros::Publisher force = nh.advertise<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, 10);
+  ASSERT_TRUE(eventually([&] { return force.getNumSubscribers() == 1 && subscriber.getNumPublishers() > 0; },
+                         ros::spinOnce));
+  SampleBlock block;
+  block.sample_rate = 1000.0;
+  block.channels = {"fx"};
+  block.units = {"N"};
+  block.samples.assign(10, 0.0);
+  for (const std::uint64_t first : {0, 10, 20, 20, 70}) {
+    block.first_index = first;
+    block.stamp = 100.0 + 0.001 * static_cast<double>(first);
+    for (double& value : block.samples) value += 1.0;
+    force.publish(toMsg(block, "dynamometer"));
+  }
+  ASSERT_TRUE(
+      eventually([&] { return !health.inputs.empty() && health.inputs[0].received == 5; }, ros::spinOnce));
+  const smartmill_msgs::StreamHealth& input = health.inputs[0];
+  EXPECT_EQ(health.node, ros::this_node::getName());
+  EXPECT_EQ(input.topic, "/smartmill/daq/dynamometer");
+  EXPECT_EQ(input.publishers, 1u);
+  EXPECT_EQ(input.lost, 0u);
+  EXPECT_EQ(input.dropped, 1u);
+  EXPECT_EQ(input.processed, 4u);
+  EXPECT_EQ(handled, 4u);
+  EXPECT_EQ(input.lost_samples, 40u);
+  EXPECT_GT(health.memory, 1e6);
+  EXPECT_GT(health.threads, 1u);
+  EXPECT_GT(health.descriptors, 3u);
+  EXPECT_NEAR(health.started, ros::WallTime::now().toSec(), 600.0);
 }
 
 TEST(KeptMessages, OutliveTheirNodeUntilTheyAreForgotten) {

@@ -48,6 +48,7 @@ constexpr const char* FORCE_REVOLUTION = "panel/revolution";
 constexpr const char* FORCE_SPECTRUM = "panel/spectrum";
 constexpr const char* PANEL_LOG = "panel/log";
 constexpr const char* REPLAY_STATE = "replay/state";
+constexpr const char* NODE_HEALTH = "health";
 
 constexpr const char* TRUE_FRF = "sim/truth/frf";
 constexpr const char* TRUE_MODES = "sim/truth/modes";

@@ -114,8 +114,9 @@ void StreamCheck::checkStamps(const SampleBlock& block) {
     return;
   }
   if (block.first_index > *next_index_) {
-    note(Kind::gap, block.stamp, 1,
-         formatted("%llu samples lost", static_cast<unsigned long long>(block.first_index - *next_index_)));
+    const std::uint64_t lost = block.first_index - *next_index_;
+    lost_samples_ += lost;
+    note(Kind::gap, block.stamp, 1, formatted("%llu samples lost", static_cast<unsigned long long>(lost)));
   }
   if (block.sample_rate != rate_) {
     note(Kind::rate, block.stamp, 1,

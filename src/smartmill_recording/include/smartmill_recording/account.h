@@ -39,17 +39,28 @@ struct StreamAccount {
   double rate_seen = 0.0;    ///< [Hz] samples over the stamps; 0: fewer than two blocks
 };
 
+/// What a node has received of a topic, by its messages on `health`: over all its starts in the recording.
+struct InputAccount {
+  std::string node, topic;
+  std::uint32_t starts = 1;                              ///< the latest, in its launch
+  std::uint64_t received = 0, dropped = 0, refused = 0;  ///< [1] messages
+  std::uint64_t lost = 0;                                ///< [1] messages between publisher and node
+};
+
 /// Account of every message and sample of a recording.
 struct RecordingAccount {
   std::vector<StreamAccount> streams;  ///< by topic
   std::vector<StreamGap> gaps;         ///< in the order of reception; samples without a force last
+  std::vector<InputAccount> inputs;    ///< by node and topic
 
-  bool isComplete() const { return gaps.empty(); }
+  /// Whether the recording and the nodes have received everything.
+  bool isComplete() const;
 };
 
 /// Counts messages by the sequence numbers of their headers, samples of SampleBlock and ForceBlock by their
 /// running index, and the samples of the force sensor that force/compensated lacks between its first and its
-/// last. What was lost before the first or after the last message of a publisher leaves no trace.
+/// last; and what each node has received. What was lost before the first or after the last message of a
+/// publisher leaves no trace.
 /// @param progress as RecordingReader::run(). @throws Error naming a file that is damaged.
 RecordingAccount accountOf(const std::string& path, const std::function<void(double)>& progress = {});
 

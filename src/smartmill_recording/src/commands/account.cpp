@@ -32,6 +32,32 @@ std::string textOf(const StreamGap& gap) {
   return formatted("%.3f s  %s: lacks %llu samples of the sensor", gap.stamp, gap.topic.c_str(), count);
 }
 
+// One line for each node, and one for each of its inputs that it has not received or used entirely.
+void printInputs(const std::vector<InputAccount>& inputs) {
+  if (inputs.empty()) return;
+  std::printf("\n%-44s %7s %9s %6s %8s %8s\n", "node", "starts", "messages", "lost", "dropped", "refused");
+  const auto print = [](const std::string& name, const std::string& starts, const InputAccount& account) {
+    std::printf(
+        "%-44s %7s %9llu %6llu %8llu %8llu\n", name.c_str(), starts.c_str(),
+        static_cast<unsigned long long>(account.received), static_cast<unsigned long long>(account.lost),
+        static_cast<unsigned long long>(account.dropped), static_cast<unsigned long long>(account.refused));
+  };
+  for (auto input = inputs.begin(); input != inputs.end();) {
+    InputAccount node;
+    std::vector<InputAccount> incomplete;
+    for (node.node = input->node; input != inputs.end() && input->node == node.node; ++input) {
+      node.starts = input->starts;
+      node.received += input->received;
+      node.lost += input->lost;
+      node.dropped += input->dropped;
+      node.refused += input->refused;
+      if (input->lost + input->dropped + input->refused > 0) incomplete.push_back(*input);
+    }
+    print(node.node, std::to_string(node.starts), node);
+    for (const InputAccount& one : incomplete) print("  " + one.topic, "", one);
+  }
+}
+
 struct Arguments {
   std::string recording;
 };
@@ -52,12 +78,16 @@ int run(const Arguments& arguments) {
     }
     std::printf("  %s\n", s.publisher.c_str());
   }
+  printInputs(account.inputs);
   for (std::size_t k = 0; k < std::min(GAPS_PRINTED, account.gaps.size()); ++k)
     std::printf("%s\n", textOf(account.gaps[k]).c_str());
   if (account.gaps.size() > GAPS_PRINTED)
     std::printf("and %zu more gaps\n", account.gaps.size() - GAPS_PRINTED);
   if (!account.isComplete()) {
-    std::printf("incomplete: %zu gaps\n", account.gaps.size());
+    std::uint64_t lost = 0;
+    for (const InputAccount& input : account.inputs) lost += input.lost;
+    std::printf("incomplete: %zu gaps; nodes have lost %llu messages\n", account.gaps.size(),
+                static_cast<unsigned long long>(lost));
     return INCOMPLETE;
   }
   std::printf("complete: no message and no sample is missing\n");
@@ -71,7 +101,9 @@ Command accountCommand() {
   command.description =
       "Counts the messages of a recording by the sequence numbers of their headers, the samples of sensors "
       "and forces "
-      "by their running index, and the samples of the force sensor that have no compensated force.";
+      "by their running index, the samples of the force sensor that have no compensated force, and by the "
+      "topic "
+      "health what each node has received, lost, dropped and refused.";
   command.examples = {{"session.bag", "proves that nothing is missing, or lists what is"}};
   command.files = {{"RECORDING", "bag or MCAP file"}};
   command.exits = {{INCOMPLETE, "messages or samples are missing or repeated"}};

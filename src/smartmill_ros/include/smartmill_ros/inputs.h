@@ -5,13 +5,17 @@
 #include <deque>
 #include <functional>
 #include <limits>
+#include <map>
 #include <string>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include <diagnostic_updater/DiagnosticStatusWrapper.h>
+#include <ros/message_event.h>
 #include <ros/node_handle.h>
 #include <smartmill_msgs/Follow.h>
+#include <smartmill_msgs/StreamHealth.h>
 #include <boost/function.hpp>
 
 #include "smartmill_core/names.h"
@@ -43,7 +47,10 @@ class InputHealth {
   std::string take(double now, const std::function<void()>& handle);
   /// Within a handler: the message is dropped as if it had not come, so that an input of which every message
   /// is dropped is dead.
-  void drop() { dropped_ = true; }
+  void drop() { is_dropped_ = true; }
+  /// Counts the messages that were lost between a publisher and this node. roscpp numbers the messages of a
+  /// publisher; a publisher that is restarted begins anew. @param number of the header
+  void count(const std::string& publisher, std::uint32_t number);
   /// A message of this input cannot be used. @return as take()
   std::string refuse(double now, const std::string& problem);
 
@@ -53,10 +60,12 @@ class InputHealth {
   /// Error since the last call, or the present one; empty: none.
   std::string takeProblem();
   std::size_t refused() const { return refused_; }  ///< [1] messages since the start
+  /// [1] messages since the start that wait for data of other topics
+  std::uint64_t waiting() const { return waiting_ ? std::min<std::uint64_t>(taken_, waiting_()) : 0; }
   /// [1] messages since the start that the node has processed
-  std::uint64_t taken() const {
-    return taken_ - (waiting_ ? std::min<std::uint64_t>(taken_, waiting_()) : 0);
-  }
+  std::uint64_t taken() const { return taken_ - waiting(); }
+  /// Account since the start. @param topic full name; longest latency since the previous call
+  smartmill_msgs::StreamHealth account(const std::string& topic);
   void setWaiting(std::function<std::size_t()> waiting) { waiting_ = std::move(waiting); }
 
   /// Of sample blocks and spindle angles.
@@ -68,6 +77,7 @@ class InputHealth {
     double newest = -std::numeric_limits<double>::infinity();  // [s]
     double behind = 0.0;                                       // [s] behind the other streams; 0: not behind
     double limit = 0.0;                                        // [s]
+    double latency = 0.0;                                      // [s] longest since the last account
   };
   Progress& progress() { return progress_; }
   const Progress& progress() const { return progress_; }
@@ -77,10 +87,11 @@ class InputHealth {
   Watchdog watchdog_;
   bool reported_ = false;      // the problem, by takeProblem()
   bool last_refused_ = false;  // the last message
-  bool dropped_ = false;       // the present message
+  bool is_dropped_ = false;    // the present message
   double logged_ = -1e9;       // [s] time of the last line for the log
   std::size_t refused_ = 0;
-  std::uint64_t taken_ = 0;
+  std::uint64_t taken_ = 0, dropped_ = 0, lost_ = 0;
+  std::map<std::string, std::uint32_t> numbers_;  // of the last message, by publisher
   std::function<std::size_t()> waiting_;
   StreamCheck check_;
   Progress progress_;
@@ -101,7 +112,11 @@ class Inputs {
   void on(const std::string& topic, std::function<void(const Data&, double)> handler) {
     using Message = typename MessageOf<Data>::Type;
     InputHealth& health = add(topic);
-    const boost::function<void(const Message&)> callback = [this, &health, handler](const Message& message) {
+    using Event = ros::MessageEvent<Message const>;
+    const boost::function<void(const Event&)> callback = [this, &health, handler](const Event& event) {
+      const Message& message = *event.getConstMessage();
+      if constexpr (ros::message_traits::HasHeader<Message>::value)
+        health.count(event.getPublisherName(), message.header.seq);
       take(health, [&] {
         if constexpr (std::is_same_v<Message, Data>) {
           handler(message, toSec(ros::Time::now()));
@@ -139,6 +154,9 @@ class Inputs {
   /// Service of a player of recorded data: receives its phase and returns the processed messages. While a
   /// player calls it, pauses of the player are no end of data.
   void follow(const smartmill_msgs::Follow::Request& request, smartmill_msgs::Follow::Response& response);
+
+  /// Accounts of all inputs; the largest latencies since the previous call.
+  std::vector<smartmill_msgs::StreamHealth> accounts();
 
   /// Diagnostics: time since the last message and errors of each input.
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);

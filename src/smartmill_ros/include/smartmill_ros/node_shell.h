@@ -6,6 +6,7 @@
 
 #include <diagnostic_updater/diagnostic_updater.h>
 #include <ros/node_handle.h>
+#include <ros/publisher.h>
 #include <ros/service_server.h>
 #include <ros/wall_timer.h>
 
@@ -17,8 +18,9 @@ namespace smartmill {
 /// on it alone): "localhost" or an address 127.x.x.x or ::1. @param host ROS_HOSTNAME or ROS_IP
 bool isLoopback(const std::string& host);
 
-/// Common parts of a node: inputs that catch exceptions, tasks on wall timers, diagnostics once a second, the
-/// count of its restarts and the service `follow` for a player of recorded data.
+/// Common parts of a node: inputs that catch exceptions, tasks on wall timers, diagnostics and the account of
+/// its inputs (topic `health`) once a second, the count of its restarts and the service `follow` for a player
+/// of recorded data.
 class NodeShell {
  public:
   /// @param hardware id in the diagnostics @param input_timeout [s] see Inputs
@@ -42,6 +44,7 @@ class NodeShell {
  private:
   void countStart();
   void diagnoseRestarts(diagnostic_updater::DiagnosticStatusWrapper& status);
+  void publishHealth();
   bool follow(smartmill_msgs::Follow::Request& request, smartmill_msgs::Follow::Response& response);
 
   ros::NodeHandle nh_;
@@ -50,7 +53,9 @@ class NodeShell {
   std::vector<std::function<void()>> tasks_;
   std::vector<ros::WallTimer> timers_;
   ros::ServiceServer follow_;
-  int starts_ = 1;  // in this launch
+  ros::Publisher health_;
+  int starts_ = 1;                                         // in this launch
+  double started_ = 0.0, counted_ = 0.0, cpu_time_ = 0.0;  // [s] wall time, that of cpu_time_, processor time
 };
 
 }  // namespace smartmill

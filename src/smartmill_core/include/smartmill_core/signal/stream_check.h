@@ -49,6 +49,8 @@ class StreamCheck {
   double newest() const { return newest_; }
   /// [1] faults of a kind since the start: samples of value and stuck, readings of angle, else blocks
   std::size_t count(Kind kind) const { return episodes_[static_cast<std::size_t>(kind)].count; }
+  /// [1] samples since the start that are missing in the running index
+  std::uint64_t lostSamples() const { return lost_samples_; }
 
  private:
   static constexpr double NEVER = -std::numeric_limits<double>::infinity();  // [s]
@@ -89,6 +91,7 @@ class StreamCheck {
 
   // Of the last block.
   std::optional<std::uint64_t> next_index_;
+  std::uint64_t lost_samples_ = 0;
   std::uint64_t first_index_ = 0;
   double rate_ = 0.0;  // [Hz]
   std::vector<Channel> channels_;
