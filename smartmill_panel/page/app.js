@@ -12,12 +12,13 @@ import { Commands } from './views/commands.js';
 import { Knowledge } from './views/knowledge.js';
 import { Discrepancy, Report, Database, Diagnostics, ForceSensor } from './views/model.js';
 import { Fleet } from './views/fleet.js';
+import { Health } from './views/health.js';
 import { FirstConnection, Instruments } from './views/instruments.js';
 
 const REFRESH = 100;  // [ms]
 
 const VIEWS = {
-  overview: 'Overview', forces: 'Forces', stability: 'Stability', dynamics: 'Dynamics', session: 'Session', model: 'Model', instruments: 'Instruments', fleet: 'Fleet',
+  overview: 'Overview', forces: 'Forces', stability: 'Stability', dynamics: 'Dynamics', session: 'Session', model: 'Model', instruments: 'Instruments', fleet: 'Fleet', health: 'Health',
 };
 
 // A card with a title.
@@ -132,7 +133,7 @@ class Page {
     const more = make('div', { style: 'display: grid; gap: 12px' });
     this.views.model.append(more);
     const known = e => new Knowledge(e, link, what_if);
-    for (const [title, build] of [['Cutting coefficients', e => new Database(e, link)], ['Tool and material', known], ['Force sensor', e => new ForceSensor(e, link)], ['Nodes', e => new Diagnostics(e, link)]]) {
+    for (const [title, build] of [['Cutting coefficients', e => new Database(e, link)], ['Tool and material', known], ['Force sensor', e => new ForceSensor(e, link)]]) {
       const element = card(title, 'tools-free');
       more.append(element);
       this.add('model', element, build(element));
@@ -141,6 +142,11 @@ class Page {
     this.add('instruments', null, new Instruments(this.views.instruments, link, card));
     this.add('instruments', null, new FirstConnection(this.views.instruments, card, this.config));
     this.add('fleet', null, new Fleet(this.views.fleet, link, card));
+
+    const inputs = card('Messages of each input', 'wide tools-free');
+    place('health', 'Nodes', 'tools-free', e => new Health(e, inputs, link));
+    place('health', 'Diagnostics', 'tools-free', e => new Diagnostics(e, link));
+    this.views.health.append(inputs);
   }
 
   setTheme(theme) {

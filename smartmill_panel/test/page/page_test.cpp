@@ -100,6 +100,9 @@ TEST_F(PageTest, TheFleetIsShown) {
 TEST_F(PageTest, InstrumentsAreShown) {
   check("InstrumentsAreShown");
 }
+TEST_F(PageTest, HealthOfTheNodesIsShown) {
+  check("HealthOfTheNodesIsShown");
+}
 TEST_F(PageTest, ANewInstrumentIsTriedWrittenAndCalibrated) {
   check("ANewInstrumentIsTriedWrittenAndCalibrated");
 }

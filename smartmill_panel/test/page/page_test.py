@@ -19,7 +19,7 @@ from browser import PATIENCE, Browser, free_port
 NODE, PAGE, OUT = sys.argv[1:4]
 TOKEN = "a token that is long enough"
 SIZES = {"1280x800": (1280, 800), "1920x1080": (1920, 1080), "phone": (390, 844)}
-VIEWS = ["overview", "forces", "stability", "dynamics", "session", "model", "instruments", "fleet"]
+VIEWS = ["overview", "forces", "stability", "dynamics", "session", "model", "instruments", "fleet", "health"]
 LOSS_TIMEOUT = 2.0  # [s] in which the page must report a lost node
 
 
@@ -196,7 +196,17 @@ class Machine:
         for topic, status in (("force/measured", 0), ("force/compensated", 1)):
             self.publish(topic, m.ForceBlock(sample_rate=rate, first_index=first, fx=fx, fy=fx, fz=[0.0] * n, status=status))
         self.diagnostics()
+        self.health()
         self.index += 1
+
+    def health(self):
+        """Of a node that was restarted and has lost messages of one input, which is stuck."""
+        m = self.msg
+        force = m.StreamHealth(topic="/smartmill/daq/dynamometer", publishers=1, received=2 ** 53 + 12, lost=3, processed=2 ** 53, waiting=5, dropped=4,
+                               refused=3, lost_samples=256, silent=0.01, latency=0.0123, fault="channel fx repeats one value")
+        angle = m.StreamHealth(topic="/smartmill/spindle/angle")
+        self.publish("health", m.NodeHealth(node="/smartmill/kalman", started=time.time() - 600, starts=3, cpu=0.214, memory=48.4e6, descriptors=31, threads=9,
+                                            inputs=[force, angle]))
 
 
 class Bench:
@@ -434,6 +444,19 @@ def instruments_are_shown(browser, machine):
     browser.wait("document.querySelector('#instruments .stale')?.textContent.startsWith('no report for')")
     machine.front_end = True
     browser.wait("!document.querySelector('#instruments .stale')")
+
+
+def health_of_the_nodes_is_shown(browser, machine):
+    browser.js("(location.hash = 'health', 1)")
+    browser.wait("document.querySelectorAll('#health-inputs tbody tr').length >= 2")
+    rows = "[...document.querySelectorAll('%s tbody tr')].map(r => [...r.children].map(e => e.textContent))"
+    nodes = {row[0]: row[1:] for row in browser.js(rows % "#health-nodes")}
+    equal(nodes["kalman"], ["restarted 2 times", "10 min", "21", "48", "31", "9"])
+    inputs = {tuple(row[:2]): row[2:] for row in browser.js(rows % "#health-inputs")}
+    equal(inputs["kalman", "daq/dynamometer"],
+          ["", str(2 ** 53 + 12), "3", "5", "4", "3", "256", "0.0 s", "12", "channel fx repeats one value"])
+    equal(inputs["kalman", "spindle/angle"], ["no publisher", "0", "0", "0", "0", "0", "0", "–", "–", ""])
+    browser.js("(location.hash = 'overview', 1)")
 
 
 def a_new_instrument_is_tried_written_and_calibrated(browser, bench, machine):
@@ -697,6 +720,7 @@ def main():
             bench.case(the_fleet_is_shown, browser, machine)
             bench.case(instruments_are_shown, browser, machine)
             bench.case(a_new_instrument_is_tried_written_and_calibrated, browser, bench, machine)
+            bench.case(health_of_the_nodes_is_shown, browser, machine)
             bench.case(silence_turns_values_grey, browser, machine)
             bench.case(hostile_origins_and_commands_without_token_are_refused, bench)
             bench.case(the_page_commands_after_an_unlock, browser)
