@@ -126,6 +126,14 @@ void ForceCompensation::reset() {
   health_ = {};
 }
 
+bool ForceCompensation::hasDynamics() const {
+  const auto known = [](const auto& axis) { return axis.has_value(); };
+  return std::all_of(sensor_.begin(), sensor_.end(), known) &&
+         std::any_of(sensor_.begin(), sensor_.end(), [](const auto& axis) {
+           return !axis->model.modes.empty() || axis->model.direct != 1.0;
+         });
+}
+
 // A piezoelectric sensor drifts; its mean without cutting is its zero.
 void ForceCompensation::updateZero(const ForceBlock& measured) {
   if (!condition_ || condition_->kind == CuttingCondition::Kind::cut || measured.force[0].empty()) return;
@@ -171,7 +179,7 @@ void ForceCompensation::handle(const SampleBlock& block) {
   updateZero(measured);
   ForceBlock compensated = measured;
   health_.speed_std = 0.0;
-  if (!takeSpeed(block.stamp) || !hasSensor() || !isMeasured(measured)) {
+  if (!takeSpeed(block.stamp) || !hasDynamics() || !isMeasured(measured)) {
     method_->stop();
     health_.speed = 0.0;
     compensated.status = ForceBlock::Status::passed_through;

@@ -224,6 +224,29 @@ TEST(ForceCompensation, bridgesSamplesThatAreNotNumbers) {
   }
 }
 
+// Status compensated promises that the dynamics of the sensor are removed.
+TEST(ForceCompensation, passesThroughUntilTheSensorIsKnown) {
+  const ForceSensor ideal;
+  const Session s = session(4);
+  std::vector<ForceBlock> compensated;
+  ForceCompensation compensation(CompensationParameters(), false,
+                                 {{}, [&](const ForceBlock& block) { compensated.push_back(block); }});
+  for (std::size_t axis = 0; axis < 3; ++axis) compensation.setSensor(axis, ideal.axis[axis]);
+  EXPECT_FALSE(compensation.hasDynamics());
+  compensation.handle(s.angles.front());
+  compensation.handle(s.blocks.front());
+  ModalModel tapped = ideal.axis[1];
+  tapped.direct = 0.1;
+  tapped.modes = {{1080.0, 0.025, 0.9}};
+  compensation.setSensor(1, tapped);
+  EXPECT_TRUE(compensation.hasDynamics());
+  compensation.handle(s.blocks.at(1));
+  ASSERT_EQ(compensated.size(), 2u);
+  EXPECT_EQ(compensated[0].status, ForceBlock::Status::passed_through);
+  EXPECT_EQ(compensated[0].force[0][10], s.blocks[0].at(10, 0));
+  EXPECT_EQ(compensated[1].status, ForceBlock::Status::settling);
+}
+
 TEST(ForceCompensation, passesThroughAtRestAndTurnsTheReaction) {
   Session s = session(4);
   for (SpindleAngle& angle : s.angles) angle.speed = 0.0;

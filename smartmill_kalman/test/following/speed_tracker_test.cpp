@@ -113,10 +113,13 @@ TEST(TrackedSpeed, NeedsNoAngles) {
   parameters.track_speed = true;
   std::size_t out = 0;
   ForceBlock::Status last = ForceBlock::Status::measured;
-  CompensationPipeline pipeline(parameters, {}, ForceSensor(), 0.05, {{{}, [&](const ForceBlock& c) {
-                                                                         ++out;
-                                                                         last = c.status;
-                                                                       }}});
+  ForceSensor sensor;
+  sensor.axis[0].direct = 0.98;
+  sensor.axis[0].modes = {{4000.0, 0.02, 0.02}};
+  CompensationPipeline pipeline(parameters, {}, sensor, 0.05, {{{}, [&](const ForceBlock& c) {
+                                                                  ++out;
+                                                                  last = c.status;
+                                                                }}});
   CuttingCondition condition;
   condition.kind = CuttingCondition::Kind::cut;
   condition.spindle_speed = units::TWO_PI * 150.0;

@@ -35,7 +35,8 @@ class ForceCompensation {
   /// Sensor with cross-talk from now on (CoupledCompensation). Its diagonal elements are the sensor models;
   /// setSensor() replaces them, the cross-talk stays. @throws Error.
   void setMatrix(const SensorMatrix& matrix);
-  bool hasSensor() const { return sensor_[0] && sensor_[1] && sensor_[2]; }
+  /// Whether the sensor differs from an ideal one in any axis, as far as known; else forces pass through.
+  bool hasDynamics() const;
   /// Process noise over the spindle speed from now on; the filters restart.
   void setMemory(const MemorySchedule& memory);
   const MemorySchedule& memory() const { return memory_; }
