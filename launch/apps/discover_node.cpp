@@ -12,6 +12,7 @@ int main(int argc, char** argv) {
   const ros::NodeHandle nh, private_nh("~");
   try {
     Discovery discovery(nh, private_nh);
+    const smartmill::MasterWatch master(nh);
     ros::AsyncSpinner spinner(1);
     spinner.start();
     while (!stop && ros::ok()) ros::WallDuration(0.05).sleep();

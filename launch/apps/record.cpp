@@ -7,13 +7,16 @@
 #include "node/bag_recorder.h"
 #include "node/shutdown_request.h"
 #include "smartmill_core/program.h"
+#include "smartmill_ros/master_watch.h"
 
 namespace {
 
 void run(const std::string& path, const std::vector<std::string>& patterns,
          const std::atomic<bool>& shutdown) {
   constexpr double SUBSCRIBE_PERIOD = 0.5, STEP = 0.1;  // [s] of wall time
-  smartmill::session::BagRecorder recorder(ros::NodeHandle(), path, patterns);
+  const ros::NodeHandle nh;
+  smartmill::session::BagRecorder recorder(nh, path, patterns);
+  const smartmill::MasterWatch master(nh);
   ros::WallTime subscribed;
   while (!shutdown && ros::ok()) {
     if ((ros::WallTime::now() - subscribed).toSec() > SUBSCRIBE_PERIOD) {

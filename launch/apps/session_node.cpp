@@ -11,6 +11,7 @@ int main(int argc, char** argv) {
   const std::atomic<bool>& stop = catchShutdownRequest();
   const ros::NodeHandle nh, private_nh("~");
   try {
+    const smartmill::MasterWatch master(nh);
     return Session(nh, private_nh, stop).run();
   } catch (const std::exception& error) {
     ROS_FATAL_STREAM(error.what());

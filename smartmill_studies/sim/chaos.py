@@ -66,9 +66,10 @@ def slot(number):
 class Graph:
     """The pipeline in a process group of its own."""
 
-    def __init__(self, folder, pace):
+    def __init__(self, folder, pace, port=None):
+        """@param port of a master that runs; None: roslaunch starts one"""
         self.folder = folder
-        self.master = f"http://localhost:{free_port()}"
+        self.master = f"http://localhost:{port or free_port()}"
         os.environ.update(ROS_MASTER_URI=self.master, ROS_HOSTNAME="localhost", ROS_HOME=str(folder / "home"))
         arguments = ["smartmill_launch", "pipeline.launch", f"pace:={pace}", f"machine:={ROOT / 'launch/models/mill_twin.yaml'}", f"port:={free_port()}", f"bag:={folder / 'run.bag'}",
                      f"database:={folder / 'machine.sqlite'}", "faults:=true", f"fault_topics:={' '.join(STREAMS)}", f"motion_log:={folder / 'motion.log'}"]

@@ -36,10 +36,18 @@ std::vector<std::uint8_t> bytesOf(const std::string& hex) {
   return hex.size() % 2 == 0 ? bytes : std::vector<std::uint8_t>();
 }
 
+std::string launchParameter(const ros::NodeHandle& nh) {
+  return nh.resolveName("kept/launch");
+}
+
+std::string keptParameter(const ros::NodeHandle& nh) {
+  return nh.resolveName("kept") + "/" +
+         ros::param::param<std::string>(launchParameter(nh), "launch_without_name") +
+         ros::this_node::getName();
+}
+
 KeptTexts::KeptTexts(const ros::NodeHandle& nh, const std::string& name)
-    : parameter_(nh.resolveName("kept") + "/" +
-                 ros::param::param<std::string>(nh.resolveName("kept/launch"), "launch_without_name") +
-                 ros::this_node::getName() + "/" + name) {
+    : parameter_(keptParameter(nh) + "/" + name) {
 }
 
 void KeptTexts::keep(const std::string& key, const std::string& text) {

@@ -17,6 +17,10 @@ std::string hexOf(const std::vector<std::uint8_t>& bytes);
 /// @return empty if the text does not consist of pairs of hexadecimal digits
 std::vector<std::uint8_t> bytesOf(const std::string& hex);
 
+/// Parameter that names the launch, and parameter that contains all results of this node in it.
+std::string launchParameter(const ros::NodeHandle& nh);
+std::string keptParameter(const ros::NodeHandle& nh);
+
 /// Results of this node on the parameter server, which lives as long as the master: a node that is restarted
 /// continues with them. Those of an earlier launch under the same master are not used: nodes.launch gives
 /// each launch a name, kept/launch.

@@ -7,6 +7,7 @@
 #include <ros/ros.h>
 
 #include "smartmill_core/parameters/parameter_table.h"
+#include "smartmill_ros/master_watch.h"
 
 namespace smartmill {
 
@@ -20,7 +21,8 @@ bool printsParameters(int argc, char** argv) {
   return true;
 }
 
-/// main() of a node class with a constructor (nh, private_nh) and a type `Parameters`.
+/// main() of a node class with a constructor (nh, private_nh) and a type `Parameters`. Outlives the ROS
+/// master.
 template <class Node>
 int runNode(int argc, char** argv, const char* name) {
   if (printsParameters<typename Node::Parameters>(argc, argv)) return 0;
@@ -29,6 +31,7 @@ int runNode(int argc, char** argv, const char* name) {
   const ros::NodeHandle nh, private_nh("~");
   try {
     Node node(nh, private_nh);
+    const MasterWatch master(nh);
     ros::spin();
   } catch (const std::exception& error) {
     ROS_FATAL("%s: %s", name, error.what());
