@@ -189,11 +189,12 @@ void fillAngle(Record& record, double phase, double speed) {
   }
 }
 
-std::optional<TipTrajectory> tipTrajectoryOf(const CampaignTest& test, const Record* recorded,
-                                             const SimulationOptions& options,
+std::optional<TipTrajectory> tipTrajectoryOf(const MachineModel& model, const CampaignTest& test,
+                                             const Record* recorded, const SimulationOptions& options,
                                              const CuttingMachine& machine) {
-  if (!options.guided || test.kind != TestKind::cut || test.running_before || !machine.vibrates() ||
-      !recorded || !TipTrajectory::isAvailable(*recorded))
+  // The displacement of a vibrating workpiece is not recorded.
+  const bool known = recorded && TipTrajectory::isAvailable(*recorded) && model.workpiece_modes.empty();
+  if (!options.guided || test.kind != TestKind::cut || test.running_before || !machine.vibrates() || !known)
     return {};
   return TipTrajectory(machine.model(), *recorded, test.sample_rate, options);
 }
@@ -239,7 +240,7 @@ Record simulate(const MachineModel& model, const CampaignTest& test, const Recor
   if (options.substeps < 1) throw Error("simulation: substeps below 1");
   CuttingMachine machine(model, 1.0 / (test.sample_rate * options.substeps), Feed::steady,
                          options.corner_slices);
-  const std::optional<TipTrajectory> trajectory = tipTrajectoryOf(test, recorded, options, machine);
+  const std::optional<TipTrajectory> trajectory = tipTrajectoryOf(model, test, recorded, options, machine);
   if (trajectory) machine.prescribeTip();
   const auto simulated = [&] {
     return simulateOn(machine, model, test, recorded, std::move(record), phase, trajectory, options);

@@ -57,11 +57,13 @@ void WhatIf::validate() const {
   require(speeds != 1, "speeds", speeds, "0 or at least 2");
 }
 
-// With q of unit modal mass the compliance of a mode is input x output / w^2.
-std::vector<SystemMode> withOverhang(std::vector<SystemMode> modes, double overhang) {
+// With q of unit modal mass the compliance of a mode is input x output / w^2. The modes of the tool are the
+// first `count`.
+std::vector<SystemMode> withOverhang(std::vector<SystemMode> modes, std::size_t count, double overhang) {
   const double frequency = 1.0 / (overhang * overhang);
   const double gain = std::sqrt(overhang * overhang * overhang) * frequency;
-  for (SystemMode& mode : modes) {
+  for (std::size_t k = 0; k < count; ++k) {
+    SystemMode& mode = modes[k];
     mode.frequency *= frequency;
     for (std::size_t a = 0; a < 2; ++a) {
       mode.input[a] *= gain;
@@ -102,7 +104,10 @@ WhatIfChart whatIfChart(const ChartCut& cut, const MeasuredMachine& machine, con
   other.parameters.validate();
   std::optional<RegenerativeSystem> system = machine.system(other);
   if (!system) throw Error("no chart yet, missing: modes in x and y or the tangential coefficient");
-  if (!std::isnan(request.overhang)) system->modes = withOverhang(system->modes, request.overhang);
+  if (!std::isnan(request.overhang)) {
+    const std::size_t of_workpiece = systemModes(other.workpiece.x, other.workpiece.y).size();
+    system->modes = withOverhang(system->modes, system->modes.size() - of_workpiece, request.overhang);
+  }
   const int count = request.speeds > 0 ? request.speeds : WHAT_IF.speeds;
   std::vector<double> speeds;
   for (int i = 0; i < count; ++i)
@@ -131,7 +136,7 @@ WhatIfChart whatIfChart(const ChartCut& cut, const MeasuredMachine& machine, con
     stable += request.axial_depth < chart.limit.depth[k];
   }
   if (!std::isnan(request.axial_depth)) chart.stable_share = static_cast<double>(stable) / count;
-  if (request.spread) addSpread(machine.measuredSpread(*system), chart);
+  if (request.spread) addSpread(machine.measuredSpread(other, *system), chart);
   return chart;
 }
 
