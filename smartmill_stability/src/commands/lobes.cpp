@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "commands/part_limits.h"
+#include "commands/speed_variation.h"
 #include "commands/surface_error.h"
 #include "smartmill_core/cutting/force_curve.h"
 #include "smartmill_core/error.h"
@@ -28,8 +29,9 @@ namespace {
 using namespace smartmill;
 
 struct Request : stability::CutRequest {
-  std::string method = "collocation", boundary, serration, force_curve, surface_error, along_part;
-  double max_depth_mm = 0.0, feed_mm = 0.0, tolerance_um = 0.0, best_pitch_rpm = 0.0;
+  std::string method = "collocation", boundary, serration, force_curve, surface_error, along_part, variation;
+  double max_depth_mm = 0.0, feed_mm = 0.0, tolerance_um = 0.0, best_pitch_rpm = 0.0,
+         best_variation_rpm = 0.0;
   bool errors = false;
 };
 
@@ -226,9 +228,39 @@ void alongPart(const Request& request, stability::Method method) {
                                         limits_at));
 }
 
+/// Limits with and without a variation of the speed.
+void varied(const Request& request, stability::Method method) {
+  if (!request.force_curve.empty() || !request.boundary.empty() || request.errors || request.feed_mm != 0.0 ||
+      !request.serration.empty() || !request.surface_error.empty() || request.best_pitch_rpm != 0.0 ||
+      !request.along_part.empty())
+    throw Error(
+        "--speed-variation: cannot be combined with --force-curve, --boundary, --errors, --feed-mm, "
+        "--serration-mm, --surface-error, --best-pitch or --along-part");
+  stability::VariationRequest out{request.out, request.max_depth_mm,
+                                  stability::speedVariationOf(request.variation), request.best_variation_rpm};
+  const std::vector<double> speeds = request.speedRange();
+  const MachineModel model = request.machine();
+  const stability::RegenerativeSystem steady = request.system(model);
+  stability::RegenerativeSystem changing = steady;
+  changing.variation = out.variation;
+  const double max_depth = request.max_depth_mm * units::MM;
+  const auto changing_solver = stability::makeSolver(method, changing);
+  const auto steady_solver = stability::makeSolver(method, steady);
+  stability::writeVariedChart(out, speeds, limitsOf(*changing_solver, speeds, max_depth),
+                              limitsOf(*steady_solver, speeds, max_depth));
+  if (out.best_rpm != 0.0) stability::printBestVariation(out, model, steady);
+}
+
 void run(const Request& request) {
   const stability::Method method = stability::methodOf(request.method);
   if (!(request.max_depth_mm > 0.0)) throw Error("--max-depth-mm: expected a value above 0");
+  if (!(request.best_variation_rpm >= 0.0)) throw Error("--best-variation: expected a speed above 0");
+  if (request.best_variation_rpm != 0.0 && request.variation.empty())
+    throw Error("--best-variation: requires --speed-variation");
+  if (!request.variation.empty()) {
+    varied(request, method);
+    return;
+  }
   if (!request.along_part.empty()) {
     alongPart(request, method);
     return;
@@ -282,6 +314,7 @@ Command lobesCommand() {
        "finishing by down-milling: the error of the wall, and the cuts that make size"}};
   command.files = {{"OUT", "CSV rpm,limit_mm,chatter_hz,kind; a picture of the same name with .png"},
                    {"BOUNDARY", "CSV curve,rpm,depth_mm,chatter_hz,kind"},
+                   {"OUT with --speed-variation", "CSV rpm,limit_mm,chatter_hz,kind,steady_limit_mm"},
                    {"ALONG-PART", "CSV position_mm,rpm,limit_mm,chatter_hz,kind"},
                    {"SURFACE-ERROR",
                     "CSV rpm,depth_mm,stable,error_um,error_std_um,least_um,most_um,peak_to_valley_um,"
@@ -319,6 +352,14 @@ Command lobesCommand() {
                 "--surface-error");
     line.option("--best-pitch", request.best_pitch_rpm,
                 "speed [rpm]: prints the linear variation of the tooth pitch with the largest limit there");
+    line.option(
+        "--speed-variation", request.variation,
+        "AMPLITUDE:RATIO[:triangle]: the speed varies by this share of the mean, at this ratio to the "
+        "spindle frequency, as a sine or triangle: limits with and without the variation");
+    line.option(
+        "--best-variation", request.best_variation_rpm,
+        "mean speed [rpm]: prints the variation with the largest limit there, up to AMPLITUDE and RATIO "
+        "and the acceleration of the model's spindle; requires --speed-variation");
     line.flag("--errors", request.errors, "estimate the error of each limit from a refined solution");
   });
   return command;
