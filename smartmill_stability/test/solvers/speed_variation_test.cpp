@@ -1,4 +1,5 @@
 #include <cmath>
+#include <functional>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -54,47 +55,62 @@ TEST(SpeedVariation, multipliersOfTwoVariationsAreTheSquares) {
   EXPECT_NEAR(twice / (once * once), 1.0, 1e-6);
 }
 
-/// Independent solution for turning with one mode: steps with the delayed motion interpolated linearly, as a
-/// full matrix; the delay follows from the angle of the spindle by bisection.
-double turningRadius(const DampedSlot& slot, double amplitude, double ratio, double speed, double depth,
-                     int steps) {
-  const double period = units::TWO_PI / (ratio * speed), h = period / steps, w = slot.natural();
-  const auto angle = [&](double t) {
-    return speed * t + amplitude / ratio * (1.0 - std::cos(ratio * speed * t));
-  };
-  const auto delayAt = [&](double t) {
-    double low = 0.0, high = units::TWO_PI / speed / (1.0 - amplitude);
-    for (int i = 0; i < 60; ++i) {
-      const double middle = 0.5 * (low + high);
-      (angle(t) - angle(t - middle) < units::TWO_PI ? low : high) = middle;
+/// Independent solution for one mode along x over one variation: steps with the delayed motion interpolated
+/// linearly, as a full matrix; the delay follows from the angle of the spindle by bisection.
+struct SteppedSystem {
+  double frequency, damping_ratio, mass;
+  double pitch;                             // [rad]
+  std::function<double(double)> stiffness;  // [N/m] against x - x(t - delay), over the angle of the spindle
+
+  double radius(const SpeedVariation& variation, double speed, int steps) const {
+    const double amplitude = variation.amplitude, ratio = variation.ratio;
+    const double h = units::TWO_PI / (ratio * speed) / steps;
+    const auto angle = [&](double t) {
+      return speed * t + amplitude / ratio * (1.0 - std::cos(ratio * speed * t));
+    };
+    const double longest = pitch / speed / (1.0 - amplitude);
+    const auto delayAt = [&](double t) {
+      double low = 0.0, high = longest;
+      for (int i = 0; i < 60; ++i) {
+        const double middle = 0.5 * (low + high);
+        (angle(t) - angle(t - middle) < pitch ? low : high) = middle;
+      }
+      return low;
+    };
+    const int past = static_cast<int>(longest / h) + 3;
+    // State: x, x', then x of the steps before.
+    Eigen::MatrixXd map = Eigen::MatrixXd::Identity(past + 2, past + 2);
+    for (int i = 0; i < steps; ++i) {
+      constexpr int PARTS = 50;  // of a step, for the mean stiffness
+      double mean = 0.0;         // [1/s2]
+      for (int k = 0; k < PARTS; ++k) mean += stiffness(angle((i + (k + 0.5) / PARTS) * h)) / mass / PARTS;
+      // x'' + 2 z w x' + (w^2 + K) x = K x(t - delay): exact for a force that is constant over a step.
+      const double w = units::TWO_PI * frequency, z = damping_ratio * w, square = w * w + mean;
+      const double wd = std::sqrt(square - z * z), e = std::exp(-z * h);
+      const double c = std::cos(wd * h), s = std::sin(wd * h) / wd;
+      Eigen::Matrix2d flow;
+      flow << e * (c + z * s), e * s, -e * square * s, e * (c - z * s);
+      const double back = delayAt((i + 0.5) * h) / h - 0.5;  // of the middle of the step, from its beginning
+      const int whole = static_cast<int>(back);
+      const double share = back - whole;
+      const auto row = [&](int k) { return k == 0 ? map.row(0) : map.row(k + 1); };
+      const Eigen::RowVectorXd force = mean * ((1.0 - share) * row(whole) + share * row(whole + 1));
+      Eigen::MatrixXd next(map.rows(), map.cols());
+      next.row(0) = flow(0, 0) * map.row(0) + flow(0, 1) * map.row(1) + (1.0 - flow(0, 0)) / square * force;
+      next.row(1) = flow(1, 0) * map.row(0) + flow(1, 1) * map.row(1) - flow(1, 0) / square * force;
+      next.row(2) = map.row(0);
+      next.bottomRows(past - 1) = map.middleRows(2, past - 1);
+      map.swap(next);
     }
-    return low;
-  };
-  const int past = static_cast<int>(units::TWO_PI / speed / (1.0 - amplitude) / h) + 3;
-  const double stiffness = slot.kr * depth / slot.mass;  // [1/s2]
-  // x'' + 2 z w x' + (w^2 + K) x = K x(t - delay): exact for a force that is constant over a step.
-  const double z = slot.damping_ratio * w, wd = std::sqrt(w * w + stiffness - z * z), e = std::exp(-z * h);
-  const double c = std::cos(wd * h), s = std::sin(wd * h) / wd;
-  Eigen::Matrix2d flow;
-  flow << e * (c + z * s), e * s, -e * (w * w + stiffness) * s, e * (c - z * s);
-  const double still = 1.0 / (w * w + stiffness);
-  // State: x, x', then x of the steps before.
-  Eigen::MatrixXd map = Eigen::MatrixXd::Identity(past + 2, past + 2);
-  for (int i = 0; i < steps; ++i) {
-    const double back = delayAt((i + 0.5) * h) / h - 0.5;  // of the middle of the step, from its beginning
-    const int whole = static_cast<int>(back);
-    const double share = back - whole;
-    const auto row = [&](int k) { return k == 0 ? map.row(0) : map.row(k + 1); };
-    const Eigen::RowVectorXd force = stiffness * ((1.0 - share) * row(whole) + share * row(whole + 1));
-    Eigen::MatrixXd next(map.rows(), map.cols());
-    next.row(0) = flow(0, 0) * map.row(0) + flow(0, 1) * map.row(1) + (1.0 - flow(0, 0)) * still * force;
-    next.row(1) = flow(1, 0) * map.row(0) + flow(1, 1) * map.row(1) - flow(1, 0) * still * force;
-    next.row(2) = map.row(0);
-    next.bottomRows(past - 1) = map.middleRows(2, past - 1);
-    map.swap(next);
+    return map.eigenvalues().cwiseAbs().maxCoeff();
   }
-  return map.eigenvalues().cwiseAbs().maxCoeff();
-}
+
+  /// Second order in the step.
+  double extrapolated(const SpeedVariation& variation, double speed, int steps) const {
+    const double coarse = radius(variation, speed, steps), fine = radius(variation, speed, 2 * steps);
+    return fine + (fine - coarse) / 3.0;
+  }
+};
 
 TEST(SpeedVariation, turningAgreesWithAnIndependentSolution) {
   DampedSlot slot;
@@ -103,11 +119,35 @@ TEST(SpeedVariation, turningAgreesWithAnIndependentSolution) {
   const double speed = units::radPerSecFromRpm(6000.0);
   const auto solver = makeFloquetSolver(Method::collocation, system);
   for (const double depth : {1e-4, 2e-4, 4e-4}) {
-    // Second order in the step: extrapolated from 300 and 600 steps, 16 and 33 per vibration.
-    const double coarse = turningRadius(slot, 0.2, 0.5, speed, depth, 300),
-                 fine = turningRadius(slot, 0.2, 0.5, speed, depth, 600),
-                 exact = fine + (fine - coarse) / 3.0;
-    EXPECT_NEAR(solver->multiplier(speed, depth).radius() / exact, 1.0, 2e-3) << depth;
+    const SteppedSystem stepped{slot.frequency, slot.damping_ratio, slot.mass, units::TWO_PI,
+                                [&](double) { return slot.kr * depth; }};
+    // 16 and 33 steps in a vibration.
+    EXPECT_NEAR(
+        solver->multiplier(speed, depth).radius() / stepped.extrapolated(*system.variation, speed, 300), 1.0,
+        2e-3)
+        << depth;
+  }
+}
+
+// Down-milling with two teeth, half immersion: entries and exits move with the angle.
+TEST(SpeedVariation, interruptedMillingAgreesWithAnIndependentSolution) {
+  const RegenerativeSystem system = varied(benchmarkSystem(0.5, true, false), 0.2, 0.5);
+  const double speed = units::radPerSecFromRpm(6000.0);
+  const auto solver = makeFloquetSolver(Method::collocation, system);
+  for (const double depth : {2e-4, 5e-4, 1e-3}) {
+    const SteppedSystem stepped{922.0, 0.011, 0.03993, units::PI, [&](double angle) {
+                                  // One tooth after the other from 90 to 180 deg.
+                                  const double phi = std::fmod(angle, units::PI);
+                                  if (phi < 0.5 * units::PI) return 0.0;
+                                  return depth * std::sin(phi) *
+                                         (system.kt * std::cos(phi) + system.kr * std::sin(phi));
+                                }};
+
+                stepped.extrapolated(*system.variation, speed, 400));
+                EXPECT_NEAR(solver->multiplier(speed, depth).radius() /
+                                stepped.extrapolated(*system.variation, speed, 400),
+                            1.0, 2e-3)
+                    << depth;
   }
 }
 

@@ -22,7 +22,7 @@ BoundaryOptions options(double entry_deg, double low_rpm, double high_rpm) {
 // The study counts 60 limits of each.
 TEST(BoundaryAgreement, limitsAlongAThinWall) {
   const MachineModel wall = readMachineModel(WALL_FILE);
-  for (const SidedLimit& p : agreementAtBoundary(wall, options(120.0, 4000.0, 16000.0)))
+  for (const SidedLimit& p : agreementAtBoundary(wall, options(120.0, 4000.0, 12000.0)))
     EXPECT_TRUE(p.agrees()) << p.position << " " << units::rpmFromRadPerSec(p.speed);
 }
 
