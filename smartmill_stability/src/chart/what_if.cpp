@@ -57,13 +57,11 @@ void WhatIf::validate() const {
   require(speeds != 1, "speeds", speeds, "0 or at least 2");
 }
 
-// With q of unit modal mass the compliance of a mode is input x output / w^2. The modes of the tool are the
-// first `count`.
-std::vector<SystemMode> withOverhang(std::vector<SystemMode> modes, std::size_t count, double overhang) {
+// With q of unit modal mass the compliance of a mode is input x output / w^2.
+std::vector<SystemMode> withOverhang(std::vector<SystemMode> modes, double overhang) {
   const double frequency = 1.0 / (overhang * overhang);
   const double gain = std::sqrt(overhang * overhang * overhang) * frequency;
-  for (std::size_t k = 0; k < count; ++k) {
-    SystemMode& mode = modes[k];
+  for (SystemMode& mode : modes) {
     mode.frequency *= frequency;
     for (std::size_t a = 0; a < 2; ++a) {
       mode.input[a] *= gain;
@@ -105,8 +103,11 @@ WhatIfChart whatIfChart(const ChartCut& cut, const MeasuredMachine& machine, con
   std::optional<RegenerativeSystem> system = machine.system(other);
   if (!system) throw Error("no chart yet, missing: modes in x and y or the tangential coefficient");
   if (!std::isnan(request.overhang)) {
-    const std::size_t of_workpiece = systemModes(other.workpiece.x, other.workpiece.y).size();
-    system->modes = withOverhang(system->modes, system->modes.size() - of_workpiece, request.overhang);
+    // The modes of the workpiece follow those of the tool.
+    const std::vector<SystemMode> workpiece = systemModes(other.workpiece.x, other.workpiece.y);
+    system->modes.resize(system->modes.size() - workpiece.size());
+    system->modes = withOverhang(system->modes, request.overhang);
+    system->modes.insert(system->modes.end(), workpiece.begin(), workpiece.end());
   }
   const int count = request.speeds > 0 ? request.speeds : WHAT_IF.speeds;
   std::vector<double> speeds;
