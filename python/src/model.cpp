@@ -107,6 +107,13 @@ void addModel(py::module_& m) {
       .def_property_readonly("effects", &effects,
                              "(name, {key: value}) of each effect, in the units of the file.")
       .def(
+          "at_position",
+          [](const MachineModel& model, double position) { return atPosition(model, position); },
+          py::arg("position"),
+          "The model with the modes of a vibrating workpiece at a position [m] along it. Raises Error "
+          "outside "
+          "its places.")
+      .def(
           "save",
           [](const MachineModel& model, const std::filesystem::path& path) {
             writeMachineModel(model, path.string());

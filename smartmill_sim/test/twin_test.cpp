@@ -112,6 +112,38 @@ MachineModel flexibleMill() {
   return model;
 }
 
+// The cutting force moves the workpiece against the tool, so that the chip depends on the sum of both
+// receptances; the tip moves by its own.
+TEST(Twin, workpieceVibratesAgainstTheTool) {
+  MachineModel tool = flexibleMill(), part = flexibleMill(), both = flexibleMill();
+  part.tool_tip = {};
+  part.workpiece_modes = {{0.0, tool.tool_tip.x, tool.tool_tip.y}};
+  for (ModalModel* axis : {&both.tool_tip.x, &both.tool_tip.y}) axis->modes.front().gain *= 0.25;
+  both.workpiece_modes = {{0.0, both.tool_tip.x, both.tool_tip.y}};
+  for (ModalModel* axis : {&both.workpiece_modes[0].x, &both.workpiece_modes[0].y})
+    axis->modes.front().gain *= 3.0;
+  SimulationOptions options;
+  options.noise = false;
+  options.phase = 1.0;
+  const Record of_tool = simulateTest(tool, slot(), blank(), options),
+               of_part = simulateTest(part, slot(), blank(), options),
+               of_both = simulateTest(both, slot(), blank(), options);
+  const std::vector<double>& moved = of_tool.column("tool_x");
+  const auto largest = [](const std::vector<double>& values) {
+    double most = 0.0;
+    for (const double v : values) most = std::max(most, std::abs(v));
+    return most;
+  };
+  const double force = largest(of_tool.column("fx")), most = largest(moved);
+  EXPECT_GT(most, 1e-6);
+  for (std::size_t i = 0; i < moved.size(); ++i) {
+    ASSERT_NEAR(of_part.column("fx")[i], of_tool.column("fx")[i], 1e-9 * force);
+    ASSERT_NEAR(of_both.column("fx")[i], of_tool.column("fx")[i], 1e-9 * force);
+    ASSERT_NEAR(of_both.column("tool_x")[i], 0.25 * moved[i], 1e-9 * most);
+    ASSERT_EQ(of_part.column("tool_x")[i], 0.0);
+  }
+}
+
 // A cached trace of one model gives identical records for models that differ after the tool, for a rigid tool
 // also in coefficients and wear.
 TEST(Twin, cachedTracesGiveIdenticalRecords) {

@@ -19,7 +19,7 @@ void StudyRequest::addTo(CommandLine& line) {
 }
 
 MachineModel StudyRequest::machine() const {
-  MachineModel machine = readMachineModel(model);
+  MachineModel machine = CutRequest::machine();
   machine.needTool("simulate cuts");
   return machine;
 }

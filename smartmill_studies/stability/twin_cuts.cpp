@@ -47,6 +47,7 @@ void runTwinCuts(const std::vector<MachineModel>& models, const std::vector<Twin
     sim::SimulationOptions options;
     options.noise = request.noise;
     options.seed = request.seed + i;
+    options.speed_variation = cuts[i].variation;
     options.phase = units::TWO_PI * BETWEEN / cuts[i].samples;
     return sim::simulateTest(models[models.size() == 1 ? 0 : i], testOf(cuts[i]),
                              planned(cuts[i], request.columns), options);

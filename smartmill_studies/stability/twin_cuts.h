@@ -1,10 +1,12 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "smartmill_core/campaign/record.h"
+#include "smartmill_core/cutting/speed_variation.h"
 #include "smartmill_core/cutting/tool.h"
 #include "smartmill_core/model/machine_model.h"
 
@@ -17,6 +19,8 @@ struct TwinCut {
   int samples = 180;      ///< [1] per revolution
   int revolutions = 100;  ///< [1] in cut
   int air = 0;            ///< [1] revolutions before the tool engages
+  /// Of the speed; revolutions are those of the mean speed.
+  std::optional<SpeedVariation> variation = std::nullopt;
 };
 
 /// Rounds the samples per revolution up to a multiple of the teeth.

@@ -243,8 +243,9 @@ bool hasToolModes(const MachineModel& model) {
 }
 
 bool canBeGuided(const TestData& test, const MachineModel& model) {
-  return hasToolModes(model) && test.test.kind == TestKind::cut && !test.test.running_before &&
-         sim::TipTrajectory::isAvailable(test.record) && !sim::TipTrajectory::isFromForce(test.record);
+  return hasToolModes(model) && model.workpiece_modes.empty() && test.test.kind == TestKind::cut &&
+         !test.test.running_before && sim::TipTrajectory::isAvailable(test.record) &&
+         !sim::TipTrajectory::isFromForce(test.record);
 }
 
 std::size_t Dataset::samples() const {

@@ -21,6 +21,13 @@ void append(Values& values, const ModalModel& modes) {
   values.push_back(modes.direct);
 }
 
+void append(Values& values, const std::vector<WorkpieceModes>& places) {
+  for (const WorkpieceModes& place : places) {
+    append(values, place.x);
+    append(values, place.y);
+  }
+}
+
 void append(Values& values, const EffectEntry& effect) {
   values.push_back(hashOf(effect.name));
   for (const auto& [name, value] : effect.numbers) values.insert(values.end(), {hashOf(name), value});
@@ -58,6 +65,7 @@ void appendCut(Values& values, const MachineModel& model, TestKind kind) {
   }
   append(values, model.tool_tip.x);
   append(values, model.tool_tip.y);
+  append(values, model.workpiece_modes);
 }
 
 bool actsOnCut(Stage stage) {
@@ -119,7 +127,8 @@ Values valuesOfChannel(const MachineModel& model, TestKind kind, std::size_t cha
 Values valuesOfTrace(const MachineModel& model, TestKind kind, bool tip_prescribed) {
   Values values;
   const bool cut = kind == TestKind::cut;
-  bool rigid = model.tool_tip.x.modes.empty() && model.tool_tip.y.modes.empty();
+  bool rigid =
+      model.tool_tip.x.modes.empty() && model.tool_tip.y.modes.empty() && model.workpiece_modes.empty();
   for (const EffectEntry& effect : model.effects)
     rigid = rigid && effect.flexibility.x.modes.empty() && effect.flexibility.y.modes.empty();
   const bool sums = rigid || tip_prescribed;
@@ -128,6 +137,7 @@ Values valuesOfTrace(const MachineModel& model, TestKind kind, bool tip_prescrib
   if (cut && !sums) appendCutting(values, model);
   if (!tip_prescribed) append(values, model.tool_tip.x);
   if (!tip_prescribed) append(values, model.tool_tip.y);
+  if (!tip_prescribed) append(values, model.workpiece_modes);
   for (const EffectEntry& effect : model.effects) {
     const EffectKind* known = findEffect(effect.name);
     if (known && (!actsOnCut(known->stage) || !actsIn(known->stage, kind))) continue;

@@ -4,7 +4,7 @@ namespace smartmill::sim {
 
 FlexibleCut::FlexibleCut(const TwinSetup& setup, const CuttingLaw& law, double time_step, Feed feed,
                          int corner_slices)
-    : tip_(setup.model.tool_tip, 1.0 / time_step) {
+    : tip_(setup.model.tool_tip, setup.model.workpieceModes(), 1.0 / time_step) {
   if (!setup.model.tool || !setup.model.cutting) return;
   const bool tables = feed == Feed::steady && !vibrates();
   cutter_.emplace(*setup.model.tool, law, time_step, setup.radius_offset, setup.corner_radius,
@@ -84,9 +84,11 @@ void FlexibleCut::integrateTip(const Input& input, const CuttingForce& force, Ch
     const std::array<double, 2> before{
         {now[0] - jump * (force.fx - last_.fx), now[1] - jump * (force.fy - last_.fy)}};
     // A jump is not extrapolated.
-    at = tip_.step(before, now, jump != 0.0, !contact.changed());
-    channels[TOOL_X] = at[0];
-    channels[TOOL_Y] = at[1];
+    const TipStructure::Displacement moved =
+        tip_.step(before, now, input.tip_force, jump != 0.0, !contact.changed());
+    channels[TOOL_X] = moved.tool[0];
+    channels[TOOL_Y] = moved.tool[1];
+    at = moved.relative;
   }
   if (!cutter_) return;
   if (input.tip) at = input.tip->displacement;

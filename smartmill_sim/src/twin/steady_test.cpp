@@ -19,6 +19,7 @@ SteadyTest::SteadyTest(const MachineModel& model, const CampaignTest& test, doub
       begin_(begin),
       substeps_(options.substeps),
       lead_in_(options.lead_in),
+      variation_(options.speed_variation),
       // A linear rise is on average half a step before the end of the step.
       rise_(engagementRise(machine.vibrates()) + 2.0 * options.early_entry),
       machine_(machine),
@@ -31,8 +32,9 @@ SteadyTest::SteadyTest(const MachineModel& model, const CampaignTest& test, doub
 }
 
 void SteadyTest::inputAt(double t, CuttingMachine::Input& input) const {
-  input.motion.angle = phase_ + test_.spindle_speed * (t - begin_);
-  input.motion.speed = test_.spindle_speed;
+  const double turn = test_.spindle_speed * (t - begin_);
+  input.motion.angle = phase_ + (variation_ ? variation_->angle(turn) : turn);
+  input.motion.speed = test_.spindle_speed * (variation_ ? variation_->speed(turn) : 1.0);
   input.motion.velocity[0] = feed_;
   input.motion.centre[0] = feed_ * (t - begin_);
 }

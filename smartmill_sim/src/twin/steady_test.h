@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_sim/twin/cutting_machine.h"
@@ -7,7 +9,7 @@
 
 namespace smartmill::sim {
 
-/// Input of a test with constant spindle speed and, in a cut, constant feed.
+/// Input of a test with constant (or periodically varied) spindle speed and, in a cut, constant feed.
 class SteadyTest {
  public:
   /// @param phase [rad] angle of tooth 1 at the time `begin` [s] of the first sample
@@ -28,6 +30,7 @@ class SteadyTest {
   double phase_, begin_;
   int substeps_;
   LeadIn lead_in_;
+  std::optional<SpeedVariation> variation_;
   double rise_;  // [samples]
   CuttingMachine& machine_;
   double start_;       // [s] begin of the cut

@@ -179,21 +179,23 @@ Record simulateTap(const MachineModel& model, const CampaignTest& test, const Re
   return record;
 }
 
-// Fills the spindle angle of a record at constant speed.
-void fillAngle(Record& record, double phase, double speed) {
+// Fills the spindle angle of a record.
+void fillAngle(Record& record, double phase, double speed, const std::optional<SpeedVariation>& variation) {
   if (!record.has("spindle_angle")) return;
   std::vector<double>& angle = record.add("spindle_angle");
   for (std::size_t i = 0; i < record.size(); ++i) {
-    angle[i] = std::fmod(phase + speed * (record.time[i] - record.time[0]), units::TWO_PI);
+    const double turn = speed * (record.time[i] - record.time[0]);
+    angle[i] = std::fmod(phase + (variation ? variation->angle(turn) : turn), units::TWO_PI);
     if (angle[i] < 0.0) angle[i] += units::TWO_PI;
   }
 }
 
-std::optional<TipTrajectory> tipTrajectoryOf(const CampaignTest& test, const Record* recorded,
-                                             const SimulationOptions& options,
+std::optional<TipTrajectory> tipTrajectoryOf(const MachineModel& model, const CampaignTest& test,
+                                             const Record* recorded, const SimulationOptions& options,
                                              const CuttingMachine& machine) {
-  if (!options.guided || test.kind != TestKind::cut || test.running_before || !machine.vibrates() ||
-      !recorded || !TipTrajectory::isAvailable(*recorded))
+  // The displacement of a vibrating workpiece is not recorded.
+  const bool known = recorded && TipTrajectory::isAvailable(*recorded) && model.workpiece_modes.empty();
+  if (!options.guided || test.kind != TestKind::cut || test.running_before || !machine.vibrates() || !known)
     return {};
   return TipTrajectory(machine.model(), *recorded, test.sample_rate, options);
 }
@@ -213,7 +215,7 @@ Record simulateOn(CuttingMachine& machine, const MachineModel& model, const Camp
                   const std::optional<TipTrajectory>& trajectory, const SimulationOptions& options) {
   if (test.kind == TestKind::tap)
     return simulateTap(model, test, recorded, std::move(record), options, machine);
-  fillAngle(record, phase, test.spindle_speed);
+  fillAngle(record, phase, test.spindle_speed, options.speed_variation);
   SteadyTest steady(model, test, phase, record.time.front(), options, machine);
   if (test.running_before) {
     machine.setClock(clockOf(model, test, record));
@@ -237,9 +239,10 @@ Record simulateOn(CuttingMachine& machine, const MachineModel& model, const Camp
 Record simulate(const MachineModel& model, const CampaignTest& test, const Record* recorded, Record record,
                 double phase, const SimulationOptions& options) {
   if (options.substeps < 1) throw Error("simulation: substeps below 1");
-  CuttingMachine machine(model, 1.0 / (test.sample_rate * options.substeps), Feed::steady,
-                         options.corner_slices);
-  const std::optional<TipTrajectory> trajectory = tipTrajectoryOf(test, recorded, options, machine);
+  if (options.speed_variation) options.speed_variation->validate();
+  CuttingMachine machine(model, 1.0 / (test.sample_rate * options.substeps),
+                         options.speed_variation ? Feed::any : Feed::steady, options.corner_slices);
+  const std::optional<TipTrajectory> trajectory = tipTrajectoryOf(model, test, recorded, options, machine);
   if (trajectory) machine.prescribeTip();
   const auto simulated = [&] {
     return simulateOn(machine, model, test, recorded, std::move(record), phase, trajectory, options);

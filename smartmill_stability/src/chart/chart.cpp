@@ -13,7 +13,7 @@ namespace smartmill::stability {
 
 ChartMaker::ChartMaker(const ChartParameters& parameters, const MachineModel& model)
     : cut_{parameters, model.needTool("predict stability"), model.spindle.value_or(Spindle{}),
-           processDamping(model)} {
+           processDamping(model), model.workpieceModes()} {
   ChartParameters& own = cut_.parameters;
   if (own.speed_high == 0.0 && cut_.spindle.max_speed) own.speed_high = *cut_.spindle.max_speed;
   own.validate();

@@ -1,6 +1,7 @@
 #include "smartmill_stability/chart/measured_machine.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <complex>
 
@@ -57,6 +58,20 @@ void addCross(const std::map<std::string, MeasuredFrf>& frfs, ToolTipResponse& r
   response.xy = lines("yx");
   if (response.xy.empty()) response.xy = response.yx;
   if (response.yx.empty()) response.yx = response.xy;
+}
+
+std::vector<SystemMode> modesOf(const WorkpieceModes& workpiece) {
+  return systemModes(workpiece.x, workpiece.y);
+}
+
+/// Adds the receptance of the workpiece, which its reaction moves against the tool.
+void addWorkpiece(const WorkpieceModes& workpiece, ToolTipResponse& response) {
+  const std::vector<SystemMode> modes = modesOf(workpiece);
+  for (std::size_t i = 0; i < response.frequency.size() && !modes.empty(); ++i) {
+    const std::array<std::complex<double>, 4> added = receptance(modes, response.frequency[i]);
+    response.xx[i] += added[0];
+    response.yy[i] += added[3];
+  }
 }
 
 bool needsModes(const ChartParameters& parameters) {
@@ -149,6 +164,7 @@ std::optional<RegenerativeSystem> MeasuredMachine::system(const ChartCut& cut,
     return {};
   RegenerativeSystem system = cutOf(cut, engagement);
   system.modes = crossModes(modes_.at("x").model, modes_.at("y").model, crossFrf(cut.parameters));
+  for (const SystemMode& mode : modesOf(cut.workpiece)) system.modes.push_back(mode);
   return system;
 }
 
@@ -160,7 +176,8 @@ std::optional<UncertainSystem> MeasuredMachine::uncertainSystem(const ChartCut& 
   least.frequency = cut.parameters.frequency_std;
   least.damping = least.gain = least.cutting = cut.parameters.gain_std;
   least.radial = cut.parameters.radial_std;
-  return measuredSystem(*mean, modes_.at("x").model, modes_.at("y").model, *coefficients_, least);
+  return measuredSystem(*mean, modes_.at("x").model, modes_.at("y").model, cut.workpiece, *coefficients_,
+                        least);
 }
 
 /// The measured cross receptance, in either direction; empty without one.
@@ -191,6 +208,7 @@ ChartSolver MeasuredMachine::solver(const ChartCut& cut) const {
   } else {
     result.system = cutOf(cut, {});
     result.system.response = measuredResponse(parameters);
+    addWorkpiece(cut.workpiece, *result.system.response);
   }
   return result;
 }
@@ -211,8 +229,8 @@ ToolTipResponse MeasuredMachine::measuredResponse(const ChartParameters& paramet
   return response;
 }
 
-UncertainSystem MeasuredMachine::measuredSpread(const RegenerativeSystem& system) const {
-  return measuredSystem(system, modes_.at("x").model, modes_.at("y").model, *coefficients_);
+UncertainSystem MeasuredMachine::measuredSpread(const ChartCut& cut, const RegenerativeSystem& system) const {
+  return measuredSystem(system, modes_.at("x").model, modes_.at("y").model, cut.workpiece, *coefficients_);
 }
 
 }  // namespace smartmill::stability

@@ -59,9 +59,10 @@ bool DrawnMachines::meanIsStable(double speed, double depth) const {
 }
 
 UncertainSystem measuredSystem(const RegenerativeSystem& system, const ModalModel& x, const ModalModel& y,
-                               const CoefficientSet& coefficients, const LeastDeviations& least) {
+                               const WorkpieceModes& workpiece, const CoefficientSet& coefficients,
+                               const LeastDeviations& least) {
   std::vector<ModeUncertainty> modes;
-  for (const ModalModel* model : {&x, &y}) {
+  for (const ModalModel* model : {&x, &y, &workpiece.x, &workpiece.y}) {
     const std::size_t before = modes.size(), count = systemModes(*model, 0).size();
     for (const Mode& mode : model->modes) {
       if (mode.gain == 0.0) continue;

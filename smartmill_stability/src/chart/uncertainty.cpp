@@ -39,7 +39,8 @@ UncertainSystem::UncertainSystem(const RegenerativeSystem& system, std::vector<M
 UncertainSystem UncertainSystem::of(const MachineModel& model, const RegenerativeSystem& system) {
   const Uncertainty& u = model.uncertainty;
   std::vector<ModeUncertainty> modes;
-  for (const ModalModel* axis : {&model.tool_tip.x, &model.tool_tip.y})
+  const WorkpieceModes workpiece = model.workpieceModes();
+  for (const ModalModel* axis : {&model.tool_tip.x, &model.tool_tip.y, &workpiece.x, &workpiece.y})
     for (const Mode& mode : axis->modes)
       modes.push_back({share(mode.frequency_std, mode.frequency, u.frequency),
                        share(mode.damping_ratio_std, mode.damping_ratio, u.damping),

@@ -102,7 +102,13 @@ WhatIfChart whatIfChart(const ChartCut& cut, const MeasuredMachine& machine, con
   other.parameters.validate();
   std::optional<RegenerativeSystem> system = machine.system(other);
   if (!system) throw Error("no chart yet, missing: modes in x and y or the tangential coefficient");
-  if (!std::isnan(request.overhang)) system->modes = withOverhang(system->modes, request.overhang);
+  if (!std::isnan(request.overhang)) {
+    // The modes of the workpiece follow those of the tool.
+    const std::vector<SystemMode> workpiece = systemModes(other.workpiece.x, other.workpiece.y);
+    system->modes.resize(system->modes.size() - workpiece.size());
+    system->modes = withOverhang(system->modes, request.overhang);
+    system->modes.insert(system->modes.end(), workpiece.begin(), workpiece.end());
+  }
   const int count = request.speeds > 0 ? request.speeds : WHAT_IF.speeds;
   std::vector<double> speeds;
   for (int i = 0; i < count; ++i)
@@ -131,7 +137,7 @@ WhatIfChart whatIfChart(const ChartCut& cut, const MeasuredMachine& machine, con
     stable += request.axial_depth < chart.limit.depth[k];
   }
   if (!std::isnan(request.axial_depth)) chart.stable_share = static_cast<double>(stable) / count;
-  if (request.spread) addSpread(machine.measuredSpread(*system), chart);
+  if (request.spread) addSpread(machine.measuredSpread(other, *system), chart);
   return chart;
 }
 

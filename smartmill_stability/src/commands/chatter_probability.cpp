@@ -26,7 +26,7 @@ struct Request : stability::CutRequest {
 
 void run(const Request& request) {
   if (!(request.risk >= 0.0) || !(request.risk < 1.0)) throw Error("--risk: expected 0 <= value < 1");
-  const MachineModel model = readMachineModel(request.model);
+  const MachineModel model = request.machine();
   const stability::RegenerativeSystem system = request.system(model);
   const std::vector<double> speeds = request.speedRange();
   std::vector<double> depths = stability::rangeOf("--depths-mm", request.depths);

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "commands/part_limits.h"
+#include "commands/speed_variation.h"
 #include "commands/surface_error.h"
 #include "smartmill_core/cutting/force_curve.h"
 #include "smartmill_core/error.h"
@@ -27,8 +29,9 @@ namespace {
 using namespace smartmill;
 
 struct Request : stability::CutRequest {
-  std::string method = "collocation", boundary, serration, force_curve, surface_error;
-  double max_depth_mm = 0.0, feed_mm = 0.0, tolerance_um = 0.0, best_pitch_rpm = 0.0;
+  std::string method = "collocation", boundary, serration, force_curve, surface_error, along_part, variation;
+  double max_depth_mm = 0.0, feed_mm = 0.0, tolerance_um = 0.0, best_pitch_rpm = 0.0,
+         best_variation_rpm = 0.0;
   bool errors = false;
 };
 
@@ -117,7 +120,7 @@ void bistable(const Request& request, stability::Method method) {
     throw Error(
         "--force-curve: cannot be combined with --serration-mm, --boundary, --errors or --surface-error");
   const ForceCurves law = readForceCurves(request.force_curve);
-  const stability::RegenerativeSystem system = request.system(readMachineModel(request.model));
+  const stability::RegenerativeSystem system = request.system(request.machine());
   const auto found = stability::bistableLimits(system, law, request.feed_mm * units::MM, method, {},
                                                request.speedRange(), request.max_depth_mm * units::MM);
   CsvWriter csv("rpm,limit_mm,chatter_hz,kind,large_limit_mm,secant_limit_mm", 8);
@@ -176,30 +179,11 @@ void printBestPitch(const Request& request, const stability::RegenerativeSystem&
       depth(design.least_limit).c_str(), depth(design.even_limit).c_str(), 100.0 * options.speed_margin);
 }
 
-void run(const Request& request) {
-  const stability::Method method = stability::methodOf(request.method);
-  if (!(request.max_depth_mm > 0.0)) throw Error("--max-depth-mm: expected a value above 0");
-  if (!request.force_curve.empty()) {
-    bistable(request, method);
-    return;
-  }
-  if (request.tolerance_um != 0.0 && request.surface_error.empty())
-    throw Error("--tolerance-um: requires --surface-error");
-  if (!request.serration.empty() && !request.surface_error.empty())
-    throw Error("--surface-error: cannot be combined with --serration-mm");
-  const std::vector<double> speeds = request.speedRange();
-  const MachineModel model = readMachineModel(request.model);
-  stability::RegenerativeSystem system = request.system(model);
-  const stability::RegenerativeSystem plain = system;
-  addChips(request, system);
-  stability::SolverOptions options;
-  options.estimate_error = request.errors;
-  const auto solver = stability::makeSolver(method, system, options);
-  const double max_depth = request.max_depth_mm * units::MM;
-  const std::vector<stability::Limit> limits = limitsOf(*solver, speeds, max_depth);
-
+/// Writes and draws the limits, and prints the least one.
+void writeChart(const Request& request, const std::vector<double>& speeds,
+                const std::vector<stability::Limit>& limits) {
   CsvWriter csv("rpm,limit_mm,chatter_hz,kind", 8);
-  double least = max_depth, error = 0.0;
+  double least = request.max_depth_mm * units::MM, error = 0.0;
   for (std::size_t i = 0; i < speeds.size(); ++i) {
     const double rpm = units::rpmFromRadPerSec(speeds[i]);
     const stability::Limit& limit = limits[i];
@@ -213,7 +197,7 @@ void run(const Request& request) {
   }
   csv.save(request.out);
   std::string plot = "plot %FILE skip 1 using 1:2 with lines lw 2 title 'first loss of stability (" +
-                     std::string(nameOf(method)) +
+                     request.method +
                      ")', %FILE skip 1 using 1:(strcol(4) eq 'flip' ? $2 : NaN) with points pt 7 ps 0.4 "
                      "title 'flip'";
   // gnuplot refuses a curve without points.
@@ -221,8 +205,86 @@ void run(const Request& request) {
     plot = "plot %FILE skip 1 using 1:(" + std::to_string(request.max_depth_mm) +
            ") with lines lw 2 title 'stable to the largest depth'";
   stability::drawPicture(request.out, axes(request.max_depth_mm) + plot);
-  std::printf("stable below %.4f mm at all of these speeds (%s)\n", least / units::MM, nameOf(method));
+  std::printf("stable below %.4f mm at all of these speeds (%s)\n", least / units::MM,
+              request.method.c_str());
   if (request.errors) std::printf("largest estimated error of a limit: %.2g %%\n", 100.0 * error);
+}
+
+/// Limits along a vibrating workpiece; the chart is that of the least one.
+void alongPart(const Request& request, stability::Method method) {
+  if (std::isfinite(request.position_mm) || !request.force_curve.empty() || !request.boundary.empty() ||
+      request.errors || !request.surface_error.empty() || request.best_pitch_rpm != 0.0)
+    throw Error(
+        "--along-part: cannot be combined with --position-mm, --force-curve, --boundary, --errors, "
+        "--surface-error or --best-pitch");
+  const std::vector<double> speeds = request.speedRange();
+  const auto limits_at = [&](const MachineModel& there) {
+    stability::RegenerativeSystem system = request.system(there);
+    addChips(request, system);
+    return limitsOf(*stability::makeSolver(method, system), speeds, request.max_depth_mm * units::MM);
+  };
+  writeChart(request, speeds,
+             stability::writePartLimits(request.along_part, request.max_depth_mm, request.machine(), speeds,
+                                        limits_at));
+}
+
+/// Limits with and without a variation of the speed.
+void varied(const Request& request, stability::Method method) {
+  if (!request.force_curve.empty() || !request.boundary.empty() || request.errors || request.feed_mm != 0.0 ||
+      !request.serration.empty() || !request.surface_error.empty() || request.best_pitch_rpm != 0.0 ||
+      !request.along_part.empty())
+    throw Error(
+        "--speed-variation: cannot be combined with --force-curve, --boundary, --errors, --feed-mm, "
+        "--serration-mm, --surface-error, --best-pitch or --along-part");
+  stability::VariationRequest out{request.out, request.max_depth_mm,
+                                  stability::speedVariationOf(request.variation), request.best_variation_rpm};
+  const std::vector<double> speeds = request.speedRange();
+  const MachineModel model = request.machine();
+  const stability::RegenerativeSystem steady = request.system(model);
+  stability::RegenerativeSystem changing = steady;
+  changing.variation = out.variation;
+  const double max_depth = request.max_depth_mm * units::MM;
+  const auto changing_solver = stability::makeSolver(method, changing);
+  const auto steady_solver = stability::makeSolver(method, steady);
+  stability::writeVariedChart(out, speeds, limitsOf(*changing_solver, speeds, max_depth),
+                              limitsOf(*steady_solver, speeds, max_depth));
+  if (out.best_rpm != 0.0) stability::printBestVariation(out, model, steady);
+}
+
+void run(const Request& request) {
+  const stability::Method method = stability::methodOf(request.method);
+  if (!(request.max_depth_mm > 0.0)) throw Error("--max-depth-mm: expected a value above 0");
+  if (!(request.best_variation_rpm >= 0.0)) throw Error("--best-variation: expected a speed above 0");
+  if (request.best_variation_rpm != 0.0 && request.variation.empty())
+    throw Error("--best-variation: requires --speed-variation");
+  if (!request.variation.empty()) {
+    varied(request, method);
+    return;
+  }
+  if (!request.along_part.empty()) {
+    alongPart(request, method);
+    return;
+  }
+  if (!request.force_curve.empty()) {
+    bistable(request, method);
+    return;
+  }
+  if (request.tolerance_um != 0.0 && request.surface_error.empty())
+    throw Error("--tolerance-um: requires --surface-error");
+  if (!request.serration.empty() && !request.surface_error.empty())
+    throw Error("--surface-error: cannot be combined with --serration-mm");
+  const std::vector<double> speeds = request.speedRange();
+  const MachineModel model = request.machine();
+  stability::RegenerativeSystem system = request.system(model);
+  const stability::RegenerativeSystem plain = system;
+  addChips(request, system);
+  stability::SolverOptions options;
+  options.estimate_error = request.errors;
+  const auto solver = stability::makeSolver(method, system, options);
+  const double max_depth = request.max_depth_mm * units::MM;
+  const std::vector<stability::Limit> limits = limitsOf(*solver, speeds, max_depth);
+
+  writeChart(request, speeds, limits);
   if (!request.boundary.empty())
     traceAll(request, *stability::makeFloquetSolver(method, system, options), speeds);
   if (request.best_pitch_rpm != 0.0) printBestPitch(request, plain);
@@ -252,6 +314,8 @@ Command lobesCommand() {
        "finishing by down-milling: the error of the wall, and the cuts that make size"}};
   command.files = {{"OUT", "CSV rpm,limit_mm,chatter_hz,kind; a picture of the same name with .png"},
                    {"BOUNDARY", "CSV curve,rpm,depth_mm,chatter_hz,kind"},
+                   {"OUT with --speed-variation", "CSV rpm,limit_mm,chatter_hz,kind,steady_limit_mm"},
+                   {"ALONG-PART", "CSV position_mm,rpm,limit_mm,chatter_hz,kind"},
                    {"SURFACE-ERROR",
                     "CSV rpm,depth_mm,stable,error_um,error_std_um,least_um,most_um,peak_to_valley_um,"
                     "mean_deviation_um; empty in unstable cuts"}};
@@ -265,6 +329,9 @@ Command lobesCommand() {
     line.option("--boundary", request.boundary,
                 "CSV of the whole boundary with its islands, in addition to the first loss; a picture of the "
                 "same name with .png");
+    line.option("--along-part", request.along_part,
+                "CSV of the limit over positions along a vibrating workpiece and speeds, a map of the same "
+                "name with .png; OUT has the least limit over the positions");
     line.option("--feed-mm", request.feed_mm,
                 "feed per tooth [mm]: takes the contact of the teeth in the forced vibration into account "
                 "(uneven pitch, serration); without it every tooth cuts along its whole arc");
@@ -285,6 +352,14 @@ Command lobesCommand() {
                 "--surface-error");
     line.option("--best-pitch", request.best_pitch_rpm,
                 "speed [rpm]: prints the linear variation of the tooth pitch with the largest limit there");
+    line.option(
+        "--speed-variation", request.variation,
+        "AMPLITUDE:RATIO[:triangle]: the speed varies by this share of the mean, at this ratio to the "
+        "spindle frequency, as a sine or triangle: limits with and without the variation");
+    line.option(
+        "--best-variation", request.best_variation_rpm,
+        "mean speed [rpm]: prints the variation with the largest limit there, up to AMPLITUDE and RATIO "
+        "and the acceleration of the model's spindle; requires --speed-variation");
     line.flag("--errors", request.errors, "estimate the error of each limit from a refined solution");
   });
   return command;

@@ -23,7 +23,7 @@ struct Request : CutRequest {
 };
 
 void run(const Request& request) {
-  const MachineModel model = readMachineModel(request.model);
+  const MachineModel model = request.machine();
   const RegenerativeSystem system = request.system(model);
   const std::vector<JudgedCut> cuts = readJudgedCuts(request.cuts);
   ProcessDampingOptions options;
@@ -38,7 +38,7 @@ void run(const Request& request) {
   std::printf("%zu cuts, %d of them on the wrong side of the limit by more than three standard deviations\n",
               cuts.size(), found.contradictions);
   if (request.out.empty()) return;
-  writeMachineModel(withProcessDamping(model, found), request.out);
+  writeMachineModel(withProcessDamping(readMachineModel(request.model), found), request.out);
 }
 
 }  // namespace

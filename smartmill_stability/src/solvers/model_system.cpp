@@ -23,6 +23,9 @@ RegenerativeSystem systemOf(const MachineModel& model, double entry_deg, double 
   const CuttingCoefficients& cutting = model.needCutting("predict stability");
   RegenerativeSystem system;
   system.modes = systemModes(model.tool_tip.x, model.tool_tip.y);
+  // The reaction moves the workpiece against the tool: receptances in series add.
+  const WorkpieceModes workpiece = model.workpieceModes();
+  for (const SystemMode& mode : systemModes(workpiece.x, workpiece.y)) system.modes.push_back(mode);
   if (system.modes.empty()) throw Error(model.file + ": tool_tip is missing (needed to predict stability)");
   system.teeth = tool.teeth;
   system.pitch = tool.pitch;

@@ -12,6 +12,12 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+namespace {
+
+constexpr int MOST_HARMONICS = 4000;  // of a period, up to 1.5 times the highest natural frequency
+
+}  // namespace
+
 PeriodMap::PeriodMap(const DelayedSystem& system, ResponseCache& responses)
     : d_(responses.axes.count()),
       n_(responses.reference->n),
@@ -43,7 +49,7 @@ double PeriodMap::strongest(const Dominant& mode, double highest) {
   march(mode.vector.imag(), out, true);
   for (std::size_t e = 0; e < elements_.size(); ++e) motion[e] += Complex(0, 1) * motion_[e].cast<Complex>();
   const double base = std::arg(mode.value) / period_, step = units::TWO_PI / period_;
-  const int most = std::min(400, static_cast<int>(highest / step) + 2);
+  const int most = std::min(MOST_HARMONICS, static_cast<int>(highest / step) + 2);
   double best = -1.0, frequency = 0.0;
   for (int k = -most; k <= most; ++k) {
     const double w = base + k * step;
@@ -91,8 +97,9 @@ PeriodMap::Source PeriodMap::find(double t, std::size_t self) {
   Source source;
   source.previous = t < -1e-12 * period_;
   if (source.previous) t += period_;
-  std::size_t e = 0;
-  while (e + 1 < elements_.size() && elements_[e + 1].begin <= t) ++e;
+  const auto after = std::partition_point(elements_.begin() + 1, elements_.end(),
+                                          [t](const Element& element) { return element.begin <= t; });
+  auto e = static_cast<std::size_t>(after - elements_.begin()) - 1;
   // Rounding must not make an element its own source.
   if (!source.previous && e >= self && e > 0) e = self - 1;
   source.element = e;
@@ -139,7 +146,7 @@ void PeriodMap::fill(const DelayedSystem& system, ResponseCache& responses, Elem
     for (const Feedback& f : at) any |= !f.delayed[k].isZero(0.0);
     if (!any) continue;
     for (const Feedback& f : at) element.delayed[k].push_back(reduced(f.delayed[k]));
-    if (std::abs(system.delays[k] - period_) <= 1e-12 * period_) {
+    if (!system.delay && std::abs(system.delays[k] - period_) <= 1e-12 * period_) {
       Source same;
       same.element = self;
       element.source[k].push_back(same);
@@ -149,7 +156,7 @@ void PeriodMap::fill(const DelayedSystem& system, ResponseCache& responses, Elem
     }
     for (Index i = 0; i < n_; ++i) {
       const double t = element.begin + element.length * reference_.node[static_cast<std::size_t>(i)];
-      element.source[k].push_back(find(t - system.delays[k], self));
+      element.source[k].push_back(find(t - (system.delay ? system.delay(k, t) : system.delays[k]), self));
     }
   }
 }

@@ -187,6 +187,8 @@ void RegenerativeSystem::validate() const {
   require("overlap", overlap, Range::closed(0.0, 1.0));
   const bool needs_diameter = helix > 0.0 || hasProcessDamping();
   require(diameter > 0.0 || !needs_diameter, "diameter [m]", diameter, "above 0");
+  if (variation) variation->validate();
+  if (chip && variation) throw Error("chip geometry with a speed variation: expected only one of them");
   if (chip && along_arc)
     throw Error("chip geometry with coefficients along the arc: expected only one of them");
   if (chip) {
@@ -272,9 +274,10 @@ std::array<std::complex<double>, 4> receptance(const std::vector<SystemMode>& mo
   return g;
 }
 
-DelayedSystem delayedSystem(const RegenerativeSystem& system, double speed, double depth) {
-  require("spindle speed [rad/s]", speed, Range::positive());
-  require("depth [m]", depth, Range::notNegative());
+namespace {
+
+/// At constant speed.
+DelayedSystem steadySystem(const RegenerativeSystem& system, double speed, double depth) {
   DelayedSystem delayed;
   delayed.modes = system.modes;
   delayed.stiffness = depth * std::hypot(system.kt, system.kr);
@@ -302,6 +305,15 @@ DelayedSystem delayedSystem(const RegenerativeSystem& system, double speed, doub
   delayed.rate = 2.0 * speed;
   delayed.feedback = teeth;
   return delayed;
+}
+
+}  // namespace
+
+DelayedSystem delayedSystem(const RegenerativeSystem& system, double speed, double depth) {
+  require("spindle speed [rad/s]", speed, Range::positive());
+  require("depth [m]", depth, Range::notNegative());
+  const DelayedSystem steady = steadySystem(system, speed, depth);
+  return system.variation ? withSpeedVariation(steady, *system.variation, speed) : steady;
 }
 
 }  // namespace smartmill::stability

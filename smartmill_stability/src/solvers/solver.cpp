@@ -262,6 +262,8 @@ std::unique_ptr<FloquetSolver> makeFloquetSolver(Method method, const Regenerati
   if (!(options.tolerance > 0.0) || options.tolerance > 0.1)
     throw Error("tolerance: " + std::to_string(options.tolerance) + ": expected 0 < value <= 0.1");
   if (method == Method::collocation) return makeCollocation(system, options);
+  if (system.variation)
+    throw Error(std::string("method ") + nameOf(method) + ": speed variation: expected collocation");
   if (method == Method::semi_discretization) return makeSemiDiscretization(system, options);
   throw Error(std::string("method ") + nameOf(method) +
               ": no characteristic multipliers: expected collocation or semi_discretization");
@@ -272,6 +274,8 @@ std::unique_ptr<StabilitySolver> makeSolver(Method method, const RegenerativeSys
   if (system.along_arc && (method == Method::zero_order || method == Method::multi_frequency))
     throw Error(std::string("method ") + nameOf(method) +
                 ": coefficients along the arc: expected collocation or semi_discretization");
+  if (system.variation && method != Method::collocation)
+    throw Error(std::string("method ") + nameOf(method) + ": speed variation: expected collocation");
   if (method == Method::zero_order) return makeZeroOrder(system);
   if (method == Method::multi_frequency) return makeMultiFrequency(system, options);
   return makeFloquetSolver(method, system, options);

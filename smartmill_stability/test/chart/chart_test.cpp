@@ -154,6 +154,42 @@ ChartMaker fromModes(ChartParameters parameters, double relative_error) {
   return maker;
 }
 
+// A workpiece as flexible as the tool doubles the receptance and halves every limit, with machines drawn for
+// the recommended points.
+TEST(ChartMaker, aFlexibleWorkpieceAddsItsReceptance) {
+  for (const bool modes : {false, true}) {
+    ChartParameters parameters = slot();
+    parameters.radial_ratio = 1.0 / 3.0;
+    parameters.speeds = 40;
+    parameters.use_modes = modes;
+    MachineModel flexible = machine();
+    flexible.workpiece_modes = {{0.0, benchmark(), benchmark()}};
+    std::vector<StabilityChart> charts;
+    for (const MachineModel& model : {machine(), flexible}) {
+      ChartMaker maker(parameters, model);
+      for (const char* direction : {"x", "y"}) {
+        maker.handle(frf(direction, 1.0));
+        if (modes)
+          maker.handle(MeasuredModes{10.0, "end_mill", POINT_TOOL_TIP, direction, "m/N", benchmark(), 0.0});
+      }
+      maker.handle(coefficients());
+      charts.push_back(maker.chart());
+    }
+    int limited = 0;
+    for (std::size_t k = 0; k < charts[0].limit.depth.size(); ++k) {
+      if (!(charts[0].limit.depth[k] < parameters.max_depth)) continue;
+      ++limited;
+      // Continued limits of a chart by collocation: 0.15 %.
+      ASSERT_NEAR(charts[1].limit.depth[k] / charts[0].limit.depth[k], 0.5, 1e-3) << modes << k;
+    }
+    EXPECT_GT(limited, 30);
+    EXPECT_FALSE(charts[1].recommended.empty());
+  }
+  MachineModel several = machine();
+  several.workpiece_modes = {{0.0, benchmark(), benchmark()}, {0.1, benchmark(), benchmark()}};
+  EXPECT_THROW(ChartMaker(slot(), several), Error);
+}
+
 // With known modes the chart is computed by collocation; expected values from an independent table of
 // converged limits.
 TEST(ChartMaker, knownModesGiveTheConvergedLimits) {

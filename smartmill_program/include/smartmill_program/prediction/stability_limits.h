@@ -17,8 +17,11 @@ class StabilityLimits {
   /// @throws Error when the model has no tool or coefficients
   explicit StabilityLimits(const MachineModel& model) : model_(model) {}
 
-  /// Whether the model states modes of the tool tip.
-  bool available() const { return !model_.tool_tip.x.modes.empty() || !model_.tool_tip.y.modes.empty(); }
+  /// Whether the model states modes of the tool tip or of the workpiece.
+  bool available() const {
+    return !model_.tool_tip.x.modes.empty() || !model_.tool_tip.y.modes.empty() ||
+           !model_.workpiece_modes.empty();
+  }
   /// [m] Largest stable axial depth, at most MOST_DEPTH tool radii. @param speed [rad/s] > 0
   double limit(const Contact& contact, double feed_angle, bool left_hand, double speed);
   std::size_t computed() const { return limits_.size(); }  ///< different limits so far

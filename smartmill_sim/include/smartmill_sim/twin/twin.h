@@ -8,6 +8,7 @@
 #include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/cutting/corner.h"
+#include "smartmill_core/cutting/speed_variation.h"
 #include "smartmill_core/model/machine_model.h"
 
 namespace smartmill::sim {
@@ -53,6 +54,9 @@ struct SimulationOptions {
   /// extended. nullptr: no cache.
   CutTraces* traces = nullptr;
   LeadIn lead_in;
+  /// Variation of the spindle speed about that of the test, from the first sample on; the feed rate is
+  /// constant.
+  std::optional<SpeedVariation> speed_variation;
 };
 
 /// [1] Part of a sample before the engagement over which the cutting force rises: one step of the programs

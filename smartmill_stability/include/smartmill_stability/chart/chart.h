@@ -19,8 +19,8 @@ struct Prediction {
 /// Computes charts from measurements: FRFs or modes of x and y, and coefficients, in any order.
 class ChartMaker {
  public:
-  /// @param model tool, spindle limits and process damping; its sections tool_tip and cutting are not used.
-  /// @throws Error on bad parameters or a model without a tool.
+  /// @param model tool, spindle limits, process damping and modes of the workpiece; its sections tool_tip and
+  /// cutting are not used. @throws Error on bad parameters or a model without a tool.
   ChartMaker(const ChartParameters& parameters, const MachineModel& model);
 
   /// As MeasuredMachine::handle().

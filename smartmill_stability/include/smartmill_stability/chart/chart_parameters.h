@@ -44,6 +44,7 @@ struct ChartCut {
   ToolGeometry tool;
   Spindle spindle;
   double process_damping = 0.0;  ///< [N/m] radial, as RegenerativeSystem::setProcessDamping()
+  WorkpieceModes workpiece;      ///< where the tool cuts; without modes: rigid
 };
 
 }  // namespace smartmill::stability

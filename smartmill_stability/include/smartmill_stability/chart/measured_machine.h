@@ -32,17 +32,17 @@ class MeasuredMachine {
   /// @throws Error when an input is missing or inputs contradict each other.
   ChartSolver solver(const ChartCut& cut) const;
 
-  /// The machine in a cut with another engagement (exit <= entry: the angles of the chart); empty while modes
-  /// of x and y or the tangential coefficient are missing.
+  /// The machine, with the workpiece of the cut, in a cut with another engagement (exit <= entry: the angles
+  /// of the chart); empty while modes of x and y or the tangential coefficient are missing.
   std::optional<RegenerativeSystem> system(const ChartCut& cut, const Engagement& engagement = {}) const;
   /// The same with the standard deviations of the measurements, combined with those of the parameters.
   std::optional<UncertainSystem> uncertainSystem(const ChartCut& cut,
                                                  const Engagement& engagement = {}) const;
   /// The same with those of the measurements alone. @param system of this machine, possibly modified
-  UncertainSystem measuredSpread(const RegenerativeSystem& system) const;
+  UncertainSystem measuredSpread(const ChartCut& cut, const RegenerativeSystem& system) const;
 
   const CoefficientSet& coefficients() const { return *coefficients_; }  ///< only if none is missing
-  std::size_t modesInX() const;  ///< first modes of system(); y follows
+  std::size_t modesInX() const;  ///< first modes of system(); those of y and of the workpiece follow
   const std::string& tool() const { return tool_; }
   double stamp() const { return stamp_; }  ///< [s] of the newest input
 

@@ -7,6 +7,7 @@
 
 #include "smartmill_core/cutting/coefficient_set.h"
 #include "smartmill_core/modal/modal_model.h"
+#include "smartmill_core/model/machine_model.h"
 #include "smartmill_stability/chart/uncertainty.h"
 
 namespace smartmill::stability {
@@ -23,9 +24,10 @@ struct LeastDeviations {
 
 /// A measured machine with the standard deviations of its modes and coefficients; a value without one gets 10
 /// %.
-/// @param system with the modes of systemModes(x, y)
+/// @param system with the modes of systemModes(x, y), then those of the workpiece
 UncertainSystem measuredSystem(const RegenerativeSystem& system, const ModalModel& x, const ModalModel& y,
-                               const CoefficientSet& coefficients, const LeastDeviations& least = {});
+                               const WorkpieceModes& workpiece, const CoefficientSet& coefficients,
+                               const LeastDeviations& least = {});
 
 /// [m] Limits of the mean machine and of drawn machines by the zero-order solution. Their ratio is the spread
 /// of the limits, also for charts of other solvers.

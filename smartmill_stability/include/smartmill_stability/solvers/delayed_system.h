@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 
+#include "smartmill_core/cutting/speed_variation.h"
 #include "smartmill_stability/solvers/solver.h"
 
 namespace smartmill::stability {
@@ -23,7 +24,9 @@ struct Feedback {
 struct DelayedSystem {
   std::vector<SystemMode> modes;
   double period = 0.0;         ///< [s] of the feedback
-  std::vector<double> delays;  ///< [s] 0 < delay <= period
+  std::vector<double> delays;  ///< [s] 0 < delay <= period; lower bounds of delays that vary
+  /// [s] Delay k at t, where it varies; empty: `delays`. Supported by collocation.
+  std::function<double(std::size_t k, double t)> delay;
   std::vector<double> breaks;  ///< [s] in [0, period), in any order
   /// [N/m] Upper bound of the stiffness of the feedback; sets the resolution.
   double stiffness = 0.0;
@@ -39,6 +42,11 @@ DelayedSystem delayedSystem(const RegenerativeSystem& system, double speed, doub
 /// The same with the contact of the teeth in the forced vibration (system.chip). Principal period: a
 /// revolution.
 DelayedSystem contactSystem(const RegenerativeSystem& system, double speed, double depth);
+
+/// A system of constant speed [rad/s] with the speed varied about it. Principal period: the least number of
+/// variations that lasts a whole number of periods of the system; the variation begins at the time 0.
+/// @throws Error on a ratio without such a period.
+DelayedSystem withSpeedVariation(const DelayedSystem& mean, const SpeedVariation& variation, double speed);
 
 /// Dominant multiplier of a delayed system by Chebyshev collocation. @param nodes of an element, 4..40
 CharacteristicMultiplier collocationMultiplier(const DelayedSystem& system, int nodes);

@@ -12,8 +12,9 @@ namespace smartmill::stability {
 /// @throws Error naming file and key when it is negative: it would drive the vibration.
 double processDamping(const MachineModel& model);
 
-/// The regenerative system of a model and an engagement [deg], with its process damping. Other effects of the
-/// model are not included. @throws Error naming what the model lacks.
+/// The regenerative system of a model and an engagement [deg], with its process damping: modes of x and y of
+/// the tool, then those of the workpiece. Other effects of the model are not included. @throws Error naming
+/// what the model lacks, or when it states several places of the workpiece (atPosition() selects one).
 RegenerativeSystem systemOf(const MachineModel& model, double entry_deg, double exit_deg);
 
 /// Values of LO:HI:N, evenly spaced; 0 < LO < HI, or N = 1 and LO = HI. @param option named in the error

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "smartmill_core/cutting/speed_variation.h"
 #include "smartmill_core/cutting/tool.h"
 #include "smartmill_core/modal/modal_model.h"
 #include "smartmill_core/units.h"
@@ -74,6 +75,9 @@ struct RegenerativeSystem {
   /// the previous tooth. Supported by the Floquet solvers; zero_order uses the mean over whole serration
   /// waves.
   std::optional<ChipGeometry> chip;
+  /// Variation of the spindle speed about the speed of the chart; the phase of the variation is 0 when tooth
+  /// 1 is at the immersion angle 0. Supported by collocation, without a chip geometry.
+  std::optional<SpeedVariation> variation;
 
   /// Process damping as the effect process_damping: radial `coefficient` [N/m], tangential 0.3 of it.
   void setProcessDamping(double coefficient);

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/range.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill {
@@ -13,6 +14,25 @@ const Section& need(const std::optional<Section>& section, const MachineModel& m
                     const std::string& why) {
   if (!section) throw Error(model.file + ": " + name + " is missing (needed to " + why + ")");
   return *section;
+}
+
+/// Modes between two places, of which both have as many.
+ModalModel between(const ModalModel& from, const ModalModel& to, double share) {
+  const auto linear = [share](double a, double b) { return (1.0 - share) * a + share * b; };
+  ModalModel model = from;
+  for (std::size_t k = 0; k < model.modes.size(); ++k) {
+    const Mode &a = from.modes[k], &b = to.modes[k];
+    Mode& mode = model.modes[k];
+    mode.frequency = linear(a.frequency, b.frequency);
+    mode.damping_ratio = linear(a.damping_ratio, b.damping_ratio);
+    const double shape =
+        linear(a.frequency * std::sqrt(a.gain), b.frequency * std::sqrt(b.gain)) / mode.frequency;
+    mode.gain = shape * shape;
+    mode.frequency_std = linear(a.frequency_std, b.frequency_std);
+    mode.damping_ratio_std = linear(a.damping_ratio_std, b.damping_ratio_std);
+    mode.gain_std = mode.gain * linear(a.gain_std / a.gain, b.gain_std / b.gain);
+  }
+  return model;
 }
 
 }  // namespace
@@ -51,6 +71,36 @@ const HammerStation& MachineModel::needHammer(const std::string& why) const {
 }
 const Workpiece& MachineModel::needWorkpiece(const std::string& why) const {
   return need(workpiece, *this, "workpiece", why);
+}
+
+WorkpieceModes MachineModel::workpieceModes() const {
+  if (workpiece_modes.size() > 1) {
+    throw Error(file + ": workpiece.modes: " + std::to_string(workpiece_modes.size()) +
+                " places, expected a position along the part");
+  }
+  return workpiece_modes.empty() ? WorkpieceModes{} : workpiece_modes.front();
+}
+
+MachineModel atPosition(MachineModel model, double position) {
+  const std::vector<WorkpieceModes>& places = model.workpiece_modes;
+  if (places.empty())
+    throw Error(model.file + ": workpiece.modes is missing (needed for a position along the part)");
+  const double low = places.front().position, high = places.back().position;
+  if (!(position >= low && position <= high)) {
+    throw Error(model.file + ": workpiece.modes: position " + shortNumber(position / units::MM) +
+                " mm is outside the places (" + shortNumber(low / units::MM) +
+                " <= value <= " + shortNumber(high / units::MM) + ")");
+  }
+  std::size_t i = 0;
+  while (i + 2 < places.size() && places[i + 1].position < position) ++i;
+  WorkpieceModes at = places[i];
+  if (places.size() > 1) {
+    const WorkpieceModes& next = places[i + 1];
+    const double share = (position - at.position) / (next.position - at.position);
+    at = {position, between(at.x, next.x, share), between(at.y, next.y, share)};
+  }
+  model.workpiece_modes = {at};
+  return model;
 }
 
 }  // namespace smartmill

@@ -318,8 +318,41 @@ Workpiece readWorkpiece(const StrictYaml& map) {
     if (!(w.high[a] > w.low[a]))
       map.fail("high_mm", "expected a value above low_mm in " + std::string(AXIS_NAMES[a]));
   }
-  map.finish();
   return w;
+}
+
+std::vector<WorkpieceModes> readWorkpieceModes(const StrictYaml& map) {
+  std::vector<WorkpieceModes> places;
+  for (const StrictYaml& entry : map.maps("modes")) {
+    WorkpieceModes place;
+    if (const auto position = entry.optionalNumber("position_mm", ANY))
+      place.position = *position * units::MM;
+    place.x.modes = readModes(entry, "x", ModeKind::stiffness);
+    place.y.modes = readModes(entry, "y", ModeKind::stiffness);
+    if (place.x.modes.empty() && place.y.modes.empty())
+      entry.fail("x", "is missing, and y too: expected modes along one axis at least");
+    if (!places.empty()) {
+      if (!entry.has("position_mm")) entry.fail("position_mm", "is missing (there are several places)");
+      if (!(place.position > places.back().position))
+        entry.fail("position_mm", yamlNumber(place.position / units::MM) + ", expected a value above " +
+                                      yamlNumber(places.back().position / units::MM));
+      if (place.x.modes.size() != places.back().x.modes.size() ||
+          place.y.modes.size() != places.back().y.modes.size())
+        entry.fail("position_mm", yamlNumber(place.position / units::MM) +
+                                      ": expected as many modes in x and in y as at the first place");
+    }
+    entry.finish();
+    places.push_back(place);
+  }
+  return places;
+}
+
+void readWorkpieceSection(const StrictYaml& map, MachineModel& model) {
+  if (map.has("modes")) model.workpiece_modes = readWorkpieceModes(map);
+  // The modes alone make a section.
+  if (!map.has("modes") || map.has("material") || map.has("low_mm") || map.has("high_mm"))
+    model.workpiece = readWorkpiece(map);
+  map.finish();
 }
 
 // The effect of an entry; an empirical one is identified by stage and form.
@@ -410,7 +443,7 @@ MachineModel readMachineModel(const std::string& file) {
   if (const auto map = root.optionalMap("axes")) model.axes = readAxes(*map);
   if (const auto map = root.optionalMap("hammer")) model.hammer = readHammer(*map);
   if (const auto map = root.optionalMap("frames")) model.frames = readFrames(*map);
-  if (const auto map = root.optionalMap("workpiece")) model.workpiece = readWorkpiece(*map);
+  if (const auto map = root.optionalMap("workpiece")) readWorkpieceSection(*map, model);
   if (root.has("effects")) {
     for (const StrictYaml& map : root.maps("effects")) model.effects.push_back(readEffect(map, model));
   }

@@ -197,10 +197,20 @@ void writeHammer(std::ostream& out, const HammerStation& h) {
     out << "    " << direction << ": " << point(p, units::MM) << "\n";
 }
 
-void writeWorkpiece(std::ostream& out, const Workpiece& workpiece) {
-  out << "workpiece:\n  material: " << yamlWord(workpiece.material) << "\n";
-  out << "  low_mm: " << point(workpiece.low, units::MM) << "\n";
-  out << "  high_mm: " << point(workpiece.high, units::MM) << "\n";
+void writeWorkpiece(std::ostream& out, const MachineModel& model) {
+  if (!model.workpiece && model.workpiece_modes.empty()) return;
+  out << "workpiece:\n";
+  if (const auto& stock = model.workpiece) {
+    out << "  material: " << yamlWord(stock->material) << "\n";
+    out << "  low_mm: " << point(stock->low, units::MM) << "\n";
+    out << "  high_mm: " << point(stock->high, units::MM) << "\n";
+  }
+  if (!model.workpiece_modes.empty()) out << "  modes:\n";
+  for (const WorkpieceModes& place : model.workpiece_modes) {
+    writeKey(out, "  - ", "position_mm", place.position / units::MM);
+    writeModes(out, "    ", "x", place.x.modes, ModeKind::stiffness);
+    writeModes(out, "    ", "y", place.y.modes, ModeKind::stiffness);
+  }
 }
 
 void writeUncertainty(std::ostream& out, const Uncertainty& u) {
@@ -233,7 +243,7 @@ void writeMachineModel(const MachineModel& model, const std::string& file) {
   if (model.spindle) writeSpindle(out, *model.spindle);
   if (model.axes) writeAxes(out, *model.axes);
   if (model.hammer) writeHammer(out, *model.hammer);
-  if (model.workpiece) writeWorkpiece(out, *model.workpiece);
+  writeWorkpiece(out, model);
   out << "effects:" << (model.effects.empty() ? " []" : "") << "\n";
   for (const EffectEntry& effect : model.effects) writeEffect(out, effect);
   writeUncertainty(out, model.uncertainty);

@@ -75,6 +75,9 @@ workpiece:
   material: AL 7050-T7451
   low_mm: [200, 100, -260]
   high_mm: [400, 250, -210]
+  modes:
+  - {position_mm: 0, y: [{frequency_hz: 400, damping_ratio: 0.01, stiffness_n_per_um: 8}]}
+  - {position_mm: 60, y: [{frequency_hz: 520, damping_ratio: 0.02, stiffness_n_per_um: 2, stiffness_n_per_um_std: 0.1}]}
 effects:
 - {name: runout, offset_um: 8.1, offset_um_std: 0.2, angle_deg: 31.0}
 - {name: cross_talk, xy: 0.02}
@@ -118,6 +121,11 @@ void expectModel(const MachineModel& m) {
   EXPECT_DOUBLE_EQ(m.hammer->position.at("y")[0], 0.12);
   EXPECT_EQ(m.workpiece->material, "AL 7050-T7451");
   EXPECT_DOUBLE_EQ(m.workpiece->high[2], -0.21);
+  ASSERT_EQ(m.workpiece_modes.size(), 2u);
+  EXPECT_DOUBLE_EQ(m.workpiece_modes[1].position, 0.06);
+  EXPECT_TRUE(m.workpiece_modes[1].x.modes.empty());
+  EXPECT_DOUBLE_EQ(m.workpiece_modes[1].y.modes.at(0).gain, 1.0 / 2e6);
+  EXPECT_NEAR(m.workpiece_modes[1].y.modes.at(0).gain_std, 0.05 / 2e6, 1e-20);
   ASSERT_EQ(m.effects.size(), 6u);
   EXPECT_DOUBLE_EQ(m.effects[0].numbers.at("offset_um"), 8.1);
   EXPECT_DOUBLE_EQ(m.effects[0].std_devs.at("offset_um"), 0.2);
@@ -198,6 +206,44 @@ TEST(MachineModel, framesCarryForcesAndMoments) {
             "frames: no transform from tool_tip to machine: the chain ends at spindle");
 }
 
+// The modes alone make a section; the stock is then absent.
+TEST(MachineModel, modesOfTheWorkpieceNeedNoStock) {
+  const TemporaryFolder folder;
+  const std::string text =
+      "format: smartmill-model/1\nworkpiece:\n  modes: [{x: [{frequency_hz: 400, damping_ratio: 0.01, "
+      "stiffness_n_per_um: 8}]}]\n";
+  const MachineModel model = readMachineModel(folder.write("a.yaml", text));
+  EXPECT_FALSE(model.workpiece);
+  EXPECT_DOUBLE_EQ(model.workpieceModes().x.modes.at(0).frequency, 400.0);
+  writeMachineModel(model, folder.file("b.yaml"));
+  EXPECT_DOUBLE_EQ(readMachineModel(folder.file("b.yaml")).workpieceModes().x.modes.at(0).frequency, 400.0);
+  EXPECT_TRUE(MachineModel().workpieceModes().y.modes.empty());
+}
+
+// Half way between two places frequency and damping ratio are the means, and so is the shape w / sqrt(k).
+TEST(MachineModel, modesAtAPositionAreInterpolated) {
+  const TemporaryFolder folder;
+  const MachineModel model = readMachineModel(folder.write("a.yaml", MODEL));
+  const Mode middle = atPosition(model, 0.03).workpieceModes().y.modes.at(0);
+  EXPECT_DOUBLE_EQ(middle.frequency, 460.0);
+  EXPECT_DOUBLE_EQ(middle.damping_ratio, 0.015);
+  const double shape = 0.5 * (400.0 / std::sqrt(8e6) + 520.0 / std::sqrt(2e6));
+  EXPECT_NEAR(middle.gain * 460.0 * 460.0 / (shape * shape), 1.0, 1e-12);
+  EXPECT_TRUE(std::isnan(middle.gain_std));  // one place states none
+  for (const std::size_t end : {0u, 1u}) {
+    const WorkpieceModes& place = model.workpiece_modes[end];
+    const Mode there = atPosition(model, place.position).workpieceModes().y.modes.at(0);
+    EXPECT_NEAR(there.gain / place.y.modes[0].gain, 1.0, 1e-12);
+    EXPECT_DOUBLE_EQ(there.frequency, place.y.modes[0].frequency);
+  }
+  EXPECT_THAT(errorOf([&] { atPosition(model, 0.061); }),
+              EndsWith("a.yaml: workpiece.modes: position 61 mm is outside the places (0 <= value <= 60)"));
+  EXPECT_THAT(errorOf([&] { model.workpieceModes(); }),
+              EndsWith("a.yaml: workpiece.modes: 2 places, expected a position along the part"));
+  EXPECT_THAT(errorOf([] { atPosition({}, 0.0); }),
+              EndsWith("workpiece.modes is missing (needed for a position along the part)"));
+}
+
 TEST(MachineModel, errorsNameFileKeyAndValue) {
   const TemporaryFolder folder;
   const std::vector<Refusal> refusals{
@@ -230,6 +276,13 @@ TEST(MachineModel, errorsNameFileKeyAndValue) {
        "axes.x_travel_mm: 500.0..0.0 is out of range (min < max)"},
       {"high_mm: [400, 250, -210]", "high_mm: [100, 250, -210]",
        "workpiece.high_mm: expected a value above low_mm in x"},
+      {"position_mm: 0, y:", "position_mm: 0, z:",
+       "workpiece.modes[0].x: is missing, and y too: expected modes along one axis at least"},
+      {"position_mm: 60,", "position_mm: -60,",
+       "workpiece.modes[1].position_mm: -60.0, expected a value above 0.0"},
+      {"position_mm: 60, y:", "y:", "workpiece.modes[1].position_mm: is missing (there are several places)"},
+      {"position_mm: 60, y:", "position_mm: 60, x:",
+       "workpiece.modes[1].position_mm: 60.0: expected as many modes in x and in y as at the first place"},
       {"name: runout", "name: run_out", "effects[0].name: 'run_out' is not an effect of the catalogue"},
       {"offset_um: 8.1", "offset: 8.1", "effects[0].offset_um: is missing"},
       {"xy: 0.02", "xx: 0.02", "effects[1].xx: unknown key (its value: '0.02')"},

@@ -92,6 +92,13 @@ struct Workpiece {
   Axes3 low{{0, 0, 0}}, high{{0, 0, 0}};  ///< [m] corners in machine coordinates of the tool tip
 };
 
+/// Modes of the workpiece at one place along the cut, receptance [m/N] where the tool cuts. An axis that the
+/// file omits is rigid.
+struct WorkpieceModes {
+  double position = 0.0;  ///< [m] along the path of the cut
+  ModalModel x, y;
+};
+
 /// One entry of effects: a name and keys of the catalogue with their values as in the file (shop units).
 struct EffectEntry {
   std::string name;
@@ -121,6 +128,7 @@ struct MachineModel {
   std::optional<MachineAxes> axes;
   std::optional<HammerStation> hammer;
   std::optional<Workpiece> workpiece;
+  std::vector<WorkpieceModes> workpiece_modes;  ///< in the order of the position; empty: a rigid workpiece
   std::vector<EffectEntry> effects;
   Uncertainty uncertainty;
   FramePoses frames;  ///< fixed frames that the file states
@@ -132,7 +140,16 @@ struct MachineModel {
   const MachineAxes& needAxes(const std::string& why) const;
   const HammerStation& needHammer(const std::string& why) const;
   const Workpiece& needWorkpiece(const std::string& why) const;
+  /// Modes of the workpiece where the tool cuts; without modes those of a rigid one. @throws Error when the
+  /// model states several places: at() selects one.
+  WorkpieceModes workpieceModes() const;
 };
+
+/// The model with the modes of the workpiece at a position [m]. Between two places the frequency, the damping
+/// ratio and the mode shape (w sqrt(gain)) of each mode are linear in the position; a standard deviation too
+/// where both places state it. @throws Error when the model states no modes of the workpiece, or the position
+/// is outside the places.
+MachineModel atPosition(MachineModel model, double position);
 
 /// @throws Error of one line that names the file, the key and the value: unknown key, missing key, wrong
 /// type, NaN, out of range.
