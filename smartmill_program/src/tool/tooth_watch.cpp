@@ -1,0 +1,205 @@
+#include "smartmill_program/tool/tooth_watch.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "smartmill_core/math/angle.h"
+#include "smartmill_core/require.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::program {
+namespace {
+
+using Complex = std::complex<double>;
+
+constexpr std::size_t STEPS = ToothWatch::STEPS;
+constexpr std::size_t DELAY = 2 * STEPS;  // from a step to the newest reference
+constexpr std::size_t CONFIRM = 7;        // steps; a step of the feed passes the test for less
+/// [1] Mean force over (teeth x mean force of a tooth in its own frame): 1 for a narrow arc, pi / 4 for the
+/// chip and 2 / pi for the edge of a slot.
+constexpr double ARC = 0.85, ARC_STD = 0.12;
+constexpr double RADIAL_ANGLE = 0.45;         // [rad] atan(Fr / Ft), 0.3..0.6 for published metals
+constexpr double UNKNOWN_DEPTH = 0.5;         // [1] tool radii
+constexpr double FORCE_TOLERANCE = 0.3;       // [1] of the mean force of a tooth
+constexpr double DIRECTION_TOLERANCE = 0.35;  // [rad] of the mean force
+constexpr double DEVIATION = 0.3;             // [1] of the largest, from which on a step belongs to the loss
+
+}  // namespace
+
+ToothWatch::ToothWatch(const ToothWatchParameters& parameters) : parameters_(parameters) {
+  parameters_.validate();
+}
+
+void ToothWatch::setTool(const ToolGeometry& tool, double axial_depth) {
+  require("teeth", tool.teeth, Range::closed(1, 1000));
+  if (tool.teeth != tool_.teeth) reset();
+  tool_ = tool;
+  const double depth = axial_depth > 0.0 ? axial_depth : UNKNOWN_DEPTH * tool.radius();
+  phase_ = RADIAL_ANGLE + (tool.diameter > 0.0 ? 0.5 * tool.lag() * depth : 0.0);
+}
+
+void ToothWatch::reset() {
+  samples_ = 0;
+  whole_ = false;
+  sum_ = {};
+  steps_.clear();
+  revolutions_.clear();
+  run_ = since_revolution_ = 0;
+  revolution_.reset();
+}
+
+std::optional<RevolutionForce> ToothWatch::takeRevolution() {
+  std::optional<RevolutionForce> taken;
+  taken.swap(revolution_);
+  return taken;
+}
+
+std::optional<ToothLoss> ToothWatch::push(const ForceSample& sample) {
+  std::optional<ToothLoss> loss;
+  const auto step = static_cast<long>(std::floor(sample.turned * (STEPS / units::TWO_PI)));
+  if (samples_ == 0) {
+    step_ = step;
+  } else if (step != step_) {
+    if (step == step_ + 1) {
+      loss = endStep();
+    } else {
+      reset();
+    }
+    step_ = step;
+  }
+  const Complex force(sample.fx, sample.fy);
+  ++samples_;
+  sum_.time = sample.time;
+  sum_.force += force;
+  sum_.rotating += force * std::polar(1.0, sample.turned);
+  return loss;
+}
+
+/// The first step of all is not whole.
+std::optional<ToothLoss> ToothWatch::endStep() {
+  const double share = 1.0 / static_cast<double>(samples_);
+  const Step step{sum_.time, share * sum_.force, share * sum_.rotating};
+  sum_ = {};
+  samples_ = 0;
+  if (!whole_) {
+    whole_ = true;
+    return {};
+  }
+  const std::size_t kept = DELAY + static_cast<std::size_t>(parameters_.reference_revolutions) * STEPS;
+  steps_.push_back(step);
+  if (steps_.size() < STEPS) return {};
+  if (steps_.size() > kept) steps_.pop_front();
+  RevolutionForce revolution;
+  revolution.begin = (steps_.end() - STEPS)->time;
+  revolution.time = step.time;
+  for (auto s = steps_.end() - STEPS; s != steps_.end(); ++s) {
+    revolution.force += s->force / static_cast<double>(STEPS);
+    revolution.rotating += s->rotating / static_cast<double>(STEPS);
+  }
+  revolutions_.push_back(revolution);
+  if (revolutions_.size() > kept) revolutions_.pop_front();
+  if (++since_revolution_ == STEPS) {
+    since_revolution_ = 0;
+    revolution_ = revolution;
+  }
+  return test();
+}
+
+/// Revolutions with at least half of the present force.
+ToothWatch::Reference ToothWatch::reference() const {
+  Reference found;
+  const double least = std::max(parameters_.least_force, 0.5 * std::abs(revolutions_.back().force));
+  for (std::size_t back = DELAY; back < revolutions_.size(); back += STEPS) {
+    const RevolutionForce& revolution = revolutionBefore(back);
+    if (std::abs(revolution.force) < least) break;
+    ++found.count;
+    found.rotating += revolution.rotating;
+  }
+  if (found.count < LEAST_REFERENCE) return found;
+  const auto count = static_cast<double>(found.count);
+  const Complex newest = revolutionBefore(DELAY).force;
+  const Complex oldest = revolutionBefore(DELAY + (found.count - 1) * STEPS).force;
+  found.force = newest + static_cast<double>(DELAY / STEPS) / (count - 1.0) * (newest - oldest);
+  found.rotating /= count;
+  for (std::size_t k = 0; k < found.count; ++k)
+    found.variance += std::norm(revolutionBefore(DELAY + k * STEPS).rotating - found.rotating);
+  found.variance /= 2.0 * (count - 1.0);
+  return found;
+}
+
+/// [1] Steps back to the first one whose force differs from that of the references at the same angle.
+std::size_t ToothWatch::firstDeviation(std::size_t references) const {
+  std::array<double, DELAY> deviation{};
+  for (std::size_t back = 0; back < DELAY; ++back) {
+    const auto at = [&](std::size_t steps) { return steps_[steps_.size() - 1 - steps].force; };
+    Complex mean = 0.0;
+    std::size_t count = 0;
+    for (std::size_t turn = 1; turn <= references + 1; ++turn) {
+      const std::size_t before = back + turn * STEPS;
+      if (before < DELAY || before >= steps_.size()) continue;
+      mean += at(before);
+      ++count;
+    }
+    if (count > 0) deviation[back] = std::abs(at(back) - mean / static_cast<double>(count));
+  }
+  const double least = DEVIATION * *std::max_element(deviation.begin(), deviation.end());
+  std::size_t back = DELAY - 1;
+  while (deviation[back] < least) --back;
+  return back;
+}
+
+std::optional<ToothLoss> ToothWatch::test() {
+  const RevolutionForce& now = revolutions_.back();
+  const auto fail = [this] {
+    run_ = 0;
+    return std::nullopt;
+  };
+  if (tool_.teeth < 2 || revolutions_.size() <= DELAY + (LEAST_REFERENCE - 1) * STEPS ||
+      std::abs(now.force) < parameters_.least_force)
+    return fail();
+  const auto teeth = static_cast<double>(tool_.teeth);
+  const double newest = std::abs(revolutionBefore(DELAY).force) / (teeth * ARC);  // [N] of a tooth
+  if (std::abs(now.rotating - revolutionBefore(DELAY).rotating) < 0.25 * newest) return fail();
+  const Reference before = reference();
+  if (before.count < LEAST_REFERENCE) return fail();
+
+  const double tooth = std::abs(before.force) / (teeth * ARC);
+  const double ratio = std::abs(now.force) / std::abs(before.force);
+  if (ratio < 1.0 - (1.0 + FORCE_TOLERANCE) / teeth || ratio > 1.0 + FORCE_TOLERANCE / teeth ||
+      std::abs(std::arg(now.force / before.force)) > DIRECTION_TOLERANCE)
+    return fail();
+  const double chip_share = std::clamp(1.0 - teeth * (1.0 - ratio), 0.0, 1.0);
+  const Complex template_of_first = 1.0 - chip_share * std::polar(1.0, units::TWO_PI / teeth);
+  const Complex change = now.rotating - before.rotating;
+  const double variance = before.variance * (1.0 + 1.0 / static_cast<double>(before.count)) +
+                          std::pow(parameters_.force_change * tooth, 2);
+  const double llr = std::norm(change) / (2.0 * variance);
+  const double loss = std::abs(change) / (tooth * std::abs(template_of_first));
+  const double period = now.time - revolutionBefore(STEPS).time;  // [s]
+  const double tests = parameters_.false_alarm_hours * 3600.0 / period * static_cast<double>(STEPS);
+  if (loss < parameters_.least_loss || llr < std::log(std::max(tests, 1.0))) return fail();
+  if (++run_ < CONFIRM) return {};
+
+  ToothLoss found;
+  found.stamp = now.time;
+  const std::size_t back = firstDeviation(before.count);
+  found.lost_at = steps_[steps_.size() - 1 - back].time;
+  found.revolutions = static_cast<double>(back) / static_cast<double>(STEPS);
+  const double at = phase_ + std::arg(template_of_first) - std::arg(change);
+  double nearest = units::TWO_PI;
+  for (int j = 0; j < tool_.teeth; ++j) {
+    const double off = std::abs(nearAngle(at - tool_.toothAngle(j), 0.0));
+    if (off < nearest) {
+      nearest = off;
+      found.tooth = j;
+    }
+  }
+  found.loss = loss;
+  found.loss_std = std::hypot(ARC_STD / ARC, std::sqrt(variance) / (tooth * std::abs(template_of_first)));
+  found.log_likelihood_ratio = llr;
+  reset();  // the tool is another one from here on
+  return found;
+}
+
+}  // namespace smartmill::program
