@@ -44,7 +44,7 @@ ProductionMachine drawMachine(std::mt19937_64& random) {
   m.spindle_acceleration = between(50.0, 500.0);
   m.ripple = between(0.0, 5e-3);
   m.ripple_frequency = between(0.5, 30.0);
-  m.noise = between(1.0, 8.0);
+  m.noise = between(0.5, 4.0);
   m.angle_noise = between(0.0, 3e-3);
   m.edge_growth = between(0.2, 1.0) / 3600.0;
   return m;
@@ -156,7 +156,7 @@ void ProductionForce::drawEvents() {
   if (chance(SPINDLE)) speed_target_ = machine_.speed * std::floor(uniform(8.0, 13.0)) / 10.0;
   if (chance(HOLDS)) hold_until_ = time_ + uniform(0.2, 2.0);
   if (chance(LOST)) lost_until_ = time_ + logUniform(1e-3, 0.1);
-  if (chatter_until_ <= time_ && chance(CHATTER)) {
+  if (chatter_until_ + 1.0 <= time_ && chance(CHATTER)) {
     chatter_until_ = time_ + uniform(0.3, 2.0);
     chatter_size_ = uniform(0.2, 2.0) * mean_force_;
     chatter_ = 0.01 * mean_force_;
@@ -189,7 +189,7 @@ double ProductionForce::radiusOf(int tooth, double turned) const {
 
 /// In the frame of the feed, x + i y. Immersion angles are clockwise, so that a feed turned counterclockwise
 /// by d has phi = angle of the machine + d.
-Complex ProductionForce::cuttingForce() {
+Complex ProductionForce::cuttingForce(double turned) {
   const int teeth = machine_.tool.teeth;
   const double pitch = TWO_PI / teeth, height = depth_ / slices_;
   const double lag = machine_.tool.lag() * height;
@@ -199,16 +199,16 @@ Complex ProductionForce::cuttingForce() {
   Complex force = 0.0;
   for (int j = 0; j < teeth; ++j) {
     for (int z = 0; z < slices_; ++z) {
-      const double phi = wrapped(turned_ + direction_ + j * pitch - (z + 0.5) * lag);
+      const double phi = wrapped(turned + direction_ + j * pitch - (z + 0.5) * lag);
       if (phi >= PI) continue;
       bool in = false;
       for (const Arc& arc : arcs_) in = in || (phi >= arc.entry && phi < arc.exit);
       if (!in) continue;
       const double sine = std::sin(phi), cosine = std::cos(phi);
-      const double own = radiusOf(j, turned_);
+      const double own = radiusOf(j, turned);
       double chip = 1.0;
       for (int n = 1; n <= teeth; ++n)
-        chip = std::min(chip, n * feed * sine + own - radiusOf((j + n) % teeth, turned_ - n * pitch));
+        chip = std::min(chip, n * feed * sine + own - radiusOf((j + n) % teeth, turned - n * pitch));
       if (chip <= 0.0) continue;
       const double ft = height * (hardness_ * k.ktc * chip + edge * k.kte);
       const double fr = height * (hardness_ * k.krc * chip + edge * k.kre);
@@ -225,7 +225,9 @@ const ProductionForce::Sample& ProductionForce::next() {
   sample_.cutting = !arcs_.empty() && feed_ > 0.0;
   Complex force = 0.0;
   if (sample_.cutting) {
-    force = cuttingForce();
+    // The converter averages over its interval.
+    const double half = 0.25 * speed_ * STEP;
+    force = 0.5 * (cuttingForce(turned_ - half) + cuttingForce(turned_ + half));
     drawEvents();
     cutting_time_ += STEP;
     worn_ += machine_.edge_growth * STEP;
@@ -234,8 +236,9 @@ const ProductionForce::Sample& ProductionForce::next() {
   }
   mean_force_ += (std::abs(force) - mean_force_) * STEP / 0.1;
   sample_.cut_force = force;
-  if (time_ < chatter_until_ && sample_.cutting) {
-    chatter_ = std::min(chatter_ * std::exp(chatter_growth_ * speed_ * STEP), chatter_size_);
+  if (chatter_ > 0.0 && sample_.cutting) {
+    const double growth = time_ < chatter_until_ ? chatter_growth_ : -chatter_growth_;
+    chatter_ = std::min(chatter_ * std::exp(growth * speed_ * STEP), chatter_size_);
     chatter_phase_ += chatter_order_ * speed_ * STEP;
     force += std::polar(chatter_ * std::cos(chatter_phase_), chatter_direction_);
   }

@@ -23,17 +23,17 @@ struct ProductionMachine {
 };
 ProductionMachine drawMachine(std::mt19937_64& random);
 
-/// Milling of a rigid tool in straight cuts one after the other, sample by sample, with everything that
-/// changes the force in production without damage: entries and exits through flat faces, gaps of the stock,
-/// changes of radial depth, corners, feed and spindle overrides, feed hold and restart, hard spots, chatter,
-/// speed ripple, runout, wear, noise, lost samples. A tooth can be broken off at any time.
+/// Milling of a rigid tool in straight cuts one after the other, sample by sample (two instants each), with
+/// everything that changes the force in production without damage: entries and exits through flat faces, gaps
+/// of the stock, changes of radial depth, corners, feed and spindle overrides, feed hold and restart, hard
+/// spots, chatter, speed ripple, runout, wear, noise, lost samples. A tooth can be broken off at any time.
 ///
 /// The chip of each tooth and slice of its helix is the least over all earlier passes of one revolution of
 /// n c sin(phi) + difference of the radii (formats.md), c of the present feed and speed. Written without code
 /// of the detection.
 class ProductionForce {
  public:
-  static constexpr double RATE = 5000.0;  // [Hz]
+  static constexpr double RATE = 10000.0;  // [Hz]
 
   struct Sample {
     double time = 0.0, turned = 0.0;  // [s], [rad] as the encoder measures it
@@ -51,6 +51,7 @@ class ProductionForce {
   /// From now on this tooth is missing.
   void breakTooth(int tooth);
   const char* stage() const { return stage_; }          // of the present cut, for messages
+  double meanForce() const { return mean_force_; }      // [N] of the last 0.1 s
   double cuttingTime() const { return cutting_time_; }  // [s]
 
  private:
@@ -68,7 +69,7 @@ class ProductionForce {
   double logUniform(double low, double high);
   bool chance(double per_second);
   double radiusOf(int tooth, double turned) const;
-  std::complex<double> cuttingForce();
+  std::complex<double> cuttingForce(double turned);
 
   ProductionMachine machine_;
   std::mt19937_64 random_;

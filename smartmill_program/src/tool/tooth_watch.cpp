@@ -14,16 +14,21 @@ namespace {
 using Complex = std::complex<double>;
 
 constexpr std::size_t STEPS = ToothWatch::STEPS;
-constexpr std::size_t DELAY = 2 * STEPS;  // from a step to the newest reference
-constexpr std::size_t CONFIRM = 7;        // steps; a step of the feed passes the test for less
+constexpr double STEP = units::TWO_PI / static_cast<double>(STEPS);  // [rad]
+constexpr std::size_t DELAY = 2 * STEPS;                             // from a step to the newest reference
+constexpr std::size_t CONFIRM = 7;  // steps; a step of the feed passes the test for less
 /// [1] Mean force over (teeth x mean force of a tooth in its own frame): 1 for a narrow arc, pi / 4 for the
 /// chip and 2 / pi for the edge of a slot.
 constexpr double ARC = 0.85, ARC_STD = 0.12;
 constexpr double RADIAL_ANGLE = 0.45;         // [rad] atan(Fr / Ft), 0.3..0.6 for published metals
 constexpr double UNKNOWN_DEPTH = 0.5;         // [1] tool radii
 constexpr double FORCE_TOLERANCE = 0.3;       // [1] of the mean force of a tooth
+constexpr double FORCE_SCATTER = 2.0;         // [1] standard deviations that are added to it
+constexpr double MOST_TOLERANCE = 0.15;       // [1] of the mean force of the tool
 constexpr double DIRECTION_TOLERANCE = 0.35;  // [rad] of the mean force
-constexpr double DEVIATION = 0.3;             // [1] of the largest, from which on a step belongs to the loss
+constexpr double LEAST_SHARE = 0.3;  // [1] of least_force that the teeth without the lost one must have
+constexpr double LEAST_STEP = 4.0;   // [1] change over the drift of the references
+constexpr double DEVIATION = 0.3;    // [1] of the largest, from which on a step belongs to the loss
 
 }  // namespace
 
@@ -40,7 +45,7 @@ void ToothWatch::setTool(const ToolGeometry& tool, double axial_depth) {
 }
 
 void ToothWatch::reset() {
-  samples_ = 0;
+  last_.reset();
   whole_ = false;
   sum_ = {};
   steps_.clear();
@@ -56,32 +61,40 @@ std::optional<RevolutionForce> ToothWatch::takeRevolution() {
 }
 
 std::optional<ToothLoss> ToothWatch::push(const ForceSample& sample) {
-  std::optional<ToothLoss> loss;
-  const auto step = static_cast<long>(std::floor(sample.turned * (STEPS / units::TWO_PI)));
-  if (samples_ == 0) {
-    step_ = step;
-  } else if (step != step_) {
-    if (step == step_ + 1) {
-      loss = endStep();
-    } else {
-      reset();
-    }
-    step_ = step;
-  }
   const Complex force(sample.fx, sample.fy);
-  ++samples_;
-  sum_.time = sample.time;
-  sum_.force += force;
-  sum_.rotating += force * std::polar(1.0, sample.turned);
+  const Point now{sample.time, sample.turned, force, force * std::polar(1.0, sample.turned)};
+  const auto step = static_cast<long>(std::floor(sample.turned / STEP));
+  std::optional<ToothLoss> loss;
+  if (!last_ || step < step_ || step > step_ + 1) {
+    if (last_) reset();
+  } else if (step == step_) {
+    integrate(*last_, now);
+  } else {
+    const double end = STEP * static_cast<double>(step);
+    const double share = (end - last_->turned) / (now.turned - last_->turned);
+    const Point between{last_->time + share * (now.time - last_->time), end,
+                        last_->force + share * (now.force - last_->force),
+                        last_->rotating + share * (now.rotating - last_->rotating)};
+    integrate(*last_, between);
+    sum_.time = between.time;
+    loss = endStep();
+    integrate(between, now);
+  }
+  step_ = step;
+  last_ = now;
   return loss;
+}
+
+void ToothWatch::integrate(const Point& from, const Point& to) {
+  const double half = 0.5 * (to.turned - from.turned) / STEP;
+  sum_.force += half * (from.force + to.force);
+  sum_.rotating += half * (from.rotating + to.rotating);
 }
 
 /// The first step of all is not whole.
 std::optional<ToothLoss> ToothWatch::endStep() {
-  const double share = 1.0 / static_cast<double>(samples_);
-  const Step step{sum_.time, share * sum_.force, share * sum_.rotating};
+  const Step step = sum_;
   sum_ = {};
-  samples_ = 0;
   if (!whole_) {
     whole_ = true;
     return {};
@@ -120,11 +133,17 @@ ToothWatch::Reference ToothWatch::reference() const {
   const auto count = static_cast<double>(found.count);
   const Complex newest = revolutionBefore(DELAY).force;
   const Complex oldest = revolutionBefore(DELAY + (found.count - 1) * STEPS).force;
-  found.force = newest + static_cast<double>(DELAY / STEPS) / (count - 1.0) * (newest - oldest);
+  const Complex slope = (newest - oldest) / (count - 1.0);  // a revolution
+  found.force = newest + static_cast<double>(DELAY / STEPS) * slope;
+  for (std::size_t k = 0; k < found.count; ++k)
+    found.force_variance +=
+        std::norm(revolutionBefore(DELAY + k * STEPS).force - (newest - static_cast<double>(k) * slope));
+  found.force_variance /= count - 2.0;
   found.rotating /= count;
   for (std::size_t k = 0; k < found.count; ++k)
     found.variance += std::norm(revolutionBefore(DELAY + k * STEPS).rotating - found.rotating);
   found.variance /= 2.0 * (count - 1.0);
+  found.drift = std::abs(revolutionBefore(DELAY).rotating - found.rotating);
   return found;
 }
 
@@ -156,17 +175,20 @@ std::optional<ToothLoss> ToothWatch::test() {
     return std::nullopt;
   };
   if (tool_.teeth < 2 || revolutions_.size() <= DELAY + (LEAST_REFERENCE - 1) * STEPS ||
-      std::abs(now.force) < parameters_.least_force)
+      std::abs(now.force) < LEAST_SHARE * parameters_.least_force)
     return fail();
   const auto teeth = static_cast<double>(tool_.teeth);
   const double newest = std::abs(revolutionBefore(DELAY).force) / (teeth * ARC);  // [N] of a tooth
   if (std::abs(now.rotating - revolutionBefore(DELAY).rotating) < 0.25 * newest) return fail();
   const Reference before = reference();
-  if (before.count < LEAST_REFERENCE) return fail();
+  if (before.count < LEAST_REFERENCE || std::abs(before.force) < parameters_.least_force) return fail();
 
   const double tooth = std::abs(before.force) / (teeth * ARC);
   const double ratio = std::abs(now.force) / std::abs(before.force);
-  if (ratio < 1.0 - (1.0 + FORCE_TOLERANCE) / teeth || ratio > 1.0 + FORCE_TOLERANCE / teeth ||
+  const double tolerance = std::min(
+      FORCE_TOLERANCE / teeth + FORCE_SCATTER * std::sqrt(before.force_variance) / std::abs(before.force),
+      MOST_TOLERANCE);
+  if (ratio < 1.0 - 1.0 / teeth - tolerance || ratio > 1.0 + tolerance ||
       std::abs(std::arg(now.force / before.force)) > DIRECTION_TOLERANCE)
     return fail();
   const double chip_share = std::clamp(1.0 - teeth * (1.0 - ratio), 0.0, 1.0);
@@ -178,6 +200,7 @@ std::optional<ToothLoss> ToothWatch::test() {
   const double loss = std::abs(change) / (tooth * std::abs(template_of_first));
   const double period = now.time - revolutionBefore(STEPS).time;  // [s]
   const double tests = parameters_.false_alarm_hours * 3600.0 / period * static_cast<double>(STEPS);
+  if (std::abs(change) < LEAST_STEP * before.drift) return fail();  // growing chatter
   if (loss < parameters_.least_loss || llr < std::log(std::max(tests, 1.0))) return fail();
   if (++run_ < CONFIRM) return {};
 

@@ -11,15 +11,15 @@
 namespace smartmill::program {
 
 struct ToothWatchParameters {
-  double least_force = 10.0;
+  double least_force = 15.0;
   double least_loss = 0.5;
   int reference_revolutions = 6;
-  double force_change = 0.08;
+  double force_change = 0.06;
   double false_alarm_hours = 1000.0;
 
   void declare(ParameterTable& table) {
     table.number("least_force", least_force, "N", Range::positive(),
-                 "mean force of a revolution below which the tool is taken as out of the cut");
+                 "mean force of a revolution below which it is no reference: the tool is out of the cut");
     table.number("least_loss", least_loss, "1", Range::open(0.0, 1.0),
                  "share of the force of a tooth whose loss is reported");
     table.number("reference_revolutions", reference_revolutions, "1", Range::closed(3, 100),
@@ -107,12 +107,19 @@ class ToothWatch {
     double time = 0.0;
     std::complex<double> force, rotating;  // [N] means
   };
+  struct Point {
+    double time, turned;
+    std::complex<double> force, rotating;  // [N]
+  };
   struct Reference {
     std::size_t count = 0;
     std::complex<double> force;     // [N] mean, extrapolated to the present
     std::complex<double> rotating;  // [N] mean
+    double force_variance = 0.0;    // [N2] about the line that is extrapolated
+    double drift = 0.0;             // [N] newest of rotating against the mean
     double variance = 0.0;          // [N2] of a component of rotating
   };
+  void integrate(const Point& from, const Point& to);
   std::optional<ToothLoss> endStep();
   std::optional<ToothLoss> test();
   Reference reference() const;
@@ -125,8 +132,8 @@ class ToothWatch {
   ToolGeometry tool_;
   double phase_ = 0.0;  // [rad] of the force of a tooth against its tip
   long step_ = 0;
-  std::size_t samples_ = 0;  // in the present step
-  bool whole_ = false;       // the present step has begun at its begin
+  bool whole_ = false;  // the present step has begun at its begin
+  std::optional<Point> last_;
   Step sum_;
   std::deque<Step> steps_;
   std::deque<RevolutionForce> revolutions_;  // that end with each step
