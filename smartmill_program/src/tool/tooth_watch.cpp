@@ -19,7 +19,7 @@ constexpr std::size_t DELAY = 2 * STEPS;                             // from a s
 constexpr std::size_t CONFIRM = 7;  // steps; a step of the feed passes the test for less
 /// [1] Mean force over (teeth x mean force of a tooth in its own frame): 1 for a narrow arc, pi / 4 for the
 /// chip and 2 / pi for the edge of a slot.
-constexpr double ARC = 0.85, ARC_STD = 0.12;
+constexpr double ARC = 0.85, ARC_STD = 0.16;
 constexpr double RADIAL_ANGLE = 0.45;         // [rad] atan(Fr / Ft), 0.3..0.6 for published metals
 constexpr double UNKNOWN_DEPTH = 0.5;         // [1] tool radii
 constexpr double FORCE_TOLERANCE = 0.3;       // [1] of the mean force of a tooth
@@ -188,12 +188,14 @@ std::optional<ToothLoss> ToothWatch::test() {
   const double tolerance = std::min(
       FORCE_TOLERANCE / teeth + FORCE_SCATTER * std::sqrt(before.force_variance) / std::abs(before.force),
       MOST_TOLERANCE);
-  if (ratio < 1.0 - 1.0 / teeth - tolerance || ratio > 1.0 + tolerance ||
+  const Complex change = now.rotating - before.rotating;
+  // With runout the lost tooth may have had up to twice the mean share.
+  const double share = std::clamp(std::abs(change) / tooth, 1.0, 2.0);
+  if (ratio < 1.0 - share / teeth - tolerance || ratio > 1.0 + tolerance ||
       std::abs(std::arg(now.force / before.force)) > DIRECTION_TOLERANCE)
     return fail();
   const double chip_share = std::clamp(1.0 - teeth * (1.0 - ratio), 0.0, 1.0);
   const Complex template_of_first = 1.0 - chip_share * std::polar(1.0, units::TWO_PI / teeth);
-  const Complex change = now.rotating - before.rotating;
   const double variance = before.variance * (1.0 + 1.0 / static_cast<double>(before.count)) +
                           std::pow(parameters_.force_change * tooth, 2);
   const double llr = std::norm(change) / (2.0 * variance);
