@@ -22,7 +22,7 @@ constexpr double PERCENT = 100.0;
 MachineModel modelOf(const ToolNodeParameters& parameters) {
   if (parameters.model.empty()) throw Error("model: empty: expected the path of a smartmill-model/1 file");
   MachineModel model = readMachineModel(parameters.model);
-  model.needTool("tell its teeth apart");
+  model.needTool("distinguish its teeth");
   return model;
 }
 
@@ -42,7 +42,7 @@ ToolNode::ToolNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
     if (from_model_) monitor_.setCoefficients(k, model_.cutting_std.value_or(NOT_IDENTIFIED));
   }
   if (model_.tool->teeth < 2)
-    ROS_WARN("a tool with one tooth: its loss cannot be told from the end of a cut");
+    ROS_WARN("a tool with one tooth: its loss is not distinguished from the end of a cut");
   listen();
   shell_.diagnose("tool", [this](auto& status) { diagnose(status); });
   if (parameters_.hold_on_breakage) shell_.every(ANSWER_PERIOD, [this] { readAnswer(); });
