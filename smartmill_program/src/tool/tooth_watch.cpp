@@ -24,11 +24,14 @@ constexpr double RADIAL_ANGLE = 0.45;         // [rad] atan(Fr / Ft), 0.3..0.6 f
 constexpr double UNKNOWN_DEPTH = 0.5;         // [1] tool radii
 constexpr double FORCE_TOLERANCE = 0.3;       // [1] of the mean force of a tooth
 constexpr double FORCE_SCATTER = 2.0;         // [1] standard deviations that are added to it
-constexpr double MOST_TOLERANCE = 0.15;       // [1] of the mean force of the tool
+constexpr double LEAST_CHIP_SHARE = 0.15;     // [1] of the chip in the force
+constexpr double MOST_TOLERANCE = 0.12;       // [1] of the mean force of the tool
 constexpr double DIRECTION_TOLERANCE = 0.35;  // [rad] of the mean force
 constexpr double LEAST_SHARE = 0.3;  // [1] of least_force that the teeth without the lost one must have
-constexpr double LEAST_STEP = 4.0;   // [1] change over the drift of the references
-constexpr double DEVIATION = 0.3;    // [1] of the largest, from which on a step belongs to the loss
+// [1] Rotating force by runout, in mean forces of a tooth, from which on a larger loss is required.
+constexpr double UNEVEN = 0.7, UNEVEN_SLOPE = 0.8;
+constexpr double LEAST_STEP = 4.0;  // [1] change over the drift of the references
+constexpr double DEVIATION = 0.3;   // [1] of the largest, from which on a step belongs to the loss
 
 }  // namespace
 
@@ -191,7 +194,7 @@ std::optional<ToothLoss> ToothWatch::test() {
   const Complex change = now.rotating - before.rotating;
   // With runout the lost tooth may have had up to twice the mean share.
   const double share = std::clamp(std::abs(change) / tooth, 1.0, 2.0);
-  if (ratio < 1.0 - share / teeth - tolerance || ratio > 1.0 + tolerance ||
+  if (ratio < 1.0 - (1.0 - LEAST_CHIP_SHARE) * share / teeth - tolerance || ratio > 1.0 + tolerance ||
       std::abs(std::arg(now.force / before.force)) > DIRECTION_TOLERANCE)
     return fail();
   const double chip_share = std::clamp(1.0 - teeth * (1.0 - ratio), 0.0, 1.0);
@@ -203,7 +206,10 @@ std::optional<ToothLoss> ToothWatch::test() {
   const double period = now.time - revolutionBefore(STEPS).time;  // [s]
   const double tests = parameters_.false_alarm_hours * 3600.0 / period * static_cast<double>(STEPS);
   if (std::abs(change) < LEAST_STEP * before.drift) return fail();  // growing chatter
-  if (loss < parameters_.least_loss || llr < std::log(std::max(tests, 1.0))) return fail();
+  // Runout of the size of the chip leaves single teeth without one as soon as the feed changes.
+  const double least =
+      parameters_.least_loss + UNEVEN_SLOPE * std::max(0.0, std::abs(before.rotating) / tooth - UNEVEN);
+  if (loss < least || llr < std::log(std::max(tests, 1.0))) return fail();
   if (++run_ < CONFIRM) return {};
 
   ToothLoss found;
