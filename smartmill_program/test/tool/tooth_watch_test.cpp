@@ -138,6 +138,8 @@ TEST(ToothWatch, ChangesOfTheCutAreNoLoss) {
   const std::vector<Event> events{
       {"override 30 % at once", [](double n, CuttingTeeth& t) { t.feed = n < 20.0 ? 80.0 : 24.0; }},
       {"override 120 % at once", [](double n, CuttingTeeth& t) { t.feed = n < 20.0 ? 80.0 : 96.0; }},
+      {"override 10 %, chips below the runout",
+       [](double n, CuttingTeeth& t) { t.feed = 40.0 * std::clamp(1.0 - 0.45 * (n - 20.0), 0.1, 1.0); }},
       {"feed hold and restart",
        [](double n, CuttingTeeth& t) {
          t.feed = 80.0 * std::clamp(n < 25.0 ? 21.0 - n : n - 25.0, 0.0, 1.0);
