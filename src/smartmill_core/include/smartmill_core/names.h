@@ -23,6 +23,7 @@ constexpr const char* INSPECTION_FEATURE = "inspection/feature";
 constexpr const char* CUTTING_CONDITION = "cut/condition";
 constexpr const char* TOOL_FRF = "tool/frf";
 constexpr const char* TOOL_MODES = "tool/modes";
+constexpr const char* TOOL_CONDITION = "tool/condition";
 constexpr const char* SPINDLE_HEALTH = "hammer/health";
 constexpr const char* COEFFICIENTS = "material/coefficients";
 constexpr const char* COEFFICIENT_PRIOR = "material/prior";

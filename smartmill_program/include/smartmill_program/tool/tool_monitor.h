@@ -1,0 +1,112 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <string>
+
+#include "smartmill_core/signal/stream_sorter.h"
+#include "smartmill_core/signal/streams.h"
+#include "smartmill_core/signal/unwrapped_angle.h"
+#include "smartmill_program/tool/tooth_watch.h"
+#include "smartmill_program/tool/wear_estimate.h"
+
+namespace smartmill::program {
+
+struct ToolMonitorParameters {
+  ToothWatchParameters watch;
+  WearParameters wear;
+  double maximum_gap = 0.2;
+  double path_tolerance = 1.0e-3;
+  double report_period = 1.0;
+
+  void declare(ParameterTable& table) {
+    table.section("Loss of a tooth.");
+    watch.declare(table);
+    table.section("Wear of steady cuts.");
+    wear.declare(table);
+    table.number("path_tolerance", path_tolerance, "m", Range::openLow(0.0, 1.0),
+                 "largest distance of the tool from the path of the steady cut");
+    table.number("report_period", report_period, "s", Range::positive(),
+                 "time between reports within a steady cut");
+    table.section();
+    table.number("maximum_gap", maximum_gap, "s", Range::openLow(0.0, 60.0),
+                 "longest interval without controller state or spindle angle");
+  }
+  /// @throws Error naming key and value.
+  void validate() const { checkBounds(*this); }
+};
+
+/// Condition of the tool (topic tool/condition).
+struct ToolReport {
+  double stamp = 0.0;  ///< [s]
+  std::string condition, tool;
+  int teeth = 0;
+  bool new_loss = false;          ///< this report is that of a loss
+  std::optional<ToothLoss> loss;  ///< the last one of this tool
+  std::optional<CutWear> wear;    ///< of the steady cut
+};
+
+/// ToothWatch and WearEstimate behind a StreamSorter: force, spindle angle, controller states, conditions in;
+/// reports out. The loss of a tooth does not need a condition.
+class ToolMonitor {
+ public:
+  using Output = std::function<void(const ToolReport&)>;
+
+  /// @param tool until a condition states one @param hold_back [s] see StreamSorter @throws Error on a
+  /// parameter out of range.
+  ToolMonitor(const ToolMonitorParameters& parameters, const ToolGeometry& tool, double hold_back,
+              Output output);
+
+  /// Coefficients of the sharp tool, see WearEstimate.
+  void setCoefficients(const CuttingCoefficients& value, const CuttingCoefficients& std_dev) {
+    wear_.setCoefficients(value, std_dev);
+  }
+  void push(const CuttingCondition& condition);
+  void push(const CncState& state);
+  void push(const SpindleAngle& angle);
+  void push(const ForceBlock& block);
+  /// Channels fx and fy. @throws Error when one is missing.
+  void push(const SampleBlock& block);
+  void flush() { sorter_.flush(); }  ///< at the end of the data
+
+  /// The name of the stream that delays the others; empty: none.
+  std::string waitingFor() const { return sorter_.waitingFor(); }
+  const std::optional<ToothLoss>& loss() const { return loss_; }
+
+ private:
+  struct Sample {
+    double time, fx, fy;
+  };
+  void handle(const CuttingCondition& condition);
+  void handle(const CncState& state);
+  void handle(const SpindleAngle& angle);
+  void handle(const ForceBlock& block);
+  void restart();
+  void gap();
+  void take(const ForceSample& sample);
+  void report(double stamp, bool new_loss, const std::optional<CutWear>& wear);
+
+  ToolMonitorParameters parameters_;
+  ToothWatch watch_;
+  WearEstimate wear_;
+  Output output_;
+  StreamSorter sorter_;
+  StreamSorter::Stream conditions_, states_, angles_, blocks_;
+
+  ToolGeometry tool_;
+  CuttingCondition condition_;
+  std::optional<ToothLoss> loss_;
+  std::deque<Sample> samples_;  // later than the last angle
+  std::optional<UnwrappedAngle> angle_;
+  double speed_ = 0.0;  // [rad/s] of the last reading
+  std::uint64_t next_index_ = 0;
+  ForceBlock::Status status_ = ForceBlock::Status::measured;
+  std::optional<double> steady_since_;                          // [s]
+  double steady_ = 0.0;                                         // [s] last state on the steady path
+  double reported_ = -std::numeric_limits<double>::infinity();  // [s]
+};
+
+}  // namespace smartmill::program

@@ -1,0 +1,126 @@
+#include "smartmill_program/tool/wear_estimate.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <tuple>
+#include <utility>
+
+#include "smartmill_core/cutting/mechanistic.h"
+
+namespace smartmill::program {
+namespace {
+
+using Complex = std::complex<double>;
+
+constexpr std::size_t LEAST_REVOLUTIONS = 3;
+constexpr double NONE = std::numeric_limits<double>::quiet_NaN();
+
+std::array<double, 6> listOf(const CuttingCoefficients& k) {
+  return {{k.ktc, k.krc, k.kac, k.kte, k.kre, k.kae}};
+}
+
+/// Direction of the feed in the machine; +x where it is not stated.
+Complex feedOf(const CuttingCondition& condition) {
+  const Complex way(condition.steady_to[0] - condition.steady_from[0],
+                    condition.steady_to[1] - condition.steady_from[1]);
+  return std::abs(way) > 0.0 ? way / std::abs(way) : Complex(1.0, 0.0);
+}
+
+}  // namespace
+
+WearEstimate::WearEstimate(const WearParameters& parameters) : parameters_(parameters) {
+  parameters_.validate();
+}
+
+void WearEstimate::setCoefficients(const CuttingCoefficients& value, const CuttingCoefficients& std_dev) {
+  value_ = value;
+  std_dev_ = std_dev;
+}
+
+void WearEstimate::begin(const CuttingCondition& condition) {
+  condition_.reset();
+  count_ = 0;
+  sum_ = squares_ = 0.0;
+  if (condition.kind != CuttingCondition::Kind::cut || !value_) return;
+  if (condition.tool_name != tool_) cuts_.clear();
+  tool_ = condition.tool_name;
+
+  const auto matrix = meanForceMatrix(condition.tool, condition.engagement);
+  const std::array<double, 6> value = listOf(*value_), std_dev = listOf(std_dev_);
+  std::array<Complex, 6> part;
+  for (std::size_t k : {0, 1, 3, 4}) part[k] = Complex(matrix[0][k], matrix[1][k]) * value[k];
+  const Complex expected = part[0] + part[1] + part[3] + part[4];
+  const double size = std::abs(expected);
+  if (!(size > 0.0)) return;  // NaN: not all coefficients are known
+  const Complex along = expected / size;
+  const auto project = [&](const Complex& force) { return (force * std::conj(along)).real(); };
+  chip_ = project(part[0] + part[1]);
+  edge_ = project(part[3] + part[4]);
+  double variance = 0.0;
+  for (std::size_t k : {0, 1, 3, 4}) {
+    const double own = std::isfinite(std_dev[k]) ? std_dev[k] / value[k] : parameters_.coefficient_error;
+    const double error = project(part[k]) * own;
+    if (std::isfinite(error)) variance += error * error;
+  }
+  expected_std_ = std::sqrt(variance) / size;
+  direction_ = along * feedOf(condition);
+  condition_ = condition;
+}
+
+void WearEstimate::add(double time, std::complex<double> force) {
+  if (!condition_) return;
+  const double ratio = (force * std::conj(direction_)).real() / (chip_ + edge_);
+  ++count_;
+  sum_ += ratio;
+  squares_ += ratio * ratio;
+  last_ = time;
+}
+
+/// Least squares with relative errors: value and standard deviation.
+std::pair<double, double> WearEstimate::edgeWear(const std::deque<Cut>& cuts) const {
+  double cc = 0.0, ce = 0.0, ee = 0.0, cf = 0.0, ef = 0.0;
+  for (const Cut& cut : cuts) {
+    const double weight = std::pow(parameters_.cut_error * cut.force, -2);
+    cc += weight * cut.chip * cut.chip;
+    ce += weight * cut.chip * cut.edge;
+    ee += weight * cut.edge * cut.edge;
+    cf += weight * cut.chip * cut.force;
+    ef += weight * cut.edge * cut.force;
+  }
+  const double determinant = cc * ee - ce * ce;
+  if (!(determinant > 1e-9 * cc * ee)) return {NONE, NONE};
+  const double std_dev = std::sqrt(cc / determinant);
+  if (!(std_dev <= parameters_.edge_error)) return {NONE, NONE};
+  return {(cc * ef - ce * cf) / determinant - 1.0, std_dev};
+}
+
+std::optional<CutWear> WearEstimate::present() const {
+  if (!condition_ || count_ < LEAST_REVOLUTIONS) return {};
+  const auto count = static_cast<double>(count_);
+  CutWear wear;
+  wear.stamp = last_;
+  wear.condition = *condition_;
+  wear.revolutions = count_;
+  const double mean = sum_ / count;
+  const double scatter = std::sqrt(std::max(0.0, squares_ / count - mean * mean) / (count - 1.0));
+  wear.wear = mean - 1.0;
+  wear.wear_std = mean * std::hypot(scatter / mean, std::hypot(parameters_.force_error, expected_std_));
+  std::deque<Cut> cuts = cuts_;
+  if (mean > 0.0) cuts.push_back({mean * (chip_ + edge_), chip_, edge_});
+  std::tie(wear.edge_wear, wear.edge_wear_std) = edgeWear(cuts);
+  return wear;
+}
+
+std::optional<CutWear> WearEstimate::end() {
+  const std::optional<CutWear> wear = present();
+  if (wear && wear->wear > -1.0) {
+    cuts_.push_back({(1.0 + wear->wear) * (chip_ + edge_), chip_, edge_});
+    while (cuts_.size() > static_cast<std::size_t>(parameters_.cuts)) cuts_.pop_front();
+  }
+  condition_.reset();
+  count_ = 0;
+  return wear;
+}
+
+}  // namespace smartmill::program
