@@ -4,12 +4,29 @@
 #include <string>
 #include <vector>
 
+#include <ros/console.h>
+
 #include "node/bag_recorder.h"
 #include "node/shutdown_request.h"
+#include "smartmill_core/io/disk_space.h"
 #include "smartmill_core/program.h"
 #include "smartmill_ros/master_watch.h"
 
 namespace {
+
+/// Logs that the disk becomes full. @return whether the recording must end, so that it can still be closed
+bool isFull(const std::string& path) {
+  constexpr double REPEAT = 60.0;  // [s] of wall time
+  const smartmill::DiskSpace space = smartmill::diskSpaceOf(path);
+  if (space.isLow() && !space.isFull())
+    ROS_WARN_THROTTLE(REPEAT, "%s: %.1f %% of the disk are free (%.0f MB); the recording ends below %.0f MB",
+                      path.c_str(), 100.0 * space.share(), 1e-6 * space.available,
+                      1e-6 * smartmill::DiskSpace::RESERVE);
+  if (space.isFull())
+    ROS_ERROR("%s: the disk is full (%.0f MB are free): the recording ends here", path.c_str(),
+              1e-6 * space.available);
+  return space.isFull();
+}
 
 void run(const std::string& path, const std::vector<std::string>& patterns,
          const std::atomic<bool>& shutdown) {
@@ -20,6 +37,7 @@ void run(const std::string& path, const std::vector<std::string>& patterns,
   ros::WallTime subscribed;
   while (!shutdown && ros::ok()) {
     if ((ros::WallTime::now() - subscribed).toSec() > SUBSCRIBE_PERIOD) {
+      if (isFull(path)) break;
       recorder.subscribe();
       subscribed = ros::WallTime::now();
     }

@@ -224,7 +224,7 @@ TEST(ForceCompensation, bridgesSamplesThatAreNotNumbers) {
   }
 }
 
-// Status compensated promises that the dynamics of the sensor are removed.
+// Status compensated means that the dynamics of the sensor are removed.
 TEST(ForceCompensation, passesThroughUntilTheSensorIsKnown) {
   const ForceSensor ideal;
   const Session s = session(4);

@@ -23,7 +23,7 @@ using Value = XmlRpc::XmlRpcValue;
 constexpr std::chrono::seconds PERIOD{1};
 constexpr int LOOKS_PER_COPY = 10;  // of the parameters, which can be large
 /// After which all nodes have registered what they publish. The master sends each list of publishers to the
-/// subscribers that it knows, which would leave those that are not in the list yet.
+/// registered subscribers, which would leave those that are not in the list yet.
 constexpr int LOOKS_TO_SUBSCRIBE = 2;
 
 Value list(const std::vector<std::string>& words) {
@@ -41,7 +41,7 @@ bool call(const std::string& method, const std::vector<std::string>& arguments, 
   return ros::master::execute(method, list(words), response, result, false);
 }
 
-/// Call of this node's own XML-RPC server, which knows its topics.
+/// Call of this node's own XML-RPC server, which lists its topics.
 bool callSelf(const std::string& method, Value arguments, Value& result) {
   std::string host;
   std::uint32_t port = 0;

@@ -82,7 +82,7 @@ TEST(MasterWatch, RegistersTheNodeAtANewMaster) {
     EXPECT_TRUE(private_nh.getParam("depth", depth));
     EXPECT_EQ(depth, 2.5e-3);
     EXPECT_EQ(KeptTexts(nh, "modes").all(), (std::map<std::string, std::string>{{"x", "930"}}));
-    // A process that knows the new master alone finds topic and service.
+    // A process that started after the new master finds topic and service.
     EXPECT_EQ(std::system(("timeout 60 rosservice call " + service + " '{phase: 0}' > /dev/null").c_str()),
               0);
     const pid_t listener = start({"timeout", "60", "rostopic", "echo", "-n", "1", topic});

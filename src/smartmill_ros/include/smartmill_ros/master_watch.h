@@ -11,7 +11,7 @@
 
 namespace smartmill {
 
-/// Registers the node again when the ROS master was replaced by a new one at the same address, which knows
+/// Registers the node again when the ROS master was replaced by a new one at the same address, which has
 /// neither nodes nor parameters; roscpp itself registers once. Connections between nodes outlive the master,
 /// so that no data are lost.
 /// Topics are those that the node has at that time, services and parameters those that the former master had.
