@@ -243,7 +243,7 @@ def nothing_from_outside_reaches_the_graph(bench, machine, client, shdr, broker)
     import rosgraph
     publishers, _, services = rosgraph.Master("/test").getSystemState()
     topics = {topic for topic, nodes in publishers if "/smartmill/exchange" in nodes}
-    assert topics == {"/rosout", "/diagnostics"}, topics
+    assert topics == {"/rosout", "/diagnostics", "/smartmill/health"}, topics
     offered = {service for service, nodes in services if "/smartmill/exchange" in nodes}
     assert all(s.rsplit("/", 1)[1] in ("follow", "get_loggers", "set_logger_level") for s in offered), offered
     for method in ("POST", "PUT", "DELETE"):
