@@ -6,7 +6,7 @@ namespace smartmill {
 
 /// Space of the file system of a file, for the user of this process.
 struct DiskSpace {
-  static constexpr double LOW_SHARE = 0.1;  ///< [1] below which users are told
+  static constexpr double LOW_SHARE = 0.1;  ///< [1] below which a warning is logged
   static constexpr double RESERVE =
       100e6;  ///< [byte] below which nothing more is written: files are closed in it
 
