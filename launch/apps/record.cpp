@@ -37,7 +37,7 @@ void run(const std::string& path, const std::vector<std::string>& patterns,
   ros::WallTime subscribed;
   while (!shutdown && ros::ok()) {
     if ((ros::WallTime::now() - subscribed).toSec() > SUBSCRIBE_PERIOD) {
-      if (isFull(path)) break;
+      if (isFull(path)) return recorder.close();
       recorder.subscribe();
       subscribed = ros::WallTime::now();
     }

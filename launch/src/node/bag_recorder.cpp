@@ -47,7 +47,7 @@ void BagRecorder::finish() {
     previous = written_;
     record(QUIET);
   }
-  writer_->close();
+  close();
 }
 
 std::uint32_t BagRecorder::connectionOf(const std::string& topic, Event event) {

@@ -32,6 +32,8 @@ class BagRecorder {
   void record(double timeout);
   /// Writes messages still in transit, for some seconds at most, and closes the file.
   void finish();
+  /// Closes the file at once; messages that wait are lost.
+  void close() { writer_->close(); }
 
  private:
   bool follow(smartmill_msgs::Follow::Request& request, smartmill_msgs::Follow::Response& response);

@@ -137,7 +137,7 @@ ToothWatch::Reference ToothWatch::reference() const {
   const Complex newest = revolutionBefore(DELAY).force;
   const Complex oldest = revolutionBefore(DELAY + (found.count - 1) * STEPS).force;
   const Complex slope = (newest - oldest) / (count - 1.0);  // a revolution
-  found.force = newest + static_cast<double>(DELAY / STEPS) * slope;
+  found.force = newest + static_cast<double>(DELAY) / static_cast<double>(STEPS) * slope;
   for (std::size_t k = 0; k < found.count; ++k)
     found.force_variance +=
         std::norm(revolutionBefore(DELAY + k * STEPS).force - (newest - static_cast<double>(k) * slope));

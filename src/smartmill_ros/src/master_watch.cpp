@@ -42,7 +42,7 @@ bool call(const std::string& method, const std::vector<std::string>& arguments, 
 }
 
 /// Call of this node's own XML-RPC server, which lists its topics.
-bool callSelf(const std::string& method, Value arguments, Value& result) {
+bool callSelf(const std::string& method, const Value& arguments, Value& result) {
   std::string host;
   std::uint32_t port = 0;
   if (!ros::network::splitURI(ros::XMLRPCManager::instance()->getServerURI(), host, port)) return false;
