@@ -16,16 +16,18 @@ namespace {
 
 /// Logs that the disk becomes full. @return whether the recording must end, so that it can still be closed
 bool isFull(const std::string& path) {
-  constexpr double REPEAT = 60.0;  // [s] of wall time
+  constexpr double REPEAT = 60.0;  // [s] of ROS time
   const smartmill::DiskSpace space = smartmill::diskSpaceOf(path);
-  if (space.isLow() && !space.isFull())
+  if (space.isFull()) {
+    ROS_ERROR("%s: the disk is full (%.0f MB are free): the recording ends here", path.c_str(),
+              1e-6 * space.available);
+    return true;
+  }
+  if (space.isLow())
     ROS_WARN_THROTTLE(REPEAT, "%s: %.1f %% of the disk are free (%.0f MB); the recording ends below %.0f MB",
                       path.c_str(), 100.0 * space.share(), 1e-6 * space.available,
                       1e-6 * smartmill::DiskSpace::RESERVE);
-  if (space.isFull())
-    ROS_ERROR("%s: the disk is full (%.0f MB are free): the recording ends here", path.c_str(),
-              1e-6 * space.available);
-  return space.isFull();
+  return false;
 }
 
 void run(const std::string& path, const std::vector<std::string>& patterns,

@@ -23,7 +23,6 @@ import random
 import re
 import shutil
 import signal
-import socket
 import sqlite3
 import statistics
 import subprocess
@@ -32,7 +31,8 @@ import tempfile
 import threading
 import time
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+from sensor_faults import ROOT, free_port
+
 NODES = ("cnc", "frames", "hammer", "kalman", "loadmeter", "stability")
 STREAMS = ("daq/dynamometer", "spindle/angle")
 # With the words of StreamCheck's table: faults that the stream alone shows. A wrong scale, sign or order does not.
@@ -49,11 +49,6 @@ STEADY = 0.3            # [1] range of the RMS of five blocks in a steady cut
 AFTER = 2.0             # [s] simulated after a fault, in which its consequences end
 COMPENSATED = 1         # ForceBlock.status
 LIMITS = {"X": 0.25, "Y": 0.2, "Z": 0.3}  # [m] travel of launch/models/mill.yaml, to both sides; Z to 0
-
-
-def free_port():
-    with socket.create_server(("127.0.0.1", 0)) as s:
-        return s.getsockname()[1]
 
 
 def slot(number):
@@ -319,7 +314,7 @@ def unmarked(bag, faults):
 
 
 def account_of(bag):
-    """@return lost between publishers and recorder or nodes, lines of the account"""
+    """@return lost between publishers and recorder or nodes, lines of the account, starts of each node"""
     done = subprocess.run(["smartmill", "account", str(bag)], capture_output=True, text=True)
     lines = done.stdout.splitlines()
     lost = [line for line in lines if "lost between publisher" in line]
@@ -327,7 +322,7 @@ def account_of(bag):
         lost.append(done.stderr.strip())
     nodes = [line.split() for line in lines if re.match(r"/smartmill/\w+ +\d+ +\d+ +\d+ +\d+ +\d+$", line)]
     lost += [f"{words[0]} lost {words[3]} messages" for words in nodes if int(words[3]) > 0]
-    return lost, lines
+    return lost, lines, [words[1] for words in nodes]
 
 
 def run(seed, arguments):
@@ -381,7 +376,7 @@ def run(seed, arguments):
         graph.end()
     bag = folder / "run.bag"
     if bag.exists():
-        lost, lines = account_of(bag)
+        lost, lines, _ = account_of(bag)
         result["violations"] += [f"lost: {line}" for line in lost[:3]]
         result["samples"] = sum(int(words[3]) for words in (line.split() for line in lines) if len(words) > 8 and words[0] == "/smartmill/daq/dynamometer")
         wrong, judged = unmarked(bag, stamps)

@@ -12,14 +12,14 @@ import argparse
 import os
 import pathlib
 import random
-import re
 import signal
 import subprocess
 import sys
 import tempfile
 import time
 
-from chaos import Graph, account_of, free_port, percentile
+from chaos import Graph, account_of, percentile
+from sensor_faults import free_port
 
 LONGEST = 30.0  # [s]
 
@@ -81,9 +81,8 @@ def main():
         finally:
             graph.end()
             running.terminate()
-        text = re.sub(r"\x1b\[[0-9;]*m", "", (pathlib.Path(folder) / "log.txt").read_text(errors="replace"))
-        lost, lines = account_of(pathlib.Path(folder) / "run.bag")
-        starts = [line.split()[1] for line in lines if re.match(r"/smartmill/\w+ +\d+ +\d+ +\d+ +\d+ +\d+$", line)]
+        text = (pathlib.Path(folder) / "log.txt").read_text(errors="replace")
+        lost, lines, starts = account_of(pathlib.Path(folder) / "run.bag")
     announced = text.count("new ROS master at ")
     print(f"{len(times)} restarts of the master ({len(before)} registrations of {len({node for _, _, node in before})} nodes), {announced} announcements of nodes, "
           f"starts of the nodes {', '.join(starts)}")

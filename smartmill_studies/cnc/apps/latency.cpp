@@ -2,8 +2,6 @@
 // simultaneous sessions and cost of polling, for the simulated Fanuc or a running LinuxCNC
 // (linuxcnc_machine).
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <atomic>
 #include <chrono>

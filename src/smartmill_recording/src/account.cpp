@@ -52,10 +52,43 @@ std::uint64_t notFinite(const std::vector<double>& values) {
       std::count_if(values.begin(), values.end(), [](double v) { return !std::isfinite(v); }));
 }
 
+// Inputs of the nodes. A node counts from its start, so that the last message of each start counts.
+class NodeAccounts {
+ public:
+  void add(const std::uint8_t* data, std::size_t size) {
+    const plain::NodeHealth& health = health_.decode(data, size);
+    last_[{health.node, health.started}] = health;
+  }
+
+  std::vector<InputAccount> inputs() const {
+    std::map<std::pair<std::string, std::string>, InputAccount> sums;
+    for (const auto& [start, health] : last_) {
+      for (const plain::StreamHealth& input : health.inputs) {
+        InputAccount& sum = sums[{health.node, input.topic}];
+        sum.node = health.node;
+        sum.topic = input.topic;
+        sum.starts = std::max(sum.starts, health.starts);
+        sum.received += input.received;
+        sum.dropped += input.dropped;
+        sum.refused += input.refused;
+        sum.lost += input.lost;
+      }
+    }
+    std::vector<InputAccount> inputs;
+    for (const auto& [key, sum] : sums) inputs.push_back(sum);
+    return inputs;
+  }
+
+ private:
+  Recorded<plain::NodeHealth> health_;
+  std::map<std::pair<std::string, double>, plain::NodeHealth> last_;  // by node and start
+};
+
 // Account of one connection.
 class Stream {
  public:
-  Stream(const RecordedConnection& connection, std::vector<StreamGap>* gaps)
+  /// @param nodes which gets the messages on health
+  Stream(const RecordedConnection& connection, std::vector<StreamGap>* gaps, NodeAccounts* nodes)
       : has_header_(beginsWithHeader(connection.definition)), gaps_(gaps) {
     account_.topic = connection.topic;
     const auto publisher = connection.more.find("callerid");
@@ -65,6 +98,9 @@ class Stream {
       samples_.emplace();
     if (type == Recorded<ForceBlock>::type() && connection.md5sum == Recorded<ForceBlock>::md5())
       forces_.emplace();
+    if (type == Recorded<plain::NodeHealth>::type() &&
+        connection.md5sum == Recorded<plain::NodeHealth>::md5())
+      nodes_ = nodes;
     account_.sampled = samples_ || forces_;
   }
 
@@ -79,6 +115,8 @@ class Stream {
       std::uint64_t not_finite = 0;
       for (const auto& axis : b.force) not_finite += notFinite(axis);
       add({account_.topic, b.stamp, b.sample_rate, b.first_index, b.force[0].size(), not_finite});
+    } else if (nodes_) {
+      nodes_->add(data, size);
     }
   }
 
@@ -135,6 +173,7 @@ class Stream {
 
   bool has_header_;
   std::vector<StreamGap>* gaps_;
+  NodeAccounts* nodes_ = nullptr;  // of a connection on health
   StreamAccount account_;
   std::optional<Recorded<SampleBlock>> samples_;
   std::optional<Recorded<ForceBlock>> forces_;
@@ -142,43 +181,6 @@ class Stream {
   std::vector<IndexRange> ranges_;
   double first_stamp_ = 0.0, last_stamp_ = 0.0;     // [s]
   std::uint64_t first_first_ = 0, last_first_ = 0;  // running indices of these blocks
-};
-
-// Inputs of the nodes. A node counts from its start, so that the last message of each start counts.
-class NodeAccounts {
- public:
-  static bool isHealth(const RecordedConnection& connection) {
-    return connection.type == Recorded<plain::NodeHealth>::type() &&
-           connection.md5sum == Recorded<plain::NodeHealth>::md5();
-  }
-
-  void add(const std::uint8_t* data, std::size_t size) {
-    const plain::NodeHealth& health = health_.decode(data, size);
-    last_[{health.node, health.started}] = health;
-  }
-
-  std::vector<InputAccount> inputs() const {
-    std::map<std::pair<std::string, std::string>, InputAccount> sums;
-    for (const auto& [start, health] : last_) {
-      for (const plain::StreamHealth& input : health.inputs) {
-        InputAccount& sum = sums[{health.node, input.topic}];
-        sum.node = health.node;
-        sum.topic = input.topic;
-        sum.starts = std::max(sum.starts, health.starts);
-        sum.received += input.received;
-        sum.dropped += input.dropped;
-        sum.refused += input.refused;
-        sum.lost += input.lost;
-      }
-    }
-    std::vector<InputAccount> inputs;
-    for (const auto& [key, sum] : sums) inputs.push_back(sum);
-    return inputs;
-  }
-
- private:
-  Recorded<plain::NodeHealth> health_;
-  std::map<std::pair<std::string, double>, plain::NodeHealth> last_;  // by node and start
 };
 
 // The sensor whose running index the forces have: of those recorded the one with most samples of them.
@@ -201,9 +203,10 @@ const Stream* sensorOf(const std::map<std::uint32_t, Stream>& streams, const Str
 
 }  // namespace
 
-bool RecordingAccount::isComplete() const {
-  return gaps.empty() &&
-         std::none_of(inputs.begin(), inputs.end(), [](const InputAccount& input) { return input.lost > 0; });
+std::uint64_t RecordingAccount::lostByNodes() const {
+  std::uint64_t lost = 0;
+  for (const InputAccount& input : inputs) lost += input.lost;
+  return lost;
 }
 
 std::vector<IndexRange> missingRanges(const std::vector<IndexRange>& all,
@@ -235,10 +238,9 @@ RecordingAccount accountOf(const std::string& path, const std::function<void(dou
   for (std::uint64_t count = 0; file->next(&entry); ++count) {
     if (progress && count % REPORTED == 0) progress(file->share());
     const RecordedConnection& connection = file->connection(entry);
-    Stream& stream = streams.try_emplace(entry.connection, connection, &result.gaps).first->second;
+    Stream& stream = streams.try_emplace(entry.connection, connection, &result.gaps, &nodes).first->second;
     try {
       stream.add(file->data(entry), entry.size);
-      if (NodeAccounts::isHealth(connection)) nodes.add(file->data(entry), entry.size);
     } catch (const Error& error) {
       throw Error(path + ": topic " + connection.topic + ": " + error.what());
     }

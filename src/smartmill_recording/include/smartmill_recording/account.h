@@ -53,8 +53,9 @@ struct RecordingAccount {
   std::vector<StreamGap> gaps;         ///< in the order of reception; samples without a force last
   std::vector<InputAccount> inputs;    ///< by node and topic
 
+  std::uint64_t lostByNodes() const;  ///< [1] messages between publishers and nodes
   /// Whether the recording and the nodes have received everything.
-  bool isComplete() const;
+  bool isComplete() const { return gaps.empty() && lostByNodes() == 0; }
 };
 
 /// Counts messages by the sequence numbers of their headers, samples of SampleBlock and ForceBlock by their

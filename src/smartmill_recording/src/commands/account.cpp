@@ -84,10 +84,8 @@ int run(const Arguments& arguments) {
   if (account.gaps.size() > GAPS_PRINTED)
     std::printf("and %zu more gaps\n", account.gaps.size() - GAPS_PRINTED);
   if (!account.isComplete()) {
-    std::uint64_t lost = 0;
-    for (const InputAccount& input : account.inputs) lost += input.lost;
     std::printf("incomplete: %zu gaps; nodes have lost %llu messages\n", account.gaps.size(),
-                static_cast<unsigned long long>(lost));
+                static_cast<unsigned long long>(account.lostByNodes()));
     return INCOMPLETE;
   }
   std::printf("complete: no message and no sample is missing\n");
@@ -100,10 +98,9 @@ Command accountCommand() {
   Command command("account", "accounts for every message and sample of a recording");
   command.description =
       "Counts the messages of a recording by the sequence numbers of their headers, the samples of sensors "
-      "and forces "
-      "by their running index, the samples of the force sensor that have no compensated force, and by the "
-      "topic "
-      "health what each node has received, lost, dropped and refused.";
+      "and forces by their running index, the samples of the force sensor that have no compensated force, "
+      "and "
+      "by the topic health what each node has received, lost, dropped and refused.";
   command.examples = {{"session.bag", "proves that nothing is missing, or lists what is"}};
   command.files = {{"RECORDING", "bag or MCAP file"}};
   command.exits = {{INCOMPLETE, "messages or samples are missing or repeated"}};
