@@ -1,5 +1,6 @@
-// A node that ends while a session needs it stops the session with one line, and motion is disarmed. The node
-// is killed while another one measures, so that no answer of its own is awaited.
+// A node that ends while a session needs it stops the session with one line, and motion is disarmed; the
+// session is resumed without what it had measured. The node is killed while another one measures, so that no
+// answer of its own is awaited.
 
 #include <signal.h>
 
@@ -32,8 +33,8 @@ bool awaitText(const std::string& log, const std::string& text, const std::atomi
   return true;
 }
 
-// Kills the processes whose command line contains both texts. @return their number
-int killAll(const std::string& one, const std::string& other) {
+// Signals the processes whose command line contains both texts. @return their number
+int killAll(const std::string& one, const std::string& other, int signal = SIGKILL) {
   int killed = 0;
   std::error_code failed;
   for (const auto& entry : std::filesystem::directory_iterator("/proc", failed)) {
@@ -41,36 +42,57 @@ int killAll(const std::string& one, const std::string& other) {
     if (name.find_first_not_of("0123456789") != std::string::npos || command.find(one) == std::string::npos ||
         command.find(other) == std::string::npos)
       continue;
-    killed += ::kill(std::stoi(name), SIGKILL) == 0 ? 1 : 0;
+    killed += ::kill(std::stoi(name), signal) == 0 ? 1 : 0;
   }
   return killed;
 }
 
-TEST(Session, StopsWhenANodeThatItNeedsEnds) {
+TEST(Session, StopsWhenANodeThatItNeedsEndsAndIsResumed) {
   const TemporaryFolder folder;
   setenv("ROS_HOSTNAME", "localhost", 1);
-  const std::string home = folder.file("ros_home"), summary = folder.file("session.json"),
-                    log = folder.file("log.txt");
+  const std::string home = folder.file("ros_home"), port = freePort();
   setenv("ROS_HOME", home.c_str(), 1);
-  std::atomic<bool> ended{false};
+  setenv("ROS_MASTER_URI", ("http://localhost:" + port).c_str(), 1);
+  const auto session = [&](const std::string& name, const std::string& more) {
+    run("roslaunch --wait smartmill_launch session.launch model:=" MODEL " params:=" SHORT_SESSION
+        " adaptive:=false summary:=" +
+            folder.file(name + ".json") + more,
+        folder.file(name + ".log"));
+  };
   std::thread graph([&] {
-    run("roslaunch -p " + freePort() + " " SHORT_SESSION " bag:=" + folder.file("session.bag") +
-            " port:=" + freePort() + " summary:=" + summary,
-        log);
+    run("roslaunch -p " + port +
+            " smartmill_launch pipeline.launch pace:=3.0 database:=none port:=" + freePort(),
+        folder.file("graph.log"));
+  });
+  std::atomic<bool> ended{false};
+  std::thread first([&] {
+    session("first", "");
     ended = true;
   });
-  const bool armed = awaitText(log, "ok   arm motion", ended);
+  const bool measured = awaitText(folder.file("first.log"), "ok   FRF of the tool in x", ended);
   // The path of its log distinguishes it from the nodes of other tests.
-  const int killed = killAll("__name:=kalman", home);
+  const int killed = killAll("__name:=loadmeter", home);
+  first.join();
+  session("second", " resume:=true");
+  session("third", " resume:=true");
+  killAll("pipeline.launch", port, SIGINT);
   graph.join();
-  ASSERT_TRUE(armed) << contentOf(log);
+
+  const std::string text = contentOf(folder.file("first.log"));
+  ASSERT_TRUE(measured) << text << contentOf(folder.file("graph.log"));
   ASSERT_EQ(killed, 1);
-  const std::string text = contentOf(log), result = contentOf(summary);
-  EXPECT_THAT(result, HasSubstr("\"completed\": false"));
-  EXPECT_THAT(text, HasSubstr("node /smartmill/kalman has ended"));
+  EXPECT_THAT(contentOf(folder.file("first.json")), HasSubstr("\"completed\": false"));
+  EXPECT_THAT(text, HasSubstr("node /smartmill/loadmeter has ended"));
   EXPECT_THAT(text, HasSubstr("disarm motion"));
   EXPECT_THAT(text, Not(HasSubstr("FAIL disarm")));
   EXPECT_THAT(text, Not(HasSubstr("air cut")));
+
+  const std::string resumed = contentOf(folder.file("second.log")),
+                    summary = contentOf(folder.file("second.json"));
+  EXPECT_THAT(resumed, HasSubstr("FRF of the tool in x: done before"));
+  EXPECT_THAT(summary, HasSubstr("\"completed\": true"));
+  EXPECT_THAT(summary, HasSubstr("\"point\": \"tool_tip\""));
+  EXPECT_THAT(contentOf(folder.file("third.log")), HasSubstr("no interrupted session in this launch"));
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <smartmill_msgs/CoefficientPrior.h>
 #include <smartmill_msgs/FindCoefficients.h>
 #include <smartmill_msgs/ForceCurve.h>
+#include <smartmill_msgs/NodeHealth.h>
 #include <smartmill_msgs/SampleBlock.h>
 #include <smartmill_msgs/SpindleAngle.h>
 #include <smartmill_msgs/WhatIf.h>
@@ -25,6 +26,10 @@ namespace {
 constexpr double FRESH = 0.5;        // [s] since the last message of a sensor
 constexpr double CURVE_WAIT = 5.0;   // [s] after the last cut, for the force curve that contains it
 constexpr double CHART_WAIT = 20.0;  // [s] for the stability limit of another immersion
+
+constexpr const char *LOADMETER = "loadmeter", *KALMAN = "kalman";  // nodes that hold results in memory
+constexpr const char* TEST_PLAN = "test plan";  // the step with which the coefficients are complete
+constexpr const char* PROGRESS = "session";     // key of the kept text
 
 std::string modesText(const smartmill_msgs::ModalModel& model) {
   std::string text;
@@ -66,10 +71,8 @@ Session::Session(ros::NodeHandle nh, const ros::NodeHandle& private_nh, const st
       drive_(nh_, names::IDENTIFY_AXIS_DRIVE, false),
       driver_(nh_, [this] { return stop_.load(); }),
       sensor_(nh_, parameters_.calibration, driver_, sensor_frf_,
-              [this](const std::string& request) { log_.request(request); }) {
-  tests_ = plan_.airCuts();
-  if (!parameters_.plan.isInformative())
-    tests_.insert(tests_.end(), plan_.slots().begin(), plan_.slots().end());
+              [this](const std::string& request) { log_.request(request); }),
+      kept_(nh_, "progress") {
   prior_ = nh_.advertise<smartmill_msgs::CoefficientPrior>(names::COEFFICIENT_PRIOR, 1, true);
   const auto subscribe = [this](const char* topic, auto example, auto use) {
     using Message = decltype(example);
@@ -108,6 +111,12 @@ Session::Session(ros::NodeHandle nh, const ros::NodeHandle& private_nh, const st
         if (!m.valid) return;
         windows_[m.condition].push_back({m.chatter != 0, m.frequency, m.severity, toSec(m.header.stamp)});
       })));
+  subscribers_.push_back(nh_.subscribe<smartmill_msgs::NodeHealth>(
+      names::NODE_HEALTH, 100,
+      boost::function<void(const smartmill_msgs::NodeHealth&)>([this](const auto& m) {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        starts_[m.node] = m.starts;
+      })));
   spinner_ = std::make_unique<ros::AsyncSpinner>(2);
   spinner_->start();
 }
@@ -123,6 +132,7 @@ int Session::run() {
   try {
     runSteps();
     log_.summary.completed = true;
+    kept_.forget();
     code = 0;
   } catch (const Interrupted&) {
     log_.record("stop", "interrupted",
@@ -147,32 +157,40 @@ int Session::run() {
 void Session::runSteps() {
   using smartmill_msgs::MeasureFrfAction;
   step("connect", [&] { return waitReady(); });
+  step(parameters_.resume ? "resume" : "begin", [&] { return beginProgress(); });
   step("arm motion", [&] { return arm(true); });
   for (char direction : parameters_.tool_directions) {
-    step(std::string("FRF of the tool in ") + direction, [&] {
+    action(std::string("FRF of the tool in ") + direction, "", [&] {
       return measure(tool_frf_, names::MEASURE_TOOL_FRF, POINT_TOOL_TIP, {direction}, parameters_.hits,
                      parameters_.modes);
     });
   }
   calibrateSensor();
-  step("discard earlier tests", [&] { return identify(true); });
-  step("stored coefficients", [&] { return useStored(); });
+  const bool identified = doneBefore(TEST_PLAN);
+  if (!identified) {
+    action("discard earlier tests", LOADMETER, [&] { return identify(true); });
+    step("stored coefficients", [&] { return useStored(); });
+  }
   moveInAir();
-  identifyFromTests();
+  if (!identified) identifyFromTests();
   tuneFilter();  // chosen test cuts have moved the lanes before
   if (parameters_.verify) {
     step("stability chart", [&] { return waitChart(); });
     step("points to verify", [&] { return choosePoints(); });
     const double feed = used_chart_.feed_per_tooth;
-    step("cut at the recommended point",
-         [&] { return verify("stable", plan_.stable(stable_, feed), CutVerdict::Kind::stable); });
-    step("cut at the unstable point",
-         [&] { return verify("unstable", plan_.unstable(unstable_, feed), CutVerdict::Kind::chatter); });
+    action(
+        "cut at the recommended point", "",
+        [&] { return verify("stable", plan_.stable(stable_, feed), CutVerdict::Kind::stable); }, true);
+    action(
+        "cut at the unstable point", "",
+        [&] { return verify("unstable", plan_.unstable(unstable_, feed), CutVerdict::Kind::chatter); }, true);
     if (const auto cut = plan_.controlled(unstable_, feed))
-      step("cut at the unstable point under chatter control", [&] { return cutUnderControl(*cut); });
+      action(
+          "cut at the unstable point under chatter control", "", [&] { return cutUnderControl(*cut); }, true);
   }
   if (plan_.resonance()) {
-    step("cut at the sensor's resonance", [&] { return runCut(*plan_.resonance()); });
+    action(
+        "cut at the sensor's resonance", "", [&] { return runCut(*plan_.resonance()); }, true);
   }
   step("disarm motion", [&] {
     waitVerdict();
@@ -185,11 +203,13 @@ void Session::calibrateSensor() {
   const double began = log_.elapsed();
   const ForceSensorKind kind = parameters_.calibration.kind();
   for (const CalibrationStage& stage : calibrationPlan(parameters_.calibration))
-    step(stage.name, [&] { return sensor_.run(stage, parameters_.frf_timeout); });
+    action(stage.name, KALMAN, [&] { return sensor_.run(stage, parameters_.frf_timeout); });
   // The taps on a plate are those of its calibration.
   if (kind != ForceSensorKind::plate) {
     for (char direction : parameters_.sensor_directions) {
-      step(std::string("taps on the force sensor in ") + direction, [&] {
+      // With a sensor in the spindle they are part of its calibration, which ends with the node.
+      const char* holder = kind == ForceSensorKind::spindle ? KALMAN : "";
+      action(std::string("taps on the force sensor in ") + direction, holder, [&] {
         return measure(sensor_frf_, names::MEASURE_SENSOR_FRF, POINT_FORCE_SENSOR, {direction},
                        parameters_.sensor_hits, parameters_.sensor_modes);
       });
@@ -199,7 +219,7 @@ void Session::calibrateSensor() {
     CalibrationStage dynamics{"cross-talk of the spindle sensor", {CalibrationStep(), CalibrationStep()}};
     dynamics.steps.front().kind = CalibrationStep::Kind::fit;
     dynamics.steps.back().kind = CalibrationStep::Kind::verify;  // of what is in use from now on
-    step(dynamics.name, [&] { return sensor_.run(dynamics, parameters_.frf_timeout); });
+    action(dynamics.name, KALMAN, [&] { return sensor_.run(dynamics, parameters_.frf_timeout); });
   }
   sensor_.requireCalibrated();
   const auto verdict = [this] {
@@ -213,11 +233,13 @@ void Session::calibrateSensor() {
 
 void Session::tuneFilter() {
   if (plan_.tuning().empty()) return;
-  for (const PlannedCut& cut : plan_.tuning())
-    step("cut for the tuning " + cut.condition.name, [&] { return runCut(cut); });
+  for (const PlannedCut& cut : plan_.tuning()) {
+    action(
+        "cut for the tuning " + cut.condition.name, KALMAN, [&] { return runCut(cut); }, cut.feed > 0.0);
+  }
   CalibrationStage tuning{"process noise of the force filter", {CalibrationStep()}};
   tuning.steps.front().kind = CalibrationStep::Kind::fit;
-  step(tuning.name, [&] { return sensor_.run(tuning, parameters_.frf_timeout); });
+  action(tuning.name, KALMAN, [&] { return sensor_.run(tuning, parameters_.frf_timeout); });
 }
 
 // With a record of Servo Guide the moves identify the drive as well.
@@ -231,9 +253,9 @@ void Session::moveInAir() {
     goal.reset = reset;
     return driver_.call(drive_, names::IDENTIFY_AXIS_DRIVE, goal, parameters_.identify_timeout).message;
   };
-  if (has_record) step("discard earlier moves", [&] { return identifyDrive(true); });
+  if (has_record) action("discard earlier moves", LOADMETER, [&] { return identifyDrive(true); });
   for (const PlannedCut& air : plan_.airMoves())
-    step("move in air " + air.condition.name, [&] { return runCut(air); });
+    action("move in air " + air.condition.name, LOADMETER, [&] { return runCut(air); });
   if (has_record) step("drive of the x axis", [&] { return identifyDrive(false); });
 }
 
@@ -246,6 +268,79 @@ void Session::step(const std::string& name, const std::function<std::string()>& 
   } catch (const Error& error) {
     throw Error(name + ": " + error.what());
   }
+}
+
+// ---------------------------------------------------------------------------------------------- resuming
+
+std::uint32_t Session::startsOf(const std::string& node) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const auto found = starts_.find(nh_.resolveName(node));
+  return found == starts_.end() ? 0 : found->second;
+}
+
+void Session::keepProgress() {
+  progress_.summary = log_.summary.text();
+  kept_.keep(PROGRESS, progress_.text());
+}
+
+bool Session::doneBefore(const std::string& name) {
+  const std::optional<SessionProgress::Action> before = progress_.take(name);
+  if (before) log_.record("ok", name, "done before: " + before->detail);
+  return before.has_value();
+}
+
+void Session::action(const std::string& name, const std::string& holder,
+                     const std::function<std::string()>& work, bool lane) {
+  driver_.checkStop();
+  if (doneBefore(name)) return;
+  step(name, [&] {
+    progress_.begin(name, holder, holder.empty() ? 0 : startsOf(holder), lane);
+    keepProgress();
+    const std::string detail = work();
+    progress_.end(detail);
+    keepProgress();
+    return detail;
+  });
+}
+
+std::string Session::beginProgress() {
+  const std::map<std::string, std::string> before = kept_.all();
+  const std::string subject =
+      parameters_.plan.tool + " in " + plan_.material() + ", force sensor " + parameters_.calibration.sensor;
+  std::string text = subject;
+  if (parameters_.resume) {
+    if (before.count(PROGRESS) == 0)
+      throw Error("no interrupted session in this launch, expected one; start without resume");
+    progress_ = SessionProgress::of(before.at(PROGRESS));
+    if (progress_.subject != subject)
+      throw Error("the interrupted session is of " + progress_.subject + ", this one of " + subject);
+    text = continueProgress(text);
+  }
+  progress_.subject = subject;
+  kept_.forget();
+  tests_ = plan_.airCuts();
+  if (!parameters_.plan.isInformative())
+    tests_.insert(tests_.end(), plan_.slots().begin(), plan_.slots().end());
+  return text;
+}
+
+// Cuts that were interrupted, or whose results a node has lost, are repeated in other lanes.
+std::string Session::continueProgress(const std::string& text) {
+  std::string lost;
+  for (const std::string& holder : progress_.holders()) {
+    const std::size_t lanes = progress_.lostLanes();
+    progress_.restarted(holder, startsOf(holder));
+    if (progress_.lostLanes() > lanes) lost += "; " + holder + " was restarted, its tests are repeated";
+  }
+  if (parameters_.plan.isInformative() && progress_.cutLanes())
+    throw Error(
+        "with test_cuts informative a session is continued only before its first cut; start without resume");
+  log_.summary.before = progress_.summary;
+  PlanParameters cuts = parameters_.cuts();
+  cuts.lost_lanes = progress_.lostLanes();
+  plan_ = SessionPlan(model_, cuts);
+  return text + lost +
+         formatted("; %zu lane%s of the stock lost", cuts.lost_lanes, cuts.lost_lanes == 1 ? "" : "s");
 }
 
 // ---------------------------------------------------------------------------------------------- waiting
@@ -270,6 +365,9 @@ std::string Session::missing() {
   server(identify_.isServerConnected(), names::IDENTIFY_COEFFICIENTS);
   if (chart_subscriber_.getNumPublishers() == 0) add(std::string("a publisher of ") + names::STABILITY_CHART);
   if (const std::string what = sensor_.missing(); !what.empty()) add(what);
+  for (const char* node : {LOADMETER, KALMAN}) {
+    if (startsOf(node) == 0) add(std::string("health of ") + nh_.resolveName(node));
+  }
   const std::lock_guard<std::mutex> lock(mutex_);
   for (const auto& [topic, time] : last_received_) {
     if ((ros::WallTime::now() - time).toSec() > FRESH) add("data on " + topic);
@@ -311,8 +409,8 @@ void Session::requireNodes() {
   const auto has = [](const auto& client) { return [&client] { return client.isServerConnected(); }; };
   driver_.require({{"cnc", [this] { return driver_.reachable(); }},
                    {"hammer", has(tool_frf_)},
-                   {"kalman", has(sensor_frf_)},
-                   {"loadmeter", has(identify_)},
+                   {KALMAN, has(sensor_frf_)},
+                   {LOADMETER, has(identify_)},
                    {"stability", [this] { return chart_subscriber_.getNumPublishers() > 0; }}});
 }
 
@@ -467,11 +565,11 @@ void Session::runTests(const std::set<std::size_t>& selected) {
     const Engagement& engagement = test.condition.engagement;
     const bool is_cut = test.condition.kind == CuttingCondition::Kind::cut;
     const bool is_slot = engagement.exit - engagement.entry > 0.75 * units::PI;
-    step((!is_cut   ? "air cut "
-          : is_slot ? "slot test "
-                    : "half immersion test ") +
-             test.condition.name,
-         [&] { return runCut(test); });
+    action((!is_cut   ? "air cut "
+            : is_slot ? "slot test "
+                      : "half immersion test ") +
+               test.condition.name,
+           LOADMETER, [&] { return runCut(test); }, is_cut);
     made_.insert(i);
     ++plan.made;
     plan.made_cuts += is_cut ? 1 : 0;
@@ -514,7 +612,7 @@ void Session::identifyFromTests() {
     runTests(needed_);
     step("cutting coefficients from all tests", [&] { return identifyAndCompare(); });
   }
-  step("test plan", [&] { return plan.text(); });
+  action(TEST_PLAN, "", [&] { return plan.text(); });
 }
 
 // The detector reports the end of a condition after it has processed all data before it.

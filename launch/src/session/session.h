@@ -24,6 +24,8 @@
 #include "session_parameters.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_launch/session/session_plan.h"
+#include "smartmill_launch/session/session_progress.h"
+#include "smartmill_ros/kept_messages.h"
 
 namespace smartmill::session {
 
@@ -41,6 +43,16 @@ class Session {
  private:
   void runSteps();
   void step(const std::string& name, const std::function<std::string()>& work);
+  /// A step that a resumed session does not repeat. @param holder node whose memory contains the result;
+  /// empty: every node restores it. @param lane it cuts a lane of the stock
+  void action(const std::string& name, const std::string& holder, const std::function<std::string()>& work,
+              bool lane = false);
+  /// Takes the result of the interrupted session. @return false: there is none
+  bool doneBefore(const std::string& name);
+  void keepProgress();
+  std::string beginProgress();
+  std::string continueProgress(const std::string& text);
+  std::uint32_t startsOf(const std::string& node) const;
   void pause(double seconds) const;
   bool waitUntil(const std::function<bool()>& ready, double seconds) const;
 
@@ -93,6 +105,7 @@ class Session {
   std::map<std::string, std::vector<ChatterWindow>> windows_;  // by condition
   bool under_control_ = false;    // the cut that the chatter control is to stabilise is running
   std::vector<CutState> states_;  // of the controller in it, in motion
+  std::map<std::string, std::uint32_t> starts_;          // of the nodes in this launch, by full name
   std::optional<smartmill_msgs::ChatterState> verdict_;  // the latest
   ros::Time curve_stamp_;                                // end of the last cut that the force curve contains
 
@@ -101,6 +114,9 @@ class Session {
   std::set<std::size_t> made_;     // of these
   bool has_prior_ = false;         // the coefficients of the database are used
   ros::Publisher prior_;
+
+  KeptTexts kept_;
+  SessionProgress progress_;
 
   ros::Time cut_from_;
   ros::Time coefficients_stamp_;

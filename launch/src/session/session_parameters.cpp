@@ -44,6 +44,9 @@ void SessionParameters::declare(ParameterTable& table) {
   table.section("Start and time limits.");
   table.text("recorder", recorder,
              "recorder node; the session starts after the node has subscribed; empty: none");
+  table.flag("resume", resume,
+             "continue the interrupted session of this launch: measurements and cuts that are done are not "
+             "repeated");
   table.number("start_delay", start_delay, "s", Range::closed(0.0, 60.0),
                "delay of the first goal, in which other subscribers connect");
   table.number("ready_timeout", ready_timeout, "s", waiting_time,

@@ -18,6 +18,7 @@ struct SessionParameters {
   bool verify = true;
   bool use_stored = true;
   std::string recorder;
+  bool resume = false;
   double start_delay = 2.0;
   double ready_timeout = 30.0;
   double frf_timeout = 300.0;

@@ -29,7 +29,9 @@ SessionPlan::SessionPlan(const MachineModel& model, const PlanParameters& parame
   const std::size_t tests = informative ? FEWEST_CUTS : parameters_.slot_feeds.size();
   const std::size_t needed = tests + verifyingCuts();
   planner_.requireLanes(
-      needed, std::to_string(tests) + " slot tests, " + std::to_string(needed - tests) + " verifying cuts");
+      parameters_.lost_lanes + needed,
+      std::to_string(tests) + " slot tests, " + std::to_string(needed - tests) + " verifying cuts" +
+          (parameters_.lost_lanes > 0 ? ", " + std::to_string(parameters_.lost_lanes) + " cut before" : ""));
   for (double speed : parameters_.air_speeds) air_cuts_.push_back(planner_.air(speed, parameters_.air_time));
   for (double feed : parameters_.air_feeds)
     air_moves_.push_back(
@@ -39,7 +41,7 @@ SessionPlan::SessionPlan(const MachineModel& model, const PlanParameters& parame
   if (informative) {
     addCandidates();
   } else {
-    verifying_lane_ = slots_.size();
+    verifying_lane_ = parameters_.lost_lanes + slots_.size();
   }
   planResonance();
   planTuning();
@@ -60,7 +62,7 @@ std::size_t SessionPlan::tuningLane() const {
 SlotRequest SessionPlan::slotRequest(std::size_t feed) const {
   SlotRequest request;
   request.name = "slot_" + std::to_string(feed + 1);
-  request.lane = feed;
+  request.lane = parameters_.lost_lanes + feed;
   request.speed = parameters_.slot_speed;
   request.depth = parameters_.slot_depth;
   request.feed_per_tooth = parameters_.slot_feeds[feed];

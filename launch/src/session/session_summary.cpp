@@ -1,5 +1,6 @@
 #include "session_summary.h"
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 
@@ -71,6 +72,20 @@ Json planOf(const SessionSummary::TestPlan& plan) {
   return json;
 }
 
+/// Adds the elements of the interrupted session whose keys have no new element.
+void addEarlier(const Json& before, const char* list, const std::vector<const char*>& keys, Json* json) {
+  Json all = Json::array();
+  for (const Json& old : before.at(list)) {
+    const auto same = [&](const Json& now) {
+      return std::all_of(keys.begin(), keys.end(), [&](const char* k) { return now.at(k) == old.at(k); });
+    };
+    const Json& now = json->at(list);
+    if (std::none_of(now.begin(), now.end(), same)) all.push_back(old);
+  }
+  for (const Json& now : json->at(list)) all.push_back(now);
+  (*json)[list] = all;
+}
+
 }  // namespace
 
 std::string SessionSummary::TestPlan::text() const {
@@ -83,7 +98,7 @@ std::string SessionSummary::TestPlan::text() const {
                    made - made_cuts, planned - planned_cuts, made_time / 60.0, planned_time / 60.0);
 }
 
-void SessionSummary::write(const std::string& file) const {
+std::string SessionSummary::text() const {
   Json json;
   json["completed"] = completed;
   json["tool"] = tool;
@@ -134,8 +149,22 @@ void SessionSummary::write(const std::string& file) const {
                             {"verified", sensor->verified != 0},
                             {"calibration_s", calibration_time}};
   }
+  if (!before.empty()) {
+    const Json earlier = Json::parse(before);
+    addEarlier(earlier, "modes", {"point", "direction"}, &json);
+    addEarlier(earlier, "verified_cuts", {"chart_says"}, &json);
+    if (!control && earlier.contains("controlled_cut")) json["controlled_cut"] = earlier["controlled_cut"];
+    if (coefficients.empty()) {
+      json["coefficients"] = earlier.at("coefficients");
+      json["test_plan"] = earlier.at("test_plan");
+    }
+  }
+  return json.dump(2);
+}
+
+void SessionSummary::write(const std::string& file) const {
   std::ofstream out(file);
-  out << json.dump(2) << "\n";
+  out << text() << "\n";
   out.close();
   if (!out) throw Error(file + ": cannot be written");
 }

@@ -55,7 +55,11 @@ struct SessionSummary {
   std::optional<smartmill_msgs::ForceSensorState> sensor;
   double calibration_time = 0.0;  ///< [s] of the force sensor, taps included
   TestPlan test_plan;
+  /// Summary of the interrupted session that this one continues, as JSON: results that are not measured again
+  /// are taken from it; empty: none.
+  std::string before;
 
+  std::string text() const;  ///< JSON
   /// @throws Error when the file cannot be written.
   void write(const std::string& file) const;
 };

@@ -39,6 +39,8 @@ struct PlanParameters : PathParameters {
   std::vector<double> tuning_speeds;  // those of the calibration with sensor spindle, else none
   double tuning_time = 1.5;
 
+  std::size_t lost_lanes = 0;  ///< lanes at the side of the first that are cut already; no parameter
+
   bool isInformative() const { return test_cuts == "informative"; }
   void declare(ParameterTable& table);
   /// @throws Error naming key and value.
