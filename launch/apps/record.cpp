@@ -1,6 +1,7 @@
 // rosrun smartmill_launch record -o FILE PATTERN...
 
 #include <atomic>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -30,16 +31,16 @@ bool isFull(const std::string& path) {
   return false;
 }
 
-void run(const std::string& path, const std::vector<std::string>& patterns,
+void run(const std::string& path, const std::vector<std::string>& patterns, std::uint64_t split,
          const std::atomic<bool>& shutdown) {
   constexpr double SUBSCRIBE_PERIOD = 0.5, STEP = 0.1;  // [s] of wall time
   const ros::NodeHandle nh;
-  smartmill::session::BagRecorder recorder(nh, path, patterns);
+  smartmill::session::BagRecorder recorder(nh, path, patterns, split);
   const smartmill::MasterWatch master(nh);
   ros::WallTime subscribed;
   while (!shutdown && ros::ok()) {
     if ((ros::WallTime::now() - subscribed).toSec() > SUBSCRIBE_PERIOD) {
-      if (isFull(path)) return recorder.close();
+      if (isFull(recorder.file())) return recorder.close();
       recorder.subscribe();
       subscribed = ros::WallTime::now();
     }
@@ -56,10 +57,16 @@ int main(int argc, char** argv) {
   const std::atomic<bool>& shutdown = smartmill::session::catchShutdownRequest();
   std::string path;
   std::vector<std::string> patterns;
+  double split = 2048.0;
   smartmill::CommandLine line(
       "Records topics to a bag or an MCAP file without losing messages on a busy computer; Ctrl-C ends the "
       "recording.");
   line.option("-o,--out", path, "file to write, *.bag or *.mcap").required();
+  line.option("--split-mb", split,
+              "size at which the recording continues in NAME_1.bag, NAME_2.bag, ... [MB]")
+      .within(1.0, 1e9)
+      .showDefault();
   line.option("patterns", patterns, "regular expressions that match full topic names").required();
-  return smartmill::runProgram(line, argc, argv, [&] { run(path, patterns, shutdown); });
+  return smartmill::runProgram(
+      line, argc, argv, [&] { run(path, patterns, static_cast<std::uint64_t>(1e6 * split), shutdown); });
 }

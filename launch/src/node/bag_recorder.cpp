@@ -1,6 +1,7 @@
 #include "node/bag_recorder.h"
 
 #include <algorithm>
+#include <filesystem>
 
 #include "smartmill_ros/follower.h"
 
@@ -14,8 +15,12 @@ constexpr double QUIET = 0.3,
 }  // namespace
 
 BagRecorder::BagRecorder(const ros::NodeHandle& nh, const std::string& path,
-                         const std::vector<std::string>& patterns)
-    : nh_(nh), writer_(createRecording(path, RecordingCompression::lz4)) {
+                         const std::vector<std::string>& patterns, std::uint64_t split)
+    : nh_(nh),
+      path_(path),
+      file_(path),
+      split_(split),
+      writer_(createRecording(path, RecordingCompression::lz4)) {
   nh_.setCallbackQueue(&queue_);
   for (const std::string& pattern : patterns) patterns_.emplace_back(pattern);
   ros::NodeHandle private_nh("~");
@@ -50,11 +55,12 @@ void BagRecorder::finish() {
   close();
 }
 
-std::uint32_t BagRecorder::connectionOf(const std::string& topic, Event event) {
-  const auto [connection_id, is_new] = connections_.try_emplace({topic, event.getPublisherName()}, 0);
-  if (!is_new) return connection_id->second;
+BagRecorder::Connection& BagRecorder::connectionOf(const std::string& topic, Event event) {
+  const auto [found, is_new] = connections_.try_emplace({topic, event.getPublisherName()});
+  Connection& known = found->second;
+  if (!is_new) return known;
   const topic_tools::ShapeShifter& message = *event.getMessage();
-  RecordedConnection connection;
+  RecordedConnection& connection = known.header;
   connection.topic = topic;
   connection.type = message.getDataType();
   connection.md5sum = message.getMD5Sum();
@@ -63,7 +69,22 @@ std::uint32_t BagRecorder::connectionOf(const std::string& topic, Event event) {
   const ros::M_string& header = event.getConnectionHeader();
   if (const auto latching = header.find("latching"); latching != header.end())
     connection.more["latching"] = latching->second;
-  return connection_id->second = writer_->connect(connection);
+  known.latching = connection.more.count("latching") != 0 && connection.more["latching"] == "1";
+  known.number = writer_->connect(connection);
+  return known;
+}
+
+void BagRecorder::beginPart(std::uint64_t time) {
+  writer_->close();
+  const std::filesystem::path path(path_);
+  file_ =
+      (path.parent_path() / path.stem()).string() + "_" + std::to_string(++part_) + path.extension().string();
+  writer_ = createRecording(file_, RecordingCompression::lz4);
+  for (auto& [publisher, connection] : connections_) {
+    connection.number = writer_->connect(connection.header);
+    if (!connection.last.empty())
+      writer_->write(connection.number, time, connection.last.data(), connection.last.size());
+  }
 }
 
 void BagRecorder::write(const std::string& topic, Event event) {
@@ -72,7 +93,10 @@ void BagRecorder::write(const std::string& topic, Event event) {
   bytes_.resize(message.size());
   ros::serialization::OStream stream(bytes_.data(), message.size());
   message.write(stream);
-  writer_->write(connectionOf(topic, event), time.toNSec(), bytes_.data(), bytes_.size());
+  if (writer_->size() >= split_) beginPart(time.toNSec());
+  Connection& connection = connectionOf(topic, event);
+  writer_->write(connection.number, time.toNSec(), bytes_.data(), bytes_.size());
+  if (connection.latching) connection.last = bytes_;
   ++written_;
   ++topics_[topic].messages;
 }

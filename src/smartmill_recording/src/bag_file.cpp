@@ -1,6 +1,7 @@
 #include "bag_file.h"
 
 #include <algorithm>
+#include <limits>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -68,23 +69,29 @@ struct Record {
 
 class BagFile : public ChunkedFile {
  public:
-  BagFile(RecordingBytes bytes, std::string name);
+  BagFile(RecordingBytes bytes, std::string name, RecordingEnd end);
 
  private:
   Record record(std::uint64_t at) const;
   Header headerOf(const std::uint8_t* data, std::size_t size) const;
-  void begin(std::uint64_t* at) const;
+  bool isWhole(std::uint64_t at) const;
+  bool begin(std::uint64_t* at) const;
   void addConnection(const Header& header, const std::uint8_t* data, std::size_t size);
   void addChunk(const Header& header, const Record& record);
   void index(std::uint32_t number, const std::vector<std::uint8_t>& bytes) override;
   void addMessageOf(const Header& header, Entry entry);
 };
 
-BagFile::BagFile(RecordingBytes bytes, std::string name) : ChunkedFile(std::move(bytes), std::move(name)) {
+BagFile::BagFile(RecordingBytes bytes, std::string name, RecordingEnd end)
+    : ChunkedFile(std::move(bytes), std::move(name), end) {
   std::uint64_t at = 0;
-  begin(&at);
+  const bool has_index = begin(&at);
   std::map<std::uint64_t, std::uint64_t> stated;  // [ns] first time of each chunk by its position
   while (at < bytes_.size) {
+    if (!has_index && !isWhole(at)) {
+      left_out_ = bytes_.size - at;
+      break;
+    }
     const Record found = record(at);
     const Header header = headerOf(found.header.data(), found.header.size());
     if (header.op() == BagOp::chunk) {
@@ -106,19 +113,39 @@ BagFile::BagFile(RecordingBytes bytes, std::string name) : ChunkedFile(std::move
     const auto first = stated.find(chunk.begin);
     chunk.first = first == stated.end() ? 0 : first->second;
   }
+  if (!has_index) {
+    for (Chunk& chunk : chunks_) chunk.first = std::numeric_limits<std::uint64_t>::max();
+    survey();
+  }
   finishChunks();
 }
 
 /// The line that every bag begins with, and its first record. @param at becomes the position behind them.
-void BagFile::begin(std::uint64_t* at) const {
+/// @return whether the bag has an index
+bool BagFile::begin(std::uint64_t* at) const {
   const Record first = record(VERSION_SIZE);
   const Header header = headerOf(first.header.data(), first.header.size());
   const std::optional<std::uint32_t> low = header.number("index_pos"), high = header.number("index_pos", 1);
   if (header.op() != BagOp::bag || !low || !high) fail("is damaged: its first record is not a bag header");
   if (!header.word("encryptor").empty()) fail("is encrypted");
-  if (*low == 0 && *high == 0)
-    fail("the bag has no index: its recording was cut off (rosbag reindex repairs it)");
+  const bool has_index = *low != 0 || *high != 0;
+  if (!has_index && end_ == RecordingEnd::index)
+    fail("the bag has no index: its recording was cut off (smartmill convert copies what is complete)");
   *at = first.end;
+  return has_index;
+}
+
+/// Whether a whole record begins there.
+bool BagFile::isWhole(std::uint64_t at) const {
+  for (int part = 0; part < 2; ++part) {  // header and data
+    std::uint8_t bytes[LENGTH];
+    if (bytes_.size - at < LENGTH) return false;
+    copy(at, bytes, LENGTH);
+    const auto size = numberAt<std::uint32_t>(bytes);
+    if (size > bytes_.size - at - LENGTH) return false;
+    at += LENGTH + size;
+  }
+  return true;
 }
 
 Record BagFile::record(std::uint64_t at) const {
@@ -225,13 +252,17 @@ void BagFile::addMessageOf(const Header& header, Entry entry) {
     fail("is damaged: a message without connection or time");
   entry.connection = *connection;
   entry.time = nanoseconds(*seconds, *rest);
-  addMessage(entry);
+  if (surveying_) {
+    chunks_[entry.chunk].first = std::min(chunks_[entry.chunk].first, entry.time);
+  } else {
+    addMessage(entry);
+  }
 }
 
 }  // namespace
 
-std::unique_ptr<RecordingFile> openBag(RecordingBytes bytes, const std::string& name) {
-  return std::make_unique<BagFile>(std::move(bytes), name);
+std::unique_ptr<RecordingFile> openBag(RecordingBytes bytes, const std::string& name, RecordingEnd end) {
+  return std::make_unique<BagFile>(std::move(bytes), name, end);
 }
 
 }  // namespace smartmill

@@ -21,6 +21,6 @@ enum class BagOp : std::uint8_t {
 };
 
 /// A bag of format 2.0 (wiki.ros.org/Bags/Format/2.0). @throws Error as openRecording()
-std::unique_ptr<RecordingFile> openBag(RecordingBytes bytes, const std::string& name);
+std::unique_ptr<RecordingFile> openBag(RecordingBytes bytes, const std::string& name, RecordingEnd end);
 
 }  // namespace smartmill

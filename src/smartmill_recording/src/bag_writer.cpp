@@ -69,6 +69,7 @@ class BagWriter : public RecordingWriter {
              std::size_t size) override;
   using RecordingWriter::write;
   void close() override;
+  std::uint64_t size() const override { return file_.position(); }
 
  private:
   struct Place {
@@ -159,6 +160,7 @@ void BagWriter::flush() {
   infos_.push_back(std::exchange(info_, {}));
   places_.clear();
   chunk_.clear();
+  file_.flush();  // what is complete outlives this program
 }
 
 void BagWriter::close() {

@@ -60,6 +60,12 @@ void ChunkedFile::finishChunks() {
   window_.clear();
 }
 
+void ChunkedFile::survey() {
+  surveying_ = true;
+  for (std::uint32_t i = 0; i < chunks_.size(); ++i) index(i, load(i));
+  surveying_ = false;
+}
+
 bool ChunkedFile::next(Entry* entry) {
   if (spent_) release(chunks_[*spent_]);
   spent_.reset();

@@ -26,6 +26,7 @@ class ChunkedFile : public RecordingFile {
   bool next(Entry* entry) override;
   const std::uint8_t* data(const Entry& entry) override;
   double share() const override;
+  std::uint64_t leftOut() const override { return left_out_; }
 
  protected:
   struct Chunk {
@@ -43,7 +44,8 @@ class ChunkedFile : public RecordingFile {
     std::size_t waiting = 0;  // messages that next() has found and not returned yet
   };
 
-  ChunkedFile(RecordingBytes bytes, std::string name) : bytes_(std::move(bytes)), name_(std::move(name)) {}
+  ChunkedFile(RecordingBytes bytes, std::string name, RecordingEnd end)
+      : bytes_(std::move(bytes)), name_(std::move(name)), end_(end) {}
 
   /// One line that names the file. @throws Error
   [[noreturn]] void fail(const std::string& what) const;
@@ -53,6 +55,8 @@ class ChunkedFile : public RecordingFile {
   std::string textAt(std::uint64_t at, std::size_t count) const;
   /// After the last chunk was added.
   void finishChunks();
+  /// Calls index() for all chunks before the first next(), when the file does not state what is in them.
+  void survey();
   /// Calls addMessage() for each message of an unpacked chunk. @throws Error
   virtual void index(std::uint32_t number, const std::vector<std::uint8_t>& bytes) = 0;
   /// After the last chunk was read. @throws Error
@@ -63,6 +67,9 @@ class ChunkedFile : public RecordingFile {
 
   RecordingBytes bytes_;
   std::string name_;
+  RecordingEnd end_;
+  std::uint64_t left_out_ = 0;  // [byte]
+  bool surveying_ = false;      // connections are gathered, messages not yet
   std::vector<Chunk> chunks_;
   std::map<std::uint32_t, RecordedConnection> connections_;
 

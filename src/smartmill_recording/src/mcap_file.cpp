@@ -50,7 +50,7 @@ struct Record {
 
 class McapFile : public ChunkedFile {
  public:
-  McapFile(RecordingBytes bytes, std::string name);
+  McapFile(RecordingBytes bytes, std::string name, RecordingEnd end);
 
  private:
   /// Fields of one record, one after the other.
@@ -94,6 +94,7 @@ class McapFile : public ChunkedFile {
   };
 
   Record record(std::uint64_t at) const;
+  bool isWhole(std::uint64_t at) const;
   void scan();
   void checkFooter(const Record& footer, std::uint64_t summary) const;
   std::uint32_t checksumOf(std::uint64_t begin, std::uint64_t end) const;
@@ -108,22 +109,21 @@ class McapFile : public ChunkedFile {
   std::map<std::uint16_t, Channel> channels_;
   std::optional<Statistics> statistics_;
   std::uint64_t loose_end_ = 0;  // behind the last message outside a chunk
-  bool declaring_ = true;        // channels are gathered, messages not yet
+  bool connected_ = false;       // all channels that were found before the first message
   bool any_loose_ = false;
 };
 
-McapFile::McapFile(RecordingBytes bytes, std::string name) : ChunkedFile(std::move(bytes), std::move(name)) {
+McapFile::McapFile(RecordingBytes bytes, std::string name, RecordingEnd end)
+    : ChunkedFile(std::move(bytes), std::move(name), end) {
   scan();
   finishChunks();
   if (statistics_ && statistics_->chunks != 0 && chunks_.empty())
     fail("is damaged: its statistics state " + std::to_string(statistics_->chunks) +
          " chunks, none is there");
   // Without a copy of the channels in the summary they are in the chunks alone.
-  if (!statistics_ || statistics_->channels != channels_.size()) {
-    for (std::uint32_t i = 0; i < chunks_.size(); ++i) index(i, load(i));
-  }
+  if (!statistics_ || statistics_->channels != channels_.size()) survey();
   for (const auto& [number, channel] : channels_) connect(number, channel);
-  declaring_ = false;
+  connected_ = true;
   if (chunks_.empty()) checkEnd(0);
 }
 
@@ -140,13 +140,26 @@ Record McapFile::record(std::uint64_t at) const {
   return found;
 }
 
+/// Whether a whole record begins there.
+bool McapFile::isWhole(std::uint64_t at) const {
+  if (bytes_.size - at < MCAP_RECORD_HEAD) return false;
+  std::uint8_t head[MCAP_RECORD_HEAD];
+  copy(at, head, sizeof head);
+  return numberAt<std::uint64_t>(head + 1) <= bytes_.size - at - MCAP_RECORD_HEAD;
+}
+
 /// Goes through the records without reading the chunks.
 void McapFile::scan() {
   Record found = record(MCAP_MAGIC_SIZE);
   if (found.op != McapOp::header) fail("is damaged: its first record is not a header");
   std::optional<std::uint64_t> summary;
   while (found.op != McapOp::footer) {
-    found = record(found.end());
+    const std::uint64_t next = found.end();
+    if (end_ == RecordingEnd::any && !isWhole(next)) {
+      left_out_ = bytes_.size - next;
+      return;
+    }
+    found = record(next);
     const bool in_data = !summary;
     if (found.op == McapOp::schema || found.op == McapOp::channel || found.op == McapOp::statistics ||
         found.op == McapOp::data_end) {
@@ -292,7 +305,7 @@ void McapFile::declare(McapOp op, const std::uint8_t* data, std::size_t size) {
   const auto [known, is_new] = channels_.emplace(number, channel);
   if (known->second != channel)
     fail("is damaged: two different channels have number " + std::to_string(number));
-  if (is_new && !declaring_) connect(number, channel);
+  if (is_new && connected_) connect(number, channel);
 }
 
 void McapFile::connect(std::uint32_t number, const Channel& channel) {
@@ -326,7 +339,7 @@ void McapFile::index(std::uint32_t number, const std::vector<std::uint8_t>& byte
     const std::uint8_t* const data = bytes.data() + at + MCAP_RECORD_HEAD;
     if (op == McapOp::schema || op == McapOp::channel) {
       declare(op, data, static_cast<std::size_t>(size));
-    } else if (op == McapOp::message && !declaring_) {
+    } else if (op == McapOp::message && !surveying_) {
       Fields fields(*this, data, static_cast<std::size_t>(size));
       Entry entry;
       entry.connection = fields.number<std::uint16_t>();
@@ -351,8 +364,8 @@ void McapFile::checkEnd(std::size_t messages) const {
 
 }  // namespace
 
-std::unique_ptr<RecordingFile> openMcap(RecordingBytes bytes, const std::string& name) {
-  return std::make_unique<McapFile>(std::move(bytes), name);
+std::unique_ptr<RecordingFile> openMcap(RecordingBytes bytes, const std::string& name, RecordingEnd end) {
+  return std::make_unique<McapFile>(std::move(bytes), name, end);
 }
 
 }  // namespace smartmill

@@ -38,6 +38,6 @@ constexpr std::size_t MCAP_RECORD_HEAD = 9;
 constexpr std::size_t MCAP_MESSAGE_HEAD = 22;
 
 /// An MCAP file (mcap.dev/spec). @throws Error as openRecording()
-std::unique_ptr<RecordingFile> openMcap(RecordingBytes bytes, const std::string& name);
+std::unique_ptr<RecordingFile> openMcap(RecordingBytes bytes, const std::string& name, RecordingEnd end);
 
 }  // namespace smartmill

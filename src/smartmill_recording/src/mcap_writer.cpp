@@ -58,6 +58,7 @@ class McapWriter : public RecordingWriter {
              std::size_t size) override;
   using RecordingWriter::write;
   void close() override;
+  std::uint64_t size() const override { return file_.position(); }
 
  private:
   struct Channel {
@@ -210,6 +211,7 @@ void McapWriter::flush() {
   chunk_.clear();
   places_.clear();
   chunk_span_ = {};
+  file_.flush();  // what is complete outlives this program
 }
 
 void McapWriter::close() {

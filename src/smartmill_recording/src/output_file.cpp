@@ -39,6 +39,11 @@ void OutputFile::rewrite(std::uint64_t position, const std::string& bytes) {
   check();
 }
 
+void OutputFile::flush() {
+  stream_.flush();
+  check();
+}
+
 void OutputFile::close() {
   stream_.close();
   check();

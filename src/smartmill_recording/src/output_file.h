@@ -17,6 +17,7 @@ class OutputFile {
 
   void write(const std::string& bytes);                            ///< @throws Error
   void rewrite(std::uint64_t position, const std::string& bytes);  ///< @throws Error
+  void flush();                                                    ///< to the disk's cache @throws Error
   void close();                                                    ///< @throws Error
   std::uint64_t position() const { return position_; }
 

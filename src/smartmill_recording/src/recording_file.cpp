@@ -24,18 +24,19 @@ const std::size_t LONGEST = std::string(BAG_VERSION_LINE).size();  // [byte] tha
 
 }  // namespace
 
-std::unique_ptr<RecordingFile> openRecording(const std::string& path) {
-  return openRecording(bytesOfFile(path), path);
+std::unique_ptr<RecordingFile> openRecording(const std::string& path, RecordingEnd end) {
+  return openRecording(bytesOfFile(path), path, end);
 }
 
-std::unique_ptr<RecordingFile> openRecording(RecordingBytes bytes, const std::string& name) {
+std::unique_ptr<RecordingFile> openRecording(RecordingBytes bytes, const std::string& name,
+                                             RecordingEnd end) {
   std::string begin(static_cast<std::size_t>(std::min<std::uint64_t>(bytes.size, LONGEST)), '\0');
   bytes.read(0, begin.data(), begin.size());
   switch (formatOf(begin)) {
     case Format::bag:
-      return openBag(std::move(bytes), name);
+      return openBag(std::move(bytes), name, end);
     case Format::mcap:
-      return openMcap(std::move(bytes), name);
+      return openMcap(std::move(bytes), name, end);
     default:
       throw Error(name + ": is neither a bag of version 2.0 nor an MCAP file (by its first bytes)");
   }

@@ -224,7 +224,7 @@ TEST_F(Recordings, OfAnotherTypeOrEncodingAreRefused) {
   EXPECT_THROW(openRecording(folder_.file("none.bag")), Error);
   EXPECT_THROW(openRecording(folder_.write("text.bag", "no bag at all")), Error);
   EXPECT_THROW(openRecording(folder_.write("empty.mcap", "")), Error);
-  EXPECT_THROW(convertRecording(path, folder_.file("a.bag"), RecordingCompression::none), Error);  // json
+  EXPECT_THROW(convertRecording({path}, folder_.file("a.bag"), RecordingCompression::none), Error);  // json
   EXPECT_FALSE(std::filesystem::exists(folder_.file("a.bag")));
   EXPECT_FALSE(std::filesystem::exists(folder_.file("a.bag.active")));
   EXPECT_THROW(createRecording(folder_.file("b.bag"), RecordingCompression::zstd), Error);
@@ -304,13 +304,73 @@ TEST_F(Recordings, ConversionLosesNothing) {
   ASSERT_EQ(expected.size(), 300u);
   const std::string mcap = folder_.file("a.mcap"), again = folder_.file("again.bag");
   double share = 0.0;
-  EXPECT_EQ(convertRecording(bag, mcap, RecordingCompression::zstd, [&](double done) { share = done; }),
-            300u);
+  EXPECT_EQ(
+      convertRecording({bag}, mcap, RecordingCompression::zstd, [&](double done) { share = done; }).messages,
+      300u);
   EXPECT_EQ(share, 1.0);
   EXPECT_EQ(messagesOf(mcap), expected);
-  EXPECT_EQ(convertRecording(mcap, again, RecordingCompression::none), 300u);
+  EXPECT_EQ(convertRecording({mcap}, again, RecordingCompression::none).messages, 300u);
   EXPECT_EQ(messagesOf(again), expected);
-  EXPECT_THROW(convertRecording(bag, bag, RecordingCompression::none), Error);
+  EXPECT_THROW(convertRecording({bag}, bag, RecordingCompression::none), Error);
+}
+
+// A recorder that is killed leaves what it has written so far.
+TEST_F(Recordings, WhatAKilledRecorderLeavesIsCopiedToItsLastCompleteRecord) {
+  const std::string bytes(997, 'x');
+  for (const char* ending : {".bag", ".mcap"}) {
+    const std::string path = folder_.file("whole") + ending, active = path + ".active";
+    const auto writer = createRecording(path, RecordingCompression::lz4);
+    RecordedConnection connection;
+    connection.topic = "/any";
+    connection.type = "some_package/Any";
+    const std::uint32_t number = writer->connect(connection);
+    for (std::uint64_t i = 0; i < 3000; ++i)
+      writer->write(number, 1000 * i, reinterpret_cast<const std::uint8_t*>(bytes.data()), i % 997);
+    std::ifstream in(active, std::ios::binary);
+    const std::string left((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+    writer->close();
+    const std::vector<Held> whole = messagesOf(path);
+    EXPECT_THROW(openRecording(folder_.write("killed", left)), Error);
+    std::size_t previous = 0;
+    for (const std::size_t length : {left.size() / 5, left.size() / 2, left.size() - 1, left.size()}) {
+      const std::string killed = folder_.write("killed", left.substr(0, length)),
+                        copy = folder_.file("copy") + ending;
+      const ConvertedRecording result = convertRecording({killed}, copy, RecordingCompression::none);
+      const std::vector<Held> held = messagesOf(copy);
+      EXPECT_EQ(held.size(), result.messages);
+      EXPECT_LE(held.size(), whole.size());
+      EXPECT_GE(held.size(), previous);
+      previous = held.size();
+      EXPECT_TRUE(std::equal(held.begin(), held.end(), whole.begin())) << ending << " " << length;
+      EXPECT_EQ(result.left_out.at(0) == 0, length == left.size());
+    }
+    EXPECT_GT(previous, 500u) << ending;  // of 3000: a chunk is complete from 768 kB on
+  }
+}
+
+TEST_F(Recordings, PartsBecomeOneRecording) {
+  const std::uint8_t latched[] = {1, 2, 3}, other[] = {4, 5};
+  std::vector<std::string> parts;
+  for (std::uint64_t part = 0; part < 3; ++part) {
+    parts.push_back(folder_.file("part" + std::to_string(part) + ".bag"));
+    const auto writer = createRecording(parts.back(), RecordingCompression::lz4);
+    RecordedConnection connection;
+    connection.topic = "/state";
+    connection.type = "some_package/Any";
+    const std::uint32_t state = writer->connect(connection);
+    connection.topic = "/modes";
+    connection.more = {{"latching", "1"}};
+    const std::uint32_t modes = writer->connect(connection);
+    writer->write(modes, 1000 * part, latched, 3);  // repeated from the part before
+    writer->write(state, 1000 * part + 1, other, 2);
+    if (part == 1) writer->write(modes, 1000 * part + 2, latched, 3);  // published again
+    writer->close();
+  }
+  const std::string whole = folder_.file("whole.bag");
+  EXPECT_EQ(convertRecording(parts, whole, RecordingCompression::none).messages, 5u);
+  std::vector<std::uint64_t> times;
+  for (const Held& held : messagesOf(whole)) times.push_back(std::get<5>(held));
+  EXPECT_EQ(times, (std::vector<std::uint64_t>{0, 1, 1001, 1002, 2001}));
 }
 
 // Each chunk has messages from all of the time: every one is decompressed once, not for each message.

@@ -54,18 +54,24 @@ class RecordingFile {
   virtual const std::uint8_t* data(const Entry& entry) = 0;
   /// [1] share of the file that next() has read.
   virtual double share() const = 0;
+  /// [byte] behind the last complete record of a recording that was cut off, which are not read.
+  virtual std::uint64_t leftOut() const = 0;
   /// @throws std::out_of_range
   const RecordedConnection& connection(const Entry& entry) const {
     return connections().at(entry.connection);
   }
 };
 
+/// What a recording must end with: its index, or anything, as when its recorder was killed.
+enum class RecordingEnd { index, any };
+
 /// Opens a bag of format 2.0 (wiki.ros.org/Bags/Format/2.0) or an MCAP file (mcap.dev/spec) with messages of
 /// ROS 1, by its first bytes and not by its name.
 /// @throws Error of one line: missing, neither format, cut off, damaged, without index.
-std::unique_ptr<RecordingFile> openRecording(const std::string& path);
+std::unique_ptr<RecordingFile> openRecording(const std::string& path, RecordingEnd end = RecordingEnd::index);
 /// @param name for messages
-std::unique_ptr<RecordingFile> openRecording(RecordingBytes bytes, const std::string& name);
+std::unique_ptr<RecordingFile> openRecording(RecordingBytes bytes, const std::string& name,
+                                             RecordingEnd end = RecordingEnd::index);
 
 /// Whether a tool should take this as a recording: its first bytes or, where it cannot be read, its name say
 /// so.

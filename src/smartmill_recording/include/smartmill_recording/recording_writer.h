@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "smartmill_core/names.h"
 #include "smartmill_recording/conversions.h"
@@ -33,6 +34,8 @@ class RecordingWriter {
                      std::size_t size) = 0;
   /// Writes the index, which readers need, and gives the file its name. @throws Error.
   virtual void close() = 0;
+  /// [byte] in the file so far.
+  virtual std::uint64_t size() const = 0;
 
   /// A core type as the message that carries it, or a message of smartmill::plain.
   /// @param topic relative to /smartmill, or absolute
@@ -57,10 +60,19 @@ class RecordingWriter {
 /// @throws Error on another name, when the file cannot be written, or a bag is to be compressed by zstd.
 std::unique_ptr<RecordingWriter> createRecording(const std::string& path, RecordingCompression compression);
 
+/// A copy of recordings.
+struct ConvertedRecording {
+  std::size_t messages = 0;
+  std::vector<std::uint64_t> left_out;  ///< [byte] of each input behind its last complete record
+};
+
 /// Copies a recording into the other format, or the same: messages, times, definitions and connections stay.
+/// @param from the parts of a recording in their order: latched messages that a part repeats from the one
+/// before are copied once. A part that was cut off is copied to its last complete record.
 /// @param progress called now and then with the share done, 0..1
-/// @return messages. @throws Error on a damaged input; on messages that are not of ROS 1 for a bag.
-std::size_t convertRecording(const std::string& from, const std::string& to, RecordingCompression compression,
-                             const std::function<void(double)>& progress = {});
+/// @throws Error on a damaged input; on messages that are not of ROS 1 for a bag.
+ConvertedRecording convertRecording(const std::vector<std::string>& from, const std::string& to,
+                                    RecordingCompression compression,
+                                    const std::function<void(double)>& progress = {});
 
 }  // namespace smartmill
