@@ -77,20 +77,20 @@ void write(const Result& r, const std::string& file) {
 class DiscoverClient {
  public:
   explicit DiscoverClient(const Request& request)
-      : request_(request), client_(names::absolute(names::DISCOVER), true), begin_(ros::WallTime::now()) {
+      : request_(request), client_(names::absolute(names::DISCOVER), true), begin_(ros::SteadyTime::now()) {
     if (!client_.waitForServer(ros::Duration(request.ready)))
       throw Error("action " + names::absolute(names::DISCOVER) + ": no node offers it");
   }
 
   // The controller may still be starting.
   void armWhenConnected() const {
-    const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(request_.ready);
+    const ros::SteadyTime end = ros::SteadyTime::now() + ros::WallDuration(request_.ready);
     for (;;) {
       try {
         arm(true);
         return;
       } catch (const Error&) {
-        if (stop || ros::WallTime::now() > end) throw;
+        if (stop || ros::SteadyTime::now() > end) throw;
         ros::WallDuration(0.5).sleep();
       }
     }
@@ -103,7 +103,7 @@ class DiscoverClient {
     goal.install = request_.install;
     client_.sendGoal(goal, {}, {}, [this](const smartmill_msgs::DiscoverFeedbackConstPtr& f) { print(*f); });
     bool ended = false;
-    while (!ended && !stop && (ros::WallTime::now() - begin_).toSec() < request_.timeout)
+    while (!ended && !stop && (ros::SteadyTime::now() - begin_).toSec() < request_.timeout)
       ended = client_.waitForResult(ros::Duration(0.1));
     if (!ended) {
       client_.cancelGoal();
@@ -115,13 +115,13 @@ class DiscoverClient {
 
  private:
   void print(const Feedback& f) const {
-    std::printf("discover [%6.1f s] %s\n", (ros::WallTime::now() - begin_).toSec(), f.stage.c_str());
+    std::printf("discover [%6.1f s] %s\n", (ros::SteadyTime::now() - begin_).toSec(), f.stage.c_str());
     std::fflush(stdout);
   }
 
   Request request_;
   actionlib::SimpleActionClient<smartmill_msgs::DiscoverAction> client_;
-  ros::WallTime begin_;
+  ros::SteadyTime begin_;
 };
 
 // @return exit status

@@ -37,12 +37,12 @@ void run(const std::string& path, const std::vector<std::string>& patterns, std:
   const ros::NodeHandle nh;
   smartmill::session::BagRecorder recorder(nh, path, patterns, split);
   const smartmill::MasterWatch master(nh);
-  ros::WallTime subscribed;
+  ros::SteadyTime subscribed;
   while (!shutdown && ros::ok()) {
-    if ((ros::WallTime::now() - subscribed).toSec() > SUBSCRIBE_PERIOD) {
+    if ((ros::SteadyTime::now() - subscribed).toSec() > SUBSCRIBE_PERIOD) {
       if (isFull(recorder.file())) return recorder.close();
       recorder.subscribe();
-      subscribed = ros::WallTime::now();
+      subscribed = ros::SteadyTime::now();
     }
     recorder.record(STEP);
   }

@@ -103,7 +103,7 @@ bool BagPlayer::onControl(smartmill_msgs::PlayControl::Request& request,
 }
 
 void BagPlayer::publishState(bool now) {
-  const ros::WallTime time = ros::WallTime::now();
+  const ros::SteadyTime time = ros::SteadyTime::now();
   if (!now && (time - state_time_).toSec() < STATE_PERIOD) return;
   state_time_ = time;
   smartmill_msgs::PlayState message;
@@ -139,13 +139,13 @@ bool BagPlayer::waitFor(const ros::Time& time) {
     }
     const bool fast = at < fast_until_ || control.speed == 0.0;
     if (fast || control.paused || control.speed != paced_speed_) {
-      paced_from_ = ros::WallTime::now();
+      paced_from_ = ros::SteadyTime::now();
       paced_position_ = at;
       paced_speed_ = control.speed;
     }
     if (at < fast_until_ || (fast && !control.paused)) break;
     const double remaining =
-        (at - paced_position_) / control.speed - (ros::WallTime::now() - paced_from_).toSec();
+        (at - paced_position_) / control.speed - (ros::SteadyTime::now() - paced_from_).toSec();
     if (!control.paused && remaining <= 0.0) break;
     if (!ros::ok()) throw Error("interrupted by the shutdown of ROS");
     // The nodes do not take a pause for the end of the data.
@@ -160,7 +160,7 @@ bool BagPlayer::waitFor(const ros::Time& time) {
 bool BagPlayer::play() {
   clock_time_ = ros::Time();
   position_ = paced_position_ = 0.0;
-  paced_from_ = ros::WallTime::now();
+  paced_from_ = ros::SteadyTime::now();
   const std::unique_ptr<RecordingFile> file = openRecording(path_);
   topic_tools::ShapeShifter message;
   for (RecordingFile::Entry entry; file->next(&entry);) {

@@ -46,9 +46,9 @@ void BagRecorder::record(double timeout) {
 }
 
 void BagRecorder::finish() {
-  const ros::WallTime begin = ros::WallTime::now();
+  const ros::SteadyTime begin = ros::SteadyTime::now();
   std::size_t previous = written_ + 1;
-  while (previous != written_ && (ros::WallTime::now() - begin).toSec() < CLOSE_TIMEOUT) {
+  while (previous != written_ && (ros::SteadyTime::now() - begin).toSec() < CLOSE_TIMEOUT) {
     previous = written_;
     record(QUIET);
   }

@@ -42,7 +42,7 @@ Discovery::Discovery(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
       boost::function<void(const smartmill_msgs::DiscrepancyState&)>([this](const auto& m) {
         const std::lock_guard<std::mutex> lock(mutex_);
         monitored_.insert(m.condition);
-        last_monitored_ = ros::WallTime::now();
+        last_monitored_ = ros::SteadyTime::now();
       }));
   server_ = std::make_unique<Server>(
       nh_, names::DISCOVER, boost::function<void(Handle)>([this](Handle handle) { onGoal(handle); }),
@@ -211,7 +211,7 @@ Explained Discovery::explain(Result& result) {
   driver_.waitUntil(
       [&] {
         const std::lock_guard<std::mutex> lock(mutex_);
-        return (ros::WallTime::now() - last_monitored_).toSec() > parameters_.quiet_time;
+        return (ros::SteadyTime::now() - last_monitored_).toSec() > parameters_.quiet_time;
       },
       parameters_.judged_timeout + parameters_.quiet_time);
   stage("explaining " + std::to_string(feedback_.cuts_done) + " cuts");
@@ -301,8 +301,8 @@ void Discovery::install(Result& result) {
   result.model = installed_model_.inUse();
   // In the thread of the callbacks, which serves the latched topics.
   const MachineModel installed = readMachineModel(installed_model_.inUse());
-  publish_timer_ = nh_.createWallTimer(
-      ros::WallDuration(0.0), [this, installed](const ros::WallTimerEvent&) { publishModel(installed); },
+  publish_timer_ = nh_.createSteadyTimer(
+      ros::WallDuration(0.0), [this, installed](const ros::SteadyTimerEvent&) { publishModel(installed); },
       true);
 }
 

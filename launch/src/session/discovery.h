@@ -73,7 +73,7 @@ class Discovery {
 
   std::mutex mutex_;                 // guards the members up to thread_
   std::set<std::string> monitored_;  // conditions with a result of the monitor
-  ros::WallTime last_monitored_;
+  ros::SteadyTime last_monitored_;
   std::optional<Handle> active_;
   std::atomic<bool> cancel_{false}, stopping_{false};
   std::thread thread_;
@@ -86,7 +86,7 @@ class Discovery {
   ros::Subscriber states_;
   ros::Publisher coefficients_;
   LatchedTopic<smartmill_msgs::ModalModel> modes_;
-  ros::WallTimer publish_timer_;
+  ros::SteadyTimer publish_timer_;
   std::unique_ptr<Server> server_;
 };
 

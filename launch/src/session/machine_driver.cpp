@@ -43,10 +43,10 @@ void MachineDriver::checkStop() const {
 }
 
 bool MachineDriver::waitUntil(const std::function<bool()>& ready, double seconds) const {
-  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(seconds);
+  const ros::SteadyTime end = ros::SteadyTime::now() + ros::WallDuration(seconds);
   while (!ready()) {
     checkStop();
-    if (ros::WallTime::now() > end) return false;
+    if (ros::SteadyTime::now() > end) return false;
     ros::WallDuration(POLL).sleep();
   }
   return true;
@@ -105,8 +105,8 @@ std::string MachineDriver::makeSafe(bool hurry) {
     goal.name = "stop the spindle";
     goal.program = "M5\n";
     program_.sendGoal(goal);
-    const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(hurry ? HURRY : STOP_TIMEOUT);
-    while (ros::ok() && !program_.getState().isDone() && ros::WallTime::now() < end)
+    const ros::SteadyTime end = ros::SteadyTime::now() + ros::WallDuration(hurry ? HURRY : STOP_TIMEOUT);
+    while (ros::ok() && !program_.getState().isDone() && ros::SteadyTime::now() < end)
       ros::WallDuration(POLL).sleep();
     if (!program_.getState().isDone()) program_.cancelGoal();
   }

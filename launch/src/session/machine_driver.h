@@ -93,8 +93,8 @@ auto MachineDriver::call(Client<Action>& client, const std::string& name, Goal g
         timeout);
   } catch (const Interrupted&) {
     client.cancelGoal();
-    const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(CANCEL_WAIT);
-    while (ros::ok() && !client.getState().isDone() && ros::WallTime::now() < end)
+    const ros::SteadyTime end = ros::SteadyTime::now() + ros::WallDuration(CANCEL_WAIT);
+    while (ros::ok() && !client.getState().isDone() && ros::SteadyTime::now() < end)
       ros::WallDuration(POLL).sleep();
     throw;
   }

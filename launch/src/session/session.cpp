@@ -78,10 +78,10 @@ Session::Session(ros::NodeHandle nh, const ros::NodeHandle& private_nh, const st
     using Message = decltype(example);
     const boost::function<void(const Message&)> callback = [this, topic, use](const Message& message) {
       const std::lock_guard<std::mutex> lock(mutex_);
-      last_received_[topic] = ros::WallTime::now();
+      last_received_[topic] = ros::SteadyTime::now();
       use(message);
     };
-    last_received_[topic] = ros::WallTime(0);
+    last_received_[topic] = ros::SteadyTime(0);
     subscribers_.push_back(nh_.subscribe<Message>(topic, 200, callback));
   };
   subscribe(names::CNC_STATE, smartmill_msgs::CncState(), [this](const smartmill_msgs::CncState& m) {
@@ -370,7 +370,7 @@ std::string Session::missing() {
   }
   const std::lock_guard<std::mutex> lock(mutex_);
   for (const auto& [topic, time] : last_received_) {
-    if ((ros::WallTime::now() - time).toSec() > FRESH) add("data on " + topic);
+    if ((ros::SteadyTime::now() - time).toSec() > FRESH) add("data on " + topic);
   }
   if (!driver_.state().connected) add("the controller's connection");
   // The detector needs forces, which a sensor that is not calibrated yet does not give.

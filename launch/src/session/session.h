@@ -100,7 +100,7 @@ class Session {
   std::unique_ptr<ros::AsyncSpinner> spinner_;
 
   mutable std::mutex mutex_;                            // guards the members that subscribers write
-  std::map<std::string, ros::WallTime> last_received_;  // by topic
+  std::map<std::string, ros::SteadyTime> last_received_;  // by topic
   std::optional<smartmill_msgs::StabilityChart> chart_;
   std::map<std::string, std::vector<ChatterWindow>> windows_;  // by condition
   bool under_control_ = false;    // the cut that the chatter control is to stabilise is running

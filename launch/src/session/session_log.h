@@ -22,12 +22,12 @@ class SessionLog {
 
   /// Requests an action of the operator, as the step in progress.
   void request(const std::string& text);
-  double elapsed() const { return (ros::WallTime::now() - begin_).toSec(); }  ///< [s]
+  double elapsed() const { return (ros::SteadyTime::now() - begin_).toSec(); }  ///< [s]
 
   SessionSummary summary;
 
  private:
-  ros::WallTime begin_ = ros::WallTime::now();
+  ros::SteadyTime begin_ = ros::SteadyTime::now();
   ros::Publisher state_;
   std::vector<std::uint8_t> outcomes_;  // SessionStep.DONE, ... of the summary's steps
 };

@@ -55,7 +55,7 @@ void AxisDriveServer::goal(Server::GoalHandle handle) {
   }
   // Without a stamp the goal has the time at which the client sent it.
   const ros::Time stamp = request->header.stamp.isZero() ? handle.getGoalID().stamp : request->header.stamp;
-  waiting_.push_back({handle, toSec(stamp), ros::WallTime::now()});
+  waiting_.push_back({handle, toSec(stamp), ros::SteadyTime::now()});
 }
 
 void AxisDriveServer::cancel(const Server::GoalHandle& handle) {
@@ -72,7 +72,7 @@ void AxisDriveServer::watch() {
   feedback.recorded = recorder_.recorded();
   for (auto waiting = waiting_.begin(); waiting != waiting_.end();) {
     const bool complete = recorder_.newest() >= waiting->stamp;
-    if (complete || (ros::WallTime::now() - waiting->since).toSec() > timeout_) {
+    if (complete || (ros::SteadyTime::now() - waiting->since).toSec() > timeout_) {
       answer(waiting->handle);
       waiting = waiting_.erase(waiting);
     } else {

@@ -23,7 +23,7 @@ class AxisDriveServer {
   struct Waiting {
     Server::GoalHandle handle;
     double stamp = 0.0;   // [s]
-    ros::WallTime since;  // of its arrival
+    ros::SteadyTime since;  // of its arrival
   };
 
   void goal(Server::GoalHandle handle);

@@ -24,6 +24,7 @@
 #include "smartmill_ros/node_shell.h"
 #include "smartmill_ros/parameter_server.h"
 #include "smartmill_ros/run_node.h"
+#include "smartmill_ros/steady_time.h"
 #include "smartmill_sim/turning/lathe.h"
 #include "smartmill_sim/turning/turning_machine.h"
 
@@ -48,8 +49,8 @@ class LatheNode {
         angle_(nh.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, STREAM_QUEUE)),
         clock_(nh),
         shell_(nh, private_nh, "simulated lathe", 1.0),
-        pacer_(ros::WallTime::now().toSec(), static_cast<double>(size_) / parameters_.lathe.rate,
-               static_cast<bool>(clock_), parameters_.pace) {
+        pacer_(steadyTime(), static_cast<double>(size_) / parameters_.lathe.rate, static_cast<bool>(clock_),
+               parameters_.pace) {
     if (parameters_.turning.motor.currents) becomeTurningCentre(nh);
     shell_.inputs().on<smartmill_msgs::SampleBlock>(names::CONTROL_COMMAND,
                                                     [this](const smartmill_msgs::SampleBlock& block, double) {
@@ -79,7 +80,7 @@ class LatheNode {
 
   void run() {
     while (!stopping_) {
-      const double wait = pacer_.wait(ros::WallTime::now().toSec());
+      const double wait = pacer_.wait(steadyTime());
       if (wait > 0.0) std::this_thread::sleep_for(std::chrono::duration<double>(wait));
       TurningMachine::Block block;
       {

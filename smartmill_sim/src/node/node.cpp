@@ -18,6 +18,7 @@
 #include "smartmill_ros/node_main.h"
 #include "smartmill_ros/parameter_server.h"
 #include "smartmill_ros/run_node.h"
+#include "smartmill_ros/steady_time.h"
 
 namespace smartmill::sim {
 namespace {
@@ -52,7 +53,7 @@ Node::Node(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
       clock_(nh_),
       panel_(nh_),
       shell_(nh_, private_nh, "simulated mill", 1.0),
-      pacer_(ros::WallTime::now().toSec(), BLOCK_TIME, static_cast<bool>(clock_), parameters_.pace) {
+      pacer_(steadyTime(), BLOCK_TIME, static_cast<bool>(clock_), parameters_.pace) {
   if (parameters_.world.motor.currents)
     motor_current_ = nh_.advertise<smartmill_msgs::SampleBlock>(names::MOTOR_CURRENT, STREAM_QUEUE);
   if (parameters_.axes_input.empty()) {
@@ -163,7 +164,7 @@ void Node::publish(const World::Block& block) {
 void Node::run() {
   World::Block block;
   while (!stopping_) {
-    const double wall = ros::WallTime::now().toSec(), behind = pacer_.behind(wall);
+    const double wall = steadyTime(), behind = pacer_.behind(wall);
     if (!clock_ && behind > parameters_.most_behind) {
       const auto blocks = static_cast<std::uint64_t>(behind / BLOCK_TIME);
       world_->skipSamples(blocks * World::BLOCK);

@@ -230,7 +230,7 @@ bool StabilityNode::whatIf(smartmill_msgs::WhatIf::Request& request,
     return true;
   }
   try {
-    const ros::WallTime begin = ros::WallTime::now();
+    const ros::SteadyTime begin = ros::SteadyTime::now();
     WhatIfChart chart = maker.whatIf(requestOf(request));
     response.code = Response::OK;
     response.spindle_speed = std::move(chart.limit.spindle_speed);
@@ -243,7 +243,7 @@ bool StabilityNode::whatIf(smartmill_msgs::WhatIf::Request& request,
     response.limit_low = std::move(chart.limit_low);
     response.limit_high = std::move(chart.limit_high);
     response.stable_share = chart.stable_share;
-    response.seconds = (ros::WallTime::now() - begin).toSec();
+    response.seconds = (ros::SteadyTime::now() - begin).toSec();
   } catch (const Error& error) {
     response.code = Response::BAD_REQUEST;
     response.message = error.what();

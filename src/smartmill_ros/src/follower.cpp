@@ -69,10 +69,10 @@ Followers::Response Followers::call(Node& node, std::uint8_t phase) {
 }
 
 void Followers::waitFor(const std::function<std::string()>& missing, double timeout) {
-  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(timeout);
+  const ros::SteadyTime end = ros::SteadyTime::now() + ros::WallDuration(timeout);
   for (std::string text = missing(); !text.empty(); text = missing()) {
     if (!ros::ok()) throw Error("interrupted by the shutdown of ROS: " + text);
-    if (ros::WallTime::now() > end) throw Error(text);
+    if (ros::SteadyTime::now() > end) throw Error(text);
     ros::WallDuration(POLL).sleep();
   }
 }
@@ -147,15 +147,15 @@ std::uint64_t Followers::behind() const {
 
 void Followers::keepUp(std::uint64_t max_behind) {
   std::uint64_t previous = 0;
-  ros::WallTime last_progress = ros::WallTime::now();
+  ros::SteadyTime last_progress = ros::SteadyTime::now();
   while (behind() > max_behind) {
     const std::uint64_t taken = updateCounts();
     if (taken != previous) {
       previous = taken;
-      last_progress = ros::WallTime::now();
+      last_progress = ros::SteadyTime::now();
       continue;
     }
-    if (!ros::ok() || (ros::WallTime::now() - last_progress).toSec() > TIMEOUT)
+    if (!ros::ok() || (ros::SteadyTime::now() - last_progress).toSec() > TIMEOUT)
       throw Error(std::to_string(behind()) + " messages are not processed by a node");
     ros::WallDuration(POLL).sleep();
   }

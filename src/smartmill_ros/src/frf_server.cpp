@@ -34,7 +34,7 @@ smartmill_msgs::MeasureFrfResult resultWithoutFrf(FrfCode code, const std::strin
 struct FrfServer::Impl {
   struct Pending {
     Handle handle;
-    ros::WallTime since;
+    ros::SteadyTime since;
     bool answered = false;
 
     void reject(FrfCode code, const std::string& reason) {
@@ -57,7 +57,7 @@ struct FrfServer::Impl {
     const MeasureFrfGoal goal = goalFromMsg(*handle.getGoal(), toSec(ros::Time::now()));
     auto pending = std::make_shared<Pending>();
     pending->handle = handle;
-    pending->since = ros::WallTime::now();
+    pending->since = ros::SteadyTime::now();
     waiting.push_back(pending);
     handlers.goal(goal, [this, pending](bool free) { return begin(pending, free); });
   }
@@ -167,7 +167,7 @@ void FrfServer::restart() {
 
 void FrfServer::refuseWaiting(const std::string& reason, double timeout) {
   for (const auto& pending : impl_->waiting) {
-    if (pending->answered || (ros::WallTime::now() - pending->since).toSec() < timeout) continue;
+    if (pending->answered || (ros::SteadyTime::now() - pending->since).toSec() < timeout) continue;
     pending->reject(FrfCode::bad_data, reason);
   }
 }

@@ -11,6 +11,7 @@
 
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/signal/stream_sorter.h"
+#include "smartmill_ros/steady_time.h"
 
 namespace smartmill {
 namespace {
@@ -99,7 +100,7 @@ InputHealth& Inputs::add(const std::string& topic) {
 
 void Inputs::take(InputHealth& health, const std::function<void()>& handle) {
   any_.heard();
-  const double now = ros::WallTime::now().toSec();
+  const double now = steadyTime();
   std::string line, line_of_other;
   line = health.take(now, [&] {
     try {

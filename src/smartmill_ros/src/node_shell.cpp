@@ -1,6 +1,7 @@
 #include "smartmill_ros/node_shell.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstdlib>
 #include <exception>
@@ -16,12 +17,14 @@
 #include "smartmill_core/names.h"
 #include "smartmill_ros/follower.h"
 #include "smartmill_ros/kept_messages.h"
+#include "smartmill_ros/steady_time.h"
 
 namespace smartmill {
 namespace {
 
 constexpr double TICK = 0.05;          // [s]
 constexpr double HEALTH_PERIOD = 1.0;  // [s]
+constexpr double CLOCK_STEP = 0.2;     // [s] beyond corrections that a time server makes gradually
 
 // ROS 1 has no authentication: every program that reaches a node can publish and call its services.
 void diagnoseNetwork(diagnostic_updater::DiagnosticStatusWrapper& status) {
@@ -55,7 +58,8 @@ NodeShell::NodeShell(ros::NodeHandle nh, ros::NodeHandle private_nh, const std::
   countStart();
   diagnostics_.add("restarts", this, &NodeShell::diagnoseRestarts);
   health_ = nh.advertise<smartmill_msgs::NodeHealth>(names::NODE_HEALTH, 10);
-  started_ = counted_ = ros::WallTime::now().toSec();
+  started_ = ros::WallTime::now().toSec();
+  counted_ = steadyTime();
   cpu_time_ = processUsage().cpu_time;
   every(HEALTH_PERIOD, [this] { publishHealth(); });
   every(TICK, [this] {
@@ -86,7 +90,11 @@ void NodeShell::diagnoseRestarts(diagnostic_updater::DiagnosticStatusWrapper& st
 
 void NodeShell::publishHealth() {
   const ProcessUsage usage = processUsage();
-  const double now = ros::WallTime::now().toSec();
+  const double now = steadyTime(), wall = ros::WallTime::now().toSec();
+  if (const double step = wall - now - clock_offset_; std::abs(step) > CLOCK_STEP) {
+    ROS_WARN("the clock of this computer was set by %+.1f s", step);
+    clock_offset_ += step;
+  }
   smartmill_msgs::NodeHealth health;
   health.header.stamp = ros::Time::now();
   health.node = ros::this_node::getName();
@@ -115,8 +123,8 @@ void NodeShell::every(double period, std::function<void()> task) {
       ROS_ERROR_STREAM_THROTTLE(5.0, error.what());
     }
   });
-  timers_.push_back(nh_.createWallTimer(ros::WallDuration(period),
-                                        [task = tasks_.back()](const ros::WallTimerEvent&) { task(); }));
+  timers_.push_back(nh_.createSteadyTimer(ros::WallDuration(period),
+                                          [task = tasks_.back()](const ros::SteadyTimerEvent&) { task(); }));
 }
 
 bool NodeShell::follow(smartmill_msgs::Follow::Request& request, smartmill_msgs::Follow::Response& response) {

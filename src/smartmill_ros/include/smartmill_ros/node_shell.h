@@ -51,7 +51,8 @@ class NodeShell {
   Inputs inputs_;
   diagnostic_updater::Updater diagnostics_;
   std::vector<std::function<void()>> tasks_;
-  std::vector<ros::WallTimer> timers_;
+  double clock_offset_ = 0.0;  // [s] of the wall clock from steadyTime()
+  std::vector<ros::SteadyTimer> timers_;
   ros::ServiceServer follow_;
   ros::Publisher health_;
   int starts_ = 1;                                         // in this launch
