@@ -13,6 +13,7 @@
 #include "listen.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
+#include "smartmill_core/io/recency_list.h"
 #include "smartmill_exchange/mtconnect/shdr.h"
 
 namespace smartmill::exchange {
@@ -44,6 +45,8 @@ struct Hub {
   std::function<double()> clock;
   Agent agent;
   ShdrWriter writer;
+  RecencyList<AgentConnection> requesting;  // connections without a stream
+  RecencyList<AdapterClient> silent;        // adapters' clients that have sent no PING
   std::set<std::shared_ptr<AgentConnection>> streams;
   std::set<std::shared_ptr<AdapterClient>> adapters;
   std::size_t connections = 0;
@@ -54,7 +57,8 @@ struct Hub {
 /// One HTTP connection of the agent.
 class AgentConnection : public std::enable_shared_from_this<AgentConnection> {
  public:
-  AgentConnection(Tcp::socket socket, Hub& hub) : stream_(std::move(socket)), hub_(hub) {
+  AgentConnection(Tcp::socket socket, Hub& hub)
+      : stream_(std::move(socket)), hub_(hub), place_(hub.requesting, this) {
     hub_.agent_clients = ++hub_.connections;
   }
   ~AgentConnection() { hub_.agent_clients = --hub_.connections; }
@@ -68,6 +72,7 @@ class AgentConnection : public std::enable_shared_from_this<AgentConnection> {
     stream_.expires_after(PATIENCE);
     http::async_read(stream_, buffer_, *parser_,
                      [self = shared_from_this()](beast::error_code failed, std::size_t) {
+                       self->place_.touch();
                        if (!failed) self->answer();
                      });
   }
@@ -88,6 +93,7 @@ class AgentConnection : public std::enable_shared_from_this<AgentConnection> {
   }
 
   void close() {
+    place_.leave();
     beast::error_code ignored;
     stream_.socket().close(ignored);
   }
@@ -130,6 +136,7 @@ class AgentConnection : public std::enable_shared_from_this<AgentConnection> {
 
   void begin(const AgentAnswer& first) {
     running_ = first.stream;
+    place_.leave();
     hub_.streams.insert(shared_from_this());
     const std::string head = formatted(
         "HTTP/1.1 200 OK\r\nContent-Type: multipart/mixed;boundary=%s\r\nCache-Control: "
@@ -177,6 +184,7 @@ class AgentConnection : public std::enable_shared_from_this<AgentConnection> {
 
   beast::tcp_stream stream_;
   Hub& hub_;
+  RecencyList<AgentConnection>::Place place_;  // a stream has left it
   beast::flat_buffer buffer_;
   std::optional<http::request_parser<http::string_body>> parser_;
   http::response<http::string_body> response_;
@@ -190,7 +198,8 @@ class AgentConnection : public std::enable_shared_from_this<AgentConnection> {
 /// One client of the SHDR adapter.
 class AdapterClient : public std::enable_shared_from_this<AdapterClient> {
  public:
-  AdapterClient(Tcp::socket socket, Hub& hub) : socket_(std::move(socket)), hub_(hub) {}
+  AdapterClient(Tcp::socket socket, Hub& hub)
+      : socket_(std::move(socket)), hub_(hub), place_(hub.silent, this) {}
 
   void start() {
     beast::error_code ignored;
@@ -216,8 +225,18 @@ class AdapterClient : public std::enable_shared_from_this<AdapterClient> {
     if (pinged_ && now - *pinged_ > 2.0 * hub_.options.heartbeat) end();
   }
 
+  // Deferred, since the server may be iterating over its clients.
+  void end() {
+    close();
+    asio::post(socket_.get_executor(), [self = shared_from_this()] {
+      self->hub_.adapters.erase(self);
+      self->hub_.adapter_clients = self->hub_.adapters.size();
+    });
+  }
+
   void close() {
     closed_ = true;
+    place_.leave();
     beast::error_code ignored;
     socket_.close(ignored);
   }
@@ -231,7 +250,10 @@ class AdapterClient : public std::enable_shared_from_this<AdapterClient> {
                                 return;
                               }
                               const int pings = self->commands_.push(self->in_.data(), size);
-                              if (pings > 0) self->pinged_ = self->hub_.clock();
+                              if (pings > 0) {
+                                self->pinged_ = self->hub_.clock();
+                                self->place_.leave();
+                              }
                               for (int i = 0; i < pings; ++i)
                                 self->send(formatted("* PONG %.0f\n", 1e3 * self->hub_.options.heartbeat));
                               if (!self->closed_) self->read();
@@ -253,17 +275,9 @@ class AdapterClient : public std::enable_shared_from_this<AdapterClient> {
                       });
   }
 
-  // Deferred, since the server may be iterating over its clients.
-  void end() {
-    close();
-    asio::post(socket_.get_executor(), [self = shared_from_this()] {
-      self->hub_.adapters.erase(self);
-      self->hub_.adapter_clients = self->hub_.adapters.size();
-    });
-  }
-
   Tcp::socket socket_;
   Hub& hub_;
+  RecencyList<AdapterClient>::Place place_;  // one that has sent a PING has left it
   ShdrCommands commands_;
   std::array<char, 1024> in_{};
   std::string out_, waiting_;
@@ -331,10 +345,19 @@ class ExchangeServer::Impl {
     return listenAt(acceptor, address, port, key);
   }
 
+  /// Room for one more client: where there is none, the quietest of those that may be closed makes it.
+  template <class Client, class Close>
+  bool hasRoom(std::size_t clients, const RecencyList<Client>& quiet, Close close) {
+    if (clients < hub_.options.most_clients) return true;
+    if (quiet.size() == 0) return false;
+    close(*quiet.quietest());
+    return true;
+  }
+
   void acceptAgent() {
     agent_.async_accept([this](beast::error_code failed, Tcp::socket socket) {
       if (!agent_.is_open()) return;
-      if (!failed && hub_.connections < hub_.options.most_clients)
+      if (!failed && hasRoom(hub_.connections, hub_.requesting, [](auto& quiet) { quiet.close(); }))
         std::make_shared<AgentConnection>(std::move(socket), hub_)->read();
       acceptAgent();
     });
@@ -343,7 +366,7 @@ class ExchangeServer::Impl {
   void acceptAdapter() {
     adapter_.async_accept([this](beast::error_code failed, Tcp::socket socket) {
       if (!adapter_.is_open()) return;
-      if (!failed && hub_.adapters.size() < hub_.options.most_clients) {
+      if (!failed && hasRoom(hub_.adapters.size(), hub_.silent, [](auto& quiet) { quiet.end(); })) {
         const auto client = std::make_shared<AdapterClient>(std::move(socket), hub_);
         hub_.adapters.insert(client);
         hub_.adapter_clients = hub_.adapters.size();

@@ -6,7 +6,9 @@
 
 #include <atomic>
 #include <chrono>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -85,6 +87,28 @@ TEST(Server, AClientOfPythonReadsAgentAndAdapter) {
                 R"([[405, "UNSUPPORTED"], [405, "UNSUPPORTED"], [400, "INVALID_REQUEST"], [404, "NO_DEVICE"],
                                               [404, "ASSET_NOT_FOUND"]])"));
   EXPECT_EQ(found["items"], catalogue().size());
+}
+
+TEST(Server, SilentConnectionsMakeRoomForAnotherOne) {
+  ServerOptions options;
+  options.most_clients = 4;
+  ExchangeServer server(options, wallTime);
+  const auto answer = [](int port, const std::string& request) {
+    const int client = connectTo(port);
+    EXPECT_EQ(send(client, request.data(), request.size(), MSG_NOSIGNAL),
+              static_cast<ssize_t>(request.size()));
+    char first = 0;
+    const ssize_t got = recv(client, &first, 1, 0);
+    close(client);
+    return got == 1 ? first : ' ';
+  };
+  std::vector<int> silent;
+  for (int i = 0; i < 50; ++i) silent.push_back(connectTo(server.agentPort()));
+  EXPECT_EQ(answer(server.agentPort(), "GET /probe HTTP/1.1\r\nHost: localhost\r\n\r\n"), 'H');
+  for (int i = 0; i < 50; ++i) silent.push_back(connectTo(server.adapterPort()));
+  EXPECT_EQ(answer(server.adapterPort(), "* PING\n"), '*');
+  EXPECT_LE(server.statistics().adapter_clients, 5u);
+  for (const int client : silent) close(client);
 }
 
 TEST(Server, ASlowClientOfTheAdapterIsDisconnectedAndOthersLoseNothing) {

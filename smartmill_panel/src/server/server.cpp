@@ -10,6 +10,7 @@
 #include "server/hub.h"
 #include "server/media_types.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/recency_list.h"
 
 namespace smartmill::panel {
 namespace {
@@ -26,11 +27,9 @@ constexpr const char* API = "/api/";
 /// One HTTP connection; an upgrade hands its socket to a WebSocket client.
 class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
  public:
-  HttpConnection(Tcp::socket socket, Hub& hub, std::size_t& open)
-      : stream_(std::move(socket)), hub_(hub), open_(open) {
-    ++open_;
-  }
-  ~HttpConnection() { --open_; }
+  using Open = RecencyList<HttpConnection>;
+  HttpConnection(Tcp::socket socket, Hub& hub, Open& open)
+      : stream_(std::move(socket)), hub_(hub), place_(open, this) {}
   HttpConnection(const HttpConnection&) = delete;
   HttpConnection& operator=(const HttpConnection&) = delete;
 
@@ -41,8 +40,14 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
     stream_.expires_after(PATIENCE);
     http::async_read(stream_, buffer_, *parser_,
                      [self = shared_from_this()](beast::error_code failed, std::size_t) {
+                       self->place_.touch();
                        if (!failed) self->answer();
                      });
+  }
+  void close() {
+    place_.leave();
+    beast::error_code ignored;
+    stream_.socket().close(ignored);
   }
 
  private:
@@ -128,7 +133,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
 
   beast::tcp_stream stream_;
   Hub& hub_;
-  std::size_t& open_;
+  Open::Place place_;
   beast::flat_buffer buffer_;
   std::optional<http::request_parser<http::string_body>> parser_;
   http::request<http::string_body> request_;
@@ -183,15 +188,15 @@ class Server::Impl {
   void accept() {
     acceptor_.async_accept([this](beast::error_code failed, Tcp::socket socket) {
       if (!acceptor_.is_open()) return;
-      // At most two connections per client; further ones are closed.
-      if (!failed && connections_ < 2 * hub_.options.most_clients)
-        std::make_shared<HttpConnection>(std::move(socket), hub_, connections_)->read();
+      // At most two connections per client; the quietest makes room for another one.
+      if (!failed && open_.size() >= 2 * hub_.options.most_clients) open_.quietest()->close();
+      if (!failed) std::make_shared<HttpConnection>(std::move(socket), hub_, open_)->read();
       accept();
     });
   }
 
   Hub hub_;
-  std::size_t connections_ = 0;
+  HttpConnection::Open open_;
   asio::io_context io_{1};  // its handlers own clients and connections, which refer to the hub
   Tcp::acceptor acceptor_;
   int port_ = 0;

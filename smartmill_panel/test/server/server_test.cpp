@@ -402,6 +402,18 @@ TEST_F(ServerTest, BoundsRequests) {
   EXPECT_FALSE(tooLong("/api/command", "short"));
 }
 
+TEST_F(ServerTest, SilentConnectionsMakeRoomForAnotherOne) {
+  start(4u << 20, 4);
+  asio::io_context io;
+  std::vector<Tcp::socket> silent;
+  for (int i = 0; i < 50; ++i) {
+    silent.emplace_back(io);
+    silent.back().connect(
+        {asio::ip::make_address("127.0.0.1"), static_cast<unsigned short>(server_->port())});
+  }
+  EXPECT_EQ(request(http::verb::get, "/api/any").result_int(), 200u);
+}
+
 TEST_F(ServerTest, ReportsWhyItCannotStart) {
   start();
   ServerOptions options;
