@@ -25,7 +25,7 @@ import reference_pages  # noqa: E402
 
 # Pages from outside docs/, by their place in the site.
 PAGES = {"README.md": "index.md", "CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
-WIDE = {"effects.md", "formats.md", "results.md"}  # tables take the place of the table of contents
+WIDE = {"effects.md", "formats.md", "ledger.md", "results.md"}  # tables take the place of the table of contents
 HIDE_CONTENTS = "---\nhide: [toc]\n---\n"
 COPIED = {".md", ".png", ".svg", ".css"}
 LINK = re.compile(r"(\]\()([^)#:\s]+)((?:#[^)]*)?\))")

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Makes docs/results.md from the records of studies in smartmill_studies/records.
+"""Makes docs/results.md and docs/ledger.md from the records of studies in smartmill_studies/records.
 
-usage: results_page.py [--check] [--records FOLDER] [--page FILE]
-  --check  writes nothing; fails where a record is invalid or the page is out of date
+usage: results_page.py [--check] [--records FOLDER] [--page FILE] [--ledger FILE]
+  --check  writes nothing; fails where a record is invalid or a page is out of date
 
 One file NAME.json is one run of one study. Of several records of a study the newest is shown. Numbers are printed with the digits of the file.
 Keys of a record (null: not recorded):
@@ -18,6 +18,7 @@ Keys of a record (null: not recorded):
   figures     list of {name, value, unit, target, met}; met is true, false, or null where nothing is required
   tables      optional list of {title, columns, rows}
   remark      text, or null
+  ledger      optional {what: number}: what the run adds to the ledger of the running graph (hours, kills, messages)
 """
 import argparse
 import decimal
@@ -31,8 +32,8 @@ TEXT, NUMBER = (str,), (int, decimal.Decimal)
 NOTHING = (type(None),)
 KEYS = {"study": TEXT, "package": TEXT, "title": TEXT, "command": TEXT + NOTHING, "commit": TEXT + NOTHING, "date": TEXT + NOTHING,
         "machine": TEXT + NOTHING, "seed": TEXT + NUMBER + NOTHING, "parameters": TEXT + NOTHING, "figures": (list,), "tables": (list,),
-        "remark": TEXT + NOTHING}
-OPTIONAL = {"tables"}
+        "remark": TEXT + NOTHING, "ledger": (dict,)}
+OPTIONAL = {"tables", "ledger"}
 FIGURE = {"name": TEXT, "value": TEXT + NUMBER, "unit": TEXT + NOTHING, "target": TEXT + NUMBER + NOTHING, "met": (bool, *NOTHING)}
 TABLE = {"title": TEXT, "columns": (list,), "rows": (list,)}
 KINDS = {str: "text", int: "a number", decimal.Decimal: "a number", bool: "true or false", list: "a list", type(None): "null"}
@@ -47,6 +48,13 @@ miss their target; where no verdict was recorded, none is shown.
 Stability charts of a session come from fitted modes; they are checked by the full search of collocation on the true machine and by cuts in the
 simulator, which is independent of the solvers. Compensated forces, tool modes and coefficients of a session are checked against the simulated machine, whose physics is validated
 by the campaigns of an independent program.
+"""
+
+LEDGER = """\
+# Ledger of the running graph
+
+Made by `docs/site/results_page.py` from the records in `smartmill_studies/records` that count hours, faults or losses; a change of this page is lost. Each run can be
+repeated by its command and seed. [reliability.md](reliability.md) describes what is tested.
 """
 
 
@@ -85,6 +93,9 @@ def check(record):
         for j, row in enumerate(table["rows"]):
             if not isinstance(row, list) or len(row) != len(table["columns"]):
                 raise Invalid(f"tables[{i}].rows[{j}]: expected a list of {len(table['columns'])} cells")
+    for what, number in record.get("ledger", {}).items():
+        if type(number) not in NUMBER:
+            raise Invalid(f"ledger.{what}: {number!r}, expected a number")
     if not record["figures"] and not record.get("tables"):
         raise Invalid("figures: expected at least one figure or table")
 
@@ -169,23 +180,48 @@ def page(records):
     return re.sub(r"\n{3,}", "\n\n", "\n".join(lines).strip()) + "\n"
 
 
+def ledger(records):
+    counted = [record for record in records if "ledger" in record]
+    totals = {}
+    for record in counted:
+        for what, number in record["ledger"].items():
+            totals[what] = totals.get(what, 0) + number
+    lines = LEDGER.splitlines() + ["", "## Totals", "", "| what | total |", "|---|---|"]
+    lines += [f"| {what} | {number:,} |" for what, number in totals.items()]
+    lines += ["", "## Runs", "", "| run | counted | command, seed | date, commit |", "|---|---|---|---|"]
+    for record in counted:
+        parts = [f"{what}: {number:,}" for what, number in record["ledger"].items()]
+        command = record["command"] or "command not recorded"
+        command += f"<br>seed {record['seed']}" if record["seed"] is not None else ""
+        lines.append("| " + " | ".join(cell(text) for text in (f"[{record['title']}](results.md#{record['study']})", "<br>".join(parts), command,
+                                                               f"{record['date']}, {record['commit']}")) + " |")
+    missed = [(record, figure) for record in counted for figure in record["figures"] if figure["met"] is False]
+    lines += ["", "## Open failures", "", "| run | figure |", "|---|---|"]
+    lines += [f"| [{record['study']}](results.md#{record['study']}) | {cell(figure_text(figure))} |" for record, figure in missed]
+    return "\n".join(lines) + "\n"
+
+
 def main(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--check", action="store_true", help="write nothing; fail where a record is invalid or the page is out of date")
     parser.add_argument("--records", type=pathlib.Path, default=ROOT / "smartmill_studies/records")
     parser.add_argument("--page", type=pathlib.Path, default=ROOT / "docs/results.md")
+    parser.add_argument("--ledger", type=pathlib.Path)
     options = parser.parse_args(arguments)
     try:
-        text = page(newest(sorted(options.records.glob("*.json"))))
+        records = newest(sorted(options.records.glob("*.json")))
     except Invalid as error:
         print(error, file=sys.stderr)
         return 1
+    pages = {options.page: page(records), options.ledger or options.page.with_name("ledger.md"): ledger(records)}
+    out_of_date = [file for file, text in pages.items() if not file.is_file() or file.read_text(encoding="utf-8") != text]
     if not options.check:
-        options.page.write_text(text, encoding="utf-8")
-    elif not options.page.is_file() or options.page.read_text(encoding="utf-8") != text:
-        print(f"{options.page}: out of date, expected the output of docs/site/results_page.py", file=sys.stderr)
-        return 1
-    return 0
+        for file, text in pages.items():
+            file.write_text(text, encoding="utf-8")
+        return 0
+    for file in out_of_date:
+        print(f"{file}: out of date, expected the output of docs/site/results_page.py", file=sys.stderr)
+    return 1 if out_of_date else 0
 
 
 if __name__ == "__main__":

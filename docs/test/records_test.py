@@ -53,6 +53,17 @@ class ResultsTest(unittest.TestCase):
         self.write("slot.json", figures=[{**RECORD["figures"][0], "met": True}])
         self.assertNotIn("**missed**", self.text())
 
+    def test_ledger_sums_runs_and_lists_failures(self):
+        self.write("slot.json", ledger={"hours": 2, "kills": 3})
+        self.write("other.json", study="other", ledger={"hours": 0.5})
+        self.text()
+        text = (self.folder / "ledger.md").read_text(encoding="utf-8")
+        self.assertIn("| hours | 2.5 |", text)
+        self.assertIn("| kills | 3 |", text)
+        self.assertIn("gap: 1.25 N", text.split("Open failures")[1])
+        self.write("slot.json", ledger={"hours": "2"})
+        self.assertEqual(self.run_page()[0], 1)
+
     def test_digits_are_kept(self):
         (self.folder / "slot.json").write_text(json.dumps(RECORD).replace("1.25", "1.2500"), encoding="utf-8")
         self.assertIn("gap: 1.2500 N", self.text())

@@ -31,7 +31,7 @@ def get(path):
     return f"GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n".encode()
 
 
-# What a client asks, and what its answer begins with. The controller's client is cnc_node.
+# What a client requests, and what its answer begins with. The controller's client is cnc_node.
 REQUESTS = {"panel": (get("/"), b"HTTP/1.1 200"), "agent": (get("/current"), b"HTTP/1.1 200"), "adapter": (b"* PING\r\n", b"*"), "focas": (b"", b"")}
 NODES = {"panel": "panel", "agent": "exchange", "adapter": "exchange", "focas": "sim"}
 

@@ -345,9 +345,9 @@ class ExchangeServer::Impl {
     return listenAt(acceptor, address, port, key);
   }
 
-  /// Room for one more client: where there is none, the quietest of those that may be closed makes it.
+  /// Space for one more client: where there is none, the quietest of those that may be closed makes it.
   template <class Client, class Close>
-  bool hasRoom(std::size_t clients, const RecencyList<Client>& quiet, Close close) {
+  bool hasSpace(std::size_t clients, const RecencyList<Client>& quiet, Close close) {
     if (clients < hub_.options.most_clients) return true;
     if (quiet.size() == 0) return false;
     close(*quiet.quietest());
@@ -357,7 +357,7 @@ class ExchangeServer::Impl {
   void acceptAgent() {
     agent_.async_accept([this](beast::error_code failed, Tcp::socket socket) {
       if (!agent_.is_open()) return;
-      if (!failed && hasRoom(hub_.connections, hub_.requesting, [](auto& quiet) { quiet.close(); }))
+      if (!failed && hasSpace(hub_.connections, hub_.requesting, [](auto& quiet) { quiet.close(); }))
         std::make_shared<AgentConnection>(std::move(socket), hub_)->read();
       acceptAgent();
     });
@@ -366,7 +366,7 @@ class ExchangeServer::Impl {
   void acceptAdapter() {
     adapter_.async_accept([this](beast::error_code failed, Tcp::socket socket) {
       if (!adapter_.is_open()) return;
-      if (!failed && hasRoom(hub_.adapters.size(), hub_.silent, [](auto& quiet) { quiet.end(); })) {
+      if (!failed && hasSpace(hub_.adapters.size(), hub_.silent, [](auto& quiet) { quiet.end(); })) {
         const auto client = std::make_shared<AdapterClient>(std::move(socket), hub_);
         hub_.adapters.insert(client);
         hub_.adapter_clients = hub_.adapters.size();

@@ -89,7 +89,7 @@ TEST(Server, AClientOfPythonReadsAgentAndAdapter) {
   EXPECT_EQ(found["items"], catalogue().size());
 }
 
-TEST(Server, SilentConnectionsMakeRoomForAnotherOne) {
+TEST(Server, SilentConnectionsMakeSpaceForAnotherOne) {
   ServerOptions options;
   options.most_clients = 4;
   ExchangeServer server(options, wallTime);

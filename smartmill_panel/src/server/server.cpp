@@ -188,7 +188,7 @@ class Server::Impl {
   void accept() {
     acceptor_.async_accept([this](beast::error_code failed, Tcp::socket socket) {
       if (!acceptor_.is_open()) return;
-      // At most two connections per client; the quietest makes room for another one.
+      // At most two connections per client; the quietest makes space for another one.
       if (!failed && open_.size() >= 2 * hub_.options.most_clients) open_.quietest()->close();
       if (!failed) std::make_shared<HttpConnection>(std::move(socket), hub_, open_)->read();
       accept();

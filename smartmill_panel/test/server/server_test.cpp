@@ -402,7 +402,7 @@ TEST_F(ServerTest, BoundsRequests) {
   EXPECT_FALSE(tooLong("/api/command", "short"));
 }
 
-TEST_F(ServerTest, SilentConnectionsMakeRoomForAnotherOne) {
+TEST_F(ServerTest, SilentConnectionsMakeSpaceForAnotherOne) {
   start(4u << 20, 4);
   asio::io_context io;
   std::vector<Tcp::socket> silent;
