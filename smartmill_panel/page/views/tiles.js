@@ -46,6 +46,8 @@ export class Tiles {
     this.load = new Tile(place, 'Spindle load [%]');
     this.loadBar = bar();
     this.feed = new Tile(place, 'Feed [mm/min]');
+    this.tool = new Tile(place, 'Tool');
+    this.tool.element.append(make('div', { style: 'height: 18px' }), this.tool.more);
     this.spindle.element.append(this.spindleBar, this.spindle.more);
     this.load.element.append(this.loadBar, this.load.more);
     this.feed.element.append(make('div', { style: 'height: 18px' }), this.feed.more);
@@ -53,7 +55,7 @@ export class Tiles {
     this.places.value.remove();
     this.axes = make('div', { class: 'axes' });
     this.places.element.append(this.axes);
-    for (const topic of ['cnc/load', 'cut/condition', 'chatter/advice', 'stability/chart']) link.on(topic, () => {});
+    for (const topic of ['cnc/load', 'cut/condition', 'chatter/advice', 'stability/chart', 'tool/condition']) link.on(topic, () => {});
     link.on('chatter/state', message => this.addVerdict(message));
     link.on('replay/state', message => {
       if (message.position < this.position) this.verdicts = [];
@@ -85,7 +87,20 @@ export class Tiles {
     this.load.setBar(this.loadBar, load_stale ? 0 : load?.spindle_load);
     this.feed.set(state ? fixed(60e3 * state.feed) : '–',
       cutting ? `${fixed(1e3 * condition.feed_per_tooth, 3)} mm/tooth, ${fixed(1e3 * condition.axial_depth, 2)} mm deep` : '', stale);
+    this.showTool(stale);
     this.showPlaces(state, stale);
+  }
+
+  // A lost tooth remains until the tool changes; the wear is that of the last steady cut.
+  showTool(stale) {
+    const tool = this.link.message('tool/condition');
+    if (!tool) return this.tool.set('–', '', stale);
+    const wear = !Number.isFinite(tool.wear) ? '' : `wear ${fixed(tool.wear, 0)} ± ${fixed(tool.wear_std, 0)} %`;
+    if (tool.broken) {
+      this.tool.set(`Tooth ${tool.tooth} lost`, `${fixed(100 * tool.loss)} ± ${fixed(100 * tool.loss_std)} % of its force`, stale, 'bad');
+    } else {
+      this.tool.set(wear ? `${fixed(tool.wear, 0)} %` : 'No loss', wear ? `${wear}, ${tool.tool}` : tool.tool, stale);
+    }
   }
 
   showLamp(gone, cutting) {

@@ -147,6 +147,7 @@ class Machine:
         self.publish("material/coefficients", m.CuttingCoefficients(
             tool="end_mill", material="al7050", ktc=796.4e6, krc=nan, kac=nan, kte=27.7e3, kre=nan, kae=nan, ktc_std=4.2e6, krc_std=nan, kac_std=nan,
             kte_std=800.0, kre_std=nan, kae_std=nan, friction_viscous=nan, friction_coulomb=nan, source="load_meter", test_count=12), latch=True)
+        self.tool(broken=False)
         steps = [m.SessionStep(name="connect", detail="all there", elapsed=1.5, state=1), m.SessionStep(name="slot test", elapsed=61.0)]
         self.publish("session/state", m.SessionState(tool="end_mill", material="al7050", running=True, steps=steps), latch=True)
         self.fleet()
@@ -166,6 +167,13 @@ class Machine:
         self.publish("loadmeter/fleet", m.FleetState(
             server="postgresql://mill_07@shop/fleet", reached=reached, message=message, behind=0 if reached else 3, between_machines=0.021,
             between_batches=0.008, between_tools=0.09, between_cuts=0.015, pairs=pairs, machines=machines), latch=True)
+
+    def tool(self, broken):
+        nan = math.nan
+        self.publish("tool/condition", self.msg.ToolCondition(
+            condition="slot_7", tool="end_mill", teeth=4, broken=broken, tooth=3 if broken else 0, revolutions=1.0 if broken else nan, loss=0.93 if broken else nan,
+            loss_std=0.04 if broken else nan, log_likelihood_ratio=60.0 if broken else nan, wear=12.4, wear_std=1.6, edge_wear=nan, edge_wear_std=nan,
+            feed_per_tooth=1e-4), latch=True)
 
     def sensor(self, calibrated):
         from geometry_msgs.msg import Vector3
@@ -281,6 +289,10 @@ def values_are_the_topics(browser, machine):
     becomes(lambda: tile(browser, "Spindle load"), "45.7")
     becomes(lambda: tile(browser, "Feed"), "738")
     becomes(lambda: tile(browser, "Cut"), "CHATTER")
+    becomes(lambda: tile(browser, "Tool"), "12 %")
+    machine.tool(broken=True)
+    becomes(lambda: tile(browser, "Tool"), "Tooth 3 lost")
+    machine.tool(broken=False)
     becomes(lambda: "1203 Hz, 85 N" in browser.text(".tile.lamp .more"), True)
     becomes(lambda: browser.js("[...document.querySelectorAll('.axes b')].map(e => e.textContent)"), ["-12.346", "50.000", "-100.000"])
     for word in ("Connected", "Armed", "DNC", "running", "no alarm", "Chatter"):
