@@ -4,8 +4,9 @@
 
 #include "search/adoption.h"
 #include "search/candidate_round.h"
-#include "search/steps/search_step.h"
+#include "search/steps/steps.h"
 #include "smartmill_core/formatted.h"
+#include "smartmill_discrepancy/search/refinement.h"
 #include "smartmill_discrepancy/search/validation.h"
 
 namespace smartmill::discrepancy {
@@ -24,11 +25,9 @@ struct RoundsOptions {
   double round_work = 2.0, last_round_work = 1.0, whole_records_work = 2.0, later_work = 4.0;
 };
 
-/// Rounds of the search, each of which adds one effect: the best fit of a round is adopted and kept if the
-/// exact twin and the held-out tests support it.
-class Rounds : public SearchStep {
+class Rounds {
  public:
-  void run(SearchState& state) override;
+  void run(SearchState& state);
 
  private:
   // Fit and derivatives at the start of a round.
@@ -43,7 +42,6 @@ class Rounds : public SearchStep {
   void reportProgress(const SearchState& state) const;
 
   RoundsOptions options_;
-  Adoption adoption_;
   bool reverted_ = false;  // to the start of the last round, whose predictions remain valid
   std::size_t rejections_in_a_row_ = 0;
 };
@@ -68,8 +66,9 @@ bool Rounds::addEffect(SearchState& s) {
   if (!round.improved() || s.bench.cancelled()) return false;
   const Hypothesis* const newest = round.best().state.members.back().hypothesis;
   RoundStart before{s.now, std::move(s.tangents)};
-  adoption_.adopt(s, std::move(round.best()));
-  adoption_.dropUnneeded(s);
+  adopt(s, std::move(round.best()));
+  // Earlier effects may have imitated the new one.
+  s.now = withoutUnneeded(s.quick, std::move(s.now), s.tangents, s.options, false);
   const double exact_squares = s.bench.exactSquares(s.now.state);
   if (!(exact_squares < s.exact_now)) {
     s.options.log(s.gapText(exact_squares) + " when simulated exactly, rejected: " + newest->title());
@@ -142,8 +141,8 @@ void Rounds::reportProgress(const SearchState& s) const {
 
 }  // namespace
 
-std::unique_ptr<SearchStep> makeRounds() {
-  return std::make_unique<Rounds>();
+void addEffects(SearchState& s) {
+  Rounds().run(s);
 }
 
 }  // namespace smartmill::discrepancy
