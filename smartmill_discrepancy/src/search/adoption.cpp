@@ -9,16 +9,6 @@
 namespace smartmill::discrepancy {
 namespace {
 
-struct AdoptionOptions {
-  int passes = 4;  ///< of a refit with corrected twin
-  /// [1] Gain over the squares beyond which a fit has left the range of its derivatives.
-  double far = 0.01;
-  /// [1] Squares over the current ones above which a fit with stated nominal values is given up.
-  double give_up_ratio = 2.0;
-};
-
-const AdoptionOptions LIMITS;
-
 using PieceValues = std::map<std::string, std::vector<double>>;  // values by the name of a piece
 
 // The form of an effect with exactly these pieces.
@@ -80,7 +70,7 @@ void refitFromStated(SearchState& s) {
   FitOptions with_stated = FitOptions::closely();
   with_stated.nominal_free = false;
   const FitResult at_stated = s.quick.fit(stated, nullptr, with_stated);
-  if (!at_stated.converged || at_stated.chi2 > LIMITS.give_up_ratio * s.now.chi2) return;
+  if (!at_stated.converged || at_stated.chi2 > s.options.stated_give_up_ratio * s.now.chi2) return;
   NominalTangents there = s.bench.linearise(s.nearStated(at_stated.state));
   FitResult free = s.quick.fit(at_stated.state, &there, FitOptions::closely());
   if (!free.converged || free.bic >= s.now.bic) return;
@@ -101,14 +91,14 @@ void adopt(SearchState& s, FitResult best) {
   }
   const FitResult refined = s.refit(best, FitOptions::closely());
   // Derivatives are valid near the start of the fit.
-  if (best.bic - refined.bic > LIMITS.far * refined.bic) {
+  if (best.bic - refined.bic > s.options.far * refined.bic) {
     s.linearise(refined.state);
   } else {
     s.lineariseBy(std::move(s.tangents), refined.state);
   }
   s.now = s.withPhasesAligned(s.refit(refined, FitOptions::closely()));
   refitFromStated(s);
-  for (int pass = 0; pass < LIMITS.passes; ++pass) {
+  for (int pass = 0; pass < s.options.refit_passes; ++pass) {
     s.lineariseBy(std::move(s.tangents), s.now.state);
     if (s.bench.cancelled()) break;
     const double before = s.now.bic;

@@ -13,9 +13,8 @@
 namespace smartmill::discrepancy {
 
 // A negligible share of the excess is not a missing effect.
-CandidateRound::CandidateRound(SearchState& state, const CandidateRoundOptions& options)
+CandidateRound::CandidateRound(SearchState& state)
     : state_(state),
-      options_(options),
       best_(state.now),
       required_gain_(std::max(state.options.min_gain, state.options.min_share * state.excess(state.now))) {
 }
@@ -41,9 +40,10 @@ bool CandidateRound::isRejected(const Hypothesis* hypothesis) const {
 // Weak hypotheses may gain more than predicted, unless nominal values can replace them; they are fitted if no
 // strong one removes much.
 bool CandidateRound::isWeak(const PredictedGain& predicted) const {
-  return state_.whole_records && state_.excess(best_) > options_.unremoved * state_.excess(state_.now) &&
-         predicted.gain < required_gain_ && predicted.gain > options_.weak * required_gain_ &&
-         predicted.independent_share > options_.min_independent_share;
+  return state_.whole_records &&
+         state_.excess(best_) > state_.options.unremoved * state_.excess(state_.now) &&
+         predicted.gain < required_gain_ && predicted.gain > state_.options.weak * required_gain_ &&
+         predicted.independent_share > state_.options.min_independent_share;
 }
 
 bool CandidateRound::isWorthFitting(const PredictedGain& predicted, double largest) const {
@@ -51,14 +51,15 @@ bool CandidateRound::isWorthFitting(const PredictedGain& predicted, double large
   const std::size_t fitted = candidates_.size();
   const bool weak = isWeak(predicted);
   if (predicted.gain < required_gain_ && !weak) return false;
-  if (weak ? weak_fitted_ >= options_.max_weak : fitted - weak_fitted_ >= state_.options.fitted_per_round)
+  if (weak ? weak_fitted_ >= state_.options.max_weak
+           : fitted - weak_fitted_ >= state_.options.fitted_per_round)
     return false;
-  if (fitted >= 2 && predicted.gain < options_.min_of_largest * largest) return false;
+  if (fitted >= 2 && predicted.gain < state_.options.min_of_largest * largest) return false;
   // A fit that leaves almost nothing can be surpassed only by a similar predicted gain, corrected by the
   // error of its own prediction.
   const double beyond = std::max(1.0, (state_.now.bic - best_.bic) / best_predicted_);
-  return !(state_.excess(best_) < options_.almost_nothing * state_.excess(state_.now) &&
-           beyond * predicted.gain < options_.similar * best_predicted_);
+  return !(state_.excess(best_) < state_.options.almost_nothing * state_.excess(state_.now) &&
+           beyond * predicted.gain < state_.options.similar * best_predicted_);
 }
 
 // A small share of the whole excess may be all of it in the channels concerned: fits hypotheses that the
@@ -68,7 +69,7 @@ void CandidateRound::fitSupportedByTests() {
   screenRemembered(s.quick, s.now, s.tangents, s.options.min_gain, &s.memory, &s.screened);
   std::size_t fitted = 0;
   for (const PredictedGain& p : s.screened) {
-    if (fitted >= options_.max_supported || p.gain < s.options.min_gain || s.bench.cancelled()) return;
+    if (fitted >= state_.options.max_supported || p.gain < s.options.min_gain || s.bench.cancelled()) return;
     const bool tried = std::any_of(candidates_.begin(), candidates_.end(),
                                    [&](const Candidate& r) { return r.hypothesis == p.hypothesis; });
     if (tried || isRejected(p.hypothesis) || p.start.empty() ||
@@ -103,10 +104,10 @@ void CandidateRound::fitHypothesis(const PredictedGain& predicted) {
 // tests prefer a larger scale.
 FitResult CandidateRound::continued(FitResult tried, const FitOptions& options) const {
   SearchState& s = state_;
-  if (!tried.converged || s.now.bic - tried.bic < options_.continued_share * s.excess(s.now) ||
+  if (!tried.converged || s.now.bic - tried.bic < state_.options.continued_share * s.excess(s.now) ||
       isImprovement(tried))
     return tried;
-  if (fittedScale(s.quick, tried, s.now).scale < options_.continued_scale) return tried;
+  if (fittedScale(s.quick, tried, s.now).scale < state_.options.continued_scale) return tried;
   NominalTangents there = s.bench.lineariseBy(s.tangents, s.nearStated(tried.state));
   FitResult on = s.quick.fit(tried.state, &there, options);
   // The other candidates of the round are compared as before.
@@ -132,7 +133,7 @@ bool CandidateRound::isImprovement(const FitResult& tried) const {
   if (!tried.converged) return false;
   const double gain = state_.now.bic - tried.bic;
   if (gain <= requiredGain(state_.quick.runner(), state_.now, tried, state_.options)) return false;
-  return gain > options_.large_share * state_.excess(state_.now) ||
+  return gain > state_.options.large_share * state_.excess(state_.now) ||
          ValidationResult::isAcceptedByFitted(fittedScale(state_.quick, tried, state_.now));
 }
 

@@ -41,12 +41,6 @@ struct ScreeningMemory {
   }
 };
 
-struct ScreeningOptions {
-  /// [1] of the required gain: a smaller remembered gain is not simulated again. Between two states of a
-  /// search gains rarely grow tenfold.
-  double min_remembered = 0.1;
-};
-
 /// Score test of each hypothesis at a fitted state, best first; hypotheses without any response come last.
 /// When cancelled, it returns the predictions so far.
 /// @param tangents of the nominal values at the state @param hypotheses existing members are skipped
@@ -54,7 +48,7 @@ struct ScreeningOptions {
 /// with a far smaller remembered gain are approximate and have no start
 std::vector<PredictedGain> screen(const Fitter& fitter, const FitResult& now, const NominalTangents& tangents,
                                   const std::vector<Hypothesis>& hypotheses, double required_gain,
-                                  ScreeningMemory* memory, const ScreeningOptions& options = {});
+                                  ScreeningMemory* memory);
 
 /// Simulates the approximate predictions whose gain exceeds a minimum.
 void screenRemembered(const Fitter& fitter, const FitResult& now, const NominalTangents& tangents,

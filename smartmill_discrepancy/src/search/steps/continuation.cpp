@@ -10,13 +10,11 @@ namespace {
 // Limits the gains on whole records by the last screening of the shortened ones if both are nearly explained:
 // squares grow with the samples, those of effects that grow in time with their third power.
 void limitGains(SearchState& s, const SearchState& shortened) {
-  // [1] of the required gain: smaller gains of shortened records, in proportion to the samples, are not
-  // screened again.
-  constexpr double WORTH_SCREENING = 0.25;
   if (!shortened.isExplained() || !s.isExplained()) return;
   const double longer = s.bench.samples() / shortened.bench.samples();
   for (const PredictedGain& p : shortened.screened)
-    s.memory.gain_limits[p.hypothesis] = p.gain * std::max(std::pow(longer, 3), longer / WORTH_SCREENING);
+    s.memory.gain_limits[p.hypothesis] =
+        p.gain * std::max(std::pow(longer, 3), longer / s.options.worth_screening);
 }
 
 }  // namespace

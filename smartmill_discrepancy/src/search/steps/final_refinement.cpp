@@ -9,9 +9,8 @@ namespace {
 // Candidates of a round are compared before convergence; compares their refined fits.
 // @return false: the twin gives no finite values
 bool swapBetterAlternatives(SearchState& s) {
-  constexpr int MAX_SWAPS = 3;  // limits the time
   SearchResult& result = s.result;
-  for (int swap = 0; swap < MAX_SWAPS && !s.bench.cancelled(); ++swap) {
+  for (int swap = 0; swap < s.options.max_swaps && !s.bench.cancelled(); ++swap) {
     const auto ahead = [&](const Alternative& r) { return r.delta_bic - result.contribution[r.member]; };
     const auto best =
         std::max_element(result.alternatives.begin(), result.alternatives.end(),

@@ -4,13 +4,12 @@
 namespace smartmill::discrepancy {
 
 void releaseGuidance(SearchState& s) {
-  constexpr double MAX_RATIO = 2.0;  // of free to guided squares: the free simulation follows the records
   if (!s.bench.guidance().isActive()) return;
-  refitSimplerAlternatives(s.quick, s.now, s.tangents, &s.result.candidates);
+  refitSimplerAlternatives(s.quick, s.now, s.tangents, s.options, &s.result.candidates);
   const double guided = s.bench.exactSquares(s.now.state), free = s.bench.guidance().freeSquares(s.now.state);
   s.options.log("guided by the tool's displacement " + s.gapText(guided) + ", simulated freely " +
                 s.gapText(free));
-  if (free < MAX_RATIO * guided) s.bench.guidance().set(false);
+  if (free < s.options.max_free_ratio * guided) s.bench.guidance().set(false);
 }
 
 }  // namespace smartmill::discrepancy

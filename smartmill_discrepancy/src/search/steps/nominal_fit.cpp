@@ -9,21 +9,6 @@
 namespace smartmill::discrepancy {
 namespace {
 
-struct NominalFitOptions {
-  int fresh_passes = 2;   ///< with new derivatives; later passes are close to each other and reuse them
-  int passes = 3;         ///< distant nominal values require new derivatives at each
-  double settled = 1e-3;  ///< [1] of the cost: gain of the last pass
-  /// The same for records without spindle angle: alignment is sensitive to the nominal values, so it needs
-  /// tighter convergence.
-  int passes_without_angle = 8;
-  double settled_without_angle = 1e-6;
-  FitOptions last{3, 1e-5};  ///< with the derivatives of the last pass, near its end
-  /// [1] Squares of the guided first pass over those of the free fit above which guidance is given up.
-  double give_up_ratio = 4.0;
-};
-
-const NominalFitOptions LIMITS;
-
 // Returns to the stated values if the fit moved to values at which the tool chatters.
 void useStatedIfBetter(SearchState& s) {
   FitState stated = s.now.state;
@@ -42,7 +27,7 @@ void fitNominal(SearchState& s) {
   const FitResult free = s.now;
   NominalTangents free_tangents = std::move(s.tangents);
   s.bench.guidance().set(true);
-  fitNominalFrom(s, stated, LIMITS.give_up_ratio * free.chi2);
+  fitNominalFrom(s, stated, s.options.guided_give_up_ratio * free.chi2);
   if (s.now.chi2 < free.chi2) {
     s.options.log("  guided by the displacement of the tool");
     return;
@@ -57,12 +42,12 @@ void fitNominalFrom(SearchState& s, const std::vector<double>& from, double give
   s.now = FitResult{};
   s.now.state.nominal = from;
   const bool without_angle = s.bench.alignment().phasesEstimated();
-  const int passes = without_angle ? LIMITS.passes_without_angle : LIMITS.passes;
-  const double share = without_angle ? LIMITS.settled_without_angle : LIMITS.settled;
+  const int passes = without_angle ? s.options.nominal_passes_without_angle : s.options.nominal_passes;
+  const double share = without_angle ? s.options.nominal_settled_without_angle : s.options.nominal_settled;
   bool settled = false;
   for (int pass = 0; pass < passes; ++pass) {
     s.bench.guidance().updateWeights(s.nearStated(s.now.state));
-    if (pass < LIMITS.fresh_passes) {
+    if (pass < s.options.fresh_nominal_passes) {
       s.linearise(s.now.state);
     } else {
       s.lineariseBy(std::move(s.tangents), s.now.state);
@@ -81,7 +66,7 @@ void fitNominalFrom(SearchState& s, const std::vector<double>& from, double give
   } else {
     s.linearise(s.now.state);
   }
-  s.now = s.withPhasesAligned(s.refit(s.now, LIMITS.last));
+  s.now = s.withPhasesAligned(s.refit(s.now, {3, 1e-5}));
   useStatedIfBetter(s);
   s.result.null = s.now;
   s.options.log("nominal model, values free within their uncertainty: " + s.gapText(s.now.chi2));

@@ -17,14 +17,6 @@ bool isMember(const FitState& state, const std::string& effect) {
                      [&](const Member& m) { return m.hypothesis->effect == effect; });
 }
 
-struct RoundsOptions {
-  /// Consecutive rejections by held-out tests that end the search; limits its time.
-  std::size_t max_rejections = 3;
-  /// Work in units of a nominal fit, from typical campaigns: a round, the last round, the nominal fit of
-  /// whole records, and refinement with validation. Steers the progress only.
-  double round_work = 2.0, last_round_work = 1.0, whole_records_work = 2.0, later_work = 4.0;
-};
-
 class Rounds {
  public:
   void run(SearchState& state);
@@ -41,7 +33,6 @@ class Rounds {
   void revertTo(SearchState& state, RoundStart start) const;
   void reportProgress(const SearchState& state) const;
 
-  RoundsOptions options_;
   bool reverted_ = false;  // to the start of the last round, whose predictions remain valid
   std::size_t rejections_in_a_row_ = 0;
 };
@@ -88,7 +79,7 @@ bool Rounds::addEffect(SearchState& s) {
         rejected_by_heldout.end())
       rejected_by_heldout.push_back(newest);
     reject(s, std::move(before), newest);
-    return rejections_in_a_row_ < options_.max_rejections;
+    return rejections_in_a_row_ < s.options.max_rejections;
   }
   rejections_in_a_row_ = 0;
   s.rejected.clear();  // they were rejected without the new effect
@@ -131,12 +122,11 @@ void Rounds::reject(SearchState& s, RoundStart start, const Hypothesis* newest) 
   reverted_ = true;
 }
 
+// Work in units of a nominal fit, from typical campaigns: a round 2, the last one 1, the nominal fit of whole
+// records 2, refinement with validation 4.
 void Rounds::reportProgress(const SearchState& s) const {
-  const double whole = options_.whole_records_work;
-  const double done =
-      1.0 + options_.round_work * static_cast<double>(s.rounds) + (s.whole_records ? whole : 0.0);
-  const double left = options_.later_work + options_.last_round_work + (s.whole_records ? 0.0 : whole);
-  s.options.reportProgress(done / (done + left));
+  const double done = 1.0 + 2.0 * static_cast<double>(s.rounds) + (s.whole_records ? 2.0 : 0.0);
+  s.options.reportProgress(done / (done + (s.whole_records ? 5.0 : 7.0)));
 }
 
 }  // namespace
