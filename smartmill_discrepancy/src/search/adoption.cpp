@@ -61,23 +61,6 @@ std::optional<FitState> withPiecesMerged(const FitState& state, const std::vecto
   return {};
 }
 
-// An effect fitted next to strongly displaced nominal values may be in a wrong valley: fits it with stated
-// values, then with all values free. The quick twin remains corrected at the last state.
-void refitFromStated(SearchState& s) {
-  if (s.nearStated(s.now.state).nominal == s.now.state.nominal) return;
-  FitState stated = s.now.state;
-  stated.nominal.assign(stated.nominal.size(), 0.0);
-  FitOptions with_stated = FitOptions::closely();
-  with_stated.nominal_free = false;
-  const FitResult at_stated = s.quick.fit(stated, nullptr, with_stated);
-  if (!at_stated.converged || at_stated.chi2 > s.options.stated_give_up_ratio * s.now.chi2) return;
-  NominalTangents there = s.bench.linearise(s.nearStated(at_stated.state));
-  FitResult free = s.quick.fit(at_stated.state, &there, FitOptions::closely());
-  if (!free.converged || free.bic >= s.now.bic) return;
-  s.lineariseBy(std::move(there), free.state);
-  s.now = s.withPhasesAligned(s.refit(free, FitOptions::closely()));
-}
-
 }  // namespace
 
 void adopt(SearchState& s, FitResult best) {
@@ -97,7 +80,6 @@ void adopt(SearchState& s, FitResult best) {
     s.lineariseBy(std::move(s.tangents), refined.state);
   }
   s.now = s.withPhasesAligned(s.refit(refined, FitOptions::closely()));
-  refitFromStated(s);
   for (int pass = 0; pass < s.options.refit_passes; ++pass) {
     s.lineariseBy(std::move(s.tangents), s.now.state);
     if (s.bench.cancelled()) break;

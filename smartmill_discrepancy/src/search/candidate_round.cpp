@@ -26,8 +26,7 @@ void CandidateRound::run(bool screened_again) {
   for (const PredictedGain& p : s.screened) {
     if (isRejected(p.hypothesis)) continue;
     if (s.bench.cancelled()) break;
-    if (!isWorthFitting(p, s.screened.front().gain)) continue;
-    if (isWeak(p)) ++weak_fitted_;
+    if (!isWorthFitting(p)) continue;
     fitHypothesis(p);
   }
   if (s.whole_records && !improved_) fitSupportedByTests();
@@ -37,24 +36,9 @@ bool CandidateRound::isRejected(const Hypothesis* hypothesis) const {
   return std::find(state_.rejected.begin(), state_.rejected.end(), hypothesis) != state_.rejected.end();
 }
 
-// Weak hypotheses may gain more than predicted, unless nominal values can replace them; they are fitted if no
-// strong one removes much.
-bool CandidateRound::isWeak(const PredictedGain& predicted) const {
-  return state_.whole_records &&
-         state_.excess(best_) > state_.options.unremoved * state_.excess(state_.now) &&
-         predicted.gain < required_gain_ && predicted.gain > state_.options.weak * required_gain_ &&
-         predicted.independent_share > state_.options.min_independent_share;
-}
-
-bool CandidateRound::isWorthFitting(const PredictedGain& predicted, double largest) const {
+bool CandidateRound::isWorthFitting(const PredictedGain& predicted) const {
   if (predicted.start.empty()) return false;
-  const std::size_t fitted = candidates_.size();
-  const bool weak = isWeak(predicted);
-  if (predicted.gain < required_gain_ && !weak) return false;
-  if (weak ? weak_fitted_ >= state_.options.max_weak
-           : fitted - weak_fitted_ >= state_.options.fitted_per_round)
-    return false;
-  if (fitted >= 2 && predicted.gain < state_.options.min_of_largest * largest) return false;
+  if (predicted.gain < required_gain_ || candidates_.size() >= state_.options.fitted_per_round) return false;
   // A fit that leaves almost nothing can be surpassed only by a similar predicted gain, corrected by the
   // error of its own prediction.
   const double beyond = std::max(1.0, (state_.now.bic - best_.bic) / best_predicted_);

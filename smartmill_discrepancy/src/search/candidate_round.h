@@ -21,8 +21,7 @@ class CandidateRound {
 
  private:
   bool isRejected(const Hypothesis* hypothesis) const;
-  bool isWeak(const PredictedGain& predicted) const;
-  bool isWorthFitting(const PredictedGain& predicted, double largest) const;
+  bool isWorthFitting(const PredictedGain& predicted) const;
   void fitSupportedByTests();
   void fitHypothesis(const PredictedGain& predicted);
   FitResult continued(FitResult tried, const FitOptions& options) const;
@@ -32,8 +31,7 @@ class CandidateRound {
   SearchState& state_;
   FitResult best_;
   double best_predicted_ = 0.0;
-  double required_gain_;         // minimum BIC gain
-  std::size_t weak_fitted_ = 0;  // fitted weak hypotheses
+  double required_gain_;  // minimum BIC gain
   bool improved_ = false;
   std::vector<Candidate> candidates_;
 };

@@ -64,7 +64,6 @@ PredictedGain predictGain(const Fitter& fitter, const FitResult& now, const Proj
     std::vector<double> start = startOf(h, probe, reduction.amplitudes);
     if (start == probe.null) continue;  // the optimum is outside the bounds
     best.gain = reduction.gain;
-    best.independent_share = reduction.independent_share;
     best.start = std::move(start);
     best.prior_evidence = {};
     if (best.gain > ValidationResult::requiredSquares()) {

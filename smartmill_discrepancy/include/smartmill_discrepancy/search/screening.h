@@ -14,11 +14,8 @@ namespace smartmill::discrepancy {
 /// Predicted gain of a hypothesis from its derivatives, with nominal values and members free.
 struct PredictedGain {
   const Hypothesis* hypothesis = nullptr;
-  double gain = 0.0;         ///< reduction of chi2 in linear approximation
-  bool approximate = false;  ///< from the previous simulation: only the gain is valid
-  /// [1] Share of its change that nominal values and members cannot replace; a gain with a small share means
-  /// that those are off.
-  double independent_share = 1.0;
+  double gain = 0.0;          ///< reduction of chi2 in linear approximation
+  bool approximate = false;   ///< from the previous simulation: only the gain is valid
   std::vector<double> start;  ///< coordinates from which a fit starts
   std::vector<double>
       null;  ///< point without effect from which start was reached; empty: start is used as it is

@@ -41,8 +41,6 @@ struct SearchOptions {
   /// [1] standard deviations from the stated values within which derivatives are taken: missing effects pull
   /// nominal values further away than they are wrong.
   double near_stated = 2.5;
-  /// [1] Squares of the guided first pass over those of the free fit above which guidance is given up.
-  double guided_give_up_ratio = 4.0;
   /// [1] Free over guided squares up to which the free simulation follows the records.
   double max_free_ratio = 2.0;
 
@@ -54,18 +52,9 @@ struct SearchOptions {
 
   // Which hypotheses a round fits
   std::size_t fitted_per_round = 5;  ///< after screening; limits the time
-  /// [1] of the largest predicted gain: smaller ones are fitted only among the first two.
-  double min_of_largest = 0.02;
   /// [1] of the excess: a fit that leaves less can be surpassed only by a similar predicted gain.
   double almost_nothing = 0.02;
-  double similar = 0.5;  ///< [1] of the predicted gain of that fit
-  /// [1] of the required gain: a weak hypothesis, whose predicted gain is below the required one, may gain
-  /// more than the linear prediction.
-  double weak = 0.25;
-  double min_independent_share = 0.02;  ///< [1] of a weak hypothesis: nominal values can replace the rest
-  /// [1] of the excess that the best fit leaves: weak hypotheses are fitted if no strong one removes much.
-  double unremoved = 0.9;
-  std::size_t max_weak = 2;       ///< weak hypotheses fitted per round; limits its time
+  double similar = 0.5;           ///< [1] of the predicted gain of that fit
   std::size_t max_supported = 2;  ///< fits of hypotheses that only the fitted tests support
   /// [1] Effect scale and gain over the excess from which a fit without improvement is continued: the linear
   /// prediction was too short.
@@ -75,9 +64,6 @@ struct SearchOptions {
   int refit_passes = 4;  ///< with corrected twin
   /// [1] Gain over the squares beyond which a fit has left the range of its derivatives.
   double far = 0.01;
-  /// [1] Squares over the current ones above which a fit with stated nominal values is given up.
-  double stated_give_up_ratio = 2.0;
-  std::size_t max_rejections = 3;  ///< in a row by held-out tests, which end the search; limits its time
   /// [1] of the required gain: smaller gains of shortened records, in proportion to the samples, are not
   /// screened again on the whole ones.
   double worth_screening = 0.25;

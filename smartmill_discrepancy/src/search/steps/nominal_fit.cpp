@@ -27,7 +27,7 @@ void fitNominal(SearchState& s) {
   const FitResult free = s.now;
   NominalTangents free_tangents = std::move(s.tangents);
   s.bench.guidance().set(true);
-  fitNominalFrom(s, stated, s.options.guided_give_up_ratio * free.chi2);
+  fitNominalFrom(s, stated);
   if (s.now.chi2 < free.chi2) {
     s.options.log("  guided by the displacement of the tool");
     return;
@@ -38,7 +38,7 @@ void fitNominal(SearchState& s) {
   s.exact_now = s.bench.exactSquares(s.now.state);
 }
 
-void fitNominalFrom(SearchState& s, const std::vector<double>& from, double give_up_above) {
+void fitNominalFrom(SearchState& s, const std::vector<double>& from) {
   s.now = FitResult{};
   s.now.state.nominal = from;
   const bool without_angle = s.bench.alignment().phasesEstimated();
@@ -58,7 +58,6 @@ void fitNominalFrom(SearchState& s, const std::vector<double>& from, double give
     if (!fit.converged) break;
     settled = pass > 0 && std::abs(s.now.bic - fit.bic) < std::max(1.0, share * fit.bic);
     s.now = std::move(fit);
-    if (s.now.chi2 > give_up_above) return;
     if (settled || s.bench.cancelled()) break;
   }
   if (settled && !without_angle) {

@@ -34,7 +34,6 @@ class Rounds {
   void reportProgress(const SearchState& state) const;
 
   bool reverted_ = false;  // to the start of the last round, whose predictions remain valid
-  std::size_t rejections_in_a_row_ = 0;
 };
 
 void Rounds::run(SearchState& s) {
@@ -79,9 +78,8 @@ bool Rounds::addEffect(SearchState& s) {
         rejected_by_heldout.end())
       rejected_by_heldout.push_back(newest);
     reject(s, std::move(before), newest);
-    return rejections_in_a_row_ < s.options.max_rejections;
+    return true;
   }
-  rejections_in_a_row_ = 0;
   s.rejected.clear();  // they were rejected without the new effect
   rejected_by_heldout.erase(std::remove(rejected_by_heldout.begin(), rejected_by_heldout.end(), newest),
                             rejected_by_heldout.end());
@@ -116,7 +114,6 @@ void Rounds::revertTo(SearchState& s, RoundStart start) const {
 }
 
 void Rounds::reject(SearchState& s, RoundStart start, const Hypothesis* newest) {
-  ++rejections_in_a_row_;
   s.rejected.push_back(newest);
   revertTo(s, std::move(start));
   reverted_ = true;

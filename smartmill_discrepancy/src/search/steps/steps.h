@@ -1,6 +1,5 @@
 #pragma once
 
-#include <limits>
 #include <vector>
 
 #include "search/search_state.h"
@@ -15,9 +14,8 @@ namespace smartmill::discrepancy {
 void fitNominal(SearchState& state);
 
 /// The same, only as the state is guided.
-/// @param from start @param give_up_above squares at which the fit ends
-void fitNominalFrom(SearchState& state, const std::vector<double>& from,
-                    double give_up_above = std::numeric_limits<double>::infinity());
+/// @param from start
+void fitNominalFrom(SearchState& state, const std::vector<double>& from);
 
 /// Continues a search on shortened records with the whole records: nominal values and effects start from its
 /// result.
