@@ -74,29 +74,13 @@ void CandidateRound::fitHypothesis(const PredictedGain& predicted) {
   options.to_beat = std::min(best_.chi2 + best_.penalty, s.now.chi2 + s.now.penalty - required_gain_);
   FitResult tried;
   candidates_.push_back(fitCandidate(
-      s.quick, predicted, s.rounds, s.now,
-      [&] { return continued(s.quick.fit(with, &s.tangents, options), options); }, &tried));
+      s.quick, predicted, s.rounds, s.now, [&] { return s.quick.fit(with, &s.tangents, options); }, &tried));
   s.options.log(formatted("  predicted gain %.4g, gain %.4g  ", predicted.gain, s.now.bic - tried.bic) +
                 describe(tried.state.members.back()));
   if (!ranksAhead(tried) || !isImprovement(tried)) return;
   best_ = tried;
   best_predicted_ = predicted.gain;
   improved_ = true;
-}
-
-// Continues a fit with the twin corrected at its end if the gain is too small for an improvement but the
-// tests prefer a larger scale.
-FitResult CandidateRound::continued(FitResult tried, const FitOptions& options) const {
-  SearchState& s = state_;
-  if (!tried.converged || s.now.bic - tried.bic < state_.options.continued_share * s.excess(s.now) ||
-      isImprovement(tried))
-    return tried;
-  if (fittedScale(s.quick, tried, s.now).scale < state_.options.continued_scale) return tried;
-  NominalTangents there = s.bench.lineariseBy(s.tangents, s.nearStated(tried.state));
-  FitResult on = s.quick.fit(tried.state, &there, options);
-  // The other candidates of the round are compared as before.
-  s.bench.lineariseBy(std::move(there), s.nearStated(s.now.state));
-  return on.converged && on.bic < tried.bic ? on : tried;
 }
 
 // Fits are not converged yet: of two similar ones the one with fewer values ranks ahead.

@@ -24,7 +24,6 @@ class CandidateRound {
   bool isWorthFitting(const PredictedGain& predicted) const;
   void fitSupportedByTests();
   void fitHypothesis(const PredictedGain& predicted);
-  FitResult continued(FitResult tried, const FitOptions& options) const;
   bool ranksAhead(const FitResult& tried) const;
   bool isImprovement(const FitResult& tried) const;
 

@@ -56,9 +56,6 @@ struct SearchOptions {
   double almost_nothing = 0.02;
   double similar = 0.5;           ///< [1] of the predicted gain of that fit
   std::size_t max_supported = 2;  ///< fits of hypotheses that only the fitted tests support
-  /// [1] Effect scale and gain over the excess from which a fit without improvement is continued: the linear
-  /// prediction was too short.
-  double continued_scale = 1.25, continued_share = 0.1;
 
   // Adoption of the best fit of a round
   int refit_passes = 4;  ///< with corrected twin
