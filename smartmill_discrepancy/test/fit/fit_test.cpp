@@ -84,7 +84,9 @@ TEST(Fitter, DeviationsAreCalibratedWithCorrelatedNoise) {
   constexpr double SHARE = 0.8;
   std::mt19937_64 random(23);
   const MachineModel nominal = spindleOnly();
-  const NominalFreedom freedom(nominal);
+  MachineModel certain = nominal;
+  certain.uncertainty.spindle = 0.0;
+  const NominalFreedom freedom(certain);  // without nominal values
   MachineModel machine = nominal;
   machine.effects.push_back(stribeckFriction(0.4, 2500.0));
   Coverage unweighted, whitened;
@@ -95,7 +97,7 @@ TEST(Fitter, DeviationsAreCalibratedWithCorrelatedNoise) {
     const Hypothesis& stribeck = effectOf(hypotheses, "stribeck_friction");
     TwinRunner runner(data, {0, 1, 2, 3, 4, 5}, 1, 1);
     const Fitter fitter(runner, freedom);
-    const FitOptions options{30, 1e-10, false};
+    const FitOptions options{30, 1e-10};
     const FitState start{
         std::vector<double>(freedom.coordinates().size(), 0.0), {{&stribeck, {0.4, std::log(2500.0)}}}, {}};
     const FitResult first = fitter.fit(start, nullptr, options);

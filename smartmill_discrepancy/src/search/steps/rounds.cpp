@@ -12,11 +12,6 @@
 namespace smartmill::discrepancy {
 namespace {
 
-bool isMember(const FitState& state, const std::string& effect) {
-  return std::any_of(state.members.begin(), state.members.end(),
-                     [&](const Member& m) { return m.hypothesis->effect == effect; });
-}
-
 class Rounds {
  public:
   void run(SearchState& state);
@@ -30,7 +25,6 @@ class Rounds {
   bool addEffect(SearchState& state);
   bool isSupportedByHeldout(SearchState& state, const FitResult& before, const Hypothesis& newest) const;
   void reject(SearchState& state, RoundStart start, const Hypothesis* newest);
-  void revertTo(SearchState& state, RoundStart start) const;
   void reportProgress(const SearchState& state) const;
 
   bool reverted_ = false;  // to the start of the last round, whose predictions remain valid
@@ -62,14 +56,7 @@ bool Rounds::addEffect(SearchState& s) {
   const double exact_squares = s.bench.exactSquares(s.now.state);
   if (!(exact_squares < s.exact_now)) {
     s.options.log(s.gapText(exact_squares) + " when simulated exactly, rejected: " + newest->title());
-    // An effect already dropped as unnecessary needs no smaller steps.
-    if (isMember(s.now.state, newest->effect) && s.bench.refineQuick()) {
-      s.options.log("  repeated with smaller steps");
-      s.memory.clear();
-      revertTo(s, std::move(before));
-    } else {
-      reject(s, std::move(before), newest);
-    }
+    reject(s, std::move(before), newest);
     return true;
   }
   auto& rejected_by_heldout = s.result.rejected;
@@ -101,7 +88,9 @@ bool Rounds::isSupportedByHeldout(SearchState& s, const FitResult& before, const
   return false;
 }
 
-void Rounds::revertTo(SearchState& s, RoundStart start) const {
+void Rounds::reject(SearchState& s, RoundStart start, const Hypothesis* newest) {
+  s.rejected.push_back(newest);
+  reverted_ = true;
   ++s.uncounted_rounds;
   s.now = std::move(start.fit);
   if (s.bench.alignment().alignPhases(s.now.state) > 0.0) {
@@ -111,12 +100,6 @@ void Rounds::revertTo(SearchState& s, RoundStart start) const {
   }
   s.now = s.refit(s.now, FitOptions::closely());
   s.exact_now = s.bench.exactSquares(s.now.state);
-}
-
-void Rounds::reject(SearchState& s, RoundStart start, const Hypothesis* newest) {
-  s.rejected.push_back(newest);
-  revertTo(s, std::move(start));
-  reverted_ = true;
 }
 
 // Work in units of a nominal fit, from typical campaigns: a round 2, the last one 1, the nominal fit of whole
