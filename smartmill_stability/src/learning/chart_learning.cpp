@@ -17,12 +17,13 @@ namespace smartmill::stability {
 namespace {
 
 constexpr double INFINITE = std::numeric_limits<double>::infinity();
-constexpr double SPEED_STEP = 0.015;  // [1] between speeds of the grid
-constexpr double DEPTH_STEP = 0.06;   // [1] between depths of the grid
-constexpr double LEAST_DEPTH = 0.01;  // [1] of the largest
-constexpr double SAME_SPEED = 0.002;  // [1] of a cut that was made
-constexpr double LINES = 24.0;        // frequencies of a mode, dense around it
-constexpr int EXAMINED = 12;          // most cuts that collocation judges for a recommendation
+constexpr double SPEED_STEP = 0.015;     // [1] between speeds of the grid
+constexpr double DEPTH_STEP = 0.06;      // [1] between depths of the grid
+constexpr double LEAST_DEPTH = 0.01;     // [1] of the largest
+constexpr double SAME_SPEED = 0.002;     // [1] of a cut that was made
+constexpr double LINES = 24.0;           // frequencies of a mode, dense around it
+constexpr double FREQUENCY_RANGE = 3.0;  // [1] of the logarithm of chatter frequencies, 200 Hz .. 4 kHz
+constexpr int EXAMINED = 12;             // most cuts that collocation judges for a recommendation
 constexpr double LOOSE = 2.0;  // [1] probability of chatter over the risk, up to which a cut is examined
 
 /// Nodes for a verdict, 0.1 % of the depth.
@@ -139,8 +140,9 @@ double ChartLearning::logLikelihood(const std::vector<double>& at) const {
     sum += std::log(options_.wrong + (1.0 - options_.wrong) * agrees);
     if (!cut.chatter || !cut.frequency || std::isinf(limit.depth[k])) continue;
     const double error = std::hypot(options_.frequency_error, cut.frequency->std_dev / cut.frequency->value);
-    sum += std::log(frequencyLikelihood(limit.chatter_frequency[k], cut.frequency->value, error,
-                                        options_.other_component));
+    // Density of any frequency over that of the predicted one at its maximum.
+    const double other = options_.other_component * std::sqrt(units::TWO_PI) * error / FREQUENCY_RANGE;
+    sum += std::log(frequencyLikelihood(limit.chatter_frequency[k], cut.frequency->value, error, other));
   }
   return sum;
 }

@@ -29,7 +29,7 @@ struct LearningOptions {
   double wrong = 0.02;             ///< [1] probability that a cut is not as its machine predicts
   /// [1] Standard deviation of a predicted chatter frequency, combined with that of the measured one.
   double frequency_error = 0.03;
-  /// [1] Relative likelihood of a chatter frequency that is not the predicted one: another lobe or an alias.
+  /// [1] Probability that a chatter frequency is not the predicted one: another lobe or an alias.
   double other_component = 0.05;
   /// [1] Standard deviation of log(limit): the machines do not contain the true one (more modes, loss of
   /// contact), and the zero-order limit from which candidates are chosen is not the exact one.
