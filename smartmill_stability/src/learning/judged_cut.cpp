@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <string_view>
+#include <utility>
 
 #include "smartmill_core/io/csv.h"
 #include "smartmill_core/units.h"
@@ -18,12 +19,10 @@ class CutReader {
     header_.assign(cells.begin(), cells.end());
     for (const char* name : {"rpm", "depth_mm", "verdict"})
       if (!has(name)) csv_.fail(std::string("column ") + name + " is missing: expected rpm,depth_mm,verdict");
-    for (const char* name : {"chatter", "kt"}) {
-      const bool chatter = std::string(name) == "chatter";
-      const std::string std_name = chatter ? "chatter_std_hz" : "kt_std_n_per_mm2",
-                        value = chatter ? "chatter_hz" : "kt_n_per_mm2";
-      if (has(std_name) && !has(value)) csv_.fail("column " + std_name + ": expected the column " + value);
-    }
+    for (const auto& [value, std_dev] :
+         {std::pair{"chatter_hz", "chatter_std_hz"}, std::pair{"kt_n_per_mm2", "kt_std_n_per_mm2"}})
+      if (has(std_dev) && !has(value))
+        csv_.fail(std::string("column ") + std_dev + ": expected the column " + value);
   }
 
   bool next(JudgedCut* cut) {
