@@ -40,7 +40,8 @@ CommandProgram smartmillProgram() {
         loadmeter::databaseCommand()}},
       {"Stability",
        {stability::lobesCommand(), stability::chartCommand(), stability::chatterProbabilityCommand(),
-        stability::processDampingCommand(), stability::detectCommand(), stability::nextSpeedCommand()}},
+        stability::processDampingCommand(), stability::detectCommand(), stability::nextSpeedCommand(),
+        stability::lobesFromCutsCommand()}},
       {"NC programs", {smartmill::program::programCommand()}},
       {"Controller", {sim::controllerCommand(), cnc::captureCommand()}},
   };

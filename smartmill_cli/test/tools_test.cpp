@@ -121,6 +121,11 @@ TEST(Tools, DoWhatTheirCommandsDoToAModel) {
   const TemporaryFolder folder;
   std::ofstream(folder.file("cuts.csv")) << "rpm,depth_mm,verdict\n3000,0.1,stable\n3000,0.3,chatter\n"
                                             "900,0.15,stable\n900,0.3,chatter\n";
+  const std::string probing =
+      "--teeth 4 --diameter-mm 12 --entry-deg 0 --exit-deg 180 --speeds 600:4000 --max-depth-mm 1 --cuts " +
+      folder.file("cuts.csv");
+  expectSame("lobes-from-cuts", probing + " -o chart.csv");
+  expectSame("lobes-from-cuts", probing + " --risk 0", 1);
   expectSame("process-damping", cut + "--cuts " + folder.file("cuts.csv") + " -o damped.yaml");
 }
 

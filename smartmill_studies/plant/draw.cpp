@@ -99,9 +99,10 @@ Mode believedMode(double frequency, double damping_ratio, double gain, double ga
 }
 
 // The model of a user, from measurements and tables.
-MachineModel believedOf(const Plant& plant, Random& random) {
+MachineModel believedOf(const Plant& plant, double errors, Random& random) {
   MachineModel m;
-  const Uncertainty u = m.uncertainty;
+  Uncertainty u = m.uncertainty;
+  for (double* value : {&u.cutting, &u.frequency, &u.damping, &u.stiffness, &u.spindle}) *value *= errors;
   m.tool = plant.tool;
   CuttingCoefficients c = plant.cutting;
   for (double* value : {&c.ktc, &c.krc, &c.kac, &c.kte, &c.kre, &c.kae})
@@ -345,7 +346,7 @@ Drawn draw(const Case& hidden) {
   Random random(hidden.seed);
   Drawn drawn;
   drawn.plant = drawPlant(hidden.vibrating, random);
-  drawn.nominal = believedOf(drawn.plant, random);
+  drawn.nominal = believedOf(drawn.plant, hidden.nominal_errors, random);
   if (hidden.kind != "outside") {
     for (const std::string& name : hidden.names)
       drawn.plant.effects.push_back(drawEffect(name, drawn.nominal, random));

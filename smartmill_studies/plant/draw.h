@@ -17,7 +17,8 @@ struct Case {
   std::string kind;                ///< single, pair, triple, none, outside
   std::vector<std::string> names;  ///< effects of the catalogue, or the kind of an outside cause
   bool vibrating = false;
-  std::uint64_t seed = 0;  ///< determines everything else
+  std::uint64_t seed = 0;       ///< determines everything else
+  double nominal_errors = 1.0;  ///< [1] standard deviation of the nominal values over the stated one
 };
 
 /// How many cases of each kind.

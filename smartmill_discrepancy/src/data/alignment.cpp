@@ -12,6 +12,15 @@
 namespace smartmill::discrepancy {
 namespace {
 
+struct AlignmentFreedomOptions {
+  /// [samples] The force may start at once or over a fraction of a sample.
+  double entry_std = 0.1, entry_step = 0.02;
+  /// [rad] The prior only limits a step; the step is far below a sample.
+  double angle_std = 1.0, angle_step = 1e-4;
+};
+
+const AlignmentFreedomOptions LIMITS;
+
 using units::TWO_PI;
 
 // Estimate of the phase of a record without spindle angle.
@@ -259,15 +268,14 @@ std::vector<std::string> estimatePhases(Dataset& data) {
   return notes;
 }
 
-std::vector<AlignmentFreedom> alignmentFreedoms(const TestData& test,
-                                                const AlignmentFreedomOptions& options) {
+std::vector<AlignmentFreedom> alignmentFreedoms(const TestData& test) {
   std::vector<AlignmentFreedom> free;
   if (test.phase_estimated) {
-    free.push_back({&RecordAlignment::phase, options.angle_std, options.angle_step});
-    free.push_back({&RecordAlignment::drift, options.angle_std, options.angle_step});
+    free.push_back({&RecordAlignment::phase, LIMITS.angle_std, LIMITS.angle_step});
+    free.push_back({&RecordAlignment::drift, LIMITS.angle_std, LIMITS.angle_step});
   }
   if (test.test.kind == TestKind::cut && test.test.engage_time && !test.test.running_before)
-    free.push_back({&RecordAlignment::entry, options.entry_std, options.entry_step});
+    free.push_back({&RecordAlignment::entry, LIMITS.entry_std, LIMITS.entry_step});
   return free;
 }
 

@@ -29,7 +29,9 @@ struct RecordOptions {
   double contact_lead = 1e-3;    ///< [s] that the contact starts earlier at most
   /// [1] RMS over that between lines, from which lines without cutting (hum, unbalance) are not noise.
   double max_line_ratio = 1.5;
-  double slow_piece = 0.25;  ///< [s] of a mean of a slow channel
+  double slow_piece = 0.25;        ///< [s] of a mean of a slow channel
+  double short_revolutions = 6.0;  ///< of a shortened cut: the entry and some of the steady cut
+  double max_short_share = 0.75;   ///< [1] of the samples of fitted cuts that are kept: no benefit above
 };
 
 const RecordOptions LIMITS;
@@ -282,14 +284,14 @@ double noiseBetweenLines(const std::vector<double>& values) {
   return std::sqrt(median(power) / std::log(2.0) / window_power);
 }
 
-std::optional<Dataset> shortenedDataset(const Dataset& data, const ShorteningOptions& options) {
+std::optional<Dataset> shortenedDataset(const Dataset& data) {
   Dataset shortened = data;
   double all = 0.0, kept = 0.0;
   for (TestData& t : shortened.tests) {
     if (t.test.kind != TestKind::cut || t.heldout) continue;
     const double revolution = units::TWO_PI / t.test.spindle_speed * t.test.sample_rate;  // [samples]
     const std::size_t first = std::max(
-        LIMITS.min_samples, t.first_cut + static_cast<std::size_t>(options.revolutions * revolution));
+        LIMITS.min_samples, t.first_cut + static_cast<std::size_t>(LIMITS.short_revolutions * revolution));
     const std::size_t size = t.phase_estimated ? t.record.size() : first;
     all += static_cast<double>(t.record.size());
     kept += static_cast<double>(std::min(size, t.record.size()));
@@ -297,7 +299,7 @@ std::optional<Dataset> shortenedDataset(const Dataset& data, const ShorteningOpt
     t.record.time.resize(size);
     for (std::vector<double>& column : t.record.columns) column.resize(size);
   }
-  if (kept >= options.max_share * all) return {};
+  if (kept >= LIMITS.max_short_share * all) return {};
   return shortened;
 }
 

@@ -14,6 +14,23 @@
 namespace smartmill::discrepancy {
 namespace {
 
+/// Limits far beyond any effect of the catalogue.
+struct LabelOptions {
+  double doubtful_gap = 5.0;  ///< squares over the noise above which a label is doubtful
+  double swapped = 0.1;       ///< [1] of the squares: maximum after a swap of channels
+  double relabelled = 0.35;   ///< [1] of the squares: maximum with another test's label
+  double comparable = 1.5;    ///< [1] maximum ratio of these squares to those of the label's own test
+  double small_gap = 6.0;     ///< [N2] squares of a label's own test that count as this many at least
+  double unusual = 3.0;       ///< [1] minimum ratio of a cut's squares to the median of all cuts
+  std::size_t min_cuts = 4;   ///< from which on a median means something
+  double speed = 0.02;        ///< [1] error of a stated spindle speed
+  double unit_factor = 30.0;  ///< [1] factor beyond any gain error, below that of N and kN
+  double min_signal = 100.0;  ///< [1] squares over the noise from which a factor below one is known
+  double inverted = 0.5;      ///< [1] minimum squared correlation with the negative model
+};
+
+const LabelOptions LIMITS;
+
 double squaresBetween(const std::vector<double>& a, const std::vector<double>& b) {
   double s = 0.0;
   for (std::size_t i = 0; i < a.size(); ++i) s += (a[i] - b[i]) * (a[i] - b[i]);
@@ -41,12 +58,12 @@ double forceSquares(const TestData& t, const Record& simulated) {
   return s;
 }
 
-std::vector<std::string> wrongSpeeds(const Dataset& data, const LabelOptions& limits) {
+std::vector<std::string> wrongSpeeds(const Dataset& data) {
   std::vector<std::string> wrong;
   for (const TestData& t : data.tests) {
     if (t.test.kind == TestKind::tap || t.phase_estimated || !t.record.has("spindle_angle")) continue;
     const double speed = rotationSpeed(t);
-    if (std::abs(speed / t.test.spindle_speed - 1.0) <= limits.speed) continue;
+    if (std::abs(speed / t.test.spindle_speed - 1.0) <= LIMITS.speed) continue;
     wrong.push_back(formatted(
         "test %s looks mislabelled: its spindle angle advances at %.0f rpm, spindle_speed_rpm is %.0f",
         t.test.name.c_str(), units::rpmFromRadPerSec(speed), units::rpmFromRadPerSec(t.test.spindle_speed)));
@@ -75,18 +92,17 @@ Comparison compare(const Dataset& data, const std::vector<Record>& own, const st
 }
 
 // Units and signs: one factor over all records of a channel.
-std::vector<std::string> wrongScales(const Dataset& data, const std::vector<Record>& own,
-                                     const LabelOptions& limits) {
+std::vector<std::string> wrongScales(const Dataset& data, const std::vector<Record>& own) {
   std::vector<std::string> wrong, inverted;
   for (const auto& [channel, noise] : data.noise) {
     const Comparison c = compare(data, own, channel);
-    if (c.product < 0.0 && c.product * c.product > limits.inverted * c.simulated * c.measured)
+    if (c.product < 0.0 && c.product * c.product > LIMITS.inverted * c.simulated * c.measured)
       inverted.push_back(channel);
     if (c.simulated <= noise * noise) continue;
     const double factor = std::abs(c.product / c.simulated);
-    if (factor > limits.unit_factor ||
-        (factor < 1.0 / limits.unit_factor &&
-         c.product * c.product / c.simulated > limits.min_signal * noise * noise)) {
+    if (factor > LIMITS.unit_factor ||
+        (factor < 1.0 / LIMITS.unit_factor &&
+         c.product * c.product / c.simulated > LIMITS.min_signal * noise * noise)) {
       wrong.push_back(formatted("%s is %.3g times the simulated value in every cut: its unit looks wrong",
                                 channel.c_str(), factor));
     }
@@ -99,7 +115,7 @@ std::vector<std::string> wrongScales(const Dataset& data, const std::vector<Reco
 
 // Whether swapping two force channels of a test fits the model far better.
 bool looksSwapped(const Dataset& data, const TestData& t, const Record& own, const std::string& x,
-                  const std::string& y, const LabelOptions& limits) {
+                  const std::string& y) {
   if (!t.record.has(x) || !t.record.has(y)) return false;
   const double as_is =
       squaresBetween(t.record.column(x), own.column(x)) + squaresBetween(t.record.column(y), own.column(y));
@@ -107,18 +123,17 @@ bool looksSwapped(const Dataset& data, const TestData& t, const Record& own, con
       squaresBetween(t.record.column(x), own.column(y)) + squaresBetween(t.record.column(y), own.column(x));
   const double floor =
       static_cast<double>(t.record.size()) * (std::pow(data.noise.at(x), 2) + std::pow(data.noise.at(y), 2));
-  return as_is > limits.doubtful_gap * floor && swap - floor < limits.swapped * (as_is - floor);
+  return as_is > LIMITS.doubtful_gap * floor && swap - floor < LIMITS.swapped * (as_is - floor);
 }
 
-std::vector<std::string> swappedChannels(const Dataset& data, const std::vector<Record>& own,
-                                         const LabelOptions& limits) {
+std::vector<std::string> swappedChannels(const Dataset& data, const std::vector<Record>& own) {
   std::vector<std::string> wrong;
   for (std::size_t a = 0; a < 3; ++a) {
     for (std::size_t b = a + 1; b < 3; ++b) {
       std::vector<std::string> tests;
       for (std::size_t i = 0; i < own.size(); ++i) {
         const TestData& t = data.tests[i];
-        if (t.test.kind != TestKind::air && looksSwapped(data, t, own[i], FORCES[a], FORCES[b], limits))
+        if (t.test.kind != TestKind::air && looksSwapped(data, t, own[i], FORCES[a], FORCES[b]))
           tests.push_back(t.test.name);
       }
       if (!tests.empty())
@@ -152,23 +167,23 @@ Foreign bestForeignLabel(const Dataset& data, const MachineModel& model, const s
 
 // Cuts that the label of another cut fits far better, while other cuts fit their own.
 std::vector<std::string> foreignLabels(const Dataset& data, const MachineModel& model,
-                                       const std::vector<Record>& own, const LabelOptions& limits) {
+                                       const std::vector<Record>& own) {
   std::vector<double> gaps(own.size(), 0.0), all;
   for (std::size_t i = 0; i < own.size(); ++i) {
     if (data.tests[i].test.kind != TestKind::cut) continue;
     gaps[i] = forceSquares(data.tests[i], own[i]) / static_cast<double>(data.tests[i].record.size());
     all.push_back(gaps[i]);
   }
-  if (all.size() < limits.min_cuts) return {};
+  if (all.size() < LIMITS.min_cuts) return {};
   const double usual = median(all);
   std::vector<std::string> doubtful;
   for (std::size_t i = 0; i < own.size(); ++i) {
     const TestData& t = data.tests[i];
-    if (t.test.kind != TestKind::cut || gaps[i] < limits.unusual * usual || gaps[i] < limits.doubtful_gap)
+    if (t.test.kind != TestKind::cut || gaps[i] < LIMITS.unusual * usual || gaps[i] < LIMITS.doubtful_gap)
       continue;
     const Foreign best = bestForeignLabel(data, model, gaps, i);
-    if (best.gap < limits.relabelled * gaps[i] &&
-        best.gap < limits.comparable * std::max(best.theirs, limits.small_gap))
+    if (best.gap < LIMITS.relabelled * gaps[i] &&
+        best.gap < LIMITS.comparable * std::max(best.theirs, LIMITS.small_gap))
       doubtful.push_back("test " + t.test.name + " looks mislabelled: feed, depth or immersion of " +
                          best.name + " fit its record");
   }
@@ -200,22 +215,21 @@ Dataset withoutChatter(const Dataset& data) {
 
 }  // namespace
 
-Labels checkLabels(const Dataset& data, int threads, const LabelOptions& limits) {
+Labels checkLabels(const Dataset& data, int threads) {
   Labels labels;
-  labels.wrong = wrongSpeeds(data, limits);
+  labels.wrong = wrongSpeeds(data);
   if (!labels.wrong.empty()) return labels;
-  if (anyChatters(data)) return checkLabels(withoutChatter(data), threads, limits);
+  if (anyChatters(data)) return checkLabels(withoutChatter(data), threads);
   const std::vector<Record> own = simulated(data, data.nominal, threads);
-  labels.wrong = wrongScales(data, own, limits);
-  if (labels.wrong.empty()) labels.wrong = swappedChannels(data, own, limits);
-  if (labels.wrong.empty()) labels.doubtful = foreignLabels(data, data.nominal, own, limits);
+  labels.wrong = wrongScales(data, own);
+  if (labels.wrong.empty()) labels.wrong = swappedChannels(data, own);
+  if (labels.wrong.empty()) labels.doubtful = foreignLabels(data, data.nominal, own);
   return labels;
 }
 
-std::vector<std::string> doubtfulLabels(const MachineModel& model, const Dataset& data, int threads,
-                                        const LabelOptions& limits) {
-  if (anyChatters(data)) return doubtfulLabels(model, withoutChatter(data), threads, limits);
-  return foreignLabels(data, model, simulated(data, model, threads), limits);
+std::vector<std::string> doubtfulLabels(const MachineModel& model, const Dataset& data, int threads) {
+  if (anyChatters(data)) return doubtfulLabels(model, withoutChatter(data), threads);
+  return foreignLabels(data, model, simulated(data, model, threads));
 }
 
 }  // namespace smartmill::discrepancy

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "smartmill_core/error.h"
-
 namespace smartmill::discrepancy {
 
 using Eigen::Index;
@@ -14,13 +12,11 @@ CampaignCoordinates::CampaignCoordinates(const Fitter& fitter, const FitState& s
                                          const NominalTangents* frozen, const FitOptions& options,
                                          const AlignmentReachOptions& reach)
     : fitter_(fitter), start_state_(start), frozen_tangents_(frozen) {
-  if (options.nominal_free) all_ = fitter.freedom().coordinates();
+  all_ = fitter.freedom().coordinates();
   nominal_count_ = all_.size();
   for (const Member& m : start.members)
     all_.insert(all_.end(), m.hypothesis->coordinates.begin(), m.hypothesis->coordinates.end());
   const bool nominal_frozen = frozen && !frozen->at.empty();
-  if (nominal_frozen && !options.nominal_free)
-    throw Error("fit: frozen derivatives of nominal values require free nominal values");
   if (frozen) addAlignments(reach);
   const std::size_t own_begin = nominal_frozen ? nominal_count_ : 0, own_end = all_.size() - alignment_count_;
   for (std::size_t c = 0; c < all_.size(); ++c)

@@ -12,6 +12,15 @@
 namespace smartmill::discrepancy {
 namespace {
 
+struct DependenceOptions {
+  std::size_t min_tests = 4;  ///< fewer have no significant correlation
+  /// [1] amplitude outside cuts over that in cuts: limit for "cutting".
+  double air_share = 0.3;
+  double chance = 0.05;  ///< [1] probability of a correlation by chance, over all conditions
+};
+
+const DependenceOptions LIMITS;
+
 struct Condition {
   const char* name;
   std::function<double(const CampaignTest&)> of;
@@ -75,19 +84,18 @@ double correlation(const std::vector<TestAmplitude>& amplitudes, const Condition
 
 }  // namespace
 
-std::vector<std::string> dependentConditions(const std::vector<TestAmplitude>& amplitudes,
-                                             const DependenceOptions& options) {
+std::vector<std::string> dependentConditions(const std::vector<TestAmplitude>& amplitudes) {
   std::vector<TestAmplitude> cuts, rest, with_spindle;
   for (const TestAmplitude& s : amplitudes) {
     (s.test->test.kind == TestKind::cut ? cuts : rest).push_back(s);
     if (s.test->test.kind != TestKind::tap) with_spindle.push_back(s);
   }
   std::vector<std::string> names;
-  if (!cuts.empty() && !rest.empty() && rmsAmplitude(rest) < options.air_share * rmsAmplitude(cuts))
+  if (!cuts.empty() && !rest.empty() && rmsAmplitude(rest) < LIMITS.air_share * rmsAmplitude(cuts))
     names.push_back("cutting");
-  const bool among_cuts = cuts.size() >= options.min_tests;
+  const bool among_cuts = cuts.size() >= LIMITS.min_tests;
   const std::vector<TestAmplitude>& chosen = among_cuts ? cuts : with_spindle;
-  if (chosen.size() < options.min_tests || !differ(chosen)) return names;
+  if (chosen.size() < LIMITS.min_tests || !differ(chosen)) return names;
   const std::vector<Condition> conditions = conditionsOf(among_cuts);
   std::vector<std::pair<double, std::string>> strengths;
   for (const Condition& c : conditions) {
@@ -95,7 +103,7 @@ std::vector<std::string> dependentConditions(const std::vector<TestAmplitude>& a
     const double r = correlation(chosen, c);
     const double z = std::atanh(std::min(r, 0.999999)) *
                      std::sqrt(std::max(static_cast<double>(chosen.size()) - 3.0, 1.0));
-    if (2.0 * normalCdf(-z) * static_cast<double>(conditions.size()) < options.chance)
+    if (2.0 * normalCdf(-z) * static_cast<double>(conditions.size()) < LIMITS.chance)
       strengths.emplace_back(-r, c.name);
   }
   std::sort(strengths.begin(), strengths.end());

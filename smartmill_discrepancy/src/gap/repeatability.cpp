@@ -11,6 +11,14 @@
 namespace smartmill::discrepancy {
 namespace {
 
+struct RepeatabilityOptions {
+  double min_revolutions = 5.0;  ///< fewer leave too few degrees of freedom for the floor
+  /// [1] of the Nyquist frequency: highest order that is removed
+  double highest = 0.9;
+};
+
+const RepeatabilityOptions LIMITS;
+
 constexpr int MAX_STEPS = 30;        // of conjugate gradients: the columns are nearly orthogonal
 constexpr double TOLERANCE = 1e-10;  // of the squares of the first gradient
 
@@ -45,13 +53,12 @@ double residualSquares(const OrderBasis& orders, std::size_t count, std::vector<
 }  // namespace
 
 std::optional<Repeatability> repeatability(const std::vector<double>& values,
-                                           const std::vector<double>& angle,
-                                           const RepeatabilityOptions& options) {
+                                           const std::vector<double>& angle) {
   const double revolutions = std::abs(rotationOf(angle)) / units::TWO_PI,
                samples = static_cast<double>(values.size());
-  if (values.size() != angle.size() || revolutions < options.min_revolutions) return {};
+  if (values.size() != angle.size() || revolutions < LIMITS.min_revolutions) return {};
   const auto orders =
-      static_cast<std::size_t>(std::max(1.0, std::floor(options.highest * 0.5 * samples / revolutions)));
+      static_cast<std::size_t>(std::max(1.0, std::floor(LIMITS.highest * 0.5 * samples / revolutions)));
   const double level = mean(values);
   std::vector<double> about = values;
   for (double& v : about) v -= level;

@@ -6,10 +6,23 @@
 #include "smartmill_sim/twin/tip_trajectory.h"
 
 namespace smartmill::discrepancy {
+namespace {
 
-TestTwin::TestTwin(const TestData& test, const CampaignChannels& channels, std::size_t chosen, int substeps,
-                   const TwinCacheOptions& options)
-    : test_data_(test), layout_(channels), chosen_(chosen), options_(options) {
+/// Memory against time; results do not depend on it.
+struct TwinCacheOptions {
+  std::size_t results = 4;  ///< of each channel: those of a state and of the last derivatives
+  /// Traces of a cut: that of a state must outlast those of the derivatives of its cutting coefficients. Fine
+  /// steps are used for few models.
+  std::size_t traces = 8, fine_traces = 2;
+  int fine_substeps = 3;  ///< from which steps are fine
+};
+
+const TwinCacheOptions LIMITS;
+
+}  // namespace
+
+TestTwin::TestTwin(const TestData& test, const CampaignChannels& channels, std::size_t chosen, int substeps)
+    : test_data_(test), layout_(channels), chosen_(chosen) {
   restart(substeps);
   record_.file = test.record.file;
   record_.time = test.record.time;
@@ -33,8 +46,8 @@ void TestTwin::clearChannels() {
 
 void TestTwin::restart(int substeps) {
   clearChannels();
-  traces_ = std::make_unique<sim::CutTraces>(substeps < options_.fine_substeps ? options_.traces
-                                                                               : options_.fine_traces);
+  traces_ =
+      std::make_unique<sim::CutTraces>(substeps < LIMITS.fine_substeps ? LIMITS.traces : LIMITS.fine_traces);
 }
 
 void TestTwin::readPhase() {
@@ -114,7 +127,7 @@ SimulatedChannels TestTwin::simulate(const MachineModel& model, const TwinSettin
     if (result[c]) continue;
     result[c] = fresh[c];
     results_[c].emplace_front(std::move(keys[c]), fresh[c]);
-    if (results_[c].size() > options_.results) results_[c].pop_back();
+    if (results_[c].size() > LIMITS.results) results_[c].pop_back();
   }
   return result;
 }

@@ -6,6 +6,13 @@
 namespace smartmill::discrepancy {
 namespace {
 
+struct WhiteningOptions {
+  std::size_t max_order = 32;          ///< limits the time; the BIC chooses the order
+  std::size_t samples_per_order = 16;  ///< minimum, so that a few values get at most a variance
+};
+
+const WhiteningOptions LIMITS;
+
 // For lags up to the order, with the biased normalisation that keeps every predictor stable.
 std::vector<double> autocovariance(const double* values, std::size_t size, std::size_t order) {
   std::vector<double> lags(order + 1, 0.0);
@@ -32,8 +39,8 @@ std::vector<double> nextPredictor(const std::vector<double>& weights, const std:
 
 }  // namespace
 
-Whitening::Whitening(const double* residual, std::size_t size, const WhiteningOptions& options) {
-  const std::size_t max_order = std::min(options.max_order, size / options.samples_per_order);
+Whitening::Whitening(const double* residual, std::size_t size) {
+  const std::size_t max_order = std::min(LIMITS.max_order, size / LIMITS.samples_per_order);
   const std::vector<double> lags = autocovariance(residual, size, max_order);
   const auto n = static_cast<double>(size);
   if (size == 0 || !std::isfinite(lags[0]) || lags[0] <= 0.0) return;

@@ -13,6 +13,17 @@
 namespace smartmill::discrepancy {
 namespace {
 
+struct NominalFreedomOptions {
+  /// [1] standard deviations to the bounds: too narrow to hide an effect that the value could replace.
+  double reach = 4.5;
+  double step = 2e-3;  ///< [1] standard deviations: of numerical derivatives
+  /// [1] Path share: bounds beyond both surfaces (0 and 1), step, prior.
+  double path_low = -0.5, path_high = 1.5, path_step = 0.02, path_std = 0.5;
+  double min_path_deviations = 3.0;  ///< standard deviations from which a path share is written
+};
+
+const NominalFreedomOptions LIMITS;
+
 using ModesOf = std::function<std::vector<Mode>&(MachineModel&)>;
 
 const char* const TOOTH_PATH = "empirical:tooth_path";
@@ -24,8 +35,7 @@ bool isToothPath(const EffectEntry& entry) {
 
 }  // namespace
 
-NominalFreedom::NominalFreedom(const MachineModel& nominal, const NominalFreedomOptions& options)
-    : options_(options) {
+NominalFreedom::NominalFreedom(const MachineModel& nominal) {
   if (nominal.cutting) addCutting(nominal);
   addModes(nominal);
   if (nominal.spindle) addSpindle(nominal);
@@ -34,7 +44,7 @@ NominalFreedom::NominalFreedom(const MachineModel& nominal, const NominalFreedom
 
 // From the surface rule of formats.md to the true tooth path.
 void NominalFreedom::addToothPath() {
-  const NominalFreedomOptions& o = options_;
+  const NominalFreedomOptions& o = LIMITS;
   coordinates_.push_back({PATH_SHARE, 0.0, o.path_low, o.path_high, o.path_step, o.path_std});
   stated_.emplace_back();
   scale_.push_back([](MachineModel& m, double factor) {
@@ -49,8 +59,8 @@ void NominalFreedom::addToothPath() {
 
 void NominalFreedom::add(std::string name, double value, double percent, Scale scale) {
   if (value == 0.0 || !std::isfinite(value) || percent <= 0.0) return;
-  const double std_dev = 0.01 * percent, reach = options_.reach * std_dev;
-  coordinates_.push_back({std::move(name), 0.0, -reach, reach, options_.step * std_dev, std_dev});
+  const double std_dev = 0.01 * percent, reach = LIMITS.reach * std_dev;
+  coordinates_.push_back({std::move(name), 0.0, -reach, reach, LIMITS.step * std_dev, std_dev});
   stated_.emplace_back(value);
   scale_.push_back(std::move(scale));
 }
@@ -128,7 +138,7 @@ std::optional<std::size_t> NominalFreedom::pathShare() const {
 }
 
 bool NominalFreedom::isPathShareSignificant(double share, double std_dev) const {
-  return std::abs(share) >= options_.min_path_deviations * std_dev;
+  return std::abs(share) >= LIMITS.min_path_deviations * std_dev;
 }
 
 void NominalFreedom::writeStdDevs(MachineModel& model, const std::vector<double>& std_devs) const {

@@ -13,9 +13,8 @@
 namespace smartmill::discrepancy {
 
 // A negligible share of the excess is not a missing effect.
-CandidateRound::CandidateRound(SearchState& state, const CandidateRoundOptions& options)
+CandidateRound::CandidateRound(SearchState& state)
     : state_(state),
-      options_(options),
       best_(state.now),
       required_gain_(std::max(state.options.min_gain, state.options.min_share * state.excess(state.now))) {
 }
@@ -27,8 +26,7 @@ void CandidateRound::run(bool screened_again) {
   for (const PredictedGain& p : s.screened) {
     if (isRejected(p.hypothesis)) continue;
     if (s.bench.cancelled()) break;
-    if (!isWorthFitting(p, s.screened.front().gain)) continue;
-    if (isWeak(p)) ++weak_fitted_;
+    if (!isWorthFitting(p)) continue;
     fitHypothesis(p);
   }
   if (s.whole_records && !improved_) fitSupportedByTests();
@@ -38,27 +36,14 @@ bool CandidateRound::isRejected(const Hypothesis* hypothesis) const {
   return std::find(state_.rejected.begin(), state_.rejected.end(), hypothesis) != state_.rejected.end();
 }
 
-// Weak hypotheses may gain more than predicted, unless nominal values can replace them; they are fitted if no
-// strong one removes much.
-bool CandidateRound::isWeak(const PredictedGain& predicted) const {
-  return state_.whole_records && state_.excess(best_) > options_.unremoved * state_.excess(state_.now) &&
-         predicted.gain < required_gain_ && predicted.gain > options_.weak * required_gain_ &&
-         predicted.independent_share > options_.min_independent_share;
-}
-
-bool CandidateRound::isWorthFitting(const PredictedGain& predicted, double largest) const {
+bool CandidateRound::isWorthFitting(const PredictedGain& predicted) const {
   if (predicted.start.empty()) return false;
-  const std::size_t fitted = candidates_.size();
-  const bool weak = isWeak(predicted);
-  if (predicted.gain < required_gain_ && !weak) return false;
-  if (weak ? weak_fitted_ >= options_.max_weak : fitted - weak_fitted_ >= state_.options.fitted_per_round)
-    return false;
-  if (fitted >= 2 && predicted.gain < options_.min_of_largest * largest) return false;
+  if (predicted.gain < required_gain_ || candidates_.size() >= state_.options.fitted_per_round) return false;
   // A fit that leaves almost nothing can be surpassed only by a similar predicted gain, corrected by the
   // error of its own prediction.
   const double beyond = std::max(1.0, (state_.now.bic - best_.bic) / best_predicted_);
-  return !(state_.excess(best_) < options_.almost_nothing * state_.excess(state_.now) &&
-           beyond * predicted.gain < options_.similar * best_predicted_);
+  return !(state_.excess(best_) < state_.options.almost_nothing * state_.excess(state_.now) &&
+           beyond * predicted.gain < state_.options.similar * best_predicted_);
 }
 
 // A small share of the whole excess may be all of it in the channels concerned: fits hypotheses that the
@@ -68,7 +53,7 @@ void CandidateRound::fitSupportedByTests() {
   screenRemembered(s.quick, s.now, s.tangents, s.options.min_gain, &s.memory, &s.screened);
   std::size_t fitted = 0;
   for (const PredictedGain& p : s.screened) {
-    if (fitted >= options_.max_supported || p.gain < s.options.min_gain || s.bench.cancelled()) return;
+    if (fitted >= state_.options.max_supported || p.gain < s.options.min_gain || s.bench.cancelled()) return;
     const bool tried = std::any_of(candidates_.begin(), candidates_.end(),
                                    [&](const Candidate& r) { return r.hypothesis == p.hypothesis; });
     if (tried || isRejected(p.hypothesis) || p.start.empty() ||
@@ -89,29 +74,13 @@ void CandidateRound::fitHypothesis(const PredictedGain& predicted) {
   options.to_beat = std::min(best_.chi2 + best_.penalty, s.now.chi2 + s.now.penalty - required_gain_);
   FitResult tried;
   candidates_.push_back(fitCandidate(
-      s.quick, predicted, s.rounds, s.now,
-      [&] { return continued(s.quick.fit(with, &s.tangents, options), options); }, &tried));
+      s.quick, predicted, s.rounds, s.now, [&] { return s.quick.fit(with, &s.tangents, options); }, &tried));
   s.options.log(formatted("  predicted gain %.4g, gain %.4g  ", predicted.gain, s.now.bic - tried.bic) +
                 describe(tried.state.members.back()));
   if (!ranksAhead(tried) || !isImprovement(tried)) return;
   best_ = tried;
   best_predicted_ = predicted.gain;
   improved_ = true;
-}
-
-// Continues a fit with the twin corrected at its end if the gain is too small for an improvement but the
-// tests prefer a larger scale.
-FitResult CandidateRound::continued(FitResult tried, const FitOptions& options) const {
-  SearchState& s = state_;
-  if (!tried.converged || s.now.bic - tried.bic < options_.continued_share * s.excess(s.now) ||
-      isImprovement(tried))
-    return tried;
-  if (fittedScale(s.quick, tried, s.now).scale < options_.continued_scale) return tried;
-  NominalTangents there = s.bench.lineariseBy(s.tangents, s.nearStated(tried.state));
-  FitResult on = s.quick.fit(tried.state, &there, options);
-  // The other candidates of the round are compared as before.
-  s.bench.lineariseBy(std::move(there), s.nearStated(s.now.state));
-  return on.converged && on.bic < tried.bic ? on : tried;
 }
 
 // Fits are not converged yet: of two similar ones the one with fewer values ranks ahead.
@@ -132,7 +101,7 @@ bool CandidateRound::isImprovement(const FitResult& tried) const {
   if (!tried.converged) return false;
   const double gain = state_.now.bic - tried.bic;
   if (gain <= requiredGain(state_.quick.runner(), state_.now, tried, state_.options)) return false;
-  return gain > options_.large_share * state_.excess(state_.now) ||
+  return gain > state_.options.large_share * state_.excess(state_.now) ||
          ValidationResult::isAcceptedByFitted(fittedScale(state_.quick, tried, state_.now));
 }
 

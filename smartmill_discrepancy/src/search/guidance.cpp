@@ -10,6 +10,14 @@
 namespace smartmill::discrepancy {
 namespace {
 
+struct GuidanceOptions {
+  /// Standard deviations of the squares of noise by which a free simulation near the stability limit must be
+  /// worse than the guided one: noise alone reaches it in one of 30,000 cuts.
+  double min_deviations = 4.0;
+};
+
+const GuidanceOptions LIMITS;
+
 bool isGuidable(const TestData& test, const MachineModel& nominal) {
   return hasToolModes(nominal) && test.test.kind == TestKind::cut && !test.heldout &&
          !test.test.running_before && sim::TipTrajectory::isAvailable(test.record);
@@ -35,12 +43,10 @@ ChannelWeight weightOf(const std::vector<double>& residual) {
 
 }  // namespace
 
-Guidance::Guidance(Twins& twins, RecordAlignments& alignment, const Fitter& fitter,
-                   const GuidanceOptions& options)
+Guidance::Guidance(Twins& twins, RecordAlignments& alignment, const Fitter& fitter)
     : twins_(twins),
       alignment_(alignment),
       fitter_(fitter),
-      options_(options),
       is_possible_(std::any_of(twins.data.tests.begin(), twins.data.tests.end(),
                                [&](const TestData& t) { return isGuidable(t, twins.data.nominal); })) {
 }
@@ -108,7 +114,7 @@ bool Guidance::markNearLimit(const TwinRunner& free, const std::vector<double>& 
   for (const auto& [t, gained] : gain) {
     TestData& test = twins_.data.tests[t];
     if (test.guided || !canBeGuided(test, twins_.data.nominal) ||
-        !(gained > options_.min_deviations * std::sqrt(2.0 * samples[t])))
+        !(gained > LIMITS.min_deviations * std::sqrt(2.0 * samples[t])))
       continue;
     test.guided = any = true;
   }

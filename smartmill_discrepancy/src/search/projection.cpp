@@ -96,7 +96,6 @@ Projection::Reduction Projection::reduction(const Eigen::MatrixXd& information, 
                                             const Eigen::VectorXd& baseline, const Eigen::MatrixXd& cross,
                                             Eigen::MatrixXd own, const Eigen::VectorXd& along) const {
   const Index fixed_count = information.rows(), count = own.rows();
-  const double raw = own.trace();
   own.diagonal() = own.diagonal().array() * (1.0 + RIDGE_SHARE) + RIDGE;
   Eigen::MatrixXd all(fixed_count + count, fixed_count + count);
   all << information, cross, cross.transpose(), own;
@@ -107,10 +106,6 @@ Projection::Reduction Projection::reduction(const Eigen::MatrixXd& information, 
   result.gain = costReduction(all, right, step.by) - costReduction(information, score, baseline);
   result.amplitudes = step.by.tail(count);
   result.all_else = step.by.head(fixed_count);
-  const Eigen::MatrixXd at_bounds = bounds_.fixedAt(step.at_bounds, information);
-  Eigen::MatrixXd free = cross;
-  for (const Index c : step.at_bounds) free.row(c).setZero();
-  result.independent_share = (own - free.transpose() * linear::solveSymmetric(at_bounds, free)).trace() / raw;
   return result;
 }
 

@@ -27,7 +27,6 @@ class Projection {
   struct Reduction {
     double gain = 0.0;  ///< [1] of chi2 and priors
     Eigen::VectorXd amplitudes;
-    double independent_share = 1.0;  ///< [1] share of the columns that the other values cannot replace
     Eigen::VectorXd all_else;
   };
   Reduction reduction(const SparseColumns& columns) const;

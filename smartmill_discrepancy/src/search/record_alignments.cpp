@@ -9,6 +9,17 @@
 namespace smartmill::discrepancy {
 namespace {
 
+struct RecordAlignmentOptions {
+  /// [rad] Smaller rotations are left to the fits, which use all samples and free values; correcting them
+  /// here would alternate between two solutions.
+  double min_rotation = 0.05;
+  int heldout_passes = 3;           ///< Gauss-Newton steps of held-out records, which converge quadratically
+  double heldout_tolerance = 1e-4;  ///< [rad] of the last step
+  double max_step = 0.3;            ///< [rad] range in which the derivatives of a rotation are valid
+};
+
+const RecordAlignmentOptions LIMITS;
+
 // The alignment of one record that minimises its residual if the twin is linear in it.
 RecordAlignment linearOptimum(const TwinRunner& runner, const MachineModel& model,
                               const SimulatedChannels& base, const Eigen::VectorXd& residual,
@@ -42,10 +53,9 @@ bool isFinite(const RecordAlignment& by) {
 
 }  // namespace
 
-RecordAlignments::RecordAlignments(Twins& twins, const Fitter& fitter, const RecordAlignmentOptions& options)
+RecordAlignments::RecordAlignments(Twins& twins, const Fitter& fitter)
     : twins_(twins),
       fitter_(fitter),
-      options_(options),
       phases_estimated_(std::any_of(twins.data.tests.begin(), twins.data.tests.end(),
                                     [](const TestData& t) { return t.phase_estimated; })) {
   for (const std::size_t t : twins.exact.tests()) loaded_.push_back(twins.data.tests[t]);
@@ -70,7 +80,7 @@ void RecordAlignments::alignFitted(const FitState& state) {
 double RecordAlignments::alignPhases(FitState& state) {
   if (!phases_estimated_) return 0.0;
   alignFitted(state);
-  const double moved = discrepancy::alignPhases(twins_.data, fitter_.model(state), options_.min_rotation);
+  const double moved = discrepancy::alignPhases(twins_.data, fitter_.model(state), LIMITS.min_rotation);
   twins_.heldout.readPhases();
   if (moved == 0.0) return moved;
   state.alignment.clear();
@@ -84,10 +94,10 @@ double RecordAlignments::alignPhases(FitState& state) {
 void RecordAlignments::alignTo(const FitState& state) {
   alignFitted(state);
   const MachineModel model = fitter_.model(state);
-  for (int pass = 0; pass < options_.heldout_passes; ++pass) {
+  for (int pass = 0; pass < LIMITS.heldout_passes; ++pass) {
     const double moved = alignHeldoutOnce(model);
     twins_.heldout.readPhases();
-    if (moved < options_.heldout_tolerance) return;
+    if (moved < LIMITS.heldout_tolerance) return;
   }
 }
 
@@ -106,7 +116,7 @@ double RecordAlignments::alignHeldoutOnce(const MachineModel& model) {
     if (free.empty()) continue;
     const RecordAlignment by = linearOptimum(runner, model, base, residual, k, free);
     const double rotation = std::max(std::abs(by.phase), std::abs(by.drift));
-    if (!isFinite(by) || rotation > options_.max_step) continue;
+    if (!isFinite(by) || rotation > LIMITS.max_step) continue;
     alignRecord(test, by);
     largest = std::max(largest, rotation);
   }

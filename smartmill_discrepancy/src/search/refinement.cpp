@@ -40,10 +40,10 @@ FitOptions weighted(FitOptions options, double weight) {
 
 // Converges to the exact solution by correcting the quick twin at each iterate. Convergence is measured in
 // standard deviations, since the cost hardly changes along a narrow valley.
-RefinedState iterate(Workbench& bench, FitState from, FitResult* best, const RefinementOptions& options) {
+RefinedState iterate(Workbench& bench, FitState from, FitResult* best, const SearchOptions& options) {
   RefinedState refined;
   bool reuse_tangents = false;
-  for (int pass = 0; pass <= options.passes; ++pass) {
+  for (int pass = 0; pass <= options.refinement_passes; ++pass) {
     const bool realigned = bench.alignment().alignPhases(from) > 0.0;
     double squares = 0.0;
     refined.tangents = reuse_tangents ? bench.lineariseBy(std::move(refined.tangents), from, &squares)
@@ -57,8 +57,8 @@ RefinedState iterate(Workbench& bench, FitState from, FitResult* best, const Ref
     const Eigen::MatrixXd covariance = refined.weight * here.covariance;
     *best = std::move(here);
     refined.converged = true;
-    if (pass == options.passes || bench.cancelled()) break;
-    const FitResult next = bench.quick().fit(from, &refined.tangents, weighted(options.step, refined.weight));
+    if (pass == options.refinement_passes || bench.cancelled()) break;
+    const FitResult next = bench.quick().fit(from, &refined.tangents, weighted({6, 1e-5}, refined.weight));
     if (!next.converged) break;
     FitState next_state = next.state;
     // If values can replace each other, frozen derivatives slow the others down: the linear optimum may be
@@ -82,7 +82,7 @@ RefinedState iterate(Workbench& bench, FitState from, FitResult* best, const Ref
 // Alternatives of a member among the candidates of the round that accepted it.
 std::vector<const Candidate*> alternativesOf(const FitState& state, std::size_t member,
                                              const std::vector<Candidate>& candidates,
-                                             const RefinementOptions& options) {
+                                             const SearchOptions& options) {
   const Hypothesis& own = *state.members[member].hypothesis;
   std::size_t round = 0;
   for (const Candidate& r : candidates) {
@@ -151,9 +151,9 @@ FitResult withoutUnneeded(const Fitter& fitter, FitResult fit, const NominalTang
 }
 
 void refitSimplerAlternatives(const Fitter& fitter, const FitResult& now, const NominalTangents& tangents,
-                              std::vector<Candidate>* candidates) {
+                              const SearchOptions& options, std::vector<Candidate>* candidates) {
   for (std::size_t m = 0; m < now.state.members.size(); ++m) {
-    for (const Candidate* alternative : alternativesOf(now.state, m, *candidates, {})) {
+    for (const Candidate* alternative : alternativesOf(now.state, m, *candidates, options)) {
       Candidate& simpler = (*candidates)[static_cast<std::size_t>(alternative - candidates->data())];
       if (simpler.values.size() >= now.state.members[m].values.size()) continue;
       FitState with = without(now.state, m);
@@ -164,9 +164,8 @@ void refitSimplerAlternatives(const Fitter& fitter, const FitResult& now, const 
   }
 }
 
-bool refine(Workbench& bench, const FitState& state, const SearchOptions& options, SearchResult* result,
-            const RefinementOptions& limits) {
-  const RefinedState refined = iterate(bench, state, &result->best, limits);
+bool refine(Workbench& bench, const FitState& state, const SearchOptions& options, SearchResult* result) {
+  const RefinedState refined = iterate(bench, state, &result->best, options);
   if (!refined.converged) return false;
   bench.alignment().alignTo(result->best.state);
   const FitOptions compared = weighted(FitOptions::toCompare(), refined.weight);
@@ -180,11 +179,11 @@ bool refine(Workbench& bench, const FitState& state, const SearchOptions& option
     result->contribution.push_back(rest.bic - result->best.bic);
     result->without_member.push_back(rest.state);
     result->is_needed.push_back(isSignificant(bench.quick().runner(), rest, result->best, options));
-    for (const Candidate* alternative : alternativesOf(at, m, result->candidates, limits)) {
+    for (const Candidate* alternative : alternativesOf(at, m, result->candidates, options)) {
       FitState with = less;
       with.members.push_back({alternative->hypothesis, startOf(bench.quick(), *alternative, at.members[m])});
       const FitResult fit = bench.quick().fit(with, &refined.tangents, without_it);
-      if (fit.converged && rest.converged && replaces(fit, result->best, rest, limits.min_overlap))
+      if (fit.converged && rest.converged && replaces(fit, result->best, rest, options.min_overlap))
         result->alternatives.push_back({m, alternative->result.effect, rest.bic - fit.bic, fit.state});
     }
   }

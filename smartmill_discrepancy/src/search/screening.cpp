@@ -64,7 +64,6 @@ PredictedGain predictGain(const Fitter& fitter, const FitResult& now, const Proj
     std::vector<double> start = startOf(h, probe, reduction.amplitudes);
     if (start == probe.null) continue;  // the optimum is outside the bounds
     best.gain = reduction.gain;
-    best.independent_share = reduction.independent_share;
     best.start = std::move(start);
     best.prior_evidence = {};
     if (best.gain > ValidationResult::requiredSquares()) {
@@ -87,7 +86,10 @@ void sortByGain(std::vector<PredictedGain>* predictions) {
 
 std::vector<PredictedGain> screen(const Fitter& fitter, const FitResult& now, const NominalTangents& tangents,
                                   const std::vector<Hypothesis>& hypotheses, double required_gain,
-                                  ScreeningMemory* memory, const ScreeningOptions& options) {
+                                  ScreeningMemory* memory) {
+  // [1] of the required gain: a smaller remembered gain is not simulated again. Between two states of a
+  // search gains rarely grow tenfold.
+  constexpr double MIN_REMEMBERED = 0.1;
   const Projection projection(fitter, now, tangents);
   const MachineModel model = fitter.model(now.state);
   ProbeFinder finder(projection, fitter.runner(), model, now);
@@ -118,7 +120,7 @@ std::vector<PredictedGain> screen(const Fitter& fitter, const FitResult& now, co
     const bool below_limit = isBelowLimit(h);
     const std::optional<double> gain =
         below_limit ? memory->gain_limits.at(&h) : rememberedGain(projection, h, *memory);
-    if (below_limit || (gain && *gain < options.min_remembered * required_gain)) {
+    if (below_limit || (gain && *gain < MIN_REMEMBERED * required_gain)) {
       one.predicted.emplace();
       one.predicted->hypothesis = &h;
       one.predicted->approximate = true;

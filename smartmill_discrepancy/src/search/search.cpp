@@ -4,13 +4,15 @@
 #include <optional>
 #include <utility>
 
-#include "search/steps/search_step.h"
+#include "search/steps/steps.h"
 
 namespace smartmill::discrepancy {
 namespace {
 
-void run(const SearchSteps& steps, SearchState& state) {
-  for (const std::unique_ptr<SearchStep>& step : steps) step->run(state);
+void finish(SearchState& state) {
+  addEffects(state);
+  releaseGuidance(state);
+  refineFinally(state);
 }
 
 // Neither fitted nor screened with too small a gain.
@@ -42,14 +44,17 @@ SearchResult search(Workbench& bench, const std::vector<Hypothesis>& hypotheses,
   const std::optional<Dataset> short_data =
       hasToolModes(bench.data().nominal) ? shortenedDataset(bench.data()) : std::nullopt;
   if (!short_data) {
-    run(stepsOnWholeRecords(nullptr), state);
+    fitNominal(state);
+    finish(state);
     if (bench.cancelled()) state.result.not_tried = notTried(state, state.screened);
     return std::move(state.result);
   }
   Workbench shortened_bench(*short_data, bench.options());
   SearchState shortened(shortened_bench, hypotheses, options, false);
-  run(stepsOnShortenedRecords(), shortened);
-  run(stepsOnWholeRecords(&shortened), state);
+  fitNominal(shortened);
+  addEffects(shortened);
+  continueOnWholeRecords(state, shortened);
+  finish(state);
   if (bench.cancelled())
     state.result.not_tried = notTried(state, state.screened.empty() ? shortened.screened : state.screened);
   return std::move(state.result);

@@ -13,7 +13,7 @@ FitState SearchState::nearStated(const FitState& where) const {
   FitState at = where;
   const std::vector<Coordinate>& free = bench.freedom().coordinates();
   for (std::size_t c = 0; c < free.size(); ++c) {
-    const double reach = limits.near_stated * free[c].prior_std;
+    const double reach = options.near_stated * free[c].prior_std;
     at.nominal[c] = std::clamp(at.nominal[c], free[c].null - reach, free[c].null + reach);
   }
   return at;
@@ -30,14 +30,14 @@ FitResult SearchState::refit(const FitResult& from, const FitOptions& fit_option
 
 FitResult SearchState::withPhasesAligned(FitResult fit) {
   for (int pass = 0;
-       pass < limits.alignment_passes && bench.alignment().phasesEstimated() && !bench.cancelled(); ++pass) {
+       pass < options.alignment_passes && bench.alignment().phasesEstimated() && !bench.cancelled(); ++pass) {
     const double rotation = bench.alignment().alignPhases(fit.state);
     if (rotation == 0.0) break;
-    if (rotation > limits.large_rotation) memory.clear();
+    if (rotation > options.large_rotation) memory.clear();
     linearise(fit.state);
     const double before = fit.bic;
     fit = refit(fit, FitOptions::closely());
-    if (std::abs(before - fit.bic) < std::max(1.0, limits.negligible_gain * excess(fit))) break;
+    if (std::abs(before - fit.bic) < std::max(1.0, options.negligible_alignment_gain * excess(fit))) break;
   }
   return fit;
 }

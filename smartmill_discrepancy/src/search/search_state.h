@@ -9,17 +9,6 @@
 
 namespace smartmill::discrepancy {
 
-/// Validity of derivatives and alignment during a search.
-struct SearchStateOptions {
-  /// [1] standard deviations from the stated values within which derivatives are taken: missing effects pull
-  /// nominal values further away than they are wrong.
-  double near_stated = 2.5;
-  int alignment_passes = 4;     ///< of rotation and refit, which affect each other
-  double large_rotation = 0.1;  ///< [rad] that invalidates remembered derivatives
-  /// [1] of the excess: a smaller gain ends the alignment. Its last part is left to the fits.
-  double negligible_gain = 0.01;
-};
-
 /// What the steps of a search work on: the current fit with its derivatives, what was tried, and the result.
 struct SearchState {
   SearchState(Workbench& workbench, const std::vector<Hypothesis>& candidates,
@@ -35,7 +24,6 @@ struct SearchState {
   const std::vector<Hypothesis>& hypotheses;
   const SearchOptions& options;
   const bool whole_records;  ///< false: search on shortened records
-  const SearchStateOptions limits = {};
 
   FitResult now;
   NominalTangents tangents;  ///< valid near the current fit

@@ -10,6 +10,14 @@
 namespace smartmill::discrepancy {
 namespace {
 
+/// Variations of a campaign's tests.
+struct SeparatingTestOptions {
+  std::vector<double> speeds{0.4, 1.0, 1.8}, feeds{0.4, 1.0, 2.0}, depths{0.5, 1.0, 2.0};  ///< [1] factors
+  double engage_time = 0.02, duration = 0.15;  ///< [s] of a cut: a few revolutions after the entry
+};
+
+const SeparatingTestOptions LIMITS;
+
 // RMS difference of two models over the noise in one test.
 double separation(const Dataset& data, const CampaignTest& test, const MachineModel& a, const MachineModel& b,
                   double duration) {
@@ -32,24 +40,24 @@ double separation(const Dataset& data, const CampaignTest& test, const MachineMo
 }  // namespace
 
 std::optional<SeparatingTest> separatingTest(const Dataset& data, const MachineModel& a,
-                                             const MachineModel& b, const SeparatingTestOptions& options) {
+                                             const MachineModel& b) {
   std::optional<SeparatingTest> best;
   for (const TestData& t : data.tests) {
     if (t.test.kind == TestKind::tap || t.chatter) continue;
-    for (const double speed : options.speeds) {
-      for (const double feed : options.feeds) {
-        for (const double depth : options.depths) {
+    for (const double speed : LIMITS.speeds) {
+      for (const double feed : LIMITS.feeds) {
+        for (const double depth : LIMITS.depths) {
           if (t.test.kind == TestKind::air && (feed != 1.0 || depth != 1.0)) continue;
           CampaignTest test = t.test;
           test.spindle_speed *= speed;
           if (test.engagement) {
             test.engagement->feed_per_tooth *= feed;
             test.engagement->axial_depth *= depth;
-            test.engage_time = options.engage_time;
+            test.engage_time = LIMITS.engage_time;
           }
           double value = 0.0;
           try {
-            value = separation(data, test, a, b, options.duration);
+            value = separation(data, test, a, b, LIMITS.duration);
           } catch (const Error&) {
             continue;  // the twin cannot simulate this test
           }

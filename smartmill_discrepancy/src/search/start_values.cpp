@@ -41,10 +41,10 @@ std::optional<std::vector<double>> equivalentValues(const Fitter& fitter, const 
 }
 
 std::vector<double> bestStart(const Fitter& fitter, const FitResult& now, const PredictedGain& predicted,
-                              const std::optional<std::vector<double>>& other, const StartOptions& options) {
+                              const std::optional<std::vector<double>>& other) {
   if (predicted.null.empty() && !other) return predicted.start;
   std::vector<std::vector<double>> starts{predicted.start};
-  for (const double share : options.shorter) {
+  for (const double share : {0.5, 0.2, 0.05}) {
     if (predicted.null.empty()) break;
     std::vector<double> start = predicted.null;
     for (std::size_t c = 0; c < start.size(); ++c)

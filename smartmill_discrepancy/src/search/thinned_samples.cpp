@@ -4,11 +4,21 @@
 #include <random>
 
 namespace smartmill::discrepancy {
+namespace {
 
-ThinnedSamples::ThinnedSamples(const TwinRunner& runner, const ThinningOptions& options) {
+struct ThinningOptions {
+  std::size_t every = 4;  ///< samples of which one is used: a scan only compares gains
+  std::size_t few = 256;  ///< samples of a span below which all are used
+};
+
+const ThinningOptions LIMITS;
+
+}  // namespace
+
+ThinnedSamples::ThinnedSamples(const TwinRunner& runner) {
   std::minstd_rand random(1);
   for (const ChannelSpan& b : runner.spans()) {
-    const std::size_t every = b.size < options.few ? 1 : options.every;
+    const std::size_t every = b.size < LIMITS.few ? 1 : LIMITS.every;
     for (std::size_t i = 0; i + every <= b.size; i += every) {
       rows_.push_back(static_cast<Eigen::Index>(b.offset + i + (every > 1 ? random() % every : 0)));
       weights_.push_back(std::sqrt(static_cast<double>(every)));

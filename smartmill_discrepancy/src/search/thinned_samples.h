@@ -10,15 +10,10 @@
 
 namespace smartmill::discrepancy {
 
-struct ThinningOptions {
-  std::size_t every = 4;  ///< samples of which one is used: a scan only compares gains
-  std::size_t few = 256;  ///< samples of a span below which all are used
-};
-
 /// Weighted subset of the samples of a campaign, chosen at random to avoid aliasing.
 class ThinnedSamples {
  public:
-  explicit ThinnedSamples(const TwinRunner& runner, const ThinningOptions& options = {});
+  explicit ThinnedSamples(const TwinRunner& runner);
 
   Eigen::VectorXd of(const Eigen::VectorXd& values) const { return weighted(values(rows_)); }
   Eigen::MatrixXd of(const SparseColumns& columns) const { return weighted(columns.rows(rows_)); }

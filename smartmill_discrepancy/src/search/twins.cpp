@@ -52,17 +52,9 @@ void Twins::setGuided(bool is_guided) {
   is_guided_ = is_guided;
   TwinSettings of_quick = quick.settings(), of_heldout = heldout.settings();
   of_quick.guided = of_heldout.guided = is_guided;
-  if (!is_refined_) of_quick.substeps = is_guided ? options_.screening_substeps : freeSubsteps();
+  of_quick.substeps = is_guided ? options_.screening_substeps : freeSubsteps();
   quick.set(of_quick);
   heldout.set(of_heldout);
-}
-
-bool Twins::refineQuick() {
-  const int now = quick.settings().substeps, finest = exact.settings().substeps;
-  if (now >= finest) return false;
-  is_refined_ = true;
-  quick.set({std::min(options_.quick.finer * now, finest), CORNER_SLICES, is_guided_});
-  return true;
 }
 
 }  // namespace smartmill::discrepancy

@@ -14,6 +14,13 @@
 namespace smartmill::discrepancy {
 namespace {
 
+struct ValidationOptions {
+  /// Squares over the noise by which held-out tests distinguish two models: five standard deviations.
+  double min_squares = 25.0;
+};
+
+const ValidationOptions LIMITS;
+
 std::vector<ScaleEvidence> scaleEvidenceBetween(const TwinRunner& runner, const std::vector<double>& better,
                                                 const std::vector<double>& other) {
   std::vector<double> change(runner.size()), residual(runner.size());
@@ -117,8 +124,7 @@ std::string ValidationResult::text() const {
                    fitted.scale, fitted.std_dev, heldout.scale, heldout.std_dev);
 }
 
-ValidationResult validate(const Workbench& bench, const FitState& better, const FitState& other,
-                          const ValidationOptions& options) {
+ValidationResult validate(const Workbench& bench, const FitState& better, const FitState& other) {
   const auto held = simulateAll(bench.heldout(), {bench.exact().model(better), bench.exact().model(other)});
   const std::vector<ScaleEvidence> heldout = scaleEvidenceBetween(bench.heldout(), held[0], held[1]);
   const std::vector<double> simulated = bench.fitted().simulate(bench.exact().model(better));
@@ -128,7 +134,7 @@ ValidationResult validate(const Workbench& bench, const FitState& better, const 
   fitted.push_back(priorEvidence(bench.freedom(), better, other, variance));
   const double squares = std::accumulate(heldout.begin(), heldout.end(), 0.0,
                                          [](double sum, const ScaleEvidence& t) { return sum + t.squares; });
-  return {effectScaleOf(squares < options.min_squares ? std::vector<ScaleEvidence>{} : heldout),
+  return {effectScaleOf(squares < LIMITS.min_squares ? std::vector<ScaleEvidence>{} : heldout),
           effectScaleOf(fitted)};
 }
 

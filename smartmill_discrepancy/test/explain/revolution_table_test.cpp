@@ -64,7 +64,7 @@ std::optional<Hypothesis> tableOf(const Dataset& data) {
   FitState nominal;
   nominal.nominal.assign(bench.freedom().coordinates().size(), 0.0);
   const NominalTangents tangents = bench.linearise(nominal);
-  const FitResult here = bench.quick().fit(nominal, &tangents, {0, 1e-8, true});
+  const FitResult here = bench.quick().fit(nominal, &tangents, {0, 1e-8});
   return revolutionTable(bench.quick().runner(), empiricalHypotheses(bench.data()), here);
 }
 

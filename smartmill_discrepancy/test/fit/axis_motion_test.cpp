@@ -34,12 +34,14 @@ const Hypothesis& inertiaOf(const std::vector<Hypothesis>& hypotheses, const std
 }
 
 double massIn(const Dataset& data, const Hypothesis& inertia) {
-  const NominalFreedom freedom(data.nominal);
+  MachineModel certain = data.nominal;
+  certain.uncertainty = {0.0, 0.0, 0.0, 0.0, 0.0};
+  const NominalFreedom freedom(certain);
   const TwinRunner runner(data, {0, 1, 2, 3}, 2, 1);
   FitState start;
   start.nominal.assign(freedom.coordinates().size(), 0.0);
   start.members.push_back({&inertia, {1.0}});
-  const FitResult fit = Fitter(runner, freedom).fit(start, nullptr, {30, 1e-10, false});
+  const FitResult fit = Fitter(runner, freedom).fit(start, nullptr, {30, 1e-10});
   EXPECT_TRUE(fit.converged);
   return fit.state.members.front().values.front();
 }

@@ -48,7 +48,7 @@ TEST(Fitter, DeviationsAreCalibrated) {
     FitState start;
     start.nominal.assign(freedom.coordinates().size(), 0.0);
     start.members.push_back({&stribeck, {0.3, std::log(2000.0)}});
-    const FitResult fit = fitter.fit(start, nullptr, {30, 1e-10, true});
+    const FitResult fit = fitter.fit(start, nullptr, {30, 1e-10});
     ASSERT_TRUE(fit.converged);
     const std::vector<double>& values = fit.state.members.front().values;
     const std::vector<double> true_values{breakaway, std::log(speed)};
@@ -84,7 +84,9 @@ TEST(Fitter, DeviationsAreCalibratedWithCorrelatedNoise) {
   constexpr double SHARE = 0.8;
   std::mt19937_64 random(23);
   const MachineModel nominal = spindleOnly();
-  const NominalFreedom freedom(nominal);
+  MachineModel certain = nominal;
+  certain.uncertainty.spindle = 0.0;
+  const NominalFreedom freedom(certain);  // without nominal values
   MachineModel machine = nominal;
   machine.effects.push_back(stribeckFriction(0.4, 2500.0));
   Coverage unweighted, whitened;
@@ -95,7 +97,7 @@ TEST(Fitter, DeviationsAreCalibratedWithCorrelatedNoise) {
     const Hypothesis& stribeck = effectOf(hypotheses, "stribeck_friction");
     TwinRunner runner(data, {0, 1, 2, 3, 4, 5}, 1, 1);
     const Fitter fitter(runner, freedom);
-    const FitOptions options{30, 1e-10, false};
+    const FitOptions options{30, 1e-10};
     const FitState start{
         std::vector<double>(freedom.coordinates().size(), 0.0), {{&stribeck, {0.4, std::log(2500.0)}}}, {}};
     const FitResult first = fitter.fit(start, nullptr, options);
@@ -124,10 +126,10 @@ TEST(Fitter, PriorWeightScalesTheSquares) {
   const TwinRunner runner(data, {0, 1, 2, 3, 4, 5}, 1, 1);
   const NominalFreedom freedom(nominal), sure_freedom(surer);
   const FitState start{std::vector<double>(freedom.coordinates().size(), 0.0), {}, {}};
-  FitOptions weighted{30, 1e-12, true};
+  FitOptions weighted{30, 1e-12};
   weighted.prior_weight = 4.0;
   const FitResult a = Fitter(runner, freedom).fit(start, nullptr, weighted);
-  const FitResult b = Fitter(runner, sure_freedom).fit(start, nullptr, {30, 1e-12, true});
+  const FitResult b = Fitter(runner, sure_freedom).fit(start, nullptr, {30, 1e-12});
   for (std::size_t c = 0; c < start.nominal.size(); ++c)
     EXPECT_NEAR(a.state.nominal[c], b.state.nominal[c], 1e-4) << freedom.coordinates()[c].name;
   EXPECT_NEAR(a.bic, b.bic, 1e-3 * b.bic);
@@ -151,11 +153,11 @@ TEST(Fitter, ResidualBelongsToTheState) {
     for (const int iterations : {1, 2, 3, 5, 8}) {
       FitState start = at_nominal;
       start.members.push_back({&h, h.probes.front().points.front()});
-      const FitResult fit = fitter.fit(start, nullptr, {iterations, 1e-9, true});
+      const FitResult fit = fitter.fit(start, nullptr, {iterations, 1e-9});
       const double left = residualSquares(runner, runner.simulate(fitter.model(fit.state)));
       EXPECT_NEAR(fit.chi2, left, 1e-9 * left) << h.title() << " after " << iterations;
       // Frozen derivatives are relative to the state at which they were computed.
-      const FitResult along = fitter.fit(start, &tangents, {iterations, 1e-9, true});
+      const FitResult along = fitter.fit(start, &tangents, {iterations, 1e-9});
       FitState simulated_state = along.state;
       simulated_state.nominal = at_nominal.nominal;
       Eigen::VectorXd there = Eigen::Map<const Eigen::VectorXd>(runner.measured().data(), runner.size());
@@ -190,7 +192,7 @@ TEST(Fitter, EndsAtOnePointWithValuesAtTheirBounds) {
     for (const double speed : {1500.0, 5000.0}) {
       FitState start = at_nominal;
       start.members.push_back({&stribeck, {breakaway, std::log(speed)}});
-      fits.push_back(fitter.fit(start, &tangents, {8, 1e-6, true}));
+      fits.push_back(fitter.fit(start, &tangents, {8, 1e-6}));
       ASSERT_TRUE(fits.back().converged);
     }
   }
@@ -256,8 +258,7 @@ TEST(Fitter, EstimatesThePathShare) {
     const Dataset data = slowSlot(freedom.apply(nominal, off), nominal, random);
     const TwinRunner runner(data, {0}, 1, 2);
     const Fitter fitter(runner, freedom);
-    const FitResult fit =
-        fitter.fit({std::vector<double>(off.size(), 0.0), {}, {}}, nullptr, {30, 1e-8, true});
+    const FitResult fit = fitter.fit({std::vector<double>(off.size(), 0.0), {}, {}}, nullptr, {30, 1e-8});
     ASSERT_TRUE(fit.converged);
     const auto i = static_cast<Eigen::Index>(share);
     coverage.add(fit.state.nominal[share] - off[share], std::sqrt(fit.covariance(i, i)));
@@ -334,9 +335,9 @@ double gainOfHum(double amplitude) {
   const Fitter fitter(runner, freedom);
   FitState start;
   start.nominal.assign(freedom.coordinates().size(), 0.0);
-  const FitResult without_it = fitter.fit(start, nullptr, {30, 1e-10, true});
+  const FitResult without_it = fitter.fit(start, nullptr, {30, 1e-10});
   start.members.push_back({&*hum, {0.5, 0.6}});
-  const FitResult with = fitter.fit(start, nullptr, {30, 1e-10, true});
+  const FitResult with = fitter.fit(start, nullptr, {30, 1e-10});
   EXPECT_TRUE(with.converged && without_it.converged);
   return without_it.bic - with.bic;
 }

@@ -39,7 +39,7 @@ TEST(Screening, PredictsTheGainOfAValueAtItsBound) {
   FitState stated;
   stated.nominal.assign(freedom.coordinates().size(), 0.0);
   const NominalTangents tangents = fitter.nominalTangents(stated);
-  const FitResult now = fitter.fit(stated, &tangents, {30, 1e-9, true});
+  const FitResult now = fitter.fit(stated, &tangents, {30, 1e-9});
   ASSERT_TRUE(now.converged);
   bool at_bound = false;
   for (std::size_t c = 0; c < now.state.nominal.size(); ++c)
@@ -56,7 +56,7 @@ TEST(Screening, PredictsTheGainOfAValueAtItsBound) {
   FitState with = now.state;
   with.members.push_back({gain->hypothesis, gain->start});
   EXPECT_NEAR(numbersOf(gain->hypothesis->entry(gain->start)).front().second, 1.2, 0.02);
-  const FitResult fit = fitter.fit(with, &tangents, {30, 1e-9, true});
+  const FitResult fit = fitter.fit(with, &tangents, {30, 1e-9});
   const double reduction = now.chi2 + now.penalty - fit.chi2 - fit.penalty;
   EXPECT_NEAR(gain->gain, reduction, 0.05 * reduction);
   // The predicted effect scale is that of the fit.

@@ -16,6 +16,8 @@ Command processDampingCommand();
 Command toolFrfCommand();
 /// Chatter in a recorded cut.
 Command detectCommand();
+/// Stability chart from cuts alone.
+Command lobesFromCutsCommand();
 /// Next spindle speed for a chattering cut, from its sound.
 Command nextSpeedCommand();
 

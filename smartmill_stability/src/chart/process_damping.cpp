@@ -7,7 +7,6 @@
 #include <boost/math/tools/minima.hpp>
 
 #include "smartmill_core/error.h"
-#include "smartmill_core/io/csv.h"
 #include "smartmill_core/math/normal.h"
 #include "smartmill_core/require.h"
 #include "smartmill_core/signal/statistics.h"
@@ -50,35 +49,6 @@ double crossing(const std::function<double(double)>& function, double level, dou
 }
 
 }  // namespace
-
-std::vector<JudgedCut> readJudgedCuts(const std::string& file) {
-  CsvReader csv(file);
-  std::vector<std::string_view> cells;
-  if (!csv.nextFilled(&cells)) csv.fail("expected the header rpm,depth_mm,verdict");
-  const auto column = [&](const char* name) {
-    const auto found = std::find(cells.begin(), cells.end(), name);
-    if (found == cells.end())
-      csv.fail(std::string("column ") + name + " is missing: expected rpm,depth_mm,verdict");
-    return static_cast<std::size_t>(found - cells.begin());
-  };
-  const std::size_t rpm = column("rpm"), depth = column("depth_mm"), verdict = column("verdict"),
-                    width = cells.size();
-  std::vector<JudgedCut> cuts;
-  while (csv.nextFilled(&cells)) {
-    if (cells.size() != width) csv.fail("expected " + std::to_string(width) + " cells");
-    JudgedCut cut;
-    cut.speed = units::radPerSecFromRpm(csv.number(cells[rpm], "rpm"));
-    cut.depth = csv.number(cells[depth], "depth_mm") * units::MM;
-    if (!(cut.speed > 0.0)) csv.fail("rpm: expected a value above 0");
-    if (!(cut.depth > 0.0)) csv.fail("depth_mm: expected a value above 0");
-    cut.chatter = cells[verdict] == "chatter";
-    if (!cut.chatter && cells[verdict] != "stable")
-      csv.fail("verdict '" + std::string(cells[verdict]) + "': expected stable or chatter");
-    cuts.push_back(cut);
-  }
-  if (cuts.empty()) csv.fail("no cuts: expected at least one");
-  return cuts;
-}
 
 void ProcessDampingOptions::validate() const {
   require("scatter of a limit [1]", scatter, Range::openLow(0.0, 0.5));

@@ -10,6 +10,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
+#include "smartmill_stability/learning/evidence.h"
 
 namespace smartmill::stability {
 namespace {
@@ -136,22 +137,17 @@ std::pair<double, double> SpeedSearch::limitAt(const std::vector<Point>& points,
 double SpeedSearch::likelihoodOf(const Machine& machine, const HeardCut& cut) const {
   const std::size_t at = nearest(cut.speed);
   const bool chatters = machine.depth > machine.limit[at];
-  double likelihood = chatters == cut.frequency.has_value() ? 1.0 : options_.wrong;
-  if (chatters && cut.frequency) {
-    const double off = (machine.frequency[at] / *cut.frequency - 1.0) / options_.frequency_error;
-    likelihood *= std::max(options_.wrong, std::exp(-0.5 * off * off));
-  }
+  double likelihood = verdictLikelihood(chatters, cut.frequency.has_value(), options_.wrong);
+  if (chatters && cut.frequency)
+    likelihood *=
+        frequencyLikelihood(machine.frequency[at], *cut.frequency, options_.frequency_error, options_.wrong);
   return likelihood;
 }
 
-/// [1] Number of equally weighted machines with the same information (Kish).
 double SpeedSearch::effectiveMachines() const {
-  double sum = 0.0, squares = 0.0;
-  for (const Machine& machine : machines_) {
-    sum += machine.weight;
-    squares += machine.weight * machine.weight;
-  }
-  return squares > 0.0 ? sum * sum / squares : 0.0;
+  std::vector<double> weights;
+  for (const Machine& machine : machines_) weights.push_back(machine.weight);
+  return effectiveCount(weights);
 }
 
 void SpeedSearch::heard(const HeardCut& cut) {

@@ -44,18 +44,7 @@ void run(const Request& request) {
       csv.row(units::rpmFromRadPerSec(speeds[s]), depths[d] / units::MM, chart.probability[s][d],
               chart.nominal[s] / units::MM);
   csv.save(request.out);
-  // Each speed has a row per depth. A limit above the largest depth is an empty cell: the line leaves the
-  // picture.
-  const double outside = 1.1 * depths.back() / units::MM;
-  stability::drawPicture(
-      request.out,
-      "set xlabel 'Spindle speed [rpm]'\nset ylabel 'Axial depth [mm]'\nset cblabel 'Probability "
-      "of chatter'\nset cbrange [0:1]\nset palette defined (0 'white', 0.05 'light-green', 0.5 "
-      "'orange', 1 'dark-red')\nset view map\nset autoscale fix\nset key opaque\n"
-      "plot %FILE skip 1 using 1:2:3 with image notitle, %FILE skip 1 using 1:(strlen(strcol(4)) ? "
-      "real(strcol(4)) : " +
-          std::to_string(outside) + ") every " + std::to_string(depths.size()) +
-          " noautoscale with lines lw 2 lc 'black' title 'limit of the nominal system'");
+  stability::drawProbabilities(request.out, depths.size(), depths.back(), "limit of the nominal system");
   std::printf(
       "robust points (probability of chatter at most %.0f %% within %.1f %% of the speed, %d draws):\n",
       100.0 * request.risk, 100.0 * request.speed_margin, request.draws);

@@ -32,7 +32,7 @@ struct Options {
   std::vector<std::string> only, outside_kinds = plant::outsideKinds();
   plant::Counts counts;
   StudyCase one;
-  int threads = 2, cases = 0;
+  int threads = 2, cases = 0, misstated = 0;
   std::uint64_t seed = 1;
   bool keep = false;
 };
@@ -61,6 +61,17 @@ void checkOutsideKinds(const std::vector<std::string>& kinds) {
   if (kinds.empty()) throw UsageError("--outside-kinds: expected at least one kind");
 }
 
+// [1] Errors of misstated nominal values over their stated uncertainty.
+constexpr double MISSTATED = 2.0;
+
+std::vector<plant::Case> casesOf(const Options& o) {
+  std::vector<plant::Case> cases = plant::drawCases(o.counts, namesOf(o), o.seed, o.outside_kinds);
+  for (std::size_t k = 0; o.misstated > 0 && k < cases.size(); ++k) {
+    if ((k + 1) % static_cast<std::size_t>(o.misstated) == 0) cases[k].nominal_errors = MISSTATED;
+  }
+  return cases;
+}
+
 // Results of an earlier run of the same bench, by case.
 std::map<int, json> readLines(const std::string& file) {
   std::map<int, json> lines;
@@ -82,7 +93,7 @@ void runOne(const Options& o, const plant::Case& hidden) {
 void run(const Options& o) {
   if (o.one.scores()) return scoreBench(readJsonLines(o.one.lines), o.out.empty() ? "." : o.out);
   checkOutsideKinds(o.outside_kinds);
-  std::vector<plant::Case> cases = plant::drawCases(o.counts, namesOf(o), o.seed, o.outside_kinds);
+  std::vector<plant::Case> cases = casesOf(o);
   if (o.cases > static_cast<int>(cases.size()))
     throw UsageError("--cases: " + std::to_string(cases.size()) +
                      " are drawn by --singles, --pairs and so on");
@@ -133,6 +144,9 @@ int main(int argc, char** argv) {
   line.option("--outside-kinds", o.outside_kinds,
               "kinds of outside causes, comma separated (default: those of the bench)")
       .commas();
+  line.option("--misstated", o.misstated,
+              "every Nth case has nominal values off by twice their stated uncertainty (default: none)")
+      .notNegative();
   line.option("--only", o.only, "effects to draw from, comma separated").commas();
   line.option("--cases", o.cases, "number of cases, from the first (default: all)").notNegative();
   line.option("--case", o.one.number, "only this case, with progress on standard error");

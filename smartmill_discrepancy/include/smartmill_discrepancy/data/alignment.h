@@ -34,17 +34,9 @@ struct AlignmentFreedom {
   double step;       ///< of the numerical derivative
 };
 
-struct AlignmentFreedomOptions {
-  /// [samples] The force may start at once or over a fraction of a sample.
-  double entry_std = 0.1, entry_step = 0.02;
-  /// [rad] The prior only limits a step; the step is far below a sample.
-  double angle_std = 1.0, angle_step = 1e-4;
-};
-
 /// Phase and speed of a record without spindle angle; entry of a cut that starts within its record, whose
 /// stated time is accurate to a fraction of a sample only.
-std::vector<AlignmentFreedom> alignmentFreedoms(const TestData& test,
-                                                const AlignmentFreedomOptions& options = {});
+std::vector<AlignmentFreedom> alignmentFreedoms(const TestData& test);
 
 /// Alignment that moves `before` to `now`, two versions of one record.
 RecordAlignment alignmentBetween(const TestData& before, const TestData& now);

@@ -96,14 +96,9 @@ struct Dataset {
 /// estimate possible.
 Dataset loadDataset(const Campaign& campaign, const MachineModel& nominal);
 
-struct ShorteningOptions {
-  double revolutions = 6.0;  ///< kept: the entry and some of the steady cut
-  double max_share = 0.75;   ///< [1] of the samples of fitted cuts that are kept: no benefit above
-};
-
 /// The same data with only the first revolutions of each fitted cut that has a spindle angle.
 /// @return nothing if most of the samples would remain
-std::optional<Dataset> shortenedDataset(const Dataset& data, const ShorteningOptions& options = {});
+std::optional<Dataset> shortenedDataset(const Dataset& data);
 
 /// Marks the held-out tests: about a quarter of the cuts and one air cut, at conditions inside the range of
 /// the others. Chattering cuts are never held out.

@@ -21,9 +21,8 @@ struct EmpiricalCandidateOptions {
 class EmpiricalCandidates {
  public:
   /// @param bench, options must outlive this object
-  EmpiricalCandidates(Workbench& bench, const SearchOptions& options,
-                      const EmpiricalCandidateOptions& limits = {})
-      : bench_(bench), options_(options), limits_(limits), reproduction_(bench, options) {}
+  EmpiricalCandidates(Workbench& bench, const SearchOptions& options)
+      : bench_(bench), options_(options), reproduction_(bench, options) {}
 
   const EmpiricalCandidateOptions& limits() const { return limits_; }
   const Reproduction& reproduction() const { return reproduction_; }

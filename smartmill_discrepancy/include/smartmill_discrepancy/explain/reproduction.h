@@ -25,8 +25,7 @@ struct ReproductionOptions {
 class Reproduction {
  public:
   /// @param bench, options must outlive this object
-  Reproduction(Workbench& bench, const SearchOptions& options, const ReproductionOptions& criteria = {})
-      : bench_(bench), options_(options), criteria_(criteria) {}
+  Reproduction(Workbench& bench, const SearchOptions& options) : bench_(bench), options_(options) {}
 
   /// A real cause reduces the residual of held-out tests by a similar share as that of the fitted ones.
   bool isReproduced(const FitState& before, const FitResult& with) const;

@@ -70,7 +70,6 @@ struct NominalTangents {
 struct FitOptions {
   int iterations = 8;       ///< of the solver; 0: the start
   double tolerance = 1e-4;  ///< [1] of the squares above the noise: a smaller gain of a step ends the fit
-  bool nominal_free = true;
   double prior_weight =
       1.0;  ///< [1] factor on the priors' squares: the residual's variance if it exceeds the noise
   /// [1] Squares of a competing fit: a fit that cannot reach them ends early.

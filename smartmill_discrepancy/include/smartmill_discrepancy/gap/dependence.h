@@ -14,16 +14,8 @@ struct TestAmplitude {
   double amplitude = 0.0, std_dev = 1.0;
 };
 
-struct DependenceOptions {
-  std::size_t min_tests = 4;  ///< fewer have no significant correlation
-  /// [1] amplitude outside cuts over that in cuts: limit for "cutting".
-  double air_share = 0.3;
-  double chance = 0.05;  ///< [1] probability of a correlation by chance, over all conditions
-};
-
 /// Conditions that the amplitude depends on, the strongest first: cutting (present in cuts only), speed,
 /// chip_load, depth, immersion, time. Empty if the amplitudes agree within their uncertainty.
-std::vector<std::string> dependentConditions(const std::vector<TestAmplitude>& amplitudes,
-                                             const DependenceOptions& options = {});
+std::vector<std::string> dependentConditions(const std::vector<TestAmplitude>& amplitudes);
 
 }  // namespace smartmill::discrepancy

@@ -18,12 +18,6 @@ struct Repeatability {
   std::vector<double> lines;
 };
 
-struct RepeatabilityOptions {
-  double min_revolutions = 5.0;  ///< fewer leave too few degrees of freedom for the floor
-  /// [1] of the Nyquist frequency: highest order that is removed
-  double highest = 0.9;
-};
-
 /// Least-squares estimate from the record itself: mean and all orders of the spindle up to a share of the
 /// Nyquist frequency; the floor is the RMS of their residual over its degrees of freedom. White noise of RMS
 /// s has a floor of s.
@@ -31,8 +25,7 @@ struct RepeatabilityOptions {
 /// omitted
 /// @return nothing below the minimum of revolutions
 std::optional<Repeatability> repeatability(const std::vector<double>& values,
-                                           const std::vector<double>& angle,
-                                           const RepeatabilityOptions& options = {});
+                                           const std::vector<double>& angle);
 
 /// Of the steady part of a cut. @param values one per sample of the record
 /// @return nothing without spindle angle or enough revolutions

@@ -24,22 +24,12 @@ struct TwinSettings {
   bool guided = false;  ///< tools with modes by the recorded displacement of the tip, see SimulationOptions
 };
 
-/// Memory against time; results do not depend on it.
-struct TwinCacheOptions {
-  std::size_t results = 4;  ///< of each channel: those of a state and of the last derivatives
-  /// Traces of a cut: that of a state must outlast those of the derivatives of its cutting coefficients. Fine
-  /// steps are used for few models.
-  std::size_t traces = 8, fine_traces = 2;
-  int fine_substeps = 3;  ///< from which steps are fine
-};
-
 /// The twin of one test with its last results. Most model values affect few channels: a tap does not depend
 /// on the cutting coefficients, a sensor mode affects one axis.
 class TestTwin {
  public:
   /// @param test, channels must outlive this object @param chosen the test's index in the channels
-  TestTwin(const TestData& test, const CampaignChannels& channels, std::size_t chosen, int substeps,
-           const TwinCacheOptions& options = {});
+  TestTwin(const TestData& test, const CampaignChannels& channels, std::size_t chosen, int substeps);
 
   /// Simulated channels of the test. @param simulations counts the simulated tests @throws Error of the twin
   SimulatedChannels simulate(const MachineModel& model, const TwinSettings& settings,
@@ -71,7 +61,6 @@ class TestTwin {
   const TestData& test_data_;
   const CampaignChannels& layout_;
   std::size_t chosen_;
-  TwinCacheOptions options_;
   Record record_;  // for the twin
   CampaignTest test_;
   double phase_ = 0.0, early_entry_ = 0.0;

@@ -5,11 +5,6 @@
 
 namespace smartmill::discrepancy {
 
-struct WhiteningOptions {
-  std::size_t max_order = 32;          ///< limits the time; the BIC chooses the order
-  std::size_t samples_per_order = 16;  ///< minimum, so that a few values get at most a variance
-};
-
 /// Autoregression of a channel's residual: x_i = a_1 x_{i-1} + .. + a_p x_{i-p} + e_i. The prediction errors
 /// over their RMS are white. The filter is the inverse root of the residual's covariance, the weight of
 /// generalised least squares (Aitken 1935): applied to residuals and derivatives it gives ordinary least
@@ -23,7 +18,7 @@ class Whitening {
   /// Identity.
   Whitening() = default;
   /// @param residual of a channel, over its noise
-  Whitening(const double* residual, std::size_t size, const WhiteningOptions& options = {});
+  Whitening(const double* residual, std::size_t size);
 
   bool isActive() const { return !predictors_.empty(); }
   std::size_t order() const { return predictors_.empty() ? 0 : predictors_.size() - 1; }

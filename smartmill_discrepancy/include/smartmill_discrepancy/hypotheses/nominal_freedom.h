@@ -10,22 +10,13 @@
 
 namespace smartmill::discrepancy {
 
-struct NominalFreedomOptions {
-  /// [1] standard deviations to the bounds: too narrow to hide an effect that the value could replace.
-  double reach = 4.5;
-  double step = 2e-3;  ///< [1] standard deviations: of numerical derivatives
-  /// [1] Path share: bounds beyond both surfaces (0 and 1), step, prior.
-  double path_low = -0.5, path_high = 1.5, path_step = 0.02, path_std = 0.5;
-  double min_path_deviations = 3.0;  ///< standard deviations from which a path share is written
-};
-
 /// Values of the nominal model that are free within their stated uncertainty. Each coordinate is the natural
 /// logarithm of value over nominal value. A tool has one more coordinate, which no nominal model states: the
 /// share between the surface of the rule in formats.md (0) and that of the true tooth path (1), written as
 /// the entry `empirical:tooth_path`.
 class NominalFreedom {
  public:
-  explicit NominalFreedom(const MachineModel& nominal, const NominalFreedomOptions& options = {});
+  explicit NominalFreedom(const MachineModel& nominal);
   const std::vector<Coordinate>& coordinates() const { return coordinates_; }
   /// [unit of the key in the model file] Stated value of a coordinate; none of the path share, which no model
   /// states.
@@ -49,7 +40,6 @@ class NominalFreedom {
   void addToothPath();
   void addSpindle(const MachineModel& nominal);
 
-  NominalFreedomOptions options_;
   std::vector<Coordinate> coordinates_;
   std::vector<std::optional<double>> stated_;
   std::vector<Scale> scale_;

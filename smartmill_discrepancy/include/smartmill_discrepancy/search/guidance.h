@@ -5,19 +5,12 @@
 
 namespace smartmill::discrepancy {
 
-struct GuidanceOptions {
-  /// Standard deviations of the squares of noise by which a free simulation near the stability limit must be
-  /// worse than the guided one: noise alone reaches it in one of 30,000 cuts.
-  double min_deviations = 4.0;
-};
-
 /// Guidance of the simulated tool by its recorded displacement. A search is guided so that no candidate
 /// diverges; results are compared freely.
 class Guidance {
  public:
   /// @param twins, alignment, fitter must outlive this object
-  Guidance(Twins& twins, RecordAlignments& alignment, const Fitter& fitter,
-           const GuidanceOptions& options = {});
+  Guidance(Twins& twins, RecordAlignments& alignment, const Fitter& fitter);
 
   /// Whether a cut of a tool with modes has a recorded displacement.
   bool isPossible() const { return is_possible_; }
@@ -42,7 +35,6 @@ class Guidance {
   Twins& twins_;
   RecordAlignments& alignment_;
   const Fitter& fitter_;
-  GuidanceOptions options_;
   bool is_possible_;
 };
 

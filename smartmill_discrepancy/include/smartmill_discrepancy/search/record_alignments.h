@@ -7,20 +7,11 @@
 
 namespace smartmill::discrepancy {
 
-struct RecordAlignmentOptions {
-  /// [rad] Smaller rotations are left to the fits, which use all samples and free values; correcting them
-  /// here would alternate between two solutions.
-  double min_rotation = 0.05;
-  int heldout_passes = 3;           ///< Gauss-Newton steps of held-out records, which converge quadratically
-  double heldout_tolerance = 1e-4;  ///< [rad] of the last step
-  double max_step = 0.3;            ///< [rad] range in which the derivatives of a rotation are valid
-};
-
 /// Alignment of the records of a campaign with the model.
 class RecordAlignments {
  public:
   /// @param twins, fitter must outlive this object @param fitter of the fitted tests
-  RecordAlignments(Twins& twins, const Fitter& fitter, const RecordAlignmentOptions& options = {});
+  RecordAlignments(Twins& twins, const Fitter& fitter);
 
   bool phasesEstimated() const { return phases_estimated_; }  ///< some records have no spindle angle
 
@@ -41,7 +32,6 @@ class RecordAlignments {
 
   Twins& twins_;
   const Fitter& fitter_;
-  RecordAlignmentOptions options_;
   std::vector<TestData> loaded_;  // fitted tests as loaded
   bool phases_estimated_;
 };

@@ -8,19 +8,6 @@
 
 namespace smartmill::discrepancy {
 
-/// Convergence of a refinement, and which alternatives it compares.
-struct RefinementOptions {
-  int passes = 6;  ///< corrections of the quick twin at most
-  FitOptions step{6, 1e-5};
-  double tolerance = 0.1;      ///< [1] standard deviations: change of a value in the last pass
-  double same_tangents = 2.0;  ///< [1] standard deviations in which derivatives remain valid
-  /// [1] standard deviations between a step and the linear optimum from which both are compared.
-  double min_distance = 0.5;
-  /// [1] of a round's largest gain: candidates with less are no alternatives, even after convergence.
-  double near = 0.3;
-  double min_overlap = 0.5;  ///< [1] of a member's effect that an alternative must have to replace it
-};
-
 /// Fits a screened hypothesis and returns it as a candidate with gain and cost.
 /// @param now fit at the start of the round @param fit runs the fit; the hypothesis is its last member
 /// @param tried receives the fit
@@ -37,15 +24,14 @@ FitResult withoutUnneeded(const Fitter& fitter, FitResult fit, const NominalTang
 /// limit do not.
 /// @param now current fit @param tangents at its state @param candidates receives the values
 void refitSimplerAlternatives(const Fitter& fitter, const FitResult& now, const NominalTangents& tangents,
-                              std::vector<Candidate>* candidates);
+                              const SearchOptions& options, std::vector<Candidate>* candidates);
 
 /// Fits a state with all values free and exact simulation; measures the contribution of each member and of
 /// its best alternatives.
 /// @param result candidates are read; best, contribution, is_needed, without_member and alternatives are
 /// written
 /// @return false: the twin gives no finite values, best is unchanged
-bool refine(Workbench& bench, const FitState& state, const SearchOptions& options, SearchResult* result,
-            const RefinementOptions& limits = {});
+bool refine(Workbench& bench, const FitState& state, const SearchOptions& options, SearchResult* result);
 
 /// Covariance of a refined fit for a residual that is not white (Fitter::sandwichCovariance()).
 Eigen::MatrixXd robustCovariance(Workbench& bench, const FitResult& best);

@@ -14,11 +14,8 @@ namespace smartmill::discrepancy {
 /// Predicted gain of a hypothesis from its derivatives, with nominal values and members free.
 struct PredictedGain {
   const Hypothesis* hypothesis = nullptr;
-  double gain = 0.0;         ///< reduction of chi2 in linear approximation
-  bool approximate = false;  ///< from the previous simulation: only the gain is valid
-  /// [1] Share of its change that nominal values and members cannot replace; a gain with a small share means
-  /// that those are off.
-  double independent_share = 1.0;
+  double gain = 0.0;          ///< reduction of chi2 in linear approximation
+  bool approximate = false;   ///< from the previous simulation: only the gain is valid
   std::vector<double> start;  ///< coordinates from which a fit starts
   std::vector<double>
       null;  ///< point without effect from which start was reached; empty: start is used as it is
@@ -41,12 +38,6 @@ struct ScreeningMemory {
   }
 };
 
-struct ScreeningOptions {
-  /// [1] of the required gain: a smaller remembered gain is not simulated again. Between two states of a
-  /// search gains rarely grow tenfold.
-  double min_remembered = 0.1;
-};
-
 /// Score test of each hypothesis at a fitted state, best first; hypotheses without any response come last.
 /// When cancelled, it returns the predictions so far.
 /// @param tangents of the nominal values at the state @param hypotheses existing members are skipped
@@ -54,7 +45,7 @@ struct ScreeningOptions {
 /// with a far smaller remembered gain are approximate and have no start
 std::vector<PredictedGain> screen(const Fitter& fitter, const FitResult& now, const NominalTangents& tangents,
                                   const std::vector<Hypothesis>& hypotheses, double required_gain,
-                                  ScreeningMemory* memory, const ScreeningOptions& options = {});
+                                  ScreeningMemory* memory);
 
 /// Simulates the approximate predictions whose gain exceeds a minimum.
 void screenRemembered(const Fitter& fitter, const FitResult& now, const NominalTangents& tangents,

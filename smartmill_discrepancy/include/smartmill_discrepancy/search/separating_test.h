@@ -19,15 +19,8 @@ struct SeparatingTest {
   double difference = 0.0;  ///< [1] RMS difference of the predictions over the noise
 };
 
-/// Variations of a campaign's tests.
-struct SeparatingTestOptions {
-  std::vector<double> speeds{0.4, 1.0, 1.8}, feeds{0.4, 1.0, 2.0}, depths{0.5, 1.0, 2.0};  ///< [1] factors
-  double engage_time = 0.02, duration = 0.15;  ///< [s] of a cut: a few revolutions after the entry
-};
-
 /// The cut or air cut with the largest difference of two models among variations of the campaign's tests.
 std::optional<SeparatingTest> separatingTest(const Dataset& data, const MachineModel& a,
-                                             const MachineModel& b,
-                                             const SeparatingTestOptions& options = {});
+                                             const MachineModel& b);
 
 }  // namespace smartmill::discrepancy

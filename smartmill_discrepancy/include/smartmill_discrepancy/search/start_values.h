@@ -12,15 +12,9 @@ namespace smartmill::discrepancy {
 std::optional<std::vector<double>> equivalentValues(const Fitter& fitter, const Member& member,
                                                     const Hypothesis& hypothesis);
 
-struct StartOptions {
-  /// [1] of the predicted values: shorter steps from the null point.
-  std::vector<double> shorter{0.5, 0.2, 0.05};
-};
-
 /// Best of several starts, since the prediction is linear: full and shorter steps from the null point, and an
 /// optional other one.
 std::vector<double> bestStart(const Fitter& fitter, const FitResult& now, const PredictedGain& predicted,
-                              const std::optional<std::vector<double>>& other = {},
-                              const StartOptions& options = {});
+                              const std::optional<std::vector<double>>& other = {});
 
 }  // namespace smartmill::discrepancy

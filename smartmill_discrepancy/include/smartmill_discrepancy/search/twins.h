@@ -14,8 +14,7 @@ struct QuickTwinOptions {
   /// Steps per period of a tool mode for the unguided twin: with fewer its stability limit is wrong and
   /// misleads the fit.
   double steps_per_period = 12.0;
-  double max_free_substeps = 2.0;  ///< of the unguided twin: more are left to Twins::refineQuick()
-  int finer = 4;                   ///< factor on its steps in Twins::refineQuick()
+  double max_free_substeps = 2.0;  ///< of the unguided twin: more take the time of the exact twin
 };
 
 struct WorkbenchOptions {
@@ -46,14 +45,12 @@ class Twins {
   void setGuided(bool is_guided);
   /// Reads guidance and weights of the records again.
   void readGuidance();
-  /// Smaller steps for the quick twin. @return false: they are those of the exact twin already
-  bool refineQuick();
 
  private:
   int freeSubsteps() const;
 
   WorkbenchOptions options_;
-  bool is_guided_ = false, is_refined_ = false;
+  bool is_guided_ = false;
 };
 
 }  // namespace smartmill::discrepancy

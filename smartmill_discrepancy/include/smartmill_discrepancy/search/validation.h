@@ -63,14 +63,8 @@ struct ValidationResult {
 /// Effect scale of the fitted tests for the change from `other` to `better`.
 EffectScale fittedScale(const Fitter& fitter, const FitResult& better, const FitResult& other);
 
-struct ValidationOptions {
-  /// Squares over the noise by which held-out tests distinguish two models: five standard deviations.
-  double min_squares = 25.0;
-};
-
 /// @param better, other states of the same campaign, both simulated exactly
-ValidationResult validate(const Workbench& bench, const FitState& better, const FitState& other,
-                          const ValidationOptions& options = {});
+ValidationResult validate(const Workbench& bench, const FitState& better, const FitState& other);
 
 /// [1] Share of the held-out squares above the noise that one model removes from another's.
 double heldoutReduction(const Workbench& bench, const FitState& better, const FitState& other);

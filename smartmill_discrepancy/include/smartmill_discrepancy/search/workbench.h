@@ -51,9 +51,6 @@ class Workbench {
   /// Squares of the exact twin on the fitted tests at a state.
   double exactSquares(const FitState& state);
 
-  /// Smaller steps for the quick twin. @return false: they are those of the exact twin already
-  bool refineQuick() { return twins_.refineQuick(); }
-
  private:
   void correctAt(const FitState& state, double* exact_squares);
 

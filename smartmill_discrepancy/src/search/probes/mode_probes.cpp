@@ -13,6 +13,13 @@
 namespace smartmill::discrepancy {
 namespace {
 
+struct ModeProbeOptions {
+  std::size_t angles = 360;  ///< per revolution at which the cutting stiffness is tabulated
+  int slices = 24;           ///< of the axial depth, which the helix spreads over the angle
+};
+
+const ModeProbeOptions LIMITS;
+
 const std::array<std::string, 2> TIP{{"tool_x", "tool_y"}};
 
 bool actsBehindSensor(const std::string& effect) {
@@ -63,9 +70,8 @@ struct ModeProbes::TipDisplacement {
   const double* row(std::size_t i) const { return at.data() + i * count; }
 };
 
-ModeProbes::ModeProbes(const TwinRunner& runner, const MachineModel& model, std::vector<Eigen::Index> samples,
-                       const ModeProbeOptions& options)
-    : runner_(runner), model_(model), samples_(std::move(samples)), options_(options) {
+ModeProbes::ModeProbes(const TwinRunner& runner, const MachineModel& model, std::vector<Eigen::Index> samples)
+    : runner_(runner), model_(model), samples_(std::move(samples)) {
   MachineModel ideal = model;
   for (ModalModel& axis : ideal.force_sensor.axis) {
     axis = ModalModel{};
@@ -85,12 +91,12 @@ ModeProbes::ModeProbes(const TwinRunner& runner, const MachineModel& model, std:
 std::vector<ModeProbes::Stiffness> ModeProbes::cuttingStiffness(const Engagement& engagement) const {
   const ToolGeometry& tool = *model_.tool;
   const CuttingCoefficients& k = *model_.cutting;
-  const double dz = engagement.axial_depth / options_.slices;
-  const std::size_t points = options_.angles;
+  const double dz = engagement.axial_depth / LIMITS.slices;
+  const std::size_t points = LIMITS.angles;
   std::vector<Stiffness> table(points, Stiffness{});
   for (std::size_t p = 0; p < points; ++p) {
     for (int j = 0; j < tool.teeth; ++j) {
-      for (int s = 0; s < options_.slices; ++s) {
+      for (int s = 0; s < LIMITS.slices; ++s) {
         const double tip =
             units::TWO_PI * static_cast<double>(p) / static_cast<double>(points) + tool.toothAngle(j);
         double phi = std::fmod(tip - tool.lag() * (s + 0.5) * dz, units::TWO_PI);

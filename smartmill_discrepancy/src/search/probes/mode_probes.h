@@ -14,18 +14,12 @@
 
 namespace smartmill::discrepancy {
 
-struct ModeProbeOptions {
-  std::size_t angles = 360;  ///< per revolution at which the cutting stiffness is tabulated
-  int slices = 24;           ///< of the axial depth, which the helix spreads over the angle
-};
-
 /// First-order response of the simulated channels to one more mode, for a scan over many frequencies.
 class ModeProbes {
  public:
   /// @param runner must outlive this object @param model at the current state @param samples to evaluate,
   /// ascending
-  ModeProbes(const TwinRunner& runner, const MachineModel& model, std::vector<Eigen::Index> samples,
-             const ModeProbeOptions& options = {});
+  ModeProbes(const TwinRunner& runner, const MachineModel& model, std::vector<Eigen::Index> samples);
 
   /// One more mode of the force sensor along an axis (0..2), per unit of gain: one column per frequency [Hz],
   /// one row per sample.
@@ -51,7 +45,6 @@ class ModeProbes {
   const TwinRunner& runner_;
   MachineModel model_;
   std::vector<Eigen::Index> samples_;
-  ModeProbeOptions options_;
   // Force per m of outward motion of the tool along x and y over a revolution: rows fx fy fz, columns x y
   // [N/m].
   using Stiffness = std::array<std::array<double, 2>, 3>;

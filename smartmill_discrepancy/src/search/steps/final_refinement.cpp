@@ -1,51 +1,16 @@
 #include <algorithm>
 
-#include "search/steps/search_step.h"
+#include "search/steps/steps.h"
 #include "smartmill_discrepancy/search/refinement.h"
 
 namespace smartmill::discrepancy {
 namespace {
 
-struct FinalRefinementOptions {
-  int max_swaps = 3;  ///< of effects by alternatives; limits the time
-};
-
-/// Refines the fit with the exact twin, drops effects that have become unnecessary and swaps effects whose
-/// refined alternatives are better.
-class FinalRefinement : public SearchStep {
- public:
-  void run(SearchState& state) override;
-
- private:
-  bool swapBetterAlternatives(SearchState& state) const;
-
-  FinalRefinementOptions options_;
-};
-
-void FinalRefinement::run(SearchState& s) {
-  s.bench.guidance().guideNearLimit(s.now.state);
-  s.bench.guidance().updateWeights(s.now.state);
-  SearchResult& result = s.result;
-  result.best = s.now;
-  bool refined = refine(s.bench, s.now.state, s.options, &result);
-  // Effects may become unnecessary after the refinement.
-  while (refined && !result.contribution.empty()) {
-    const auto least = std::min_element(result.contribution.begin(), result.contribution.end());
-    const auto m = static_cast<std::size_t>(least - result.contribution.begin());
-    if (result.is_needed[m]) break;
-    s.options.log("  no longer needed: " + result.best.state.members[m].hypothesis->title());
-    refined = refine(s.bench, without(result.best.state, m), s.options, &result);
-  }
-  if (refined) refined = swapBetterAlternatives(s);
-  if (!refined) result.clearMembers();
-  for (const Member& m : result.best.state.members) s.options.log("found " + describe(m));
-}
-
 // Candidates of a round are compared before convergence; compares their refined fits.
 // @return false: the twin gives no finite values
-bool FinalRefinement::swapBetterAlternatives(SearchState& s) const {
+bool swapBetterAlternatives(SearchState& s) {
   SearchResult& result = s.result;
-  for (int swap = 0; swap < options_.max_swaps && !s.bench.cancelled(); ++swap) {
+  for (int swap = 0; swap < s.options.max_swaps && !s.bench.cancelled(); ++swap) {
     const auto ahead = [&](const Alternative& r) { return r.delta_bic - result.contribution[r.member]; };
     const auto best =
         std::max_element(result.alternatives.begin(), result.alternatives.end(),
@@ -63,8 +28,23 @@ bool FinalRefinement::swapBetterAlternatives(SearchState& s) const {
 
 }  // namespace
 
-std::unique_ptr<SearchStep> makeFinalRefinement() {
-  return std::make_unique<FinalRefinement>();
+void refineFinally(SearchState& s) {
+  s.bench.guidance().guideNearLimit(s.now.state);
+  s.bench.guidance().updateWeights(s.now.state);
+  SearchResult& result = s.result;
+  result.best = s.now;
+  bool refined = refine(s.bench, s.now.state, s.options, &result);
+  // Effects may become unnecessary after the refinement.
+  while (refined && !result.contribution.empty()) {
+    const auto least = std::min_element(result.contribution.begin(), result.contribution.end());
+    const auto m = static_cast<std::size_t>(least - result.contribution.begin());
+    if (result.is_needed[m]) break;
+    s.options.log("  no longer needed: " + result.best.state.members[m].hypothesis->title());
+    refined = refine(s.bench, without(result.best.state, m), s.options, &result);
+  }
+  if (refined) refined = swapBetterAlternatives(s);
+  if (!refined) result.clearMembers();
+  for (const Member& m : result.best.state.members) s.options.log("found " + describe(m));
 }
 
 }  // namespace smartmill::discrepancy

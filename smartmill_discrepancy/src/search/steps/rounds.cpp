@@ -4,31 +4,17 @@
 
 #include "search/adoption.h"
 #include "search/candidate_round.h"
-#include "search/steps/search_step.h"
+#include "search/steps/steps.h"
 #include "smartmill_core/formatted.h"
+#include "smartmill_discrepancy/search/refinement.h"
 #include "smartmill_discrepancy/search/validation.h"
 
 namespace smartmill::discrepancy {
 namespace {
 
-bool isMember(const FitState& state, const std::string& effect) {
-  return std::any_of(state.members.begin(), state.members.end(),
-                     [&](const Member& m) { return m.hypothesis->effect == effect; });
-}
-
-struct RoundsOptions {
-  /// Consecutive rejections by held-out tests that end the search; limits its time.
-  std::size_t max_rejections = 3;
-  /// Work in units of a nominal fit, from typical campaigns: a round, the last round, the nominal fit of
-  /// whole records, and refinement with validation. Steers the progress only.
-  double round_work = 2.0, last_round_work = 1.0, whole_records_work = 2.0, later_work = 4.0;
-};
-
-/// Rounds of the search, each of which adds one effect: the best fit of a round is adopted and kept if the
-/// exact twin and the held-out tests support it.
-class Rounds : public SearchStep {
+class Rounds {
  public:
-  void run(SearchState& state) override;
+  void run(SearchState& state);
 
  private:
   // Fit and derivatives at the start of a round.
@@ -39,13 +25,9 @@ class Rounds : public SearchStep {
   bool addEffect(SearchState& state);
   bool isSupportedByHeldout(SearchState& state, const FitResult& before, const Hypothesis& newest) const;
   void reject(SearchState& state, RoundStart start, const Hypothesis* newest);
-  void revertTo(SearchState& state, RoundStart start) const;
   void reportProgress(const SearchState& state) const;
 
-  RoundsOptions options_;
-  Adoption adoption_;
   bool reverted_ = false;  // to the start of the last round, whose predictions remain valid
-  std::size_t rejections_in_a_row_ = 0;
 };
 
 void Rounds::run(SearchState& s) {
@@ -68,19 +50,13 @@ bool Rounds::addEffect(SearchState& s) {
   if (!round.improved() || s.bench.cancelled()) return false;
   const Hypothesis* const newest = round.best().state.members.back().hypothesis;
   RoundStart before{s.now, std::move(s.tangents)};
-  adoption_.adopt(s, std::move(round.best()));
-  adoption_.dropUnneeded(s);
+  adopt(s, std::move(round.best()));
+  // Earlier effects may have imitated the new one.
+  s.now = withoutUnneeded(s.quick, std::move(s.now), s.tangents, s.options, false);
   const double exact_squares = s.bench.exactSquares(s.now.state);
   if (!(exact_squares < s.exact_now)) {
     s.options.log(s.gapText(exact_squares) + " when simulated exactly, rejected: " + newest->title());
-    // An effect already dropped as unnecessary needs no smaller steps.
-    if (isMember(s.now.state, newest->effect) && s.bench.refineQuick()) {
-      s.options.log("  repeated with smaller steps");
-      s.memory.clear();
-      revertTo(s, std::move(before));
-    } else {
-      reject(s, std::move(before), newest);
-    }
+    reject(s, std::move(before), newest);
     return true;
   }
   auto& rejected_by_heldout = s.result.rejected;
@@ -89,9 +65,8 @@ bool Rounds::addEffect(SearchState& s) {
         rejected_by_heldout.end())
       rejected_by_heldout.push_back(newest);
     reject(s, std::move(before), newest);
-    return rejections_in_a_row_ < options_.max_rejections;
+    return true;
   }
-  rejections_in_a_row_ = 0;
   s.rejected.clear();  // they were rejected without the new effect
   rejected_by_heldout.erase(std::remove(rejected_by_heldout.begin(), rejected_by_heldout.end(), newest),
                             rejected_by_heldout.end());
@@ -113,7 +88,9 @@ bool Rounds::isSupportedByHeldout(SearchState& s, const FitResult& before, const
   return false;
 }
 
-void Rounds::revertTo(SearchState& s, RoundStart start) const {
+void Rounds::reject(SearchState& s, RoundStart start, const Hypothesis* newest) {
+  s.rejected.push_back(newest);
+  reverted_ = true;
   ++s.uncounted_rounds;
   s.now = std::move(start.fit);
   if (s.bench.alignment().alignPhases(s.now.state) > 0.0) {
@@ -125,25 +102,17 @@ void Rounds::revertTo(SearchState& s, RoundStart start) const {
   s.exact_now = s.bench.exactSquares(s.now.state);
 }
 
-void Rounds::reject(SearchState& s, RoundStart start, const Hypothesis* newest) {
-  ++rejections_in_a_row_;
-  s.rejected.push_back(newest);
-  revertTo(s, std::move(start));
-  reverted_ = true;
-}
-
+// Work in units of a nominal fit, from typical campaigns: a round 2, the last one 1, the nominal fit of whole
+// records 2, refinement with validation 4.
 void Rounds::reportProgress(const SearchState& s) const {
-  const double whole = options_.whole_records_work;
-  const double done =
-      1.0 + options_.round_work * static_cast<double>(s.rounds) + (s.whole_records ? whole : 0.0);
-  const double left = options_.later_work + options_.last_round_work + (s.whole_records ? 0.0 : whole);
-  s.options.reportProgress(done / (done + left));
+  const double done = 1.0 + 2.0 * static_cast<double>(s.rounds) + (s.whole_records ? 2.0 : 0.0);
+  s.options.reportProgress(done / (done + (s.whole_records ? 5.0 : 7.0)));
 }
 
 }  // namespace
 
-std::unique_ptr<SearchStep> makeRounds() {
-  return std::make_unique<Rounds>();
+void addEffects(SearchState& s) {
+  Rounds().run(s);
 }
 
 }  // namespace smartmill::discrepancy

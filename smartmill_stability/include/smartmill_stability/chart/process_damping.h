@@ -5,20 +5,10 @@
 #include <vector>
 
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_stability/learning/judged_cut.h"
 #include "smartmill_stability/solvers/solver.h"
 
 namespace smartmill::stability {
-
-/// A cut that was made, and whether it chattered.
-struct JudgedCut {
-  double speed = 0.0;  ///< [rad/s]
-  double depth = 0.0;  ///< [m]
-  bool chatter = false;
-};
-
-/// Cuts of a CSV file with the columns rpm, depth_mm and verdict (stable or chatter).
-/// @throws Error naming file, line and column.
-std::vector<JudgedCut> readJudgedCuts(const std::string& file);
 
 struct ProcessDampingOptions {
   /// [1] Standard deviation of log(limit) from cut to cut: speed, depth and engagement are not exactly the

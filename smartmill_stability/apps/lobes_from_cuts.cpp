@@ -1,0 +1,5 @@
+#include "smartmill_stability/commands.h"
+
+int main(int argc, char** argv) {
+  return smartmill::runCommand(smartmill::stability::lobesFromCutsCommand(), argc, argv);
+}
