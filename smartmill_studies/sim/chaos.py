@@ -47,7 +47,7 @@ WRONG = 0.5             # [1] error of a block's RMS over that of the true force
 LEAST_FORCE = 20.0      # [N] RMS of a block that is judged
 STEADY = 0.3            # [1] range of the RMS of five blocks in a steady cut
 AFTER = 2.0             # [s] simulated after a fault, in which its consequences end
-COMPENSATED = 1         # ForceBlock.status
+COMPENSATED, PASSED_THROUGH, TRANSIENT = 1, 2, 4  # ForceBlock.status
 LIMITS = {"X": 0.25, "Y": 0.2, "Z": 0.3}  # [m] travel of launch/models/mill.yaml, to both sides; Z to 0
 
 
@@ -158,7 +158,7 @@ class Observer:
                 lacks.append("state of the controller")
             elif not self.state.armed or self.state.run != 3:
                 lacks.append("a running program")
-            if now - self.force_at > 1.0 or self.force_status not in (COMPENSATED, 2):
+            if now - self.force_at > 1.0 or self.force_status not in (COMPENSATED, PASSED_THROUGH, TRANSIENT):
                 lacks.append("compensated forces")
         return lacks
 

@@ -107,12 +107,12 @@ std::uint64_t ForceTrack::indexAt(double stamp) const {
 }
 
 std::pair<std::uint64_t, std::uint64_t> ForceTrack::covered(std::uint64_t from, std::uint64_t to,
-                                                            std::optional<ForceBlock::Status> status) const {
+                                                            bool compensated) const {
   std::pair<std::uint64_t, std::uint64_t> best{from, from}, run{from, from};
   for (const auto& [index, block] : blocks_) {
     const std::uint64_t begin = std::max(index, from);
     const std::uint64_t end = std::min<std::uint64_t>(index + block.force[0].size(), to);
-    if (begin >= end || (status && block.status != *status)) continue;
+    if (begin >= end || (compensated && !block.isCompensated())) continue;
     run = begin == run.second ? std::make_pair(run.first, end) : std::make_pair(begin, end);
     if (run.second - run.first > best.second - best.first) best = run;
   }

@@ -261,9 +261,8 @@ std::pair<std::uint64_t, std::uint64_t> evaluatedSamples(const RecordedCut& cut,
   if (!std::isfinite(cut.steady_from) || cut.raw.empty() || cut.compensated.empty()) return {0, 0};
   const double settle = settle_revolutions * units::TWO_PI / cut.condition.spindle_speed;
   if (cut.steady_from + settle >= cut.steady_to) return {0, 0};
-  auto range =
-      cut.compensated.covered(cut.compensated.indexAt(cut.steady_from + settle),
-                              cut.compensated.indexAt(cut.steady_to), ForceBlock::Status::compensated);
+  auto range = cut.compensated.covered(cut.compensated.indexAt(cut.steady_from + settle),
+                                       cut.compensated.indexAt(cut.steady_to), true);
   range = cut.raw.covered(range.first, range.second);
   return cut.truth.empty() ? range : cut.truth.covered(range.first, range.second);
 }

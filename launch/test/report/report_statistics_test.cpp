@@ -112,10 +112,8 @@ TEST(ForceTrack, LongestSegmentWithoutGapAndOfOneStatus) {
   track.add(block(130, 10));
   track.add(block(140, 10));
   EXPECT_EQ(track.covered(0, 1000), std::make_pair(std::uint64_t{120}, std::uint64_t{150}));
-  EXPECT_EQ(track.covered(0, 1000, ForceBlock::Status::compensated),
-            std::make_pair(std::uint64_t{130}, std::uint64_t{150}));
-  EXPECT_EQ(track.covered(105, 135, ForceBlock::Status::compensated),
-            std::make_pair(std::uint64_t{105}, std::uint64_t{110}));
+  EXPECT_EQ(track.covered(0, 1000, true), std::make_pair(std::uint64_t{130}, std::uint64_t{150}));
+  EXPECT_EQ(track.covered(105, 135, true), std::make_pair(std::uint64_t{105}, std::uint64_t{110}));
 }
 
 TEST(MiddleRange, OfASineIsTwiceTheSineOf72Degrees) {

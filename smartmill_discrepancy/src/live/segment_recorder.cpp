@@ -101,7 +101,7 @@ void SegmentRecorder::handle(const ForceBlock& compensated) {
   block.first_index = compensated.first_index;
   block.channels = {FORCE_CHANNELS.begin(), FORCE_CHANNELS.end()};
   block.units.assign(FORCE_CHANNELS.size(), "N");
-  bool valid = compensated.status == ForceBlock::Status::compensated;
+  bool valid = compensated.isCompensated();
   for (std::size_t i = 0; i < compensated.force[0].size(); ++i) {
     for (const std::vector<double>& axis : compensated.force) {
       valid = valid && std::isfinite(axis[i]);

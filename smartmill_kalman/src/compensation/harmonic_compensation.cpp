@@ -141,6 +141,9 @@ void HarmonicCompensation::process(const ForceBlock& measured, ForceBlock compen
     if (health.speed_std > parameters_.speed_converged * health.speed)
       compensated.status = ForceBlock::Status::settling;
   }
+  if (compensated.status == ForceBlock::Status::compensated &&
+      health.innovation_ratio > parameters_.innovation_limit)
+    compensated.status = ForceBlock::Status::transient;
   const double end = measured.stamp + static_cast<double>(count) / measured.sample_rate;
   publish(measured, std::move(compensated));
   if (mode_follower_ && followModes(end)) ++health.mode_updates;

@@ -24,11 +24,10 @@
 namespace smartmill::kalman {
 namespace {
 
-constexpr std::size_t MAX_WAITING = 4000;     // blocks that wait for the rotation: 20 s of both topics
-constexpr double MAX_INNOVATION_RATIO = 3.0;  // [1] innovations are larger than the model explains
-constexpr double MAX_CORRELATION = 0.5;       // [1] of neighbouring innovations
-constexpr double CHECK_PERIOD = 0.05;         // [s]
-constexpr double GOAL_TIMEOUT = 1.0;          // [s] before a goal that waits for a dead input is refused
+constexpr std::size_t MAX_WAITING = 4000;  // blocks that wait for the rotation: 20 s of both topics
+constexpr double MAX_CORRELATION = 0.5;    // [1] of neighbouring innovations
+constexpr double CHECK_PERIOD = 0.05;      // [s]
+constexpr double GOAL_TIMEOUT = 1.0;       // [s] before a goal that waits for a dead input is refused
 
 ForceSensor sensorOf(const NodeParameters& parameters) {
   if (parameters.model.empty()) throw Error("model: empty, expected the path of a smartmill-model/1 file");
@@ -257,7 +256,7 @@ std::pair<int, std::string> KalmanNode::summary(const SpindleSensorHealth* spind
   if (!rotation_known_) return {Level::ERROR, "no transform of the force sensor"};
   if (health.gaps + health.not_finite + health.clipped > 0)
     return {Level::WARN, "samples were lost, clipped or not finite"};
-  if (health.innovation_ratio > MAX_INNOVATION_RATIO)
+  if (health.innovation_ratio > parameters_.compensation.innovation_limit)
     return {Level::WARN, "innovations larger than the sensor model explains"};
   if (health.speed > 0.0 && health.innovation_correlation > MAX_CORRELATION)
     return {Level::WARN, "innovations are not white: the model misses part of the force or of the sensor"};

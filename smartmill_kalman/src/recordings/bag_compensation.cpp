@@ -34,7 +34,7 @@ class CutSplitter {
       if (speed > 0.0) cut_->speed = speed;
       if (i == 0 && !forces.hasDefaultForceModel()) cut_->force_model = forces.forceModel();
       cut_->offset.push_back(time - cut_->stamp);
-      if (block.status != ForceBlock::Status::compensated) cut_->settling += 1.0 / block.sample_rate;
+      if (!block.isCompensated()) cut_->settling += 1.0 / block.sample_rate;
       for (std::size_t axis = 0; axis < 3; ++axis) {
         cut_->measured[axis].push_back(measured_.force[axis][i]);
         cut_->compensated[axis].push_back(block.force[axis][i]);

@@ -71,8 +71,7 @@ class CutCollector {
     if (angle.stamp > angles_.back().time) angles_.push_back(angles_.back().next(angle));
   }
   void push(const ForceBlock& block) {
-    if (cutting() && block.status == ForceBlock::Status::compensated)
-      force_.add(block.stamp, block.sample_rate, block.force);
+    if (cutting() && block.isCompensated()) force_.add(block.stamp, block.sample_rate, block.force);
   }
   void push(const SampleBlock& raw) {
     const bool six = SpindleForceSensor::isSixChannels(raw);

@@ -112,6 +112,48 @@ TEST(ForceCompensation, keepsTheSampleIndexAndFindsTheForce) {
   EXPECT_EQ(runner.result.compensated.front().status, ForceBlock::Status::settling);
 }
 
+// The tool leaves the stock over five revolutions: the force falls faster than the filter follows. Every
+// block whose error is above half of the force is marked; in the steady cut before none is.
+TEST(ForceCompensation, marksAForceThatFallsFasterThanTheFilterFollows) {
+  constexpr std::size_t STEADY = 60, FALL = 8;
+  Session s = session(STEADY + FALL + 4);
+  std::vector<ModalFilter> filters(3, ModalFilter(dynamometer(), RATE, Hold::first_order));
+  std::mt19937 random(6);
+  std::normal_distribution<double> noise(0.0, 1.0);
+  const double speed = units::radPerSecFromRpm(9000.0);
+  const MechanisticForce process({4, 19.05e-3, units::radFromDeg(30.0), {}},
+                                 {796e6, 168e6, 222e6, 27.7e3, 30.8e3, 1.4e3}, {0.0, units::PI, 2e-3, 6e-5});
+  for (std::size_t b = 0; b < s.blocks.size(); ++b) {
+    for (std::size_t i = 0; i < BLOCK; ++i) {
+      const double blocks = static_cast<double>(b) + static_cast<double>(i) / static_cast<double>(BLOCK);
+      const double share =
+          std::clamp((static_cast<double>(STEADY + FALL) - blocks) / static_cast<double>(FALL), 0.0, 1.0);
+      const CuttingForce force = process.at(speed * static_cast<double>(s.blocks[b].first_index + i) / RATE);
+      s.truth_x[b * BLOCK + i] = share * force.fx;
+      s.blocks[b].samples[3 * i] = filters[0].step(share * force.fx) + noise(random);
+      s.blocks[b].samples[3 * i + 1] = filters[1].step(share * force.fy) + noise(random);
+      s.blocks[b].samples[3 * i + 2] = filters[2].step(share * force.fz) + noise(random);
+    }
+  }
+  Runner runner;
+  runner.feed(s);
+  std::size_t marked = 0;
+  for (std::size_t b = 40; b < STEADY + FALL; ++b) {
+    const ForceBlock& block = runner.result.compensated[b];
+    double error = 0.0, norm = 0.0;
+    for (std::size_t i = 0; i < BLOCK; ++i) {
+      error += std::pow(block.force[0][i] - s.truth_x[b * BLOCK + i], 2);
+      norm += std::pow(s.truth_x[b * BLOCK + i], 2);
+    }
+    const bool transient = block.status == ForceBlock::Status::transient;
+    marked += transient ? 1 : 0;
+    EXPECT_TRUE(block.isCompensated());
+    EXPECT_FALSE(transient && b < STEADY) << "block " << b;
+    EXPECT_TRUE(transient || error < 0.25 * norm) << "block " << b;
+  }
+  EXPECT_GT(marked, 0u);
+}
+
 TEST(ForceCompensation, doesNotDependOnTheOrderOfArrival) {
   const Session s = session(40);
   Runner straight;

@@ -105,7 +105,7 @@ void ForceCurveIdentification::handle(const SpindleAngle& angle) {
 }
 
 void ForceCurveIdentification::handle(const ForceBlock& block) {
-  if (block.status != ForceBlock::Status::compensated) {
+  if (!block.isCompensated()) {
     samples_.clear();
     return;
   }

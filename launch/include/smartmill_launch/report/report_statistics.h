@@ -60,9 +60,9 @@ class ForceTrack {
   std::vector<double> axisAt(std::size_t axis, const std::vector<double>& times) const;
   /// Index of the first sample not before a time [s]. @throws Error on an empty track.
   std::uint64_t indexAt(double stamp) const;
-  /// Longest segment without a gap within from <= index < to. @param status of its blocks; empty: any
+  /// Longest segment without a gap within from <= index < to. @param compensated only in blocks that are
   std::pair<std::uint64_t, std::uint64_t> covered(std::uint64_t from, std::uint64_t to,
-                                                  std::optional<ForceBlock::Status> status = {}) const;
+                                                  bool compensated = false) const;
 
  private:
   std::map<std::uint64_t, ForceBlock> blocks_;  // by first index

@@ -49,6 +49,9 @@ struct CompensationParameters {
   /// Half samples of the period that the gains of the delay form may be off before they are replaced; 3
   /// diverge.
   double delay_hysteresis = 0.7;
+  /// [1] RMS of a block's innovations over their standard deviation by design above which it is TRANSIENT: it
+  /// is 0.95 to 1.05 in steady cuts and 5 to 11 where the tool enters or leaves.
+  double innovation_limit = 3.0;
   double zero_time = 2.0;  ///< [s] time constant of the zero's average: long against a revolution
 
   void declare(ParameterTable& table) {

@@ -95,12 +95,21 @@ struct CuttingCondition {
 
 /// One block of force on the tool.
 struct ForceBlock {
-  enum class Status : std::uint8_t { measured = 0, compensated = 1, passed_through = 2, settling = 3 };
+  enum class Status : std::uint8_t {
+    measured = 0,
+    compensated = 1,
+    passed_through = 2,
+    settling = 3,
+    transient = 4
+  };
   double stamp = 0.0;                        ///< [s] of the first sample
   double sample_rate = 0.0;                  ///< [Hz]
   std::uint64_t first_index = 0;             ///< the sensor's running index
   std::array<std::vector<double>, 3> force;  ///< [N] x, y, z
   Status status = Status::measured;
+
+  /// The sensor's dynamics are removed, if not as accurately in a transient.
+  bool isCompensated() const { return status == Status::compensated || status == Status::transient; }
 };
 
 }  // namespace smartmill
