@@ -1,5 +1,5 @@
 // A program on the simulated mill, sent without a condition: program_node states the cuts, and the load meter
-// identifies the coefficients from them.
+// identifies the coefficients from them. A tooth that breaks in a further slot is reported.
 
 #include <cmath>
 #include <cstdio>
@@ -15,6 +15,7 @@
 #include <ros/package.h>
 #include <ros/ros.h>
 #include <smartmill_msgs/ArmMotion.h>
+#include <smartmill_msgs/BreakTooth.h>
 #include <smartmill_msgs/ChatterState.h>
 #include <smartmill_msgs/CncState.h>
 #include <smartmill_msgs/CuttingCoefficients.h>
@@ -22,11 +23,13 @@
 #include <smartmill_msgs/IdentifyCoefficientsAction.h>
 #include <smartmill_msgs/NodeHealth.h>
 #include <smartmill_msgs/RunProgramAction.h>
+#include <smartmill_msgs/ToolCondition.h>
 
 #include "launched.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/units.h"
+#include "smartmill_ros/conversions.h"
 
 namespace smartmill {
 namespace {
@@ -181,6 +184,81 @@ TEST(Program, OnePartGivesTheCoefficients) {
   EXPECT_NEAR(published.kte, true_kte, 4.0 * published.kte_std);
   EXPECT_EQ(diagnostics["parts begun"], "1");
   EXPECT_EQ(diagnostics["losses of the path"], "0");
+}
+
+/// Answer of the machine to the loss of a tooth; 0: a new tool.
+smartmill_msgs::BreakTooth::Response breakTooth(std::uint32_t tooth) {
+  smartmill_msgs::BreakTooth call;
+  call.request.tooth = tooth;
+  EXPECT_TRUE(ros::service::call(names::absolute("sim/break_tooth"), call));
+  return call.response;
+}
+
+// Another slot of the same material, with the coefficients of the load meter: the wear of the sharp tool,
+// then the loss of a tooth.
+TEST(Program, ALostToothIsReportedWithinTwoRevolutions) {
+  constexpr double SPEED = 4000.0, FEED = 0.1 * units::MM, TO = -0.03, Z = -0.161;
+  const MachineModel model =
+      readMachineModel(ros::package::getPath("smartmill_launch") + "/models/mill_twin.yaml");
+  ros::NodeHandle nh("smartmill");
+  std::vector<smartmill_msgs::ToolCondition> reports;
+  const ros::Subscriber on_tool = nh.subscribe<smartmill_msgs::ToolCondition>(
+      names::TOOL_CONDITION, 1000,
+      boost::function<void(const smartmill_msgs::ToolCondition&)>([&](const auto& m) {
+        if (m.condition == "slot" || m.broken) reports.push_back(m);
+      }));
+  smartmill_msgs::ArmMotion arm;
+  arm.request.arm = 1;
+  ASSERT_TRUE(ros::service::call(names::absolute(names::ARM_MOTION), arm));
+  ASSERT_EQ(arm.response.code, 0) << arm.response.message;
+
+  smartmill_msgs::RunProgramGoal goal;
+  goal.header.stamp = ros::Time::now();
+  goal.name = "slot";
+  goal.program = "G90 G0 Z-150.\nX-155. Y0.\nS4000 M3\nG4 X2.\nZ-161.\nG1 X-30. F1600.\nG0 Z-150.\nM30\n";
+  CuttingCondition slot;
+  slot.kind = CuttingCondition::Kind::cut;
+  slot.name = "slot";
+  slot.tool_name = "end_mill";
+  slot.material = "al7050";
+  slot.tool = *model.tool;
+  slot.engagement = {0.0, units::PI, 1.0 * units::MM, FEED};
+  slot.spindle_speed = units::radPerSecFromRpm(SPEED);
+  slot.steady_from = {model.workpiece->low[0] + model.tool->diameter, 0.0, Z};
+  slot.steady_to = {TO, 0.0, Z};
+  goal.condition = toMsg(slot);
+  actionlib::SimpleActionClient<smartmill_msgs::RunProgramAction> client(names::absolute(names::RUN_PROGRAM),
+                                                                         false);
+  ASSERT_TRUE(wait([&] { return client.isServerConnected(); }));
+  client.sendGoal(goal);
+  ASSERT_TRUE(wait([&] { return !reports.empty() || client.getState().isDone(); }));
+  ASSERT_FALSE(reports.empty()) << client.getResult()->message;
+  const smartmill_msgs::ToolCondition sharp = reports.front();
+  std::printf("wear of the sharp tool %.1f +- %.1f %%\n", sharp.wear, sharp.wear_std);
+  EXPECT_FALSE(sharp.broken);
+  EXPECT_LT(std::abs(sharp.wear), 3.0 * sharp.wear_std);
+  EXPECT_LT(sharp.wear_std, 5.0);
+
+  EXPECT_EQ(breakTooth(5).code, smartmill_msgs::BreakTooth::Response::REFUSED);
+  const smartmill_msgs::BreakTooth::Response broken = breakTooth(3);
+  ASSERT_EQ(broken.code, smartmill_msgs::BreakTooth::Response::OK) << broken.message;
+  ASSERT_TRUE(wait([&] { return reports.back().broken || client.getState().isDone(); }));
+  const smartmill_msgs::ToolCondition report = reports.back();
+  ASSERT_TRUE(report.broken);
+  const double revolution = 60.0 / SPEED;  // [s]
+  const double passed = (report.header.stamp - broken.stamp).toSec() / revolution,
+               lost_at = (report.lost_at - broken.stamp).toSec() / revolution;
+  std::printf(
+      "tooth %u of %u reported %.2f revolutions after its loss, which is estimated at %.2f; %.0f +- %.0f "
+      "%%\n",
+      report.tooth, report.teeth, passed, lost_at, 100.0 * report.loss, 100.0 * report.loss_std);
+  EXPECT_EQ(report.tooth, 3u);
+  EXPECT_GT(passed, 0.0);
+  EXPECT_LE(passed, 2.0);
+  EXPECT_NEAR(lost_at, 0.0, 1.0);  // the tooth is missed when it comes to the cut again
+  ASSERT_TRUE(wait([&] { return client.getState().isDone(); }));
+  EXPECT_EQ(client.getResult()->code, smartmill_msgs::RunProgramResult::OK) << client.getResult()->message;
+  EXPECT_EQ(breakTooth(0).code, smartmill_msgs::BreakTooth::Response::OK);
 }
 
 }  // namespace

@@ -78,6 +78,103 @@ TEST(MillingProcess, rigidSteadyCutMatchesTheClosedForm) {
             2e-6);  // lags by more than a revolution
 }
 
+/// A slot with four straight teeth, of which one breaks after two revolutions and is whole again after five.
+struct BrokenTooth {
+  static constexpr int TEETH = 4, STEPS = 1200, LOST = 2, BREAKS = 2 * STEPS + 357, WHOLE = 5 * STEPS + 101;
+  static constexpr double SPEED = 471.0, FEED = 6e-5, DEPTH = 2e-3;  // [rad/s], [m] per tooth, [m]
+  const ToolGeometry tool = endMill(TEETH, 0.0);
+
+  ToolMotion motion(int step) const {
+    ToolMotion at = motionAt(step * TWO_PI / SPEED / STEPS, SPEED, FEED * TEETH * SPEED / TWO_PI);
+    at.angle = angle(step);
+    return at;
+  }
+  static double angle(int step) { return 1e-4 + TWO_PI * step / STEPS; }
+  /// Force of each step. @param only tooth, -1: all
+  std::vector<CuttingForce> simulate(double length, int only = -1) const {
+    MillingProcess process(tool, aluminium(), TWO_PI / SPEED / STEPS);
+    if (only >= 0) process.selectTooth(only);
+    process.engage({{0.0, PI, DEPTH}}, motion(0));
+    std::vector<CuttingForce> forces;
+    for (int i = 0; i < 8 * STEPS; ++i) {
+      if (i == BREAKS) process.setRadii({0.0, 0.0, -length, 0.0});
+      if (i == WHOLE) process.setRadii({0.0, 0.0, 0.0, 0.0});
+      forces.push_back(process.step(motion(i)));
+      process.endStep({{0.0, 0.0}});
+    }
+    return forces;
+  }
+  /// The least distance to the surfaces of all earlier passes, each with the radius of its tooth at that
+  /// time.
+  CuttingForce expected(int step, double length) const {
+    CuttingForce sum;
+    for (int j = 0; j < TEETH; ++j) {
+      const double phi = std::fmod(angle(step) + j * TWO_PI / TEETH, TWO_PI);
+      if (phi > PI) continue;
+      const auto radius = [&](int tooth, int at) {
+        return tooth == LOST && at >= BREAKS && at < WHOLE ? -length : 0.0;
+      };
+      double chip = 1.0;
+      for (int n = 1; n <= 40; ++n)
+        chip = std::min(chip, n * FEED * std::sin(phi) +
+                                  (n * n - 1) * std::pow(FEED * std::cos(phi), 2) / tool.diameter +
+                                  radius(j, step) - radius((j + n) % TEETH, step - n * STEPS / TEETH));
+      if (chip <= 0.0) continue;
+      const CuttingCoefficients& k = ALUMINIUM;
+      sum.add(toolForce(DEPTH * (k.ktc * chip + k.kte), DEPTH * (k.krc * chip + k.kre),
+                        DEPTH * (k.kac * chip + k.kae), phi, tool.radius()));
+    }
+    return sum;
+  }
+  static double meanTorque(const std::vector<CuttingForce>& forces, int revolution) {
+    double sum = 0.0;
+    for (int i = 0; i < STEPS; ++i)
+      sum += forces[static_cast<std::size_t>(revolution * STEPS + i)].torque / STEPS;
+    return sum;
+  }
+};
+
+// Lost, and shortened by less and by more than a chip: the exact rule at every angle, also in the revolutions
+// in which surfaces of the former teeth are left.
+TEST(MillingProcess, aBrokenToothLeavesItsChipToTheNextOne) {
+  const BrokenTooth cut;
+  for (const double length : {1e-3, 2e-5, 1e-4}) {
+    const std::vector<CuttingForce> forces = cut.simulate(length);
+    double worst = 0.0, largest = 0.0;
+    for (int i = 0; i < static_cast<int>(forces.size()); ++i) {
+      const CuttingForce expected = cut.expected(i, length);
+      worst = std::max(worst,
+                       largestDifference(forces[static_cast<std::size_t>(i)], expected, cut.tool.radius()));
+      largest = std::max({largest, std::abs(expected.fx), std::abs(expected.fy)});
+    }
+    EXPECT_LT(worst / largest, 1e-6) << length;
+  }
+}
+
+// Revolution 1 is before the loss, 4 with the lost tooth, 7 after renewal of the surfaces.
+TEST(MillingProcess, theToothAfterALostOneHasTwiceTheChip) {
+  const BrokenTooth cut;
+  const std::vector<CuttingForce> lost = cut.simulate(1e-3, BrokenTooth::LOST),
+                                  next = cut.simulate(1e-3, BrokenTooth::LOST - 1), all = cut.simulate(1e-3);
+  const double edge = 0.5 * ALUMINIUM.kte * BrokenTooth::DEPTH * cut.tool.radius();  // cuts half of the time
+  const double before = BrokenTooth::meanTorque(next, 1), after = BrokenTooth::meanTorque(next, 4);
+  EXPECT_DOUBLE_EQ(BrokenTooth::meanTorque(lost, 4), 0.0);
+  EXPECT_NEAR((after - edge) / (before - edge), 2.0, 0.01);  // roundness of the tool: feed / radius
+  EXPECT_NEAR(BrokenTooth::meanTorque(all, 4), BrokenTooth::meanTorque(all, 1) - edge,
+              0.003 * BrokenTooth::meanTorque(all, 1));
+  for (int i = 0; i < BrokenTooth::STEPS; ++i) {
+    const auto at = [&](int revolution) {
+      return all[static_cast<std::size_t>(revolution * BrokenTooth::STEPS + i)];
+    };
+    ASSERT_LT(largestDifference(at(7), at(1), cut.tool.radius()), 1e-6) << i;  // [N]
+  }
+}
+
+TEST(MillingProcess, refusesRadiiOfAnotherNumberOfTeeth) {
+  MillingProcess process(endMill(4, 30.0), aluminium(), 1e-5);
+  EXPECT_THROW(process.setRadii({0.0, 0.0}), Error);
+}
+
 /// A prescribed motion of spindle and tool.
 struct PrescribedMotion {
   std::function<double(double)> time;                                 // [s] by angle of the spindle [rad]

@@ -26,9 +26,9 @@ MachineModel modelOf(const ToolNodeParameters& parameters) {
   return model;
 }
 
-/// Whether the mean force in the plane follows from them.
-bool givePlaneForce(const CuttingCoefficients& k) {
-  return std::isfinite(k.ktc + k.krc + k.kte + k.kre);
+/// Whether the mean tangential force follows from them.
+bool giveTangentialForce(const CuttingCoefficients& k) {
+  return std::isfinite(k.ktc + k.kte);
 }
 
 }  // namespace
@@ -43,7 +43,7 @@ ToolNode::ToolNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
       hold_(nh.serviceClient<smartmill_msgs::FeedHold>(names::FEED_HOLD)) {
   if (model_.cutting) {
     const CuttingCoefficients& k = *model_.cutting;
-    from_model_ = givePlaneForce(k);
+    from_model_ = giveTangentialForce(k);
     if (from_model_) monitor_.setCoefficients(k, model_.cutting_std.value_or(NOT_IDENTIFIED));
   }
   if (model_.tool->teeth < 2)
@@ -71,7 +71,7 @@ void ToolNode::listen() {
 /// The first set of a pair is that of the sharp tool, since later ones follow the wear.
 void ToolNode::handle(const CoefficientSet& set) {
   const std::string pair = set.tool + " in " + set.material;
-  if (from_model_ || pair == coefficients_of_ || !givePlaneForce(set.value)) return;
+  if (from_model_ || pair == coefficients_of_ || !giveTangentialForce(set.value)) return;
   coefficients_of_ = pair;
   monitor_.setCoefficients(set.value, set.std_dev);
 }

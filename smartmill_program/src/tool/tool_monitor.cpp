@@ -149,6 +149,7 @@ void ToolMonitor::take(const ForceSample& sample) {
     report(loss->stamp, true, wear_.present());
   }
   const std::optional<RevolutionForce> revolution = watch_.takeRevolution();
+  if (loss_) return;  // the expected force is that of all teeth
   if (!revolution || !steady_since_ || revolution->begin < *steady_since_ ||
       revolution->time - steady_ > parameters_.maximum_gap)
     return;

@@ -14,6 +14,7 @@ namespace {
 using Complex = std::complex<double>;
 
 constexpr std::size_t LEAST_REVOLUTIONS = 3;
+constexpr Complex IMAGINARY{0.0, 1.0};
 constexpr double NONE = std::numeric_limits<double>::quiet_NaN();
 
 std::array<double, 6> listOf(const CuttingCoefficients& k) {
@@ -42,30 +43,55 @@ void WearEstimate::begin(const CuttingCondition& condition) {
   condition_.reset();
   count_ = 0;
   sum_ = squares_ = 0.0;
+  force_sum_ = 0.0;
   if (condition.kind != CuttingCondition::Kind::cut || !value_) return;
   if (condition.tool_name != tool_) cuts_.clear();
   tool_ = condition.tool_name;
 
   const auto matrix = meanForceMatrix(condition.tool, condition.engagement);
   const std::array<double, 6> value = listOf(*value_), std_dev = listOf(std_dev_);
-  std::array<Complex, 6> part;
-  for (std::size_t k : {0, 1, 3, 4}) part[k] = Complex(matrix[0][k], matrix[1][k]) * value[k];
-  const Complex expected = part[0] + part[1] + part[3] + part[4];
-  const double size = std::abs(expected);
-  if (!(size > 0.0)) return;  // NaN: not all coefficients are known
-  const Complex along = expected / size;
-  const auto project = [&](const Complex& force) { return (force * std::conj(along)).real(); };
-  chip_ = project(part[0] + part[1]);
-  edge_ = project(part[3] + part[4]);
+  std::array<Complex, 6> column, part;
+  for (std::size_t k : {0, 1, 3, 4}) {
+    column[k] = Complex(matrix[0][k], matrix[1][k]);
+    part[k] = column[k] * value[k];
+  }
+  const bool total = std::isfinite(value[1] + value[4]);
+  if (!(total ? expectTotal(part) : expectTangential(part, column[0], column[3]))) return;
+  const auto project = [&](const Complex& force) { return (force * std::conj(direction_)).real(); };
+  chip_ = project(part[0] + (total ? part[1] : 0.0));
+  edge_ = project(part[3] + (total ? part[4] : 0.0));
   double variance = 0.0;
   for (std::size_t k : {0, 1, 3, 4}) {
     const double own = std::isfinite(std_dev[k]) ? std_dev[k] / value[k] : parameters_.coefficient_error;
     const double error = project(part[k]) * own;
     if (std::isfinite(error)) variance += error * error;
   }
-  expected_std_ = std::sqrt(variance) / size;
-  direction_ = along * feedOf(condition);
+  expected_std_ = std::sqrt(variance) / (chip_ + edge_);
+  direction_ *= feedOf(condition);
   condition_ = condition;
+}
+
+/// Compares with the force by all coefficients. @return whether there is one
+bool WearEstimate::expectTotal(const std::array<Complex, 6>& part) {
+  const Complex expected = part[0] + part[1] + part[3] + part[4];
+  if (!(std::abs(expected) > 0.0)) return false;  // NaN: not all coefficients are known
+  direction_ = expected / std::abs(expected);
+  radial_angle_std_ = NONE;
+  return true;
+}
+
+/// Compares with the force by the tangential coefficients, across the radial force. @param chip, edge the
+/// tangential force per coefficient; those of the radial force are i times as large @return whether there is
+/// one
+bool WearEstimate::expectTangential(const std::array<Complex, 6>& part, Complex chip, Complex edge) {
+  const Complex expected = part[0] + part[3];
+  if (!(std::abs(expected) > 0.0 && std::abs(chip) > 0.0 && std::abs(edge) > 0.0)) return false;
+  tangential_ = expected / std::abs(expected);
+  const Complex middle = chip / std::abs(chip) + edge / std::abs(edge);
+  direction_ = middle / std::abs(middle);
+  radial_ = IMAGINARY * direction_;
+  radial_angle_std_ = std::abs(std::arg(edge / chip)) / std::sqrt(12.0);  // uniform between chip and edge
+  return true;
 }
 
 void WearEstimate::add(double time, std::complex<double> force) {
@@ -74,6 +100,7 @@ void WearEstimate::add(double time, std::complex<double> force) {
   ++count_;
   sum_ += ratio;
   squares_ += ratio * ratio;
+  force_sum_ += force;
   last_ = time;
 }
 
@@ -106,6 +133,16 @@ std::optional<CutWear> WearEstimate::present() const {
   const double scatter = std::sqrt(std::max(0.0, squares_ / count - mean * mean) / (count - 1.0));
   wear.wear = mean - 1.0;
   wear.wear_std = mean * std::hypot(scatter / mean, std::hypot(parameters_.force_error, expected_std_));
+  if (std::isfinite(radial_angle_std_)) {
+    // Force = tangential part + radial part; the error of the radial part across its direction.
+    const double expected = chip_ + edge_;
+    const Complex across = -IMAGINARY * radial_;
+    const Complex tangential = mean * expected / (tangential_ * std::conj(across)).real() * tangential_;
+    const Complex force = force_sum_ / count * std::conj(feedOf(*condition_));
+    const double radial = ((force - tangential) * std::conj(radial_)).real();
+    const double error = radial * std::hypot(radial_angle_std_, parameters_.force_error);
+    wear.wear_std = std::hypot(wear.wear_std, error / expected);
+  }
   std::deque<Cut> cuts = cuts_;
   if (mean > 0.0) cuts.push_back({mean * (chip_ + edge_), chip_, edge_});
   std::tie(wear.edge_wear, wear.edge_wear_std) = edgeWear(cuts);

@@ -181,6 +181,28 @@ TEST(ToolMonitor, WearOfTheEdgeFollowsFromCutsOfDifferentFeed) {
   EXPECT_LT(last.wear->edge_wear_std, 0.25);
 }
 
+// At 50 revolutions a second the loss after one second is reported within two.
+TEST(ToolMonitor, WearEndsAtALostTooth) {
+  Rig rig;
+  rig.monitor.setCoefficients(SHARP, {});
+  rig.monitor.push(cut("cut", 0.0, 0.08 * MM));
+  CuttingTeeth teeth;
+  teeth.exit = PI / 2.0;
+  teeth.missing = 2;
+  teeth.missing_from = SPEED * 1.003;
+  rig.run(0.0, 3.0, [&](double t, double a) { return teeth.at(t, a); });
+  CuttingCondition none;
+  none.stamp = 3.0;
+  rig.monitor.push(none);
+  rig.monitor.flush();
+  ASSERT_FALSE(rig.reports.empty());
+  const ToolReport& last = rig.reports.back();
+  ASSERT_TRUE(last.loss);
+  ASSERT_TRUE(last.wear);
+  EXPECT_GE(last.wear->revolutions, 45u);
+  EXPECT_LE(last.wear->revolutions, 53u);
+}
+
 TEST(ToolMonitor, NoWearWithoutCoefficientsOrOffThePath) {
   Rig rig;
   CuttingCondition condition = cut("cut", 0.0, 0.1 * MM);

@@ -1,5 +1,6 @@
 #include "node/node.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <utility>
@@ -65,6 +66,7 @@ Node::Node(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
   publishTruth();
   panel_.advertiseManualActions(*world_, parameters_.world);
   strike_server_ = nh_.advertiseService(names::STRIKE, &Node::strike, this);
+  break_server_ = nh_.advertiseService("sim/break_tooth", &Node::breakTooth, this);
   shell_.diagnose("simulated machine", [this](auto& status) { diagnose(status); });
   thread_ = std::thread([this] { run(); });
 }
@@ -233,6 +235,21 @@ bool Node::strike(smartmill_msgs::Strike::Request& request, smartmill_msgs::Stri
     case World::StrikeAnswer::failed:
       response.code = smartmill_msgs::Strike::Response::FAILED;
       break;
+  }
+  return true;
+}
+
+bool Node::breakTooth(smartmill_msgs::BreakTooth::Request& request,
+                      smartmill_msgs::BreakTooth::Response& response) {
+  try {
+    constexpr std::uint32_t MOST = 1000000;
+    const int tooth = static_cast<int>(std::min(request.tooth, MOST));
+    response.stamp = fromSec(pacer_.start() + world_->breakTooth(tooth, request.length));
+    response.message = tooth == 0 ? "a new tool" : "tooth " + std::to_string(tooth) + " is broken";
+    ROS_INFO_STREAM("sim: " << response.message);
+  } catch (const Error& e) {
+    response.code = smartmill_msgs::BreakTooth::Response::REFUSED;
+    response.message = e.what();
   }
   return true;
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <ros/ros.h>
+#include <smartmill_msgs/BreakTooth.h>
 #include <smartmill_msgs/Frf.h>
 #include <smartmill_msgs/ModalModel.h>
 #include <smartmill_msgs/Strike.h>
@@ -28,7 +29,8 @@ namespace smartmill::sim {
 
 /// The simulated machine on ROS: the controller on its port, sensors on daq/* and spindle/angle (or
 /// daq/tachometer), hammers by the service daq/strike, true values on sim/truth/*, the operator's panel by
-/// services sim/panel/*. Runs in wall-clock time, or as the clock of the graph with /use_sim_time.
+/// services sim/panel/*, loss of a tooth by sim/break_tooth. Runs in wall-clock time, or as the clock of the
+/// graph with /use_sim_time.
 class Node {
  public:
   using Parameters = NodeParameters;
@@ -47,6 +49,8 @@ class Node {
   void logAlarms();
   void publishTruth();
   bool strike(smartmill_msgs::Strike::Request& request, smartmill_msgs::Strike::Response& response);
+  bool breakTooth(smartmill_msgs::BreakTooth::Request& request,
+                  smartmill_msgs::BreakTooth::Response& response);
   void addTruth(const std::string& point, const std::string& direction, const ModalModel& modes);
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
@@ -60,7 +64,7 @@ class Node {
       motor_current_, coefficients_, load_meter_;
   LatchedTopic<smartmill_msgs::Frf> frf_;
   LatchedTopic<smartmill_msgs::ModalModel> modes_;
-  ros::ServiceServer strike_server_;
+  ros::ServiceServer strike_server_, break_server_;
   Clock clock_;
   OperatorPanel panel_;
   NodeShell shell_;

@@ -5,6 +5,8 @@
 #include <Eigen/Core>
 #include <Eigen/LU>
 
+#include "smartmill_core/error.h"
+
 namespace smartmill::sim {
 
 Cutter::Cutter(const ToolGeometry& tool, const CuttingLaw& law, double time_step,
@@ -82,6 +84,11 @@ void Cutter::setLaw(const CuttingLaw& law) {
     if (mill.process) mill.process->setLaw(adapted);
     if (mill.rigid) mill.rigid->setLaw(adapted);
   }
+}
+
+void Cutter::setRadii(const std::vector<double>& radius_offset) {
+  if (method_ == Method::tables) throw Error("cutting: radii that change, expected none with tables");
+  for (StraightMill& mill : mills_) mill.process->setRadii(radius_offset);
 }
 
 CutSums Cutter::sumsOf(StraightMill& mill, const ToolMotion& now) const {

@@ -3,12 +3,18 @@
 #include <algorithm>
 #include <utility>
 
+#include "smartmill_core/error.h"
 #include "smartmill_sim/twin/tool_contact.h"
 
 namespace smartmill::sim {
 namespace {
 
 constexpr double GONE = 1e-3;  // [m] radius reduction of a missing edge, more than any feed
+
+std::vector<double> radiiOf(const EdgeLayer& layer, std::vector<double> radius) {
+  if (layer.missing_tooth >= 0) radius.at(static_cast<std::size_t>(layer.missing_tooth)) -= GONE;
+  return radius;
+}
 
 double depthOf(const EdgeLayer& layer, double depth) {
   return std::max(layer.from_surface ? depth - layer.height : std::min(layer.height, depth), SMALLEST_DEPTH);
@@ -28,8 +34,7 @@ CuttingLaw lawOf(const EdgeLayer& layer, CuttingLaw law) {
 EdgeLayers::EdgeLayers(const TwinSetup& setup, const CuttingLaw& law, double time_step, bool rigid) {
   for (const EdgeLayer& definition : setup.layers) {
     if (definition.weight == 0.0) continue;
-    std::vector<double> radius = setup.radius_offset;
-    if (definition.missing_tooth >= 0) radius.at(static_cast<std::size_t>(definition.missing_tooth)) -= GONE;
+    std::vector<double> radius = radiiOf(definition, setup.radius_offset);
     Layer layer{definition, {}, {}};
     // Tables do not separate the teeth.
     if (rigid && definition.only_tooth < 0) {
@@ -65,6 +70,13 @@ void EdgeLayers::setLaw(const CuttingLaw& law) {
   for (Layer& layer : layers_) {
     if (layer.rigid) layer.rigid->setLaw(lawOf(layer.definition, law));
     if (layer.process) layer.process->setLaw(lawOf(layer.definition, law));
+  }
+}
+
+void EdgeLayers::setRadii(const std::vector<double>& radius_offset) {
+  for (Layer& layer : layers_) {
+    if (!layer.process) throw Error("cutting: radii that change, expected none with tables");
+    layer.process->setRadii(radiiOf(layer.definition, radius_offset));
   }
 }
 

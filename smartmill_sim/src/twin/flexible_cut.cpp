@@ -1,11 +1,16 @@
 #include "smartmill_sim/twin/flexible_cut.h"
 
+#include <string>
+
+#include "smartmill_core/error.h"
+
 namespace smartmill::sim {
 
 FlexibleCut::FlexibleCut(const TwinSetup& setup, const CuttingLaw& law, double time_step, Feed feed,
                          int corner_slices)
     : tip_(setup.model.tool_tip, setup.model.workpieceModes(), 1.0 / time_step) {
   if (!setup.model.tool || !setup.model.cutting) return;
+  radius_offset_ = setup.radius_offset;
   const bool tables = feed == Feed::steady && !vibrates();
   cutter_.emplace(*setup.model.tool, law, time_step, setup.radius_offset, setup.corner_radius,
                   setup.path_share, tables ? Cutter::Method::tables : Cutter::Method::history, corner_slices);
@@ -15,6 +20,16 @@ FlexibleCut::FlexibleCut(const TwinSetup& setup, const CuttingLaw& law, double t
 void FlexibleCut::update(const TwinState& state) {
   if (cutter_) cutter_->setLaw(state.law);
   layers_.setLaw(state.law);
+}
+
+void FlexibleCut::shortenTeeth(const std::vector<double>& shortening) {
+  if (!cutter_ || shortening.size() != radius_offset_.size())
+    throw Error("cutting: " + std::to_string(shortening.size()) + " teeth to shorten, expected " +
+                std::to_string(radius_offset_.size()));
+  std::vector<double> radius = radius_offset_;
+  for (std::size_t j = 0; j < radius.size(); ++j) radius[j] -= shortening[j];
+  cutter_->setRadii(radius);
+  layers_.setRadii(radius);
 }
 
 void FlexibleCut::engage(const ToolMotion& now, const TwinState& state) {

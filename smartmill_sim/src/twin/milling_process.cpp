@@ -6,18 +6,21 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/math/angle.h"
+#include "smartmill_core/units.h"
 
 namespace smartmill::sim {
 MillingProcess::MillingProcess(const ToolGeometry& tool, const CuttingLaw& law, double time_step,
                                std::vector<double> radius_offset, double path_share)
     : tool_((validate(tool), tool)),
-      rule_(tool, std::move(radius_offset)),
+      rule_(tool, radius_offset),
+      radius_offset_(std::move(radius_offset)),
       law_(law),
       time_step_(time_step),
       lag_(tool.lag()),
       path_share_(path_share),
       history_(time_step),
       passes_(static_cast<std::size_t>(tool.teeth)) {
+  radius_offset_.resize(passes_.size());  // empty: none
 }
 
 void MillingProcess::engage(const std::vector<ContactArc>& arcs, const ToolMotion& now) {
@@ -30,6 +33,7 @@ void MillingProcess::engage(const std::vector<ContactArc>& arcs, const ToolMotio
     }
     if (arcs_.empty()) {
       history_.clear(now);
+      earlier_radii_.clear();
       for (std::vector<Pass>& passes : passes_) passes.clear();
     }
   }
@@ -40,21 +44,70 @@ void MillingProcess::setDepths(const std::vector<double>& depths) {
   for (std::size_t a = 0; a < arcs_.size(); ++a) arcs_[a].depth = depths.at(a);
 }
 
+void MillingProcess::setRadii(std::vector<double> radius_offset) {
+  rule_ = ChipRule(tool_, radius_offset);
+  std::vector<double> change = std::move(radius_offset);
+  change.resize(radius_offset_.size());
+  change.swap(radius_offset_);
+  if (arcs_.empty()) return;  // the next contact begins with the surfaces of these radii
+  const auto teeth = static_cast<std::size_t>(rule_.teeth());
+  for (std::size_t j = 0; j < teeth; ++j) change[j] -= radius_offset_[j];
+  for (EarlierRadii& earlier : earlier_radii_)
+    for (std::size_t j = 0; j < teeth; ++j) earlier.lengthening[j] += change[j];
+  // Between the last step and the next one.
+  earlier_radii_.push_back({history_.rotation() + 0.5 / history_.stepsPerRadian(), change});
+  for (std::vector<Pass>& passes : passes_)
+    for (Pass& pass : passes) pass.valid_regime = -1;
+}
+
+/// [m] Radius of the tooth n passes ahead when it left its surface, minus its present radius.
+double MillingProcess::lengthening(int tooth, int n) const {
+  const double then = history_.rotation() - rule_.turn(tooth, n);
+  for (const EarlierRadii& earlier : earlier_radii_)
+    if (then < earlier.until) return earlier.lengthening[static_cast<std::size_t>(rule_.ahead(tooth, n))];
+  return 0.0;
+}
+
+/// [m] ChipRule::overhang() over the surfaces of all radii.
+double MillingProcess::overhang(int tooth) const {
+  if (earlier_radii_.empty()) return rule_.overhang(tooth);
+  const double first = radius_offset_[static_cast<std::size_t>(rule_.ahead(tooth, 1))];
+  double largest = rule_.overhang(tooth) + first;
+  for (const EarlierRadii& earlier : earlier_radii_)
+    for (std::size_t j = 0; j < radius_offset_.size(); ++j)
+      largest = std::max(largest, radius_offset_[j] + earlier.lengthening[j]);
+  return largest - first - lengthening(tooth, 1);
+}
+
+/// Drops earlier radii when all passes that are considered are later.
+void MillingProcess::forgetRadii() {
+  if (earlier_radii_.empty()) return;
+  double longest = units::TWO_PI;  // [rad]
+  for (const std::vector<Pass>& passes : passes_)
+    for (const Pass& pass : passes) longest = std::max(longest, history_.turnOf(pass.delay));
+  if (history_.rotation() - earlier_radii_.back().until <= longest) return;
+  earlier_radii_.clear();
+  for (std::vector<Pass>& passes : passes_)
+    for (Pass& pass : passes) pass.valid_regime = -1;
+}
+
 void MillingProcess::addPass(int tooth) {
   std::vector<Pass>& passes = passes_[static_cast<std::size_t>(tooth)];
   const int n = static_cast<int>(passes.size()) + 1;
   Pass pass;
   pass.delay = history_.delayOf(rule_.turn(tooth, n));
-  pass.step = rule_.step(tooth, n) - rule_.step(tooth, 1);
   passes.push_back(pass);
 }
 
 void MillingProcess::shapePass(int tooth, int n, Pass& pass) {
-  const bool steady = history_.isSteadyOver(history_.turnOf(pass.delay));
+  const double longer = lengthening(tooth, n);
+  const bool steady = earlier_radii_.empty() && history_.isSteadyOver(history_.turnOf(pass.delay));
   if (steady && pass.valid_regime == history_.regime()) return;
   const Pass& first = passes_[static_cast<std::size_t>(tooth)].front();
   const std::array<double, 2> fed_first = history_.at(first.delay).fed;
+  pass.step = rule_.step(tooth, n) - rule_.step(tooth, 1) + lengthening(tooth, 1) - longer;
   pass.rigid = rule_.shape(tooth, n, history_.at(pass.delay).fed, fed_first);
+  pass.rigid.level -= longer;
   pass.excess = pass.rigid - first.rigid;
   pass.bend = pass.excess.bend();
   pass.valid_regime = steady ? history_.regime() : -1;
@@ -150,7 +203,7 @@ bool MillingProcess::collectShapes(int tooth, const AngleInterval& cell, bool& c
   // [m] bound on how much nearer vibration may bring an older surface than the last one: (u_1 - u_n).e.
   const double reach = history_.largestDeflection() - (then[0] * cell.at.sine + then[1] * cell.at.cosine) +
                        cell.half * (std::abs(then[0]) + std::abs(then[1]));
-  const double end = reach + rule_.overhang(tooth);
+  const double end = reach + overhang(tooth);
   int unknown = 0;
   for (int n = 2; unknown < rule_.teeth(); ++n) {
     Pass& pass = passOf(tooth, n);
@@ -214,6 +267,7 @@ CutSums MillingProcess::sumsAt(const ToolMotion& now) {
   CutSums sums;
   if (arcs_.empty()) return sums;
   history_.advance(now);
+  forgetRadii();
   rubbing_moments_ = {};
   forEachEdgeSegment(arcs_, lag_, rule_.toothAngle(), now.angle, [&](const EdgeSegment& part) {
     if (only_tooth_ >= 0 && part.tooth != only_tooth_) return;

@@ -14,6 +14,7 @@ namespace {
 
 using Lock = std::lock_guard<std::mutex>;
 
+constexpr double WHOLE_TOOTH = 1e-3;           // [m] more than any chip
 constexpr std::uint64_t FLANGE_SEED = 0x1000;  // offset from the seed of the world
 
 double stepOf(const WorldOptions& options) {
@@ -70,6 +71,7 @@ World::World(const MachineModel& model, const WorldOptions& options)
   const ToolGeometry& tool = model.needTool("simulate the machine");
   model.needCutting("simulate the machine");
   model.needAxes("simulate the machine");
+  shortening_.assign(static_cast<std::size_t>(tool.teeth), 0.0);
   if (model.workpiece) stock_.emplace(*model.workpiece, tool.radius());
   last_ = controller_.motion();
   machine_.resetLoadMeter(0.0);
@@ -157,6 +159,25 @@ void World::advance(Block& block, const std::vector<MotionState>& states) {
     throw Error("axes: " + std::to_string(states.size()) + " states, expected one block");
   const Lock lock(mutex_);
   simulateBlock(block, states);
+}
+
+double World::breakTooth(int tooth, double length) {
+  const Lock lock(mutex_);
+  const auto teeth = static_cast<int>(shortening_.size());
+  if (tooth < 0 || tooth > teeth)
+    throw Error("tooth: " + std::to_string(tooth) + ", expected 1.." + std::to_string(teeth) +
+                " or 0 for a new tool");
+  if (!(length >= 0.0 && std::isfinite(length)))
+    throw Error("length: " + std::to_string(length) + " m, expected at least 0");
+  std::vector<double> shortening = shortening_;
+  if (tooth == 0) {
+    shortening.assign(shortening.size(), 0.0);
+  } else {
+    shortening[static_cast<std::size_t>(tooth) - 1] = length > 0.0 ? length : WHOLE_TOOTH;
+  }
+  machine_.shortenTeeth(shortening);
+  shortening_ = shortening;
+  return static_cast<double>(index_) / SAMPLE_RATE;
 }
 
 void World::skipSamples(std::uint64_t samples) {

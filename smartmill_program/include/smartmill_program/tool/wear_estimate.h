@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <complex>
 #include <cstddef>
 #include <deque>
@@ -54,6 +55,13 @@ struct CutWear {
 /// (mechanistic.h) with the coefficients of the sharp tool. The measured mean force is projected on its
 /// direction in the frame of the feed; runout does not change it as long as every tooth cuts.
 ///
+/// With the tangential coefficients alone (a load meter's) the tangential forces of the teeth are separated
+/// from the radial ones. In the plane, F = Ktc C + Kte E + i (Krc C + Kre E), with C and E the mean over a
+/// revolution of -h exp(-i phi) and -exp(-i phi) over the edges in cut. The component of F across i C and i E
+/// depends on the tangential force alone. C and E are parallel in a slot and in every arc that is symmetric
+/// about the feed's normal, else up to some degrees apart; where the radial force lies between them is not
+/// known and is part of the standard deviation, as is an error of the two components of the sensor.
+///
 /// Wear increases the edge coefficients, hardly those of the chip. From cuts with different feeds per tooth,
 /// least squares of force = s chip part + e edge part give the wear of the edge coefficients, e - 1.
 class WearEstimate {
@@ -61,7 +69,8 @@ class WearEstimate {
   /// @throws Error on a parameter out of range.
   explicit WearEstimate(const WearParameters& parameters);
 
-  /// Coefficients of the sharp tool. @param std_dev NaN: coefficient_error
+  /// Coefficients of the sharp tool; krc, kre NaN: not known, the tangential forces are compared.
+  /// @param std_dev NaN: coefficient_error
   void setCoefficients(const CuttingCoefficients& value, const CuttingCoefficients& std_dev);
   /// A cut begins; without coefficients or for other kinds there is no estimate.
   void begin(const CuttingCondition& condition);
@@ -76,17 +85,25 @@ class WearEstimate {
   struct Cut {
     double force, chip, edge;  // [N] measured, expected parts
   };
+  bool expectTotal(const std::array<std::complex<double>, 6>& part);
+  bool expectTangential(const std::array<std::complex<double>, 6>& part, std::complex<double> chip,
+                        std::complex<double> edge);
   std::pair<double, double> edgeWear(const std::deque<Cut>& cuts) const;
 
   WearParameters parameters_;
   std::optional<CuttingCoefficients> value_;
   CuttingCoefficients std_dev_;
   std::optional<CuttingCondition> condition_;
-  std::complex<double> direction_ = {1.0, 0.0};  // of the expected force, machine
+  std::complex<double> direction_ = {1.0, 0.0};  // on which forces are projected, machine
   double chip_ = 0.0, edge_ = 0.0;               // [N] expected parts along direction_
-  double expected_std_ = 0.0;                    // [1]
+  // Without radial coefficients: directions of tangential and radial force with the feed along x; [rad]
+  // standard deviation of the latter.
+  std::complex<double> tangential_, radial_;
+  double radial_angle_std_ = std::numeric_limits<double>::quiet_NaN();  // NaN: all coefficients are known
+  double expected_std_ = 0.0;                                           // [1]
   std::size_t count_ = 0;
   double sum_ = 0.0, squares_ = 0.0;  // of measured over expected
+  std::complex<double> force_sum_;    // [N] of the revolutions, machine
   double last_ = 0.0;                 // [s]
   std::string tool_;
   std::deque<Cut> cuts_;

@@ -38,6 +38,8 @@ class Cutter {
   /// Depth of each arc [m] > 0.
   void setDepths(const std::vector<double>& depths);
   void setLaw(const CuttingLaw& law);
+  /// Other radii of the teeth from now on, see MillingProcess. @throws Error with tables.
+  void setRadii(const std::vector<double>& radius_offset);
 
   Method method() const { return method_; }
   /// With tables or a prescribed motion of the tip: record the sums of each further step, or replay sums that

@@ -45,6 +45,11 @@ class CuttingMachine {
   /// that is skipped
   void setDepth(double depth, double passed_over = 0.0);
 
+  /// Breaks the teeth off from now on; surfaces that they have left remain until they are cut away. For
+  /// Feed::any. @param shortening [m] of each tooth's radius from that of the model @throws Error when it is
+  /// not one for each tooth.
+  void shortenTeeth(const std::vector<double>& shortening) { parts_.cut.shortenTeeth(shortening); }
+
   /// Starts a record: drift and hum restart. A new edge has edge_time 0.
   void setClock(const Clock& clock) { parts_.timeline.setClock(clock); }
 

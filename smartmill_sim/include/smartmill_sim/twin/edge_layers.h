@@ -26,6 +26,8 @@ class EdgeLayers {
   void engage(const std::vector<ContactArc>& arcs, const ToolMotion& now);
   void setDepths(const std::vector<double>& depths);
   void setLaw(const CuttingLaw& law);
+  /// Other radii of the teeth of the whole edge from now on. @throws Error for layers of tables.
+  void setRadii(const std::vector<double>& radius_offset);
   void add(const ToolMotion& now, CuttingForce& sum);
   /// Ends the step of a tool that may vibrate. @param displacement [m] of the tip
   void endStep(const std::array<double, 2>& displacement);

@@ -50,6 +50,10 @@ class FlexibleCut {
   /// Changes of the law by the effects.
   void update(const TwinState& state);
 
+  /// Radii of the teeth from now on. @param shortening [m] of each tooth, from the radii of the setup
+  /// @throws Error with tables, without a tool or when it is not one for each tooth.
+  void shortenTeeth(const std::vector<double>& shortening);
+
   ToolContact contact;
   /// Applies a changed contact to the tool.
   void engage(const ToolMotion& now, const TwinState& state);
@@ -81,6 +85,7 @@ class FlexibleCut {
   void integrateTip(const Input& input, const CuttingForce& force, ChannelValues& channels);
 
   std::optional<Cutter> cutter_;
+  std::vector<double> radius_offset_;  // [m] of the setup
   EdgeLayers layers_;
   TipStructure tip_;
   CuttingForce last_;

@@ -45,6 +45,9 @@ class MillingProcess {
   /// Depth of each arc [m] > 0.
   void setDepths(const std::vector<double>& depths);
   void setLaw(const CuttingLaw& law) { law_ = law; }
+  /// The teeth have other radii from now on; surfaces that they have left remain until they are cut away.
+  /// @param radius_offset [m] of each tooth, empty: none @throws Error on another number.
+  void setRadii(std::vector<double> radius_offset);
   /// From here on returns the force of this tooth alone; all teeth cut.
   void selectTooth(int tooth) { only_tooth_ = tooth; }
 
@@ -73,9 +76,18 @@ class MillingProcess {
     std::vector<Pass>& passes = passes_[static_cast<std::size_t>(tooth)];
     if (passes.size() < static_cast<std::size_t>(n)) addPass(tooth);
     Pass& pass = passes[static_cast<std::size_t>(n) - 1];
-    if (pass.valid_regime != history_.regime() || history_.regime() != 0) shapePass(tooth, n, pass);
+    if (pass.valid_regime != history_.regime() || history_.regime() != 0 || !earlier_radii_.empty())
+      shapePass(tooth, n, pass);
     return pass;
   }
+  /// Radii of the teeth until a change.
+  struct EarlierRadii {
+    double until = 0.0;               // [rad] rotation of the history
+    std::vector<double> lengthening;  // [m] radius until then minus the present one, of each tooth
+  };
+  double lengthening(int tooth, int n) const;
+  double overhang(int tooth) const;
+  void forgetRadii();
   void addPass(int tooth);
   void shapePass(int tooth, int n, Pass& pass);
   double pathMargin(double vibrated, double fed) const;
@@ -89,14 +101,16 @@ class MillingProcess {
 
   ToolGeometry tool_;
   ChipRule rule_;
+  std::vector<double> radius_offset_;  // [m] of each tooth
   CuttingLaw law_;
   double time_step_, lag_;
   double path_share_;  // [1] weight of the path correction
   int only_tooth_ = -1;
   std::vector<ContactArc> arcs_;
   ToolHistory history_;
-  std::vector<std::vector<Pass>> passes_;  // of each tooth
-  std::vector<ChipShape> shapes_;          // candidates for the chip of a cell
+  std::vector<std::vector<Pass>> passes_;    // of each tooth
+  std::vector<EarlierRadii> earlier_radii_;  // oldest first; empty: no surface of other radii is left
+  std::vector<ChipShape> shapes_;            // candidates for the chip of a cell
   // [m] Moments of the rubbing edges over their length in contact at this step.
   struct {
     double sine2 = 0.0, sine_cosine = 0.0, cosine2 = 0.0, sine = 0.0, cosine = 0.0;

@@ -72,6 +72,7 @@ class ToolHistory {
 
   /// Index of the delay by an angle [rad].
   std::size_t delayOf(double turn);
+  double rotation() const { return rotation_now_; }                       ///< [rad] since the first contact
   double turnOf(std::size_t delay) const { return delays_[delay].turn; }  ///< [rad]
   const Delay& at(std::size_t delay) {
     return delays_[delay].updated_at == count_ ? delays_[delay] : update(delays_[delay]);

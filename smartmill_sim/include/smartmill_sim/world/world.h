@@ -135,6 +135,12 @@ class World {
   /// Point of hits on the workpiece. @param point [m] from the plate's origin
   void setTapPoint(const std::array<double, 3>& point);
 
+  /// Breaks a tooth of the tool from the next block on. Thread-safe. @param tooth 1..teeth, 0: a new tool,
+  /// all teeth whole @param length [m] that its radius loses, from that of the whole tooth; 0: more than any
+  /// chip
+  /// @return [s] time of the first sample with this tool @throws Error on another tooth or length.
+  double breakTooth(int tooth, double length);
+
   /// The next BLOCK samples.
   void advance(Block& block);
   /// The same with axes and spindle under an external controller. @param states at half a sample after each
@@ -159,6 +165,7 @@ class World {
   std::optional<HammerStation> station_;
   ToolTip tip_;
   CuttingMachine machine_;
+  std::vector<double> shortening_;  // [m] of each tooth
   std::optional<StockContact> stock_;
   std::optional<SpindleSensor> flange_;
   ManualForces manual_;
