@@ -38,9 +38,11 @@ TEST(Session, LearnsStabilityFromCutsWithoutAHammer) {
   const auto summary = nlohmann::json::parse(contentOf(folder.file("summary.json")));
   EXPECT_TRUE(summary.at("completed"));
   EXPECT_TRUE(summary.at("modes").empty());
-  ASSERT_EQ(summary.at("probing_cuts").size(), 4u);  // the slot tests first
+  const std::size_t cuts = summary.at("probing_cuts").size();
+  ASSERT_GE(cuts, 2u);  // the slot tests first
+  ASSERT_LE(cuts, 4u);
   EXPECT_TRUE(summary["probing_cuts"][0].at("probability_stable").is_null());
-  for (std::size_t k = 1; k < 4; ++k) {
+  for (std::size_t k = 1; k < cuts; ++k) {
     const auto& cut = summary["probing_cuts"][k];
     EXPECT_GT(cut.at("probability_stable"), 0.0) << cut;
     EXPECT_GE(cut.at("windows"), 2) << cut;

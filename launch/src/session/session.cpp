@@ -724,6 +724,7 @@ void Session::learnFromCuts() {
   for (std::size_t k = 0; k < cuts; ++k) {
     const std::string number = std::to_string(k + 1);
     step("choice of probing cut " + number, [&] { return chooseProbingCut(cuts - k); });
+    if (std::isnan(next_.spindle_speed)) break;
     action(
         "probing cut " + number, "", [&] { return probe(k); }, true);
   }
@@ -783,6 +784,8 @@ std::string Session::chooseProbingCut(std::size_t cuts_left) {
   if (cuts_left > 0) {
     next_ = {answer.next_speed, answer.next_depth, NOT_A_NUMBER, NOT_A_NUMBER};
     next_probability_ = answer.next_probability;
+    if (std::isnan(next_.spindle_speed))
+      return std::string("none: no further cut within machine and spindle removes 5 % more");
     return text(next_, next_probability_) + formatted("; chosen in %.1f s", answer.seconds);
   }
   if (std::isnan(answer.recommended_speed))

@@ -12,6 +12,7 @@ namespace {
 constexpr double UNSTATED_KTC = 0.1;  // [1] standard deviation of a coefficient without one
 // [1] Of the coefficient in addition to that of the identification: it depends on speed and chip thickness.
 constexpr double KTC_MODEL = 0.05;
+constexpr double LEAST_GAIN = 1.05;  // [1] removal of the next cut over the recommended one
 
 MachinePrior priorOf(const ChartCut& cut, const ProbingRequest& request) {
   RegenerativeSystem system;
@@ -58,24 +59,27 @@ void ProbingRequest::validate() const {
 ProbingChoice chooseProbingCut(const ChartCut& cut, const ProbingRequest& request,
                                const LearningOptions& options) {
   request.validate();
-  ChartLearning learning(priorOf(cut, request), rangeOf(cut, request), options);
-  for (const JudgedCut& made : request.cuts) learning.add(made);
+  const MachinePrior prior = priorOf(cut, request);
   ChartCut requested = cut;
   requested.parameters.entry = request.entry;
   requested.parameters.exit = request.exit;
   CoefficientSet coefficients;
-  coefficients.value.ktc = request.ktc ? request.ktc->value : learning.estimate().kt.median;
+  coefficients.value.ktc = prior.kt.median;
   coefficients.value.kte = request.kte;
+  CutRange range = rangeOf(cut, request);
   const SpindleLoad load(requested, coefficients);
-  const auto withinLoad = [&](CutProposal proposal) {
-    const auto [torque, power] = load.limits(proposal.speed);
-    const double most = cut.parameters.load_share * std::min(torque, power);
-    if (proposal.depth <= most) return proposal;
-    return learning.judge(proposal.speed, most);
+  range.depth_limit = [&](double speed) {
+    const auto [torque, power] = load.limits(speed);
+    return cut.parameters.load_share * std::min(torque, power);
   };
+  ChartLearning learning(prior, range, options);
+  for (const JudgedCut& made : request.cuts) learning.add(made);
   ProbingChoice choice;
-  if (!request.last) choice.next = withinLoad(learning.next());
-  if (const auto best = learning.recommended()) choice.recommended = withinLoad(*best);
+  choice.recommended = learning.recommended();
+  if (request.last) return choice;
+  const CutProposal next = learning.next();
+  const double least = choice.recommended ? LEAST_GAIN * choice.recommended->removal() : 0.0;
+  if (next.removal() > least) choice.next = next;
   return choice;
 }
 

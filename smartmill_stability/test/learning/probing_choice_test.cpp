@@ -64,6 +64,11 @@ TEST(ProbingChoice, DepthsEndAtTheLoadOfTheSpindle) {
   ASSERT_TRUE(choice.next && choice.recommended);
   EXPECT_LE(choice.next->depth, most * 1.001);
   EXPECT_LE(choice.recommended->depth, most * 1.001);
+  // A stable cut near the highest speed and the largest depth leaves nothing to gain.
+  ProbingRequest done = oneStableCut();
+  done.cuts[0].speed = 1580.0;
+  done.cuts[0].depth = most;
+  EXPECT_FALSE(chooseProbingCut(weak, done, quick()).next);
 }
 
 TEST(ProbingChoice, RefusesBadRequestsInOneLine) {

@@ -25,7 +25,8 @@ struct ProbingRequest {
 };
 
 struct ProbingChoice {
-  std::optional<CutProposal> next;  ///< empty after the last
+  /// Empty after the last one, and if no cut of the range removes 5 % more than the recommended one.
+  std::optional<CutProposal> next;
   /// Empty if no cut has an acceptable risk; judged by collocation.
   std::optional<CutProposal> recommended;
 };
