@@ -88,6 +88,14 @@ double CutPlanner::laneWidth() const {
   return tool_.diameter + parameters_.lane_margin;
 }
 
+double CutPlanner::height() const {
+  return stock_.high[2] - stock_.low[2];
+}
+
+double CutPlanner::feedPerTooth(double speed) const {
+  return axes_.rapid * 60.0 / (wholeRpm(speed) * tool_.teeth);
+}
+
 double CutPlanner::stripWidth() const {
   return tool_.radius();
 }

@@ -47,6 +47,13 @@ void declareChecks(PlanParameters& p, ParameterTable& table) {
       "file where the control acts); 0.0: no such cut");
   table.number("least_revolutions", p.least_revolutions, "1", Range::positive(),
                "minimum spindle revolutions of steady cutting; points with fewer are skipped");
+  table.section("Without a hammer: stability is learned from cuts (docs/stability.md).");
+  table.flag(
+      "hammer", p.hammer,
+      "false: no FRFs, no taps, no cut at the sensor's resonance; a slot is chosen, made and judged up to "
+      "probing_cuts times, and the recommended slot verifies the result");
+  table.number("probing_cuts", p.probing_cuts, "1", Range::closed(3, 20),
+               "largest number of these slots; fewer if the stock has no lanes for them");
   table.section(
       "A light cut with the tooth passing frequency at the resonance of the dynamometer: raw and compensated "
       "force.");

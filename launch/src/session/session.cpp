@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include <smartmill_msgs/ChooseProbingCut.h>
 #include <smartmill_msgs/CoefficientPrior.h>
 #include <smartmill_msgs/FindCoefficients.h>
 #include <smartmill_msgs/ForceCurve.h>
@@ -23,9 +24,10 @@
 namespace smartmill::session {
 namespace {
 
-constexpr double FRESH = 0.5;        // [s] since the last message of a sensor
-constexpr double CURVE_WAIT = 5.0;   // [s] after the last cut, for the force curve that contains it
-constexpr double CHART_WAIT = 20.0;  // [s] for the stability limit of another immersion
+constexpr double FRESH = 0.5;         // [s] since the last message of a sensor
+constexpr double CURVE_WAIT = 5.0;    // [s] after the last cut, for the force curve that contains it
+constexpr double CHART_WAIT = 20.0;   // [s] for the stability limit of another immersion
+constexpr double CHOICE_WAIT = 60.0;  // [s] for the choice of a probing cut, which takes seconds
 
 constexpr const char *LOADMETER = "loadmeter", *KALMAN = "kalman";  // nodes that hold results in memory
 constexpr const char* TEST_PLAN = "test plan";  // the step with which the coefficients are complete
@@ -87,7 +89,7 @@ Session::Session(ros::NodeHandle nh, const ros::NodeHandle& private_nh, const st
   subscribe(names::CNC_STATE, smartmill_msgs::CncState(), [this](const smartmill_msgs::CncState& m) {
     if (under_control_ && m.feed > 0.0) states_.push_back({toSec(m.header.stamp), m.spindle_speed, m.feed});
   });
-  subscribe(names::HAMMER, smartmill_msgs::SampleBlock(), [](const auto&) {});
+  if (parameters_.plan.hammer) subscribe(names::HAMMER, smartmill_msgs::SampleBlock(), [](const auto&) {});
   subscribe(
       parameters_.calibration.kind() == ForceSensorKind::spindle ? names::SPINDLE_FORCE : names::DYNAMOMETER,
       smartmill_msgs::SampleBlock(), [](const auto&) {});
@@ -159,7 +161,7 @@ void Session::runSteps() {
   step("connect", [&] { return waitReady(); });
   step(parameters_.resume ? "resume" : "begin", [&] { return beginProgress(); });
   step("arm motion", [&] { return arm(true); });
-  for (char direction : parameters_.tool_directions) {
+  for (char direction : parameters_.plan.hammer ? parameters_.tool_directions : "") {
     action(std::string("FRF of the tool in ") + direction, "", [&] {
       return measure(tool_frf_, names::MEASURE_TOOL_FRF, POINT_TOOL_TIP, {direction}, parameters_.hits,
                      parameters_.modes);
@@ -174,7 +176,9 @@ void Session::runSteps() {
   moveInAir();
   if (!identified) identifyFromTests();
   tuneFilter();  // chosen test cuts have moved the lanes before
-  if (parameters_.verify) {
+  if (parameters_.verify && !parameters_.plan.hammer) {
+    learnFromCuts();
+  } else if (parameters_.verify) {
     step("stability chart", [&] { return waitChart(); });
     step("points to verify", [&] { return choosePoints(); });
     const double feed = used_chart_.feed_per_tooth;
@@ -205,7 +209,7 @@ void Session::calibrateSensor() {
   for (const CalibrationStage& stage : calibrationPlan(parameters_.calibration))
     action(stage.name, KALMAN, [&] { return sensor_.run(stage, parameters_.frf_timeout); });
   // The taps on a plate are those of its calibration.
-  if (kind != ForceSensorKind::plate) {
+  if (kind != ForceSensorKind::plate && parameters_.plan.hammer) {
     for (char direction : parameters_.sensor_directions) {
       // With a sensor in the spindle they are part of its calibration, which ends with the node.
       const char* holder = kind == ForceSensorKind::spindle ? KALMAN : "";
@@ -332,6 +336,8 @@ std::string Session::continueProgress(const std::string& text) {
     progress_.restarted(holder, startsOf(holder));
     if (progress_.lostLanes() > lanes) lost += "; " + holder + " was restarted, its tests are repeated";
   }
+  if (!parameters_.plan.hammer && progress_.cutLanes())
+    throw Error("without a hammer a session is continued only before its first cut; start without resume");
   if (parameters_.plan.isInformative() && progress_.cutLanes())
     throw Error(
         "with test_cuts informative a session is continued only before its first cut; start without resume");
@@ -360,7 +366,7 @@ std::string Session::missing() {
     if (!there) add(std::string("action ") + name);
   };
   server(driver_.reachable(), names::RUN_PROGRAM);
-  server(tool_frf_.isServerConnected(), names::MEASURE_TOOL_FRF);
+  if (parameters_.plan.hammer) server(tool_frf_.isServerConnected(), names::MEASURE_TOOL_FRF);
   server(sensor_frf_.isServerConnected(), names::MEASURE_SENSOR_FRF);
   server(identify_.isServerConnected(), names::IDENTIFY_COEFFICIENTS);
   if (chart_subscriber_.getNumPublishers() == 0) add(std::string("a publisher of ") + names::STABILITY_CHART);
@@ -407,11 +413,13 @@ std::string Session::waitReady() {
 // Steps use what earlier ones have measured, so that a node which is restarted lacks it.
 void Session::requireNodes() {
   const auto has = [](const auto& client) { return [&client] { return client.isServerConnected(); }; };
-  driver_.require({{"cnc", [this] { return driver_.reachable(); }},
-                   {"hammer", has(tool_frf_)},
-                   {KALMAN, has(sensor_frf_)},
-                   {LOADMETER, has(identify_)},
-                   {"stability", [this] { return chart_subscriber_.getNumPublishers() > 0; }}});
+  std::map<std::string, std::function<bool()>> nodes{
+      {"cnc", [this] { return driver_.reachable(); }},
+      {KALMAN, has(sensor_frf_)},
+      {LOADMETER, has(identify_)},
+      {"stability", [this] { return chart_subscriber_.getNumPublishers() > 0; }}};
+  if (parameters_.plan.hammer) nodes["hammer"] = has(tool_frf_);
+  driver_.require(std::move(nodes));
 }
 
 std::string Session::arm(bool on) {
@@ -687,10 +695,7 @@ std::string Session::verify(const char* role, const PlannedCut& cut, CutVerdict:
   const std::string detail = runCut(cut);
   waitVerdict();
   SessionSummary::Verified verified;
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    verified.verdict = cutVerdict(windows_[cut.condition.name]);
-  }
+  verified.verdict = verdictOn(cut.condition.name);
   const Point& point = predicted == CutVerdict::Kind::stable ? stable_ : unstable_;
   verified.role = role;
   verified.spindle_speed = cut.condition.spindle_speed;
@@ -698,10 +703,115 @@ std::string Session::verify(const char* role, const PlannedCut& cut, CutVerdict:
   verified.depth_limit = point.depth_limit;
   verified.as_predicted = verified.verdict.kind == predicted;
   log_.summary.verified.push_back(verified);
+  const bool hammer = parameters_.plan.hammer;
+  const std::string source = hammer ? "the chart" : "the probing cuts", ending = hammer ? "s " : " ";
   return detail + "; " + verified.verdict.text() +
-         (verified.as_predicted ? ", as predicted by the chart"
-                                : ", the chart predicts " + std::string(role));
+         (verified.as_predicted ? ", as predicted by " + source : ", " + source + " predict" + ending + role);
 }
+
+CutVerdict Session::verdictOn(const std::string& condition) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const auto found = windows_.find(condition);
+  return cutVerdict(found == windows_.end() ? std::vector<ChatterWindow>{} : found->second);
+}
+
+// ---------------------------------------------------------------------------------------------- no hammer
+
+// Stability from cuts: each is chosen by what those before have shown.
+void Session::learnFromCuts() {
+  judgeSlotTests();
+  const std::size_t cuts = plan_.probingCuts();
+  for (std::size_t k = 0; k < cuts; ++k) {
+    const std::string number = std::to_string(k + 1);
+    step("choice of probing cut " + number, [&] { return chooseProbingCut(cuts - k); });
+    if (std::isnan(next_.spindle_speed)) break;
+    action(
+        "probing cut " + number, "", [&] { return probe(k); }, true);
+  }
+  step("recommended cut", [&] { return chooseProbingCut(0); });
+  action(
+      "cut at the recommended point", "",
+      [&] { return verify("stable", plan_.stable(stable_, probing_feed_), CutVerdict::Kind::stable); }, true);
+}
+
+// The slot tests have one speed and one depth: they are one judged cut, which chatters if one of them does.
+void Session::judgeSlotTests() {
+  SessionSummary::Probing all;
+  for (const std::size_t i : made_) {
+    const CuttingCondition& condition = tests_[i].condition;
+    const bool is_slot = condition.engagement.exit - condition.engagement.entry > 0.75 * units::PI;
+    if (condition.kind != CuttingCondition::Kind::cut || !is_slot) continue;
+    const CutVerdict verdict = verdictOn(condition.name);
+    const bool worse = verdict.chattering > all.verdict.chattering;
+    if (verdict.kind == CutVerdict::Kind::unknown || (!all.name.empty() && !worse)) continue;
+    all.name = condition.name;
+    all.spindle_speed = condition.spindle_speed;
+    all.axial_depth = condition.engagement.axial_depth;
+    all.verdict = verdict;
+  }
+  if (!all.name.empty()) log_.summary.probing.push_back(all);
+}
+
+// @param cuts_left 0: only the recommended cut
+std::string Session::chooseProbingCut(std::size_t cuts_left) {
+  smartmill_msgs::ChooseProbingCut service;
+  auto& request = service.request;
+  for (const SessionSummary::Probing& cut : log_.summary.probing) {
+    if (cut.verdict.kind == CutVerdict::Kind::unknown) continue;
+    // An undecided cut is near the limit: no cut to recommend.
+    request.spindle_speed.push_back(cut.spindle_speed);
+    request.axial_depth.push_back(cut.axial_depth);
+    request.chatter.push_back(cut.verdict.kind != CutVerdict::Kind::stable);
+    request.chatter_frequency.push_back(cut.verdict.frequency);
+  }
+  const CoefficientSet& found = log_.summary.coefficients.front();
+  request.ktc = found.value.ktc;
+  request.ktc_std = found.std_dev.ktc;
+  request.kte = found.value.kte;
+  request.exit_angle = units::PI;
+  request.max_depth = plan_.largestDepth();
+  request.cuts_left = static_cast<std::uint32_t>(cuts_left);
+  if (!driver_.callService(names::CHOOSE_PROBING_CUT, service, CHOICE_WAIT))
+    throw Error(std::string(names::CHOOSE_PROBING_CUT) + ": no answer");
+  const auto& answer = service.response;
+  if (answer.code != smartmill_msgs::ChooseProbingCut::Response::OK) throw Error(answer.message);
+  probing_feed_ = answer.feed_per_tooth;
+  const auto text = [](const Point& point, double probability) {
+    return formatted("%.0f rpm %.2f mm, stable with a probability of %.0f %%",
+                     units::rpmFromRadPerSec(point.spindle_speed), point.axial_depth / units::MM,
+                     100.0 * probability);
+  };
+  if (cuts_left > 0) {
+    next_ = {answer.next_speed, answer.next_depth, NOT_A_NUMBER, NOT_A_NUMBER};
+    next_probability_ = answer.next_probability;
+    if (std::isnan(next_.spindle_speed))
+      return std::string("none: no further cut within machine and spindle removes 5 % more");
+    return text(next_, next_probability_) + formatted("; chosen in %.1f s", answer.seconds);
+  }
+  if (std::isnan(answer.recommended_speed))
+    throw Error(formatted("no cut is probably stable after %zu cuts", log_.summary.probing.size()));
+  stable_ = {answer.recommended_speed, answer.recommended_depth, NOT_A_NUMBER, NOT_A_NUMBER};
+  log_.summary.recommended =
+      SessionSummary::RecommendedCut{answer.recommended_speed, answer.recommended_depth,
+                                     answer.recommended_probability, answer.recommended_probability_std};
+  return text(stable_, answer.recommended_probability) + formatted("; chosen in %.1f s", answer.seconds);
+}
+
+std::string Session::probe(std::size_t index) {
+  const PlannedCut cut = plan_.probing(index, next_, probing_feed_);
+  const std::string detail = runCut(cut);
+  waitVerdict();
+  SessionSummary::Probing made;
+  made.name = cut.condition.name;
+  made.spindle_speed = cut.condition.spindle_speed;
+  made.axial_depth = next_.axial_depth;
+  made.probability = next_probability_;
+  made.verdict = verdictOn(made.name);
+  log_.summary.probing.push_back(made);
+  return detail + "; " + made.verdict.text();
+}
+
+// ---------------------------------------------------------------------------------------------- control
 
 std::string Session::cutUnderControl(const PlannedCut& cut) {
   const auto follow = [this](bool on) {

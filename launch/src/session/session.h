@@ -75,6 +75,11 @@ class Session {
   std::string identify(bool reset);
   std::string waitChart();
   std::string choosePoints();
+  void learnFromCuts();
+  void judgeSlotTests();
+  std::string chooseProbingCut(std::size_t cuts_left);
+  std::string probe(std::size_t index);
+  CutVerdict verdictOn(const std::string& condition) const;
   std::string cutUnderControl(const PlannedCut& cut);
   std::string verify(const char* role, const PlannedCut& cut, CutVerdict::Kind predicted);
   void makeSafe();
@@ -99,7 +104,7 @@ class Session {
   ros::Subscriber chart_subscriber_;
   std::unique_ptr<ros::AsyncSpinner> spinner_;
 
-  mutable std::mutex mutex_;                            // guards the members that subscribers write
+  mutable std::mutex mutex_;                              // guards the members that subscribers write
   std::map<std::string, ros::SteadyTime> last_received_;  // by topic
   std::optional<smartmill_msgs::StabilityChart> chart_;
   std::map<std::string, std::vector<ChatterWindow>> windows_;  // by condition
@@ -122,6 +127,9 @@ class Session {
   ros::Time coefficients_stamp_;
   smartmill_msgs::StabilityChart used_chart_;
   Point stable_, unstable_;
+  // Without a hammer: the next cut and its probability of being stable [1], and the feed per tooth [m].
+  Point next_;
+  double next_probability_ = NOT_A_NUMBER, probing_feed_ = 0.0;
 };
 
 }  // namespace smartmill::session

@@ -69,7 +69,11 @@ void SessionParameters::validate() const {
   plan.validate();
   calibration.validate();
   if (model.empty()) throw Error("model: empty, expected the path of a smartmill-model/1 file");
-  if (verify && tool_directions.size() < 2) {
+  if (!plan.hammer && calibration.kind() != ForceSensorKind::table) {
+    throw Error("hammer: false: sensor " + calibration.sensor +
+                " is calibrated by taps, expected sensor table or a hammer");
+  }
+  if (plan.hammer && verify && tool_directions.size() < 2) {
     throw Error("verify: a stability chart requires the tool's FRF in x and y, tool_directions is '" +
                 tool_directions + "'");
   }

@@ -15,6 +15,7 @@ constexpr std::size_t VERIFYING_CUTS = 2;
 // Of the feed of the chart: the cut lasts longer in its lane, and the limit does not depend on it.
 constexpr double CONTROL_FEED = 0.5;    // [1]
 constexpr std::size_t FEWEST_CUTS = 3;  // for the coefficients, as slots
+constexpr std::size_t FEWEST_PROBING_CUTS = 3;
 
 const PlanParameters& checked(const PlanParameters& parameters) {
   parameters.validate();
@@ -27,10 +28,13 @@ SessionPlan::SessionPlan(const MachineModel& model, const PlanParameters& parame
     : parameters_(checked(parameters)), planner_(model, parameters) {
   const bool informative = parameters_.isInformative();
   const std::size_t tests = informative ? FEWEST_CUTS : parameters_.slot_feeds.size();
+  if (!parameters_.hammer) countProbingCuts(tests);
   const std::size_t needed = tests + verifyingCuts();
   planner_.requireLanes(
       parameters_.lost_lanes + needed,
-      std::to_string(tests) + " slot tests, " + std::to_string(needed - tests) + " verifying cuts" +
+      std::to_string(tests) + " slot tests, " +
+          (parameters_.hammer ? std::to_string(needed - tests) + " verifying cuts"
+                              : std::to_string(probing_) + " probing cuts, the recommended cut") +
           (parameters_.lost_lanes > 0 ? ", " + std::to_string(parameters_.lost_lanes) + " cut before" : ""));
   for (double speed : parameters_.air_speeds) air_cuts_.push_back(planner_.air(speed, parameters_.air_time));
   for (double feed : parameters_.air_feeds)
@@ -47,7 +51,16 @@ SessionPlan::SessionPlan(const MachineModel& model, const PlanParameters& parame
   planTuning();
 }
 
+// As many as there are lanes, so that the recommended cut has one.
+void SessionPlan::countProbingCuts(std::size_t tests) {
+  const auto most = static_cast<std::size_t>(parameters_.probing_cuts);
+  const std::size_t others = parameters_.lost_lanes + tests + 1, lanes = planner_.lanes();
+  const std::size_t free = lanes > others ? lanes - others : 0;
+  probing_ = std::min(most, std::max(free, FEWEST_PROBING_CUTS));
+}
+
 std::size_t SessionPlan::verifyingCuts() const {
+  if (!parameters_.hammer) return probing_ + 1;
   return tuningLane() + parameters_.tuning_speeds.size();
 }
 
@@ -102,7 +115,7 @@ SlotRequest SessionPlan::lightSlot(double speed, std::size_t lane) const {
 }
 
 void SessionPlan::planResonance() {
-  if (!(parameters_.resonance_speed > 0.0)) return;
+  if (!parameters_.hammer || !(parameters_.resonance_speed > 0.0)) return;
   SlotRequest request = lightSlot(parameters_.resonance_speed, VERIFYING_CUTS);
   request.name = "resonance";
   request.time = parameters_.resonance_time;
@@ -182,12 +195,22 @@ PlannedCut SessionPlan::verifying(const char* name, std::size_t lane, const Poin
   request.feed_per_tooth = feed_per_tooth;
   request.time = time;
   request.least_time = parameters_.least_revolutions * units::TWO_PI / point.spindle_speed;
+  if (!parameters_.hammer) {
+    // The speed is chosen by what the cuts have shown: machine and time follow it.
+    request.feed_per_tooth = std::min(feed_per_tooth, planner_.feedPerTooth(point.spindle_speed));
+    request.time = std::max(time, request.least_time);
+  }
   request.shift = shift_;
   return planner_.slot(request);
 }
 
 PlannedCut SessionPlan::stable(const Point& point, double feed_per_tooth) const {
-  return verifying("verify_stable", 0, point, feed_per_tooth, parameters_.stable_time);
+  return verifying("verify_stable", probing_, point, feed_per_tooth, parameters_.stable_time);
+}
+
+PlannedCut SessionPlan::probing(std::size_t index, const Point& point, double feed_per_tooth) const {
+  const std::string name = "probe_" + std::to_string(index + 1);
+  return verifying(name.c_str(), index, point, feed_per_tooth, parameters_.stable_time);
 }
 
 PlannedCut SessionPlan::unstable(const Point& point, double feed_per_tooth) const {

@@ -125,6 +125,23 @@ std::string SessionSummary::text() const {
                                      {"chatter_frequency_hz", number(cut.verdict.frequency)},
                                      {"as_predicted", cut.as_predicted}});
   }
+  if (!probing.empty()) json["probing_cuts"] = Json::array();
+  for (const Probing& cut : probing) {
+    json["probing_cuts"].push_back({{"name", cut.name},
+                                    {"spindle_speed_rad_per_s", cut.spindle_speed},
+                                    {"axial_depth_m", cut.axial_depth},
+                                    {"probability_stable", number(cut.probability)},
+                                    {"cut_is", wordOf(cut.verdict.kind)},
+                                    {"windows", cut.verdict.windows},
+                                    {"chattering_windows", cut.verdict.chattering},
+                                    {"chatter_frequency_hz", number(cut.verdict.frequency)}});
+  }
+  if (recommended) {
+    json["recommended_cut"] = {{"spindle_speed_rad_per_s", recommended->spindle_speed},
+                               {"axial_depth_m", recommended->axial_depth},
+                               {"probability_stable", number(recommended->probability)},
+                               {"probability_stable_std", number(recommended->probability_std)}};
+  }
   if (control) {
     json["controlled_cut"] = {{"suppressed", control->suppressed()},
                               {"chatter_frequency_hz", number(control->frequency)},

@@ -25,6 +25,18 @@ struct SessionSummary {
     CutVerdict verdict;
     bool as_predicted = false;
   };
+  /// A cut from which a machine without a hammer learns its stability.
+  struct Probing {
+    std::string name;
+    double spindle_speed = 0.0, axial_depth = 0.0;  ///< [rad/s], [m]
+    double probability = NOT_A_NUMBER;  ///< [1] that it is stable, before it was made; NaN: it was not chosen
+    CutVerdict verdict;
+  };
+  /// The cut that these recommend.
+  struct RecommendedCut {
+    double spindle_speed = 0.0, axial_depth = 0.0;    ///< [rad/s], [m]
+    double probability = 0.0, probability_std = 0.0;  ///< [1] that it is stable
+  };
   /// Test plan with the knowledge of the database.
   struct TestPlan {
     std::size_t planned = 0, made = 0;            ///< air cuts and cuts: in the full plan, made
@@ -51,7 +63,9 @@ struct SessionSummary {
   std::vector<MeasuredModes> modes;
   std::vector<CoefficientSet> coefficients;  ///< none or one
   std::vector<Verified> verified;
-  std::optional<ControlVerdict> control;  ///< of the cut under chatter control; empty: none was made
+  std::vector<Probing> probing;               ///< without a hammer, the slot tests first
+  std::optional<RecommendedCut> recommended;  ///< without a hammer
+  std::optional<ControlVerdict> control;      ///< of the cut under chatter control; empty: none was made
   std::optional<smartmill_msgs::ForceSensorState> sensor;
   double calibration_time = 0.0;  ///< [s] of the force sensor, taps included
   TestPlan test_plan;

@@ -72,6 +72,32 @@ ToolPath toolPathOf(const std::string& program, std::array<double, 3> at) {
   return out;
 }
 
+TEST(SessionPlan, WithoutAHammerTheStockLimitsTheProbingCuts) {
+  PlanParameters parameters;
+  parameters.hammer = false;
+  const SessionPlan four(mill(), parameters);  // 9 lanes: 4 slots, 4 probing cuts, the recommended one
+  ASSERT_EQ(four.planner().lanes(), 9u);
+  EXPECT_EQ(four.probingCuts(), 4u);
+  EXPECT_FALSE(four.resonance());
+  parameters.slot_feeds.pop_back();
+  const SessionPlan three(mill(), parameters);
+  ASSERT_EQ(three.probingCuts(), 5u);
+  const Point point{1000.0, 2.0 * MM};
+  const double y = three.slots().back().from[1];
+  EXPECT_NEAR(three.probing(0, point, 1e-4).from[1], y + three.planner().laneWidth(), 1e-9);
+  EXPECT_NEAR(three.stable(point, 1e-4).from[1], y + 6.0 * three.planner().laneWidth(), 1e-9);
+  // 50 revolutions or more, and no feed beyond that of the axes.
+  const PlannedCut slow = three.probing(1, {200.0, 2.0 * MM}, 1e-4);
+  EXPECT_GE((slow.condition.steady_to[0] - slow.condition.steady_from[0]) / slow.feed,
+            50.0 * units::TWO_PI / slow.condition.spindle_speed * 0.999);
+  EXPECT_NEAR(three.probing(2, {radPerSecFromRpm(20000.0), 2.0 * MM}, 1e-3).feed, 0.4, 1e-9);
+  parameters.lost_lanes = 2;
+  EXPECT_EQ(SessionPlan(mill(), parameters).probingCuts(), 3u);
+  parameters.lost_lanes = 3;
+  EXPECT_THAT(refusal(mill(), parameters),
+              ::testing::HasSubstr("3 probing cuts, the recommended cut, 3 cut"));
+}
+
 TEST(SessionPlan, FeedIsFeedPerToothTimesTeethTimesSpeed) {
   PlanParameters parameters;
   parameters.slot_speed = radPerSecFromRpm(4000.0);

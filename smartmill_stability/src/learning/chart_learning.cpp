@@ -119,6 +119,9 @@ ChartLearning::ChartLearning(const MachinePrior& prior, const CutRange& range, c
     throw Error("risk: expected at least the probability of a wrong verdict");
   speeds_ = geometric(range.speed_low, range.speed_high, SPEED_STEP);
   depths_ = geometric(LEAST_DEPTH * range.max_depth, range.max_depth, DEPTH_STEP);
+  for (const double speed : speeds_)
+    most_.push_back(range.depth_limit ? std::min(range.max_depth, range.depth_limit(speed))
+                                      : range.max_depth);
   std::normal_distribution<double> normal;
   machines_.resize(options_.candidates);
   for (Machine& machine : machines_)
@@ -322,7 +325,7 @@ CutProposal ChartLearning::next() const {
   for (std::size_t s = 0; s < speeds_.size(); ++s)
     for (std::size_t d = 0; d < depths_.size(); ++d) {
       const CutProposal cut{speeds_[s], depths_[d], probability_[s][d], 0.0};
-      if (!std::isnan(knownStable(cut.speed, cut.depth))) continue;
+      if (cut.depth > most_[s] || !std::isnan(knownStable(cut.speed, cut.depth))) continue;
       const double gain = cut.stable * (cut.removal() - least) / (options_.risk_offset + 1.0 - cut.stable);
       if (gain <= most) continue;
       most = gain;
@@ -348,7 +351,8 @@ std::optional<CutProposal> ChartLearning::chosen(bool exact) const {
     for (std::size_t d = 0; d < depths_.size(); ++d) {
       const CutProposal cut{speeds_[s], depths_[d], probability_[s][d],
                             deviationOf(probability_[s][d], shown_.size())};
-      if (cut.stable >= loose && (!best || cut.removal() > best->removal())) candidates.push_back(cut);
+      if (cut.depth <= most_[s] && cut.stable >= loose && (!best || cut.removal() > best->removal()))
+        candidates.push_back(cut);
     }
   std::sort(candidates.begin(), candidates.end(),
             [](const CutProposal& a, const CutProposal& b) { return a.removal() > b.removal(); });

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 
 #include <smartmill_msgs/BistableChart.h>
 #include <smartmill_msgs/ChatterAdvice.h>
@@ -43,6 +44,33 @@ WhatIf requestOf(const smartmill_msgs::WhatIf::Request& request) {
   return what_if;
 }
 
+ProbingRequest requestOf(const smartmill_msgs::ChooseProbingCut::Request& request) {
+  const std::size_t count = request.spindle_speed.size();
+  if (request.axial_depth.size() != count || request.chatter.size() != count ||
+      request.chatter_frequency.size() != count)
+    throw Error("cuts so far: expected arrays of one length");
+  ProbingRequest probing;
+  for (std::size_t k = 0; k < count; ++k) {
+    JudgedCut cut;
+    cut.speed = request.spindle_speed[k];
+    cut.depth = request.axial_depth[k];
+    cut.chatter = request.chatter[k] != 0;
+    if (cut.chatter && !std::isnan(request.chatter_frequency[k]))
+      cut.frequency = Measured{request.chatter_frequency[k], 0.0};
+    probing.cuts.push_back(cut);
+  }
+  const auto known = [](double value, double other) { return std::isnan(value) ? other : value; };
+  if (!std::isnan(request.ktc)) probing.ktc = Measured{request.ktc, known(request.ktc_std, 0.0)};
+  probing.kte = known(request.kte, 0.0);
+  probing.entry = request.entry_angle;
+  probing.exit = request.exit_angle;
+  probing.speed_low = request.speed_low;
+  probing.speed_high = request.speed_high;
+  probing.max_depth = request.max_depth;
+  probing.last = request.cuts_left == 0;
+  return probing;
+}
+
 }  // namespace
 
 StabilityNode::StabilityNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
@@ -71,6 +99,10 @@ StabilityNode::StabilityNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   what_if_nh.setCallbackQueue(&what_if_queue_);
   what_if_ = what_if_nh.advertiseService(names::WHAT_IF, &StabilityNode::whatIf, this);
   what_if_spinner_.start();
+  ros::NodeHandle probing_nh(nh);
+  probing_nh.setCallbackQueue(&probing_queue_);
+  probing_ = probing_nh.advertiseService(names::CHOOSE_PROBING_CUT, &StabilityNode::chooseProbingCut, this);
+  probing_spinner_.start();
   if (!parameters_.force_curve.empty()) {
     curves_.emplace();
     curves_->curves = readForceCurves(parameters_.force_curve);
@@ -243,6 +275,39 @@ bool StabilityNode::whatIf(smartmill_msgs::WhatIf::Request& request,
     response.limit_low = std::move(chart.limit_low);
     response.limit_high = std::move(chart.limit_high);
     response.stable_share = chart.stable_share;
+    response.seconds = (ros::SteadyTime::now() - begin).toSec();
+  } catch (const Error& error) {
+    response.code = Response::BAD_REQUEST;
+    response.message = error.what();
+  }
+  return true;
+}
+
+bool StabilityNode::chooseProbingCut(smartmill_msgs::ChooseProbingCut::Request& request,
+                                     smartmill_msgs::ChooseProbingCut::Response& response) {
+  using Response = smartmill_msgs::ChooseProbingCut::Response;
+  std::unique_lock<std::mutex> lock(maker_mutex_);
+  const ChartMaker maker = maker_;
+  lock.unlock();
+  response.next_speed = response.next_depth = response.next_probability = NOT_A_NUMBER;
+  response.recommended_speed = response.recommended_depth = NOT_A_NUMBER;
+  response.recommended_probability = response.recommended_probability_std = NOT_A_NUMBER;
+  response.feed_per_tooth = maker.feedPerTooth();
+  try {
+    const ros::SteadyTime begin = ros::SteadyTime::now();
+    const ProbingChoice choice = maker.chooseProbingCut(requestOf(request));
+    response.code = Response::OK;
+    if (choice.next) {
+      response.next_speed = choice.next->speed;
+      response.next_depth = choice.next->depth;
+      response.next_probability = choice.next->stable;
+    }
+    if (choice.recommended) {
+      response.recommended_speed = choice.recommended->speed;
+      response.recommended_depth = choice.recommended->depth;
+      response.recommended_probability = choice.recommended->stable;
+      response.recommended_probability_std = choice.recommended->std_dev;
+    }
     response.seconds = (ros::SteadyTime::now() - begin).toSec();
   } catch (const Error& error) {
     response.code = Response::BAD_REQUEST;

@@ -12,6 +12,7 @@
 #include <ros/service_client.h>
 #include <ros/service_server.h>
 #include <ros/spinner.h>
+#include <smartmill_msgs/ChooseProbingCut.h>
 #include <smartmill_msgs/PredictStability.h>
 #include <smartmill_msgs/SetOverrides.h>
 #include <smartmill_msgs/WhatIf.h>
@@ -26,7 +27,8 @@
 namespace smartmill::stability {
 
 /// ROS node of ChartMaker, DetectionPipeline and MillingControl. From FRFs, modes and coefficients: topic
-/// stability/chart, services stability/predict and stability/what_if. From compensated force (or vibration,
+/// stability/chart, services stability/predict and stability/what_if; without FRFs, from verdicts on cuts:
+/// service stability/choose_probing_cut. From compensated force (or vibration,
 /// sound) and controller state: topics chatter/state and chatter/advice. With adaptive: true, the requests of
 /// MillingControl are sent to the service cnc/set_overrides.
 class StabilityNode {
@@ -59,6 +61,8 @@ class StabilityNode {
   bool predict(smartmill_msgs::PredictStability::Request& request,
                smartmill_msgs::PredictStability::Response& response);
   bool whatIf(smartmill_msgs::WhatIf::Request& request, smartmill_msgs::WhatIf::Response& response);
+  bool chooseProbingCut(smartmill_msgs::ChooseProbingCut::Request& request,
+                        smartmill_msgs::ChooseProbingCut::Response& response);
   /// Starts the chart of small and large vibrations in a thread, when its inputs are complete.
   void startBistable();
   void publishBistable();
@@ -86,11 +90,15 @@ class StabilityNode {
   std::future<std::optional<BistableChart>> bistable_chart_;  // in progress
   std::string bistable_problem_;
 
-  // The service what_if has its own thread, so that it does not delay the detection.
+  // The services what_if and choose_probing_cut have their own threads, so that they do not delay the
+  // detection.
   std::mutex maker_mutex_;
   ros::CallbackQueue what_if_queue_;
   ros::ServiceServer what_if_;
   ros::AsyncSpinner what_if_spinner_{1, &what_if_queue_};
+  ros::CallbackQueue probing_queue_;
+  ros::ServiceServer probing_;
+  ros::AsyncSpinner probing_spinner_{1, &probing_queue_};
 };
 
 }  // namespace smartmill::stability

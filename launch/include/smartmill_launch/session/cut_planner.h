@@ -87,9 +87,12 @@ class CutPlanner {
   void requireLanes(std::size_t needed, const std::string& purpose) const;
 
   double laneWidth() const;   ///< [m] of a slot with the margin to the next
+  double height() const;      ///< [m] of the stock
   double stripWidth() const;  ///< [m] of a cut of half immersion
   /// [m] width of the stock for lanes and strips, without the margin of the first lane.
   double width() const;
+
+  double feedPerTooth(double speed) const;  ///< [m] at the maximum feed of the axes and a speed [rad/s]
 
   /// @throws Error if the cut does not fit machine or stock.
   PlannedCut slot(const SlotRequest& request) const;

@@ -29,6 +29,8 @@ struct PlanParameters : PathParameters {
 
   double stable_time = 1.0, unstable_time = 0.5;
   double control_time = 0.0;
+  bool hammer = true;
+  int probing_cuts = 5;
   double least_revolutions = 50.0;
 
   double resonance_speed = 1460.84;
@@ -82,6 +84,15 @@ class SessionPlan {
   /// Paths of chosen candidates, in their order. @throws Error if they do not fit the stock.
   std::vector<PlannedCut> place(const std::vector<std::size_t>& chosen);
 
+  /// Without a hammer: number of cuts from which stability is learned, at most probing_cuts and as many as
+  /// the stock has lanes for.
+  std::size_t probingCuts() const { return probing_; }
+  /// [m] largest depth of a probing or recommended cut: the height of the stock.
+  double largestDepth() const { return planner_.height(); }
+  /// @param index below probingCuts() @param feed_per_tooth [m] reduced where the axes are too slow: the
+  /// limit of stability does not depend on it. @throws Error if the cut does not fit machine or stock.
+  PlannedCut probing(std::size_t index, const Point& point, double feed_per_tooth) const;
+
   /// Cuts that verify the chart, each in its own lane. @throws Error if a cut does not fit machine or stock.
   PlannedCut stable(const Point& point, double feed_per_tooth) const;
   PlannedCut unstable(const Point& point, double feed_per_tooth) const;
@@ -100,6 +111,7 @@ class SessionPlan {
 
  private:
   void addCandidates();
+  void countProbingCuts(std::size_t tests);
   void planResonance();
   void planTuning();
   SlotRequest lightSlot(double speed, std::size_t lane) const;
@@ -118,6 +130,7 @@ class SessionPlan {
   std::vector<SlotRequest> requests_;  // of the candidates
   std::vector<bool> placed_;           // of the candidates
   std::size_t verifying_lane_ = 0;     // the first
+  std::size_t probing_ = 0;            // cuts, before the recommended one
   double shift_ = 0.0;                 // [m] of all lanes
   std::optional<PlannedCut> resonance_;
 };

@@ -6,6 +6,7 @@
 
 #include "smartmill_stability/chart/measured_machine.h"
 #include "smartmill_stability/chart/what_if.h"
+#include "smartmill_stability/learning/probing_choice.h"
 
 namespace smartmill::stability {
 
@@ -54,6 +55,11 @@ class ChartMaker {
 
   /// As whatIfChart().
   WhatIfChart whatIf(const WhatIf& request) const { return whatIfChart(cut_, machine_, request); }
+  /// As smartmill::stability::chooseProbingCut(); requires no measurement.
+  ProbingChoice chooseProbingCut(const ProbingRequest& request) const {
+    return stability::chooseProbingCut(cut_, request);
+  }
+  double feedPerTooth() const { return cut_.parameters.feed_per_tooth; }  ///< [m]
 
  private:
   ChartCut cut_;

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <random>
 #include <vector>
@@ -17,6 +18,8 @@ namespace smartmill::stability {
 struct CutRange {
   double speed_low = 0.0, speed_high = 0.0;  ///< [rad/s] 0 < low < high
   double max_depth = 0.0;                    ///< [m] > 0
+  /// [m] Largest depth at a speed [rad/s], for example by the power of the spindle; empty: max_depth.
+  std::function<double(double speed)> depth_limit = nullptr;
 
   void validate() const;  ///< @throws Error naming quantity and value
 };
@@ -89,7 +92,7 @@ class ChartLearning {
   void add(const JudgedCut& cut);
 
   /// The cut with the largest expected gain in removal over the recommended one per risk:
-  /// P(stable) x gain / (risk_offset + P(chatter)).
+  /// P(stable) x gain / (risk_offset + P(chatter)). Depth 0: no cut of the range is left.
   CutProposal next() const;
   /// The cut that removes most among those with at most the accepted risk; empty if there is none within the
   /// range. A cut that was stable, and every less deep one at its speed, has at least 1 - wrong.
@@ -134,6 +137,7 @@ class ChartLearning {
   std::vector<RegenerativeSystem> shown_;
   std::vector<double> speeds_;                    // [rad/s]
   std::vector<double> depths_;                    // [m]
+  std::vector<double> most_;                      // [m] largest depth at each speed
   std::vector<std::vector<double>> probability_;  // [speed][depth] of a stable cut
 };
 

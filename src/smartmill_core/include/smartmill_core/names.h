@@ -81,6 +81,7 @@ constexpr const char* RECOMMEND_CUT = "loadmeter/recommend_cut";
 constexpr const char* FIND_COEFFICIENTS = "loadmeter/find_coefficients";
 constexpr const char* PREDICT_STABILITY = "stability/predict";
 constexpr const char* WHAT_IF = "stability/what_if";
+constexpr const char* CHOOSE_PROBING_CUT = "stability/choose_probing_cut";
 constexpr const char* REPLAY_CONTROL = "replay/control";
 constexpr const char* SET_FAULT = "sim/set_fault";
 
