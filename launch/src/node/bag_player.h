@@ -60,8 +60,8 @@ class BagPlayer {
   std::mutex mutex_;  // guards control_
   Control control_;
   double position_ = 0.0, fast_until_ = 0.0;  // [s] from the start
-  ros::SteadyTime paced_from_;                  // start of the present speed
-  ros::SteadyTime state_time_;                  // last publication of the state
+  ros::SteadyTime paced_from_;                // start of the present speed
+  ros::SteadyTime state_time_;                // last publication of the state
   double paced_position_ = 0.0, paced_speed_ = 0.0;
   ros::Time clock_time_;  // last published
   std::map<std::string, ros::Publisher> publishers_;

@@ -22,7 +22,7 @@ class AxisDriveServer {
   using Server = actionlib::ActionServer<smartmill_msgs::IdentifyAxisDriveAction>;
   struct Waiting {
     Server::GoalHandle handle;
-    double stamp = 0.0;   // [s]
+    double stamp = 0.0;     // [s]
     ros::SteadyTime since;  // of its arrival
   };
 
