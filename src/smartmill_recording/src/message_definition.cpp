@@ -47,7 +47,8 @@ std::map<std::string, std::string> textsOf(const std::string& type, const std::s
 
 class Sums {
  public:
-  explicit Sums(std::map<std::string, std::string> texts) : texts_(std::move(texts)) {}
+  Sums(std::map<std::string, std::string> texts, bool with_constants)
+      : texts_(std::move(texts)), with_constants_(with_constants) {}
 
   /// @return empty: incomplete, or nested deeper than DEEPEST
   std::string of(const std::string& type) {
@@ -76,7 +77,8 @@ class Sums {
       if (sign != std::string::npos) {
         // A string's value is all that follows, '#' too.
         const std::string value = kind == "string" ? line.substr(line.find('=') + 1) : plain.substr(sign + 1);
-        constants += kind + " " + trimmed(plain.substr(gap, sign - gap)) + "=" + trimmed(value) + "\n";
+        if (with_constants_)
+          constants += kind + " " + trimmed(plain.substr(gap, sign - gap)) + "=" + trimmed(value) + "\n";
         continue;
       }
       const std::string name = trimmed(plain.substr(gap));
@@ -101,13 +103,18 @@ class Sums {
   }
 
   std::map<std::string, std::string> texts_, sums_;
+  bool with_constants_;
   int depth_ = 0;
 };
 
 }  // namespace
 
 std::string definitionMd5(const std::string& type, const std::string& definition) {
-  return Sums(textsOf(type, definition)).of(type);
+  return Sums(textsOf(type, definition), true).of(type);
+}
+
+std::string fieldsMd5(const std::string& type, const std::string& definition) {
+  return Sums(textsOf(type, definition), false).of(type);
 }
 
 }  // namespace smartmill

@@ -10,4 +10,8 @@ namespace smartmill {
 /// @return empty: the definition is incomplete
 std::string definitionMd5(const std::string& type, const std::string& definition);
 
+/// The same without constants: equal where messages have the same fields in the same order, and so the same
+/// bytes.
+std::string fieldsMd5(const std::string& type, const std::string& definition);
+
 }  // namespace smartmill

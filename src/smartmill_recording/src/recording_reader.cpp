@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "message_definition.h"
 #include "smartmill_core/error.h"
 
 namespace smartmill {
@@ -29,6 +30,14 @@ bool RecordingReader::has(const std::string& topic) const {
 double RecordingReader::duration() const {
   // A difference of two dates in seconds loses digits.
   return first_ ? 1e-9 * static_cast<double>(last_.time - first_->time) : 0.0;
+}
+
+void RecordingReader::requireFields(const RecordedConnection& connection, const char* type,
+                                    const char* definition) const {
+  const std::string expected = fieldsMd5(type, definition);
+  if (connection.encoding != "ros1" || connection.type != type || expected.empty() ||
+      fieldsMd5(connection.type, connection.definition) != expected)
+    refuse(connection, type);
 }
 
 void RecordingReader::refuse(const RecordedConnection& connection, const char* expected) const {

@@ -230,6 +230,40 @@ TEST_F(Recordings, OfAnotherTypeOrEncodingAreRefused) {
   EXPECT_THROW(createRecording(folder_.file("b.bag"), RecordingCompression::zstd), Error);
 }
 
+// An earlier version of a message lacks a constant; one that lacks a field is refused.
+TEST_F(Recordings, AMessageOfOtherConstantsIsRead) {
+  const std::string definition = plain::ForceBlock::DEFINITION, type = plain::ForceBlock::TYPE;
+  const auto without = [&](const std::string& line) {
+    const std::size_t begin = definition.find(line);
+    return definition.substr(0, begin) + definition.substr(definition.find('\n', begin) + 1);
+  };
+  ForceBlock block;
+  block.sample_rate = 1000.0;
+  block.force = {{{1.0}, {2.0}, {3.0}}};
+  const std::string bytes = writeMessage(toPlain(block));
+  const auto read = [&](const std::string& text) {
+    const std::string path = folder_.file("earlier.bag");
+    const auto writer = createRecording(path, RecordingCompression::none);
+    RecordedConnection connection;
+    connection.topic = names::absolute(names::FORCE_COMPENSATED);
+    connection.type = type;
+    connection.definition = text;
+    connection.md5sum = definitionMd5(type, text);
+    EXPECT_NE(connection.md5sum, plain::ForceBlock::MD5);
+    writer->write(writer->connect(connection), SECOND, reinterpret_cast<const std::uint8_t*>(bytes.data()),
+                  bytes.size());
+    writer->close();
+    RecordingReader reader(path);
+    double found = 0.0;
+    reader.on<ForceBlock>(names::FORCE_COMPENSATED,
+                          [&](const ForceBlock& b, double) { found = b.force[1].at(0); });
+    reader.run();
+    return found;
+  };
+  EXPECT_EQ(read(without("uint8 TRANSIENT=4")), 2.0);
+  EXPECT_THROW(read(without("float64[] fz")), Error);
+}
+
 TEST_F(Recordings, TheFormatIsFoundByTheContent) {
   const std::string path = reference("chunks");
   const std::string renamed = folder_.file("renamed.bag");

@@ -19,6 +19,7 @@ class Recorded<Message, true> {
  public:
   static const char* type() { return Message::TYPE; }
   static const char* md5() { return Message::MD5; }
+  static const char* definition() { return Message::DEFINITION; }
   const Message& decode(const std::uint8_t* data, std::size_t size) {
     readMessage(data, size, message_);
     return message_;
@@ -34,6 +35,7 @@ class Recorded<Data, false> {
  public:
   static const char* type() { return PlainOf<Data>::Type::TYPE; }
   static const char* md5() { return PlainOf<Data>::Type::MD5; }
+  static const char* definition() { return PlainOf<Data>::Type::DEFINITION; }
   const Data& decode(const std::uint8_t* data, std::size_t size) {
     return data_ = fromMsg(message_.decode(data, size));
   }

@@ -28,9 +28,12 @@ class RecordingReader {
     const std::string name = names::absolute(topic);
     // One of each for all messages, so that their vectors' memory is taken once.
     handlers_[name] = [this, name, handler = std::move(handler),
-                       recorded = std::make_shared<Recorded<Data>>()](const Instance& instance) {
-      if (instance.connection.md5sum != Recorded<Data>::md5())
-        refuse(instance.connection, Recorded<Data>::type());
+                       recorded = std::make_shared<Recorded<Data>>(),
+                       accepted = std::string(Recorded<Data>::md5())](const Instance& instance) mutable {
+      if (instance.connection.md5sum != accepted) {
+        requireFields(instance.connection, Recorded<Data>::type(), Recorded<Data>::definition());
+        accepted = instance.connection.md5sum;
+      }
       const Data* data = nullptr;
       try {
         data = &recorded->decode(instance.data, instance.size);
@@ -57,6 +60,8 @@ class RecordingReader {
     std::uint32_t size;
     double time;  // [s]
   };
+  /// Another version of a message may differ in its constants, not in its fields. @throws Error
+  void requireFields(const RecordedConnection& connection, const char* type, const char* definition) const;
   [[noreturn]] void refuse(const RecordedConnection& connection, const char* expected) const;
   [[noreturn]] void refuse(const RecordedConnection& connection, const std::exception& error) const;
 
