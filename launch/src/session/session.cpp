@@ -53,6 +53,11 @@ std::vector<Point> pointsOf(const std::vector<smartmill_msgs::StabilityPoint>& m
   return points;
 }
 
+/// Of the cuts of a session: the others have half immersion.
+bool isSlot(const CuttingCondition& condition) {
+  return condition.engagement.exit - condition.engagement.entry > 0.75 * units::PI;
+}
+
 std::string pointText(const Point& point) {
   return formatted("%.0f rpm %.2f mm (limit %.2f mm)", units::rpmFromRadPerSec(point.spindle_speed),
                    point.axial_depth / units::MM, point.depth_limit / units::MM);
@@ -321,7 +326,7 @@ std::string Session::beginProgress() {
     text = continueProgress(text);
   }
   progress_.subject = subject;
-  kept_.forget();
+  keepProgress();  // in place of an earlier one
   tests_ = plan_.airCuts();
   if (!parameters_.plan.isInformative())
     tests_.insert(tests_.end(), plan_.slots().begin(), plan_.slots().end());
@@ -570,12 +575,10 @@ void Session::runTests(const std::set<std::size_t>& selected) {
   SessionSummary::TestPlan& plan = log_.summary.test_plan;
   for (const std::size_t i : selected) {
     const PlannedCut& test = tests_.at(i);
-    const Engagement& engagement = test.condition.engagement;
     const bool is_cut = test.condition.kind == CuttingCondition::Kind::cut;
-    const bool is_slot = engagement.exit - engagement.entry > 0.75 * units::PI;
-    action((!is_cut   ? "air cut "
-            : is_slot ? "slot test "
-                      : "half immersion test ") +
+    action((!is_cut                  ? "air cut "
+            : isSlot(test.condition) ? "slot test "
+                                     : "half immersion test ") +
                test.condition.name,
            LOADMETER, [&] { return runCut(test); }, is_cut);
     made_.insert(i);
@@ -739,8 +742,7 @@ void Session::judgeSlotTests() {
   SessionSummary::Probing all;
   for (const std::size_t i : made_) {
     const CuttingCondition& condition = tests_[i].condition;
-    const bool is_slot = condition.engagement.exit - condition.engagement.entry > 0.75 * units::PI;
-    if (condition.kind != CuttingCondition::Kind::cut || !is_slot) continue;
+    if (condition.kind != CuttingCondition::Kind::cut || !isSlot(condition)) continue;
     const CutVerdict verdict = verdictOn(condition.name);
     const bool worse = verdict.chattering > all.verdict.chattering;
     if (verdict.kind == CutVerdict::Kind::unknown || (!all.name.empty() && !worse)) continue;
