@@ -21,6 +21,7 @@
 #include <smartmill_msgs/CuttingCoefficients.h>
 #include <smartmill_msgs/CuttingCondition.h>
 #include <smartmill_msgs/IdentifyCoefficientsAction.h>
+#include <smartmill_msgs/NewTool.h>
 #include <smartmill_msgs/NodeHealth.h>
 #include <smartmill_msgs/RunProgramAction.h>
 #include <smartmill_msgs/ToolCondition.h>
@@ -195,7 +196,7 @@ smartmill_msgs::BreakTooth::Response breakTooth(std::uint32_t tooth) {
 }
 
 // Another slot of the same material, with the coefficients of the load meter: the wear of the sharp tool,
-// then the loss of a tooth.
+// then the loss of a tooth, which is no chatter.
 TEST(Program, ALostToothIsReportedWithinTwoRevolutions) {
   constexpr double SPEED = 4000.0, FEED = 0.1 * units::MM, TO = -0.03, Z = -0.161;
   const MachineModel model =
@@ -206,6 +207,12 @@ TEST(Program, ALostToothIsReportedWithinTwoRevolutions) {
       names::TOOL_CONDITION, 1000,
       boost::function<void(const smartmill_msgs::ToolCondition&)>([&](const auto& m) {
         if (m.condition == "slot" || m.broken) reports.push_back(m);
+      }));
+  std::vector<smartmill_msgs::ChatterState> verdicts;
+  const ros::Subscriber on_chatter = nh.subscribe<smartmill_msgs::ChatterState>(
+      names::CHATTER_STATE, 1000,
+      boost::function<void(const smartmill_msgs::ChatterState&)>([&](const auto& m) {
+        if (m.valid && m.condition == "slot") verdicts.push_back(m);
       }));
   smartmill_msgs::ArmMotion arm;
   arm.request.arm = 1;
@@ -258,7 +265,23 @@ TEST(Program, ALostToothIsReportedWithinTwoRevolutions) {
   EXPECT_NEAR(lost_at, 0.0, 1.0);  // the tooth is missed when it comes to the cut again
   ASSERT_TRUE(wait([&] { return client.getState().isDone(); }));
   EXPECT_EQ(client.getResult()->code, smartmill_msgs::RunProgramResult::OK) << client.getResult()->message;
+  int after = 0;
+  for (const smartmill_msgs::ChatterState& verdict : verdicts) {
+    if (verdict.header.stamp < broken.stamp) continue;
+    ++after;
+    EXPECT_FALSE(verdict.chatter) << verdict.frequency << " Hz";
+  }
+  EXPECT_GT(after, 5);
+
   EXPECT_EQ(breakTooth(0).code, smartmill_msgs::BreakTooth::Response::OK);
+  smartmill_msgs::NewTool replaced;
+  ASSERT_TRUE(ros::service::call(names::absolute(names::NEW_TOOL), replaced));
+  EXPECT_NE(replaced.response.message.find("the loss of tooth 3"), std::string::npos) << replaced.response.message;
+  bool whole = false;
+  const ros::Subscriber on_new = nh.subscribe<smartmill_msgs::ToolCondition>(
+      names::TOOL_CONDITION, 10,
+      boost::function<void(const smartmill_msgs::ToolCondition&)>([&](const auto& m) { whole = !m.broken; }));
+  EXPECT_TRUE(wait([&] { return whole; }));
 }
 
 }  // namespace

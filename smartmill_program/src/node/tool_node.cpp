@@ -40,6 +40,7 @@ ToolNode::ToolNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
       monitor_(parameters_.monitor, *model_.tool, parameters_.hold_back,
                [this](const ToolReport& report) { publish(report); }),
       publisher_(nh.advertise<smartmill_msgs::ToolCondition>(names::TOOL_CONDITION, STREAM_QUEUE, true)),
+      new_tool_(nh.advertiseService(names::NEW_TOOL, &ToolNode::newTool, this)),
       hold_(nh.serviceClient<smartmill_msgs::FeedHold>(names::FEED_HOLD)) {
   if (model_.cutting) {
     const CuttingCoefficients& k = *model_.cutting;
@@ -74,6 +75,16 @@ void ToolNode::handle(const CoefficientSet& set) {
   if (from_model_ || pair == coefficients_of_ || !giveTangentialForce(set.value)) return;
   coefficients_of_ = pair;
   monitor_.setCoefficients(set.value, set.std_dev);
+}
+
+bool ToolNode::newTool(smartmill_msgs::NewTool::Request&, smartmill_msgs::NewTool::Response& response) {
+  const std::string tool = last_.tool.empty() ? "" : " " + last_.tool;
+  const std::string lost =
+      last_.loss ? " the loss of tooth " + std::to_string(last_.loss->tooth + 1) + " and" : "";
+  monitor_.newTool(ros::Time::now().toSec());
+  response.message = "new tool" + tool + ":" + lost + " its cuts for the wear are forgotten";
+  ROS_INFO("%s", response.message.c_str());
+  return true;
 }
 
 void ToolNode::publish(const ToolReport& report) {

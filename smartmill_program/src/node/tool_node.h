@@ -7,7 +7,9 @@
 #include <ros/node_handle.h>
 #include <ros/publisher.h>
 #include <ros/service_client.h>
+#include <ros/service_server.h>
 #include <smartmill_msgs/FeedHold.h>
+#include <smartmill_msgs/NewTool.h>
 
 #include "node/tool_parameters.h"
 #include "smartmill_core/cutting/coefficient_set.h"
@@ -17,7 +19,7 @@
 namespace smartmill::program {
 
 /// ToolMonitor in ROS: force, spindle/angle, cnc/state, cut/condition and material/coefficients in,
-/// tool/condition out. With hold_on_breakage a lost tooth requests a feed hold.
+/// tool/condition out; service tool/new_tool. With hold_on_breakage a lost tooth requests a feed hold.
 class ToolNode {
  public:
   using Parameters = ToolNodeParameters;
@@ -27,6 +29,7 @@ class ToolNode {
  private:
   void listen();
   void handle(const CoefficientSet& coefficients);
+  bool newTool(smartmill_msgs::NewTool::Request& request, smartmill_msgs::NewTool::Response& response);
   void publish(const ToolReport& report);
   void requestHold();
   void readAnswer();
@@ -38,6 +41,7 @@ class ToolNode {
   NodeShell shell_;
   ToolMonitor monitor_;
   ros::Publisher publisher_;
+  ros::ServiceServer new_tool_;
   ros::ServiceClient hold_;
   std::future<smartmill_msgs::FeedHold::Response> answer_;
   std::string answered_, coefficients_of_;

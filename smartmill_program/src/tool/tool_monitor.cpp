@@ -57,6 +57,13 @@ void ToolMonitor::push(const SampleBlock& block) {
   push(force);
 }
 
+void ToolMonitor::newTool(double stamp) {
+  gap();
+  loss_.reset();
+  wear_.forget();
+  report(stamp, false, {});
+}
+
 void ToolMonitor::restart() {
   gap();
   angle_.reset();

@@ -149,6 +149,12 @@ std::optional<CutWear> WearEstimate::present() const {
   return wear;
 }
 
+void WearEstimate::forget() {
+  cuts_.clear();
+  condition_.reset();
+  count_ = 0;
+}
+
 std::optional<CutWear> WearEstimate::end() {
   const std::optional<CutWear> wear = present();
   if (wear && wear->wear > -1.0) {

@@ -101,6 +101,21 @@ TEST(ToolMonitor, ReportsALossWithoutACondition) {
   EXPECT_FALSE(rig.reports[0].wear);
 }
 
+TEST(ToolMonitor, ANewToolHasAllItsTeeth) {
+  Rig rig;
+  const CuttingTeeth teeth = broken(1.003), whole;
+  rig.run(0.0, 1.5, [&](double t, double a) { return teeth.at(t, a); });
+  ASSERT_EQ(rig.reports.size(), 1u);
+  rig.monitor.newTool(1.6);
+  ASSERT_EQ(rig.reports.size(), 2u);
+  EXPECT_FALSE(rig.reports[1].loss);
+  EXPECT_FALSE(rig.monitor.loss());
+  EXPECT_EQ(rig.reports[1].stamp, 1.6);
+  rig.run(1.7, 2.5, [&](double t, double a) { return whole.at(t, a); });
+  rig.monitor.flush();
+  EXPECT_EQ(rig.reports.size(), 2u);
+}
+
 TEST(ToolMonitor, ReportsNothingWithoutAngleForceOrAtLostSamples) {
   const CuttingTeeth teeth = broken(1.003);
   const auto force = [&](double t, double a) { return teeth.at(t, a); };

@@ -70,6 +70,10 @@ class ToolMonitor {
   void push(const ForceBlock& block);
   /// Channels fx and fy. @throws Error when one is missing.
   void push(const SampleBlock& block);
+  /// The tool has been replaced by a new one of the same name: clears the loss and the cuts for the wear, and
+  /// reports.
+  /// @param stamp [s] of the report
+  void newTool(double stamp);
   void flush() { sorter_.flush(); }  ///< at the end of the data
 
   /// The name of the stream that delays the others; empty: none.

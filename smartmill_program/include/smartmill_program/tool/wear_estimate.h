@@ -78,6 +78,8 @@ class WearEstimate {
   void add(double time, std::complex<double> force);
   /// The present cut up to now; empty: no expectation or less than three revolutions.
   std::optional<CutWear> present() const;
+  /// A new tool of the same name: the cuts so far, the present one included, are not its own.
+  void forget();
   /// Ends the cut. @return as present()
   std::optional<CutWear> end();
 

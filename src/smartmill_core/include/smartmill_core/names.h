@@ -83,6 +83,7 @@ constexpr const char* PREDICT_STABILITY = "stability/predict";
 constexpr const char* WHAT_IF = "stability/what_if";
 constexpr const char* CHOOSE_PROBING_CUT = "stability/choose_probing_cut";
 constexpr const char* REPLAY_CONTROL = "replay/control";
+constexpr const char* NEW_TOOL = "tool/new_tool";
 constexpr const char* SET_FAULT = "sim/set_fault";
 
 /// Ends the source of coefficients that were combined with those of the database.

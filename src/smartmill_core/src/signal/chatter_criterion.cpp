@@ -193,7 +193,9 @@ ChatterEvidence ChatterCriterion::judge(const RevolutionWindow& window, double p
   const double kept = 1.0 - 1.0 / static_cast<double>(window.turns());
   evidence.synchronous = std::max(0.0, window.total() - kept * window.remainder());
   evidence.alternation = total > 0.0 ? std::min(1.0, window.alternating() / total) : 0.0;
-  evidence.flip = evidence.alternation > options_.alternation_ratio && window.alternating() > remainder;
+  // In a flip every second tooth cuts alike; a lost tooth or runout has its energy mostly at other orders.
+  evidence.flip = evidence.alternation > options_.alternation_ratio && window.alternating() > remainder &&
+                  window.alternating() > window.unequal();
   const double energy = evidence.flip ? remainder + window.alternating() : remainder;
   evidence.energy_ratio = total > 0.0 ? std::min(1.0, energy / total) : 0.0;
   evidence.severity = std::sqrt(energy);

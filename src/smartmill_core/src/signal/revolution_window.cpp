@@ -68,8 +68,11 @@ void RevolutionWindow::addOrders(const std::vector<double>& repeated) {
   const auto orders = fourier(repeated);
   for (std::size_t k = 1; 2 * k < bins_; ++k)
     of_order_[k] += 2.0 * std::norm(orders[k]) / std::pow(static_cast<double>(bins_), 2);
-  alternating_ = 0.0;
-  for (std::size_t k = half_; half_ > 0 && 2 * k < bins_; k += 2 * half_) alternating_ += of_order_[k];
+  alternating_ = unequal_ = 0.0;
+  for (std::size_t k = 1; half_ > 0 && 2 * k < bins_; ++k) {
+    if (k % half_ != 0) unequal_ += of_order_[k];
+    if (k % (2 * half_) == half_) alternating_ += of_order_[k];
+  }
 }
 
 }  // namespace smartmill

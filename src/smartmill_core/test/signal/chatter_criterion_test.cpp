@@ -111,6 +111,27 @@ TEST(ChatterCriterion, aFlipAlternatesFromToothToTooth) {
   EXPECT_FALSE(judge(flip, never).chatter);
 }
 
+// The radial force sin(phi) of the teeth in half immersion, with and without one of them.
+TEST(ChatterCriterion, aLostToothIsNoFlip) {
+  for (const int teeth : {4, 6}) {
+    for (const bool lost : {false, true}) {
+      RevolutionWindow window(BINS, TURNS, teeth);
+      std::vector<double> force(BINS * TURNS, 0.0);
+      for (std::size_t i = 0; i < force.size(); ++i) {
+        for (int tooth = lost ? 1 : 0; tooth < teeth; ++tooth) {
+          const double turn = static_cast<double>(i % BINS) / BINS + static_cast<double>(tooth) / teeth;
+          const double immersion = units::TWO_PI * (turn - std::floor(turn));
+          if (immersion < units::PI / 2.0) force[i] += std::sin(immersion);
+        }
+      }
+      window.add(force);
+      const ChatterEvidence evidence = ChatterCriterion({}).judge(window, PERIOD);
+      EXPECT_FALSE(evidence.chatter) << teeth << " teeth";
+      if (lost) EXPECT_GT(evidence.alternation, 0.05) << teeth << " teeth";
+    }
+  }
+}
+
 TEST(ChatterCriterion, linesOfTheBackgroundAreNoChatter) {
   const ChatterCriterion criterion({});
   const RevolutionWindow cut = window(with({{10.37, 8.0}, {6.37, 2.0}}), 1.0);

@@ -95,7 +95,8 @@ struct ChatterEvidence {
 /// - near a mode with one of its lines, where the modes are known;
 /// - strong compared with the forced vibration.
 /// A flip (period doubling) of a tool with an even number of teeth repeats every revolution, as runout does,
-/// and is distinguished by its size alone.
+/// and is distinguished by its size, and from a lost tooth by its orders: in a flip every second tooth cuts
+/// alike. A tool with two teeth has the same orders in both cases; a lost tooth is then reported as chatter.
 class ChatterCriterion {
  public:
   explicit ChatterCriterion(const ChatterCriterionOptions& options) : options_(options) {}

@@ -33,6 +33,10 @@ class RevolutionWindow {
   /// Mean square of the synchronous part at the orders of a flip: odd multiples of half the number of teeth;
   /// 0 for an odd number of teeth.
   double alternating() const { return alternating_; }
+  /// And at the orders that are no multiple of half the number of teeth: teeth that differ from each other, by
+  /// runout, uneven pitch or a lost tooth. 0 for two teeth, whose orders are all multiples, and for an odd
+  /// number.
+  double unequal() const { return unequal_; }
   double strongestFlipOrder() const;  ///< [1/revolution]
   /// Mean square of the synchronous part at each order from 0; that of order 0 is not defined.
   const std::vector<double>& ofOrder() const { return of_order_; }
@@ -42,7 +46,7 @@ class RevolutionWindow {
 
   std::size_t bins_, turns_, half_;
   int teeth_;
-  double total_ = 0.0, remainder_ = 0.0, alternating_ = 0.0;
+  double total_ = 0.0, remainder_ = 0.0, alternating_ = 0.0, unequal_ = 0.0;
   std::vector<double> remainder_of_turn_, taper_, of_order_, power_;
 };
 
