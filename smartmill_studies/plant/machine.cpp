@@ -180,7 +180,14 @@ class TestRun {
     const double before = 10.0 * units::TWO_PI / test_.spindle_speed;
     came_ = before * feed_;
     for (double t = engage_ - before; t < engage_ - 0.5 * step_; t += step_)
-      cutting_->step(turning_.angle(t), {feed_ * (t - engage_) + came_, 0.0}, {}, 0.0, 0.0, 0.0);
+      cutting_->step(angle(t) + test_.feed_direction, {feed_ * (t - engage_) + came_, 0.0}, {}, 0.0, 0.0,
+                     0.0);
+  }
+
+  // Between the axes of the machine and those of the cut, whose x is along the feed.
+  Point turned(const Point& p, double by) const {
+    const double c = std::cos(by), s = std::sin(by);
+    return {c * p.x - s * p.y, s * p.x + c * p.y};
   }
 
   void step(double t) {
@@ -188,8 +195,14 @@ class TestRun {
     if (cutting_ && t >= engage_ - 0.5 * step_) {
       const Point at = tip_.next();
       const double fed = feed_ * (t - engage_);
-      chip = cutting_->step(angle(t), {came_ + fed + at.x, at.y}, tip_.nextRate(),
-                            turning_.unsteadiness(angle(t)), t - engage_, fed);
+      const double direction = test_.feed_direction;
+      const Point moved = turned(at, -direction);
+      chip = cutting_->step(angle(t) + direction, {came_ + fed + moved.x, moved.y},
+                            turned(tip_.nextRate(), -direction), turning_.unsteadiness(angle(t)), t - engage_,
+                            fed);
+      const Point force = turned({chip.force[0], chip.force[1]}, direction);
+      chip.force[0] = force.x;
+      chip.force[1] = force.y;
     }
     tip_.step(chip.force);
     std::array<double, 3> force =

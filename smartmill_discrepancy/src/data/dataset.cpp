@@ -312,9 +312,13 @@ void chooseHeldout(std::vector<TestData>& tests) {
   }
   // Conditions of a cut. A test alone at the end of a range is not held out.
   const auto conditions = [](const TestData& t) {
-    return std::vector<double>{t.test.spindle_speed,           t.test.engagement->feed_per_tooth,
-                               t.test.engagement->axial_depth, t.test.engagement->entry,
-                               t.test.engagement->exit,        t.test.cut_time_before.value_or(0.0)};
+    return std::vector<double>{t.test.spindle_speed,
+                               t.test.engagement->feed_per_tooth,
+                               t.test.engagement->axial_depth,
+                               t.test.engagement->entry,
+                               t.test.engagement->exit,
+                               t.test.feed_direction,
+                               t.test.cut_time_before.value_or(0.0)};
   };
   std::vector<TestData*> inside;
   for (TestData* t : cuts) {

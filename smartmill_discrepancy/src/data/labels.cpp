@@ -158,6 +158,7 @@ Foreign bestForeignLabel(const Dataset& data, const MachineModel& model, const s
     if (other.test.kind != TestKind::cut || other.test.name == t.test.name) continue;
     CampaignTest test = t.test;
     test.engagement = other.test.engagement;
+    test.feed_direction = other.test.feed_direction;
     const double gap = forceSquares(t, sim::simulateTest(model, test, t.record, coarseSimulation())) /
                        static_cast<double>(t.record.size());
     if (gap < best.gap) best = {gap, gaps[k], other.test.name};

@@ -39,7 +39,8 @@ bool alike(double a, double b) {
 bool sameButFeed(const CampaignTest& a, const CampaignTest& b) {
   return alike(a.spindle_speed, b.spindle_speed) &&
          alike(a.engagement->axial_depth, b.engagement->axial_depth) &&
-         a.engagement->entry == b.engagement->entry && a.engagement->exit == b.engagement->exit;
+         a.engagement->entry == b.engagement->entry && a.engagement->exit == b.engagement->exit &&
+         a.feed_direction == b.feed_direction;
 }
 
 // By force channel, without the curvature. Entry and the initial transient of the sensor are omitted.

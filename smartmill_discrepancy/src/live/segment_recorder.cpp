@@ -13,12 +13,12 @@
 namespace smartmill::discrepancy {
 namespace {
 
-/// The forces of a campaign's cut are those of a feed along +x of the machine.
-bool feedsAlongX(const CuttingCondition& condition) {
-  constexpr double STRAIGHT = 1e-3;  // [1]
+/// Whether the feed of a cut is in the plane of the table; on a ramp the end face cuts as well.
+bool isLevel(const CuttingCondition& condition) {
+  constexpr double LEVEL = 1e-3;  // [1]
   const auto& from = condition.steady_from;
   const auto& to = condition.steady_to;
-  return std::hypot(to[1] - from[1], to[2] - from[2]) <= STRAIGHT * (to[0] - from[0]);
+  return std::abs(to[2] - from[2]) <= LEVEL * std::hypot(to[0] - from[0], to[1] - from[1]);
 }
 
 }  // namespace
@@ -57,7 +57,7 @@ void SegmentRecorder::handle(const CncState& state) {
   if (!condition_ || condition_->kind == CuttingCondition::Kind::none) return;
   const bool cut = condition_->kind == CuttingCondition::Kind::cut;
   const bool path =
-      !cut || (feedsAlongX(*condition_) && onSteadyPath(*condition_, state, parameters_.path_tolerance));
+      !cut || (isLevel(*condition_) && onSteadyPath(*condition_, state, parameters_.path_tolerance));
   const bool steady = path && std::abs(state.spindle_speed / condition_->spindle_speed - 1.0) < limits_.speed;
   if (steady && !steady_since_) steady_since_ = state.stamp;
   if (!steady && steady_since_) {
@@ -161,6 +161,7 @@ CampaignTest SegmentRecorder::testOf(double begin, double speed) const {
   test.start_time = begin - *first_;
   if (test.kind == TestKind::cut) {
     test.engagement = condition_->engagement;
+    test.feed_direction = headingOf(*condition_);
     test.cut_time_before = cut_time_ + *test.running_before;
   }
   return test;

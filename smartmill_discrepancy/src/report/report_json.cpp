@@ -63,6 +63,7 @@ Json cutOf(const CampaignTest& test) {
   cut["axial_depth_mm"] = rounded(e.axial_depth / units::MM);
   cut["entry_deg"] = rounded(units::degFromRad(e.entry));
   cut["exit_deg"] = rounded(units::degFromRad(e.exit));
+  if (test.feed_direction != 0.0) cut["feed_direction_deg"] = rounded(units::degFromRad(test.feed_direction));
   return cut;
 }
 

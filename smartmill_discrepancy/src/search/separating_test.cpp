@@ -37,6 +37,13 @@ double separation(const Dataset& data, const CampaignTest& test, const MachineMo
   return count ? std::sqrt(squares / static_cast<double>(count)) : 0.0;
 }
 
+/// ", feed at 90 deg from +x"; empty: along +x.
+std::string feedText(const CampaignTest& test) {
+  return test.feed_direction == 0.0
+             ? ""
+             : formatted(", feed at %.0f deg from +x", units::degFromRad(test.feed_direction));
+}
+
 }  // namespace
 
 std::optional<SeparatingTest> separatingTest(const Dataset& data, const MachineModel& a,
@@ -65,11 +72,12 @@ std::optional<SeparatingTest> separatingTest(const Dataset& data, const MachineM
           best = SeparatingTest{"", test, value};
           if (test.engagement) {
             best->text = formatted(
-                "a cut at %.0f rpm, %.3g mm per tooth, %.3g mm deep, from %.0f to %.0f deg: the predictions "
+                "a cut at %.0f rpm, %.3g mm per tooth, %.3g mm deep, from %.0f to %.0f deg%s: the "
+                "predictions "
                 "differ by %.2g times the noise",
                 units::rpmFromRadPerSec(test.spindle_speed), test.engagement->feed_per_tooth * 1e3,
                 test.engagement->axial_depth * 1e3, units::degFromRad(test.engagement->entry),
-                units::degFromRad(test.engagement->exit), value);
+                units::degFromRad(test.engagement->exit), feedText(test).c_str(), value);
           } else {
             best->text = formatted("an air cut at %.0f rpm: the predictions differ by %.2g times the noise",
                                    units::rpmFromRadPerSec(test.spindle_speed), value);

@@ -1,5 +1,6 @@
 #include "smartmill_discrepancy/live/segment_recorder.h"
 
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -21,10 +22,10 @@ struct Machine {
   double begin = 100.0;          // [s] stamp of the start
   double settle = 0.0;           // [s]
   ComparedForce compared = ComparedForce::measured;
-  double settling_at = -1.0;  // [s] time of a block in which the compensation settles
-  double stops = 1e300;       // [s] the controller's position leaves the path from here on
-  double acceleration = 0.0;  // [rad/s2] of the spindle
-  bool backwards = false;     // the feed is along -x
+  double settling_at = -1.0;                   // [s] time of a block in which the compensation settles
+  double stops = 1e300;                        // [s] the controller's position leaves the path from here on
+  double acceleration = 0.0;                   // [rad/s2] of the spindle
+  std::array<double, 3> way{{1.0, 0.0, 0.0}};  // direction of the feed
 };
 
 /// A second of straight cutting through the recorder; fx counts samples.
@@ -42,7 +43,7 @@ std::vector<RecordSegment> run(const Machine& machine, double length = 0.3) {
   condition.spindle_speed = SPEED;
   condition.engagement.feed_per_tooth = 1e-4;
   condition.engagement.axial_depth = 1e-3;
-  condition.steady_to = {{machine.backwards ? -0.1 : 0.1, 0.0, 0.0}};
+  for (std::size_t a = 0; a < 3; ++a) condition.steady_to[a] = 0.1 * machine.way[a];
   recorder.push(condition);
   for (int k = 0; k < 100; ++k) {  // 10 ms each
     const double t = 0.01 * k, stamp = machine.begin + t;
@@ -50,8 +51,9 @@ std::vector<RecordSegment> run(const Machine& machine, double length = 0.3) {
       CncState state;
       state.stamp = stamp;
       state.axes = {"X", "Y", "Z"};
-      state.position = {(machine.backwards ? -FEED : FEED) * (t - machine.started_cutting),
-                        machine.feed_offset, 0.0};
+      const double along = FEED * (t - machine.started_cutting);
+      state.position = {along * machine.way[0], along * machine.way[1] + machine.feed_offset,
+                        along * machine.way[2]};
       if (t > machine.stops) state.position[2] = 0.01;
       state.spindle_speed = machine.actual_speed;
       recorder.push(state);
@@ -115,9 +117,13 @@ TEST(SegmentRecorder, CutsSteadyCuttingIntoEqualSegments) {
   }
 }
 
-TEST(SegmentRecorder, LeavesOutCutsOfAnotherFeedDirection) {
+TEST(SegmentRecorder, StatesTheDirectionOfTheFeedAndLeavesOutRamps) {
   Machine machine;
-  machine.backwards = true;
+  machine.way = {-0.6, 0.8, 0.0};
+  const std::vector<RecordSegment> segments = run(machine);
+  ASSERT_EQ(segments.size(), 3U);
+  EXPECT_NEAR(segments[0].test.feed_direction, std::atan2(0.8, -0.6), 1e-9);
+  machine.way = {0.8, 0.0, -0.6};
   EXPECT_TRUE(run(machine).empty());
 }
 

@@ -4,15 +4,9 @@
 #include <cmath>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/signal/steady_path.h"
 
 namespace smartmill::loadmeter {
-
-double headingOf(const CuttingCondition& condition) {
-  const auto& from = condition.steady_from;
-  const auto& to = condition.steady_to;
-  const std::size_t across = condition.tool.teeth == 0 ? 2 : 1;
-  return std::atan2(to[across] - from[across], to[0] - from[0]);
-}
 
 CutForces::CutForces(const MotorParameters& motor, const ForceEstimateParameters& force,
                      const std::optional<MachineAxes>& axes)

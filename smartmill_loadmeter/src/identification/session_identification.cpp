@@ -8,6 +8,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/names.h"
+#include "smartmill_core/signal/steady_path.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/database/knowledge.h"
 #include "smartmill_loadmeter/identification/cut_forces.h"

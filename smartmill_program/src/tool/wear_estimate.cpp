@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "smartmill_core/cutting/mechanistic.h"
+#include "smartmill_core/signal/steady_path.h"
 
 namespace smartmill::program {
 namespace {
@@ -23,9 +24,7 @@ std::array<double, 6> listOf(const CuttingCoefficients& k) {
 
 /// Direction of the feed in the machine; +x where it is not stated.
 Complex feedOf(const CuttingCondition& condition) {
-  const Complex way(condition.steady_to[0] - condition.steady_from[0],
-                    condition.steady_to[1] - condition.steady_from[1]);
-  return std::abs(way) > 0.0 ? way / std::abs(way) : Complex(1.0, 0.0);
+  return std::polar(1.0, headingOf(condition));
 }
 
 }  // namespace

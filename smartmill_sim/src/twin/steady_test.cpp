@@ -1,5 +1,8 @@
 #include "twin/steady_test.h"
 
+#include <cmath>
+
+#include "smartmill_core/cutting/contact_arc.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::sim {
@@ -27,16 +30,19 @@ SteadyTest::SteadyTest(const MachineModel& model, const CampaignTest& test, doub
       start_(test.engage_time.value_or(begin - 1.0) - 1e-3 / test.sample_rate) {
   if (!cut()) return;
   model.needCutting("simulate a cut");
-  feed_ = test.engagement->feed_per_tooth * model.needTool("simulate a cut").teeth * test.spindle_speed /
-          units::TWO_PI;
+  const double feed = test.engagement->feed_per_tooth * model.needTool("simulate a cut").teeth *
+                      test.spindle_speed / units::TWO_PI;
+  feed_ = {feed * std::cos(test.feed_direction), feed * std::sin(test.feed_direction)};
 }
 
 void SteadyTest::inputAt(double t, CuttingMachine::Input& input) const {
   const double turn = test_.spindle_speed * (t - begin_);
   input.motion.angle = phase_ + (variation_ ? variation_->angle(turn) : turn);
   input.motion.speed = test_.spindle_speed * (variation_ ? variation_->speed(turn) : 1.0);
-  input.motion.velocity[0] = feed_;
-  input.motion.centre[0] = feed_ * (t - begin_);
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    input.motion.velocity[axis] = feed_[axis];
+    input.motion.centre[axis] = feed_[axis] * (t - begin_);
+  }
 }
 
 void SteadyTest::next(double t, CuttingMachine::Input& input) {
@@ -63,11 +69,15 @@ void SteadyTest::leadIn() {
     }
     machine_.step(input, out);
   }
-  if (engaged_) machine_.setDepth(test_.engagement->axial_depth, feed_ * (*test_.running_before - time));
+  if (engaged_)
+    machine_.setDepth(test_.engagement->axial_depth,
+                      std::hypot(feed_[0], feed_[1]) * (*test_.running_before - time));
 }
 
 void SteadyTest::engage(const ToolMotion& now, double depth) {
-  machine_.engage({{test_.engagement->entry, test_.engagement->exit, depth}}, now, rise_ * substeps_);
+  Engagement engagement = *test_.engagement;
+  engagement.axial_depth = depth;
+  machine_.engage(contactArcs(engagement, test_.feed_direction), now, rise_ * substeps_);
   engaged_ = true;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <optional>
 
 #include "smartmill_core/campaign/campaign.h"
@@ -33,8 +34,8 @@ class SteadyTest {
   std::optional<SpeedVariation> variation_;
   double rise_;  // [samples]
   CuttingMachine& machine_;
-  double start_;       // [s] begin of the cut
-  double feed_ = 0.0;  // [m/s]
+  double start_;                        // [s] begin of the cut
+  std::array<double, 2> feed_{{0, 0}};  // [m/s] x, y
   bool engaged_ = false;
 };
 

@@ -320,6 +320,47 @@ TEST(Machine, LeavesTheSurfaceOfTheTeethsPath) {
   }
 }
 
+// A tool whose modes differ in x and y, so that the direction of the feed matters. The plant turns its axes,
+// the twin its arcs.
+TEST(Machine, FeedsInAnyDirectionAsTheTwinDoes) {
+  MachineModel model;
+  model.tool = rigidPlant().tool;
+  model.cutting = rigidPlant().cutting;
+  model.tool_tip.x.modes = {{1100.0, 0.03, 1.0 / 25e6}};
+  model.tool_tip.y.modes = {{900.0, 0.04, 1.0 / 40e6}};
+  model.effects = {effectEntry("empirical:tooth_path", {{"share", 1.0}})};
+  std::mt19937_64 random(1);
+  RunOptions o;
+  o.noise = false;
+  o.steps = 8;
+  o.show_tip = true;
+  o.slice = 0.02e-3;
+  for (const double direction : {120.0, -75.0}) {
+    CampaignTest test = slot(3000.0, 0.1e-3, 1e-3);
+    test.engagement->exit = 0.5 * units::PI;  // up-milling
+    test.feed_direction = units::radFromDeg(direction);
+    const Record machine = run(plantOf(model), test, o, random);
+    const auto difference = [&](const CampaignTest& simulated, const char* name) {
+      sim::SimulationOptions options;
+      options.noise = false;
+      options.substeps = 8;
+      const Record twin = sim::simulateTest(model, simulated, machine, options);
+      double squares = 0.0, size = 0.0;
+      for (std::size_t i = twin.size() / 2; i < twin.size(); ++i) {
+        squares += std::pow(twin.column(name)[i] - machine.column(name)[i], 2);
+        size += std::pow(machine.column(name)[i], 2);
+      }
+      return std::sqrt(squares / size);
+    };
+    CampaignTest along_x = test;
+    along_x.feed_direction = 0.0;
+    for (const char* name : {"fx", "fy", "tool_x", "tool_y"}) {
+      EXPECT_LT(difference(test, name), 0.01) << name << " " << direction;
+      EXPECT_GT(difference(along_x, name), 0.5) << name << " " << direction;
+    }
+  }
+}
+
 // The plant has its acceleration in closed form, the twin derives it from the recorded position.
 TEST(Machine, MovesAMassAsTheTwinDoes) {
   MachineModel model;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "smartmill_core/cutting/contact_arc.h"
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/modal/modal_filter.h"
 #include "smartmill_core/model/effect_catalogue.h"
@@ -84,11 +85,13 @@ ModeProbes::ModeProbes(const TwinRunner& runner, const MachineModel& model, std:
   applied_ = runner.simulate(ideal);
   for (const std::size_t t : runner.tests()) {
     const CampaignTest& test = runner.data().tests[t].test;
-    if (test.kind == TestKind::cut) stiffness_[t] = cuttingStiffness(*test.engagement);
+    if (test.kind == TestKind::cut) stiffness_[t] = cuttingStiffness(test);
   }
 }
 
-std::vector<ModeProbes::Stiffness> ModeProbes::cuttingStiffness(const Engagement& engagement) const {
+std::vector<ModeProbes::Stiffness> ModeProbes::cuttingStiffness(const CampaignTest& test) const {
+  const Engagement& engagement = *test.engagement;
+  const std::vector<ContactArc> arcs = contactArcs(engagement, test.feed_direction);
   const ToolGeometry& tool = *model_.tool;
   const CuttingCoefficients& k = *model_.cutting;
   const double dz = engagement.axial_depth / LIMITS.slices;
@@ -101,7 +104,9 @@ std::vector<ModeProbes::Stiffness> ModeProbes::cuttingStiffness(const Engagement
             units::TWO_PI * static_cast<double>(p) / static_cast<double>(points) + tool.toothAngle(j);
         double phi = std::fmod(tip - tool.lag() * (s + 0.5) * dz, units::TWO_PI);
         if (phi < 0.0) phi += units::TWO_PI;
-        if (phi < engagement.entry || phi >= engagement.exit) continue;
+        if (std::none_of(arcs.begin(), arcs.end(),
+                         [&](const ContactArc& arc) { return phi >= arc.entry && phi < arc.exit; }))
+          continue;
         const double sn = std::sin(phi), cs = std::cos(phi);
         const CuttingForce f = toolForce(k.ktc * dz, k.krc * dz, k.kac * dz, phi, tool.radius());
         const std::array<double, 3> force{{f.fx, f.fy, f.fz}};

@@ -48,7 +48,7 @@ class ModeProbes {
   // Force per m of outward motion of the tool along x and y over a revolution: rows fx fy fz, columns x y
   // [N/m].
   using Stiffness = std::array<std::array<double, 2>, 3>;
-  std::vector<Stiffness> cuttingStiffness(const Engagement& engagement) const;
+  std::vector<Stiffness> cuttingStiffness(const CampaignTest& test) const;
   std::map<std::size_t, std::vector<Stiffness>> stiffness_;  // by cut of the runner
   std::vector<double> applied_;  // force on the sensor over noise, in the layout of the runner's vectors
 };

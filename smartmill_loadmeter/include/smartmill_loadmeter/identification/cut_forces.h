@@ -14,10 +14,6 @@
 
 namespace smartmill::loadmeter {
 
-/// Direction of a test's feed [rad] in the X-Y plane from +X towards +Y; of a turning cut (no teeth) in the
-/// X-Z plane, from +X towards +Z.
-double headingOf(const CuttingCondition& condition);
-
 /// Force of each cut: by calibrated motors, and by all measurements together.
 class CutForces {
  public:

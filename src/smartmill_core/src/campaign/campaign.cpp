@@ -105,6 +105,8 @@ CampaignTest readTest(const StrictYaml& map) {
     e.entry = units::radFromDeg(entry);
     e.exit = units::radFromDeg(exit);
     test.engagement = e;
+    test.feed_direction = units::radFromDeg(
+        map.optionalNumber("feed_direction_deg", Range::closed(-360.0, 360.0)).value_or(0.0));
     test.engage_time = map.optionalNumber("engage_time_s", NOT_NEGATIVE);
   }
   if (turns) {
@@ -192,6 +194,7 @@ void writeCampaign(const Campaign& campaign, const std::string& folder) {
       number("axial_depth_mm", test.engagement->axial_depth / units::MM);
       number("entry_deg", units::degFromRad(test.engagement->entry));
       number("exit_deg", units::degFromRad(test.engagement->exit));
+      if (test.feed_direction != 0.0) number("feed_direction_deg", units::degFromRad(test.feed_direction));
     }
     if (test.engage_time) number("engage_time_s", *test.engage_time);
     if (test.running_before) number("running_before_s", *test.running_before);

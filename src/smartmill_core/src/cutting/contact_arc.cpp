@@ -12,4 +12,13 @@ void validate(const ContactArc& arc) {
                 arc.entry, arc.exit, arc.depth));
 }
 
+std::vector<ContactArc> contactArcs(const Engagement& engagement, double feed_direction) {
+  const double depth = engagement.axial_depth;
+  // Immersion angles are counted clockwise, the direction of the feed counter-clockwise.
+  const double entry = wrapped(engagement.entry - feed_direction);
+  const double exit = engagement.exit + (entry - engagement.entry);
+  if (exit <= units::TWO_PI) return {{entry, exit, depth}};
+  return {{entry, units::TWO_PI, depth}, {0.0, exit - units::TWO_PI, depth}};
+}
+
 }  // namespace smartmill

@@ -1,5 +1,6 @@
 #include "smartmill_core/signal/steady_path.h"
 
+#include <cmath>
 #include <cstddef>
 #include <optional>
 
@@ -20,6 +21,13 @@ bool onSteadyPath(const CuttingCondition& condition, const CncState& state, doub
   }
   if (!(length2 > 0.0) || along < 0.0 || along > length2) return false;
   return distance2 - along * along / length2 <= tolerance * tolerance;
+}
+
+double headingOf(const CuttingCondition& condition) {
+  const auto& from = condition.steady_from;
+  const auto& to = condition.steady_to;
+  const std::size_t across = condition.tool.teeth == 0 ? 2 : 1;
+  return std::atan2(to[across] - from[across], to[0] - from[0]);
 }
 
 }  // namespace smartmill

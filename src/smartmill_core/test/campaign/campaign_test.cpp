@@ -38,6 +38,7 @@ tests:
   axial_depth_mm: 2.0
   entry_deg: 0.0
   exit_deg: 180.0
+  feed_direction_deg: -90
   engage_time_s: 0.02
   start_time_s: 405.0
   cut_time_before_s: 20.0
@@ -53,6 +54,7 @@ void expectCampaign(const Campaign& c, const std::string& folder) {
   EXPECT_DOUBLE_EQ(c.tests[0].spindle_speed, 150.0 * units::PI);
   EXPECT_DOUBLE_EQ(c.tests[0].engagement->feed_per_tooth, 6e-5);
   EXPECT_DOUBLE_EQ(c.tests[0].engagement->exit, units::PI);
+  EXPECT_DOUBLE_EQ(c.tests[0].feed_direction, -0.5 * units::PI);
   EXPECT_DOUBLE_EQ(*c.tests[0].engage_time, 0.02);
   EXPECT_EQ(c.tests[1].kind, TestKind::air);
   EXPECT_FALSE(c.tests[1].start_time);
@@ -181,6 +183,8 @@ TEST(Campaign, errorsNameFileKeyAndValue) {
       {"exit_deg: 180.0", "exit_deg: 361", "tests[0].exit_deg: 361 is out of range (0 <= value <= 360)"},
       {"  axial_depth_mm: 2.0\n", "", "tests[0].axial_depth_mm: is missing"},
       {"sample_rate_hz: 100", "sample_rate_hz: fast", "tests[0].sample_rate_hz: 'fast' is not a number"},
+      {"feed_direction_deg: -90", "feed_direction_deg: 400",
+       "tests[0].feed_direction_deg: 400 is out of range (-360 <= value <= 360)"},
       {"direction: z", "direction: u", "tests[2].direction: 'u' is not one of x | y | z"},
       {"  engage_time_s: 0.02\n", "  engage_time_s: 0.02\n  running_before_s: 0.3\n",
        "tests[0].running_before_s: 0.3 contradicts engage_time_s"},

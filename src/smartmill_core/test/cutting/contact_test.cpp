@@ -1,16 +1,44 @@
 #include "smartmill_core/cutting/contact.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "smartmill_core/cutting/contact_arc.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill {
 namespace {
+
+// A slot: the half circle ahead of the tool, in the machine clockwise from +y. Half immersion: its left half.
+TEST(ContactArc, turnsWithTheFeed) {
+  constexpr double PI = units::PI;
+  const auto arcs = [](double entry, double exit, double direction) {
+    return contactArcs({entry, exit, 1e-3, 1e-4}, direction);
+  };
+  const auto expect = [](const std::vector<ContactArc>& arcs,
+                         const std::vector<std::array<double, 2>>& ends) {
+    ASSERT_EQ(arcs.size(), ends.size());
+    for (std::size_t k = 0; k < ends.size(); ++k) {
+      EXPECT_NEAR(arcs[k].entry, ends[k][0], 1e-12);
+      EXPECT_NEAR(arcs[k].exit, ends[k][1], 1e-12);
+      EXPECT_EQ(arcs[k].depth, 1e-3);
+      validate(arcs[k]);
+    }
+  };
+  expect(arcs(0.0, PI, 0.0), {{0.0, PI}});
+  expect(arcs(0.0, PI, PI), {{PI, 2.0 * PI}});                               // along -x
+  expect(arcs(0.0, PI, 0.5 * PI), {{1.5 * PI, 2.0 * PI}, {0.0, 0.5 * PI}});  // along +y
+  expect(arcs(0.0, PI, -0.5 * PI), {{0.5 * PI, 1.5 * PI}});                  // along -y
+  expect(arcs(0.0, 0.5 * PI, 0.5 * PI), {{1.5 * PI, 2.0 * PI}});
+  const double entry = 1.2, exit = 3.1;
+  EXPECT_EQ(arcs(entry, exit, 0.0)[0].entry, entry);
+  EXPECT_EQ(arcs(entry, exit, 0.0)[0].exit, exit);
+}
 
 TEST(SineCosine, equalsTheStandardLibrary) {
   for (double angle = 0.0; angle < 12.5; angle += 0.00713) {

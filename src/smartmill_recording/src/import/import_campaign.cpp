@@ -222,6 +222,7 @@ class Importer {
     if (s.engage_time_s && s.running_before_s)
       result_.faults.push_back(file + ": running_before_s contradicts engage_time_s");
     test.engagement = e;
+    test.feed_direction = units::radFromDeg(s.feed_direction_deg.value_or(0.0));
     test.engage_time = s.engage_time_s;
     return test;
   }

@@ -75,6 +75,8 @@ const std::vector<SettingKey>& settingKeys() {
        "immersion angle where a tooth enters; a slot: 0"},
       {"exit_deg", "--exit-deg", &TestSettings::exit_deg, Range::closed(0.0, 360.0),
        "immersion angle where a tooth leaves; a slot: 180"},
+      {"feed_direction_deg", "--feed-direction-deg", &TestSettings::feed_direction_deg,
+       Range::closed(-360.0, 360.0), "of the feed from +x towards +y; absent: along +x"},
       {"engage_time_s", "--engage-time-s", &TestSettings::engage_time_s, Range::notNegative(),
        "full engagement begins so long behind the first sample"},
       {"running_before_s", "--running-before-s", &TestSettings::running_before_s, Range::notNegative(),

@@ -26,6 +26,7 @@ struct CampaignTest {
   double sample_rate = 0.0;                     ///< [Hz]
   double spindle_speed = 0.0;                   ///< [rad/s]
   std::optional<Engagement> engagement;         ///< of a cut
+  double feed_direction = 0.0;                  ///< [rad] of a cut: of its feed, from +x towards +y
   std::optional<double> engage_time;            ///< [s] absent: in cut throughout
   std::optional<double>
       running_before;  ///< [s] of a cut or air: time at these conditions before the record began

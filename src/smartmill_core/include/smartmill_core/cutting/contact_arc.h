@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "smartmill_core/cutting/tool.h"
 #include "smartmill_core/math/angle.h"
 #include "smartmill_core/units.h"
 
@@ -18,6 +19,10 @@ struct ContactArc {
 
 /// @throws Error on an arc outside 0..2 pi or without height.
 void validate(const ContactArc& arc);
+
+/// The arcs of a cut in the machine: one, or two where it contains +y.
+/// @param feed_direction [rad] of the feed in the machine, from +x towards +y
+std::vector<ContactArc> contactArcs(const Engagement& engagement, double feed_direction);
 
 /// Segment of a tooth's edge inside an arc.
 struct EdgeSegment {

@@ -13,7 +13,7 @@ namespace smartmill::recording {
 struct TestSettings {
   std::optional<std::string> name, kind, direction;
   std::optional<double> sample_rate_hz, spindle_speed_rpm, feed_per_tooth_mm, axial_depth_mm, entry_deg,
-      exit_deg, engage_time_s, running_before_s, start_time_s, cut_time_before_s;
+      exit_deg, feed_direction_deg, engage_time_s, running_before_s, start_time_s, cut_time_before_s;
   ChannelChoices channels;
 
   /// Takes what `other` states.
