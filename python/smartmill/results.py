@@ -56,13 +56,14 @@ class Tool:
 
 @dataclass(frozen=True)
 class Cut:
-    """Engagement, feed and speed. Angles are immersion angles: clockwise from +y, x is the feed direction."""
+    """Engagement, feed and speed. Angles are immersion angles: clockwise from the left side of the feed."""
 
     spindle_speed: float  #: [rad/s]
     feed_per_tooth: float  #: [m]
     axial_depth: float  #: [m]
     entry: float = 0.0  #: [rad]
     exit: float = math.pi  #: [rad]
+    feed_direction: float = 0.0  #: [rad] of the feed in the machine, from +x towards +y
 
     @classmethod
     def of(cls, *, speed_rpm: float, feed_mm: float, depth_mm: float, entry_deg: float = 0.0,

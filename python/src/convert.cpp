@@ -92,9 +92,9 @@ py::object toPython(const CuttingCoefficients& value, const CuttingCoefficients*
   return make("Coefficients", **fields);
 }
 
-py::object toPython(const Engagement& engagement, double spindle_speed) {
+py::object toPython(const Engagement& engagement, double spindle_speed, double feed_direction) {
   return make("Cut", spindle_speed, engagement.feed_per_tooth, engagement.axial_depth, engagement.entry,
-              engagement.exit);
+              engagement.exit, feed_direction);
 }
 
 py::object toPython(const CampaignTest& test, Record record) {
@@ -102,8 +102,8 @@ py::object toPython(const CampaignTest& test, Record record) {
   py::dict channels;
   for (std::size_t c = 0; c < record.names.size(); ++c)
     channels[record.names[c].c_str()] = arrayOf(std::move(record.columns[c]));
-  const py::object cut =
-      test.engagement ? toPython(*test.engagement, test.spindle_speed) : py::object(py::none());
+  const py::object cut = test.engagement ? toPython(*test.engagement, test.spindle_speed, test.feed_direction)
+                                         : py::object(py::none());
   return make("Record", test.name, kind, test.sample_rate, test.spindle_speed, cut, test.direction,
               arrayOf(std::move(record.time)), channels);
 }

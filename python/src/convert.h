@@ -49,7 +49,7 @@ py::object toPython(const std::vector<Mode>& modes);
 py::object toPython(const ToolGeometry& tool);
 /// @param std_dev nullptr: not known
 py::object toPython(const CuttingCoefficients& value, const CuttingCoefficients* std_dev);
-py::object toPython(const Engagement& engagement, double spindle_speed);
+py::object toPython(const Engagement& engagement, double spindle_speed, double feed_direction = 0.0);
 py::object toPython(const CampaignTest& test, Record record);
 
 /// The reverse, of the dataclasses.

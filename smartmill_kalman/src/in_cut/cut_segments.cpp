@@ -54,7 +54,7 @@ CutSegment sensorSegment(const Record& record, const CampaignTest& test, std::si
   CuttingLaw law;
   law.coefficients = model.needCutting("predict the cutting force");
   if (!test.engagement) throw Error(test.name + ": no engagement");
-  RigidCut rigid(tool, law, *test.engagement);
+  RigidCut rigid(tool, law, *test.engagement, {}, test.feed_direction);
   cut.force.reserve(cut.angle.size());
   for (const double angle : cut.angle) {
     const CuttingForce force = rigid.at(angle);

@@ -55,14 +55,13 @@ std::vector<AngleRecord> angleRecords(const Options& o, const Campaign& campaign
   for (const CampaignTest& test : campaign.tests) {
     if (test.kind != TestKind::cut) continue;
     const std::size_t number = cut++;
-    Record record = readRecord(campaign, test, model);
+    const Record record = inFeedAxes(readRecord(campaign, test, model), test);
     const std::vector<double>* angle =
         record.has("spindle_angle") ? &record.column("spindle_angle") : nullptr;
     MeanRevolution revolution;
     const auto first = static_cast<std::size_t>(test.engage_time.value_or(0.0) * test.sample_rate);
-    Record force = o.compensated.empty()
-                       ? record
-                       : readCsv((std::filesystem::path(o.compensated) / (test.name + ".csv")).string());
+    const std::filesystem::path compensated = std::filesystem::path(o.compensated) / (test.name + ".csv");
+    const Record force = o.compensated.empty() ? record : inFeedAxes(readCsv(compensated.string()), test);
     if (force.size() != record.size())
       throw Error(formatted("%s: %zu samples, expected %zu as in the record", force.file.c_str(),
                             force.size(), record.size()));

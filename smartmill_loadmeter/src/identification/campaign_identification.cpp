@@ -26,7 +26,7 @@ IdentifiedCoefficients identifyFromForceRecords(const Campaign& campaign, const 
   std::vector<MeanForceTest> tests;
   for (const CampaignTest& test : campaign.tests) {
     if (test.kind != TestKind::cut) continue;
-    const Record record = readRecord(campaign, test, model);
+    const Record record = inFeedAxes(readRecord(campaign, test, model), test);
     std::size_t first = firstInCut(test, record);
     std::size_t count = record.size() - std::min(first, record.size());
     if (means == Means::revolutions) {

@@ -8,7 +8,7 @@ LoadRecordResult identifyFromLoadRecords(const Campaign& campaign, const Machine
   std::vector<TestRecord> tests;
   for (const CampaignTest& test : campaign.tests) {
     if (test.kind == TestKind::cut || test.kind == TestKind::air)
-      tests.push_back({test, readRecord(campaign, test)});
+      tests.push_back({test, inFeedAxes(readRecord(campaign, test), test)});
   }
   return identifyFromLoadRecords(tests, model, options, campaign.folder);
 }

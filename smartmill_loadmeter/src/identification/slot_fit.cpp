@@ -69,7 +69,7 @@ class SlotFitter {
       : options_(options), tool_(model.needTool("fit forces over a revolution")) {
     for (const CampaignTest& test : campaign.tests) {
       if (test.kind != TestKind::cut) continue;
-      const Record record = readRecord(campaign, test, model);
+      const Record record = inFeedAxes(readRecord(campaign, test, model), test);
       angle_ = angle_ && record.has("spindle_angle");
       cuts_.push_back(revolutionOf(test, record));
     }
@@ -280,7 +280,7 @@ std::vector<ForcePoint> revolutionPoints(const Campaign& campaign, const Machine
   std::size_t cut = 0;
   for (const CampaignTest& test : campaign.tests) {
     if (test.kind != TestKind::cut) continue;
-    const CutRevolution r = revolutionOf(test, readRecord(campaign, test, model));
+    const CutRevolution r = revolutionOf(test, inFeedAxes(readRecord(campaign, test, model), test));
     std::vector<double> fx, fy, angle;
     for (std::size_t i = 0; i < ANGLES; ++i) {
       fx.push_back(r.force.axis[0][i]);

@@ -14,6 +14,7 @@
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/io/csv.h"
 #include "smartmill_core/io/text_file.h"
+#include "smartmill_core/math/angle.h"
 #include "smartmill_core/signal/force_channels.h"
 
 namespace smartmill {
@@ -315,6 +316,23 @@ Record readRecord(const Campaign& campaign, const CampaignTest& test, const Mach
   for (const char* name : FORCE_CHANNELS) {
     if (!record.has(name)) continue;
     for (double& value : record.add(name)) value = -value;
+  }
+  return record;
+}
+
+Record inFeedAxes(Record record, const CampaignTest& test) {
+  if (test.feed_direction == 0.0) return record;
+  const double c = std::cos(test.feed_direction), s = std::sin(test.feed_direction);
+  if (record.has("fx") && record.has("fy")) {
+    const std::vector<double> fx = record.column("fx"), fy = record.column("fy");
+    std::vector<double>&along = record.add("fx"), &across = record.add("fy");
+    for (std::size_t i = 0; i < fx.size(); ++i) {
+      along[i] = c * fx[i] + s * fy[i];
+      across[i] = c * fy[i] - s * fx[i];
+    }
+  }
+  if (record.has("spindle_angle")) {
+    for (double& angle : record.add("spindle_angle")) angle = wrapped(angle + test.feed_direction);
   }
   return record;
 }

@@ -18,10 +18,6 @@ constexpr double NODE_ANGLE = REVOLUTION_NODE_ANGLE;
 constexpr std::size_t MOST_TEETH = 20;
 constexpr double LEAST_CHIP = 1e-15;  // [m] at the ends of a contact, where edge forces still act
 
-ContactArc arcOf(const Engagement& engagement) {
-  return {engagement.entry, std::min(engagement.exit, TWO_PI), engagement.axial_depth};
-}
-
 // sums += share (b - a)
 void addDifference(const EdgeSums& a, const EdgeSums& b, double share, EdgeSums& sums) {
   sums.chip_sine += share * (b.chip_sine - a.chip_sine);
@@ -44,10 +40,12 @@ RigidCut::RigidCut(const ToolGeometry& tool, const CuttingLaw& law, std::vector<
 }
 
 RigidCut::RigidCut(const ToolGeometry& tool, const CuttingLaw& law, const Engagement& engagement,
-                   std::vector<double> radius_offset)
+                   std::vector<double> radius_offset, double feed_direction)
     : RigidCut(tool, law, std::move(radius_offset)) {
   validate(engagement);
-  engage({arcOf(engagement)}, {{engagement.feed_per_tooth * tool.teeth / TWO_PI, 0.0}});
+  const double feed = engagement.feed_per_tooth * tool.teeth / TWO_PI;
+  engage(contactArcs(engagement, feed_direction),
+         {{feed * std::cos(feed_direction), feed * std::sin(feed_direction)}});
 }
 
 void RigidCut::add(double weight, double thickness, const SineCosine& at, EdgeSums& sums) const {

@@ -32,6 +32,8 @@ Record readRecord(const Campaign& campaign, const CampaignTest& test);
 /// The same, with the sign of the forces reversed where the model states that its sensor measures the
 /// reaction on the workpiece.
 Record readRecord(const Campaign& campaign, const CampaignTest& test, const MachineModel& model);
+/// A record of a cut in axes whose x is along its feed: fx, fy and spindle_angle, where it has them.
+Record inFeedAxes(Record record, const CampaignTest& test);
 Record readCsv(const std::string& file);
 Record readDynoware(const std::string& file, const std::map<std::string, std::string>& channels);
 

@@ -30,9 +30,9 @@ class RigidCut {
   /// @throws Error on an invalid tool.
   RigidCut(const ToolGeometry& tool, const CuttingLaw& law, std::vector<double> radius_offset = {},
            double path_share = 0.0);
-  /// One arc, feed along x. @throws Error also on an invalid engagement.
+  /// One arc. @param feed_direction [rad] from +x towards +y @throws Error also on an invalid engagement.
   RigidCut(const ToolGeometry& tool, const CuttingLaw& law, const Engagement& engagement,
-           std::vector<double> radius_offset = {});
+           std::vector<double> radius_offset = {}, double feed_direction = 0.0);
 
   /// @param feed [m/rad] of the spindle, x and y. @throws Error on an invalid arc.
   void engage(const std::vector<ContactArc>& arcs, const std::array<double, 2>& feed);
