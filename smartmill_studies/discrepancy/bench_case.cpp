@@ -18,18 +18,6 @@ namespace {
 
 using nlohmann::json;
 
-bool contains(const std::vector<std::string>& names, const std::string& name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
-}
-
-// Whether two effects are equal, or reported by explain as an unidentifiable pair.
-bool standsFor(const Explanation& e, const std::string& named, const std::string& hidden) {
-  return named == hidden || std::any_of(e.not_separable.begin(), e.not_separable.end(),
-                                        [&](const std::vector<std::string>& group) {
-                                          return contains(group, named) && contains(group, hidden);
-                                        });
-}
-
 // Errors of the found parameters in their standard deviations.
 std::vector<double> scores(const FoundEffect& found, const EffectEntry& truth) {
   std::vector<double> all;

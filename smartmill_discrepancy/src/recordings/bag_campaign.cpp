@@ -1,13 +1,10 @@
 #include "recordings/bag_campaign.h"
 
-#include <algorithm>
-#include <vector>
-
 #include "node/monitor_parameters.h"
 #include "node/wiring.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/names.h"
-#include "smartmill_discrepancy/live/live_gap.h"
+#include "smartmill_discrepancy/live/segment_campaign.h"
 #include "smartmill_recording/recording_reader.h"
 
 namespace smartmill::discrepancy {
@@ -20,30 +17,14 @@ Campaign campaignOfBag(const std::string& bag, const std::string& model_file, co
     progress("compared: force/compensated, since the recording has no daq/dynamometer");
   }
   const MachineModel model = comparedModel(readMachineModel(model_file), parameters.compared());
-  std::vector<RecordSegment> chosen;
-  const auto choose = [&](const RecordSegment& segment) {
-    const auto same = [&](const RecordSegment& other) { return other.test.name == segment.test.name; };
-    const auto earlier = std::find_if(chosen.begin(), chosen.end(), same);
-    if (earlier == chosen.end()) {
-      chosen.push_back(segment);
-    } else {
-      *earlier = segment;
-    }
-  };
-  SegmentPipeline segments(parameters.segment, parameters.compared(), parameters.hold_back, choose);
+  SegmentCampaign campaign;
+  SegmentPipeline segments(parameters.segment, parameters.compared(), parameters.hold_back,
+                           [&](const RecordSegment& segment) { campaign.add(segment); });
   connect(reader, segments);
   reader.run();
   segments.flush();
-  bool recorded = false;
-  for (const RecordSegment& segment : chosen) {
-    if (model.force_sensor.noise_rms && liveGap(model, segment, parameters.gapOptions()).near_limit) {
-      progress(segment.test.name + ": omitted, near the stability limit of the model");
-      continue;
-    }
-    recordSegment(model, segment, folder);
-    recorded = true;
-  }
-  if (!recorded) throw Error(bag + ": expected a steady segment of 0.3 s with a cutting condition");
+  if (campaign.write(model, parameters.gapOptions(), folder, progress) == 0)
+    throw Error(bag + ": expected a steady segment of 0.3 s with a cutting condition");
   return readCampaign(folder);
 }
 

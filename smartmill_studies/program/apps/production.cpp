@@ -2,40 +2,29 @@
 // one pocket each, through the simulated Fanuc control and the bridge, without a test cut.
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <map>
-#include <memory>
 #include <optional>
 #include <random>
 #include <string>
-#include <thread>
 #include <vector>
 
+#include "program/machined_part.h"
 #include "program/pocket_program.h"
-#include "smartmill_cnc/bridge.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
-#include "smartmill_focas/server.h"
 #include "smartmill_loadmeter/identification/identification_pipeline.h"
-#include "smartmill_program/live/path_follower.h"
-#include "smartmill_program/nc/program_reader.h"
 #include "smartmill_program/prediction/stability_limits.h"
-#include "smartmill_sim/world/world.h"
 #include "study_case.h"
 
 namespace {
 
 using namespace smartmill;
 
-constexpr double PERIOD = 0.02;                     // [s] of the controller's states
-constexpr double LATE = 0.005;                      // [s] largest delay of a stamp
-constexpr double MOST_TIME = 600.0;                 // [s] of a part
-constexpr double STABLE = 0.7;                      // [1] depth over the stability limit of a slot
-constexpr double HOLD_BACK = 0.05;                  // [s]
-constexpr std::chrono::microseconds TRANSFER(200);  // for the server's thread
+constexpr double STABLE = 0.7;      // [1] depth over the stability limit of a slot
+constexpr double HOLD_BACK = 0.05;  // [s]
 
 struct Arguments {
   StudyCase study;
@@ -63,87 +52,23 @@ MachineModel drawMachine(const MachineModel& base, std::mt19937_64& random) {
   return machine;
 }
 
-std::shared_ptr<const program::LiveProgram> prepared(const std::string& text, const std::string& model_file,
-                                                     const MachineModel& model) {
-  program::ToolModels tools({model_file});
-  program::Stock stock({model.workpiece->low, model.workpiece->high}, 1e-4);
-  return std::make_shared<const program::LiveProgram>(
-      program::prepareProgram("pocket.nc", program::interpretProgram(text, "pocket.nc"), tools, stock,
-                              program::SimulationOptions(), program::StretchParameters()));
-}
-
-cnc::MotionParameters motionOf(const MachineModel& model) {
-  cnc::MotionParameters motion;
-  motion.read_only = false;
-  motion.limits.travel = model.axes->travel;
-  motion.limits.max_feed = model.axes->rapid;
-  motion.limits.max_spindle_speed = *model.spindle->max_speed;
-  return motion;
-}
-
-struct Part {
+struct Part : MachinedPart {
   std::optional<loadmeter::RecursiveCoefficients> estimate;
-  std::size_t cuts = 0, air = 0, lost = 0;
-  double time = 0.0;  // [s] of the program
 };
 
-/// Runs a program from its first block to its end. @throws Error when the controller refuses it
-Part machinePart(const MachineModel& machine, const MachineModel& nominal, const std::string& text,
-                 const std::shared_ptr<const program::LiveProgram>& program, std::uint64_t seed) {
-  std::mt19937_64 random(seed);
-  sim::WorldOptions options;
-  options.seed = seed;
-  sim::World world(machine, options);
-  focas::ServerOptions server_options;
-  server_options.port = 0;
-  focas::Server server(server_options, world.controller().calls());
-  cnc::FocasParameters focas;
-  focas.port = server.port();
-  focas.reply_timeout = 20.0;
-  cnc::Bridge bridge(cnc::makeFocasController(focas), 1.0, motionOf(nominal));
-  program::PathFollower follower(program, {{0, 0, 0}}, {"end_mill", nominal.workpiece->material},
-                                 program::FollowerParameters());
+/// Machines a pocket; the load meter identifies the coefficients.
+Part identifiedPart(const MachineModel& machine, const MachineModel& nominal, const std::string& text,
+                    const std::string& model_file, std::uint64_t seed) {
   loadmeter::IdentificationPipeline pipeline(nominal, loadmeter::IdentificationParameters(), HOLD_BACK);
-
+  PartStreams streams;
+  streams.state = [&](const CncState& state) { pipeline.push(state); };
+  streams.load = [&](const LoadSample& load) { pipeline.push(load); };
+  streams.condition = [&](const CuttingCondition& condition) { pipeline.push(condition); };
   Part part;
-  sim::World::Block block;
-  double now = 0.0;
-  bool started = false;
-  while (now < MOST_TIME) {
-    for (int i = 0; i < 2; ++i) world.advance(block);
-    now += PERIOD;
-    bridge.fetch(now);
-    bridge.step(now + uniform(random, 0.0, LATE));
-    std::this_thread::sleep_for(TRANSFER);
-    const CncState& state = bridge.state();
-    if (state.connected) {
-      pipeline.push(state);
-      if (bridge.load()) pipeline.push(*bridge.load());
-      if (const auto condition = follower.handle(state)) {
-        part.cuts += condition->kind == CuttingCondition::Kind::cut;
-        part.air += condition->kind == CuttingCondition::Kind::air;
-        pipeline.push(*condition);
-      }
-    }
-    if (!started && state.connected && !state.armed) {
-      const auto answer = bridge.arm(true);
-      if (answer.code != cnc::ArmCode::ok) throw Error("arm: " + answer.message);
-    } else if (!started && state.armed) {
-      if (const auto refusal = bridge.runProgram("pocket", text, CuttingCondition()))
-        throw Error("program: " + refusal->message);
-      started = true;
-      part.time = -now;
-    }
-    if (const auto outcome = bridge.takeOutcome()) {
-      if (outcome->code != cnc::MotionCode::ok) throw Error("program: " + outcome->message);
-      part.time += now;
-      break;
-    }
-  }
-  if (now >= MOST_TIME) throw Error("program: it has not ended");
+  static_cast<MachinedPart&>(part) =
+      machinePart(machine, nominal, text, preparedPart(text, model_file, nominal), seed, streams);
   pipeline.flush();
   part.estimate = pipeline.identification().production();
-  part.lost = follower.status().lost;
   return part;
 }
 
@@ -159,7 +84,7 @@ nlohmann::json lineOf(const Arguments& a, int number) {
   traits.depth = std::min(traits.depth,
                           STABLE * program::StabilityLimits(machine).limit(slot, 0.0, false, traits.speed));
   const std::string text = pocketProgram(traits, nominal);
-  const Part part = machinePart(machine, nominal, text, prepared(text, a.model, nominal), seed);
+  const Part part = identifiedPart(machine, nominal, text, a.model, seed);
   nlohmann::json line{
       {"case", number}, {"cuts", part.cuts}, {"air", part.air}, {"lost", part.lost}, {"time", part.time}};
   line["ktc"] = line["kte"] = line["z_ktc"] = line["z_kte"] = nullptr;

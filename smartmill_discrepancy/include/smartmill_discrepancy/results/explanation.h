@@ -141,4 +141,7 @@ struct Explanation {
   double seconds = 0.0;
 };
 
+/// Whether two names are equal, or not separable by the tests of this explanation.
+bool standsFor(const Explanation& explanation, const std::string& named, const std::string& other);
+
 }  // namespace smartmill::discrepancy

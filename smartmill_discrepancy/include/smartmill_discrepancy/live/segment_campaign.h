@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "smartmill_discrepancy/live/live_gap.h"
+
+namespace smartmill::discrepancy {
+
+/// Campaign of a recorded or running production: the last segment of each cutting condition.
+class SegmentCampaign {
+ public:
+  void add(const RecordSegment& segment);
+  bool empty() const { return segments_.empty(); }
+  /// Writes the campaign, without segments near the stability limit of the model.
+  /// @param progress receives one line for each of these @return number of tests @throws Error.
+  std::size_t write(const MachineModel& model, const LiveGapOptions& options, const std::string& folder,
+                    const std::function<void(const std::string&)>& progress) const;
+
+ private:
+  std::vector<RecordSegment> segments_;
+};
+
+}  // namespace smartmill::discrepancy

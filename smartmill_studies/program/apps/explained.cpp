@@ -1,0 +1,150 @@
+// rosrun smartmill_studies program_explained: causes hidden in a machine of which nothing is known but the
+// production of one pocket, through the simulated Fanuc control, the bridge and the follower of the program.
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "program/machined_part.h"
+#include "program/pocket_program.h"
+#include "smartmill_core/model/effect_catalogue.h"
+#include "smartmill_core/program.h"
+#include "smartmill_core/units.h"
+#include "smartmill_discrepancy/explain/explain.h"
+#include "smartmill_discrepancy/live/segment_campaign.h"
+#include "smartmill_discrepancy/report/report_json.h"
+#include "smartmill_program/prediction/stability_limits.h"
+#include "study_case.h"
+
+namespace {
+
+using namespace smartmill;
+
+constexpr double STABLE = 0.7;      // [1] depth over the stability limit of a slot
+constexpr double HOLD_BACK = 0.05;  // [s]
+constexpr std::array<const char*, 3> CAUSES{"runout", "gain_error", "tool_wear"};
+
+struct Arguments {
+  StudyCase study;
+  std::string model = "launch/models/mill_twin.yaml", output;
+  int cases = 30;
+  std::uint64_t seed = 1;
+};
+
+/// What the monitor sees of the production of one part, as a campaign.
+Campaign producedCampaign(const MachineModel& machine, const MachineModel& nominal, const std::string& text,
+                          const std::string& model_file, std::uint64_t seed, const std::string& folder,
+                          nlohmann::json* line) {
+  discrepancy::SegmentCampaign campaign;
+  discrepancy::SegmentPipeline segments(
+      discrepancy::SegmentParameters(), discrepancy::ComparedForce::measured, HOLD_BACK,
+      [&](const discrepancy::RecordSegment& segment) { campaign.add(segment); });
+  PartStreams streams;
+  streams.state = [&](const CncState& state) { segments.push(state); };
+  streams.load = [&](const LoadSample& load) { segments.push(load); };
+  streams.condition = [&](const CuttingCondition& condition) { segments.push(condition); };
+  streams.sensors = [&](const sim::World::Block& block) {
+    segments.push(block.dynamometer);
+    for (const SpindleAngle& angle : block.angle) segments.push(angle);
+  };
+  const MachinedPart part =
+      machinePart(machine, nominal, text, preparedPart(text, model_file, nominal), seed, streams);
+  segments.flush();
+  (*line)["tests"] =
+      campaign.write(nominal, discrepancy::LiveGapOptions(), folder, [](const std::string&) {});
+  (*line)["time"] = part.time;
+  return readCampaign(folder);
+}
+
+nlohmann::json lineOf(const Arguments& a, int number) {
+  const std::uint64_t seed = seedOfCase(a.seed, number);
+  std::mt19937_64 random(seed);
+  const MachineModel nominal = readMachineModel(a.model);
+  const std::string cause = CAUSES[static_cast<std::size_t>(number) % CAUSES.size()];
+  MachineModel machine = nominal;
+  machine.effects = {drawEffect(cause, nominal, random)};
+  PocketTraits traits = drawPocket(random);
+  const program::Contact slot{{{0.0, units::PI, traits.depth}}};
+  traits.depth = std::min(traits.depth,
+                          STABLE * program::StabilityLimits(machine).limit(slot, 0.0, false, traits.speed));
+  const std::string folder = a.output + "/" + std::to_string(number);
+  std::filesystem::remove_all(folder);
+  nlohmann::json line{{"case", number}, {"hidden", cause}};
+  const Campaign campaign = producedCampaign(machine, nominal, pocketProgram(traits, nominal), a.model, seed,
+                                             folder + "/campaign", &line);
+  const discrepancy::Dataset data =
+      discrepancy::loadDataset(campaign, readMachineModel(campaign.modelPath()));
+  discrepancy::ExplainOptions options;
+  options.bench.threads = 1;
+  std::filesystem::create_directories(folder + "/report");
+  const discrepancy::Explanation e = discrepancy::explain(data, options, folder + "/report");
+  discrepancy::writeReport(e, folder + "/report");
+  line["verdict"] = nameOf(e.verdict);
+  line["named"] = nlohmann::json::array();
+  bool found = false, wrong = false;
+  for (const discrepancy::FoundEffect& effect : e.effects) {
+    line["named"].push_back(effect.name);
+    const bool right = standsFor(e, effect.name, cause);
+    found = found || right;
+    wrong = wrong || !(right || findEffect(effect.name)->empirical());
+  }
+  line["right"] = found && !wrong;
+  line["found"] = found;
+  line["gap_before"] = e.before.fit;
+  line["gap_after"] = e.after.fit;
+  line["seconds"] = e.seconds;
+  return line;
+}
+
+void score(const std::vector<nlohmann::json>& lines) {
+  std::map<std::string, std::array<int, 3>> of;  // cases, found, found and nothing else named
+  for (const nlohmann::json& line : lines) {
+    std::array<int, 3>& count = of[line.at("hidden").get<std::string>()];
+    ++count[0];
+    count[1] += line.at("found").get<bool>();
+    count[2] += line.at("right").get<bool>();
+  }
+  std::array<int, 3> all{};
+  for (const auto& [cause, count] : of) {
+    std::printf("%-12s %d parts: named in %d, nothing else in %d\n", cause.c_str(), count[0], count[1],
+                count[2]);
+    for (std::size_t k = 0; k < all.size(); ++k) all[k] += count[k];
+  }
+  std::printf("%-12s %d parts: named in %d, nothing else in %d; 27 of 30 is the aim\n", "all", all[0], all[1],
+              all[2]);
+}
+
+void run(const Arguments& a) {
+  if (a.study.scores()) return score(readJsonLines(a.study.lines));
+  a.study.check(a.cases);
+  if (a.output.empty()) throw UsageError("-o: expected a folder for campaigns and reports");
+  if (a.study.one()) return a.study.print(lineOf(a, a.study.number));
+  std::vector<nlohmann::json> lines;
+  for (int i = 0; i < a.cases; ++i) {
+    lines.push_back(lineOf(a, i));
+    a.study.print(lines.back());
+    std::fflush(stdout);
+  }
+  score(lines);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CommandLine line(
+      "Runout, gain error or wear hidden in a machine that only produces: one pocket each through the "
+      "simulated Fanuc control, bridge and follower of the program; explain gets the steady cuts.");
+  Arguments a;
+  a.study.addTo(line, "--cases", a.cases, "number of machines, the causes in turn");
+  a.study.addScore(line);
+  line.option("-o", a.output, "folder for the campaigns and reports");
+  line.option("--model", a.model, "machine model with tool, coefficients and workpiece").showDefault();
+  line.option("--seed", a.seed, "of causes, pockets and noise").showDefault();
+  return runProgram(line, argc, argv, [&] { run(a); });
+}
