@@ -276,7 +276,8 @@ TEST(Program, ALostToothIsReportedWithinTwoRevolutions) {
   EXPECT_EQ(breakTooth(0).code, smartmill_msgs::BreakTooth::Response::OK);
   smartmill_msgs::NewTool replaced;
   ASSERT_TRUE(ros::service::call(names::absolute(names::NEW_TOOL), replaced));
-  EXPECT_NE(replaced.response.message.find("the loss of tooth 3"), std::string::npos) << replaced.response.message;
+  EXPECT_NE(replaced.response.message.find("the loss of tooth 3"), std::string::npos)
+      << replaced.response.message;
   bool whole = false;
   const ros::Subscriber on_new = nh.subscribe<smartmill_msgs::ToolCondition>(
       names::TOOL_CONDITION, 10,

@@ -11,6 +11,7 @@ import { Session, Progress, Notes, Replay } from './views/session.js';
 import { Commands } from './views/commands.js';
 import { Knowledge } from './views/knowledge.js';
 import { Discrepancy, Report, Database, Diagnostics, ForceSensor } from './views/model.js';
+import { Part } from './views/part.js';
 import { Fleet } from './views/fleet.js';
 import { Health } from './views/health.js';
 import { FirstConnection, Instruments } from './views/instruments.js';
@@ -18,7 +19,7 @@ import { FirstConnection, Instruments } from './views/instruments.js';
 const REFRESH = 100;  // [ms]
 
 const VIEWS = {
-  overview: 'Overview', forces: 'Forces', stability: 'Stability', dynamics: 'Dynamics', session: 'Session', model: 'Model', instruments: 'Instruments', fleet: 'Fleet', health: 'Health',
+  overview: 'Overview', forces: 'Forces', part: 'Part', stability: 'Stability', dynamics: 'Dynamics', session: 'Session', model: 'Model', instruments: 'Instruments', fleet: 'Fleet', health: 'Health',
 };
 
 // A card with a title.
@@ -111,6 +112,10 @@ class Page {
     place('forces', 'Spectrum', '', e => new Spectrum(e, link, store));
     place('forces', 'Force over one revolution', '', e => new Revolution(e, link, store, false));
     place('forces', 'Spectrum of the last minute', '', e => new SpectrumCourse(e, link, store));
+
+    const lines = card('Lines to look at', 'tools-free');
+    place('part', 'Part', 'tools-free', e => new Part(e, lines, link, store));
+    this.views.part.append(lines);
 
     let chart = null, what_if = null;
     place('stability', 'Stability', '', e => chart = new ChartView(e, link, 'stability'));

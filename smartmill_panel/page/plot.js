@@ -7,6 +7,13 @@ export function colour(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 }
 
+// Colour of a share 0..1, also for the colour-blind: blue over grey to yellow, cividis (Nunez, Anderton and Renslow, PLoS ONE 13, 2018).
+export function toColour(share) {
+  const stops = [[0, 34, 78], [53, 69, 108], [102, 105, 112], [148, 142, 119], [200, 184, 102], [254, 232, 56]];
+  const at = 5 * Math.max(0, Math.min(1, share)), k = Math.min(4, Math.floor(at));
+  return `rgb(${stops[k].map((low, i) => Math.round(low + (at - k) * (stops[k + 1][i] - low))).join()})`;
+}
+
 // Round values between low and high, about `count` of them.
 function ticks(low, high, count, least = 0) {
   const rough = Math.max(least, (high - low) / Math.max(1, count));

@@ -58,6 +58,9 @@ class StretchFinder {
     if (cut) addToCut(step);
   }
 
+  /// [m] on the path, at the end of the last step
+  double place() const { return at_; }
+
   void finish() {
     dwellBefore(moves().size());
     if (run_) close(false);
@@ -190,15 +193,20 @@ bool LiveProgram::cutsBetween(double from, double to) const {
 
 LiveProgram prepareProgram(const std::string& name, std::vector<Move> moves, ToolModels& tools, Stock& stock,
                            const SimulationOptions& simulation, const StretchParameters& parameters) {
-  LiveProgram program{name, ProgramPath(std::move(moves)), {}, {}};
+  LiveProgram program{name, ProgramPath(std::move(moves)), {}, {}, {}};
   StretchFinder finder(program, tools, parameters);
+  PieceMaker pieces(tools, {parameters.angle_tolerance, parameters.depth_tolerance});
   AnalysisOptions options;
   options.simulation = simulation;
   options.prediction = false;
   ProgramAnalysis analysis(name, tools, stock, options);
   const AnalysisResult result =
-      analysis.run(program.path.moves(), [&](const Step& step, const StepPrediction&) { finder.add(step); });
+      analysis.run(program.path.moves(), [&](const Step& step, const StepPrediction&) {
+        finder.add(step);
+        pieces.add(step, finder.place() - step.length);
+      });
   finder.finish();
+  program.pieces = pieces.take();
   refuseRapidHits(name, result.blocks);
   return program;
 }

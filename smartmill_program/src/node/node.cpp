@@ -1,15 +1,20 @@
 #include "node/node.h"
 
 #include <algorithm>
+#include <chrono>
+#include <cmath>
 #include <memory>
 #include <sstream>
 #include <utility>
 #include <vector>
 
 #include <ros/this_node.h>
+#include <smartmill_msgs/ProgramPath.h>
+#include <smartmill_msgs/ProgramProgress.h>
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/names.h"
+#include "smartmill_core/signal/feed.h"
 #include "smartmill_core/units.h"
 #include "smartmill_program/nc/program_reader.h"
 #include "smartmill_ros/conversions.h"
@@ -21,6 +26,8 @@ namespace smartmill::program {
 namespace {
 
 using units::MM;
+
+constexpr double PREDICTION_PERIOD = 0.1;  // [s] between two looks for predictions
 
 std::vector<std::string> wordsOf(const std::string& text) {
   std::istringstream words(text);
@@ -51,7 +58,33 @@ StockBlock blockOf(const NodeParameters& parameters, const ToolModels& models) {
   return block;
 }
 
-PathFollower followerOf(const NodeParameters& parameters) {
+smartmill_msgs::ProgramPath pathOf(const LiveProgram& program,
+                                   const std::vector<PiecePrediction>& predictions,
+                                   const std::array<double, 3>& zero) {
+  smartmill_msgs::ProgramPath message;
+  message.header.stamp = ros::Time::now();
+  message.program = program.name;
+  const auto add = [&](double place, const nc::PathSegment::Point& point) {
+    message.place.push_back(place);
+    message.x.push_back(point[0] + zero[0]);
+    message.y.push_back(point[1] + zero[1]);
+    message.z.push_back(point[2] + zero[2]);
+  };
+  if (!program.pieces.empty()) add(program.pieces.front().from, program.pieces.front().begin);
+  for (std::size_t k = 0; k < program.pieces.size(); ++k) {
+    const PathPiece& piece = program.pieces[k];
+    add(piece.to, piece.end);
+    message.line.push_back(static_cast<std::uint32_t>(piece.line));
+    message.kind.push_back(static_cast<std::uint8_t>(piece.kind));
+    message.peak_force.push_back(predictions[k].peak_force);
+    message.stability_margin.push_back(predictions[k].margin);
+  }
+  return message;
+}
+
+}  // namespace
+
+ProgramNode::Prepared ProgramNode::prepare(const NodeParameters& parameters) {
   if (parameters.program.empty()) throw Error("program: expected the path of an NC program");
   if (parameters.models.empty()) throw Error("models: expected the path of a smartmill-model/1 file");
   ToolModels models(wordsOf(parameters.models));
@@ -75,22 +108,97 @@ PathFollower followerOf(const NodeParameters& parameters) {
   if (cuts == 0)
     ROS_WARN("%s: no cut is steady for %.3g s (least_time)", parameters.program.c_str(),
              parameters.stretches.least_time);
-  return {program, parameters.program_zero, names, parameters.follower};
+  return {program, std::move(models), names};
 }
-
-}  // namespace
 
 ProgramNode::ProgramNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
     : parameters_(parametersFromServer(private_nh).readAll<NodeParameters>()),
-      follower_(followerOf(parameters_)),
+      prepared_(prepare(parameters_)),
+      follower_(prepared_.program, parameters_.program_zero, prepared_.names, parameters_.follower),
       shell_(nh, private_nh, "NC program", parameters_.input_timeout),
+      monitor_(prepared_.program, parameters_.progress_period, parameters_.hold_back,
+               [this](const PartProgress& progress) { publish(progress); }),
       publisher_(
-          nh.advertise<smartmill_msgs::CuttingCondition>(names::CUTTING_CONDITION, STREAM_QUEUE, true)) {
+          nh.advertise<smartmill_msgs::CuttingCondition>(names::CUTTING_CONDITION, STREAM_QUEUE, true)),
+      path_(nh.advertise<smartmill_msgs::ProgramPath>(names::PROGRAM_PATH, 1, true)),
+      progress_(nh.advertise<smartmill_msgs::ProgramProgress>(names::PROGRAM_PROGRESS, STREAM_QUEUE)) {
   conditions_ = nh.subscribe<smartmill_msgs::CuttingCondition>(
       names::CUTTING_CONDITION, STREAM_QUEUE,
       boost::function<void(const ConditionEvent&)>([this](const ConditionEvent& event) { handle(event); }));
-  shell_.inputs().on<CncState>(names::CNC_STATE, [this](const CncState& state, double) { handle(state); });
+  listen();
   shell_.diagnose("NC program", [this](auto& status) { diagnose(status); });
+  shell_.every(PREDICTION_PERIOD, [this] { readPredictions(); });
+  predict(std::nullopt);
+}
+
+void ProgramNode::listen() {
+  Inputs& inputs = shell_.inputs();
+  inputs.on<CncState>(names::CNC_STATE, [this](const CncState& state, double) { handle(state); });
+  feed<ForceBlock>(inputs, names::FORCE_COMPENSATED, monitor_);
+  inputs.on<smartmill_msgs::ChatterState>(
+      names::CHATTER_STATE, [this](const smartmill_msgs::ChatterState& message, double) {
+        if (message.valid)
+          monitor_.push(PartVerdict{toSec(message.header.stamp), message.chatter != 0, message.frequency});
+      });
+  inputs.on<CoefficientSet>(names::COEFFICIENTS, [this](const CoefficientSet& set, double) { handle(set); });
+}
+
+/// The first set of the pair that the program cuts, where the models state none.
+void ProgramNode::handle(const CoefficientSet& set) {
+  CuttingCoefficients k = set.value;
+  if (!predicted_for_.empty() || predictions_.valid() || set.material != prepared_.names.material ||
+      !std::isfinite(k.ktc + k.kte))
+    return;
+  if (!std::isfinite(k.krc)) k.krc = parameters_.radial_ratio * k.ktc;
+  if (!std::isfinite(k.kre)) k.kre = k.kte;
+  for (double* axial : {&k.kac, &k.kae}) {  // no part of the force across the axis
+    if (!std::isfinite(*axial)) *axial = 0.0;
+  }
+  predicted_for_ = set.tool + " in " + set.material;
+  predict(k);
+}
+
+/// In a thread: stability limits take seconds.
+void ProgramNode::predict(const std::optional<CuttingCoefficients>& coefficients) {
+  predictions_ = std::async(std::launch::async,
+                            [program = prepared_.program, models = prepared_.models, coefficients]() {
+                              return predictPieces(program->pieces, models, coefficients);
+                            });
+}
+
+void ProgramNode::readPredictions() {
+  if (!predictions_.valid() || predictions_.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
+    return;
+  std::vector<PiecePrediction> predictions = predictions_.get();
+  const auto predicted =
+      std::count_if(predictions.begin(), predictions.end(),
+                    [](const PiecePrediction& one) { return std::isfinite(one.peak_force); });
+  if (predicted > 0 && predicted_for_.empty()) predicted_for_ = "models";
+  path_.publish(pathOf(*prepared_.program, predictions, parameters_.program_zero));
+  monitor_.setPredictions(std::move(predictions));
+}
+
+void ProgramNode::publish(const PartProgress& progress) {
+  smartmill_msgs::ProgramProgress message;
+  message.header.stamp = fromSec(progress.stamp);
+  message.begin = fromSec(progress.begin);
+  message.program = prepared_.program->name;
+  message.part = static_cast<std::uint32_t>(progress.part);
+  message.first_line = static_cast<std::uint32_t>(progress.first_line);
+  message.last_line = static_cast<std::uint32_t>(progress.last_line);
+  message.from_place = progress.from;
+  message.to_place = progress.to;
+  message.peak_force = progress.peak_force;
+  message.predicted_peak_force = progress.predicted.peak_force;
+  message.stability_margin = progress.predicted.margin;
+  message.judged = !progress.verdicts.empty();
+  message.chatter_frequency = NOT_A_NUMBER;
+  for (const PartVerdict& verdict : progress.verdicts) {
+    if (!verdict.chatter) continue;
+    message.chatter = true;
+    message.chatter_frequency = verdict.frequency;
+  }
+  progress_.publish(message);
 }
 
 /// A node that was killed in a steady stretch has left its condition. The latched ones of other nodes come
@@ -114,6 +222,9 @@ void ProgramNode::handle(const CncState& state) {
     publisher_.publish(toMsg(*condition));
   }
   const PathFollower::Status& status = follower_.status();
+  const bool follows = status.follows == PathFollower::Follows::following;
+  monitor_.push(PartPlace{state.stamp, follows ? std::optional<double>(status.place) : std::nullopt,
+                          status.line, status.parts, state.feed});
   if (status.lost > losses_) ROS_WARN("the tool has left the path of the program after line %d", status.line);
   losses_ = status.lost;
 }
@@ -166,6 +277,7 @@ void ProgramNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) 
   status.add("parts begun", now.parts);
   status.add("conditions stated", now.conditions);
   status.add("losses of the path", now.lost);
+  status.add("coefficients of the prediction", predicted_for_.empty() ? "not known" : predicted_for_);
 }
 
 }  // namespace smartmill::program

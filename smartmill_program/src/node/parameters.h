@@ -18,6 +18,9 @@ struct NodeParameters {
   std::string tool = "end_mill", material;
   StretchParameters stretches;
   FollowerParameters follower;
+  double progress_period = 0.25;
+  double radial_ratio = 0.3;
+  double hold_back = 0.05;
   double input_timeout = 1.0;
 
   void declare(ParameterTable& table) {
@@ -47,6 +50,15 @@ struct NodeParameters {
     stretches.declare(table);
     table.section("Place of the tool on the path.");
     follower.declare(table);
+    table.section("Comparison with the prediction.");
+    table.number("progress_period", progress_period, "s", Range::openLow(0.0, 10.0),
+                 "time of a stretch whose force is compared with its prediction");
+    table.number(
+        "kr", radial_ratio, "1", Range::notNegative(),
+        "radial over tangential coefficient, used while the radial one is not identified; the radial "
+        "edge coefficient is then the tangential one");
+    table.number("hold_back", hold_back, "s", Range::closed(0.0, 10.0),
+                 "maximum delay of a verdict after its stamp");
     table.section();
     table.number("input_timeout", input_timeout, "s", Range::positive(),
                  "time without a state of the controller after which diagnostics report a dead input");

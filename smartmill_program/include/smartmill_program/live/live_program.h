@@ -7,6 +7,7 @@
 #include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_core/units.h"
 #include "smartmill_program/engagement/cut_simulation.h"
+#include "smartmill_program/live/path_piece.h"
 #include "smartmill_program/live/program_path.h"
 #include "smartmill_program/prediction/tool_models.h"
 #include "smartmill_program/stock/stock.h"
@@ -59,6 +60,7 @@ struct LiveProgram {
   ProgramPath path;
   std::vector<SteadyStretch> stretches;  ///< in ascending order
   std::vector<Interval> contact;         ///< where material is removed, in ascending order
+  std::vector<PathPiece> pieces;         ///< in ascending order
 
   /// Whether material is removed between two places [m].
   bool cutsBetween(double from, double to) const;
