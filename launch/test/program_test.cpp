@@ -23,6 +23,8 @@
 #include <smartmill_msgs/IdentifyCoefficientsAction.h>
 #include <smartmill_msgs/NewTool.h>
 #include <smartmill_msgs/NodeHealth.h>
+#include <smartmill_msgs/ProgramPath.h>
+#include <smartmill_msgs/ProgramProgress.h>
 #include <smartmill_msgs/RunProgramAction.h>
 #include <smartmill_msgs/ToolCondition.h>
 
@@ -98,6 +100,16 @@ TEST(Program, OnePartGivesTheCoefficients) {
       boost::function<void(const smartmill_msgs::ChatterState&)>([&](const smartmill_msgs::ChatterState& m) {
         if (m.valid) ++judged[m.condition];
         if (m.valid && m.chatter) ++chattered[m.condition];
+      }));
+  smartmill_msgs::ProgramPath path;
+  const ros::Subscriber on_path = nh.subscribe<smartmill_msgs::ProgramPath>(
+      names::PROGRAM_PATH, 10,
+      boost::function<void(const smartmill_msgs::ProgramPath&)>([&](const auto& m) { path = m; }));
+  std::map<std::uint32_t, double> peak;  // [N] largest force, by line
+  const ros::Subscriber on_progress = nh.subscribe<smartmill_msgs::ProgramProgress>(
+      names::PROGRAM_PROGRESS, 1000,
+      boost::function<void(const smartmill_msgs::ProgramProgress&)>([&](const auto& m) {
+        if (m.first_line == m.last_line) peak[m.last_line] = std::max(peak[m.last_line], m.peak_force);
       }));
   // A node that is connected later misses the first stretches in air.
   const std::map<std::string, std::set<std::string>> inputs{
@@ -183,6 +195,23 @@ TEST(Program, OnePartGivesTheCoefficients) {
   EXPECT_NEAR(published.kte, true_kte, 0.05 * true_kte);
   EXPECT_NEAR(published.ktc, true_ktc, 4.0 * published.ktc_std);
   EXPECT_NEAR(published.kte, true_kte, 4.0 * published.kte_std);
+
+  // The force met in each pass, next to what these coefficients predict of it: the load meter gives no radial
+  // ones, and the sensor rings.
+  const auto predicted = [&](int line) {
+    double largest = 0.0;
+    for (std::size_t k = 0; k < path.line.size(); ++k)
+      if (path.line[k] == static_cast<std::uint32_t>(line) && path.peak_force[k] > largest)
+        largest = path.peak_force[k];
+    return largest;
+  };
+  ASSERT_TRUE(wait([&] { return predicted(passes[0].line) > 0.0; }));
+  for (const Pass& pass : passes) {
+    const double expected = predicted(pass.line), met = peak[static_cast<std::uint32_t>(pass.line)];
+    std::printf("line %d: predicted %.0f N, met %.0f N\n", pass.line, expected, met);
+    EXPECT_GT(met, 0.8 * expected) << pass.line;
+    EXPECT_LT(met, 1.5 * expected) << pass.line;
+  }
   EXPECT_EQ(diagnostics["parts begun"], "1");
   EXPECT_EQ(diagnostics["losses of the path"], "0");
 }

@@ -98,6 +98,7 @@ export class Part {
     }
     if (m.chatter) this.chatter.set(m.last_line, m.chatter_frequency);
     else if (m.judged && !this.chatter.has(m.last_line)) this.chatter.set(m.last_line, null);
+    this.compensated = m.compensated;
     this.changed = true;
   }
 
@@ -207,6 +208,7 @@ export class Part {
     this.draw();
     if (!this.changed) return;
     this.changed = false;
+    this.card.aside.textContent = this.compensated ? '' : 'force not compensated: dynamics of the sensor are not known';
     this.drawLines();
   }
   onShow() { this.draw(); this.drawLines(); }

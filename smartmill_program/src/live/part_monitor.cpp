@@ -46,7 +46,7 @@ void PartMonitor::push(const PartVerdict& verdict) {
 
 void PartMonitor::handle(const ForceBlock& block) {
   if (!present_) return;
-  compensated_ = compensated_ && block.isCompensated();
+  present_->compensated = present_->compensated && block.isCompensated();
   for (std::size_t i = 0; i < block.force[0].size(); ++i) {
     const double force = std::hypot(block.force[0][i], block.force[1][i]);
     if (!(force <= present_->peak_force)) present_->peak_force = force;
@@ -65,7 +65,6 @@ void PartMonitor::handle(const PartPlace& place) {
     present_->last_line = place.line;
     const double slack = place.feed * LATE;
     present_->predicted = predictedBetween(present_->from - slack, present_->to + slack);
-    if (!compensated_) present_->peak_force = NOT_A_NUMBER;
     output_(*present_);
   }
   present_ = PartProgress();
@@ -73,7 +72,6 @@ void PartMonitor::handle(const PartPlace& place) {
   present_->from = *place.place;
   present_->first_line = place.line;
   present_->part = place.part;
-  compensated_ = true;
 }
 
 PiecePrediction PartMonitor::predictedBetween(double from, double to) const {

@@ -189,6 +189,7 @@ void ProgramNode::publish(const PartProgress& progress) {
   message.from_place = progress.from;
   message.to_place = progress.to;
   message.peak_force = progress.peak_force;
+  message.compensated = progress.compensated;
   message.predicted_peak_force = progress.predicted.peak_force;
   message.stability_margin = progress.predicted.margin;
   message.judged = !progress.verdicts.empty();

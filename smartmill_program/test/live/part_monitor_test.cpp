@@ -127,6 +127,7 @@ TEST(PartMonitor, ComparesStretchesOfThePath) {
     place = report.to;
     EXPECT_LE(report.first_line, report.last_line);
     EXPECT_NEAR(report.peak_force, 100.0 * report.last_line, 1e-9);
+    EXPECT_TRUE(report.compensated);
     EXPECT_EQ(report.verdicts.size(), report.begin < 51.0 && 51.0 <= report.stamp ? 1u : 0u);
     if (report.last_line == 4 && report.to < rig.begin(4) + 60 * MM)
       EXPECT_NEAR(report.predicted.peak_force / peakOf(0.0, PI), 1.0, 0.02);
@@ -135,12 +136,13 @@ TEST(PartMonitor, ComparesStretchesOfThePath) {
   EXPECT_EQ(rig.reports.back().last_line, 6);
 }
 
-TEST(PartMonitor, StatesNoForceThatIsNotCompensatedAndNothingWithoutAPlace) {
+TEST(PartMonitor, StatesWhetherTheForceIsCompensatedAndNothingWithoutAPlace) {
   Rig raw;
   raw.run(raw.begin(4) + 30 * MM, 1.0, false);
   ASSERT_FALSE(raw.reports.empty());
   for (const PartProgress& report : raw.reports) {
-    EXPECT_TRUE(std::isnan(report.peak_force));
+    EXPECT_FALSE(report.compensated);
+    EXPECT_NEAR(report.peak_force, 400.0, 1e-9);
     EXPECT_TRUE(std::isnan(report.predicted.peak_force));  // not predicted yet
   }
   Rig lost;

@@ -32,9 +32,9 @@ struct PartProgress {
   double begin = 0.0, stamp = 0.0;  ///< [s] begin and end
   double from = 0.0, to = 0.0;      ///< [m] places on the path
   int first_line = 0, last_line = 0, part = 0;
-  double peak_force =
-      NOT_A_NUMBER;           ///< [N] largest compensated force across the tool axis; NaN: not compensated
-  PiecePrediction predicted;  ///< largest force, least margin of the pieces
+  double peak_force = NOT_A_NUMBER;  ///< [N] largest force across the tool axis; NaN: no force
+  bool compensated = true;           ///< the force is free of the sensor's dynamics throughout
+  PiecePrediction predicted;         ///< largest force, least margin of the pieces
   std::vector<PartVerdict> verdicts;
 };
 
@@ -66,7 +66,6 @@ class PartMonitor {
   StreamSorter::Stream places_, blocks_, verdicts_;
   std::vector<PiecePrediction> predictions_;
   std::optional<PartProgress> present_;  // since the last report
-  bool compensated_ = true;              // all blocks of the present stretch
 };
 
 }  // namespace smartmill::program
