@@ -1,5 +1,7 @@
 #include "smartmill_launch/discovery/discovery_parameters.h"
 
+#include <algorithm>
+
 #include "smartmill_core/error.h"
 
 namespace smartmill::discovery {
@@ -26,6 +28,9 @@ void DiscoveryParameters::declare(ParameterTable& table) {
   table.number("slot_time", slot_time, "s", Range::positive(),
                "maximum time of steady cutting: two segments of the monitor");
   table.number("least_slot_time", least_slot_time, "s", Range::positive(), "minimum time of steady cutting");
+  table.number("stable_share", stable_share, "1", Range::openLow(0.0, 1.0),
+               "largest depth of a slot over the stability limit that the model in use predicts; deeper cuts "
+               "are made at this depth");
   table.number("air_time", air_time, "s", Range::positive(), "time of an air cut at speed");
   paths.declareNames(table);
   paths.declarePaths(table);
@@ -64,8 +69,8 @@ session::SlotRequest DiscoveryParameters::slotRequest(const std::string& name, s
 }
 
 std::vector<session::PlannedCut> DiscoveryParameters::initialCuts(const session::CutPlanner& planner,
-                                                                  const std::string& prefix,
-                                                                  std::size_t lane) const {
+                                                                  const std::string& prefix, std::size_t lane,
+                                                                  const BelievedLimits& limits) const {
   planner.requireLanes(lane + watch_speeds.size(),
                        lane == 0 ? "initial slots" : "initial slots, in addition to those already cut");
   std::vector<session::PlannedCut> cuts;
@@ -77,7 +82,7 @@ std::vector<session::PlannedCut> DiscoveryParameters::initialCuts(const session:
     session::SlotRequest request = slotRequest(prefix + "slot_" + std::to_string(k + 1), lane + k);
     request.speed = watch_speeds[k];
     request.feed_per_tooth = watch_feeds[k];
-    request.depth = watch_depths[k];
+    request.depth = std::min(watch_depths[k], limits.depthAt(request.speed));
     cuts.push_back(planner.slot(request));
   }
   return cuts;

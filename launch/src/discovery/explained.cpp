@@ -1,5 +1,6 @@
 #include "smartmill_launch/discovery/explained.h"
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <utility>
@@ -86,7 +87,8 @@ Explained readExplained(const std::string& file) {
 
 session::PlannedCut planSuggestedTest(const session::CutPlanner& planner,
                                       const Explained::SuggestedTest& suggested_test,
-                                      const session::SlotRequest& slot, double air_time) {
+                                      const session::SlotRequest& slot, double air_time,
+                                      const BelievedLimits& limits) {
   if (!suggested_test.cut) {
     session::PlannedCut air = planner.air(suggested_test.speed, air_time);
     air.condition.name = slot.name;
@@ -101,7 +103,7 @@ session::PlannedCut planSuggestedTest(const session::CutPlanner& planner,
   session::SlotRequest request = slot;
   planner.requireLanes(request.lane + 1, "no lane is left for the suggested test");
   request.speed = suggested_test.speed;
-  request.depth = e.axial_depth;
+  request.depth = std::min(e.axial_depth, limits.depthAt(request.speed));
   request.feed_per_tooth = e.feed_per_tooth;
   return planner.slot(request);
 }

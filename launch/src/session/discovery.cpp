@@ -15,6 +15,7 @@
 #include "smartmill_core/modal/results.h"
 #include "smartmill_core/model/cause_odds.h"
 #include "smartmill_core/names.h"
+#include "smartmill_core/units.h"
 #include "smartmill_ros/conversions.h"
 #include "smartmill_ros/parameter_server.h"
 
@@ -175,11 +176,42 @@ void Discovery::waitUntilReady() {
   }
 }
 
+/// Of slots at all speeds of the spindle, by the chart of the model in use.
+discovery::BelievedLimits Discovery::believedLimits() {
+  const MachineModel model = readMachineModel(installed_model_.inUse());
+  if (model.tool_tip.x.modes.empty() && model.tool_tip.y.modes.empty()) return {};
+  constexpr double DEEPEST = 20.0;  // [mm]
+  constexpr int SPEEDS = 400;
+  const double lowest = *std::min_element(parameters_.watch_speeds.begin(), parameters_.watch_speeds.end());
+  const double highest =
+      model.spindle && model.spindle->max_speed
+          ? *model.spindle->max_speed
+          : 2.0 * *std::max_element(parameters_.watch_speeds.begin(), parameters_.watch_speeds.end());
+  const std::string chart = parameters_.folder + "/stability_" + std::to_string(explained_) + ".csv",
+                    log = chart + ".log";
+  stage("computing the stability limits that the model in use predicts");
+  std::error_code failed;
+  fs::create_directories(parameters_.folder, failed);
+  try {
+    const int code = runTool({"lobes", "the stability limits of the cuts"},
+                             {installed_model_.inUse(), "--entry-deg", "0", "--exit-deg", "180", "--speeds",
+                              formatted("%.0f:%.0f:%d", 0.5 * units::rpmFromRadPerSec(lowest),
+                                        units::rpmFromRadPerSec(highest), SPEEDS),
+                              "--max-depth-mm", formatted("%g", DEEPEST), "-o", chart},
+                             log, [&] { return cancel_.load(); });
+    driver_.checkStop();
+    if (code != 0) throw Error("lobes: no chart of " + installed_model_.inUse() + ", see " + log);
+    return {chart, parameters_.stable_share};
+  } catch (const Error& error) {
+    throw Failure{Result::CUT_FAILED, error.what()};
+  }
+}
+
 void Discovery::makeInitialCuts() {
   std::vector<PlannedCut> cuts;
   try {
-    cuts =
-        parameters_.initialCuts(planner_, goals_ == 1 ? "" : "again_" + std::to_string(goals_) + "_", lane_);
+    cuts = parameters_.initialCuts(planner_, goals_ == 1 ? "" : "again_" + std::to_string(goals_) + "_",
+                                   lane_, believedLimits());
   } catch (const Error& error) {
     throw Failure{Result::CUT_FAILED, error.what()};
   }
@@ -269,16 +301,22 @@ bool Discovery::makeSuggestedTest(const Explained::SuggestedTest& suggested_test
   PlannedCut planned;
   try {
     planned = planSuggestedTest(planner_, suggested_test, parameters_.slotRequest(name, lane_),
-                                parameters_.air_time);
+                                parameters_.air_time, believedLimits());
   } catch (const Error& error) {
     result.tests.push_back("refused, " + std::string(error.what()) + ": " + suggested_test.text);
     stage(result.tests.back());
     return false;
   }
+  const double depth = planned.condition.engagement.axial_depth;
+  const std::string made =
+      suggested_test.cut && depth < suggested_test.engagement.axial_depth
+          ? formatted("made at a depth of %.3g mm, %.3g of the predicted stability limit: ",
+                      depth / units::MM, parameters_.stable_share)
+          : "made: ";
   stage("suggested test " + suggested_test.text);
   cut(planned);
   ++feedback_.tests_done;
-  result.tests.push_back("made: " + suggested_test.text);
+  result.tests.push_back(made + suggested_test.text);
   return true;
 }
 

@@ -54,6 +54,7 @@ class Discovery {
   void finish(Handle& handle, const Result& result);
 
   void waitUntilReady();
+  discovery::BelievedLimits believedLimits();
   void makeInitialCuts();
   void cut(const PlannedCut& cut);
   discovery::Explained explain(Result& result);

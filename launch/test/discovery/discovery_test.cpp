@@ -110,6 +110,36 @@ TEST(Explained, aSuggestedTestMustFitMachineAndStock) {
   EXPECT_EQ(planSuggestedTest(planner, air, p.slotRequest("suggested", 9), 1.0).feed, 0.0);
 }
 
+// Limits of 8 and 2 mm at 4000 and 4050 rpm, stable to the largest depth at 7200 rpm.
+TEST(BelievedLimits, CutsStayInsideTheirShareOfTheLimit) {
+  const TemporaryFolder folder;
+  const BelievedLimits limits(written(folder, "chart.csv",
+                                      "rpm,limit_mm,chatter_hz,kind\n4000,8,1200,hopf\n4050,2,1210,hopf\n"
+                                      "7200,,,\n"),
+                              0.5);
+  EXPECT_NEAR(limits.depthAt(units::radPerSecFromRpm(4000.0)), 1e-3, 1e-12);  // both are within 2 %
+  EXPECT_NEAR(limits.depthAt(units::radPerSecFromRpm(3950.0)), 4e-3, 1e-12);
+  EXPECT_TRUE(std::isinf(limits.depthAt(units::radPerSecFromRpm(7200.0))));
+  EXPECT_TRUE(std::isinf(BelievedLimits().depthAt(400.0)));
+  EXPECT_THROW(BelievedLimits(written(folder, "no_chart.csv", "speed,depth\n1,2\n"), 0.5), Error);
+
+  const session::CutPlanner planner(machine(), {});
+  DiscoveryParameters p;
+  p.watch_speeds[0] = units::radPerSecFromRpm(4000.0);
+  p.watch_depths[0] = 1.4e-3;
+  p.watch_depths[3] = 1.4e-3;
+  const auto cuts = p.initialCuts(planner, "", 0, limits);
+  EXPECT_NEAR(cuts[p.watch_air.size()].condition.engagement.axial_depth, 1e-3, 1e-12);
+  EXPECT_NEAR(cuts[p.watch_air.size() + 3].condition.engagement.axial_depth, 1.4e-3, 1e-12);
+  Explained::SuggestedTest test;
+  test.cut = true;
+  test.speed = units::radPerSecFromRpm(4000.0);
+  test.engagement = {0.0, units::PI, 3e-3, 1e-4};
+  EXPECT_NEAR(planSuggestedTest(planner, test, p.slotRequest("suggested", 2), 1.0, limits)
+                  .condition.engagement.axial_depth,
+              1e-3, 1e-12);
+}
+
 TEST(InstalledModel, keepsThePreviousModel) {
   const TemporaryFolder folder;
   const std::string nominal = written(folder, "nominal.yaml", "old"),

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "smartmill_launch/discovery/believed_limits.h"
 #include "smartmill_launch/session/cut_planner.h"
 
 namespace smartmill::discovery {
@@ -20,6 +21,7 @@ struct DiscoveryParameters {
   std::vector<double> watch_air{523.6};
   double slot_time = 0.9, least_slot_time = 0.8;
   double air_time = 1.0;
+  double stable_share = 0.5;
 
   int threads = 2;
   double ready_timeout = 30.0;
@@ -34,10 +36,11 @@ struct DiscoveryParameters {
   /// @throws Error naming key and value.
   void validate() const;
 
-  /// The initial cuts, in order. @param prefix of their names @param lane of the first slot
+  /// The initial cuts, in order, no deeper than the limits. @param prefix of their names @param lane of the
+  /// first slot
   /// @throws Error if a cut does not fit machine or stock.
   std::vector<session::PlannedCut> initialCuts(const session::CutPlanner& planner, const std::string& prefix,
-                                               std::size_t lane) const;
+                                               std::size_t lane, const BelievedLimits& limits = {}) const;
   /// A slot with name, lane and times; cutting conditions not set.
   session::SlotRequest slotRequest(const std::string& name, std::size_t lane) const;
 };

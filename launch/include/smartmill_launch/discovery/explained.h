@@ -6,6 +6,7 @@
 
 #include "smartmill_core/model/reported_parameter.h"
 #include "smartmill_core/signal/streams.h"
+#include "smartmill_launch/discovery/believed_limits.h"
 #include "smartmill_launch/session/cut_planner.h"
 
 namespace smartmill::discovery {
@@ -37,9 +38,11 @@ struct Explained {
 /// @throws Error with the file and what is wrong in it.
 Explained readExplained(const std::string& file);
 
-/// The suggested test as a slot or an air cut. @throws Error if it does not fit machine, stock or tool.
+/// The suggested test as a slot, no deeper than the limits, or an air cut. @throws Error if it does not fit
+/// machine, stock or tool.
 session::PlannedCut planSuggestedTest(const session::CutPlanner& planner,
                                       const Explained::SuggestedTest& suggested_test,
-                                      const session::SlotRequest& slot, double air_time);
+                                      const session::SlotRequest& slot, double air_time,
+                                      const BelievedLimits& limits = {});
 
 }  // namespace smartmill::discovery
