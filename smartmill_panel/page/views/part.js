@@ -168,6 +168,7 @@ export class Part {
       line(k, Number.isFinite(value) ? toColour((value - low) / (high - low)) : unknown, Number.isFinite(value) ? 4 : 2);
     }
     this.drawTool(c);
+    this.canvas.dataset.drawn = 'yes';
   }
 
   drawTool(c) {

@@ -19,7 +19,7 @@ from browser import PATIENCE, Browser, free_port
 NODE, PAGE, OUT = sys.argv[1:4]
 TOKEN = "a token that is long enough"
 SIZES = {"1280x800": (1280, 800), "1920x1080": (1920, 1080), "phone": (390, 844)}
-VIEWS = ["overview", "forces", "stability", "dynamics", "session", "model", "instruments", "fleet", "health"]
+VIEWS = ["overview", "forces", "part", "stability", "dynamics", "session", "model", "instruments", "fleet", "health"]
 LOSS_TIMEOUT = 2.0  # [s] in which the page must report a lost node
 
 
@@ -151,6 +151,22 @@ class Machine:
         steps = [m.SessionStep(name="connect", detail="all there", elapsed=1.5, state=1), m.SessionStep(name="slot test", elapsed=61.0)]
         self.publish("session/state", m.SessionState(tool="end_mill", material="al7050", running=True, steps=steps), latch=True)
         self.fleet()
+        self.part()
+
+    def part(self):
+        """A slot (line 4), the way to the next pass in air (5), and that pass (6), predicted to chatter."""
+        m, nan = self.msg, math.nan
+        xs, ys = [-0.04, 0.0, 0.02, 0.02, -0.02], [0.05, 0.05, 0.05, 0.06, 0.06]
+        place = [0.0]
+        for k in range(1, len(xs)):
+            place.append(place[-1] + math.hypot(xs[k] - xs[k - 1], ys[k] - ys[k - 1]))
+        self.publish("program/path", m.ProgramPath(program="/parts/part.nc", place=place, x=xs, y=ys, z=[-0.1] * 5, line=[4, 4, 5, 6], kind=[2, 2, 1, 2],
+                                                   peak_force=[200.0, 210.0, nan, 300.0], stability_margin=[1.8, 1.7, nan, 0.9]), latch=True)
+        for line, begin, end, force, expected, margin, chatter in ((4, 0.0, 0.06, 205.0, 210.0, 1.7, nan), (5, 0.06, 0.07, 3.0, nan, nan, nan),
+                                                                   (6, 0.07, 0.09, 420.0, 300.0, 0.9, 812.0)):
+            self.publish("program/progress", m.ProgramProgress(
+                program="/parts/part.nc", part=1, first_line=line, last_line=line, from_place=begin, to_place=end, peak_force=force, compensated=True,
+                predicted_peak_force=expected, stability_margin=margin, judged=line != 5, chatter=line == 6, chatter_frequency=chatter))
 
     def fleet(self, reached=True, message="2 new of 2 sent to postgresql://mill_07@shop/fleet"):
         """A fleet of twelve machines: Ktc of mill 3 is 24 % larger, mill 7 is this one, mill 9 has never pushed."""
@@ -458,6 +474,25 @@ def instruments_are_shown(browser, machine):
     browser.wait("!document.querySelector('#instruments .stale')")
 
 
+def the_part_is_shown(browser, machine):
+    browser.js("(location.hash = 'part', 1)")
+    browser.wait("document.querySelector('#part-path').dataset.drawn == 'yes'")
+    machine.part()  # the page is subscribed
+    row = "[...document.querySelectorAll('#part-lines tbody tr')].map(r => [...r.children].map(e => e.textContent))"
+    becomes(lambda: browser.js(row), [["6", "chatter at 812 Hzpredicted to chattermore force than predicted", "420", "300", "1.40", "0.90"]])
+    becomes(lambda: browser.text("#part-scale"), "Measured peak force 0 to 420 N, grey: not cut yet")
+    # Colours of the pieces at their middle: the slot is cut with half of the largest force, the pass with all of it.
+    at = ("(p => { const [x, y] = p.toPixel(arguments[0], arguments[1]), r = devicePixelRatio;"
+          " return [...p.canvas.getContext('2d').getImageData(x * r, y * r, 1, 1).data].slice(0, 3); })(window.smartmill.parts.find(p => p.between))")
+    slot, last = browser.js(at, -0.03, 0.05), browser.js(at, 0.0, 0.06)
+    assert max(abs(a - b) for a, b in zip(last, (254, 232, 56))) < 12, last
+    assert max(abs(a - b) for a, b in zip(slot, (122, 122, 115))) < 20, slot
+    browser.js("(document.querySelector('#part-quantity').value = 'margin', document.querySelector('#part-quantity').dispatchEvent(new Event('change')), 1)")
+    becomes(lambda: browser.text("#part-scale"), "Stability margin 0.500 to 3.00 , grey: not predicted")
+    browser.js("(document.querySelector('#part-quantity').value = 'measured', document.querySelector('#part-quantity').dispatchEvent(new Event('change')), 1)")
+    browser.js("(location.hash = 'overview', 1)")
+
+
 def health_of_the_nodes_is_shown(browser, machine):
     browser.js("(location.hash = 'health', 1)")
     browser.wait("document.querySelectorAll('#health-inputs tbody tr').length >= 2")
@@ -732,6 +767,7 @@ def main():
             bench.case(the_fleet_is_shown, browser, machine)
             bench.case(instruments_are_shown, browser, machine)
             bench.case(a_new_instrument_is_tried_written_and_calibrated, browser, bench, machine)
+            bench.case(the_part_is_shown, browser, machine)
             bench.case(health_of_the_nodes_is_shown, browser, machine)
             bench.case(silence_turns_values_grey, browser, machine)
             bench.case(hostile_origins_and_commands_without_token_are_refused, bench)
