@@ -100,6 +100,9 @@ TEST_F(PageTest, TheFleetIsShown) {
 TEST_F(PageTest, InstrumentsAreShown) {
   check("InstrumentsAreShown");
 }
+TEST_F(PageTest, ThePartIsShown) {
+  check("ThePartIsShown");
+}
 TEST_F(PageTest, HealthOfTheNodesIsShown) {
   check("HealthOfTheNodesIsShown");
 }
