@@ -105,7 +105,7 @@ TEST(PathPieces, CoverThePathAndArePredicted) {
   // Where the tool enters or leaves, some angles of the slot are cut without the others.
   EXPECT_NEAR(peak[4] / peakOf(0.0, PI), 1.0, 0.02);
   EXPECT_NEAR(peak[6] / peakOf(PI - std::acos(0.4), PI), 1.0, 0.02);
-  EXPECT_NEAR(length[4], 70 * MM, 0.5 * MM);  // 60 mm of stock and a diameter
+  EXPECT_NEAR(length[4], 65 * MM, 0.5 * MM);  // 60 mm of stock and a radius
   EXPECT_LT(pieces.size(),
             250u);  // one piece for the steady part of each line, one for each step at its ends
   for (const PiecePrediction& one : predictPieces(pieces, tools(), std::nullopt))
