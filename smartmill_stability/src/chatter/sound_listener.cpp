@@ -116,6 +116,7 @@ void SoundListener::endFrame() {
       [](const SoundFrame& f) { return static_cast<double>(f.clipped) / static_cast<double>(f.samples); });
   if (state_.kind == SoundState::Kind::no_sound) {
     state_.kind = SoundState::Kind::idle;
+    state_.silence.clear();
     note("listening");
   }
   const CutFinderOptions detection;
@@ -221,7 +222,7 @@ void SoundListener::endCut(std::uint64_t end) {
 }
 
 void SoundListener::stop(const std::string& reason) {
-  if (state_.kind == SoundState::Kind::no_sound) return;
+  if (!state_.silence.empty()) return;
   std::string line = "no sound: " + reason;
   if (cut_) {
     line += formatted(", in a cut: the %.1f s that were heard are judged", newest_ - cut_->begin_time);
@@ -231,6 +232,7 @@ void SoundListener::stop(const std::string& reason) {
   state_.level = state_.quiet_level = RecordingVerdict::UNKNOWN;
   state_.clipped = 0.0;
   rate_ = 0.0;
+  state_.silence = line;
   note(line);
 }
 

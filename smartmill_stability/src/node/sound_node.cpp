@@ -147,7 +147,8 @@ void SoundNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   constexpr double MOST_CLIPPED = 0.001;  // [1]
   const SoundState& state = listener_.state();
   if (state.kind == SoundState::Kind::no_sound) {
-    status.summary(diagnostic_msgs::DiagnosticStatus::ERROR, state.text.empty() ? "no sound" : state.text);
+    status.summary(diagnostic_msgs::DiagnosticStatus::ERROR,
+                   state.silence.empty() ? "no sound yet" : state.silence);
   } else if (state.clipped > MOST_CLIPPED) {
     status.summaryf(diagnostic_msgs::DiagnosticStatus::WARN,
                     "%.1f %% of the samples are clipped: reduce the gain", 100.0 * state.clipped);

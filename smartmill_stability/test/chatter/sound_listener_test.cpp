@@ -199,6 +199,13 @@ TEST(SoundListener, lostSamplesEndACutAndAFewAreBridged) {
   EXPECT_THAT(shop.lines, ::testing::Contains(HasSubstr("4000 samples are missing, in a cut")));
 }
 
+TEST(SoundListener, aMicrophoneThatNeverSendsIsOneLine) {
+  SoundListener listener(parameters());
+  listener.stop("no samples");
+  listener.stop("no samples");
+  EXPECT_EQ(listener.takeLines(), std::vector<std::string>{"no sound: no samples"});
+}
+
 TEST(SoundListener, mutedIsNoSound) {
   Workshop shop(parameters());
   shop.idle(1.0);

@@ -58,6 +58,7 @@ struct SoundState {
   std::vector<SoundTry> tries;  ///< in the order in which they were made; the last one may still run
   bool running = false;         ///< the last try is not complete
   SpeedAdvice advice;           ///< from the tries
+  std::string silence;          ///< why there is no sound, one line; empty: there is
   std::string text;             ///< last event, one line
 };
 
