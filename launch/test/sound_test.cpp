@@ -16,11 +16,11 @@
 #include <smartmill_msgs/SoundAdvice.h>
 
 #include "launched.h"
+#include "session/child.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/testing/eventually.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
-#include "smartmill_launch/session/child.h"
 #include "smartmill_recording/recording_reader.h"
 
 namespace smartmill {
