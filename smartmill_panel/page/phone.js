@@ -56,7 +56,7 @@ class Phone {
 
     const number = (id, label, step) => [make('label', {}, label, make('input', { id, type: 'number', inputmode: 'numeric', min: '0', step }))];
     this.answer = make('div', { id: 'answer', class: 'dim' });
-    this.settings = card('', '', make('div', { class: 'fields' }, ...number('teeth', 'Teeth', '1'), ...number('speed', 'Speed of the next cut [rpm]', '10'),
+    this.settings = card('', '', make('div', { class: 'fields' }, ...number('teeth', 'Teeth', '1'), ...number('speed', 'Next cut [rpm]', '10'),
       make('button', { id: 'set', onclick: () => this.set() }, 'Set')), this.answer);
 
     this.tries = make('div', { id: 'tries' });
@@ -140,9 +140,9 @@ class Phone {
     this.word.textContent = word;
     const parts = [];
     if (last?.kind === 2) parts.push(`${fixed(last.frequency)} Hz`);
-    if (last && Number.isFinite(last.probability)) parts.push(`chatter ${percent(last.probability)}`);
-    if (last) parts.push(`at ${fixed(rpm(last.spindle_speed))} rpm${m.running ? ', cutting' : ''}`);
-    this.frequency.textContent = parts.join(', ');
+    if (last && Number.isFinite(last.spindle_speed)) parts.push(`at ${fixed(rpm(last.spindle_speed))} rpm`);
+    if (last && Number.isFinite(last.probability)) parts.push(`probability of chatter ${percent(last.probability)}`);
+    this.frequency.replaceChildren(...parts.map(part => make('div', {}, part)));
   }
 
   showNext(m) {
@@ -162,10 +162,11 @@ class Phone {
     if (!m.tries.length) return this.tries.replaceChildren(make('p', { class: 'dim' }, 'None yet'));
     const rows = m.tries.map((one, k) => {
       const [kind, word] = VERDICTS[one.kind];
-      return make('tr', { class: one.used ? '' : 'unused', title: one.text }, make('td', { title: clock(one.begin) }, `${k + 1}`), make('td', { class: 'number' }, `${fixed(rpm(one.spindle_speed))} rpm`),
-        make('td', {}, make('span', { class: `shape ${kind}` }), word === 'CHATTER' ? 'Chatter' : word), make('td', { class: 'number' }, one.kind === 2 ? `${fixed(one.frequency)} Hz` : ''));
+      return make('tr', { class: one.used ? '' : 'unused', title: one.text }, make('td', { title: clock(one.begin) }, `${k + 1}`), make('td', { class: 'number' }, fixed(rpm(one.spindle_speed))),
+        make('td', {}, make('span', { class: `shape ${kind}` }), word === 'CHATTER' ? 'Chatter' : word), make('td', { class: 'number' }, one.kind === 2 ? fixed(one.frequency) : ''));
     });
-    this.tries.replaceChildren(make('table', {}, make('tbody', {}, ...rows.reverse())));
+    this.tries.replaceChildren(make('table', {}, make('thead', {}, make('tr', {}, make('th'), make('th', { class: 'number' }, 'rpm'), make('th'), make('th', { class: 'number' }, 'Hz'))),
+      make('tbody', {}, ...rows.reverse())));
   }
 }
 
