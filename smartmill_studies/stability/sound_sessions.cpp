@@ -47,6 +47,7 @@ SoundSession runSoundSession(const MachineModel& model, const RegenerativeSystem
     listenTo(cut.scene, listener, stream);
     cut.scene.recording = {};
     cut.heard.kind = RecordingVerdict::Kind::no_cut;
+    cut.heard.text = listener.state().text;
     if (listener.state().tries.size() > before) cut.heard = listener.state().tries.back();
     session.cuts.push_back(cut);
     session.stable = !cut.scene.chatters && cut.heard.kind == RecordingVerdict::Kind::stable;

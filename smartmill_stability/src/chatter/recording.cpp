@@ -385,7 +385,7 @@ class RecordingAnalysis {
     } else {
       verdict.kind = probability < RecordingVerdict::STABLE_BELOW    ? Kind::stable
                      : probability > RecordingVerdict::CHATTER_ABOVE ? Kind::chatter
-                                                   : Kind::unsure;
+                                                                     : Kind::unsure;
       if (verdict.kind != Kind::chatter) verdict.reason = textOf(mostFrequentReason());
     }
     return verdict;

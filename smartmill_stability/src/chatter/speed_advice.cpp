@@ -21,19 +21,21 @@ double secondsOf(const Recording& recording) {
 }  // namespace
 
 RecordingVerdict judgeCut(const CutSound& sound) {
+  constexpr double MARGIN = 0.001;  // [s] of the interpolation
+  constexpr int FAMILY = 2;         // [1] companions that show teeth
   RecordingRequest request;
   request.speed = sound.speed;
   request.teeth = sound.teeth;
-  RecordingVerdict verdict = judgeRecording(sound.cut, request);
-  constexpr double MARGIN = 0.001;  // [s] of the interpolation
-  if (verdict.kind == Kind::no_cut || !std::isfinite(verdict.speed) ||
-      secondsOf(sound.air) < CutFinder::windowOf(sound.cut, verdict.speed) + MARGIN)
-    return verdict;
-  request.speed = verdict.speed;
+  const RecordingVerdict alone = judgeRecording(sound.cut, request);
+  if (!std::isfinite(alone.speed) ||
+      secondsOf(sound.air) < CutFinder::windowOf(sound.cut, alone.speed) + MARGIN)
+    return alone;
+  request.speed = alone.speed;
   request.idle = sound.air;
-  const RecordingVerdict::SpeedSource source = verdict.speed_source;
-  verdict = judgeRecording(sound.cut, request);
-  verdict.speed_source = source;
+  RecordingVerdict verdict = judgeRecording(sound.cut, request);
+  const bool vibrates = verdict.kind == Kind::unsure || (verdict.chatter() && verdict.companions >= FAMILY);
+  if (alone.kind == Kind::no_cut && !vibrates) return alone;
+  verdict.speed_source = alone.speed_source;
   return verdict;
 }
 

@@ -69,6 +69,7 @@ void run(const Request& request) {
       wrong += decides && (cut.heard.kind == RecordingVerdict::Kind::chatter) != cut.scene.chatters;
       undecided += !decides;
       ++cuts;
+      if (!decides) std::printf(" (%s)", cut.heard.text.c_str());
       std::printf(" %.0f rpm %s, heard %s;", units::rpmFromRadPerSec(cut.scene.speed),
                   cut.scene.chatters ? "chatters" : "stable", nameOf(cut.heard.kind));
     }

@@ -18,8 +18,9 @@ struct CutSound {
   double speed = 0.0;  ///< [rad/s] stated; 0: unknown
 };
 
-/// judgeRecording() of a cut. Lines of the air are no chatter, but being louder than the air is no sign of a
-/// cut here: a spindle that starts and coolant are, too.
+/// judgeRecording() of a cut. Lines of the air are no chatter. Being louder than the air is no sign of a cut
+/// here: a spindle that starts and coolant are, too; lines that are not in the air and a tooth passing
+/// frequency apart are one.
 RecordingVerdict judgeCut(const CutSound& sound);
 
 /// A cut that was heard and judged.
