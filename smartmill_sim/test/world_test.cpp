@@ -338,6 +338,33 @@ TEST(World, PulsesMatchTheAngle) {
   EXPECT_GT(compared, 65);
 }
 
+// In air: four orders of the spindle with amplitudes of 0.01 Pa over the order, and noise of 0.004 Pa.
+TEST(World, AMicrophoneHearsTheSpindle) {
+  WorldOptions options;
+  EXPECT_FALSE(options.microphone);
+  options.microphone = true;
+  World world(millThatCuts(), options);
+  std::vector<MotionState> states(World::BLOCK);
+  const double speed = units::radPerSecFromRpm(6000.0);  // 256 samples a revolution
+  double angle = 0.0, square = 0.0;
+  World::Block block;
+  constexpr int BLOCKS = 100;
+  for (int k = 0; k < BLOCKS; ++k) {
+    for (MotionState& state : states) {
+      angle += speed / World::SAMPLE_RATE;
+      state.spindle_angle = std::fmod(angle, units::TWO_PI);
+      state.spindle_speed = speed;
+      state.position = {0.0, 0.0, 0.1};
+    }
+    world.advance(block, states);
+    ASSERT_EQ(block.sound.units, std::vector<std::string>{"Pa"});
+    ASSERT_EQ(block.sound.size(), World::BLOCK);
+    for (const double pressure : block.sound.samples) square += pressure * pressure / (BLOCKS * World::BLOCK);
+  }
+  const double expected = 0.5e-4 * (1.0 + 1.0 / 4.0 + 1.0 / 9.0 + 1.0 / 25.0) + 0.004 * 0.004;
+  EXPECT_NEAR(square, expected, 0.02 * expected);  // 4 sigma of the noise's contribution: 25,600 samples
+}
+
 TEST(World, CuttingWithTheSpindleAtRestIsRefused) {
   Machine machine(millThatCuts());
   machine.program("G90\nG0 X-60\nG1 F6000 Z-1\nG1 F2400 X40\n");

@@ -237,6 +237,21 @@ std::vector<double> soundOf(const SoundScene& scene, const std::vector<double>& 
   return shop.take();
 }
 
+/// [1] in a revolution
+int samplesOf(const RegenerativeSystem& system) {
+  return wholeTeeth(SAMPLES, system.teeth);
+}
+
+TwinCut planOf(const RegenerativeSystem& system, const SoundScene& scene) {
+  const int turns = static_cast<int>(CUT * scene.speed / units::TWO_PI);
+  return {scene.speed, {system.entry, system.exit, scene.depth, FEED}, samplesOf(system), turns, 0};
+}
+
+bool chattersIn(const Record& record, const RegenerativeSystem& system) {
+  const int samples = samplesOf(system);
+  return repeatsNoMore(record, samples, system.evenPitch() ? samples / system.teeth : samples, FEED);
+}
+
 }  // namespace
 
 std::vector<SoundKind> soundKinds() {
@@ -272,7 +287,6 @@ std::vector<SoundScene> soundScenes(const MachineModel& model, const Regenerativ
   const auto solver = makeFloquetSolver(Method::collocation, system);
   std::mt19937_64 random(range.seed);
   std::uniform_real_distribution<double> unit;
-  const int samples = wholeTeeth(SAMPLES, system.teeth);
   std::vector<SoundScene> scenes;
   std::vector<std::vector<double>> sounds(kinds.size());
   std::vector<TwinCut> plan;
@@ -293,17 +307,15 @@ std::vector<SoundScene> soundScenes(const MachineModel& model, const Regenerativ
     const bool off = kind == SoundKind::speed_error || kind == SoundKind::chatter_shop;
     scene.stated_speed = scene.speed * (1.0 + (off ? 0.015 : 0.003) * (2.0 * unit(random) - 1.0));
     if (cuts(kind)) {
-      const int turns = static_cast<int>(CUT * scene.speed / units::TWO_PI);
-      plan.push_back({scene.speed, {system.entry, system.exit, scene.depth, FEED}, samples, turns, 0});
+      plan.push_back(planOf(system, scene));
       of.push_back(scenes.size());
     }
     scenes.push_back(scene);
   }
-  const int period = system.evenPitch() ? samples / system.teeth : samples;
   runTwinCuts({model}, plan, {{"tool_x", "tool_y"}}, [&](std::size_t i, const Record& record) {
     SoundScene& scene = scenes[of[i]];
-    scene.chatters = repeatsNoMore(record, samples, period, FEED);
-    sounds[of[i]] = pressureOf(record, samples * scene.speed / units::TWO_PI);
+    scene.chatters = chattersIn(record, system);
+    sounds[of[i]] = pressureOf(record, samplesOf(system) * scene.speed / units::TWO_PI);
   });
   for (std::size_t k = 0; k < scenes.size(); ++k) {
     scenes[k].recording.sample_rate = RATE;
@@ -311,6 +323,22 @@ std::vector<SoundScene> soundScenes(const MachineModel& model, const Regenerativ
         soundOf(scenes[k], sounds[k], range.seed + 17u * static_cast<unsigned>(k))};
   }
   return scenes;
+}
+
+SoundScene cutScene(const MachineModel& model, const RegenerativeSystem& system, double speed, double depth,
+                    unsigned seed) {
+  SoundScene scene;
+  scene.kind = SoundKind::stable;
+  scene.speed = scene.stated_speed = speed;
+  scene.depth = depth;
+  runTwinCuts({model}, {planOf(system, scene)}, {{"tool_x", "tool_y"}},
+              [&](std::size_t, const Record& record) {
+                scene.chatters = chattersIn(record, system);
+                scene.recording.channels = {
+                    soundOf(scene, pressureOf(record, samplesOf(system) * speed / units::TWO_PI), seed)};
+              });
+  scene.recording.sample_rate = RATE;
+  return scene;
 }
 
 std::vector<Capture> captures() {

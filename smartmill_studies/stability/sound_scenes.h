@@ -58,6 +58,11 @@ struct SoundScene {
 std::vector<SoundScene> soundScenes(const MachineModel& model, const RegenerativeSystem& system,
                                     const StudyRange& range, const std::vector<SoundKind>& kinds);
 
+/// The same of one cut at a speed [rad/s] and depth [m] that are given, with a second of the idle spindle
+/// before and after it.
+SoundScene cutScene(const MachineModel& model, const RegenerativeSystem& system, double speed, double depth,
+                    unsigned seed);
+
 /// Records a scene in another way. @param teeth of the tool
 SoundScene captured(const SoundScene& scene, Capture capture, int teeth, unsigned seed);
 

@@ -203,6 +203,7 @@ ApiResponse PanelNode::answerNow(const ApiRequest& request) {
   if (request.path == "report") return newestReport(parameters_.reports);
   if (request.path == "note") return takeNote(request, log_);
   if (request.path == "replay") return controlReplay(nh_, request);
+  if (request.path == "sound") return setSoundCut(nh_, request, log_);
   for (const auto& [path, run] : authorised_) {
     if (request.path != path) continue;
     if (const auto refusal = gate_.refusal(request)) {

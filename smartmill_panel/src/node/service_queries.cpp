@@ -7,6 +7,7 @@
 
 #include <smartmill_msgs/FindCoefficients.h>
 #include <smartmill_msgs/PlayControl.h>
+#include <smartmill_msgs/SetSoundCut.h>
 #include <smartmill_msgs/WhatIf.h>
 #include <nlohmann/json.hpp>
 
@@ -20,7 +21,7 @@ namespace {
 using nlohmann::json;
 
 // Data that do not exist yet are no error of the client: the response contains the reason instead.
-constexpr int BAD_REQUEST = 400, UNAVAILABLE = 200;
+constexpr int BAD_REQUEST = 400, CONFLICT = 409, UNAVAILABLE = 200;
 constexpr double NONE = std::numeric_limits<double>::quiet_NaN();
 
 double numberOf(const ApiRequest& request, const std::string& key, double otherwise) {
@@ -161,6 +162,51 @@ ApiResponse queryCoefficients(ros::NodeHandle& nh, const ApiRequest& request) {
                        {"stamp", c.header.stamp.toSec()},
                        {"message", found.message}};
   return {200, answer.dump(-1, ' ', false, json::error_handler_t::replace)};
+}
+
+ApiResponse setSoundCut(ros::NodeHandle& nh, const ApiRequest& request, PanelLog& log) {
+  constexpr int NOT_ALLOWED = 405;
+  if (!request.post) return messageResponse(NOT_ALLOWED, "a setting requires POST");
+  const json body = json::parse(request.body, nullptr, false);
+  if (!body.is_object()) return messageResponse(BAD_REQUEST, "expected a JSON object");
+  smartmill_msgs::SetSoundCut service;
+  auto& setting = service.request;
+  setting.speed_low = setting.speed_high = setting.spindle_speed = NONE;
+  for (const auto& [key, value] : body.items()) {
+    const auto number = [&, key = key, value = value] {
+      if (!value.is_number()) throw Error(oneLine(key, 40) + ": expected a number");
+      return value.get<double>();
+    };
+    const auto flag = [&, key = key, value = value] {
+      if (!value.is_boolean()) throw Error(oneLine(key, 40) + ": expected true or false");
+      return value.get<bool>();
+    };
+    if (key == "teeth") {
+      const double teeth = number();
+      if (!(teeth >= 1.0 && teeth <= 40.0) || teeth != std::floor(teeth))
+        throw Error("teeth: expected an integer from 1 to 40");
+      setting.teeth = static_cast<std::uint32_t>(teeth);
+    } else if (key == "speed_low") {
+      setting.speed_low = number();
+    } else if (key == "speed_high") {
+      setting.speed_high = number();
+    } else if (key == "spindle_speed") {
+      setting.spindle_speed = number();
+    } else if (key == "restart") {
+      setting.restart = flag();
+    } else if (key == "discard_last") {
+      setting.discard_last = flag();
+    } else {
+      throw Error("'" + oneLine(key, 40) +
+                  "': expected teeth, speed_low, speed_high, spindle_speed, restart or discard_last");
+    }
+  }
+  if (!nh.serviceClient<smartmill_msgs::SetSoundCut>(names::SET_SOUND_CUT).call(service))
+    return messageResponse(CONFLICT, "the sound node does not answer");
+  if (service.response.code != service.response.OK)
+    return messageResponse(BAD_REQUEST, service.response.message);
+  log.write("phone", request.from, "sound: " + service.response.message);
+  return messageResponse(200, service.response.message);
 }
 
 ApiResponse newestReport(const std::string& folder) {

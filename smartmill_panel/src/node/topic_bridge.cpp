@@ -23,6 +23,7 @@
 #include <smartmill_msgs/ModalModel.h>
 #include <smartmill_msgs/SampleBlock.h>
 #include <smartmill_msgs/SessionState.h>
+#include <smartmill_msgs/SoundAdvice.h>
 #include <smartmill_msgs/SpindleAngle.h>
 #include <smartmill_msgs/StabilityChart.h>
 #include <std_msgs/String.h>
@@ -51,7 +52,7 @@ const std::map<std::string, std::string>& knownDefinitions() {
       definitionsOf<ChatterAdvice, ChatterState, CncState, CuttingCoefficients, CuttingCondition,
                     DiscrepancyState, FleetState, ForceBlock, ForceRevolution, ForceSensorState,
                     ForceSpectrum, ForceStrip, Frf, LoadSample, ModalModel, SampleBlock, SessionState,
-                    SpindleAngle, StabilityChart, diagnostic_msgs::DiagnosticArray>();
+                    SoundAdvice, SpindleAngle, StabilityChart, diagnostic_msgs::DiagnosticArray>();
   return definitions;
 }
 
@@ -90,8 +91,11 @@ void TopicBridge::discover() {
   if (!ros::master::getTopics(topics)) return;
   static const std::set<std::string> OTHERS{"/diagnostics", "/tf", "/tf_static"};
   const std::string prefix = nh_.getNamespace() + "/";
+  // Who reads the panel must not listen to the workshop.
+  const std::string private_sound = prefix + names::SOUND;
   for (const ros::master::TopicInfo& topic : topics)
-    if (topic.name.rfind(prefix, 0) == 0 || OTHERS.count(topic.name) || isStatusTopic(topic.name))
+    if ((topic.name.rfind(prefix, 0) == 0 && topic.name != private_sound) || OTHERS.count(topic.name) ||
+        isStatusTopic(topic.name))
       add(topic.name, topic.datatype);
 }
 

@@ -60,6 +60,7 @@ std::string fileOf(const std::string& folder, const std::string& target) {
   namespace fs = std::filesystem;
   std::string path = target.substr(0, target.find_first_of("?#"));
   if (path == "/") path = "/index.html";
+  if (path == "/phone") path = "/phone.html";
   const bool plain = std::all_of(path.begin(), path.end(), [](unsigned char c) {
     return std::isalnum(c) || c == '.' || c == '_' || c == '-' || c == '/';
   });

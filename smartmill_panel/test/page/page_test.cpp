@@ -136,6 +136,18 @@ TEST_F(PageTest, MachinesOfOtherNamespacesHaveTheirStatusLines) {
 TEST_F(PageTest, ReportsSortAndZoomWithoutAServer) {
   check("ReportsSortAndZoomWithoutAServer");
 }
+TEST_F(PageTest, ThePhoneShowsVerdictAndNextSpeed) {
+  check("ThePhoneShowsVerdictAndNextSpeed");
+}
+TEST_F(PageTest, ThePhoneSetsSpeedAndTeeth) {
+  check("ThePhoneSetsSpeedAndTeeth");
+}
+TEST_F(PageTest, ThePhoneStatesThatThereIsNoSound) {
+  check("ThePhoneStatesThatThereIsNoSound");
+}
+TEST_F(PageTest, RawSoundIsNotServed) {
+  check("RawSoundIsNotServed");
+}
 TEST_F(PageTest, NoErrorOnTheConsole) {
   check("NoErrorOnTheConsole");
 }

@@ -44,10 +44,12 @@ class Machine:
         self.service = rospy.Service("/smartmill/loadmeter/find_coefficients", FindCoefficients, self.find)
         self.front_end, self.tried, self.calibrated, self.moved = True, [], [], []
         self.diagnostics_publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
-        from smartmill_msgs.srv import ArmMotion, CalibrateChannel, TryInstrument
+        from smartmill_msgs.srv import ArmMotion, CalibrateChannel, SetSoundCut, TryInstrument
+        self.cuts = []
         self.setup = [rospy.Service("/smartmill/daq/try_instrument", TryInstrument, self.try_instrument),
                       rospy.Service("/smartmill/daq/calibrate_channel", CalibrateChannel, self.calibrate),
-                      rospy.Service("/smartmill/cnc/arm_motion", ArmMotion, self.moved.append)]
+                      rospy.Service("/smartmill/cnc/arm_motion", ArmMotion, self.moved.append),
+                      rospy.Service("/smartmill/sound/set_cut", SetSoundCut, self.set_cut)]
         self.thread = threading.Thread(target=self.run, daemon=True)
         self.thread.start()
 
@@ -65,6 +67,26 @@ class Machine:
         return FindCoefficientsResponse(message="8 tests in 2 identifications", coefficients=found, of_pair=True, database="/data/mill.sqlite",
                                         identifications=2, production_cuts=5, cutting_speed=[1.0, 2.5], feed_per_tooth=[5e-5, 2e-4],
                                         axial_depth=[1e-3, 1e-3], edge_age=[nan, nan], next_test=test, next_std=[2.1e6, 400.0])
+
+    def set_cut(self, request):
+        """As sound_node: a number of teeth beyond the bounds is refused."""
+        from smartmill_msgs.srv import SetSoundCutResponse as Response
+        self.cuts.append(request)
+        if request.spindle_speed > 5000.0:
+            return Response(code=1, message="speed: 95493 rpm: expected 4000 to 18000 rpm, the range of the spindle")
+        return Response(message="4 teeth, next cut at 9120 rpm")
+
+    def sound(self, **changes):
+        m, rad = self.msg, 2 * math.pi / 60
+        heard = [m.SoundTry(kind=2, spindle_speed=8000 * rad, probability=0.99, frequency=1068.4, used=True, text="chatter (probability of chatter 99 %)"),
+                 m.SoundTry(kind=3, spindle_speed=15920 * rad, probability=0.5, frequency=math.nan),
+                 m.SoundTry(kind=2, spindle_speed=15920 * rad, probability=0.97, frequency=2210.2, used=True)]
+        for k, one in enumerate(heard):
+            one.begin = one.end = self.rospy.Time(100 * (k + 1))
+        fields = dict(state=2, level=0.02, quiet_level=0.004, unit="1", clipped=0.0, teeth=4, spindle_speed=15920 * rad, speed_low=4000 * rad,
+                      speed_high=18000 * rad, tries=heard, running=True, next_speed=[9120 * rad, 12210 * rad], next_stable=[0.356, 0.21],
+                      text="chatter (probability of chatter 97 %) at 2210.2 Hz")
+        self.publish("sound/advice", m.SoundAdvice(**{**fields, **changes}), latch=True)
 
     def try_instrument(self, request):
         """As setup_node: a wrong sensitivity is named, a file is written once."""
@@ -746,8 +768,76 @@ def reports_sort_and_zoom_without_a_server(browser):
     assert wide <= SIZES["1280x800"][0], wide
 
 
+def the_phone_shows_verdict_and_next_speed(browser, bench, machine):
+    browser.resize(*SIZES["phone"])
+    browser.open(bench.address + "phone")
+    browser.wait("window.smartmill?.link.alive")
+    becomes(lambda: browser.text("#state"), "No microphone yet")
+    machine.sound()
+    becomes(lambda: browser.text("#state"), "Cutting")
+    equal(browser.text("#verdict"), "CHATTER")
+    assert browser.js("document.querySelector('.verdict .shape.chatter').checkVisibility()")
+    equal(browser.text("#frequency"), "2210 Hzat 15920 rpmprobability of chatter 97 %")
+    equal(browser.text("#next"), "9120 rpm")
+    equal(browser.text("#stable"), "stable with a probability of 36 %")
+    equal(browser.text("#others"), "12210 rpm, 21 %")
+    equal(browser.text("#level"), "-34 dB of full scale")
+    equal(browser.js("[...document.querySelectorAll('#tries tbody tr')].map(e => e.textContent)"),
+          ["315920Chatter2210", "215920Not certain", "18000Chatter1068"])
+    equal(browser.js("['teeth', 'speed', 'low', 'high'].map(id => document.getElementById(id).value)"), ["4", "15920", "4000", "18000"])
+    # All but the list fits on the screen, and nothing is wider than it; what is tapped is large.
+    assert browser.js("document.documentElement.scrollWidth") <= SIZES["phone"][0]
+    assert browser.js("document.querySelector('#set').getBoundingClientRect().bottom") <= SIZES["phone"][1]
+    small = browser.js("[...document.querySelectorAll('button, input')].filter(e => e.checkVisibility() && e.getBoundingClientRect().height < 44).map(e => e.id)")
+    equal(small, [])
+    browser.picture(f"{OUT}/sound_phone.png")
+
+
+def the_phone_sets_speed_and_teeth(browser, machine):
+    browser.click("#go")
+    becomes(lambda: len(machine.cuts), 1)
+    first = machine.cuts[0]
+    assert abs(first.spindle_speed - 9120 * 2 * math.pi / 60) < 1e-6, first
+    assert first.teeth == 0 and math.isnan(first.speed_low) and not first.restart and not first.discard_last, first
+    becomes(lambda: browser.text("#answer"), "4 teeth, next cut at 9120 rpm")
+    browser.js("(document.querySelector('#teeth').value = '3', document.querySelector('#speed').value = '60000', 1)")
+    browser.click("#set")
+    becomes(lambda: browser.text("#answer"), "speed: 95493 rpm: expected 4000 to 18000 rpm, the range of the spindle")
+    equal(machine.cuts[1].teeth, 3)
+    browser.click("#restart")
+    becomes(lambda: len(machine.cuts), 3)
+    assert machine.cuts[2].restart and math.isnan(machine.cuts[2].spindle_speed), machine.cuts[2]
+    browser.wait("window.smartmill.link.channels.has('/smartmill/panel/log')")
+
+
+def the_phone_states_that_there_is_no_sound(browser, machine):
+    machine.sound(clipped=0.031, state=1, tries=[], running=False, next_speed=[], next_stable=[], teeth=0)
+    becomes(lambda: browser.text("#clipping"), "Clipping, 3.1 %: reduce the gain")
+    equal([browser.text(at) for at in ("#state", "#verdict", "#next")], ["Listening", "Set the teeth", "Enter the number of teeth"])
+    machine.sound(state=0, level=math.nan)
+    becomes(lambda: browser.text("#state"), "No sound")
+    equal(browser.text("#level"), "–")
+    browser.picture(f"{OUT}/sound_phone_no_sound.png")
+    browser.wait("document.querySelector('#state').textContent.startsWith('No report for')")
+    assert browser.js("document.querySelector('.next').classList.contains('stale')")
+
+
+def raw_sound_is_not_served(browser, bench, machine):
+    """Anyone who reads the panel could listen to the workshop otherwise. Settings are bounded."""
+    block = machine.msg.SampleBlock(sample_rate=48000.0, channels=["sound"], units=["1"], samples=[0.1] * 240)
+    machine.publish("daq/sound", block)
+    machine.publish("daq/vibration", block)
+    browser.wait("window.smartmill.link.channels.has('/smartmill/daq/vibration')")
+    assert not browser.js("window.smartmill.link.channels.has('/smartmill/daq/sound')")
+    at = bench.address + "api/sound"
+    for bad in (b"no json", b"[]", b'{"teeth": 0}', b'{"teeth": 2.5}', b'{"teeth": "4"}', b'{"restart": 1}', b'{"speed": 3}', b'{"spindle_speed": null}'):
+        equal(status_of(at, bad), 400)
+    equal(status_of(at, b'{"teeth": 4}', Origin="http://evil.example"), 403)
+    equal(status_of(at), 405)
+
+
 def no_error_on_the_console(browser):
-    errors = [e for e in browser.errors() if "/api/command" not in e and "/api/instrument" not in e]  # the refusals above are expected
+    errors = [e for e in browser.errors() if not any(api in e for api in ("/api/command", "/api/instrument", "/api/sound"))]  # the refusals above are expected
     assert not errors, errors
 
 
@@ -778,6 +868,11 @@ def main():
             bench.case(the_layout_is_kept, browser, bench)
             bench.case(machines_of_other_namespaces_have_their_status_lines, browser, bench, machine)
             bench.case(reports_sort_and_zoom_without_a_server, browser)
+            bench.case(the_phone_shows_verdict_and_next_speed, browser, bench, machine)
+            bench.case(the_phone_sets_speed_and_teeth, browser, machine)
+            bench.case(the_phone_states_that_there_is_no_sound, browser, machine)
+            bench.case(raw_sound_is_not_served, browser, bench, machine)
+            browser.resize(*SIZES["1280x800"])
             browser.open(bench.address)
             bench.case(no_error_on_the_console, browser)
             bench.case(a_lost_node_is_reported_and_a_restarted_one_is_shown, browser, bench)

@@ -40,6 +40,7 @@ struct Folder {
     path = mkdtemp(name);
     std::filesystem::create_directory(path + "/page");
     write("page/index.html", "<p>here</p>");
+    write("page/phone.html", "<p>phone</p>");
     write("page/secret.key", "no page");
     write("outside.html", "outside");
     std::filesystem::create_symlink("../outside.html", path + "/page/link.html");
@@ -364,6 +365,7 @@ TEST_F(ServerTest, ServesThePageAndNothingElse) {
   EXPECT_EQ(page.body(), "<p>here</p>");
   EXPECT_NE(std::string(page["Content-Security-Policy"]).find("default-src 'self'"), std::string::npos);
   EXPECT_EQ(request(http::verb::get, "/index.html?x=1").body(), "<p>here</p>");
+  EXPECT_EQ(request(http::verb::get, "/phone").body(), "<p>phone</p>");
   for (const char* target : {"/../outside.html", "/%2e%2e/outside.html", "/..%2foutside.html", "//etc/passwd",
                              "/etc/passwd", "/link.html", "/secret.key", "/missing.html", "/.hidden.html",
                              "/index.html/../../outside.html", "/index.html\\..\\x.html"})

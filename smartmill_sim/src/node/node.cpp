@@ -55,6 +55,8 @@ Node::Node(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
       panel_(nh_),
       shell_(nh_, private_nh, "simulated mill", 1.0),
       pacer_(steadyTime(), BLOCK_TIME, static_cast<bool>(clock_), parameters_.pace) {
+  if (parameters_.world.microphone)
+    sound_ = nh_.advertise<smartmill_msgs::SampleBlock>(names::SOUND, STREAM_QUEUE);
   if (parameters_.world.motor.currents)
     motor_current_ = nh_.advertise<smartmill_msgs::SampleBlock>(names::MOTOR_CURRENT, STREAM_QUEUE);
   if (parameters_.axes_input.empty()) {
@@ -160,6 +162,7 @@ void Node::publish(const World::Block& block) {
   force_.publish(toMsg(shifted(block.force), frames::MACHINE));
   vibration_.publish(toMsg(shifted(block.vibration)));
   servo_.publish(toMsg(shifted(block.servo)));
+  if (!block.sound.channels.empty()) sound_.publish(toMsg(shifted(block.sound)));
   if (!block.motor_current.channels.empty()) motor_current_.publish(toMsg(shifted(block.motor_current)));
 }
 

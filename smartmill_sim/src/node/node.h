@@ -61,7 +61,7 @@ class Node {
   std::unique_ptr<focas::Server> server_;
 
   ros::Publisher hammer_, dynamometer_, spindle_force_, angle_, tachometer_, force_, vibration_, servo_,
-      motor_current_, coefficients_, load_meter_;
+      motor_current_, sound_, coefficients_, load_meter_;
   LatchedTopic<smartmill_msgs::Frf> frf_;
   LatchedTopic<smartmill_msgs::ModalModel> modes_;
   ros::ServiceServer strike_server_, break_server_;

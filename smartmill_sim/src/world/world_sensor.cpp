@@ -1,5 +1,6 @@
 #include "world/world_sensor.h"
 
+#include <cmath>
 #include <string>
 #include <utility>
 
@@ -17,6 +18,7 @@ using Names = std::vector<std::string>;
 
 constexpr std::uint64_t PLATE_SEED = 0x2000;  // offset from the seed of the world
 constexpr std::uint64_t TACHOMETER_SEED = 0x3000;
+constexpr std::uint64_t MICROPHONE_SEED = 0x4000;
 
 template <class T>
 void beginBlock(T& block, double stamp, std::uint64_t first_index) {
@@ -164,6 +166,35 @@ class TachometerSensor : public BlockSensor {
   WorldRandom random_;
 };
 
+/// Pressure next to the tool: that of a tip that moves, the orders of the spindle and noise of the workshop.
+class Microphone : public BlockSensor {
+ public:
+  explicit Microphone(std::uint64_t seed)
+      : BlockSensor(&World::Block::sound, {"sound"}, {"Pa"}), random_{std::mt19937_64(seed), {}} {}
+
+  void step(const Step& step) override {
+    constexpr double SIDE = 0.6;  // [1] of the acceleration in y: the microphone is nearer to the x direction
+    displacement_ += step.output.displacement[0] + SIDE * step.output.displacement[1];
+  }
+  void read(const Sample& sample, World::Block& block) override {
+    constexpr double RADIATED = 2e-3;                // [Pa/(m/s2)] 94 dB at 500 m/s2
+    constexpr double SPINDLE = 0.01, NOISE = 0.004;  // [Pa] amplitude of the first order, RMS
+    constexpr std::array<int, 4> ORDERS{1, 2, 3, 5};
+    const double at = sample.share * std::exchange(displacement_, 0.0);
+    const double acceleration = (at - 2.0 * last_ + before_) * World::SAMPLE_RATE * World::SAMPLE_RATE;
+    before_ = std::exchange(last_, at);
+    double pressure = RADIATED * acceleration + random_.gaussian(NOISE);
+    if (sample.motion.spindle_speed > 0.0)
+      for (const int order : ORDERS)
+        pressure += SPINDLE / order * std::sin(order * sample.motion.spindle_angle);
+    append(std::array<double, 1>{{pressure}}, block);
+  }
+
+ private:
+  WorldRandom random_;
+  double displacement_ = 0.0, last_ = 0.0, before_ = 0.0;  // [m] sum over the steps, of the last samples
+};
+
 class TrueValues : public BlockSensor {
  public:
   TrueValues() : BlockSensor(&World::Block::vibration, {"x", "y"}, {"m", "m"}) {}
@@ -233,6 +264,7 @@ std::vector<std::unique_ptr<WorldSensor>> makeSensors(const SensorContext& c) {
   }
   if (c.flange) add(FlangeSensor(*c.flange));
   if (c.options.pulse_train) add(TachometerSensor(c.options.seed + TACHOMETER_SEED));
+  if (c.options.microphone) add(Microphone(c.options.seed + MICROPHONE_SEED));
   add(TrueValues());
   return sensors;
 }

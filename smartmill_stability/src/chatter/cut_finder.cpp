@@ -12,14 +12,19 @@
 
 namespace smartmill::stability {
 
-CutFinder::CutFinder(const Recording& recording, const RecordingRequest& request) : request_(request) {
+double CutFinder::windowOf(const Recording& recording, double speed) {
   constexpr double MARGIN = 6.0;  // [samples] of the interpolation
+  const CutFinderOptions options;
   const double seconds = (static_cast<double>(recording.channels[0].size()) - MARGIN) / recording.sample_rate;
-  const double turn = units::TWO_PI / request.speed;
-  window_ = std::min(std::clamp(options_.turns * turn, options_.least_window,
-                                std::max(options_.longest_window, options_.least_turns * turn)),
-                     2.0 * seconds / (options_.least_windows + 1));
-  if (window_ < options_.least_turns * turn) window_ = seconds;  // no level of cut and air
+  const double turn = units::TWO_PI / speed;
+  const double window = std::min(std::clamp(options.turns * turn, options.least_window,
+                                            std::max(options.longest_window, options.least_turns * turn)),
+                                 2.0 * seconds / (options.least_windows + 1));
+  return window < options.least_turns * turn ? seconds : window;  // no level of cut and air
+}
+
+CutFinder::CutFinder(const Recording& recording, const RecordingRequest& request)
+    : request_(request), window_(windowOf(recording, request.speed)) {
   spectrogram_ = spectrogramOf(recording, window_, options_.highest);
   step_ = spectrogram_.frequency.size() > 1 ? spectrogram_.frequency[1] : 1.0 / window_;
   findCut();

@@ -30,6 +30,9 @@ class CutFinder {
   /// @param request with the actual speed
   CutFinder(const Recording& recording, const RecordingRequest& request);
 
+  /// [s] Length of the windows of a recording. @param speed [rad/s]
+  static double windowOf(const Recording& recording, double speed);
+
   double from() const;                       ///< [s] first window in the cut
   double to() const;                         ///< [s] last window in the cut
   bool hasAir() const { return has_air_; }   ///< the recording contains windows outside the cut

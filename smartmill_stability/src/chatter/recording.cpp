@@ -28,8 +28,6 @@ using Kind = RecordingVerdict::Kind;
 /// [1] Relative variation of the spindle speed within a window, and error of its correction.
 constexpr double SPEED_ERROR = 6e-4;
 
-/// [1] Verdicts between these probabilities of chatter are unsure.
-constexpr double STABLE_BELOW = 0.2, CHATTER_ABOVE = 0.8;
 constexpr double NOT_KNOWN = 0.5;  ///< [1] probability of what the recording does not distinguish
 /// Probability of chatter from the mean margin m of the windows: 1 / (1 + exp(-SLOPE m)).
 constexpr double SLOPE = 2.0;
@@ -377,17 +375,17 @@ class RecordingAnalysis {
     if (!verdict.cut) {
       verdict.probability = NOT_KNOWN;
       verdict.reason = "vibration between the spindle harmonics, but no sign that teeth cut";
-    } else if (bearing && probability > CHATTER_ABOVE) {
+    } else if (bearing && probability > RecordingVerdict::CHATTER_ABOVE) {
       verdict.probability = NOT_KNOWN;
       verdict.reason = "lines modulated by the spindle, not by the teeth: chatter or a bearing";
-    } else if (probability < STABLE_BELOW && harmonicLikeChatter()) {
+    } else if (probability < RecordingVerdict::STABLE_BELOW && harmonicLikeChatter()) {
       verdict.probability = NOT_KNOWN;
       verdict.reason =
           "the strongest line is a spindle harmonic, but none of the teeth: chatter may coincide with it";
     } else {
-      verdict.kind = probability < STABLE_BELOW    ? Kind::stable
-                     : probability > CHATTER_ABOVE ? Kind::chatter
-                                                   : Kind::unsure;
+      verdict.kind = probability < RecordingVerdict::STABLE_BELOW    ? Kind::stable
+                     : probability > RecordingVerdict::CHATTER_ABOVE ? Kind::chatter
+                                                                     : Kind::unsure;
       if (verdict.kind != Kind::chatter) verdict.reason = textOf(mostFrequentReason());
     }
     return verdict;

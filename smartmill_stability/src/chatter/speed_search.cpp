@@ -206,4 +206,19 @@ SpeedProposal SpeedSearch::next() const {
   return best;
 }
 
+std::vector<SpeedProposal> bestProposals(const std::vector<SpeedProposal>& all) {
+  constexpr std::size_t MOST = 5, AROUND = 4;  // speeds of the grid
+  std::vector<SpeedProposal> best;
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    const auto from = all.begin() + static_cast<std::ptrdiff_t>(k > AROUND ? k - AROUND : 0);
+    const auto to = all.begin() + static_cast<std::ptrdiff_t>(std::min(all.size(), k + AROUND + 1));
+    if (std::all_of(from, to, [&](const SpeedProposal& p) { return p.stable <= all[k].stable; }))
+      best.push_back(all[k]);
+  }
+  std::sort(best.begin(), best.end(),
+            [](const SpeedProposal& a, const SpeedProposal& b) { return a.stable > b.stable; });
+  best.resize(std::min(best.size(), MOST));
+  return best;
+}
+
 }  // namespace smartmill::stability

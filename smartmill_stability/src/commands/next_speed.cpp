@@ -1,6 +1,5 @@
 #include "smartmill_stability/commands.h"
 
-#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -55,22 +54,6 @@ std::optional<HeardCut> cutOf(const std::string& text, int teeth) {
   return cut;
 }
 
-/// The likeliest speeds, each the best of its surroundings.
-std::vector<SpeedProposal> bestOf(const std::vector<SpeedProposal>& all) {
-  constexpr std::size_t MOST = 5, AROUND = 4;
-  std::vector<SpeedProposal> best;
-  for (std::size_t k = 0; k < all.size(); ++k) {
-    const auto from = all.begin() + static_cast<std::ptrdiff_t>(k > AROUND ? k - AROUND : 0);
-    const auto to = all.begin() + static_cast<std::ptrdiff_t>(std::min(all.size(), k + AROUND + 1));
-    if (std::all_of(from, to, [&](const SpeedProposal& p) { return p.stable <= all[k].stable; }))
-      best.push_back(all[k]);
-  }
-  std::sort(best.begin(), best.end(),
-            [](const SpeedProposal& a, const SpeedProposal& b) { return a.stable > b.stable; });
-  best.resize(std::min(best.size(), MOST));
-  return best;
-}
-
 void run(const Request& request) {
   double low = 0.0, high = 0.0;
   char rest = 0;
@@ -86,7 +69,7 @@ void run(const Request& request) {
     std::printf("stable at %.0f rpm: no other speed is needed\n", units::rpmFromRadPerSec(last->speed));
     return;
   }
-  const std::vector<SpeedProposal> best = bestOf(search.proposals());
+  const std::vector<SpeedProposal> best = bestProposals(search.proposals());
   if (best.empty()) throw Error("no cut with chatter was heard: expected one at least");
   const SpeedProposal next = search.next();
   std::printf("next: %.0f rpm, stable with a probability of %.0f %% at the same depth\n",

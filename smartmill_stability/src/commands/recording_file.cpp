@@ -9,6 +9,7 @@
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/io/csv.h"
 #include "smartmill_core/io/sound_file.h"
+#include "smartmill_core/names.h"
 #include "smartmill_recording/recording_file.h"
 #include "smartmill_recording/recording_reader.h"
 
@@ -110,7 +111,7 @@ class LongestSegment {
 
 Recording fromBag(RecordingOptions o) {
   RecordingReader bag(o.file);
-  for (const char* topic : {"daq/sound", "daq/vibration", names::FORCE_COMPENSATED, names::DYNAMOMETER})
+  for (const char* topic : {names::SOUND, "daq/vibration", names::FORCE_COMPENSATED, names::DYNAMOMETER})
     if (o.topic.empty() && bag.has(topic)) o.topic = topic;
   if (o.topic.empty() || !bag.has(o.topic))
     throw Error(o.file + ": expected topic " +

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <rosbag/bag.h>
 
+#include "node/sound_parameters.h"
 #include "recordings/bag_charts.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/testing/shipped_parameters.h"
@@ -170,6 +171,7 @@ TEST(Bag, listsMissingInputs) {
 TEST(Parameters, theShippedFilesMatchTheTables) {
   expectShipped<NodeParameters>(LAUNCH_CONFIG_FOLDER "/stability.yaml", "smartmill_stability stability_node");
   EXPECT_NO_THROW(NodeParameters().validate());
+  expectShipped<SoundNodeParameters>(LAUNCH_CONFIG_FOLDER "/sound.yaml", "smartmill_stability sound_node");
   expectShipped<ControlStreamParameters>("config/chatter_control.yaml",
                                          "smartmill_stability chatter_control_node");
 }

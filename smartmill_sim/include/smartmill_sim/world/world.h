@@ -35,6 +35,7 @@ struct WorldOptions {
   double load_step = LOAD_METER_STEP;
   int servo_trigger = 0;
   bool pulse_train = false;
+  bool microphone = false;
   StationTraits hammer;
   MotorTraits motor;
   SpindleSensorTraits spindle_sensor;
@@ -64,6 +65,8 @@ struct WorldOptions {
     table.flag(
         "pulse_train", pulse_train,
         "true: daq/tachometer (one pulse of 5 V per revolution, at angle 0) in place of spindle/angle");
+    table.flag("microphone", microphone,
+               "true: daq/sound, the pressure at a microphone next to the tool [Pa]");
     table.part("hammer_", hammer);
     table.part("motor_", motor);
     table.part("spindle_sensor_", spindle_sensor);
@@ -101,6 +104,7 @@ class World {
     SampleBlock spindle_force;  ///< x1 .. z2 [N]; no channels without these sensors
     std::array<SpindleAngle, ANGLES> angle;
     SampleBlock tachometer;     ///< one pulse per revolution [V]; no channels without pulse_train
+    SampleBlock sound;          ///< pressure [Pa]; no channels without a microphone
     ForceBlock force;           ///< true cutting force on the tool
     SampleBlock vibration;      ///< true displacement of the tip, x, y [m]
     SampleBlock servo;          ///< ServoRecorder's: spindle load and axis currents at 1 kHz

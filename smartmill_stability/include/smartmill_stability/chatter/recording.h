@@ -39,6 +39,8 @@ struct Spectrogram {
 /// Result of judgeRecording().
 struct RecordingVerdict {
   static constexpr double UNKNOWN = std::numeric_limits<double>::quiet_NaN();
+  /// [1] Verdicts between these probabilities of chatter are unsure.
+  static constexpr double STABLE_BELOW = 0.2, CHATTER_ABOVE = 0.8;
   enum class Kind { no_cut, stable, chatter, unsure };
   /// Where the speed comes from: stated, or found since none is stated or the stated one does not agree with
   /// the harmonics.

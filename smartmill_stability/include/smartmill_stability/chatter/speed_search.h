@@ -86,4 +86,7 @@ class SpeedSearch {
   std::vector<HeardCut> cuts_;
 };
 
+/// The five likeliest of SpeedSearch::proposals(), each the best of its surroundings; likeliest first.
+std::vector<SpeedProposal> bestProposals(const std::vector<SpeedProposal>& all);
+
 }  // namespace smartmill::stability
