@@ -40,6 +40,7 @@ std::vector<RecordSegment> run(const Machine& machine, double length = 0.3) {
   condition.stamp = machine.begin;
   condition.kind = CuttingCondition::Kind::cut;
   condition.name = "slot";
+  condition.tool.teeth = 4;
   condition.spindle_speed = SPEED;
   condition.engagement.feed_per_tooth = 1e-4;
   condition.engagement.axial_depth = 1e-3;
