@@ -33,8 +33,8 @@ class RevolutionWindow {
   /// Mean square of the synchronous part at the orders of a flip: odd multiples of half the number of teeth;
   /// 0 for an odd number of teeth.
   double alternating() const { return alternating_; }
-  /// And at the orders that are no multiple of half the number of teeth: teeth that differ from each other, by
-  /// runout, uneven pitch or a lost tooth. 0 for two teeth, whose orders are all multiples, and for an odd
+  /// And at the orders that are no multiple of half the number of teeth: teeth that differ from each other,
+  /// by runout, uneven pitch or a lost tooth. 0 for two teeth, whose orders are all multiples, and for an odd
   /// number.
   double unequal() const { return unequal_; }
   double strongestFlipOrder() const;  ///< [1/revolution]
