@@ -43,7 +43,7 @@ py::object simulateCut(const MachineModel& model, const py::object& cut, double 
   test.sample_rate = rate;
   test.spindle_speed = cut.attr("spindle_speed").cast<double>();
   test.engagement = engagementOf(cut);
-  test.feed_direction = number(cut, "feed_direction");
+  test.feed_direction = cut.attr("feed_direction").cast<double>();
   sim::SimulationOptions options;
   options.noise = noise;
   options.seed = seed;
