@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <cstdio>
 #include <fstream>
 #include <limits>
 #include <random>
@@ -38,6 +39,21 @@ struct StudyCase {
     if (number >= cases) throw UsageError("--case: expected 0.." + std::to_string(cases - 1));
   }
   void print(const nlohmann::json& line) const { std::printf("%s\n", line.dump().c_str()); }
+
+  /// Runs the one case, or all of them with the figures at the end.
+  /// @param line of a case by its number @param score prints the figures
+  template <class Line, class Score>
+  void run(int cases, const Line& line, const Score& score) const {
+    check(cases);
+    if (one()) return print(line(number));
+    std::vector<nlohmann::json> all;
+    for (int k = 0; k < cases; ++k) {
+      all.push_back(line(k));
+      print(all.back());
+      std::fflush(stdout);
+    }
+    score(all);
+  }
 };
 
 /// Seed of one case of a study.

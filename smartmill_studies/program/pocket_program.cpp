@@ -5,6 +5,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
+#include "smartmill_program/prediction/stability_limits.h"
 
 namespace smartmill {
 namespace {
@@ -26,6 +27,15 @@ PocketTraits drawPocket(std::mt19937_64& random) {
   traits.speed = units::radPerSecFromRpm(uniform(3000.0, 5000.0));
   traits.least_feed = uniform(0.04, 0.06) * MM;
   traits.largest_feed = uniform(0.15, 0.2) * MM;
+  return traits;
+}
+
+PocketTraits drawStablePocket(std::mt19937_64& random, const MachineModel& machine) {
+  constexpr double STABLE = 0.7;  // [1] depth over the limit
+  PocketTraits traits = drawPocket(random);
+  const program::Contact slot{{{0.0, units::PI, traits.depth}}};
+  traits.depth = std::min(traits.depth,
+                          STABLE * program::StabilityLimits(machine).limit(slot, 0.0, false, traits.speed));
   return traits;
 }
 

@@ -23,6 +23,9 @@ struct PocketTraits {
 /// Draws sizes, speed and feeds.
 PocketTraits drawPocket(std::mt19937_64& random);
 
+/// The same; a level is at most 0.7 times as deep as the stability limit of the slot.
+PocketTraits drawStablePocket(std::mt19937_64& random, const MachineModel& machine);
+
 /// @throws Error when the pocket does not fit the model's workpiece
 std::string pocketProgram(const PocketTraits& traits, const MachineModel& model);
 

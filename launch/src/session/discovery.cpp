@@ -301,7 +301,8 @@ bool Discovery::makeSuggestedTest(const Explained::SuggestedTest& suggested_test
   PlannedCut planned;
   try {
     planned = planSuggestedTest(planner_, suggested_test, parameters_.slotRequest(name, lane_),
-                                parameters_.air_time, believedLimits());
+                                parameters_.air_time,
+                                suggested_test.cut ? believedLimits() : discovery::BelievedLimits());
   } catch (const Error& error) {
     result.tests.push_back("refused, " + std::string(error.what()) + ": " + suggested_test.text);
     stage(result.tests.back());

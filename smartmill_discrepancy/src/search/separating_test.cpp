@@ -73,8 +73,7 @@ std::optional<SeparatingTest> separatingTest(const Dataset& data, const MachineM
           if (test.engagement) {
             best->text = formatted(
                 "a cut at %.0f rpm, %.3g mm per tooth, %.3g mm deep, from %.0f to %.0f deg%s: the "
-                "predictions "
-                "differ by %.2g times the noise",
+                "predictions differ by %.2g times the noise",
                 units::rpmFromRadPerSec(test.spindle_speed), test.engagement->feed_per_tooth * 1e3,
                 test.engagement->axial_depth * 1e3, units::degFromRad(test.engagement->entry),
                 units::degFromRad(test.engagement->exit), feedText(test).c_str(), value);

@@ -14,7 +14,7 @@ const LISTED = 30;        // lines
 
 export class Part {
   constructor(card, lines_card, link, store) {
-    Object.assign(this, { card, link, store, path: null, part: 0 });
+    Object.assign(this, { card, link, store, path: null, view: null, part: 0 });
     this.choice = make('select', { id: 'part-quantity', 'aria-label': 'Quantity', onchange: () => { this.store.quantity = this.choice.value; this.draw(); } },
       ...Object.entries(QUANTITIES).map(([key, q]) => make('option', { value: key }, q.name)));
     this.choice.value = QUANTITIES[store.quantity] ? store.quantity : 'measured';
@@ -38,6 +38,7 @@ export class Part {
   listen() {
     this.canvas.addEventListener('wheel', event => {
       event.preventDefault();
+      if (!this.view) return;
       const at = this.toData(event.offsetX, event.offsetY), factor = 1.2 ** (event.deltaY < 0 ? 1 : -1);
       this.view.scale *= factor;
       this.view.x = at[0] - (at[0] - this.view.x) / factor;
@@ -58,7 +59,7 @@ export class Part {
     this.path = message;
     if (!same) {
       this.clear();
-      this.showAll();
+      this.view = null;
     }
     this.draw();
   }
@@ -113,14 +114,18 @@ export class Part {
   }
 
   showAll() {
-    if (!this.path?.x.length) return;
+    this.view = null;
+    this.draw();
+  }
+
+  // The view of all cuts; without cuts, of the whole path.
+  wholeView() {
     const cut = Array.from(this.path.kind, (kind, k) => kind === CUT ? k : -1).filter(k => k >= 0);
     const xs = cut.flatMap(k => [this.path.x[k], this.path.x[k + 1]]), ys = cut.flatMap(k => [this.path.y[k], this.path.y[k + 1]]);
     const range = list => list.reduce(([low, high], v) => [Math.min(low, v), Math.max(high, v)], [Infinity, -Infinity]);
     const [x0, x1] = range(xs.length ? xs : Array.from(this.path.x)), [y0, y1] = range(ys.length ? ys : Array.from(this.path.y));
     const width = Math.max(x1 - x0, 1e-3), height = Math.max(y1 - y0, 1e-3);
-    this.view = { x: (x0 + x1) / 2, y: (y0 + y1) / 2, scale: 0.85 * Math.min(this.frame.clientWidth / width, this.frame.clientHeight / height) || 1 };
-    this.draw();
+    return { x: (x0 + x1) / 2, y: (y0 + y1) / 2, scale: 0.85 * Math.min(this.frame.clientWidth / width, this.frame.clientHeight / height) };
   }
 
   toPixel(x, y) {
@@ -143,8 +148,8 @@ export class Part {
   draw() {
     this.empty.hidden = Boolean(this.path);
     const width = this.frame.clientWidth, height = this.frame.clientHeight;
-    if (!this.path || !width) return;
-    if (!this.view || !(this.view.scale > 1)) { this.view = { scale: 2 }; return this.showAll(); }
+    if (!this.path?.line.length || !width || !height) return;
+    this.view ??= this.wholeView();
     const ratio = devicePixelRatio || 1, c = this.canvas.getContext('2d');
     this.canvas.width = width * ratio;
     this.canvas.height = height * ratio;

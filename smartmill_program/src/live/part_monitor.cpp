@@ -58,8 +58,8 @@ void PartMonitor::handle(const PartPlace& place) {
     present_.reset();
     return;
   }
-  if (present_ && place.part == present_->part && place.stamp - present_->begin < period_) return;
   if (present_ && place.part == present_->part) {
+    if (place.stamp - present_->begin < period_) return;
     present_->stamp = place.stamp;
     present_->to = *place.place;
     present_->last_line = place.line;

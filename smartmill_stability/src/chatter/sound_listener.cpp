@@ -262,7 +262,7 @@ void SoundListener::followSpeed() {
 }
 
 void SoundListener::set(const CutSetting& setting) {
-  constexpr int MOST_TEETH = 40;
+  constexpr int MOST_TEETH = SoundParameters::MOST_TEETH;
   if (setting.teeth && (*setting.teeth < 1 || *setting.teeth > MOST_TEETH))
     throw Error(formatted("teeth: %d: expected 1 to %d", *setting.teeth, MOST_TEETH));
   if (setting.range) setting.range->validate();

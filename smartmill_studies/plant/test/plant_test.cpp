@@ -282,6 +282,21 @@ TEST(Machine, MeetsRecordsOfAnotherProgram) {
   }
 }
 
+/// [1] RMS difference of the twin in a column over the RMS of the record, in its second half.
+double differenceOfTwin(const MachineModel& model, const CampaignTest& test, const Record& machine,
+                        const char* name) {
+  sim::SimulationOptions options;
+  options.noise = false;
+  options.substeps = 8;
+  const Record twin = sim::simulateTest(model, test, machine, options);
+  double squares = 0.0, size = 0.0;
+  for (std::size_t i = twin.size() / 2; i < twin.size(); ++i) {
+    squares += std::pow(twin.column(name)[i] - machine.column(name)[i], 2);
+    size += std::pow(machine.column(name)[i], 2);
+  }
+  return std::sqrt(squares / size);
+}
+
 // Weight of the true tooth path in the twin, from the rule of formats.md (0) to the true path (1): a slot
 // with large vibration per rotation angle.
 TEST(Machine, LeavesTheSurfaceOfTheTeethsPath) {
@@ -300,16 +315,7 @@ TEST(Machine, LeavesTheSurfaceOfTheTeethsPath) {
   const Record machine = run(plantOf(model), test, o, random);
   const auto difference = [&](double share, const char* name) {
     model.effects = {effectEntry("empirical:tooth_path", {{"share", share}})};
-    sim::SimulationOptions options;
-    options.noise = false;
-    options.substeps = 8;
-    const Record twin = sim::simulateTest(model, test, machine, options);
-    double squares = 0.0, size = 0.0;
-    for (std::size_t i = twin.size() / 2; i < twin.size(); ++i) {
-      squares += std::pow(twin.column(name)[i] - machine.column(name)[i], 2);
-      size += std::pow(machine.column(name)[i], 2);
-    }
-    return std::sqrt(squares / size);
+    return differenceOfTwin(model, test, machine, name);
   };
   for (const char* name : {"fx", "fy", "tool_x", "tool_y"}) {
     const double by_rule = difference(0.0, name), half = difference(0.5, name),
@@ -340,23 +346,11 @@ TEST(Machine, FeedsInAnyDirectionAsTheTwinDoes) {
     test.engagement->exit = 0.5 * units::PI;  // up-milling
     test.feed_direction = units::radFromDeg(direction);
     const Record machine = run(plantOf(model), test, o, random);
-    const auto difference = [&](const CampaignTest& simulated, const char* name) {
-      sim::SimulationOptions options;
-      options.noise = false;
-      options.substeps = 8;
-      const Record twin = sim::simulateTest(model, simulated, machine, options);
-      double squares = 0.0, size = 0.0;
-      for (std::size_t i = twin.size() / 2; i < twin.size(); ++i) {
-        squares += std::pow(twin.column(name)[i] - machine.column(name)[i], 2);
-        size += std::pow(machine.column(name)[i], 2);
-      }
-      return std::sqrt(squares / size);
-    };
     CampaignTest along_x = test;
     along_x.feed_direction = 0.0;
     for (const char* name : {"fx", "fy", "tool_x", "tool_y"}) {
-      EXPECT_LT(difference(test, name), 0.01) << name << " " << direction;
-      EXPECT_GT(difference(along_x, name), 0.5) << name << " " << direction;
+      EXPECT_LT(differenceOfTwin(model, test, machine, name), 0.01) << name << " " << direction;
+      EXPECT_GT(differenceOfTwin(model, along_x, machine, name), 0.5) << name << " " << direction;
     }
   }
 }

@@ -20,14 +20,12 @@
 #include "smartmill_discrepancy/explain/explain.h"
 #include "smartmill_discrepancy/live/segment_campaign.h"
 #include "smartmill_discrepancy/report/report_json.h"
-#include "smartmill_program/prediction/stability_limits.h"
 #include "study_case.h"
 
 namespace {
 
 using namespace smartmill;
 
-constexpr double STABLE = 0.7;      // [1] depth over the stability limit of a slot
 constexpr double HOLD_BACK = 0.05;  // [s]
 constexpr std::array<const char*, 3> CAUSES{"runout", "gain_error", "tool_wear"};
 
@@ -70,10 +68,7 @@ nlohmann::json lineOf(const Arguments& a, int number) {
   const std::string cause = CAUSES[static_cast<std::size_t>(number) % CAUSES.size()];
   MachineModel machine = nominal;
   machine.effects = {drawEffect(cause, nominal, random)};
-  PocketTraits traits = drawPocket(random);
-  const program::Contact slot{{{0.0, units::PI, traits.depth}}};
-  traits.depth = std::min(traits.depth,
-                          STABLE * program::StabilityLimits(machine).limit(slot, 0.0, false, traits.speed));
+  const PocketTraits traits = drawStablePocket(random, machine);
   const std::string folder = a.output + "/" + std::to_string(number);
   std::filesystem::remove_all(folder);
   nlohmann::json line{{"case", number}, {"hidden", cause}};
@@ -123,16 +118,9 @@ void score(const std::vector<nlohmann::json>& lines) {
 
 void run(const Arguments& a) {
   if (a.study.scores()) return score(readJsonLines(a.study.lines));
-  a.study.check(a.cases);
   if (a.output.empty()) throw UsageError("-o: expected a folder for campaigns and reports");
-  if (a.study.one()) return a.study.print(lineOf(a, a.study.number));
-  std::vector<nlohmann::json> lines;
-  for (int i = 0; i < a.cases; ++i) {
-    lines.push_back(lineOf(a, i));
-    a.study.print(lines.back());
-    std::fflush(stdout);
-  }
-  score(lines);
+  a.study.run(
+      a.cases, [&](int number) { return lineOf(a, number); }, score);
 }
 
 }  // namespace

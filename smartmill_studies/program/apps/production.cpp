@@ -16,14 +16,12 @@
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/identification/identification_pipeline.h"
-#include "smartmill_program/prediction/stability_limits.h"
 #include "study_case.h"
 
 namespace {
 
 using namespace smartmill;
 
-constexpr double STABLE = 0.7;      // [1] depth over the stability limit of a slot
 constexpr double HOLD_BACK = 0.05;  // [s]
 
 struct Arguments {
@@ -78,11 +76,7 @@ nlohmann::json lineOf(const Arguments& a, int number) {
   MachineModel nominal = readMachineModel(a.model);
   const MachineModel machine = drawMachine(nominal, random);
   nominal.cutting.reset();
-  PocketTraits traits = drawPocket(random);
-  // The shop's depth does not chatter.
-  const program::Contact slot{{{0.0, units::PI, traits.depth}}};
-  traits.depth = std::min(traits.depth,
-                          STABLE * program::StabilityLimits(machine).limit(slot, 0.0, false, traits.speed));
+  const PocketTraits traits = drawStablePocket(random, machine);
   const std::string text = pocketProgram(traits, nominal);
   const Part part = identifiedPart(machine, nominal, text, a.model, seed);
   nlohmann::json line{
@@ -124,15 +118,8 @@ void score(const std::vector<nlohmann::json>& lines) {
 
 void run(const Arguments& a) {
   if (a.study.scores()) return score(readJsonLines(a.study.lines));
-  a.study.check(a.cases);
-  if (a.study.one()) return a.study.print(lineOf(a, a.study.number));
-  std::vector<nlohmann::json> lines;
-  for (int i = 0; i < a.cases; ++i) {
-    lines.push_back(lineOf(a, i));
-    a.study.print(lines.back());
-    std::fflush(stdout);
-  }
-  score(lines);
+  a.study.run(
+      a.cases, [&](int number) { return lineOf(a, number); }, score);
 }
 
 }  // namespace

@@ -13,7 +13,6 @@ namespace smartmill::discrepancy {
 class SegmentCampaign {
  public:
   void add(const RecordSegment& segment);
-  bool empty() const { return segments_.empty(); }
   /// Writes the campaign, without segments near the stability limit of the model.
   /// @param progress receives one line for each of these @return number of tests @throws Error.
   std::size_t write(const MachineModel& model, const LiveGapOptions& options, const std::string& folder,

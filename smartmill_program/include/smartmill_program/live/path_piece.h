@@ -34,14 +34,13 @@ struct PiecePrediction {
 
 /// Tolerances within which the engagement counts as constant.
 struct PieceTolerance {
-  double angle = 0.0175;  ///< [rad] of entry and exit
-  double depth = 0.02;    ///< [1] of the axial depth
+  double angle;  ///< [rad] of entry and exit
+  double depth;  ///< [1] of the axial depth
 };
 
 /// Joins the steps of a program to pieces.
 class PieceMaker {
  public:
-  /// @param teeth_of [1] of a tool by its number
   PieceMaker(ToolModels& tools, const PieceTolerance& tolerance) : tools_(tools), tolerance_(tolerance) {}
 
   /// @param place [m] of the step's begin

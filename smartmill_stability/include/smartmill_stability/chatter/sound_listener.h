@@ -15,13 +15,14 @@
 namespace smartmill::stability {
 
 struct SoundParameters {
+  static constexpr int MOST_TEETH = 40;
   std::string channel;
   int teeth = 0;
   double speed_low = 0.0, speed_high = 0.0, speed = 0.0;
 
   void declare(ParameterTable& table) {
     table.text("channel", channel, "channel of the microphone; empty: the first one");
-    table.number("teeth", teeth, "1", Range::closed(0, 40),
+    table.number("teeth", teeth, "1", Range::closed(0, MOST_TEETH),
                  "of the tool; 0: set by sound/set_cut, before that no cut is judged");
     table.number("speed_low", speed_low, "rad/s", Range::notNegative(),
                  "lowest spindle speed to try; 0: half the speed of the first cut that chatters");
