@@ -146,9 +146,12 @@ void ProgramNode::listen() {
 /// The first set of the pair that the program cuts, where the models state none.
 void ProgramNode::handle(const CoefficientSet& set) {
   CuttingCoefficients k = set.value;
-  if (!predicted_for_.empty() || predictions_.valid() || set.material != prepared_.names.material ||
-      !std::isfinite(k.ktc + k.kte))
+  if (!predicted_for_.empty() || set.material != prepared_.names.material || !std::isfinite(k.ktc + k.kte))
     return;
+  if (predictions_.valid()) {
+    early_ = set;
+    return;
+  }
   if (!std::isfinite(k.krc)) k.krc = parameters_.radial_ratio * k.ktc;
   if (!std::isfinite(k.kre)) k.kre = k.kte;
   for (double* axial : {&k.kac, &k.kae}) {  // no part of the force across the axis
@@ -176,6 +179,7 @@ void ProgramNode::readPredictions() {
   if (predicted > 0 && predicted_for_.empty()) predicted_for_ = "models";
   path_.publish(pathOf(*prepared_.program, predictions, parameters_.program_zero));
   monitor_.setPredictions(std::move(predictions));
+  if (const std::optional<CoefficientSet> set = std::exchange(early_, std::nullopt)) handle(*set);
 }
 
 void ProgramNode::publish(const PartProgress& progress) {

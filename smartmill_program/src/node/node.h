@@ -62,6 +62,7 @@ class ProgramNode {
   bool ended_predecessor_ = false;
   std::string predicted_for_;  // coefficients of the predictions; empty: none
   std::future<std::vector<PiecePrediction>> predictions_;
+  std::optional<CoefficientSet> early_;  // arrived during the prediction by the models
 };
 
 }  // namespace smartmill::program
