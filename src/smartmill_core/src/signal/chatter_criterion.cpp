@@ -195,7 +195,7 @@ ChatterEvidence ChatterCriterion::judge(const RevolutionWindow& window, double p
   evidence.alternation = total > 0.0 ? std::min(1.0, window.alternating() / total) : 0.0;
   // In a flip every second tooth cuts alike; a lost tooth or runout has its energy mostly at other orders.
   evidence.flip = evidence.alternation > options_.alternation_ratio && window.alternating() > remainder &&
-                  window.alternating() > window.unequal();
+                  window.alternating() > options_.alternation_purity * window.unequal();
   const double energy = evidence.flip ? remainder + window.alternating() : remainder;
   evidence.energy_ratio = total > 0.0 ? std::min(1.0, energy / total) : 0.0;
   evidence.severity = std::sqrt(energy);

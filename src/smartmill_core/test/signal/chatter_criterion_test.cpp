@@ -111,23 +111,27 @@ TEST(ChatterCriterion, aFlipAlternatesFromToothToTooth) {
   EXPECT_FALSE(judge(flip, never).chatter);
 }
 
-// The radial force sin(phi) of the teeth in half immersion, with and without one of them.
+// The force of the teeth with and without one of them: sin(phi) in half immersion, sin(phi) cos(phi) in a
+// slot.
 TEST(ChatterCriterion, aLostToothIsNoFlip) {
-  for (const int teeth : {4, 6}) {
-    for (const bool lost : {false, true}) {
-      RevolutionWindow window(BINS, TURNS, teeth);
-      std::vector<double> force(BINS * TURNS, 0.0);
-      for (std::size_t i = 0; i < force.size(); ++i) {
-        for (int tooth = lost ? 1 : 0; tooth < teeth; ++tooth) {
-          const double turn = static_cast<double>(i % BINS) / BINS + static_cast<double>(tooth) / teeth;
-          const double immersion = units::TWO_PI * (turn - std::floor(turn));
-          if (immersion < units::PI / 2.0) force[i] += std::sin(immersion);
+  for (const bool slot : {false, true}) {
+    for (const int teeth : {4, 6}) {
+      for (const bool lost : {false, true}) {
+        RevolutionWindow window(BINS, TURNS, teeth);
+        std::vector<double> force(BINS * TURNS, 0.0);
+        for (std::size_t i = 0; i < force.size(); ++i) {
+          for (int tooth = lost ? 1 : 0; tooth < teeth; ++tooth) {
+            const double turn = static_cast<double>(i % BINS) / BINS + static_cast<double>(tooth) / teeth;
+            const double phi = units::TWO_PI * (turn - std::floor(turn));
+            if (phi < (slot ? units::PI : 0.5 * units::PI))
+              force[i] += std::sin(phi) * (slot ? std::cos(phi) : 1.0);
+          }
         }
+        window.add(force);
+        const ChatterEvidence evidence = ChatterCriterion({}).judge(window, PERIOD);
+        EXPECT_FALSE(evidence.chatter) << teeth << " teeth";
+        if (lost) EXPECT_GT(evidence.alternation, 0.05) << teeth << " teeth";
       }
-      window.add(force);
-      const ChatterEvidence evidence = ChatterCriterion({}).judge(window, PERIOD);
-      EXPECT_FALSE(evidence.chatter) << teeth << " teeth";
-      if (lost) EXPECT_GT(evidence.alternation, 0.05) << teeth << " teeth";
     }
   }
 }

@@ -19,6 +19,10 @@ struct ChatterCriterionOptions {
   /// 1: flips are not judged. Every other tooth leaves the cut, so that the share is far above that of
   /// runout.
   double alternation_ratio = 0.1;
+  /// [1] Least energy of a flip over that at the spindle harmonics at which unequal teeth differ. A flip has
+  /// none there; a lost tooth has about as much, in a slot sin(phi) cos(phi) over half a revolution: 1/32 at
+  /// order 2 and at the odd orders together, and the resonances of tool and sensor shift the shares.
+  double alternation_purity = 4.0;
   /// [Hz] Band of the sensor. Vibration below is drift, hum and rumble, above it hiss and converters; unless
   /// synchronous with the spindle it counts nowhere.
   double lowest_frequency = 0.0, highest_frequency = std::numeric_limits<double>::infinity();
