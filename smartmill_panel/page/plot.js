@@ -39,13 +39,13 @@ function tickText(value, log) {
 const linked = new Map();  // group -> plots
 
 // Buttons that save a plot.
-function exportsOf(plot) {
+export function exportsOf(plot) {
   return make('div', { class: 'tools' },
     make('button', { title: 'Save as PNG', onclick: () => plot.savePicture() }, 'PNG'),
     make('button', { title: 'Save as CSV', onclick: () => plot.saveNumbers() }, 'CSV'));
 }
 
-function saveCanvas(canvas, name) {
+export function saveCanvas(canvas, name) {
   const copy = make('canvas', { width: canvas.width, height: canvas.height }), c = copy.getContext('2d');
   c.fillStyle = colour('card'); c.fillRect(0, 0, copy.width, copy.height); c.drawImage(canvas, 0, 0);
   copy.toBlob(blob => save(`${name}.png`, blob));

@@ -1,6 +1,6 @@
 // The part: tool path of the running program from above, coloured by what is predicted or measured, the tool, and the lines to look at.
-import { digits, fixed, make, table } from '../format.js';
-import { colour, toColour } from '../plot.js';
+import { digits, fixed, make, save, table } from '../format.js';
+import { colour, exportsOf, saveCanvas, toColour } from '../plot.js';
 
 const CUT = 2, MM = 1e3;
 const QUANTITIES = {
@@ -14,7 +14,8 @@ const LISTED = 30;        // lines
 
 export class Part {
   constructor(card, lines_card, link, store) {
-    Object.assign(this, { card, link, store, path: null, view: null, part: 0 });
+    Object.assign(this, { card, link, store, path: null, shown: null, part: 0 });
+    this.clear();
     this.choice = make('select', { id: 'part-quantity', 'aria-label': 'Quantity', onchange: () => { this.store.quantity = this.choice.value; this.draw(); } },
       ...Object.entries(QUANTITIES).map(([key, q]) => make('option', { value: key }, q.name)));
     this.choice.value = QUANTITIES[store.quantity] ? store.quantity : 'measured';
@@ -23,7 +24,7 @@ export class Part {
     this.canvas = make('canvas', { id: 'part-path', role: 'img', 'aria-label': 'tool path from above', style: 'width: 100%; height: 100%; cursor: grab' });
     this.frame = make('div', { class: 'plot' }, this.canvas);
     this.empty = make('div', { class: 'empty' }, 'No program is followed: machine.launch program:=FILE');
-    this.frame.append(this.empty);
+    this.frame.append(this.empty, exportsOf(this));
     card.append(make('div', { class: 'row' }, this.choice, this.whole, this.scale), this.frame);
     this.lines = make('div', { class: 'dim scroll' }, 'No line yet');
     lines_card.append(this.lines);
@@ -38,17 +39,17 @@ export class Part {
   listen() {
     this.canvas.addEventListener('wheel', event => {
       event.preventDefault();
-      if (!this.view) return;
+      if (!this.shown) return;
       const at = this.toData(event.offsetX, event.offsetY), factor = 1.2 ** (event.deltaY < 0 ? 1 : -1);
-      this.view.scale *= factor;
-      this.view.x = at[0] - (at[0] - this.view.x) / factor;
-      this.view.y = at[1] - (at[1] - this.view.y) / factor;
+      this.shown.scale *= factor;
+      this.shown.x = at[0] - (at[0] - this.shown.x) / factor;
+      this.shown.y = at[1] - (at[1] - this.shown.y) / factor;
       this.draw();
     }, { passive: false });
     this.canvas.addEventListener('pointermove', event => {
-      if (!(event.buttons & 1) || !this.view) return;
-      this.view.x -= event.movementX / this.view.scale;
-      this.view.y += event.movementY / this.view.scale;
+      if (!(event.buttons & 1) || !this.shown) return;
+      this.shown.x -= event.movementX / this.shown.scale;
+      this.shown.y += event.movementY / this.shown.scale;
       this.draw();
     });
     this.canvas.addEventListener('dblclick', () => this.showAll());
@@ -59,14 +60,14 @@ export class Part {
     this.path = message;
     if (!same) {
       this.clear();
-      this.view = null;
+      this.shown = null;
     }
     this.draw();
   }
 
   // A new part begins.
   clear() {
-    this.measured = new Float64Array(this.path.line.length).fill(NaN);
+    this.measured = new Float64Array(this.path?.line.length ?? 0).fill(NaN);
     this.chatter = new Map();  // line -> frequency [Hz]; null: judged stable
     this.found = new Map();    // line -> {measured, predicted, margin}
   }
@@ -114,7 +115,7 @@ export class Part {
   }
 
   showAll() {
-    this.view = null;
+    this.shown = null;
     this.draw();
   }
 
@@ -129,10 +130,10 @@ export class Part {
   }
 
   toPixel(x, y) {
-    return [this.frame.clientWidth / 2 + (x - this.view.x) * this.view.scale, this.frame.clientHeight / 2 - (y - this.view.y) * this.view.scale];
+    return [this.frame.clientWidth / 2 + (x - this.shown.x) * this.shown.scale, this.frame.clientHeight / 2 - (y - this.shown.y) * this.shown.scale];
   }
   toData(px, py) {
-    return [this.view.x + (px - this.frame.clientWidth / 2) / this.view.scale, this.view.y - (py - this.frame.clientHeight / 2) / this.view.scale];
+    return [this.shown.x + (px - this.frame.clientWidth / 2) / this.shown.scale, this.shown.y - (py - this.frame.clientHeight / 2) / this.shown.scale];
   }
 
   // Colour scale: fixed for ratios, from 0 to the largest of prediction and measurement for forces.
@@ -149,7 +150,7 @@ export class Part {
     this.empty.hidden = Boolean(this.path);
     const width = this.frame.clientWidth, height = this.frame.clientHeight;
     if (!this.path?.line.length || !width || !height) return;
-    this.view ??= this.wholeView();
+    this.shown ??= this.wholeView();
     const ratio = devicePixelRatio || 1, c = this.canvas.getContext('2d');
     this.canvas.width = width * ratio;
     this.canvas.height = height * ratio;
@@ -182,7 +183,7 @@ export class Part {
     const x = axis('X'), y = axis('Y');
     if (x < 0 || y < 0) return;
     const condition = this.link.message('cut/condition');
-    const radius = Math.max(5, (condition?.diameter ?? 0) / 2 * this.view.scale);
+    const radius = Math.max(5, (condition?.diameter ?? 0) / 2 * this.shown.scale);
     c.strokeStyle = colour('warn');
     c.lineWidth = 2;
     c.beginPath();
@@ -206,6 +207,15 @@ export class Part {
     this.lines.replaceChildren(table(['Line', '', 'Measured [N]', 'Predicted [N]', 'Ratio', 'Margin'], notable.map(l => [
       l.line, make('span', {}, ...l.reasons), fixed(l.f.measured), fixed(l.f.predicted), fixed(l.ratio, 2), fixed(l.f.margin, 2)]), { id: 'part-lines' }));
   }
+
+  savePicture() { saveCanvas(this.canvas, 'part'); }
+  csv() {
+    const { place, x, y, z, line, kind, peak_force, stability_margin } = this.path ?? { line: [] };
+    const rows = Array.from(line, (number, k) => [number, kind[k] === CUT ? 1 : 0, place[k], place[k + 1], x[k], y[k], z[k], x[k + 1], y[k + 1], z[k + 1],
+      this.measured[k], peak_force[k], stability_margin[k]].map(v => Number.isFinite(v) ? v : '').join());
+    return ['line,cut,from [m],to [m],x [m],y [m],z [m],end x [m],end y [m],end z [m],measured [N],predicted [N],margin', ...rows].join('\n') + '\n';
+  }
+  saveNumbers() { save('part.csv', this.csv(), 'text/csv'); }
 
   refresh() {
     const state = this.link.message('cnc/state'), at = JSON.stringify(state?.position);

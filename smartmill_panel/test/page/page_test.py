@@ -189,6 +189,7 @@ class Machine:
             self.publish("program/progress", m.ProgramProgress(
                 program="/parts/part.nc", part=1, first_line=line, last_line=line, from_place=begin, to_place=end, peak_force=force, compensated=True,
                 predicted_peak_force=expected, stability_margin=margin, judged=line != 5, chatter=line == 6, chatter_frequency=chatter))
+            time.sleep(0.25)  # as program_node
 
     def fleet(self, reached=True, message="2 new of 2 sent to postgresql://mill_07@shop/fleet"):
         """A fleet of twelve machines: Ktc of mill 3 is 24 % larger, mill 7 is this one, mill 9 has never pushed."""
