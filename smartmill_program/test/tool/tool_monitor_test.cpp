@@ -48,6 +48,7 @@ struct Rig {
   ToolMonitor monitor{ToolMonitorParameters(), tool(), 0.05,
                       [this](const ToolReport& report) { reports.push_back(report); }};
   std::uint64_t index = 0;
+  double transient_from = 1e9;  // [s]
 
   /// @param force of a time and angle
   template <class Force>
@@ -57,7 +58,7 @@ struct Rig {
       block.stamp = t;
       block.sample_rate = RATE;
       block.first_index = index;
-      block.status = ForceBlock::Status::compensated;
+      block.status = t > transient_from ? ForceBlock::Status::transient : ForceBlock::Status::compensated;
       for (int i = 0; i < BLOCK; ++i) {
         const double time = t + i / RATE;
         const ForceSample sample = force(time, SPEED * time);
@@ -99,6 +100,17 @@ TEST(ToolMonitor, ReportsALossWithoutACondition) {
   EXPECT_EQ(rig.reports[0].loss->tooth, 3);
   EXPECT_LE(rig.reports[0].stamp, 1.003 + 2.0 * TWO_PI / SPEED);
   EXPECT_FALSE(rig.reports[0].wear);
+}
+
+// As force/compensated: the blocks from the loss on are transients.
+TEST(ToolMonitor, ReportsALossThatIsATransient) {
+  Rig rig;
+  rig.transient_from = 0.99;
+  const CuttingTeeth teeth = broken(1.003);
+  rig.run(0.0, 2.0, [&](double t, double a) { return teeth.at(t, a); });
+  rig.monitor.flush();
+  ASSERT_EQ(rig.reports.size(), 1u);
+  EXPECT_EQ(rig.reports[0].loss->tooth, 3);
 }
 
 TEST(ToolMonitor, ANewToolHasAllItsTeeth) {

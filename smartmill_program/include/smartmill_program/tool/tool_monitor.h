@@ -107,7 +107,7 @@ class ToolMonitor {
   std::optional<UnwrappedAngle> angle_;
   double speed_ = 0.0;  // [rad/s] of the last reading
   std::uint64_t next_index_ = 0;
-  ForceBlock::Status status_ = ForceBlock::Status::measured;
+  ForceBlock::Status status_ = ForceBlock::Status::measured;    // of the last block; transient: compensated
   std::optional<double> steady_since_;                          // [s]
   double steady_ = 0.0;                                         // [s] last state on the steady path
   double reported_ = -std::numeric_limits<double>::infinity();  // [s]
