@@ -75,7 +75,7 @@ TEST(Instrument, theShippedFilesAreRead) {
     EXPECT_NO_THROW(readInstrument(entry.path(), &options)) << entry.path();
     ++count;
   }
-  EXPECT_EQ(count, 2);
+  EXPECT_EQ(count, 3);
 }
 
 TEST(Instrument, aWrongFileIsRefusedInOneLine) {

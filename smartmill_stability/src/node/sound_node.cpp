@@ -61,7 +61,7 @@ SoundNode::SoundNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
     : parameters_(parametersFromServer(private_nh).readAll<SoundNodeParameters>()),
       shell_(nh, private_nh, "none", parameters_.input_timeout),
       listener_(parameters_.sound),
-      advice_(nh.advertise<SoundAdvice>(names::SOUND_ADVICE, 10, true)),
+      advice_(nh.advertise<smartmill_msgs::SoundAdvice>(names::SOUND_ADVICE, 10, true)),
       features_(nh.advertise<smartmill_msgs::SoundFeatures>(names::SOUND_FEATURES, STREAM_QUEUE)),
       set_cut_(nh.advertiseService(names::SET_SOUND_CUT, &SoundNode::setCut, this)) {
   shell_.inputs().on<SampleBlock>(parameters_.input, [this](const SampleBlock& block, double) {
