@@ -156,6 +156,12 @@ RegenerativeSystem MeasuredMachine::cutOf(const ChartCut& cut, const Engagement&
   system.kt = cutting.ktc;
   system.kr = std::isfinite(cutting.krc) ? cutting.krc : cut.parameters.radial_ratio * cutting.ktc;
   system.ka = cutting.kac;
+  if (system.edge.inclined() && !std::isfinite(system.ka))
+    throw Error("no chart yet, missing: axial coefficient (inclined edge)");
+  if (system.edge.serrated()) {
+    system.chip.emplace();
+    system.chip->feed = cut.parameters.feed_per_tooth;
+  }
   system.setProcessDamping(cut.process_damping);
   return system;
 }

@@ -61,8 +61,17 @@ std::vector<double> readPerTooth(const StrictYaml& map, const std::string& key, 
   return list;
 }
 
-void readEdge(const StrictYaml& map, ToolGeometry& tool) {
+}  // namespace
+
+void readEdges(const StrictYaml& map, ToolGeometry& tool) {
   EdgeShape& edge = tool.edge;
+  if (map.isList("helix_deg")) {
+    std::vector<double> helix = map.numbers("helix_deg", static_cast<std::size_t>(tool.teeth), HELIX_DEG);
+    for (double& h : helix) h = units::radFromDeg(h);
+    tool.setHelix(helix);
+  } else if (map.has("helix_deg")) {
+    tool.helix = units::radFromDeg(map.number("helix_deg", HELIX_DEG));
+  }
   const double angle = map.optionalNumber("edge_angle_deg", Range::openLow(0.0, 90.0)).value_or(90.0);
   if (angle < 90.0) edge.edge_angle = units::radFromDeg(angle);
   // The largest corner whose centre does not lie beyond the axis.
@@ -78,24 +87,20 @@ void readEdge(const StrictYaml& map, ToolGeometry& tool) {
   }
 }
 
+namespace {
+
 void readTool(const StrictYaml& map, MachineModel& model) {
   ToolGeometry tool;
   tool.teeth = map.integer("teeth", 1, 20);
   tool.diameter = map.number("diameter_mm", POSITIVE) * units::MM;
-  if (map.isList("helix_deg")) {
-    std::vector<double> helix = map.numbers("helix_deg", static_cast<std::size_t>(tool.teeth), HELIX_DEG);
-    for (double& h : helix) h = units::radFromDeg(h);
-    tool.setHelix(helix);
-  } else {
-    tool.helix = units::radFromDeg(map.number("helix_deg", HELIX_DEG));
-  }
+  if (!map.has("helix_deg")) map.fail("helix_deg", "is missing");
+  readEdges(map, tool);
   if (map.has("pitch_deg")) {
     for (const double p :
          readPerTooth(map, "pitch_deg", static_cast<std::size_t>(tool.teeth), POSITIVE, 360.0)) {
       tool.pitch.push_back(units::radFromDeg(p));
     }
   }
-  readEdge(map, tool);
   if (const auto stickout = map.optionalNumber("stickout_mm", POSITIVE))
     model.stickout = *stickout * units::MM;
   map.finish();
