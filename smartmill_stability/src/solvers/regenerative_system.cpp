@@ -348,7 +348,7 @@ void RegenerativeSystem::validate() const {
     if (edge.serrated() && !chip)
       throw Error("serrated edge: expected a chip geometry (the feed determines which teeth cut)");
     if (edge.inclined()) require("axial coefficient [N/m2]", ka, Range::notNegative());
-    require("diameter [m]", diameter, Range::positive());
+    if (edge.inclined() || !edge.helix.empty()) require("diameter [m]", diameter, Range::positive());
     smartmill::validate(edge, tool());
   }
   if (cut == Cut::turning) {
