@@ -174,16 +174,15 @@ class ShapedTeeth {
       : system_(system), tool_(system.tool()), speed_(speed) {
     corner_ = std::min(depth, cornerHeight(tool_));
     if (corner_ > 0.0) bands_.push_back({0.0, corner_, true, {}});
-    // Above the corner the delay is that of the middle of a slice.
-    if (system.edge.helix.empty()) {
-      if (depth > corner_) bands_.push_back({corner_, depth, false, {}});
-    } else {
+    // The delay is that of the middle of a slice.
+    if (!system.edge.helix.empty()) {
       bands_.clear();
       for (const EdgeSlice& slice : edgeSlices(tool_, depth)) {
         const double top = std::min(slice.high, depth);
         if (top > slice.low) bands_.push_back({slice.low, top, slice.curved, {}});
       }
     }
+    if (bands_.empty() || bands_.back().high < depth) bands_.push_back({corner_, depth, false, {}});
     ends_ = {0.0};
     if (corner_ > 0.0 && corner_ < depth) ends_.push_back(corner_);
     ends_.push_back(depth);
