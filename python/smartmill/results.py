@@ -46,12 +46,17 @@ class Mode:
 
 @dataclass(frozen=True)
 class Tool:
-    """A cylindrical end mill."""
+    """A mill: teeth about an axis and the shape of their edges; by default a flat end mill."""
 
     teeth: int  #: 1..20
     diameter: float  #: [m]
     helix: float = 0.0  #: [rad]
     pitch: Tuple[float, ...] = ()  #: [rad] tooth k to tooth k + 1, summing to 2 pi; empty: even
+    corner_radius: float = 0.0  #: [m] that of the tool: ball end
+    edge_angle: float = 0.5 * math.pi  #: [rad] of the edge to the plane across the tool axis (KAPR)
+    tooth_helix: Tuple[float, ...] = ()  #: [rad] of each tooth, in place of helix; empty: all as helix
+    serration_amplitude: float = 0.0  #: [m] of the radius
+    serration_wavelength: float = 0.0  #: [m] > 0 with an amplitude
 
 
 @dataclass(frozen=True)

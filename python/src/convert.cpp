@@ -79,8 +79,12 @@ py::object toPython(const std::vector<Mode>& modes) {
 }
 
 py::object toPython(const ToolGeometry& tool) {
-  return make("Tool", tool.teeth, tool.diameter, tool.helix,
-              tupleOf(tool.pitch, [](double pitch) { return py::float_(pitch); }));
+  const auto numbers = [](const std::vector<double>& values) {
+    return tupleOf(values, [](double value) { return py::float_(value); });
+  };
+  const EdgeShape& edge = tool.edge;
+  return make("Tool", tool.teeth, tool.diameter, tool.helix, numbers(tool.pitch), edge.corner_radius,
+              edge.edge_angle, numbers(edge.helix), edge.serration_amplitude, edge.serration_wavelength);
 }
 
 py::object toPython(const CuttingCoefficients& value, const CuttingCoefficients* std_dev) {
@@ -130,6 +134,14 @@ ToolGeometry toolOf(const py::object& tool) {
   geometry.diameter = number(tool, "diameter");
   geometry.helix = number(tool, "helix");
   for (const py::handle& pitch : tool.attr("pitch")) geometry.pitch.push_back(number(pitch));
+  EdgeShape& edge = geometry.edge;
+  edge.corner_radius = number(tool, "corner_radius");
+  edge.edge_angle = number(tool, "edge_angle");
+  edge.serration_amplitude = number(tool, "serration_amplitude");
+  edge.serration_wavelength = number(tool, "serration_wavelength");
+  std::vector<double> helix;
+  for (const py::handle& of_tooth : tool.attr("tooth_helix")) helix.push_back(number(of_tooth));
+  if (!helix.empty()) geometry.setHelix(helix);
   validate(geometry);
   return geometry;
 }

@@ -296,6 +296,9 @@ const std::vector<std::string>& requestedOutsideKinds() {
 Plant plantOf(const MachineModel& model) {
   Plant p;
   p.tool = model.needTool("mill");
+  ToolGeometry above_corner = p.tool;
+  above_corner.edge.corner_radius = 0.0;
+  requireStraightEdge(above_corner, "to mill");
   p.cutting = model.needCutting("mill");
   for (const Mode& m : model.tool_tip.x.modes) p.tip[0].push_back({m.frequency, m.damping_ratio, m.gain});
   for (const Mode& m : model.tool_tip.y.modes) p.tip[1].push_back({m.frequency, m.damping_ratio, m.gain});

@@ -68,6 +68,14 @@ CutPlanner::CutPlanner(const MachineModel& model, const PathParameters& paramete
       spindle_(model.needSpindle("plan the cuts")),
       axes_(model.needAxes("plan the cuts")),
       stock_(model.needWorkpiece("plan the cuts")) {
+  // The topics state the teeth and the mean helix of a tool only.
+  ToolGeometry of_topics = tool_;
+  of_topics.edge.helix.clear();
+  try {
+    requireStraightEdge(of_topics, "to identify its coefficients in a session");
+  } catch (const Error& error) {
+    throw Error(file_ + ": " + error.what());
+  }
   material_ = parameters_.material.empty() ? stock_.material : parameters_.material;
   const double width = stock_.high[1] - stock_.low[1] - 2.0 * parameters_.lane_margin - tool_.diameter;
   lanes_ = width < 0.0 ? 0 : static_cast<std::size_t>(std::floor(width / laneWidth() + 1e-9)) + 1;

@@ -361,6 +361,7 @@ ForceCurves fitForceCurves(const std::vector<AngleRecord>& records, const ToolGe
                            const CurveFitOptions& options) {
   if (pieces < 2 || pieces > 30)
     throw Error("force curve: " + std::to_string(pieces) + " segments of a spline, expected 2..30");
+  requireStraightEdge(tool, "to fit a force curve");
   CurveModel model{records, tool, options, thickest(records), pieces};
   model.chip_offset.assign(static_cast<std::size_t>(tool.teeth), 0.0);
   if (!(model.top > 0.0)) throw Error("force curve: no chip thickness > 0 in the records");

@@ -15,6 +15,7 @@ using units::TWO_PI;
 std::vector<ForcePoint> forcePoints(const std::vector<double>& fx, const std::vector<double>& fy,
                                     const std::vector<double>& spindle_angle, const ToolGeometry& tool,
                                     const Engagement& engagement) {
+  requireStraightEdge(tool, "to compute the force of a chip thickness");
   const double spread = tool.lag() * engagement.axial_depth;  // [rad] of an edge
   std::vector<ForcePoint> points;
   for (std::size_t i = 0; i < fx.size(); ++i) {

@@ -153,14 +153,6 @@ void refuseRapidHits(const std::string& program, const std::vector<BlockSummary>
               (others > 0 ? " (and in " + std::to_string(others) + " more blocks, see blocks.csv)" : ""));
 }
 
-void noteCornerRadii(const ToolModels& models) {
-  for (const auto& [number, model] : models.models())
-    for (const EffectEntry& effect : model.effects)
-      if (effect.name == "corner_radius")
-        std::fprintf(stderr, "%s: corner_radius is ignored, the tool is taken as a flat end mill\n",
-                     model.file.c_str());
-}
-
 /// Plans the feeds, after the analysis of the program. @return exit code
 int writePlan(const Arguments& arguments, const std::string& text, FeedPlanner& planner,
               const std::vector<Move>& moves, const AnalysisResult& before, const AnalysisOptions& options) {
@@ -216,7 +208,6 @@ int run(const Arguments& arguments) {
   progress.close();
   const double seconds = progress.elapsed();
 
-  noteCornerRadii(models);
   const std::string summary = summaryOf(result.blocks);
   blockTable(result.blocks).save(arguments.out + "/blocks.csv");
   steps.csv().save(arguments.out + "/steps.csv");

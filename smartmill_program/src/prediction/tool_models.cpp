@@ -2,7 +2,9 @@
 
 #include <algorithm>
 
+#include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
 
 namespace smartmill::program {
 namespace {
@@ -11,6 +13,14 @@ MachineModel withTool(const std::string& file) {
   MachineModel model = readMachineModel(file);
   if (model.needTool("simulate a program").teeth == 0)
     throw Error(file + ": tool.teeth: 0, expected an end mill");
+  for (const EffectEntry& effect : model.effects)
+    if (effect.name == "corner_radius")
+      model.tool->edge.corner_radius = effect.numbers.at("corner_radius_mm") * units::MM;
+  try {
+    validate(*model.tool);
+  } catch (const Error& error) {
+    throw Error(file + ": " + error.what());
+  }
   return model;
 }
 

@@ -108,7 +108,7 @@ void SignalStage::apply(double record_time, ChannelValues& channels) const {
 
 TwinSetup setUpOf(MachineModel model, const EffectSet& effects) {
   model.effects.clear();
-  TwinSetup setup{std::move(model), {}, {}, 0.0, 0.0, {}, {}, {}};
+  TwinSetup setup{std::move(model), {}, {}, 0.0, {}, {}, {}};
   if (setup.model.tool) setup.radius_offset.assign(static_cast<std::size_t>(setup.model.tool->teeth), 0.0);
   effects.setUp(setup);
   return setup;

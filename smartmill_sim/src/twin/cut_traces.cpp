@@ -44,6 +44,10 @@ void appendTool(Values& values, const MachineModel& model) {
   if (const auto& t = model.tool) {
     values.insert(values.end(), {static_cast<double>(t->teeth), t->diameter, t->helix});
     values.insert(values.end(), t->pitch.begin(), t->pitch.end());
+    const EdgeShape& edge = t->edge;
+    values.insert(values.end(), {edge.corner_radius, edge.edge_angle, edge.serration_amplitude,
+                                 edge.serration_wavelength, static_cast<double>(edge.helix.size())});
+    values.insert(values.end(), edge.helix.begin(), edge.helix.end());
   }
 }
 

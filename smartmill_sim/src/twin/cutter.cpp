@@ -10,18 +10,31 @@
 namespace smartmill::sim {
 
 Cutter::Cutter(const ToolGeometry& tool, const CuttingLaw& law, double time_step,
-               const std::vector<double>& radius_offset, double corner_radius, double path_share,
-               Method method, int corner_slices)
-    : method_(method), corner_radius_(corner_radius), lag_(tool.lag()), law_(law) {
-  for (const EdgeSlice& slice : edgeSlices(tool, corner_radius, corner_slices)) {
+               const std::vector<double>& radius_offset, double path_share, Method method, int corner_slices)
+    : tool_((validate(tool), tool)),
+      method_(method),
+      time_step_(time_step),
+      path_share_(path_share),
+      corner_slices_(corner_slices),
+      radius_offset_(radius_offset),
+      law_(law) {
+  addMills(0.0);
+}
+
+/// Straight mills up to a height [m] at least.
+void Cutter::addMills(double height) {
+  if (!mills_.empty() && mills_.back().slice.high >= height) return;
+  const std::vector<EdgeSlice> slices = edgeSlices(tool_, height, corner_slices_);
+  for (std::size_t s = mills_.size(); s < slices.size(); ++s) {
     StraightMill mill;
-    mill.slice = mill.actual = slice;
-    mill.top = slice.high;
-    const ToolGeometry straight = toolOf(slice, tool);
-    if (method == Method::tables) {
-      mill.rigid.emplace(straight, lawOf(slice, law), radius_offset, path_share);
+    mill.slice = mill.actual = slices[s];
+    mill.top = slices[s].high;
+    const ToolGeometry straight = toolOf(slices[s], tool_);
+    const std::vector<double> radii = radiiOf(slices[s], tool_, radius_offset_);
+    if (method_ == Method::tables) {
+      mill.rigid.emplace(straight, lawOf(slices[s], law_), radii, path_share_);
     } else {
-      mill.process.emplace(straight, lawOf(slice, law), time_step, radius_offset, path_share);
+      mill.process.emplace(straight, lawOf(slices[s], law_), time_step_, radii, path_share_);
     }
     mills_.push_back(std::move(mill));
   }
@@ -30,7 +43,7 @@ Cutter::Cutter(const ToolGeometry& tool, const CuttingLaw& law, double time_step
 // The edge of a slice is the edge of a tip whose angle lags accordingly.
 ToolMotion Cutter::motionOf(const StraightMill& mill, const ToolMotion& now) const {
   ToolMotion motion = now;
-  motion.angle -= lag_ * mill.slice.low;
+  motion.angle -= mill.slice.turn;
   return motion;
 }
 
@@ -44,10 +57,9 @@ void Cutter::updateContact(StraightMill& mill) {
     arcs.push_back({arc.entry, arc.exit, height - mill.slice.low});
     top = std::max(top, height);
   }
-  const bool leans = mill.slice.high <= corner_radius_ * (1.0 + 1e-9);
-  if (leans && !arcs.empty() && top != mill.top) {
+  if (mill.slice.curved && !arcs.empty() && top != mill.top) {
     mill.top = top;
-    mill.actual = top == mill.slice.high ? mill.slice : upTo(top, mill.slice, corner_radius_);
+    mill.actual = top == mill.slice.high ? mill.slice : upTo(top, mill.slice, tool_);
     const CuttingLaw law = lawOf(mill.actual, law_);
     if (mill.process) mill.process->setLaw(law);
     if (mill.rigid) mill.rigid->setLaw(law);
@@ -64,17 +76,24 @@ void Cutter::updateContact(StraightMill& mill) {
   if (mill.rigid) mill.rigid->setDepths(depths);
 }
 
+void Cutter::updateContacts() {
+  double height = 0.0;
+  for (const ContactArc& arc : arcs_) height = std::max(height, arc.depth);
+  addMills(height);
+  for (StraightMill& mill : mills_) updateContact(mill);
+}
+
 void Cutter::engage(const std::vector<ContactArc>& arcs, const ToolMotion& now) {
   arcs_ = arcs;
   now_ = now;
   arcs_changed_ = true;
-  for (StraightMill& mill : mills_) updateContact(mill);
+  updateContacts();
   arcs_changed_ = false;
 }
 
 void Cutter::setDepths(const std::vector<double>& depths) {
   for (std::size_t a = 0; a < arcs_.size(); ++a) arcs_[a].depth = depths.at(a);
-  for (StraightMill& mill : mills_) updateContact(mill);
+  updateContacts();
 }
 
 void Cutter::setLaw(const CuttingLaw& law) {
@@ -88,13 +107,14 @@ void Cutter::setLaw(const CuttingLaw& law) {
 
 void Cutter::setRadii(const std::vector<double>& radius_offset) {
   if (method_ == Method::tables) throw Error("cutting: radii that change, expected none with tables");
-  for (StraightMill& mill : mills_) mill.process->setRadii(radius_offset);
+  radius_offset_ = radius_offset;
+  for (StraightMill& mill : mills_) mill.process->setRadii(radiiOf(mill.slice, tool_, radius_offset));
 }
 
 CutSums Cutter::sumsOf(StraightMill& mill, const ToolMotion& now) const {
-  if (mill.process) return mill.process->sumsAt(mill.slice.low == 0.0 ? now : motionOf(mill, now));
+  if (mill.process) return mill.process->sumsAt(mill.slice.turn == 0.0 ? now : motionOf(mill, now));
   CutSums sums;
-  sums.edges = mill.rigid->sumsAt(now.angle - lag_ * mill.slice.low);
+  sums.edges = mill.rigid->sumsAt(now.angle - mill.slice.turn);
   return sums;
 }
 

@@ -32,15 +32,18 @@ CuttingLaw lawOf(const EdgeLayer& layer, CuttingLaw law) {
 }  // namespace
 
 EdgeLayers::EdgeLayers(const TwinSetup& setup, const CuttingLaw& law, double time_step, bool rigid) {
+  if (setup.layers.empty()) return;
+  ToolGeometry tool = *setup.model.tool;
+  tool.edge = {};
   for (const EdgeLayer& definition : setup.layers) {
     if (definition.weight == 0.0) continue;
     std::vector<double> radius = radiiOf(definition, setup.radius_offset);
     Layer layer{definition, {}, {}};
     // Tables do not separate the teeth.
     if (rigid && definition.only_tooth < 0) {
-      layer.rigid.emplace(*setup.model.tool, lawOf(definition, law), std::move(radius), setup.path_share);
+      layer.rigid.emplace(tool, lawOf(definition, law), std::move(radius), setup.path_share);
     } else {
-      layer.process.emplace(*setup.model.tool, lawOf(definition, law), time_step, std::move(radius),
+      layer.process.emplace(tool, lawOf(definition, law), time_step, std::move(radius),
                             setup.path_share);
       if (definition.only_tooth >= 0) layer.process->selectTooth(definition.only_tooth);
     }

@@ -12,8 +12,8 @@ FlexibleCut::FlexibleCut(const TwinSetup& setup, const CuttingLaw& law, double t
   if (!setup.model.tool || !setup.model.cutting) return;
   radius_offset_ = setup.radius_offset;
   const bool tables = feed == Feed::steady && !vibrates();
-  cutter_.emplace(*setup.model.tool, law, time_step, setup.radius_offset, setup.corner_radius,
-                  setup.path_share, tables ? Cutter::Method::tables : Cutter::Method::history, corner_slices);
+  cutter_.emplace(*setup.model.tool, law, time_step, setup.radius_offset, setup.path_share,
+                  tables ? Cutter::Method::tables : Cutter::Method::history, corner_slices);
   layers_ = EdgeLayers(setup, law, time_step, tables);
 }
 

@@ -11,7 +11,7 @@
 namespace smartmill::sim {
 MillingProcess::MillingProcess(const ToolGeometry& tool, const CuttingLaw& law, double time_step,
                                std::vector<double> radius_offset, double path_share)
-    : tool_((validate(tool), tool)),
+    : tool_((validate(tool), requireStraightEdge(tool, "to cut as one mill"), tool)),
       rule_(tool, radius_offset),
       radius_offset_(std::move(radius_offset)),
       law_(law),

@@ -242,12 +242,13 @@ TEST(Effects, cornerRadiusIsTheSumOverTheElementsOfTheEdge) {
 
 // Tables and history of passes agree, also for a change of depth within the corner.
 TEST(Effects, cornerRadiusIsTheSameWithHistory) {
-  const MachineModel model = mill(3, 35.0);
+  MachineModel model = mill(3, 35.0);
+  model.tool->edge.corner_radius = 4e-3;
   CuttingLaw law;
   law.coefficients = *model.cutting;
   const double speed = 300.0, dt = TWO_PI / speed / 1024.0;
-  Cutter tables(*model.tool, law, dt, {}, 4e-3, 0.0, Cutter::Method::tables),
-      history(*model.tool, law, dt, {}, 4e-3, 0.0, Cutter::Method::history);
+  Cutter tables(*model.tool, law, dt, {}, 0.0, Cutter::Method::tables),
+      history(*model.tool, law, dt, {}, 0.0, Cutter::Method::history);
   ToolMotion motion;
   motion.speed = speed;
   motion.velocity[0] = 3e-4 * speed / TWO_PI;

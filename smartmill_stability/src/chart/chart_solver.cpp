@@ -24,7 +24,7 @@ StabilityLimit ChartSolver::limits(const std::vector<double>& speeds) const {
 }
 
 double ChartSolver::absoluteDepthLimit(const StabilityLimit& chart) const {
-  if (method == Method::zero_order && !system.hasProcessDamping()) {
+  if (method == Method::zero_order && !system.hasProcessDamping() && !system.edge.inclined()) {
     const RegenerativeProcess process{system.teeth, system.entry, system.exit, system.kt,
                                       system.kr / system.kt};
     return stability::absoluteDepthLimit(process, *system.response);

@@ -150,10 +150,18 @@ RegenerativeSystem MeasuredMachine::cutOf(const ChartCut& cut, const Engagement&
   system.pitch = cut.tool.pitch;
   system.helix = cut.tool.helix;
   system.diameter = cut.tool.diameter;
+  system.edge = cut.tool.edge;
   system.entry = given ? engagement.entry : cut.parameters.entry;
   system.exit = given ? engagement.exit : cut.parameters.exit;
   system.kt = cutting.ktc;
   system.kr = std::isfinite(cutting.krc) ? cutting.krc : cut.parameters.radial_ratio * cutting.ktc;
+  system.ka = cutting.kac;
+  if (system.edge.inclined() && !std::isfinite(system.ka))
+    throw Error("no chart yet, missing: axial coefficient (inclined edge)");
+  if (system.edge.serrated()) {
+    system.chip.emplace();
+    system.chip->feed = cut.parameters.feed_per_tooth;
+  }
   system.setProcessDamping(cut.process_damping);
   return system;
 }

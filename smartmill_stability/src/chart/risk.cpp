@@ -85,11 +85,17 @@ DrawnLimits drawnLimits(const UncertainSystem& system, const std::vector<double>
   if (draws < 1) throw Error("draws: " + std::to_string(draws) + ": expected at least 1");
   double highest = 0.0;
   for (const SystemMode& mode : system.mean().modes) highest = std::max(highest, mode.frequency);
+  double typical = 1.0;  // [m] depth over which an inclined edge is averaged
   const auto zeroOrder = [&](const RegenerativeSystem& machine) {
     const RegenerativeProcess process{machine.teeth, machine.entry, machine.exit, machine.kt,
-                                      machine.kr / machine.kt};
+                                      machine.meanRadial(typical) / machine.kt};
     return zeroOrderLimit(process, responseOf(machine.modes, 1.0, 2.0 * highest, DRAW.lines), speeds).depth;
   };
+  if (system.mean().edge.inclined()) {
+    const std::vector<double> first = zeroOrder(system.mean());
+    const double least = *std::min_element(first.begin(), first.end());
+    if (std::isfinite(least)) typical = least;
+  }
   DrawnLimits limits;
   limits.mean = zeroOrder(system.mean());
   std::mt19937_64 random(seed);

@@ -111,8 +111,7 @@ WallPrediction::WallPrediction(const RegenerativeSystem& system) : system_(syste
   if (system_.cut != Cut::milling || !system_.chip || system_.modes.empty())
     throw Error("surface error: expected milling with modes and a chip geometry");
   if (!(system_.diameter > 0.0)) throw Error("surface error: expected a tool diameter above 0");
-  if (system_.chip->serration_amplitude > 0.0)
-    throw Error("surface error: serrated edge: expected a smooth one, as of a finishing tool");
+  requireStraightEdge(system_.tool(), "for the surface location error");
   const bool up = std::abs(system_.entry) < WALL.same_angle;
   down_ = std::abs(system_.exit - PI) < WALL.same_angle;
   if (up == down_)
@@ -120,7 +119,7 @@ WallPrediction::WallPrediction(const RegenerativeSystem& system) : system_(syste
         formatted("surface error: entry %.2f deg, exit %.2f deg: expected one wall, by up-milling (entry "
                   "0, exit below 180 deg) or down-milling (entry above 0, exit 180 deg)",
                   units::degFromRad(system_.entry), units::degFromRad(system_.exit)));
-  const ToolGeometry tool{system_.teeth, system_.diameter, system_.helix, system_.pitch};
+  const ToolGeometry tool = system_.tool();
   lag_ = system_.helix > 0.0 ? tool.lag() : 0.0;
   const ChipRule rule(tool, system_.chip->radius_offset);
   alike_ = rule.alike();

@@ -70,7 +70,9 @@ RegenerativeSystem UncertainSystem::draw(std::mt19937_64& random) const {
     }
   }
   drawn.kt *= factor(random, kt_share_);
-  drawn.kr *= factor(random, kr_share_);
+  const double radial = factor(random, kr_share_);
+  drawn.kr *= radial;
+  drawn.ka *= radial;  // of an inclined edge: both act across the tool
   return drawn;
 }
 

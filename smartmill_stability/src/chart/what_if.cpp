@@ -92,10 +92,12 @@ WhatIfChart whatIfChart(const ChartCut& cut, const MeasuredMachine& machine, con
     if (!std::isnan(requested)) value = requested;
   };
   change(other.tool.helix, request.helix);
+  const bool other_teeth = request.teeth > 0 && request.teeth != cut.tool.teeth;
+  if (!std::isnan(request.helix) || other_teeth) other.tool.edge.helix.clear();
   change(other.parameters.entry, request.entry);
   change(other.parameters.exit, request.exit);
   change(other.parameters.feed_per_tooth, request.feed_per_tooth);
-  if (request.teeth > 0 && request.teeth != cut.tool.teeth) {
+  if (other_teeth) {
     other.tool.teeth = request.teeth;
     other.tool.pitch.clear();
   }

@@ -95,9 +95,9 @@ void traceAll(const Request& request, const stability::FloquetSolver& solver,
 
 /// Adds the chip geometry, and with it the actual contact of the teeth, when a feed is given.
 void addChips(const Request& request, stability::RegenerativeSystem& system) {
-  if (request.feed_mm == 0.0 && request.serration.empty()) return;
+  if (request.feed_mm == 0.0 && request.serration.empty() && !system.edge.serrated()) return;
   if (!(request.feed_mm > 0.0))
-    throw Error("--feed-mm: expected a value above 0 (required by --serration-mm)");
+    throw Error("--feed-mm: expected a value above 0 (required by a serrated edge)");
   stability::ChipGeometry chip;
   chip.feed = request.feed_mm * units::MM;
   if (!request.serration.empty()) {
@@ -106,8 +106,8 @@ void addChips(const Request& request, stability::RegenerativeSystem& system) {
     if (std::sscanf(request.serration.c_str(), "%lf:%lf%c", &amplitude, &wavelength, &rest) != 2 ||
         !(amplitude > 0.0) || !(wavelength > 0.0))
       throw Error("--serration-mm " + request.serration + ": expected AMPLITUDE:WAVELENGTH, both above 0");
-    chip.serration_amplitude = amplitude * units::MM;
-    chip.serration_wavelength = wavelength * units::MM;
+    system.edge.serration_amplitude = amplitude * units::MM;
+    system.edge.serration_wavelength = wavelength * units::MM;
   }
   system.chip = chip;
 }

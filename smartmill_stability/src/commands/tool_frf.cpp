@@ -76,7 +76,7 @@ void run(const Request& request) {
   const ModalModel y = predict(request, table, entry, true);
   if (request.model.empty()) return;
   MachineModel model = readMachineModel(request.model);
-  model.tool = ToolGeometry{entry.tool.teeth, entry.tool.diameter, entry.tool.helix, {}};
+  model.tool = entry.geometry;
   model.stickout = entry.tool.stickout;
   model.tool_tip.x = x;
   model.tool_tip.y = y;

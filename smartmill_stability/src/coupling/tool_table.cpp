@@ -6,6 +6,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/io/csv.h"
 #include "smartmill_core/io/uff.h"
+#include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/model/strict_yaml.h"
 #include "smartmill_core/units.h"
 
@@ -47,7 +48,10 @@ TableTool toolOf(const StrictYaml& yaml, const std::string& table) {
   tool.diameter = yaml.number("diameter_mm", Range::positive()) * units::MM;
   tool.fluted_length = yaml.number("fluted_length_mm", Range::notNegative()) * units::MM;
   tool.teeth = yaml.integer("teeth", 1, 20);
-  tool.helix = units::radFromDeg(yaml.optionalNumber("helix_deg", Range::openHigh(0.0, 80.0)).value_or(0.0));
+  entry.geometry.teeth = tool.teeth;
+  entry.geometry.diameter = tool.diameter;
+  readEdges(yaml, entry.geometry);
+  tool.helix = entry.geometry.helix;
   if (const auto ratio = yaml.optionalNumber("flute_ratio", Range::openLow(0.3, 1.0)))
     tool.flute_ratio = *ratio;
   tool.material = beamMaterial(yaml.has("material") ? yaml.word("material") : "carbide");

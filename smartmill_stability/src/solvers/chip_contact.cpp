@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 
 #include "smartmill_core/cutting/chip_rule.h"
+#include "smartmill_core/cutting/corner.h"
 #include "smartmill_core/error.h"
 #include "smartmill_stability/solvers/delayed_system.h"
 #include "solvers/floquet.h"
@@ -42,23 +43,26 @@ class Contact {
         period_(TWO_PI / speed),
         teeth_(system.teeth),
         vibration_(system.modes, period_) {
-    const ToolGeometry tool{system.teeth, system.diameter, system.helix, system.pitch};
-    const double lag = system.helix > 0.0 ? tool.lag() : 0.0;
-    double required = std::max(1.0, lag * depth / CONTACT.slice_lag);
-    if (chip_.serration_amplitude > 0.0)
-      required = std::max(required, CONTACT.wave_slices * depth / chip_.serration_wavelength);
-    slices_ = std::min(CONTACT.most_slices, static_cast<int>(std::ceil(required)));
-    height_ = depth / slices_;
+    const ToolGeometry tool = system.tool();
+    addSlices(tool, depth);
     bool alike = true;
-    for (int s = 0; s < slices_; ++s) {
-      const double z = (s + 0.5) * height_;
+    for (std::size_t s = 0; s < slices_.size(); ++s) {
+      const double z = slices_[s].middle;
+      ToolGeometry mill = tool;
+      mill.edge = {};
+      mill.diameter = 2.0 * (tool.radius() - slices_[s].inset);
       std::vector<double> offset;
       for (int k = 0; k < teeth_; ++k) {
-        offset.push_back(offsetAt(k, z));
-        angle_.push_back(tool.toothAngle(k) - lag * z);
+        offset.push_back((chip_.radius_offset.empty() ? 0.0 : chip_.radius_offset[static_cast<std::size_t>(k)]) +
+                         serrationAt(tool, k, z));
+        angle_.push_back(tool.toothAngle(k) - (tool.helix > 0.0 ? tool.lagOf(k) : 0.0) * z);
       }
-      const ChipRule rule(tool, offset);
-      addPasses(rule, s == 0);
+      if (!tool.edge.helix.empty()) {
+        mill.pitch.clear();
+        for (int k = 0; k < teeth_; ++k) mill.pitch.push_back(tool.pitchAt(k, z));
+      }
+      const ChipRule rule(mill, offset);
+      addPasses(rule, s == 0 || !tool.edge.helix.empty());
       alike = alike && rule.alike();
     }
     solve(chip_.forced_vibration && !alike && !system.modes.empty());
@@ -88,7 +92,7 @@ class Contact {
     feedback.now.setZero();
     feedback.velocity.setZero();
     feedback.delayed.assign(delays_.size(), Eigen::Matrix2d::Zero());
-    const double damp = system_.hasProcessDamping() ? 1.0 / (0.5 * speed_ * system_.diameter) : 0.0;
+    const bool damps = system_.hasProcessDamping();
     double at = std::fmod(inside, period_);
     if (at < 0.0) at += period_;
     for (std::size_t e = 0; e < segments_.size(); ++e) {
@@ -96,42 +100,90 @@ class Contact {
         const double shifted = at < s.begin ? at + period_ : at;
         if (shifted < s.begin || shifted >= s.end) continue;
         const double angle = angle_[e] + speed_ * t;
-        const Eigen::Matrix2d stiffness = height_ * directional(system_.kt, system_.kr, angle);
+        const Slice& slice = sliceOf(e);
+        const Eigen::Matrix2d stiffness = slice.height * directional(system_.kt, slice.kr, angle);
         feedback.now += stiffness;
         feedback.delayed[s.delay] -= stiffness;
-        if (damp > 0.0)
-          feedback.velocity +=
-              height_ * damp * directional(system_.damping_tangential, system_.damping_radial, angle);
+        if (damps)
+          feedback.velocity += slice.height / (speed_ * (0.5 * system_.diameter - slice.inset)) *
+                               directional(system_.damping_tangential,
+                                           slice.chip_radial * system_.damping_radial, angle);
         break;
       }
     }
   }
 
  private:
+  /// A height of the tool with one contact.
+  struct Slice {
+    double middle, height;            ///< [m]
+    double kr;                        ///< [N/m2] across the tool
+    double chip_radial = 1.0;         ///< [1] sin(kappa)
+    double inset = 0.0;               ///< [m] tool radius minus local radius
+  };
+
+  int sliceCount() const { return static_cast<int>(slices_.size()); }
   std::size_t edge(int s, int k) const { return static_cast<std::size_t>(s * teeth_ + k); }
-  std::size_t pass(int k, int m) const { return static_cast<std::size_t>(k * teeth_ + m - 1); }
+  const Slice& sliceOf(std::size_t edge) const { return slices_[edge / static_cast<std::size_t>(teeth_)]; }
+  /// Delay of an edge against the m-th previous tooth.
+  std::size_t delayOf(std::size_t edge, int m) const {
+    const std::size_t first = edge * static_cast<std::size_t>(teeth_) + static_cast<std::size_t>(m - 1);
+    return delay_[first % delay_.size()];
+  }
+
+  /// Slices of the corner, then equal ones above it.
+  void addSlices(const ToolGeometry& tool, double depth) {
+    const EdgeShape& shape = system_.edge;
+    const double corner = std::min(depth, cornerHeight(tool));
+    double most_lag = system_.helix > 0.0 ? tool.lag() : 0.0, pitch_change = 0.0;  // [rad/m]
+    for (int k = 0; k < teeth_ && !shape.helix.empty(); ++k) {
+      most_lag = std::max(most_lag, tool.lagOf(k));
+      pitch_change = std::max(pitch_change, std::abs(tool.lagOf((k + 1) % teeth_) - tool.lagOf(k)));
+    }
+    const auto add = [&](double low, double high, double across, double along, double inset) {
+      const double rise = high - low;
+      double required =
+          std::max({1.0, most_lag * rise / CONTACT.slice_lag, pitch_change * rise / CONTACT.pitch_change});
+      if (shape.serrated())
+        required = std::max(required, CONTACT.wave_slices * rise / shape.serration_wavelength);
+      const int count = std::min(CONTACT.most_slices, static_cast<int>(std::ceil(required)));
+      for (int s = 0; s < count; ++s) {
+        Slice slice{low + (s + 0.5) * (rise / count), rise / count, system_.kr};
+        if (shape.inclined()) {
+          slice.kr = system_.kr * across - system_.ka * along;
+          slice.chip_radial = across;
+          slice.inset = inset;
+        }
+        slices_.push_back(slice);
+      }
+    };
+    for (const EdgeSlice& whole : edgeSlices(tool, depth)) {
+      if (!whole.curved || whole.low >= depth) break;
+      const EdgeSlice slice = depth < whole.high ? upTo(depth, whole, tool) : whole;
+      add(slice.low, slice.high, slice.chip_radial, slice.chip_axial, slice.inset);
+    }
+    if (depth <= corner) return;
+    const double sine = std::sin(shape.edge_angle), cosine = std::cos(shape.edge_angle);
+    add(corner, depth, sine, shape.edge_angle < 0.5 * units::PI ? cosine : 0.0,
+        shape.edge_angle < 0.5 * units::PI ? -0.5 * (corner + depth) * cosine / sine : 0.0);
+  }
+
   /// Chip of an edge against the m-th previous tooth, without vibration.
   const ChipShape& rigidChip(std::size_t e, int m) const {
     return rigid_chips_[e * static_cast<std::size_t>(teeth_) + static_cast<std::size_t>(m - 1)];
   }
 
-  /// [m] Radius of tooth k at height z minus the nominal radius.
-  double offsetAt(int k, double z) const {
-    double offset = chip_.radius_offset.empty() ? 0.0 : chip_.radius_offset[static_cast<std::size_t>(k)];
-    if (chip_.serration_amplitude > 0.0)
-      offset += chip_.serration_amplitude *
-                std::sin(TWO_PI * (z / chip_.serration_wavelength + static_cast<double>(k) / teeth_));
-    return offset;
-  }
-
   /// Adds the previous passes of one revolution. The forced vibration is synchronous with the revolution, so
   /// older surfaces are deeper.
-  void addPasses(const ChipRule& rule, bool first_slice) {
+  /// @param with_delays of this slice; otherwise those of the first one
+  void addPasses(const ChipRule& rule, bool with_delays) {
     for (int k = 0; k < teeth_; ++k) {
       for (int m = 1; m <= teeth_; ++m) {
         rigid_chips_.push_back(rule.steadyShape(k, m, {{chip_.feed * teeth_ / TWO_PI, 0.0}}));
-        if (!first_slice) continue;
-        const double delay = rule.turn(k, m) / speed_;
+        if (!with_delays) continue;
+        double turn = rule.turn(k, m);
+        if (!system_.edge.helix.empty()) turn = CONTACT.delay_step * std::round(turn / CONTACT.delay_step);
+        const double delay = m == teeth_ ? period_ : turn / speed_;
         std::size_t d = 0;
         while (d < delays_.size() && std::abs(delays_[d] - delay) > 1e-9 * delay) ++d;
         if (d == delays_.size()) delays_.push_back(delay);
@@ -142,13 +194,13 @@ class Contact {
 
   /// [m] Chip thickness of a tooth against the m-th previous tooth at a cell.
   double chipAgainst(int s, int k, int m, int cell) const {
-    const std::size_t e = edge(s, k), p = pass(k, m);
+    const std::size_t e = edge(s, k);
     const double angle = angle_[e] + TWO_PI * (cell + 0.5) / CELLS;
     const double sine = std::sin(angle), cosine = std::cos(angle);
     double h = rigidChip(e, m).at(sine, cosine);
     if (!vibration_.empty()) {
       const auto i = static_cast<std::size_t>(cell);
-      const auto &now = vibration_.motion(), &before = vibration_.delayed(delay_[p]);
+      const auto &now = vibration_.motion(), &before = vibration_.delayed(delayOf(e, m));
       h += (now[0][i] - before[0][i]) * sine + (now[1][i] - before[1][i]) * cosine;
     }
     return h;
@@ -180,7 +232,7 @@ class Contact {
 
   Pattern patternOf() const {
     Pattern pattern(angle_.size() * CELLS, 0);
-    for (int s = 0; s < slices_; ++s) {
+    for (int s = 0; s < sliceCount(); ++s) {
       for (int k = 0; k < teeth_; ++k) {
         const std::size_t e = edge(s, k);
         for (int cell = 0; cell < CELLS; ++cell) {
@@ -211,23 +263,24 @@ class Contact {
         std::vector<std::vector<Eigen::Matrix2d>>(
             1 + delays_.size(), std::vector<Eigen::Matrix2d>(CELLS, Eigen::Matrix2d::Zero())),
         std::vector<Eigen::Vector2d>(CELLS, Eigen::Vector2d::Zero())};
-    for (int s = 0; s < slices_; ++s) {
+    for (int s = 0; s < sliceCount(); ++s) {
       for (int k = 0; k < teeth_; ++k) {
         const std::size_t e = edge(s, k);
+        const Slice& slice = sliceOf(e);
         for (int cell = 0; cell < CELLS; ++cell) {
           const auto i = static_cast<std::size_t>(cell);
           const int m = pattern[e * CELLS + i];
           if (m == 0) continue;
           const double angle = angle_[e] + TWO_PI * (cell + 0.5) / CELLS;
           const double sine = std::sin(angle), cosine = std::cos(angle);
-          const Eigen::Matrix2d d = inArc(e, cell) * height_ * directional(system_.kt, system_.kr, angle);
+          const Eigen::Matrix2d d = inArc(e, cell) * slice.height * directional(system_.kt, slice.kr, angle);
           forces.gain[0][i] += d;
-          forces.gain[1 + delay_[pass(k, m)]][i] -= d;
+          forces.gain[1 + delayOf(e, m)][i] -= d;
           // directional() is force times normal; multiplied by the normal it is the force per chip thickness.
           // The edge force is that of a chip of one metre with the coefficients kte and kre.
           const Eigen::Vector2d normal(sine, cosine);
           forces.force[i] += d * normal * rigidChip(e, m).at(sine, cosine) +
-                             inArc(e, cell) * height_ * directional(chip_.kte, chip_.kre, angle) * normal;
+                             inArc(e, cell) * slice.height * directional(chip_.kte, chip_.kre, angle) * normal;
         }
       }
     }
@@ -239,7 +292,7 @@ class Contact {
   void setSegments(const Pattern& pattern) {
     const double width = period_ / CELLS;
     segments_.assign(angle_.size(), {});
-    for (int s = 0; s < slices_; ++s) {
+    for (int s = 0; s < sliceCount(); ++s) {
       for (int k = 0; k < teeth_; ++k) {
         const std::size_t e = edge(s, k);
         // Entry and exit of this edge in time.
@@ -258,7 +311,7 @@ class Contact {
           if (next == m) continue;
           double to = end;
           if (cell <= last) to = std::clamp(change(s, k, cell - 1, m, next), from, end);
-          if (m > 0 && to > from + 1e-9 * period_) segments_[e].push_back({from, to, delay_[pass(k, m)]});
+          if (m > 0 && to > from + 1e-9 * period_) segments_[e].push_back({from, to, delayOf(e, m)});
           from = to;
           m = next;
         }
@@ -285,12 +338,12 @@ class Contact {
   RegenerativeSystem system_;
   ChipGeometry chip_;
   double speed_, period_;
-  int teeth_, slices_ = 1;
-  double height_ = 0.0;                 // [m] of a slice
+  int teeth_;
+  std::vector<Slice> slices_;
   std::vector<double> angle_;           // [rad] of each edge at time 0
   std::vector<double> delays_;          // [s]
   std::vector<ChipShape> rigid_chips_;  // of each edge against each pass
-  std::vector<std::size_t> delay_;      // of each pass
+  std::vector<std::size_t> delay_;      // of each pass of the first slice, or of all
   ForcedVibration vibration_;
   std::vector<std::vector<ContactSegment>> segments_;  // of each edge
 };
@@ -309,7 +362,8 @@ DelayedSystem contactSystem(const RegenerativeSystem& system, double speed, doub
   const Contact contact(system, speed, depth);
   DelayedSystem delayed;
   delayed.modes = system.modes;
-  delayed.stiffness = depth * std::hypot(system.kt, system.kr);
+  delayed.stiffness =
+      depth * std::hypot(system.kt, system.edge.inclined() ? std::hypot(system.kr, system.ka) : system.kr);
   delayed.period = contact.period();
   delayed.delays = contact.delays();
   delayed.rate = 2.0 * speed;

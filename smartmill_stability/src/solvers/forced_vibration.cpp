@@ -45,12 +45,19 @@ VectorXcd ForcedVibration::balance(const ContactForces& forces, const std::vecto
   const Index n = 2 * most + 1;
   std::vector<std::vector<Eigen::Matrix2cd>> c;  // Fourier coefficients of the gains, -2 most .. 2 most
   for (const auto& gain : forces.gain) {
-    c.emplace_back(static_cast<std::size_t>(4 * most + 1));
+    c.emplace_back(static_cast<std::size_t>(4 * most + 1), Eigen::Matrix2cd::Zero());
+    if (std::all_of(gain.begin(), gain.end(), [](const auto& g) { return g.isZero(0.0); })) continue;
     for (int j = 0; j <= 2 * most; ++j) {
       const auto sum = coefficient<Eigen::Matrix2cd>(gain, j);
       c.back()[static_cast<std::size_t>(2 * most + j)] = sum;
       c.back()[static_cast<std::size_t>(2 * most - j)] = sum.conjugate();
     }
+  }
+  // Delays without force, of passes that no tooth meets, are left out.
+  std::vector<std::size_t> used;
+  for (std::size_t d = 0; d < delays.size(); ++d) {
+    const auto& gain = forces.gain[1 + d];
+    if (std::any_of(gain.begin(), gain.end(), [](const auto& g) { return !g.isZero(0.0); })) used.push_back(d);
   }
   MatrixXcd matrix = MatrixXcd::Identity(2 * n, 2 * n);
   VectorXcd right(2 * n);
@@ -62,7 +69,7 @@ VectorXcd ForcedVibration::balance(const ContactForces& forces, const std::vecto
     for (int l = -most; l <= most; ++l) {
       const auto k = static_cast<std::size_t>(2 * most + r - l);
       Eigen::Matrix2cd sum = c[0][k];
-      for (std::size_t d = 0; d < delays.size(); ++d)
+      for (const std::size_t d : used)
         sum += std::polar(1.0, -TWO_PI * l * delays[d] / period_) * c[1 + d][k];
       matrix.block<2, 2>(2 * (r + most), 2 * (l + most)) -= compliance * sum;
     }

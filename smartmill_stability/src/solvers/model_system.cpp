@@ -31,10 +31,12 @@ RegenerativeSystem systemOf(const MachineModel& model, double entry_deg, double 
   system.pitch = tool.pitch;
   system.helix = tool.helix;
   system.diameter = tool.diameter;
+  system.edge = tool.edge;
   system.entry = units::radFromDeg(entry_deg);
   system.exit = units::radFromDeg(exit_deg);
   system.kt = cutting.ktc;
   system.kr = cutting.krc;
+  system.ka = cutting.kac;
   system.setProcessDamping(processDamping(model));
   return system;
 }

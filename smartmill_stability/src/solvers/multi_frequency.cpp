@@ -70,7 +70,7 @@ class MultiFrequency : public StabilitySolver {
     const double period = TWO_PI / speed / (system_.evenPitch() ? system_.teeth : 1);
     const int within = static_cast<int>(std::ceil(highest_ * period / TWO_PI));
     const int reach = within + extra;
-    if (system_.helix > 0.0) return withHelix(speed, max_depth, reach);
+    if (system_.dependsOnHeight()) return withHelix(speed, max_depth, reach);
     // The harmonics -reach .. reach - 1 are symmetric at half a step, the frequency of a flip.
     const Balance balance(system_, axes_, speed, reach, reach - 1);
     Limit limit;
@@ -116,7 +116,7 @@ class MultiFrequency : public StabilitySolver {
 
   /// [m] Limit without helix, close to that with helix unless the lag of the edge is large.
   double straightLimit(double speed, double max_depth, int reach) const {
-    RegenerativeSystem straight = system_;
+    RegenerativeSystem straight = system_.straightened(max_depth);
     straight.helix = 0.0;
     const Balance plain(straight, axes_, speed, reach, reach - 1);
     double limit = max_depth;

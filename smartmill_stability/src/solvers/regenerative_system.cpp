@@ -1,6 +1,8 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 
+#include "smartmill_core/cutting/corner.h"
 #include "smartmill_core/cutting/cutting_law.h"
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
@@ -54,7 +56,7 @@ double wrap(double angle) {
 class Teeth {
  public:
   Teeth(const RegenerativeSystem& system, double speed, double depth) : system_(system), speed_(speed) {
-    ToolGeometry tool{system.teeth, system.diameter, system.helix, system.pitch};
+    const ToolGeometry tool = system.tool();
     swept_ = system.helix > 0.0 ? tool.lag() * depth : 0.0;
     depth_ = depth;
     const double v = 0.5 * speed * system.diameter;
@@ -164,6 +166,144 @@ class Teeth {
   std::vector<Eigen::Matrix2d> arc_;
 };
 
+/// The same for edges of any shape. The feedback is integrated over the height by Gauss quadrature between
+/// the exact ends of an edge in the arc, over kappa in the corner, where it is smooth.
+class ShapedTeeth {
+ public:
+  ShapedTeeth(const RegenerativeSystem& system, double speed, double depth)
+      : system_(system), tool_(system.tool()), speed_(speed) {
+    corner_ = std::min(depth, cornerHeight(tool_));
+    if (corner_ > 0.0) bands_.push_back({0.0, corner_, true, {}});
+    // The delay is that of the middle of a slice.
+    if (!system.edge.helix.empty()) {
+      bands_.clear();
+      for (const EdgeSlice& slice : edgeSlices(tool_, depth)) {
+        const double top = std::min(slice.high, depth);
+        if (top > slice.low) bands_.push_back({slice.low, top, slice.curved, {}});
+      }
+    }
+    if (bands_.empty() || bands_.back().high < depth) bands_.push_back({corner_, depth, false, {}});
+    ends_ = {0.0};
+    if (corner_ > 0.0 && corner_ < depth) ends_.push_back(corner_);
+    ends_.push_back(depth);
+    for (int k = 0; k < system.teeth; ++k) {
+      angle_.push_back(tool_.toothAngle(k));
+      lag_.push_back(tool_.lagOf(k));
+      for (Band& band : bands_)
+        band.delay.push_back(delayIndex(tool_.pitchAt(k, 0.5 * (band.low + band.high)) / speed));
+    }
+  }
+
+  const std::vector<double>& delays() const { return delays_; }
+
+  std::vector<double> breaks(double period) const {
+    std::vector<double> times;
+    for (std::size_t k = 0; k < angle_.size(); ++k) {
+      for (const double edge : {system_.entry, system_.exit}) {
+        for (const double height : ends_) {
+          const double t = wrap(edge - angle_[k] + lag_[k] * height) / speed_;
+          if (t < period * (1.0 - 1e-12)) times.push_back(t);
+        }
+      }
+    }
+    return times;
+  }
+
+  void operator()(double t, double inside, Feedback& feedback) const {
+    feedback.now.setZero();
+    feedback.velocity.setZero();
+    feedback.delayed.assign(delays_.size(), Eigen::Matrix2d::Zero());
+    for (std::size_t k = 0; k < angle_.size(); ++k) {
+      const double middle = wrap(angle_[k] + speed_ * inside);
+      const double angle = middle + speed_ * (t - inside);
+      for (const Band& band : bands_) {
+        const double swept = lag_[k] * (band.high - band.low), top = angle - lag_[k] * band.low;
+        if (swept < NO_SWEEP) {
+          // An arc beyond a full revolution contains angle + 2 pi too.
+          for (const double turn : {0.0, TWO_PI}) {
+            const double at = middle - lag_[k] * band.low + turn;
+            if (at > system_.entry && at < system_.exit)
+              addBand(feedback, k, band, angle + turn, band.low, band.high);
+          }
+          continue;
+        }
+        // The band covers the angles from top - swept to top.
+        for (double turn = -TWO_PI * std::floor(top / TWO_PI); top + turn - swept < system_.exit;
+             turn += TWO_PI) {
+          const double low = std::max(band.low, (angle + turn - system_.exit) / lag_[k]);
+          const double high = std::min(band.high, (angle + turn - system_.entry) / lag_[k]);
+          if (high > low) addBand(feedback, k, band, angle + turn, low, high);
+        }
+      }
+    }
+  }
+
+ private:
+  struct Band {
+    double low, high;  // [m]
+    bool curved;
+    std::vector<std::size_t> delay;  // of each tooth
+  };
+
+  std::size_t delayIndex(double delay) {
+    std::size_t d = 0;
+    while (d < delays_.size() && std::abs(delays_[d] - delay) > 1e-9 * delay) ++d;
+    if (d == delays_.size()) delays_.push_back(delay);
+    return d;
+  }
+
+  /// Adds the edge of tooth k between two heights of a band, its tip at an angle.
+  void addBand(Feedback& feedback, std::size_t k, const Band& band, double angle, double low,
+               double high) const {
+    const double radius = tool_.edge.corner_radius;
+    const auto lean = [radius](double z) { return std::acos(std::clamp(1.0 - z / radius, -1.0, 1.0)); };
+    // Over kappa in the corner (dz = r sin(kappa) dkappa), over z above it.
+    const double from = band.curved ? lean(low) : low, to = band.curved ? lean(high) : high;
+    const double range = std::max(lag_[k] * (high - low), band.curved ? to - from : 0.0);
+    const int parts = std::max(1, static_cast<int>(std::ceil(range / GAUSS_RANGE)));
+    const double half = 0.5 * (to - from) / parts;
+    for (int p = 0; p < parts; ++p) {
+      for (const auto& [x, w] : EDGE_GAUSS) {
+        const double at = from + (2 * p + 1 + x) * half;
+        const double kappa = band.curved ? at : tool_.edge.edge_angle;
+        const double sine = std::sin(kappa), cosine = std::cos(kappa);
+        const double z = band.curved ? radius * (1.0 - cosine) : at;
+        const double height = w * half * (band.curved ? radius * sine : 1.0);
+        const double phi = angle - lag_[k] * z;
+        const Eigen::Matrix2d stiffness =
+            height * directional(system_.kt, system_.kr * sine - system_.ka * cosine, phi);
+        feedback.now += stiffness;
+        feedback.delayed[band.delay[k]] -= system_.overlap * stiffness;
+        if (!system_.hasProcessDamping()) continue;
+        const double speed = speed_ * localRadius(kappa, z);
+        feedback.velocity += height * directional(system_.damping_tangential / speed,
+                                                  system_.damping_radial * sine / speed, phi);
+      }
+    }
+  }
+
+  /// [m] Of the edge at a height.
+  double localRadius(double kappa, double z) const {
+    const EdgeShape& edge = tool_.edge;
+    if (z < corner_) return tool_.radius() - edge.corner_radius * (std::tan(0.5 * edge.edge_angle) - std::sin(kappa));
+    return tool_.radius() + (edge.edge_angle < 0.5 * PI ? z / std::tan(edge.edge_angle) : 0.0);
+  }
+
+  static constexpr double GAUSS_RANGE = 1.0;  // [rad] of four Gauss points: error of sines 1e-9
+  static constexpr std::array<std::array<double, 2>, 4> EDGE_GAUSS{
+      {{{-0.8611363115940526, 0.3478548451374538}},
+       {{-0.3399810435848563, 0.6521451548625461}},
+       {{0.3399810435848563, 0.6521451548625461}},
+       {{0.8611363115940526, 0.3478548451374538}}}};
+
+  RegenerativeSystem system_;
+  ToolGeometry tool_;
+  double speed_, corner_ = 0.0;
+  std::vector<Band> bands_;
+  std::vector<double> ends_;  // [m] heights where the edge or its curvature ends
+  std::vector<double> angle_, lag_, delays_;
+};
+
 }  // namespace
 
 void RegenerativeSystem::setProcessDamping(double coefficient) {
@@ -199,10 +339,16 @@ void RegenerativeSystem::validate() const {
             "one for each tooth");
     require("tangential edge force [N/m]", chip->kte, Range::notNegative());
     require("radial edge force [N/m]", chip->kre, Range::notNegative());
-    require("serration amplitude [m]", chip->serration_amplitude, Range::notNegative());
-    require(chip->serration_amplitude == 0.0 || chip->serration_wavelength > 0.0, "serration wavelength [m]",
-            chip->serration_wavelength, "above 0");
     require(exit <= TWO_PI + 1e-9, "exit angle with a chip geometry [rad]", exit, "at most 2 pi");
+  }
+  if (!edge.straight()) {
+    if (cut != Cut::milling) throw Error("edge shape in turning: expected milling");
+    if (along_arc) requireStraightEdge(tool(), "for coefficients along the arc");
+    if (edge.serrated() && !chip)
+      throw Error("serrated edge: expected a chip geometry (the feed determines which teeth cut)");
+    if (edge.inclined()) require("axial coefficient [N/m2]", ka, Range::notNegative());
+    if (edge.inclined() || !edge.helix.empty()) require("diameter [m]", diameter, Range::positive());
+    smartmill::validate(edge, tool());
   }
   if (cut == Cut::turning) {
     require(teeth == 1, "number of teeth in turning", teeth, "1");
@@ -224,7 +370,35 @@ void RegenerativeSystem::validate() const {
   }
 }
 
+ToolGeometry RegenerativeSystem::tool() const {
+  return {teeth, diameter, helix, pitch, edge};
+}
+
+double RegenerativeSystem::meanRadial(double depth) const {
+  if (!edge.inclined()) return kr;
+  const double corner = std::min(depth, cornerHeight(tool()));
+  double sine = 0.0, cosine = 0.0;  // [m] integrals over the height
+  if (corner > 0.0) {
+    const EdgeSlice slice = upTo(corner, EdgeSlice{}, tool());
+    sine = corner * slice.chip_radial;
+    cosine = corner * slice.chip_axial;
+  }
+  sine += (depth - corner) * std::sin(edge.edge_angle);
+  if (edge.edge_angle < 0.5 * PI) cosine += (depth - corner) * std::cos(edge.edge_angle);
+  return (kr * sine - ka * cosine) / depth;
+}
+
+RegenerativeSystem RegenerativeSystem::straightened(double depth) const {
+  RegenerativeSystem straight = *this;
+  straight.kr = meanRadial(depth);
+  straight.edge = {};
+  return straight;
+}
+
 bool RegenerativeSystem::evenPitch() const {
+  if (!edge.helix.empty() &&
+      std::any_of(edge.helix.begin(), edge.helix.end(), [&](double h) { return h != edge.helix.front(); }))
+    return false;
   return std::all_of(pitch.begin(), pitch.end(),
                      [&](double p) { return std::abs(p * teeth / TWO_PI - 1.0) < 1e-9; });
 }
@@ -280,7 +454,8 @@ namespace {
 DelayedSystem steadySystem(const RegenerativeSystem& system, double speed, double depth) {
   DelayedSystem delayed;
   delayed.modes = system.modes;
-  delayed.stiffness = depth * std::hypot(system.kt, system.kr);
+  delayed.stiffness =
+      depth * std::hypot(system.kt, system.edge.inclined() ? std::hypot(system.kr, system.ka) : system.kr);
   if (system.cut == Cut::turning) {
     delayed.period = TWO_PI / speed;
     delayed.delays = {delayed.period};
@@ -298,12 +473,18 @@ DelayedSystem steadySystem(const RegenerativeSystem& system, double speed, doubl
     return delayed;
   }
   if (system.chip && depth > 0.0) return contactSystem(system, speed, depth);
-  const Teeth teeth(system, speed, depth);
   delayed.period = TWO_PI / speed / (system.evenPitch() ? system.teeth : 1);
-  delayed.delays = teeth.delays();
-  delayed.breaks = teeth.breaks(delayed.period);
   delayed.rate = 2.0 * speed;
-  delayed.feedback = teeth;
+  const auto use = [&](const auto& teeth) {
+    delayed.delays = teeth.delays();
+    delayed.breaks = teeth.breaks(delayed.period);
+    delayed.feedback = teeth;
+  };
+  if (system.edge.straight()) {
+    use(Teeth(system, speed, depth));
+  } else {
+    use(ShapedTeeth(system, speed, depth));
+  }
   return delayed;
 }
 

@@ -195,13 +195,21 @@ FloquetSolver::FloquetSolver(const RegenerativeSystem& system, const SolverOptio
                                           (2.0 * mode.damping_ratio * w * w));
   }
   depth_scale_ = 0.5 / (std::hypot(system_.kt, system_.kr) * compliance);
+  if (system_.edge.inclined()) depth_scale_ *= std::hypot(system_.kt, system_.kr) /
+                                               std::hypot(system_.kt, std::hypot(system_.kr, system_.ka));
   if (system_.cut == Cut::milling && system_.kt > 0.0) {
-    const RegenerativeProcess mean{system_.teeth, system_.entry, std::min(system_.exit, units::TWO_PI),
-                                   system_.kt, system_.kr / system_.kt};
-    const double least =
-        system_.exit <= units::TWO_PI
-            ? absoluteDepthLimit(mean, responseOf(system_.modes, 1.0, 2.0 * highest, SEARCH.mean_lines))
-            : depth_scale_;
+    const auto leastWith = [&](double kr) {
+      const RegenerativeProcess mean{system_.teeth, system_.entry, std::min(system_.exit, units::TWO_PI),
+                                     system_.kt, kr / system_.kt};
+      return absoluteDepthLimit(mean, responseOf(system_.modes, 1.0, 2.0 * highest, SEARCH.mean_lines));
+    };
+    double least = depth_scale_;
+    if (system_.exit <= units::TWO_PI) {
+      least = leastWith(system_.meanRadial(depth_scale_));
+      // The radial coefficient of an inclined edge changes with the depth: that of twice the height too.
+      for (double depth = depth_scale_; system_.edge.inclined() && depth < least; depth *= 2.0)
+        least = std::min(least, leastWith(system_.meanRadial(depth)));
+    }
     if (std::isfinite(least)) depth_scale_ = std::max(depth_scale_, SEARCH.first_share * least);
   }
 }
@@ -274,6 +282,9 @@ std::unique_ptr<StabilitySolver> makeSolver(Method method, const RegenerativeSys
   if (system.along_arc && (method == Method::zero_order || method == Method::multi_frequency))
     throw Error(std::string("method ") + nameOf(method) +
                 ": coefficients along the arc: expected collocation or semi_discretization");
+  if (!system.edge.helix.empty() && method == Method::zero_order)
+    throw Error(std::string("method ") + nameOf(method) +
+                ": a helix angle of each tooth (the delays change with height): expected collocation");
   if (system.variation && method != Method::collocation)
     throw Error(std::string("method ") + nameOf(method) + ": speed variation: expected collocation");
   if (method == Method::zero_order) return makeZeroOrder(system);

@@ -95,7 +95,7 @@ void RegenerativeProcess::validate() const {
   require("entry angle [rad]", entry, Range::notNegative());
   require("exit angle [rad]", exit, Range::openLow(entry, TWO_PI + 1e-9));
   require("tangential coefficient [N/m2]", kt, Range::positive());
-  require("radial ratio", radial_ratio, Range::notNegative());
+  require("radial ratio", radial_ratio, Range{});  // below 0 at the tip of a ball end
 }
 
 std::array<double, 4> directionalCoefficients(const RegenerativeProcess& process) {

@@ -5,6 +5,7 @@
 
 #include <Eigen/LU>
 
+#include "smartmill_core/cutting/corner.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
 #include "smartmill_stability/solvers/zero_order.h"
@@ -41,7 +42,8 @@ class ZeroOrder : public StabilitySolver {
       std::vector<double> sorted = speeds;
       std::sort(sorted.begin(), sorted.end());
       sorted.erase(std::unique(sorted.begin(), sorted.end()), sorted.end());
-      const StabilityLimit found = zeroOrderLimit(process, response_, sorted);
+      const StabilityLimit found =
+          system_.edge.inclined() ? inclined(sorted) : zeroOrderLimit(process, response_, sorted);
       std::vector<Limit> limits(speeds.size());
       for (std::size_t i = 0; i < speeds.size(); ++i) {
         const auto k = static_cast<std::size_t>(std::lower_bound(sorted.begin(), sorted.end(), speeds[i]) -
@@ -53,12 +55,62 @@ class ZeroOrder : public StabilitySolver {
       }
       return limits;
     }
+    if (system_.edge.inclined())
+      throw Error(
+          "method zero_order: inclined edge with uneven pitch, process damping or a chip geometry: expected "
+          "collocation");
     std::vector<Limit> limits;
     for (const double speed : speeds) limits.push_back(general(speed, max_depth));
     return limits;
   }
 
  private:
+  /// The mean radial coefficient of an inclined edge changes with the depth b: limits L of its values give
+  /// the first solution of L(kr(b)) = b.
+  StabilityLimit inclined(const std::vector<double>& speeds) const {
+    constexpr int VALUES = 33;
+    constexpr double GROWTH = 1.02;  // of the depth, from one sample to the next
+    const double shallow = system_.meanRadial(1e-3 * cornerHeight(system_.tool())), deep = system_.meanRadial(1e6);
+    const double low = std::min(shallow, deep), high = std::max(shallow, deep);
+    std::vector<StabilityLimit> of;  // radial coefficients from low to high
+    for (int i = 0; i < (high > low ? VALUES : 1); ++i)
+      of.push_back(zeroOrderLimit({system_.teeth, system_.entry, system_.exit, system_.kt,
+                                   (low + (high - low) * i / (VALUES - 1)) / system_.kt},
+                                  response_, speeds));
+    StabilityLimit limit = of.front();
+    for (std::size_t k = 0; k < speeds.size() && of.size() > 1; ++k) {
+      double least = std::numeric_limits<double>::infinity(), most = 0.0;
+      for (const StabilityLimit& l : of) {
+        least = std::min(least, l.depth[k]);
+        most = std::max(most, l.depth[k]);
+      }
+      limit.depth[k] = std::numeric_limits<double>::infinity();
+      // [m] of the limit above the depth
+      const auto above = [&](double depth, std::size_t* at) {
+        const double place =
+            std::clamp((system_.meanRadial(depth) - low) / (high - low), 0.0, 1.0) * (VALUES - 1);
+        const auto i = std::min(static_cast<std::size_t>(place), of.size() - 2);
+        const double share = place - static_cast<double>(i);
+        *at = i;
+        return (1.0 - share) * of[i].depth[k] + share * of[i + 1].depth[k] - depth;
+      };
+      if (!std::isfinite(least)) continue;
+      std::size_t at = 0;
+      double depth = 0.999 * least, over = above(depth, &at);
+      for (double next = GROWTH * depth; std::isfinite(over) && depth <= most; next *= GROWTH) {
+        const double over_next = above(next, &at);
+        if (over_next <= 0.0) {
+          limit.depth[k] = depth + (next - depth) * over / (over - over_next);
+          limit.chatter_frequency[k] = of[at].chatter_frequency[k];
+          break;
+        }
+        depth = next;
+        over = over_next;
+      }
+    }
+    return limit;
+  }
+
   Limit general(double speed, double max_depth) const {
     RegenerativeSystem straight = system_;
     straight.helix = 0.0;  // no effect on the mean
@@ -66,7 +118,7 @@ class ZeroOrder : public StabilitySolver {
     double height = 1.0;  // [m]
     if (straight.chip) {
       straight.chip->forced_vibration = false;
-      if (straight.chip->serration_amplitude > 0.0) height = straight.chip->serration_wavelength;
+      if (straight.edge.serrated()) height = straight.edge.serration_wavelength;
     }
     const Harmonics mean = harmonicsOf(straight, speed, 0, height);
     Limit limit;

@@ -46,8 +46,8 @@ TEST(ChipContact, slicesOfAHelixGiveTheSameAsTheIntegral) {
 TEST(ChipContact, theMeanOfADeepSerrationIsThatOfOneTooth) {
   RegenerativeSystem serrated = withChips(benchmarkSystem(0.5, true, true));
   serrated.teeth = 3;
-  serrated.chip->serration_amplitude = 200.0 * FEED;
-  serrated.chip->serration_wavelength = 2e-3;
+  serrated.edge.serration_amplitude = 200.0 * FEED;
+  serrated.edge.serration_wavelength = 2e-3;
   RegenerativeSystem one = benchmarkSystem(0.5, true, true);
   one.teeth = 1;
   for (const double rpm : {6000.0, 9000.0, 14000.0}) {
@@ -68,8 +68,8 @@ TEST(ChipContact, aSerrationRaisesTheLeastLimit) {
     return system;
   }();
   RegenerativeSystem serrated = withChips(plain);
-  serrated.chip->serration_amplitude = 0.5e-3;
-  serrated.chip->serration_wavelength = 1e-3;
+  serrated.edge.serration_amplitude = 0.5e-3;
+  serrated.edge.serration_wavelength = 1e-3;
   double least_plain = 1.0, least_serrated = 1.0;
   for (double rpm = 3000.0; rpm <= 3400.0; rpm += 80.0) {
     const double speed = radPerSecFromRpm(rpm);
@@ -106,10 +106,10 @@ int agreement(const RegenerativeSystem& system, const std::vector<double>& offse
       continue;
     ++n;
     const int slices =
-        system.chip ? static_cast<int>(20.0 * depth / system.chip->serration_wavelength) + 1 : 1;
+        system.chip ? static_cast<int>(20.0 * depth / system.edge.serration_wavelength) + 1 : 1;
     TimeDomain run(system, benchmark(), benchmark(), speed, depth, FEED, 720, true, slices);
     run.setRunout(offsets);
-    if (system.chip) run.setSerration(system.chip->serration_amplitude, system.chip->serration_wavelength);
+    if (system.chip) run.setSerration(system.edge.serration_amplitude, system.edge.serration_wavelength);
     const bool simulated = chattersInTime(run, 720, FEED);
     agree += simulated == chatters;
     if (simulated != chatters)
@@ -131,8 +131,8 @@ TEST(ChipContact, unevenPitchWithTeethThatLeaveTheCut) {
 
 TEST(ChipContact, aSerratedToolAgreesWithTheTimeDomain) {
   RegenerativeSystem system = withChips(benchmarkSystem(0.5, true, true));
-  system.chip->serration_amplitude = 0.15e-3;
-  system.chip->serration_wavelength = 0.2e-3;  // limits of the benchmark are tenths of a millimetre
+  system.edge.serration_amplitude = 0.15e-3;
+  system.edge.serration_wavelength = 0.2e-3;  // limits of the benchmark are tenths of a millimetre
   EXPECT_EQ(agreement(system, {}, 4, 5, true), 4);
 }
 
@@ -141,9 +141,9 @@ TEST(ChipContact, refusesInvalidSystems) {
   system.chip->feed = 0.0;
   EXPECT_THROW(makeSolver(Method::collocation, system), Error);
   system.chip->feed = FEED;
-  system.chip->serration_amplitude = 1e-3;
+  system.edge.serration_amplitude = 1e-3;
   EXPECT_THROW(makeSolver(Method::collocation, system), Error);
-  system.chip->serration_amplitude = 0.0;
+  system.edge.serration_amplitude = 0.0;
   system.chip->radius_offset = {0.0};
   EXPECT_THROW(makeSolver(Method::collocation, system), Error);
   system.chip->radius_offset.clear();

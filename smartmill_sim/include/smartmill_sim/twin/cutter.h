@@ -18,7 +18,8 @@ struct TipMobility {
   std::array<double, 2> rate_per_force{{0, 0}};  ///< [m/s/N] change of the rate per newton
 };
 
-/// Cutting force of a tool: one straight mill or, for a corner radius, a stack of straight mills.
+/// Cutting force of a tool: one straight mill or, for edges that are not straight, a stack of straight mills
+/// (EdgeSlice).
 class Cutter {
  public:
   /// How the forces are computed.
@@ -27,10 +28,9 @@ class Cutter {
     tables    ///< from tables over a revolution (RigidCut): steady and rigid
   };
 
-  /// @param radius_offset [m] of each tooth @param corner_radius [m] 0: none @throws Error on an invalid tool
-  /// or corner radius.
+  /// @param radius_offset [m] of each tooth @throws Error on an invalid tool.
   Cutter(const ToolGeometry& tool, const CuttingLaw& law, double time_step,
-         const std::vector<double>& radius_offset, double corner_radius, double path_share, Method method,
+         const std::vector<double>& radius_offset, double path_share, Method method,
          int corner_slices = CORNER_SLICES);
 
   /// Sets the contact from now on, see MillingProcess and RigidCut.
@@ -64,14 +64,19 @@ class Cutter {
     std::size_t arcs = 0;  // number of arcs at this height
     CutSums sums;          // of the present step
   };
+  void addMills(double height);
+  void updateContacts();
   void updateContact(StraightMill& mill);
   ToolMotion motionOf(const StraightMill& mill, const ToolMotion& now) const;
   CutSums sumsOf(StraightMill& mill, const ToolMotion& now) const;
   CuttingForce force() const;  // from the sums
   void solveRubbing(const ToolMotion& now, const TipMobility& mobility);
 
+  ToolGeometry tool_;
   Method method_;
-  double corner_radius_, lag_;
+  double time_step_, path_share_;
+  int corner_slices_;
+  std::vector<double> radius_offset_;  // [m] of each tooth
   CuttingLaw law_;
   std::vector<StraightMill> mills_;
   std::vector<ContactArc> arcs_;

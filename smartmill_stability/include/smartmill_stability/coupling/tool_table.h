@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "smartmill_core/cutting/tool.h"
 #include "smartmill_core/signal/frequency_response.h"
 #include "smartmill_stability/coupling/spindle.h"
 #include "smartmill_stability/coupling/tool_assembly.h"
@@ -18,6 +19,7 @@ struct GaugeFiles {
 /// One tool of the table with the FRF files of its taps, if any.
 struct TableTool {
   ToolDescription tool;
+  ToolGeometry geometry;           ///< of its teeth and edges
   std::string tapped_x, tapped_y;  ///< empty: not tapped in that direction
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "smartmill_core/cutting/corner.h"
 #include "smartmill_core/cutting/cutting_law.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
@@ -61,6 +62,7 @@ void validate(const ToolGeometry& tool) {
   if (!(tool.helix >= 0.0 && tool.helix < units::radFromDeg(80.0))) {
     refuse("tool helix", tool.helix, "rad", "0 <= helix < 80 deg");
   }
+  validate(tool.edge, tool);
   if (tool.pitch.empty()) return;
   if (tool.pitch.size() != static_cast<std::size_t>(tool.teeth)) {
     refuse("tool pitch", static_cast<double>(tool.pitch.size()), "values", "one per tooth");
@@ -72,6 +74,28 @@ void validate(const ToolGeometry& tool) {
   }
   // Pitches are written with a few digits in degrees.
   if (std::abs(sum - TWO_PI) > 1e-4) refuse("tool pitch", sum, "rad in total", "sum 2 pi");
+}
+
+void validate(const EdgeShape& edge, const ToolGeometry& tool) {
+  if (!(edge.corner_radius >= 0.0) || !std::isfinite(edge.corner_radius))
+    refuse("tool corner radius", edge.corner_radius / units::MM, "mm", ">= 0");
+  if (!(edge.edge_angle > 0.0 && edge.edge_angle <= 0.5 * PI))
+    refuse("tool edge angle", units::degFromRad(edge.edge_angle), "deg", "0 < value <= 90");
+  // The centre of the corner does not lie beyond the axis.
+  constexpr double ROUNDING = 1e-9;
+  if (edge.corner_radius * std::tan(0.5 * edge.edge_angle) > tool.radius() * (1.0 + ROUNDING)) {
+    throw Error(formatted("a corner radius of %g mm does not fit a tool of radius %g mm",
+                          edge.corner_radius / units::MM, tool.radius() / units::MM));
+  }
+  if (!edge.helix.empty() && edge.helix.size() != static_cast<std::size_t>(tool.teeth))
+    refuse("tool helix", static_cast<double>(edge.helix.size()), "values", "one per tooth");
+  for (const double helix : edge.helix) {
+    if (!(helix >= 0.0 && helix < units::radFromDeg(80.0))) refuse("tool helix", helix, "rad", "0 <= helix < 80 deg");
+  }
+  if (!(edge.serration_amplitude >= 0.0) || !std::isfinite(edge.serration_amplitude))
+    refuse("tool serration amplitude", edge.serration_amplitude / units::MM, "mm", ">= 0");
+  if (edge.serrated() && (!(edge.serration_wavelength > 0.0) || !std::isfinite(edge.serration_wavelength)))
+    refuse("tool serration wavelength", edge.serration_wavelength / units::MM, "mm", "> 0");
 }
 
 void validate(const Engagement& engagement) {
@@ -89,6 +113,27 @@ void validate(const Engagement& engagement) {
   }
 }
 
+namespace {
+
+/// Calls visit(slice, mill, engagement) for the slices of a tool within the axial depth.
+template <class Visit>
+void forEachSlice(const ToolGeometry& tool, const Engagement& engagement, Visit&& visit) {
+  if (tool.edge.serrated())
+    throw Error(formatted("tool: serration: amplitude_mm: %g, expected a smooth edge (needed to compute the "
+                          "force of a chip in proportion to the feed)",
+                          tool.edge.serration_amplitude / units::MM));
+  for (const EdgeSlice& whole : edgeSlices(tool, engagement.axial_depth)) {
+    const double top = std::min(whole.high, engagement.axial_depth);
+    if (top <= whole.low) break;
+    const EdgeSlice slice = whole.curved && top < whole.high ? upTo(top, whole, tool) : whole;
+    Engagement part = engagement;
+    part.axial_depth = top - slice.low;
+    visit(slice, toolOf(whole, tool), part);
+  }
+}
+
+}  // namespace
+
 MechanisticForce::MechanisticForce(const ToolGeometry& tool, const CuttingCoefficients& coefficients,
                                    const Engagement& engagement)
     : tool_(tool), coefficients_(coefficients), engagement_(engagement) {
@@ -101,10 +146,19 @@ MechanisticForce::MechanisticForce(const ToolGeometry& tool, const CuttingCoeffi
   for (const auto& [name, value] : values) {
     if (!std::isfinite(value)) refuse(name, value, "", "finite");
   }
+  if (tool.edge.straight()) return;
+  CuttingLaw law;
+  law.coefficients = coefficients;
+  forEachSlice(tool, engagement, [&](const EdgeSlice& slice, const ToolGeometry& mill, const Engagement& part) {
+    slices_.emplace_back(mill, lawOf(slice, law).coefficients, part);
+    turn_.push_back(slice.turn);
+  });
 }
 
 CuttingForce MechanisticForce::at(double spindle_angle) const {
   CuttingForce sum;
+  for (std::size_t s = 0; s < slices_.size(); ++s) sum.add(slices_[s].at(spindle_angle - turn_[s]));
+  if (!slices_.empty()) return sum;
   const double lag = tool_.lag(), depth = engagement_.axial_depth;
   const double entry = firstCut(engagement_), exit = lastCut(engagement_);
   if (exit <= entry || engagement_.feed_per_tooth <= 0.0) return sum;
@@ -149,6 +203,26 @@ CuttingForce MechanisticForce::mean() const {
 
 namespace {
 
+/// Sum over the slices: the coefficients of each are linear in those of the tool.
+std::array<std::array<double, 6>, 4> slicedForceMatrix(const ToolGeometry& tool,
+                                                       const Engagement& engagement) {
+  constexpr std::array<double CuttingCoefficients::*, 6> ALL{
+      &CuttingCoefficients::ktc, &CuttingCoefficients::krc, &CuttingCoefficients::kac,
+      &CuttingCoefficients::kte, &CuttingCoefficients::kre, &CuttingCoefficients::kae};
+  std::array<std::array<double, 6>, 4> sum{};
+  forEachSlice(tool, engagement, [&](const EdgeSlice& slice, const ToolGeometry& mill, const Engagement& part) {
+    const auto local = meanForceMatrix(mill, part);
+    for (std::size_t c = 0; c < 6; ++c) {
+      CuttingLaw unit;
+      unit.coefficients.*ALL[c] = 1.0;
+      const CuttingCoefficients rotated = lawOf(slice, unit).coefficients;
+      for (std::size_t r = 0; r < 4; ++r)
+        for (std::size_t k = 0; k < 6; ++k) sum[r][c] += local[r][k] * rotated.*ALL[k];
+    }
+  });
+  return sum;
+}
+
 // The edge at an immersion of pi/2: x along the feed, y along the cutting speed, z along the edge.
 std::array<std::array<double, 6>, 4> turningForceMatrix(const ToolGeometry& tool,
                                                         const Engagement& engagement) {
@@ -170,6 +244,7 @@ std::array<std::array<double, 6>, 4> meanForceMatrix(const ToolGeometry& tool, c
   if (tool.teeth == 0) return turningForceMatrix(tool, engagement);
   validate(tool);
   validate(engagement);
+  if (!tool.edge.straight()) return slicedForceMatrix(tool, engagement);
   const double entry = firstCut(engagement), exit = lastCut(engagement);
   if (exit <= entry || engagement.feed_per_tooth <= 0.0) return {};
   const double arc = exit - entry;

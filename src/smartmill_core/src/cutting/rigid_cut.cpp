@@ -18,6 +18,11 @@ constexpr double NODE_ANGLE = REVOLUTION_NODE_ANGLE;
 constexpr std::size_t MOST_TEETH = 20;
 constexpr double LEAST_CHIP = 1e-15;  // [m] at the ends of a contact, where edge forces still act
 
+void validateStraight(const ToolGeometry& tool) {
+  validate(tool);
+  requireStraightEdge(tool, "to tabulate its force over a revolution");
+}
+
 // sums += share (b - a)
 void addDifference(const EdgeSums& a, const EdgeSums& b, double share, EdgeSums& sums) {
   sums.chip_sine += share * (b.chip_sine - a.chip_sine);
@@ -32,7 +37,7 @@ void addDifference(const EdgeSums& a, const EdgeSums& b, double share, EdgeSums&
 
 RigidCut::RigidCut(const ToolGeometry& tool, const CuttingLaw& law, std::vector<double> radius_offset,
                    double path_share)
-    : tool_((validate(tool), tool)),
+    : tool_((validateStraight(tool), tool)),
       rule_(tool, std::move(radius_offset)),
       law_(law),
       lag_(tool.lag()),

@@ -27,7 +27,9 @@ class Helix : public Effect {
   explicit Helix(const EffectEntry& entry) : helix_(units::radFromDeg(valueOf(entry, "helix_deg"))) {}
 
   void setUp(TwinSetup& setup) const override {
-    if (setup.model.tool) setup.model.tool->helix = helix_;
+    if (!setup.model.tool) return;
+    setup.model.tool->helix = helix_;
+    setup.model.tool->edge.helix.clear();
   }
 
  private:

@@ -61,11 +61,40 @@ std::vector<double> readPerTooth(const StrictYaml& map, const std::string& key, 
   return list;
 }
 
+}  // namespace
+
+void readEdges(const StrictYaml& map, ToolGeometry& tool) {
+  EdgeShape& edge = tool.edge;
+  if (map.isList("helix_deg")) {
+    std::vector<double> helix = map.numbers("helix_deg", static_cast<std::size_t>(tool.teeth), HELIX_DEG);
+    for (double& h : helix) h = units::radFromDeg(h);
+    tool.setHelix(helix);
+  } else if (map.has("helix_deg")) {
+    tool.helix = units::radFromDeg(map.number("helix_deg", HELIX_DEG));
+  }
+  const double angle = map.optionalNumber("edge_angle_deg", Range::openLow(0.0, 90.0)).value_or(90.0);
+  if (angle < 90.0) edge.edge_angle = units::radFromDeg(angle);
+  // The largest corner whose centre does not lie beyond the axis.
+  const double most = tool.radius() / std::tan(0.5 * edge.edge_angle) / units::MM;
+  constexpr double ROUNDING = 1e-12;
+  edge.corner_radius =
+      units::MM *
+      map.optionalNumber("corner_radius_mm", Range::closed(0.0, most * (1.0 + ROUNDING))).value_or(0.0);
+  if (const auto serration = map.optionalMap("serration")) {
+    edge.serration_amplitude = units::MM * serration->number("amplitude_mm", POSITIVE);
+    edge.serration_wavelength = units::MM * serration->number("wavelength_mm", POSITIVE);
+    serration->finish();
+  }
+}
+
+namespace {
+
 void readTool(const StrictYaml& map, MachineModel& model) {
   ToolGeometry tool;
   tool.teeth = map.integer("teeth", 1, 20);
   tool.diameter = map.number("diameter_mm", POSITIVE) * units::MM;
-  tool.helix = units::radFromDeg(map.number("helix_deg", HELIX_DEG));
+  if (!map.has("helix_deg")) map.fail("helix_deg", "is missing");
+  readEdges(map, tool);
   if (map.has("pitch_deg")) {
     for (const double p :
          readPerTooth(map, "pitch_deg", static_cast<std::size_t>(tool.teeth), POSITIVE, 360.0)) {

@@ -100,6 +100,10 @@ bool StrictYaml::has(const std::string& key) const {
   return impl_->find(key).IsDefined();
 }
 
+bool StrictYaml::isList(const std::string& key) const {
+  return has(key) && impl_->find(key).IsSequence();
+}
+
 std::vector<std::string> StrictYaml::keys() const {
   std::vector<std::string> names;
   for (const auto& entry : impl_->node) names.push_back(entry.first.Scalar());

@@ -99,7 +99,19 @@ void writeTool(std::ostream& out, const MachineModel& model) {
   const ToolGeometry& tool = *model.tool;
   out << "tool:\n  teeth: " << tool.teeth << "\n";
   writeKey(out, "  ", "diameter_mm", tool.diameter / units::MM);
-  writeKey(out, "  ", "helix_deg", units::degFromRad(tool.helix));
+  const EdgeShape& edge = tool.edge;
+  if (edge.helix.empty()) {
+    writeKey(out, "  ", "helix_deg", units::degFromRad(tool.helix));
+  } else {
+    out << "  helix_deg: " << list(edge.helix, units::radFromDeg(1.0)) << "\n";
+  }
+  if (edge.corner_radius > 0.0) writeKey(out, "  ", "corner_radius_mm", edge.corner_radius / units::MM);
+  if (edge.edge_angle < 0.5 * units::PI)
+    writeKey(out, "  ", "edge_angle_deg", units::degFromRad(edge.edge_angle));
+  if (edge.serrated()) {
+    out << "  serration: {amplitude_mm: " << yamlNumber(edge.serration_amplitude / units::MM)
+        << ", wavelength_mm: " << yamlNumber(edge.serration_wavelength / units::MM) << "}\n";
+  }
   if (!tool.pitch.empty()) out << "  pitch_deg: " << list(tool.pitch, units::radFromDeg(1.0)) << "\n";
   writeOptional(out, "stickout_mm", model.stickout, units::MM);
 }

@@ -1,7 +1,9 @@
 #include "smartmill_core/cutting/mechanistic.h"
 
+#include <algorithm>
 #include <cmath>
 #include <random>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -189,6 +191,110 @@ TEST(MechanisticForce, errorsNameTheInvalidQuantity) {
   CuttingCoefficients k = ALUMINIUM;
   k.kre = NAN;
   EXPECT_NE(messageOf(tool(2, 0.02, 30.0), slot, k).find("Kre"), std::string::npos);
+}
+
+/// The force of a general end mill (Engin & Altintas 2001) summed over elements of its edges: lag, inclination
+/// and local radius at each height from the definition of the shape.
+CuttingForce generalMill(const ToolGeometry& t, const CuttingCoefficients& k, const Engagement& e,
+                         double angle) {
+  const double r = t.edge.corner_radius, lean = t.edge.edge_angle, top = r * (1.0 - std::cos(lean));
+  constexpr int ELEMENTS = 4000;
+  CuttingForce sum;
+  double position = 0.0;
+  for (int tooth = 0; tooth < t.teeth; ++tooth) {
+    const auto helix = t.edge.helix.empty() ? t.helix : t.edge.helix[static_cast<std::size_t>(tooth)];
+    const double pitch_at_tip = t.pitch.empty() ? TWO_PI / t.teeth : t.pitch[static_cast<std::size_t>(tooth)];
+    const auto next =
+        t.edge.helix.empty() ? t.helix : t.edge.helix[static_cast<std::size_t>((tooth + 1) % t.teeth)];
+    for (int i = 0; i < ELEMENTS; ++i) {
+      // Finer towards the tip, where the edge per height grows.
+      const double s = (i + 0.5) / ELEMENTS, z = e.axial_depth * s * s;
+      const double dz = 2.0 * e.axial_depth * s / ELEMENTS;
+      const double kappa = z < top ? std::acos(1.0 - z / r) : lean;
+      const double radius = z < top ? t.radius() - r * std::tan(0.5 * lean) + r * std::sin(kappa)
+                                    : t.radius() + z / std::tan(lean);
+      const double phi = std::fmod(angle + position - z * std::tan(helix) / t.radius() + 8.0 * TWO_PI, TWO_PI);
+      const double pitch = pitch_at_tip - z * (std::tan(next) - std::tan(helix)) / t.radius();
+      const double h = e.feed_per_tooth * t.teeth * pitch / TWO_PI * std::sin(phi) * std::sin(kappa);
+      if (phi < e.entry || phi >= e.exit || h <= 0.0) continue;
+      const double length = dz / std::sin(kappa);
+      const double ft = (k.ktc * h + k.kte) * length, fr = (k.krc * h + k.kre) * length,
+                   fa = (k.kac * h + k.kae) * length;
+      const double across = fr * std::sin(kappa) - fa * std::cos(kappa);
+      sum.fx += -ft * std::cos(phi) - across * std::sin(phi);
+      sum.fy += ft * std::sin(phi) - across * std::cos(phi);
+      sum.fz += fr * std::cos(kappa) + fa * std::sin(kappa);
+      sum.torque += ft * radius;
+    }
+    position += pitch_at_tip;
+  }
+  return sum;
+}
+
+struct ShapedCase {
+  const char* name;
+  double corner_mm, edge_deg;
+  std::vector<double> helix_deg;
+};
+
+TEST(MechanisticForce, edgesOfOtherShapesAreTheSumOfTheirElements) {
+  const Engagement cut{0.3, 2.4, 4e-3, 1e-4};
+  for (const ShapedCase& shape : {ShapedCase{"bull nose", 2.0, 90.0, {}}, ShapedCase{"ball", 10.0, 90.0, {}},
+                                  ShapedCase{"face mill", 0.0, 45.0, {}},
+                                  ShapedCase{"rounded face mill", 1.5, 60.0, {}},
+                                  ShapedCase{"variable helix", 0.0, 90.0, {30.0, 38.0, 34.0}},
+                                  ShapedCase{"bull nose of variable helix", 2.0, 90.0, {30.0, 38.0, 34.0}}}) {
+    ToolGeometry t = tool(3, 0.02, 30.0);
+    t.edge.corner_radius = 1e-3 * shape.corner_mm;
+    if (shape.edge_deg < 90.0) t.edge.edge_angle = radFromDeg(shape.edge_deg);
+    std::vector<double> helix;
+    for (const double h : shape.helix_deg) helix.push_back(radFromDeg(h));
+    if (!helix.empty()) t.setHelix(helix);
+    const MechanisticForce force(t, ALUMINIUM, cut);
+    double most = 0.0, error = 0.0;
+    CuttingForce mean;
+    constexpr int ANGLES = 360;
+    for (int i = 0; i < ANGLES; ++i) {
+      const CuttingForce a = force.at(TWO_PI * (i + 0.5) / ANGLES);
+      mean.add(a, 1.0 / ANGLES);
+      if (i % 5 != 0) continue;
+      const CuttingForce b = generalMill(t, ALUMINIUM, cut, TWO_PI * (i + 0.5) / ANGLES);
+      most = std::max({most, std::abs(b.fx), std::abs(b.fy)});
+      error = std::max({error, std::abs(a.fx - b.fx), std::abs(a.fy - b.fy), std::abs(a.fz - b.fz),
+                        std::abs(a.torque - b.torque) / t.radius()});
+    }
+    // Slices with a uniform lag and a uniform pitch.
+    EXPECT_LT(error, 1e-2 * most) << shape.name;
+    const CuttingForce closed = force.mean();
+    EXPECT_NEAR(closed.fx, mean.fx, 2e-3 * most) << shape.name;
+    EXPECT_NEAR(closed.fy, mean.fy, 2e-3 * most) << shape.name;
+    EXPECT_NEAR(closed.fz, mean.fz, 2e-3 * most) << shape.name;
+    EXPECT_NEAR(closed.torque, mean.torque, 2e-3 * most * t.radius()) << shape.name;
+  }
+}
+
+// Ball end, one edge engaged over its radius r: integrals over a quarter of a circle.
+TEST(MechanisticForce, meanForceOfABallEndHasAClosedForm) {
+  const double r = 10e-3, c = 1e-4;
+  ToolGeometry ball = tool(2, 2.0 * r, 30.0);
+  ball.edge.corner_radius = r;
+  const auto m = meanForceMatrix(ball, {0.0, PI, r, c});
+  const double teeth = 2.0 / TWO_PI;
+  EXPECT_NEAR(m[1][0], teeth * 0.5 * PI * c * r, 1e-12);               // fy of Ktc: sin^2
+  EXPECT_NEAR(m[0][1], -teeth * 0.5 * PI * c * r * PI / 4.0, 1e-12);   // fx of Krc: mean of sin(kappa)
+  EXPECT_NEAR(m[0][2], teeth * 0.5 * PI * c * r / 2.0, 1e-12);         // fx of Kac: mean of cos(kappa)
+  EXPECT_NEAR(m[2][1], teeth * 2.0 * c * r / 2.0, 1e-12);              // fz of Krc
+  EXPECT_NEAR(m[1][3], teeth * 2.0 * r * PI / 2.0, 1e-9);              // fy of Kte: length of the edge
+}
+
+TEST(MechanisticForce, refusesASerratedEdge) {
+  ToolGeometry rough = tool(3, 0.02, 30.0);
+  rough.edge.serration_amplitude = 1e-4;
+  rough.edge.serration_wavelength = 1e-3;
+  const Engagement slot{0.0, PI, 0.002, 1e-4};
+  EXPECT_NE(messageOf(rough, slot).find("serration: amplitude_mm: 0.1, expected a smooth edge"),
+            std::string::npos);
+  EXPECT_THROW(meanForceMatrix(rough, slot), Error);
 }
 
 // Turning is the limit of milling with one edge always in the cut about an immersion of pi/2: 20 teeth over

@@ -147,6 +147,49 @@ TEST(MachineModel, readsAndWritesEveryKey) {
   expectModel(readMachineModel(folder.file("b.yaml")));
 }
 
+TEST(MachineModel, edgesOfATool) {
+  const TemporaryFolder folder;
+  const std::string text =
+      "format: smartmill-model/1\ntool:\n  teeth: 2\n  diameter_mm: 20\n  helix_deg: [35, 38]\n"
+      "  corner_radius_mm: 2.5\n  edge_angle_deg: 45\n  serration: {amplitude_mm: 0.2, wavelength_mm: 2}\n";
+  writeMachineModel(readMachineModel(folder.write("a.yaml", text)), folder.file("b.yaml"));
+  for (const char* file : {"a.yaml", "b.yaml"}) {
+    const ToolGeometry tool = *readMachineModel(folder.file(file)).tool;
+    EXPECT_DOUBLE_EQ(tool.edge.corner_radius, 2.5e-3);
+    EXPECT_DOUBLE_EQ(tool.edge.edge_angle, 0.25 * units::PI);
+    ASSERT_EQ(tool.edge.helix.size(), 2u);
+    EXPECT_DOUBLE_EQ(tool.edge.helix[1], units::radFromDeg(38.0));
+    EXPECT_NEAR(std::tan(tool.helix),
+                0.5 * (std::tan(units::radFromDeg(35.0)) + std::tan(units::radFromDeg(38.0))), 1e-12);
+    EXPECT_DOUBLE_EQ(tool.edge.serration_amplitude, 0.2e-3);
+    EXPECT_DOUBLE_EQ(tool.edge.serration_wavelength, 2e-3);
+  }
+  const std::string flat =
+      "format: smartmill-model/1\ntool: {teeth: 2, diameter_mm: 20, helix_deg: 30, edge_angle_deg: 90}\n";
+  EXPECT_TRUE(readMachineModel(folder.write("flat.yaml", flat)).tool->edge.straight());
+}
+
+TEST(MachineModel, errorsNameTheEdgesOfATool) {
+  const std::string text =
+      "format: smartmill-model/1\ntool:\n  teeth: 2\n  diameter_mm: 20\n  helix_deg: [35, 38]\n"
+      "  corner_radius_mm: 2.5\n  edge_angle_deg: 90\n  serration: {amplitude_mm: 0.2, wavelength_mm: 2}\n";
+  expectRefusals(
+      text,
+      {{"[35, 38]", "[35, 38, 35]", "tool.helix_deg: a list of 3, expected 2 numbers"},
+       {"[35, 38]", "[35, 80]", "tool.helix_deg[1]: 80 is out of range (0 <= value < 80)"},
+       {"corner_radius_mm: 2.5", "corner_radius_mm: 10.5",
+        "tool.corner_radius_mm: 10.5 is out of range (0 <= value <= 10)"},
+       {"corner_radius_mm: 2.5", "corner_radius_mm: -1",
+        "tool.corner_radius_mm: -1 is out of range (0 <= value <= 10)"},
+       {"edge_angle_deg: 90", "edge_angle_deg: 0", "tool.edge_angle_deg: 0 is out of range (0 < value <= 90)"},
+       {"edge_angle_deg: 90", "edge_angle_deg: 95",
+        "tool.edge_angle_deg: 95 is out of range (0 < value <= 90)"},
+       {"amplitude_mm: 0.2", "amplitude_mm: 0", "tool.serration.amplitude_mm: 0 is out of range (> 0)"},
+       {", wavelength_mm: 2", "", "tool.serration.wavelength_mm: is missing"},
+       {"wavelength_mm: 2", "wave_mm: 2", "tool.serration.wavelength_mm: is missing"}},
+      readMachineModel);
+}
+
 TEST(MachineModel, anEmptyModelIsValidAndErrorsNameTheMissingSection) {
   const TemporaryFolder folder;
   const MachineModel model = readMachineModel(folder.write("m.yaml", "format: smartmill-model/1\n"));

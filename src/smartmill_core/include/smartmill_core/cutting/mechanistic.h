@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <vector>
 
 #include "smartmill_core/cutting/tool.h"
 
@@ -24,10 +25,11 @@ CuttingForce toolForce(double ft, double fr, double fa, double immersion_angle, 
 
 /// Force of a rigid tool without runout over the spindle angle: chip thickness c sin(phi), integrated along
 /// the helix in closed form between the exact entry and exit of each tooth (Dunwoody eq. 3.13..3.15,
-/// 5.64..5.67).
+/// 5.64..5.67); inclined edges and a helix angle of each tooth as slices (EdgeSlice).
 class MechanisticForce {
  public:
-  /// @throws Error naming an invalid tool, engagement or coefficient.
+  /// @throws Error naming an invalid tool, engagement or coefficient, and on a serrated edge, whose chip is
+  /// another one.
   MechanisticForce(const ToolGeometry& tool, const CuttingCoefficients& coefficients,
                    const Engagement& engagement);
 
@@ -41,15 +43,18 @@ class MechanisticForce {
   ToolGeometry tool_;
   CuttingCoefficients coefficients_;
   Engagement engagement_;
+  std::vector<MechanisticForce> slices_;  // straight mills; empty: the edge is straight
+  std::vector<double> turn_;              // [rad] by which tooth 1 of each slice lags behind the tip
 };
 
 /// Checks: @throws Error naming the quantity and its value.
 void validate(const ToolGeometry& tool);
+void validate(const EdgeShape& edge, const ToolGeometry& tool);
 void validate(const Engagement& engagement);
 
 /// Linear map of the six coefficients (ktc, krc, kac, kte, kre, kae) to the mean force over a revolution: row
 /// 0..2 fx, fy, fz [N], row 3 torque [N m]. With uneven pitch the feed of each tooth is in proportion to its
-/// pitch.
+/// pitch. Inclined edges as slices (EdgeSlice). @throws Error on a serrated edge.
 std::array<std::array<double, 6>, 4> meanForceMatrix(const ToolGeometry& tool, const Engagement& engagement);
 
 }  // namespace smartmill

@@ -65,7 +65,6 @@ struct TwinSetup {
   MachineModel model;                       ///< without effects
   std::vector<double> radius_offset;        ///< [m] of each tooth
   std::array<double, CHANNEL_COUNT> delay;  ///< [s] of each channel
-  double corner_radius = 0.0;               ///< [m] of the tool
   double path_share = 0.0;  ///< [1] 0: surface by the rule of formats.md, 1: by the teeth's path
   std::vector<EdgeLayer> layers;
   std::vector<Resonance> resonances;                   ///< act before the shelves

@@ -155,6 +155,12 @@ MachineModel atPosition(MachineModel model, double position);
 /// type, NaN, out of range.
 MachineModel readMachineModel(const std::string& file);
 
+class StrictYaml;
+
+/// Reads the keys that state the edges of a tool: helix_deg, corner_radius_mm, edge_angle_deg, serration.
+/// @param tool with teeth and diameter
+void readEdges(const StrictYaml& map, ToolGeometry& tool);
+
 /// A key of the section `cutting` and its coefficient, in the order of the file.
 struct CuttingKey {
   const char* key;

@@ -17,6 +17,7 @@ class StrictYaml {
   static StrictYaml fromFile(const std::string& file);
 
   bool has(const std::string& key) const;
+  bool isList(const std::string& key) const;
   std::vector<std::string> keys() const;
 
   /// Required values. @throws Error: missing, wrong type, NaN, out of range.
