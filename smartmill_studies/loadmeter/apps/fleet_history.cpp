@@ -20,7 +20,7 @@
 #include <thread>
 #include <vector>
 
-#include "fleet_history.h"
+#include "loadmeter/fleet_history.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/testing/temporary_folder.h"

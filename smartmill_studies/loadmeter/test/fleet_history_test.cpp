@@ -1,4 +1,4 @@
-#include "fleet_history.h"
+#include "loadmeter/fleet_history.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
