@@ -133,7 +133,7 @@ def words(shares):
     return ", ".join(f"{key} {100 * share:.0f} %" for key, share in shares.items() if share >= 0.005) or "none"
 
 
-LINE = re.compile(r"@/smartmill/(\w+) (?:ERROR|WARN) (.*)")
+LINE = re.compile(r"@/smartmill/(\w+) +(?:ERROR|WARN) (.*)")
 
 
 def announcements(text, topic, begin, end):

@@ -15,7 +15,6 @@ namespace {
 constexpr double TIME =
     0.15;  // [s] of a window; two that disagree and one that contains the beginning: 0.45 s
 constexpr double REVOLUTIONS = 5.0;       // of a window
-constexpr std::size_t READINGS = 3;       // of the load meter in a window
 constexpr double SETTLING = 4.0;          // [1] time constants of the load meter
 constexpr double LATE = 0.2;              // [s] after which a reading of the load meter is not current
 constexpr double SPEED_TOLERANCE = 0.02;  // [1]
@@ -120,7 +119,7 @@ void TorqueCheck::handle(const ForceBlock& measured, const std::array<double, 3>
   }
   const double end = measured.stamp + static_cast<double>(measured.force[0].size()) / measured.sample_rate;
   if (end - window_.begin < std::max(TIME, REVOLUTIONS * units::TWO_PI / condition_->spindle_speed) ||
-      window_.readings < READINGS)
+      window_.readings == 0)
     return;
   compare(end);
   window_ = {};

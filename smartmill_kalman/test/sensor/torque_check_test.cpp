@@ -42,6 +42,7 @@ struct Case {
   CuttingCoefficients coefficients{900e6, 300e6, 100e6, 25e3, 25e3, 5e3};  // al7050
   double friction = 1.3;  // [1] of the nominal one, which the air cut shows
   bool air = true;
+  double load_period = 0.02;  // [s]
 };
 
 struct Outcome {
@@ -85,7 +86,7 @@ Outcome run(const Case& c, const Distort& distort = {}, double until = 1e9) {
                  lag = 1.0 / (units::TWO_PI * spindle.load_meter_bandwidth);
     load += (torque - load) * (1.0 - std::exp(-static_cast<double>(SIZE) / RATE / lag));
     if (stamp >= next_load) {
-      next_load += 0.02;
+      next_load += c.load_period;
       CncState state;
       state.stamp = stamp;
       state.connected = state.motion = true;
@@ -184,6 +185,7 @@ TEST(TorqueCheck, WrongChannelsAreAnnounced) {
         Case c;
         c.rotation = rotation;
         c.heading = heading;
+        c.load_period = 0.08;  // of a slow connection
         const Outcome outcome = run(c, distort);
         EXPECT_LE(outcome.announced, PROMPT) << explanation;
         EXPECT_NE(outcome.line.find("load meter measures"), std::string::npos);

@@ -14,9 +14,11 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <memory>
 #include <random>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -33,6 +35,7 @@ using namespace smartmill;             // NOLINT
 using namespace smartmill::loadmeter;  // NOLINT
 using namespace smartmill::studies;    // NOLINT
 
+constexpr std::string_view COMMIT("COMMIT\0", 7);  // as it is sent, not that of ON COMMIT DROP
 constexpr const char* SOCKET = "/.s.PGSQL.5432";
 constexpr std::array<const char*, 3> MACHINES{{"mill_a", "mill_b", "mill_c"}};
 
@@ -50,7 +53,7 @@ sockaddr_un addressOf(const std::string& path) {
 }
 
 /// The network between clients and server: passes the bytes of each connection, and cuts those whose answers
-/// exceed a number of bytes, so that the client does not see the rest.
+/// exceed a number of bytes, or when a COMMIT is answered, so that the client does not see the rest.
 class Network {
  public:
   Network(std::string server, const std::string& client)
@@ -72,6 +75,8 @@ class Network {
 
   /// Of each connection from now on; a negative number: none is cut
   void cutAfter(std::int64_t answered) { cut_after_ = answered; }
+  /// Whether the answer to a COMMIT is lost, from now on.
+  void loseCommits(bool lose) { lose_commits_ = lose; }
   std::size_t cuts() const { return cuts_; }
 
  private:
@@ -88,6 +93,7 @@ class Network {
     const sockaddr_un address = addressOf(server_);
     bool open = ::connect(server, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
     std::int64_t answered = 0;
+    bool commits = false;  // the last request
     std::array<char, 65536> bytes;
     while (open && !ended_) {
       std::array<pollfd, 2> ends{{{client, POLLIN, 0}, {server, POLLIN, 0}}};
@@ -96,10 +102,14 @@ class Network {
         if (ends[from].revents == 0) continue;
         const ssize_t count = ::recv(ends[from].fd, bytes.data(), bytes.size(), 0);
         open = count > 0;
+        if (open && from == 0)
+          commits =
+              lose_commits_ && std::string_view(bytes.data(), static_cast<std::size_t>(count)).find(COMMIT) !=
+                                   std::string_view::npos;
         if (open && from == 1) {
           answered += count;
           const std::int64_t limit = cut_after_;
-          if (limit >= 0 && answered > limit) {
+          if (commits || (limit >= 0 && answered > limit)) {
             ++cuts_;
             open = false;
           }
@@ -123,6 +133,7 @@ class Network {
   int listener_;
   std::atomic<bool> ended_{false};
   std::atomic<std::int64_t> cut_after_{-1};
+  std::atomic<bool> lose_commits_{false};
   std::atomic<std::size_t> cuts_{0};
   std::thread acceptor_;
   std::vector<std::thread> connections_;
@@ -238,12 +249,13 @@ void check(const Shop& shop, Counts& counts) {
 
 // All machines push at once; in each round one thing fails.
 void runRound(Shop& shop, std::mt19937& random, Counts& counts) {
-  enum class Fault { none, client, server, network };
-  std::discrete_distribution<int> kinds{1.0, 4.0, 1.0, 4.0};
+  enum class Fault { none, client, server, network, commit };
+  std::discrete_distribution<int> kinds{1.0, 4.0, 1.0, 2.0, 2.0};
   const auto fault = static_cast<Fault>(kinds(random));
-  std::uniform_int_distribution<int> soon(0, 60), bytes(0, 2500);
+  std::uniform_int_distribution<int> soon(0, 30), bytes(0, 2500);
   std::uniform_int_distribution<std::size_t> which(0, MACHINES.size() - 1);
   shop.network().cutAfter(fault == Fault::network ? bytes(random) : -1);
+  shop.network().loseCommits(fault == Fault::commit);
   std::vector<pid_t> clients;
   for (const char* machine : MACHINES) {
     shop.addRecords(machine);
@@ -254,6 +266,7 @@ void runRound(Shop& shop, std::mt19937& random, Counts& counts) {
   if (fault == Fault::server) shop.server().kill();
   wait(clients, counts);
   shop.network().cutAfter(-1);
+  shop.network().loseCommits(false);
   if (fault == Fault::server) {
     ++counts.servers_killed;
     shop.server().start();
