@@ -29,6 +29,7 @@ def programs(folder):
         text = cmake.read_text()
         names |= set(re.findall(r"smartmill_executable\((\w+)", text))
         names |= set(re.findall(r"OUTPUT_NAME (\w+)", text))
+        names |= set(re.findall(r"install\(PROGRAMS scripts/(\w+)", text))
     return names
 
 

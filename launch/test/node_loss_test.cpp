@@ -54,10 +54,10 @@ TEST(Session, StopsWhenANodeThatItNeedsEndsAndIsResumed) {
   setenv("ROS_HOME", home.c_str(), 1);
   setenv("ROS_MASTER_URI", ("http://localhost:" + port).c_str(), 1);
   const auto session = [&](const std::string& name, const std::string& more) {
-    run("roslaunch --wait smartmill_launch session.launch model:=" MODEL " params:=" SHORT_SESSION
-        " adaptive:=false summary:=" +
-            folder.file(name + ".json") + more,
-        folder.file(name + ".log"));
+    return run("rosrun smartmill_launch run_launch --wait smartmill_launch session.launch model:=" MODEL
+               " params:=" SHORT_SESSION " adaptive:=false summary:=" +
+                   folder.file(name + ".json") + more,
+               folder.file(name + ".log"));
   };
   std::thread graph([&] {
     run("roslaunch -p " + port +
@@ -65,16 +65,17 @@ TEST(Session, StopsWhenANodeThatItNeedsEndsAndIsResumed) {
         folder.file("graph.log"));
   });
   std::atomic<bool> ended{false};
+  int first_code = -1;
   std::thread first([&] {
-    session("first", "");
+    first_code = session("first", "");
     ended = true;
   });
   const bool measured = awaitText(folder.file("first.log"), "ok   FRF of the tool in x", ended);
   // The path of its log distinguishes it from the nodes of other tests.
   const int killed = killAll("__name:=loadmeter", home);
   first.join();
-  session("second", " resume:=true");
-  session("third", " resume:=true");
+  const int second_code = session("second", " resume:=true");
+  const int third_code = session("third", " resume:=true");
   killAll("pipeline.launch", port, SIGINT);
   graph.join();
 
@@ -92,6 +93,10 @@ TEST(Session, StopsWhenANodeThatItNeedsEndsAndIsResumed) {
   EXPECT_THAT(resumed, HasSubstr("FRF of the tool in x: done before"));
   EXPECT_THAT(summary, HasSubstr("\"completed\": true"));
   EXPECT_THAT(summary, HasSubstr("\"point\": \"tool_tip\""));
+  // roslaunch itself would return 0 each time.
+  EXPECT_NE(first_code, 0);
+  EXPECT_EQ(second_code, 0);
+  EXPECT_NE(third_code, 0);
   EXPECT_THAT(contentOf(folder.file("third.log")), HasSubstr("no interrupted session in this launch"));
 }
 

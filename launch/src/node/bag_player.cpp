@@ -68,8 +68,7 @@ void BagPlayer::advertise(const RecordedConnection& connection) {
                 ", expected ros1");
   ros::AdvertiseOptions options(connection.topic, UNLIMITED, connection.md5sum, connection.type,
                                 connection.definition);
-  const auto latching = connection.more.find("latching");
-  options.latch = latching != connection.more.end() && latching->second == "1";
+  options.latch = connection.isLatched();
   publishers_[connection.topic] = nh_.advertise(options);
 }
 
@@ -157,16 +156,21 @@ bool BagPlayer::waitFor(const ros::Time& time) {
 }
 
 // @return false: backward jump
-bool BagPlayer::play() {
+bool BagPlayer::play(double step) {
   clock_time_ = ros::Time();
   position_ = paced_position_ = 0.0;
   paced_from_ = ros::SteadyTime::now();
   const std::unique_ptr<RecordingFile> file = openRecording(path_);
   topic_tools::ShapeShifter message;
+  double next_step = step;  // [s] from the start
   for (RecordingFile::Entry entry; file->next(&entry);) {
     const RecordedConnection& connection = file->connection(entry);
     if (topics_.count(connection.topic) == 0) continue;
     if (!waitFor(timeOf(entry))) return false;
+    if (step > 0.0 && position_ >= next_step) {
+      followers_.step();
+      next_step = position_ + step;
+    }
     publishClock(timeOf(entry));
     message.morph(connection.md5sum, connection.type, connection.definition, "");
     // IStream has no constant form; the data are only read.
@@ -178,13 +182,13 @@ bool BagPlayer::play() {
   return true;
 }
 
-void BagPlayer::run(double rate, bool stay) {
+void BagPlayer::run(double rate, double step, bool stay) {
   control_.speed = paced_speed_ = rate;
   ros::AsyncSpinner spinner(1);
   spinner.start();
   connect();
   for (;;) {
-    while (!play()) continue;
+    while (!play(step)) continue;
     followers_.end();
     publishState(true);
     if (!stay) return;

@@ -27,9 +27,10 @@ class BagPlayer {
   BagPlayer(ros::NodeHandle nh, const std::string& path, const std::vector<std::string>& topics,
             std::vector<std::string> nodes);
 
-  /// @param rate multiple of real time; 0: as fast as the nodes process the data. @param stay wait at the end
-  /// for a jump back. @throws Error if a node is missing or stops processing messages
-  void run(double rate, bool stay);
+  /// @param rate multiple of real time; 0: as fast as the nodes process the data. @param step [s] of the
+  /// recording after which the nodes have processed all data and look for missing ones; 0: never. @param stay
+  /// wait at the end for a jump back. @throws Error if a node is missing or stops processing messages
+  void run(double rate, double step, bool stay);
 
  private:
   static constexpr double NO_JUMP = std::numeric_limits<double>::quiet_NaN();
@@ -42,7 +43,7 @@ class BagPlayer {
   void advertise(const RecordedConnection& connection);
   void connect();
   void publishClock(const ros::Time& time);
-  bool play();
+  bool play(double step);
   bool waitFor(const ros::Time& time);
   bool takeJump();
   void publishState(bool now);

@@ -69,7 +69,6 @@ BagRecorder::Connection& BagRecorder::connectionOf(const std::string& topic, Eve
   const ros::M_string& header = event.getConnectionHeader();
   if (const auto latching = header.find("latching"); latching != header.end())
     connection.more["latching"] = latching->second;
-  known.latching = connection.more.count("latching") != 0 && connection.more["latching"] == "1";
   known.number = writer_->connect(connection);
   return known;
 }
@@ -96,7 +95,7 @@ void BagRecorder::write(const std::string& topic, Event event) {
   if (writer_->size() >= split_) beginPart(time.toNSec());
   Connection& connection = connectionOf(topic, event);
   writer_->write(connection.number, time.toNSec(), bytes_.data(), bytes_.size());
-  if (connection.latching) connection.last = bytes_;
+  if (connection.header.isLatched()) connection.last = bytes_;
   ++written_;
   ++topics_[topic].messages;
 }

@@ -42,8 +42,7 @@ class BagRecorder {
  private:
   struct Connection {
     RecordedConnection header;
-    std::uint32_t number = 0;  // in this file
-    bool latching = false;
+    std::uint32_t number = 0;        // in this file
     std::vector<std::uint8_t> last;  // message, where it is latched
   };
 

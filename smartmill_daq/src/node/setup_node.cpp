@@ -3,7 +3,7 @@
 #include <ros/ros.h>
 
 #include "smartmill_core/formatted.h"
-#include "smartmill_core/instrument_names.h"
+#include "smartmill_core/names.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_ros/conversions.h"
 #include "smartmill_ros/node_main.h"

@@ -10,7 +10,6 @@
 #include <smartmill_msgs/TryInstrument.h>
 
 #include "smartmill_core/formatted.h"
-#include "smartmill_core/instrument_names.h"
 #include "smartmill_core/io/text_file.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/testing/eventually.h"

@@ -199,7 +199,7 @@ void Translator::take(const plain::SpindleAngle& m, double received) {
 
 void Translator::take(const plain::ForceBlock& m, double received) {
   ForceBlock block = fromMsg(m);
-  if (block.status == ForceBlock::Status::settling) {
+  if (block.isUnusable()) {
     for (std::vector<double>& axis : block.force) axis.assign(axis.size(), NOT_A_NUMBER);
   }
   impl_->features().push(block);

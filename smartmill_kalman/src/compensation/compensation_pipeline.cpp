@@ -34,7 +34,7 @@ CompensationPipeline::CompensationPipeline(const CompensationParameters& paramet
                                            double hold_back, Outputs outputs)
     : outputs_(std::move(outputs)),
       sorter_(hold_back),
-      forces_(parameters, sensor, outputs_.force),
+      forces_(parameters, sensor, checkedOutputs()),
       identification_(withRange(taps, parameters.saturation), parameters.filter, forces_, sorter_, outputs_),
       may_estimate_(parameters.track_speed.isAuto()),
       conditions_(sorter_.addLatched(names::CUTTING_CONDITION)),
@@ -42,7 +42,8 @@ CompensationPipeline::CompensationPipeline(const CompensationParameters& paramet
       hammers_(sorter_.addOptional(names::HAMMER)),
       angles_(addAngles(sorter_, parameters)),
       blocks_(sorter_.addRegular(names::DYNAMOMETER)),
-      states_(sorter_.addEvents(names::CNC_STATE)) {
+      states_(sorter_.addEvents(names::CNC_STATE)),
+      loads_(sorter_.addEvents(names::CNC_LOAD)) {
   if (sensor.channels) channels_.emplace(*sensor.channels);
   sorter_.onRestart([this] { restart(); });
 }
@@ -50,8 +51,23 @@ CompensationPipeline::CompensationPipeline(const CompensationParameters& paramet
 void CompensationPipeline::restart() {
   identification_.reset();
   forces_.reset();
+  if (torque_check_) torque_check_->reset();
   if (use_file_) use_file_();
   if (outputs_.restart) outputs_.restart();
+}
+
+ForceOutputs CompensationPipeline::checkedOutputs() {
+  return {[this](const ForceBlock& measured) {
+            if (torque_check_) torque_check_->handle(measured, forces_.health().zero);
+            if (outputs_.force.measured) outputs_.force.measured(measured);
+          },
+          [this](const ForceBlock& compensated) {
+            if (!outputs_.force.compensated) return;
+            if (!torque_check_ || !torque_check_->disagrees()) return outputs_.force.compensated(compensated);
+            ForceBlock marked = compensated;
+            marked.status = ForceBlock::Status::implausible;
+            outputs_.force.compensated(marked);
+          }};
 }
 
 void CompensationPipeline::useKind(ForceSensorKind kind) {
@@ -101,7 +117,6 @@ void CompensationPipeline::push(SampleBlock channels) {
 }
 
 void CompensationPipeline::handle(const SampleBlock& channels, const SampleBlock& block) {
-  stuck_.handle(channels);
   identification_.handleChannels(block);
   if (const SampleBlock* forces = forces_.handle(block)) identification_.handleForces(*forces);
 }
@@ -125,12 +140,21 @@ void CompensationPipeline::push(const SpindleAngle& reading) {
 void CompensationPipeline::push(const CuttingCondition& condition) {
   sorter_.push(conditions_, condition.stamp, [this, condition] {
     forces_.handle(condition);
+    if (torque_check_) torque_check_->handle(condition);
     identification_.handle(condition);
   });
 }
 
 void CompensationPipeline::push(const CncState& state) {
-  sorter_.push(states_, state.stamp, [this, state] { forces_.handle(state); });
+  sorter_.push(states_, state.stamp, [this, state] {
+    forces_.handle(state);
+    if (torque_check_) torque_check_->handle(state);
+  });
+}
+
+void CompensationPipeline::push(const LoadSample& sample) {
+  if (!torque_check_) return;
+  sorter_.push(loads_, sample.stamp, [this, sample] { torque_check_->handle(sample); });
 }
 
 void CompensationPipeline::push(const MeasureFrfGoal& goal, std::function<bool(bool)> begin) {

@@ -29,9 +29,16 @@ constexpr double MAX_CORRELATION = 0.5;    // [1] of neighbouring innovations
 constexpr double CHECK_PERIOD = 0.05;      // [s]
 constexpr double GOAL_TIMEOUT = 1.0;       // [s] before a goal that waits for a dead input is refused
 
-ForceSensor sensorOf(const NodeParameters& parameters) {
+MachineModel modelOf(const NodeParameters& parameters) {
   if (parameters.model.empty()) throw Error("model: empty, expected the path of a smartmill-model/1 file");
-  return readMachineModel(parameters.model).force_sensor;
+  return readMachineModel(parameters.model);
+}
+
+// A corner radius shortens the lever of the force.
+bool canCheckTorque(const MachineModel& model) {
+  return model.spindle && model.spindle->load_meter_full_scale &&
+         std::none_of(model.effects.begin(), model.effects.end(),
+                      [](const EffectEntry& effect) { return effect.name == "corner_radius"; });
 }
 
 }  // namespace
@@ -45,11 +52,13 @@ KalmanNode::KalmanNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
       wrench_(nh.advertise<geometry_msgs::WrenchStamped>(names::FORCE_WRENCH, STREAM_QUEUE)),
       sensor_state_(nh.advertise<smartmill_msgs::ForceSensorState>(names::FORCE_SENSOR, 10, true)),
       strike_(nh, parameters_.kind() == ForceSensorKind::spindle ? "tool" : POINT_FORCE_SENSOR),
-      pipeline_(parameters_.compensationOfSensor(), parameters_.taps, sensorOf(parameters_),
+      model_(modelOf(parameters_)),
+      pipeline_(parameters_.compensationOfSensor(), parameters_.taps, model_.force_sensor,
                 parameters_.hold_back, pipelineOutputs()),
       measurement_server_(nh, names::MEASURE_SENSOR_FRF, "kalman", measurementHandlers()),
       calibration_server_(nh, pipeline_, parameters_.command_machine) {
   loadSensorFiles(pipeline_, parameters_);
+  if (canCheckTorque(model_)) pipeline_.checkTorque(*model_.spindle);
   if (pipeline_.forces().isUncalibrated())
     ROS_WARN("%s", pipeline_.identification().calibration().message.c_str());
   publishSensor();
@@ -120,6 +129,7 @@ void KalmanNode::subscribe() {
   inputs.setWaiting(force_input_, [this] { return (waiting_.size() + 1) / 2; });
   connect(inputs, pipeline_);
   feed<CuttingCondition>(inputs, names::CUTTING_CONDITION, pipeline_);
+  feed<LoadSample>(inputs, names::CNC_LOAD, pipeline_);
   // A recording that starts after the taps contains the modes that were used in it.
   if (!parameters_.command_machine) feed<MeasuredModes>(inputs, names::TOOL_MODES, pipeline_);
 }
@@ -130,6 +140,7 @@ bool KalmanNode::lookUpRotation() {
   try {
     const auto transform = transforms_.lookupTransform(frames::MACHINE, sensor_frame_, ros::Time(0));
     rotation_ = frames::rotationMatrix(transform.transform.rotation);
+    if (TorqueCheck* check = pipeline_.torqueCheck()) check->setRotation(rotation_);
     return true;
   } catch (const tf2::TransformException& e) {
     ROS_WARN_THROTTLE(5.0, "no transform from %s to %s, force blocks wait: %s", sensor_frame_.c_str(),
@@ -194,6 +205,7 @@ void KalmanNode::publishSensor() {
 void KalmanNode::checkInputs() {
   checkMeasurement();
   checkAngles();
+  checkTorque();
   publishWaiting();
   // End of data: no later input releases the blocks that wait.
   if (shell_.inputs().watchdog(force_input_).ended()) pipeline_.flush();
@@ -209,6 +221,12 @@ void KalmanNode::checkAngles() {
     blocks_from_ = 0.0;
   }
   if (silent - blocks_from_ > parameters_.input_timeout) pipeline_.anglesStopped();
+}
+
+void KalmanNode::checkTorque() {
+  TorqueCheck* check = pipeline_.torqueCheck();
+  const std::string line = check ? check->takeLine() : "";
+  if (!line.empty()) ROS_ERROR_STREAM(force_input_ << ": " << line);
 }
 
 void KalmanNode::checkMeasurement() {
@@ -245,12 +263,15 @@ std::pair<int, std::string> KalmanNode::summary(const SpindleSensorHealth* spind
     return {Level::ERROR, "force blocks were dropped: no transform of the force sensor for 20 s"};
   if (shell_.inputs().watchdog(force_input_).dead())
     return {Level::STALE, "no samples from the force sensor"};
-  if (const StuckChannel& stuck = pipeline_.stuck(); stuck.duration() > parameters_.input_timeout) {
+  if (const StreamCheck::Unchanged stuck = shell_.inputs().unchanged(force_input_);
+      stuck.duration > parameters_.input_timeout) {
     const std::string text = force_input_ + formatted(": channel %s has not changed for %.1f s: stuck",
-                                                      stuck.channel().c_str(), stuck.duration());
+                                                      stuck.channel.c_str(), stuck.duration);
     ROS_ERROR_STREAM_THROTTLE(5.0, text);
     return {Level::ERROR, text};
   }
+  if (const TorqueCheck* check = pipeline_.torqueCheck(); check && check->disagrees())
+    return {Level::ERROR, force_input_ + ": mean force and load meter disagree"};
   if (pipeline_.forces().isUncalibrated())
     return {Level::ERROR, pipeline_.identification().calibration().message};
   if (!rotation_known_) return {Level::ERROR, "no transform of the force sensor"};
@@ -289,6 +310,8 @@ void KalmanNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
     status.addf("expected RMS force error [N]", "%.2f %.2f %.2f", *memory.error(0, health.speed),
                 *memory.error(1, health.speed), *memory.error(2, health.speed));
   }
+  if (const TorqueCheck* check = pipeline_.torqueCheck())
+    status.add("torque by the force over that of the load meter [1]", check->ratio());
   status.add("age of the measured modes [s]", pipeline_.ageOfModes());
   status.add("updates of the sensor's modes", health.mode_updates);
   status.add("gaps", health.gaps);

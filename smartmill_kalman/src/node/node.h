@@ -38,6 +38,7 @@ class KalmanNode {
   void publishSensor();
   void checkInputs();
   void checkAngles();
+  void checkTorque();
   void checkMeasurement();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
   std::pair<int, std::string> summary(const SpindleSensorHealth* spindle);
@@ -61,6 +62,7 @@ class KalmanNode {
 
   ros::Publisher measured_, compensated_, wrench_, sensor_state_;
   StrikeClient strike_;
+  MachineModel model_;
   CompensationPipeline pipeline_;
   FrfServer measurement_server_;
   CalibrationServer calibration_server_;

@@ -11,7 +11,6 @@
 #include "smartmill_core/signal/force_channels.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/compensation/compensation_pipeline.h"
-#include "smartmill_kalman/sensor/stuck_channel.h"
 #include "smartmill_kalman_testing/plate_sensor.h"
 
 namespace smartmill::kalman {
@@ -169,17 +168,6 @@ TEST(CompensationPipeline, APlateGivesNoForceBeforeItsMatrix) {
   pipeline.flush();
   EXPECT_EQ(forces, 0u);
   EXPECT_FALSE(pipeline.identification().calibration().calibrated);
-}
-
-TEST(StuckChannel, IsTheOneThatHasNotChangedForLongest) {
-  StuckChannel stuck;
-  for (int b = 0; b < 50; ++b) stuck.handle(plateBlock(b, b < 10 ? b : 10.0));
-  EXPECT_EQ(stuck.channel(), "fy");
-  EXPECT_NEAR(stuck.duration(), 0.4, 0.011);
-  stuck.handle(plateBlock(50, 0.0));
-  EXPECT_LT(stuck.duration(), 0.011);
-  stuck.handle(plateBlock(0, 0.0));  // the recording was restarted
-  EXPECT_LT(stuck.duration(), 0.011);
 }
 
 }  // namespace

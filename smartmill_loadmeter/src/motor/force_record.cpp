@@ -26,7 +26,7 @@ std::optional<Estimate> ForceMeasurement::rmsAbove(const std::optional<ForceMeas
 }
 
 void ForceRecord::add(const ForceBlock& block) {
-  if (block.status == ForceBlock::Status::settling || block.force[0].empty()) return;
+  if (block.isUnusable() || block.force[0].empty()) return;
   BlockSums block_sums;
   block_sums.count = static_cast<double>(block.force[0].size());
   block_sums.end = block.stamp + block_sums.count / block.sample_rate;

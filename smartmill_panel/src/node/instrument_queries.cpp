@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "smartmill_core/error.h"
-#include "smartmill_core/instrument_names.h"
+#include "smartmill_core/names.h"
 #include "smartmill_panel/server/command_gate.h"
 
 namespace smartmill::panel {

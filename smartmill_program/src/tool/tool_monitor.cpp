@@ -110,7 +110,7 @@ void ToolMonitor::handle(const ForceBlock& block) {
   if (block.first_index != next_index_ || kind != status_) gap();
   next_index_ = block.first_index + block.force[0].size();
   status_ = kind;
-  if (block.status == ForceBlock::Status::settling) return;
+  if (block.isUnusable()) return;
   for (std::size_t i = 0; i < block.force[0].size(); ++i) {
     const Sample sample{block.stamp + static_cast<double>(i) / block.sample_rate, block.force[0][i],
                         block.force[1][i]};

@@ -75,8 +75,7 @@ ConvertedRecording convertRecording(const std::vector<std::string>& from, const 
       const auto [number, is_new] = there.try_emplace(entry.connection, 0);
       if (is_new) number->second = numberOf(connection);
       const std::uint8_t* const data = file->data(entry);
-      if (const auto latching = connection.more.find("latching");
-          latching != connection.more.end() && latching->second == "1") {
+      if (connection.isLatched()) {
         std::vector<std::uint8_t> bytes(data, data + entry.size);
         const bool first = begun.insert(entry.connection).second;
         const auto before = latched.find(number->second);

@@ -171,6 +171,11 @@ void Followers::settle() {
   }
 }
 
+void Followers::step() {
+  settle();
+  for (Node& node : nodes_) call(node, Request::STEP);
+}
+
 // Messages of other publishers may never stand still.
 void Followers::leave() {
   keepUp(0);

@@ -18,8 +18,6 @@ namespace {
 
 constexpr double LOG_PERIOD = 5.0;  // [s] between lines in the log about one input
 constexpr double HOLD = 120.0;      // [s] without a call after which a player has ended
-constexpr int LEADING =
-    2;  // other streams that have to be ahead, so that one whose clock is ahead blames none
 
 }  // namespace
 
@@ -69,7 +67,7 @@ smartmill_msgs::StreamHealth InputHealth::account(const std::string& topic) {
   account.processed = taken_ - std::min(taken_, unused);
   account.lost_samples = check_.lostSamples();
   account.silent = watchdog_.silent();
-  account.latency = std::exchange(progress_.latency, 0.0);
+  account.latency = std::exchange(latency_, 0.0);
   account.fault = check_.present();
   return account;
 }
@@ -91,6 +89,8 @@ void Inputs::tick(double period) {
   }
   any_.tick(period);
   for (InputHealth& input : inputs_) input.watchdog().tick(period);
+  progress_.tick(period, toSec(ros::Time::now()));
+  logBehind();
 }
 
 InputHealth& Inputs::add(const std::string& topic) {
@@ -123,38 +123,24 @@ void Inputs::logLines(InputHealth& health) {
     ROS_ERROR_STREAM(health.topic() << ": " << line);
 }
 
-void Inputs::compareSpeed(InputHealth& health, const SpindleAngle& reading) {
+// Which of both is wrong is not known: the reading is not used.
+bool Inputs::agreesWithController(InputHealth& health, const SpindleAngle& reading) {
   const std::string line = speeds_.check(reading);
   if (!line.empty()) ROS_ERROR_STREAM(health.topic() << ": " << line);
+  return !speeds_.disagrees();
 }
 
 void Inputs::noteStamp(InputHealth& health, double stamp, double limit) {
-  InputHealth::Progress& progress = health.progress();
-  if (stamp < progress.newest - StreamSorter::RESTART) {
-    for (InputHealth& input : inputs_) input.progress() = {};
-  }
-  progress.newest = std::max(progress.newest, stamp);
-  progress.limit = limit;
-  progress.latency = std::max(progress.latency, toSec(ros::Time::now()) - stamp);
-  for (InputHealth& input : inputs_) {
-    InputHealth::Progress& own = input.progress();
-    if (!std::isfinite(own.newest)) continue;
-    int others = 0, ahead = 0;
-    double least = std::numeric_limits<double>::infinity();  // [s] of those ahead
-    for (const InputHealth& other : inputs_) {
-      if (&other == &input || !std::isfinite(other.progress().newest)) continue;
-      ++others;
-      const double lead = other.progress().newest - own.newest;
-      if (lead <= own.limit) continue;
-      ++ahead;
-      least = std::min(least, lead);
+  if (!health.progress) health.progress = progress_.add(limit);
+  progress_.heard(*health.progress, stamp);
+  health.noteLatency(toSec(ros::Time::now()) - stamp);
+}
+
+void Inputs::logBehind() {
+  for (const auto& [stream, line] : progress_.takeLines()) {
+    for (const InputHealth& input : inputs_) {
+      if (input.progress == stream) ROS_WARN_STREAM(input.topic() << ": " << line);
     }
-    const bool silent = input.watchdog().silent() >= SENSOR_BEHIND;  // not only waiting in a queue
-    const bool behind = silent && others > 0 && ahead >= std::min(LEADING, others);
-    if (behind && own.behind == 0.0)
-      ROS_WARN("%s: no data for %.2f s of the other inputs, since %.3f s", input.topic().c_str(), least,
-               own.newest);
-    own.behind = behind ? least : 0.0;
   }
 }
 
@@ -182,6 +168,10 @@ void Inputs::follow(const smartmill_msgs::Follow::Request& request,
   using Request = smartmill_msgs::Follow::Request;
   if (request.phase == Request::BEGIN || hold_ > 0.0) hold_ = HOLD;
   if (request.phase == Request::END || request.phase == Request::LEAVE) hold_ = 0.0;
+  if (request.phase == Request::STEP) {
+    progress_.step();
+    logBehind();
+  }
   if (request.phase == Request::END) {
     any_.end();
     for (InputHealth& input : inputs_) input.watchdog().end();
@@ -212,9 +202,9 @@ void Inputs::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
     if (!problem.empty()) status.mergeSummary(Level::ERROR, input.topic() + ": " + problem);
     const std::string fault = input.streamCheck().present();
     if (!fault.empty()) status.mergeSummary(Level::ERROR, input.topic() + ": " + fault);
-    if (input.progress().behind > 0.0)
-      status.mergeSummary(Level::WARN, input.topic() + formatted(": %.2f s behind the other inputs",
-                                                                 input.progress().behind));
+    const double behind = input.progress ? progress_.behind(*input.progress) : 0.0;
+    if (behind > 0.0)
+      status.mergeSummary(Level::WARN, input.topic() + formatted(": %.2f s behind the other inputs", behind));
     if (input.watchdog().ever()) {
       status.addf(input.topic(), "%.2f s since the last message, %zu refused", input.watchdog().silent(),
                   input.refused());

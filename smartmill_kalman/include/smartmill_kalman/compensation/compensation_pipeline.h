@@ -11,7 +11,7 @@
 #include "smartmill_kalman/compensation/sensor_forces.h"
 #include "smartmill_kalman/compensation/sensor_identification.h"
 #include "smartmill_kalman/sensor/channel_forces.h"
-#include "smartmill_kalman/sensor/stuck_channel.h"
+#include "smartmill_kalman/sensor/torque_check.h"
 
 namespace smartmill::kalman {
 
@@ -35,8 +35,6 @@ class CompensationPipeline {
   const StreamSorter& sorter() const { return sorter_; }
   /// Channels of the machine model's sensor; nullptr: its forces are measured.
   const ChannelForces* channels() const { return channels_ ? &*channels_ : nullptr; }
-  /// Channel of the force sensor whose samples have not changed for longest.
-  const StuckChannel& stuck() const { return stuck_; }
   /// Kind of the sensor. Six sensors in the spindle and a plate give no force until they are calibrated.
   void useKind(ForceSensorKind kind);
   /// Accepts blocks of six sensors in the spindle (channels x1 .. z2).
@@ -44,6 +42,10 @@ class CompensationPipeline {
   void useSpindleSensor(const SpindleSensorCalibration& calibration, double length);
   /// Inverts the transfer matrix of a sensor of 3 or 6 channels instead of filtering. @throws Error.
   void useTransferMatrix(const TransferMatrix& matrix, double bandwidth);
+  /// Compares the forces with the load meter from now on; blocks that disagree are marked.
+  void checkTorque(const Spindle& spindle) { torque_check_.emplace(spindle); }
+  /// nullptr: not compared
+  TorqueCheck* torqueCheck() { return torque_check_ ? &*torque_check_ : nullptr; }
   /// Age of the oldest measured modes in use, at the newest input [s]; 0 without measured modes.
   double ageOfModes() const;
 
@@ -55,6 +57,8 @@ class CompensationPipeline {
   void push(const CuttingCondition& condition);
   /// State of the controller: its speed, for estimates without spindle/angle.
   void push(const CncState& state);
+  /// Reading of the load meter, for checkTorque().
+  void push(const LoadSample& sample);
   /// @param begin called at the goal's stamp with whether no other measurement runs; returns whether to
   /// start; may be empty
   void push(const MeasureFrfGoal& goal, std::function<bool(bool)> begin = {});
@@ -78,6 +82,7 @@ class CompensationPipeline {
  private:
   void handle(const SampleBlock& channels, const SampleBlock& block);
   void restart();
+  ForceOutputs checkedOutputs();
 
   Outputs outputs_;
   StreamSorter sorter_;
@@ -85,9 +90,9 @@ class CompensationPipeline {
   SensorIdentification identification_;
   std::function<void()> use_file_;  // the calibration of a file; empty: none
   std::optional<ChannelForces> channels_;
-  StuckChannel stuck_;
+  std::optional<TorqueCheck> torque_check_;
   bool may_estimate_;  // the speed, where angles are missing
-  StreamSorter::Stream conditions_, goals_, hammers_, angles_, blocks_, states_;
+  StreamSorter::Stream conditions_, goals_, hammers_, angles_, blocks_, states_, loads_;
 };
 
 }  // namespace smartmill::kalman

@@ -75,6 +75,8 @@ constexpr const char* ORIENT_SPINDLE = "cnc/orient_spindle";
 
 // Services.
 constexpr const char* STRIKE = "daq/strike";
+constexpr const char* TRY_INSTRUMENT = "daq/try_instrument";
+constexpr const char* CALIBRATE_CHANNEL = "daq/calibrate_channel";
 constexpr const char* OPERATOR_ACTION = "operator/act";
 constexpr const char* OPERATOR_DONE = "session/done";
 constexpr const char* ARM_MOTION = "cnc/arm_motion";

@@ -26,11 +26,11 @@ constexpr double ANGLE_NOISE = 0.3;      // [rad] of a window
 constexpr double LEAST_ADVANCE = 2.0 * units::TWO_PI;
 constexpr double LONGEST_WINDOW = 2.0;  // [s] at rest
 constexpr std::size_t LEAST_READINGS = 5;
-constexpr double LOST_PERIODS = 5.0;   // [1] mean periods without a reading after which readings are missing
-constexpr double STEADY_TIME = 0.4;    // [s] of both speeds
+constexpr double LOST_PERIODS = 5.0;  // [1] mean periods without a reading, or of one block, that are a fault
+constexpr double STEADY_TIME = 0.25;  // [s] of both speeds
 constexpr double STEADY_SHARE = 0.02;  // [1] change of a steady speed
 constexpr double SPEED_SHARE = 0.1;    // [1] difference of the speeds; slip and rounding are far less
-constexpr double PERIOD_SHARE = 0.1;   // [1] weight of a reading in the mean period
+constexpr double PERIOD_SHARE = 0.1;   // [1] weight of a reading or block in the mean period
 
 }  // namespace
 
@@ -41,6 +41,7 @@ void StreamCheck::reset() {
   channels_.clear();
   window_samples_ = 0;
   wrong_windows_ = 0;
+  length_ = 0.0;
   reading_.reset();
   period_ = 0.0;
   disagrees_ = false;
@@ -76,6 +77,7 @@ bool StreamCheck::check(SampleBlock& block) {
     const bool jumped = next_index_ && block.first_index >= *next_index_ && back > 0.0;
     reset();
     channels_.resize(block.channels.size());
+    for (std::size_t c = 0; c < channels_.size(); ++c) channels_[c].name = block.channels[c];
     if (jumped)
       note(Kind::jump, block.stamp, 1, formatted("stamps jumped back by %.3f s against the index", back));
   }
@@ -86,6 +88,7 @@ bool StreamCheck::check(SampleBlock& block) {
     return false;
   }
   checkStamps(block);
+  checkLength(block);
   checkValues(block);
   first_index_ = block.first_index;
   next_index_ = block.first_index + block.size();
@@ -142,6 +145,25 @@ void StreamCheck::endStampWindow(const SampleBlock& block) {
   wrong_windows_ = 0;
   if (std::abs(window.largest) > LEAST_JUMP)
     note(Kind::jump, block.stamp, 1, formatted("stamps jumped by %.3f s against the index", window.largest));
+}
+
+void StreamCheck::checkLength(const SampleBlock& block) {
+  const double length = static_cast<double>(block.size()) / block.sample_rate;
+  if (length_ > 0.0 && length > LOST_PERIODS * length_) {
+    note(Kind::length, block.stamp, 1,
+         formatted("block of %.3f s, usually %.3f s: delayed", length, length_));
+    return;
+  }
+  length_ += (length_ > 0.0 ? PERIOD_SHARE : 1.0) * (length - length_);
+}
+
+StreamCheck::Unchanged StreamCheck::longestUnchanged() const {
+  Unchanged longest;
+  for (const Channel& channel : channels_) {
+    const double duration = rate_ > 0.0 ? static_cast<double>(channel.run) / rate_ : 0.0;
+    if (duration > longest.duration) longest = {channel.name, duration};
+  }
+  return longest;
 }
 
 void StreamCheck::checkValues(SampleBlock& block) {

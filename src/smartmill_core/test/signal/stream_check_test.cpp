@@ -141,6 +141,37 @@ TEST(StreamCheck, AQuietChannelIsNotStuck) {
   EXPECT_TRUE(check.takeLines().empty());
 }
 
+// A cable that was broken from the start, too.
+TEST(StreamCheck, TheChannelThatHasNotChangedForLongestIsKnown) {
+  StreamCheck check;
+  Blocks blocks;
+  const auto push = [&](double fy) {
+    SampleBlock block = blocks.next();
+    for (std::size_t i = 0; i < SIZE; ++i) block.samples[2 * i + 1] = fy;
+    check.check(block);
+  };
+  for (int k = 0; k < 50; ++k) push(3.0);
+  EXPECT_EQ(check.longestUnchanged().channel, "fy");
+  EXPECT_NEAR(check.longestUnchanged().duration, 0.5, 1e-3);
+  EXPECT_TRUE(check.takeLines().empty());  // a channel without noise may be quiet
+  push(4.0);
+  EXPECT_LT(check.longestUnchanged().duration, 0.011);
+}
+
+// Ten blocks arrive as one.
+TEST(StreamCheck, ALongBlockIsDelayed) {
+  StreamCheck check;
+  std::string line;
+  announcedAfter(
+      check,
+      [](SampleBlock& block) {
+        for (int k = 1; k < 10; ++k)
+          block.samples.insert(block.samples.end(), block.samples.begin(), block.samples.begin() + 2 * SIZE);
+      },
+      &line);
+  EXPECT_EQ(line.rfind("block of 0.100 s, usually 0.010 s: delayed", 0), 0u) << line;
+}
+
 TEST(StreamCheck, LostBlocksAreCounted) {
   StreamCheck check;
   std::string line;

@@ -25,6 +25,12 @@ struct RecordedConnection {
   std::string topic, type, md5sum, definition;
   std::string encoding = "ros1";            ///< of its messages
   std::map<std::string, std::string> more;  ///< other fields of its header: callerid, latching
+
+  /// Whether a new subscriber gets the last message of the publisher.
+  bool isLatched() const {
+    const auto latching = more.find("latching");
+    return latching != more.end() && latching->second == "1";
+  }
 };
 
 /// The messages of a recording in the order of their reception. Every length in the file is compared with the

@@ -60,6 +60,9 @@ class Followers {
   /// a goal or a condition then precedes all later data. @throws Error as keepUp()
   void settle();
 
+  /// settle(), then the nodes report inputs that are behind the others. @throws Error as keepUp()
+  void step();
+
   /// Announces the end of the data: the nodes release delayed results, one node after the other.
   void end();
 

@@ -6,6 +6,7 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <optional>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -20,6 +21,7 @@
 
 #include "smartmill_core/names.h"
 #include "smartmill_core/signal/stream_check.h"
+#include "smartmill_core/signal/stream_progress.h"
 #include "smartmill_core/signal/watchdog.h"
 #include "smartmill_ros/conversions.h"
 
@@ -72,15 +74,10 @@ class InputHealth {
   StreamCheck& streamCheck() { return check_; }
   const StreamCheck& streamCheck() const { return check_; }
 
-  /// Stamps of a stream, compared with those of the others.
-  struct Progress {
-    double newest = -std::numeric_limits<double>::infinity();  // [s]
-    double behind = 0.0;                                       // [s] behind the other streams; 0: not behind
-    double limit = 0.0;                                        // [s]
-    double latency = 0.0;                                      // [s] longest since the last account
-  };
-  Progress& progress() { return progress_; }
-  const Progress& progress() const { return progress_; }
+  /// @param latency [s] of a message with a stamp
+  void noteLatency(double latency) { latency_ = std::max(latency_, latency); }
+  /// Number in the comparison of the stamps; set with the first stamp.
+  std::optional<StreamProgress::Stream> progress;
 
  private:
   std::string topic_, problem_;
@@ -94,7 +91,7 @@ class InputHealth {
   std::map<std::string, std::uint32_t> numbers_;  // of the last message, by publisher
   std::function<std::size_t()> waiting_;
   StreamCheck check_;
-  Progress progress_;
+  double latency_ = 0.0;  // [s] longest since the last account
 };
 
 /// Subscriptions of a node. on() has the signature of RecordingReader::on(), so that one function can connect
@@ -155,6 +152,11 @@ class Inputs {
   /// player calls it, pauses of the player are no end of data.
   void follow(const smartmill_msgs::Follow::Request& request, smartmill_msgs::Follow::Response& response);
 
+  /// Of an input of sample blocks. @throws std::out_of_range as watchdog().
+  StreamCheck::Unchanged unchanged(const std::string& topic) {
+    return find(topic).streamCheck().longestUnchanged();
+  }
+
   /// Accounts of all inputs; the largest latencies since the previous call.
   std::vector<smartmill_msgs::StreamHealth> accounts();
 
@@ -171,9 +173,9 @@ class Inputs {
     if constexpr (std::is_same_v<Data, FramedBlock>) {
       return isUsable(health, data.block);
     } else if constexpr (std::is_same_v<Data, SampleBlock> || std::is_same_v<Data, SpindleAngle>) {
-      const bool usable = health.streamCheck().check(data);
+      bool usable = health.streamCheck().check(data);
       logLines(health);
-      if constexpr (std::is_same_v<Data, SpindleAngle>) compareSpeed(health, data);
+      if constexpr (std::is_same_v<Data, SpindleAngle>) usable = agreesWithController(health, data) && usable;
       noteStamp(health, data.stamp, SENSOR_BEHIND);
       return usable;
     } else if constexpr (std::is_same_v<Data, ForceBlock>) {
@@ -185,9 +187,10 @@ class Inputs {
     return true;
   }
   void logLines(InputHealth& health);
-  void compareSpeed(InputHealth& health, const SpindleAngle& reading);
+  bool agreesWithController(InputHealth& health, const SpindleAngle& reading);
   /// @param limit [s] beyond which the stream is behind the others
   void noteStamp(InputHealth& health, double stamp, double limit);
+  void logBehind();
 
   ros::NodeHandle nh_;
   double timeout_;
@@ -195,6 +198,7 @@ class Inputs {
   std::deque<InputHealth> inputs_;  // with stable addresses
   Watchdog any_;
   SpeedAgreement speeds_;
+  StreamProgress progress_;
   std::deque<ros::Subscriber> subscribers_;
 };
 

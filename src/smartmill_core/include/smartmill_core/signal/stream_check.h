@@ -23,14 +23,15 @@ namespace smartmill {
 /// | block or reading received twice | dropped |
 /// | stated rate differs from that of the stamps by more than 3 % | dropped from the second window of 0.2 s |
 /// | stamps jump against the index or the angle | pass |
+/// | block of more than five times the usual length | pass |
 /// | angle does not advance by the stated speed | dropped |
 /// | angle or speed out of range | dropped |
 ///
 /// A wrong scale, sign or order of channels is not visible in sample blocks alone.
 class StreamCheck {
  public:
-  enum class Kind : std::uint8_t { value, stuck, gap, duplicate, rate, jump, angle };
-  static constexpr std::size_t KINDS = 7;
+  enum class Kind : std::uint8_t { value, stuck, gap, duplicate, rate, jump, angle, length };
+  static constexpr std::size_t KINDS = 8;
 
   /// Where the samples come from: values of a controller are digital and repeat at rest.
   enum class Source : std::uint8_t { sensor, controller };
@@ -47,6 +48,12 @@ class StreamCheck {
   std::string present() const;
   /// [s] newest stamp; -inf before any
   double newest() const { return newest_; }
+  /// The channel that has repeated its value for longest.
+  struct Unchanged {
+    std::string channel;
+    double duration = 0.0;  ///< [s]
+  };
+  Unchanged longestUnchanged() const;
   /// [1] faults of a kind since the start: samples of value and stuck, readings of angle, else blocks
   std::size_t count(Kind kind) const { return episodes_[static_cast<std::size_t>(kind)].count; }
   /// [1] samples since the start that are missing in the running index
@@ -60,6 +67,7 @@ class StreamCheck {
     std::size_t count = 0;
   };
   struct Channel {
+    std::string name;
     double last = NOT_A_NUMBER;
     std::size_t run = 0;                        // samples that repeat the last value
     std::size_t changes = 0;                    // in the present window
@@ -81,6 +89,7 @@ class StreamCheck {
   bool isRepeated(const SampleBlock& block);
   void checkStamps(const SampleBlock& block);
   void endStampWindow(const SampleBlock& block);
+  void checkLength(const SampleBlock& block);
   void checkValues(SampleBlock& block);
   void checkAdvance(const SpindleAngle& reading);
 
@@ -93,7 +102,8 @@ class StreamCheck {
   std::optional<std::uint64_t> next_index_;
   std::uint64_t lost_samples_ = 0;
   std::uint64_t first_index_ = 0;
-  double rate_ = 0.0;  // [Hz]
+  double rate_ = 0.0;    // [Hz]
+  double length_ = 0.0;  // [s] mean
   std::vector<Channel> channels_;
   std::size_t window_samples_ = 0;
   int wrong_windows_ = 0;
@@ -112,7 +122,7 @@ class SpeedAgreement {
  public:
   /// @param speed [rad/s] of the controller; 0 or NaN: not known
   void setController(double stamp, double speed);
-  /// @return one line when both have been steady for 0.4 s and differ by more than 10 %, every 5 s; else
+  /// @return one line when both have been steady for 0.25 s and differ by more than 10 %, every 5 s; else
   /// empty
   std::string check(const SpindleAngle& reading);
   bool disagrees() const { return disagrees_; }

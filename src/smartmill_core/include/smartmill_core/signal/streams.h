@@ -100,7 +100,8 @@ struct ForceBlock {
     compensated = 1,
     passed_through = 2,
     settling = 3,
-    transient = 4
+    transient = 4,
+    implausible = 5
   };
   double stamp = 0.0;                        ///< [s] of the first sample
   double sample_rate = 0.0;                  ///< [Hz]
@@ -110,6 +111,8 @@ struct ForceBlock {
 
   /// The sensor's dynamics are removed, if not as accurately in a transient.
   bool isCompensated() const { return status == Status::compensated || status == Status::transient; }
+  /// No result about the size or the direction of the force is to be based on the block.
+  bool isUnusable() const { return status == Status::settling || status == Status::implausible; }
 };
 
 }  // namespace smartmill

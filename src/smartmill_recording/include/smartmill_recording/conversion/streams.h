@@ -202,7 +202,7 @@ void read(const M& m, ForceBlock& block) {
   requireRate(m.sample_rate);
   requireLength("fy", m.fy.size(), m.fx.size());
   requireLength("fz", m.fz.size(), m.fx.size());
-  if (m.status > M::TRANSIENT) throw Error("status: " + std::to_string(m.status) + " is unknown");
+  if (m.status > M::IMPLAUSIBLE) throw Error("status: " + std::to_string(m.status) + " is unknown");
   block.stamp = secondsOf(m.header.stamp);
   block.sample_rate = m.sample_rate;
   block.first_index = m.first_index;
