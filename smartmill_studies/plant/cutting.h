@@ -121,9 +121,8 @@ class Cutting {
           (1.0 - std::exp(-test.start_time.value_or(0.0) / hidden("thermal_growth", "time_constant_s")));
     tilt_ = 1e-3 * hidden("depth_tilt", "slope_um_per_mm");
     slabs_ = slabsOf(hidden.has("corner_radius") ? units::MM * hidden("corner_radius", "corner_radius_mm")
-                                                  : plant.tool.edge.corner_radius,
-                     depth_ + std::abs(tilt_) * 0.02,
-                     slice);
+                                                 : plant.tool.edge.corner_radius,
+                     depth_ + std::abs(tilt_) * 0.02, slice);
     for (const Slab& slab : slabs_)
       fronts_.emplace_back(0.5 * plant.tool.diameter - slab.inset, plant.tool.teeth, step_angle);
   }

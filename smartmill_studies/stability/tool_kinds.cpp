@@ -96,13 +96,15 @@ std::vector<CutAtLimit> cutsAtLimit(const MachineModel& model, const ToolKind& k
         std::max(LEAST_SAMPLES,
                  static_cast<int>(std::ceil(SAMPLES_OF_A_WAVE * highest * units::TWO_PI / p.speed))),
         system.teeth);
-    cuts.push_back({p.speed, {system.entry, system.exit, p.depth, options.feed}, samples, options.revolutions, 0});
+    cuts.push_back(
+        {p.speed, {system.entry, system.exit, p.depth, options.feed}, samples, options.revolutions, 0});
     points.push_back(p);
   }
   runTwinCuts(
       {machine}, cuts, {{"tool_x", "tool_y"}},
       [&](std::size_t i, const Record& record) {
-        const int period = system.evenPitch() && !kind.unlike_chips ? cuts[i].samples / system.teeth : cuts[i].samples;
+        const int period =
+            system.evenPitch() && !kind.unlike_chips ? cuts[i].samples / system.teeth : cuts[i].samples;
         points[i].observed = repeatsNoMore(record, cuts[i].samples, period, options.feed);
       },
       progress);

@@ -18,8 +18,8 @@ struct ToolKind {
   bool unlike_chips = false;
 };
 
-/// Straight, bull nose, ball, face mill of 45 degrees, variable pitch, variable helix, serrated: variants of a
-/// tool with four teeth. @throws Error on another number of teeth.
+/// Straight, bull nose, ball, face mill of 45 degrees, variable pitch, variable helix, serrated: variants of
+/// a tool with four teeth. @throws Error on another number of teeth.
 std::vector<ToolKind> toolKinds(const ToolGeometry& straight);
 
 struct ToolKindOptions : StudyRange {

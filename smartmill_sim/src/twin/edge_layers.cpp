@@ -43,8 +43,7 @@ EdgeLayers::EdgeLayers(const TwinSetup& setup, const CuttingLaw& law, double tim
     if (rigid && definition.only_tooth < 0) {
       layer.rigid.emplace(tool, lawOf(definition, law), std::move(radius), setup.path_share);
     } else {
-      layer.process.emplace(tool, lawOf(definition, law), time_step, std::move(radius),
-                            setup.path_share);
+      layer.process.emplace(tool, lawOf(definition, law), time_step, std::move(radius), setup.path_share);
       if (definition.only_tooth >= 0) layer.process->selectTooth(definition.only_tooth);
     }
     layers_.push_back(std::move(layer));

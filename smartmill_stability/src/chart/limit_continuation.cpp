@@ -39,14 +39,14 @@ StabilityLimit firstGuess(const RegenerativeSystem& system, const std::vector<do
     if (f >= LEAST && (frequencies.empty() || f > frequencies.back())) frequencies.push_back(f);
   const ToolTipResponse response = responseOf(system.modes, std::move(frequencies));
   const auto limitWith = [&](double kr) {
-    return zeroOrderLimit({system.teeth, system.entry, std::min(system.exit, units::TWO_PI), system.kt,
-                           kr / system.kt},
-                          response, speeds);
+    return zeroOrderLimit(
+        {system.teeth, system.entry, std::min(system.exit, units::TWO_PI), system.kt, kr / system.kt},
+        response, speeds);
   };
   if (!system.edge.inclined()) return limitWith(system.kr);
-  const double least = absoluteDepthLimit({system.teeth, system.entry, std::min(system.exit, units::TWO_PI),
-                                           system.kt, system.kr / system.kt},
-                                          response);
+  const double least = absoluteDepthLimit(
+      {system.teeth, system.entry, std::min(system.exit, units::TWO_PI), system.kt, system.kr / system.kt},
+      response);
   return limitWith(system.meanRadial(std::isfinite(least) ? least : 1.0));
 }
 

@@ -53,8 +53,9 @@ class Contact {
       mill.diameter = 2.0 * (tool.radius() - slices_[s].inset);
       std::vector<double> offset;
       for (int k = 0; k < teeth_; ++k) {
-        offset.push_back((chip_.radius_offset.empty() ? 0.0 : chip_.radius_offset[static_cast<std::size_t>(k)]) +
-                         serrationAt(tool, k, z));
+        offset.push_back(
+            (chip_.radius_offset.empty() ? 0.0 : chip_.radius_offset[static_cast<std::size_t>(k)]) +
+            serrationAt(tool, k, z));
         angle_.push_back(tool.toothAngle(k) - (tool.helix > 0.0 ? tool.lagOf(k) : 0.0) * z);
       }
       if (!tool.edge.helix.empty()) {
@@ -105,9 +106,9 @@ class Contact {
         feedback.now += stiffness;
         feedback.delayed[s.delay] -= stiffness;
         if (damps)
-          feedback.velocity += slice.height / (speed_ * (0.5 * system_.diameter - slice.inset)) *
-                               directional(system_.damping_tangential,
-                                           slice.chip_radial * system_.damping_radial, angle);
+          feedback.velocity +=
+              slice.height / (speed_ * (0.5 * system_.diameter - slice.inset)) *
+              directional(system_.damping_tangential, slice.chip_radial * system_.damping_radial, angle);
         break;
       }
     }
@@ -116,10 +117,10 @@ class Contact {
  private:
   /// A height of the tool with one contact.
   struct Slice {
-    double middle, height;            ///< [m]
-    double kr;                        ///< [N/m2] across the tool
-    double chip_radial = 1.0;         ///< [1] sin(kappa)
-    double inset = 0.0;               ///< [m] tool radius minus local radius
+    double middle, height;     ///< [m]
+    double kr;                 ///< [N/m2] across the tool
+    double chip_radial = 1.0;  ///< [1] sin(kappa)
+    double inset = 0.0;        ///< [m] tool radius minus local radius
   };
 
   int sliceCount() const { return static_cast<int>(slices_.size()); }
@@ -279,8 +280,9 @@ class Contact {
           // directional() is force times normal; multiplied by the normal it is the force per chip thickness.
           // The edge force is that of a chip of one metre with the coefficients kte and kre.
           const Eigen::Vector2d normal(sine, cosine);
-          forces.force[i] += d * normal * rigidChip(e, m).at(sine, cosine) +
-                             inArc(e, cell) * slice.height * directional(chip_.kte, chip_.kre, angle) * normal;
+          forces.force[i] +=
+              d * normal * rigidChip(e, m).at(sine, cosine) +
+              inArc(e, cell) * slice.height * directional(chip_.kte, chip_.kre, angle) * normal;
         }
       }
     }

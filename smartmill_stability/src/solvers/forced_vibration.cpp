@@ -57,7 +57,8 @@ VectorXcd ForcedVibration::balance(const ContactForces& forces, const std::vecto
   std::vector<std::size_t> used;
   for (std::size_t d = 0; d < delays.size(); ++d) {
     const auto& gain = forces.gain[1 + d];
-    if (std::any_of(gain.begin(), gain.end(), [](const auto& g) { return !g.isZero(0.0); })) used.push_back(d);
+    if (std::any_of(gain.begin(), gain.end(), [](const auto& g) { return !g.isZero(0.0); }))
+      used.push_back(d);
   }
   MatrixXcd matrix = MatrixXcd::Identity(2 * n, 2 * n);
   VectorXcd right(2 * n);

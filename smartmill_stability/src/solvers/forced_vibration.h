@@ -11,12 +11,12 @@ namespace smartmill::stability {
 
 /// Resolution of the contact of the teeth.
 struct ContactResolution {
-  int cells = 384;          ///< of a revolution: about one degree
-  double slice_lag = 0.03;  ///< [rad] lag of the edge over a slice, two cells
-  int wave_slices = 20;     ///< of a serration wave
+  int cells = 384;              ///< of a revolution: about one degree
+  double slice_lag = 0.03;      ///< [rad] lag of the edge over a slice, two cells
+  int wave_slices = 20;         ///< of a serration wave
   double pitch_change = 0.015;  ///< [rad] of the teeth over a slice, by a helix angle of each
   double delay_step = 0.004;    ///< [rad] of the pitch at which the delays of such a tool are taken
-  int most_slices = 60;     ///< limits the time
+  int most_slices = 60;         ///< limits the time
   /// Newton's method ends after a few iterations where the contact no longer changes; a contact that
   /// alternates is ended.
   int most_iterations = 30;

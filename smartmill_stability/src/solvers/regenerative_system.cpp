@@ -285,7 +285,8 @@ class ShapedTeeth {
   /// [m] Of the edge at a height.
   double localRadius(double kappa, double z) const {
     const EdgeShape& edge = tool_.edge;
-    if (z < corner_) return tool_.radius() - edge.corner_radius * (std::tan(0.5 * edge.edge_angle) - std::sin(kappa));
+    if (z < corner_)
+      return tool_.radius() - edge.corner_radius * (std::tan(0.5 * edge.edge_angle) - std::sin(kappa));
     return tool_.radius() + (edge.edge_angle < 0.5 * PI ? z / std::tan(edge.edge_angle) : 0.0);
   }
 

@@ -195,8 +195,9 @@ FloquetSolver::FloquetSolver(const RegenerativeSystem& system, const SolverOptio
                                           (2.0 * mode.damping_ratio * w * w));
   }
   depth_scale_ = 0.5 / (std::hypot(system_.kt, system_.kr) * compliance);
-  if (system_.edge.inclined()) depth_scale_ *= std::hypot(system_.kt, system_.kr) /
-                                               std::hypot(system_.kt, std::hypot(system_.kr, system_.ka));
+  if (system_.edge.inclined())
+    depth_scale_ *=
+        std::hypot(system_.kt, system_.kr) / std::hypot(system_.kt, std::hypot(system_.kr, system_.ka));
   if (system_.cut == Cut::milling && system_.kt > 0.0) {
     const auto leastWith = [&](double kr) {
       const RegenerativeProcess mean{system_.teeth, system_.entry, std::min(system_.exit, units::TWO_PI),

@@ -215,8 +215,9 @@ TEST(EdgeShape, refusesWhatCannotBe) {
   EXPECT_NE(message(varied).find("helix_deg: one of each tooth"), std::string::npos);
   RegenerativeSystem steep = mill();
   setHelix(steep, {0.0, 70.0, 0.0, 70.0});
-  EXPECT_NE(errorOf([&] { makeFloquetSolver(Method::collocation, steep)->multiplier(600.0, 30e-3); })
-                .find("the edges of teeth 1 and 2 meet"),
+  EXPECT_NE(errorOf([&] {
+              makeFloquetSolver(Method::collocation, steep)->multiplier(600.0, 30e-3);
+            }).find("the edges of teeth 1 and 2 meet"),
             std::string::npos);
 }
 

@@ -60,9 +60,10 @@ bool run(const Request& request) {
                     c.limit / units::MM, c.depth / units::MM, 100.0 * (c.depth / c.limit - 1.0),
                     word(c.chatters), word(c.observed));
     }
-    std::printf("%s: %d of %zu on the right side or within %.3g %% of the limit; %d chatter, limits %.2f..%.2f mm\n",
-                kind.name.c_str(), right, cuts.size(), 100.0 * options.within, chatter, least / units::MM,
-                most / units::MM);
+    std::printf(
+        "%s: %d of %zu on the right side or within %.3g %% of the limit; %d chatter, limits %.2f..%.2f mm\n",
+        kind.name.c_str(), right, cuts.size(), 100.0 * options.within, chatter, least / units::MM,
+        most / units::MM);
     met = met && right >= request.least;
   }
   if (!found) throw Error("--only " + request.only + ": expected the name of a kind of tool");
@@ -75,7 +76,8 @@ bool run(const Request& request) {
 int main(int argc, char** argv) {
   Request request;
   CommandLine line{
-      "Compares charts of tools with edges of different shapes with the time-domain simulator: cuts about the "
+      "Compares charts of tools with edges of different shapes with the time-domain simulator: cuts about "
+      "the "
       "limit, at random speeds. Exit code 0: each kind reaches --least, else 3."};
   request.addTo(line);
   line.option("--points", request.points, "cuts of each kind (60)").within(1, 100000);

@@ -15,8 +15,8 @@ namespace smartmill::sim {
 
 /// Forces of edge layers, added to the force of the whole edge: each layer is a cutter of its own down to the
 /// layer's depth, whose force is multiplied by the layer's weight. An edge that varies over its height is
-/// thus a sum of uniform ones: full depth minus a lower layer is the upper layer. The cutters of the layers are
-/// straight mills.
+/// thus a sum of uniform ones: full depth minus a lower layer is the upper layer. The cutters of the layers
+/// are straight mills.
 class EdgeLayers {
  public:
   EdgeLayers() = default;

@@ -54,17 +54,17 @@ struct RegenerativeSystem {
   std::vector<double> pitch;  ///< [rad] tooth k to tooth k + 1, sum 2 pi; empty: even
   double helix = 0.0;         ///< [rad] 0 <= helix < 80 deg; requires the diameter
   double diameter = 0.0;      ///< [m] of the tool (milling) or of the workpiece (turning)
-  /// Shape of the edges (milling). Inclined ones press along the tool too, where it is rigid: at an inclination
-  /// kappa the force across the tool is that of kt and kr sin(kappa) - ka cos(kappa) for a metre of height
-  /// (EdgeSlice). With a helix angle of each tooth the delays change with height (Sims, Mann, Huyanan 2008;
-  /// Sellmeier and Denkena 2011). A serrated edge requires a chip geometry. Supported by the Floquet solvers
-  /// and multi_frequency; zero_order excludes a helix angle of each tooth.
+  /// Shape of the edges (milling). Inclined ones press along the tool too, where it is rigid: at an
+  /// inclination kappa the force across the tool is that of kt and kr sin(kappa) - ka cos(kappa) for a metre
+  /// of height (EdgeSlice). With a helix angle of each tooth the delays change with height (Sims, Mann,
+  /// Huyanan 2008; Sellmeier and Denkena 2011). A serrated edge requires a chip geometry. Supported by the
+  /// Floquet solvers and multi_frequency; zero_order excludes a helix angle of each tooth.
   EdgeShape edge;
-  double entry = 0.0;         ///< [rad] milling: entry angle; turning: constant angle of the edge
-  double exit = units::PI;    ///< [rad] > entry; unused in turning
-  double kt = 0.0;            ///< [N/m2] tangential
-  double kr = 0.0;            ///< [N/m2] radial, in the frame of the edge
-  double ka = 0.0;            ///< [N/m2] axial; read where the edge is inclined
+  double entry = 0.0;       ///< [rad] milling: entry angle; turning: constant angle of the edge
+  double exit = units::PI;  ///< [rad] > entry; unused in turning
+  double kt = 0.0;          ///< [N/m2] tangential
+  double kr = 0.0;          ///< [N/m2] radial, in the frame of the edge
+  double ka = 0.0;          ///< [N/m2] axial; read where the edge is inclined
   /// [N/m2] Tangential and radial coefficient at an immersion angle, for a nonlinear force law linearised at
   /// the chip thickness of that angle. Empty: kt and kr; otherwise kt and kr only set the scale. Supported by
   /// the Floquet solvers, without a chip geometry, for straight edges.
@@ -88,7 +88,7 @@ struct RegenerativeSystem {
   bool hasProcessDamping() const { return damping_radial > 0.0 || damping_tangential > 0.0; }
   /// @throws Error naming the quantity and its value.
   void validate() const;
-  bool evenPitch() const;  ///< at all heights
+  bool evenPitch() const;           ///< at all heights
   double pitchOf(int tooth) const;  ///< [rad] at the tip
   ToolGeometry tool() const;        ///< of a milling system
   /// Whether the feedback for a metre of depth changes with the depth.

@@ -138,9 +138,8 @@ std::vector<double> radiiOf(const EdgeSlice& slice, const ToolGeometry& tool,
 double serrationAt(const ToolGeometry& tool, int tooth, double height) {
   const EdgeShape& edge = tool.edge;
   if (!edge.serrated()) return 0.0;
-  return edge.serration_amplitude *
-         std::sin(units::TWO_PI *
-                  (height / edge.serration_wavelength + static_cast<double>(tooth) / tool.teeth));
+  return edge.serration_amplitude * std::sin(units::TWO_PI * (height / edge.serration_wavelength +
+                                                              static_cast<double>(tooth) / tool.teeth));
 }
 
 CuttingLaw lawOf(const EdgeSlice& slice, const CuttingLaw& law) {

@@ -90,7 +90,8 @@ void validate(const EdgeShape& edge, const ToolGeometry& tool) {
   if (!edge.helix.empty() && edge.helix.size() != static_cast<std::size_t>(tool.teeth))
     refuse("tool helix", static_cast<double>(edge.helix.size()), "values", "one per tooth");
   for (const double helix : edge.helix) {
-    if (!(helix >= 0.0 && helix < units::radFromDeg(80.0))) refuse("tool helix", helix, "rad", "0 <= helix < 80 deg");
+    if (!(helix >= 0.0 && helix < units::radFromDeg(80.0)))
+      refuse("tool helix", helix, "rad", "0 <= helix < 80 deg");
   }
   if (!(edge.serration_amplitude >= 0.0) || !std::isfinite(edge.serration_amplitude))
     refuse("tool serration amplitude", edge.serration_amplitude / units::MM, "mm", ">= 0");
@@ -119,9 +120,10 @@ namespace {
 template <class Visit>
 void forEachSlice(const ToolGeometry& tool, const Engagement& engagement, Visit&& visit) {
   if (tool.edge.serrated())
-    throw Error(formatted("tool: serration: amplitude_mm: %g, expected a smooth edge (needed to compute the "
-                          "force of a chip in proportion to the feed)",
-                          tool.edge.serration_amplitude / units::MM));
+    throw Error(
+        formatted("tool: serration: amplitude_mm: %g, expected a smooth edge (needed to compute the "
+                  "force of a chip in proportion to the feed)",
+                  tool.edge.serration_amplitude / units::MM));
   for (const EdgeSlice& whole : edgeSlices(tool, engagement.axial_depth)) {
     const double top = std::min(whole.high, engagement.axial_depth);
     if (top <= whole.low) break;
@@ -149,10 +151,11 @@ MechanisticForce::MechanisticForce(const ToolGeometry& tool, const CuttingCoeffi
   if (tool.edge.straight()) return;
   CuttingLaw law;
   law.coefficients = coefficients;
-  forEachSlice(tool, engagement, [&](const EdgeSlice& slice, const ToolGeometry& mill, const Engagement& part) {
-    slices_.emplace_back(mill, lawOf(slice, law).coefficients, part);
-    turn_.push_back(slice.turn);
-  });
+  forEachSlice(tool, engagement,
+               [&](const EdgeSlice& slice, const ToolGeometry& mill, const Engagement& part) {
+                 slices_.emplace_back(mill, lawOf(slice, law).coefficients, part);
+                 turn_.push_back(slice.turn);
+               });
 }
 
 CuttingForce MechanisticForce::at(double spindle_angle) const {
@@ -210,16 +213,17 @@ std::array<std::array<double, 6>, 4> slicedForceMatrix(const ToolGeometry& tool,
       &CuttingCoefficients::ktc, &CuttingCoefficients::krc, &CuttingCoefficients::kac,
       &CuttingCoefficients::kte, &CuttingCoefficients::kre, &CuttingCoefficients::kae};
   std::array<std::array<double, 6>, 4> sum{};
-  forEachSlice(tool, engagement, [&](const EdgeSlice& slice, const ToolGeometry& mill, const Engagement& part) {
-    const auto local = meanForceMatrix(mill, part);
-    for (std::size_t c = 0; c < 6; ++c) {
-      CuttingLaw unit;
-      unit.coefficients.*ALL[c] = 1.0;
-      const CuttingCoefficients rotated = lawOf(slice, unit).coefficients;
-      for (std::size_t r = 0; r < 4; ++r)
-        for (std::size_t k = 0; k < 6; ++k) sum[r][c] += local[r][k] * rotated.*ALL[k];
-    }
-  });
+  forEachSlice(tool, engagement,
+               [&](const EdgeSlice& slice, const ToolGeometry& mill, const Engagement& part) {
+                 const auto local = meanForceMatrix(mill, part);
+                 for (std::size_t c = 0; c < 6; ++c) {
+                   CuttingLaw unit;
+                   unit.coefficients.*ALL[c] = 1.0;
+                   const CuttingCoefficients rotated = lawOf(slice, unit).coefficients;
+                   for (std::size_t r = 0; r < 4; ++r)
+                     for (std::size_t k = 0; k < 6; ++k) sum[r][c] += local[r][k] * rotated.*ALL[k];
+                 }
+               });
   return sum;
 }
 

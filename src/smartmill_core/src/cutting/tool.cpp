@@ -33,9 +33,10 @@ double ToolGeometry::pitchAt(int k, double height) const {
   const int ahead = (k + 1) % teeth;
   const double here = pitchOf(k) - (lagOf(ahead) - lagOf(k)) * height;
   if (here > 0.0) return here;
-  throw Error(formatted("tool: helix_deg: the edges of teeth %d and %d meet %.3g mm above the tip, expected "
-                        "them apart over the axial depth",
-                        k + 1, ahead + 1, pitchOf(k) / (lagOf(ahead) - lagOf(k)) / units::MM));
+  throw Error(
+      formatted("tool: helix_deg: the edges of teeth %d and %d meet %.3g mm above the tip, expected "
+                "them apart over the axial depth",
+                k + 1, ahead + 1, pitchOf(k) / (lagOf(ahead) - lagOf(k)) / units::MM));
 }
 
 void ToolGeometry::setHelix(const std::vector<double>& of_each_tooth) {

@@ -132,7 +132,8 @@ TEST(Corner, thePitchOfAVariableHelixChangesWithHeight) {
     ASSERT_EQ(mill.pitch.size(), 2u);
     EXPECT_NEAR(mill.pitch[0], PI - change * slice.middle(), 1e-12);
     // In its middle tooth 1 of the slice's mill is where the edge is.
-    EXPECT_NEAR(slice.turn + mill.lag() * (slice.middle() - slice.low), tool.lagOf(0) * slice.middle(), 1e-12);
+    EXPECT_NEAR(slice.turn + mill.lag() * (slice.middle() - slice.low), tool.lagOf(0) * slice.middle(),
+                1e-12);
     EXPECT_TRUE(mill.edge.straight());
   }
   EXPECT_THROW(tool.pitchAt(0, PI / change * 1.01), Error);

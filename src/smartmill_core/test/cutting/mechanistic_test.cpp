@@ -193,8 +193,8 @@ TEST(MechanisticForce, errorsNameTheInvalidQuantity) {
   EXPECT_NE(messageOf(tool(2, 0.02, 30.0), slot, k).find("Kre"), std::string::npos);
 }
 
-/// The force of a general end mill (Engin & Altintas 2001) summed over elements of its edges: lag, inclination
-/// and local radius at each height from the definition of the shape.
+/// The force of a general end mill (Engin & Altintas 2001) summed over elements of its edges: lag,
+/// inclination and local radius at each height from the definition of the shape.
 CuttingForce generalMill(const ToolGeometry& t, const CuttingCoefficients& k, const Engagement& e,
                          double angle) {
   const double r = t.edge.corner_radius, lean = t.edge.edge_angle, top = r * (1.0 - std::cos(lean));
@@ -213,7 +213,8 @@ CuttingForce generalMill(const ToolGeometry& t, const CuttingCoefficients& k, co
       const double kappa = z < top ? std::acos(1.0 - z / r) : lean;
       const double radius = z < top ? t.radius() - r * std::tan(0.5 * lean) + r * std::sin(kappa)
                                     : t.radius() + z / std::tan(lean);
-      const double phi = std::fmod(angle + position - z * std::tan(helix) / t.radius() + 8.0 * TWO_PI, TWO_PI);
+      const double phi =
+          std::fmod(angle + position - z * std::tan(helix) / t.radius() + 8.0 * TWO_PI, TWO_PI);
       const double pitch = pitch_at_tip - z * (std::tan(next) - std::tan(helix)) / t.radius();
       const double h = e.feed_per_tooth * t.teeth * pitch / TWO_PI * std::sin(phi) * std::sin(kappa);
       if (phi < e.entry || phi >= e.exit || h <= 0.0) continue;
@@ -239,11 +240,11 @@ struct ShapedCase {
 
 TEST(MechanisticForce, edgesOfOtherShapesAreTheSumOfTheirElements) {
   const Engagement cut{0.3, 2.4, 4e-3, 1e-4};
-  for (const ShapedCase& shape : {ShapedCase{"bull nose", 2.0, 90.0, {}}, ShapedCase{"ball", 10.0, 90.0, {}},
-                                  ShapedCase{"face mill", 0.0, 45.0, {}},
-                                  ShapedCase{"rounded face mill", 1.5, 60.0, {}},
-                                  ShapedCase{"variable helix", 0.0, 90.0, {30.0, 38.0, 34.0}},
-                                  ShapedCase{"bull nose of variable helix", 2.0, 90.0, {30.0, 38.0, 34.0}}}) {
+  for (const ShapedCase& shape :
+       {ShapedCase{"bull nose", 2.0, 90.0, {}}, ShapedCase{"ball", 10.0, 90.0, {}},
+        ShapedCase{"face mill", 0.0, 45.0, {}}, ShapedCase{"rounded face mill", 1.5, 60.0, {}},
+        ShapedCase{"variable helix", 0.0, 90.0, {30.0, 38.0, 34.0}},
+        ShapedCase{"bull nose of variable helix", 2.0, 90.0, {30.0, 38.0, 34.0}}}) {
     ToolGeometry t = tool(3, 0.02, 30.0);
     t.edge.corner_radius = 1e-3 * shape.corner_mm;
     if (shape.edge_deg < 90.0) t.edge.edge_angle = radFromDeg(shape.edge_deg);
@@ -280,11 +281,11 @@ TEST(MechanisticForce, meanForceOfABallEndHasAClosedForm) {
   ball.edge.corner_radius = r;
   const auto m = meanForceMatrix(ball, {0.0, PI, r, c});
   const double teeth = 2.0 / TWO_PI;
-  EXPECT_NEAR(m[1][0], teeth * 0.5 * PI * c * r, 1e-12);               // fy of Ktc: sin^2
-  EXPECT_NEAR(m[0][1], -teeth * 0.5 * PI * c * r * PI / 4.0, 1e-12);   // fx of Krc: mean of sin(kappa)
-  EXPECT_NEAR(m[0][2], teeth * 0.5 * PI * c * r / 2.0, 1e-12);         // fx of Kac: mean of cos(kappa)
-  EXPECT_NEAR(m[2][1], teeth * 2.0 * c * r / 2.0, 1e-12);              // fz of Krc
-  EXPECT_NEAR(m[1][3], teeth * 2.0 * r * PI / 2.0, 1e-9);              // fy of Kte: length of the edge
+  EXPECT_NEAR(m[1][0], teeth * 0.5 * PI * c * r, 1e-12);              // fy of Ktc: sin^2
+  EXPECT_NEAR(m[0][1], -teeth * 0.5 * PI * c * r * PI / 4.0, 1e-12);  // fx of Krc: mean of sin(kappa)
+  EXPECT_NEAR(m[0][2], teeth * 0.5 * PI * c * r / 2.0, 1e-12);        // fx of Kac: mean of cos(kappa)
+  EXPECT_NEAR(m[2][1], teeth * 2.0 * c * r / 2.0, 1e-12);             // fz of Krc
+  EXPECT_NEAR(m[1][3], teeth * 2.0 * r * PI / 2.0, 1e-9);             // fy of Kte: length of the edge
 }
 
 TEST(MechanisticForce, refusesASerratedEdge) {

@@ -28,9 +28,9 @@ struct EdgeShape {
 
 /// Mill: teeth about an axis and the shape of their edges.
 struct ToolGeometry {
-  int teeth = 0;              ///< 1..20
-  double diameter = 0.0;      ///< [m] above the corner; with an edge angle where the extended edge meets the tip
-  double helix = 0.0;         ///< [rad] 0 <= helix < 80 deg; with one for each tooth: of the mean lag
+  int teeth = 0;          ///< 1..20
+  double diameter = 0.0;  ///< [m] above the corner; with an edge angle where the extended edge meets the tip
+  double helix = 0.0;     ///< [rad] 0 <= helix < 80 deg; with one for each tooth: of the mean lag
   std::vector<double> pitch;  ///< [rad] tooth k to tooth k+1 at the tip, sums to 2 pi; empty: even
   EdgeShape edge = {};
 
