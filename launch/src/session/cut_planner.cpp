@@ -68,11 +68,11 @@ CutPlanner::CutPlanner(const MachineModel& model, const PathParameters& paramete
       spindle_(model.needSpindle("plan the cuts")),
       axes_(model.needAxes("plan the cuts")),
       stock_(model.needWorkpiece("plan the cuts")) {
-  // The topics state the teeth and the mean helix of a tool only.
-  ToolGeometry of_topics = tool_;
-  of_topics.edge.helix.clear();
+  // The force law that a session identifies is that of vertical edges with one helix.
+  ToolGeometry of_law = tool_;
+  of_law.edge.helix.clear();
   try {
-    requireStraightEdge(of_topics, "to identify its coefficients in a session");
+    requireStraightEdge(of_law, "to identify its coefficients in a session");
   } catch (const Error& error) {
     throw Error(file_ + ": " + error.what());
   }

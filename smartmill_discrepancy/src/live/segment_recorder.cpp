@@ -162,7 +162,9 @@ CampaignTest SegmentRecorder::testOf(double begin, double speed) const {
   if (test.kind == TestKind::cut) {
     test.engagement = condition_->engagement;
     test.feed_direction = headingOf(*condition_);
-    test.cut_time_before = cut_time_ + *test.running_before;
+    test.cut_time_before = std::isnan(condition_->cut_time_before)
+                               ? cut_time_ + *test.running_before
+                               : condition_->cut_time_before + begin - condition_->stamp;
   }
   return test;
 }

@@ -26,6 +26,7 @@ struct Machine {
   double stops = 1e300;                        // [s] the controller's position leaves the path from here on
   double acceleration = 0.0;                   // [rad/s2] of the spindle
   std::array<double, 3> way{{1.0, 0.0, 0.0}};  // direction of the feed
+  double cut_time_before = NOT_A_NUMBER;       // [s]
 };
 
 /// A second of straight cutting through the recorder; fx counts samples.
@@ -42,6 +43,7 @@ std::vector<RecordSegment> run(const Machine& machine, double length = 0.3) {
   condition.name = "slot";
   condition.tool.teeth = 4;
   condition.spindle_speed = SPEED;
+  condition.cut_time_before = machine.cut_time_before;
   condition.engagement.feed_per_tooth = 1e-4;
   condition.engagement.axial_depth = 1e-3;
   for (std::size_t a = 0; a < 3; ++a) condition.steady_to[a] = 0.1 * machine.way[a];
@@ -146,6 +148,15 @@ TEST(SegmentRecorder, StatesTheTimeBefore) {
     ASSERT_GE(load.size(), 28U);
     for (const LoadMeasurement& r : load) EXPECT_NEAR(r.load, begin + r.time - 0.004, 1e-6);
   }
+}
+
+TEST(SegmentRecorder, CountsTheTimeInTheWorkFromThatOfTheCondition) {
+  Machine machine;
+  machine.cut_time_before = 40.0;
+  const std::vector<RecordSegment> segments = run(machine);
+  ASSERT_EQ(segments.size(), 3U);
+  for (std::size_t k = 0; k < 3; ++k)
+    EXPECT_NEAR(*segments[k].test.cut_time_before, 40.0 + 0.3 * static_cast<double>(k), 1e-6);
 }
 
 // The controller's state may be late: samples of an ended cut can precede it.

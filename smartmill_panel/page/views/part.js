@@ -22,6 +22,7 @@ export class Part {
     this.whole = make('button', { title: 'Show all (double-click)', onclick: () => this.showAll() }, 'Show all');
     this.scale = make('span', { class: 'dim', id: 'part-scale' });
     this.canvas = make('canvas', { id: 'part-path', role: 'img', 'aria-label': 'tool path from above', style: 'width: 100%; height: 100%; cursor: grab' });
+    this.drawing = document.createElement('canvas');  // the path without the tool, which moves more often
     this.frame = make('div', { class: 'plot' }, this.canvas);
     this.empty = make('div', { class: 'empty' }, 'No program is followed: machine.launch program:=FILE');
     this.frame.append(this.empty, exportsOf(this));
@@ -151,9 +152,8 @@ export class Part {
     const width = this.frame.clientWidth, height = this.frame.clientHeight;
     if (!this.path?.line.length || !width || !height) return;
     this.shown ??= this.wholeView();
-    const ratio = devicePixelRatio || 1, c = this.canvas.getContext('2d');
-    this.canvas.width = width * ratio;
-    this.canvas.height = height * ratio;
+    const ratio = devicePixelRatio || 1, c = this.drawing.getContext('2d');
+    for (const canvas of [this.drawing, this.canvas]) Object.assign(canvas, { width: width * ratio, height: height * ratio });
     c.scale(ratio, ratio);
     const [low, high] = this.limits(), quantity = QUANTITIES[this.choice.value];
     this.scale.textContent = `${quantity.name} ${digits(low)} to ${digits(high)} ${quantity.unit}, grey: ${this.choice.value === 'measured' || this.choice.value === 'ratio' ? 'not cut yet' : 'not predicted'}`;
@@ -173,11 +173,17 @@ export class Part {
       const value = this.value(k);
       line(k, Number.isFinite(value) ? toColour((value - low) / (high - low)) : unknown, Number.isFinite(value) ? 4 : 2);
     }
-    this.drawTool(c);
+    this.drawTool();
     this.canvas.dataset.drawn = 'yes';
   }
 
-  drawTool(c) {
+  drawTool() {
+    if (!this.shown || !this.drawing.width) return;
+    const ratio = devicePixelRatio || 1, c = this.canvas.getContext('2d');
+    c.setTransform(1, 0, 0, 1, 0, 0);
+    c.clearRect(0, 0, this.canvas.width, this.canvas.height);
+    c.drawImage(this.drawing, 0, 0);
+    c.scale(ratio, ratio);
     const state = this.link.message('cnc/state');
     const axis = name => state?.axes.findIndex(a => a.toUpperCase() === name) ?? -1;
     const x = axis('X'), y = axis('Y');
@@ -221,9 +227,9 @@ export class Part {
     const state = this.link.message('cnc/state'), at = JSON.stringify(state?.position);
     if (!this.path || (at === this.drawn_at && !this.changed)) return;
     this.drawn_at = at;
-    this.draw();
-    if (!this.changed) return;
+    if (!this.changed) return this.drawTool();
     this.changed = false;
+    this.draw();
     this.card.aside.textContent = this.compensated ? '' : 'force not compensated: dynamics of the sensor are not known';
     this.drawLines();
   }

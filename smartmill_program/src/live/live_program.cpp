@@ -185,10 +185,13 @@ void refuseRapidHits(const std::string& name, const std::vector<BlockSummary>& b
 
 }  // namespace
 
-bool LiveProgram::cutsBetween(double from, double to) const {
-  const auto next = std::find_if(contact.begin(), contact.end(),
-                                 [from](const Interval& interval) { return interval.to > from; });
-  return next != contact.end() && next->from < to;
+double LiveProgram::contactBetween(double from, double to) const {
+  auto next = std::upper_bound(contact.begin(), contact.end(), from,
+                               [](double place, const Interval& interval) { return place < interval.to; });
+  double length = 0.0;
+  for (; next != contact.end() && next->from < to; ++next)
+    length += std::min(to, next->to) - std::max(from, next->from);
+  return length;
 }
 
 LiveProgram prepareProgram(const std::string& name, std::vector<Move> moves, ToolModels& tools, Stock& stock,

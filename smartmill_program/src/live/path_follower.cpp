@@ -80,6 +80,7 @@ void PathFollower::restart() {
   stopped_ = true;
   furthest_ = -1.0;
   cut_until_ = 0.0;
+  cut_time_.clear();
   status_ = {};
 }
 
@@ -118,6 +119,7 @@ void PathFollower::track(const CncState& state, const Point& tip) {
   }
   keepInBlock(state.sequence);
   const Hypothesis* at = unique();
+  if (at && followed_) addCutTime(status_.place, *at, time);
   if (at && !followed_) arrive(*at);
   followed_ = at != nullptr;
   if (!hypotheses_.empty()) {
@@ -131,6 +133,14 @@ void PathFollower::track(const CncState& state, const Point& tip) {
   status_.line = program_->path.moves()[at->move].line;
   status_.deviation = at->deviation;
   status_.largest_deviation = std::max(status_.largest_deviation, at->deviation);
+}
+
+/// Where the part was cut before there is no contact. @param from [m] place at the last state @param time [s]
+/// since then
+void PathFollower::addCutTime(double from, const Hypothesis& at, double time) {
+  if (!(at.place > from)) return;
+  const double contact = program_->contactBetween(std::max(from, cut_until_), at.place);
+  cut_time_[program_->path.moves()[at.move].tool] += time * contact / (at.place - from);
 }
 
 /// The tool has moved at least its displacement along the path. @param most [m] way by its feed
@@ -292,6 +302,7 @@ CuttingCondition PathFollower::begin(std::size_t index, double stamp) {
   condition.material = names_.material;
   condition.tool_name = names_.tool + (several_tools_ ? formatted(" T%d", stretch.tool) : "");
   condition.tool = stretch.geometry;
+  condition.cut_time_before = cut_time_[stretch.tool];
   condition.spindle_speed = active.speed;
   if (!stretch.cut) return condition;
   condition.engagement = stretch.engagement;

@@ -15,6 +15,7 @@ constexpr double KTC_MODEL = 0.05;
 constexpr double LEAST_GAIN = 1.05;  // [1] removal of the next cut over the recommended one
 
 MachinePrior priorOf(const ChartCut& cut, const ProbingRequest& request) {
+  requireStraightEdge(cut.tool, "to choose probing cuts");
   RegenerativeSystem system;
   system.teeth = cut.tool.teeth;
   system.pitch = cut.tool.pitch;

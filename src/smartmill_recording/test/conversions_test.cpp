@@ -169,6 +169,9 @@ TEST(Conversions, CuttingCondition) {
   c.tool.teeth = 4;
   c.tool.diameter = 12e-3;
   c.tool.helix = 0.5;
+  c.tool.edge.corner_radius = 1e-3;
+  c.tool.edge.edge_angle = 1.2;
+  c.cut_time_before = 240.0;
   c.engagement = {0.1, 3.0, 2e-3, 0.05e-3};
   c.spindle_speed = 900.0;
   c.steady_from = {1.0, 2.0, 3.0};
@@ -182,6 +185,9 @@ TEST(Conversions, CuttingCondition) {
   EXPECT_EQ(again.tool.teeth, 4);
   EXPECT_EQ(again.tool.diameter, 12e-3);
   EXPECT_EQ(again.tool.helix, 0.5);
+  EXPECT_EQ(again.tool.edge.corner_radius, 1e-3);
+  EXPECT_EQ(again.tool.edge.edge_angle, 1.2);
+  EXPECT_EQ(again.cut_time_before, 240.0);
   EXPECT_EQ(again.engagement.entry, 0.1);
   EXPECT_EQ(again.engagement.exit, 3.0);
   EXPECT_EQ(again.engagement.axial_depth, 2e-3);

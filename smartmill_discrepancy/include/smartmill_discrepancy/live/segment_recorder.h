@@ -23,8 +23,8 @@ struct LoadMeasurement {
 /// Record segment of steady cutting or air cutting, as a test of a campaign.
 struct RecordSegment {
   double stamp = 0.0;  ///< [s] of its end
-  /// In cut throughout: running_before is stated. start_time counts from the first input, cut_time_before is
-  /// the steady cutting time since then.
+  /// In cut throughout: running_before is stated. start_time counts from the first input. cut_time_before
+  /// is that of the condition; without it the steady cutting time since the first input.
   CampaignTest test;
   Record record;  ///< time, spindle_angle, fx, fy, fz
   std::vector<LoadMeasurement> load;

@@ -63,7 +63,9 @@ struct LiveProgram {
   std::vector<PathPiece> pieces;         ///< in ascending order
 
   /// Whether material is removed between two places [m].
-  bool cutsBetween(double from, double to) const;
+  bool cutsBetween(double from, double to) const { return contactBetween(from, to) > 0.0; }
+  /// [m] Length of the path between two places [m] on which material is removed.
+  double contactBetween(double from, double to) const;
 };
 
 /// Runs a program through its stock. @param name of the program, for messages

@@ -81,6 +81,7 @@ class PathFollower {
   bool runs(const CncState& state) const;
   std::optional<Point> tipOf(const CncState& state) const;
   void track(const CncState& state, const Point& tip);
+  void addCutTime(double from, const Hypothesis& at, double time);
   void restart();
   void advance(const Point& tip, double most);
   void search(const Point& tip);
@@ -115,6 +116,7 @@ class PathFollower {
   std::optional<Active> active_;
   bool other_source_ = false;
   std::map<std::size_t, int> stated_;  // conditions by stretch
+  std::map<int, double> cut_time_;     // [s] in the work, by T
   Status status_;
 };
 

@@ -86,7 +86,8 @@ struct CuttingCondition {
   std::string name;
   std::string material;
   std::string tool_name;
-  ToolGeometry tool;  ///< even pitch
+  ToolGeometry tool;                      ///< even pitch, one helix angle
+  double cut_time_before = NOT_A_NUMBER;  ///< [s] time in the work of this tool before the stamp
   Engagement engagement;
   double spindle_speed = 0.0;                    ///< [rad/s] commanded
   std::array<double, 3> steady_from{{0, 0, 0}};  ///< [m] tool centre in the machine frame: from here ...

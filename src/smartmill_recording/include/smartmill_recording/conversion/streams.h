@@ -172,6 +172,9 @@ void read(const M& m, CuttingCondition& c) {
   c.tool.teeth = static_cast<int>(m.teeth);
   c.tool.diameter = m.diameter;
   c.tool.helix = m.helix;
+  c.tool.edge.corner_radius = m.corner_radius;
+  c.tool.edge.edge_angle = m.edge_angle == 0.0 ? 0.5 * units::PI : m.edge_angle;
+  c.cut_time_before = m.cut_time_before;
   c.engagement = {m.entry_angle, m.exit_angle, m.axial_depth, m.feed_per_tooth};
   c.spindle_speed = m.spindle_speed;
   c.steady_from = fromPoint(m.steady_from);
@@ -188,6 +191,9 @@ void write(const CuttingCondition& c, M& m) {
   m.teeth = static_cast<std::uint32_t>(c.tool.teeth);
   m.diameter = c.tool.diameter;
   m.helix = c.tool.helix;
+  m.corner_radius = c.tool.edge.corner_radius;
+  m.edge_angle = c.tool.edge.edge_angle;
+  m.cut_time_before = c.cut_time_before;
   m.spindle_speed = c.spindle_speed;
   m.feed_per_tooth = c.engagement.feed_per_tooth;
   m.axial_depth = c.engagement.axial_depth;
