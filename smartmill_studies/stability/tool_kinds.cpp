@@ -23,7 +23,7 @@ std::vector<double> radians(const std::vector<double>& deg) {
   return values;
 }
 
-RegenerativeSystem systemOf(const MachineModel& model, const ToolKind& kind, const ToolKindOptions& options) {
+RegenerativeSystem systemOfKind(const MachineModel& model, const ToolKind& kind, const ToolKindOptions& options) {
   RegenerativeSystem system = systemOf(model, options.entry_deg, options.exit_deg);
   if (kind.unlike_chips) {
     system.chip.emplace();
@@ -71,7 +71,7 @@ std::vector<CutAtLimit> cutsAtLimit(const MachineModel& model, const ToolKind& k
     throw Error("tool kinds: expected points, 100 revolutions or more and a reach of 0..50 %");
   MachineModel machine = model;
   machine.tool = kind.tool;
-  const RegenerativeSystem system = systemOf(machine, kind, options);
+  const RegenerativeSystem system = systemOfKind(machine, kind, options);
   SolverOptions accuracy;
   if (kind.unlike_chips) accuracy = SolverOptions::ofManyPoints();
   const auto solver = makeFloquetSolver(Method::collocation, system, accuracy);

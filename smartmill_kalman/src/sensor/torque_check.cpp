@@ -27,9 +27,11 @@ constexpr double REPEAT = 5.0;  // [s] between lines about a disagreement that l
 // Krc / Ktc of metals with edge forces is 0.1 to 0.8.
 constexpr double LEAST_RADIAL = -0.2, LARGEST_RADIAL = 1.5;
 
-bool isMilling(const CuttingCondition& condition) {
-  return condition.tool.teeth > 0 && (condition.steady_to[0] != condition.steady_from[0] ||
-                                      condition.steady_to[1] != condition.steady_from[1]);
+// An inclined edge has a shorter lever and a radial force that is partly axial.
+bool isMilledSideways(const CuttingCondition& condition) {
+  return condition.tool.teeth > 0 && !condition.tool.edge.inclined() &&
+         (condition.steady_to[0] != condition.steady_from[0] ||
+          condition.steady_to[1] != condition.steady_from[1]);
 }
 
 }  // namespace
@@ -99,7 +101,7 @@ double TorqueCheck::idleTorque() const {
 }
 
 void TorqueCheck::handle(const ForceBlock& measured, const std::array<double, 3>& zero) {
-  if (!rotation_ || !isSteadyAt(measured.stamp) || !isMilling(*condition_)) {
+  if (!rotation_ || !isSteadyAt(measured.stamp) || !isMilledSideways(*condition_)) {
     window_ = {};
     return;
   }
