@@ -170,7 +170,7 @@ TEST(PathFollower, EachCutStatesTheTimeThatTheToolWasInTheWork) {
     if (condition.name == "part.nc line 8") expected.push_back((60.0 + reach + reach + x) / feed);
   }
   ASSERT_EQ(stated.size(), expected.size() + 2);  // the slot before and after the change of the feed
-  // Of the slot the feed changed in its middle: what is left is the same in both steps.
+  // Of the slot the feed changed in its middle: its time is the same in both steps.
   const double slot = stated[2] - expected[0];
   EXPECT_NEAR(stated[3] - expected[1], slot, 0.1);
   EXPECT_GT(slot, 65.0 / 10.0);
