@@ -162,19 +162,23 @@ class Study:
     def find_begins(self):
         """Stamps of the first message of each stream, and of the beginning of the fault."""
         import rosbag
-        firsts, cuts, hits = {}, [], []
+        firsts, cuts, hits, condition = {}, [], [], None
         with rosbag.Bag(str(self.bag)) as file:
-            for topic, message, _ in file.read_messages(topics=["/smartmill/" + t for t in (DYNAMOMETER, ANGLE, HAMMER, "cut/condition")]):
+            for topic, message, _ in file.read_messages(topics=["/smartmill/" + t for t in (DYNAMOMETER, ANGLE, HAMMER, "cut/condition", "cnc/state")]):
                 name, stamp = topic.replace("/smartmill/", ""), message.header.stamp.to_sec()
                 if name == "cut/condition":
-                    if message.kind == message.CUT:
+                    condition = message if message.kind == message.CUT else None
+                    continue
+                if name == "cnc/state":  # slots are along x
+                    if condition and condition.steady_from.x < message.position[0] < condition.steady_to.x:
                         cuts.append(stamp)
+                        condition = None
                     continue
                 firsts.setdefault(name, stamp)
                 if name == HAMMER and max(message.samples[message.channels.index("hammer")::len(message.channels)]) > 50.0:
                     hits.append(stamp)
-        # In the second slot, once force and chatter state are steady; the hammer's before the second hit.
-        begins = {DYNAMOMETER: cuts[1] + 1.5, ANGLE: cuts[1] + 1.5, HAMMER: hits[0] + 0.2}
+        # In the steady part of the second slot, after its first verdict on chatter; the hammer's before the second hit.
+        begins = {DYNAMOMETER: cuts[1] + 0.6, ANGLE: cuts[1] + 0.6, HAMMER: hits[0] + 0.2}
         return {topic: (firsts[topic], begin) for topic, begin in begins.items()}
 
     def replay(self, name, faults):
