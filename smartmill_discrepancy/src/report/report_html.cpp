@@ -13,6 +13,7 @@
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/io/report_page.h"
 #include "smartmill_core/model/effect_catalogue.h"
+#include "smartmill_core/signal/force_channels.h"
 #include "smartmill_core/units.h"
 #include "smartmill_discrepancy/report/shop_quantity.h"
 #include "smartmill_discrepancy/report/shop_text.h"
@@ -27,6 +28,10 @@ constexpr double ONLY_NOISE = 1.01;
 
 std::string times(double difference) {
   return formatted(difference < 10.0 ? "%.2f" : difference < 100.0 ? "%.1f" : "%.0f", difference);
+}
+
+std::string counted(std::size_t count, const char* one, const char* several) {
+  return std::to_string(count) + " " + (count == 1 ? one : several);
 }
 
 std::string percentText(double share) {
@@ -85,7 +90,7 @@ void head(std::ostream& out, const Explanation& e) {
   facts.push_back(formatted("%zu tests, %zu of them held out", e.tests.size(), heldoutTests(e)));
   out << "<p class=\"dim\">" << joined(facts, " &middot; ") << "</p>\n<p class=\"verdict\">" << verdictText(e)
       << "</p>\n";
-  if (!e.sentence.empty()) out << "<p><b>" << escapedHtml(e.sentence) << "</b></p>\n";
+  if (e.verdict == Verdict::recalibrated) out << "<p>" << escapedHtml(e.sentence) << "</p>\n";
 }
 
 // ---- causes
@@ -100,6 +105,23 @@ std::string sureText(const Explanation& e, const FoundEffect& f) {
   return text + ".";
 }
 
+// Of the causes that were compared in the round of an effect the one that explains most in its place.
+std::string nearestText(const Explanation& e, const FoundEffect& f) {
+  const CandidateResult *own = nullptr, *nearest = nullptr;
+  for (const CandidateResult& t : e.candidates) {
+    if (t.effect == f.name && t.accepted) own = &t;
+  }
+  for (const CandidateResult& t : e.candidates) {
+    if (own && t.round == own->round && t.effect != f.name && !t.accepted && t.delta_bic > 0.0 &&
+        (!nearest || t.delta_bic > nearest->delta_bic))
+      nearest = &t;
+  }
+  if (!nearest) return "None of the other causes that were checked explains it. ";
+  return "Nearest of the others that were checked: " + namedCause(nearest->effect) +
+         formatted(", which explains %.2g %% of what this cause explains. ",
+                   100.0 * nearest->delta_bic / own->delta_bic);
+}
+
 std::string rivalsText(const Explanation& e, const FoundEffect& f, const ShopConditions& conditions) {
   std::string text;
   for (const Rival& r : f.alternatives) {
@@ -112,10 +134,26 @@ std::string rivalsText(const Explanation& e, const FoundEffect& f, const ShopCon
       text += " (held-out tests: difference " + times(r.heldout_gap) + " times the noise)";
     text += ".<br>";
   }
-  if (f.alternatives.empty()) text = "None of the other causes that were checked does the same. ";
+  if (f.alternatives.empty()) text = nearestText(e, f);
   return text + (e.not_tried.empty()
                      ? ""
-                     : formatted("%zu causes were not checked (appendix).", e.not_tried.size()));
+                     : counted(e.not_tried.size(), "cause was", "causes were") + " not checked (appendix).");
+}
+
+// The unit on the channel of an effect, of one that acts on forces or on the load meter: "N or V".
+std::string unitOn(const FoundEffect& f, const std::string& unit) {
+  const std::size_t between = unit.find(" or ");
+  if (between == std::string::npos) return unit;
+  const auto channel = f.words.find("channel");
+  const bool is_force = channel == f.words.end() || channel->second != "load_meter";
+  return is_force ? unit.substr(0, between) : unit.substr(between + 4);
+}
+
+void notNamed(std::ostream& out, const Explanation& e) {
+  for (const Resemblance& r : e.resembles)
+    out << "<p>Considered, but not accepted: " << namedCause(r.name)
+        << (r.variant.empty() ? "" : " (" + escapedHtml(r.variant) + ")") << ", " << escapedHtml(r.reason)
+        << ".</p>\n";
 }
 
 void causes(std::ostream& out, const Explanation& e) {
@@ -128,8 +166,10 @@ void causes(std::ostream& out, const Explanation& e) {
     out << "<tr><td>" << namedCause(f.name);
     for (const auto& [key, word] : f.words) out << "<br>" << key << ": " << escapedHtml(word);
     out << "<td>";
-    for (const ShopQuantity& q : shopQuantities(f.name, f.parameters, conditions))
+    for (ShopQuantity& q : shopQuantities(f.name, f.parameters, conditions)) {
+      q.unit = unitOn(f, q.unit);
       out << sizeText(q) << "<br>";
+    }
     out << "<td>" << sureText(e, f) << "<td>" << rivalsText(e, f, conditions) << "</tr>\n";
   }
   out << "</table>\n<p class=\"dim\">&plusmn; is the 95 % interval. Spindle angle 0: tooth 1 points to +y; "
@@ -155,14 +195,25 @@ void values(std::ostream& out, const char* title, const std::vector<Recalibrated
 
 // ---- actions
 
+std::string kindText(const CampaignTest& test) {
+  if (test.kind == TestKind::tap) return "tap " + test.direction;
+  if (!test.engagement) return test.kind == TestKind::air ? "air cut" : testKindName(test.kind);
+  constexpr double NEAR = 1e-6;
+  const bool from_zero = test.engagement->entry<NEAR, to_half_turn = test.engagement->exit> units::PI - NEAR;
+  return from_zero && to_half_turn ? "slot"
+         : from_zero               ? "up-milling"
+         : to_half_turn            ? "down-milling"
+                                   : "cut";
+}
+
 std::string cutText(const CampaignTest& test) {
-  const double rpm = units::rpmFromRadPerSec(test.spindle_speed);
-  if (!test.engagement) return formatted("an air cut at %.0f rpm", rpm);
+  const std::string text =
+      kindText(test) + formatted(", %.0f rpm", units::rpmFromRadPerSec(test.spindle_speed));
+  if (!test.engagement) return text;
   const Engagement& c = *test.engagement;
-  return formatted(
-      "a cut at %.0f rpm, feed %.3g mm per tooth, depth %.3g mm, immersion %.0f&deg; to %.0f&deg;", rpm,
-      c.feed_per_tooth / units::MM, c.axial_depth / units::MM, units::degFromRad(c.entry),
-      units::degFromRad(c.exit));
+  return text + formatted(", feed %.3g mm per tooth, depth %.3g mm, immersion %.0f&deg; to %.0f&deg;",
+                          c.feed_per_tooth / units::MM, c.axial_depth / units::MM, units::degFromRad(c.entry),
+                          units::degFromRad(c.exit));
 }
 
 std::string outcomeText(const TestOutcome& o) {
@@ -175,10 +226,29 @@ std::string outcomeText(const TestOutcome& o) {
            words.text(o.other_peak) + "</b>: " + causeTitle(o.second) + ". ";
   else
     text =
-        "The peaks of both causes are equal; the shape of the signal differs, so that only the search "
+        "Both causes give nearly the same peak; only the shape of the signals differs, so that the next "
+        "search "
         "decides. ";
   return text + (o.chatters ? "<b>The model predicts chatter in this cut: approach it with less depth.</b> "
                             : "The model predicts no chatter. ");
+}
+
+// What decides without a cut: the sizes that a shop measures, of a cause and its rival.
+std::string measuredInstead(const Explanation& e) {
+  const ShopConditions conditions = conditionsOf(e.tests);
+  std::vector<std::string> parts;
+  for (const FoundEffect& f : e.effects) {
+    for (const Rival& r : f.alternatives) {
+      if (!isRival(e, f.name, r.name)) continue;
+      for (const auto& [name, parameters] :
+           {std::pair(f.name, f.parameters), std::pair(r.name, r.parameters)}) {
+        const std::vector<ShopQuantity> sizes = shopQuantities(name, parameters, conditions);
+        if (!sizes.empty()) parts.push_back(causeTitle(name) + ": " + sizeText(sizes.front()));
+      }
+    }
+  }
+  return parts.empty() ? ""
+                       : "<p>Or measure at the machine. If it is " + joined(parts, "; if it is ") + ".</p>\n";
 }
 
 std::string command(const std::string& line) {
@@ -193,7 +263,7 @@ void nextTest(std::ostream& out, const Explanation& e, const std::string& campai
               const std::string& folder) {
   out << "<h2>Next test</h2>\n<p>";
   if (e.suggested_cut) {
-    out << "Make " << cutText(*e.suggested_cut);
+    out << "Make this test: <b>" << cutText(*e.suggested_cut) << "</b>";
     if (e.outcome) out << formatted("; %.2g s in the cut are enough", e.outcome->duration);
     out << ". ";
     if (e.outcome) out << outcomeText(*e.outcome);
@@ -201,16 +271,18 @@ void nextTest(std::ostream& out, const Explanation& e, const std::string& campai
   } else if (e.suggested_test) {
     out << "Make " << escapedHtml(*e.suggested_test) << ".</p>";
   } else if (!e.not_tried.empty()) {
-    out << "First complete the search (below); then the report states whether a test is needed.</p>";
-  } else if (e.unexplained.empty()) {
-    out << "No further test is needed: no difference beyond the noise remains, and no other cause that was "
-           "checked "
-           "does the same.</p>";
+    out << "First complete the search (see What to do now); then the report states whether a test is "
+           "needed.</p>";
+  } else if (e.unexplained.empty() || e.named_only) {
+    out << (e.named_only ? "No cut is known that shows the source of what has no name."
+                         : "No further test is needed: no difference beyond the noise remains, and no other "
+                           "cause that was checked does the same.")
+        << "</p>";
   } else {
     out << "No single cut decides what the remainder is. Its signal, place and dependence are listed "
            "below.</p>";
   }
-  out << "\n";
+  out << "\n" << measuredInstead(e);
 }
 
 void actions(std::ostream& out, const Explanation& e, const std::string& campaign,
@@ -238,10 +310,16 @@ void actions(std::ostream& out, const Explanation& e, const std::string& campaig
     const std::string whole = searchCommand(campaign, folder, true);
     steps.push_back("Complete the search, without a limit of its time:" + whole);
   }
+  if (!e.sentence.empty() && e.verdict != Verdict::recalibrated)
+    steps.push_back("Look at the machine for the source of what has no name: " + escapedHtml(e.sentence));
   if (e.verdict == Verdict::no_disagreement)
     steps.push_back("Nothing: use the supplied model.");
   else
-    steps.push_back("Until the cause is removed, use the corrected model:" +
+    steps.push_back((e.verdict == Verdict::recalibrated ? "Use the corrected model:"
+                     : e.effects.empty()
+                         ? "The cause is not known. Until it is, the corrected model predicts better than "
+                           "the supplied one:"
+                         : "Until the cause is removed, use the corrected model:") +
                     command("roslaunch smartmill_launch pipeline.launch model:=" + folder + "/model.yaml"));
   out << "<h2>What to do now</h2>\n<ol>";
   for (const std::string& step : steps) out << "<li>" << step << "</li>";
@@ -265,7 +343,8 @@ void difference(std::ostream& out, const Explanation& e) {
          "(RMS)<th>noise<th>fitted "
          "tests, supplied model<th>corrected model<th>held-out tests, supplied model<th>corrected "
          "model<th>corrected "
-         "model, of the variation in the cuts</tr>\n<tr><td><b>all signals, times the noise</b><td>1<td><b>"
+         "model, noise included, of the variation in the cuts</tr>\n<tr><td><b>all signals, times the "
+         "noise</b><td>1<td><b>"
       << times(e.before.fit) << "</b><td><b>" << times(e.after.fit) << "</b><td><b>"
       << times(e.before.heldout) << "</b><td><b>" << times(e.after.heldout) << "</b><td></tr>\n";
   for (const auto& [channel, noise] : e.noise) {
@@ -319,7 +398,9 @@ std::string placeText(const Finding& f, int teeth) {
     const double order = f.location.at("order");
     const bool at_teeth = teeth > 1 && std::abs(std::remainder(order, teeth)) < 1e-6;
     return formatted("%.4g times per revolution", order) +
-           (at_teeth ? formatted(" (%.0f times the tooth passing)", order / teeth) : "");
+           (!at_teeth        ? ""
+            : order == teeth ? " (the tooth passing)"
+                             : formatted(" (%.0f times the tooth passing)", order / teeth));
   }
   if (f.domain == "frequency")
     return formatted("at %.4g Hz, not locked to the spindle", f.location.at("frequency_hz"));
@@ -361,7 +442,7 @@ void remainder(std::ostream& out, const Explanation& e) {
   else
     out << "With the corrected model a difference of " << times(e.after.fit) << " times the noise remains. ";
   if (first)
-    out << (e.named_only ? "Without a name in the catalogue: " : "Its largest part: ")
+    out << (e.named_only ? "It contains the effect without a name, which was: " : "Its largest part: ")
         << findingText(*first, e.nominal.tool ? e.nominal.tool->teeth : 0) << ". ";
   if (!only_noise) {
     std::vector<std::string> shares;
@@ -396,22 +477,11 @@ void inspection(std::ostream& out, const InspectionCheck& check) {
 
 // ---- tests
 
-std::string kindText(const CampaignTest& test) {
-  if (test.kind == TestKind::tap) return "hammer tap " + test.direction;
-  if (!test.engagement) return test.kind == TestKind::air ? "air cut" : testKindName(test.kind);
-  constexpr double NEAR = 1e-6;
-  const bool from_zero = test.engagement->entry<NEAR, to_half_turn = test.engagement->exit> units::PI - NEAR;
-  return from_zero && to_half_turn ? "slot"
-         : from_zero               ? "up-milling"
-         : to_half_turn            ? "down-milling"
-                                   : "cut";
-}
-
 std::string worseText(const Explanation& e, const std::string& test) {
   std::string text;
   for (const TestGap& g : e.gaps) {
     if (g.test == test && gotWorse(g))
-      text += "<span class=\"bad\">worse: </span>" + channelWords(g.channel).title + " " + times(g.before) +
+      text += "<span class=\"bad\">worse</span> " + channelWords(g.channel).title + " " + times(g.before) +
               " &rarr; " + times(g.after) + "<br>";
   }
   return text;
@@ -419,7 +489,7 @@ std::string worseText(const Explanation& e, const std::string& test) {
 
 void tests(std::ostream& out, const Explanation& e) {
   out << "<h2>Tests</h2>\n<table><tr><th>test<th>kind<th>speed [rpm]<th>feed per tooth [mm]<th>depth "
-         "[mm]<th>immersion [&deg;]<th>held out<th>supplied model<th>corrected model<th>signals</tr>\n";
+         "[mm]<th>immersion [&deg;]<th>held out<th>supplied model<th>corrected model<th>worse signals</tr>\n";
   for (const ReportedTest& t : e.tests) {
     const auto of_test = [&](const TestGap& g) { return g.test == t.test.name; };
     out << "<tr><td>" << escapedHtml(t.test.name) << "<td>" << kindText(t.test) << "<td>"
@@ -431,7 +501,7 @@ void tests(std::ostream& out, const Explanation& e) {
     else
       out << "<td><td><td>";
     const double before = differenceOf(e.gaps, false, of_test), after = differenceOf(e.gaps, true, of_test);
-    out << "<td>" << (t.heldout ? "held out" : "");
+    out << "<td>" << (t.heldout ? "yes" : "");
     if (before > 0.0)
       out << "<td>" << times(before) << "<td>" << times(after) << "<td>" << worseText(e, t.test.name)
           << "</tr>\n";
@@ -555,26 +625,63 @@ std::vector<PagePlot::Mark> orderMarks(const SpectrumCurve& s, int teeth) {
   return marks;
 }
 
-// The largest line before, and what remains of it.
+// The largest line before, and the same after.
 std::string largestLine(const SpectrumCurve& s) {
   const auto largest = std::max_element(s.before.begin(), s.before.end());
   if (largest == s.before.end()) return "";
   const auto k = static_cast<std::size_t>(largest - s.before.begin());
   const ChannelWords words = channelWords(s.channel);
+  const double order = s.order_hz > 0.0 ? s.frequency_hz[k] / s.order_hz : 0.0;
   return words.title + " in " + escapedHtml(s.test) + ": " + words.text(s.before[k]) + " at " +
          formatted("%.4g Hz", s.frequency_hz[k]) +
-         (s.order_hz > 0.0 ? formatted(" (%.3g times per revolution)", s.frequency_hz[k] / s.order_hz) : "") +
-         ", " + words.text(s.after[k]) + " with the corrected model";
+         (order == 0.0  ? ""
+          : order < 0.5 ? ", slower than the spindle"
+                        : formatted(", %.3g times per revolution", order)) +
+         "; with the corrected model " + words.text(s.after[k]);
+}
+
+// What the models lack in the forces of each cut, over the cutting time of the edge.
+void wear(ReportPage& page, const Explanation& e) {
+  if (std::none_of(e.effects.begin(), e.effects.end(),
+                   [](const FoundEffect& f) { return f.name == "tool_wear"; }))
+    return;
+  PagePlot::Curve before{"supplied model", SUPPLIED_COLOUR, true, {}, {}},
+      after{"corrected model", CORRECTED_COLOUR, true, {}, {}};
+  for (const ReportedTest& t : e.tests) {
+    if (t.test.kind != TestKind::cut || !t.test.cut_time_before) continue;
+    double supplied = 0.0, corrected = 0.0;  // [N2]
+    for (const TestGap& g : e.gaps) {
+      const auto& forces = FORCE_CHANNELS;
+      if (g.test != t.test.name || std::find(forces.begin(), forces.end(), g.channel) == forces.end())
+        continue;
+      supplied += std::pow(g.before * e.noise.at(g.channel), 2);
+      corrected += std::pow(g.after * e.noise.at(g.channel), 2);
+    }
+    for (PagePlot::Curve* curve : {&before, &after}) curve->x.push_back(*t.test.cut_time_before / 60.0);
+    before.y.push_back(std::sqrt(supplied));
+    after.y.push_back(std::sqrt(corrected));
+  }
+  page.html()
+      << "<h2>Wear over the cutting time</h2>\n<p>Force that a model lacks in each cut, RMS of fx, fy and fz "
+         "together. With wear it grows with the cutting time of the edge and with the depth of the "
+         "cut.</p>\n<div class=\"plots\">\n";
+  page.plot({"difference of the forces",
+             "cutting time of the edge before the cut [min]",
+             "difference [N]",
+             false,
+             {before, after}});
+  page.html() << "</div>\n";
 }
 
 void spectra(ReportPage& page, const Explanation& e) {
   if (e.spectra.empty()) return;
   std::vector<std::string> lines;
   for (const SpectrumCurve& s : e.spectra) lines.push_back(largestLine(s));
-  page.html() << "<h2>Spectra of the difference</h2>\n<p>Largest lines: " << joined(lines, "; ")
-              << ".</p>\n<p class=\"dim\">Dashed: once per revolution (1x) and the tooth passing with its "
-                 "multiples.</p>\n"
-                 "<div class=\"plots\">\n";
+  page.html()
+      << "<h2>Spectra of the difference</h2>\n<p>Largest lines:</p>\n<ul><li>" << joined(lines, "</li><li>")
+      << "</li></ul>\n<p class=\"dim\">Dashed: once per revolution (1x) and the tooth passing with its "
+         "multiples.</p>\n"
+         "<div class=\"plots\">\n";
   for (const SpectrumCurve& s : e.spectra)
     page.plot({channelWords(s.channel).title + ", " + s.test,
                "frequency [Hz]",
@@ -619,8 +726,8 @@ void cells(std::ostream& out, const Explanation& e) {
 
 void candidates(std::ostream& out, const Explanation& e) {
   if (!e.candidates.empty()) {
-    out << "<h2>Causes that were compared by a fit</h2>\n<table><tr><th>round<th>cause<th>effect on the fit, "
-           "of the best "
+    out << "<h2>Causes that were compared by a fit</h2>\n<table><tr><th>round<th>cause<th>explains, of the "
+           "best "
            "of its round<th>accepted</tr>\n";
     for (const CandidateResult& t : e.candidates) {
       double best = 0.0;
@@ -634,10 +741,6 @@ void candidates(std::ostream& out, const Explanation& e) {
     }
     out << "</table>\n";
   }
-  for (const Resemblance& r : e.resembles)
-    out << "<p>Not named: " << namedCause(r.name)
-        << (r.variant.empty() ? "" : " (" + escapedHtml(r.variant) + ")") << ", " << escapedHtml(r.reason)
-        << ".</p>\n";
   if (e.not_tried.empty()) return;
   out << "<h2>Causes that were not checked</h2>\n<ul>";
   for (const std::string& name : e.not_tried) out << "<li>" << namedCause(name) << "</li>";
@@ -696,6 +799,7 @@ void writeHtml(const Explanation& e, const std::string& campaign, const std::str
   std::ostream& out = page.html();
   head(out, e);
   causes(out, e);
+  notNamed(out, e);
   values(out, "Values of the supplied model that are wrong", e.recalibrated);
   actions(out, e, from, to);
   nextTest(out, e, from, to);
@@ -705,6 +809,7 @@ void writeHtml(const Explanation& e, const std::string& campaign, const std::str
   tests(out, e);
   quality(out, e);
   revolutions(page, e);
+  wear(page, e);
   spectra(page, e);
   appendix(out, e);
   page.write(folder + "/report.html");

@@ -26,7 +26,7 @@ Quantities ofRunout(const Parameters& p, const ShopConditions&) {
   const FoundParameter& offset = find(p, "offset_um");
   const double factor = 2.0 * units::UM / units::MM;
   return {
-      {"a dial indicator on the turning tool reads", factor * offset.value, factor * offset.std_dev, "mm"}};
+      {"a dial indicator on the turning shank reads", factor * offset.value, factor * offset.std_dev, "mm"}};
 }
 
 Quantities ofUnbalance(const Parameters& p, const ShopConditions& conditions) {
@@ -44,12 +44,10 @@ Quantities ofWear(const Parameters& p, const ShopConditions& conditions) {
   const double minutes = conditions.cutting_time / 60.0;
   Quantities all;
   if (minutes > 0.0)
-    all.push_back(
-        {formatted("edge force after the last cut (%.1f min of cutting), times that of the sharp edge",
-                   minutes),
-         1.0 + growth.value * minutes, growth.std_dev * minutes, "1"});
+    all.push_back({formatted("edge force after the last cut (%.1f min of cutting)", minutes),
+                   1.0 + growth.value * minutes, growth.std_dev * minutes, "times that of a sharp edge"});
   if (growth.value > 0.0)
-    all.push_back({"cutting time in which the edge force grows by that of the sharp edge", 1.0 / growth.value,
+    all.push_back({"cutting time in which the edge force of a sharp edge doubles", 1.0 / growth.value,
                    growth.std_dev / (growth.value * growth.value), "min"});
   return all;
 }

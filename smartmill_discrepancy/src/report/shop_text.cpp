@@ -10,19 +10,29 @@
 namespace smartmill::discrepancy {
 namespace {
 
-// Channels with their differences in units, the largest over the noise first.
-std::string largestDifferences(const Explanation& e, bool corrected, std::size_t count) {
+// Of the first digit, after rounding to three.
+int magnitudeOf(double value) {
+  return value == 0.0 ? 0 : static_cast<int>(std::floor(std::log10(std::abs(value) * 1.0005)));
+}
+
+// Channels of the supplied model that differ by more than the noise, the largest over the noise first.
+std::string largestDifferences(const Explanation& e) {
+  constexpr double MORE_THAN_NOISE = 1.2;
+  constexpr std::size_t MOST = 3;
   std::vector<std::pair<double, std::string>> channels;
   for (const auto& [channel, noise] : e.noise) {
     const double difference =
-        differenceOf(e.gaps, corrected, [&c = channel](const TestGap& g) { return g.channel == c; });
+        differenceOf(e.gaps, false, [&c = channel](const TestGap& g) { return g.channel == c; });
     const ChannelWords words = channelWords(channel);
-    channels.emplace_back(difference, words.title + " " + words.text(difference * noise));
+    if (difference > MORE_THAN_NOISE)
+      channels.emplace_back(difference, words.title + " " + words.text(difference * noise) +
+                                            " with a noise of " + words.text(noise));
   }
   std::sort(channels.rbegin(), channels.rend());
-  std::vector<std::string> texts;
-  for (std::size_t k = 0; k < std::min(count, channels.size()); ++k) texts.push_back(channels[k].second);
-  return joined(texts);
+  std::string text;
+  for (std::size_t k = 0; k < std::min(MOST, channels.size()); ++k)
+    text += (k ? ", " : " (") + channels[k].second;
+  return text.empty() ? "" : text + "; RMS over the tests)";
 }
 
 std::string causesOf(const Explanation& e) {
@@ -34,7 +44,8 @@ std::string causesOf(const Explanation& e) {
 }  // namespace
 
 std::string shortText(double value) {
-  return formatted(std::abs(value) < 999.5 ? std::abs(value) < 1e-3 ? "%.1e" : "%.3g" : "%.0f", value);
+  constexpr int DIGITS = 3, MOST_DECIMALS = 6;
+  return formatted("%.*f", std::clamp(DIGITS - 1 - magnitudeOf(value), 0, MOST_DECIMALS), value);
 }
 
 std::string intervalText(double value, double std_dev) {
@@ -42,10 +53,7 @@ std::string intervalText(double value, double std_dev) {
   constexpr int DIGITS = 4;  // significant ones at most
   if (std_dev <= 0.0 || !std::isfinite(std_dev)) return shortText(value);
   const double half = SIDES * std_dev;
-  const auto magnitude = [](double v) {
-    return v == 0.0 ? 0 : static_cast<int>(std::floor(std::log10(std::abs(v))));
-  };
-  const int decimals = std::clamp(std::min(1 - magnitude(half), DIGITS - 1 - magnitude(value)), 0, 9);
+  const int decimals = std::clamp(std::min(1 - magnitudeOf(half), DIGITS - 1 - magnitudeOf(value)), 0, 9);
   const double step = std::pow(10.0, -decimals);
   return formatted("%.*f", decimals, value) + " &plusmn; " +
          (half < 0.5 * step ? "less than " + formatted("%.*f", decimals, step)
@@ -71,7 +79,7 @@ std::string causeTitle(const std::string& effect) {
   if (!kind.empirical()) return kind.title;
   std::string form = kind.form;
   std::replace(form.begin(), form.end(), '_', ' ');
-  return "a cause without a name in the catalogue (" + form + ")";
+  return "an effect without a name in the catalogue (" + form + ")";
 }
 
 std::string causeWithRivals(const Explanation& e, const std::string& effect) {
@@ -121,14 +129,13 @@ std::string verdictText(const Explanation& e) {
         "Measurement and simulation agree: they differ by %.2f times the noise. Nothing is missing "
         "in the supplied model.",
         e.before.fit);
-  std::string text = formatted(
-      "Measurement and simulation with the supplied model differ by %s times the noise "
-      "(%s, RMS over the tests). ",
-      shortText(e.before.fit).c_str(), largestDifferences(e, false, 3).c_str());
+  std::string text =
+      formatted("Measurement and simulation with the supplied model differ by %s times the noise%s. ",
+                shortText(e.before.fit).c_str(), largestDifferences(e).c_str());
   if (e.verdict == Verdict::recalibrated)
     text += "No cause is missing: some values of the supplied model are wrong. ";
   else if (e.effects.empty())
-    text += "None of the causes checked explains this. ";
+    text += "None of the causes that were checked explains this. ";
   else
     text += (e.effects.size() > 1 ? "Causes: " : "Cause: ") + causesOf(e) + ". ";
   text += formatted("With the corrected model the difference is %.2f times the noise", e.after.fit);

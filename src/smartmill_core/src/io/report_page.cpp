@@ -175,10 +175,13 @@ for (const box of document.querySelectorAll('.plot')) {
     }
     element(svg, 'text', { x: (L + W - R) / 2, y: H - 6, 'text-anchor': 'middle' }, data.x_label);
     element(svg, 'text', { transform: `translate(13 ${(H - B + T) / 2}) rotate(-90)`, 'text-anchor': 'middle' }, data.y_label);
+    let free = 0;  // right of the last text
     for (const mark of data.marks ?? []) {
       if (mark.x < view.x0 || mark.x > view.x1) continue;
       element(svg, 'line', { x1: px(mark.x), x2: px(mark.x), y1: T, y2: H - B, stroke: 'var(--dim)', 'stroke-dasharray': '3 3' });
+      if (px(mark.x) < free) continue;
       element(svg, 'text', { x: px(mark.x) + 3, y: T + 11 }, mark.text);
+      free = px(mark.x) + 24;
     }
     const inside = element(svg, 'svg', { x: L, y: T, width: W - L - R, height: H - B - T, viewBox: `${L} ${T} ${W - L - R} ${H - B - T}` });
     for (const curve of data.curves) {
