@@ -527,7 +527,7 @@ std::string vibrationText(const Explanation& e) {
 
 void quality(std::ostream& out, const Explanation& e) {
   std::vector<std::string> lines;
-  lines.push_back("Search: " + searchText(e) + formatted(" It took %.0f s", e.seconds) +
+  lines.push_back(searchText(e) + formatted(" It took %.0f s", e.seconds) +
                   (e.spent_budget
                        ? formatted("; its stages were ended by the budget of %.0f s.", *e.spent_budget)
                        : std::string(".")) +

@@ -66,8 +66,8 @@ ChannelWords channelWords(const std::string& channel) {
       {"fy", {"force y", "N", 1.0}},
       {"fz", {"force z", "N", 1.0}},
       {"load_meter", {"spindle load meter", "mV", 1e3}},
-      {"tool_x", {"displacement of the tool tip in x", "&micro;m", 1e6}},
-      {"tool_y", {"displacement of the tool tip in y", "&micro;m", 1e6}},
+      {"tool_x", {"tool tip displacement x", "&micro;m", 1e6}},
+      {"tool_y", {"tool tip displacement y", "&micro;m", 1e6}},
       {"displacement", {"displacement", "&micro;m", 1e6}},
       {"acceleration", {"acceleration", "m/s&sup2;", 1.0}}};
   const auto found = WORDS.find(channel);
@@ -137,7 +137,7 @@ std::string verdictText(const Explanation& e) {
   else if (e.effects.empty())
     text += "None of the causes that were checked explains this. ";
   else
-    text += (e.effects.size() > 1 ? "Causes: " : "Cause: ") + causesOf(e) + ". ";
+    text += (e.effects.size() > 1 ? "Causes: <b>" : "Cause: <b>") + causesOf(e) + "</b>. ";
   text += formatted("With the corrected model the difference is %.2f times the noise", e.after.fit);
   if (e.after.heldout > 0.0) text += formatted(", in the held-out tests %.2f times", e.after.heldout);
   text += ". ";

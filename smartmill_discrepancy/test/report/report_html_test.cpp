@@ -69,7 +69,7 @@ void expectContains(const std::string& page, const std::string& part) {
 TEST(ReportHtml, NamesCauseAndRivalWithTheirSizes) {
   const std::string page = pageOf(runoutOrTeeth());
   expectContains(page, "Measurement and simulation: mill&lt;2&gt;");
-  expectContains(page, "Cause: tool axis off centre or teeth of unequal radius. ");
+  expectContains(page, "Cause: <b>tool axis off centre or teeth of unequal radius</b>. ");
   expectContains(page, "a dial indicator on the turning shank reads <b>0.0400 &plusmn; 0.0020 mm</b>");
   expectContains(
       page,
