@@ -23,6 +23,8 @@ namespace {
 
 /// [1] of the remaining difference: smaller components are not listed.
 constexpr double LEAST_SHARE = 0.01;
+/// In a note on an effect of the catalogue that the records cannot show, between its name and the reason.
+const std::string NOT_TESTED = " is not tested: ";
 /// [1] Difference, times the noise, up to which only noise remains.
 constexpr double ONLY_NOISE = 1.01;
 
@@ -74,6 +76,11 @@ bool hasRivals(const Explanation& e, const std::string& effect) {
 std::size_t heldoutTests(const Explanation& e) {
   return static_cast<std::size_t>(
       std::count_if(e.tests.begin(), e.tests.end(), [](const ReportedTest& t) { return t.heldout; }));
+}
+
+void list(std::ostream& out, const char* title, const std::vector<std::string>& items) {
+  if (!items.empty())
+    out << "<h2>" << title << "</h2>\n<ul><li>" << joined(items, "</li><li>") << "</li></ul>\n";
 }
 
 void head(std::ostream& out, const Explanation& e) {
@@ -262,7 +269,7 @@ std::string searchCommand(const std::string& campaign, const std::string& folder
 void nextTest(std::ostream& out, const Explanation& e, const std::string& campaign,
               const std::string& folder) {
   out << "<h2>Next test</h2>\n<p>";
-  if (e.suggested_cut) {
+  if (e.suggested_test && e.suggested_cut) {
     out << "Make this test: <b>" << cutText(*e.suggested_cut) << "</b>";
     if (e.outcome) out << formatted("; %.2g s in the cut are enough", e.outcome->duration);
     out << ". ";
@@ -397,7 +404,8 @@ std::string placeText(const Finding& f, int teeth) {
   if (f.domain == "order") {
     const double order = f.location.at("order");
     const bool at_teeth = teeth > 1 && std::abs(std::remainder(order, teeth)) < 1e-6;
-    return formatted("%.4g times per revolution", order) +
+    return (order == 1.0 ? std::string("once per revolution")
+                         : formatted("%.4g times per revolution", order)) +
            (!at_teeth        ? ""
             : order == teeth ? " (the tooth passing)"
                              : formatted(" (%.0f times the tooth passing)", order / teeth));
@@ -411,7 +419,7 @@ std::string placeText(const Finding& f, int teeth) {
 
 std::string findingText(const Finding& f, int teeth) {
   const ChannelWords words = channelWords(f.channel);
-  return words.title + ", " + words.text(f.amplitude) + " " + placeText(f, teeth);
+  return words.title + ", " + words.text(f.amplitude) + ", " + placeText(f, teeth);
 }
 
 void findings(std::ostream& out, const std::vector<std::pair<double, const Finding*>>& list,
@@ -546,10 +554,10 @@ void quality(std::ostream& out, const Explanation& e) {
   for (const std::string& note : e.notes) {
     if (note.find("are recorded") != std::string::npos) shifts += " " + escapedHtml(note) + ".";
   }
-  lines.push_back("Signals: none is clipped (a clipped record is refused)." +
-                  (shifts.empty()
-                       ? std::string(" No shift in time between force sensor and controller was corrected.")
-                       : shifts));
+  lines.push_back(
+      "Signals: no force and no displacement is clipped by the recorder (such records are refused)." +
+      (shifts.empty() ? std::string(" No shift in time between force sensor and controller was corrected.")
+                      : shifts));
   std::size_t beyond = 0;
   for (const RecalibratedValue& v : e.calibrated) beyond += std::abs(v.deviations) > 2.0;
   if (!e.calibrated.empty()) {
@@ -566,9 +574,7 @@ void quality(std::ostream& out, const Explanation& e) {
                       : formatted("%zu of %zu signals (tests times channels) are predicted worse by the "
                                   "corrected model; they are marked in the table of the tests.",
                                   worse, e.gaps.size()));
-  out << "<h2>Data and search</h2>\n<ul>";
-  for (const std::string& line : lines) out << "<li>" << line << "</li>";
-  out << "</ul>\n";
+  list(out, "Data and search", lines);
 }
 
 // ---- plots
@@ -741,10 +747,14 @@ void candidates(std::ostream& out, const Explanation& e) {
     }
     out << "</table>\n";
   }
-  if (e.not_tried.empty()) return;
-  out << "<h2>Causes that were not checked</h2>\n<ul>";
-  for (const std::string& name : e.not_tried) out << "<li>" << namedCause(name) << "</li>";
-  out << "</ul>\n";
+  std::vector<std::string> unchecked;
+  for (const std::string& name : e.not_tried) unchecked.push_back(namedCause(name));
+  for (const std::string& note : e.notes) {
+    if (const std::size_t end = note.find(NOT_TESTED); end != std::string::npos)
+      unchecked.push_back(namedCause(note.substr(0, end)) + ": these tests cannot show it, " +
+                          escapedHtml(note.substr(end + NOT_TESTED.size())));
+  }
+  list(out, "Causes that were not checked", unchecked);
 }
 
 void chattering(std::ostream& out, const std::vector<ChatteringCut>& cuts) {
@@ -777,11 +787,11 @@ void appendix(std::ostream& out, const Explanation& e) {
   }
   values(out, "Values of the model", e.calibrated);
   chattering(out, e.chattering);
-  if (!e.notes.empty()) {
-    out << "<h2>Notes</h2>\n<ul>";
-    for (const std::string& note : e.notes) out << "<li>" << escapedHtml(note) << "</li>";
-    out << "</ul>\n";
+  std::vector<std::string> notes;
+  for (const std::string& note : e.notes) {
+    if (note.find(NOT_TESTED) == std::string::npos) notes.push_back(escapedHtml(note));
   }
+  list(out, "Notes", notes);
   out << "<p class=\"dim\">Verdict in report.json: " << nameOf(e.verdict) << ".</p>\n</details>\n";
 }
 

@@ -103,11 +103,15 @@ TEST(ReportHtml, StatesWhetherTheSearchWasComplete) {
   expectContains(pageOf(e), "All 30 causes that these tests can show were checked.");
   e.not_tried = {"helix", "feed_error"};
   e.spent_budget = 60.0;
+  e.notes = {"process_damping is not tested: the model's tool is rigid", "fp is not simulated"};
   const std::string page = pageOf(e);
   expectContains(page, "28 of 30 causes that these tests can show were checked");
   expectContains(page, "smartmill explain /data/mill&lt;2&gt; -o ");
   expectContains(page, " --budget 0");
   expectContains(page, "<li><b>other helix angle of the tool</b> <span class=\"dim\">(helix)</span></li>");
+  expectContains(page,
+                 "(process_damping)</span>: these tests cannot show it, the model's tool is rigid</li>");
+  expectContains(page, "<h2>Notes</h2>\n<ul><li>fp is not simulated</li></ul>");
 }
 
 // The largest first, and none below one percent of what remains.
@@ -127,10 +131,10 @@ TEST(ReportHtml, ListsTheLargestRemainderFirst) {
   e.unexplained = {finding(1.0, 200.0), finding(3.0, 600.0), finding(8.0, 15000.0)};
   const std::string page = pageOf(e);
   expectContains(page,
-                 "Its largest part: force x, 8.00 N 8 times per revolution (2 times the tooth passing).");
+                 "Its largest part: force x, 8.00 N, 8 times per revolution (2 times the tooth passing).");
   expectContains(page, "<td>50 %");
   expectContains(page, "<td>2 %");
-  EXPECT_EQ(page.find("1 times per revolution"), std::string::npos);
+  EXPECT_EQ(page.find("once per revolution"), std::string::npos);
 }
 
 TEST(ReportHtml, AgreementNeedsNoCause) {

@@ -52,7 +52,7 @@ pre { background: var(--raised); border-radius: 8px; padding: 8px 12px; margin: 
 .level1 { background: #fdd49e; color: #131a21; } .level2 { background: #fc8d59; color: #131a21; }
 .level3 { background: #d7301f; color: #ffffff; } .level4 { background: #7f0000; color: #ffffff; }
 td[class*=level] { padding-left: 6px; border-left: 2px solid var(--card); }
-.plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(440px, 100%), 1fr)); gap: 10px; }
+.plots { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(440px, 100%), 1fr)); gap: 10px; }
 .plot { background: var(--card); border-radius: 12px; padding: 8px 10px; break-inside: avoid; }
 .plot h3 { font-size: 15px; font-weight: 500; margin: 0 0 4px; }
 .plot svg { width: 100%; height: auto; display: block; touch-action: none; cursor: crosshair; }
