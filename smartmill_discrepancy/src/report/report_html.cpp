@@ -281,10 +281,11 @@ void nextTest(std::ostream& out, const Explanation& e, const std::string& campai
     out << "First complete the search (see What to do now); then the report states whether a test is "
            "needed.</p>";
   } else if (e.unexplained.empty() || e.named_only) {
-    out << (e.named_only ? "No cut is known that shows the source of what has no name."
-                         : "No further test is needed: no difference beyond the noise remains, and no other "
-                           "cause that was checked does the same.")
-        << "</p>";
+    out << (e.named_only ? "No cut is known that shows the source of what has no name.</p>"
+            : e.effects.empty()
+                ? "No further test is needed: no difference beyond the noise remains.</p>"
+                : "No further test is needed: no difference beyond the noise remains, and no other "
+                  "cause that was checked does the same.</p>");
   } else {
     out << "No single cut decides what the remainder is. Its signal, place and dependence are listed "
            "below.</p>";
