@@ -10,8 +10,8 @@
 
 namespace smartmill::studies {
 
-/// What a client knows about its pushes: records [first, last) of its machine were sent, or were
-/// acknowledged. Sent records that were not acknowledged are unknown to it: the server has them or not.
+/// Line of a client's log about its pushes: records [first, last) of its machine were sent, or were
+/// acknowledged. Sent records that were not acknowledged may be stored or not.
 struct PushEvent {
   enum class Kind : std::uint8_t { attempted, acknowledged };
   Kind kind = Kind::attempted;
@@ -27,7 +27,7 @@ loadmeter::CoefficientRecord recordOf(const std::string& machine, std::size_t nu
 /// was cut off by a kill is left out. @throws Error naming another line.
 std::vector<PushEvent> readPushEvents(const std::string& file);
 
-/// Compares the server's records with what the clients know. @return a line for each acknowledged record that
+/// Compares the server's records with the logs of the clients. @return a line for each acknowledged record that
 /// is not there, record that is there twice, that no client has sent, or with another content
 std::vector<std::string> violationsOf(const PushHistory& history,
                                       const std::vector<loadmeter::CoefficientRecord>& server);

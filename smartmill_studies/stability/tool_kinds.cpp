@@ -23,7 +23,8 @@ std::vector<double> radians(const std::vector<double>& deg) {
   return values;
 }
 
-RegenerativeSystem systemOfKind(const MachineModel& model, const ToolKind& kind, const ToolKindOptions& options) {
+RegenerativeSystem systemOfKind(const MachineModel& model, const ToolKind& kind,
+                                const ToolKindOptions& options) {
   RegenerativeSystem system = systemOf(model, options.entry_deg, options.exit_deg);
   if (kind.unlike_chips) {
     system.chip.emplace();
@@ -53,8 +54,8 @@ std::vector<ToolKind> toolKinds(const ToolGeometry& straight) {
   helix.name = "variable helix";
   helix.tool.setHelix(radians({25.0, 35.0, 25.0, 35.0}));
   serrated.name = "serrated";
-  serrated.tool.edge.serration_amplitude = 0.3e-3;
-  serrated.tool.edge.serration_wavelength = 2e-3;
+  serrated.tool.edge.serration_amplitude = 0.6e-3;
+  serrated.tool.edge.serration_wavelength = 3e-3;
   pitch.unlike_chips = helix.unlike_chips = serrated.unlike_chips = true;
   return {plain, bull, ball, face, pitch, helix, serrated};
 }

@@ -27,6 +27,7 @@ struct ToolKindOptions : StudyRange {
   double reach = 0.10;   ///< [1] largest distance of a cut from the limit, over the limit
   double within = 0.03;  ///< [1] distance of a cut from the limit that counts as right on either side
   double feed = 0.1e-3;  ///< [m] per tooth
+                         ///< below the limit
   int points = 60;
   int revolutions = 400;  ///< [1] in cut
 };

@@ -102,7 +102,7 @@ SetupNode::SetupNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
       calibrate_(nh.advertiseService(names::CALIBRATE_CHANNEL, &SetupNode::calibrate, this)) {
 }
 
-bool SetupNode::tryInstrument(TryInstrument::Request& request, TryInstrument::Response& response) {
+bool SetupNode::tryInstrument(smartmill_msgs::TryInstrument::Request& request, TryResponse& response) {
   try {
     response.code = TryResponse::BAD_DESCRIPTION;
     if (!request.description.empty()) {
@@ -130,7 +130,7 @@ bool SetupNode::tryInstrument(TryInstrument::Request& request, TryInstrument::Re
   return true;
 }
 
-bool SetupNode::calibrate(CalibrateChannel::Request& request, CalibrateChannel::Response& response) {
+bool SetupNode::calibrate(CalibrateRequest& request, CalibrateResponse& response) {
   response.sensitivity = response.sensitivity_std = response.before = NOT_A_NUMBER;
   try {
     const std::optional<NewSensitivity> found = resultOf(setup_, request);

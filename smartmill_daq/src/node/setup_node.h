@@ -20,11 +20,10 @@ class SetupNode {
   SetupNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh);
 
  private:
-  using TryInstrument = smartmill_msgs::TryInstrument;
-  using CalibrateChannel = smartmill_msgs::CalibrateChannel;
-
-  bool tryInstrument(TryInstrument::Request& request, TryInstrument::Response& response);
-  bool calibrate(CalibrateChannel::Request& request, CalibrateChannel::Response& response);
+  bool tryInstrument(smartmill_msgs::TryInstrument::Request& request,
+                     smartmill_msgs::TryInstrument::Response& response);
+  bool calibrate(smartmill_msgs::CalibrateChannel::Request& request,
+                 smartmill_msgs::CalibrateChannel::Response& response);
 
   InstrumentSetup setup_;
   ros::ServiceServer try_, calibrate_;

@@ -1,7 +1,6 @@
 #include "node/node.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <memory>
 #include <sstream>
@@ -13,6 +12,7 @@
 #include <smartmill_msgs/ProgramProgress.h>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/is_ready.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/signal/feed.h"
 #include "smartmill_core/units.h"
@@ -170,8 +170,7 @@ void ProgramNode::predict(const std::optional<CuttingCoefficients>& coefficients
 }
 
 void ProgramNode::readPredictions() {
-  if (!predictions_.valid() || predictions_.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
-    return;
+  if (!isReady(predictions_)) return;
   std::vector<PiecePrediction> predictions = predictions_.get();
   const auto predicted =
       std::count_if(predictions.begin(), predictions.end(),

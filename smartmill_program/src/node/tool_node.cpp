@@ -1,11 +1,11 @@
 #include "node/tool_node.h"
 
-#include <chrono>
 #include <cmath>
 
 #include <smartmill_msgs/ToolCondition.h>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/is_ready.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/signal/feed.h"
 #include "smartmill_ros/conversions.h"
@@ -131,7 +131,7 @@ void ToolNode::requestHold() {
 }
 
 void ToolNode::readAnswer() {
-  if (!answer_.valid() || answer_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
+  if (!isReady(answer_)) return;
   const smartmill_msgs::FeedHold::Response answer = answer_.get();
   const bool held = answer.code == smartmill_msgs::FeedHold::Response::OK;
   answered_ = held ? "held" : "refused: " + answer.message;

@@ -159,22 +159,23 @@ TEST(PathFollower, EachCutStatesTheTimeThatTheToolWasInTheWork) {
   controller.override_of = [](double time) { return time < 1004.0 ? 1.0 : 0.5; };
   controller.run(SHOULDER_WAYS);
   const double feed = 5.0, reach = std::sqrt(21.0);  // [mm/s], [mm]
-  std::vector<double> expected, stated;
+  std::vector<double> expected, stated, place;
   for (std::size_t i = 0; i < controller.conditions.size(); ++i) {
     const CuttingCondition& condition = controller.conditions[i];
     if (condition.kind != CuttingCondition::Kind::cut) continue;
     const double x = controller.places[i][0];
     stated.push_back(condition.cut_time_before);
+    place.push_back(x);
     if (condition.name == "part.nc line 6") expected.push_back((60.0 + reach - x) / feed);
     if (condition.name == "part.nc line 8") expected.push_back((60.0 + reach + reach + x) / feed);
   }
   ASSERT_EQ(stated.size(), expected.size() + 2);  // the slot before and after the change of the feed
-  // Of the slot the feed changed in its middle: what is left is the same in both steps.
+  // Of the slot the feed changed in its middle: its time is the same in both steps.
   const double slot = stated[2] - expected[0];
   EXPECT_NEAR(stated[3] - expected[1], slot, 0.1);
   EXPECT_GT(slot, 65.0 / 10.0);
   EXPECT_LT(slot, 65.0 / 5.0);
-  EXPECT_NEAR(stated[0], (controller.places[0][0] + 5.0) / 10.0, 0.1);
+  EXPECT_NEAR(stated[0], (place[0] + 5.0) / 10.0, 0.1);
 }
 
 TEST(PathFollower, AirIsStatedWithTheSpindleTurning) {

@@ -1,6 +1,7 @@
 #include "smartmill_stability/chart/chart_parameters.h"
 
 #include "smartmill_core/require.h"
+#include "smartmill_stability/chart/surface_error.h"
 
 namespace smartmill::stability {
 namespace {
@@ -27,6 +28,11 @@ void declarePoints(ChartParameters& p, ParameterTable& table) {
                "relative standard deviation of a radial coefficient that was not identified");
   table.number("load_share", p.load_share, "1", Range::openLow(0.0, 1.0),
                "largest fraction of the rated torque and power of the spindle");
+  table.number("surface_tolerance", p.surface_tolerance, "m", Range::notNegative(),
+               "largest surface location error of a recommended finishing cut on either side, with two "
+               "standard deviations; "
+               "requires modes, edge coefficients (kte, kre) and one wall (entry_angle 0 or exit_angle pi); "
+               "0: not limited");
   table.number("recommended", p.recommended, "1", Range::closed(0, 100),
                "largest number of recommended points, one for each pocket");
   table.number("unstable_factor", p.unstable_factor, "1",
@@ -76,6 +82,7 @@ void ChartParameters::validate() const {
   checkBounds(*this);
   require(exit > entry, "exit_angle", exit, "above entry_angle");
   require(speed_high == 0.0 || speed_high > speed_low, "speed_high", speed_high, "above speed_low, or 0");
+  if (surface_tolerance > 0.0) requireOneWall(entry, exit);
   require(frequency_high > frequency_low, "frequency_high", frequency_high, "above frequency_low");
 }
 

@@ -119,6 +119,11 @@ std::string MeasuredMachine::missing(const ChartParameters& parameters) const {
     }
   }
   need(coefficients_ && coefficients_->value.ktc > 0.0, "tangential coefficient");
+  if (parameters.surface_tolerance > 0.0) {
+    need(modes_.count("x") > 0 && modes_.count("y") > 0, "modes in x and y (surface_tolerance)");
+    need(coefficients_ && std::isfinite(coefficients_->value.kte + coefficients_->value.kre),
+         "edge coefficients (surface_tolerance)");
+  }
   return list;
 }
 

@@ -107,12 +107,16 @@ std::vector<double> Recommendation::depthShares(const std::vector<double>& speed
 void Recommendation::recommend(StabilityChart& chart) const {
   const std::vector<double>& speeds = chart.limit.spindle_speed;
   const std::vector<double> shares = depthShares(speeds);
+  const std::optional<SizeLimit> size = sizeLimit();
   std::vector<StabilityPoint> cuts, peaks;
   for (std::size_t k = 0; k < speeds.size(); ++k) {
     const double stable = around(wide_, k + static_cast<std::size_t>(extraSpeeds(parameters_)),
                                  parameters_.speed_margin, std::less<>());
-    const double depth = std::min({(1.0 - parameters_.depth_margin) * stable,
-                                   shares[k] * chart.limit.depth[k], permittedDepth(chart, k)});
+    double depth = std::min({(1.0 - parameters_.depth_margin) * stable, shares[k] * chart.limit.depth[k],
+                             permittedDepth(chart, k)});
+    const double least = RECOMMENDATION.least_depth * depth;
+    while (size && depth > 0.0 && !size->meanHolds(speeds[k], depth))
+      depth = RECOMMENDATION.reduction * depth > least ? RECOMMENDATION.reduction * depth : 0.0;
     cuts.push_back(load_.point(speeds[k], depth, chart.limit.depth[k], chart.limit.chatter_frequency[k]));
   }
   for (std::size_t k = 0; k < cuts.size(); ++k) {
@@ -124,21 +128,41 @@ void Recommendation::recommend(StabilityChart& chart) const {
   peaks = pick(peaks, static_cast<int>(peaks.size()), removesMore);
   for (StabilityPoint& best : peaks) best = farthestFromFlanks(chart.limit, cuts, best);
   peaks = pick(peaks, static_cast<int>(peaks.size()), removesMore);  // some may now coincide
-  chart.recommended = confirmed(std::move(peaks));
+  chart.recommended = confirmed(std::move(peaks), size ? &*size : nullptr);
 }
 
-/// The best of the peaks whose stability collocation confirms, since the zero-order solution misses flips. A
-/// rejected point is tried again at a smaller depth, in the order of the reduced removal rate.
-std::vector<StabilityPoint> Recommendation::confirmed(std::vector<StabilityPoint> peaks) const {
-  const std::optional<UncertainSystem> uncertain = machine_.uncertainSystem(cut_);
+RiskOptions Recommendation::riskOptions() const {
   RiskOptions options;
   options.risk = parameters_.risk;
   options.speed_margin = parameters_.speed_margin;
+  return options;
+}
+
+/// With edge forces and alike teeth; empty: size is not limited.
+std::optional<SizeLimit> Recommendation::sizeLimit() const {
+  if (parameters_.surface_tolerance == 0.0) return std::nullopt;
+  const std::optional<UncertainSystem> uncertain = machine_.uncertainSystem(cut_);
+  RegenerativeSystem system = uncertain->mean();
+  const CuttingCoefficients& cutting = machine_.coefficients().value;
+  system.chip.emplace();
+  system.chip->feed = parameters_.feed_per_tooth;
+  system.chip->kte = cutting.kte;
+  system.chip->kre = cutting.kre;
+  return SizeLimit(uncertain->about(system), parameters_.surface_tolerance, riskOptions());
+}
+
+/// The best of the peaks that make size and whose stability collocation confirms, since the zero-order
+/// solution misses flips. A rejected point is tried again at a smaller depth, in the order of the reduced
+/// removal rate.
+std::vector<StabilityPoint> Recommendation::confirmed(std::vector<StabilityPoint> peaks,
+                                                      const SizeLimit* size) const {
+  const std::optional<UncertainSystem> uncertain = machine_.uncertainSystem(cut_);
   std::optional<DrawnMachines> machines;
-  if (parameters_.risk > 0.0 && uncertain) machines.emplace(*uncertain, options);
+  if (parameters_.risk > 0.0 && uncertain) machines.emplace(*uncertain, riskOptions());
   const bool mean_known =
       machine_.byCollocation(parameters_);  // the limits of the chart are from collocation already
   const auto isStable = [&](const StabilityPoint& cut) {
+    if (size && !size->holds(cut.spindle_speed, cut.axial_depth)) return false;
     if (!machines) return true;
     const double depth = cut.axial_depth / (1.0 - parameters_.depth_margin);
     return (mean_known || machines->meanIsStable(cut.spindle_speed, depth)) &&

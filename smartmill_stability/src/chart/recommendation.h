@@ -1,7 +1,9 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
+#include "chart/size_limit.h"
 #include "chart/spindle_load.h"
 #include "smartmill_core/cutting/stability_chart.h"
 #include "smartmill_stability/chart/measured_machine.h"
@@ -45,7 +47,9 @@ class Recommendation {
  private:
   void recommend(StabilityChart& chart) const;
   void proposeUnstable(StabilityChart& chart) const;
-  std::vector<StabilityPoint> confirmed(std::vector<StabilityPoint> peaks) const;
+  std::vector<StabilityPoint> confirmed(std::vector<StabilityPoint> peaks, const SizeLimit* size) const;
+  std::optional<SizeLimit> sizeLimit() const;
+  RiskOptions riskOptions() const;
   std::vector<double> depthShares(const std::vector<double>& speeds) const;
   /// [m] Largest depth permitted by torque, power and max_depth at speed k.
   double permittedDepth(const StabilityChart& chart, std::size_t k) const;

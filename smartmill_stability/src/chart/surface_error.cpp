@@ -106,19 +106,23 @@ ChipGeometry finishingChip(const MachineModel& model, double feed) {
   return chip;
 }
 
+bool requireOneWall(double entry, double exit) {
+  const bool up = std::abs(entry) < WALL.same_angle, down = std::abs(exit - PI) < WALL.same_angle;
+  if (up == down)
+    throw Error(
+        formatted("surface error: entry %.2f deg, exit %.2f deg: expected one wall, by up-milling (entry "
+                  "0, exit below 180 deg) or down-milling (entry above 0, exit 180 deg)",
+                  units::degFromRad(entry), units::degFromRad(exit)));
+  return down;
+}
+
 WallPrediction::WallPrediction(const RegenerativeSystem& system) : system_(system) {
   system_.validate();
   if (system_.cut != Cut::milling || !system_.chip || system_.modes.empty())
     throw Error("surface error: expected milling with modes and a chip geometry");
   if (!(system_.diameter > 0.0)) throw Error("surface error: expected a tool diameter above 0");
   requireStraightEdge(system_.tool(), "for the surface location error");
-  const bool up = std::abs(system_.entry) < WALL.same_angle;
-  down_ = std::abs(system_.exit - PI) < WALL.same_angle;
-  if (up == down_)
-    throw Error(
-        formatted("surface error: entry %.2f deg, exit %.2f deg: expected one wall, by up-milling (entry "
-                  "0, exit below 180 deg) or down-milling (entry above 0, exit 180 deg)",
-                  units::degFromRad(system_.entry), units::degFromRad(system_.exit)));
+  down_ = requireOneWall(system_.entry, system_.exit);
   const ToolGeometry tool = system_.tool();
   lag_ = system_.helix > 0.0 ? tool.lag() : 0.0;
   const ChipRule rule(tool, system_.chip->radius_offset);
@@ -211,6 +215,16 @@ MachinedWall WallPrediction::at(double speed, double depth) const {
   return wall;
 }
 
+double errorStd(const std::vector<WallPrediction>& drawn, double speed, double depth) {
+  std::vector<double> least, most;
+  for (const WallPrediction& machine : drawn) {
+    const MachinedWall wall = machine.at(speed, depth);
+    least.push_back(wall.least);
+    most.push_back(wall.most);
+  }
+  return std::max(standardDeviation(least), standardDeviation(most));
+}
+
 SurfaceMap surfaceMap(const UncertainSystem& system, const std::vector<double>& speeds,
                       const std::vector<double>& depths, const SurfaceMapOptions& options,
                       const std::function<void(double)>& progress) {
@@ -242,13 +256,7 @@ SurfaceMap surfaceMap(const UncertainSystem& system, const std::vector<double>& 
     map.error_std.emplace_back();
     for (const double depth : depths) {
       map.wall.back().push_back(mean.at(speeds[s], depth));
-      std::vector<double> least, most;
-      for (const WallPrediction& machine : drawn) {
-        const MachinedWall wall = machine.at(speeds[s], depth);
-        least.push_back(wall.least);
-        most.push_back(wall.most);
-      }
-      map.error_std.back().push_back(std::max(standardDeviation(least), standardDeviation(most)));
+      map.error_std.back().push_back(errorStd(drawn, speeds[s], depth));
     }
     if (progress) progress((s + 1.0) / static_cast<double>(speeds.size()));
   }

@@ -29,9 +29,9 @@ constexpr double CONTROLLER_AGE = 2.0;  // [s]
 /// Whether a try is used in another way than before.
 bool differs(const SoundTry& a, const std::optional<SoundTry>& before) {
   constexpr double SAME = 0.005;  // [1] of speed and frequency
-  if (!before || before->kind != a.kind || !a.decides()) return true;
+  if (!before || before->kind != a.kind || before->chatters() != a.chatters() || !a.decides()) return true;
   return std::abs(before->speed / a.speed - 1.0) > SAME ||
-         (a.kind == Kind::chatter && std::abs(before->frequency / a.frequency - 1.0) > SAME);
+         (a.chatters() && std::abs(before->frequency / a.frequency - 1.0) > SAME);
 }
 
 }  // namespace

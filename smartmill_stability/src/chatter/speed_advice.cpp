@@ -73,8 +73,8 @@ SpeedAdvice adviseSpeeds(int teeth, const SpeedRange& range, const std::vector<S
   range.validate();
   SpeedAdvice advice;
   advice.used.assign(tries.size(), false);
-  const auto first = std::find_if(tries.begin(), tries.end(),
-                                  [](const SoundTry& t) { return t.decides() && t.kind == Kind::chatter; });
+  const auto first =
+      std::find_if(tries.begin(), tries.end(), [](const SoundTry& t) { return t.decides() && t.chatters(); });
   SpeedRange speeds = range;
   if (speeds.high == 0.0 && first != tries.end()) {
     speeds = {0.5 * first->speed, 2.0 * first->speed};

@@ -1,7 +1,6 @@
 #include "node/node.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include <smartmill_msgs/BistableChart.h>
@@ -11,6 +10,7 @@
 
 #include "node/wiring.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/is_ready.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/names.h"
 #include "smartmill_ros/node_main.h"
@@ -170,7 +170,7 @@ void StabilityNode::handle(const ChatterState& state) {
 void StabilityNode::override() {
   for (const std::string& note : control_.takeNotes()) ROS_WARN("%s", note.c_str());
   if (answer_.valid()) {
-    if (answer_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
+    if (!isReady(answer_)) return;
     const smartmill_msgs::SetOverrides::Response answer = answer_.get();
     control_.answer(answer.code == smartmill_msgs::SetOverrides::Response::OK, answer.message,
                     toSec(ros::Time::now()));
@@ -326,9 +326,7 @@ void StabilityNode::startBistable() {
 }
 
 void StabilityNode::publishBistable() {
-  if (!bistable_chart_.valid() ||
-      bistable_chart_.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
-    return;
+  if (!isReady(bistable_chart_)) return;
   bistable_problem_.clear();
   try {
     const std::optional<BistableChart> chart = bistable_chart_.get();

@@ -1,6 +1,5 @@
 #include "node/sound_node.h"
 
-#include <chrono>
 #include <cmath>
 
 #include <smartmill_msgs/CncState.h>
@@ -10,6 +9,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
+#include "smartmill_core/is_ready.h"
 #include "smartmill_core/units.h"
 #include "smartmill_ros/node_main.h"
 #include "smartmill_ros/parameter_server.h"
@@ -79,8 +79,7 @@ void SoundNode::work() {
   if (shell_.inputs().watchdog(parameters_.input).dead())
     listener_.stop(
         formatted("%s: no samples for %g s", parameters_.input.c_str(), parameters_.input_timeout));
-  if (outcome_.valid() && outcome_.wait_for(std::chrono::seconds(0)) == std::future_status::ready)
-    listener_.finish(outcome_.get());
+  if (isReady(outcome_)) listener_.finish(outcome_.get());
   if (!outcome_.valid())
     if (auto job = listener_.nextJob())
       outcome_ = std::async(std::launch::async, [job = std::move(*job)] { return job.run(); });

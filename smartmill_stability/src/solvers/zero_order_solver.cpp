@@ -70,8 +70,8 @@ class ZeroOrder : public StabilitySolver {
   StabilityLimit inclined(const std::vector<double>& speeds) const {
     constexpr int VALUES = 33;
     constexpr double GROWTH = 1.02;  // of the depth, from one sample to the next
-    const double shallow = system_.meanRadial(1e-3 * cornerHeight(system_.tool())),
-                 deep = system_.meanRadial(1e6);
+    const double corner = cornerHeight(system_.tool()), deep = system_.meanRadial(1e6);
+    const double shallow = corner > 0.0 ? system_.meanRadial(1e-3 * corner) : deep;
     const double low = std::min(shallow, deep), high = std::max(shallow, deep);
     std::vector<StabilityLimit> of;  // radial coefficients from low to high
     for (int i = 0; i < (high > low ? VALUES : 1); ++i)

@@ -9,6 +9,7 @@
 
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
+#include "smartmill_stability/chart/surface_error.h"
 #include "smartmill_stability_testing/benchmark.h"
 
 namespace smartmill::stability {
@@ -350,6 +351,58 @@ TEST(ChartMaker, aWeakSpindleLimitsTheRecommendedDepth) {
   for (const auto* points : {&chart.recommended, &chart.unstable}) {
     for (const StabilityPoint& point : *points) EXPECT_LE(point.torque, 0.8);
   }
+}
+
+/// Finishing down-milling, 1 mm wide, of the benchmark with edge coefficients.
+ChartMaker finishing(double tolerance) {
+  ChartParameters parameters = slot();
+  parameters.entry = std::acos(2.0 * 1e-3 / 20e-3 - 1.0);
+  parameters.exit = units::PI;
+  parameters.speed_low = units::radPerSecFromRpm(8000.0);
+  parameters.speed_high = units::radPerSecFromRpm(16000.0);
+  parameters.speeds = 161;
+  parameters.surface_tolerance = tolerance;
+  ChartMaker maker = fromModes(parameters, 0.01);
+  CoefficientSet identified = coefficients();
+  identified.value.krc = 2e8;
+  identified.value.kre = 1e4;
+  maker.handle(identified);
+  return maker;
+}
+
+// Walls by the solution that is compared with the time domain (surface_error_test), at the feed of the chart.
+TEST(ChartMaker, finishingCutsMakeSizeAtAllSpeedsOfTheMargin) {
+  const StabilityChart any = finishing(0.0).chart();
+  const auto worst = [&](const ChartMaker& maker, const StabilityPoint& cut) {
+    RegenerativeSystem system = *maker.system({});
+    system.chip.emplace();
+    system.chip->feed = ChartParameters().feed_per_tooth;
+    system.chip->kte = system.chip->kre = 1e4;
+    double error = 0.0;
+    for (const double side : {0.99, 1.0, 1.01})
+      error = std::max(error,
+                       std::abs(WallPrediction(system).at(side * cut.spindle_speed, cut.axial_depth).error));
+    return error;
+  };
+  double largest = 0.0;
+  for (const StabilityPoint& cut : any.recommended) largest = std::max(largest, worst(finishing(0.0), cut));
+  const double tolerance = 0.3 * largest;
+  const ChartMaker maker = finishing(tolerance);
+  const StabilityChart chart = maker.chart();
+  ASSERT_FALSE(chart.recommended.empty());
+  for (const StabilityPoint& cut : chart.recommended) EXPECT_LT(worst(maker, cut), tolerance);
+  EXPECT_LT(chart.recommended[0].material_removal_rate, any.recommended[0].material_removal_rate);
+  EXPECT_TRUE(finishing(1e-9).chart().recommended.empty());
+  EXPECT_EQ(chart.limit.depth, any.limit.depth);
+}
+
+TEST(ChartMaker, aToleranceOfTheSurfaceRequiresEdgeCoefficientsAndOneWall) {
+  ChartMaker maker = finishing(10e-6);
+  maker.handle(coefficients());
+  EXPECT_EQ(maker.missing(), "edge coefficients (surface_tolerance)");
+  ChartParameters both = slot();
+  both.surface_tolerance = 10e-6;
+  EXPECT_THROW(ChartMaker(both, machine()), Error);
 }
 
 TEST(ChartMaker, listsMissingInputs) {

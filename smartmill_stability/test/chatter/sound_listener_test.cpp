@@ -339,6 +339,23 @@ TEST(SoundListener, withoutTeethNothingIsJudged) {
   EXPECT_EQ(shop.lines.back(), "a cut was heard; it is judged when the number of teeth is set");
 }
 
+TEST(SpeedAdvice, anUnsureCutThatProbablyChattersIsUsed) {
+  SoundTry unsure;
+  unsure.speed = units::radPerSecFromRpm(RPM);
+  unsure.kind = Kind::unsure;
+  unsure.frequency = 873.0;
+  unsure.probability = 0.6;
+  SoundTry sure = unsure;
+  sure.kind = Kind::chatter;
+  const SpeedRange range{0.5 * unsure.speed, 2.0 * unsure.speed};
+  const SpeedAdvice advice = adviseSpeeds(TEETH, range, {unsure});
+  ASSERT_FALSE(advice.speeds.empty());
+  EXPECT_TRUE(advice.used[0]);
+  EXPECT_EQ(advice.speeds[0].speed, adviseSpeeds(TEETH, range, {sure}).speeds[0].speed);
+  unsure.probability = 0.4;
+  EXPECT_TRUE(adviseSpeeds(TEETH, range, {unsure}).speeds.empty());
+}
+
 TEST(SoundListener, refusesInvalidSettings) {
   SoundListener listener(parameters());
   const auto refused = [&](const CutSetting& setting) { EXPECT_THROW(listener.set(setting), Error); };

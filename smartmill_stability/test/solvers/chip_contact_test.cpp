@@ -90,6 +90,7 @@ int agreement(const RegenerativeSystem& system, const std::vector<double>& offse
   const auto solver = makeFloquetSolver(Method::collocation, solved);
   RegenerativeSystem bare = system;
   bare.chip.reset();
+  bare.edge.serration_amplitude = 0.0;
   const auto bare_solver = makeFloquetSolver(Method::collocation, bare);
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> unit;

@@ -1,5 +1,5 @@
-// Pushes to a fleet's server while clients and the server are killed and connections are cut: what the
-// clients know about each push is compared with the records of the server.
+// Pushes to a fleet's server while clients and the server are killed and connections are cut: the
+// logs of the clients are compared with the records of the server.
 #include <poll.h>
 #include <signal.h>
 #include <sys/socket.h>
@@ -305,9 +305,8 @@ bool run(const Options& options) {
 int main(int argc, char** argv) {
   Options o;
   CommandLine line(
-      "Pushes to a fleet's server while clients and server are killed and connections are cut; what the "
-      "clients "
-      "know is compared with what is stored.");
+      "Pushes to a fleet's server while clients and server are killed and connections are cut; the "
+      "logs of the clients are compared with the records of the server.");
   line.option("--rounds", o.rounds).showDefault().within(1, 100000);
   line.option("--records", o.records, "of each machine in a round").showDefault().within(1, 10000);
   line.option("--seed", o.seed).showDefault();

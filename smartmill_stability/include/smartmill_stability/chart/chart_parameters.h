@@ -29,6 +29,7 @@ struct ChartParameters {
   double risk = 0.05;
   double frequency_std = 0.01, gain_std = 0.05, radial_std = 0.3;
   double load_share = 0.9;
+  double surface_tolerance = 0.0;
   int recommended = 5;
   double unstable_factor = 1.75;
   int unstable = 5;

@@ -31,6 +31,10 @@ struct MachinedWall {
   double peak_to_valley = 0.0, mean_deviation = 0.0;
 };
 
+/// @throws Error unless an engagement generates one wall: entry 0 or exit pi [rad]. @return whether it is
+/// down-milling
+bool requireOneWall(double entry, double exit);
+
 /// The wall from the steady vibration of a stable cut. In a stable cut with alike teeth the regeneration
 /// cancels (u repeats with the tooth period), and the vibration is the response of the modes to the Fourier
 /// series of the force of a rigid tool; with unequal teeth it is the forced vibration with the contact of the
@@ -59,6 +63,9 @@ class WallPrediction {
   double lag_ = 0.0;                 // [rad/m]
   std::vector<double> tooth_angle_;  // [rad]
 };
+
+/// [m] Standard deviation of the surface location error over drawn machines.
+double errorStd(const std::vector<WallPrediction>& drawn, double speed, double depth);
 
 /// Walls over speeds and depths with standard deviations.
 struct SurfaceMap {

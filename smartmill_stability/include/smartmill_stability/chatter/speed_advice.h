@@ -38,7 +38,12 @@ struct SoundTry {
   /// Adds the verdict on a further part of the cut: it chatters if a part does; otherwise the probability is
   /// the mean of the parts. A part without a cut changes nothing if another one has signs of it.
   void add(const RecordingVerdict& part);
-  bool decides() const { return (kind == Kind::chatter || kind == Kind::stable) && std::isfinite(speed); }
+  /// Chatter, or unsure and more probable than not, with a frequency.
+  bool chatters() const {
+    return kind == Kind::chatter || (kind == Kind::unsure && probability >= 0.5 && std::isfinite(frequency));
+  }
+  /// Whether the search of speeds uses it.
+  bool decides() const { return (chatters() || kind == Kind::stable) && std::isfinite(speed); }
 };
 
 /// Speeds of the spindle [rad/s]; 0: half and twice the speed of the first cut that chatters.
